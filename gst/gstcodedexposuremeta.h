@@ -1,0 +1,42 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* What is known of one coded frame or subframe, as a GstCustomMeta. */
+#pragma once
+
+#include <optional>
+
+#include <gst/gst.h>
+
+namespace cexp::gst
+{
+
+/** Name of the custom meta, "CodedExposureFrame"; tagged {"video"}. Fields:
+ * docs/formats.md. */
+extern const char *const kFrameMetaName;
+
+struct FrameMeta {
+  /** Number of the coded frame since the start of the stream, lost frames
+   * counted. */
+  guint64 frame = 0;
+  /** Index of the subframe in its coded frame; -1 on a coded frame. */
+  gint subframe = -1;
+  /** Running PTS domain: start and length of the light of the coded frame, or
+   * of the slot. */
+  GstClockTime exposure_start = GST_CLOCK_TIME_NONE;
+  GstClockTime exposure_duration = GST_CLOCK_TIME_NONE;
+  /** The masks are known to be in phase with the exposure. */
+  gboolean locked = FALSE;
+  /** Slots by which the masks were found late (> 0) or early; 0 when locked. */
+  gint slip = 0;
+  /** Coded frames lost between this one and the one before. */
+  guint64 lost_before = 0;
+  /** Pixels at the largest value. */
+  guint64 saturated = 0;
+};
+
+/** Registers the meta; call once from plugin_init. */
+void register_frame_meta ();
+/** Writes @p meta to @p buffer, which must be writable, over what was there. */
+void set_frame_meta (GstBuffer *buffer, const FrameMeta &meta);
+std::optional<FrameMeta> get_frame_meta (GstBuffer *buffer);
+
+} // namespace cexp::gst

@@ -1,0 +1,25 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The stream tag that carries a schedule: GST_TAG_COMMENT =
+ * "coded-exposure={...}". */
+#pragma once
+
+#include <optional>
+
+#include <gst/gst.h>
+
+#include "base/result.h"
+#include "schedule/schedule.h"
+
+namespace cexp::gst
+{
+
+/** A tag list that says the schedule; Transfer: full. */
+GstTagList *schedule_to_tags (const Schedule &schedule);
+/** A TAG event that says the schedule; Transfer: full. */
+GstEvent *schedule_to_event (const Schedule &schedule);
+
+/** The schedule in @p tags: none where no comment speaks of one, an error
+ * where one does and cannot be read. */
+std::optional<Result<Schedule>> schedule_from_tags (const GstTagList *tags);
+
+} // namespace cexp::gst

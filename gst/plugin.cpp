@@ -1,0 +1,16 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The plugin: registers its elements, nothing else. */
+#include <gst/gst.h>
+
+#include "gstcodedexposuremeta.h"
+
+static gboolean
+plugin_init (GstPlugin *)
+{
+  cexp::gst::register_frame_meta ();
+  return TRUE;
+}
+
+GST_PLUGIN_DEFINE (GST_VERSION_MAJOR, GST_VERSION_MINOR, codedexposure,
+    "Per-pixel coded exposure: a fast camera from a slow one and a DMD",
+    plugin_init, PACKAGE_VERSION, "LGPL", PACKAGE, "gst-codedexposure")

@@ -1,0 +1,94 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* One coded frame in, n subframes out. */
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string_view>
+
+#include "base/image.h"
+#include "base/result.h"
+#include "schedule/schedule.h"
+
+namespace cexp
+{
+
+enum class Method {
+  kAuto,   ///< select for one-hot codes without leak, else decode, else rank
+  kRank,   ///< subframe k = k-th smallest of the group (paper, Section 3.3)
+  kSelect, ///< subframe k = the element that is open in slot k
+  kDecode, ///< solve the code for the light of each slot
+};
+
+/** "auto", "rank", "select" or "decode". */
+std::string_view method_name (Method method);
+Result<Method> parse_method (std::string_view name);
+
+/** How to extract; the zero value is the default everywhere. */
+struct ExtractOptions {
+  Method method = Method::kAuto;
+  /** Factor on the light of a slot (decode only); 0: white in a slot is white
+   * out, i.e. the code's largest number of open slots. */
+  double gain = 0.0;
+  /** Significant bits of a pixel, 1..8 or 1..16; 0: all that the type has. */
+  int bits = 0;
+  /** decode only: interpolate each element to the centre of the cell before
+   * the code is solved, where the tile is a raster. Off: solve with the pixels
+   * as they stand, at different places. */
+  bool interpolate = true;
+};
+
+/** What one coded frame was seen to hold. */
+struct ExtractReport {
+  /** Pixels of the cells that stand at the largest value: their light is
+   * unknown. */
+  std::uint64_t saturated = 0;
+};
+
+/**
+ * A plan to extract frames of one size and depth, made once per caps. run ()
+ * is const, may be called from several threads, and allocates nothing.
+ */
+template <typename Pixel> // std::uint8_t or std::uint16_t (host order)
+class Extractor
+{
+public:
+  /** Error when the method needs what the code has not (decode of a singular
+   * code, select of a code that is not one-hot when asked for by name is
+   * allowed: it shows exposures of different lengths), when a number is out of
+   * range, or when the frame holds no cell. */
+  static Result<Extractor> make (const Schedule &schedule, int width,
+      int height, const ExtractOptions &options = {});
+
+  Extractor (Extractor &&) noexcept;
+  Extractor &operator= (Extractor &&) noexcept;
+  ~Extractor ();
+
+  /** The method in force, never kAuto. */
+  Method method () const;
+  /** The gain in force; 1 where it does not apply. */
+  double gain () const;
+  int subframes () const;
+  Extent subframe_size () const;
+
+  /**
+   * @p coded      width x height pixels.
+   * @p subframes  subframes () views of subframe_size (), in exposure order,
+   *               fully overwritten; none overlaps another or @p coded.
+   * Select and rank copy values; decode rounds to nearest and clamps to
+   * 0..2^bits - 1.
+   */
+  ExtractReport run (ImageView<const Pixel> coded,
+      std::span<const ImageView<Pixel>> subframes) const;
+
+private:
+  struct Plan;
+  explicit Extractor (std::unique_ptr<const Plan> plan);
+  std::unique_ptr<const Plan> plan_;
+};
+
+extern template class Extractor<std::uint8_t>;
+extern template class Extractor<std::uint16_t>;
+
+} // namespace cexp

@@ -1,0 +1,116 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Everything that was decided before the exposure, as one value. */
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/image.h"
+#include "base/result.h"
+#include "schedule/code.h"
+#include "schedule/tile.h"
+#include "schedule/timing.h"
+
+namespace cexp
+{
+
+/**
+ * Tile, code and timing of a coded exposure.
+ *
+ * The DMD driver renders masks from it, the simulator integrates light with
+ * it, the demultiplexer decodes with it, the recorder stores it.
+ *
+ * A pixel's label, its place in the tile, becomes its element, its row of the
+ * code, through the order. An immutable value: make () is the only way in, so
+ * that every schedule there is can be shown and decoded.
+ */
+class Schedule
+{
+public:
+  struct Parts {
+    Tile tile;
+    Code code;
+    Timing timing = {};
+    /** Element of each label, a permutation of 0..n-1; empty: the labels. */
+    std::vector<int> order = {};
+    /** Pixel (x, y) bears label tile.label (x + phase.x, y + phase.y). */
+    Offset phase = {};
+    /** Light of a mirror that is off, as a part of one that is on; [0, 0.5]. */
+    double leak = 0.0;
+    /** Rows at the bottom of the array that show the pilot (pilot.h) instead
+     * of the code; 0: no pilot. */
+    int pilot_rows = 0;
+
+    bool operator== (const Parts &) const = default;
+  };
+
+  /** sequential:2x2, which stands wherever nothing else is said. */
+  Schedule ();
+  /** Error when tile and code differ in n, the order is no permutation, the
+   * tile has no cell at this phase, or a number is out of its range. */
+  static Result<Schedule> make (Parts parts);
+
+  /**
+   * A preset "CODE:TILE[,key=value...]" with keys active, switching, readout,
+   * order, phase, leak and pilot; else the path of a JSON file (anything with
+   * a '/' or ending in ".json"). See docs/formats.md.
+   */
+  static Result<Schedule> parse (std::string_view preset_or_path);
+  static Result<Schedule> from_preset (std::string_view preset);
+  /** The strict, versioned text form; unknown keys are errors. */
+  static Result<Schedule> from_json (std::string_view json);
+  std::string to_json () const;
+  /** A preset that parses back to this schedule; for a tile or code that was
+   * written out, a description in the same manner that does not. */
+  std::string text () const;
+
+  const Tile &tile () const { return parts_.tile; }
+  const Code &code () const { return parts_.code; }
+  const Timing &timing () const { return parts_.timing; }
+  const std::vector<int> &order () const { return parts_.order; }
+  Offset phase () const { return parts_.phase; }
+  double leak () const { return parts_.leak; }
+  int pilot_rows () const { return parts_.pilot_rows; }
+
+  int elements () const { return parts_.tile.elements (); }
+  int slots () const { return parts_.code.slots (); }
+  /** The block of pixels that becomes one pixel of every subframe. Cells lie on
+   * the grid that starts at the coded frame's pixel (0, 0). */
+  Extent cell () const { return cell_; }
+
+  /** Element of the pixel (x, y), pilot or not. */
+  int element_at (int x, int y) const
+  {
+    const int label =
+        parts_.tile.label (x + parts_.phase.x, y + parts_.phase.y);
+    return parts_.order[std::size_t (label)];
+  }
+
+  /** Masks in one period of what the DMD shows: N, or 2 N with a pilot. */
+  int masks () const { return slots () * (parts_.pilot_rows > 0 ? 2 : 1); }
+
+  bool operator== (const Schedule &other) const
+  {
+    return parts_ == other.parts_;
+  }
+
+private:
+  Schedule (Parts parts, Extent cell);
+
+  Parts parts_;
+  Extent cell_;
+};
+
+/**
+ * The mirrors of one mask.
+ *
+ * @p mask  index in 0..masks () - 1; mask s + N (frame mod 2) belongs to slot
+ *          s where a pilot makes two frames differ.
+ * @p out   one byte a mirror, 1 on and 0 off; any size.
+ */
+void render_mask (
+    const Schedule &schedule, int mask, ImageView<std::uint8_t> out);
+
+} // namespace cexp

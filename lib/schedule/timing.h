@@ -1,0 +1,79 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* How the slots lie in a frame period, in integer nanoseconds. */
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "base/result.h"
+
+namespace cexp
+{
+
+using Nanoseconds = std::int64_t;
+
+/** Frames per second as the exact fraction that caps carry; both > 0. */
+struct FrameRate {
+  int num = 25;
+  int den = 1;
+
+  /** floor ((index + part / parts) frame periods): the start of slot @p part
+   * of frame @p index. Exact, however large the index; 0 <= part <= parts. */
+  Nanoseconds time_of (
+      std::int64_t index, int part = 0, int parts = 1) const;
+  /** One frame period, rounded down. */
+  Nanoseconds period () const { return time_of (1); }
+  bool operator== (const FrameRate &) const = default;
+};
+
+/**
+ * What a schedule fixes of its slots. The frame period belongs to the camera
+ * and comes with the caps; fit () joins the two.
+ */
+struct Timing {
+  /** Time for which a mask is shown, t_i; 0: all that the frame period leaves,
+   * in equal slots. */
+  Nanoseconds active = 0;
+  /** Time between two masks in which the mirrors move, t_r. */
+  Nanoseconds switching = 0;
+  /** Time at the end of the frame in which the camera is blind. */
+  Nanoseconds readout = 0;
+
+  bool operator== (const Timing &) const = default;
+};
+
+/** The slots of one frame: slot s is open in [start (s), start (s) + active),
+ * counted from the start of the exposure. */
+class SlotPlan
+{
+public:
+  /**
+   * Paper, Eq. 8: frame period = N t_i + dt, where dt holds the N t_r of
+   * switching and the readout. Error with the numbers when the slots do not
+   * fit the frame period or nothing of it is left for light.
+   */
+  static Result<SlotPlan> fit (const Timing &timing, int slots, FrameRate rate);
+
+  int slots () const { return slots_; }
+  Nanoseconds frame_period () const { return period_; }
+  Nanoseconds active () const { return active_; }
+  Nanoseconds start (int slot) const;
+  /** End of the last slot's light. */
+  Nanoseconds exposure () const { return start (slots_ - 1) + active_; }
+
+private:
+  int slots_ = 1;
+  Nanoseconds period_ = 0;
+  Nanoseconds active_ = 0;
+  /** Slots start at floor (s * span_ / slots_). */
+  Nanoseconds span_ = 0;
+};
+
+/** "9.8ms", "200us", "105000ns", "0.04s" or "0": a non-negative time below an
+ * hour. The unit may only be left out for 0. */
+Result<Nanoseconds> parse_time (std::string_view text);
+/** The shortest such text that parses back to @p time. */
+std::string time_text (Nanoseconds time);
+
+} // namespace cexp

@@ -1,0 +1,16 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* main () of the element tests. */
+#include <gst/gst.h>
+#include <gtest/gtest.h>
+
+int
+main (int argc, char **argv)
+{
+  /* A forked registry scanner cannot load the plugin of a sanitizer build. */
+  gst_registry_fork_set_enabled (FALSE);
+  gst_init (&argc, &argv);
+  ::testing::InitGoogleTest (&argc, argv);
+  const int failed = RUN_ALL_TESTS ();
+  gst_deinit ();
+  return failed;
+}

@@ -9,9 +9,9 @@
 
 /** Template of every pad of the plugin: GRAY8 and GRAY16_LE at any size and
  * rate. */
-#define CODED_EXPOSURE_VIDEO_CAPS                                             \
-  "video/x-raw, format = (string) { GRAY8, GRAY16_LE }, "                     \
-  "width = (int) [ 1, 2147483647 ], height = (int) [ 1, 2147483647 ], "       \
+#define CODED_EXPOSURE_VIDEO_CAPS                                              \
+  "video/x-raw, format = (string) { GRAY8, GRAY16_LE }, "                      \
+  "width = (int) [ 1, 2147483647 ], height = (int) [ 1, 2147483647 ], "        \
   "framerate = (fraction) [ 0/1, 2147483647/1 ]"
 
 namespace cexp::gst

@@ -22,16 +22,12 @@ set_frame_meta (GstBuffer *buffer, const FrameMeta &meta)
   GstCustomMeta *custom = gst_buffer_get_custom_meta (buffer, kFrameMetaName);
   if (!custom)
     custom = gst_buffer_add_custom_meta (buffer, kFrameMetaName);
-  gst_structure_set (gst_custom_meta_get_structure (custom),
-      "frame", G_TYPE_UINT64, meta.frame,
-      "subframe", G_TYPE_INT, meta.subframe,
-      "exposure-start", G_TYPE_UINT64, meta.exposure_start,
-      "exposure-duration", G_TYPE_UINT64, meta.exposure_duration,
-      "locked", G_TYPE_BOOLEAN, meta.locked,
-      "slip", G_TYPE_INT, meta.slip,
-      "lost-before", G_TYPE_UINT64, meta.lost_before,
-      "saturated", G_TYPE_UINT64, meta.saturated,
-      nullptr);
+  gst_structure_set (gst_custom_meta_get_structure (custom), "frame",
+      G_TYPE_UINT64, meta.frame, "subframe", G_TYPE_INT, meta.subframe,
+      "exposure-start", G_TYPE_UINT64, meta.exposure_start, "exposure-duration",
+      G_TYPE_UINT64, meta.exposure_duration, "locked", G_TYPE_BOOLEAN,
+      meta.locked, "slip", G_TYPE_INT, meta.slip, "lost-before", G_TYPE_UINT64,
+      meta.lost_before, "saturated", G_TYPE_UINT64, meta.saturated, nullptr);
 }
 
 std::optional<FrameMeta>
@@ -42,16 +38,13 @@ get_frame_meta (GstBuffer *buffer)
     return std::nullopt;
 
   FrameMeta meta;
-  gst_structure_get (gst_custom_meta_get_structure (custom),
-      "frame", G_TYPE_UINT64, &meta.frame,
-      "subframe", G_TYPE_INT, &meta.subframe,
+  gst_structure_get (gst_custom_meta_get_structure (custom), "frame",
+      G_TYPE_UINT64, &meta.frame, "subframe", G_TYPE_INT, &meta.subframe,
       "exposure-start", G_TYPE_UINT64, &meta.exposure_start,
-      "exposure-duration", G_TYPE_UINT64, &meta.exposure_duration,
-      "locked", G_TYPE_BOOLEAN, &meta.locked,
-      "slip", G_TYPE_INT, &meta.slip,
-      "lost-before", G_TYPE_UINT64, &meta.lost_before,
-      "saturated", G_TYPE_UINT64, &meta.saturated,
-      nullptr);
+      "exposure-duration", G_TYPE_UINT64, &meta.exposure_duration, "locked",
+      G_TYPE_BOOLEAN, &meta.locked, "slip", G_TYPE_INT, &meta.slip,
+      "lost-before", G_TYPE_UINT64, &meta.lost_before, "saturated",
+      G_TYPE_UINT64, &meta.saturated, nullptr);
   return meta;
 }
 

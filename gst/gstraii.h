@@ -66,7 +66,7 @@ public:
   MappedFrame (const GstVideoInfo &info, GstBuffer *buffer, GstMapFlags flags)
       : mapped_ (gst_video_frame_map (&frame_,
             const_cast<GstVideoInfo *> (&info), buffer,
-            GstMapFlags (flags | GST_VIDEO_FRAME_MAP_FLAG_NO_REF)))
+            GstMapFlags (int (flags) | int (GST_VIDEO_FRAME_MAP_FLAG_NO_REF))))
   {
   }
   ~MappedFrame () { reset (); }

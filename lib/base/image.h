@@ -38,8 +38,7 @@ struct ImageView {
     return {row (y), width, count, stride};
   }
 
-  operator ImageView<const T> () const
-    requires (!std::is_const_v<T>)
+  operator ImageView<const T> () const requires (!std::is_const_v<T>)
   {
     return {data, width, height, stride};
   }
@@ -68,13 +67,13 @@ public:
   int height () const { return height_; }
   ImageView<T> view ()
   {
-    return {pixels_.data (), width_, height_,
-        std::ptrdiff_t (width_ * sizeof (T))};
+    return {
+        pixels_.data (), width_, height_, std::ptrdiff_t (width_ * sizeof (T))};
   }
   ImageView<const T> view () const
   {
-    return {pixels_.data (), width_, height_,
-        std::ptrdiff_t (width_ * sizeof (T))};
+    return {
+        pixels_.data (), width_, height_, std::ptrdiff_t (width_ * sizeof (T))};
   }
   T &at (int x, int y) { return view ().at (x, y); }
   const T &at (int x, int y) const { return view ().at (x, y); }

@@ -51,8 +51,8 @@ public:
    * @p mask  a negative value is the parked DMD: every mirror shut.
    */
   template <typename Pixel>
-  void expose (ImageView<const Pixel> scene, const Schedule &schedule,
-      int mask, double slots);
+  void expose (ImageView<const Pixel> scene, const Schedule &schedule, int mask,
+      double slots);
   /**
    * Lens, sensor and converter: shot and read noise, gain, rounding, clamp.
    * @p frame  number of the frame; it and the seed fix the noise, whatever the
@@ -60,8 +60,8 @@ public:
    * @p slots_to_white  slot times of full light that make white at gain 0.
    */
   template <typename Pixel>
-  void read_out (std::uint64_t frame, double slots_to_white,
-      ImageView<Pixel> coded) const;
+  void read_out (
+      std::uint64_t frame, double slots_to_white, ImageView<Pixel> coded) const;
 
 private:
   struct State;

@@ -20,8 +20,7 @@ struct FrameRate {
 
   /** floor ((index + part / parts) frame periods): the start of slot @p part
    * of frame @p index. Exact, however large the index; 0 <= part <= parts. */
-  Nanoseconds time_of (
-      std::int64_t index, int part = 0, int parts = 1) const;
+  Nanoseconds time_of (std::int64_t index, int part = 0, int parts = 1) const;
   /** One frame period, rounded down. */
   Nanoseconds period () const { return time_of (1); }
   bool operator== (const FrameRate &) const = default;
@@ -73,7 +72,8 @@ private:
 /** "9.8ms", "200us", "105000ns", "0.04s" or "0": a non-negative time below an
  * hour. The unit may only be left out for 0. */
 Result<Nanoseconds> parse_time (std::string_view text);
-/** The shortest such text that parses back to @p time. */
+/** Such a text, in the largest unit that keeps it at 1 or more, that parses
+ * back to @p time; @p time >= 0. */
 std::string time_text (Nanoseconds time);
 
 } // namespace cexp

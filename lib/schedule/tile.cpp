@@ -1,0 +1,233 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "schedule/tile.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cstdlib>
+#include <numeric>
+#include <optional>
+
+namespace cexp
+{
+
+namespace
+{
+
+/** The whole of @p text as a decimal number in [0, 9999]. */
+std::optional<int>
+parse_number (std::string_view text)
+{
+  int value = 0;
+  const char *end = text.data () + text.size ();
+  const auto [stop, error] = std::from_chars (text.data (), end, value);
+  if (error != std::errc () || stop != end || text.size () > 4 || value < 0)
+    return std::nullopt;
+  return value;
+}
+
+std::string
+number (int value)
+{
+  return std::to_string (value);
+}
+
+Error
+bad_elements (const std::string &name, int elements)
+{
+  return {"tile '" + name + "' has " + number (elements) +
+          " elements; a tile has 2 to " + number (Tile::kMaxElements)};
+}
+
+/** The label map (step_x x + step_y y) mod n. */
+std::vector<std::uint8_t>
+linear_labels (int elements, int step_y, int period_y)
+{
+  std::vector<std::uint8_t> labels;
+  labels.reserve (std::size_t (elements * period_y));
+  for (int y = 0; y < period_y; y++)
+    for (int x = 0; x < elements; x++)
+      labels.push_back (std::uint8_t ((x + step_y * y) % elements));
+  return labels;
+}
+
+/** "diamond:N" is a tile for the N = 2r^2 + 2r + 1 with r >= 1. */
+std::optional<int>
+diamond_radius (int elements)
+{
+  for (int r = 1; 2 * r * r + 2 * r + 1 <= Tile::kMaxElements; r++)
+    if (2 * r * r + 2 * r + 1 == elements)
+      return r;
+  return std::nullopt;
+}
+
+bool
+holds_each_label_once (const Tile &tile, int left, int top, Extent block)
+{
+  std::vector<bool> seen (std::size_t (tile.elements ()));
+  for (int y = top; y < top + block.height; y++) {
+    for (int x = left; x < left + block.width; x++) {
+      auto label = seen[std::size_t (tile.label (x, y))];
+      if (label)
+        return false;
+      label = true;
+    }
+  }
+  return true;
+}
+
+bool
+is_cell (const Tile &tile, Offset phase, Extent block)
+{
+  const int right = std::lcm (tile.period_x (), block.width);
+  const int bottom = std::lcm (tile.period_y (), block.height);
+  for (int y = 0; y < bottom; y += block.height)
+    for (int x = 0; x < right; x += block.width)
+      if (!holds_each_label_once (tile, x + phase.x, y + phase.y, block))
+        return false;
+  return true;
+}
+
+} // namespace
+
+Tile::Tile (std::string name, int elements, int period_x, int period_y,
+    std::vector<std::uint8_t> labels)
+    : name_ (std::move (name)), elements_ (elements), period_x_ (period_x),
+      period_y_ (period_y), labels_ (std::move (labels))
+{
+}
+
+Result<Tile>
+Tile::raster (int columns, int rows)
+{
+  const std::string name = number (columns) + "x" + number (rows);
+  if (columns < 1 || rows < 1 || columns > kMaxElements ||
+      rows > kMaxElements || columns * rows < 2 ||
+      columns * rows > kMaxElements)
+    return Error{"tile '" + name +
+                 "': a raster has at least one column and "
+                 "one row and 2 to " +
+                 number (kMaxElements) + " elements in all"};
+
+  std::vector<std::uint8_t> labels (std::size_t (columns * rows));
+  std::iota (labels.begin (), labels.end (), std::uint8_t (0));
+  return Tile (name, columns * rows, columns, rows, std::move (labels));
+}
+
+Result<Tile>
+Tile::lattice (int elements, int step)
+{
+  const std::string name = "lattice:" + number (elements) + "/" + number (step);
+  if (elements < 2 || elements > kMaxElements)
+    return bad_elements (name, elements);
+  if (step < 0 || step >= elements)
+    return Error{"tile '" + name + "': the step " + number (step) +
+                 " must lie in 0.." + number (elements - 1)};
+
+  const int period_y = elements / std::gcd (elements, step);
+  return Tile (name, elements, elements, period_y,
+      linear_labels (elements, step, period_y));
+}
+
+Result<Tile>
+Tile::diamond (int elements)
+{
+  const std::string name = "diamond:" + number (elements);
+  const std::optional<int> radius = diamond_radius (elements);
+  if (!radius)
+    return Error{"tile '" + name +
+                 "': a diamond has 5, 13, 25, 41, 61, 85, "
+                 "113, 145, 181 or 221 elements"};
+
+  const int step = 2 * *radius + 1;
+  const int period_y = elements / std::gcd (elements, step);
+  return Tile (name, elements, elements, period_y,
+      linear_labels (elements, step, period_y));
+}
+
+Result<Tile>
+Tile::from_labels (int period_x, int period_y, std::vector<std::uint8_t> labels)
+{
+  if (period_x < 1 || period_y < 1 || period_x > kMaxPeriod ||
+      period_y > kMaxPeriod)
+    return Error{"label map of " + number (period_x) + " x " +
+                 number (period_y) + " pixels: each side must lie in 1.." +
+                 number (kMaxPeriod)};
+  if (labels.size () != std::size_t (period_x * period_y))
+    return Error{"label map of " + number (period_x) + " x " +
+                 number (period_y) + " pixels needs " +
+                 number (period_x * period_y) + " labels, not " +
+                 std::to_string (labels.size ())};
+
+  std::vector<bool> seen (kMaxElements);
+  for (const std::uint8_t label : labels)
+    seen[label] = true;
+  const int elements = int (std::count (seen.begin (), seen.end (), true));
+  for (int label = 0; label < elements; label++)
+    if (!seen[std::size_t (label)])
+      return Error{"label map with " + number (elements) +
+                   " different labels lacks label " + number (label) +
+                   "; labels must be 0.." + number (elements - 1)};
+  if (elements < 2)
+    return bad_elements ("labels", elements);
+  return Tile ("labels", elements, period_x, period_y, std::move (labels));
+}
+
+Result<Tile>
+Tile::parse (std::string_view text)
+{
+  const Error malformed{
+      "tile '" + std::string (text.substr (0, 64)) +
+      "' is none of WxH, lattice:N/B and diamond:N, such as 2x2, "
+      "lattice:8/3 or diamond:13"};
+  const auto after = [text] (std::string_view prefix) {
+    return text.starts_with (prefix)
+               ? std::optional (text.substr (prefix.size ()))
+               : std::nullopt;
+  };
+  const auto pair = [] (std::string_view both, char separator) {
+    const std::size_t at = both.find (separator);
+    return at == both.npos
+               ? std::pair (std::optional<int> (), std::optional<int> ())
+               : std::pair (parse_number (both.substr (0, at)),
+                     parse_number (both.substr (at + 1)));
+  };
+
+  if (const auto rest = after ("lattice:")) {
+    const auto [elements, step] = pair (*rest, '/');
+    return elements && step ? lattice (*elements, *step) : malformed;
+  }
+  if (const auto rest = after ("diamond:")) {
+    const auto elements = parse_number (*rest);
+    return elements ? diamond (*elements) : malformed;
+  }
+  const auto [columns, rows] = pair (text, 'x');
+  return columns && rows ? raster (*columns, *rows) : malformed;
+}
+
+Result<Extent>
+Tile::cell (Offset phase) const
+{
+  std::vector<Extent> blocks;
+  for (int width = 1; width <= elements_; width++)
+    if (elements_ % width == 0)
+      blocks.push_back ({width, elements_ / width});
+  std::stable_sort (
+      blocks.begin (), blocks.end (), [] (const Extent &a, const Extent &b) {
+        const int a_off = std::abs (a.width - a.height);
+        const int b_off = std::abs (b.width - b.height);
+        return a_off != b_off ? a_off < b_off : a.width > b.width;
+      });
+  if (is_named () && name_.find (':') == std::string::npos)
+    return Extent{period_x_, period_y_};
+
+  for (const Extent &block : blocks)
+    if (is_cell (*this, phase, block))
+      return block;
+  return Error{"tile '" + name_ + "' with phase " + number (phase.x) + "/" +
+               number (phase.y) + " has no cell: no block of " +
+               number (elements_) +
+               " pixels, repeated from pixel (0, 0) on, holds each label "
+               "exactly once"};
+}
+
+} // namespace cexp

@@ -1,0 +1,150 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "schedule/timing.h"
+
+#include <array>
+#include <charconv>
+#include <limits>
+
+namespace cexp
+{
+
+namespace
+{
+
+__extension__ typedef __int128 Wide;
+
+constexpr Nanoseconds kSecond = 1'000'000'000;
+constexpr Nanoseconds kHour = 3600 * kSecond;
+
+struct Unit {
+  std::string_view suffix;
+  Nanoseconds nanoseconds;
+};
+constexpr std::array<Unit, 4> kUnits{
+    {{"ns", 1}, {"us", 1000}, {"ms", 1'000'000}, {"s", kSecond}}};
+
+bool
+is_digit (char c)
+{
+  return c >= '0' && c <= '9';
+}
+
+} // namespace
+
+Nanoseconds
+FrameRate::time_of (std::int64_t index, int part, int parts) const
+{
+  const Wide in_parts = Wide (index) * parts + part;
+  return Nanoseconds (in_parts * den * kSecond / (Wide (num) * parts));
+}
+
+Result<SlotPlan>
+SlotPlan::fit (const Timing &timing, int slots, FrameRate rate)
+{
+  const Nanoseconds period = rate.period ();
+  const std::string at = " at " + std::to_string (rate.num) + "/" +
+                         std::to_string (rate.den) + " frames/s (" +
+                         time_text (period) + " a frame)";
+
+  SlotPlan plan;
+  plan.slots_ = slots;
+  plan.period_ = period;
+  if (timing.active > 0) {
+    plan.active_ = timing.active;
+    plan.span_ = slots * (timing.active + timing.switching);
+  } else {
+    plan.span_ = period - timing.readout;
+    plan.active_ = plan.span_ / slots - timing.switching;
+  }
+
+  if (plan.active_ <= 0)
+    return Error{std::to_string (slots) + " slots with " +
+                 time_text (timing.switching) + " of switching and " +
+                 time_text (timing.readout) +
+                 " of readout leave no time for light" + at +
+                 "; take fewer slots or a lower frame rate"};
+  if (plan.span_ > period - timing.readout)
+    return Error{
+        std::to_string (slots) + " slots of " + time_text (timing.active) +
+        " active + " + time_text (timing.switching) + " switching + " +
+        time_text (timing.readout) + " readout need " +
+        time_text (plan.span_ + timing.readout) + ", which does not fit" + at +
+        "; shorten active, or lower the frame rate"};
+  return plan;
+}
+
+Nanoseconds
+SlotPlan::start (int slot) const
+{
+  return Nanoseconds (Wide (slot) * span_ / slots_);
+}
+
+Result<Nanoseconds>
+parse_time (std::string_view text)
+{
+  const Error malformed{"time '" + std::string (text.substr (0, 64)) +
+                        "' is not a number with a unit, such as 9.8ms, "
+                        "200us, 105000ns or 0.04s"};
+  const auto too_long = [text] {
+    return Error{"time '" + std::string (text.substr (0, 64)) +
+                 "' is not below an hour"};
+  };
+  if (text == "0")
+    return Nanoseconds (0);
+
+  std::size_t digits = 0;
+  while (digits < text.size () && is_digit (text[digits]))
+    digits++;
+  std::size_t end = digits;
+  if (end < text.size () && text[end] == '.')
+    for (end++; end < text.size () && is_digit (text[end]);)
+      end++;
+  if (digits == 0 || end == digits + 1)
+    return malformed;
+
+  for (const Unit &unit : kUnits) {
+    if (text.substr (end) != unit.suffix)
+      continue;
+    Nanoseconds whole = 0;
+    const auto parsed =
+        std::from_chars (text.data (), text.data () + digits, whole);
+    if (parsed.ec != std::errc () || whole >= kHour / unit.nanoseconds)
+      return too_long ();
+
+    Nanoseconds time = whole * unit.nanoseconds;
+    Nanoseconds place = unit.nanoseconds;
+    for (std::size_t i = digits + 1; i < end; i++) {
+      place /= 10;
+      if (place == 0 && text[i] != '0')
+        return Error{"time '" + std::string (text.substr (0, 64)) +
+                     "' is finer than a nanosecond"};
+      time += place * (text[i] - '0');
+    }
+    return time;
+  }
+  return malformed;
+}
+
+std::string
+time_text (Nanoseconds time)
+{
+  if (time == 0)
+    return "0";
+  const Unit *unit = &kUnits.front ();
+  for (const Unit &candidate : kUnits)
+    if (time >= candidate.nanoseconds)
+      unit = &candidate;
+
+  std::string text = std::to_string (time / unit->nanoseconds);
+  Nanoseconds rest = time % unit->nanoseconds;
+  if (rest != 0) {
+    text += '.';
+    for (Nanoseconds place = unit->nanoseconds / 10; rest != 0; place /= 10) {
+      text += char ('0' + rest / place);
+      rest %= place;
+    }
+  }
+  return text + std::string (unit->suffix);
+}
+
+} // namespace cexp

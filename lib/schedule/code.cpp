@@ -3,8 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
+#include <optional>
 
+#include "base/text.h"
 #include "schedule/hadamard.h"
 #include "schedule/tile.h"
 
@@ -57,6 +60,81 @@ half_hadamard_bits (const SignMatrix &hadamard, int n)
   return open;
 }
 
+/** Square and row-major. */
+using Matrix = std::vector<double>;
+
+/** What an inverse may be off from one, at any element, to be of use. */
+constexpr double kMaxResidual = 1e-6;
+
+void
+swap_rows (Matrix &matrix, std::size_t n, std::size_t a, std::size_t b)
+{
+  const auto row = [&] (std::size_t r) {
+    return matrix.begin () + std::ptrdiff_t (r * n);
+  };
+  if (a != b)
+    std::swap_ranges (row (a), row (a + 1), row (b));
+}
+
+/** Row @p to -= factor times row @p from. */
+void
+subtract_row (Matrix &matrix, std::size_t n, std::size_t from, std::size_t to,
+    double factor)
+{
+  for (std::size_t k = 0; k < n; k++)
+    matrix[to * n + k] -= factor * matrix[from * n + k];
+}
+
+/** Gauss-Jordan with partial pivoting; none where a pivot vanishes. */
+std::optional<Matrix>
+inverted (Matrix a, std::size_t n)
+{
+  Matrix b (n * n);
+  for (std::size_t i = 0; i < n; i++)
+    b[i * n + i] = 1.0;
+
+  for (std::size_t c = 0; c < n; c++) {
+    std::size_t pivot = c;
+    for (std::size_t r = c + 1; r < n; r++)
+      if (std::abs (a[r * n + c]) > std::abs (a[pivot * n + c]))
+        pivot = r;
+    const double value = a[pivot * n + c];
+    if (std::abs (value) < std::numeric_limits<double>::epsilon ())
+      return std::nullopt;
+    for (Matrix *matrix : {&a, &b}) {
+      swap_rows (*matrix, n, pivot, c);
+      for (std::size_t k = 0; k < n; k++)
+        (*matrix)[c * n + k] /= value;
+    }
+    for (std::size_t r = 0; r < n; r++) {
+      const double factor = a[r * n + c];
+      if (r == c || factor == 0.0)
+        continue;
+      subtract_row (a, n, c, r, factor);
+      subtract_row (b, n, c, r, factor);
+    }
+  }
+  return b;
+}
+
+/** The largest element of a b - 1. */
+double
+worst_residual (const Matrix &a, const Matrix &b, std::size_t n)
+{
+  double worst = 0.0;
+  std::vector<double> row (n);
+  for (std::size_t r = 0; r < n; r++) {
+    std::fill (row.begin (), row.end (), 0.0);
+    row[r] = -1.0;
+    for (std::size_t k = 0; k < n; k++)
+      for (std::size_t c = 0; c < n; c++)
+        row[c] += a[r * n + k] * b[k * n + c];
+    for (const double element : row)
+      worst = std::max (worst, std::abs (element));
+  }
+  return worst;
+}
+
 } // namespace
 
 Code::Code (std::string name, int n, std::vector<std::uint8_t> open)
@@ -69,7 +147,7 @@ Code::named (std::string_view name, int elements)
 {
   const int n = elements;
   if (n < 2 || n > Tile::kMaxElements)
-    return Error{"code '" + std::string (name) + "' for " + std::to_string (n) +
+    return Error{"code " + in_quotes (name) + " for " + std::to_string (n) +
                  " elements: 2 to " + std::to_string (Tile::kMaxElements) +
                  " are possible"};
   if (name == "sequential")
@@ -86,8 +164,8 @@ Code::named (std::string_view name, int elements)
                  "a multiple of 4; take a tile of 3, 4, 7, 8, 11, 12, 15, 16, "
                  "... elements"};
   }
-  return Error{"code '" + std::string (name.substr (0, 64)) +
-               "' is none of sequential, staircase and s-matrix"};
+  return Error{"code " + in_quotes (name) +
+               " is none of sequential, staircase and s-matrix"};
 }
 
 Result<Code>
@@ -107,8 +185,8 @@ Code::from_rows (const std::vector<std::string> &rows)
                    " slots; a code of " + std::to_string (n) +
                    " elements has as many slots"};
     if (rows[e].find_first_not_of ("01") != std::string::npos)
-      return Error{row + " is '" + rows[e].substr (0, 64) +
-                   "'; only 0 (shut) and 1 (open) can stand in it"};
+      return Error{row + " is " + in_quotes (rows[e]) +
+                   "; only 0 (shut) and 1 (open) can stand in it"};
     if (rows[e].find ('1') == std::string::npos)
       return Error{row + " is never open; every element must see light in at "
                          "least one slot"};
@@ -163,45 +241,18 @@ Result<std::vector<double>>
 Code::inverse (double leak) const
 {
   const std::size_t n = std::size_t (n_);
-  std::vector<double> a (n * n), b (n * n);
-  for (std::size_t i = 0; i < n * n; i++)
-    a[i] = open_[i] != 0 ? 1.0 : leak;
-  for (std::size_t i = 0; i < n; i++)
-    b[i * n + i] = 1.0;
-
-  /* Gauss-Jordan with partial pivoting. Determinants of binary matrices are
-   * integers, so a pivot of a regular one never comes near the limit. */
-  constexpr double kSingular = 1e-9;
-  for (std::size_t c = 0; c < n; c++) {
-    std::size_t pivot = c;
-    for (std::size_t r = c + 1; r < n; r++)
-      if (std::abs (a[r * n + c]) > std::abs (a[pivot * n + c]))
-        pivot = r;
-    if (std::abs (a[pivot * n + c]) < kSingular)
-      return Error{"code '" + name_ + "' of " + std::to_string (n_) +
-                   " elements cannot be inverted: its rows are not "
-                   "independent, so the light of single slots cannot be "
-                   "told; use rank, or a code such as sequential"};
-    for (std::size_t k = 0; k < n; k++) {
-      std::swap (a[pivot * n + k], a[c * n + k]);
-      std::swap (b[pivot * n + k], b[c * n + k]);
-    }
-    const double scale = 1.0 / a[c * n + c];
-    for (std::size_t k = 0; k < n; k++) {
-      a[c * n + k] *= scale;
-      b[c * n + k] *= scale;
-    }
-    for (std::size_t r = 0; r < n; r++) {
-      const double factor = a[r * n + c];
-      if (r == c || factor == 0.0)
-        continue;
-      for (std::size_t k = 0; k < n; k++) {
-        a[r * n + k] -= factor * a[c * n + k];
-        b[r * n + k] -= factor * b[c * n + k];
-      }
-    }
-  }
-  return b;
+  Matrix light (n * n);
+  std::transform (open_.begin (), open_.end (), light.begin (),
+      [leak] (std::uint8_t open) { return open != 0 ? 1.0 : leak; });
+  auto inverse = inverted (light, n);
+  if (!inverse || worst_residual (light, *inverse, n) > kMaxResidual)
+    return Error{"code '" + name_ + "' of " + std::to_string (n_) +
+                 " elements cannot be inverted at a leak of " +
+                 real_text (leak) +
+                 ": its rows are not independent, or nearly so, and the light "
+                 "of single slots cannot be told; use rank, or a code such as "
+                 "sequential"};
+  return *std::move (inverse);
 }
 
 } // namespace cexp

@@ -3,16 +3,13 @@
 
 #include <numeric>
 
+#include "base/text.h"
+
 namespace cexp
 {
 
 namespace
 {
-
-/** Bound on pilot rows and on the phase: no array of mirrors is larger. */
-constexpr int kMaxMirrors = 16384;
-constexpr double kMaxLeak = 0.5;
-constexpr Nanoseconds kHour = 3'600'000'000'000;
 
 Result<void>
 check_order (const std::vector<int> &order, int elements)
@@ -39,9 +36,9 @@ check_order (const std::vector<int> &order, int elements)
 Result<void>
 check_time (const char *name, Nanoseconds time)
 {
-  if (time < 0 || time >= kHour)
+  if (time < 0 || time >= kTimeLimit)
     return Error{std::string (name) + " of " + std::to_string (time) +
-                 " ns: it must lie in 0 .. 1 hour"};
+                 " ns: it must not be negative and must be below an hour"};
   return {};
 }
 
@@ -55,17 +52,19 @@ check_numbers (const Schedule::Parts &parts)
     if (const auto checked = check_time (name, time); !checked)
       return checked;
 
-  if (!(parts.leak >= 0.0 && parts.leak <= kMaxLeak))
-    return Error{"leak " + std::to_string (parts.leak) +
-                 ": the off/on contrast of the mirrors must lie in 0..0.5"};
+  if (!(parts.leak >= 0.0 && parts.leak <= Schedule::kMaxLeak))
+    return Error{"leak " + real_text (parts.leak) +
+                 ": the light of a shut mirror as a part of an open one's "
+                 "must lie in 0..0.5"};
   for (const int shift : {parts.phase.x, parts.phase.y})
-    if (shift < 0 || shift > kMaxMirrors)
+    if (shift < 0 || shift > Schedule::kMaxMirrors)
       return Error{"phase " + std::to_string (parts.phase.x) + "/" +
                    std::to_string (parts.phase.y) + ": each must lie in 0.." +
-                   std::to_string (kMaxMirrors)};
-  if (parts.pilot_rows < 0 || parts.pilot_rows > kMaxMirrors)
+                   std::to_string (Schedule::kMaxMirrors)};
+  if (parts.pilot_rows < 0 || parts.pilot_rows > Schedule::kMaxMirrors)
     return Error{"pilot of " + std::to_string (parts.pilot_rows) +
-                 " rows: it must lie in 0.." + std::to_string (kMaxMirrors)};
+                 " rows: it must lie in 0.." +
+                 std::to_string (Schedule::kMaxMirrors)};
   return {};
 }
 

@@ -29,6 +29,12 @@ namespace cexp
 class Schedule
 {
 public:
+  /** Bound on pilot rows and on the phase: no array of mirrors is larger. */
+  static constexpr int kMaxMirrors = 16384;
+  static constexpr double kMaxLeak = 0.5;
+  /** Bound on the JSON form, in bytes. */
+  static constexpr std::size_t kMaxJsonSize = std::size_t (1) << 20;
+
   struct Parts {
     Tile tile;
     Code code;
@@ -53,14 +59,29 @@ public:
   static Result<Schedule> make (Parts parts);
 
   /**
-   * A preset "CODE:TILE[,key=value...]" with keys active, switching, readout,
-   * order, phase, leak and pilot; else the path of a JSON file (anything with
-   * a '/' or ending in ".json"). See docs/formats.md.
+   * A preset or the path of a JSON file. What begins with the name of a code
+   * and ':' is a preset; of the rest, what holds a '/' or ends in ".json" is a
+   * path, and everything else a preset again, a wrong one. (So
+   * "./staircase:2x2" is a path, and "sequential:lattice:8/3" is not.)
    */
   static Result<Schedule> parse (std::string_view preset_or_path);
+  /**
+   * "CODE:TILE[,key=value...]". CODE and TILE as Code::named () and
+   * Tile::parse () know them; each key at most once, in any order:
+   *   active, switching, readout   times, parse_time ()
+   *   order   raster (the default), bit-reversal, or the element of each
+   *           label, as in 0/2/1/3. bit-reversal lists the numbers below n in
+   *           the order of their reversed binary digits; where n is no power
+   *           of two, as many digits as n - 1 has
+   *   phase   x/y
+   *   leak    0 to 0.5
+   *   pilot   rows
+   */
   static Result<Schedule> from_preset (std::string_view preset);
-  /** The strict, versioned text form; unknown keys are errors. */
+  /** The strict, versioned text form: unknown, missing and doubled keys, other
+   * types and other versions are errors. See docs/formats.md. */
   static Result<Schedule> from_json (std::string_view json);
+  /** One line; equal schedules have equal texts. */
   std::string to_json () const;
   /** A preset that parses back to this schedule; for a tile or code that was
    * written out, a description in the same manner that does not. */

@@ -2,10 +2,11 @@
 #include "schedule/tile.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cstdlib>
 #include <numeric>
 #include <optional>
+
+#include "base/text.h"
 
 namespace cexp
 {
@@ -13,29 +14,13 @@ namespace cexp
 namespace
 {
 
-/** The whole of @p text as a decimal number in [0, 9999]. */
-std::optional<int>
-parse_number (std::string_view text)
-{
-  int value = 0;
-  const char *end = text.data () + text.size ();
-  const auto [stop, error] = std::from_chars (text.data (), end, value);
-  if (error != std::errc () || stop != end || text.size () > 4 || value < 0)
-    return std::nullopt;
-  return value;
-}
-
-std::string
-number (int value)
-{
-  return std::to_string (value);
-}
+using std::to_string;
 
 Error
 bad_elements (const std::string &name, int elements)
 {
-  return {"tile '" + name + "' has " + number (elements) +
-          " elements; a tile has 2 to " + number (Tile::kMaxElements)};
+  return {"tile '" + name + "' has " + to_string (elements) +
+          " elements; a tile has 2 to " + to_string (Tile::kMaxElements)};
 }
 
 /** The label map (step_x x + step_y y) mod n. */
@@ -66,22 +51,30 @@ holds_each_label_once (const Tile &tile, int left, int top, Extent block)
   std::vector<bool> seen (std::size_t (tile.elements ()));
   for (int y = top; y < top + block.height; y++) {
     for (int x = left; x < left + block.width; x++) {
-      auto label = seen[std::size_t (tile.label (x, y))];
-      if (label)
+      auto seen_label = seen[std::size_t (tile.label (x, y))];
+      if (seen_label)
         return false;
-      label = true;
+      seen_label = true;
     }
   }
   return true;
 }
 
+/**
+ * Whether @p block is a cell. Its sides divide the period: with g the greatest
+ * common divisor of width and period, blocks stand at every multiple of g, and
+ * what a step of g drops at a block's left it gains at its right. So the labels
+ * of g columns come again after a width, after a period, and therefore after g
+ * columns: only a block of g columns holds none of them twice.
+ */
 bool
 is_cell (const Tile &tile, Offset phase, Extent block)
 {
-  const int right = std::lcm (tile.period_x (), block.width);
-  const int bottom = std::lcm (tile.period_y (), block.height);
-  for (int y = 0; y < bottom; y += block.height)
-    for (int x = 0; x < right; x += block.width)
+  if (tile.period_x () % block.width != 0 ||
+      tile.period_y () % block.height != 0)
+    return false;
+  for (int y = 0; y < tile.period_y (); y += block.height)
+    for (int x = 0; x < tile.period_x (); x += block.width)
       if (!holds_each_label_once (tile, x + phase.x, y + phase.y, block))
         return false;
   return true;
@@ -99,14 +92,14 @@ Tile::Tile (std::string name, int elements, int period_x, int period_y,
 Result<Tile>
 Tile::raster (int columns, int rows)
 {
-  const std::string name = number (columns) + "x" + number (rows);
+  const std::string name = to_string (columns) + "x" + to_string (rows);
   if (columns < 1 || rows < 1 || columns > kMaxElements ||
       rows > kMaxElements || columns * rows < 2 ||
       columns * rows > kMaxElements)
     return Error{"tile '" + name +
                  "': a raster has at least one column and "
                  "one row and 2 to " +
-                 number (kMaxElements) + " elements in all"};
+                 to_string (kMaxElements) + " elements in all"};
 
   std::vector<std::uint8_t> labels (std::size_t (columns * rows));
   std::iota (labels.begin (), labels.end (), std::uint8_t (0));
@@ -116,12 +109,13 @@ Tile::raster (int columns, int rows)
 Result<Tile>
 Tile::lattice (int elements, int step)
 {
-  const std::string name = "lattice:" + number (elements) + "/" + number (step);
+  const std::string name =
+      "lattice:" + to_string (elements) + "/" + to_string (step);
   if (elements < 2 || elements > kMaxElements)
     return bad_elements (name, elements);
   if (step < 0 || step >= elements)
-    return Error{"tile '" + name + "': the step " + number (step) +
-                 " must lie in 0.." + number (elements - 1)};
+    return Error{"tile '" + name + "': the step " + to_string (step) +
+                 " must lie in 0.." + to_string (elements - 1)};
 
   const int period_y = elements / std::gcd (elements, step);
   return Tile (name, elements, elements, period_y,
@@ -131,7 +125,7 @@ Tile::lattice (int elements, int step)
 Result<Tile>
 Tile::diamond (int elements)
 {
-  const std::string name = "diamond:" + number (elements);
+  const std::string name = "diamond:" + to_string (elements);
   const std::optional<int> radius = diamond_radius (elements);
   if (!radius)
     return Error{"tile '" + name +
@@ -149,14 +143,14 @@ Tile::from_labels (int period_x, int period_y, std::vector<std::uint8_t> labels)
 {
   if (period_x < 1 || period_y < 1 || period_x > kMaxPeriod ||
       period_y > kMaxPeriod)
-    return Error{"label map of " + number (period_x) + " x " +
-                 number (period_y) + " pixels: each side must lie in 1.." +
-                 number (kMaxPeriod)};
+    return Error{"label map of " + to_string (period_x) + " x " +
+                 to_string (period_y) + " pixels: each side must lie in 1.." +
+                 to_string (kMaxPeriod)};
   if (labels.size () != std::size_t (period_x * period_y))
-    return Error{"label map of " + number (period_x) + " x " +
-                 number (period_y) + " pixels needs " +
-                 number (period_x * period_y) + " labels, not " +
-                 std::to_string (labels.size ())};
+    return Error{"label map of " + to_string (period_x) + " x " +
+                 to_string (period_y) + " pixels needs " +
+                 to_string (period_x * period_y) + " labels, not " +
+                 to_string (labels.size ())};
 
   std::vector<bool> seen (kMaxElements);
   for (const std::uint8_t label : labels)
@@ -164,9 +158,9 @@ Tile::from_labels (int period_x, int period_y, std::vector<std::uint8_t> labels)
   const int elements = int (std::count (seen.begin (), seen.end (), true));
   for (int label = 0; label < elements; label++)
     if (!seen[std::size_t (label)])
-      return Error{"label map with " + number (elements) +
-                   " different labels lacks label " + number (label) +
-                   "; labels must be 0.." + number (elements - 1)};
+      return Error{"label map with " + to_string (elements) +
+                   " different labels lacks label " + to_string (label) +
+                   "; labels must be 0.." + to_string (elements - 1)};
   if (elements < 2)
     return bad_elements ("labels", elements);
   return Tile ("labels", elements, period_x, period_y, std::move (labels));
@@ -176,9 +170,9 @@ Result<Tile>
 Tile::parse (std::string_view text)
 {
   const Error malformed{
-      "tile '" + std::string (text.substr (0, 64)) +
-      "' is none of WxH, lattice:N/B and diamond:N, such as 2x2, "
-      "lattice:8/3 or diamond:13"};
+      "tile " + in_quotes (text) +
+      " is none of WxH, lattice:N/B and diamond:N, such as 2x2, lattice:8/3 "
+      "or diamond:13; any other is written out in a JSON file"};
   const auto after = [text] (std::string_view prefix) {
     return text.starts_with (prefix)
                ? std::optional (text.substr (prefix.size ()))
@@ -188,8 +182,8 @@ Tile::parse (std::string_view text)
     const std::size_t at = both.find (separator);
     return at == both.npos
                ? std::pair (std::optional<int> (), std::optional<int> ())
-               : std::pair (parse_number (both.substr (0, at)),
-                     parse_number (both.substr (at + 1)));
+               : std::pair (parse_int (both.substr (0, at)),
+                     parse_int (both.substr (at + 1)));
   };
 
   if (const auto rest = after ("lattice:")) {
@@ -197,7 +191,7 @@ Tile::parse (std::string_view text)
     return elements && step ? lattice (*elements, *step) : malformed;
   }
   if (const auto rest = after ("diamond:")) {
-    const auto elements = parse_number (*rest);
+    const auto elements = parse_int (*rest);
     return elements ? diamond (*elements) : malformed;
   }
   const auto [columns, rows] = pair (text, 'x');
@@ -217,15 +211,13 @@ Tile::cell (Offset phase) const
         const int b_off = std::abs (b.width - b.height);
         return a_off != b_off ? a_off < b_off : a.width > b.width;
       });
-  if (is_named () && name_.find (':') == std::string::npos)
-    return Extent{period_x_, period_y_};
 
   for (const Extent &block : blocks)
     if (is_cell (*this, phase, block))
       return block;
-  return Error{"tile '" + name_ + "' with phase " + number (phase.x) + "/" +
-               number (phase.y) + " has no cell: no block of " +
-               number (elements_) +
+  return Error{"tile '" + name_ + "' with phase " + to_string (phase.x) + "/" +
+               to_string (phase.y) + " has no cell: no block of " +
+               to_string (elements_) +
                " pixels, repeated from pixel (0, 0) on, holds each label "
                "exactly once"};
 }

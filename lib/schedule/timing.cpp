@@ -3,7 +3,8 @@
 
 #include <array>
 #include <charconv>
-#include <limits>
+
+#include "base/text.h"
 
 namespace cexp
 {
@@ -14,7 +15,6 @@ namespace
 __extension__ typedef __int128 Wide;
 
 constexpr Nanoseconds kSecond = 1'000'000'000;
-constexpr Nanoseconds kHour = 3600 * kSecond;
 
 struct Unit {
   std::string_view suffix;
@@ -82,12 +82,11 @@ SlotPlan::start (int slot) const
 Result<Nanoseconds>
 parse_time (std::string_view text)
 {
-  const Error malformed{"time '" + std::string (text.substr (0, 64)) +
-                        "' is not a number with a unit, such as 9.8ms, "
+  const Error malformed{"time " + in_quotes (text) +
+                        " is not a number with a unit, such as 9.8ms, "
                         "200us, 105000ns or 0.04s"};
   const auto too_long = [text] {
-    return Error{"time '" + std::string (text.substr (0, 64)) +
-                 "' is not below an hour"};
+    return Error{"time " + in_quotes (text) + " is not below an hour"};
   };
   if (text == "0")
     return Nanoseconds (0);
@@ -108,7 +107,7 @@ parse_time (std::string_view text)
     Nanoseconds whole = 0;
     const auto parsed =
         std::from_chars (text.data (), text.data () + digits, whole);
-    if (parsed.ec != std::errc () || whole >= kHour / unit.nanoseconds)
+    if (parsed.ec != std::errc () || whole >= kTimeLimit / unit.nanoseconds)
       return too_long ();
 
     Nanoseconds time = whole * unit.nanoseconds;
@@ -116,8 +115,8 @@ parse_time (std::string_view text)
     for (std::size_t i = digits + 1; i < end; i++) {
       place /= 10;
       if (place == 0 && text[i] != '0')
-        return Error{"time '" + std::string (text.substr (0, 64)) +
-                     "' is finer than a nanosecond"};
+        return Error{
+            "time " + in_quotes (text) + " is finer than a nanosecond"};
       time += place * (text[i] - '0');
     }
     return time;

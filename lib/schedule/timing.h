@@ -13,6 +13,9 @@ namespace cexp
 
 using Nanoseconds = std::int64_t;
 
+/** Times of a schedule are non-negative and below this: an hour. */
+constexpr Nanoseconds kTimeLimit = 3'600'000'000'000;
+
 /** Frames per second as the exact fraction that caps carry; both > 0. */
 struct FrameRate {
   int num = 25;

@@ -1,0 +1,376 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The versioned JSON form of schedules: docs/formats.md. */
+#include <algorithm>
+#include <initializer_list>
+#include <optional>
+#include <set>
+
+#include <nlohmann/json.hpp>
+
+#include "base/text.h"
+#include "schedule/schedule.h"
+
+namespace cexp
+{
+
+namespace
+{
+
+using Json = nlohmann::json;
+using OrderedJson = nlohmann::ordered_json;
+
+constexpr std::string_view kFormat = "coded-exposure";
+constexpr int kVersion = 1;
+
+/** @p value as text for a message. */
+std::string
+shown (const Json &value)
+{
+  return printable (value.dump ());
+}
+
+Error
+expected (const std::string &key, const std::string &rule, const Json &value)
+{
+  return {"key '" + key + "' must be " + rule + ", not " + shown (value)};
+}
+
+Result<void>
+check_keys (const Json &object, const std::string &where,
+    std::initializer_list<std::string_view> known)
+{
+  for (const auto &item : object.items ()) {
+    if (std::find (known.begin (), known.end (), item.key ()) != known.end ())
+      continue;
+    std::string names;
+    for (const std::string_view name : known)
+      names += (names.empty () ? "" : ", ") + std::string (name);
+    return Error{"there is no key " + in_quotes (item.key ()) + where +
+                 "; the keys are " + names};
+  }
+  return {};
+}
+
+/** @p value as a whole number from 0 to @p highest, written without a
+ * fraction. */
+std::optional<std::int64_t>
+as_integer (const Json &value, std::int64_t highest)
+{
+  const bool fits =
+      value.is_number_unsigned ()
+          ? value.get<std::uint64_t> () <= std::uint64_t (highest)
+          : value.is_number_integer () && value.get<std::int64_t> () == 0;
+  if (!fits)
+    return std::nullopt;
+  return value.get<std::int64_t> ();
+}
+
+std::string
+integer_rule (std::int64_t highest)
+{
+  return "a whole number from 0 to " + std::to_string (highest);
+}
+
+Result<std::int64_t>
+read_integer (const Json &value, const std::string &key, std::int64_t highest)
+{
+  if (const auto number = as_integer (value, highest))
+    return *number;
+  return expected (key, integer_rule (highest), value);
+}
+
+Result<std::vector<int>>
+read_integers (const Json &value, const std::string &key, int highest)
+{
+  if (!value.is_array ())
+    return expected (key, "a list of whole numbers", value);
+  std::vector<int> numbers;
+  numbers.reserve (value.size ());
+  for (const Json &entry : value) {
+    const auto number = as_integer (entry, highest);
+    if (!number)
+      return expected (key + "[" + std::to_string (numbers.size ()) + "]",
+          integer_rule (highest), entry);
+    numbers.push_back (int (*number));
+  }
+  return numbers;
+}
+
+/** The two numbers of @p value, such as [0, 1]. */
+Result<Offset>
+read_pair (const Json &value, const std::string &key, int highest)
+{
+  const auto numbers = read_integers (value, key, highest);
+  if (!numbers)
+    return numbers.error ();
+  if (numbers->size () != 2)
+    return expected (key, "two whole numbers, x and y", value);
+  return Offset{numbers->front (), numbers->back ()};
+}
+
+Result<Tile>
+read_tile (const Json &value)
+{
+  if (value.is_string ())
+    return Tile::parse (value.get_ref<const std::string &> ());
+  if (!value.is_object ())
+    return expected ("tile",
+        "a name, such as \"2x2\", or {\"period\":[w,h],\"labels\":[...]}",
+        value);
+  if (const auto checked = check_keys (value, " in tile", {"period", "labels"});
+      !checked)
+    return checked.error ();
+  for (const char *key : {"period", "labels"})
+    if (!value.contains (key))
+      return Error{"key 'tile." + std::string (key) +
+                   "' is missing; a tile that is written out has a period, "
+                   "[width, height], and width x height labels"};
+
+  const auto period =
+      read_pair (value["period"], "tile.period", Tile::kMaxPeriod);
+  if (!period)
+    return period.error ();
+  const auto labels =
+      read_integers (value["labels"], "tile.labels", Tile::kMaxElements - 1);
+  if (!labels)
+    return labels.error ();
+  return Tile::from_labels (
+      period->x, period->y, {labels->begin (), labels->end ()});
+}
+
+Result<Code>
+read_code (const Json &value, int elements)
+{
+  if (value.is_string ())
+    return Code::named (value.get_ref<const std::string &> (), elements);
+  if (!value.is_object ())
+    return expected ("code",
+        "a name, such as \"sequential\", or {\"rows\":[\"1000\",...]}", value);
+  if (const auto checked = check_keys (value, " in code", {"rows"}); !checked)
+    return checked.error ();
+
+  const auto rows = value.find ("rows");
+  if (rows == value.end () || !rows->is_array ())
+    return expected (
+        "code", "a name or {\"rows\":[...]} with a list of rows", value);
+  std::vector<std::string> texts;
+  for (const Json &row : *rows) {
+    if (!row.is_string ())
+      return expected ("code.rows[" + std::to_string (texts.size ()) + "]",
+          "a string of 0 and 1, such as \"1000\"", row);
+    texts.push_back (row.get<std::string> ());
+  }
+  return Code::from_rows (texts);
+}
+
+Result<void>
+read_timing (const Json &value, Timing &timing)
+{
+  if (!value.is_object ())
+    return expected ("timing", "an object", value);
+  if (const auto checked = check_keys (
+          value, " in timing", {"active_ns", "switching_ns", "readout_ns"});
+      !checked)
+    return checked;
+  for (const auto &[key, field] : {std::pair ("active_ns", &Timing::active),
+           std::pair ("switching_ns", &Timing::switching),
+           std::pair ("readout_ns", &Timing::readout)}) {
+    const auto found = value.find (key);
+    if (found == value.end ())
+      continue;
+    const auto time =
+        read_integer (*found, "timing." + std::string (key), kTimeLimit - 1);
+    if (!time)
+      return time.error ();
+    timing.*field = *time;
+  }
+  return {};
+}
+
+/** The keys that may be left out. */
+Result<void>
+read_options (const Json &root, Schedule::Parts &parts)
+{
+  if (root.contains ("timing"))
+    if (const auto read = read_timing (root["timing"], parts.timing); !read)
+      return read;
+  if (root.contains ("order")) {
+    const auto order =
+        read_integers (root["order"], "order", Tile::kMaxElements - 1);
+    if (!order)
+      return order.error ();
+    if (order->empty ())
+      return expected ("order", "the element of each label", root["order"]);
+    parts.order = *order;
+  }
+  if (root.contains ("phase")) {
+    const auto phase =
+        read_pair (root["phase"], "phase", Schedule::kMaxMirrors);
+    if (!phase)
+      return phase.error ();
+    parts.phase = *phase;
+  }
+  if (root.contains ("leak")) {
+    if (!root["leak"].is_number ())
+      return expected ("leak", "a number from 0 to 0.5", root["leak"]);
+    parts.leak = root["leak"].get<double> ();
+  }
+  if (root.contains ("pilot_rows")) {
+    const auto rows =
+        read_integer (root["pilot_rows"], "pilot_rows", Schedule::kMaxMirrors);
+    if (!rows)
+      return rows.error ();
+    parts.pilot_rows = int (*rows);
+  }
+  return {};
+}
+
+/** Format and version first, so that a text of another kind is named as such
+ * and not by the first key that is strange here. */
+Result<void>
+check_head (const Json &root)
+{
+  const std::string head =
+      "; a schedule begins with {\"format\":\"" + std::string (kFormat) +
+      "\",\"version\":" + std::to_string (kVersion) + ",...";
+  if (!root.is_object ())
+    return Error{"it must be an object, not " + shown (root) + head};
+  for (const char *key : {"format", "version"})
+    if (!root.contains (key))
+      return Error{"key '" + std::string (key) + "' is missing" + head};
+  if (root["format"] != kFormat)
+    return Error{"format " + shown (root["format"]) + " is not known" + head};
+  if (!root["version"].is_number_integer () || root["version"] != kVersion)
+    return Error{"version " + shown (root["version"]) +
+                 " is not known; this program reads version " +
+                 std::to_string (kVersion)};
+
+  if (const auto checked = check_keys (root, "",
+          {"format", "version", "tile", "code", "timing", "order", "phase",
+              "leak", "pilot_rows"});
+      !checked)
+    return checked;
+  for (const char *key : {"tile", "code"})
+    if (!root.contains (key))
+      return Error{"key '" + std::string (key) +
+                   "' is missing; a schedule needs at least format, version, "
+                   "tile and code"};
+  return {};
+}
+
+Result<Schedule>
+read_schedule (const Json &root)
+{
+  if (const auto checked = check_head (root); !checked)
+    return checked.error ();
+  const auto tile = read_tile (root["tile"]);
+  if (!tile)
+    return tile.error ();
+  const auto code = read_code (root["code"], tile->elements ());
+  if (!code)
+    return code.error ();
+  Schedule::Parts parts{*tile, *code};
+  if (const auto read = read_options (root, parts); !read)
+    return read.error ();
+  return Schedule::make (std::move (parts));
+}
+
+/** Refuses, while the parser runs, what it would let pass: a key that stands
+ * twice in one object, because readers disagree on which one counts, and
+ * nesting that no schedule has, because it is walked recursively later. */
+class Watch
+{
+public:
+  bool operator() (int depth, Json::parse_event_t event, Json &parsed)
+  {
+    using Event = Json::parse_event_t;
+    if (event == Event::object_start || event == Event::array_start) {
+      if (depth >= kMaxDepth)
+        throw Error{"brackets nest deeper than " + std::to_string (kMaxDepth) +
+                    " levels; no schedule does"};
+      keys_.resize (std::size_t (depth) + 1);
+      keys_.back ().clear ();
+    } else if (event == Event::key) {
+      const auto &key = parsed.get_ref<const std::string &> ();
+      if (!keys_[std::size_t (depth) - 1].insert (key).second)
+        throw Error{"key " + in_quotes (key) + " stands twice; leave one out"};
+    }
+    return true;
+  }
+
+private:
+  static constexpr int kMaxDepth = 8;
+  /** Keys of the objects around the place that is being read. */
+  std::vector<std::set<std::string>> keys_;
+};
+
+Result<Json>
+parse_strictly (std::string_view text)
+{
+  try {
+    return Json::parse (text, Watch ());
+  } catch (const Error &refused) {
+    return refused;
+  } catch (const Json::exception &failure) {
+    std::string_view why = failure.what ();
+    why.remove_prefix (std::min (why.find ("] ") + 2, why.size ()));
+    return Error{"it is no valid JSON: " + printable (why, 200)};
+  }
+}
+
+OrderedJson
+tile_json (const Tile &tile)
+{
+  if (tile.is_named ())
+    return tile.name ();
+  OrderedJson map;
+  map["period"] = {tile.period_x (), tile.period_y ()};
+  map["labels"] = tile.labels ();
+  return map;
+}
+
+} // namespace
+
+Result<Schedule>
+Schedule::from_json (std::string_view json)
+{
+  const std::string what = "schedule JSON: ";
+  if (json.size () > kMaxJsonSize)
+    return Error{what + "more than " + std::to_string (kMaxJsonSize) +
+                 " bytes; no schedule is that long"};
+  const auto root = parse_strictly (json);
+  if (!root)
+    return Error{what + root.error ().message};
+  auto schedule = read_schedule (*root);
+  if (!schedule)
+    return Error{what + schedule.error ().message};
+  return schedule;
+}
+
+std::string
+Schedule::to_json () const
+{
+  OrderedJson root;
+  root["format"] = kFormat;
+  root["version"] = kVersion;
+  root["tile"] = tile_json (tile ());
+  if (code ().is_named ())
+    root["code"] = code ().name ();
+  else
+    root["code"]["rows"] = code ().rows ();
+  if (timing () != Timing{})
+    root["timing"] = {{"active_ns", timing ().active},
+        {"switching_ns", timing ().switching},
+        {"readout_ns", timing ().readout}};
+  if (!std::is_sorted (order ().begin (), order ().end ()))
+    root["order"] = order ();
+  if (phase () != Offset{})
+    root["phase"] = {phase ().x, phase ().y};
+  if (leak () != 0.0)
+    root["leak"] = leak ();
+  if (pilot_rows () != 0)
+    root["pilot_rows"] = pilot_rows ();
+  return root.dump ();
+}
+
+} // namespace cexp

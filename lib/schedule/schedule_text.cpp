@@ -1,0 +1,330 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Presets, the one-line text form of schedules, and where a text is a path. */
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cerrno>
+#include <cstdio>
+#include <memory>
+#include <numeric>
+#include <system_error>
+
+#include "base/text.h"
+#include "schedule/schedule.h"
+
+namespace cexp
+{
+
+namespace
+{
+
+constexpr std::string_view kExample = "sequential:2x2";
+constexpr std::array<std::string_view, 3> kCodes{
+    "sequential", "staircase", "s-matrix"};
+
+/** Labels in the order of their reversed binary digits; where n is no power of
+ * two, those of the next one with the missing labels left out. */
+std::vector<int>
+bit_reversed_order (int n)
+{
+  const int size = int (std::bit_ceil (unsigned (n)));
+  std::vector<int> order;
+  order.reserve (std::size_t (n));
+  for (int i = 0; i < size; i++) {
+    int reversed = 0;
+    for (int bit = 1; bit < size; bit <<= 1)
+      reversed = reversed << 1 | ((i & bit) != 0 ? 1 : 0);
+    if (reversed < n)
+      order.push_back (reversed);
+  }
+  return order;
+}
+
+std::vector<int>
+raster_order (int n)
+{
+  std::vector<int> order (std::size_t (n), 0);
+  std::iota (order.begin (), order.end (), 0);
+  return order;
+}
+
+/** What stands before ':' in @p text, if it is the name of a code. */
+bool
+begins_with_code (std::string_view text)
+{
+  const std::string_view code = text.substr (0, text.find (':'));
+  return code.size () < text.size () &&
+         std::find (kCodes.begin (), kCodes.end (), code) != kCodes.end ();
+}
+
+Error
+bad_value (
+    std::string_view key, std::string_view value, const std::string &rule)
+{
+  return {std::string (key) + "=" + printable (value) + ": " + rule};
+}
+
+Result<void>
+read_time (std::string_view key, std::string_view value, Nanoseconds &out)
+{
+  const auto time = parse_time (value);
+  if (!time)
+    return Error{std::string (key) + ": " + time.error ().message};
+  out = *time;
+  return {};
+}
+
+Result<void>
+read_order (std::string_view value, Schedule::Parts &parts)
+{
+  const int n = parts.tile.elements ();
+  if (value == "raster" || value == "bit-reversal") {
+    parts.order = value == "raster" ? raster_order (n) : bit_reversed_order (n);
+    return {};
+  }
+  for (const std::string_view entry : split (value, '/')) {
+    const auto element = parse_int (entry);
+    if (!element)
+      return bad_value ("order", value,
+          in_quotes (entry) +
+              " is no element; write raster, bit-reversal or the element of "
+              "each label, as in order=0/2/1/3");
+    parts.order.push_back (*element);
+  }
+  return {};
+}
+
+Result<void>
+read_phase (std::string_view value, Schedule::Parts &parts)
+{
+  const auto pieces = split (value, '/');
+  const auto x = parse_int (pieces.front ());
+  const auto y = parse_int (pieces.back ());
+  if (pieces.size () != 2 || !x || !y)
+    return bad_value ("phase", value,
+        "it must be two whole numbers x/y, in pixels, as in phase=1/0");
+  parts.phase = {*x, *y};
+  return {};
+}
+
+Result<void>
+read_leak (std::string_view value, Schedule::Parts &parts)
+{
+  const auto leak = parse_real (value);
+  if (!leak)
+    return bad_value ("leak", value,
+        "it must be a number from 0 to 0.5, the light of a shut mirror as a "
+        "part of an open one's, as in leak=0.01");
+  parts.leak = *leak;
+  return {};
+}
+
+Result<void>
+read_pilot (std::string_view value, Schedule::Parts &parts)
+{
+  const auto rows = parse_int (value);
+  if (!rows)
+    return bad_value ("pilot", value,
+        "it must be a whole number of mirror rows, as in pilot=16");
+  parts.pilot_rows = *rows;
+  return {};
+}
+
+struct Key {
+  std::string_view name;
+  Result<void> (*read) (std::string_view value, Schedule::Parts &parts);
+};
+
+constexpr std::array<Key, 7> kKeys{{
+    {"active",
+        [] (std::string_view value, Schedule::Parts &parts) {
+          return read_time ("active", value, parts.timing.active);
+        }},
+    {"switching",
+        [] (std::string_view value, Schedule::Parts &parts) {
+          return read_time ("switching", value, parts.timing.switching);
+        }},
+    {"readout",
+        [] (std::string_view value, Schedule::Parts &parts) {
+          return read_time ("readout", value, parts.timing.readout);
+        }},
+    {"order", read_order},
+    {"phase", read_phase},
+    {"leak", read_leak},
+    {"pilot", read_pilot},
+}};
+
+std::string
+key_names ()
+{
+  std::string names;
+  for (const Key &key : kKeys)
+    names += (names.empty () ? "" : ", ") + std::string (key.name);
+  return names;
+}
+
+/** Reads every key=value of @p settings into @p parts. */
+Result<void>
+read_settings (
+    const std::vector<std::string_view> &settings, Schedule::Parts &parts)
+{
+  std::array<bool, kKeys.size ()> seen{};
+  for (const std::string_view setting : settings) {
+    const std::size_t equals = setting.find ('=');
+    if (equals == setting.npos)
+      return Error{
+          in_quotes (setting) +
+          " after a comma is not of the form key=value; the keys are " +
+          key_names () +
+          ", and lists are written with '/', as in order=0/2/1/3"};
+    const std::string_view name = setting.substr (0, equals);
+    const auto key = std::find_if (kKeys.begin (), kKeys.end (),
+        [name] (const Key &known) { return known.name == name; });
+    if (key == kKeys.end ())
+      return Error{"there is no key " + in_quotes (name) + "; the keys are " +
+                   key_names ()};
+
+    bool &given = seen[std::size_t (key - kKeys.begin ())];
+    if (given)
+      return Error{
+          "key " + in_quotes (name) + " is given twice; leave one out"};
+    given = true;
+    if (const auto read = key->read (setting.substr (equals + 1), parts); !read)
+      return read;
+  }
+  return {};
+}
+
+Result<Schedule>
+read_preset (std::string_view preset)
+{
+  const std::string form = "; a preset is CODE:TILE[,key=value...], such as " +
+                           std::string (kExample);
+  auto pieces = split (preset, ',');
+  const std::string_view head = pieces.front ();
+  const std::size_t colon = head.find (':');
+  const std::string_view name = head.substr (0, colon);
+  if (std::find (kCodes.begin (), kCodes.end (), name) == kCodes.end ())
+    return Error{in_quotes (name) +
+                 " is no code; the codes are sequential, "
+                 "staircase and s-matrix, and any other is "
+                 "written out in a JSON file" +
+                 form};
+  if (colon == head.npos)
+    return Error{"the tile is missing" + form};
+
+  const auto tile = Tile::parse (head.substr (colon + 1));
+  if (!tile)
+    return tile.error ();
+  const auto code = Code::named (name, tile->elements ());
+  if (!code)
+    return code.error ();
+
+  Schedule::Parts parts{*tile, *code};
+  pieces.erase (pieces.begin ());
+  if (const auto read = read_settings (pieces, parts); !read)
+    return read.error ();
+  return Schedule::make (std::move (parts));
+}
+
+/** Up to @p limit + 1 bytes of a file, so that the caller can tell when there
+ * are too many. */
+Result<std::string>
+read_file (const std::string &path, std::size_t limit)
+{
+  const auto failure = [] (const char *what) {
+    return Error{
+        std::string (what) + ": " + std::generic_category ().message (errno)};
+  };
+  const std::unique_ptr<std::FILE, int (*) (std::FILE *)> file (
+      std::fopen (path.c_str (), "rb"), std::fclose);
+  if (!file)
+    return failure ("it cannot be opened");
+
+  std::string content (limit + 1, '\0');
+  content.resize (
+      std::fread (content.data (), 1, content.size (), file.get ()));
+  if (std::ferror (file.get ()) != 0)
+    return failure ("it cannot be read");
+  return content;
+}
+
+Result<Schedule>
+read_json_file (std::string_view path)
+{
+  const std::string what = "schedule file " + in_quotes (path) + ": ";
+  if (path.find ('\0') != path.npos)
+    return Error{what + "a path holds no zero bytes"};
+  const auto content = read_file (std::string (path), Schedule::kMaxJsonSize);
+  if (!content)
+    return Error{what + content.error ().message +
+                 "; a text with '/' or ending in .json is the path of a JSON "
+                 "file unless it begins with sequential:, staircase: or "
+                 "s-matrix:"};
+  auto schedule = Schedule::from_json (*content);
+  if (!schedule)
+    return Error{what + schedule.error ().message};
+  return schedule;
+}
+
+std::string
+order_text (const std::vector<int> &order)
+{
+  const int n = int (order.size ());
+  if (order == raster_order (n))
+    return "";
+  if (order == bit_reversed_order (n))
+    return ",order=bit-reversal";
+  std::string text;
+  for (const int element : order)
+    text += (text.empty () ? ",order=" : "/") + std::to_string (element);
+  return text;
+}
+
+} // namespace
+
+Result<Schedule>
+Schedule::parse (std::string_view preset_or_path)
+{
+  if (preset_or_path.empty ())
+    return Error{"the schedule is empty; write a preset, such as " +
+                 std::string (kExample) + ", or the path of a JSON file"};
+  const bool path_like = preset_or_path.find ('/') != preset_or_path.npos ||
+                         preset_or_path.ends_with (".json");
+  if (path_like && !begins_with_code (preset_or_path))
+    return read_json_file (preset_or_path);
+  return from_preset (preset_or_path);
+}
+
+Result<Schedule>
+Schedule::from_preset (std::string_view preset)
+{
+  auto schedule = read_preset (preset);
+  if (!schedule)
+    return Error{
+        "schedule " + in_quotes (preset) + ": " + schedule.error ().message};
+  return schedule;
+}
+
+std::string
+Schedule::text () const
+{
+  std::string text = code ().name () + ":" + tile ().name ();
+  if (timing ().active != 0)
+    text += ",active=" + time_text (timing ().active);
+  if (timing ().switching != 0)
+    text += ",switching=" + time_text (timing ().switching);
+  if (timing ().readout != 0)
+    text += ",readout=" + time_text (timing ().readout);
+  text += order_text (order ());
+  if (phase () != Offset{})
+    text += ",phase=" + std::to_string (phase ().x) + "/" +
+            std::to_string (phase ().y);
+  if (leak () != 0.0)
+    text += ",leak=" + real_text (leak ());
+  if (pilot_rows () != 0)
+    text += ",pilot=" + std::to_string (pilot_rows ());
+  return text;
+}
+
+} // namespace cexp

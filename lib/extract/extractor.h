@@ -6,6 +6,7 @@
 #include <memory>
 #include <span>
 #include <string_view>
+#include <vector>
 
 #include "base/image.h"
 #include "base/result.h"
@@ -34,10 +35,18 @@ struct ExtractOptions {
   /** Significant bits of a pixel, 1..8 or 1..16; 0: all that the type has. */
   int bits = 0;
   /** decode only: interpolate each element to the centre of the cell before
-   * the code is solved, where the tile is a raster. Off: solve with the pixels
+   * the code is solved, where each element stands at the same place in every
+   * cell (raster tiles) and the code is not one-hot. Off: solve with the pixels
    * as they stand, at different places. */
   bool interpolate = true;
+  /** One of extract_targets (), which all give the same pixels; empty: the
+   * fastest. */
+  std::string_view target = {};
 };
+
+/** The instruction sets that extraction can use on this machine, fastest first;
+ * the last one is always "scalar", the readable reference. */
+std::vector<std::string_view> extract_targets ();
 
 /** What one coded frame was seen to hold. */
 struct ExtractReport {
@@ -54,10 +63,12 @@ template <typename Pixel> // std::uint8_t or std::uint16_t (host order)
 class Extractor
 {
 public:
-  /** Error when the method needs what the code has not (decode of a singular
-   * code, select of a code that is not one-hot when asked for by name is
-   * allowed: it shows exposures of different lengths), when a number is out of
-   * range, or when the frame holds no cell. */
+  /**
+   * Error when the method needs what the code has not (decode of a singular
+   * code), when a number is out of range, or when the frame holds no cell.
+   * Select of a code that is not one-hot is allowed by name: subframe k is
+   * element k then, and exposures have different lengths.
+   */
   static Result<Extractor> make (const Schedule &schedule, int width,
       int height, const ExtractOptions &options = {});
 
@@ -76,11 +87,20 @@ public:
    * @p coded      width x height pixels.
    * @p subframes  subframes () views of subframe_size (), in exposure order,
    *               fully overwritten; none overlaps another or @p coded.
-   * Select and rank copy values; decode rounds to nearest and clamps to
-   * 0..2^bits - 1.
+   * Select and rank copy values. Decode rounds to nearest and clamps to
+   * 0..2^bits - 1 (decoder.h has the arithmetic): of a still, flat scene, and
+   * with interpolation of any that is linear over neighbouring cells, it gives
+   * the light of a slot times the gain within
+   *   sum |factor| / 2 + 1/2, which is gain (1/2 + 1/2) + 1/2 for a staircase:
+   * half a step from each coded pixel, half from the result.
    */
   ExtractReport run (ImageView<const Pixel> coded,
       std::span<const ImageView<Pixel>> subframes) const;
+  /** The same for rows [@p first_row, @p first_row + @p rows) of the
+   * subframes only, so that threads can share one frame. */
+  ExtractReport run_rows (ImageView<const Pixel> coded,
+      std::span<const ImageView<Pixel>> subframes, int first_row,
+      int rows) const;
 
 private:
   struct Plan;

@@ -1,0 +1,209 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "extract/extractor.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <string>
+
+#include "extract/decoder.h"
+#include "extract/reference.h"
+#include "schedule/sample_grid.h"
+
+namespace cexp
+{
+
+namespace
+{
+
+constexpr std::array<std::string_view, 4> kMethodNames = {
+    "auto", "rank", "select", "decode"};
+
+Method
+method_for (const Schedule &schedule)
+{
+  if (schedule.code ().one_hot () && schedule.leak () == 0.0)
+    return Method::kSelect;
+  return schedule.code ().inverse (schedule.leak ()) ? Method::kDecode
+                                                     : Method::kRank;
+}
+
+/** Element of each subframe: the one that is open in the slot of a one-hot
+ * code, else the element of that number. */
+std::vector<int>
+elements_by_slot (const Code &code)
+{
+  std::vector<int> elements (std::size_t (code.slots ()));
+  for (int s = 0; s < code.slots (); s++) {
+    int &element = elements[std::size_t (s)] = s;
+    if (code.one_hot ())
+      for (element = 0; !code.open (element, s); element++) {
+      }
+  }
+  return elements;
+}
+
+Result<void>
+check_options (const ExtractOptions &options, int type_bits)
+{
+  if (options.bits < 0 || options.bits > type_bits)
+    return Error{"bits " + std::to_string (options.bits) +
+                 " of pixels that have " + std::to_string (type_bits) +
+                 ": give 1 to " + std::to_string (type_bits) +
+                 ", or 0 for all of them"};
+  if (!std::isfinite (options.gain) || options.gain < 0.0)
+    return Error{"gain " + std::to_string (options.gain) +
+                 " is not a factor on light: give a positive number, or 0 for "
+                 "the gain that keeps white white"};
+  const auto targets = extract_targets ();
+  if (!options.target.empty () &&
+      std::ranges::find (targets, options.target) == targets.end ())
+    return Error{"extraction for '" +
+                 std::string (options.target.substr (0, 64)) +
+                 "' does not exist on this machine; 'scalar' always does"};
+  return {};
+}
+
+} // namespace
+
+std::string_view
+method_name (Method method)
+{
+  return kMethodNames[std::size_t (method)];
+}
+
+Result<Method>
+parse_method (std::string_view name)
+{
+  const auto found = std::ranges::find (kMethodNames, name);
+  if (found == kMethodNames.end ())
+    return Error{"method '" + std::string (name.substr (0, 64)) +
+                 "' is none of auto, rank, select and decode"};
+  return Method (found - kMethodNames.begin ());
+}
+
+std::vector<std::string_view>
+extract_targets ()
+{
+  return {"scalar"};
+}
+
+template <typename Pixel>
+struct Extractor<Pixel>::Plan {
+  Method method;
+  SampleGrid grid;
+  Extent size;
+  int largest;
+  std::vector<int> elements;
+  std::optional<Decoder> decoder = {};
+};
+
+template <typename Pixel>
+Extractor<Pixel>::Extractor (std::unique_ptr<const Plan> plan)
+    : plan_ (std::move (plan))
+{
+}
+
+template <typename Pixel>
+Extractor<Pixel>::Extractor (Extractor &&) noexcept = default;
+template <typename Pixel>
+Extractor<Pixel> &Extractor<Pixel>::operator= (Extractor &&) noexcept = default;
+template <typename Pixel>
+Extractor<Pixel>::~Extractor () = default;
+
+template <typename Pixel>
+Result<Extractor<Pixel>>
+Extractor<Pixel>::make (const Schedule &schedule, int width, int height,
+    const ExtractOptions &options)
+{
+  constexpr int kTypeBits = std::numeric_limits<Pixel>::digits;
+  if (const auto checked = check_options (options, kTypeBits); !checked)
+    return checked.error ();
+
+  const SampleGrid grid (schedule);
+  const Extent size = grid.subframe_size (width, height);
+  if (size.width < 1 || size.height < 1)
+    return Error{"frame of " + std::to_string (width) + "x" +
+                 std::to_string (height) + " pixels holds no cell of " +
+                 std::to_string (grid.cell ().width) + "x" +
+                 std::to_string (grid.cell ().height) + " above the pilot's " +
+                 std::to_string (schedule.pilot_rows ()) +
+                 " rows; take larger frames or a smaller tile"};
+
+  const Method method =
+      options.method == Method::kAuto ? method_for (schedule) : options.method;
+  const int bits = options.bits > 0 ? options.bits : kTypeBits;
+  auto plan = std::make_unique<Plan> (Plan{method, grid, size, (1 << bits) - 1,
+      elements_by_slot (schedule.code ())});
+  if (method == Method::kDecode) {
+    auto decoder = Decoder::make (schedule, options.gain, options.interpolate);
+    if (!decoder)
+      return decoder.error ();
+    plan->decoder = std::move (*decoder);
+  }
+  return Extractor (std::move (plan));
+}
+
+template <typename Pixel>
+Method
+Extractor<Pixel>::method () const
+{
+  return plan_->method;
+}
+
+template <typename Pixel>
+double
+Extractor<Pixel>::gain () const
+{
+  return plan_->decoder ? plan_->decoder->gain () : 1.0;
+}
+
+template <typename Pixel>
+int
+Extractor<Pixel>::subframes () const
+{
+  return plan_->grid.elements ();
+}
+
+template <typename Pixel>
+Extent
+Extractor<Pixel>::subframe_size () const
+{
+  return plan_->size;
+}
+
+template <typename Pixel>
+ExtractReport
+Extractor<Pixel>::run (ImageView<const Pixel> coded,
+    std::span<const ImageView<Pixel>> subframes) const
+{
+  return run_rows (coded, subframes, 0, plan_->size.height);
+}
+
+template <typename Pixel>
+ExtractReport
+Extractor<Pixel>::run_rows (ImageView<const Pixel> coded,
+    std::span<const ImageView<Pixel>> subframes, int first_row, int rows) const
+{
+  const Plan &plan = *plan_;
+  const RowRange range = {first_row, rows};
+  switch (plan.method) {
+  case Method::kDecode:
+    reference_decode (
+        coded, plan.grid, *plan.decoder, plan.largest, range, subframes);
+    break;
+  case Method::kSelect:
+    reference_select<Pixel> (coded, plan.grid, plan.elements, range, subframes);
+    break;
+  default:
+    reference_rank (coded, plan.grid, range, subframes);
+  }
+  return {reference_saturated (coded, plan.grid, plan.largest, range)};
+}
+
+template class Extractor<std::uint8_t>;
+template class Extractor<std::uint16_t>;
+
+} // namespace cexp

@@ -1,0 +1,138 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "extract/reference.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "extract/group_sort.h"
+
+namespace cexp
+{
+
+namespace
+{
+
+/** The pixels of elements, found through the grid. */
+template <typename Pixel>
+struct Samples {
+  ImageView<const Pixel> coded;
+  const SampleGrid &grid;
+
+  Pixel at (int element, int i, int j) const
+  {
+    const Offset d = grid.offset (element, i, j);
+    const Extent cell = grid.cell ();
+    return coded.at (i * cell.width + d.x, j * cell.height + d.y);
+  }
+};
+
+template <typename Pixel>
+int
+element_value (const Samples<Pixel> &samples, const Decoder &decoder,
+    Extent size, int element, int i, int j)
+{
+  const Offset offset = samples.grid.offset (element, i, j);
+  const Lerp x = decoder.lerp_x (offset);
+  const Lerp y = decoder.lerp_y (offset);
+  const int xi = std::clamp (i + x.step, 0, size.width - 1);
+  const int yj = std::clamp (j + y.step, 0, size.height - 1);
+  const int here =
+      y.near * samples.at (element, i, j) + y.far * samples.at (element, i, yj);
+  const int beside = y.near * samples.at (element, xi, j) +
+                     y.far * samples.at (element, xi, yj);
+  return x.near * here + x.far * beside;
+}
+
+} // namespace
+
+template <typename Pixel>
+void
+reference_rank (ImageView<const Pixel> coded, const SampleGrid &grid,
+    RowRange rows, std::span<const ImageView<Pixel>> subframes)
+{
+  const Samples<Pixel> samples{coded, grid};
+  const int n = grid.elements ();
+  std::array<Pixel, Tile::kMaxElements> group;
+
+  for (int j = rows.first; j < rows.first + rows.count; j++) {
+    for (int i = 0; i < subframes[0].width; i++) {
+      for (int e = 0; e < n; e++)
+        group[std::size_t (e)] = samples.at (e, i, j);
+      group_sort (std::span (group).first (std::size_t (n)));
+      for (int k = 0; k < n; k++)
+        subframes[std::size_t (k)].at (i, j) = group[std::size_t (k)];
+    }
+  }
+}
+
+template <typename Pixel>
+void
+reference_select (ImageView<const Pixel> coded, const SampleGrid &grid,
+    std::span<const int> elements, RowRange rows,
+    std::span<const ImageView<Pixel>> subframes)
+{
+  const Samples<Pixel> samples{coded, grid};
+  for (std::size_t k = 0; k < subframes.size (); k++)
+    for (int j = rows.first; j < rows.first + rows.count; j++)
+      for (int i = 0; i < subframes[k].width; i++)
+        subframes[k].at (i, j) = samples.at (elements[k], i, j);
+}
+
+template <typename Pixel>
+void
+reference_decode (ImageView<const Pixel> coded, const SampleGrid &grid,
+    const Decoder &decoder, int largest, RowRange rows,
+    std::span<const ImageView<Pixel>> subframes)
+{
+  const Samples<Pixel> samples{coded, grid};
+  const Extent size = {subframes[0].width, subframes[0].height};
+  std::array<int, Tile::kMaxElements> values;
+
+  for (int j = rows.first; j < rows.first + rows.count; j++) {
+    for (int i = 0; i < size.width; i++) {
+      for (int e = 0; e < grid.elements (); e++)
+        values[std::size_t (e)] =
+            element_value (samples, decoder, size, e, i, j);
+      for (int s = 0; s < decoder.slots (); s++) {
+        double light = 0.0;
+        for (const Term &term : decoder.terms (s))
+          light += term.factor * values[std::size_t (term.element)];
+        subframes[std::size_t (s)].at (i, j) = Pixel (
+            std::clamp (std::floor (light + 0.5), 0.0, double (largest)));
+      }
+    }
+  }
+}
+
+template <typename Pixel>
+std::uint64_t
+reference_saturated (ImageView<const Pixel> coded, const SampleGrid &grid,
+    int largest, RowRange rows)
+{
+  const Extent cell = grid.cell ();
+  const int width = coded.width / cell.width * cell.width;
+  std::uint64_t count = 0;
+  for (int y = rows.first * cell.height;
+       y < (rows.first + rows.count) * cell.height; y++) {
+    const Pixel *row = coded.row (y);
+    count += std::uint64_t (std::count_if (row, row + width,
+        [largest] (Pixel pixel) { return pixel >= largest; }));
+  }
+  return count;
+}
+
+#define CEXP_INSTANTIATE(Pixel)                                                \
+  template void reference_rank (ImageView<const Pixel>, const SampleGrid &,    \
+      RowRange, std::span<const ImageView<Pixel>>);                            \
+  template void reference_select (ImageView<const Pixel>, const SampleGrid &,  \
+      std::span<const int>, RowRange, std::span<const ImageView<Pixel>>);      \
+  template void reference_decode (ImageView<const Pixel>, const SampleGrid &,  \
+      const Decoder &, int, RowRange, std::span<const ImageView<Pixel>>);      \
+  template std::uint64_t reference_saturated (                                 \
+      ImageView<const Pixel>, const SampleGrid &, int, RowRange);
+
+CEXP_INSTANTIATE (std::uint8_t)
+CEXP_INSTANTIATE (std::uint16_t)
+
+} // namespace cexp

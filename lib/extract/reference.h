@@ -1,0 +1,48 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Extraction pixel by pixel: slow, readable, and the truth that the kernels
+ * must equal bit for bit. */
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "base/image.h"
+#include "extract/decoder.h"
+#include "schedule/sample_grid.h"
+
+namespace cexp
+{
+
+/** Rows of cells. */
+struct RowRange {
+  int first = 0;
+  int count = 0;
+};
+
+/* In all of these: @p coded is the whole coded frame, @p subframes are n whole
+ * subframes in exposure order, of which @p rows are written. Pixel is
+ * std::uint8_t or std::uint16_t. */
+
+/** Subframe k = k-th smallest of the group, by the paper's group_sort (). */
+template <typename Pixel>
+void reference_rank (ImageView<const Pixel> coded, const SampleGrid &grid,
+    RowRange rows, std::span<const ImageView<Pixel>> subframes);
+
+/** Subframe k = element @p elements[k]. */
+template <typename Pixel>
+void reference_select (ImageView<const Pixel> coded, const SampleGrid &grid,
+    std::span<const int> elements, RowRange rows,
+    std::span<const ImageView<Pixel>> subframes);
+
+/** Subframe k = light of slot k by @p decoder, clamped to 0..@p largest. */
+template <typename Pixel>
+void reference_decode (ImageView<const Pixel> coded, const SampleGrid &grid,
+    const Decoder &decoder, int largest, RowRange rows,
+    std::span<const ImageView<Pixel>> subframes);
+
+/** Pixels of the cells in @p rows that are not below @p largest. */
+template <typename Pixel>
+std::uint64_t reference_saturated (ImageView<const Pixel> coded,
+    const SampleGrid &grid, int largest, RowRange rows);
+
+} // namespace cexp

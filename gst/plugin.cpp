@@ -2,13 +2,14 @@
 /* The plugin: registers its elements, nothing else. */
 #include <gst/gst.h>
 
+#include "gstcodedexposurelog.h"
 #include "gstcodedexposuremeta.h"
 
 static gboolean
-plugin_init (GstPlugin *)
+plugin_init (GstPlugin *plugin)
 {
   cexp::gst::register_frame_meta ();
-  return TRUE;
+  return GST_ELEMENT_REGISTER (codedexposure_log, plugin);
 }
 
 GST_PLUGIN_DEFINE (GST_VERSION_MAJOR, GST_VERSION_MINOR, codedexposure,

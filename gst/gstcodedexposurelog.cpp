@@ -1,0 +1,324 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-codedexposure-log
+ * @title: codedexposure-log
+ *
+ * Passes coded frames on and writes what is known of each of them to a file,
+ * one line of JSON a frame: number, time, exposure, lock, losses. A recording
+ * keeps the pictures and the schedule, but nothing that travels as meta; this
+ * file, its sidecar, keeps the rest.
+ *
+ * The first line is the schedule in its JSON form, so that a recording that was
+ * cut short, before its tags could be written, still decodes. Every line is
+ * handed to the system as soon as it is known: a crash costs one line at most.
+ *
+ * ## Example pipeline
+ * |[
+ * gst-launch-1.0 -e videotestsrc num-buffers=100 !
+ * video/x-raw,format=GRAY8,framerate=100/1 ! codedexposure-sim !
+ * codedexposure-log location=coded.jsonl ! avenc_ffv1 ! matroskamux
+ * timecodescale=1000 ! filesink location=coded.mkv
+ * ]|
+ *
+ * Since: 0.1
+ */
+#include "gstcodedexposurelog.h"
+
+#include <cerrno>
+#include <optional>
+#include <string>
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <nlohmann/json.hpp>
+
+#include "gstcodedexposurecaps.h"
+#include "gstcodedexposuremeta.h"
+#include "gstcodedexposuretag.h"
+#include "gstraii.h"
+
+using namespace cexp::gst;
+
+GST_DEBUG_CATEGORY_STATIC (codedexposure_log_debug);
+#define GST_CAT_DEFAULT codedexposure_log_debug
+
+namespace
+{
+
+struct LogState {
+  std::string location; // object lock
+  /* Streaming thread, and start and stop, which exclude it: */
+  std::string open_location;
+  int file = -1;
+  guint64 frames = 0;
+  std::optional<cexp::Schedule> schedule; // written last
+};
+
+enum { PROP_0, PROP_LOCATION };
+
+constexpr auto kReadyFlags = GParamFlags (
+    G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY);
+
+/** One line of JSON, keys in this order; unknown values are left out. */
+std::string
+frame_line (GstBuffer *frame, guint64 counted, const GstSegment &segment)
+{
+  const auto meta = get_frame_meta (frame);
+  const auto set_time = [&segment] (nlohmann::ordered_json &line,
+                            const char *key, GstClockTime time) {
+    const guint64 running =
+        gst_segment_to_running_time (&segment, GST_FORMAT_TIME, time);
+    if (GST_CLOCK_TIME_IS_VALID (running))
+      line[key] = running;
+  };
+
+  nlohmann::ordered_json line;
+  line["frame"] = meta ? meta->frame : counted;
+  set_time (line, "pts_ns", GST_BUFFER_PTS (frame));
+  if (meta) {
+    set_time (line, "exposure_start_ns", meta->exposure_start);
+    if (GST_CLOCK_TIME_IS_VALID (meta->exposure_duration))
+      line["exposure_duration_ns"] = meta->exposure_duration;
+    line["locked"] = bool (meta->locked);
+    line["slip"] = meta->slip;
+    line["lost_before"] = meta->lost_before;
+    line["saturated"] = meta->saturated;
+  }
+  auto flags = nlohmann::ordered_json::array ();
+  if (GST_BUFFER_IS_DISCONT (frame))
+    flags.push_back ("discont");
+  if (GST_BUFFER_FLAG_IS_SET (frame, GST_BUFFER_FLAG_CORRUPTED))
+    flags.push_back ("corrupted");
+  if (GST_BUFFER_FLAG_IS_SET (frame, GST_BUFFER_FLAG_GAP))
+    flags.push_back ("gap");
+  if (GST_BUFFER_FLAG_IS_SET (frame, GST_BUFFER_FLAG_DROPPABLE))
+    flags.push_back ("droppable");
+  line["flags"] = std::move (flags);
+  return line.dump ();
+}
+
+/** Writes all of @p text; 0, or the errno of the failure. */
+int
+write_all (int file, const std::string &text)
+{
+  std::size_t written = 0;
+  while (written < text.size ()) {
+    const ssize_t n =
+        write (file, text.data () + written, text.size () - written);
+    if (n < 0 && errno == EINTR)
+      continue;
+    if (n < 0)
+      return errno;
+    written += std::size_t (n);
+  }
+  return 0;
+}
+
+} // namespace
+
+struct _GstCodedExposureLog {
+  GstBaseTransform parent;
+  LogState *state;
+};
+
+#define gst_coded_exposure_log_parent_class parent_class
+G_DEFINE_TYPE_WITH_CODE (GstCodedExposureLog, gst_coded_exposure_log,
+    GST_TYPE_BASE_TRANSFORM,
+    GST_DEBUG_CATEGORY_INIT (codedexposure_log_debug, "codedexposure-log", 0,
+        "per-frame record of coded frames"))
+GST_ELEMENT_REGISTER_DEFINE (codedexposure_log, "codedexposure-log",
+    GST_RANK_NONE, GST_TYPE_CODED_EXPOSURE_LOG)
+
+/* Errors go to the bus. */
+static bool
+write_line (GstCodedExposureLog *self, const std::string &line)
+{
+  const LogState &state = *self->state;
+  const int failure = write_all (state.file, line + "\n");
+  if (failure == 0)
+    return true;
+  gst_element_message_full (GST_ELEMENT (self), GST_MESSAGE_ERROR,
+      GST_RESOURCE_ERROR,
+      failure == ENOSPC ? GST_RESOURCE_ERROR_NO_SPACE_LEFT
+                        : GST_RESOURCE_ERROR_WRITE,
+      g_strdup_printf (
+          "Cannot write to \"%s\": %s. It holds the frames up to here.",
+          state.open_location.c_str (), g_strerror (failure)),
+      nullptr, __FILE__, GST_FUNCTION, __LINE__);
+  return false;
+}
+
+static GstFlowReturn
+gst_coded_exposure_log_transform_ip (GstBaseTransform *base, GstBuffer *frame)
+{
+  auto *self = GST_CODED_EXPOSURE_LOG (base);
+  LogState &state = *self->state;
+  const std::string line = frame_line (frame, state.frames, base->segment);
+  state.frames++;
+  return write_line (self, line) ? GST_FLOW_OK : GST_FLOW_ERROR;
+}
+
+/* Tags repeat as they are merged on their way; the schedule is written once. */
+static void
+note_schedule (GstCodedExposureLog *self, GstEvent *event)
+{
+  LogState &state = *self->state;
+  GstTagList *tags = nullptr;
+  gst_event_parse_tag (event, &tags);
+  const auto schedule = schedule_from_tags (tags);
+  if (!schedule)
+    return;
+  if (!*schedule) {
+    GST_ELEMENT_WARNING (self, STREAM, DECODE,
+        ("The schedule of the stream is not recorded: %s",
+            schedule->error ().message.c_str ()),
+        (nullptr));
+    return;
+  }
+  if (state.schedule == schedule->value ())
+    return;
+  state.schedule = schedule->value ();
+  write_line (self, state.schedule->to_json ());
+}
+
+static gboolean
+gst_coded_exposure_log_sink_event (GstBaseTransform *base, GstEvent *event)
+{
+  if (GST_EVENT_TYPE (event) == GST_EVENT_TAG)
+    note_schedule (GST_CODED_EXPOSURE_LOG (base), event);
+  return GST_BASE_TRANSFORM_CLASS (parent_class)->sink_event (base, event);
+}
+
+static gboolean
+gst_coded_exposure_log_start (GstBaseTransform *base)
+{
+  auto *self = GST_CODED_EXPOSURE_LOG (base);
+  LogState &state = *self->state;
+  {
+    const ObjectLock lock (self);
+    state.open_location = state.location;
+  }
+  state.frames = 0;
+  state.schedule.reset ();
+  if (state.open_location.empty ()) {
+    GST_ELEMENT_ERROR (self, RESOURCE, NOT_FOUND,
+        ("codedexposure-log has no file to write to: set location=FILE.jsonl"),
+        (nullptr));
+    return FALSE;
+  }
+  state.file = open (state.open_location.c_str (),
+      O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  if (state.file < 0) {
+    GST_ELEMENT_ERROR (self, RESOURCE, OPEN_WRITE,
+        ("Cannot open \"%s\" for writing: %s", state.open_location.c_str (),
+            g_strerror (errno)),
+        (nullptr));
+    return FALSE;
+  }
+  return TRUE;
+}
+
+static gboolean
+gst_coded_exposure_log_stop (GstBaseTransform *base)
+{
+  auto *self = GST_CODED_EXPOSURE_LOG (base);
+  LogState &state = *self->state;
+  /* Network and quota errors may wait for the end. */
+  if (close (state.file) != 0)
+    GST_ELEMENT_ERROR (self, RESOURCE, CLOSE,
+        ("Cannot finish \"%s\": %s", state.open_location.c_str (),
+            g_strerror (errno)),
+        (nullptr));
+  state.file = -1;
+  return TRUE;
+}
+
+static void
+gst_coded_exposure_log_set_property (
+    GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+{
+  auto *self = GST_CODED_EXPOSURE_LOG (object);
+  if (id != PROP_LOCATION) {
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+    return;
+  }
+  const ObjectLock lock (self);
+  if (GST_STATE (self) > GST_STATE_READY) {
+    GST_WARNING_OBJECT (self, "location cannot change while frames flow");
+    return;
+  }
+  const gchar *location = g_value_get_string (value);
+  self->state->location = location ? location : "";
+}
+
+static void
+gst_coded_exposure_log_get_property (
+    GObject *object, guint id, GValue *value, GParamSpec *pspec)
+{
+  auto *self = GST_CODED_EXPOSURE_LOG (object);
+  if (id != PROP_LOCATION) {
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+    return;
+  }
+  const ObjectLock lock (self);
+  const std::string &location = self->state->location;
+  g_value_set_string (value, location.empty () ? nullptr : location.c_str ());
+}
+
+static void
+gst_coded_exposure_log_init (GstCodedExposureLog *self)
+{
+  self->state = new LogState;
+  gst_base_transform_set_passthrough (GST_BASE_TRANSFORM (self), TRUE);
+}
+
+static void
+gst_coded_exposure_log_finalize (GObject *object)
+{
+  delete GST_CODED_EXPOSURE_LOG (object)->state;
+  G_OBJECT_CLASS (parent_class)->finalize (object);
+}
+
+static void
+gst_coded_exposure_log_class_init (GstCodedExposureLogClass *klass)
+{
+  auto *object_class = G_OBJECT_CLASS (klass);
+  auto *element_class = GST_ELEMENT_CLASS (klass);
+  auto *transform_class = GST_BASE_TRANSFORM_CLASS (klass);
+
+  object_class->set_property = gst_coded_exposure_log_set_property;
+  object_class->get_property = gst_coded_exposure_log_get_property;
+  object_class->finalize = gst_coded_exposure_log_finalize;
+  /**
+   * GstCodedExposureLog:location:
+   *
+   * File to write, overwritten when it exists.
+   *
+   * Since: 0.1
+   */
+  g_object_class_install_property (object_class, PROP_LOCATION,
+      g_param_spec_string ("location", "File Location",
+          "File to write, one line of JSON a coded frame; overwritten when it "
+          "exists",
+          nullptr, kReadyFlags));
+
+  gst_element_class_set_static_metadata (element_class,
+      "Coded exposure frame log", "Filter/Analyzer/Video",
+      "Writes what is known of every coded frame to a file of JSON lines",
+      "gst-codedexposure");
+  static GstStaticPadTemplate sink =
+      GST_STATIC_PAD_TEMPLATE ("sink", GST_PAD_SINK, GST_PAD_ALWAYS,
+          GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
+  static GstStaticPadTemplate src = GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC,
+      GST_PAD_ALWAYS, GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
+  gst_element_class_add_static_pad_template (element_class, &sink);
+  gst_element_class_add_static_pad_template (element_class, &src);
+
+  transform_class->start = GST_DEBUG_FUNCPTR (gst_coded_exposure_log_start);
+  transform_class->stop = GST_DEBUG_FUNCPTR (gst_coded_exposure_log_stop);
+  transform_class->sink_event =
+      GST_DEBUG_FUNCPTR (gst_coded_exposure_log_sink_event);
+  transform_class->transform_ip =
+      GST_DEBUG_FUNCPTR (gst_coded_exposure_log_transform_ip);
+}

@@ -1,0 +1,589 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* codedexposure-launch: runs one pipeline for a script of this folder, and says
+ * how far it is, what went wrong and what was counted. */
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <cstring>
+#include <string>
+#include <string_view>
+
+#include <glib-unix.h>
+#include <gst/gst.h>
+
+#include "gstraii.h"
+
+namespace
+{
+
+using namespace cexp::gst;
+using Clock = std::chrono::steady_clock;
+
+/* What the scripts learn from the exit status. */
+enum ExitCode { kDone = 0, kFailed = 1, kUsage = 2, kNobodyListens = 4 };
+
+struct Options {
+  gchar *what = nullptr;     // the word in front of every line
+  gchar *count = nullptr;    // element whose sink pad sees every coded frame
+  gint64 total = 0;          // coded frames that are expected, 0: unknown
+  gchar *receiver = nullptr; // tcpserversink to wait for
+  gdouble retry = 0;         // seconds to go on trying to connect
+  gboolean print = FALSE;    // show the pipeline, do not run it
+};
+
+/** Elements that are not in GStreamer's base package, and what has them. */
+struct Provider {
+  std::string_view element, package;
+};
+constexpr Provider kProviders[] = {
+    {"aravissrc", "libaravis-0.8-0"},
+    {"avenc_ffv1", "gstreamer1.0-libav"},
+    {"avdec_ffv1", "gstreamer1.0-libav"},
+    {"gdppay", "gstreamer1.0-plugins-bad"},
+    {"gdpdepay", "gstreamer1.0-plugins-bad"},
+    {"openh264enc", "gstreamer1.0-plugins-bad"},
+    {"h264parse", "gstreamer1.0-plugins-bad"},
+    {"matroskamux", "gstreamer1.0-plugins-good"},
+    {"matroskademux", "gstreamer1.0-plugins-good"},
+    {"pngenc", "gstreamer1.0-plugins-good"},
+    {"autovideosink", "gstreamer1.0-plugins-good"},
+    {"ximagesink", "gstreamer1.0-x"},
+    {"textoverlay", "gstreamer1.0-x"},
+};
+
+std::string
+package_of (std::string_view element)
+{
+  for (const Provider &provider : kProviders)
+    if (provider.element == element)
+      return std::string (provider.package);
+  return {};
+}
+
+/** The last line of progress: rewritten on a terminal, one line every ten
+ * seconds in a log. */
+class Status
+{
+public:
+  explicit Status (std::string what)
+      : what_ (std::move (what)), terminal_ (isatty (STDERR_FILENO) != 0)
+  {
+  }
+
+  void progress (const std::string &text)
+  {
+    if (terminal_) {
+      std::fprintf (stderr, "\r%s: %s\033[K", what_.c_str (), text.c_str ());
+      open_ = true;
+    } else if (Clock::now () >= next_) {
+      std::fprintf (stderr, "%s: %s\n", what_.c_str (), text.c_str ());
+      next_ = Clock::now () + std::chrono::seconds (10);
+    }
+  }
+
+  void line (const std::string &text)
+  {
+    if (std::exchange (open_, false))
+      std::fprintf (stderr, "\r\033[K");
+    std::fprintf (stderr, "%s: %s\n", what_.c_str (), text.c_str ());
+  }
+
+private:
+  std::string what_;
+  bool terminal_;
+  bool open_ = false;
+  Clock::time_point next_ = Clock::now () + std::chrono::seconds (2);
+};
+
+std::string format (const char *pattern, ...) G_GNUC_PRINTF (1, 2);
+std::string
+format (const char *pattern, ...)
+{
+  va_list arguments;
+  va_start (arguments, pattern);
+  const CharPtr text (g_strdup_vprintf (pattern, arguments));
+  va_end (arguments);
+  return text.get ();
+}
+
+std::string
+minutes (double seconds)
+{
+  const int whole = int (seconds + 0.5);
+  return format ("%d:%02d", whole / 60, whole % 60);
+}
+
+double
+cpu_seconds ()
+{
+  rusage usage = {};
+  getrusage (RUSAGE_SELF, &usage);
+  const auto seconds = [] (const timeval &t) {
+    return double (t.tv_sec) + 1e-6 * double (t.tv_usec);
+  };
+  return seconds (usage.ru_utime) + seconds (usage.ru_stime);
+}
+
+class Launch
+{
+public:
+  Launch (const Options &options)
+      : options_ (options), status_ (options.what ? options.what : "launch"),
+        loop_ (g_main_loop_new (nullptr, FALSE))
+  {
+  }
+  ~Launch ()
+  {
+    if (pipeline_) {
+      gst_element_set_state (pipeline_.get (), GST_STATE_NULL);
+      const ObjectPtr<GstBus> bus (gst_element_get_bus (pipeline_.get ()));
+      gst_bus_remove_watch (bus.get ());
+    }
+    g_main_loop_unref (loop_);
+  }
+  Launch (const Launch &) = delete;
+  Launch &operator= (const Launch &) = delete;
+
+  bool parse (const char *description);
+  int run ();
+
+private:
+  GstElement *find (const gchar *name);
+  bool connect_counter ();
+  void start ();
+  bool has_receiver ();
+  void play ();
+  void interrupt ();
+  void on_message (GstMessage *message);
+  void on_error (GstMessage *message);
+  void on_element_message (GstMessage *message);
+  void tick ();
+  void summarise ();
+  void quit (int code)
+  {
+    code_ = code;
+    g_main_loop_quit (loop_);
+  }
+
+  static gboolean on_bus (GstBus *, GstMessage *message, gpointer self)
+  {
+    static_cast<Launch *> (self)->on_message (message);
+    return G_SOURCE_CONTINUE;
+  }
+  static gboolean on_signal (gpointer self)
+  {
+    static_cast<Launch *> (self)->interrupt ();
+    return G_SOURCE_CONTINUE;
+  }
+  static gboolean on_tick (gpointer self)
+  {
+    static_cast<Launch *> (self)->tick ();
+    return G_SOURCE_CONTINUE;
+  }
+  static GstPadProbeReturn on_frame (
+      GstPad *, GstPadProbeInfo *info, gpointer self);
+
+  const Options &options_;
+  Status status_;
+  GMainLoop *loop_;
+  ObjectPtr<GstElement> pipeline_;
+  ObjectPtr<GstPad> counted_;
+  std::atomic<gint64> frames_ = 0;
+  std::atomic<gint64> last_pts_ = -1; // ns, of the counted pad
+  Clock::time_point began_ = Clock::now ();
+  Clock::time_point retry_until_ = Clock::now ();
+  double cpu_at_start_ = 0;
+  bool playing_ = false;
+  bool interrupted_ = false;
+  int code_ = kDone;
+};
+
+bool
+Launch::parse (const char *description)
+{
+  GError *error = nullptr;
+  GstParseContext *context = gst_parse_context_new ();
+  GstElement *parsed = gst_parse_launch_full (
+      description, context, GST_PARSE_FLAG_FATAL_ERRORS, &error);
+  gchar **missing = gst_parse_context_get_missing_elements (context);
+  for (gchar **name = missing; name && *name; name++) {
+    const std::string package = package_of (*name);
+    status_.line (format ("there is no element \"%s\"%s%s", *name,
+        package.empty () ? "" : ": apt-get install ", package.c_str ()));
+  }
+  if (error && !missing)
+    status_.line (format ("the pipeline is wrong: %s", error->message));
+  g_strfreev (missing);
+  g_clear_error (&error);
+  gst_parse_context_free (context);
+  if (!parsed)
+    return false;
+  if (!GST_IS_PIPELINE (parsed)) { // a lone element is not wrapped
+    GstElement *pipeline = gst_pipeline_new (nullptr);
+    gst_bin_add (GST_BIN (pipeline), parsed);
+    parsed = pipeline;
+  }
+  pipeline_.reset (GST_ELEMENT (gst_object_ref_sink (parsed)));
+  return true;
+}
+
+GstElement *
+Launch::find (const gchar *name)
+{
+  return name ? gst_bin_get_by_name (GST_BIN (pipeline_.get ()), name)
+              : nullptr;
+}
+
+GstPadProbeReturn
+Launch::on_frame (GstPad *, GstPadProbeInfo *info, gpointer self)
+{
+  auto *launch = static_cast<Launch *> (self);
+  const GstBuffer *frame = GST_PAD_PROBE_INFO_BUFFER (info);
+  launch->frames_++;
+  if (GST_BUFFER_PTS_IS_VALID (frame))
+    launch->last_pts_ = gint64 (GST_BUFFER_PTS (frame));
+  return GST_PAD_PROBE_OK;
+}
+
+bool
+Launch::connect_counter ()
+{
+  if (!options_.count)
+    return true;
+  const ObjectPtr<GstElement> element (find (options_.count));
+  if (element)
+    counted_.reset (gst_element_get_static_pad (element.get (), "sink"));
+  if (!counted_) {
+    status_.line (format ("no element named %s to count at", options_.count));
+    return false;
+  }
+  gst_pad_add_probe (
+      counted_.get (), GST_PAD_PROBE_TYPE_BUFFER, on_frame, this, nullptr);
+  return true;
+}
+
+void
+Launch::play ()
+{
+  playing_ = true;
+  began_ = Clock::now ();
+  cpu_at_start_ = cpu_seconds ();
+  gst_element_set_state (pipeline_.get (), GST_STATE_PLAYING);
+}
+
+/* A paused sink already takes receivers, so that none of them misses the first
+ * frame. */
+bool
+Launch::has_receiver ()
+{
+  const ObjectPtr<GstElement> sink (find (options_.receiver));
+  guint receivers = 0;
+  g_object_get (sink.get (), "num-handles", &receivers, nullptr);
+  return receivers > 0;
+}
+
+void
+Launch::start ()
+{
+  retry_until_ = Clock::now () +
+                 std::chrono::milliseconds (gint64 (options_.retry * 1000));
+  if (options_.receiver)
+    gst_element_set_state (pipeline_.get (), GST_STATE_PAUSED);
+  else
+    play ();
+}
+
+int
+Launch::run ()
+{
+  if (!connect_counter ())
+    return kFailed;
+  const ObjectPtr<GstBus> bus (gst_element_get_bus (pipeline_.get ()));
+  gst_bus_add_watch (bus.get (), on_bus, this);
+  const guint sources[] = {g_unix_signal_add (SIGINT, on_signal, this),
+      g_unix_signal_add (SIGTERM, on_signal, this),
+      g_timeout_add (200, on_tick, this)};
+
+  start ();
+  g_main_loop_run (loop_);
+
+  for (const guint source : sources)
+    g_source_remove (source);
+  if (code_ == kDone)
+    summarise ();
+  return code_;
+}
+
+/* The first request ends the stream, so that files are finished; the second
+ * does not wait for that. */
+void
+Launch::interrupt ()
+{
+  if (interrupted_ || !playing_) {
+    status_.line ("stopped");
+    quit (kFailed);
+    return;
+  }
+  interrupted_ = true;
+  status_.line ("stopping; once more to stop at once");
+  gst_element_send_event (pipeline_.get (), gst_event_new_eos ());
+}
+
+void
+Launch::on_error (GstMessage *message)
+{
+  GError *error = nullptr;
+  gchar *detail = nullptr;
+  gst_message_parse_error (message, &error, &detail);
+  const CharPtr owned_detail (detail);
+  const std::unique_ptr<GError, decltype (&g_error_free)> owned (
+      error, g_error_free);
+  GstObject *source = GST_MESSAGE_SRC (message);
+  const GstElementFactory *factory =
+      GST_IS_ELEMENT (source) ? gst_element_get_factory (GST_ELEMENT (source))
+                              : nullptr;
+  const std::string_view kind = factory ? GST_OBJECT_NAME (factory) : "";
+
+  if (kind == "tcpclientsrc" && frames_ == 0 &&
+      g_error_matches (
+          error, GST_RESOURCE_ERROR, GST_RESOURCE_ERROR_OPEN_READ)) {
+    gst_element_set_state (pipeline_.get (), GST_STATE_NULL);
+    playing_ = false;
+    if (Clock::now () >= retry_until_)
+      quit (kNobodyListens);
+    return;
+  }
+  if (factory && GST_OBJECT_FLAG_IS_SET (source, GST_ELEMENT_FLAG_SINK) &&
+      g_error_matches (
+          error, GST_RESOURCE_ERROR, GST_RESOURCE_ERROR_NOT_FOUND) &&
+      frames_ > 0) {
+    status_.line ("the window was closed");
+    quit (kDone);
+    return;
+  }
+  status_.line (format ("error: %s: %s%s%s", GST_OBJECT_NAME (source),
+      error->message, detail ? "\n    " : "", detail ? detail : ""));
+  quit (kFailed);
+}
+
+/* What the plugin's elements report: locks, slips, lost frames. */
+void
+Launch::on_element_message (GstMessage *message)
+{
+  const GstStructure *structure = gst_message_get_structure (message);
+  const std::string_view name = gst_structure_get_name (structure);
+  if (name.substr (0, 14) != "codedexposure/" &&
+      name.substr (0, 8) != "dmdsync/")
+    return;
+  std::string text =
+      format ("%s: %s", GST_OBJECT_NAME (GST_MESSAGE_SRC (message)),
+          gst_structure_get_name (structure));
+  for (gint i = 0; i < gst_structure_n_fields (structure); i++) {
+    const gchar *field = gst_structure_nth_field_name (structure, guint (i));
+    const CharPtr value (
+        gst_value_serialize (gst_structure_get_value (structure, field)));
+    text += format (" %s=%s", field, value ? value.get () : "?");
+  }
+  status_.line (text);
+}
+
+void
+Launch::on_message (GstMessage *message)
+{
+  switch (GST_MESSAGE_TYPE (message)) {
+  case GST_MESSAGE_EOS:
+    quit (kDone);
+    break;
+  case GST_MESSAGE_ERROR:
+    on_error (message);
+    break;
+  case GST_MESSAGE_WARNING: {
+    GError *error = nullptr;
+    gchar *detail = nullptr;
+    gst_message_parse_warning (message, &error, &detail);
+    status_.line (format ("warning: %s: %s%s%s",
+        GST_OBJECT_NAME (GST_MESSAGE_SRC (message)), error->message,
+        detail ? "\n    " : "", detail ? detail : ""));
+    g_error_free (error);
+    g_free (detail);
+    break;
+  }
+  case GST_MESSAGE_PROGRESS: {
+    GstProgressType type;
+    gchar *code = nullptr, *text = nullptr;
+    gst_message_parse_progress (message, &type, &code, &text);
+    status_.progress (text ? text : code);
+    g_free (code);
+    g_free (text);
+    break;
+  }
+  case GST_MESSAGE_LATENCY:
+    gst_bin_recalculate_latency (GST_BIN (pipeline_.get ()));
+    break;
+  case GST_MESSAGE_ELEMENT:
+    on_element_message (message);
+    break;
+  default:
+    break;
+  }
+}
+
+void
+Launch::tick ()
+{
+  if (!playing_) {
+    if (!options_.receiver || has_receiver ())
+      play ();
+    else
+      status_.progress ("waiting for a receiver");
+    return;
+  }
+  const double seconds =
+      std::chrono::duration<double> (Clock::now () - began_).count ();
+  const gint64 frames = frames_;
+  if (!counted_ || frames == 0)
+    return;
+
+  double done = 0;
+  gint64 duration = 0;
+  if (options_.total > 0)
+    done = double (frames) / double (options_.total);
+  else if (gst_pad_peer_query_duration (
+               counted_.get (), GST_FORMAT_TIME, &duration) &&
+           duration > 0 && last_pts_ >= 0)
+    done = double (last_pts_) / double (duration);
+  std::string text = format ("%" G_GINT64_FORMAT " coded frames in %s", frames,
+      minutes (seconds).c_str ());
+  if (done > 0 && done <= 1)
+    text += format (", %.0f %%, %s left", 100 * done,
+        minutes (seconds * (1 - done) / done).c_str ());
+  status_.progress (text);
+}
+
+/* "name: a=1 b=2" of the counters that @p element has: the read-only numbers
+ * of the plugin's elements, the statistics of a video sink. */
+std::string
+counters_of (GstElement *element)
+{
+  const GstElementFactory *factory = gst_element_get_factory (element);
+  if (!factory)
+    return {};
+  std::string text;
+  const gchar *plugin =
+      gst_plugin_feature_get_plugin_name (GST_PLUGIN_FEATURE (factory));
+  if (plugin && std::strcmp (plugin, "codedexposure") == 0) {
+    guint n = 0;
+    GParamSpec **specs =
+        g_object_class_list_properties (G_OBJECT_GET_CLASS (element), &n);
+    for (guint i = 0; i < n; i++) {
+      const GType type = specs[i]->value_type;
+      if ((specs[i]->flags & G_PARAM_WRITABLE) ||
+          !(type == G_TYPE_UINT64 || type == G_TYPE_UINT || type == G_TYPE_INT))
+        continue;
+      GValue value = G_VALUE_INIT, printed = G_VALUE_INIT;
+      g_object_get_property (G_OBJECT (element), specs[i]->name, &value);
+      g_value_init (&printed, G_TYPE_STRING);
+      g_value_transform (&value, &printed);
+      text += format (" %s=%s", specs[i]->name, g_value_get_string (&printed));
+      g_value_unset (&printed);
+      g_value_unset (&value);
+    }
+    g_free (specs);
+  } else if (gst_element_factory_list_is_type (GST_ELEMENT_FACTORY (factory),
+                 GST_ELEMENT_FACTORY_TYPE_SINK) &&
+             std::strstr (
+                 gst_element_factory_get_metadata (
+                     GST_ELEMENT_FACTORY (factory), GST_ELEMENT_METADATA_KLASS),
+                 "Video") &&
+             g_object_class_find_property (
+                 G_OBJECT_GET_CLASS (element), "stats")) {
+    GstStructure *stats = nullptr;
+    guint64 rendered = 0, dropped = 0;
+    g_object_get (element, "stats", &stats, nullptr);
+    gst_structure_get (stats, "rendered", G_TYPE_UINT64, &rendered, "dropped",
+        G_TYPE_UINT64, &dropped, nullptr);
+    gst_structure_free (stats);
+    text = format (" shown=%" G_GUINT64_FORMAT " late=%" G_GUINT64_FORMAT,
+        rendered, dropped);
+  }
+  return text.empty () ? text : GST_OBJECT_NAME (element) + (":" + text);
+}
+
+void
+Launch::summarise ()
+{
+  const double seconds =
+      std::chrono::duration<double> (Clock::now () - began_).count ();
+  const double cpu = cpu_seconds () - cpu_at_start_;
+  status_.line (
+      format ("%" G_GINT64_FORMAT
+              " coded frames in %.1f s, %.1f a second, %.0f %% of one "
+              "processor core",
+          frames_.load (), seconds, double (frames_) / seconds,
+          100 * cpu / seconds));
+
+  GstIterator *elements = gst_bin_iterate_recurse (GST_BIN (pipeline_.get ()));
+  GValue item = G_VALUE_INIT;
+  while (gst_iterator_next (elements, &item) == GST_ITERATOR_OK) {
+    const std::string counters =
+        counters_of (GST_ELEMENT (g_value_get_object (&item)));
+    if (!counters.empty ())
+      status_.line (counters);
+    g_value_reset (&item);
+  }
+  g_value_unset (&item);
+  gst_iterator_free (elements);
+}
+
+} // namespace
+
+int
+main (int argc, char **argv)
+{
+  Options options;
+  const GOptionEntry entries[] = {
+      {"what", 0, 0, G_OPTION_ARG_STRING, &options.what,
+          "Word in front of every line", "WORD"},
+      {"count", 0, 0, G_OPTION_ARG_STRING, &options.count,
+          "Element at whose sink pad the coded frames are counted", "NAME"},
+      {"total", 0, 0, G_OPTION_ARG_INT64, &options.total,
+          "Coded frames that are expected", "N"},
+      {"start-with-receiver", 0, 0, G_OPTION_ARG_STRING, &options.receiver,
+          "Stay paused until this tcpserversink has a receiver", "NAME"},
+      {"retry", 0, 0, G_OPTION_ARG_DOUBLE, &options.retry,
+          "Go on trying to connect; status 4 when nobody listens", "SECONDS"},
+      {"print", 0, 0, G_OPTION_ARG_NONE, &options.print,
+          "Show the pipeline instead of running it", nullptr},
+      {},
+  };
+  GOptionContext *context = g_option_context_new ("PIPELINE");
+  g_option_context_add_main_entries (context, entries, nullptr);
+  g_option_context_add_group (context, gst_init_get_option_group ());
+  GError *error = nullptr;
+  const bool parsed = g_option_context_parse (context, &argc, &argv, &error);
+  g_option_context_free (context);
+  if (!parsed || argc != 2) {
+    std::fprintf (stderr, "codedexposure-launch: %s\n",
+        error ? error->message : "one PIPELINE is needed");
+    g_clear_error (&error);
+    return kUsage;
+  }
+
+  int code = kDone;
+  if (options.print) {
+    std::printf ("gst-launch-1.0 -e %s\n", argv[1]);
+  } else {
+    Launch launch (options);
+    code = launch.parse (argv[1]) ? launch.run () : int (kFailed);
+  }
+  g_free (options.what);
+  g_free (options.count);
+  g_free (options.receiver);
+  gst_deinit ();
+  return code;
+}

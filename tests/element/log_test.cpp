@@ -1,0 +1,233 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* codedexposure-log: one true line of JSON a frame, on disk at once. */
+#include <cstdio>
+#include <fstream>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <glib/gstdio.h>
+#include <gst/check/gstharness.h>
+#include <gst/gst.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "gstcodedexposuremeta.h"
+#include "gstcodedexposuretag.h"
+#include "gstraii.h"
+
+namespace
+{
+
+using namespace cexp;
+using namespace cexp::gst;
+using Json = nlohmann::json;
+using Harness = std::unique_ptr<GstHarness, decltype (&gst_harness_teardown)>;
+
+constexpr char kCaps[] =
+    "video/x-raw,format=GRAY8,width=8,height=8,framerate=30000/1001";
+
+class LogTest : public ::testing::Test
+{
+protected:
+  LogTest ()
+  {
+    gchar *name = nullptr;
+    const gint file = g_file_open_tmp ("log_test_XXXXXX.jsonl", &name, nullptr);
+    EXPECT_GE (file, 0);
+    g_close (file, nullptr);
+    path_.reset (name);
+  }
+  ~LogTest () override { std::remove (path_.get ()); }
+
+  void play (const char *location)
+  {
+    GstElement *element =
+        gst_element_factory_make ("codedexposure-log", nullptr);
+    g_object_set (element, "location", location, nullptr);
+    harness_.reset (gst_harness_new_with_element (element, "sink", "src"));
+    gst_object_unref (element);
+    gst_harness_set_src_caps_str (harness_.get (), kCaps);
+  }
+
+  BufferPtr frame (GstClockTime pts)
+  {
+    GstBuffer *buffer = gst_harness_create_buffer (harness_.get (), 64);
+    GST_BUFFER_PTS (buffer) = pts;
+    return BufferPtr (buffer);
+  }
+  GstFlowReturn push (BufferPtr buffer)
+  {
+    return gst_harness_push (harness_.get (), buffer.release ());
+  }
+
+  /** The lines that are on disk now. */
+  std::vector<Json> lines () const
+  {
+    std::ifstream file (path_.get ());
+    std::vector<Json> lines;
+    for (std::string line; std::getline (file, line);)
+      lines.push_back (Json::parse (line));
+    return lines;
+  }
+
+  CharPtr path_;
+  Harness harness_{nullptr, gst_harness_teardown};
+};
+
+/** What an element says on the bus when it is started, or nothing. */
+std::pair<GQuark, gint>
+error_at_start (const char *location)
+{
+  const ObjectPtr<GstElement> element (GST_ELEMENT (gst_object_ref_sink (
+      gst_element_factory_make ("codedexposure-log", nullptr))));
+  const ObjectPtr<GstBus> bus (gst_bus_new ());
+  gst_element_set_bus (element.get (), bus.get ());
+  g_object_set (element.get (), "location", location, nullptr);
+  const GstStateChangeReturn result =
+      gst_element_set_state (element.get (), GST_STATE_PAUSED);
+  std::pair<GQuark, gint> found;
+  if (GstMessage *message =
+          gst_bus_pop_filtered (bus.get (), GST_MESSAGE_ERROR)) {
+    GError *error = nullptr;
+    gst_message_parse_error (message, &error, nullptr);
+    found = {error->domain, error->code};
+    g_error_free (error);
+    gst_message_unref (message);
+    EXPECT_EQ (result, GST_STATE_CHANGE_FAILURE);
+  }
+  gst_element_set_state (element.get (), GST_STATE_NULL);
+  gst_element_set_bus (element.get (), nullptr);
+  return found;
+}
+
+TEST_F (LogTest, WritesWhatTheMetaSays)
+{
+  play (path_.get ());
+  BufferPtr buffer = frame (80 * GST_MSECOND);
+  FrameMeta meta;
+  meta.frame = 7;
+  meta.exposure_start = 80 * GST_MSECOND;
+  meta.exposure_duration = 39'200'000;
+  meta.locked = TRUE;
+  meta.slip = -1;
+  meta.lost_before = 2;
+  meta.saturated = 5;
+  set_frame_meta (buffer.get (), meta);
+  GST_BUFFER_FLAG_SET (buffer.get (), GST_BUFFER_FLAG_DISCONT);
+  GST_BUFFER_FLAG_SET (buffer.get (), GST_BUFFER_FLAG_CORRUPTED);
+  ASSERT_EQ (push (std::move (buffer)), GST_FLOW_OK);
+
+  ASSERT_EQ (lines ().size (), 1u);
+  EXPECT_EQ (lines ()[0], Json::parse (R"({"frame": 7, "pts_ns": 80000000,
+      "exposure_start_ns": 80000000, "exposure_duration_ns": 39200000,
+      "locked": true, "slip": -1, "lost_before": 2, "saturated": 5,
+      "flags": ["discont", "corrupted"]})"));
+}
+
+TEST_F (LogTest, CountsFramesWithoutMetaAndLeavesOutWhatIsUnknown)
+{
+  play (path_.get ());
+  ASSERT_EQ (push (frame (0)), GST_FLOW_OK);
+  ASSERT_EQ (push (frame (33'366'666)), GST_FLOW_OK);
+  ASSERT_EQ (push (frame (GST_CLOCK_TIME_NONE)), GST_FLOW_OK);
+
+  ASSERT_EQ (lines ().size (), 3u);
+  EXPECT_EQ (lines ()[1],
+      Json::parse (R"({"frame": 1, "pts_ns": 33366666, "flags": []})"));
+  EXPECT_EQ (lines ()[2], Json::parse (R"({"frame": 2, "flags": []})"));
+}
+
+/* As the recording's timestamps: what an encoder adds to PTS and segment alike
+ * is not in them. */
+TEST_F (LogTest, TimesAreRunningTimes)
+{
+  play (path_.get ());
+  constexpr GstClockTime kShift = 1000 * 3600 * GST_SECOND;
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_TIME);
+  segment.start = kShift;
+  gst_harness_push_event (harness_.get (), gst_event_new_segment (&segment));
+  ASSERT_EQ (push (frame (kShift + 40 * GST_MSECOND)), GST_FLOW_OK);
+  EXPECT_EQ (lines ().at (0).at ("pts_ns"), 40'000'000);
+}
+
+TEST_F (LogTest, ScheduleComesFirstAndOnce)
+{
+  const Schedule staircase = *Schedule::from_preset ("staircase:2x2");
+  play (path_.get ());
+  gst_harness_push_event (harness_.get (), schedule_to_event (staircase));
+  ASSERT_EQ (push (frame (0)), GST_FLOW_OK);
+  gst_harness_push_event (harness_.get (), schedule_to_event (staircase));
+  ASSERT_EQ (push (frame (40 * GST_MSECOND)), GST_FLOW_OK);
+
+  ASSERT_EQ (lines ().size (), 3u);
+  const auto read_back = Schedule::from_json (lines ()[0].dump ());
+  ASSERT_TRUE (read_back) << read_back.error ().message;
+  EXPECT_EQ (*read_back, staircase);
+}
+
+TEST_F (LogTest, NewScheduleIsWrittenBeforeItsFrames)
+{
+  play (path_.get ());
+  for (const char *preset : {"staircase:2x2", "sequential:lattice:8/3"}) {
+    gst_harness_push_event (
+        harness_.get (), schedule_to_event (*Schedule::from_preset (preset)));
+    ASSERT_EQ (push (frame (0)), GST_FLOW_OK);
+  }
+  ASSERT_EQ (lines ().size (), 4u);
+  EXPECT_EQ (lines ()[2].at ("tile"), "lattice:8/3");
+}
+
+TEST_F (LogTest, FramesPassUntouched)
+{
+  play (path_.get ());
+  BufferPtr buffer = frame (0);
+  GstBuffer *const before = buffer.get ();
+  ASSERT_EQ (push (std::move (buffer)), GST_FLOW_OK);
+  const BufferPtr after (gst_harness_pull (harness_.get ()));
+  EXPECT_EQ (after.get (), before);
+}
+
+TEST_F (LogTest, SecondRunStartsAnew)
+{
+  play (path_.get ());
+  ASSERT_EQ (push (frame (0)), GST_FLOW_OK);
+  ASSERT_EQ (push (frame (40 * GST_MSECOND)), GST_FLOW_OK);
+  harness_.reset ();
+  play (path_.get ());
+  ASSERT_EQ (push (frame (0)), GST_FLOW_OK);
+  ASSERT_EQ (lines ().size (), 1u);
+  EXPECT_EQ (lines ()[0].at ("frame"), 0);
+}
+
+TEST_F (LogTest, FullDiskStopsTheStreamAndSaysSo)
+{
+  play ("/dev/full");
+  const ObjectPtr<GstBus> bus (gst_bus_new ());
+  gst_element_set_bus (harness_->element, bus.get ());
+  EXPECT_EQ (push (frame (0)), GST_FLOW_ERROR);
+  GstMessage *message = gst_bus_pop_filtered (bus.get (), GST_MESSAGE_ERROR);
+  ASSERT_NE (message, nullptr);
+  GError *error = nullptr;
+  gst_message_parse_error (message, &error, nullptr);
+  EXPECT_TRUE (g_error_matches (
+      error, GST_RESOURCE_ERROR, GST_RESOURCE_ERROR_NO_SPACE_LEFT));
+  EXPECT_NE (std::string (error->message).find ("/dev/full"), std::string::npos)
+      << error->message;
+  g_error_free (error);
+  gst_message_unref (message);
+  gst_element_set_bus (harness_->element, nullptr);
+}
+
+TEST_F (LogTest, SaysAtStartWhatItCannotWrite)
+{
+  using Failure = std::pair<GQuark, gint>;
+  EXPECT_EQ (error_at_start (nullptr),
+      Failure (GST_RESOURCE_ERROR, GST_RESOURCE_ERROR_NOT_FOUND));
+  EXPECT_EQ (error_at_start ("/nonexistent/frames.jsonl"),
+      Failure (GST_RESOURCE_ERROR, GST_RESOURCE_ERROR_OPEN_WRITE));
+  EXPECT_EQ (error_at_start (path_.get ()), Failure ());
+}
+
+} // namespace

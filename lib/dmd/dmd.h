@@ -2,9 +2,9 @@
 /* What every digital micromirror device can do for a coded exposure. */
 #pragma once
 
-#include <cstdint>
 #include <functional>
 #include <memory>
+#include <stop_token>
 #include <string>
 #include <string_view>
 
@@ -20,19 +20,22 @@ struct DmdInfo {
   Extent size;                    ///< mirrors: columns by rows
   Nanoseconds minimum_active = 0; ///< shortest time a mask can be shown
   Nanoseconds minimum_switching = 0;
-  int resident_masks = 0;      ///< masks the device holds at once
-  bool run_time_upload = true; ///< masks can be sent while it is open
+  int resident_masks = 0;       ///< masks the device holds at once
+  bool run_time_upload = true;  ///< masks can be sent while it is open
+  bool triggers_camera = false; ///< no frame is exposed while it is parked
 };
 
-/** Called during upload with masks sent and masks in all; false cancels. */
-using UploadProgress = std::function<bool (int sent, int total)>;
+/** Called during upload with masks sent and masks in all: first with 0, last
+ * with all of them. */
+using UploadProgress = std::function<void (int sent, int total)>;
 
 /**
  * A device that shows the masks of a schedule, over and over, one slot each.
  *
  * Life: open (a Dmd is open) -> upload () -> start () -> stop (), again from
- * upload () or start (). The destructor stops. Calls come from one thread at a
- * time and may block on hardware; never call them on a streaming thread.
+ * upload () or start (). The destructor parks the mirrors. Calls come from one
+ * thread at a time and may block on hardware; DmdRunner keeps them off the
+ * threads that must not.
  */
 class Dmd
 {
@@ -40,19 +43,36 @@ public:
   virtual ~Dmd () = default;
 
   virtual const DmdInfo &info () const = 0;
-  /** Renders and sends every mask of the schedule. Error when the device cannot
-   * hold or show them; slots are checked against the device's limits. */
-  virtual Result<void> upload (const Schedule &schedule, FrameRate rate,
-      const UploadProgress &progress = {}) = 0;
-  /** Shows mask 0 at the start of the next exposure, and goes on. */
-  virtual Result<void> start () = 0;
+  /**
+   * Renders and sends every mask of the schedule; the mirrors are parked. Masks
+   * do not depend on the frame rate. Masks that the device holds already need
+   * not be sent again.
+   *
+   * @p stop  a request ends the upload within 100 ms, with an error.
+   */
+  virtual Result<void> upload (const Schedule &schedule, std::stop_token stop,
+      const UploadProgress &progress) = 0;
+  /**
+   * Shows mask 0 from the start of an exposure on, each mask for its slot of
+   * @p plan. After a stop () one whole exposure at least passes with the
+   * mirrors parked (or, where the device triggers the camera, without a
+   * trigger): whoever watches the frames sees where the masks began anew.
+   */
+  virtual Result<void> start (const SlotPlan &plan) = 0;
   /** Parks the mirrors, all off. */
   virtual void stop () = 0;
   virtual bool running () const = 0;
 };
 
-/** Opens "sim:NAME". Error for a scheme that nobody serves, naming those that
- * there are. */
+/**
+ * Opens a device by name, "SCHEME:..."; "sim:NAME" is simulated_dmd.h's. Error
+ * for a scheme that nobody serves, naming those that there are.
+ */
 Result<std::unique_ptr<Dmd>> open_dmd (std::string_view device);
+
+/** Whether a device of that kind can show @p schedule in the slots of @p plan;
+ * the error tells the numbers on both sides. */
+Result<void> check_limits (
+    const DmdInfo &info, const Schedule &schedule, const SlotPlan &plan);
 
 } // namespace cexp

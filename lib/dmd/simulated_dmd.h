@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -18,7 +19,8 @@ namespace cexp
  * programs them and the bench that looks through them. Thread-safe.
  *
  * Its clock is the bench's exposure clock: the bench counts slots from its
- * first frame, and asks which mask stands in each.
+ * first frame, and asks in order which mask stands in each. Exposures start at
+ * whole multiples of the schedule's slots.
  */
 class SimulatedMirrors
 {
@@ -27,6 +29,7 @@ public:
    * when nobody holds them. */
   static std::shared_ptr<SimulatedMirrors> find (const std::string &name);
 
+  /** Parks the mirrors and takes the masks of @p schedule. */
   void program (const Schedule &schedule);
   void start ();
   void stop ();
@@ -36,24 +39,48 @@ public:
   std::optional<Schedule> schedule () const;
 
   /**
-   * Index of the mask that stands in slot @p slot counted from the bench's
-   * first exposure, none while the mirrors are parked. The first call after
-   * start () falls on the start of an exposure and shows mask 0 or, for
-   * schedules with a pilot, the mask of that frame's parity.
+   * Index of the mask (render_mask ()) that stands in slot @p slot counted from
+   * the bench's first exposure, none while the mirrors are parked. They step
+   * from the first exposure after start () on, which shows mask 0 or, where a
+   * pilot makes two frames differ, the mask of that frame's parity; one whole
+   * exposure later if they stood still for less than that since stop ().
    */
   std::optional<int> mask_in_slot (std::int64_t slot);
 
   /** From slot @p slot on, the masks come @p by slots late (> 0) or early
-   * (< 0): a missed or a spurious trigger. start () mends it. */
+   * (< 0): a missed or a spurious trigger. Slips add up, and are given in the
+   * order of their slots; start () mends those that were. */
   void slip_at (std::int64_t slot, int by);
 
 private:
+  enum class Motion { parked, armed, stepping };
+  struct Slip {
+    std::int64_t slot;
+    int by;
+  };
+
+  void begin_exposure ();
+
   mutable std::mutex lock_; // covers everything below; a leaf lock
   std::optional<Schedule> schedule_;
-  bool running_ = false;
-  std::int64_t slip_slot_ = -1;
-  int slip_by_ = 0;
-  int offset_ = 0;
+  Motion motion_ = Motion::parked;
+  bool owes_dark_exposure_ = false;
+  std::deque<Slip> slips_;
+  std::int64_t offset_ = 0;
 };
+
+/**
+ * Opens "sim:NAME[,key=value...]", whose mirrors are SimulatedMirrors::find
+ * (NAME). The keys say what the device can do and how it misbehaves:
+ *   size=WxH            mirrors, default 1024x768
+ *   masks=N             masks it holds, default 512
+ *   min-active=TIME     default 0
+ *   min-switching=TIME  default 0
+ *   mask-time=TIME      time to send one mask, default 0
+ *   slip-at=SLOT[:BY]   slips by BY slots (default 1: late) in slot SLOT of the
+ *                       bench; may be given again, for a later slot
+ *   fail=open|upload|start|restart  what goes wrong
+ */
+Result<std::unique_ptr<Dmd>> open_simulated_dmd (std::string_view device);
 
 } // namespace cexp

@@ -17,7 +17,7 @@ namespace cexp
 /** What a device can do, in its own numbers. */
 struct DmdInfo {
   std::string name;               ///< as the user wrote it, "sim:bench"
-  Extent size;                    ///< mirrors: columns by rows
+  Extent size = {};               ///< mirrors: columns by rows
   Nanoseconds minimum_active = 0; ///< shortest time a mask can be shown
   Nanoseconds minimum_switching = 0;
   int resident_masks = 0;       ///< masks the device holds at once

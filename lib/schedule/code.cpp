@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <numeric>
 #include <optional>
@@ -37,27 +38,44 @@ staircase_bits (int n)
   return open;
 }
 
-/** The S-matrix that remains of a normalised Hadamard matrix of order n + 1
- * without its first row and column: -1 is open. */
-Bits
-s_matrix_bits (const SignMatrix &hadamard, int n)
+/** What a normalised Hadamard matrix of order n + 1 leaves without its first
+ * row and column, -1 being open, or (H + J) / 2 of one of order n; none where
+ * there is neither. */
+std::optional<Bits>
+s_matrix_bits (int n)
 {
   Bits open;
-  for (int e = 1; e <= n; e++)
-    for (int s = 1; s <= n; s++)
-      open.push_back (hadamard.at (e, s) < 0);
-  return open;
+  open.reserve (std::size_t (n * n));
+  if (const auto hadamard = hadamard_matrix (n + 1)) {
+    for (int e = 1; e <= n; e++)
+      for (int s = 1; s <= n; s++)
+        open.push_back (hadamard->at (e, s) < 0);
+    return open;
+  }
+  if (const auto hadamard = hadamard_matrix (n)) {
+    std::transform (hadamard->signs.begin (), hadamard->signs.end (),
+        std::back_inserter (open),
+        [] (std::int8_t sign) { return std::uint8_t (sign > 0); });
+    return open;
+  }
+  return std::nullopt;
 }
 
-/** (H + J) / 2: +1 is open. */
-Bits
-half_hadamard_bits (const SignMatrix &hadamard, int n)
+/** Names the nearest numbers of elements that have an S-matrix; 2 and 256
+ * do. */
+Error
+no_s_matrix (int n)
 {
-  Bits open;
-  for (int e = 0; e < n; e++)
-    for (int s = 0; s < n; s++)
-      open.push_back (hadamard.at (e, s) > 0);
-  return open;
+  const auto nearest = [n] (int step) {
+    int other = n + step;
+    while (!s_matrix_bits (other))
+      other += step;
+    return std::to_string (other);
+  };
+  return {"code 's-matrix' cannot be built for " + std::to_string (n) +
+          " elements, only where a Hadamard matrix of order n or n + 1 is "
+          "known; the nearest are " +
+          nearest (-1) + " and " + nearest (1)};
 }
 
 /** Square and row-major. */
@@ -155,14 +173,9 @@ Code::named (std::string_view name, int elements)
   if (name == "staircase")
     return Code ("staircase", n, staircase_bits (n));
   if (name == "s-matrix") {
-    if (const auto hadamard = hadamard_matrix (n + 1))
-      return Code ("s-matrix", n, s_matrix_bits (*hadamard, n));
-    if (const auto hadamard = hadamard_matrix (n))
-      return Code ("s-matrix", n, half_hadamard_bits (*hadamard, n));
-    return Error{"code 's-matrix' does not exist for " + std::to_string (n) +
-                 " elements: it needs a Hadamard matrix of order n or n + 1, "
-                 "a multiple of 4; take a tile of 3, 4, 7, 8, 11, 12, 15, 16, "
-                 "... elements"};
+    if (auto open = s_matrix_bits (n))
+      return Code ("s-matrix", n, *std::move (open));
+    return no_s_matrix (n);
   }
   return Error{"code " + in_quotes (name) +
                " is none of sequential, staircase and s-matrix"};

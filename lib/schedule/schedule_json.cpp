@@ -307,6 +307,10 @@ private:
 Result<Json>
 parse_strictly (std::string_view text)
 {
+  /* The parser takes a zero byte for the end and what follows for nothing. */
+  if (const std::size_t zero = text.find ('\0'); zero != text.npos)
+    return Error{"it is no valid JSON: a zero byte at " +
+                 std::to_string (zero) + "; remove it and what follows"};
   try {
     return Json::parse (text, Watch ());
   } catch (const Error &refused) {

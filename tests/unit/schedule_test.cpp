@@ -1,0 +1,342 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The schedule as a value, its masks and where its samples lie. */
+#include "schedule/schedule.h"
+
+#include <cmath>
+#include <map>
+#include <set>
+
+#include <gtest/gtest.h>
+
+#include "schedule/pilot.h"
+#include "schedule/sample_grid.h"
+
+using namespace cexp;
+
+namespace
+{
+
+constexpr Extent kSizes[] = {{1, 1}, {7, 5}, {16, 9}, {13, 32}};
+constexpr const char *kPresets[] = {"sequential:2x2", "staircase:3x2",
+    "s-matrix:7x1,phase=3/0", "sequential:lattice:8/3,order=bit-reversal",
+    "staircase:lattice:5/2,phase=1/4", "s-matrix:4x4,order=raster,phase=5/2",
+    "sequential:diamond:13", "sequential:lattice:4/2,pilot=2",
+    "staircase:2x2,pilot=3,phase=1/1"};
+
+Schedule
+preset (const std::string &text)
+{
+  auto schedule = Schedule::from_preset (text);
+  EXPECT_TRUE (schedule.ok ()) << schedule.error ().message;
+  return schedule.ok () ? *schedule : Schedule ();
+}
+
+Schedule::Parts
+parts_of (const char *tile, const char *code)
+{
+  const Tile parsed = *Tile::parse (tile);
+  return {parsed, *Code::named (code, parsed.elements ())};
+}
+
+Image<std::uint8_t>
+mask_of (const Schedule &schedule, int mask, Extent size)
+{
+  Image<std::uint8_t> image (size.width, size.height);
+  render_mask (schedule, mask, image.view ());
+  return image;
+}
+
+void
+expect_error (Schedule::Parts parts, std::vector<std::string> words)
+{
+  const auto schedule = Schedule::make (std::move (parts));
+  ASSERT_FALSE (schedule.ok ());
+  for (const std::string &word : words)
+    EXPECT_NE (schedule.error ().message.find (word), std::string::npos)
+        << "'" << word << "' in: " << schedule.error ().message;
+}
+
+} // namespace
+
+TEST (Schedule, DefaultIsSequentialTwoByTwo)
+{
+  const Schedule schedule;
+  EXPECT_EQ (schedule, preset ("sequential:2x2"));
+  EXPECT_EQ (schedule.elements (), 4);
+  EXPECT_EQ (schedule.slots (), 4);
+  EXPECT_EQ (schedule.masks (), 4);
+  EXPECT_EQ (schedule.cell (), (Extent{2, 2}));
+  EXPECT_EQ (schedule.timing (), Timing{});
+  EXPECT_EQ (schedule.order (), (std::vector{0, 1, 2, 3}));
+}
+
+TEST (Schedule, OrderGivesEachLabelItsElement)
+{
+  auto parts = parts_of ("2x2", "sequential");
+  parts.order = {2, 0, 3, 1};
+  const auto schedule = Schedule::make (parts);
+  ASSERT_TRUE (schedule.ok ());
+  EXPECT_EQ (schedule->element_at (0, 0), 2);
+  EXPECT_EQ (schedule->element_at (1, 0), 0);
+  EXPECT_EQ (schedule->element_at (0, 1), 3);
+  EXPECT_EQ (schedule->element_at (1, 1), 1);
+  EXPECT_EQ (schedule->element_at (6, 9), 3);
+}
+
+TEST (Schedule, PhaseIsWherePixelZeroLiesInTheTile)
+{
+  auto parts = parts_of ("4x2", "sequential");
+  parts.phase = {3, 1};
+  const auto schedule = Schedule::make (parts);
+  ASSERT_TRUE (schedule.ok ());
+  EXPECT_EQ (schedule->element_at (0, 0), 7);
+  EXPECT_EQ (schedule->element_at (1, 0), 4);
+  EXPECT_EQ (schedule->element_at (0, 1), 3);
+  EXPECT_EQ (schedule->element_at (1, 1), 0);
+  EXPECT_EQ (schedule->cell (), (Extent{4, 2}));
+}
+
+TEST (Schedule, WrongPartsAreNamed)
+{
+  const auto good = parts_of ("2x2", "sequential");
+  auto parts = good;
+  parts.code = *Code::named ("staircase", 3);
+  expect_error (parts, {"'staircase' has 3", "'2x2' has 4", "as many"});
+
+  parts = good;
+  parts.order = {0, 1, 2};
+  expect_error (parts, {"order with 3 entries for 4 labels"});
+  parts.order = {0, 1, 2, 4};
+  expect_error (parts, {"element 4", "0..3"});
+  parts.order = {0, 1, -2, 3};
+  expect_error (parts, {"element -2", "0..3"});
+  parts.order = {0, 1, 1, 3};
+  expect_error (parts, {"element 1 twice", "permutation"});
+
+  parts = good;
+  parts.timing.active = -1;
+  expect_error (parts, {"active of -1 ns", "negative", "below an hour"});
+  parts.timing = {0, kTimeLimit, 0};
+  expect_error (parts, {"switching of 3600000000000 ns", "below an hour"});
+  parts.timing = {0, 0, -5};
+  expect_error (parts, {"readout of -5 ns"});
+
+  for (const double leak : {-0.01, 0.51, 1e300, double (INFINITY)}) {
+    parts = good;
+    parts.leak = leak;
+    expect_error (parts, {"leak ", "0..0.5"});
+  }
+  parts.leak = NAN;
+  expect_error (parts, {"leak nan", "0..0.5"});
+
+  parts = good;
+  parts.phase = {-1, 0};
+  expect_error (parts, {"phase -1/0", "0..16384"});
+  parts.phase = {0, 16385};
+  expect_error (parts, {"phase 0/16385", "0..16384"});
+  parts = good;
+  parts.pilot_rows = -1;
+  expect_error (parts, {"pilot of -1 rows", "0..16384"});
+
+  parts = {
+      *Tile::from_labels (4, 1, {0, 1, 1, 0}), *Code::named ("sequential", 2)};
+  EXPECT_TRUE (Schedule::make (parts).ok ());
+  parts.phase = {1, 0};
+  expect_error (parts, {"'labels'", "phase 1/0", "no cell"});
+}
+
+TEST (Mask, EveryMirrorFollowsTheCode)
+{
+  for (const char *text : kPresets) {
+    const Schedule schedule = preset (text);
+    for (const Extent size : kSizes) {
+      const int lit_rows = size.height - schedule.pilot_rows ();
+      for (int mask = 0; mask < schedule.masks (); mask++) {
+        const auto image = mask_of (schedule, mask, size);
+        for (int y = 0; y < lit_rows; y++)
+          for (int x = 0; x < size.width; x++)
+            ASSERT_EQ (image.at (x, y),
+                schedule.code ().open (
+                    schedule.element_at (x, y), mask % schedule.slots ()))
+                << text << " mask " << mask << " mirror " << x << ", " << y;
+      }
+    }
+  }
+}
+
+TEST (Mask, OfTheDefaultSchedule)
+{
+  const Schedule schedule;
+  for (int mask = 0; mask < 4; mask++) {
+    const auto image = mask_of (schedule, mask, {5, 3});
+    for (int y = 0; y < 3; y++)
+      for (int x = 0; x < 5; x++)
+        EXPECT_EQ (image.at (x, y), x % 2 + 2 * (y % 2) == mask ? 1 : 0);
+  }
+}
+
+TEST (Mask, SumOverSlotsIsTheExposureOfTheElement)
+{
+  for (const char *text : kPresets) {
+    const Schedule schedule = preset (text);
+    for (const Extent size : kSizes) {
+      Image<int> sum (size.width, size.height);
+      for (int mask = 0; mask < schedule.slots (); mask++) {
+        const auto image = mask_of (schedule, mask, size);
+        for (int y = 0; y < size.height; y++)
+          for (int x = 0; x < size.width; x++)
+            sum.at (x, y) += image.at (x, y);
+      }
+      for (int y = 0; y < size.height - schedule.pilot_rows (); y++)
+        for (int x = 0; x < size.width; x++)
+          ASSERT_EQ (sum.at (x, y),
+              schedule.code ().open_slots (schedule.element_at (x, y)))
+              << text;
+    }
+  }
+}
+
+TEST (Mask, WritesNothingOutsideItsRows)
+{
+  Image<std::uint8_t> image (8, 4);
+  for (int y = 0; y < 4; y++)
+    std::fill_n (image.view ().row (y), 8, std::uint8_t (99));
+  render_mask (preset ("staircase:2x2"), 3, {image.view ().data, 5, 3, 8});
+  for (int y = 0; y < 4; y++)
+    for (int x = 0; x < 8; x++)
+      EXPECT_EQ (image.at (x, y) == 99, x >= 5 || y >= 3);
+}
+
+TEST (Pilot, MirrorsOpenForHalfOfTwoFramesInOneStretch)
+{
+  for (const char *tile : {"2x1", "3x1", "2x2", "5x1", "lattice:8/3"}) {
+    const Schedule schedule =
+        preset ("sequential:" + std::string (tile) + ",pilot=2");
+    const int n = schedule.slots ();
+    ASSERT_EQ (schedule.masks (), 2 * n);
+    for (int x = 0; x < 9; x++) {
+      int open = 0, opened = 0;
+      for (int mask = 0; mask < 2 * n; mask++) {
+        const int now = mask_of (schedule, mask, {9, 6}).at (x, 4);
+        const int then =
+            mask_of (schedule, (mask + 2 * n - 1) % (2 * n), {9, 6}).at (x, 5);
+        open += now;
+        opened += now == 1 && then == 0;
+      }
+      EXPECT_EQ (open, n) << tile << " column " << x;
+      EXPECT_EQ (opened, 1) << tile << " column " << x;
+    }
+  }
+}
+
+TEST (Pilot, ColumnsOfTheTwoByTwoSchedule)
+{
+  const Schedule schedule = preset ("sequential:2x2,pilot=1");
+  const char *const rows[] = {"10011001", "10011001", "11001100", "11001100",
+      "01100110", "01100110", "00110011", "00110011"};
+  for (int mask = 0; mask < 8; mask++) {
+    const auto image = mask_of (schedule, mask, {8, 5});
+    std::string row;
+    for (int x = 0; x < 8; x++)
+      row += image.at (x, 4) != 0 ? '1' : '0';
+    EXPECT_EQ (row, rows[mask]) << mask;
+  }
+}
+
+TEST (Pilot, MeansOfOneFrameTellThePhase)
+{
+  for (int slots = 2; slots <= 256; slots++) {
+    std::set<std::vector<int>> seen;
+    for (int phase = 0; phase < 2 * slots; phase++) {
+      std::vector<int> light (kPilotColumns, 0);
+      for (int slot = 0; slot < slots; slot++)
+        for (int x = 0; x < kPilotColumns; x++)
+          light[std::size_t (x)] +=
+              pilot_open (x, (phase + slot) % (2 * slots), slots);
+      EXPECT_TRUE (seen.insert (light).second)
+          << slots << " slots, phase " << phase;
+    }
+  }
+}
+
+TEST (Pilot, TallerThanTheArrayCoversIt)
+{
+  const auto image = mask_of (preset ("staircase:2x2,pilot=9"), 0, {4, 3});
+  for (int y = 0; y < 3; y++)
+    for (int x = 0; x < 4; x++)
+      EXPECT_EQ (image.at (x, y), pilot_open (x, 0, 4));
+}
+
+TEST (SampleGrid, EverySampleIsAPixelOfItsElement)
+{
+  for (const char *text : kPresets) {
+    const Schedule schedule = preset (text);
+    const SampleGrid grid (schedule);
+    ASSERT_EQ (grid.elements (), schedule.elements ());
+    const Extent cell = grid.cell ();
+    std::map<std::pair<int, int>, int> uses;
+    for (int j = 0; j < 17; j++) {
+      for (int i = 0; i < 19; i++) {
+        for (int e = 0; e < grid.elements (); e++) {
+          const Offset d = grid.offset (e, i, j);
+          ASSERT_TRUE (
+              d.x >= 0 && d.x < cell.width && d.y >= 0 && d.y < cell.height);
+          const int x = i * cell.width + d.x, y = j * cell.height + d.y;
+          ASSERT_EQ (schedule.element_at (x, y), e) << text;
+          uses[{x, y}]++;
+        }
+      }
+    }
+    EXPECT_EQ (uses.size (), std::size_t (17 * 19 * cell.width * cell.height));
+  }
+}
+
+TEST (SampleGrid, RasterOffsetsAreTheSameInEveryCell)
+{
+  const SampleGrid grid (preset ("sequential:4x2,phase=1/1"));
+  EXPECT_EQ (grid.repeat (), (Extent{1, 1}));
+  EXPECT_EQ (grid.offset (0, 0, 0), (Offset{3, 1}));
+  EXPECT_EQ (grid.offset (0, 5, 9), (Offset{3, 1}));
+  EXPECT_EQ (grid.offset (5, 2, 2), (Offset{0, 0}));
+}
+
+TEST (SampleGrid, LatticeOffsetsRepeat)
+{
+  const SampleGrid grid (preset ("sequential:lattice:8/4"));
+  EXPECT_EQ (grid.cell (), (Extent{4, 2}));
+  EXPECT_EQ (grid.repeat (), (Extent{2, 1}));
+  EXPECT_EQ (grid.offset (0, 0, 0), (Offset{0, 0}));
+  EXPECT_EQ (grid.offset (0, 1, 0), (Offset{0, 1}));
+  EXPECT_EQ (grid.offset (0, 2, 3), (Offset{0, 0}));
+}
+
+TEST (SampleGrid, SubframesHaveAPixelForEveryWholeCell)
+{
+  const auto size = [] (const char *text, int width, int height) {
+    return SampleGrid (preset (text)).subframe_size (width, height);
+  };
+  EXPECT_EQ (size ("sequential:2x2", 768, 576), (Extent{384, 288}));
+  EXPECT_EQ (size ("sequential:2x2", 769, 577), (Extent{384, 288}));
+  EXPECT_EQ (size ("sequential:3x3", 768, 576), (Extent{256, 192}));
+  EXPECT_EQ (size ("sequential:lattice:5/2", 768, 576), (Extent{153, 576}));
+  EXPECT_EQ (size ("sequential:2x2,pilot=16", 768, 576), (Extent{384, 280}));
+  EXPECT_EQ (size ("sequential:2x2,pilot=15", 768, 576), (Extent{384, 280}));
+  EXPECT_EQ (size ("sequential:2x2,pilot=600", 768, 576), (Extent{384, 0}));
+  EXPECT_EQ (size ("sequential:2x2", 1, 1), (Extent{0, 0}));
+}
+
+TEST (SampleGrid, GridOfTheWidestMapIsSmall)
+{
+  std::vector<std::uint8_t> labels;
+  for (int y = 0; y < 256; y++)
+    for (int x = 0; x < 256; x++)
+      labels.push_back (std::uint8_t ((x + 16 * y + y / 16) % 256));
+  auto tile = Tile::from_labels (256, 256, labels);
+  ASSERT_TRUE (tile.ok ());
+  const auto schedule =
+      Schedule::make ({*tile, *Code::named ("sequential", 256)});
+  ASSERT_TRUE (schedule.ok ()) << schedule.error ().message;
+  const SampleGrid grid (*schedule);
+  EXPECT_EQ (grid.repeat ().width * grid.cell ().width, 256);
+  EXPECT_EQ (grid.repeat ().height * grid.cell ().height, 256);
+}

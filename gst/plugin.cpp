@@ -2,6 +2,7 @@
 /* The plugin: registers its elements, nothing else. */
 #include <gst/gst.h>
 
+#include "gstcodedexposuredemux.h"
 #include "gstcodedexposurelog.h"
 #include "gstcodedexposuremeta.h"
 
@@ -9,7 +10,8 @@ static gboolean
 plugin_init (GstPlugin *plugin)
 {
   cexp::gst::register_frame_meta ();
-  return GST_ELEMENT_REGISTER (codedexposure_log, plugin);
+  return GST_ELEMENT_REGISTER (codedexposure_demux, plugin) &&
+         GST_ELEMENT_REGISTER (codedexposure_log, plugin);
 }
 
 GST_PLUGIN_DEFINE (GST_VERSION_MAJOR, GST_VERSION_MINOR, codedexposure,

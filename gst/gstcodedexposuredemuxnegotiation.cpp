@@ -1,0 +1,328 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* From caps, schedule and settings to a plan, and to the caps of all pads. */
+#include <algorithm>
+
+#include "gstcodedexposuredemuxstate.h"
+
+#define GST_CAT_DEFAULT codedexposure_demux_debug
+
+namespace cexp::gst::demux
+{
+
+namespace
+{
+
+void
+refuse (GstCodedExposureDemux *self, const std::string &why)
+{
+  GST_ELEMENT_ERROR (self, STREAM, FORMAT, ("%s", why.c_str ()), (nullptr));
+}
+
+void
+take_settings (GstCodedExposureDemux *self)
+{
+  DemuxState &st = state (self);
+  const ObjectLock lock (self);
+  if (!std::exchange (st.settings_changed, false))
+    return;
+  st.stream.settings = st.settings;
+  st.stream.stale = true;
+}
+
+struct Source {
+  Schedule schedule;
+  bool assumed = false;
+};
+
+/* The property wins over the stream's tag, which wins over the default. */
+std::optional<Source>
+find_schedule (GstCodedExposureDemux *self)
+{
+  Stream &stream = state (self).stream;
+  const auto &asked = stream.settings.parsed;
+  const Result<Schedule> *said =
+      asked ? asked.get () : (stream.tagged ? &*stream.tagged : nullptr);
+  if (said && *said)
+    return Source{said->value ()};
+  if (said) {
+    refuse (self,
+        std::string (asked ? "The schedule property cannot be read: "
+                           : "The schedule in the stream's tags cannot be "
+                             "read: ") +
+            said->error ().message);
+    return std::nullopt;
+  }
+
+  const Source source{Schedule (), true};
+  if (!std::exchange (stream.warned_assumed, true))
+    GST_ELEMENT_WARNING (self, STREAM, FORMAT,
+        ("The stream says nothing of its schedule: assuming %s. Set the "
+         "schedule property if it is another.",
+            source.schedule.text ().c_str ()),
+        (nullptr));
+  return source;
+}
+
+/* The caps of the coded frames with a frame rate in any case. */
+CapsPtr
+coded_caps (GstCodedExposureDemux *self)
+{
+  const Stream &stream = state (self).stream;
+  const Settings &settings = stream.settings;
+  if (!stream.caps) {
+    refuse (self, "Coded frames came without caps.");
+    return nullptr;
+  }
+  CapsPtr caps (gst_caps_copy (stream.caps.get ()));
+  gint num = 0, den = 1;
+  gst_structure_get_fraction (
+      gst_caps_get_structure (caps.get (), 0), "framerate", &num, &den);
+  if (num > 0)
+    return caps;
+  if (settings.rate_num == 0) {
+    refuse (self,
+        "The coded frames have no frame rate, so their subframes have no "
+        "length: set the frame-rate property, for example frame-rate=25/1.");
+    return nullptr;
+  }
+  gst_caps_set_simple (caps.get (), "framerate", GST_TYPE_FRACTION,
+      settings.rate_num, settings.rate_den, nullptr);
+  return caps;
+}
+
+template <typename Pixel>
+std::optional<AnyExtractor>
+make_extractor (GstCodedExposureDemux *self, const Schedule &schedule,
+    const GstVideoInfo &info)
+{
+  auto made = Extractor<Pixel>::make (
+      schedule, info.width, info.height, state (self).stream.settings.extract);
+  if (made)
+    return AnyExtractor (std::move (*made));
+  refuse (self, made.error ().message);
+  return std::nullopt;
+}
+
+/* The element that is k-th in the order of open slots; none where two are open
+ * for equally long, so that a rank says nothing of the slot. */
+std::optional<int>
+element_of_rank (const Code &code, int k)
+{
+  for (int element = 0; element < code.elements (); element++) {
+    int shorter = 0, alike = 0;
+    for (int other = 0; other < code.elements (); other++) {
+      shorter += code.open_slots (other) < code.open_slots (element);
+      alike += code.open_slots (other) == code.open_slots (element);
+    }
+    if (shorter == k && alike == 1)
+      return element;
+  }
+  return std::nullopt;
+}
+
+/* First and last slot in which the light of subframe @k fell. */
+std::pair<int, int>
+slots_of (const Code &code, Method method, int k)
+{
+  if (method == Method::kDecode ||
+      (method == Method::kSelect && code.one_hot ()))
+    return {k, k};
+  const auto element = method == Method::kRank ? element_of_rank (code, k) : k;
+  int first = 0, last = code.slots () - 1;
+  while (element && !code.open (*element, first))
+    first++;
+  while (element && !code.open (*element, last))
+    last--;
+  return {first, last};
+}
+
+std::vector<Window>
+light_windows (const Schedule &schedule, Method method, const SlotPlan &slots)
+{
+  std::vector<Window> windows;
+  for (int k = 0; k < schedule.slots (); k++) {
+    const auto [first, last] = slots_of (schedule.code (), method, k);
+    const Nanoseconds start = slots.start (first);
+    windows.push_back ({GstClockTime (start),
+        GstClockTime (slots.start (last) + slots.active () - start)});
+  }
+  return windows;
+}
+
+std::vector<GstClockTime>
+slot_boundaries (FrameRate rate, int n)
+{
+  std::vector<GstClockTime> boundaries;
+  for (int k = 0; k <= n; k++)
+    boundaries.push_back (GstClockTime (rate.time_of (0, k, n)));
+  return boundaries;
+}
+
+PadCaps
+output_caps (CapsPtr coded, const GstVideoInfo &info, const Schedule &schedule)
+{
+  const CapsPtr with_aspect (gst_caps_copy (coded.get ()));
+  gst_caps_set_simple (with_aspect.get (), "pixel-aspect-ratio",
+      GST_TYPE_FRACTION, info.par_n, info.par_d, nullptr);
+  PadCaps caps;
+  caps.all.reset (
+      scale_caps (with_aspect.get (), coded_to_subframes (schedule, true)));
+  caps.one.reset (
+      scale_caps (with_aspect.get (), coded_to_subframes (schedule, false)));
+  caps.coded = std::move (coded);
+  return caps;
+}
+
+void
+say_what_is_cropped (GstCodedExposureDemux *self, const Plan &plan)
+{
+  const Extent cell = plan.schedule.cell ();
+  const int columns = plan.coded.width - plan.subframe.width * cell.width;
+  const int rows = plan.coded.height - plan.subframe.height * cell.height;
+  if (columns > 0 || rows > 0)
+    GST_INFO_OBJECT (self,
+        "%d columns and %d rows (pilot: %d) of the coded frames are cropped: "
+        "they fill no cell of %dx%d pixels",
+        columns, rows, plan.schedule.pilot_rows (), cell.width, cell.height);
+}
+
+struct Proposal {
+  Plan plan;
+  PadCaps caps;
+  bool assumed;
+};
+
+std::optional<Proposal>
+propose (GstCodedExposureDemux *self)
+{
+  CapsPtr coded = coded_caps (self);
+  if (!coded)
+    return std::nullopt;
+  GstVideoInfo info;
+  if (!gst_video_info_from_caps (&info, coded.get ())) {
+    refuse (self, "The caps of the coded frames cannot be read.");
+    return std::nullopt;
+  }
+  if (GST_VIDEO_INFO_IS_INTERLACED (&info)) {
+    refuse (self,
+        "The coded frames are interlaced: a coded exposure needs a camera "
+        "that exposes all rows together (progressive, global shutter).");
+    return std::nullopt;
+  }
+  const auto source = find_schedule (self);
+  if (!source)
+    return std::nullopt;
+  const Schedule &schedule = source->schedule;
+
+  const FrameRate rate{info.fps_n, info.fps_d};
+  const auto slots =
+      SlotPlan::fit (schedule.timing (), schedule.slots (), rate);
+  if (!slots) {
+    refuse (self, slots.error ().message);
+    return std::nullopt;
+  }
+  auto extractor = GST_VIDEO_INFO_FORMAT (&info) == GST_VIDEO_FORMAT_GRAY8
+                       ? make_extractor<std::uint8_t> (self, schedule, info)
+                       : make_extractor<std::uint16_t> (self, schedule, info);
+  if (!extractor)
+    return std::nullopt;
+  const Method method =
+      std::visit ([] (const auto &e) { return e.method (); }, *extractor);
+
+  PadCaps caps = output_caps (std::move (coded), info, schedule);
+  GstVideoInfo subframe;
+  gst_video_info_from_caps (&subframe, caps.one.get ());
+  return Proposal{Plan{schedule, info, subframe, std::move (*extractor), method,
+                      slot_boundaries (rate, schedule.slots ()),
+                      light_windows (schedule, method, *slots)},
+      std::move (caps), source->assumed};
+}
+
+/* Makes @proposal the plan in force. */
+void
+install (GstCodedExposureDemux *self, Proposal proposal)
+{
+  DemuxState &st = state (self);
+  Stream &stream = st.stream;
+  stream.plan = std::move (proposal.plan);
+  stream.stale = false;
+  stream.scratch.clear ();
+  say_what_is_cropped (self, *stream.plan);
+
+  bool schedule_changed, method_changed;
+  {
+    const ObjectLock lock (self);
+    schedule_changed = !st.in_force || !(*st.in_force == stream.plan->schedule);
+    method_changed =
+        std::exchange (st.method, stream.plan->method) != stream.plan->method;
+    st.in_force = std::make_shared<const Schedule> (stream.plan->schedule);
+    st.assumed = proposal.assumed;
+    st.caps = std::move (proposal.caps);
+  }
+  outputs (self)->each ([&] (const OutputRef &output) {
+    output->allocation.reset ();
+    push_caps (self, *output);
+  });
+  GST_INFO_OBJECT (self, "%s, %s: %dx%d to %dx%d",
+      stream.plan->schedule.text ().c_str (),
+      std::string (method_name (stream.plan->method)).c_str (),
+      stream.plan->coded.width, stream.plan->coded.height,
+      stream.plan->subframe.width, stream.plan->subframe.height);
+  if (schedule_changed)
+    notify (self, "schedule-in-force");
+  if (method_changed)
+    notify (self, "method-in-force");
+}
+
+} // namespace
+
+GstCaps *
+PadCaps::of (Output::Kind kind) const
+{
+  switch (kind) {
+  case Output::Kind::kCoded:
+    return coded.get ();
+  case Output::Kind::kOne:
+    return one.get ();
+  default:
+    return all.get ();
+  }
+}
+
+GstFlowReturn
+negotiate (GstCodedExposureDemux *self)
+{
+  Stream &stream = state (self).stream;
+  take_settings (self);
+  if (stream.stale) {
+    auto proposal = propose (self);
+    if (!proposal)
+      return GST_FLOW_NOT_NEGOTIATED;
+    install (self, std::move (*proposal));
+  }
+  flush_pending (self);
+  return GST_FLOW_OK;
+}
+
+bool
+check_pads (GstCodedExposureDemux *self, const Outputs &list)
+{
+  const Schedule &schedule = state (self).stream.plan->schedule;
+  const int n = schedule.elements ();
+  if (list.ones.empty () || list.ones.rbegin ()->first < n)
+    return true;
+  refuse (self, "Pad subframe_" + std::to_string (list.ones.rbegin ()->first) +
+                    " was requested, but " + schedule.text () +
+                    " has subframe_0 to subframe_" + std::to_string (n - 1) +
+                    ".");
+  return false;
+}
+
+void
+flush_pending (GstCodedExposureDemux *self)
+{
+  for (EventPtr &event : std::exchange (state (self).stream.pending, {}))
+    forward (self, std::move (event));
+}
+
+} // namespace cexp::gst::demux

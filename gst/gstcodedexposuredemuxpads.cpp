@@ -1,0 +1,293 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The source pads: asked for, given back, and told of events. */
+#include <cstdio>
+
+#include "gstcodedexposuredemuxstate.h"
+
+#define GST_CAT_DEFAULT codedexposure_demux_debug
+
+namespace cexp::gst::demux
+{
+
+namespace
+{
+
+GstIterator *
+internal_links (GstPad *, GstObject *parent)
+{
+  const DemuxState &st = state (GST_CODED_EXPOSURE_DEMUX (parent));
+  GValue sink = G_VALUE_INIT;
+  g_value_init (&sink, GST_TYPE_PAD);
+  g_value_set_object (&sink, st.sinkpad);
+  GstIterator *links = gst_iterator_new_single (GST_TYPE_PAD, &sink);
+  g_value_unset (&sink);
+  return links;
+}
+
+/* gst_pad_create_stream_id () needs the sink pad's sticky event, which is
+ * stored only after its handler has returned. */
+EventPtr
+stream_start_for (GstPad *pad, GstEvent *upstream)
+{
+  const gchar *id = nullptr;
+  gst_event_parse_stream_start (upstream, &id);
+  const CharPtr name (gst_pad_get_name (pad));
+  const std::string own = std::string (id) + "/" + name.get ();
+
+  EventPtr event (gst_event_new_stream_start (own.c_str ()));
+  gst_event_set_seqnum (event.get (), gst_event_get_seqnum (upstream));
+  GstStreamFlags flags = GST_STREAM_FLAG_NONE;
+  gst_event_parse_stream_flags (upstream, &flags);
+  gst_event_set_stream_flags (event.get (), flags);
+  guint group = GST_GROUP_ID_INVALID;
+  if (gst_event_parse_group_id (upstream, &group))
+    gst_event_set_group_id (event.get (), group);
+  return event;
+}
+
+/* The upstream event as @output shows it; null for one that is not shown. */
+EventPtr
+translate (const Output &output, const PadCaps &caps, GstEvent *upstream)
+{
+  switch (GST_EVENT_TYPE (upstream)) {
+  case GST_EVENT_STREAM_START:
+    return stream_start_for (output.pad.get (), upstream);
+  case GST_EVENT_CAPS: {
+    EventPtr event (gst_event_new_caps (caps.of (output.kind)));
+    gst_event_set_seqnum (event.get (), gst_event_get_seqnum (upstream));
+    return event;
+  }
+  default:
+    return EventPtr (gst_event_ref (upstream));
+  }
+}
+
+struct Replay {
+  const Output &output;
+  const PadCaps &caps;
+};
+
+/* Before the source pads have caps, only the start of the stream has passed
+ * them; everything else waits and comes to the new pad with the others. */
+gboolean
+replay_sticky (GstPad *, GstEvent **event, gpointer user_data)
+{
+  const auto &replay = *static_cast<const Replay *> (user_data);
+  if (!replay.caps && GST_EVENT_TYPE (*event) != GST_EVENT_STREAM_START)
+    return TRUE;
+  const EventPtr own = translate (replay.output, replay.caps, *event);
+  gst_pad_store_sticky_event (replay.output.pad.get (), own.get ());
+  return TRUE;
+}
+
+/* Lists @output and gives it what the others were told. Both under one lock,
+ * and forward () stores an event on the sink pad before it reads the list: an
+ * event that comes meanwhile reaches the pad by one way or the other. */
+void
+enlist (GstCodedExposureDemux *self, const OutputRef &output)
+{
+  DemuxState &st = state (self);
+  const ObjectLock lock (self);
+  Replay replay{*output, st.caps};
+  gst_pad_sticky_events_foreach (st.sinkpad, replay_sticky, &replay);
+
+  auto list = std::make_shared<Outputs> (*st.outputs);
+  switch (output->kind) {
+  case Output::Kind::kAll:
+    list->all = output;
+    break;
+  case Output::Kind::kCoded:
+    list->coded = output;
+    break;
+  case Output::Kind::kOne:
+    list->ones[output->index] = output;
+    break;
+  }
+  st.outputs = std::move (list);
+  gst_flow_combiner_add_pad (st.combiner.get (), output->pad.get ());
+}
+
+OutputRef
+strike (GstCodedExposureDemux *self, GstPad *pad)
+{
+  DemuxState &st = state (self);
+  const ObjectLock lock (self);
+  OutputRef found;
+  st.outputs->each ([&] (const OutputRef &output) {
+    if (output->pad.get () == pad)
+      found = output;
+  });
+  if (!found)
+    return nullptr;
+  found->released = true;
+  auto list = std::make_shared<Outputs> (*st.outputs);
+  if (found->kind == Output::Kind::kCoded)
+    list->coded.reset ();
+  else
+    list->ones.erase (found->index);
+  st.outputs = std::move (list);
+  gst_flow_combiner_remove_pad (st.combiner.get (), pad);
+  return found;
+}
+
+/* The index in "subframe_%u", or the lowest free one where no name is given;
+ * -1 when the name is none. */
+int
+subframe_index (const Outputs &list, const gchar *name)
+{
+  if (!name || g_str_equal (name, "subframe_%u")) {
+    int index = 0;
+    while (list.ones.count (index) > 0)
+      index++;
+    return index;
+  }
+  guint index = 0;
+  int end = 0;
+  if (std::sscanf (name, "subframe_%u%n", &index, &end) != 1 ||
+      name[end] != '\0' || index > G_MAXINT)
+    return -1;
+  return int (index);
+}
+
+/* While a schedule is in force its range is known; before, the largest there
+ * can be, and negotiate () looks again. */
+bool
+index_allowed (GstCodedExposureDemux *self, int index)
+{
+  ScheduleRef schedule;
+  {
+    const ObjectLock lock (self);
+    schedule = state (self).in_force;
+  }
+  const int n = schedule ? schedule->elements () : Tile::kMaxElements;
+  if (index >= 0 && index < n)
+    return true;
+  GST_ELEMENT_WARNING (self, STREAM, WRONG_TYPE,
+      ("There is no pad subframe_%d: %s has subframe_0 to subframe_%d.", index,
+          schedule ? schedule->text ().c_str () : "the largest schedule",
+          n - 1),
+      (nullptr));
+  return false;
+}
+
+} // namespace
+
+OutputRef
+add_output (GstCodedExposureDemux *self, GstPadTemplate *templ,
+    Output::Kind kind, int index)
+{
+  const CharPtr name (kind == Output::Kind::kOne
+                          ? g_strdup_printf ("subframe_%d", index)
+                          : g_strdup (GST_PAD_TEMPLATE_NAME_TEMPLATE (templ)));
+  auto output = std::make_shared<Output> ();
+  output->kind = kind;
+  output->index = index;
+  GstPad *pad = gst_pad_new_from_template (templ, name.get ());
+  output->pad.reset (GST_PAD (gst_object_ref_sink (pad)));
+  gst_pad_set_event_function (pad, GST_DEBUG_FUNCPTR (src_event));
+  gst_pad_set_query_function (pad, GST_DEBUG_FUNCPTR (src_query));
+  gst_pad_set_iterate_internal_links_function (
+      pad, GST_DEBUG_FUNCPTR (internal_links));
+  GST_PAD_SET_ACCEPT_TEMPLATE (pad);
+
+  gst_pad_set_active (pad, TRUE);
+  enlist (self, output);
+  gst_element_add_pad (GST_ELEMENT (self), pad);
+  return output;
+}
+
+GstPad *
+request_pad (GstElement *element, GstPadTemplate *templ, const gchar *name,
+    const GstCaps *)
+{
+  auto *self = GST_CODED_EXPOSURE_DEMUX (element);
+  const auto list = outputs (self);
+  if (g_str_equal (GST_PAD_TEMPLATE_NAME_TEMPLATE (templ), "coded")) {
+    if (list->coded) {
+      GST_WARNING_OBJECT (self, "pad coded exists: tee it to use it twice");
+      return nullptr;
+    }
+    return add_output (self, templ, Output::Kind::kCoded, -1)->pad.get ();
+  }
+
+  const int index = subframe_index (*list, name);
+  if (!index_allowed (self, index))
+    return nullptr;
+  if (list->ones.count (index) > 0) {
+    GST_WARNING_OBJECT (
+        self, "pad subframe_%d exists: tee it to use it twice", index);
+    return nullptr;
+  }
+  return add_output (self, templ, Output::Kind::kOne, index)->pad.get ();
+}
+
+void
+release_pad (GstElement *element, GstPad *pad)
+{
+  const OutputRef output = strike (GST_CODED_EXPOSURE_DEMUX (element), pad);
+  if (!output)
+    return;
+  gst_pad_set_active (pad, FALSE);
+  gst_element_remove_pad (element, pad);
+}
+
+/* A blocked pad has a probe that waits for data. */
+bool
+is_wanted (const Output &output)
+{
+  return gst_pad_is_linked (output.pad.get ()) ||
+         gst_pad_is_blocked (output.pad.get ());
+}
+
+gboolean
+forward (GstCodedExposureDemux *self, EventPtr event)
+{
+  DemuxState &st = state (self);
+  if (is_sticky (event.get ()))
+    gst_pad_store_sticky_event (st.sinkpad, event.get ());
+  const PadCaps none;
+  outputs (self)->each ([&] (const OutputRef &output) {
+    gst_pad_push_event (
+        output->pad.get (), translate (*output, none, event.get ()).release ());
+  });
+  return TRUE;
+}
+
+CapsPtr
+caps_for (GstCodedExposureDemux *self, const Output &output)
+{
+  const ObjectLock lock (self);
+  return CapsPtr (gst_caps_ref (state (self).caps.of (output.kind)));
+}
+
+void
+push_caps (GstCodedExposureDemux *self, const Output &output)
+{
+  const CapsPtr caps = caps_for (self, output);
+  const CapsPtr current (gst_pad_get_current_caps (output.pad.get ()));
+  if (current && gst_caps_is_equal (current.get (), caps.get ()))
+    return;
+  GstEvent *event = gst_event_new_caps (caps.get ());
+  gst_event_set_seqnum (event, state (self).stream.caps_seqnum);
+  gst_pad_push_event (output.pad.get (), event);
+}
+
+GstFlowReturn
+combine_flow (
+    GstCodedExposureDemux *self, const Output &output, GstFlowReturn flow)
+{
+  const ObjectLock lock (self);
+  if (output.released)
+    return GST_FLOW_OK;
+  return gst_flow_combiner_update_pad_flow (
+      state (self).combiner.get (), output.pad.get (), flow);
+}
+
+void
+forget_flow (GstCodedExposureDemux *self)
+{
+  const ObjectLock lock (self);
+  gst_flow_combiner_reset (state (self).combiner.get ());
+}
+
+} // namespace cexp::gst::demux

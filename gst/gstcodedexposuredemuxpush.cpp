@@ -1,0 +1,591 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* A coded frame comes in, its subframes go out. */
+#include <algorithm>
+#include <numeric>
+
+#include "gstcodedexposuredemuxstate.h"
+
+#define GST_CAT_DEFAULT codedexposure_demux_debug
+
+namespace cexp::gst::demux
+{
+
+namespace
+{
+
+/* One coded frame on its way through the element. */
+struct Job {
+  GstBuffer *inbuf;
+  GstClockTime pts;
+  FrameMeta meta;
+  std::shared_ptr<const Outputs> outputs;
+  bool backwards; ///< reverse playback: the last subframe goes first
+};
+
+/* The pads that a subframe goes to; null where it does not. */
+struct Targets {
+  Output *all = nullptr;
+  Output *one = nullptr;
+  BufferPtr buffer;
+  Output *owner () const { return all ? all : one; }
+};
+
+/* NOT_LINKED and EOS of one pad leave the others to go on. */
+bool
+is_fatal (GstFlowReturn flow)
+{
+  return flow == GST_FLOW_FLUSHING || flow <= GST_FLOW_NOT_NEGOTIATED;
+}
+
+void
+count (GstCodedExposureDemux *self, guint64 Counters::*counter, guint64 by = 1)
+{
+  const ObjectLock lock (self);
+  state (self).counters.*counter += by;
+}
+
+void
+post (GstCodedExposureDemux *self, GstStructure *structure)
+{
+  gst_element_post_message (GST_ELEMENT (self),
+      gst_message_new_element (GST_OBJECT (self), structure));
+}
+
+void
+start_anew (const Outputs &list)
+{
+  list.each ([] (const OutputRef &output) { output->discont = true; });
+}
+
+void
+report_loss (GstCodedExposureDemux *self, guint64 lost, GstClockTime from,
+    GstClockTime to)
+{
+  GST_WARNING_OBJECT (self,
+      "%" G_GUINT64_FORMAT " coded frames lost from %" GST_TIME_FORMAT
+      " to %" GST_TIME_FORMAT,
+      lost, GST_TIME_ARGS (from), GST_TIME_ARGS (to));
+  count (self, &Counters::frames_lost, lost);
+  post (self,
+      gst_structure_new ("codedexposure/frames-lost", "count", G_TYPE_UINT64,
+          lost, "from", G_TYPE_UINT64, from, "to", G_TYPE_UINT64, to, nullptr));
+  notify (self, "frames-lost");
+}
+
+void
+warn_of_backwards_time (
+    GstCodedExposureDemux *self, GstClockTime last, GstClockTime pts)
+{
+  if (std::exchange (state (self).stream.warned_backwards, true))
+    return;
+  GST_ELEMENT_WARNING (self, STREAM, FORMAT,
+      ("A coded frame at %" GST_TIME_FORMAT " follows one at %" GST_TIME_FORMAT
+       ": its subframes start a new stretch of time.",
+          GST_TIME_ARGS (pts), GST_TIME_ARGS (last)),
+      ("this is said once"));
+}
+
+/* Compares the frame's time with that of the frame before; returns how many
+ * frames are missing between them. The period comes from the caps: one that
+ * was measured would stretch with every frame that is lost. */
+guint64
+check_time (GstCodedExposureDemux *self, const Job &job)
+{
+  Stream &stream = state (self).stream;
+  const GstClockTime period = stream.plan->period ();
+  const GstClockTime last = std::exchange (stream.last_pts, job.pts);
+  if (!GST_CLOCK_TIME_IS_VALID (last))
+    return 0;
+  const GstClockTimeDiff step = job.backwards ? GST_CLOCK_DIFF (job.pts, last)
+                                              : GST_CLOCK_DIFF (last, job.pts);
+  if (step <= 0) {
+    warn_of_backwards_time (self, last, job.pts);
+    start_anew (*job.outputs);
+    return 0;
+  }
+  if (GstClockTime (step) <= period + period / 2)
+    return 0;
+  const guint64 lost = (GstClockTime (step) + period / 2) / period - 1;
+  const GstClockTime due =
+      job.backwards ? last - std::min (last, period) : last + period;
+  report_loss (self, lost, due, job.pts);
+  start_anew (*job.outputs);
+  return lost;
+}
+
+/* What the frame is known by: the meta that came with it, else our own count.
+ */
+FrameMeta
+describe (GstCodedExposureDemux *self, const Job &job, guint64 lost)
+{
+  Stream &stream = state (self).stream;
+  stream.next_frame += lost;
+  FrameMeta meta;
+  if (const auto upstream = get_frame_meta (job.inbuf)) {
+    meta = *upstream;
+  } else {
+    meta.frame = stream.next_frame;
+    meta.lost_before = lost;
+  }
+  stream.next_frame++;
+  return meta;
+}
+
+void
+note_saturation (GstCodedExposureDemux *self, const Job &job)
+{
+  Burst &burst = state (self).stream.saturation;
+  if (job.meta.saturated == 0) {
+    end_saturation (self);
+    return;
+  }
+  count (self, &Counters::saturated_frames);
+  burst.to = job.pts;
+  burst.peak = std::max (burst.peak, job.meta.saturated);
+  if (burst.frames++ > 0)
+    return;
+  burst.from = job.pts;
+  post (self,
+      gst_structure_new ("codedexposure/saturated", "active", G_TYPE_BOOLEAN,
+          TRUE, "frame", G_TYPE_UINT64, job.meta.frame, "from", G_TYPE_UINT64,
+          job.pts, "pixels", G_TYPE_UINT64, job.meta.saturated, nullptr));
+  notify (self, "saturated-frames");
+}
+
+/* Asked only for the sake of QoS messages. */
+bool
+is_live (GstCodedExposureDemux *self)
+{
+  DemuxState &st = state (self);
+  if (!st.stream.live) {
+    const QueryPtr query (gst_query_new_latency ());
+    gboolean live = FALSE;
+    if (gst_pad_peer_query (st.sinkpad, query.get ()))
+      gst_query_parse_latency (query.get (), &live, nullptr, nullptr);
+    st.stream.live = live;
+  }
+  return *st.stream.live;
+}
+
+/* Says that @output goes without a subframe, to it and on the bus. */
+void
+skip (GstCodedExposureDemux *self, Output &output, GstClockTime pts,
+    GstClockTime duration)
+{
+  const GstSegment &segment = state (self).stream.segment;
+  const auto running =
+      gst_segment_to_running_time (&segment, GST_FORMAT_TIME, pts);
+  const auto stream_time =
+      gst_segment_to_stream_time (&segment, GST_FORMAT_TIME, pts);
+  GstMessage *message = gst_message_new_qos (
+      GST_OBJECT (self), is_live (self), running, stream_time, pts, duration);
+  {
+    const ObjectLock lock (self);
+    Counters &counters = state (self).counters;
+    counters.subframes_dropped++;
+    gst_message_set_qos_values (
+        message, output.jitter, output.proportion, 1000000);
+    gst_message_set_qos_stats (message, GST_FORMAT_BUFFERS,
+        counters.subframes_out, counters.subframes_dropped);
+  }
+  gst_element_post_message (GST_ELEMENT (self), message);
+  output.discont = true;
+  gst_pad_push_event (output.pad.get (), gst_event_new_gap (pts, duration));
+}
+
+bool
+is_late (GstCodedExposureDemux *self, const Output &output, GstClockTime pts,
+    GstClockTime duration)
+{
+  const Stream &stream = state (self).stream;
+  if (!stream.settings.qos)
+    return false;
+  GstClockTime earliest;
+  {
+    const ObjectLock lock (self);
+    earliest = output.earliest;
+  }
+  const GstClockTime running = gst_segment_to_running_time (&stream.segment,
+      GST_FORMAT_TIME, stream.segment.rate < 0 ? pts + duration : pts);
+  return GST_CLOCK_TIME_IS_VALID (earliest) &&
+         GST_CLOCK_TIME_IS_VALID (running) && running < earliest;
+}
+
+/* Subframes in the order in which they are pushed. */
+std::vector<std::size_t>
+push_order (const Job &job, std::size_t n)
+{
+  std::vector<std::size_t> order (n);
+  std::iota (order.begin (), order.end (), 0);
+  if (job.backwards)
+    std::reverse (order.begin (), order.end ());
+  return order;
+}
+
+/* A pad that is not linked gets nothing made for it, but has its say in the
+ * flow. */
+bool
+prepare_output (GstCodedExposureDemux *self, Output &output, guint at_once,
+    GstFlowReturn &flow)
+{
+  if (!is_wanted (output)) {
+    flow = combine_flow (self, output, GST_FLOW_NOT_LINKED);
+    return false;
+  }
+  prepare_allocation (self, output, at_once);
+  return true;
+}
+
+/* Finds where every subframe has to go; says so where one is left out. */
+std::vector<Targets>
+find_targets (GstCodedExposureDemux *self, const Job &job, GstFlowReturn &flow)
+{
+  const Plan &plan = *state (self).stream.plan;
+  const auto &bounds = plan.boundaries;
+  std::vector<Targets> targets (std::size_t (plan.subframes ()));
+  const auto aim = [&] (Output &output, std::size_t k, GstClockTime duration,
+                       Output *&target) {
+    const GstClockTime pts = job.pts + bounds[k];
+    if (is_late (self, output, pts, duration))
+      skip (self, output, pts, duration);
+    else
+      target = &output;
+  };
+
+  Output &all = *job.outputs->all;
+  if (prepare_output (self, all, guint (targets.size ()), flow)) {
+    for (std::size_t k : push_order (job, targets.size ()))
+      aim (all, k, bounds[k + 1] - bounds[k], targets[k].all);
+  }
+  for (const auto &[index, output] : job.outputs->ones) {
+    const auto k = std::size_t (index);
+    if (prepare_output (self, *output, 1, flow))
+      aim (*output, k, plan.period (), targets[k].one);
+  }
+  return targets;
+}
+
+template <typename Pixel>
+ImageView<Pixel>
+view_of (MappedFrame &mapped)
+{
+  GstVideoFrame *frame = mapped.frame ();
+  return {static_cast<Pixel *> (GST_VIDEO_FRAME_PLANE_DATA (frame, 0)),
+      GST_VIDEO_FRAME_WIDTH (frame), GST_VIDEO_FRAME_HEIGHT (frame),
+      GST_VIDEO_FRAME_PLANE_STRIDE (frame, 0)};
+}
+
+/* Room for a subframe that nobody wants: the extractor writes all of them. */
+template <typename Pixel>
+ImageView<Pixel>
+scratch_view (Stream &stream, std::size_t k)
+{
+  const GstVideoInfo &info = stream.plan->subframe;
+  const std::size_t row = std::size_t (info.width) * sizeof (Pixel);
+  const std::size_t plane = row * std::size_t (info.height);
+  stream.scratch.resize (plane * std::size_t (stream.plan->subframes ()));
+  return {reinterpret_cast<Pixel *> (stream.scratch.data () + k * plane),
+      info.width, info.height, std::ptrdiff_t (row)};
+}
+
+template <typename Pixel>
+ExtractReport
+extract (const Extractor<Pixel> &extractor, Stream &stream, MappedFrame &coded,
+    std::vector<MappedFrame> &subframes)
+{
+  std::vector<ImageView<Pixel>> views;
+  views.reserve (subframes.size ());
+  for (std::size_t k = 0; k < subframes.size (); k++)
+    views.push_back (subframes[k] ? view_of<Pixel> (subframes[k])
+                                  : scratch_view<Pixel> (stream, k));
+  return extractor.run (view_of<Pixel> (coded), views);
+}
+
+/* Takes a buffer for every subframe that has a target and maps it; a subframe
+ * that has none is left unmapped. */
+GstFlowReturn
+map_subframes (GstCodedExposureDemux *self, std::vector<Targets> &targets,
+    std::vector<MappedFrame> &subframes)
+{
+  const GstVideoInfo &info = state (self).stream.plan->subframe;
+  subframes.reserve (targets.size ());
+  for (Targets &target : targets) {
+    if (!target.owner ()) {
+      subframes.emplace_back ();
+      continue;
+    }
+    const GstFlowReturn flow = acquire (*target.owner (), target.buffer);
+    if (flow == GST_FLOW_FLUSHING)
+      return flow;
+    if (target.buffer)
+      subframes.emplace_back (info, target.buffer.get (), GST_MAP_WRITE);
+    if (!target.buffer || !subframes.back ()) {
+      GST_ELEMENT_ERROR (self, RESOURCE, NO_SPACE_LEFT,
+          ("No buffer for a subframe of %dx%d pixels.", info.width,
+              info.height),
+          ("pool %" GST_PTR_FORMAT, target.owner ()->allocation->pool.get ()));
+      return GST_FLOW_ERROR;
+    }
+  }
+  return GST_FLOW_OK;
+}
+
+/* Fills the buffers of @targets. */
+GstFlowReturn
+render (GstCodedExposureDemux *self, Job &job, std::vector<Targets> &targets)
+{
+  Stream &stream = state (self).stream;
+  const Plan &plan = *stream.plan;
+  MappedFrame coded (plan.coded, job.inbuf, GST_MAP_READ);
+  if (!coded) {
+    GST_ELEMENT_ERROR (self, STREAM, FORMAT,
+        ("A coded frame of %" G_GSIZE_FORMAT " bytes cannot be read as %dx%d "
+         "pixels, which take %" G_GSIZE_FORMAT ".",
+            gst_buffer_get_size (job.inbuf), plan.coded.width,
+            plan.coded.height, GST_VIDEO_INFO_SIZE (&plan.coded)),
+        (nullptr));
+    return GST_FLOW_ERROR;
+  }
+  std::vector<MappedFrame> subframes;
+  const GstFlowReturn flow = map_subframes (self, targets, subframes);
+  if (flow != GST_FLOW_OK)
+    return flow;
+  job.meta.saturated = std::visit (
+      [&] (const auto &extractor) {
+        return extract (extractor, stream, coded, subframes).saturated;
+      },
+      plan.extractor);
+  return GST_FLOW_OK;
+}
+
+struct MetaCopy {
+  GstBuffer *to;
+  const Plan *plan;
+};
+
+/* Carries a meta of the coded frame over, unless it describes memory that is
+ * not the subframe's. What speaks of places in the picture is scaled. */
+gboolean
+copy_meta (GstBuffer *from, GstMeta **meta, gpointer user_data)
+{
+  const auto &copy = *static_cast<const MetaCopy *> (user_data);
+  const GstMetaInfo *info = (*meta)->info;
+  if (!info->transform_func || info->api == GST_VIDEO_META_API_TYPE ||
+      info->api == GST_VIDEO_CROP_META_API_TYPE ||
+      info->api == GST_PARENT_BUFFER_META_API_TYPE ||
+      gst_meta_api_type_has_tag (
+          info->api, g_quark_from_static_string (GST_META_TAG_MEMORY_STR)))
+    return TRUE;
+  if (gst_meta_api_type_has_tag (info->api,
+          g_quark_from_static_string (GST_META_TAG_VIDEO_SIZE_STR))) {
+    GstVideoInfo in = copy.plan->coded, out = copy.plan->subframe;
+    GstVideoMetaTransform scale{&in, &out};
+    info->transform_func (copy.to, *meta, from,
+        gst_video_meta_transform_scale_get_quark (), &scale);
+    return TRUE;
+  }
+  GstMetaTransformCopy whole{FALSE, 0, gsize (-1)};
+  info->transform_func (copy.to, *meta, from, _gst_meta_transform_copy, &whole);
+  return TRUE;
+}
+
+/* What all pads that get subframe @k see alike. */
+void
+describe_subframe (GstCodedExposureDemux *self, const Job &job, std::size_t k,
+    GstBuffer *outbuf)
+{
+  const Plan &plan = *state (self).stream.plan;
+  gst_buffer_copy_into (outbuf, job.inbuf, GST_BUFFER_COPY_FLAGS, 0, -1);
+  GST_BUFFER_FLAG_UNSET (outbuf, GST_BUFFER_FLAG_MARKER);
+  MetaCopy copy{outbuf, &plan};
+  gst_buffer_foreach_meta (job.inbuf, copy_meta, &copy);
+
+  FrameMeta meta = job.meta;
+  meta.subframe = gint (k);
+  meta.exposure_start = job.pts + plan.windows[k].start;
+  meta.exposure_duration = plan.windows[k].duration;
+  set_frame_meta (outbuf, meta);
+  GST_BUFFER_PTS (outbuf) = job.pts + plan.boundaries[k];
+  GST_BUFFER_DTS (outbuf) = GST_CLOCK_TIME_NONE;
+}
+
+/* Sets or clears a flag that must not be inherited from the coded frame. */
+void
+mark_discont (Output &output, GstBuffer *outbuf)
+{
+  if (std::exchange (output.discont, false)) {
+    GST_BUFFER_FLAG_SET (outbuf, GST_BUFFER_FLAG_DISCONT);
+  } else {
+    GST_BUFFER_FLAG_UNSET (outbuf, GST_BUFFER_FLAG_DISCONT);
+    GST_BUFFER_FLAG_UNSET (outbuf, GST_BUFFER_FLAG_RESYNC);
+  }
+}
+
+/* @outbuf: writable, taken. */
+GstFlowReturn
+push_on (GstCodedExposureDemux *self, Output &output, BufferPtr outbuf,
+    GstClockTime duration)
+{
+  GST_BUFFER_DURATION (outbuf.get ()) = duration;
+  GST_BUFFER_OFFSET (outbuf.get ()) = output.offset++;
+  GST_BUFFER_OFFSET_END (outbuf.get ()) = output.offset;
+  mark_discont (output, outbuf.get ());
+  GST_LOG_OBJECT (output.pad.get (), "[OUT] %" GST_PTR_FORMAT, outbuf.get ());
+  const GstFlowReturn flow =
+      gst_pad_push (output.pad.get (), outbuf.release ());
+  if (flow == GST_FLOW_OK)
+    count (self, &Counters::subframes_out);
+  return combine_flow (self, output, flow);
+}
+
+/* @outbuf once more, in the same memory unless the peer of @output could not
+ * read its layout. */
+BufferPtr
+share (const Plan &plan, const Output &output, GstBuffer *outbuf)
+{
+  const GstVideoMeta *layout = gst_buffer_get_video_meta (outbuf);
+  const bool plain =
+      !layout || (layout->offset[0] == plan.subframe.offset[0] &&
+                     layout->stride[0] == plan.subframe.stride[0]);
+  if (plain || output.allocation->video_meta)
+    return BufferPtr (gst_buffer_copy (outbuf));
+
+  BufferPtr packed (gst_buffer_new_allocate (
+      nullptr, GST_VIDEO_INFO_SIZE (&plan.subframe), nullptr));
+  gst_buffer_copy_into (packed.get (), outbuf,
+      GstBufferCopyFlags (GST_BUFFER_COPY_FLAGS | GST_BUFFER_COPY_TIMESTAMPS),
+      0, -1);
+  MetaCopy copy{packed.get (), &plan};
+  gst_buffer_foreach_meta (outbuf, copy_meta, &copy);
+  MappedFrame from (plan.subframe, outbuf, GST_MAP_READ);
+  MappedFrame to (plan.subframe, packed.get (), GST_MAP_WRITE);
+  if (from && to)
+    gst_video_frame_copy (to.frame (), from.frame ());
+  return packed;
+}
+
+GstFlowReturn
+push_subframe (
+    GstCodedExposureDemux *self, const Job &job, std::size_t k, Targets target)
+{
+  const Plan &plan = *state (self).stream.plan;
+  describe_subframe (self, job, k, target.buffer.get ());
+  BufferPtr second;
+  if (target.all && target.one)
+    second = share (plan, *target.one, target.buffer.get ());
+
+  GstFlowReturn flow = GST_FLOW_OK;
+  if (target.all)
+    flow = push_on (self, *target.all, std::move (target.buffer),
+        plan.boundaries[k + 1] - plan.boundaries[k]);
+  else
+    second = std::move (target.buffer);
+  if (target.one && !is_fatal (flow))
+    flow = push_on (self, *target.one, std::move (second), plan.period ());
+  return flow;
+}
+
+/* The recorder of coded frames must not wait for a display of subframes, so
+ * this pad comes first. */
+GstFlowReturn
+push_coded (GstCodedExposureDemux *self, const Job &job)
+{
+  const OutputRef &output = job.outputs->coded;
+  if (!output)
+    return GST_FLOW_OK;
+  BufferPtr outbuf (gst_buffer_ref (job.inbuf));
+  if (std::exchange (output->discont, false) &&
+      !GST_BUFFER_IS_DISCONT (job.inbuf)) {
+    outbuf.reset (gst_buffer_make_writable (outbuf.release ()));
+    GST_BUFFER_FLAG_SET (outbuf.get (), GST_BUFFER_FLAG_DISCONT);
+  }
+  GST_LOG_OBJECT (output->pad.get (), "[OUT] %" GST_PTR_FORMAT, outbuf.get ());
+  return combine_flow (
+      self, *output, gst_pad_push (output->pad.get (), outbuf.release ()));
+}
+
+GstFlowReturn
+push_subframes (GstCodedExposureDemux *self, Job &job)
+{
+  GstFlowReturn flow = GST_FLOW_OK;
+  std::vector<Targets> targets = find_targets (self, job, flow);
+  if (std::none_of (targets.begin (), targets.end (),
+          [] (const Targets &target) { return target.owner (); }))
+    return flow;
+  flow = render (self, job, targets);
+  if (flow != GST_FLOW_OK)
+    return flow;
+  if (!GST_BUFFER_FLAG_IS_SET (job.inbuf, GST_BUFFER_FLAG_GAP))
+    note_saturation (self, job);
+
+  for (std::size_t k : push_order (job, targets.size ())) {
+    if (targets[k].owner () && !is_fatal (flow))
+      flow = push_subframe (self, job, k, std::move (targets[k]));
+  }
+  return flow;
+}
+
+/* Counts and judges the frame before anything of it goes out. */
+Job
+admit (GstCodedExposureDemux *self, GstBuffer *inbuf)
+{
+  const Stream &stream = state (self).stream;
+  Job job{inbuf, GST_BUFFER_PTS (inbuf), {}, outputs (self),
+      stream.segment.rate < 0};
+  count (self, &Counters::frames_in);
+  if (GST_BUFFER_IS_DISCONT (inbuf))
+    start_anew (*job.outputs);
+  if (GST_BUFFER_FLAG_IS_SET (inbuf, GST_BUFFER_FLAG_CORRUPTED)) {
+    count (self, &Counters::frames_corrupted);
+    notify (self, "frames-corrupted");
+  }
+  job.meta = describe (self, job, check_time (self, job));
+  return job;
+}
+
+} // namespace
+
+void
+end_saturation (GstCodedExposureDemux *self)
+{
+  const Burst burst = std::exchange (state (self).stream.saturation, {});
+  if (burst.frames == 0)
+    return;
+  post (self, gst_structure_new ("codedexposure/saturated", "active",
+                  G_TYPE_BOOLEAN, FALSE, "frames", G_TYPE_UINT64, burst.frames,
+                  "from", G_TYPE_UINT64, burst.from, "to", G_TYPE_UINT64,
+                  burst.to, "pixels", G_TYPE_UINT64, burst.peak, nullptr));
+  notify (self, "saturated-frames");
+}
+
+/* The subframes of one coded frame, in the order of their exposure. One
+ * thread serves all pads, so that a sink that waits for its time makes the
+ * others wait: users put a queue after every pad. Buffers are pushed one by
+ * one, because a sink would show a whole list at the time of its first. */
+GstFlowReturn
+chain (GstPad *pad, GstObject *parent, GstBuffer *inbuf)
+{
+  auto *self = GST_CODED_EXPOSURE_DEMUX (parent);
+  const BufferPtr frame (inbuf);
+  GST_LOG_OBJECT (pad, "[IN] %" GST_PTR_FORMAT, inbuf);
+  if (state (self).stream.segment.format != GST_FORMAT_TIME)
+    return GST_FLOW_ERROR;
+  if (const GstFlowReturn flow = negotiate (self); flow != GST_FLOW_OK)
+    return flow;
+  if (!GST_BUFFER_PTS_IS_VALID (inbuf)) {
+    GST_ELEMENT_ERROR (self, STREAM, FORMAT,
+        ("A coded frame has no time stamp (PTS), so its subframes cannot be "
+         "placed in time: let the source set one, for example with "
+         "do-timestamp=true."),
+        (nullptr));
+    return GST_FLOW_ERROR;
+  }
+
+  Job job = admit (self, inbuf);
+  if (!check_pads (self, *job.outputs))
+    return GST_FLOW_NOT_NEGOTIATED;
+  const GstFlowReturn flow = push_coded (self, job);
+  return is_fatal (flow) ? flow : push_subframes (self, job);
+}
+
+} // namespace cexp::gst::demux

@@ -1,0 +1,262 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* What codedexposure-demux knows, and what its parts call each other for. */
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include <gst/base/gstflowcombiner.h>
+#include <gst/gst.h>
+#include <gst/video/video.h>
+
+#include "base/result.h"
+#include "extract/extractor.h"
+#include "gstcodedexposurecaps.h"
+#include "gstcodedexposuredemux.h"
+#include "gstcodedexposuremeta.h"
+#include "gstraii.h"
+#include "schedule/schedule.h"
+
+GST_DEBUG_CATEGORY_EXTERN (codedexposure_demux_debug);
+
+namespace cexp::gst::demux
+{
+
+using ScheduleRef = std::shared_ptr<const Schedule>;
+
+/** What the user asked for. */
+struct Settings {
+  std::string schedule;
+  /** The schedule read from the text; null where the text is empty. */
+  std::shared_ptr<const Result<Schedule>> parsed;
+  ExtractOptions extract;
+  int rate_num = 0, rate_den = 1; ///< 0/1: only from the caps
+  bool qos = false;
+};
+
+struct Counters {
+  guint64 frames_in = 0;
+  guint64 subframes_out = 0;
+  guint64 frames_lost = 0;
+  guint64 frames_corrupted = 0;
+  guint64 subframes_dropped = 0;
+  guint64 saturated_frames = 0;
+};
+
+struct PoolRelease {
+  void operator() (GstBufferPool *pool) const
+  {
+    gst_buffer_pool_set_active (pool, FALSE);
+    gst_object_unref (pool);
+  }
+};
+using PoolPtr = std::unique_ptr<GstBufferPool, PoolRelease>;
+
+/** Where the buffers of a pad come from. */
+struct Allocation {
+  PoolPtr pool;
+  /** Only a pool that is used is active: starting it allocates. */
+  bool active = false;
+  /** The peer reads strides and offsets from the GstVideoMeta. */
+  bool video_meta = false;
+};
+
+/** A source pad. */
+struct Output {
+  enum class Kind { kAll, kOne, kCoded };
+
+  Kind kind;
+  int index; ///< of the subframe, for kOne
+  ObjectPtr<GstPad> pad;
+
+  /* Sink pad's stream lock. */
+  bool discont = true;
+  guint64 offset = 0;
+  std::optional<Allocation> allocation;
+
+  /* Object lock of the element. */
+  bool released = false;
+  /** Running time before which a subframe would come too late. */
+  GstClockTime earliest = GST_CLOCK_TIME_NONE;
+  gdouble proportion = 1.0;
+  GstClockTimeDiff jitter = 0;
+};
+using OutputRef = std::shared_ptr<Output>;
+
+/** All source pads at one moment. */
+struct Outputs {
+  OutputRef all;
+  OutputRef coded; ///< null until requested
+  std::map<int, OutputRef> ones;
+
+  template <typename F>
+  void each (F &&f) const
+  {
+    if (coded)
+      f (coded);
+    f (all);
+    for (const auto &[index, output] : ones)
+      f (output);
+  }
+};
+
+/** What is pushed on each kind of pad. */
+struct PadCaps {
+  CapsPtr coded, all, one;
+  GstCaps *of (Output::Kind kind) const;
+  explicit operator bool () const { return all != nullptr; }
+};
+
+using AnyExtractor =
+    std::variant<Extractor<std::uint8_t>, Extractor<std::uint16_t>>;
+
+/** Light that a subframe holds, counted from the start of its coded frame. */
+struct Window {
+  GstClockTime start, duration;
+};
+
+/** Everything that follows from the caps, the schedule and the settings. */
+struct Plan {
+  Schedule schedule;
+  GstVideoInfo coded, subframe;
+  AnyExtractor extractor;
+  Method method;
+  /** Slot boundaries, n + 1 of them, counted from the frame's PTS. */
+  std::vector<GstClockTime> boundaries;
+  std::vector<Window> windows;
+
+  int subframes () const { return schedule.elements (); }
+  GstClockTime period () const { return boundaries.back (); }
+};
+
+/** Saturated frames that follow each other. */
+struct Burst {
+  guint64 frames = 0;
+  guint64 peak = 0; ///< most saturated pixels in one of them
+  GstClockTime from = GST_CLOCK_TIME_NONE;
+  GstClockTime to = GST_CLOCK_TIME_NONE;
+};
+
+/** All that is forgotten from PAUSED to READY. Sink pad's stream lock. */
+struct Stream {
+  Stream () { gst_segment_init (&segment, GST_FORMAT_UNDEFINED); }
+
+  CapsPtr caps;
+  guint32 caps_seqnum = 0;
+  GstSegment segment;
+  /** What the tags of the stream say; an error where they cannot be read. */
+  std::optional<Result<Schedule>> tagged;
+  Settings settings; ///< in force
+  std::optional<Plan> plan;
+  bool stale = true; ///< the plan has to be made again before the next frame
+  /** Serialised events that wait for the caps of the source pads. */
+  std::vector<EventPtr> pending;
+  GstClockTime last_pts = GST_CLOCK_TIME_NONE;
+  guint64 next_frame = 0;
+  Burst saturation;
+  bool warned_assumed = false;
+  bool warned_backwards = false;
+  std::optional<bool> live;       ///< asked for when first needed
+  std::vector<std::byte> scratch; ///< subframes that no pad wants
+};
+
+struct CombinerFree {
+  void operator() (GstFlowCombiner *combiner) const
+  {
+    gst_flow_combiner_free (combiner);
+  }
+};
+
+/** Behind the GObject. The object lock of the element is a leaf: it is never
+ * held while pushing, querying or posting; where the stream lock of the sink
+ * pad is needed too, that one is taken first. */
+struct DemuxState {
+  GstPad *sinkpad = nullptr;
+
+  /* Object lock. */
+  Settings settings;
+  bool settings_changed = true;
+  /** Replaced, never changed: the streaming thread works on one while the
+   * application requests and releases pads. */
+  std::shared_ptr<const Outputs> outputs = std::make_shared<Outputs> ();
+  std::unique_ptr<GstFlowCombiner, CombinerFree> combiner{
+      gst_flow_combiner_new ()};
+  Counters counters;
+  PadCaps caps;
+  ScheduleRef in_force; ///< null before the first frame
+  bool assumed = false; ///< in_force came from nowhere
+  Method method = Method::kAuto;
+
+  /* Sink pad's stream lock. */
+  Stream stream;
+};
+
+DemuxState &state (GstCodedExposureDemux *self);
+std::shared_ptr<const Outputs> outputs (GstCodedExposureDemux *self);
+/** Notifies of a property that the streaming thread changed. */
+void notify (GstCodedExposureDemux *self, const char *property);
+
+inline bool
+is_sticky (GstEvent *event)
+{
+  return gst_event_type_get_flags (GST_EVENT_TYPE (event)) &
+         GST_EVENT_TYPE_STICKY;
+}
+
+/* Pads. */
+OutputRef add_output (GstCodedExposureDemux *self, GstPadTemplate *templ,
+    Output::Kind kind, int index);
+GstPad *request_pad (GstElement *element, GstPadTemplate *templ,
+    const gchar *name, const GstCaps *caps);
+void release_pad (GstElement *element, GstPad *pad);
+/** Whether a buffer pushed there goes anywhere. */
+bool is_wanted (const Output &output);
+/** Pushes @p event on every source pad, in the form that suits each. */
+gboolean forward (GstCodedExposureDemux *self, EventPtr event);
+/** The negotiated caps of @p output. */
+CapsPtr caps_for (GstCodedExposureDemux *self, const Output &output);
+void push_caps (GstCodedExposureDemux *self, const Output &output);
+/** The flow of all pads together after @p output returned @p flow. */
+GstFlowReturn combine_flow (
+    GstCodedExposureDemux *self, const Output &output, GstFlowReturn flow);
+void forget_flow (GstCodedExposureDemux *self);
+
+/* Events and queries. */
+gboolean sink_event (GstPad *pad, GstObject *parent, GstEvent *event);
+gboolean src_event (GstPad *pad, GstObject *parent, GstEvent *event);
+gboolean sink_query (GstPad *pad, GstObject *parent, GstQuery *query);
+gboolean src_query (GstPad *pad, GstObject *parent, GstQuery *query);
+
+/* Negotiation. */
+/** Makes the plan and tells the source pads, where that is due. Posts an error
+ * and returns other than OK when there can be no plan. */
+GstFlowReturn negotiate (GstCodedExposureDemux *self);
+/** Whether the plan has a subframe for every pad of @p list; posts an error
+ * where it has not. */
+bool check_pads (GstCodedExposureDemux *self, const Outputs &list);
+/** Forwards the events that waited for the caps. */
+void flush_pending (GstCodedExposureDemux *self);
+/** Answers for the CAPS query; Transfer: full. */
+GstCaps *sink_caps (GstCodedExposureDemux *self);
+GstCaps *src_caps (GstCodedExposureDemux *self, GstPad *pad);
+
+/* Buffers. */
+/** Asks the peer of @p output for its pool, where that is due. @p at_once
+ * buffers of it will be out at the same time. */
+void prepare_allocation (
+    GstCodedExposureDemux *self, Output &output, guint at_once);
+/** A subframe's buffer from the pool of @p output. */
+GstFlowReturn acquire (Output &output, BufferPtr &outbuf);
+gboolean answer_allocation (GstCodedExposureDemux *self, GstQuery *query);
+
+/* Frames. */
+GstFlowReturn chain (GstPad *pad, GstObject *parent, GstBuffer *inbuf);
+/** Says on the bus that a burst of saturated frames is over, if there is one.
+ */
+void end_saturation (GstCodedExposureDemux *self);
+
+} // namespace cexp::gst::demux

@@ -7,6 +7,7 @@
 
 #include "base/image.h"
 #include "base/result.h"
+#include "optics/lens.h"
 #include "schedule/schedule.h"
 
 namespace cexp
@@ -14,54 +15,80 @@ namespace cexp
 
 /** Camera and lens; the zero value is an ideal, aligned, noise-free bench. */
 struct BenchOptions {
-  double psf_sigma = 0.0;  ///< Gaussian blur from mirror to pixel, px; 0..16
-  double full_well = 0.0;  ///< electrons at white; 0: noise-free
+  static constexpr double kMaxPsfSigma = 16.0;
+  static constexpr double kMaxFullWell = 1e7;
+  static constexpr double kMaxReadNoise = 1e5;
+  static constexpr double kMaxGain = 1000.0;
+  static constexpr double kMaxShift = 10000.0;
+  static constexpr double kMinScale = 0.5;
+  static constexpr double kMaxScale = 2.0;
+
+  /** Blur between mirrors and pixels, standard deviation in pixels. */
+  double psf_sigma = 0.0;
+  /** Electrons that white makes when every slot is open, and the most that a
+   * pixel holds; 0: noise-free. The light does not depend on the code: a pixel
+   * that is open in one slot of N gets an Nth of it. */
+  double full_well = 0.0;
   double read_noise = 0.0; ///< electrons rms; needs a full well
-  int bits = 0;            ///< significant bits; 0: all that the type has
-  double gain = 0.0;       ///< 0: white in a fully used slot budget is white
+  int bits = 0; ///< significant bits; 0, or too many: all of the pixel's
+  /** At 1, white makes white when every slot is open; 0: OpticalBench::gain ()
+   */
+  double gain = 0.0;
   std::uint64_t seed = 0;
-  double shift_x = 0.0, shift_y = 0.0; ///< mirrors against pixels, px
-  double rotation = 0.0;               ///< degrees about the centre
-  double scale = 1.0;                  ///< pixels a mirror; 0.5..2
+  Alignment alignment;
+
+  bool operator== (const BenchOptions &) const = default;
 };
 
 /**
  * Forward model of a coded exposure (paper, Eqs. 1-7), one frame at a time:
  * begin (), expose () for every stretch of light, read_out ().
  *
- * One mirror to one scene pixel; the camera sees the mirrors through the
- * misalignment and the point spread function. Light is linear in the scene's
- * values; white is the largest value of the pixel type.
+ * One mirror to one scene pixel; the camera sees the mirrors through the lens
+ * (lens.h) and counts light with its sensor (sensor.h). Light is linear in the
+ * scene's values, and white is the largest value of the pixel type.
+ *
+ * With no blur, no misalignment and no noise, a pixel that was open for one
+ * slot is, at gain 0 and no leak, the scene's value in that slot exactly.
+ *
+ * Pixels have 8 or 16 bits (host order), the same in all of an exposure.
  */
 class OpticalBench
 {
 public:
+  /** Error when an option is out of its range. */
   static Result<OpticalBench> make (
       int width, int height, const BenchOptions &options);
   OpticalBench (OpticalBench &&) noexcept;
   OpticalBench &operator= (OpticalBench &&) noexcept;
   ~OpticalBench ();
 
-  /** Empties the sensor. */
-  void begin ();
+  /** Empties the sensor for an exposure with the masks of @p schedule. */
+  void begin (const Schedule &schedule);
   /**
-   * Adds the light of @p scene through mask @p mask of @p schedule (render_mask
-   * ()) for @p slots slot times; open mirrors pass all of it, shut ones
-   * schedule.leak ().
-   * @p mask  a negative value is the parked DMD: every mirror shut.
+   * Adds the light of @p scene through a mask; open mirrors pass all of it,
+   * shut ones schedule.leak ().
+   * @p scene  of the bench's size.
+   * @p mask   index as in render_mask (); a negative one is the parked DMD:
+   *           every mirror shut.
+   * @p slots  how long, in active times of a slot.
    */
-  template <typename Pixel>
-  void expose (ImageView<const Pixel> scene, const Schedule &schedule, int mask,
-      double slots);
+  void expose (ImageView<const std::uint8_t> scene, int mask, double slots);
+  void expose (ImageView<const std::uint16_t> scene, int mask, double slots);
   /**
-   * Lens, sensor and converter: shot and read noise, gain, rounding, clamp.
-   * @p frame  number of the frame; it and the seed fix the noise, whatever the
-   *           thread that computes it.
-   * @p slots_to_white  slot times of full light that make white at gain 0.
+   * Reads what was collected since begin ().
+   * @p frame  number of the frame; it and the seed fix the noise.
+   * @p coded  of the bench's size, fully overwritten.
    */
-  template <typename Pixel>
-  void read_out (
-      std::uint64_t frame, double slots_to_white, ImageView<Pixel> coded) const;
+  void read_out (std::uint64_t frame, ImageView<std::uint8_t> coded);
+  void read_out (std::uint64_t frame, ImageView<std::uint16_t> coded);
+
+  /**
+   * The gain in force. Where the options leave it at 0, white makes white for
+   * the element that is open longest: N / (k + leak (N - k)), k =
+   * code.max_open_slots ().
+   */
+  double gain () const;
 
 private:
   struct State;

@@ -1,0 +1,206 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "optics/bench.h"
+
+#include <algorithm>
+#include <cassert>
+#include <limits>
+#include <optional>
+#include <sstream>
+
+#include "optics/mirror_rows.h"
+#include "optics/sensor.h"
+
+namespace cexp
+{
+
+struct OpticalBench::State {
+  State (int width, int height, const BenchOptions &opts)
+      : options (opts), lens (opts.alignment, opts.psf_sigma, width, height),
+        light (width, height)
+  {
+    if (!lens.ideal ())
+      seen = Image<float> (width, height);
+  }
+
+  BenchOptions options;
+  Lens lens;
+  Image<float> light; // on the mirrors, scene values times slots
+  Image<float> seen;  // by the pixels
+  std::optional<MirrorRows> mirrors;
+  double white = 0.0; // of the scene
+  bool empty = true;  // light is yet to be overwritten
+
+  double gain () const;
+  template <typename Pixel>
+  void expose (ImageView<const Pixel> scene, int mask, double slots);
+  template <typename Pixel>
+  void read_out (std::uint64_t frame, ImageView<Pixel> coded);
+};
+
+namespace
+{
+
+Error
+out_of_range (const char *what, double value, double low, double high)
+{
+  std::ostringstream text;
+  text << what << " = " << value << " is outside " << low << ".." << high;
+  return Error{text.str ()};
+}
+
+Result<void>
+check (const BenchOptions &options)
+{
+  using O = BenchOptions;
+  const Alignment &a = options.alignment;
+  const struct {
+    const char *what;
+    double value, low, high;
+  } ranges[] = {
+      {"PSF sigma (pixels)", options.psf_sigma, 0.0, O::kMaxPsfSigma},
+      {"full well (electrons)", options.full_well, 0.0, O::kMaxFullWell},
+      {"read noise (electrons)", options.read_noise, 0.0, O::kMaxReadNoise},
+      {"bits", double (options.bits), 0.0, 16.0},
+      {"gain", options.gain, 0.0, O::kMaxGain},
+      {"horizontal shift (mirrors)", a.shift_x, -O::kMaxShift, O::kMaxShift},
+      {"vertical shift (mirrors)", a.shift_y, -O::kMaxShift, O::kMaxShift},
+      {"rotation (degrees)", a.rotation, -180.0, 180.0},
+      {"scale (pixels a mirror)", a.scale, O::kMinScale, O::kMaxScale},
+  };
+  for (const auto &range : ranges)
+    /* So written that not-a-number fails, too. */
+    if (!(range.value >= range.low && range.value <= range.high))
+      return out_of_range (range.what, range.value, range.low, range.high);
+  if (options.read_noise > 0.0 && options.full_well == 0.0)
+    return Error{"read noise is counted in electrons and needs a full well; "
+                 "set it, 10000 for example"};
+  return {};
+}
+
+/* One row: every mirror passes @open or @shut of its light. */
+template <bool kFirst, typename Pixel>
+void
+collect (const Pixel *scene, const std::uint8_t *mirrors, int width, float open,
+    float shut, float *light)
+{
+  for (int x = 0; x < width; x++) {
+    const float passed = float (scene[x]) * (mirrors[x] != 0 ? open : shut);
+    light[x] = kFirst ? passed : light[x] + passed;
+  }
+}
+
+} // namespace
+
+Result<OpticalBench>
+OpticalBench::make (int width, int height, const BenchOptions &options)
+{
+  if (width < 1 || height < 1)
+    return Error{"a bench of " + std::to_string (width) + "x" +
+                 std::to_string (height) + " mirrors has no picture"};
+  if (Result<void> checked = check (options); !checked)
+    return checked.error ();
+  return OpticalBench (std::make_unique<State> (width, height, options));
+}
+
+OpticalBench::OpticalBench (std::unique_ptr<State> state)
+    : state_ (std::move (state))
+{
+}
+
+OpticalBench::OpticalBench (OpticalBench &&) noexcept = default;
+OpticalBench &OpticalBench::operator= (OpticalBench &&) noexcept = default;
+OpticalBench::~OpticalBench () = default;
+
+void
+OpticalBench::begin (const Schedule &schedule)
+{
+  State &st = *state_;
+  if (!st.mirrors || !(st.mirrors->schedule () == schedule))
+    st.mirrors.emplace (schedule, st.light.width (), st.light.height ());
+  st.empty = true;
+}
+
+template <typename Pixel>
+void
+OpticalBench::State::expose (
+    ImageView<const Pixel> scene, int mask, double slots)
+{
+  assert (mirrors && same_size (scene, light.view ()));
+  const float open = float (slots);
+  const float shut = float (slots * mirrors->schedule ().leak ());
+  const auto collect_row = empty ? collect<true, Pixel> : collect<false, Pixel>;
+  mirrors->show (mask);
+  for (int y = 0; y < scene.height; y++)
+    collect_row (scene.row (y), mirrors->row (y), scene.width, open, shut,
+        light.view ().row (y));
+  white = std::numeric_limits<Pixel>::max ();
+  empty = false;
+}
+
+void
+OpticalBench::expose (
+    ImageView<const std::uint8_t> scene, int mask, double slots)
+{
+  state_->expose (scene, mask, slots);
+}
+
+void
+OpticalBench::expose (
+    ImageView<const std::uint16_t> scene, int mask, double slots)
+{
+  state_->expose (scene, mask, slots);
+}
+
+template <typename Pixel>
+void
+OpticalBench::State::read_out (std::uint64_t frame, ImageView<Pixel> coded)
+{
+  assert (mirrors && same_size (coded, light.view ()));
+  if (empty) {
+    light = Image<float> (coded.width, coded.height);
+    white = std::numeric_limits<Pixel>::max ();
+  }
+  if (!lens.ideal ())
+    lens.image (light.view (), seen.view ());
+
+  const int all_bits = std::numeric_limits<Pixel>::digits;
+  Sensor sensor;
+  sensor.full_well = options.full_well;
+  sensor.read_noise = options.read_noise;
+  sensor.gain = gain ();
+  sensor.bits = options.bits > 0 ? std::min (options.bits, all_bits) : all_bits;
+  sensor.seed = options.seed;
+  sensor.read_out<Pixel> (lens.ideal () ? light.view () : seen.view (),
+      white * mirrors->schedule ().slots (), frame, coded);
+}
+
+void
+OpticalBench::read_out (std::uint64_t frame, ImageView<std::uint8_t> coded)
+{
+  state_->read_out (frame, coded);
+}
+
+void
+OpticalBench::read_out (std::uint64_t frame, ImageView<std::uint16_t> coded)
+{
+  state_->read_out (frame, coded);
+}
+
+double
+OpticalBench::State::gain () const
+{
+  if (options.gain > 0.0 || !mirrors)
+    return options.gain;
+  const Schedule &schedule = mirrors->schedule ();
+  const int slots = schedule.slots ();
+  const int open = schedule.code ().max_open_slots ();
+  return slots / (open + schedule.leak () * (slots - open));
+}
+
+double
+OpticalBench::gain () const
+{
+  return state_->gain ();
+}
+
+} // namespace cexp

@@ -1,0 +1,530 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The optical bench: what a coded frame holds of the scene, to the number. */
+#include "optics/bench.h"
+
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <numeric>
+
+#include <gtest/gtest.h>
+
+#include "optics/light_share.h"
+#include "optics/mirror_rows.h"
+
+namespace
+{
+
+using namespace cexp;
+
+Schedule
+schedule (const char *preset)
+{
+  Result<Schedule> parsed = Schedule::from_preset (preset);
+  EXPECT_TRUE (parsed) << parsed.error ().message;
+  return *parsed;
+}
+
+OpticalBench
+bench (int width, int height, const BenchOptions &options = {})
+{
+  Result<OpticalBench> made = OpticalBench::make (width, height, options);
+  EXPECT_TRUE (made) << made.error ().message;
+  return std::move (*made);
+}
+
+/* Scenes that differ in every pixel and slot. */
+template <typename Pixel>
+Image<Pixel>
+scene (int width, int height, int slot)
+{
+  Image<Pixel> image (width, height);
+  for (int y = 0; y < height; y++)
+    for (int x = 0; x < width; x++)
+      image.at (x, y) =
+          Pixel (x * 7919 + y * 104729 + slot * 15485863 + x * y * slot);
+  return image;
+}
+
+template <typename Pixel>
+Image<Pixel>
+flat (int width, int height, Pixel value)
+{
+  Image<Pixel> image (width, height);
+  for (int y = 0; y < height; y++)
+    for (int x = 0; x < width; x++)
+      image.at (x, y) = value;
+  return image;
+}
+
+/* One coded frame of a scene that changes with every slot. */
+template <typename Pixel>
+Image<Pixel>
+coded_frame (OpticalBench &bench, const Schedule &schedule, int width,
+    int height, const std::function<Image<Pixel> (int slot)> &scene_of)
+{
+  Image<Pixel> coded (width, height);
+  bench.begin (schedule);
+  for (int slot = 0; slot < schedule.slots (); slot++)
+    bench.expose (scene_of (slot).view (), slot, 1.0);
+  bench.read_out (0, coded.view ());
+  return coded;
+}
+
+Image<std::uint8_t>
+still (OpticalBench &bench, const Schedule &schedule,
+    const Image<std::uint8_t> &picture)
+{
+  return coded_frame<std::uint8_t> (bench, schedule, picture.width (),
+      picture.height (), [&] (int) { return picture; });
+}
+
+/* Sum over the slots in which a pixel is open, in integers. */
+template <typename Pixel>
+void
+expect_exact (const Schedule &schedule)
+{
+  SCOPED_TRACE (schedule.text ());
+  const int width = 37, height = 23, slots = schedule.slots ();
+  OpticalBench ideal = bench (width, height);
+  const Image<Pixel> coded = coded_frame<Pixel> (ideal, schedule, width, height,
+      [&] (int slot) { return scene<Pixel> (width, height, slot); });
+
+  const int budget = schedule.code ().max_open_slots ();
+  for (int y = 0; y < height; y++)
+    for (int x = 0; x < width; x++) {
+      std::int64_t light = 0;
+      for (int slot = 0; slot < slots; slot++)
+        if (schedule.code ().open (schedule.element_at (x, y), slot))
+          light += scene<Pixel> (width, height, slot).at (x, y);
+      ASSERT_EQ (coded.at (x, y), (2 * light + budget) / (2 * budget))
+          << "at " << x << ", " << y;
+    }
+}
+
+class Exact : public ::testing::TestWithParam<const char *>
+{
+};
+
+TEST_P (Exact, CodedFrameIsTheMeanOfTheOpenSlots)
+{
+  expect_exact<std::uint8_t> (schedule (GetParam ()));
+  expect_exact<std::uint16_t> (schedule (GetParam ()));
+}
+
+INSTANTIATE_TEST_SUITE_P (Schedules, Exact,
+    ::testing::Values ("sequential:2x2", "sequential:lattice:4/2",
+        "sequential:lattice:8/3,order=bit-reversal", "sequential:4x2,phase=1/3",
+        "sequential:3x3", "staircase:2x2", "staircase:3x2",
+        "staircase:lattice:8/3", "staircase:3x3", "s-matrix:lattice:7/2",
+        "sequential:16x16"));
+
+TEST (Bench, ReadsRowsThatLieApart)
+{
+  const int width = 5, height = 4, stride = 11;
+  const Schedule code = schedule ("sequential:2x2");
+  Image<std::uint8_t> packed = scene<std::uint8_t> (width, height, 0);
+  std::vector<std::uint8_t> in (stride * height, 99), out (stride * height, 77);
+  for (int y = 0; y < height; y++)
+    std::copy_n (packed.view ().row (y), width, in.data () + y * stride);
+
+  OpticalBench ideal = bench (width, height);
+  ideal.begin (code);
+  for (int slot = 0; slot < 4; slot++)
+    ideal.expose (
+        ImageView<const std::uint8_t>{in.data (), width, height, stride}, slot,
+        1.0);
+  ideal.read_out (
+      0, ImageView<std::uint8_t>{out.data (), width, height, stride});
+  for (int y = 0; y < height; y++)
+    for (int x = 0; x < stride; x++)
+      EXPECT_EQ (
+          out[std::size_t (y * stride + x)], x < width ? packed.at (x, y) : 77);
+}
+
+TEST (Bench, WhiteIsWhiteWithLeakAndEveryCode)
+{
+  for (const char *preset : {"sequential:2x2,leak=0.05", "sequential:3x3",
+           "staircase:2x2,leak=0.1", "s-matrix:lattice:7/2,leak=0.02"}) {
+    SCOPED_TRACE (preset);
+    const Schedule code = schedule (preset);
+    OpticalBench ideal = bench (18, 14);
+    const Image<std::uint8_t> coded =
+        still (ideal, code, flat<std::uint8_t> (18, 14, 255));
+    const int most = code.code ().max_open_slots ();
+    for (int y = 0; y < 14; y++)
+      for (int x = 0; x < 18; x++)
+        if (code.code ().open_slots (code.element_at (x, y)) == most) {
+          ASSERT_EQ (coded.at (x, y), 255);
+        }
+  }
+}
+
+TEST (Bench, ShutMirrorsLeakWhatTheScheduleSays)
+{
+  const Schedule code = schedule ("sequential:2x2,leak=0.25");
+  OpticalBench ideal = bench (2, 2);
+  ideal.begin (code);
+  ideal.expose (flat<std::uint8_t> (2, 2, 140).view (), 0, 1.0);
+  Image<std::uint8_t> coded (2, 2);
+  ideal.read_out (0, coded.view ());
+  /* White needs 1 + 3 * 0.25 = 1.75 slots. */
+  EXPECT_DOUBLE_EQ (ideal.gain (), 4 / 1.75);
+  EXPECT_EQ (coded.at (0, 0), 80);
+  EXPECT_EQ (coded.at (1, 0), 20);
+  EXPECT_EQ (coded.at (0, 1), 20);
+  EXPECT_EQ (coded.at (1, 1), 20);
+}
+
+TEST (Bench, ParkedMirrorsAreDarkButForTheirLeak)
+{
+  Image<std::uint8_t> coded (4, 4);
+  for (const auto &[preset, expected] : {std::pair ("sequential:2x2", 0),
+           std::pair ("sequential:2x2,leak=0.25", 114)}) {
+    OpticalBench ideal = bench (4, 4);
+    ideal.begin (schedule (preset));
+    for (int slot = 0; slot < 4; slot++)
+      ideal.expose (flat<std::uint8_t> (4, 4, 200).view (), -1, 1.0);
+    ideal.read_out (0, coded.view ());
+    EXPECT_EQ (coded, (flat<std::uint8_t> (4, 4, std::uint8_t (expected))));
+  }
+}
+
+TEST (Bench, NothingExposedIsBlack)
+{
+  OpticalBench ideal = bench (4, 4);
+  const Schedule code;
+  Image<std::uint8_t> coded = flat<std::uint8_t> (4, 4, 9);
+  still (ideal, code, flat<std::uint8_t> (4, 4, 200));
+  ideal.begin (code);
+  ideal.read_out (0, coded.view ());
+  EXPECT_EQ (coded, (flat<std::uint8_t> (4, 4, 0)));
+}
+
+TEST (Bench, GainAndBitsScaleTheNumbers)
+{
+  const Schedule code = schedule ("staircase:2x2");
+  BenchOptions options;
+  options.bits = 12;
+  OpticalBench twelve = bench (2, 2, options);
+  const auto white = [] (int) { return flat<std::uint16_t> (2, 2, 65535); };
+  Image<std::uint16_t> coded =
+      coded_frame<std::uint16_t> (twelve, code, 2, 2, white);
+  /* Elements 0..3 are open in 1..4 slots of 4. */
+  EXPECT_EQ (coded.at (0, 0), 1024);
+  EXPECT_EQ (coded.at (1, 1), 4095);
+
+  options.gain = 2.0;
+  OpticalBench bright = bench (2, 2, options);
+  coded = coded_frame<std::uint16_t> (bright, code, 2, 2, white);
+  EXPECT_EQ (coded.at (0, 0), 2048);
+  EXPECT_EQ (coded.at (1, 0), 4095);
+  EXPECT_EQ (coded.at (1, 1), 4095) << "clamped";
+  EXPECT_DOUBLE_EQ (bright.gain (), 2.0);
+}
+
+TEST (Bench, SaysWhichOptionIsWrong)
+{
+  const auto error = [] (BenchOptions options) {
+    Result<OpticalBench> made = OpticalBench::make (4, 4, options);
+    return made ? "" : made.error ().message;
+  };
+  BenchOptions options;
+  options.psf_sigma = 17;
+  EXPECT_EQ (error (options), "PSF sigma (pixels) = 17 is outside 0..16");
+  options = {};
+  options.alignment.scale = 0;
+  EXPECT_EQ (error (options), "scale (pixels a mirror) = 0 is outside 0.5..2");
+  options = {};
+  options.gain = std::nan ("");
+  EXPECT_EQ (error (options), "gain = nan is outside 0..1000");
+  options = {};
+  options.read_noise = 5;
+  EXPECT_EQ (error (options),
+      "read noise is counted in electrons and needs a full well; set it, 10000 "
+      "for example");
+  EXPECT_FALSE (OpticalBench::make (0, 4, {}));
+}
+
+TEST (MirrorRows, AreTheRenderedMask)
+{
+  for (const char *preset : {"staircase:3x2,phase=2/1",
+           "sequential:lattice:8/3,order=bit-reversal", "sequential:diamond:13",
+           "sequential:2x2,pilot=6", "sequential:4x4,pilot=4"}) {
+    SCOPED_TRACE (preset);
+    const Schedule code = schedule (preset);
+    const int width = 29, height = 31;
+    MirrorRows rows (code, width, height);
+    Image<std::uint8_t> mask (width, height);
+    for (int m = -1; m < code.masks (); m++) {
+      if (m >= 0)
+        render_mask (code, m, mask.view ());
+      rows.show (m);
+      for (int y = 0; y < height; y++)
+        ASSERT_TRUE (std::equal (
+            rows.row (y), rows.row (y) + width, mask.view ().row (y)))
+            << "mask " << m << " row " << y;
+    }
+  }
+}
+
+SlotPlan
+plan (const Timing &timing, int slots, FrameRate rate)
+{
+  return SlotPlan::fit (timing, slots, rate).value ();
+}
+
+constexpr Nanoseconds kMillisecond = 1'000'000;
+
+TEST (LightShare, OneStretchASlotGivesAllOfIt)
+{
+  for (const FrameRate rate : {FrameRate{25, 1}, FrameRate{30000, 1001}})
+    for (const int slots : {4, 8, 9, 256}) {
+      const auto shares = share_light (plan ({}, slots, rate), slots);
+      ASSERT_EQ (int (shares.size ()), slots);
+      for (int i = 0; i < slots; i++)
+        EXPECT_EQ (shares[std::size_t (i)], (std::vector<LightShare>{{i, 1.0}}))
+            << slots << " slots at " << rate.num << "/" << rate.den;
+    }
+}
+
+TEST (LightShare, SwitchingIsDarkAndTakesNothingFromTheRest)
+{
+  const Timing paper = {9'800'000, 200'000, 0};
+  const auto shares = share_light (plan (paper, 4, {25, 1}), 8);
+  for (int i = 0; i < 8; i += 2) {
+    ASSERT_EQ (shares[std::size_t (i)].size (), 1u);
+    ASSERT_EQ (shares[std::size_t (i) + 1].size (), 1u);
+    EXPECT_EQ (shares[std::size_t (i)][0].slot, i / 2);
+    EXPECT_NEAR (shares[std::size_t (i)][0].slots, 5.0 / 9.8, 1e-6);
+    EXPECT_EQ (
+        shares[std::size_t (i)][0].slots + shares[std::size_t (i) + 1][0].slots,
+        1.0);
+  }
+}
+
+TEST (LightShare, ReadoutTakesItsPartOfTheStretches)
+{
+  const Timing timing = {0, 0, 10 * kMillisecond};
+  const auto shares = share_light (plan (timing, 4, {25, 1}), 4);
+  /* Slots of 7.5 ms, stretches of 10 ms. */
+  EXPECT_EQ (shares[0].size (), 2u);
+  EXPECT_EQ (shares[0][0], (LightShare{0, 1.0}));
+  EXPECT_EQ (shares[0][1].slot, 1);
+  EXPECT_NEAR (shares[0][1].slots, 1.0 / 3, 1e-6);
+  EXPECT_NEAR (shares[1][0].slots, 2.0 / 3, 1e-6);
+  EXPECT_NEAR (shares[1][1].slots, 2.0 / 3, 1e-6);
+  EXPECT_TRUE (shares[3].empty ());
+}
+
+TEST (LightShare, HalvesAreHalvesAtEveryRate)
+{
+  for (const FrameRate rate : {FrameRate{25, 1}, FrameRate{30000, 1001}}) {
+    const auto shares = share_light (plan ({}, 4, rate), 8);
+    for (int i = 0; i < 8; i++)
+      EXPECT_EQ (
+          shares[std::size_t (i)], (std::vector<LightShare>{{i / 2, 0.5}}));
+  }
+}
+
+TEST (LightShare, EverySlotGetsAllItsLight)
+{
+  const Timing timing = {0, 123'457, 3'333'333};
+  for (const int slots : {4, 9, 25})
+    for (const int multiple : {1, 2, 3, 7}) {
+      std::vector<double> sums (std::size_t (slots), 0.0);
+      for (const auto &stretch :
+          share_light (plan (timing, slots, {30000, 1001}), slots * multiple))
+        for (const LightShare &share : stretch)
+          sums[std::size_t (share.slot)] += share.slots;
+      for (const double sum : sums)
+        EXPECT_EQ (sum, 1.0);
+    }
+}
+
+/* Bench of one open mask: what the lens makes of a picture. */
+Image<std::uint8_t>
+seen (const Image<std::uint8_t> &picture, const Alignment &alignment,
+    double psf_sigma = 0.0)
+{
+  const int width = picture.width (), height = picture.height ();
+  Lens lens (alignment, psf_sigma, width, height);
+  Image<float> mirrors (width, height), pixels (width, height);
+  for (int y = 0; y < height; y++)
+    for (int x = 0; x < width; x++)
+      mirrors.at (x, y) = picture.at (x, y);
+  if (lens.ideal ())
+    return picture;
+  lens.image (mirrors.view (), pixels.view ());
+  Image<std::uint8_t> out (width, height);
+  for (int y = 0; y < height; y++)
+    for (int x = 0; x < width; x++)
+      out.at (x, y) = std::uint8_t (std::lround (pixels.at (x, y)));
+  return out;
+}
+
+/* Brightness along x, f periods a mirror, exactly as a mirror shows it. */
+Image<float>
+waves (int width, int height, double f)
+{
+  Image<float> image (width, height);
+  for (int y = 0; y < height; y++)
+    for (int x = 0; x < width; x++)
+      image.at (x, y) =
+          float (std::cos (2 * std::numbers::pi * f * (x - 0.5 * (width - 1))));
+  return image;
+}
+
+TEST (Lens, WholeShiftsMoveThePictureTheOtherWay)
+{
+  const Image<std::uint8_t> picture = scene<std::uint8_t> (20, 16, 1);
+  const Image<std::uint8_t> out = seen (picture, {3.0, -2.0, 0.0, 1.0});
+  for (int y = 0; y < 16; y++)
+    for (int x = 0; x < 20; x++)
+      EXPECT_EQ (out.at (x, y),
+          x + 3 < 20 && y - 2 >= 0 ? picture.at (x + 3, y - 2) : 0)
+          << "at " << x << ", " << y << "; dark beyond the mirrors";
+}
+
+TEST (Lens, ShiftBeyondTheMirrorsIsDark)
+{
+  for (const double shift : {25.0, -25.0, 1000.0, -1000.0})
+    EXPECT_EQ (seen (scene<std::uint8_t> (20, 16, 1), {shift, 0, 0, 1}),
+        (flat<std::uint8_t> (20, 16, 0)));
+}
+
+TEST (Lens, HalfAMirrorMixesTwo)
+{
+  const Image<std::uint8_t> picture = scene<std::uint8_t> (8, 8, 1);
+  const Image<std::uint8_t> out = seen (picture, {0.5, 0.0, 0.0, 1.0});
+  EXPECT_EQ (out.at (2, 3),
+      std::lround ((picture.at (2, 3) + picture.at (3, 3)) / 2.0));
+}
+
+TEST (Lens, TurnsAboutTheCentreFromXToY)
+{
+  const Image<std::uint8_t> picture = scene<std::uint8_t> (9, 9, 1);
+  const Image<std::uint8_t> out = seen (picture, {0.0, 0.0, 90.0, 1.0});
+  /* Pixel to the right of the centre looks at the mirror below it. */
+  for (int y = 0; y < 9; y++)
+    for (int x = 0; x < 9; x++)
+      EXPECT_NEAR (out.at (x, y), picture.at (8 - y, x), 1);
+}
+
+TEST (Lens, ScaleTwoShowsEveryMirrorOnFourPixels)
+{
+  Image<std::uint8_t> picture = scene<std::uint8_t> (8, 8, 1);
+  const Image<std::uint8_t> out = seen (picture, {0.0, 0.0, 0.0, 2.0});
+  /* Pixel (x, y) lies on mirror 3.5 + (x - 3.5) / 2, a quarter off centre. */
+  for (int y = 0; y < 8; y++)
+    for (int x = 0; x < 8; x++)
+      EXPECT_EQ (out.at (x, y), picture.at ((x + 4) / 2, (y + 4) / 2));
+}
+
+TEST (Lens, ScaleHalfGathersFourMirrors)
+{
+  const Image<std::uint8_t> picture = scene<std::uint8_t> (8, 8, 1);
+  const Image<std::uint8_t> out = seen (picture, {0.0, 0.0, 0.0, 0.5});
+  for (int y = 2; y < 6; y++)
+    for (int x = 2; x < 6; x++) {
+      const int u = 2 * x - 4, v = 2 * y - 4;
+      const int sum = picture.at (u, v) + picture.at (u + 1, v) +
+                      picture.at (u, v + 1) + picture.at (u + 1, v + 1);
+      EXPECT_NEAR (out.at (x, y), sum / 4.0, 0.51);
+    }
+}
+
+TEST (Lens, MappingSaysWhereEachPixelLooks)
+{
+  const Affine m = camera_to_mirrors ({1.5, -2.5, 90.0, 2.0}, 101, 51);
+  const auto look = [&m] (double x, double y) {
+    return std::pair (m.xx * x + m.xy * y + m.x0, m.yx * x + m.yy * y + m.y0);
+  };
+  EXPECT_NEAR (look (50, 25).first, 51.5, 1e-12);
+  EXPECT_NEAR (look (50, 25).second, 22.5, 1e-12);
+  EXPECT_NEAR (look (60, 25).first, 51.5, 1e-12);
+  EXPECT_NEAR (look (60, 25).second, 27.5, 1e-12);
+}
+
+TEST (Lens, FlatLightStaysFlatAwayFromTheBorder)
+{
+  const Image<std::uint8_t> white = flat<std::uint8_t> (40, 40, 255);
+  for (const Alignment &alignment :
+      {Alignment{}, Alignment{0.3, 0.7, 0, 1}, Alignment{0.1, 0.2, 1.0, 1.02}})
+    for (const double sigma : {0.2, 0.5, 1.0, 2.0}) {
+      const Image<std::uint8_t> out = seen (white, alignment, sigma);
+      for (int y = 11; y < 29; y++)
+        for (int x = 11; x < 29; x++)
+          ASSERT_EQ (out.at (x, y), 255);
+    }
+}
+
+/* A wave passes the mirror's box, the Gaussian and the pixel's box. Mirrors
+ * show its samples; their box lets through neighbours of its spectrum, too,
+ * which alias onto it. */
+double
+transfer (double f, double sigma)
+{
+  const auto one = [sigma] (double g) {
+    const double box =
+        g == 0.0 ? 1.0
+                 : std::sin (std::numbers::pi * g) / (std::numbers::pi * g);
+    return box * box *
+           std::exp (-2 * std::pow (std::numbers::pi * sigma * g, 2));
+  };
+  double sum = 0.0;
+  for (int k = -50; k <= 50; k++)
+    sum += one (f + k);
+  return sum;
+}
+
+TEST (Lens, BlursAsTheoryDemands)
+{
+  for (const double sigma : {0.3, 0.5, 1.0, 2.5})
+    for (const double f : {0.03, 0.125, 0.25}) {
+      Lens lens ({}, sigma, 81, 81);
+      Image<float> out (81, 81);
+      lens.image (waves (81, 81, f).view (), out.view ());
+      EXPECT_NEAR (out.at (40, 40), transfer (f, sigma), 2e-4)
+          << "sigma " << sigma << " f " << f;
+    }
+}
+
+TEST (Lens, GeneralWayAgreesWithTheShiftsWay)
+{
+  const Image<float> picture = waves (61, 61, 0.21);
+  for (const double sigma : {0.0, 0.5, 1.5})
+    for (const double shift : {0.0, 0.25, -7.4}) {
+      Lens straight ({shift, shift, 0.0, 1.0}, sigma, 61, 61);
+      Lens turned ({shift, shift, 1e-9, 1.0}, sigma, 61, 61);
+      Image<float> a (61, 61), b (61, 61);
+      straight.image (picture.view (), a.view ());
+      turned.image (picture.view (), b.view ());
+      if (straight.ideal ())
+        a = picture;
+      for (int y = 20; y < 41; y++)
+        for (int x = 20; x < 41; x++)
+          ASSERT_NEAR (a.at (x, y), b.at (x, y), 2e-3)
+              << "sigma " << sigma << " shift " << shift;
+    }
+}
+
+TEST (Bench, BlurMixesTheCodesOfNeighbours)
+{
+  BenchOptions options;
+  options.psf_sigma = 0.5;
+  OpticalBench blurred = bench (16, 16, options);
+  /* Light in slot 0 only reaches element 0's pixels, and now its neighbours. */
+  const Image<std::uint8_t> coded = coded_frame<std::uint8_t> (
+      blurred, schedule ("sequential:2x2"), 16, 16, [] (int slot) {
+        return flat<std::uint8_t> (16, 16, slot == 0 ? 200 : 0);
+      });
+  EXPECT_LT (coded.at (6, 6), 150);
+  EXPECT_GT (coded.at (7, 6), 30);
+  EXPECT_GT (coded.at (7, 7), 10);
+  const int sum =
+      coded.at (6, 6) + coded.at (7, 6) + coded.at (6, 7) + coded.at (7, 7);
+  EXPECT_NEAR (sum, 200, 2) << "no light is lost";
+}
+
+} // namespace

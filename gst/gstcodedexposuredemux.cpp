@@ -354,6 +354,7 @@ forget_stream (GstCodedExposureDemux *self)
   st.in_force.reset ();
   st.assumed = false;
   st.method = Method::kAuto;
+  st.ended = false;
   gst_flow_combiner_reset (st.combiner.get ());
   list->each ([] (const demux::OutputRef &output) {
     output->earliest = GST_CLOCK_TIME_NONE;

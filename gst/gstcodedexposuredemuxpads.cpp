@@ -73,7 +73,8 @@ gboolean
 replay_sticky (GstPad *, GstEvent **event, gpointer user_data)
 {
   const auto &replay = *static_cast<const Replay *> (user_data);
-  if (!replay.caps && GST_EVENT_TYPE (*event) != GST_EVENT_STREAM_START)
+  const GstEventType type = GST_EVENT_TYPE (*event);
+  if (type == GST_EVENT_EOS || (!replay.caps && type != GST_EVENT_STREAM_START))
     return TRUE;
   const EventPtr own = translate (replay.output, replay.caps, *event);
   gst_pad_store_sticky_event (replay.output.pad.get (), own.get ());
@@ -90,6 +91,8 @@ enlist (GstCodedExposureDemux *self, const OutputRef &output)
   const ObjectLock lock (self);
   Replay replay{*output, st.caps};
   gst_pad_sticky_events_foreach (st.sinkpad, replay_sticky, &replay);
+  if (const EventPtr eos (gst_event_new_eos ()); st.ended)
+    gst_pad_store_sticky_event (output->pad.get (), eos.get ());
 
   auto list = std::make_shared<Outputs> (*st.outputs);
   switch (output->kind) {
@@ -239,12 +242,20 @@ is_wanted (const Output &output)
          gst_pad_is_blocked (output.pad.get ());
 }
 
+/* Core stores a sticky event on the sink pad when its handler has returned,
+ * which would be too late for enlist (); EOS it stores only once. */
 gboolean
 forward (GstCodedExposureDemux *self, EventPtr event)
 {
   DemuxState &st = state (self);
-  if (is_sticky (event.get ()))
+  const GstEventType type = GST_EVENT_TYPE (event.get ());
+  if (is_sticky (event.get ()) && type != GST_EVENT_EOS)
     gst_pad_store_sticky_event (st.sinkpad, event.get ());
+  if (type == GST_EVENT_EOS || type == GST_EVENT_STREAM_START ||
+      type == GST_EVENT_FLUSH_STOP) {
+    const ObjectLock lock (self);
+    st.ended = type == GST_EVENT_EOS;
+  }
   const PadCaps none;
   outputs (self)->each ([&] (const OutputRef &output) {
     gst_pad_push_event (

@@ -190,6 +190,7 @@ struct DemuxState {
   ScheduleRef in_force; ///< null before the first frame
   bool assumed = false; ///< in_force came from nowhere
   Method method = Method::kAuto;
+  bool ended = false; ///< EOS was forwarded
 
   /* Sink pad's stream lock. */
   Stream stream;

@@ -1,0 +1,531 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* codedexposure-demux: time stamps, losses, flags, flushes and runs. */
+#include "harness.h"
+
+#include "gstcodedexposuremeta.h"
+
+namespace
+{
+
+using namespace cexp;
+using namespace cexp::gst;
+using namespace cexp::test;
+
+constexpr GstClockTime kMs = GST_MSECOND;
+
+BufferPtr
+coded_frame (GstClockTime pts, int width = 16, int height = 16)
+{
+  return frame_of (
+      draw<std::uint8_t> (width, height, [] (int x, int y) { return x + y; }),
+      pts);
+}
+
+GstClockTime
+pts_of (const BufferPtr &buffer)
+{
+  return GST_BUFFER_PTS (buffer.get ());
+}
+
+GstClockTime
+duration_of (const BufferPtr &buffer)
+{
+  return GST_BUFFER_DURATION (buffer.get ());
+}
+
+bool
+discont (const BufferPtr &buffer)
+{
+  return GST_BUFFER_IS_DISCONT (buffer.get ());
+}
+
+class DemuxTime : public ::testing::Test
+{
+protected:
+  void start (const std::string &settings = "schedule=sequential:2x2",
+      const std::string &rate = "25/1")
+  {
+    demux =
+        std::make_unique<ElementHarness> ("codedexposure-demux " + settings);
+    demux->set_caps (gray_caps (16, 16, rate));
+  }
+  void push (GstClockTime pts)
+  {
+    ASSERT_EQ (demux->push (coded_frame (pts)), GST_FLOW_OK);
+  }
+  void push_all (std::initializer_list<GstClockTime> milliseconds)
+  {
+    for (GstClockTime ms : milliseconds)
+      push (ms * kMs);
+  }
+  std::vector<BufferPtr> pull_all (const std::string &pad = "")
+  {
+    std::vector<BufferPtr> all;
+    while (BufferPtr buffer = demux->pull (pad))
+      all.push_back (std::move (buffer));
+    return all;
+  }
+  /** PTS in ms of all subframes on "src", those with DISCONT negative. A
+   * DISCONT at 0 is -1. */
+  std::vector<int> discont_times ()
+  {
+    std::vector<int> times;
+    for (const BufferPtr &buffer : pull_all ()) {
+      const int ms = int (pts_of (buffer) / kMs);
+      times.push_back (discont (buffer) ? (ms == 0 ? -1 : -ms) : ms);
+    }
+    return times;
+  }
+  guint64 counter (const char *name)
+  {
+    return property<guint64> (demux->element (), name);
+  }
+
+  std::unique_ptr<ElementHarness> demux;
+};
+
+struct RateCase {
+  const char *name;
+  const char *schedule;
+  const char *rate;
+  int subframes;
+  int num, den;
+};
+
+class DemuxRates : public ::testing::TestWithParam<RateCase>
+{
+};
+
+INSTANTIATE_TEST_SUITE_P (Rates, DemuxRates,
+    ::testing::Values (RateCase{"n4_25", "sequential:2x2", "25/1", 4, 25, 1},
+        RateCase{"n8_25", "sequential:lattice:8/3", "25/1", 8, 25, 1},
+        RateCase{"n9_25", "sequential:3x3", "25/1", 9, 25, 1},
+        RateCase{"n4_ntsc", "sequential:2x2", "30000/1001", 4, 30000, 1001},
+        RateCase{
+            "n8_ntsc", "sequential:lattice:8/3", "30000/1001", 8, 30000, 1001},
+        RateCase{"n9_ntsc", "sequential:3x3", "30000/1001", 9, 30000, 1001}),
+    [] (const auto &info) { return info.param.name; });
+
+/* Every input PTS is an anchor of its own: a time base far from zero and a
+ * jitter must come through to the nanosecond. */
+TEST_P (DemuxRates, SlotsTileTheFrameFromItsOwnTimeStamp)
+{
+  const RateCase &c = GetParam ();
+  ElementHarness demux (
+      std::string ("codedexposure-demux schedule=") + c.schedule);
+  demux.request ("subframe_1");
+  demux.set_caps (gray_caps (24, 24, c.rate));
+  const auto boundary = [&] (int k) {
+    return gst_util_uint64_scale (GST_SECOND, guint64 (k) * guint64 (c.den),
+        guint64 (c.num) * guint64 (c.subframes));
+  };
+
+  guint64 offset = 0;
+  for (guint64 frame = 0; frame < 3; frame++) {
+    const GstClockTime anchor =
+        3600 * GST_SECOND + frame * boundary (c.subframes) + frame * 7;
+    ASSERT_EQ (demux.push (coded_frame (anchor, 24, 24)), GST_FLOW_OK);
+    for (int k = 0; k < c.subframes; k++, offset++) {
+      SCOPED_TRACE (::testing::Message () << "frame " << frame << " k " << k);
+      const BufferPtr sub = demux.pull ();
+      ASSERT_TRUE (sub);
+      EXPECT_EQ (pts_of (sub), anchor + boundary (k));
+      EXPECT_EQ (duration_of (sub), boundary (k + 1) - boundary (k));
+      EXPECT_EQ (GST_BUFFER_DTS (sub.get ()), GST_CLOCK_TIME_NONE);
+      EXPECT_EQ (GST_BUFFER_OFFSET (sub.get ()), offset);
+      EXPECT_EQ (GST_BUFFER_OFFSET_END (sub.get ()), offset + 1);
+      EXPECT_EQ (discont (sub), offset == 0);
+      const auto meta = get_frame_meta (sub.get ());
+      ASSERT_TRUE (meta);
+      EXPECT_EQ (meta->frame, frame);
+      EXPECT_EQ (meta->subframe, k);
+      /* The light is counted in whole nanoseconds from a period that was
+       * rounded already. */
+      EXPECT_NEAR (
+          double (meta->exposure_start - anchor), double (boundary (k)), 1.0);
+    }
+    EXPECT_FALSE (demux.pull ());
+
+    const BufferPtr one = demux.pull ("subframe_1");
+    ASSERT_TRUE (one);
+    EXPECT_EQ (pts_of (one), anchor + boundary (1));
+    EXPECT_EQ (duration_of (one), boundary (c.subframes));
+    EXPECT_EQ (GST_BUFFER_OFFSET (one.get ()), frame);
+    EXPECT_EQ (GST_BUFFER_OFFSET_END (one.get ()), frame + 1);
+    EXPECT_EQ (discont (one), frame == 0);
+    EXPECT_FALSE (demux.pull ("subframe_1"));
+  }
+}
+
+/* The slots of the reference bench: 4 x (9.8 ms + 0.2 ms). */
+TEST_F (DemuxTime, MetaHoldsTheLightNotTheSlot)
+{
+  start ("schedule=\"sequential:2x2,active=9.8ms,switching=0.2ms\"");
+  push (0);
+  const auto subframes = pull_all ();
+  ASSERT_EQ (subframes.size (), 4u);
+  for (guint k = 0; k < 4; k++) {
+    const auto meta = get_frame_meta (subframes[k].get ());
+    ASSERT_TRUE (meta);
+    EXPECT_EQ (meta->exposure_start, k * 10 * kMs);
+    EXPECT_EQ (meta->exposure_duration, 9800 * GST_USECOND);
+    EXPECT_EQ (duration_of (subframes[k]), 10 * kMs);
+  }
+}
+
+TEST_F (DemuxTime, LightOfAStaircaseGrowsUnlessItIsDecoded)
+{
+  const auto lengths = [this] (const std::string &method) {
+    start ("schedule=staircase:2x2 method=" + method);
+    push (0);
+    std::vector<GstClockTime> ms;
+    for (const BufferPtr &buffer : pull_all ()) {
+      const auto meta = get_frame_meta (buffer.get ());
+      ms.push_back (meta->exposure_duration / kMs);
+    }
+    return ms;
+  };
+  EXPECT_EQ (lengths ("select"), (std::vector<GstClockTime>{10, 20, 30, 40}));
+  EXPECT_EQ (lengths ("rank"), (std::vector<GstClockTime>{10, 20, 30, 40}));
+  EXPECT_EQ (lengths ("decode"), (std::vector<GstClockTime>{10, 10, 10, 10}));
+}
+
+TEST_F (DemuxTime, RankOfEqualExposuresKnowsNoSlot)
+{
+  start ("schedule=sequential:2x2 method=rank");
+  push (80 * kMs);
+  for (const BufferPtr &buffer : pull_all ()) {
+    const auto meta = get_frame_meta (buffer.get ());
+    EXPECT_EQ (meta->exposure_start, 80 * kMs);
+    EXPECT_EQ (meta->exposure_duration, 40 * kMs);
+  }
+}
+
+TEST_F (DemuxTime, LostFrameIsMarkedNotStretched)
+{
+  start ();
+  demux->request ("coded");
+  demux->request ("subframe_2");
+  push_all ({0, 80});
+
+  EXPECT_EQ (
+      discont_times (), (std::vector<int>{-1, 10, 20, 30, -80, 90, 100, 110}));
+  const auto coded = pull_all ("coded");
+  ASSERT_EQ (coded.size (), 2u);
+  EXPECT_TRUE (discont (coded[1]));
+  const auto third = pull_all ("subframe_2");
+  ASSERT_EQ (third.size (), 2u);
+  EXPECT_TRUE (discont (third[1]));
+  EXPECT_EQ (counter ("frames-lost"), 1u);
+  EXPECT_EQ (get_frame_meta (third[1].get ())->frame, 2u);
+  EXPECT_EQ (get_frame_meta (third[1].get ())->lost_before, 1u);
+}
+
+TEST_F (DemuxTime, LossIsSaidOnTheBusWithItsPlace)
+{
+  start ("schedule=sequential:2x2", "30000/1001");
+  const GstClockTime period = 33366666;
+  push (GST_SECOND);
+  push (GST_SECOND + 4 * period);
+
+  const MessagePtr message =
+      demux->element_message ("codedexposure/frames-lost");
+  ASSERT_TRUE (message);
+  guint64 count = 0, from = 0, to = 0;
+  ASSERT_TRUE (gst_structure_get (gst_message_get_structure (message.get ()),
+      "count", G_TYPE_UINT64, &count, "from", G_TYPE_UINT64, &from, "to",
+      G_TYPE_UINT64, &to, nullptr));
+  EXPECT_EQ (count, 3u);
+  EXPECT_EQ (from, GST_SECOND + period);
+  EXPECT_EQ (to, GST_SECOND + 4 * period);
+  EXPECT_FALSE (demux->element_message ("codedexposure/frames-lost"));
+  EXPECT_EQ (counter ("frames-lost"), 3u);
+}
+
+TEST_F (DemuxTime, JitterUpToHalfAPeriodIsNoLoss)
+{
+  start ();
+  push_all ({0, 60, 61, 120});
+  EXPECT_EQ (counter ("frames-lost"), 0u);
+  EXPECT_FALSE (demux->element_message ("codedexposure/frames-lost"));
+  push (120 * kMs + 60 * kMs + 1);
+  EXPECT_EQ (counter ("frames-lost"), 1u);
+}
+
+TEST_F (DemuxTime, TimeThatRunsBackwardsIsANewBeginningAndWarnedOfOnce)
+{
+  start ();
+  push_all ({400, 0, 40, 0, 0});
+  EXPECT_EQ (
+      discont_times (), (std::vector<int>{-400, 410, 420, 430, -1, 10, 20, 30,
+                            40, 50, 60, 70, -1, 10, 20, 30, -1, 10, 20, 30}));
+  EXPECT_EQ (counter ("frames-lost"), 0u);
+  EXPECT_NE (demux->warning ().find ("0:00:00.400000000"), std::string::npos);
+  EXPECT_EQ (demux->warning (), "");
+}
+
+TEST_F (DemuxTime, FrameWithoutTimeStampIsAnError)
+{
+  start ();
+  EXPECT_EQ (demux->push (coded_frame (GST_CLOCK_TIME_NONE)), GST_FLOW_ERROR);
+  EXPECT_NE (demux->error ().find ("PTS"), std::string::npos);
+  EXPECT_FALSE (demux->pull ());
+}
+
+TEST_F (DemuxTime, UpstreamDiscontIsGivenOnOnce)
+{
+  start ();
+  push (0);
+  BufferPtr frame = coded_frame (40 * kMs);
+  GST_BUFFER_FLAG_SET (frame.get (), GST_BUFFER_FLAG_DISCONT);
+  GST_BUFFER_FLAG_SET (frame.get (), GST_BUFFER_FLAG_RESYNC);
+  GST_BUFFER_FLAG_SET (frame.get (), GST_BUFFER_FLAG_MARKER);
+  ASSERT_EQ (demux->push (std::move (frame)), GST_FLOW_OK);
+  const auto subframes = pull_all ();
+  ASSERT_EQ (subframes.size (), 8u);
+  for (std::size_t i = 4; i < 8; i++) {
+    GstBuffer *buffer = subframes[i].get ();
+    EXPECT_EQ (GST_BUFFER_IS_DISCONT (buffer), i == 4);
+    EXPECT_EQ (
+        bool (GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_RESYNC)), i == 4);
+    EXPECT_FALSE (GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_MARKER));
+  }
+  EXPECT_EQ (counter ("frames-lost"), 0u);
+}
+
+TEST_F (DemuxTime, CorruptedFrameMakesCorruptedSubframesAndIsCounted)
+{
+  start ();
+  push (0);
+  BufferPtr frame = coded_frame (40 * kMs);
+  GST_BUFFER_FLAG_SET (frame.get (), GST_BUFFER_FLAG_CORRUPTED);
+  ASSERT_EQ (demux->push (std::move (frame)), GST_FLOW_OK);
+  push (80 * kMs);
+  std::size_t i = 0;
+  for (const BufferPtr &buffer : pull_all ()) {
+    EXPECT_EQ (bool (GST_BUFFER_FLAG_IS_SET (
+                   buffer.get (), GST_BUFFER_FLAG_CORRUPTED)),
+        i / 4 == 1)
+        << i;
+    i++;
+  }
+  EXPECT_EQ (i, 12u);
+  EXPECT_EQ (counter ("frames-corrupted"), 1u);
+}
+
+TEST_F (DemuxTime, GapFrameMakesGapSubframes)
+{
+  start ();
+  BufferPtr frame = coded_frame (0);
+  GST_BUFFER_FLAG_SET (frame.get (), GST_BUFFER_FLAG_GAP);
+  ASSERT_EQ (demux->push (std::move (frame)), GST_FLOW_OK);
+  const auto subframes = pull_all ();
+  ASSERT_EQ (subframes.size (), 4u);
+  for (const BufferPtr &buffer : subframes)
+    EXPECT_TRUE (GST_BUFFER_FLAG_IS_SET (buffer.get (), GST_BUFFER_FLAG_GAP));
+}
+
+TEST_F (DemuxTime, GapEventReachesEveryPadBehindItsCaps)
+{
+  start ();
+  demux->request ("subframe_0");
+  demux->push_event (gst_event_new_gap (0, 40 * kMs));
+  for (const char *pad : {"", "subframe_0"}) {
+    ASSERT_TRUE (demux->pull_event (GST_EVENT_CAPS, pad)) << pad;
+    const EventPtr gap = demux->pull_event (GST_EVENT_GAP, pad);
+    ASSERT_TRUE (gap) << pad;
+    GstClockTime time, duration;
+    gst_event_parse_gap (gap.get (), &time, &duration);
+    EXPECT_EQ (time, 0u);
+    EXPECT_EQ (duration, 40 * kMs);
+  }
+}
+
+TEST_F (DemuxTime, MetaOfTheFrameIsKept)
+{
+  start ();
+  BufferPtr frame = coded_frame (0);
+  FrameMeta given;
+  given.frame = 1234;
+  given.locked = TRUE;
+  given.slip = -2;
+  given.lost_before = 5;
+  set_frame_meta (frame.get (), given);
+  ASSERT_EQ (demux->push (std::move (frame)), GST_FLOW_OK);
+  const auto subframes = pull_all ();
+  ASSERT_EQ (subframes.size (), 4u);
+  for (guint k = 0; k < 4; k++) {
+    const auto meta = get_frame_meta (subframes[k].get ());
+    ASSERT_TRUE (meta);
+    EXPECT_EQ (meta->frame, 1234u);
+    EXPECT_EQ (meta->subframe, int (k));
+    EXPECT_TRUE (meta->locked);
+    EXPECT_EQ (meta->slip, -2);
+    EXPECT_EQ (meta->lost_before, 5u);
+    EXPECT_EQ (meta->exposure_start, k * 10 * kMs);
+    EXPECT_EQ (meta->exposure_duration, 10 * kMs);
+  }
+}
+
+void
+push_segment (
+    ElementHarness &demux, gdouble rate, GstClockTime start, GstClockTime stop)
+{
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_TIME);
+  segment.rate = rate;
+  segment.start = start;
+  segment.stop = stop;
+  segment.position = rate < 0 ? stop : start;
+  ASSERT_TRUE (demux.push_event (gst_event_new_segment (&segment)));
+}
+
+TEST_F (DemuxTime, ReversePlaybackGivesTheLastSubframeFirst)
+{
+  start ();
+  push_segment (*demux, -1.0, 0, GST_SECOND);
+  push_all ({80, 40, 0});
+  EXPECT_EQ (discont_times (),
+      (std::vector<int>{-110, 100, 90, 80, 70, 60, 50, 40, 30, 20, 10, 0}));
+  EXPECT_EQ (counter ("frames-lost"), 0u);
+  EXPECT_EQ (demux->warning (), "");
+}
+
+TEST_F (DemuxTime, LossInReversePlaybackIsFound)
+{
+  start ();
+  push_segment (*demux, -1.0, 0, GST_SECOND);
+  push_all ({160, 40});
+  EXPECT_EQ (counter ("frames-lost"), 2u);
+  EXPECT_EQ (discont_times (),
+      (std::vector<int>{-190, 180, 170, 160, -70, 60, 50, 40}));
+}
+
+TEST_F (DemuxTime, FlushForgetsTimeAndMarksANewBeginning)
+{
+  start ();
+  demux->request ("coded");
+  push_all ({0, 40});
+  pull_all ();
+  pull_all ("coded");
+
+  ASSERT_TRUE (demux->push_event (gst_event_new_flush_start ()));
+  ASSERT_TRUE (demux->push_event (gst_event_new_flush_stop (TRUE)));
+  push_segment (*demux, 1.0, 10 * GST_SECOND, GST_CLOCK_TIME_NONE);
+  push (10 * GST_SECOND);
+
+  EXPECT_EQ (discont_times (), (std::vector<int>{-10000, 10010, 10020, 10030}));
+  const auto coded = pull_all ("coded");
+  ASSERT_EQ (coded.size (), 1u);
+  EXPECT_TRUE (discont (coded[0]));
+  EXPECT_EQ (counter ("frames-lost"), 0u);
+  EXPECT_EQ (demux->warning (), "");
+  for (const char *pad : {"", "coded"}) {
+    EXPECT_TRUE (demux->pull_event (GST_EVENT_FLUSH_START, pad));
+    EXPECT_TRUE (demux->pull_event (GST_EVENT_FLUSH_STOP, pad));
+    EXPECT_TRUE (demux->pull_event (GST_EVENT_SEGMENT, pad));
+  }
+}
+
+TEST_F (DemuxTime, NewSegmentIsGivenOnUnchangedAndNoLoss)
+{
+  start ();
+  push_all ({0});
+  pull_all ();
+  while (demux->pull_event (GST_EVENT_SEGMENT))
+    ;
+  push_segment (*demux, 1.0, 5 * GST_SECOND, 9 * GST_SECOND);
+  push (5 * GST_SECOND);
+  EXPECT_EQ (counter ("frames-lost"), 0u);
+  EXPECT_EQ (discont_times (), (std::vector<int>{-5000, 5010, 5020, 5030}));
+  const EventPtr event = demux->pull_event (GST_EVENT_SEGMENT);
+  ASSERT_TRUE (event);
+  const GstSegment *segment = nullptr;
+  gst_event_parse_segment (event.get (), &segment);
+  EXPECT_EQ (segment->start, 5 * GST_SECOND);
+  EXPECT_EQ (segment->stop, 9 * GST_SECOND);
+}
+
+TEST_F (DemuxTime, SegmentThatIsNotInTimeIsAnError)
+{
+  start ();
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_BYTES);
+  demux->push_event (gst_event_new_segment (&segment));
+  EXPECT_NE (demux->error ().find ("bytes"), std::string::npos);
+  EXPECT_EQ (demux->push (coded_frame (0)), GST_FLOW_ERROR);
+}
+
+TEST_F (DemuxTime, EosReachesEveryPad)
+{
+  start ();
+  demux->request ("coded");
+  demux->request ("subframe_3");
+  push (0);
+  ASSERT_TRUE (demux->push_event (gst_event_new_eos ()));
+  for (const char *pad : {"", "coded", "subframe_3"})
+    EXPECT_TRUE (demux->pull_event (GST_EVENT_EOS, pad)) << pad;
+}
+
+TEST_F (DemuxTime, EosBeforeAnyFrameReachesEveryPad)
+{
+  start ();
+  demux->request ("subframe_3");
+  ASSERT_TRUE (demux->push_event (gst_event_new_eos ()));
+  for (const char *pad : {"", "subframe_3"}) {
+    EXPECT_TRUE (demux->pull_event (GST_EVENT_SEGMENT, pad)) << pad;
+    EXPECT_TRUE (demux->pull_event (GST_EVENT_EOS, pad)) << pad;
+  }
+  EXPECT_EQ (demux->error (), "");
+}
+
+TEST_F (DemuxTime, SecondRunKnowsNothingOfTheFirst)
+{
+  start ();
+  demux->request ("subframe_0");
+  push_all ({0, 400});
+  EXPECT_EQ (counter ("frames-in"), 2u);
+  EXPECT_EQ (counter ("frames-lost"), 9u);
+  pull_all ();
+  pull_all ("subframe_0");
+
+  gst_element_set_state (demux->element (), GST_STATE_READY);
+  EXPECT_EQ (counter ("frames-in"), 2u) << "a run is counted until the next";
+  gst_element_set_state (demux->element (), GST_STATE_PLAYING);
+  EXPECT_EQ (counter ("frames-in"), 0u);
+  EXPECT_EQ (counter ("frames-lost"), 0u);
+  EXPECT_EQ (text_property (demux->element (), "schedule-in-force"), "");
+
+  demux->push_event (gst_event_new_stream_start ("again"));
+  demux->set_caps (gray_caps (8, 8, "50/1"));
+  push_segment (*demux, 1.0, 0, GST_CLOCK_TIME_NONE);
+  ASSERT_EQ (demux->push (coded_frame (0, 8, 8)), GST_FLOW_OK);
+  const auto subframes = pull_all ();
+  ASSERT_EQ (subframes.size (), 4u);
+  EXPECT_EQ (GST_BUFFER_OFFSET (subframes[0].get ()), 0u);
+  EXPECT_EQ (get_frame_meta (subframes[0].get ())->frame, 0u);
+  EXPECT_TRUE (discont (subframes[0]));
+  EXPECT_EQ (pts_of (subframes[1]), 5 * kMs);
+  EXPECT_EQ (pull_all ("subframe_0").size (), 1u);
+  EXPECT_EQ (counter ("frames-in"), 1u);
+  EXPECT_EQ (counter ("subframes-out"), 5u);
+}
+
+TEST_F (DemuxTime, StatsHoldAllCountersAtOneMoment)
+{
+  start ();
+  push_all ({0, 120});
+  GstStructure *raw = property<GstStructure *> (demux->element (), "stats");
+  const StructurePtr stats (raw);
+  for (const char *name : {"frames-in", "subframes-out", "frames-lost",
+           "frames-corrupted", "subframes-dropped", "saturated-frames"}) {
+    guint64 value = 0;
+    ASSERT_TRUE (gst_structure_get_uint64 (stats.get (), name, &value)) << name;
+    EXPECT_EQ (value, counter (name)) << name;
+  }
+  EXPECT_EQ (counter ("frames-in"), 2u);
+  EXPECT_EQ (counter ("subframes-out"), 8u);
+  EXPECT_EQ (counter ("frames-lost"), 2u);
+}
+
+} // namespace

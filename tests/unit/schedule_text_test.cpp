@@ -297,6 +297,39 @@ TEST (Parse, AnythingElseIsAWrongPreset)
       Schedule::parse ("{\"format\":1}"), "", {"is no code", "JSON file"});
 }
 
+/* Every fenced block that is JSON of a schedule, and every line of one that
+ * begins with the name of a code and a colon. */
+TEST (Documentation, ExamplesAreRead)
+{
+  std::ifstream page (SOURCE_ROOT "/docs/formats.md");
+  ASSERT_TRUE (page.good ());
+  int presets = 0, jsons = 0;
+  std::string line, block;
+  for (bool fenced = false; std::getline (page, line);) {
+    if (line.starts_with ("```")) {
+      if (fenced && block.starts_with ("{") &&
+          block.find ("\"coded-exposure\"") != block.npos) {
+        const auto schedule = Schedule::from_json (block);
+        EXPECT_TRUE (schedule.ok ()) << schedule.error ().message;
+        jsons++;
+      }
+      fenced = !fenced;
+      block.clear ();
+    } else if (fenced) {
+      block += line + "\n";
+      const std::string code = line.substr (0, line.find (':') + 1);
+      if (code == "sequential:" || code == "staircase:" ||
+          code == "s-matrix:") {
+        const auto schedule = Schedule::parse (line);
+        EXPECT_TRUE (schedule.ok ()) << schedule.error ().message;
+        presets++;
+      }
+    }
+  }
+  EXPECT_GE (presets, 7);
+  EXPECT_GE (jsons, 2);
+}
+
 TEST_F (ScheduleFile, IsRead)
 {
   const Schedule schedule = preset ("staircase:lattice:8/3,leak=0.02");

@@ -1,0 +1,137 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "dmd/dmd_runner.h"
+
+namespace cexp
+{
+
+DmdRunner::DmdRunner (std::unique_ptr<Dmd> dmd, Reports reports)
+    : dmd_ (std::move (dmd)), reports_ (std::move (reports)),
+      thread_ ([this] { work (); })
+{
+}
+
+DmdRunner::~DmdRunner ()
+{
+  halt ();
+  {
+    const std::lock_guard guard (lock_);
+    quit_ = true;
+  }
+  changed_.notify_all ();
+  thread_.join ();
+}
+
+void
+DmdRunner::upload (const Schedule &schedule)
+{
+  {
+    const std::lock_guard guard (lock_);
+    run_ = Run::on;
+  }
+  ask ([this, schedule] (std::stop_token stop) {
+    return dmd_->upload (schedule, stop, reports_.progress);
+  });
+}
+
+void
+DmdRunner::start (const SlotPlan &plan)
+{
+  ask ([this, plan] (std::stop_token) {
+    dmd_->stop ();
+    return dmd_->start (plan);
+  });
+}
+
+void
+DmdRunner::ask (Job job)
+{
+  {
+    const std::lock_guard guard (lock_);
+    if (run_ != Run::on)
+      return;
+    jobs_.push_back (std::move (job));
+  }
+  changed_.notify_all ();
+}
+
+bool
+DmdRunner::settled () const
+{
+  const std::lock_guard guard (lock_);
+  return run_ == Run::on && idle ();
+}
+
+bool
+DmdRunner::settle ()
+{
+  std::unique_lock guard (lock_);
+  changed_.wait (
+      guard, [this] { return idle () || interrupted_ || run_ != Run::on; });
+  return run_ == Run::on && idle () && !interrupted_;
+}
+
+bool
+DmdRunner::failed () const
+{
+  const std::lock_guard guard (lock_);
+  return run_ == Run::failed;
+}
+
+void
+DmdRunner::interrupt (bool on)
+{
+  {
+    const std::lock_guard guard (lock_);
+    interrupted_ = on;
+  }
+  changed_.notify_all ();
+}
+
+void
+DmdRunner::halt ()
+{
+  std::unique_lock guard (lock_);
+  run_ = Run::none;
+  cancel_.request_stop ();
+  jobs_.clear ();
+  jobs_.push_back ([this] (std::stop_token) {
+    dmd_->stop ();
+    return Result<void> ();
+  });
+  changed_.notify_all ();
+  changed_.wait (guard, [this] { return idle (); });
+  cancel_ = std::stop_source ();
+}
+
+void
+DmdRunner::work ()
+{
+  std::unique_lock guard (lock_);
+  while (true) {
+    changed_.wait (guard, [this] { return quit_ || !jobs_.empty (); });
+    if (jobs_.empty ())
+      return;
+    const Job job = std::move (jobs_.front ());
+    jobs_.pop_front ();
+    const std::stop_token stop = cancel_.get_token ();
+    working_ = true;
+
+    guard.unlock ();
+    const Result<void> done = job (stop);
+    if (!done) {
+      dmd_->stop ();
+      if (!stop.stop_requested ())
+        reports_.failed (done.error ());
+    }
+    guard.lock ();
+
+    working_ = false;
+    if (!done && run_ == Run::on) {
+      run_ = Run::failed;
+      jobs_.clear ();
+    }
+    changed_.notify_all ();
+  }
+}
+
+} // namespace cexp

@@ -1,0 +1,86 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The thread that talks to a DMD. */
+#pragma once
+
+#include <condition_variable>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <stop_token>
+#include <thread>
+
+#include "dmd/dmd.h"
+
+namespace cexp
+{
+
+/**
+ * Drives a Dmd from a thread of its own, so that no other thread waits for
+ * hardware unless it chooses to.
+ *
+ * A run lasts from upload () to halt (); its jobs are done in the order in
+ * which they were asked for. One that fails parks the mirrors and ends the run.
+ * What is asked for outside a run is not done. Thread-safe. The destructor
+ * halts.
+ */
+class DmdRunner
+{
+public:
+  /** Called on the runner's thread; they must not call the runner. */
+  struct Reports {
+    UploadProgress progress = [] (int, int) {};
+    /** A job failed, other than by halt (). */
+    std::function<void (const Error &)> failed = [] (const Error &) {};
+  };
+
+  DmdRunner (std::unique_ptr<Dmd> dmd, Reports reports);
+  ~DmdRunner ();
+  DmdRunner (const DmdRunner &) = delete;
+  DmdRunner &operator= (const DmdRunner &) = delete;
+
+  const DmdInfo &info () const { return dmd_->info (); }
+
+  /** Begins a run. */
+  void upload (const Schedule &schedule);
+  /** Starts, or starts anew, from mask 0. */
+  void start (const SlotPlan &plan);
+
+  /** Whether there is a run and all its jobs are done. */
+  bool settled () const;
+  /** Waits for that. False when the run ended, or interrupt () cut the wait
+   * short. */
+  bool settle ();
+  /** Whether a job failed in the last run. */
+  bool failed () const;
+  /** While on, settle () does not wait. */
+  void interrupt (bool on);
+
+  /** Ends the run: drops its jobs, cancels the one at work, parks the mirrors,
+   * and returns when that is done. */
+  void halt ();
+
+private:
+  using Job = std::function<Result<void> (std::stop_token)>;
+  enum class Run { none, on, failed };
+
+  void ask (Job job);
+  void work ();
+  bool idle () const { return jobs_.empty () && !working_; }
+
+  const std::unique_ptr<Dmd> dmd_; // used by the thread only, but for info ()
+  const Reports reports_;
+
+  mutable std::mutex lock_; // covers everything below; held over no job
+  std::condition_variable changed_;
+  std::deque<Job> jobs_;
+  std::stop_source cancel_;
+  Run run_ = Run::none;
+  bool working_ = false;
+  bool interrupted_ = false;
+  bool quit_ = false;
+
+  std::thread thread_; // last: it uses all of the above
+};
+
+} // namespace cexp

@@ -3,28 +3,47 @@
  * visible on any scene. */
 #pragma once
 
+#include <bit>
+
 namespace cexp
 {
 
 /**
  * The sum of the masks over a whole exposure does not depend on their order:
  * on a still scene a code of one frame cannot show that the masks are shifted
- * by whole slots. The pilot therefore has a period of two frames. Its columns,
- * x mod 4, open for N slots in a row out of 2 N:
- *   0: slots 0 .. N-1          1: slots h .. h+N-1, h = N / 2 rounded down
- *   2: when column 0 is shut   3: when column 1 is shut
- * so that the four means of one frame tell the phase modulo 2 N.
+ * by whole slots. The pilot therefore has a period of two frames. Each of its
+ * columns is open in one mask out of 2 N. In phase, a frame lights columns of
+ * masks 0 .. N-1 only or of masks N .. 2N-1 only, whatever the light does;
+ * masks that come late light columns at the end of the other half as well,
+ * those that come early columns at its start.
+ *
+ * One slot a column, because that is what a sensor set for a one-hot code can
+ * take. The columns repeat; which masks they have grows finer towards the
+ * borders of the two frames, where a slip shows first.
  */
-constexpr int kPilotColumns = 4;
+constexpr int kPilotColumns = 32;
+
+/** The mask out of 2 @p slots in which the pilot's mirrors in column @p column
+ * are open: 2^k - 1 masks from a border, no farther than half a frame. */
+constexpr int
+pilot_mask (int column, int slots)
+{
+  constexpr int kSide = kPilotColumns / 4;
+  const int frame = column / (2 * kSide);
+  const int place = column % (2 * kSide);
+  const bool at_start = place < kSide;
+  const int turn = at_start ? kSide - 1 - place : place - kSide;
+  const int depths = std::bit_width (unsigned ((slots - 1) / 2 + 1));
+  const int depth = (1 << (turn % depths)) - 1;
+  return frame * slots + (at_start ? depth : slots - 1 - depth);
+}
 
 /** Whether the pilot's mirrors in column @p x are open in mask @p mask of
  * 2 @p slots. */
 constexpr bool
 pilot_open (int x, int mask, int slots)
 {
-  const int lag = (x & 1) != 0 ? slots / 2 : 0;
-  const bool in_first = (mask - lag + 2 * slots) % (2 * slots) < slots;
-  return in_first == ((x & 2) == 0);
+  return pilot_mask (x % kPilotColumns, slots) == mask;
 }
 
 } // namespace cexp

@@ -4,7 +4,6 @@
 
 #include <cmath>
 #include <map>
-#include <set>
 
 #include <gtest/gtest.h>
 
@@ -207,56 +206,41 @@ TEST (Mask, WritesNothingOutsideItsRows)
       EXPECT_EQ (image.at (x, y) == 99, x >= 5 || y >= 3);
 }
 
-TEST (Pilot, MirrorsOpenForHalfOfTwoFramesInOneStretch)
-{
-  for (const char *tile : {"2x1", "3x1", "2x2", "5x1", "lattice:8/3"}) {
-    const Schedule schedule =
-        preset ("sequential:" + std::string (tile) + ",pilot=2");
-    const int n = schedule.slots ();
-    ASSERT_EQ (schedule.masks (), 2 * n);
-    for (int x = 0; x < 9; x++) {
-      int open = 0, opened = 0;
-      for (int mask = 0; mask < 2 * n; mask++) {
-        const int now = mask_of (schedule, mask, {9, 6}).at (x, 4);
-        const int then =
-            mask_of (schedule, (mask + 2 * n - 1) % (2 * n), {9, 6}).at (x, 5);
-        open += now;
-        opened += now == 1 && then == 0;
-      }
-      EXPECT_EQ (open, n) << tile << " column " << x;
-      EXPECT_EQ (opened, 1) << tile << " column " << x;
-    }
-  }
-}
-
 TEST (Pilot, ColumnsOfTheTwoByTwoSchedule)
 {
   const Schedule schedule = preset ("sequential:2x2,pilot=1");
-  const char *const rows[] = {"10011001", "10011001", "11001100", "11001100",
-      "01100110", "01100110", "00110011", "00110011"};
+  const std::string open_in = "10101010323232325454545476767676";
   for (int mask = 0; mask < 8; mask++) {
-    const auto image = mask_of (schedule, mask, {8, 5});
-    std::string row;
-    for (int x = 0; x < 8; x++)
-      row += image.at (x, 4) != 0 ? '1' : '0';
-    EXPECT_EQ (row, rows[mask]) << mask;
+    const auto image = mask_of (schedule, mask, {40, 5});
+    for (int x = 0; x < 40; x++)
+      EXPECT_EQ (image.at (x, 4), open_in[std::size_t (x % 32)] == '0' + mask)
+          << "mask " << mask << " column " << x;
   }
 }
 
-TEST (Pilot, MeansOfOneFrameTellThePhase)
+TEST (Pilot, EveryColumnIsOpenInOneMaskOfTwoFrames)
 {
-  for (int slots = 2; slots <= 256; slots++) {
-    std::set<std::vector<int>> seen;
-    for (int phase = 0; phase < 2 * slots; phase++) {
-      std::vector<int> light (kPilotColumns, 0);
+  for (int slots = 2; slots <= 256; slots++)
+    for (int x = 0; x < kPilotColumns; x++) {
+      int open = 0;
+      for (int mask = 0; mask < 2 * slots; mask++)
+        open += pilot_open (x, mask, slots);
+      EXPECT_EQ (open, 1) << slots << " slots, column " << x;
+    }
+}
+
+TEST (Pilot, BothFramesAreLitOutOfPhaseOnly)
+{
+  for (int slots = 2; slots <= 256; slots++)
+    for (int first = 0; first < 2 * slots; first++) {
+      bool lit[2] = {};
       for (int slot = 0; slot < slots; slot++)
         for (int x = 0; x < kPilotColumns; x++)
-          light[std::size_t (x)] +=
-              pilot_open (x, (phase + slot) % (2 * slots), slots);
-      EXPECT_TRUE (seen.insert (light).second)
-          << slots << " slots, phase " << phase;
+          lit[x * 2 / kPilotColumns] |=
+              pilot_open (x, (first + slot) % (2 * slots), slots);
+      EXPECT_EQ (lit[0] && lit[1], first % slots != 0)
+          << slots << " slots, mask " << first << " first";
     }
-  }
 }
 
 TEST (Pilot, TallerThanTheArrayCoversIt)

@@ -1,0 +1,519 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* codedexposure-demux: where the schedule comes from, and what the pixels of
+ * the subframes are. */
+#include "harness.h"
+
+#include <cstdio>
+#include <fstream>
+
+#include <glib/gstdio.h>
+
+#include "extract/extractor.h"
+#include "gstcodedexposuremeta.h"
+#include "gstcodedexposuretag.h"
+
+namespace
+{
+
+using namespace cexp;
+using namespace cexp::gst;
+using namespace cexp::test;
+
+constexpr GstClockTime kPeriod = 40 * GST_MSECOND;
+
+/* Every pixel says where it comes from. */
+template <typename Pixel = std::uint8_t>
+Image<Pixel>
+picture (int width = 24, int height = 24)
+{
+  return draw<Pixel> (width, height, [] (int x, int y) {
+    return sizeof (Pixel) == 1 ? (7 * x + 31 * y) % 251 : 2621 * x + 41 * y;
+  });
+}
+
+Schedule
+schedule_of (const std::string &preset)
+{
+  auto schedule = Schedule::from_preset (preset);
+  EXPECT_TRUE (schedule) << preset;
+  return *schedule;
+}
+
+template <typename Pixel>
+std::vector<Image<Pixel>>
+expected (const std::string &preset, const Image<Pixel> &coded, Method method)
+{
+  const auto extractor = Extractor<Pixel>::make (
+      schedule_of (preset), coded.width (), coded.height (), {method});
+  EXPECT_TRUE (extractor) << extractor.error ().message;
+  std::vector<Image<Pixel>> subframes (std::size_t (extractor->subframes ()),
+      Image<Pixel> (extractor->subframe_size ().width,
+          extractor->subframe_size ().height));
+  std::vector<ImageView<Pixel>> views;
+  for (auto &subframe : subframes)
+    views.push_back (subframe.view ());
+  extractor->run (coded.view (), views);
+  return subframes;
+}
+
+template <typename Pixel = std::uint8_t>
+std::vector<Image<Pixel>>
+pull_images (ElementHarness &demux)
+{
+  std::vector<Image<Pixel>> images;
+  const CapsPtr caps = demux.pad_caps ();
+  while (const BufferPtr buffer = demux.pull ())
+    images.push_back (image_of<Pixel> (buffer.get (), caps.get ()));
+  return images;
+}
+
+std::string
+in_force (ElementHarness &demux)
+{
+  return text_property (demux.element (), "schedule-in-force");
+}
+
+int
+method_in_force (ElementHarness &demux)
+{
+  return property<int> (demux.element (), "method-in-force");
+}
+
+class DemuxSchedule : public ::testing::Test
+{
+protected:
+  void start (const std::string &settings)
+  {
+    demux =
+        std::make_unique<ElementHarness> ("codedexposure-demux " + settings);
+    demux->set_caps (gray_caps (24, 24));
+  }
+  GstFlowReturn push (int frame)
+  {
+    return demux->push (frame_of (picture (), GstClockTime (frame) * kPeriod));
+  }
+  std::unique_ptr<ElementHarness> demux;
+};
+
+/* -------------------------------------------------------------- sources -- */
+
+TEST_F (DemuxSchedule, ComesFromTheTagOfTheStream)
+{
+  start ("");
+  ASSERT_TRUE (
+      demux->push_event (schedule_to_event (schedule_of ("sequential:3x3"))));
+  ASSERT_EQ (push (0), GST_FLOW_OK);
+  EXPECT_EQ (in_force (*demux), "sequential:3x3");
+  EXPECT_EQ (pull_images (*demux),
+      expected ("sequential:3x3", picture (), Method::kSelect));
+  EXPECT_EQ (demux->warning (), "");
+}
+
+TEST_F (DemuxSchedule, PropertyWinsOverTheTag)
+{
+  start ("schedule=sequential:2x2");
+  demux->push_event (schedule_to_event (schedule_of ("sequential:3x3")));
+  ASSERT_EQ (push (0), GST_FLOW_OK);
+  EXPECT_EQ (in_force (*demux), "sequential:2x2");
+  EXPECT_EQ (pull_images (*demux).size (), 4u);
+}
+
+TEST_F (DemuxSchedule, PropertyMakesAnUnreadableTagHarmless)
+{
+  start ("schedule=sequential:2x2");
+  demux->push_event (gst_event_new_tag (
+      gst_tag_list_new (GST_TAG_COMMENT, "coded-exposure={nonsense", nullptr)));
+  EXPECT_EQ (push (0), GST_FLOW_OK);
+  EXPECT_EQ (demux->error (), "");
+}
+
+TEST_F (DemuxSchedule, IsAssumedWithOneWarningWhereNothingIsSaid)
+{
+  start ("");
+  demux->push_event (gst_event_new_tag (
+      gst_tag_list_new (GST_TAG_COMMENT, "shot in the garden", nullptr)));
+  for (int frame = 0; frame < 3; frame++)
+    ASSERT_EQ (push (frame), GST_FLOW_OK);
+  EXPECT_EQ (in_force (*demux), "sequential:2x2");
+  EXPECT_NE (
+      demux->warning ().find ("assuming sequential:2x2"), std::string::npos);
+  EXPECT_EQ (demux->warning (), "");
+}
+
+TEST_F (DemuxSchedule, RankNeedsNoSchedule)
+{
+  start ("method=rank");
+  ASSERT_EQ (push (0), GST_FLOW_OK);
+  EXPECT_EQ (pull_images (*demux),
+      expected ("sequential:2x2", picture (), Method::kRank));
+  EXPECT_NE (demux->warning (), "");
+}
+
+TEST_F (DemuxSchedule, UnreadableTagIsAnErrorThatSaysWhy)
+{
+  start ("");
+  demux->push_event (gst_event_new_tag (gst_tag_list_new (GST_TAG_COMMENT,
+      "coded-exposure={\"format\":\"coded-exposure\",\"version\":77}",
+      nullptr)));
+  EXPECT_NE (push (0), GST_FLOW_OK);
+  const std::string text = demux->error ();
+  EXPECT_NE (text.find ("tag"), std::string::npos) << text;
+  EXPECT_NE (text.find ("77"), std::string::npos) << text;
+  EXPECT_FALSE (demux->pull ());
+}
+
+TEST_F (DemuxSchedule, TagThatComesLaterChangesTheNumberOfSubframes)
+{
+  start ("");
+  ASSERT_EQ (push (0), GST_FLOW_OK);
+  EXPECT_EQ (pull_images (*demux).size (), 4u);
+  demux->push_event (
+      schedule_to_event (schedule_of ("sequential:lattice:8/3")));
+  ASSERT_EQ (push (1), GST_FLOW_OK);
+  EXPECT_TRUE (same_caps (demux->pad_caps ().get (),
+      "video/x-raw,format=GRAY8,width=3,height=24,framerate=200/1,"
+      "pixel-aspect-ratio=8/1"));
+  EXPECT_EQ (pull_images (*demux),
+      expected ("sequential:lattice:8/3", picture (), Method::kSelect));
+}
+
+TEST_F (DemuxSchedule, TagOfAnotherStreamIsForgotten)
+{
+  start ("");
+  demux->push_event (schedule_to_event (schedule_of ("sequential:3x3")));
+  ASSERT_EQ (push (0), GST_FLOW_OK);
+  EXPECT_EQ (demux->warning (), "");
+  demux->push_event (gst_event_new_stream_start ("another"));
+  demux->set_caps (gray_caps (24, 24));
+  ASSERT_EQ (push (0), GST_FLOW_OK);
+  EXPECT_EQ (in_force (*demux), "sequential:2x2");
+  EXPECT_NE (demux->warning (), "");
+}
+
+TEST_F (DemuxSchedule, TagsAreGivenOnOnEveryPad)
+{
+  start ("");
+  demux->request ("subframe_0");
+  demux->request ("coded");
+  const Schedule schedule = schedule_of ("sequential:3x3");
+  demux->push_event (schedule_to_event (schedule));
+  ASSERT_EQ (push (0), GST_FLOW_OK);
+  for (const char *pad : {"", "subframe_0", "coded"}) {
+    const EventPtr event = demux->pull_event (GST_EVENT_TAG, pad);
+    ASSERT_TRUE (event) << pad;
+    GstTagList *tags = nullptr;
+    gst_event_parse_tag (event.get (), &tags);
+    const auto found = schedule_from_tags (tags);
+    ASSERT_TRUE (found && *found) << pad;
+    EXPECT_EQ (found->value (), schedule);
+  }
+}
+
+TEST_F (DemuxSchedule, MayBeAFile)
+{
+  gchar *name = nullptr;
+  g_close (g_file_open_tmp ("demux_XXXXXX.json", &name, nullptr), nullptr);
+  const CharPtr path (name);
+  std::ofstream (name) << schedule_of ("sequential:3x2").to_json ();
+  start (std::string ("schedule=") + name);
+  ASSERT_EQ (push (0), GST_FLOW_OK);
+  EXPECT_EQ (in_force (*demux), "sequential:3x2");
+
+  /* What the file says at the start of a run counts. */
+  gst_element_set_state (demux->element (), GST_STATE_NULL);
+  std::ofstream (name) << schedule_of ("sequential:3x3").to_json ();
+  gst_element_set_state (demux->element (), GST_STATE_PLAYING);
+  demux->push_event (gst_event_new_stream_start ("again"));
+  demux->set_caps (gray_caps (24, 24));
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_TIME);
+  demux->push_event (gst_event_new_segment (&segment));
+  ASSERT_EQ (push (0), GST_FLOW_OK);
+  EXPECT_EQ (in_force (*demux), "sequential:3x3");
+  std::remove (name);
+}
+
+TEST_F (DemuxSchedule, PropertyThatCannotBeReadFailsTheStart)
+{
+  const ObjectPtr<GstElement> element (
+      gst_element_factory_make ("codedexposure-demux", nullptr));
+  gst_object_ref_sink (element.get ());
+  const ObjectPtr<GstBus> bus (gst_bus_new ());
+  gst_element_set_bus (element.get (), bus.get ());
+  g_object_set (element.get (), "schedule", "sequential:0x2", nullptr);
+  EXPECT_EQ (gst_element_set_state (element.get (), GST_STATE_READY),
+      GST_STATE_CHANGE_FAILURE);
+  const MessagePtr message (
+      gst_bus_pop_filtered (bus.get (), GST_MESSAGE_ERROR));
+  ASSERT_TRUE (message);
+  GError *error = nullptr;
+  gst_message_parse_error (message.get (), &error, nullptr);
+  EXPECT_NE (std::string (error->message).find ("0x2"), std::string::npos)
+      << error->message;
+  g_error_free (error);
+
+  g_object_set (element.get (), "schedule", "", nullptr);
+  EXPECT_EQ (gst_element_set_state (element.get (), GST_STATE_READY),
+      GST_STATE_CHANGE_SUCCESS);
+  gst_element_set_bus (element.get (), nullptr);
+  gst_element_set_state (element.get (), GST_STATE_NULL);
+}
+
+TEST_F (DemuxSchedule, PropertiesApplyAtTheNextFrame)
+{
+  start ("schedule=sequential:2x2");
+  ASSERT_EQ (push (0), GST_FLOW_OK);
+  pull_images (*demux);
+  g_object_set (demux->element (), "schedule", "staircase:3x3", nullptr);
+  EXPECT_EQ (in_force (*demux), "sequential:2x2");
+  ASSERT_EQ (push (1), GST_FLOW_OK);
+  EXPECT_EQ (in_force (*demux), "staircase:3x3");
+  EXPECT_EQ (method_in_force (*demux), int (Method::kDecode));
+  EXPECT_EQ (pull_images (*demux),
+      expected ("staircase:3x3", picture (), Method::kDecode));
+  gst_util_set_object_arg (G_OBJECT (demux->element ()), "method", "select");
+  ASSERT_EQ (push (2), GST_FLOW_OK);
+  EXPECT_EQ (pull_images (*demux),
+      expected ("staircase:3x3", picture (), Method::kSelect));
+}
+
+TEST_F (DemuxSchedule, UnreadablePropertyMidStreamIsAnError)
+{
+  start ("schedule=sequential:2x2");
+  ASSERT_EQ (push (0), GST_FLOW_OK);
+  g_object_set (demux->element (), "schedule", "zigzag:2x2", nullptr);
+  EXPECT_NE (push (1), GST_FLOW_OK);
+  const std::string text = demux->error ();
+  EXPECT_NE (text.find ("zigzag"), std::string::npos) << text;
+}
+
+TEST_F (DemuxSchedule, InForceIsNotifiedOnChangeOnly)
+{
+  start ("schedule=sequential:2x2");
+  int times = 0;
+  g_signal_connect_swapped (demux->element (), "notify::schedule-in-force",
+      G_CALLBACK (+[] (int *count) { (*count)++; }), &times);
+  for (int frame = 0; frame < 3; frame++)
+    ASSERT_EQ (push (frame), GST_FLOW_OK);
+  EXPECT_EQ (times, 1);
+  demux->set_caps (gray_caps (24, 24, "50/1"));
+  ASSERT_EQ (push (3), GST_FLOW_OK);
+  EXPECT_EQ (times, 1);
+  g_object_set (demux->element (), "schedule", "sequential:3x3", nullptr);
+  ASSERT_EQ (push (4), GST_FLOW_OK);
+  EXPECT_EQ (times, 2);
+}
+
+TEST_F (DemuxSchedule, MethodThatTheCodeDoesNotAllowIsAnError)
+{
+  start ("schedule=staircase:2x2 method=decode bits=9");
+  EXPECT_NE (push (0), GST_FLOW_OK);
+  EXPECT_NE (demux->error ().find ("9"), std::string::npos);
+}
+
+TEST_F (DemuxSchedule, PadBeyondTheScheduleIsAnErrorThatNamesTheRange)
+{
+  start ("");
+  demux->request ("subframe_7");
+  demux->push_event (schedule_to_event (schedule_of ("sequential:3x2")));
+  EXPECT_NE (push (0), GST_FLOW_OK);
+  const std::string text = demux->error ();
+  EXPECT_NE (text.find ("subframe_7"), std::string::npos) << text;
+  EXPECT_NE (text.find ("sequential:3x2"), std::string::npos) << text;
+  EXPECT_NE (text.find ("subframe_5"), std::string::npos) << text;
+}
+
+TEST_F (DemuxSchedule, PadBeyondTheScheduleInForceIsRefused)
+{
+  start ("schedule=sequential:2x2");
+  ASSERT_EQ (push (0), GST_FLOW_OK);
+  EXPECT_EQ (gst_element_request_pad_simple (demux->element (), "subframe_4"),
+      nullptr);
+  const std::string text = demux->warning ();
+  EXPECT_NE (text.find ("subframe_4"), std::string::npos) << text;
+  EXPECT_NE (text.find ("subframe_3"), std::string::npos) << text;
+  EXPECT_EQ (push (1), GST_FLOW_OK);
+}
+
+/* --------------------------------------------------------------- pixels -- */
+
+struct PixelCase {
+  const char *name;
+  const char *schedule;
+  const char *method;
+  Method in_force;
+};
+
+class DemuxPixels : public ::testing::TestWithParam<PixelCase>
+{
+};
+
+INSTANTIATE_TEST_SUITE_P (Methods, DemuxPixels,
+    ::testing::Values (
+        PixelCase{"one_hot", "sequential:2x2", "auto", Method::kSelect},
+        PixelCase{"lattice", "sequential:lattice:4/2", "auto", Method::kSelect},
+        PixelCase{"reordered", "sequential:lattice:8/3,order=bit-reversal",
+            "auto", Method::kSelect},
+        PixelCase{"phase", "sequential:2x2,phase=1/0", "auto", Method::kSelect},
+        PixelCase{"staircase", "staircase:2x2", "auto", Method::kDecode},
+        PixelCase{
+            "staircase_select", "staircase:2x2", "select", Method::kSelect},
+        PixelCase{"staircase_rank", "staircase:3x3", "rank", Method::kRank},
+        PixelCase{"diamond", "sequential:diamond:5", "auto", Method::kSelect}),
+    [] (const auto &info) { return info.param.name; });
+
+template <typename Pixel>
+void
+check_pixels (const PixelCase &c, const char *format)
+{
+  const Image<Pixel> coded = picture<Pixel> (40, 40);
+  ElementHarness demux (std::string ("codedexposure-demux schedule=\"") +
+                        c.schedule + "\" method=" + c.method);
+  demux.set_caps (gray_caps (40, 40, "25/1", format));
+  ASSERT_EQ (demux.push (frame_of (coded, 0)), GST_FLOW_OK) << demux.error ();
+  EXPECT_EQ (method_in_force (demux), int (c.in_force));
+  EXPECT_EQ (
+      pull_images<Pixel> (demux), expected (c.schedule, coded, c.in_force));
+}
+
+TEST_P (DemuxPixels, EqualTheExtractors)
+{
+  check_pixels<std::uint8_t> (GetParam (), "GRAY8");
+  check_pixels<std::uint16_t> (GetParam (), "GRAY16_LE");
+}
+
+TEST (DemuxPixels, SubframeIsTheElementThatIsOpenInItsSlot)
+{
+  ElementHarness demux ("codedexposure-demux schedule=sequential:2x2");
+  demux.set_caps (gray_caps (24, 24));
+  const auto coded = picture ();
+  ASSERT_EQ (demux.push (frame_of (coded, 0)), GST_FLOW_OK);
+  const auto subframes = pull_images (demux);
+  ASSERT_EQ (subframes.size (), 4u);
+  for (int k = 0; k < 4; k++)
+    EXPECT_EQ (subframes[std::size_t (k)],
+        draw<std::uint8_t> (12, 12, [&] (int x, int y) {
+          return coded.at (2 * x + k % 2, 2 * y + k / 2);
+        }));
+}
+
+TEST (DemuxPixels, GainAndInterpolationReachTheDecoder)
+{
+  ElementHarness demux (
+      "codedexposure-demux schedule=staircase:2x2 gain=1 interpolate=false");
+  demux.set_caps (gray_caps (8, 8));
+  /* A still scene of value 10 in each slot: elements hold 10, 20, 30, 40. */
+  const auto coded = draw<std::uint8_t> (
+      8, 8, [] (int x, int y) { return 10 * (1 + x % 2 + 2 * (y % 2)); });
+  ASSERT_EQ (demux.push (frame_of (coded, 0)), GST_FLOW_OK);
+  for (const auto &subframe : pull_images (demux))
+    EXPECT_EQ (
+        subframe, draw<std::uint8_t> (4, 4, [] (int, int) { return 10; }));
+  g_object_set (demux.element (), "gain", 3.0, nullptr);
+  ASSERT_EQ (demux.push (frame_of (coded, kPeriod)), GST_FLOW_OK);
+  for (const auto &subframe : pull_images (demux))
+    EXPECT_EQ (
+        subframe, draw<std::uint8_t> (4, 4, [] (int, int) { return 30; }));
+}
+
+/* ----------------------------------------------------------- saturation -- */
+
+class DemuxSaturation : public DemuxSchedule
+{
+protected:
+  struct Said {
+    bool active;
+    guint64 frames, pixels, from, to;
+  };
+  void push_frame (int frame, int saturated)
+  {
+    auto image = picture ();
+    for (int i = 0; i < saturated; i++)
+      image.at (i, 3) = 255;
+    ASSERT_EQ (demux->push (frame_of (image, GstClockTime (frame) * kPeriod)),
+        GST_FLOW_OK);
+  }
+  std::optional<Said> said ()
+  {
+    const MessagePtr message =
+        demux->element_message ("codedexposure/saturated");
+    if (!message)
+      return std::nullopt;
+    const GstStructure *s = gst_message_get_structure (message.get ());
+    Said found{};
+    gboolean active = FALSE;
+    EXPECT_TRUE (gst_structure_get_boolean (s, "active", &active));
+    found.active = active;
+    gst_structure_get_uint64 (s, "frames", &found.frames);
+    gst_structure_get_uint64 (s, "pixels", &found.pixels);
+    gst_structure_get_uint64 (s, "from", &found.from);
+    gst_structure_get_uint64 (s, "to", &found.to);
+    return found;
+  }
+};
+
+TEST_F (DemuxSaturation, IsSaidWhenAStretchBeginsAndEnds)
+{
+  start ("schedule=sequential:2x2");
+  push_frame (0, 0);
+  EXPECT_FALSE (said ());
+  push_frame (1, 3);
+  push_frame (2, 5);
+  push_frame (3, 1);
+  const auto begun = said ();
+  ASSERT_TRUE (begun);
+  EXPECT_TRUE (begun->active);
+  EXPECT_EQ (begun->pixels, 3u);
+  EXPECT_EQ (begun->from, kPeriod);
+  EXPECT_FALSE (said ());
+
+  push_frame (4, 0);
+  const auto ended = said ();
+  ASSERT_TRUE (ended);
+  EXPECT_FALSE (ended->active);
+  EXPECT_EQ (ended->frames, 3u);
+  EXPECT_EQ (ended->pixels, 5u);
+  EXPECT_EQ (ended->from, kPeriod);
+  EXPECT_EQ (ended->to, 3 * kPeriod);
+  EXPECT_EQ (property<guint64> (demux->element (), "saturated-frames"), 3u);
+}
+
+TEST_F (DemuxSaturation, EosEndsAStretch)
+{
+  start ("schedule=sequential:2x2");
+  push_frame (0, 1);
+  ASSERT_TRUE (said ());
+  demux->push_event (gst_event_new_eos ());
+  const auto ended = said ();
+  ASSERT_TRUE (ended);
+  EXPECT_FALSE (ended->active);
+  EXPECT_EQ (ended->frames, 1u);
+}
+
+TEST_F (DemuxSaturation, IsCountedInTheMetaOfTheSubframes)
+{
+  start ("schedule=sequential:2x2");
+  push_frame (0, 7);
+  for (int k = 0; k < 4; k++) {
+    const BufferPtr subframe = demux->pull ();
+    ASSERT_TRUE (subframe);
+    EXPECT_EQ (get_frame_meta (subframe.get ())->saturated, 7u);
+  }
+}
+
+TEST_F (DemuxSaturation, IsJudgedByTheSignificantBits)
+{
+  demux = std::make_unique<ElementHarness> (
+      "codedexposure-demux schedule=sequential:2x2 bits=12");
+  demux->set_caps (gray_caps (24, 24, "25/1", "GRAY16_LE"));
+  auto image = draw<std::uint16_t> (24, 24, [] (int, int) { return 4094; });
+  ASSERT_EQ (demux->push (frame_of (image, 0)), GST_FLOW_OK);
+  EXPECT_FALSE (said ());
+  image.at (2, 2) = 4095;
+  ASSERT_EQ (demux->push (frame_of (image, kPeriod)), GST_FLOW_OK);
+  const auto begun = said ();
+  ASSERT_TRUE (begun);
+  EXPECT_EQ (begun->pixels, 1u);
+}
+
+} // namespace

@@ -6,11 +6,12 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <span>
 #include <string>
 
-#include "extract/decoder.h"
+#include "extract/fast_path.h"
 #include "extract/reference.h"
-#include "schedule/sample_grid.h"
+#include "extract/targets.h"
 
 namespace cexp
 {
@@ -18,6 +19,7 @@ namespace cexp
 namespace
 {
 
+constexpr std::string_view kScalar = "scalar";
 constexpr std::array<std::string_view, 4> kMethodNames = {
     "auto", "rank", "select", "decode"};
 
@@ -66,6 +68,16 @@ check_options (const ExtractOptions &options, int type_bits)
   return {};
 }
 
+/** The named target and the narrower ones that help it out. */
+std::span<const Target>
+targets_from (std::string_view name)
+{
+  auto targets = supported_targets ();
+  while (!name.empty () && targets.front ().name != name)
+    targets = targets.subspan (1);
+  return targets;
+}
+
 } // namespace
 
 std::string_view
@@ -87,17 +99,17 @@ parse_method (std::string_view name)
 std::vector<std::string_view>
 extract_targets ()
 {
-  return {"scalar"};
+  std::vector<std::string_view> names;
+  for (const Target &target : supported_targets ())
+    names.push_back (target.name);
+  names.push_back (kScalar);
+  return names;
 }
 
 template <typename Pixel>
-struct Extractor<Pixel>::Plan {
-  Method method;
-  SampleGrid grid;
-  Extent size;
-  int largest;
-  std::vector<int> elements;
-  std::optional<Decoder> decoder = {};
+struct Extractor<Pixel>::Plan : ExtractPlan {
+  /** Empty: the reference does it. */
+  std::optional<FastPath<Pixel>> fast = {};
 };
 
 template <typename Pixel>
@@ -135,14 +147,16 @@ Extractor<Pixel>::make (const Schedule &schedule, int width, int height,
   const Method method =
       options.method == Method::kAuto ? method_for (schedule) : options.method;
   const int bits = options.bits > 0 ? options.bits : kTypeBits;
-  auto plan = std::make_unique<Plan> (Plan{method, grid, size, (1 << bits) - 1,
-      elements_by_slot (schedule.code ())});
+  auto plan = std::make_unique<Plan> (Plan{{method, grid, size, (1 << bits) - 1,
+      elements_by_slot (schedule.code ())}});
   if (method == Method::kDecode) {
     auto decoder = Decoder::make (schedule, options.gain, options.interpolate);
     if (!decoder)
       return decoder.error ();
     plan->decoder = std::move (*decoder);
   }
+  if (options.target != kScalar)
+    plan->fast = FastPath<Pixel>::make (*plan, targets_from (options.target));
   return Extractor (std::move (plan));
 }
 
@@ -189,6 +203,8 @@ Extractor<Pixel>::run_rows (ImageView<const Pixel> coded,
 {
   const Plan &plan = *plan_;
   const RowRange range = {first_row, rows};
+  if (plan.fast)
+    return plan.fast->run (plan, coded, subframes, range);
   switch (plan.method) {
   case Method::kDecode:
     reference_decode (

@@ -1,0 +1,313 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "extract/fast_path.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace cexp
+{
+
+namespace
+{
+
+/* Coded frames from this size on do not fit the caches together with their
+ * subframes and the next frame, so nothing is gained by writing into them. */
+constexpr std::size_t kLargeFrame = std::size_t (8) << 20;
+
+/** A staircase without leak: slot k is a multiple of element k less element
+ * k - 1. Its factor, or 0. */
+double
+staircase_factor (const Decoder &decoder)
+{
+  const double factor = decoder.terms (0).back ().factor;
+  for (int s = 0; s < decoder.slots (); s++) {
+    const auto terms = decoder.terms (s);
+    const bool is_step =
+        terms.back () == Term{s, factor} &&
+        (s == 0 ? terms.size () == 1
+                : terms.size () == 2 && terms[0] == Term{s - 1, -factor});
+    if (!is_step)
+      return 0.0;
+  }
+  return factor;
+}
+
+} // namespace
+
+/** Elements of some columns of cells, for one row of cells or a ring of
+ * three, with a cell more at either end where neighbours are needed. */
+template <typename Pixel>
+struct FastPath<Pixel>::Chunk {
+  /* Three rows of 66 cells of 256 elements. A single row takes no more than
+   * the L1 cache. */
+  static constexpr int kRingPixels = 3 * 66 * Tile::kMaxElements;
+  static constexpr int kRowPixels = 64 * Tile::kMaxElements;
+
+  alignas (64) Pixel pixels[kRingPixels];
+  Pixel peaks[3];
+  int n;
+  int first;
+  int count;
+  int halo;
+  int pitch;
+
+  static int most_cells (int n, bool ring)
+  {
+    return ring ? std::min (kRingPixels / 3 / n - 2, kMaxRowCells)
+                : kRowPixels / n;
+  }
+
+  int slot (int j) const { return halo > 0 ? j % 3 : 0; }
+  Pixel *row (int j, int element)
+  {
+    return pixels + (slot (j) * n + element) * pitch + halo;
+  }
+  const Pixel *row (int j, int element) const
+  {
+    return pixels + (slot (j) * n + element) * pitch + halo;
+  }
+  Pixel peak (int j) const { return peaks[slot (j)]; }
+
+  void fill (const ElementRows<Pixel> &elements, ImageView<const Pixel> coded,
+      int j, int width)
+  {
+    const int begin = std::max (first - halo, 0);
+    const int end = std::min (first + count + halo, width);
+    RowPointers<Pixel> rows;
+    for (int e = 0; e < n; e++)
+      rows[std::size_t (e)] = row (j, e) + (begin - first);
+    peaks[slot (j)] =
+        elements.gather (coded, j, begin, end - begin, rows, false);
+    if (halo == 0)
+      return;
+    for (int e = 0; e < n; e++) {
+      Pixel *const at = row (j, e);
+      if (first == 0)
+        at[-1] = at[0];
+      if (end == first + count)
+        at[count] = at[count - 1];
+    }
+  }
+};
+
+template <typename Pixel>
+std::optional<FastPath<Pixel>>
+FastPath<Pixel>::make (const ExtractPlan &plan, std::span<const Target> targets)
+{
+  while (!targets.empty () &&
+         targets.front ().kernels<Pixel> ().lanes > plan.size.width)
+    targets = targets.subspan (1);
+  if (targets.empty ())
+    return {};
+  return FastPath (plan, targets);
+}
+
+template <typename Pixel>
+FastPath<Pixel>::FastPath (
+    const ExtractPlan &plan, std::span<const Target> targets)
+    : targets_ (targets), elements_ (plan.grid, targets)
+{
+  if (plan.decoder) {
+    take_terms (*plan.decoder);
+    take_weights (plan);
+  }
+}
+
+template <typename Pixel>
+void
+FastPath<Pixel>::take_terms (const Decoder &decoder)
+{
+  const double factor = staircase_factor (decoder);
+  if (decoder.interpolates () && factor == 0.25)
+    form_ = DecodeForm::kLerpDifference;
+  else if (!decoder.interpolates () && factor >= 1.0 && factor <= 256.0 &&
+           factor == std::floor (factor))
+    form_ = DecodeForm::kDifference;
+
+  for (int s = 0; s < decoder.slots (); s++) {
+    for (const Term &term : decoder.terms (s)) {
+      term_elements_.push_back (term.element);
+      term_factors_.push_back (term.factor);
+    }
+  }
+  std::size_t start = 0;
+  for (int s = 0; s < decoder.slots (); s++) {
+    const std::size_t size = decoder.terms (s).size ();
+    terms_.push_back ({term_elements_.data () + start,
+        term_factors_.data () + start, int (size)});
+    start += size;
+  }
+}
+
+template <typename Pixel>
+void
+FastPath<Pixel>::take_weights (const ExtractPlan &plan)
+{
+  for (int e = 0; e < plan.grid.elements (); e++) {
+    const Offset offset = plan.grid.offset (e, 0, 0);
+    const Lerp x = plan.decoder->lerp_x (offset);
+    const Lerp y = plan.decoder->lerp_y (offset);
+    weights_.push_back (
+        {nullptr, nullptr, {x.near, x.far}, {y.near, y.far}, x.step});
+    row_steps_.push_back (y.step);
+  }
+}
+
+template <typename Pixel>
+ExtractReport
+FastPath<Pixel>::run (const ExtractPlan &plan, ImageView<const Pixel> coded,
+    std::span<const ImageView<Pixel>> subframes, RowRange rows) const
+{
+  if (plan.method == Method::kDecode)
+    return {decode (plan, coded, subframes, rows)};
+
+  const std::size_t n = subframes.size ();
+  const bool large = n * sizeof (Pixel) * std::size_t (plan.size.width) *
+                         std::size_t (plan.size.height) >=
+                     kLargeFrame;
+  ExtractReport report;
+  for (int j = rows.first; j < rows.first + rows.count; j++) {
+    RowPointers<Pixel> to;
+    Pixel peak;
+    if (plan.method == Method::kRank) {
+      for (std::size_t k = 0; k < n; k++)
+        to[k] = subframes[k].row (j);
+      peak = rank_row (plan, coded, j, to, large);
+    } else {
+      for (std::size_t k = 0; k < n; k++)
+        to[std::size_t (plan.elements[k])] = subframes[k].row (j);
+      peak = elements_.gather (coded, j, 0, plan.size.width, to, large);
+    }
+    report.saturated += saturated (plan, coded, j, 0, plan.size.width, peak);
+  }
+  if (large)
+    targets_.front ().kernels<Pixel> ().fence ();
+  return report;
+}
+
+template <typename Pixel>
+Pixel
+FastPath<Pixel>::rank_row (const ExtractPlan &plan,
+    ImageView<const Pixel> coded, int j, const RowPointers<Pixel> &rows,
+    bool large) const
+{
+  const Extent cell = plan.grid.cell ();
+  const int n = plan.grid.elements ();
+  Pixel peak = 0;
+  for_segments<Pixel> (targets_, plan.size.width,
+      [&] (const Kernels<Pixel> &kernels, int first, int count) {
+        const auto to = moved (rows, n, first);
+        const Cells<Pixel> cells = {
+            coded.row (j * cell.height) + first * cell.width, coded.stride,
+            cell.width, cell.height};
+        peak = std::max (
+            peak, kernels.rank (cells, to.data (),
+                      strips_for (kernels, count, large, to.data (), n)));
+      });
+  return peak;
+}
+
+template <typename Pixel>
+std::uint64_t
+FastPath<Pixel>::decode (const ExtractPlan &plan, ImageView<const Pixel> coded,
+    std::span<const ImageView<Pixel>> subframes, RowRange rows) const
+{
+  Chunk chunk;
+  chunk.n = plan.grid.elements ();
+  chunk.halo = plan.decoder->interpolates () ? 1 : 0;
+  const int most = Chunk::most_cells (chunk.n, chunk.halo > 0);
+  const int chunks = (plan.size.width + most - 1) / most;
+  chunk.pitch = (plan.size.width + chunks - 1) / chunks + 2 * chunk.halo;
+
+  std::uint64_t count = 0;
+  for (int c = 0; c < chunks; c++) {
+    chunk.first = plan.size.width * c / chunks;
+    chunk.count = plan.size.width * (c + 1) / chunks - chunk.first;
+    count += decode_chunk (plan, coded, subframes, rows, chunk);
+  }
+  return count;
+}
+
+template <typename Pixel>
+std::uint64_t
+FastPath<Pixel>::decode_chunk (const ExtractPlan &plan,
+    ImageView<const Pixel> coded, std::span<const ImageView<Pixel>> subframes,
+    RowRange rows, Chunk &chunk) const
+{
+  const int width = plan.size.width;
+  const int height = plan.size.height;
+  std::uint64_t count = 0;
+  if (chunk.halo > 0)
+    for (int j = std::max (rows.first - 1, 0); j <= rows.first; j++)
+      chunk.fill (elements_, coded, j, width);
+
+  for (int j = rows.first; j < rows.first + rows.count; j++) {
+    if (chunk.halo == 0)
+      chunk.fill (elements_, coded, j, width);
+    else if (j + 1 < height)
+      chunk.fill (elements_, coded, j + 1, width);
+
+    RowPointers<Pixel> to;
+    for (std::size_t k = 0; k < subframes.size (); k++)
+      to[k] = subframes[k].row (j) + chunk.first;
+    decode_row (plan, chunk, j, to);
+    count +=
+        saturated (plan, coded, j, chunk.first, chunk.count, chunk.peak (j));
+  }
+  return count;
+}
+
+template <typename Pixel>
+void
+FastPath<Pixel>::decode_row (const ExtractPlan &plan, const Chunk &chunk, int j,
+    const RowPointers<Pixel> &to) const
+{
+  const Kernels<Pixel> &kernels = targets_.front ().kernels<Pixel> ();
+  const Pixel largest = Pixel (plan.largest);
+  const std::size_t n = std::size_t (chunk.n);
+  if (form_ == DecodeForm::kDifference) {
+    std::array<const Pixel *, Tile::kMaxElements> rows;
+    for (std::size_t e = 0; e < n; e++)
+      rows[e] = chunk.row (j, int (e));
+    kernels.difference (rows.data (), chunk.n, chunk.count,
+        int (plan.decoder->terms (0)[0].factor), largest, to.data ());
+    return;
+  }
+
+  std::array<ElementRow<Pixel>, Tile::kMaxElements> rows;
+  for (std::size_t e = 0; e < n; e++) {
+    const int beside = std::clamp (j + row_steps_[e], 0, plan.size.height - 1);
+    rows[e] = weights_[e];
+    rows[e].here = chunk.row (j, int (e));
+    rows[e].there = chunk.row (beside, int (e));
+  }
+  if (form_ == DecodeForm::kLerpDifference)
+    kernels.lerp_difference (
+        rows.data (), chunk.n, chunk.count, largest, to.data ());
+  else
+    kernels.decode (rows.data (), terms_.data (), chunk.n, chunk.count, largest,
+        to.data ());
+}
+
+/** Counts only where the largest pixel says that there is something to. */
+template <typename Pixel>
+std::uint64_t
+FastPath<Pixel>::saturated (const ExtractPlan &plan,
+    ImageView<const Pixel> coded, int j, int first, int count, Pixel peak) const
+{
+  if (peak < plan.largest)
+    return 0;
+  const Kernels<Pixel> &kernels = targets_.front ().kernels<Pixel> ();
+  const Extent cell = plan.grid.cell ();
+  std::uint64_t found = 0;
+  for (int y = 0; y < cell.height; y++)
+    found +=
+        kernels.count (coded.row (j * cell.height + y) + first * cell.width,
+            count * cell.width, Pixel (plan.largest));
+  return found;
+}
+
+template class FastPath<std::uint8_t>;
+template class FastPath<std::uint16_t>;
+
+} // namespace cexp

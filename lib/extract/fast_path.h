@@ -1,0 +1,84 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Extraction by the kernels of an instruction set. */
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "base/image.h"
+#include "extract/decoder.h"
+#include "extract/element_rows.h"
+#include "extract/extractor.h"
+#include "extract/reference.h"
+#include "extract/targets.h"
+#include "schedule/sample_grid.h"
+
+namespace cexp
+{
+
+/** What is to be done, whoever does it. */
+struct ExtractPlan {
+  Method method;
+  SampleGrid grid;
+  Extent size;                         ///< of a subframe
+  int largest;                         ///< pixel value
+  std::vector<int> elements;           ///< select: element of each subframe
+  std::optional<Decoder> decoder = {}; ///< decode
+};
+
+/**
+ * The plan carried out by kernels: equal to the reference bit for bit. Holds
+ * nothing that changes, so that threads can share it.
+ */
+template <typename Pixel>
+class FastPath
+{
+public:
+  /** @p targets  the kernels that may be used, widest first; those that are
+   * too wide for the rows are left out. Nothing when all are. */
+  static std::optional<FastPath> make (
+      const ExtractPlan &plan, std::span<const Target> targets);
+
+  ExtractReport run (const ExtractPlan &plan, ImageView<const Pixel> coded,
+      std::span<const ImageView<Pixel>> subframes, RowRange rows) const;
+
+private:
+  /** What the code's terms come down to. */
+  enum class DecodeForm {
+    kDifference,     ///< whole multiples of element k less element k - 1
+    kLerpDifference, ///< quarters of the same, interpolated
+    kTerms,          ///< anything
+  };
+  struct Chunk;
+
+  FastPath (const ExtractPlan &plan, std::span<const Target> targets);
+  void take_terms (const Decoder &decoder);
+  void take_weights (const ExtractPlan &plan);
+
+  Pixel rank_row (const ExtractPlan &plan, ImageView<const Pixel> coded, int j,
+      const RowPointers<Pixel> &rows, bool large) const;
+  std::uint64_t decode (const ExtractPlan &plan, ImageView<const Pixel> coded,
+      std::span<const ImageView<Pixel>> subframes, RowRange rows) const;
+  std::uint64_t decode_chunk (const ExtractPlan &plan,
+      ImageView<const Pixel> coded, std::span<const ImageView<Pixel>> subframes,
+      RowRange rows, Chunk &chunk) const;
+  void decode_row (const ExtractPlan &plan, const Chunk &chunk, int j,
+      const RowPointers<Pixel> &to) const;
+  std::uint64_t saturated (const ExtractPlan &plan,
+      ImageView<const Pixel> coded, int j, int first, int count,
+      Pixel peak) const;
+
+  std::span<const Target> targets_;
+  ElementRows<Pixel> elements_;
+  DecodeForm form_ = DecodeForm::kTerms;
+  std::vector<int> term_elements_;
+  std::vector<double> term_factors_;
+  std::vector<TermList> terms_;
+  /** Weights of each element; its rows are filled in for every row of cells. */
+  std::vector<ElementRow<Pixel>> weights_;
+  /** Row of cells, -1, 0 or 1 from its own, with which an element is joined. */
+  std::vector<int> row_steps_;
+};
+
+} // namespace cexp

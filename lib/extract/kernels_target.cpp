@@ -1,0 +1,20 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The kernels of one instruction set, compiled once for each. */
+#include "extract/combine.h"
+#include "extract/kernels.h"
+#include "extract/sort.h"
+#include "extract/split.h"
+#include "extract/vector.h"
+
+namespace cexp::CEXP_TARGET
+{
+
+template <typename T>
+constexpr Kernels<T> kKernels = {kLanes<T>, split<T>, rank<T>, relabel<T>,
+    difference<T>, lerp_difference<T>, decode<T>, count<T>, fence};
+
+extern const Kernels<std::uint8_t> *const kernels_u8 = &kKernels<std::uint8_t>;
+extern const Kernels<std::uint16_t> *const kernels_u16 =
+    &kKernels<std::uint16_t>;
+
+} // namespace cexp::CEXP_TARGET

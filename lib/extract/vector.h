@@ -1,0 +1,111 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Vectors of pixels as wide as the instruction set this file is compiled for.
+ *
+ * Included only by files that are compiled once per instruction set. All that
+ * they define lies in a namespace of its own, CEXP_TARGET, and they call no
+ * inline function from elsewhere, the standard library's included: the linker
+ * keeps one copy of such a function, and it could be one that the processor
+ * cannot run. */
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+#ifdef __SSE2__
+#include <immintrin.h>
+#endif
+
+namespace cexp::CEXP_TARGET
+{
+
+constexpr int kVectorBytes = CEXP_VECTOR_BYTES;
+
+template <typename T>
+struct VectorOf {
+  typedef T Type __attribute__ ((vector_size (kVectorBytes)));
+};
+template <typename T>
+using Vector = typename VectorOf<T>::Type;
+template <typename T>
+constexpr int kLanes = kVectorBytes / int (sizeof (T));
+
+#define CEXP_INLINE [[gnu::always_inline]] inline
+#define CEXP_INLINE_BODY __attribute__ ((always_inline))
+
+template <typename T>
+CEXP_INLINE Vector<T>
+load (const T *from)
+{
+  Vector<T> v;
+  __builtin_memcpy (&v, from, kVectorBytes);
+  return v;
+}
+
+template <typename T>
+CEXP_INLINE void
+store (T *to, Vector<T> v)
+{
+  __builtin_memcpy (to, &v, kVectorBytes);
+}
+
+/** Past the caches; @p to is aligned to a vector. */
+template <typename T>
+CEXP_INLINE void
+stream (T *to, Vector<T> v)
+{
+#if defined __AVX512F__ && CEXP_VECTOR_BYTES == 64
+  _mm512_stream_si512 (reinterpret_cast<__m512i *> (to), __m512i (v));
+#elif defined __AVX__ && CEXP_VECTOR_BYTES == 32
+  _mm256_stream_si256 (reinterpret_cast<__m256i *> (to), __m256i (v));
+#elif defined __SSE2__
+  _mm_stream_si128 (reinterpret_cast<__m128i *> (to), __m128i (v));
+#else
+  store (to, v);
+#endif
+}
+
+template <typename V>
+CEXP_INLINE V
+smaller (V a, V b)
+{
+  return a < b ? a : b;
+}
+
+template <typename V>
+CEXP_INLINE V
+larger (V a, V b)
+{
+  return a < b ? b : a;
+}
+
+template <typename T>
+CEXP_INLINE T
+largest_lane (Vector<T> v)
+{
+  T lanes[kLanes<T>];
+  store (lanes, v);
+  T most = 0;
+  for (const T lane : lanes)
+    most = lane > most ? lane : most;
+  return most;
+}
+
+/** Lane i of the result is lane Index (i) of a and b in a row. */
+template <typename V, typename Index, int... I>
+CEXP_INLINE V
+pick (V a, V b, Index, std::integer_sequence<int, I...>)
+{
+  return __builtin_shufflevector (a, b, Index::at (I)...);
+}
+
+/** Fetches the @p vectors vectors at @p from before they are needed. */
+template <int Vectors, typename T>
+CEXP_INLINE void
+prefetch (const T *from)
+{
+  const char *bytes = reinterpret_cast<const char *> (from);
+  for (int at = 0; at < Vectors * kVectorBytes; at += 64)
+    __builtin_prefetch (bytes + at);
+}
+
+} // namespace cexp::CEXP_TARGET

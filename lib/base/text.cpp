@@ -77,9 +77,9 @@ printable (std::string_view text, std::size_t limit)
 }
 
 std::string
-in_quotes (std::string_view text)
+in_quotes (std::string_view text, std::size_t limit)
 {
-  std::string shown = printable (text);
+  std::string shown = printable (text, limit);
   shown.insert (shown.begin (), '\'');
   shown += '\'';
   return shown;

@@ -17,7 +17,7 @@ namespace cexp
 std::string printable (std::string_view text, std::size_t limit = 64);
 
 /** printable () in single quotes. */
-std::string in_quotes (std::string_view text);
+std::string in_quotes (std::string_view text, std::size_t limit = 64);
 
 /** The whole of @p text as a decimal integer that fits an int. */
 std::optional<int> parse_int (std::string_view text);

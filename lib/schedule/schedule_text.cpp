@@ -252,7 +252,7 @@ read_file (const std::string &path, std::size_t limit)
 Result<Schedule>
 read_json_file (std::string_view path)
 {
-  const std::string what = "schedule file " + in_quotes (path) + ": ";
+  const std::string what = "schedule file " + in_quotes (path, 4096) + ": ";
   if (path.find ('\0') != path.npos)
     return Error{what + "a path holds no zero bytes"};
   const auto content = read_file (std::string (path), Schedule::kMaxJsonSize);

@@ -22,7 +22,8 @@ struct FrameRate {
   int den = 1;
 
   /** floor ((index + part / parts) frame periods): the start of slot @p part
-   * of frame @p index. Exact, however large the index; 0 <= part <= parts. */
+   * of frame @p index. Exact as long as the time itself fits; index >= 0,
+   * 0 <= part <= parts. */
   Nanoseconds time_of (std::int64_t index, int part = 0, int parts = 1) const;
   /** One frame period, rounded down. */
   Nanoseconds period () const { return time_of (1); }

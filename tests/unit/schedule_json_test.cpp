@@ -222,6 +222,9 @@ TEST (ScheduleJson, WrongTextsAreNamed)
       {with_code (R"({"rows":"10"})"), {"'code'", "rows"}},
       {with_code (R"({"rows":["10",1]})"), {"'code.rows[1]'", "not 1"}},
       {with_code (R"({"rows":["10","01"],"n":2})"), {"no key 'n' in code"}},
+      {R"({"format":"coded-exposure","version":1,"tile":{"period":[2,1],)"
+       R"("labels":[0,1]},"code":{"rows":["10","01"],"period":[2,1]}})",
+          {"no key 'period' in code"}},
       {with_code (R"({"rows":[]})"), {"0 rows"}},
       {with_code (R"({"rows":["10","1"]})"), {"row 1", "1 slots"}},
       {with_code (R"({"rows":["10","0 "]})"), {"row 1", "'0 '"}},

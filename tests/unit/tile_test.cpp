@@ -214,11 +214,14 @@ TEST (Tile, CellOfAWrittenMapDependsOnThePhase)
 
 TEST (Tile, CellOfEverySmallWrittenMapIsTheSquarestBlock)
 {
-  int with_cell = 0;
-  for (int bits = 1; bits < (1 << 8) - 1; bits++) {
-    for (const Extent period : {Extent{8, 1}, Extent{4, 2}, Extent{2, 4}}) {
+  int with_cell = 0, without = 0;
+  for (const Extent period :
+      {Extent{8, 1}, Extent{4, 2}, Extent{2, 4}, Extent{1, 8}, Extent{3, 1},
+          Extent{1, 3}, Extent{3, 2}, Extent{2, 3}}) {
+    const int pixels = period.width * period.height;
+    for (int bits = 1; bits < (1 << pixels) - 1; bits++) {
       std::vector<std::uint8_t> labels;
-      for (int i = 0; i < 8; i++)
+      for (int i = 0; i < pixels; i++)
         labels.push_back (std::uint8_t (bits >> i & 1));
       const auto tile = Tile::from_labels (period.width, period.height, labels);
       ASSERT_TRUE (tile.ok ());
@@ -229,11 +232,12 @@ TEST (Tile, CellOfEverySmallWrittenMapIsTheSquarestBlock)
         if (best) {
           EXPECT_EQ (*cell, *best) << bits;
         }
-        with_cell += cell.ok ();
+        (cell.ok () ? with_cell : without)++;
       }
     }
   }
   EXPECT_GT (with_cell, 100);
+  EXPECT_GT (without, 100);
 }
 
 TEST (Tile, WrittenMapIsKept)

@@ -32,7 +32,7 @@ Decoder::make (const Schedule &schedule, double gain, bool interpolate)
   const SampleGrid grid (schedule);
   Decoder decoder;
   decoder.cell_ = grid.cell ();
-  decoder.gain_ = gain > 0.0 ? gain : schedule.code ().max_open_slots ();
+  decoder.gain_ = gain > 0.0 ? gain : schedule.white_slots ();
   decoder.interpolates_ = interpolate && grid.repeat () == Extent{1, 1} &&
                           !schedule.code ().one_hot ();
 

@@ -45,7 +45,7 @@ struct Lerp {
 class Decoder
 {
 public:
-  /** @p gain  0: the code's largest number of open slots. Error when the code
+  /** @p gain  0: schedule.white_slots (). Error when the code
    * cannot be inverted. */
   static Result<Decoder> make (
       const Schedule &schedule, double gain, bool interpolate);

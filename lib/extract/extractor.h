@@ -30,7 +30,7 @@ Result<Method> parse_method (std::string_view name);
 struct ExtractOptions {
   Method method = Method::kAuto;
   /** Factor on the light of a slot (decode only); 0: white in a slot is white
-   * out, i.e. the code's largest number of open slots. */
+   * out, i.e. Schedule::white_slots (). */
   double gain = 0.0;
   /** Significant bits of a pixel, 1..8 or 1..16; 0: all that the type has. */
   int bits = 0;

@@ -191,10 +191,7 @@ OpticalBench::State::gain () const
 {
   if (options.gain > 0.0 || !mirrors)
     return options.gain;
-  const Schedule &schedule = mirrors->schedule ();
-  const int slots = schedule.slots ();
-  const int open = schedule.code ().max_open_slots ();
-  return slots / (open + schedule.leak () * (slots - open));
+  return mirrors->schedule ().slots () / mirrors->schedule ().white_slots ();
 }
 
 double

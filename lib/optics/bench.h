@@ -85,8 +85,7 @@ public:
 
   /**
    * The gain in force. Where the options leave it at 0, white makes white for
-   * the element that is open longest: N / (k + leak (N - k)), k =
-   * code.max_open_slots ().
+   * the element that is open longest: N / schedule.white_slots ().
    */
   double gain () const;
 

@@ -110,4 +110,11 @@ Schedule::make (Parts parts)
   return Schedule (std::move (parts), *cell);
 }
 
+double
+Schedule::white_slots () const
+{
+  const int open = parts_.code.max_open_slots ();
+  return open + parts_.leak * (slots () - open);
+}
+
 } // namespace cexp

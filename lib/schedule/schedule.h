@@ -112,6 +112,11 @@ public:
   /** Masks in one period of what the DMD shows: N, or 2 N with a pilot. */
   int masks () const { return slots () * (parts_.pilot_rows > 0 ? 2 : 1); }
 
+  /** Slots' worth of white light that make white in the coded frame, so that
+   * the element with the most light just fills the range: its open slots, and
+   * what leaks through in the others. */
+  double white_slots () const;
+
   bool operator== (const Schedule &other) const
   {
     return parts_ == other.parts_;

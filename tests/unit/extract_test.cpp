@@ -45,7 +45,7 @@ expose (const Schedule &schedule, int width, int height, const Scene &scene)
                                            ? 1.0
                                            : schedule.leak ());
       coded.at (x, y) = Pixel (
-          std::clamp (std::round (light / code.max_open_slots ()), 0.0, white));
+          std::clamp (std::round (light / schedule.white_slots ()), 0.0, white));
     }
   }
   return coded;
@@ -161,7 +161,6 @@ TEST (Extract, DecodeGivesTheLightOfEverySlotWithinTheQuantisationBound)
     const auto light = [n] (int, int, int slot) {
       return 20000.0 + 37000.0 * ((slot * 7) % n) / n;
     };
-    /* White needs a clear range: leak adds light to the brightest element. */
     const auto out =
         extract (schedule, expose<std::uint16_t> (schedule, 64, 64, light),
             {.method = Method::kDecode});

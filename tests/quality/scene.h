@@ -1,0 +1,36 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The light in front of the bench: one picture a slot. */
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "base/image.h"
+
+namespace cexp::quality
+{
+
+using Picture = Image<std::uint8_t>;
+
+/** What a perfect fast camera would have seen, one frame a slot, linear. */
+struct Scene {
+  std::string name;
+  std::vector<Picture> frames;
+};
+
+/**
+ * Edges and texture that move in known ways, drawn with the exact coverage of
+ * each pixel's edge: a still background of two gratings, a bar (3 px a slot to
+ * the right), a disc (2 px right and 1 px down a slot), and a patch of fine
+ * stripes that drifts by a quarter of its period a slot.
+ */
+Scene synthetic_scene (int width, int height, int frames);
+
+/** One picture that stands still for that many slots. */
+Scene still_scene (std::string name, const Picture &picture, int frames);
+
+/** The same grey everywhere, always. */
+Scene flat_scene (int width, int height, int frames, std::uint8_t level);
+
+} // namespace cexp::quality

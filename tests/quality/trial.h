@@ -1,0 +1,80 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* One way to take and to split coded frames, and how true its subframes are. */
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "extract/extractor.h"
+#include "metrics.h"
+#include "scene.h"
+#include "schedule/schedule.h"
+
+namespace cexp::quality
+{
+
+/** What is done to the subframes once they are out. */
+enum class Reading {
+  kAsShown,    ///< nothing
+  kNormalised, ///< subframe k times n / (k + 1): all equally bright
+  kDifference, ///< n times what subframe k has more than subframe k - 1
+};
+
+/** The way from light to subframes. */
+struct Way {
+  std::string label = {}; ///< of its row in a table
+  Schedule schedule = {}; ///< of the bench
+  ExtractOptions extract = {};
+  Reading reading = Reading::kAsShown;
+  /** The schedule that extraction believes in, where it is another. */
+  std::optional<Schedule> believed = {};
+};
+
+/** A condition under which coded frames are taken. */
+struct Condition {
+  /** Electrons that white makes in an exposure without masks; an element that
+   * is open in one slot of n gets an nth of them. 0: noise-free. */
+  double electrons = 0.0;
+  double read_noise = 0.0;
+  /** Analog gain; 0: white in the element that is open longest is white. */
+  double gain = 0.0;
+  double shift = 0.0; ///< of mirrors against pixels, px, in x and in y
+};
+
+/** What a way made of a scene. */
+struct Score {
+  /** Against the scene's pixel at the place of the subframe's element, in the
+   * slot of the subframe. */
+  PooledError point;
+  /** Against the mean of the cell in that slot. */
+  PooledError cell;
+  /** Against every pixel of the scene in that slot, the gaps between samples
+   * filled linearly (upsample.h), without the border. */
+  PooledError full;
+  std::uint64_t pixels = 0; ///< of all subframes
+  /** Pixels whose rank in their cell is not their slot; ties count as right. */
+  std::uint64_t mislabelled = 0;
+  std::uint64_t cells = 0;
+  std::uint64_t mislabelled_cells = 0;
+
+  Score &operator+= (const Score &other);
+};
+
+/** The coded frames of a scene, n slots each; slots left over at the end make
+ * none. Noise depends on the number of the frame only. */
+std::vector<Picture> take (
+    const Scene &scene, const Schedule &schedule, const Condition &condition);
+
+/** The subframes of one coded frame, as they are, before any Reading. */
+std::vector<Picture> split (const Picture &coded, const Way &way);
+
+/** Scores of each coded frame of the scene. */
+std::vector<Score> score_frames (
+    const Scene &scene, const Way &way, const Condition &condition);
+
+/** Their sum: one mean over all slots and frames of the scene. */
+Score score_scene (
+    const Scene &scene, const Way &way, const Condition &condition);
+
+} // namespace cexp::quality

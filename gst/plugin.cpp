@@ -5,13 +5,15 @@
 #include "gstcodedexposuredemux.h"
 #include "gstcodedexposurelog.h"
 #include "gstcodedexposuremeta.h"
+#include "gstcodedexposuresim.h"
 
 static gboolean
 plugin_init (GstPlugin *plugin)
 {
   cexp::gst::register_frame_meta ();
   return GST_ELEMENT_REGISTER (codedexposure_demux, plugin) &&
-         GST_ELEMENT_REGISTER (codedexposure_log, plugin);
+         GST_ELEMENT_REGISTER (codedexposure_log, plugin) &&
+         GST_ELEMENT_REGISTER (codedexposure_sim, plugin);
 }
 
 GST_PLUGIN_DEFINE (GST_VERSION_MAJOR, GST_VERSION_MINOR, codedexposure,

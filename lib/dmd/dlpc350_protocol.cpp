@@ -1,0 +1,70 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "dmd/dlpc350_protocol.h"
+
+#include <array>
+
+namespace cexp::dlpc350
+{
+
+Bytes
+encode_entries (const std::vector<Entry> &entries)
+{
+  constexpr std::uint32_t kOneBit = 1 << 8;
+  constexpr std::uint32_t kWhite = 7 << 12;
+  Bytes bytes;
+  for (const Entry &entry : entries)
+    append_le (bytes,
+        std::uint32_t (entry.trigger) | std::uint32_t (entry.plane) << 2 |
+            kOneBit | kWhite | std::uint32_t (entry.black_after) << 17 |
+            std::uint32_t (entry.next_image) << 18,
+        3);
+  return bytes;
+}
+
+Bytes
+encode_configuration (int entries, bool repeat, int per_trigger, int images)
+{
+  return {std::uint8_t (entries - 1), std::uint8_t (repeat),
+      std::uint8_t (per_trigger - 1), std::uint8_t (images - 1)};
+}
+
+Bytes
+encode_times (const PatternTime &time)
+{
+  Bytes bytes;
+  append_le (bytes, time.exposure, 4);
+  append_le (bytes, time.exposure + time.dark, 4);
+  return bytes;
+}
+
+Result<Verdict>
+parse_verdict (ByteView data)
+{
+  struct Finding {
+    std::uint8_t bit;
+    bool error;
+    const char *text;
+  };
+  static constexpr std::array<Finding, 5> kFindings{{
+      {0, true, "exposure or period is out of range"},
+      {1, true, "a pattern number is out of range"},
+      {2, false, "trigger output 1 never falls"},
+      {3, false, "no black before a triggered pattern"},
+      {4, false, "less than 230 us of dark time"},
+  }};
+  constexpr unsigned kBusy = 1 << 7;
+  if (data.size () != 1)
+    return Error{"the verdict on the pattern table comes in " +
+                 std::to_string (data.size ()) + " bytes, not in 1"};
+  Verdict verdict{(data[0] & kBusy) != 0, true, ""};
+  for (const Finding &finding : kFindings) {
+    if ((data[0] >> finding.bit & 1) == 0)
+      continue;
+    verdict.good &= !finding.error;
+    verdict.text += (verdict.text.empty () ? "" : "; ");
+    verdict.text += finding.text;
+  }
+  return verdict;
+}
+
+} // namespace cexp::dlpc350

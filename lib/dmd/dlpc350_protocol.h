@@ -1,0 +1,90 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Commands and tables of the DLPC350 controller, as bytes. */
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "dmd/hid_packet.h"
+#include "dmd/pattern_timing.h"
+
+namespace cexp::dlpc350
+{
+
+constexpr HidCommand kPower{0x0200, "set the power mode"};
+constexpr HidCommand kVersion{0x0205, "read the firmware version"};
+constexpr HidCommand kHardwareStatus{0x1A0A, "read the hardware status"};
+constexpr HidCommand kMainStatus{0x1A0C, "read the main status"};
+constexpr HidCommand kDisplayMode{0x1A1B, "set the display mode"};
+constexpr HidCommand kTriggerOut1{0x1A1D, "set up trigger output 1"};
+constexpr HidCommand kTriggerOut2{0x1A1E, "set up trigger output 2"};
+constexpr HidCommand kSource{0x1A22, "choose the source of patterns"};
+constexpr HidCommand kTriggerMode{0x1A23, "choose the trigger mode"};
+constexpr HidCommand kRun{0x1A24, "start or stop the patterns"};
+constexpr HidCommand kTimes{0x1A29, "set exposure and period"};
+constexpr HidCommand kConfigure{0x1A31, "set up the pattern table"};
+constexpr HidCommand kMailboxOffset{0x1A32, "address the mailbox"};
+constexpr HidCommand kMailbox{0x1A33, "open or close the mailbox"};
+constexpr HidCommand kMailboxData{0x1A34, "fill the mailbox"};
+constexpr HidCommand kTriggerIn1{0x1A35, "set up trigger input 1"};
+constexpr HidCommand kValidate{0x1A1A, "validate the pattern table"};
+constexpr HidCommand kFlashImages{0x1A42, "count the images in flash"};
+
+constexpr std::uint8_t kModePattern = 1;
+constexpr std::uint8_t kRunStop = 0;
+constexpr std::uint8_t kRunStart = 2;
+constexpr std::uint8_t kMailboxClosed = 0;
+constexpr std::uint8_t kMailboxImages = 1;
+constexpr std::uint8_t kMailboxPatterns = 2;
+/** Main status. */
+constexpr std::uint8_t kSequencerRuns = 1 << 1;
+/** Hardware status: initialised. */
+constexpr std::uint8_t kInitialised = 1 << 0;
+
+constexpr int kMaxPatterns = 128;
+constexpr int kMaxImages = 64;
+/** Masks in the two buffers, shown without reading flash meanwhile. */
+constexpr int kPreloadedPlanes = 48;
+constexpr std::uint32_t kMinimumExposure = 235;
+/** A black mask takes this long to load: period and exposure differ by it at
+ * least, or not at all. */
+constexpr std::uint32_t kMinimumDark = 230;
+constexpr std::uint32_t kMaximumExposure = 200'000'000;
+
+enum class Source : std::uint8_t { video = 0, flash = 3 };
+/** What lets the table go on: the frames of the video, or a timer or the
+ * trigger input, entry by entry. */
+enum class TriggerMode : std::uint8_t { video = 0, timer_or_input = 1 };
+enum class Trigger : std::uint8_t {
+  timer = 0,
+  rising = 1,
+  falling = 2,
+  none = 3, ///< goes on from the pattern before
+};
+
+/** One line of the pattern table: a binary plane, all LEDs as they are. */
+struct Entry {
+  Trigger trigger = Trigger::timer;
+  int plane = 0;           ///< of the image: 0..7 green, 8..15 red, 16..23 blue
+  bool next_image = false; ///< takes the next image of the image table first
+  bool black_after = false;
+};
+/** 3 bytes each, end to end. */
+Bytes encode_entries (const std::vector<Entry> &entries);
+
+/** @p per_trigger  patterns from one pulse of trigger output 2 to the next. */
+Bytes encode_configuration (
+    int entries, bool repeat, int per_trigger, int images);
+/** Exposure and frame period, us. */
+Bytes encode_times (const PatternTime &time);
+
+/** What validation said. */
+struct Verdict {
+  bool busy;
+  bool good;        ///< no error; warnings do not keep it from starting
+  std::string text; ///< errors and warnings, "" where there are none
+};
+Result<Verdict> parse_verdict (ByteView data);
+
+} // namespace cexp::dlpc350

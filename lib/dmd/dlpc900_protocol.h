@@ -1,0 +1,122 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Commands, tables and images of the DLPC900 controller, as bytes. */
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "dmd/hid_packet.h"
+#include "dmd/pattern_timing.h"
+#include "dmd/plane_image.h"
+
+namespace cexp::dlpc900
+{
+
+using namespace std::chrono_literals;
+
+constexpr HidCommand kErrorCode{0x0100, "read the error code"};
+constexpr HidCommand kErrorText{0x0101, "read the error text"};
+constexpr HidCommand kPower{0x0200, "set the power mode", 10s};
+constexpr HidCommand kIdle{0x0201, "set the idle mode"};
+constexpr HidCommand kVersion{0x0205, "read the firmware version"};
+constexpr HidCommand kHardware{0x0206, "read the hardware type"};
+constexpr HidCommand kPark{0x0609, "park the mirrors"};
+constexpr HidCommand kHardwareStatus{0x1A0A, "read the hardware status"};
+constexpr HidCommand kMainStatus{0x1A0C, "read the main status"};
+constexpr HidCommand kDisplayMode{0x1A1B, "set the display mode"};
+constexpr HidCommand kTriggerOut1{0x1A1D, "set up trigger output 1"};
+constexpr HidCommand kTriggerOut2{0x1A1E, "set up trigger output 2"};
+constexpr HidCommand kRun{0x1A24, "start or stop the patterns"};
+constexpr HidCommand kLoadImage{0x1A2A, "announce an image"};
+constexpr HidCommand kImageData{0x1A2B, "send image data"};
+constexpr HidCommand kLoadSecond{0x1A2C, "announce an image's right half"};
+constexpr HidCommand kSecondData{0x1A2D, "send data of the right half"};
+constexpr HidCommand kConfigure{0x1A31, "take the pattern table", 10s};
+constexpr HidCommand kReorder{0x1A32, "set the order of patterns"};
+constexpr HidCommand kDefine{0x1A34, "define a pattern"};
+constexpr HidCommand kTriggerIn1{0x1A35, "set up trigger input 1"};
+constexpr HidCommand kMinimumExposures{0x1A42, "read the shortest exposures"};
+
+constexpr std::uint8_t kModeOnTheFly = 3;
+constexpr std::uint8_t kRunStop = 0;
+constexpr std::uint8_t kRunStart = 2;
+/** Main status. */
+constexpr std::uint8_t kSequencerRuns = 1 << 1;
+/** Hardware status: initialised; two controllers. */
+constexpr std::uint8_t kInitialised = 1 << 0;
+constexpr std::uint8_t kSecondController = 1 << 4;
+/** Image bytes in one message: what its buffer of 512 leaves. */
+constexpr std::size_t kImageChunk = 504;
+constexpr int kMaxEntries = 400;
+constexpr int kMaxImages = 18;
+
+/** What a board is, by the hardware type that it reports. */
+struct Board {
+  std::uint8_t type;
+  const char *name;
+  Extent size;
+  int planes;                     ///< that it holds
+  std::uint32_t minimum_exposure; ///< of a binary mask, us
+};
+/** Error for a type that is not in the table. */
+Result<Board> find_board (std::uint8_t type);
+
+/** One line of the pattern table. Exposure and dark time are below 2^24 us. */
+struct Entry {
+  std::uint16_t index = 0;
+  PatternTime time = {};
+  bool wait_for_trigger = false;
+  bool clear_after = true;
+  bool trigger_out_2 = true;
+  PlaneSlot plane = {};
+
+  bool operator== (const Entry &) const = default;
+};
+Bytes encode_entry (const Entry &entry);
+
+/** @p shown  patterns until it stops by itself; 0: for ever. */
+Bytes encode_configuration (int entries, std::uint32_t shown);
+/** The same, showing entry order[k] in place k. */
+Bytes encode_order (const std::vector<int> &order, std::uint32_t shown);
+
+/** Delays of a trigger output against the exposure, -20..20000 us. */
+Bytes encode_trigger_out (bool invert, int rising_us, int falling_us);
+/** @p delay_us  104 or more. */
+Bytes encode_trigger_in (int delay_us, bool falling);
+
+/** What the device is sent for one image: a header and the encoded pixels, or
+ * plain pixels where these are fewer. */
+Bytes encode_image (ImageView<const PlanePixel> image);
+/** Its size. */
+std::size_t encoded_size (ImageView<const PlanePixel> image);
+/** Data of kLoadImage for an image of @p size encoded bytes. */
+Bytes encode_load (int index, std::size_t size);
+/** Data of one kImageData with at most kImageChunk bytes. */
+Bytes encode_chunk (ByteView bytes);
+/** Packets in which an image of @p size encoded bytes comes, its announcement
+ * included. A full-speed interrupt endpoint takes one in 1 ms. */
+std::size_t image_packets (std::size_t size);
+
+/** What the error code that follows a refusal means. */
+std::string error_text (std::uint8_t code);
+
+/** Shortest exposures of 1 to 8 bit patterns, us. */
+Result<std::vector<std::uint32_t>> parse_minimum_exposures (ByteView data);
+
+struct Version {
+  int major = 0;
+  int minor = 0;
+  int patch = 0;
+  auto operator<=> (const Version &) const = default;
+  std::string text () const;
+};
+/** The application's version, first of the four of a version reply. */
+Result<Version> parse_version (ByteView data);
+
+/** After a change of mode, some firmware can leave a block of mirrors locked
+ * until they are parked and released (data sheet errata, DLPT028). */
+bool needs_park_cycle (const Version &version);
+
+} // namespace cexp::dlpc900

@@ -1,0 +1,62 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Slots as the whole microseconds in which controllers count. */
+#pragma once
+
+#include <vector>
+
+#include "base/result.h"
+#include "schedule/timing.h"
+
+namespace cexp
+{
+
+/** Who tells the other when an exposure starts. */
+enum class Master {
+  dmd,    ///< the DMD sends the camera one pulse per exposure
+  camera, ///< each exposure of the camera starts the masks of that exposure
+};
+
+/** One mask: shown for @p exposure, then dark for @p dark, microseconds. */
+struct PatternTime {
+  std::uint32_t exposure = 0;
+  std::uint32_t dark = 0;
+  bool operator== (const PatternTime &) const = default;
+};
+
+/** What a controller can keep to, in microseconds. */
+struct PatternLimits {
+  std::uint32_t minimum_exposure = 0;
+  std::uint32_t maximum_exposure = 0;
+  /** Shortest dark time other than none. */
+  std::uint32_t minimum_dark = 0;
+  /** From the camera's edge to light, with the camera as master. */
+  std::uint32_t trigger_delay = 0;
+  /** Dark time that the controller adds before it waits for the next edge. */
+  std::uint32_t trigger_dark = 0;
+};
+
+/**
+ * The times of the N masks of one exposure.
+ *
+ * Slot starts are rounded down to microseconds, so that errors do not add up.
+ * The switching time of the plan becomes dark time where the controller can
+ * keep it; a shorter one is the movement of the mirrors itself, within the
+ * exposure. With the DMD as master, the last mask lasts to the end of the
+ * frame period, rounded down: the camera follows, by 1 us a frame at most.
+ *
+ * Error with the numbers when a mask is too short or too long, or, with the
+ * camera as master, when its slots leave too little of the frame period for
+ * the trigger.
+ */
+Result<std::vector<PatternTime>> fit_patterns (
+    const SlotPlan &plan, const PatternLimits &limits, Master master);
+
+/**
+ * The same with one exposure and one dark time for all masks, for controllers
+ * that know no others; slots are rounded down. With the DMD as master, the
+ * slots must fill the frame period: such a controller knows no pause.
+ */
+Result<PatternTime> fit_equal_patterns (
+    const SlotPlan &plan, const PatternLimits &limits, Master master);
+
+} // namespace cexp

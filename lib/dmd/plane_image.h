@@ -1,0 +1,58 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Binary masks packed as the planes of 24-bit images. */
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "dmd/erle.h"
+#include "dmd/mirror_array.h"
+
+namespace cexp
+{
+
+constexpr int kPlanesPerImage = 24;
+
+/** Up to 24 masks of one array. */
+using PlaneImage = Image<PlanePixel>;
+
+/** Where a mask is: a plane of an image. */
+struct PlaneSlot {
+  int image = 0;
+  int plane = 0;
+  bool operator== (const PlaneSlot &) const = default;
+};
+
+/** The masks of a schedule as images, which hold as few bytes as they can. */
+struct PlaneSet {
+  std::vector<PlaneImage> images;
+  std::vector<PlaneSlot> masks; ///< of each mask of the schedule
+};
+
+/**
+ * The order in which the masks of @p schedule are packed into planes: sorted by
+ * the first pixel of the tile that they open. Where a code opens few elements
+ * at a time, an image then has masks of neighbouring rows of the tile, and its
+ * other rows are dark and cost nothing; in the order of the slots, a
+ * bit-reversed schedule would light every row of every image.
+ */
+std::vector<int> plane_order (const Schedule &schedule);
+
+/** Renders the masks of @p schedule, 24 an image, planes filled from 0. */
+PlaneSet render_planes (
+    const Schedule &schedule, const Placement &placement, Extent size);
+
+/** Columns [x, x + width) of @p image. */
+ImageView<const PlanePixel> columns (
+    ImageView<const PlanePixel> image, int x, int width);
+
+/** A digest of the pixels (128 bits, for equality among a device's images; no
+ * protection against forgery). */
+struct PlaneDigest {
+  std::uint64_t high = 0;
+  std::uint64_t low = 0;
+  bool operator== (const PlaneDigest &) const = default;
+};
+PlaneDigest digest (ImageView<const PlanePixel> image);
+
+} // namespace cexp

@@ -1,0 +1,309 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The bytes that DLPC350 and DLPC900 are sent, and what is read in replies. */
+#include <gtest/gtest.h>
+
+#include "dmd/dlpc350_protocol.h"
+#include "dmd/dlpc900_protocol.h"
+#include "hex.h"
+#include "spld_decoder.h"
+
+using namespace cexp;
+using namespace cexp::test;
+
+namespace
+{
+
+/** The bytes of a request, without the zeros of its last packet. */
+std::string
+request (HidKind kind, int sequence, const HidCommand &command, Bytes data)
+{
+  const Bytes packets =
+      encode_request (kind, std::uint8_t (sequence), command.word, data);
+  return packet_hex (packets, data.size () + 6);
+}
+
+std::string
+write (int sequence, const HidCommand &command, Bytes data)
+{
+  return request (HidKind::write, sequence, command, std::move (data));
+}
+
+std::string
+read (int sequence, const HidCommand &command)
+{
+  return request (HidKind::read, sequence, command, {});
+}
+
+Bytes
+reply_packet (const std::string &head)
+{
+  Bytes packet = from_hex (head);
+  packet.resize (kHidPacketSize);
+  return packet;
+}
+
+/** One plane lit everywhere, all others dark. */
+PlaneImage
+uniform_image (int width, int height, PlanePixel pixel)
+{
+  PlaneImage image (width, height);
+  for (int y = 0; y < height; y++)
+    std::fill_n (image.view ().row (y), width, pixel);
+  return image;
+}
+
+} // namespace
+
+TEST (HidRequest, FillsWholePacketsWithZeros)
+{
+  for (const std::size_t data : {0u, 57u, 58u, 59u, 122u, 123u, 506u}) {
+    const Bytes packets =
+        encode_request (HidKind::write, 1, 0x1A34, Bytes (data, 0xFF));
+    EXPECT_EQ (packets.size (), (6 + data + 63) / 64 * 64);
+    EXPECT_EQ (std::count (packets.begin () + 6, packets.end (), 0xFF),
+        std::ptrdiff_t (data));
+    EXPECT_EQ (read_le (packets, 2, 2), data + 2);
+  }
+}
+
+TEST (HidReply, IsParsedFieldByField)
+{
+  const auto head = parse_reply_head (reply_packet ("C0 07 04 00 01 02 03 04"));
+  ASSERT_TRUE (head.ok ());
+  EXPECT_EQ (head->sequence, 7);
+  EXPECT_FALSE (head->refused);
+  EXPECT_EQ (head->length, 4u);
+  EXPECT_EQ (head->packets (), 1u);
+}
+
+TEST (HidReply, Bit5OfTheFirstByteIsARefusal)
+{
+  EXPECT_TRUE (parse_reply_head (reply_packet ("60 07 00 00"))->refused);
+  EXPECT_FALSE (
+      parse_reply_head (reply_packet ("40 07 01 00 00 00 20"))->refused);
+}
+
+TEST (HidReply, LongOnesComeInMorePackets)
+{
+  EXPECT_EQ (parse_reply_head (reply_packet ("C0 01 3C 00"))->packets (), 1u);
+  EXPECT_EQ (parse_reply_head (reply_packet ("C0 01 3D 00"))->packets (), 2u);
+  EXPECT_EQ (parse_reply_head (reply_packet ("C0 01 80 00"))->packets (), 3u);
+}
+
+TEST (HidReply, WrongOnesAreErrors)
+{
+  EXPECT_FALSE (parse_reply_head (Bytes (63, 0)).ok ());
+  EXPECT_FALSE (parse_reply_head ({}).ok ());
+  EXPECT_TRUE (parse_reply_head (reply_packet ("C0 01 FC 01")).ok ());
+  EXPECT_FALSE (parse_reply_head (reply_packet ("C0 01 FD 01")).ok ());
+}
+
+TEST (Dlpc350Bytes, AreThoseOfTheDocument)
+{
+  using namespace dlpc350;
+  EXPECT_EQ (read (1, kVersion), "C0 01 02 00 05 02");
+  EXPECT_EQ (read (2, kHardwareStatus), "C0 02 02 00 0A 1A");
+  EXPECT_EQ (read (2, kMainStatus), "C0 02 02 00 0C 1A");
+  EXPECT_EQ (write (0x13, kRun, {kRunStop}), "40 13 03 00 24 1A 00");
+  EXPECT_EQ (write (0x13, kRun, {kRunStart}), "40 13 03 00 24 1A 02");
+  EXPECT_EQ (write (2, kDisplayMode, {kModePattern}), "40 02 03 00 1B 1A 01");
+  EXPECT_EQ (write (3, kSource, {std::uint8_t (Source::flash)}),
+      "40 03 03 00 22 1A 03");
+  EXPECT_EQ (write (3, kSource, {std::uint8_t (Source::video)}),
+      "40 03 03 00 22 1A 00");
+  EXPECT_EQ (write (4, kConfigure, encode_configuration (24, true, 24, 1)),
+      "40 04 06 00 31 1A 17 01 17 00");
+  EXPECT_EQ (
+      write (5, kTriggerMode, {std::uint8_t (TriggerMode::timer_or_input)}),
+      "40 05 03 00 23 1A 01");
+  EXPECT_EQ (write (6, kTimes, encode_times ({235, 0})),
+      "40 06 0A 00 29 1A EB 00 00 00 EB 00 00 00");
+  EXPECT_EQ (write (6, kTimes, encode_times ({1000, 230})),
+      "40 06 0A 00 29 1A E8 03 00 00 CE 04 00 00");
+  EXPECT_EQ (write (7, kMailbox, {kMailboxImages}), "40 07 03 00 33 1A 01");
+  EXPECT_EQ (write (8, kMailboxOffset, {0}), "40 08 03 00 32 1A 00");
+  EXPECT_EQ (write (9, kMailboxData, {0}), "40 09 03 00 34 1A 00");
+  EXPECT_EQ (write (10, kMailbox, {kMailboxClosed}), "40 0A 03 00 33 1A 00");
+  EXPECT_EQ (write (11, kMailbox, {kMailboxPatterns}), "40 0B 03 00 33 1A 02");
+  EXPECT_EQ (write (0x11, kValidate, {0}), "40 11 03 00 1A 1A 00");
+  EXPECT_EQ (read (0x12, kValidate), "C0 12 02 00 1A 1A");
+  EXPECT_EQ (write (0x14, kPower, {0}), "40 14 03 00 00 02 00");
+  EXPECT_EQ (write (0x16, kTriggerOut1, {0, 0xBB, 0xBB}),
+      "40 16 05 00 1D 1A 00 BB BB");
+  EXPECT_EQ (
+      write (0x16, kTriggerIn1, {0, 0, 0, 0}), "40 16 06 00 35 1A 00 00 00 00");
+}
+
+TEST (Dlpc350Bytes, PatternEntries)
+{
+  using namespace dlpc350;
+  EXPECT_EQ (write (0x0D, kMailboxData,
+                 encode_entries ({{Trigger::timer, 0, true}, {}})),
+      "40 0D 08 00 34 1A 00 71 04 00 71 00");
+  EXPECT_EQ (to_hex (encode_entries ({{Trigger::timer, 1}})), "04 71 00");
+  EXPECT_EQ (
+      to_hex (encode_entries ({{Trigger::rising, 0, true, true}})), "01 71 06");
+  EXPECT_EQ (to_hex (encode_entries ({{Trigger::none, 1}})), "07 71 00");
+}
+
+TEST (Dlpc350Bytes, TwentyFourEntriesTakeTwoPackets)
+{
+  using namespace dlpc350;
+  std::vector<Entry> entries;
+  for (int plane = 0; plane < 24; plane++)
+    entries.push_back ({Trigger::timer, plane, plane == 0});
+  EXPECT_EQ (write (0x0D, kMailboxData, encode_entries (entries)),
+      "40 0D 4A 00 34 1A 00 71 04 04 71 00 08 71 00 0C 71 00 10 71 00 14 71 "
+      "00 18 71 00 1C 71 00 20 71 00 24 71 00 28 71 00 2C 71 00 30 71 00 34 "
+      "71 00 38 71 00 3C 71 00 40 71 00 44 71 00 48 71 00 4C 71 00 50 71 00 "
+      "54 71 00 58 71 00 5C 71 00");
+}
+
+TEST (Dlpc350Verdict, ErrorsAndWarningsAreToldApart)
+{
+  const auto verdict = [] (std::uint8_t byte) {
+    return *dlpc350::parse_verdict (Bytes{byte});
+  };
+  EXPECT_TRUE (verdict (0).good);
+  EXPECT_EQ (verdict (0).text, "");
+  EXPECT_TRUE (verdict (0x80).busy);
+  EXPECT_TRUE (verdict (0x08).good);
+  EXPECT_EQ (verdict (0x08).text, "no black before a triggered pattern");
+  EXPECT_FALSE (verdict (0x01).good);
+  EXPECT_FALSE (verdict (0x02).good);
+  EXPECT_EQ (verdict (0x11).text,
+      "exposure or period is out of range; less than 230 us of dark time");
+  EXPECT_FALSE (dlpc350::parse_verdict (Bytes{}).ok ());
+  EXPECT_FALSE (dlpc350::parse_verdict (Bytes{0, 0}).ok ());
+}
+
+TEST (Dlpc900Bytes, AreThoseOfTheDocument)
+{
+  using namespace dlpc900;
+  EXPECT_EQ (read (1, kVersion), "C0 01 02 00 05 02");
+  EXPECT_EQ (read (0x12, kHardware), "C0 12 02 00 06 02");
+  EXPECT_EQ (read (2, kMainStatus), "C0 02 02 00 0C 1A");
+  EXPECT_EQ (read (0x12, kErrorCode), "C0 12 02 00 00 01");
+  EXPECT_EQ (read (0x12, kErrorText), "C0 12 02 00 01 01");
+  EXPECT_EQ (read (0x12, kMinimumExposures), "C0 12 02 00 42 1A");
+  EXPECT_EQ (write (0x11, kRun, {kRunStop}), "40 11 03 00 24 1A 00");
+  EXPECT_EQ (write (0x11, kRun, {kRunStart}), "40 11 03 00 24 1A 02");
+  EXPECT_EQ (write (2, kDisplayMode, {kModeOnTheFly}), "40 02 03 00 1B 1A 03");
+  EXPECT_EQ (write (5, kConfigure, encode_configuration (2, 0)),
+      "40 05 08 00 31 1A 02 00 00 00 00 00");
+  EXPECT_EQ (write (5, kConfigure, encode_configuration (2, 2)),
+      "40 05 08 00 31 1A 02 00 02 00 00 00");
+  EXPECT_EQ (write (6, kLoadImage, encode_load (0, 4372)),
+      "40 06 08 00 2A 1A 00 00 14 11 00 00");
+  EXPECT_EQ (write (0x12, kTriggerIn1, encode_trigger_in (105, false)),
+      "40 12 05 00 35 1A 69 00 00");
+  EXPECT_EQ (write (0x12, kTriggerOut1, encode_trigger_out (false, 0, 0)),
+      "40 12 07 00 1D 1A 00 00 00 00 00");
+  EXPECT_EQ (write (0x12, kTriggerOut1, encode_trigger_out (false, -20, 0)),
+      "40 12 07 00 1D 1A 00 EC FF 00 00");
+  EXPECT_EQ (write (0x12, kIdle, {1}), "40 12 03 00 01 02 01");
+  EXPECT_EQ (write (0x12, kPark, {1}), "40 12 03 00 09 06 01");
+}
+
+TEST (Dlpc900Bytes, PatternEntries)
+{
+  using namespace dlpc900;
+  EXPECT_EQ (write (3, kDefine, encode_entry ({0, {105, 0}})),
+      "40 03 0E 00 34 1A 00 00 69 00 00 71 00 00 00 00 00 00");
+  EXPECT_EQ (
+      write (4, kDefine,
+          encode_entry ({.index = 1, .time = {105, 0}, .plane = {0, 1}})),
+      "40 04 0E 00 34 1A 01 00 69 00 00 71 00 00 00 00 00 08");
+  EXPECT_EQ (write (3, kDefine,
+                 encode_entry ({.time = {105, 0}, .wait_for_trigger = true})),
+      "40 03 0E 00 34 1A 00 00 69 00 00 F1 00 00 00 00 00 00");
+  EXPECT_EQ (
+      write (3, kDefine,
+          encode_entry ({.index = 24, .time = {105, 0}, .plane = {1, 0}})),
+      "40 03 0E 00 34 1A 18 00 69 00 00 71 00 00 00 00 01 00");
+  EXPECT_EQ (to_hex (encode_entry ({.index = 0x102,
+                 .time = {0x123456, 0x654321},
+                 .clear_after = false,
+                 .trigger_out_2 = false,
+                 .plane = {17, 23}})),
+      "02 01 56 34 12 70 21 43 65 01 11 B8");
+}
+
+TEST (Dlpc900Image, IsTheDocumentsPackets)
+{
+  using namespace dlpc900;
+  const Bytes image = encode_image (uniform_image (1920, 1080, 1).view ());
+  ASSERT_EQ (image.size (), 4372u);
+  const Bytes first = encode_request (HidKind::post, 7, kImageData.word,
+      encode_chunk (ByteView (image).first (kImageChunk)));
+  ASSERT_EQ (first.size (), kHidMessageSize);
+  EXPECT_EQ (to_hex (ByteView (first).first (64)),
+      "00 07 FC 01 2B 1A F8 01 53 70 6C 64 80 07 38 04 E4 10 00 00 FF FF FF FF "
+      "FF FF FF FF 00 00 00 00 01 02 01 00 00 01 00 00 00 00 00 00 00 00 00 00 "
+      "00 00 00 00 00 00 00 00 80 0F 00 00 01 00 01 80");
+  EXPECT_EQ (
+      to_hex (ByteView (first).subspan (64, 8)), "0F 00 01 80 0F 00 01 80");
+  const Bytes last = encode_request (HidKind::post, 0x10, kImageData.word,
+      encode_chunk (ByteView (image).subspan (8 * kImageChunk)));
+  EXPECT_EQ (last.size (), 6 * kHidPacketSize);
+  EXPECT_EQ (to_hex (ByteView (last).first (12)),
+      "00 10 58 01 2B 1A 54 01 0F 00 01 80");
+  EXPECT_EQ (image_packets (image.size ()), 1u + 8 * 8 + 6);
+}
+
+TEST (Dlpc900Image, IsPlainWhereThatIsShorter)
+{
+  using namespace dlpc900;
+  // Literals with a header for each row: 3 * 7 + 2 against rows of 32 bytes.
+  // Only widths whose rows need no padding are shorter plain.
+  PlaneImage image (16, 4);
+  for (int y = 0; y < 4; y++)
+    for (int x = 0; x < 16; x++)
+      image.at (x, y) = PlanePixel (100 * y + x);
+  const Bytes bytes = encode_image (image.view ());
+  EXPECT_EQ (bytes[25], 0);
+  EXPECT_EQ (bytes.size (), 48u + 16 * 4 * 3);
+  EXPECT_EQ (bytes.size (), encoded_size (image.view ()));
+  EXPECT_EQ (decode_spld (bytes), image);
+}
+
+TEST (Dlpc900Replies, MinimumExposures)
+{
+  using dlpc900::parse_minimum_exposures;
+  const Bytes table =
+      from_hex ("69 00 30 01 8A 01 37 03 BF 04 CF 05 CE 07 CE 0F");
+  const std::vector<std::uint32_t> expected{
+      105, 304, 394, 823, 1215, 1487, 1998, 4046};
+  EXPECT_EQ (*parse_minimum_exposures (table), expected);
+  Bytes extended = table;
+  extended.resize (32);
+  EXPECT_EQ (*parse_minimum_exposures (extended), expected);
+  EXPECT_FALSE (parse_minimum_exposures (ByteView (table).first (15)).ok ());
+  EXPECT_FALSE (parse_minimum_exposures (Bytes (16, 0)).ok ());
+}
+
+TEST (Dlpc900Replies, Version)
+{
+  using namespace dlpc900;
+  Bytes reply = from_hex ("07 00 02 04");
+  reply.resize (16);
+  EXPECT_EQ (parse_version (reply)->text (), "4.2.7");
+  EXPECT_FALSE (parse_version (ByteView (reply).first (4)).ok ());
+}
+
+TEST (Dlpc900Replies, FirmwareThatLocksBlocksIsParkedAfterAChangeOfMode)
+{
+  using dlpc900::needs_park_cycle;
+  EXPECT_FALSE (needs_park_cycle ({4, 0, 0})); // has no such command
+  EXPECT_TRUE (needs_park_cycle ({4, 1, 3}));
+  EXPECT_TRUE (needs_park_cycle ({4, 2, 0}));
+  EXPECT_TRUE (needs_park_cycle ({5, 0, 0}));
+  EXPECT_FALSE (needs_park_cycle ({5, 1, 0}));
+}
+
+TEST (Dlpc900Replies, ErrorsHaveTheirNames)
+{
+  EXPECT_EQ (dlpc900::error_text (5),
+      "command not allowed in the current mode (error 5)");
+  EXPECT_EQ (dlpc900::error_text (77), "error 77");
+}

@@ -1,0 +1,248 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Mirrors of orthogonal and diamond arrays, their groups, and schedules on
+ * them. */
+#include <array>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include <gtest/gtest.h>
+
+#include "dmd/mirror_array.h"
+#include "dmd/plane_image.h"
+
+using namespace cexp;
+
+namespace
+{
+
+constexpr Extent kSmallDiamond{12, 24};
+
+double
+distance (MirrorPoint a, MirrorPoint b)
+{
+  return std::hypot (a.x - b.x, a.y - b.y);
+}
+
+/** Mirrors of one 2x2 group of the tile laid in @p layout, by the pixel of the
+ * group's corner. */
+std::map<std::pair<int, int>, std::vector<Offset>>
+groups_of (MirrorLayout layout)
+{
+  std::map<std::pair<int, int>, std::vector<Offset>> groups;
+  for (int row = 0; row < kSmallDiamond.height; row++)
+    for (int column = 0; column < kSmallDiamond.width; column++) {
+      const Offset pixel = tile_pixel (layout, column, row);
+      groups[{pixel.x - floor_mod (pixel.x, 2),
+                 pixel.y - floor_mod (pixel.y, 2)}]
+          .push_back ({column, row});
+    }
+  return groups;
+}
+
+MirrorPoint
+diamond_position (Offset address)
+{
+  return mirror_position (Array::diamond, address.x, address.y);
+}
+
+Schedule
+parsed (const char *preset)
+{
+  const auto schedule = Schedule::parse (preset);
+  EXPECT_TRUE (schedule.ok ()) << schedule.error ().message;
+  return *schedule;
+}
+
+} // namespace
+
+TEST (MirrorPosition, RowsOfADiamondLieHalfAColumnApartAndAreShifted)
+{
+  const MirrorPoint even = mirror_position (Array::diamond, 3, 4);
+  EXPECT_EQ (even.x, 3.0);
+  EXPECT_EQ (even.y, 2.0);
+  const MirrorPoint odd = mirror_position (Array::diamond, 3, 5);
+  EXPECT_EQ (odd.x, 3.5);
+  EXPECT_EQ (odd.y, 2.5);
+  EXPECT_EQ (mirror_position (Array::diamond, 3, 5, -0.5).x, 2.5);
+  EXPECT_EQ (mirror_position (Array::orthogonal, 3, 5).x, 3.0);
+  EXPECT_EQ (mirror_position (Array::orthogonal, 3, 5).y, 5.0);
+}
+
+TEST (Lattice, IsTheDocumentsFormulaAndItsInverse)
+{
+  for (int row = 0; row < 20; row++)
+    for (int column = 0; column < 20; column++) {
+      const LatticePoint point = lattice_of (column, row);
+      EXPECT_EQ (point.u, column + int (std::ceil (row / 2.0)));
+      EXPECT_EQ (point.v, column - int (std::floor (row / 2.0)));
+      EXPECT_EQ (address_of (point), (Offset{column, row}));
+      const MirrorPoint at = diamond_position ({column, row});
+      EXPECT_EQ (at.x, (point.u + point.v) / 2.0);
+      EXPECT_EQ (at.y, (point.u - point.v) / 2.0);
+    }
+}
+
+TEST (Lattice, NeighboursShareAnEdge)
+{
+  const double edge = std::sqrt (0.5);
+  for (const Offset address : {Offset{5, 8}, Offset{5, 9}}) {
+    const LatticePoint at = lattice_of (address.x, address.y);
+    for (const LatticePoint next :
+        {LatticePoint{at.u + 1, at.v}, LatticePoint{at.u - 1, at.v},
+            LatticePoint{at.u, at.v + 1}, LatticePoint{at.u, at.v - 1}})
+      EXPECT_DOUBLE_EQ (distance (diamond_position (address),
+                            diamond_position (address_of (next))),
+          edge);
+  }
+}
+
+TEST (GroupsOnADiamond, AddressBlocksAreParallelograms)
+{
+  const auto groups = groups_of (MirrorLayout::address);
+  EXPECT_EQ (groups.size (), std::size_t (12 / 2 * 24 / 2));
+  const auto &group = groups.at ({2, 4});
+  EXPECT_EQ (group, (std::vector<Offset>{{2, 4}, {3, 4}, {2, 5}, {3, 5}}));
+  double x = 0, y = 0;
+  for (const Offset address : group) {
+    x += diamond_position (address).x / 4;
+    y += diamond_position (address).y / 4;
+  }
+  EXPECT_DOUBLE_EQ (x - 2, 0.75);
+  EXPECT_DOUBLE_EQ (y - 2, 0.25);
+}
+
+TEST (GroupsOnADiamond, LatticeBlocksAreSquaresOfFourNeighbours)
+{
+  int whole = 0;
+  for (const auto &[corner, group] : groups_of (MirrorLayout::lattice)) {
+    if (group.size () != 4)
+      continue; // cut by the border
+    whole++;
+    std::multiset<double> distances;
+    std::map<int, int> mirrors_in_row;
+    for (const Offset a : group) {
+      mirrors_in_row[a.y]++;
+      for (const Offset b : group)
+        distances.insert (
+            distance (diamond_position (a), diamond_position (b)));
+    }
+    EXPECT_EQ (distances.count (0.0), 4u);
+    EXPECT_EQ (distances.count (std::sqrt (0.5)), 8u) << "four edges";
+    EXPECT_EQ (distances.count (1.0), 4u) << "two diagonals";
+    ASSERT_EQ (mirrors_in_row.size (), 3u);
+    EXPECT_EQ (std::next (mirrors_in_row.begin ())->second, 2);
+  }
+  EXPECT_GT (whole, 40);
+}
+
+TEST (GroupsOnADiamond, CellsAreFourRowsOfTwoMirrors)
+{
+  const auto groups = groups_of (MirrorLayout::cell);
+  EXPECT_EQ (groups.size (), std::size_t (12 / 2 * 24 / 4));
+  for (const auto &[corner, group] : groups) {
+    ASSERT_EQ (group.size (), 8u);
+    std::map<std::pair<int, int>, int> per_label;
+    for (const Offset address : group) {
+      const Offset pixel =
+          tile_pixel (MirrorLayout::cell, address.x, address.y);
+      per_label[{floor_mod (pixel.x, 2), floor_mod (pixel.y, 2)}]++;
+      EXPECT_EQ (address.x / 2, group.front ().x / 2);
+      EXPECT_EQ (address.y / 4, group.front ().y / 4);
+    }
+    EXPECT_EQ (per_label.size (), 4u);
+    for (const auto &[label, mirrors] : per_label)
+      EXPECT_EQ (mirrors, 2);
+  }
+}
+
+TEST (Placement, RegionsAreReadAndChecked)
+{
+  EXPECT_EQ (*MirrorRegion::parse ("768x576+576+252"),
+      (MirrorRegion{{768, 576}, {576, 252}}));
+  EXPECT_EQ (*MirrorRegion::parse ("8x4"), (MirrorRegion{{8, 4}, {0, 0}}));
+  for (const char *wrong :
+      {"", "8", "8x", "x8", "0x4", "8x4+1", "8x4+1+-1", "8x4+1+1+1", "8x4 "})
+    EXPECT_FALSE (MirrorRegion::parse (wrong).ok ()) << wrong;
+
+  const auto check = [] (const char *region, Array array) {
+    return check_placement (
+        {MirrorLayout::address, *MirrorRegion::parse (region)}, array,
+        {912, 1140});
+  };
+  EXPECT_TRUE (check ("912x1140", Array::diamond).ok ());
+  EXPECT_FALSE (check ("912x1140+0+2", Array::diamond).ok ());
+  EXPECT_FALSE (check ("913x10", Array::diamond).ok ());
+  EXPECT_FALSE (check ("10x10+0+1", Array::diamond).ok ());
+  EXPECT_TRUE (check ("10x10+0+1", Array::orthogonal).ok ());
+  EXPECT_FALSE (
+      check_placement ({MirrorLayout::cell, {}}, Array::orthogonal, {8, 8})
+          .ok ());
+}
+
+class RenderedMirrors : public ::testing::TestWithParam<const char *>
+{
+};
+
+TEST_P (RenderedMirrors, InAddressOrderAreTheSchedulesMasks)
+{
+  const Schedule schedule = parsed (GetParam ());
+  Image<std::uint8_t> expected (40, 30), mirrors (40, 30);
+  for (int mask = 0; mask < schedule.masks (); mask++) {
+    render_mask (schedule, mask, expected.view ());
+    render_mirrors (schedule, mask, {}, mirrors.view ());
+    EXPECT_EQ (mirrors, expected) << mask;
+  }
+}
+
+TEST_P (RenderedMirrors, ComeBackFromTheirPlanes)
+{
+  const Schedule schedule = parsed (GetParam ());
+  for (const MirrorLayout layout :
+      {MirrorLayout::address, MirrorLayout::lattice, MirrorLayout::cell}) {
+    const Placement placement{layout, MirrorRegion{{30, 20}, {6, 4}}};
+    const PlaneSet set = render_planes (schedule, placement, {40, 30});
+    ASSERT_EQ (int (set.masks.size ()), schedule.masks ());
+    EXPECT_EQ (int (set.images.size ()), (schedule.masks () + 23) / 24);
+    Image<std::uint8_t> mirrors (40, 30), plane (40, 30);
+    for (int mask = 0; mask < schedule.masks (); mask++) {
+      const PlaneSlot slot = set.masks[std::size_t (mask)];
+      render_mirrors (schedule, mask, placement, mirrors.view ());
+      for (int y = 0; y < 30; y++)
+        for (int x = 0; x < 40; x++)
+          plane.at (x, y) =
+              set.images[std::size_t (slot.image)].at (x, y) >> slot.plane & 1;
+      ASSERT_EQ (plane, mirrors) << layout_text (layout) << " " << mask;
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P (OfSchedules, RenderedMirrors,
+    ::testing::Values ("sequential:2x2", "staircase:2x2,pilot=4",
+        "sequential:lattice:8/3,order=bit-reversal", "s-matrix:7x1",
+        "sequential:6x5,phase=3/1"));
+
+TEST (PlaneOrder, KeepsMasksOfNeighbouringRowsInOneImage)
+{
+  // 64 masks in 3 images: in the order of slots, a bit-reversed schedule would
+  // light all 8 rows of the tile in each of them.
+  const Schedule schedule = parsed ("sequential:8x8,order=bit-reversal");
+  const PlaneSet set = render_planes (schedule, {}, {64, 64});
+  ASSERT_EQ (set.images.size (), 3u);
+  for (const PlaneImage &image : set.images) {
+    int lit_rows = 0;
+    for (int y = 0; y < 8; y++)
+      lit_rows += image.at (0, y) != 0;
+    EXPECT_LE (lit_rows, 3);
+  }
+}
+
+TEST (PlaneDigest, TellsImagesApart)
+{
+  PlaneImage image (16, 16);
+  const PlaneDigest dark = digest (image.view ());
+  EXPECT_EQ (digest (PlaneImage (16, 16).view ()), dark);
+  EXPECT_NE (digest (PlaneImage (8, 32).view ()), dark);
+  image.at (15, 15) = 1;
+  EXPECT_NE (digest (image.view ()), dark);
+}

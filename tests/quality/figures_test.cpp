@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "figures.h"
+#include "footage.h"
 #include "metrics.h"
 #include "trial.h"
 
@@ -44,8 +45,8 @@ expect_same (const std::string &printed, const Cell &cell, int decimals)
 {
   if (cell.is_text ())
     EXPECT_EQ (printed, cell.text);
-  else if (std::isinf (cell.number))
-    EXPECT_EQ (printed, "exact");
+  else if (!std::isfinite (cell.number))
+    EXPECT_EQ (printed, std::isinf (cell.number) ? "exact" : "-");
   else
     EXPECT_NEAR (
         std::stod (printed), cell.number, 1.5 * std::pow (10.0, -decimals));
@@ -89,6 +90,34 @@ TEST (QualityDocument, SaysWhatAStillSceneAndAFlatGreyShow)
 {
   expect_documented (still_table (synthetic ()));
   expect_documented (light_table ());
+}
+
+/* The clips come from elsewhere; see tests/quality/run. */
+TEST (QualityDocument, AgreesWithTheIndependentCalculation)
+{
+  auto clips = read_clips (QUALITY_CLIPS, 8);
+  if (!clips)
+    GTEST_SKIP () << clips.error ().message;
+  std::erase_if (*clips, [] (const Scene &scene) {
+    return scene.name != "traffic48" && scene.name != "runner40";
+  });
+  if (clips->size () != 2)
+    GTEST_SKIP () << "the clips traffic48 and runner40 are not there";
+
+  const Table table = comparison_table (*clips);
+  expect_documented (table);
+  constexpr std::size_t kHere = 3, kThere = 5;
+  for (const auto &row : table.rows) {
+    SCOPED_TRACE (row[0].text + " " + row[1].text + " " + row[2].text);
+    for (const std::size_t truth : {0, 1}) {
+      const double here = row[kHere + truth].number;
+      const double there = row[kThere + truth].number;
+      if (std::isinf (there))
+        EXPECT_TRUE (std::isinf (here));
+      else
+        EXPECT_NEAR (here, there, 0.06);
+    }
+  }
 }
 
 Way

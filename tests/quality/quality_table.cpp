@@ -90,64 +90,66 @@ parse (int argc, char **argv, Options &options)
   return true;
 }
 
-void
-skip (const std::string &what, const std::string &remedy)
-{
-  std::cerr << "skipped: " << what << "; " << remedy << '\n';
-}
+struct Scenes {
+  std::vector<Scene> all;
+  std::vector<Scene> compared; ///< those of the comparison, or none
+  bool complete = true;        ///< all that the document shows are there
 
-/* Every scene there is, with as many slots as make whole coded frames. */
-std::vector<Scene>
-all_scenes (const Options &options)
+  void skip (const std::string &what, const std::string &remedy)
+  {
+    std::cerr << "skipped: " << what << "; " << remedy << '\n';
+    complete = false;
+  }
+};
+
+/* What is to be had, as many slots of it as make whole coded frames. */
+Scenes
+find_scenes (const Options &options)
 {
-  std::vector<Scene> scenes = {synthetic_scene (256, 192, options.frames)};
+  Scenes scenes;
+  scenes.all.push_back (synthetic_scene (256, 192, options.frames));
   if (auto video = read_video (options.video, options.frames))
-    scenes.push_back (std::move (*video));
+    scenes.all.push_back (std::move (*video));
   else
-    skip (video.error ().message,
+    scenes.skip (video.error ().message,
         "install opencv-doc, or name a video with --video");
   if (options.clips.empty ())
-    skip ("no folder of clips", "name one with --clips");
+    scenes.skip ("no folder of clips", "name one with --clips");
   else if (auto clips = read_clips (options.clips, options.frames))
-    std::ranges::move (*clips, std::back_inserter (scenes));
+    std::ranges::move (*clips, std::back_inserter (scenes.all));
   else
-    skip (clips.error ().message, "name another folder with --clips");
-  std::erase_if (scenes, [] (Scene &scene) {
+    scenes.skip (clips.error ().message, "name another folder with --clips");
+
+  std::erase_if (scenes.all, [&] (Scene &scene) {
     scene.frames.resize (scene.frames.size () / kLeastFrames * kLeastFrames);
     if (scene.frames.empty ())
-      skip (scene.name, "it has less than 8 frames");
+      scenes.skip (scene.name, "it has fewer than 8 frames");
     return scene.frames.empty ();
   });
+  std::ranges::copy_if (scenes.all, std::back_inserter (scenes.compared),
+      [] (const Scene &scene) {
+        return scene.name == "traffic48" || scene.name == "runner40";
+      });
+  if (scenes.compared.size () != 2) {
+    scenes.compared.clear ();
+    scenes.skip ("the comparison", "it needs the clips traffic48 and runner40");
+  }
   return scenes;
 }
 
-/* The two clips of the comparison; empty unless both are there. */
-std::vector<Scene>
-compared_scenes (const std::vector<Scene> &scenes)
-{
-  std::vector<Scene> both;
-  for (const Scene &scene : scenes) {
-    if (scene.name == "traffic48" || scene.name == "runner40")
-      both.push_back (scene);
-  }
-  return both.size () == 2 ? both : std::vector<Scene>{};
-}
-
 std::vector<Table>
-all_tables (const std::vector<Scene> &scenes, const Progress &progress)
+all_tables (const Scenes &scenes, const Progress &progress)
 {
-  std::vector<Table> tables = method_tables (scenes, progress);
-  tables.push_back (mislabelled_table (scenes, progress));
+  std::vector<Table> tables = method_tables (scenes.all, progress);
+  tables.push_back (mislabelled_table (scenes.all, progress));
   std::ranges::move (
-      leak_tables (scenes, progress), std::back_inserter (tables));
+      leak_tables (scenes.all, progress), std::back_inserter (tables));
   std::ranges::move (
-      shift_tables (scenes, progress), std::back_inserter (tables));
-  tables.push_back (still_table (scenes));
+      shift_tables (scenes.all, progress), std::back_inserter (tables));
+  tables.push_back (still_table (scenes.all));
   tables.push_back (light_table ());
-  if (const auto compared = compared_scenes (scenes); !compared.empty ())
-    tables.push_back (comparison_table (compared));
-  else
-    skip ("the comparison", "it needs the clips traffic48 and runner40");
+  if (!scenes.compared.empty ())
+    tables.push_back (comparison_table (scenes.compared));
   return tables;
 }
 
@@ -175,7 +177,12 @@ main (int argc, char **argv)
     return 2;
 
   const bool show = !options.quiet && isatty (STDERR_FILENO) != 0;
-  const auto scenes = all_scenes (options);
+  const Scenes scenes = find_scenes (options);
+  if (!options.document.empty () && !scenes.complete) {
+    std::cerr << options.document
+              << " is of all scenes, and stays as it is without some\n";
+    return 1;
+  }
   const auto tables = all_tables (scenes, [show] (const std::string &what) {
     if (show)
       std::cerr << "\r\033[K" << what << std::flush;

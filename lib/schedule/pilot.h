@@ -18,8 +18,10 @@ namespace cexp
  * those that come early columns at its start.
  *
  * One slot a column, because that is what a sensor set for a one-hot code can
- * take. The columns repeat; which masks they have grows finer towards the
- * borders of the two frames, where a slip shows first.
+ * take. The columns repeat; in each turn their masks ascend, so that lit
+ * columns lie side by side and the blur of a lens matters at two places only.
+ * The masks lie close at the borders of the two frames, where a slip shows
+ * first.
  */
 constexpr int kPilotColumns = 32;
 
@@ -32,9 +34,9 @@ pilot_mask (int column, int slots)
   const int frame = column / (2 * kSide);
   const int place = column % (2 * kSide);
   const bool at_start = place < kSide;
-  const int turn = at_start ? kSide - 1 - place : place - kSide;
+  const int from_border = at_start ? place : 2 * kSide - 1 - place;
   const int depths = std::bit_width (unsigned ((slots - 1) / 2 + 1));
-  const int depth = (1 << (turn % depths)) - 1;
+  const int depth = (1 << (from_border * depths / kSide)) - 1;
   return frame * slots + (at_start ? depth : slots - 1 - depth);
 }
 

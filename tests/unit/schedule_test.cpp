@@ -209,7 +209,7 @@ TEST (Mask, WritesNothingOutsideItsRows)
 TEST (Pilot, ColumnsOfTheTwoByTwoSchedule)
 {
   const Schedule schedule = preset ("sequential:2x2,pilot=1");
-  const std::string open_in = "10101010323232325454545476767676";
+  const std::string open_in = "00001111222233334444555566667777";
   for (int mask = 0; mask < 8; mask++) {
     const auto image = mask_of (schedule, mask, {40, 5});
     for (int x = 0; x < 40; x++)

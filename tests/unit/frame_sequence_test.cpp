@@ -1,0 +1,133 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Numbers of frames from their times. */
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "clock/frame_sequence.h"
+
+using namespace cexp;
+
+namespace
+{
+
+constexpr Nanoseconds kMs = 1'000'000;
+
+struct Expected {
+  Nanoseconds time;
+  Arrival arrival;
+  std::uint64_t number;
+  std::uint64_t lost;
+};
+
+void
+expect_steps (FrameSequence &sequence, const std::vector<Expected> &frames,
+    bool reverse = false)
+{
+  for (const Expected &frame : frames) {
+    SCOPED_TRACE (frame.time);
+    const FrameStep step = sequence.take (frame.time, reverse);
+    EXPECT_EQ (step.arrival, frame.arrival);
+    EXPECT_EQ (step.number, frame.number);
+    EXPECT_EQ (step.lost, frame.lost);
+  }
+}
+
+} // namespace
+
+TEST (FrameSequence, NumbersEveryFrameOfAnHourExactly)
+{
+  for (const FrameRate rate : {FrameRate{25, 1}, FrameRate{30000, 1001}}) {
+    FrameSequence sequence (rate);
+    const std::int64_t frames = 3600LL * rate.num / rate.den;
+    for (std::int64_t k = 0; k < frames; k++) {
+      const FrameStep step = sequence.take (rate.time_of (k));
+      ASSERT_EQ (step.arrival, k == 0 ? Arrival::first : Arrival::next);
+      ASSERT_EQ (step.number, std::uint64_t (k));
+    }
+  }
+}
+
+TEST (FrameSequence, AStepOfMoreThanOneAndAHalfPeriodsIsALoss)
+{
+  FrameSequence sequence ({25, 1});
+  expect_steps (
+      sequence, {{0, Arrival::first, 0, 0}, {60 * kMs, Arrival::next, 1, 0},
+                    {120 * kMs + 1, Arrival::after_loss, 3, 1},
+                    {200 * kMs, Arrival::after_loss, 5, 1},
+                    {1200 * kMs, Arrival::after_loss, 30, 24},
+                    {1240 * kMs, Arrival::next, 31, 0}});
+}
+
+TEST (FrameSequence, CountsLossesExactlyOverALongGap)
+{
+  const FrameRate rate{30000, 1001};
+  FrameSequence sequence (rate);
+  sequence.take (0);
+  const FrameStep step = sequence.take (rate.time_of (100'000));
+  EXPECT_EQ (step.number, 100'000u);
+  EXPECT_EQ (step.lost, 99'999u);
+}
+
+TEST (FrameSequence, JitterOfAnEighthIsNotALoss)
+{
+  FrameSequence sequence ({25, 1});
+  for (int k = 0; k < 1000; k++) {
+    const Nanoseconds jitter = (k * 7919 % 11 - 5) * kMs;
+    const FrameStep step = sequence.take (k * 40 * kMs + jitter);
+    ASSERT_EQ (step.number, std::uint64_t (k));
+    ASSERT_EQ (step.lost, 0u);
+  }
+}
+
+TEST (FrameSequence, TheSameTimeAgainIsADuplicate)
+{
+  FrameSequence sequence ({25, 1});
+  expect_steps (
+      sequence, {{0, Arrival::first, 0, 0}, {40 * kMs, Arrival::next, 1, 0},
+                    {40 * kMs, Arrival::duplicate, 1, 0},
+                    {49 * kMs, Arrival::duplicate, 1, 0},
+                    {80 * kMs, Arrival::next, 2, 0}});
+}
+
+TEST (FrameSequence, ALateFrameHasTheNumberThatWasCountedAsLost)
+{
+  FrameSequence sequence ({25, 1});
+  expect_steps (sequence,
+      {{0, Arrival::first, 0, 0}, {80 * kMs, Arrival::after_loss, 2, 1},
+          {40 * kMs, Arrival::late, 1, 0}, {120 * kMs, Arrival::next, 3, 0}});
+}
+
+TEST (FrameSequence, TimeThatBeginsAnewIsFollowed)
+{
+  FrameSequence sequence ({25, 1});
+  expect_steps (sequence,
+      {{400 * kMs, Arrival::first, 0, 0}, {440 * kMs, Arrival::next, 1, 0},
+          {0, Arrival::late, 0, 0}, {40 * kMs, Arrival::restarted, 2, 0},
+          {80 * kMs, Arrival::next, 3, 0}});
+
+  FrameSequence far ({25, 1});
+  expect_steps (
+      far, {{5000 * kMs, Arrival::first, 0, 0}, {0, Arrival::restarted, 1, 0},
+               {40 * kMs, Arrival::next, 2, 0}});
+}
+
+TEST (FrameSequence, RunsBackwardWhenToldTo)
+{
+  FrameSequence sequence ({25, 1});
+  expect_steps (sequence,
+      {{400 * kMs, Arrival::first, 0, 0}, {360 * kMs, Arrival::next, 1, 0},
+          {240 * kMs, Arrival::after_loss, 4, 2},
+          {280 * kMs, Arrival::late, 3, 0}},
+      true);
+}
+
+TEST (FrameSequence, ResyncKeepsTheNumbersAndExpectsNothing)
+{
+  FrameSequence sequence ({25, 1});
+  expect_steps (
+      sequence, {{0, Arrival::first, 0, 0}, {40 * kMs, Arrival::next, 1, 0}});
+  sequence.resync ();
+  expect_steps (sequence,
+      {{9000 * kMs, Arrival::first, 2, 0}, {9040 * kMs, Arrival::next, 3, 0}});
+}

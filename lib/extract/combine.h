@@ -3,6 +3,7 @@
  * the compiler turns into vectors. */
 #pragma once
 
+#include "extract/cells.h"
 #include "extract/kernels.h"
 #include "extract/split.h"
 #include "extract/vector.h"
@@ -10,12 +11,40 @@
 namespace cexp::CEXP_TARGET
 {
 
+/** Sum of all lanes, pairs of lanes added in lanes twice as wide. */
+template <typename T>
+CEXP_INLINE std::uint64_t
+sum_of_lanes (Vector<T> v)
+{
+  using Sums = Vector<std::uint64_t>;
+  Sums sums = Sums (v);
+  if constexpr (sizeof (T) == 1)
+    sums = (sums & 0x00ff00ff00ff00ff) + (sums >> 8 & 0x00ff00ff00ff00ff);
+  sums = (sums & 0x0000ffff0000ffff) + (sums >> 16 & 0x0000ffff0000ffff);
+  sums = (sums & 0xffffffff) + (sums >> 32);
+  std::uint64_t sum = 0;
+  for (int i = 0; i < kLanes<std::uint64_t>; i++)
+    sum += sums[i];
+  return sum;
+}
+
 template <typename T>
 std::uint64_t
 count (const T *row, int pixels, T largest)
 {
+  constexpr int kL = kLanes<T>;
+  /* A lane counts its hits as a number of its own type. */
+  constexpr int kMostVectors = 255;
+  const Vector<T> bound = largest + Vector<T>{};
   std::uint64_t found = 0;
-  for (int x = 0; x < pixels; x++)
+  int x = 0;
+  while (x + kL <= pixels) {
+    Vector<T> hits = {};
+    for (int v = 0; v < kMostVectors && x + kL <= pixels; v++, x += kL)
+      hits -= Vector<T> (load (row + x) >= bound);
+    found += sum_of_lanes<T> (hits);
+  }
+  for (; x < pixels; x++)
     found += row[x] >= largest;
   return found;
 }
@@ -28,45 +57,81 @@ fence ()
 #endif
 }
 
+/** Kernels::difference of elements that are in registers. */
 template <typename T>
-void
-relabel (const T *const *places, const std::uint8_t *place, int n, int repeat,
-    int phase, const T *comb, T *const *out, const Strips &strips)
+struct DifferenceInRegisters {
+  int gain;
+  T largest;
+  T limit; ///< largest step that the gain leaves in range
+
+  CEXP_INLINE Vector<T> scaled (Vector<T> step) const
+  {
+    const Vector<T> bound = limit + Vector<T>{};
+    const Vector<T> most = largest + Vector<T>{};
+    return step > bound ? most : step * T (gain);
+  }
+  CEXP_INLINE Vector<T> operator() (Vector<T> now, Vector<T> before) const
+  {
+    return scaled (larger (now, before) - before);
+  }
+  template <int N, typename V, typename PutVector>
+  CEXP_INLINE void operator() (V (&wires)[N], PutVector put) const
+  {
+    put (0, scaled (wires[0]));
+#pragma GCC unroll 16
+    for (int k = 1; k < N; k++)
+      put (k, (*this) (wires[k], wires[k - 1]));
+  }
+};
+
+/** Kernels::difference through a buffer. */
+template <typename T>
+T
+difference_any (const Block<T> &block, const Layout<T> &layout,
+    const DifferenceInRegisters<T> &work, const Planes<T> &to)
 {
-  for_strips<T> (strips, [&] (int at, auto put) CEXP_INLINE_BODY {
-    const int first = (at + phase) % repeat;
-    for (int e = 0; e < n; e++) {
-      Vector<T> v = {};
-      int shift = first;
-      for (int c = 0; c < repeat; c++) {
-        v |= load (comb + shift) & load (places[place[e * repeat + c]] + at);
-        shift = shift > 0 ? shift - 1 : repeat - 1;
-      }
-      put (out[e] + at, v);
-    }
-  });
+  const auto strip = split_kernels<T> (block.width).strip;
+  Wires<T> places (layout.n), elements (layout.n);
+  T *order[256];
+  Vector<T> most = {};
+  for (int j = 0; j < block.rows; j++) {
+    const std::uint8_t *place =
+        layout.place + (j + layout.row) % layout.rows * layout.n;
+    if (layout.repeat == 1)
+      for (int e = 0; e < layout.n; e++)
+        order[place[e]] = elements.rows[e];
+    const std::ptrdiff_t row = j * to.stride / std::ptrdiff_t (sizeof (T));
+    for_strips<T> (block.cells, to.rows[0] + row, to.stream,
+        [&] (int at, auto put) CEXP_INLINE_BODY {
+          if (layout.repeat == 1) {
+            most = larger (most, strip (block, j, at, order));
+          } else {
+            most = larger (most, strip (block, j, at, places.rows));
+            relabel_strip (
+                layout, j, at, places.rows, elements.rows, 0, Put<false> ());
+          }
+          Vector<T> before = {};
+          for (int k = 0; k < layout.n; k++) {
+            const Vector<T> now = load (elements.rows[k]);
+            put (to.rows[k] + row + at, work (now, before));
+            before = now;
+          }
+        });
+  }
+  return largest_lane<T> (most);
 }
 
 template <typename T>
-void
-difference (const T *const *elements, int n, int cells, int gain, T largest,
-    T *const *out)
+T
+difference (const Block<T> &block, const Layout<T> &layout, int gain, T largest,
+    const Planes<T> &to)
 {
-  const T limit = T (largest / gain);
-  for (int k = 0; k < n; k++) {
-    const T *__restrict now = elements[k];
-    T *__restrict to = out[k];
-    if (k == 0) {
-      for (int i = 0; i < cells; i++)
-        to[i] = now[i] > limit ? largest : T (now[i] * gain);
-      continue;
-    }
-    const T *__restrict before = elements[k - 1];
-    for (int i = 0; i < cells; i++) {
-      const T step = T (now[i] > before[i] ? now[i] - before[i] : 0);
-      to[i] = step > limit ? largest : T (step * gain);
-    }
-  }
+  using Work = DifferenceInRegisters<T>;
+  const Work work = {gain, largest, T (largest / gain)};
+  const auto own = layout.identity
+                       ? in_registers<Work, T> (block.width, block.height)
+                       : nullptr;
+  return own ? own (block, to, work) : difference_any (block, layout, work, to);
 }
 
 /** The element at the centre of the cell, 4 n times as large; @p between has

@@ -2,6 +2,7 @@
 #include "extract/fast_path.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace cexp
@@ -13,6 +14,52 @@ namespace
 /* Coded frames from this size on do not fit the caches together with their
  * subframes and the next frame, so nothing is gained by writing into them. */
 constexpr std::size_t kLargeFrame = std::size_t (8) << 20;
+/* As much of a frame is worked on before saturated pixels are looked for: few
+ * enough to be still in the caches, enough to make calls cheap. */
+constexpr std::size_t kBand = std::size_t (32) << 10;
+constexpr std::size_t kLine = 64;
+
+/**
+ * Calls @p body (kernels, first, count) for parts that cover @p cells cells:
+ * the widest vectors as far as they are well filled, narrower ones for the
+ * rest. Parts may overlap. @p cells is at least the lanes of the last target.
+ */
+template <typename Pixel, typename Body>
+void
+for_segments (std::span<const Target> targets, int cells, Body body)
+{
+  const int narrowest = targets.back ().kernels<Pixel> ().lanes;
+  int at = 0;
+  for (const Target &target : targets) {
+    const Kernels<Pixel> &kernels = target.kernels<Pixel> ();
+    const int lanes = kernels.lanes;
+    if (at == cells)
+      return;
+    if (cells < lanes)
+      continue;
+    const int left_over = (cells - at) % lanes;
+    const bool to_the_end =
+        lanes == narrowest || left_over == 0 || left_over > lanes / 2;
+    const int end = to_the_end ? cells : cells - left_over;
+    if (end == at)
+      continue;
+    const int first = std::min (at, end - lanes);
+    body (kernels, first, end - first);
+    at = end;
+  }
+}
+
+/** Whether all rows lie equally to lines of the cache. */
+template <typename Pixel>
+bool
+equally_aligned (std::span<Pixel *const> rows)
+{
+  const auto address = [] (Pixel *row) {
+    return reinterpret_cast<std::uintptr_t> (row) % kLine;
+  };
+  return std::ranges::all_of (
+      rows, [&] (Pixel *row) { return address (row) == address (rows[0]); });
+}
 
 /** A staircase without leak: slot k is a multiple of element k less element
  * k - 1. Its factor, or 0. */
@@ -68,16 +115,25 @@ struct FastPath<Pixel>::Chunk {
   }
   Pixel peak (int j) const { return peaks[slot (j)]; }
 
-  void fill (const ElementRows<Pixel> &elements, ImageView<const Pixel> coded,
-      int j, int width)
+  void fill (std::span<const Target> targets, const LayoutTable<Pixel> &layout,
+      const SampleGrid &grid, ImageView<const Pixel> coded, int j, int width)
   {
+    const Extent cell = grid.cell ();
     const int begin = std::max (first - halo, 0);
     const int end = std::min (first + count + halo, width);
-    RowPointers<Pixel> rows;
-    for (int e = 0; e < n; e++)
-      rows[std::size_t (e)] = row (j, e) + (begin - first);
-    peaks[slot (j)] =
-        elements.gather (coded, j, begin, end - begin, rows, false);
+    Pixel &peak = peaks[slot (j)] = 0;
+    for_segments<Pixel> (targets, end - begin,
+        [&] (const Kernels<Pixel> &kernels, int at, int cells) {
+          RowPointers<Pixel> rows;
+          for (int e = 0; e < n; e++)
+            rows[std::size_t (e)] = row (j, e) + (begin + at - first);
+          const Block<Pixel> block = {
+              coded.row (j * cell.height) + (begin + at) * cell.width,
+              coded.stride, cell.width, cell.height, cells, 1};
+          peak = std::max (
+              peak, kernels.select (
+                        block, layout.from (begin + at, j), {rows.data (), 0}));
+        });
     if (halo == 0)
       return;
     for (int e = 0; e < n; e++) {
@@ -105,7 +161,8 @@ FastPath<Pixel>::make (const ExtractPlan &plan, std::span<const Target> targets)
 template <typename Pixel>
 FastPath<Pixel>::FastPath (
     const ExtractPlan &plan, std::span<const Target> targets)
-    : targets_ (targets), elements_ (plan.grid, targets)
+    : targets_ (targets),
+      layout_ (plan.grid, targets.front ().kernels<Pixel> ().lanes)
 {
   if (plan.decoder) {
     take_terms (*plan.decoder);
@@ -158,53 +215,90 @@ ExtractReport
 FastPath<Pixel>::run (const ExtractPlan &plan, ImageView<const Pixel> coded,
     std::span<const ImageView<Pixel>> subframes, RowRange rows) const
 {
-  if (plan.method == Method::kDecode)
-    return {decode (plan, coded, subframes, rows)};
+  const bool through_elements =
+      plan.method == Method::kDecode && form_ != DecodeForm::kDifference;
+  return {through_elements ? decode (plan, coded, subframes, rows)
+                           : run_bands (plan, coded, subframes, rows)};
+}
 
+template <typename Pixel>
+std::uint64_t
+FastPath<Pixel>::run_bands (const ExtractPlan &plan,
+    ImageView<const Pixel> coded, std::span<const ImageView<Pixel>> subframes,
+    RowRange rows) const
+{
   const std::size_t n = subframes.size ();
-  const bool large = n * sizeof (Pixel) * std::size_t (plan.size.width) *
-                         std::size_t (plan.size.height) >=
-                     kLargeFrame;
-  ExtractReport report;
-  for (int j = rows.first; j < rows.first + rows.count; j++) {
+  const std::size_t row_bytes =
+      n * std::size_t (plan.size.width) * sizeof (Pixel);
+  const std::ptrdiff_t stride = subframes[0].stride;
+  const bool one_stride = std::ranges::all_of (
+      subframes, [stride] (const auto &s) { return s.stride == stride; });
+  const int band = one_stride ? std::max (1, int (kBand / row_bytes)) : 1;
+  const bool large = row_bytes * std::size_t (plan.size.height) >= kLargeFrame;
+
+  std::uint64_t count = 0;
+  bool streamed = false;
+  const int end = rows.first + rows.count;
+  for (int j = rows.first; j < end; j += band) {
     RowPointers<Pixel> to;
-    Pixel peak;
-    if (plan.method == Method::kRank) {
-      for (std::size_t k = 0; k < n; k++)
-        to[k] = subframes[k].row (j);
-      peak = rank_row (plan, coded, j, to, large);
-    } else {
-      for (std::size_t k = 0; k < n; k++)
-        to[std::size_t (plan.elements[k])] = subframes[k].row (j);
-      peak = elements_.gather (coded, j, 0, plan.size.width, to, large);
-    }
-    report.saturated += saturated (plan, coded, j, 0, plan.size.width, peak);
+    for (std::size_t k = 0; k < n; k++)
+      to[plan.method == Method::kSelect ? std::size_t (plan.elements[k]) : k] =
+          subframes[k].row (j);
+    const bool stream =
+        large && equally_aligned<Pixel> (std::span (to).first (n));
+    streamed = streamed || stream;
+
+    const RowRange part = {j, std::min (band, end - j)};
+    const Pixel peak =
+        run_band (plan, coded, part, {to.data (), stride, stream});
+    count += saturated (plan, coded, part, 0, plan.size.width, peak);
   }
-  if (large)
+  if (streamed)
     targets_.front ().kernels<Pixel> ().fence ();
-  return report;
+  return count;
 }
 
 template <typename Pixel>
 Pixel
-FastPath<Pixel>::rank_row (const ExtractPlan &plan,
-    ImageView<const Pixel> coded, int j, const RowPointers<Pixel> &rows,
-    bool large) const
+FastPath<Pixel>::run_band (const ExtractPlan &plan,
+    ImageView<const Pixel> coded, RowRange rows, const Planes<Pixel> &to) const
 {
   const Extent cell = plan.grid.cell ();
-  const int n = plan.grid.elements ();
+  const std::size_t n = std::size_t (plan.grid.elements ());
   Pixel peak = 0;
   for_segments<Pixel> (targets_, plan.size.width,
       [&] (const Kernels<Pixel> &kernels, int first, int count) {
-        const auto to = moved (rows, n, first);
-        const Cells<Pixel> cells = {
-            coded.row (j * cell.height) + first * cell.width, coded.stride,
-            cell.width, cell.height};
-        peak = std::max (
-            peak, kernels.rank (cells, to.data (),
-                      strips_for (kernels, count, large, to.data (), n)));
+        RowPointers<Pixel> moved;
+        for (std::size_t k = 0; k < n; k++)
+          moved[k] = to.rows[k] + first;
+        /* Narrower stores leave lines half written, which memory punishes. */
+        const bool whole_lines =
+            std::size_t (kernels.lanes) * sizeof (Pixel) == kLine;
+        const Block<Pixel> block = {
+            coded.row (rows.first * cell.height) + first * cell.width,
+            coded.stride, cell.width, cell.height, count, rows.count};
+        peak = std::max (peak,
+            run_block (plan, kernels, block, layout_.from (first, rows.first),
+                {moved.data (), to.stride, to.stream && whole_lines}));
       });
   return peak;
+}
+
+template <typename Pixel>
+Pixel
+FastPath<Pixel>::run_block (const ExtractPlan &plan,
+    const Kernels<Pixel> &kernels, const Block<Pixel> &block,
+    const Layout<Pixel> &layout, const Planes<Pixel> &to) const
+{
+  switch (plan.method) {
+  case Method::kRank:
+    return kernels.rank (block, to);
+  case Method::kDecode:
+    return kernels.difference (block, layout,
+        int (plan.decoder->terms (0)[0].factor), Pixel (plan.largest), to);
+  default:
+    return kernels.select (block, layout, to);
+  }
 }
 
 template <typename Pixel>
@@ -239,20 +333,20 @@ FastPath<Pixel>::decode_chunk (const ExtractPlan &plan,
   std::uint64_t count = 0;
   if (chunk.halo > 0)
     for (int j = std::max (rows.first - 1, 0); j <= rows.first; j++)
-      chunk.fill (elements_, coded, j, width);
+      chunk.fill (targets_, layout_, plan.grid, coded, j, width);
 
   for (int j = rows.first; j < rows.first + rows.count; j++) {
     if (chunk.halo == 0)
-      chunk.fill (elements_, coded, j, width);
+      chunk.fill (targets_, layout_, plan.grid, coded, j, width);
     else if (j + 1 < height)
-      chunk.fill (elements_, coded, j + 1, width);
+      chunk.fill (targets_, layout_, plan.grid, coded, j + 1, width);
 
     RowPointers<Pixel> to;
     for (std::size_t k = 0; k < subframes.size (); k++)
       to[k] = subframes[k].row (j) + chunk.first;
     decode_row (plan, chunk, j, to);
-    count +=
-        saturated (plan, coded, j, chunk.first, chunk.count, chunk.peak (j));
+    count += saturated (
+        plan, coded, {j, 1}, chunk.first, chunk.count, chunk.peak (j));
   }
   return count;
 }
@@ -265,15 +359,6 @@ FastPath<Pixel>::decode_row (const ExtractPlan &plan, const Chunk &chunk, int j,
   const Kernels<Pixel> &kernels = targets_.front ().kernels<Pixel> ();
   const Pixel largest = Pixel (plan.largest);
   const std::size_t n = std::size_t (chunk.n);
-  if (form_ == DecodeForm::kDifference) {
-    std::array<const Pixel *, Tile::kMaxElements> rows;
-    for (std::size_t e = 0; e < n; e++)
-      rows[e] = chunk.row (j, int (e));
-    kernels.difference (rows.data (), chunk.n, chunk.count,
-        int (plan.decoder->terms (0)[0].factor), largest, to.data ());
-    return;
-  }
-
   std::array<ElementRow<Pixel>, Tile::kMaxElements> rows;
   for (std::size_t e = 0; e < n; e++) {
     const int beside = std::clamp (j + row_steps_[e], 0, plan.size.height - 1);
@@ -293,17 +378,18 @@ FastPath<Pixel>::decode_row (const ExtractPlan &plan, const Chunk &chunk, int j,
 template <typename Pixel>
 std::uint64_t
 FastPath<Pixel>::saturated (const ExtractPlan &plan,
-    ImageView<const Pixel> coded, int j, int first, int count, Pixel peak) const
+    ImageView<const Pixel> coded, RowRange rows, int first, int count,
+    Pixel peak) const
 {
   if (peak < plan.largest)
     return 0;
   const Kernels<Pixel> &kernels = targets_.front ().kernels<Pixel> ();
   const Extent cell = plan.grid.cell ();
   std::uint64_t found = 0;
-  for (int y = 0; y < cell.height; y++)
-    found +=
-        kernels.count (coded.row (j * cell.height + y) + first * cell.width,
-            count * cell.width, Pixel (plan.largest));
+  for (int y = 0; y < rows.count * cell.height; y++)
+    found += kernels.count (
+        coded.row (rows.first * cell.height + y) + first * cell.width,
+        count * cell.width, Pixel (plan.largest));
   return found;
 }
 

@@ -2,20 +2,25 @@
 /* Extraction by the kernels of an instruction set. */
 #pragma once
 
+#include <array>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "base/image.h"
 #include "extract/decoder.h"
-#include "extract/element_rows.h"
 #include "extract/extractor.h"
+#include "extract/layout_table.h"
 #include "extract/reference.h"
 #include "extract/targets.h"
 #include "schedule/sample_grid.h"
 
 namespace cexp
 {
+
+/** A row of pixels for each element or rank. */
+template <typename Pixel>
+using RowPointers = std::array<Pixel *, Tile::kMaxElements>;
 
 /** What is to be done, whoever does it. */
 struct ExtractPlan {
@@ -56,8 +61,14 @@ private:
   void take_terms (const Decoder &decoder);
   void take_weights (const ExtractPlan &plan);
 
-  Pixel rank_row (const ExtractPlan &plan, ImageView<const Pixel> coded, int j,
-      const RowPointers<Pixel> &rows, bool large) const;
+  std::uint64_t run_bands (const ExtractPlan &plan,
+      ImageView<const Pixel> coded, std::span<const ImageView<Pixel>> subframes,
+      RowRange rows) const;
+  Pixel run_band (const ExtractPlan &plan, ImageView<const Pixel> coded,
+      RowRange rows, const Planes<Pixel> &to) const;
+  Pixel run_block (const ExtractPlan &plan, const Kernels<Pixel> &kernels,
+      const Block<Pixel> &block, const Layout<Pixel> &layout,
+      const Planes<Pixel> &to) const;
   std::uint64_t decode (const ExtractPlan &plan, ImageView<const Pixel> coded,
       std::span<const ImageView<Pixel>> subframes, RowRange rows) const;
   std::uint64_t decode_chunk (const ExtractPlan &plan,
@@ -66,11 +77,11 @@ private:
   void decode_row (const ExtractPlan &plan, const Chunk &chunk, int j,
       const RowPointers<Pixel> &to) const;
   std::uint64_t saturated (const ExtractPlan &plan,
-      ImageView<const Pixel> coded, int j, int first, int count,
+      ImageView<const Pixel> coded, RowRange rows, int first, int count,
       Pixel peak) const;
 
   std::span<const Target> targets_;
-  ElementRows<Pixel> elements_;
+  LayoutTable<Pixel> layout_;
   DecodeForm form_ = DecodeForm::kTerms;
   std::vector<int> term_elements_;
   std::vector<double> term_factors_;

@@ -9,25 +9,49 @@
 namespace cexp
 {
 
-/** How the cells of a row are cut into vectors. */
-struct Strips {
-  /** At least one vector's worth; the last vector is moved back to end with
-   * the row. */
-  int cells = 0;
-  /** Past the caches: from cell @p lead on, which has to be aligned to a vector
-   * in every plane. */
-  bool stream = false;
-  int lead = 0;
-};
-
-/** Cells of @p width by @p height pixels: pixel (x, y) of cell i is
- * row y [i width + x], rows @p stride bytes apart. */
+/**
+ * Rows of cells of @p width by @p height pixels: pixel (x, y) of cell (i, j) is
+ * in column i width + x of row j height + y; rows are @p stride bytes apart.
+ * There are at least as many cells in a row as a vector has lanes.
+ */
 template <typename Pixel>
-struct Cells {
+struct Block {
   const Pixel *pixels;
   std::ptrdiff_t stride;
   int width;
   int height;
+  int cells; ///< in a row
+  int rows;
+};
+
+/**
+ * Rows of the subframes that take a block: row j of subframe k starts @p stride
+ * bytes times j after rows[k].
+ */
+template <typename Pixel>
+struct Planes {
+  Pixel *const *rows;
+  std::ptrdiff_t stride;
+  /** Write past the caches; all rows[k] lie equally to lines of 64 bytes. */
+  bool stream = false;
+};
+
+/**
+ * Where the elements stand. In cell (i, j) of the block element e is at place,
+ * counted by rows of the cell,
+ *   place[((j + row) % rows * n + e) * repeat + (i + column) % repeat].
+ */
+template <typename Pixel>
+struct Layout {
+  const std::uint8_t *place;
+  int n;
+  int repeat, rows;
+  int column, row;
+  /** repeat + lanes pixels, all ones where the index is a multiple of repeat
+   * and 0 elsewhere. */
+  const Pixel *comb;
+  /** Every element is at the place of its own number. */
+  bool identity;
 };
 
 /** Whole-number weights of a sample and of its neighbour. */
@@ -64,31 +88,23 @@ struct Kernels {
   /** Cells in a vector: rows of fewer cells need a narrower instruction set. */
   int lanes;
 
-  /** out[x][i] = pixel x of cell i, cells one row high. Returns the largest
-   * pixel. */
-  Pixel (*split) (
-      const Pixel *row, int width, Pixel *const *out, const Strips &strips);
+  /* These return the largest pixel of the block. Vectors at the end of a row
+   * are moved back to end with it. */
 
-  /** out[k][i] = k-th smallest pixel of cell i. Returns the largest pixel. */
-  Pixel (*rank) (
-      const Cells<Pixel> &cells, Pixel *const *out, const Strips &strips);
+  /** Row e of the planes = element e. */
+  Pixel (*select) (const Block<Pixel> &block, const Layout<Pixel> &layout,
+      const Planes<Pixel> &to);
 
-  /**
-   * out[e][i] = places[place[e repeat + (i + phase) mod repeat]][i], e < n.
-   * @p comb  repeat + lanes pixels, all ones where the index is a multiple of
-   *          repeat, else 0.
-   */
-  void (*relabel) (const Pixel *const *places, const std::uint8_t *place, int n,
-      int repeat, int phase, const Pixel *comb, Pixel *const *out,
-      const Strips &strips);
+  /** Row k of the planes = k-th smallest pixel of each cell. */
+  Pixel (*rank) (const Block<Pixel> &block, const Planes<Pixel> &to);
 
-  /** out[k][i] = gain (elements[k][i] - elements[k - 1][i]) clamped to
-   * 0..largest, n rows of @p cells; gain in 1..256. */
-  void (*difference) (const Pixel *const *elements, int n, int cells, int gain,
-      Pixel largest, Pixel *const *out);
+  /** Row k of the planes = gain (element k - element k - 1) clamped to
+   * 0..largest; gain in 1..256. */
+  Pixel (*difference) (const Block<Pixel> &block, const Layout<Pixel> &layout,
+      int gain, Pixel largest, const Planes<Pixel> &to);
 
-  /** The same of interpolated elements, a quarter of the difference rounded to
-   * nearest; cells at most kMaxRowCells. */
+  /** out[k][i] = a quarter of interpolated element k less element k - 1,
+   * rounded and clamped to 0..largest; cells at most kMaxRowCells. */
   void (*lerp_difference) (const ElementRow<Pixel> *elements, int n, int cells,
       Pixel largest, Pixel *const *out);
 

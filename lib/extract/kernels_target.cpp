@@ -10,8 +10,8 @@ namespace cexp::CEXP_TARGET
 {
 
 template <typename T>
-constexpr Kernels<T> kKernels = {kLanes<T>, split<T>, rank<T>, relabel<T>,
-    difference<T>, lerp_difference<T>, decode<T>, count<T>, fence};
+constexpr Kernels<T> kKernels = {kLanes<T>, select<T>, rank<T>, difference<T>,
+    lerp_difference<T>, decode<T>, count<T>, fence};
 
 extern const Kernels<std::uint8_t> *const kernels_u8 = &kKernels<std::uint8_t>;
 extern const Kernels<std::uint16_t> *const kernels_u16 =

@@ -3,6 +3,7 @@
  * vector has lanes, and a network sorts them without a branch. */
 #pragma once
 
+#include "extract/cells.h"
 #include "extract/kernels.h"
 #include "extract/network.h"
 #include "extract/split.h"
@@ -288,104 +289,42 @@ private:
   int levels_ = 0;
 };
 
-/** Kernels::rank for cells that fit in the registers. */
-template <int Width, int Height, typename T>
-T
-rank_cells (const Cells<T> &cells, T *const *out, const Strips &strips)
-{
-  constexpr int kN = Width * Height;
-  Vector<T> most = {};
-  const auto row = [&cells] (int y) CEXP_INLINE_BODY {
-    return reinterpret_cast<const T *> (
-        reinterpret_cast<const char *> (cells.pixels) + y * cells.stride);
-  };
-  for_strips<T> (strips, [&] (int at, auto put) CEXP_INLINE_BODY {
-    Vector<T> wires[kN];
-#pragma GCC unroll 16
-    for (int y = 0; y < Height; y++) {
-      const T *const from = row (y) + at * Width;
-      Vector<T> parts[Width];
-      split_cells<Width, T> (from, parts);
-#pragma GCC unroll 16
-      for (int x = 0; x < Width; x++)
-        wires[y * Width + x] = parts[x];
-    }
-#pragma GCC unroll 16
-    for (int y = 0; y < Height; y++)
-      prefetch<Width> (row (Height + y) + at * Width);
-    run_network<kSort<kN>> (
-        wires, [] (Vector<T> *, int) CEXP_INLINE_BODY {},
-        [&] (int k, Vector<T> v) CEXP_INLINE_BODY {
-          if (k == kN - 1)
-            most = larger (most, v);
-          put (out[k] + at, v);
-        },
-        std::make_integer_sequence<int, kSort<kN>.size ()> ());
-  });
-  return largest_lane<T> (most);
-}
-
 /** Kernels::rank for any cells, vector by vector through a buffer. */
 template <typename T>
 T
-rank_any_cells (const Cells<T> &cells, T *const *out, const Strips &strips)
+rank_any (const Block<T> &block, const Planes<T> &to)
 {
-  constexpr int kL = kLanes<T>;
-  const int n = cells.width * cells.height;
-  BlockSort<T> block (n);
-  T most = 0;
-  const auto strip = [&] (int at, bool streams) {
-    for (int y = 0; y < cells.height; y++) {
-      const T *const row = reinterpret_cast<const T *> (
-                               reinterpret_cast<const char *> (cells.pixels) +
-                               y * cells.stride) +
-                           at * cells.width;
-      const T peak = split<T> (
-          row, cells.width, block.wires () + y * cells.width, {.cells = kL});
-      most = peak > most ? peak : most;
-    }
-    block.run ({out, at, streams});
-  };
-  int at = 0;
-  if (strips.stream) {
-    if (strips.lead > 0)
-      strip (0, false);
-    at = strips.lead;
+  const auto strip = split_kernels<T> (block.width).strip;
+  BlockSort<T> sort (block.width * block.height);
+  Vector<T> most = {};
+  for (int j = 0; j < block.rows; j++) {
+    const std::ptrdiff_t row = j * to.stride / std::ptrdiff_t (sizeof (T));
+    for_strips<T> (block.cells, to.rows[0] + row, to.stream,
+        [&] (int at, auto put) CEXP_INLINE_BODY {
+          most = larger (most, strip (block, j, at, sort.wires ()));
+          sort.run ({to.rows, row + at, put.kStreams});
+        });
   }
-  for (; at + kL <= strips.cells; at += kL)
-    strip (at, strips.stream);
-  if (at < strips.cells)
-    strip (strips.cells - kL, false);
-  return most;
+  return largest_lane<T> (most);
 }
 
-/** The squarest cells of n pixels, for the n that fit in the registers. */
+/** Kernels::rank: the network on wires that are in registers. */
+struct RankInRegisters {
+  template <int N, typename V, typename Put>
+  CEXP_INLINE void operator() (V (&wires)[N], Put put) const
+  {
+    run_network<kSort<N>> (
+        wires, [] (V *, int) CEXP_INLINE_BODY {}, put,
+        std::make_integer_sequence<int, kSort<N>.size ()> ());
+  }
+};
+
 template <typename T>
 T
-rank (const Cells<T> &cells, T *const *out, const Strips &strips)
+rank (const Block<T> &block, const Planes<T> &to)
 {
-  struct Own {
-    int width, height;
-    T (*rank) (const Cells<T> &, T *const *, const Strips &);
-  };
-  static constexpr Own kOwn[] = {
-      {2, 1, rank_cells<2, 1, T>},
-      {3, 1, rank_cells<3, 1, T>},
-      {2, 2, rank_cells<2, 2, T>},
-      {5, 1, rank_cells<5, 1, T>},
-      {3, 2, rank_cells<3, 2, T>},
-      {7, 1, rank_cells<7, 1, T>},
-      {4, 2, rank_cells<4, 2, T>},
-      {3, 3, rank_cells<3, 3, T>},
-      {5, 2, rank_cells<5, 2, T>},
-      {4, 3, rank_cells<4, 3, T>},
-      {5, 3, rank_cells<5, 3, T>},
-      {4, 4, rank_cells<4, 4, T>},
-  };
-  for (const Own &own : kOwn)
-    if (own.width == cells.width && own.height == cells.height)
-      return own.rank (cells, out, strips);
-  return rank_any_cells (cells, out, strips);
+  const auto own = in_registers<RankInRegisters, T> (block.width, block.height);
+  return own ? own (block, to, {}) : rank_any (block, to);
 }
 
 } // namespace cexp::CEXP_TARGET

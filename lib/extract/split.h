@@ -2,6 +2,8 @@
 /* Rows of cells into one vector for each pixel of the cell. */
 #pragma once
 
+#include <type_traits>
+
 #include "extract/kernels.h"
 #include "extract/vector.h"
 
@@ -119,51 +121,61 @@ split_cells (const T *from, Vector<T> (&out)[Width])
   split_vectors<Width, T> (in, out);
 }
 
-/** Calls body (at, streams) for every vector of a row; see Strips. */
+template <typename T>
+CEXP_INLINE T *
+bytes_on (T *p, std::ptrdiff_t bytes)
+{
+  using Byte = std::conditional_t<std::is_const_v<T>, const char, char>;
+  return reinterpret_cast<T *> (reinterpret_cast<Byte *> (p) + bytes);
+}
+
+/** Writes a vector, past the caches or not. */
+template <bool Streams>
+struct Put {
+  static constexpr bool kStreams = Streams;
+  template <typename T, typename V>
+  CEXP_INLINE void operator() (T *to, V v) const
+  {
+    if constexpr (Streams)
+      stream (to, v);
+    else
+      store (to, v);
+  }
+};
+
+/**
+ * Calls body (at, put) for every vector of a row of cells whose first output
+ * pixel is @p to; put (to, vector) writes past the caches where it may.
+ */
 template <typename T, typename Body>
 CEXP_INLINE void
-for_strips (const Strips &strips, Body body)
+for_strips (int cells, const T *to, bool streams, Body body)
 {
   constexpr int kL = kLanes<T>;
-  const auto plain = [] (T *to, Vector<T> v) { store (to, v); };
-  const auto past_caches = [] (T *to, Vector<T> v) { stream (to, v); };
+  constexpr Put<false> plain;
   int at = 0;
-  if (strips.stream) {
-    if (strips.lead > 0)
-      body (0, plain);
-    for (at = strips.lead; at + kL <= strips.cells; at += kL)
-      body (at, past_caches);
-  } else {
-    for (; at + kL <= strips.cells; at += kL)
-      body (at, plain);
-  }
-  if (at < strips.cells)
-    body (strips.cells - kL, plain);
-}
-
-/** Kernels::split for one width. */
-template <int Width, typename T>
-T
-split_row (const T *row, int, T *const *out, const Strips &strips)
-{
-  Vector<T> most = {};
-  for_strips<T> (strips, [&] (int at, auto put) CEXP_INLINE_BODY {
-    Vector<T> parts[Width];
-    split_cells<Width, T> (row + at * Width, parts);
-#pragma GCC unroll 256
-    for (int x = 0; x < Width; x++) {
-      most = larger (most, parts[x]);
-      put (out[x] + at, parts[x]);
+  if (streams) {
+    const auto address = reinterpret_cast<std::uintptr_t> (to);
+    const int lead = int (-address % kVectorBytes / sizeof (T));
+    if (lead + kL <= cells) {
+      if (lead > 0)
+        body (0, plain);
+      for (at = lead; at + kL <= cells; at += kL)
+        body (at, Put<true> ());
     }
-  });
-  return largest_lane<T> (most);
+  }
+  for (; at + kL <= cells; at += kL)
+    body (at, plain);
+  if (at < cells)
+    body (cells - kL, plain);
 }
 
-/* Cells wider than that are turned in square blocks of 16 bytes: a row of a
- * block is a piece of a cell, a column is a piece of an output row. */
+/* Cells wider than kOwnWidths are turned in square blocks of 16 bytes: a row of
+ * a block is a piece of a cell, a column is a piece of an output row. */
+constexpr int kOwnWidths = 16;
 
 template <typename T>
-struct BlockOf {
+struct SquareOf {
   static constexpr int kSize = 16 / int (sizeof (T));
   typedef T Row __attribute__ ((vector_size (16)));
 };
@@ -178,18 +190,17 @@ struct Interleave {
 };
 
 template <typename T>
-CEXP_INLINE void turn (typename BlockOf<T>::Row (&rows)[BlockOf<T>::kSize])
+CEXP_INLINE void turn (typename SquareOf<T>::Row (&rows)[SquareOf<T>::kSize])
 {
-  constexpr int kSize = BlockOf<T>::kSize;
+  constexpr int kSize = SquareOf<T>::kSize;
   constexpr std::make_integer_sequence<int, kSize> lanes;
   for (int step = 1; step < kSize; step *= 2) {
-    typename BlockOf<T>::Row next[kSize];
+    typename SquareOf<T>::Row next[kSize];
 #pragma GCC unroll 16
     for (int r = 0; r < kSize / 2; r++) {
-      next[2 * r] =
-          pick (rows[r], rows[r + kSize / 2], Interleave<kSize, 0> (), lanes);
-      next[2 * r + 1] =
-          pick (rows[r], rows[r + kSize / 2], Interleave<kSize, 1> (), lanes);
+      const auto &upper = rows[r], &lower = rows[r + kSize / 2];
+      next[2 * r] = pick (upper, lower, Interleave<kSize, 0> (), lanes);
+      next[2 * r + 1] = pick (upper, lower, Interleave<kSize, 1> (), lanes);
     }
 #pragma GCC unroll 16
     for (int r = 0; r < kSize; r++)
@@ -197,55 +208,183 @@ CEXP_INLINE void turn (typename BlockOf<T>::Row (&rows)[BlockOf<T>::kSize])
   }
 }
 
-/** Kernels::split for cells at least as wide as a block. */
+/** One vector of cells @p width pixels wide, at least the size of a square:
+ * out[x] + at takes pixel x. */
 template <typename T>
-T
-split_wide_row (const T *row, int width, T *const *out, const Strips &strips)
+CEXP_INLINE Vector<T>
+split_wide (const T *from, int width, T *const *out, int at)
 {
-  using Row = typename BlockOf<T>::Row;
-  constexpr int kSize = BlockOf<T>::kSize;
+  using Row = typename SquareOf<T>::Row;
+  constexpr int kSize = SquareOf<T>::kSize;
   Row most = {};
-  for (int i = 0; i < strips.cells; i += kSize) {
-    const int cell = i + kSize <= strips.cells ? i : strips.cells - kSize;
+  for (int i = 0; i < kLanes<T>; i += kSize) {
     for (int x = 0; x < width; x += kSize) {
       const int pixel = x + kSize <= width ? x : width - kSize;
-      Row block[kSize];
+      Row square[kSize];
       for (int r = 0; r < kSize; r++) {
-        __builtin_memcpy (&block[r], row + (cell + r) * width + pixel, 16);
-        most = larger (most, block[r]);
+        __builtin_memcpy (&square[r], from + (i + r) * width + pixel, 16);
+        most = larger (most, square[r]);
       }
-      turn<T> (block);
+      turn<T> (square);
       for (int r = 0; r < kSize; r++)
-        __builtin_memcpy (out[pixel + r] + cell, &block[r], 16);
+        __builtin_memcpy (out[pixel + r] + at + i, &square[r], 16);
     }
   }
-  T peak = 0;
-  for (int lane = 0; lane < kSize; lane++)
-    peak = most[lane] > peak ? most[lane] : peak;
-  return peak;
+  Vector<T> result = {};
+  __builtin_memcpy (&result, &most, 16);
+  return result;
 }
 
-/** Widths that have a kernel of their own. */
-constexpr int kOwnWidths = 16;
+/** All vectors of one row of pixels; Width 0: any. Returns the largest pixels.
+ */
+template <int Width, typename T>
+CEXP_INLINE Vector<T>
+split_row (const T *row, int width, int cells, T *const *out, bool streams)
+{
+  Vector<T> most = {};
+  for_strips<T> (
+      cells, out[0], streams, [&] (int at, auto put) CEXP_INLINE_BODY {
+        if constexpr (Width == 0) {
+          most =
+              larger (most, split_wide<T> (row + at * width, width, out, at));
+        } else {
+          Vector<T> parts[Width];
+          split_cells<Width, T> (row + at * Width, parts);
+#pragma GCC unroll 256
+          for (int x = 0; x < Width; x++) {
+            most = larger (most, parts[x]);
+            put (out[x] + at, parts[x]);
+          }
+        }
+      });
+  return most;
+}
+
+/** Kernels::select where elements stand at one place throughout a row. */
+template <int Width, typename T>
+T
+select_rows (
+    const Block<T> &block, const Layout<T> &layout, const Planes<T> &to)
+{
+  Vector<T> most = {};
+  T *places[256];
+  for (int j = 0; j < block.rows; j++) {
+    const std::uint8_t *place =
+        layout.place + (j + layout.row) % layout.rows * layout.n;
+    for (int e = 0; e < layout.n; e++)
+      places[place[e]] = bytes_on (to.rows[e], j * to.stride);
+    for (int y = 0; y < block.height; y++) {
+      const T *row = bytes_on (
+          block.pixels, (std::ptrdiff_t (j) * block.height + y) * block.stride);
+      most = larger (most, split_row<Width, T> (row, block.width, block.cells,
+                               places + y * block.width, to.stream));
+    }
+  }
+  return largest_lane<T> (most);
+}
+
+/** One vector of cells, all places of the cell: places[p] takes the pixels. */
+template <int Width, typename T>
+Vector<T>
+split_strip (const Block<T> &block, int j, int at, T *const *places)
+{
+  constexpr int kL = kLanes<T>;
+  Vector<T> most = {};
+  for (int y = 0; y < block.height; y++) {
+    const T *row = bytes_on (block.pixels,
+                       (std::ptrdiff_t (j) * block.height + y) * block.stride) +
+                   at * block.width;
+    most = larger (most, split_row<Width, T> (row, block.width, kL,
+                             places + y * block.width, false));
+  }
+  return most;
+}
+
+/** What exists once for each width of a cell, and for any. */
+template <typename T>
+struct SplitKernels {
+  T (*select) (const Block<T> &, const Layout<T> &, const Planes<T> &);
+  Vector<T> (*strip) (const Block<T> &, int j, int at, T *const *places);
+};
+
+template <typename T, int... Width>
+const SplitKernels<T> &
+split_kernels (int width, std::integer_sequence<int, Width...>)
+{
+  static constexpr SplitKernels<T> kAll[] = {
+      {select_rows<Width, T>, split_strip<Width, T>}...};
+  return kAll[width <= kOwnWidths ? width : 0];
+}
 
 template <typename T>
-using SplitRow = T (*) (const T *, int, T *const *, const Strips &);
+const SplitKernels<T> &
+split_kernels (int width)
+{
+  return split_kernels<T> (
+      width, std::make_integer_sequence<int, kOwnWidths + 1> ());
+}
 
-template <typename T, typename Widths>
-struct SplitTable;
-template <typename T, int... I>
-struct SplitTable<T, std::integer_sequence<int, I...>> {
-  static constexpr SplitRow<T> kRows[] = {split_row<I + 1, T>...};
+/** Brings one vector of all places into the order of the elements where that
+ * differs from cell to cell: rows[e] takes element e. */
+template <typename T, typename PutVector>
+CEXP_INLINE void
+relabel_strip (const Layout<T> &layout, int j, int at, const T *const *places,
+    T *const *rows, std::ptrdiff_t to, PutVector put)
+{
+  const int repeat = layout.repeat;
+  const std::uint8_t *place =
+      layout.place + (j + layout.row) % layout.rows * layout.n * repeat;
+  alignas (kVectorBytes) T masks[256 * kLanes<T>];
+  for (int c = 0; c < repeat; c++)
+    store (masks + c * kLanes<T>,
+        load (layout.comb + (at + layout.column + repeat - c) % repeat));
+  for (int e = 0; e < layout.n; e++) {
+    Vector<T> v = {};
+    for (int c = 0; c < repeat; c++)
+      v |= load (masks + c * kLanes<T>) & load (places[place[e * repeat + c]]);
+    put (rows[e] + to, v);
+  }
+}
+
+/** A vector for each of up to 256 wires. */
+template <typename T>
+struct Wires {
+  alignas (64) T lanes[256 * kLanes<T>];
+  T *rows[256];
+
+  explicit Wires (int n)
+  {
+    for (int w = 0; w < n; w++)
+      rows[w] = lanes + w * kLanes<T>;
+  }
 };
+
+/** Kernels::select where the places of elements differ from cell to cell. */
+template <typename T>
+T
+select_relabelled (
+    const Block<T> &block, const Layout<T> &layout, const Planes<T> &to)
+{
+  const auto strip = split_kernels<T> (block.width).strip;
+  Wires<T> wires (layout.n);
+  Vector<T> most = {};
+  for (int j = 0; j < block.rows; j++)
+    for_strips<T> (block.cells, bytes_on (to.rows[0], j * to.stride), to.stream,
+        [&] (int at, auto put) CEXP_INLINE_BODY {
+          most = larger (most, strip (block, j, at, wires.rows));
+          relabel_strip (layout, j, at, wires.rows, to.rows,
+              at + j * to.stride / std::ptrdiff_t (sizeof (T)), put);
+        });
+  return largest_lane<T> (most);
+}
 
 template <typename T>
 T
-split (const T *row, int width, T *const *out, const Strips &strips)
+select (const Block<T> &block, const Layout<T> &layout, const Planes<T> &to)
 {
-  using Table = SplitTable<T, std::make_integer_sequence<int, kOwnWidths>>;
-  const SplitRow<T> own =
-      width <= kOwnWidths ? Table::kRows[width - 1] : split_wide_row<T>;
-  return own (row, width, out, strips);
+  return layout.repeat > 1
+             ? select_relabelled (block, layout, to)
+             : split_kernels<T> (block.width).select (block, layout, to);
 }
 
 } // namespace cexp::CEXP_TARGET

@@ -78,24 +78,31 @@ larger (V a, V b)
   return a < b ? b : a;
 }
 
-template <typename T>
-CEXP_INLINE T
-largest_lane (Vector<T> v)
-{
-  T lanes[kLanes<T>];
-  store (lanes, v);
-  T most = 0;
-  for (const T lane : lanes)
-    most = lane > most ? lane : most;
-  return most;
-}
-
 /** Lane i of the result is lane Index (i) of a and b in a row. */
 template <typename V, typename Index, int... I>
 CEXP_INLINE V
 pick (V a, V b, Index, std::integer_sequence<int, I...>)
 {
   return __builtin_shufflevector (a, b, Index::at (I)...);
+}
+
+/** The lanes, each moved down by By places, those at the end to the start. */
+template <int Lanes, int By>
+struct Rotate {
+  static constexpr int at (int lane) { return (lane + By) % Lanes; }
+};
+
+template <typename T, int Reach = kLanes<T> / 2>
+CEXP_INLINE T
+largest_lane (Vector<T> v)
+{
+  if constexpr (Reach == 0) {
+    return v[0];
+  } else {
+    constexpr std::make_integer_sequence<int, kLanes<T>> lanes;
+    return largest_lane<T, Reach / 2> (
+        larger (v, pick (v, v, Rotate<kLanes<T>, Reach> (), lanes)));
+  }
 }
 
 /** Fetches the @p vectors vectors at @p from before they are needed. */

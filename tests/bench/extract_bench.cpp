@@ -1,0 +1,326 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Extraction against a plain copy of the frame, the paper's sort and what
+ * libraries offer. Prints the table of docs/performance.md: without arguments
+ * all of it, else what a regular expression over WIDTHxHEIGHT/DEPTH/N picks. */
+#include "extract/extractor.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <cstring>
+#include <functional>
+#include <map>
+#include <memory>
+#include <random>
+#include <regex>
+#include <string>
+
+#include <benchmark/benchmark.h>
+#ifdef HAVE_OPENCV
+#include <opencv2/core.hpp>
+#endif
+
+#include "extract/planes.h"
+
+namespace
+{
+
+using namespace cexp;
+
+/** Frames in flight at either side of an element, as buffer pools keep them. */
+constexpr int kRing = 4;
+
+struct Case {
+  int width;
+  int height;
+  int depth;
+  int columns;
+  int rows;
+
+  int n () const { return columns * rows; }
+  std::string name () const
+  {
+    return std::to_string (width) + "x" + std::to_string (height) + "/u" +
+           std::to_string (depth) + "/" + std::to_string (n ());
+  }
+  std::string tile () const
+  {
+    return std::to_string (columns) + "x" + std::to_string (rows);
+  }
+};
+
+/** Coded frames of random pixels and the subframes that take them. */
+template <typename Pixel>
+class Pool
+{
+public:
+  explicit Pool (const Case &c)
+      : width_ (c.width / c.columns), height_ (c.height / c.rows)
+  {
+    std::mt19937_64 random (1);
+    /* What a video buffer has by default. */
+    const std::size_t stride =
+        (std::size_t (width_) * sizeof (Pixel) + 3) / 4 * 4;
+    const std::size_t plane =
+        (stride * std::size_t (height_) + 2 * 4096) / 4096 * 4096;
+    for (int i = 0; i < kRing; i++) {
+      coded_.emplace_back (c.width, c.height);
+      auto view = coded_.back ().view ();
+      for (int y = 0; y < c.height; y++)
+        for (int x = 0; x < c.width; x++)
+          view.at (x, y) = Pixel (random () % std::numeric_limits<Pixel>::max ());
+
+      bytes_.emplace_back (plane * std::size_t (c.n ()) + 2 * 4096);
+      auto *first = bytes_.back ().data ();
+      first += 4096 - reinterpret_cast<std::uintptr_t> (first) % 4096;
+      auto &planes = planes_.emplace_back ();
+      for (int k = 0; k < c.n (); k++)
+        planes.push_back (
+            {reinterpret_cast<Pixel *> (
+                 first + plane * std::size_t (k) + plane_stagger (k)),
+                width_, height_, std::ptrdiff_t (stride)});
+    }
+  }
+
+  void next () { at_ = (at_ + 1) % kRing; }
+  const Image<Pixel> &coded () const { return coded_[at_]; }
+  const std::vector<ImageView<Pixel>> &planes () const { return planes_[at_]; }
+  int width () const { return width_; }
+  int height () const { return height_; }
+
+private:
+  int width_;
+  int height_;
+  std::size_t at_ = 0;
+  std::vector<Image<Pixel>> coded_;
+  std::vector<std::vector<std::uint8_t>> bytes_;
+  std::vector<std::vector<ImageView<Pixel>>> planes_;
+};
+
+template <typename Pixel>
+using Body = std::function<void (Pool<Pixel> &)>;
+
+template <typename Pixel>
+void
+copy (Pool<Pixel> &pool)
+{
+  const std::size_t bytes = std::size_t (pool.width ()) *
+                            std::size_t (pool.height ()) * sizeof (Pixel);
+  auto *from =
+      reinterpret_cast<const std::uint8_t *> (pool.coded ().view ().data);
+  for (const auto &plane : pool.planes ()) {
+    std::memcpy (plane.data, from, bytes);
+    from += bytes;
+  }
+}
+
+template <typename Pixel>
+Body<Pixel>
+extraction (const Case &c, const std::string &code, ExtractOptions options,
+    const std::string &tile = {})
+{
+  const auto schedule =
+      Schedule::from_preset (code + ":" + (tile.empty () ? c.tile () : tile));
+  if (!schedule) {
+    std::fprintf (stderr, "%s\n", schedule.error ().message.c_str ());
+    std::exit (1);
+  }
+  auto extractor = std::make_shared<Extractor<Pixel>> (
+      *Extractor<Pixel>::make (*schedule, c.width, c.height, options));
+  return [extractor] (Pool<Pixel> &pool) {
+    extractor->run (pool.coded ().view (), pool.planes ());
+  };
+}
+
+template <typename Pixel>
+void
+sort_groups (const Case &c, Pool<Pixel> &pool)
+{
+  std::vector<Pixel> group (std::size_t (c.n ()));
+  const auto coded = pool.coded ().view ();
+  for (int j = 0; j < pool.height (); j++)
+    for (int i = 0; i < pool.width (); i++) {
+      for (int y = 0; y < c.rows; y++)
+        std::copy_n (coded.row (j * c.rows + y) + i * c.columns, c.columns,
+            group.begin () + y * c.columns);
+      std::ranges::sort (group);
+      for (std::size_t k = 0; k < group.size (); k++)
+        pool.planes ()[k].at (i, j) = group[k];
+    }
+}
+
+#ifdef HAVE_OPENCV
+template <typename Pixel>
+constexpr int kCvDepth = sizeof (Pixel) == 1 ? CV_8U : CV_16U;
+
+/** Every row of a cell is a row of pixels with as many channels as the cell is
+ * wide. */
+template <typename Pixel>
+void
+cv_split (const Case &c, Pool<Pixel> &pool)
+{
+  const auto coded = pool.coded ().view ();
+  for (int y = 0; y < c.rows; y++) {
+    const cv::Mat rows (pool.height (), pool.width (),
+        CV_MAKETYPE (kCvDepth<Pixel>, c.columns),
+        const_cast<Pixel *> (coded.row (y)),
+        std::size_t (coded.stride * c.rows));
+    std::vector<cv::Mat> planes;
+    for (int x = 0; x < c.columns; x++) {
+      const auto &plane = pool.planes ()[std::size_t (y * c.columns + x)];
+      planes.emplace_back (plane.height, plane.width, kCvDepth<Pixel>,
+          plane.data, std::size_t (plane.stride));
+    }
+    cv::split (rows, planes.data ());
+  }
+}
+
+/** Groups as the rows of a matrix. */
+template <typename Pixel>
+void
+cv_sort (const Case &c, Pool<Pixel> &pool)
+{
+  const auto coded = pool.coded ().view ();
+  cv::Mat groups (pool.width (), c.n (), kCvDepth<Pixel>);
+  for (int j = 0; j < pool.height (); j++) {
+    for (int i = 0; i < pool.width (); i++)
+      for (int y = 0; y < c.rows; y++)
+        std::copy_n (coded.row (j * c.rows + y) + i * c.columns, c.columns,
+            groups.ptr<Pixel> (i) + y * c.columns);
+    cv::sort (groups, groups, cv::SORT_EVERY_ROW | cv::SORT_ASCENDING);
+    for (int i = 0; i < pool.width (); i++)
+      for (int k = 0; k < c.n (); k++)
+        pool.planes ()[std::size_t (k)].at (i, j) = groups.at<Pixel> (i, k);
+  }
+}
+#endif
+
+/** Lattices of as many elements as a raster of the table. */
+const std::map<int, std::string> kLattices = {
+    {4, "lattice:4/2"}, {9, "lattice:9/3"}, {16, "lattice:16/4"}};
+
+template <typename Pixel>
+std::vector<std::pair<std::string, Body<Pixel>>>
+contenders (const Case &c)
+{
+  std::vector<std::pair<std::string, Body<Pixel>>> all = {
+      {"memcpy", copy<Pixel>},
+      {"select",
+          extraction<Pixel> (c, "sequential", {.method = Method::kSelect})},
+      {"decode", extraction<Pixel> (c, "staircase",
+                     {.method = Method::kDecode, .interpolate = false})},
+      {"decode, interpolated",
+          extraction<Pixel> (c, "staircase", {.method = Method::kDecode})},
+      {"rank", extraction<Pixel> (c, "staircase", {.method = Method::kRank})},
+  };
+  if (const auto lattice = kLattices.find (c.n ()); lattice != kLattices.end ())
+    all.push_back (
+        {"select, lattice", extraction<Pixel> (c, "sequential",
+                                {.method = Method::kSelect}, lattice->second)});
+  all.push_back ({"paper's quicksort",
+      extraction<Pixel> (
+          c, "staircase", {.method = Method::kRank, .target = "scalar"})});
+  all.push_back (
+      {"std::sort", [c] (Pool<Pixel> &pool) { sort_groups (c, pool); }});
+#ifdef HAVE_OPENCV
+  all.push_back ({"cv::sort", [c] (Pool<Pixel> &pool) { cv_sort (c, pool); }});
+  all.push_back (
+      {"cv::split", [c] (Pool<Pixel> &pool) { cv_split (c, pool); }});
+#endif
+  return all;
+}
+
+/** Keeps the median time of each contender of one case. */
+class Medians : public benchmark::BenchmarkReporter
+{
+public:
+  bool ReportContext (const Context &) override { return true; }
+  void ReportRuns (const std::vector<Run> &runs) override
+  {
+    for (const Run &run : runs)
+      if (run.run_type == Run::RT_Iteration)
+        times_[run.run_name.function_name].push_back (
+            run.cpu_accumulated_time / double (run.iterations));
+  }
+  double seconds (const std::string &contender)
+  {
+    auto &times = times_[contender];
+    if (times.empty ())
+      return 0.0;
+    const auto middle = times.begin () + std::ptrdiff_t (times.size () / 2);
+    std::nth_element (times.begin (), middle, times.end ());
+    return *middle;
+  }
+
+private:
+  std::map<std::string, std::vector<double>> times_;
+};
+
+template <typename Pixel>
+void
+run_case (const Case &c)
+{
+  Pool<Pixel> pool (c);
+  const auto all = contenders<Pixel> (c);
+  benchmark::ClearRegisteredBenchmarks ();
+  for (const auto &[name, body] : all)
+    benchmark::RegisterBenchmark (
+        name.c_str (), [&pool, body = body] (benchmark::State &state) {
+          for (auto _ : state) {
+            body (pool);
+            pool.next ();
+          }
+        });
+  Medians medians;
+  benchmark::RunSpecifiedBenchmarks (&medians);
+
+  const double bytes = double (c.width) * c.height * c.depth / 8;
+  const double copied = medians.seconds ("memcpy");
+  const double sorted = medians.seconds ("paper's quicksort");
+  std::printf ("\n%s: memcpy %.1f us, %.1f GB/s\n\n", c.name ().c_str (),
+      copied * 1e6, bytes / copied * 1e-9);
+  std::printf ("| | us | of memcpy | of the paper's quicksort |\n");
+  std::printf ("|---|---|---|---|\n");
+  for (const auto &[name, body] : all) {
+    const double seconds = medians.seconds (name);
+    if (seconds > 0.0)
+      std::printf ("| %s | %.1f | %.3f | %.1f |\n", name.c_str (),
+          seconds * 1e6, copied / seconds, sorted / seconds);
+  }
+  std::fflush (stdout);
+}
+
+} // namespace
+
+int
+main (int argc, char **argv)
+{
+  /* Contenders take turns, so that what disturbs one disturbs all. */
+  std::vector<const char *> arguments = {argv[0], "--benchmark_repetitions=9",
+      "--benchmark_min_time=0.02",
+      "--benchmark_enable_random_interleaving=true"};
+  std::string picked = ".*";
+  for (int i = 1; i < argc; i++) {
+    if (std::strncmp (argv[i], "--", 2) == 0)
+      arguments.push_back (argv[i]);
+    else
+      picked = argv[i];
+  }
+  int count = int (arguments.size ());
+  benchmark::Initialize (&count, const_cast<char **> (arguments.data ()));
+
+  std::printf ("Extraction for %s, one thread, %d frames in the pools\n",
+      std::string (extract_targets ().front ()).c_str (), kRing);
+  for (const auto &[width, height] :
+      {std::pair (768, 576), {1920, 1080}, {4096, 3072}})
+    for (const int depth : {8, 16})
+      for (const auto &[columns, rows] :
+          {std::pair (2, 2), {3, 3}, {4, 4}, {9, 9}, {16, 16}}) {
+        const Case c = {width, height, depth, columns, rows};
+        if (!std::regex_search (c.name (), std::regex (picked)))
+          continue;
+        if (depth == 8)
+          run_case<std::uint8_t> (c);
+        else
+          run_case<std::uint16_t> (c);
+      }
+}

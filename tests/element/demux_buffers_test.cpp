@@ -461,8 +461,9 @@ TEST_F (DemuxBuffers, MetasOfTheFrameAreOnEverySubframe)
     EXPECT_EQ (region->w, 5u);
     EXPECT_EQ (region->h, 3u);
     EXPECT_FALSE (gst_buffer_get_video_crop_meta (buffer.get ()));
-    if (const auto *layout = gst_buffer_get_video_meta (buffer.get ()))
-      EXPECT_EQ (int (layout->width), kWidth / 2);
+    const auto *layout = gst_buffer_get_video_meta (buffer.get ());
+    ASSERT_TRUE (layout);
+    EXPECT_EQ (int (layout->width), kWidth / 2);
     EXPECT_EQ (
         gst_buffer_get_n_meta (buffer.get (), GST_VIDEO_META_API_TYPE), 1u);
   }

@@ -208,7 +208,7 @@ TEST_F (DemuxQos, MessageSaysWhenTheStreamIsNotLive)
   start ("qos=true");
   upstream->live = FALSE;
   push (0);
-  report_late (40 * kMs, 0 * kMs + 5 * kMs);
+  report_late (40 * kMs, 5 * kMs);
   push (40 * kMs);
   const MessagePtr message = demux->message (GST_MESSAGE_QOS);
   ASSERT_TRUE (message);

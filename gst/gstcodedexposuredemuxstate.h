@@ -196,6 +196,13 @@ struct DemuxState {
   Stream stream;
 };
 
+/* Properties. */
+void install_properties (GObjectClass *klass);
+/** Reads @p text, outside of the lock, and keeps both; null for an empty one.
+ */
+std::shared_ptr<const Result<Schedule>> set_schedule (
+    GstCodedExposureDemux *self, const std::string &text);
+
 DemuxState &state (GstCodedExposureDemux *self);
 std::shared_ptr<const Outputs> outputs (GstCodedExposureDemux *self);
 /** Notifies of a property that the streaming thread changed. */

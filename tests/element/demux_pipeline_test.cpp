@@ -1,0 +1,262 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* codedexposure-demux in pipelines of real elements. */
+#include "harness.h"
+
+#include "gstcodedexposuremeta.h"
+#include "schedule/sample_grid.h"
+
+namespace
+{
+
+using namespace cexp;
+using namespace cexp::gst;
+using namespace cexp::test;
+
+/* Long enough for a loaded machine; only a pipeline that hangs uses it up. */
+constexpr GstClockTime kPatience = 60 * GST_SECOND;
+
+class Pipeline
+{
+public:
+  explicit Pipeline (const std::string &line)
+  {
+    GError *error = nullptr;
+    GstElement *made = gst_parse_launch (line.c_str (), &error);
+    EXPECT_EQ (error, nullptr) << error->message;
+    pipeline_.reset (GST_ELEMENT (gst_object_ref_sink (made)));
+    bus_.reset (gst_element_get_bus (made));
+  }
+  ~Pipeline () { gst_element_set_state (pipeline_.get (), GST_STATE_NULL); }
+
+  ObjectPtr<GstElement> operator[] (const char *name) const
+  {
+    return ObjectPtr<GstElement> (
+        gst_bin_get_by_name (GST_BIN (pipeline_.get ()), name));
+  }
+  ObjectPtr<GstPad> pad (const char *element, const char *name) const
+  {
+    return ObjectPtr<GstPad> (
+        gst_element_get_static_pad ((*this)[element].get (), name));
+  }
+
+  /** Plays to the end; the error that ended it otherwise, or "". */
+  std::string play ()
+  {
+    gst_element_set_state (pipeline_.get (), GST_STATE_PLAYING);
+    const MessagePtr message (gst_bus_timed_pop_filtered (bus_.get (),
+        kPatience, GstMessageType (GST_MESSAGE_EOS | GST_MESSAGE_ERROR)));
+    if (!message)
+      return "the pipeline hangs";
+    if (GST_MESSAGE_TYPE (message.get ()) == GST_MESSAGE_EOS)
+      return "";
+    GError *error = nullptr;
+    gst_message_parse_error (message.get (), &error, nullptr);
+    const std::string text = error->message;
+    g_error_free (error);
+    return text;
+  }
+
+private:
+  ObjectPtr<GstElement> pipeline_;
+  ObjectPtr<GstBus> bus_;
+};
+
+/* Pictures and times of all buffers that pass a pad. */
+template <typename Pixel>
+class Watch
+{
+public:
+  explicit Watch (ObjectPtr<GstPad> pad) : pad_ (std::move (pad))
+  {
+    gst_pad_add_probe (
+        pad_.get (), GST_PAD_PROBE_TYPE_BUFFER,
+        [] (GstPad *from, GstPadProbeInfo *info, gpointer user_data) {
+          static_cast<Watch *> (user_data)->note (
+              from, GST_PAD_PROBE_INFO_BUFFER (info));
+          return GST_PAD_PROBE_OK;
+        },
+        this, nullptr);
+  }
+  std::vector<Image<Pixel>> images;
+  std::vector<GstClockTime> times;
+
+private:
+  void note (GstPad *from, GstBuffer *buffer)
+  {
+    const CapsPtr caps (gst_pad_get_current_caps (from));
+    images.push_back (image_of<Pixel> (buffer, caps.get ()));
+    times.push_back (GST_BUFFER_PTS (buffer));
+  }
+  ObjectPtr<GstPad> pad_;
+};
+
+struct BenchCase {
+  const char *name;
+  const char *schedule;
+  const char *rate;
+  const char *format;
+  int frames;
+};
+
+class DemuxBench : public ::testing::TestWithParam<BenchCase>
+{
+};
+
+INSTANTIATE_TEST_SUITE_P (Schedules, DemuxBench,
+    ::testing::Values (
+        BenchCase{"raster", "sequential:2x2", "100/1", "GRAY8", 40},
+        BenchCase{"raster_ntsc", "sequential:2x2", "120000/1001", "GRAY8", 40},
+        BenchCase{"raster_deep", "sequential:3x2", "150/1", "GRAY16_LE", 36},
+        BenchCase{"lattice", "sequential:lattice:4/2", "100/1", "GRAY8", 40},
+        BenchCase{"reordered", "sequential:lattice:8/3,order=bit-reversal",
+            "200/1", "GRAY8", 40},
+        BenchCase{"pilot", "sequential:2x2,pilot=8", "100/1", "GRAY8", 40}),
+    [] (const auto &info) { return info.param.name; });
+
+/* Point samples of every input frame, where the mirrors of its slot were. */
+template <typename Pixel>
+void
+check_bench (const BenchCase &c)
+{
+  const Schedule schedule = *Schedule::from_preset (c.schedule);
+  Pipeline pipeline (
+      "videotestsrc pattern=ball num-buffers=" + std::to_string (c.frames) +
+      " ! video/x-raw,format=" + c.format + ",width=66,height=50,framerate=" +
+      c.rate + " ! codedexposure-sim name=sim schedule=\"" + c.schedule +
+      "\" ! queue ! codedexposure-demux name=demux ! fakesink");
+  Watch<Pixel> in (pipeline.pad ("sim", "sink"));
+  Watch<Pixel> out (pipeline.pad ("demux", "src"));
+  ASSERT_EQ (pipeline.play (), "");
+
+  const SampleGrid grid (schedule);
+  const Extent cell = grid.cell ();
+  ASSERT_EQ (in.images.size (), std::size_t (c.frames));
+  ASSERT_EQ (out.images.size (), in.images.size ());
+  for (std::size_t i = 0; i < in.images.size (); i++) {
+    SCOPED_TRACE (i);
+    /* The demux has the time of the coded frame and the rate, both rounded to
+     * a nanosecond; the source has rounded the time of each frame itself. */
+    EXPECT_NEAR (double (out.times[i]), double (in.times[i]), 1.0);
+    const int slot = int (i) % schedule.slots ();
+    EXPECT_EQ (
+        out.images[i], draw<Pixel> (out.images[i].width (),
+                           out.images[i].height (), [&] (int x, int y) {
+                             const Offset d = grid.offset (slot, x, y);
+                             return in.images[i].at (
+                                 x * cell.width + d.x, y * cell.height + d.y);
+                           }));
+  }
+}
+
+TEST_P (DemuxBench, GivesThePointSamplesOfTheInput)
+{
+  if (std::string (GetParam ().format) == "GRAY8")
+    check_bench<std::uint8_t> (GetParam ());
+  else
+    check_bench<std::uint16_t> (GetParam ());
+}
+
+TEST (DemuxPipeline, PrerollsWithAQueueAfterEveryPad)
+{
+  Pipeline pipeline (
+      "videotestsrc num-buffers=40 ! "
+      "video/x-raw,format=GRAY8,width=64,height=48,framerate=100/1 ! "
+      "codedexposure-sim ! codedexposure-demux name=demux "
+      "demux.src ! queue ! fakesink sync=true name=all "
+      "demux.subframe_0 ! queue ! fakesink sync=true "
+      "demux.subframe_3 ! queue ! fakesink sync=true "
+      "demux.coded ! queue ! fakesink sync=true");
+  Watch<std::uint8_t> all (pipeline.pad ("demux", "src"));
+  Watch<std::uint8_t> first (pipeline.pad ("demux", "subframe_0"));
+  Watch<std::uint8_t> coded (pipeline.pad ("demux", "coded"));
+  ASSERT_EQ (pipeline.play (), "");
+  EXPECT_EQ (all.images.size (), 40u);
+  EXPECT_EQ (coded.images.size (), 10u);
+  ASSERT_EQ (first.images.size (), 10u);
+  for (std::size_t i = 0; i < 10; i++)
+    EXPECT_EQ (first.images[i], all.images[4 * i]);
+}
+
+TEST (DemuxPipeline, SubframesRunThroughConvertersAndKeepTheirMeta)
+{
+  Pipeline pipeline (
+      "videotestsrc num-buffers=8 ! "
+      "video/x-raw,format=GRAY8,width=64,height=48,framerate=100/1 ! "
+      "codedexposure-sim ! codedexposure-demux ! videoconvertscale ! "
+      "video/x-raw,format=I420,width=128,height=96 ! queue ! "
+      "identity name=last ! fakesink");
+  std::vector<std::pair<guint64, int>> seen;
+  gst_pad_add_probe (
+      pipeline.pad ("last", "sink").get (), GST_PAD_PROBE_TYPE_BUFFER,
+      [] (GstPad *, GstPadProbeInfo *info, gpointer user_data) {
+        const auto meta = get_frame_meta (GST_PAD_PROBE_INFO_BUFFER (info));
+        EXPECT_TRUE (meta);
+        if (meta)
+          static_cast<decltype (seen) *> (user_data)->emplace_back (
+              meta->frame, meta->subframe);
+        return GST_PAD_PROBE_OK;
+      },
+      &seen, nullptr);
+  ASSERT_EQ (pipeline.play (), "");
+  EXPECT_EQ (seen, (std::vector<std::pair<guint64, int>>{{0, 0}, {0, 1}, {0, 2},
+                       {0, 3}, {1, 0}, {1, 1}, {1, 2}, {1, 3}}));
+}
+
+TEST (DemuxPipeline, TwoInOneProcessDoNotKnowOfEachOther)
+{
+  Pipeline pipeline (
+      "videotestsrc num-buffers=36 ! "
+      "video/x-raw,format=GRAY8,width=72,height=72,framerate=900/1 ! tee "
+      "name=t "
+      "t. ! queue ! codedexposure-sim schedule=sequential:2x2 ! "
+      "codedexposure-demux name=four ! fakesink async=false "
+      "t. ! queue ! codedexposure-sim schedule=sequential:3x3 ! "
+      "codedexposure-demux name=nine ! fakesink async=false");
+  ASSERT_EQ (pipeline.play (), "");
+  const auto in_force = [&] (const char *name) {
+    return text_property (pipeline[name].get (), "schedule-in-force");
+  };
+  const auto frames = [&] (const char *name) {
+    return property<guint64> (pipeline[name].get (), "frames-in");
+  };
+  EXPECT_EQ (in_force ("four"), "sequential:2x2");
+  EXPECT_EQ (in_force ("nine"), "sequential:3x3");
+  EXPECT_EQ (frames ("four"), 9u);
+  EXPECT_EQ (frames ("nine"), 4u);
+}
+
+TEST (DemuxPipeline, SeekStartsANewStretchOfTime)
+{
+  Pipeline pipeline (
+      "videotestsrc num-buffers=400 ! "
+      "video/x-raw,format=GRAY8,width=64,height=48,framerate=25/1 ! "
+      "codedexposure-demux name=demux schedule=sequential:2x2 ! queue ! "
+      "fakesink name=sink");
+  const ObjectPtr<GstElement> sink = pipeline["sink"];
+  const ObjectPtr<GstElement> demux = pipeline["demux"];
+  GstObject *top = GST_OBJECT_PARENT (demux.get ());
+  gst_element_set_state (GST_ELEMENT (top), GST_STATE_PAUSED);
+  ASSERT_EQ (
+      gst_element_get_state (GST_ELEMENT (top), nullptr, nullptr, kPatience),
+      GST_STATE_CHANGE_SUCCESS);
+  Watch<std::uint8_t> out (pipeline.pad ("demux", "src"));
+  ASSERT_TRUE (gst_element_seek (GST_ELEMENT (top), 1.0, GST_FORMAT_TIME,
+      GST_SEEK_FLAG_FLUSH, GST_SEEK_TYPE_SET, 4 * GST_SECOND, GST_SEEK_TYPE_SET,
+      5 * GST_SECOND));
+  ASSERT_EQ (pipeline.play (), "");
+  ASSERT_EQ (out.times.size (), 100u);
+  EXPECT_EQ (out.times.front (), 4 * GST_SECOND);
+  EXPECT_EQ (out.times.back (), 5 * GST_SECOND - 10 * GST_MSECOND);
+  EXPECT_EQ (property<guint64> (demux.get (), "frames-lost"), 0u);
+}
+
+TEST (DemuxPipeline, ErrorReachesTheBusOnceAndStopsThePipeline)
+{
+  Pipeline pipeline (
+      "videotestsrc ! video/x-raw,format=GRAY8,width=64,height=48,"
+      "framerate=0/1 ! codedexposure-demux schedule=sequential:2x2 ! "
+      "fakesink");
+  EXPECT_NE (pipeline.play ().find ("frame-rate"), std::string::npos);
+}
+
+} // namespace

@@ -2,7 +2,6 @@
 #include "schedule/sample_grid.h"
 
 #include <algorithm>
-#include <numeric>
 
 namespace cexp
 {
@@ -12,8 +11,7 @@ SampleGrid::SampleGrid (const Schedule &schedule)
       cell_ (schedule.cell ())
 {
   const Tile &tile = schedule.tile ();
-  repeat_ = {std::lcm (tile.period_x (), cell_.width) / cell_.width,
-      std::lcm (tile.period_y (), cell_.height) / cell_.height};
+  repeat_ = {tile.period_x () / cell_.width, tile.period_y () / cell_.height};
   offsets_.resize (std::size_t (repeat_.width * repeat_.height * elements_));
 
   for (int y = 0; y < repeat_.height * cell_.height; y++) {

@@ -80,7 +80,8 @@ public:
   /**
    * The squarest block W x H, W H = n, that holds each label exactly once
    * wherever it is placed on the grid of its own size that starts at @p phase;
-   * the wider of two equally square ones. Error when there is none.
+   * the wider of two equally square ones. Its sides divide the period. Error
+   * when there is none.
    */
   Result<Extent> cell (Offset phase = {}) const;
 

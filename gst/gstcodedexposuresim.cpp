@@ -279,27 +279,55 @@ stop (GstBaseTransform *trans)
   return TRUE;
 }
 
+gboolean
+take_caps (GstCodedExposureSim *self, GstEvent *event)
+{
+  auto *parent = GST_BASE_TRANSFORM_CLASS (gst_coded_exposure_sim_parent_class);
+  const EventPtr kept (gst_event_ref (event));
+  if (parent->sink_event (GST_BASE_TRANSFORM (self), event))
+    return TRUE;
+  GstCaps *caps = nullptr;
+  gst_event_parse_caps (kept.get (), &caps);
+  sim::explain_refusal (self, caps);
+  return FALSE;
+}
+
 /* The tag follows the segment at once, since it is what the caps of a
  * demultiplexer wait for. */
+gboolean
+take_segment (GstCodedExposureSim *self, GstEvent *event)
+{
+  auto *parent = GST_BASE_TRANSFORM_CLASS (gst_coded_exposure_sim_parent_class);
+  sim::restart (self, sim::Drop::kSegment);
+  if (!parent->sink_event (GST_BASE_TRANSFORM (self), event))
+    return FALSE;
+  sim::push_tag (self);
+  return TRUE;
+}
+
 gboolean
 sink_event (GstBaseTransform *trans, GstEvent *event)
 {
   auto *self = GST_CODED_EXPOSURE_SIM (trans);
-  auto *parent = GST_BASE_TRANSFORM_CLASS (gst_coded_exposure_sim_parent_class);
-  const GstEventType type = GST_EVENT_TYPE (event);
-  if (type == GST_EVENT_STREAM_START)
+  switch (GST_EVENT_TYPE (event)) {
+  case GST_EVENT_CAPS:
+    return take_caps (self, event);
+  case GST_EVENT_SEGMENT:
+    return take_segment (self, event);
+  case GST_EVENT_STREAM_START:
     self->state->stream.tag_due = true;
-  else if (type == GST_EVENT_EOS)
+    break;
+  case GST_EVENT_EOS:
     sim::drop_exposure (self, sim::Drop::kEos);
-  else if (type == GST_EVENT_FLUSH_STOP)
+    break;
+  case GST_EVENT_FLUSH_STOP:
     sim::restart (self, sim::Drop::kFlush);
-  else if (type == GST_EVENT_SEGMENT)
-    sim::restart (self, sim::Drop::kSegment);
-
-  const gboolean handled = parent->sink_event (trans, event);
-  if (type == GST_EVENT_SEGMENT && handled)
-    sim::push_tag (self);
-  return handled;
+    break;
+  default:
+    break;
+  }
+  return GST_BASE_TRANSFORM_CLASS (gst_coded_exposure_sim_parent_class)
+      ->sink_event (trans, event);
 }
 
 /* A coded frame leaves with its last input frame, and is stamped with the

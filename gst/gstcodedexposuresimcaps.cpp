@@ -209,6 +209,15 @@ set_latency (GstCodedExposureSim *self, GstClockTime latency)
       GST_ELEMENT (self), gst_message_new_latency (GST_OBJECT (self)));
 }
 
+/* A source offers the same caps again and again before it gives up; the bus
+ * hears of it once. */
+void
+refuse (GstCodedExposureSim *self, const std::string &why)
+{
+  if (std::exchange (state (self).stream.refused, why) != why)
+    GST_ELEMENT_ERROR (self, STREAM, FORMAT, ("%s", why.c_str ()), (nullptr));
+}
+
 } // namespace
 
 bool
@@ -219,10 +228,7 @@ make_plan (
   stream.plan.reset ();
   Result<Plan> made = plan_for (in, out, *stream.schedule);
   if (!made) {
-    /* A source offers the same caps again and again before it gives up. */
-    const std::string &why = made.error ().message;
-    if (std::exchange (stream.refused, why) != why)
-      GST_ELEMENT_ERROR (self, STREAM, FORMAT, ("%s", why.c_str ()), (nullptr));
+    refuse (self, made.error ().message);
     return false;
   }
   GST_INFO_OBJECT (self, "%d input frames in a coded frame", made->inputs);
@@ -232,6 +238,24 @@ make_plan (
   set_latency (
       self, gst_util_uint64_scale (GST_SECOND, held * in.fps_d, in.fps_n));
   return true;
+}
+
+void
+explain_refusal (GstCodedExposureSim *self, GstCaps *incaps)
+{
+  auto *trans = GST_BASE_TRANSFORM (self);
+  const CapsPtr possible (
+      transform_caps (trans, GST_PAD_SINK, incaps, nullptr));
+  const CapsPtr wanted (
+      gst_pad_peer_query_caps (GST_BASE_TRANSFORM_SRC_PAD (trans), nullptr));
+  if (gst_caps_can_intersect (possible.get (), wanted.get ()))
+    return;
+  const auto text = [] (const CapsPtr &caps) {
+    return std::string (CharPtr (gst_caps_to_string (caps.get ())).get ());
+  };
+  refuse (self, "Downstream takes \"" + text (wanted) +
+                    "\", but the coded frames of this input can only be \"" +
+                    text (possible) + "\".");
 }
 
 gboolean

@@ -100,6 +100,8 @@ gboolean set_info (GstVideoFilter *filter, GstCaps *incaps,
  * be none, with an error on the bus that is not repeated. */
 bool make_plan (
     GstCodedExposureSim *self, const GstVideoInfo &in, const GstVideoInfo &out);
+/** Says on the bus when it is downstream that has no caps for @incaps. */
+void explain_refusal (GstCodedExposureSim *self, GstCaps *incaps);
 
 /* Frames. */
 /** Looks for the DMD and for what is to be done first; posts an error and

@@ -1,0 +1,554 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* codedexposure-sim: times, gaps, events, caps and what is said of them. */
+#include "gstcodedexposuretag.h"
+#include "sim_harness.h"
+
+namespace
+{
+
+using namespace cexp;
+using namespace cexp::test;
+
+void
+push_segment (SimHarness &sim, gdouble rate, GstClockTime start)
+{
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_TIME);
+  segment.rate = rate;
+  segment.start = segment.time = start;
+  sim.push_event (gst_event_new_segment (&segment));
+}
+
+/* PTS of all coded frames there are, in milliseconds, negative where DISCONT.
+ */
+std::vector<int>
+times_of (SimHarness &sim)
+{
+  std::vector<int> times;
+  while (const BufferPtr coded = sim.pull ()) {
+    const int ms = int (GST_BUFFER_PTS (coded.get ()) / kMs);
+    times.push_back (GST_BUFFER_IS_DISCONT (coded.get ()) ? -ms : ms);
+  }
+  return times;
+}
+
+struct Dropped {
+  std::string reason;
+  int pts, inputs, needed;
+  guint64 all;
+  bool operator== (const Dropped &) const = default;
+};
+
+std::optional<Dropped>
+dropped (SimHarness &sim)
+{
+  const MessagePtr message =
+      sim.element_message ("codedexposure/frame-dropped");
+  if (!message)
+    return std::nullopt;
+  const GstStructure *s = gst_message_get_structure (message.get ());
+  Dropped drop;
+  drop.reason = gst_structure_get_string (s, "reason");
+  guint64 pts = 0;
+  EXPECT_TRUE (gst_structure_get (s, "pts", G_TYPE_UINT64, &pts, "inputs",
+      G_TYPE_INT, &drop.inputs, "needed", G_TYPE_INT, &drop.needed,
+      "frames-dropped", G_TYPE_UINT64, &drop.all, nullptr));
+  drop.pts = int (pts / kMs);
+  return drop;
+}
+
+struct Rate {
+  int num, den;
+};
+
+class SimRates : public ::testing::TestWithParam<Rate>
+{
+};
+
+TEST_P (SimRates, CodedFramesAreStampedWithTheirFirstInputFrame)
+{
+  const auto [num, den] = GetParam ();
+  SimHarness sim;
+  sim.start (2, 2, 4 * num, den);
+  for (int frame = 0; frame < 1000; frame++) {
+    sim.send_range (4 * frame, 4 * frame + 4);
+    const BufferPtr coded = sim.pull ();
+    ASSERT_TRUE (coded);
+    ASSERT_EQ (GST_BUFFER_PTS (coded.get ()), sim.time (4 * frame));
+    ASSERT_EQ (GST_BUFFER_DTS (coded.get ()), GST_CLOCK_TIME_NONE);
+    ASSERT_EQ (GST_BUFFER_DURATION (coded.get ()),
+        gst_util_uint64_scale (GST_SECOND, den, num));
+    ASSERT_EQ (GST_BUFFER_OFFSET (coded.get ()), guint64 (frame));
+    ASSERT_EQ (GST_BUFFER_OFFSET_END (coded.get ()), guint64 (frame) + 1);
+    ASSERT_EQ (bool (GST_BUFFER_IS_DISCONT (coded.get ())), frame == 0);
+  }
+  EXPECT_EQ (sim.counter ("frames-out"), 1000u);
+  EXPECT_EQ (sim.counter ("frames-dropped"), 0u);
+}
+
+/* Matroska keeps milliseconds. */
+TEST_P (SimRates, RoundedTimeStampsAreNoGaps)
+{
+  const auto [num, den] = GetParam ();
+  SimHarness sim;
+  sim.start (2, 2, 4 * num, den);
+  for (int k = 0; k < 400; k++) {
+    const GstClockTime rounded = (sim.time (k) + kMs / 2) / kMs * kMs;
+    ASSERT_EQ (
+        sim.push (frame_of (flat<std::uint8_t> (2, 2, 9), 5 * kMs + rounded)),
+        GST_FLOW_OK);
+  }
+  EXPECT_EQ (sim.counter ("frames-out"), 100u);
+  EXPECT_EQ (sim.counter ("frames-dropped"), 0u);
+}
+
+TEST_P (SimRates, LatencyIsFromTheFirstInputFrameToTheLast)
+{
+  const auto [num, den] = GetParam ();
+  SimHarness sim;
+  gst_harness_set_upstream_latency (sim.get (), 7 * kMs);
+  sim.start (2, 2, 4 * num, den);
+  EXPECT_TRUE (sim.message (GST_MESSAGE_LATENCY));
+  EXPECT_EQ (gst_harness_query_latency (sim.get ()), 7 * kMs + sim.time (3));
+}
+
+INSTANTIATE_TEST_SUITE_P (Rates, SimRates,
+    ::testing::Values (Rate{25, 1}, Rate{30000, 1001}, Rate{50, 1}));
+
+TEST (SimTime, GapDropsTheExposureAndStartsTheNext)
+{
+  SimHarness sim;
+  sim.start (2, 2);
+  sim.send_range (0, 6);
+  sim.send_range (7, 15);
+  EXPECT_EQ (times_of (sim), (std::vector<int>{0, -70, 110}));
+  EXPECT_EQ (dropped (sim), (Dropped{"gap", 40, 2, 4, 1}));
+  EXPECT_EQ (sim.counter ("frames-dropped"), 1u);
+  EXPECT_EQ (sim.warning (),
+      "A gap in the input after 2 of 4 input frames of the coded frame at "
+      "0:00:00.040000000, which is dropped.");
+
+  sim.send_range (16, 22);
+  EXPECT_EQ (dropped (sim), std::nullopt) << "a gap between two exposures";
+  sim.send_range (23, 24);
+  EXPECT_EQ (dropped (sim), (Dropped{"gap", 200, 2, 4, 2}));
+  EXPECT_EQ (sim.warning (), "") << "said once";
+  EXPECT_EQ (times_of (sim), (std::vector<int>{-160}));
+}
+
+TEST (SimTime, DiscontInAnExposureIsAGap)
+{
+  SimHarness sim;
+  sim.start (2, 2);
+  sim.send_range (0, 6);
+  BufferPtr frame = frame_of (flat<std::uint8_t> (2, 2, 0), sim.time (6));
+  GST_BUFFER_FLAG_SET (frame.get (), GST_BUFFER_FLAG_DISCONT);
+  ASSERT_EQ (sim.push (std::move (frame)), GST_FLOW_OK);
+  sim.send_range (7, 14);
+  EXPECT_EQ (dropped (sim), (Dropped{"gap", 40, 2, 4, 1}));
+  EXPECT_EQ (times_of (sim), (std::vector<int>{0, -60, 100}));
+}
+
+TEST (SimTime, TimeThatRunsBackwardsIsAGap)
+{
+  SimHarness sim;
+  sim.start (2, 2);
+  sim.send_range (100, 106);
+  sim.send_range (2, 6);
+  EXPECT_EQ (times_of (sim), (std::vector<int>{-1000, -20}));
+  EXPECT_EQ (dropped (sim), (Dropped{"gap", 1040, 2, 4, 1}));
+}
+
+TEST (SimTime, EndOfStreamDropsWhatIsNotComplete)
+{
+  SimHarness sim;
+  sim.start (2, 2);
+  sim.send_range (0, 7);
+  EXPECT_TRUE (sim.push_event (gst_event_new_eos ()));
+  EXPECT_TRUE (sim.pull_event (GST_EVENT_EOS));
+  EXPECT_EQ (times_of (sim), (std::vector<int>{0}));
+  EXPECT_EQ (dropped (sim), (Dropped{"eos", 40, 3, 4, 1}));
+  EXPECT_EQ (sim.warning (), "");
+}
+
+TEST (SimTime, EndOfStreamInfoSaysHowFarTheExposureGot)
+{
+  SimHarness sim;
+  sim.start (2, 2);
+  sim.send_range (0, 7);
+  sim.push_event (gst_event_new_eos ());
+  const MessagePtr info = sim.message (GST_MESSAGE_INFO);
+  ASSERT_TRUE (info);
+  gchar *debug = nullptr;
+  gst_message_parse_info (info.get (), nullptr, &debug);
+  EXPECT_NE (std::string (CharPtr (debug).get ())
+                 .find ("ended after 3 of 4 input frames of the coded frame at "
+                        "0:00:00.040000000"),
+      std::string::npos);
+}
+
+TEST (SimTime, CompleteStreamEndsWithoutAWord)
+{
+  SimHarness sim;
+  sim.start (2, 2);
+  sim.send_range (0, 8);
+  sim.push_event (gst_event_new_eos ());
+  EXPECT_FALSE (sim.message (GST_MESSAGE_INFO));
+  EXPECT_EQ (dropped (sim), std::nullopt);
+}
+
+TEST (SimTime, FlushStartsAnew)
+{
+  SimHarness sim;
+  sim.start (2, 2);
+  sim.send_range (0, 7);
+  EXPECT_EQ (times_of (sim), (std::vector<int>{0}));
+  sim.push_event (gst_event_new_flush_start ());
+  sim.push_event (gst_event_new_flush_stop (TRUE));
+  push_segment (sim, 1.0, 90 * kMs);
+  sim.send_range (9, 17);
+  EXPECT_EQ (dropped (sim), (Dropped{"flush", 40, 3, 4, 1}));
+  EXPECT_EQ (times_of (sim), (std::vector<int>{-90, 130}));
+  EXPECT_EQ (sim.warning (), "") << "asked for by the application";
+}
+
+TEST (SimTime, SegmentStartsAnew)
+{
+  SimHarness sim;
+  sim.start (2, 2);
+  sim.send_range (0, 5);
+  push_segment (sim, 1.0, 0);
+  sim.send_range (5, 9);
+  EXPECT_EQ (dropped (sim), (Dropped{"segment", 40, 1, 4, 1}));
+  EXPECT_EQ (times_of (sim), (std::vector<int>{0, -50}));
+}
+
+TEST (SimTime, NewCapsStartAnew)
+{
+  SimHarness sim;
+  sim.start (2, 2);
+  sim.send_range (0, 6);
+  sim.start (6, 4, 200, 1, "GRAY16_LE");
+  for (int k = 0; k < 4; k++)
+    ASSERT_EQ (sim.push (frame_of (
+                   flat<std::uint16_t> (6, 4, 40000), sim.time (12 + k))),
+        GST_FLOW_OK);
+  EXPECT_EQ (dropped (sim), (Dropped{"caps", 40, 2, 4, 1}));
+  sim.pull ();
+  EXPECT_EQ (sim.coded<std::uint16_t> (), (flat<std::uint16_t> (6, 4, 40000)));
+}
+
+TEST (SimTime, SecondRunKnowsNothingOfTheFirst)
+{
+  SimHarness sim ("full-well=500");
+  std::vector<Image<std::uint8_t>> runs;
+  for (int run = 0; run < 2; run++) {
+    sim.push_event (gst_event_new_stream_start ("stream"));
+    sim.start (20, 20);
+    push_segment (sim, 1.0, 0);
+    for (int k = 0; k < 6; k++)
+      ASSERT_EQ (sim.send (k, 77), GST_FLOW_OK);
+    runs.push_back (sim.coded ());
+    EXPECT_EQ (sim.counter ("frames-out"), 1u);
+    gst_element_set_state (sim.element (), GST_STATE_READY);
+    EXPECT_EQ (sim.counter ("frames-out"), 1u) << "until the next run";
+    gst_element_set_state (sim.element (), GST_STATE_PLAYING);
+    EXPECT_EQ (sim.counter ("frames-out"), 0u);
+  }
+  EXPECT_EQ (runs[0], runs[1]) << "noise, too, starts anew";
+}
+
+TEST (SimTime, CorruptedInputMakesACorruptedFrame)
+{
+  SimHarness sim;
+  sim.start (2, 2);
+  for (int k = 0; k < 8; k++) {
+    BufferPtr frame = frame_of (flat<std::uint8_t> (2, 2, 0), sim.time (k));
+    if (k == 2)
+      GST_BUFFER_FLAG_SET (frame.get (), GST_BUFFER_FLAG_CORRUPTED);
+    sim.push (std::move (frame));
+  }
+  for (const bool corrupted : {true, false})
+    EXPECT_EQ (bool (GST_BUFFER_FLAG_IS_SET (
+                   sim.pull ().get (), GST_BUFFER_FLAG_CORRUPTED)),
+        corrupted);
+}
+
+TEST (SimTime, FrameWithoutTimeStampIsAnError)
+{
+  SimHarness sim;
+  sim.start (2, 2);
+  EXPECT_EQ (
+      sim.push (frame_of (flat<std::uint8_t> (2, 2, 0), GST_CLOCK_TIME_NONE)),
+      GST_FLOW_ERROR);
+  EXPECT_NE (sim.error ().find ("no time stamp"), std::string::npos);
+}
+
+TEST (SimTime, ReversePlaybackIsAnError)
+{
+  SimHarness sim;
+  sim.start (2, 2);
+  push_segment (sim, -1.0, 0);
+  EXPECT_EQ (sim.send (0), GST_FLOW_ERROR);
+  EXPECT_NE (sim.error ().find ("positive rate"), std::string::npos);
+}
+
+std::string
+schedule_in (GstEvent *event)
+{
+  GstTagList *tags = nullptr;
+  gst_event_parse_tag (event, &tags);
+  const auto schedule = schedule_from_tags (tags);
+  return schedule && *schedule ? (*schedule)->text () : "";
+}
+
+TEST (SimTag, SaysTheScheduleOnceAndBeforeTheFirstFrame)
+{
+  SimHarness sim ("schedule=staircase:3x3,leak=0.01");
+  sim.start (3, 3, 900, 4);
+  const EventPtr event = sim.pull_event (GST_EVENT_TAG);
+  ASSERT_TRUE (event) << "with the segment";
+  EXPECT_EQ (schedule_in (event.get ()), "staircase:3x3,leak=0.01");
+  sim.send_range (0, 18);
+  push_segment (sim, 1.0, 0);
+  sim.send_range (18, 27);
+  EXPECT_FALSE (sim.pull_event (GST_EVENT_TAG));
+  EXPECT_EQ (sim.counter ("frames-out"), 3u);
+}
+
+TEST (SimTag, IsSaidAgainForANewStream)
+{
+  SimHarness sim;
+  sim.start (2, 2);
+  EXPECT_TRUE (sim.pull_event (GST_EVENT_TAG));
+  sim.push_event (gst_event_new_stream_start ("another"));
+  push_segment (sim, 1.0, 0);
+  const EventPtr event = sim.pull_event (GST_EVENT_TAG);
+  ASSERT_TRUE (event);
+  EXPECT_EQ (schedule_in (event.get ()), "sequential:2x2");
+}
+
+TEST (SimTag, ANewScheduleIsSaidBeforeItsFirstFrame)
+{
+  SimHarness sim;
+  sim.start (2, 2);
+  EXPECT_TRUE (sim.pull_event (GST_EVENT_TAG));
+  g_object_set (sim.element (), "schedule", "staircase:2x2", nullptr);
+  sim.send_range (0, 3);
+  EXPECT_FALSE (sim.pull_event (GST_EVENT_TAG));
+  sim.send_range (3, 4);
+  const EventPtr event = sim.pull_event (GST_EVENT_TAG);
+  ASSERT_TRUE (event);
+  EXPECT_EQ (schedule_in (event.get ()), "staircase:2x2");
+}
+
+TEST (SimTag, TagsOfUpstreamPass)
+{
+  SimHarness sim;
+  sim.start (2, 2);
+  EXPECT_TRUE (sim.pull_event (GST_EVENT_TAG));
+  sim.push_event (
+      gst_event_new_tag (gst_tag_list_new (GST_TAG_TITLE, "a clip", nullptr)));
+  EXPECT_TRUE (sim.pull_event (GST_EVENT_TAG));
+}
+
+struct Ask {
+  const char *rule;
+  const char *there; ///< caps on the other side of the element
+  const char *here;
+};
+
+void
+PrintTo (const Ask &ask, std::ostream *os)
+{
+  *os << ask.rule;
+}
+
+std::string
+fields (const std::string &rate)
+{
+  return "video/x-raw,format=GRAY8,width=8,height=6,framerate=" + rate;
+}
+
+class SimSinkCaps : public ::testing::TestWithParam<Ask>
+{
+};
+
+TEST_P (SimSinkCaps, FollowThoseOfDownstream)
+{
+  SimHarness sim ("schedule=sequential:2x2");
+  gst_harness_set_sink_caps_str (
+      sim.get (), fields (GetParam ().there).c_str ());
+  const CapsPtr caps (gst_pad_peer_query_caps (sim.get ()->srcpad, nullptr));
+  EXPECT_TRUE (same_caps (caps.get (), fields (GetParam ().here)));
+}
+
+INSTANTIATE_TEST_SUITE_P (Rates, SimSinkCaps,
+    ::testing::Values (Ask{"fixed: that times the slots, or more", "25/1",
+                           "[100/1,2147483647/1]"},
+        Ask{"odd", "30000/1001", "[120000/1001,2147483647/1]"},
+        Ask{"range", "[10/1,30/1]", "[40/1,2147483647/1]"},
+        Ask{"list", "{(fraction)25/1,(fraction)15/1}", "[60/1,2147483647/1]"},
+        Ask{"everything", "[0/1,2147483647/1]", "[0/1,2147483647/1]"}));
+
+class SimSrcCaps : public ::testing::TestWithParam<Ask>
+{
+};
+
+TEST_P (SimSrcCaps, FollowThoseOfUpstream)
+{
+  SimHarness sim ("schedule=sequential:2x2");
+  const CapsPtr upstream = caps_of (fields (GetParam ().there));
+  GstBaseTransformClass *klass = GST_BASE_TRANSFORM_GET_CLASS (sim.element ());
+  const CapsPtr caps (
+      klass->transform_caps (GST_BASE_TRANSFORM (sim.element ()), GST_PAD_SINK,
+          upstream.get (), nullptr));
+  EXPECT_TRUE (same_caps (caps.get (), fields (GetParam ().here)));
+}
+
+INSTANTIATE_TEST_SUITE_P (Rates, SimSrcCaps,
+    ::testing::Values (
+        Ask{"fixed: up to one of the slots", "100/1", "[0/1,25/1]"},
+        Ask{"odd", "120000/1001", "[0/1,30000/1001]"},
+        Ask{"range", "[40/1,200/1]", "[0/1,50/1]"},
+        Ask{"list", "{(fraction)100/1,(fraction)200/1}", "[0/1,50/1]"},
+        Ask{"unknown", "0/1", "0/1"}));
+
+struct Negotiation {
+  const char *in, *downstream, *out;
+};
+
+class SimRate : public ::testing::TestWithParam<Negotiation>
+{
+};
+
+TEST_P (SimRate, IsTheLargestThatDownstreamTakes)
+{
+  SimHarness sim ("schedule=sequential:2x2");
+  if (*GetParam ().downstream)
+    gst_harness_set_sink_caps_str (
+        sim.get (), fields (GetParam ().downstream).c_str ());
+  sim.set_caps (fields (GetParam ().in));
+  EXPECT_TRUE (same_caps (sim.pad_caps ().get (), fields (GetParam ().out)));
+}
+
+INSTANTIATE_TEST_SUITE_P (Rates, SimRate,
+    ::testing::Values (Negotiation{"100/1", "", "25/1"},
+        Negotiation{"30/1", "", "15/2"},
+        Negotiation{"120000/1001", "", "30000/1001"},
+        Negotiation{"200/1", "25/1", "25/1"},
+        Negotiation{"300/1", "25/1", "25/1"},
+        Negotiation{"240000/1001", "30000/1001", "30000/1001"},
+        Negotiation{"200/1", "[1/1,30/1]", "25/1"}));
+
+/* What the bus says when a frame meets an element of @properties. */
+std::string
+complaint (const std::string &properties, const std::string &caps,
+    const std::string &downstream = "")
+{
+  SimHarness sim (properties);
+  if (!downstream.empty ())
+    gst_harness_set_sink_caps_str (sim.get (), downstream.c_str ());
+  sim.set_caps (caps);
+  EXPECT_LT (
+      sim.push (frame_of (flat<std::uint8_t> (8, 6, 0), 0)), GST_FLOW_OK);
+  const std::string error = sim.error ();
+  EXPECT_EQ (sim.error (), "") << "said once";
+  return error;
+}
+
+TEST (SimError, SaysWhichRateDoesNotFit)
+{
+  EXPECT_EQ (complaint ("", fields ("200/1"), fields ("30/1")),
+      "200/1 input frames/s do not fill the 4 slots of 'sequential:2x2' evenly "
+      "at 30/1 coded frames/s; ask for 50/1 coded frames/s or a whole fraction "
+      "of it, or change the input's rate with videorate.");
+}
+
+TEST (SimError, SaysWhatDownstreamWantsInVain)
+{
+  const std::string error = complaint ("", fields ("100/1"), fields ("30/1"));
+  EXPECT_NE (error.find ("(fraction)30/1\", but"), std::string::npos) << error;
+  EXPECT_NE (error.find ("[ 0/1, 25/1 ]"), std::string::npos) << error;
+}
+
+TEST (SimError, SaysThatARateIsMissing)
+{
+  const std::string expected =
+      "The input has no frame rate, and an exposure cannot be cut into slots "
+      "without; put 'videorate ! video/x-raw,framerate=100/1' before "
+      "codedexposure-sim.";
+  EXPECT_EQ (complaint ("", fields ("0/1")), expected);
+  EXPECT_EQ (
+      complaint ("", "video/x-raw,format=GRAY8,width=8,height=6"), expected);
+}
+
+TEST (SimError, SaysThatTheSlotsDoNotFit)
+{
+  const std::string error =
+      complaint ("schedule=sequential:2x2,active=12ms", fields ("100/1"));
+  EXPECT_NE (error.find ("'sequential:2x2,active=12ms' cannot be shown"),
+      std::string::npos);
+  EXPECT_NE (error.find ("need 48ms"), std::string::npos) << error;
+}
+
+TEST (SimError, SaysWhatIsWrongWithASetting)
+{
+  EXPECT_EQ (complaint ("bits=12", fields ("100/1")),
+      "bits = 12 is more than the 8 bits of GRAY8; set fewer, or 0 for all.");
+  EXPECT_NE (
+      complaint ("read-noise=5", fields ("100/1")).find ("needs a full well"),
+      std::string::npos);
+}
+
+TEST (SimError, RefusesToStartWithWhatItCannotRead)
+{
+  for (const auto &[properties, words] :
+      {std::pair ("schedule=nonsense:2x2", "nonsense"),
+          std::pair ("schedule=/does/not/exist.json", "/does/not/exist.json"),
+          std::pair ("dmd=dlpc350", "dmd 'dlpc350' is no simulated DMD"),
+          std::pair ("dmd=sim:", "write sim:NAME")}) {
+    SCOPED_TRACE (properties);
+    const ObjectPtr<GstBus> bus (gst_bus_new ());
+    const ObjectPtr<GstElement> element (
+        GST_ELEMENT (gst_object_ref_sink (gst_parse_launch (
+            ("codedexposure-sim " + std::string (properties)).c_str (),
+            nullptr))));
+    gst_element_set_bus (element.get (), bus.get ());
+    EXPECT_EQ (gst_element_set_state (element.get (), GST_STATE_PAUSED),
+        GST_STATE_CHANGE_FAILURE);
+    const MessagePtr message (
+        gst_bus_pop_filtered (bus.get (), GST_MESSAGE_ERROR));
+    ASSERT_TRUE (message);
+    GError *error = nullptr;
+    gst_message_parse_error (message.get (), &error, nullptr);
+    EXPECT_NE (std::string (error->message).find (words), std::string::npos)
+        << error->message;
+    g_error_free (error);
+    gst_element_set_bus (element.get (), nullptr);
+    gst_element_set_state (element.get (), GST_STATE_NULL);
+  }
+}
+
+TEST (SimError, ABufferThatIsTooSmallIsSaid)
+{
+  SimHarness sim;
+  sim.start (8, 6);
+  BufferPtr buffer (gst_buffer_new_allocate (nullptr, 10, nullptr));
+  GST_BUFFER_PTS (buffer.get ()) = 0;
+  EXPECT_EQ (sim.push (std::move (buffer)), GST_FLOW_ERROR);
+  EXPECT_EQ (sim.error (), "A buffer does not hold a frame of GRAY8 8x6.");
+}
+
+TEST (SimAllocation, UpstreamMaySendVideoMeta)
+{
+  SimHarness sim;
+  sim.start (8, 6);
+  const CapsPtr caps (gst_pad_get_current_caps (sim.get ()->srcpad));
+  const QueryPtr query (gst_query_new_allocation (caps.get (), TRUE));
+  ASSERT_TRUE (gst_pad_peer_query (sim.get ()->srcpad, query.get ()));
+  EXPECT_TRUE (gst_query_find_allocation_meta (
+      query.get (), GST_VIDEO_META_API_TYPE, nullptr));
+}
+
+} // namespace

@@ -63,7 +63,8 @@ void
 break_time (GstCodedExposureDemux *self)
 {
   Stream &stream = state (self).stream;
-  stream.last_pts = GST_CLOCK_TIME_NONE;
+  if (stream.sequence)
+    stream.sequence->resync ();
   stream.live.reset ();
   forget_lateness (self);
   outputs (self)->each (

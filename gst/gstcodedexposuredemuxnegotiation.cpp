@@ -233,7 +233,7 @@ propose (GstCodedExposureDemux *self)
   GstVideoInfo subframe;
   gst_video_info_from_caps (&subframe, caps.one.get ());
   return Proposal{Plan{schedule, info, subframe, std::move (*extractor), method,
-                      slot_boundaries (rate, schedule.slots ()),
+                      rate, slot_boundaries (rate, schedule.slots ()),
                       light_windows (schedule, method, *slots)},
       std::move (caps), source->assumed};
 }
@@ -244,6 +244,10 @@ install (GstCodedExposureDemux *self, Proposal proposal)
 {
   DemuxState &st = state (self);
   Stream &stream = st.stream;
+  if (!stream.plan || !(stream.plan->rate == proposal.plan.rate)) {
+    stream.sequence.emplace (proposal.plan.rate);
+    stream.first_number = stream.next_number;
+  }
   stream.plan = std::move (proposal.plan);
   stream.stale = false;
   stream.scratch.clear ();

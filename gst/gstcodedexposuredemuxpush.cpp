@@ -58,77 +58,69 @@ start_anew (const Outputs &list)
 }
 
 void
-report_loss (GstCodedExposureDemux *self, guint64 lost, GstClockTime from,
-    GstClockTime to)
+report_loss (GstCodedExposureDemux *self, const Job &job, guint64 lost)
 {
+  const Stream &stream = state (self).stream;
+  const GstClockTime last = stream.last_pts;
+  const GstClockTime period = stream.plan->period ();
+  const GstClockTime from =
+      job.backwards ? last - std::min (last, period) : last + period;
   GST_WARNING_OBJECT (self,
       "%" G_GUINT64_FORMAT " coded frames lost from %" GST_TIME_FORMAT
       " to %" GST_TIME_FORMAT,
-      lost, GST_TIME_ARGS (from), GST_TIME_ARGS (to));
+      lost, GST_TIME_ARGS (from), GST_TIME_ARGS (job.pts));
   count (self, &Counters::frames_lost, lost);
-  post (self,
-      gst_structure_new ("codedexposure/frames-lost", "count", G_TYPE_UINT64,
-          lost, "from", G_TYPE_UINT64, from, "to", G_TYPE_UINT64, to, nullptr));
+  post (self, gst_structure_new ("codedexposure/frames-lost", "count",
+                  G_TYPE_UINT64, lost, "from", G_TYPE_UINT64, from, "to",
+                  G_TYPE_UINT64, job.pts, nullptr));
   notify (self, "frames-lost");
 }
 
 void
-warn_of_backwards_time (
-    GstCodedExposureDemux *self, GstClockTime last, GstClockTime pts)
+warn_of_wrong_time (GstCodedExposureDemux *self, const Job &job)
 {
-  if (std::exchange (state (self).stream.warned_backwards, true))
+  Stream &stream = state (self).stream;
+  if (std::exchange (stream.warned_of_time, true))
     return;
   GST_ELEMENT_WARNING (self, STREAM, FORMAT,
       ("A coded frame at %" GST_TIME_FORMAT " follows one at %" GST_TIME_FORMAT
-       ": its subframes start a new stretch of time.",
-          GST_TIME_ARGS (pts), GST_TIME_ARGS (last)),
+       ", where frames are %" GST_TIME_FORMAT " apart: its subframes overlap "
+       "others in time.",
+          GST_TIME_ARGS (job.pts), GST_TIME_ARGS (stream.last_pts),
+          GST_TIME_ARGS (stream.plan->period ())),
       ("this is said once"));
 }
 
-/* Compares the frame's time with that of the frame before; returns how many
- * frames are missing between them. The period comes from the caps: one that
- * was measured would stretch with every frame that is lost. */
-guint64
+/* Compares the frame's time with that of the frame before. */
+FrameStep
 check_time (GstCodedExposureDemux *self, const Job &job)
 {
   Stream &stream = state (self).stream;
-  const GstClockTime period = stream.plan->period ();
-  const GstClockTime last = std::exchange (stream.last_pts, job.pts);
-  if (!GST_CLOCK_TIME_IS_VALID (last))
-    return 0;
-  const GstClockTimeDiff step = job.backwards ? GST_CLOCK_DIFF (job.pts, last)
-                                              : GST_CLOCK_DIFF (last, job.pts);
-  if (step <= 0) {
-    warn_of_backwards_time (self, last, job.pts);
+  const FrameStep step =
+      stream.sequence->take (Nanoseconds (job.pts), job.backwards);
+  const bool after_late =
+      std::exchange (stream.was_late, step.arrival == Arrival::late);
+  if (step.arrival != Arrival::next || after_late)
     start_anew (*job.outputs);
-    return 0;
-  }
-  if (GstClockTime (step) <= period + period / 2)
-    return 0;
-  const guint64 lost = (GstClockTime (step) + period / 2) / period - 1;
-  const GstClockTime due =
-      job.backwards ? last - std::min (last, period) : last + period;
-  report_loss (self, lost, due, job.pts);
-  start_anew (*job.outputs);
-  return lost;
+  if (step.arrival == Arrival::after_loss)
+    report_loss (self, job, step.lost);
+  else if (step.arrival != Arrival::next && step.arrival != Arrival::first)
+    warn_of_wrong_time (self, job);
+  stream.last_pts = job.pts;
+  return step;
 }
 
 /* What the frame is known by: the meta that came with it, else our own count.
  */
 FrameMeta
-describe (GstCodedExposureDemux *self, const Job &job, guint64 lost)
+describe (GstCodedExposureDemux *self, const Job &job, const FrameStep &step)
 {
   Stream &stream = state (self).stream;
-  stream.next_frame += lost;
   FrameMeta meta;
-  if (const auto upstream = get_frame_meta (job.inbuf)) {
-    meta = *upstream;
-  } else {
-    meta.frame = stream.next_frame;
-    meta.lost_before = lost;
-  }
-  stream.next_frame++;
-  return meta;
+  meta.frame = stream.first_number + step.number;
+  meta.lost_before = step.lost;
+  stream.next_number = std::max (stream.next_number, meta.frame + 1);
+  return get_frame_meta (job.inbuf).value_or (meta);
 }
 
 void

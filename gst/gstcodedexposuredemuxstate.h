@@ -14,6 +14,7 @@
 #include <gst/video/video.h>
 
 #include "base/result.h"
+#include "clock/frame_sequence.h"
 #include "extract/extractor.h"
 #include "gstcodedexposurecaps.h"
 #include "gstcodedexposuredemux.h"
@@ -125,6 +126,7 @@ struct Plan {
   GstVideoInfo coded, subframe;
   AnyExtractor extractor;
   Method method;
+  FrameRate rate;
   /** Slot boundaries, n + 1 of them, counted from the frame's PTS. */
   std::vector<GstClockTime> boundaries;
   std::vector<Window> windows;
@@ -155,11 +157,14 @@ struct Stream {
   bool stale = true; ///< the plan has to be made again before the next frame
   /** Serialised events that wait for the caps of the source pads. */
   std::vector<EventPtr> pending;
+  std::optional<FrameSequence> sequence;
+  guint64 first_number = 0; ///< of the sequence
+  guint64 next_number = 0;
   GstClockTime last_pts = GST_CLOCK_TIME_NONE;
-  guint64 next_frame = 0;
+  bool was_late = false; ///< the last frame was
   Burst saturation;
   bool warned_assumed = false;
-  bool warned_backwards = false;
+  bool warned_of_time = false;
   std::optional<bool> live;       ///< asked for when first needed
   std::vector<std::byte> scratch; ///< subframes that no pad wants
 };

@@ -245,23 +245,63 @@ TEST_F (DemuxTime, LossIsSaidOnTheBusWithItsPlace)
 TEST_F (DemuxTime, JitterUpToHalfAPeriodIsNoLoss)
 {
   start ();
-  push_all ({0, 60, 61, 120});
+  push_all ({0, 60, 80, 140});
   EXPECT_EQ (counter ("frames-lost"), 0u);
   EXPECT_FALSE (demux->element_message ("codedexposure/frames-lost"));
-  push (120 * kMs + 60 * kMs + 1);
+  EXPECT_EQ (demux->warning (), "");
+  push (140 * kMs + 60 * kMs + 1);
   EXPECT_EQ (counter ("frames-lost"), 1u);
 }
 
 TEST_F (DemuxTime, TimeThatRunsBackwardsIsANewBeginningAndWarnedOfOnce)
 {
   start ();
-  push_all ({400, 0, 40, 0, 0});
-  EXPECT_EQ (
-      discont_times (), (std::vector<int>{-400, 410, 420, 430, -1, 10, 20, 30,
-                            40, 50, 60, 70, -1, 10, 20, 30, -1, 10, 20, 30}));
+  push_all ({400, 0, 40, 80, 0});
+  EXPECT_EQ (discont_times (),
+      (std::vector<int>{-400, 410, 420, 430, -1, 10, 20, 30, -40, 50, 60, 70,
+          80, 90, 100, 110, -1, 10, 20, 30}));
   EXPECT_EQ (counter ("frames-lost"), 0u);
   EXPECT_NE (demux->warning ().find ("0:00:00.400000000"), std::string::npos);
   EXPECT_EQ (demux->warning (), "");
+}
+
+TEST_F (DemuxTime, FrameAfterALateOneIsANewBeginning)
+{
+  start ();
+  push_all ({0, 40, 120, 80, 160});
+  EXPECT_EQ (discont_times (),
+      (std::vector<int>{-1, 10, 20, 30, 40, 50, 60, 70, -120, 130, 140, 150,
+          -80, 90, 100, 110, -160, 170, 180, 190}));
+}
+
+TEST_F (DemuxTime, FrameThatComesTwiceIsMarkedAndHasOneNumber)
+{
+  start ();
+  push_all ({0, 40, 41, 80});
+  std::vector<guint64> numbers;
+  for (const BufferPtr &buffer : pull_all ()) {
+    const auto meta = get_frame_meta (buffer.get ());
+    if (meta->subframe == 0)
+      numbers.push_back (meta->frame);
+  }
+  EXPECT_EQ (numbers, (std::vector<guint64>{0, 1, 1, 2}));
+  EXPECT_NE (demux->warning (), "");
+  EXPECT_EQ (counter ("frames-lost"), 0u);
+}
+
+TEST_F (DemuxTime, NumbersGoOnWhenTheRateChanges)
+{
+  start ();
+  push_all ({0, 40});
+  demux->set_caps (gray_caps (16, 16, "50/1"));
+  push_all ({80, 140});
+  std::vector<guint64> numbers;
+  for (const BufferPtr &buffer : pull_all ()) {
+    const auto meta = get_frame_meta (buffer.get ());
+    if (meta->subframe == 0)
+      numbers.push_back (meta->frame);
+  }
+  EXPECT_EQ (numbers, (std::vector<guint64>{0, 1, 2, 5}));
 }
 
 TEST_F (DemuxTime, FrameWithoutTimeStampIsAnError)

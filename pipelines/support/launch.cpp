@@ -33,7 +33,9 @@ struct Options {
   gint64 total = 0;          // coded frames that are expected, 0: unknown
   gchar *receiver = nullptr; // tcpserversink to wait for
   gdouble retry = 0;         // seconds to go on trying to connect
-  gboolean print = FALSE;    // show the pipeline, do not run it
+  gdouble start = 0;         // first second of the stream to play
+  gdouble duration = 0;      // seconds to play, 0: all
+  gdouble shift_to = -1;     // running time of the first frame, -1: its own
 };
 
 /** Elements that are not in GStreamer's base package, and what has them. */
@@ -46,7 +48,7 @@ constexpr Provider kProviders[] = {
     {"avdec_ffv1", "gstreamer1.0-libav"},
     {"gdppay", "gstreamer1.0-plugins-bad"},
     {"gdpdepay", "gstreamer1.0-plugins-bad"},
-    {"openh264enc", "gstreamer1.0-plugins-bad"},
+    {"x264enc", "gstreamer1.0-plugins-ugly"},
     {"h264parse", "gstreamer1.0-plugins-bad"},
     {"matroskamux", "gstreamer1.0-plugins-good"},
     {"matroskademux", "gstreamer1.0-plugins-good"},
@@ -111,6 +113,16 @@ format (const char *pattern, ...)
   return text.get ();
 }
 
+/** The text of an error or a warning, and what its writer added for experts;
+ * not the place in the source. */
+std::string
+told (GstMessage *message, const GError *error, const gchar *debug)
+{
+  const gchar *detail = debug ? std::strchr (debug, '\n') : nullptr;
+  return format ("%s: %s%s%s", GST_OBJECT_NAME (GST_MESSAGE_SRC (message)),
+      error->message, detail ? "\n    " : "", detail ? detail + 1 : "");
+}
+
 std::string
 minutes (double seconds)
 {
@@ -157,6 +169,7 @@ private:
   bool connect_counter ();
   void start ();
   bool has_receiver ();
+  void seek ();
   void play ();
   void interrupt ();
   void on_message (GstMessage *message);
@@ -185,7 +198,16 @@ private:
     static_cast<Launch *> (self)->tick ();
     return G_SOURCE_CONTINUE;
   }
+  static gboolean on_held (gpointer self)
+  {
+    static_cast<Launch *> (self)->seek ();
+    return G_SOURCE_REMOVE;
+  }
+  static GstPadProbeReturn on_first_frame (
+      GstPad *, GstPadProbeInfo *, gpointer self);
   static GstPadProbeReturn on_frame (
+      GstPad *, GstPadProbeInfo *info, gpointer self);
+  static GstPadProbeReturn shift_first_frame (
       GstPad *, GstPadProbeInfo *info, gpointer self);
 
   const Options &options_;
@@ -198,6 +220,8 @@ private:
   Clock::time_point began_ = Clock::now ();
   Clock::time_point retry_until_ = Clock::now ();
   double cpu_at_start_ = 0;
+  gulong hold_ = 0; // probe that holds the first frame until the seek
+  bool held_ = false;
   bool playing_ = false;
   bool interrupted_ = false;
   int code_ = kDone;
@@ -250,6 +274,57 @@ Launch::on_frame (GstPad *, GstPadProbeInfo *info, gpointer self)
   return GST_PAD_PROBE_OK;
 }
 
+constexpr GstClockTime
+nanoseconds (double seconds)
+{
+  return GstClockTime (seconds * 1e9 + 0.5);
+}
+
+GstPadProbeReturn
+Launch::on_first_frame (GstPad *, GstPadProbeInfo *, gpointer self)
+{
+  auto *launch = static_cast<Launch *> (self);
+  if (!std::exchange (launch->held_, true))
+    g_idle_add (on_held, launch);
+  return GST_PAD_PROBE_OK;
+}
+
+/* While the first frame is held no file has been begun and nothing is shown, so
+ * the stream can be sent elsewhere without a trace. */
+void
+Launch::seek ()
+{
+  GstEvent *event = gst_event_new_seek (1.0, GST_FORMAT_TIME,
+      GstSeekFlags (GST_SEEK_FLAG_FLUSH | GST_SEEK_FLAG_ACCURATE),
+      GST_SEEK_TYPE_SET, gint64 (nanoseconds (options_.start)),
+      options_.duration > 0 ? GST_SEEK_TYPE_SET : GST_SEEK_TYPE_NONE,
+      gint64 (nanoseconds (options_.start + options_.duration)));
+  if (!gst_pad_push_event (counted_.get (), event)) {
+    status_.line ("error: this stream cannot be played from the middle");
+    quit (kFailed);
+  }
+  gst_pad_remove_probe (counted_.get (), std::exchange (hold_, 0));
+}
+
+/* A stream that is joined late would be shown as late as it was joined. */
+GstPadProbeReturn
+Launch::shift_first_frame (GstPad *pad, GstPadProbeInfo *info, gpointer self)
+{
+  const auto *launch = static_cast<Launch *> (self);
+  const EventPtr sticky (gst_pad_get_sticky_event (pad, GST_EVENT_SEGMENT, 0));
+  const GstSegment *segment = nullptr;
+  gst_event_parse_segment (sticky.get (), &segment);
+  const guint64 running = gst_segment_to_running_time (segment, GST_FORMAT_TIME,
+      GST_BUFFER_PTS (GST_PAD_PROBE_INFO_BUFFER (info)));
+  const ObjectPtr<GstElement> element (gst_pad_get_parent_element (pad));
+  const ObjectPtr<GstPad> src (
+      gst_element_get_static_pad (element.get (), "src"));
+  if (GST_CLOCK_TIME_IS_VALID (running) && src)
+    gst_pad_set_offset (src.get (),
+        gint64 (nanoseconds (launch->options_.shift_to)) - gint64 (running));
+  return GST_PAD_PROBE_REMOVE;
+}
+
 bool
 Launch::connect_counter ()
 {
@@ -262,6 +337,13 @@ Launch::connect_counter ()
     status_.line (format ("no element named %s to count at", options_.count));
     return false;
   }
+  if (options_.start > 0 || options_.duration > 0)
+    hold_ = gst_pad_add_probe (counted_.get (),
+        GstPadProbeType (GST_PAD_PROBE_TYPE_BLOCK | GST_PAD_PROBE_TYPE_BUFFER),
+        on_first_frame, this, nullptr);
+  if (options_.shift_to >= 0)
+    gst_pad_add_probe (counted_.get (), GST_PAD_PROBE_TYPE_BUFFER,
+        shift_first_frame, this, nullptr);
   gst_pad_add_probe (
       counted_.get (), GST_PAD_PROBE_TYPE_BUFFER, on_frame, this, nullptr);
   return true;
@@ -314,9 +396,14 @@ Launch::run ()
 
   for (const guint source : sources)
     g_source_remove (source);
-  if (code_ == kDone)
-    summarise ();
-  return code_;
+  if (code_ != kDone || !counted_)
+    return code_;
+  if (frames_ == 0) {
+    status_.line ("error: no coded frame came");
+    return kFailed;
+  }
+  summarise ();
+  return kDone;
 }
 
 /* The first request ends the stream, so that files are finished; the second
@@ -366,8 +453,7 @@ Launch::on_error (GstMessage *message)
     quit (kDone);
     return;
   }
-  status_.line (format ("error: %s: %s%s%s", GST_OBJECT_NAME (source),
-      error->message, detail ? "\n    " : "", detail ? detail : ""));
+  status_.line ("error: " + told (message, error, detail));
   quit (kFailed);
 }
 
@@ -406,9 +492,7 @@ Launch::on_message (GstMessage *message)
     GError *error = nullptr;
     gchar *detail = nullptr;
     gst_message_parse_warning (message, &error, &detail);
-    status_.line (format ("warning: %s: %s%s%s",
-        GST_OBJECT_NAME (GST_MESSAGE_SRC (message)), error->message,
-        detail ? "\n    " : "", detail ? detail : ""));
+    status_.line ("warning: " + told (message, error, detail));
     g_error_free (error);
     g_free (detail);
     break;
@@ -453,6 +537,8 @@ Launch::tick ()
   gint64 duration = 0;
   if (options_.total > 0)
     done = double (frames) / double (options_.total);
+  else if (options_.duration > 0)
+    done = (1e-9 * double (last_pts_) - options_.start) / options_.duration;
   else if (gst_pad_peer_query_duration (
                counted_.get (), GST_FORMAT_TIME, &duration) &&
            duration > 0 && last_pts_ >= 0)
@@ -557,8 +643,12 @@ main (int argc, char **argv)
           "Stay paused until this tcpserversink has a receiver", "NAME"},
       {"retry", 0, 0, G_OPTION_ARG_DOUBLE, &options.retry,
           "Go on trying to connect; status 4 when nobody listens", "SECONDS"},
-      {"print", 0, 0, G_OPTION_ARG_NONE, &options.print,
-          "Show the pipeline instead of running it", nullptr},
+      {"start", 0, 0, G_OPTION_ARG_DOUBLE, &options.start,
+          "First second of the stream to play", "SECONDS"},
+      {"duration", 0, 0, G_OPTION_ARG_DOUBLE, &options.duration,
+          "How much of the stream to play", "SECONDS"},
+      {"shift-to", 0, 0, G_OPTION_ARG_DOUBLE, &options.shift_to,
+          "Let the first counted frame have this running time", "SECONDS"},
       {},
   };
   GOptionContext *context = g_option_context_new ("PIPELINE");
@@ -574,12 +664,11 @@ main (int argc, char **argv)
     return kUsage;
   }
 
-  int code = kDone;
-  if (options.print) {
-    std::printf ("gst-launch-1.0 -e %s\n", argv[1]);
-  } else {
+  int code = kFailed;
+  {
     Launch launch (options);
-    code = launch.parse (argv[1]) ? launch.run () : int (kFailed);
+    if (launch.parse (argv[1]))
+      code = launch.run ();
   }
   g_free (options.what);
   g_free (options.count);

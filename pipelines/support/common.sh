@@ -1,0 +1,402 @@
+# shellcheck shell=bash disable=SC2034 # most of this is used by the scripts
+# SPDX-License-Identifier: LGPL-2.1-or-later
+# What the scripts share: options, the plugin, and the parts of their pipelines.
+# Sourced; a script defines usage () first.
+
+set -euo pipefail
+
+script=$(basename "$0")
+pipelines=$(cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.." && pwd)
+
+# Options of the scene and the bench, and of the coded stream's source.
+scene_options='input input-rate pattern size frame-rate bits'
+bench_options='schedule psf-sigma full-well read-noise gain seed shift-x shift-y
+  rotation scale'
+source_options="$scene_options $bench_options frames camera features source
+  device"
+
+scene_help='Scene, one frame of it a slot of the exposure:
+  --input FILE        any video; its frames become slots, whatever its rate
+  --input-rate R      frames a second of the input, where the file does not say
+  --pattern NAME      a moving test picture instead, as of videotestsrc [ball]
+  --size WxH          size of scene and camera [that of the input; 768x576]
+  --bits N            significant bits of the camera, 8 or 9..16 [8]'
+bench_help='Bench:
+  --schedule S        CODE:TILE[,key=value...] or a JSON file [sequential:2x2]
+  --frame-rate R      coded frames a second, 25 or 30000/1001 [25]
+  --frames N          stop after N coded frames
+  --full-well E       electrons at white; 0: no noise [0]
+  --read-noise E      electrons rms [0]
+  --psf-sigma P       blur of the lens, pixels [0]
+  --gain G            light to grey values; 0: white is white [0]
+  --seed N            of the noise [0]
+  --shift-x P, --shift-y P, --rotation DEG, --scale F   misalignment'
+camera_help='Instead of the bench:
+  --camera NAME       a GenICam camera, as arv-tool-0.8 lists it
+  --features "A=1 ..."  camera features; default: triggered by the DMD on Line0
+  --device DEV        the DMD [sim:bench on the bench]
+  --source "GST"      any GStreamer source of coded frames'
+common_help='  --print             show the pipeline instead of running it
+  -h, --help          this text'
+
+say ()
+{
+  printf '%s: %s\n' "$script" "$*" >&2
+}
+
+die ()
+{
+  say "$*"
+  exit 1
+}
+
+# How another script is called from where this one was.
+sibling ()
+{
+  if [[ $script == codedexposure-* ]]; then
+    printf 'codedexposure-%s' "$1"
+  else
+    printf '%s/%s' "$(dirname "$0")" "$1"
+  fi
+}
+
+usage_error ()
+{
+  say "$*"
+  printf 'Try: %s --help\n' "$0" >&2
+  exit 2
+}
+
+declare -A opt=()
+args=()
+
+# parse_options "NAMES THAT TAKE A VALUE" "FLAGS" "$@"
+# fills opt[NAME] (a flag: 1) and args.
+parse_options ()
+{
+  local valued=" ${1//$'\n'/ } " flags=" $2 print help " name
+  shift 2
+  while [ $# -gt 0 ]; do
+    case $1 in
+      -h | --help)
+        usage
+        exit 0
+        ;;
+      --)
+        shift
+        args+=("$@")
+        return
+        ;;
+      --*)
+        name=${1#--}
+        name=${name%%=*}
+        if [[ $valued == *" $name "* ]]; then
+          if [[ $1 == *=* ]]; then
+            opt[$name]=${1#*=}
+          else
+            [ $# -gt 1 ] || usage_error "--$name needs a value"
+            opt[$name]=$2
+            shift
+          fi
+        elif [[ $flags == *" $name "* && $1 != *=* ]]; then
+          opt[$name]=1
+        else
+          usage_error "there is no option $1"
+        fi
+        ;;
+      -?*) usage_error "there is no option $1" ;;
+      *) args+=("$1") ;;
+    esac
+    shift
+  done
+}
+
+is_set ()
+{
+  [ -n "${opt[$1]:-}" ]
+}
+
+# check_number NAME REGEX "WHAT IT MUST BE"
+check_option ()
+{
+  ! is_set "$1" || [[ ${opt[$1]} =~ ^($2)$ ]] \
+    || usage_error "--$1 must be $3, not ${opt[$1]}"
+}
+
+check_options ()
+{
+  local name
+  check_option size '[1-9][0-9]{0,4}x[1-9][0-9]{0,4}' 'WIDTHxHEIGHT'
+  check_option frame-rate '[1-9][0-9]{0,6}(/[1-9][0-9]{0,6})?' \
+    'a rate such as 25 or 30000/1001'
+  check_option input-rate '[1-9][0-9]{0,6}(/[1-9][0-9]{0,6})?' \
+    'a rate such as 25 or 30000/1001'
+  check_option frames '[1-9][0-9]{0,8}' 'a number of coded frames'
+  check_option bits '[1-9]|1[0-6]' 'a number from 1 to 16'
+  check_option port '[1-9][0-9]{0,4}' 'a TCP port'
+  check_option wait '[0-9]+(\.[0-9]+)?' 'a number of seconds'
+  check_option start '[0-9]+(\.[0-9]+)?' 'a number of seconds'
+  check_option duration '[0-9]+(\.[0-9]+)?' 'a number of seconds'
+  check_option method 'auto|rank|select|decode' 'auto, rank, select or decode'
+  for name in psf-sigma full-well read-noise gain scale; do
+    check_option "$name" '[0-9]*\.?[0-9]+' 'a number that is not negative'
+  done
+  for name in shift-x shift-y rotation; do
+    check_option "$name" '-?[0-9]*\.?[0-9]+' 'a number'
+  done
+  check_option seed '[0-9]+' 'a whole number'
+}
+
+# Where the plugin and its programs are: beside this folder in the build tree,
+# or where they were installed to.
+find_plugin ()
+{
+  local build=${CODEDEXPOSURE_BUILD:-$pipelines/../build}
+  local prefix=$pipelines/../.. libs='' folder
+  if [ -e "$build/gst/libgstcodedexposure.so" ]; then
+    build=$(cd "$build" && pwd)
+    programs=$build/pipelines
+    libs=$build/gst
+    export GST_REGISTRY_1_0=$build/registry.bin
+  elif [ -x "$prefix/bin/codedexposure-launch" ]; then
+    programs=$prefix/bin
+    for folder in "$prefix"/lib{,/*}/gstreamer-1.0; do
+      [ ! -e "$folder/libgstcodedexposure.so" ] || libs=$folder
+    done
+  else
+    die "the plugin is not built: run $pipelines/demo, or" \
+      "meson setup build && meson compile -C build"
+  fi
+  # Installed where GStreamer looks, it needs no help.
+  [ -z "$libs" ] || export \
+    GST_PLUGIN_PATH_1_0="$libs${GST_PLUGIN_PATH_1_0:+:$GST_PLUGIN_PATH_1_0}"
+}
+
+# launch OPTION... PIPELINE
+launch ()
+{
+  if is_set print; then
+    printf 'gst-launch-1.0 -e %s\n' "$(tr -s ' \n' '  ' <<< "${*: -1}")"
+    exit 0
+  fi
+  "$programs/codedexposure-launch" --what="$script" "$@"
+}
+
+# A text as a value in a pipeline.
+quoted ()
+{
+  local text=${1//\\/\\\\}
+  printf '"%s"' "${text//\"/\\\"}"
+}
+
+# NAME=VALUE for each of the named options that is set.
+properties ()
+{
+  local name
+  for name in "$@"; do
+    ! is_set "$name" || printf '%s=%s ' "$name" "$(quoted "${opt[$name]}")"
+  done
+}
+
+schedule ()
+{
+  printf '%s' "${opt[schedule]:-sequential:2x2}"
+}
+
+schedule_slots ()
+{
+  "$programs/codedexposure-schedule" --slots "$(schedule)"
+}
+
+grey_format ()
+{
+  if [ "${opt[bits]:-8}" -gt 8 ]; then
+    printf GRAY16_LE
+  else
+    printf GRAY8
+  fi
+}
+
+# Prints WIDTH HEIGHT NUM DEN of a video file.
+probe_video ()
+{
+  local caps
+  [ -r "$1" ] || die "cannot read $1"
+  caps=$(gst-launch-1.0 -v filesrc location="$(quoted "$1")" ! decodebin ! \
+    videoconvert name=probe ! identity eos-after=2 ! fakesink 2>&1 \
+    | sed -n 's/.*probe.GstPad:sink: caps = //p' | head -n 1) || true
+  [ -n "$caps" ] || die "$1 is no video that the installed decoders can read"
+  sed -E 's/.*width=\(int\)([0-9]+).*height=\(int\)([0-9]+).*framerate=\(fraction\)([0-9]+)\/([0-9]+).*/\1 \2 \3 \4/' \
+    <<< "$caps"
+}
+
+# Sets slots, frame_rate and scene_rate (N times it) as fractions, width, height.
+plan_scene ()
+{
+  slots=$(schedule_slots) || usage_error "--schedule names no schedule"
+  frame_rate=${opt[frame-rate]:-25}
+  [[ $frame_rate == */* ]] || frame_rate=$frame_rate/1
+  scene_rate=$((${frame_rate%/*} * slots))/${frame_rate#*/}
+  width=768 height=576
+  if is_set input; then
+    local facts num den
+    facts=$(probe_video "${opt[input]}")
+    read -r width height num den <<< "$facts"
+    input_rate=${opt[input-rate]:-$num/$den}
+    [[ $input_rate == */* ]] || input_rate=$input_rate/1
+    [ "${input_rate%/*}" != 0 ] \
+      || usage_error "${opt[input]} has no fixed rate: give --input-rate"
+  fi
+  if is_set size; then
+    width=${opt[size]%x*} height=${opt[size]#*x}
+  fi
+}
+
+# The scene at N times the frame rate; "live": in real time.
+scene ()
+{
+  local caps
+  caps="video/x-raw,format=$(grey_format),width=$width,height=$height"
+  caps+=",framerate=$scene_rate"
+  if is_set input; then
+    # Every frame of the file becomes one slot: its times are stretched.
+    local speed
+    speed=$(awk -v s="$scene_rate" -v i="$input_rate" 'BEGIN {
+      split(s, a, "/"); split(i, b, "/")
+      printf "%.12g", a[1] * b[2] / (a[2] * b[1]) }')
+    printf 'filesrc location=%s ! decodebin ! videoconvert ! videoscale ! ' \
+      "$(quoted "${opt[input]}")"
+    printf 'videorate rate=%s ! %s ! ' "$speed" "$caps"
+    [ "${1:-}" != live ] || printf 'clocksync ! '
+    printf 'queue ! '
+  else
+    printf 'videotestsrc pattern=%s %s ! %s ! ' \
+      "$(quoted "${opt[pattern]:-ball}")" \
+      "$([ "${1:-}" != live ] || echo is-live=true)" "$caps"
+  fi
+}
+
+# Ends the stream after --frames coded frames; identity counts the one it
+# refuses.
+frame_limit ()
+{
+  ! is_set frames \
+    || printf 'identity name=limit eos-after=%d ! ' $((opt[frames] + 1))
+}
+
+# The optical bench in software; its masks come from the schedule.
+simulation ()
+{
+  scene "$@"
+  printf 'codedexposure-sim name=bench schedule=%s %s ! ' \
+    "$(quoted "$(schedule)")" \
+    "$(properties psf-sigma full-well read-noise bits gain seed \
+      shift-x shift-y rotation scale)"
+  printf 'video/x-raw,framerate=%s ! ' "$frame_rate"
+}
+
+# Coded frames of a camera, of any source, or of the bench with its DMD.
+coded_source ()
+{
+  local caps features
+  if is_set camera; then
+    caps="video/x-raw,format=$(grey_format),width=$width,height=$height"
+    caps+=",framerate=$frame_rate"
+    features='TriggerSelector=FrameStart TriggerSource=Line0 TriggerMode=On'
+    printf 'aravissrc camera-name=%s num-arv-buffers=150 features=%s ! %s ! ' \
+      "$(quoted "${opt[camera]}")" \
+      "$(quoted "${opt[features]:-$features}")" "$caps"
+  elif is_set source; then
+    printf '%s ! ' "${opt[source]}"
+  else
+    simulation "$@" | sed 's/codedexposure-sim /&dmd=sim:bench /'
+  fi
+  if is_set device || ! { is_set camera || is_set source; }; then
+    printf 'dmdsync name=sync device=%s schedule=%s ! ' \
+      "$(quoted "${opt[device]:-sim:bench}")" "$(quoted "$(schedule)")"
+  fi
+  frame_limit
+}
+
+# Where a coded recording's frames are described.
+sidecar_of ()
+{
+  printf '%s.jsonl' "${1%.mkv}"
+}
+
+# Coded frames to FFV1 in Matroska, their description to the sidecar. Every
+# frame is decodable alone, and at 1 us a tick a cluster of its own.
+coded_recording ()
+{
+  printf 'codedexposure-log name=log location=%s ! ' \
+    "$(quoted "$(sidecar_of "$1")")"
+  printf 'queue max-size-buffers=75 max-size-bytes=0 max-size-time=0 ! '
+  lossless_video "$1"
+}
+
+lossless_video ()
+{
+  printf 'avenc_ffv1 gop-size=1 slices=4 threads=auto ! '
+  printf 'matroskamux timecodescale=1000 ! filesink location=%s ' \
+    "$(quoted "$1")"
+}
+
+# Frames to a file by its ending: FFV1, H.264, or a folder of PNG.
+video_output ()
+{
+  case $1 in
+    *.mkv) lossless_video "$1" ;;
+    *.mp4)
+      # 4:2:0 with even sides is what every player and browser opens.
+      printf 'videoconvert ! videoscale ! %s ! ' \
+        'video/x-raw,format=I420,width=[2,65536,2],height=[2,65536,2]'
+      printf 'x264enc pass=qual quantizer=18 speed-preset=veryfast ! '
+      printf 'h264parse ! mp4mux ! filesink location=%s ' "$(quoted "$1")"
+      ;;
+    */ | *%*d*.png)
+      local pattern=$1
+      [[ $1 != */ ]] || pattern=$1%06d.png
+      printf 'videoconvert ! pngenc snapshot=false ! '
+      printf 'multifilesink location=%s ' "$(quoted "$pattern")"
+      ;;
+    *)
+      usage_error "--output $1: end in .mkv (FFV1, lossless), .mp4 (H.264)," \
+        "/ (a folder of PNG) or %06d.png"
+      ;;
+  esac
+}
+
+# Makes room for an output; the pictures of an earlier run are replaced as a
+# file would be.
+make_folder_for ()
+{
+  if [[ $1 == */ ]]; then
+    mkdir -p "$1"
+    find "$1" -maxdepth 1 -name '[0-9][0-9][0-9][0-9][0-9][0-9].png' -delete
+  else
+    mkdir -p "$(dirname "$1")"
+  fi
+}
+
+# Subframes and coded frames beside them in a window; display shows the latest
+# and never holds up what feeds it.
+display ()
+{
+  local sink=${opt[sink]:-autovideosink}
+  local latest='queue leaky=downstream max-size-bytes=0 max-size-time=0'
+  local exact='videoconvert ! video/x-raw,format=BGRx'
+  printf 'demux.src ! %s max-size-buffers=%d ! %s ! view.sink_0 ' \
+    "$latest" $((2 * slots)) "$exact"
+  printf 'demux.coded ! %s max-size-buffers=2 ! %s ! view.sink_1 ' \
+    "$latest" "$exact"
+  printf 'compositor name=view background=black sink_0::xpos=%d ! ' "$width"
+  printf 'queue max-size-buffers=4 ! %s ' "$sink"
+}
+
+need_display ()
+{
+  if [ -z "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ] && ! is_set sink; then
+    die "no screen: DISPLAY is not set. Run this in a desktop session or" \
+      "through ssh -X, or record and decode instead."
+  fi
+}

@@ -1,0 +1,175 @@
+# shellcheck shell=bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
+# Installs what is missing and builds; sourced by pipelines/demo and tests/run.
+#
+#   install_packages run|tests   Debian packages, those of tests being more
+#   build_tree DIR OPTION...     meson setup and compile
+#   sample_video                 path of the sample clip, fetched when needed
+#
+# Nothing here asks the network for what is already there.
+
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
+cache=$root/build/cache
+
+# package|what it is for|who needs it
+packages='
+meson|configures the build (brings ninja)|run
+g++|compiles C++20|run
+pkg-config|finds the libraries|run
+libgstreamer1.0-dev|GStreamer core and its test harness|run
+libgstreamer-plugins-base1.0-dev|GStreamer video library|run
+nlohmann-json3-dev|schedules and sidecars are JSON|run
+gstreamer1.0-tools|gst-launch-1.0, gst-inspect-1.0|run
+gstreamer1.0-plugins-base|test scenes, conversion, TCP, compositor|run
+gstreamer1.0-plugins-good|Matroska, AVI, PNG, window selection|run
+gstreamer1.0-plugins-bad|GDP for send and receive, H.264 in MP4|run
+gstreamer1.0-plugins-ugly|H.264 encoder|run
+gstreamer1.0-libav|FFV1, and reading most video files|run
+gstreamer1.0-x|windows under X, text in pictures|run
+libgtest-dev|unit and element tests|tests
+libbenchmark-dev|benchmarks|tests
+xvfb|a screen for the window tests|tests
+shellcheck|checks the scripts|tests
+'
+
+note ()
+{
+  printf '== %s\n' "$*" >&2
+}
+
+give_up ()
+{
+  printf 'setup: %s\n' "$*" >&2
+  exit 1
+}
+
+is_installed ()
+{
+  [ "$(dpkg-query -W -f '${db:Status-Status}' "$1" 2>/dev/null)" = installed ]
+}
+
+# Packages that a purpose needs and that are missing, a line each: name|reason.
+missing_packages ()
+{
+  local name reason who
+  while IFS='|' read -r name reason who; do
+    [ -n "$name" ] || continue
+    if [ "$who" = run ] || [ "$1" = tests ]; then
+      is_installed "$name" || printf '%s|%s\n' "$name" "$reason"
+    fi
+  done <<< "$packages"
+}
+
+as_root ()
+{
+  if [ "$(id -u)" = 0 ]; then "$@"; else sudo "$@"; fi
+}
+
+# Turns apt's status messages into one line every ten percent.
+show_apt_progress ()
+{
+  local kind percent last=-10
+  while IFS=: read -r kind _ percent _; do
+    percent=${percent%%.*}
+    case $kind-$percent in
+      dlstatus-[0-9]* | pmstatus-[0-9]*) ;;
+      *) continue ;;
+    esac
+    [ "$percent" -ge "$last" ] || last=-10
+    if [ "$percent" -ge $((last + 10)) ]; then
+      last=$((percent / 10 * 10))
+      if [ "$kind" = dlstatus ]; then
+        note "downloading: $last %"
+      else
+        note "installing: $last %"
+      fi
+    fi
+  done
+}
+
+apt_install ()
+{
+  # apt's status goes to a descriptor that is opened here, as sudo closes all.
+  # shellcheck disable=SC2016
+  as_root env DEBIAN_FRONTEND=noninteractive sh -c '
+    exec 3>&1 >"$0" 2>&1
+    exec apt-get install -y --no-install-recommends -o APT::Status-Fd=3 "$@"
+  ' "$cache/apt.log" "$@" </dev/null | show_apt_progress
+  return "${PIPESTATUS[0]}"
+}
+
+install_packages ()
+{
+  local missing names
+  if ! command -v dpkg-query >/dev/null; then
+    note "this is no Debian: install what these are called here, if needed:"
+    awk -F'|' 'NF { printf "     %-34s %s\n", $1, $2 }' <<< "$packages" >&2
+    return
+  fi
+  missing=$(missing_packages "$1")
+  [ -n "$missing" ] || return 0
+
+  note "these Debian packages are missing, and will be installed:"
+  awk -F'|' '{ printf "     %-34s %s\n", $1, $2 }' <<< "$missing" >&2
+  mapfile -t names < <(cut -d'|' -f1 <<< "$missing")
+  [ "$(id -u)" = 0 ] || command -v sudo >/dev/null || give_up "this needs root," \
+    "and there is no sudo. As root, run:" \
+    "apt-get install --no-install-recommends ${names[*]}"
+  mkdir -p "$cache"
+  # A new system has no package lists, and old lists name files that are gone.
+  if ! apt-cache show "${names[@]}" >/dev/null 2>&1 \
+      || ! apt_install "${names[@]}"; then
+    note "reading the package lists"
+    as_root apt-get update -qq >"$cache/apt.log" 2>&1 || {
+      cat "$cache/apt.log" >&2
+      give_up "apt-get update failed; is there a network?"
+    }
+    apt_install "${names[@]}" || {
+      tail -n 20 "$cache/apt.log" >&2
+      give_up "apt-get failed; all it said is in $cache/apt.log"
+    }
+  fi
+}
+
+# Configures a build folder, or changes the options of one, and builds it.
+build_tree ()
+{
+  local dir=$1
+  shift
+  if [ ! -f "$dir/build.ninja" ]; then
+    note "configuring $dir"
+    mkdir -p "$cache"
+    meson setup "$dir" "$root" "$@" >"$cache/meson.log" 2>&1 || {
+      cat "$cache/meson.log" >&2
+      give_up "meson setup failed"
+    }
+  elif [ $# -gt 0 ]; then
+    meson configure "$dir" "$@" >/dev/null
+  fi
+  note "building $dir"
+  meson compile -C "$dir" || give_up "the build failed"
+}
+
+# Prints the path of vtest.avi: 768x576, 795 frames of people walking. It lies
+# in opencv-doc, which is 270 MB installed, so only this file is taken out of
+# the package. Fails when there is none to be had.
+sample_video ()
+{
+  local name=vtest.avi where=usr/share/doc/opencv-doc/examples/data deb
+  for path in "$cache/$name" "/$where/$name"; do
+    if [ -f "$path" ]; then
+      printf '%s\n' "$path"
+      return
+    fi
+  done
+  note "fetching the sample clip $name out of the package opencv-doc (96 MB)"
+  mkdir -p "$cache/deb"
+  (cd "$cache/deb" && apt-get download -qq opencv-doc) >"$cache/deb.log" 2>&1 \
+    || return 1
+  for deb in "$cache"/deb/opencv-doc_*.deb; do
+    dpkg-deb --fsys-tarfile "$deb" \
+      | tar -x -C "$cache" --transform 's,.*/,,' "./$where/$name" || return 1
+  done
+  rm -r "$cache/deb"
+  printf '%s\n' "$cache/$name"
+}

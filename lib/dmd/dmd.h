@@ -7,8 +7,11 @@
 #include <stop_token>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "base/result.h"
+#include "dmd/mirror_array.h"
 #include "schedule/schedule.h"
 
 namespace cexp
@@ -23,10 +26,18 @@ struct DmdInfo {
   int resident_masks = 0;       ///< masks the device holds at once
   bool run_time_upload = true;  ///< masks can be sent while it is open
   bool triggers_camera = false; ///< no frame is exposed while it is parked
+  Array array = Array::orthogonal;
 };
 
-/** Called during upload with masks sent and masks in all: first with 0, last
- * with all of them. */
+/** What a device says of itself now. */
+struct DmdStatus {
+  bool running = false;
+  /** Names and values for people: firmware, errors, what its triggers do. */
+  std::vector<std::pair<std::string, std::string>> details = {};
+};
+
+/** Called during upload with what is sent and what there is to send, in units
+ * of about equal time: first with 0, last with all of it. */
 using UploadProgress = std::function<void (int sent, int total)>;
 
 /**
@@ -43,6 +54,11 @@ public:
   virtual ~Dmd () = default;
 
   virtual const DmdInfo &info () const = 0;
+  /** Asks the device. */
+  virtual Result<DmdStatus> status () { return DmdStatus{running ()}; }
+  /** How long upload () is going to take at least, with what the device holds
+   * already. */
+  virtual Nanoseconds upload_time (const Schedule &) { return 0; }
   /**
    * Renders and sends every mask of the schedule; the mirrors are parked. Masks
    * do not depend on the frame rate. Masks that the device holds already need

@@ -2,8 +2,8 @@
 #include "dmd/plane_image.h"
 
 #include <algorithm>
+#include <array>
 #include <numeric>
-#include <utility>
 
 #include "schedule/pilot.h"
 
@@ -29,22 +29,26 @@ first_open_pixel (const Schedule &schedule, int slot)
   return pixels;
 }
 
-/** Planes of each element, by label of its pixels, and of the pilot's columns.
+/** The planes in which each element, and each of the pilot's columns, is open.
  */
 class PixelTable
 {
 public:
-  PixelTable (const Schedule &schedule, const std::vector<int> &masks)
+  PixelTable (const Schedule &schedule, const PlanePlan &plan, int image)
       : elements_ (std::size_t (schedule.elements ()), 0)
   {
-    for (std::size_t plane = 0; plane < masks.size (); plane++) {
-      const int slot = masks[plane] % schedule.slots ();
+    for (int mask = 0; mask < schedule.masks (); mask++) {
+      const PlaneSlot at = plan.masks[std::size_t (mask)];
+      if (at.image != image)
+        continue;
+      const PlanePixel plane = PlanePixel (1) << at.plane;
+      const int slot = mask % schedule.slots ();
       for (int e = 0; e < schedule.elements (); e++)
         if (schedule.code ().open (e, slot))
-          elements_[std::size_t (e)] |= PlanePixel (1) << plane;
+          elements_[std::size_t (e)] |= plane;
       for (int column = 0; column < kPilotColumns; column++)
-        if (pilot_open (column, masks[plane], schedule.slots ()))
-          pilot_[std::size_t (column)] |= PlanePixel (1) << plane;
+        if (pilot_open (column, mask, schedule.slots ()))
+          pilot_[std::size_t (column)] |= plane;
     }
   }
 
@@ -80,8 +84,8 @@ fill_planes (const Schedule &schedule, const PixelTable &table,
 
 } // namespace
 
-std::vector<int>
-plane_order (const Schedule &schedule)
+PlanePlan
+plan_planes (const Schedule &schedule)
 {
   std::vector<int> first;
   for (int slot = 0; slot < schedule.slots (); slot++)
@@ -92,27 +96,23 @@ plane_order (const Schedule &schedule)
     return first[std::size_t (a % schedule.slots ())] <
            first[std::size_t (b % schedule.slots ())];
   });
-  return order;
+
+  PlanePlan plan;
+  plan.masks.resize (order.size ());
+  for (int place = 0; place < int (order.size ()); place++)
+    plan.masks[std::size_t (order[std::size_t (place)])] = {
+        place / kPlanesPerImage, place % kPlanesPerImage};
+  plan.images = (int (order.size ()) + kPlanesPerImage - 1) / kPlanesPerImage;
+  return plan;
 }
 
-PlaneSet
-render_planes (
-    const Schedule &schedule, const Placement &placement, Extent size)
+PlaneImage
+render_planes (const Schedule &schedule, const PlanePlan &plan, int image,
+    const Placement &placement, Extent size)
 {
-  const std::vector<int> order = plane_order (schedule);
-  PlaneSet set;
-  set.masks.resize (order.size ());
-  for (std::size_t first = 0; first < order.size (); first += kPlanesPerImage) {
-    const std::size_t last = std::min (order.size (), first + kPlanesPerImage);
-    const std::vector<int> masks (order.begin () + std::ptrdiff_t (first),
-        order.begin () + std::ptrdiff_t (last));
-    for (std::size_t plane = 0; plane < masks.size (); plane++)
-      set.masks[std::size_t (masks[plane])] = {
-          int (set.images.size ()), int (plane)};
-    PlaneImage &image = set.images.emplace_back (size.width, size.height);
-    fill_planes (schedule, PixelTable (schedule, masks), placement, image);
-  }
-  return set;
+  PlaneImage planes (size.width, size.height);
+  fill_planes (schedule, PixelTable (schedule, plan, image), placement, planes);
+  return planes;
 }
 
 ImageView<const PlanePixel>
@@ -136,6 +136,25 @@ digest (ImageView<const PlanePixel> image)
     for (int x = 0; x < image.width; x++)
       mix (image.row (y)[x]);
   return sum;
+}
+
+PlaneDigest
+digest_mask (const Schedule &schedule, int mask)
+{
+  // One period of the tile and the pilot's columns say everything.
+  const Tile &tile = schedule.tile ();
+  const int width = tile.period_x (), height = tile.period_y ();
+  PlaneImage period (width + kPilotColumns + 1, height);
+  for (int y = 0; y < height; y++)
+    for (int x = 0; x < width; x++)
+      period.at (x, y) = schedule.code ().open (
+          schedule.element_at (x, y), mask % schedule.slots ());
+  period.at (width, 0) = PlanePixel (schedule.pilot_rows ());
+  if (schedule.pilot_rows () > 0)
+    for (int column = 0; column < kPilotColumns; column++)
+      period.at (width + 1 + column, 0) =
+          pilot_open (column, mask, schedule.slots ());
+  return digest (period.view ());
 }
 
 } // namespace cexp

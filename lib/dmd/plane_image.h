@@ -23,24 +23,24 @@ struct PlaneSlot {
   bool operator== (const PlaneSlot &) const = default;
 };
 
-/** The masks of a schedule as images, which hold as few bytes as they can. */
-struct PlaneSet {
-  std::vector<PlaneImage> images;
+/** How the masks of a schedule are packed into images. */
+struct PlanePlan {
   std::vector<PlaneSlot> masks; ///< of each mask of the schedule
+  int images = 0;
 };
 
 /**
- * The order in which the masks of @p schedule are packed into planes: sorted by
- * the first pixel of the tile that they open. Where a code opens few elements
- * at a time, an image then has masks of neighbouring rows of the tile, and its
- * other rows are dark and cost nothing; in the order of the slots, a
- * bit-reversed schedule would light every row of every image.
+ * Packs 24 masks an image, planes filled from 0, in the order of the first
+ * pixel of the tile that they open. Where a code opens few elements at a time,
+ * an image then has masks of neighbouring rows of the tile, and its other rows
+ * are dark and cost nothing; in the order of the slots, a bit-reversed schedule
+ * would light every row of every image.
  */
-std::vector<int> plane_order (const Schedule &schedule);
+PlanePlan plan_planes (const Schedule &schedule);
 
-/** Renders the masks of @p schedule, 24 an image, planes filled from 0. */
-PlaneSet render_planes (
-    const Schedule &schedule, const Placement &placement, Extent size);
+/** The masks that @p plan puts into image @p image, on an array of @p size. */
+PlaneImage render_planes (const Schedule &schedule, const PlanePlan &plan,
+    int image, const Placement &placement, Extent size);
 
 /** Columns [x, x + width) of @p image. */
 ImageView<const PlanePixel> columns (
@@ -54,5 +54,9 @@ struct PlaneDigest {
   bool operator== (const PlaneDigest &) const = default;
 };
 PlaneDigest digest (ImageView<const PlanePixel> image);
+
+/** Of all mirrors of a mask, on an array of any one size and placement: masks
+ * are equal where their digests are, whatever schedules they belong to. */
+PlaneDigest digest_mask (const Schedule &schedule, int mask);
 
 } // namespace cexp

@@ -201,17 +201,21 @@ TEST_P (RenderedMirrors, ComeBackFromTheirPlanes)
   for (const MirrorLayout layout :
       {MirrorLayout::address, MirrorLayout::lattice, MirrorLayout::cell}) {
     const Placement placement{layout, MirrorRegion{{30, 20}, {6, 4}}};
-    const PlaneSet set = render_planes (schedule, placement, {40, 30});
-    ASSERT_EQ (int (set.masks.size ()), schedule.masks ());
-    EXPECT_EQ (int (set.images.size ()), (schedule.masks () + 23) / 24);
+    const PlanePlan plan = plan_planes (schedule);
+    ASSERT_EQ (int (plan.masks.size ()), schedule.masks ());
+    EXPECT_EQ (plan.images, (schedule.masks () + 23) / 24);
+    std::vector<PlaneImage> images;
+    for (int image = 0; image < plan.images; image++)
+      images.push_back (
+          render_planes (schedule, plan, image, placement, {40, 30}));
     Image<std::uint8_t> mirrors (40, 30), plane (40, 30);
     for (int mask = 0; mask < schedule.masks (); mask++) {
-      const PlaneSlot slot = set.masks[std::size_t (mask)];
+      const PlaneSlot slot = plan.masks[std::size_t (mask)];
       render_mirrors (schedule, mask, placement, mirrors.view ());
       for (int y = 0; y < 30; y++)
         for (int x = 0; x < 40; x++)
           plane.at (x, y) =
-              set.images[std::size_t (slot.image)].at (x, y) >> slot.plane & 1;
+              images[std::size_t (slot.image)].at (x, y) >> slot.plane & 1;
       ASSERT_EQ (plane, mirrors) << layout_text (layout) << " " << mask;
     }
   }
@@ -227,14 +231,28 @@ TEST (PlaneOrder, KeepsMasksOfNeighbouringRowsInOneImage)
   // 64 masks in 3 images: in the order of slots, a bit-reversed schedule would
   // light all 8 rows of the tile in each of them.
   const Schedule schedule = parsed ("sequential:8x8,order=bit-reversal");
-  const PlaneSet set = render_planes (schedule, {}, {64, 64});
-  ASSERT_EQ (set.images.size (), 3u);
-  for (const PlaneImage &image : set.images) {
+  const PlanePlan plan = plan_planes (schedule);
+  ASSERT_EQ (plan.images, 3);
+  for (int index = 0; index < plan.images; index++) {
+    const PlaneImage image =
+        render_planes (schedule, plan, index, {}, {64, 64});
     int lit_rows = 0;
     for (int y = 0; y < 8; y++)
       lit_rows += image.at (0, y) != 0;
     EXPECT_LE (lit_rows, 3);
   }
+}
+
+TEST (MaskDigest, IsThatOfTheMirrors)
+{
+  // The masks of a raster that starts one pixel later are those of the raster.
+  const Schedule raster = parsed ("sequential:2x2");
+  const Schedule shifted = parsed ("sequential:2x2,phase=1/0");
+  EXPECT_EQ (digest_mask (raster, 0), digest_mask (shifted, 1));
+  EXPECT_NE (digest_mask (raster, 0), digest_mask (shifted, 0));
+  const Schedule pilot = parsed ("sequential:2x2,pilot=8");
+  EXPECT_NE (digest_mask (raster, 0), digest_mask (pilot, 0));
+  EXPECT_NE (digest_mask (pilot, 0), digest_mask (pilot, 4));
 }
 
 TEST (PlaneDigest, TellsImagesApart)

@@ -1,0 +1,52 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* What the user says of a board behind its name. */
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "dmd/dlpc350_protocol.h"
+#include "dmd/mirror_array.h"
+#include "dmd/pattern_timing.h"
+
+namespace cexp
+{
+
+/**
+ * Options of a real DMD: "SCHEME:WHICH[,key=value...]" with the keys
+ *   master=dmd|camera    who starts an exposure; default dmd
+ *   layout=address|lattice|cell  of the tile on a diamond array
+ *   region=WxH[+X+Y]     mirrors that show masks; the others stay off, and
+ *                        cost next to nothing to upload
+ *   trigger-delay=TIME   from the camera's edge to light (DLPC900: 104 us or
+ *                        more, default 105 us)
+ *   edge=rising|falling  of the camera's signal
+ * and, for boards whose masks come from elsewhere (DLPC350),
+ *   images=A[/B...]      flash images that hold the masks, 24 each
+ *   source=flash|video
+ * What documents leave open can be turned, see docs/dmd.md:
+ *   trigger2-bit=disables|enables  sense of the DLPC900's trigger output flag
+ *   table=first|last     whether its table is sent before the images
+ *   invert-bit=0|1       place of the DLPC350's polarity flag
+ *   image-pair=plain|swapped  order of two images in the DLPC350's table
+ *   gap=TIME             between two masks of a DLP3000, default 250 us
+ */
+struct DmdOptions {
+  std::string which; ///< what stands between the scheme and the first comma
+  Master master = Master::dmd;
+  Placement placement = {};
+  Nanoseconds trigger_delay = 105'000;
+  bool falling_edge = false;
+  std::vector<int> images = {};
+  dlpc350::Source source = dlpc350::Source::flash;
+  bool trigger2_bit_disables = true;
+  bool table_first = true;
+  bool swap_image_pair = false;
+  Nanoseconds gap = 250'000;
+
+  /** @p text  what follows the scheme. */
+  static Result<DmdOptions> parse (std::string_view text);
+};
+
+} // namespace cexp

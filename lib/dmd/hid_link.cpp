@@ -1,0 +1,138 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "dmd/hid_link.h"
+
+#include <algorithm>
+
+namespace cexp
+{
+
+namespace
+{
+
+using namespace std::chrono_literals;
+
+/** Waits are cut into such pieces, between which a stop is noticed. */
+constexpr auto kPatience = 50ms;
+constexpr auto kDrainTime = 5ms;
+/** Packets of other requests before the wait for a reply is given up: a device
+ * that talks for ever must not keep its driver listening for ever. */
+constexpr int kMaxStrayPackets = 64;
+
+} // namespace
+
+HidLink::HidLink (std::unique_ptr<PacketPipe> pipe, std::string name)
+    : pipe_ (std::move (pipe)), name_ (std::move (name))
+{
+}
+
+Result<HidReply>
+HidLink::read (const HidCommand &command, ByteView data)
+{
+  return transact (HidKind::read, command, data);
+}
+
+Result<HidReply>
+HidLink::write (const HidCommand &command, ByteView data)
+{
+  return transact (HidKind::write, command, data);
+}
+
+Result<void>
+HidLink::post (const HidCommand &command, ByteView data)
+{
+  const std::lock_guard guard (lock_);
+  return send (HidKind::post, command, data);
+}
+
+Error
+HidLink::error (const std::string &what, const std::string &reason) const
+{
+  if (gone ())
+    return Error{name_ + " was unplugged or switched off; connect it, then "
+                         "open it again"};
+  return Error{name_ + ": cannot " + what + ": " + reason};
+}
+
+Result<HidReply>
+HidLink::transact (HidKind kind, const HidCommand &command, ByteView data)
+{
+  const std::lock_guard guard (lock_);
+  if (const auto sent = send (kind, command, data); !sent)
+    return sent.error ();
+  auto reply = receive (command);
+  unclean_ = !reply.ok ();
+  return reply;
+}
+
+Result<void>
+HidLink::send (HidKind kind, const HidCommand &command, ByteView data)
+{
+  if (unclean_)
+    drain ();
+  const auto sent = pipe_->write (
+      encode_request (kind, ++sequence_, command.word, data), command.timeout);
+  unclean_ = !sent;
+  return sent ? sent
+              : Result<void> (error (command.name, sent.error ().message));
+}
+
+Result<HidReply>
+HidLink::receive (const HidCommand &command)
+{
+  std::chrono::milliseconds left = command.timeout;
+  for (int strays = 0; strays < kMaxStrayPackets && left > 0ms;) {
+    if (cancelled ())
+      return error (command.name, "cancelled");
+    const auto wait = std::min<std::chrono::milliseconds> (left, kPatience);
+    const auto packet = pipe_->read (wait);
+    if (!packet)
+      return error (command.name, packet.error ().message);
+    if (packet->empty ()) {
+      left -= wait;
+      continue;
+    }
+    const auto head = parse_reply_head (*packet);
+    if (!head || head->sequence != sequence_) {
+      strays++; // late reply to an earlier request, or a piece of one
+      continue;
+    }
+    auto rest = receive_rest (*head, *packet);
+    if (!rest)
+      return error (command.name, rest.error ().message);
+    return HidReply{head->refused, *std::move (rest)};
+  }
+  return error (command.name,
+      left > 0ms ? "it sends only replies to other requests; is another "
+                   "program using it?"
+                 : "no reply within " +
+                       std::to_string (command.timeout.count ()) + " ms");
+}
+
+Result<Bytes>
+HidLink::receive_rest (HidReplyHead head, Bytes first)
+{
+  Bytes data (first.begin () + HidReplyHead::kSize, first.end ());
+  for (std::size_t packet = 1; packet < head.packets (); packet++) {
+    const auto more = pipe_->read (1s);
+    if (!more)
+      return more.error ();
+    if (more->size () != kHidPacketSize)
+      return Error{"the reply ends after " + std::to_string (data.size ()) +
+                   " of " + std::to_string (head.length) + " bytes"};
+    append (data, *more);
+  }
+  data.resize (head.length);
+  return data;
+}
+
+void
+HidLink::drain ()
+{
+  for (int packets = 0; packets < kMaxStrayPackets; packets++) {
+    const auto stray = pipe_->read (kDrainTime);
+    if (!stray || stray->empty ())
+      return;
+  }
+}
+
+} // namespace cexp

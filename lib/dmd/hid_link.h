@@ -1,0 +1,72 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Requests and replies, one at a time, over a pipe that may fail. */
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <stop_token>
+#include <string>
+
+#include "dmd/hid_packet.h"
+#include "dmd/packet_pipe.h"
+
+namespace cexp
+{
+
+/** What a device answered. */
+struct HidReply {
+  bool refused = false;
+  Bytes data = {};
+};
+
+/**
+ * Talks to one controller: one request in flight, the reply of the same
+ * sequence number, others dropped. Thread-safe: a transaction is not
+ * interrupted by another.
+ *
+ * A wait ends early, with an error, within 50 ms of a request on the stop token
+ * that cancel_on () gave; a transaction that began a message is always finished
+ * as far as the pipe allows, so that the device is left between two messages.
+ */
+class HidLink
+{
+public:
+  /** @p name  of the device, for messages. Drops replies that wait from an
+   * earlier conversation. */
+  HidLink (std::unique_ptr<PacketPipe> pipe, std::string name);
+
+  /** Data that the device answers. Error for a refusal, too. */
+  Result<HidReply> read (const HidCommand &command, ByteView data = {});
+  /** The device acknowledges, or refuses. */
+  Result<HidReply> write (const HidCommand &command, ByteView data);
+  /** Nothing is answered; a failure on the way is the only one known. */
+  Result<void> post (const HidCommand &command, ByteView data);
+
+  void pause (std::chrono::milliseconds time) { pipe_->pause (time); }
+  bool gone () const { return pipe_->gone (); }
+  const std::string &name () const { return name_; }
+
+  /** Waits end when @p stop is requested; a token without a source: never. */
+  void cancel_on (std::stop_token stop) { stop_ = std::move (stop); }
+  bool cancelled () const { return stop_.stop_requested (); }
+
+  /** "NAME: cannot WHAT: REASON". */
+  Error error (const std::string &what, const std::string &reason) const;
+
+private:
+  Result<HidReply> transact (
+      HidKind kind, const HidCommand &command, ByteView data);
+  Result<void> send (HidKind kind, const HidCommand &command, ByteView data);
+  Result<HidReply> receive (const HidCommand &command);
+  Result<Bytes> receive_rest (HidReplyHead head, Bytes first);
+  void drain ();
+
+  const std::unique_ptr<PacketPipe> pipe_;
+  const std::string name_;
+  std::stop_token stop_;
+  std::mutex lock_; // held over one transaction; covers what is below
+  std::uint8_t sequence_ = 0;
+  bool unclean_ = true; // a reply to nobody may be waiting
+};
+
+} // namespace cexp

@@ -1,0 +1,101 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* An emulated board, the wire to it and the driver in front. */
+#pragma once
+
+#include <cstdlib>
+
+#include <gtest/gtest.h>
+
+#include "dmd/dmd.h"
+#include "dmd/dmd_options.h"
+#include "dmd/hid_link.h"
+#include "emulated_pipe.h"
+
+namespace cexp::test
+{
+
+using OpenDriver = Result<std::unique_ptr<Dmd>> (*) (
+    std::unique_ptr<HidLink>, const DmdOptions &);
+
+inline DmdOptions
+options_of (std::string_view text)
+{
+  const auto options = DmdOptions::parse (text);
+  EXPECT_TRUE (options.ok ()) << options.error ().message;
+  return *options;
+}
+
+inline Schedule
+schedule_of (std::string_view preset)
+{
+  const auto schedule = Schedule::from_preset (preset);
+  EXPECT_TRUE (schedule.ok ()) << schedule.error ().message;
+  return *schedule;
+}
+
+inline SlotPlan
+plan_of (const Schedule &schedule, FrameRate rate = {25, 1})
+{
+  const auto plan = SlotPlan::fit (schedule.timing (), schedule.slots (), rate);
+  EXPECT_TRUE (plan.ok ()) << plan.error ().message;
+  return *plan;
+}
+
+inline void
+ignore_progress (int, int)
+{
+}
+
+/** How many random sequences of faults a test goes through: FAULT_SEQUENCES of
+ * them, 500 where nothing is said. */
+inline int
+fault_sequences ()
+{
+  const char *asked = std::getenv ("FAULT_SEQUENCES");
+  return asked != nullptr ? std::atoi (asked) : 500;
+}
+
+/** "" for a success. */
+template <typename T>
+std::string
+message_of (const Result<T> &result)
+{
+  return result.ok () ? "" : result.error ().message;
+}
+
+template <typename Board, OpenDriver open_driver>
+struct DmdRig {
+  std::shared_ptr<Board> board;
+  std::shared_ptr<EmulatedPipe::Clock> clock =
+      std::make_shared<EmulatedPipe::Clock> ();
+  std::unique_ptr<Dmd> dmd = {};
+
+  explicit DmdRig (std::shared_ptr<Board> emulated)
+      : board (std::move (emulated))
+  {
+  }
+
+  Result<void> open (std::string_view options = "")
+  {
+    auto opened = open_driver (
+        std::make_unique<HidLink> (
+            std::make_unique<EmulatedPipe> (board, clock), "board"),
+        options_of (options));
+    if (!opened)
+      return opened.error ();
+    dmd = *std::move (opened);
+    return {};
+  }
+  Result<void> upload (const Schedule &schedule)
+  {
+    return dmd->upload (schedule, {}, ignore_progress);
+  }
+  /** Everything up to running masks, at 25 frames/s. */
+  Result<void> show (const Schedule &schedule)
+  {
+    const auto uploaded = upload (schedule);
+    return uploaded ? dmd->start (plan_of (schedule)) : uploaded;
+  }
+};
+
+} // namespace cexp::test

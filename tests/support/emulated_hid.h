@@ -1,0 +1,165 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* A controller on the other end of the wire, which misbehaves on command. */
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <optional>
+#include <vector>
+
+namespace cexp::test
+{
+
+using Packet = std::vector<std::uint8_t>;
+
+/** What goes wrong with a message, or with the reply to it. */
+enum class Fault {
+  none,
+  refuse,      ///< the message is not obeyed, and a NACK comes
+  lose_reply,  ///< obeyed, but nobody hears of it
+  late_reply,  ///< the reply comes when the next message does
+  stale_reply, ///< a reply to somebody else comes first
+  short_reply, ///< the packet ends early
+  wild_reply,  ///< a reply that announces more than there can be
+  stall,       ///< the host cannot send
+  unplug,      ///< gone, and does not come back
+};
+constexpr int kFaults = int (Fault::unplug) + 1;
+
+/**
+ * The part that controllers have in common: packets in, whole messages to
+ * obey (), packets out. Faults strike the message of their number.
+ */
+class EmulatedHid
+{
+public:
+  virtual ~EmulatedHid () = default;
+
+  std::map<int, Fault> faults; ///< by number of the message, from 0
+
+  bool gone () const { return gone_; }
+  void unplug () { gone_ = true; }
+  int messages () const { return messages_; }
+  virtual bool running () const = 0;
+
+  /** The host sends one packet of 64 bytes; false when it cannot. */
+  bool out (const Packet &packet)
+  {
+    if (pending_.empty () && !begin_message ())
+      return false;
+    pending_.insert (pending_.end (), packet.begin (), packet.end ());
+    const std::size_t needed = 4 + word (pending_, 2);
+    if (pending_.size () < needed)
+      return true;
+    Packet message = std::move (pending_);
+    pending_.clear ();
+    message.resize (needed);
+    if (needed >= 6)
+      answer (message);
+    return true;
+  }
+
+  /** The next packet for the host, none while there is none. */
+  std::optional<Packet> in ()
+  {
+    if (gone_ || replies_.empty ())
+      return std::nullopt;
+    Packet packet = std::move (replies_.front ());
+    replies_.pop_front ();
+    return packet;
+  }
+
+protected:
+  using Data = std::vector<std::uint8_t>;
+
+  /** Does what a message asks for; none refuses it. */
+  virtual std::optional<Data> obey (
+      bool read, int command, const Data &data) = 0;
+
+  static std::uint32_t number (const Data &data, std::size_t at, int bytes)
+  {
+    std::uint32_t value = 0;
+    for (int i = bytes - 1; i >= 0; i--)
+      value = value * 256 + data.at (at + std::size_t (i));
+    return value;
+  }
+  static std::size_t word (const Data &data, std::size_t at)
+  {
+    return number (data, at, 2);
+  }
+
+private:
+  /** Draws the fault of a message; false where the host cannot send it. */
+  bool begin_message ()
+  {
+    if (gone_)
+      return false;
+    const auto found = faults.find (messages_++);
+    fault_ = found == faults.end () ? Fault::none : found->second;
+    if (fault_ == Fault::unplug)
+      gone_ = true;
+    return !gone_ && fault_ != Fault::stall;
+  }
+
+  void answer (const Packet &message)
+  {
+    for (Packet &late : late_)
+      replies_.push_back (std::move (late));
+    late_.clear ();
+    const bool read = (message[0] & 0x80) != 0;
+    const Data data (message.begin () + 6, message.end ());
+    const auto done = fault_ == Fault::refuse
+                          ? std::nullopt
+                          : obey (read, int (word (message, 4)), data);
+    if ((message[0] & 0x40) == 0)
+      return;
+    Packet reply{std::uint8_t (message[0] | (done ? 0 : 0x20)), message[1]};
+    const Data content = done.value_or (Data{});
+    reply.push_back (std::uint8_t (content.size () & 0xFF));
+    reply.push_back (std::uint8_t (content.size () >> 8));
+    reply.insert (reply.end (), content.begin (), content.end ());
+    reply.resize ((reply.size () + 63) / 64 * 64);
+    send (reply);
+  }
+
+  void send (const Packet &reply)
+  {
+    std::deque<Packet> packets;
+    for (std::size_t at = 0; at < reply.size (); at += 64)
+      packets.emplace_back (reply.begin () + std::ptrdiff_t (at),
+          reply.begin () + std::ptrdiff_t (at + 64));
+    switch (fault_) {
+    case Fault::lose_reply:
+      return;
+    case Fault::late_reply:
+      late_.insert (late_.end (), packets.begin (), packets.end ());
+      return;
+    case Fault::stale_reply: {
+      Packet stale = packets.front ();
+      stale[1] = std::uint8_t (stale[1] - 3);
+      packets.push_front (stale);
+      break;
+    }
+    case Fault::short_reply:
+      packets.back ().resize (17);
+      break;
+    case Fault::wild_reply:
+      packets.front ()[3] = 0xFF;
+      break;
+    default:
+      break;
+    }
+    replies_.insert (replies_.end (), packets.begin (), packets.end ());
+  }
+
+  Packet pending_; // pieces of a message that is not complete
+  std::deque<Packet> replies_;
+  std::deque<Packet> late_;
+  Fault fault_ = Fault::none;
+  int messages_ = 0;
+  bool gone_ = false;
+};
+
+} // namespace cexp::test

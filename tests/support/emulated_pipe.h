@@ -1,0 +1,61 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The shortest wire: packets straight into an emulated controller, with a clock
+ * of its own, so that waiting costs no time. */
+#pragma once
+
+#include <functional>
+#include <memory>
+
+#include "dmd/packet_pipe.h"
+#include "emulated_hid.h"
+
+namespace cexp::test
+{
+
+class EmulatedPipe : public PacketPipe
+{
+public:
+  /** Time on the wire's clock, which only goes on where somebody waits. */
+  struct Clock {
+    Milliseconds now{0};
+    /** Called when packets are sent. */
+    std::function<void ()> on_write = [] {};
+  };
+
+  EmulatedPipe (
+      std::shared_ptr<EmulatedHid> device, std::shared_ptr<Clock> clock)
+      : device_ (std::move (device)), clock_ (std::move (clock))
+  {
+  }
+
+  Result<void> write (ByteView packets, Milliseconds timeout) override
+  {
+    clock_->on_write ();
+    for (std::size_t at = 0; at < packets.size (); at += 64) {
+      const auto packet = packets.subspan (at, 64);
+      clock_->now += Milliseconds (1);
+      if (!device_->out ({packet.begin (), packet.end ()})) {
+        if (!device_->gone ())
+          clock_->now += timeout;
+        return Error{"it takes no packets"};
+      }
+    }
+    return {};
+  }
+  Result<Bytes> read (Milliseconds timeout) override
+  {
+    if (device_->gone ())
+      return Error{"it is gone"};
+    const auto packet = device_->in ();
+    clock_->now += packet ? Milliseconds (1) : timeout;
+    return packet.value_or (Bytes{});
+  }
+  bool gone () const override { return device_->gone (); }
+  void pause (Milliseconds time) override { clock_->now += time; }
+
+private:
+  std::shared_ptr<EmulatedHid> device_;
+  std::shared_ptr<Clock> clock_;
+};
+
+} // namespace cexp::test

@@ -1,0 +1,182 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The DLPC350 driver against an emulated board: tables for flash and video and
+ * for either master, what it cannot do, and faults. */
+#include <random>
+
+#include "dmd/dlpc350.h"
+#include "dmd_rig.h"
+#include "emulated_dlpc350.h"
+
+using namespace cexp;
+using namespace cexp::test;
+
+namespace
+{
+
+struct Rig : DmdRig<EmulatedDlpc350, open_dlpc350> {
+  Rig () : DmdRig (std::make_shared<EmulatedDlpc350> ()) {}
+};
+
+/** Trigger and plane of each line: "t0 t1" (timer), "r0 n1" (rising, none). */
+std::string
+table (const EmulatedDlpc350 &board)
+{
+  std::string text;
+  for (const auto &line : board.lines ()) {
+    if (!text.empty ())
+      text += ' ';
+    text += "trfn"[line.trigger];
+    text += std::to_string (line.plane);
+    if (line.next_image)
+      text += '*';
+  }
+  return text;
+}
+
+} // namespace
+
+TEST (Dlpc350, SaysWhatTheBoardIs)
+{
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open ()), "");
+  const DmdInfo &info = rig.dmd->info ();
+  EXPECT_EQ (info.size, (Extent{912, 1140}));
+  EXPECT_EQ (info.array, Array::diamond);
+  EXPECT_EQ (info.minimum_active, 235'000);
+  EXPECT_EQ (info.resident_masks, 48);
+  EXPECT_FALSE (info.run_time_upload);
+}
+
+TEST (Dlpc350, WithoutImagesSaysWhatTheUserCanDo)
+{
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open ()), "");
+  const std::string message = message_of (rig.upload (Schedule ()));
+  for (const char *part : {"takes no masks over USB",
+           "codedexposure schedule render", "images=0", "source=video"})
+    EXPECT_NE (message.find (part), std::string::npos) << message;
+}
+
+TEST (Dlpc350, ImagesMustBeInFlash)
+{
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open ("x,images=2")), "");
+  EXPECT_EQ (message_of (rig.upload (Schedule ())),
+      "board (DLP4500) has 2 images in flash, there is no image 2");
+}
+
+TEST (Dlpc350, AsMasterRunsOnItsTimer)
+{
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open ("x,images=1")), "");
+  ASSERT_EQ (message_of (rig.show (Schedule ())), "");
+  EXPECT_TRUE (rig.board->running ());
+  EXPECT_EQ (table (*rig.board), "t0* t1 t2 t3");
+  EXPECT_EQ (rig.board->images (), (Bytes{1}));
+  EXPECT_EQ (rig.board->exposure (), 10'000u);
+  EXPECT_EQ (rig.board->period (), 10'000u);
+  EXPECT_EQ (rig.board->per_trigger (), 4);
+  EXPECT_EQ (rig.board->trigger_mode (), 1);
+}
+
+TEST (Dlpc350, WithTheCameraAsMasterWaitsOnceAFrame)
+{
+  Rig rig;
+  ASSERT_EQ (
+      message_of (rig.open ("x,images=0,master=camera,edge=falling")), "");
+  const Schedule schedule =
+      schedule_of ("sequential:2x2,switching=250us,readout=1ms");
+  ASSERT_EQ (message_of (rig.show (schedule)), "");
+  EXPECT_EQ (table (*rig.board), "f0* n1 n2 n3");
+  EXPECT_EQ (rig.board->exposure (), 9'500u);
+  EXPECT_EQ (rig.board->period (), 9'750u);
+}
+
+TEST (Dlpc350, ShowsOneFrameOfVideoPerSequence)
+{
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open ("x,source=video")), "");
+  ASSERT_EQ (message_of (rig.show (Schedule ())), "");
+  EXPECT_EQ (table (*rig.board), "r0* n1 n2 n3");
+  EXPECT_EQ (rig.board->source (), 0);
+  EXPECT_EQ (rig.board->trigger_mode (), 0);
+}
+
+TEST (Dlpc350, TwoImagesFollowTheMasks)
+{
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open ("x,images=0/1")), "");
+  ASSERT_EQ (message_of (rig.show (schedule_of ("sequential:6x5"))), "");
+  ASSERT_EQ (rig.board->lines ().size (), 30u);
+  EXPECT_TRUE (rig.board->lines ()[24].next_image);
+  EXPECT_EQ (rig.board->lines ()[24].plane, 0);
+  EXPECT_EQ (rig.board->images (), (Bytes{0, 1}));
+
+  Rig turned;
+  ASSERT_EQ (message_of (turned.open ("x,images=0/1,image-pair=swapped")), "");
+  ASSERT_EQ (message_of (turned.show (schedule_of ("sequential:6x5"))), "");
+  EXPECT_EQ (turned.board->images (), (Bytes{1, 0}));
+}
+
+TEST (Dlpc350, IsToldToStartAgainWhereItIgnoresTheFirst)
+{
+  Rig rig;
+  rig.board->ignores_first_start = true;
+  ASSERT_EQ (message_of (rig.open ("x,images=0")), "");
+  ASSERT_EQ (message_of (rig.show (Schedule ())), "");
+  EXPECT_TRUE (rig.board->running ());
+}
+
+TEST (Dlpc350, StartsAnewAfterAStop)
+{
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open ("x,images=0")), "");
+  ASSERT_EQ (message_of (rig.show (Schedule ())), "");
+  rig.dmd->stop ();
+  EXPECT_FALSE (rig.board->running ());
+  ASSERT_EQ (message_of (rig.dmd->start (plan_of (Schedule ()))), "");
+  EXPECT_TRUE (rig.board->running ());
+  rig.dmd.reset ();
+  EXPECT_FALSE (rig.board->running ());
+}
+
+TEST (Dlpc350, WithoutAVideoSignalSaysSo)
+{
+  Rig rig;
+  rig.board->video_locked = false;
+  ASSERT_EQ (message_of (rig.open ("x,source=video")), "");
+  EXPECT_EQ (message_of (rig.show (Schedule ())),
+      "board: cannot start the patterns: it does not; is a 912x1140 signal on "
+      "its HDMI input?");
+}
+
+TEST (Dlpc350Faults, WhateverHappensItStopsInTheEndAndHangsNowhere)
+{
+  const int kSequences = fault_sequences ();
+  const Schedule schedule = schedule_of ("sequential:2x2");
+  std::mt19937 random (4);
+  int ran = 0;
+  for (int sequence = 0; sequence < kSequences; sequence++) {
+    Rig rig;
+    for (int i = 0; i < 3; i++)
+      rig.board->faults[int (random () % 80)] =
+          Fault (1 + random () % (kFaults - 1));
+    std::chrono::milliseconds last{0}, longest{0};
+    rig.clock->on_write = [&] {
+      longest = std::max (longest, rig.clock->now - last);
+      last = rig.clock->now;
+    };
+    if (rig.open ("x,images=0"))
+      for (int round = 0; round < 2; round++) {
+        ran += rig.show (schedule).ok ();
+        if (random () % 2 == 0)
+          rig.dmd->stop ();
+      }
+    rig.board->faults.clear (); // what comes now is the end
+    rig.dmd.reset ();
+    ASSERT_TRUE (rig.board->gone () || !rig.board->running ())
+        << "sequence " << sequence;
+    ASSERT_LE (longest, std::chrono::seconds (3)) << "sequence " << sequence;
+  }
+  EXPECT_GT (ran, 0);
+}

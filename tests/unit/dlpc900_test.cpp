@@ -1,0 +1,401 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The DLPC900 driver against an emulated board: masks that arrive, tables for
+ * either master, what is not sent twice, and faults. */
+#include <random>
+
+#include "dmd/dlpc900.h"
+#include "dmd_rig.h"
+#include "emulated_dlpc900.h"
+
+using namespace cexp;
+using namespace cexp::test;
+
+namespace
+{
+
+using namespace std::chrono_literals;
+
+constexpr int kDlp6500 = 1, kDlp9000 = 2, kDlp5500 = 5;
+
+struct Rig : DmdRig<EmulatedDlpc900, open_dlpc900> {
+  explicit Rig (int type = kDlp5500)
+      : DmdRig (std::make_shared<EmulatedDlpc900> (type))
+  {
+  }
+};
+
+void
+expect_masks (const EmulatedDlpc900 &board, const Schedule &schedule,
+    const Placement &placement = {})
+{
+  ASSERT_EQ (int (board.shown ().size ()), schedule.masks ());
+  for (int mask = 0; mask < schedule.masks (); mask++) {
+    const auto shown = board.mirrors (mask);
+    Image<std::uint8_t> expected (shown.width (), shown.height ());
+    render_mirrors (schedule, mask, placement, expected.view ());
+    ASSERT_TRUE (shown == expected) << "mask " << mask;
+  }
+}
+
+std::vector<std::uint32_t>
+exposures (const EmulatedDlpc900 &board)
+{
+  std::vector<std::uint32_t> times;
+  for (const auto &line : board.shown ())
+    times.push_back (line.exposure);
+  return times;
+}
+
+/** 1 for each mask of which @p flag holds, in the order shown. */
+std::string
+flags (const EmulatedDlpc900 &board, bool EmulatedDlpc900::Line::*flag)
+{
+  std::string text;
+  for (const auto &line : board.shown ())
+    text += line.*flag ? '1' : '0';
+  return text;
+}
+
+} // namespace
+
+TEST (Dlpc900, SaysWhatTheBoardIs)
+{
+  Rig rig (kDlp6500);
+  ASSERT_EQ (message_of (rig.open ()), "");
+  const DmdInfo &info = rig.dmd->info ();
+  EXPECT_EQ (info.name, "board (DLP6500)");
+  EXPECT_EQ (info.size, (Extent{1920, 1080}));
+  EXPECT_EQ (info.minimum_active, 105'000);
+  EXPECT_EQ (info.resident_masks, 400);
+  EXPECT_TRUE (info.run_time_upload);
+  EXPECT_TRUE (info.triggers_camera);
+  EXPECT_EQ (info.array, Array::orthogonal);
+}
+
+TEST (Dlpc900, OldFirmwareHasTheMinimaOfTheTable)
+{
+  Rig rig (kDlp6500);
+  rig.board->firmware_has_minima = false;
+  ASSERT_EQ (message_of (rig.open ()), "");
+  EXPECT_EQ (rig.dmd->info ().minimum_active, 105'000);
+}
+
+TEST (Dlpc900, UnknownHardwareIsAnError)
+{
+  Rig rig (9);
+  EXPECT_EQ (message_of (rig.open ()),
+      "board: cannot open it: hardware type 9 is no DMD that is known here "
+      "(1..5)");
+}
+
+TEST (Dlpc900, OpeningDisturbsNothing)
+{
+  Rig first;
+  ASSERT_EQ (message_of (first.open ()), "");
+  ASSERT_EQ (message_of (first.show (Schedule ())), "");
+  {
+    Rig second;
+    second.board = first.board;
+    ASSERT_EQ (message_of (second.open ()), "");
+    EXPECT_TRUE (second.dmd->status ()->running);
+  }
+  EXPECT_TRUE (first.board->running ());
+}
+
+TEST (Dlpc900, DestructorStopsAndLetsTheMirrorsMove)
+{
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open ()), "");
+  ASSERT_EQ (message_of (rig.show (Schedule ())), "");
+  EXPECT_TRUE (rig.board->running ());
+  EXPECT_FALSE (rig.board->idle ());
+  rig.dmd.reset ();
+  EXPECT_FALSE (rig.board->running ());
+  EXPECT_TRUE (rig.board->idle ());
+}
+
+class Dlpc900Masks : public ::testing::TestWithParam<const char *>
+{
+};
+
+TEST_P (Dlpc900Masks, ArriveMirrorByMirror)
+{
+  const Schedule schedule = schedule_of (GetParam ());
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open ()), "");
+  ASSERT_EQ (message_of (rig.show (schedule)), "");
+  expect_masks (*rig.board, schedule);
+  EXPECT_TRUE (rig.board->running ());
+}
+
+INSTANTIATE_TEST_SUITE_P (OfSchedules, Dlpc900Masks,
+    ::testing::Values ("sequential:2x2", "staircase:3x2,pilot=16",
+        "sequential:lattice:8/3,order=bit-reversal", "s-matrix:7x1",
+        "sequential:8x8,order=bit-reversal"));
+
+TEST (Dlpc900, TwoControllersGetHalfTheColumnsEach)
+{
+  Rig rig (kDlp9000);
+  const Schedule schedule = schedule_of ("sequential:3x1");
+  ASSERT_EQ (message_of (rig.open ()), "");
+  ASSERT_EQ (message_of (rig.show (schedule)), "");
+  expect_masks (*rig.board, schedule);
+}
+
+TEST (Dlpc900, MirrorsOutsideTheRegionAreOff)
+{
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open ("x,region=101x50+7+20")), "");
+  ASSERT_EQ (message_of (rig.show (Schedule ())), "");
+  expect_masks (*rig.board, Schedule (),
+      {MirrorLayout::address, MirrorRegion{{101, 50}, {7, 20}}});
+}
+
+TEST (Dlpc900, AsMasterItPulsesOnceAFrame)
+{
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open ()), "");
+  ASSERT_EQ (
+      message_of (rig.show (schedule_of ("sequential:2x2,pilot=8"))), "");
+  EXPECT_EQ (exposures (*rig.board), (std::vector<std::uint32_t> (8, 10'000)));
+  EXPECT_EQ (flags (*rig.board, &EmulatedDlpc900::Line::pulses), "10001000");
+  EXPECT_EQ (flags (*rig.board, &EmulatedDlpc900::Line::waits), "00000000");
+}
+
+TEST (Dlpc900, TheSenseOfTheTriggerFlagCanBeTurned)
+{
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open ("x,trigger2-bit=enables")), "");
+  ASSERT_EQ (message_of (rig.show (Schedule ())), "");
+  EXPECT_EQ (flags (*rig.board, &EmulatedDlpc900::Line::pulses), "0111");
+}
+
+TEST (Dlpc900, WithTheCameraAsMasterItWaitsOnceAFrame)
+{
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open ("x,master=camera")), "");
+  EXPECT_FALSE (rig.dmd->info ().triggers_camera);
+  ASSERT_EQ (
+      message_of (rig.show (schedule_of ("sequential:2x2,readout=400us"))), "");
+  EXPECT_EQ (flags (*rig.board, &EmulatedDlpc900::Line::waits), "1000");
+  EXPECT_EQ (exposures (*rig.board),
+      (std::vector<std::uint32_t>{9900, 9900, 9900, 9900}));
+  const auto full = rig.dmd->start (plan_of (Schedule ()));
+  EXPECT_NE (message_of (full).find ("readout=211us"), std::string::npos)
+      << message_of (full);
+}
+
+TEST (Dlpc900, AfterAStopAWholeFrameIsDark)
+{
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open ()), "");
+  ASSERT_EQ (message_of (rig.show (Schedule ())), "");
+  rig.dmd->stop ();
+  EXPECT_FALSE (rig.board->running ());
+  const auto stopped = rig.clock->now;
+  ASSERT_EQ (message_of (rig.dmd->start (plan_of (Schedule ()))), "");
+  EXPECT_GE (rig.clock->now - stopped, 40ms);
+}
+
+TEST (Dlpc900, FirmwareThatLocksMirrorsIsParkedOnce)
+{
+  Rig rig;
+  rig.board->firmware_major = 4;
+  rig.board->firmware_minor = 2;
+  ASSERT_EQ (message_of (rig.open ()), "");
+  ASSERT_EQ (message_of (rig.show (Schedule ())), "");
+  EXPECT_EQ (rig.board->park_cycles (), 1);
+}
+
+TEST (Dlpc900Upload, TellsTimeAndProgress)
+{
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open ()), "");
+  const Schedule columns = schedule_of ("sequential:4x1");
+  const Nanoseconds predicted = rig.dmd->upload_time (columns);
+  std::vector<std::pair<int, int>> told;
+  const auto before = rig.clock->now;
+  ASSERT_TRUE (
+      rig.dmd
+          ->upload (columns, {},
+              [&] (int sent, int total) { told.emplace_back (sent, total); })
+          .ok ());
+  ASSERT_GE (told.size (), 10u);
+  EXPECT_EQ (told.front ().first, 0);
+  EXPECT_EQ (told.back ().first, told.back ().second);
+  EXPECT_EQ (Nanoseconds (told.back ().second) * 1'000'000, predicted);
+  for (std::size_t i = 1; i < told.size (); i++)
+    EXPECT_GT (told[i].first, told[i - 1].first);
+  // The wire takes a packet in 1 ms; the rest is tables and their replies.
+  const auto spent = rig.clock->now - before;
+  EXPECT_GE (spent, std::chrono::nanoseconds (predicted));
+  EXPECT_LE (spent, std::chrono::nanoseconds (predicted) + 100ms);
+}
+
+TEST (Dlpc900Upload, TheSameMasksAreNotSentAgain)
+{
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open ()), "");
+  ASSERT_EQ (message_of (rig.show (Schedule ())), "");
+  ASSERT_EQ (rig.board->images_received (), 1);
+  const Schedule slower = schedule_of ("sequential:2x2,active=5ms");
+  EXPECT_EQ (rig.dmd->upload_time (slower), 0);
+  ASSERT_EQ (message_of (rig.show (slower)), "");
+  EXPECT_EQ (rig.board->images_received (), 1);
+  expect_masks (*rig.board, slower);
+}
+
+TEST (Dlpc900Upload, AnotherOrderOfTheSameMasksMovesLinesOnly)
+{
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open ()), "");
+  ASSERT_EQ (message_of (rig.show (Schedule ())), "");
+  for (const char *preset : {"sequential:2x2,order=bit-reversal",
+           "sequential:2x2,phase=1/1", "sequential:2x2"}) {
+    const Schedule schedule = schedule_of (preset);
+    EXPECT_EQ (rig.dmd->upload_time (schedule), 0);
+    ASSERT_EQ (message_of (rig.show (schedule)), "") << preset;
+    EXPECT_EQ (rig.board->images_received (), 1) << preset;
+    expect_masks (*rig.board, schedule);
+    EXPECT_EQ (flags (*rig.board, &EmulatedDlpc900::Line::pulses), "1000");
+  }
+}
+
+TEST (Dlpc900Upload, OldFirmwareKnowsNoOrder)
+{
+  Rig rig;
+  rig.board->firmware_major = 4;
+  ASSERT_EQ (message_of (rig.open ()), "");
+  ASSERT_EQ (message_of (rig.show (Schedule ())), "");
+  const Schedule other = schedule_of ("sequential:2x2,order=bit-reversal");
+  ASSERT_EQ (message_of (rig.show (other)), "");
+  expect_masks (*rig.board, other);
+}
+
+TEST (Dlpc900Upload, OtherMasksAreSent)
+{
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open ()), "");
+  ASSERT_EQ (message_of (rig.show (Schedule ())), "");
+  const Schedule stairs = schedule_of ("staircase:2x2");
+  EXPECT_GT (rig.dmd->upload_time (stairs), 0);
+  ASSERT_EQ (message_of (rig.show (stairs)), "");
+  expect_masks (*rig.board, stairs);
+}
+
+TEST (Dlpc900Upload, IsCancelledWithinAFewMessages)
+{
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open ()), "");
+  std::stop_source stop;
+  std::chrono::milliseconds asked{0};
+  const auto cancelled = rig.dmd->upload (
+      Schedule (), stop.get_token (), [&] (int sent, int total) {
+        if (sent > total / 2 && !stop.stop_requested ()) {
+          stop.request_stop ();
+          asked = rig.clock->now;
+        }
+      });
+  EXPECT_EQ (message_of (cancelled), "board (DLP5500): upload cancelled");
+  EXPECT_LE (rig.clock->now - asked, 100ms);
+  EXPECT_EQ (message_of (rig.dmd->start (plan_of (Schedule ()))),
+      "board (DLP5500): no masks to start; upload first");
+  ASSERT_EQ (message_of (rig.show (Schedule ())), "");
+  expect_masks (*rig.board, Schedule ());
+}
+
+TEST (Dlpc900Upload, MoreMasksThanItHoldsAreAnError)
+{
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open ()), "");
+  EXPECT_EQ (message_of (rig.upload (schedule_of ("sequential:15x15,pilot=8"))),
+      "board (DLP5500) holds 400 masks, not 450");
+}
+
+TEST (Dlpc900Faults, ARefusalIsToldWithItsReason)
+{
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open ()), "");
+  ASSERT_EQ (message_of (rig.upload (Schedule ())), "");
+  const Schedule long_slots = schedule_of ("sequential:2x2");
+  const auto plan = SlotPlan::fit ({}, 2, {25, 1});
+  EXPECT_EQ (message_of (rig.dmd->start (*plan)),
+      "board (DLP5500): the masks are for 4 slots, not for 2");
+  rig.board->faults[rig.board->messages ()] = Fault::refuse;
+  EXPECT_EQ (message_of (rig.dmd->start (plan_of (long_slots))),
+      "board: cannot start or stop the patterns: error 0, 'no'");
+}
+
+TEST (Dlpc900Faults, StaleAndLateRepliesAreTakenForWhatTheyAre)
+{
+  Rig rig;
+  for (int message = 0; message < 400; message++)
+    rig.board->faults[message] = Fault::stale_reply;
+  ASSERT_EQ (message_of (rig.open ()), "");
+  ASSERT_EQ (message_of (rig.show (Schedule ())), "");
+  expect_masks (*rig.board, Schedule ());
+}
+
+TEST (Dlpc900Faults, AnUnpluggedBoardIsOneClearErrorAtOnce)
+{
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open ()), "");
+  rig.board->faults[rig.board->messages () + 100] = Fault::unplug;
+  const auto before = rig.clock->now;
+  EXPECT_EQ (message_of (rig.show (Schedule ())),
+      "board was unplugged or switched off; connect it, then open it again");
+  rig.dmd->stop ();
+  EXPECT_FALSE (rig.dmd->running ());
+  EXPECT_LE (rig.clock->now - before, 2s);
+}
+
+/** Opens, uploads, starts, stops and goes on, whatever happens. */
+void
+live_through (Rig &rig, const Schedule &schedule, std::mt19937 &random)
+{
+  if (!rig.open ("x,region=32x16"))
+    return;
+  for (int round = 0; round < 3; round++) {
+    std::stop_source stop;
+    int until_stop = int (random () % 12);
+    (void)rig.dmd->upload (schedule, stop.get_token (), [&] (int, int) {
+      if (until_stop-- == 0)
+        stop.request_stop ();
+    });
+    (void)rig.dmd->start (plan_of (schedule));
+    (void)rig.dmd->status ();
+    if (random () % 2 == 0)
+      rig.dmd->stop ();
+  }
+}
+
+TEST (Dlpc900Faults, WhateverHappensItStopsInTheEndAndHangsNowhere)
+{
+  const int kSequences = fault_sequences ();
+  const Schedule schedule = schedule_of ("sequential:2x1");
+  std::mt19937 random (3);
+  int survivors = 0;
+  for (int sequence = 0; sequence < kSequences; sequence++) {
+    Rig rig;
+    const int faults = 1 + int (random () % 3);
+    for (int i = 0; i < faults; i++)
+      rig.board->faults[int (random () % 200)] =
+          Fault (1 + random () % (kFaults - 1));
+    // The longest time that the wire stands still without a message.
+    std::chrono::milliseconds last{0}, longest{0};
+    rig.clock->on_write = [&] {
+      longest = std::max (longest, rig.clock->now - last);
+      last = rig.clock->now;
+    };
+    live_through (rig, schedule, random);
+    rig.board->faults.clear (); // what comes now is the end
+    rig.dmd.reset ();
+    ASSERT_TRUE (rig.board->gone () || !rig.board->running ())
+        << "sequence " << sequence;
+    // 10 s for the table alone, which real boards take.
+    ASSERT_LE (longest, 11s) << "sequence " << sequence;
+    survivors += !rig.board->gone ();
+  }
+  EXPECT_GT (survivors, kSequences / 2);
+  EXPECT_LT (survivors, kSequences);
+}

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <iostream>
 #include <limits>
 #include <utility>
 
@@ -26,17 +25,6 @@ constexpr ExtractOptions kSelect = {.method = Method::kSelect};
 constexpr ExtractOptions kDecode = {.method = Method::kDecode};
 constexpr ExtractOptions kDecodeInPlace = {
     .method = Method::kDecode, .interpolate = false};
-
-Schedule
-schedule_of (const std::string &preset)
-{
-  auto schedule = Schedule::from_preset (preset);
-  if (!schedule) {
-    std::cerr << schedule.error ().message << '\n';
-    std::abort ();
-  }
-  return std::move (*schedule);
-}
 
 Way
 way_of (const std::string &preset, std::string label,

@@ -124,7 +124,7 @@ Way
 way_of (const char *preset, Method method)
 {
   Way way;
-  way.schedule = *Schedule::from_preset (preset);
+  way.schedule = schedule_of (preset);
   way.extract.method = method;
   return way;
 }
@@ -185,7 +185,7 @@ TEST (Quality, KnownLeakCostsNothing)
 {
   const Way known = way_of ("sequential:2x2,leak=0.01", Method::kAuto);
   Way ignored = known;
-  ignored.believed = *Schedule::from_preset ("sequential:2x2");
+  ignored.believed = schedule_of ("sequential:2x2");
   const Scene &scene = synthetic ()[0];
   EXPECT_GT (score_scene (scene, known, {}).point.psnr (), 45.0);
   EXPECT_LT (score_scene (scene, ignored, {.gain = 4.0}).point.psnr (), 40.0);

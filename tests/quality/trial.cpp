@@ -169,6 +169,12 @@ score_frame (const Picture &coded, const Picture *slots, const Way &way)
 
 } // namespace
 
+Schedule
+schedule_of (std::string_view preset)
+{
+  return must (Schedule::from_preset (preset));
+}
+
 Score &
 Score::operator+= (const Score &other)
 {

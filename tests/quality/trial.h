@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "extract/extractor.h"
@@ -13,6 +14,9 @@
 
 namespace cexp::quality
 {
+
+/** The schedule of a preset that is known to be good. */
+Schedule schedule_of (std::string_view preset);
 
 /** What is done to the subframes once they are out. */
 enum class Reading {

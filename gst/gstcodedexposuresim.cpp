@@ -292,6 +292,16 @@ take_caps (GstCodedExposureSim *self, GstEvent *event)
   return FALSE;
 }
 
+/* A dmdsync lets the start of a stream pass when the DMD has its masks. */
+gboolean
+take_stream_start (GstCodedExposureSim *self, GstEvent *event)
+{
+  auto *parent = GST_BASE_TRANSFORM_CLASS (gst_coded_exposure_sim_parent_class);
+  self->state->stream.tag_due = true;
+  return parent->sink_event (GST_BASE_TRANSFORM (self), event) &&
+         sim::follow_schedule (self);
+}
+
 /* The tag follows the segment at once, since it is what the caps of a
  * demultiplexer wait for. */
 gboolean
@@ -315,8 +325,7 @@ sink_event (GstBaseTransform *trans, GstEvent *event)
   case GST_EVENT_SEGMENT:
     return take_segment (self, event);
   case GST_EVENT_STREAM_START:
-    self->state->stream.tag_due = true;
-    break;
+    return take_stream_start (self, event);
   case GST_EVENT_EOS:
     sim::drop_exposure (self, sim::Drop::kEos);
     break;

@@ -56,7 +56,8 @@ wanted_schedule (GstCodedExposureSim *self)
   return nullptr;
 }
 
-/* Takes over a schedule that was changed since the last exposure. */
+} // namespace
+
 bool
 follow_schedule (GstCodedExposureSim *self)
 {
@@ -73,6 +74,9 @@ follow_schedule (GstCodedExposureSim *self)
   gst_base_transform_reconfigure_src (GST_BASE_TRANSFORM (self));
   return true;
 }
+
+namespace
+{
 
 GstClockTime
 input_time (const Plan &plan, guint64 inputs)

@@ -107,6 +107,9 @@ void explain_refusal (GstCodedExposureSim *self, GstCaps *incaps);
 /** Looks for the DMD and for what is to be done first; posts an error and
  * returns false when a setting is wrong. */
 bool begin_stream (GstCodedExposureSim *self);
+/** Takes over a schedule that was changed since the last exposure, or was sent
+ * to the DMD. Returns false, with an error on the bus, when there is none. */
+bool follow_schedule (GstCodedExposureSim *self);
 GstFlowReturn submit_input_buffer (
     GstBaseTransform *trans, gboolean is_discont, GstBuffer *inbuf);
 GstFlowReturn generate_output (GstBaseTransform *trans, GstBuffer **outbuf);

@@ -3,6 +3,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "gstraii.h"
 
@@ -11,8 +12,30 @@ namespace cexp::gst
 
 namespace
 {
+
 constexpr std::string_view kPrefix = "coded-exposure=";
+
+/** The comments in @p tags, in their order. */
+std::vector<std::string>
+comments_of (const GstTagList *tags)
+{
+  std::vector<std::string> comments;
+  const guint count = gst_tag_list_get_tag_size (tags, GST_TAG_COMMENT);
+  for (guint i = 0; i < count; i++) {
+    gchar *owned = nullptr;
+    if (gst_tag_list_get_string_index (tags, GST_TAG_COMMENT, i, &owned))
+      comments.emplace_back (CharPtr (owned).get ());
+  }
+  return comments;
 }
+
+bool
+says_schedule (std::string_view comment)
+{
+  return comment.substr (0, kPrefix.size ()) == kPrefix;
+}
+
+} // namespace
 
 GstTagList *
 schedule_to_tags (const Schedule &schedule)
@@ -30,17 +53,26 @@ schedule_to_event (const Schedule &schedule)
 std::optional<Result<Schedule>>
 schedule_from_tags (const GstTagList *tags)
 {
-  const guint comments = gst_tag_list_get_tag_size (tags, GST_TAG_COMMENT);
-  for (guint i = 0; i < comments; i++) {
-    gchar *owned = nullptr;
-    if (!gst_tag_list_get_string_index (tags, GST_TAG_COMMENT, i, &owned))
-      continue;
-    const CharPtr text (owned);
-    const std::string_view comment (text.get ());
-    if (comment.substr (0, kPrefix.size ()) == kPrefix)
-      return Schedule::from_json (comment.substr (kPrefix.size ()));
-  }
+  for (const std::string &comment : comments_of (tags))
+    if (says_schedule (comment))
+      return Schedule::from_json (
+          std::string_view (comment).substr (kPrefix.size ()));
   return std::nullopt;
+}
+
+GstTagList *
+tags_with_schedule (const GstTagList *tags, const Schedule &schedule)
+{
+  GstTagList *ours = schedule_to_tags (schedule);
+  gst_tag_list_set_scope (ours, gst_tag_list_get_scope (tags));
+  for (const std::string &comment : comments_of (tags))
+    if (!says_schedule (comment))
+      gst_tag_list_add (ours, GST_TAG_MERGE_APPEND, GST_TAG_COMMENT,
+          comment.c_str (), nullptr);
+
+  /* Other tags only: comments are there already, and are kept. */
+  gst_tag_list_insert (ours, tags, GST_TAG_MERGE_KEEP);
+  return ours;
 }
 
 } // namespace cexp::gst

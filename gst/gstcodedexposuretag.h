@@ -22,4 +22,9 @@ GstEvent *schedule_to_event (const Schedule &schedule);
  * where one does and cannot be read. */
 std::optional<Result<Schedule>> schedule_from_tags (const GstTagList *tags);
 
+/** @p tags with @p schedule in place of what they say of one; Transfer: full.
+ */
+GstTagList *tags_with_schedule (
+    const GstTagList *tags, const Schedule &schedule);
+
 } // namespace cexp::gst

@@ -6,6 +6,7 @@
 #include "gstcodedexposurelog.h"
 #include "gstcodedexposuremeta.h"
 #include "gstcodedexposuresim.h"
+#include "gstdmdsync.h"
 
 static gboolean
 plugin_init (GstPlugin *plugin)
@@ -13,7 +14,8 @@ plugin_init (GstPlugin *plugin)
   cexp::gst::register_frame_meta ();
   return GST_ELEMENT_REGISTER (codedexposure_demux, plugin) &&
          GST_ELEMENT_REGISTER (codedexposure_log, plugin) &&
-         GST_ELEMENT_REGISTER (codedexposure_sim, plugin);
+         GST_ELEMENT_REGISTER (codedexposure_sim, plugin) &&
+         GST_ELEMENT_REGISTER (dmdsync, plugin);
 }
 
 GST_PLUGIN_DEFINE (GST_VERSION_MAJOR, GST_VERSION_MINOR, codedexposure,

@@ -42,6 +42,10 @@ class PhaseWatch
 public:
   PhaseWatch (const Schedule &schedule, int width, int height);
 
+  /** Whether the frames are large enough to hold every element, and the pilot
+   * where there is one. */
+  bool complete () const { return meter_.complete (); }
+
   template <typename Pixel>
   PhaseSight look (ImageView<const Pixel> frame)
   {

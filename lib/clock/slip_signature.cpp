@@ -167,7 +167,7 @@ SlipSignature::add_lens (const Schedule &schedule, double blur)
   std::optional<Matrix> slots = inverted (levels, n);
   if (slots)
     lenses_.push_back ({product (levels, Vector (n, 1.0)), *std::move (slots),
-        kFirstUnrest, true});
+        {}, kFirstUnrest, true});
 }
 
 /** The masks come @p late slots late from slot @p from on. */
@@ -184,12 +184,13 @@ SlipSignature::add_slip (int slots, int from, int late)
       [&] (const Slip &slip) { return slip.stood == stood; });
   if (same == slips_.end ()) {
     slips_.push_back ({stood, late, true});
-  } else if (std::abs (late) <= std::abs (same->slots)) {
-    /* Few slots are likelier than many, a trigger missed than one too much. */
-    same->certain = same->certain && same->slots == late;
-    if (std::abs (late) < std::abs (same->slots))
-      same->certain = true;
-    same->slots = late;
+  } else if (std::abs (late) < std::abs (same->slots)) {
+    /* Few slots are likelier than many, */
+    *same = {stood, late, true};
+  } else if (late == -same->slots) {
+    /* and a trigger that was missed than one too much. */
+    same->slots = std::abs (late);
+    same->certain = false;
   }
 }
 
@@ -220,16 +221,19 @@ SlipSignature::read (std::span<const double> levels)
   const double light = dot (levels, usual_) / dot (usual_, usual_);
   if (is_parked (levels))
     return {Kind::parked};
-  const PhaseReading slip = read_slip (levels, light);
+  for (Lens &lens : lenses_)
+    lens.stood = slots_stood (levels, lens);
+  const PhaseReading slip = read_slip (light);
   if (slip.kind == Kind::slipped)
     return slip;
 
-  const bool steady = learn (levels, light);
+  const bool steady = is_steady ();
+  learn (levels, light, steady);
   return {steady ? Kind::in_phase : Kind::unclear};
 }
 
 PhaseReading
-SlipSignature::read_slip (std::span<const double> levels, double light) const
+SlipSignature::read_slip (double light) const
 {
   if (std::abs (std::log (light / brightness_)) > std::log (kLightChange))
     return {};
@@ -239,7 +243,7 @@ SlipSignature::read_slip (std::span<const double> levels, double light) const
   for (const Lens &lens : lenses_) {
     if (!lens.likely || lens.unrest > kRestless)
       continue;
-    const Vector stood = slots_stood (levels, lens);
+    const Vector &stood = lens.stood;
     if (unrest_of (stood) < 1 - kMatch)
       continue;
     for (const Slip &slip : slips_) {
@@ -277,16 +281,18 @@ SlipSignature::guess_usual (std::span<const double> levels)
 /** Whether every mask stood for one slot, as far as the sharpest lens that
  * could be shows. */
 bool
-SlipSignature::learn (std::span<const double> levels, double light)
+SlipSignature::is_steady () const
 {
-  std::optional<double> unrest;
-  for (Lens &lens : lenses_) {
-    const double off = unrest_of (slots_stood (levels, lens));
-    lens.unrest += kSteadyRate * (off - lens.unrest);
-    if (lens.likely && !unrest)
-      unrest = off;
-  }
-  const bool steady = unrest.value_or (0) < kSteady;
+  const auto sharpest = std::find_if (lenses_.begin (), lenses_.end (),
+      [] (const Lens &lens) { return lens.likely; });
+  return unrest_of (sharpest->stood) < kSteady;
+}
+
+void
+SlipSignature::learn (std::span<const double> levels, double light, bool steady)
+{
+  for (Lens &lens : lenses_)
+    lens.unrest += kSteadyRate * (unrest_of (lens.stood) - lens.unrest);
 
   const double rate = learned_ < kFirstFrames ? 1.0 / (learned_ + 1)
                       : steady                ? kSteadyRate
@@ -299,7 +305,6 @@ SlipSignature::learn (std::span<const double> levels, double light)
     level *= scale;
   brightness_ = light;
   judge_lenses ();
-  return steady;
 }
 
 void

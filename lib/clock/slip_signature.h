@@ -42,9 +42,10 @@ private:
   using Vector = std::vector<double>; // a value for each element, or each slot
 
   struct Lens {
-    Vector code;   // levels of the code, in light of 1 a slot
-    Matrix slots;  // from the levels of the elements to the light of the slots
-    double unrest; // of the slots in frames without a slip
+    Vector code;  // levels of the code, in light of 1 a slot
+    Matrix slots; // from the levels of the elements to the light of the slots
+    Vector stood; // slots for which each mask stood in this frame, by this lens
+    double unrest; // of these in frames without a slip
     bool likely;   // it could have made the usual levels
   };
   struct Slip {
@@ -56,10 +57,11 @@ private:
   void add_lens (const Schedule &schedule, double blur);
   void add_slip (int slots, int from, int late);
   Vector slots_stood (std::span<const double> levels, const Lens &lens) const;
-  PhaseReading read_slip (std::span<const double> levels, double light) const;
+  PhaseReading read_slip (double light) const;
   bool is_parked (std::span<const double> levels) const;
   void guess_usual (std::span<const double> levels);
-  bool learn (std::span<const double> levels, double light);
+  bool is_steady () const;
+  void learn (std::span<const double> levels, double light, bool steady);
   void judge_lenses ();
 
   std::vector<Lens> lenses_; // from sharp to blurred

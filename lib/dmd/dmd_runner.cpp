@@ -65,8 +65,15 @@ bool
 DmdRunner::settle ()
 {
   std::unique_lock guard (lock_);
-  changed_.wait (
-      guard, [this] { return idle () || interrupted_ || run_ != Run::on; });
+  changed_.wait (guard, [this] { return wait_is_over (); });
+  return run_ == Run::on && idle () && !interrupted_;
+}
+
+bool
+DmdRunner::settle_within (std::chrono::milliseconds time)
+{
+  std::unique_lock guard (lock_);
+  changed_.wait_for (guard, time, [this] { return wait_is_over (); });
   return run_ == Run::on && idle () && !interrupted_;
 }
 

@@ -2,6 +2,7 @@
 /* The thread that talks to a DMD. */
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <deque>
 #include <functional>
@@ -51,6 +52,8 @@ public:
   /** Waits for that. False when the run ended, or interrupt () cut the wait
    * short. */
   bool settle ();
+  /** The same, but no longer than @p time. */
+  bool settle_within (std::chrono::milliseconds time);
   /** Whether a job failed in the last run. */
   bool failed () const;
   /** While on, settle () does not wait. */
@@ -67,6 +70,10 @@ private:
   void ask (Job job);
   void work ();
   bool idle () const { return jobs_.empty () && !working_; }
+  bool wait_is_over () const
+  {
+    return idle () || interrupted_ || run_ != Run::on;
+  }
 
   const std::unique_ptr<Dmd> dmd_; // used by the thread only, but for info ()
   const Reports reports_;

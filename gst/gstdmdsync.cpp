@@ -1,0 +1,655 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-dmdsync
+ * @title: dmdsync
+ * @short_description: Drives the DMD, and makes time and phase of coded frames
+ * known
+ *
+ * Stands right behind the camera. It programs and starts the micromirror device
+ * (DMD), gives every coded frame the time and the number of its exposure, finds
+ * frames that are lost, late or doubled, and watches whether the masks are in
+ * phase with the exposure. Pixels are read, never written.
+ *
+ * ## The DMD
+ *
+ * NULL to READY opens #dmdsync:device. READY to PAUSED sends the masks of
+ * #dmdsync:schedule from a thread of its own, with PROGRESS messages named
+ * `upload`; the stream begins when that is done, and a change of state cancels
+ * it. The mirrors start when the caps, and with them the frame period, are
+ * known, before caps go on: a camera that the DMD triggers waits for its first
+ * trigger then. Slots that fit neither the frame period nor the device are an
+ * error that tells the numbers. PAUSED to READY parks the mirrors, always.
+ *
+ * Without a device, the element watches and stamps the frames of a DMD that
+ * somebody else drives.
+ *
+ * ## Time
+ *
+ * The PTS of outgoing frames is the start of the exposure's first slot; see
+ * #dmdsync:timestamp-at and #dmdsync:exposure-offset. What PTS are moved back
+ * is latency, and answered as such. DURATION is the frame period of the caps,
+ * OFFSET the number of the frame since the start of the stream, lost ones
+ * counted.
+ *
+ * |[
+ *   mirrors   | slot 0 | slot 1 | ... | slot N-1 | readout | slot 0
+ *   PTS means ^ exposure-start                   ^         ^ arrival
+ *                                   exposure-end |
+ * ]|
+ *
+ * A step of more than one and a half periods is a loss. What takes the place of
+ * the lost frames says #dmdsync:on-loss. A frame at the time of the one before
+ * is a duplicate and dropped; one at a time that was passed is late, and goes
+ * on with DISCONT.
+ *
+ * ## Phase
+ *
+ * #dmdsync:slip-observable says whether a DMD that slips by whole slots can be
+ * seen with the schedule: `never` for codes that open every element in one
+ * slot, `in-the-frame` in which it happens for staircase and s-matrix, `always`
+ * with a pilot (`pilot=16` in the schedule). A frame out of phase is CORRUPTED,
+ * its meta says `locked` false; see #dmdsync:on-unlock. The DMD is started
+ * anew, and when frames show that, they are locked again.
+ *
+ * ## Metas, messages and tags
+ *
+ * Every frame bears the custom meta `CodedExposureFrame`. Element messages are
+ * `dmdsync/frames-lost`, `dmdsync/frame-late`, `dmdsync/frame-dropped`,
+ * `dmdsync/slip` and `dmdsync/locked`. The schedule goes downstream as stream
+ * tag; another one in the stream is replaced, with a warning. QoS events go no
+ * further upstream: some camera sources stop their stream for them.
+ *
+ * ## Example pipelines
+ *
+ * |[
+ * gst-launch-1.0 -m videotestsrc num-buffers=800 pattern=ball !
+ * video/x-raw,format=GRAY8,width=768,height=576,framerate=100/1 !
+ * codedexposure-sim dmd=sim:bench !
+ * dmdsync device=sim:bench schedule=staircase:2x2 ! codedexposure-demux !
+ * queue ! videoconvert ! autovideosink
+ * ]| A simulated bench whose mirrors dmdsync drives.
+ * |[
+ * gst-launch-1.0 -m videotestsrc num-buffers=800 pattern=ball !
+ * video/x-raw,format=GRAY8,width=768,height=576,framerate=100/1 !
+ * codedexposure-sim dmd=sim:bench !
+ * dmdsync device=sim:bench,slip-at=401 schedule=sequential:2x2,pilot=16 !
+ * fakesink
+ * ]| The same with a DMD that misses a trigger in slot 401: `dmdsync/slip` and,
+ * after the DMD was started anew, `dmdsync/locked` appear among the messages.
+ *
+ * Since: 0.1
+ */
+#include "gstdmdsync.h"
+
+#include "gstcodedexposurecaps.h"
+#include "gstdmdsyncstate.h"
+
+GST_DEBUG_CATEGORY (dmdsync_debug);
+#define GST_CAT_DEFAULT dmdsync_debug
+
+using namespace cexp;
+using namespace cexp::gst;
+using sync::Counters;
+using sync::OnLoss;
+using sync::OnUnlock;
+using sync::SyncState;
+using sync::TimestampAt;
+
+struct _GstDmdSync {
+  GstBaseTransform parent;
+  SyncState *state;
+};
+
+G_DEFINE_TYPE_WITH_CODE (GstDmdSync, gst_dmd_sync, GST_TYPE_BASE_TRANSFORM,
+    GST_DEBUG_CATEGORY_INIT (
+        dmdsync_debug, "dmdsync", 0, "drives the DMD, times coded frames"))
+GST_ELEMENT_REGISTER_DEFINE (
+    dmdsync, "dmdsync", GST_RANK_NONE, GST_TYPE_DMD_SYNC)
+
+namespace
+{
+
+enum {
+  PROP_0,
+  PROP_DEVICE,
+  PROP_SCHEDULE,
+  PROP_TIMESTAMP_AT,
+  PROP_EXPOSURE_OFFSET,
+  PROP_ON_LOSS,
+  PROP_ON_UNLOCK,
+  PROP_LOCKED,
+  PROP_SLIP_OBSERVABLE,
+  PROP_FRAMES_IN,
+  PROP_FRAMES_LOST,
+  PROP_FRAMES_LATE,
+  PROP_FRAMES_DUPLICATE,
+  PROP_SLIPS,
+  PROP_STATS,
+};
+
+#define DEFAULT_DEVICE ""
+#define DEFAULT_SCHEDULE "sequential:2x2"
+#define DEFAULT_TIMESTAMP_AT int (TimestampAt::exposure_start)
+#define DEFAULT_EXPOSURE_OFFSET 0
+#define DEFAULT_ON_LOSS int (OnLoss::gap)
+#define DEFAULT_ON_UNLOCK int (OnUnlock::keep)
+
+/* Longer offsets are slips of the pen. */
+constexpr gint64 kMaxOffset = 3600 * GST_SECOND;
+/* READY to PAUSED waits so long for an upload: most devices have their masks by
+ * then, and whatever begins with the frames finds them programmed. */
+constexpr std::chrono::milliseconds kQuickUpload{1000};
+
+constexpr auto kNull = GParamFlags (
+    G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY);
+constexpr auto kPlaying = GParamFlags (
+    G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
+constexpr auto kReadOnly =
+    GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS);
+
+GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE ("sink",
+    GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
+GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC,
+    GST_PAD_ALWAYS, GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
+
+GType
+register_enum (gsize &type, const char *name, const GEnumValue *values)
+{
+  if (g_once_init_enter (&type))
+    g_once_init_leave (&type, g_enum_register_static (name, values));
+  return type;
+}
+
+#define GST_TYPE_DMD_SYNC_TIMESTAMP_AT (timestamp_at_get_type ())
+GType
+timestamp_at_get_type ()
+{
+  static gsize type = 0;
+  static const GEnumValue values[] = {
+      {int (TimestampAt::exposure_start), "Start of the first slot",
+          "exposure-start"},
+      {int (TimestampAt::exposure_end), "End of the last slot", "exposure-end"},
+      {int (TimestampAt::arrival),
+          "Arrival: one frame period after the start, exposure and readout",
+          "arrival"},
+      {0, nullptr, nullptr},
+  };
+  return register_enum (type, "GstDmdSyncTimestampAt", values);
+}
+
+#define GST_TYPE_DMD_SYNC_ON_LOSS (on_loss_get_type ())
+GType
+on_loss_get_type ()
+{
+  static gsize type = 0;
+  static const GEnumValue values[] = {
+      {int (OnLoss::gap), "A GAP event tells of the time that is missing",
+          "gap"},
+      {int (OnLoss::repeat),
+          "The frame before, again, with the flags GAP and DROPPABLE; a gap "
+          "of more than 100 frames stays one",
+          "repeat"},
+      {int (OnLoss::error), "The stream stops with an error", "error"},
+      {0, nullptr, nullptr},
+  };
+  return register_enum (type, "GstDmdSyncOnLoss", values);
+}
+
+#define GST_TYPE_DMD_SYNC_ON_UNLOCK (on_unlock_get_type ())
+GType
+on_unlock_get_type ()
+{
+  static gsize type = 0;
+  static const GEnumValue values[] = {
+      {int (OnUnlock::keep), "Goes on with the flag CORRUPTED", "keep"},
+      {int (OnUnlock::skip), "Is dropped; a GAP event takes its place", "skip"},
+      {int (OnUnlock::error), "The stream stops with an error", "error"},
+      {0, nullptr, nullptr},
+  };
+  return register_enum (type, "GstDmdSyncOnUnlock", values);
+}
+
+#define GST_TYPE_DMD_SYNC_SLIP_OBSERVABLE (slip_observable_get_type ())
+GType
+slip_observable_get_type ()
+{
+  static gsize type = 0;
+  static const GEnumValue values[] = {
+      {int (SlipObservable::never), "In no frame", "never"},
+      {int (SlipObservable::in_the_frame),
+          "In the frame in which it happens, if it happens during the exposure",
+          "in-the-frame"},
+      {int (SlipObservable::always), "In every frame while it lasts", "always"},
+      {0, nullptr, nullptr},
+  };
+  return register_enum (type, "GstDmdSyncSlipObservable", values);
+}
+
+/* Object lock. */
+void
+set_schedule (GstDmdSync *self, const gchar *text)
+{
+  SyncState &st = *self->state;
+  st.settings.schedule = text && *text ? text : DEFAULT_SCHEDULE;
+  const Result<Schedule> schedule = Schedule::parse (st.settings.schedule);
+  if (schedule)
+    st.observable = slip_observable (*schedule);
+  else
+    GST_WARNING_OBJECT (self, "%s", schedule.error ().message.c_str ());
+}
+
+/* Device and schedule are fixed while the device is open. Object lock. */
+bool
+may_change (GstDmdSync *self, const GParamSpec *pspec)
+{
+  if (GST_STATE (self) == GST_STATE_NULL)
+    return true;
+  g_warning ("%s: %s cannot change above the NULL state; it stays as it is",
+      GST_OBJECT_NAME (self), pspec->name);
+  return false;
+}
+
+void
+set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+{
+  auto *self = GST_DMD_SYNC (object);
+  {
+    const ObjectLock lock (self);
+    sync::Settings &settings = self->state->settings;
+    switch (id) {
+    case PROP_DEVICE:
+      if (may_change (self, pspec)) {
+        const gchar *device = g_value_get_string (value);
+        settings.device = device ? device : DEFAULT_DEVICE;
+      }
+      break;
+    case PROP_SCHEDULE:
+      if (may_change (self, pspec))
+        set_schedule (self, g_value_get_string (value));
+      break;
+    case PROP_TIMESTAMP_AT:
+      settings.timestamp_at = TimestampAt (g_value_get_enum (value));
+      break;
+    case PROP_EXPOSURE_OFFSET:
+      settings.exposure_offset = g_value_get_int64 (value);
+      break;
+    case PROP_ON_LOSS:
+      settings.on_loss = OnLoss (g_value_get_enum (value));
+      break;
+    case PROP_ON_UNLOCK:
+      settings.on_unlock = OnUnlock (g_value_get_enum (value));
+      break;
+    default:
+      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+    }
+  }
+  sync::update_latency (self);
+}
+
+GstStructure *
+stats (const SyncState &st)
+{
+  const Counters &counters = st.counters;
+  return gst_structure_new ("application/x-dmdsync-stats", "frames-in",
+      G_TYPE_UINT64, counters.frames_in, "frames-lost", G_TYPE_UINT64,
+      counters.frames_lost, "frames-late", G_TYPE_UINT64, counters.frames_late,
+      "frames-duplicate", G_TYPE_UINT64, counters.frames_duplicate,
+      "frames-early", G_TYPE_UINT64, counters.frames_early, "frames-skipped",
+      G_TYPE_UINT64, counters.frames_skipped, "frames-repeated", G_TYPE_UINT64,
+      counters.frames_repeated, "slips", G_TYPE_UINT64, counters.slips,
+      "locked", G_TYPE_BOOLEAN, gboolean (st.locked), nullptr);
+}
+
+/* Everything that the streaming thread writes. */
+void
+get_report (GObject *object, guint id, GValue *value, GParamSpec *pspec)
+{
+  const SyncState &st = *GST_DMD_SYNC (object)->state;
+  switch (id) {
+  case PROP_LOCKED:
+    return g_value_set_boolean (value, st.locked);
+  case PROP_SLIP_OBSERVABLE:
+    return g_value_set_enum (value, int (st.observable));
+  case PROP_FRAMES_IN:
+    return g_value_set_uint64 (value, st.counters.frames_in);
+  case PROP_FRAMES_LOST:
+    return g_value_set_uint64 (value, st.counters.frames_lost);
+  case PROP_FRAMES_LATE:
+    return g_value_set_uint64 (value, st.counters.frames_late);
+  case PROP_FRAMES_DUPLICATE:
+    return g_value_set_uint64 (value, st.counters.frames_duplicate);
+  case PROP_SLIPS:
+    return g_value_set_uint64 (value, st.counters.slips);
+  case PROP_STATS:
+    return g_value_take_boxed (value, stats (st));
+  default:
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+  }
+}
+
+void
+get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
+{
+  auto *self = GST_DMD_SYNC (object);
+  const ObjectLock lock (self);
+  const sync::Settings &settings = self->state->settings;
+  switch (id) {
+  case PROP_DEVICE:
+    return g_value_set_string (value, settings.device.c_str ());
+  case PROP_SCHEDULE:
+    return g_value_set_string (value, settings.schedule.c_str ());
+  case PROP_TIMESTAMP_AT:
+    return g_value_set_enum (value, int (settings.timestamp_at));
+  case PROP_EXPOSURE_OFFSET:
+    return g_value_set_int64 (value, settings.exposure_offset);
+  case PROP_ON_LOSS:
+    return g_value_set_enum (value, int (settings.on_loss));
+  case PROP_ON_UNLOCK:
+    return g_value_set_enum (value, int (settings.on_unlock));
+  default:
+    get_report (object, id, value, pspec);
+  }
+}
+
+void
+say_observable (GstDmdSync *self)
+{
+  const SyncState &st = *self->state;
+  if (slip_observable (st.schedule) != SlipObservable::never)
+    return;
+  GST_ELEMENT_INFO (self, RESOURCE, SETTINGS,
+      ("A slip of the DMD by whole slots is not observable with %s; reserve "
+       "some rows of mirrors for a pilot, as in %s,pilot=16, to see one",
+          st.schedule.text ().c_str (), st.schedule.text ().c_str ()),
+      (nullptr));
+}
+
+void
+begin_run (GstDmdSync *self)
+{
+  SyncState &st = *self->state;
+  {
+    const ObjectLock lock (self);
+    st.counters = Counters ();
+    st.observable = slip_observable (st.schedule);
+  }
+  say_observable (self);
+  sync::begin_upload (self);
+  if (st.runner)
+    st.runner->settle_within (kQuickUpload);
+}
+
+void
+forget_stream (GstDmdSync *self)
+{
+  SyncState &st = *self->state;
+  st.stream = sync::Stream ();
+  const ObjectLock lock (self);
+  st.time.reset ();
+  st.locked = false;
+  st.latency = 0;
+}
+
+GstStateChangeReturn
+change_state (GstElement *element, GstStateChange transition)
+{
+  auto *self = GST_DMD_SYNC (element);
+  if (transition == GST_STATE_CHANGE_NULL_TO_READY && !sync::open_device (self))
+    return GST_STATE_CHANGE_FAILURE;
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED)
+    begin_run (self);
+  /* First, because the streaming thread may be waiting for the DMD. */
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY)
+    sync::park (self);
+
+  const GstStateChangeReturn changed =
+      GST_ELEMENT_CLASS (gst_dmd_sync_parent_class)
+          ->change_state (element, transition);
+
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED &&
+      changed == GST_STATE_CHANGE_FAILURE)
+    sync::park (self);
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY)
+    forget_stream (self);
+  if (transition == GST_STATE_CHANGE_READY_TO_NULL)
+    self->state->runner.reset ();
+  return changed;
+}
+
+void
+finalize (GObject *object)
+{
+  delete GST_DMD_SYNC (object)->state;
+  G_OBJECT_CLASS (gst_dmd_sync_parent_class)->finalize (object);
+}
+
+void
+install_settings (GObjectClass *klass)
+{
+  /**
+   * dmdsync:device:
+   *
+   * Name of the DMD, `sim:NAME` for a simulated one. Empty: no DMD is driven.
+   * Fixed above NULL.
+   *
+   * Since: 0.1
+   */
+  g_object_class_install_property (klass, PROP_DEVICE,
+      g_param_spec_string ("device", "Device",
+          "DMD to drive, sim:NAME[,key=value...] for a simulated one "
+          "(docs/timing.md); empty: none, frames are stamped and watched only",
+          DEFAULT_DEVICE, kNull));
+  /**
+   * dmdsync:schedule:
+   *
+   * Tile, code and timing that the DMD shows. Fixed above NULL.
+   *
+   * Since: 0.1
+   */
+  g_object_class_install_property (klass, PROP_SCHEDULE,
+      g_param_spec_string ("schedule", "Schedule",
+          "Tile, code and timing of the exposure: a preset such as "
+          "staircase:2x2 or sequential:lattice:8/3,pilot=16, or a JSON file",
+          DEFAULT_SCHEDULE, kNull));
+  /**
+   * dmdsync:timestamp-at:
+   *
+   * What the PTS of incoming frames mean.
+   *
+   * Since: 0.1
+   */
+  g_object_class_install_property (klass, PROP_TIMESTAMP_AT,
+      g_param_spec_enum ("timestamp-at", "Timestamp at",
+          "The instant that PTS of incoming frames mean; outgoing ones mean "
+          "the start of the exposure's first slot",
+          GST_TYPE_DMD_SYNC_TIMESTAMP_AT, DEFAULT_TIMESTAMP_AT, kPlaying));
+  /**
+   * dmdsync:exposure-offset:
+   *
+   * What is known beyond timestamp-at: a trigger delay, the transfer.
+   *
+   * Since: 0.1
+   */
+  g_object_class_install_property (klass, PROP_EXPOSURE_OFFSET,
+      g_param_spec_int64 ("exposure-offset", "Exposure offset",
+          "Nanoseconds by which PTS are moved back beyond what timestamp-at "
+          "says (negative: forward), at most an hour; paid for as latency",
+          -kMaxOffset, kMaxOffset, DEFAULT_EXPOSURE_OFFSET, kPlaying));
+  /**
+   * dmdsync:on-loss:
+   *
+   * What takes the place of lost frames.
+   *
+   * Since: 0.1
+   */
+  g_object_class_install_property (klass, PROP_ON_LOSS,
+      g_param_spec_enum ("on-loss", "On loss",
+          "What takes the place of lost frames", GST_TYPE_DMD_SYNC_ON_LOSS,
+          DEFAULT_ON_LOSS, kPlaying));
+  /**
+   * dmdsync:on-unlock:
+   *
+   * What becomes of a frame whose masks are not known to be in phase.
+   *
+   * Since: 0.1
+   */
+  g_object_class_install_property (klass, PROP_ON_UNLOCK,
+      g_param_spec_enum ("on-unlock", "On unlock",
+          "What becomes of a frame whose masks are not known to be in phase "
+          "with the exposure",
+          GST_TYPE_DMD_SYNC_ON_UNLOCK, DEFAULT_ON_UNLOCK, kPlaying));
+}
+
+void
+install_counter (GObjectClass *klass, guint id, const char *name,
+    const char *nick, const char *blurb)
+{
+  g_object_class_install_property (klass, id,
+      g_param_spec_uint64 (name, nick, blurb, 0, G_MAXUINT64, 0, kReadOnly));
+}
+
+void
+install_reports (GObjectClass *klass)
+{
+  /**
+   * dmdsync:locked:
+   *
+   * Whether the masks are in phase with the exposure, as far as the frames can
+   * show; see #dmdsync:slip-observable.
+   *
+   * Since: 0.1
+   */
+  g_object_class_install_property (klass, PROP_LOCKED,
+      g_param_spec_boolean ("locked", "Locked",
+          "The masks are in phase with the exposure: the DMD was started, and "
+          "no slip was seen since",
+          FALSE, kReadOnly));
+  /**
+   * dmdsync:slip-observable:
+   *
+   * Whether the schedule lets a slip of the DMD by whole slots be seen.
+   *
+   * Since: 0.1
+   */
+  g_object_class_install_property (klass, PROP_SLIP_OBSERVABLE,
+      g_param_spec_enum ("slip-observable", "Slip observable",
+          "In which frames a slip of the DMD by whole slots can be seen with "
+          "the schedule",
+          GST_TYPE_DMD_SYNC_SLIP_OBSERVABLE, int (SlipObservable::never),
+          kReadOnly));
+  install_counter (klass, PROP_FRAMES_IN, "frames-in", "Frames in",
+      "Frames that came from the camera");
+  install_counter (klass, PROP_FRAMES_LOST, "frames-lost", "Frames lost",
+      "Frames that were missing between two that came");
+  install_counter (klass, PROP_FRAMES_LATE, "frames-late", "Frames late",
+      "Frames whose time had passed; they were counted as lost before");
+  install_counter (klass, PROP_FRAMES_DUPLICATE, "frames-duplicate",
+      "Frames duplicate", "Frames at the time of the one before; dropped");
+  install_counter (klass, PROP_SLIPS, "slips", "Slips",
+      "Times that the DMD was found to have slipped");
+  /**
+   * dmdsync:stats:
+   *
+   * All counters at one instant, of this run or the last one.
+   *
+   * Since: 0.1
+   */
+  g_object_class_install_property (klass, PROP_STATS,
+      g_param_spec_boxed ("stats", "Statistics",
+          "All counters at one instant (docs/formats.md)", GST_TYPE_STRUCTURE,
+          kReadOnly));
+}
+
+} // namespace
+
+namespace cexp::gst::sync
+{
+
+SyncState &
+state (GstDmdSync *self)
+{
+  return *self->state;
+}
+
+void
+notify (GstDmdSync *self, const char *property)
+{
+  g_object_notify (G_OBJECT (self), property);
+}
+
+GstClockTimeDiff
+moved_back (const SyncState &st)
+{
+  if (!st.time)
+    return 0;
+  const SlotPlan &plan = st.time->plan;
+  switch (st.settings.timestamp_at) {
+  case TimestampAt::exposure_end:
+    return plan.exposure () + st.settings.exposure_offset;
+  case TimestampAt::arrival:
+    return plan.frame_period () + st.settings.exposure_offset;
+  default:
+    return st.settings.exposure_offset;
+  }
+}
+
+void
+update_latency (GstDmdSync *self)
+{
+  SyncState &st = *self->state;
+  {
+    const ObjectLock lock (self);
+    const auto latency =
+        GstClockTime (std::max<GstClockTimeDiff> (0, moved_back (st)));
+    if (std::exchange (st.latency, latency) == latency)
+      return;
+  }
+  gst_element_post_message (
+      GST_ELEMENT (self), gst_message_new_latency (GST_OBJECT (self)));
+}
+
+} // namespace cexp::gst::sync
+
+static void
+gst_dmd_sync_class_init (GstDmdSyncClass *klass)
+{
+  auto *object_class = G_OBJECT_CLASS (klass);
+  auto *element_class = GST_ELEMENT_CLASS (klass);
+  auto *transform_class = GST_BASE_TRANSFORM_CLASS (klass);
+
+  object_class->set_property = set_property;
+  object_class->get_property = get_property;
+  object_class->finalize = finalize;
+  install_settings (object_class);
+  install_reports (object_class);
+  for (const GType type :
+      {GST_TYPE_DMD_SYNC_TIMESTAMP_AT, GST_TYPE_DMD_SYNC_ON_LOSS,
+          GST_TYPE_DMD_SYNC_ON_UNLOCK, GST_TYPE_DMD_SYNC_SLIP_OBSERVABLE})
+    gst_type_mark_as_plugin_api (type, GstPluginAPIFlags (0));
+
+  gst_element_class_set_static_metadata (element_class, "DMD synchroniser",
+      "Filter/Video",
+      "Drives the DMD of a coded exposure camera; times, counts and watches "
+      "its frames",
+      "gst-codedexposure");
+  gst_element_class_add_static_pad_template (element_class, &sink_template);
+  gst_element_class_add_static_pad_template (element_class, &src_template);
+
+  element_class->change_state = GST_DEBUG_FUNCPTR (change_state);
+  transform_class->set_caps = GST_DEBUG_FUNCPTR (sync::set_caps);
+  transform_class->sink_event = GST_DEBUG_FUNCPTR (sync::sink_event);
+  transform_class->src_event = GST_DEBUG_FUNCPTR (sync::src_event);
+  transform_class->query = GST_DEBUG_FUNCPTR (sync::query);
+  transform_class->generate_output = GST_DEBUG_FUNCPTR (sync::generate_output);
+}
+
+static void
+gst_dmd_sync_init (GstDmdSync *self)
+{
+  self->state = new SyncState;
+  self->state->settings.schedule = DEFAULT_SCHEDULE;
+  auto *transform = GST_BASE_TRANSFORM (self);
+  /* Pixels pass untouched: buffers are allocated as downstream wants them. */
+  gst_base_transform_set_passthrough (transform, TRUE);
+  gst_base_transform_set_qos_enabled (transform, FALSE);
+}

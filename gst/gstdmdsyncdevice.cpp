@@ -1,0 +1,105 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* dmdsync and its DMD: opening, upload, parking. */
+#include "gstdmdsyncstate.h"
+
+#define GST_CAT_DEFAULT dmdsync_debug
+
+namespace cexp::gst::sync
+{
+
+namespace
+{
+
+void
+post_progress (GstDmdSync *self, GstProgressType type, const std::string &text)
+{
+  gst_element_post_message (
+      GST_ELEMENT (self), gst_message_new_progress (GST_OBJECT (self), type,
+                              "upload", text.c_str ()));
+}
+
+/* Reports come from the runner's thread. */
+DmdRunner::Reports
+reports (GstDmdSync *self)
+{
+  DmdRunner::Reports reports;
+  reports.progress = [self] (int sent, int total) {
+    SyncState &st = state (self);
+    const std::string text =
+        std::to_string (sent) + " of " + std::to_string (total) + " masks of " +
+        st.schedule.text () + " sent to " + st.runner->info ().name;
+    st.uploading = sent < total;
+    post_progress (self,
+        sent == 0      ? GST_PROGRESS_TYPE_START
+        : sent < total ? GST_PROGRESS_TYPE_CONTINUE
+                       : GST_PROGRESS_TYPE_COMPLETE,
+        text);
+  };
+  reports.failed = [self] (const Error &error) {
+    if (state (self).uploading.exchange (false))
+      post_progress (self, GST_PROGRESS_TYPE_ERROR, error.message);
+    GST_ELEMENT_ERROR (self, RESOURCE, WRITE,
+        ("The DMD failed: %s", error.message.c_str ()), (nullptr));
+  };
+  return reports;
+}
+
+} // namespace
+
+bool
+open_device (GstDmdSync *self)
+{
+  SyncState &st = state (self);
+  std::string device;
+  std::string text;
+  {
+    const ObjectLock lock (self);
+    device = st.settings.device;
+    text = st.settings.schedule;
+  }
+
+  Result<Schedule> schedule = Schedule::parse (text);
+  if (!schedule) {
+    GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
+        ("The schedule property cannot be read: %s",
+            schedule.error ().message.c_str ()),
+        (nullptr));
+    return false;
+  }
+  st.schedule = *std::move (schedule);
+  if (device.empty ())
+    return true;
+
+  Result<std::unique_ptr<Dmd>> dmd = open_dmd (device);
+  if (!dmd) {
+    GST_ELEMENT_ERROR (self, RESOURCE, OPEN_READ_WRITE,
+        ("Cannot open the DMD \"%s\": %s", device.c_str (),
+            dmd.error ().message.c_str ()),
+        (nullptr));
+    return false;
+  }
+  st.runner = std::make_unique<DmdRunner> (*std::move (dmd), reports (self));
+  GST_INFO_OBJECT (self, "opened %s", device.c_str ());
+  return true;
+}
+
+void
+begin_upload (GstDmdSync *self)
+{
+  SyncState &st = state (self);
+  if (st.runner)
+    st.runner->upload (st.schedule);
+}
+
+void
+park (GstDmdSync *self)
+{
+  SyncState &st = state (self);
+  if (!st.runner)
+    return;
+  st.runner->halt ();
+  if (st.uploading.exchange (false))
+    post_progress (self, GST_PROGRESS_TYPE_CANCELED, "Upload cancelled");
+}
+
+} // namespace cexp::gst::sync

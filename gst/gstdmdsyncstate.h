@@ -1,0 +1,121 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* What dmdsync knows, and what its parts call each other for. */
+#pragma once
+
+#include <atomic>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <gst/gst.h>
+#include <gst/video/video.h>
+
+#include "clock/frame_sequence.h"
+#include "clock/phase_lock.h"
+#include "clock/phase_watch.h"
+#include "dmd/dmd_runner.h"
+#include "gstdmdsync.h"
+#include "gstraii.h"
+#include "schedule/schedule.h"
+
+GST_DEBUG_CATEGORY_EXTERN (dmdsync_debug);
+
+namespace cexp::gst::sync
+{
+
+/** The instant of an exposure that the PTS of incoming frames mean. */
+enum class TimestampAt { exposure_start, exposure_end, arrival };
+/** What takes the place of lost frames. */
+enum class OnLoss { gap, repeat, error };
+/** What becomes of frames that are not locked. */
+enum class OnUnlock { keep, skip, error };
+
+struct Settings {
+  std::string device;
+  std::string schedule;
+  TimestampAt timestamp_at = TimestampAt::exposure_start;
+  GstClockTimeDiff exposure_offset = 0;
+  OnLoss on_loss = OnLoss::gap;
+  OnUnlock on_unlock = OnUnlock::keep;
+};
+
+struct Counters {
+  guint64 frames_in = 0;
+  guint64 frames_lost = 0;
+  guint64 frames_late = 0;
+  guint64 frames_duplicate = 0;
+  guint64 frames_early = 0; ///< dropped: exposed before the stream's time 0
+  guint64 frames_skipped = 0;
+  guint64 frames_repeated = 0;
+  guint64 slips = 0;
+};
+
+/** Everything that follows from the caps. */
+struct Timebase {
+  GstVideoInfo info;
+  FrameRate rate;
+  SlotPlan plan;
+};
+
+/** All that is forgotten from PAUSED to READY. Sink pad's stream lock. */
+struct Stream {
+  std::optional<Timebase> time;
+  std::optional<FrameSequence> sequence;
+  std::optional<PhaseWatch> watch;
+  std::optional<PhaseLock> lock;
+  BufferPtr last;              ///< a copy, for on-loss=repeat
+  std::deque<BufferPtr> ready; ///< to be pushed
+  bool discont = true;         ///< the next frame does not follow the last one
+  bool tag_due = true;
+  bool warned_tag = false;
+};
+
+/** Behind the GObject. The object lock of the element is a leaf: it is never
+ * held while pushing, querying or posting. */
+struct SyncState {
+  /* Object lock. */
+  Settings settings;
+  Counters counters;
+  bool locked = false;
+  SlipObservable observable = SlipObservable::never; ///< of the schedule
+  std::optional<Timebase> time;                      ///< that of the stream
+  GstClockTime latency = 0;                          ///< our own
+
+  /* Changed between NULL and READY only. */
+  Schedule schedule;
+  std::unique_ptr<DmdRunner> runner; ///< null: no DMD is driven
+
+  std::atomic<bool> uploading = false;
+
+  /* Sink pad's stream lock. */
+  Stream stream;
+};
+
+SyncState &state (GstDmdSync *self);
+
+/** Tells watchers of a property that it changed. */
+void notify (GstDmdSync *self, const char *property);
+/** Follows the settings and the caps; posts a message when the latency that
+ * they make has changed. */
+void update_latency (GstDmdSync *self);
+/** By how much PTS are moved back for the settings. Object lock. */
+GstClockTimeDiff moved_back (const SyncState &st);
+
+/* The DMD; each returns false with an error on the bus. */
+bool open_device (GstDmdSync *self);
+void begin_upload (GstDmdSync *self);
+/** Parks the mirrors, whatever they are at. */
+void park (GstDmdSync *self);
+
+/* Negotiation and events. */
+gboolean set_caps (GstBaseTransform *trans, GstCaps *incaps, GstCaps *outcaps);
+gboolean sink_event (GstBaseTransform *trans, GstEvent *event);
+gboolean src_event (GstBaseTransform *trans, GstEvent *event);
+gboolean query (
+    GstBaseTransform *trans, GstPadDirection direction, GstQuery *query);
+
+/* Frames. */
+GstFlowReturn generate_output (GstBaseTransform *trans, GstBuffer **outbuf);
+
+} // namespace cexp::gst::sync

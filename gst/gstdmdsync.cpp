@@ -357,11 +357,14 @@ say_observable (GstDmdSync *self)
   const SyncState &st = *self->state;
   if (slip_observable (st.schedule) != SlipObservable::never)
     return;
-  GST_ELEMENT_INFO (self, RESOURCE, SETTINGS,
-      ("A slip of the DMD by whole slots is not observable with %s; reserve "
-       "some rows of mirrors for a pilot, as in %s,pilot=16, to see one",
-          st.schedule.text ().c_str (), st.schedule.text ().c_str ()),
-      (nullptr));
+  const std::string schedule = st.schedule.text ();
+  const std::string text =
+      "A slip of the DMD by whole slots is not observable with " + schedule +
+      "; reserve some rows of mirrors for a pilot, as in " + schedule +
+      ",pilot=16, to see one";
+  /* gst-launch shows the second text only. */
+  GST_ELEMENT_INFO (
+      self, RESOURCE, SETTINGS, ("%s", text.c_str ()), ("%s", text.c_str ()));
 }
 
 void

@@ -160,7 +160,7 @@ forget_stream (GstCodedExposureDemux *self)
 }
 
 GstStateChangeReturn
-change_state (GstElement *element, GstStateChange transition)
+change_state (GstElement *element, GstStateChange transition) noexcept
 {
   auto *self = GST_CODED_EXPOSURE_DEMUX (element);
   if (transition == GST_STATE_CHANGE_NULL_TO_READY &&
@@ -181,7 +181,7 @@ change_state (GstElement *element, GstStateChange transition)
 }
 
 void
-finalize (GObject *object)
+finalize (GObject *object) noexcept
 {
   delete GST_CODED_EXPOSURE_DEMUX (object)->state;
   G_OBJECT_CLASS (gst_coded_exposure_demux_parent_class)->finalize (object);

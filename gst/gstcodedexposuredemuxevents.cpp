@@ -27,7 +27,7 @@ gboolean
 on_stream_start (GstCodedExposureDemux *self, EventPtr event)
 {
   Stream &stream = state (self).stream;
-  flush_pending (self);
+  settle_pending (self);
   stream.tagged.reset ();
   stream.stale = true;
   return forward (self, std::move (event));
@@ -103,20 +103,25 @@ on_tag (GstCodedExposureDemux *self, EventPtr event)
   return forward_in_turn (self, std::move (event));
 }
 
+/* A gap stands for a frame, so downstream has to know the caps. */
 gboolean
 on_gap (GstCodedExposureDemux *self, EventPtr event)
 {
-  if (state (self).stream.caps && negotiate (self) != GST_FLOW_OK)
-    return FALSE;
-  flush_pending (self);
-  return forward (self, std::move (event));
+  if (!state (self).stream.caps)
+    return forward_in_turn (self, std::move (event));
+  return negotiate (self) == GST_FLOW_OK && forward (self, std::move (event));
 }
 
+/* A stream that ends before its first frame is a stream: a muxer downstream
+ * needs its caps. */
 gboolean
 on_eos (GstCodedExposureDemux *self, EventPtr event)
 {
+  const Stream &stream = state (self).stream;
   end_saturation (self);
-  flush_pending (self);
+  if (stream.caps && !stream.plan)
+    negotiate (self);
+  settle_pending (self);
   return forward (self, std::move (event));
 }
 
@@ -192,7 +197,7 @@ subframes_of (GstCodedExposureDemux *self, GstPad *pad, gint64 frames)
 } // namespace
 
 gboolean
-sink_event (GstPad *pad, GstObject *parent, GstEvent *raw)
+sink_event (GstPad *pad, GstObject *parent, GstEvent *raw) noexcept
 {
   auto *self = GST_CODED_EXPOSURE_DEMUX (parent);
   EventPtr event (raw);
@@ -223,7 +228,7 @@ sink_event (GstPad *pad, GstObject *parent, GstEvent *raw)
 /* QoS stops here: aravissrc holds its object lock while it waits for a frame,
  * so a sink that reports to it waits too, and loses frames for it. */
 gboolean
-src_event (GstPad *pad, GstObject *parent, GstEvent *raw)
+src_event (GstPad *pad, GstObject *parent, GstEvent *raw) noexcept
 {
   if (GST_EVENT_TYPE (raw) != GST_EVENT_QOS)
     return gst_pad_event_default (pad, parent, raw);
@@ -233,7 +238,7 @@ src_event (GstPad *pad, GstObject *parent, GstEvent *raw)
 }
 
 gboolean
-sink_query (GstPad *pad, GstObject *parent, GstQuery *query)
+sink_query (GstPad *pad, GstObject *parent, GstQuery *query) noexcept
 {
   auto *self = GST_CODED_EXPOSURE_DEMUX (parent);
   switch (GST_QUERY_TYPE (query)) {
@@ -251,7 +256,7 @@ sink_query (GstPad *pad, GstObject *parent, GstQuery *query)
  * subframe k is due k slots after its frame. The time it computes for is what
  * the processing deadline of sinks stands for. */
 gboolean
-src_query (GstPad *pad, GstObject *parent, GstQuery *query)
+src_query (GstPad *pad, GstObject *parent, GstQuery *query) noexcept
 {
   auto *self = GST_CODED_EXPOSURE_DEMUX (parent);
   if (GST_QUERY_TYPE (query) == GST_QUERY_CAPS)

@@ -267,9 +267,11 @@ install (GstCodedExposureDemux *self, Proposal proposal)
     output->allocation.reset ();
     push_caps (self, *output);
   });
-  GST_INFO_OBJECT (self, "%s, %s: %dx%d to %dx%d",
+  GST_INFO_OBJECT (self, "%s, %s, gain %g: %dx%d to %dx%d",
       stream.plan->schedule.text ().c_str (),
       std::string (method_name (stream.plan->method)).c_str (),
+      std::visit (
+          [] (const auto &e) { return e.gain (); }, stream.plan->extractor),
       stream.plan->coded.width, stream.plan->coded.height,
       stream.plan->subframe.width, stream.plan->subframe.height);
   if (schedule_changed)
@@ -304,7 +306,7 @@ negotiate (GstCodedExposureDemux *self)
       return GST_FLOW_NOT_NEGOTIATED;
     install (self, std::move (*proposal));
   }
-  flush_pending (self);
+  settle_pending (self);
   return GST_FLOW_OK;
 }
 
@@ -323,10 +325,13 @@ check_pads (GstCodedExposureDemux *self, const Outputs &list)
 }
 
 void
-flush_pending (GstCodedExposureDemux *self)
+settle_pending (GstCodedExposureDemux *self)
 {
-  for (EventPtr &event : std::exchange (state (self).stream.pending, {}))
-    forward (self, std::move (event));
+  Stream &stream = state (self).stream;
+  for (EventPtr &event : std::exchange (stream.pending, {})) {
+    if (stream.plan)
+      forward (self, std::move (event));
+  }
 }
 
 } // namespace cexp::gst::demux

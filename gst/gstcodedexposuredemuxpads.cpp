@@ -201,7 +201,7 @@ add_output (GstCodedExposureDemux *self, GstPadTemplate *templ,
 
 GstPad *
 request_pad (GstElement *element, GstPadTemplate *templ, const gchar *name,
-    const GstCaps *)
+    const GstCaps *) noexcept
 {
   auto *self = GST_CODED_EXPOSURE_DEMUX (element);
   const auto list = outputs (self);
@@ -225,7 +225,7 @@ request_pad (GstElement *element, GstPadTemplate *templ, const gchar *name,
 }
 
 void
-release_pad (GstElement *element, GstPad *pad)
+release_pad (GstElement *element, GstPad *pad) noexcept
 {
   const OutputRef output = strike (GST_CODED_EXPOSURE_DEMUX (element), pad);
   if (!output)

@@ -69,7 +69,8 @@ coded_exposure_method_get_type ()
 }
 
 void
-set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+set_property (
+    GObject *object, guint id, const GValue *value, GParamSpec *pspec) noexcept
 {
   auto *self = GST_CODED_EXPOSURE_DEMUX (object);
   if (id == PROP_SCHEDULE)
@@ -157,7 +158,8 @@ get_report (const DemuxState &st, guint id, GValue *value)
 }
 
 void
-get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
+get_property (
+    GObject *object, guint id, GValue *value, GParamSpec *pspec) noexcept
 {
   auto *self = GST_CODED_EXPOSURE_DEMUX (object);
   const ObjectLock lock (self);

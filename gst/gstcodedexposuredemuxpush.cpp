@@ -555,7 +555,7 @@ end_saturation (GstCodedExposureDemux *self)
  * others wait: users put a queue after every pad. Buffers are pushed one by
  * one, because a sink would show a whole list at the time of its first. */
 GstFlowReturn
-chain (GstPad *pad, GstObject *parent, GstBuffer *inbuf)
+chain (GstPad *pad, GstObject *parent, GstBuffer *inbuf) noexcept
 {
   auto *self = GST_CODED_EXPOSURE_DEMUX (parent);
   const BufferPtr frame (inbuf);

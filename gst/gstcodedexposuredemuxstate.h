@@ -176,9 +176,15 @@ struct CombinerFree {
   }
 };
 
-/** Behind the GObject. The object lock of the element is a leaf: it is never
- * held while pushing, querying or posting; where the stream lock of the sink
- * pad is needed too, that one is taken first. */
+/** Behind the GObject.
+ *
+ * What GStreamer calls is noexcept: lib/ returns its errors, and a lack of
+ * memory ends the process, as in GLib.
+ *
+ * The object lock of the element is never held while
+ * pushing, querying or posting; the stream lock of the sink pad is taken before
+ * it, the object locks of pads after it.
+ */
 struct DemuxState {
   GstPad *sinkpad = nullptr;
 
@@ -224,8 +230,8 @@ is_sticky (GstEvent *event)
 OutputRef add_output (GstCodedExposureDemux *self, GstPadTemplate *templ,
     Output::Kind kind, int index);
 GstPad *request_pad (GstElement *element, GstPadTemplate *templ,
-    const gchar *name, const GstCaps *caps);
-void release_pad (GstElement *element, GstPad *pad);
+    const gchar *name, const GstCaps *caps) noexcept;
+void release_pad (GstElement *element, GstPad *pad) noexcept;
 /** Whether a buffer pushed there goes anywhere. */
 bool is_wanted (const Output &output);
 /** Pushes @p event on every source pad, in the form that suits each. */
@@ -239,10 +245,10 @@ GstFlowReturn combine_flow (
 void forget_flow (GstCodedExposureDemux *self);
 
 /* Events and queries. */
-gboolean sink_event (GstPad *pad, GstObject *parent, GstEvent *event);
-gboolean src_event (GstPad *pad, GstObject *parent, GstEvent *event);
-gboolean sink_query (GstPad *pad, GstObject *parent, GstQuery *query);
-gboolean src_query (GstPad *pad, GstObject *parent, GstQuery *query);
+gboolean sink_event (GstPad *pad, GstObject *parent, GstEvent *event) noexcept;
+gboolean src_event (GstPad *pad, GstObject *parent, GstEvent *event) noexcept;
+gboolean sink_query (GstPad *pad, GstObject *parent, GstQuery *query) noexcept;
+gboolean src_query (GstPad *pad, GstObject *parent, GstQuery *query) noexcept;
 
 /* Negotiation. */
 /** Makes the plan and tells the source pads, where that is due. Posts an error
@@ -251,8 +257,9 @@ GstFlowReturn negotiate (GstCodedExposureDemux *self);
 /** Whether the plan has a subframe for every pad of @p list; posts an error
  * where it has not. */
 bool check_pads (GstCodedExposureDemux *self, const Outputs &list);
-/** Forwards the events that waited for the caps. */
-void flush_pending (GstCodedExposureDemux *self);
+/** Forwards the events that waited for the caps; forgets them where no caps
+ * came. */
+void settle_pending (GstCodedExposureDemux *self);
 /** Answers for the CAPS query; Transfer: full. */
 GstCaps *sink_caps (GstCodedExposureDemux *self);
 GstCaps *src_caps (GstCodedExposureDemux *self, GstPad *pad);
@@ -267,7 +274,7 @@ GstFlowReturn acquire (Output &output, BufferPtr &outbuf);
 gboolean answer_allocation (GstCodedExposureDemux *self, GstQuery *query);
 
 /* Frames. */
-GstFlowReturn chain (GstPad *pad, GstObject *parent, GstBuffer *inbuf);
+GstFlowReturn chain (GstPad *pad, GstObject *parent, GstBuffer *inbuf) noexcept;
 /** Says on the bus that a burst of saturated frames is over, if there is one.
  */
 void end_saturation (GstCodedExposureDemux *self);

@@ -507,16 +507,32 @@ TEST_F (DemuxTime, EosReachesEveryPad)
     EXPECT_TRUE (demux->pull_event (GST_EVENT_EOS, pad)) << pad;
 }
 
-TEST_F (DemuxTime, EosBeforeAnyFrameReachesEveryPad)
+TEST_F (DemuxTime, EosBeforeAnyFrameReachesEveryPadBehindItsCaps)
 {
   start ();
   demux->request ("subframe_3");
   ASSERT_TRUE (demux->push_event (gst_event_new_eos ()));
   for (const char *pad : {"", "subframe_3"}) {
+    EXPECT_TRUE (demux->pull_event (GST_EVENT_CAPS, pad)) << pad;
     EXPECT_TRUE (demux->pull_event (GST_EVENT_SEGMENT, pad)) << pad;
     EXPECT_TRUE (demux->pull_event (GST_EVENT_EOS, pad)) << pad;
   }
   EXPECT_EQ (demux->error (), "");
+}
+
+TEST_F (DemuxTime, StreamWithoutCapsEndsAndTheNextOneIsPlayed)
+{
+  demux = std::make_unique<ElementHarness> (
+      "codedexposure-demux schedule=sequential:2x2");
+  demux->push_event (gst_event_new_stream_start ("empty"));
+  demux->push_event (gst_event_new_gap (0, 40 * kMs));
+  ASSERT_TRUE (demux->push_event (gst_event_new_eos ()));
+  EXPECT_TRUE (demux->pull_event (GST_EVENT_EOS));
+
+  demux->push_event (gst_event_new_stream_start ("full"));
+  demux->set_caps (gray_caps (16, 16));
+  push (0);
+  EXPECT_EQ (pull_all ().size (), 4u);
 }
 
 TEST_F (DemuxTime, SecondRunKnowsNothingOfTheFirst)

@@ -1,0 +1,98 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* What gst-inspect-1.0 shows is the manual: it must be complete. */
+#include <memory>
+#include <string>
+
+#include <gst/gst.h>
+#include <gtest/gtest.h>
+
+namespace
+{
+
+struct FeatureListFree {
+  void operator() (GList *list) const { gst_plugin_feature_list_free (list); }
+};
+using FeatureList = std::unique_ptr<GList, FeatureListFree>;
+
+struct ObjectUnref {
+  void operator() (gpointer object) const { gst_object_unref (object); }
+};
+
+FeatureList
+features ()
+{
+  return FeatureList (gst_registry_get_feature_list_by_plugin (
+      gst_registry_get (), "codedexposure"));
+}
+
+/** Every element of the plugin, one after the other. */
+template <typename Check>
+void
+for_each_element (Check check)
+{
+  const FeatureList list = features ();
+  ASSERT_NE (list, nullptr) << "the plugin is missing or blacklisted";
+  for (GList *at = list.get (); at; at = at->next) {
+    if (!GST_IS_ELEMENT_FACTORY (at->data))
+      continue;
+    auto *factory = GST_ELEMENT_FACTORY (at->data);
+    SCOPED_TRACE (GST_OBJECT_NAME (factory));
+    const std::unique_ptr<GstElement, ObjectUnref> element (
+        gst_element_factory_create (factory, nullptr));
+    ASSERT_NE (element, nullptr);
+    check (factory, element.get ());
+  }
+}
+
+bool
+is_ours (const GParamSpec *spec)
+{
+  const gchar *owner = g_type_name (spec->owner_type);
+  return g_str_has_prefix (owner, "GstCodedExposure") ||
+         g_str_has_prefix (owner, "GstDmd");
+}
+
+} // namespace
+
+TEST (Plugin, HasTheElementsOfTheBench)
+{
+  for (const char *name : {"codedexposure-sim", "codedexposure-demux",
+           "codedexposure-log", "dmdsync"}) {
+    const std::unique_ptr<GstElementFactory, ObjectUnref> factory (
+        gst_element_factory_find (name));
+    EXPECT_NE (factory, nullptr) << name;
+  }
+}
+
+TEST (Plugin, EveryElementIsDescribed)
+{
+  for_each_element ([] (GstElementFactory *factory, GstElement *) {
+    for (const char *key :
+        {GST_ELEMENT_METADATA_LONGNAME, GST_ELEMENT_METADATA_KLASS,
+            GST_ELEMENT_METADATA_DESCRIPTION, GST_ELEMENT_METADATA_AUTHOR}) {
+      const gchar *text = gst_element_factory_get_metadata (factory, key);
+      EXPECT_TRUE (text && *text) << key;
+    }
+  });
+}
+
+TEST (Plugin, EveryPropertyIsExplained)
+{
+  for_each_element ([] (GstElementFactory *, GstElement *element) {
+    guint count = 0;
+    GParamSpec **specs =
+        g_object_class_list_properties (G_OBJECT_GET_CLASS (element), &count);
+    for (guint i = 0; i < count; i++) {
+      if (!is_ours (specs[i]))
+        continue;
+      SCOPED_TRACE (specs[i]->name);
+      const std::string nick = g_param_spec_get_nick (specs[i]);
+      const gchar *blurb = g_param_spec_get_blurb (specs[i]);
+      EXPECT_FALSE (nick.empty ());
+      EXPECT_NE (nick, specs[i]->name) << "the nick only repeats the name";
+      ASSERT_NE (blurb, nullptr);
+      EXPECT_GE (std::string (blurb).size (), 20u) << blurb;
+    }
+    g_free (specs);
+  });
+}

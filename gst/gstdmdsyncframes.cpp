@@ -99,6 +99,7 @@ fill_gap (GstDmdSync *self, const Frame &frame, OnLoss on_loss)
   }
   for (guint64 k = 0; k < lost; k++) {
     BufferPtr filler (gst_buffer_copy (stream.last.get ()));
+    GST_BUFFER_FLAG_UNSET (filler.get (), GST_BUFFER_FLAG_DISCONT);
     GST_BUFFER_FLAG_SET (
         filler.get (), GST_BUFFER_FLAG_GAP | GST_BUFFER_FLAG_DROPPABLE);
     stamp (self, filler.get (),

@@ -1,0 +1,124 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* dmdsync between pads of the test, linked in so that the mirrors of simulated
+ * DMDs are those of the test. */
+#pragma once
+
+#include "gstcodedexposuredemux.h"
+#include "gstcodedexposuremeta.h"
+#include "gstcodedexposuresim.h"
+#include "gstdmdsync.h"
+#include "harness.h"
+#include "schedule/timing.h"
+
+namespace cexp::test
+{
+
+/** Make one of these global in every program that runs linked elements. */
+class LinkedElements : public ::testing::Environment
+{
+  void SetUp () override
+  {
+    register_frame_meta ();
+    ASSERT_TRUE (GST_ELEMENT_REGISTER (codedexposure_demux, nullptr));
+    ASSERT_TRUE (GST_ELEMENT_REGISTER (codedexposure_sim, nullptr));
+    ASSERT_TRUE (GST_ELEMENT_REGISTER (dmdsync, nullptr));
+  }
+};
+
+constexpr int kSyncWidth = 64;
+constexpr int kSyncHeight = 48;
+
+/** A dmdsync with @p settings, and frames for it. */
+class SyncHarness : public ElementHarness
+{
+public:
+  explicit SyncHarness (const std::string &settings = "")
+      : ElementHarness ("dmdsync " + settings)
+  {
+  }
+
+  /** Says caps of 64x48 pixels at @p rate, and their segment. */
+  void start (const FrameRate &rate = {25, 1})
+  {
+    rate_ = rate;
+    set_caps (gray_caps (kSyncWidth, kSyncHeight,
+        std::to_string (rate.num) + "/" + std::to_string (rate.den)));
+  }
+  GstClockTime time_of (int frame) const
+  {
+    return GstClockTime (rate_.time_of (frame));
+  }
+
+  /** Sends a frame, flat or with a level for each element of a 2x2 tile. */
+  GstFlowReturn send (GstClockTime pts, int level = 100)
+  {
+    return send_levels (pts, {level, level, level, level});
+  }
+  GstFlowReturn send_levels (GstClockTime pts, std::array<int, 4> levels)
+  {
+    return push (frame_of (draw<std::uint8_t> (kSyncWidth, kSyncHeight,
+                               [&] (int x, int y) {
+                                 return levels[std::size_t (x % 2 + y % 2 * 2)];
+                               }),
+        pts));
+  }
+  /** Sends frames @p first to @p last - 1 at their times. */
+  void send_frames (int first, int last)
+  {
+    for (int frame = first; frame < last; frame++)
+      ASSERT_EQ (send (time_of (frame)), GST_FLOW_OK);
+  }
+
+  template <typename T>
+  T get_property (const char *name)
+  {
+    return property<T> (element (), name);
+  }
+  guint64 counter (const char *name)
+  {
+    GstStructure *stats = nullptr;
+    g_object_get (element (), "stats", &stats, nullptr);
+    const StructurePtr owned (stats);
+    guint64 value = G_MAXUINT64;
+    EXPECT_TRUE (gst_structure_get_uint64 (stats, name, &value)) << name;
+    return value;
+  }
+
+private:
+  FrameRate rate_;
+};
+
+inline guint64
+uint64_field (const MessagePtr &message, const char *name)
+{
+  guint64 value = G_MAXUINT64;
+  EXPECT_TRUE (
+      message && gst_structure_get_uint64 (
+                     gst_message_get_structure (message.get ()), name, &value))
+      << name;
+  return value;
+}
+
+inline int
+int_field (const MessagePtr &message, const char *name)
+{
+  int value = G_MININT;
+  EXPECT_TRUE (
+      message && gst_structure_get_int (
+                     gst_message_get_structure (message.get ()), name, &value))
+      << name;
+  return value;
+}
+
+inline std::string
+string_field (const MessagePtr &message, const char *name)
+{
+  EXPECT_TRUE (message) << "no message with " << name;
+  const gchar *text =
+      message ? gst_structure_get_string (
+                    gst_message_get_structure (message.get ()), name)
+              : nullptr;
+  return text ? text : "";
+}
+
+} // namespace cexp::test

@@ -11,8 +11,10 @@
 #include "clock/phase_watch.h"
 #include "dmd/simulated_dmd.h"
 #include "optics/bench.h"
+#include "scenes.h"
 
 using namespace cexp;
+using namespace cexp::test;
 
 namespace
 {
@@ -29,68 +31,6 @@ schedule_of (const char *preset)
 
 constexpr int kWidth = 96;
 constexpr int kHeight = 72;
-
-/** Draws what stands before the camera during a slot. */
-using Scene =
-    std::function<void (std::int64_t slot, ImageView<std::uint8_t> out)>;
-
-/** Part of white of a texture that goes on for ever. */
-double
-texture (int x, int y)
-{
-  static const std::vector<double> tile = [] {
-    std::vector<double> values;
-    for (int v = 0; v < 128; v++)
-      for (int u = 0; u < 128; u++)
-        values.push_back (0.45 +
-                          0.2 * std::sin (u * 0.1964) * std::cos (v * 0.1473) +
-                          0.15 * std::sin (u * 0.884 - v * 0.491) +
-                          (u * 31 + v * 17) % 13 * 0.01);
-    return values;
-  }();
-  return tile[std::size_t ((y & 127) * 128 + (x & 127))];
-}
-
-/** The texture, moved (dx, dy), in light of @p brightness. */
-void
-draw (ImageView<std::uint8_t> out, int dx, int dy, double brightness = 1.0)
-{
-  for (int y = 0; y < out.height; y++)
-    for (int x = 0; x < out.width; x++)
-      out.at (x, y) = std::uint8_t (
-          255 * std::min (1.0, brightness * texture (x + dx, y + dy)));
-}
-
-void
-still (std::int64_t, ImageView<std::uint8_t> out)
-{
-  draw (out, 0, 0);
-}
-
-void
-moving (std::int64_t slot, ImageView<std::uint8_t> out)
-{
-  draw (out, int (slot), -int (slot / 2));
-}
-
-/** A moving scene in light that changes with the slot. */
-Scene
-lit_by (std::function<double (std::int64_t slot)> light)
-{
-  return [light] (std::int64_t slot, ImageView<std::uint8_t> out) {
-    draw (out, int (slot), -int (slot / 2), light (slot));
-  };
-}
-
-Scene
-each_pixel (std::function<double (int x, int y, std::int64_t slot)> value)
-{
-  return [value] (std::int64_t slot, ImageView<std::uint8_t> out) {
-    for (int y = 0; y < out.height; y++)
-      for (int x = 0; x < out.width; x++)
-        out.at (x, y) = std::uint8_t (255 * value (x, y, slot));
-  };
-}
 
 /** A camera that looks at a scene through the masks of simulated mirrors. */
 class Camera
@@ -250,9 +190,7 @@ TEST (SlipSignature, CannotSeeASlipBetweenTwoExposures)
 TEST (SlipSignature, LightThatChangesIsNotASlip)
 {
   const std::vector<std::pair<const char *, Scene>> scenes{
-      {"lamps on the mains", lit_by ([] (std::int64_t slot) {
-         return 0.8 + 0.2 * std::sin (0.754 * double (slot));
-       })},
+      {"lamps on the mains", kMains},
       {"lamp on and off", lit_by ([] (std::int64_t slot) {
          return slot / 37 % 2 ? 1.0 : 0.3;
        })},
@@ -413,10 +351,6 @@ run_lock (const char *preset, const Scene &scene, int frames, std::int64_t at,
   }
   return run;
 }
-
-const Scene kMains = lit_by ([] (std::int64_t slot) {
-  return 0.8 + 0.2 * std::sin (0.754 * double (slot));
-});
 
 } // namespace
 

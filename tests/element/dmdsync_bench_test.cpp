@@ -1,0 +1,310 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* dmdsync behind the simulated bench whose mirrors it drives: a DMD that slips
+ * is seen, said, flagged and mended. */
+#include <deque>
+
+#include <gst/app/gstappsink.h>
+#include <gst/app/gstappsrc.h>
+
+#include "dmd/simulated_dmd.h"
+#include "scenes.h"
+#include "sync_harness.h"
+
+namespace
+{
+
+using namespace cexp;
+using namespace cexp::test;
+
+const auto *const linked =
+    ::testing::AddGlobalTestEnvironment (new LinkedElements);
+
+constexpr int kWidth = 96;
+constexpr int kHeight = 72;
+constexpr const char *kOptics =
+    " full-well=10000 read-noise=5 psf-sigma=0.5 seed=3 ";
+
+/** A pipeline that exposes one coded frame at a time. */
+class Bench
+{
+public:
+  /** @p line: what stands between the scene and the test. */
+  Bench (const std::string &schedule, const std::string &line)
+      : slots_ (Schedule::parse (schedule)->slots ()),
+        pipeline_ (GST_ELEMENT (gst_object_ref_sink (gst_parse_launch (
+            ("appsrc name=scene format=time caps=\"" +
+                gray_caps (
+                    kWidth, kHeight, std::to_string (25 * slots_) + "/1") +
+                "\" ! " + line + " ! appsink name=camera sync=false")
+                .c_str (),
+            nullptr)))),
+        scene_ (gst_bin_get_by_name (GST_BIN (pipeline_.get ()), "scene")),
+        camera_ (gst_bin_get_by_name (GST_BIN (pipeline_.get ()), "camera")),
+        bus_ (gst_element_get_bus (pipeline_.get ()))
+  {
+    gst_element_set_state (pipeline_.get (), GST_STATE_PLAYING);
+  }
+  ~Bench () { gst_element_set_state (pipeline_.get (), GST_STATE_NULL); }
+
+  int slots () const { return slots_; }
+  std::int64_t frames () const { return slot_ / slots_; }
+
+  /** Exposes the next frame. */
+  void expose (const Scene &scene)
+  {
+    const FrameRate rate{25 * slots_, 1};
+    for (int s = 0; s < slots_; s++, slot_++) {
+      Image<std::uint8_t> picture (kWidth, kHeight);
+      scene (slot_, picture.view ());
+      ASSERT_EQ (gst_app_src_push_buffer (GST_APP_SRC (scene_.get ()),
+                     frame_of (picture, GstClockTime (rate.time_of (slot_)))
+                         .release ()),
+          GST_FLOW_OK);
+    }
+  }
+  /** The next buffer that comes out; there has to be one. */
+  BufferPtr pull ()
+  {
+    GstSample *sample = gst_app_sink_try_pull_sample (
+        GST_APP_SINK (camera_.get ()), 60 * GST_SECOND);
+    EXPECT_TRUE (sample) << "no frame";
+    if (!sample)
+      return nullptr;
+    BufferPtr frame (gst_buffer_ref (gst_sample_get_buffer (sample)));
+    gst_sample_unref (sample);
+    return frame;
+  }
+  BufferPtr next (const Scene &scene)
+  {
+    expose (scene);
+    return pull ();
+  }
+
+  /** Element messages of dmdsync so far, by name. */
+  std::vector<MessagePtr> messages (const char *name)
+  {
+    while (GstMessage *next = gst_bus_pop (bus_.get ()))
+      said_.emplace_back (next);
+    std::vector<MessagePtr> found;
+    for (const MessagePtr &message : said_)
+      if (gst_message_has_name (message.get (), name))
+        found.emplace_back (gst_message_ref (message.get ()));
+    return found;
+  }
+  /** Text of the next error, for which it waits. */
+  std::string wait_error ()
+  {
+    const MessagePtr found (gst_bus_timed_pop_filtered (
+        bus_.get (), 60 * GST_SECOND, GST_MESSAGE_ERROR));
+    if (!found)
+      return "";
+    GError *error = nullptr;
+    gst_message_parse_error (found.get (), &error, nullptr);
+    const std::string text = error->message;
+    g_error_free (error);
+    return text;
+  }
+  guint64 counter (const char *name)
+  {
+    const ObjectPtr<GstElement> sync (
+        gst_bin_get_by_name (GST_BIN (pipeline_.get ()), "sync"));
+    return property<guint64> (sync.get (), name);
+  }
+
+private:
+  int slots_;
+  ObjectPtr<GstElement> pipeline_, scene_, camera_;
+  ObjectPtr<GstBus> bus_;
+  std::int64_t slot_ = 0;
+  std::deque<MessagePtr> said_;
+};
+
+/** A bench with a DMD of its own that slips, and one that never does. */
+struct Benches {
+  Bench slipping;
+  Bench steady;
+
+  Benches (const std::string &schedule, const std::string &slips)
+      : slipping (schedule, "codedexposure-sim dmd=sim:bench" +
+                                std::string (kOptics) +
+                                "! dmdsync name=sync device=sim:bench" + slips +
+                                " schedule=" + schedule),
+        steady (schedule,
+            "codedexposure-sim schedule=" + schedule + kOptics + " ! identity")
+  {
+  }
+};
+
+std::string
+pixels (const BufferPtr &buffer)
+{
+  if (!buffer)
+    return "";
+  std::string bytes (gst_buffer_get_size (buffer.get ()), '\0');
+  gst_buffer_extract (buffer.get (), 0, bytes.data (), bytes.size ());
+  return bytes;
+}
+
+bool
+is_locked (const BufferPtr &frame)
+{
+  const auto meta = get_frame_meta (frame.get ());
+  const bool locked = meta && meta->locked;
+  EXPECT_EQ (GST_BUFFER_FLAG_IS_SET (frame.get (), GST_BUFFER_FLAG_CORRUPTED),
+      !locked);
+  return locked;
+}
+
+/** What a slip in frame @p at does to a run. */
+void
+expect_noticed_and_mended (
+    Benches &benches, const Scene &scene, int at, int blind_frames)
+{
+  int unlocked = 0;
+  bool mended = false;
+  for (int f = 0; f < 20'000 && !mended; f++) {
+    const BufferPtr frame = benches.slipping.next (scene);
+    const BufferPtr truth = benches.steady.next (scene);
+    ASSERT_TRUE (frame && truth);
+    EXPECT_EQ (GST_BUFFER_PTS (frame.get ()), GST_BUFFER_PTS (truth.get ()));
+    EXPECT_EQ (GST_BUFFER_OFFSET (frame.get ()), guint64 (f));
+    const bool right = pixels (frame) == pixels (truth);
+    const bool locked = is_locked (frame);
+    EXPECT_TRUE (right || !locked || (f >= at && f < at + blind_frames))
+        << "frame " << f << " is wrong and passes for right";
+    EXPECT_TRUE (locked || f >= at) << "frame " << f << " is flagged";
+    unlocked += !locked;
+    mended = unlocked > 0 && locked;
+  }
+  EXPECT_TRUE (mended);
+
+  /* And stays so. */
+  for (int f = 0; f < 50; f++) {
+    const BufferPtr frame = benches.slipping.next (scene);
+    EXPECT_EQ (pixels (frame), pixels (benches.steady.next (scene)));
+    EXPECT_TRUE (is_locked (frame));
+  }
+  const auto slips = benches.slipping.messages ("dmdsync/slip");
+  ASSERT_EQ (slips.size (), 1u);
+  EXPECT_GE (uint64_field (slips[0], "frame"), guint64 (at));
+  EXPECT_LE (uint64_field (slips[0], "frame"), guint64 (at + 2));
+  EXPECT_EQ (benches.slipping.messages ("dmdsync/locked").size (), 2u);
+  EXPECT_EQ (benches.slipping.counter ("slips"), 1u);
+  EXPECT_EQ (benches.slipping.counter ("frames-lost"), 0u);
+}
+
+class StaircaseSlip : public ::testing::TestWithParam<std::pair<int, int>>
+{
+};
+
+TEST_P (StaircaseSlip, InsideTheExposureIsFlaggedInItsFrameAndMended)
+{
+  const auto [slot, by] = GetParam ();
+  Benches benches ("staircase:2x2",
+      ",slip-at=" + std::to_string (4 * 30 + slot) + ":" + std::to_string (by));
+  expect_noticed_and_mended (benches, moving, 30, 0);
+  const auto slips = benches.slipping.messages ("dmdsync/slip");
+  ASSERT_EQ (slips.size (), 1u);
+  EXPECT_EQ (uint64_field (slips[0], "frame"), 30u);
+  EXPECT_EQ (uint64_field (slips[0], "pts"), 30 * 40 * GST_MSECOND);
+  gboolean certain = FALSE;
+  gst_structure_get_boolean (
+      gst_message_get_structure (slips[0].get ()), "certain", &certain);
+  EXPECT_TRUE (!certain || int_field (slips[0], "slots") == by);
+}
+
+INSTANTIATE_TEST_SUITE_P (Slots, StaircaseSlip,
+    ::testing::Values (std::pair (1, 1), std::pair (2, 1), std::pair (3, 1),
+        std::pair (1, -1), std::pair (2, -1), std::pair (3, -1)));
+
+class PilotSlip : public ::testing::TestWithParam<std::pair<int, int>>
+{
+};
+
+/* Right at a border of two exposures, too, where nothing else shows it. */
+TEST_P (PilotSlip, AnywhereIsNoticedWithinThreeFramesAndMended)
+{
+  const auto [slot, by] = GetParam ();
+  Benches benches ("sequential:2x2,pilot=8",
+      ",slip-at=" + std::to_string (4 * 30 + slot) + ":" + std::to_string (by));
+  expect_noticed_and_mended (benches, kMains, 30, 2);
+  const auto slips = benches.slipping.messages ("dmdsync/slip");
+  ASSERT_EQ (slips.size (), 1u);
+  EXPECT_EQ (int_field (slips[0], "slots"), by);
+  EXPECT_LE (uint64_field (slips[0], "pts"), 32 * 40 * GST_MSECOND);
+}
+
+INSTANTIATE_TEST_SUITE_P (Slots, PilotSlip,
+    ::testing::Values (std::pair (0, 1), std::pair (1, 1), std::pair (2, 1),
+        std::pair (3, 1), std::pair (0, -1), std::pair (1, -1),
+        std::pair (2, -1), std::pair (3, -1)));
+
+TEST (DmdsyncBench, EverySlipOfManyIsMended)
+{
+  Bench bench ("staircase:2x2",
+      "codedexposure-sim dmd=sim:many ! dmdsync name=sync "
+      "device=sim:many,slip-at=41,slip-at=4003:-1,slip-at=8003:2 "
+      "schedule=staircase:2x2");
+  while (bench.frames () < 2500)
+    ASSERT_TRUE (bench.next (moving));
+  EXPECT_EQ (bench.messages ("dmdsync/slip").size (), 3u);
+  EXPECT_EQ (bench.messages ("dmdsync/locked").size (), 4u);
+  EXPECT_TRUE (is_locked (bench.next (moving)));
+}
+
+TEST (DmdsyncBench, SceneAndLightRaiseNoAlarm)
+{
+  for (const char *schedule :
+      {"staircase:2x2", "s-matrix:7x1", "sequential:2x2,pilot=8"}) {
+    SCOPED_TRACE (schedule);
+    Bench bench (schedule,
+        "codedexposure-sim dmd=sim:calm" + std::string (kOptics) +
+            "! dmdsync name=sync device=sim:calm schedule=" + schedule);
+    for (int f = 0; f < 500; f++)
+      EXPECT_TRUE (is_locked (bench.next (kMains))) << f;
+    EXPECT_TRUE (bench.messages ("dmdsync/slip").empty ());
+    EXPECT_EQ (bench.messages ("dmdsync/locked").size (), 1u);
+  }
+}
+
+TEST (DmdsyncBench, WithoutAPilotAOneHotCodeHidesASlipAndSaysSoFirst)
+{
+  Bench bench ("sequential:2x2",
+      "codedexposure-sim dmd=sim:blind ! "
+      "dmdsync name=sync device=sim:blind,slip-at=42 schedule=sequential:2x2");
+  for (int f = 0; f < 30; f++)
+    EXPECT_TRUE (is_locked (bench.next (still)));
+  EXPECT_TRUE (bench.messages ("dmdsync/slip").empty ());
+}
+
+TEST (DmdsyncBench, AFailedRestartIsAnError)
+{
+  Bench bench ("staircase:2x2",
+      "codedexposure-sim dmd=sim:dead ! dmdsync name=sync "
+      "device=sim:dead,slip-at=42,fail=restart schedule=staircase:2x2");
+  for (int f = 0; f < 11; f++)
+    ASSERT_TRUE (bench.next (still));
+  EXPECT_NE (bench.wait_error ().find ("restart failed"), std::string::npos);
+  EXPECT_FALSE (SimulatedMirrors::find ("dead")->running ());
+}
+
+TEST (DmdsyncBench, FlagsReachTheSubframes)
+{
+  Bench bench ("staircase:2x2",
+      "codedexposure-sim dmd=sim:flags ! dmdsync name=sync "
+      "device=sim:flags,slip-at=22 schedule=staircase:2x2 ! "
+      "codedexposure-demux");
+  for (int f = 0; f < 6; f++)
+    bench.expose (still);
+  for (int k = 0; k < 24; k++) {
+    const BufferPtr subframe = bench.pull ();
+    ASSERT_TRUE (subframe);
+    EXPECT_EQ (
+        GST_BUFFER_PTS (subframe.get ()), guint64 (k) * 10 * GST_MSECOND);
+    EXPECT_EQ (
+        GST_BUFFER_FLAG_IS_SET (subframe.get (), GST_BUFFER_FLAG_CORRUPTED),
+        k >= 20);
+  }
+}
+
+} // namespace

@@ -244,8 +244,8 @@ may_change (GstDmdSync *self, const GParamSpec *pspec)
 {
   if (GST_STATE (self) == GST_STATE_NULL)
     return true;
-  g_warning ("%s: %s cannot change above the NULL state; it stays as it is",
-      GST_OBJECT_NAME (self), pspec->name);
+  GST_WARNING_OBJECT (self,
+      "%s cannot change above the NULL state; it stays as it is", pspec->name);
   return false;
 }
 

@@ -3,7 +3,9 @@
 
 #include <array>
 
+#include "dmd/lightcrafter.h"
 #include "dmd/simulated_dmd.h"
+#include "dmd/usb_bus.h"
 
 namespace cexp
 {
@@ -18,7 +20,12 @@ struct Scheme {
 };
 
 constexpr std::array kSchemes{
-    Scheme{"sim:", "sim:NAME (a simulated DMD)", open_simulated_dmd}};
+    Scheme{"sim:", "sim:NAME (a simulated DMD)", open_simulated_dmd},
+    Scheme{"usb:", "usb:[PORT|SERIAL] (a LightCrafter 4500, 6500 or 9000)",
+        open_usb_dmd},
+    Scheme{"lightcrafter:",
+        "lightcrafter:[HOST[:PORT]] (the first LightCrafter, over TCP)",
+        open_lightcrafter}};
 
 } // namespace
 

@@ -1,0 +1,337 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "dmd/lightcrafter.h"
+
+#include <algorithm>
+#include <thread>
+
+#include "base/text.h"
+#include "dmd/dmd_options.h"
+#include "dmd/lightcrafter_protocol.h"
+#include "dmd/tcp_stream.h"
+
+namespace cexp
+{
+
+namespace
+{
+
+using namespace lightcrafter;
+using namespace std::chrono_literals;
+
+constexpr Extent kMirrors{608, 684};
+constexpr std::uint32_t kMinimumExposure = 250;
+constexpr std::uint32_t kMaximumExposure = 2'000'000;
+constexpr std::uint32_t kCameraPulse = 100;
+constexpr auto kTimeout = 2s;
+constexpr auto kBusyPause = 500ms;
+constexpr std::uint8_t kBusy = 6; // error code
+constexpr int kMaxStrayReplies = 16;
+constexpr int kBusyAttempts = 4;
+/** What a mask of 52 kB takes over the board's network port, about. */
+constexpr Nanoseconds kMaskTime = 50'000'000;
+
+class Lightcrafter : public Dmd
+{
+public:
+  Lightcrafter (std::string host, int port, const DmdOptions &options)
+      : options_ (options), host_ (std::move (host)), port_ (port)
+  {
+    info_.name = "lightcrafter:" + host_;
+    info_.size = kMirrors;
+    info_.array = Array::diamond;
+    info_.minimum_active = Nanoseconds (kMinimumExposure) * 1000;
+    info_.minimum_switching = options_.gap;
+    info_.resident_masks = kMaxPatterns;
+    info_.triggers_camera = options_.master == Master::dmd;
+  }
+  ~Lightcrafter () override { stop (); }
+
+  Result<void> open ();
+
+  const DmdInfo &info () const override { return info_; }
+  Result<DmdStatus> status () override;
+  Nanoseconds upload_time (const Schedule &schedule) override
+  {
+    return schedule.masks () * kMaskTime;
+  }
+  Result<void> upload (const Schedule &schedule, std::stop_token stop,
+      const UploadProgress &progress) override;
+  Result<void> start (const SlotPlan &plan) override;
+  void stop () override;
+  bool running () const override { return running_; }
+
+private:
+  struct Reply {
+    std::uint8_t refused = 0; ///< error code, 0: done
+    Bytes payload = {};
+  };
+
+  Result<void> connect ();
+  Error error (const char *what, const std::string &reason) const;
+  Result<Reply> receive (std::uint16_t command);
+  Result<Reply> ask (PacketType type, std::uint16_t command, ByteView payload);
+  Result<void> write (
+      const char *what, std::uint16_t command, ByteView payload);
+  Result<void> set_sequence (const PatternTime &time);
+  Result<void> send_masks (
+      const Schedule &schedule, const UploadProgress &progress);
+
+  const DmdOptions options_;
+  const std::string host_;
+  const int port_;
+  std::unique_ptr<TcpStream> stream_;
+  DmdInfo info_;
+  std::string version_;
+  std::stop_token cancel_;
+  int masks_ = 0; // on the board, 0: none
+  bool touched_ = false;
+  bool running_ = false;
+};
+
+Result<void>
+Lightcrafter::connect ()
+{
+  if (stream_ && !stream_->broken ())
+    return {};
+  auto stream = TcpStream::connect (host_, port_, kTimeout);
+  if (!stream)
+    return Error{info_.name + ": " + stream.error ().message +
+                 "; is the board on, and this computer in its network?"};
+  stream_ = *std::move (stream);
+  return {};
+}
+
+Error
+Lightcrafter::error (const char *what, const std::string &reason) const
+{
+  return Error{info_.name + ": cannot " + what + ": " + reason};
+}
+
+/** The reply to one packet; replies to other commands are late ones. */
+Result<Lightcrafter::Reply>
+Lightcrafter::receive (std::uint16_t command)
+{
+  for (int replies = 0; replies <= kMaxStrayReplies; replies++) {
+    Result<Bytes> head = stream_->receive (kHeadSize, kTimeout);
+    if (!head)
+      return head.error ();
+    const auto parsed = parse_head (*head);
+    if (!parsed)
+      return parsed.error ();
+    const auto rest = stream_->receive (parsed->payload + 1, kTimeout);
+    if (!rest)
+      return rest.error ();
+    Bytes packet = *head;
+    append (packet, *rest);
+    if (!checksum_holds (packet))
+      return Error{"the checksum of a reply is wrong"};
+    if (parsed->command != command)
+      continue;
+    Reply reply{0, Bytes (rest->begin (), rest->end () - 1)};
+    if (parsed->type == PacketType::busy)
+      reply.refused = kBusy;
+    if (parsed->type == PacketType::error)
+      reply.refused =
+          reply.payload.empty () ? std::uint8_t (1) : reply.payload.front ();
+    return reply;
+  }
+  return Error{"it replies to other commands only"};
+}
+
+Result<Lightcrafter::Reply>
+Lightcrafter::ask (PacketType type, std::uint16_t command, ByteView payload)
+{
+  if (stream_->broken ())
+    return Error{"the connection is lost; open the board again"};
+  Result<Reply> reply = Reply{};
+  for (const Bytes &packet : encode_message (type, command, payload)) {
+    for (int attempt = 0; attempt < kBusyAttempts; attempt++) {
+      if (const auto sent = stream_->send (packet, kTimeout); !sent)
+        return sent.error ();
+      reply = receive (command);
+      if (!reply || reply->refused != kBusy)
+        break;
+      for (auto left = kBusyPause; left > 0ms && !cancel_.stop_requested ();
+           left -= 10ms)
+        std::this_thread::sleep_for (10ms);
+    }
+    if (!reply || reply->refused != 0)
+      break;
+  }
+  return reply;
+}
+
+Result<void>
+Lightcrafter::write (const char *what, std::uint16_t command, ByteView payload)
+{
+  const auto reply = ask (PacketType::write, command, payload);
+  if (!reply)
+    return error (what, reply.error ().message);
+  if (reply->refused != 0)
+    return error (what, error_text (reply->refused));
+  return {};
+}
+
+Result<void>
+Lightcrafter::open ()
+{
+  if (const auto connected = connect (); !connected)
+    return connected;
+  const Bytes of_system{0x00};
+  const auto version = ask (PacketType::read, kVersion, of_system);
+  if (!version)
+    return error ("read its version", version.error ().message);
+  if (version->refused != 0)
+    return error ("read its version", error_text (version->refused));
+  version_ = printable (std::string (version->payload.begin (),
+      std::find (version->payload.begin (), version->payload.end (), 0)));
+  return check_placement (options_.placement, info_.array, info_.size);
+}
+
+Result<DmdStatus>
+Lightcrafter::status ()
+{
+  // The board cannot be asked whether it runs.
+  return DmdStatus{running_, {{"controller", "DLPC300"}, {"mirrors", "DLP3000"},
+                                 {"firmware", version_}}};
+}
+
+Result<void>
+Lightcrafter::set_sequence (const PatternTime &time)
+{
+  Sequence sequence{.patterns = masks_,
+      .period = time.exposure + time.dark,
+      .exposure = time.exposure};
+  if (options_.master == Master::camera)
+    sequence.trigger =
+        options_.falling_edge ? Trigger::falling : Trigger::rising;
+  constexpr std::uint8_t kNotSupported = 2, kInvalid = 3;
+  // Older firmware knows older, shorter forms only.
+  Result<Reply> reply =
+      ask (PacketType::write, kSequence, encode_sequence (sequence, 19));
+  for (const int bytes : {18, 17})
+    if (reply &&
+        (reply->refused == kNotSupported || reply->refused == kInvalid))
+      reply = ask (
+          PacketType::write, kSequenceOld, encode_sequence (sequence, bytes));
+  if (!reply)
+    return error ("set up the sequence", reply.error ().message);
+  if (reply->refused != 0)
+    return error ("set up the sequence", error_text (reply->refused));
+  return {};
+}
+
+Result<void>
+Lightcrafter::send_masks (
+    const Schedule &schedule, const UploadProgress &progress)
+{
+  const Bytes off{0}, sequence_mode{kModeSequence};
+  if (const auto stopped = write ("stop the sequence", kRun, off); !stopped)
+    return stopped;
+  if (const auto mode =
+          write ("change the display mode", kDisplayMode, sequence_mode);
+      !mode)
+    return mode;
+  masks_ = schedule.masks ();
+  if (const auto set =
+          set_sequence ({10'000, std::uint32_t (options_.gap / 1000)});
+      !set)
+    return set;
+
+  Image<std::uint8_t> mirrors (kMirrors.width, kMirrors.height);
+  for (int mask = 0; mask < masks_; mask++) {
+    progress (mask, masks_);
+    if (cancel_.stop_requested ())
+      return Error{info_.name + ": upload cancelled"};
+    render_mirrors (schedule, mask, options_.placement, mirrors.view ());
+    Bytes payload{std::uint8_t (mask)};
+    append (payload, encode_bitmap (mirrors.view ()));
+    if (const auto sent = write ("send a mask", kPattern, payload); !sent)
+      return sent;
+  }
+  progress (masks_, masks_);
+  return {};
+}
+
+Result<void>
+Lightcrafter::upload (const Schedule &schedule, std::stop_token stop_token,
+    const UploadProgress &progress)
+{
+  if (schedule.masks () > info_.resident_masks)
+    return Error{info_.name + " holds " +
+                 std::to_string (info_.resident_masks) + " masks, not " +
+                 std::to_string (schedule.masks ()) +
+                 "; take a tile with fewer elements"};
+  // A wait that was cut short has left the old connection in mid-packet.
+  if (const auto connected = connect (); !connected)
+    return connected;
+  touched_ = true;
+  running_ = false;
+  cancel_ = stop_token;
+  stream_->cancel_on (stop_token);
+  const auto sent = send_masks (schedule, progress);
+  cancel_ = {};
+  stream_->cancel_on ({});
+  if (!sent) {
+    masks_ = 0;
+    stop ();
+  }
+  return sent;
+}
+
+Result<void>
+Lightcrafter::start (const SlotPlan &plan)
+{
+  if (masks_ == 0)
+    return Error{info_.name + ": no masks to start; upload first"};
+  const auto gap = std::uint32_t (options_.gap / 1000);
+  const auto time = fit_equal_patterns (
+      plan, {kMinimumExposure, kMaximumExposure, gap, 0, gap}, options_.master);
+  if (!time)
+    return Error{info_.name + ": " + time.error ().message};
+  if (const auto set = set_sequence (*time); !set)
+    return set;
+  if (const auto trigger = write ("set up the trigger output", kCameraTrigger,
+          encode_camera_trigger (options_.master == Master::dmd, kCameraPulse));
+      !trigger)
+    return trigger;
+  std::this_thread::sleep_for (std::chrono::nanoseconds (plan.frame_period ()));
+  const Bytes on{1};
+  const auto started = write ("start the sequence", kRun, on);
+  running_ = started.ok ();
+  return started;
+}
+
+void
+Lightcrafter::stop ()
+{
+  running_ = false;
+  const Bytes off{0};
+  if (touched_ && !stream_->broken ())
+    (void)write ("stop the sequence", kRun, off);
+}
+
+} // namespace
+
+Result<std::unique_ptr<Dmd>>
+open_lightcrafter (std::string_view device)
+{
+  constexpr std::string_view kScheme = "lightcrafter:";
+  const auto options = DmdOptions::parse (device.substr (kScheme.size ()));
+  if (!options)
+    return Error{"DMD " + in_quotes (device) + ": " + options.error ().message};
+  const auto parts = split (options->which, ':');
+  constexpr int kPort = 21845, kMaxPort = 65535;
+  const auto port = parts.size () < 2 ? kPort : parse_int (parts[1]);
+  if (parts.size () > 2 || !port || *port < 1 || *port > kMaxPort)
+    return Error{"DMD " + in_quotes (device) +
+                 ": write lightcrafter:HOST or lightcrafter:HOST:PORT"};
+  const std::string host =
+      parts[0].empty () ? "192.168.1.100" : std::string (parts[0]);
+  auto dmd = std::make_unique<Lightcrafter> (host, *port, *options);
+  if (const auto opened = dmd->open (); !opened)
+    return opened.error ();
+  return std::unique_ptr<Dmd> (std::move (dmd));
+}
+
+} // namespace cexp

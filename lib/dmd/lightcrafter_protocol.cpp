@@ -1,0 +1,158 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "dmd/lightcrafter_protocol.h"
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+
+namespace cexp::lightcrafter
+{
+
+namespace
+{
+
+constexpr std::size_t kMaxPayload = 65535;
+constexpr std::uint8_t kGreen = 1;
+constexpr std::uint8_t kRepeat = 1;
+
+constexpr std::array<const char *, 12> kErrors{"no error", "command failed",
+    "command not supported", "invalid parameter", "out of resources",
+    "device failure", "busy", "not initialised", "not found", "checksum",
+    "packet format", "continuation of a packet"};
+
+/** Where in a message a packet stands: the flag byte. */
+std::uint8_t
+place_of (bool first, bool last)
+{
+  if (first)
+    return last ? 0 : 1;
+  return last ? 3 : 2;
+}
+
+std::uint8_t
+checksum (ByteView bytes)
+{
+  return std::uint8_t (std::accumulate (bytes.begin (), bytes.end (), 0u));
+}
+
+} // namespace
+
+std::vector<Bytes>
+encode_message (PacketType type, std::uint16_t command, ByteView payload)
+{
+  std::vector<Bytes> packets;
+  std::size_t at = 0;
+  do {
+    const auto piece =
+        payload.subspan (at, std::min (kMaxPayload, payload.size () - at));
+    const bool last = at + piece.size () == payload.size ();
+    Bytes packet{std::uint8_t (type), std::uint8_t (command >> 8),
+        std::uint8_t (command), place_of (at == 0, last)};
+    packet.reserve (kHeadSize + piece.size () + 1);
+    append_le (packet, std::uint32_t (piece.size ()), 2);
+    append (packet, piece);
+    packet.push_back (checksum (packet));
+    packets.push_back (std::move (packet));
+    at += piece.size ();
+  } while (at < payload.size ());
+  return packets;
+}
+
+Bytes
+encode_sequence (const Sequence &sequence, int bytes)
+{
+  const bool extended = bytes == 19;
+  Bytes data{1}; // bit
+  append_le (data, std::uint32_t (sequence.patterns), extended ? 2 : 1);
+  data.push_back (0); // no inverse patterns in between
+  data.push_back (std::uint8_t (sequence.trigger));
+  append_le (data, sequence.delay, 4);
+  append_le (data, sequence.period, 4);
+  append_le (data, sequence.exposure, 4);
+  data.push_back (kGreen);
+  if (bytes > 17)
+    data.push_back (kRepeat);
+  return data;
+}
+
+Bytes
+encode_bitmap (ImageView<const std::uint8_t> mirrors)
+{
+  constexpr std::uint32_t kHeaders = 14 + 40, kPalette = 8;
+  const std::size_t row_bytes = (std::size_t (mirrors.width) + 31) / 32 * 4;
+  const auto pixels = std::uint32_t (row_bytes * std::size_t (mirrors.height));
+  Bytes file{'B', 'M'};
+  file.reserve (kHeaders + kPalette + pixels);
+  append_le (file, kHeaders + kPalette + pixels, 4);
+  append_le (file, 0, 4);
+  append_le (file, kHeaders + kPalette, 4);
+  append_le (file, 40, 4);
+  append_le (file, std::uint32_t (mirrors.width), 4);
+  append_le (file, std::uint32_t (mirrors.height), 4);
+  append_le (file, 1, 2); // plane
+  append_le (file, 1, 2); // bit a pixel
+  append_le (file, 0, 4); // not compressed
+  append_le (file, pixels, 4);
+  append_le (file, 0, 4); // pixels a metre, two times
+  append_le (file, 0, 4);
+  append_le (file, 2, 4); // colours
+  append_le (file, 0, 4);
+  append_le (file, 0x000000, 4);
+  append_le (file, 0xFFFFFF, 4);
+  for (int y = mirrors.height - 1; y >= 0; y--) {
+    const std::size_t start = file.size ();
+    file.resize (start + row_bytes);
+    for (int x = 0; x < mirrors.width; x++)
+      if (mirrors.row (y)[x] != 0)
+        file[start + std::size_t (x / 8)] |= std::uint8_t (0x80 >> x % 8);
+  }
+  return file;
+}
+
+Bytes
+encode_camera_trigger (bool enable, std::uint32_t pulse_us)
+{
+  Bytes data{std::uint8_t (enable), 0, 0};
+  append_le (data, 0, 4);
+  append_le (data, pulse_us, 4);
+  return data;
+}
+
+Result<PacketHead>
+parse_head (ByteView head)
+{
+  if (head.size () != kHeadSize)
+    return Error{"a packet begins with " + std::to_string (head.size ()) +
+                 " bytes instead of 6"};
+  const auto type = PacketType (head[0]);
+  switch (type) {
+  case PacketType::busy:
+  case PacketType::error:
+  case PacketType::write_response:
+  case PacketType::read_response:
+    break;
+  default:
+    return Error{"a packet of type " + std::to_string (head[0]) +
+                 " is none that the board sends"};
+  }
+  return PacketHead{
+      type, std::uint16_t (head[1] << 8 | head[2]), read_le (head, 4, 2)};
+}
+
+bool
+checksum_holds (ByteView packet)
+{
+  return !packet.empty () &&
+         checksum (packet.first (packet.size () - 1)) == packet.back ();
+}
+
+std::string
+error_text (std::uint8_t code)
+{
+  const std::string number = "error " + std::to_string (code);
+  return code < kErrors.size ()
+             ? std::string (kErrors[code]) + " (" + number + ")"
+             : number;
+}
+
+} // namespace cexp::lightcrafter

@@ -1,0 +1,135 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "dmd/tcp_stream.h"
+
+#include <fcntl.h>
+#include <netdb.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+
+namespace cexp
+{
+
+namespace
+{
+
+using namespace std::chrono_literals;
+
+constexpr auto kPatience = 50ms;
+
+std::string
+errno_text (int code)
+{
+  return std::strerror (code);
+}
+
+using Addresses = std::unique_ptr<addrinfo,
+    std::integral_constant<decltype (&freeaddrinfo), freeaddrinfo>>;
+
+} // namespace
+
+Result<std::unique_ptr<TcpStream>>
+TcpStream::connect (const std::string &host, int port, Milliseconds timeout)
+{
+  const std::string where = host + ":" + std::to_string (port);
+  addrinfo hints{};
+  hints.ai_family = AF_UNSPEC;
+  hints.ai_socktype = SOCK_STREAM;
+  addrinfo *raw = nullptr;
+  if (const int code = getaddrinfo (
+          host.c_str (), std::to_string (port).c_str (), &hints, &raw);
+      code != 0)
+    return Error{"cannot find " + where + ": " + gai_strerror (code)};
+  const Addresses addresses (raw);
+
+  const int socket = ::socket (raw->ai_family,
+      raw->ai_socktype | SOCK_CLOEXEC | SOCK_NONBLOCK, raw->ai_protocol);
+  if (socket < 0)
+    return Error{"cannot make a socket: " + errno_text (errno)};
+  std::unique_ptr<TcpStream> stream (new TcpStream (socket));
+  int code = 0;
+  if (::connect (socket, raw->ai_addr, raw->ai_addrlen) != 0)
+    code = errno;
+  if (code == EINPROGRESS) {
+    if (!stream->wait_for (POLLOUT, timeout))
+      return Error{"cannot connect to " + where + ": no answer within " +
+                   std::to_string (timeout.count ()) + " ms"};
+    socklen_t size = sizeof code;
+    getsockopt (socket, SOL_SOCKET, SO_ERROR, &code, &size);
+  }
+  if (code != 0)
+    return Error{"cannot connect to " + where + ": " + errno_text (code)};
+  const int on = 1;
+  setsockopt (socket, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+  return stream;
+}
+
+TcpStream::~TcpStream ()
+{
+  close (socket_);
+}
+
+Error
+TcpStream::fail (const std::string &message)
+{
+  broken_ = true;
+  return Error{message};
+}
+
+Result<void>
+TcpStream::wait_for (short events, Milliseconds timeout)
+{
+  for (auto left = timeout; left > 0ms;) {
+    if (stop_.stop_requested ())
+      return fail ("cancelled");
+    const auto wait = std::min<Milliseconds> (left, kPatience);
+    pollfd poll_this{socket_, events, 0};
+    const int ready = ::poll (&poll_this, 1, int (wait.count ()));
+    if (ready > 0)
+      return {};
+    if (ready < 0 && errno != EINTR)
+      return fail (errno_text (errno));
+    left -= wait;
+  }
+  return fail ("no answer within " + std::to_string (timeout.count ()) + " ms");
+}
+
+Result<void>
+TcpStream::send (ByteView bytes, Milliseconds timeout)
+{
+  while (!bytes.empty ()) {
+    if (const auto ready = wait_for (POLLOUT, timeout); !ready)
+      return ready;
+    const ssize_t sent =
+        ::send (socket_, bytes.data (), bytes.size (), MSG_NOSIGNAL);
+    if (sent < 0 && errno != EAGAIN && errno != EINTR)
+      return fail (errno_text (errno));
+    bytes = bytes.subspan (std::size_t (std::max<ssize_t> (sent, 0)));
+  }
+  return {};
+}
+
+Result<Bytes>
+TcpStream::receive (std::size_t size, Milliseconds timeout)
+{
+  Bytes bytes (size);
+  for (std::size_t at = 0; at < size;) {
+    if (const auto ready = wait_for (POLLIN, timeout); !ready)
+      return ready.error ();
+    const ssize_t got = ::recv (socket_, bytes.data () + at, size - at, 0);
+    if (got == 0)
+      return fail ("the board closed the connection");
+    if (got < 0 && errno != EAGAIN && errno != EINTR)
+      return fail (errno_text (errno));
+    at += std::size_t (std::max<ssize_t> (got, 0));
+  }
+  return bytes;
+}
+
+} // namespace cexp

@@ -1,0 +1,49 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* A TCP connection whose every wait has an end. */
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <stop_token>
+#include <string>
+
+#include "base/result.h"
+#include "dmd/little_endian.h"
+
+namespace cexp
+{
+
+/** One connection, used from one thread at a time. */
+class TcpStream
+{
+public:
+  using Milliseconds = std::chrono::milliseconds;
+
+  /** @p host  a name or an address. */
+  static Result<std::unique_ptr<TcpStream>> connect (
+      const std::string &host, int port, Milliseconds timeout);
+  ~TcpStream ();
+  TcpStream (const TcpStream &) = delete;
+  TcpStream &operator= (const TcpStream &) = delete;
+
+  Result<void> send (ByteView bytes, Milliseconds timeout);
+  /** Exactly @p size bytes. */
+  Result<Bytes> receive (std::size_t size, Milliseconds timeout);
+  /** Whether the other side has closed, or a failure left the stream in the
+   * middle of something. */
+  bool broken () const { return broken_; }
+
+  /** Waits end within 50 ms of a request. */
+  void cancel_on (std::stop_token stop) { stop_ = std::move (stop); }
+
+private:
+  explicit TcpStream (int socket) : socket_ (socket) {}
+  Result<void> wait_for (short events, Milliseconds timeout);
+  Error fail (const std::string &message);
+
+  const int socket_;
+  std::stop_token stop_;
+  bool broken_ = false;
+};
+
+} // namespace cexp

@@ -1,0 +1,391 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "usb_bed.h"
+
+#include <linux/usbdevice_fs.h>
+#include <sys/ioctl.h>
+
+#include <cerrno>
+#include <cstddef>
+#include <cstdio>
+#include <cstring>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+namespace cexp::test
+{
+
+namespace
+{
+
+constexpr std::uint8_t kOut = 0x01, kIn = 0x81;
+
+/** A reference to memory of the program under test. */
+class Reference
+{
+public:
+  Reference () = default;
+  explicit Reference (UMockdevIoctlData *data) : data_ (data) {}
+  Reference (Reference &&other) noexcept
+      : data_ (std::exchange (other.data_, nullptr))
+  {
+  }
+  Reference &operator= (Reference &&other) noexcept
+  {
+    std::swap (data_, other.data_);
+    return *this;
+  }
+  ~Reference ()
+  {
+    if (data_ != nullptr)
+      umockdev_ioctl_data_unref (data_);
+  }
+
+  /** The memory behind the pointer at @p offset. */
+  Reference resolve (std::size_t offset, std::size_t size) const
+  {
+    return Reference (
+        umockdev_ioctl_data_resolve (data_, offset, size, nullptr));
+  }
+  UMockdevIoctlData *get () const { return data_; }
+  template <typename T>
+  T *as () const
+  {
+    return reinterpret_cast<T *> (data_->data);
+  }
+  explicit operator bool () const { return data_ != nullptr; }
+
+private:
+  UMockdevIoctlData *data_ = nullptr;
+};
+
+std::vector<std::uint8_t>
+descriptors (std::uint16_t product)
+{
+  return {18, 1, 0x10, 0x01, 0, 0, 0, 64, 0x51, 0x04, std::uint8_t (product),
+      std::uint8_t (product >> 8), 0, 1, 1, 2, 3, 1,
+      // configuration, interface, HID, two interrupt endpoints of 64 bytes
+      9, 2, 41, 0, 1, 1, 0, 0x80, 50,         //
+      9, 4, 0, 0, 2, 3, 0, 0, 0,              //
+      9, 0x21, 0x11, 0x01, 0, 1, 0x22, 36, 0, //
+      7, 5, kIn, 3, 64, 0, 1,                 //
+      7, 5, kOut, 3, 64, 0, 1};
+}
+
+} // namespace
+
+/** What the kernel does for one board. Called on the bed's thread. */
+class UsbPort
+{
+public:
+  UsbPort (std::uint16_t product, std::string serial,
+      std::shared_ptr<EmulatedHid> board)
+      : descriptors_ (descriptors (product)), serial_ (std::move (serial)),
+        board_ (std::move (board)), handler_ (umockdev_ioctl_base_new ())
+  {
+    g_signal_connect_after (
+        handler_, "handle-ioctl", G_CALLBACK (on_ioctl), this);
+  }
+  ~UsbPort () { g_object_unref (handler_); }
+
+  UMockdevIoctlBase *handler () const { return handler_; }
+  const std::vector<std::uint8_t> &all_descriptors () const
+  {
+    return descriptors_;
+  }
+  std::string sys_path, node;
+
+  void pull ()
+  {
+    const std::lock_guard guard (lock_);
+    board_->unplug ();
+    drop_all (-ENODEV);
+  }
+  bool kernel_bound () const
+  {
+    const std::lock_guard guard (lock_);
+    return bound_;
+  }
+  void occupy ()
+  {
+    const std::lock_guard guard (lock_);
+    occupied_ = true;
+  }
+
+private:
+  struct Urb {
+    Reference urb, buffer;
+    gulong address = 0;
+    usbdevfs_urb *get () const { return urb.as<usbdevfs_urb> (); }
+  };
+
+  static gboolean on_ioctl (
+      UMockdevIoctlBase *, UMockdevIoctlClient *client, gpointer self)
+  {
+    int error = 0;
+    const int result = static_cast<UsbPort *> (self)->handle (client, error);
+    umockdev_ioctl_client_complete (client, result, error);
+    return TRUE;
+  }
+
+  int fail (int &error, int code)
+  {
+    error = code;
+    return -1;
+  }
+
+  int handle (UMockdevIoctlClient *client, int &error)
+  {
+    const std::lock_guard guard (lock_);
+    const auto request =
+        std::uint32_t (umockdev_ioctl_client_get_request (client));
+    const auto argument = [client] {
+      // The client owns its argument.
+      return umockdev_ioctl_client_get_arg (client);
+    };
+    if (board_->gone ())
+      drop_all (-ENODEV);
+    switch (request) {
+    case USBDEVFS_GET_CAPABILITIES: {
+      const Reference value (umockdev_ioctl_data_resolve (
+          argument (), 0, sizeof (std::uint32_t), nullptr));
+      *value.as<std::uint32_t> () = USBDEVFS_CAP_REAP_AFTER_DISCONNECT;
+      return 0;
+    }
+    case USBDEVFS_REAPURBNDELAY:
+      return reap (argument (), error);
+    default:
+      break;
+    }
+    if (board_->gone ())
+      return fail (error, ENODEV);
+    switch (request) {
+    case USBDEVFS_SUBMITURB:
+      return submit (argument (), error);
+    case USBDEVFS_DISCARDURB:
+      return discard (argument (), error);
+    default:
+      return manage (request, argument (), error);
+    }
+  }
+
+  /** Interfaces and drivers. */
+  int manage (std::uint32_t request, UMockdevIoctlData *argument, int &error)
+  {
+    switch (request) {
+    case USBDEVFS_GETDRIVER: {
+      if (!bound_)
+        return fail (error, ENODATA);
+      const Reference value (umockdev_ioctl_data_resolve (
+          argument, 0, sizeof (usbdevfs_getdriver), nullptr));
+      std::strcpy (value.as<usbdevfs_getdriver> ()->driver, "usbhid");
+      return 0;
+    }
+    case USBDEVFS_IOCTL: {
+      const Reference value (umockdev_ioctl_data_resolve (
+          argument, 0, sizeof (usbdevfs_ioctl), nullptr));
+      const auto code = std::uint32_t (value.as<usbdevfs_ioctl> ()->ioctl_code);
+      if (code == USBDEVFS_DISCONNECT && !bound_)
+        return fail (error, ENODATA);
+      bound_ = code == USBDEVFS_CONNECT;
+      return 0;
+    }
+    case USBDEVFS_DISCONNECT_CLAIM:
+    case USBDEVFS_CLAIMINTERFACE:
+      if (occupied_ || (request == USBDEVFS_CLAIMINTERFACE && bound_))
+        return fail (error, EBUSY);
+      bound_ = false;
+      return 0;
+    case USBDEVFS_RELEASEINTERFACE:
+    case USBDEVFS_CLEAR_HALT:
+    case USBDEVFS_RESET:
+    case USBDEVFS_SETINTERFACE:
+    case USBDEVFS_SETCONFIGURATION:
+      return 0;
+    default:
+      return fail (error, ENOTTY);
+    }
+  }
+
+  int submit (UMockdevIoctlData *argument, int &)
+  {
+    Urb urb;
+    urb.urb = Reference (umockdev_ioctl_data_resolve (
+        argument, 0, sizeof (usbdevfs_urb), nullptr));
+    urb.address = urb.urb.get ()->client_addr;
+    const int length = urb.get ()->buffer_length;
+    if (length > 0)
+      urb.buffer = urb.urb.resolve (
+          offsetof (usbdevfs_urb, buffer), std::size_t (length));
+    if (urb.get ()->type == USBDEVFS_URB_TYPE_CONTROL)
+      finish_control (std::move (urb));
+    else if (urb.get ()->endpoint == kIn)
+      waiting_.push_back (std::move (urb));
+    else
+      finish_out (std::move (urb));
+    serve_waiting ();
+    return 0;
+  }
+
+  void finish (Urb urb, int status, int length)
+  {
+    urb.get ()->status = status;
+    urb.get ()->actual_length = length;
+    done_.push_back (std::move (urb));
+  }
+
+  void finish_out (Urb urb)
+  {
+    const auto *bytes = urb.buffer.as<const std::uint8_t> ();
+    const int length = urb.get ()->buffer_length;
+    int sent = 0;
+    while (sent < length && board_->out ({bytes + sent, bytes + sent + 64}))
+      sent += 64;
+    const int status = sent == length ? 0 : board_->gone () ? -ENODEV : -EPIPE;
+    finish (std::move (urb), status, sent);
+  }
+
+  void serve_waiting ()
+  {
+    while (!waiting_.empty () && !board_->gone ()) {
+      const auto packet = board_->in ();
+      if (!packet)
+        return;
+      Urb urb = std::move (waiting_.front ());
+      waiting_.erase (waiting_.begin ());
+      std::memcpy (
+          urb.buffer.as<std::uint8_t> (), packet->data (), packet->size ());
+      finish (std::move (urb), 0, int (packet->size ()));
+    }
+  }
+
+  /** Strings are all that is asked for on endpoint 0. */
+  void finish_control (Urb urb)
+  {
+    constexpr int kSetup = 8;
+    auto *bytes = urb.buffer.as<std::uint8_t> ();
+    const bool string = bytes[1] == 6 && bytes[3] == 3;
+    std::vector<std::uint8_t> answer{4, 3, 9, 4}; // US English
+    if (bytes[2] != 0) {
+      answer = {0, 3};
+      for (const char c : bytes[2] == 3 ? serial_ : std::string ("DLPC"))
+        answer.insert (answer.end (), {std::uint8_t (c), 0});
+      answer[0] = std::uint8_t (answer.size ());
+    }
+    const int length =
+        std::min (int (answer.size ()), urb.get ()->buffer_length - kSetup);
+    std::memcpy (bytes + kSetup, answer.data (), std::size_t (length));
+    finish (std::move (urb), string ? 0 : -EPIPE, string ? length : 0);
+  }
+
+  int reap (UMockdevIoctlData *argument, int &error)
+  {
+    if (done_.empty ())
+      return fail (error, board_->gone () ? ENODEV : EAGAIN);
+    const Urb urb = std::move (done_.front ());
+    done_.erase (done_.begin ());
+    const Reference slot (
+        umockdev_ioctl_data_resolve (argument, 0, sizeof (gpointer), nullptr));
+    umockdev_ioctl_data_set_ptr (slot.get (), 0, urb.urb.get ());
+    return 0;
+  }
+
+  int discard (UMockdevIoctlData *argument, int &error)
+  {
+    const auto address = *reinterpret_cast<const gulong *> (argument->data);
+    for (std::size_t i = 0; i < waiting_.size (); i++)
+      if (waiting_[i].address == address) {
+        Urb urb = std::move (waiting_[i]);
+        waiting_.erase (waiting_.begin () + std::ptrdiff_t (i));
+        finish (std::move (urb), -ENOENT, 0);
+        return 0;
+      }
+    return fail (error, EINVAL);
+  }
+
+  void drop_all (int status)
+  {
+    for (Urb &urb : waiting_)
+      finish (std::move (urb), status, 0);
+    waiting_.clear ();
+  }
+
+  const std::vector<std::uint8_t> descriptors_;
+  const std::string serial_;
+  const std::shared_ptr<EmulatedHid> board_;
+  UMockdevIoctlBase *const handler_;
+  mutable std::mutex lock_; // covers everything below, and the board
+  bool bound_ = true;
+  bool occupied_ = false;
+  std::vector<Urb> waiting_, done_;
+};
+
+UsbBed::UsbBed () : bed_ (umockdev_testbed_new ()) {}
+
+UsbBed::~UsbBed ()
+{
+  while (!ports_.empty ())
+    unplug (ports_.begin ()->first);
+  g_object_unref (bed_);
+}
+
+void
+UsbBed::plug (const std::string &port, std::uint16_t product,
+    const std::string &serial, std::shared_ptr<EmulatedHid> board)
+{
+  auto made = std::make_unique<UsbPort> (product, serial, std::move (board));
+  const std::string number = "00" + port.substr (port.find ('-') + 1);
+  made->node = "/dev/bus/usb/001/" + number;
+  made->sys_path = "/sys/devices/usb1/" + port;
+  std::string hex;
+  for (const std::uint8_t byte : made->all_descriptors ()) {
+    char text[3];
+    std::snprintf (text, sizeof text, "%02x", byte);
+    hex += text;
+  }
+  char product_text[8];
+  std::snprintf (product_text, sizeof product_text, "%04x", product);
+  const std::string text =
+      "P: /devices/usb1/" + port + "\nN: bus/usb/001/" + number +
+      "\nE: SUBSYSTEM=usb\nE: DEVTYPE=usb_device\nE: BUSNUM=001\nE: DEVNUM=" +
+      number + "\nE: DEVNAME=" + made->node + "\nE: PRODUCT=451/" +
+      product_text +
+      "/100\nA: busnum=1\nA: devnum=" + port.substr (port.find ('-') + 1) +
+      "\nA: speed=12\nA: bConfigurationValue=1\nA: idVendor=0451\n"
+      "A: idProduct=" +
+      product_text + "\nH: descriptors=" + hex + "\n";
+  GError *error = nullptr;
+  umockdev_testbed_attach_ioctl (
+      bed_, made->node.c_str (), made->handler (), &error);
+  if (error == nullptr)
+    umockdev_testbed_add_from_string (bed_, text.c_str (), &error);
+  if (error != nullptr)
+    g_error ("cannot plug %s: %s", port.c_str (), error->message);
+  ports_[port] = std::move (made);
+}
+
+void
+UsbBed::unplug (const std::string &port)
+{
+  const auto found = ports_.find (port);
+  UsbPort &gone = *found->second;
+  gone.pull ();
+  umockdev_testbed_detach_ioctl (bed_, gone.node.c_str (), nullptr);
+  umockdev_testbed_uevent (bed_, gone.sys_path.c_str (), "remove");
+  umockdev_testbed_remove_device (bed_, gone.sys_path.c_str ());
+  ports_.erase (found);
+}
+
+bool
+UsbBed::kernel_driver_bound (const std::string &port) const
+{
+  return ports_.at (port)->kernel_bound ();
+}
+
+void
+UsbBed::occupy (const std::string &port)
+{
+  ports_.at (port)->occupy ();
+}
+
+} // namespace cexp::test

@@ -1,0 +1,44 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* A USB in software under the unmodified libusb: boards that are plugged in and
+ * pulled out. */
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+
+#include <umockdev.h>
+
+#include "emulated_hid.h"
+
+namespace cexp::test
+{
+
+class UsbPort;
+
+/** One bus; one at a time in a process. */
+class UsbBed
+{
+public:
+  UsbBed ();
+  ~UsbBed ();
+  UsbBed (const UsbBed &) = delete;
+  UsbBed &operator= (const UsbBed &) = delete;
+
+  /** @p port  such as "1-2", the 2 in 1..9; @p product  0x6401 or 0xC900. */
+  void plug (const std::string &port, std::uint16_t product,
+      const std::string &serial, std::shared_ptr<EmulatedHid> board);
+  /** Pulls the plug, with whatever is in flight. */
+  void unplug (const std::string &port);
+  /** Whether the kernel's own driver has the board. */
+  bool kernel_driver_bound (const std::string &port) const;
+  /** The board at @p port is held by another program. */
+  void occupy (const std::string &port);
+
+private:
+  UMockdevTestbed *const bed_;
+  std::map<std::string, std::unique_ptr<UsbPort>> ports_;
+};
+
+} // namespace cexp::test

@@ -1,0 +1,187 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The USB transport under the unmodified libusb: boards that are found, taken
+ * from the kernel, shown masks, and pulled out. */
+#include <random>
+
+#include "dmd/usb_bus.h"
+#include "dmd_rig.h"
+#include "emulated_dlpc350.h"
+#include "emulated_dlpc900.h"
+#include "usb_bed.h"
+
+using namespace cexp;
+using namespace cexp::test;
+
+namespace
+{
+
+constexpr std::uint16_t kDlpc350 = 0x6401, kDlpc900 = 0xC900;
+constexpr int kDlp5500 = 5;
+
+class Usb : public ::testing::Test
+{
+protected:
+  std::shared_ptr<EmulatedDlpc900> plug_dlpc900 (
+      const std::string &port, const std::string &serial = "LCR6500")
+  {
+    auto board = std::make_shared<EmulatedDlpc900> (kDlp5500);
+    bed.plug (port, kDlpc900, serial, board);
+    return board;
+  }
+  std::shared_ptr<EmulatedDlpc350> plug_dlpc350 (const std::string &port)
+  {
+    auto board = std::make_shared<EmulatedDlpc350> ();
+    bed.plug (port, kDlpc350, "LCR2", board);
+    return board;
+  }
+
+  UsbBed bed;
+};
+
+Result<void>
+show (Dmd &dmd, const Schedule &schedule)
+{
+  const auto uploaded = dmd.upload (schedule, {}, ignore_progress);
+  return uploaded ? dmd.start (plan_of (schedule)) : uploaded;
+}
+
+} // namespace
+
+TEST_F (Usb, BoardsAreListedByPortAndSerial)
+{
+  plug_dlpc900 ("1-3", "second");
+  plug_dlpc350 ("1-2");
+  const auto boards = list_usb_boards ();
+  ASSERT_EQ (message_of (boards), "");
+  ASSERT_EQ (boards->size (), 2u);
+  EXPECT_EQ ((*boards)[0].port, "1-2");
+  EXPECT_EQ ((*boards)[0].controller, UsbController::dlpc350);
+  EXPECT_EQ ((*boards)[0].serial, "LCR2");
+  EXPECT_EQ ((*boards)[1].port, "1-3");
+  EXPECT_EQ ((*boards)[1].controller, UsbController::dlpc900);
+  EXPECT_EQ ((*boards)[1].serial, "second");
+}
+
+TEST_F (Usb, WithoutABoardSaysWhatToLookFor)
+{
+  EXPECT_NE (message_of (open_dmd ("usb:")).find ("no DMD is connected"),
+      std::string::npos);
+}
+
+TEST_F (Usb, OneOfSeveralIsChosenByPortOrSerial)
+{
+  plug_dlpc900 ("1-2", "first");
+  plug_dlpc900 ("1-3", "second");
+  EXPECT_EQ (message_of (open_dmd ("usb:")),
+      "several DMDs are meant by 'usb:'; choose one by its port: usb:1-2 "
+      "(first), usb:1-3 (second)");
+  EXPECT_EQ (message_of (open_dmd ("usb:1-9")),
+      "no DMD '1-9' is connected; there is usb:1-2 (first), usb:1-3 (second)");
+  for (const char *name : {"usb:1-3", "usb:second"}) {
+    const auto dmd = open_dmd (name);
+    ASSERT_EQ (message_of (dmd), "");
+    EXPECT_EQ ((*dmd)->info ().name, "usb:1-3 (DLP5500)");
+  }
+}
+
+TEST_F (Usb, MasksArriveMirrorByMirror)
+{
+  const auto board = plug_dlpc900 ("1-2");
+  auto dmd = open_dmd ("usb:");
+  ASSERT_EQ (message_of (dmd), "");
+  const Schedule schedule = schedule_of ("sequential:4x1");
+  ASSERT_EQ (message_of (show (**dmd, schedule)), "");
+  EXPECT_TRUE (board->running ());
+  for (int mask = 0; mask < schedule.masks (); mask++) {
+    const auto shown = board->mirrors (mask);
+    Image<std::uint8_t> expected (shown.width (), shown.height ());
+    render_mask (schedule, mask, expected.view ());
+    EXPECT_TRUE (shown == expected) << mask;
+  }
+  dmd->reset ();
+  EXPECT_FALSE (board->running ());
+}
+
+TEST_F (Usb, TheOtherControllerShowsItsFlash)
+{
+  const auto board = plug_dlpc350 ("1-2");
+  auto dmd = open_dmd ("usb:,images=1");
+  ASSERT_EQ (message_of (dmd), "");
+  ASSERT_EQ (message_of (show (**dmd, Schedule ())), "");
+  EXPECT_TRUE (board->running ());
+  dmd->reset ();
+  EXPECT_FALSE (board->running ());
+}
+
+TEST_F (Usb, TheKernelsDriverGivesTheBoardAwayAndGetsItBack)
+{
+  plug_dlpc900 ("1-2");
+  EXPECT_TRUE (bed.kernel_driver_bound ("1-2"));
+  {
+    const auto dmd = open_dmd ("usb:");
+    ASSERT_EQ (message_of (dmd), "");
+    EXPECT_FALSE (bed.kernel_driver_bound ("1-2"));
+  }
+  EXPECT_TRUE (bed.kernel_driver_bound ("1-2"));
+}
+
+TEST_F (Usb, ABoardThatAnotherProgramHoldsIsAnError)
+{
+  plug_dlpc900 ("1-2");
+  bed.occupy ("1-2");
+  const std::string message = message_of (open_dmd ("usb:"));
+  EXPECT_NE (message.find ("another program uses the board"), message.npos)
+      << message;
+}
+
+TEST_F (Usb, PulledInTheMiddleOfAnUploadIsOneClearError)
+{
+  const auto board = plug_dlpc900 ("1-2");
+  auto dmd = open_dmd ("usb:");
+  ASSERT_EQ (message_of (dmd), "");
+  const auto uploaded =
+      (*dmd)->upload (Schedule (), {}, [&] (int sent, int total) {
+        if (sent > total / 10 && !board->gone ())
+          bed.unplug ("1-2");
+      });
+  EXPECT_EQ (message_of (uploaded), "usb:1-2 was unplugged or switched off; "
+                                    "connect it, then open it again");
+  (*dmd)->stop ();
+  dmd->reset ();
+
+  const auto again = plug_dlpc900 ("1-2");
+  auto reopened = open_dmd ("usb:");
+  ASSERT_EQ (message_of (reopened), "");
+  EXPECT_EQ (
+      message_of (show (**reopened, schedule_of ("sequential:4x1"))), "");
+}
+
+TEST_F (Usb, AStallIsAnErrorAndTheBoardStopped)
+{
+  const auto board = plug_dlpc900 ("1-2");
+  auto dmd = open_dmd ("usb:");
+  ASSERT_EQ (message_of (dmd), "");
+  ASSERT_EQ (message_of (show (**dmd, schedule_of ("sequential:4x1"))), "");
+  board->faults[board->messages ()] = Fault::stall;
+  const auto stairs =
+      (*dmd)->upload (schedule_of ("staircase:4x1"), {}, ignore_progress);
+  EXPECT_NE (message_of (stairs).find ("0 of 64 bytes"), std::string::npos)
+      << message_of (stairs);
+  EXPECT_FALSE (board->running ());
+}
+
+TEST_F (Usb, PulledAtAnyMessageItEnds)
+{
+  for (int message = 0; message < 60; message += 3) {
+    const auto board = plug_dlpc900 ("1-2");
+    board->faults[message] = Fault::unplug;
+    auto dmd = open_dmd ("usb:,region=64x64");
+    if (dmd.ok ()) {
+      const auto shown = show (**dmd, schedule_of ("sequential:4x1"));
+      EXPECT_EQ (shown.ok (), !board->gone ()) << message;
+      dmd->reset ();
+    }
+    EXPECT_TRUE (board->gone () || !board->running ()) << message;
+    bed.unplug ("1-2");
+  }
+}

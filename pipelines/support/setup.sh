@@ -19,6 +19,8 @@ pkg-config|finds the libraries|run
 libgstreamer1.0-dev|GStreamer core and its test harness|run
 libgstreamer-plugins-base1.0-dev|GStreamer video library|run
 nlohmann-json3-dev|schedules and sidecars are JSON|run
+libusb-1.0-0-dev|DMD boards on the USB|run
+libcli11-dev|options of the command-line tool|run
 gstreamer1.0-tools|gst-launch-1.0, gst-inspect-1.0|run
 gstreamer1.0-plugins-base|test scenes, conversion, TCP, compositor|run
 gstreamer1.0-plugins-good|Matroska, AVI, PNG, window selection|run
@@ -28,6 +30,8 @@ gstreamer1.0-libav|FFV1, and reading most video files|run
 gstreamer1.0-x|windows under X, text in pictures|run
 libgtest-dev|unit and element tests|tests
 libbenchmark-dev|benchmarks|tests
+libumockdev-dev|a USB in software for the tests of DMDs|tests
+umockdev|a USB in software for the tests of DMDs|tests
 xvfb|a screen for the window tests|tests
 shellcheck|checks the scripts|tests
 '

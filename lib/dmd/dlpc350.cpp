@@ -32,7 +32,11 @@ public:
         })
   {
   }
-  ~Dlpc350 () override { stop (); }
+  ~Dlpc350 () override
+  {
+    if (touched_)
+      stop ();
+  }
 
   Result<void> open ();
 
@@ -95,7 +99,7 @@ Dlpc350::status ()
       (*hardware & kInitialised) != 0 && (*hardware & kFailureBits) == 0;
   return DmdStatus{(*main & kSequencerRuns) != 0,
       {{"controller", "DLPC350"}, {"mirrors", "DLP4500"},
-          {"images in flash", std::to_string (*images)},
+          {"images-in-flash", std::to_string (*images)},
           {"health", healthy ? "good" : "hardware status reports a failure"},
           {"parked", (*main & 1) != 0 ? "yes" : "no"}}};
 }
@@ -318,7 +322,7 @@ void
 Dlpc350::stop ()
 {
   running_ = false;
-  if (!touched_ || board_.link ().gone ())
+  if (board_.link ().gone ())
     return;
   // A device that does not answer now does not keep anybody waiting.
   HidCommand stop = kRun;

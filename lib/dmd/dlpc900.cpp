@@ -506,17 +506,15 @@ Dlpc900::start (const SlotPlan &plan)
 void
 Dlpc900::stop ()
 {
-  if (!touched_ || board_.link ().gone ()) {
-    running_ = false;
+  running_ = false;
+  if (board_.link ().gone ())
     return;
-  }
   // A device that does not answer now does not keep anybody waiting.
   HidCommand run = kRun;
   run.timeout = 500ms;
   for (int attempt = 0; attempt < 2; attempt++)
     if (board_.write_byte (run, kRunStop))
       break;
-  running_ = false;
 }
 
 } // namespace

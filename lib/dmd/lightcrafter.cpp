@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "base/text.h"
+#include "dmd/bitmap.h"
 #include "dmd/dmd_options.h"
 #include "dmd/lightcrafter_protocol.h"
 #include "dmd/tcp_stream.h"
@@ -44,7 +45,11 @@ public:
     info_.resident_masks = kMaxPatterns;
     info_.triggers_camera = options_.master == Master::dmd;
   }
-  ~Lightcrafter () override { stop (); }
+  ~Lightcrafter () override
+  {
+    if (touched_)
+      stop ();
+  }
 
   Result<void> open ();
 
@@ -307,7 +312,7 @@ Lightcrafter::stop ()
 {
   running_ = false;
   const Bytes off{0};
-  if (touched_ && !stream_->broken ())
+  if (!stream_->broken ())
     (void)write ("stop the sequence", kRun, off);
 }
 

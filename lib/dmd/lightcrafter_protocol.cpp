@@ -76,40 +76,6 @@ encode_sequence (const Sequence &sequence, int bytes)
 }
 
 Bytes
-encode_bitmap (ImageView<const std::uint8_t> mirrors)
-{
-  constexpr std::uint32_t kHeaders = 14 + 40, kPalette = 8;
-  const std::size_t row_bytes = (std::size_t (mirrors.width) + 31) / 32 * 4;
-  const auto pixels = std::uint32_t (row_bytes * std::size_t (mirrors.height));
-  Bytes file{'B', 'M'};
-  file.reserve (kHeaders + kPalette + pixels);
-  append_le (file, kHeaders + kPalette + pixels, 4);
-  append_le (file, 0, 4);
-  append_le (file, kHeaders + kPalette, 4);
-  append_le (file, 40, 4);
-  append_le (file, std::uint32_t (mirrors.width), 4);
-  append_le (file, std::uint32_t (mirrors.height), 4);
-  append_le (file, 1, 2); // plane
-  append_le (file, 1, 2); // bit a pixel
-  append_le (file, 0, 4); // not compressed
-  append_le (file, pixels, 4);
-  append_le (file, 0, 4); // pixels a metre, two times
-  append_le (file, 0, 4);
-  append_le (file, 2, 4); // colours
-  append_le (file, 0, 4);
-  append_le (file, 0x000000, 4);
-  append_le (file, 0xFFFFFF, 4);
-  for (int y = mirrors.height - 1; y >= 0; y--) {
-    const std::size_t start = file.size ();
-    file.resize (start + row_bytes);
-    for (int x = 0; x < mirrors.width; x++)
-      if (mirrors.row (y)[x] != 0)
-        file[start + std::size_t (x / 8)] |= std::uint8_t (0x80 >> x % 8);
-  }
-  return file;
-}
-
-Bytes
 encode_camera_trigger (bool enable, std::uint32_t pulse_us)
 {
   Bytes data{std::uint8_t (enable), 0, 0};

@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "base/image.h"
 #include "base/result.h"
 #include "dmd/little_endian.h"
 
@@ -54,9 +53,6 @@ std::vector<Bytes> encode_message (
 
 /** @p bytes 19: for kSequence; 18 or 17: for kSequenceOld. */
 Bytes encode_sequence (const Sequence &sequence, int bytes);
-/** A binary mask as the Windows bitmap file that the board takes: 1 bit a
- * mirror, rows from the bottom up. */
-Bytes encode_bitmap (ImageView<const std::uint8_t> mirrors);
 /** One pulse of the trigger output per pattern. */
 Bytes encode_camera_trigger (bool enable, std::uint32_t pulse_us);
 

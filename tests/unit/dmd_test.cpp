@@ -130,9 +130,9 @@ TEST (SimulatedMirrors, AreSharedByNameWhileSomebodyHoldsThem)
 
 TEST (OpenDmd, NamesTheDevicesThereAre)
 {
-  const auto opened = open_dmd ("usb:1-2");
+  const auto opened = open_dmd ("tape:1-2");
   ASSERT_FALSE (opened);
-  EXPECT_NE (opened.error ().message.find ("usb:1-2"), std::string::npos);
+  EXPECT_NE (opened.error ().message.find ("tape:1-2"), std::string::npos);
   EXPECT_NE (opened.error ().message.find ("sim:NAME"), std::string::npos);
 }
 

@@ -3,7 +3,9 @@
  */
 #include "dmd/lightcrafter.h"
 
+#include "dmd/bitmap.h"
 #include "dmd/lightcrafter_protocol.h"
+#include "dmd/plane_image.h"
 #include "dmd_rig.h"
 #include "hex.h"
 #include "lightcrafter_server.h"
@@ -79,11 +81,23 @@ TEST (LightcrafterBytes, AMaskIsOnePacket)
 {
   const Image<std::uint8_t> mirrors (608, 684);
   Bytes payload{0};
-  append (payload, lightcrafter::encode_bitmap (mirrors.view ()));
+  append (payload, encode_bitmap (mirrors.view ()));
   const auto packets = encode_message (PacketType::write, 0x0401, payload);
   ASSERT_EQ (packets.size (), 1u);
   EXPECT_EQ (
       to_hex (ByteView (packets[0]).first (9)), "02 04 01 00 4F CB 00 42 4D");
+}
+
+TEST (PlaneBitmap, HasThePlanesInTheChannelsOfTheController)
+{
+  // Plane 0 is the lowest green bit, 8 red, 16 blue; rows are 2 + 2 bytes.
+  PlaneImage planes (1, 2);
+  planes.at (0, 0) = 1 << 0 | 1 << 9;
+  planes.at (0, 1) = 1 << 18;
+  const Bytes file = encode_plane_bitmap (planes.view ());
+  ASSERT_EQ (file.size (), 54u + 2 * 4);
+  EXPECT_EQ (to_hex (ByteView (file).first (2)), "42 4D");
+  EXPECT_EQ (to_hex (ByteView (file).subspan (54)), "04 00 00 00 00 01 02 00");
 }
 
 TEST (LightcrafterReply, WrongOnesAreErrors)

@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* The USB transport under the unmodified libusb: boards that are found, taken
  * from the kernel, shown masks, and pulled out. */
-#include <random>
+#include <sys/wait.h>
+
+#include <cstdio>
 
 #include "dmd/usb_bus.h"
 #include "dmd_rig.h"
@@ -184,4 +186,65 @@ TEST_F (Usb, PulledAtAnyMessageItEnds)
     EXPECT_TRUE (board->gone () || !board->running ()) << message;
     bed.unplug ("1-2");
   }
+}
+
+namespace
+{
+
+/** What the command-line tool prints; its status is in @p status. */
+std::string
+tool_says (const std::string &arguments, int &status)
+{
+  // A child process sees this bus, too, if it loads what stands in between.
+  const std::string command = "LD_PRELOAD=libumockdev-preload.so.0 '" TOOL
+                              "' --quiet --json " +
+                              arguments + " 2>&1";
+  std::string said;
+  FILE *out = popen (command.c_str (), "r");
+  char text[256];
+  while (std::fgets (text, sizeof text, out) != nullptr)
+    said += text;
+  status = WEXITSTATUS (pclose (out));
+  return said;
+}
+
+} // namespace
+
+TEST_F (Usb, TheToolListsShowsAndStops)
+{
+  const auto board = plug_dlpc900 ("1-2");
+  int status = -1;
+  const std::string listed = tool_says ("dmd list", status);
+  EXPECT_EQ (status, 0);
+  EXPECT_NE (listed.find ("\"device\": \"usb:1-2\""), listed.npos) << listed;
+
+  const std::string shown =
+      tool_says ("dmd start usb: sequential:4x1 --for 10ms", status);
+  EXPECT_EQ (status, 0) << shown;
+  EXPECT_EQ (board->images_received (), 1);
+  EXPECT_FALSE (board->running ());
+
+  tool_says ("dmd start usb: sequential:2x2,active=12ms", status);
+  EXPECT_EQ (status, 4);
+  bed.unplug ("1-2");
+  tool_says ("dmd status", status);
+  EXPECT_EQ (status, 3);
+}
+
+TEST_F (Usb, TheToolStopsWhatSomebodyLeftRunning)
+{
+  const auto board = plug_dlpc350 ("1-2");
+  auto dmd = open_dmd ("usb:,images=0");
+  ASSERT_EQ (message_of (dmd), "");
+  ASSERT_EQ (message_of (show (**dmd, Schedule ())), "");
+  // Its program ends without a word.
+  const auto survivor = std::make_shared<EmulatedDlpc350> (*board);
+  dmd->reset ();
+  bed.unplug ("1-2");
+  bed.plug ("1-3", kDlpc350, "LCR2", survivor);
+  ASSERT_TRUE (survivor->running ());
+  int status = -1;
+  tool_says ("dmd stop", status);
+  EXPECT_EQ (status, 0);
+  EXPECT_FALSE (survivor->running ());
 }

@@ -1,0 +1,329 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* codedexposure dmd: boards that are there, and what they do. */
+#include <chrono>
+#include <condition_variable>
+#include <cstdio>
+#include <functional>
+#include <memory>
+#include <mutex>
+
+#include <unistd.h>
+
+#include "dmd/dmd.h"
+#include "dmd/usb_bus.h"
+#include "tools/tool.h"
+
+namespace cexp::tool
+{
+
+namespace
+{
+
+using Json = nlohmann::ordered_json;
+using Clock = std::chrono::steady_clock;
+
+struct Arguments {
+  std::string device = "usb:";
+  std::string schedule = "sequential:2x2";
+  std::string rate = "25";
+  std::string duration;
+  bool predict = false;
+};
+
+std::string
+seconds_text (double seconds)
+{
+  char text[32];
+  std::snprintf (text, sizeof text, "%.1f s", seconds);
+  return text;
+}
+
+/** Shows how far an upload is, and how long it still takes. */
+class ProgressLine
+{
+public:
+  explicit ProgressLine (const Session &session)
+      : shown_ (!session.quiet && isatty (STDERR_FILENO) != 0)
+  {
+  }
+
+  void operator() (int sent, int total)
+  {
+    if (!shown_)
+      return;
+    const double spent =
+        std::chrono::duration<double> (Clock::now () - start_).count ();
+    const double part = total > 0 ? double (sent) / total : 1.0;
+    std::fprintf (stderr, "\ruploading %3.0f %%", 100 * part);
+    if (sent > 0 && sent < total)
+      std::fprintf (stderr, ", %s left  ",
+          seconds_text (spent * (1 - part) / part).c_str ());
+    if (sent == total)
+      std::fprintf (stderr, ", done in %s\n", seconds_text (spent).c_str ());
+  }
+
+private:
+  const bool shown_;
+  const Clock::time_point start_ = Clock::now ();
+};
+
+std::unique_ptr<Dmd>
+open (Session &session, const std::string &device)
+{
+  auto dmd = open_dmd (device);
+  if (dmd)
+    return *std::move (dmd);
+  session.fail (Exit::no_device, dmd.error ());
+  return nullptr;
+}
+
+Json
+describe (const DmdInfo &info)
+{
+  return {{"device", info.name},
+      {"mirrors", std::to_string (info.size.width) + "x" +
+                      std::to_string (info.size.height)},
+      {"array", info.array == Array::diamond ? "diamond" : "orthogonal"},
+      {"shortest-mask", time_text (info.minimum_active)},
+      {"shortest-pause", time_text (info.minimum_switching)},
+      {"masks", info.resident_masks}, {"takes-masks", info.run_time_upload},
+      {"triggers-camera", info.triggers_camera}};
+}
+
+void
+list (Session &session)
+{
+  const auto boards = list_usb_boards ();
+  if (!boards)
+    return session.fail (Exit::failed, boards.error ());
+  Json result = Json::array ();
+  for (const UsbBoard &board : *boards) {
+    Json entry{{"device", "usb:" + board.port},
+        {"controller", controller_text (board.controller)},
+        {"serial", board.serial}};
+    if (!board.trouble.empty ())
+      entry["trouble"] = board.trouble;
+    result.push_back (std::move (entry));
+  }
+  if (boards->empty ())
+    session.say ("no DMD is connected by USB");
+  session.print (result);
+}
+
+void
+status (Session &session, const Arguments &arguments)
+{
+  const auto dmd = open (session, arguments.device);
+  if (!dmd)
+    return;
+  const auto now = dmd->status ();
+  if (!now)
+    return session.fail (Exit::failed, now.error ());
+  Json result{{"device", dmd->info ().name}, {"running", now->running}};
+  for (const auto &[name, value] : now->details)
+    result[name] = value;
+  session.print (result);
+}
+
+void
+stop (Session &session, const Arguments &arguments)
+{
+  const auto dmd = open (session, arguments.device);
+  if (!dmd)
+    return;
+  dmd->stop ();
+  const auto now = dmd->status ();
+  if (!now)
+    return session.fail (Exit::failed, now.error ());
+  if (now->running)
+    return session.fail (
+        Exit::failed, Error{dmd->info ().name + " does not stop"});
+  session.print ({{"device", dmd->info ().name}, {"running", false}});
+}
+
+/** A schedule and its slots, for a device that can show them. */
+struct Show {
+  Schedule schedule;
+  SlotPlan plan;
+};
+
+std::optional<Show>
+fit (Session &session, const Arguments &arguments, const DmdInfo &info)
+{
+  const auto rate = parse_rate (arguments.rate);
+  const auto schedule = Schedule::parse (arguments.schedule);
+  if (!rate || !schedule) {
+    session.fail (Exit::usage, rate ? schedule.error () : rate.error ());
+    return std::nullopt;
+  }
+  const auto plan =
+      SlotPlan::fit (schedule->timing (), schedule->slots (), *rate);
+  const auto fits =
+      plan ? check_limits (info, *schedule, *plan) : plan.error ();
+  if (!fits) {
+    session.fail (Exit::does_not_fit, fits.error ());
+    return std::nullopt;
+  }
+  return Show{*schedule, *plan};
+}
+
+bool
+send (Session &session, Dmd &dmd, const Schedule &schedule, Json &result)
+{
+  const Nanoseconds predicted = dmd.upload_time (schedule);
+  result["upload-predicted"] = time_text (predicted);
+  if (predicted > 0)
+    session.say ("the upload takes " + seconds_text (double (predicted) / 1e9) +
+                 " or more");
+  ProgressLine line (session);
+  const auto start = Clock::now ();
+  const auto sent = dmd.upload (schedule, session.stop,
+      [&] (int done, int total) { line (done, total); });
+  if (!sent) {
+    session.fail (Exit::failed, sent.error ());
+    return false;
+  }
+  result["upload-took"] =
+      time_text (std::chrono::nanoseconds (Clock::now () - start).count ());
+  return true;
+}
+
+void
+upload (Session &session, const Arguments &arguments)
+{
+  const auto dmd = open (session, arguments.device);
+  if (!dmd)
+    return;
+  const auto show = fit (session, arguments, dmd->info ());
+  if (!show)
+    return;
+  Json result{{"device", dmd->info ().name},
+      {"schedule", show->schedule.text ()}, {"masks", show->schedule.masks ()}};
+  if (arguments.predict)
+    result["upload-predicted"] = time_text (dmd->upload_time (show->schedule));
+  else if (!send (session, *dmd, show->schedule, result))
+    return;
+  session.print (result);
+}
+
+/** Until the user stops it, or the time is over: then true. */
+bool
+wait (const Session &session, std::optional<Nanoseconds> duration)
+{
+  std::mutex lock;
+  std::condition_variable_any never;
+  std::unique_lock guard (lock);
+  const auto nothing = [] { return false; };
+  if (duration)
+    never.wait_for (
+        guard, session.stop, std::chrono::nanoseconds (*duration), nothing);
+  else
+    never.wait (guard, session.stop, nothing);
+  return !session.stop.stop_requested ();
+}
+
+void
+start (Session &session, const Arguments &arguments)
+{
+  std::optional<Nanoseconds> duration;
+  if (!arguments.duration.empty ()) {
+    const auto parsed = parse_time (arguments.duration);
+    if (!parsed)
+      return session.fail (Exit::usage, parsed.error ());
+    duration = *parsed;
+  }
+  const auto dmd = open (session, arguments.device);
+  if (!dmd)
+    return;
+  const auto show = fit (session, arguments, dmd->info ());
+  Json result{{"device", dmd->info ().name}};
+  if (!show || !send (session, *dmd, show->schedule, result))
+    return;
+  if (const auto started = dmd->start (show->plan); !started)
+    return session.fail (Exit::failed, started.error ());
+  session.say ("running; Ctrl-C stops it");
+  const bool over = wait (session, duration);
+  dmd->stop ();
+  session.print (result);
+  if (!over && duration)
+    session.exit = Exit::interrupted;
+}
+
+/** Shows a schedule that uploads fast, and looks whether the board does what
+ * it is told. */
+void
+selftest (Session &session, Arguments arguments)
+{
+  const auto dmd = open (session, arguments.device);
+  if (!dmd)
+    return;
+  arguments.schedule = "sequential:4x1";
+  if (dmd->info ().minimum_switching > 0)
+    arguments.schedule +=
+        ",switching=" + time_text (dmd->info ().minimum_switching);
+  const auto show = fit (session, arguments, dmd->info ());
+  Json result = describe (dmd->info ());
+  if (!show || !send (session, *dmd, show->schedule, result))
+    return;
+  if (const auto started = dmd->start (show->plan); !started)
+    return session.fail (Exit::failed, started.error ());
+  const auto running = dmd->status ();
+  dmd->stop ();
+  const auto stopped = dmd->status ();
+  if (!running || !stopped)
+    return session.fail (
+        Exit::failed, running ? stopped.error () : running.error ());
+  if (!running->running || stopped->running)
+    return session.fail (Exit::failed,
+        Error{dmd->info ().name + (running->running
+                                          ? " does not stop"
+                                          : " says that it does not run")});
+  result["selftest"] = "passed";
+  session.print (result);
+}
+
+} // namespace
+
+void
+add_dmd_commands (CLI::App &app, Session &session)
+{
+  auto *dmd = app.add_subcommand ("dmd", "Boards, and what they show");
+  dmd->require_subcommand (1);
+  const auto arguments = std::make_shared<Arguments> ();
+  const auto add = [&] (const char *name, const char *help, auto command) {
+    auto *sub = dmd->add_subcommand (name, help);
+    sub->callback (
+        [&session, arguments, command] { command (session, *arguments); });
+    return sub;
+  };
+  const auto with_device = [&] (CLI::App *sub) {
+    sub->add_option ("device", arguments->device,
+        "usb:[PORT|SERIAL], lightcrafter:[HOST] or sim:NAME");
+    return sub;
+  };
+  const auto with_schedule = [&] (CLI::App *sub) {
+    with_device (sub);
+    sub->add_option ("schedule", arguments->schedule,
+        "CODE:TILE[,key=value...] or a JSON file");
+    sub->add_option ("--rate", arguments->rate, "Frames/s of the camera");
+    return sub;
+  };
+
+  add ("list", "The boards that are connected by USB",
+      [] (Session &s, const Arguments &) { list (s); });
+  with_device (
+      add ("info", "What a board can do", [] (Session &s, const Arguments &a) {
+        if (const auto opened = open (s, a.device))
+          s.print (describe (opened->info ()));
+      }));
+  with_device (add ("status", "What a board says of itself", status));
+  with_schedule (add ("upload", "Send the masks of a schedule", upload))
+      ->add_flag (
+          "--predict", arguments->predict, "Only say how long it would take");
+  with_schedule (add ("start", "Send masks and show them until Ctrl-C", start))
+      ->add_option ("--for", arguments->duration, "Stop after that time");
+  with_device (add ("stop", "Stop what a board shows", stop));
+  with_device (add ("selftest", "Try upload, start and stop", selftest));
+}
+
+} // namespace cexp::tool

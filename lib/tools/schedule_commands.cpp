@@ -1,0 +1,217 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* codedexposure schedule: what schedules say, and their masks as pictures. */
+#include <array>
+#include <fstream>
+#include <memory>
+
+#include "base/text.h"
+#include "dmd/bitmap.h"
+#include "dmd/dmd.h"
+#include "dmd/plane_image.h"
+#include "tools/tool.h"
+
+namespace cexp::tool
+{
+
+namespace
+{
+
+using Json = nlohmann::ordered_json;
+
+struct Arguments {
+  std::string schedule = "sequential:2x2";
+  std::string board = "dlp6500";
+  std::string layout = "address";
+  std::string region;
+  std::string prefix = "mask";
+  std::string rate = "25";
+  bool planes = false;
+};
+
+/** Boards by name, for use without the board. */
+struct Kind {
+  const char *name;
+  Extent size;
+  Array array;
+  int masks;
+  Nanoseconds minimum_active, minimum_switching;
+};
+constexpr std::array<Kind, 4> kKinds{{
+    {"dlp3000", {608, 684}, Array::diamond, 96, 250'000, 250'000},
+    {"dlp4500", {912, 1140}, Array::diamond, 48, 235'000, 0},
+    {"dlp6500", {1920, 1080}, Array::orthogonal, 400, 105'000, 0},
+    {"dlp9000", {2560, 1600}, Array::orthogonal, 400, 105'000, 0},
+}};
+
+Result<Kind>
+find_kind (const std::string &name)
+{
+  for (const Kind &kind : kKinds)
+    if (name == kind.name)
+      return kind;
+  return Error{"no DMD is called " + in_quotes (name) +
+               "; there are dlp3000, dlp4500, dlp6500 and dlp9000"};
+}
+
+std::optional<Schedule>
+read (Session &session, const Arguments &arguments)
+{
+  auto schedule = Schedule::parse (arguments.schedule);
+  if (schedule)
+    return *std::move (schedule);
+  session.fail (Exit::usage, schedule.error ());
+  return std::nullopt;
+}
+
+void
+show (Session &session, const Arguments &arguments)
+{
+  const auto schedule = read (session, arguments);
+  if (!schedule)
+    return;
+  if (session.json)
+    return session.print (Json::parse (schedule->to_json ()));
+  const Timing &timing = schedule->timing ();
+  session.print ({{"schedule", schedule->text ()},
+      {"slots", schedule->slots ()}, {"masks", schedule->masks ()},
+      {"cell", std::to_string (schedule->cell ().width) + "x" +
+                   std::to_string (schedule->cell ().height)},
+      {"active", timing.active > 0 ? time_text (timing.active)
+                                   : "what the frame leaves"},
+      {"switching", time_text (timing.switching)},
+      {"readout", time_text (timing.readout)}});
+}
+
+void
+check (Session &session, const Arguments &arguments)
+{
+  const auto schedule = read (session, arguments);
+  if (!schedule)
+    return;
+  const auto rate = parse_rate (arguments.rate);
+  const auto kind = find_kind (arguments.board);
+  if (!rate || !kind)
+    return session.fail (Exit::usage, rate ? kind.error () : rate.error ());
+  const auto plan =
+      SlotPlan::fit (schedule->timing (), schedule->slots (), *rate);
+  const DmdInfo info{.name = kind->name,
+      .size = kind->size,
+      .minimum_active = kind->minimum_active,
+      .minimum_switching = kind->minimum_switching,
+      .resident_masks = kind->masks};
+  const auto fits =
+      plan ? check_limits (info, *schedule, *plan) : plan.error ();
+  if (!fits)
+    return session.fail (Exit::does_not_fit, fits.error ());
+  session.print ({{"schedule", schedule->text ()}, {"dmd", kind->name},
+      {"slots", plan->slots ()}, {"active", time_text (plan->active ())},
+      {"exposure", time_text (plan->exposure ())},
+      {"frame", time_text (plan->frame_period ())}, {"fits", true}});
+}
+
+Result<Placement>
+placement_of (const Arguments &arguments, const Kind &kind)
+{
+  Placement placement;
+  const auto layout = parse_layout (arguments.layout);
+  if (!layout)
+    return layout.error ();
+  placement.layout = *layout;
+  if (!arguments.region.empty ()) {
+    const auto region = MirrorRegion::parse (arguments.region);
+    if (!region)
+      return region.error ();
+    placement.region = *region;
+  }
+  const auto checked = check_placement (placement, kind.array, kind.size);
+  return checked ? Result<Placement> (placement) : checked.error ();
+}
+
+Result<void>
+write_file (const std::string &path, const Bytes &bytes)
+{
+  std::ofstream file (path, std::ios::binary);
+  file.write (reinterpret_cast<const char *> (bytes.data ()),
+      std::streamsize (bytes.size ()));
+  file.close ();
+  return file ? Result<void> ()
+              : Error{"cannot write " + in_quotes (path) +
+                      "; is there room, and the folder?"};
+}
+
+void
+render (Session &session, const Arguments &arguments)
+{
+  const auto schedule = read (session, arguments);
+  if (!schedule)
+    return;
+  const auto kind = find_kind (arguments.board);
+  const auto placement = kind ? placement_of (arguments, *kind) : kind.error ();
+  if (!placement)
+    return session.fail (Exit::usage, placement.error ());
+
+  const PlanePlan plan = plan_planes (*schedule);
+  const int pictures = arguments.planes ? plan.images : schedule->masks ();
+  Json files = Json::array ();
+  Image<std::uint8_t> mirrors (kind->size.width, kind->size.height);
+  for (int picture = 0; picture < pictures; picture++) {
+    if (session.stop.stop_requested ())
+      return session.fail (Exit::interrupted, Error{"interrupted"});
+    const std::string path =
+        arguments.prefix + std::to_string (picture) + ".bmp";
+    Bytes bytes;
+    if (arguments.planes) {
+      bytes = encode_plane_bitmap (
+          render_planes (*schedule, plan, picture, *placement, kind->size)
+              .view ());
+    } else {
+      render_mirrors (*schedule, picture, *placement, mirrors.view ());
+      bytes = encode_bitmap (mirrors.view ());
+    }
+    if (const auto written = write_file (path, bytes); !written)
+      return session.fail (Exit::failed, written.error ());
+    files.push_back (path);
+  }
+  session.print (
+      {{"schedule", schedule->text ()}, {"dmd", kind->name}, {"files", files}});
+}
+
+} // namespace
+
+void
+add_schedule_commands (CLI::App &app, Session &session)
+{
+  auto *schedule =
+      app.add_subcommand ("schedule", "Schedules, and their masks");
+  schedule->require_subcommand (1);
+  const auto arguments = std::make_shared<Arguments> ();
+  const auto add = [&] (const char *name, const char *help, auto command) {
+    auto *sub = schedule->add_subcommand (name, help);
+    sub->add_option ("schedule", arguments->schedule,
+        "CODE:TILE[,key=value...] or a JSON file");
+    sub->callback (
+        [&session, arguments, command] { command (session, *arguments); });
+    return sub;
+  };
+  const auto with_board = [&] (CLI::App *sub) {
+    sub->add_option (
+        "--dmd", arguments->board, "dlp3000, dlp4500, dlp6500 or dlp9000");
+    return sub;
+  };
+
+  add ("show", "Say what a schedule is", show);
+  with_board (add ("check", "Does it fit a DMD and a frame rate", check))
+      ->add_option ("--rate", arguments->rate, "Frames/s of the camera");
+  auto *pictures =
+      with_board (add ("render", "Write the masks as bitmap files", render));
+  pictures->add_option ("--layout", arguments->layout,
+      "Of the tile on a diamond array: address, lattice or cell");
+  pictures->add_option (
+      "--region", arguments->region, "WxH[+X+Y], mirrors that show masks");
+  pictures->add_option (
+      "--output", arguments->prefix, "What the files' names begin with");
+  pictures->add_flag ("--planes", arguments->planes,
+      "24 masks a file, for the flash or the video of a LightCrafter 4500");
+}
+
+} // namespace cexp::tool

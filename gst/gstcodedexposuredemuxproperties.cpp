@@ -48,8 +48,8 @@ coded_exposure_method_get_type ()
 {
   static const GEnumValue values[] = {
       {int (Method::kAuto),
-          "select for one-hot codes, decode for other codes that can be "
-          "inverted, else rank",
+          "select for one-hot codes without leak, decode for other codes that "
+          "can be inverted, else rank",
           "auto"},
       {int (Method::kRank),
           "subframe k is the k-th smallest pixel of each group", "rank"},

@@ -114,15 +114,13 @@ fill_in_rate (const Known &now, GstCaps *caps)
 
 } // namespace
 
-/* A pad that is not linked limits nothing. */
+/* A pad that is not linked limits nothing: without a peer, ANY comes back. */
 GstCaps *
 sink_caps (GstCodedExposureDemux *self)
 {
   const Known now = known (self);
   CapsPtr caps (gst_pad_get_pad_template_caps (state (self).sinkpad));
   outputs (self)->each ([&] (const OutputRef &output) {
-    if (!gst_pad_is_linked (output->pad.get ()))
-      return;
     const CapsPtr peer (gst_pad_peer_query_caps (output->pad.get (), nullptr));
     const CapsPtr coded = to_coded (now, output->kind, peer.get ());
     caps = intersect (coded.get (), caps.get ());

@@ -3,6 +3,8 @@
  * and renegotiation. */
 #include "harness.h"
 
+#include "gstcodedexposuretag.h"
+
 namespace
 {
 
@@ -257,6 +259,25 @@ TEST_P (DemuxSinkQuery, AnswersForDownstream)
   const CapsPtr answer (
       gst_pad_peer_query_caps (demux.get ()->srcpad, nullptr));
   EXPECT_TRUE (same_caps (answer.get (), c.answer));
+}
+
+/* A schedule that is only assumed must not keep upstream from sending what the
+ * schedule of its tag needs; one that the stream has told binds. */
+TEST (DemuxCaps, QueryIsBoundByTheTagButNotByAnAssumption)
+{
+  ElementHarness demux ("codedexposure-demux");
+  gst_harness_set_sink_caps_str (
+      demux.get (), GRAY8_FIELDS "framerate={100/1,225/1}");
+  demux.set_caps (gray_caps (18, 18));
+  ASSERT_EQ (demux.push (coded_frame (18, 18)), GST_FLOW_OK);
+  CapsPtr answer (gst_pad_peer_query_caps (demux.get ()->srcpad, nullptr));
+  EXPECT_TRUE (same_caps (answer.get (), GRAY8_FIELDS ANY_SIZE "," ANY_RATE));
+
+  demux.push_event (schedule_to_event (*Schedule::parse ("sequential:3x3")));
+  ASSERT_EQ (demux.push (coded_frame (18, 18, kPeriod)), GST_FLOW_OK);
+  answer.reset (gst_pad_peer_query_caps (demux.get ()->srcpad, nullptr));
+  EXPECT_TRUE (same_caps (
+      answer.get (), GRAY8_FIELDS ANY_SIZE ",framerate={100/9,25/1}"));
 }
 
 TEST (DemuxCaps, QueryKeepsTheOrderOfTheFilter)

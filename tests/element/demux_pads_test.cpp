@@ -361,6 +361,21 @@ TEST (DemuxPads, FlushMakesThePadsForgetTheirEnd)
   EXPECT_EQ (demux.push (coded_frame (0)), kOk);
 }
 
+TEST (DemuxPads, FlushMakesThePadsForgetThatTheyWereFlushing)
+{
+  ElementHarness demux (kLine, "sink", nullptr);
+  FlowSink src (demux, "src"), one (demux, "subframe_1");
+  one.flow = kFlushing;
+  start_stream (demux);
+  EXPECT_EQ (demux.push (coded_frame (0)), kFlushing);
+  demux.push_event (gst_event_new_flush_start ());
+  demux.push_event (gst_event_new_flush_stop (TRUE));
+  start_stream (demux);
+  one.flow = kOk;
+  EXPECT_EQ (demux.push (coded_frame (0)), kOk);
+  EXPECT_EQ (one.buffers, 2);
+}
+
 TEST (DemuxPads, PadThatIsLinkedLaterGetsTheNextFrame)
 {
   ElementHarness demux (kLine, "sink", nullptr);

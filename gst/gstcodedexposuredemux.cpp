@@ -46,7 +46,8 @@
  * `codedexposure/frames-lost` says `count`, `from` (when the first was due) and
  * `to` (the frame that came). CORRUPTED and GAP pass to all subframes of a
  * frame. `codedexposure/saturated` says when a stretch of frames with pixels at
- * the largest value begins (`active` true) and ends.
+ * the largest value begins (`active` true), and when there were none for a
+ * second.
  *
  * Every subframe bears the custom meta `CodedExposureFrame` with the number of
  * its frame, its index and the time of its light; other metas of the frame are

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* A coded frame comes in, its subframes go out. */
 #include <algorithm>
+#include <cstdlib>
 #include <numeric>
 
 #include "gstcodedexposuredemuxstate.h"
@@ -126,9 +127,13 @@ describe (GstCodedExposureDemux *self, const Job &job, const FrameStep &step)
 void
 note_saturation (GstCodedExposureDemux *self, const Job &job)
 {
+  /* Noise lifts a bright pixel to white in one frame and not in the next. */
+  constexpr GstClockTimeDiff kCalm = GST_SECOND;
   Burst &burst = state (self).stream.saturation;
   if (job.meta.saturated == 0) {
-    end_saturation (self);
+    if (burst.frames > 0 &&
+        std::abs (GST_CLOCK_DIFF (burst.to, job.pts)) >= kCalm)
+      end_saturation (self);
     return;
   }
   count (self, &Counters::saturated_frames);

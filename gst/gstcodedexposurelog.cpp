@@ -306,7 +306,7 @@ gst_coded_exposure_log_class_init (GstCodedExposureLogClass *klass)
   gst_element_class_set_static_metadata (element_class,
       "Coded exposure frame log", "Filter/Analyzer/Video",
       "Writes what is known of every coded frame to a file of JSON lines",
-      "gst-codedexposure");
+      "The gst-codedexposure authors");
   static GstStaticPadTemplate sink =
       GST_STATIC_PAD_TEMPLATE ("sink", GST_PAD_SINK, GST_PAD_ALWAYS,
           GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));

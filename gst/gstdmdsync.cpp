@@ -634,7 +634,7 @@ gst_dmd_sync_class_init (GstDmdSyncClass *klass)
       "Filter/Video",
       "Drives the DMD of a coded exposure camera; times, counts and watches "
       "its frames",
-      "gst-codedexposure");
+      "The gst-codedexposure authors");
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);
 

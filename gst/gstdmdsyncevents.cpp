@@ -150,6 +150,17 @@ take_segment (GstDmdSync *self, GstEvent *event)
   return push_tag (self) && taken;
 }
 
+/* A source offers the same caps again before it gives up; the bus hears of it
+ * once. */
+void
+refuse (GstDmdSync *self, GstCaps *incaps, const std::string &why)
+{
+  if (std::exchange (state (self).stream.refused, why) != why)
+    GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
+        ("The frames do not fit the schedule: %s", why.c_str ()),
+        ("%" GST_PTR_FORMAT, (void *)incaps));
+}
+
 } // namespace
 
 gboolean
@@ -159,12 +170,10 @@ set_caps (GstBaseTransform *trans, GstCaps *incaps, GstCaps *)
   SyncState &st = state (self);
   const Result<Timebase> time = make_timebase (incaps, st);
   if (!time) {
-    GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
-        ("The frames do not fit the schedule: %s",
-            time.error ().message.c_str ()),
-        ("%" GST_PTR_FORMAT, (void *)incaps));
+    refuse (self, incaps, time.error ().message);
     return FALSE;
   }
+  st.stream.refused.clear ();
 
   const bool restart = !same_slots (st.stream.time, *time);
   st.stream.time = *time;

@@ -69,6 +69,7 @@ struct Stream {
   bool discont = true;         ///< the next frame does not follow the last one
   bool tag_due = true;
   bool warned_tag = false;
+  std::string refused; ///< what was said of the caps that were refused last
 };
 
 /** Behind the GObject. The object lock of the element is a leaf: it is never

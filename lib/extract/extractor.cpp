@@ -78,6 +78,20 @@ targets_from (std::string_view name)
   return targets;
 }
 
+Error
+no_cell (const Schedule &schedule, int width, int height)
+{
+  const Extent cell = schedule.cell ();
+  std::string text = "frame of " + std::to_string (width) + "x" +
+                     std::to_string (height) + " pixels holds no cell of " +
+                     std::to_string (cell.width) + "x" +
+                     std::to_string (cell.height);
+  if (schedule.pilot_rows () > 0)
+    text += " above the pilot's " + std::to_string (schedule.pilot_rows ()) +
+            " rows";
+  return Error{text + "; take larger frames or a smaller tile"};
+}
+
 } // namespace
 
 std::string_view
@@ -137,12 +151,7 @@ Extractor<Pixel>::make (const Schedule &schedule, int width, int height,
   const SampleGrid grid (schedule);
   const Extent size = grid.subframe_size (width, height);
   if (size.width < 1 || size.height < 1)
-    return Error{"frame of " + std::to_string (width) + "x" +
-                 std::to_string (height) + " pixels holds no cell of " +
-                 std::to_string (grid.cell ().width) + "x" +
-                 std::to_string (grid.cell ().height) + " above the pilot's " +
-                 std::to_string (schedule.pilot_rows ()) +
-                 " rows; take larger frames or a smaller tile"};
+    return no_cell (schedule, width, height);
 
   const Method method =
       options.method == Method::kAuto ? method_for (schedule) : options.method;

@@ -422,6 +422,9 @@ TEST (DemuxPixels, GainAndInterpolationReachTheDecoder)
 class DemuxSaturation : public DemuxSchedule
 {
 protected:
+  /* No saturation for a second ends a stretch. */
+  static constexpr int kCalmFrames = int (GST_SECOND / kPeriod);
+
   struct Said {
     bool active;
     guint64 frames, pixels, from, to;
@@ -468,7 +471,10 @@ TEST_F (DemuxSaturation, IsSaidWhenAStretchBeginsAndEnds)
   EXPECT_EQ (begun->from, kPeriod);
   EXPECT_FALSE (said ());
 
-  push_frame (4, 0);
+  for (int frame = 4; frame < 3 + kCalmFrames; frame++)
+    push_frame (frame, 0);
+  EXPECT_FALSE (said ());
+  push_frame (3 + kCalmFrames, 0);
   const auto ended = said ();
   ASSERT_TRUE (ended);
   EXPECT_FALSE (ended->active);
@@ -477,6 +483,22 @@ TEST_F (DemuxSaturation, IsSaidWhenAStretchBeginsAndEnds)
   EXPECT_EQ (ended->from, kPeriod);
   EXPECT_EQ (ended->to, 3 * kPeriod);
   EXPECT_EQ (property<guint64> (demux->element (), "saturated-frames"), 3u);
+}
+
+TEST_F (DemuxSaturation, IsOneStretchWhereFramesFlicker)
+{
+  start ("schedule=sequential:2x2");
+  for (int frame = 0; frame < 4 * kCalmFrames; frame++)
+    push_frame (frame, frame % kCalmFrames == 0 ? 1 : 0);
+  const auto begun = said ();
+  ASSERT_TRUE (begun);
+  EXPECT_TRUE (begun->active);
+  EXPECT_FALSE (said ());
+  demux->push_event (gst_event_new_eos ());
+  const auto ended = said ();
+  ASSERT_TRUE (ended);
+  EXPECT_EQ (ended->frames, 4u);
+  EXPECT_EQ (ended->to, 3 * kCalmFrames * kPeriod);
 }
 
 TEST_F (DemuxSaturation, EosEndsAStretch)

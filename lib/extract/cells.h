@@ -30,6 +30,8 @@ run_in_registers (const Block<T> &block, const Planes<T> &to, Work work)
 #pragma GCC unroll 16
           for (int y = 0; y < Height; y++) {
             const T *from = bytes_on (row, y * block.stride) + at * Width;
+            prefetch (
+                bytes_on (from, Height * block.stride), Width * kVectorBytes);
             Vector<T> parts[Width];
             split_cells<Width, T> (from, parts);
 #pragma GCC unroll 16

@@ -21,30 +21,27 @@ constexpr std::size_t kLine = 64;
 
 /**
  * Calls @p body (kernels, first, count) for parts that cover @p cells cells:
- * the widest vectors as far as they are well filled, narrower ones for the
- * rest. Parts may overlap. @p cells is at least the lanes of the last target.
+ * the widest vectors, and at the end some half as wide where these are enough.
+ * Parts may overlap. @p cells is at least the lanes of the last target.
  */
 template <typename Pixel, typename Body>
 void
 for_segments (std::span<const Target> targets, int cells, Body body)
 {
-  const int narrowest = targets.back ().kernels<Pixel> ().lanes;
   int at = 0;
-  for (const Target &target : targets) {
-    const Kernels<Pixel> &kernels = target.kernels<Pixel> ();
+  for (std::size_t t = 0; t < targets.size () && at < cells; t++) {
+    const Kernels<Pixel> &kernels = targets[t].kernels<Pixel> ();
     const int lanes = kernels.lanes;
-    if (at == cells)
-      return;
     if (cells < lanes)
       continue;
     const int left_over = (cells - at) % lanes;
-    const bool to_the_end =
-        lanes == narrowest || left_over == 0 || left_over > lanes / 2;
-    const int end = to_the_end ? cells : cells - left_over;
-    if (end == at)
-      continue;
+    const bool half_is_enough =
+        t + 1 < targets.size () && left_over <= lanes / 2 &&
+        lanes / 2 == targets[t + 1].kernels<Pixel> ().lanes && t == 0;
+    const int end = half_is_enough ? cells - left_over : cells;
     const int first = std::min (at, end - lanes);
-    body (kernels, first, end - first);
+    if (end > at)
+      body (kernels, first, end - first);
     at = end;
   }
 }

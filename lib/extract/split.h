@@ -235,15 +235,18 @@ split_wide (const T *from, int width, T *const *out, int at)
   return result;
 }
 
-/** All vectors of one row of pixels; Width 0: any. Returns the largest pixels.
- */
+/** All vectors of one row of pixels; Width 0: any. Fetches the row @p ahead
+ * bytes further on. Returns the largest pixels. */
 template <int Width, typename T>
 CEXP_INLINE Vector<T>
-split_row (const T *row, int width, int cells, T *const *out, bool streams)
+split_row (const T *row, int width, int cells, T *const *out, bool streams,
+    std::ptrdiff_t ahead)
 {
   Vector<T> most = {};
   for_strips<T> (
       cells, out[0], streams, [&] (int at, auto put) CEXP_INLINE_BODY {
+        prefetch (bytes_on (row, ahead) + at * width,
+            (Width > 0 ? Width : width) * kVectorBytes);
         if constexpr (Width == 0) {
           most =
               larger (most, split_wide<T> (row + at * width, width, out, at));
@@ -277,7 +280,8 @@ select_rows (
       const T *row = bytes_on (
           block.pixels, (std::ptrdiff_t (j) * block.height + y) * block.stride);
       most = larger (most, split_row<Width, T> (row, block.width, block.cells,
-                               places + y * block.width, to.stream));
+                               places + y * block.width, to.stream,
+                               block.height * block.stride));
     }
   }
   return largest_lane<T> (most);
@@ -294,8 +298,9 @@ split_strip (const Block<T> &block, int j, int at, T *const *places)
     const T *row = bytes_on (block.pixels,
                        (std::ptrdiff_t (j) * block.height + y) * block.stride) +
                    at * block.width;
-    most = larger (most, split_row<Width, T> (row, block.width, kL,
-                             places + y * block.width, false));
+    most = larger (most,
+        split_row<Width, T> (row, block.width, kL, places + y * block.width,
+            false, block.height * block.stride));
   }
   return most;
 }

@@ -16,6 +16,7 @@
 
 #if defined __x86_64__
 CEXP_DECLARE (avx512)
+CEXP_DECLARE (avx512vl)
 CEXP_DECLARE (avx2)
 CEXP_DECLARE (sse4)
 #endif
@@ -37,7 +38,8 @@ find_targets ()
       __builtin_cpu_supports ("avx512dq") &&
       __builtin_cpu_supports ("avx512vl") &&
       __builtin_cpu_supports ("avx512vbmi"))
-    targets.push_back (CEXP_TARGET_ENTRY (avx512));
+    targets.insert (targets.end (),
+        {CEXP_TARGET_ENTRY (avx512), CEXP_TARGET_ENTRY (avx512vl)});
   if (__builtin_cpu_supports ("avx2"))
     targets.push_back (CEXP_TARGET_ENTRY (avx2));
   if (__builtin_cpu_supports ("sse4.1") && __builtin_cpu_supports ("ssse3"))

@@ -105,14 +105,15 @@ largest_lane (Vector<T> v)
   }
 }
 
-/** Fetches the @p vectors vectors at @p from before they are needed. */
-template <int Vectors, typename T>
+/** Fetches @p bytes bytes before they are needed: rows of large frames end with
+ * their page, where the processor loses the trail. They need not exist. */
+template <typename T>
 CEXP_INLINE void
-prefetch (const T *from)
+prefetch (const T *from, int bytes)
 {
-  const char *bytes = reinterpret_cast<const char *> (from);
-  for (int at = 0; at < Vectors * kVectorBytes; at += 64)
-    __builtin_prefetch (bytes + at);
+  const char *first = reinterpret_cast<const char *> (from);
+  for (int at = 0; at < bytes; at += 64)
+    __builtin_prefetch (first + at);
 }
 
 } // namespace cexp::CEXP_TARGET

@@ -108,7 +108,7 @@ difference_any (const Block<T> &block, const Layout<T> &layout,
           } else {
             most = larger (most, strip (block, j, at, places.rows));
             relabel_strip (
-                layout, j, at, places.rows, elements.rows, 0, Put<false> ());
+                layout, j, at, places.rows, elements.rows, 0, Put ());
           }
           Vector<T> before = {};
           for (int k = 0; k < layout.n; k++) {

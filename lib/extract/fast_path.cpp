@@ -22,11 +22,13 @@ constexpr std::size_t kLine = 64;
 /**
  * Calls @p body (kernels, first, count) for parts that cover @p cells cells:
  * the widest vectors, and at the end some half as wide where these are enough.
- * Parts may overlap. @p cells is at least the lanes of the last target.
+ * Parts may overlap. @p cells is at least the lanes of the last target; without
+ * @p halves vectors have one width throughout.
  */
 template <typename Pixel, typename Body>
 void
-for_segments (std::span<const Target> targets, int cells, Body body)
+for_segments (
+    std::span<const Target> targets, int cells, bool halves, Body body)
 {
   int at = 0;
   for (std::size_t t = 0; t < targets.size () && at < cells; t++) {
@@ -35,9 +37,9 @@ for_segments (std::span<const Target> targets, int cells, Body body)
     if (cells < lanes)
       continue;
     const int left_over = (cells - at) % lanes;
-    const bool half_is_enough =
-        t + 1 < targets.size () && left_over <= lanes / 2 &&
-        lanes / 2 == targets[t + 1].kernels<Pixel> ().lanes && t == 0;
+    const bool half_is_enough = halves && t == 0 && targets.size () > 1 &&
+                                left_over <= lanes / 2 &&
+                                lanes / 2 == targets[1].kernels<Pixel> ().lanes;
     const int end = half_is_enough ? cells - left_over : cells;
     const int first = std::min (at, end - lanes);
     if (end > at)
@@ -119,7 +121,7 @@ struct FastPath<Pixel>::Chunk {
     const int begin = std::max (first - halo, 0);
     const int end = std::min (first + count + halo, width);
     Pixel &peak = peaks[slot (j)] = 0;
-    for_segments<Pixel> (targets, end - begin,
+    for_segments<Pixel> (targets, end - begin, true,
         [&] (const Kernels<Pixel> &kernels, int at, int cells) {
           RowPointers<Pixel> rows;
           for (int e = 0; e < n; e++)
@@ -263,7 +265,7 @@ FastPath<Pixel>::run_band (const ExtractPlan &plan,
   const Extent cell = plan.grid.cell ();
   const std::size_t n = std::size_t (plan.grid.elements ());
   Pixel peak = 0;
-  for_segments<Pixel> (targets_, plan.size.width,
+  for_segments<Pixel> (targets_, plan.size.width, !to.stream,
       [&] (const Kernels<Pixel> &kernels, int first, int count) {
         RowPointers<Pixel> moved;
         for (std::size_t k = 0; k < n; k++)

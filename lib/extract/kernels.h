@@ -32,7 +32,8 @@ template <typename Pixel>
 struct Planes {
   Pixel *const *rows;
   std::ptrdiff_t stride;
-  /** Write past the caches; all rows[k] lie equally to lines of 64 bytes. */
+  /** Write past the caches, with vectors of 64 bytes only; all rows[k] lie
+   * equally to such lines. */
   bool stream = false;
 };
 
@@ -56,8 +57,8 @@ struct Layout {
 
 /** Whole-number weights of a sample and of its neighbour. */
 struct Weights {
-  int near = 1;
-  int far = 0;
+  int near;
+  int far;
 };
 
 /** One element along a row of cells, and how to bring it to the centre of the

@@ -129,19 +129,58 @@ bytes_on (T *p, std::ptrdiff_t bytes)
   return reinterpret_cast<T *> (reinterpret_cast<Byte *> (p) + bytes);
 }
 
-/** Writes a vector, past the caches or not. */
-template <bool Streams>
+/** Writes a vector. */
 struct Put {
-  static constexpr bool kStreams = Streams;
+  static constexpr bool kStreams = false;
   template <typename T, typename V>
   CEXP_INLINE void operator() (T *to, V v) const
   {
-    if constexpr (Streams)
-      stream (to, v);
-    else
-      store (to, v);
+    store (to, v);
   }
 };
+
+#if CEXP_VECTOR_BYTES == 64
+/** Writes a vector past the caches. */
+struct PutPastCaches {
+  static constexpr bool kStreams = true;
+  template <typename T, typename V>
+  CEXP_INLINE void operator() (T *to, V v) const
+  {
+    stream (to, v);
+  }
+};
+
+/** Writes the lanes of a vector whose bits are set. */
+struct PutLanes {
+  static constexpr bool kStreams = false;
+  std::uint64_t lanes;
+  template <typename T, typename V>
+  CEXP_INLINE void operator() (T *to, V v) const
+  {
+    if constexpr (sizeof (T) == 1)
+      _mm512_mask_storeu_epi8 (to, lanes, __m512i (v));
+    else
+      _mm512_mask_storeu_epi16 (to, __mmask32 (lanes), __m512i (v));
+  }
+};
+
+/** for_strips () past the caches. A line that is written both ways costs a trip
+ * to memory, so what lies before the first whole line and after the last is
+ * written by single lanes. */
+template <typename T, typename Body>
+CEXP_INLINE void
+stream_strips (int cells, int lead, Body body)
+{
+  constexpr int kL = kLanes<T>;
+  if (lead > 0)
+    body (0, PutLanes{(std::uint64_t (1) << lead) - 1});
+  int at = lead;
+  for (; at + kL <= cells; at += kL)
+    body (at, PutPastCaches ());
+  if (at < cells)
+    body (cells - kL, PutLanes{~std::uint64_t (0) << (kL - (cells - at))});
+}
+#endif
 
 /**
  * Calls body (at, put) for every vector of a row of cells whose first output
@@ -149,25 +188,21 @@ struct Put {
  */
 template <typename T, typename Body>
 CEXP_INLINE void
-for_strips (int cells, const T *to, bool streams, Body body)
+for_strips (int cells, [[maybe_unused]] const T *to,
+    [[maybe_unused]] bool streams, Body body)
 {
   constexpr int kL = kLanes<T>;
-  constexpr Put<false> plain;
+#if CEXP_VECTOR_BYTES == 64
+  const auto address = reinterpret_cast<std::uintptr_t> (to);
+  const int lead = int (-address % kVectorBytes / sizeof (T));
+  if (streams && lead + kL <= cells)
+    return stream_strips<T> (cells, lead, body);
+#endif
   int at = 0;
-  if (streams) {
-    const auto address = reinterpret_cast<std::uintptr_t> (to);
-    const int lead = int (-address % kVectorBytes / sizeof (T));
-    if (lead + kL <= cells) {
-      if (lead > 0)
-        body (0, plain);
-      for (at = lead; at + kL <= cells; at += kL)
-        body (at, Put<true> ());
-    }
-  }
   for (; at + kL <= cells; at += kL)
-    body (at, plain);
+    body (at, Put ());
   if (at < cells)
-    body (cells - kL, plain);
+    body (cells - kL, Put ());
 }
 
 /* Cells wider than kOwnWidths are turned in square blocks of 16 bytes: a row of

@@ -48,17 +48,14 @@ store (T *to, Vector<T> v)
   __builtin_memcpy (to, &v, kVectorBytes);
 }
 
-/** Past the caches; @p to is aligned to a vector. */
+/** Past the caches where that pays, which is with vectors of a whole line; @p
+ * to is aligned to a vector. */
 template <typename T>
 CEXP_INLINE void
 stream (T *to, Vector<T> v)
 {
-#if defined __AVX512F__ && CEXP_VECTOR_BYTES == 64
+#if CEXP_VECTOR_BYTES == 64
   _mm512_stream_si512 (reinterpret_cast<__m512i *> (to), __m512i (v));
-#elif defined __AVX__ && CEXP_VECTOR_BYTES == 32
-  _mm256_stream_si256 (reinterpret_cast<__m256i *> (to), __m256i (v));
-#elif defined __SSE2__
-  _mm_stream_si128 (reinterpret_cast<__m128i *> (to), __m128i (v));
 #else
   store (to, v);
 #endif

@@ -22,7 +22,8 @@
  *   coded frame    |PTS of input frame 0           |PTS of 8
  * ]|
  *
- * An input frame is constant light from its time until that of the next one.
+ * An input frame is constant light from its time until that of the next one,
+ * as much in each pixel as its value says.
  * Slots lie in the frame as the schedule's timing says (`active`, `switching`,
  * `readout`) and collect what falls into their active time; while mirrors
  * switch and while the camera reads out, light is lost.

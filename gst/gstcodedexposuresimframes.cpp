@@ -20,8 +20,6 @@ namespace cexp::gst::sim
 namespace
 {
 
-constexpr std::string_view kSimulated = "sim:";
-
 void
 use_schedule (GstCodedExposureSim *self, ScheduleRef schedule)
 {
@@ -191,7 +189,6 @@ begin_exposure (GstCodedExposureSim *self, GstBuffer *inbuf)
   Exposure exposure;
   exposure.start = GST_BUFFER_PTS (inbuf);
   exposure.frame = next_frame (stream, exposure.start);
-  exposure.masks = find_masks (self, exposure.frame);
   /* The output buffer takes flags and metas of the first input frame. */
   auto *trans = GST_BASE_TRANSFORM (self);
   GstBuffer *outbuf = nullptr;
@@ -205,6 +202,7 @@ begin_exposure (GstCodedExposureSim *self, GstBuffer *inbuf)
   if (stream.discont || !follows (*stream.plan, stream.last_start,
                             stream.plan->inputs, exposure.start))
     GST_BUFFER_FLAG_SET (outbuf, GST_BUFFER_FLAG_DISCONT);
+  exposure.masks = find_masks (self, exposure.frame);
   stream.discont = false;
   stream.last_start = exposure.start;
   stream.last_frame = exposure.frame;
@@ -300,6 +298,19 @@ stamp (GstCodedExposureSim *self, Exposure exposure)
   return outbuf;
 }
 
+/* The mirrors of "sim:NAME"; what follows a comma is for the driver. Null for
+ * anything else. */
+std::shared_ptr<SimulatedMirrors>
+find_mirrors (std::string_view device)
+{
+  constexpr std::string_view scheme = "sim:";
+  if (!device.starts_with (scheme))
+    return nullptr;
+  device.remove_prefix (scheme.size ());
+  const std::string name (device.substr (0, device.find (',')));
+  return name.empty () ? nullptr : SimulatedMirrors::find (name);
+}
+
 } // namespace
 
 bool
@@ -312,17 +323,13 @@ begin_stream (GstCodedExposureSim *self)
     dmd = state (self).settings.dmd;
     state (self).counters = Counters ();
   }
-  if (!dmd.empty ()) {
-    if (dmd.rfind (kSimulated, 0) != 0 || dmd.size () == kSimulated.size ()) {
-      GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
-          ("dmd '%s' is no simulated DMD; write sim:NAME, with the name that "
-           "dmdsync's device has.",
-              dmd.c_str ()),
-          (nullptr));
-      return false;
-    }
-    const std::string rest = dmd.substr (kSimulated.size ());
-    stream.mirrors = SimulatedMirrors::find (rest.substr (0, rest.find (',')));
+  if (!dmd.empty () && !(stream.mirrors = find_mirrors (dmd))) {
+    GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
+        ("dmd '%s' is no simulated DMD; write sim:NAME, with the name that "
+         "dmdsync's device has.",
+            dmd.c_str ()),
+        (nullptr));
+    return false;
   }
   ScheduleRef schedule = wanted_schedule (self);
   if (!schedule)

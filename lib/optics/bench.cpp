@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cassert>
 #include <limits>
+#include <new>
 #include <optional>
 #include <sstream>
 
@@ -99,7 +100,12 @@ OpticalBench::make (int width, int height, const BenchOptions &options)
                  std::to_string (height) + " mirrors has no picture"};
   if (Result<void> checked = check (options); !checked)
     return checked.error ();
-  return OpticalBench (std::make_unique<State> (width, height, options));
+  try {
+    return OpticalBench (std::make_unique<State> (width, height, options));
+  } catch (const std::bad_alloc &) {
+    return Error{"there is no memory for a bench of " + std::to_string (width) +
+                 "x" + std::to_string (height) + " mirrors"};
+  }
 }
 
 OpticalBench::OpticalBench (std::unique_ptr<State> state)
@@ -157,7 +163,8 @@ OpticalBench::State::read_out (std::uint64_t frame, ImageView<Pixel> coded)
 {
   assert (mirrors && same_size (coded, light.view ()));
   if (empty) {
-    light = Image<float> (coded.width, coded.height);
+    for (int y = 0; y < coded.height; y++)
+      std::fill_n (light.view ().row (y), coded.width, 0.0f);
     white = std::numeric_limits<Pixel>::max ();
   }
   if (!lens.ideal ())

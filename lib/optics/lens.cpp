@@ -113,8 +113,7 @@ camera_to_mirrors (const Alignment &alignment, int width, int height)
 }
 
 Lens::Lens (const Alignment &alignment, double psf_sigma, int width, int height)
-    : between_ (width, height),
-      to_mirrors_ (camera_to_mirrors (alignment, width, height))
+    : to_mirrors_ (camera_to_mirrors (alignment, width, height))
 {
   if (alignment.rotation == 0.0 && alignment.scale == 1.0) {
     horizontal_ = shifted_taps (alignment.shift_x, psf_sigma);
@@ -126,6 +125,9 @@ Lens::Lens (const Alignment &alignment, double psf_sigma, int width, int height)
     horizontal_ = vertical_ =
         gaussian_taps (std::sqrt (psf_sigma * psf_sigma - sigma * sigma));
   }
+  if (horizontal_.identity () && vertical_.identity ())
+    return;
+  between_ = Image<float> (width, height);
   padded_.resize (std::size_t (width) + horizontal_.weights.size () - 1);
 }
 
@@ -150,6 +152,11 @@ Lens::make_windows (double scale, double sigma)
 void
 Lens::image (ImageView<const float> mirrors, ImageView<float> camera)
 {
+  if (ideal_) {
+    for (int y = 0; y < camera.height; y++)
+      std::copy_n (mirrors.row (y), camera.width, camera.row (y));
+    return;
+  }
   switch (taps_) {
   case 0:
     return blur (mirrors, camera);
@@ -200,7 +207,7 @@ struct Place {
 };
 
 /* Spelled out: the compiler finds no vectors in the plain loops. */
-using Four [[gnu::vector_size (16)]] = float;
+typedef float Four __attribute__ ((vector_size (16)));
 
 inline Four
 load_four (const float *from)

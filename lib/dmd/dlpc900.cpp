@@ -291,6 +291,7 @@ Dlpc900::upload (const Schedule &schedule, std::stop_token stop_token,
   board_.link ().cancel_on ({});
   if (!sent) {
     forget ();
+    prepared_ = false;
     stop ();
   }
   return sent;

@@ -40,7 +40,6 @@ HidLink::write (const HidCommand &command, ByteView data)
 Result<void>
 HidLink::post (const HidCommand &command, ByteView data)
 {
-  const std::lock_guard guard (lock_);
   return send (HidKind::post, command, data);
 }
 
@@ -56,7 +55,6 @@ HidLink::error (const std::string &what, const std::string &reason) const
 Result<HidReply>
 HidLink::transact (HidKind kind, const HidCommand &command, ByteView data)
 {
-  const std::lock_guard guard (lock_);
   if (const auto sent = send (kind, command, data); !sent)
     return sent.error ();
   auto reply = receive (command);

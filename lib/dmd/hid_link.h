@@ -3,7 +3,6 @@
 #pragma once
 
 #include <memory>
-#include <mutex>
 #include <stop_token>
 #include <string>
 
@@ -21,8 +20,7 @@ struct HidReply {
 
 /**
  * Talks to one controller: one request in flight, the reply of the same
- * sequence number, others dropped. Thread-safe: a transaction is not
- * interrupted by another.
+ * sequence number, others dropped. For one thread at a time.
  *
  * A wait ends early, with an error, within 50 ms of a request on the stop token
  * that cancel_on () gave; a transaction that began a message is always finished
@@ -64,7 +62,6 @@ private:
   const std::unique_ptr<PacketPipe> pipe_;
   const std::string name_;
   std::stop_token stop_;
-  std::mutex lock_; // held over one transaction; covers what is below
   std::uint8_t sequence_ = 0;
   bool unclean_ = true; // a reply to nobody may be waiting
 };

@@ -39,6 +39,9 @@ public:
 
   std::map<int, Fault> faults; ///< by number of the message, from 0
 
+  /** Data of the writes of each command, in the order in which they came. */
+  std::map<int, std::vector<std::vector<std::uint8_t>>> writes;
+
   bool gone () const { return gone_; }
   void unplug () { gone_ = true; }
   int messages () const { return messages_; }
@@ -110,6 +113,8 @@ private:
     late_.clear ();
     const bool read = (message[0] & 0x80) != 0;
     const Data data (message.begin () + 6, message.end ());
+    if (!read && data.size () < 64)
+      writes[int (word (message, 4))].push_back (data);
     const auto done = fault_ == Fault::refuse
                           ? std::nullopt
                           : obey (read, int (word (message, 4)), data);

@@ -6,6 +6,7 @@
 #include "dmd/dlpc900.h"
 #include "dmd_rig.h"
 #include "emulated_dlpc900.h"
+#include "hex.h"
 
 using namespace cexp;
 using namespace cexp::test;
@@ -160,6 +161,43 @@ TEST (Dlpc900, AsMasterItPulsesOnceAFrame)
   EXPECT_EQ (exposures (*rig.board), (std::vector<std::uint32_t> (8, 10'000)));
   EXPECT_EQ (flags (*rig.board, &EmulatedDlpc900::Line::pulses), "10001000");
   EXPECT_EQ (flags (*rig.board, &EmulatedDlpc900::Line::waits), "00000000");
+}
+
+/** The table that was sent last, a line each. */
+std::string
+last_table (EmulatedDlpc900 &board, std::size_t lines)
+{
+  const auto &sent = board.writes[0x1A34];
+  std::string text;
+  for (std::size_t i = sent.size () - lines; i < sent.size (); i++)
+    text += to_hex (sent[i]) + "\n";
+  return text + to_hex (board.writes[0x1A31].back ());
+}
+
+TEST (Dlpc900, TablesAreThoseOfTheDocumentation)
+{
+  Rig master;
+  ASSERT_EQ (message_of (master.open ()), "");
+  ASSERT_EQ (message_of (master.show (Schedule ())), "");
+  EXPECT_EQ (last_table (*master.board, 3),
+      "01 00 10 27 00 71 00 00 00 01 00 08\n"
+      "02 00 10 27 00 71 00 00 00 01 00 10\n"
+      "03 00 10 27 00 71 00 00 00 01 00 18\n"
+      "04 00 00 00 00 00");
+  EXPECT_EQ (to_hex (master.board->writes[0x1A1E].back ()), "00 00 00 14 00");
+
+  Rig slave;
+  ASSERT_EQ (message_of (slave.open ("x,master=camera")), "");
+  ASSERT_EQ (
+      message_of (slave.show (schedule_of ("sequential:2x2,readout=211us"))),
+      "");
+  EXPECT_EQ (last_table (*slave.board, 4),
+      "00 00 DB 26 00 F1 00 00 00 00 00 00\n"
+      "01 00 DB 26 00 71 00 00 00 00 00 08\n"
+      "02 00 DB 26 00 71 00 00 00 00 00 10\n"
+      "03 00 DC 26 00 71 00 00 00 00 00 18\n"
+      "04 00 00 00 00 00");
+  EXPECT_EQ (to_hex (slave.board->writes[0x1A35].back ()), "69 00 00");
 }
 
 TEST (Dlpc900, TheSenseOfTheTriggerFlagCanBeTurned)

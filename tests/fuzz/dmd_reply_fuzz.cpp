@@ -1,0 +1,114 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Any bytes as what a board sends: whatever it says, drivers end with a result
+ * or a message that can be shown, and do not wait for ever. */
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+
+#include "base/text.h"
+#include "dmd/dlpc350.h"
+#include "dmd/dlpc900.h"
+#include "dmd/lightcrafter_protocol.h"
+
+using namespace cexp;
+
+namespace
+{
+
+void
+require (bool holds, const char *what, const std::string &shown)
+{
+  if (holds)
+    return;
+  std::fprintf (stderr, "%s: %s\n", what, shown.c_str ());
+  std::abort ();
+}
+
+/** Answers each request with the next bytes, under the right sequence number
+ * where the first of them is even; dumb when they are used up. */
+class FuzzPipe : public PacketPipe
+{
+public:
+  explicit FuzzPipe (ByteView bytes) : bytes_ (bytes) {}
+
+  Result<void> write (ByteView packets, Milliseconds) override
+  {
+    sequence_ = packets[1];
+    return {};
+  }
+  Result<Bytes> read (Milliseconds) override
+  {
+    require (++reads_ < 20'000, "the driver reads for ever", "");
+    if (bytes_.empty ())
+      return Bytes{};
+    const std::size_t length =
+        std::min<std::size_t> (bytes_[0] % 80, bytes_.size () - 1);
+    Bytes packet (
+        bytes_.begin () + 1, bytes_.begin () + 1 + std::ptrdiff_t (length));
+    if (bytes_[0] < 0xE0) { // a whole packet
+      packet.resize (64);
+      if (bytes_[0] % 2 == 0)
+        packet[1] = sequence_;
+    }
+    bytes_ = bytes_.subspan (1 + length);
+    return packet;
+  }
+  bool gone () const override { return false; }
+  void pause (Milliseconds) override {}
+
+private:
+  ByteView bytes_;
+  std::uint8_t sequence_ = 0;
+  int reads_ = 0;
+};
+
+void
+check (const Error &error)
+{
+  require (
+      !error.message.empty () && error.message.size () < 1000 &&
+          printable (error.message, error.message.size ()) == error.message,
+      "message cannot be shown", printable (error.message, 2000));
+}
+
+template <typename Open>
+void
+drive (Open open, const DmdOptions &options, ByteView bytes)
+{
+  auto dmd = open (
+      std::make_unique<HidLink> (std::make_unique<FuzzPipe> (bytes), "board"),
+      options);
+  if (!dmd)
+    return check (dmd.error ());
+  const auto status = (*dmd)->status ();
+  if (!status)
+    check (status.error ());
+}
+
+void
+read_lightcrafter (ByteView bytes)
+{
+  const auto head = lightcrafter::parse_head (
+      bytes.first (std::min (bytes.size (), lightcrafter::kHeadSize)));
+  if (!head)
+    check (head.error ());
+  (void)lightcrafter::checksum_holds (bytes);
+}
+
+} // namespace
+
+extern "C" int LLVMFuzzerTestOneInput (const std::uint8_t *, std::size_t);
+
+extern "C" int
+LLVMFuzzerTestOneInput (const std::uint8_t *data, std::size_t size)
+{
+  const ByteView bytes (data, size);
+  drive (open_dlpc900, {}, bytes);
+  DmdOptions in_flash;
+  in_flash.images = {0};
+  drive (open_dlpc350, in_flash, bytes);
+  read_lightcrafter (bytes);
+  return 0;
+}

@@ -45,28 +45,17 @@ unbind (GstCaps *caps)
   return free;
 }
 
+/* @caps of a pad of @kind as those of coded frames, or the other way. */
 CapsPtr
-to_coded (const Known &now, Output::Kind kind, GstCaps *caps)
+convert (const Known &now, Output::Kind kind, GstCaps *caps, bool to_coded)
 {
   if (kind == Output::Kind::kCoded)
     return CapsPtr (gst_caps_ref (caps));
   if (!now.schedule)
     return unbind (caps);
-  const bool raised = kind == Output::Kind::kAll;
-  return CapsPtr (
-      scale_caps (caps, coded_to_subframes (*now.schedule, raised).inverse ()));
-}
-
-CapsPtr
-from_coded (const Known &now, Output::Kind kind, GstCaps *caps)
-{
-  if (kind == Output::Kind::kCoded)
-    return CapsPtr (gst_caps_ref (caps));
-  if (!now.schedule)
-    return unbind (caps);
-  const bool raised = kind == Output::Kind::kAll;
-  return CapsPtr (
-      scale_caps (caps, coded_to_subframes (*now.schedule, raised)));
+  const CapsScale scale =
+      coded_to_subframes (*now.schedule, kind == Output::Kind::kAll);
+  return CapsPtr (scale_caps (caps, to_coded ? scale.inverse () : scale));
 }
 
 CapsPtr
@@ -122,7 +111,7 @@ sink_caps (GstCodedExposureDemux *self)
   CapsPtr caps (gst_pad_get_pad_template_caps (state (self).sinkpad));
   outputs (self)->each ([&] (const OutputRef &output) {
     const CapsPtr peer (gst_pad_peer_query_caps (output->pad.get (), nullptr));
-    const CapsPtr coded = to_coded (now, output->kind, peer.get ());
+    const CapsPtr coded = convert (now, output->kind, peer.get (), true);
     caps = intersect (coded.get (), caps.get ());
   });
   return admit_unknown_rate (now, std::move (caps)).release ();
@@ -144,7 +133,7 @@ src_caps (GstCodedExposureDemux *self, GstPad *pad)
   const CapsPtr peer (gst_pad_peer_query_caps (state (self).sinkpad, nullptr));
   const CapsPtr coded = intersect (peer.get (), templ.get ());
   const CapsPtr filled = fill_in_rate (now, coded.get ());
-  const CapsPtr own = from_coded (now, output->kind, filled.get ());
+  const CapsPtr own = convert (now, output->kind, filled.get (), false);
   return intersect (own.get (), templ.get ()).release ();
 }
 

@@ -262,16 +262,6 @@ find_targets (GstCodedExposureDemux *self, const Job &job, GstFlowReturn &flow)
   return targets;
 }
 
-template <typename Pixel>
-ImageView<Pixel>
-view_of (MappedFrame &mapped)
-{
-  GstVideoFrame *frame = mapped.frame ();
-  return {static_cast<Pixel *> (GST_VIDEO_FRAME_PLANE_DATA (frame, 0)),
-      GST_VIDEO_FRAME_WIDTH (frame), GST_VIDEO_FRAME_HEIGHT (frame),
-      GST_VIDEO_FRAME_PLANE_STRIDE (frame, 0)};
-}
-
 /* Room for a subframe that nobody wants: the extractor writes all of them. */
 template <typename Pixel>
 ImageView<Pixel>
@@ -357,7 +347,7 @@ render (GstCodedExposureDemux *self, Job &job, std::vector<Targets> &targets)
 
 struct MetaCopy {
   GstBuffer *to;
-  const Plan *plan;
+  GstVideoInfo from_info, to_info;
 };
 
 /* Carries a meta of the coded frame over, unless it describes memory that is
@@ -365,7 +355,7 @@ struct MetaCopy {
 gboolean
 copy_meta (GstBuffer *from, GstMeta **meta, gpointer user_data)
 {
-  const auto &copy = *static_cast<const MetaCopy *> (user_data);
+  auto &copy = *static_cast<MetaCopy *> (user_data);
   const GstMetaInfo *info = (*meta)->info;
   if (!info->transform_func || info->api == GST_VIDEO_META_API_TYPE ||
       info->api == GST_VIDEO_CROP_META_API_TYPE ||
@@ -375,8 +365,7 @@ copy_meta (GstBuffer *from, GstMeta **meta, gpointer user_data)
     return TRUE;
   if (gst_meta_api_type_has_tag (info->api,
           g_quark_from_static_string (GST_META_TAG_VIDEO_SIZE_STR))) {
-    GstVideoInfo in = copy.plan->coded, out = copy.plan->subframe;
-    GstVideoMetaTransform scale{&in, &out};
+    GstVideoMetaTransform scale{&copy.from_info, &copy.to_info};
     info->transform_func (copy.to, *meta, from,
         gst_video_meta_transform_scale_get_quark (), &scale);
     return TRUE;
@@ -394,7 +383,7 @@ describe_subframe (GstCodedExposureDemux *self, const Job &job, std::size_t k,
   const Plan &plan = *state (self).stream.plan;
   gst_buffer_copy_into (outbuf, job.inbuf, GST_BUFFER_COPY_FLAGS, 0, -1);
   GST_BUFFER_FLAG_UNSET (outbuf, GST_BUFFER_FLAG_MARKER);
-  MetaCopy copy{outbuf, &plan};
+  MetaCopy copy{outbuf, plan.coded, plan.subframe};
   gst_buffer_foreach_meta (job.inbuf, copy_meta, &copy);
 
   FrameMeta meta = job.meta;
@@ -452,7 +441,7 @@ share (const Plan &plan, const Output &output, GstBuffer *outbuf)
   gst_buffer_copy_into (packed.get (), outbuf,
       GstBufferCopyFlags (GST_BUFFER_COPY_FLAGS | GST_BUFFER_COPY_TIMESTAMPS),
       0, -1);
-  MetaCopy copy{packed.get (), &plan};
+  MetaCopy copy{packed.get (), plan.subframe, plan.subframe};
   gst_buffer_foreach_meta (outbuf, copy_meta, &copy);
   MappedFrame from (plan.subframe, outbuf, GST_MAP_READ);
   MappedFrame to (plan.subframe, packed.get (), GST_MAP_WRITE);

@@ -211,16 +211,6 @@ begin_exposure (GstCodedExposureSim *self, GstBuffer *inbuf)
   return GST_FLOW_OK;
 }
 
-template <typename Pixel>
-ImageView<Pixel>
-view_of (MappedFrame &mapped)
-{
-  GstVideoFrame *frame = mapped.frame ();
-  return {static_cast<Pixel *> (GST_VIDEO_FRAME_PLANE_DATA (frame, 0)),
-      GST_VIDEO_FRAME_WIDTH (frame), GST_VIDEO_FRAME_HEIGHT (frame),
-      GST_VIDEO_FRAME_PLANE_STRIDE (frame, 0)};
-}
-
 bool
 is_wide (const GstVideoInfo &info)
 {

@@ -9,6 +9,8 @@
 #include <gst/gst.h>
 #include <gst/video/video.h>
 
+#include "base/image.h"
+
 namespace cexp::gst
 {
 
@@ -88,5 +90,16 @@ private:
   GstVideoFrame frame_ = {};
   bool mapped_ = false;
 };
+
+/** The pixels of a mapped grey frame, whatever its strides. */
+template <typename Pixel>
+ImageView<Pixel>
+view_of (MappedFrame &mapped)
+{
+  GstVideoFrame *frame = mapped.frame ();
+  return {static_cast<Pixel *> (GST_VIDEO_FRAME_PLANE_DATA (frame, 0)),
+      GST_VIDEO_FRAME_WIDTH (frame), GST_VIDEO_FRAME_HEIGHT (frame),
+      GST_VIDEO_FRAME_PLANE_STRIDE (frame, 0)};
+}
 
 } // namespace cexp::gst

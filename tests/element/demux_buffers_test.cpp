@@ -259,6 +259,8 @@ TEST_F (DemuxBuffers, PadOfOneSubframeGetsACopyWhereItCouldNotReadTheLayout)
   Downstream able (demux.request ("subframe_3"));
   BufferPtr frame = frame_of (picture (), 0);
   GST_BUFFER_FLAG_SET (frame.get (), GST_BUFFER_FLAG_CORRUPTED);
+  gst_buffer_add_video_region_of_interest_meta (
+      frame.get (), "cell", 4, 8, 10, 6);
   ASSERT_EQ (demux.push (std::move (frame)), GST_FLOW_OK);
 
   const CapsPtr caps = demux.pad_caps ();
@@ -270,6 +272,9 @@ TEST_F (DemuxBuffers, PadOfOneSubframeGetsACopyWhereItCouldNotReadTheLayout)
   EXPECT_EQ (get_frame_meta (packed.get ())->subframe, 2);
   EXPECT_TRUE (
       GST_BUFFER_FLAG_IS_SET (packed.get (), GST_BUFFER_FLAG_CORRUPTED));
+
+  EXPECT_EQ (
+      gst_buffer_get_video_region_of_interest_meta (packed.get ())->x, 2u);
 
   const BufferPtr shared = demux.pull ("subframe_3");
   ASSERT_TRUE (shared);

@@ -199,16 +199,6 @@ info_of (GstCaps *caps)
   return info;
 }
 
-template <typename Pixel>
-ImageView<Pixel>
-pixels_of (MappedFrame &mapped)
-{
-  GstVideoFrame *frame = mapped.frame ();
-  return {static_cast<Pixel *> (GST_VIDEO_FRAME_PLANE_DATA (frame, 0)),
-      GST_VIDEO_FRAME_WIDTH (frame), GST_VIDEO_FRAME_HEIGHT (frame),
-      GST_VIDEO_FRAME_PLANE_STRIDE (frame, 0)};
-}
-
 /** A picture whose pixels are @p value (x, y). */
 template <typename Pixel>
 Image<Pixel>
@@ -234,7 +224,7 @@ frame_of (const Image<Pixel> &image, GstClockTime pts)
       gst_buffer_new_allocate (nullptr, GST_VIDEO_INFO_SIZE (&info), nullptr));
   GST_BUFFER_PTS (buffer.get ()) = pts;
   MappedFrame mapped (info, buffer.get (), GST_MAP_WRITE);
-  const auto view = pixels_of<Pixel> (mapped);
+  const auto view = view_of<Pixel> (mapped);
   for (int y = 0; y < view.height; y++)
     for (int x = 0; x < view.width; x++)
       view.at (x, y) = image.at (x, y);
@@ -251,7 +241,7 @@ image_of (GstBuffer *buffer, GstCaps *caps)
   EXPECT_TRUE (mapped);
   Image<Pixel> image (info.width, info.height);
   if (mapped) {
-    const auto view = pixels_of<Pixel> (mapped);
+    const auto view = view_of<Pixel> (mapped);
     for (int y = 0; y < view.height; y++)
       for (int x = 0; x < view.width; x++)
         image.at (x, y) = view.at (x, y);

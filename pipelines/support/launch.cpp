@@ -1,15 +1,11 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure-launch: runs one pipeline for a script of this folder, and says
  * how far it is, what went wrong and what was counted. */
-#include <sys/resource.h>
-#include <unistd.h>
-
-#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
-#include <cstring>
+#include <memory>
 #include <string>
 #include <string_view>
 
@@ -17,11 +13,13 @@
 #include <gst/gst.h>
 
 #include "gstraii.h"
+#include "report.h"
 
 namespace
 {
 
 using namespace cexp::gst;
+using namespace report;
 using Clock = std::chrono::steady_clock;
 
 /* What the scripts learn from the exit status. */
@@ -37,109 +35,6 @@ struct Options {
   gdouble duration = 0;      // seconds to play, 0: all
   gdouble shift_to = -1;     // running time of the first frame, -1: its own
 };
-
-/** Elements that are not in GStreamer's base package, and what has them. */
-struct Provider {
-  std::string_view element, package;
-};
-constexpr Provider kProviders[] = {
-    {"aravissrc", "libaravis-0.8-0"},
-    {"avenc_ffv1", "gstreamer1.0-libav"},
-    {"avdec_ffv1", "gstreamer1.0-libav"},
-    {"gdppay", "gstreamer1.0-plugins-bad"},
-    {"gdpdepay", "gstreamer1.0-plugins-bad"},
-    {"x264enc", "gstreamer1.0-plugins-ugly"},
-    {"h264parse", "gstreamer1.0-plugins-bad"},
-    {"matroskamux", "gstreamer1.0-plugins-good"},
-    {"matroskademux", "gstreamer1.0-plugins-good"},
-    {"pngenc", "gstreamer1.0-plugins-good"},
-    {"autovideosink", "gstreamer1.0-plugins-good"},
-    {"ximagesink", "gstreamer1.0-x"},
-    {"textoverlay", "gstreamer1.0-x"},
-};
-
-std::string
-package_of (std::string_view element)
-{
-  for (const Provider &provider : kProviders)
-    if (provider.element == element)
-      return std::string (provider.package);
-  return {};
-}
-
-/** The last line of progress: rewritten on a terminal, one line every ten
- * seconds in a log. */
-class Status
-{
-public:
-  explicit Status (std::string what)
-      : what_ (std::move (what)), terminal_ (isatty (STDERR_FILENO) != 0)
-  {
-  }
-
-  void progress (const std::string &text)
-  {
-    if (terminal_) {
-      std::fprintf (stderr, "\r%s: %s\033[K", what_.c_str (), text.c_str ());
-      open_ = true;
-    } else if (Clock::now () >= next_) {
-      std::fprintf (stderr, "%s: %s\n", what_.c_str (), text.c_str ());
-      next_ = Clock::now () + std::chrono::seconds (10);
-    }
-  }
-
-  void line (const std::string &text)
-  {
-    if (std::exchange (open_, false))
-      std::fprintf (stderr, "\r\033[K");
-    std::fprintf (stderr, "%s: %s\n", what_.c_str (), text.c_str ());
-  }
-
-private:
-  std::string what_;
-  bool terminal_;
-  bool open_ = false;
-  Clock::time_point next_ = Clock::now () + std::chrono::seconds (2);
-};
-
-std::string format (const char *pattern, ...) G_GNUC_PRINTF (1, 2);
-std::string
-format (const char *pattern, ...)
-{
-  va_list arguments;
-  va_start (arguments, pattern);
-  const CharPtr text (g_strdup_vprintf (pattern, arguments));
-  va_end (arguments);
-  return text.get ();
-}
-
-/** The text of an error or a warning, and what its writer added for experts;
- * not the place in the source. */
-std::string
-told (GstMessage *message, const GError *error, const gchar *debug)
-{
-  const gchar *detail = debug ? std::strchr (debug, '\n') : nullptr;
-  return format ("%s: %s%s%s", GST_OBJECT_NAME (GST_MESSAGE_SRC (message)),
-      error->message, detail ? "\n    " : "", detail ? detail + 1 : "");
-}
-
-std::string
-minutes (double seconds)
-{
-  const int whole = int (seconds + 0.5);
-  return format ("%d:%02d", whole / 60, whole % 60);
-}
-
-double
-cpu_seconds ()
-{
-  rusage usage = {};
-  getrusage (RUSAGE_SELF, &usage);
-  const auto seconds = [] (const timeval &t) {
-    return double (t.tv_sec) + 1e-6 * double (t.tv_usec);
-  };
-  return seconds (usage.ru_utime) + seconds (usage.ru_stime);
-}
 
 class Launch
 {
@@ -466,16 +361,7 @@ Launch::on_element_message (GstMessage *message)
   if (name.substr (0, 14) != "codedexposure/" &&
       name.substr (0, 8) != "dmdsync/")
     return;
-  std::string text =
-      format ("%s: %s", GST_OBJECT_NAME (GST_MESSAGE_SRC (message)),
-          gst_structure_get_name (structure));
-  for (gint i = 0; i < gst_structure_n_fields (structure); i++) {
-    const gchar *field = gst_structure_nth_field_name (structure, guint (i));
-    const CharPtr value (
-        gst_value_serialize (gst_structure_get_value (structure, field)));
-    text += format (" %s=%s", field, value ? value.get () : "?");
-  }
-  status_.line (text);
+  status_.line (fields_of (message));
 }
 
 void
@@ -549,55 +435,6 @@ Launch::tick ()
     text += format (", %.0f %%, %s left", 100 * done,
         minutes (seconds * (1 - done) / done).c_str ());
   status_.progress (text);
-}
-
-/* "name: a=1 b=2" of the counters that @p element has: the read-only numbers
- * of the plugin's elements, the statistics of a video sink. */
-std::string
-counters_of (GstElement *element)
-{
-  const GstElementFactory *factory = gst_element_get_factory (element);
-  if (!factory)
-    return {};
-  std::string text;
-  const gchar *plugin =
-      gst_plugin_feature_get_plugin_name (GST_PLUGIN_FEATURE (factory));
-  if (plugin && std::strcmp (plugin, "codedexposure") == 0) {
-    guint n = 0;
-    GParamSpec **specs =
-        g_object_class_list_properties (G_OBJECT_GET_CLASS (element), &n);
-    for (guint i = 0; i < n; i++) {
-      const GType type = specs[i]->value_type;
-      if ((specs[i]->flags & G_PARAM_WRITABLE) ||
-          !(type == G_TYPE_UINT64 || type == G_TYPE_UINT || type == G_TYPE_INT))
-        continue;
-      GValue value = G_VALUE_INIT, printed = G_VALUE_INIT;
-      g_object_get_property (G_OBJECT (element), specs[i]->name, &value);
-      g_value_init (&printed, G_TYPE_STRING);
-      g_value_transform (&value, &printed);
-      text += format (" %s=%s", specs[i]->name, g_value_get_string (&printed));
-      g_value_unset (&printed);
-      g_value_unset (&value);
-    }
-    g_free (specs);
-  } else if (gst_element_factory_list_is_type (GST_ELEMENT_FACTORY (factory),
-                 GST_ELEMENT_FACTORY_TYPE_SINK) &&
-             std::strstr (
-                 gst_element_factory_get_metadata (
-                     GST_ELEMENT_FACTORY (factory), GST_ELEMENT_METADATA_KLASS),
-                 "Video") &&
-             g_object_class_find_property (
-                 G_OBJECT_GET_CLASS (element), "stats")) {
-    GstStructure *stats = nullptr;
-    guint64 rendered = 0, dropped = 0;
-    g_object_get (element, "stats", &stats, nullptr);
-    gst_structure_get (stats, "rendered", G_TYPE_UINT64, &rendered, "dropped",
-        G_TYPE_UINT64, &dropped, nullptr);
-    gst_structure_free (stats);
-    text = format (" shown=%" G_GUINT64_FORMAT " late=%" G_GUINT64_FORMAT,
-        rendered, dropped);
-  }
-  return text.empty () ? text : GST_OBJECT_NAME (element) + (":" + text);
 }
 
 void

@@ -1,0 +1,199 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "report.h"
+
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <cstdarg>
+#include <cstdio>
+#include <cstring>
+#include <utility>
+
+#include "gstraii.h"
+
+namespace report
+{
+
+namespace
+{
+
+using namespace cexp::gst;
+
+/** Elements that are not in GStreamer's base package, and what has them. */
+struct Provider {
+  std::string_view element, package;
+};
+constexpr Provider kProviders[] = {
+    {"aravissrc", "libaravis-0.8-0"},
+    {"autovideosink", "gstreamer1.0-plugins-good"},
+    {"avdec_ffv1", "gstreamer1.0-libav"},
+    {"avenc_ffv1", "gstreamer1.0-libav"},
+    {"gdpdepay", "gstreamer1.0-plugins-bad"},
+    {"gdppay", "gstreamer1.0-plugins-bad"},
+    {"h264parse", "gstreamer1.0-plugins-bad"},
+    {"matroskademux", "gstreamer1.0-plugins-good"},
+    {"matroskamux", "gstreamer1.0-plugins-good"},
+    {"pngenc", "gstreamer1.0-plugins-good"},
+    {"textoverlay", "gstreamer1.0-x"},
+    {"x264enc", "gstreamer1.0-plugins-ugly"},
+    {"ximagesink", "gstreamer1.0-x"},
+};
+
+bool
+is_counter (const GParamSpec *spec)
+{
+  const GType type = spec->value_type;
+  return !(spec->flags & G_PARAM_WRITABLE) &&
+         (type == G_TYPE_UINT64 || type == G_TYPE_UINT || type == G_TYPE_INT);
+}
+
+std::string
+numbers_of (GstElement *element)
+{
+  std::string text;
+  guint n = 0;
+  GParamSpec **specs =
+      g_object_class_list_properties (G_OBJECT_GET_CLASS (element), &n);
+  for (guint i = 0; i < n; i++) {
+    if (!is_counter (specs[i]))
+      continue;
+    GValue value = G_VALUE_INIT, printed = G_VALUE_INIT;
+    g_object_get_property (G_OBJECT (element), specs[i]->name, &value);
+    g_value_init (&printed, G_TYPE_STRING);
+    g_value_transform (&value, &printed);
+    text += format (" %s=%s", specs[i]->name, g_value_get_string (&printed));
+    g_value_unset (&printed);
+    g_value_unset (&value);
+  }
+  g_free (specs);
+  return text;
+}
+
+std::string
+frames_shown_by (GstElement *sink)
+{
+  GstStructure *taken = nullptr;
+  g_object_get (sink, "stats", &taken, nullptr);
+  const StructurePtr stats (taken);
+  guint64 rendered = 0, dropped = 0;
+  gst_structure_get (stats.get (), "rendered", G_TYPE_UINT64, &rendered,
+      "dropped", G_TYPE_UINT64, &dropped, nullptr);
+  return format (" shown=%" G_GUINT64_FORMAT " late=%" G_GUINT64_FORMAT,
+      rendered, dropped);
+}
+
+bool
+is_video_sink (GstElement *element, GstElementFactory *factory)
+{
+  const gchar *klass =
+      gst_element_factory_get_metadata (factory, GST_ELEMENT_METADATA_KLASS);
+  return std::strstr (klass, "Sink") && std::strstr (klass, "Video") &&
+         g_object_class_find_property (G_OBJECT_GET_CLASS (element), "stats");
+}
+
+} // namespace
+
+std::string
+format (const char *pattern, ...)
+{
+  va_list arguments;
+  va_start (arguments, pattern);
+  const CharPtr text (g_strdup_vprintf (pattern, arguments));
+  va_end (arguments);
+  return text.get ();
+}
+
+std::string
+minutes (double seconds)
+{
+  const int whole = int (seconds + 0.5);
+  return format ("%d:%02d", whole / 60, whole % 60);
+}
+
+double
+cpu_seconds ()
+{
+  rusage usage = {};
+  getrusage (RUSAGE_SELF, &usage);
+  const auto seconds = [] (const timeval &t) {
+    return double (t.tv_sec) + 1e-6 * double (t.tv_usec);
+  };
+  return seconds (usage.ru_utime) + seconds (usage.ru_stime);
+}
+
+std::string
+package_of (std::string_view element)
+{
+  for (const Provider &provider : kProviders)
+    if (provider.element == element)
+      return std::string (provider.package);
+  return {};
+}
+
+std::string
+told (GstMessage *message, const GError *error, const gchar *debug)
+{
+  const gchar *detail = debug ? std::strchr (debug, '\n') : nullptr;
+  return format ("%s: %s%s%s", GST_OBJECT_NAME (GST_MESSAGE_SRC (message)),
+      error->message, detail ? "\n    " : "", detail ? detail + 1 : "");
+}
+
+std::string
+fields_of (GstMessage *message)
+{
+  const GstStructure *structure = gst_message_get_structure (message);
+  std::string text =
+      format ("%s: %s", GST_OBJECT_NAME (GST_MESSAGE_SRC (message)),
+          gst_structure_get_name (structure));
+  for (gint i = 0; i < gst_structure_n_fields (structure); i++) {
+    const gchar *field = gst_structure_nth_field_name (structure, guint (i));
+    const CharPtr value (
+        gst_value_serialize (gst_structure_get_value (structure, field)));
+    text += format (" %s=%s", field, value ? value.get () : "?");
+  }
+  return text;
+}
+
+std::string
+counters_of (GstElement *element)
+{
+  GstElementFactory *factory = gst_element_get_factory (element);
+  if (!factory)
+    return {};
+  const gchar *plugin =
+      gst_plugin_feature_get_plugin_name (GST_PLUGIN_FEATURE (factory));
+  std::string counters;
+  if (plugin && std::strcmp (plugin, "codedexposure") == 0)
+    counters = numbers_of (element);
+  else if (is_video_sink (element, factory))
+    counters = frames_shown_by (element);
+  return counters.empty () ? counters
+                           : GST_OBJECT_NAME (element) + (":" + counters);
+}
+
+Status::Status (std::string what)
+    : what_ (std::move (what)), terminal_ (isatty (STDERR_FILENO) != 0)
+{
+}
+
+void
+Status::progress (const std::string &text)
+{
+  if (terminal_) {
+    std::fprintf (stderr, "\r%s: %s\033[K", what_.c_str (), text.c_str ());
+    open_ = true;
+  } else if (Clock::now () >= next_) {
+    std::fprintf (stderr, "%s: %s\n", what_.c_str (), text.c_str ());
+    next_ = Clock::now () + std::chrono::seconds (10);
+  }
+}
+
+void
+Status::line (const std::string &text)
+{
+  if (std::exchange (open_, false))
+    std::fprintf (stderr, "\r\033[K");
+  std::fprintf (stderr, "%s: %s\n", what_.c_str (), text.c_str ());
+}
+
+} // namespace report

@@ -311,9 +311,13 @@ coded_source ()
   else
     simulation "$@" | sed 's/codedexposure-sim /&dmd=sim:bench /'
   fi
-  if is_set device || ! { is_set camera || is_set source; }; then
-    printf 'dmdsync name=sync device=%s schedule=%s ! ' \
-      "$(quoted "${opt[device]:-sim:bench}")" "$(quoted "$(schedule)")"
+  # A source of one's own may come with a schedule and times.
+  if ! is_set source || is_set device || is_set schedule; then
+    local device=${opt[device]:-} timestamps=''
+    is_set camera || is_set source || device=${device:-sim:bench}
+    ! is_set camera || timestamps='timestamp-at=arrival '
+    printf 'dmdsync name=sync device=%s schedule=%s %s! ' \
+      "$(quoted "$device")" "$(quoted "$(schedule)")" "$timestamps"
   fi
   frame_limit
 }
@@ -383,11 +387,11 @@ make_folder_for ()
 display ()
 {
   local sink=${opt[sink]:-autovideosink}
-  local latest='queue leaky=downstream max-size-bytes=0 max-size-time=0'
+  local latest='leaky=downstream max-size-bytes=0 max-size-time=0'
   local exact='videoconvert ! video/x-raw,format=BGRx'
-  printf 'demux.src ! %s max-size-buffers=%d ! %s ! view.sink_0 ' \
+  printf 'demux.src ! queue name=fast %s max-size-buffers=%d ! %s ! view.sink_0 ' \
     "$latest" $((2 * slots)) "$exact"
-  printf 'demux.coded ! %s max-size-buffers=2 ! %s ! view.sink_1 ' \
+  printf 'demux.coded ! queue name=beside %s max-size-buffers=2 ! %s ! view.sink_1 ' \
     "$latest" "$exact"
   printf 'compositor name=view background=black sink_0::xpos=%d ! ' "$width"
   printf 'queue max-size-buffers=4 ! %s ' "$sink"

@@ -8,6 +8,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <glib-unix.h>
 #include <gst/gst.h>
@@ -36,6 +37,42 @@ struct Options {
   gdouble shift_to = -1;     // running time of the first frame, -1: its own
 };
 
+/** A queue that drops what it cannot hold, and does not say so. */
+class LeakyQueue
+{
+public:
+  explicit LeakyQueue (GstElement *queue) : name_ (GST_OBJECT_NAME (queue))
+  {
+    count (queue, "sink", in_);
+    count (queue, "src", out_);
+  }
+  LeakyQueue (const LeakyQueue &) = delete;
+  LeakyQueue &operator= (const LeakyQueue &) = delete;
+
+  std::string counters () const
+  {
+    return format ("%s: in=%" G_GINT64_FORMAT " skipped=%" G_GINT64_FORMAT,
+        name_.c_str (), in_.load (), in_.load () - out_.load ());
+  }
+
+private:
+  static void count (
+      GstElement *queue, const char *pad_name, std::atomic<gint64> &buffers)
+  {
+    const ObjectPtr<GstPad> pad (gst_element_get_static_pad (queue, pad_name));
+    gst_pad_add_probe (
+        pad.get (), GST_PAD_PROBE_TYPE_BUFFER,
+        [] (GstPad *, GstPadProbeInfo *, gpointer counter) {
+          (*static_cast<std::atomic<gint64> *> (counter))++;
+          return GST_PAD_PROBE_OK;
+        },
+        &buffers, nullptr);
+  }
+
+  std::string name_;
+  std::atomic<gint64> in_ = 0, out_ = 0;
+};
+
 class Launch
 {
 public:
@@ -62,6 +99,9 @@ public:
 private:
   GstElement *find (const gchar *name);
   bool connect_counter ();
+  void watch_leaky_queues ();
+  template <typename Visit>
+  void for_each_element (Visit visit);
   void start ();
   bool has_receiver ();
   void seek ();
@@ -110,6 +150,7 @@ private:
   GMainLoop *loop_;
   ObjectPtr<GstElement> pipeline_;
   ObjectPtr<GstPad> counted_;
+  std::vector<std::unique_ptr<LeakyQueue>> leaky_queues_;
   std::atomic<gint64> frames_ = 0;
   std::atomic<gint64> last_pts_ = -1; // ns, of the counted pad
   Clock::time_point began_ = Clock::now ();
@@ -244,6 +285,32 @@ Launch::connect_counter ()
   return true;
 }
 
+template <typename Visit>
+void
+Launch::for_each_element (Visit visit)
+{
+  GstIterator *elements = gst_bin_iterate_recurse (GST_BIN (pipeline_.get ()));
+  GValue item = G_VALUE_INIT;
+  while (gst_iterator_next (elements, &item) == GST_ITERATOR_OK) {
+    visit (GST_ELEMENT (g_value_get_object (&item)));
+    g_value_reset (&item);
+  }
+  g_value_unset (&item);
+  gst_iterator_free (elements);
+}
+
+void
+Launch::watch_leaky_queues ()
+{
+  for_each_element ([this] (GstElement *element) {
+    gint leaky = 0;
+    if (g_object_class_find_property (G_OBJECT_GET_CLASS (element), "leaky"))
+      g_object_get (element, "leaky", &leaky, nullptr);
+    if (leaky != 0)
+      leaky_queues_.push_back (std::make_unique<LeakyQueue> (element));
+  });
+}
+
 void
 Launch::play ()
 {
@@ -280,6 +347,7 @@ Launch::run ()
 {
   if (!connect_counter ())
     return kFailed;
+  watch_leaky_queues ();
   const ObjectPtr<GstBus> bus (gst_element_get_bus (pipeline_.get ()));
   gst_bus_add_watch (bus.get (), on_bus, this);
   const guint sources[] = {g_unix_signal_add (SIGINT, on_signal, this),
@@ -450,17 +518,13 @@ Launch::summarise ()
           frames_.load (), seconds, double (frames_) / seconds,
           100 * cpu / seconds));
 
-  GstIterator *elements = gst_bin_iterate_recurse (GST_BIN (pipeline_.get ()));
-  GValue item = G_VALUE_INIT;
-  while (gst_iterator_next (elements, &item) == GST_ITERATOR_OK) {
-    const std::string counters =
-        counters_of (GST_ELEMENT (g_value_get_object (&item)));
+  for_each_element ([this] (GstElement *element) {
+    const std::string counters = counters_of (element);
     if (!counters.empty ())
       status_.line (counters);
-    g_value_reset (&item);
-  }
-  g_value_unset (&item);
-  gst_iterator_free (elements);
+  });
+  for (const auto &queue : leaky_queues_)
+    status_.line (queue->counters ());
 }
 
 } // namespace

@@ -147,7 +147,7 @@ check_options ()
   check_option seed '[0-9]+' 'a whole number'
 }
 
-# Where the plugin and its programs are: beside this folder in the build tree,
+# Where the plugin and the programs are: beside this folder in the build tree,
 # or where they were installed to.
 find_plugin ()
 {
@@ -155,11 +155,13 @@ find_plugin ()
   local prefix=$pipelines/../.. libs='' folder
   if [ -e "$build/gst/libgstcodedexposure.so" ]; then
     build=$(cd "$build" && pwd)
-    programs=$build/pipelines
+    launcher=$build/pipelines/codedexposure-launch
+    tool=$build/lib/tools/codedexposure
     libs=$build/gst
     export GST_REGISTRY_1_0=$build/registry.bin
   elif [ -x "$prefix/bin/codedexposure-launch" ]; then
-    programs=$prefix/bin
+    launcher=$prefix/bin/codedexposure-launch
+    tool=$prefix/bin/codedexposure
     for folder in "$prefix"/lib{,/*}/gstreamer-1.0; do
       [ ! -e "$folder/libgstcodedexposure.so" ] || libs=$folder
     done
@@ -179,7 +181,7 @@ launch ()
     printf 'gst-launch-1.0 -e %s\n' "$(tr -s ' \n' '  ' <<< "${*: -1}")"
     exit 0
   fi
-  "$programs/codedexposure-launch" --what="$script" "$@"
+  "$launcher" --what="$script" "$@"
 }
 
 # A text as a value in a pipeline.
@@ -205,7 +207,7 @@ schedule ()
 
 schedule_slots ()
 {
-  "$programs/codedexposure-schedule" --slots "$(schedule)"
+  "$tool" schedule show "$(schedule)" | awk '$1 == "slots" { print $2 }'
 }
 
 grey_format ()

@@ -186,7 +186,9 @@ set_caps (GstBaseTransform *trans, GstCaps *incaps, GstCaps *)
   if (!st.runner || !restart)
     return TRUE;
   st.runner->start (time->plan);
-  return st.runner->settle ();
+  st.runner->settle ();
+  /* A wait cut short by a flush or on the way down says nothing of the caps. */
+  return !st.runner->failed ();
 }
 
 gboolean
@@ -197,8 +199,9 @@ sink_event (GstBaseTransform *trans, GstEvent *event)
   switch (GST_EVENT_TYPE (event)) {
   case GST_EVENT_STREAM_START:
     /* Nothing flows before the masks are on the device: not even caps, for
-     * which a simulated bench needs to know them. */
-    if (st.runner && !st.runner->settle ()) {
+     * which a simulated bench needs to know them. On the way down, frames are
+     * refused as flushing; an event that fails would be an error. */
+    if (st.runner && !st.runner->settle () && !st.runner->halted ()) {
       gst_event_unref (event);
       return FALSE;
     }

@@ -328,6 +328,8 @@ generate_output (GstBaseTransform *trans, GstBuffer **outbuf)
     BufferPtr buffer (std::exchange (trans->queued_buf, nullptr));
     if (st.runner && st.runner->failed ())
       return GST_FLOW_ERROR;
+    if (st.runner && st.runner->halted ())
+      return GST_FLOW_FLUSHING;
     if (!stream.time)
       return GST_FLOW_NOT_NEGOTIATED;
     if (!GST_BUFFER_PTS_IS_VALID (buffer.get ())) {

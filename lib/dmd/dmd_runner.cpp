@@ -84,6 +84,13 @@ DmdRunner::failed () const
   return run_ == Run::failed;
 }
 
+bool
+DmdRunner::halted () const
+{
+  const std::lock_guard guard (lock_);
+  return run_ == Run::none;
+}
+
 void
 DmdRunner::interrupt (bool on)
 {

@@ -56,6 +56,8 @@ public:
   bool settle_within (std::chrono::milliseconds time);
   /** Whether a job failed in the last run. */
   bool failed () const;
+  /** Whether there is no run, before upload () or after halt (). */
+  bool halted () const;
   /** While on, settle () does not wait. */
   void interrupt (bool on);
 

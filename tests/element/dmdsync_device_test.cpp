@@ -243,16 +243,14 @@ TEST (DmdsyncDevice, AnUploadIsCancelledByAChangeOfState)
   const ObjectPtr<GstPad> sink (
       gst_element_get_static_pad (device.element (), "sink"));
   std::atomic<bool> sending = false;
-  gboolean sent = TRUE;
   std::thread streaming ([&] {
     sending = true;
-    sent = gst_pad_send_event (sink.get (), gst_event_new_stream_start ("s"));
+    gst_pad_send_event (sink.get (), gst_event_new_stream_start ("s"));
   });
   while (!sending)
     std::this_thread::yield ();
   EXPECT_EQ (device.set_state (GST_STATE_NULL), GST_STATE_CHANGE_SUCCESS);
   streaming.join ();
-  EXPECT_FALSE (sent) << "the stream never began";
   EXPECT_EQ (device.progress (),
       (std::vector{GST_PROGRESS_TYPE_START, GST_PROGRESS_TYPE_CANCELED}));
   EXPECT_EQ (device.error (), "");

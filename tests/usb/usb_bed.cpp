@@ -86,7 +86,11 @@ public:
     g_signal_connect_after (
         handler_, "handle-ioctl", G_CALLBACK (on_ioctl), this);
   }
-  ~UsbPort () { g_object_unref (handler_); }
+  ~UsbPort ()
+  {
+    g_signal_handlers_disconnect_by_data (handler_, this);
+    g_object_unref (handler_);
+  }
 
   UMockdevIoctlBase *handler () const { return handler_; }
   const std::vector<std::uint8_t> &all_descriptors () const
@@ -373,6 +377,7 @@ UsbBed::unplug (const std::string &port)
   umockdev_testbed_detach_ioctl (bed_, gone.node.c_str (), nullptr);
   umockdev_testbed_uevent (bed_, gone.sys_path.c_str (), "remove");
   umockdev_testbed_remove_device (bed_, gone.sys_path.c_str ());
+  pulled_.push_back (std::move (found->second));
   ports_.erase (found);
 }
 

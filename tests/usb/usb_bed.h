@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <umockdev.h>
 
@@ -39,6 +40,8 @@ public:
 private:
   UMockdevTestbed *const bed_;
   std::map<std::string, std::unique_ptr<UsbPort>> ports_;
+  // Whoever had a board open asks its port once more before it sees the end.
+  std::vector<std::unique_ptr<UsbPort>> pulled_;
 };
 
 } // namespace cexp::test

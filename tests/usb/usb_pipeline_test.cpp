@@ -1,0 +1,118 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* dmdsync with a board on the USB, in a pipeline: shown masks, cancelled
+ * uploads, and a plug that is pulled. */
+#include "dmd/mirror_array.h"
+#include "emulated_dlpc900.h"
+#include "sync_harness.h"
+#include "usb_bed.h"
+
+namespace
+{
+
+using namespace cexp;
+using namespace cexp::test;
+
+const auto *const linked =
+    ::testing::AddGlobalTestEnvironment (new LinkedElements);
+
+constexpr std::uint16_t kDlpc900 = 0xC900;
+constexpr int kDlp5500 = 5;
+
+/** Coded frames of 25 frames/s through a dmdsync with a board at 1-2. */
+class UsbPipeline : public ::testing::Test
+{
+protected:
+  void SetUp () override { bed.plug ("1-2", kDlpc900, "LCR", board); }
+  void TearDown () override { set_state (GST_STATE_NULL); }
+
+  void make (const std::string &schedule)
+  {
+    const std::string text =
+        "videotestsrc is-live=true ! "
+        "video/x-raw,format=GRAY8,width=64,height=48,framerate=25/1 ! "
+        "dmdsync device=usb:1-2 schedule=" +
+        schedule + " ! fakesink sync=false";
+    pipeline.reset (GST_ELEMENT (
+        gst_object_ref_sink (gst_parse_launch (text.c_str (), nullptr))));
+    bus.reset (gst_element_get_bus (pipeline.get ()));
+  }
+  void set_state (GstState state)
+  {
+    if (pipeline)
+      gst_element_set_state (pipeline.get (), state);
+  }
+  /** The next message of that type within a minute. */
+  MessagePtr wait_message (GstMessageType type)
+  {
+    return MessagePtr (
+        gst_bus_timed_pop_filtered (bus.get (), 60 * GST_SECOND, type));
+  }
+  /** The end of the progress of the upload. */
+  MessagePtr wait_upload ()
+  {
+    for (;;) {
+      MessagePtr message = wait_message (GST_MESSAGE_PROGRESS);
+      if (!message)
+        return message;
+      GstProgressType type;
+      gst_message_parse_progress (message.get (), &type, nullptr, nullptr);
+      if (type != GST_PROGRESS_TYPE_START && type != GST_PROGRESS_TYPE_CONTINUE)
+        return message;
+    }
+  }
+
+  UsbBed bed;
+  std::shared_ptr<EmulatedDlpc900> board =
+      std::make_shared<EmulatedDlpc900> (kDlp5500);
+  ObjectPtr<GstElement> pipeline;
+  ObjectPtr<GstBus> bus;
+};
+
+} // namespace
+
+TEST_F (UsbPipeline, ShowsTheMasksOfTheScheduleUntilItStops)
+{
+  make ("staircase:4x1");
+  set_state (GST_STATE_PLAYING);
+  ASSERT_NE (wait_upload (), nullptr);
+  ASSERT_NE (wait_message (GST_MESSAGE_ASYNC_DONE), nullptr);
+  EXPECT_TRUE (board->running ());
+  set_state (GST_STATE_NULL);
+  EXPECT_FALSE (board->running ());
+
+  const auto schedule = Schedule::from_preset ("staircase:4x1");
+  for (int mask = 0; mask < schedule->masks (); mask++) {
+    const auto shown = board->mirrors (mask);
+    Image<std::uint8_t> expected (shown.width (), shown.height ());
+    render_mask (*schedule, mask, expected.view ());
+    EXPECT_TRUE (shown == expected) << mask;
+  }
+}
+
+TEST_F (UsbPipeline, AnUploadEndsWithTheStateThatWantedIt)
+{
+  make ("sequential:2x2"); // 2.4 MB
+  set_state (GST_STATE_PAUSED);
+  ASSERT_NE (wait_message (GST_MESSAGE_PROGRESS), nullptr);
+  set_state (GST_STATE_NULL);
+  EXPECT_EQ (board->images_received (), 0);
+  EXPECT_FALSE (board->running ());
+}
+
+TEST_F (UsbPipeline, APulledPlugIsOneErrorAndACleanStop)
+{
+  make ("sequential:2x2");
+  set_state (GST_STATE_PLAYING);
+  ASSERT_NE (wait_message (GST_MESSAGE_PROGRESS), nullptr);
+  bed.unplug ("1-2");
+  const MessagePtr message = wait_message (GST_MESSAGE_ERROR);
+  ASSERT_NE (message, nullptr);
+  GError *error = nullptr;
+  gchar *debug = nullptr;
+  gst_message_parse_error (message.get (), &error, &debug);
+  const std::string said = std::string (error->message) + (debug ? debug : "");
+  EXPECT_NE (said.find ("usb:1-2 was unplugged"), said.npos) << said;
+  g_error_free (error);
+  g_free (debug);
+  set_state (GST_STATE_NULL);
+}

@@ -298,6 +298,7 @@ gboolean
 take_stream_start (GstCodedExposureSim *self, GstEvent *event)
 {
   auto *parent = GST_BASE_TRANSFORM_CLASS (gst_coded_exposure_sim_parent_class);
+  sim::restart (self, sim::Drop::kSegment);
   self->state->stream.tag_due = true;
   return parent->sink_event (GST_BASE_TRANSFORM (self), event) &&
          sim::follow_schedule (self);

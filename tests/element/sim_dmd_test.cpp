@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* codedexposure-sim behind a simulated DMD that the test drives. The element is
- * linked in, since the mirrors of a plugin that is loaded are not ours. */
+/* codedexposure-sim behind a simulated DMD that the test drives. */
 #include "dmd/simulated_dmd.h"
-#include "gstcodedexposuresim.h"
+#include "linked_elements.h"
 #include "sim_harness.h"
 
 namespace
@@ -11,15 +10,8 @@ namespace
 using namespace cexp;
 using namespace cexp::test;
 
-class LinkedElement : public ::testing::Environment
-{
-  void SetUp () override
-  {
-    ASSERT_TRUE (GST_ELEMENT_REGISTER (codedexposure_sim, nullptr));
-  }
-};
 const auto *const linked =
-    ::testing::AddGlobalTestEnvironment (new LinkedElement);
+    ::testing::AddGlobalTestEnvironment (new LinkedElements);
 
 TEST (SimDmd, ParkedMirrorsAreDarkAndSaidOnce)
 {
@@ -101,6 +93,25 @@ TEST (SimDmd, FollowsAScheduleThatIsProgrammedLater)
     sim.send (k, k);
   EXPECT_EQ (sim.coded ().at (1, 0), 5);
   EXPECT_EQ (sim.coded ().at (1, 0), 7);
+}
+
+TEST (SimDmd, ScheduleThatComesWithANewStreamEndsTheExposure)
+{
+  const auto mirrors = SimulatedMirrors::find ("new stream");
+  mirrors->program (*Schedule::parse ("sequential:2x2"));
+  mirrors->start ();
+  SimHarness sim ("dmd=\"sim:new stream\"");
+  sim.start (2, 2);
+  sim.send_range (0, 2);
+  mirrors->program (*Schedule::parse ("sequential:2x1"));
+  mirrors->start ();
+  sim.push_event (gst_event_new_stream_start ("new"));
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_TIME);
+  sim.push_event (gst_event_new_segment (&segment));
+  sim.send_range (0, 2);
+  EXPECT_EQ (sim.counter ("frames-dropped"), 1u);
+  EXPECT_EQ (sim.counter ("frames-out"), 1u);
 }
 
 TEST (SimDmd, PilotTakesTwoFramesForItsMasks)

@@ -3,27 +3,13 @@
  * DMDs are those of the test. */
 #pragma once
 
-#include "gstcodedexposuredemux.h"
 #include "gstcodedexposuremeta.h"
-#include "gstcodedexposuresim.h"
-#include "gstdmdsync.h"
 #include "harness.h"
+#include "linked_elements.h"
 #include "schedule/timing.h"
 
 namespace cexp::test
 {
-
-/** Make one of these global in every program that runs linked elements. */
-class LinkedElements : public ::testing::Environment
-{
-  void SetUp () override
-  {
-    register_frame_meta ();
-    ASSERT_TRUE (GST_ELEMENT_REGISTER (codedexposure_demux, nullptr));
-    ASSERT_TRUE (GST_ELEMENT_REGISTER (codedexposure_sim, nullptr));
-    ASSERT_TRUE (GST_ELEMENT_REGISTER (dmdsync, nullptr));
-  }
-};
 
 constexpr int kSyncWidth = 64;
 constexpr int kSyncHeight = 48;

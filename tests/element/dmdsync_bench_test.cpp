@@ -267,6 +267,67 @@ TEST (DmdsyncBench, SceneAndLightRaiseNoAlarm)
   }
 }
 
+/** The pictures of a film, a slot each; it holds one at a time. */
+class Film
+{
+public:
+  explicit Film (const std::string &location)
+      : pipeline_ (GST_ELEMENT (gst_object_ref_sink (gst_parse_launch (
+            ("filesrc location=" + location +
+                " ! decodebin ! videoconvert ! videoscale ! "
+                "video/x-raw,format=GRAY8,width=" +
+                std::to_string (kWidth) +
+                ",height=" + std::to_string (kHeight) +
+                " ! appsink name=film sync=false max-buffers=4")
+                .c_str (),
+            nullptr)))),
+        film_ (gst_bin_get_by_name (GST_BIN (pipeline_.get ()), "film"))
+  {
+    gst_element_set_state (pipeline_.get (), GST_STATE_PLAYING);
+  }
+  ~Film () { gst_element_set_state (pipeline_.get (), GST_STATE_NULL); }
+
+  void draw (ImageView<std::uint8_t> out)
+  {
+    GstSample *sample = gst_app_sink_pull_sample (GST_APP_SINK (film_.get ()));
+    ASSERT_TRUE (sample) << "the film is over";
+    const Image<std::uint8_t> picture = image_of<std::uint8_t> (
+        gst_sample_get_buffer (sample), gst_sample_get_caps (sample));
+    gst_sample_unref (sample);
+    for (int y = 0; y < out.height; y++)
+      std::copy_n (picture.view ().row (y), out.width, out.row (y));
+  }
+
+private:
+  ObjectPtr<GstElement> pipeline_, film_;
+};
+
+TEST (DmdsyncBench, OnRealFootageOnlyTheSlipIsASlip)
+{
+  const char *clip = "/usr/share/doc/opencv-doc/examples/data/vtest.avi";
+  if (!g_file_test (clip, G_FILE_TEST_EXISTS))
+    GTEST_SKIP () << clip << " is not installed (Debian's opencv-doc)";
+  for (const std::string schedule :
+      {"staircase:2x2", "sequential:2x2,pilot=8"}) {
+    SCOPED_TRACE (schedule);
+    Film film (clip);
+    const Scene scene = [&] (std::int64_t, ImageView<std::uint8_t> out) {
+      film.draw (out);
+    };
+    Bench bench (schedule,
+        "codedexposure-sim dmd=sim:film" + std::string (kOptics) +
+            "! dmdsync name=sync device=sim:film,slip-at=402 schedule=" +
+            schedule);
+    for (int f = 0; f < 190; f++)
+      ASSERT_TRUE (bench.next (scene));
+    const auto slips = bench.messages ("dmdsync/slip");
+    ASSERT_EQ (slips.size (), 1u);
+    EXPECT_EQ (uint64_field (slips[0], "frame"), 100u);
+    EXPECT_EQ (int_field (slips[0], "slots"), 1);
+    EXPECT_EQ (bench.messages ("dmdsync/locked").size (), 2u);
+  }
+}
+
 TEST (DmdsyncBench, WithoutAPilotAOneHotCodeHidesASlipAndSaysSoFirst)
 {
   Bench bench ("sequential:2x2",

@@ -82,6 +82,7 @@
 #include "gstdmdsync.h"
 
 #include "gstcodedexposurecaps.h"
+#include "gstdmdsyncenums.h"
 #include "gstdmdsyncstate.h"
 
 GST_DEBUG_CATEGORY (dmdsync_debug);
@@ -151,79 +152,6 @@ GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE ("sink",
     GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
 GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC,
     GST_PAD_ALWAYS, GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
-
-GType
-register_enum (gsize &type, const char *name, const GEnumValue *values)
-{
-  if (g_once_init_enter (&type))
-    g_once_init_leave (&type, g_enum_register_static (name, values));
-  return type;
-}
-
-#define GST_TYPE_DMD_SYNC_TIMESTAMP_AT (timestamp_at_get_type ())
-GType
-timestamp_at_get_type ()
-{
-  static gsize type = 0;
-  static const GEnumValue values[] = {
-      {int (TimestampAt::exposure_start), "Start of the first slot",
-          "exposure-start"},
-      {int (TimestampAt::exposure_end), "End of the last slot", "exposure-end"},
-      {int (TimestampAt::arrival),
-          "Arrival: one frame period after the start, exposure and readout",
-          "arrival"},
-      {0, nullptr, nullptr},
-  };
-  return register_enum (type, "GstDmdSyncTimestampAt", values);
-}
-
-#define GST_TYPE_DMD_SYNC_ON_LOSS (on_loss_get_type ())
-GType
-on_loss_get_type ()
-{
-  static gsize type = 0;
-  static const GEnumValue values[] = {
-      {int (OnLoss::gap), "A GAP event tells of the time that is missing",
-          "gap"},
-      {int (OnLoss::repeat),
-          "The frame before, again, with the flags GAP and DROPPABLE; a gap "
-          "of more than 100 frames stays one",
-          "repeat"},
-      {int (OnLoss::error), "The stream stops with an error", "error"},
-      {0, nullptr, nullptr},
-  };
-  return register_enum (type, "GstDmdSyncOnLoss", values);
-}
-
-#define GST_TYPE_DMD_SYNC_ON_UNLOCK (on_unlock_get_type ())
-GType
-on_unlock_get_type ()
-{
-  static gsize type = 0;
-  static const GEnumValue values[] = {
-      {int (OnUnlock::keep), "Goes on with the flag CORRUPTED", "keep"},
-      {int (OnUnlock::skip), "Is dropped; a GAP event takes its place", "skip"},
-      {int (OnUnlock::error), "The stream stops with an error", "error"},
-      {0, nullptr, nullptr},
-  };
-  return register_enum (type, "GstDmdSyncOnUnlock", values);
-}
-
-#define GST_TYPE_DMD_SYNC_SLIP_OBSERVABLE (slip_observable_get_type ())
-GType
-slip_observable_get_type ()
-{
-  static gsize type = 0;
-  static const GEnumValue values[] = {
-      {int (SlipObservable::never), "In no frame", "never"},
-      {int (SlipObservable::in_the_frame),
-          "In the frame in which it happens, if it happens during the exposure",
-          "in-the-frame"},
-      {int (SlipObservable::always), "In every frame while it lasts", "always"},
-      {0, nullptr, nullptr},
-  };
-  return register_enum (type, "GstDmdSyncSlipObservable", values);
-}
 
 /* Object lock. */
 void

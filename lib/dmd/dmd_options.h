@@ -28,7 +28,6 @@ namespace cexp
  * What documents leave open can be turned, see docs/dmd.md:
  *   trigger2-bit=disables|enables  sense of the DLPC900's trigger output flag
  *   table=first|last     whether its table is sent before the images
- *   invert-bit=0|1       place of the DLPC350's polarity flag
  *   image-pair=plain|swapped  order of two images in the DLPC350's table
  *   gap=TIME             between two masks of a DLP3000, default 250 us
  */

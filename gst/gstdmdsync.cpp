@@ -360,15 +360,17 @@ install_settings (GObjectClass *klass)
   /**
    * dmdsync:device:
    *
-   * Name of the DMD, `sim:NAME` for a simulated one. Empty: no DMD is driven.
-   * Fixed above NULL.
+   * Name of the DMD: a board, or `sim:NAME` for a simulated one. Empty: no DMD
+   * is driven. Fixed above NULL.
    *
    * Since: 0.1
    */
   g_object_class_install_property (klass, PROP_DEVICE,
       g_param_spec_string ("device", "Device",
-          "DMD to drive, sim:NAME[,key=value...] for a simulated one "
-          "(docs/timing.md); empty: none, frames are stamped and watched only",
+          "DMD to drive: usb: or lightcrafter: for a board (docs/dmd.md), "
+          "sim:NAME[,key=value...] for a simulated one (docs/timing.md); "
+          "empty: "
+          "none, frames are stamped and watched only",
           DEFAULT_DEVICE, kNull));
   /**
    * dmdsync:schedule:

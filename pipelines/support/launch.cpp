@@ -417,6 +417,10 @@ Launch::on_error (GstMessage *message)
     return;
   }
   status_.line ("error: " + told (message, error, detail));
+  if (kind == "aravissrc" && error->domain == GST_STREAM_ERROR)
+    status_.line (
+        "the camera sent nothing for 2 s or more: is the DMD running, "
+        "and on the camera's trigger line?");
   quit (kFailed);
 }
 

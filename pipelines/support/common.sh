@@ -16,7 +16,7 @@ source_options="$scene_options $bench_options frames camera features source
   device"
 
 scene_help='Scene, one frame of it a slot of the exposure:
-  --input FILE        any video; its frames become slots, whatever its rate
+  --input FILE        any video; each of its frames becomes a slot
   --input-rate R      frames a second of the input, where the file does not say
   --pattern NAME      a moving test picture instead, as of videotestsrc [ball]
   --size WxH          size of scene and camera [that of the input; 768x576]
@@ -262,13 +262,15 @@ scene ()
   caps+=",framerate=$scene_rate"
   if is_set input; then
     # Every frame of the file becomes one slot: its times are stretched.
+    # videorate reckons them from 0, which is not where every file begins.
     local speed
     speed=$(awk -v s="$scene_rate" -v i="$input_rate" 'BEGIN {
       split(s, a, "/"); split(i, b, "/")
       printf "%.12g", a[1] * b[2] / (a[2] * b[1]) }')
     printf 'filesrc location=%s ! decodebin ! videoconvert ! videoscale ! ' \
       "$(quoted "${opt[input]}")"
-    printf 'videorate rate=%s ! %s ! ' "$speed" "$caps"
+    printf 'identity single-segment=true ! videorate rate=%s ! %s ! ' \
+      "$speed" "$caps"
     [ "${1:-}" != live ] || printf 'clocksync ! '
     printf 'queue ! '
   else

@@ -140,7 +140,7 @@ build_tree ()
 {
   local dir=$1
   shift
-  if [ ! -f "$dir/build.ninja" ]; then
+  if [ ! -f "$dir/build.ninja" ] || [ ! -f "$dir/meson-private/coredata.dat" ]; then
     note "configuring $dir"
     mkdir -p "$cache"
     meson setup "$dir" "$root" "$@" >"$cache/meson.log" 2>&1 || {

@@ -1,13 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* The versioned JSON form of schedules: docs/formats.md. */
 #include <algorithm>
-#include <initializer_list>
-#include <optional>
-#include <set>
 
-#include <nlohmann/json.hpp>
-
-#include "base/text.h"
+#include "schedule/json_forms.h"
 #include "schedule/schedule.h"
 
 namespace cexp
@@ -16,85 +11,8 @@ namespace cexp
 namespace
 {
 
-using Json = nlohmann::json;
-using OrderedJson = nlohmann::ordered_json;
-
 constexpr std::string_view kFormat = "coded-exposure";
 constexpr int kVersion = 1;
-
-/** @p value as text for a message. */
-std::string
-shown (const Json &value)
-{
-  return printable (value.dump ());
-}
-
-Error
-expected (const std::string &key, const std::string &rule, const Json &value)
-{
-  return {"key '" + key + "' must be " + rule + ", not " + shown (value)};
-}
-
-Result<void>
-check_keys (const Json &object, const std::string &where,
-    std::initializer_list<std::string_view> known)
-{
-  for (const auto &item : object.items ()) {
-    if (std::find (known.begin (), known.end (), item.key ()) != known.end ())
-      continue;
-    std::string names;
-    for (const std::string_view name : known)
-      names += (names.empty () ? "" : ", ") + std::string (name);
-    return Error{"there is no key " + in_quotes (item.key ()) + where +
-                 "; the keys are " + names};
-  }
-  return {};
-}
-
-/** @p value as a whole number from 0 to @p highest, written without a
- * fraction. */
-std::optional<std::int64_t>
-as_integer (const Json &value, std::int64_t highest)
-{
-  const bool fits =
-      value.is_number_unsigned ()
-          ? value.get<std::uint64_t> () <= std::uint64_t (highest)
-          : value.is_number_integer () && value.get<std::int64_t> () == 0;
-  if (!fits)
-    return std::nullopt;
-  return value.get<std::int64_t> ();
-}
-
-std::string
-integer_rule (std::int64_t highest)
-{
-  return "a whole number from 0 to " + std::to_string (highest);
-}
-
-Result<std::int64_t>
-read_integer (const Json &value, const std::string &key, std::int64_t highest)
-{
-  if (const auto number = as_integer (value, highest))
-    return *number;
-  return expected (key, integer_rule (highest), value);
-}
-
-Result<std::vector<int>>
-read_integers (const Json &value, const std::string &key, int highest)
-{
-  if (!value.is_array ())
-    return expected (key, "a list of whole numbers", value);
-  std::vector<int> numbers;
-  numbers.reserve (value.size ());
-  for (const Json &entry : value) {
-    const auto number = as_integer (entry, highest);
-    if (!number)
-      return expected (key + "[" + std::to_string (numbers.size ()) + "]",
-          integer_rule (highest), entry);
-    numbers.push_back (int (*number));
-  }
-  return numbers;
-}
 
 /** The two numbers of @p value, such as [0, 1]. */
 Result<Offset>
@@ -225,26 +143,12 @@ read_options (const Json &root, Schedule::Parts &parts)
   return {};
 }
 
-/** Format and version first, so that a text of another kind is named as such
- * and not by the first key that is strange here. */
 Result<void>
-check_head (const Json &root)
+check_schedule_keys (const Json &root)
 {
-  const std::string head =
-      "; a schedule begins with {\"format\":\"" + std::string (kFormat) +
-      "\",\"version\":" + std::to_string (kVersion) + ",...";
-  if (!root.is_object ())
-    return Error{"it must be an object, not " + shown (root) + head};
-  for (const char *key : {"format", "version"})
-    if (!root.contains (key))
-      return Error{"key '" + std::string (key) + "' is missing" + head};
-  if (root["format"] != kFormat)
-    return Error{"format " + shown (root["format"]) + " is not known" + head};
-  if (!root["version"].is_number_integer () || root["version"] != kVersion)
-    return Error{"version " + shown (root["version"]) +
-                 " is not known; this program reads version " +
-                 std::to_string (kVersion)};
-
+  if (const auto checked = check_head (root, kFormat, kVersion, "schedule");
+      !checked)
+    return checked;
   if (const auto checked = check_keys (root, "",
           {"format", "version", "tile", "code", "timing", "order", "phase",
               "leak", "pilot_rows"});
@@ -256,70 +160,6 @@ check_head (const Json &root)
                    "' is missing; a schedule needs at least format, version, "
                    "tile and code"};
   return {};
-}
-
-Result<Schedule>
-read_schedule (const Json &root)
-{
-  if (const auto checked = check_head (root); !checked)
-    return checked.error ();
-  const auto tile = read_tile (root["tile"]);
-  if (!tile)
-    return tile.error ();
-  const auto code = read_code (root["code"], tile->elements ());
-  if (!code)
-    return code.error ();
-  Schedule::Parts parts{*tile, *code};
-  if (const auto read = read_options (root, parts); !read)
-    return read.error ();
-  return Schedule::make (std::move (parts));
-}
-
-/** Refuses, while the parser runs, what it would let pass: a key that stands
- * twice in one object, because readers disagree on which one counts, and
- * nesting that no schedule has, because it is walked recursively later. */
-class Watch
-{
-public:
-  bool operator() (int depth, Json::parse_event_t event, Json &parsed)
-  {
-    using Event = Json::parse_event_t;
-    if (event == Event::object_start || event == Event::array_start) {
-      if (depth >= kMaxDepth)
-        throw Error{"brackets nest deeper than " + std::to_string (kMaxDepth) +
-                    " levels; no schedule does"};
-      keys_.resize (std::size_t (depth) + 1);
-      keys_.back ().clear ();
-    } else if (event == Event::key) {
-      const auto &key = parsed.get_ref<const std::string &> ();
-      if (!keys_[std::size_t (depth) - 1].insert (key).second)
-        throw Error{"key " + in_quotes (key) + " stands twice; leave one out"};
-    }
-    return true;
-  }
-
-private:
-  static constexpr int kMaxDepth = 8;
-  /** Keys of the objects around the place that is being read. */
-  std::vector<std::set<std::string>> keys_;
-};
-
-Result<Json>
-parse_strictly (std::string_view text)
-{
-  /* The parser takes a zero byte for the end and what follows for nothing. */
-  if (const std::size_t zero = text.find ('\0'); zero != text.npos)
-    return Error{"it is no valid JSON: a zero byte at " +
-                 std::to_string (zero) + "; remove it and what follows"};
-  try {
-    return Json::parse (text, Watch ());
-  } catch (const Error &refused) {
-    return refused;
-  } catch (const Json::exception &failure) {
-    std::string_view why = failure.what ();
-    why.remove_prefix (std::min (why.find ("] ") + 2, why.size ()));
-    return Error{"it is no valid JSON: " + printable (why, 200)};
-  }
 }
 
 OrderedJson
@@ -336,13 +176,30 @@ tile_json (const Tile &tile)
 } // namespace
 
 Result<Schedule>
+read_schedule (const Json &root)
+{
+  if (const auto checked = check_schedule_keys (root); !checked)
+    return checked.error ();
+  const auto tile = read_tile (root["tile"]);
+  if (!tile)
+    return tile.error ();
+  const auto code = read_code (root["code"], tile->elements ());
+  if (!code)
+    return code.error ();
+  Schedule::Parts parts{*tile, *code};
+  if (const auto read = read_options (root, parts); !read)
+    return read.error ();
+  return Schedule::make (std::move (parts));
+}
+
+Result<Schedule>
 Schedule::from_json (std::string_view json)
 {
   const std::string what = "schedule JSON: ";
   if (json.size () > kMaxJsonSize)
     return Error{what + "more than " + std::to_string (kMaxJsonSize) +
                  " bytes; no schedule is that long"};
-  const auto root = parse_strictly (json);
+  const auto root = parse_strictly (json, "schedule");
   if (!root)
     return Error{what + root.error ().message};
   auto schedule = read_schedule (*root);

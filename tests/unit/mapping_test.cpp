@@ -1,0 +1,282 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Mappings: places both ways, what they say of a bench, their JSON form. */
+#include "schedule/mapping.h"
+
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+
+#include <gtest/gtest.h>
+
+#include "schedule/stream_setup.h"
+
+using namespace cexp;
+
+namespace
+{
+
+constexpr Extent kCamera = {768, 576};
+constexpr Extent kMirrors = {1024, 768};
+
+Mapping
+made (Mapping::Parts parts)
+{
+  auto mapping = Mapping::make (std::move (parts));
+  EXPECT_TRUE (mapping.ok ()) << mapping.error ().message;
+  return mapping.ok () ? *mapping : Mapping (kCamera);
+}
+
+std::string
+refusal (Mapping::Parts parts)
+{
+  const auto mapping = Mapping::make (std::move (parts));
+  return mapping.ok () ? "" : mapping.error ().message;
+}
+
+/** Turned by @p degrees, @p scale pixels a mirror, centre on centre. */
+Homography
+turned (double degrees, double scale, double shift_x = 0, double shift_y = 0)
+{
+  const double turn = degrees * std::numbers::pi / 180;
+  const double c = std::cos (turn) / scale, s = std::sin (turn) / scale;
+  const double cx = 383.5, cy = 287.5;
+  return {c, -s, 511.5 + shift_x - c * cx + s * cy, s, c,
+      383.5 + shift_y - s * cx - c * cy, 0, 0, 1};
+}
+
+Mapping::Parts
+all_parts ()
+{
+  Mapping::Parts parts = {kCamera, kMirrors, turned (0.5, 1.01, 3, -2)};
+  parts.homography[6] = 1e-6;
+  Mapping::Covariance covariance = {};
+  for (std::size_t i = 0; i < 8; i++)
+    for (std::size_t j = 0; j < 8; j++)
+      covariance[i * 8 + j] = i == j ? 1e-8 : 1e-10 / double (i + j);
+  parts.covariance = covariance;
+  parts.displacement = {2, 3, {0, 0.25, 0, 0, 0, 0}, {0, 0, 0, 0, 0, -0.5}};
+  return parts;
+}
+
+std::string
+with (const std::string &more)
+{
+  return R"({"format":"coded-exposure-mapping","version":1,"camera":[8,6],)"
+         R"("mirrors":[8,6],"homography":[1,0,0,0,1,0,0,0,1])" +
+         more + "}";
+}
+
+std::string
+complaint (const std::string &json)
+{
+  const auto mapping = Mapping::from_json (json);
+  return mapping.ok () ? "" : mapping.error ().message;
+}
+
+} // namespace
+
+TEST (Mapping, OfTheSameSizeIsTheIdentity)
+{
+  const Mapping mapping (kCamera);
+  EXPECT_EQ (mapping.mirror_at (12.25, 7.5), (Position{12.25, 7.5}));
+  EXPECT_TRUE (mapping.one_to_one ());
+  EXPECT_EQ (mapping.stance ().magnification, 1.0);
+  EXPECT_FALSE (made ({kCamera, kMirrors, turned (0, 1, 0.25)}).one_to_one ());
+  EXPECT_TRUE (made ({kCamera, kMirrors, turned (0, 1, 0.04)}).one_to_one ());
+  EXPECT_FALSE (
+      made ({{9, 9}, {99, 99}, {2, 0, 0, 0, 2, 0, 0, 0, 1}}).one_to_one ());
+}
+
+TEST (Mapping, SaysHowTheCameraStands)
+{
+  const Stance s =
+      made ({kCamera, kMirrors, turned (0.5, 1.01, 3.25, -2)}).stance ();
+  EXPECT_NEAR (s.shift_x, 3.25, 1e-9);
+  EXPECT_NEAR (s.shift_y, -2.0, 1e-9);
+  EXPECT_NEAR (s.rotation, 0.5, 1e-12);
+  EXPECT_NEAR (s.magnification, 1.01, 1e-12);
+  EXPECT_NEAR (s.stretch, 0.0, 1e-12);
+  EXPECT_FALSE (s.flipped);
+}
+
+TEST (Mapping, TellsAFlipAndAStretch)
+{
+  const Stance s =
+      made ({kCamera, kMirrors, {-1.02, 0, 900, 0, 1, 96, 0, 0, 1}}).stance ();
+  EXPECT_TRUE (s.flipped);
+  EXPECT_NEAR (s.rotation, 0.0, 1e-12);
+  EXPECT_NEAR (s.stretch, 0.02, 1e-12);
+}
+
+TEST (Mapping, PlacesGoBothWays)
+{
+  const Mapping mapping = made (all_parts ());
+  for (const Position p : {Position{0, 0}, Position{767, 575},
+           Position{383.5, 100.25}, Position{-3, 580}}) {
+    const Position m = mapping.mirror_at (p.x, p.y);
+    const Position back = mapping.camera_at (m);
+    EXPECT_NEAR (back.x, p.x, 1e-9);
+    EXPECT_NEAR (back.y, p.y, 1e-9);
+  }
+}
+
+TEST (Mapping, DisplacementIsBilinearBetweenTheCorners)
+{
+  Mapping::Parts parts = {{101, 201}, {101, 201}};
+  parts.displacement = {2, 3, {0, 1, 0, 0, 0, 0}, {0, 0, 0, 0, 0, -0.5}};
+  const Mapping mapping = made (parts);
+  EXPECT_EQ (mapping.mirror_at (100, 0), (Position{101, 0}));
+  EXPECT_EQ (mapping.mirror_at (100, 200), (Position{100, 199.5}));
+  EXPECT_EQ (mapping.mirror_at (50, 50), (Position{50.25, 50}));
+  EXPECT_EQ (mapping.mirror_at (0, 0), (Position{0, 0}));
+  /* Beyond the frame, that of the border. */
+  EXPECT_EQ (mapping.mirror_at (120, -5), (Position{121, -5}));
+  const auto slope = mapping.slope_at (50, 50);
+  EXPECT_NEAR (slope[0], 1.005, 1e-12);
+  EXPECT_NEAR (slope[1], -0.005, 1e-12);
+}
+
+TEST (Mapping, SlopeIsThatOfThePlaces)
+{
+  const Mapping mapping = made (
+      {kCamera, kMirrors, {0.98, 0.03, 5, -0.02, 1.01, 7, 2e-5, -1e-5, 1}});
+  const auto slope = mapping.slope_at (200, 300);
+  const Position l = mapping.mirror_at (199.5, 300);
+  const Position r = mapping.mirror_at (200.5, 300);
+  EXPECT_NEAR (slope[0], r.x - l.x, 1e-7);
+  EXPECT_NEAR (slope[2], r.y - l.y, 1e-7);
+}
+
+TEST (Mapping, CentredFormIsTheSameMapping)
+{
+  const Mapping mapping = made (
+      {kCamera, kMirrors, {0.98, 0.03, 5, -0.02, 1.01, 7, 2e-5, -1e-5, 1}});
+  const Homography c = mapping.centred ();
+  EXPECT_NEAR (c[8], 1.0, 1e-12);
+  EXPECT_NEAR (c[2], mapping.mirror_at (383.5, 287.5).x, 1e-9);
+  const auto back = Mapping::from_centred (kCamera, kMirrors, c);
+  ASSERT_TRUE (back.ok ());
+  EXPECT_NEAR (
+      back->mirror_at (700, 20).x, mapping.mirror_at (700, 20).x, 1e-9);
+}
+
+TEST (Mapping, UncertaintyOfAShiftAndATurn)
+{
+  Mapping::Parts parts = {kCamera, kMirrors, turned (0, 1)};
+  Mapping::Covariance covariance = {};
+  covariance[2 * 8 + 2] = 0.01 * 0.01; // of the shift in x
+  covariance[1 * 8 + 1] = 0.02 * 0.02; // of x against y
+  parts.covariance = covariance;
+  const Mapping mapping = made (parts);
+  EXPECT_NEAR (mapping.sigma_at (383.5, 287.5).x, 0.01, 1e-12);
+  EXPECT_NEAR (mapping.sigma_at (383.5, 287.5).y, 0.0, 1e-12);
+  /* One r below the centre both count. */
+  EXPECT_NEAR (mapping.sigma_at (383.5, 287.5 + 383.5).x,
+      std::hypot (0.01, 0.02), 1e-12);
+  const Stance sigma = mapping.stance_sigma ();
+  EXPECT_NEAR (sigma.shift_x, 0.01, 1e-12);
+  EXPECT_NEAR (sigma.rotation, 0.01 / 383.5 * 180 / std::numbers::pi, 1e-7);
+  EXPECT_NEAR (sigma.magnification, 0.0, 1e-7);
+}
+
+TEST (Mapping, RefusesWhatNoBenchHas)
+{
+  EXPECT_NE (
+      refusal ({{0, 5}, kMirrors}).find ("camera of 0x5"), std::string::npos);
+  EXPECT_NE (refusal ({kCamera, kMirrors, {1, 0, 0, 0, 1, 0, -0.01, 0, 1}})
+                 .find ("horizon must lie outside"),
+      std::string::npos);
+  EXPECT_NE (refusal ({kCamera, kMirrors, {1, 1, 0, 1, 1, 0, 0, 0, 1}})
+                 .find ("must have an inverse"),
+      std::string::npos);
+  EXPECT_NE (refusal ({kCamera, kMirrors, {NAN, 1, 0, 1, 1, 0, 0, 0, 1}})
+                 .find ("homography[0] is nan"),
+      std::string::npos);
+  Mapping::Parts parts = all_parts ();
+  parts.displacement->x.pop_back ();
+  EXPECT_NE (refusal (parts).find ("columns x rows = 6"), std::string::npos);
+  parts = all_parts ();
+  (*parts.covariance)[9] = -1;
+  EXPECT_NE (
+      refusal (parts).find ("no variance is negative"), std::string::npos);
+}
+
+TEST (MappingJson, HoldsEveryKeyBothWays)
+{
+  const Mapping mapping = made (all_parts ());
+  const auto read = Mapping::from_json (mapping.to_json ());
+  ASSERT_TRUE (read.ok ()) << read.error ().message;
+  EXPECT_EQ (*read, mapping);
+  EXPECT_EQ (read->to_json (), mapping.to_json ());
+}
+
+TEST (MappingJson, OfTheIdentity)
+{
+  EXPECT_EQ (Mapping (Extent{8, 6}).to_json (),
+      R"({"format":"coded-exposure-mapping","version":1,"camera":[8,6],)"
+      R"("mirrors":[8,6],"homography":[1.0,0.0,0.0,0.0,1.0,0.0,0.0,0.0,1.0]})");
+  const auto read = Mapping::from_json (with (""));
+  ASSERT_TRUE (read.ok ()) << read.error ().message;
+  EXPECT_EQ (*read, Mapping (Extent{8, 6}));
+}
+
+TEST (MappingJson, NamesWhatIsWrong)
+{
+  const struct {
+    std::string json, says;
+  } cases[] = {
+      {"[]", "mapping JSON: it must be an object"},
+      {R"({"format":"coded-exposure","version":1})",
+          R"(format "coded-exposure" is not known; a mapping begins with)"},
+      {R"({"format":"coded-exposure-mapping","version":2})",
+          "this program reads version 1"},
+      {with (R"(,"skew":1)"), "no key 'skew'; the keys are format"},
+      {with (R"(,"camera":[8,6])"), "key 'camera' stands twice"},
+      {R"({"format":"coded-exposure-mapping","version":1,"camera":[8,6],)"
+       R"("mirrors":[8,6],"homography":[1,0,0]})",
+          "key 'homography' must be 9 numbers in a list"},
+      {R"({"format":"coded-exposure-mapping","version":1,"camera":[8,6]})",
+          "key 'mirrors' is missing"},
+      {with (R"(,"covariance":[1])"), "must be 36 numbers"},
+      {with (R"(,"displacement":{"columns":2,"rows":2,"x":[0,0,0,0]})"),
+          "key 'displacement.y' is missing"},
+      {with (R"(,"displacement":{"columns":1,"rows":2,"x":[0,0],"y":[0,0]})"),
+          "displacement.columns is 1; it must be 2 to 257"},
+  };
+  for (const auto &c : cases)
+    EXPECT_NE (complaint (c.json).find (c.says), std::string::npos)
+        << complaint (c.json);
+}
+
+TEST (MappingJson, OfAFile)
+{
+  const std::string path = testing::TempDir () + "mapping_test.json";
+  const Mapping mapping = made (all_parts ());
+  ASSERT_TRUE (mapping.save (path).ok ());
+  const auto read = Mapping::load (path);
+  std::remove (path.c_str ());
+  ASSERT_TRUE (read.ok ()) << read.error ().message;
+  EXPECT_EQ (*read, mapping);
+  EXPECT_EQ (Mapping::load ("/no/such/file").error ().message,
+      "the mapping file '/no/such/file' cannot be read: No such file or "
+      "directory");
+}
+
+TEST (StreamSetup, CarriesAMappingBesideTheSchedule)
+{
+  const StreamSetup setup = {Schedule (), made (all_parts ())};
+  const auto read = StreamSetup::from_json (setup.to_json ());
+  ASSERT_TRUE (read.ok ()) << read.error ().message;
+  EXPECT_EQ (*read, setup);
+  EXPECT_EQ (StreamSetup{}.to_json (), Schedule ().to_json ());
+  EXPECT_EQ (*StreamSetup::from_json (Schedule ().to_json ()), StreamSetup{});
+}
+
+TEST (StreamSetup, NamesWhatIsWrongInside)
+{
+  std::string json = Schedule ().to_json ();
+  json.replace (json.size () - 1, 1, R"(,"mapping":{"version":1}})");
+  EXPECT_EQ (StreamSetup::from_json (json).error ().message.find (
+                 "schedule JSON: in key 'mapping': key 'format' is missing"),
+      0u);
+}

@@ -1,0 +1,200 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* A camera's clock told by the pipeline's, from jittery arrivals. */
+#include <cmath>
+#include <functional>
+#include <random>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "clock/device_clock.h"
+
+using namespace cexp;
+
+namespace
+{
+
+constexpr Nanoseconds kUs = 1'000;
+constexpr Nanoseconds kMs = 1'000'000;
+constexpr Nanoseconds kSecond = 1'000'000'000;
+
+/* A camera whose clock drifts, at the end of a path that delays its frames. */
+class Path
+{
+public:
+  using Delay = std::function<double (std::mt19937 &)>; // milliseconds
+
+  Path (FrameRate rate, double drift, Delay delay, unsigned seed = 1)
+      : rate_ (rate), drift_ (drift), delay_ (std::move (delay)), random_ (seed)
+  {
+  }
+
+  Nanoseconds truth (std::int64_t frame) const
+  {
+    return 7 * kSecond + rate_.time_of (frame);
+  }
+  Nanoseconds stamp (std::int64_t frame) const
+  {
+    return kEpoch +
+           std::llround ((1 + drift_) * double (rate_.time_of (frame)));
+  }
+  Nanoseconds arrival (std::int64_t frame)
+  {
+    return truth (frame) + std::llround (delay_ (random_) * double (kMs));
+  }
+
+  static constexpr Nanoseconds kEpoch = 86'400 * kSecond;
+
+private:
+  FrameRate rate_;
+  double drift_;
+  Delay delay_;
+  std::mt19937 random_;
+};
+
+double
+even (std::mt19937 &random)
+{
+  return std::uniform_real_distribution (0.0, 5.0) (random);
+}
+
+/* Most frames come soon, some much later. */
+double
+queued (std::mt19937 &random)
+{
+  return std::exponential_distribution (1 / 5.0) (random);
+}
+
+double
+stalled (std::mt19937 &random)
+{
+  const double usual = even (random);
+  return std::uniform_real_distribution (0.0, 1.0) (random) < 0.02 ? usual + 300
+                                                                   : usual;
+}
+
+struct Case {
+  std::string name;
+  Path::Delay delay;
+  double drift;
+  FrameRate rate;
+};
+
+class DeviceClockTime : public ::testing::TestWithParam<Case>
+{
+};
+
+/* The line is known better with every frame, until its window is full. */
+TEST_P (DeviceClockTime, IsWithin50MicrosecondsWhateverDriftAndJitter)
+{
+  const Case &c = GetParam ();
+  const auto after = [&] (int seconds) {
+    return std::int64_t (seconds * kSecond / c.rate.period ());
+  };
+  Nanoseconds early = 0;
+  Nanoseconds settled = 0;
+  for (unsigned seed = 1; seed <= 5; seed++) {
+    Path path (c.rate, c.drift, c.delay, seed);
+    DeviceClock clock;
+    for (std::int64_t k = 0; k < after (400); k++) {
+      const Nanoseconds time = clock.take (path.stamp (k), path.arrival (k));
+      const Nanoseconds error = std::abs (time - path.truth (k));
+      if (k >= after (170))
+        settled = std::max (settled, error);
+      else if (k >= after (20))
+        early = std::max (early, error);
+    }
+    EXPECT_NEAR (clock.drift (), c.drift, 1e-6);
+    EXPECT_EQ (clock.restarts (), 0u);
+  }
+  EXPECT_LE (early, 250 * kUs);
+  EXPECT_LE (settled, 50 * kUs);
+}
+
+INSTANTIATE_TEST_SUITE_P (Paths, DeviceClockTime,
+    ::testing::Values (Case{"fast", even, 200e-6, {25, 1}},
+        Case{"slow", even, -200e-6, {25, 1}},
+        Case{"queued", queued, 200e-6, {30000, 1001}},
+        Case{"stalled", stalled, -200e-6, {25, 1}},
+        Case{"many", even, 200e-6, {200, 1}}),
+    [] (const auto &info) { return info.param.name; });
+
+} // namespace
+
+TEST (DeviceClock, WithoutJitterIsExactFromTheSecondFrameOn)
+{
+  Path path ({25, 1}, 200e-6, [] (auto &) { return 0.0; });
+  DeviceClock clock;
+  for (int k = 0; k < 10'000; k++)
+    ASSERT_NEAR (double (clock.take (path.stamp (k), path.arrival (k))),
+        double (path.truth (k)), 2)
+        << k;
+  EXPECT_NEAR (clock.drift (), 200e-6, 1e-9);
+}
+
+TEST (DeviceClock, LatenessIsWhatTheFrameWasHeldUpBy)
+{
+  Path path ({25, 1}, 0, [] (auto &) { return 0.0; });
+  DeviceClock clock;
+  for (int k = 0; k < 300; k++)
+    clock.take (path.stamp (k), path.arrival (k));
+  const Nanoseconds time =
+      clock.take (path.stamp (300), path.truth (300) + 12 * kMs);
+  EXPECT_EQ (time, path.truth (300));
+  EXPECT_EQ (clock.lateness (), 12 * kMs);
+}
+
+TEST (DeviceClock, AFirstFrameThatWasHeldUpIsForgotten)
+{
+  Path path ({25, 1}, 0, [] (auto &) { return 0.0; });
+  DeviceClock clock;
+  const Nanoseconds begin = path.truth (0) + 500 * kMs;
+  Nanoseconds before = clock.take (path.stamp (0), begin);
+  for (int k = 1; k < 60; k++) {
+    const Nanoseconds time =
+        clock.take (path.stamp (k), std::max (begin, path.truth (k)));
+    EXPECT_GT (time, before) << "times never run back";
+    before = time;
+  }
+  EXPECT_EQ (before, path.truth (59));
+}
+
+TEST (DeviceClock, BeginsAnewWithTheCamera)
+{
+  Path path ({25, 1}, 200e-6, even);
+  for (const Nanoseconds shift : {-86'000 * kSecond, 30 * kSecond, 2 * kMs}) {
+    SCOPED_TRACE (shift);
+    DeviceClock clock;
+    for (int k = 0; k < 500; k++)
+      clock.take (path.stamp (k), path.truth (k));
+    for (int k = 600; k < 700; k++)
+      EXPECT_NEAR (double (clock.take (path.stamp (k) + shift, path.truth (k))),
+          double (path.truth (k)), 2);
+    EXPECT_EQ (clock.restarts (), 1u);
+  }
+}
+
+TEST (DeviceClock, ALateFrameTeachesNothing)
+{
+  Path path ({25, 1}, 200e-6, [] (auto &) { return 0.0; });
+  DeviceClock clock;
+  for (int k = 0; k < 300; k++)
+    if (k != 298)
+      clock.take (path.stamp (k), path.truth (k));
+  EXPECT_NEAR (double (clock.take (path.stamp (298), path.truth (299))),
+      double (path.truth (298)), 2);
+  EXPECT_NEAR (double (clock.take (path.stamp (300), path.truth (300))),
+      double (path.truth (300)), 2);
+  EXPECT_EQ (clock.restarts (), 0u);
+}
+
+TEST (DeviceClock, AfterAResetTheNextFrameIsTheFirst)
+{
+  Path path ({25, 1}, 200e-6, even);
+  DeviceClock clock;
+  for (int k = 0; k < 100; k++)
+    clock.take (path.stamp (k), path.arrival (k));
+  clock.reset ();
+  EXPECT_EQ (clock.take (5, 90 * kSecond), 90 * kSecond);
+  EXPECT_EQ (clock.drift (), 0);
+}

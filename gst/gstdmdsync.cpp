@@ -29,7 +29,9 @@
  * #dmdsync:timestamp-at and #dmdsync:exposure-offset. What PTS are moved back
  * is latency, and answered as such. DURATION is the frame period of the caps,
  * OFFSET the number of the frame since the start of the stream, lost ones
- * counted.
+ * counted. With `timestamp-at=device-clock` the stamps of the camera's own
+ * clock are fitted to the pipeline's; both stay on the frame as reference
+ * timestamps, `timestamp/x-camera-device` and `timestamp/x-arrival`.
  *
  * |[
  *   mirrors   | slot 0 | slot 1 | ... | slot N-1 | readout | slot 0
@@ -225,7 +227,9 @@ stats (const SyncState &st)
       "frames-early", G_TYPE_UINT64, counters.frames_early, "frames-skipped",
       G_TYPE_UINT64, counters.frames_skipped, "frames-repeated", G_TYPE_UINT64,
       counters.frames_repeated, "slips", G_TYPE_UINT64, counters.slips,
-      "locked", G_TYPE_BOOLEAN, gboolean (st.locked), nullptr);
+      "clock-restarts", G_TYPE_UINT64, counters.clock_restarts, "clock-drift",
+      G_TYPE_DOUBLE, counters.clock_drift, "locked", G_TYPE_BOOLEAN,
+      gboolean (st.locked), nullptr);
 }
 
 /* Everything that the streaming thread writes. */
@@ -318,6 +322,7 @@ forget_stream (GstDmdSync *self)
   const ObjectLock lock (self);
   st.time.reset ();
   st.locked = false;
+  st.jitter = 0;
   st.latency = 0;
 }
 
@@ -508,37 +513,6 @@ void
 notify (GstDmdSync *self, const char *property)
 {
   g_object_notify (G_OBJECT (self), property);
-}
-
-GstClockTimeDiff
-moved_back (const SyncState &st)
-{
-  if (!st.time)
-    return 0;
-  const SlotPlan &plan = st.time->plan;
-  switch (st.settings.timestamp_at) {
-  case TimestampAt::exposure_end:
-    return plan.exposure () + st.settings.exposure_offset;
-  case TimestampAt::arrival:
-    return plan.frame_period () + st.settings.exposure_offset;
-  default:
-    return st.settings.exposure_offset;
-  }
-}
-
-void
-update_latency (GstDmdSync *self)
-{
-  SyncState &st = *self->state;
-  {
-    const ObjectLock lock (self);
-    const auto latency =
-        GstClockTime (std::max<GstClockTimeDiff> (0, moved_back (st)));
-    if (std::exchange (st.latency, latency) == latency)
-      return;
-  }
-  gst_element_post_message (
-      GST_ELEMENT (self), gst_message_new_latency (GST_OBJECT (self)));
 }
 
 } // namespace cexp::gst::sync

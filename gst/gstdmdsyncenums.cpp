@@ -32,6 +32,10 @@ gst_dmd_sync_timestamp_at_get_type ()
       {int (TimestampAt::arrival),
           "Arrival: one frame period after the start, exposure and readout",
           "arrival"},
+      {int (TimestampAt::device_clock),
+          "Some instant of each exposure by the camera's own clock, as "
+          "aravissrc has it: fitted to when frames arrive, then as arrival",
+          "device-clock"},
       {0, nullptr, nullptr},
   };
   return register_enum (type, "GstDmdSyncTimestampAt", values);

@@ -145,6 +145,7 @@ take_segment (GstDmdSync *self, GstEvent *event)
   }
   if (stream.sequence)
     stream.sequence->resync ();
+  stream.device_clock.reset ();
   const gboolean taken =
       base_class ()->sink_event (GST_BASE_TRANSFORM (self), event);
   return push_tag (self) && taken;

@@ -285,11 +285,14 @@ take_frame (GstDmdSync *self, BufferPtr buffer)
   }
 
   const GstSegment &segment = GST_BASE_TRANSFORM (self)->segment;
-  const bool too_early = back > 0 && GstClockTime (back) > came;
   Frame frame;
   frame.buffer.reset (gst_buffer_make_writable (buffer.release ()));
   frame.step = stream.sequence->take (Nanoseconds (came), segment.rate < 0);
-  frame.pts = too_early ? 0 : came - GstClockTime (back);
+  if (frame.step.arrival == Arrival::restarted)
+    stream.device_clock.reset ();
+  const GstClockTime time = pipeline_time (self, frame.buffer.get ());
+  const bool too_early = back > 0 && GstClockTime (back) > time;
+  frame.pts = too_early ? 0 : time - GstClockTime (back);
 
   GstFlowReturn flow = GST_FLOW_OK;
   if (!take_arrival (self, frame, flow))

@@ -11,6 +11,7 @@
 #include <gst/gst.h>
 #include <gst/video/video.h>
 
+#include "clock/device_clock.h"
 #include "clock/frame_sequence.h"
 #include "clock/phase_lock.h"
 #include "clock/phase_watch.h"
@@ -25,7 +26,7 @@ namespace cexp::gst::sync
 {
 
 /** The instant of an exposure that the PTS of incoming frames mean. */
-enum class TimestampAt { exposure_start, exposure_end, arrival };
+enum class TimestampAt { exposure_start, exposure_end, arrival, device_clock };
 /** What takes the place of lost frames. */
 enum class OnLoss { gap, repeat, error };
 /** What becomes of frames that are not locked. */
@@ -49,6 +50,8 @@ struct Counters {
   guint64 frames_skipped = 0;
   guint64 frames_repeated = 0;
   guint64 slips = 0;
+  guint64 clock_restarts = 0;
+  gdouble clock_drift = 0; ///< ppm by which the camera's clock is fast
 };
 
 /** Everything that follows from the caps. */
@@ -62,6 +65,7 @@ struct Timebase {
 struct Stream {
   std::optional<Timebase> time;
   std::optional<FrameSequence> sequence;
+  DeviceClock device_clock;
   std::optional<PhaseWatch> watch;
   std::optional<PhaseLock> lock;
   BufferPtr last;              ///< a copy, for on-loss=repeat
@@ -81,7 +85,8 @@ struct SyncState {
   bool locked = false;
   SlipObservable observable = SlipObservable::never; ///< of the schedule
   std::optional<Timebase> time;                      ///< that of the stream
-  GstClockTime latency = 0;                          ///< our own
+  GstClockTime jitter = 0;  ///< most by which frames came after their time
+  GstClockTime latency = 0; ///< our own
 
   /* Changed between NULL and READY only. */
   Schedule schedule;
@@ -97,11 +102,16 @@ SyncState &state (GstDmdSync *self);
 
 /** Tells watchers of a property that it changed. */
 void notify (GstDmdSync *self, const char *property);
-/** Follows the settings and the caps; posts a message when the latency that
- * they make has changed. */
+
+/* Time. */
+/** Follows the settings, the caps and the jitter; posts a message when the
+ * latency that they make has changed. */
 void update_latency (GstDmdSync *self);
 /** By how much PTS are moved back for the settings. Object lock. */
 GstClockTimeDiff moved_back (const SyncState &st);
+/** The PTS that @p frame came with, by the pipeline's clock. Leaves what it was
+ * told from on the frame, which is writable. */
+GstClockTime pipeline_time (GstDmdSync *self, GstBuffer *frame);
 
 /* The DMD; each returns false with an error on the bus. */
 bool open_device (GstDmdSync *self);

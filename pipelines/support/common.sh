@@ -319,7 +319,7 @@ coded_source ()
   if ! is_set source || is_set device || is_set schedule; then
     local device=${opt[device]:-} timestamps=''
     is_set camera || is_set source || device=${device:-sim:bench}
-    ! is_set camera || timestamps='timestamp-at=arrival '
+    ! is_set camera || timestamps='timestamp-at=device-clock '
     printf 'dmdsync name=sync device=%s schedule=%s %s! ' \
       "$(quoted "$device")" "$(quoted "$(schedule)")" "$timestamps"
   fi

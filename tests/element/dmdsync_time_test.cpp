@@ -1,0 +1,132 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* dmdsync behind a camera that stamps frames by a clock of its own. */
+#include <cmath>
+#include <random>
+
+#include "sync_harness.h"
+
+namespace
+{
+
+using namespace cexp;
+using namespace cexp::test;
+
+const auto *const linked =
+    ::testing::AddGlobalTestEnvironment (new LinkedElements);
+
+constexpr GstClockTime kMs = GST_MSECOND;
+
+/** A time that a frame bears, of the clock that @p caps name. */
+GstClockTime
+reference_time (const BufferPtr &frame, const char *caps)
+{
+  const GstReferenceTimestampMeta *meta =
+      gst_buffer_get_reference_timestamp_meta (
+          frame.get (), caps_of (caps).get ());
+  return meta ? meta->timestamp : GST_CLOCK_TIME_NONE;
+}
+
+/* The camera's clock is 200 ppm fast; frames take a frame period and up to 5 ms
+ * more to arrive. */
+class DmdsyncDeviceClock : public ::testing::TestWithParam<FrameRate>
+{
+protected:
+  DmdsyncDeviceClock ()
+  {
+    gst_harness_use_testclock (sync_.get ());
+    sync_.start (rate_);
+  }
+
+  GstClockTime exposure (int frame) const
+  {
+    return 3 * GST_SECOND + sync_.time_of (frame);
+  }
+  GstClockTime stamp (int frame) const
+  {
+    return 3 * GST_SECOND + GstClockTime (std::llround (
+                                1.0002 * double (sync_.time_of (frame))));
+  }
+  BufferPtr send (int frame, GstClockTime delay)
+  {
+    arrival_ = exposure (frame) + GstClockTime (rate_.period ()) + delay;
+    gst_harness_set_time (sync_.get (), arrival_);
+    EXPECT_EQ (sync_.send (stamp (frame)), GST_FLOW_OK);
+    return sync_.pull ();
+  }
+
+  const FrameRate rate_ = GetParam ();
+  SyncHarness sync_{"timestamp-at=device-clock"};
+  GstClockTime arrival_ = 0;
+};
+
+TEST_P (DmdsyncDeviceClock, PtsIsTheStartOfTheExposureWithin50Microseconds)
+{
+  std::mt19937 random (1);
+  std::uniform_int_distribution<GstClockTime> delay (0, 5 * kMs);
+  const int settled = int (170 * GST_SECOND / GstClockTime (rate_.period ()));
+  for (int k = 0; k < settled + 500; k++) {
+    const BufferPtr frame = send (k, delay (random));
+    ASSERT_TRUE (frame);
+    ASSERT_EQ (reference_time (frame, "timestamp/x-camera-device"), stamp (k));
+    ASSERT_EQ (reference_time (frame, "timestamp/x-arrival"), arrival_);
+    ASSERT_EQ (
+        GST_BUFFER_DURATION (frame.get ()), GstClockTime (rate_.period ()));
+    ASSERT_EQ (GST_BUFFER_OFFSET (frame.get ()), guint64 (k));
+    if (k < settled)
+      continue;
+    ASSERT_LE (
+        std::abs (GST_CLOCK_DIFF (exposure (k), GST_BUFFER_PTS (frame.get ()))),
+        50 * GST_USECOND)
+        << k;
+  }
+  EXPECT_EQ (sync_.counter ("frames-lost"), 0u);
+  EXPECT_EQ (sync_.counter ("clock-restarts"), 0u);
+  /* Of the first frames, the times themselves were not known as well. */
+  const GstClockTime latency = gst_harness_query_latency (sync_.get ());
+  EXPECT_GE (latency, GstClockTime (rate_.period ()) + 5 * kMs);
+  EXPECT_LE (latency, GstClockTime (rate_.period ()) + 6 * kMs);
+}
+
+TEST_P (DmdsyncDeviceClock, LatencyIsAnnouncedWhenItGrows)
+{
+  ASSERT_TRUE (send (0, 0));
+  while (sync_.message (GST_MESSAGE_LATENCY))
+    ;
+  const GstClockTime transfer = GstClockTime (rate_.period ());
+  EXPECT_EQ (gst_harness_query_latency (sync_.get ()), transfer);
+  ASSERT_TRUE (send (1, 0));
+  EXPECT_FALSE (sync_.message (GST_MESSAGE_LATENCY));
+
+  ASSERT_TRUE (send (2, 2'500'000));
+  EXPECT_TRUE (sync_.message (GST_MESSAGE_LATENCY));
+  EXPECT_EQ (gst_harness_query_latency (sync_.get ()), transfer + 3 * kMs);
+
+  /* A frame that was held up for seconds is no jitter. */
+  ASSERT_TRUE (send (3, 2 * GST_SECOND));
+  EXPECT_FALSE (sync_.message (GST_MESSAGE_LATENCY));
+  EXPECT_EQ (gst_harness_query_latency (sync_.get ()), transfer + 3 * kMs);
+}
+
+TEST_P (DmdsyncDeviceClock, ANewSegmentIsANewClock)
+{
+  for (int k = 0; k < 300; k++)
+    ASSERT_TRUE (send (k, 0));
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_TIME);
+  sync_.push_event (gst_event_new_segment (&segment));
+
+  /* The camera was away; its first frame bears the time of its arrival. */
+  const GstClockTime back = exposure (900) + 7 * kMs;
+  gst_harness_set_time (sync_.get (), back);
+  ASSERT_EQ (sync_.send (back), GST_FLOW_OK);
+  const BufferPtr frame = sync_.pull ();
+  ASSERT_TRUE (frame);
+  EXPECT_EQ (
+      GST_BUFFER_PTS (frame.get ()), back - GstClockTime (rate_.period ()));
+}
+
+INSTANTIATE_TEST_SUITE_P (Rates, DmdsyncDeviceClock,
+    ::testing::Values (FrameRate{25, 1}, FrameRate{30000, 1001}),
+    [] (const auto &info) { return "num" + std::to_string (info.param.num); });
+
+} // namespace

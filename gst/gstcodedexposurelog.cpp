@@ -24,16 +24,13 @@
  */
 #include "gstcodedexposurelog.h"
 
-#include <cerrno>
 #include <optional>
 #include <string>
-
-#include <fcntl.h>
-#include <unistd.h>
 
 #include <nlohmann/json.hpp>
 
 #include "gstcodedexposurecaps.h"
+#include "gstcodedexposurelines.h"
 #include "gstcodedexposuremeta.h"
 #include "gstcodedexposuretag.h"
 #include "gstraii.h"
@@ -47,10 +44,11 @@ namespace
 {
 
 struct LogState {
+  explicit LogState (gpointer element) : file (element) {}
+
   std::string location; // object lock
   /* Streaming thread, and start and stop, which exclude it: */
-  std::string open_location;
-  int file = -1;
+  LineFile file;
   guint64 frames = 0;
   std::optional<cexp::Schedule> schedule; // written last
 };
@@ -85,34 +83,8 @@ frame_line (GstBuffer *frame, guint64 counted, const GstSegment &segment)
     line["lost_before"] = meta->lost_before;
     line["saturated"] = meta->saturated;
   }
-  auto flags = nlohmann::ordered_json::array ();
-  if (GST_BUFFER_IS_DISCONT (frame))
-    flags.push_back ("discont");
-  if (GST_BUFFER_FLAG_IS_SET (frame, GST_BUFFER_FLAG_CORRUPTED))
-    flags.push_back ("corrupted");
-  if (GST_BUFFER_FLAG_IS_SET (frame, GST_BUFFER_FLAG_GAP))
-    flags.push_back ("gap");
-  if (GST_BUFFER_FLAG_IS_SET (frame, GST_BUFFER_FLAG_DROPPABLE))
-    flags.push_back ("droppable");
-  line["flags"] = std::move (flags);
+  line["flags"] = flag_names (frame);
   return line.dump ();
-}
-
-/** Writes all of @p text; 0, or the errno of the failure. */
-int
-write_all (int file, const std::string &text)
-{
-  std::size_t written = 0;
-  while (written < text.size ()) {
-    const ssize_t n =
-        write (file, text.data () + written, text.size () - written);
-    if (n < 0 && errno == EINTR)
-      continue;
-    if (n < 0)
-      return errno;
-    written += std::size_t (n);
-  }
-  return 0;
 }
 
 } // namespace
@@ -130,33 +102,13 @@ G_DEFINE_TYPE_WITH_CODE (GstCodedExposureLog, gst_coded_exposure_log,
 GST_ELEMENT_REGISTER_DEFINE (codedexposure_log, "codedexposure-log",
     GST_RANK_NONE, GST_TYPE_CODED_EXPOSURE_LOG)
 
-/* Errors go to the bus. */
-static bool
-write_line (GstCodedExposureLog *self, const std::string &line)
-{
-  const LogState &state = *self->state;
-  const int failure = write_all (state.file, line + "\n");
-  if (failure == 0)
-    return true;
-  gst_element_message_full (GST_ELEMENT (self), GST_MESSAGE_ERROR,
-      GST_RESOURCE_ERROR,
-      failure == ENOSPC ? GST_RESOURCE_ERROR_NO_SPACE_LEFT
-                        : GST_RESOURCE_ERROR_WRITE,
-      g_strdup_printf (
-          "Cannot write to \"%s\": %s. It holds the frames up to here.",
-          state.open_location.c_str (), g_strerror (failure)),
-      nullptr, __FILE__, GST_FUNCTION, __LINE__);
-  return false;
-}
-
 static GstFlowReturn
 gst_coded_exposure_log_transform_ip (GstBaseTransform *base, GstBuffer *frame)
 {
-  auto *self = GST_CODED_EXPOSURE_LOG (base);
-  LogState &state = *self->state;
+  LogState &state = *GST_CODED_EXPOSURE_LOG (base)->state;
   const std::string line = frame_line (frame, state.frames, base->segment);
   state.frames++;
-  return write_line (self, line) ? GST_FLOW_OK : GST_FLOW_ERROR;
+  return state.file.write (line) ? GST_FLOW_OK : GST_FLOW_ERROR;
 }
 
 /* Tags repeat as they are merged on their way; the schedule is written once. */
@@ -179,7 +131,7 @@ note_schedule (GstCodedExposureLog *self, GstEvent *event)
   if (state.schedule == schedule->value ())
     return;
   state.schedule = schedule->value ();
-  write_line (self, state.schedule->to_json ());
+  state.file.write (state.schedule->to_json ());
 }
 
 static gboolean
@@ -195,42 +147,26 @@ gst_coded_exposure_log_start (GstBaseTransform *base)
 {
   auto *self = GST_CODED_EXPOSURE_LOG (base);
   LogState &state = *self->state;
+  std::string location;
   {
     const ObjectLock lock (self);
-    state.open_location = state.location;
+    location = state.location;
   }
   state.frames = 0;
   state.schedule.reset ();
-  if (state.open_location.empty ()) {
+  if (location.empty ()) {
     GST_ELEMENT_ERROR (self, RESOURCE, NOT_FOUND,
         ("codedexposure-log has no file to write to: set location=FILE.jsonl"),
         (nullptr));
     return FALSE;
   }
-  state.file = open (state.open_location.c_str (),
-      O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-  if (state.file < 0) {
-    GST_ELEMENT_ERROR (self, RESOURCE, OPEN_WRITE,
-        ("Cannot open \"%s\" for writing: %s", state.open_location.c_str (),
-            g_strerror (errno)),
-        (nullptr));
-    return FALSE;
-  }
-  return TRUE;
+  return state.file.open (location);
 }
 
 static gboolean
 gst_coded_exposure_log_stop (GstBaseTransform *base)
 {
-  auto *self = GST_CODED_EXPOSURE_LOG (base);
-  LogState &state = *self->state;
-  /* Network and quota errors may wait for the end. */
-  if (close (state.file) != 0)
-    GST_ELEMENT_ERROR (self, RESOURCE, CLOSE,
-        ("Cannot finish \"%s\": %s", state.open_location.c_str (),
-            g_strerror (errno)),
-        (nullptr));
-  state.file = -1;
+  GST_CODED_EXPOSURE_LOG (base)->state->file.close ();
   return TRUE;
 }
 
@@ -269,7 +205,7 @@ gst_coded_exposure_log_get_property (
 static void
 gst_coded_exposure_log_init (GstCodedExposureLog *self)
 {
-  self->state = new LogState;
+  self->state = new LogState (self);
   gst_base_transform_set_passthrough (GST_BASE_TRANSFORM (self), TRUE);
 }
 

@@ -7,15 +7,19 @@
 #include "gstcodedexposuremeta.h"
 #include "gstcodedexposuresim.h"
 #include "gstdmdsync.h"
+#include "gstsubframestats.h"
+#include "gstsubframestatsreport.h"
 
 static gboolean
 plugin_init (GstPlugin *plugin)
 {
   cexp::gst::register_frame_meta ();
+  cexp::gst::register_stats_meta ();
   return GST_ELEMENT_REGISTER (codedexposure_demux, plugin) &&
          GST_ELEMENT_REGISTER (codedexposure_log, plugin) &&
          GST_ELEMENT_REGISTER (codedexposure_sim, plugin) &&
-         GST_ELEMENT_REGISTER (dmdsync, plugin);
+         GST_ELEMENT_REGISTER (dmdsync, plugin) &&
+         GST_ELEMENT_REGISTER (subframestats, plugin);
 }
 
 GST_PLUGIN_DEFINE (GST_VERSION_MAJOR, GST_VERSION_MINOR, codedexposure,

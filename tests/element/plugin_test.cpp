@@ -49,7 +49,8 @@ is_ours (const GParamSpec *spec)
 {
   const gchar *owner = g_type_name (spec->owner_type);
   return g_str_has_prefix (owner, "GstCodedExposure") ||
-         g_str_has_prefix (owner, "GstDmd");
+         g_str_has_prefix (owner, "GstDmd") ||
+         g_str_has_prefix (owner, "GstSubframe");
 }
 
 } // namespace
@@ -57,7 +58,7 @@ is_ours (const GParamSpec *spec)
 TEST (Plugin, HasTheElementsOfTheBench)
 {
   for (const char *name : {"codedexposure-sim", "codedexposure-demux",
-           "codedexposure-log", "dmdsync"}) {
+           "codedexposure-log", "dmdsync", "subframestats"}) {
     const std::unique_ptr<GstElementFactory, ObjectUnref> factory (
         gst_element_factory_find (name));
     EXPECT_NE (factory, nullptr) << name;

@@ -1,0 +1,139 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "stats/picture_stats.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <span>
+#include <string>
+
+namespace cexp
+{
+
+namespace
+{
+
+template <typename Pixel>
+constexpr std::size_t
+    kLevels = std::size_t (std::numeric_limits<Pixel>::max ()) + 1;
+
+/* Equal neighbours, as in flat parts of a picture, would wait for each other at
+ * one counter. Counts of 16-bit levels would not stay in the cache. */
+template <typename Pixel>
+constexpr std::size_t kCounts = sizeof (Pixel) == 1 ? 4 : 1;
+
+} // namespace
+
+template <typename Pixel>
+Result<StatsMeter<Pixel>>
+StatsMeter<Pixel>::make (Extent size, const StatsOptions &options)
+{
+  constexpr int kBits = std::numeric_limits<Pixel>::digits;
+  if (size.width < 1 || size.height < 1)
+    return Error{"a picture of " + std::to_string (size.width) + "x" +
+                 std::to_string (size.height) + " has no statistics"};
+  if (options.bits < 0 || options.bits > kBits)
+    return Error{"bits = " + std::to_string (options.bits) +
+                 " is no number of bits of a pixel; it has 1 to " +
+                 std::to_string (kBits) + ", 0 for all"};
+  if (options.bins < 0)
+    return Error{"a histogram cannot have " + std::to_string (options.bins) +
+                 " bins; 0 leaves it out"};
+  StatsMeter meter;
+  meter.bits_ = options.bits > 0 ? options.bits : kBits;
+  if (options.line) {
+    auto points = options.line->points (size);
+    if (!points)
+      return points.error ();
+    meter.points_ = *std::move (points);
+  }
+  meter.levels_.resize (kCounts<Pixel> * kLevels<Pixel>);
+  meter.stats_.pixels =
+      std::uint64_t (size.width) * std::uint64_t (size.height);
+  meter.stats_.histogram.resize (
+      std::size_t (std::min (options.bins, 1 << meter.bits_)));
+  meter.stats_.profile.resize (meter.points_.size ());
+  return meter;
+}
+
+template <typename Pixel>
+void
+StatsMeter<Pixel>::count_levels (ImageView<const Pixel> picture)
+{
+  constexpr std::size_t kSide = kCounts<Pixel>;
+  std::ranges::fill (levels_, 0u);
+  std::uint32_t *counts = levels_.data ();
+  const auto width = std::size_t (picture.width);
+  for (int y = 0; y < picture.height; y++) {
+    const Pixel *row = picture.row (y);
+    std::size_t x = 0;
+    for (; x + kSide <= width; x += kSide)
+      for (std::size_t i = 0; i < kSide; i++)
+        counts[i * kLevels<Pixel> + row[x + i]]++;
+    for (; x < width; x++)
+      counts[row[x]]++;
+  }
+  for (std::size_t i = 1; i < kSide; i++)
+    for (std::size_t v = 0; v < kLevels<Pixel>; v++)
+      counts[v] += counts[i * kLevels<Pixel> + v];
+}
+
+/* Entropy: -sum p log p with p = c / N is log N - (sum c log c) / N. */
+template <typename Pixel>
+void
+StatsMeter<Pixel>::summarise ()
+{
+  const auto largest = std::size_t ((1 << bits_) - 1);
+  const auto levels = std::span (levels_).first (kLevels<Pixel>);
+  const auto occurs = [] (std::uint32_t count) { return count > 0; };
+  const auto first = std::ranges::find_if (levels, occurs);
+  stats_.minimum = unsigned (first - levels.begin ());
+  stats_.saturated = 0;
+  double sum = 0.0, weighed = 0.0;
+  for (std::size_t v = stats_.minimum; v < levels.size (); v++) {
+    if (!occurs (levels[v]))
+      continue;
+    const double count = levels[v];
+    stats_.maximum = unsigned (v);
+    sum += count * double (v);
+    weighed += count * std::log2 (count);
+    if (v >= largest)
+      stats_.saturated += levels[v];
+  }
+  const auto pixels = double (stats_.pixels);
+  stats_.mean = sum / pixels;
+  stats_.entropy = std::max (0.0, std::log2 (pixels) - weighed / pixels);
+}
+
+template <typename Pixel>
+void
+StatsMeter<Pixel>::fill_histogram ()
+{
+  std::vector<std::uint64_t> &histogram = stats_.histogram;
+  if (histogram.empty ())
+    return;
+  std::ranges::fill (histogram, 0u);
+  const auto largest = std::size_t ((1 << bits_) - 1);
+  for (std::size_t v = stats_.minimum; v <= stats_.maximum; v++) {
+    const std::size_t bin =
+        (std::min (v, largest) * histogram.size ()) >> bits_;
+    histogram[bin] += levels_[v];
+  }
+}
+
+template <typename Pixel>
+const PictureStats &
+StatsMeter<Pixel>::measure (ImageView<const Pixel> picture)
+{
+  count_levels (picture);
+  summarise ();
+  fill_histogram ();
+  std::ranges::transform (points_, stats_.profile.begin (),
+      [&] (PicturePoint at) { return value_at (picture, at); });
+  return stats_;
+}
+
+template class StatsMeter<std::uint8_t>;
+template class StatsMeter<std::uint16_t>;
+
+} // namespace cexp

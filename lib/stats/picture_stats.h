@@ -1,0 +1,69 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* What a picture's grey levels say of it: intensity, entropy, profile. */
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "base/image.h"
+#include "base/result.h"
+#include "stats/profile_line.h"
+
+namespace cexp
+{
+
+/** What is to be measured; the zero value is all but a line. */
+struct StatsOptions {
+  /** Significant bits of a pixel, 1..8 or 1..16; 0: all that the type has. */
+  int bits = 0;
+  /** Bins of the histogram, of equal width over all levels; 0: none; more than
+   * there are levels: one a level. */
+  int bins = 256;
+  std::optional<ProfileLine> line = {};
+};
+
+/** The figures of a picture (paper, Figs. 9c, 10c and 11c). */
+struct PictureStats {
+  std::uint64_t pixels = 0;
+  double mean = 0.0;           ///< counts
+  unsigned minimum = 0;        ///< counts
+  unsigned maximum = 0;        ///< counts
+  double entropy = 0.0;        ///< of the grey levels (Shannon), bits a pixel
+  std::uint64_t saturated = 0; ///< pixels at 2^bits - 1, or above
+  std::vector<std::uint64_t> histogram; ///< pixels in each bin
+  std::vector<double> profile;          ///< values along the line
+};
+
+/**
+ * Measures pictures of one size, one after the other. Everything but the
+ * profile comes from one count of the grey levels, in one pass.
+ */
+template <typename Pixel> // std::uint8_t or std::uint16_t (host order)
+class StatsMeter
+{
+public:
+  /** Error when the picture is empty, a number is out of range, or the line
+   * leaves the picture. */
+  static Result<StatsMeter> make (Extent size, const StatsOptions &options);
+
+  /** @p picture of the size that was given. Valid until the next call. */
+  const PictureStats &measure (ImageView<const Pixel> picture);
+
+private:
+  StatsMeter () = default;
+  void count_levels (ImageView<const Pixel> picture);
+  void summarise ();
+  void fill_histogram ();
+
+  int bits_ = 0;
+  std::vector<PicturePoint> points_;
+  /** Pixels of each level; several counts side by side for bytes. */
+  std::vector<std::uint32_t> levels_;
+  PictureStats stats_;
+};
+
+extern template class StatsMeter<std::uint8_t>;
+extern template class StatsMeter<std::uint16_t>;
+
+} // namespace cexp

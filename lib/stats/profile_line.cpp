@@ -1,0 +1,106 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "stats/profile_line.h"
+
+#include <algorithm>
+#include <array>
+
+#include "base/text.h"
+
+namespace cexp
+{
+
+double
+ProfileLine::Coordinate::in (int length) const
+{
+  return relative ? value * (length - 1) : value;
+}
+
+Result<ProfileLine::Coordinate>
+ProfileLine::parse_coordinate (std::string_view text)
+{
+  const bool relative = text.ends_with ('%');
+  const auto number =
+      parse_real (relative ? text.substr (0, text.size () - 1) : text);
+  const double most = relative ? 100.0 : 1e6;
+  if (!number || *number < 0.0 || *number > most)
+    return Error{in_quotes (text) +
+                 " is no place in a picture; write pixels, such as 143, or a "
+                 "part, 0% to 100%"};
+  return Coordinate{relative ? *number / 100.0 : *number, relative};
+}
+
+Result<ProfileLine>
+ProfileLine::parse (std::string_view text)
+{
+  ProfileLine line;
+  const auto rest_of = [text] (std::string_view prefix) {
+    return split (text.substr (prefix.size ()), '/');
+  };
+  constexpr std::string_view kRow = "row:", kColumn = "column:";
+  std::vector<std::string_view> parts;
+  std::array<Coordinate *, 4> wanted = {
+      &line.x0_, &line.y0_, &line.x1_, &line.y1_};
+  std::size_t count = 4;
+  if (text.starts_with (kRow)) {
+    parts = rest_of (kRow);
+    wanted = {&line.y0_};
+    count = 1;
+  } else if (text.starts_with (kColumn)) {
+    line.kind_ = Kind::kColumn;
+    parts = rest_of (kColumn);
+    wanted = {&line.x0_};
+    count = 1;
+  } else {
+    line.kind_ = Kind::kFree;
+    parts = split (text, '/');
+  }
+  if (parts.size () != count)
+    return Error{"cannot use " + in_quotes (text) +
+                 " as a line; write row:Y, column:X or X0/Y0/X1/Y1, each in "
+                 "pixels or in %"};
+  for (std::size_t i = 0; i < count; i++) {
+    const auto coordinate = parse_coordinate (parts[i]);
+    if (!coordinate)
+      return coordinate.error ();
+    *wanted[i] = *coordinate;
+  }
+  return line;
+}
+
+Result<std::vector<PicturePoint>>
+ProfileLine::points (Extent size) const
+{
+  PicturePoint from{x0_.in (size.width), y0_.in (size.height)};
+  PicturePoint to{x1_.in (size.width), y1_.in (size.height)};
+  if (kind_ == Kind::kRow) {
+    from = {0.0, std::round (from.y)};
+    to = {double (size.width - 1), from.y};
+  } else if (kind_ == Kind::kColumn) {
+    from = {std::round (from.x), 0.0};
+    to = {from.x, double (size.height - 1)};
+  }
+  const double right = std::max (from.x, to.x);
+  const double bottom = std::max (from.y, to.y);
+  if (right > size.width - 1 || bottom > size.height - 1)
+    return Error{"the line reaches pixel (" + real_text (right) + ", " +
+                 real_text (bottom) + ") of a picture of " +
+                 std::to_string (size.width) + "x" +
+                 std::to_string (size.height) + "; its last pixel is (" +
+                 std::to_string (size.width - 1) + ", " +
+                 std::to_string (size.height - 1) +
+                 "), and parts such as 50% fit every size"};
+
+  const int steps = std::max (
+      1, int (std::lround (std::hypot (to.x - from.x, to.y - from.y))));
+  std::vector<PicturePoint> points;
+  if (from == to)
+    return std::vector{from};
+  for (int i = 0; i <= steps; i++) {
+    const double part = double (i) / steps;
+    points.push_back (
+        {std::lerp (from.x, to.x, part), std::lerp (from.y, to.y, part)});
+  }
+  return points;
+}
+
+} // namespace cexp

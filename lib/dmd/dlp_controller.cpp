@@ -7,10 +7,13 @@ namespace cexp
 namespace
 {
 
+using namespace dlp;
 using namespace std::chrono_literals;
 
 constexpr auto kPollPause = 10ms;
-constexpr int kPolls = 100;
+/** Of a stop, in all and for each of two attempts. */
+constexpr auto kStopPatience = 800ms;
+constexpr auto kStopTimeout = 400ms;
 
 } // namespace
 
@@ -57,17 +60,69 @@ Result<void>
 DlpController::await (const HidCommand &command, std::uint8_t mask,
     std::uint8_t value, const std::string &what)
 {
-  for (int poll = 0; poll < kPolls; poll++) {
+  do {
     const auto byte = read_byte (command);
     if (!byte)
       return byte.error ();
     if ((*byte & mask) == value)
       return {};
-    link_->pause (kPollPause);
-  }
-  return link_->error (what, "it did not within " +
-                                 std::to_string (kPolls * kPollPause.count ()) +
-                                 " ms");
+  } while (link_->wait (kPollPause));
+  return link_->error (
+      what, link_->cancelled () ? "cancelled" : "it takes too long");
+}
+
+Result<void>
+DlpController::enter (std::uint8_t mode)
+{
+  if (const auto set = write_byte (kDisplayMode, mode); !set)
+    return set;
+  return await (kDisplayMode, 0xFF, mode, "change the display mode");
+}
+
+Result<void>
+DlpController::halt ()
+{
+  if (const auto stopped = write_byte (kRun, kRunStop); !stopped)
+    return stopped;
+  return await (kMainStatus, kSequencerRuns, 0, "stop the patterns");
+}
+
+bool
+DlpController::stop ()
+{
+  link_->begin ({}, kStopPatience);
+  HidCommand run = kRun;
+  run.timeout = kStopTimeout;
+  for (int attempt = 0; attempt < 2 && !link_->gone (); attempt++)
+    if (write_byte (run, kRunStop))
+      return true;
+  return link_->gone ();
+}
+
+Result<DmdStatus>
+DlpController::status ()
+{
+  const auto main = read_byte (kMainStatus);
+  const auto hardware = main ? read_byte (kHardwareStatus) : main;
+  if (!hardware)
+    return hardware.error ();
+  return DmdStatus{(*main & kSequencerRuns) != 0,
+      {{"health",
+           healthy (*hardware) ? "good" : "hardware status reports a failure"},
+          {"parked", (*main & kParked) != 0 ? "yes" : "no"}}};
+}
+
+Result<void>
+DlpController::check_health ()
+{
+  const auto hardware = read_byte (kHardwareStatus);
+  if (!hardware)
+    return hardware.error ();
+  if (!healthy (*hardware))
+    return link_->error (
+        "show masks", "its hardware status is " + std::to_string (*hardware) +
+                          ", which tells of a failure; switch it off and on");
+  return {};
 }
 
 } // namespace cexp

@@ -5,6 +5,8 @@
 
 #include <functional>
 
+#include "dmd/dlp_commands.h"
+#include "dmd/dmd.h"
 #include "dmd/hid_link.h"
 
 namespace cexp
@@ -17,8 +19,11 @@ public:
   /** Says what was wrong with the last command, after a refusal. */
   using Explain = std::function<std::string (DlpController &)>;
 
-  DlpController (std::unique_ptr<HidLink> link, Explain explain)
-      : link_ (std::move (link)), explain_ (std::move (explain))
+  /** @p failures  bits of the hardware status that tell of one. */
+  DlpController (
+      std::unique_ptr<HidLink> link, std::uint8_t failures, Explain explain)
+      : link_ (std::move (link)), failures_ (failures),
+        explain_ (std::move (explain))
   {
   }
 
@@ -33,11 +38,35 @@ public:
   Result<void> await (const HidCommand &command, std::uint8_t mask,
       std::uint8_t value, const std::string &what);
 
+  /** Changes the display mode, and waits until it has. */
+  Result<void> enter (std::uint8_t mode);
+  /** Stops the sequencer, and waits until it stands. */
+  Result<void> halt ();
+  /**
+   * Stops the sequencer in a short job of its own, which a board that does not
+   * answer ends.
+   *
+   * @return false when it may be running on: it did not say that it stopped,
+   * and is still there.
+   */
+  bool stop ();
+
+  /** What all boards say of themselves. */
+  Result<DmdStatus> status ();
+  /** Error when the hardware status tells of a failure. */
+  Result<void> check_health ();
+
   HidLink &link () { return *link_; }
   const HidLink &link () const { return *link_; }
 
 private:
+  bool healthy (std::uint8_t hardware) const
+  {
+    return (hardware & dlp::kInitialised) != 0 && (hardware & failures_) == 0;
+  }
+
   std::unique_ptr<HidLink> link_;
+  std::uint8_t failures_;
   Explain explain_;
 };
 

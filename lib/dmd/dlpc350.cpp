@@ -16,8 +16,8 @@ namespace
 using namespace dlpc350;
 
 constexpr Extent kMirrors{912, 1140};
-constexpr std::uint8_t kFailureBits = 0xCC; // of the hardware status
-constexpr int kVerdictPolls = 100;
+/** Of the hardware status: resets, forced swap, sequencer. */
+constexpr std::uint8_t kFailures = 0xCC;
 constexpr int kStartAttempts = 3;
 /** Masks in one frame of video. */
 constexpr int kVideoPlanes = kPlanesPerImage;
@@ -26,7 +26,8 @@ class Dlpc350 : public Dmd
 {
 public:
   Dlpc350 (std::unique_ptr<HidLink> link, const DmdOptions &options)
-      : options_ (options), board_ (std::move (link), [] (DlpController &) {
+      : options_ (options),
+        board_ (std::move (link), kFailures, [] (DlpController &) {
           return std::string ("refused; the board is in another mode, or its "
                               "firmware does not know this");
         })
@@ -44,13 +45,16 @@ public:
   Result<DmdStatus> status () override;
   Result<void> upload (const Schedule &schedule, std::stop_token stop,
       const UploadProgress &progress) override;
-  Result<void> start (const SlotPlan &plan) override;
-  void stop () override;
+  Result<void> start (const SlotPlan &plan, std::stop_token stop) override;
+  void stop () override { running_ = !board_.stop () && running_; }
   bool running () const override { return running_; }
 
 private:
+  void begin (std::stop_token stop = {})
+  {
+    board_.link ().begin (std::move (stop), options_.patience);
+  }
   Result<void> check_images (const Schedule &schedule);
-  Result<void> halt ();
   Result<void> prepare ();
   std::vector<Entry> entries () const;
   Result<void> fill_mailbox (std::uint8_t mailbox, const Bytes &data);
@@ -70,6 +74,7 @@ private:
 Result<void>
 Dlpc350::open ()
 {
+  begin ();
   const auto version = board_.read (kVersion, 16);
   if (!version)
     return version.error ();
@@ -90,18 +95,16 @@ Dlpc350::open ()
 Result<DmdStatus>
 Dlpc350::status ()
 {
-  const auto main = board_.read_byte (kMainStatus);
-  const auto hardware = main ? board_.read_byte (kHardwareStatus) : main;
-  const auto images = hardware ? board_.read_byte (kFlashImages) : hardware;
+  begin ();
+  const auto images = board_.read_byte (kFlashImages);
   if (!images)
     return images.error ();
-  const bool healthy =
-      (*hardware & kInitialised) != 0 && (*hardware & kFailureBits) == 0;
-  return DmdStatus{(*main & kSequencerRuns) != 0,
-      {{"controller", "DLPC350"}, {"mirrors", "DLP4500"},
-          {"images-in-flash", std::to_string (*images)},
-          {"health", healthy ? "good" : "hardware status reports a failure"},
-          {"parked", (*main & 1) != 0 ? "yes" : "no"}}};
+  auto status = board_.status ();
+  if (status)
+    status->details.insert (status->details.begin (),
+        {{"controller", "DLPC350"}, {"mirrors", "DLP4500"},
+            {"images-in-flash", std::to_string (*images)}});
+  return status;
 }
 
 /** Whether the user said where the masks are, and it can be so. */
@@ -141,14 +144,12 @@ Dlpc350::upload (const Schedule &schedule, std::stop_token stop_token,
     const UploadProgress &progress)
 {
   masks_.clear ();
+  begin (std::move (stop_token));
   if (const auto there = check_images (schedule); !there)
     return there;
   progress (0, 1);
   touched_ = true;
-  board_.link ().cancel_on (stop_token);
-  const auto ready = prepare ();
-  board_.link ().cancel_on ({});
-  if (!ready) {
+  if (const auto ready = prepare (); !ready) {
     stop ();
     return ready;
   }
@@ -159,25 +160,13 @@ Dlpc350::upload (const Schedule &schedule, std::stop_token stop_token,
 }
 
 Result<void>
-Dlpc350::halt ()
-{
-  if (const auto stopped = board_.write_byte (kRun, kRunStop); !stopped)
-    return stopped;
-  running_ = false;
-  return board_.await (kMainStatus, kSequencerRuns, 0, "stop the patterns");
-}
-
-Result<void>
 Dlpc350::prepare ()
 {
-  if (const auto stopped = halt (); !stopped)
+  if (const auto stopped = board_.halt (); !stopped)
     return stopped;
-  if (const auto set = board_.write_byte (kDisplayMode, kModePattern); !set)
-    return set;
-  if (const auto changed = board_.await (
-          kDisplayMode, 0xFF, kModePattern, "change the display mode");
-      !changed)
-    return changed;
+  running_ = false;
+  if (const auto entered = board_.enter (kModePattern); !entered)
+    return entered;
   return board_.write_byte (kSource, std::uint8_t (options_.source));
 }
 
@@ -255,7 +244,7 @@ Dlpc350::validate ()
 {
   if (const auto asked = board_.write_byte (kValidate, 0); !asked)
     return asked;
-  for (int poll = 0; poll < kVerdictPolls; poll++) {
+  do {
     const auto data = board_.read (kValidate);
     if (!data)
       return data.error ();
@@ -266,8 +255,7 @@ Dlpc350::validate ()
       return board_.link ().error ("show these masks", verdict->text);
     if (!verdict->busy)
       return {};
-    board_.link ().pause (std::chrono::milliseconds (10));
-  }
+  } while (board_.link ().wait (std::chrono::milliseconds (10)));
   return board_.link ().error (kValidate.name, "it is busy with it for ever");
 }
 
@@ -275,6 +263,7 @@ Dlpc350::validate ()
 Result<void>
 Dlpc350::run ()
 {
+  running_ = true;
   for (int attempt = 0; attempt < kStartAttempts; attempt++) {
     if (const auto asked = board_.write_byte (kRun, kRunStart); !asked)
       return asked;
@@ -282,8 +271,9 @@ Dlpc350::run ()
     if (!status)
       return status.error ();
     if ((*status & kSequencerRuns) != 0)
-      return {};
-    board_.link ().pause (std::chrono::milliseconds (100));
+      return board_.check_health ();
+    if (!board_.link ().wait (std::chrono::milliseconds (100)))
+      break;
   }
   return board_.link ().error ("start the patterns",
       options_.source == Source::video
@@ -292,7 +282,7 @@ Dlpc350::run ()
 }
 
 Result<void>
-Dlpc350::start (const SlotPlan &plan)
+Dlpc350::start (const SlotPlan &plan, std::stop_token stop_token)
 {
   if (masks_.empty ())
     return Error{info_.name + ": no masks to start; upload first"};
@@ -305,31 +295,19 @@ Dlpc350::start (const SlotPlan &plan)
     return Error{info_.name + ": masks from video follow each other without "
                               "dark time; give the schedule switching=0"};
   // After every stop, it wants its tables anew, and validated.
-  if (const auto stopped = halt (); !stopped)
+  begin (std::move (stop_token));
+  if (const auto stopped = board_.halt (); !stopped)
     return stopped;
+  running_ = false;
   if (const auto sent = send_tables (*time); !sent)
     return sent;
   if (const auto valid = validate (); !valid)
     return valid;
-  board_.link ().pause (
-      std::chrono::milliseconds (plan.frame_period () / 1'000'000 + 1));
-  const auto started = run ();
-  running_ = started.ok ();
-  return started;
-}
-
-void
-Dlpc350::stop ()
-{
-  running_ = false;
-  if (board_.link ().gone ())
-    return;
-  // A device that does not answer now does not keep anybody waiting.
-  HidCommand stop = kRun;
-  stop.timeout = std::chrono::milliseconds (500);
-  for (int attempt = 0; attempt < 2; attempt++)
-    if (board_.write_byte (stop, kRunStop))
-      break;
+  if (const auto passed = board_.link ().pause (
+          std::chrono::milliseconds (plan.frame_period () / 1'000'000 + 1));
+      !passed)
+    return passed;
+  return run ();
 }
 
 } // namespace

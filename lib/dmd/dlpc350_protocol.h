@@ -6,41 +6,28 @@
 #include <string>
 #include <vector>
 
-#include "dmd/hid_packet.h"
+#include "dmd/dlp_commands.h"
 #include "dmd/pattern_timing.h"
 
 namespace cexp::dlpc350
 {
 
-constexpr HidCommand kPower{0x0200, "set the power mode"};
-constexpr HidCommand kVersion{0x0205, "read the firmware version"};
-constexpr HidCommand kHardwareStatus{0x1A0A, "read the hardware status"};
-constexpr HidCommand kMainStatus{0x1A0C, "read the main status"};
-constexpr HidCommand kDisplayMode{0x1A1B, "set the display mode"};
-constexpr HidCommand kTriggerOut1{0x1A1D, "set up trigger output 1"};
-constexpr HidCommand kTriggerOut2{0x1A1E, "set up trigger output 2"};
+using namespace dlp;
+
 constexpr HidCommand kSource{0x1A22, "choose the source of patterns"};
 constexpr HidCommand kTriggerMode{0x1A23, "choose the trigger mode"};
-constexpr HidCommand kRun{0x1A24, "start or stop the patterns"};
 constexpr HidCommand kTimes{0x1A29, "set exposure and period"};
 constexpr HidCommand kConfigure{0x1A31, "set up the pattern table"};
 constexpr HidCommand kMailboxOffset{0x1A32, "address the mailbox"};
 constexpr HidCommand kMailbox{0x1A33, "open or close the mailbox"};
 constexpr HidCommand kMailboxData{0x1A34, "fill the mailbox"};
-constexpr HidCommand kTriggerIn1{0x1A35, "set up trigger input 1"};
 constexpr HidCommand kValidate{0x1A1A, "validate the pattern table"};
 constexpr HidCommand kFlashImages{0x1A42, "count the images in flash"};
 
 constexpr std::uint8_t kModePattern = 1;
-constexpr std::uint8_t kRunStop = 0;
-constexpr std::uint8_t kRunStart = 2;
 constexpr std::uint8_t kMailboxClosed = 0;
 constexpr std::uint8_t kMailboxImages = 1;
 constexpr std::uint8_t kMailboxPatterns = 2;
-/** Main status. */
-constexpr std::uint8_t kSequencerRuns = 1 << 1;
-/** Hardware status: initialised. */
-constexpr std::uint8_t kInitialised = 1 << 0;
 
 constexpr int kMaxPatterns = 128;
 constexpr int kMaxImages = 64;

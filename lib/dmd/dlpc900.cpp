@@ -25,7 +25,9 @@ constexpr std::uint32_t kTriggerDark = 105;
 constexpr int kShortestTriggerDelay = 104;
 /** Entries whose order fits in one message. */
 constexpr int kMaxOrder = int (kHidRequestData - 6) / 2;
-constexpr std::uint8_t kFailureBits = 0xCE; // of the hardware status
+/** Of the hardware status: DMD of another kind, resets, forced swap, sequencer.
+ */
+constexpr std::uint8_t kFailures = 0xCE;
 
 /** The reason of a refusal: a number, and a text if the board has one. */
 std::string
@@ -86,7 +88,7 @@ class Dlpc900 : public Dmd
 {
 public:
   Dlpc900 (std::unique_ptr<HidLink> link, const DmdOptions &options)
-      : options_ (options), board_ (std::move (link), explain)
+      : options_ (options), board_ (std::move (link), kFailures, explain)
   {
   }
   ~Dlpc900 () override;
@@ -98,7 +100,7 @@ public:
   Nanoseconds upload_time (const Schedule &schedule) override;
   Result<void> upload (const Schedule &schedule, std::stop_token stop,
       const UploadProgress &progress) override;
-  Result<void> start (const SlotPlan &plan) override;
+  Result<void> start (const SlotPlan &plan, std::stop_token stop) override;
   void stop () override;
   bool running () const override { return running_; }
 
@@ -110,7 +112,7 @@ private:
   std::size_t packets_of (const PlaneImage &image) const;
 
   void forget ();
-  Result<void> halt ();
+  void begin (std::stop_token stop = {});
   Result<void> prepare ();
   Result<void> send (const Schedule &schedule, const UploadPlan &plan,
       const UploadProgress &progress);
@@ -120,7 +122,7 @@ private:
   Result<void> send_half (const HidCommand &load, const HidCommand &data,
       int index, ImageView<const PlanePixel> half,
       const std::function<void (std::size_t)> &sent);
-  Result<void> check_health ();
+  Result<void> run (const SlotPlan &plan);
 
   DmdOptions options_;
   DlpController board_;
@@ -144,13 +146,14 @@ Dlpc900::~Dlpc900 ()
     return;
   stop ();
   // Mirrors live longer when they move while nothing is shown.
-  if (!board_.link ().gone ())
+  if (!running_ && !board_.link ().gone ())
     (void)board_.write_byte (kIdle, 1);
 }
 
 Result<void>
 Dlpc900::open ()
 {
+  begin ();
   const auto version = board_.read (kVersion);
   if (!version)
     return version.error ();
@@ -201,17 +204,14 @@ Dlpc900::limits () const
 Result<DmdStatus>
 Dlpc900::status ()
 {
-  const auto main = board_.read_byte (kMainStatus);
-  const auto hardware = main ? board_.read_byte (kHardwareStatus) : main;
-  if (!hardware)
-    return hardware.error ();
-  const bool healthy =
-      (*hardware & kInitialised) != 0 && (*hardware & kFailureBits) == 0;
-  return DmdStatus{(*main & kSequencerRuns) != 0,
-      {{"controller", "DLPC900"}, {"mirrors", kind_.name},
-          {"firmware", version_.text ()}, {"controllers", dual () ? "2" : "1"},
-          {"health", healthy ? "good" : "hardware status reports a failure"},
-          {"parked", (*main & 1) != 0 ? "yes" : "no"}}};
+  begin ();
+  auto status = board_.status ();
+  if (status)
+    status->details.insert (status->details.begin (),
+        {{"controller", "DLPC900"}, {"mirrors", kind_.name},
+            {"firmware", version_.text ()},
+            {"controllers", dual () ? "2" : "1"}});
+  return status;
 }
 
 std::size_t
@@ -286,9 +286,8 @@ Dlpc900::upload (const Schedule &schedule, std::stop_token stop_token,
                  std::to_string (schedule.masks ())};
   const UploadPlan plan = plan_upload (schedule);
   touched_ = true;
-  board_.link ().cancel_on (stop_token);
+  begin (stop_token);
   const auto sent = send (schedule, plan, progress);
-  board_.link ().cancel_on ({});
   if (!sent) {
     forget ();
     prepared_ = false;
@@ -326,23 +325,24 @@ Dlpc900::forget ()
   times_.clear ();
 }
 
-Result<void>
-Dlpc900::halt ()
+void
+Dlpc900::begin (std::stop_token stop_token)
 {
-  if (const auto stopped = board_.write_byte (kRun, kRunStop); !stopped)
-    return stopped;
-  running_ = false;
-  return board_.await (kMainStatus, kSequencerRuns, 0, "stop the patterns");
+  board_.link ().begin (std::move (stop_token), options_.patience);
 }
 
 /** Brings the board into the mode in which it takes masks. */
 Result<void>
 Dlpc900::prepare ()
 {
-  if (const auto stopped = halt (); !stopped || prepared_)
+  if (const auto stopped = board_.halt (); !stopped || prepared_)
     return stopped;
-  std::vector<std::pair<HidCommand, Bytes>> steps{
-      {kIdle, {0}}, {kDisplayMode, {kModeOnTheFly}}};
+  running_ = false;
+  if (const auto awake = board_.write_byte (kIdle, 0); !awake)
+    return awake;
+  if (const auto entered = board_.enter (kModeOnTheFly); !entered)
+    return entered;
+  std::vector<std::pair<HidCommand, Bytes>> steps;
   if (needs_park_cycle (version_)) {
     steps.push_back ({kPark, {1}});
     steps.push_back ({kPark, {0}});
@@ -351,15 +351,9 @@ Dlpc900::prepare ()
   steps.push_back (
       {kTriggerIn1, encode_trigger_in (int (options_.trigger_delay / 1000),
                         options_.falling_edge)});
-  for (const auto &[command, data] : steps) {
+  for (const auto &[command, data] : steps)
     if (const auto done = board_.write (command, data); !done)
       return done;
-    if (command.word == kDisplayMode.word)
-      if (const auto changed = board_.await (
-              kDisplayMode, 0xFF, kModeOnTheFly, "change the display mode");
-          !changed)
-        return changed;
-  }
   prepared_ = true;
   return {};
 }
@@ -463,20 +457,7 @@ Dlpc900::send_half (const HidCommand &load, const HidCommand &data, int index,
 }
 
 Result<void>
-Dlpc900::check_health ()
-{
-  const auto status = board_.read_byte (kHardwareStatus);
-  if (!status)
-    return status.error ();
-  if ((*status & kInitialised) == 0 || (*status & kFailureBits) != 0)
-    return board_.link ().error (
-        "show masks", "its hardware status is " + std::to_string (*status) +
-                          ", which tells of a failure; switch it off and on");
-  return {};
-}
-
-Result<void>
-Dlpc900::start (const SlotPlan &plan)
+Dlpc900::start (const SlotPlan &plan, std::stop_token stop_token)
 {
   if (order_.empty ())
     return Error{info_.name + ": no masks to start; upload first"};
@@ -486,36 +467,38 @@ Dlpc900::start (const SlotPlan &plan)
   const auto times = fit_patterns (plan, limits (), options_.master);
   if (!times)
     return Error{info_.name + ": " + times.error ().message};
-  if (const auto stopped = halt (); !stopped)
+  begin (std::move (stop_token));
+  if (const auto stopped = board_.halt (); !stopped)
     return stopped;
+  running_ = false;
   if (*times != times_)
     if (const auto table = send_table (*times); !table)
       return table;
+  return run (plan);
+}
+
+Result<void>
+Dlpc900::run (const SlotPlan &plan)
+{
   // A whole exposure without masks, or without a trigger.
-  board_.link ().pause (
-      std::chrono::milliseconds (plan.frame_period () / 1'000'000 + 1));
-  if (const auto run = board_.write_byte (kRun, kRunStart); !run)
-    return run;
+  if (const auto passed = board_.link ().pause (
+          std::chrono::milliseconds (plan.frame_period () / 1'000'000 + 1));
+      !passed)
+    return passed;
   running_ = true;
+  if (const auto asked = board_.write_byte (kRun, kRunStart); !asked)
+    return asked;
   if (const auto runs = board_.await (
           kMainStatus, kSequencerRuns, kSequencerRuns, "start the patterns");
       !runs)
     return runs;
-  return check_health ();
+  return board_.check_health ();
 }
 
 void
 Dlpc900::stop ()
 {
-  running_ = false;
-  if (board_.link ().gone ())
-    return;
-  // A device that does not answer now does not keep anybody waiting.
-  HidCommand run = kRun;
-  run.timeout = 500ms;
-  for (int attempt = 0; attempt < 2; attempt++)
-    if (board_.write_byte (run, kRunStop))
-      break;
+  running_ = !board_.stop () && running_;
 }
 
 } // namespace

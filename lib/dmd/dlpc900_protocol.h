@@ -7,46 +7,31 @@
 #include <vector>
 
 #include "base/result.h"
-#include "dmd/hid_packet.h"
+#include "dmd/dlp_commands.h"
 #include "dmd/pattern_timing.h"
 #include "dmd/plane_image.h"
 
 namespace cexp::dlpc900
 {
 
-using namespace std::chrono_literals;
+using namespace dlp;
 
 constexpr HidCommand kErrorCode{0x0100, "read the error code"};
 constexpr HidCommand kErrorText{0x0101, "read the error text"};
-constexpr HidCommand kPower{0x0200, "set the power mode", 10s};
 constexpr HidCommand kIdle{0x0201, "set the idle mode"};
-constexpr HidCommand kVersion{0x0205, "read the firmware version"};
 constexpr HidCommand kHardware{0x0206, "read the hardware type"};
 constexpr HidCommand kPark{0x0609, "park the mirrors"};
-constexpr HidCommand kHardwareStatus{0x1A0A, "read the hardware status"};
-constexpr HidCommand kMainStatus{0x1A0C, "read the main status"};
-constexpr HidCommand kDisplayMode{0x1A1B, "set the display mode"};
-constexpr HidCommand kTriggerOut1{0x1A1D, "set up trigger output 1"};
-constexpr HidCommand kTriggerOut2{0x1A1E, "set up trigger output 2"};
-constexpr HidCommand kRun{0x1A24, "start or stop the patterns"};
 constexpr HidCommand kLoadImage{0x1A2A, "announce an image"};
 constexpr HidCommand kImageData{0x1A2B, "send image data"};
 constexpr HidCommand kLoadSecond{0x1A2C, "announce an image's right half"};
 constexpr HidCommand kSecondData{0x1A2D, "send data of the right half"};
-constexpr HidCommand kConfigure{0x1A31, "take the pattern table", 10s};
+constexpr HidCommand kConfigure{
+    0x1A31, "take the pattern table", std::chrono::seconds (10)};
 constexpr HidCommand kReorder{0x1A32, "set the order of patterns"};
 constexpr HidCommand kDefine{0x1A34, "define a pattern"};
-constexpr HidCommand kTriggerIn1{0x1A35, "set up trigger input 1"};
 constexpr HidCommand kMinimumExposures{0x1A42, "read the shortest exposures"};
 
 constexpr std::uint8_t kModeOnTheFly = 3;
-constexpr std::uint8_t kRunStop = 0;
-constexpr std::uint8_t kRunStart = 2;
-/** Main status. */
-constexpr std::uint8_t kSequencerRuns = 1 << 1;
-/** Hardware status: initialised; two controllers. */
-constexpr std::uint8_t kInitialised = 1 << 0;
-constexpr std::uint8_t kSecondController = 1 << 4;
 /** Image bytes in one message: what its buffer of 512 leaves. */
 constexpr std::size_t kImageChunk = 504;
 constexpr int kMaxEntries = 400;

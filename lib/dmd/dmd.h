@@ -73,10 +73,15 @@ public:
    * @p plan. After a stop () one whole exposure at least passes with the
    * mirrors parked (or, where the device triggers the camera, without a
    * trigger): whoever watches the frames sees where the masks began anew.
+   *
+   * @p stop  a request ends the start within 100 ms, with an error.
    */
-  virtual Result<void> start (const SlotPlan &plan) = 0;
+  virtual Result<void> start (
+      const SlotPlan &plan, std::stop_token stop = {}) = 0;
   /** Parks the mirrors, all off. */
   virtual void stop () = 0;
+  /** Whether it shows masks, for all that is known: a device that did not
+   * answer when it was told to stop still does. */
   virtual bool running () const = 0;
 };
 

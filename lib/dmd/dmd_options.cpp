@@ -55,7 +55,7 @@ struct Key {
 using Text = std::string_view;
 using Options = DmdOptions;
 
-constexpr std::array<Key, 11> kKeys{{
+constexpr std::array<Key, 12> kKeys{{
     {"master", "dmd|camera",
         [] (Text v, Options &o) {
           return choose (
@@ -76,6 +76,13 @@ constexpr std::array<Key, 11> kKeys{{
     {"edge", "rising|falling",
         [] (Text v, Options &o) {
           return choose (v, "rising", false, "falling", true, o.falling_edge);
+        }},
+    {"patience", "TIME of 100ms or more",
+        [] (Text v, Options &o) {
+          Nanoseconds time = 0;
+          const bool taken = take (parse_time (v), time);
+          o.patience = std::chrono::milliseconds (time / 1'000'000);
+          return taken && o.patience >= std::chrono::milliseconds (100);
         }},
     {"images", "A[/B...]",
         [] (Text v, Options &o) { return parse_images (v, o.images); }},

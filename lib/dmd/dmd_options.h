@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dmd/dlpc350_protocol.h"
+#include "dmd/hid_link.h"
 #include "dmd/mirror_array.h"
 #include "dmd/pattern_timing.h"
 
@@ -22,6 +23,9 @@ namespace cexp
  *   trigger-delay=TIME   from the camera's edge to light (DLPC900: 104 us or
  *                        more, default 105 us)
  *   edge=rising|falling  of the camera's signal
+ *   patience=TIME        for a USB board that does not answer, or is not ready,
+ *                        in one go; default 2 s. A DLPC900 may take longer over
+ *                        a table
  * and, for boards whose masks come from elsewhere (DLPC350),
  *   images=A[/B...]      flash images that hold the masks, 24 each
  *   source=flash|video
@@ -37,6 +41,7 @@ struct DmdOptions {
   Placement placement = {};
   Nanoseconds trigger_delay = 105'000;
   bool falling_edge = false;
+  std::chrono::milliseconds patience = HidLink::kPatience;
   std::vector<int> images = {};
   dlpc350::Source source = dlpc350::Source::flash;
   bool trigger2_bit_disables = true;

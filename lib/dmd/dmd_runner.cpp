@@ -36,9 +36,9 @@ DmdRunner::upload (const Schedule &schedule)
 void
 DmdRunner::start (const SlotPlan &plan)
 {
-  ask ([this, plan] (std::stop_token) {
+  ask ([this, plan] (std::stop_token stop) {
     dmd_->stop ();
-    return dmd_->start (plan);
+    return dmd_->start (plan, stop);
   });
 }
 

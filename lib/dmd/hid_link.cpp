@@ -12,10 +12,10 @@ namespace
 using namespace std::chrono_literals;
 
 /** Waits are cut into such pieces, between which a stop is noticed. */
-constexpr auto kPatience = 50ms;
-constexpr auto kDrainTime = 5ms;
-/** Packets of other requests before the wait for a reply is given up: a device
- * that talks for ever must not keep its driver listening for ever. */
+constexpr std::chrono::milliseconds kPiece{50};
+constexpr std::chrono::milliseconds kDrainTime{5};
+/** The packets of one reply follow each other. */
+constexpr std::chrono::milliseconds kRestTime{200};
 constexpr int kMaxStrayPackets = 64;
 
 } // namespace
@@ -52,6 +52,32 @@ HidLink::error (const std::string &what, const std::string &reason) const
   return Error{name_ + ": cannot " + what + ": " + reason};
 }
 
+void
+HidLink::begin (std::stop_token stop, Milliseconds patience)
+{
+  stop_ = std::move (stop);
+  patience_ = patience;
+}
+
+Result<void>
+HidLink::pause (Milliseconds time)
+{
+  for (; time > 0ms && !cancelled (); time -= kPiece)
+    pipe_->pause (std::min (time, kPiece));
+  return cancelled () ? Result<void> (error ("go on", "cancelled"))
+                      : Result<void> ();
+}
+
+bool
+HidLink::wait (Milliseconds time)
+{
+  if (cancelled () || patience_ < time)
+    return false;
+  patience_ -= time;
+  pipe_->pause (time);
+  return true;
+}
+
 Result<HidReply>
 HidLink::transact (HidKind kind, const HidCommand &command, ByteView data)
 {
@@ -67,31 +93,35 @@ HidLink::send (HidKind kind, const HidCommand &command, ByteView data)
 {
   if (unclean_)
     drain ();
+  const auto timeout = std::min (command.timeout, patience_);
   const auto sent = pipe_->write (
-      encode_request (kind, ++sequence_, command.word, data), command.timeout);
+      encode_request (kind, ++sequence_, command.word, data), timeout);
   unclean_ = !sent;
-  return sent ? sent
-              : Result<void> (error (command.name, sent.error ().message));
+  if (sent)
+    return sent;
+  patience_ -= timeout;
+  return error (command.name, sent.error ().message);
 }
 
 Result<HidReply>
 HidLink::receive (const HidCommand &command)
 {
-  std::chrono::milliseconds left = command.timeout;
-  for (int strays = 0; strays < kMaxStrayPackets && left > 0ms;) {
+  const Milliseconds limit = std::min (command.timeout, patience_);
+  Milliseconds left = limit;
+  bool strays = false;
+  while (left > 0ms) {
     if (cancelled ())
       return error (command.name, "cancelled");
-    const auto wait = std::min<std::chrono::milliseconds> (left, kPatience);
-    const auto packet = pipe_->read (wait);
+    const Milliseconds piece = std::min (left, kPiece);
+    const auto packet = pipe_->read (piece);
     if (!packet)
       return error (command.name, packet.error ().message);
-    if (packet->empty ()) {
-      left -= wait;
-      continue;
-    }
     const auto head = parse_reply_head (*packet);
     if (!head || head->sequence != sequence_) {
-      strays++; // late reply to an earlier request, or a piece of one
+      // Nothing yet; or a late reply to an earlier request, or a piece of one.
+      strays |= !packet->empty ();
+      left -= piece;
+      patience_ -= piece;
       continue;
     }
     auto rest = receive_rest (*head, *packet);
@@ -100,10 +130,9 @@ HidLink::receive (const HidCommand &command)
     return HidReply{head->refused, *std::move (rest)};
   }
   return error (command.name,
-      left > 0ms ? "it sends only replies to other requests; is another "
-                   "program using it?"
-                 : "no reply within " +
-                       std::to_string (command.timeout.count ()) + " ms");
+      strays ? "it sends only replies to other requests; is another program "
+               "using it?"
+             : "no reply within " + std::to_string (limit.count ()) + " ms");
 }
 
 Result<Bytes>
@@ -111,7 +140,7 @@ HidLink::receive_rest (HidReplyHead head, Bytes first)
 {
   Bytes data (first.begin () + HidReplyHead::kSize, first.end ());
   for (std::size_t packet = 1; packet < head.packets (); packet++) {
-    const auto more = pipe_->read (1s);
+    const auto more = pipe_->read (kRestTime);
     if (!more)
       return more.error ();
     if (more->size () != kHidPacketSize)

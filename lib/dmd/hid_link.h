@@ -22,13 +22,19 @@ struct HidReply {
  * Talks to one controller: one request in flight, the reply of the same
  * sequence number, others dropped. For one thread at a time.
  *
- * A wait ends early, with an error, within 50 ms of a request on the stop token
- * that cancel_on () gave; a transaction that began a message is always finished
- * as far as the pipe allows, so that the device is left between two messages.
+ * A job, which begin () begins, ends within 50 ms of a request to stop, and
+ * when the device has kept it waiting for longer than its patience in all; a
+ * message that was begun is always finished as far as the pipe allows, so that
+ * the device is left between two messages.
  */
 class HidLink
 {
 public:
+  using Milliseconds = std::chrono::milliseconds;
+
+  /** What a job waits for a device that does not answer, or is not ready. */
+  static constexpr Milliseconds kPatience{2000};
+
   /** @p name  of the device, for messages. Drops replies that wait from an
    * earlier conversation. */
   HidLink (std::unique_ptr<PacketPipe> pipe, std::string name);
@@ -40,13 +46,17 @@ public:
   /** Nothing is answered; a failure on the way is the only one known. */
   Result<void> post (const HidCommand &command, ByteView data);
 
-  void pause (std::chrono::milliseconds time) { pipe_->pause (time); }
+  /** @p stop  a token without a source: never. */
+  void begin (std::stop_token stop = {}, Milliseconds patience = kPatience);
+  bool cancelled () const { return stop_.stop_requested (); }
+  /** Lets time go by that the device was given; error when cancelled. */
+  Result<void> pause (Milliseconds time);
+  /** Gives the device time that it should not need; false when the job's
+   * patience is at its end. */
+  bool wait (Milliseconds time);
+
   bool gone () const { return pipe_->gone (); }
   const std::string &name () const { return name_; }
-
-  /** Waits end when @p stop is requested; a token without a source: never. */
-  void cancel_on (std::stop_token stop) { stop_ = std::move (stop); }
-  bool cancelled () const { return stop_.stop_requested (); }
 
   /** "NAME: cannot WHAT: REASON". */
   Error error (const std::string &what, const std::string &reason) const;
@@ -62,6 +72,7 @@ private:
   const std::unique_ptr<PacketPipe> pipe_;
   const std::string name_;
   std::stop_token stop_;
+  Milliseconds patience_ = kPatience; // that is left to the job
   std::uint8_t sequence_ = 0;
   bool unclean_ = true; // a reply to nobody may be waiting
 };

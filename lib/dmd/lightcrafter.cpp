@@ -23,11 +23,12 @@ constexpr Extent kMirrors{608, 684};
 constexpr std::uint32_t kMinimumExposure = 250;
 constexpr std::uint32_t kMaximumExposure = 2'000'000;
 constexpr std::uint32_t kCameraPulse = 100;
-constexpr auto kTimeout = 2s;
-constexpr auto kBusyPause = 500ms;
+/** What a job waits for a board that is silent or busy, and a stop. */
+constexpr std::chrono::milliseconds kPatience{2000};
+constexpr std::chrono::milliseconds kStopPatience{800};
+constexpr std::chrono::milliseconds kBusyPause{500};
 constexpr std::uint8_t kBusy = 6; // error code
 constexpr int kMaxStrayReplies = 16;
-constexpr int kBusyAttempts = 4;
 /** What a mask of 52 kB takes over the board's network port, about. */
 constexpr Nanoseconds kMaskTime = 50'000'000;
 
@@ -61,7 +62,7 @@ public:
   }
   Result<void> upload (const Schedule &schedule, std::stop_token stop,
       const UploadProgress &progress) override;
-  Result<void> start (const SlotPlan &plan) override;
+  Result<void> start (const SlotPlan &plan, std::stop_token stop) override;
   void stop () override;
   bool running () const override { return running_; }
 
@@ -71,7 +72,10 @@ private:
     Bytes payload = {};
   };
 
+  Result<void> begin (std::stop_token stop = {},
+      std::chrono::milliseconds patience = kPatience);
   Result<void> connect ();
+  bool pause (std::chrono::milliseconds time) const;
   Error error (const char *what, const std::string &reason) const;
   Result<Reply> receive (std::uint16_t command);
   Result<Reply> ask (PacketType type, std::uint16_t command, ByteView payload);
@@ -88,22 +92,48 @@ private:
   DmdInfo info_;
   std::string version_;
   std::stop_token cancel_;
-  int masks_ = 0; // on the board, 0: none
+  std::chrono::milliseconds patience_ = kPatience; // that is left to the job
+  int masks_ = 0;                                  // on the board, 0: none
   bool touched_ = false;
   bool running_ = false;
 };
+
+/** Begins a job. A wait that was cut short has left the connection of the last
+ * one in mid-packet: then there is another one. */
+Result<void>
+Lightcrafter::begin (
+    std::stop_token stop_token, std::chrono::milliseconds patience)
+{
+  cancel_ = std::move (stop_token);
+  patience_ = patience;
+  if (const auto connected = connect (); !connected)
+    return connected;
+  stream_->cancel_on (cancel_);
+  return {};
+}
 
 Result<void>
 Lightcrafter::connect ()
 {
   if (stream_ && !stream_->broken ())
     return {};
-  auto stream = TcpStream::connect (host_, port_, kTimeout);
+  stream_.reset (); // the board serves one at a time
+  auto stream = TcpStream::connect (host_, port_, patience_);
   if (!stream)
     return Error{info_.name + ": " + stream.error ().message +
                  "; is the board on, and this computer in its network?"};
   stream_ = *std::move (stream);
   return {};
+}
+
+/** False when cancelled. */
+bool
+Lightcrafter::pause (std::chrono::milliseconds time) const
+{
+  constexpr std::chrono::milliseconds kPiece{10};
+  for (; time > 0ms && !cancel_.stop_requested (); time -= kPiece)
+    std::this_thread::sleep_for (std::min (time, kPiece));
+  return !cancel_.stop_requested ();
 }
 
 Error
@@ -117,13 +147,13 @@ Result<Lightcrafter::Reply>
 Lightcrafter::receive (std::uint16_t command)
 {
   for (int replies = 0; replies <= kMaxStrayReplies; replies++) {
-    Result<Bytes> head = stream_->receive (kHeadSize, kTimeout);
+    Result<Bytes> head = stream_->receive (kHeadSize, patience_);
     if (!head)
       return head.error ();
     const auto parsed = parse_head (*head);
     if (!parsed)
       return parsed.error ();
-    const auto rest = stream_->receive (parsed->payload + 1, kTimeout);
+    const auto rest = stream_->receive (parsed->payload + 1, patience_);
     if (!rest)
       return rest.error ();
     Bytes packet = *head;
@@ -146,19 +176,17 @@ Lightcrafter::receive (std::uint16_t command)
 Result<Lightcrafter::Reply>
 Lightcrafter::ask (PacketType type, std::uint16_t command, ByteView payload)
 {
-  if (stream_->broken ())
-    return Error{"the connection is lost; open the board again"};
   Result<Reply> reply = Reply{};
   for (const Bytes &packet : encode_message (type, command, payload)) {
-    for (int attempt = 0; attempt < kBusyAttempts; attempt++) {
-      if (const auto sent = stream_->send (packet, kTimeout); !sent)
+    for (;;) {
+      if (const auto sent = stream_->send (packet, patience_); !sent)
         return sent.error ();
       reply = receive (command);
-      if (!reply || reply->refused != kBusy)
+      if (!reply || reply->refused != kBusy || patience_ <= kBusyPause)
         break;
-      for (auto left = kBusyPause; left > 0ms && !cancel_.stop_requested ();
-           left -= 10ms)
-        std::this_thread::sleep_for (10ms);
+      patience_ -= kBusyPause;
+      if (!pause (kBusyPause))
+        return Error{"cancelled"};
     }
     if (!reply || reply->refused != 0)
       break;
@@ -180,8 +208,8 @@ Lightcrafter::write (const char *what, std::uint16_t command, ByteView payload)
 Result<void>
 Lightcrafter::open ()
 {
-  if (const auto connected = connect (); !connected)
-    return connected;
+  if (const auto begun = begin (); !begun)
+    return begun;
   const Bytes of_system{0x00};
   const auto version = ask (PacketType::read, kVersion, of_system);
   if (!version)
@@ -233,6 +261,7 @@ Lightcrafter::send_masks (
   const Bytes off{0}, sequence_mode{kModeSequence};
   if (const auto stopped = write ("stop the sequence", kRun, off); !stopped)
     return stopped;
+  running_ = false;
   if (const auto mode =
           write ("change the display mode", kDisplayMode, sequence_mode);
       !mode)
@@ -267,16 +296,10 @@ Lightcrafter::upload (const Schedule &schedule, std::stop_token stop_token,
                  std::to_string (info_.resident_masks) + " masks, not " +
                  std::to_string (schedule.masks ()) +
                  "; take a tile with fewer elements"};
-  // A wait that was cut short has left the old connection in mid-packet.
-  if (const auto connected = connect (); !connected)
-    return connected;
+  if (const auto begun = begin (std::move (stop_token)); !begun)
+    return begun;
   touched_ = true;
-  running_ = false;
-  cancel_ = stop_token;
-  stream_->cancel_on (stop_token);
   const auto sent = send_masks (schedule, progress);
-  cancel_ = {};
-  stream_->cancel_on ({});
   if (!sent) {
     masks_ = 0;
     stop ();
@@ -285,7 +308,7 @@ Lightcrafter::upload (const Schedule &schedule, std::stop_token stop_token,
 }
 
 Result<void>
-Lightcrafter::start (const SlotPlan &plan)
+Lightcrafter::start (const SlotPlan &plan, std::stop_token stop_token)
 {
   if (masks_ == 0)
     return Error{info_.name + ": no masks to start; upload first"};
@@ -294,26 +317,27 @@ Lightcrafter::start (const SlotPlan &plan)
       plan, {kMinimumExposure, kMaximumExposure, gap, 0, gap}, options_.master);
   if (!time)
     return Error{info_.name + ": " + time.error ().message};
+  if (const auto begun = begin (std::move (stop_token)); !begun)
+    return begun;
   if (const auto set = set_sequence (*time); !set)
     return set;
   if (const auto trigger = write ("set up the trigger output", kCameraTrigger,
           encode_camera_trigger (options_.master == Master::dmd, kCameraPulse));
       !trigger)
     return trigger;
-  std::this_thread::sleep_for (std::chrono::nanoseconds (plan.frame_period ()));
+  if (!pause (std::chrono::milliseconds (plan.frame_period () / 1'000'000 + 1)))
+    return error ("start the sequence", "cancelled");
+  running_ = true;
   const Bytes on{1};
-  const auto started = write ("start the sequence", kRun, on);
-  running_ = started.ok ();
-  return started;
+  return write ("start the sequence", kRun, on);
 }
 
 void
 Lightcrafter::stop ()
 {
-  running_ = false;
   const Bytes off{0};
-  if (!stream_->broken ())
-    (void)write ("stop the sequence", kRun, off);
+  if (begin ({}, kStopPatience) && write ("stop the sequence", kRun, off))
+    running_ = false;
 }
 
 } // namespace

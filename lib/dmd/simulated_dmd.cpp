@@ -151,7 +151,7 @@ public:
     return {};
   }
 
-  Result<void> start (const SlotPlan &) override
+  Result<void> start (const SlotPlan &, std::stop_token) override
   {
     if (!mirrors_->schedule ())
       return Error{options_.info.name + ": no masks to start; upload first"};

@@ -57,7 +57,7 @@ TcpStream::connect (const std::string &host, int port, Milliseconds timeout)
   if (::connect (socket, raw->ai_addr, raw->ai_addrlen) != 0)
     code = errno;
   if (code == EINPROGRESS) {
-    if (!stream->wait_for (POLLOUT, timeout))
+    if (!stream->wait_for (POLLOUT, Clock::now () + timeout))
       return Error{"cannot connect to " + where + ": no answer within " +
                    std::to_string (timeout.count ()) + " ms"};
     socklen_t size = sizeof code;
@@ -83,11 +83,15 @@ TcpStream::fail (const std::string &message)
 }
 
 Result<void>
-TcpStream::wait_for (short events, Milliseconds timeout)
+TcpStream::wait_for (short events, Clock::time_point deadline)
 {
-  for (auto left = timeout; left > 0ms;) {
+  for (;;) {
     if (stop_.stop_requested ())
       return fail ("cancelled");
+    const auto left =
+        std::chrono::ceil<Milliseconds> (deadline - Clock::now ());
+    if (left <= 0ms)
+      return fail ("no answer in time");
     const auto wait = std::min<Milliseconds> (left, kPatience);
     pollfd poll_this{socket_, events, 0};
     const int ready = ::poll (&poll_this, 1, int (wait.count ()));
@@ -95,16 +99,15 @@ TcpStream::wait_for (short events, Milliseconds timeout)
       return {};
     if (ready < 0 && errno != EINTR)
       return fail (errno_text (errno));
-    left -= wait;
   }
-  return fail ("no answer within " + std::to_string (timeout.count ()) + " ms");
 }
 
 Result<void>
 TcpStream::send (ByteView bytes, Milliseconds timeout)
 {
+  const auto deadline = Clock::now () + timeout;
   while (!bytes.empty ()) {
-    if (const auto ready = wait_for (POLLOUT, timeout); !ready)
+    if (const auto ready = wait_for (POLLOUT, deadline); !ready)
       return ready;
     const ssize_t sent =
         ::send (socket_, bytes.data (), bytes.size (), MSG_NOSIGNAL);
@@ -118,9 +121,10 @@ TcpStream::send (ByteView bytes, Milliseconds timeout)
 Result<Bytes>
 TcpStream::receive (std::size_t size, Milliseconds timeout)
 {
+  const auto deadline = Clock::now () + timeout;
   Bytes bytes (size);
   for (std::size_t at = 0; at < size;) {
-    if (const auto ready = wait_for (POLLIN, timeout); !ready)
+    if (const auto ready = wait_for (POLLIN, deadline); !ready)
       return ready.error ();
     const ssize_t got = ::recv (socket_, bytes.data () + at, size - at, 0);
     if (got == 0)

@@ -26,8 +26,9 @@ public:
   TcpStream (const TcpStream &) = delete;
   TcpStream &operator= (const TcpStream &) = delete;
 
+  /** @p timeout  for all of it. */
   Result<void> send (ByteView bytes, Milliseconds timeout);
-  /** Exactly @p size bytes. */
+  /** Exactly @p size bytes; @p timeout for all of them. */
   Result<Bytes> receive (std::size_t size, Milliseconds timeout);
   /** Whether the other side has closed, or a failure left the stream in the
    * middle of something. */
@@ -38,7 +39,9 @@ public:
 
 private:
   explicit TcpStream (int socket) : socket_ (socket) {}
-  Result<void> wait_for (short events, Milliseconds timeout);
+  using Clock = std::chrono::steady_clock;
+
+  Result<void> wait_for (short events, Clock::time_point deadline);
   Error fail (const std::string &message);
 
   const int socket_;

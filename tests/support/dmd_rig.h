@@ -75,12 +75,16 @@ struct DmdRig {
   {
   }
 
-  Result<void> open (std::string_view options = "")
+  Result<std::unique_ptr<Dmd>> make (std::string_view options) const
   {
-    auto opened = open_driver (
+    return open_driver (
         std::make_unique<HidLink> (
             std::make_unique<EmulatedPipe> (board, clock), "board"),
         options_of (options));
+  }
+  Result<void> open (std::string_view options = "")
+  {
+    auto opened = make (options);
     if (!opened)
       return opened.error ();
     dmd = *std::move (opened);

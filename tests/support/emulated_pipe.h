@@ -18,6 +18,7 @@ public:
   /** Time on the wire's clock, which only goes on where somebody waits. */
   struct Clock {
     Milliseconds now{0};
+    Milliseconds wire{0}; ///< of it, packets were under way
     /** Called when packets are sent. */
     std::function<void ()> on_write = [] {};
   };
@@ -33,7 +34,8 @@ public:
     clock_->on_write ();
     for (std::size_t at = 0; at < packets.size (); at += 64) {
       const auto packet = packets.subspan (at, 64);
-      clock_->now += Milliseconds (1);
+      clock_->now += kPacket;
+      clock_->wire += kPacket;
       if (!device_->out ({packet.begin (), packet.end ()})) {
         if (!device_->gone ())
           clock_->now += timeout;
@@ -47,13 +49,16 @@ public:
     if (device_->gone ())
       return Error{"it is gone"};
     const auto packet = device_->in ();
-    clock_->now += packet ? Milliseconds (1) : timeout;
+    clock_->now += packet ? kPacket : timeout;
+    clock_->wire += packet ? kPacket : Milliseconds (0);
     return packet.value_or (Bytes{});
   }
   bool gone () const override { return device_->gone (); }
   void pause (Milliseconds time) override { clock_->now += time; }
 
 private:
+  static constexpr Milliseconds kPacket{1};
+
   std::shared_ptr<EmulatedHid> device_;
   std::shared_ptr<Clock> clock_;
 };

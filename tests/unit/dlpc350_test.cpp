@@ -4,8 +4,8 @@
 #include <random>
 
 #include "dmd/dlpc350.h"
-#include "dmd_rig.h"
 #include "emulated_dlpc350.h"
+#include "fault_life.h"
 
 using namespace cexp;
 using namespace cexp::test;
@@ -155,28 +155,19 @@ TEST (Dlpc350Faults, WhateverHappensItStopsInTheEndAndHangsNowhere)
   const int kSequences = fault_sequences ();
   const Schedule schedule = schedule_of ("sequential:2x2");
   std::mt19937 random (4);
-  int ran = 0;
+  int shown = 0;
   for (int sequence = 0; sequence < kSequences; sequence++) {
     Rig rig;
-    for (int i = 0; i < 3; i++)
-      rig.board->faults[int (random () % 80)] =
-          Fault (1 + random () % (kFaults - 1));
-    std::chrono::milliseconds last{0}, longest{0};
-    rig.clock->on_write = [&] {
-      longest = std::max (longest, rig.clock->now - last);
-      last = rig.clock->now;
-    };
-    if (rig.open ("x,images=0"))
-      for (int round = 0; round < 2; round++) {
-        ran += rig.show (schedule).ok ();
-        if (random () % 2 == 0)
-          rig.dmd->stop ();
-      }
+    FaultLife life = life_of (rig, random);
+    life.draw (*rig.board, 100);
+    auto dmd = life.live ([&] { return rig.make ("x,images=0"); }, schedule);
     rig.board->faults.clear (); // what comes now is the end
-    rig.dmd.reset ();
+    life.close (std::move (dmd));
     ASSERT_TRUE (rig.board->gone () || !rig.board->running ())
         << "sequence " << sequence;
-    ASSERT_LE (longest, std::chrono::seconds (3)) << "sequence " << sequence;
+    ASSERT_LE (life.longest (), FaultLife::kLongestCall)
+        << "sequence " << sequence;
+    shown += life.shown ();
   }
-  EXPECT_GT (ran, 0);
+  EXPECT_GT (shown, kSequences / 2);
 }

@@ -4,8 +4,8 @@
 #include <random>
 
 #include "dmd/dlpc900.h"
-#include "dmd_rig.h"
 #include "emulated_dlpc900.h"
+#include "fault_life.h"
 #include "hex.h"
 
 using namespace cexp;
@@ -387,24 +387,64 @@ TEST (Dlpc900Faults, AnUnpluggedBoardIsOneClearErrorAtOnce)
   EXPECT_LE (rig.clock->now - before, 2s);
 }
 
-/** Opens, uploads, starts, stops and goes on, whatever happens. */
-void
-live_through (Rig &rig, const Schedule &schedule, std::mt19937 &random)
+TEST (Dlpc900Faults, ATableThatIsNotAnsweredForIsGivenUpSoon)
 {
-  if (!rig.open ("x,region=32x16"))
-    return;
-  for (int round = 0; round < 3; round++) {
-    std::stop_source stop;
-    int until_stop = int (random () % 12);
-    (void)rig.dmd->upload (schedule, stop.get_token (), [&] (int, int) {
-      if (until_stop-- == 0)
-        stop.request_stop ();
-    });
-    (void)rig.dmd->start (plan_of (schedule));
-    (void)rig.dmd->status ();
-    if (random () % 2 == 0)
-      rig.dmd->stop ();
+  for (const auto &[options, least, most] :
+      {std::tuple{"x", 1900ms, 2900ms}, {"x,patience=9s", 8900ms, 9900ms}}) {
+    Rig rig;
+    ASSERT_EQ (message_of (rig.open (options)), "");
+    // Before it: stop and its status, idle, mode and its status, two triggers,
+    // and the four lines.
+    rig.board->faults[rig.board->messages () + 11] = Fault::lose_reply;
+    const auto before = rig.clock->now;
+    const std::string message = message_of (rig.upload (Schedule ()));
+    EXPECT_NE (
+        message.find ("take the pattern table: no reply within"), message.npos)
+        << message;
+    EXPECT_GE (rig.clock->now - before, least);
+    EXPECT_LE (rig.clock->now - before, most);
+    EXPECT_FALSE (rig.board->running ());
   }
+}
+
+TEST (Dlpc900Faults, AStartIsCancelledWhereverItIs)
+{
+  for (int message = 0; message < 9; message++) {
+    Rig rig;
+    ASSERT_EQ (message_of (rig.open ()), "");
+    ASSERT_EQ (message_of (rig.upload (Schedule ())), "");
+    // Nothing answers any more, and a frame lasts 10 s.
+    for (int lost = message + 1; lost < 20; lost++)
+      rig.board->faults[rig.board->messages () + lost] = Fault::lose_reply;
+    std::stop_source stop;
+    std::chrono::milliseconds asked{-1};
+    rig.clock->on_write = [&, left = message] () mutable {
+      if (left-- == 0) {
+        stop.request_stop ();
+        asked = rig.clock->now;
+      }
+    };
+    const auto started =
+        rig.dmd->start (plan_of (Schedule (), {1, 10}), stop.get_token ());
+    EXPECT_FALSE (started.ok ()) << message;
+    ASSERT_GE (asked, 0ms) << message;
+    EXPECT_LE (rig.clock->now - asked, 100ms) << message;
+  }
+}
+
+TEST (Dlpc900Faults, ABoardThatDoesNotSayThatItStoppedStillRuns)
+{
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open ()), "");
+  ASSERT_EQ (message_of (rig.show (Schedule ())), "");
+  for (int attempt = 0; attempt < 2; attempt++)
+    rig.board->faults[rig.board->messages () + attempt] = Fault::stall;
+  rig.dmd->stop ();
+  EXPECT_TRUE (rig.dmd->running ());
+  EXPECT_TRUE (rig.board->running ());
+  rig.dmd->stop ();
+  EXPECT_FALSE (rig.dmd->running ());
+  EXPECT_FALSE (rig.board->running ());
 }
 
 TEST (Dlpc900Faults, WhateverHappensItStopsInTheEndAndHangsNowhere)
@@ -412,28 +452,23 @@ TEST (Dlpc900Faults, WhateverHappensItStopsInTheEndAndHangsNowhere)
   const int kSequences = fault_sequences ();
   const Schedule schedule = schedule_of ("sequential:2x1");
   std::mt19937 random (3);
-  int survivors = 0;
+  int survivors = 0, shown = 0;
   for (int sequence = 0; sequence < kSequences; sequence++) {
     Rig rig;
-    const int faults = 1 + int (random () % 3);
-    for (int i = 0; i < faults; i++)
-      rig.board->faults[int (random () % 200)] =
-          Fault (1 + random () % (kFaults - 1));
-    // The longest time that the wire stands still without a message.
-    std::chrono::milliseconds last{0}, longest{0};
-    rig.clock->on_write = [&] {
-      longest = std::max (longest, rig.clock->now - last);
-      last = rig.clock->now;
-    };
-    live_through (rig, schedule, random);
+    FaultLife life = life_of (rig, random);
+    life.draw (*rig.board, 200);
+    auto dmd =
+        life.live ([&] { return rig.make ("x,region=32x16"); }, schedule);
     rig.board->faults.clear (); // what comes now is the end
-    rig.dmd.reset ();
+    life.close (std::move (dmd));
     ASSERT_TRUE (rig.board->gone () || !rig.board->running ())
         << "sequence " << sequence;
-    // 10 s for the table alone, which real boards take.
-    ASSERT_LE (longest, 11s) << "sequence " << sequence;
+    ASSERT_LE (life.longest (), FaultLife::kLongestCall)
+        << "sequence " << sequence;
     survivors += !rig.board->gone ();
+    shown += life.shown ();
   }
   EXPECT_GT (survivors, kSequences / 2);
   EXPECT_LT (survivors, kSequences);
+  EXPECT_GT (shown, kSequences / 2);
 }

@@ -48,7 +48,7 @@ public:
     }
     return {};
   }
-  Result<void> start (const SlotPlan &plan) override
+  Result<void> start (const SlotPlan &plan, std::stop_token) override
   {
     record_->calls.push_back ("start " + time_text (plan.active ()));
     if (record_->start_fails)

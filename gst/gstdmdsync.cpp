@@ -143,7 +143,8 @@ constexpr gint64 kMaxOffset = 3600 * GST_SECOND;
  * then, and whatever begins with the frames finds them programmed. */
 constexpr std::chrono::milliseconds kQuickUpload{1000};
 
-constexpr auto kNull = GParamFlags (
+constexpr auto kNull = GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS);
+constexpr auto kReady = GParamFlags (
     G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY);
 constexpr auto kPlaying = GParamFlags (
     G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
@@ -168,14 +169,15 @@ set_schedule (GstDmdSync *self, const gchar *text)
     GST_WARNING_OBJECT (self, "%s", schedule.error ().message.c_str ());
 }
 
-/* Device and schedule are fixed while the device is open. Object lock. */
+/* Object lock. */
 bool
-may_change (GstDmdSync *self, const GParamSpec *pspec)
+may_change (GstDmdSync *self, const GParamSpec *pspec, GstState highest)
 {
-  if (GST_STATE (self) == GST_STATE_NULL)
+  if (GST_STATE (self) <= highest)
     return true;
   GST_WARNING_OBJECT (self,
-      "%s cannot change above the NULL state; it stays as it is", pspec->name);
+      "%s cannot change above the %s state; it stays as it is", pspec->name,
+      gst_element_state_get_name (highest));
   return false;
 }
 
@@ -188,13 +190,13 @@ set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
     sync::Settings &settings = self->state->settings;
     switch (id) {
     case PROP_DEVICE:
-      if (may_change (self, pspec)) {
+      if (may_change (self, pspec, GST_STATE_NULL)) {
         const gchar *device = g_value_get_string (value);
         settings.device = device ? device : DEFAULT_DEVICE;
       }
       break;
     case PROP_SCHEDULE:
-      if (may_change (self, pspec))
+      if (may_change (self, pspec, GST_STATE_READY))
         set_schedule (self, g_value_get_string (value));
       break;
     case PROP_TIMESTAMP_AT:
@@ -330,6 +332,12 @@ GstStateChangeReturn
 change_state (GstElement *element, GstStateChange transition)
 {
   auto *self = GST_DMD_SYNC (element);
+  /* A wrong schedule is told before a device is opened; it may be another one
+   * by the time that it is shown. */
+  const bool schedule_due = transition == GST_STATE_CHANGE_NULL_TO_READY ||
+                            transition == GST_STATE_CHANGE_READY_TO_PAUSED;
+  if (schedule_due && !sync::read_schedule (self))
+    return GST_STATE_CHANGE_FAILURE;
   if (transition == GST_STATE_CHANGE_NULL_TO_READY && !sync::open_device (self))
     return GST_STATE_CHANGE_FAILURE;
   if (transition == GST_STATE_CHANGE_READY_TO_PAUSED)
@@ -375,12 +383,12 @@ install_settings (GObjectClass *klass)
           "DMD to drive: usb: or lightcrafter: for a board (docs/dmd.md), "
           "sim:NAME[,key=value...] for a simulated one (docs/timing.md); "
           "empty: "
-          "none, frames are stamped and watched only",
+          "none, frames are stamped and watched only; fixed above NULL",
           DEFAULT_DEVICE, kNull));
   /**
    * dmdsync:schedule:
    *
-   * Tile, code and timing that the DMD shows. Fixed above NULL.
+   * Tile, code and timing that the DMD shows. Fixed above READY.
    *
    * Since: 0.1
    */
@@ -388,7 +396,7 @@ install_settings (GObjectClass *klass)
       g_param_spec_string ("schedule", "Schedule",
           "Tile, code and timing of the exposure: a preset such as "
           "staircase:2x2 or sequential:lattice:8/3,pilot=16, or a JSON file",
-          DEFAULT_SCHEDULE, kNull));
+          DEFAULT_SCHEDULE, kReady));
   /**
    * dmdsync:timestamp-at:
    *

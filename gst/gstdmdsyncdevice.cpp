@@ -47,17 +47,14 @@ reports (GstDmdSync *self)
 } // namespace
 
 bool
-open_device (GstDmdSync *self)
+read_schedule (GstDmdSync *self)
 {
   SyncState &st = state (self);
-  std::string device;
   std::string text;
   {
     const ObjectLock lock (self);
-    device = st.settings.device;
     text = st.settings.schedule;
   }
-
   Result<Schedule> schedule = Schedule::parse (text);
   if (!schedule) {
     GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
@@ -67,6 +64,18 @@ open_device (GstDmdSync *self)
     return false;
   }
   st.schedule = *std::move (schedule);
+  return true;
+}
+
+bool
+open_device (GstDmdSync *self)
+{
+  SyncState &st = state (self);
+  std::string device;
+  {
+    const ObjectLock lock (self);
+    device = st.settings.device;
+  }
   if (device.empty ())
     return true;
 

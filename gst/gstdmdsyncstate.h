@@ -88,7 +88,7 @@ struct SyncState {
   GstClockTime jitter = 0;  ///< most by which frames came after their time
   GstClockTime latency = 0; ///< our own
 
-  /* Changed between NULL and READY only. */
+  /* Changed by changes of state only, while nothing flows or is uploaded. */
   Schedule schedule;
   std::unique_ptr<DmdRunner> runner; ///< null: no DMD is driven
 
@@ -113,7 +113,8 @@ GstClockTimeDiff moved_back (const SyncState &st);
  * told from on the frame, which is writable. */
 GstClockTime pipeline_time (GstDmdSync *self, GstBuffer *frame);
 
-/* The DMD; each returns false with an error on the bus. */
+/* What the properties name; false with an error on the bus. */
+bool read_schedule (GstDmdSync *self);
 bool open_device (GstDmdSync *self);
 void begin_upload (GstDmdSync *self);
 /** Parks the mirrors, whatever they are at. */

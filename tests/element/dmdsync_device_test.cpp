@@ -170,14 +170,31 @@ TEST (DmdsyncDevice, RunsAgain)
   EXPECT_EQ (sync.error (), "");
 }
 
-TEST (DmdsyncDevice, IsNotChangedWhileItIsOpen)
+TEST (DmdsyncDevice, IsFixedWhileOpenAndTheScheduleWhileItRuns)
 {
   Device device ("device=sim:fixed schedule=staircase:2x2");
-  device.set_state (GST_STATE_READY);
-  g_object_set (device.element (), "device", "sim:other", "schedule",
-      "sequential:3x3", nullptr);
+  const auto set = [&] {
+    g_object_set (device.element (), "device", "sim:other", "schedule",
+        "sequential:3x3", nullptr);
+  };
+  device.set_state (GST_STATE_PAUSED);
+  set ();
   EXPECT_EQ (text_property (device.element (), "device"), "sim:fixed");
   EXPECT_EQ (text_property (device.element (), "schedule"), "staircase:2x2");
+
+  device.set_state (GST_STATE_READY);
+  set ();
+  EXPECT_EQ (text_property (device.element (), "device"), "sim:fixed");
+  EXPECT_EQ (text_property (device.element (), "schedule"), "sequential:3x3");
+  const auto mirrors = SimulatedMirrors::find ("fixed");
+  device.set_state (GST_STATE_PAUSED);
+  while (mirrors->schedule () != *Schedule::parse ("sequential:3x3"))
+    std::this_thread::yield ();
+
+  device.set_state (GST_STATE_READY);
+  g_object_set (device.element (), "schedule", "staircase:2x9999", nullptr);
+  EXPECT_EQ (device.set_state (GST_STATE_PAUSED), GST_STATE_CHANGE_FAILURE);
+  EXPECT_NE (device.error ().find ("2x9999"), std::string::npos);
 }
 
 TEST (DmdsyncDevice, ThatCannotBeOpenedIsNamed)

@@ -16,35 +16,71 @@ register_frame_meta ()
     gst_meta_register_custom (kFrameMetaName, tags, nullptr, nullptr, nullptr);
 }
 
+namespace
+{
+
+/* Looked up once: a subframe takes a few microseconds, names a good part of
+ * one. */
+struct Names {
+  const GQuark frame = g_quark_from_static_string ("frame");
+  const GQuark subframe = g_quark_from_static_string ("subframe");
+  const GQuark exposure_start = g_quark_from_static_string ("exposure-start");
+  const GQuark exposure_duration =
+      g_quark_from_static_string ("exposure-duration");
+  const GQuark locked = g_quark_from_static_string ("locked");
+  const GQuark slip = g_quark_from_static_string ("slip");
+  const GQuark lost_before = g_quark_from_static_string ("lost-before");
+  const GQuark saturated = g_quark_from_static_string ("saturated");
+};
+
+const Names &
+names ()
+{
+  static const Names quarks;
+  return quarks;
+}
+
+GstCustomMeta *
+find (GstBuffer *buffer)
+{
+  static const GType api = gst_meta_get_info (kFrameMetaName)->api;
+  return reinterpret_cast<GstCustomMeta *> (gst_buffer_get_meta (buffer, api));
+}
+
+} // namespace
+
 void
 set_frame_meta (GstBuffer *buffer, const FrameMeta &meta)
 {
-  GstCustomMeta *custom = gst_buffer_get_custom_meta (buffer, kFrameMetaName);
+  GstCustomMeta *custom = find (buffer);
   if (!custom)
     custom = gst_buffer_add_custom_meta (buffer, kFrameMetaName);
-  gst_structure_set (gst_custom_meta_get_structure (custom), "frame",
-      G_TYPE_UINT64, meta.frame, "subframe", G_TYPE_INT, meta.subframe,
-      "exposure-start", G_TYPE_UINT64, meta.exposure_start, "exposure-duration",
-      G_TYPE_UINT64, meta.exposure_duration, "locked", G_TYPE_BOOLEAN,
-      meta.locked, "slip", G_TYPE_INT, meta.slip, "lost-before", G_TYPE_UINT64,
-      meta.lost_before, "saturated", G_TYPE_UINT64, meta.saturated, nullptr);
+  const Names &name = names ();
+  gst_structure_id_set (gst_custom_meta_get_structure (custom), name.frame,
+      G_TYPE_UINT64, meta.frame, name.subframe, G_TYPE_INT, meta.subframe,
+      name.exposure_start, G_TYPE_UINT64, meta.exposure_start,
+      name.exposure_duration, G_TYPE_UINT64, meta.exposure_duration,
+      name.locked, G_TYPE_BOOLEAN, meta.locked, name.slip, G_TYPE_INT,
+      meta.slip, name.lost_before, G_TYPE_UINT64, meta.lost_before,
+      name.saturated, G_TYPE_UINT64, meta.saturated, nullptr);
 }
 
 std::optional<FrameMeta>
 get_frame_meta (GstBuffer *buffer)
 {
-  GstCustomMeta *custom = gst_buffer_get_custom_meta (buffer, kFrameMetaName);
+  GstCustomMeta *custom = find (buffer);
   if (!custom)
     return std::nullopt;
 
   FrameMeta meta;
-  gst_structure_get (gst_custom_meta_get_structure (custom), "frame",
-      G_TYPE_UINT64, &meta.frame, "subframe", G_TYPE_INT, &meta.subframe,
-      "exposure-start", G_TYPE_UINT64, &meta.exposure_start,
-      "exposure-duration", G_TYPE_UINT64, &meta.exposure_duration, "locked",
-      G_TYPE_BOOLEAN, &meta.locked, "slip", G_TYPE_INT, &meta.slip,
-      "lost-before", G_TYPE_UINT64, &meta.lost_before, "saturated",
-      G_TYPE_UINT64, &meta.saturated, nullptr);
+  const Names &name = names ();
+  gst_structure_id_get (gst_custom_meta_get_structure (custom), name.frame,
+      G_TYPE_UINT64, &meta.frame, name.subframe, G_TYPE_INT, &meta.subframe,
+      name.exposure_start, G_TYPE_UINT64, &meta.exposure_start,
+      name.exposure_duration, G_TYPE_UINT64, &meta.exposure_duration,
+      name.locked, G_TYPE_BOOLEAN, &meta.locked, name.slip, G_TYPE_INT,
+      &meta.slip, name.lost_before, G_TYPE_UINT64, &meta.lost_before,
+      name.saturated, G_TYPE_UINT64, &meta.saturated, nullptr);
   return meta;
 }
 

@@ -9,6 +9,7 @@
 #include <span>
 #include <string>
 
+#include "base/text.h"
 #include "extract/fast_path.h"
 #include "extract/reference.h"
 #include "extract/targets.h"
@@ -62,9 +63,8 @@ check_options (const ExtractOptions &options, int type_bits)
   const auto targets = extract_targets ();
   if (!options.target.empty () &&
       std::ranges::find (targets, options.target) == targets.end ())
-    return Error{"extraction for '" +
-                 std::string (options.target.substr (0, 64)) +
-                 "' does not exist on this machine; 'scalar' always does"};
+    return Error{"extraction for " + in_quotes (options.target) +
+                 " does not exist on this machine; 'scalar' always does"};
   return {};
 }
 
@@ -105,8 +105,8 @@ parse_method (std::string_view name)
 {
   const auto found = std::ranges::find (kMethodNames, name);
   if (found == kMethodNames.end ())
-    return Error{"method '" + std::string (name.substr (0, 64)) +
-                 "' is none of auto, rank, select and decode"};
+    return Error{"method " + in_quotes (name) +
+                 " is none of auto, rank, select and decode"};
   return Method (found - kMethodNames.begin ());
 }
 

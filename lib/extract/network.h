@@ -23,16 +23,16 @@ struct WireList {
   short at[Capacity] = {};
   int size = 0;
 
-  consteval void add (int wire) { at[size++] = short (wire); }
+  constexpr void add (int wire) { at[size++] = short (wire); }
   /** Every second wire, from @p first on. */
-  consteval WireList every_second (int first) const
+  constexpr WireList every_second (int first) const
   {
     WireList part;
     for (int i = first; i < size; i += 2)
       part.add (at[i]);
     return part;
   }
-  consteval WireList slice (int first, int count) const
+  constexpr WireList slice (int first, int count) const
   {
     WireList part;
     for (int i = first; i < first + count; i++)
@@ -81,7 +81,7 @@ class Network
 public:
   using List = WireList<Wires>;
 
-  static consteval Network sort ()
+  static constexpr Network sort ()
   {
     Network network;
     network.rank_ = network.sorted (all_wires ());
@@ -89,7 +89,7 @@ public:
     return network;
   }
   /** Joins the sorted lists of wires 0..first-1 and first..Wires-1. */
-  static consteval Network merge (int first)
+  static constexpr Network merge (int first)
   {
     Network network;
     const List all = all_wires ();
@@ -116,7 +116,7 @@ private:
   /* 3 791 comparators sort 256 wires. */
   static constexpr int kCapacity = Wires * (Wires <= 32 ? 8 : 15);
 
-  static consteval List all_wires ()
+  static constexpr List all_wires ()
   {
     List all;
     for (int w = 0; w < Wires; w++)
@@ -124,13 +124,13 @@ private:
     return all;
   }
 
-  consteval void compare (int low, int high)
+  constexpr void compare (int low, int high)
   {
     comparators_[size_].low = short (low);
     comparators_[size_++].high = short (high);
   }
 
-  consteval List sorted (const List &in)
+  constexpr List sorted (const List &in)
   {
     if (in.size == 9)
       return known (kBest9, in);
@@ -149,7 +149,7 @@ private:
 
   /** A table, its last inputs left out as if they were infinite. */
   template <int Count>
-  consteval List known (const Pair (&table)[Count], const List &in)
+  constexpr List known (const Pair (&table)[Count], const List &in)
   {
     short wires[16];
     for (int i = 0; i < 16; i++)
@@ -170,7 +170,7 @@ private:
     return out;
   }
 
-  consteval List merged (const List &a, const List &b)
+  constexpr List merged (const List &a, const List &b)
   {
     if (a.size == 0)
       return b;
@@ -199,7 +199,7 @@ private:
 
   /** Puts the comparators in the order in which ranks 0, 1, 2, ... need them:
    * fewer wires are under way at any time, so fewer leave the registers. */
-  consteval void in_order_of_demand ()
+  constexpr void in_order_of_demand ()
   {
     const Network as_built = *this;
     bool emitted[kCapacity] = {};
@@ -210,7 +210,7 @@ private:
   }
 
   /** Emits what wire @p wire needs of the comparators before @p end. */
-  consteval void emit_before (
+  constexpr void emit_before (
       const Network &from, int end, int wire, bool *emitted)
   {
     for (int i = end - 1; i >= 0; i--) {
@@ -227,7 +227,7 @@ private:
     }
   }
 
-  consteval void mark_uses ()
+  constexpr void mark_uses ()
   {
     bool used[Wires] = {};
     for (int i = 0; i < size_; i++) {

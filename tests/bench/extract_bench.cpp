@@ -20,6 +20,7 @@
 #endif
 
 #include "extract/planes.h"
+#include "medians.h"
 
 namespace
 {
@@ -229,32 +230,6 @@ contenders (const Case &c)
   return all;
 }
 
-/** Keeps the median time of each contender of one case. */
-class Medians : public benchmark::BenchmarkReporter
-{
-public:
-  bool ReportContext (const Context &) override { return true; }
-  void ReportRuns (const std::vector<Run> &runs) override
-  {
-    for (const Run &run : runs)
-      if (run.run_type == Run::RT_Iteration)
-        times_[run.run_name.function_name].push_back (
-            run.cpu_accumulated_time / double (run.iterations));
-  }
-  double seconds (const std::string &contender)
-  {
-    auto &times = times_[contender];
-    if (times.empty ())
-      return 0.0;
-    const auto middle = times.begin () + std::ptrdiff_t (times.size () / 2);
-    std::nth_element (times.begin (), middle, times.end ());
-    return *middle;
-  }
-
-private:
-  std::map<std::string, std::vector<double>> times_;
-};
-
 template <typename Pixel>
 void
 run_case (const Case &c)
@@ -270,7 +245,7 @@ run_case (const Case &c)
             pool.next ();
           }
         });
-  Medians medians;
+  bench::Medians medians;
   benchmark::RunSpecifiedBenchmarks (&medians);
 
   const double bytes = double (c.width) * c.height * c.depth / 8;
@@ -294,10 +269,7 @@ run_case (const Case &c)
 int
 main (int argc, char **argv)
 {
-  /* Contenders take turns, so that what disturbs one disturbs all. */
-  std::vector<const char *> arguments = {argv[0], "--benchmark_repetitions=9",
-      "--benchmark_min_time=0.02",
-      "--benchmark_enable_random_interleaving=true"};
+  auto arguments = bench::taking_turns (argv[0]);
   std::string picked = ".*";
   for (int i = 1; i < argc; i++) {
     if (std::strncmp (argv[i], "--", 2) == 0)

@@ -1,0 +1,443 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "moire/calibration.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <new>
+
+#include "moire/displacement_fit.h"
+#include "moire/gray_fit.h"
+#include "moire/phase_fit.h"
+
+namespace cexp
+{
+
+namespace
+{
+
+/* A pixel that gets less than this part of the light of most others sees no
+ * mirrors. */
+constexpr float kCovered = 0.2f;
+
+/* Side of the squares over which light is averaged for the weights. */
+constexpr int kSmooth = 16;
+
+/* Squared residuals of blocks, of what noise leaves, above which there is a
+ * displacement. */
+constexpr double kDisplaced = 1.3;
+
+constexpr int kRounds = 12;
+/* Mirrors; a step as short as this changes nothing. */
+constexpr double kSettled = 1e-7;
+
+} // namespace
+
+struct Calibration::State {
+  struct Slot {
+    Pattern pattern;
+    Image<float> sum;
+    int frames = 0;
+  };
+  Extent camera, mirrors;
+  std::vector<Slot> slots;
+  Image<std::uint8_t> saturated;
+
+  Slot *find (const Pattern &pattern)
+  {
+    const auto at = std::find_if (slots.begin (), slots.end (),
+        [&] (const Slot &s) { return s.pattern == pattern; });
+    return at == slots.end () ? nullptr : &*at;
+  }
+  template <typename Pixel>
+  Result<void> add (
+      const Pattern &pattern, ImageView<const Pixel> frame, int most);
+
+  Image<float> mean (const Slot &slot) const;
+  const Slot *find (Pattern::Kind kind) const;
+  std::optional<GrayCode> gray_code (Axis axis) const;
+  std::vector<const Slot *> gratings (Axis axis) const;
+  Result<CalibrationResult> solve (const CalibrationOptions &options) const;
+};
+
+namespace
+{
+
+/* Means over kSmooth x kSmooth squares, spread over them again. */
+Image<float>
+smoothed (const Image<float> &image)
+{
+  Image<float> out (image.width (), image.height ());
+  for (int y0 = 0; y0 < image.height (); y0 += kSmooth)
+    for (int x0 = 0; x0 < image.width (); x0 += kSmooth) {
+      const int y1 = std::min (image.height (), y0 + kSmooth);
+      const int x1 = std::min (image.width (), x0 + kSmooth);
+      double sum = 0.0;
+      for (int y = y0; y < y1; y++)
+        for (int x = x0; x < x1; x++)
+          sum += double (image.at (x, y));
+      const float mean = float (sum / ((y1 - y0) * (x1 - x0)));
+      for (int y = y0; y < y1; y++)
+        std::fill (out.view ().row (y) + x0, out.view ().row (y) + x1, mean);
+    }
+  return out;
+}
+
+/* The value that @part of an image's pixels do not exceed. */
+float
+quantile (const Image<float> &image, double part)
+{
+  std::vector<float> values;
+  for (int y = 0; y < image.height (); y += 2)
+    for (int x = y / 2 % 2; x < image.width (); x += 2)
+      values.push_back (image.at (x, y));
+  if (values.empty ())
+    return image.at (0, 0);
+  const auto at =
+      values.begin () + std::ptrdiff_t (part * double (values.size () - 1));
+  std::nth_element (values.begin (), at, values.end ());
+  return *at;
+}
+
+/* Rounds until nothing changes; the noise is learned on the way. */
+Result<void>
+settle (PhaseFit &fit, std::size_t numbers)
+{
+  double before = std::numeric_limits<double>::infinity ();
+  for (int round = 0; round < kRounds; round++) {
+    const auto step = fit.round (numbers);
+    if (!step)
+      return Error{"the gratings do not determine a mapping; check light and "
+                   "focus, and that each frame shows the pattern that it is "
+                   "of"};
+    if (*step < kSettled || (round > 3 && *step > 0.5 * before))
+      break;
+    before = *step;
+    if (round < 4)
+      fit.estimate_noise ();
+  }
+  return {};
+}
+
+/* Adds a grid if the blocks show more than noise. */
+Result<void>
+displace (PhaseFit &fit, int node_distance)
+{
+  if (std::max (excess (fit.blocks_x, fit.noise_ratio),
+          excess (fit.blocks_y, fit.noise_ratio)) < kDisplaced)
+    return {};
+  const auto nodes = [node_distance] (int size) {
+    return std::clamp (
+        1 + (size + node_distance / 2) / node_distance, 3, Mapping::kMaxNodes);
+  };
+  Displacement grid;
+  grid.columns = nodes (fit.camera.width);
+  grid.rows = nodes (fit.camera.height);
+  grid.x.resize (std::size_t (grid.columns) * std::size_t (grid.rows));
+  grid.y = grid.x;
+  for (int round = 0; round < 3; round++) {
+    add_displacement (grid, grid.x, fit.blocks_x, fit.block_size, fit.camera);
+    add_displacement (grid, grid.y, fit.blocks_y, fit.block_size, fit.camera);
+    auto made = Mapping::make (
+        {fit.camera, fit.mirrors, fit.mapping.homography (), {}, grid});
+    if (!made)
+      return made.error ();
+    fit.mapping = std::move (*made);
+    const Mapping::Covariance covariance = fit.covariance;
+    if (!fit.round (0))
+      return Error{"the gratings do not determine a displacement grid"};
+    fit.covariance = covariance;
+  }
+  return {};
+}
+
+} // namespace
+
+Result<Calibration>
+Calibration::make (
+    Extent camera, Extent mirrors, std::span<const Pattern> patterns)
+{
+  if (const auto checked = Mapping::make ({camera, mirrors}); !checked)
+    return checked.error ();
+  if (std::min (camera.width, camera.height) < 32)
+    return Error{"a calibration needs frames of 32x32 pixels or more, not " +
+                 std::to_string (camera.width) + "x" +
+                 std::to_string (camera.height)};
+  auto state = std::make_unique<State> ();
+  state->camera = camera;
+  state->mirrors = mirrors;
+  state->saturated = Image<std::uint8_t> (camera.width, camera.height);
+  for (const Pattern &pattern : patterns) {
+    if (state->find (pattern) != nullptr)
+      return Error{
+          "pattern " + pattern.text () + " stands twice in a calibration"};
+    state->slots.push_back ({pattern, {}, 0});
+  }
+  for (const Axis axis : {Axis::x, Axis::y}) {
+    const auto gratings = state->gratings (axis);
+    const bool whole = !gratings.empty () &&
+                       int (gratings.size ()) == gratings[0]->pattern.period &&
+                       gratings.size () >= 4;
+    if (!whole || !state->gray_code (axis) ||
+        state->find (Pattern::Kind::dark) == nullptr ||
+        state->find (Pattern::Kind::white) == nullptr)
+      return Error{"a calibration needs dark, white, the Gray codes of x and y "
+                   "with their inverses and gratings of one period, 4 or "
+                   "more, at all phases, as calibration_patterns () has them"};
+  }
+  return Calibration (std::move (state));
+}
+
+Calibration::Calibration (std::unique_ptr<State> state)
+    : state_ (std::move (state))
+{
+}
+
+Calibration::Calibration (Calibration &&) noexcept = default;
+Calibration &Calibration::operator= (Calibration &&) noexcept = default;
+Calibration::~Calibration () = default;
+
+template <typename Pixel>
+Result<void>
+Calibration::State::add (
+    const Pattern &pattern, ImageView<const Pixel> frame, int most)
+{
+  Slot *slot = find (pattern);
+  if (slot == nullptr)
+    return Error{"pattern " + pattern.text () + " is not of this calibration"};
+  if (frame.width != camera.width || frame.height != camera.height)
+    return Error{"a calibration frame of " + std::to_string (frame.width) +
+                 "x" + std::to_string (frame.height) + " pixels came where " +
+                 std::to_string (camera.width) + "x" +
+                 std::to_string (camera.height) + " are expected"};
+  if (slot->frames++ == 0)
+    slot->sum = Image<float> (camera.width, camera.height);
+  for (int y = 0; y < frame.height; y++) {
+    const Pixel *in = frame.row (y);
+    float *sum = slot->sum.view ().row (y);
+    std::uint8_t *full = saturated.view ().row (y);
+    for (int x = 0; x < frame.width; x++) {
+      sum[x] += float (in[x]);
+      full[x] |= in[x] >= most;
+    }
+  }
+  return {};
+}
+
+Result<void>
+Calibration::add (const Pattern &pattern, ImageView<const std::uint8_t> frame)
+{
+  return state_->add (pattern, frame, 255);
+}
+
+Result<void>
+Calibration::add (
+    const Pattern &pattern, ImageView<const std::uint16_t> frame, int bits)
+{
+  return state_->add (
+      pattern, frame, (1 << std::clamp (bits > 0 ? bits : 16, 1, 16)) - 1);
+}
+
+std::vector<Pattern>
+Calibration::missing () const
+{
+  std::vector<Pattern> patterns;
+  for (const auto &slot : state_->slots)
+    if (slot.frames == 0)
+      patterns.push_back (slot.pattern);
+  return patterns;
+}
+
+Image<float>
+Calibration::State::mean (const Slot &slot) const
+{
+  Image<float> mean = slot.sum;
+  const float part = 1.0f / float (slot.frames);
+  for (int y = 0; y < camera.height; y++)
+    for (int x = 0; x < camera.width; x++)
+      mean.at (x, y) *= part;
+  return mean;
+}
+
+const Calibration::State::Slot *
+Calibration::State::find (Pattern::Kind kind) const
+{
+  const auto at = std::find_if (slots.begin (), slots.end (),
+      [kind] (const Slot &s) { return s.pattern.kind == kind; });
+  return at == slots.end () ? nullptr : &*at;
+}
+
+/* Of the slots that have frames; without frames, whether there are all bits. */
+std::optional<GrayCode>
+Calibration::State::gray_code (Axis axis) const
+{
+  GrayCode code;
+  for (int bit = 0;; bit++) {
+    const Slot *pair[2] = {};
+    for (const Slot &slot : slots)
+      if (slot.pattern.kind == Pattern::Kind::gray &&
+          slot.pattern.axis == axis && slot.pattern.bit == bit)
+        pair[slot.pattern.inverse ? 1 : 0] = &slot;
+    if (pair[0] == nullptr || pair[1] == nullptr)
+      break;
+    code.width = pair[0]->pattern.period;
+    Image<float> difference;
+    if (pair[0]->frames > 0 && pair[1]->frames > 0) {
+      difference = mean (*pair[0]);
+      const Image<float> inverse = mean (*pair[1]);
+      for (int y = 0; y < camera.height; y++)
+        for (int x = 0; x < camera.width; x++)
+          difference.at (x, y) -= inverse.at (x, y);
+    }
+    code.bits.push_back (std::move (difference));
+  }
+  const int size = axis == Axis::x ? mirrors.width : mirrors.height;
+  const bool all =
+      !code.bits.empty () && (size - 1) / code.width < 1 << code.bits.size ();
+  return all ? std::optional (std::move (code)) : std::nullopt;
+}
+
+/* By phase. */
+std::vector<const Calibration::State::Slot *>
+Calibration::State::gratings (Axis axis) const
+{
+  std::vector<const Slot *> found;
+  for (const Slot &slot : slots)
+    if (slot.pattern.kind == Pattern::Kind::grating &&
+        slot.pattern.axis == axis)
+      found.push_back (&slot);
+  std::sort (found.begin (), found.end (), [] (const Slot *a, const Slot *b) {
+    return a->pattern.phase < b->pattern.phase;
+  });
+  return found;
+}
+
+Result<CalibrationResult>
+Calibration::State::solve (const CalibrationOptions &options) const
+{
+  const int width = camera.width, height = camera.height;
+  const Image<float> dark = mean (*find (Pattern::Kind::dark));
+  Image<float> contrast = mean (*find (Pattern::Kind::white));
+  const Image<float> dark_smooth = smoothed (dark);
+  const Image<float> white_smooth = smoothed (contrast);
+  for (int y = 0; y < height; y++)
+    for (int x = 0; x < width; x++)
+      contrast.at (x, y) -= dark.at (x, y);
+
+  CalibrationResult result = {Mapping (camera), 0, 0, 0, 0,
+      Image<PixelQuality> (width, height), {}, {}, {}};
+  const float covered = std::max (1.0f, kCovered * quantile (contrast, 0.9));
+  Image<std::uint8_t> usable (width, height);
+  for (int y = 0; y < height; y++)
+    for (int x = 0; x < width; x++) {
+      PixelQuality &quality = result.quality.at (x, y);
+      quality = contrast.at (x, y) < covered ? PixelQuality::uncovered
+                : saturated.at (x, y) != 0   ? PixelQuality::saturated
+                                             : PixelQuality::good;
+      usable.at (x, y) = quality == PixelQuality::good;
+    }
+  if (result.pixels (PixelQuality::saturated) >
+      std::uint64_t (width) * std::uint64_t (height) / 2)
+    return Error{"more than half of the pixels stand at the largest value; "
+                 "reduce light, exposure or gain, and calibrate again"};
+
+  const bool affine = options.model == FitModel::affine;
+  const auto coarse = fit_gray_codes (*gray_code (Axis::x),
+      *gray_code (Axis::y), std::as_const (usable).view (), affine);
+  if (!coarse)
+    return coarse.error ();
+  const auto start = Mapping::from_centred (camera, mirrors, *coarse);
+  if (!start)
+    return start.error ();
+
+  PhaseFit fit = {camera, mirrors, {}, {}, std::as_const (usable).view (),
+      dark_smooth.view (), white_smooth.view (), *start};
+  std::vector<Image<float>> frames;
+  int repeats = std::numeric_limits<int>::max ();
+  for (const Axis axis : {Axis::x, Axis::y})
+    for (const Slot *slot : gratings (axis)) {
+      frames.push_back (mean (*slot));
+      repeats = std::min (repeats, slot->frames);
+    }
+  for (std::size_t i = 0; i < frames.size (); i++)
+    (i < gratings (Axis::x).size () ? fit.x : fit.y)
+        .frames.push_back (std::as_const (frames[i]).view ());
+
+  if (const auto settled = settle (fit, affine ? 6 : 8); !settled)
+    return settled.error ();
+  const int across =
+      (width + CalibrationResult::kBlock - 1) / CalibrationResult::kBlock;
+  const int down =
+      (height + CalibrationResult::kBlock - 1) / CalibrationResult::kBlock;
+  result.residual_x = result.residual_y = Image<float> (across, down);
+  for (int j = 0; j < down; j++)
+    for (int i = 0; i < across; i++) {
+      const auto shift = [] (const PhaseFit::Block &b) {
+        return b.information > 0.0 ? float (b.score / b.information) : 0.0f;
+      };
+      const std::size_t at = std::size_t (j * across + i);
+      result.residual_x.at (i, j) = shift (fit.blocks_x[at]);
+      result.residual_y.at (i, j) = shift (fit.blocks_y[at]);
+    }
+  if (options.model == FitModel::displaced)
+    if (const auto displaced = displace (fit, options.node_distance);
+        !displaced)
+      return displaced.error ();
+
+  auto mapping = Mapping::make ({camera, mirrors, fit.mapping.homography (),
+      fit.covariance, fit.mapping.displacement ()});
+  if (!mapping)
+    return mapping.error ();
+  result.mapping = std::move (*mapping);
+  const double magnification = result.mapping.stance ().magnification;
+  result.psf_sigma =
+      magnification * std::sqrt (0.5 * (fit.blur_x + fit.blur_y));
+  result.noise_floor = fit.noise.floor;
+  result.noise_slope = fit.noise.slope;
+  result.misfit = std::sqrt (0.5 * (excess (fit.blocks_x, fit.noise_ratio) +
+                                       excess (fit.blocks_y, fit.noise_ratio)));
+  for (int y = 0; y < height; y++)
+    for (int x = 0; x < width; x++) {
+      PixelQuality &quality = result.quality.at (x, y);
+      if (quality != PixelQuality::good)
+        continue;
+      if (!result.mapping.covers (result.mapping.mirror_at (x, y)))
+        quality = PixelQuality::uncovered;
+      else if (fit.faint.at (x, y) != 0)
+        quality = PixelQuality::low_contrast;
+      else if (fit.outlier.at (x, y) != 0)
+        quality = PixelQuality::outlier;
+    }
+  result.contrast = std::move (contrast);
+  return result;
+}
+
+Result<CalibrationResult>
+Calibration::solve (const CalibrationOptions &options) const
+{
+  if (const auto patterns = missing (); !patterns.empty ())
+    return Error{std::to_string (patterns.size ()) +
+                 " frames of the calibration are missing, that of " +
+                 patterns.front ().text () + " first; add them"};
+  if (options.node_distance < 4)
+    return Error{"the nodes of a displacement grid must be 4 pixels apart or "
+                 "more, not " +
+                 std::to_string (options.node_distance)};
+  try {
+    return state_->solve (options);
+  } catch (const std::bad_alloc &) {
+    return Error{"there is no memory to solve the calibration"};
+  }
+}
+
+std::uint64_t
+CalibrationResult::pixels (PixelQuality what) const
+{
+  std::uint64_t count = 0;
+  for (int y = 0; y < quality.height (); y++)
+    count += std::uint64_t (std::count (quality.view ().row (y),
+        quality.view ().row (y) + quality.width (), what));
+  return count;
+}
+
+} // namespace cexp

@@ -1,0 +1,546 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "moire/live_moire.h"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <complex>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "schedule/matrix.h"
+
+namespace cexp
+{
+
+namespace
+{
+
+using Phasor = std::complex<float>;
+constexpr double kTurn = 2.0 * std::numbers::pi;
+
+constexpr int kMinSampling = 3;
+constexpr int kMaxSampling = 64;
+constexpr int kMinPeriods = 8;
+
+/* Blocks with less than this part of the typical amplitude show no grating. */
+constexpr float kFaint = 0.4f;
+
+/* Part of the phasors' power that neighbours must have in common. */
+constexpr double kCoherent = 0.5;
+
+double
+sinc (double x)
+{
+  const double a = std::numbers::pi * x;
+  return std::abs (a) < 1e-9 ? 1.0 : std::sin (a) / a;
+}
+
+/* cos and sin of 2 pi t / T, and the same times t / T: the triangle that
+ * linear interpolation between every T-th sample makes has the one for its
+ * falling and the other for its rising side. */
+struct Carrier {
+  int period;
+  std::vector<float> cosine, sine, rising_cosine, rising_sine;
+
+  explicit Carrier (int samples) : period (samples)
+  {
+    for (int t = 0; t < samples; t++) {
+      const double angle = kTurn * t / samples;
+      const double part = double (t) / samples;
+      cosine.push_back (float (std::cos (angle)));
+      sine.push_back (float (std::sin (angle)));
+      rising_cosine.push_back (float (part * std::cos (angle)));
+      rising_sine.push_back (float (part * std::sin (angle)));
+    }
+  }
+
+  /* Of T values: with the falling side, and with the rising one. */
+  void demodulate (const float *values, std::size_t step, Phasor &whole,
+      Phasor &rising) const
+  {
+    float wc = 0, ws = 0, rc = 0, rs = 0;
+    for (std::size_t t = 0; t < std::size_t (period); t++) {
+      const float value = values[t * step];
+      wc += cosine[t] * value;
+      ws += sine[t] * value;
+      rc += rising_cosine[t] * value;
+      rs += rising_sine[t] * value;
+    }
+    whole = {wc, -ws};
+    rising = {rc, -rs};
+  }
+
+  /* Power of white noise that a phasor gathers, of that of its window's sum:
+   * what neighbouring windows share. */
+  double overlap () const
+  {
+    double squares = 0.0;
+    for (int t = -period; t <= period; t++)
+      squares += std::pow (1.0 - std::abs (double (t) / period), 2);
+    return period / squares;
+  }
+};
+
+/* Phasors of one grating, one for each place of a lattice of T x T pixels. */
+struct Phasors {
+  int columns = 0, rows = 0;
+  double first_x = 0, first_y = 0; // of the places, pixels
+  std::vector<Phasor> at;
+  Image<float> phase, amplitude;
+  float reference = 0.0f; // amplitude where there is a grating
+  double power = 0.0;
+
+  void resize (int width, int height)
+  {
+    columns = width;
+    rows = height;
+    at.resize (std::size_t (width) * std::size_t (height));
+    phase = amplitude = Image<float> (width, height);
+  }
+  const Phasor *row (int r) const
+  {
+    return at.data () + std::ptrdiff_t (r) * columns;
+  }
+  Phasor *row (int r) { return at.data () + std::ptrdiff_t (r) * columns; }
+  bool shows (std::size_t i) const
+  {
+    return std::norm (at[i]) > kFaint * kFaint * reference * reference;
+  }
+
+  std::complex<double> product (int lag_x, int lag_y) const;
+  double slope (bool along_y) const;
+};
+
+/* Sum of the products of each phasor and one @lag_x, @lag_y farther on. */
+std::complex<double>
+Phasors::product (int lag_x, int lag_y) const
+{
+  std::complex<double> sum = 0.0;
+  for (int r = 0; r + lag_y < rows; r++) {
+    const Phasor *here = row (r);
+    const Phasor *there = row (r + lag_y) + lag_x;
+    float re = 0.0f, im = 0.0f;
+    for (int c = 0; c + lag_x < columns; c++) {
+      re += here[c].real () * there[c].real () +
+            here[c].imag () * there[c].imag ();
+      im += here[c].real () * there[c].imag () -
+            here[c].imag () * there[c].real ();
+    }
+    sum += std::complex<double> (re, im);
+  }
+  return sum;
+}
+
+/* Radians from place to place, from ever longer baselines. */
+double
+Phasors::slope (bool along_y) const
+{
+  double slope = 0.0;
+  for (int lag = 1; lag <= (along_y ? rows : columns) / 2; lag *= 4) {
+    const auto sum = along_y ? product (0, lag) : product (lag, 0);
+    slope += std::arg (sum * std::polar (1.0, -lag * slope)) / lag;
+  }
+  return slope;
+}
+
+/* phase = a xi + b eta + c, in places relative to the frame's centre. */
+struct Plane {
+  std::array<double, 3> at = {};
+  Matrix covariance;
+};
+
+} // namespace
+
+struct LiveMoire::State {
+  State (const Mapping &where, const Options &how, int samples)
+      : expected (where), options (how), carrier (samples)
+  {
+    const Extent camera = where.camera ();
+    blocks_x = camera.width / samples;
+    blocks_y = camera.height / samples;
+    const double middle = 0.5 * (samples - 1);
+    x.resize (blocks_x - 1, blocks_y);
+    x.first_x = samples;
+    x.first_y = middle;
+    y.resize (blocks_x, blocks_y - 1);
+    y.first_x = middle;
+    y.first_y = samples;
+    columns.resize (std::size_t (blocks_x * samples));
+    row_sums.resize (std::size_t (blocks_x * samples));
+    rising.resize (std::size_t (blocks_x));
+    sorted.reserve (std::max (x.at.size (), y.at.size ()));
+  }
+
+  Mapping expected;
+  Options options;
+  Carrier carrier;
+  int blocks_x, blocks_y;
+  Phasors x, y;
+  double sum = 0.0;            // of the numbers in whole blocks
+  std::vector<float> columns;  // sums over the rows of a block
+  std::vector<float> row_sums; // of a block's T rows, T by T
+  std::vector<Phasor> rising;
+  std::vector<float> sorted;
+
+  template <typename Pixel>
+  void collect (ImageView<const Pixel> frame);
+  void demodulate_x (int block_row);
+  void demodulate_y (int block_row);
+  Result<void> find_grating (Phasors &phasors, const char *name);
+  Plane start (const Phasors &phasors, double sign, bool along_y) const;
+  Result<Plane> fit (const Phasors &phasors, double sign, bool along_y) const;
+  double refine (
+      const Phasors &phasors, Plane &plane, double sign, double limit) const;
+  Result<Mapping> combine (const Plane &px, const Plane &py) const;
+  template <typename Pixel>
+  Result<LiveReading> solve (ImageView<const Pixel> frame);
+};
+
+/* Phasors of the whole frame, T rows at a time. */
+template <typename Pixel>
+void
+LiveMoire::State::collect (ImageView<const Pixel> frame)
+{
+  const int samples = carrier.period;
+  const int width = blocks_x * samples;
+  sum = 0.0;
+  for (int r = 0; r < blocks_y; r++) {
+    std::fill (columns.begin (), columns.end (), 0.0f);
+    for (int t = 0; t < samples; t++) {
+      const Pixel *row = frame.row (r * samples + t);
+      float *sums = row_sums.data () + std::ptrdiff_t (t) * blocks_x;
+      for (int i = 0; i < width; i++)
+        columns[std::size_t (i)] += float (row[i]);
+      for (int c = 0; c < blocks_x; c++) {
+        std::uint32_t total = 0;
+        for (int i = 0; i < samples; i++)
+          total += row[c * samples + i];
+        sums[c] = float (total);
+      }
+    }
+    for (int c = 0; c < width; c++)
+      sum += double (columns[std::size_t (c)]);
+    demodulate_x (r);
+    demodulate_y (r);
+  }
+}
+
+void
+LiveMoire::State::demodulate_x (int block_row)
+{
+  Phasor *out = x.row (block_row);
+  Phasor before = 0.0f;
+  for (int c = 0; c < blocks_x; c++) {
+    Phasor whole, rise;
+    carrier.demodulate (columns.data () + c * carrier.period, 1, whole, rise);
+    if (c > 0)
+      out[c - 1] = before + whole - rise;
+    before = rise;
+  }
+}
+
+void
+LiveMoire::State::demodulate_y (int block_row)
+{
+  for (int c = 0; c < blocks_x; c++) {
+    Phasor whole, rise;
+    carrier.demodulate (
+        row_sums.data () + c, std::size_t (blocks_x), whole, rise);
+    if (block_row > 0)
+      y.row (block_row - 1)[c] = rising[std::size_t (c)] + whole - rise;
+    rising[std::size_t (c)] = rise;
+  }
+}
+
+/* Fills the maps; error where there is no grating. */
+Result<void>
+LiveMoire::State::find_grating (Phasors &phasors, const char *name)
+{
+  const float to_amplitude = 2.0f / float (carrier.period * carrier.period);
+  phasors.power = 0.0;
+  sorted.clear ();
+  for (int r = 0; r < phasors.rows; r++)
+    for (int c = 0; c < phasors.columns; c++) {
+      const Phasor z = phasors.row (r)[c];
+      const float norm = std::norm (z);
+      const float size = std::sqrt (norm);
+      phasors.power += double (norm);
+      phasors.phase.at (c, r) = std::atan2 (z.imag (), z.real ());
+      phasors.amplitude.at (c, r) = to_amplitude * size;
+      sorted.push_back (size);
+    }
+  const auto high = sorted.begin () + std::ptrdiff_t (sorted.size () * 9 / 10);
+  std::nth_element (sorted.begin (), high, sorted.end ());
+  phasors.reference = *high;
+
+  const double common =
+      std::abs (phasors.product (1, 0)) + std::abs (phasors.product (0, 1));
+  if (phasors.power > 0.0 && common > 2.0 * kCoherent * phasors.power)
+    return {};
+  return Error{std::string ("no grating is seen in ") + name + ": show " +
+               std::to_string (options.period) +
+               "-mirror stripes, bring the mirrors into focus, and set "
+               "magnification and turn to what is expected within " +
+               std::to_string (int (options.search * 100 + 0.5)) + " %"};
+}
+
+Plane
+LiveMoire::State::start (
+    const Phasors &phasors, double sign, bool along_y) const
+{
+  const Extent camera = expected.camera ();
+  const double cx = 0.5 * (camera.width - 1), cy = 0.5 * (camera.height - 1);
+  const double r = std::max (cx, cy);
+  double slope_x = phasors.slope (false), slope_y = phasors.slope (true);
+  const double step = carrier.period;
+
+  std::complex<double> mean = 0.0;
+  for (int j = 0; j < phasors.rows; j++)
+    for (int i = 0; i < phasors.columns; i++)
+      mean += std::complex<double> (phasors.row (j)[i]) *
+              std::polar (1.0, -(slope_x * i + slope_y * j));
+  const double origin = std::arg (mean) -
+                        slope_x * (phasors.first_x - cx) / step -
+                        slope_y * (phasors.first_y - cy) / step;
+  /* A carrier's turn for each place went unseen. */
+  (along_y ? slope_y : slope_x) += kTurn;
+  Plane plane;
+  plane.at = {sign * slope_x / step * r, sign * slope_y / step * r,
+      sign *
+          (origin +
+              kTurn * (along_y ? cy - phasors.first_y : cx - phasors.first_x) /
+                  step)};
+  return plane;
+}
+
+/* One round of least squares on the phases that @plane leaves, as far as they
+ * are below @limit; returns their variance. */
+double
+LiveMoire::State::refine (
+    const Phasors &phasors, Plane &plane, double sign, double limit) const
+{
+  const Extent camera = expected.camera ();
+  const double cx = 0.5 * (camera.width - 1), cy = 0.5 * (camera.height - 1);
+  const double r = std::max (cx, cy);
+  const double step = carrier.period / r;
+  Matrix normal (9);
+  std::array<double, 3> right = {};
+  double squares = 0.0, count = 0.0;
+  const std::complex<float> turn (std::polar (1.0, -sign * plane.at[0] * step));
+  for (int j = 0; j < phasors.rows; j++) {
+    const double eta = (phasors.first_y - cy) / r + j * step;
+    const double xi0 = (phasors.first_x - cx) / r;
+    std::complex<float> back (std::polar (
+        1.0, -sign * (plane.at[0] * xi0 + plane.at[1] * eta + plane.at[2])));
+    double n = 0, nx = 0, nxx = 0, s = 0, sx = 0;
+    for (int i = 0; i < phasors.columns; i++, back *= turn) {
+      const std::size_t at = std::size_t (j * phasors.columns + i);
+      if (!phasors.shows (at))
+        continue;
+      const Phasor z = phasors.at[at];
+      const Phasor left = {z.real () * back.real () - z.imag () * back.imag (),
+          z.real () * back.imag () + z.imag () * back.real ()};
+      const float norm = std::norm (left);
+      const double rest = left.real () > 0.0f
+                              ? double (left.imag () / std::sqrt (norm))
+                              : std::copysign (1.0, double (left.imag ()));
+      if (std::abs (rest) > limit)
+        continue;
+      const double xi = xi0 + i * step;
+      n += 1;
+      nx += xi;
+      nxx += xi * xi;
+      s += rest;
+      sx += rest * xi;
+      squares += rest * rest;
+    }
+    count += n;
+    const double sums[] = {nxx, nx * eta, nx, n * eta * eta, n * eta, n};
+    normal[0] += sums[0];
+    normal[1] += sums[1];
+    normal[2] += sums[2];
+    normal[4] += sums[3];
+    normal[5] += sums[4];
+    normal[8] += sums[5];
+    right[0] += sx;
+    right[1] += s * eta;
+    right[2] += s;
+  }
+  normal[3] = normal[1];
+  normal[6] = normal[2];
+  normal[7] = normal[5];
+  const auto inverse = inverted (normal, 3);
+  if (!inverse)
+    return -1.0;
+  for (std::size_t i = 0; i < 3; i++)
+    for (std::size_t j = 0; j < 3; j++)
+      plane.at[i] += sign * (*inverse)[3 * i + j] * right[j];
+  plane.covariance = *inverse;
+  return squares / count;
+}
+
+Result<Plane>
+LiveMoire::State::fit (const Phasors &phasors, double sign, bool along_y) const
+{
+  Plane plane = start (phasors, sign, along_y);
+  /* Places at the edge of the array go last. */
+  double variance = 1.0;
+  for (int round = 0; round < 4 && variance >= 0.0; round++)
+    variance = refine (phasors, plane, sign, 3.0 * std::sqrt (variance));
+  if (!(variance >= 0.0))
+    return Error{"the grating is seen in too small a part of the frame"};
+  for (double &entry : plane.covariance)
+    entry *= variance * carrier.overlap ();
+  return plane;
+}
+
+/* Mirrors from phases. */
+Result<Mapping>
+LiveMoire::State::combine (const Plane &px, const Plane &py) const
+{
+  const double to_mirrors = options.period / kTurn;
+  /* Mirror of phase 0: the middle of those that are on. */
+  const double origin = 0.5 * (options.period / 2 - 1);
+  const Homography known = expected.centred ();
+  Homography h = {0, 0, 0, 0, 0, 0, 0, 0, 1};
+  Mapping::Covariance covariance = {};
+  const Plane *planes[] = {&px, &py};
+  for (std::size_t d = 0; d < 2; d++) {
+    for (std::size_t i = 0; i < 3; i++) {
+      h[3 * d + i] = to_mirrors * planes[d]->at[i];
+      for (std::size_t j = 0; j < 3; j++)
+        covariance[(3 * d + i) * Mapping::kParameters + 3 * d + j] =
+            to_mirrors * to_mirrors *
+            (planes[d]->covariance[3 * i + j] +
+                planes[d]->covariance[3 * j + i]) /
+            2.0;
+    }
+    double &offset = h[3 * d + 2];
+    offset += origin;
+    offset += options.period *
+              std::round ((known[3 * d + 2] - offset) / options.period);
+  }
+  auto mapping =
+      Mapping::from_centred (expected.camera (), expected.mirrors (), h);
+  if (!mapping)
+    return mapping.error ();
+  return Mapping::make ({expected.camera (), expected.mirrors (),
+      mapping->homography (), covariance});
+}
+
+template <typename Pixel>
+Result<LiveReading>
+LiveMoire::State::solve (ImageView<const Pixel> frame)
+{
+  assert (frame.width == expected.camera ().width &&
+          frame.height == expected.camera ().height);
+  collect (frame);
+  for (const auto &[phasors, name] : {std::pair (&x, "x"), std::pair (&y, "y")})
+    if (const auto found = find_grating (*phasors, name); !found)
+      return found.error ();
+
+  const Homography known = expected.centred ();
+  const auto fit_x = fit (x, known[0] < 0.0 ? -1.0 : 1.0, false);
+  if (!fit_x)
+    return fit_x.error ();
+  const auto fit_y = fit (y, known[4] < 0.0 ? -1.0 : 1.0, true);
+  if (!fit_y)
+    return fit_y.error ();
+  const auto mapping = combine (*fit_x, *fit_y);
+  if (!mapping)
+    return mapping.error ();
+
+  LiveReading reading = {*mapping, {}, 0.0, 0};
+  const double pixels =
+      double (blocks_x) * blocks_y * carrier.period * carrier.period;
+  const double most =
+      sum / pixels * 4.0 / std::numbers::pi * sinc (1.0 / carrier.period);
+  const double to_contrast =
+      2.0 / (carrier.period * carrier.period * std::max (1e-9, most));
+  reading.contrast = {
+      to_contrast * double (x.reference), to_contrast * double (y.reference)};
+  std::size_t shown = 0;
+  for (const Phasors *phasors : {&x, &y})
+    for (std::size_t i = 0; i < phasors->at.size (); i++)
+      shown += phasors->shows (i);
+  reading.coverage = double (shown) / double (x.at.size () + y.at.size ());
+  for (int row = 0; row < frame.height; row++)
+    reading.saturated += std::uint64_t (std::count (frame.row (row),
+        frame.row (row) + frame.width, std::numeric_limits<Pixel>::max ()));
+  return reading;
+}
+
+Result<LiveMoire>
+LiveMoire::make (const Mapping &expected)
+{
+  return make (expected, Options{});
+}
+
+Result<LiveMoire>
+LiveMoire::make (const Mapping &expected, const Options &options)
+{
+  const Stance stance = expected.stance ();
+  const double pixels = options.period * stance.magnification;
+  const int samples = int (std::lround (pixels));
+  if (options.period < 2 || options.period % 2 != 0)
+    return Error{"a live grating of " + std::to_string (options.period) +
+                 " mirrors has no equal stripes; its period must be even"};
+  if (samples < kMinSampling || samples > kMaxSampling)
+    return Error{"a period of the live grating has " +
+                 std::to_string (samples) + " pixels; it must have " +
+                 std::to_string (kMinSampling) + " to " +
+                 std::to_string (kMaxSampling) + ", take another period"};
+  const Extent camera = expected.camera ();
+  if (std::min (camera.width, camera.height) < kMinPeriods * samples)
+    return Error{"a frame of " + std::to_string (camera.width) + "x" +
+                 std::to_string (camera.height) + " pixels holds less than " +
+                 std::to_string (kMinPeriods) + " periods of the live grating"};
+  return LiveMoire (std::make_unique<State> (expected, options, samples));
+}
+
+LiveMoire::LiveMoire (std::unique_ptr<State> state) : state_ (std::move (state))
+{
+}
+
+LiveMoire::LiveMoire (LiveMoire &&) noexcept = default;
+LiveMoire &LiveMoire::operator= (LiveMoire &&) noexcept = default;
+LiveMoire::~LiveMoire () = default;
+
+int
+LiveMoire::sampling () const
+{
+  return state_->carrier.period;
+}
+
+Result<LiveReading>
+LiveMoire::solve (ImageView<const std::uint8_t> frame)
+{
+  return state_->solve (frame);
+}
+
+Result<LiveReading>
+LiveMoire::solve (ImageView<const std::uint16_t> frame)
+{
+  return state_->solve (frame);
+}
+
+ImageView<const float>
+LiveMoire::phase (bool y) const
+{
+  const Phasors &phasors = y ? state_->y : state_->x;
+  return phasors.phase.view ();
+}
+
+ImageView<const float>
+LiveMoire::amplitude (bool y) const
+{
+  const Phasors &phasors = y ? state_->y : state_->x;
+  return phasors.amplitude.view ();
+}
+
+} // namespace cexp

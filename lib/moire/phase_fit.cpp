@@ -1,0 +1,384 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "moire/phase_fit.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "moire/gratings.h"
+
+namespace cexp
+{
+
+namespace
+{
+
+/* Squared residuals of a pixel that are this many standard deviations too
+ * large are no noise. */
+constexpr double kUnlikely = 6.0;
+
+/* A pixel whose gratings swing by less than this part of its white is out of
+ * focus, or sees something else. */
+constexpr float kFaintSwing = 0.3f;
+
+/* Numbers squared. Where there is hardly any light there is hardly any noise,
+ * and rounding is no noise either: weights leave room for what it does there.
+ */
+constexpr double kRounding = 2.0;
+
+/* Mirrors beyond the array's edge that still give light to a pixel. */
+double
+reach (double side, double variance)
+{
+  return 0.5 * side + 4.0 * std::sqrt (variance);
+}
+
+/* Weighted sums over the phases of one pixel. */
+struct Sums {
+  float w = 0, l = 0, ll = 0;                  // of 1, light
+  float d = 0, dl = 0, dd = 0;                 // slope
+  float b = 0, bl = 0, bb = 0, bd = 0;         // blur
+  float y = 0, yl = 0, yd = 0, yb = 0, yy = 0; // number
+};
+
+typedef GratingResponse::Value Value;
+
+/* Where the table of @response is entered by a pixel that looks at @mirror. */
+struct Entry {
+  std::size_t low;
+  float part;
+
+  Entry (const GratingResponse &response, double mirror)
+  {
+    const double turns = mirror / response.period ();
+    const double step = (turns - std::floor (turns)) * response.period () *
+                        GratingResponse::kSteps;
+    low = std::min (std::size_t (step),
+        std::size_t (response.period () * GratingResponse::kSteps - 1));
+    part = float (step - double (low));
+  }
+  Value at (const GratingResponse &response, int phase) const
+  {
+    const Value *v =
+        response.table () + low + std::size_t (phase * GratingResponse::kSteps);
+    return {v[0].light + part * (v[1].light - v[0].light),
+        v[0].slope + part * (v[1].slope - v[0].slope),
+        v[0].blur + part * (v[1].blur - v[0].blur), 0.0f};
+  }
+};
+
+struct PixelLight {
+  float dark, swing;
+};
+
+/* Everything that the frames of one axis say of pixel @x of their row @rows.
+ * Dark level and swing of the pixel are its own: sums over the phases are taken
+ * at right angles to both. */
+PixelFinding
+find (const float *const *rows, int x, const GratingResponse &response,
+    double mirror, PixelLight light, const NoiseModel &noise)
+{
+  const Entry entry (response, mirror);
+  const int phases = response.period ();
+  const float floor = float (noise.floor + kRounding);
+  const float slope = float (noise.slope);
+  Sums s;
+  for (int k = 0; k < phases; k++) {
+    const Value v = entry.at (response, k);
+    const float expected = light.dark + light.swing * v.light;
+    const float w = 1.0f / (floor + slope * std::max (0.0f, expected));
+    const float y = rows[k][x] - expected;
+    const float wl = w * v.light, wd = w * v.slope, wb = w * v.blur;
+    s.w += w;
+    s.l += wl;
+    s.ll += wl * v.light;
+    s.d += wd;
+    s.dl += wd * v.light;
+    s.dd += wd * v.slope;
+    s.b += wb;
+    s.bl += wb * v.light;
+    s.bb += wb * v.blur;
+    s.bd += wb * v.slope;
+    s.y += w * y;
+    s.yl += wl * y;
+    s.yd += wd * y;
+    s.yb += wb * y;
+    s.yy += w * y * y;
+  }
+  const float determinant = s.w * s.ll - s.l * s.l;
+  const float inverse = determinant > 0.0f ? 1.0f / determinant : 0.0f;
+  /* Sum of products of two quantities, less what 1 and light explain of it. */
+  const auto rest = [&] (float ab, float a, float al, float b, float bl) {
+    return ab -
+           inverse * (a * (s.ll * b - s.l * bl) + al * (s.w * bl - s.l * b));
+  };
+  PixelFinding found;
+  const float swing = light.swing + inverse * (s.w * s.yl - s.l * s.y);
+  found.swing = swing;
+  found.score = swing * rest (s.yd, s.y, s.yl, s.d, s.dl);
+  found.information = swing * swing * rest (s.dd, s.d, s.dl, s.d, s.dl);
+  found.blur_score = swing * rest (s.yb, s.y, s.yl, s.b, s.bl);
+  found.blur_information = swing * swing * rest (s.bb, s.b, s.bl, s.b, s.bl);
+  found.cross = swing * swing * rest (s.bd, s.b, s.bl, s.d, s.dl);
+  found.misfit = rest (s.yy, s.y, s.yl, s.y, s.yl);
+  if (found.information > 0.0f)
+    found.misfit -= found.score * found.score / found.information;
+  return found;
+}
+
+/* Squared residuals by expected number. */
+struct NoiseBins {
+  static constexpr int kBins = 64;
+  double width = 1.0;
+  std::array<double, kBins> squares = {}, numbers = {}, counts = {};
+
+  void add (double number, double square)
+  {
+    const int bin = std::clamp (int (number / width), 0, kBins - 1);
+    squares[std::size_t (bin)] += square;
+    numbers[std::size_t (bin)] += number;
+    counts[std::size_t (bin)] += 1.0;
+  }
+  NoiseModel fit (NoiseModel start) const;
+};
+
+/* A line through the bins' variances, whose own variances are their squares. */
+NoiseModel
+NoiseBins::fit (NoiseModel model) const
+{
+  for (int round = 0; round < 4; round++) {
+    double n = 0, nx = 0, nxx = 0, s = 0, sx = 0;
+    for (std::size_t i = 0; i < kBins; i++) {
+      if (counts[i] < 100.0)
+        continue;
+      const double at = numbers[i] / counts[i];
+      const double variance = squares[i] / counts[i];
+      const double expected = model.floor + model.slope * std::max (0.0, at);
+      const double weight = counts[i] / (expected * expected);
+      n += weight;
+      nx += weight * at;
+      nxx += weight * at * at;
+      s += weight * variance;
+      sx += weight * variance * at;
+    }
+    const double determinant = n * nxx - nx * nx;
+    if (!(determinant > 0.0))
+      return model;
+    model.slope = std::max (0.0, (n * sx - nx * s) / determinant);
+    model.floor = std::max (1e-3, (s - model.slope * nx) / n);
+  }
+  return model;
+}
+
+/* Adds the residuals of one pixel, its level, swing and place being its own. A
+ * residual is smaller than the noise by what it took part in the fit. */
+void
+find_noise (const float *const *rows, int x, const GratingResponse &response,
+    double mirror, PixelLight light, const NoiseModel &noise, NoiseBins &bins)
+{
+  constexpr std::size_t kTerms = 3;
+  const Entry entry (response, mirror);
+  const std::size_t phases = std::size_t (response.period ());
+  std::array<std::array<double, Pattern::kMaxPeriod>, kTerms> term;
+  std::array<double, Pattern::kMaxPeriod> weight, rest, expected, freedom;
+  for (std::size_t k = 0; k < phases; k++) {
+    const Value v = entry.at (response, int (k));
+    expected[k] = double (light.dark) + double (light.swing) * double (v.light);
+    weight[k] = 1.0 / (noise.floor + noise.slope * std::max (0.0, expected[k]));
+    rest[k] = double (rows[k][x]) - expected[k];
+    term[0][k] = 1.0;
+    term[1][k] = double (v.light);
+    term[2][k] = double (v.slope);
+    freedom[k] = 1.0;
+  }
+  /* Gram and Schmidt; the products are weighted. */
+  const auto product = [&] (const auto &a, const auto &b) {
+    double sum = 0.0;
+    for (std::size_t k = 0; k < phases; k++)
+      sum += weight[k] * a[k] * b[k];
+    return sum;
+  };
+  for (std::size_t i = 0; i < kTerms; i++) {
+    for (std::size_t j = 0; j < i; j++) {
+      const double part = product (term[i], term[j]);
+      for (std::size_t k = 0; k < phases; k++)
+        term[i][k] -= part * term[j][k];
+    }
+    const double length = std::sqrt (product (term[i], term[i]));
+    for (std::size_t k = 0; k < phases; k++)
+      term[i][k] /= length;
+    const double part = product (rest, term[i]);
+    for (std::size_t k = 0; k < phases; k++) {
+      rest[k] -= part * term[i][k];
+      freedom[k] -= weight[k] * term[i][k] * term[i][k];
+    }
+  }
+  for (std::size_t k = 0; k < phases; k++)
+    if (freedom[k] > 0.2)
+      bins.add (expected[k], rest[k] * rest[k] / freedom[k]);
+}
+
+std::vector<const float *>
+rows_of (const PhaseStack &stack, int y)
+{
+  std::vector<const float *> rows;
+  for (const auto &frame : stack.frames)
+    rows.push_back (frame.row (y));
+  return rows;
+}
+
+} // namespace
+
+std::optional<double>
+PhaseFit::round (std::size_t numbers)
+{
+  const CentredFrame frame (camera);
+  const auto slope = mapping.slope_at (frame.cx, frame.cy);
+  const double side_x = std::hypot (slope[0], slope[1]);
+  const double side_y = std::hypot (slope[2], slope[3]);
+  const GratingResponse response_x (x.period (), side_x, std::sqrt (blur_x));
+  const GratingResponse response_y (y.period (), side_y, std::sqrt (blur_y));
+  const double margin_x = reach (side_x, blur_x);
+  const double margin_y = reach (side_y, blur_y);
+  const Homography centred = mapping.centred ();
+
+  const int across = (camera.width + block_size - 1) / block_size;
+  const int down = (camera.height + block_size - 1) / block_size;
+  blocks_x.assign (std::size_t (across * down), {});
+  blocks_y.assign (std::size_t (across * down), {});
+  outlier = faint = Image<std::uint8_t> (camera.width, camera.height);
+
+  const auto unlikely = [this] (int phases) {
+    const double freedom = std::max (1, phases - 3);
+    return float (
+        misfit * freedom * (1.0 + kUnlikely * std::sqrt (2.0 / freedom)));
+  };
+  const float limit_x = unlikely (x.period ());
+  const float limit_y = unlikely (y.period ());
+
+  HomographyFit fit;
+  double squares = 0.0, freedom = 0.0, scores = 0.0, pixels = 0.0;
+  for (int py = 0; py < camera.height; py++) {
+    const auto rows_x = rows_of (x, py), rows_y = rows_of (y, py);
+    const double eta = (py - frame.cy) / frame.r;
+    for (int px = 0; px < camera.width; px++) {
+      if (usable.at (px, py) == 0)
+        continue;
+      const Position m = mapping.mirror_at (px, py);
+      if (m.x < margin_x - 0.5 || m.x > mirrors.width - 0.5 - margin_x ||
+          m.y < margin_y - 0.5 || m.y > mirrors.height - 0.5 - margin_y)
+        continue;
+      const float low = dark.at (px, py);
+      const PixelLight light = {low, white.at (px, py) - low};
+      const PixelFinding fx =
+          find (rows_x.data (), px, response_x, m.x, light, noise);
+      const PixelFinding fy =
+          find (rows_y.data (), px, response_y, m.y, light, noise);
+      if (std::min (fx.swing, fy.swing) < kFaintSwing * light.swing) {
+        faint.at (px, py) = 1;
+        continue;
+      }
+      if (fx.misfit > limit_x || fy.misfit > limit_y) {
+        outlier.at (px, py) = 1;
+        continue;
+      }
+      squares += double (fx.misfit) + double (fy.misfit);
+      freedom += x.period () + y.period () - 6;
+      scores += double (fx.score * fx.score / fx.information) +
+                double (fy.score * fy.score / fy.information);
+      pixels += 1.0;
+      const double xi = (px - frame.cx) / frame.r;
+      const CentredMirror at = centred_mirror (centred, xi, eta);
+      fit.add_x (xi, eta, at,
+          {fx.score, fx.information, fx.blur_score, fx.blur_information,
+              fx.cross});
+      fit.add_y (xi, eta, at,
+          {fy.score, fy.information, fy.blur_score, fy.blur_information,
+              fy.cross});
+      const std::size_t block =
+          std::size_t (py / block_size * across + px / block_size);
+      blocks_x[block].score += double (fx.score);
+      blocks_x[block].information += double (fx.information);
+      blocks_y[block].score += double (fy.score);
+      blocks_y[block].information += double (fy.information);
+    }
+  }
+  if (freedom <= 0.0)
+    return std::nullopt;
+  misfit = squares / freedom;
+  noise_ratio = scores / (2.0 * pixels);
+  const auto step = fit.solve (numbers, true);
+  if (!step)
+    return std::nullopt;
+
+  Homography next = centred;
+  for (std::size_t i = 0; i < numbers; i++)
+    next[i] += step->change[i];
+  for (std::size_t i = 0; i < Mapping::kParameters; i++)
+    for (std::size_t j = 0; j < Mapping::kParameters; j++)
+      covariance[i * Mapping::kParameters + j] =
+          noise_ratio * step->covariance[i * HomographyFit::kNumbers + j];
+  /* A blur changes by no more than a factor: far off, the model is no line. */
+  const auto moved = [] (double blur, double change) {
+    return std::clamp (blur + change, std::max (1e-3, 0.4 * blur), 2.5 * blur);
+  };
+  blur_x = moved (blur_x, step->change[HomographyFit::kExtra]);
+  blur_y = moved (blur_y, step->change[HomographyFit::kExtra + 1]);
+
+  double longest = 0.0;
+  for (const double xi : {-1.0, 1.0})
+    for (const double eta : {-1.0, 1.0}) {
+      const CentredMirror a = centred_mirror (centred, xi, eta);
+      const CentredMirror b = centred_mirror (next, xi, eta);
+      longest = std::max (longest, std::hypot (a.x - b.x, a.y - b.y));
+    }
+  if (numbers > 0) {
+    const auto changed = Mapping::from_centred (camera, mirrors, next);
+    if (!changed)
+      return std::nullopt;
+    const auto made = Mapping::make (
+        {camera, mirrors, changed->homography (), {}, mapping.displacement ()});
+    if (!made)
+      return std::nullopt;
+    mapping = *made;
+  }
+  return longest;
+}
+
+void
+PhaseFit::estimate_noise ()
+{
+  const CentredFrame frame (camera);
+  const auto slope = mapping.slope_at (frame.cx, frame.cy);
+  const GratingResponse responses[] = {
+      {x.period (), std::hypot (slope[0], slope[1]), std::sqrt (blur_x)},
+      {y.period (), std::hypot (slope[2], slope[3]), std::sqrt (blur_y)}};
+  const PhaseStack *stacks[] = {&x, &y};
+
+  NoiseBins bins;
+  float brightest = 1.0f;
+  for (int py = 0; py < camera.height; py += 8)
+    for (int px = 0; px < camera.width; px++)
+      brightest = std::max (brightest, white.at (px, py));
+  bins.width = double (brightest) / NoiseBins::kBins;
+
+  for (int py = 0; py < camera.height; py += 4)
+    for (std::size_t axis = 0; axis < 2; axis++) {
+      const auto rows = rows_of (*stacks[axis], py);
+
+      for (int px = 0; px < camera.width; px++) {
+        if (usable.at (px, py) == 0 || outlier.at (px, py) != 0 ||
+            faint.at (px, py) != 0)
+          continue;
+        const Position m = mapping.mirror_at (px, py);
+        if (m.x < 2.0 || m.y < 2.0 || m.x > mirrors.width - 3.0 ||
+            m.y > mirrors.height - 3.0)
+          continue;
+        const float low = dark.at (px, py);
+        find_noise (rows.data (), px, responses[axis], axis == 0 ? m.x : m.y,
+            {low, white.at (px, py) - low}, noise, bins);
+      }
+    }
+  noise = bins.fit (noise);
+}
+
+} // namespace cexp

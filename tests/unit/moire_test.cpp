@@ -1,0 +1,182 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Where the camera stands, from frames of gratings and Gray codes. */
+#include "moire/calibration.h"
+#include "moire/live_moire.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "moire_bench.h"
+
+using namespace cexp;
+
+namespace
+{
+
+constexpr Extent kSize = {256, 192};
+
+struct Distance {
+  double rms = 0.0; ///< per axis, mirrors
+  double most = 0.0;
+};
+
+Distance
+distance (const Mapping &mapping, const Alignment &alignment)
+{
+  const Extent size = mapping.camera ();
+  const Affine truth = camera_to_mirrors (alignment, size.width, size.height);
+  Distance found;
+  double squares = 0.0, count = 0.0;
+  for (int y = 0; y < size.height; y += 5)
+    for (int x = 0; x < size.width; x += 5) {
+      const Position m = mapping.mirror_at (x, y);
+      const double dx = m.x - (truth.xx * x + truth.xy * y + truth.x0);
+      const double dy = m.y - (truth.yx * x + truth.yy * y + truth.y0);
+      squares += dx * dx + dy * dy;
+      count += 2.0;
+      found.most = std::max (found.most, std::hypot (dx, dy));
+    }
+  found.rms = std::sqrt (squares / count);
+  return found;
+}
+
+Result<CalibrationResult>
+calibrate (MoireBench &bench, const CalibrationOptions &options = {},
+    Extent size = kSize)
+{
+  const auto patterns = calibration_patterns (size);
+  auto run = Calibration::make (size, size, patterns);
+  if (!run)
+    return run.error ();
+  std::uint64_t number = 0;
+  for (const Pattern &pattern : patterns) {
+    const Image<std::uint8_t> frame = bench.frame (pattern, number++);
+    if (const auto added = run->add (pattern, frame.view ()); !added)
+      return added.error ();
+  }
+  return run->solve (options);
+}
+
+} // namespace
+
+TEST (LiveMoire, FindsWhereTheCameraStands)
+{
+  const Alignment alignments[] = {
+      {0.3, -1.2, 1.5, 1.01}, {1.8, 0.5, -2, 0.98}, {-1.5, 1.9, 0.3, 1.02}};
+  for (const Alignment &alignment : alignments) {
+    MoireBench bench (alignment, 0.5, kSize);
+    auto live = LiveMoire::make (Mapping (kSize));
+    ASSERT_TRUE (live.ok ()) << live.error ().message;
+    EXPECT_EQ (live->sampling (), 4);
+    const auto frame = bench.frame (live_grating (), 0);
+    const auto reading = live->solve (frame.view ());
+    ASSERT_TRUE (reading.ok ()) << reading.error ().message;
+    EXPECT_LT (distance (reading->mapping, alignment).most, 0.02);
+    EXPECT_GT (reading->coverage, 0.9);
+    EXPECT_NEAR (reading->contrast.x, 0.75, 0.1);
+    EXPECT_NEAR (reading->contrast.y, 0.75, 0.1);
+    EXPECT_EQ (reading->saturated, 0u);
+  }
+}
+
+TEST (LiveMoire, ShiftsAreTheNearestToWhatIsExpected)
+{
+  const Alignment alignment = {21.3, -18.2, 0.5, 1.005};
+  MoireBench bench (alignment, 0.5, kSize);
+  const auto near =
+      Mapping::make ({kSize, kSize, {1, 0, 20, 0, 1, -19, 0, 0, 1}});
+  auto live = LiveMoire::make (*near);
+  const auto frame = bench.frame (live_grating (), 0);
+  const auto reading = live->solve (frame.view ());
+  ASSERT_TRUE (reading.ok ()) << reading.error ().message;
+  EXPECT_LT (distance (reading->mapping, alignment).most, 0.03);
+}
+
+TEST (LiveMoire, FringesVanishWhereAllIsAligned)
+{
+  MoireBench bench ({0.7, 0.2, 0, 1}, 0.5, kSize);
+  auto live = LiveMoire::make (Mapping (kSize));
+  const auto frame = bench.frame (live_grating (), 0);
+  const auto reading = live->solve (frame.view ());
+  ASSERT_TRUE (reading.ok ()) << reading.error ().message;
+  const auto phase = live->phase (false);
+  /* Within the third harmonic's alias, 0.05 mirrors of 4. */
+  for (int y = 2; y < phase.height - 2; y++)
+    for (int x = 2; x < phase.width - 2; x++)
+      ASSERT_NEAR (phase.at (x, y), 2 * M_PI * (0.7 - 0.5) / 4, 0.15);
+}
+
+TEST (LiveMoire, SaysWhereThereIsNoGrating)
+{
+  MoireBench bench ({}, 0.5, kSize);
+  auto live = LiveMoire::make (Mapping (kSize));
+  const auto frame = bench.frame ({Pattern::Kind::white}, 0);
+  const auto reading = live->solve (frame.view ());
+  ASSERT_FALSE (reading.ok ());
+  EXPECT_NE (reading.error ().message.find ("no grating is seen in x"),
+      std::string::npos);
+  EXPECT_EQ (LiveMoire::make (Mapping (Extent{20, 20})).error ().message,
+      "a frame of 20x20 pixels holds less than 8 periods of the live grating");
+}
+
+TEST (Calibration, FindsTheMappingToItsStatedUncertainty)
+{
+  const std::pair<Alignment, double> benches[] = {
+      {{12.3, -31.4, 1.7, 0.985}, 0.5}, {{-39.6, 3.2, -1.1, 1.018}, 0.7}};
+  for (const auto &[alignment, psf] : benches) {
+    MoireBench bench (alignment, psf, kSize);
+    const auto result = calibrate (bench);
+    ASSERT_TRUE (result.ok ()) << result.error ().message;
+    EXPECT_LT (distance (result->mapping, alignment).most, 1e-3);
+    EXPECT_FALSE (result->mapping.displacement ());
+    EXPECT_NEAR (result->psf_sigma, psf, 0.02);
+    EXPECT_NEAR (result->noise_slope, 0.0255, 0.003);
+    EXPECT_NEAR (result->misfit, 1.0, 0.05);
+    const Stance stance = result->mapping.stance ();
+    const Stance sigma = result->mapping.stance_sigma ();
+    EXPECT_NEAR (stance.rotation, alignment.rotation, 5 * sigma.rotation);
+    EXPECT_NEAR (
+        stance.magnification, alignment.scale, 5 * sigma.magnification);
+    EXPECT_LT (sigma.shift_x, 1e-4);
+  }
+}
+
+TEST (Calibration, TellsWhatPixelsAreGoodFor)
+{
+  MoireBench bench ({30, 0, 0, 1}, 0.5, kSize);
+  const auto result = calibrate (bench);
+  ASSERT_TRUE (result.ok ()) << result.error ().message;
+  const auto uncovered = result->pixels (PixelQuality::uncovered);
+  EXPECT_NEAR (double (uncovered), 30.0 * kSize.height, 1.0 * kSize.height);
+  EXPECT_EQ (result->quality.at (250, 100), PixelQuality::uncovered);
+  EXPECT_EQ (result->quality.at (100, 100), PixelQuality::good);
+}
+
+TEST (Calibration, TooMuchLightIsAnError)
+{
+  MoireBench bench ({}, 0.5, kSize, 1.5);
+  const auto result = calibrate (bench);
+  ASSERT_FALSE (result.ok ());
+  EXPECT_NE (result.error ().message.find ("reduce light"), std::string::npos);
+}
+
+TEST (Calibration, NamesWhatIsMissing)
+{
+  auto patterns = calibration_patterns (kSize);
+  auto run = Calibration::make (kSize, kSize, patterns);
+  ASSERT_TRUE (run.ok ());
+  EXPECT_EQ (run->missing (), patterns);
+  EXPECT_NE (run->solve ().error ().message.find ("that of dark first"),
+      std::string::npos);
+  Image<std::uint8_t> frame (8, 8);
+  EXPECT_NE (run->add (patterns[0], std::as_const (frame).view ())
+                 .error ()
+                 .message.find ("256x192 are expected"),
+      std::string::npos);
+  EXPECT_FALSE (
+      run->add (live_grating (), std::as_const (frame).view ()).ok ());
+  patterns.pop_back ();
+  EXPECT_FALSE (Calibration::make (kSize, kSize, patterns).ok ());
+}

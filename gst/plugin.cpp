@@ -5,6 +5,7 @@
 #include "gstcodedexposuredemux.h"
 #include "gstcodedexposurelog.h"
 #include "gstcodedexposuremeta.h"
+#include "gstcodedexposurescene.h"
 #include "gstcodedexposuresim.h"
 #include "gstdmdsync.h"
 #include "gstsubframestats.h"
@@ -17,6 +18,7 @@ plugin_init (GstPlugin *plugin)
   cexp::gst::register_stats_meta ();
   return GST_ELEMENT_REGISTER (codedexposure_demux, plugin) &&
          GST_ELEMENT_REGISTER (codedexposure_log, plugin) &&
+         GST_ELEMENT_REGISTER (codedexposure_scene, plugin) &&
          GST_ELEMENT_REGISTER (codedexposure_sim, plugin) &&
          GST_ELEMENT_REGISTER (dmdsync, plugin) &&
          GST_ELEMENT_REGISTER (subframestats, plugin);

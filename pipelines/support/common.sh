@@ -9,7 +9,7 @@ script=$(basename "$0")
 pipelines=$(cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.." && pwd)
 
 # Options of the scene and the bench, and of the coded stream's source.
-scene_options='input input-rate pattern size frame-rate bits'
+scene_options='input input-rate scene pattern size frame-rate bits'
 bench_options='schedule psf-sigma full-well read-noise gain seed shift-x shift-y
   rotation scale'
 source_options="$scene_options $bench_options frames camera features source
@@ -18,7 +18,8 @@ source_options="$scene_options $bench_options frames camera features source
 scene_help='Scene, one frame of it a slot of the exposure:
   --input FILE        any video; each of its frames becomes a slot
   --input-rate R      frames a second of the input, where the file does not say
-  --pattern NAME      a moving test picture instead, as of videotestsrc [ball]
+  --scene NAME        a drawn scene instead: candle, blown-out or pour
+  --pattern NAME      or a moving test picture, as of videotestsrc [ball]
   --size WxH          size of scene and camera [that of the input; 768x576]
   --bits N            significant bits of the camera, 8 or 9..16 [8]'
 bench_help='Bench:
@@ -133,6 +134,7 @@ check_options ()
     'a rate such as 25 or 30000/1001'
   check_option frames '[1-9][0-9]{0,8}' 'a number of coded frames'
   check_option bits '[1-9]|1[0-6]' 'a number from 1 to 16'
+  check_option scene 'candle|blown-out|pour' 'candle, blown-out or pour'
   check_option port '[1-9][0-9]{0,4}' 'a TCP port'
   check_option wait '[0-9]+(\.[0-9]+)?' 'a number of seconds'
   check_option start '[0-9]+(\.[0-9]+)?' 'a number of seconds'
@@ -240,6 +242,8 @@ plan_scene ()
   [[ $frame_rate == */* ]] || frame_rate=$frame_rate/1
   scene_rate=$((${frame_rate%/*} * slots))/${frame_rate#*/}
   width=768 height=576
+  ! is_set input || ! is_set scene \
+    || usage_error "--input and --scene: which of the two?"
   if is_set input; then
     local facts num den
     facts=$(probe_video "${opt[input]}")
@@ -271,6 +275,10 @@ scene ()
       "$(quoted "${opt[input]}")"
     printf 'identity single-segment=true ! videorate rate=%s ! %s ! ' \
       "$speed" "$caps"
+    [ "${1:-}" != live ] || printf 'clocksync ! '
+    printf 'queue ! '
+  elif is_set scene; then
+    printf 'codedexposure-scene scene=%s ! %s ! ' "${opt[scene]}" "$caps"
     [ "${1:-}" != live ] || printf 'clocksync ! '
     printf 'queue ! '
   else

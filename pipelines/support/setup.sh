@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 # Installs what is missing and builds; sourced by pipelines/demo and tests/run.
 #
-#   install_packages run|tests   Debian packages, those of tests being more
+#   install_packages run|report|tests   Debian packages; tests need all of them
 #   build_tree DIR OPTION...     meson setup and compile
 #   sample_video                 path of the sample clip, fetched when needed
 #
@@ -28,6 +28,7 @@ gstreamer1.0-plugins-bad|GDP for send and receive, H.264 in MP4|run
 gstreamer1.0-plugins-ugly|H.264 encoder|run
 gstreamer1.0-libav|FFV1, and reading most video files|run
 gstreamer1.0-x|windows under X, text in pictures|run
+gnuplot-nox|draws the figures of a report|report
 libgtest-dev|unit and element tests|tests
 libbenchmark-dev|benchmarks|tests
 libumockdev-dev|a USB in software for the tests of DMDs|tests
@@ -58,7 +59,7 @@ missing_packages ()
   local name reason who
   while IFS='|' read -r name reason who; do
     [ -n "$name" ] || continue
-    if [ "$who" = run ] || [ "$1" = tests ]; then
+    if [ "$who" = run ] || [ "$who" = "$1" ] || [ "$1" = tests ]; then
       is_installed "$name" || printf '%s|%s\n' "$name" "$reason"
     fi
   done <<< "$packages"

@@ -57,8 +57,9 @@ is_ours (const GParamSpec *spec)
 
 TEST (Plugin, HasTheElementsOfTheBench)
 {
-  for (const char *name : {"codedexposure-sim", "codedexposure-demux",
-           "codedexposure-log", "dmdsync", "subframestats"}) {
+  for (const char *name :
+      {"codedexposure-sim", "codedexposure-demux", "codedexposure-log",
+          "codedexposure-scene", "dmdsync", "subframestats"}) {
     const std::unique_ptr<GstElementFactory, ObjectUnref> factory (
         gst_element_factory_find (name));
     EXPECT_NE (factory, nullptr) << name;

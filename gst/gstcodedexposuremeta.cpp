@@ -56,13 +56,18 @@ set_frame_meta (GstBuffer *buffer, const FrameMeta &meta)
   if (!custom)
     custom = gst_buffer_add_custom_meta (buffer, kFrameMetaName);
   const Names &name = names ();
-  gst_structure_id_set (gst_custom_meta_get_structure (custom), name.frame,
-      G_TYPE_UINT64, meta.frame, name.subframe, G_TYPE_INT, meta.subframe,
-      name.exposure_start, G_TYPE_UINT64, meta.exposure_start,
-      name.exposure_duration, G_TYPE_UINT64, meta.exposure_duration,
-      name.locked, G_TYPE_BOOLEAN, meta.locked, name.slip, G_TYPE_INT,
-      meta.slip, name.lost_before, G_TYPE_UINT64, meta.lost_before,
-      name.saturated, G_TYPE_UINT64, meta.saturated, nullptr);
+  GstStructure *structure = gst_custom_meta_get_structure (custom);
+  if (!meta.pattern.empty ())
+    gst_structure_set (
+        structure, "pattern", G_TYPE_STRING, meta.pattern.c_str (), nullptr);
+  else if (gst_structure_has_field (structure, "pattern"))
+    gst_structure_remove_field (structure, "pattern");
+  gst_structure_id_set (structure, name.frame, G_TYPE_UINT64, meta.frame,
+      name.subframe, G_TYPE_INT, meta.subframe, name.exposure_start,
+      G_TYPE_UINT64, meta.exposure_start, name.exposure_duration, G_TYPE_UINT64,
+      meta.exposure_duration, name.locked, G_TYPE_BOOLEAN, meta.locked,
+      name.slip, G_TYPE_INT, meta.slip, name.lost_before, G_TYPE_UINT64,
+      meta.lost_before, name.saturated, G_TYPE_UINT64, meta.saturated, nullptr);
 }
 
 std::optional<FrameMeta>
@@ -74,13 +79,16 @@ get_frame_meta (GstBuffer *buffer)
 
   FrameMeta meta;
   const Names &name = names ();
-  gst_structure_id_get (gst_custom_meta_get_structure (custom), name.frame,
-      G_TYPE_UINT64, &meta.frame, name.subframe, G_TYPE_INT, &meta.subframe,
-      name.exposure_start, G_TYPE_UINT64, &meta.exposure_start,
-      name.exposure_duration, G_TYPE_UINT64, &meta.exposure_duration,
-      name.locked, G_TYPE_BOOLEAN, &meta.locked, name.slip, G_TYPE_INT,
-      &meta.slip, name.lost_before, G_TYPE_UINT64, &meta.lost_before,
-      name.saturated, G_TYPE_UINT64, &meta.saturated, nullptr);
+  const GstStructure *structure = gst_custom_meta_get_structure (custom);
+  if (const gchar *pattern = gst_structure_get_string (structure, "pattern"))
+    meta.pattern = pattern;
+  gst_structure_id_get (structure, name.frame, G_TYPE_UINT64, &meta.frame,
+      name.subframe, G_TYPE_INT, &meta.subframe, name.exposure_start,
+      G_TYPE_UINT64, &meta.exposure_start, name.exposure_duration,
+      G_TYPE_UINT64, &meta.exposure_duration, name.locked, G_TYPE_BOOLEAN,
+      &meta.locked, name.slip, G_TYPE_INT, &meta.slip, name.lost_before,
+      G_TYPE_UINT64, &meta.lost_before, name.saturated, G_TYPE_UINT64,
+      &meta.saturated, nullptr);
   return meta;
 }
 

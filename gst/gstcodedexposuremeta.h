@@ -3,6 +3,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 
 #include <gst/gst.h>
 
@@ -29,6 +30,9 @@ struct FrameMeta {
   gint slip = 0;
   /** Coded frames lost between this one and the one before. */
   guint64 lost_before = 0;
+  /** What the mirrors showed in place of the schedule; "": the schedule, or
+   * not known, when they are about to change. */
+  std::string pattern = {};
   /** Pixels at the largest value. */
   guint64 saturated = 0;
 };

@@ -206,7 +206,8 @@ begin_exposure (GstCodedExposureSim *self, GstBuffer *inbuf)
   stream.discont = false;
   stream.last_start = exposure.start;
   stream.last_frame = exposure.frame;
-  stream.bench->begin (*stream.schedule);
+  stream.bench->begin (
+      *stream.schedule, stream.mirrors ? stream.mirrors->held () : nullptr);
   stream.exposure = std::move (exposure);
   return GST_FLOW_OK;
 }

@@ -53,11 +53,20 @@
  * its meta says `locked` false; see #dmdsync:on-unlock. The DMD is started
  * anew, and when frames show that, they are locked again.
  *
+ * ## Patterns
+ *
+ * An element behind this one can have the mirrors show a grating or a code for
+ * a while, with an event (docs/formats.md, "Patterns on request"). Frames that
+ * show it bear its name in their meta; they are not coded frames and never
+ * locked. The mirrors are given back when that is asked for, or nobody asks any
+ * more.
+ *
  * ## Metas, messages and tags
  *
  * Every frame bears the custom meta `CodedExposureFrame`. Element messages are
  * `dmdsync/frames-lost`, `dmdsync/frame-late`, `dmdsync/frame-dropped`,
- * `dmdsync/slip` and `dmdsync/locked`. The schedule goes downstream as stream
+ * `dmdsync/slip`, `dmdsync/locked`, `dmdsync/pattern-shown` and
+ * `dmdsync/pattern-over`. The schedule goes downstream as stream
  * tag; another one in the stream is replaced, with a warning. QoS events go no
  * further upstream: some camera sources stop their stream for them.
  *
@@ -323,6 +332,7 @@ forget_stream (GstDmdSync *self)
   st.stream = sync::Stream ();
   const ObjectLock lock (self);
   st.time.reset ();
+  st.switches = 0;
   st.locked = false;
   st.jitter = 0;
   st.latency = 0;

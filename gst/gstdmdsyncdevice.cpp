@@ -107,6 +107,10 @@ park (GstDmdSync *self)
   if (!st.runner)
     return;
   st.runner->halt ();
+  {
+    const ObjectLock lock (self);
+    st.pattern.reset ();
+  }
   if (st.uploading.exchange (false))
     post_progress (self, GST_PROGRESS_TYPE_CANCELED, "Upload cancelled");
 }

@@ -79,16 +79,9 @@ same_slots (const std::optional<Timebase> &before, const Timebase &now)
 void
 begin_frames (GstDmdSync *self)
 {
-  SyncState &st = state (self);
-  Stream &stream = st.stream;
-  const Timebase &time = *stream.time;
-  stream.sequence.emplace (time.rate);
-  stream.watch.emplace (st.schedule, time.info.width, time.info.height);
-  stream.lock.emplace (PhaseLock::Options{
-      .observable = stream.watch->complete () ? slip_observable (st.schedule)
-                                              : SlipObservable::never,
-      .can_restart = st.runner != nullptr,
-      .gap_shows_restart = st.runner && st.runner->info ().triggers_camera});
+  Stream &stream = state (self).stream;
+  stream.sequence.emplace (stream.time->rate);
+  begin_phase (self);
   stream.last.reset ();
 }
 
@@ -164,6 +157,23 @@ refuse (GstDmdSync *self, GstCaps *incaps, const std::string &why)
 
 } // namespace
 
+void
+begin_phase (GstDmdSync *self)
+{
+  SyncState &st = state (self);
+  Stream &stream = st.stream;
+  const GstVideoInfo &info = stream.time->info;
+  const bool triggers = st.runner && st.runner->info ().triggers_camera;
+  stream.watch.emplace (st.schedule, info.width, info.height);
+  stream.lock.emplace (PhaseLock::Options{
+      .observable = stream.watch->complete () ? slip_observable (st.schedule)
+                                              : SlipObservable::never,
+      .can_restart = st.runner != nullptr,
+      .gap_shows_restart = triggers});
+  if (stream.coded)
+    stream.shown = SwitchWatch (triggers);
+}
+
 gboolean
 set_caps (GstBaseTransform *trans, GstCaps *incaps, GstCaps *)
 {
@@ -184,6 +194,7 @@ set_caps (GstBaseTransform *trans, GstCaps *incaps, GstCaps *)
   }
   begin_frames (self);
   update_latency (self);
+  give_back (self, "caps");
   if (!st.runner || !restart)
     return TRUE;
   st.runner->start (time->plan);
@@ -221,7 +232,11 @@ sink_event (GstBaseTransform *trans, GstEvent *event)
     if (st.runner)
       st.runner->interrupt (true);
     break;
+  case GST_EVENT_EOS:
+    give_back (self, "eos");
+    break;
   case GST_EVENT_FLUSH_STOP:
+    give_back (self, "flush");
     if (st.runner)
       st.runner->interrupt (false);
     if (st.stream.sequence)
@@ -245,6 +260,8 @@ src_event (GstBaseTransform *trans, GstEvent *event)
     gst_event_unref (event);
     return TRUE;
   }
+  if (is_pattern_event (event))
+    return take_pattern_event (GST_DMD_SYNC (trans), event);
   return base_class ()->src_event (trans, event);
 }
 
@@ -254,6 +271,8 @@ src_event (GstBaseTransform *trans, GstEvent *event)
 gboolean
 query (GstBaseTransform *trans, GstPadDirection direction, GstQuery *query)
 {
+  if (direction == GST_PAD_SRC && answer_mirrors (GST_DMD_SYNC (trans), query))
+    return TRUE;
   if (!base_class ()->query (trans, direction, query))
     return FALSE;
   if (GST_QUERY_TYPE (query) != GST_QUERY_LATENCY || direction != GST_PAD_SRC)

@@ -21,6 +21,7 @@ struct Frame {
   FrameStep step;
   GstClockTime pts;
   LockDecision phase;
+  PatternSight sight;
 };
 
 void
@@ -132,7 +133,7 @@ take_loss (GstDmdSync *self, const Frame &frame)
   post (self, gst_structure_new ("dmdsync/frames-lost", "count", G_TYPE_UINT64,
                   lost, "from", G_TYPE_UINT64, from, "to", G_TYPE_UINT64,
                   frame.pts, nullptr));
-  if (on_loss == OnLoss::error) {
+  if (on_loss == OnLoss::error && st.stream.coded) {
     GST_ELEMENT_ERROR (self, RESOURCE, READ,
         ("%" G_GUINT64_FORMAT " frames were lost before %" GST_TIME_FORMAT
          ", and on-loss=error says to stop",
@@ -262,6 +263,8 @@ void
 watch_phase (GstDmdSync *self, Frame &frame)
 {
   SyncState &st = state (self);
+  if (!frame.sight.coded)
+    return say_phase (self, frame);
   frame.phase = st.stream.lock->take (look_at (self, frame.buffer.get ()),
       frame.step.number, frame.step.lost, st.runner && st.runner->settled ());
   if (frame.phase.restart)
@@ -297,13 +300,15 @@ take_frame (GstDmdSync *self, BufferPtr buffer)
   GstFlowReturn flow = GST_FLOW_OK;
   if (!take_arrival (self, frame, flow))
     return flow;
+  frame.sight =
+      look_for_pattern (self, frame.buffer.get (), frame.step, frame.pts);
   watch_phase (self, frame);
   if (too_early) {
     count (self, &Counters::frames_early, 1, nullptr);
     say_dropped (self, frame, "before-start");
     return GST_FLOW_OK;
   }
-  if (!frame.phase.locked)
+  if (!frame.phase.locked && frame.sight.coded)
     if (flow = take_unlocked (self, frame); flow != GST_FLOW_OK)
       return flow == GST_BASE_TRANSFORM_FLOW_DROPPED ? GST_FLOW_OK : flow;
 
@@ -311,6 +316,7 @@ take_frame (GstDmdSync *self, BufferPtr buffer)
   meta.locked = frame.phase.locked;
   meta.slip = frame.phase.slip;
   meta.lost_before = frame.step.lost;
+  meta.pattern = frame.sight.pattern;
   stamp (self, frame.buffer.get (), meta);
   /* A camera source may use the memory again while it is still held here. */
   if (repeats)

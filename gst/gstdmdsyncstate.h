@@ -5,6 +5,7 @@
 #include <atomic>
 #include <deque>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 
@@ -15,6 +16,7 @@
 #include "clock/frame_sequence.h"
 #include "clock/phase_lock.h"
 #include "clock/phase_watch.h"
+#include "clock/switch_watch.h"
 #include "dmd/dmd_runner.h"
 #include "gstdmdsync.h"
 #include "gstraii.h"
@@ -61,6 +63,12 @@ struct Timebase {
   SlotPlan plan;
 };
 
+/** A pattern that stands in place of the schedule, or is about to. */
+struct ShownPattern {
+  std::string text;
+  guint64 frames_left; ///< until the mirrors are given back unasked
+};
+
 /** All that is forgotten from PAUSED to READY. Sink pad's stream lock. */
 struct Stream {
   std::optional<Timebase> time;
@@ -70,6 +78,9 @@ struct Stream {
   std::optional<PhaseLock> lock;
   BufferPtr last;              ///< a copy, for on-loss=repeat
   std::deque<BufferPtr> ready; ///< to be pushed
+  SwitchWatch shown;           ///< since the last change of the mirrors
+  guint switches = 0;          ///< of which this stream knows
+  bool coded = true;           ///< frames are those of the schedule
   bool discont = true;         ///< the next frame does not follow the last one
   bool tag_due = true;
   bool warned_tag = false;
@@ -87,6 +98,12 @@ struct SyncState {
   std::optional<Timebase> time;                      ///< that of the stream
   GstClockTime jitter = 0;  ///< most by which frames came after their time
   GstClockTime latency = 0; ///< our own
+  std::optional<ShownPattern> pattern; ///< none: the schedule
+  guint switches = 0;                  ///< between schedule and patterns
+
+  /** Keeps what is asked of the runner in the order of the patterns; taken
+   * before the object lock. */
+  std::mutex pattern_order;
 
   /* Changed by changes of state only, while nothing flows or is uploaded. */
   Schedule schedule;
@@ -120,7 +137,26 @@ void begin_upload (GstDmdSync *self);
 /** Parks the mirrors, whatever they are at. */
 void park (GstDmdSync *self);
 
+/* Patterns, which others ask for. */
+/** Takes an event that asks for one; false when it cannot be had, with a
+ * warning that says why. */
+gboolean take_pattern_event (GstDmdSync *self, GstEvent *event);
+bool is_pattern_event (GstEvent *event);
+/** Answers who asks for the mirrors. False for other queries. */
+bool answer_mirrors (GstDmdSync *self, GstQuery *query);
+/** The mirrors show the schedule again. */
+void give_back (GstDmdSync *self, const char *reason);
+/** What a frame shows. */
+struct PatternSight {
+  bool coded = true;
+  std::string pattern = {}; ///< "" while that is not known
+};
+PatternSight look_for_pattern (GstDmdSync *self, GstBuffer *buffer,
+    const FrameStep &step, GstClockTime pts);
+
 /* Negotiation and events. */
+/** Forgets what frames have shown of the phase. */
+void begin_phase (GstDmdSync *self);
 gboolean set_caps (GstBaseTransform *trans, GstCaps *incaps, GstCaps *outcaps);
 gboolean sink_event (GstBaseTransform *trans, GstEvent *event);
 gboolean src_event (GstBaseTransform *trans, GstEvent *event);

@@ -101,6 +101,8 @@ public:
   Result<void> upload (const Schedule &schedule, std::stop_token stop,
       const UploadProgress &progress) override;
   Result<void> start (const SlotPlan &plan, std::stop_token stop) override;
+  Result<void> show (const StillMask &mask, const SlotPlan &plan,
+      std::stop_token stop) override;
   void stop () override;
   bool running () const override { return running_; }
 
@@ -117,12 +119,16 @@ private:
   Result<void> send (const Schedule &schedule, const UploadPlan &plan,
       const UploadProgress &progress);
   Result<void> send_table (const std::vector<PatternTime> &times);
-  Result<void> send_images (const Schedule &schedule,
-      const std::vector<int> &images, const UploadProgress &progress);
+  Result<void> send_still (
+      const StillMask &mask, const std::vector<PatternTime> &times);
+  Result<void> send_images (const std::vector<int> &images,
+      const std::function<PlaneImage (int image)> &render,
+      const UploadProgress &progress);
   Result<void> send_half (const HidCommand &load, const HidCommand &data,
       int index, ImageView<const PlanePixel> half,
       const std::function<void (std::size_t)> &sent);
-  Result<void> run (const SlotPlan &plan);
+  Result<void> run (
+      const std::vector<PatternTime> &times, const SlotPlan &plan);
 
   DmdOptions options_;
   DlpController board_;
@@ -178,6 +184,7 @@ Dlpc900::open ()
   info_.minimum_active = Nanoseconds (kind_.minimum_exposure) * 1000;
   info_.resident_masks = std::min (kind_.planes, kMaxEntries);
   info_.triggers_camera = options_.master == Master::dmd;
+  info_.still_masks = true;
   // Firmware without this command has the minima of the table.
   if (const auto minima = board_.read (kMinimumExposures))
     if (const auto exposures = parse_minimum_exposures (*minima))
@@ -190,6 +197,8 @@ Dlpc900::open ()
                  " cannot be had; give it 104us to 65535us"};
   if (!options_.images.empty ())
     return Error{info_.name + ": takes its masks over USB; leave out images="};
+  if (options_.placement.region)
+    info_.region = options_.placement.region->size;
   return check_placement (options_.placement, info_.array, info_.size);
 }
 
@@ -313,7 +322,9 @@ Dlpc900::send (const Schedule &schedule, const UploadPlan &plan,
     if (const auto table = send_table (times); !table)
       return table;
   }
-  return send_images (schedule, plan.images, progress);
+  return send_images (
+      plan.images, [&] (int image) { return render (schedule, image); },
+      progress);
 }
 
 /** There are no masks to start or to use again. */
@@ -391,7 +402,8 @@ Dlpc900::send_table (const std::vector<PatternTime> &times)
 }
 
 Result<void>
-Dlpc900::send_images (const Schedule &schedule, const std::vector<int> &images,
+Dlpc900::send_images (const std::vector<int> &images,
+    const std::function<PlaneImage (int image)> &render,
     const UploadProgress &progress)
 {
   const Error cancelled{info_.name + ": upload cancelled"};
@@ -399,7 +411,7 @@ Dlpc900::send_images (const Schedule &schedule, const std::vector<int> &images,
   for (const int index : images) {
     if (board_.link ().cancelled ())
       return cancelled;
-    total += packets_of (render (schedule, index));
+    total += packets_of (render (index));
   }
   const auto sent = [&] (std::size_t packets) {
     constexpr std::size_t kSteps = 200;
@@ -412,7 +424,7 @@ Dlpc900::send_images (const Schedule &schedule, const std::vector<int> &images,
 
   progress (0, int (total));
   for (const int index : images) {
-    const PlaneImage image = render (schedule, index);
+    const PlaneImage image = render (index);
     const int width = dual () ? image.width () / 2 : image.width ();
     auto half = send_half (
         kLoadImage, kImageData, index, columns (image.view (), 0, width), sent);
@@ -468,18 +480,19 @@ Dlpc900::start (const SlotPlan &plan, std::stop_token stop_token)
   if (!times)
     return Error{info_.name + ": " + times.error ().message};
   begin (std::move (stop_token));
+  return run (*times, plan);
+}
+
+/** @p times  of the lines of one frame; @p plan  of that frame. */
+Result<void>
+Dlpc900::run (const std::vector<PatternTime> &times, const SlotPlan &plan)
+{
   if (const auto stopped = board_.halt (); !stopped)
     return stopped;
   running_ = false;
-  if (*times != times_)
-    if (const auto table = send_table (*times); !table)
+  if (times != times_)
+    if (const auto table = send_table (times); !table)
       return table;
-  return run (plan);
-}
-
-Result<void>
-Dlpc900::run (const SlotPlan &plan)
-{
   // A whole exposure without masks, or without a trigger.
   if (const auto passed = board_.link ().pause (
           std::chrono::milliseconds (plan.frame_period () / 1'000'000 + 1));
@@ -493,6 +506,46 @@ Dlpc900::run (const SlotPlan &plan)
       !runs)
     return runs;
   return board_.check_health ();
+}
+
+Result<void>
+Dlpc900::show (
+    const StillMask &mask, const SlotPlan &plan, std::stop_token stop_token)
+{
+  const auto times = fit_patterns (plan, limits (), options_.master);
+  if (!times)
+    return Error{info_.name + ": " + times.error ().message};
+  touched_ = true;
+  const std::vector<PatternTime> still{
+      first_patterns (*times, mask.slots, limits ().minimum_dark)};
+  begin (std::move (stop_token));
+  const auto sent = send_still (mask, still);
+  if (!sent) {
+    forget ();
+    prepared_ = false;
+    stop ();
+    return sent;
+  }
+  return run (still, plan);
+}
+
+Result<void>
+Dlpc900::send_still (
+    const StillMask &mask, const std::vector<PatternTime> &times)
+{
+  forget ();
+  if (const auto ready = prepare (); !ready)
+    return ready;
+  residents_.planes = {{0, 0}}; // no schedule has one mask: it stays unknown
+  order_ = {0};
+  slots_ = 1;
+  if (options_.table_first)
+    if (const auto table = send_table (times); !table)
+      return table;
+  return send_images (
+      {0},
+      [&] (int) { return render_still (mask, options_.placement, info_.size); },
+      [] (int, int) {});
 }
 
 void

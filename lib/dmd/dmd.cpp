@@ -43,6 +43,13 @@ open_dmd (std::string_view device)
 }
 
 Result<void>
+Dmd::show (const StillMask &mask, const SlotPlan &, std::stop_token)
+{
+  return Error{info ().name + " cannot show " + mask.name +
+               ": it takes no single masks while it runs"};
+}
+
+Result<void>
 check_limits (
     const DmdInfo &info, const Schedule &schedule, const SlotPlan &plan)
 {

@@ -13,6 +13,7 @@
 #include "base/result.h"
 #include "dmd/mirror_array.h"
 #include "schedule/schedule.h"
+#include "schedule/still_mask.h"
 
 namespace cexp
 {
@@ -25,8 +26,13 @@ struct DmdInfo {
   Nanoseconds minimum_switching = 0;
   int resident_masks = 0;       ///< masks the device holds at once
   bool run_time_upload = true;  ///< masks can be sent while it is open
+  bool still_masks = false;     ///< show () is served
   bool triggers_camera = false; ///< no frame is exposed while it is parked
   Array array = Array::orthogonal;
+  /** Mirrors that show masks, from the first that do; {}: all. */
+  Extent region = {};
+
+  Extent shown () const { return region == Extent () ? size : region; }
 };
 
 /** What a device says of itself now. */
@@ -78,6 +84,16 @@ public:
    */
   virtual Result<void> start (
       const SlotPlan &plan, std::stop_token stop = {}) = 0;
+  /**
+   * Sends one mask and shows it in the first slots of every exposure, at the
+   * same trigger as a schedule's; like start (), after one whole exposure with
+   * the mirrors parked. The masks of the schedule are lost: what follows is
+   * another show (), or upload () and start ().
+   *
+   * @p plan  of the schedule in whose place it stands. @p stop as in upload ().
+   */
+  virtual Result<void> show (
+      const StillMask &mask, const SlotPlan &plan, std::stop_token stop);
   /** Parks the mirrors, all off. */
   virtual void stop () = 0;
   /** Whether it shows masks, for all that is known: a device that did not

@@ -28,6 +28,12 @@ DmdRunner::upload (const Schedule &schedule)
     const std::lock_guard guard (lock_);
     run_ = Run::on;
   }
+  ask_upload (schedule);
+}
+
+void
+DmdRunner::ask_upload (const Schedule &schedule)
+{
   ask ([this, schedule] (std::stop_token stop) {
     return dmd_->upload (schedule, stop, reports_.progress);
   });
@@ -40,6 +46,22 @@ DmdRunner::start (const SlotPlan &plan)
     dmd_->stop ();
     return dmd_->start (plan, stop);
   });
+}
+
+void
+DmdRunner::show (const StillMask &mask, const SlotPlan &plan)
+{
+  ask ([this, mask, plan] (std::stop_token stop) {
+    dmd_->stop ();
+    return dmd_->show (mask, plan, stop);
+  });
+}
+
+void
+DmdRunner::restore (const Schedule &schedule, const SlotPlan &plan)
+{
+  ask_upload (schedule);
+  start (plan);
 }
 
 void

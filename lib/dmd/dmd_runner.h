@@ -47,6 +47,11 @@ public:
   /** Starts, or starts anew, from mask 0. */
   void start (const SlotPlan &plan);
 
+  /** Shows @p mask instead, until the schedule is restored. */
+  void show (const StillMask &mask, const SlotPlan &plan);
+  /** Sends @p schedule once more in the same run, and starts it. */
+  void restore (const Schedule &schedule, const SlotPlan &plan);
+
   /** Whether there is a run and all its jobs are done. */
   bool settled () const;
   /** Waits for that. False when the run ended, or interrupt () cut the wait
@@ -70,6 +75,7 @@ private:
   enum class Run { none, on, failed };
 
   void ask (Job job);
+  void ask_upload (const Schedule &schedule);
   void work ();
   bool idle () const { return jobs_.empty () && !working_; }
   bool wait_is_over () const

@@ -98,6 +98,25 @@ fit_patterns (const SlotPlan &plan, const PatternLimits &limits, Master master)
   return times;
 }
 
+PatternTime
+first_patterns (const std::vector<PatternTime> &times, int slots,
+    std::uint32_t minimum_dark)
+{
+  PatternTime first;
+  for (std::size_t slot = 0; slot < times.size (); slot++) {
+    const PatternTime &time = times[slot];
+    if (int (slot) < slots) {
+      first.exposure += first.dark + time.exposure;
+      first.dark = time.dark;
+    } else {
+      first.dark += time.exposure + time.dark;
+    }
+  }
+  if (first.dark < minimum_dark)
+    first = {first.exposure + first.dark, 0};
+  return first;
+}
+
 Result<PatternTime>
 fit_equal_patterns (
     const SlotPlan &plan, const PatternLimits &limits, Master master)

@@ -52,6 +52,13 @@ Result<std::vector<PatternTime>> fit_patterns (
     const SlotPlan &plan, const PatternLimits &limits, Master master);
 
 /**
+ * One mask in the first @p slots of the masks of one exposure, and dark until
+ * the next exposure, or shown on where the dark time would be too short.
+ */
+PatternTime first_patterns (const std::vector<PatternTime> &times, int slots,
+    std::uint32_t minimum_dark);
+
+/**
  * The same with one exposure and one dark time for all masks, for controllers
  * that know no others; slots are rounded down. With the DMD as master, the
  * slots must fill the frame period: such a controller knows no pause.

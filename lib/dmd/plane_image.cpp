@@ -115,6 +115,22 @@ render_planes (const Schedule &schedule, const PlanePlan &plan, int image,
   return planes;
 }
 
+PlaneImage
+render_still (const StillMask &mask, const Placement &placement, Extent size)
+{
+  PlaneImage plane (size.width, size.height);
+  const MirrorRegion region =
+      placement.region.value_or (MirrorRegion{size, {}});
+  for (int y = 0; y < region.size.height; y++) {
+    PlanePixel *row = plane.view ().row (region.origin.y + y) + region.origin.x;
+    for (int x = 0; x < region.size.width; x++) {
+      const Offset pixel = tile_pixel (placement.layout, x, y);
+      row[x] = mask.open (pixel.x, pixel.y);
+    }
+  }
+  return plane;
+}
+
 ImageView<const PlanePixel>
 columns (ImageView<const PlanePixel> image, int x, int width)
 {

@@ -7,6 +7,7 @@
 
 #include "dmd/erle.h"
 #include "dmd/mirror_array.h"
+#include "schedule/still_mask.h"
 
 namespace cexp
 {
@@ -41,6 +42,10 @@ PlanePlan plan_planes (const Schedule &schedule);
 /** The masks that @p plan puts into image @p image, on an array of @p size. */
 PlaneImage render_planes (const Schedule &schedule, const PlanePlan &plan,
     int image, const Placement &placement, Extent size);
+
+/** One mask that stands still, in plane 0. */
+PlaneImage render_still (
+    const StillMask &mask, const Placement &placement, Extent size);
 
 /** Columns [x, x + width) of @p image. */
 ImageView<const PlanePixel> columns (

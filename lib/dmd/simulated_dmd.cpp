@@ -31,6 +31,22 @@ SimulatedMirrors::program (const Schedule &schedule)
   stop ();
   const std::lock_guard guard (lock_);
   schedule_ = schedule;
+  hold_.reset ();
+}
+
+void
+SimulatedMirrors::hold (StillMask mask)
+{
+  stop ();
+  const std::lock_guard guard (lock_);
+  hold_ = std::make_shared<const StillMask> (std::move (mask));
+}
+
+std::shared_ptr<const StillMask>
+SimulatedMirrors::held () const
+{
+  const std::lock_guard guard (lock_);
+  return held_;
 }
 
 void
@@ -70,6 +86,7 @@ SimulatedMirrors::begin_exposure ()
     return;
   if (motion_ == Motion::armed && !owes_dark_exposure_) {
     motion_ = Motion::stepping;
+    held_ = hold_;
     offset_ = 0;
   }
   owes_dark_exposure_ = false;
@@ -87,6 +104,8 @@ SimulatedMirrors::mask_in_slot (std::int64_t slot)
     offset_ += slips_.front ().by;
   if (motion_ != Motion::stepping)
     return std::nullopt;
+  if (held_)
+    return slot % schedule_->slots () < held_->slots ? kStillMask : kShutMask;
 
   const std::int64_t masks = schedule_->masks ();
   const std::int64_t mask = (slot - offset_) % masks;
@@ -163,6 +182,18 @@ public:
     return {};
   }
 
+  Result<void> show (
+      const StillMask &mask, const SlotPlan &, std::stop_token stop) override
+  {
+    if (!mirrors_->schedule ())
+      return Error{options_.info.name + ": no masks; upload first"};
+    if (!send_mask (stop))
+      return Error{
+          options_.info.name + ": sending " + mask.name + " cancelled"};
+    mirrors_->hold (mask);
+    mirrors_->start ();
+    return {};
+  }
   void stop () override { mirrors_->stop (); }
   bool running () const override { return mirrors_->running (); }
 
@@ -257,6 +288,10 @@ set_option (Options &options, std::string_view key, std::string_view value)
     return parse_time_into (value, options.info.minimum_switching);
   if (key == "mask-time")
     return parse_time_into (value, options.mask_time);
+  if (key == "still") {
+    options.info.still_masks = value == "yes";
+    return value == "yes" || value == "no";
+  }
   if (key == "slip-at")
     return parse_slip (value, options.slips);
   if (key == "fail")
@@ -274,6 +309,7 @@ parse_options (std::string_view device)
   options.info.name = "sim:" + options.mirrors;
   options.info.size = {1024, 768};
   options.info.resident_masks = 512;
+  options.info.still_masks = true;
   if (options.mirrors.empty ())
     return Error{"DMD '" + std::string (device) +
                  "' has no name; write sim:NAME, such as sim:bench"};
@@ -291,6 +327,7 @@ parse_options (std::string_view device)
           std::string (option) +
           "'; options of a simulated DMD are size=WxH, masks=N, "
           "min-active=TIME, min-switching=TIME, mask-time=TIME, "
+          "still=yes|no, "
           "slip-at=SLOT[:BY] (slots ascending), fail=open|upload|start|"
           "restart"};
     rest.remove_prefix (option.size ());

@@ -31,6 +31,8 @@ public:
 
   /** Parks the mirrors and takes the masks of @p schedule. */
   void program (const Schedule &schedule);
+  /** Takes one mask that stands still, until the next program (). */
+  void hold (StillMask mask);
   void start ();
   void stop ();
   bool running () const;
@@ -43,9 +45,14 @@ public:
    * the bench's first exposure, none while the mirrors are parked. They step
    * from the first exposure after start () on, which shows mask 0 or, where a
    * pilot makes two frames differ, the mask of that frame's parity; one whole
-   * exposure later if they stood still for less than that since stop ().
+   * exposure later if they stood still for less than that since stop (). A mask
+   * that is held is kStillMask in its slots, kShutMask in the others.
    */
   std::optional<int> mask_in_slot (std::int64_t slot);
+
+  /** The mask that is held in the exposure for whose slots was asked last; null
+   * where it is the schedule's. */
+  std::shared_ptr<const StillMask> held () const;
 
   /** From slot @p slot on, the masks come @p by slots late (> 0) or early
    * (< 0): a missed or a spurious trigger. Slips add up, and are given in the
@@ -63,6 +70,7 @@ private:
 
   mutable std::mutex lock_; // covers everything below; a leaf lock
   std::optional<Schedule> schedule_;
+  std::shared_ptr<const StillMask> hold_, held_; // from now on; since it began
   Motion motion_ = Motion::parked;
   bool owes_dark_exposure_ = false;
   std::deque<Slip> slips_;
@@ -77,6 +85,7 @@ private:
  *   min-active=TIME     default 0
  *   min-switching=TIME  default 0
  *   mask-time=TIME      time to send one mask, default 0
+ *   still=yes|no        whether it shows patterns on request, default yes
  *   slip-at=SLOT[:BY]   slips by BY slots (default 1: late) in slot SLOT of the
  *                       bench; may be given again, for a later slot
  *   fail=open|upload|start|restart  what goes wrong

@@ -118,11 +118,13 @@ OpticalBench &OpticalBench::operator= (OpticalBench &&) noexcept = default;
 OpticalBench::~OpticalBench () = default;
 
 void
-OpticalBench::begin (const Schedule &schedule)
+OpticalBench::begin (
+    const Schedule &schedule, std::shared_ptr<const StillMask> still)
 {
   State &st = *state_;
   if (!st.mirrors || !(st.mirrors->schedule () == schedule))
     st.mirrors.emplace (schedule, st.light.width (), st.light.height ());
+  st.mirrors->hold (std::move (still));
   st.empty = true;
 }
 

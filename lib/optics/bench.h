@@ -9,6 +9,7 @@
 #include "base/result.h"
 #include "optics/lens.h"
 #include "schedule/schedule.h"
+#include "schedule/still_mask.h"
 
 namespace cexp
 {
@@ -63,14 +64,16 @@ public:
   OpticalBench &operator= (OpticalBench &&) noexcept;
   ~OpticalBench ();
 
-  /** Empties the sensor for an exposure with the masks of @p schedule. */
-  void begin (const Schedule &schedule);
+  /** Empties the sensor for an exposure with the masks of @p schedule, and
+   * with @p still where expose () is told kStillMask. */
+  void begin (const Schedule &schedule,
+      std::shared_ptr<const StillMask> still = nullptr);
   /**
    * Adds the light of @p scene through a mask; open mirrors pass all of it,
    * shut ones schedule.leak ().
    * @p scene  of the bench's size.
-   * @p mask   index as in render_mask (); a negative one is the parked DMD:
-   *           every mirror shut.
+   * @p mask   index as in render_mask (), or kStillMask; a negative one is the
+   *           parked DMD: every mirror shut.
    * @p slots  how long, in active times of a slot.
    */
   void expose (ImageView<const std::uint8_t> scene, int mask, double slots);

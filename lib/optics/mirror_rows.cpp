@@ -18,11 +18,26 @@ MirrorRows::MirrorRows (Schedule schedule, int width, int height)
     : schedule_ (std::move (schedule)),
       pilot_top_ (std::max (0, height - schedule_.pilot_rows ())),
       elements_ (width, schedule_.tile ().period_y ()),
-      mirrors_ (width, schedule_.tile ().period_y () + 1), shown_ (kParked)
+      mirrors_ (width, schedule_.tile ().period_y () + 1), height_ (height),
+      shown_ (kParked)
 {
   for (int y = 0; y < elements_.height (); y++)
     for (int x = 0; x < width; x++)
       elements_.at (x, y) = std::uint8_t (schedule_.element_at (x, y));
+}
+
+void
+MirrorRows::hold (std::shared_ptr<const StillMask> mask)
+{
+  if (mask == held_)
+    return;
+  held_ = std::move (mask);
+  if (!held_)
+    return;
+  still_ = Image<std::uint8_t> (elements_.width (), height_);
+  for (int y = 0; y < still_.height (); y++)
+    for (int x = 0; x < still_.width (); x++)
+      still_.at (x, y) = held_->open (x, y);
 }
 
 void
@@ -32,6 +47,8 @@ MirrorRows::show (int mask)
   if (mask == shown_)
     return;
   shown_ = mask;
+  if (mask == kStillMask)
+    return;
 
   const int slots = schedule_.slots ();
   std::array<std::uint8_t, Tile::kMaxElements> open = {};

@@ -3,10 +3,12 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "base/image.h"
 #include "schedule/schedule.h"
+#include "schedule/still_mask.h"
 
 namespace cexp
 {
@@ -21,11 +23,17 @@ public:
   MirrorRows (Schedule schedule, int width, int height);
 
   const Schedule &schedule () const { return schedule_; }
-  /** @p mask: index in 0..masks () - 1; a negative one parks the mirrors. */
+  /** What kStillMask shows from now on; may be null where nobody asks for it.
+   */
+  void hold (std::shared_ptr<const StillMask> mask);
+  /** @p mask: index in 0..masks () - 1, or kStillMask; a negative one shuts
+   * every mirror. */
   void show (int mask);
   /** The mirrors of row @p y, one byte each, 1 on and 0 off. */
   const std::uint8_t *row (int y) const
   {
+    if (shown_ == kStillMask)
+      return still_.view ().row (y);
     return mirrors_.view ().row (
         y < pilot_top_ ? y % elements_.height () : elements_.height ());
   }
@@ -35,6 +43,9 @@ private:
   int pilot_top_;
   Image<std::uint8_t> elements_; // one period of rows
   Image<std::uint8_t> mirrors_;  // the same and, last, a row of the pilot
+  int height_;
+  std::shared_ptr<const StillMask> held_;
+  Image<std::uint8_t> still_;
   int shown_;
 };
 

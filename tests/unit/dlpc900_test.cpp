@@ -115,6 +115,68 @@ TEST (Dlpc900, DestructorStopsAndLetsTheMirrorsMove)
   EXPECT_TRUE (rig.board->idle ());
 }
 
+/** Stripes of one and a half rows and columns, so that nothing repeats. */
+StillMask
+stripes (int slots)
+{
+  return {.name = "stripes",
+      .open = [] (int x, int y) { return (x * 2 / 3 + y * 2 / 3) % 2 == 0; },
+      .slots = slots};
+}
+
+TEST (Dlpc900, AStillMaskStandsInItsSlotsOfEveryExposure)
+{
+  const Schedule schedule;
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open ()), "");
+  ASSERT_TRUE (rig.dmd->info ().still_masks);
+  ASSERT_EQ (message_of (rig.show (schedule)), "");
+  for (const int slots : {1, 3, 4}) {
+    ASSERT_EQ (
+        message_of (rig.dmd->show (stripes (slots), plan_of (schedule), {})),
+        "");
+    EXPECT_TRUE (rig.board->running ());
+    const auto lines = rig.board->shown ();
+    ASSERT_EQ (lines.size (), 1u);
+    EXPECT_EQ (lines[0].exposure, 10'000u * unsigned (slots));
+    EXPECT_EQ (lines[0].exposure + lines[0].dark, 40'000u);
+    EXPECT_TRUE (lines[0].pulses);
+    const auto mirrors = rig.board->mirrors (0);
+    for (int y = 0; y < mirrors.height (); y++)
+      for (int x = 0; x < mirrors.width (); x++)
+        ASSERT_EQ (mirrors.at (x, y), stripes (1).open (x, y));
+  }
+}
+
+TEST (Dlpc900, AfterAStillMaskTheScheduleIsSentOnceMore)
+{
+  const Schedule schedule;
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open ()), "");
+  ASSERT_EQ (message_of (rig.show (schedule)), "");
+  ASSERT_EQ (
+      message_of (rig.dmd->show (stripes (1), plan_of (schedule), {})), "");
+  ASSERT_EQ (message_of (rig.show (schedule)), "");
+  expect_masks (*rig.board, schedule);
+  EXPECT_TRUE (rig.board->running ());
+}
+
+TEST (Dlpc900, AStillMaskStartsInTheRegion)
+{
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open (",region=96x64+16+8")), "");
+  EXPECT_EQ (rig.dmd->info ().shown (), (Extent{96, 64}));
+  ASSERT_EQ (
+      message_of (rig.dmd->show (stripes (1), plan_of (Schedule ()), {})), "");
+  const auto mirrors = rig.board->mirrors (0);
+  for (int y = 0; y < mirrors.height (); y++)
+    for (int x = 0; x < mirrors.width (); x++) {
+      const bool in = x >= 16 && x < 112 && y >= 8 && y < 72;
+      ASSERT_EQ (mirrors.at (x, y), in && stripes (1).open (x - 16, y - 8))
+          << x << ", " << y;
+    }
+}
+
 class Dlpc900Masks : public ::testing::TestWithParam<const char *>
 {
 };

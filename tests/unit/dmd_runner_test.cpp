@@ -56,6 +56,13 @@ public:
     record_->running = true;
     return {};
   }
+  Result<void> show (
+      const StillMask &mask, const SlotPlan &, std::stop_token) override
+  {
+    record_->calls.push_back ("show " + mask.name);
+    record_->running = true;
+    return {};
+  }
   void stop () override
   {
     record_->calls.push_back ("stop");
@@ -196,4 +203,25 @@ TEST_F (DmdRunnerTest, AFailureParksEndsTheRunAndIsReportedOnce)
   runner->upload (Schedule ());
   runner->start (plan);
   EXPECT_TRUE (runner->settle ());
+}
+
+TEST_F (DmdRunnerTest, ShowsAMaskAndRestoresTheSchedule)
+{
+  const auto runner = make_runner ();
+  runner->upload (Schedule ());
+  runner->start (plan);
+  ASSERT_TRUE (runner->settle ());
+  record->calls.clear ();
+  runner->show ({.name = "stripes", .open = {}}, plan);
+  EXPECT_TRUE (runner->settle ());
+  runner->restore (Schedule (), plan);
+  EXPECT_TRUE (runner->settle ());
+  EXPECT_EQ (
+      record->calls, (std::vector<std::string>{"stop", "show stripes",
+                         "upload sequential:2x2", "stop", "start 10ms"}));
+  runner->halt ();
+  record->calls.clear ();
+  runner->show ({.name = "stripes", .open = {}}, plan);
+  EXPECT_FALSE (runner->settle ());
+  EXPECT_TRUE (record->calls.empty ());
 }

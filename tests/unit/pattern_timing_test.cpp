@@ -103,3 +103,12 @@ TEST (EqualPatternTiming, AsMasterKnowsNoPause)
   EXPECT_EQ (*fit_equal_patterns (plan (timing, 4), kLimits, Master::camera),
       (PatternTime{9900, 0}));
 }
+
+TEST (PatternTiming, OneMaskInTheFirstSlotsIsDarkInTheOthers)
+{
+  const Times times{{9800, 200}, {9800, 200}, {9800, 200}, {9800, 200}};
+  EXPECT_EQ (first_patterns (times, 1, 105), (PatternTime{9800, 30200}));
+  EXPECT_EQ (first_patterns (times, 3, 105), (PatternTime{29800, 10200}));
+  EXPECT_EQ (first_patterns (times, 4, 105), (PatternTime{39800, 200}));
+  EXPECT_EQ (first_patterns (times, 4, 300), (PatternTime{40000, 0}));
+}

@@ -1,0 +1,27 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* A mask that stands still: what mirrors show while a bench is measured. */
+#pragma once
+
+#include <functional>
+#include <string>
+
+namespace cexp
+{
+
+/** One mask in place of a schedule's, the same in every exposure. */
+struct StillMask {
+  std::string name; ///< for people
+  /** Whether pixel (x, y) of the tile is open; x, y >= 0. Called from other
+   * threads, also at the same time. */
+  std::function<bool (int x, int y)> open;
+  /** Slots of the schedule, from the first on, for which it stands in every
+   * exposure; the mirrors are shut in the others. */
+  int slots = 1;
+};
+
+/** Index of the still mask where those of a schedule are 0, 1, ... */
+constexpr int kStillMask = 1 << 20;
+/** Index of no mask: every mirror is shut, but not for want of a start. */
+constexpr int kShutMask = -2;
+
+} // namespace cexp

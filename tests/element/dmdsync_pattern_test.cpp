@@ -1,0 +1,255 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* dmdsync shows patterns that are asked for from downstream, says from which
+ * frame on, and gives the mirrors back. */
+#include "dmd/simulated_dmd.h"
+#include "moire/gratings.h"
+#include "sync_bench.h"
+
+namespace
+{
+
+using namespace cexp;
+using namespace cexp::test;
+
+const auto *const linked =
+    ::testing::AddGlobalTestEnvironment (new LinkedElements);
+
+/** Frames are exposed as fast as they can be, and the thread that moves the
+ * mirrors may have to wait for its turn meanwhile. */
+constexpr int kPatience = 100'000;
+
+void
+white (std::int64_t, ImageView<std::uint8_t> out)
+{
+  for (int y = 0; y < out.height; y++)
+    std::fill_n (out.row (y), out.width, std::uint8_t (255));
+}
+
+GstEvent *
+request (const char *pattern, guint64 frames = 100)
+{
+  return gst_event_new_custom (GST_EVENT_CUSTOM_UPSTREAM,
+      gst_structure_new ("dmdsync/pattern", "pattern", G_TYPE_STRING, pattern,
+          "frames", G_TYPE_UINT64, frames, nullptr));
+}
+
+std::string
+line_of (const std::string &schedule, const std::string &options = "")
+{
+  return "codedexposure-sim dmd=sim:bench ! dmdsync name=sync "
+         "device=sim:bench" +
+         options + " schedule=" + schedule;
+}
+
+class PatternTest : public ::testing::TestWithParam<const char *>
+{
+protected:
+  Bench bench{GetParam (), line_of (GetParam ())};
+
+  FrameMeta next ()
+  {
+    frame = bench.next (white);
+    return frame ? get_frame_meta (frame.get ()).value_or (FrameMeta ())
+                 : FrameMeta ();
+  }
+  /** The first frame that is said to show @p pattern; none before it is said
+   * to show anything. */
+  FrameMeta wait_for (const std::string &pattern)
+  {
+    for (int i = 0; i < kPatience; i++) {
+      const FrameMeta meta = next ();
+      if (!meta.pattern.empty ()) {
+        EXPECT_EQ (meta.pattern, pattern);
+        return meta;
+      }
+      EXPECT_FALSE (meta.locked);
+    }
+    ADD_FAILURE () << pattern << " never came";
+    return {};
+  }
+  void wait_for_lock ()
+  {
+    for (int i = 0; i < kPatience; i++) {
+      const FrameMeta meta = next ();
+      EXPECT_EQ (meta.pattern, "");
+      if (meta.locked)
+        return;
+    }
+    ADD_FAILURE () << "never locked again";
+  }
+  Image<std::uint8_t> pixels ()
+  {
+    return image_of<std::uint8_t> (
+        frame.get (), caps_of (gray_caps (kWidth, kHeight)).get ());
+  }
+  /** White where @p pattern is on, black elsewhere. */
+  static Image<std::uint8_t> drawn (const char *pattern)
+  {
+    const Pattern parsed = *Pattern::parse (pattern);
+    return draw<std::uint8_t> (kWidth, kHeight,
+        [&] (int x, int y) { return parsed.on (x, y) ? 255 : 0; });
+  }
+
+  BufferPtr frame;
+};
+
+INSTANTIATE_TEST_SUITE_P (Schedules, PatternTest,
+    ::testing::Values ("sequential:2x2", "staircase:2x2",
+        "sequential:2x2,pilot=16", "s-matrix:7x1"));
+
+} // namespace
+
+TEST_P (PatternTest, IsShownOneAfterTheOtherAndTheMirrorsComeBack)
+{
+  /* Two, since a pilot makes two frames differ. */
+  std::array<Image<std::uint8_t>, 2> coded;
+  for (int i = 0; i < 2; i++) {
+    const FrameMeta meta = next ();
+    ASSERT_TRUE (meta.locked);
+    coded[meta.frame % 2] = pixels ();
+  }
+  for (const char *pattern :
+      {"grating-x:4/1", "gray-y:6/2-inverse", "dark", "white"}) {
+    SCOPED_TRACE (pattern);
+    ASSERT_TRUE (bench.send_upstream (request (pattern)));
+    const FrameMeta first = wait_for (pattern);
+    EXPECT_EQ (pixels (), drawn (pattern));
+    EXPECT_EQ (next ().pattern, pattern);
+    EXPECT_EQ (pixels (), drawn (pattern));
+
+    const auto said = bench.messages ("dmdsync/pattern-shown");
+    ASSERT_FALSE (said.empty ());
+    EXPECT_EQ (string_field (said.back (), "pattern"), pattern);
+    EXPECT_EQ (uint64_field (said.back (), "frame"), first.frame);
+  }
+  ASSERT_TRUE (bench.send_upstream (request ("")));
+  wait_for_lock ();
+  const FrameMeta last = next ();
+  EXPECT_EQ (pixels (), coded[last.frame % 2]);
+  EXPECT_EQ (bench.messages ("dmdsync/pattern-over").size (), 1u);
+  EXPECT_EQ (bench.counter ("slips"), 0u);
+  EXPECT_EQ (bench.counter ("frames-lost"), 0u);
+}
+
+TEST_P (PatternTest, EndsAfterTheFramesThatWereAskedFor)
+{
+  next ();
+  ASSERT_TRUE (bench.send_upstream (request ("white", 3)));
+  wait_for ("white");
+  EXPECT_EQ (next ().pattern, "white");
+  EXPECT_EQ (next ().pattern, "white");
+  wait_for_lock ();
+  const auto over = bench.messages ("dmdsync/pattern-over");
+  ASSERT_EQ (over.size (), 1u);
+  EXPECT_EQ (string_field (over[0], "reason"), "frames");
+}
+
+TEST_P (PatternTest, AskedForOnceMoreStaysWithoutAChange)
+{
+  next ();
+  ASSERT_TRUE (bench.send_upstream (request ("white", 3)));
+  wait_for ("white");
+  for (int i = 0; i < 6; i++) {
+    ASSERT_TRUE (bench.send_upstream (request ("white", 3)));
+    EXPECT_EQ (next ().pattern, "white");
+  }
+  EXPECT_TRUE (bench.messages ("dmdsync/pattern-over").empty ());
+}
+
+TEST_P (PatternTest, GoesWithAChangeOfState)
+{
+  next ();
+  ASSERT_TRUE (bench.send_upstream (request ("grating-x:4/0")));
+  wait_for ("grating-x:4/0");
+  bench.restart ();
+  const FrameMeta meta = next ();
+  EXPECT_TRUE (meta.locked);
+  EXPECT_EQ (meta.pattern, "");
+}
+
+TEST_P (PatternTest, GoesWithTheEndOfTheStream)
+{
+  next ();
+  ASSERT_TRUE (bench.send_upstream (request ("grating-x:4/0")));
+  wait_for ("grating-x:4/0");
+  bench.end ();
+  const auto over = bench.messages ("dmdsync/pattern-over");
+  ASSERT_EQ (over.size (), 1u);
+  EXPECT_EQ (string_field (over[0], "reason"), "eos");
+}
+
+namespace
+{
+
+gboolean
+ask (SyncHarness &h, const char *pattern)
+{
+  return gst_harness_push_upstream_event (h.get (), request (pattern));
+}
+
+} // namespace
+
+TEST (DmdSyncPattern, GoesWithAFlush)
+{
+  SyncHarness h ("device=sim:flushed");
+  h.start ();
+  ASSERT_EQ (h.send (0), GST_FLOW_OK);
+  ASSERT_TRUE (ask (h, "grating-x:4/0"));
+  h.push_event (gst_event_new_flush_start ());
+  h.push_event (gst_event_new_flush_stop (FALSE));
+  EXPECT_EQ (
+      string_field (h.element_message ("dmdsync/pattern-over"), "reason"),
+      "flush");
+}
+
+TEST (DmdSyncPattern, IsRefusedWithoutADevice)
+{
+  SyncHarness h;
+  h.start ();
+  EXPECT_FALSE (ask (h, "white"));
+  EXPECT_EQ (h.warning (), "Cannot show the pattern white: dmdsync drives no "
+                           "DMD; set its device property");
+}
+
+TEST (DmdSyncPattern, IsRefusedWhereMasksCannotBeSentAtRunTime)
+{
+  SyncHarness h ("device=sim:fixed,still=no");
+  h.start ();
+  EXPECT_FALSE (ask (h, "white"));
+  EXPECT_EQ (h.warning (),
+      "Cannot show the pattern white: sim:fixed takes no masks at run time; "
+      "put the pattern on the device by its own software, and leave dmdsync's "
+      "device empty");
+}
+
+TEST (DmdSyncPattern, IsRefusedWhenItIsNone)
+{
+  SyncHarness h ("device=sim:some");
+  h.start ();
+  EXPECT_FALSE (ask (h, "plaid"));
+  EXPECT_NE (h.warning ().find ("plaid"), std::string::npos);
+}
+
+TEST (DmdSyncPattern, IsRefusedBeforeTheStream)
+{
+  SyncHarness h ("device=sim:early");
+  EXPECT_FALSE (ask (h, "white"));
+  EXPECT_NE (h.warning ().find ("no stream yet"), std::string::npos);
+}
+
+TEST (DmdSyncPattern, TellsTheSizeOfTheArray)
+{
+  SyncHarness h ("device=sim:sized,size=640x480");
+  h.start ();
+  const QueryPtr query (gst_query_new_custom (
+      GST_QUERY_CUSTOM, gst_structure_new_empty ("dmdsync/mirrors")));
+  ASSERT_TRUE (gst_pad_peer_query (h.get ()->sinkpad, query.get ()));
+  const GstStructure *answer = gst_query_get_structure (query.get ());
+  int width = 0, height = 0;
+  gboolean patterns = FALSE;
+  ASSERT_TRUE (gst_structure_get (answer, "width", G_TYPE_INT, &width, "height",
+      G_TYPE_INT, &height, "patterns", G_TYPE_BOOLEAN, &patterns, nullptr));
+  EXPECT_EQ (width, 640);
+  EXPECT_EQ (height, 480);
+  EXPECT_TRUE (patterns);
+}

@@ -1,0 +1,59 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The frame from which on a DMD shows something else. */
+#include <gtest/gtest.h>
+
+#include "clock/switch_watch.h"
+
+using namespace cexp;
+
+namespace
+{
+
+constexpr double kLight = 100.0, kHalf = 50.0, kDark = 1.0;
+
+/** Has seen the frames of a schedule, and is to see something else. */
+SwitchWatch
+switching (bool gap_shows = false)
+{
+  SwitchWatch watch (gap_shows);
+  EXPECT_TRUE (watch.take (true, kLight, false));
+  watch.begin ();
+  return watch;
+}
+
+} // namespace
+
+TEST (SwitchWatch, TheFrameAfterTheDarkOneShowsIt)
+{
+  SwitchWatch watch = switching ();
+  EXPECT_FALSE (watch.take (false, kLight, false));
+  EXPECT_FALSE (watch.take (true, kLight, false)); // still on its way
+  EXPECT_FALSE (watch.take (true, kDark, false));
+  EXPECT_TRUE (watch.take (true, kHalf, false));
+  EXPECT_TRUE (watch.take (true, kDark, false)); // until something else comes
+}
+
+TEST (SwitchWatch, NothingIsShownBeforeTheDeviceIsDone)
+{
+  SwitchWatch watch = switching ();
+  EXPECT_FALSE (watch.take (false, kDark, false));
+  for (int i = 0; i < 100; i++)
+    ASSERT_FALSE (watch.take (false, kHalf, false));
+  EXPECT_TRUE (watch.take (true, kHalf, false));
+}
+
+TEST (SwitchWatch, AGapShowsItWhereTheDmdTriggersTheCamera)
+{
+  SwitchWatch triggers = switching (true);
+  EXPECT_TRUE (triggers.take (true, kHalf, true));
+  SwitchWatch loses = switching (false);
+  EXPECT_FALSE (loses.take (true, kHalf, true));
+}
+
+TEST (SwitchWatch, WhatIsDarkItselfIsBelievedInTheEnd)
+{
+  SwitchWatch watch = switching ();
+  for (int i = 0; i < SwitchWatch::kPatience; i++)
+    ASSERT_FALSE (watch.take (true, kDark, false)) << i;
+  EXPECT_TRUE (watch.take (true, kDark, false));
+}

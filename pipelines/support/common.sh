@@ -72,7 +72,8 @@ declare -A opt=()
 args=()
 
 # parse_options "NAMES THAT TAKE A VALUE" "FLAGS" "$@"
-# fills opt[NAME] (a flag: 1) and args.
+# fills opt[NAME] (a flag: 1) and args. With command_follows set, the first word
+# that is no option begins a command, whose own options are left to it.
 parse_options ()
 {
   local valued=" ${1//$'\n'/ } " flags=" $2 print help " name
@@ -106,7 +107,13 @@ parse_options ()
         fi
         ;;
       -?*) usage_error "there is no option $1" ;;
-      *) args+=("$1") ;;
+      *)
+        if [ -n "${command_follows:-}" ]; then
+          args+=("$@")
+          return
+        fi
+        args+=("$1")
+        ;;
     esac
     shift
   done
@@ -159,11 +166,13 @@ find_plugin ()
     build=$(cd "$build" && pwd)
     launcher=$build/pipelines/codedexposure-launch
     tool=$build/lib/tools/codedexposure
+    camera_program=$build/pipelines/codedexposure-camera
     libs=$build/gst
     export GST_REGISTRY_1_0=$build/registry.bin
   elif [ -x "$prefix/bin/codedexposure-launch" ]; then
     launcher=$prefix/bin/codedexposure-launch
     tool=$prefix/bin/codedexposure
+    camera_program=$prefix/bin/codedexposure-camera
     for folder in "$prefix"/lib{,/*}/gstreamer-1.0; do
       [ ! -e "$folder/libgstcodedexposure.so" ] || libs=$folder
     done

@@ -32,6 +32,8 @@ gnuplot-nox|draws the figures of a report|report
 libgtest-dev|unit and element tests|tests
 libbenchmark-dev|benchmarks|tests
 libumockdev-dev|a USB in software for the tests of DMDs|tests
+libaravis-dev|the camera in software, and aravissrc|tests
+iproute2|the network that it is alone on|tests
 umockdev|a USB in software for the tests of DMDs|tests
 xvfb|a screen for the window tests|tests
 shellcheck|checks the scripts|tests

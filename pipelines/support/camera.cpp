@@ -1,0 +1,267 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* codedexposure-camera: serves the coded frames of any GStreamer pipeline as a
+ * GigE Vision camera does. */
+#include <atomic>
+#include <csignal>
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include <CLI/CLI.hpp>
+#include <gst/app/gstappsink.h>
+#include <gst/gst.h>
+
+#include "camera/gige_camera.h"
+#include "gstraii.h"
+
+using namespace cexp;
+using namespace cexp::gst;
+
+namespace
+{
+
+struct Arguments {
+  GigeCameraOptions camera;
+  std::string pipeline;
+  std::string faults;
+  std::string jitter = "0";
+  int bits = 0;
+  bool loop = false;
+  bool log = false;
+};
+
+void
+say (const std::string &text)
+{
+  std::fprintf (stderr, "codedexposure-camera: %s\n", text.c_str ());
+}
+
+/* The coded frames of a pipeline, one after the other. */
+class Frames
+{
+public:
+  static Result<std::unique_ptr<Frames>> open (
+      const std::string &line, bool loop)
+  {
+    GError *error = nullptr;
+    GstElement *pipeline = gst_parse_launch (
+        (line + " ! appsink name=frames sync=false max-buffers=4 "
+                "caps=\"video/x-raw,format={GRAY8,GRAY16_LE}\"")
+            .c_str (),
+        &error);
+    if (error) {
+      Error why{error->message};
+      g_error_free (error);
+      return why;
+    }
+    auto frames = std::unique_ptr<Frames> (new Frames);
+    frames->loop_ = loop;
+    frames->pipeline_.reset (GST_ELEMENT (gst_object_ref_sink (pipeline)));
+    frames->sink_.reset (
+        GST_APP_SINK (gst_bin_get_by_name (GST_BIN (pipeline), "frames")));
+    gst_element_set_state (pipeline, GST_STATE_PLAYING);
+    if (!frames->advance ())
+      return Error{frames->why_ended ()};
+    return frames;
+  }
+  ~Frames ()
+  {
+    if (pipeline_)
+      gst_element_set_state (pipeline_.get (), GST_STATE_NULL);
+  }
+
+  const GstVideoInfo &info () const { return info_; }
+  bool is_wide () const
+  {
+    return GST_VIDEO_INFO_FORMAT (&info_) == GST_VIDEO_FORMAT_GRAY16_LE;
+  }
+  bool ended () const { return ended_; }
+
+  /* The next frame; false at the end. */
+  bool take (ImageView<std::uint16_t> picture)
+  {
+    if (!sample_ && !advance ())
+      return false;
+    MappedFrame mapped (
+        info_, gst_sample_get_buffer (sample_.get ()), GST_MAP_READ);
+    if (mapped && is_wide ())
+      copy (view_of<const std::uint16_t> (mapped), picture);
+    else if (mapped)
+      copy (view_of<const std::uint8_t> (mapped), picture);
+    mapped.reset ();
+    sample_.reset ();
+    return true;
+  }
+
+  std::string why_ended () const
+  {
+    const ObjectPtr<GstBus> bus (gst_element_get_bus (pipeline_.get ()));
+    std::unique_ptr<GstMessage, MiniObjectUnref> message (
+        gst_bus_pop_filtered (bus.get (), GST_MESSAGE_ERROR));
+    if (!message)
+      return "the pipeline ended";
+    GError *error = nullptr;
+    gst_message_parse_error (message.get (), &error, nullptr);
+    std::string text = error->message;
+    g_error_free (error);
+    return text;
+  }
+
+private:
+  struct SampleUnref {
+    void operator() (GstSample *sample) const { gst_sample_unref (sample); }
+  };
+
+  Frames () = default;
+
+  bool advance ()
+  {
+    sample_.reset (gst_app_sink_pull_sample (sink_.get ()));
+    if (!sample_ && loop_ && gst_app_sink_is_eos (sink_.get ()) &&
+        gst_element_seek_simple (
+            pipeline_.get (), GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH, 0))
+      sample_.reset (gst_app_sink_pull_sample (sink_.get ()));
+    ended_ = !sample_ || !gst_video_info_from_caps (
+                             &info_, gst_sample_get_caps (sample_.get ()));
+    return !ended_;
+  }
+
+  template <typename Pixel>
+  static void copy (ImageView<const Pixel> from, ImageView<std::uint16_t> to)
+  {
+    for (int y = 0; y < to.height; y++)
+      std::copy_n (from.row (y), to.width, to.row (y));
+  }
+
+  ObjectPtr<GstElement> pipeline_;
+  ObjectPtr<GstAppSink> sink_;
+  std::unique_ptr<GstSample, SampleUnref> sample_;
+  GstVideoInfo info_ = {};
+  bool loop_ = false;
+  std::atomic<bool> ended_ = false;
+};
+
+const char *
+fault_text (Fault::Kind kind)
+{
+  static constexpr const char *names[] = {
+      "sent", "lose", "incomplete", "delay", "duplicate", "late", "stop"};
+  return names[int (kind)];
+}
+
+void
+log_frame (const SentFrame &sent)
+{
+  std::printf ("{\"frame\":%llu,\"device_ns\":%lld,\"host_ns\":%lld,"
+               "\"fault\":\"%s\"}\n",
+      static_cast<unsigned long long> (sent.frame),
+      static_cast<long long> (sent.device_time),
+      static_cast<long long> (sent.host_time), fault_text (sent.fault.kind));
+  std::fflush (stdout);
+}
+
+/* Faults that are typed or piped in; the thread ends with the process. */
+void
+obey_stdin (GigeCamera &camera)
+{
+  std::thread ([&camera] {
+    for (std::string line; std::getline (std::cin, line);)
+      if (const auto added = camera.add_faults (line); !added)
+        say (added.error ().message);
+  }).detach ();
+}
+
+int
+serve (Arguments &arguments)
+{
+  const auto jitter = parse_time (arguments.jitter);
+  const auto faults = arguments.camera.faults.add (arguments.faults);
+  auto frames = Frames::open (arguments.pipeline, arguments.loop);
+  if (!jitter || !faults || !frames) {
+    say (!jitter   ? jitter.error ().message
+         : !faults ? faults.error ().message
+                   : frames.error ().message);
+    return 1;
+  }
+  Frames &source = **frames;
+  GigeCameraOptions &options = arguments.camera;
+  options.jitter = *jitter;
+  options.width = source.info ().width;
+  options.height = source.info ().height;
+  options.bits = arguments.bits > 0  ? arguments.bits
+                 : source.is_wide () ? 16
+                                     : 8;
+  if (arguments.log)
+    options.sent = log_frame;
+
+  /* Before the camera's thread begins, so that it takes none of them. */
+  sigset_t ends;
+  sigemptyset (&ends);
+  sigaddset (&ends, SIGINT);
+  sigaddset (&ends, SIGTERM);
+  pthread_sigmask (SIG_BLOCK, &ends, nullptr);
+  const auto camera = GigeCamera::open (
+      options, [&] (std::uint64_t, ImageView<std::uint16_t> picture) {
+        return source.take (picture);
+      });
+  if (!camera) {
+    say (camera.error ().message);
+    return 1;
+  }
+  say ("serving " + std::to_string (options.width) + "x" +
+       std::to_string (options.height) + " as Aravis-Fake-" + options.serial +
+       " at " + options.address);
+  obey_stdin (**camera);
+  const timespec moment{0, 100'000'000};
+  while (!source.ended () && sigtimedwait (&ends, nullptr, &moment) < 0)
+    ;
+  if (source.ended ())
+    say (source.why_ended ());
+  return 0;
+}
+
+} // namespace
+
+int
+main (int argc, char **argv)
+{
+  gst_init (&argc, &argv);
+  Arguments arguments;
+  GigeCameraOptions &camera = arguments.camera;
+  CLI::App app{"Serves the coded frames of a GStreamer pipeline as a GigE "
+               "Vision camera, each when the camera exposes. Faults can also "
+               "be typed while it runs, as in lose@now:3."};
+  app.add_option ("pipeline", arguments.pipeline,
+         "GStreamer launch line whose frames are served")
+      ->required ();
+  app.add_option ("--address", camera.address, "address of the interface")
+      ->capture_default_str ();
+  app.add_option ("--serial", camera.serial, "serial number")
+      ->capture_default_str ();
+  app.add_option ("--bits", arguments.bits, "significant bits of the frames")
+      ->check (CLI::Range (1, 16));
+  app.add_option ("--trigger-rate", camera.trigger_rate,
+         "triggers a second on its lines")
+      ->check (CLI::Range (0.1, 1000.0))
+      ->capture_default_str ();
+  app.add_option ("--drift", camera.drift, "ppm by which its clock is fast")
+      ->check (CLI::Range (-500.0, 500.0));
+  app.add_option ("--jitter", arguments.jitter,
+      "time up to which frames are held up at random, such as 5ms");
+  app.add_option ("--packet-loss", camera.packet_loss,
+         "part of the packets that is lost")
+      ->check (CLI::Range (0.0, 1.0));
+  app.add_option ("--seed", camera.seed, "of the jitter");
+  app.add_option ("--faults", arguments.faults,
+      "what befalls frames: lose@10:3 incomplete@20 delay@30:5ms duplicate@40 "
+      "late@50 stop@60");
+  app.add_flag ("--loop", arguments.loop, "begin again where it ends");
+  app.add_flag (
+      "--log", arguments.log, "a line of JSON on every frame to the output");
+  CLI11_PARSE (app, argc, argv);
+  const int result = serve (arguments);
+  gst_deinit ();
+  return result;
+}

@@ -1,0 +1,234 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* dmdsync behind the unmodified aravissrc, which reads a camera in software. */
+#include <cstdlib>
+#include <map>
+
+#include "camera_rig.h"
+#include "linked_elements.h"
+#include "own_network.h"
+
+namespace
+{
+
+using namespace cexp;
+using namespace cexp::test;
+
+const auto *const linked =
+    ::testing::AddGlobalTestEnvironment (new LinkedElements);
+
+/** Pixels of @p buffer that are not those of the scene's frame. */
+template <typename Pixel>
+int
+wrong_pixels (GstBuffer *buffer, const GstVideoInfo &info, std::uint64_t frame,
+    int mask, int shift = 0)
+{
+  MappedFrame mapped (info, buffer, GST_MAP_READ);
+  if (!mapped)
+    return -1;
+  const auto view = view_of<Pixel> (mapped);
+  int wrong = 0;
+  for (int y = 0; y < view.height; y++)
+    for (int x = 0; x < view.width; x++)
+      wrong += view.at (x, y) != ((scene_pixel (frame, x, y) & mask) << shift);
+  return wrong;
+}
+
+/** What came behind dmdsync, each frame compared with the scene's frame of its
+ * number. */
+struct Received {
+  std::map<guint64, int> frames; // by number, how often
+  std::vector<guint64> order;
+  guint64 first_frame = 0; // of the camera, that is number 0
+  int wrong = 0;
+
+  void take (GstBuffer *buffer, const GstVideoInfo &info)
+  {
+    const guint64 number = GST_BUFFER_OFFSET (buffer);
+    if (order.empty ())
+      while (first_frame < 100 &&
+             wrong_pixels<std::uint8_t> (buffer, info, first_frame, 255) > 0)
+        first_frame++;
+    frames[number]++;
+    order.push_back (number);
+    wrong += wrong_pixels<std::uint8_t> (
+                 buffer, info, first_frame + number, 255) != 0;
+  }
+};
+
+guint64
+counter (const CameraPipeline &pipeline, const char *name)
+{
+  const auto sync = pipeline.element ("sync");
+  const StructurePtr stats (property<GstStructure *> (sync.get (), "stats"));
+  guint64 value = 0;
+  EXPECT_TRUE (gst_structure_get_uint64 (stats.get (), name, &value)) << name;
+  return value;
+}
+
+guint64
+sum_of (const CameraPipeline &pipeline, const char *message, const char *field)
+{
+  guint64 sum = 0;
+  for (const MessagePtr &said : pipeline.messages) {
+    const GstStructure *structure = gst_message_get_structure (said.get ());
+    guint64 value = 0;
+    if (structure && gst_structure_has_name (structure, message) &&
+        gst_structure_get_uint64 (structure, field, &value))
+      sum += value;
+  }
+  return sum;
+}
+
+constexpr const char *kSync = "dmdsync name=sync timestamp-at=device-clock ! ";
+
+TEST (Gige, EveryPixelOfEveryFrameArrives)
+{
+  const auto camera = open_camera ({});
+  Received received;
+  CameraPipeline pipeline (
+      camera_source ("100/1", "GRAY8", "num-buffers=100") + kSync,
+      [&] (auto *buffer, auto &info) { received.take (buffer, info); });
+  pipeline.play ();
+  EXPECT_EQ (pipeline.wait_end (), "end");
+  EXPECT_EQ (received.frames.size (), 100u);
+  EXPECT_EQ (received.wrong, 0);
+  EXPECT_EQ (counter (pipeline, "frames-lost"), 0u);
+}
+
+TEST (Gige, WideFormatsKeepTheirBits)
+{
+  const struct {
+    int bits;
+    const char *format;
+  } cases[] = {{16, "Mono16"}, {12, "Mono12"}, {10, "Mono10"}};
+  for (const auto &[bits, format] : cases) {
+    SCOPED_TRACE (format);
+    GigeCameraOptions options;
+    options.bits = bits;
+    const auto camera = open_camera (options);
+    std::uint64_t frames = 0;
+    int wrong = 0;
+    CameraPipeline pipeline (camera_source ("100/1", "GRAY16_LE",
+                                 "num-buffers=10 features=\"PixelFormat=" +
+                                     std::string (format) + "\""),
+        [&] (auto *buffer, auto &info) {
+          wrong += wrong_pixels<std::uint16_t> (
+              buffer, info, frames++, (1 << bits) - 1);
+        });
+    pipeline.play ();
+    EXPECT_EQ (pipeline.wait_end (), "end");
+    EXPECT_EQ (frames, 10u);
+    EXPECT_EQ (wrong, 0);
+  }
+}
+
+TEST (Gige, EveryFaultIsAccountedFor)
+{
+  GigeCameraOptions options;
+  ASSERT_TRUE (options.faults
+                   .add ("lose@10:3 incomplete@20 duplicate@30 late@40 "
+                         "delay@50:12ms")
+                   .ok ());
+  const auto camera = open_camera (std::move (options));
+  Received received;
+  CameraPipeline pipeline (
+      camera_source ("100/1", "GRAY8", "num-buffers=60") + kSync,
+      [&] (auto *buffer, auto &info) { received.take (buffer, info); });
+  pipeline.play ();
+  EXPECT_EQ (pipeline.wait_end (), "end");
+
+  ASSERT_EQ (received.first_frame, 0u);
+  EXPECT_EQ (received.wrong, 0);
+  for (const guint64 lost : {10, 11, 12, 20, 31, 42})
+    EXPECT_FALSE (received.frames.contains (lost)) << lost;
+  const auto late =
+      std::find (received.order.begin (), received.order.end (), 40);
+  ASSERT_NE (late, received.order.end ());
+  EXPECT_EQ (*(late - 1), 41u);
+  EXPECT_EQ (counter (pipeline, "frames-lost"), 7u);
+  EXPECT_EQ (sum_of (pipeline, "dmdsync/frames-lost", "count"), 7u);
+  EXPECT_EQ (counter (pipeline, "frames-late"), 1u);
+  EXPECT_EQ (sum_of (pipeline, "dmdsync/frame-late", "frame"), 40u);
+  EXPECT_EQ (counter (pipeline, "frames-duplicate"), 1u);
+  EXPECT_EQ (sum_of (pipeline, "dmdsync/frame-dropped", "frame"), 30u);
+}
+
+TEST (Gige, WithOnePercentOfThePacketsLostEveryGapIsAccountedFor)
+{
+  GigeCameraOptions options;
+  options.packet_loss = 0.01;
+  const auto camera = open_camera (options);
+  Received received;
+  CameraPipeline pipeline (
+      camera_source ("100/1", "GRAY8", "num-buffers=100") + kSync,
+      [&] (auto *buffer, auto &info) { received.take (buffer, info); });
+  pipeline.play ();
+  EXPECT_EQ (pipeline.wait_end (), "end");
+
+  EXPECT_EQ (received.order.size (), 100u);
+  EXPECT_EQ (received.wrong, 0);
+  const guint64 lost = received.order.back () + 1 - 100;
+  EXPECT_GT (lost, 0u) << "36 packets a frame";
+  EXPECT_EQ (counter (pipeline, "frames-lost"), lost);
+  EXPECT_EQ (sum_of (pipeline, "dmdsync/frames-lost", "count"), lost);
+}
+
+TEST (Gige, TwoCamerasSideBySide)
+{
+  const auto first = open_camera ({});
+  GigeCameraOptions options;
+  options.address = "127.0.0.2";
+  options.serial = "CE02";
+  const auto second = open_camera (
+      options, [] (std::uint64_t frame, ImageView<std::uint16_t> picture) {
+        for (int y = 0; y < picture.height; y++)
+          for (int x = 0; x < picture.width; x++)
+            picture.at (x, y) = scene_pixel (frame + 1000, x, y) & 255;
+        return true;
+      });
+  Received of_first;
+  std::uint64_t of_second = 1000;
+  int wrong = 0;
+  CameraPipeline one (camera_source ("50/1", "GRAY8", "num-buffers=50") + kSync,
+      [&] (auto *buffer, auto &info) { of_first.take (buffer, info); });
+  std::string line = camera_source ("50/1", "GRAY8", "num-buffers=50");
+  line.replace (line.find ("127.0.0.1"), 9, "127.0.0.2");
+  CameraPipeline other (line, [&] (auto *buffer, auto &info) {
+    wrong += wrong_pixels<std::uint8_t> (buffer, info, of_second++, 255) != 0;
+  });
+  one.play ();
+  other.play ();
+  EXPECT_EQ (one.wait_end (), "end");
+  EXPECT_EQ (other.wait_end (), "end");
+  EXPECT_EQ (of_first.frames.size (), 50u);
+  EXPECT_EQ (of_first.wrong, 0);
+  EXPECT_EQ (of_second, 1050u);
+  EXPECT_EQ (wrong, 0);
+}
+
+TEST (Gige, AnAddressThatIsNotHereIsAnError)
+{
+  GigeCameraOptions options;
+  options.address = "192.0.2.1";
+  const auto camera = GigeCamera::open (
+      options, [] (std::uint64_t, ImageView<std::uint16_t>) { return true; });
+  ASSERT_FALSE (camera.ok ());
+  EXPECT_NE (camera.error ().message.find ("'192.0.2.1'"), std::string::npos);
+}
+
+} // namespace
+
+int
+main (int argc, char **argv)
+{
+  const bool alone = enter_own_network ();
+  gst_init (&argc, &argv);
+  ::testing::InitGoogleTest (&argc, argv);
+  if (!alone) {
+    std::puts ("a network of its own is not allowed here: skipped");
+    return 77;
+  }
+  const int result = RUN_ALL_TESTS ();
+  gst_deinit ();
+  return result;
+}

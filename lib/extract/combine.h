@@ -90,16 +90,16 @@ T
 difference_any (const Block<T> &block, const Layout<T> &layout,
     const DifferenceInRegisters<T> &work, const Planes<T> &to)
 {
-  const auto strip = split_kernels<T> (block.width).strip;
+  const auto strip = split_strip_of<T> (block.width);
   Wires<T> places (layout.n), elements (layout.n);
   T *order[256];
   Vector<T> most = {};
   for (int j = 0; j < block.rows; j++) {
-    const std::uint8_t *place =
-        layout.place + (j + layout.row) % layout.rows * layout.n;
+    const std::uint8_t *element =
+        layout.element + (j + layout.row) % layout.rows * layout.n;
     if (layout.repeat == 1)
-      for (int e = 0; e < layout.n; e++)
-        order[place[e]] = elements.rows[e];
+      for (int p = 0; p < layout.n; p++)
+        order[p] = elements.rows[element[p]];
     const std::ptrdiff_t row = j * to.stride / std::ptrdiff_t (sizeof (T));
     for_strips<T> (block.cells, to.rows[0] + row, to.stream,
         [&] (int at, auto put) CEXP_INLINE_BODY {
@@ -121,6 +121,72 @@ difference_any (const Block<T> &block, const Layout<T> &layout,
   return largest_lane<T> (most);
 }
 
+/** The last elements of one row of all cells: the next row begins with the
+ * steps from them. */
+template <typename T>
+struct LastOfRow {
+  static constexpr int kBytes = 8 << 10;
+  alignas (64) T elements[kBytes / sizeof (T)];
+};
+
+/** Kernels::difference where every element is at the place of its own number,
+ * in the order of select_rows (). Vectors at the end of a row are worked on
+ * twice, so that what they start from is kept until the row is over. */
+template <int Width, typename T>
+T
+difference_rows (const Block<T> &block, const DifferenceInRegisters<T> &work,
+    const Planes<T> &to)
+{
+  LastOfRow<T> last[2];
+  Vector<T> most = {};
+  for (int y = 0; y < block.height; y++) {
+    const LastOfRow<T> &above = last[y & 1];
+    LastOfRow<T> &here = last[1 - (y & 1)];
+    for (int j = 0; j < block.rows; j++) {
+      const T *row = bytes_on (
+          block.pixels, (std::ptrdiff_t (j) * block.height + y) * block.stride);
+      T *const *out = to.rows + y * Width;
+      const std::ptrdiff_t line = j * to.stride;
+      for_strips<T> (block.cells, bytes_on (out[0], line), to.stream,
+          [&] (int at, auto put) CEXP_INLINE_BODY {
+            const T *from = row + at * Width;
+            prefetch (bytes_on (from, block.height * block.stride),
+                Width * kVectorBytes);
+            Vector<T> parts[Width];
+            split_cells<Width, T> (from, parts);
+            Vector<T> before = {};
+            if (y > 0)
+              before = load (above.elements + j * block.cells + at);
+#pragma GCC unroll 16
+            for (int x = 0; x < Width; x++) {
+              most = larger (most, parts[x]);
+              put (bytes_on (out[x], line) + at, work (parts[x], before));
+              before = parts[x];
+            }
+            store (here.elements + j * block.cells + at, before);
+          });
+    }
+  }
+  return largest_lane<T> (most);
+}
+
+template <typename T>
+using DifferenceRows = T (*) (
+    const Block<T> &, const DifferenceInRegisters<T> &, const Planes<T> &);
+
+/** Null where cells are too wide, or too many for what is kept of a row. */
+template <typename T, int... Width>
+DifferenceRows<T>
+difference_rows_of (const Block<T> &block, std::integer_sequence<int, Width...>)
+{
+  static constexpr DifferenceRows<T> kAll[] = {
+      difference_rows<Width + 1, T>...};
+  const bool fits =
+      std::ptrdiff_t (block.cells) * block.rows * std::ptrdiff_t (sizeof (T)) <=
+      LastOfRow<T>::kBytes;
+  return block.width <= kOwnWidths && fits ? kAll[block.width - 1] : nullptr;
+}
+
 template <typename T>
 T
 difference (const Block<T> &block, const Layout<T> &layout, int gain, T largest,
@@ -128,10 +194,14 @@ difference (const Block<T> &block, const Layout<T> &layout, int gain, T largest,
 {
   using Work = DifferenceInRegisters<T>;
   const Work work = {gain, largest, T (largest / gain)};
-  const auto own = layout.identity
-                       ? in_registers<Work, T> (block.width, block.height)
-                       : nullptr;
-  return own ? own (block, to, work) : difference_any (block, layout, work, to);
+  if (layout.identity) {
+    if (const auto own = in_registers<Work, T> (block.width, block.height))
+      return own (block, to, work);
+    if (const auto rows = difference_rows_of<T> (
+            block, std::make_integer_sequence<int, kOwnWidths> ()))
+      return rows (block, work, to);
+  }
+  return difference_any (block, layout, work, to);
 }
 
 /** The element at the centre of the cell, 4 n times as large; @p between has

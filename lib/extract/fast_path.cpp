@@ -16,7 +16,7 @@ namespace
 constexpr std::size_t kLargeFrame = std::size_t (8) << 20;
 /* As much of a frame is worked on before saturated pixels are looked for: few
  * enough to be still in the caches, enough to make calls cheap. */
-constexpr std::size_t kBand = std::size_t (32) << 10;
+constexpr std::size_t kBand = std::size_t (128) << 10;
 constexpr std::size_t kLine = 64;
 
 /**

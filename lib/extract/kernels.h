@@ -53,6 +53,9 @@ struct Layout {
   const Pixel *comb;
   /** Every element is at the place of its own number. */
   bool identity;
+  /** With repeat = 1 the other way round: at place p of row j of the block is
+   * element [(j + row) % rows * n + p]. */
+  const std::uint8_t *element;
 };
 
 /** Whole-number weights of a sample and of its neighbour. */

@@ -2,8 +2,8 @@
 /* The kernels of one instruction set, compiled once for each. */
 #include "extract/combine.h"
 #include "extract/kernels.h"
+#include "extract/select.h"
 #include "extract/sort.h"
-#include "extract/split.h"
 #include "extract/vector.h"
 
 namespace cexp::CEXP_TARGET

@@ -23,7 +23,8 @@ public:
   Layout<Pixel> from (int column, int row) const
   {
     return {places_.data (), n_, repeat_.width, repeat_.height,
-        column % repeat_.width, row % repeat_.height, comb_.data (), identity_};
+        column % repeat_.width, row % repeat_.height, comb_.data (), identity_,
+        elements_.data ()};
   }
 
 private:
@@ -31,6 +32,7 @@ private:
   Extent repeat_;
   bool identity_ = true;
   std::vector<std::uint8_t> places_;
+  std::vector<std::uint8_t> elements_; ///< as far as Layout says
   std::vector<Pixel> comb_;
 };
 

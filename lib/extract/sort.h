@@ -294,7 +294,7 @@ template <typename T>
 T
 rank_any (const Block<T> &block, const Planes<T> &to)
 {
-  const auto strip = split_kernels<T> (block.width).strip;
+  const auto strip = split_strip_of<T> (block.width);
   BlockSort<T> sort (block.width * block.height);
   Vector<T> most = {};
   for (int j = 0; j < block.rows; j++) {

@@ -298,30 +298,6 @@ split_row (const T *row, int width, int cells, T *const *out, bool streams,
   return most;
 }
 
-/** Kernels::select where elements stand at one place throughout a row. */
-template <int Width, typename T>
-T
-select_rows (
-    const Block<T> &block, const Layout<T> &layout, const Planes<T> &to)
-{
-  Vector<T> most = {};
-  T *places[256];
-  for (int j = 0; j < block.rows; j++) {
-    const std::uint8_t *place =
-        layout.place + (j + layout.row) % layout.rows * layout.n;
-    for (int e = 0; e < layout.n; e++)
-      places[place[e]] = bytes_on (to.rows[e], j * to.stride);
-    for (int y = 0; y < block.height; y++) {
-      const T *row = bytes_on (
-          block.pixels, (std::ptrdiff_t (j) * block.height + y) * block.stride);
-      most = larger (most, split_row<Width, T> (row, block.width, block.cells,
-                               places + y * block.width, to.stream,
-                               block.height * block.stride));
-    }
-  }
-  return largest_lane<T> (most);
-}
-
 /** One vector of cells, all places of the cell: places[p] takes the pixels. */
 template <int Width, typename T>
 Vector<T>
@@ -340,28 +316,26 @@ split_strip (const Block<T> &block, int j, int at, T *const *places)
   return most;
 }
 
-/** What exists once for each width of a cell, and for any. */
+/** Width 0 stands for any. */
+using OwnWidths = std::make_integer_sequence<int, kOwnWidths + 1>;
+
 template <typename T>
-struct SplitKernels {
-  T (*select) (const Block<T> &, const Layout<T> &, const Planes<T> &);
-  Vector<T> (*strip) (const Block<T> &, int j, int at, T *const *places);
-};
+using SplitStrip = Vector<T> (*) (
+    const Block<T> &, int j, int at, T *const *places);
 
 template <typename T, int... Width>
-const SplitKernels<T> &
-split_kernels (int width, std::integer_sequence<int, Width...>)
+SplitStrip<T>
+split_strip_of (int width, std::integer_sequence<int, Width...>)
 {
-  static constexpr SplitKernels<T> kAll[] = {
-      {select_rows<Width, T>, split_strip<Width, T>}...};
+  static constexpr SplitStrip<T> kAll[] = {split_strip<Width, T>...};
   return kAll[width <= kOwnWidths ? width : 0];
 }
 
 template <typename T>
-const SplitKernels<T> &
-split_kernels (int width)
+SplitStrip<T>
+split_strip_of (int width)
 {
-  return split_kernels<T> (
-      width, std::make_integer_sequence<int, kOwnWidths + 1> ());
+  return split_strip_of<T> (width, OwnWidths ());
 }
 
 /** Brings one vector of all places into the order of the elements where that
@@ -398,33 +372,5 @@ struct Wires {
       rows[w] = lanes + w * kLanes<T>;
   }
 };
-
-/** Kernels::select where the places of elements differ from cell to cell. */
-template <typename T>
-T
-select_relabelled (
-    const Block<T> &block, const Layout<T> &layout, const Planes<T> &to)
-{
-  const auto strip = split_kernels<T> (block.width).strip;
-  Wires<T> wires (layout.n);
-  Vector<T> most = {};
-  for (int j = 0; j < block.rows; j++)
-    for_strips<T> (block.cells, bytes_on (to.rows[0], j * to.stride), to.stream,
-        [&] (int at, auto put) CEXP_INLINE_BODY {
-          most = larger (most, strip (block, j, at, wires.rows));
-          relabel_strip (layout, j, at, wires.rows, to.rows,
-              at + j * to.stride / std::ptrdiff_t (sizeof (T)), put);
-        });
-  return largest_lane<T> (most);
-}
-
-template <typename T>
-T
-select (const Block<T> &block, const Layout<T> &layout, const Planes<T> &to)
-{
-  return layout.repeat > 1
-             ? select_relabelled (block, layout, to)
-             : split_kernels<T> (block.width).select (block, layout, to);
-}
 
 } // namespace cexp::CEXP_TARGET

@@ -190,7 +190,9 @@ TYPED_TEST (Kernels, EqualTheReferenceOnEveryTileAndMethod)
       {"staircase:4x4",
           {.method = Method::kDecode, .gain = 7.0, .interpolate = false}},
       {"staircase:3x2", {.method = Method::kDecode, .gain = 1.7}},
+      {"staircase:9x9", {.method = Method::kDecode, .interpolate = false}},
       {"staircase:16x16", {.method = Method::kDecode, .interpolate = false}},
+      {"staircase:17x3", {.method = Method::kDecode, .interpolate = false}},
       {"staircase:lattice:8/3", {.method = Method::kDecode}},
       {"staircase:2x2,leak=0.01", {.method = Method::kDecode}},
       {"sequential:2x2,leak=0.01", {.method = Method::kDecode}},
@@ -207,8 +209,8 @@ TYPED_TEST (Kernels, EqualTheReferenceOnEveryTileAndMethod)
   };
   for (const Case &c : cases)
     for (const Content &content : contents ())
-      for (const int columns : {17, 85})
-        expect_equal<TypeParam> (c, content, columns, 2);
+      for (const auto &[columns, rows] : {std::pair (17, 2), {85, 5}})
+        expect_equal<TypeParam> (c, content, columns, rows);
 }
 
 TYPED_TEST (Kernels, EqualTheReferenceAtEveryWidth)
@@ -219,6 +221,7 @@ TYPED_TEST (Kernels, EqualTheReferenceAtEveryWidth)
       {"sequential:lattice:8/3", {.method = Method::kSelect}},
       {"staircase:2x2", {.method = Method::kDecode}},
       {"staircase:3x3", {.method = Method::kDecode, .interpolate = false}},
+      {"staircase:5x4", {.method = Method::kDecode, .interpolate = false}},
       {"s-matrix:2x2", {.method = Method::kDecode}},
       {"staircase:3x3", {.method = Method::kRank}},
       {"staircase:5x5", {.method = Method::kRank}},

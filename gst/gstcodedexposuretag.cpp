@@ -37,11 +37,22 @@ says_schedule (std::string_view comment)
 
 } // namespace
 
+namespace
+{
+
+GstTagList *
+setup_to_tags (const StreamSetup &setup)
+{
+  const std::string comment = std::string (kPrefix) + setup.to_json ();
+  return gst_tag_list_new (GST_TAG_COMMENT, comment.c_str (), nullptr);
+}
+
+} // namespace
+
 GstTagList *
 schedule_to_tags (const Schedule &schedule)
 {
-  const std::string comment = std::string (kPrefix) + schedule.to_json ();
-  return gst_tag_list_new (GST_TAG_COMMENT, comment.c_str (), nullptr);
+  return setup_to_tags ({schedule, {}});
 }
 
 GstEvent *
@@ -50,20 +61,42 @@ schedule_to_event (const Schedule &schedule)
   return gst_event_new_tag (schedule_to_tags (schedule));
 }
 
-std::optional<Result<Schedule>>
-schedule_from_tags (const GstTagList *tags)
+GstEvent *
+setup_to_event (const StreamSetup &setup)
+{
+  return gst_event_new_tag (setup_to_tags (setup));
+}
+
+std::optional<Result<StreamSetup>>
+setup_from_tags (const GstTagList *tags)
 {
   for (const std::string &comment : comments_of (tags))
     if (says_schedule (comment))
-      return Schedule::from_json (
+      return StreamSetup::from_json (
           std::string_view (comment).substr (kPrefix.size ()));
   return std::nullopt;
+}
+
+std::optional<Result<Schedule>>
+schedule_from_tags (const GstTagList *tags)
+{
+  const auto setup = setup_from_tags (tags);
+  if (!setup)
+    return std::nullopt;
+  return *setup ? Result<Schedule> (setup->value ().schedule)
+                : Result<Schedule> (setup->error ());
 }
 
 GstTagList *
 tags_with_schedule (const GstTagList *tags, const Schedule &schedule)
 {
-  GstTagList *ours = schedule_to_tags (schedule);
+  return tags_with_setup (tags, {schedule, {}});
+}
+
+GstTagList *
+tags_with_setup (const GstTagList *tags, const StreamSetup &setup)
+{
+  GstTagList *ours = setup_to_tags (setup);
   gst_tag_list_set_scope (ours, gst_tag_list_get_scope (tags));
   for (const std::string &comment : comments_of (tags))
     if (!says_schedule (comment))

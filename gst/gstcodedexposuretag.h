@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The stream tag that carries a schedule: GST_TAG_COMMENT =
- * "coded-exposure={...}". */
+/* The stream tag that carries a schedule and, if known, a mapping:
+ * GST_TAG_COMMENT = "coded-exposure={...}". */
 #pragma once
 
 #include <optional>
@@ -9,6 +9,7 @@
 
 #include "base/result.h"
 #include "schedule/schedule.h"
+#include "schedule/stream_setup.h"
 
 namespace cexp::gst
 {
@@ -18,6 +19,11 @@ GstTagList *schedule_to_tags (const Schedule &schedule);
 /** A TAG event that says the schedule; Transfer: full. */
 GstEvent *schedule_to_event (const Schedule &schedule);
 
+/** The same with a mapping. */
+GstEvent *setup_to_event (const StreamSetup &setup);
+
+/** Schedule and mapping in @p tags; as schedule_from_tags (). */
+std::optional<Result<StreamSetup>> setup_from_tags (const GstTagList *tags);
 /** The schedule in @p tags: none where no comment speaks of one, an error
  * where one does and cannot be read. */
 std::optional<Result<Schedule>> schedule_from_tags (const GstTagList *tags);
@@ -26,5 +32,6 @@ std::optional<Result<Schedule>> schedule_from_tags (const GstTagList *tags);
  */
 GstTagList *tags_with_schedule (
     const GstTagList *tags, const Schedule &schedule);
+GstTagList *tags_with_setup (const GstTagList *tags, const StreamSetup &setup);
 
 } // namespace cexp::gst

@@ -8,6 +8,7 @@
 #include "gstcodedexposurescene.h"
 #include "gstcodedexposuresim.h"
 #include "gstdmdsync.h"
+#include "gstmoirecalib.h"
 #include "gstsubframestats.h"
 #include "gstsubframestatsreport.h"
 
@@ -21,6 +22,7 @@ plugin_init (GstPlugin *plugin)
          GST_ELEMENT_REGISTER (codedexposure_scene, plugin) &&
          GST_ELEMENT_REGISTER (codedexposure_sim, plugin) &&
          GST_ELEMENT_REGISTER (dmdsync, plugin) &&
+         GST_ELEMENT_REGISTER (moirecalib, plugin) &&
          GST_ELEMENT_REGISTER (subframestats, plugin);
 }
 

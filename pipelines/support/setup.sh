@@ -19,6 +19,7 @@ pkg-config|finds the libraries|run
 libgstreamer1.0-dev|GStreamer core and its test harness|run
 libgstreamer-plugins-base1.0-dev|GStreamer video library|run
 nlohmann-json3-dev|schedules and sidecars are JSON|run
+libcairo2-dev|letters and arrows over the picture of a calibration|run
 libusb-1.0-0-dev|DMD boards on the USB|run
 libcli11-dev|options of the command-line tool|run
 gstreamer1.0-tools|gst-launch-1.0, gst-inspect-1.0|run

@@ -9,6 +9,7 @@
 #include "gstcodedexposuremeta.h"
 #include "gstcodedexposuresim.h"
 #include "gstdmdsync.h"
+#include "gstmoirecalib.h"
 
 namespace cexp::test
 {
@@ -23,6 +24,7 @@ class LinkedElements : public ::testing::Environment
     ASSERT_TRUE (GST_ELEMENT_REGISTER (codedexposure_demux, nullptr));
     ASSERT_TRUE (GST_ELEMENT_REGISTER (codedexposure_sim, nullptr));
     ASSERT_TRUE (GST_ELEMENT_REGISTER (dmdsync, nullptr));
+    ASSERT_TRUE (GST_ELEMENT_REGISTER (moirecalib, nullptr));
   }
 };
 

@@ -72,6 +72,27 @@ public:
     return pull ();
   }
 
+  ObjectPtr<GstElement> find (const char *name)
+  {
+    return ObjectPtr<GstElement> (
+        gst_bin_get_by_name (GST_BIN (pipeline_.get ()), name));
+  }
+  /** Tags of the stream as they arrive. */
+  struct TagsUnref {
+    void operator() (GstTagList *tags) const { gst_tag_list_unref (tags); }
+  };
+  std::unique_ptr<GstTagList, TagsUnref> tags ()
+  {
+    const ObjectPtr<GstPad> pad (
+        gst_element_get_static_pad (camera_.get (), "sink"));
+    const EventPtr event (
+        gst_pad_get_sticky_event (pad.get (), GST_EVENT_TAG, 0));
+    GstTagList *tags = nullptr;
+    if (event)
+      gst_event_parse_tag (event.get (), &tags);
+    return std::unique_ptr<GstTagList, TagsUnref> (
+        tags ? gst_tag_list_ref (tags) : gst_tag_list_new_empty ());
+  }
   gboolean send_upstream (GstEvent *event)
   {
     const ObjectPtr<GstPad> pad (
@@ -117,6 +138,21 @@ public:
     const std::string text = error->message;
     g_error_free (error);
     return text;
+  }
+  /** Texts of all warnings that were said, a line each. */
+  std::string warnings ()
+  {
+    std::string all;
+    messages ("");
+    for (const MessagePtr &message : said_) {
+      if (GST_MESSAGE_TYPE (message.get ()) != GST_MESSAGE_WARNING)
+        continue;
+      GError *error = nullptr;
+      gst_message_parse_warning (message.get (), &error, nullptr);
+      all += error->message + std::string ("\n");
+      g_error_free (error);
+    }
+    return all;
   }
   guint64 counter (const char *name)
   {

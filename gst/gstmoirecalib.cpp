@@ -1,0 +1,429 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-moirecalib
+ * @title: moirecalib
+ * @short_description: Aligns the camera with the mirrors, and maps one to the
+ * other
+ *
+ * Stands behind dmdsync, asks it for gratings, and reads from their moiré where
+ * the camera stands against the mirrors (paper, Section 2.3).
+ *
+ * First it shows one grating and, over the picture, the fringes in x and y, the
+ * numbers, and how to move the stage of the camera: #moirecalib:state goes from
+ * `searching` over `coarse` and `fine` to `aligned`, where no pixel is off by
+ * more than #moirecalib:tolerance mirrors. Then, or at once with `mode=map`, it
+ * shows Gray codes and gratings, one after the other, gives the mirrors back,
+ * and finds the mapping from each pixel to its mirror. The mapping is the
+ * #moirecalib:mapping property, an element message, the file
+ * #moirecalib:location, and part of the stream tag that says the schedule; a
+ * codedexposure-demux behind it uses it from then on.
+ *
+ * Frames pass without waiting: a thread of its own solves and draws. While it
+ * is busy, frames pass with the panel that was drawn last.
+ *
+ * Where the DMD takes no masks at run time, put a grating on it by other means
+ * and name it (#moirecalib:pattern): alignment works, mapping does not.
+ *
+ * ## Messages
+ *
+ * `moirecalib/state`, `moirecalib/reading`, `moirecalib/mapping` and PROGRESS
+ * messages with the code `mapping`; see docs/formats.md.
+ *
+ * ## Example pipeline
+ *
+ * |[
+ * gst-launch-1.0 -m videotestsrc pattern=white !
+ * video/x-raw,format=GRAY8,width=768,height=576,framerate=100/1 !
+ * codedexposure-sim dmd=sim:bench rotation=0.5 scale=1.01 !
+ * dmdsync device=sim:bench,size=768x576 !
+ * moirecalib mode=map location=mapping.json report=mapping.png !
+ * videoconvert ! autovideosink
+ * ]| A simulated bench is mapped; the mapping is in mapping.json.
+ *
+ * Since: 0.1
+ */
+#include "gstcodedexposurecaps.h"
+#include "gstmoirecalibstate.h"
+
+GST_DEBUG_CATEGORY (moirecalib_debug);
+#define GST_CAT_DEFAULT moirecalib_debug
+
+using namespace cexp;
+using namespace cexp::gst;
+using moire::CalibState;
+using moire::Mode;
+using moire::Settings;
+
+struct _GstMoireCalib {
+  GstBaseTransform parent;
+  CalibState *state;
+};
+
+G_DEFINE_TYPE_WITH_CODE (GstMoireCalib, gst_moire_calib,
+    GST_TYPE_BASE_TRANSFORM,
+    GST_DEBUG_CATEGORY_INIT (
+        moirecalib_debug, "moirecalib", 0, "camera against mirrors"))
+GST_ELEMENT_REGISTER_DEFINE (
+    moirecalib, "moirecalib", GST_RANK_NONE, GST_TYPE_MOIRE_CALIB)
+
+#define GST_TYPE_MOIRE_CALIB_MODE (gst_moire_calib_mode_get_type ())
+static GType
+gst_moire_calib_mode_get_type ()
+{
+  static gsize type = 0;
+  static const GEnumValue values[] = {
+      {int (Mode::automatic), "Alignment, and the mapping once it is aligned",
+          "auto"},
+      {int (Mode::align), "Alignment only", "align"},
+      {int (Mode::map), "The mapping at once", "map"},
+      {0, nullptr, nullptr},
+  };
+  if (g_once_init_enter (&type))
+    g_once_init_leave (
+        &type, g_enum_register_static ("GstMoireCalibMode", values));
+  return type;
+}
+
+namespace
+{
+
+enum {
+  PROP_0,
+  PROP_MODE,
+  PROP_LOCATION,
+  PROP_REPORT,
+  PROP_PATTERN,
+  PROP_OVERLAY,
+  PROP_PERIOD,
+  PROP_FRAMES,
+  PROP_BITS,
+  PROP_TOLERANCE,
+  PROP_MIRROR_PITCH,
+  PROP_PIXELS_PER_MIRROR,
+  PROP_FLIP_X,
+  PROP_FLIP_Y,
+  PROP_FLIP_THETA,
+  PROP_STATE,
+  PROP_MAPPING,
+};
+
+const Settings kDefaults;
+
+constexpr auto kPlaying = GParamFlags (
+    G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
+constexpr auto kReadOnly =
+    GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS);
+
+GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE ("sink",
+    GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
+GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC,
+    GST_PAD_ALWAYS, GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
+
+std::string
+text_of (const GValue *value)
+{
+  const gchar *text = g_value_get_string (value);
+  return text ? text : "";
+}
+
+void
+set_stage_property (StageOptions &stage, guint id, const GValue *value)
+{
+  switch (id) {
+  case PROP_TOLERANCE:
+    stage.tolerance = g_value_get_double (value);
+    break;
+  case PROP_MIRROR_PITCH:
+    stage.mirror_pitch = g_value_get_double (value);
+    break;
+  case PROP_PIXELS_PER_MIRROR:
+    stage.pixels_per_mirror = g_value_get_double (value);
+    break;
+  case PROP_FLIP_X:
+    stage.flip_x = g_value_get_boolean (value);
+    break;
+  case PROP_FLIP_Y:
+    stage.flip_y = g_value_get_boolean (value);
+    break;
+  default:
+    stage.flip_theta = g_value_get_boolean (value);
+  }
+}
+
+void
+set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+{
+  const ObjectLock lock (object);
+  Settings &settings = GST_MOIRE_CALIB (object)->state->settings;
+  switch (id) {
+  case PROP_MODE:
+    settings.mode = Mode (g_value_get_enum (value));
+    break;
+  case PROP_LOCATION:
+    settings.location = text_of (value);
+    break;
+  case PROP_REPORT:
+    settings.report = text_of (value);
+    break;
+  case PROP_PATTERN:
+    settings.pattern = text_of (value);
+    if (!settings.pattern.empty () && !Pattern::parse (settings.pattern))
+      GST_WARNING_OBJECT (
+          object, "%s is no pattern", settings.pattern.c_str ());
+    break;
+  case PROP_OVERLAY:
+    settings.overlay = g_value_get_boolean (value);
+    break;
+  case PROP_PERIOD:
+    settings.period = g_value_get_int (value) / 2 * 2;
+    break;
+  case PROP_FRAMES:
+    settings.frames = g_value_get_int (value);
+    break;
+  case PROP_BITS:
+    settings.bits = g_value_get_int (value);
+    break;
+  case PROP_TOLERANCE:
+  case PROP_MIRROR_PITCH:
+  case PROP_PIXELS_PER_MIRROR:
+  case PROP_FLIP_X:
+  case PROP_FLIP_Y:
+  case PROP_FLIP_THETA:
+    set_stage_property (settings.stage, id, value);
+    break;
+  default:
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+  }
+}
+
+void
+get_stage_property (
+    const StageOptions &stage, guint id, GValue *value, GParamSpec *pspec)
+{
+  switch (id) {
+  case PROP_TOLERANCE:
+    return g_value_set_double (value, stage.tolerance);
+  case PROP_MIRROR_PITCH:
+    return g_value_set_double (value, stage.mirror_pitch);
+  case PROP_PIXELS_PER_MIRROR:
+    return g_value_set_double (value, stage.pixels_per_mirror);
+  case PROP_FLIP_X:
+    return g_value_set_boolean (value, stage.flip_x);
+  case PROP_FLIP_Y:
+    return g_value_set_boolean (value, stage.flip_y);
+  case PROP_FLIP_THETA:
+    return g_value_set_boolean (value, stage.flip_theta);
+  default:
+    g_warning ("no property %s", pspec->name);
+  }
+}
+
+void
+get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
+{
+  const ObjectLock lock (object);
+  const CalibState &st = *GST_MOIRE_CALIB (object)->state;
+  const Settings &settings = st.settings;
+  switch (id) {
+  case PROP_MODE:
+    return g_value_set_enum (value, int (settings.mode));
+  case PROP_LOCATION:
+    return g_value_set_string (value, settings.location.c_str ());
+  case PROP_REPORT:
+    return g_value_set_string (value, settings.report.c_str ());
+  case PROP_PATTERN:
+    return g_value_set_string (value, settings.pattern.c_str ());
+  case PROP_OVERLAY:
+    return g_value_set_boolean (value, settings.overlay);
+  case PROP_PERIOD:
+    return g_value_set_int (value, settings.period);
+  case PROP_FRAMES:
+    return g_value_set_int (value, settings.frames);
+  case PROP_BITS:
+    return g_value_set_int (value, settings.bits);
+  case PROP_STATE:
+    return g_value_set_string (value, moire::stage_text (st.stage));
+  case PROP_MAPPING:
+    return g_value_set_string (value, st.mapping.c_str ());
+  default:
+    get_stage_property (settings.stage, id, value, pspec);
+  }
+}
+
+void
+before_transform (GstBaseTransform *trans, GstBuffer *)
+{
+  gst_base_transform_set_passthrough (
+      trans, !moire::settings_of (GST_MOIRE_CALIB (trans)).overlay);
+}
+
+GstStateChangeReturn
+change_state (GstElement *element, GstStateChange transition)
+{
+  auto *self = GST_MOIRE_CALIB (element);
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED) {
+    moire::set_stage (self, moire::Stage::searching);
+    moire::start_worker (self);
+  }
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
+    moire::release_mirrors (self);
+    /* First, because the streaming thread may wait for it at the end. */
+    moire::stop_worker (self);
+  }
+  const GstStateChangeReturn changed =
+      GST_ELEMENT_CLASS (gst_moire_calib_parent_class)
+          ->change_state (element, transition);
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED &&
+      changed == GST_STATE_CHANGE_FAILURE)
+    moire::stop_worker (self);
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY)
+    self->state->stream = moire::Stream ();
+  return changed;
+}
+
+void
+finalize (GObject *object)
+{
+  delete GST_MOIRE_CALIB (object)->state;
+  G_OBJECT_CLASS (gst_moire_calib_parent_class)->finalize (object);
+}
+
+void
+install_text (GObjectClass *klass, guint id, const char *name, const char *nick,
+    const char *blurb, GParamFlags flags = kPlaying)
+{
+  g_object_class_install_property (
+      klass, id, g_param_spec_string (name, nick, blurb, "", flags));
+}
+
+void
+install_number (GObjectClass *klass, guint id, const char *name,
+    const char *nick, const char *blurb, int least, int most, int value)
+{
+  g_object_class_install_property (klass, id,
+      g_param_spec_int (name, nick, blurb, least, most, value, kPlaying));
+}
+
+void
+install_flag (GObjectClass *klass, guint id, const char *name, const char *nick,
+    const char *blurb, bool value)
+{
+  g_object_class_install_property (
+      klass, id, g_param_spec_boolean (name, nick, blurb, value, kPlaying));
+}
+
+void
+install_run (GObjectClass *klass)
+{
+  g_object_class_install_property (klass, PROP_MODE,
+      g_param_spec_enum ("mode", "Mode",
+          "What is to be done; a change begins it anew",
+          GST_TYPE_MOIRE_CALIB_MODE, int (kDefaults.mode), kPlaying));
+  install_text (klass, PROP_LOCATION, "location", "Location",
+      "File to write the mapping to, JSON (docs/formats.md)");
+  install_text (klass, PROP_REPORT, "report", "Report",
+      "File to write a picture of fringes, residuals and pixels to, PNG");
+  install_text (klass, PROP_PATTERN, "pattern", "Pattern",
+      "Grating that the mirrors show without being asked, such as "
+      "grating-both:4/0; empty: upstream is asked for patterns");
+  install_flag (klass, PROP_OVERLAY, "overlay", "Overlay",
+      "Lay fringes, numbers and arrows over the picture", kDefaults.overlay);
+  install_number (klass, PROP_PERIOD, "period", "Period",
+      "Period of the gratings of a mapping, mirrors, even", 4, 64,
+      kDefaults.period);
+  install_number (klass, PROP_FRAMES, "frames", "Frames",
+      "Frames of each pattern of a mapping, which are averaged", 1, 1000,
+      kDefaults.frames);
+  install_number (klass, PROP_BITS, "bits", "Bits",
+      "Significant bits of GRAY16_LE frames; 0: all", 0, 16, kDefaults.bits);
+  install_text (klass, PROP_STATE, "state", "State",
+      "searching, coarse, fine, aligned, mapping, solving, mapped or failed",
+      kReadOnly);
+  install_text (klass, PROP_MAPPING, "mapping", "Mapping",
+      "The mapping that was found last, JSON (docs/formats.md); empty before",
+      kReadOnly);
+}
+
+void
+install_stage (GObjectClass *klass)
+{
+  const StageOptions &stage = kDefaults.stage;
+  g_object_class_install_property (klass, PROP_TOLERANCE,
+      g_param_spec_double ("tolerance", "Tolerance",
+          "Largest distance of any pixel from its place at which the bench is "
+          "aligned, mirrors",
+          0.001, 10, stage.tolerance, kPlaying));
+  g_object_class_install_property (klass, PROP_MIRROR_PITCH,
+      g_param_spec_double ("mirror-pitch", "Mirror pitch",
+          "Way of the camera's stage for one mirror, micrometres: the pitch of "
+          "the mirrors times the magnification of the optics",
+          0.01, 1000, stage.mirror_pitch, kPlaying));
+  g_object_class_install_property (klass, PROP_PIXELS_PER_MIRROR,
+      g_param_spec_double ("pixels-per-mirror", "Pixels per mirror",
+          "Magnification that is wanted", 0.25, 16, stage.pixels_per_mirror,
+          kPlaying));
+  install_flag (klass, PROP_FLIP_X, "flip-x", "Flip x",
+      "The stage's x runs against the picture's", false);
+  install_flag (klass, PROP_FLIP_Y, "flip-y", "Flip y",
+      "The stage's y runs against the picture's", false);
+  install_flag (klass, PROP_FLIP_THETA, "flip-theta", "Flip theta",
+      "The stage's angle runs anticlockwise in the picture", false);
+}
+
+} // namespace
+
+namespace cexp::gst::moire
+{
+
+CalibState &
+state (GstMoireCalib *self)
+{
+  return *self->state;
+}
+
+Settings
+settings_of (GstMoireCalib *self)
+{
+  const ObjectLock lock (self);
+  return self->state->settings;
+}
+
+} // namespace cexp::gst::moire
+
+static void
+gst_moire_calib_class_init (GstMoireCalibClass *klass)
+{
+  auto *object_class = G_OBJECT_CLASS (klass);
+  auto *element_class = GST_ELEMENT_CLASS (klass);
+  auto *transform_class = GST_BASE_TRANSFORM_CLASS (klass);
+
+  object_class->set_property = set_property;
+  object_class->get_property = get_property;
+  object_class->finalize = finalize;
+  install_run (object_class);
+  install_stage (object_class);
+  gst_type_mark_as_plugin_api (
+      GST_TYPE_MOIRE_CALIB_MODE, GstPluginAPIFlags (0));
+
+  gst_element_class_set_static_metadata (element_class, "Moiré calibration",
+      "Filter/Analyzer/Video",
+      "Aligns a coded exposure camera with its mirrors, and maps one to the "
+      "other",
+      "The gst-codedexposure authors");
+  gst_element_class_add_static_pad_template (element_class, &sink_template);
+  gst_element_class_add_static_pad_template (element_class, &src_template);
+
+  element_class->change_state = GST_DEBUG_FUNCPTR (change_state);
+  transform_class->set_caps = GST_DEBUG_FUNCPTR (moire::set_caps);
+  transform_class->sink_event = GST_DEBUG_FUNCPTR (moire::sink_event);
+  transform_class->before_transform = GST_DEBUG_FUNCPTR (before_transform);
+  transform_class->transform_ip = GST_DEBUG_FUNCPTR (moire::transform_ip);
+}
+
+static void
+gst_moire_calib_init (GstMoireCalib *self)
+{
+  self->state = new CalibState;
+  gst_base_transform_set_in_place (GST_BASE_TRANSFORM (self), TRUE);
+  gst_base_transform_set_qos_enabled (GST_BASE_TRANSFORM (self), FALSE);
+}

@@ -1,0 +1,383 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* moirecalib, frame by frame: asks for patterns, hands copies to the worker,
+ * lays the panel over the picture. Nothing here waits or solves. */
+#include "gstcodedexposuremeta.h"
+#include "gstcodedexposuretag.h"
+#include "gstmoirecalibstate.h"
+
+#define GST_CAT_DEFAULT moirecalib_debug
+
+namespace cexp::gst::moire
+{
+
+namespace
+{
+
+/* Patterns are asked for again before upstream takes the mirrors back. */
+constexpr guint64 kLease = 250, kRenewal = 100;
+/* Frames that may wait for the worker; a pattern stays until they have room. */
+constexpr std::size_t kMostSamples = 32;
+/* Readings in a row that make an alignment: one second at 25 a second. */
+constexpr int kSteady = 25;
+
+GstBaseTransformClass *
+base_class ()
+{
+  return GST_BASE_TRANSFORM_CLASS (g_type_class_peek (GST_TYPE_BASE_TRANSFORM));
+}
+
+gboolean
+send_request (GstMoireCalib *self, const std::string &pattern)
+{
+  return gst_pad_push_event (GST_BASE_TRANSFORM_SINK_PAD (self),
+      gst_event_new_custom (GST_EVENT_CUSTOM_UPSTREAM,
+          gst_structure_new ("dmdsync/pattern", "pattern", G_TYPE_STRING,
+              pattern.c_str (), "frames", G_TYPE_UINT64, kLease, nullptr)));
+}
+
+/** Says that there are no patterns to be had, and @p why; false. */
+bool
+refuse (GstMoireCalib *self, const std::string &why)
+{
+  GST_ELEMENT_ERROR (self, RESOURCE, NOT_FOUND,
+      ("Nobody upstream shows patterns. Put a dmdsync with a device that takes "
+       "masks at run time before moirecalib, or show a grating by other means "
+       "and say which: pattern=%s.",
+          live_grating ().text ().c_str ()),
+      ("%s", why.c_str ()));
+  return false;
+}
+
+/** Asks upstream for @p pattern; false, with an error, when it cannot be had.
+ */
+bool
+ask (GstMoireCalib *self, const std::string &pattern)
+{
+  Stream &stream = state (self).stream;
+  stream.asked = pattern;
+  stream.frames = 0;
+  return !settings_of (self).pattern.empty () || send_request (self, pattern) ||
+         refuse (self, "the request for " + pattern + " was refused");
+}
+
+/** Upstream has taken the mirrors back by itself. */
+void
+begin_anew (GstMoireCalib *self)
+{
+  Stream &stream = state (self).stream;
+  stream.begun = false;
+  stream.asked.clear ();
+}
+
+/** What dmdsync says of its mirrors. */
+struct Mirrors {
+  Extent size;
+  gboolean patterns = FALSE; ///< can be asked for
+  std::string reason;        ///< why not
+};
+Mirrors
+ask_mirrors (GstMoireCalib *self)
+{
+  const QueryPtr query (gst_query_new_custom (
+      GST_QUERY_CUSTOM, gst_structure_new_empty ("dmdsync/mirrors")));
+  if (!gst_pad_peer_query (GST_BASE_TRANSFORM_SINK_PAD (self), query.get ()))
+    return {.size = {}, .reason = "no element upstream knows of mirrors"};
+  const GstStructure *answer = gst_query_get_structure (query.get ());
+  Mirrors mirrors;
+  gst_structure_get (answer, "width", G_TYPE_INT, &mirrors.size.width, "height",
+      G_TYPE_INT, &mirrors.size.height, "patterns", G_TYPE_BOOLEAN,
+      &mirrors.patterns, nullptr);
+  if (const gchar *reason = gst_structure_get_string (answer, "reason"))
+    mirrors.reason = reason;
+  return mirrors;
+}
+
+std::string
+live_pattern (const Settings &settings)
+{
+  return settings.pattern.empty () ? live_grating ().text () : settings.pattern;
+}
+
+bool
+begin_mapping (GstMoireCalib *self)
+{
+  CalibState &st = state (self);
+  std::string first;
+  std::size_t count = 0;
+  {
+    const std::lock_guard guard (st.exchange.lock);
+    first = st.exchange.geometry->patterns.front ().text ();
+    count = st.exchange.geometry->patterns.size ();
+    st.exchange.live.reset ();
+    st.exchange.stage = Stage::mapping;
+  }
+  st.stream.mapping = true;
+  st.stream.next = 0;
+  st.stream.taken = 0;
+  set_stage (self, Stage::mapping);
+  say_progress (self, GST_PROGRESS_TYPE_START,
+      "mapping with " + std::to_string (count) + " patterns");
+  return ask (self, first);
+}
+
+bool
+begin (GstMoireCalib *self, const Settings &settings)
+{
+  CalibState &st = state (self);
+  Stream &stream = st.stream;
+  const Mirrors mirrors = ask_mirrors (self);
+  if (settings.pattern.empty () && !mirrors.patterns)
+    return refuse (self, mirrors.reason);
+  Geometry geometry;
+  geometry.info = *stream.info;
+  geometry.camera = {stream.info->width, stream.info->height};
+  geometry.mirrors = mirrors.size.width > 0 && mirrors.size.height > 0
+                         ? mirrors.size
+                         : geometry.camera;
+  geometry.patterns = calibration_patterns (geometry.mirrors, settings.period);
+  {
+    const std::lock_guard guard (st.exchange.lock);
+    st.exchange.geometry = std::move (geometry);
+    st.exchange.run++;
+    st.exchange.live.reset ();
+    st.exchange.samples.clear ();
+    st.exchange.solve = false;
+    st.exchange.stage = Stage::searching;
+    st.exchange.readings = 0;
+    st.exchange.aligned_readings = 0;
+  }
+  stream.begun = true;
+  stream.mode = settings.mode;
+  stream.mapping = false;
+  set_stage (self, Stage::searching);
+  return ask (self, live_pattern (settings));
+}
+
+Sample
+copy_of (GstBuffer *buffer, const std::string &pattern, guint64 number)
+{
+  return {BufferPtr (gst_buffer_copy_deep (buffer)), pattern, number,
+      GST_BUFFER_PTS (buffer)};
+}
+
+/** A frame of the live grating: for the worker, if that has nothing to do. */
+bool
+align (GstMoireCalib *self, const Settings &settings, GstBuffer *buffer,
+    const std::string &shown, guint64 number)
+{
+  CalibState &st = state (self);
+  Stream &stream = st.stream;
+  bool enough = false;
+  if (shown == stream.asked) {
+    const std::lock_guard guard (st.exchange.lock);
+    if (!st.exchange.busy && !st.exchange.live) {
+      st.exchange.live = copy_of (buffer, shown, number);
+      st.exchange.changed.notify_all ();
+    }
+    /* One look at the fringes, for the report. */
+    enough = settings.mode == Mode::map
+                 ? st.exchange.readings > 0
+                 : settings.mode == Mode::automatic &&
+                       st.exchange.aligned_readings >= kSteady;
+  }
+  if (enough && settings.pattern.empty ())
+    return begin_mapping (self);
+  if (++stream.frames >= kRenewal)
+    return ask (self, stream.asked);
+  return true;
+}
+
+/** A frame of a calibration pattern. */
+bool
+map (GstMoireCalib *self, const Settings &settings, GstBuffer *buffer,
+    const std::string &shown, guint64 number)
+{
+  CalibState &st = state (self);
+  Stream &stream = st.stream;
+  if (stream.asked.empty ())
+    return true;
+  if (shown != stream.asked)
+    return ++stream.frames < kRenewal || ask (self, stream.asked);
+
+  std::string following;
+  {
+    const std::lock_guard guard (st.exchange.lock);
+    if (st.exchange.samples.size () >= kMostSamples)
+      return true;
+    st.exchange.samples.push_back (copy_of (buffer, shown, number));
+    if (++stream.taken >= settings.frames) {
+      stream.taken = 0;
+      const auto &patterns = st.exchange.geometry->patterns;
+      if (++stream.next < patterns.size ())
+        following = patterns[stream.next].text ();
+      else
+        st.exchange.solve = true;
+    }
+    st.exchange.changed.notify_all ();
+  }
+  if (stream.taken > 0)
+    return true;
+  if (!following.empty ())
+    return ask (self, following);
+  stream.asked.clear ();
+  release_mirrors (self);
+  return true;
+}
+
+void
+overlay (GstMoireCalib *self, GstBuffer *buffer)
+{
+  CalibState &st = state (self);
+  std::shared_ptr<const Panel> panel;
+  {
+    const std::lock_guard guard (st.exchange.lock);
+    panel = st.exchange.panel;
+  }
+  const GstVideoInfo &info = *st.stream.info;
+  if (!panel || panel->grey.width () != info.width ||
+      panel->grey.height () != info.height)
+    return;
+  MappedFrame mapped (info, buffer, GstMapFlags (GST_MAP_READWRITE));
+  if (!mapped)
+    return;
+  if (GST_VIDEO_INFO_FORMAT (&info) == GST_VIDEO_FORMAT_GRAY8)
+    lay_over (*panel, view_of<guint8> (mapped));
+  else
+    lay_over (*panel, view_of<guint16> (mapped));
+}
+
+/** Tells downstream of the mapping, in the tag that says the schedule. */
+void
+push_mapping (GstMoireCalib *self)
+{
+  CalibState &st = state (self);
+  std::optional<Mapping> mapping;
+  {
+    const std::lock_guard guard (st.exchange.lock);
+    if (!std::exchange (st.exchange.mapping_due, false))
+      return;
+    mapping = st.exchange.mapping;
+  }
+  if (!st.stream.setup) {
+    GST_INFO_OBJECT (self, "no schedule to send the mapping with");
+    return;
+  }
+  st.stream.setup->mapping = *mapping;
+  gst_pad_push_event (
+      GST_BASE_TRANSFORM_SRC_PAD (self), setup_to_event (*st.stream.setup));
+}
+
+/** Reads what a tag says, and adds the mapping that was found here. */
+GstEvent *
+take_tag (GstMoireCalib *self, GstEvent *event)
+{
+  CalibState &st = state (self);
+  GstTagList *tags = nullptr;
+  gst_event_parse_tag (event, &tags);
+  const auto said = setup_from_tags (tags);
+  if (!said || !*said)
+    return event;
+  st.stream.setup = said->value ();
+  {
+    const std::lock_guard guard (st.exchange.lock);
+    if (!st.exchange.mapping)
+      return event;
+    st.stream.setup->mapping = st.exchange.mapping;
+  }
+  GstEvent *ours = gst_event_new_tag (tags_with_setup (tags, *st.stream.setup));
+  gst_event_set_seqnum (ours, gst_event_get_seqnum (event));
+  gst_event_unref (event);
+  return ours;
+}
+
+/** At the end of the stream: what was begun is brought to its end. */
+void
+finish (GstMoireCalib *self)
+{
+  CalibState &st = state (self);
+  Exchange &exchange = st.exchange;
+  std::size_t patterns = 0;
+  {
+    std::unique_lock guard (exchange.lock);
+    exchange.changed.wait (guard, [&exchange] {
+      return exchange.quit ||
+             (!exchange.busy && !exchange.solve && exchange.samples.empty ());
+    });
+    if (exchange.geometry)
+      patterns = exchange.geometry->patterns.size ();
+  }
+  push_mapping (self);
+  if (st.stream.mapping && st.stream.next < patterns)
+    GST_ELEMENT_WARNING (self, STREAM, FAILED,
+        ("The stream ended after %d of %d patterns: there is no mapping.",
+            int (st.stream.next), int (patterns)),
+        (nullptr));
+}
+
+} // namespace
+
+void
+release_mirrors (GstMoireCalib *self)
+{
+  if (settings_of (self).pattern.empty ())
+    send_request (self, "");
+}
+
+GstFlowReturn
+transform_ip (GstBaseTransform *trans, GstBuffer *buffer)
+{
+  auto *self = GST_MOIRE_CALIB (trans);
+  Stream &stream = state (self).stream;
+  const Settings settings = settings_of (self);
+  if (!stream.info)
+    return GST_FLOW_NOT_NEGOTIATED;
+  if ((!stream.begun || stream.mode != settings.mode) &&
+      !begin (self, settings))
+    return GST_FLOW_ERROR;
+
+  const FrameMeta meta = get_frame_meta (buffer).value_or (FrameMeta ());
+  const std::string shown =
+      settings.pattern.empty () ? meta.pattern : settings.pattern;
+  const bool went_on = (stream.mapping ? map : align) (
+      self, settings, buffer, shown, meta.frame);
+  if (!went_on)
+    return GST_FLOW_ERROR;
+  push_mapping (self);
+  if (settings.overlay && gst_buffer_is_writable (buffer))
+    overlay (self, buffer);
+  return GST_FLOW_OK;
+}
+
+gboolean
+set_caps (GstBaseTransform *trans, GstCaps *incaps, GstCaps *)
+{
+  auto *self = GST_MOIRE_CALIB (trans);
+  GstVideoInfo info;
+  if (!gst_video_info_from_caps (&info, incaps))
+    return FALSE;
+  begin_anew (self);
+  state (self).stream.info = info;
+  return TRUE;
+}
+
+gboolean
+sink_event (GstBaseTransform *trans, GstEvent *event)
+{
+  auto *self = GST_MOIRE_CALIB (trans);
+  switch (GST_EVENT_TYPE (event)) {
+  case GST_EVENT_TAG:
+    event = take_tag (self, event);
+    break;
+  case GST_EVENT_FLUSH_STOP:
+    begin_anew (self);
+    break;
+  case GST_EVENT_EOS:
+    finish (self);
+    break;
+  default:
+    break;
+  }
+  return base_class ()->sink_event (trans, event);
+}
+
+} // namespace cexp::gst::moire

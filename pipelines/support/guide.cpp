@@ -1,0 +1,324 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* codedexposure-guide: runs a pipeline with a moirecalib, and tells a person at
+ * the terminal what to turn, how far it is, and what came out. */
+#include <cmath>
+#include <cstdio>
+#include <string>
+#include <string_view>
+
+#include <unistd.h>
+
+#include <glib-unix.h>
+#include <gst/gst.h>
+
+#include "gstraii.h"
+#include "report.h"
+
+namespace
+{
+
+using namespace cexp::gst;
+using namespace report;
+
+enum ExitCode { kDone = 0, kFailed = 1, kUsage = 2 };
+
+/* Readings between two turns of the simulated stage: those that were taken
+ * before the last turn have passed by then. */
+constexpr int kHandsOff = 8;
+/* Part of the way that a hand gets right at once. */
+constexpr double kHandsSkill = 0.9;
+
+double
+number_of (const GstStructure *structure, const char *field)
+{
+  double value = 0.0;
+  gst_structure_get_double (structure, field, &value);
+  return value;
+}
+
+std::string
+text_of (const GstStructure *structure, const char *field)
+{
+  const gchar *text = gst_structure_get_string (structure, field);
+  return text ? text : "";
+}
+
+class Guide
+{
+public:
+  Guide (const char *what, const char *stage)
+      : status_ (what ? what : "guide"), stage_name_ (stage ? stage : ""),
+        loop_ (g_main_loop_new (nullptr, FALSE))
+  {
+  }
+  ~Guide ()
+  {
+    if (pipeline_) {
+      gst_element_set_state (pipeline_.get (), GST_STATE_NULL);
+      const ObjectPtr<GstBus> bus (gst_element_get_bus (pipeline_.get ()));
+      gst_bus_remove_watch (bus.get ());
+    }
+    g_main_loop_unref (loop_);
+  }
+  Guide (const Guide &) = delete;
+  Guide &operator= (const Guide &) = delete;
+
+  bool parse (const char *description);
+  int run ();
+
+private:
+  static gboolean on_bus (GstBus *, GstMessage *message, gpointer self)
+  {
+    static_cast<Guide *> (self)->on_message (message);
+    return G_SOURCE_CONTINUE;
+  }
+  static gboolean on_signal (gpointer self)
+  {
+    auto *guide = static_cast<Guide *> (self);
+    guide->status_.line ("stopped; the mirrors are given back");
+    guide->quit (kFailed);
+    return G_SOURCE_CONTINUE;
+  }
+  static gboolean on_key (gint, GIOCondition, gpointer self)
+  {
+    return static_cast<Guide *> (self)->take_key ();
+  }
+
+  gboolean take_key ();
+  void on_message (GstMessage *message);
+  void on_element (const GstStructure *structure);
+  void on_state (const std::string &state);
+  void on_reading (const GstStructure *reading);
+  void on_mapping (const GstStructure *mapping);
+  void turn_stage (const GstStructure *reading);
+  void quit (int code)
+  {
+    code_ = code;
+    g_main_loop_quit (loop_);
+  }
+
+  Status status_;
+  std::string stage_name_;
+  GMainLoop *loop_;
+  ObjectPtr<GstElement> pipeline_, calib_, stage_;
+  int readings_ = 0;
+  bool mapped_ = false;
+  int code_ = kDone;
+};
+
+bool
+Guide::parse (const char *description)
+{
+  GError *error = nullptr;
+  GstElement *parsed = gst_parse_launch_full (
+      description, nullptr, GST_PARSE_FLAG_FATAL_ERRORS, &error);
+  if (!parsed) {
+    status_.line (format ("the pipeline is wrong: %s", error->message));
+    g_clear_error (&error);
+    return false;
+  }
+  pipeline_.reset (GST_ELEMENT (gst_object_ref_sink (parsed)));
+  calib_.reset (gst_bin_get_by_name (GST_BIN (parsed), "calib"));
+  if (!stage_name_.empty ())
+    stage_.reset (gst_bin_get_by_name (GST_BIN (parsed), stage_name_.c_str ()));
+  return true;
+}
+
+/* Enter: the person wants the mapping as the bench stands. */
+gboolean
+Guide::take_key ()
+{
+  char keys[64];
+  if (read (STDIN_FILENO, keys, sizeof keys) <= 0)
+    return G_SOURCE_REMOVE;
+  if (calib_ && !mapped_) {
+    status_.line ("mapping the bench as it stands");
+    gst_util_set_object_arg (G_OBJECT (calib_.get ()), "mode", "map");
+  }
+  return G_SOURCE_CONTINUE;
+}
+
+void
+Guide::on_state (const std::string &state)
+{
+  if (state == "searching")
+    status_.line ("looking for the grating: focus, and put the camera roughly "
+                  "before the mirrors");
+  else if (state == "coarse")
+    status_.line ("coarse: turn the stage as the arrows say, the angle first; "
+                  "Enter maps the bench as it stands");
+  else if (state == "fine")
+    status_.line ("fine: every pixel is within one mirror; go on");
+  else if (state == "aligned")
+    status_.line ("aligned: hands off");
+  else if (state == "mapping")
+    status_.line ("showing patterns; touch nothing");
+  else if (state == "solving")
+    status_.line ("solving; the mirrors show the schedule again");
+}
+
+std::string
+arrow (double way, const char *forth, const char *back)
+{
+  return way >= 0 ? forth : back;
+}
+
+void
+Guide::on_reading (const GstStructure *reading)
+{
+  const double x = number_of (reading, "stage-x");
+  const double y = number_of (reading, "stage-y");
+  const double theta = number_of (reading, "stage-theta");
+  const double magnify = number_of (reading, "magnify");
+  status_.progress (format (
+      "%s  %s %+.2f um  %s %+.2f um  %s %+.1f mdeg  magnify %+.2f per mille  "
+      "(worst corner %.3f mirrors)",
+      text_of (reading, "state").c_str (), arrow (x, "→", "←").c_str (), x,
+      arrow (y, "↓", "↑").c_str (), y, arrow (theta, "↻", "↺").c_str (), theta,
+      magnify, number_of (reading, "deviation")));
+  if (stage_ && ++readings_ % kHandsOff == 0)
+    turn_stage (reading);
+}
+
+/* Turns the bench in software as a person turns a stage. */
+void
+Guide::turn_stage (const GstStructure *reading)
+{
+  if (text_of (reading, "state") == "aligned")
+    return;
+  GObject *stage = G_OBJECT (stage_.get ());
+  double x = 0, y = 0, rotation = 0, scale = 1;
+  g_object_get (stage, "shift-x", &x, "shift-y", &y, "rotation", &rotation,
+      "scale", &scale, nullptr);
+  const double magnify = number_of (reading, "magnify") / 1000.0;
+  g_object_set (stage, "shift-x",
+      x - kHandsSkill * number_of (reading, "offset-x"), "shift-y",
+      y - kHandsSkill * number_of (reading, "offset-y"), "rotation",
+      rotation - kHandsSkill * number_of (reading, "rotation"), "scale",
+      scale * (1.0 + kHandsSkill * magnify), nullptr);
+}
+
+void
+Guide::on_mapping (const GstStructure *mapping)
+{
+  mapped_ = true;
+  guint64 good = 0, uncovered = 0, saturated = 0;
+  gst_structure_get (mapping, "good", G_TYPE_UINT64, &good, "uncovered",
+      G_TYPE_UINT64, &uncovered, "saturated", G_TYPE_UINT64, &saturated,
+      nullptr);
+  status_.line (format ("mapped: rotation %+.5f ± %.5f deg, magnification "
+                        "%.6f ± %.6f, offset %+.5f, %+.5f ± %.5f mirrors",
+      number_of (mapping, "rotation"), number_of (mapping, "sigma-rotation"),
+      number_of (mapping, "magnification"),
+      number_of (mapping, "sigma-magnification"),
+      number_of (mapping, "offset-x"), number_of (mapping, "offset-y"),
+      number_of (mapping, "sigma-x")));
+  status_.line (format ("pixels: %" G_GUINT64_FORMAT " good, %" G_GUINT64_FORMAT
+                        " see no mirror, %" G_GUINT64_FORMAT " saturated",
+      good, uncovered, saturated));
+  for (const char *file : {"location", "report"})
+    if (const std::string path = text_of (mapping, file); !path.empty ())
+      status_.line ("wrote " + path);
+  gst_element_send_event (pipeline_.get (), gst_event_new_eos ());
+}
+
+void
+Guide::on_element (const GstStructure *structure)
+{
+  const std::string_view name = gst_structure_get_name (structure);
+  if (name == "moirecalib/state")
+    on_state (text_of (structure, "state"));
+  else if (name == "moirecalib/reading")
+    on_reading (structure);
+  else if (name == "moirecalib/mapping")
+    on_mapping (structure);
+}
+
+void
+Guide::on_message (GstMessage *message)
+{
+  GError *error = nullptr;
+  gchar *text = nullptr;
+  switch (GST_MESSAGE_TYPE (message)) {
+  case GST_MESSAGE_EOS:
+    quit (mapped_ ? kDone : kFailed);
+    return;
+  case GST_MESSAGE_ERROR:
+    gst_message_parse_error (message, &error, &text);
+    status_.line ("error: " + told (message, error, text));
+    quit (mapped_ ? kDone : kFailed);
+    break;
+  case GST_MESSAGE_WARNING:
+    gst_message_parse_warning (message, &error, &text);
+    status_.line ("warning: " + told (message, error, text));
+    break;
+  case GST_MESSAGE_PROGRESS:
+    gst_message_parse_progress (message, nullptr, nullptr, &text);
+    status_.progress (text ? text : "");
+    break;
+  case GST_MESSAGE_LATENCY:
+    gst_bin_recalculate_latency (GST_BIN (pipeline_.get ()));
+    break;
+  case GST_MESSAGE_ELEMENT:
+    on_element (gst_message_get_structure (message));
+    break;
+  default:
+    break;
+  }
+  g_clear_error (&error);
+  g_free (text);
+}
+
+int
+Guide::run ()
+{
+  const ObjectPtr<GstBus> bus (gst_element_get_bus (pipeline_.get ()));
+  gst_bus_add_watch (bus.get (), on_bus, this);
+  const guint sources[] = {g_unix_signal_add (SIGINT, on_signal, this),
+      g_unix_signal_add (SIGTERM, on_signal, this)};
+  if (isatty (STDIN_FILENO))
+    g_unix_fd_add (STDIN_FILENO, G_IO_IN, on_key, this);
+  gst_element_set_state (pipeline_.get (), GST_STATE_PLAYING);
+  g_main_loop_run (loop_);
+  for (const guint source : sources)
+    g_source_remove (source);
+  return code_;
+}
+
+} // namespace
+
+int
+main (int argc, char **argv)
+{
+  gchar *what = nullptr, *stage = nullptr;
+  const GOptionEntry entries[] = {
+      {"what", 0, 0, G_OPTION_ARG_STRING, &what, "Word in front of every line",
+          "WORD"},
+      {"stage", 0, 0, G_OPTION_ARG_STRING, &stage,
+          "codedexposure-sim to turn as a person would", "NAME"},
+      {},
+  };
+  GOptionContext *context = g_option_context_new ("PIPELINE");
+  g_option_context_add_main_entries (context, entries, nullptr);
+  g_option_context_add_group (context, gst_init_get_option_group ());
+  GError *error = nullptr;
+  const bool parsed = g_option_context_parse (context, &argc, &argv, &error);
+  g_option_context_free (context);
+  if (!parsed || argc != 2) {
+    std::fprintf (stderr, "codedexposure-guide: %s\n",
+        error ? error->message : "one PIPELINE is needed");
+    g_clear_error (&error);
+    return kUsage;
+  }
+
+  int code = kFailed;
+  {
+    Guide guide (what, stage);
+    if (guide.parse (argv[1]))
+      code = guide.run ();
+  }
+  g_free (what);
+  g_free (stage);
+  gst_deinit ();
+  return code;
+}

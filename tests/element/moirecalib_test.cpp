@@ -1,0 +1,271 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* moirecalib behind a simulated bench: readings, states, the mapping and where
+ * it goes; and what it says where there is nobody to show patterns. */
+#include <filesystem>
+
+#include "gstcodedexposuretag.h"
+#include "moire/gratings.h"
+#include "optics/lens.h"
+#include "sync_bench.h"
+
+namespace
+{
+
+using namespace cexp;
+using namespace cexp::test;
+
+const auto *const linked =
+    ::testing::AddGlobalTestEnvironment (new LinkedElements);
+
+/** Frames are exposed as fast as they can be, and threads may have to wait for
+ * their turn meanwhile. */
+constexpr int kPatience = 30'000;
+
+void
+white (std::int64_t, ImageView<std::uint8_t> out)
+{
+  for (int y = 0; y < out.height; y++)
+    std::fill_n (out.row (y), out.width, std::uint8_t (200));
+}
+
+double
+double_field (const MessagePtr &message, const char *name)
+{
+  double value = NAN;
+  EXPECT_TRUE (gst_structure_get_double (
+      gst_message_get_structure (message.get ()), name, &value))
+      << name;
+  return value;
+}
+
+constexpr Alignment kStand{
+    .shift_x = 0.4, .shift_y = -0.3, .rotation = 0.5, .scale = 1.01};
+constexpr const char *kOptics =
+    "full-well=10000 read-noise=5 psf-sigma=0.5 seed=3 shift-x=0.4 "
+    "shift-y=-0.3 rotation=0.5 scale=1.01 ";
+
+class MoireCalibTest : public ::testing::Test
+{
+protected:
+  void begin (const std::string &settings)
+  {
+    bench.emplace ("sequential:2x2",
+        "codedexposure-sim name=bench dmd=sim:calib " + std::string (kOptics) +
+            "! dmdsync name=sync device=sim:calib,size=" +
+            std::to_string (kWidth) + "x" + std::to_string (kHeight) +
+            " ! moirecalib name=calib " + settings);
+    calib = bench->find ("calib");
+  }
+  /** Exposes until there is a message of that name; the last of them. */
+  MessagePtr wait_for (const char *name, const std::string &state = "")
+  {
+    for (int i = 0; i < kPatience; i++) {
+      last = bench->next (white);
+      auto said = bench->messages (name);
+      if (!said.empty () &&
+          (state.empty () || string_field (said.back (), "state") == state))
+        return std::move (said.back ());
+    }
+    ADD_FAILURE () << name << " never came";
+    return nullptr;
+  }
+
+  std::optional<Bench> bench;
+  ObjectPtr<GstElement> calib;
+  BufferPtr last;
+};
+
+double
+worst_error (const Mapping &mapping)
+{
+  const Affine truth = camera_to_mirrors (kStand, kWidth, kHeight);
+  double worst = 0.0;
+  for (const double x : {0.0, kWidth - 1.0})
+    for (const double y : {0.0, kHeight - 1.0}) {
+      const Position found = mapping.mirror_at (x, y);
+      worst = std::max (
+          worst, std::hypot (found.x - (truth.xx * x + truth.xy * y + truth.x0),
+                     found.y - (truth.yx * x + truth.yy * y + truth.y0)));
+    }
+  return worst;
+}
+
+} // namespace
+
+TEST_F (MoireCalibTest, SaysHowTheBenchStandsAndHowToMove)
+{
+  begin ("mode=align mirror-pitch=10");
+  const MessagePtr reading = wait_for ("moirecalib/reading");
+  ASSERT_TRUE (reading);
+  EXPECT_NEAR (double_field (reading, "offset-x"), 0.4, 0.02);
+  EXPECT_NEAR (double_field (reading, "offset-y"), -0.3, 0.02);
+  EXPECT_NEAR (double_field (reading, "rotation"), 0.5, 0.03);
+  EXPECT_NEAR (double_field (reading, "magnification"), 1.01, 5e-4);
+  EXPECT_NEAR (double_field (reading, "stage-x"), -4.0, 0.2);
+  EXPECT_NEAR (double_field (reading, "stage-theta"), -500, 30);
+}
+
+TEST_F (MoireCalibTest, FollowsTheStageFromCoarseToAligned)
+{
+  begin ("mode=align");
+  ASSERT_TRUE (wait_for ("moirecalib/state", "coarse"));
+  const ObjectPtr<GstElement> stage = bench->find ("bench");
+  g_object_set (stage.get (), "rotation", 0.1, "scale", 1.0, nullptr);
+  ASSERT_TRUE (wait_for ("moirecalib/state", "fine"));
+  g_object_set (stage.get (), "rotation", 0.0, "scale", 1.0, "shift-x", 3.0,
+      "shift-y", 0.0, nullptr);
+  ASSERT_TRUE (wait_for ("moirecalib/state", "aligned"));
+  EXPECT_EQ (text_property (calib.get (), "state"), "aligned");
+}
+
+TEST_F (MoireCalibTest, MapsAndTellsEverybody)
+{
+  const auto file = std::filesystem::temp_directory_path () /
+                    ("cexp-map-" + std::to_string (getpid ()) + ".json");
+  begin ("mode=map frames=2 location=" + file.string ());
+  const MessagePtr said = wait_for ("moirecalib/mapping");
+  ASSERT_TRUE (said);
+  const std::string json = string_field (said, "mapping");
+  const Result<Mapping> mapping = Mapping::from_json (json);
+  ASSERT_TRUE (mapping.ok ()) << mapping.error ().message;
+  EXPECT_LT (worst_error (*mapping), 0.02);
+  EXPECT_EQ (text_property (calib.get (), "mapping"), json);
+  const Result<Mapping> saved = Mapping::load (file.string ());
+  ASSERT_TRUE (saved.ok ()) << saved.error ().message;
+  EXPECT_EQ (saved->to_json (), json);
+  std::filesystem::remove (file);
+
+  /* Downstream, in the tag of the schedule. */
+  for (int i = 0; i < 2; i++)
+    bench->next (white);
+  const auto setup = setup_from_tags (bench->tags ().get ());
+  ASSERT_TRUE (setup && *setup);
+  EXPECT_EQ (setup->value ().schedule, Schedule ());
+  ASSERT_TRUE (setup->value ().mapping);
+  EXPECT_EQ (setup->value ().mapping->to_json (), json);
+
+  /* And the mirrors are back. */
+  EXPECT_EQ (
+      string_field (bench->messages ("dmdsync/pattern-over").back (), "reason"),
+      "asked");
+  for (int i = 0; i < kPatience; i++) {
+    last = bench->next (white);
+    if (get_frame_meta (last.get ())->locked)
+      break;
+  }
+  EXPECT_TRUE (get_frame_meta (last.get ())->locked);
+}
+
+TEST_F (MoireCalibTest, MapsByItselfOnceItIsAligned)
+{
+  begin ("frames=1 tolerance=10");
+  ASSERT_TRUE (wait_for ("moirecalib/state", "aligned"));
+  ASSERT_TRUE (wait_for ("moirecalib/mapping"));
+  EXPECT_EQ (text_property (calib.get (), "state"), "mapped");
+}
+
+TEST_F (MoireCalibTest, AStreamThatEndsEarlyHasNoMapping)
+{
+  begin ("mode=map");
+  ASSERT_TRUE (wait_for ("moirecalib/state", "mapping"));
+  bench->end ();
+  EXPECT_NE (
+      bench->warnings ().find ("there is no mapping"), std::string::npos);
+  EXPECT_EQ (text_property (calib.get (), "mapping"), "");
+}
+
+namespace
+{
+
+constexpr int kLargeWidth = 256, kLargeHeight = 192;
+
+BufferPtr
+grating_frame (int number)
+{
+  const Pattern pattern = live_grating ();
+  return frame_of (draw<std::uint8_t> (kLargeWidth, kLargeHeight,
+                       [&] (int x, int y) { return pattern.on (x, y) * 200; }),
+      GstClockTime (FrameRate{30000, 1001}.time_of (number)));
+}
+
+gboolean
+answer_as_dmdsync (GstPad *pad, GstObject *parent, GstQuery *query)
+{
+  if (GST_QUERY_TYPE (query) != GST_QUERY_CUSTOM)
+    return gst_pad_query_default (pad, parent, query);
+  gst_structure_set (gst_query_writable_structure (query), "width", G_TYPE_INT,
+      kLargeWidth, "height", G_TYPE_INT, kLargeHeight, "patterns",
+      G_TYPE_BOOLEAN, TRUE, nullptr);
+  return TRUE;
+}
+
+} // namespace
+
+TEST (MoireCalib, WithoutADmdsyncItSaysWhatToDo)
+{
+  ElementHarness h ("moirecalib");
+  h.set_caps (gray_caps (kLargeWidth, kLargeHeight));
+  EXPECT_EQ (h.push (grating_frame (0)), GST_FLOW_ERROR);
+  EXPECT_EQ (h.error (),
+      "Nobody upstream shows patterns. Put a dmdsync with a device that takes "
+      "masks at run time before moirecalib, or show a grating by other means "
+      "and say which: pattern=grating-both:4/0.");
+}
+
+TEST (MoireCalib, EveryFramePassesWithItsTimesWhateverTheWorkerDoes)
+{
+  ElementHarness h ("moirecalib pattern=grating-both:4/0");
+  h.set_caps (gray_caps (kLargeWidth, kLargeHeight, "30000/1001"));
+  for (int i = 0; i < 200; i++) {
+    ASSERT_EQ (h.push (grating_frame (i)), GST_FLOW_OK);
+    const BufferPtr out = h.pull ();
+    ASSERT_TRUE (out);
+    EXPECT_EQ (GST_BUFFER_PTS (out.get ()),
+        GstClockTime (FrameRate{30000, 1001}.time_of (i)));
+  }
+}
+
+TEST (MoireCalib, LaysItsPanelOverThePictureOrLeavesItAlone)
+{
+  for (const bool overlay : {true, false}) {
+    ElementHarness h ("moirecalib pattern=grating-both:4/0 overlay=" +
+                      std::string (overlay ? "true" : "false"));
+    const std::string caps = gray_caps (kLargeWidth, kLargeHeight);
+    h.set_caps (caps);
+    const auto plain = image_of<std::uint8_t> (
+        grating_frame (0).get (), caps_of (caps).get ());
+    bool changed = false;
+    MessagePtr reading;
+    for (int i = 0; i < kPatience && !(changed || (reading && !overlay)); i++) {
+      ASSERT_EQ (h.push (grating_frame (i)), GST_FLOW_OK);
+      const BufferPtr out = h.pull ();
+      changed = !(
+          image_of<std::uint8_t> (out.get (), caps_of (caps).get ()) == plain);
+      if (!reading)
+        reading = h.element_message ("moirecalib/reading");
+    }
+    EXPECT_EQ (changed, overlay);
+  }
+}
+
+TEST (MoireCalib, GivesTheMirrorsBackWhenItStops)
+{
+  ElementHarness h ("moirecalib");
+  std::vector<std::string> asked;
+  gst_pad_add_probe (
+      h.get ()->srcpad, GST_PAD_PROBE_TYPE_EVENT_UPSTREAM,
+      [] (GstPad *, GstPadProbeInfo *info, gpointer list) {
+        GstEvent *event = GST_PAD_PROBE_INFO_EVENT (info);
+        if (gst_event_has_name (event, "dmdsync/pattern"))
+          static_cast<std::vector<std::string> *> (list)->emplace_back (
+              gst_structure_get_string (
+                  gst_event_get_structure (event), "pattern"));
+        return GST_PAD_PROBE_OK;
+      },
+      &asked, nullptr);
+  gst_pad_set_query_function (h.get ()->srcpad, answer_as_dmdsync);
+  h.set_caps (gray_caps (kLargeWidth, kLargeHeight));
+  EXPECT_EQ (h.push (grating_frame (0)), GST_FLOW_OK);
+  gst_element_set_state (h.element (), GST_STATE_NULL);
+  EXPECT_EQ (asked, (std::vector<std::string>{"grating-both:4/0", ""}));
+}

@@ -1,0 +1,114 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* What is laid over the picture, and the report. */
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <numbers>
+
+#include <gtest/gtest.h>
+
+#include "overlay/panel.h"
+#include "overlay/report.h"
+
+using namespace cexp;
+
+namespace
+{
+
+Fringes
+ramp (int width, int height, double turns)
+{
+  Fringes fringes{Image<float> (width, height), Image<float> (width, height)};
+  for (int y = 0; y < height; y++)
+    for (int x = 0; x < width; x++) {
+      fringes.phase.at (x, y) =
+          float (2 * std::numbers::pi * turns * x / width);
+      fringes.amplitude.at (x, y) = 50.0f;
+    }
+  return fringes;
+}
+
+CalibrationResult
+small_result ()
+{
+  CalibrationResult result{.mapping = Mapping (Extent{64, 48}),
+      .quality = Image<PixelQuality> (64, 48),
+      .contrast = {},
+      .residual_x = Image<float> (4, 3),
+      .residual_y = Image<float> (4, 3)};
+  return result;
+}
+
+} // namespace
+
+TEST (Panel, ShowsFringesAsTheyAre)
+{
+  const Fringes fringes = ramp (192, 144, 2.0);
+  PanelContent content{.title = "coarse"};
+  content.fringes_x = &fringes;
+  const Panel panel = draw_panel ({768, 576}, content);
+  ASSERT_EQ (panel.opaque.size (), 2u); // the fringes, and the text
+  const Rectangle at = panel.opaque[1];
+  /* Two whole fringes: bright at the borders and in the middle. */
+  EXPECT_GT (panel.grey.at (at.x, at.y), 250);
+  EXPECT_LT (panel.grey.at (at.x + at.width / 4, at.y), 5);
+  EXPECT_GT (panel.grey.at (at.x + at.width / 2, at.y), 250);
+}
+
+TEST (Panel, WritesItsTitle)
+{
+  const Panel empty = draw_panel ({768, 576}, {});
+  const Panel titled = draw_panel ({768, 576}, {.title = "aligned"});
+  EXPECT_FALSE (empty.grey == titled.grey);
+}
+
+TEST (Panel, HidesItsPartsOfThePictureAndLeavesTheRest)
+{
+  for (const Extent size : {Extent{768, 576}, Extent{160, 120}}) {
+    const Panel panel = draw_panel (size, {.title = "fine"});
+    Image<std::uint8_t> narrow (size.width, size.height);
+    Image<std::uint16_t> wide (size.width, size.height);
+    for (int y = 0; y < size.height; y++)
+      for (int x = 0; x < size.width; x++) {
+        narrow.at (x, y) = 77;
+        wide.at (x, y) = 7777;
+      }
+    lay_over (panel, narrow.view ());
+    lay_over (panel, wide.view ());
+    for (int y = 0; y < size.height; y++)
+      for (int x = 0; x < size.width; x++) {
+        bool hidden = false;
+        for (const Rectangle &at : panel.opaque)
+          hidden = hidden || (x >= at.x && x < at.x + at.width && y >= at.y &&
+                                 y < at.y + at.height);
+        const int level = panel.grey.at (x, y);
+        ASSERT_EQ (narrow.at (x, y), hidden ? level : 77);
+        ASSERT_EQ (wide.at (x, y), hidden ? level * 257 : 7777);
+      }
+  }
+}
+
+TEST (Report, IsAPicture)
+{
+  const CalibrationResult result = small_result ();
+  const auto path = std::filesystem::temp_directory_path () /
+                    ("cexp-report-" + std::to_string (getpid ()) + ".png");
+  CalibrationReport report{.title = "report", .result = &result};
+  report.before = FringePair{ramp (16, 12, 3), ramp (16, 12, 1), "first look"};
+  ASSERT_TRUE (write_report (path.string (), report).ok ());
+  std::ifstream file (path, std::ios::binary);
+  std::string head (8, '\0');
+  file.read (head.data (), 8);
+  EXPECT_EQ (head, "\x89PNG\r\n\x1a\n");
+  std::filesystem::remove (path);
+}
+
+TEST (Report, SaysThatItCannotBeWritten)
+{
+  const CalibrationResult result = small_result ();
+  const auto written = write_report (
+      "/nowhere/at/all.png", {.title = "report", .result = &result});
+  ASSERT_FALSE (written.ok ());
+  EXPECT_NE (
+      written.error ().message.find ("/nowhere/at/all.png"), std::string::npos);
+}

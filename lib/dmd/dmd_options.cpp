@@ -55,7 +55,7 @@ struct Key {
 using Text = std::string_view;
 using Options = DmdOptions;
 
-constexpr std::array<Key, 12> kKeys{{
+constexpr std::array<Key, 13> kKeys{{
     {"master", "dmd|camera",
         [] (Text v, Options &o) {
           return choose (
@@ -83,6 +83,10 @@ constexpr std::array<Key, 12> kKeys{{
           const bool taken = take (parse_time (v), time);
           o.patience = std::chrono::milliseconds (time / 1'000'000);
           return taken && o.patience >= std::chrono::milliseconds (100);
+        }},
+    {"guard", "on|off",
+        [] (Text v, Options &o) {
+          return choose (v, "on", true, "off", false, o.guard);
         }},
     {"images", "A[/B...]",
         [] (Text v, Options &o) { return parse_images (v, o.images); }},

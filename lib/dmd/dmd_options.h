@@ -26,6 +26,7 @@ namespace cexp
  *   patience=TIME        for a USB board that does not answer, or is not ready,
  *                        in one go; default 2 s. A DLPC900 may take longer over
  *                        a table
+ *   guard=on|off         stop_guard.h; default on
  * and, for boards whose masks come from elsewhere (DLPC350),
  *   images=A[/B...]      flash images that hold the masks, 24 each
  *   source=flash|video
@@ -44,6 +45,7 @@ struct DmdOptions {
   std::chrono::milliseconds patience = HidLink::kPatience;
   std::vector<int> images = {};
   dlpc350::Source source = dlpc350::Source::flash;
+  bool guard = true;
   bool trigger2_bit_disables = true;
   bool table_first = true;
   bool swap_image_pair = false;

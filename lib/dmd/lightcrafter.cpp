@@ -8,6 +8,7 @@
 #include "dmd/bitmap.h"
 #include "dmd/dmd_options.h"
 #include "dmd/lightcrafter_protocol.h"
+#include "dmd/stop_guard.h"
 #include "dmd/tcp_stream.h"
 
 namespace cexp
@@ -360,7 +361,10 @@ open_lightcrafter (std::string_view device)
   auto dmd = std::make_unique<Lightcrafter> (host, *port, *options);
   if (const auto opened = dmd->open (); !opened)
     return opened.error ();
-  return std::unique_ptr<Dmd> (std::move (dmd));
+  if (!options->guard)
+    return std::unique_ptr<Dmd> (std::move (dmd));
+  return guarded (std::move (dmd),
+      std::string (kScheme) + host + ":" + std::to_string (*port));
 }
 
 } // namespace cexp

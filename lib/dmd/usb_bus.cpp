@@ -11,6 +11,7 @@
 #include "base/text.h"
 #include "dmd/dlpc350.h"
 #include "dmd/dlpc900.h"
+#include "dmd/stop_guard.h"
 
 namespace cexp
 {
@@ -333,11 +334,14 @@ open_usb_dmd (std::string_view device)
   auto pipe = open_pipe (*context, *found);
   if (!pipe)
     return pipe.error ();
-  auto link =
-      std::make_unique<HidLink> (*std::move (pipe), "usb:" + found->board.port);
-  return found->board.controller == UsbController::dlpc350
-             ? open_dlpc350 (std::move (link), *options)
-             : open_dlpc900 (std::move (link), *options);
+  const std::string name = "usb:" + found->board.port;
+  auto link = std::make_unique<HidLink> (*std::move (pipe), name);
+  auto dmd = found->board.controller == UsbController::dlpc350
+                 ? open_dlpc350 (std::move (link), *options)
+                 : open_dlpc900 (std::move (link), *options);
+  if (!dmd || !options->guard)
+    return dmd;
+  return guarded (*std::move (dmd), name);
 }
 
 } // namespace cexp

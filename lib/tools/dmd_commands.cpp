@@ -2,6 +2,7 @@
 /* codedexposure dmd: boards that are there, and what they do. */
 #include <chrono>
 #include <condition_variable>
+#include <csignal>
 #include <cstdio>
 #include <functional>
 #include <memory>
@@ -10,6 +11,7 @@
 #include <unistd.h>
 
 #include "dmd/dmd.h"
+#include "dmd/stop_guard.h"
 #include "dmd/usb_bus.h"
 #include "tools/tool.h"
 
@@ -249,6 +251,17 @@ start (Session &session, const Arguments &arguments)
     session.exit = Exit::interrupted;
 }
 
+/** Ends when its standard input does: another process started the board, and is
+ * no more. */
+void
+guard (Session &session, const Arguments &arguments)
+{
+  std::signal (SIGHUP, SIG_IGN); // others are taken as requests to stop
+  if (const auto stopped = stand_guard (STDIN_FILENO, arguments.device);
+      !stopped)
+    session.fail (Exit::failed, stopped.error ());
+}
+
 /** Shows a schedule that uploads fast, and looks whether the board does what
  * it is told. */
 void
@@ -323,6 +336,7 @@ add_dmd_commands (CLI::App &app, Session &session)
   with_schedule (add ("start", "Send masks and show them until Ctrl-C", start))
       ->add_option ("--for", arguments->duration, "Stop after that time");
   with_device (add ("stop", "Stop what a board shows", stop));
+  with_device (add ("guard", "", guard))->group (""); // StopGuard's other side
   with_device (add ("selftest", "Try upload, start and stop", selftest));
 }
 

@@ -47,12 +47,12 @@ ignore_progress (int, int)
 }
 
 /** How many random sequences of faults a test goes through: FAULT_SEQUENCES of
- * them, 500 where nothing is said. */
+ * them, @p few where nothing is said. */
 inline int
-fault_sequences ()
+fault_sequences (int few = 500)
 {
   const char *asked = std::getenv ("FAULT_SEQUENCES");
-  return asked != nullptr ? std::atoi (asked) : 500;
+  return asked != nullptr ? std::atoi (asked) : few;
 }
 
 /** "" for a success. */

@@ -34,7 +34,8 @@ Result<std::unique_ptr<Dmd>>
 open (const LightcrafterServer &server, const std::string &options = "")
 {
   return open_lightcrafter (
-      "lightcrafter:127.0.0.1:" + std::to_string (server.port ()) + options);
+      "lightcrafter:127.0.0.1:" + std::to_string (server.port ()) +
+      ",guard=off" + options);
 }
 
 } // namespace

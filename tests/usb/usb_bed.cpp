@@ -4,11 +4,14 @@
 #include <linux/usbdevice_fs.h>
 #include <sys/ioctl.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cstddef>
 #include <cstdio>
 #include <cstring>
 #include <mutex>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -110,6 +113,11 @@ public:
     const std::lock_guard guard (lock_);
     return bound_;
   }
+  bool running () const
+  {
+    const std::lock_guard guard (lock_);
+    return board_->running ();
+  }
   void occupy ()
   {
     const std::lock_guard guard (lock_);
@@ -120,6 +128,7 @@ private:
   struct Urb {
     Reference urb, buffer;
     gulong address = 0;
+    const UMockdevIoctlClient *client = nullptr;
     usbdevfs_urb *get () const { return urb.as<usbdevfs_urb> (); }
   };
 
@@ -128,8 +137,22 @@ private:
   {
     int error = 0;
     const int result = static_cast<UsbPort *> (self)->handle (client, error);
+    // To poll (), a node in software is always ready: whoever waits for
+    // something to reap would ask as fast as it can.
+    if (error == EAGAIN)
+      std::this_thread::sleep_for (std::chrono::milliseconds (1));
     umockdev_ioctl_client_complete (client, result, error);
     return TRUE;
+  }
+
+  /** Who claims the board is its only user: what a process had under way went
+   * with it. */
+  void drop_others (const UMockdevIoctlClient *client)
+  {
+    const auto of_others = [client] (
+                               const Urb &urb) { return urb.client != client; };
+    std::erase_if (waiting_, of_others);
+    std::erase_if (done_, of_others);
   }
 
   int fail (int &error, int code)
@@ -157,7 +180,7 @@ private:
       return 0;
     }
     case USBDEVFS_REAPURBNDELAY:
-      return reap (argument (), error);
+      return reap (client, argument (), error);
     default:
       break;
     }
@@ -165,17 +188,18 @@ private:
       return fail (error, ENODEV);
     switch (request) {
     case USBDEVFS_SUBMITURB:
-      return submit (argument (), error);
+      return submit (client, argument ());
     case USBDEVFS_DISCARDURB:
       return discard (argument (), error);
     default:
-      return manage (request, argument (), error);
+      return manage (client, request, error);
     }
   }
 
   /** Interfaces and drivers. */
-  int manage (std::uint32_t request, UMockdevIoctlData *argument, int &error)
+  int manage (UMockdevIoctlClient *client, std::uint32_t request, int &error)
   {
+    auto *const argument = umockdev_ioctl_client_get_arg (client);
     switch (request) {
     case USBDEVFS_GETDRIVER: {
       if (!bound_)
@@ -199,6 +223,7 @@ private:
       if (occupied_ || (request == USBDEVFS_CLAIMINTERFACE && bound_))
         return fail (error, EBUSY);
       bound_ = false;
+      drop_others (client);
       return 0;
     case USBDEVFS_RELEASEINTERFACE:
     case USBDEVFS_CLEAR_HALT:
@@ -211,9 +236,10 @@ private:
     }
   }
 
-  int submit (UMockdevIoctlData *argument, int &)
+  int submit (UMockdevIoctlClient *client, UMockdevIoctlData *argument)
   {
     Urb urb;
+    urb.client = client;
     urb.urb = Reference (umockdev_ioctl_data_resolve (
         argument, 0, sizeof (usbdevfs_urb), nullptr));
     urb.address = urb.urb.get ()->client_addr;
@@ -282,12 +308,15 @@ private:
     finish (std::move (urb), string ? 0 : -EPIPE, string ? length : 0);
   }
 
-  int reap (UMockdevIoctlData *argument, int &error)
+  int reap (
+      UMockdevIoctlClient *client, UMockdevIoctlData *argument, int &error)
   {
-    if (done_.empty ())
+    const auto found = std::find_if (done_.begin (), done_.end (),
+        [client] (const Urb &urb) { return urb.client == client; });
+    if (found == done_.end ())
       return fail (error, board_->gone () ? ENODEV : EAGAIN);
-    const Urb urb = std::move (done_.front ());
-    done_.erase (done_.begin ());
+    const Urb urb = std::move (*found);
+    done_.erase (found);
     const Reference slot (
         umockdev_ioctl_data_resolve (argument, 0, sizeof (gpointer), nullptr));
     umockdev_ioctl_data_set_ptr (slot.get (), 0, urb.urb.get ());
@@ -381,10 +410,22 @@ UsbBed::unplug (const std::string &port)
   ports_.erase (found);
 }
 
+void
+UsbBed::forget_pulled ()
+{
+  pulled_.clear ();
+}
+
 bool
 UsbBed::kernel_driver_bound (const std::string &port) const
 {
   return ports_.at (port)->kernel_bound ();
+}
+
+bool
+UsbBed::running (const std::string &port) const
+{
+  return ports_.at (port)->running ();
 }
 
 void

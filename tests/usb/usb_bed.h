@@ -32,10 +32,14 @@ public:
       const std::string &serial, std::shared_ptr<EmulatedHid> board);
   /** Pulls the plug, with whatever is in flight. */
   void unplug (const std::string &port);
+  /** Nobody has a board open any more that was pulled. */
+  void forget_pulled ();
   /** Whether the kernel's own driver has the board. */
   bool kernel_driver_bound (const std::string &port) const;
   /** The board at @p port is held by another program. */
   void occupy (const std::string &port);
+  /** Whether the board at @p port shows masks; also while somebody uses it. */
+  bool running (const std::string &port) const;
 
 private:
   UMockdevTestbed *const bed_;

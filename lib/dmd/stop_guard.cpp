@@ -1,0 +1,213 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "dmd/stop_guard.h"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <spawn.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <chrono>
+#include <cstdlib>
+#include <cstring>
+#include <thread>
+
+#include "dmd/dmd.h"
+#include "dmd/tool_path.h"
+
+namespace cexp
+{
+
+namespace
+{
+
+using namespace std::chrono_literals;
+
+constexpr char kRuns = '1', kStands = '0';
+
+/** Owns what posix_spawn () is told. */
+struct SpawnSettings {
+  SpawnSettings ()
+  {
+    posix_spawn_file_actions_init (&files);
+    posix_spawnattr_init (&attributes);
+  }
+  ~SpawnSettings ()
+  {
+    posix_spawn_file_actions_destroy (&files);
+    posix_spawnattr_destroy (&attributes);
+  }
+  SpawnSettings (const SpawnSettings &) = delete;
+  SpawnSettings &operator= (const SpawnSettings &) = delete;
+
+  posix_spawn_file_actions_t files;
+  posix_spawnattr_t attributes;
+};
+
+const char *
+tool_path ()
+{
+  const char *named = std::getenv ("CODEDEXPOSURE_TOOL");
+  return named != nullptr ? named : CODEDEXPOSURE_TOOL_PATH;
+}
+
+/** Runs the tool with @p words as its standard input and nothing else of this
+ * process but standard error; 0 or an errno. */
+int
+spawn_tool (const std::string &device, int words, pid_t &process)
+{
+  SpawnSettings settings;
+  posix_spawn_file_actions_adddup2 (&settings.files, words, STDIN_FILENO);
+  posix_spawn_file_actions_addopen (
+      &settings.files, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+  posix_spawn_file_actions_addclosefrom_np (&settings.files, STDERR_FILENO + 1);
+  posix_spawnattr_setflags (&settings.attributes, POSIX_SPAWN_SETSID);
+  std::string tool = tool_path (), dmd = "dmd", guard = "guard", board = device;
+  char *const arguments[] = {
+      tool.data (), dmd.data (), guard.data (), board.data (), nullptr};
+  return posix_spawn (&process, tool.c_str (), &settings.files,
+      &settings.attributes, arguments, environ);
+}
+
+Result<void>
+stop_board (const std::string &device)
+{
+  const auto dmd = open_dmd (device);
+  if (!dmd)
+    return dmd.error ();
+  (*dmd)->stop ();
+  const auto now = (*dmd)->status ();
+  if (!now)
+    return now.error ();
+  if (now->running)
+    return Error{(*dmd)->info ().name + " does not stop"};
+  return {};
+}
+
+class GuardedDmd : public Dmd
+{
+public:
+  GuardedDmd (std::unique_ptr<Dmd> dmd, std::string device)
+      : device_ (std::move (device)), dmd_ (std::move (dmd))
+  {
+  }
+  ~GuardedDmd () override { stop (); }
+
+  const DmdInfo &info () const override { return dmd_->info (); }
+  Result<DmdStatus> status () override { return dmd_->status (); }
+  Nanoseconds upload_time (const Schedule &schedule) override
+  {
+    return dmd_->upload_time (schedule);
+  }
+  Result<void> upload (const Schedule &schedule, std::stop_token stop_token,
+      const UploadProgress &progress) override
+  {
+    return dmd_->upload (schedule, std::move (stop_token), progress);
+  }
+  Result<void> start (const SlotPlan &plan, std::stop_token stop_token) override
+  {
+    if (const auto watched = watch (); !watched)
+      return watched;
+    return dmd_->start (plan, std::move (stop_token));
+  }
+  void stop () override
+  {
+    dmd_->stop ();
+    if (guard_)
+      guard_->tell (dmd_->running ());
+  }
+  bool running () const override { return dmd_->running (); }
+
+private:
+  Result<void> watch ()
+  {
+    if (guard_ && guard_->tell (true))
+      return {};
+    auto guard = StopGuard::post (device_);
+    if (!guard)
+      return Error{info ().name + ": " + guard.error ().message};
+    guard_ = *std::move (guard);
+    guard_->tell (true);
+    return {};
+  }
+
+  const std::string device_;
+  std::unique_ptr<StopGuard> guard_; // relieved when the device is closed
+  const std::unique_ptr<Dmd> dmd_;
+};
+
+} // namespace
+
+Result<std::unique_ptr<StopGuard>>
+StopGuard::post (const std::string &device)
+{
+  int ends[2];
+  int code = 0;
+  if (socketpair (AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) {
+    code = errno;
+  } else {
+    pid_t process = 0;
+    code = spawn_tool (device, ends[0], process);
+    close (ends[0]);
+    if (code == 0)
+      return std::unique_ptr<StopGuard> (new StopGuard (ends[1], process));
+    close (ends[1]);
+  }
+  return Error{std::string ("cannot run '") + tool_path () +
+               "', which would stop the mirrors if this process were killed: " +
+               std::strerror (code) +
+               "; install it, say where it is in CODEDEXPOSURE_TOOL, or do "
+               "without it: guard=off"};
+}
+
+StopGuard::~StopGuard ()
+{
+  shutdown (words_, SHUT_WR);
+  // Where it has nothing to do but to end, it is waited for.
+  constexpr int kPatience = 1000; // ms
+  pollfd end{words_, 0, 0};
+  const bool ending = !running_ && poll (&end, 1, kPatience) == 1;
+  waitpid (process_, nullptr, ending ? 0 : WNOHANG);
+  close (words_);
+}
+
+bool
+StopGuard::tell (bool running)
+{
+  running_ = running;
+  const char word = running ? kRuns : kStands;
+  return send (words_, &word, 1, MSG_NOSIGNAL) == 1;
+}
+
+Result<void>
+stand_guard (int words, const std::string &device)
+{
+  char word = kStands;
+  ssize_t got = 0;
+  do
+    got = read (words, &word, 1);
+  while (got > 0 || (got < 0 && errno == EINTR));
+  if (word != kRuns)
+    return {};
+
+  // The kernel may still be closing what the process held.
+  constexpr int kAttempts = 20;
+  Result<void> stopped;
+  for (int attempt = 0; attempt < kAttempts; attempt++) {
+    std::this_thread::sleep_for (100ms);
+    stopped = stop_board (device);
+    if (stopped)
+      break;
+  }
+  return stopped;
+}
+
+std::unique_ptr<Dmd>
+guarded (std::unique_ptr<Dmd> dmd, std::string device)
+{
+  return std::make_unique<GuardedDmd> (std::move (dmd), std::move (device));
+}
+
+} // namespace cexp

@@ -1,0 +1,125 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Random faults of boards under the unmodified libusb: no call hangs, nothing
+ * is left behind, and the mirrors stand still in the end. */
+#include <filesystem>
+#include <fstream>
+#include <thread>
+
+#include "emulated_dlpc350.h"
+#include "emulated_dlpc900.h"
+#include "fault_life.h"
+#include "usb_bed.h"
+
+using namespace cexp;
+using namespace cexp::test;
+
+namespace
+{
+
+constexpr std::uint16_t kDlpc350 = 0x6401, kDlpc900 = 0xC900;
+constexpr int kDlp5500 = 5;
+
+std::ptrdiff_t
+entries (const char *folder)
+{
+  return std::distance (std::filesystem::directory_iterator (folder),
+      std::filesystem::directory_iterator ());
+}
+
+/** For how long threads of this process were ready to run and did not, because
+ * others did. */
+std::chrono::nanoseconds
+kept_waiting ()
+{
+  std::chrono::nanoseconds sum{0};
+  for (const auto &task :
+      std::filesystem::directory_iterator ("/proc/self/task")) {
+    std::ifstream file (task.path () / "schedstat");
+    std::int64_t ran = 0, waited = 0;
+    if (file >> ran >> waited)
+      sum += std::chrono::nanoseconds (waited);
+  }
+  return sum;
+}
+
+/** Whether @p folder comes to have no more than @p most entries: the bus closes
+ * its ends a little later. */
+bool
+settles (const char *folder, std::ptrdiff_t most)
+{
+  using namespace std::chrono;
+  const auto deadline = steady_clock::now () + 10s;
+  while (entries (folder) > most && steady_clock::now () < deadline)
+    std::this_thread::sleep_for (1ms);
+  return entries (folder) <= most;
+}
+
+/** A clock that stands still where the machine is busy with others. */
+FaultLife::Time
+now ()
+{
+  return std::chrono::duration_cast<FaultLife::Time> (
+      std::chrono::steady_clock::now ().time_since_epoch () - kept_waiting ());
+}
+
+/** One life of one board. */
+void
+live (UsbBed &bed, FaultLife &life, std::uint16_t product, const char *options)
+{
+  std::shared_ptr<EmulatedHid> board;
+  if (product == kDlpc900)
+    board = std::make_shared<EmulatedDlpc900> (kDlp5500);
+  else
+    board = std::make_shared<EmulatedDlpc350> ();
+  life.draw (*board, 100);
+  bed.plug ("1-2", product, "LCR", board);
+  const auto open = [&] {
+    return open_dmd (std::string ("usb:,guard=off") + options);
+  };
+  life.close (life.live (open, schedule_of ("sequential:2x1")));
+  if (!board->gone () && board->running ()) {
+    // Both its stops were struck: what whoever comes next does.
+    board->faults.clear ();
+    const auto next = open_dmd ("usb:");
+    ASSERT_EQ (message_of (next), "");
+    (*next)->stop ();
+  }
+  EXPECT_TRUE (board->gone () || !board->running ());
+  bed.unplug ("1-2");
+  bed.forget_pulled ();
+}
+
+} // namespace
+
+/** FAULT_SEQUENCES lives of each controller, with the luck of FAULT_SEED. */
+TEST (UsbFaults, WhateverHappensItStopsInTheEndAndHangsNowhere)
+{
+  const char *seed = std::getenv ("FAULT_SEED");
+  std::mt19937 random (seed != nullptr ? unsigned (std::atoi (seed)) : 5);
+  UsbBed bed;
+  std::ptrdiff_t files = 0, threads = 0;
+  int shown = 0;
+  FaultLife::Time longest{0};
+  const int sequences = fault_sequences (3);
+  for (int sequence = 0; sequence < sequences; sequence++)
+    for (const auto &[product, options] :
+        {std::pair{kDlpc900, ",region=32x16"}, {kDlpc350, ",images=0"}}) {
+      FaultLife life (random, now);
+      live (bed, life, product, options);
+      if (HasFatalFailure ())
+        return;
+      ASSERT_LE (life.longest (), FaultLife::kLongestCall)
+          << "sequence " << sequence << " of " << std::hex << product;
+      if (sequence == 0) { // what libraries keep once and for all
+        files = entries ("/proc/self/fd");
+        threads = entries ("/proc/self/task");
+      }
+      ASSERT_TRUE (settles ("/proc/self/fd", files)) << sequence;
+      ASSERT_TRUE (settles ("/proc/self/task", threads)) << sequence;
+      shown += life.shown ();
+      longest = std::max (longest, life.longest ());
+    }
+  EXPECT_GT (shown, 0);
+  std::printf ("%d sequences, masks shown %d times, longest call %d ms\n",
+      2 * sequences, shown, int (longest.count ()));
+}

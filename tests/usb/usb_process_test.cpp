@@ -1,0 +1,151 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Processes that end while a board shows masks: by a signal that they take, and
+ * by one that nobody can take. The board is stopped all the same. */
+#include <signal.h>
+#include <spawn.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <thread>
+
+#include <gtest/gtest.h>
+
+#include "emulated_dlpc350.h"
+#include "emulated_dlpc900.h"
+#include "usb_bed.h"
+
+using namespace cexp::test;
+
+namespace
+{
+
+constexpr std::uint16_t kDlpc350 = 0x6401, kDlpc900 = 0xC900;
+constexpr int kDlp5500 = 5;
+constexpr const char *kPort = "1-2";
+
+/** A process that sees the bus of this one. */
+class Process
+{
+public:
+  explicit Process (std::vector<std::string> words)
+  {
+    std::vector<char *> arguments;
+    for (std::string &word : words)
+      arguments.push_back (word.data ());
+    arguments.push_back (nullptr);
+    // It does not have in it what stands between libusb and the kernel.
+    setenv ("LD_PRELOAD", "libumockdev-preload.so.0", 1);
+    const int code = posix_spawnp (
+        &id_, arguments[0], nullptr, nullptr, arguments.data (), environ);
+    unsetenv ("LD_PRELOAD");
+    EXPECT_EQ (code, 0) << words[0];
+  }
+  ~Process ()
+  {
+    if (!ended_)
+      end_by (SIGKILL);
+  }
+
+  /** @return as waitpid () has it. */
+  int end_by (int signal)
+  {
+    kill (id_, signal);
+    int status = -1;
+    waitpid (id_, &status, 0);
+    ended_ = true;
+    return status;
+  }
+
+private:
+  pid_t id_ = 0;
+  bool ended_ = false;
+};
+
+class UsbProcess : public ::testing::TestWithParam<std::uint16_t>
+{
+protected:
+  void SetUp () override
+  {
+    // Guards of processes that ended become children of this one.
+    prctl (PR_SET_CHILD_SUBREAPER, 1);
+    if (GetParam () == kDlpc900)
+      bed.plug (
+          kPort, kDlpc900, "LCR", std::make_shared<EmulatedDlpc900> (kDlp5500));
+    else
+      bed.plug (kPort, kDlpc350, "LCR2", std::make_shared<EmulatedDlpc350> ());
+  }
+
+  /** Nobody uses the bus any more when it goes. */
+  void TearDown () override
+  {
+    while (waitpid (-1, nullptr, 0) > 0)
+      ;
+  }
+
+  std::string device () const
+  {
+    return GetParam () == kDlpc900 ? "usb:" : "usb:,images=0";
+  }
+  std::vector<std::string> pipeline () const
+  {
+    return {"gst-launch-1.0", "-q", "videotestsrc", "is-live=true", "!",
+        "video/x-raw,format=GRAY8,width=64,height=48,framerate=25/1", "!",
+        "dmdsync", "device=" + device (), "schedule=sequential:4x1", "!",
+        "fakesink"};
+  }
+  std::vector<std::string> tool () const
+  {
+    return {TOOL, "--quiet", "dmd", "start", device (), "sequential:4x1"};
+  }
+  /** Whether the board gets there within half a minute. */
+  bool comes_to_be (bool running) const
+  {
+    using namespace std::chrono;
+    const auto deadline = steady_clock::now () + 30s;
+    while (bed.running (kPort) != running && steady_clock::now () < deadline)
+      std::this_thread::sleep_for (1ms);
+    return bed.running (kPort) == running;
+  }
+
+  UsbBed bed;
+};
+
+} // namespace
+
+TEST_P (UsbProcess, AnInterruptedPipelineStopsTheBoard)
+{
+  Process launch (pipeline ());
+  ASSERT_TRUE (comes_to_be (true));
+  EXPECT_TRUE (WIFEXITED (launch.end_by (SIGINT)));
+  EXPECT_FALSE (bed.running (kPort)) << "it was stopped before the end";
+}
+
+TEST_P (UsbProcess, AKilledPipelineIsStoppedFor)
+{
+  Process launch (pipeline ());
+  ASSERT_TRUE (comes_to_be (true));
+  EXPECT_TRUE (WIFSIGNALED (launch.end_by (SIGKILL)));
+  EXPECT_TRUE (comes_to_be (false));
+}
+
+TEST_P (UsbProcess, AnInterruptedToolStopsTheBoard)
+{
+  Process start (tool ());
+  ASSERT_TRUE (comes_to_be (true));
+  EXPECT_EQ (WEXITSTATUS (start.end_by (SIGTERM)), 0);
+  EXPECT_FALSE (bed.running (kPort)) << "it was stopped before the end";
+}
+
+TEST_P (UsbProcess, AToolThatCrashesIsStoppedFor)
+{
+  Process start (tool ());
+  ASSERT_TRUE (comes_to_be (true));
+  EXPECT_TRUE (WIFSIGNALED (start.end_by (SIGSEGV)));
+  EXPECT_TRUE (comes_to_be (false));
+}
+
+INSTANTIATE_TEST_SUITE_P (
+    Controllers, UsbProcess, ::testing::Values (kDlpc900, kDlpc350));

@@ -112,6 +112,13 @@ public:
       return watched;
     return dmd_->start (plan, std::move (stop_token));
   }
+  Result<void> show (const StillMask &mask, const SlotPlan &plan,
+      std::stop_token stop_token) override
+  {
+    if (const auto watched = watch (); !watched)
+      return watched;
+    return dmd_->show (mask, plan, std::move (stop_token));
+  }
   void stop () override
   {
     dmd_->stop ();

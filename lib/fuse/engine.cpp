@@ -1,0 +1,246 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "fuse/engine.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/text.h"
+#include "fuse/kriging.h"
+
+namespace cexp::fuse
+{
+
+namespace
+{
+
+constexpr double kWhite = 255.0;
+/* Light, as a part of white, at which the noise of filters is taken. */
+constexpr double kTypicalLight = 0.4;
+/* Noise of coded pixels, in units of the scene's variance, below which the
+ * equations become ill-conditioned. */
+constexpr double kLeastNoise = 1e-3;
+
+/* Of the taps: far enough to see every slot several times. */
+int
+tap_radius (int slots)
+{
+  return std::clamp (int (std::ceil (1.8 * std::sqrt (slots))), 5, 8);
+}
+
+const Kernels *
+find_kernels (std::string_view target)
+{
+  for (const Kernels &kernels : supported_kernels ())
+    if (target.empty () || kernels.name == target)
+      return &kernels;
+  return nullptr;
+}
+
+/* Mirrors a coordinate beyond the frame into it. */
+int
+mirrored (int at, int size)
+{
+  if (at < 0)
+    at = -at;
+  if (at >= size)
+    at = 2 * size - 2 - at;
+  return std::clamp (at, 0, size - 1);
+}
+
+} // namespace
+
+Result<std::unique_ptr<Engine>>
+Engine::make (const Schedule &schedule, int width, int height,
+    const FuseOptions &options, double steps)
+{
+  const int rows = height - schedule.pilot_rows ();
+  const Extent cell = schedule.cell ();
+  if (width < cell.width || rows < cell.height)
+    return Error{"frames of " + std::to_string (width) + "x" +
+                 std::to_string (height) + " pixels hold no cell of " +
+                 schedule.text ()};
+  if (options.lookahead < 0 || options.lookahead > 1)
+    return Error{"lookahead " + std::to_string (options.lookahead) +
+                 ": it must be 0 or 1 coded frames"};
+  if (!find_kernels (options.target))
+    return Error{"target " + in_quotes (options.target) +
+                 " does not run on this machine; leave it empty"};
+  if (options.noise.full_well < 0.0 || options.noise.read_noise < 0.0)
+    return Error{"full well and read noise must not be negative"};
+  const Phases phases (schedule);
+  if (phases.rows () * phases.period () > Fuser<std::uint8_t>::kMaxPhases)
+    return Error{"the tile of " + schedule.text () + " has " +
+                 std::to_string (phases.rows () * phases.period ()) +
+                 " pixels with different neighbours, and fusion is made for " +
+                 std::to_string (Fuser<std::uint8_t>::kMaxPhases) +
+                 ": take a tile with a smaller period"};
+  return std::unique_ptr<Engine> (
+      new Engine (schedule, width, rows, options, steps));
+}
+
+Engine::Engine (const Schedule &schedule, int width, int height,
+    const FuseOptions &options, double steps)
+    : width_ (width), height_ (height),
+      observation_ (schedule, options.noise, steps), phases_ (schedule),
+      kernels_ (*find_kernels (options.target)),
+      radius_ (tap_radius (schedule.slots ())),
+      plain_ (phases_, disc (radius_), schedule.slots ()),
+      stillness_ (width, height, schedule.cell (), !observation_.noise_free ())
+{
+  map_noise (schedule);
+  find_margin (schedule);
+  prepare_plain (options);
+}
+
+void
+Engine::map_noise (const Schedule &schedule)
+{
+  noise_ = {Field (width_, height_), Field (width_, height_)};
+  if (!observation_.exact ())
+    gain_ = Field (width_, height_);
+  for (int y = 0; y < height_; y++) {
+    for (int x = 0; x < width_; x++) {
+      const int element = schedule.element_at (x, y);
+      const double dark = observation_.variance (element, 0.0);
+      const double white = observation_.variance (element, 1.0);
+      noise_.slope.row (y)[x] = float ((white - dark) * kWhite);
+      noise_.offset.row (y)[x] = float (dark * kWhite * kWhite);
+      if (!gain_.empty ())
+        gain_.row (y)[x] = float (observation_.gain (element));
+    }
+  }
+}
+
+/* The margin mirrors the frame. Where elements see several slots, a pixel of it
+ * repeats the pixel of its own element that lies closest to its mirror image:
+ * weights of both signs add up to a slot only while the code keeps its phase.
+ */
+void
+Engine::find_margin (const Schedule &schedule)
+{
+  const Field field (width_, height_, radius_);
+  const int reach = std::max (
+      schedule.tile ().period_x (), schedule.tile ().period_y ());
+  const auto closest = [&] (int x, int y, int element) {
+    Offset best{x, y};
+    int least = 4 * reach * reach;
+    for (int dy = -reach; dy <= reach; dy++) {
+      if (dy * dy >= least || y + dy < 0 || y + dy >= height_)
+        continue;
+      for (int dx = -reach; dx <= reach; dx++) {
+        const int distance = dx * dx + dy * dy;
+        if (distance < least && x + dx >= 0 && x + dx < width_ &&
+            schedule.element_at (x + dx, y + dy) == element) {
+          least = distance;
+          best = {x + dx, y + dy};
+        }
+      }
+    }
+    return best;
+  };
+  for (int y = -radius_; y < height_ + radius_; y++) {
+    const bool inside = y >= 0 && y < height_;
+    for (int x = -radius_; x < width_ + radius_; x++) {
+      if (inside && x == 0)
+        x = width_;
+      const Offset image{mirrored (x, width_), mirrored (y, height_)};
+      const Offset from =
+          observation_.exact ()
+              ? image
+              : closest (image.x, image.y, schedule.element_at (x, y));
+      margin_.push_back ({y * field.stride () + x,
+          from.y * field.stride () + from.x});
+    }
+  }
+}
+
+/* Filters of every phase under the plain model. */
+void
+Engine::prepare_plain (const FuseOptions &options)
+{
+  const std::vector<Offset> taps = disc (radius_);
+  const Covariance covariance (
+      options.scene.plain, observation_, 2 * radius_);
+  const double scene = options.scene.contrast * options.scene.contrast;
+  std::vector<double> noise;
+  for (int e = 0; e < observation_.slots (); e++)
+    noise.push_back (std::max (
+        observation_.variance (e, kTypicalLight) / scene, kLeastNoise));
+
+  for (int row = 0; row < phases_.rows (); row++) {
+    for (int x = 0; x < phases_.period (); x++) {
+      std::vector<int> elements;
+      for (const Offset &tap : taps)
+        elements.push_back (phases_.element (row, x, tap.x, tap.y));
+      KrigingFilter filter =
+          solve_kriging (covariance, observation_, taps, elements, noise);
+      for (int s = 0; s < observation_.slots (); s++)
+        plain_.set (row, x, s,
+            std::span (filter.slots)
+                .subspan (std::size_t (s) * taps.size (), taps.size ()));
+    }
+  }
+}
+
+Field &
+Engine::next ()
+{
+  if (spare_.empty ())
+    spare_ = Field (width_, height_, radius_);
+  return spare_;
+}
+
+const float *
+Engine::gain (int y) const
+{
+  return gain_.empty () ? nullptr : gain_.row (y);
+}
+
+void
+Engine::take ()
+{
+  float *origin = spare_.row (0);
+  for (const Repeat &repeat : margin_)
+    origin[repeat.to] = origin[repeat.from];
+  queue_.push_back (std::exchange (spare_, Field ()));
+}
+
+/* Where the picture stands still it is the same in every slot. */
+void
+Engine::blend (int y, float *const *rows) const
+{
+  const float *weight = stillness_.weight (y), *light = stillness_.light (y);
+  for (int s = 0; s < slots (); s++)
+    for (int x = 0; x < width_; x++)
+      rows[s][x] += weight[x] * (light[x] - rows[s][x]);
+}
+
+void
+Engine::fuse (const RowSink &sink)
+{
+  const Field &coded = queue_.front ();
+  stillness_.take (
+      coded, queue_.size () > 1 ? &queue_[1] : nullptr, noise_);
+
+  const std::vector<std::ptrdiff_t> offsets = plain_.offsets (coded);
+  Field rows_of_slots (width_, slots ());
+  std::vector<float *> rows;
+  for (int s = 0; s < slots (); s++)
+    rows.push_back (rows_of_slots.row (s));
+  for (int y = 0; y < height_; y++) {
+    kernels_.filter (plain_.row (phases_, coded, y, offsets), rows.data ());
+    blend (y, rows.data ());
+    sink (y, rows.data ());
+  }
+  spare_ = std::move (queue_.front ());
+  queue_.pop_front ();
+}
+
+void
+Engine::forget ()
+{
+  queue_.clear ();
+  stillness_.forget ();
+}
+
+} // namespace cexp::fuse

@@ -1,0 +1,74 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Fusion of light, before and after it is pixels. */
+#pragma once
+
+#include <deque>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "base/result.h"
+#include "fuse/field.h"
+#include "fuse/filter_bank.h"
+#include "fuse/fuser.h"
+#include "fuse/stillness.h"
+
+namespace cexp::fuse
+{
+
+/** Row @p y of every slot, of the frame's width, 255 for white. */
+using RowSink = std::function<void (int y, const float *const *slots)>;
+
+/** Light in the coded frame to light in every slot; see Fuser. */
+class Engine
+{
+public:
+  static Result<std::unique_ptr<Engine>> make (const Schedule &schedule,
+      int width, int height, const FuseOptions &options, double steps);
+
+  int slots () const { return observation_.slots (); }
+  int width () const { return width_; }
+  int height () const { return height_; }
+
+  /** A field to write the next coded frame to, times gain () row by row. */
+  Field &next ();
+  /** What pixels of row @p y are to be multiplied by, beside 255 / white; null
+   * where that is 1. */
+  const float *gain (int y) const;
+  /** next () has been written. */
+  void take ();
+
+  int pending () const { return int (queue_.size ()); }
+  void fuse (const RowSink &sink);
+  void forget ();
+
+private:
+  Engine (const Schedule &schedule, int width, int height,
+      const FuseOptions &options, double steps);
+  void map_noise (const Schedule &schedule);
+  void find_margin (const Schedule &schedule);
+  void prepare_plain (const FuseOptions &options);
+  void blend (int y, float *const *rows) const;
+
+  int width_, height_;
+  Observation observation_;
+  Phases phases_;
+  const Kernels &kernels_;
+  int radius_;
+  FilterBank plain_;
+  NoiseMap noise_;
+  Field gain_; ///< empty where it is 1 everywhere
+  Stillness stillness_;
+
+  /* Pixels of the margin and the pixels of the same element that they repeat.
+   */
+  struct Repeat {
+    std::ptrdiff_t to, from;
+  };
+  std::vector<Repeat> margin_;
+
+  std::deque<Field> queue_;
+  Field spare_;
+};
+
+} // namespace cexp::fuse

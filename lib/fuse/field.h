@@ -1,0 +1,49 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* A plane of light with a margin, so that filters need no border. */
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+namespace cexp
+{
+
+/**
+ * width x height floats, 255 for white, with @p margin more on every side and
+ * kSlack after every row, which vectors may read and write in passing.
+ */
+class Field
+{
+public:
+  /** Floats of the widest vector. */
+  static constexpr int kSlack = 16;
+
+  Field () = default;
+  Field (int width, int height, int margin = 0)
+      : width_ (width), height_ (height), margin_ (margin),
+        stride_ (width + 2 * margin + kSlack),
+        values_ (std::size_t (stride_) * std::size_t (height + 2 * margin))
+  {
+  }
+
+  int width () const { return width_; }
+  int height () const { return height_; }
+  int margin () const { return margin_; }
+  std::ptrdiff_t stride () const { return stride_; } ///< in floats
+  /** Row @p y in -margin .. height + margin - 1, from x = 0. */
+  float *row (int y) { return values_.data () + start (y); }
+  const float *row (int y) const { return values_.data () + start (y); }
+  bool empty () const { return values_.empty (); }
+
+private:
+  std::ptrdiff_t start (int y) const
+  {
+    return (y + margin_) * stride_ + margin_;
+  }
+
+  int width_ = 0, height_ = 0, margin_ = 0;
+  std::ptrdiff_t stride_ = 0;
+  std::vector<float> values_;
+};
+
+} // namespace cexp

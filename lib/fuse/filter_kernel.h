@@ -1,0 +1,104 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Filter banks with weights that repeat along the row. */
+#pragma once
+
+#include "extract/vector.h"
+#include "fuse/kernels.h"
+
+namespace cexp::CEXP_TARGET
+{
+
+using Floats = Vector<float>;
+constexpr int kFloats = kLanes<float>;
+
+/* What becomes of a vector of an output. */
+struct Put {
+  CEXP_INLINE void operator() (float *to, int, Floats value) const
+  {
+    store (to, value);
+  }
+};
+struct Add {
+  const float *scale;
+  CEXP_INLINE void operator() (float *to, int x, Floats value) const
+  {
+    store (to, load (to) + load (scale + x) * value);
+  }
+};
+
+/* Outputs first .. first + Outputs - 1 of Vectors neighbouring vectors. */
+template <int Outputs, int Vectors, typename Finish>
+CEXP_INLINE void
+filter_vectors (const fuse::FilterRow &row, int first, int x, Finish finish,
+    float *const *outputs)
+{
+  Floats sum[Vectors][Outputs] = {};
+  const float *weights[Vectors];
+  for (int v = 0; v < Vectors; v++)
+    weights[v] = row.weights + first * row.width +
+                 (row.phase + x + v * kFloats) % row.period;
+  const std::ptrdiff_t step = std::ptrdiff_t (row.outputs) * row.width;
+  for (int t = 0; t < row.taps; t++) {
+    const float *from = row.source + x + row.offsets[t];
+    for (int v = 0; v < Vectors; v++) {
+      const Floats value = load (from + v * kFloats);
+      for (int k = 0; k < Outputs; k++)
+        sum[v][k] += load (weights[v] + k * row.width) * value;
+      weights[v] += step;
+    }
+  }
+  for (int v = 0; v < Vectors; v++)
+    for (int k = 0; k < Outputs; k++)
+      finish (outputs[first + k] + x + v * kFloats, x + v * kFloats, sum[v][k]);
+}
+
+/* A pair of vectors hides the latency of the sums where there are few. */
+template <int Outputs, typename Finish, typename Wanted>
+CEXP_INLINE void
+filter_outputs (const fuse::FilterRow &row, int first, Finish finish,
+    Wanted wanted, float *const *outputs)
+{
+  constexpr int kPair = Outputs <= 4 ? 2 : 1;
+  int x = 0;
+  for (; x + kPair * kFloats <= row.count; x += kPair * kFloats)
+    if (wanted (x, kPair * kFloats))
+      filter_vectors<Outputs, kPair> (row, first, x, finish, outputs);
+  for (; x < row.count; x += kFloats)
+    if (wanted (x, kFloats))
+      filter_vectors<Outputs, 1> (row, first, x, finish, outputs);
+}
+
+template <typename Finish, typename Wanted>
+CEXP_INLINE void
+filter_all (const fuse::FilterRow &row, Finish finish, Wanted wanted,
+    float *const *outputs)
+{
+  int first = 0;
+  for (; first + 8 <= row.outputs; first += 8)
+    filter_outputs<8> (row, first, finish, wanted, outputs);
+  for (; first + 4 <= row.outputs; first += 4)
+    filter_outputs<4> (row, first, finish, wanted, outputs);
+  for (; first < row.outputs; first++)
+    filter_outputs<1> (row, first, finish, wanted, outputs);
+}
+
+inline void
+filter (const fuse::FilterRow &row, float *const *outputs)
+{
+  filter_all (row, Put (), [] (int, int) { return true; }, outputs);
+}
+
+inline void
+filter_add (
+    const fuse::FilterRow &row, const float *scale, float *const *outputs)
+{
+  const auto wanted = [scale] (int x, int count) {
+    for (int i = x; i < x + count; i++)
+      if (scale[i] != 0.0f)
+        return true;
+    return false;
+  };
+  filter_all (row, Add{scale}, wanted, outputs);
+}
+
+} // namespace cexp::CEXP_TARGET

@@ -1,0 +1,46 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "fuse/kernels.h"
+
+#include <vector>
+
+#include "fuse/reference.h"
+
+#define CEXP_DECLARE(target)                                                   \
+  namespace cexp::target                                                       \
+  {                                                                            \
+  extern const fuse::Kernels kernels;                                          \
+  }
+
+#if defined __x86_64__
+CEXP_DECLARE (fuse_avx512)
+CEXP_DECLARE (fuse_avx2)
+#endif
+CEXP_DECLARE (fuse_baseline)
+
+namespace cexp::fuse
+{
+
+static std::vector<Kernels>
+find_kernels ()
+{
+  std::vector<Kernels> found;
+#if defined __x86_64__
+  if (__builtin_cpu_supports ("avx512f") && __builtin_cpu_supports ("avx512dq"))
+    found.push_back (fuse_avx512::kernels);
+  if (__builtin_cpu_supports ("avx2"))
+    found.push_back (fuse_avx2::kernels);
+#endif
+  found.push_back (fuse_baseline::kernels);
+  found.push_back (
+      {"scalar", reference_filter, reference_filter_add, reference_shrink});
+  return found;
+}
+
+std::span<const Kernels>
+supported_kernels ()
+{
+  static const std::vector<Kernels> kernels = find_kernels ();
+  return kernels;
+}
+
+} // namespace cexp::fuse

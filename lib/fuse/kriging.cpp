@@ -1,0 +1,234 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "fuse/kriging.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace cexp
+{
+
+namespace
+{
+
+/* sum over s, t of a_s b_t c (s - t), c given for differences from 1 - n. */
+template <typename Correlation>
+double
+weigh (const Observation &observation, int a, int b, Correlation c)
+{
+  const int n = observation.slots ();
+  double sum = 0.0;
+  for (int s = 0; s < n; s++) {
+    const double factor = observation.response (a, s);
+    for (int t = 0; t < n && factor != 0.0; t++)
+      if (observation.response (b, t) != 0.0)
+        sum += factor * observation.response (b, t) * c (s - t);
+  }
+  return sum;
+}
+
+template <typename Correlation>
+double
+weigh_slot (const Observation &observation, int a, int slot, Correlation c)
+{
+  double sum = 0.0;
+  for (int s = 0; s < observation.slots (); s++)
+    if (observation.response (a, s) != 0.0)
+      sum += observation.response (a, s) * c (s - slot);
+  return sum;
+}
+
+/* A symmetric positive definite matrix, factored in place: L L^T. */
+class Cholesky
+{
+public:
+  Cholesky (std::vector<double> matrix, int size)
+      : l_ (std::move (matrix)), size_ (size)
+  {
+    for (int i = 0; i < size_; i++) {
+      for (int j = 0; j < i; j++)
+        row (i)[j] = (row (i)[j] - dot (row (i), row (j), j)) / row (j)[j];
+      row (i)[i] = std::sqrt (row (i)[i] - dot (row (i), row (i), i));
+    }
+  }
+
+  /* Replaces each of @count right-hand sides, columns of @b, by its solution.
+   */
+  void solve (std::vector<double> &b, int count) const
+  {
+    for (int i = 0; i < size_; i++) {
+      for (int j = 0; j < i; j++)
+        subtract (b, count, i, j, row (i)[j]);
+      divide (b, count, i);
+    }
+    for (int i = size_ - 1; i >= 0; i--) {
+      for (int j = i + 1; j < size_; j++)
+        subtract (b, count, i, j, row (j)[i]);
+      divide (b, count, i);
+    }
+  }
+
+private:
+  double *row (int i) { return l_.data () + std::size_t (i * size_); }
+  const double *row (int i) const
+  {
+    return l_.data () + std::size_t (i * size_);
+  }
+  static double dot (const double *a, const double *b, int count)
+  {
+    double sum = 0.0;
+    for (int i = 0; i < count; i++)
+      sum += a[i] * b[i];
+    return sum;
+  }
+  static void subtract (
+      std::vector<double> &b, int count, int to, int from, double factor)
+  {
+    double *out = b.data () + std::size_t (to * count);
+    const double *in = b.data () + std::size_t (from * count);
+    for (int k = 0; k < count; k++)
+      out[k] -= factor * in[k];
+  }
+  void divide (std::vector<double> &b, int count, int i) const
+  {
+    double *out = b.data () + std::size_t (i * count);
+    for (int k = 0; k < count; k++)
+      out[k] /= row (i)[i];
+  }
+
+  std::vector<double> l_;
+  int size_;
+};
+
+} // namespace
+
+Covariance::Covariance (
+    const SceneClass &patch, const Observation &observation, int reach)
+    : n_ (observation.slots ()), reach_ (reach),
+      moving_ (patch.vx != 0.0 || patch.vy != 0.0)
+{
+  if (moving_)
+    fill_moving (patch, observation);
+  else
+    fill_still (patch, observation);
+}
+
+/* Space and time part where nothing moves. */
+void
+Covariance::fill_still (
+    const SceneClass &patch, const Observation &observation)
+{
+  for (int dy = -reach_; dy <= reach_; dy++)
+    for (int dx = -reach_; dx <= reach_; dx++)
+      space_.push_back (scene_correlation (patch, dx, dy, 0));
+  const auto time = [&] (int slots) {
+    return std::pow (patch.correlation, std::abs (slots));
+  };
+  for (int a = 0; a < n_; a++) {
+    for (int b = 0; b < n_; b++) {
+      coded_.push_back (weigh (observation, a, b, time));
+      cross_.push_back (weigh_slot (observation, a, b, time));
+    }
+  }
+}
+
+void
+Covariance::fill_moving (
+    const SceneClass &patch, const Observation &observation)
+{
+  std::vector<double> at (std::size_t (2 * n_ - 1));
+  for (int dy = -reach_; dy <= reach_; dy++) {
+    for (int dx = -reach_; dx <= reach_; dx++) {
+      for (int d = 1 - n_; d < n_; d++)
+        at[std::size_t (d + n_ - 1)] = scene_correlation (patch, dx, dy, d);
+      const auto of = [&] (int d) { return at[std::size_t (d + n_ - 1)]; };
+      for (int a = 0; a < n_; a++) {
+        for (int b = 0; b < n_; b++) {
+          coded_.push_back (weigh (observation, a, b, of));
+          cross_.push_back (weigh_slot (observation, a, b, of));
+        }
+      }
+    }
+  }
+}
+
+/* With C the covariance of the taps and c theirs with what is sought:
+ * w = C^-1 (c + lambda 1) such that the weights sum to 1, so that flat light
+ * comes out as it is. The residual is row `middle` of the inverse of the
+ * bordered matrix, scaled. */
+KrigingFilter
+solve_kriging (const Covariance &covariance, const Observation &observation,
+    std::span<const Offset> taps, std::span<const int> elements,
+    std::span<const double> noise)
+{
+  const int m = int (taps.size ()), n = observation.slots ();
+  std::vector<double> matrix;
+  matrix.reserve (std::size_t (m * m));
+  std::size_t middle = 0;
+  for (int i = 0; i < m; i++) {
+    const Offset a = taps[std::size_t (i)];
+    const int element = elements[std::size_t (i)];
+    if (a == Offset{})
+      middle = std::size_t (i);
+    for (int j = 0; j < m; j++) {
+      const Offset b = taps[std::size_t (j)];
+      matrix.push_back (covariance.coded (
+          a.x - b.x, a.y - b.y, element, elements[std::size_t (j)]));
+    }
+    matrix[std::size_t (i * m + i)] += noise[std::size_t (element)];
+  }
+
+  const int columns = n + 2;
+  std::vector<double> right;
+  right.reserve (std::size_t (m * columns));
+  for (std::size_t i = 0; i < taps.size (); i++) {
+    for (int s = 0; s < n; s++)
+      right.push_back (
+          covariance.cross (taps[i].x, taps[i].y, elements[i], s));
+    right.push_back (1.0);
+    right.push_back (i == middle ? 1.0 : 0.0);
+  }
+  Cholesky (std::move (matrix), m).solve (right, columns);
+
+  const auto at = [&] (std::size_t i, int column) {
+    return right[i * std::size_t (columns) + std::size_t (column)];
+  };
+  std::vector<double> flat (std::size_t (columns), 0.0);
+  for (std::size_t i = 0; i < taps.size (); i++)
+    for (int k = 0; k < columns; k++)
+      flat[std::size_t (k)] += at (i, k);
+  const double flat_flat = flat[std::size_t (n)];
+
+  KrigingFilter filter;
+  for (int s = 0; s < n; s++) {
+    const double lambda = (1.0 - flat[std::size_t (s)]) / flat_flat;
+    const bool known = observation.exact () && observation.noise_free () &&
+                       observation.response (elements[middle], s) == 1.0;
+    if (known) {
+      for (std::size_t i = 0; i < taps.size (); i++)
+        filter.slots.push_back (i == middle ? 1.0f : 0.0f);
+      continue;
+    }
+    for (std::size_t i = 0; i < taps.size (); i++)
+      filter.slots.push_back (float (at (i, s) + lambda * at (i, n)));
+  }
+  const double share = flat[std::size_t (n + 1)] / flat_flat;
+  const auto inverse = [&] (std::size_t i) {
+    return at (i, n + 1) - share * at (i, n);
+  };
+  for (std::size_t i = 0; i < taps.size (); i++)
+    filter.residual.push_back (float (-inverse (i) / inverse (middle)));
+  return filter;
+}
+
+std::vector<Offset>
+disc (int radius)
+{
+  std::vector<Offset> places;
+  for (int y = -radius; y <= radius; y++)
+    for (int x = -radius; x <= radius; x++)
+      if (x * x + y * y <= (radius + 0.5) * (radius + 0.5))
+        places.push_back ({x, y});
+  return places;
+}
+
+} // namespace cexp

@@ -1,0 +1,169 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "fuse/reference.h"
+
+#include <cmath>
+
+#include "fuse/dct.h"
+
+namespace cexp::fuse
+{
+
+namespace
+{
+
+float
+filtered (const FilterRow &row, int x, int k)
+{
+  float sum = 0.0f;
+  for (int t = 0; t < row.taps; t++)
+    sum += row.weights[(t * row.outputs + k) * row.width +
+                       (row.phase + x) % row.period] *
+           row.source[x + row.offsets[t]];
+  return sum;
+}
+
+void
+dct (float *values, int step)
+{
+  constexpr int kHalf = kBlock / 2;
+  float sum[kHalf], difference[kHalf];
+  for (int i = 0; i < kHalf; i++) {
+    const float a = values[i * step], b = values[(kBlock - 1 - i) * step];
+    sum[i] = a + b;
+    difference[i] = a - b;
+  }
+  for (int k = 0; k < kBlock; k++) {
+    float value = 0.0f;
+    for (int i = 0; i < kHalf; i++)
+      value += kDct.at[k][i] * (k % 2 ? difference[i] : sum[i]);
+    values[k * step] = value;
+  }
+}
+
+void
+undo_dct (float *values, int step)
+{
+  constexpr int kHalf = kBlock / 2;
+  float out[kBlock];
+  for (int i = 0; i < kHalf; i++) {
+    float part[2] = {};
+    for (int k = 0; k < kBlock; k++)
+      part[k % 2] += kDct.at[k][i] * values[k * step];
+    out[i] = part[0] + part[1];
+    out[kBlock - 1 - i] = part[0] - part[1];
+  }
+  for (int i = 0; i < kBlock; i++)
+    values[i * step] = out[i];
+}
+
+/* A block of its own: value of slot s at (x, y). */
+class Block
+{
+public:
+  Block (const ShrinkRow &row, int lane) : row_ (row), lane_ (lane) {}
+
+  float &at (int s, int y, int x)
+  {
+    return row_.scratch[(s * kBlock + y) * kBlock + x];
+  }
+  std::ptrdiff_t place (int y, int x) const
+  {
+    return y * row_.stride + (x % kBlockStep) * row_.split + x / kBlockStep +
+           lane_;
+  }
+  void transform_slots (int y, int x, bool back)
+  {
+    float in[16] = {};
+    for (int s = 0; s < row_.slots; s++)
+      in[s] = at (s, y, x);
+    for (int k = 0; k < row_.slots; k++) {
+      float sum = 0.0f;
+      for (int s = 0; s < row_.slots; s++)
+        sum += row_.slot_transform[back ? s * row_.slots + k
+                                        : k * row_.slots + s] *
+               in[s];
+      at (k, y, x) = sum;
+    }
+  }
+  void read ()
+  {
+    for (int s = 0; s < row_.slots; s++) {
+      for (int y = 0; y < kBlock; y++)
+        for (int x = 0; x < kBlock; x++)
+          at (s, y, x) = row_.source[s][place (y, x)];
+      for (int y = 0; y < kBlock; y++)
+        dct (&at (s, y, 0), 1);
+      for (int x = 0; x < kBlock; x++)
+        dct (&at (s, 0, x), kBlock);
+    }
+  }
+  /* Returns how many coefficients are left. */
+  int shrink ()
+  {
+    int kept = 0;
+    for (int y = 0; y < kBlock; y++) {
+      for (int x = 0; x < kBlock; x++) {
+        transform_slots (y, x, false);
+        for (int s = 0; s < row_.slots; s++) {
+          const bool mean = s == 0 && y == 0 && x == 0;
+          if (mean || std::abs (at (s, y, x)) > row_.threshold)
+            kept++;
+          else
+            at (s, y, x) = 0.0f;
+        }
+        transform_slots (y, x, true);
+      }
+    }
+    return kept;
+  }
+  void add (float weight)
+  {
+    for (int s = 0; s < row_.slots; s++) {
+      for (int x = 0; x < kBlock; x++)
+        undo_dct (&at (s, 0, x), kBlock);
+      for (int y = 0; y < kBlock; y++) {
+        undo_dct (&at (s, y, 0), 1);
+        for (int x = 0; x < kBlock; x++)
+          row_.sum[s][place (y, x)] += weight * at (s, y, x);
+      }
+    }
+    for (int y = 0; y < kBlock; y++)
+      for (int x = 0; x < kBlock; x++)
+        row_.weight[place (y, x)] += weight;
+  }
+
+private:
+  const ShrinkRow &row_;
+  int lane_;
+};
+
+} // namespace
+
+void
+reference_filter (const FilterRow &row, float *const *outputs)
+{
+  for (int k = 0; k < row.outputs; k++)
+    for (int x = 0; x < row.count; x++)
+      outputs[k][x] = filtered (row, x, k);
+}
+
+void
+reference_filter_add (
+    const FilterRow &row, const float *scale, float *const *outputs)
+{
+  for (int k = 0; k < row.outputs; k++)
+    for (int x = 0; x < row.count; x++)
+      outputs[k][x] += scale[x] * filtered (row, x, k);
+}
+
+void
+reference_shrink (const ShrinkRow &row)
+{
+  for (int lane = 0; lane < row.blocks; lane++) {
+    Block block (row, lane);
+    block.read ();
+    block.add (1.0f / float (block.shrink ()));
+  }
+}
+
+} // namespace cexp::fuse

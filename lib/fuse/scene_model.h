@@ -1,0 +1,47 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* What is believed of scenes before a frame is seen: how alike two points of
+ * them are. */
+#pragma once
+
+#include <vector>
+
+namespace cexp
+{
+
+/**
+ * A kind of patch: a stationary Gaussian process that moves at a constant
+ * velocity and slowly becomes another.
+ *
+ * The correlation of two points is Matern (distance in the moving patch /
+ * length) times correlation ^ |slots between them|.
+ */
+struct SceneClass {
+  double vx = 0.0, vy = 0.0; ///< px per slot
+  double length = 5.0;       ///< px
+  double smoothness = 1.5;   ///< Matern order: 1 or 1.5
+  double correlation = 0.85; ///< per slot, in (0, 1]
+
+  bool operator== (const SceneClass &) const = default;
+};
+
+/** Correlation of two points of a patch that lie @p dx, @p dy px and @p slots
+ * apart. */
+double scene_correlation (
+    const SceneClass &patch, double dx, double dy, double slots);
+
+/** The classes that fusion chooses from. */
+struct SceneModel {
+  /** What `fast` takes everything for; codedexposure train finds it. */
+  SceneClass plain;
+  /** Standard deviation of a scene as a part of white: how far noise is
+   * believed to be below the scene. */
+  double contrast = 0.13;
+
+  bool operator== (const SceneModel &) const = default;
+};
+
+/** Still and moving patches for motion-adaptive fusion, @p fine or only those
+ * at whole pixels of up to 2 px per slot. */
+std::vector<SceneClass> motion_classes (bool fine);
+
+} // namespace cexp

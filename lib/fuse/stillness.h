@@ -1,0 +1,56 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Where nothing moves: found by comparing coded frames with each other. */
+#pragma once
+
+#include "fuse/field.h"
+#include "fuse/observation.h"
+
+namespace cexp::fuse
+{
+
+/** Noise of every pixel of a frame: variance = slope * light + offset, in
+ * units of the fields (255 for white). */
+struct NoiseMap {
+  Field slope, offset;
+};
+
+/**
+ * A pixel sees the same slots of every frame. Where it and all pixels around
+ * it, of every other slot, have not changed by more than noise explains, the
+ * picture stands still, and the coded frame is the picture, whatever its
+ * texture; no aliasing can mislead this comparison.
+ *
+ * The light of still pixels is averaged over frames, as far back as they stood
+ * still, where the noise is known.
+ */
+class Stillness
+{
+public:
+  /** @p cell  of the tile: the surroundings hold every slot. */
+  Stillness (int width, int height, Extent cell, bool average);
+
+  /** Takes the next coded frame; a frame after it, or null, as well. */
+  void take (const Field &coded, const Field *after, const NoiseMap &noise);
+  /** Forgets all frames. */
+  void forget () { begun_ = false; }
+
+  /** How far to believe in light (): 0 to 1. */
+  const float *weight (int y) const { return weight_.row (y); }
+  /** The picture where it stands still. */
+  const float *light (int y) const { return mean_.row (y); }
+
+private:
+  void compare (const Field &now, const Field &other, const Field *count,
+      const NoiseMap &noise);
+  void judge (Field &weight, bool raise);
+
+  int radius_;
+  bool average_;
+  bool begun_ = false;
+  Field mean_;  ///< of the frames in which a pixel stood still
+  Field count_; ///< of these frames
+  Field change_, rows_sum_, rows_most_; ///< while judging
+  Field weight_;
+};
+
+} // namespace cexp::fuse

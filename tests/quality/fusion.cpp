@@ -1,0 +1,124 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "fusion.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <iostream>
+
+namespace cexp::quality
+{
+
+namespace
+{
+
+/* Sums over squares of kWindow x kWindow, from the sums over a corner. */
+class Sums
+{
+public:
+  template <typename F>
+  Sums (int width, int height, F &&value)
+      : width_ (width + 1), sums_ (std::size_t ((width + 1) * (height + 1)))
+  {
+    for (int y = 0; y < height; y++)
+      for (int x = 0; x < width; x++)
+        at (x + 1, y + 1) = value (x, y) + at (x, y + 1) + at (x + 1, y) -
+                            at (x, y);
+  }
+  double over (int x, int y, int size)
+  {
+    return at (x + size, y + size) - at (x, y + size) - at (x + size, y) +
+           at (x, y);
+  }
+
+private:
+  double &at (int x, int y)
+  {
+    return sums_[std::size_t (y * width_ + x)];
+  }
+  int width_;
+  std::vector<double> sums_;
+};
+
+} // namespace
+
+double
+ssim (ImageView<const std::uint8_t> a, ImageView<const std::uint8_t> b)
+{
+  constexpr int kWindow = 7;
+  constexpr double kArea = kWindow * kWindow;
+  constexpr double kC1 = 0.01 * 255 * 0.01 * 255, kC2 = 0.03 * 255 * 0.03 * 255;
+  const auto sums = [&] (auto value) {
+    return Sums (a.width, a.height, [&] (int x, int y) {
+      return value (double (a.at (x, y)), double (b.at (x, y)));
+    });
+  };
+  Sums sum_a = sums ([] (double p, double) { return p; });
+  Sums sum_b = sums ([] (double, double q) { return q; });
+  Sums sum_aa = sums ([] (double p, double) { return p * p; });
+  Sums sum_bb = sums ([] (double, double q) { return q * q; });
+  Sums sum_ab = sums ([] (double p, double q) { return p * q; });
+
+  double total = 0.0;
+  for (int y = 0; y + kWindow <= a.height; y++) {
+    for (int x = 0; x + kWindow <= a.width; x++) {
+      const auto mean = [&] (Sums &s) { return s.over (x, y, kWindow) / kArea; };
+      const double ma = mean (sum_a), mb = mean (sum_b);
+      const double unbiased = kArea / (kArea - 1);
+      const double va = unbiased * (mean (sum_aa) - ma * ma);
+      const double vb = unbiased * (mean (sum_bb) - mb * mb);
+      const double vab = unbiased * (mean (sum_ab) - ma * mb);
+      total += (2 * ma * mb + kC1) * (2 * vab + kC2) /
+               ((ma * ma + mb * mb + kC1) * (va + vb + kC2));
+    }
+  }
+  return total / ((a.width - kWindow + 1) * (a.height - kWindow + 1));
+}
+
+FrameMean
+compare (const std::vector<Picture> &frames, const std::vector<Picture> &truth)
+{
+  FrameMean mean;
+  for (std::size_t i = 0; i < frames.size (); i++) {
+    PooledError error;
+    for (int y = 0; y < frames[i].height (); y++)
+      for (int x = 0; x < frames[i].width (); x++)
+        error.add (frames[i].at (x, y), truth[i].at (x, y));
+    mean.psnr += std::min (error.psnr (), 99.0) / double (frames.size ());
+    mean.ssim += ssim (frames[i].view (), truth[i].view ()) /
+                 double (frames.size ());
+  }
+  return mean;
+}
+
+std::vector<Picture>
+fuse (const std::vector<Picture> &coded, const Schedule &schedule,
+    const FuseOptions &options)
+{
+  auto fuser = Fuser<std::uint8_t>::make (
+      schedule, coded[0].width (), coded[0].height (), options);
+  if (!fuser) {
+    std::cerr << fuser.error ().message << '\n';
+    std::abort ();
+  }
+  std::vector<Picture> frames;
+  const auto fuse_one = [&] {
+    std::vector<Picture> slots (std::size_t (fuser->slots ()),
+        Picture (coded[0].width (), coded[0].height ()));
+    std::vector<ImageView<std::uint8_t>> views;
+    for (Picture &slot : slots)
+      views.push_back (slot.view ());
+    fuser->fuse (views);
+    std::ranges::move (slots, std::back_inserter (frames));
+  };
+  for (const Picture &frame : coded) {
+    fuser->take (frame.view ());
+    if (fuser->pending () > options.lookahead)
+      fuse_one ();
+  }
+  while (fuser->pending () > 0)
+    fuse_one ();
+  return frames;
+}
+
+} // namespace cexp::quality

@@ -1,0 +1,33 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* How true fused frames are. */
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "fuse/fuser.h"
+#include "scene.h"
+#include "trial.h"
+
+namespace cexp::quality
+{
+
+/** Mean over frames of figures that are of one frame each, as the literature
+ * on compressed video gives them. */
+struct FrameMean {
+  double psnr = 0.0; ///< dB, peak 255
+  double ssim = 0.0;
+};
+
+/** Structural similarity (Wang et al., 2004) with uniform windows of 7x7, their
+ * sample covariance, K1 = 0.01, K2 = 0.03, without the border. */
+double ssim (ImageView<const std::uint8_t> a, ImageView<const std::uint8_t> b);
+
+FrameMean compare (
+    const std::vector<Picture> &frames, const std::vector<Picture> &truth);
+
+/** Fused frames of all coded frames of a stream. */
+std::vector<Picture> fuse (const std::vector<Picture> &coded,
+    const Schedule &schedule, const FuseOptions &options);
+
+} // namespace cexp::quality

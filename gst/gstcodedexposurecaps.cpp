@@ -207,6 +207,15 @@ scale_structure (GstStructure *structure, const CapsScale &scale)
          scale_field (structure, "pixel-aspect-ratio", aspect);
 }
 
+bool
+has_rate (const GstStructure *structure)
+{
+  gint num = 1, den = 1;
+  return gst_structure_has_field (structure, "framerate") &&
+         !(gst_structure_get_fraction (structure, "framerate", &num, &den) &&
+             num == 0);
+}
+
 } // namespace
 
 CapsScale
@@ -253,6 +262,52 @@ scale_caps (GstCaps *caps, const CapsScale &scale)
     scaled = gst_caps_merge_structure_full (scaled, structure, features);
   }
   return scaled;
+}
+
+CapsPtr
+unbind_caps (GstCaps *caps)
+{
+  if (gst_caps_is_any (caps))
+    return CapsPtr (gst_caps_ref (caps));
+  CapsPtr free (gst_caps_copy (caps));
+  for (guint i = 0; i < gst_caps_get_size (free.get ()); i++)
+    gst_structure_remove_fields (gst_caps_get_structure (free.get (), i),
+        "framerate", "max-framerate", "width", "height", "pixel-aspect-ratio",
+        nullptr);
+  return free;
+}
+
+CapsPtr
+intersect_caps (GstCaps *preferred, GstCaps *other)
+{
+  return CapsPtr (
+      gst_caps_intersect_full (preferred, other, GST_CAPS_INTERSECT_FIRST));
+}
+
+CapsPtr
+admit_unknown_rate (SaidRate rate, CapsPtr caps)
+{
+  if (rate.num == 0 || gst_caps_is_any (caps.get ()))
+    return caps;
+  const CapsPtr said (gst_caps_new_simple ("video/x-raw", "framerate",
+      GST_TYPE_FRACTION, rate.num, rate.den, nullptr));
+  const CapsPtr at_rate = intersect_caps (caps.get (), said.get ());
+  GstCaps *unknown = gst_caps_copy (at_rate.get ());
+  gst_caps_set_simple (unknown, "framerate", GST_TYPE_FRACTION, 0, 1, nullptr);
+  return CapsPtr (gst_caps_merge (caps.release (), unknown));
+}
+
+CapsPtr
+fill_in_rate (SaidRate rate, GstCaps *caps)
+{
+  CapsPtr filled (gst_caps_copy (caps));
+  for (guint i = 0; i < gst_caps_get_size (filled.get ()); i++) {
+    GstStructure *structure = gst_caps_get_structure (filled.get (), i);
+    if (rate.num > 0 && !has_rate (structure))
+      gst_structure_set (structure, "framerate", GST_TYPE_FRACTION, rate.num,
+          rate.den, nullptr);
+  }
+  return filled;
 }
 
 } // namespace cexp::gst

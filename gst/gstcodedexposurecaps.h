@@ -5,6 +5,7 @@
 #include <gst/gst.h>
 #include <gst/video/video.h>
 
+#include "gstraii.h"
 #include "schedule/schedule.h"
 
 /** Template of every pad of the plugin: GRAY8 and GRAY16_LE at any size and
@@ -43,5 +44,20 @@ CapsScale coded_to_subframes (const Schedule &schedule, bool raised_rate);
  * of 0/1 stays. Transfer: full.
  */
 GstCaps *scale_caps (GstCaps *caps, const CapsScale &scale);
+
+/** @p caps without the fields that a schedule changes. */
+CapsPtr unbind_caps (GstCaps *caps);
+/** In the order of @p preferred. */
+CapsPtr intersect_caps (GstCaps *preferred, GstCaps *other);
+
+/** The frame rate that the user gives to coded frames whose caps have none;
+ * 0/1: none. */
+struct SaidRate {
+  int num = 0, den = 1;
+};
+/** Where the user has said the rate, frames whose caps have none do as well. */
+CapsPtr admit_unknown_rate (SaidRate rate, CapsPtr caps);
+/** @p caps with the rate the user has said where they have none. */
+CapsPtr fill_in_rate (SaidRate rate, GstCaps *caps);
 
 } // namespace cexp::gst

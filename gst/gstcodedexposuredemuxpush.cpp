@@ -345,36 +345,6 @@ render (GstCodedExposureDemux *self, Job &job, std::vector<Targets> &targets)
   return GST_FLOW_OK;
 }
 
-struct MetaCopy {
-  GstBuffer *to;
-  GstVideoInfo from_info, to_info;
-};
-
-/* Carries a meta of the coded frame over, unless it describes memory that is
- * not the subframe's. What speaks of places in the picture is scaled. */
-gboolean
-copy_meta (GstBuffer *from, GstMeta **meta, gpointer user_data)
-{
-  auto &copy = *static_cast<MetaCopy *> (user_data);
-  const GstMetaInfo *info = (*meta)->info;
-  if (!info->transform_func || info->api == GST_VIDEO_META_API_TYPE ||
-      info->api == GST_VIDEO_CROP_META_API_TYPE ||
-      info->api == GST_PARENT_BUFFER_META_API_TYPE ||
-      gst_meta_api_type_has_tag (
-          info->api, g_quark_from_static_string (GST_META_TAG_MEMORY_STR)))
-    return TRUE;
-  if (gst_meta_api_type_has_tag (info->api,
-          g_quark_from_static_string (GST_META_TAG_VIDEO_SIZE_STR))) {
-    GstVideoMetaTransform scale{&copy.from_info, &copy.to_info};
-    info->transform_func (copy.to, *meta, from,
-        gst_video_meta_transform_scale_get_quark (), &scale);
-    return TRUE;
-  }
-  GstMetaTransformCopy whole{FALSE, 0, gsize (-1)};
-  info->transform_func (copy.to, *meta, from, _gst_meta_transform_copy, &whole);
-  return TRUE;
-}
-
 /* What all pads that get subframe @k see alike. */
 void
 describe_subframe (GstCodedExposureDemux *self, const Job &job, std::size_t k,
@@ -383,8 +353,7 @@ describe_subframe (GstCodedExposureDemux *self, const Job &job, std::size_t k,
   const Plan &plan = *state (self).stream.plan;
   gst_buffer_copy_into (outbuf, job.inbuf, GST_BUFFER_COPY_FLAGS, 0, -1);
   GST_BUFFER_FLAG_UNSET (outbuf, GST_BUFFER_FLAG_MARKER);
-  MetaCopy copy{outbuf, plan.coded, plan.subframe};
-  gst_buffer_foreach_meta (job.inbuf, copy_meta, &copy);
+  copy_metas (job.inbuf, plan.coded, outbuf, plan.subframe);
 
   FrameMeta meta = job.meta;
   meta.subframe = gint (k);
@@ -441,8 +410,7 @@ share (const Plan &plan, const Output &output, GstBuffer *outbuf)
   gst_buffer_copy_into (packed.get (), outbuf,
       GstBufferCopyFlags (GST_BUFFER_COPY_FLAGS | GST_BUFFER_COPY_TIMESTAMPS),
       0, -1);
-  MetaCopy copy{packed.get (), plan.subframe, plan.subframe};
-  gst_buffer_foreach_meta (outbuf, copy_meta, &copy);
+  copy_metas (outbuf, plan.subframe, packed.get (), plan.subframe);
   MappedFrame from (plan.subframe, outbuf, GST_MAP_READ);
   MappedFrame to (plan.subframe, packed.get (), GST_MAP_WRITE);
   if (from && to)

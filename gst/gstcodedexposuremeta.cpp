@@ -4,6 +4,39 @@
 namespace cexp::gst
 {
 
+namespace
+{
+
+struct MetaCopy {
+  GstBuffer *to;
+  GstVideoInfo from_info, to_info;
+};
+
+gboolean
+copy_meta (GstBuffer *from, GstMeta **meta, gpointer user_data)
+{
+  auto &copy = *static_cast<MetaCopy *> (user_data);
+  const GstMetaInfo *info = (*meta)->info;
+  if (!info->transform_func || info->api == GST_VIDEO_META_API_TYPE ||
+      info->api == GST_VIDEO_CROP_META_API_TYPE ||
+      info->api == GST_PARENT_BUFFER_META_API_TYPE ||
+      gst_meta_api_type_has_tag (
+          info->api, g_quark_from_static_string (GST_META_TAG_MEMORY_STR)))
+    return TRUE;
+  if (gst_meta_api_type_has_tag (info->api,
+          g_quark_from_static_string (GST_META_TAG_VIDEO_SIZE_STR))) {
+    GstVideoMetaTransform scale{&copy.from_info, &copy.to_info};
+    info->transform_func (copy.to, *meta, from,
+        gst_video_meta_transform_scale_get_quark (), &scale);
+    return TRUE;
+  }
+  GstMetaTransformCopy whole{FALSE, 0, gsize (-1)};
+  info->transform_func (copy.to, *meta, from, _gst_meta_transform_copy, &whole);
+  return TRUE;
+}
+
+} // namespace
+
 const char *const kFrameMetaName = "CodedExposureFrame";
 
 /* A custom meta is copied by every element that copies {"video"} metas, also
@@ -90,6 +123,14 @@ get_frame_meta (GstBuffer *buffer)
       G_TYPE_UINT64, &meta.lost_before, name.saturated, G_TYPE_UINT64,
       &meta.saturated, nullptr);
   return meta;
+}
+
+void
+copy_metas (GstBuffer *from, const GstVideoInfo &from_info, GstBuffer *to,
+    const GstVideoInfo &to_info)
+{
+  MetaCopy copy{to, from_info, to_info};
+  gst_buffer_foreach_meta (from, copy_meta, &copy);
 }
 
 } // namespace cexp::gst

@@ -6,6 +6,7 @@
 #include <string>
 
 #include <gst/gst.h>
+#include <gst/video/video.h>
 
 namespace cexp::gst
 {
@@ -42,5 +43,11 @@ void register_frame_meta ();
 /** Writes @p meta to @p buffer, which must be writable, over what was there. */
 void set_frame_meta (GstBuffer *buffer, const FrameMeta &meta);
 std::optional<FrameMeta> get_frame_meta (GstBuffer *buffer);
+
+/** Copies the metas of @p from to the picture @p to that was made of it, but
+ * those that describe memory. What speaks of places in the picture is scaled.
+ */
+void copy_metas (GstBuffer *from, const GstVideoInfo &from_info, GstBuffer *to,
+    const GstVideoInfo &to_info);
 
 } // namespace cexp::gst

@@ -3,6 +3,7 @@
 #include <gst/gst.h>
 
 #include "gstcodedexposuredemux.h"
+#include "gstcodedexposurefuse.h"
 #include "gstcodedexposurelog.h"
 #include "gstcodedexposuremeta.h"
 #include "gstcodedexposurescene.h"
@@ -18,6 +19,7 @@ plugin_init (GstPlugin *plugin)
   cexp::gst::register_frame_meta ();
   cexp::gst::register_stats_meta ();
   return GST_ELEMENT_REGISTER (codedexposure_demux, plugin) &&
+         GST_ELEMENT_REGISTER (codedexposure_fuse, plugin) &&
          GST_ELEMENT_REGISTER (codedexposure_log, plugin) &&
          GST_ELEMENT_REGISTER (codedexposure_scene, plugin) &&
          GST_ELEMENT_REGISTER (codedexposure_sim, plugin) &&

@@ -15,8 +15,9 @@ dct_matrix (int length)
   for (int k = 0; k < length; k++) {
     const double scale = std::sqrt ((k == 0 ? 1.0 : 2.0) / length);
     for (int i = 0; i < length; i++)
-      matrix.push_back (float (scale * std::cos (std::numbers::pi *
-                                           (2 * i + 1) * k / (2 * length))));
+      matrix.push_back (
+          float (scale *
+                 std::cos (std::numbers::pi * (2 * i + 1) * k / (2 * length))));
   }
   return matrix;
 }

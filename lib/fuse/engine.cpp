@@ -65,8 +65,22 @@ Engine::make (const Schedule &schedule, int width, int height,
   if (!find_kernels (options.target))
     return Error{"target " + in_quotes (options.target) +
                  " does not run on this machine; leave it empty"};
-  if (options.noise.full_well < 0.0 || options.noise.read_noise < 0.0)
-    return Error{"full well and read noise must not be negative"};
+  const auto within = [] (double value, double most) {
+    return value >= 0.0 && value <= most;
+  };
+  if (!within (options.noise.full_well, SensorNoise::kMaxFullWell) ||
+      !within (options.noise.read_noise, SensorNoise::kMaxReadNoise))
+    return Error{"a full well of " + real_text (options.noise.full_well) +
+                 " and a read noise of " +
+                 real_text (options.noise.read_noise) +
+                 " electrons: they must lie in 0..1e7 and 0..1e5"};
+  if (options.quality != FuseQuality::kFast &&
+      schedule.slots () > Fuser<std::uint8_t>::kMaxSlots)
+    return Error{"quality=" + std::string (quality_name (options.quality)) +
+                 " knows motion for " +
+                 std::to_string (Fuser<std::uint8_t>::kMaxSlots) +
+                 " slots at most, and " + schedule.text () + " has " +
+                 std::to_string (schedule.slots ()) + ": take quality=fast"};
   const Phases phases (schedule);
   if (phases.rows () * phases.period () > Fuser<std::uint8_t>::kMaxPhases)
     return Error{"the tile of " + schedule.text () + " has " +
@@ -119,8 +133,8 @@ void
 Engine::find_margin (const Schedule &schedule)
 {
   const Field field (width_, height_, radius_);
-  const int reach = std::max (
-      schedule.tile ().period_x (), schedule.tile ().period_y ());
+  const int reach =
+      std::max (schedule.tile ().period_x (), schedule.tile ().period_y ());
   const auto closest = [&] (int x, int y, int element) {
     Offset best{x, y};
     int least = 4 * reach * reach;
@@ -148,8 +162,8 @@ Engine::find_margin (const Schedule &schedule)
           observation_.exact ()
               ? image
               : closest (image.x, image.y, schedule.element_at (x, y));
-      margin_.push_back ({y * field.stride () + x,
-          from.y * field.stride () + from.x});
+      margin_.push_back (
+          {y * field.stride () + x, from.y * field.stride () + from.x});
     }
   }
 }
@@ -159,8 +173,7 @@ void
 Engine::prepare_plain (const FuseOptions &options)
 {
   const std::vector<Offset> taps = disc (radius_);
-  const Covariance covariance (
-      options.scene.plain, observation_, 2 * radius_);
+  const Covariance covariance (options.scene.plain, observation_, 2 * radius_);
   const double scene = options.scene.contrast * options.scene.contrast;
   std::vector<double> noise;
   for (int e = 0; e < observation_.slots (); e++)
@@ -219,8 +232,7 @@ void
 Engine::fuse (const RowSink &sink)
 {
   const Field &coded = queue_.front ();
-  stillness_.take (
-      coded, queue_.size () > 1 ? &queue_[1] : nullptr, noise_);
+  stillness_.take (coded, queue_.size () > 1 ? &queue_[1] : nullptr, noise_);
 
   const std::vector<std::ptrdiff_t> offsets = plain_.offsets (coded);
   Field rows_of_slots (width_, slots ());

@@ -32,9 +32,8 @@ FilterBank::row (const Phases &phases, const Field &source, int y,
 {
   const std::size_t start = std::size_t (phases.row_of (y)) * taps_.size () *
                             std::size_t (outputs_) * std::size_t (width_);
-  return {source.row (y), source.width (), offsets.data (),
-      int (taps_.size ()), weights_.data () + start, width_, outputs_, period_,
-      phases.shift (y)};
+  return {source.row (y), source.width (), offsets.data (), int (taps_.size ()),
+      weights_.data () + start, width_, outputs_, period_, phases.shift (y)};
 }
 
 std::vector<std::ptrdiff_t>

@@ -85,7 +85,8 @@ filter_all (const fuse::FilterRow &row, Finish finish, Wanted wanted,
 inline void
 filter (const fuse::FilterRow &row, float *const *outputs)
 {
-  filter_all (row, Put (), [] (int, int) { return true; }, outputs);
+  filter_all (
+      row, Put (), [] (int, int) { return true; }, outputs);
 }
 
 inline void

@@ -39,8 +39,8 @@ parse_quality (std::string_view name)
   for (int i = 0; i < int (std::size (kQualityNames)); i++)
     if (kQualityNames[i] == name)
       return FuseQuality (i);
-  return Error{"quality " + in_quotes (name) +
-               ": it must be fast, balanced or best"};
+  return Error{
+      "quality " + in_quotes (name) + ": it must be fast, balanced or best"};
 }
 
 std::vector<std::string_view>
@@ -71,8 +71,8 @@ Fuser<Pixel>::~Fuser () = default;
 
 template <typename Pixel>
 Result<Fuser<Pixel>>
-Fuser<Pixel>::make (const Schedule &schedule, int width, int height,
-    const FuseOptions &options)
+Fuser<Pixel>::make (
+    const Schedule &schedule, int width, int height, const FuseOptions &options)
 {
   constexpr int kBits = 8 * int (sizeof (Pixel));
   if (options.bits < 0 || options.bits > kBits)
@@ -80,12 +80,10 @@ Fuser<Pixel>::make (const Schedule &schedule, int width, int height,
                  ": pixels have 1 to " + std::to_string (kBits) +
                  ", and 0 stands for all of them"};
   const int largest = (1 << (options.bits ? options.bits : kBits)) - 1;
-  auto engine =
-      fuse::Engine::make (schedule, width, height, options, largest);
+  auto engine = fuse::Engine::make (schedule, width, height, options, largest);
   if (!engine)
     return engine.error ();
-  return Fuser (
-      std::make_unique<State> (std::move (*engine), float (largest)));
+  return Fuser (std::make_unique<State> (std::move (*engine), float (largest)));
 }
 
 template <typename Pixel>

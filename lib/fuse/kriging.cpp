@@ -15,14 +15,10 @@ template <typename Correlation>
 double
 weigh (const Observation &observation, int a, int b, Correlation c)
 {
-  const int n = observation.slots ();
   double sum = 0.0;
-  for (int s = 0; s < n; s++) {
-    const double factor = observation.response (a, s);
-    for (int t = 0; t < n && factor != 0.0; t++)
-      if (observation.response (b, t) != 0.0)
-        sum += factor * observation.response (b, t) * c (s - t);
-  }
+  for (const auto &[s, share_a] : observation.shares (a))
+    for (const auto &[t, share_b] : observation.shares (b))
+      sum += share_a * share_b * c (s - t);
   return sum;
 }
 
@@ -31,9 +27,8 @@ double
 weigh_slot (const Observation &observation, int a, int slot, Correlation c)
 {
   double sum = 0.0;
-  for (int s = 0; s < observation.slots (); s++)
-    if (observation.response (a, s) != 0.0)
-      sum += observation.response (a, s) * c (s - slot);
+  for (const auto &[s, share] : observation.shares (a))
+    sum += share * c (s - slot);
   return sum;
 }
 
@@ -114,8 +109,7 @@ Covariance::Covariance (
 
 /* Space and time part where nothing moves. */
 void
-Covariance::fill_still (
-    const SceneClass &patch, const Observation &observation)
+Covariance::fill_still (const SceneClass &patch, const Observation &observation)
 {
   for (int dy = -reach_; dy <= reach_; dy++)
     for (int dx = -reach_; dx <= reach_; dx++)
@@ -182,8 +176,7 @@ solve_kriging (const Covariance &covariance, const Observation &observation,
   right.reserve (std::size_t (m * columns));
   for (std::size_t i = 0; i < taps.size (); i++) {
     for (int s = 0; s < n; s++)
-      right.push_back (
-          covariance.cross (taps[i].x, taps[i].y, elements[i], s));
+      right.push_back (covariance.cross (taps[i].x, taps[i].y, elements[i], s));
     right.push_back (1.0);
     right.push_back (i == middle ? 1.0 : 0.0);
   }
@@ -202,7 +195,7 @@ solve_kriging (const Covariance &covariance, const Observation &observation,
   for (int s = 0; s < n; s++) {
     const double lambda = (1.0 - flat[std::size_t (s)]) / flat_flat;
     const bool known = observation.exact () && observation.noise_free () &&
-                       observation.response (elements[middle], s) == 1.0;
+                       observation.shares (elements[middle])[0].slot == s;
     if (known) {
       for (std::size_t i = 0; i < taps.size (); i++)
         filter.slots.push_back (i == middle ? 1.0f : 0.0f);

@@ -18,8 +18,10 @@ Observation::Observation (
     for (int s = 0; s < n_; s++)
       light.push_back (schedule.code ().open (e, s) ? 1.0 : schedule.leak ());
     const double total = std::accumulate (light.begin (), light.end (), 0.0);
-    for (const double part : light)
-      response_.push_back (part / total);
+    auto &shares = shares_.emplace_back ();
+    for (int s = 0; s < n_; s++)
+      if (light[std::size_t (s)] > 0.0)
+        shares.push_back ({s, light[std::size_t (s)] / total});
     gain_.push_back (schedule.white_slots () / total);
   }
 }
@@ -31,10 +33,9 @@ Observation::variance (int element, double light) const
   if (noise_free ())
     return gain_squared * rounding_;
   const double electrons = light / gain (element) * white_electrons_;
-  return gain_squared *
-         ((electrons + noise_.read_noise * noise_.read_noise) /
-                 (white_electrons_ * white_electrons_) +
-             rounding_);
+  return gain_squared * ((electrons + noise_.read_noise * noise_.read_noise) /
+                                (white_electrons_ * white_electrons_) +
+                            rounding_);
 }
 
 Phases::Phases (const Schedule &schedule)

@@ -12,6 +12,9 @@ namespace cexp
 
 /** Noise of the camera; the zero value is a noise-free one. */
 struct SensorNoise {
+  static constexpr double kMaxFullWell = 1e7;
+  static constexpr double kMaxReadNoise = 1e5;
+
   /** Electrons that white makes where every slot is open, as in BenchOptions;
    * 0: noise-free. */
   double full_well = 0.0;
@@ -34,9 +37,14 @@ public:
       const Schedule &schedule, const SensorNoise &noise, double steps);
 
   int slots () const { return n_; }
-  double response (int element, int slot) const
+  /** The response to a slot, where it is not 0. */
+  struct Share {
+    int slot;
+    double response;
+  };
+  const std::vector<Share> &shares (int element) const
   {
-    return response_[std::size_t (element * n_ + slot)];
+    return shares_[std::size_t (element)];
   }
   double gain (int element) const { return gain_[std::size_t (element)]; }
   /** Variance of the noise of y where the light is @p light. */
@@ -51,7 +59,7 @@ private:
   SensorNoise noise_;
   double white_electrons_; ///< that make the coded frame's white
   double rounding_;        ///< variance of a pixel
-  std::vector<double> response_;
+  std::vector<std::vector<Share>> shares_;
   std::vector<double> gain_;
   bool exact_;
 };
@@ -68,7 +76,7 @@ class Phases
 public:
   explicit Phases (const Schedule &schedule);
 
-  int period () const { return period_; } ///< along a row, px
+  int period () const { return period_; }                 ///< along a row, px
   int rows () const { return int (row_starts_.size ()); } ///< distinct ones
   /** The distinct row that row @p y of the frame is a shift of. */
   int row_of (int y) const { return at (y).row; }
@@ -76,8 +84,7 @@ public:
   /** Element at (x, y) from pixel @p x of distinct row @p row. */
   int element (int row, int x, int dx, int dy) const
   {
-    return schedule_.element_at (
-        x + dx, row_starts_[std::size_t (row)] + dy);
+    return schedule_.element_at (x + dx, row_starts_[std::size_t (row)] + dy);
   }
 
 private:

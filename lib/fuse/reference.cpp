@@ -159,7 +159,7 @@ reference_filter_add (
 void
 reference_shrink (const ShrinkRow &row)
 {
-  for (int lane = 0; lane < row.blocks; lane++) {
+  for (int lane = row.blocks - 1; lane >= 0; lane--) {
     Block block (row, lane);
     block.read ();
     block.add (1.0f / float (block.shrink ()));

@@ -116,12 +116,12 @@ shrink_vector (const fuse::ShrinkRow &row, int first)
       const Ints keep = (value > threshold) | (value < -threshold) |
                         (Ints{} - int (i == 0 && s == 0));
       kept -= keep;
-      store (values + s * kSlot, (Floats) ((Ints) value & keep));
+      store (values + s * kSlot, (Floats)((Ints)value & keep));
     }
     transform_slots<true> (values, kSlot, row.slot_transform, row.slots);
   }
 
-  const Floats weight = 1.0f / __builtin_convertvector (kept, Floats);
+  const Floats weight = 1.0f / __builtin_convertvector(kept, Floats);
   for (int s = 0; s < row.slots; s++) {
     float *plane = block + s * kSlot;
     for (int x = 0; x < fuse::kBlock; x++)
@@ -130,8 +130,7 @@ shrink_vector (const fuse::ShrinkRow &row, int first)
       undo_dct (plane + y * kRow, kFloats);
       for (int x = 0; x < fuse::kBlock; x++) {
         float *to = row.sum[s] + y * row.stride + column (row, x) + first;
-        store (to,
-            load (to) + weight * load (plane + y * kRow + x * kFloats));
+        store (to, load (to) + weight * load (plane + y * kRow + x * kFloats));
       }
     }
   }
@@ -143,10 +142,12 @@ shrink_vector (const fuse::ShrinkRow &row, int first)
   }
 }
 
+/* From the last to the first: a pixel then gets what its blocks have in the
+ * same order, whatever the width of vectors. */
 inline void
 shrink (const fuse::ShrinkRow &row)
 {
-  for (int first = 0; first < row.blocks; first += kFloats)
+  for (int first = row.blocks - kFloats; first >= 0; first -= kFloats)
     shrink_vector (row, first);
 }
 

@@ -97,17 +97,15 @@ Stillness::judge (Field &weight, bool raise)
     }
     float *out = weight.row (y);
     for (int x = 0; x < width; x++) {
-      const float still =
-          fade (sum[x] / area, kStillMean, kMovedMean) *
-          fade (most[x], kStillMost, kMovedMost);
+      const float still = fade (sum[x] / area, kStillMean, kMovedMean) *
+                          fade (most[x], kStillMost, kMovedMost);
       out[x] = raise ? std::max (out[x], still) : still;
     }
   }
 }
 
 void
-Stillness::take (
-    const Field &coded, const Field *after, const NoiseMap &noise)
+Stillness::take (const Field &coded, const Field *after, const NoiseMap &noise)
 {
   const int width = coded.width (), height = coded.height ();
   if (begun_) {

@@ -22,8 +22,8 @@ public:
   {
     for (int y = 0; y < height; y++)
       for (int x = 0; x < width; x++)
-        at (x + 1, y + 1) = value (x, y) + at (x, y + 1) + at (x + 1, y) -
-                            at (x, y);
+        at (x + 1, y + 1) =
+            value (x, y) + at (x, y + 1) + at (x + 1, y) - at (x, y);
   }
   double over (int x, int y, int size)
   {
@@ -32,10 +32,7 @@ public:
   }
 
 private:
-  double &at (int x, int y)
-  {
-    return sums_[std::size_t (y * width_ + x)];
-  }
+  double &at (int x, int y) { return sums_[std::size_t (y * width_ + x)]; }
   int width_;
   std::vector<double> sums_;
 };
@@ -62,7 +59,8 @@ ssim (ImageView<const std::uint8_t> a, ImageView<const std::uint8_t> b)
   double total = 0.0;
   for (int y = 0; y + kWindow <= a.height; y++) {
     for (int x = 0; x + kWindow <= a.width; x++) {
-      const auto mean = [&] (Sums &s) { return s.over (x, y, kWindow) / kArea; };
+      const auto mean = [&] (
+                            Sums &s) { return s.over (x, y, kWindow) / kArea; };
       const double ma = mean (sum_a), mb = mean (sum_b);
       const double unbiased = kArea / (kArea - 1);
       const double va = unbiased * (mean (sum_aa) - ma * ma);
@@ -85,8 +83,8 @@ compare (const std::vector<Picture> &frames, const std::vector<Picture> &truth)
       for (int x = 0; x < frames[i].width (); x++)
         error.add (frames[i].at (x, y), truth[i].at (x, y));
     mean.psnr += std::min (error.psnr (), 99.0) / double (frames.size ());
-    mean.ssim += ssim (frames[i].view (), truth[i].view ()) /
-                 double (frames.size ());
+    mean.ssim +=
+        ssim (frames[i].view (), truth[i].view ()) / double (frames.size ());
   }
   return mean;
 }

@@ -1,0 +1,256 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* A coded frame comes in, its fused frames go out. */
+#include <algorithm>
+
+#include "gstcodedexposurefusestate.h"
+
+#define GST_CAT_DEFAULT codedexposure_fuse_debug
+
+namespace cexp::gst::fuse
+{
+
+namespace
+{
+
+/* Flags of frames that are no picture, or none to compare others with. */
+constexpr guint kUnfit = GST_BUFFER_FLAG_CORRUPTED | GST_BUFFER_FLAG_GAP;
+
+void
+count (GstCodedExposureFuse *self, guint64 Counters::*counter, guint64 by = 1)
+{
+  const ObjectLock lock (self);
+  state (self).counters.*counter += by;
+}
+
+void
+report_loss (GstCodedExposureFuse *self, GstClockTime pts, guint64 lost)
+{
+  const Stream &stream = state (self).stream;
+  const GstClockTime period =
+      stream.plan->boundary (stream.plan->schedule.slots ());
+  const GstClockTime from =
+      stream.segment.rate < 0
+          ? stream.last_pts - std::min (stream.last_pts, period)
+          : stream.last_pts + period;
+  GST_WARNING_OBJECT (self,
+      "%" G_GUINT64_FORMAT " coded frames lost from %" GST_TIME_FORMAT
+      " to %" GST_TIME_FORMAT,
+      lost, GST_TIME_ARGS (from), GST_TIME_ARGS (pts));
+  count (self, &Counters::frames_lost, lost);
+  gst_element_post_message (GST_ELEMENT (self),
+      gst_message_new_element (GST_OBJECT (self),
+          gst_structure_new ("codedexposure/frames-lost", "count",
+              G_TYPE_UINT64, lost, "from", G_TYPE_UINT64, from, "to",
+              G_TYPE_UINT64, pts, nullptr)));
+  notify (self, "frames-lost");
+}
+
+/* Numbers the frame; ends the history where it does not follow the last one.
+ */
+GstFlowReturn
+admit (GstCodedExposureFuse *self, GstBuffer *inbuf, FrameMeta &meta)
+{
+  Stream &stream = state (self).stream;
+  const GstClockTime pts = GST_BUFFER_PTS (inbuf);
+  count (self, &Counters::frames_in);
+  const FrameStep step =
+      stream.sequence->take (Nanoseconds (pts), stream.segment.rate < 0);
+  const bool follows = step.arrival == Arrival::next &&
+                       !GST_BUFFER_IS_DISCONT (inbuf) &&
+                       !(GST_BUFFER_FLAGS (inbuf) & kUnfit);
+  if (!follows) {
+    if (const GstFlowReturn flow = drain (self); flow != GST_FLOW_OK)
+      return flow;
+    forget_history (self);
+  }
+  stream.discont |= step.arrival != Arrival::next;
+  stream.discont |= GST_BUFFER_IS_DISCONT (inbuf) != 0;
+  if (step.arrival == Arrival::after_loss)
+    report_loss (self, pts, step.lost);
+  stream.last_pts = pts;
+
+  meta.frame = stream.first_number + step.number;
+  meta.lost_before = step.lost;
+  stream.next_number = std::max (stream.next_number, meta.frame + 1);
+  meta = get_frame_meta (inbuf).value_or (meta);
+  return GST_FLOW_OK;
+}
+
+/* Gives the pixels of @inbuf to the fuser and keeps the rest. */
+GstFlowReturn
+take (GstCodedExposureFuse *self, GstBuffer *inbuf, const FrameMeta &meta)
+{
+  Stream &stream = state (self).stream;
+  Plan &plan = *stream.plan;
+  MappedFrame coded (plan.coded, inbuf, GST_MAP_READ);
+  if (!coded) {
+    GST_ELEMENT_ERROR (self, STREAM, FORMAT,
+        ("A coded frame of %" G_GSIZE_FORMAT " bytes cannot be read as %dx%d "
+         "pixels, which take %" G_GSIZE_FORMAT ".",
+            gst_buffer_get_size (inbuf), plan.coded.width, plan.coded.height,
+            GST_VIDEO_INFO_SIZE (&plan.coded)),
+        (nullptr));
+    return GST_FLOW_ERROR;
+  }
+  if (auto *fuser = std::get_if<Fuser<std::uint8_t>> (&plan.fuser))
+    fuser->take (view_of<std::uint8_t> (coded));
+  else
+    std::get<Fuser<std::uint16_t>> (plan.fuser)
+        .take (view_of<std::uint16_t> (coded));
+
+  BufferPtr description (gst_buffer_new ());
+  gst_buffer_copy_into (description.get (), inbuf,
+      GstBufferCopyFlags (GST_BUFFER_COPY_FLAGS | GST_BUFFER_COPY_TIMESTAMPS),
+      0, -1);
+  copy_metas (inbuf, plan.coded, description.get (), plan.fused);
+  stream.waiting.push_back ({std::move (description), meta});
+  return GST_FLOW_OK;
+}
+
+template <typename Pixel>
+void
+fill (Fuser<Pixel> &fuser, std::vector<MappedFrame> &mapped)
+{
+  std::vector<ImageView<Pixel>> views;
+  for (MappedFrame &frame : mapped)
+    views.push_back (view_of<Pixel> (frame));
+  fuser.fuse (views);
+}
+
+/* The frames of the oldest coded frame that waits; none on an error, which is
+ * posted unless it is a flush. */
+std::vector<BufferPtr>
+render (GstCodedExposureFuse *self, GstFlowReturn &flow)
+{
+  Plan &plan = *state (self).stream.plan;
+  std::vector<BufferPtr> buffers;
+  std::vector<MappedFrame> mapped;
+  for (int k = 0; k < plan.schedule.slots (); k++) {
+    GstBuffer *buffer = nullptr;
+    flow = gst_buffer_pool_acquire_buffer (plan.pool.get (), &buffer, nullptr);
+    if (flow == GST_FLOW_OK) {
+      buffers.emplace_back (buffer);
+      mapped.emplace_back (plan.fused, buffer, GST_MAP_WRITE);
+    }
+    if (flow == GST_FLOW_OK && mapped.back ())
+      continue;
+    GST_ELEMENT_ERROR (self, RESOURCE, NO_SPACE_LEFT,
+        ("No buffer for a fused frame of %dx%d pixels.", plan.fused.width,
+            plan.fused.height),
+        (nullptr));
+    flow = GST_FLOW_ERROR;
+    return {};
+  }
+  std::visit ([&] (auto &fuser) { fill (fuser, mapped); }, plan.fuser);
+  return buffers;
+}
+
+void
+describe (
+    GstCodedExposureFuse *self, const Waiting &coded, int k, GstBuffer *outbuf)
+{
+  Stream &stream = state (self).stream;
+  const Plan &plan = *stream.plan;
+  GstBuffer *description = coded.description.get ();
+  const GstClockTime pts = GST_BUFFER_PTS (description);
+  gst_buffer_copy_into (outbuf, description, GST_BUFFER_COPY_FLAGS, 0, -1);
+  GST_BUFFER_FLAG_UNSET (outbuf, GST_BUFFER_FLAG_MARKER);
+  copy_metas (description, plan.fused, outbuf, plan.fused);
+
+  FrameMeta meta = coded.meta;
+  meta.subframe = k;
+  meta.exposure_start = pts + GstClockTime (plan.slots.start (k));
+  meta.exposure_duration = GstClockTime (plan.slots.active ());
+  set_frame_meta (outbuf, meta);
+  GST_BUFFER_PTS (outbuf) = pts + plan.boundary (k);
+  GST_BUFFER_DTS (outbuf) = GST_CLOCK_TIME_NONE;
+  GST_BUFFER_DURATION (outbuf) = plan.boundary (k + 1) - plan.boundary (k);
+  GST_BUFFER_OFFSET (outbuf) = stream.offset++;
+  GST_BUFFER_OFFSET_END (outbuf) = stream.offset;
+  if (std::exchange (stream.discont, false)) {
+    GST_BUFFER_FLAG_SET (outbuf, GST_BUFFER_FLAG_DISCONT);
+  } else {
+    GST_BUFFER_FLAG_UNSET (outbuf, GST_BUFFER_FLAG_DISCONT);
+    GST_BUFFER_FLAG_UNSET (outbuf, GST_BUFFER_FLAG_RESYNC);
+  }
+}
+
+/* Buffers are pushed one by one, because a sink would show a whole list at the
+ * time of its first. */
+GstFlowReturn
+push_oldest (GstCodedExposureFuse *self)
+{
+  FuseState &st = state (self);
+  GstFlowReturn flow = GST_FLOW_OK;
+  std::vector<BufferPtr> buffers = render (self, flow);
+  const Waiting coded = std::move (st.stream.waiting.front ());
+  st.stream.waiting.pop_front ();
+  const int n = int (buffers.size ());
+  for (int i = 0; i < n && flow == GST_FLOW_OK; i++) {
+    const int k = st.stream.segment.rate < 0 ? n - 1 - i : i;
+    BufferPtr &outbuf = buffers[std::size_t (k)];
+    describe (self, coded, k, outbuf.get ());
+    GST_LOG_OBJECT (st.srcpad, "[OUT] %" GST_PTR_FORMAT, outbuf.get ());
+    flow = gst_pad_push (st.srcpad, outbuf.release ());
+    if (flow == GST_FLOW_OK)
+      count (self, &Counters::frames_out);
+  }
+  return flow;
+}
+
+} // namespace
+
+GstFlowReturn
+drain (GstCodedExposureFuse *self)
+{
+  const Stream &stream = state (self).stream;
+  GstFlowReturn flow = GST_FLOW_OK;
+  while (!stream.waiting.empty () && flow == GST_FLOW_OK)
+    flow = push_oldest (self);
+  return flow;
+}
+
+void
+forget_history (GstCodedExposureFuse *self)
+{
+  Stream &stream = state (self).stream;
+  stream.waiting.clear ();
+  if (stream.plan)
+    std::visit ([] (auto &fuser) { fuser.forget (); }, stream.plan->fuser);
+}
+
+GstFlowReturn
+chain (GstPad *pad, GstObject *parent, GstBuffer *inbuf) noexcept
+{
+  auto *self = GST_CODED_EXPOSURE_FUSE (parent);
+  const BufferPtr frame (inbuf);
+  Stream &stream = state (self).stream;
+  GST_LOG_OBJECT (pad, "[IN] %" GST_PTR_FORMAT, inbuf);
+  if (stream.segment.format != GST_FORMAT_TIME)
+    return GST_FLOW_ERROR;
+  if (const GstFlowReturn flow = negotiate (self); flow != GST_FLOW_OK)
+    return flow;
+  if (!GST_BUFFER_PTS_IS_VALID (inbuf)) {
+    GST_ELEMENT_ERROR (self, STREAM, FORMAT,
+        ("A coded frame has no time stamp (PTS), so its fused frames cannot be "
+         "placed in time: let the source set one, for example with "
+         "do-timestamp=true."),
+        (nullptr));
+    return GST_FLOW_ERROR;
+  }
+
+  FrameMeta meta;
+  GstFlowReturn flow = admit (self, inbuf, meta);
+  if (flow == GST_FLOW_OK)
+    flow = take (self, inbuf, meta);
+  if (flow == GST_FLOW_OK && GST_BUFFER_FLAGS (inbuf) & kUnfit) {
+    flow = drain (self);
+    forget_history (self);
+  }
+  while (flow == GST_FLOW_OK &&
+         int (stream.waiting.size ()) > stream.plan->lookahead)
+    flow = push_oldest (self);
+  return flow;
+}
+
+} // namespace cexp::gst::fuse

@@ -1,0 +1,290 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* From caps, schedule and settings to a plan, and caps seen from either side.
+ */
+#include "gstcodedexposurecaps.h"
+#include "gstcodedexposurefusestate.h"
+
+#define GST_CAT_DEFAULT codedexposure_fuse_debug
+
+namespace cexp::gst::fuse
+{
+
+namespace
+{
+
+void
+refuse (GstCodedExposureFuse *self, const std::string &why)
+{
+  GST_ELEMENT_ERROR (self, STREAM, FORMAT, ("%s", why.c_str ()), (nullptr));
+}
+
+/* Rate times N, and the pilot's rows cropped. */
+CapsScale
+coded_to_fused (const Schedule &schedule)
+{
+  CapsScale scale;
+  scale.rate_num = schedule.slots ();
+  scale.crop_rows = schedule.pilot_rows ();
+  return scale;
+}
+
+struct Source {
+  Schedule schedule;
+  bool assumed = false;
+};
+
+/* The property wins over the stream's tag, which wins over the default. */
+std::optional<Source>
+find_schedule (GstCodedExposureFuse *self)
+{
+  Stream &stream = state (self).stream;
+  const auto &asked = stream.settings.parsed;
+  const Result<Schedule> *said =
+      asked ? asked.get () : (stream.tagged ? &*stream.tagged : nullptr);
+  if (said && *said)
+    return Source{said->value ()};
+  if (said) {
+    refuse (self,
+        std::string (asked ? "The schedule property cannot be read: "
+                           : "The schedule in the stream's tags cannot be "
+                             "read: ") +
+            said->error ().message);
+    return std::nullopt;
+  }
+  const Source source{Schedule (), true};
+  if (!std::exchange (stream.warned_assumed, true))
+    GST_ELEMENT_WARNING (self, STREAM, FORMAT,
+        ("The stream says nothing of its schedule: assuming %s. Set the "
+         "schedule property if it is another.",
+            source.schedule.text ().c_str ()),
+        (nullptr));
+  return source;
+}
+
+/* The caps of the coded frames, with a frame rate in any case. */
+std::optional<GstVideoInfo>
+coded_info (GstCodedExposureFuse *self)
+{
+  const Stream &stream = state (self).stream;
+  if (!stream.caps) {
+    refuse (self, "Coded frames came without caps.");
+    return std::nullopt;
+  }
+  const Settings &settings = stream.settings;
+  const CapsPtr caps =
+      fill_in_rate ({settings.rate_num, settings.rate_den}, stream.caps.get ());
+  GstVideoInfo info;
+  if (!gst_video_info_from_caps (&info, caps.get ())) {
+    refuse (self, "The caps of the coded frames cannot be read.");
+    return std::nullopt;
+  }
+  if (GST_VIDEO_INFO_IS_INTERLACED (&info)) {
+    refuse (self,
+        "The coded frames are interlaced: a coded exposure needs a camera "
+        "that exposes all rows together (progressive, global shutter).");
+    return std::nullopt;
+  }
+  if (info.fps_n == 0) {
+    refuse (self,
+        "The coded frames have no frame rate, so fused frames have no length: "
+        "set the frame-rate property, for example frame-rate=25/1.");
+    return std::nullopt;
+  }
+  return info;
+}
+
+template <typename Pixel>
+Result<AnyFuser>
+make_fuser (const Schedule &schedule, const GstVideoInfo &info,
+    const FuseOptions &options)
+{
+  auto made = Fuser<Pixel>::make (schedule, info.width, info.height, options);
+  if (!made)
+    return made.error ();
+  return AnyFuser (std::move (*made));
+}
+
+PoolPtr
+make_pool (GstCaps *caps, const GstVideoInfo &info)
+{
+  PoolPtr pool (gst_video_buffer_pool_new ());
+  GstStructure *config = gst_buffer_pool_get_config (pool.get ());
+  gst_buffer_pool_config_set_params (
+      config, caps, guint (GST_VIDEO_INFO_SIZE (&info)), 0, 0);
+  if (!gst_buffer_pool_set_config (pool.get (), config) ||
+      !gst_buffer_pool_set_active (pool.get (), TRUE))
+    return nullptr;
+  return pool;
+}
+
+struct Proposal {
+  Plan plan;
+  CapsPtr caps;
+  bool assumed;
+};
+
+std::optional<Proposal>
+propose (GstCodedExposureFuse *self)
+{
+  const Stream &stream = state (self).stream;
+  const auto info = coded_info (self);
+  const auto source = info ? find_schedule (self) : std::nullopt;
+  if (!source)
+    return std::nullopt;
+  const Schedule &schedule = source->schedule;
+  const FrameRate rate{info->fps_n, info->fps_d};
+  const auto slots =
+      SlotPlan::fit (schedule.timing (), schedule.slots (), rate);
+  if (!slots) {
+    refuse (self, slots.error ().message);
+    return std::nullopt;
+  }
+  const FuseOptions &options = stream.settings.options;
+  auto fuser = GST_VIDEO_INFO_FORMAT (&*info) == GST_VIDEO_FORMAT_GRAY8
+                   ? make_fuser<std::uint8_t> (schedule, *info, options)
+                   : make_fuser<std::uint16_t> (schedule, *info, options);
+  if (!fuser) {
+    refuse (self, fuser.error ().message);
+    return std::nullopt;
+  }
+
+  const CapsPtr with_rate = fill_in_rate (
+      {stream.settings.rate_num, stream.settings.rate_den}, stream.caps.get ());
+  CapsPtr caps (scale_caps (with_rate.get (), coded_to_fused (schedule)));
+  GstVideoInfo fused;
+  gst_video_info_from_caps (&fused, caps.get ());
+  PoolPtr pool = make_pool (caps.get (), fused);
+  if (!pool) {
+    refuse (self, "No buffers for fused frames of " +
+                      std::to_string (fused.width) + "x" +
+                      std::to_string (fused.height) + " pixels.");
+    return std::nullopt;
+  }
+  return Proposal{Plan{schedule, *info, fused, std::move (*fuser), rate, *slots,
+                      options.lookahead, std::move (pool)},
+      std::move (caps), source->assumed};
+}
+
+/* Makes @proposal the plan in force. */
+void
+install (GstCodedExposureFuse *self, Proposal proposal)
+{
+  FuseState &st = state (self);
+  Stream &stream = st.stream;
+  if (!stream.plan || !(stream.plan->rate == proposal.plan.rate)) {
+    stream.sequence.emplace (proposal.plan.rate);
+    stream.first_number = stream.next_number;
+  }
+  stream.plan = std::move (proposal.plan);
+  stream.stale = false;
+  const Plan &plan = *stream.plan;
+  const GstClockTime latency =
+      GstClockTime (plan.lookahead) * plan.boundary (plan.schedule.slots ());
+  bool schedule_changed, latency_changed;
+  {
+    const ObjectLock lock (self);
+    schedule_changed = !st.in_force || !(*st.in_force == plan.schedule);
+    latency_changed = std::exchange (st.latency, latency) != latency;
+    st.in_force = std::make_shared<const Schedule> (plan.schedule);
+    st.assumed = proposal.assumed;
+  }
+  const CapsPtr current (gst_pad_get_current_caps (st.srcpad));
+  if (!current || !gst_caps_is_equal (current.get (), proposal.caps.get ()))
+    gst_pad_push_event (st.srcpad, gst_event_new_caps (proposal.caps.get ()));
+  GST_INFO_OBJECT (self, "%s: %dx%d", plan.schedule.text ().c_str (),
+      plan.fused.width, plan.fused.height);
+  if (schedule_changed)
+    notify (self, "schedule-in-force");
+  if (latency_changed)
+    gst_element_post_message (
+        GST_ELEMENT (self), gst_message_new_latency (GST_OBJECT (self)));
+}
+
+/* What answers about caps depend on, at one moment. A schedule that was only
+ * assumed binds nobody: the tag may still come. */
+struct Known {
+  std::shared_ptr<const Schedule> schedule; ///< null: any may come
+  SaidRate rate;
+};
+
+Known
+known (GstCodedExposureFuse *self)
+{
+  const FuseState &st = state (self);
+  const ObjectLock lock (self);
+  Known now{nullptr, {st.settings.rate_num, st.settings.rate_den}};
+  if (st.settings.parsed && *st.settings.parsed)
+    now.schedule = {st.settings.parsed, &st.settings.parsed->value ()};
+  else if (!st.assumed)
+    now.schedule = st.in_force;
+  return now;
+}
+
+CapsPtr
+convert (const Known &now, GstCaps *caps, bool to_coded)
+{
+  if (!now.schedule)
+    return unbind_caps (caps);
+  const CapsScale scale = coded_to_fused (*now.schedule);
+  return CapsPtr (scale_caps (caps, to_coded ? scale.inverse () : scale));
+}
+
+} // namespace
+
+GstFlowReturn
+negotiate (GstCodedExposureFuse *self)
+{
+  FuseState &st = state (self);
+  bool changed;
+  {
+    const ObjectLock lock (self);
+    changed = std::exchange (st.settings_changed, false);
+    if (changed)
+      st.stream.settings = st.settings;
+  }
+  if (changed || st.stream.stale) {
+    if (const GstFlowReturn flow = drain (self); flow != GST_FLOW_OK)
+      return flow;
+    auto proposal = propose (self);
+    if (!proposal)
+      return GST_FLOW_NOT_NEGOTIATED;
+    install (self, std::move (*proposal));
+  }
+  settle_pending (self);
+  return GST_FLOW_OK;
+}
+
+void
+settle_pending (GstCodedExposureFuse *self)
+{
+  FuseState &st = state (self);
+  for (EventPtr &event : std::exchange (st.stream.pending, {}))
+    if (st.stream.plan)
+      gst_pad_push_event (st.srcpad, event.release ());
+}
+
+GstCaps *
+sink_caps (GstCodedExposureFuse *self)
+{
+  const Known now = known (self);
+  const CapsPtr templ (gst_pad_get_pad_template_caps (state (self).sinkpad));
+  const CapsPtr peer (gst_pad_peer_query_caps (state (self).srcpad, nullptr));
+  const CapsPtr coded = convert (now, peer.get (), true);
+  return admit_unknown_rate (
+      now.rate, intersect_caps (coded.get (), templ.get ()))
+      .release ();
+}
+
+GstCaps *
+src_caps (GstCodedExposureFuse *self)
+{
+  const Known now = known (self);
+  const CapsPtr templ (gst_pad_get_pad_template_caps (state (self).srcpad));
+  const CapsPtr peer (gst_pad_peer_query_caps (state (self).sinkpad, nullptr));
+  const CapsPtr coded = intersect_caps (peer.get (), templ.get ());
+  const CapsPtr filled = fill_in_rate (now.rate, coded.get ());
+  const CapsPtr own = convert (now, filled.get (), false);
+  return intersect_caps (own.get (), templ.get ()).release ();
+}
+
+} // namespace cexp::gst::fuse

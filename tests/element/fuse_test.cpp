@@ -1,0 +1,406 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* codedexposure-fuse: pixels, times, schedules, losses, flushes. */
+#include "harness.h"
+
+#include "fuse/fuser.h"
+#include "gstcodedexposuremeta.h"
+#include "gstcodedexposuretag.h"
+
+namespace
+{
+
+using namespace cexp;
+using namespace cexp::gst;
+using namespace cexp::test;
+
+constexpr GstClockTime kPeriod = 40 * GST_MSECOND;
+constexpr int kWidth = 24, kHeight = 20;
+
+/* Frame @number of a moving texture. */
+template <typename Pixel = std::uint8_t>
+Image<Pixel>
+picture (int number)
+{
+  return draw<Pixel> (kWidth, kHeight, [number] (int x, int y) {
+    const int value = (7 * (x + 3 * number) + 31 * y) % 251;
+    return sizeof (Pixel) == 1 ? value : 257 * value;
+  });
+}
+
+Schedule
+schedule_of (const std::string &preset)
+{
+  auto schedule = Schedule::from_preset (preset);
+  EXPECT_TRUE (schedule) << preset;
+  return *schedule;
+}
+
+/* What the library makes of the pictures @numbers, one after the other. */
+template <typename Pixel = std::uint8_t>
+std::vector<Image<Pixel>>
+expected (const std::string &preset, std::initializer_list<int> numbers,
+    const FuseOptions &options = {})
+{
+  auto fuser =
+      Fuser<Pixel>::make (schedule_of (preset), kWidth, kHeight, options);
+  EXPECT_TRUE (fuser) << fuser.error ().message;
+  std::vector<Image<Pixel>> frames;
+  const auto fuse_one = [&] {
+    std::vector<Image<Pixel>> slots (std::size_t (fuser->slots ()),
+        Image<Pixel> (fuser->size ().width, fuser->size ().height));
+    std::vector<ImageView<Pixel>> views;
+    for (auto &slot : slots)
+      views.push_back (slot.view ());
+    fuser->fuse (views);
+    frames.insert (frames.end (), slots.begin (), slots.end ());
+  };
+  for (const int number : numbers) {
+    fuser->take (picture<Pixel> (number).view ());
+    if (fuser->pending () > options.lookahead)
+      fuse_one ();
+  }
+  while (fuser->pending () > 0)
+    fuse_one ();
+  return frames;
+}
+
+class Fuse : public ::testing::Test
+{
+protected:
+  void start (const std::string &settings = "schedule=sequential:lattice:4/2",
+      const std::string &rate = "25/1", const std::string &format = "GRAY8")
+  {
+    fuse = std::make_unique<ElementHarness> ("codedexposure-fuse " + settings);
+    fuse->set_caps (gray_caps (kWidth, kHeight, rate, format));
+  }
+  void push (int number, GstClockTime pts, int flags = 0)
+  {
+    BufferPtr frame = frame_of (picture (number), pts);
+    GST_BUFFER_FLAG_SET (frame.get (), flags);
+    ASSERT_EQ (fuse->push (std::move (frame)), GST_FLOW_OK);
+  }
+  void push (int number) { push (number, GstClockTime (number) * kPeriod); }
+  std::vector<BufferPtr> pull_all ()
+  {
+    std::vector<BufferPtr> all;
+    while (BufferPtr buffer = fuse->pull ())
+      all.push_back (std::move (buffer));
+    return all;
+  }
+  template <typename Pixel = std::uint8_t>
+  std::vector<Image<Pixel>> pull_images ()
+  {
+    std::vector<Image<Pixel>> images;
+    const CapsPtr caps = fuse->pad_caps ();
+    for (const BufferPtr &buffer : pull_all ())
+      images.push_back (image_of<Pixel> (buffer.get (), caps.get ()));
+    return images;
+  }
+  /* Those of the frames that begin anew, by their place. */
+  std::vector<std::size_t> disconts ()
+  {
+    std::vector<std::size_t> places;
+    const auto all = pull_all ();
+    for (std::size_t i = 0; i < all.size (); i++)
+      if (GST_BUFFER_IS_DISCONT (all[i].get ()))
+        places.push_back (i);
+    return places;
+  }
+  GstClockTime min_latency ()
+  {
+    gst_harness_set_upstream_latency (fuse->get (), 5 * GST_MSECOND);
+    return gst_harness_query_latency (fuse->get ());
+  }
+  std::unique_ptr<ElementHarness> fuse;
+};
+
+/* --------------------------------------------------------------- pixels -- */
+
+TEST_F (Fuse, GivesWhatTheLibraryGives)
+{
+  start ();
+  push (0);
+  push (1);
+  EXPECT_EQ (pull_images (), expected ("sequential:lattice:4/2", {0, 1}));
+}
+
+TEST_F (Fuse, TakesSixteenBitsAndNoiseAndQuality)
+{
+  start ("schedule=sequential:2x2 quality=balanced full-well=10000 "
+         "read-noise=5 bits=16",
+      "25/1", "GRAY16_LE");
+  for (int number : {0, 1})
+    ASSERT_EQ (fuse->push (frame_of (picture<std::uint16_t> (number),
+                   GstClockTime (number) * kPeriod)),
+        GST_FLOW_OK);
+  FuseOptions options;
+  options.quality = FuseQuality::kBalanced;
+  options.noise = {10000.0, 5.0};
+  options.bits = 16;
+  EXPECT_EQ (pull_images<std::uint16_t> (),
+      expected<std::uint16_t> ("sequential:2x2", {0, 1}, options));
+}
+
+TEST_F (Fuse, ReadsStridesOfItsInput)
+{
+  start ();
+  const Image<std::uint8_t> image = picture (0);
+  BufferPtr wide (gst_buffer_new_allocate (nullptr, 64 * kHeight, nullptr));
+  gsize offset[GST_VIDEO_MAX_PLANES] = {0};
+  gint stride[GST_VIDEO_MAX_PLANES] = {64};
+  gst_buffer_add_video_meta_full (wide.get (), GST_VIDEO_FRAME_FLAG_NONE,
+      GST_VIDEO_FORMAT_GRAY8, kWidth, kHeight, 1, offset, stride);
+  for (int y = 0; y < kHeight; y++)
+    gst_buffer_fill (
+        wide.get (), gsize (64 * y), image.view ().row (y), kWidth);
+  GST_BUFFER_PTS (wide.get ()) = 0;
+  ASSERT_EQ (fuse->push (std::move (wide)), GST_FLOW_OK);
+  EXPECT_EQ (pull_images (), expected ("sequential:lattice:4/2", {0}));
+}
+
+/* ---------------------------------------------------------------- times -- */
+
+TEST_F (Fuse, FramesFollowInEvenSteps)
+{
+  start ();
+  push (0);
+  push (1);
+  const auto all = pull_all ();
+  ASSERT_EQ (all.size (), 8u);
+  for (std::size_t i = 0; i < all.size (); i++) {
+    EXPECT_EQ (GST_BUFFER_PTS (all[i].get ()), i * 10 * GST_MSECOND);
+    EXPECT_EQ (GST_BUFFER_DURATION (all[i].get ()), 10 * GST_MSECOND);
+    EXPECT_EQ (GST_BUFFER_OFFSET (all[i].get ()), i);
+  }
+}
+
+TEST_F (Fuse, TimesAreExactAtBrokenRates)
+{
+  start ("schedule=sequential:lattice:8/3", "30000/1001");
+  const GstClockTime first = 1234567;
+  push (0, first);
+  push (1, first + 33366666);
+  const auto all = pull_all ();
+  ASSERT_EQ (all.size (), 16u);
+  /* floor (k 1001 s / 30000 / 8) */
+  const GstClockTime starts[] = {0, 4170833, 8341666, 12512500, 16683333,
+      20854166, 25025000, 29195833, 33366666};
+  for (std::size_t k = 0; k < 8; k++) {
+    EXPECT_EQ (GST_BUFFER_PTS (all[k].get ()), first + starts[k]);
+    EXPECT_EQ (GST_BUFFER_DURATION (all[k].get ()), starts[k + 1] - starts[k]);
+    EXPECT_EQ (
+        GST_BUFFER_PTS (all[8 + k].get ()), first + 33366666 + starts[k]);
+  }
+}
+
+TEST_F (Fuse, MetaSaysWhenTheLightOfAFrameFell)
+{
+  start ("schedule=sequential:2x2,active=9ms,switching=500us");
+  push (0);
+  push (1);
+  const auto all = pull_all ();
+  const auto meta = get_frame_meta (all[6].get ());
+  ASSERT_TRUE (meta);
+  EXPECT_EQ (meta->frame, 1u);
+  EXPECT_EQ (meta->subframe, 2);
+  EXPECT_EQ (meta->exposure_start, kPeriod + 2 * 9500 * GST_USECOND);
+  EXPECT_EQ (meta->exposure_duration, 9 * GST_MSECOND);
+}
+
+/* ------------------------------------------------- schedules and caps -- */
+
+TEST_F (Fuse, RateIsRaisedSizeStaysAndThePilotIsCropped)
+{
+  start ("schedule=sequential:lattice:4/2,pilot=4");
+  push (0);
+  EXPECT_TRUE (same_caps (
+      fuse->pad_caps ().get (), gray_caps (kWidth, kHeight - 4, "100/1")));
+  EXPECT_EQ (pull_all ().size (), 4u);
+}
+
+TEST_F (Fuse, ScheduleComesFromTheTagUnlessThePropertySays)
+{
+  start ("");
+  fuse->push_event (schedule_to_event (schedule_of ("sequential:lattice:5/2")));
+  push (0);
+  EXPECT_EQ (text_property (fuse->element (), "schedule-in-force"),
+      "sequential:lattice:5/2");
+  EXPECT_EQ (pull_images (), expected ("sequential:lattice:5/2", {0}));
+  EXPECT_EQ (fuse->warning (), "");
+
+  start ("schedule=sequential:2x2");
+  fuse->push_event (schedule_to_event (schedule_of ("sequential:lattice:5/2")));
+  push (0);
+  EXPECT_EQ (pull_images (), expected ("sequential:2x2", {0}));
+}
+
+TEST_F (Fuse, WarnsWhereItHasToAssumeASchedule)
+{
+  start ("");
+  push (0);
+  push (1);
+  EXPECT_NE (
+      fuse->warning ().find ("assuming sequential:2x2"), std::string::npos);
+  EXPECT_EQ (fuse->warning (), "");
+}
+
+TEST_F (Fuse, RefusesMotionForMoreSlotsThanItCan)
+{
+  start ("schedule=sequential:lattice:25/10 quality=best");
+  EXPECT_EQ (fuse->push (frame_of (picture (0), 0)), GST_FLOW_NOT_NEGOTIATED);
+  EXPECT_NE (fuse->error ().find ("quality=fast"), std::string::npos);
+}
+
+TEST_F (Fuse, NeedsARateFromSomewhere)
+{
+  start ("schedule=sequential:2x2", "0/1");
+  EXPECT_EQ (fuse->push (frame_of (picture (0), 0)), GST_FLOW_NOT_NEGOTIATED);
+  EXPECT_NE (fuse->error ().find ("frame-rate=25/1"), std::string::npos);
+
+  start ("schedule=sequential:2x2 frame-rate=25/1", "0/1");
+  push (0);
+  EXPECT_EQ (pull_all ().size (), 4u);
+}
+
+TEST_F (Fuse, ANewQualityHoldsFromTheNextFrameOn)
+{
+  start ();
+  push (0);
+  fuse->pull_event (GST_EVENT_CAPS);
+  gst_util_set_object_arg (G_OBJECT (fuse->element ()), "quality", "balanced");
+  push (1);
+  EXPECT_EQ (pull_all ().size (), 8u);
+  EXPECT_FALSE (fuse->pull_event (GST_EVENT_CAPS));
+}
+
+/* ------------------------------------------------------------ lookahead -- */
+
+TEST_F (Fuse, AddsNoLatencyByDefault)
+{
+  start ();
+  push (0);
+  EXPECT_EQ (pull_all ().size (), 4u);
+  EXPECT_EQ (min_latency (), 5 * GST_MSECOND);
+}
+
+TEST_F (Fuse, LookaheadWaitsForAFrameAndSaysSo)
+{
+  start ("schedule=sequential:lattice:4/2 lookahead=1");
+  push (0);
+  EXPECT_TRUE (pull_all ().empty ());
+  EXPECT_TRUE (fuse->message (GST_MESSAGE_LATENCY));
+  EXPECT_EQ (min_latency (), 45 * GST_MSECOND);
+  push (1);
+  push (2);
+  ASSERT_TRUE (fuse->push_event (gst_event_new_eos ()));
+  FuseOptions options;
+  options.lookahead = 1;
+  EXPECT_EQ (
+      pull_images (), expected ("sequential:lattice:4/2", {0, 1, 2}, options));
+}
+
+TEST_F (Fuse, WhatWaitsGoesBeforeTheEnd)
+{
+  start ("schedule=sequential:lattice:4/2 lookahead=1");
+  push (0);
+  ASSERT_TRUE (fuse->push_event (gst_event_new_eos ()));
+  EXPECT_EQ (pull_all ().size (), 4u);
+  EXPECT_TRUE (fuse->pull_event (GST_EVENT_EOS));
+}
+
+TEST_F (Fuse, AFlushDropsWhatWaits)
+{
+  start ("schedule=sequential:lattice:4/2 lookahead=1");
+  push (0);
+  ASSERT_TRUE (fuse->push_event (gst_event_new_flush_start ()));
+  ASSERT_TRUE (fuse->push_event (gst_event_new_flush_stop (TRUE)));
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_TIME);
+  ASSERT_TRUE (fuse->push_event (gst_event_new_segment (&segment)));
+  push (7, 0);
+  ASSERT_TRUE (fuse->push_event (gst_event_new_eos ()));
+  EXPECT_EQ (pull_images (), expected ("sequential:lattice:4/2", {7}));
+}
+
+/* --------------------------------------------------------------- losses -- */
+
+TEST_F (Fuse, ALossIsSaidAndStartsHistoryAnew)
+{
+  start ();
+  push (0);
+  push (0, kPeriod);
+  push (0, 4 * kPeriod);
+  const MessagePtr message =
+      fuse->element_message ("codedexposure/frames-lost");
+  ASSERT_TRUE (message);
+  guint64 lost = 0;
+  gst_structure_get_uint64 (
+      gst_message_get_structure (message.get ()), "count", &lost);
+  EXPECT_EQ (lost, 2u);
+  EXPECT_EQ (property<guint64> (fuse->element (), "frames-lost"), 2u);
+  const auto images = pull_images ();
+  ASSERT_EQ (images.size (), 12u);
+  /* The second frame knows that nothing moved; the third starts again. */
+  EXPECT_NE (images[4], images[0]);
+  for (std::size_t k = 0; k < 4; k++)
+    EXPECT_EQ (images[8 + k], images[k]);
+}
+
+TEST_F (Fuse, LossesAndBreaksAreDiscont)
+{
+  start ();
+  push (0);
+  push (1);
+  push (2, 4 * kPeriod);
+  push (3, 5 * kPeriod, GST_BUFFER_FLAG_DISCONT);
+  push (4, 6 * kPeriod);
+  EXPECT_EQ (disconts (), (std::vector<std::size_t>{0, 8, 12}));
+}
+
+TEST_F (Fuse, DamagedFramesPassTheirFlagsAndAreNotCompared)
+{
+  start ();
+  push (0);
+  push (0, kPeriod, GST_BUFFER_FLAG_CORRUPTED);
+  push (0, 2 * kPeriod);
+  const auto all = pull_all ();
+  ASSERT_EQ (all.size (), 12u);
+  const CapsPtr caps = fuse->pad_caps ();
+  for (std::size_t i = 0; i < all.size (); i++) {
+    EXPECT_EQ (bool (GST_BUFFER_FLAG_IS_SET (
+                   all[i].get (), GST_BUFFER_FLAG_CORRUPTED)),
+        i / 4 == 1);
+    EXPECT_EQ (image_of<std::uint8_t> (all[i].get (), caps.get ()),
+        image_of<std::uint8_t> (all[i % 4].get (), caps.get ()));
+  }
+}
+
+TEST_F (Fuse, NeedsTimeStamps)
+{
+  start ();
+  EXPECT_EQ (
+      fuse->push (frame_of (picture (0), GST_CLOCK_TIME_NONE)), GST_FLOW_ERROR);
+  EXPECT_NE (fuse->error ().find ("do-timestamp"), std::string::npos);
+}
+
+TEST_F (Fuse, QosEndsHere)
+{
+  start ();
+  push (0);
+  gst_harness_push_upstream_event (
+      fuse->get (), gst_event_new_qos (GST_QOS_TYPE_UNDERFLOW, 1.0, 5, 10));
+  while (
+      const EventPtr event{gst_harness_try_pull_upstream_event (fuse->get ())})
+    EXPECT_NE (GST_EVENT_TYPE (event.get ()), GST_EVENT_QOS);
+}
+
+TEST_F (Fuse, CountersAgree)
+{
+  start ();
+  push (0);
+  push (1);
+  EXPECT_EQ (property<guint64> (fuse->element (), "frames-in"), 2u);
+  EXPECT_EQ (property<guint64> (fuse->element (), "frames-out"), 8u);
+}
+
+} // namespace

@@ -1,0 +1,514 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Fusion: kernels against their scalar oracle, and what users rely on. */
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <random>
+#include <type_traits>
+
+#include <gtest/gtest.h>
+
+#include "fuse/dct_matrix.h"
+#include "fuse/fuser.h"
+#include "fuse/kernels.h"
+#include "optics/bench.h"
+
+namespace
+{
+
+using namespace cexp;
+
+template <typename Pixel = std::uint8_t>
+using Pictures = std::vector<Image<Pixel>>;
+
+Schedule
+schedule_of (const std::string &preset)
+{
+  auto schedule = Schedule::parse (preset);
+  EXPECT_TRUE (schedule) << schedule.error ().message;
+  return *schedule;
+}
+
+template <typename Pixel = std::uint8_t>
+Image<Pixel>
+draw (int width, int height, const std::function<double (int, int)> &value)
+{
+  constexpr double kLargest = sizeof (Pixel) == 1 ? 255.0 : 65535.0;
+  Image<Pixel> image (width, height);
+  for (int y = 0; y < height; y++)
+    for (int x = 0; x < width; x++)
+      image.at (x, y) = Pixel (std::lround (kLargest * value (x, y)));
+  return image;
+}
+
+/* Gratings of several periods, with edges. */
+double
+texture (int x, int y)
+{
+  const double waves =
+      std::sin (0.9 * x) * std::cos (0.7 * y) + std::sin (0.31 * (x + 2 * y));
+  return 0.5 + 0.2 * waves + ((x / 9 + y / 7) % 2 ? 0.08 : -0.08);
+}
+
+/* Coded frames of a scene that shows picture (slot) in each slot. */
+template <typename Pixel = std::uint8_t>
+Pictures<Pixel>
+take (const Schedule &schedule, int frames,
+    const std::type_identity_t<std::function<Image<Pixel> (int)>> &picture,
+    const BenchOptions &options = {})
+{
+  Pictures<Pixel> coded;
+  for (int frame = 0; frame < frames; frame++) {
+    const Image<Pixel> first = picture (0);
+    auto bench = OpticalBench::make (first.width (), first.height (), options);
+    bench->begin (schedule);
+    for (int s = 0; s < schedule.slots (); s++)
+      bench->expose (picture (frame * schedule.slots () + s).view (), s, 1.0);
+    Image<Pixel> &image = coded.emplace_back (first.width (), first.height ());
+    bench->read_out (std::uint64_t (frame), image.view ());
+  }
+  return coded;
+}
+
+template <typename Pixel = std::uint8_t>
+Pictures<Pixel>
+fuse (const Pictures<Pixel> &coded, const Schedule &schedule,
+    const FuseOptions &options = {})
+{
+  auto fuser = Fuser<Pixel>::make (
+      schedule, coded[0].width (), coded[0].height (), options);
+  EXPECT_TRUE (fuser) << fuser.error ().message;
+  Pictures<Pixel> frames;
+  const auto fuse_one = [&] {
+    Pictures<Pixel> slots (std::size_t (fuser->slots ()),
+        Image<Pixel> (fuser->size ().width, fuser->size ().height));
+    std::vector<ImageView<Pixel>> views;
+    for (auto &slot : slots)
+      views.push_back (slot.view ());
+    fuser->fuse (views);
+    std::move (slots.begin (), slots.end (), std::back_inserter (frames));
+  };
+  for (const auto &frame : coded) {
+    fuser->take (frame.view ());
+    if (fuser->pending () > options.lookahead)
+      fuse_one ();
+  }
+  while (fuser->pending () > 0)
+    fuse_one ();
+  return frames;
+}
+
+template <typename Pixel>
+double
+psnr (const Image<Pixel> &a, const Image<Pixel> &b)
+{
+  const double scale = sizeof (Pixel) == 1 ? 1.0 : 257.0;
+  double sum = 0.0;
+  for (int y = 0; y < a.height (); y++)
+    for (int x = 0; x < a.width (); x++)
+      sum += std::pow ((a.at (x, y) - double (b.at (x, y))) / scale, 2.0);
+  return 10.0 * std::log10 (255.0 * 255.0 * a.width () * a.height () /
+                            std::max (sum, 1e-9));
+}
+
+FuseOptions
+with_quality (FuseQuality quality, bool noisy = false)
+{
+  FuseOptions options;
+  options.quality = quality;
+  if (noisy)
+    options.noise = {10000.0, 5.0};
+  return options;
+}
+
+BenchOptions
+noisy_bench ()
+{
+  BenchOptions options;
+  options.full_well = 10000.0;
+  options.read_noise = 5.0;
+  return options;
+}
+
+constexpr FuseQuality kQualities[] = {
+    FuseQuality::kFast, FuseQuality::kBalanced, FuseQuality::kBest};
+
+/* -------------------------------------------------------------- kernels -- */
+
+std::vector<float>
+random_numbers (std::size_t count, unsigned seed)
+{
+  std::mt19937 engine (seed);
+  std::vector<float> numbers (count);
+  for (float &number : numbers)
+    number = float (engine () % 2001) / 10.0f - 100.0f;
+  return numbers;
+}
+
+/* What a kernel makes of @row in each of its outputs. */
+std::vector<std::vector<float>>
+outputs_of (const fuse::Kernels &kernels, const fuse::FilterRow &row,
+    const std::vector<float> *scale)
+{
+  std::vector<std::vector<float>> outputs (
+      std::size_t (row.outputs), random_numbers (256, 5));
+  std::vector<float *> to;
+  for (auto &output : outputs)
+    to.push_back (output.data ());
+  if (scale)
+    kernels.filter_add (row, scale->data (), to.data ());
+  else
+    kernels.filter (row, to.data ());
+  for (auto &output : outputs)
+    output.resize (std::size_t (row.count));
+  return outputs;
+}
+
+TEST (FuseKernels, FiltersEqualTheReference)
+{
+  const auto source = random_numbers (4096, 1);
+  const std::vector<std::ptrdiff_t> offsets = {-300, -17, -1, 0, 2, 256, 301};
+  for (const int period : {1, 3, 4, 8, 25}) {
+    for (const int outputs : {1, 3, 4, 8, 13}) {
+      const int width = period + 15;
+      auto weights =
+          random_numbers (offsets.size () * std::size_t (outputs * width), 2);
+      for (std::size_t i = 0; i < weights.size (); i++)
+        if (i % std::size_t (width) >= std::size_t (period))
+          weights[i] = weights[i - std::size_t (period)];
+      const fuse::FilterRow row{source.data () + 1000, 77, offsets.data (),
+          int (offsets.size ()), weights.data (), width, outputs, period,
+          period / 2};
+      std::vector<float> scale (256, 0.0f);
+      for (std::size_t x = 20; x < 60; x += 3)
+        scale[x] = 0.25f * float (x % 5);
+      const fuse::Kernels &oracle = fuse::supported_kernels ().back ();
+      for (const fuse::Kernels &kernels : fuse::supported_kernels ()) {
+        SCOPED_TRACE (kernels.name);
+        EXPECT_EQ (outputs_of (kernels, row, nullptr),
+            outputs_of (oracle, row, nullptr));
+        EXPECT_EQ (outputs_of (kernels, row, &scale),
+            outputs_of (oracle, row, &scale));
+      }
+    }
+  }
+}
+
+/* Sums and weights after shrinking blocks of @slots planes. */
+std::vector<float>
+shrunk (const fuse::Kernels &kernels, int slots, float threshold)
+{
+  constexpr std::ptrdiff_t kSplit = 64;
+  constexpr std::ptrdiff_t kStride = kSplit * fuse::kBlockStep;
+  constexpr std::size_t kPlane = std::size_t (kStride) * fuse::kBlock;
+  const auto light = random_numbers (kPlane * std::size_t (slots), 3);
+  std::vector<float> sums (kPlane * std::size_t (slots + 1));
+  std::vector<const float *> source;
+  std::vector<float *> sum;
+  for (int s = 0; s < slots; s++) {
+    source.push_back (light.data () + kPlane * std::size_t (s));
+    sum.push_back (sums.data () + kPlane * std::size_t (s));
+  }
+  std::vector<float> scratch (
+      std::size_t (slots * fuse::kBlock * fuse::kBlock * 16));
+  const auto transform = fuse::dct_matrix (slots);
+  kernels.shrink ({source.data (), sum.data (),
+      sums.data () + kPlane * std::size_t (slots), kStride, kSplit, slots,
+      transform.data (), 32, threshold, scratch.data ()});
+  return sums;
+}
+
+TEST (FuseKernels, ShrinkingEqualsTheReference)
+{
+  const fuse::Kernels &oracle = fuse::supported_kernels ().back ();
+  for (const fuse::Kernels &kernels : fuse::supported_kernels ()) {
+    SCOPED_TRACE (kernels.name);
+    for (const int slots : {2, 4, 5, 8, 16})
+      EXPECT_EQ (shrunk (kernels, slots, 70.0f), shrunk (oracle, slots, 70.0f));
+  }
+}
+
+TEST (FuseKernels, NothingIsLostBelowAThresholdOfNothing)
+{
+  /* Every coefficient is kept, so the blocks come back times their weight. */
+  for (const fuse::Kernels &kernels : fuse::supported_kernels ()) {
+    SCOPED_TRACE (kernels.name);
+    const auto sums = shrunk (kernels, 4, -1.0f);
+    const auto light = random_numbers (std::size_t (64 * 4 * 12 * 4), 3);
+    const std::size_t plane = 64 * 4 * 12;
+    for (std::size_t i = 0; i < 4 * plane; i++) {
+      const float weight = sums[4 * plane + i % plane];
+      if (weight > 0.0f) {
+        ASSERT_NEAR (sums[i] / weight, light[i], 1e-3);
+      }
+    }
+  }
+}
+
+TEST (Fuse, AllTargetsGiveTheSamePixels)
+{
+  const Schedule schedule = schedule_of ("sequential:lattice:4/2");
+  const auto coded = take (schedule, 2, [] (int slot) {
+    return draw (
+        40, 32, [slot] (int x, int y) { return texture (x - slot, y); });
+  });
+  for (const FuseQuality quality : kQualities) {
+    FuseOptions options = with_quality (quality);
+    const auto expected = fuse (coded, schedule, options);
+    for (const std::string_view target : fuse_targets ()) {
+      options.target = target;
+      EXPECT_EQ (fuse (coded, schedule, options), expected)
+          << target << ' ' << quality_name (quality);
+    }
+  }
+}
+
+/* -------------------------------------------------------------- pixels -- */
+
+constexpr const char *kSchedules[] = {"sequential:2x2", "sequential:4x2",
+    "sequential:lattice:4/2", "sequential:lattice:8/3,order=bit-reversal",
+    "sequential:diamond:5", "sequential:lattice:4/2,leak=0.02", "staircase:2x2",
+    "staircase:lattice:4/2", "s-matrix:7x1"};
+
+TEST (Fuse, FlatLightStaysFlatUnderEverySchedule)
+{
+  for (const char *preset : kSchedules) {
+    const Schedule schedule = schedule_of (preset);
+    const auto coded = take<std::uint16_t> (schedule, 2, [] (int) {
+      return draw<std::uint16_t> (40, 35, [] (int, int) { return 0.4; });
+    });
+    for (const FuseQuality quality : kQualities) {
+      SCOPED_TRACE (
+          std::string (preset) + " " + std::string (quality_name (quality)));
+      for (const auto &frame : fuse (coded, schedule, with_quality (quality)))
+        for (int y = 0; y < frame.height (); y++)
+          for (int x = 0; x < frame.width (); x++)
+            ASSERT_NEAR (frame.at (x, y), 0.4 * 65535, 25.0) << x << ' ' << y;
+    }
+  }
+}
+
+TEST (Fuse, PixelsStayAsTheyWereInTheirOwnSlot)
+{
+  const Schedule schedule = schedule_of ("sequential:lattice:4/2");
+  const auto coded = take (schedule, 2, [] (int slot) {
+    return draw (
+        40, 32, [slot] (int x, int y) { return texture (x - 2 * slot, y); });
+  });
+  for (const FuseQuality quality : kQualities) {
+    const auto frames = fuse (coded, schedule, with_quality (quality));
+    for (std::size_t f = 0; f < coded.size (); f++)
+      for (int y = 0; y < 32; y++)
+        for (int x = 0; x < 40; x++)
+          ASSERT_EQ (
+              frames[4 * f + std::size_t (schedule.element_at (x, y))].at (
+                  x, y),
+              coded[f].at (x, y))
+              << quality_name (quality);
+  }
+}
+
+TEST (Fuse, AStillSceneIsSeenAtFullResolution)
+{
+  const auto scene = draw (64, 48, texture);
+  for (const char *preset : {"sequential:2x2", "sequential:lattice:4/2",
+           "sequential:lattice:8/3,order=bit-reversal",
+           "staircase:lattice:4/2"}) {
+    SCOPED_TRACE (preset);
+    const Schedule schedule = schedule_of (preset);
+    const auto coded = take (schedule, 2, [&] (int) { return scene; });
+    for (const FuseQuality quality : kQualities) {
+      const auto frames = fuse (coded, schedule, with_quality (quality));
+      for (std::size_t k = frames.size () / 2; k < frames.size (); k++)
+        EXPECT_GT (psnr (frames[k], scene), 45.0) << quality_name (quality);
+    }
+  }
+}
+
+TEST (Fuse, LookaheadKnowsTheFirstFrameStandsStill)
+{
+  const auto scene = draw (64, 48, texture);
+  const Schedule schedule = schedule_of ("sequential:lattice:4/2");
+  const auto coded = take (schedule, 2, [&] (int) { return scene; });
+  FuseOptions options;
+  options.lookahead = 1;
+  for (const auto &frame : fuse (coded, schedule, options))
+    EXPECT_GT (psnr (frame, scene), 45.0);
+}
+
+/* Standard deviation over the slots of a frame, the largest of all pixels'
+ * root mean square. */
+double
+flicker (std::span<const Image<std::uint8_t>> slots)
+{
+  double sum = 0.0;
+  const auto n = double (slots.size ());
+  for (int y = 0; y < slots[0].height (); y++) {
+    for (int x = 0; x < slots[0].width (); x++) {
+      double mean = 0.0, squares = 0.0;
+      for (const auto &slot : slots) {
+        mean += slot.at (x, y) / n;
+        squares += slot.at (x, y) * double (slot.at (x, y)) / n;
+      }
+      sum += squares - mean * mean;
+    }
+  }
+  return std::sqrt (sum / (slots[0].width () * slots[0].height ()));
+}
+
+TEST (Fuse, AStillSceneDoesNotFlickerUnderNoise)
+{
+  const auto scene = draw (64, 48, texture);
+  for (const char *preset :
+      {"sequential:lattice:4/2", "sequential:lattice:8/3,order=bit-reversal"}) {
+    const Schedule schedule = schedule_of (preset);
+    const auto coded = take (
+        schedule, 4, [&] (int) { return scene; }, noisy_bench ());
+    const auto n = std::size_t (schedule.slots ());
+    const auto frames =
+        fuse (coded, schedule, with_quality (FuseQuality::kFast, true));
+    for (std::size_t f = 1; f < 4; f++)
+      EXPECT_LT (flicker (std::span (frames).subspan (f * n, n)), 1.0)
+          << preset << " frame " << f;
+  }
+}
+
+TEST (Fuse, StillLightIsAveragedOverFramesWhereNoiseIsKnown)
+{
+  const auto scene = draw (64, 48, texture);
+  const Schedule schedule = schedule_of ("sequential:lattice:4/2");
+  const auto coded = take (
+      schedule, 12, [&] (int) { return scene; }, noisy_bench ());
+  const auto frames =
+      fuse (coded, schedule, with_quality (FuseQuality::kFast, true));
+  EXPECT_GT (psnr (frames.back (), scene), 45.0);
+  EXPECT_LT (psnr (coded.back (), scene), 39.0);
+}
+
+/* A small disc crosses a still texture. */
+Image<std::uint8_t>
+disc_over_texture (int slot)
+{
+  return draw (96, 48, [slot] (int x, int y) {
+    return std::hypot (x - 8 - 3 * slot, y - 24) < 4.0 ? 1.0
+                                                       : 0.5 * texture (x, y);
+  });
+}
+
+TEST (Fuse, WhatMovesLeavesNoGhosts)
+{
+  const Schedule schedule = schedule_of ("sequential:lattice:4/2");
+  const auto coded = take (schedule, 6, disc_over_texture);
+  for (const FuseQuality quality : kQualities) {
+    const auto frames = fuse (coded, schedule, with_quality (quality));
+    for (int slot = 4; slot < 24; slot++) {
+      const auto truth = disc_over_texture (slot);
+      const auto &frame = frames[std::size_t (slot)];
+      double worst = 0.0;
+      for (int y = 0; y < 48; y++) {
+        for (int x = 0; x < 96; x++) {
+          const double d = std::hypot (x - 8 - 3 * slot, y - 24);
+          if (d > 9.0) // beyond the edge and what blurs it
+            worst = std::max (
+                worst, std::abs (frame.at (x, y) - double (truth.at (x, y))));
+        }
+      }
+      EXPECT_LT (worst, 70.0) << quality_name (quality) << ' ' << slot;
+    }
+  }
+}
+
+TEST (Fuse, ForgottenFramesHaveNoSay)
+{
+  const Schedule schedule;
+  const auto scene = draw (32, 24, texture);
+  const auto coded = take (schedule, 1, [&] (int) { return scene; });
+  auto fuser = Fuser<std::uint8_t>::make (schedule, 32, 24);
+  ASSERT_TRUE (fuser);
+  const auto once = [&] {
+    Pictures<> slots (4, Image<std::uint8_t> (32, 24));
+    std::vector<ImageView<std::uint8_t>> views;
+    for (auto &slot : slots)
+      views.push_back (slot.view ());
+    fuser->take (coded[0].view ());
+    fuser->fuse (views);
+    return slots;
+  };
+  const auto first = once ();
+  EXPECT_NE (once (), first);
+  fuser->forget ();
+  EXPECT_EQ (once (), first);
+}
+
+TEST (Fuse, SixteenBitsAreFinerThanEight)
+{
+  const Schedule schedule = schedule_of ("sequential:lattice:4/2");
+  const auto picture = [] (int) {
+    return draw<std::uint16_t> (48, 48, [] (int x, int y) {
+      return 0.5 + 0.004 * std::sin (0.1 * x) * std::cos (0.08 * y);
+    });
+  };
+  const auto coded = take<std::uint16_t> (schedule, 1, picture);
+  for (const auto &frame : fuse (coded, schedule))
+    EXPECT_GT (psnr (frame, picture (0)), 62.0);
+}
+
+/* --------------------------------------------------------------- errors -- */
+
+std::string
+error_of (const std::string &preset, int width, int height,
+    const FuseOptions &options = {})
+{
+  const auto made =
+      Fuser<std::uint8_t>::make (schedule_of (preset), width, height, options);
+  return made ? "" : made.error ().message;
+}
+
+TEST (Fuse, RefusesWhatItCannotDo)
+{
+  FuseOptions options;
+  EXPECT_NE (
+      error_of ("sequential:4x4", 3, 8).find ("no cell"), std::string::npos);
+  options.bits = 9;
+  EXPECT_NE (error_of ("sequential:2x2", 8, 8, options).find ("bits 9"),
+      std::string::npos);
+  options = {};
+  options.lookahead = 2;
+  EXPECT_NE (error_of ("sequential:2x2", 8, 8, options).find ("lookahead 2"),
+      std::string::npos);
+  options = with_quality (FuseQuality::kBest);
+  EXPECT_NE (error_of ("sequential:5x5", 32, 32, options).find ("quality=fast"),
+      std::string::npos);
+  EXPECT_EQ (error_of ("sequential:5x5", 32, 32), "");
+}
+
+/* Groups of 2x2 whose elements are mixed anew in each. */
+TEST (Fuse, RefusesTilesThatHardlyRepeat)
+{
+  constexpr int kPeriod = 80;
+  std::mt19937 engine (9);
+  std::vector<std::uint8_t> labels (kPeriod * kPeriod);
+  for (int y = 0; y < kPeriod; y += 2) {
+    for (int x = 0; x < kPeriod; x += 2) {
+      std::uint8_t mixed[] = {0, 1, 2, 3};
+      std::shuffle (mixed, mixed + 4, engine);
+      for (int i = 0; i < 4; i++)
+        labels[std::size_t ((y + i / 2) * kPeriod + x + i % 2)] = mixed[i];
+    }
+  }
+  Schedule::Parts parts{*Tile::from_labels (kPeriod, kPeriod, labels),
+      *Code::named ("sequential", 4)};
+  const auto made =
+      Fuser<std::uint8_t>::make (*Schedule::make (parts), 160, 160);
+  ASSERT_FALSE (made);
+  EXPECT_NE (made.error ().message.find ("smaller period"), std::string::npos);
+}
+
+TEST (Fuse, QualitiesHaveNames)
+{
+  for (const FuseQuality quality : kQualities)
+    EXPECT_EQ (*parse_quality (quality_name (quality)), quality);
+  EXPECT_FALSE (parse_quality ("finest"));
+}
+
+} // namespace

@@ -20,6 +20,11 @@ constexpr double kTypicalLight = 0.4;
  * equations become ill-conditioned. */
 constexpr double kLeastNoise = 1e-3;
 
+/* Two scenes: all slots are alike; or they have less to do with each other than
+ * in any scene. */
+constexpr SceneClass kStill{0.0, 0.0, 5.0, 1.5, 1.0};
+constexpr SceneClass kMoved{0.0, 0.0, 5.0, 1.5, 0.6};
+
 /* Of the taps: far enough to see every slot several times. */
 int
 tap_radius (int slots)
@@ -98,12 +103,13 @@ Engine::Engine (const Schedule &schedule, int width, int height,
       observation_ (schedule, options.noise, steps), phases_ (schedule),
       kernels_ (*find_kernels (options.target)),
       radius_ (tap_radius (schedule.slots ())),
-      plain_ (phases_, disc (radius_), schedule.slots ()),
+      predictions_ (phases_, disc (radius_), 2), if_still_ (width, height),
+      if_moved_ (width, height),
       stillness_ (width, height, schedule.cell (), !observation_.noise_free ())
 {
   map_noise (schedule);
   find_margin (schedule);
-  prepare_plain (options);
+  prepare (schedule, options);
 }
 
 void
@@ -168,31 +174,43 @@ Engine::find_margin (const Schedule &schedule)
   }
 }
 
-/* Filters of every phase under the plain model. */
+/* Filters of every phase under the plain model, and under those of motion. */
 void
-Engine::prepare_plain (const FuseOptions &options)
+Engine::prepare (const Schedule &schedule, const FuseOptions &options)
 {
-  const std::vector<Offset> taps = disc (radius_);
-  const Covariance covariance (options.scene.plain, observation_, 2 * radius_);
   const double scene = options.scene.contrast * options.scene.contrast;
   std::vector<double> noise;
-  for (int e = 0; e < observation_.slots (); e++)
+  for (int e = 0; e < slots (); e++)
     noise.push_back (std::max (
         observation_.variance (e, kTypicalLight) / scene, kLeastNoise));
-
-  for (int row = 0; row < phases_.rows (); row++) {
-    for (int x = 0; x < phases_.period (); x++) {
-      std::vector<int> elements;
-      for (const Offset &tap : taps)
-        elements.push_back (phases_.element (row, x, tap.x, tap.y));
-      KrigingFilter filter =
-          solve_kriging (covariance, observation_, taps, elements, noise);
-      for (int s = 0; s < observation_.slots (); s++)
-        plain_.set (row, x, s,
-            std::span (filter.slots)
-                .subspan (std::size_t (s) * taps.size (), taps.size ()));
-    }
+  const std::vector<Offset> taps = disc (radius_);
+  const auto each_phase = [&] (const SceneClass &patch, auto use) {
+    const Covariance covariance (patch, observation_, 2 * radius_);
+    for (int row = 0; row < phases_.rows (); row++)
+      for (int x = 0; x < phases_.period (); x++)
+        use (row, x,
+            solve_phase (
+                covariance, observation_, phases_, row, x, taps, noise));
+  };
+  for (const int output : {0, 1})
+    each_phase (output == 0 ? kStill : kMoved,
+        [&] (int row, int x, const KrigingFilter &filter) {
+          predictions_.set (row, x, output, filter.residual);
+        });
+  if (options.quality != FuseQuality::kFast) {
+    const bool best = options.quality == FuseQuality::kBest;
+    motion_.emplace (phases_, observation_, motion_classes (), radius_, noise);
+    if (best)
+      likeness_.emplace (schedule, observation_, width_, height_);
+    light_.assign (std::size_t (slots ()), Field (width_, height_));
+    return;
   }
+
+  plain_.emplace (phases_, taps, slots ());
+  each_phase (
+      options.scene.plain, [&] (int row, int x, const KrigingFilter &filter) {
+        plain_->set_all (row, x, filter.slots);
+      });
 }
 
 Field &
@@ -218,6 +236,21 @@ Engine::take ()
   queue_.push_back (std::exchange (spare_, Field ()));
 }
 
+void
+Engine::find_stillness (const Field &coded)
+{
+  const std::vector<std::ptrdiff_t> offsets = predictions_.offsets (coded);
+  for (int y = 0; y < height_; y++) {
+    float *errors[] = {if_still_.row (y), if_moved_.row (y)};
+    kernels_.filter (predictions_.row (phases_, coded, y, offsets), errors);
+    for (float *error : errors)
+      for (int x = 0; x < width_; x++)
+        error[x] *= error[x];
+  }
+  stillness_.take (coded, queue_.size () > 1 ? &queue_[1] : nullptr, noise_,
+      if_still_, if_moved_);
+}
+
 /* Where the picture stands still it is the same in every slot. */
 void
 Engine::blend (int y, float *const *rows) const
@@ -229,23 +262,54 @@ Engine::blend (int y, float *const *rows) const
 }
 
 void
-Engine::fuse (const RowSink &sink)
+Engine::fuse_plainly (const Field &coded, const RowSink &sink)
 {
-  const Field &coded = queue_.front ();
-  stillness_.take (coded, queue_.size () > 1 ? &queue_[1] : nullptr, noise_);
-
-  const std::vector<std::ptrdiff_t> offsets = plain_.offsets (coded);
+  const std::vector<std::ptrdiff_t> offsets = plain_->offsets (coded);
   Field rows_of_slots (width_, slots ());
   std::vector<float *> rows;
   for (int s = 0; s < slots (); s++)
     rows.push_back (rows_of_slots.row (s));
   for (int y = 0; y < height_; y++) {
-    kernels_.filter (plain_.row (phases_, coded, y, offsets), rows.data ());
+    kernels_.filter (plain_->row (phases_, coded, y, offsets), rows.data ());
     blend (y, rows.data ());
     sink (y, rows.data ());
   }
+}
+
+void
+Engine::fuse_motion (const Field &coded, const RowSink &sink)
+{
+  motion_->run (kernels_, coded, light_);
+  if (likeness_)
+    likeness_->run (kernels_, coded, typical_noise (), light_);
+  std::vector<float *> rows (light_.size ());
+  for (int y = 0; y < height_; y++) {
+    for (std::size_t s = 0; s < rows.size (); s++)
+      rows[s] = light_[s].row (y);
+    blend (y, rows.data ());
+    sink (y, rows.data ());
+  }
+}
+
+void
+Engine::fuse (const RowSink &sink)
+{
+  const Field &coded = queue_.front ();
+  find_stillness (coded);
+  if (plain_)
+    fuse_plainly (coded, sink);
+  else
+    fuse_motion (coded, sink);
   spare_ = std::move (queue_.front ());
   queue_.pop_front ();
+}
+
+double
+Engine::typical_noise () const
+{
+  return observation_.noise_free ()
+             ? 0.0
+             : kWhite * std::sqrt (observation_.variance (0, kTypicalLight));
 }
 
 void

@@ -5,12 +5,15 @@
 #include <deque>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "base/result.h"
 #include "fuse/field.h"
 #include "fuse/filter_bank.h"
 #include "fuse/fuser.h"
+#include "fuse/likeness.h"
+#include "fuse/motion.h"
 #include "fuse/stillness.h"
 
 namespace cexp::fuse
@@ -47,15 +50,25 @@ private:
       const FuseOptions &options, double steps);
   void map_noise (const Schedule &schedule);
   void find_margin (const Schedule &schedule);
-  void prepare_plain (const FuseOptions &options);
+  void prepare (const Schedule &schedule, const FuseOptions &options);
+  void find_stillness (const Field &coded);
   void blend (int y, float *const *rows) const;
+  void fuse_plainly (const Field &coded, const RowSink &sink);
+  void fuse_motion (const Field &coded, const RowSink &sink);
+  /** Standard deviation of coded pixels in grey levels. */
+  double typical_noise () const;
 
   int width_, height_;
   Observation observation_;
   Phases phases_;
   const Kernels &kernels_;
   int radius_;
-  FilterBank plain_;
+  FilterBank predictions_;    ///< of a pixel by others: if still, if moved
+  Field if_still_, if_moved_; ///< their squared errors
+  std::optional<FilterBank> plain_; ///< fast: no motion
+  std::optional<Motion> motion_;
+  std::optional<Likeness> likeness_;
+  std::vector<Field> light_; ///< of each slot, unless fast
   NoiseMap noise_;
   Field gain_; ///< empty where it is 1 everywhere
   Stillness stillness_;

@@ -26,6 +26,14 @@ FilterBank::set (int row, int x, int output, std::span<const float> weights)
   }
 }
 
+void
+FilterBank::set_all (int row, int x, std::span<const float> weights)
+{
+  for (int k = 0; k < outputs_; k++)
+    set (row, x, k,
+        weights.subspan (std::size_t (k) * taps_.size (), taps_.size ()));
+}
+
 FilterRow
 FilterBank::row (const Phases &phases, const Field &source, int y,
     std::span<const std::ptrdiff_t> offsets) const

@@ -21,6 +21,8 @@ public:
   int outputs () const { return outputs_; }
   /** Weights of the pixels at @p x of distinct row @p row of the phases. */
   void set (int row, int x, int output, std::span<const float> weights);
+  /** Of all outputs, one after the other. */
+  void set_all (int row, int x, std::span<const float> weights);
   /** How to filter row @p y of @p source, whose margin holds the taps;
    * @p offsets as offsets () gives them for a field of its size. */
   FilterRow row (const Phases &phases, const Field &source, int y,

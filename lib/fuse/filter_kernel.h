@@ -37,14 +37,13 @@ filter_vectors (const fuse::FilterRow &row, int first, int x, Finish finish,
   for (int v = 0; v < Vectors; v++)
     weights[v] = row.weights + first * row.width +
                  (row.phase + x + v * kFloats) % row.period;
-  const std::ptrdiff_t step = std::ptrdiff_t (row.outputs) * row.width;
   for (int t = 0; t < row.taps; t++) {
     const float *from = row.source + x + row.offsets[t];
     for (int v = 0; v < Vectors; v++) {
       const Floats value = load (from + v * kFloats);
       for (int k = 0; k < Outputs; k++)
         sum[v][k] += load (weights[v] + k * row.width) * value;
-      weights[v] += step;
+      weights[v] += row.outputs * row.width;
     }
   }
   for (int v = 0; v < Vectors; v++)

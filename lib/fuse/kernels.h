@@ -35,9 +35,9 @@ struct FilterRow {
 
 /**
  * Overlapping blocks of kBlock x kBlock pixels x slots, kBlockStep apart, as
- * many side by side as a vector has lanes: lane l of plane (slot, y), column x
- * is at source[slot][y * stride + (x mod kBlockStep) * split
- *                    + x / kBlockStep + l].
+ * many side by side as a vector has lanes: column x of row y of block l is at
+ * source[slot][y * stride + ((x + shift) mod kBlockStep) * split
+ *              + (x + shift) / kBlockStep + l].
  */
 constexpr int kBlock = 12;
 constexpr int kBlockStep = 4;
@@ -48,6 +48,7 @@ struct ShrinkRow {
   float *weight;              ///< the same places of one slot: += weight
   std::ptrdiff_t stride;
   std::ptrdiff_t split;
+  int shift; ///< of the blocks to the right, 0 .. kBlockStep - 1
   int slots;
   const float *slot_transform; ///< orthonormal, slots x slots
   int blocks;                  ///< a multiple of 16

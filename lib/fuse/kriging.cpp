@@ -32,17 +32,25 @@ weigh_slot (const Observation &observation, int a, int slot, Correlation c)
   return sum;
 }
 
-/* A symmetric positive definite matrix, factored in place: L L^T. */
+/* A symmetric positive definite matrix, factored in place: U^T U. */
 class Cholesky
 {
 public:
+  /* Column by column, so that what is subtracted lies in rows. */
   Cholesky (std::vector<double> matrix, int size)
       : l_ (std::move (matrix)), size_ (size)
   {
-    for (int i = 0; i < size_; i++) {
-      for (int j = 0; j < i; j++)
-        row (i)[j] = (row (i)[j] - dot (row (i), row (j), j)) / row (j)[j];
-      row (i)[i] = std::sqrt (row (i)[i] - dot (row (i), row (i), i));
+    for (int k = 0; k < size_; k++) {
+      double *upper = row (k);
+      const double pivot = std::sqrt (upper[k]);
+      for (int j = k; j < size_; j++)
+        upper[j] /= pivot;
+      for (int i = k + 1; i < size_; i++) {
+        double *to = row (i);
+        const double factor = upper[i];
+        for (int j = i; j < size_; j++)
+          to[j] -= factor * upper[j];
+      }
     }
   }
 
@@ -52,12 +60,12 @@ public:
   {
     for (int i = 0; i < size_; i++) {
       for (int j = 0; j < i; j++)
-        subtract (b, count, i, j, row (i)[j]);
+        subtract (b, count, i, j, row (j)[i]);
       divide (b, count, i);
     }
     for (int i = size_ - 1; i >= 0; i--) {
       for (int j = i + 1; j < size_; j++)
-        subtract (b, count, i, j, row (j)[i]);
+        subtract (b, count, i, j, row (i)[j]);
       divide (b, count, i);
     }
   }
@@ -67,13 +75,6 @@ private:
   const double *row (int i) const
   {
     return l_.data () + std::size_t (i * size_);
-  }
-  static double dot (const double *a, const double *b, int count)
-  {
-    double sum = 0.0;
-    for (int i = 0; i < count; i++)
-      sum += a[i] * b[i];
-    return sum;
   }
   static void subtract (
       std::vector<double> &b, int count, int to, int from, double factor)
@@ -211,6 +212,17 @@ solve_kriging (const Covariance &covariance, const Observation &observation,
   for (std::size_t i = 0; i < taps.size (); i++)
     filter.residual.push_back (float (-inverse (i) / inverse (middle)));
   return filter;
+}
+
+KrigingFilter
+solve_phase (const Covariance &covariance, const Observation &observation,
+    const Phases &phases, int row, int x, std::span<const Offset> taps,
+    std::span<const double> noise)
+{
+  std::vector<int> elements;
+  for (const Offset &tap : taps)
+    elements.push_back (phases.element (row, x, tap.x, tap.y));
+  return solve_kriging (covariance, observation, taps, elements, noise);
 }
 
 std::vector<Offset>

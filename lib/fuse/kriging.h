@@ -72,6 +72,11 @@ KrigingFilter solve_kriging (const Covariance &covariance,
     const Observation &observation, std::span<const Offset> taps,
     std::span<const int> elements, std::span<const double> noise);
 
+/** The same for the pixels at @p x of distinct row @p row of the phases. */
+KrigingFilter solve_phase (const Covariance &covariance,
+    const Observation &observation, const Phases &phases, int row, int x,
+    std::span<const Offset> taps, std::span<const double> noise);
+
 /** The places within @p radius px and a half, row by row. */
 std::vector<Offset> disc (int radius);
 

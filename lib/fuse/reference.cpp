@@ -68,8 +68,9 @@ public:
   }
   std::ptrdiff_t place (int y, int x) const
   {
-    return y * row_.stride + (x % kBlockStep) * row_.split + x / kBlockStep +
-           lane_;
+    const int column = x + row_.shift;
+    return y * row_.stride + (column % kBlockStep) * row_.split +
+           column / kBlockStep + lane_;
   }
   void transform_slots (int y, int x, bool back)
   {

@@ -35,13 +35,13 @@ struct SceneModel {
   SceneClass plain;
   /** Standard deviation of a scene as a part of white: how far noise is
    * believed to be below the scene. */
-  double contrast = 0.13;
+  double contrast = 0.25;
 
   bool operator== (const SceneModel &) const = default;
 };
 
-/** Still and moving patches for motion-adaptive fusion, @p fine or only those
- * at whole pixels of up to 2 px per slot. */
-std::vector<SceneClass> motion_classes (bool fine);
+/** Still and moving patches for motion-adaptive fusion: up to 4 px per slot
+ * along each axis. */
+std::vector<SceneClass> motion_classes ();
 
 } // namespace cexp

@@ -84,7 +84,8 @@ transform_slots (
 CEXP_INLINE std::ptrdiff_t
 column (const fuse::ShrinkRow &row, int x)
 {
-  return (x % fuse::kBlockStep) * row.split + x / fuse::kBlockStep;
+  return ((x + row.shift) % fuse::kBlockStep) * row.split +
+         (x + row.shift) / fuse::kBlockStep;
 }
 
 CEXP_INLINE void

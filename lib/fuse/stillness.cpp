@@ -16,6 +16,9 @@ constexpr float kFloor = 0.5f;
 constexpr float kStillMean = 1.8f, kMovedMean = 3.0f;
 /* The same for the largest of them: something small may have passed. */
 constexpr float kStillMost = 25.0f, kMovedMost = 40.0f;
+/* Errors of prediction if still in units of those if moved, up to which nothing
+ * repeats itself, and from which on it does. */
+constexpr float kStillError = 1.5f, kMovedError = 2.2f;
 /* Frames over which still light is averaged. */
 constexpr float kMemory = 16.0f;
 
@@ -31,7 +34,8 @@ Stillness::Stillness (int width, int height, Extent cell, bool average)
     : radius_ (std::max (3, std::max (cell.width, cell.height) / 2 + 1)),
       average_ (average), mean_ (width, height), count_ (width, height),
       change_ (width, height, radius_), rows_sum_ (width, height, radius_),
-      rows_most_ (width, height, radius_), weight_ (width, height)
+      rows_most_ (width, height, radius_), repeats_ (width, height),
+      weight_ (width, height)
 {
 }
 
@@ -96,17 +100,61 @@ Stillness::judge (Field &weight, bool raise)
       }
     }
     float *out = weight.row (y);
+    const float *repeats = repeats_.row (y);
     for (int x = 0; x < width; x++) {
       const float still = fade (sum[x] / area, kStillMean, kMovedMean) *
-                          fade (most[x], kStillMost, kMovedMost);
+                          fade (most[x], kStillMost, kMovedMost) * repeats[x];
       out[x] = raise ? std::max (out[x], still) : still;
     }
   }
 }
 
+/* repeats_ = where the errors if still are not larger than those if moved. */
 void
-Stillness::take (const Field &coded, const Field *after, const NoiseMap &noise)
+Stillness::doubt (const Field &still, const Field &moved)
 {
+  const int width = still.width (), height = still.height ();
+  const auto along = [&] (const Field &errors, Field &sums) {
+    for (int y = 0; y < height; y++) {
+      float *change = change_.row (y), *sum = sums.row (y);
+      std::copy_n (errors.row (y), width, change);
+      for (int x = 1; x <= radius_; x++) {
+        change[-x] = change[0];
+        change[width - 1 + x] = change[width - 1];
+      }
+      std::fill_n (sum, width, 0.0f);
+      for (int i = -radius_; i <= radius_; i++)
+        for (int x = 0; x < width; x++)
+          sum[x] += change[x + i];
+    }
+  };
+  along (still, rows_sum_);
+  along (moved, rows_most_);
+  Field sums (width, 2);
+  float *const if_still = sums.row (0), *const if_moved = sums.row (1);
+  const float floor = kFloor * float ((2 * radius_ + 1) * (2 * radius_ + 1));
+  for (int y = 0; y < height; y++) {
+    std::fill_n (if_still, width, 0.0f);
+    std::fill_n (if_moved, width, floor);
+    for (int i = -radius_; i <= radius_; i++) {
+      const int from = std::clamp (y + i, 0, height - 1);
+      const float *a = rows_sum_.row (from), *b = rows_most_.row (from);
+      for (int x = 0; x < width; x++) {
+        if_still[x] += a[x];
+        if_moved[x] += b[x];
+      }
+    }
+    float *repeats = repeats_.row (y);
+    for (int x = 0; x < width; x++)
+      repeats[x] = fade (if_still[x] / if_moved[x], kStillError, kMovedError);
+  }
+}
+
+void
+Stillness::take (const Field &coded, const Field *after, const NoiseMap &noise,
+    const Field &still, const Field &moved)
+{
+  doubt (still, moved);
   const int width = coded.width (), height = coded.height ();
   if (begun_) {
     compare (coded, mean_, &count_, noise);

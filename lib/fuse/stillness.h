@@ -18,7 +18,9 @@ struct NoiseMap {
  * A pixel sees the same slots of every frame. Where it and all pixels around
  * it, of every other slot, have not changed by more than noise explains, the
  * picture stands still, and the coded frame is the picture, whatever its
- * texture; no aliasing can mislead this comparison.
+ * texture. What repeats itself with the frame rate looks just so; there,
+ * neighbours that saw the same slot predict a pixel better than those that are
+ * close, and what they predict must not be.
  *
  * The light of still pixels is averaged over frames, as far back as they stood
  * still, where the noise is known.
@@ -29,8 +31,12 @@ public:
   /** @p cell  of the tile: the surroundings hold every slot. */
   Stillness (int width, int height, Extent cell, bool average);
 
-  /** Takes the next coded frame; a frame after it, or null, as well. */
-  void take (const Field &coded, const Field *after, const NoiseMap &noise);
+  /** Takes the next coded frame; a frame after it, or null, as well.
+   * @p still, @p moved  squared errors of the predictions of each pixel by its
+   *                     neighbours, if the picture stands still and if every
+   *                     slot shows another. */
+  void take (const Field &coded, const Field *after, const NoiseMap &noise,
+      const Field &still, const Field &moved);
   /** Forgets all frames. */
   void forget () { begun_ = false; }
 
@@ -43,6 +49,7 @@ private:
   void compare (const Field &now, const Field &other, const Field *count,
       const NoiseMap &noise);
   void judge (Field &weight, bool raise);
+  void doubt (const Field &still, const Field &moved);
 
   int radius_;
   bool average_;
@@ -50,6 +57,7 @@ private:
   Field mean_;  ///< of the frames in which a pixel stood still
   Field count_; ///< of these frames
   Field change_, rows_sum_, rows_most_; ///< while judging
+  Field repeats_; ///< 1 where nothing speaks for repetition
   Field weight_;
 };
 

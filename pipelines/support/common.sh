@@ -146,6 +146,7 @@ check_options ()
   check_option wait '[0-9]+(\.[0-9]+)?' 'a number of seconds'
   check_option start '[0-9]+(\.[0-9]+)?' 'a number of seconds'
   check_option duration '[0-9]+(\.[0-9]+)?' 'a number of seconds'
+  check_option fuse 'fast|balanced|best' 'fast, balanced or best'
   check_option method 'auto|rank|select|decode' 'auto, rank, select or decode'
   for name in psf-sigma full-well read-noise gain scale; do
     check_option "$name" '[0-9]*\.?[0-9]+' 'a number that is not negative'
@@ -403,17 +404,17 @@ make_folder_for ()
   fi
 }
 
-# Subframes and coded frames beside them in a window; display shows the latest
-# and never holds up what feeds it.
+# display FAST CODED: the frames of two pads in a window, the fast ones on the
+# right; it shows the latest and never holds up what feeds it.
 display ()
 {
   local sink=${opt[sink]:-autovideosink}
   local latest='leaky=downstream max-size-bytes=0 max-size-time=0'
   local exact='videoconvert ! video/x-raw,format=BGRx'
-  printf 'demux.src ! queue name=fast %s max-size-buffers=%d ! %s ! view.sink_0 ' \
-    "$latest" $((2 * slots)) "$exact"
-  printf 'demux.coded ! queue name=beside %s max-size-buffers=2 ! %s ! view.sink_1 ' \
-    "$latest" "$exact"
+  printf '%s ! queue name=fast %s max-size-buffers=%d ! %s ! view.sink_0 ' \
+    "$1" "$latest" $((2 * slots)) "$exact"
+  printf '%s ! queue name=beside %s max-size-buffers=2 ! %s ! view.sink_1 ' \
+    "$2" "$latest" "$exact"
   printf 'compositor name=view background=black sink_0::xpos=%d ! ' "$width"
   printf 'queue max-size-buffers=4 ! %s ' "$sink"
 }

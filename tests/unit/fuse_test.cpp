@@ -213,7 +213,7 @@ shrunk (const fuse::Kernels &kernels, int slots, float threshold)
       std::size_t (slots * fuse::kBlock * fuse::kBlock * 16));
   const auto transform = fuse::dct_matrix (slots);
   kernels.shrink ({source.data (), sum.data (),
-      sums.data () + kPlane * std::size_t (slots), kStride, kSplit, slots,
+      sums.data () + kPlane * std::size_t (slots), kStride, kSplit, 3, slots,
       transform.data (), 32, threshold, scratch.data ()});
   return sums;
 }

@@ -1,0 +1,217 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "fuse/motion.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "fuse/kriging.h"
+
+namespace cexp::fuse
+{
+
+namespace
+{
+
+/* Surroundings over which the error of a class is averaged. */
+constexpr double kSigma = 2.5;
+constexpr int kReach = 8;
+/* Rows that are worked on at a time. */
+constexpr int kBandRows = 48;
+/* Classes whose error is measured at a time: those that one pass of a filter
+ * yields. */
+constexpr std::size_t kChunk = 8;
+/* Error, in grey levels squared, that means nothing. */
+constexpr float kErrorFloor = 1.0f;
+/* Weight relative to the best class below which one has no say. */
+constexpr float kLeastWeight = 0.01f;
+
+std::vector<float>
+gaussian ()
+{
+  std::vector<float> weights;
+  double sum = 0.0;
+  for (int i = -kReach; i <= kReach; i++)
+    sum += std::exp (-0.5 * i * i / (kSigma * kSigma));
+  for (int i = -kReach; i <= kReach; i++)
+    weights.push_back (
+        float (std::exp (-0.5 * i * i / (kSigma * kSigma)) / sum));
+  return weights;
+}
+
+/* A filter of one output with the same weights everywhere. */
+class Blur
+{
+public:
+  Blur ()
+  {
+    for (const float weight : gaussian ())
+      weights_.insert (weights_.end (), Field::kSlack, weight);
+    static_assert (Field::kSlack >= 16, "a row of weights is a vector long");
+  }
+  void run (const Kernels &kernels, const float *source, std::ptrdiff_t step,
+      int count, float *to) const
+  {
+    std::array<std::ptrdiff_t, 2 * kReach + 1> offsets;
+    for (int i = -kReach; i <= kReach; i++)
+      offsets[std::size_t (i + kReach)] = i * step;
+    kernels.filter ({source, count, offsets.data (), int (offsets.size ()),
+                        weights_.data (), Field::kSlack, 1, 1, 0},
+        &to);
+  }
+
+private:
+  std::vector<float> weights_;
+};
+
+/* Mirrored without the border itself. */
+int
+mirrored (int at, int size)
+{
+  if (at < 0)
+    at = -at;
+  return std::clamp (at < size ? at : 2 * size - 2 - at, 0, size - 1);
+}
+
+} // namespace
+
+/* Rows first .. first + rows - 1 of a frame on their way. */
+struct Motion::Band {
+  Band (int width, std::size_t classes)
+      : fit (classes, Field (width, kBandRows)),
+        squares (kChunk, Field (width, kBandRows, kReach)),
+        along (width, kBandRows + 2 * kReach)
+  {
+  }
+
+  int first = 0, rows = 0;
+  std::vector<Field> fit;     ///< of each class: error, then weight
+  std::vector<Field> squares; ///< of a chunk: squared residuals
+  Field along;                ///< blurred along rows
+};
+
+Motion::Motion (const Phases &phases, const Observation &observation,
+    std::span<const SceneClass> classes, int radius,
+    std::span<const double> noise)
+    : phases_ (phases)
+{
+  const std::vector<Offset> taps = disc (radius);
+  for (std::size_t c = 0; c < classes.size (); c++) {
+    const SceneClass &patch = classes[c];
+    if (c % kChunk == 0)
+      residuals_.emplace_back (
+          phases, taps, int (std::min (kChunk, classes.size () - c)));
+    penalties_.push_back (float (1.0 + 0.1 * std::hypot (patch.vx, patch.vy)));
+    filters_.emplace_back (phases, taps, observation.slots ());
+    const Covariance covariance (patch, observation, 2 * radius);
+    for (int row = 0; row < phases.rows (); row++) {
+      for (int x = 0; x < phases.period (); x++) {
+        const KrigingFilter filter =
+            solve_phase (covariance, observation, phases, row, x, taps, noise);
+        filters_.back ().set_all (row, x, filter.slots);
+        residuals_.back ().set (row, x, int (c % kChunk), filter.residual);
+      }
+    }
+  }
+}
+
+/* The squared error of every class around each pixel of the band. */
+void
+Motion::measure (const Kernels &kernels, const Field &coded, Band &band) const
+{
+  const Blur blur;
+  const int width = coded.width (), height = coded.height ();
+  const auto offsets = filters_[0].offsets (coded);
+  for (std::size_t c = 0; c < band.fit.size (); c += kChunk) {
+    const std::size_t count = std::min (kChunk, band.fit.size () - c);
+    for (int y = -kReach; y < band.rows + kReach; y++) {
+      std::array<float *, kChunk> to;
+      for (std::size_t i = 0; i < count; i++)
+        to[i] = band.squares[i].row (y);
+      kernels.filter (residuals_[c / kChunk].row (phases_, coded,
+                          mirrored (band.first + y, height), offsets),
+          to.data ());
+    }
+    for (std::size_t i = 0; i < count; i++) {
+      Field &squares = band.squares[i];
+      for (int y = -kReach; y < band.rows + kReach; y++) {
+        float *square = squares.row (y);
+        for (int x = 0; x < width; x++)
+          square[x] *= square[x];
+        for (int x = 1; x <= kReach; x++) {
+          square[-x] = square[mirrored (-x, width)];
+          square[width - 1 + x] = square[mirrored (width - 1 + x, width)];
+        }
+        blur.run (kernels, square, 1, width, band.along.row (y + kReach));
+      }
+      for (int y = 0; y < band.rows; y++)
+        blur.run (kernels, band.along.row (y + kReach), band.along.stride (),
+            width, band.fit[c + i].row (y));
+    }
+  }
+}
+
+/* Weights (best error / error) ^ 12.5, the number of independent errors in the
+ * surroundings being some 25. */
+void
+Motion::weigh (Band &band) const
+{
+  const int width = band.along.width ();
+  Field room (width, 2);
+  float *const best = room.row (0), *const sum = room.row (1);
+  for (int y = 0; y < band.rows; y++) {
+    std::fill_n (best, width, 1e30f);
+    std::fill_n (sum, width, 0.0f);
+    for (std::size_t c = 0; c < band.fit.size (); c++) {
+      float *fit = band.fit[c].row (y);
+      for (int x = 0; x < width; x++) {
+        fit[x] = penalties_[c] * fit[x] + kErrorFloor;
+        best[x] = std::min (best[x], fit[x]);
+      }
+    }
+    for (Field &field : band.fit) {
+      float *fit = field.row (y);
+      for (int x = 0; x < width; x++) {
+        const float ratio = best[x] / fit[x];
+        const float fourth = ratio * ratio * ratio * ratio;
+        const float weight = fourth * fourth * fourth * std::sqrt (ratio);
+        fit[x] = weight < kLeastWeight ? 0.0f : weight;
+        sum[x] += fit[x];
+      }
+    }
+    for (Field &field : band.fit) {
+      float *fit = field.row (y);
+      for (int x = 0; x < width; x++)
+        fit[x] /= sum[x];
+    }
+  }
+}
+
+void
+Motion::run (
+    const Kernels &kernels, const Field &coded, std::span<Field> slots) const
+{
+  const int width = coded.width (), height = coded.height ();
+  Band band (width, filters_.size ());
+  const auto offsets = filters_[0].offsets (coded);
+  std::vector<float *> to (slots.size ());
+  for (band.first = 0; band.first < height; band.first += kBandRows) {
+    band.rows = std::min (kBandRows, height - band.first);
+    measure (kernels, coded, band);
+    weigh (band);
+    for (Field &slot : slots)
+      for (int y = 0; y < band.rows; y++)
+        std::fill_n (slot.row (band.first + y), width, 0.0f);
+    for (std::size_t c = 0; c < filters_.size (); c++) {
+      for (int y = 0; y < band.rows; y++) {
+        for (std::size_t s = 0; s < slots.size (); s++)
+          to[s] = slots[s].row (band.first + y);
+        kernels.filter_add (
+            filters_[c].row (phases_, coded, band.first + y, offsets),
+            band.fit[c].row (y), to.data ());
+      }
+    }
+  }
+}
+
+} // namespace cexp::fuse

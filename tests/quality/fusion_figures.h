@@ -1,0 +1,32 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The tables of docs/fusion.md. */
+#pragma once
+
+#include <vector>
+
+#include "figures.h"
+#include "fusion.h"
+#include "scene.h"
+#include "table.h"
+
+namespace cexp::quality
+{
+
+/** The schedule that is measured for @p n slots, 4 or 8. */
+Schedule fusion_schedule (int n);
+
+/** The camera of the noisy tables, as fusion is told of it. */
+SensorNoise fusion_noise ();
+
+/** PSNR and SSIM of fused frames and of what they are compared with on the
+ * first @p frames frames of every scene, clean and noisy: means over frames,
+ * and over scenes. */
+std::vector<Table> fusion_tables (
+    const std::vector<Scene> &scenes, int frames, const Progress &progress);
+
+/** The first frame of every scene standing still: PSNR against it and standard
+ * deviation over the slots of a frame, of the third coded frame. */
+Table still_fusion_table (
+    const std::vector<Scene> &scenes, const Progress &progress);
+
+} // namespace cexp::quality

@@ -1,0 +1,94 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Fusion is as true as an independent calculation of the same methods, and
+ * beats what it is compared with. */
+#include <gtest/gtest.h>
+
+#include "baselines.h"
+#include "footage.h"
+#include "fusion_figures.h"
+
+namespace
+{
+
+using namespace cexp;
+using namespace cexp::quality;
+
+constexpr Condition kNoisy = {.electrons = 10000.0, .read_noise = 5.0};
+
+/* The first 8 frames of one of the clips; none where they are not there. */
+Scene
+clip (const std::string &name)
+{
+  if (auto clips = read_clips (QUALITY_CLIPS, 8))
+    for (Scene &scene : *clips)
+      if (scene.name == name)
+        return std::move (scene);
+  return {};
+}
+
+FrameMean
+figure (const Scene &scene, int n, FuseQuality quality,
+    const Condition &condition = {})
+{
+  const Schedule schedule = fusion_schedule (n);
+  FuseOptions options;
+  options.quality = quality;
+  options.noise = {condition.electrons, condition.read_noise};
+  return compare (fuse (take (scene, schedule, condition), schedule, options),
+      scene.frames);
+}
+
+/* What the methods reach in an independent calculation, dB. */
+struct Goal {
+  const char *clip;
+  int n;
+  double fast, best, best_noisy;
+};
+
+TEST (FusionQuality, ReachesTheIndependentCalculation)
+{
+  /* It does not round to 8 bits, which costs up to 0.02 dB. */
+  constexpr double kRounding = 0.05;
+  for (const Goal &goal : {Goal{"traffic48", 4, 24.65, 28.42, 27.27},
+           Goal{"traffic48", 8, 22.55, 25.79, 25.12},
+           Goal{"runner40", 4, 37.19, 38.42, 36.56},
+           Goal{"runner40", 8, 33.80, 36.40, 34.54}}) {
+    const Scene scene = clip (goal.clip);
+    if (scene.frames.empty ())
+      GTEST_SKIP () << "the clip " << goal.clip << " is not there";
+    SCOPED_TRACE (goal.clip);
+    EXPECT_GT (
+        figure (scene, goal.n, FuseQuality::kFast).psnr, goal.fast - kRounding);
+    EXPECT_GT (
+        figure (scene, goal.n, FuseQuality::kBest).psnr, goal.best - kRounding);
+    EXPECT_GT (figure (scene, goal.n, FuseQuality::kBest, kNoisy).psnr,
+        goal.best_noisy - kRounding);
+  }
+}
+
+/* A drawn scene that everybody has. */
+TEST (FusionQuality, MotionIsTruerThanAFilterAndLikenessThanMotion)
+{
+  const Scene scene = synthetic_scene (96, 80, 4);
+  const Schedule schedule = fusion_schedule (4);
+  const double bicubic = compare (
+      bicubic_frames (take (scene, schedule, kNoisy), schedule), scene.frames)
+                             .psnr;
+  const double fast = figure (scene, 4, FuseQuality::kFast, kNoisy).psnr;
+  const double balanced =
+      figure (scene, 4, FuseQuality::kBalanced, kNoisy).psnr;
+  const double best = figure (scene, 4, FuseQuality::kBest, kNoisy).psnr;
+  EXPECT_GT (balanced, fast + 0.5);
+  EXPECT_GT (best, balanced);
+  EXPECT_GT (best, bicubic + 0.5);
+}
+
+TEST (FusionQuality, SsimIsOneOfThatWhichIsTheSame)
+{
+  const Scene scene = synthetic_scene (64, 48, 2);
+  EXPECT_DOUBLE_EQ (
+      ssim (scene.frames[0].view (), scene.frames[0].view ()), 1.0);
+  EXPECT_LT (ssim (scene.frames[0].view (), scene.frames[1].view ()), 0.99);
+}
+
+} // namespace

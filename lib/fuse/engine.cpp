@@ -103,7 +103,7 @@ Engine::Engine (const Schedule &schedule, int width, int height,
       observation_ (schedule, options.noise, steps), phases_ (schedule),
       kernels_ (*find_kernels (options.target)),
       radius_ (tap_radius (schedule.slots ())),
-      predictions_ (phases_, disc (radius_), 2), if_still_ (width, height),
+      predictions_ (phases_, disc (radius_ - 2), 2), if_still_ (width, height),
       if_moved_ (width, height),
       stillness_ (width, height, schedule.cell (), !observation_.noise_free ())
 {
@@ -183,8 +183,8 @@ Engine::prepare (const Schedule &schedule, const FuseOptions &options)
   for (int e = 0; e < slots (); e++)
     noise.push_back (std::max (
         observation_.variance (e, kTypicalLight) / scene, kLeastNoise));
-  const std::vector<Offset> taps = disc (radius_);
-  const auto each_phase = [&] (const SceneClass &patch, auto use) {
+  const auto each_phase = [&] (const SceneClass &patch,
+                              std::span<const Offset> taps, auto use) {
     const Covariance covariance (patch, observation_, 2 * radius_);
     for (int row = 0; row < phases_.rows (); row++)
       for (int x = 0; x < phases_.period (); x++)
@@ -192,8 +192,9 @@ Engine::prepare (const Schedule &schedule, const FuseOptions &options)
             solve_phase (
                 covariance, observation_, phases_, row, x, taps, noise));
   };
+  const std::vector<Offset> near = disc (radius_ - 2);
   for (const int output : {0, 1})
-    each_phase (output == 0 ? kStill : kMoved,
+    each_phase (output == 0 ? kStill : kMoved, near,
         [&] (int row, int x, const KrigingFilter &filter) {
           predictions_.set (row, x, output, filter.residual);
         });
@@ -206,9 +207,10 @@ Engine::prepare (const Schedule &schedule, const FuseOptions &options)
     return;
   }
 
+  const std::vector<Offset> taps = disc (radius_);
   plain_.emplace (phases_, taps, slots ());
-  each_phase (
-      options.scene.plain, [&] (int row, int x, const KrigingFilter &filter) {
+  each_phase (options.scene.plain, taps,
+      [&] (int row, int x, const KrigingFilter &filter) {
         plain_->set_all (row, x, filter.slots);
       });
 }

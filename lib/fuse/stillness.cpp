@@ -17,8 +17,8 @@ constexpr float kStillMean = 1.8f, kMovedMean = 3.0f;
 /* The same for the largest of them: something small may have passed. */
 constexpr float kStillMost = 25.0f, kMovedMost = 40.0f;
 /* Errors of prediction if still in units of those if moved, up to which nothing
- * repeats itself, and from which on it does. */
-constexpr float kStillError = 1.5f, kMovedError = 2.2f;
+ * credible itself, and from which on it does. */
+constexpr float kStillError = 1.3f, kMovedError = 1.8f;
 /* Frames over which still light is averaged. */
 constexpr float kMemory = 16.0f;
 
@@ -34,7 +34,7 @@ Stillness::Stillness (int width, int height, Extent cell, bool average)
     : radius_ (std::max (3, std::max (cell.width, cell.height) / 2 + 1)),
       average_ (average), mean_ (width, height), count_ (width, height),
       change_ (width, height, radius_), rows_sum_ (width, height, radius_),
-      rows_most_ (width, height, radius_), repeats_ (width, height),
+      rows_most_ (width, height, radius_), credible_ (width, height),
       weight_ (width, height)
 {
 }
@@ -100,16 +100,16 @@ Stillness::judge (Field &weight, bool raise)
       }
     }
     float *out = weight.row (y);
-    const float *repeats = repeats_.row (y);
+    const float *credible = credible_.row (y);
     for (int x = 0; x < width; x++) {
       const float still = fade (sum[x] / area, kStillMean, kMovedMean) *
-                          fade (most[x], kStillMost, kMovedMost) * repeats[x];
+                          fade (most[x], kStillMost, kMovedMost) * credible[x];
       out[x] = raise ? std::max (out[x], still) : still;
     }
   }
 }
 
-/* repeats_ = where the errors if still are not larger than those if moved. */
+/* credible_ = where the errors if still are not larger than those if moved. */
 void
 Stillness::doubt (const Field &still, const Field &moved)
 {
@@ -144,9 +144,9 @@ Stillness::doubt (const Field &still, const Field &moved)
         if_moved[x] += b[x];
       }
     }
-    float *repeats = repeats_.row (y);
+    float *credible = credible_.row (y);
     for (int x = 0; x < width; x++)
-      repeats[x] = fade (if_still[x] / if_moved[x], kStillError, kMovedError);
+      credible[x] = fade (if_still[x] / if_moved[x], kStillError, kMovedError);
   }
 }
 

@@ -57,7 +57,7 @@ private:
   Field mean_;  ///< of the frames in which a pixel stood still
   Field count_; ///< of these frames
   Field change_, rows_sum_, rows_most_; ///< while judging
-  Field repeats_; ///< 1 where nothing speaks for repetition
+  Field credible_; ///< 1 where nothing speaks for repetition
   Field weight_;
 };
 

@@ -202,4 +202,38 @@ still_fusion_table (const std::vector<Scene> &scenes, const Progress &progress)
   return table;
 }
 
+Table
+training_table (
+    const std::vector<Scene> &scenes, int frames, const Progress &progress)
+{
+  Table table{"fusion-training",
+      "fast, clean: mean PSNR (dB) by the model of scenes",
+      {{"length px"}, {"correlation per slot", 2}, {"n = 4", 2}, {"n = 8", 2}},
+      {}};
+  for (const double length : {3.0, 4.0, 5.0, 6.0, 8.0}) {
+    for (const double correlation : {0.75, 0.8, 0.85, 0.9, 0.95}) {
+      progress ("length " + std::to_string (length));
+      auto &row =
+          table.rows.emplace_back (std::vector<Cell>{length, correlation});
+      for (const int n : {4, 8}) {
+        FuseOptions options;
+        options.scene.plain.length = length;
+        options.scene.plain.correlation = correlation;
+        double psnr = 0.0;
+        for (const Scene &scene : scenes) {
+          const Scene part = first_of (scene, frames, n);
+          const Schedule schedule = fusion_schedule (n);
+          psnr +=
+              compare (fuse (take (part, schedule, kClean), schedule, options),
+                  part.frames)
+                  .psnr /
+              double (scenes.size ());
+        }
+        row.push_back (psnr);
+      }
+    }
+  }
+  return table;
+}
+
 } // namespace cexp::quality

@@ -29,4 +29,10 @@ std::vector<Table> fusion_tables (
 Table still_fusion_table (
     const std::vector<Scene> &scenes, const Progress &progress);
 
+/** Mean PSNR of `fast` over the first @p frames frames of every scene for
+ * models of scenes around the one in force, clean: to choose
+ * SceneModel::plain by. */
+Table training_table (
+    const std::vector<Scene> &scenes, int frames, const Progress &progress);
+
 } // namespace cexp::quality

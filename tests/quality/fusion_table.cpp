@@ -22,7 +22,7 @@ constexpr int kLeastFrames = 8;
 struct Options {
   char *clips = nullptr, *document = nullptr;
   int frames = kLeastFrames;
-  gboolean json = FALSE, quiet = FALSE;
+  gboolean json = FALSE, quiet = FALSE, train = FALSE;
 };
 
 bool
@@ -35,6 +35,8 @@ parse (int &argc, char **&argv, Options &options)
           "of each clip, at most [8]", "N"},
       {"json", 0, 0, G_OPTION_ARG_NONE, &options.json, "figures for a program",
           nullptr},
+      {"train", 0, 0, G_OPTION_ARG_NONE, &options.train,
+          "compare models of scenes instead, for the filters of fast", nullptr},
       {"update", 0, 0, G_OPTION_ARG_FILENAME, &options.document,
           "write the tables to where this document marks places for them",
           "FILE"},
@@ -103,8 +105,13 @@ main (int argc, char **argv)
       std::cerr << "\r\033[K" << what << std::flush;
   };
   const std::vector<Scene> scenes = find_scenes (options);
-  auto tables = fusion_tables (scenes, options.frames, progress);
-  tables.push_back (still_fusion_table (scenes, progress));
+  std::vector<Table> tables;
+  if (options.train) {
+    tables = {training_table (scenes, options.frames, progress)};
+  } else {
+    tables = fusion_tables (scenes, options.frames, progress);
+    tables.push_back (still_fusion_table (scenes, progress));
+  }
   progress ("");
 
   if (options.document)

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <numbers>
 #include <random>
 #include <type_traits>
 
@@ -416,6 +417,25 @@ TEST (Fuse, WhatMovesLeavesNoGhosts)
       EXPECT_LT (worst, 70.0) << quality_name (quality) << ' ' << slot;
     }
   }
+}
+
+/* Stripes that come back to where they were with every coded frame. */
+Image<std::uint8_t>
+stripes (int slot)
+{
+  return draw (64, 48, [slot] (int x, int) {
+    return 0.5 +
+           0.35 * std::sin (2.0 * std::numbers::pi * (x / 5.0 - slot / 4.0));
+  });
+}
+
+TEST (Fuse, WhatRepeatsWithTheFrameRateIsNotTakenForStill)
+{
+  const Schedule schedule = schedule_of ("sequential:lattice:4/2");
+  const auto frames = fuse (take (schedule, 3, stripes), schedule);
+  for (std::size_t slot = 4; slot < frames.size (); slot++)
+    EXPECT_GT (psnr (frames[slot], stripes (int (slot))),
+        psnr (frames[slot % 4], stripes (int (slot % 4))) - 1.0);
 }
 
 TEST (Fuse, ForgottenFramesHaveNoSay)

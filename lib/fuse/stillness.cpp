@@ -17,7 +17,7 @@ constexpr float kStillMean = 1.8f, kMovedMean = 3.0f;
 /* The same for the largest of them: something small may have passed. */
 constexpr float kStillMost = 25.0f, kMovedMost = 40.0f;
 /* Errors of prediction if still in units of those if moved, up to which nothing
- * credible itself, and from which on it does. */
+ * repeats itself, and from which on it does. */
 constexpr float kStillError = 1.3f, kMovedError = 1.8f;
 /* Frames over which still light is averaged. */
 constexpr float kMemory = 16.0f;

@@ -384,14 +384,14 @@ Calibration::State::solve (const CalibrationOptions &options) const
         !displaced)
       return displaced.error ();
 
+  const double magnification = fit.mapping.stance ().magnification;
+  result.psf_sigma =
+      magnification * std::sqrt (0.5 * (fit.blur_x + fit.blur_y));
   auto mapping = Mapping::make ({camera, mirrors, fit.mapping.homography (),
-      fit.covariance, fit.mapping.displacement ()});
+      fit.covariance, fit.mapping.displacement (), result.psf_sigma});
   if (!mapping)
     return mapping.error ();
   result.mapping = std::move (*mapping);
-  const double magnification = result.mapping.stance ().magnification;
-  result.psf_sigma =
-      magnification * std::sqrt (0.5 * (fit.blur_x + fit.blur_y));
   result.noise_floor = fit.noise.floor;
   result.noise_slope = fit.noise.slope;
   result.misfit = std::sqrt (0.5 * (excess (fit.blocks_x, fit.noise_ratio) +

@@ -81,4 +81,12 @@ GratingResponse::at (double place) const
       0.0f};
 }
 
+double
+mirror_share (double distance, double side, double sigma)
+{
+  sigma = std::max (sigma, kLeastSigma);
+  return edge_at (0.5 - distance, side, sigma).light -
+         edge_at (-0.5 - distance, side, sigma).light;
+}
+
 } // namespace cexp

@@ -38,4 +38,8 @@ private:
   std::vector<Value> table_;
 };
 
+/** Part of a pixel's light that it gets from a mirror @p distance mirrors away
+ * along one axis; @p side and @p sigma as above. */
+double mirror_share (double distance, double side, double sigma);
+
 } // namespace cexp

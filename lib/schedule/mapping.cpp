@@ -246,6 +246,9 @@ Mapping::make (Parts parts)
       return checked.error ();
   if (const auto checked = normalise (parts.homography, parts.camera); !checked)
     return checked.error ();
+  if (!(parts.psf_sigma >= 0.0 && parts.psf_sigma <= kMaxPsfSigma))
+    return bad_number ("psf_sigma", parts.psf_sigma,
+        "it must be 0 to " + real_text (kMaxPsfSigma) + " pixels");
   if (parts.covariance)
     if (const auto checked = check_covariance (*parts.covariance); !checked)
       return checked.error ();

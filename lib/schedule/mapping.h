@@ -69,6 +69,7 @@ public:
   static constexpr int kMaxSize = 16384;
   static constexpr int kMaxNodes = 257;
   static constexpr std::size_t kMaxJsonSize = std::size_t (1) << 23;
+  static constexpr double kMaxPsfSigma = 16.0;
 
   /** Symmetric, row by row, in mirrors squared: of the first eight numbers of
    * centred (). */
@@ -81,6 +82,9 @@ public:
     Homography homography = {1, 0, 0, 0, 1, 0, 0, 0, 1};
     std::optional<Covariance> covariance = {};
     std::optional<Displacement> displacement = {};
+    /** Blur between mirrors and pixels: standard deviation of a Gaussian, in
+     * pixels; 0 where it is not known. */
+    double psf_sigma = 0.0;
 
     bool operator== (const Parts &) const = default;
   };
@@ -89,7 +93,8 @@ public:
   explicit Mapping (Extent both);
   /** Error when a size is out of its range, a number is not finite, the
    * homography has no inverse or its horizon crosses the frame, a variance is
-   * negative, or a grid has not as many numbers as nodes. */
+   * negative, a blur is out of its range, or a grid has not as many numbers as
+   * nodes. */
   static Result<Mapping> make (Parts parts);
 
   /** The strict, versioned text form: see docs/formats.md. */
@@ -112,6 +117,8 @@ public:
   {
     return parts_.displacement;
   }
+
+  double psf_sigma () const { return parts_.psf_sigma; }
 
   /** Where camera place @p x, @p y looks at, among the mirrors. */
   Position mirror_at (double x, double y) const;

@@ -104,7 +104,7 @@ read_mapping (const Json &root)
     return checked.error ();
   if (const auto checked = check_keys (root, "",
           {"format", "version", "camera", "mirrors", "homography", "covariance",
-              "displacement"});
+              "displacement", "psf_sigma"});
       !checked)
     return checked.error ();
   for (const char *key : {"camera", "mirrors", "homography"})
@@ -137,6 +137,11 @@ read_mapping (const Json &root)
     if (!grid)
       return grid.error ();
     parts.displacement = std::move (*grid);
+  }
+  if (root.contains ("psf_sigma")) {
+    if (!root["psf_sigma"].is_number ())
+      return expected ("psf_sigma", "a number of pixels", root["psf_sigma"]);
+    parts.psf_sigma = root["psf_sigma"].get<double> ();
   }
   return Mapping::make (std::move (parts));
 }
@@ -175,6 +180,8 @@ Mapping::to_json () const
   }
   if (displacement ())
     root["displacement"] = displacement_json (*displacement ());
+  if (psf_sigma () != 0.0)
+    root["psf_sigma"] = psf_sigma ();
   return root.dump ();
 }
 

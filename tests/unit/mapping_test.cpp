@@ -55,6 +55,7 @@ all_parts ()
       covariance[i * 8 + j] = i == j ? 1e-8 : 1e-10 / double (i + j);
   parts.covariance = covariance;
   parts.displacement = {2, 3, {0, 0.25, 0, 0, 0, 0}, {0, 0, 0, 0, 0, -0.5}};
+  parts.psf_sigma = 0.5;
   return parts;
 }
 

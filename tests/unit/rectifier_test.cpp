@@ -1,0 +1,199 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Frames of a misaligned camera, brought back to the mirrors. */
+#include "moire/rectifier.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "optics/bench.h"
+
+using namespace cexp;
+
+namespace
+{
+
+constexpr Extent kSize = {96, 64};
+
+Schedule
+schedule_of (const char *preset)
+{
+  return *Schedule::from_preset (preset);
+}
+
+Mapping
+mapping_of (const Alignment &alignment, double psf_sigma = 0.0)
+{
+  const Affine t = camera_to_mirrors (alignment, kSize.width, kSize.height);
+  Mapping::Parts parts = {
+      kSize, kSize, {t.xx, t.xy, t.x0, t.yx, t.yy, t.y0, 0, 0, 1}};
+  parts.psf_sigma = psf_sigma;
+  return *Mapping::make (parts);
+}
+
+/** A coded frame of a scene whose brightness changes smoothly in space and
+ * from slot to slot. */
+Image<std::uint8_t>
+coded (const Alignment &alignment, const Schedule &schedule,
+    double psf_sigma = 0.0, int texture = 1)
+{
+  BenchOptions options;
+  options.alignment = alignment;
+  options.psf_sigma = psf_sigma;
+  auto bench = OpticalBench::make (kSize.width, kSize.height, options);
+  bench->begin (schedule);
+  Image<std::uint8_t> scene (kSize.width, kSize.height);
+  for (int slot = 0; slot < schedule.slots (); slot++) {
+    for (int y = 0; y < kSize.height; y++)
+      for (int x = 0; x < kSize.width; x++)
+        scene.at (x, y) = std::uint8_t (std::lround (
+            100 + texture * (40 * std::sin (0.15 * x + 0.1 * y + 0.8 * slot) +
+                                15 * slot)));
+    bench->expose (std::as_const (scene).view (), slot, 1.0);
+  }
+  Image<std::uint8_t> frame (kSize.width, kSize.height);
+  bench->read_out (0, frame.view ());
+  return frame;
+}
+
+Image<std::uint8_t>
+rectified (const Rectifier &rectifier, const Image<std::uint8_t> &frame)
+{
+  Image<std::uint8_t> mirrors (
+      rectifier.mirrors ().width, rectifier.mirrors ().height);
+  rectifier.run (frame.view (), mirrors.view ());
+  return mirrors;
+}
+
+double
+rms (const Image<std::uint8_t> &a, const Image<std::uint8_t> &b, int border)
+{
+  double squares = 0.0, count = 0.0;
+  for (int y = border; y < a.height () - border; y++)
+    for (int x = border; x < a.width () - border; x++) {
+      squares += std::pow (double (a.at (x, y)) - double (b.at (x, y)), 2);
+      count += 1.0;
+    }
+  return std::sqrt (squares / count);
+}
+
+Rectifier
+made (const Mapping &mapping, const Schedule &schedule)
+{
+  auto rectifier = Rectifier::make (mapping, schedule);
+  EXPECT_TRUE (rectifier.ok ()) << rectifier.error ().message;
+  return std::move (*rectifier);
+}
+
+} // namespace
+
+TEST (Rectifier, CopiesWherePixelsAndMirrorsAreOneToOne)
+{
+  const Schedule schedule = schedule_of ("sequential:2x2");
+  const Alignment alignment = {3, -2, 0, 1};
+  const auto rectifier = made (mapping_of (alignment), schedule);
+  EXPECT_EQ (rectifier.report ().weighted, 0u);
+  EXPECT_EQ (rectifier.report ().unseen, std::uint64_t (96 * 64 - 93 * 62));
+  const auto aligned = coded ({}, schedule);
+  const auto mirrors = rectified (rectifier, coded (alignment, schedule));
+  for (int y = 0; y < 62; y++)
+    for (int x = 3; x < 96; x++)
+      ASSERT_EQ (mirrors.at (x, y), aligned.at (x, y)) << x << ' ' << y;
+  EXPECT_EQ (mirrors.at (0, 0), 0);
+}
+
+TEST (Rectifier, SeparatesWhatPixelsMix)
+{
+  for (const char *preset :
+      {"sequential:2x2", "sequential:lattice:8/3", "staircase:2x2"}) {
+    const Schedule schedule = schedule_of (preset);
+    const Alignment alignment = {0.4, 0.4, 0.5, 1.01};
+    const auto rectifier = made (mapping_of (alignment), schedule);
+    const auto &report = rectifier.report ();
+    EXPECT_GT (report.weighted, 5000u);
+    EXPECT_GT (report.mixed, 1000u);
+    EXPECT_LT (report.mixed, report.weighted);
+    EXPECT_EQ (report.exact + report.weighted + report.unseen, 96u * 64u);
+    const auto aligned = coded ({}, schedule);
+    const auto seen = coded (alignment, schedule);
+    const double before = rms (seen, aligned, 6);
+    EXPECT_LT (rms (rectified (rectifier, seen), aligned, 6), before / 4)
+        << preset;
+  }
+}
+
+TEST (Rectifier, TakesBackTheBlur)
+{
+  const Schedule schedule = schedule_of ("sequential:2x2");
+  const auto sharp = coded ({}, schedule);
+  const Alignment alignment = {0.4, -0.3, 0.2, 0.995};
+  const auto blurred = coded (alignment, schedule, 0.5);
+  const auto rectifier = made (mapping_of (alignment, 0.5), schedule);
+  EXPECT_LT (rms (rectified (rectifier, blurred), sharp, 6),
+      0.7 * rms (coded ({}, schedule, 0.5), sharp, 6));
+}
+
+TEST (Rectifier, KeepsTheBrightnessOfAFlatScene)
+{
+  for (const char *preset : {"sequential:2x2", "staircase:2x2", "s-matrix:3x1",
+           "sequential:3x3,leak=0.02"}) {
+    const Schedule schedule = schedule_of (preset);
+    const Alignment alignment = {0.5, 0.5, 1.0, 0.99};
+    const auto aligned = coded ({}, schedule, 0.0, 0);
+    const auto mirrors = rectified (made (mapping_of (alignment), schedule),
+        coded (alignment, schedule, 0.0, 0));
+    for (int y = 6; y < 58; y++)
+      for (int x = 6; x < 90; x++)
+        ASSERT_NEAR (mirrors.at (x, y), aligned.at (x, y), 5) << preset;
+  }
+}
+
+TEST (Rectifier, TakesSeveralPixelsAMirror)
+{
+  const Schedule schedule = schedule_of ("sequential:2x2");
+  const Alignment alignment = {0.3, 0.1, 0.5, 2.0};
+  const auto rectifier = made (mapping_of (alignment), schedule);
+  const auto aligned = coded ({}, schedule);
+  const auto mirrors = rectified (rectifier, coded (alignment, schedule));
+  /* The camera sees the middle of the mirrors. */
+  EXPECT_NEAR (double (rectifier.report ().unseen), 0.75 * 96 * 64, 300.0);
+  for (int y = 20; y < 44; y++)
+    for (int x = 28; x < 68; x++)
+      ASSERT_NEAR (mirrors.at (x, y), aligned.at (x, y), 6) << x << ' ' << y;
+}
+
+TEST (Rectifier, RowsAreThoseOfTheWhole)
+{
+  const Schedule schedule = schedule_of ("sequential:2x2");
+  const Alignment alignment = {0.4, 0.4, 0.5, 1.01};
+  const auto rectifier = made (mapping_of (alignment), schedule);
+  const auto frame = coded (alignment, schedule);
+  const auto whole = rectified (rectifier, frame);
+  Image<std::uint8_t> parts (kSize.width, kSize.height);
+  for (int y = 0; y < kSize.height; y += 16)
+    rectifier.run_rows (frame.view (), parts.view (), y, 16);
+  EXPECT_EQ (parts, whole);
+
+  Image<std::uint16_t> wide (kSize.width, kSize.height), out = wide;
+  for (int y = 0; y < kSize.height; y++)
+    for (int x = 0; x < kSize.width; x++)
+      wide.at (x, y) = frame.at (x, y);
+  rectifier.run (std::as_const (wide).view (), out.view (), 255);
+  for (int y = 0; y < kSize.height; y++)
+    for (int x = 0; x < kSize.width; x++)
+      ASSERT_EQ (out.at (x, y), whole.at (x, y));
+}
+
+TEST (Rectifier, RefusesWhatItCannotDo)
+{
+  const Schedule schedule;
+  const auto far = Rectifier::make (mapping_of ({5000, 0, 0, 1}), schedule);
+  ASSERT_FALSE (far.ok ());
+  EXPECT_NE (far.error ().message.find ("sees none of the mirrors"),
+      std::string::npos);
+  const auto small = Rectifier::make (mapping_of ({0, 0, 0, 0.5}), schedule);
+  ASSERT_FALSE (small.ok ());
+  EXPECT_EQ (small.error ().message,
+      "a mapping with 0.500000 pixels a mirror cannot be corrected; 0.75 to "
+      "3.5 can");
+}

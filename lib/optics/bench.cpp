@@ -67,6 +67,9 @@ check (const BenchOptions &options)
       {"vertical shift (mirrors)", a.shift_y, -O::kMaxShift, O::kMaxShift},
       {"rotation (degrees)", a.rotation, -180.0, 180.0},
       {"scale (pixels a mirror)", a.scale, O::kMinScale, O::kMaxScale},
+      {"horizontal tilt", a.tilt_x, -O::kMaxTilt, O::kMaxTilt},
+      {"vertical tilt", a.tilt_y, -O::kMaxTilt, O::kMaxTilt},
+      {"distortion", a.distortion, -O::kMaxDistortion, O::kMaxDistortion},
   };
   for (const auto &range : ranges)
     /* So written that not-a-number fails, too. */

@@ -22,7 +22,9 @@ struct BenchOptions {
   static constexpr double kMaxGain = 1000.0;
   static constexpr double kMaxShift = 10000.0;
   static constexpr double kMinScale = 0.5;
-  static constexpr double kMaxScale = 2.0;
+  static constexpr double kMaxScale = 4.0;
+  static constexpr double kMaxTilt = 0.3;
+  static constexpr double kMaxDistortion = 0.1;
 
   /** Blur between mirrors and pixels, standard deviation in pixels. */
   double psf_sigma = 0.0;

@@ -112,10 +112,28 @@ camera_to_mirrors (const Alignment &alignment, int width, int height)
       cy + alignment.shift_y - s * cx - c * cy};
 }
 
-Lens::Lens (const Alignment &alignment, double psf_sigma, int width, int height)
-    : to_mirrors_ (camera_to_mirrors (alignment, width, height))
+Position
+mirror_seen (const Alignment &alignment, int width, int height, Position pixel)
 {
-  if (alignment.rotation == 0.0 && alignment.scale == 1.0) {
+  const double cx = 0.5 * (width - 1);
+  const double cy = 0.5 * (height - 1);
+  const double dx = pixel.x - cx, dy = pixel.y - cy;
+  const double out = 1.0 + alignment.distortion * (dx * dx + dy * dy) /
+                               std::max (1.0, cx * cx + cy * cy);
+  const double qx = out * dx, qy = out * dy;
+  const double z = 1.0 + alignment.tilt_x * qx / std::max (1.0, cx) +
+                   alignment.tilt_y * qy / std::max (1.0, cy);
+  const Affine m = camera_to_mirrors (alignment, width, height);
+  return {cx + alignment.shift_x + (m.xx * qx + m.xy * qy) / z,
+      cy + alignment.shift_y + (m.yx * qx + m.yy * qy) / z};
+}
+
+Lens::Lens (const Alignment &alignment, double psf_sigma, int width, int height)
+    : alignment_ (alignment), width_ (width), height_ (height),
+      to_mirrors_ (camera_to_mirrors (alignment, width, height))
+{
+  if (alignment.rotation == 0.0 && alignment.scale == 1.0 &&
+      alignment.affine ()) {
     horizontal_ = shifted_taps (alignment.shift_x, psf_sigma);
     vertical_ = shifted_taps (alignment.shift_y, psf_sigma);
     ideal_ = horizontal_.identity () && vertical_.identity ();
@@ -127,7 +145,11 @@ Lens::Lens (const Alignment &alignment, double psf_sigma, int width, int height)
   }
   if (horizontal_.identity () && vertical_.identity ())
     return;
-  between_ = Image<float> (width, height);
+  if (taps_ > 0) {
+    margin_ = int (horizontal_.weights.size ()) / 2;
+    wide_ = Image<float> (width + 2 * margin_, height + 2 * margin_);
+  }
+  between_ = Image<float> (width, height + 2 * margin_);
   padded_.resize (std::size_t (width) + horizontal_.weights.size () - 1);
 }
 
@@ -155,25 +177,29 @@ Lens::image (ImageView<const float> mirrors, ImageView<float> camera)
   if (ideal_) {
     for (int y = 0; y < camera.height; y++)
       std::copy_n (mirrors.row (y), camera.width, camera.row (y));
-    return;
+  } else if (taps_ == 0) {
+    blur (mirrors, camera);
+  } else if (margin_ == 0) {
+    resample (mirrors, camera);
+  } else {
+    resample (mirrors, wide_.view ());
+    blur_beyond (camera);
   }
+}
+
+void
+Lens::resample (ImageView<const float> mirrors, ImageView<float> camera) const
+{
   switch (taps_) {
-  case 0:
-    return blur (mirrors, camera);
   case 4:
-    resample<4> (mirrors, camera);
-    break;
+    return resample<4> (mirrors, camera);
   case 8:
-    resample<8> (mirrors, camera);
-    break;
+    return resample<8> (mirrors, camera);
   case 12:
-    resample<12> (mirrors, camera);
-    break;
+    return resample<12> (mirrors, camera);
   default:
-    resample<kMaxWindow> (mirrors, camera);
+    return resample<kMaxWindow> (mirrors, camera);
   }
-  if (!horizontal_.identity ())
-    blur (camera, camera);
 }
 
 namespace
@@ -253,20 +279,53 @@ gather_at_border (ImageView<const float> mirrors, const Place<kTaps> &x,
 
 } // namespace
 
+/* @camera may reach beyond the frame by margin_ pixels on each side. */
 template <int kTaps>
 void
 Lens::resample (ImageView<const float> mirrors, ImageView<float> camera) const
 {
   const Affine &m = to_mirrors_;
-  for (int py = 0; py < camera.height; py++) {
-    float *out = camera.row (py);
-    for (int px = 0; px < camera.width; px++) {
-      const Place<kTaps> x (m.xx * px + m.xy * py + m.x0, windows_);
-      const Place<kTaps> y (m.yx * px + m.yy * py + m.y0, windows_);
+  const bool affine = alignment_.affine ();
+  for (int row = 0; row < camera.height; row++) {
+    const int py = row - margin_;
+    float *out = camera.row (row);
+    for (int px = -margin_; px < camera.width - margin_; px++) {
+      const Position at = affine ? Position{m.xx * px + m.xy * py + m.x0,
+                                       m.yx * px + m.yy * py + m.y0}
+                                 : mirror_seen (alignment_, width_, height_,
+                                       {double (px), double (py)});
+      const Place<kTaps> x (at.x, windows_);
+      const Place<kTaps> y (at.y, windows_);
       const bool inside = x.first >= 0 && x.first + kTaps <= mirrors.width &&
                           y.first >= 0 && y.first + kTaps <= mirrors.height;
-      out[px] = inside ? gather_inside (mirrors, x, y)
-                       : gather_at_border (mirrors, x, y);
+      *out++ = inside ? gather_inside (mirrors, x, y)
+                      : gather_at_border (mirrors, x, y);
+    }
+  }
+}
+
+/* Blurs wide_ into the frame in its middle. */
+void
+Lens::blur_beyond (ImageView<float> to)
+{
+  const std::vector<float> &weights = horizontal_.weights;
+  const int width = to.width;
+  for (int y = 0; y < wide_.height (); y++) {
+    float *out = between_.view ().row (y);
+    std::fill (out, out + width, 0.0f);
+    for (std::size_t i = 0; i < weights.size (); i++) {
+      const float *in = wide_.view ().row (y) + i;
+      for (int x = 0; x < width; x++)
+        out[x] += weights[i] * in[x];
+    }
+  }
+  for (int y = 0; y < to.height; y++) {
+    float *out = to.row (y);
+    std::fill (out, out + width, 0.0f);
+    for (std::size_t i = 0; i < weights.size (); i++) {
+      const float *in = between_.view ().row (y + int (i));
+      for (int x = 0; x < width; x++)
+        out[x] += weights[i] * in[x];
     }
   }
 }

@@ -26,14 +26,16 @@ Distance
 distance (const Mapping &mapping, const Alignment &alignment)
 {
   const Extent size = mapping.camera ();
-  const Affine truth = camera_to_mirrors (alignment, size.width, size.height);
   Distance found;
   double squares = 0.0, count = 0.0;
   for (int y = 0; y < size.height; y += 5)
     for (int x = 0; x < size.width; x += 5) {
       const Position m = mapping.mirror_at (x, y);
-      const double dx = m.x - (truth.xx * x + truth.xy * y + truth.x0);
-      const double dy = m.y - (truth.yx * x + truth.yy * y + truth.y0);
+      const Position truth = mirror_seen (
+          alignment, size.width, size.height, {double (x), double (y)});
+      if (!mapping.covers (truth))
+        continue;
+      const double dx = m.x - truth.x, dy = m.y - truth.y;
       squares += dx * dx + dy * dy;
       count += 2.0;
       found.most = std::max (found.most, std::hypot (dx, dy));
@@ -141,6 +143,43 @@ TEST (Calibration, FindsTheMappingToItsStatedUncertainty)
         stance.magnification, alignment.scale, 5 * sigma.magnification);
     EXPECT_LT (sigma.shift_x, 1e-4);
   }
+}
+
+TEST (Calibration, FindsATiltAsAHomography)
+{
+  Alignment alignment = {5.5, -3.2, 0.5, 1.01};
+  alignment.tilt_x = 0.01;
+  alignment.tilt_y = -0.02;
+  MoireBench bench (alignment, 0.5, kSize);
+  const auto result = calibrate (bench);
+  ASSERT_TRUE (result.ok ()) << result.error ().message;
+  EXPECT_LT (distance (result->mapping, alignment).most, 5e-3);
+  EXPECT_NEAR (result->mapping.homography ()[6], 0.01 / 127.5, 3e-6);
+  EXPECT_NEAR (result->mapping.homography ()[7], -0.02 / 95.5, 3e-6);
+  /* As an affine mapping it is far off. */
+  CalibrationOptions options;
+  options.model = FitModel::affine;
+  const auto affine = calibrate (bench, options);
+  ASSERT_TRUE (affine.ok ()) << affine.error ().message;
+  EXPECT_GT (distance (affine->mapping, alignment).most, 0.5);
+}
+
+TEST (Calibration, FindsADistortionAsADisplacement)
+{
+  Alignment alignment = {-4.3, 2.7, -1.0, 0.99};
+  alignment.distortion = 0.003;
+  MoireBench bench (alignment, 0.5, kSize);
+  const auto result = calibrate (bench);
+  ASSERT_TRUE (result.ok ()) << result.error ().message;
+  ASSERT_TRUE (result->mapping.displacement ());
+  EXPECT_LT (distance (result->mapping, alignment).rms, 5e-3);
+  CalibrationOptions options;
+  options.model = FitModel::homography;
+  const auto without = calibrate (bench, options);
+  ASSERT_TRUE (without.ok ()) << without.error ().message;
+  EXPECT_FALSE (without->mapping.displacement ());
+  EXPECT_GT (distance (without->mapping, alignment).rms, 0.02);
+  EXPECT_GT (without->misfit, 2.0);
 }
 
 TEST (Calibration, TellsWhatPixelsAreGoodFor)

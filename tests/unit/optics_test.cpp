@@ -234,7 +234,7 @@ TEST (Bench, SaysWhichOptionIsWrong)
   EXPECT_EQ (error (options), "PSF sigma (pixels) = 17 is outside 0..16");
   options = {};
   options.alignment.scale = 0;
-  EXPECT_EQ (error (options), "scale (pixels a mirror) = 0 is outside 0.5..2");
+  EXPECT_EQ (error (options), "scale (pixels a mirror) = 0 is outside 0.5..4");
   options = {};
   options.gain = std::nan ("");
   EXPECT_EQ (error (options), "gain = nan is outside 0..1000");
@@ -432,6 +432,52 @@ TEST (Lens, ScaleHalfGathersFourMirrors)
                       picture.at (u, v + 1) + picture.at (u + 1, v + 1);
       EXPECT_NEAR (out.at (x, y), sum / 4.0, 0.51);
     }
+}
+
+TEST (Lens, TiltAndDistortionMoveWhatIsSeen)
+{
+  Alignment alignment = {1.0, -2.0, 0.0, 1.0};
+  const Position centre = {50.0, 25.0};
+  alignment.distortion = 0.01;
+  /* Nothing at the centre, a hundredth of the way at a corner. */
+  EXPECT_EQ (mirror_seen (alignment, 101, 51, centre), (Position{51, 23}));
+  const Position corner = mirror_seen (alignment, 101, 51, {100, 50});
+  EXPECT_NEAR (corner.x, 51 + 50 * 1.01, 1e-12);
+  EXPECT_NEAR (corner.y, 23 + 25 * 1.01, 1e-12);
+  alignment.distortion = 0.0;
+  alignment.tilt_x = 0.1;
+  EXPECT_NEAR (
+      mirror_seen (alignment, 101, 51, {100, 25}).x, 51 + 50 / 1.1, 1e-12);
+  EXPECT_NEAR (
+      mirror_seen (alignment, 101, 51, {0, 25}).x, 51 - 50 / 0.9, 1e-12);
+
+  /* A bright column of mirrors is seen where it should be. */
+  Image<float> mirrors (101, 51), seen (101, 51);
+  for (int y = 0; y < 51; y++)
+    mirrors.at (91, y) = 1.0f;
+  Lens (alignment, 0.5, 101, 51)
+      .image (std::as_const (mirrors).view (), seen.view ());
+  double sum = 0.0, moment = 0.0;
+  for (int x = 80; x < 101; x++) {
+    sum += double (seen.at (x, 25));
+    moment += x * double (seen.at (x, 25));
+  }
+  /* 51 + d / (1 + 0.1 d / 50) = 91 */
+  EXPECT_NEAR (moment / sum, 50.0 + 40.0 / (1.0 - 40.0 * 0.1 / 50.0), 0.02);
+}
+
+TEST (Lens, ABlurReachesBeyondTheFrame)
+{
+  /* All mirrors are bright, and the camera looks at their middle. */
+  Image<float> mirrors (64, 64), seen (64, 64);
+  for (int y = 0; y < 64; y++)
+    for (int x = 0; x < 64; x++)
+      mirrors.at (x, y) = 1.0f;
+  Lens ({0, 0, 1.0, 2.0}, 1.5, 64, 64)
+      .image (std::as_const (mirrors).view (), seen.view ());
+  for (int y = 0; y < 64; y++)
+    for (int x = 0; x < 64; x++)
+      ASSERT_NEAR (seen.at (x, y), 1.0f, 1e-5f) << x << ' ' << y;
 }
 
 TEST (Lens, MappingSaysWhereEachPixelLooks)

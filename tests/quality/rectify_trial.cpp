@@ -1,0 +1,147 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* How true subframes of a misaligned camera are, with its mapping and without.
+ */
+#include "rectify_trial.h"
+
+#include <chrono>
+#include <cstdlib>
+#include <iostream>
+#include <utility>
+
+#include "extract/extractor.h"
+#include "moire/calibration.h"
+#include "moire/rectifier.h"
+#include "moire_bench.h"
+#include "upsample.h"
+
+namespace cexp::quality
+{
+
+namespace
+{
+
+constexpr int kBorder = 16;
+
+template <typename T>
+T
+must (Result<T> result)
+{
+  if (!result) {
+    std::cerr << result.error ().message << '\n';
+    std::abort ();
+  }
+  return std::move (*result);
+}
+
+Mapping
+measure (Extent size, const BenchOptions &options)
+{
+  const auto patterns = calibration_patterns (size);
+  auto run = must (Calibration::make (size, size, patterns));
+  MoireBench bench (options.alignment, options.psf_sigma, size);
+  std::uint64_t number = 0;
+  for (const Pattern &pattern : patterns) {
+    const auto frame = bench.frame (pattern, number++);
+    if (const auto added = run.add (pattern, frame.view ()); !added)
+      std::cerr << added.error ().message << '\n';
+  }
+  return must (run.solve ()).mapping;
+}
+
+struct Errors {
+  PooledError point, full;
+
+  RectifyScore score () const { return {point.psnr (), full.psnr ()}; }
+};
+
+/* @slots: the scene in each slot of this exposure. */
+void
+compare (const Picture &coded, const Picture *slots, const Schedule &schedule,
+    Errors &errors)
+{
+  for (int y = kBorder; y < coded.height () - kBorder; y++)
+    for (int x = kBorder; x < coded.width () - kBorder; x++)
+      errors.point.add (
+          coded.at (x, y), slots[schedule.element_at (x, y)].at (x, y));
+
+  const auto extractor = must (Extractor<std::uint8_t>::make (
+      schedule, coded.width (), coded.height ()));
+  const Extent size = extractor.subframe_size ();
+  std::vector<Picture> subframes (
+      std::size_t (extractor.subframes ()), Picture (size.width, size.height));
+  std::vector<ImageView<std::uint8_t>> views;
+  for (Picture &subframe : subframes)
+    views.push_back (subframe.view ());
+  extractor.run (coded.view (), views);
+
+  for (std::size_t k = 0; k < subframes.size (); k++) {
+    Image<float> values (size.width, size.height);
+    for (int j = 0; j < size.height; j++)
+      for (int i = 0; i < size.width; i++)
+        values.at (i, j) = subframes[k].at (i, j);
+    const Upsampler upsampler (schedule, int (k), false);
+    const Extent cell = schedule.cell ();
+    for (int y = kBorder; y < size.height * cell.height - kBorder; y++)
+      for (int x = kBorder; x < size.width * cell.width - kBorder; x++)
+        errors.full.add (upsampler.at (std::as_const (values).view (), x, y),
+            slots[k].at (x, y));
+  }
+}
+
+} // namespace
+
+BenchOptions
+misaligned_bench (double psf_sigma)
+{
+  BenchOptions options;
+  options.alignment = {0.4, 0.4, 0.5, 1.01};
+  options.psf_sigma = psf_sigma;
+  options.full_well = 10000;
+  options.read_noise = 5;
+  return options;
+}
+
+RectifyOutcome
+run_rectify (
+    const Scene &scene, const Schedule &schedule, const BenchOptions &options)
+{
+  const Extent size = {
+      scene.frames.front ().width (), scene.frames.front ().height ()};
+  BenchOptions straight = options;
+  straight.alignment = {};
+  auto aligned = must (OpticalBench::make (size.width, size.height, straight));
+  auto crooked = must (OpticalBench::make (size.width, size.height, options));
+  const auto rectifier =
+      must (Rectifier::make (measure (size, options), schedule));
+
+  Errors on_aligned, on_crooked, on_rectified;
+  RectifyOutcome outcome;
+  const auto slots = std::size_t (schedule.slots ());
+  Picture frame (size.width, size.height), mirrors = frame;
+  std::uint64_t number = 0;
+  for (std::size_t at = 0; at + slots <= scene.frames.size (); at += slots) {
+    const Picture *light = scene.frames.data () + at;
+    for (const auto &[bench, errors] : {std::pair (&aligned, &on_aligned),
+             std::pair (&crooked, &on_crooked)}) {
+      bench->begin (schedule);
+      for (std::size_t s = 0; s < slots; s++)
+        bench->expose (light[s].view (), int (s), 1.0);
+      bench->read_out (number, frame.view ());
+      compare (frame, light, schedule, *errors);
+    }
+    number++;
+    const auto start = std::chrono::steady_clock::now ();
+    rectifier.run (std::as_const (frame).view (), mirrors.view ());
+    outcome.milliseconds += std::chrono::duration<double, std::milli> (
+        std::chrono::steady_clock::now () - start)
+                                .count ();
+    compare (mirrors, light, schedule, on_rectified);
+  }
+  outcome.milliseconds /= double (number);
+  outcome.aligned = on_aligned.score ();
+  outcome.misaligned = on_crooked.score ();
+  outcome.rectified = on_rectified.score ();
+  return outcome;
+}
+
+} // namespace cexp::quality

@@ -20,7 +20,7 @@ struct RectifyOptions {
   /** Noise of a pixel, rms, as a part of the scene's variation. */
   double noise = 0.08;
   /** Mirrors over which a scene is much the same. */
-  double correlation_length = 5.0;
+  double correlation_length = 2.5;
   /** Correlation of a scene with itself a slot later. */
   double persistence = 0.9;
 };

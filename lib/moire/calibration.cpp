@@ -57,6 +57,9 @@ struct Calibration::State {
   const Slot *find (Pattern::Kind kind) const;
   std::optional<GrayCode> gray_code (Axis axis) const;
   std::vector<const Slot *> gratings (Axis axis) const;
+  Result<Image<std::uint8_t>> usable_pixels (CalibrationResult &result) const;
+  Result<Mapping> coarse_mapping (
+      ImageView<const std::uint8_t> usable, bool affine) const;
   Result<CalibrationResult> solve (const CalibrationOptions &options) const;
 };
 
@@ -97,6 +100,59 @@ quantile (const Image<float> &image, double part)
       values.begin () + std::ptrdiff_t (part * double (values.size () - 1));
   std::nth_element (values.begin (), at, values.end ());
   return *at;
+}
+
+Image<float>
+difference (Image<float> a, const Image<float> &b)
+{
+  for (int y = 0; y < a.height (); y++)
+    for (int x = 0; x < a.width (); x++)
+      a.at (x, y) -= b.at (x, y);
+  return a;
+}
+
+/* Mean residuals of blocks, in mirrors. */
+Image<float>
+shifts_of (const PhaseFit &fit, const std::vector<PhaseFit::Block> &blocks)
+{
+  Image<float> shifts (fit.blocks_across (), fit.blocks_down ());
+  std::transform (blocks.begin (), blocks.end (), shifts.view ().data,
+      [] (const PhaseFit::Block &b) {
+        return b.information > 0.0 ? float (b.score / b.information) : 0.0f;
+      });
+  return shifts;
+}
+
+/* What is known at the end of the fit. */
+Result<void>
+report (const PhaseFit &fit, CalibrationResult &result)
+{
+  const double magnification = fit.mapping.stance ().magnification;
+  result.psf_sigma =
+      magnification * std::sqrt (0.5 * (fit.blur_x + fit.blur_y));
+  auto mapping =
+      Mapping::make ({fit.camera, fit.mirrors, fit.mapping.homography (),
+          fit.covariance, fit.mapping.displacement (), result.psf_sigma});
+  if (!mapping)
+    return mapping.error ();
+  result.mapping = std::move (*mapping);
+  result.noise_floor = fit.noise.floor;
+  result.noise_slope = fit.noise.slope;
+  result.misfit = std::sqrt (0.5 * (excess (fit.blocks_x, fit.noise_ratio) +
+                                       excess (fit.blocks_y, fit.noise_ratio)));
+  for (int y = 0; y < fit.camera.height; y++)
+    for (int x = 0; x < fit.camera.width; x++) {
+      PixelQuality &quality = result.quality.at (x, y);
+      if (quality != PixelQuality::good)
+        continue;
+      if (!result.mapping.covers (result.mapping.mirror_at (x, y)))
+        quality = PixelQuality::uncovered;
+      else if (fit.faint.at (x, y) != 0)
+        quality = PixelQuality::low_contrast;
+      else if (fit.outlier.at (x, y) != 0)
+        quality = PixelQuality::outlier;
+    }
+  return {};
 }
 
 /* Rounds until nothing changes; the noise is learned on the way. */
@@ -143,10 +199,8 @@ displace (PhaseFit &fit, int node_distance)
     if (!made)
       return made.error ();
     fit.mapping = std::move (*made);
-    const Mapping::Covariance covariance = fit.covariance;
     if (!fit.round (0))
       return Error{"the gratings do not determine a displacement grid"};
-    fit.covariance = covariance;
   }
   return {};
 }
@@ -281,15 +335,9 @@ Calibration::State::gray_code (Axis axis) const
     if (pair[0] == nullptr || pair[1] == nullptr)
       break;
     code.width = pair[0]->pattern.period;
-    Image<float> difference;
-    if (pair[0]->frames > 0 && pair[1]->frames > 0) {
-      difference = mean (*pair[0]);
-      const Image<float> inverse = mean (*pair[1]);
-      for (int y = 0; y < camera.height; y++)
-        for (int x = 0; x < camera.width; x++)
-          difference.at (x, y) -= inverse.at (x, y);
-    }
-    code.bits.push_back (std::move (difference));
+    const bool seen = pair[0]->frames > 0 && pair[1]->frames > 0;
+    code.bits.push_back (
+        seen ? difference (mean (*pair[0]), mean (*pair[1])) : Image<float> ());
   }
   const int size = axis == Axis::x ? mirrors.width : mirrors.height;
   const bool all =
@@ -312,103 +360,79 @@ Calibration::State::gratings (Axis axis) const
   return found;
 }
 
-Result<CalibrationResult>
-Calibration::State::solve (const CalibrationOptions &options) const
+/* What dark and white say of the pixels. */
+Result<Image<std::uint8_t>>
+Calibration::State::usable_pixels (CalibrationResult &result) const
 {
-  const int width = camera.width, height = camera.height;
-  const Image<float> dark = mean (*find (Pattern::Kind::dark));
-  Image<float> contrast = mean (*find (Pattern::Kind::white));
-  const Image<float> dark_smooth = smoothed (dark);
-  const Image<float> white_smooth = smoothed (contrast);
-  for (int y = 0; y < height; y++)
-    for (int x = 0; x < width; x++)
-      contrast.at (x, y) -= dark.at (x, y);
-
-  CalibrationResult result = {Mapping (camera), 0, 0, 0, 0,
-      Image<PixelQuality> (width, height), {}, {}, {}};
-  const float covered = std::max (1.0f, kCovered * quantile (contrast, 0.9));
-  Image<std::uint8_t> usable (width, height);
-  for (int y = 0; y < height; y++)
-    for (int x = 0; x < width; x++) {
+  const float covered =
+      std::max (1.0f, kCovered * quantile (result.contrast, 0.9));
+  Image<std::uint8_t> usable (camera.width, camera.height);
+  for (int y = 0; y < camera.height; y++)
+    for (int x = 0; x < camera.width; x++) {
       PixelQuality &quality = result.quality.at (x, y);
-      quality = contrast.at (x, y) < covered ? PixelQuality::uncovered
-                : saturated.at (x, y) != 0   ? PixelQuality::saturated
-                                             : PixelQuality::good;
+      quality = result.contrast.at (x, y) < covered ? PixelQuality::uncovered
+                : saturated.at (x, y) != 0          ? PixelQuality::saturated
+                                                    : PixelQuality::good;
       usable.at (x, y) = quality == PixelQuality::good;
     }
   if (result.pixels (PixelQuality::saturated) >
-      std::uint64_t (width) * std::uint64_t (height) / 2)
+      std::uint64_t (camera.width) * std::uint64_t (camera.height) / 2)
     return Error{"more than half of the pixels stand at the largest value; "
                  "reduce light, exposure or gain, and calibrate again"};
+  return usable;
+}
 
-  const bool affine = options.model == FitModel::affine;
-  const auto coarse = fit_gray_codes (*gray_code (Axis::x),
-      *gray_code (Axis::y), std::as_const (usable).view (), affine);
+Result<Mapping>
+Calibration::State::coarse_mapping (
+    ImageView<const std::uint8_t> usable, bool affine) const
+{
+  const auto coarse = fit_gray_codes (
+      *gray_code (Axis::x), *gray_code (Axis::y), usable, affine);
   if (!coarse)
     return coarse.error ();
-  const auto start = Mapping::from_centred (camera, mirrors, *coarse);
+  return Mapping::from_centred (camera, mirrors, *coarse);
+}
+
+Result<CalibrationResult>
+Calibration::State::solve (const CalibrationOptions &options) const
+{
+  const Image<float> dark = mean (*find (Pattern::Kind::dark));
+  const Image<float> white = mean (*find (Pattern::Kind::white));
+  const Image<float> dark_smooth = smoothed (dark);
+  const Image<float> white_smooth = smoothed (white);
+  CalibrationResult result = {Mapping (camera), 0, 0, 0, 0,
+      Image<PixelQuality> (camera.width, camera.height),
+      difference (white, dark), {}, {}};
+  const auto usable = usable_pixels (result);
+  if (!usable)
+    return usable.error ();
+  const bool affine = options.model == FitModel::affine;
+  const auto start = coarse_mapping (usable->view (), affine);
   if (!start)
     return start.error ();
 
-  PhaseFit fit = {camera, mirrors, {}, {}, std::as_const (usable).view (),
-      dark_smooth.view (), white_smooth.view (), *start};
+  PhaseFit fit = {camera, mirrors, {}, {}, usable->view (), dark_smooth.view (),
+      white_smooth.view (), *start};
+  fit.block_size = CalibrationResult::kBlock;
   std::vector<Image<float>> frames;
-  int repeats = std::numeric_limits<int>::max ();
   for (const Axis axis : {Axis::x, Axis::y})
-    for (const Slot *slot : gratings (axis)) {
+    for (const Slot *slot : gratings (axis))
       frames.push_back (mean (*slot));
-      repeats = std::min (repeats, slot->frames);
-    }
+  const std::size_t of_x = gratings (Axis::x).size ();
   for (std::size_t i = 0; i < frames.size (); i++)
-    (i < gratings (Axis::x).size () ? fit.x : fit.y)
+    (i < of_x ? fit.x : fit.y)
         .frames.push_back (std::as_const (frames[i]).view ());
 
   if (const auto settled = settle (fit, affine ? 6 : 8); !settled)
     return settled.error ();
-  const int across =
-      (width + CalibrationResult::kBlock - 1) / CalibrationResult::kBlock;
-  const int down =
-      (height + CalibrationResult::kBlock - 1) / CalibrationResult::kBlock;
-  result.residual_x = result.residual_y = Image<float> (across, down);
-  for (int j = 0; j < down; j++)
-    for (int i = 0; i < across; i++) {
-      const auto shift = [] (const PhaseFit::Block &b) {
-        return b.information > 0.0 ? float (b.score / b.information) : 0.0f;
-      };
-      const std::size_t at = std::size_t (j * across + i);
-      result.residual_x.at (i, j) = shift (fit.blocks_x[at]);
-      result.residual_y.at (i, j) = shift (fit.blocks_y[at]);
-    }
+  result.residual_x = shifts_of (fit, fit.blocks_x);
+  result.residual_y = shifts_of (fit, fit.blocks_y);
   if (options.model == FitModel::displaced)
     if (const auto displaced = displace (fit, options.node_distance);
         !displaced)
       return displaced.error ();
-
-  const double magnification = fit.mapping.stance ().magnification;
-  result.psf_sigma =
-      magnification * std::sqrt (0.5 * (fit.blur_x + fit.blur_y));
-  auto mapping = Mapping::make ({camera, mirrors, fit.mapping.homography (),
-      fit.covariance, fit.mapping.displacement (), result.psf_sigma});
-  if (!mapping)
-    return mapping.error ();
-  result.mapping = std::move (*mapping);
-  result.noise_floor = fit.noise.floor;
-  result.noise_slope = fit.noise.slope;
-  result.misfit = std::sqrt (0.5 * (excess (fit.blocks_x, fit.noise_ratio) +
-                                       excess (fit.blocks_y, fit.noise_ratio)));
-  for (int y = 0; y < height; y++)
-    for (int x = 0; x < width; x++) {
-      PixelQuality &quality = result.quality.at (x, y);
-      if (quality != PixelQuality::good)
-        continue;
-      if (!result.mapping.covers (result.mapping.mirror_at (x, y)))
-        quality = PixelQuality::uncovered;
-      else if (fit.faint.at (x, y) != 0)
-        quality = PixelQuality::low_contrast;
-      else if (fit.outlier.at (x, y) != 0)
-        quality = PixelQuality::outlier;
-    }
-  result.contrast = std::move (contrast);
+  if (const auto reported = report (fit, result); !reported)
+    return reported.error ();
   return result;
 }
 

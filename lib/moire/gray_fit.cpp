@@ -38,12 +38,11 @@ decode (const GrayCode &gx, const GrayCode &gy,
   return samples;
 }
 
-/* Most samples have the median distance to the stripes of their neighbours:
- * the start is the affine mapping through medians of differences. */
+/* The affine mapping through all samples; what is wrong with some of them is
+ * found out later. */
 Homography
 start_of (const std::vector<Sample> &samples)
 {
-  /* Trimmed sums do: a wrong bit is rare, and its pixel is thrown out below. */
   HomographyFit fit;
   for (const Sample &s : samples) {
     const CentredMirror zero = {0.0, 0.0, 1.0};

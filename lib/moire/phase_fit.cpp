@@ -226,134 +226,176 @@ rows_of (const PhaseStack &stack, int y)
   return rows;
 }
 
+/* What all pixels of a round have in common. */
+struct Conditions {
+  GratingResponse x, y;
+  double margin_x, margin_y; // of the array, where its edge is seen
+  float limit_x, limit_y;    // of squared residuals that are noise
+
+  explicit Conditions (const PhaseFit &fit)
+      : Conditions (fit, fit.mapping.slope_at (0.5 * (fit.camera.width - 1),
+                             0.5 * (fit.camera.height - 1)))
+  {
+  }
+
+  bool sees_edge (Position m, Extent mirrors) const
+  {
+    return m.x < margin_x - 0.5 || m.x > mirrors.width - 0.5 - margin_x ||
+           m.y < margin_y - 0.5 || m.y > mirrors.height - 0.5 - margin_y;
+  }
+
+private:
+  Conditions (const PhaseFit &fit, const std::array<double, 4> &slope)
+      : Conditions (fit, std::hypot (slope[0], slope[1]),
+            std::hypot (slope[2], slope[3]))
+  {
+  }
+  Conditions (const PhaseFit &fit, double side_x, double side_y)
+      : x (fit.x.period (), side_x, std::sqrt (fit.blur_x)),
+        y (fit.y.period (), side_y, std::sqrt (fit.blur_y)),
+        margin_x (reach (side_x, fit.blur_x)),
+        margin_y (reach (side_y, fit.blur_y)),
+        limit_x (unlikely (fit.misfit, x.period ())),
+        limit_y (unlikely (fit.misfit, y.period ()))
+  {
+  }
+  static float unlikely (double misfit, int phases)
+  {
+    const double freedom = std::max (1, phases - 3);
+    return float (
+        misfit * freedom * (1.0 + kUnlikely * std::sqrt (2.0 / freedom)));
+  }
+};
+
+HomographyFit::Observation
+observation (const PixelFinding &f)
+{
+  return {double (f.score), double (f.information), double (f.blur_score),
+      double (f.blur_information), double (f.cross)};
+}
+
+/* Sums over the pixels of a round. */
+struct PhaseSums {
+  HomographyFit fit;
+  double squares = 0.0, freedom = 0.0; // of residuals
+  double scores = 0.0, count = 0.0;    // squared, of their variance
+
+  void add (const PixelFinding &f, int phases)
+  {
+    squares += double (f.misfit);
+    freedom += phases - 3;
+    scores += double (f.score * f.score / f.information);
+    count += 1.0;
+  }
+};
+
+/* Largest distance between two mappings in a frame's corners. */
+double
+largest_step (const Homography &a, const Homography &b)
+{
+  double longest = 0.0;
+  for (const double xi : {-1.0, 1.0})
+    for (const double eta : {-1.0, 1.0}) {
+      const CentredMirror p = centred_mirror (a, xi, eta);
+      const CentredMirror q = centred_mirror (b, xi, eta);
+      longest = std::max (longest, std::hypot (p.x - q.x, p.y - q.y));
+    }
+  return longest;
+}
+
+/* A blur changes by no more than a factor: far off, the model is no line. */
+double
+moved (double blur, double change)
+{
+  return std::clamp (blur + change, std::max (1e-3, 0.4 * blur), 2.5 * blur);
+}
+
+/* All pixels of the frame that are of use. */
+PhaseSums
+sum_up (PhaseFit &p)
+{
+  const Conditions at (p);
+  const CentredFrame frame (p.camera);
+  const Homography centred = p.mapping.centred ();
+  PhaseSums sums;
+  for (int y = 0; y < p.camera.height; y++) {
+    const auto rows_x = rows_of (p.x, y), rows_y = rows_of (p.y, y);
+    for (int x = 0; x < p.camera.width; x++) {
+      const Position m = p.mapping.mirror_at (x, y);
+      if (p.usable.at (x, y) == 0 || at.sees_edge (m, p.mirrors))
+        continue;
+      const float low = p.dark.at (x, y);
+      const PixelLight light = {low, p.white.at (x, y) - low};
+      const auto fx = find (rows_x.data (), x, at.x, m.x, light, p.noise);
+      const auto fy = find (rows_y.data (), x, at.y, m.y, light, p.noise);
+      if (std::min (fx.swing, fy.swing) < kFaintSwing * light.swing) {
+        p.faint.at (x, y) = 1;
+      } else if (fx.misfit > at.limit_x || fy.misfit > at.limit_y) {
+        p.outlier.at (x, y) = 1;
+      } else {
+        sums.add (fx, p.x.period ());
+        sums.add (fy, p.y.period ());
+        const double xi = (x - frame.cx) / frame.r;
+        const double eta = (y - frame.cy) / frame.r;
+        const CentredMirror seen = centred_mirror (centred, xi, eta);
+        sums.fit.add_x (xi, eta, seen, observation (fx));
+        sums.fit.add_y (xi, eta, seen, observation (fy));
+        p.block_at (p.blocks_x, x, y).add (fx.score, fx.information);
+        p.block_at (p.blocks_y, x, y).add (fy.score, fy.information);
+      }
+    }
+  }
+  return sums;
+}
+
 } // namespace
+
+PhaseFit::Block &
+PhaseFit::block_at (std::vector<Block> &blocks, int px, int py) const
+{
+  return blocks[std::size_t (
+      py / block_size * blocks_across () + px / block_size)];
+}
 
 std::optional<double>
 PhaseFit::round (std::size_t numbers)
 {
-  const CentredFrame frame (camera);
-  const auto slope = mapping.slope_at (frame.cx, frame.cy);
-  const double side_x = std::hypot (slope[0], slope[1]);
-  const double side_y = std::hypot (slope[2], slope[3]);
-  const GratingResponse response_x (x.period (), side_x, std::sqrt (blur_x));
-  const GratingResponse response_y (y.period (), side_y, std::sqrt (blur_y));
-  const double margin_x = reach (side_x, blur_x);
-  const double margin_y = reach (side_y, blur_y);
-  const Homography centred = mapping.centred ();
-
-  const int across = (camera.width + block_size - 1) / block_size;
-  const int down = (camera.height + block_size - 1) / block_size;
-  blocks_x.assign (std::size_t (across * down), {});
-  blocks_y.assign (std::size_t (across * down), {});
+  const auto blocks = std::size_t (blocks_across () * blocks_down ());
+  blocks_x.assign (blocks, {});
+  blocks_y.assign (blocks, {});
   outlier = faint = Image<std::uint8_t> (camera.width, camera.height);
-
-  const auto unlikely = [this] (int phases) {
-    const double freedom = std::max (1, phases - 3);
-    return float (
-        misfit * freedom * (1.0 + kUnlikely * std::sqrt (2.0 / freedom)));
-  };
-  const float limit_x = unlikely (x.period ());
-  const float limit_y = unlikely (y.period ());
-
-  HomographyFit fit;
-  double squares = 0.0, freedom = 0.0, scores = 0.0, pixels = 0.0;
-  for (int py = 0; py < camera.height; py++) {
-    const auto rows_x = rows_of (x, py), rows_y = rows_of (y, py);
-    const double eta = (py - frame.cy) / frame.r;
-    for (int px = 0; px < camera.width; px++) {
-      if (usable.at (px, py) == 0)
-        continue;
-      const Position m = mapping.mirror_at (px, py);
-      if (m.x < margin_x - 0.5 || m.x > mirrors.width - 0.5 - margin_x ||
-          m.y < margin_y - 0.5 || m.y > mirrors.height - 0.5 - margin_y)
-        continue;
-      const float low = dark.at (px, py);
-      const PixelLight light = {low, white.at (px, py) - low};
-      const PixelFinding fx =
-          find (rows_x.data (), px, response_x, m.x, light, noise);
-      const PixelFinding fy =
-          find (rows_y.data (), px, response_y, m.y, light, noise);
-      if (std::min (fx.swing, fy.swing) < kFaintSwing * light.swing) {
-        faint.at (px, py) = 1;
-        continue;
-      }
-      if (fx.misfit > limit_x || fy.misfit > limit_y) {
-        outlier.at (px, py) = 1;
-        continue;
-      }
-      squares += double (fx.misfit) + double (fy.misfit);
-      freedom += x.period () + y.period () - 6;
-      scores += double (fx.score * fx.score / fx.information) +
-                double (fy.score * fy.score / fy.information);
-      pixels += 1.0;
-      const double xi = (px - frame.cx) / frame.r;
-      const CentredMirror at = centred_mirror (centred, xi, eta);
-      fit.add_x (xi, eta, at,
-          {fx.score, fx.information, fx.blur_score, fx.blur_information,
-              fx.cross});
-      fit.add_y (xi, eta, at,
-          {fy.score, fy.information, fy.blur_score, fy.blur_information,
-              fy.cross});
-      const std::size_t block =
-          std::size_t (py / block_size * across + px / block_size);
-      blocks_x[block].score += double (fx.score);
-      blocks_x[block].information += double (fx.information);
-      blocks_y[block].score += double (fy.score);
-      blocks_y[block].information += double (fy.information);
-    }
-  }
-  if (freedom <= 0.0)
+  const PhaseSums sums = sum_up (*this);
+  if (sums.freedom <= 0.0)
     return std::nullopt;
-  misfit = squares / freedom;
-  noise_ratio = scores / (2.0 * pixels);
-  const auto step = fit.solve (numbers, true);
+  misfit = sums.squares / sums.freedom;
+  noise_ratio = sums.scores / sums.count;
+  const auto step = sums.fit.solve (numbers, true);
   if (!step)
     return std::nullopt;
 
-  Homography next = centred;
-  for (std::size_t i = 0; i < numbers; i++)
-    next[i] += step->change[i];
+  blur_x = moved (blur_x, step->change[HomographyFit::kExtra]);
+  blur_y = moved (blur_y, step->change[HomographyFit::kExtra + 1]);
+  if (numbers == 0)
+    return 0.0;
   for (std::size_t i = 0; i < Mapping::kParameters; i++)
     for (std::size_t j = 0; j < Mapping::kParameters; j++)
       covariance[i * Mapping::kParameters + j] =
           noise_ratio * step->covariance[i * HomographyFit::kNumbers + j];
-  /* A blur changes by no more than a factor: far off, the model is no line. */
-  const auto moved = [] (double blur, double change) {
-    return std::clamp (blur + change, std::max (1e-3, 0.4 * blur), 2.5 * blur);
-  };
-  blur_x = moved (blur_x, step->change[HomographyFit::kExtra]);
-  blur_y = moved (blur_y, step->change[HomographyFit::kExtra + 1]);
-
-  double longest = 0.0;
-  for (const double xi : {-1.0, 1.0})
-    for (const double eta : {-1.0, 1.0}) {
-      const CentredMirror a = centred_mirror (centred, xi, eta);
-      const CentredMirror b = centred_mirror (next, xi, eta);
-      longest = std::max (longest, std::hypot (a.x - b.x, a.y - b.y));
-    }
-  if (numbers > 0) {
-    const auto changed = Mapping::from_centred (camera, mirrors, next);
-    if (!changed)
-      return std::nullopt;
-    const auto made = Mapping::make (
-        {camera, mirrors, changed->homography (), {}, mapping.displacement ()});
-    if (!made)
-      return std::nullopt;
-    mapping = *made;
-  }
-  return longest;
+  const Homography before = mapping.centred ();
+  Homography next = before;
+  for (std::size_t i = 0; i < numbers; i++)
+    next[i] += step->change[i];
+  auto made = Mapping::from_centred (camera, mirrors, next);
+  if (!made)
+    return std::nullopt;
+  mapping = std::move (*made);
+  return largest_step (before, next);
 }
 
 void
 PhaseFit::estimate_noise ()
 {
-  const CentredFrame frame (camera);
-  const auto slope = mapping.slope_at (frame.cx, frame.cy);
-  const GratingResponse responses[] = {
-      {x.period (), std::hypot (slope[0], slope[1]), std::sqrt (blur_x)},
-      {y.period (), std::hypot (slope[2], slope[3]), std::sqrt (blur_y)}};
-  const PhaseStack *stacks[] = {&x, &y};
-
+  const Conditions at (*this);
   NoiseBins bins;
   float brightest = 1.0f;
   for (int py = 0; py < camera.height; py += 8)
@@ -362,20 +404,18 @@ PhaseFit::estimate_noise ()
   bins.width = double (brightest) / NoiseBins::kBins;
 
   for (int py = 0; py < camera.height; py += 4)
-    for (std::size_t axis = 0; axis < 2; axis++) {
-      const auto rows = rows_of (*stacks[axis], py);
-
+    for (const bool along_y : {false, true}) {
+      const auto rows = rows_of (along_y ? y : x, py);
       for (int px = 0; px < camera.width; px++) {
         if (usable.at (px, py) == 0 || outlier.at (px, py) != 0 ||
             faint.at (px, py) != 0)
           continue;
         const Position m = mapping.mirror_at (px, py);
-        if (m.x < 2.0 || m.y < 2.0 || m.x > mirrors.width - 3.0 ||
-            m.y > mirrors.height - 3.0)
+        if (at.sees_edge (m, mirrors))
           continue;
         const float low = dark.at (px, py);
-        find_noise (rows.data (), px, responses[axis], axis == 0 ? m.x : m.y,
-            {low, white.at (px, py) - low}, noise, bins);
+        find_noise (rows.data (), px, along_y ? at.y : at.x,
+            along_y ? m.y : m.x, {low, white.at (px, py) - low}, noise, bins);
       }
     }
   noise = bins.fit (noise);

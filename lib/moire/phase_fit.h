@@ -63,6 +63,12 @@ struct PhaseFit {
   struct Block {
     double score = 0.0;
     double information = 0.0;
+
+    void add (float more_score, float more_information)
+    {
+      score += double (more_score);
+      information += double (more_information);
+    }
   };
   int block_size = 16;
   std::vector<Block> blocks_x = {}, blocks_y = {};
@@ -71,10 +77,22 @@ struct PhaseFit {
   /** Those in which the gratings are blurred away. */
   Image<std::uint8_t> faint = {};
 
+  int blocks_across () const
+  {
+    return (camera.width + block_size - 1) / block_size;
+  }
+  int blocks_down () const
+  {
+    return (camera.height + block_size - 1) / block_size;
+  }
+  /** The one of @p blocks that holds pixel (@p px, @p py). */
+  Block &block_at (std::vector<Block> &blocks, int px, int py) const;
+
   /**
-   * One round: a step of the first @p numbers numbers of the homography (0: of
-   * none) and of the blur. Returns the step's length in mirrors, largest over
-   * the frame's corners; none where the frames determine nothing.
+   * One round: a step of the first @p numbers numbers of the homography and of
+   * the blur. With 0 only blocks, blur and misfit change; else the mapping has
+   * no displacement. Returns the step's length in mirrors, largest over the
+   * frame's corners; none where the frames determine nothing.
    */
   std::optional<double> round (std::size_t numbers);
   /** Fits the noise to the residuals of a part of the rows. */

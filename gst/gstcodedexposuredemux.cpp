@@ -152,6 +152,7 @@ forget_stream (GstCodedExposureDemux *self)
   st.caps = demux::PadCaps ();
   st.in_force.reset ();
   st.assumed = false;
+  st.rectifies = false;
   st.method = Method::kAuto;
   st.ended = false;
   gst_flow_combiner_reset (st.combiner.get ());

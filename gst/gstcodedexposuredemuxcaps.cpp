@@ -14,6 +14,7 @@ namespace
 struct Known {
   ScheduleRef schedule; ///< null: any may come
   SaidRate rate;
+  bool mapped; ///< frames and subframes can be of any size
 };
 
 /* A schedule that was only assumed binds nobody: the tag may still come. */
@@ -22,7 +23,8 @@ known (GstCodedExposureDemux *self)
 {
   const DemuxState &st = state (self);
   const ObjectLock lock (self);
-  Known now{nullptr, {st.settings.rate_num, st.settings.rate_den}};
+  Known now{nullptr, {st.settings.rate_num, st.settings.rate_den},
+      st.settings.mapped || st.rectifies};
   if (st.settings.parsed && *st.settings.parsed)
     now.schedule =
         ScheduleRef (st.settings.parsed, &st.settings.parsed->value ());
@@ -41,7 +43,14 @@ convert (const Known &now, Output::Kind kind, GstCaps *caps, bool to_coded)
     return unbind_caps (caps);
   const CapsScale scale =
       coded_to_subframes (*now.schedule, kind == Output::Kind::kAll);
-  return CapsPtr (scale_caps (caps, to_coded ? scale.inverse () : scale));
+  CapsPtr scaled (scale_caps (caps, to_coded ? scale.inverse () : scale));
+  if (!now.mapped || gst_caps_is_any (scaled.get ()))
+    return scaled;
+  CapsPtr any_size (gst_caps_copy (scaled.get ()));
+  for (guint i = 0; i < gst_caps_get_size (any_size.get ()); i++)
+    gst_structure_remove_fields (gst_caps_get_structure (any_size.get (), i),
+        "width", "height", nullptr);
+  return any_size;
 }
 
 } // namespace

@@ -9,14 +9,14 @@
 namespace cexp::gst::demux
 {
 
-namespace
-{
-
 void
 refuse (GstCodedExposureDemux *self, const std::string &why)
 {
   GST_ELEMENT_ERROR (self, STREAM, FORMAT, ("%s", why.c_str ()), (nullptr));
 }
+
+namespace
+{
 
 void
 take_settings (GstCodedExposureDemux *self)
@@ -40,16 +40,15 @@ find_schedule (GstCodedExposureDemux *self)
 {
   Stream &stream = state (self).stream;
   const auto &asked = stream.settings.parsed;
-  const Result<Schedule> *said =
-      asked ? asked.get () : (stream.tagged ? &*stream.tagged : nullptr);
-  if (said && *said)
-    return Source{said->value ()};
-  if (said) {
-    refuse (self,
-        std::string (asked ? "The schedule property cannot be read: "
-                           : "The schedule in the stream's tags cannot be "
-                             "read: ") +
-            said->error ().message);
+  if (asked && *asked)
+    return Source{asked->value ()};
+  if (!asked && stream.tagged && *stream.tagged)
+    return Source{stream.tagged->value ().schedule};
+  if (asked || stream.tagged) {
+    refuse (self, asked ? "The schedule property cannot be read: " +
+                              asked->error ().message
+                        : "The schedule in the stream's tags cannot be read: " +
+                              stream.tagged->error ().message);
     return std::nullopt;
   }
 
@@ -92,11 +91,11 @@ coded_caps (GstCodedExposureDemux *self)
 
 template <typename Pixel>
 std::optional<AnyExtractor>
-make_extractor (GstCodedExposureDemux *self, const Schedule &schedule,
-    const GstVideoInfo &info)
+make_extractor (
+    GstCodedExposureDemux *self, const Schedule &schedule, Extent size)
 {
   auto made = Extractor<Pixel>::make (
-      schedule, info.width, info.height, state (self).stream.settings.extract);
+      schedule, size.width, size.height, state (self).stream.settings.extract);
   if (made)
     return AnyExtractor (std::move (*made));
   refuse (self, made.error ().message);
@@ -159,11 +158,13 @@ slot_boundaries (FrameRate rate, int n)
 }
 
 PadCaps
-output_caps (CapsPtr coded, const GstVideoInfo &info, const Schedule &schedule)
+output_caps (CapsPtr coded, const GstVideoInfo &info, Extent extracted,
+    const Schedule &schedule)
 {
   const CapsPtr with_aspect (gst_caps_copy (coded.get ()));
   gst_caps_set_simple (with_aspect.get (), "pixel-aspect-ratio",
-      GST_TYPE_FRACTION, info.par_n, info.par_d, nullptr);
+      GST_TYPE_FRACTION, info.par_n, info.par_d, "width", G_TYPE_INT,
+      extracted.width, "height", G_TYPE_INT, extracted.height, nullptr);
   PadCaps caps;
   caps.all.reset (
       scale_caps (with_aspect.get (), coded_to_subframes (schedule, true)));
@@ -177,8 +178,8 @@ void
 say_what_is_cropped (GstCodedExposureDemux *self, const Plan &plan)
 {
   const Extent cell = plan.schedule.cell ();
-  const int columns = plan.coded.width - plan.subframe.width * cell.width;
-  const int rows = plan.coded.height - plan.subframe.height * cell.height;
+  const int columns = plan.extracted.width - plan.subframe.width * cell.width;
+  const int rows = plan.extracted.height - plan.subframe.height * cell.height;
   if (columns > 0 || rows > 0)
     GST_INFO_OBJECT (self,
         "%d columns and %d rows (pilot: %d) of the coded frames are cropped: "
@@ -221,20 +222,27 @@ propose (GstCodedExposureDemux *self)
     refuse (self, slots.error ().message);
     return std::nullopt;
   }
+  std::shared_ptr<const Rectifier> rectifier;
+  Extent size{info.width, info.height};
+  if (!find_rectifier (self, schedule, size, rectifier))
+    return std::nullopt;
+  if (rectifier)
+    size = rectifier->mirrors ();
   auto extractor = GST_VIDEO_INFO_FORMAT (&info) == GST_VIDEO_FORMAT_GRAY8
-                       ? make_extractor<std::uint8_t> (self, schedule, info)
-                       : make_extractor<std::uint16_t> (self, schedule, info);
+                       ? make_extractor<std::uint8_t> (self, schedule, size)
+                       : make_extractor<std::uint16_t> (self, schedule, size);
   if (!extractor)
     return std::nullopt;
   const Method method =
       std::visit ([] (const auto &e) { return e.method (); }, *extractor);
 
-  PadCaps caps = output_caps (std::move (coded), info, schedule);
+  PadCaps caps = output_caps (std::move (coded), info, size, schedule);
   GstVideoInfo subframe;
   gst_video_info_from_caps (&subframe, caps.one.get ());
   return Proposal{Plan{schedule, info, subframe, std::move (*extractor), method,
                       rate, slot_boundaries (rate, schedule.slots ()),
-                      light_windows (schedule, method, *slots)},
+                      light_windows (schedule, method, *slots),
+                      std::move (rectifier), size},
       std::move (caps), source->assumed};
 }
 
@@ -252,6 +260,7 @@ install (GstCodedExposureDemux *self, Proposal proposal)
   stream.stale = false;
   stream.scratch.clear ();
   say_what_is_cropped (self, *stream.plan);
+  say_mapping (self);
 
   bool schedule_changed, method_changed;
   {

@@ -13,6 +13,7 @@ namespace
 enum {
   PROP_0,
   PROP_SCHEDULE,
+  PROP_MAPPING,
   PROP_METHOD,
   PROP_GAIN,
   PROP_BITS,
@@ -25,6 +26,8 @@ enum {
   PROP_FRAMES_CORRUPTED,
   PROP_SUBFRAMES_DROPPED,
   PROP_SATURATED_FRAMES,
+  PROP_MIRRORS_MIXED,
+  PROP_MIRRORS_UNSEEN,
   PROP_SCHEDULE_IN_FORCE,
   PROP_METHOD_IN_FORCE,
   PROP_STATS,
@@ -75,12 +78,15 @@ set_property (
   auto *self = GST_CODED_EXPOSURE_DEMUX (object);
   if (id == PROP_SCHEDULE)
     set_schedule (self, g_value_get_string (value) ?: "");
+  if (id == PROP_MAPPING)
+    set_mapping (self, g_value_get_string (value) ?: "");
 
   const ObjectLock lock (self);
   Settings &settings = state (self).settings;
   state (self).settings_changed = true;
   switch (id) {
   case PROP_SCHEDULE:
+  case PROP_MAPPING:
     break;
   case PROP_METHOD:
     settings.extract.method = Method (g_value_get_enum (value));
@@ -115,7 +121,11 @@ stats (const Counters &counters)
       counters.frames_lost, "frames-corrupted", G_TYPE_UINT64,
       counters.frames_corrupted, "subframes-dropped", G_TYPE_UINT64,
       counters.subframes_dropped, "saturated-frames", G_TYPE_UINT64,
-      counters.saturated_frames, nullptr);
+      counters.saturated_frames, "mirrors-exact", G_TYPE_UINT64,
+      guint64 (counters.rectified.exact), "mirrors-weighted", G_TYPE_UINT64,
+      guint64 (counters.rectified.weighted), "mirrors-mixed", G_TYPE_UINT64,
+      guint64 (counters.rectified.mixed), "mirrors-unseen", G_TYPE_UINT64,
+      guint64 (counters.rectified.unseen), nullptr);
 }
 
 /* Everything that the streaming thread writes. Returns false for a property
@@ -142,6 +152,12 @@ get_report (const DemuxState &st, guint id, GValue *value)
   case PROP_SATURATED_FRAMES:
     g_value_set_uint64 (value, st.counters.saturated_frames);
     return true;
+  case PROP_MIRRORS_MIXED:
+    g_value_set_uint64 (value, st.counters.rectified.mixed);
+    return true;
+  case PROP_MIRRORS_UNSEEN:
+    g_value_set_uint64 (value, st.counters.rectified.unseen);
+    return true;
   case PROP_SCHEDULE_IN_FORCE:
     g_value_set_string (
         value, st.in_force ? st.in_force->text ().c_str () : "");
@@ -167,6 +183,9 @@ get_property (
   switch (id) {
   case PROP_SCHEDULE:
     g_value_set_string (value, settings.schedule.c_str ());
+    break;
+  case PROP_MAPPING:
+    g_value_set_string (value, settings.mapping.c_str ());
     break;
   case PROP_METHOD:
     g_value_set_enum (value, int (settings.extract.method));
@@ -209,6 +228,22 @@ install_settings (GObjectClass *klass)
           "of a JSON file; empty: what the stream's tag says, else "
           "sequential:2x2",
           DEFAULT_SCHEDULE, kReadWrite));
+  /**
+   * codedexposure-demux:mapping:
+   *
+   * A file with the mapping from camera pixels to mirrors, as moirecalib writes
+   * it; wins over what the stream's tags say. Frames are then rectified to one
+   * pixel a mirror before they are taken apart, so that subframes have the size
+   * that the mirrors give them. Empty: the mapping of the tags, or none.
+   * Applied at the next frame.
+   *
+   * Since: 0.1
+   */
+  g_object_class_install_property (klass, PROP_MAPPING,
+      g_param_spec_string ("mapping", "Mapping",
+          "File with the mapping from camera pixels to mirrors (moirecalib "
+          "writes one); empty: that of the stream's tags, or none",
+          "", kReadWrite));
   /**
    * codedexposure-demux:method:
    *
@@ -314,6 +349,12 @@ install_reports (GObjectClass *klass)
       "Saturated frames",
       "Coded frames with a pixel at the largest value; notifies when a "
       "stretch of them begins or ends");
+  install_counter (klass, PROP_MIRRORS_MIXED, "mirrors-mixed", "Mirrors mixed",
+      "Mirrors of the mapping in force of which even the best pixel gets less "
+      "than half of its light");
+  install_counter (klass, PROP_MIRRORS_UNSEEN, "mirrors-unseen",
+      "Mirrors unseen",
+      "Mirrors of the mapping in force at which no pixel looks; black");
   /**
    * codedexposure-demux:schedule-in-force:
    *
@@ -361,6 +402,19 @@ set_schedule (GstCodedExposureDemux *self, const std::string &text)
   state (self).settings.schedule = text;
   state (self).settings.parsed = parsed;
   return parsed;
+}
+
+void
+set_mapping (GstCodedExposureDemux *self, const std::string &path)
+{
+  std::shared_ptr<const Result<Mapping>> mapped;
+  if (!path.empty ())
+    mapped = std::make_shared<const Result<Mapping>> (Mapping::load (path));
+  if (mapped && !*mapped)
+    GST_WARNING_OBJECT (self, "%s", mapped->error ().message.c_str ());
+  const ObjectLock lock (self);
+  state (self).settings.mapping = path;
+  state (self).settings.mapped = std::move (mapped);
 }
 
 void

@@ -285,7 +285,10 @@ extract (const Extractor<Pixel> &extractor, Stream &stream, MappedFrame &coded,
   for (std::size_t k = 0; k < subframes.size (); k++)
     views.push_back (subframes[k] ? view_of<Pixel> (subframes[k])
                                   : scratch_view<Pixel> (stream, k));
-  return extractor.run (view_of<Pixel> (coded), views);
+  ImageView<const Pixel> light = view_of<const Pixel> (coded);
+  if (stream.plan->rectifier)
+    light = rectify (stream, light);
+  return extractor.run (light, views);
 }
 
 /* Takes a buffer for every subframe that has a target and maps it; a subframe

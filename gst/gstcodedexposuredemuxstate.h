@@ -20,7 +20,9 @@
 #include "gstcodedexposuredemux.h"
 #include "gstcodedexposuremeta.h"
 #include "gstraii.h"
+#include "moire/rectifier.h"
 #include "schedule/schedule.h"
+#include "schedule/stream_setup.h"
 
 GST_DEBUG_CATEGORY_EXTERN (codedexposure_demux_debug);
 
@@ -34,6 +36,9 @@ struct Settings {
   std::string schedule;
   /** The schedule read from the text; null where the text is empty. */
   std::shared_ptr<const Result<Schedule>> parsed;
+  std::string mapping;
+  /** Read from the file of that name; null where there is none. */
+  std::shared_ptr<const Result<Mapping>> mapped;
   ExtractOptions extract;
   int rate_num = 0, rate_den = 1; ///< 0/1: only from the caps
   bool qos = false;
@@ -46,6 +51,7 @@ struct Counters {
   guint64 frames_corrupted = 0;
   guint64 subframes_dropped = 0;
   guint64 saturated_frames = 0;
+  RectifyReport rectified; ///< of the mapping in force
 };
 
 struct PoolRelease {
@@ -130,9 +136,19 @@ struct Plan {
   /** Slot boundaries, n + 1 of them, counted from the frame's PTS. */
   std::vector<GstClockTime> boundaries;
   std::vector<Window> windows;
+  /** Null: the camera stands as the schedule has it. */
+  std::shared_ptr<const Rectifier> rectifier = nullptr;
+  Extent extracted = {}; ///< size of what the extractor takes
 
   int subframes () const { return schedule.elements (); }
   GstClockTime period () const { return boundaries.back (); }
+};
+
+/** Weights take a while to make: kept as long as they are right. */
+struct RectifierCache {
+  Mapping mapping;
+  Schedule schedule;
+  std::shared_ptr<const Rectifier> rectifier;
 };
 
 /** Saturated frames that follow each other. */
@@ -151,7 +167,10 @@ struct Stream {
   guint32 caps_seqnum = 0;
   GstSegment segment;
   /** What the tags of the stream say; an error where they cannot be read. */
-  std::optional<Result<Schedule>> tagged;
+  std::optional<Result<StreamSetup>> tagged;
+  std::optional<RectifierCache> rectifiers;
+  Image<std::uint8_t> narrow; ///< a rectified frame, of either depth
+  Image<std::uint16_t> wide;
   Settings settings; ///< in force
   std::optional<Plan> plan;
   bool stale = true; ///< the plan has to be made again before the next frame
@@ -164,6 +183,7 @@ struct Stream {
   bool was_late = false; ///< the last frame was
   Burst saturation;
   bool warned_assumed = false;
+  bool warned_of_mapping = false;
   bool warned_of_time = false;
   std::optional<bool> live;       ///< asked for when first needed
   std::vector<std::byte> scratch; ///< subframes that no pad wants
@@ -198,8 +218,9 @@ struct DemuxState {
       gst_flow_combiner_new ()};
   Counters counters;
   PadCaps caps;
-  ScheduleRef in_force; ///< null before the first frame
-  bool assumed = false; ///< in_force came from nowhere
+  ScheduleRef in_force;   ///< null before the first frame
+  bool assumed = false;   ///< in_force came from nowhere
+  bool rectifies = false; ///< a mapping is in force
   Method method = Method::kAuto;
   bool ended = false; ///< EOS was forwarded
 
@@ -213,6 +234,9 @@ void install_properties (GObjectClass *klass);
  */
 std::shared_ptr<const Result<Schedule>> set_schedule (
     GstCodedExposureDemux *self, const std::string &text);
+
+/** Reads the file @p path, outside of the lock; none for an empty one. */
+void set_mapping (GstCodedExposureDemux *self, const std::string &path);
 
 DemuxState &state (GstCodedExposureDemux *self);
 std::shared_ptr<const Outputs> outputs (GstCodedExposureDemux *self);
@@ -254,6 +278,23 @@ gboolean src_query (GstPad *pad, GstObject *parent, GstQuery *query) noexcept;
 /** Makes the plan and tells the source pads, where that is due. Posts an error
  * and returns other than OK when there can be no plan. */
 GstFlowReturn negotiate (GstCodedExposureDemux *self);
+/** Shows on the bus why there can be no plan. */
+void refuse (GstCodedExposureDemux *self, const std::string &why);
+
+/* Mapping. */
+/** Sets @p rectifier for frames of @p camera pixels, null where they are taken
+ * as they are. Returns false, with an error on the bus, when the mapping that
+ * was asked for cannot be used. */
+bool find_rectifier (GstCodedExposureDemux *self, const Schedule &schedule,
+    Extent camera, std::shared_ptr<const Rectifier> &rectifier);
+/** Says and counts what the mapping in force does to the mirrors. */
+void say_mapping (GstCodedExposureDemux *self);
+/** @p coded, one pixel a mirror; valid until the next call. */
+ImageView<const std::uint8_t> rectify (
+    Stream &stream, ImageView<const std::uint8_t> coded);
+ImageView<const std::uint16_t> rectify (
+    Stream &stream, ImageView<const std::uint16_t> coded);
+
 /** Whether the plan has a subframe for every pad of @p list; posts an error
  * where it has not. */
 bool check_pads (GstCodedExposureDemux *self, const Outputs &list);

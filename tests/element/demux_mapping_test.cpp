@@ -1,0 +1,193 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* codedexposure-demux with a mapping: by property and by tag, what it says, and
+ * what it refuses. */
+#include <filesystem>
+#include <fstream>
+
+#include <unistd.h>
+
+#include "gstcodedexposuretag.h"
+#include "harness.h"
+
+namespace
+{
+
+using namespace cexp;
+using namespace cexp::test;
+
+constexpr int kWidth = 64, kHeight = 48;
+
+/** Of a camera that looks @p x, @p y mirrors further right and down. */
+Mapping
+shifted (double x, double y)
+{
+  const Extent size{kWidth, kHeight};
+  const Result<Mapping> mapping = Mapping::make ({.camera = size,
+      .mirrors = size,
+      .homography = {1, 0, x, 0, 1, y, 0, 0, 1}});
+  EXPECT_TRUE (mapping.ok ());
+  return *mapping;
+}
+
+/** What mirror (x, y) shows. */
+int
+light (int x, int y)
+{
+  return (x * 7 + y * 13 + (x % 2 + 2 * (y % 2)) * 50) % 200 + 20;
+}
+
+/** Frame of a camera that looks (dx, dy) mirrors further. */
+BufferPtr
+frame (int dx, int dy)
+{
+  return frame_of (draw<std::uint8_t> (kWidth, kHeight,
+                       [=] (int x, int y) {
+                         const int u = x + dx, v = y + dy;
+                         return u < kWidth && v < kHeight ? light (u, v) : 0;
+                       }),
+      0);
+}
+
+class DemuxMapping : public ::testing::Test
+{
+protected:
+  ~DemuxMapping () override { std::filesystem::remove (path); }
+
+  std::string save (const std::string &text)
+  {
+    std::ofstream (path) << text;
+    return path.string ();
+  }
+  /** The first subframe of @p coded. */
+  static Image<std::uint8_t> subframe (ElementHarness &demux, BufferPtr coded)
+  {
+    EXPECT_EQ (demux.push (std::move (coded)), GST_FLOW_OK);
+    const BufferPtr out = demux.pull ();
+    EXPECT_TRUE (out);
+    return out ? image_of<std::uint8_t> (out.get (), demux.pad_caps ().get ())
+               : Image<std::uint8_t> ();
+  }
+  static Image<std::uint8_t> aligned ()
+  {
+    ElementHarness demux ("codedexposure-demux schedule=sequential:2x2");
+    demux.set_caps (gray_caps (kWidth, kHeight));
+    return subframe (demux, frame (0, 0));
+  }
+  static std::string demux_with (const std::string &mapping)
+  {
+    return "codedexposure-demux schedule=sequential:2x2 mapping=" + mapping;
+  }
+
+  std::filesystem::path path =
+      std::filesystem::temp_directory_path () /
+      ("cexp-demux-mapping-" + std::to_string (getpid ()) + ".json");
+};
+
+guint64
+field (const MessagePtr &message, const char *name)
+{
+  guint64 value = G_MAXUINT64;
+  EXPECT_TRUE (
+      message && gst_structure_get_uint64 (
+                     gst_message_get_structure (message.get ()), name, &value))
+      << name;
+  return value;
+}
+
+} // namespace
+
+TEST_F (DemuxMapping, OfAnAlignedBenchChangesNothing)
+{
+  ElementHarness demux (demux_with (save (shifted (0, 0).to_json ())));
+  demux.set_caps (gray_caps (kWidth, kHeight));
+  EXPECT_EQ (subframe (demux, frame (0, 0)), aligned ());
+  const MessagePtr said = demux.element_message ("codedexposure/mapping");
+  EXPECT_EQ (field (said, "exact"), guint64 (kWidth * kHeight));
+  EXPECT_EQ (field (said, "mixed"), 0u);
+  EXPECT_EQ (property<guint64> (demux.element (), "mirrors-mixed"), 0u);
+}
+
+TEST_F (DemuxMapping, FindsElementsThatStandElsewhere)
+{
+  ElementHarness demux (demux_with (save (shifted (5, 3).to_json ())));
+  demux.set_caps (gray_caps (kWidth, kHeight));
+  const Image<std::uint8_t> found = subframe (demux, frame (5, 3));
+  const Image<std::uint8_t> wanted = aligned ();
+  ASSERT_EQ (found.width (), wanted.width ());
+  ASSERT_EQ (found.height (), wanted.height ());
+  /* The first mirrors are out of sight: 5 columns and 3 rows of them. */
+  for (int y = 2; y < wanted.height (); y++)
+    for (int x = 3; x < wanted.width (); x++)
+      ASSERT_EQ (found.at (x, y), wanted.at (x, y)) << x << ", " << y;
+  const MessagePtr said = demux.element_message ("codedexposure/mapping");
+  EXPECT_EQ (field (said, "exact"), guint64 ((kWidth - 5) * (kHeight - 3)));
+  EXPECT_EQ (field (said, "unseen"),
+      guint64 (kWidth * kHeight - (kWidth - 5) * (kHeight - 3)));
+  EXPECT_EQ (property<guint64> (demux.element (), "mirrors-unseen"),
+      field (said, "unseen"));
+}
+
+TEST_F (DemuxMapping, SaysThatPixelsSeeSeveralMirrors)
+{
+  ElementHarness demux (demux_with (save (shifted (0.5, 0.5).to_json ())));
+  demux.set_caps (gray_caps (kWidth, kHeight));
+  subframe (demux, frame (0, 0));
+  const MessagePtr said = demux.element_message ("codedexposure/mapping");
+  EXPECT_EQ (field (said, "exact"), 0u);
+  EXPECT_GT (field (said, "mixed"), guint64 ((kWidth - 2) * (kHeight - 2)));
+  EXPECT_EQ (property<guint64> (demux.element (), "mirrors-mixed"),
+      field (said, "mixed"));
+}
+
+TEST_F (DemuxMapping, ComesWithTheTag)
+{
+  ElementHarness demux ("codedexposure-demux");
+  demux.set_caps (gray_caps (kWidth, kHeight));
+  ASSERT_TRUE (demux.push_event (setup_to_event ({Schedule (), {}})));
+  EXPECT_EQ (subframe (demux, frame (0, 0)), aligned ());
+  while (demux.pull ())
+    ;
+  ASSERT_TRUE (
+      demux.push_event (setup_to_event ({Schedule (), shifted (5, 3)})));
+  const Image<std::uint8_t> found = subframe (demux, frame (5, 3));
+  EXPECT_EQ (found.at (10, 10), aligned ().at (10, 10));
+  EXPECT_EQ (found.at (0, 0), 0);
+}
+
+TEST_F (DemuxMapping, OfOtherFramesIsRefused)
+{
+  ElementHarness demux (demux_with (save (shifted (0, 0).to_json ())));
+  demux.set_caps (gray_caps (kWidth, kHeight + 2));
+  EXPECT_EQ (demux.push (frame_of (draw<std::uint8_t> (kWidth, kHeight + 2,
+                                       [] (int, int) { return 0; }),
+                 0)),
+      GST_FLOW_NOT_NEGOTIATED);
+  EXPECT_EQ (demux.error (),
+      "The mapping " + path.string () +
+          " is of frames of 64x48 pixels, these have 64x50: map the camera as "
+          "it is set now (moirecalib).");
+}
+
+TEST_F (DemuxMapping, OfOtherFramesInTheTagIsLeftOut)
+{
+  ElementHarness demux ("codedexposure-demux");
+  demux.set_caps (gray_caps (kWidth, kHeight + 2));
+  demux.push_event (setup_to_event ({Schedule (), shifted (5, 3)}));
+  EXPECT_EQ (demux.push (frame_of (draw<std::uint8_t> (kWidth, kHeight + 2,
+                                       [] (int, int) { return 0; }),
+                 0)),
+      GST_FLOW_OK);
+  EXPECT_NE (
+      demux.warning ().find ("Do not scale coded frames"), std::string::npos);
+}
+
+TEST_F (DemuxMapping, ThatCannotBeReadIsAnError)
+{
+  for (const char *text : {"{}", "nonsense"}) {
+    ElementHarness demux (demux_with (save (text)));
+    demux.set_caps (gray_caps (kWidth, kHeight));
+    EXPECT_EQ (demux.push (frame (0, 0)), GST_FLOW_NOT_NEGOTIATED);
+    EXPECT_EQ (
+        demux.error ().find ("The mapping property cannot be read: "), 0u);
+  }
+}

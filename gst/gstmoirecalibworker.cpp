@@ -47,10 +47,10 @@ lines_of (const LiveReading &reading, const StageCorrection &todo)
 {
   const Stance sigma = reading.mapping.stance_sigma ();
   return {
-      format ("rotation %+.4f ± %.4f°    magnification %.5f ± %.5f",
+      format ("rotation %+.4f ± %.0e°    magnification %.5f ± %.0e",
           todo.rotation, sigma.rotation, todo.magnification,
           sigma.magnification),
-      format ("offset x %+.4f  y %+.4f ± %.4f mirrors    worst corner %.3f",
+      format ("offset x %+.4f  y %+.4f ± %.0e mirrors    worst corner %.3f",
           todo.offset.x, todo.offset.y, sigma.shift_x, todo.deviation),
       format ("stage: x %+.2f µm   y %+.2f µm   θ %+.1f m°   magnify %+.2f ‰",
           todo.stage_x, todo.stage_y, todo.stage_theta, todo.magnify),
@@ -275,10 +275,10 @@ Worker::write_files (const CalibrationResult &result, const Settings &settings)
   const Stance sigma = result.mapping.stance_sigma ();
   const CalibrationReport report{.title = "Camera against mirrors",
       .lines = {format (
-                    "rotation %+.5f ± %.5f°", found.rotation, sigma.rotation),
-          format ("magnification %.6f ± %.6f pixels a mirror",
+                    "rotation %+.5f ± %.0e°", found.rotation, sigma.rotation),
+          format ("magnification %.6f ± %.0e pixels a mirror",
               found.magnification, sigma.magnification),
-          format ("from the nearest good place: x %+.5f, y %+.5f ± %.5f "
+          format ("from the nearest good place: x %+.5f, y %+.5f ± %.0e "
                   "mirrors; worst corner %.4f",
               found.offset.x, found.offset.y, sigma.shift_x, found.deviation),
           format ("blur of the optics %.2f pixels; misfit %.2f",
@@ -311,10 +311,10 @@ Worker::finish (const CalibrationResult &result)
   correction_ = correct_stage (result.mapping, settings.stage);
   const Stance sigma = result.mapping.stance_sigma ();
   draw ("mapped",
-      {format ("rotation %+.5f ± %.5f°    magnification %.6f ± %.6f",
+      {format ("rotation %+.5f ± %.0e°    magnification %.6f ± %.0e",
            correction_->rotation, sigma.rotation, correction_->magnification,
            sigma.magnification),
-          format ("offset x %+.5f  y %+.5f ± %.5f mirrors    worst corner %.3f",
+          format ("offset x %+.5f  y %+.5f ± %.0e mirrors    worst corner %.3f",
               correction_->offset.x, correction_->offset.y, sigma.shift_x,
               correction_->deviation)},
       1.0);

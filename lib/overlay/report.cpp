@@ -147,7 +147,7 @@ add_result (Sheet &sheet, const CalibrationResult &result)
   const float full = usual (dx, dy);
   char caption[96];
   std::snprintf (caption, sizeof caption,
-      "residuals before displacement, bright: %.1e mirrors", double (full));
+      "residuals by direction, bright: %.0e mirrors", double (full));
   if (dx.width () > 0 && dx.height () > 0)
     sheet.picture (
         2, 0, {dx.width (), dx.height ()}, caption, [&] (int x, int y) {

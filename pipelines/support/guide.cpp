@@ -206,8 +206,8 @@ Guide::on_mapping (const GstStructure *mapping)
   gst_structure_get (mapping, "good", G_TYPE_UINT64, &good, "uncovered",
       G_TYPE_UINT64, &uncovered, "saturated", G_TYPE_UINT64, &saturated,
       nullptr);
-  status_.line (format ("mapped: rotation %+.5f ± %.5f deg, magnification "
-                        "%.6f ± %.6f, offset %+.5f, %+.5f ± %.5f mirrors",
+  status_.line (format ("mapped: rotation %+.5f ± %.0e deg, magnification "
+                        "%.6f ± %.0e, offset %+.5f, %+.5f ± %.0e mirrors",
       number_of (mapping, "rotation"), number_of (mapping, "sigma-rotation"),
       number_of (mapping, "magnification"),
       number_of (mapping, "sigma-magnification"),

@@ -153,6 +153,8 @@ prepare_bench (GstCodedExposureSim *self)
   {
     const ObjectLock lock (self);
     optics = state (self).settings.optics;
+    if (stream.mirrors)
+      optics.diamond = stream.mirrors->diamond ();
   }
   if (stream.bench && optics == stream.optics)
     return true;

@@ -18,16 +18,32 @@ post_progress (GstDmdSync *self, GstProgressType type, const std::string &text)
                               "upload", text.c_str ()));
 }
 
+/* Where an upload is that takes @predicted in all, or more. */
+std::string
+progress_text (const SyncState &st, int sent, int total, Nanoseconds predicted)
+{
+  constexpr Nanoseconds kTenth = GST_SECOND / 10;
+  const std::string masks = "masks of " + st.schedule.text ();
+  const std::string &dmd = st.runner->info ().name;
+  if (sent == total)
+    return "The " + masks + " are on " + dmd;
+  const Nanoseconds left = predicted / total * (total - sent) / kTenth * kTenth;
+  const std::string time =
+      left > 0 ? ", " + time_text (left) + " or more left" : "";
+  return std::to_string (std::int64_t (sent) * 100 / total) + " % of the " +
+         masks + " sent to " + dmd + time;
+}
+
 /* Reports come from the runner's thread. */
 DmdRunner::Reports
 reports (GstDmdSync *self)
 {
   DmdRunner::Reports reports;
-  reports.progress = [self] (int sent, int total) {
+  const auto predicted = std::make_shared<Nanoseconds> (0);
+  reports.predicted = [predicted] (Nanoseconds time) { *predicted = time; };
+  reports.progress = [self, predicted] (int sent, int total) {
     SyncState &st = state (self);
-    const std::string text =
-        std::to_string (sent) + " of " + std::to_string (total) + " masks of " +
-        st.schedule.text () + " sent to " + st.runner->info ().name;
+    const std::string text = progress_text (st, sent, total, *predicted);
     st.uploading = sent < total;
     post_progress (self,
         sent == 0      ? GST_PROGRESS_TYPE_START

@@ -89,6 +89,8 @@ Dlpc350::open ()
       options_.source == Source::flash ? kPreloadedPlanes : kVideoPlanes;
   info_.run_time_upload = false;
   info_.triggers_camera = options_.master == Master::dmd;
+  info_.trigger_in = info_.trigger_out = info_.finite_run = true;
+  info_.minimum_dark = Nanoseconds (kMinimumDark) * 1000;
   return check_placement (options_.placement, info_.array, info_.size);
 }
 
@@ -167,6 +169,12 @@ Dlpc350::prepare ()
   running_ = false;
   if (const auto entered = board_.enter (kModePattern); !entered)
     return entered;
+  // After a reset, pulses are high and come without delay.
+  if (options_.pulse_low)
+    if (const auto set = board_.write (
+            kTriggerOut2, encode_low_pulse (options_.polarity_bit));
+        !set)
+      return set;
   return board_.write_byte (kSource, std::uint8_t (options_.source));
 }
 

@@ -37,6 +37,13 @@ encode_times (const PatternTime &time)
   return bytes;
 }
 
+Bytes
+encode_low_pulse (int polarity_bit)
+{
+  constexpr std::uint8_t kNoDelay = 0xBB;
+  return {std::uint8_t (1 << polarity_bit), kNoDelay};
+}
+
 Result<Verdict>
 parse_verdict (ByteView data)
 {

@@ -66,6 +66,10 @@ Bytes encode_configuration (
 /** Exposure and frame period, us. */
 Bytes encode_times (const PatternTime &time);
 
+/** Trigger output 2, without delay, as pulses to low level. @p polarity_bit
+ * 0 or 1: documents disagree on which it is. */
+Bytes encode_low_pulse (int polarity_bit);
+
 /** What validation said. */
 struct Verdict {
   bool busy;

@@ -97,7 +97,8 @@ public:
 
   const DmdInfo &info () const override { return info_; }
   Result<DmdStatus> status () override;
-  Nanoseconds upload_time (const Schedule &schedule) override;
+  Nanoseconds upload_time (
+      const Schedule &schedule, std::stop_token stop) override;
   Result<void> upload (const Schedule &schedule, std::stop_token stop,
       const UploadProgress &progress) override;
   Result<void> start (const SlotPlan &plan, std::stop_token stop) override;
@@ -185,6 +186,8 @@ Dlpc900::open ()
   info_.resident_masks = std::min (kind_.planes, kMaxEntries);
   info_.triggers_camera = options_.master == Master::dmd;
   info_.still_masks = true;
+  info_.trigger_in = info_.trigger_out = info_.finite_run = true;
+  info_.minimum_dark = Nanoseconds (kind_.minimum_exposure) * 1000;
   // Firmware without this command has the minima of the table.
   if (const auto minima = board_.read (kMinimumExposures))
     if (const auto exposures = parse_minimum_exposures (*minima))
@@ -226,11 +229,13 @@ Dlpc900::status ()
 std::size_t
 Dlpc900::packets_of (const PlaneImage &image) const
 {
-  if (!dual ())
-    return image_packets (encoded_size (image.view ()));
-  const int half = image.width () / 2;
-  return image_packets (encoded_size (columns (image.view (), 0, half))) +
-         image_packets (encoded_size (columns (image.view (), half, half)));
+  const int parts = dual () ? 2 : 1;
+  const int width = image.width () / parts;
+  std::size_t packets = 0;
+  for (int part = 0; part < parts; part++)
+    packets += image_packets (encoded_size (
+        columns (image.view (), part * width, width), options_.erle_unit));
+  return packets;
 }
 
 PlaneImage
@@ -277,11 +282,12 @@ Dlpc900::plan_upload (const Schedule &schedule) const
 }
 
 Nanoseconds
-Dlpc900::upload_time (const Schedule &schedule)
+Dlpc900::upload_time (const Schedule &schedule, std::stop_token stop_token)
 {
   std::size_t packets = 0;
   for (const int image : plan_upload (schedule).images)
-    packets += packets_of (render (schedule, image));
+    if (!stop_token.stop_requested ())
+      packets += packets_of (render (schedule, image));
   return Nanoseconds (packets) * kPacketTime;
 }
 
@@ -353,12 +359,16 @@ Dlpc900::prepare ()
     return awake;
   if (const auto entered = board_.enter (kModeOnTheFly); !entered)
     return entered;
+  constexpr int kPulse = 20; // us
+  const Bytes pulse = options_.pulse_low
+                          ? encode_trigger_out (true, kPulse, 0)
+                          : encode_trigger_out (false, 0, kPulse);
   std::vector<std::pair<HidCommand, Bytes>> steps;
   if (needs_park_cycle (version_)) {
     steps.push_back ({kPark, {1}});
     steps.push_back ({kPark, {0}});
   }
-  steps.push_back ({kTriggerOut2, encode_trigger_out (false, 0, 20)});
+  steps.push_back ({kTriggerOut2, pulse});
   steps.push_back (
       {kTriggerIn1, encode_trigger_in (int (options_.trigger_delay / 1000),
                         options_.falling_edge)});
@@ -413,6 +423,7 @@ Dlpc900::send_images (const std::vector<int> &images,
       return cancelled;
     total += packets_of (render (index));
   }
+  total = std::max<std::size_t> (total, 1); // there is an end to tell of
   const auto sent = [&] (std::size_t packets) {
     constexpr std::size_t kSteps = 200;
     done += packets;
@@ -443,7 +454,7 @@ Dlpc900::send_half (const HidCommand &load, const HidCommand &data, int index,
     ImageView<const PlanePixel> half,
     const std::function<void (std::size_t)> &sent)
 {
-  const Bytes image = encode_image (half);
+  const Bytes image = encode_image (half, options_.erle_unit);
   if (const auto announced =
           board_.write (load, encode_load (index, image.size ()));
       !announced)

@@ -160,9 +160,9 @@ encode_trigger_in (int delay_us, bool falling)
 }
 
 Bytes
-encode_image (ImageView<const PlanePixel> image)
+encode_image (ImageView<const PlanePixel> image, std::size_t unit)
 {
-  Bytes body = encode_erle (image);
+  Bytes body = encode_erle (image, unit);
   std::uint8_t packing = kEnhancedRunLength;
   if (body.size () > plain_size (image)) {
     body = plain_pixels (image);
@@ -174,9 +174,9 @@ encode_image (ImageView<const PlanePixel> image)
 }
 
 std::size_t
-encoded_size (ImageView<const PlanePixel> image)
+encoded_size (ImageView<const PlanePixel> image, std::size_t unit)
 {
-  return kHeaderSize + std::min (erle_size (image), plain_size (image));
+  return kHeaderSize + std::min (erle_size (image, unit), plain_size (image));
 }
 
 Bytes

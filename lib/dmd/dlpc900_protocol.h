@@ -72,10 +72,12 @@ Bytes encode_trigger_out (bool invert, int rising_us, int falling_us);
 Bytes encode_trigger_in (int delay_us, bool falling);
 
 /** What the device is sent for one image: a header and the encoded pixels, or
- * plain pixels where these are fewer. */
-Bytes encode_image (ImageView<const PlanePixel> image);
+ * plain pixels where these are fewer. @p unit  as in encode_erle (). */
+Bytes encode_image (
+    ImageView<const PlanePixel> image, std::size_t unit = kErleUnit);
 /** Its size. */
-std::size_t encoded_size (ImageView<const PlanePixel> image);
+std::size_t encoded_size (
+    ImageView<const PlanePixel> image, std::size_t unit = kErleUnit);
 /** Data of kLoadImage for an image of @p size encoded bytes. */
 Bytes encode_load (int index, std::size_t size);
 /** Data of one kImageData with at most kImageChunk bytes. */

@@ -28,6 +28,11 @@ struct DmdInfo {
   bool run_time_upload = true;  ///< masks can be sent while it is open
   bool still_masks = false;     ///< show () is served
   bool triggers_camera = false; ///< no frame is exposed while it is parked
+  bool trigger_in = false;      ///< a camera can start its masks
+  bool trigger_out = false;     ///< it can start a camera's exposures
+  bool finite_run = false;      ///< it can stop by itself after so many masks
+  /** Shortest dark time between two masks, where there is any. */
+  Nanoseconds minimum_dark = 0;
   Array array = Array::orthogonal;
   /** Mirrors that show masks, from the first that do; {}: all. */
   Extent region = {};
@@ -63,8 +68,11 @@ public:
   /** Asks the device. */
   virtual Result<DmdStatus> status () { return DmdStatus{running ()}; }
   /** How long upload () is going to take at least, with what the device holds
-   * already. */
-  virtual Nanoseconds upload_time (const Schedule &) { return 0; }
+   * already. A request to @p stop ends the reckoning, with too short a time. */
+  virtual Nanoseconds upload_time (const Schedule &, std::stop_token = {})
+  {
+    return 0;
+  }
   /**
    * Renders and sends every mask of the schedule; the mirrors are parked. Masks
    * do not depend on the frame rate. Masks that the device holds already need

@@ -55,7 +55,7 @@ struct Key {
 using Text = std::string_view;
 using Options = DmdOptions;
 
-constexpr std::array<Key, 13> kKeys{{
+constexpr std::array<Key, 17> kKeys{{
     {"master", "dmd|camera",
         [] (Text v, Options &o) {
           return choose (
@@ -76,6 +76,10 @@ constexpr std::array<Key, 13> kKeys{{
     {"edge", "rising|falling",
         [] (Text v, Options &o) {
           return choose (v, "rising", false, "falling", true, o.falling_edge);
+        }},
+    {"pulse", "high|low",
+        [] (Text v, Options &o) {
+          return choose (v, "high", false, "low", true, o.pulse_low);
         }},
     {"patience", "TIME of 100ms or more",
         [] (Text v, Options &o) {
@@ -103,6 +107,20 @@ constexpr std::array<Key, 13> kKeys{{
     {"table", "first|last",
         [] (Text v, Options &o) {
           return choose (v, "first", true, "last", false, o.table_first);
+        }},
+    {"erle-padding", "on|off",
+        [] (Text v, Options &o) {
+          return choose (
+              v, "on", kErleUnit, "off", std::size_t (1), o.erle_unit);
+        }},
+    {"polarity-bit", "0|1",
+        [] (Text v, Options &o) {
+          return choose (v, "0", 0, "1", 1, o.polarity_bit);
+        }},
+    {"odd-rows", "right|left",
+        [] (Text v, Options &o) {
+          return choose (
+              v, "right", false, "left", true, o.placement.odd_rows_left);
         }},
     {"image-pair", "plain|swapped",
         [] (Text v, Options &o) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dmd/dlpc350_protocol.h"
+#include "dmd/erle.h"
 #include "dmd/hid_link.h"
 #include "dmd/mirror_array.h"
 #include "dmd/pattern_timing.h"
@@ -23,6 +24,7 @@ namespace cexp
  *   trigger-delay=TIME   from the camera's edge to light (DLPC900: 104 us or
  *                        more, default 105 us)
  *   edge=rising|falling  of the camera's signal
+ *   pulse=high|low       level of the pulses to the camera (USB boards)
  *   patience=TIME        for a USB board that does not answer, or is not ready,
  *                        in one go; default 2 s. A DLPC900 may take longer over
  *                        a table
@@ -33,6 +35,9 @@ namespace cexp
  * What documents leave open can be turned, see docs/dmd.md:
  *   trigger2-bit=disables|enables  sense of the DLPC900's trigger output flag
  *   table=first|last     whether its table is sent before the images
+ *   erle-padding=on|off  of its encoded images to 4 bytes
+ *   polarity-bit=0|1     of the DLPC350 that pulse=low sets
+ *   odd-rows=right|left  where they are shifted to on a diamond array
  *   image-pair=plain|swapped  order of two images in the DLPC350's table
  *   gap=TIME             between two masks of a DLP3000, default 250 us
  */
@@ -42,12 +47,15 @@ struct DmdOptions {
   Placement placement = {};
   Nanoseconds trigger_delay = 105'000;
   bool falling_edge = false;
+  bool pulse_low = false;
   std::chrono::milliseconds patience = HidLink::kPatience;
   std::vector<int> images = {};
   dlpc350::Source source = dlpc350::Source::flash;
   bool guard = true;
   bool trigger2_bit_disables = true;
   bool table_first = true;
+  std::size_t erle_unit = kErleUnit;
+  int polarity_bit = 0;
   bool swap_image_pair = false;
   Nanoseconds gap = 250'000;
 

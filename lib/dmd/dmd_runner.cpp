@@ -35,6 +35,7 @@ void
 DmdRunner::ask_upload (const Schedule &schedule)
 {
   ask ([this, schedule] (std::stop_token stop) {
+    reports_.predicted (dmd_->upload_time (schedule, stop));
     return dmd_->upload (schedule, stop, reports_.progress);
   });
 }

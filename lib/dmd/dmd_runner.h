@@ -30,6 +30,8 @@ class DmdRunner
 public:
   /** Called on the runner's thread; they must not call the runner. */
   struct Reports {
+    /** Before an upload: how long it is going to take at least. */
+    std::function<void (Nanoseconds)> predicted = [] (Nanoseconds) {};
     UploadProgress progress = [] (int, int) {};
     /** A job failed, other than by halt (). */
     std::function<void (const Error &)> failed = [] (const Error &) {};

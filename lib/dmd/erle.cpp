@@ -13,7 +13,6 @@ namespace
 
 constexpr int kTwoByteCount = 128;
 constexpr int kMaxCount = 0x7FFF;
-constexpr std::size_t kPadding = 4;
 
 /** Counts the bytes that it is given. */
 class ByteCounter
@@ -130,7 +129,7 @@ encode_row (
 
 template <typename Sink>
 void
-encode (Sink &sink, ImageView<const PlanePixel> image)
+encode (Sink &sink, ImageView<const PlanePixel> image, std::size_t unit)
 {
   static constexpr std::array<std::uint8_t, 3> kEndOfImage{0, 1, 0};
   assert (image.width >= 1 && image.width <= kMaxCount);
@@ -139,25 +138,25 @@ encode (Sink &sink, ImageView<const PlanePixel> image)
         sink, image.row (y), y > 0 ? image.row (y - 1) : nullptr, image.width);
   for (const std::uint8_t byte : kEndOfImage)
     sink.put (byte);
-  while (sink.size () % kPadding != 0)
+  while (sink.size () % unit != 0)
     sink.put (0);
 }
 
 } // namespace
 
 Bytes
-encode_erle (ImageView<const PlanePixel> image)
+encode_erle (ImageView<const PlanePixel> image, std::size_t unit)
 {
-  ByteSink sink (erle_size (image));
-  encode (sink, image);
+  ByteSink sink (erle_size (image, unit));
+  encode (sink, image, unit);
   return sink.take ();
 }
 
 std::size_t
-erle_size (ImageView<const PlanePixel> image)
+erle_size (ImageView<const PlanePixel> image, std::size_t unit)
 {
   ByteCounter counter;
-  encode (counter, image);
+  encode (counter, image, unit);
   return counter.size ();
 }
 

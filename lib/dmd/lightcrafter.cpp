@@ -46,6 +46,8 @@ public:
     info_.minimum_switching = options_.gap;
     info_.resident_masks = kMaxPatterns;
     info_.triggers_camera = options_.master == Master::dmd;
+    info_.trigger_in = info_.trigger_out = info_.finite_run = true;
+    info_.minimum_dark = options_.gap;
   }
   ~Lightcrafter () override
   {
@@ -57,7 +59,7 @@ public:
 
   const DmdInfo &info () const override { return info_; }
   Result<DmdStatus> status () override;
-  Nanoseconds upload_time (const Schedule &schedule) override
+  Nanoseconds upload_time (const Schedule &schedule, std::stop_token) override
   {
     return schedule.masks () * kMaskTime;
   }

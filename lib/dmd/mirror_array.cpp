@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "base/text.h"
 #include "schedule/pilot.h"
@@ -37,6 +38,14 @@ mirror_position (Array array, int column, int row, double odd_row_shift)
     return {double (column), double (row)};
   const double shift = row % 2 != 0 ? odd_row_shift : 0.0;
   return {column + shift, 0.5 * row};
+}
+
+Offset
+mirror_at (MirrorPoint point)
+{
+  // Along the lattice's axes, mirrors are squares around whole numbers.
+  return address_of ({int (std::floor (point.x + point.y + 0.5)),
+      int (std::floor (point.x - point.y + 0.5))});
 }
 
 Result<MirrorLayout>
@@ -75,6 +84,13 @@ MirrorRegion::parse (std::string_view text)
                " as a region; write WxH or WxH+X+Y in mirrors"};
 }
 
+int
+pilot_top (const Schedule &schedule, MirrorLayout layout, int rows)
+{
+  const int addresses = layout == MirrorLayout::cell ? 2 : 1;
+  return std::max (0, rows - addresses * schedule.pilot_rows ());
+}
+
 Result<void>
 check_placement (const Placement &placement, Array array, Extent size)
 {
@@ -107,18 +123,18 @@ render_mirrors (const Schedule &schedule, int mask, const Placement &placement,
   const MirrorRegion region =
       placement.region.value_or (MirrorRegion{{out.width, out.height}, {}});
   const int slot = mask % schedule.slots ();
-  const int pilot_top =
-      std::max (0, region.size.height - schedule.pilot_rows ());
+  const int pilot = pilot_top (schedule, placement.layout, region.size.height);
 
   for (int y = 0; y < out.height; y++)
     std::fill_n (out.row (y), out.width, std::uint8_t (0));
   for (int y = 0; y < region.size.height; y++) {
     std::uint8_t *row = out.row (region.origin.y + y) + region.origin.x;
     for (int x = 0; x < region.size.width; x++) {
-      const Offset pixel = tile_pixel (placement.layout, x, y);
-      row[x] = y < pilot_top ? schedule.code ().open (
-                                   schedule.element_at (pixel.x, pixel.y), slot)
-                             : pilot_open (x, mask, schedule.slots ());
+      const Offset pixel =
+          tile_pixel (placement.layout, x, y, placement.odd_rows_left);
+      row[x] = y < pilot ? schedule.code ().open (
+                               schedule.element_at (pixel.x, pixel.y), slot)
+                         : pilot_open (x, mask, schedule.slots ());
     }
   }
 }

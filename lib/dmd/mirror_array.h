@@ -35,21 +35,26 @@ struct LatticePoint {
   bool operator== (const LatticePoint &) const = default;
 };
 
-/** Lattice point of the mirror in @p column and @p row, both >= 0. */
+/** Lattice point of the mirror in @p column and @p row of an array that goes on
+ * in all directions. @p odd_rows_left  they are shifted to the left, not to the
+ * right. */
 constexpr LatticePoint
-lattice_of (int column, int row)
+lattice_of (int column, int row, bool odd_rows_left = false)
 {
-  return {column + (row + 1) / 2, column - row / 2};
+  const int odd = floor_mod (row, 2);
+  const int down = (row - odd) / 2, up = (row + odd) / 2;
+  return odd_rows_left ? LatticePoint{column + down, column - up}
+                       : LatticePoint{column + up, column - down};
 }
 
 /** Address (x: column, y: row) of a lattice point; the inverse of lattice_of.
  */
 constexpr Offset
-address_of (LatticePoint point)
+address_of (LatticePoint point, bool odd_rows_left = false)
 {
   const int row = point.u - point.v;
-  const int half = (row - floor_mod (row, 2)) / 2;
-  return {point.v + half, row};
+  const int odd = floor_mod (row, 2);
+  return {point.v + (odd_rows_left ? row + odd : row - odd) / 2, row};
 }
 
 /** Centre of a mirror. @p odd_row_shift  of a diamond array, +0.5 or -0.5:
@@ -77,20 +82,42 @@ const char *layout_text (MirrorLayout layout);
 
 /** Pixel of the tile that the mirror in @p column and @p row is. */
 constexpr Offset
-tile_pixel (MirrorLayout layout, int column, int row)
+tile_pixel (
+    MirrorLayout layout, int column, int row, bool odd_rows_left = false)
 {
   switch (layout) {
   case MirrorLayout::lattice: {
-    const LatticePoint point = lattice_of (column, row);
+    const LatticePoint point = lattice_of (column, row, odd_rows_left);
     return {point.u, point.v};
   }
   case MirrorLayout::cell:
-    return {column, row / 2};
+    return {column, (row - floor_mod (row, 2)) / 2};
   case MirrorLayout::address:
     break;
   }
   return {column, row};
 }
+
+/** Where on a diamond array (its odd rows shifted to the right) the place
+ * (@p x, @p y) of the tile is: whole numbers are the centres of what makes one
+ * pixel of @p layout. */
+constexpr MirrorPoint
+tile_place (MirrorLayout layout, double x, double y)
+{
+  switch (layout) {
+  case MirrorLayout::lattice:
+    return {(x + y) / 2, (x - y) / 2};
+  case MirrorLayout::cell: // between the two mirrors of a pixel
+    return {x + 0.25, y + 0.25};
+  case MirrorLayout::address: // between even and odd rows
+    break;
+  }
+  return {x + 0.25, y / 2};
+}
+
+/** Address of the mirror of a diamond array, its odd rows shifted to the right,
+ * that covers @p point; the array goes on in all directions. */
+Offset mirror_at (MirrorPoint point);
 
 /** The mirrors that show masks; the others are off. */
 struct MirrorRegion {
@@ -106,8 +133,12 @@ struct MirrorRegion {
 struct Placement {
   MirrorLayout layout = MirrorLayout::address;
   std::optional<MirrorRegion> region = {}; ///< none: all mirrors
+  bool odd_rows_left = false;              ///< of a diamond array
   bool operator== (const Placement &) const = default;
 };
+
+/** The first of @p rows rows of addresses that the pilot takes. */
+int pilot_top (const Schedule &schedule, MirrorLayout layout, int rows);
 
 /** Error when @p placement does not suit an array of that kind and size. */
 Result<void> check_placement (
@@ -117,7 +148,9 @@ Result<void> check_placement (
  * The mirrors of mask @p mask, one byte a mirror by address, 1 on and 0 off.
  *
  * The tile and the pilot start where the region does, as render_mask () has it
- * for an array of the region's size; the pilot's rows are rows of addresses.
+ * for an array of the region's size; the pilot's rows are those of the tile,
+ * two of addresses with MirrorLayout::cell. (With MirrorLayout::lattice they
+ * are of addresses and lie across the tile's, of no use to a camera.)
  * @p out  the whole array; check_placement () must allow the placement.
  */
 void render_mirrors (const Schedule &schedule, int mask,

@@ -69,13 +69,13 @@ fill_planes (const Schedule &schedule, const PixelTable &table,
 {
   const MirrorRegion region = placement.region.value_or (
       MirrorRegion{{image.width (), image.height ()}, {}});
-  const int pilot_top =
-      std::max (0, region.size.height - schedule.pilot_rows ());
+  const int pilot = pilot_top (schedule, placement.layout, region.size.height);
   for (int y = 0; y < region.size.height; y++) {
     PlanePixel *row = image.view ().row (region.origin.y + y) + region.origin.x;
     for (int x = 0; x < region.size.width; x++) {
-      const Offset pixel = tile_pixel (placement.layout, x, y);
-      row[x] = y < pilot_top
+      const Offset pixel =
+          tile_pixel (placement.layout, x, y, placement.odd_rows_left);
+      row[x] = y < pilot
                    ? table.element (schedule.element_at (pixel.x, pixel.y))
                    : table.pilot (x);
     }
@@ -124,7 +124,8 @@ render_still (const StillMask &mask, const Placement &placement, Extent size)
   for (int y = 0; y < region.size.height; y++) {
     PlanePixel *row = plane.view ().row (region.origin.y + y) + region.origin.x;
     for (int x = 0; x < region.size.width; x++) {
-      const Offset pixel = tile_pixel (placement.layout, x, y);
+      const Offset pixel =
+          tile_pixel (placement.layout, x, y, placement.odd_rows_left);
       row[x] = mask.open (pixel.x, pixel.y);
     }
   }

@@ -50,6 +50,20 @@ SimulatedMirrors::held () const
 }
 
 void
+SimulatedMirrors::lay (std::optional<MirrorLayout> diamond)
+{
+  const std::lock_guard guard (lock_);
+  diamond_ = diamond;
+}
+
+std::optional<MirrorLayout>
+SimulatedMirrors::diamond () const
+{
+  const std::lock_guard guard (lock_);
+  return diamond_;
+}
+
+void
 SimulatedMirrors::start ()
 {
   const std::lock_guard guard (lock_);
@@ -133,6 +147,7 @@ struct Slip {
 struct Options {
   std::string mirrors;
   DmdInfo info;
+  std::optional<MirrorLayout> diamond;
   Nanoseconds mask_time = 0;
   std::vector<Slip> slips;
   Failure failure = Failure::none;
@@ -145,6 +160,7 @@ public:
       : options_ (std::move (options)),
         mirrors_ (SimulatedMirrors::find (options_.mirrors))
   {
+    mirrors_->lay (options_.diamond);
     for (const Slip &slip : options_.slips)
       mirrors_->slip_at (slip.slot, slip.by);
   }
@@ -280,6 +296,13 @@ set_option (Options &options, std::string_view key, std::string_view value)
 {
   if (key == "size")
     return parse_size (value, options.info.size);
+  if (key == "layout") {
+    const auto layout = parse_layout (value);
+    if (layout)
+      options.diamond = *layout;
+    options.info.array = Array::diamond;
+    return layout.ok ();
+  }
   if (key == "masks")
     return parse_number (value, 1, options.info.resident_masks);
   if (key == "min-active")
@@ -325,7 +348,8 @@ parse_options (std::string_view device)
       return Error{
           "DMD '" + std::string (device) + "': cannot use '" +
           std::string (option) +
-          "'; options of a simulated DMD are size=WxH, masks=N, "
+          "'; options of a simulated DMD are size=WxH, "
+          "layout=address|lattice|cell, masks=N, "
           "min-active=TIME, min-switching=TIME, mask-time=TIME, "
           "still=yes|no, "
           "slip-at=SLOT[:BY] (slots ascending), fail=open|upload|start|"

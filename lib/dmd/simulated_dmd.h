@@ -37,6 +37,10 @@ public:
   void stop ();
   bool running () const;
 
+  /** How the tile lies on a diamond array; none: an orthogonal one. */
+  void lay (std::optional<MirrorLayout> diamond);
+  std::optional<MirrorLayout> diamond () const;
+
   /** What was programmed last; none before the first upload. */
   std::optional<Schedule> schedule () const;
 
@@ -70,6 +74,7 @@ private:
 
   mutable std::mutex lock_; // covers everything below; a leaf lock
   std::optional<Schedule> schedule_;
+  std::optional<MirrorLayout> diamond_;
   std::shared_ptr<const StillMask> hold_, held_; // from now on; since it began
   Motion motion_ = Motion::parked;
   bool owes_dark_exposure_ = false;
@@ -81,6 +86,8 @@ private:
  * Opens "sim:NAME[,key=value...]", whose mirrors are SimulatedMirrors::find
  * (NAME). The keys say what the device can do and how it misbehaves:
  *   size=WxH            mirrors, default 1024x768
+ *   layout=address|lattice|cell  they stand on their corners, and the tile lies
+ *                       on them so; without it, an orthogonal array
  *   masks=N             masks it holds, default 512
  *   min-active=TIME     default 0
  *   min-switching=TIME  default 0

@@ -97,9 +97,10 @@ public:
 
   const DmdInfo &info () const override { return dmd_->info (); }
   Result<DmdStatus> status () override { return dmd_->status (); }
-  Nanoseconds upload_time (const Schedule &schedule) override
+  Nanoseconds upload_time (
+      const Schedule &schedule, std::stop_token stop_token) override
   {
-    return dmd_->upload_time (schedule);
+    return dmd_->upload_time (schedule, std::move (stop_token));
   }
   Result<void> upload (const Schedule &schedule, std::stop_token stop_token,
       const UploadProgress &progress) override

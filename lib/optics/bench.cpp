@@ -7,7 +7,9 @@
 #include <new>
 #include <optional>
 #include <sstream>
+#include <vector>
 
+#include "optics/diamond_view.h"
 #include "optics/mirror_rows.h"
 #include "optics/sensor.h"
 
@@ -21,6 +23,10 @@ struct OpticalBench::State {
   {
     if (!lens.ideal ())
       seen = Image<float> (width, height);
+    if (options.diamond) {
+      diamond.emplace (*options.diamond);
+      shares.resize (std::size_t (width));
+    }
   }
 
   BenchOptions options;
@@ -28,8 +34,10 @@ struct OpticalBench::State {
   Image<float> light; // on the mirrors, scene values times slots
   Image<float> seen;  // by the pixels
   std::optional<MirrorRows> mirrors;
-  double white = 0.0; // of the scene
-  bool empty = true;  // light is yet to be overwritten
+  std::optional<DiamondView> diamond;
+  std::vector<float> shares; // of a row
+  double white = 0.0;        // of the scene
+  bool empty = true;         // light is yet to be overwritten
 
   double gain () const;
   template <typename Pixel>
@@ -93,6 +101,18 @@ collect (const Pixel *scene, const std::uint8_t *mirrors, int width, float open,
   }
 }
 
+/* The same where mirrors that are on cover a @share of each pixel. */
+template <bool kFirst, typename Pixel>
+void
+collect_shares (const Pixel *scene, const float *share, int width, float open,
+    float shut, float *light)
+{
+  for (int x = 0; x < width; x++) {
+    const float passed = float (scene[x]) * (shut + (open - shut) * share[x]);
+    light[x] = kFirst ? passed : light[x] + passed;
+  }
+}
+
 } // namespace
 
 Result<OpticalBench>
@@ -140,10 +160,20 @@ OpticalBench::State::expose (
   const float open = float (slots);
   const float shut = float (slots * mirrors->schedule ().leak ());
   const auto collect_row = empty ? collect<true, Pixel> : collect<false, Pixel>;
+  const auto collect_shared =
+      empty ? collect_shares<true, Pixel> : collect_shares<false, Pixel>;
   mirrors->show (mask);
-  for (int y = 0; y < scene.height; y++)
-    collect_row (scene.row (y), mirrors->row (y), scene.width, open, shut,
-        light.view ().row (y));
+  for (int y = 0; y < scene.height; y++) {
+    float *const row = light.view ().row (y);
+    if (diamond) {
+      diamond->look (*mirrors, {scene.width, scene.height}, y, shares.data ());
+      collect_shared (
+          scene.row (y), shares.data (), scene.width, open, shut, row);
+    } else {
+      collect_row (
+          scene.row (y), mirrors->row (y), scene.width, open, shut, row);
+    }
+  }
   white = std::numeric_limits<Pixel>::max ();
   empty = false;
 }

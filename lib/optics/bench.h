@@ -4,9 +4,11 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 
 #include "base/image.h"
 #include "base/result.h"
+#include "dmd/mirror_array.h"
 #include "optics/lens.h"
 #include "schedule/schedule.h"
 #include "schedule/still_mask.h"
@@ -39,6 +41,10 @@ struct BenchOptions {
   double gain = 0.0;
   std::uint64_t seed = 0;
   Alignment alignment;
+  /** The mirrors stand on their corners, the tile lies on them so, and the
+   * camera's pixels are the tile's (diamond_view.h); none: an orthogonal array.
+   * The lens, alignment and all, sees what lies between two pixels averaged. */
+  std::optional<MirrorLayout> diamond = {};
 
   bool operator== (const BenchOptions &) const = default;
 };
@@ -47,9 +53,10 @@ struct BenchOptions {
  * Forward model of a coded exposure (paper, Eqs. 1-7), one frame at a time:
  * begin (), expose () for every stretch of light, read_out ().
  *
- * One mirror to one scene pixel; the camera sees the mirrors through the lens
- * (lens.h) and counts light with its sensor (sensor.h). Light is linear in the
- * scene's values, and white is the largest value of the pixel type.
+ * One mirror of the tile to one scene pixel; the camera sees the mirrors
+ * through the lens (lens.h) and counts light with its sensor (sensor.h). Light
+ * is linear in the scene's values, and white is the largest value of the pixel
+ * type.
  *
  * With no blur, no misalignment and no noise, a pixel that was open for one
  * slot is, at gain 0 and no leak, the scene's value in that slot exactly.

@@ -10,6 +10,7 @@
 
 #include <unistd.h>
 
+#include "base/text.h"
 #include "dmd/dmd.h"
 #include "dmd/stop_guard.h"
 #include "dmd/usb_bus.h"
@@ -29,6 +30,7 @@ struct Arguments {
   std::string schedule = "sequential:2x2";
   std::string rate = "25";
   std::string duration;
+  std::string mask = "0";
   bool predict = false;
 };
 
@@ -88,8 +90,11 @@ describe (const DmdInfo &info)
       {"array", info.array == Array::diamond ? "diamond" : "orthogonal"},
       {"shortest-mask", time_text (info.minimum_active)},
       {"shortest-pause", time_text (info.minimum_switching)},
+      {"shortest-dark-time", time_text (info.minimum_dark)},
       {"masks", info.resident_masks}, {"takes-masks", info.run_time_upload},
-      {"triggers-camera", info.triggers_camera}};
+      {"trigger-input", info.trigger_in}, {"trigger-output", info.trigger_out},
+      {"triggers-camera", info.triggers_camera},
+      {"finite-run", info.finite_run}};
 }
 
 void
@@ -224,16 +229,41 @@ wait (const Session &session, std::optional<Nanoseconds> duration)
   return !session.stop.stop_requested ();
 }
 
+/** The time after which to stop, none where the user is to say when; false when
+ * it cannot be read. */
+bool
+read_duration (Session &session, const Arguments &arguments,
+    std::optional<Nanoseconds> &duration)
+{
+  if (arguments.duration.empty ())
+    return true;
+  const auto parsed = parse_time (arguments.duration);
+  if (parsed)
+    duration = *parsed;
+  else
+    session.fail (Exit::usage, parsed.error ());
+  return parsed.ok ();
+}
+
+/** Lets @p dmd show what it shows, until it is time to stop. */
+void
+run (Session &session, Dmd &dmd, std::optional<Nanoseconds> duration,
+    const Json &result)
+{
+  session.say ("running; Ctrl-C stops it");
+  const bool over = wait (session, duration);
+  dmd.stop ();
+  session.print (result);
+  if (!over && duration)
+    session.exit = Exit::interrupted;
+}
+
 void
 start (Session &session, const Arguments &arguments)
 {
   std::optional<Nanoseconds> duration;
-  if (!arguments.duration.empty ()) {
-    const auto parsed = parse_time (arguments.duration);
-    if (!parsed)
-      return session.fail (Exit::usage, parsed.error ());
-    duration = *parsed;
-  }
+  if (!read_duration (session, arguments, duration))
+    return;
   const auto dmd = open (session, arguments.device);
   if (!dmd)
     return;
@@ -241,14 +271,50 @@ start (Session &session, const Arguments &arguments)
   Json result{{"device", dmd->info ().name}};
   if (!show || !send (session, *dmd, show->schedule, result))
     return;
-  if (const auto started = dmd->start (show->plan); !started)
+  if (const auto started = dmd->start (show->plan, session.stop); !started)
     return session.fail (Exit::failed, started.error ());
-  session.say ("running; Ctrl-C stops it");
-  const bool over = wait (session, duration);
-  dmd->stop ();
-  session.print (result);
-  if (!over && duration)
-    session.exit = Exit::interrupted;
+  run (session, *dmd, duration, result);
+}
+
+/** "on", "off", or a mask of the schedule by its number; in all slots. */
+Result<StillMask>
+still_mask (const Schedule &schedule, const std::string &name)
+{
+  StillMask still{"mirrors " + name, {}, schedule.slots ()};
+  const auto mask = parse_int (name);
+  if (name == "on" || name == "off")
+    still.open = [on = name == "on"] (int, int) { return on; };
+  else if (mask && *mask >= 0 && *mask < schedule.slots ())
+    still.open = [schedule, slot = *mask] (int x, int y) {
+      return schedule.code ().open (schedule.element_at (x, y), slot);
+    };
+  else
+    return Error{"cannot show mask " + in_quotes (name) + "; " +
+                 schedule.text () + " has the masks 0 to " +
+                 std::to_string (schedule.slots () - 1) +
+                 ", and there are on and off"};
+  return still;
+}
+
+void
+show (Session &session, const Arguments &arguments)
+{
+  std::optional<Nanoseconds> duration;
+  if (!read_duration (session, arguments, duration))
+    return;
+  const auto dmd = open (session, arguments.device);
+  if (!dmd)
+    return;
+  const auto wanted = fit (session, arguments, dmd->info ());
+  if (!wanted)
+    return;
+  const auto mask = still_mask (wanted->schedule, arguments.mask);
+  if (!mask)
+    return session.fail (Exit::usage, mask.error ());
+  Json result{{"device", dmd->info ().name}, {"shows", mask->name}};
+  if (const auto shown = dmd->show (*mask, wanted->plan, session.stop); !shown)
+    return session.fail (Exit::failed, shown.error ());
+  run (session, *dmd, duration, result);
 }
 
 /** Ends when its standard input does: another process started the board, and is
@@ -278,7 +344,7 @@ selftest (Session &session, Arguments arguments)
   Json result = describe (dmd->info ());
   if (!show || !send (session, *dmd, show->schedule, result))
     return;
-  if (const auto started = dmd->start (show->plan); !started)
+  if (const auto started = dmd->start (show->plan, session.stop); !started)
     return session.fail (Exit::failed, started.error ());
   const auto running = dmd->status ();
   dmd->stop ();
@@ -335,6 +401,11 @@ add_dmd_commands (CLI::App &app, Session &session)
           "--predict", arguments->predict, "Only say how long it would take");
   with_schedule (add ("start", "Send masks and show them until Ctrl-C", start))
       ->add_option ("--for", arguments->duration, "Stop after that time");
+  auto *shown = with_schedule (
+      add ("show", "Show one mask that stands still, to align by", show));
+  shown->add_option ("--mask", arguments->mask,
+      "Number of a mask of the schedule, on, or off");
+  shown->add_option ("--for", arguments->duration, "Stop after that time");
   with_device (add ("stop", "Stop what a board shows", stop));
   with_device (add ("guard", "", guard))->group (""); // StopGuard's other side
   with_device (add ("selftest", "Try upload, start and stop", selftest));

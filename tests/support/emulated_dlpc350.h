@@ -67,7 +67,7 @@ private:
   bool execute (int command, const Data &data)
   {
     static const std::map<int, std::size_t> lengths{{0x1A1A, 1}, {0x1A1B, 1},
-        {0x1A22, 1}, {0x1A23, 1}, {0x1A24, 1}, {0x1A29, 8}, {0x1A31, 4},
+        {0x1A1E, 2}, {0x1A22, 1}, {0x1A23, 1}, {0x1A24, 1}, {0x1A29, 8}, {0x1A31, 4},
         {0x1A32, 1}, {0x1A33, 1}};
     const auto length = lengths.find (command);
     if (length != lengths.end () && data.size () != length->second)
@@ -85,6 +85,8 @@ private:
       return true;
     case 0x1A1B:
       mode_ = data[0];
+      return true;
+    case 0x1A1E:
       return true;
     case 0x1A22:
       source_ = data[0];

@@ -134,6 +134,21 @@ TEST (Dlpc350Bytes, AreThoseOfTheDocument)
       write (0x16, kTriggerIn1, {0, 0, 0, 0}), "40 16 06 00 35 1A 00 00 00 00");
 }
 
+TEST (Dlpc350Bytes, OfCommandsThatTheDriverDoesNotUse)
+{
+  using namespace dlpc350;
+  EXPECT_EQ (read (2, {0x1A0B, ""}), "C0 02 02 00 0B 1A");
+  EXPECT_EQ (write (0x13, kRun, {1}), "40 13 03 00 24 1A 01");
+  EXPECT_EQ (write (2, kDisplayMode, {0}), "40 02 03 00 1B 1A 00");
+  EXPECT_EQ (write (5, kTriggerMode, {std::uint8_t (TriggerMode::video)}),
+      "40 05 03 00 23 1A 00");
+  EXPECT_EQ (write (14, kMailbox, {kMailboxClosed}), "40 0E 03 00 33 1A 00");
+  EXPECT_EQ (write (0x14, kPower, {1}), "40 14 03 00 00 02 01");
+  EXPECT_EQ (
+      request (HidKind::post, 0x15, {0x0802, ""}, {}), "00 15 02 00 02 08");
+  EXPECT_EQ (write (0x16, kTriggerOut2, {0, 0xBB}), "40 16 04 00 1E 1A 00 BB");
+}
+
 TEST (Dlpc350Bytes, PatternEntries)
 {
   using namespace dlpc350;
@@ -202,7 +217,10 @@ TEST (Dlpc900Bytes, AreThoseOfTheDocument)
   EXPECT_EQ (write (0x12, kTriggerOut1, encode_trigger_out (false, -20, 0)),
       "40 12 07 00 1D 1A 00 EC FF 00 00");
   EXPECT_EQ (write (0x12, kIdle, {1}), "40 12 03 00 01 02 01");
+  EXPECT_EQ (write (0x12, kIdle, {0}), "40 12 03 00 01 02 00");
   EXPECT_EQ (write (0x12, kPark, {1}), "40 12 03 00 09 06 01");
+  EXPECT_EQ (write (0x12, kPark, {0}), "40 12 03 00 09 06 00");
+  EXPECT_EQ (write (0x12, {0x1A40, ""}, {0, 1}), "40 12 04 00 40 1A 00 01");
 }
 
 TEST (Dlpc900Bytes, PatternEntries)

@@ -45,6 +45,8 @@ TEST (Dlpc350, SaysWhatTheBoardIs)
   EXPECT_EQ (info.minimum_active, 235'000);
   EXPECT_EQ (info.resident_masks, 48);
   EXPECT_FALSE (info.run_time_upload);
+  EXPECT_TRUE (info.trigger_in && info.trigger_out && info.finite_run);
+  EXPECT_EQ (info.minimum_dark, 230'000);
 }
 
 TEST (Dlpc350, WithoutImagesSaysWhatTheUserCanDo)
@@ -77,6 +79,19 @@ TEST (Dlpc350, AsMasterRunsOnItsTimer)
   EXPECT_EQ (rig.board->period (), 10'000u);
   EXPECT_EQ (rig.board->per_trigger (), 4);
   EXPECT_EQ (rig.board->trigger_mode (), 1);
+}
+
+TEST (Dlpc350, PulsesCanBeTurnedByEitherBit)
+{
+  for (const auto &[options, bytes] :
+      {std::pair{"x,images=0", std::vector<std::vector<std::uint8_t>>{}},
+          {"x,images=0,pulse=low", {{1, 0xBB}}},
+          {"x,images=0,pulse=low,polarity-bit=1", {{2, 0xBB}}}}) {
+    Rig rig;
+    ASSERT_EQ (message_of (rig.open (options)), "");
+    ASSERT_EQ (message_of (rig.upload (Schedule ())), "");
+    EXPECT_EQ (rig.board->writes[0x1A1E], bytes) << options;
+  }
 }
 
 TEST (Dlpc350, WithTheCameraAsMasterWaitsOnceAFrame)

@@ -70,6 +70,8 @@ TEST (Dlpc900, SaysWhatTheBoardIs)
   EXPECT_EQ (info.resident_masks, 400);
   EXPECT_TRUE (info.run_time_upload);
   EXPECT_TRUE (info.triggers_camera);
+  EXPECT_TRUE (info.trigger_in && info.trigger_out && info.finite_run);
+  EXPECT_EQ (info.minimum_dark, 105'000);
   EXPECT_EQ (info.array, Array::orthogonal);
 }
 
@@ -270,6 +272,24 @@ TEST (Dlpc900, TheSenseOfTheTriggerFlagCanBeTurned)
   EXPECT_EQ (flags (*rig.board, &EmulatedDlpc900::Line::pulses), "0111");
 }
 
+TEST (Dlpc900, WhatDocumentsLeaveOpenCanBeTurned)
+{
+  const Schedule schedule = schedule_of ("sequential:4x1");
+  std::vector<std::string> sizes;
+  for (const char *options : {"x", "x,pulse=low,erle-padding=off"}) {
+    Rig rig;
+    ASSERT_EQ (message_of (rig.open (options)), "");
+    ASSERT_EQ (message_of (rig.upload (schedule)), "");
+    const bool low = std::string (options) != "x";
+    EXPECT_EQ (to_hex (rig.board->writes[0x1A1E].back ()),
+        low ? "01 14 00 00 00" : "00 00 00 14 00");
+    ASSERT_FALSE (rig.board->writes[0x1A2A].empty ());
+    sizes.push_back (to_hex (rig.board->writes[0x1A2A].back ()));
+  }
+  ASSERT_EQ (sizes.size (), 2u);
+  EXPECT_NE (sizes[0], sizes[1]) << "the padding";
+}
+
 TEST (Dlpc900, WithTheCameraAsMasterItWaitsOnceAFrame)
 {
   Rig rig;
@@ -340,6 +360,13 @@ TEST (Dlpc900Upload, TheSameMasksAreNotSentAgain)
   ASSERT_EQ (rig.board->images_received (), 1);
   const Schedule slower = schedule_of ("sequential:2x2,active=5ms");
   EXPECT_EQ (rig.dmd->upload_time (slower), 0);
+  std::vector<std::pair<int, int>> told;
+  ASSERT_TRUE (
+      rig.dmd
+          ->upload (slower, {},
+              [&] (int sent, int total) { told.emplace_back (sent, total); })
+          .ok ());
+  EXPECT_EQ (told, (std::vector<std::pair<int, int>>{{0, 1}, {1, 1}}));
   ASSERT_EQ (message_of (rig.show (slower)), "");
   EXPECT_EQ (rig.board->images_received (), 1);
   expect_masks (*rig.board, slower);

@@ -34,6 +34,10 @@ public:
   ~RecordingDmd () override { record_->calls.push_back ("closed"); }
 
   const DmdInfo &info () const override { return info_; }
+  Nanoseconds upload_time (const Schedule &schedule, std::stop_token) override
+  {
+    return schedule.masks () * 1'000'000;
+  }
   Result<void> upload (const Schedule &schedule, std::stop_token stop,
       const UploadProgress &progress) override
   {
@@ -82,6 +86,7 @@ protected:
   {
     return std::make_unique<DmdRunner> (std::make_unique<RecordingDmd> (record),
         DmdRunner::Reports{
+            .predicted = [this] (Nanoseconds time) { predicted = time; },
             .progress = [this] (int sent, int) { progress.push_back (sent); },
             .failed =
                 [this] (const Error &error) {
@@ -90,6 +95,7 @@ protected:
   }
 
   std::shared_ptr<Record> record = std::make_shared<Record> ();
+  Nanoseconds predicted = 0;
   std::vector<int> progress;
   std::vector<std::string> failures;
   const SlotPlan plan = *SlotPlan::fit ({}, 4, {25, 1});
@@ -111,6 +117,7 @@ TEST_F (DmdRunnerTest, UploadsStartsAndParks)
   EXPECT_FALSE (record->running);
   EXPECT_EQ (record->calls, (std::vector<std::string>{"upload sequential:2x2",
                                 "stop", "start 10ms", "stop"}));
+  EXPECT_EQ (predicted, 4'000'000);
   EXPECT_EQ (progress, std::vector{0});
   EXPECT_TRUE (failures.empty ());
 }

@@ -52,6 +52,7 @@ TEST (LightcrafterBytes, AreThoseOfTheDocument)
   EXPECT_EQ (write (kRun, {1}), "02 04 02 00 01 00 01 0A");
   EXPECT_EQ (write (kRun, {0}), "02 04 02 00 01 00 00 09");
   EXPECT_EQ (write (0x0403, {}), "02 04 03 00 00 00 09");
+  EXPECT_EQ (write (0x0405, {3, 0}), "02 04 05 00 02 00 03 00 10");
   EXPECT_EQ (write (kCameraTrigger, encode_camera_trigger (true, 100)),
       "02 04 04 00 0B 00 01 00 00 00 00 00 00 64 00 00 00 7A");
   EXPECT_EQ (write (kSequence, encode_sequence ({.patterns = 24,

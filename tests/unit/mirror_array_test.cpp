@@ -83,6 +83,21 @@ TEST (Lattice, IsTheDocumentsFormulaAndItsInverse)
     }
 }
 
+TEST (Lattice, OddRowsMayBeShiftedToTheLeft)
+{
+  for (int row = 0; row < 20; row++)
+    for (int column = 0; column < 20; column++) {
+      const LatticePoint point = lattice_of (column, row, true);
+      EXPECT_EQ (address_of (point, true), (Offset{column, row}));
+      const MirrorPoint at =
+          mirror_position (Array::diamond, column, row, -0.5);
+      EXPECT_EQ (at.x, (point.u + point.v) / 2.0);
+      EXPECT_EQ (at.y, (point.u - point.v) / 2.0);
+      EXPECT_EQ (tile_pixel (MirrorLayout::lattice, column, row, true),
+          (Offset{point.u, point.v}));
+    }
+}
+
 TEST (Lattice, NeighboursShareAnEdge)
 {
   const double edge = std::sqrt (0.5);
@@ -225,6 +240,13 @@ INSTANTIATE_TEST_SUITE_P (OfSchedules, RenderedMirrors,
     ::testing::Values ("sequential:2x2", "staircase:2x2,pilot=4",
         "sequential:lattice:8/3,order=bit-reversal", "s-matrix:7x1",
         "sequential:6x5,phase=3/1"));
+
+TEST (RenderedMirrors, ThePilotHasTheRowsOfTheTile)
+{
+  const Schedule schedule = parsed ("sequential:2x2,pilot=4");
+  EXPECT_EQ (pilot_top (schedule, MirrorLayout::address, 40), 36);
+  EXPECT_EQ (pilot_top (schedule, MirrorLayout::cell, 40), 32);
+}
 
 TEST (PlaneOrder, KeepsMasksOfNeighbouringRowsInOneImage)
 {

@@ -93,7 +93,13 @@ TEST_F (UsbPipeline, AnUploadEndsWithTheStateThatWantedIt)
 {
   make ("sequential:2x2"); // 2.4 MB
   set_state (GST_STATE_PAUSED);
-  ASSERT_NE (wait_message (GST_MESSAGE_PROGRESS), nullptr);
+  const MessagePtr begun = wait_message (GST_MESSAGE_PROGRESS);
+  ASSERT_NE (begun, nullptr);
+  gchar *text = nullptr;
+  gst_message_parse_progress (begun.get (), nullptr, nullptr, &text);
+  EXPECT_STREQ (text, "0 % of the masks of sequential:2x2 sent to usb:1-2 "
+                      "(DLP5500), 37.4s or more left");
+  g_free (text);
   set_state (GST_STATE_NULL);
   EXPECT_EQ (board->images_received (), 0);
   EXPECT_FALSE (board->running ());
@@ -116,3 +122,45 @@ TEST_F (UsbPipeline, APulledPlugIsOneErrorAndACleanStop)
   g_free (debug);
   set_state (GST_STATE_NULL);
 }
+
+/** In a pipeline, a fault is either mended or one error; the board is stopped
+ * in the end. */
+class UsbPipelineFaults : public UsbPipeline,
+                          public ::testing::WithParamInterface<Fault>
+{
+};
+
+TEST_P (UsbPipelineFaults, EndInOneErrorOrInMasks)
+{
+  // Struck: the first line of the table, and the start.
+  for (const int message : {12, 24}) {
+    board->faults = {{board->messages () + message, GetParam ()}};
+    make ("sequential:4x1");
+    set_state (GST_STATE_PLAYING);
+    const MessagePtr message_of_end (
+        gst_bus_timed_pop_filtered (bus.get (), 60 * GST_SECOND,
+            GstMessageType (GST_MESSAGE_ERROR | GST_MESSAGE_ASYNC_DONE)));
+    ASSERT_NE (message_of_end, nullptr);
+    set_state (GST_STATE_NULL);
+    EXPECT_TRUE (board->gone () || !board->running ()) << message;
+    int errors =
+        GST_MESSAGE_TYPE (message_of_end.get ()) == GST_MESSAGE_ERROR ? 1 : 0;
+    while (const MessagePtr more{
+        gst_bus_pop_filtered (bus.get (), GST_MESSAGE_ERROR)})
+      if (GST_MESSAGE_SRC (more.get ()) !=
+          GST_MESSAGE_SRC (message_of_end.get ()))
+        continue; // what the source says of a stream that ended
+      else
+        errors++;
+    EXPECT_LE (errors, 1) << message;
+    if (GetParam () == Fault::none || GetParam () == Fault::stale_reply)
+      EXPECT_EQ (errors, 0) << message;
+    if (board->gone ())
+      return;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P (All, UsbPipelineFaults,
+    ::testing::Values (Fault::none, Fault::refuse, Fault::lose_reply,
+        Fault::late_reply, Fault::stale_reply, Fault::short_reply, Fault::stall,
+        Fault::unplug));

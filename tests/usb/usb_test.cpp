@@ -224,6 +224,23 @@ TEST_F (Usb, TheToolListsShowsAndStops)
   EXPECT_EQ (board->images_received (), 1);
   EXPECT_FALSE (board->running ());
 
+  for (const char *mask : {"on", "3"}) {
+    const std::string still = tool_says (
+        std::string ("dmd show usb: sequential:4x1 --for 10ms --mask ") + mask,
+        status);
+    EXPECT_EQ (status, 0) << still;
+    const auto mirrors = board->mirrors (0);
+    EXPECT_EQ (mirrors.at (0, 0), std::string (mask) == "on");
+    EXPECT_EQ (mirrors.at (3, 0), 1);
+    EXPECT_FALSE (board->running ());
+  }
+  tool_says ("dmd show usb: sequential:4x1 --mask 4", status);
+  EXPECT_EQ (status, 2);
+  const std::string info = tool_says ("dmd info", status);
+  for (const char *key :
+      {"trigger-input", "trigger-output", "finite-run", "shortest-dark-time"})
+    EXPECT_NE (info.find (key), info.npos) << key;
+
   tool_says ("dmd start usb: sequential:2x2,active=12ms", status);
   EXPECT_EQ (status, 4);
   bed.unplug ("1-2");

@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* The bytes that DLPC350 and DLPC900 are sent, and what is read in replies. */
+#include <functional>
+
 #include <gtest/gtest.h>
 
 #include "dmd/dlpc350_protocol.h"
@@ -267,6 +269,57 @@ TEST (Dlpc900Image, IsTheDocumentsPackets)
   EXPECT_EQ (to_hex (ByteView (last).first (12)),
       "00 10 58 01 2B 1A 54 01 0F 00 01 80");
   EXPECT_EQ (image_packets (image.size ()), 1u + 8 * 8 + 6);
+}
+
+namespace
+{
+
+/** Bytes of the images of a schedule on a DLP6500, of those of its masks that
+ * @p wanted names. */
+std::size_t
+upload_bytes (
+    const char *preset, const Placement &placement = {},
+    const std::function<bool (int mask)> &wanted = [] (int) { return true; })
+{
+  const auto schedule = Schedule::parse (preset);
+  PlanePlan plan = plan_planes (*schedule);
+  for (int mask = 0; mask < schedule->masks (); mask++)
+    if (!wanted (mask))
+      plan.masks[std::size_t (mask)].image = -1;
+  std::size_t bytes = 0;
+  for (int image = 0; image < plan.images; image++)
+    bytes += dlpc900::encoded_size (
+        render_planes (*schedule, plan, image, placement, {1920, 1080})
+            .view ());
+  return bytes;
+}
+
+Placement
+region_of (const char *text)
+{
+  return {.region = *MirrorRegion::parse (text)};
+}
+
+} // namespace
+
+TEST (Dlpc900Image, SizesAreThoseOfTheDocumentation)
+{
+  EXPECT_EQ (upload_bytes ("sequential:2x2"), 6'220'848u);
+  EXPECT_EQ (upload_bytes ("sequential:2x2", region_of ("768x576+576+252")),
+      1'335'512u);
+  EXPECT_EQ (
+      upload_bytes ("sequential:2x2", region_of ("384x288+768+396")), 338'168u);
+  EXPECT_EQ (upload_bytes ("sequential:4x1"), 10'132u);
+  EXPECT_EQ (upload_bytes ("sequential:1x4"), 5'452u);
+  EXPECT_EQ (upload_bytes ("sequential:8x8,order=bit-reversal"), 6'233'244u);
+  EXPECT_EQ (upload_bytes ("sequential:16x16,order=bit-reversal"), 6'712'348u);
+  EXPECT_EQ (upload_bytes ("sequential:4x6"), 6'220'848u);
+  EXPECT_EQ (
+      upload_bytes ("sequential:2x2", {}, [] (int mask) { return mask == 0; }),
+      3'630'596u);
+  EXPECT_EQ (
+      upload_bytes ("sequential:2x2", {}, [] (int mask) { return mask < 2; }),
+      3'114'772u);
 }
 
 TEST (Dlpc900Image, IsPlainWhereThatIsShorter)

@@ -73,9 +73,10 @@ live (UsbBed &bed, FaultLife &life, std::uint16_t product, const char *options)
     board = std::make_shared<EmulatedDlpc350> ();
   life.draw (*board, 100);
   bed.plug ("1-2", product, "LCR", board);
-  const auto open = [&] {
-    return open_dmd (std::string ("usb:,guard=off") + options);
-  };
+  const char *patience = std::getenv ("FAULT_PATIENCE");
+  const std::string device = std::string ("usb:,guard=off,patience=") +
+                             (patience != nullptr ? patience : "2s") + options;
+  const auto open = [&] { return open_dmd (device); };
   life.close (life.live (open, schedule_of ("sequential:2x1")));
   if (!board->gone () && board->running ()) {
     // Both its stops were struck: what whoever comes next does.
@@ -91,7 +92,9 @@ live (UsbBed &bed, FaultLife &life, std::uint16_t product, const char *options)
 
 } // namespace
 
-/** FAULT_SEQUENCES lives of each controller, with the luck of FAULT_SEED. */
+/** FAULT_SEQUENCES lives of each controller, with the luck of FAULT_SEED.
+ * Nearly all of its time is patience with boards that do not answer;
+ * FAULT_PATIENCE (2s unless told) makes many lives short. */
 TEST (UsbFaults, WhateverHappensItStopsInTheEndAndHangsNowhere)
 {
   const char *seed = std::getenv ("FAULT_SEED");

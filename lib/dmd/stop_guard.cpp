@@ -86,7 +86,7 @@ stop_board (const std::string &device)
   return {};
 }
 
-class GuardedDmd : public Dmd
+class GuardedDmd final : public Dmd
 {
 public:
   GuardedDmd (std::unique_ptr<Dmd> dmd, std::string device)

@@ -4,6 +4,7 @@
 #include <random>
 
 #include "dmd/dlpc350.h"
+#include "dmd/dlpc350_protocol.h"
 #include "emulated_dlpc350.h"
 #include "fault_life.h"
 
@@ -153,6 +154,46 @@ TEST (Dlpc350, StartsAnewAfterAStop)
   EXPECT_TRUE (rig.board->running ());
   rig.dmd.reset ();
   EXPECT_FALSE (rig.board->running ());
+}
+
+TEST (EmulatedDlpc350, StartsNothingThatWasNotValidatedOrIsWrong)
+{
+  using namespace dlpc350;
+  const auto board = std::make_shared<EmulatedDlpc350> ();
+  HidLink link (std::make_unique<EmulatedPipe> (
+                    board, std::make_shared<EmulatedPipe::Clock> ()),
+      "board");
+  const auto write = [&] (const HidCommand &command, const Bytes &data) {
+    const auto reply = link.write (command, data);
+    EXPECT_TRUE (reply.ok ());
+    return !reply->refused;
+  };
+  const auto verdict_of = [&] (std::uint32_t exposure, int entries) {
+    write (kTimes, encode_times ({exposure, 0}));
+    write (kConfigure, encode_configuration (entries, true, 2, 1));
+    write (kValidate, {0});
+    for (;;)
+      if (const auto said = parse_verdict (link.read (kValidate)->data);
+          !said->busy)
+        return *said;
+  };
+  EXPECT_TRUE (write (kDisplayMode, {kModePattern}));
+  for (const auto &[mailbox, data] : {std::pair{kMailboxImages, Bytes{0}},
+           {kMailboxPatterns, encode_entries ({{.next_image = true}, {}})}}) {
+    EXPECT_TRUE (write (kMailbox, {mailbox}));
+    EXPECT_TRUE (write (kMailboxData, data));
+  }
+  EXPECT_TRUE (write (kMailbox, {kMailboxClosed}));
+  EXPECT_FALSE (verdict_of (234, 2).good) << "too short";
+  EXPECT_FALSE (verdict_of (235, 3).good) << "a wrong count";
+  EXPECT_TRUE (write (kRun, {kRunStart}));
+  EXPECT_FALSE (board->running ()) << "not validated";
+  EXPECT_TRUE (verdict_of (235, 2).good);
+  EXPECT_TRUE (write (kRun, {kRunStart}));
+  EXPECT_TRUE (board->running ());
+  EXPECT_TRUE (write (kRun, {kRunStop}));
+  EXPECT_TRUE (write (kRun, {kRunStart}));
+  EXPECT_FALSE (board->running ()) << "not validated since it was stopped";
 }
 
 TEST (Dlpc350, WithoutAVideoSignalSaysSo)

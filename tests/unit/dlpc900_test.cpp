@@ -4,6 +4,7 @@
 #include <random>
 
 #include "dmd/dlpc900.h"
+#include "dmd/dlpc900_protocol.h"
 #include "emulated_dlpc900.h"
 #include "fault_life.h"
 #include "hex.h"
@@ -437,6 +438,52 @@ TEST (Dlpc900Upload, MoreMasksThanItHoldsAreAnError)
   ASSERT_EQ (message_of (rig.open ()), "");
   EXPECT_EQ (message_of (rig.upload (schedule_of ("sequential:15x15,pilot=8"))),
       "board (DLP5500) holds 400 masks, not 450");
+}
+
+/** What a board says to a write: the code of its refusal, 0 for none. */
+int
+verdict (EmulatedDlpc900 &board, const HidCommand &command, const Bytes &data)
+{
+  HidLink link (std::make_unique<EmulatedPipe> (
+                    std::shared_ptr<EmulatedHid> (&board, [] (auto *) {}),
+                    std::make_shared<EmulatedPipe::Clock> ()),
+      "board");
+  const auto reply = link.write (command, data);
+  EXPECT_TRUE (reply.ok ());
+  const auto code = link.read (dlpc900::kErrorCode);
+  EXPECT_TRUE (code.ok ());
+  EXPECT_EQ (reply->refused, code->data.front () != 0);
+  return code->data.front ();
+}
+
+TEST (EmulatedDlpc900, RefusesWhatTheControllerRefuses)
+{
+  using namespace dlpc900;
+  EmulatedDlpc900 board (kDlp5500);
+  const auto line = [] (int index, std::uint32_t exposure,
+                        std::uint32_t dark = 0) {
+    return encode_entry ({.index = std::uint16_t (index),
+        .time = {exposure, dark},
+        .plane = {index, 0}});
+  };
+  EXPECT_EQ (verdict (board, kDefine, line (0, 105)), 5) << "in video mode";
+  EXPECT_EQ (verdict (board, kDisplayMode, {kModeOnTheFly}), 0);
+  EXPECT_EQ (verdict (board, kRun, {kRunStart}), 5) << "without a table";
+  EXPECT_EQ (verdict (board, kDefine, line (0, 104)), 14);
+  EXPECT_EQ (verdict (board, kDefine, line (0, 105, 104)), 12);
+  EXPECT_EQ (verdict (board, kTriggerIn1, encode_trigger_in (103, false)), 13);
+  EXPECT_EQ (verdict (board, kDefine, line (0, 105)), 0);
+  EXPECT_EQ (verdict (board, kDefine, line (1, 105)), 0);
+  EXPECT_EQ (verdict (board, kConfigure, encode_configuration (3, 0)), 15)
+      << "more lines than were sent";
+  EXPECT_EQ (verdict (board, kConfigure, encode_configuration (2, 0)), 0);
+  EXPECT_EQ (verdict (board, kLoadImage, encode_load (0, 500)), 0);
+  EXPECT_EQ (verdict (board, kLoadImage, encode_load (1, 500)), 15)
+      << "not from the highest down";
+  EXPECT_EQ (verdict (board, kIdle, {0}), 0);
+  EXPECT_EQ (verdict (board, kRun, {kRunStart}), 11) << "without images";
+  EXPECT_EQ (verdict (board, kRun, {}), 6) << "a wrong length";
+  EXPECT_FALSE (board.running ());
 }
 
 TEST (Dlpc900Faults, ARefusalIsToldWithItsReason)

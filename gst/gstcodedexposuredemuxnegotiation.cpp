@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "gstcodedexposuredemuxstate.h"
+#include "gstcodedexposuremeta.h"
 
 #define GST_CAT_DEFAULT codedexposure_demux_debug
 
@@ -94,8 +95,12 @@ std::optional<AnyExtractor>
 make_extractor (
     GstCodedExposureDemux *self, const Schedule &schedule, Extent size)
 {
-  auto made = Extractor<Pixel>::make (
-      schedule, size.width, size.height, state (self).stream.settings.extract);
+  const Stream &stream = state (self).stream;
+  ExtractOptions options = stream.settings.extract;
+  if (options.bits == 0)
+    options.bits = stream.bits;
+  auto made =
+      Extractor<Pixel>::make (schedule, size.width, size.height, options);
   if (made)
     return AnyExtractor (std::move (*made));
   refuse (self, made.error ().message);
@@ -305,10 +310,13 @@ PadCaps::of (Output::Kind kind) const
 }
 
 GstFlowReturn
-negotiate (GstCodedExposureDemux *self)
+negotiate (GstCodedExposureDemux *self, GstBuffer *next)
 {
   Stream &stream = state (self).stream;
   take_settings (self);
+  if (const auto meta = next ? get_frame_meta (next) : std::nullopt;
+      meta && std::exchange (stream.bits, meta->bits) != meta->bits)
+    stream.stale = true;
   if (stream.stale) {
     auto proposal = propose (self);
     if (!proposal)

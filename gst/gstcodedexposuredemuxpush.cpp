@@ -527,7 +527,7 @@ chain (GstPad *pad, GstObject *parent, GstBuffer *inbuf) noexcept
   GST_LOG_OBJECT (pad, "[IN] %" GST_PTR_FORMAT, inbuf);
   if (state (self).stream.segment.format != GST_FORMAT_TIME)
     return GST_FLOW_ERROR;
-  if (const GstFlowReturn flow = negotiate (self); flow != GST_FLOW_OK)
+  if (const GstFlowReturn flow = negotiate (self, inbuf); flow != GST_FLOW_OK)
     return flow;
   if (!GST_BUFFER_PTS_IS_VALID (inbuf)) {
     GST_ELEMENT_ERROR (self, STREAM, FORMAT,

@@ -173,6 +173,7 @@ struct Stream {
   Image<std::uint16_t> wide;
   Settings settings; ///< in force
   std::optional<Plan> plan;
+  int bits = 0;      ///< significant ones, as the frames say; 0: they do not
   bool stale = true; ///< the plan has to be made again before the next frame
   /** Serialised events that wait for the caps of the source pads. */
   std::vector<EventPtr> pending;
@@ -277,7 +278,9 @@ gboolean src_query (GstPad *pad, GstObject *parent, GstQuery *query) noexcept;
 /* Negotiation. */
 /** Makes the plan and tells the source pads, where that is due. Posts an error
  * and returns other than OK when there can be no plan. */
-GstFlowReturn negotiate (GstCodedExposureDemux *self);
+/** @p next: the frame that comes next, where there is one. */
+GstFlowReturn negotiate (
+    GstCodedExposureDemux *self, GstBuffer *next = nullptr);
 /** Shows on the bus why there can be no plan. */
 void refuse (GstCodedExposureDemux *self, const std::string &why);
 

@@ -63,6 +63,7 @@ struct Names {
   const GQuark locked = g_quark_from_static_string ("locked");
   const GQuark slip = g_quark_from_static_string ("slip");
   const GQuark lost_before = g_quark_from_static_string ("lost-before");
+  const GQuark bits = g_quark_from_static_string ("bits");
   const GQuark saturated = g_quark_from_static_string ("saturated");
 };
 
@@ -100,7 +101,8 @@ set_frame_meta (GstBuffer *buffer, const FrameMeta &meta)
       G_TYPE_UINT64, meta.exposure_start, name.exposure_duration, G_TYPE_UINT64,
       meta.exposure_duration, name.locked, G_TYPE_BOOLEAN, meta.locked,
       name.slip, G_TYPE_INT, meta.slip, name.lost_before, G_TYPE_UINT64,
-      meta.lost_before, name.saturated, G_TYPE_UINT64, meta.saturated, nullptr);
+      meta.lost_before, name.saturated, G_TYPE_UINT64, meta.saturated,
+      name.bits, G_TYPE_INT, meta.bits, nullptr);
 }
 
 std::optional<FrameMeta>
@@ -122,6 +124,7 @@ get_frame_meta (GstBuffer *buffer)
       &meta.locked, name.slip, G_TYPE_INT, &meta.slip, name.lost_before,
       G_TYPE_UINT64, &meta.lost_before, name.saturated, G_TYPE_UINT64,
       &meta.saturated, nullptr);
+  gst_structure_id_get (structure, name.bits, G_TYPE_INT, &meta.bits, nullptr);
   return meta;
 }
 

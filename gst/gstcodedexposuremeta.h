@@ -36,6 +36,9 @@ struct FrameMeta {
   std::string pattern = {};
   /** Pixels at the largest value. */
   guint64 saturated = 0;
+  /** Significant bits of a pixel, counted from the lowest; 0: not known, all of
+   * the format. */
+  gint bits = 0;
 };
 
 /** Registers the meta; call once from plugin_init. */

@@ -81,6 +81,7 @@ begin_frames (GstDmdSync *self)
 {
   Stream &stream = state (self).stream;
   stream.sequence.emplace (stream.time->rate);
+  stream.rate_watch.emplace (stream.time->rate);
   begin_phase (self);
   stream.last.reset ();
 }
@@ -136,8 +137,10 @@ take_segment (GstDmdSync *self, GstEvent *event)
     gst_event_unref (event);
     return FALSE;
   }
-  if (stream.sequence)
+  if (stream.sequence) {
     stream.sequence->resync ();
+    stream.rate_watch->resync ();
+  }
   stream.device_clock.reset ();
   const gboolean taken =
       base_class ()->sink_event (GST_BASE_TRANSFORM (self), event);
@@ -184,10 +187,14 @@ set_caps (GstBaseTransform *trans, GstCaps *incaps, GstCaps *)
     refuse (self, incaps, time.error ().message);
     return FALSE;
   }
-  st.stream.refused.clear ();
-
   const bool restart = !same_slots (st.stream.time, *time);
   st.stream.time = *time;
+  if (std::string why; !plan_pixels (self, why)) {
+    st.stream.time.reset ();
+    refuse (self, incaps, why);
+    return FALSE;
+  }
+  st.stream.refused.clear ();
   {
     const ObjectLock lock (self);
     st.time = *time;
@@ -233,14 +240,17 @@ sink_event (GstBaseTransform *trans, GstEvent *event)
       st.runner->interrupt (true);
     break;
   case GST_EVENT_EOS:
+    note_end (self);
     give_back (self, "eos");
     break;
   case GST_EVENT_FLUSH_STOP:
     give_back (self, "flush");
     if (st.runner)
       st.runner->interrupt (false);
-    if (st.stream.sequence)
+    if (st.stream.sequence) {
       st.stream.sequence->resync ();
+      st.stream.rate_watch->resync ();
+    }
     st.stream.last.reset ();
     st.stream.ready.clear ();
     st.stream.discont = true;

@@ -66,7 +66,7 @@ meta_of (const Timebase &time, guint64 number, GstClockTime pts)
 
 /** Times, number and meta of a frame that is ready. @p buffer is writable. */
 void
-stamp (GstDmdSync *self, GstBuffer *buffer, const FrameMeta &meta)
+stamp (GstDmdSync *self, GstBuffer *buffer, FrameMeta meta)
 {
   Stream &stream = state (self).stream;
   GST_BUFFER_PTS (buffer) = meta.exposure_start;
@@ -77,6 +77,8 @@ stamp (GstDmdSync *self, GstBuffer *buffer, const FrameMeta &meta)
   GST_BUFFER_OFFSET_END (buffer) = meta.frame + 1;
   if (std::exchange (stream.discont, false))
     GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DISCONT);
+  if (stream.format)
+    meta.bits = significant_bits (*stream.format);
   set_frame_meta (buffer, meta);
 }
 
@@ -174,6 +176,34 @@ take_arrival (GstDmdSync *self, const Frame &frame, GstFlowReturn &flow)
   default:
     return true;
   }
+}
+
+/** Sees to a frame of which a part is missing, and unpacks the others. Returns
+ * false when it goes no further. */
+bool
+take_whole (GstDmdSync *self, Frame &frame)
+{
+  Stream &stream = state (self).stream;
+  const bool readable = is_whole (self, frame.buffer.get ());
+  if (!readable ||
+      GST_BUFFER_FLAG_IS_SET (frame.buffer.get (), GST_BUFFER_FLAG_CORRUPTED)) {
+    count (self, &Counters::frames_incomplete, 1, "frames-incomplete");
+    post (self,
+        gst_structure_new ("dmdsync/frame-incomplete", "frame", G_TYPE_UINT64,
+            frame.step.number, "pts", G_TYPE_UINT64, frame.pts, "bytes",
+            G_TYPE_UINT64, guint64 (gst_buffer_get_size (frame.buffer.get ())),
+            nullptr));
+  }
+  if (readable)
+    frame.buffer = unpack (self, std::move (frame.buffer));
+  if (readable && frame.buffer)
+    return true;
+  say_dropped (self, frame, "incomplete");
+  stream.discont = true;
+  gst_pad_push_event (GST_BASE_TRANSFORM_SRC_PAD (self),
+      gst_event_new_gap (
+          frame.pts, GstClockTime (stream.time->rate.period ())));
+  return false;
 }
 
 PhaseSight
@@ -294,12 +324,15 @@ take_frame (GstDmdSync *self, BufferPtr buffer)
   if (frame.step.arrival == Arrival::restarted)
     stream.device_clock.reset ();
   const GstClockTime time = pipeline_time (self, frame.buffer.get ());
+  watch_rate (self, came);
   const bool too_early = back > 0 && GstClockTime (back) > time;
   frame.pts = too_early ? 0 : time - GstClockTime (back);
 
   GstFlowReturn flow = GST_FLOW_OK;
   if (!take_arrival (self, frame, flow))
     return flow;
+  if (!take_whole (self, frame))
+    return GST_FLOW_OK;
   frame.sight =
       look_for_pattern (self, frame.buffer.get (), frame.step, frame.pts);
   watch_phase (self, frame);
@@ -321,6 +354,7 @@ take_frame (GstDmdSync *self, BufferPtr buffer)
   /* A camera source may use the memory again while it is still held here. */
   if (repeats)
     stream.last.reset (gst_buffer_copy_deep (frame.buffer.get ()));
+  keep_whole (self, frame.buffer.get (), frame.step.number);
   stream.ready.push_back (std::move (frame.buffer));
   return GST_FLOW_OK;
 }

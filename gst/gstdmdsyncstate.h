@@ -12,13 +12,16 @@
 #include <gst/gst.h>
 #include <gst/video/video.h>
 
+#include "camera/packed_mono.h"
 #include "clock/device_clock.h"
 #include "clock/frame_sequence.h"
 #include "clock/phase_lock.h"
 #include "clock/phase_watch.h"
+#include "clock/rate_watch.h"
 #include "clock/switch_watch.h"
 #include "dmd/dmd_runner.h"
 #include "gstdmdsync.h"
+#include "gstleasedmemory.h"
 #include "gstraii.h"
 #include "schedule/schedule.h"
 
@@ -36,21 +39,25 @@ enum class OnUnlock { keep, skip, error };
 
 struct Settings {
   std::string device;
-  std::string schedule;
+  std::string schedule = "sequential:2x2";
   TimestampAt timestamp_at = TimestampAt::exposure_start;
   GstClockTimeDiff exposure_offset = 0;
   OnLoss on_loss = OnLoss::gap;
   OnUnlock on_unlock = OnUnlock::keep;
+  GstClockTime max_hold = GST_CLOCK_TIME_NONE; ///< none: as the source has it
+  std::string pixel_format;                    ///< empty: as the caps say
 };
 
 struct Counters {
   guint64 frames_in = 0;
   guint64 frames_lost = 0;
+  guint64 frames_incomplete = 0;
   guint64 frames_late = 0;
   guint64 frames_duplicate = 0;
   guint64 frames_early = 0; ///< dropped: exposed before the stream's time 0
   guint64 frames_skipped = 0;
   guint64 frames_repeated = 0;
+  guint64 frames_held = 0; ///< kept until their memory was due; copied
   guint64 slips = 0;
   guint64 clock_restarts = 0;
   gdouble clock_drift = 0; ///< ppm by which the camera's clock is fast
@@ -73,7 +80,11 @@ struct ShownPattern {
 struct Stream {
   std::optional<Timebase> time;
   std::optional<FrameSequence> sequence;
+  std::optional<RateWatch> rate_watch;
+  std::optional<MonoFormat> format;            ///< of the pixels, where known
+  GstClockTime max_hold = GST_CLOCK_TIME_NONE; ///< none: as long as one likes
   DeviceClock device_clock;
+  GstClockTime last_arrival = GST_CLOCK_TIME_NONE;
   std::optional<PhaseWatch> watch;
   std::optional<PhaseLock> lock;
   BufferPtr last;              ///< a copy, for on-loss=repeat
@@ -110,9 +121,12 @@ struct SyncState {
   std::unique_ptr<DmdRunner> runner; ///< null: no DMD is driven
 
   std::atomic<bool> uploading = false;
+  std::atomic<bool> warned_held = false; ///< in this run
 
   /* Sink pad's stream lock. */
   Stream stream;
+
+  std::unique_ptr<LeaseKeeper> keeper; ///< last: its thread uses the above
 };
 
 SyncState &state (GstDmdSync *self);
@@ -129,6 +143,25 @@ GstClockTimeDiff moved_back (const SyncState &st);
 /** The PTS that @p frame came with, by the pipeline's clock. Leaves what it was
  * told from on the frame, which is writable. */
 GstClockTime pipeline_time (GstDmdSync *self, GstBuffer *frame);
+
+/** Says it when the stream ends long after its last frame. */
+void note_end (GstDmdSync *self);
+/** Says it when frames come at another rate than that of the caps. */
+void watch_rate (GstDmdSync *self, GstClockTime time);
+
+/* Memory and pixels of frames. */
+/** What follows from the caps; false with @p why. */
+bool plan_pixels (GstDmdSync *self, std::string &why);
+/** Whether all of the frame is there. */
+bool is_whole (GstDmdSync *self, GstBuffer *frame);
+/** @p frame with one value a pixel. */
+BufferPtr unpack (GstDmdSync *self, BufferPtr frame);
+/** Sees to it that the writable @p frame stays what it is, however long it is
+ * kept. */
+void keep_whole (GstDmdSync *self, GstBuffer *frame, guint64 number);
+
+/* Properties. */
+void install_properties (GObjectClass *klass);
 
 /* What the properties name; false with an error on the bus. */
 bool read_schedule (GstDmdSync *self);

@@ -29,7 +29,7 @@ GstClockTime
 arrival_time (GstDmdSync *self)
 {
   const ObjectPtr<GstClock> clock (gst_element_get_clock (GST_ELEMENT (self)));
-  if (!clock)
+  if (!clock || GST_BASE_TRANSFORM (self)->segment.format != GST_FORMAT_TIME)
     return GST_CLOCK_TIME_NONE;
   const GstClockTime now = gst_clock_get_time (clock.get ());
   const GstClockTime base = gst_element_get_base_time (GST_ELEMENT (self));
@@ -105,6 +105,7 @@ pipeline_time (GstDmdSync *self, GstBuffer *frame)
   if (!GST_CLOCK_TIME_IS_VALID (arrival))
     return device;
   keep (frame, arrival_caps, arrival);
+  st.stream.last_arrival = arrival;
 
   DeviceClock &clock = st.stream.device_clock;
   const Nanoseconds time =
@@ -121,6 +122,42 @@ pipeline_time (GstDmdSync *self, GstBuffer *frame)
   }
   note_jitter (self, GstClockTime (clock.lateness ()));
   return GstClockTime (std::max<Nanoseconds> (0, time));
+}
+
+void
+note_end (GstDmdSync *self)
+{
+  constexpr GstClockTime kSilence = GST_SECOND;
+  const GstClockTime last = state (self).stream.last_arrival;
+  const GstClockTime now = arrival_time (self);
+  if (!GST_CLOCK_TIME_IS_VALID (last) || !GST_CLOCK_TIME_IS_VALID (now) ||
+      now < last + kSilence)
+    return;
+  GST_ELEMENT_WARNING (self, RESOURCE, READ,
+      ("The stream ends %.1f s after its last frame: the camera stopped, was "
+       "unplugged or gets no trigger. Look at its cable, at the DMD and at the "
+       "line between them.",
+          double (now - last) / GST_SECOND),
+      (nullptr));
+}
+
+void
+watch_rate (GstDmdSync *self, GstClockTime time)
+{
+  const Stream &stream = state (self).stream;
+  const auto rate = state (self).stream.rate_watch->take (Nanoseconds (time));
+  if (!rate)
+    return;
+  const FrameRate said = stream.time->rate;
+  gst_element_post_message (GST_ELEMENT (self),
+      gst_message_new_element (GST_OBJECT (self),
+          gst_structure_new ("dmdsync/frame-rate", "measured", G_TYPE_DOUBLE,
+              *rate, "caps", GST_TYPE_FRACTION, said.num, said.den, nullptr)));
+  GST_ELEMENT_WARNING (self, RESOURCE, SETTINGS,
+      ("Frames come at %.4g a second, the caps say %d/%d. Whoever triggers the "
+       "camera imposes its rate: set the caps and the trigger to the same.",
+          *rate, said.num, said.den),
+      (nullptr));
 }
 
 } // namespace cexp::gst::sync

@@ -21,6 +21,9 @@ namespace cexp
 namespace
 {
 
+/* Where a client says whether it wants the trigger. */
+constexpr guint32 kTriggerMode = 0x400;
+
 struct Unref {
   void operator() (gpointer object) const { g_object_unref (object); }
 };
@@ -70,6 +73,19 @@ set_entries (std::string &xml, const std::string &enumeration,
   return true;
 }
 
+/* A feature that a client may set and nothing comes of: what a line of the
+ * camera puts out goes nowhere here. */
+std::string
+choice (const std::string &name, const std::vector<std::string> &values)
+{
+  std::string text = "<Enumeration Name=\"" + name + "\">\n";
+  for (std::size_t k = 0; k < values.size (); k++)
+    text += "<EnumEntry Name=\"" + values[k] + "\"><Value>" +
+            std::to_string (k) + "</Value></EnumEntry>\n";
+  return text + "<pValue>" + name + "Value</pValue></Enumeration>\n" +
+         "<Integer Name=\"" + name + "Value\"><Value>0</Value></Integer>\n";
+}
+
 /* What the camera says of itself: Aravis' own description, with the formats and
  * lines of this one. */
 Result<std::string>
@@ -85,12 +101,22 @@ describe ()
   for (const WireFormat &wire : kWireFormats)
     formats.emplace_back (mono_format_text (wire.format), wire.code);
   if (!set_entries (xml, "PixelFormat", formats) ||
-      !set_entries (xml, "TriggerSource",
-          {{"Line0", 0}, {"Software", 1}, {"Line1", 2}}) ||
+      !set_entries (xml, "TriggerSource", {{"Line0", 0}, {"Line1", 1}}) ||
       !set_entries (
           xml, "TriggerActivation", {{"RisingEdge", 0}, {"FallingEdge", 1}}))
     return Error{"the description of Aravis' fake camera is another than that "
                  "of version 0.8.26; the simulated camera needs that one"};
+  /* Aravis' camera waits for a software trigger only: it shall know of none. */
+  const std::string theirs = "<Address>0x300</Address>";
+  const auto mode = xml.find (theirs);
+  const auto end = xml.rfind ("<Port Name");
+  if (mode == xml.npos || end == xml.npos || mode > end)
+    return Error{"the description of Aravis' fake camera lacks its trigger"};
+  xml.insert (end, choice ("LineSelector", {"Line0", "Line1"}) +
+                       choice ("LineMode", {"Input", "Output"}) +
+                       choice ("LineSource", {"Off", "ExposureActive"}) +
+                       choice ("LineInverter", {"false", "true"}));
+  xml.replace (mode, theirs.size (), "<Address>0x400</Address>");
   return xml;
 }
 
@@ -135,14 +161,17 @@ struct GigeCamera::State {
     return value;
   }
 
-  double period () const
+  /* The trigger imposes its rate, whatever the client asked for. */
+  double period ()
   {
-    const bool triggered =
-        get_register (ARV_FAKE_CAMERA_REGISTER_TRIGGER_MODE) == 1;
-    const double free_run =
-        1e3 *
-        get_register (ARV_FAKE_CAMERA_REGISTER_ACQUISITION_FRAME_PERIOD_US);
-    return triggered ? 1e9 / options.trigger_rate : free_run;
+    constexpr guint32 kPeriod =
+        ARV_FAKE_CAMERA_REGISTER_ACQUISITION_FRAME_PERIOD_US;
+    if (get_register (kTriggerMode) != 1)
+      return 1e3 * get_register (kPeriod);
+    const double triggered = 1e9 / options.trigger_rate;
+    arv_fake_camera_write_register (
+        camera, kPeriod, guint32 (std::lround (triggered / 1e3)));
+    return triggered;
   }
 
   void send (ArvBuffer *buffer);
@@ -336,7 +365,6 @@ GigeCamera::open (GigeCameraOptions options, Expose expose)
   set (ARV_FAKE_CAMERA_REGISTER_PIXEL_FORMAT,
       st.options.bits > 8 ? ARV_PIXEL_FORMAT_MONO_16 : ARV_PIXEL_FORMAT_MONO_8);
   set (ARV_FAKE_CAMERA_REGISTER_EXPOSURE_TIME_US, 10e6);
-  arv_fake_camera_set_trigger_frequency (st.camera, st.options.trigger_rate);
   arv_fake_camera_set_fill_pattern (
       st.camera,
       [] (ArvBuffer *buffer, void *self, guint32, guint32, ArvPixelFormat) {

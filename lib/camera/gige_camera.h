@@ -60,8 +60,9 @@ using Expose =
  *
  * It offers Mono8, Mono10, Mono12, Mono16 and the packed formats of 10 and 12
  * bits; pictures are shifted to the format's bits, so that white stays white.
- * Triggers (Software, Line0, Line1; either edge) and exposure are features: an
- * exposure time shorter than the frame period lets through as much less light.
+ * Triggers (Line0, Line1; either edge) and exposure are features: with a
+ * trigger, frames come at its rate; an exposure time shorter than the frame
+ * period lets through as much less light.
  *
  * Frame k is stamped with k frame periods by the camera's clock, however late
  * the host is: a host that lags makes jitter, not losses.

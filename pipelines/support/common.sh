@@ -13,7 +13,7 @@ scene_options='input input-rate scene pattern size frame-rate bits'
 bench_options='schedule psf-sigma full-well read-noise gain seed shift-x shift-y
   rotation scale'
 source_options="$scene_options $bench_options frames camera features source
-  device"
+  device exposure trigger trigger-line trigger-edge pixel-format"
 
 scene_help='Scene, one frame of it a slot of the exposure:
   --input FILE        any video; each of its frames becomes a slot
@@ -34,7 +34,12 @@ bench_help='Bench:
   --shift-x P, --shift-y P, --rotation DEG, --scale F   misalignment'
 camera_help='Instead of the bench:
   --camera NAME       a GenICam camera, as arv-tool-0.8 lists it
-  --features "A=1 ..."  camera features; default: triggered by the DMD on Line0
+  --trigger M         who is the master, dmd or camera [dmd]
+  --trigger-line L    line of the camera to or from the DMD [Line0; Line1]
+  --trigger-edge E    rising or falling [rising]
+  --exposure US       exposure time, microseconds [as the camera has it]
+  --pixel-format F    Mono8, Mono12, Mono12Packed ... [Mono8; Mono16]
+  --features "A=1 ..."  camera features beyond these
   --device DEV        the DMD [sim:bench on the bench]
   --source "GST"      any GStreamer source of coded frames'
 common_help='  --print             show the pipeline instead of running it
@@ -147,6 +152,11 @@ check_options ()
   check_option start '[0-9]+(\.[0-9]+)?' 'a number of seconds'
   check_option duration '[0-9]+(\.[0-9]+)?' 'a number of seconds'
   check_option fuse 'fast|balanced|best' 'fast, balanced or best'
+  check_option trigger 'dmd|camera' 'dmd or camera'
+  check_option trigger-edge 'rising|falling' 'rising or falling'
+  check_option exposure '[0-9]*\.?[0-9]+' 'a time in microseconds'
+  check_option pixel-format 'Mono(8|16|1[02](Packed|p)?)' \
+    'Mono8, Mono16, Mono10 or Mono12, these also with Packed or p'
   check_option method 'auto|rank|select|decode' 'auto, rank, select or decode'
   for name in psf-sigma full-well read-noise gain scale; do
     check_option "$name" '[0-9]*\.?[0-9]+' 'a number that is not negative'
@@ -224,7 +234,7 @@ schedule_slots ()
 
 grey_format ()
 {
-  if [ "${opt[bits]:-8}" -gt 8 ]; then
+  if [ "${opt[bits]:-8}" -gt 8 ] || [ "${opt[pixel-format]:-Mono8}" != Mono8 ]; then
     printf GRAY16_LE
   else
     printf GRAY8
@@ -317,6 +327,28 @@ simulation ()
   printf 'video/x-raw,framerate=%s ! ' "$frame_rate"
 }
 
+# Features that make the camera follow the DMD's trigger, or give it one. They
+# come in the order that Aravis needs: it sets the frame rate first, which ends
+# all triggers, and what belongs to a selector follows that.
+camera_features ()
+{
+  local falling=
+  [ "${opt[trigger-edge]:-rising}" = rising ] || falling=1
+  if [ "${opt[trigger]:-dmd}" = dmd ]; then
+    printf 'TriggerSelector=FrameStart TriggerSource=%s TriggerActivation=%s ' \
+      "${opt[trigger-line]:-Line0}" \
+      "$([ -n "$falling" ] && echo FallingEdge || echo RisingEdge)"
+    printf 'TriggerMode=On'
+  else
+    printf 'TriggerSelector=FrameStart TriggerMode=Off LineSelector=%s ' \
+      "${opt[trigger-line]:-Line1}"
+    printf 'LineMode=Output LineSource=ExposureActive LineInverter=%s' \
+      "$([ -n "$falling" ] && echo true || echo false)"
+  fi
+  ! is_set pixel-format || printf ' PixelFormat=%s' "${opt[pixel-format]}"
+  ! is_set features || printf ' %s' "${opt[features]}"
+}
+
 # Coded frames of a camera, of any source, or of the bench with its DMD.
 coded_source ()
 {
@@ -324,10 +356,10 @@ coded_source ()
   if is_set camera; then
     caps="video/x-raw,format=$(grey_format),width=$width,height=$height"
     caps+=",framerate=$frame_rate"
-    features='TriggerSelector=FrameStart TriggerSource=Line0 TriggerMode=On'
-    printf 'aravissrc camera-name=%s num-arv-buffers=150 features=%s ! %s ! ' \
-      "$(quoted "${opt[camera]}")" \
-      "$(quoted "${opt[features]:-$features}")" "$caps"
+    features=$(camera_features)
+    printf 'aravissrc camera-name=%s num-arv-buffers=150 features=%s %s! %s ! ' \
+      "$(quoted "${opt[camera]}")" "$(quoted "$features")" \
+      "$(properties exposure)" "$caps"
   elif is_set source; then
     printf '%s ! ' "${opt[source]}"
   else
@@ -337,7 +369,8 @@ coded_source ()
   if ! is_set source || is_set device || is_set schedule; then
     local device=${opt[device]:-} timestamps=''
     is_set camera || is_set source || device=${device:-sim:bench}
-    ! is_set camera || timestamps='timestamp-at=device-clock '
+    ! is_set camera \
+      || timestamps="timestamp-at=device-clock $(properties pixel-format)"
     printf 'dmdsync name=sync device=%s schedule=%s %s! ' \
       "$(quoted "$device")" "$(quoted "$(schedule)")" "$timestamps"
   fi

@@ -3,6 +3,7 @@
 #include <cstdlib>
 #include <map>
 
+#include "camera/packed_mono.h"
 #include "camera_rig.h"
 #include "linked_elements.h"
 #include "own_network.h"
@@ -180,6 +181,159 @@ TEST (Gige, WithOnePercentOfThePacketsLostEveryGapIsAccountedFor)
   EXPECT_GT (lost, 0u) << "36 packets a frame";
   EXPECT_EQ (counter (pipeline, "frames-lost"), lost);
   EXPECT_EQ (sum_of (pipeline, "dmdsync/frames-lost", "count"), lost);
+}
+
+/* aravissrc gives memory to its camera again that it has handed out. */
+TEST (Gige, FramesThatAreKeptStayWhatTheyAre)
+{
+  const auto camera = open_camera ({});
+  std::vector<BufferPtr> kept;
+  GstVideoInfo info;
+  CameraPipeline pipeline (
+      camera_source ("100/1", "GRAY8", "num-buffers=60 num-arv-buffers=8") +
+          kSync + "queue max-size-buffers=20 ! ",
+      [&] (GstBuffer *buffer, const GstVideoInfo &of_sink) {
+        info = of_sink;
+        kept.emplace_back (gst_buffer_ref (buffer));
+      });
+  pipeline.play ();
+  EXPECT_EQ (pipeline.wait_end (), "end");
+  const guint64 held = counter (pipeline, "frames-held");
+  pipeline.stop ();
+  Received received;
+  for (const BufferPtr &buffer : kept)
+    received.take (buffer.get (), info);
+  EXPECT_EQ (received.frames.size (), 60u);
+  EXPECT_EQ (received.wrong, 0);
+  EXPECT_GT (held, 40u);
+}
+
+TEST (Gige, PackedFormatsAreUnpackedWithTheirBits)
+{
+  for (const char *format :
+      {"Mono10Packed", "Mono12Packed", "Mono10p", "Mono12p"}) {
+    SCOPED_TRACE (format);
+    GigeCameraOptions options;
+    options.bits = significant_bits (*parse_mono_format (format));
+    const int mask = (1 << options.bits) - 1;
+    const auto camera = open_camera (options);
+    int frames = 0;
+    std::uint64_t first = 0;
+    int wrong = 0;
+    CameraPipeline pipeline (
+        camera_source ("100/1", "GRAY16_LE",
+            "num-buffers=5 features=\"PixelFormat=" + std::string (format) +
+                "\"") +
+            "dmdsync timestamp-at=device-clock pixel-format=" + format + " ! ",
+        [&] (auto *buffer, auto &info) {
+          const guint64 number = GST_BUFFER_OFFSET (buffer);
+          const auto differs = [&] (std::uint64_t frame) {
+            return wrong_pixels<std::uint16_t> (buffer, info, frame, mask) != 0;
+          };
+          while (frames == 0 && first < 100 && differs (first))
+            first++;
+          frames++;
+          wrong += differs (first + number);
+          EXPECT_EQ (get_frame_meta (buffer)->bits,
+              significant_bits (*parse_mono_format (format)));
+        });
+    pipeline.play ();
+    EXPECT_EQ (pipeline.wait_end (), "end");
+    EXPECT_EQ (frames, 5);
+    EXPECT_EQ (wrong, 0);
+  }
+}
+
+TEST (Gige, ATriggerThatImposesAnotherRateIsSaid)
+{
+  GigeCameraOptions options;
+  options.trigger_rate = 80;
+  const auto camera = open_camera (options);
+  CameraPipeline pipeline (
+      camera_source ("100/1", "GRAY8",
+          "num-buffers=70 features=\"TriggerSelector=FrameStart "
+          "TriggerSource=Line1 TriggerActivation=FallingEdge "
+          "TriggerMode=On\"") +
+          kSync,
+      [] (auto *, auto &) {});
+  pipeline.play ();
+  EXPECT_EQ (pipeline.wait_end (), "end");
+  const auto said = std::find_if (pipeline.messages.begin (),
+      pipeline.messages.end (), [] (const MessagePtr &message) {
+        return gst_message_has_name (message.get (), "dmdsync/frame-rate");
+      });
+  ASSERT_NE (said, pipeline.messages.end ());
+  double measured = 0;
+  gst_structure_get_double (
+      gst_message_get_structure (said->get ()), "measured", &measured);
+  EXPECT_NEAR (measured, 80, 0.1);
+}
+
+TEST (Gige, ExposureAndLinesAreFeaturesOfTheCamera)
+{
+  GigeCameraOptions options;
+  const auto camera = open_camera (
+      options, [] (std::uint64_t, ImageView<std::uint16_t> picture) {
+        for (int y = 0; y < picture.height; y++)
+          std::fill_n (picture.row (y), picture.width, 200);
+        return true;
+      });
+  int level = 0;
+  CameraPipeline pipeline (
+      camera_source ("50/1", "GRAY8",
+          "num-buffers=3 exposure=5000 features=\"TriggerSelector=FrameStart "
+          "TriggerMode=Off LineSelector=Line1 LineMode=Output "
+          "LineSource=ExposureActive LineInverter=true\""),
+      [&] (GstBuffer *buffer, const GstVideoInfo &info) {
+        MappedFrame mapped (info, buffer, GST_MAP_READ);
+        level = view_of<std::uint8_t> (mapped).at (9, 9);
+      });
+  pipeline.play ();
+  EXPECT_EQ (pipeline.wait_end (), "end");
+  EXPECT_EQ (level, 50) << "a quarter of the period's light";
+}
+
+TEST (Gige, ACameraThatStopsIsAnErrorAndACleanStop)
+{
+  GigeCameraOptions options;
+  ASSERT_TRUE (options.faults.add ("stop@20").ok ());
+  const auto camera = open_camera (std::move (options));
+  Received received;
+  CameraPipeline pipeline (camera_source () + kSync,
+      [&] (auto *buffer, auto &info) { received.take (buffer, info); });
+  pipeline.play ();
+  const std::string error = pipeline.wait_end ();
+  EXPECT_NE (error.find ("data stream error"), std::string::npos) << error;
+  EXPECT_EQ (received.frames.size () + received.first_frame, 20u);
+  EXPECT_EQ (received.wrong, 0);
+  /* The error comes first, why it came after it. */
+  const MessagePtr warning = pipeline.wait (GST_MESSAGE_WARNING);
+  ASSERT_TRUE (warning);
+  EXPECT_NE (CameraPipeline::error_text (warning).find ("gets no trigger"),
+      std::string::npos);
+  pipeline.stop ();
+}
+
+TEST (Gige, ACameraThatRestartsIsLockedAtOnceInTheNextRun)
+{
+  auto camera = open_camera ({});
+  std::vector<bool> locked;
+  CameraPipeline pipeline (
+      camera_source ("100/1", "GRAY8", "num-buffers=12") + kSync,
+      [&] (GstBuffer *buffer, const GstVideoInfo &) {
+        locked.push_back (get_frame_meta (buffer)->locked);
+      });
+  for (int run = 0; run < 2; run++) {
+    SCOPED_TRACE (run);
+    const auto camera = open_camera ({});
+    locked.clear ();
+    pipeline.play ();
+    EXPECT_EQ (pipeline.wait_end (), "end");
+    pipeline.stop ();
+    ASSERT_EQ (locked.size (), 12u);
+    EXPECT_TRUE (locked[9]);
+    EXPECT_EQ (counter (pipeline, "frames-lost"), 0u);
+  }
 }
 
 TEST (Gige, TwoCamerasSideBySide)

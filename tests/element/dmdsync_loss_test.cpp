@@ -1,0 +1,221 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* dmdsync and frames that are incomplete, kept too long, packed, or come at
+ * another rate. */
+#include "camera/packed_mono.h"
+#include "sync_harness.h"
+
+namespace
+{
+
+using namespace cexp;
+using namespace cexp::test;
+
+const auto *const linked =
+    ::testing::AddGlobalTestEnvironment (new LinkedElements);
+
+constexpr GstClockTime kMs = GST_MSECOND;
+
+BufferPtr
+flat_frame (int level, GstClockTime pts)
+{
+  return frame_of (draw<std::uint8_t> (kSyncWidth, kSyncHeight,
+                       [level] (int, int) { return level; }),
+      pts);
+}
+
+/* A buffer of a camera's ring, which the camera writes into when it likes. */
+struct Ring {
+  std::vector<guint8> bytes =
+      std::vector<guint8> (kSyncWidth * kSyncHeight, 77);
+
+  BufferPtr frame ()
+  {
+    BufferPtr buffer (gst_buffer_new_wrapped_full (GstMemoryFlags (0),
+        bytes.data (), bytes.size (), 0, bytes.size (), nullptr, nullptr));
+    GST_BUFFER_PTS (buffer.get ()) = 0;
+    return buffer;
+  }
+  void write () { std::fill (bytes.begin (), bytes.end (), guint8 (5)); }
+};
+
+int
+first_pixel (const BufferPtr &buffer, const CapsPtr &caps)
+{
+  return image_of<std::uint8_t> (buffer.get (), caps.get ()).at (3, 3);
+}
+
+TEST (DmdsyncLoss, AnIncompleteFrameIsCountedSaidAndFlaggedOrDropped)
+{
+  SyncHarness sync;
+  sync.start ();
+  sync.send_frames (0, 1);
+  BufferPtr flagged = flat_frame (50, 40 * kMs);
+  GST_BUFFER_FLAG_SET (flagged.get (), GST_BUFFER_FLAG_CORRUPTED);
+  ASSERT_EQ (sync.push (std::move (flagged)), GST_FLOW_OK);
+  BufferPtr cut = flat_frame (50, 80 * kMs);
+  gst_buffer_set_size (cut.get (), 100);
+  ASSERT_EQ (sync.push (std::move (cut)), GST_FLOW_OK);
+  sync.send_frames (3, 4);
+
+  EXPECT_FALSE (
+      GST_BUFFER_FLAG_IS_SET (sync.pull ().get (), GST_BUFFER_FLAG_CORRUPTED));
+  const BufferPtr second = sync.pull ();
+  ASSERT_TRUE (second);
+  EXPECT_TRUE (
+      GST_BUFFER_FLAG_IS_SET (second.get (), GST_BUFFER_FLAG_CORRUPTED));
+  const BufferPtr after = sync.pull ();
+  ASSERT_TRUE (after);
+  EXPECT_EQ (GST_BUFFER_OFFSET (after.get ()), 3u);
+  EXPECT_TRUE (GST_BUFFER_FLAG_IS_SET (after.get (), GST_BUFFER_FLAG_DISCONT));
+  EXPECT_EQ (sync.get_property<guint64> ("frames-incomplete"), 2u);
+  EXPECT_EQ (sync.get_property<guint64> ("frames-lost"), 0u);
+
+  MessagePtr said = sync.element_message ("dmdsync/frame-incomplete");
+  EXPECT_EQ (uint64_field (said, "frame"), 1u);
+  said = sync.element_message ("dmdsync/frame-incomplete");
+  EXPECT_EQ (uint64_field (said, "frame"), 2u);
+  EXPECT_EQ (uint64_field (said, "bytes"), 100u);
+  said = sync.element_message ("dmdsync/frame-dropped");
+  EXPECT_EQ (string_field (said, "reason"), "incomplete");
+
+  const EventPtr gap = sync.pull_event (GST_EVENT_GAP);
+  ASSERT_TRUE (gap);
+  GstClockTime from = 0;
+  GstClockTime length = 0;
+  gst_event_parse_gap (gap.get (), &from, &length);
+  EXPECT_EQ (from, 80 * kMs);
+  EXPECT_EQ (length, 40 * kMs);
+}
+
+/* Waits for the thread that copies, up to a minute. */
+guint64
+wait_held (SyncHarness &sync, guint64 frames)
+{
+  const gint64 end = g_get_monotonic_time () + 60 * G_TIME_SPAN_SECOND;
+  guint64 held = 0;
+  while ((held = sync.get_property<guint64> ("frames-held")) < frames &&
+         g_get_monotonic_time () < end)
+    g_thread_yield ();
+  return held;
+}
+
+TEST (DmdsyncLoss, AFrameThatIsKeptTooLongIsCopiedBeforeItChanges)
+{
+  Ring ring;
+  SyncHarness sync ("max-hold=1000000");
+  sync.start ();
+  ASSERT_EQ (sync.push (ring.frame ()), GST_FLOW_OK);
+  const BufferPtr kept = sync.pull ();
+  ASSERT_TRUE (kept);
+  /* A part of it, as a cropping element has it. */
+  const BufferPtr part (
+      gst_buffer_copy_region (kept.get (), GST_BUFFER_COPY_MEMORY, 100, 50));
+  EXPECT_EQ (wait_held (sync, 1), 1u);
+
+  ring.write ();
+  EXPECT_EQ (first_pixel (kept, sync.pad_caps ()), 77);
+  guint8 byte = 0;
+  ASSERT_EQ (gst_buffer_extract (part.get (), 20, &byte, 1), 1u);
+  EXPECT_EQ (byte, 77);
+  const MessagePtr said = sync.element_message ("dmdsync/frame-held");
+  EXPECT_EQ (uint64_field (said, "frame"), 0u);
+  EXPECT_NE (sync.warning ().find ("num-arv-buffers"), std::string::npos);
+}
+
+TEST (DmdsyncLoss, WhatIsGivenBackInTimeIsNotCopied)
+{
+  Ring ring;
+  SyncHarness sync ("max-hold=3600000000000");
+  sync.start ();
+  ASSERT_EQ (sync.push (ring.frame ()), GST_FLOW_OK);
+  const BufferPtr kept = sync.pull ();
+  ASSERT_TRUE (kept);
+  ring.write ();
+  EXPECT_EQ (first_pixel (kept, sync.pad_caps ()), 5) << "the same memory";
+  EXPECT_EQ (sync.get_property<guint64> ("frames-held"), 0u);
+}
+
+TEST (DmdsyncLoss, NobodyReadsTheCamerasMemoryWhenItIsGone)
+{
+  BufferPtr kept;
+  CapsPtr caps;
+  Ring ring;
+  {
+    SyncHarness sync ("max-hold=3600000000000");
+    sync.start ();
+    ASSERT_EQ (sync.push (ring.frame ()), GST_FLOW_OK);
+    kept = sync.pull ();
+    caps = sync.pad_caps ();
+    gst_element_set_state (sync.element (), GST_STATE_NULL);
+  }
+  ASSERT_TRUE (kept);
+  ring.write ();
+  EXPECT_EQ (first_pixel (kept, caps), 77);
+}
+
+TEST (DmdsyncLoss, PackedPixelsAreUnpackedWithoutAShift)
+{
+  for (const MonoFormat format :
+      {MonoFormat::mono10_packed, MonoFormat::mono12_packed,
+          MonoFormat::mono10p, MonoFormat::mono12p, MonoFormat::mono12})
+    for (const int width : {64, 66}) {
+      SCOPED_TRACE (std::string (mono_format_text (format)) + " " +
+                    std::to_string (width));
+      SyncHarness sync (
+          std::string ("pixel-format=") + mono_format_text (format));
+      sync.set_caps (gray_caps (width, kSyncHeight, "25/1", "GRAY16_LE"));
+      const int mask = (1 << significant_bits (format)) - 1;
+      Image<std::uint16_t> values (width, kSyncHeight);
+      for (int y = 0; y < kSyncHeight; y++)
+        for (int x = 0; x < width; x++)
+          values.at (x, y) = std::uint16_t ((x * 37 + y * 211) & mask);
+      /* aravissrc fills rows up to four bytes. */
+      const gsize row = (row_bytes (format, width) + 3) / 4 * 4;
+      BufferPtr packed (gst_buffer_new_and_alloc (row * gsize (kSyncHeight)));
+      GstMapInfo map;
+      ASSERT_TRUE (gst_buffer_map (packed.get (), &map, GST_MAP_WRITE));
+      ASSERT_TRUE (pack_mono (format, values.view (),
+          {map.data, int (row), kSyncHeight, std::ptrdiff_t (row)})
+                       .ok ());
+      gst_buffer_unmap (packed.get (), &map);
+      GST_BUFFER_PTS (packed.get ()) = 0;
+      ASSERT_EQ (sync.push (std::move (packed)), GST_FLOW_OK);
+      const BufferPtr out = sync.pull ();
+      ASSERT_TRUE (out);
+      const auto caps = sync.pad_caps ();
+      const auto image = image_of<std::uint16_t> (out.get (), caps.get ());
+      for (int y = 0; y < kSyncHeight; y++)
+        for (int x = 0; x < width; x++)
+          ASSERT_EQ (image.at (x, y), values.at (x, y)) << x << "," << y;
+      EXPECT_EQ (get_frame_meta (out.get ())->bits, significant_bits (format));
+    }
+}
+
+TEST (DmdsyncLoss, APixelFormatThatDoesNotFitTheCapsIsAnError)
+{
+  for (const char *format : {"Mono12p", "Mono14"}) {
+    SyncHarness sync (std::string ("pixel-format=") + format);
+    sync.start ();
+    EXPECT_NE (sync.send (0), GST_FLOW_OK);
+    EXPECT_NE (sync.error ().find (format), std::string::npos);
+  }
+}
+
+TEST (DmdsyncLoss, AnotherRateThanThatOfTheCapsIsSaid)
+{
+  SyncHarness sync;
+  sync.start ();
+  for (int k = 0; k < 200; k++)
+    ASSERT_EQ (sync.send (GstClockTime (k) * GST_SECOND / 24), GST_FLOW_OK);
+  const MessagePtr said = sync.element_message ("dmdsync/frame-rate");
+  ASSERT_TRUE (said);
+  double measured = 0;
+  EXPECT_TRUE (gst_structure_get_double (
+      gst_message_get_structure (said.get ()), "measured", &measured));
+  EXPECT_NEAR (measured, 24, 0.01);
+  EXPECT_NE (sync.warning ().find ("24 a second, the caps say 25/1"),
+      std::string::npos);
+  EXPECT_FALSE (sync.element_message ("dmdsync/frame-rate"));
+}
+
+} // namespace

@@ -1,0 +1,62 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The rate of frames against the one that was said. */
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "clock/rate_watch.h"
+
+using namespace cexp;
+
+namespace
+{
+
+/* What is told of frames of one rate with jitter and losses. */
+std::vector<double>
+told (FrameRate said, FrameRate real, double jitter_ms, double loss)
+{
+  RateWatch watch (said);
+  std::mt19937 random (1);
+  std::uniform_real_distribution delay (0.0, jitter_ms * 1e6 + 1e-3);
+  std::bernoulli_distribution lost (loss);
+  std::vector<double> rates;
+  for (int k = 0; k < 1000; k++)
+    if (!lost (random))
+      if (const auto rate =
+              watch.take (real.time_of (k) + Nanoseconds (delay (random))))
+        rates.push_back (*rate);
+  return rates;
+}
+
+} // namespace
+
+TEST (RateWatch, SaysNothingOfTheRateThatWasSaid)
+{
+  for (const FrameRate rate : {FrameRate{25, 1}, FrameRate{30000, 1001}})
+    for (const double loss : {0.0, 0.3}) {
+      EXPECT_TRUE (told (rate, rate, 0, loss).empty ());
+      EXPECT_TRUE (told (rate, rate, 5, loss).empty ());
+    }
+}
+
+TEST (RateWatch, TellsAnotherRateOnce)
+{
+  for (const FrameRate real : {FrameRate{24, 1}, FrameRate{30000, 1001},
+           FrameRate{50, 1}, FrameRate{25, 2}, FrameRate{200, 1}})
+    for (const double loss : {0.0, 0.3}) {
+      SCOPED_TRACE (real.num);
+      const auto rates = told ({25, 1}, real, real.num > 100 ? 0 : 2, loss);
+      ASSERT_EQ (rates.size (), 1u);
+      EXPECT_NEAR (rates[0] * real.den / real.num, 1, 0.005);
+    }
+}
+
+TEST (RateWatch, AGapThatIsNoneIsNotMeasured)
+{
+  RateWatch watch ({25, 1});
+  for (int round = 0; round < 100; round++) {
+    for (int k = 0; k < 3; k++)
+      EXPECT_FALSE (watch.take (1'000'000'000LL * round + 40'000'000 * k));
+    watch.resync ();
+  }
+}

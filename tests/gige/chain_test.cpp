@@ -1,0 +1,199 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The whole chain, with nothing but the light and the silicon in software: the
+ * driver uploads masks to a DLPC900 on the USB, the camera sees the scene
+ * through the mirrors that the board shows, aravissrc reads it over the
+ * network, and what is split, recorded and decoded again is the scene. */
+#include <cstdio>
+#include <filesystem>
+#include <map>
+
+#include "camera_rig.h"
+#include "dmd/dmd.h"
+#include "emulated_dlpc900.h"
+#include "linked_elements.h"
+#include "optics/bench.h"
+#include "own_network.h"
+#include "usb_bed.h"
+
+namespace
+{
+
+using namespace cexp;
+using namespace cexp::test;
+
+const auto *const linked =
+    ::testing::AddGlobalTestEnvironment (new LinkedElements);
+
+constexpr std::uint16_t kDlpc900 = 0xC900;
+constexpr int kDlp5500 = 5;
+constexpr const char *kSchedule = "sequential:2x2";
+constexpr int kSlots = 4;
+constexpr guint64 kFrames = 40;
+
+/** What there is to see in a slot of a frame. */
+std::uint8_t
+scene_value (std::uint64_t frame, int slot, int x, int y)
+{
+  return std::uint8_t (
+      scene_pixel (frame * kSlots + std::uint64_t (slot), x, y));
+}
+
+/** Camera and mirrors: the optical model exposes through the masks that the
+ * board shows, and through none while it stands still. */
+class Optics
+{
+public:
+  explicit Optics (EmulatedDlpc900 &board)
+      : board_ (board),
+        bench_ (*OpticalBench::make (kCameraWidth, kCameraHeight, {})),
+        scene_ (kCameraWidth, kCameraHeight),
+        coded_ (kCameraWidth, kCameraHeight)
+  {
+  }
+
+  bool expose (std::uint64_t frame, ImageView<std::uint16_t> picture)
+  {
+    if (!board_.running ())
+      return false;
+    if (masks_.empty ())
+      find_masks ();
+    bench_.begin (schedule_);
+    for (int slot = 0; slot < kSlots; slot++) {
+      for (int y = 0; y < kCameraHeight; y++)
+        for (int x = 0; x < kCameraWidth; x++)
+          scene_.at (x, y) = scene_value (frame, slot, x, y);
+      const auto view = scene_.view ();
+      bench_.expose (ImageView<const std::uint8_t> (view),
+          masks_[std::size_t (slot)], 1.0);
+    }
+    bench_.read_out (frame, coded_.view ());
+    for (int y = 0; y < kCameraHeight; y++)
+      std::copy_n (coded_.view ().row (y), kCameraWidth, picture.row (y));
+    return true;
+  }
+
+private:
+  /* Which mask of the schedule each line of the board's table shows. */
+  void find_masks ()
+  {
+    for (int slot = 0; slot < kSlots; slot++) {
+      const auto shown = board_.mirrors (slot);
+      int found = -1;
+      for (int mask = 0; mask < kSlots; mask++) {
+        Image<std::uint8_t> expected (shown.width (), shown.height ());
+        render_mask (schedule_, mask, expected.view ());
+        if (shown == expected)
+          found = mask;
+      }
+      masks_.push_back (found);
+    }
+  }
+
+  EmulatedDlpc900 &board_;
+  const Schedule schedule_ = *Schedule::parse (kSchedule);
+  OpticalBench bench_;
+  Image<std::uint8_t> scene_;
+  Image<std::uint8_t> coded_;
+  std::vector<int> masks_;
+};
+
+/** Compares subframes with the scene, whichever frame of the camera was the
+ * first. */
+struct Subframes {
+  std::map<guint64, int> of_frame;
+  guint64 first_frame = 0;
+  int wrong = 0;
+
+  static bool differs (
+      GstBuffer *buffer, const GstVideoInfo &info, guint64 frame, int slot)
+  {
+    MappedFrame mapped (info, buffer, GST_MAP_READ);
+    const auto view = view_of<std::uint8_t> (mapped);
+    for (int y = 0; y < view.height; y++)
+      for (int x = 0; x < view.width; x++)
+        if (view.at (x, y) !=
+            scene_value (frame, slot, 2 * x + slot % 2, 2 * y + slot / 2))
+          return true;
+    return false;
+  }
+  void take (GstBuffer *buffer, const GstVideoInfo &info)
+  {
+    const FrameMeta meta = get_frame_meta (buffer).value_or (FrameMeta ());
+    if (of_frame.empty ())
+      while (first_frame < 1000 &&
+             differs (buffer, info, first_frame, meta.subframe))
+        first_frame++;
+    of_frame[meta.frame]++;
+    wrong += differs (buffer, info, first_frame + meta.frame, meta.subframe);
+  }
+};
+
+TEST (Chain, WhatIsSplitRecordedAndDecodedIsTheScene)
+{
+  const std::string recording =
+      std::filesystem::temp_directory_path () /
+      ("chain-" + std::to_string (getpid ()) + ".mkv");
+  UsbBed bed;
+  const auto board = std::make_shared<EmulatedDlpc900> (kDlp5500);
+  bed.plug ("1-2", kDlpc900, "LCR", board);
+  Optics optics (*board);
+  const auto camera = open_camera ({}, [&] (std::uint64_t frame, auto picture) {
+    return optics.expose (frame, picture);
+  });
+
+  Subframes live;
+  {
+    CameraPipeline pipeline (
+        camera_source (
+            "25/1", "GRAY8", "num-buffers=" + std::to_string (kFrames)) +
+            "dmdsync name=sync device=usb:1-2 timestamp-at=device-clock "
+            "schedule=" +
+            kSchedule +
+            " ! codedexposure-demux name=demux demux.coded ! queue ! "
+            "avenc_ffv1 ! matroskamux timecodescale=1000 ! filesink location=" +
+            recording + " demux.src ! queue max-size-buffers=100 ! ",
+        [&] (auto *buffer, auto &info) { live.take (buffer, info); });
+    /* A window shows every subframe at its time, or late, but drops none. */
+    const auto window = pipeline.element ("sink");
+    g_object_set (
+        window.get (), "sync", TRUE, "max-lateness", gint64 (-1), nullptr);
+    pipeline.play ();
+    EXPECT_EQ (pipeline.wait_end (), "end");
+    EXPECT_TRUE (board->running ());
+    pipeline.stop ();
+    EXPECT_FALSE (board->running ());
+  }
+  EXPECT_EQ (live.of_frame.size (), kFrames);
+  for (const auto &[frame, subframes] : live.of_frame)
+    EXPECT_EQ (subframes, kSlots) << frame;
+  EXPECT_EQ (live.wrong, 0);
+
+  Subframes decoded;
+  CameraPipeline decoder (
+      "filesrc location=" + recording +
+          " ! matroskademux ! avdec_ffv1 ! codedexposure-demux ! ",
+      [&] (auto *buffer, auto &info) { decoded.take (buffer, info); });
+  decoder.play ();
+  EXPECT_EQ (decoder.wait_end (), "end");
+  EXPECT_EQ (decoded.of_frame.size (), kFrames);
+  EXPECT_EQ (decoded.wrong, 0);
+  EXPECT_EQ (decoded.first_frame, live.first_frame);
+  std::filesystem::remove (recording);
+}
+
+} // namespace
+
+int
+main (int argc, char **argv)
+{
+  const bool alone = enter_own_network ();
+  gst_init (&argc, &argv);
+  ::testing::InitGoogleTest (&argc, argv);
+  if (!alone) {
+    std::puts ("a network of its own is not allowed here: skipped");
+    return 77;
+  }
+  const int result = RUN_ALL_TESTS ();
+  gst_deinit ();
+  return result;
+}

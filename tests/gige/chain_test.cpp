@@ -27,6 +27,7 @@ const auto *const linked =
 constexpr std::uint16_t kDlpc900 = 0xC900;
 constexpr int kDlp5500 = 5;
 constexpr const char *kSchedule = "sequential:2x2";
+constexpr const char *kWithPilot = "sequential:2x2,pilot=16";
 constexpr int kSlots = 4;
 constexpr guint64 kFrames = 40;
 
@@ -43,28 +44,41 @@ scene_value (std::uint64_t frame, int slot, int x, int y)
 class Optics
 {
 public:
-  explicit Optics (EmulatedDlpc900 &board)
-      : board_ (board),
+  explicit Optics (EmulatedDlpc900 &board, const char *schedule = kSchedule)
+      : board_ (board), schedule_ (*Schedule::parse (schedule)),
         bench_ (*OpticalBench::make (kCameraWidth, kCameraHeight, {})),
         scene_ (kCameraWidth, kCameraHeight),
         coded_ (kCameraWidth, kCameraHeight)
   {
   }
 
+  /** The DMD misses a trigger right before this frame of its first run. */
+  std::int64_t slip_before = -1;
+  /** Number of the frame that came after the slip, from the first one on. */
+  std::int64_t slipped = -1;
+
   bool expose (std::uint64_t frame, ImageView<std::uint16_t> picture)
   {
-    if (!board_.running ())
+    if (!board_.running ()) {
+      shown_ = 0;
       return false;
+    }
     if (masks_.empty ())
       find_masks ();
+    if (slipped < 0 && shown_ == slip_before * kSlots) {
+      slipped = std::int64_t (frame - first_);
+      shown_--;
+    }
+    if (std::exchange (began_, true) == false)
+      first_ = frame;
     bench_.begin (schedule_);
     for (int slot = 0; slot < kSlots; slot++) {
       for (int y = 0; y < kCameraHeight; y++)
         for (int x = 0; x < kCameraWidth; x++)
           scene_.at (x, y) = scene_value (frame, slot, x, y);
       const auto view = scene_.view ();
-      bench_.expose (ImageView<const std::uint8_t> (view),
-          masks_[std::size_t (slot)], 1.0);
+      const auto line = std::size_t (shown_++) % masks_.size ();
+      bench_.expose (ImageView<const std::uint8_t> (view), masks_[line], 1.0);
     }
     bench_.read_out (frame, coded_.view ());
     for (int y = 0; y < kCameraHeight; y++)
@@ -76,10 +90,11 @@ private:
   /* Which mask of the schedule each line of the board's table shows. */
   void find_masks ()
   {
-    for (int slot = 0; slot < kSlots; slot++) {
-      const auto shown = board_.mirrors (slot);
+    const int lines = int (board_.shown ().size ());
+    for (int line = 0; line < lines; line++) {
+      const auto shown = board_.mirrors (line);
       int found = -1;
-      for (int mask = 0; mask < kSlots; mask++) {
+      for (int mask = 0; mask < schedule_.masks (); mask++) {
         Image<std::uint8_t> expected (shown.width (), shown.height ());
         render_mask (schedule_, mask, expected.view ());
         if (shown == expected)
@@ -90,11 +105,14 @@ private:
   }
 
   EmulatedDlpc900 &board_;
-  const Schedule schedule_ = *Schedule::parse (kSchedule);
+  const Schedule schedule_;
   OpticalBench bench_;
   Image<std::uint8_t> scene_;
   Image<std::uint8_t> coded_;
-  std::vector<int> masks_;
+  std::vector<int> masks_; // by line of the board's table
+  std::int64_t shown_ = 0; // slots since the board began
+  std::uint64_t first_ = 0;
+  bool began_ = false;
 };
 
 /** Compares subframes with the scene, whichever frame of the camera was the
@@ -179,6 +197,52 @@ TEST (Chain, WhatIsSplitRecordedAndDecodedIsTheScene)
   EXPECT_EQ (decoded.wrong, 0);
   EXPECT_EQ (decoded.first_frame, live.first_frame);
   std::filesystem::remove (recording);
+}
+
+guint64
+counter_of (const CameraPipeline &pipeline)
+{
+  return property<guint64> (pipeline.element ("sync").get (), "slips");
+}
+
+TEST (Chain, ASlipIsFoundWithinThreeFramesAndMended)
+{
+  UsbBed bed;
+  const auto board = std::make_shared<EmulatedDlpc900> (kDlp5500);
+  bed.plug ("1-2", kDlpc900, "LCR", board);
+  Optics optics (*board, kWithPilot);
+  optics.slip_before = 20;
+  const auto camera = open_camera ({}, [&] (std::uint64_t frame, auto picture) {
+    return optics.expose (frame, picture);
+  });
+  std::map<guint64, bool> locked;
+  CameraPipeline pipeline (
+      camera_source ("25/1", "GRAY8", "num-buffers=60") +
+          "dmdsync name=sync device=usb:1-2 timestamp-at=device-clock "
+          "schedule=" +
+          kWithPilot + " ! ",
+      [&] (GstBuffer *buffer, const GstVideoInfo &) {
+        const auto meta = *get_frame_meta (buffer);
+        locked[meta.frame] = meta.locked;
+      });
+  pipeline.play ();
+  EXPECT_EQ (pipeline.wait_end (), "end");
+
+  ASSERT_GE (optics.slipped, 0);
+  const auto slip = guint64 (optics.slipped);
+  const auto first_unlocked = std::find_if (locked.begin (), locked.end (),
+      [] (const auto &frame) { return !frame.second; });
+  ASSERT_NE (first_unlocked, locked.end ());
+  EXPECT_GE (first_unlocked->first, slip);
+  EXPECT_LT (first_unlocked->first, slip + 3);
+  const auto mended = std::find_if (first_unlocked, locked.end (),
+      [] (const auto &frame) { return frame.second; });
+  ASSERT_NE (mended, locked.end ());
+  EXPECT_EQ (counter_of (pipeline), 1u);
+  EXPECT_TRUE (std::all_of (
+      mended, locked.end (), [] (const auto &frame) { return frame.second; }));
+  std::printf ("slip in frame %d, found in %d, locked again in %d\n",
+      int (slip), int (first_unlocked->first), int (mended->first));
 }
 
 } // namespace

@@ -71,13 +71,14 @@ say_held (GstDmdSync *self, const Overdue &overdue)
   {
     const ObjectLock lock (self);
     st.counters.frames_held++;
+    st.counters.frames_spoilt += overdue.spoilt;
   }
   notify (self, "frames-held");
   gst_element_post_message (GST_ELEMENT (self),
       gst_message_new_element (GST_OBJECT (self),
           gst_structure_new ("dmdsync/frame-held", "frame", G_TYPE_UINT64,
-              overdue.number, "in-use", G_TYPE_BOOLEAN,
-              gboolean (overdue.in_use), nullptr)));
+              overdue.number, "spoilt", G_TYPE_BOOLEAN,
+              gboolean (overdue.spoilt), nullptr)));
   if (!st.warned_held.exchange (true))
     GST_ELEMENT_WARNING (self, RESOURCE, NO_SPACE_LEFT,
         ("Frames are kept downstream, as in a deep queue, until the camera "

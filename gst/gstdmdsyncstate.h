@@ -57,7 +57,8 @@ struct Counters {
   guint64 frames_early = 0; ///< dropped: exposed before the stream's time 0
   guint64 frames_skipped = 0;
   guint64 frames_repeated = 0;
-  guint64 frames_held = 0; ///< kept until their memory was due; copied
+  guint64 frames_held = 0;   ///< kept until their memory was due; copied
+  guint64 frames_spoilt = 0; ///< of these, copied too late for certainty
   guint64 slips = 0;
   guint64 clock_restarts = 0;
   gdouble clock_drift = 0; ///< ppm by which the camera's clock is fast

@@ -187,7 +187,8 @@ LeaseKeeper::lend (
     const std::lock_guard guard (lock_);
     std::erase_if (
         entries_, [] (const Entry &entry) { return entry.lease.expired (); });
-    entries_.push_back ({lease, number, Clock::now () + time});
+    const auto now = Clock::now ();
+    entries_.push_back ({lease, number, now + time, now + 2 * time});
   }
   changed_.notify_all ();
 }
@@ -224,7 +225,7 @@ LeaseKeeper::work ()
     if (const auto lease = first.lease.lock ()) {
       /* We hold the lease as well, but nobody maps it through us. */
       const bool in_use = lease->end ();
-      overdue_ ({first.number, in_use});
+      overdue_ ({first.number, in_use || Clock::now () > first.due});
     }
     guard.lock ();
   }

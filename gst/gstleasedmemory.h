@@ -22,7 +22,9 @@ class Lease;
 /** What became of a frame that was kept for longer than its lease. */
 struct Overdue {
   guint64 number; ///< as lend () was told
-  bool in_use;    ///< somebody was reading it: what he reads may change
+  /** Somebody was reading it, or the copy came so late that the source may have
+   * written already: it may show something else. */
+  bool spoilt;
 };
 
 /**
@@ -43,7 +45,8 @@ public:
   LeaseKeeper &operator= (const LeaseKeeper &) = delete;
 
   /** Puts memory that is lent for @p time, and read-only, in the place of that
-   * of @p buffer, which is writable. */
+   * of @p buffer, which is writable. The source must not write for twice as
+   * long. */
   void lend (GstBuffer *buffer, guint64 number, std::chrono::nanoseconds time);
   /** Ends all leases: nobody looks into the source's memory after this. */
   void recall ();
@@ -54,6 +57,7 @@ private:
     std::weak_ptr<Lease> lease;
     guint64 number;
     Clock::time_point end;
+    Clock::time_point due; ///< when the source may write
   };
 
   void work ();

@@ -164,7 +164,8 @@ TEST (Chain, WhatIsSplitRecordedAndDecodedIsTheScene)
     CameraPipeline pipeline (
         camera_source (
             "25/1", "GRAY8", "num-buffers=" + std::to_string (kFrames)) +
-            "dmdsync name=sync device=usb:1-2 timestamp-at=device-clock "
+            "dmdsync name=sync device=usb:1-2,guard=off "
+            "timestamp-at=device-clock "
             "schedule=" +
             kSchedule +
             " ! codedexposure-demux name=demux demux.coded ! queue ! "
@@ -216,11 +217,11 @@ TEST (Chain, ASlipIsFoundWithinThreeFramesAndMended)
     return optics.expose (frame, picture);
   });
   std::map<guint64, bool> locked;
-  CameraPipeline pipeline (
-      camera_source ("25/1", "GRAY8", "num-buffers=60") +
-          "dmdsync name=sync device=usb:1-2 timestamp-at=device-clock "
-          "schedule=" +
-          kWithPilot + " ! ",
+  CameraPipeline pipeline (camera_source ("25/1", "GRAY8", "num-buffers=60") +
+                               "dmdsync name=sync device=usb:1-2,guard=off "
+                               "timestamp-at=device-clock "
+                               "schedule=" +
+                               kWithPilot + " ! ",
       [&] (GstBuffer *buffer, const GstVideoInfo &) {
         const auto meta = *get_frame_meta (buffer);
         locked[meta.frame] = meta.locked;

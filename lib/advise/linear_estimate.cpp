@@ -1,0 +1,219 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "advise/linear_estimate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <map>
+#include <numeric>
+#include <span>
+
+namespace cexp
+{
+
+namespace
+{
+
+std::vector<Offset>
+disc (double radius)
+{
+  std::vector<Offset> places;
+  const int r = int (radius);
+  for (int y = -r; y <= r; y++)
+    for (int x = -r; x <= r; x++)
+      if (std::hypot (x, y) <= radius)
+        places.push_back ({x, y});
+  return places;
+}
+
+/* Covariances of the light of two slots at two places, by |dx|, |dy| and the
+ * slots between them, and of a slot with the truth of another. */
+class Covariances
+{
+public:
+  Covariances (
+      const ExposureModel &model, const SceneStatistics &scene, int reach)
+      : side_ (reach + 1), slots_ (model.slots ())
+  {
+    /* A quarter of a detail apart, as far as time allows. */
+    const double path = scene.speed * model.hold () / scene.detail;
+    const int samples = int (std::clamp (4.0 * path, 6.0, 12.0));
+    const auto within = time_steps (model.active (), model.active (), samples);
+    const auto towards = time_steps (model.active (), model.hold (), samples);
+    for (int dy = 0; dy < side_; dy++)
+      for (int dx = 0; dx < side_; dx++)
+        for (int k = 0; k < slots_; k++) {
+          const double between = k * model.pitch ();
+          light_.push_back (light_covariance (scene, dx, dy, between, within));
+          truth_.push_back (light_covariance (scene, dx, dy, between, towards));
+        }
+  }
+  double light (int dx, int dy, int slots) const
+  {
+    return light_[index (dx, dy, slots)];
+  }
+  double truth (int dx, int dy, int slots) const
+  {
+    return truth_[index (dx, dy, slots)];
+  }
+
+private:
+  std::size_t index (int dx, int dy, int slots) const
+  {
+    return std::size_t (
+        (std::abs (dy) * side_ + std::abs (dx)) * slots_ + std::abs (slots));
+  }
+  int side_, slots_;
+  std::vector<double> light_, truth_;
+};
+
+/* A symmetric positive definite system, factored once. */
+class Cholesky
+{
+public:
+  explicit Cholesky (std::vector<double> a, std::size_t n)
+      : l_ (std::move (a)), n_ (n)
+  {
+    for (std::size_t j = 0; j < n; j++)
+      for (std::size_t i = j; i < n; i++) {
+        double sum = at (i, j);
+        for (std::size_t k = 0; k < j; k++)
+          sum -= at (i, k) * at (j, k);
+        at (i, j) = i == j ? std::sqrt (sum) : sum / at (j, j);
+      }
+  }
+  /** Replaces the right side by the solution. */
+  void solve (std::span<double> b)
+  {
+    for (std::size_t i = 0; i < n_; i++) {
+      for (std::size_t k = 0; k < i; k++)
+        b[i] -= at (i, k) * b[k];
+      b[i] /= at (i, i);
+    }
+    for (std::size_t i = n_; i-- > 0;) {
+      for (std::size_t k = i + 1; k < n_; k++)
+        b[i] -= at (k, i) * b[k];
+      b[i] /= at (i, i);
+    }
+  }
+
+private:
+  double &at (std::size_t i, std::size_t j) { return l_[i * n_ + j]; }
+  std::vector<double> l_;
+  std::size_t n_;
+};
+
+/* Slots whose light an element lets through. */
+struct Share {
+  int slot;
+  double part;
+};
+std::vector<std::vector<Share>>
+shares_of (const ExposureModel &model)
+{
+  std::vector<std::vector<Share>> shares (std::size_t (model.elements ()));
+  for (int e = 0; e < model.elements (); e++)
+    for (int s = 0; s < model.slots (); s++)
+      if (model.open (e, s) > 0.0)
+        shares[std::size_t (e)].push_back ({s, model.open (e, s)});
+  return shares;
+}
+
+/* What is known of the coded pixels at the places around a pixel. */
+struct Estimator {
+  const ExposureModel &model;
+  const SceneStatistics &scene;
+  Covariances covariances;
+  std::vector<std::vector<Share>> shares; ///< of each element
+  const std::vector<Offset> &places;
+
+  /** Covariances of the coded pixels with each other, lower triangle. */
+  std::vector<double> system (const std::vector<int> &elements) const
+  {
+    const std::size_t n = places.size ();
+    std::vector<double> result (n * n);
+    for (std::size_t i = 0; i < n; i++)
+      for (std::size_t j = 0; j <= i; j++) {
+        double sum = i == j ? model.variance (elements[i], scene.level) : 0.0;
+        for (const Share &a : shares[std::size_t (elements[i])])
+          for (const Share &b : shares[std::size_t (elements[j])])
+            sum += a.part * b.part *
+                   covariances.light (places[i].x - places[j].x,
+                       places[i].y - places[j].y, a.slot - b.slot);
+        result[i * n + j] = sum;
+      }
+    return result;
+  }
+  /** Covariances of the coded pixels with the truth in a slot. */
+  std::vector<double> sought (const std::vector<int> &elements, int slot) const
+  {
+    std::vector<double> result (places.size ());
+    for (std::size_t i = 0; i < places.size (); i++)
+      for (const Share &a : shares[std::size_t (elements[i])])
+        result[i] += a.part * covariances.truth (
+                                  places[i].x, places[i].y, a.slot - slot);
+    return result;
+  }
+};
+
+/* A pixel of every element: the neighbourhood of others of that element is the
+ * same, in tiles with a name. */
+std::map<int, Offset>
+representatives (const ExposureModel &model)
+{
+  std::map<int, Offset> found;
+  for (int y = 0; int (found.size ()) < model.elements (); y++)
+    for (int x = 0; x < Tile::kMaxPeriod; x++)
+      found.try_emplace (model.element_at (x, y), Offset{x, y});
+  return found;
+}
+
+} // namespace
+
+LinearEstimate::LinearEstimate (
+    const ExposureModel &model, const SceneStatistics &scene)
+    : slots_ (model.slots ()),
+      places_ (disc (std::max (5.0, 1.6 * std::sqrt (model.elements ()))))
+{
+  const int reach = 2 * std::abs (places_.front ().y) + 1;
+  const Estimator estimator{
+      model, scene, {model, scene, reach}, shares_of (model), places_};
+  const std::size_t n = places_.size ();
+  weights_.resize (std::size_t (model.elements () * slots_) * n);
+  for (const auto &[element, at] : representatives (model)) {
+    std::vector<int> elements;
+    for (const Offset place : places_)
+      elements.push_back (model.element_at (at.x + place.x, at.y + place.y));
+    Cholesky cholesky (estimator.system (elements), n);
+    for (int s = 0; s < slots_; s++) {
+      const auto weights = std::span (weights_).subspan (
+          std::size_t (element * slots_ + s) * n, n);
+      const std::vector<double> sought = estimator.sought (elements, s);
+      std::ranges::copy (sought, weights.begin ());
+      cholesky.solve (weights);
+      const double found = std::inner_product (
+          sought.begin (), sought.end (), weights.begin (), 0.0);
+      error_ += (scene.contrast * scene.contrast - found) /
+                (model.elements () * slots_);
+    }
+  }
+}
+
+double
+LinearEstimate::psnr () const
+{
+  return -10.0 * std::log10 (error_);
+}
+
+std::vector<EstimateTap>
+LinearEstimate::taps (int element, int slot) const
+{
+  std::vector<EstimateTap> taps;
+  const std::size_t first =
+      std::size_t (element * slots_ + slot) * places_.size ();
+  for (std::size_t i = 0; i < places_.size (); i++)
+    taps.push_back ({places_[i], weights_[first + i]});
+  return taps;
+}
+
+} // namespace cexp

@@ -43,6 +43,10 @@ predict (const std::optional<Schedule> &schedule, const Conditions &conditions)
 {
   if (const auto good = conditions.scene.check (); !good)
     return good.error ();
+  if (schedule && schedule->elements () > LinearEstimate::kMaxElements)
+    return Error{"it has " + std::to_string (schedule->elements ()) +
+                 " elements; predictions go up to " +
+                 std::to_string (LinearEstimate::kMaxElements)};
   const auto model =
       ExposureModel::make (schedule, conditions.camera, conditions.light);
   if (!model)

@@ -42,8 +42,8 @@ struct Prediction {
   std::string text () const;
 };
 
-/** Error when a number is out of range, the slots do not fit the frame period
- * or the code cannot be inverted. */
+/** Error when a number is out of range, the slots do not fit the frame period,
+ * the code cannot be inverted or has more than LinearEstimate::kMaxElements. */
 Result<Prediction> predict (
     const std::optional<Schedule> &schedule, const Conditions &conditions);
 

@@ -29,6 +29,11 @@ struct EstimateTap {
 class LinearEstimate
 {
 public:
+  /** Filters for more elements would take minutes to find. */
+  static constexpr int kMaxElements = 64;
+
+  /** @p model  of kMaxElements or fewer. Of a tile that is written out, each
+   * element stands for all of its pixels. */
   LinearEstimate (const ExposureModel &model, const SceneStatistics &scene);
 
   /** Mean squared error over pixels and slots, white being 1. */

@@ -114,6 +114,7 @@ run (int argc, char **argv)
   app.set_version_flag ("--version", "codedexposure " VERSION);
   app.add_flag ("--json", session.json, "Print results as JSON");
   app.add_flag ("--quiet", session.quiet, "Say nothing on the way");
+  add_advise_command (app, session);
   add_dmd_commands (app, session);
   add_schedule_commands (app, session);
   try {

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure schedule: what schedules say, and their masks as pictures. */
-#include <array>
 #include <fstream>
 #include <memory>
 
@@ -8,6 +7,7 @@
 #include "dmd/bitmap.h"
 #include "dmd/dmd.h"
 #include "dmd/plane_image.h"
+#include "tools/board_kinds.h"
 #include "tools/tool.h"
 
 namespace cexp::tool
@@ -27,31 +27,6 @@ struct Arguments {
   std::string rate = "25";
   bool planes = false;
 };
-
-/** Boards by name, for use without the board. */
-struct Kind {
-  const char *name;
-  Extent size;
-  Array array;
-  int masks;
-  Nanoseconds minimum_active, minimum_switching;
-};
-constexpr std::array<Kind, 4> kKinds{{
-    {"dlp3000", {608, 684}, Array::diamond, 96, 250'000, 250'000},
-    {"dlp4500", {912, 1140}, Array::diamond, 48, 235'000, 0},
-    {"dlp6500", {1920, 1080}, Array::orthogonal, 400, 105'000, 0},
-    {"dlp9000", {2560, 1600}, Array::orthogonal, 400, 105'000, 0},
-}};
-
-Result<Kind>
-find_kind (const std::string &name)
-{
-  for (const Kind &kind : kKinds)
-    if (name == kind.name)
-      return kind;
-  return Error{"no DMD is called " + in_quotes (name) +
-               "; there are dlp3000, dlp4500, dlp6500 and dlp9000"};
-}
 
 std::optional<Schedule>
 read (Session &session, const Arguments &arguments)
@@ -94,13 +69,8 @@ check (Session &session, const Arguments &arguments)
     return session.fail (Exit::usage, rate ? kind.error () : rate.error ());
   const auto plan =
       SlotPlan::fit (schedule->timing (), schedule->slots (), *rate);
-  const DmdInfo info{.name = kind->name,
-      .size = kind->size,
-      .minimum_active = kind->minimum_active,
-      .minimum_switching = kind->minimum_switching,
-      .resident_masks = kind->masks};
   const auto fits =
-      plan ? check_limits (info, *schedule, *plan) : plan.error ();
+      plan ? check_limits (*kind, *schedule, *plan) : plan.error ();
   if (!fits)
     return session.fail (Exit::does_not_fit, fits.error ());
   session.print ({{"schedule", schedule->text ()}, {"dmd", kind->name},
@@ -110,7 +80,7 @@ check (Session &session, const Arguments &arguments)
 }
 
 Result<Placement>
-placement_of (const Arguments &arguments, const Kind &kind)
+placement_of (const Arguments &arguments, const DmdInfo &kind)
 {
   Placement placement;
   const auto layout = parse_layout (arguments.layout);

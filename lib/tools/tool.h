@@ -43,6 +43,7 @@ struct Session {
 /** "25", "29.97" or "30000/1001" frames/s. */
 Result<FrameRate> parse_rate (const std::string &text);
 
+void add_advise_command (CLI::App &app, Session &session);
 void add_dmd_commands (CLI::App &app, Session &session);
 void add_schedule_commands (CLI::App &app, Session &session);
 

@@ -1,0 +1,244 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* codedexposure advise: which schedule to take. */
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+
+#include "advise/advice.h"
+#include "base/text.h"
+#include "tools/board_kinds.h"
+#include "tools/tool.h"
+
+namespace cexp::tool
+{
+
+namespace
+{
+
+using Json = nlohmann::ordered_json;
+
+struct Arguments {
+  Conditions conditions;
+  std::vector<std::string> schedules;
+  std::string size = "768x576";
+  std::string rate = "25";
+  std::string board = "dlp6500";
+  std::string readout = "0";
+  double least_rate = 0.0;
+};
+
+/** What was found of a schedule: what it would do, or why it cannot. */
+struct Finding {
+  std::string text;
+  Result<Prediction> prediction;
+};
+
+Result<Extent>
+parse_size (const std::string &text)
+{
+  const auto sides = split (text, 'x');
+  const auto width = parse_int (sides.front ());
+  const auto height = parse_int (sides.back ());
+  if (sides.size () == 2 && width && height)
+    return Extent{*width, *height};
+  return Error{"cannot use " + in_quotes (text) +
+               " as a size; write WIDTHxHEIGHT, such as 768x576"};
+}
+
+/** The schedules to look at: those that were named, else the usual ones. */
+Result<std::vector<Schedule>>
+candidates (const Arguments &arguments, const DmdInfo &board)
+{
+  const auto readout = parse_time (arguments.readout);
+  if (!readout)
+    return readout.error ();
+  if (arguments.schedules.empty ())
+    return usual_schedules (board.minimum_switching, *readout);
+  std::vector<Schedule> schedules;
+  for (const std::string &text : arguments.schedules) {
+    auto schedule = Schedule::parse (text);
+    if (!schedule)
+      return schedule.error ();
+    schedules.push_back (*std::move (schedule));
+  }
+  return schedules;
+}
+
+Result<Prediction>
+look_at (const Schedule &schedule, const Conditions &conditions,
+    const DmdInfo &board)
+{
+  const auto plan = SlotPlan::fit (
+      schedule.timing (), schedule.slots (), conditions.camera.rate);
+  if (!plan)
+    return plan.error ();
+  if (const auto fits = check_limits (board, schedule, *plan); !fits)
+    return fits.error ();
+  return predict (schedule, conditions);
+}
+
+double
+rounded (double value, int digits)
+{
+  const double scale = std::pow (10.0, digits);
+  return std::round (value * scale) / scale;
+}
+
+Json
+describe (const Finding &finding)
+{
+  if (!finding.prediction)
+    return {{"schedule", finding.text}, {"fits", false},
+        {"trouble", finding.prediction.error ().message}};
+  const Prediction &p = *finding.prediction;
+  return {{"schedule", finding.text}, {"fits", true},
+      {"frame_rate", rounded (p.frame_rate, 3)},
+      {"subframe", {p.subframe.width, p.subframe.height}},
+      {"light_efficiency", rounded (p.efficiency, 4)},
+      {"slot_electrons", rounded (p.slot_electrons, 1)},
+      {"snr_white_db", rounded (p.snr_white, 2)},
+      {"snr_grey_db", rounded (p.snr_grey, 2)},
+      {"psnr_db", rounded (p.psnr, 2)}, {"overexposed", p.overexposed}};
+}
+
+void
+print_table (const std::vector<Finding> &findings)
+{
+  std::size_t width = 8;
+  for (const Finding &finding : findings)
+    width = std::max (width, finding.text.size ());
+  const int column = int (width);
+  std::printf ("%-*s %8s %10s %6s %9s %9s %9s\n", column, "schedule", "fps",
+      "subframes", "light", "SNR white", "SNR grey", "PSNR");
+  for (const Finding &finding : findings) {
+    if (!finding.prediction) {
+      std::printf ("%-*s %s\n", column, finding.text.c_str (),
+          finding.prediction.error ().message.c_str ());
+      continue;
+    }
+    const Prediction &p = *finding.prediction;
+    std::printf ("%-*s %8.5g %5dx%-4d %5.1f%% %6.1f dB %6.1f dB %6.1f dB%s\n",
+        column, finding.text.c_str (), p.frame_rate, p.subframe.width,
+        p.subframe.height, 100 * p.efficiency, p.snr_white, p.snr_grey, p.psnr,
+        p.overexposed ? "  too much light" : "");
+  }
+}
+
+/* Why that one, or why none. */
+std::string
+reason (const Prediction *best, const Arguments &arguments)
+{
+  char text[200];
+  if (!best)
+    std::snprintf (text, sizeof text,
+        "none of these reaches %g frames/s without being overexposed; ask for "
+        "less, or let in less light",
+        arguments.least_rate);
+  else if (!best->schedule)
+    std::snprintf (text, sizeof text,
+        "take no mask at all: at %g pixels/s the camera is fast enough",
+        arguments.conditions.scene.speed);
+  else
+    std::snprintf (text, sizeof text,
+        "take %s: of these it is truest to a scene of %g pixels/s",
+        best->text ().c_str (), arguments.conditions.scene.speed);
+  return text;
+}
+
+void
+show (Session &session, const Arguments &arguments,
+    const std::vector<Finding> &findings)
+{
+  std::vector<Prediction> predictions;
+  Json list = Json::array ();
+  for (const Finding &finding : findings) {
+    if (finding.prediction)
+      predictions.push_back (*finding.prediction);
+    list.push_back (describe (finding));
+  }
+  const Prediction *best = recommend (predictions, arguments.least_rate);
+  const std::string why = reason (best, arguments);
+  if (session.json) {
+    session.print ({{"schedules", list},
+        {"recommended", best ? Json (best->text ()) : Json ()},
+        {"reason", why}});
+  } else {
+    print_table (findings);
+    std::printf ("\n%s\n", why.c_str ());
+  }
+  if (!best)
+    session.exit = Exit::does_not_fit;
+}
+
+void
+advise (Session &session, Arguments arguments)
+{
+  Conditions &conditions = arguments.conditions;
+  const auto size = parse_size (arguments.size);
+  const auto rate = parse_rate (arguments.rate);
+  const auto board = find_kind (arguments.board);
+  if (!size || !rate)
+    return session.fail (Exit::usage, size ? rate.error () : size.error ());
+  if (!board)
+    return session.fail (Exit::usage, board.error ());
+  conditions.camera.size = *size;
+  conditions.camera.rate = *rate;
+  const auto schedules = candidates (arguments, *board);
+  /* An ordinary exposure fails only where the question is wrong. */
+  const auto none = predict (std::nullopt, conditions);
+  if (!schedules || !none)
+    return session.fail (
+        Exit::usage, schedules ? none.error () : schedules.error ());
+
+  std::vector<Finding> findings{{none->text (), *none}};
+  for (const Schedule &schedule : *schedules) {
+    if (session.stop.stop_requested ())
+      return session.fail (Exit::interrupted, Error{"interrupted"});
+    findings.push_back (
+        {schedule.text (), look_at (schedule, conditions, *board)});
+  }
+  show (session, arguments, findings);
+}
+
+} // namespace
+
+void
+add_advise_command (CLI::App &app, Session &session)
+{
+  auto *sub = app.add_subcommand (
+      "advise", "Predict what schedules are worth, and recommend one");
+  const auto arguments = std::make_shared<Arguments> ();
+  Conditions &conditions = arguments->conditions;
+  sub->add_option ("schedules", arguments->schedules,
+      "CODE:TILE[,key=value...] or JSON files; without any, the usual ones");
+  sub->add_option ("--size", arguments->size, "WIDTHxHEIGHT of the camera");
+  sub->add_option ("--rate", arguments->rate, "Frames/s of the camera");
+  sub->add_option ("--full-well", conditions.camera.full_well,
+      "Electrons that a pixel holds");
+  sub->add_option (
+      "--read-noise", conditions.camera.read_noise, "Electrons rms");
+  sub->add_option ("--bits", conditions.camera.bits, "Of the converter");
+  sub->add_option ("--readout", arguments->readout,
+      "Time at the end of a frame in which the camera is blind, such as 500us");
+  sub->add_option (
+      "--dmd", arguments->board, "dlp3000, dlp4500, dlp6500 or dlp9000");
+  sub->add_option ("--light", conditions.light,
+      "Of white, in a frame without masks, as a part of the full well");
+  sub->add_option ("--speed", conditions.scene.speed,
+      "Of what moves, in pixels of the coded frame a second");
+  sub->add_option ("--detail", conditions.scene.detail,
+      "Size of details, in pixels of the coded frame");
+  sub->add_option ("--contrast", conditions.scene.contrast,
+      "Standard deviation of the scene, part of white");
+  sub->add_option (
+      "--level", conditions.scene.level, "Mean of the scene, part of white");
+  sub->add_option (
+      "--least-rate", arguments->least_rate, "Subframes/s that there must be");
+  for (CLI::Option *option : sub->get_options ())
+    if (option->get_name () != "--help" && option->get_name () != "schedules")
+      option->capture_default_str ();
+  sub->callback ([&session, arguments] { advise (session, *arguments); });
+}
+
+} // namespace cexp::tool

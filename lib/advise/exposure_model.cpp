@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/text.h"
+#include "base/range.h"
 
 namespace cexp
 {
@@ -15,23 +15,14 @@ namespace
 Result<void>
 check (const Camera &camera, double light)
 {
-  const struct {
-    const char *what;
-    double value, low, high;
-  } ranges[] = {
+  return check_ranges ({
       {"full well (electrons)", camera.full_well, 1.0, Camera::kMaxFullWell},
       {"read noise (electrons)", camera.read_noise, 0.0, Camera::kMaxReadNoise},
       {"bits", double (camera.bits), 1.0, 16.0},
       {"width", double (camera.size.width), 1.0, 65536.0},
       {"height", double (camera.size.height), 1.0, 65536.0},
       {"light (parts of the full well)", light, 1e-6, 1000.0},
-  };
-  for (const auto &range : ranges)
-    if (!(range.value >= range.low && range.value <= range.high))
-      return Error{std::string (range.what) + " = " + real_text (range.value) +
-                   " is outside " + real_text (range.low) + ".." +
-                   real_text (range.high)};
-  return {};
+  });
 }
 
 /* What an element collects when its light is white in every slot. */

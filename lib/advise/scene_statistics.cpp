@@ -7,7 +7,7 @@
 #include <numbers>
 #include <utility>
 
-#include "base/text.h"
+#include "base/range.h"
 
 namespace cexp
 {
@@ -15,21 +15,12 @@ namespace cexp
 Result<void>
 SceneStatistics::check () const
 {
-  const struct {
-    const char *what;
-    double value, low, high;
-  } ranges[] = {
+  return check_ranges ({
       {"level", level, 0.001, 1.0},
       {"contrast", contrast, 0.001, 1.0},
       {"detail (pixels)", detail, 0.1, 1000.0},
       {"speed (pixels/s)", speed, 0.0, 1e6},
-  };
-  for (const auto &range : ranges)
-    if (!(range.value >= range.low && range.value <= range.high))
-      return Error{std::string (range.what) + " = " + real_text (range.value) +
-                   " is outside " + real_text (range.low) + ".." +
-                   real_text (range.high)};
-  return {};
+  });
 }
 
 double

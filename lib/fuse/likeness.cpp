@@ -16,7 +16,7 @@ constexpr int kBorder = kBlock;
 constexpr int kIterations = 40;
 /* Thresholds in grey levels, of the first iteration and of the last without
  * noise; with noise, the last is as many standard deviations. */
-constexpr double kFirstThreshold = 30.0, kLastThreshold = 3.0;
+constexpr double kFirstThreshold = 30.0, kLastThreshold = 2.0;
 constexpr double kNoiseThreshold = 1.8;
 
 int

@@ -63,6 +63,7 @@ std::vector<SceneClass>
 motion_classes ()
 {
   std::vector<SceneClass> classes;
+  classes.push_back ({0.0, 0.0, 12.0, 1.0, 0.9999});
   add_grid (classes, 4.0, 1.0, 0.99);
   for (const double vx : {-1.5, -0.5, 0.0, 0.5, 1.5})
     for (const double vy : {-1.5, -0.5, 0.0, 0.5, 1.5})

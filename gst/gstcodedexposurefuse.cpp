@@ -39,9 +39,10 @@
  *
  * ## Quality and speed
  *
- * `quality=fast` runs in real time: 768x576 from 25 to 100 frames/s take a
- * third of a core or less. `balanced` and `best` look for the motion around
- * each pixel and are for decoding of recordings.
+ * `quality=fast` runs in real time: 768x576 from 25 to 100 frames/s take less
+ * than half of a core of a fast processor. `balanced` and `best` look for the
+ * motion around each pixel, take a hundred times as long, and are for decoding
+ * of recordings.
  * Tell the element about the camera's noise (#codedexposure-fuse:full-well,
  * #codedexposure-fuse:read-noise): it filters more where the noise is larger,
  * and knows what it may take for still.

@@ -41,17 +41,6 @@ find_kernels (std::string_view target)
   return nullptr;
 }
 
-/* Mirrors a coordinate beyond the frame into it. */
-int
-mirrored (int at, int size)
-{
-  if (at < 0)
-    at = -at;
-  if (at >= size)
-    at = 2 * size - 2 - at;
-  return std::clamp (at, 0, size - 1);
-}
-
 } // namespace
 
 Result<std::unique_ptr<Engine>>

@@ -2,11 +2,22 @@
 /* A plane of light with a margin, so that filters need no border. */
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <vector>
 
 namespace cexp
 {
+
+/** A coordinate beyond 0 .. @p size - 1 mirrored at the border pixel, or at
+ * the border itself where that is not far enough. */
+inline int
+mirrored (int at, int size)
+{
+  const int inside = at < 0 ? -at : at;
+  return std::clamp (
+      inside < size ? inside : 2 * size - 2 - inside, 0, size - 1);
+}
 
 /**
  * width x height floats, 255 for white, with @p margin more on every side and
@@ -28,7 +39,6 @@ public:
 
   int width () const { return width_; }
   int height () const { return height_; }
-  int margin () const { return margin_; }
   std::ptrdiff_t stride () const { return stride_; } ///< in floats
   /** Row @p y in -margin .. height + margin - 1, from x = 0. */
   float *row (int y) { return values_.data () + start (y); }

@@ -18,7 +18,6 @@ class FilterBank
 public:
   FilterBank (const Phases &phases, std::vector<Offset> taps, int outputs);
 
-  int outputs () const { return outputs_; }
   /** Weights of the pixels at @p x of distinct row @p row of the phases. */
   void set (int row, int x, int output, std::span<const float> weights);
   /** Of all outputs, one after the other. */

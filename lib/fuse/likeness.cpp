@@ -25,14 +25,6 @@ round_up (int value, int step)
   return (value + step - 1) / step * step;
 }
 
-int
-mirrored (int at, int size)
-{
-  if (at < 0)
-    at = -at;
-  return std::clamp (at < size ? at : 2 * size - 2 - at, 0, size - 1);
-}
-
 } // namespace
 
 Likeness::Likeness (const Schedule &schedule, const Observation &observation,

@@ -64,15 +64,6 @@ private:
   std::vector<float> weights_;
 };
 
-/* Mirrored without the border itself. */
-int
-mirrored (int at, int size)
-{
-  if (at < 0)
-    at = -at;
-  return std::clamp (at < size ? at : 2 * size - 2 - at, 0, size - 1);
-}
-
 } // namespace
 
 /* Rows first .. first + rows - 1 of a frame on their way. */

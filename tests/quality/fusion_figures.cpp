@@ -125,12 +125,6 @@ fusion_schedule (int n)
                              : "sequential:lattice:8/3,order=bit-reversal");
 }
 
-SensorNoise
-fusion_noise ()
-{
-  return {kNoisy.electrons, kNoisy.read_noise};
-}
-
 std::vector<Table>
 fusion_tables (
     const std::vector<Scene> &scenes, int frames, const Progress &progress)

@@ -15,9 +15,6 @@ namespace cexp::quality
 /** The schedule that is measured for @p n slots, 4 or 8. */
 Schedule fusion_schedule (int n);
 
-/** The camera of the noisy tables, as fusion is told of it. */
-SensorNoise fusion_noise ();
-
 /** PSNR and SSIM of fused frames and of what they are compared with on the
  * first @p frames frames of every scene, clean and noisy: means over frames,
  * and over scenes. */

@@ -167,9 +167,11 @@ report (const PhaseFit &fit, CalibrationResult &result)
   const double magnification = fit.mapping.stance ().magnification;
   result.psf_sigma =
       magnification * std::sqrt (0.5 * (fit.blur_x + fit.blur_y));
-  auto mapping =
-      Mapping::make ({fit.camera, fit.mirrors, fit.mapping.homography (),
-          fit.covariance, fit.mapping.displacement (), result.psf_sigma});
+  const double swing =
+      double (std::max (1.0f, quantile (result.contrast, 0.5)));
+  auto mapping = Mapping::make ({fit.camera, fit.mirrors,
+      fit.mapping.homography (), with_rounding (fit, swing),
+      fit.mapping.displacement (), result.psf_sigma});
   if (!mapping)
     return mapping.error ();
   result.mapping = std::move (*mapping);

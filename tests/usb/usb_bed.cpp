@@ -88,6 +88,8 @@ public:
   {
     g_signal_connect_after (
         handler_, "handle-ioctl", G_CALLBACK (on_ioctl), this);
+    g_signal_connect (
+        handler_, "client-vanished", G_CALLBACK (on_vanished), this);
   }
   ~UsbPort ()
   {
@@ -145,14 +147,17 @@ private:
     return TRUE;
   }
 
-  /** Who claims the board is its only user: what a process had under way went
-   * with it. */
-  void drop_others (const UMockdevIoctlClient *client)
+  /** What a process had under way goes with it; the next one may be found at
+   * the same address. */
+  static void on_vanished (
+      UMockdevIoctlBase *, UMockdevIoctlClient *client, gpointer self)
   {
-    const auto of_others = [client] (
-                               const Urb &urb) { return urb.client != client; };
-    std::erase_if (waiting_, of_others);
-    std::erase_if (done_, of_others);
+    auto *const port = static_cast<UsbPort *> (self);
+    const std::lock_guard guard (port->lock_);
+    const auto of_it = [client] (
+                           const Urb &urb) { return urb.client == client; };
+    std::erase_if (port->waiting_, of_it);
+    std::erase_if (port->done_, of_it);
   }
 
   int fail (int &error, int code)
@@ -188,7 +193,7 @@ private:
       return fail (error, ENODEV);
     switch (request) {
     case USBDEVFS_SUBMITURB:
-      return submit (client, argument ());
+      return submit (client, argument (), error);
     case USBDEVFS_DISCARDURB:
       return discard (argument (), error);
     default:
@@ -223,7 +228,6 @@ private:
       if (occupied_ || (request == USBDEVFS_CLAIMINTERFACE && bound_))
         return fail (error, EBUSY);
       bound_ = false;
-      drop_others (client);
       return 0;
     case USBDEVFS_RELEASEINTERFACE:
     case USBDEVFS_CLEAR_HALT:
@@ -236,17 +240,22 @@ private:
     }
   }
 
-  int submit (UMockdevIoctlClient *client, UMockdevIoctlData *argument)
+  int submit (
+      UMockdevIoctlClient *client, UMockdevIoctlData *argument, int &error)
   {
     Urb urb;
     urb.client = client;
     urb.urb = Reference (umockdev_ioctl_data_resolve (
         argument, 0, sizeof (usbdevfs_urb), nullptr));
+    if (!urb.urb.get ())
+      return fail (error, EFAULT); // killed in the middle
     urb.address = urb.urb.get ()->client_addr;
     const int length = urb.get ()->buffer_length;
     if (length > 0)
       urb.buffer = urb.urb.resolve (
           offsetof (usbdevfs_urb, buffer), std::size_t (length));
+    if (length > 0 && !urb.buffer.get ())
+      return fail (error, EFAULT);
     if (urb.get ()->type == USBDEVFS_URB_TYPE_CONTROL)
       finish_control (std::move (urb));
     else if (urb.get ()->endpoint == kIn)
@@ -319,6 +328,8 @@ private:
     done_.erase (found);
     const Reference slot (
         umockdev_ioctl_data_resolve (argument, 0, sizeof (gpointer), nullptr));
+    if (!slot.get ())
+      return fail (error, EFAULT);
     umockdev_ioctl_data_set_ptr (slot.get (), 0, urb.urb.get ());
     return 0;
   }

@@ -120,6 +120,11 @@ public:
     const std::lock_guard guard (lock_);
     return board_->running ();
   }
+  bool idle () const
+  {
+    const std::unique_lock guard (lock_, std::try_to_lock);
+    return guard.owns_lock ();
+  }
   void occupy ()
   {
     const std::lock_guard guard (lock_);
@@ -134,16 +139,24 @@ private:
     usbdevfs_urb *get () const { return urb.as<usbdevfs_urb> (); }
   };
 
+  struct Unref {
+    void operator() (gpointer object) const { g_object_unref (object); }
+  };
+  using ClientRef = std::unique_ptr<UMockdevIoctlClient, Unref>;
+
   static gboolean on_ioctl (
       UMockdevIoctlBase *, UMockdevIoctlClient *client, gpointer self)
   {
+    /* A process may be killed in the middle of it. */
+    const ClientRef held (UMOCKDEV_IOCTL_CLIENT (g_object_ref (client)));
     int error = 0;
     const int result = static_cast<UsbPort *> (self)->handle (client, error);
     // To poll (), a node in software is always ready: whoever waits for
     // something to reap would ask as fast as it can.
     if (error == EAGAIN)
       std::this_thread::sleep_for (std::chrono::milliseconds (1));
-    umockdev_ioctl_client_complete (client, result, error);
+    if (umockdev_ioctl_client_get_connected (client))
+      umockdev_ioctl_client_complete (client, result, error);
     return TRUE;
   }
 
@@ -437,6 +450,12 @@ bool
 UsbBed::running (const std::string &port) const
 {
   return ports_.at (port)->running ();
+}
+
+bool
+UsbBed::idle (const std::string &port) const
+{
+  return ports_.at (port)->idle ();
 }
 
 void

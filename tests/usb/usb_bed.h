@@ -40,6 +40,8 @@ public:
   void occupy (const std::string &port);
   /** Whether the board at @p port shows masks; also while somebody uses it. */
   bool running (const std::string &port) const;
+  /** Whether no process is in the middle of a message to the board. */
+  bool idle (const std::string &port) const;
 
 private:
   UMockdevTestbed *const bed_;

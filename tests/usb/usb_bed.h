@@ -18,6 +18,14 @@ namespace cexp::test
 
 class UsbPort;
 
+/** What a process has to load first to see the bus; a sanitizer wants to come
+ * before all. */
+#ifdef __SANITIZE_ADDRESS__
+inline constexpr const char *kPreload = "libasan.so.8 libumockdev-preload.so.0";
+#else
+inline constexpr const char *kPreload = "libumockdev-preload.so.0";
+#endif
+
 /** One bus; one at a time in a process. */
 class UsbBed
 {

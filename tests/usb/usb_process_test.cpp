@@ -37,7 +37,7 @@ public:
       arguments.push_back (word.data ());
     arguments.push_back (nullptr);
     // It does not have in it what stands between libusb and the kernel.
-    setenv ("LD_PRELOAD", "libumockdev-preload.so.0", 1);
+    setenv ("LD_PRELOAD", kPreload, 1);
     const int code = posix_spawnp (
         &id_, arguments[0], nullptr, nullptr, arguments.data (), environ);
     unsetenv ("LD_PRELOAD");

@@ -196,9 +196,9 @@ std::string
 tool_says (const std::string &arguments, int &status)
 {
   // A child process sees this bus, too, if it loads what stands in between.
-  const std::string command = "LD_PRELOAD=libumockdev-preload.so.0 '" TOOL
-                              "' --quiet --json " +
-                              arguments + " 2>&1";
+  const std::string command = "LD_PRELOAD='" + std::string (kPreload) +
+                              "' '" TOOL "' --quiet --json " + arguments +
+                              " 2>&1";
   std::string said;
   FILE *out = popen (command.c_str (), "r");
   char text[256];

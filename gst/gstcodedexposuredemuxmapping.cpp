@@ -70,7 +70,7 @@ rectify_into (
   if (rectified.width () != plan.extracted.width ||
       rectified.height () != plan.extracted.height)
     rectified = Image<Pixel> (plan.extracted.width, plan.extracted.height);
-  const int bits = stream.settings.extract.bits;
+  const int bits = stream.bits_in_force ();
   plan.rectifier->run (
       coded, rectified.view (), bits > 0 ? (1 << bits) - 1 : 0);
   return rectified.view ();

@@ -97,8 +97,7 @@ make_extractor (
 {
   const Stream &stream = state (self).stream;
   ExtractOptions options = stream.settings.extract;
-  if (options.bits == 0)
-    options.bits = stream.bits;
+  options.bits = stream.bits_in_force ();
   auto made =
       Extractor<Pixel>::make (schedule, size.width, size.height, options);
   if (made)

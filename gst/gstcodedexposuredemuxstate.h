@@ -175,6 +175,11 @@ struct Stream {
   std::optional<Plan> plan;
   int bits = 0;      ///< significant ones, as the frames say; 0: they do not
   bool stale = true; ///< the plan has to be made again before the next frame
+  /** Significant bits: the property wins over the frames; 0: of the type. */
+  int bits_in_force () const
+  {
+    return settings.extract.bits > 0 ? settings.extract.bits : bits;
+  }
   /** Serialised events that wait for the caps of the source pads. */
   std::vector<EventPtr> pending;
   std::optional<FrameSequence> sequence;

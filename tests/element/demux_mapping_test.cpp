@@ -6,6 +6,7 @@
 
 #include <unistd.h>
 
+#include "gstcodedexposuremeta.h"
 #include "gstcodedexposuretag.h"
 #include "harness.h"
 
@@ -125,6 +126,29 @@ TEST_F (DemuxMapping, FindsElementsThatStandElsewhere)
       guint64 (kWidth * kHeight - (kWidth - 5) * (kHeight - 3)));
   EXPECT_EQ (property<guint64> (demux.element (), "mirrors-unseen"),
       field (said, "unseen"));
+}
+
+TEST_F (DemuxMapping, KeepsWithinTheBitsThatFramesSay)
+{
+  ElementHarness demux (demux_with (save (shifted (0.3, 0.3).to_json ())));
+  demux.set_caps (gray_caps (kWidth, kHeight, "25/1", "GRAY16_LE"));
+  BufferPtr coded = frame_of (
+      draw<std::uint16_t> (kWidth, kHeight,
+          [] (int x, int y) { return (x / 6 + y / 6) % 2 ? 4095 : 0; }),
+      0);
+  gst::set_frame_meta (coded.get (), {.bits = 12});
+  ASSERT_EQ (demux.push (std::move (coded)), GST_FLOW_OK);
+  int largest = 0;
+  for (int k = 0; k < 4; k++) {
+    const BufferPtr out = demux.pull ();
+    ASSERT_TRUE (out);
+    const auto image =
+        image_of<std::uint16_t> (out.get (), demux.pad_caps ().get ());
+    for (int y = 0; y < image.height (); y++)
+      for (int x = 0; x < image.width (); x++)
+        largest = std::max (largest, int (image.at (x, y)));
+  }
+  EXPECT_EQ (largest, 4095) << "sharpened edges are clamped to what fits";
 }
 
 TEST_F (DemuxMapping, SaysThatPixelsSeeSeveralMirrors)

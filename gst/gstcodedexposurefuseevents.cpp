@@ -86,9 +86,9 @@ on_tag (GstCodedExposureFuse *self, EventPtr event)
   Stream &stream = state (self).stream;
   GstTagList *tags = nullptr;
   gst_event_parse_tag (event.get (), &tags);
-  if (auto tagged = schedule_from_tags (tags)) {
-    if (!*tagged || !stream.plan ||
-        !(tagged->value () == stream.plan->schedule))
+  if (auto tagged = setup_from_tags (tags)) {
+    if (!*tagged || !stream.tagged || !*stream.tagged || !stream.plan ||
+        !(tagged->value () == stream.tagged->value ()))
       stream.stale = true;
     stream.tagged = std::move (tagged);
   }

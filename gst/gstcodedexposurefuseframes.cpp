@@ -134,6 +134,8 @@ render (GstCodedExposureFuse *self, GstFlowReturn &flow)
     }
     if (flow == GST_FLOW_OK && mapped.back ())
       continue;
+    if (flow == GST_FLOW_FLUSHING)
+      return {};
     GST_ELEMENT_ERROR (self, RESOURCE, NO_SPACE_LEFT,
         ("No buffer for a fused frame of %dx%d pixels.", plan.fused.width,
             plan.fused.height),
@@ -228,7 +230,7 @@ chain (GstPad *pad, GstObject *parent, GstBuffer *inbuf) noexcept
   GST_LOG_OBJECT (pad, "[IN] %" GST_PTR_FORMAT, inbuf);
   if (stream.segment.format != GST_FORMAT_TIME)
     return GST_FLOW_ERROR;
-  if (const GstFlowReturn flow = negotiate (self); flow != GST_FLOW_OK)
+  if (const GstFlowReturn flow = negotiate (self, inbuf); flow != GST_FLOW_OK)
     return flow;
   if (!GST_BUFFER_PTS_IS_VALID (inbuf)) {
     GST_ELEMENT_ERROR (self, STREAM, FORMAT,

@@ -38,17 +38,18 @@ std::optional<Source>
 find_schedule (GstCodedExposureFuse *self)
 {
   Stream &stream = state (self).stream;
-  const auto &asked = stream.settings.parsed;
-  const Result<Schedule> *said =
-      asked ? asked.get () : (stream.tagged ? &*stream.tagged : nullptr);
-  if (said && *said)
-    return Source{said->value ()};
-  if (said) {
+  if (const auto &asked = stream.settings.parsed) {
+    if (*asked)
+      return Source{asked->value ()};
     refuse (self,
-        std::string (asked ? "The schedule property cannot be read: "
-                           : "The schedule in the stream's tags cannot be "
-                             "read: ") +
-            said->error ().message);
+        "The schedule property cannot be read: " + asked->error ().message);
+    return std::nullopt;
+  }
+  if (const auto &tagged = stream.tagged) {
+    if (*tagged)
+      return Source{tagged->value ().schedule};
+    refuse (self, "The schedule in the stream's tags cannot be read: " +
+                      tagged->error ().message);
     return std::nullopt;
   }
   const Source source{Schedule (), true};
@@ -59,6 +60,22 @@ find_schedule (GstCodedExposureFuse *self)
             source.schedule.text ().c_str ()),
         (nullptr));
   return source;
+}
+
+/* Pixels are taken to see the mirror of their own place. */
+void
+warn_of_mapping (GstCodedExposureFuse *self)
+{
+  Stream &stream = state (self).stream;
+  const bool mapped = stream.tagged && *stream.tagged &&
+                      stream.tagged->value ().mapping.has_value ();
+  if (!mapped || std::exchange (stream.warned_of_mapping, true))
+    return;
+  GST_ELEMENT_WARNING (self, STREAM, FORMAT,
+      ("The stream has a mapping, which fused frames do not follow: they show "
+       "the camera's misalignment. Align the camera (moirecalib), or take "
+       "subframes (codedexposure-demux)."),
+      (nullptr));
 }
 
 /* The caps of the coded frames, with a frame rate in any case. */
@@ -139,7 +156,9 @@ propose (GstCodedExposureFuse *self)
     refuse (self, slots.error ().message);
     return std::nullopt;
   }
-  const FuseOptions &options = stream.settings.options;
+  FuseOptions options = stream.settings.options;
+  if (options.bits == 0)
+    options.bits = stream.bits;
   auto fuser = GST_VIDEO_INFO_FORMAT (&*info) == GST_VIDEO_FORMAT_GRAY8
                    ? make_fuser<std::uint8_t> (schedule, *info, options)
                    : make_fuser<std::uint16_t> (schedule, *info, options);
@@ -232,9 +251,12 @@ convert (const Known &now, GstCaps *caps, bool to_coded)
 } // namespace
 
 GstFlowReturn
-negotiate (GstCodedExposureFuse *self)
+negotiate (GstCodedExposureFuse *self, GstBuffer *next)
 {
   FuseState &st = state (self);
+  if (const auto meta = next ? get_frame_meta (next) : std::nullopt;
+      meta && std::exchange (st.stream.bits, meta->bits) != meta->bits)
+    st.stream.stale = true;
   bool changed;
   {
     const ObjectLock lock (self);
@@ -249,6 +271,7 @@ negotiate (GstCodedExposureFuse *self)
     if (!proposal)
       return GST_FLOW_NOT_NEGOTIATED;
     install (self, std::move (*proposal));
+    warn_of_mapping (self);
   }
   settle_pending (self);
   return GST_FLOW_OK;

@@ -19,6 +19,7 @@
 #include "gstcodedexposuremeta.h"
 #include "gstraii.h"
 #include "schedule/schedule.h"
+#include "schedule/stream_setup.h"
 
 GST_DEBUG_CATEGORY_EXTERN (codedexposure_fuse_debug);
 
@@ -81,9 +82,10 @@ struct Stream {
   CapsPtr caps;
   GstSegment segment;
   /** What the tags of the stream say; an error where they cannot be read. */
-  std::optional<Result<Schedule>> tagged;
+  std::optional<Result<StreamSetup>> tagged;
   Settings settings; ///< in force
   std::optional<Plan> plan;
+  int bits = 0;      ///< significant ones, as the frames say; 0: they do not
   bool stale = true; ///< the plan has to be made again before the next frame
   /** Serialised events that wait for the caps of the source pad. */
   std::vector<EventPtr> pending;
@@ -95,6 +97,7 @@ struct Stream {
   bool discont = true;
   guint64 offset = 0;
   bool warned_assumed = false;
+  bool warned_of_mapping = false;
 };
 
 /** Behind the GObject.
@@ -135,8 +138,9 @@ gboolean src_query (GstPad *pad, GstObject *parent, GstQuery *query) noexcept;
 
 /* Negotiation. */
 /** Makes the plan and sends the caps, where that is due. Posts an error and
- * returns other than OK when there can be no plan. */
-GstFlowReturn negotiate (GstCodedExposureFuse *self);
+ * returns other than OK when there can be no plan.
+ * @p next  the frame that comes next, where there is one. */
+GstFlowReturn negotiate (GstCodedExposureFuse *self, GstBuffer *next = nullptr);
 /** Forwards the events that waited for the caps; forgets them where no caps
  * came. */
 void settle_pending (GstCodedExposureFuse *self);

@@ -141,6 +141,22 @@ TEST_F (Fuse, TakesSixteenBitsAndNoiseAndQuality)
       expected<std::uint16_t> ("sequential:2x2", {0, 1}, options));
 }
 
+TEST_F (Fuse, TakesTheBitsThatFramesSay)
+{
+  start ("schedule=sequential:lattice:4/2", "25/1", "GRAY16_LE");
+  const auto twelve = draw<std::uint16_t> (kWidth, kHeight,
+      [] (int x, int y) { return (x / 3 + y / 2) % 2 ? 4095 : 0; });
+  BufferPtr frame = frame_of (twelve, 0);
+  set_frame_meta (frame.get (), {.bits = 12});
+  ASSERT_EQ (fuse->push (std::move (frame)), GST_FLOW_OK);
+  int largest = 0;
+  for (const auto &image : pull_images<std::uint16_t> ())
+    for (int y = 0; y < kHeight; y++)
+      for (int x = 0; x < kWidth; x++)
+        largest = std::max (largest, int (image.at (x, y)));
+  EXPECT_EQ (largest, 4095);
+}
+
 TEST_F (Fuse, ReadsStridesOfItsInput)
 {
   start ();
@@ -232,6 +248,24 @@ TEST_F (Fuse, ScheduleComesFromTheTagUnlessThePropertySays)
   fuse->push_event (schedule_to_event (schedule_of ("sequential:lattice:5/2")));
   push (0);
   EXPECT_EQ (pull_images (), expected ("sequential:2x2", {0}));
+}
+
+TEST_F (Fuse, SaysThatItFollowsNoMapping)
+{
+  const Extent size{kWidth, kHeight};
+  const auto mapping = Mapping::make ({.camera = size,
+      .mirrors = size,
+      .homography = {1, 0, 2, 0, 1, 0, 0, 0, 1}});
+  ASSERT_TRUE (mapping.ok ());
+  start ("");
+  fuse->push_event (
+      setup_to_event ({schedule_of ("sequential:lattice:5/2"), *mapping}));
+  push (0);
+  push (1);
+  EXPECT_NE (fuse->warning ().find ("mapping"), std::string::npos);
+  EXPECT_EQ (fuse->warning (), "") << "it is said once";
+  EXPECT_EQ (text_property (fuse->element (), "schedule-in-force"),
+      "sequential:lattice:5/2");
 }
 
 TEST_F (Fuse, WarnsWhereItHasToAssumeASchedule)

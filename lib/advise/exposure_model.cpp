@@ -16,8 +16,10 @@ Result<void>
 check (const Camera &camera, double light)
 {
   return check_ranges ({
-      {"full well (electrons)", camera.full_well, 1.0, Camera::kMaxFullWell},
-      {"read noise (electrons)", camera.read_noise, 0.0, Camera::kMaxReadNoise},
+      {"full well (electrons)", camera.noise.full_well, 1.0,
+          SensorNoise::kMaxFullWell},
+      {"read noise (electrons)", camera.noise.read_noise, 0.0,
+          SensorNoise::kMaxReadNoise},
       {"bits", double (camera.bits), 1.0, 16.0},
       {"width", double (camera.size.width), 1.0, 65536.0},
       {"height", double (camera.size.height), 1.0, 65536.0},
@@ -46,7 +48,7 @@ ExposureModel::make (
   ExposureModel model;
   const double period = double (camera.rate.den) / camera.rate.num;
   model.schedule_ = schedule;
-  model.read_noise_ = camera.read_noise;
+  model.noise_ = camera.noise;
   model.active_ = model.pitch_ = model.hold_ = period;
   model.open_ = {1.0};
   double open_slots = 1.0;
@@ -67,13 +69,14 @@ ExposureModel::make (
             schedule->code ().open (e, s) ? 1.0 : schedule->leak ());
     }
   }
-  model.slot_electrons_ = camera.full_well * light * model.active_ / period;
+  model.slot_electrons_ =
+      camera.noise.full_well * light * model.active_ / period;
   model.efficiency_ = open_slots * model.active_ / period;
 
   double white = 0.0;
   for (int e = 0; e < model.n_; e++)
     white = std::max (white, white_of (model, e) * model.slot_electrons_);
-  model.overexposed_ = white > camera.full_well * (1.0 + 1e-9);
+  model.overexposed_ = white > camera.noise.full_well * (1.0 + 1e-9);
   model.step_ = white / double ((1 << camera.bits) - 1);
   return model;
 }
@@ -82,8 +85,7 @@ double
 ExposureModel::variance (int element, double level) const
 {
   const double photons = white_of (*this, element) * level * slot_electrons_;
-  return (photons + read_noise_ * read_noise_ + step_ * step_ / 12.0) /
-         (slot_electrons_ * slot_electrons_);
+  return noise_.variance (photons, step_) / (slot_electrons_ * slot_electrons_);
 }
 
 Result<double>

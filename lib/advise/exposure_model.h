@@ -7,20 +7,17 @@
 
 #include "base/result.h"
 #include "schedule/schedule.h"
+#include "stats/sensor_noise.h"
 
 namespace cexp
 {
 
 /** What takes the coded frames. */
 struct Camera {
-  static constexpr double kMaxFullWell = 1e7;
-  static constexpr double kMaxReadNoise = 1e5;
-
   Extent size{768, 576};
   FrameRate rate;
-  double full_well = 10000.0; ///< electrons that a pixel holds
-  double read_noise = 5.0;    ///< electrons rms
-  int bits = 8;               ///< of the converter, 1..16
+  SensorNoise noise{10000.0, 5.0}; ///< its full well is above 0
+  int bits = 8;                    ///< of the converter, 1..16
 };
 
 /**
@@ -88,7 +85,7 @@ private:
   std::vector<double> open_;
   double active_ = 0.0, pitch_ = 0.0, hold_ = 0.0;
   double slot_electrons_ = 0.0;
-  double read_noise_ = 0.0;
+  SensorNoise noise_;
   double step_ = 0.0; ///< electrons a number
   double efficiency_ = 0.0;
   bool overexposed_ = false;

@@ -6,7 +6,8 @@
 #include <cstdlib>
 #include <map>
 #include <numeric>
-#include <span>
+
+#include "base/cholesky.h"
 
 namespace cexp
 {
@@ -67,42 +68,6 @@ private:
   std::vector<double> light_, truth_;
 };
 
-/* A symmetric positive definite system, factored once. */
-class Cholesky
-{
-public:
-  explicit Cholesky (std::vector<double> a, std::size_t n)
-      : l_ (std::move (a)), n_ (n)
-  {
-    for (std::size_t j = 0; j < n; j++)
-      for (std::size_t i = j; i < n; i++) {
-        double sum = at (i, j);
-        for (std::size_t k = 0; k < j; k++)
-          sum -= at (i, k) * at (j, k);
-        at (i, j) = i == j ? std::sqrt (sum) : sum / at (j, j);
-      }
-  }
-  /** Replaces the right side by the solution. */
-  void solve (std::span<double> b)
-  {
-    for (std::size_t i = 0; i < n_; i++) {
-      for (std::size_t k = 0; k < i; k++)
-        b[i] -= at (i, k) * b[k];
-      b[i] /= at (i, i);
-    }
-    for (std::size_t i = n_; i-- > 0;) {
-      for (std::size_t k = i + 1; k < n_; k++)
-        b[i] -= at (k, i) * b[k];
-      b[i] /= at (i, i);
-    }
-  }
-
-private:
-  double &at (std::size_t i, std::size_t j) { return l_[i * n_ + j]; }
-  std::vector<double> l_;
-  std::size_t n_;
-};
-
 /* Slots whose light an element lets through. */
 struct Share {
   int slot;
@@ -127,13 +92,13 @@ struct Estimator {
   std::vector<std::vector<Share>> shares; ///< of each element
   const std::vector<Offset> &places;
 
-  /** Covariances of the coded pixels with each other, lower triangle. */
+  /** Covariances of the coded pixels with each other, upper triangle. */
   std::vector<double> system (const std::vector<int> &elements) const
   {
     const std::size_t n = places.size ();
     std::vector<double> result (n * n);
     for (std::size_t i = 0; i < n; i++)
-      for (std::size_t j = 0; j <= i; j++) {
+      for (std::size_t j = i; j < n; j++) {
         double sum = i == j ? model.variance (elements[i], scene.level) : 0.0;
         for (const Share &a : shares[std::size_t (elements[i])])
           for (const Share &b : shares[std::size_t (elements[j])])
@@ -144,14 +109,17 @@ struct Estimator {
       }
     return result;
   }
-  /** Covariances of the coded pixels with the truth in a slot. */
-  std::vector<double> sought (const std::vector<int> &elements, int slot) const
+  /** Covariances of the coded pixels with the truth, a column for each slot. */
+  std::vector<double> sought (const std::vector<int> &elements) const
   {
-    std::vector<double> result (places.size ());
+    std::vector<double> result;
     for (std::size_t i = 0; i < places.size (); i++)
-      for (const Share &a : shares[std::size_t (elements[i])])
-        result[i] += a.part * covariances.truth (
-                                  places[i].x, places[i].y, a.slot - slot);
+      for (int slot = 0; slot < model.slots (); slot++) {
+        double &sum = result.emplace_back (0.0);
+        for (const Share &a : shares[std::size_t (elements[i])])
+          sum += a.part *
+                 covariances.truth (places[i].x, places[i].y, a.slot - slot);
+      }
     return result;
   }
 };
@@ -184,18 +152,17 @@ LinearEstimate::LinearEstimate (
     std::vector<int> elements;
     for (const Offset place : places_)
       elements.push_back (model.element_at (at.x + place.x, at.y + place.y));
-    Cholesky cholesky (estimator.system (elements), n);
-    for (int s = 0; s < slots_; s++) {
-      const auto weights = std::span (weights_).subspan (
-          std::size_t (element * slots_ + s) * n, n);
-      const std::vector<double> sought = estimator.sought (elements, s);
-      std::ranges::copy (sought, weights.begin ());
-      cholesky.solve (weights);
-      const double found = std::inner_product (
-          sought.begin (), sought.end (), weights.begin (), 0.0);
-      error_ += (scene.contrast * scene.contrast - found) /
-                (model.elements () * slots_);
-    }
+    const std::vector<double> sought = estimator.sought (elements);
+    std::vector<double> solved = sought;
+    Cholesky (estimator.system (elements), int (n)).solve (solved, slots_);
+    for (std::size_t i = 0; i < n; i++)
+      for (std::size_t s = 0; s < std::size_t (slots_); s++)
+        weights_[(std::size_t (element * slots_) + s) * n + i] =
+            solved[i * std::size_t (slots_) + s];
+    const double found = std::inner_product (
+        sought.begin (), sought.end (), solved.begin (), 0.0);
+    error_ += (slots_ * scene.contrast * scene.contrast - found) /
+              (model.elements () * slots_);
   }
 }
 

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "base/range.h"
+#include "stats/matern.h"
 
 namespace cexp
 {
@@ -26,8 +27,7 @@ SceneStatistics::check () const
 double
 texture_correlation (const SceneStatistics &scene, double distance)
 {
-  const double q = std::numbers::sqrt3 * distance / scene.detail;
-  return (1.0 + q) * std::exp (-q);
+  return matern_3_2 (std::numbers::sqrt3 * distance / scene.detail);
 }
 
 std::vector<TimeStep>

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/cholesky.h"
+
 namespace cexp
 {
 
@@ -31,69 +33,6 @@ weigh_slot (const Observation &observation, int a, int slot, Correlation c)
     sum += share * c (s - slot);
   return sum;
 }
-
-/* A symmetric positive definite matrix, factored in place: U^T U. */
-class Cholesky
-{
-public:
-  /* Column by column, so that what is subtracted lies in rows. */
-  Cholesky (std::vector<double> matrix, int size)
-      : l_ (std::move (matrix)), size_ (size)
-  {
-    for (int k = 0; k < size_; k++) {
-      double *upper = row (k);
-      const double pivot = std::sqrt (upper[k]);
-      for (int j = k; j < size_; j++)
-        upper[j] /= pivot;
-      for (int i = k + 1; i < size_; i++) {
-        double *to = row (i);
-        const double factor = upper[i];
-        for (int j = i; j < size_; j++)
-          to[j] -= factor * upper[j];
-      }
-    }
-  }
-
-  /* Replaces each of @count right-hand sides, columns of @b, by its solution.
-   */
-  void solve (std::vector<double> &b, int count) const
-  {
-    for (int i = 0; i < size_; i++) {
-      for (int j = 0; j < i; j++)
-        subtract (b, count, i, j, row (j)[i]);
-      divide (b, count, i);
-    }
-    for (int i = size_ - 1; i >= 0; i--) {
-      for (int j = i + 1; j < size_; j++)
-        subtract (b, count, i, j, row (i)[j]);
-      divide (b, count, i);
-    }
-  }
-
-private:
-  double *row (int i) { return l_.data () + std::size_t (i * size_); }
-  const double *row (int i) const
-  {
-    return l_.data () + std::size_t (i * size_);
-  }
-  static void subtract (
-      std::vector<double> &b, int count, int to, int from, double factor)
-  {
-    double *out = b.data () + std::size_t (to * count);
-    const double *in = b.data () + std::size_t (from * count);
-    for (int k = 0; k < count; k++)
-      out[k] -= factor * in[k];
-  }
-  void divide (std::vector<double> &b, int count, int i) const
-  {
-    double *out = b.data () + std::size_t (i * count);
-    for (int k = 0; k < count; k++)
-      out[k] /= row (i)[i];
-  }
-
-  std::vector<double> l_;
-  int size_;
-};
 
 } // namespace
 

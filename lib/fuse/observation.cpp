@@ -10,7 +10,7 @@ Observation::Observation (
     const Schedule &schedule, const SensorNoise &noise, double steps)
     : n_ (schedule.slots ()), noise_ (noise),
       white_electrons_ (noise.full_well * schedule.white_slots () / n_),
-      rounding_ (1.0 / (12.0 * steps * steps)),
+      steps_ (steps),
       exact_ (schedule.code ().one_hot () && schedule.leak () == 0.0)
 {
   for (int e = 0; e < n_; e++) {
@@ -31,11 +31,10 @@ Observation::variance (int element, double light) const
 {
   const double gain_squared = gain (element) * gain (element);
   if (noise_free ())
-    return gain_squared * rounding_;
+    return gain_squared / (12.0 * steps_ * steps_);
   const double electrons = light / gain (element) * white_electrons_;
-  return gain_squared * ((electrons + noise_.read_noise * noise_.read_noise) /
-                                (white_electrons_ * white_electrons_) +
-                            rounding_);
+  return gain_squared * noise_.variance (electrons, white_electrons_ / steps_) /
+         (white_electrons_ * white_electrons_);
 }
 
 Phases::Phases (const Schedule &schedule)

@@ -6,22 +6,10 @@
 #include <vector>
 
 #include "schedule/schedule.h"
+#include "stats/sensor_noise.h"
 
 namespace cexp
 {
-
-/** Noise of the camera; the zero value is a noise-free one. */
-struct SensorNoise {
-  static constexpr double kMaxFullWell = 1e7;
-  static constexpr double kMaxReadNoise = 1e5;
-
-  /** Electrons that white makes where every slot is open, as in BenchOptions;
-   * 0: noise-free. */
-  double full_well = 0.0;
-  double read_noise = 0.0; ///< electrons rms
-
-  bool operator== (const SensorNoise &) const = default;
-};
 
 /**
  * The linear model y_e = sum over s of response (e, s) x_s + noise, where x_s
@@ -32,7 +20,9 @@ struct SensorNoise {
 class Observation
 {
 public:
-  /** @p steps  numbers between black and white, for the rounding. */
+  /** @p noise  of a camera whose full well white fills where every slot is
+   *            open, as in BenchOptions.
+   *  @p steps  numbers between black and white, for the rounding. */
   Observation (
       const Schedule &schedule, const SensorNoise &noise, double steps);
 
@@ -58,7 +48,7 @@ private:
   int n_;
   SensorNoise noise_;
   double white_electrons_; ///< that make the coded frame's white
-  double rounding_;        ///< variance of a pixel
+  double steps_;
   std::vector<std::vector<Share>> shares_;
   std::vector<double> gain_;
   bool exact_;

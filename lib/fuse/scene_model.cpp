@@ -3,40 +3,13 @@
 
 #include <cmath>
 
+#include "stats/matern.h"
+
 namespace cexp
 {
 
 namespace
 {
-
-/* r K1 (r), the Matern correlation of order 1, from a table: the Bessel
- * function takes its time. Off by less than 1e-5. */
-double
-matern_of_order_1 (double r)
-{
-  constexpr int kSteps = 256, kReach = 24;
-  static const std::vector<double> table = [] {
-    std::vector<double> values = {1.0};
-    for (int i = 1; i <= kSteps * kReach + 1; i++)
-      values.push_back (
-          double (i) / kSteps * std::cyl_bessel_k (1.0, double (i) / kSteps));
-    return values;
-  }();
-  if (r >= kReach)
-    return 0.0;
-  const auto at = std::size_t (r * kSteps);
-  const double part = r * kSteps - double (at);
-  return table[at] + part * (table[at + 1] - table[at]);
-}
-
-/* Of order 1 or 3/2, with r not normalised. */
-double
-matern (double r, double smoothness)
-{
-  if (smoothness > 1.25)
-    return (1.0 + r) * std::exp (-r);
-  return matern_of_order_1 (r);
-}
 
 void
 add_grid (std::vector<SceneClass> &classes, double reach, double step,
@@ -55,7 +28,7 @@ scene_correlation (const SceneClass &patch, double dx, double dy, double slots)
 {
   const double r =
       std::hypot (dx - patch.vx * slots, dy - patch.vy * slots) / patch.length;
-  return matern (r, patch.smoothness) *
+  return (patch.smoothness > 1.25 ? matern_3_2 (r) : matern_1 (r)) *
          std::pow (patch.correlation, std::abs (slots));
 }
 

@@ -214,10 +214,10 @@ add_advise_command (CLI::App &app, Session &session)
       "CODE:TILE[,key=value...] or JSON files; without any, the usual ones");
   sub->add_option ("--size", arguments->size, "WIDTHxHEIGHT of the camera");
   sub->add_option ("--rate", arguments->rate, "Frames/s of the camera");
-  sub->add_option ("--full-well", conditions.camera.full_well,
+  sub->add_option ("--full-well", conditions.camera.noise.full_well,
       "Electrons that a pixel holds");
   sub->add_option (
-      "--read-noise", conditions.camera.read_noise, "Electrons rms");
+      "--read-noise", conditions.camera.noise.read_noise, "Electrons rms");
   sub->add_option ("--bits", conditions.camera.bits, "Of the converter");
   sub->add_option ("--readout", arguments->readout,
       "Time at the end of a frame in which the camera is blind, such as 500us");

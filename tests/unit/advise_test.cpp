@@ -45,7 +45,7 @@ bench_of (const ExposureModel &model, const Conditions &conditions, int side)
 {
   BenchOptions options;
   options.full_well = model.slot_electrons () * model.slots ();
-  options.read_noise = conditions.camera.read_noise;
+  options.read_noise = conditions.camera.noise.read_noise;
   options.bits = conditions.camera.bits;
   auto bench = OpticalBench::make (side, side, options);
   EXPECT_TRUE (bench) << bench.error ().message;
@@ -98,7 +98,7 @@ TEST (Advise, SignalToNoiseIsThatOfTheBench)
   Conditions bright, dark;
   bright.camera.bits = dark.camera.bits = 12;
   dark.light = 0.5;
-  dark.camera.read_noise = 20.0;
+  dark.camera.noise.read_noise = 20.0;
   for (const Conditions &conditions : {bright, dark})
     for (const char *preset : {"sequential:2x2", "staircase:2x2",
              "s-matrix:7x1", "sequential:lattice:8/3", "sequential:4x4",

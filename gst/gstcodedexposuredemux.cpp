@@ -126,14 +126,7 @@ read_schedule_again (GstCodedExposureDemux *self)
     const ObjectLock lock (self);
     text = self->state->settings.schedule;
   }
-  const auto parsed = demux::set_schedule (self, text);
-  if (!parsed || *parsed)
-    return true;
-  GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
-      ("The schedule property cannot be read: %s",
-          parsed->error ().message.c_str ()),
-      (nullptr));
-  return false;
+  return check_schedule (GST_ELEMENT (self), demux::set_schedule (self, text));
 }
 
 void

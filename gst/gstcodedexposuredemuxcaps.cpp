@@ -17,20 +17,13 @@ struct Known {
   bool mapped; ///< frames and subframes can be of any size
 };
 
-/* A schedule that was only assumed binds nobody: the tag may still come. */
 Known
 known (GstCodedExposureDemux *self)
 {
   const DemuxState &st = state (self);
   const ObjectLock lock (self);
-  Known now{nullptr, {st.settings.rate_num, st.settings.rate_den},
-      st.settings.mapped || st.rectifies};
-  if (st.settings.parsed && *st.settings.parsed)
-    now.schedule =
-        ScheduleRef (st.settings.parsed, &st.settings.parsed->value ());
-  else if (!st.assumed)
-    now.schedule = st.in_force;
-  return now;
+  return {binding_schedule (st.settings, st.in_force, st.assumed),
+      st.settings.rate, st.settings.mapped || st.rectifies};
 }
 
 /* @caps of a pad of @kind as those of coded frames, or the other way. */

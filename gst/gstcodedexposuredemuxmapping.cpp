@@ -39,17 +39,18 @@ find_mapping (
   Stream &stream = state (self).stream;
   if (const auto &asked = stream.settings.mapped) {
     if (!*asked) {
-      refuse (self,
+      refuse (GST_ELEMENT (self),
           "The mapping property cannot be read: " + asked->error ().message);
       return false;
     }
     mapping = asked->value ();
     if (mapping->camera () == camera)
       return true;
-    refuse (self, "The mapping " + stream.settings.mapping +
-                      " is of frames of " + text_of (mapping->camera ()) +
-                      " pixels, these have " + text_of (camera) +
-                      ": map the camera as it is set now (moirecalib).");
+    refuse (GST_ELEMENT (self),
+        "The mapping " + stream.settings.mapping + " is of frames of " +
+            text_of (mapping->camera ()) + " pixels, these have " +
+            text_of (camera) +
+            ": map the camera as it is set now (moirecalib).");
     return false;
   }
   if (stream.tagged && *stream.tagged)
@@ -94,7 +95,8 @@ find_rectifier (GstCodedExposureDemux *self, const Schedule &schedule,
       !(cache->schedule == schedule)) {
     Result<Rectifier> made = Rectifier::make (*mapping, schedule);
     if (!made) {
-      refuse (self, "The mapping cannot be used: " + made.error ().message);
+      refuse (GST_ELEMENT (self),
+          "The mapping cannot be used: " + made.error ().message);
       return false;
     }
     cache.emplace (RectifierCache{*mapping, schedule,

@@ -3,18 +3,11 @@
 #include <algorithm>
 
 #include "gstcodedexposuredemuxstate.h"
-#include "gstcodedexposuremeta.h"
 
 #define GST_CAT_DEFAULT codedexposure_demux_debug
 
 namespace cexp::gst::demux
 {
-
-void
-refuse (GstCodedExposureDemux *self, const std::string &why)
-{
-  GST_ELEMENT_ERROR (self, STREAM, FORMAT, ("%s", why.c_str ()), (nullptr));
-}
 
 namespace
 {
@@ -30,66 +23,6 @@ take_settings (GstCodedExposureDemux *self)
   st.stream.stale = true;
 }
 
-struct Source {
-  Schedule schedule;
-  bool assumed = false;
-};
-
-/* The property wins over the stream's tag, which wins over the default. */
-std::optional<Source>
-find_schedule (GstCodedExposureDemux *self)
-{
-  Stream &stream = state (self).stream;
-  const auto &asked = stream.settings.parsed;
-  if (asked && *asked)
-    return Source{asked->value ()};
-  if (!asked && stream.tagged && *stream.tagged)
-    return Source{stream.tagged->value ().schedule};
-  if (asked || stream.tagged) {
-    refuse (self, asked ? "The schedule property cannot be read: " +
-                              asked->error ().message
-                        : "The schedule in the stream's tags cannot be read: " +
-                              stream.tagged->error ().message);
-    return std::nullopt;
-  }
-
-  const Source source{Schedule (), true};
-  if (!std::exchange (stream.warned_assumed, true))
-    GST_ELEMENT_WARNING (self, STREAM, FORMAT,
-        ("The stream says nothing of its schedule: assuming %s. Set the "
-         "schedule property if it is another.",
-            source.schedule.text ().c_str ()),
-        (nullptr));
-  return source;
-}
-
-/* The caps of the coded frames with a frame rate in any case. */
-CapsPtr
-coded_caps (GstCodedExposureDemux *self)
-{
-  const Stream &stream = state (self).stream;
-  const Settings &settings = stream.settings;
-  if (!stream.caps) {
-    refuse (self, "Coded frames came without caps.");
-    return nullptr;
-  }
-  CapsPtr caps (gst_caps_copy (stream.caps.get ()));
-  gint num = 0, den = 1;
-  gst_structure_get_fraction (
-      gst_caps_get_structure (caps.get (), 0), "framerate", &num, &den);
-  if (num > 0)
-    return caps;
-  if (settings.rate_num == 0) {
-    refuse (self,
-        "The coded frames have no frame rate, so their subframes have no "
-        "length: set the frame-rate property, for example frame-rate=25/1.");
-    return nullptr;
-  }
-  gst_caps_set_simple (caps.get (), "framerate", GST_TYPE_FRACTION,
-      settings.rate_num, settings.rate_den, nullptr);
-  return caps;
-}
-
 template <typename Pixel>
 std::optional<AnyExtractor>
 make_extractor (
@@ -102,7 +35,7 @@ make_extractor (
       Extractor<Pixel>::make (schedule, size.width, size.height, options);
   if (made)
     return AnyExtractor (std::move (*made));
-  refuse (self, made.error ().message);
+  refuse (GST_ELEMENT (self), made.error ().message);
   return std::nullopt;
 }
 
@@ -162,19 +95,19 @@ slot_boundaries (FrameRate rate, int n)
 }
 
 PadCaps
-output_caps (CapsPtr coded, const GstVideoInfo &info, Extent extracted,
-    const Schedule &schedule)
+output_caps (CodedFormat coded, Extent extracted, const Schedule &schedule)
 {
-  const CapsPtr with_aspect (gst_caps_copy (coded.get ()));
+  const CapsPtr with_aspect (gst_caps_copy (coded.caps.get ()));
   gst_caps_set_simple (with_aspect.get (), "pixel-aspect-ratio",
-      GST_TYPE_FRACTION, info.par_n, info.par_d, "width", G_TYPE_INT,
-      extracted.width, "height", G_TYPE_INT, extracted.height, nullptr);
+      GST_TYPE_FRACTION, coded.info.par_n, coded.info.par_d, "width",
+      G_TYPE_INT, extracted.width, "height", G_TYPE_INT, extracted.height,
+      nullptr);
   PadCaps caps;
   caps.all.reset (
       scale_caps (with_aspect.get (), coded_to_subframes (schedule, true)));
   caps.one.reset (
       scale_caps (with_aspect.get (), coded_to_subframes (schedule, false)));
-  caps.coded = std::move (coded);
+  caps.coded = std::move (coded.caps);
   return caps;
 }
 
@@ -200,30 +133,21 @@ struct Proposal {
 std::optional<Proposal>
 propose (GstCodedExposureDemux *self)
 {
-  CapsPtr coded = coded_caps (self);
-  if (!coded)
+  GstElement *element = GST_ELEMENT (self);
+  Stream &stream = state (self).stream;
+  auto format = find_format (element, stream, stream.settings);
+  const auto found =
+      format ? find_schedule (element, stream, stream.settings) : std::nullopt;
+  if (!found)
     return std::nullopt;
-  GstVideoInfo info;
-  if (!gst_video_info_from_caps (&info, coded.get ())) {
-    refuse (self, "The caps of the coded frames cannot be read.");
-    return std::nullopt;
-  }
-  if (GST_VIDEO_INFO_IS_INTERLACED (&info)) {
-    refuse (self,
-        "The coded frames are interlaced: a coded exposure needs a camera "
-        "that exposes all rows together (progressive, global shutter).");
-    return std::nullopt;
-  }
-  const auto source = find_schedule (self);
-  if (!source)
-    return std::nullopt;
-  const Schedule &schedule = source->schedule;
+  const Schedule &schedule = found->schedule;
+  const GstVideoInfo info = format->info;
 
   const FrameRate rate{info.fps_n, info.fps_d};
   const auto slots =
       SlotPlan::fit (schedule.timing (), schedule.slots (), rate);
   if (!slots) {
-    refuse (self, slots.error ().message);
+    refuse (element, slots.error ().message);
     return std::nullopt;
   }
   std::shared_ptr<const Rectifier> rectifier;
@@ -240,14 +164,14 @@ propose (GstCodedExposureDemux *self)
   const Method method =
       std::visit ([] (const auto &e) { return e.method (); }, *extractor);
 
-  PadCaps caps = output_caps (std::move (coded), info, size, schedule);
+  PadCaps caps = output_caps (std::move (*format), size, schedule);
   GstVideoInfo subframe;
   gst_video_info_from_caps (&subframe, caps.one.get ());
   return Proposal{Plan{schedule, info, subframe, std::move (*extractor), method,
                       rate, slot_boundaries (rate, schedule.slots ()),
                       light_windows (schedule, method, *slots),
                       std::move (rectifier), size},
-      std::move (caps), source->assumed};
+      std::move (caps), found->assumed};
 }
 
 /* Makes @proposal the plan in force. */
@@ -256,10 +180,8 @@ install (GstCodedExposureDemux *self, Proposal proposal)
 {
   DemuxState &st = state (self);
   Stream &stream = st.stream;
-  if (!stream.plan || !(stream.plan->rate == proposal.plan.rate)) {
-    stream.sequence.emplace (proposal.plan.rate);
-    stream.first_number = stream.next_number;
-  }
+  count_at_rate (stream, proposal.plan.rate,
+      stream.plan ? std::optional (stream.plan->rate) : std::nullopt);
   stream.plan = std::move (proposal.plan);
   stream.stale = false;
   stream.scratch.clear ();
@@ -313,16 +235,14 @@ negotiate (GstCodedExposureDemux *self, GstBuffer *next)
 {
   Stream &stream = state (self).stream;
   take_settings (self);
-  if (const auto meta = next ? get_frame_meta (next) : std::nullopt;
-      meta && std::exchange (stream.bits, meta->bits) != meta->bits)
-    stream.stale = true;
+  take_bits (stream, next);
   if (stream.stale) {
     auto proposal = propose (self);
     if (!proposal)
       return GST_FLOW_NOT_NEGOTIATED;
     install (self, std::move (*proposal));
   }
-  settle_pending (self);
+  settle_events (self);
   return GST_FLOW_OK;
 }
 
@@ -333,21 +253,11 @@ check_pads (GstCodedExposureDemux *self, const Outputs &list)
   const int n = schedule.elements ();
   if (list.ones.empty () || list.ones.rbegin ()->first < n)
     return true;
-  refuse (self, "Pad subframe_" + std::to_string (list.ones.rbegin ()->first) +
-                    " was requested, but " + schedule.text () +
-                    " has subframe_0 to subframe_" + std::to_string (n - 1) +
-                    ".");
+  refuse (GST_ELEMENT (self),
+      "Pad subframe_" + std::to_string (list.ones.rbegin ()->first) +
+          " was requested, but " + schedule.text () +
+          " has subframe_0 to subframe_" + std::to_string (n - 1) + ".");
   return false;
-}
-
-void
-settle_pending (GstCodedExposureDemux *self)
-{
-  Stream &stream = state (self).stream;
-  for (EventPtr &event : std::exchange (stream.pending, {})) {
-    if (stream.plan)
-      forward (self, std::move (event));
-  }
 }
 
 } // namespace cexp::gst::demux

@@ -12,6 +12,13 @@ namespace cexp::gst::demux
 namespace
 {
 
+bool
+is_sticky (const GstEvent *event)
+{
+  return gst_event_type_get_flags (GST_EVENT_TYPE (event)) &
+         GST_EVENT_TYPE_STICKY;
+}
+
 GstIterator *
 internal_links (GstPad *, GstObject *parent)
 {

@@ -101,8 +101,8 @@ set_property (
     settings.extract.interpolate = g_value_get_boolean (value);
     break;
   case PROP_FRAME_RATE:
-    settings.rate_num = gst_value_get_fraction_numerator (value);
-    settings.rate_den = gst_value_get_fraction_denominator (value);
+    settings.rate = {gst_value_get_fraction_numerator (value),
+        gst_value_get_fraction_denominator (value)};
     break;
   case PROP_QOS:
     settings.qos = g_value_get_boolean (value);
@@ -200,7 +200,7 @@ get_property (
     g_value_set_boolean (value, settings.extract.interpolate);
     break;
   case PROP_FRAME_RATE:
-    gst_value_set_fraction (value, settings.rate_num, settings.rate_den);
+    gst_value_set_fraction (value, settings.rate.num, settings.rate.den);
     break;
   case PROP_QOS:
     g_value_set_boolean (value, settings.qos);
@@ -393,11 +393,7 @@ install_reports (GObjectClass *klass)
 std::shared_ptr<const Result<Schedule>>
 set_schedule (GstCodedExposureDemux *self, const std::string &text)
 {
-  std::shared_ptr<const Result<Schedule>> parsed;
-  if (!text.empty ())
-    parsed = std::make_shared<const Result<Schedule>> (Schedule::parse (text));
-  if (parsed && !*parsed)
-    GST_WARNING_OBJECT (self, "%s", parsed->error ().message.c_str ());
+  auto parsed = read_schedule (GST_ELEMENT (self), text);
   const ObjectLock lock (self);
   state (self).settings.schedule = text;
   state (self).settings.parsed = parsed;

@@ -45,110 +45,6 @@ count (GstCodedExposureDemux *self, guint64 Counters::*counter, guint64 by = 1)
   state (self).counters.*counter += by;
 }
 
-void
-post (GstCodedExposureDemux *self, GstStructure *structure)
-{
-  gst_element_post_message (GST_ELEMENT (self),
-      gst_message_new_element (GST_OBJECT (self), structure));
-}
-
-void
-start_anew (const Outputs &list)
-{
-  list.each ([] (const OutputRef &output) { output->discont = true; });
-}
-
-void
-report_loss (GstCodedExposureDemux *self, const Job &job, guint64 lost)
-{
-  const Stream &stream = state (self).stream;
-  const GstClockTime last = stream.last_pts;
-  const GstClockTime period = stream.plan->period ();
-  const GstClockTime from =
-      job.backwards ? last - std::min (last, period) : last + period;
-  GST_WARNING_OBJECT (self,
-      "%" G_GUINT64_FORMAT " coded frames lost from %" GST_TIME_FORMAT
-      " to %" GST_TIME_FORMAT,
-      lost, GST_TIME_ARGS (from), GST_TIME_ARGS (job.pts));
-  count (self, &Counters::frames_lost, lost);
-  post (self, gst_structure_new ("codedexposure/frames-lost", "count",
-                  G_TYPE_UINT64, lost, "from", G_TYPE_UINT64, from, "to",
-                  G_TYPE_UINT64, job.pts, nullptr));
-  notify (self, "frames-lost");
-}
-
-void
-warn_of_wrong_time (GstCodedExposureDemux *self, const Job &job)
-{
-  Stream &stream = state (self).stream;
-  if (std::exchange (stream.warned_of_time, true))
-    return;
-  GST_ELEMENT_WARNING (self, STREAM, FORMAT,
-      ("A coded frame at %" GST_TIME_FORMAT " follows one at %" GST_TIME_FORMAT
-       ", where frames are %" GST_TIME_FORMAT " apart: its subframes overlap "
-       "others in time.",
-          GST_TIME_ARGS (job.pts), GST_TIME_ARGS (stream.last_pts),
-          GST_TIME_ARGS (stream.plan->period ())),
-      ("this is said once"));
-}
-
-/* Compares the frame's time with that of the frame before. */
-FrameStep
-check_time (GstCodedExposureDemux *self, const Job &job)
-{
-  Stream &stream = state (self).stream;
-  const FrameStep step =
-      stream.sequence->take (Nanoseconds (job.pts), job.backwards);
-  const bool after_late =
-      std::exchange (stream.was_late, step.arrival == Arrival::late);
-  if (step.arrival != Arrival::next || after_late)
-    start_anew (*job.outputs);
-  if (step.arrival == Arrival::after_loss)
-    report_loss (self, job, step.lost);
-  else if (step.arrival != Arrival::next && step.arrival != Arrival::first)
-    warn_of_wrong_time (self, job);
-  stream.last_pts = job.pts;
-  return step;
-}
-
-/* What the frame is known by: the meta that came with it, else our own count.
- */
-FrameMeta
-describe (GstCodedExposureDemux *self, const Job &job, const FrameStep &step)
-{
-  Stream &stream = state (self).stream;
-  FrameMeta meta;
-  meta.frame = stream.first_number + step.number;
-  meta.lost_before = step.lost;
-  stream.next_number = std::max (stream.next_number, meta.frame + 1);
-  return get_frame_meta (job.inbuf).value_or (meta);
-}
-
-void
-note_saturation (GstCodedExposureDemux *self, const Job &job)
-{
-  /* Noise lifts a bright pixel to white in one frame and not in the next. */
-  constexpr GstClockTimeDiff kCalm = GST_SECOND;
-  Burst &burst = state (self).stream.saturation;
-  if (job.meta.saturated == 0) {
-    if (burst.frames > 0 &&
-        std::abs (GST_CLOCK_DIFF (burst.to, job.pts)) >= kCalm)
-      end_saturation (self);
-    return;
-  }
-  count (self, &Counters::saturated_frames);
-  burst.to = job.pts;
-  burst.peak = std::max (burst.peak, job.meta.saturated);
-  if (burst.frames++ > 0)
-    return;
-  burst.from = job.pts;
-  post (self,
-      gst_structure_new ("codedexposure/saturated", "active", G_TYPE_BOOLEAN,
-          TRUE, "frame", G_TYPE_UINT64, job.meta.frame, "from", G_TYPE_UINT64,
-          job.pts, "pixels", G_TYPE_UINT64, job.meta.saturated, nullptr));
-  notify (self, "saturated-frames");
-}
-
 /* Asked only for the sake of QoS messages. */
 bool
 is_live (GstCodedExposureDemux *self)
@@ -473,7 +369,8 @@ push_subframes (GstCodedExposureDemux *self, Job &job)
   if (flow != GST_FLOW_OK)
     return flow;
   if (!GST_BUFFER_FLAG_IS_SET (job.inbuf, GST_BUFFER_FLAG_GAP))
-    note_saturation (self, job);
+    note_saturation (GST_ELEMENT (self), state (self).stream,
+        state (self).counters, job.pts, job.meta);
 
   for (std::size_t k : push_order (job, targets.size ())) {
     if (targets[k].owner () && !is_fatal (flow))
@@ -484,36 +381,20 @@ push_subframes (GstCodedExposureDemux *self, Job &job)
 
 /* Counts and judges the frame before anything of it goes out. */
 Job
-admit (GstCodedExposureDemux *self, GstBuffer *inbuf)
+take_in (GstCodedExposureDemux *self, GstBuffer *inbuf)
 {
-  const Stream &stream = state (self).stream;
-  Job job{inbuf, GST_BUFFER_PTS (inbuf), {}, outputs (self),
-      stream.segment.rate < 0};
-  count (self, &Counters::frames_in);
-  if (GST_BUFFER_IS_DISCONT (inbuf))
-    start_anew (*job.outputs);
-  if (GST_BUFFER_FLAG_IS_SET (inbuf, GST_BUFFER_FLAG_CORRUPTED)) {
-    count (self, &Counters::frames_corrupted);
-    notify (self, "frames-corrupted");
-  }
-  job.meta = describe (self, job, check_time (self, job));
+  DemuxState &st = state (self);
+  const Admitted admitted = admit (GST_ELEMENT (self), st.stream, st.counters,
+      inbuf, st.stream.plan->period ());
+  Job job{inbuf, GST_BUFFER_PTS (inbuf), admitted.meta, outputs (self),
+      st.stream.backwards ()};
+  if (!admitted.follows)
+    job.outputs->each (
+        [] (const OutputRef &output) { output->discont = true; });
   return job;
 }
 
 } // namespace
-
-void
-end_saturation (GstCodedExposureDemux *self)
-{
-  const Burst burst = std::exchange (state (self).stream.saturation, {});
-  if (burst.frames == 0)
-    return;
-  post (self, gst_structure_new ("codedexposure/saturated", "active",
-                  G_TYPE_BOOLEAN, FALSE, "frames", G_TYPE_UINT64, burst.frames,
-                  "from", G_TYPE_UINT64, burst.from, "to", G_TYPE_UINT64,
-                  burst.to, "pixels", G_TYPE_UINT64, burst.peak, nullptr));
-  notify (self, "saturated-frames");
-}
 
 /* The subframes of one coded frame, in the order of their exposure. One
  * thread serves all pads, so that a sink that waits for its time makes the
@@ -525,23 +406,17 @@ chain (GstPad *pad, GstObject *parent, GstBuffer *inbuf) noexcept
   auto *self = GST_CODED_EXPOSURE_DEMUX (parent);
   const BufferPtr frame (inbuf);
   GST_LOG_OBJECT (pad, "[IN] %" GST_PTR_FORMAT, inbuf);
-  if (state (self).stream.segment.format != GST_FORMAT_TIME)
-    return GST_FLOW_ERROR;
-  if (const GstFlowReturn flow = negotiate (self, inbuf); flow != GST_FLOW_OK)
+  GstFlowReturn flow =
+      check_stamp (GST_ELEMENT (self), state (self).stream, inbuf);
+  if (flow == GST_FLOW_OK)
+    flow = negotiate (self, inbuf);
+  if (flow != GST_FLOW_OK)
     return flow;
-  if (!GST_BUFFER_PTS_IS_VALID (inbuf)) {
-    GST_ELEMENT_ERROR (self, STREAM, FORMAT,
-        ("A coded frame has no time stamp (PTS), so its subframes cannot be "
-         "placed in time: let the source set one, for example with "
-         "do-timestamp=true."),
-        (nullptr));
-    return GST_FLOW_ERROR;
-  }
 
-  Job job = admit (self, inbuf);
+  Job job = take_in (self, inbuf);
   if (!check_pads (self, *job.outputs))
     return GST_FLOW_NOT_NEGOTIATED;
-  const GstFlowReturn flow = push_coded (self, job);
+  flow = push_coded (self, job);
   return is_fatal (flow) ? flow : push_subframes (self, job);
 }
 

@@ -13,44 +13,28 @@
 #include <gst/gst.h>
 #include <gst/video/video.h>
 
-#include "base/result.h"
-#include "clock/frame_sequence.h"
 #include "extract/extractor.h"
-#include "gstcodedexposurecaps.h"
 #include "gstcodedexposuredemux.h"
-#include "gstcodedexposuremeta.h"
-#include "gstraii.h"
+#include "gstcodedinput.h"
 #include "moire/rectifier.h"
-#include "schedule/schedule.h"
-#include "schedule/stream_setup.h"
 
 GST_DEBUG_CATEGORY_EXTERN (codedexposure_demux_debug);
 
 namespace cexp::gst::demux
 {
 
-using ScheduleRef = std::shared_ptr<const Schedule>;
-
 /** What the user asked for. */
-struct Settings {
-  std::string schedule;
-  /** The schedule read from the text; null where the text is empty. */
-  std::shared_ptr<const Result<Schedule>> parsed;
+struct Settings : CodedSettings {
   std::string mapping;
   /** Read from the file of that name; null where there is none. */
   std::shared_ptr<const Result<Mapping>> mapped;
   ExtractOptions extract;
-  int rate_num = 0, rate_den = 1; ///< 0/1: only from the caps
   bool qos = false;
 };
 
-struct Counters {
-  guint64 frames_in = 0;
+struct Counters : CodedCounters {
   guint64 subframes_out = 0;
-  guint64 frames_lost = 0;
-  guint64 frames_corrupted = 0;
   guint64 subframes_dropped = 0;
-  guint64 saturated_frames = 0;
   RectifyReport rectified; ///< of the mapping in force
 };
 
@@ -151,46 +135,19 @@ struct RectifierCache {
   std::shared_ptr<const Rectifier> rectifier;
 };
 
-/** Saturated frames that follow each other. */
-struct Burst {
-  guint64 frames = 0;
-  guint64 peak = 0; ///< most saturated pixels in one of them
-  GstClockTime from = GST_CLOCK_TIME_NONE;
-  GstClockTime to = GST_CLOCK_TIME_NONE;
-};
-
 /** All that is forgotten from PAUSED to READY. Sink pad's stream lock. */
-struct Stream {
-  Stream () { gst_segment_init (&segment, GST_FORMAT_UNDEFINED); }
-
-  CapsPtr caps;
-  guint32 caps_seqnum = 0;
-  GstSegment segment;
-  /** What the tags of the stream say; an error where they cannot be read. */
-  std::optional<Result<StreamSetup>> tagged;
+struct Stream : CodedStream {
   std::optional<RectifierCache> rectifiers;
   Image<std::uint8_t> narrow; ///< a rectified frame, of either depth
   Image<std::uint16_t> wide;
   Settings settings; ///< in force
   std::optional<Plan> plan;
-  int bits = 0;      ///< significant ones, as the frames say; 0: they do not
-  bool stale = true; ///< the plan has to be made again before the next frame
   /** Significant bits: the property wins over the frames; 0: of the type. */
   int bits_in_force () const
   {
     return settings.extract.bits > 0 ? settings.extract.bits : bits;
   }
-  /** Serialised events that wait for the caps of the source pads. */
-  std::vector<EventPtr> pending;
-  std::optional<FrameSequence> sequence;
-  guint64 first_number = 0; ///< of the sequence
-  guint64 next_number = 0;
-  GstClockTime last_pts = GST_CLOCK_TIME_NONE;
-  bool was_late = false; ///< the last frame was
-  Burst saturation;
-  bool warned_assumed = false;
   bool warned_of_mapping = false;
-  bool warned_of_time = false;
   std::optional<bool> live;       ///< asked for when first needed
   std::vector<std::byte> scratch; ///< subframes that no pad wants
 };
@@ -249,13 +206,6 @@ std::shared_ptr<const Outputs> outputs (GstCodedExposureDemux *self);
 /** Notifies of a property that the streaming thread changed. */
 void notify (GstCodedExposureDemux *self, const char *property);
 
-inline bool
-is_sticky (GstEvent *event)
-{
-  return gst_event_type_get_flags (GST_EVENT_TYPE (event)) &
-         GST_EVENT_TYPE_STICKY;
-}
-
 /* Pads. */
 OutputRef add_output (GstCodedExposureDemux *self, GstPadTemplate *templ,
     Output::Kind kind, int index);
@@ -282,13 +232,10 @@ gboolean src_query (GstPad *pad, GstObject *parent, GstQuery *query) noexcept;
 
 /* Negotiation. */
 /** Makes the plan and tells the source pads, where that is due. Posts an error
- * and returns other than OK when there can be no plan. */
-/** @p next: the frame that comes next, where there is one. */
+ * and returns other than OK when there can be no plan.
+ * @p next  the frame that comes next, where there is one. */
 GstFlowReturn negotiate (
     GstCodedExposureDemux *self, GstBuffer *next = nullptr);
-/** Shows on the bus why there can be no plan. */
-void refuse (GstCodedExposureDemux *self, const std::string &why);
-
 /* Mapping. */
 /** Sets @p rectifier for frames of @p camera pixels, null where they are taken
  * as they are. Returns false, with an error on the bus, when the mapping that
@@ -306,9 +253,8 @@ ImageView<const std::uint16_t> rectify (
 /** Whether the plan has a subframe for every pad of @p list; posts an error
  * where it has not. */
 bool check_pads (GstCodedExposureDemux *self, const Outputs &list);
-/** Forwards the events that waited for the caps; forgets them where no caps
- * came. */
-void settle_pending (GstCodedExposureDemux *self);
+/** Forwards the events that waited for the caps. */
+void settle_events (GstCodedExposureDemux *self);
 /** Answers for the CAPS query; Transfer: full. */
 GstCaps *sink_caps (GstCodedExposureDemux *self);
 GstCaps *src_caps (GstCodedExposureDemux *self, GstPad *pad);
@@ -324,8 +270,5 @@ gboolean answer_allocation (GstCodedExposureDemux *self, GstQuery *query);
 
 /* Frames. */
 GstFlowReturn chain (GstPad *pad, GstObject *parent, GstBuffer *inbuf) noexcept;
-/** Says on the bus that a burst of saturated frames is over, if there is one.
- */
-void end_saturation (GstCodedExposureDemux *self);
 
 } // namespace cexp::gst::demux

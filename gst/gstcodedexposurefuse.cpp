@@ -53,9 +53,11 @@
  * counted, the next frame is DISCONT, and the element message
  * `codedexposure/frames-lost` says `count`, `from` (when the first was due) and
  * `to` (the frame that came). CORRUPTED and GAP pass to all frames of a coded
- * frame. Every frame bears the custom meta `CodedExposureFrame` with the number
- * of its coded frame, its slot and the time of its light; other metas of the
- * coded frame are copied. QoS events go no further upstream: some camera
+ * frame. `codedexposure/saturated` says when a stretch of frames with pixels at
+ * the largest value begins (`active` true), and when there were none for a
+ * second. Every frame bears the custom meta `CodedExposureFrame` with the
+ * number of its coded frame, its slot and the time of its light; other metas of
+ * the coded frame are copied. QoS events go no further upstream: some camera
  * sources stop their stream for them.
  *
  * ## Example pipelines
@@ -72,7 +74,6 @@
  */
 #include "gstcodedexposurefuse.h"
 
-#include "gstcodedexposurecaps.h"
 #include "gstcodedexposurefusestate.h"
 
 GST_DEBUG_CATEGORY (codedexposure_fuse_debug);
@@ -111,14 +112,8 @@ read_schedule_again (GstCodedExposureFuse *self)
     const ObjectLock lock (self);
     text = self->state->settings.schedule;
   }
-  const auto parsed = cexp::gst::fuse::set_schedule (self, text);
-  if (!parsed || *parsed)
-    return true;
-  GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
-      ("The schedule property cannot be read: %s",
-          parsed->error ().message.c_str ()),
-      (nullptr));
-  return false;
+  return check_schedule (
+      GST_ELEMENT (self), cexp::gst::fuse::set_schedule (self, text));
 }
 
 void

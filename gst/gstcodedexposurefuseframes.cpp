@@ -2,6 +2,7 @@
 /* A coded frame comes in, its fused frames go out. */
 #include <algorithm>
 
+#include "extract/saturation.h"
 #include "gstcodedexposurefusestate.h"
 
 #define GST_CAT_DEFAULT codedexposure_fuse_debug
@@ -15,72 +16,37 @@ namespace
 /* Flags of frames that are no picture, or none to compare others with. */
 constexpr guint kUnfit = GST_BUFFER_FLAG_CORRUPTED | GST_BUFFER_FLAG_GAP;
 
-void
-count (GstCodedExposureFuse *self, guint64 Counters::*counter, guint64 by = 1)
-{
-  const ObjectLock lock (self);
-  state (self).counters.*counter += by;
-}
-
-void
-report_loss (GstCodedExposureFuse *self, GstClockTime pts, guint64 lost)
-{
-  const Stream &stream = state (self).stream;
-  const GstClockTime period =
-      stream.plan->boundary (stream.plan->schedule.slots ());
-  const GstClockTime from =
-      stream.segment.rate < 0
-          ? stream.last_pts - std::min (stream.last_pts, period)
-          : stream.last_pts + period;
-  GST_WARNING_OBJECT (self,
-      "%" G_GUINT64_FORMAT " coded frames lost from %" GST_TIME_FORMAT
-      " to %" GST_TIME_FORMAT,
-      lost, GST_TIME_ARGS (from), GST_TIME_ARGS (pts));
-  count (self, &Counters::frames_lost, lost);
-  gst_element_post_message (GST_ELEMENT (self),
-      gst_message_new_element (GST_OBJECT (self),
-          gst_structure_new ("codedexposure/frames-lost", "count",
-              G_TYPE_UINT64, lost, "from", G_TYPE_UINT64, from, "to",
-              G_TYPE_UINT64, pts, nullptr)));
-  notify (self, "frames-lost");
-}
-
-/* Numbers the frame; ends the history where it does not follow the last one.
- */
+/* Counts the frame; ends the history where it does not follow the last one. */
 GstFlowReturn
-admit (GstCodedExposureFuse *self, GstBuffer *inbuf, FrameMeta &meta)
+take_in (GstCodedExposureFuse *self, GstBuffer *inbuf, FrameMeta &meta)
 {
-  Stream &stream = state (self).stream;
-  const GstClockTime pts = GST_BUFFER_PTS (inbuf);
-  count (self, &Counters::frames_in);
-  const FrameStep step =
-      stream.sequence->take (Nanoseconds (pts), stream.segment.rate < 0);
-  const bool follows = step.arrival == Arrival::next &&
-                       !GST_BUFFER_IS_DISCONT (inbuf) &&
-                       !(GST_BUFFER_FLAGS (inbuf) & kUnfit);
-  if (!follows) {
-    if (const GstFlowReturn flow = drain (self); flow != GST_FLOW_OK)
-      return flow;
-    forget_history (self);
-  }
-  stream.discont |= step.arrival != Arrival::next;
-  stream.discont |= GST_BUFFER_IS_DISCONT (inbuf) != 0;
-  if (step.arrival == Arrival::after_loss)
-    report_loss (self, pts, step.lost);
-  stream.last_pts = pts;
+  FuseState &st = state (self);
+  const Admitted admitted = admit (GST_ELEMENT (self), st.stream, st.counters,
+      inbuf, st.stream.plan->period ());
+  meta = admitted.meta;
+  st.stream.discont |= !admitted.follows;
+  if (admitted.follows && !(GST_BUFFER_FLAGS (inbuf) & kUnfit))
+    return GST_FLOW_OK;
+  const GstFlowReturn flow = drain (self);
+  forget_history (self);
+  return flow;
+}
 
-  meta.frame = stream.first_number + step.number;
-  meta.lost_before = step.lost;
-  stream.next_number = std::max (stream.next_number, meta.frame + 1);
-  meta = get_frame_meta (inbuf).value_or (meta);
-  return GST_FLOW_OK;
+/* Returns the number of saturated pixels. */
+template <typename Pixel>
+guint64
+take_pixels (Fuser<Pixel> &fuser, ImageView<const Pixel> coded, int bits)
+{
+  fuser.take (coded);
+  return count_saturated (coded, bits);
 }
 
 /* Gives the pixels of @inbuf to the fuser and keeps the rest. */
 GstFlowReturn
-take (GstCodedExposureFuse *self, GstBuffer *inbuf, const FrameMeta &meta)
+take (GstCodedExposureFuse *self, GstBuffer *inbuf, FrameMeta meta)
 {
-  Stream &stream = state (self).stream;
+  FuseState &st = state (self);
+  Stream &stream = st.stream;
   Plan &plan = *stream.plan;
   MappedFrame coded (plan.coded, inbuf, GST_MAP_READ);
   if (!coded) {
@@ -92,11 +58,16 @@ take (GstCodedExposureFuse *self, GstBuffer *inbuf, const FrameMeta &meta)
         (nullptr));
     return GST_FLOW_ERROR;
   }
-  if (auto *fuser = std::get_if<Fuser<std::uint8_t>> (&plan.fuser))
-    fuser->take (view_of<std::uint8_t> (coded));
+  const int bits = stream.bits_in_force ();
+  if (auto *narrow = std::get_if<Fuser<std::uint8_t>> (&plan.fuser))
+    meta.saturated =
+        take_pixels (*narrow, view_of<const std::uint8_t> (coded), bits);
   else
-    std::get<Fuser<std::uint16_t>> (plan.fuser)
-        .take (view_of<std::uint16_t> (coded));
+    meta.saturated = take_pixels (std::get<Fuser<std::uint16_t>> (plan.fuser),
+        view_of<const std::uint16_t> (coded), bits);
+  if (!GST_BUFFER_FLAG_IS_SET (inbuf, GST_BUFFER_FLAG_GAP))
+    note_saturation (
+        GST_ELEMENT (self), stream, st.counters, GST_BUFFER_PTS (inbuf), meta);
 
   BufferPtr description (gst_buffer_new ());
   gst_buffer_copy_into (description.get (), inbuf,
@@ -194,8 +165,10 @@ push_oldest (GstCodedExposureFuse *self)
     describe (self, coded, k, outbuf.get ());
     GST_LOG_OBJECT (st.srcpad, "[OUT] %" GST_PTR_FORMAT, outbuf.get ());
     flow = gst_pad_push (st.srcpad, outbuf.release ());
-    if (flow == GST_FLOW_OK)
-      count (self, &Counters::frames_out);
+    if (flow != GST_FLOW_OK)
+      break;
+    const ObjectLock lock (self);
+    st.counters.frames_out++;
   }
   return flow;
 }
@@ -228,21 +201,12 @@ chain (GstPad *pad, GstObject *parent, GstBuffer *inbuf) noexcept
   const BufferPtr frame (inbuf);
   Stream &stream = state (self).stream;
   GST_LOG_OBJECT (pad, "[IN] %" GST_PTR_FORMAT, inbuf);
-  if (stream.segment.format != GST_FORMAT_TIME)
-    return GST_FLOW_ERROR;
-  if (const GstFlowReturn flow = negotiate (self, inbuf); flow != GST_FLOW_OK)
-    return flow;
-  if (!GST_BUFFER_PTS_IS_VALID (inbuf)) {
-    GST_ELEMENT_ERROR (self, STREAM, FORMAT,
-        ("A coded frame has no time stamp (PTS), so its fused frames cannot be "
-         "placed in time: let the source set one, for example with "
-         "do-timestamp=true."),
-        (nullptr));
-    return GST_FLOW_ERROR;
-  }
-
   FrameMeta meta;
-  GstFlowReturn flow = admit (self, inbuf, meta);
+  GstFlowReturn flow = check_stamp (GST_ELEMENT (self), stream, inbuf);
+  if (flow == GST_FLOW_OK)
+    flow = negotiate (self, inbuf);
+  if (flow == GST_FLOW_OK)
+    flow = take_in (self, inbuf, meta);
   if (flow == GST_FLOW_OK)
     flow = take (self, inbuf, meta);
   if (flow == GST_FLOW_OK && GST_BUFFER_FLAGS (inbuf) & kUnfit) {

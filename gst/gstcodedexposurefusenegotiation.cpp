@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* From caps, schedule and settings to a plan, and caps seen from either side.
  */
-#include "gstcodedexposurecaps.h"
 #include "gstcodedexposurefusestate.h"
 
 #define GST_CAT_DEFAULT codedexposure_fuse_debug
@@ -12,12 +11,6 @@ namespace cexp::gst::fuse
 namespace
 {
 
-void
-refuse (GstCodedExposureFuse *self, const std::string &why)
-{
-  GST_ELEMENT_ERROR (self, STREAM, FORMAT, ("%s", why.c_str ()), (nullptr));
-}
-
 /* Rate times N, and the pilot's rows cropped. */
 CapsScale
 coded_to_fused (const Schedule &schedule)
@@ -26,40 +19,6 @@ coded_to_fused (const Schedule &schedule)
   scale.rate_num = schedule.slots ();
   scale.crop_rows = schedule.pilot_rows ();
   return scale;
-}
-
-struct Source {
-  Schedule schedule;
-  bool assumed = false;
-};
-
-/* The property wins over the stream's tag, which wins over the default. */
-std::optional<Source>
-find_schedule (GstCodedExposureFuse *self)
-{
-  Stream &stream = state (self).stream;
-  if (const auto &asked = stream.settings.parsed) {
-    if (*asked)
-      return Source{asked->value ()};
-    refuse (self,
-        "The schedule property cannot be read: " + asked->error ().message);
-    return std::nullopt;
-  }
-  if (const auto &tagged = stream.tagged) {
-    if (*tagged)
-      return Source{tagged->value ().schedule};
-    refuse (self, "The schedule in the stream's tags cannot be read: " +
-                      tagged->error ().message);
-    return std::nullopt;
-  }
-  const Source source{Schedule (), true};
-  if (!std::exchange (stream.warned_assumed, true))
-    GST_ELEMENT_WARNING (self, STREAM, FORMAT,
-        ("The stream says nothing of its schedule: assuming %s. Set the "
-         "schedule property if it is another.",
-            source.schedule.text ().c_str ()),
-        (nullptr));
-  return source;
 }
 
 /* Pixels are taken to see the mirror of their own place. */
@@ -76,38 +35,6 @@ warn_of_mapping (GstCodedExposureFuse *self)
        "the camera's misalignment. Align the camera (moirecalib), or take "
        "subframes (codedexposure-demux)."),
       (nullptr));
-}
-
-/* The caps of the coded frames, with a frame rate in any case. */
-std::optional<GstVideoInfo>
-coded_info (GstCodedExposureFuse *self)
-{
-  const Stream &stream = state (self).stream;
-  if (!stream.caps) {
-    refuse (self, "Coded frames came without caps.");
-    return std::nullopt;
-  }
-  const Settings &settings = stream.settings;
-  const CapsPtr caps =
-      fill_in_rate ({settings.rate_num, settings.rate_den}, stream.caps.get ());
-  GstVideoInfo info;
-  if (!gst_video_info_from_caps (&info, caps.get ())) {
-    refuse (self, "The caps of the coded frames cannot be read.");
-    return std::nullopt;
-  }
-  if (GST_VIDEO_INFO_IS_INTERLACED (&info)) {
-    refuse (self,
-        "The coded frames are interlaced: a coded exposure needs a camera "
-        "that exposes all rows together (progressive, global shutter).");
-    return std::nullopt;
-  }
-  if (info.fps_n == 0) {
-    refuse (self,
-        "The coded frames have no frame rate, so fused frames have no length: "
-        "set the frame-rate property, for example frame-rate=25/1.");
-    return std::nullopt;
-  }
-  return info;
 }
 
 template <typename Pixel>
@@ -143,45 +70,45 @@ struct Proposal {
 std::optional<Proposal>
 propose (GstCodedExposureFuse *self)
 {
-  const Stream &stream = state (self).stream;
-  const auto info = coded_info (self);
-  const auto source = info ? find_schedule (self) : std::nullopt;
-  if (!source)
+  GstElement *element = GST_ELEMENT (self);
+  Stream &stream = state (self).stream;
+  const auto format = find_format (element, stream, stream.settings);
+  const auto found =
+      format ? find_schedule (element, stream, stream.settings) : std::nullopt;
+  if (!found)
     return std::nullopt;
-  const Schedule &schedule = source->schedule;
-  const FrameRate rate{info->fps_n, info->fps_d};
+  const Schedule &schedule = found->schedule;
+  const GstVideoInfo &info = format->info;
+  const FrameRate rate{info.fps_n, info.fps_d};
   const auto slots =
       SlotPlan::fit (schedule.timing (), schedule.slots (), rate);
   if (!slots) {
-    refuse (self, slots.error ().message);
+    refuse (element, slots.error ().message);
     return std::nullopt;
   }
   FuseOptions options = stream.settings.options;
-  if (options.bits == 0)
-    options.bits = stream.bits;
-  auto fuser = GST_VIDEO_INFO_FORMAT (&*info) == GST_VIDEO_FORMAT_GRAY8
-                   ? make_fuser<std::uint8_t> (schedule, *info, options)
-                   : make_fuser<std::uint16_t> (schedule, *info, options);
+  options.bits = stream.bits_in_force ();
+  auto fuser = GST_VIDEO_INFO_FORMAT (&info) == GST_VIDEO_FORMAT_GRAY8
+                   ? make_fuser<std::uint8_t> (schedule, info, options)
+                   : make_fuser<std::uint16_t> (schedule, info, options);
   if (!fuser) {
-    refuse (self, fuser.error ().message);
+    refuse (element, fuser.error ().message);
     return std::nullopt;
   }
 
-  const CapsPtr with_rate = fill_in_rate (
-      {stream.settings.rate_num, stream.settings.rate_den}, stream.caps.get ());
-  CapsPtr caps (scale_caps (with_rate.get (), coded_to_fused (schedule)));
+  CapsPtr caps (scale_caps (format->caps.get (), coded_to_fused (schedule)));
   GstVideoInfo fused;
   gst_video_info_from_caps (&fused, caps.get ());
   PoolPtr pool = make_pool (caps.get (), fused);
   if (!pool) {
-    refuse (self, "No buffers for fused frames of " +
-                      std::to_string (fused.width) + "x" +
-                      std::to_string (fused.height) + " pixels.");
+    refuse (element, "No buffers for fused frames of " +
+                         std::to_string (fused.width) + "x" +
+                         std::to_string (fused.height) + " pixels.");
     return std::nullopt;
   }
-  return Proposal{Plan{schedule, *info, fused, std::move (*fuser), rate, *slots,
+  return Proposal{Plan{schedule, info, fused, std::move (*fuser), rate, *slots,
                       options.lookahead, std::move (pool)},
-      std::move (caps), source->assumed};
+      std::move (caps), found->assumed};
 }
 
 /* Makes @proposal the plan in force. */
@@ -190,15 +117,12 @@ install (GstCodedExposureFuse *self, Proposal proposal)
 {
   FuseState &st = state (self);
   Stream &stream = st.stream;
-  if (!stream.plan || !(stream.plan->rate == proposal.plan.rate)) {
-    stream.sequence.emplace (proposal.plan.rate);
-    stream.first_number = stream.next_number;
-  }
+  count_at_rate (stream, proposal.plan.rate,
+      stream.plan ? std::optional (stream.plan->rate) : std::nullopt);
   stream.plan = std::move (proposal.plan);
   stream.stale = false;
   const Plan &plan = *stream.plan;
-  const GstClockTime latency =
-      GstClockTime (plan.lookahead) * plan.boundary (plan.schedule.slots ());
+  const GstClockTime latency = GstClockTime (plan.lookahead) * plan.period ();
   bool schedule_changed, latency_changed;
   {
     const ObjectLock lock (self);
@@ -219,10 +143,9 @@ install (GstCodedExposureFuse *self, Proposal proposal)
         GST_ELEMENT (self), gst_message_new_latency (GST_OBJECT (self)));
 }
 
-/* What answers about caps depend on, at one moment. A schedule that was only
- * assumed binds nobody: the tag may still come. */
+/* What answers about caps depend on, at one moment. */
 struct Known {
-  std::shared_ptr<const Schedule> schedule; ///< null: any may come
+  ScheduleRef schedule; ///< null: any may come
   SaidRate rate;
 };
 
@@ -231,12 +154,8 @@ known (GstCodedExposureFuse *self)
 {
   const FuseState &st = state (self);
   const ObjectLock lock (self);
-  Known now{nullptr, {st.settings.rate_num, st.settings.rate_den}};
-  if (st.settings.parsed && *st.settings.parsed)
-    now.schedule = {st.settings.parsed, &st.settings.parsed->value ()};
-  else if (!st.assumed)
-    now.schedule = st.in_force;
-  return now;
+  return {binding_schedule (st.settings, st.in_force, st.assumed),
+      st.settings.rate};
 }
 
 CapsPtr
@@ -254,9 +173,7 @@ GstFlowReturn
 negotiate (GstCodedExposureFuse *self, GstBuffer *next)
 {
   FuseState &st = state (self);
-  if (const auto meta = next ? get_frame_meta (next) : std::nullopt;
-      meta && std::exchange (st.stream.bits, meta->bits) != meta->bits)
-    st.stream.stale = true;
+  take_bits (st.stream, next);
   bool changed;
   {
     const ObjectLock lock (self);
@@ -273,17 +190,8 @@ negotiate (GstCodedExposureFuse *self, GstBuffer *next)
     install (self, std::move (*proposal));
     warn_of_mapping (self);
   }
-  settle_pending (self);
+  settle_events (self);
   return GST_FLOW_OK;
-}
-
-void
-settle_pending (GstCodedExposureFuse *self)
-{
-  FuseState &st = state (self);
-  for (EventPtr &event : std::exchange (st.stream.pending, {}))
-    if (st.stream.plan)
-      gst_pad_push_event (st.srcpad, event.release ());
 }
 
 GstCaps *

@@ -22,6 +22,8 @@ enum {
   PROP_FRAMES_IN,
   PROP_FRAMES_OUT,
   PROP_FRAMES_LOST,
+  PROP_FRAMES_CORRUPTED,
+  PROP_SATURATED_FRAMES,
   PROP_SCHEDULE_IN_FORCE,
   PROP_STATS,
 };
@@ -85,8 +87,8 @@ set_property (
     settings.options.bits = g_value_get_int (value);
     break;
   case PROP_FRAME_RATE:
-    settings.rate_num = gst_value_get_fraction_numerator (value);
-    settings.rate_den = gst_value_get_fraction_denominator (value);
+    settings.rate = {gst_value_get_fraction_numerator (value),
+        gst_value_get_fraction_denominator (value)};
     break;
   default:
     G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
@@ -99,7 +101,9 @@ stats (const Counters &counters)
   return gst_structure_new ("application/x-codedexposure-fuse-stats",
       "frames-in", G_TYPE_UINT64, counters.frames_in, "frames-out",
       G_TYPE_UINT64, counters.frames_out, "frames-lost", G_TYPE_UINT64,
-      counters.frames_lost, nullptr);
+      counters.frames_lost, "frames-corrupted", G_TYPE_UINT64,
+      counters.frames_corrupted, "saturated-frames", G_TYPE_UINT64,
+      counters.saturated_frames, nullptr);
 }
 
 void
@@ -130,7 +134,7 @@ get_property (
     g_value_set_int (value, settings.options.bits);
     break;
   case PROP_FRAME_RATE:
-    gst_value_set_fraction (value, settings.rate_num, settings.rate_den);
+    gst_value_set_fraction (value, settings.rate.num, settings.rate.den);
     break;
   case PROP_FRAMES_IN:
     g_value_set_uint64 (value, st.counters.frames_in);
@@ -140,6 +144,12 @@ get_property (
     break;
   case PROP_FRAMES_LOST:
     g_value_set_uint64 (value, st.counters.frames_lost);
+    break;
+  case PROP_FRAMES_CORRUPTED:
+    g_value_set_uint64 (value, st.counters.frames_corrupted);
+    break;
+  case PROP_SATURATED_FRAMES:
+    g_value_set_uint64 (value, st.counters.saturated_frames);
     break;
   case PROP_SCHEDULE_IN_FORCE:
     g_value_set_string (
@@ -269,6 +279,11 @@ install_reports (GObjectClass *klass)
   counter (PROP_FRAMES_LOST, "frames-lost", "Frames lost",
       "Coded frames that never came, by the gaps between time stamps; "
       "notifies");
+  counter (PROP_FRAMES_CORRUPTED, "frames-corrupted", "Frames corrupted",
+      "Coded frames that upstream flagged as corrupted; notifies");
+  counter (PROP_SATURATED_FRAMES, "saturated-frames", "Saturated frames",
+      "Coded frames with a pixel at the largest value; notifies when a "
+      "stretch of them begins or ends");
   /**
    * codedexposure-fuse:schedule-in-force:
    *
@@ -297,11 +312,7 @@ install_reports (GObjectClass *klass)
 std::shared_ptr<const Result<Schedule>>
 set_schedule (GstCodedExposureFuse *self, const std::string &text)
 {
-  std::shared_ptr<const Result<Schedule>> parsed;
-  if (!text.empty ())
-    parsed = std::make_shared<const Result<Schedule>> (Schedule::parse (text));
-  if (parsed && !*parsed)
-    GST_WARNING_OBJECT (self, "%s", parsed->error ().message.c_str ());
+  auto parsed = read_schedule (GST_ELEMENT (self), text);
   const ObjectLock lock (self);
   state (self).settings.schedule = text;
   state (self).settings.parsed = parsed;

@@ -12,14 +12,9 @@
 #include <gst/gst.h>
 #include <gst/video/video.h>
 
-#include "base/result.h"
-#include "clock/frame_sequence.h"
 #include "fuse/fuser.h"
 #include "gstcodedexposurefuse.h"
-#include "gstcodedexposuremeta.h"
-#include "gstraii.h"
-#include "schedule/schedule.h"
-#include "schedule/stream_setup.h"
+#include "gstcodedinput.h"
 
 GST_DEBUG_CATEGORY_EXTERN (codedexposure_fuse_debug);
 
@@ -27,18 +22,12 @@ namespace cexp::gst::fuse
 {
 
 /** What the user asked for. */
-struct Settings {
-  std::string schedule;
-  /** The schedule read from the text; null where the text is empty. */
-  std::shared_ptr<const Result<Schedule>> parsed;
+struct Settings : CodedSettings {
   FuseOptions options;
-  int rate_num = 0, rate_den = 1; ///< 0/1: only from the caps
 };
 
-struct Counters {
-  guint64 frames_in = 0;
+struct Counters : CodedCounters {
   guint64 frames_out = 0;
-  guint64 frames_lost = 0;
 };
 
 struct PoolRelease {
@@ -62,6 +51,7 @@ struct Plan {
   int lookahead;
   PoolPtr pool;
 
+  GstClockTime period () const { return boundary (schedule.slots ()); }
   /** Start of slot @p k by even steps, from the frame's PTS. */
   GstClockTime boundary (int k) const
   {
@@ -76,27 +66,17 @@ struct Waiting {
 };
 
 /** All that is forgotten from PAUSED to READY. Sink pad's stream lock. */
-struct Stream {
-  Stream () { gst_segment_init (&segment, GST_FORMAT_UNDEFINED); }
-
-  CapsPtr caps;
-  GstSegment segment;
-  /** What the tags of the stream say; an error where they cannot be read. */
-  std::optional<Result<StreamSetup>> tagged;
+struct Stream : CodedStream {
   Settings settings; ///< in force
   std::optional<Plan> plan;
-  int bits = 0;      ///< significant ones, as the frames say; 0: they do not
-  bool stale = true; ///< the plan has to be made again before the next frame
-  /** Serialised events that wait for the caps of the source pad. */
-  std::vector<EventPtr> pending;
+  /** Significant bits: the property wins over the frames; 0: of the type. */
+  int bits_in_force () const
+  {
+    return settings.options.bits > 0 ? settings.options.bits : bits;
+  }
   std::deque<Waiting> waiting; ///< as many as the fuser's pending ()
-  std::optional<FrameSequence> sequence;
-  guint64 first_number = 0; ///< of the sequence
-  guint64 next_number = 0;
-  GstClockTime last_pts = GST_CLOCK_TIME_NONE;
   bool discont = true;
   guint64 offset = 0;
-  bool warned_assumed = false;
   bool warned_of_mapping = false;
 };
 
@@ -112,8 +92,8 @@ struct FuseState {
   Settings settings;
   bool settings_changed = true;
   Counters counters;
-  std::shared_ptr<const Schedule> in_force; ///< null before the first frame
-  bool assumed = false;                     ///< in_force came from nowhere
+  ScheduleRef in_force;     ///< null before the first frame
+  bool assumed = false;     ///< in_force came from nowhere
   GstClockTime latency = 0; ///< that lookahead adds; from the plan
 
   /* Sink pad's stream lock. */
@@ -141,9 +121,8 @@ gboolean src_query (GstPad *pad, GstObject *parent, GstQuery *query) noexcept;
  * returns other than OK when there can be no plan.
  * @p next  the frame that comes next, where there is one. */
 GstFlowReturn negotiate (GstCodedExposureFuse *self, GstBuffer *next = nullptr);
-/** Forwards the events that waited for the caps; forgets them where no caps
- * came. */
-void settle_pending (GstCodedExposureFuse *self);
+/** Forwards the events that waited for the caps. */
+void settle_events (GstCodedExposureFuse *self);
 /** Answers for the CAPS query; Transfer: full. */
 GstCaps *sink_caps (GstCodedExposureFuse *self);
 GstCaps *src_caps (GstCodedExposureFuse *self);

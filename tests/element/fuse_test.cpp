@@ -409,6 +409,49 @@ TEST_F (Fuse, DamagedFramesPassTheirFlagsAndAreNotCompared)
   }
 }
 
+TEST_F (Fuse, CountsDamagedFrames)
+{
+  start ();
+  push (0);
+  push (1, kPeriod, GST_BUFFER_FLAG_CORRUPTED);
+  EXPECT_EQ (property<guint64> (fuse->element (), "frames-corrupted"), 1u);
+}
+
+TEST_F (Fuse, ALateFrameIsSaidAndComparedWithNothing)
+{
+  start ();
+  push (0);
+  push (0, 3 * kPeriod);
+  push (0, kPeriod);
+  push (0, 4 * kPeriod);
+  EXPECT_NE (fuse->warning ().find ("overlaps"), std::string::npos);
+  EXPECT_EQ (disconts (), (std::vector<std::size_t>{0, 4, 8, 12}));
+}
+
+TEST_F (Fuse, SaysWhenFramesAreSaturated)
+{
+  start ("schedule=sequential:2x2", "25/1", "GRAY16_LE");
+  const auto white = draw<std::uint16_t> (
+      kWidth, kHeight, [] (int x, int y) { return x + y == 0 ? 4095 : 100; });
+  const auto grey =
+      draw<std::uint16_t> (kWidth, kHeight, [] (int, int) { return 4094; });
+  const auto push_twelve = [&] (const auto &image, int i) {
+    BufferPtr frame = frame_of (image, GstClockTime (i) * kPeriod);
+    set_frame_meta (frame.get (), {.bits = 12});
+    ASSERT_EQ (fuse->push (std::move (frame)), GST_FLOW_OK);
+  };
+  push_twelve (grey, 0);
+  EXPECT_FALSE (fuse->element_message ("codedexposure/saturated"));
+  push_twelve (white, 1);
+  const MessagePtr message = fuse->element_message ("codedexposure/saturated");
+  ASSERT_TRUE (message);
+  guint64 pixels = 0;
+  gst_structure_get_uint64 (
+      gst_message_get_structure (message.get ()), "pixels", &pixels);
+  EXPECT_EQ (pixels, 1u);
+  EXPECT_EQ (property<guint64> (fuse->element (), "saturated-frames"), 1u);
+}
+
 TEST_F (Fuse, NeedsTimeStamps)
 {
   start ();

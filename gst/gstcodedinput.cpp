@@ -1,0 +1,124 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* What the user and the stream say of coded frames. */
+#include "gstcodedinput.h"
+
+#include <utility>
+
+namespace cexp::gst
+{
+
+void
+refuse (GstElement *element, const std::string &why)
+{
+  GST_ELEMENT_ERROR (element, STREAM, FORMAT, ("%s", why.c_str ()), (nullptr));
+}
+
+std::shared_ptr<const Result<Schedule>>
+read_schedule (GstElement *element, const std::string &text)
+{
+  if (text.empty ())
+    return nullptr;
+  auto parsed =
+      std::make_shared<const Result<Schedule>> (Schedule::parse (text));
+  if (!*parsed)
+    GST_WARNING_OBJECT (element, "%s", parsed->error ().message.c_str ());
+  return parsed;
+}
+
+bool
+check_schedule (
+    GstElement *element, const std::shared_ptr<const Result<Schedule>> &parsed)
+{
+  if (!parsed || *parsed)
+    return true;
+  GST_ELEMENT_ERROR (element, RESOURCE, SETTINGS,
+      ("The schedule property cannot be read: %s",
+          parsed->error ().message.c_str ()),
+      (nullptr));
+  return false;
+}
+
+std::optional<FoundSchedule>
+find_schedule (
+    GstElement *element, CodedStream &stream, const CodedSettings &settings)
+{
+  if (const auto &asked = settings.parsed) {
+    if (*asked)
+      return FoundSchedule{asked->value ()};
+    refuse (element,
+        "The schedule property cannot be read: " + asked->error ().message);
+    return std::nullopt;
+  }
+  if (const auto &tagged = stream.tagged) {
+    if (*tagged)
+      return FoundSchedule{tagged->value ().schedule};
+    refuse (element, "The schedule in the stream's tags cannot be read: " +
+                         tagged->error ().message);
+    return std::nullopt;
+  }
+  const FoundSchedule assumed{Schedule (), true};
+  if (!std::exchange (stream.warned_assumed, true))
+    GST_ELEMENT_WARNING (element, STREAM, FORMAT,
+        ("The stream says nothing of its schedule: assuming %s. Set the "
+         "schedule property if it is another.",
+            assumed.schedule.text ().c_str ()),
+        (nullptr));
+  return assumed;
+}
+
+ScheduleRef
+binding_schedule (
+    const CodedSettings &settings, const ScheduleRef &in_force, bool assumed)
+{
+  if (settings.parsed && *settings.parsed)
+    return {settings.parsed, &settings.parsed->value ()};
+  return assumed ? nullptr : in_force;
+}
+
+std::optional<CodedFormat>
+find_format (GstElement *element, const CodedStream &stream,
+    const CodedSettings &settings)
+{
+  if (!stream.caps) {
+    refuse (element, "Coded frames came without caps.");
+    return std::nullopt;
+  }
+  CodedFormat format{fill_in_rate (settings.rate, stream.caps.get ()), {}};
+  if (!gst_video_info_from_caps (&format.info, format.caps.get ())) {
+    refuse (element, "The caps of the coded frames cannot be read.");
+    return std::nullopt;
+  }
+  if (GST_VIDEO_INFO_IS_INTERLACED (&format.info)) {
+    refuse (element,
+        "The coded frames are interlaced: a coded exposure needs a camera "
+        "that exposes all rows together (progressive, global shutter).");
+    return std::nullopt;
+  }
+  if (format.info.fps_n == 0) {
+    refuse (element,
+        "The coded frames have no frame rate, so what is made of them has no "
+        "length: set the frame-rate property, for example frame-rate=25/1.");
+    return std::nullopt;
+  }
+  return format;
+}
+
+void
+take_bits (CodedStream &stream, GstBuffer *next)
+{
+  const auto meta = next ? get_frame_meta (next) : std::nullopt;
+  if (meta && std::exchange (stream.bits, meta->bits) != meta->bits)
+    stream.stale = true;
+}
+
+void
+count_at_rate (
+    CodedStream &stream, FrameRate rate, std::optional<FrameRate> before)
+{
+  if (before == rate)
+    return;
+  stream.sequence.emplace (rate);
+  stream.first_number = stream.next_number;
+}
+
+} // namespace cexp::gst

@@ -1,0 +1,197 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The side of an element on which coded frames come in: what the user and the
+ * stream say of them, which of them came, and which did not. */
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <gst/gst.h>
+#include <gst/video/video.h>
+
+#include "base/result.h"
+#include "clock/frame_sequence.h"
+#include "gstcodedexposurecaps.h"
+#include "gstcodedexposuremeta.h"
+#include "gstraii.h"
+#include "schedule/schedule.h"
+#include "schedule/stream_setup.h"
+
+namespace cexp::gst
+{
+
+using ScheduleRef = std::shared_ptr<const Schedule>;
+
+/** What the user says of coded frames. */
+struct CodedSettings {
+  std::string schedule;
+  /** The schedule read from the text; null where the text is empty. */
+  std::shared_ptr<const Result<Schedule>> parsed;
+  SaidRate rate;
+};
+
+/** Counted under the object lock of the element. */
+struct CodedCounters {
+  guint64 frames_in = 0;
+  guint64 frames_lost = 0;
+  guint64 frames_corrupted = 0;
+  guint64 saturated_frames = 0;
+};
+
+/** Saturated frames that follow each other. */
+struct Burst {
+  guint64 frames = 0;
+  guint64 peak = 0; ///< most saturated pixels in one of them
+  GstClockTime from = GST_CLOCK_TIME_NONE;
+  GstClockTime to = GST_CLOCK_TIME_NONE;
+};
+
+/** All that came, forgotten from PAUSED to READY. Sink pad's stream lock. */
+struct CodedStream {
+  CodedStream () { gst_segment_init (&segment, GST_FORMAT_UNDEFINED); }
+
+  CapsPtr caps;
+  guint32 caps_seqnum = 0;
+  GstSegment segment;
+  /** What the tags of the stream say; an error where they cannot be read. */
+  std::optional<Result<StreamSetup>> tagged;
+  int bits = 0;      ///< significant ones, as the frames say; 0: they do not
+  bool stale = true; ///< what follows from all this has to be made again
+  /** Serialised events that wait for the caps of the source pads. */
+  std::vector<EventPtr> pending;
+  std::optional<FrameSequence> sequence;
+  guint64 first_number = 0; ///< of the sequence
+  guint64 next_number = 0;
+  GstClockTime last_pts = GST_CLOCK_TIME_NONE;
+  bool was_late = false; ///< the last frame was
+  Burst saturation;
+  bool warned_assumed = false;
+  bool warned_of_time = false;
+
+  bool backwards () const { return segment.rate < 0; }
+};
+
+/** Shows on the bus why the coded frames cannot be used. */
+void refuse (GstElement *element, const std::string &why);
+
+/** Reads @p text, a preset or a file, with a log where it cannot be read; null
+ * for an empty one. Not under a lock. */
+std::shared_ptr<const Result<Schedule>> read_schedule (
+    GstElement *element, const std::string &text);
+/** Posts an error where @p parsed is one. */
+bool check_schedule (
+    GstElement *element, const std::shared_ptr<const Result<Schedule>> &parsed);
+
+/** A schedule, and whether somebody said so. */
+struct FoundSchedule {
+  Schedule schedule;
+  bool assumed = false;
+};
+/** The property wins over the stream's tag, which wins over the default, of
+ * which is warned once. None, with an error on the bus, where what was said
+ * cannot be read. */
+std::optional<FoundSchedule> find_schedule (
+    GstElement *element, CodedStream &stream, const CodedSettings &settings);
+/** What binds caps before frames come: @p settings, else what is @p in_force;
+ * null where any may come. A schedule that was only @p assumed binds nobody:
+ * the tag may still come. */
+ScheduleRef binding_schedule (
+    const CodedSettings &settings, const ScheduleRef &in_force, bool assumed);
+
+/** Coded frames that can be worked on. */
+struct CodedFormat {
+  CapsPtr caps; ///< with a frame rate in any case
+  GstVideoInfo info;
+};
+/** None, with an error on the bus, where there is no rate or interlacing. */
+std::optional<CodedFormat> find_format (GstElement *element,
+    const CodedStream &stream, const CodedSettings &settings);
+
+/** Takes the significant bits from the meta of @p next, where it has one. */
+void take_bits (CodedStream &stream, GstBuffer *next);
+/** Frames are numbered anew, from where they were, when the rate changes. */
+void count_at_rate (
+    CodedStream &stream, FrameRate rate, std::optional<FrameRate> before);
+
+/** The CAPS query's answer @p own, as its filter wants it; takes @p own. */
+void answer_caps (GstQuery *query, GstCaps *own);
+/** A DURATION or POSITION in frames becomes one in frames that are @p times as
+ * many. */
+void scale_frames (GstQuery *query, int times);
+
+/** What an element does about the events of coded frames. */
+class CodedEvents
+{
+public:
+  CodedEvents (GstElement *element, CodedStream &stream)
+      : element_ (element), stream_ (stream)
+  {
+  }
+  virtual ~CodedEvents () = default;
+
+  /** Takes an event of the sink pad.
+   *
+   * Source pads get their caps with the first frame, because the schedule may
+   * stand in a tag, and tags follow the caps. Until then events wait. */
+  gboolean handle (EventPtr event);
+  /** Forwards the events that waited for the caps; forgets them where no caps
+   * came. */
+  void settle ();
+
+protected:
+  virtual gboolean forward (EventPtr event) = 0;
+  /** Whether source pads have their caps. */
+  virtual bool has_plan () const = 0;
+  /** Gives source pads their caps; false, with an error posted, where there can
+   * be none. */
+  virtual bool negotiate () = 0;
+  /** Frames that are still held go out: an event comes after them. */
+  virtual void drain () {}
+  /** What comes next is a new beginning. */
+  virtual void break_time () = 0;
+  /** After FLUSH_STOP went downstream. */
+  virtual void flushed () {}
+  /** Before EOS and FLUSH_STOP go downstream. */
+  virtual void end () {}
+  virtual void gap () {}
+
+private:
+  gboolean forward_in_turn (EventPtr event);
+  gboolean on_stream_start (EventPtr event);
+  gboolean on_caps (const EventPtr &event);
+  gboolean on_segment (EventPtr event);
+  gboolean on_tag (EventPtr event);
+  gboolean on_gap (EventPtr event);
+  gboolean on_eos (EventPtr event);
+  gboolean on_flush_stop (EventPtr event);
+
+  GstElement *element_;
+  CodedStream &stream_;
+};
+
+/** GST_FLOW_OK where @p frame stands in time; else an error is on the bus. */
+GstFlowReturn check_stamp (
+    GstElement *element, const CodedStream &stream, GstBuffer *frame);
+/** A frame that came in. */
+struct Admitted {
+  /** The meta that came with it, else by our own count. */
+  FrameMeta meta;
+  /** It comes right after the frame before, in time and by its flags. */
+  bool follows;
+};
+/** Counts @p frame and compares its time with that of the one before; counts
+ * and says what is lost or corrupted, warns of times that cannot be.
+ * @p period of the coded frames. */
+Admitted admit (GstElement *element, CodedStream &stream,
+    CodedCounters &counters, GstBuffer *frame, GstClockTime period);
+
+/** Counts @p frame if @p meta says that it is saturated; says when a stretch of
+ * such frames begins, and when there were none for a second. */
+void note_saturation (GstElement *element, CodedStream &stream,
+    CodedCounters &counters, GstClockTime pts, const FrameMeta &meta);
+/** Says that a stretch of saturated frames is over, if there is one. */
+void end_saturation (GstElement *element, CodedStream &stream);
+
+} // namespace cexp::gst

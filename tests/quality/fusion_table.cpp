@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Prints the tables of docs/fusion.md, or writes them into it. */
-#include <fstream>
 #include <iostream>
 #include <iterator>
 
@@ -77,20 +76,6 @@ find_scenes (const Options &options)
   return {synthetic_scene (256, 192, options.frames)};
 }
 
-int
-update (const char *path, const std::vector<Table> &tables)
-{
-  std::ifstream in (path);
-  const std::string document (std::istreambuf_iterator<char> (in), {});
-  const auto updated = with_tables (document, tables);
-  if (!updated) {
-    std::cerr << path << ": " << updated.error ().message << '\n';
-    return 1;
-  }
-  std::ofstream (path) << *updated;
-  return 0;
-}
-
 } // namespace
 
 int
@@ -115,7 +100,7 @@ main (int argc, char **argv)
   progress ("");
 
   if (options.document)
-    return update (options.document, tables);
+    return update_document (options.document, tables) ? 0 : 1;
   if (options.json)
     std::cout << to_json (tables);
   else

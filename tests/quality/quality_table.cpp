@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Prints how true subframes are, method by method. */
 #include <algorithm>
-#include <fstream>
 #include <iostream>
 #include <iterator>
 #include <string>
@@ -153,20 +152,6 @@ all_tables (const Scenes &scenes, const Progress &progress)
   return tables;
 }
 
-int
-update (const std::string &path, const std::vector<Table> &tables)
-{
-  std::ifstream in (path);
-  const std::string document (std::istreambuf_iterator<char> (in), {});
-  const auto updated = with_tables (document, tables);
-  if (!updated) {
-    std::cerr << path << ": " << updated.error ().message << '\n';
-    return 1;
-  }
-  std::ofstream (path) << *updated;
-  return 0;
-}
-
 } // namespace
 
 int
@@ -191,7 +176,7 @@ main (int argc, char **argv)
     std::cerr << "\r\033[K";
 
   if (!options.document.empty ())
-    return update (options.document, tables);
+    return update_document (options.document, tables) ? 0 : 1;
   if (options.json)
     std::cout << to_json (tables);
   for (const Table &table : tables) {

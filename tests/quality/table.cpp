@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <fstream>
+#include <iostream>
+#include <iterator>
 #include <sstream>
 
 #include <nlohmann/json.hpp>
@@ -163,6 +166,23 @@ with_tables (std::string document, const std::vector<Table> &tables)
     document.replace (inside, end - inside, to_markdown (table));
   }
   return document;
+}
+
+bool
+update_document (const std::string &path, const std::vector<Table> &tables)
+{
+  std::ifstream in (path);
+  const std::string document (std::istreambuf_iterator<char> (in), {});
+  const auto updated = with_tables (document, tables);
+  if (!updated) {
+    std::cerr << path << ": " << updated.error ().message << '\n';
+    return false;
+  }
+  std::ofstream out (path);
+  out << *updated << std::flush;
+  if (!out)
+    std::cerr << path << ": it cannot be written\n";
+  return bool (out);
 }
 
 std::vector<std::vector<std::string>>

@@ -48,6 +48,10 @@ std::string to_json (const std::vector<Table> &tables);
  */
 Result<std::string> with_tables (
     std::string document, const std::vector<Table> &tables);
+/** The same in the file @p path; false, with a word on the standard error, when
+ * that cannot be done. */
+bool update_document (
+    const std::string &path, const std::vector<Table> &tables);
 
 /**
  * The cells of table @p id in a document made so, as text, without its head.

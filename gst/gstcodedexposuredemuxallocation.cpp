@@ -2,6 +2,7 @@
 /* Buffers: downstream's own where it offers a pool, else from a pool of ours.
  */
 #include "gstcodedexposuredemuxstate.h"
+#include "gstsubframepool.h"
 
 #define GST_CAT_DEFAULT codedexposure_demux_debug
 
@@ -89,7 +90,7 @@ choose_pool (
       return offer.pool.release ();
     offer.min = offer.max = 0;
   }
-  GstBufferPool *pool = gst_video_buffer_pool_new ();
+  GstBufferPool *pool = make_subframe_pool ();
   if (configure (pool, offer, caps, size, 0))
     return pool;
   gst_object_unref (pool);

@@ -295,6 +295,8 @@ combine_flow (
     GstCodedExposureDemux *self, const Output &output, GstFlowReturn flow)
 {
   const ObjectLock lock (self);
+  if (flow == GST_FLOW_OK && output.kind != Output::Kind::kCoded)
+    state (self).counters.subframes_out++;
   if (output.released)
     return GST_FLOW_OK;
   return gst_flow_combiner_update_pad_flow (

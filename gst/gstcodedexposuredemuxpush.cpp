@@ -38,13 +38,6 @@ is_fatal (GstFlowReturn flow)
   return flow == GST_FLOW_FLUSHING || flow <= GST_FLOW_NOT_NEGOTIATED;
 }
 
-void
-count (GstCodedExposureDemux *self, guint64 Counters::*counter, guint64 by = 1)
-{
-  const ObjectLock lock (self);
-  state (self).counters.*counter += by;
-}
-
 /* Asked only for the sake of QoS messages. */
 bool
 is_live (GstCodedExposureDemux *self)
@@ -285,11 +278,8 @@ push_on (GstCodedExposureDemux *self, Output &output, BufferPtr outbuf,
   GST_BUFFER_OFFSET_END (outbuf.get ()) = output.offset;
   mark_discont (output, outbuf.get ());
   GST_LOG_OBJECT (output.pad.get (), "[OUT] %" GST_PTR_FORMAT, outbuf.get ());
-  const GstFlowReturn flow =
-      gst_pad_push (output.pad.get (), outbuf.release ());
-  if (flow == GST_FLOW_OK)
-    count (self, &Counters::subframes_out);
-  return combine_flow (self, output, flow);
+  return combine_flow (
+      self, output, gst_pad_push (output.pad.get (), outbuf.release ()));
 }
 
 /* @outbuf once more, in the same memory unless the peer of @output could not

@@ -219,7 +219,8 @@ gboolean forward (GstCodedExposureDemux *self, EventPtr event);
 /** The negotiated caps of @p output. */
 CapsPtr caps_for (GstCodedExposureDemux *self, const Output &output);
 void push_caps (GstCodedExposureDemux *self, const Output &output);
-/** The flow of all pads together after @p output returned @p flow. */
+/** The flow of all pads together after @p output returned @p flow to a buffer,
+ * which is counted; NOT_LINKED where there was none to push. */
 GstFlowReturn combine_flow (
     GstCodedExposureDemux *self, const Output &output, GstFlowReturn flow);
 void forget_flow (GstCodedExposureDemux *self);

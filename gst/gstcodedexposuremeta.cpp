@@ -65,7 +65,10 @@ struct Names {
   const GQuark lost_before = g_quark_from_static_string ("lost-before");
   const GQuark bits = g_quark_from_static_string ("bits");
   const GQuark saturated = g_quark_from_static_string ("saturated");
+  const GQuark pattern = g_quark_from_static_string ("pattern");
 };
+
+constexpr gint kFields = 9; ///< that are always there: all but the pattern
 
 const Names &
 names ()
@@ -81,6 +84,47 @@ find (GstBuffer *buffer)
   return reinterpret_cast<GstCustomMeta *> (gst_buffer_get_meta (buffer, api));
 }
 
+/* A frame that is described anew has all fields, and making them again would
+ * take several times as long. */
+gboolean
+rewrite_field (GQuark field, GValue *value, gpointer user_data)
+{
+  const auto &meta = *static_cast<const FrameMeta *> (user_data);
+  const Names &name = names ();
+  if (field == name.frame)
+    g_value_set_uint64 (value, meta.frame);
+  else if (field == name.subframe)
+    g_value_set_int (value, meta.subframe);
+  else if (field == name.exposure_start)
+    g_value_set_uint64 (value, meta.exposure_start);
+  else if (field == name.exposure_duration)
+    g_value_set_uint64 (value, meta.exposure_duration);
+  else if (field == name.locked)
+    g_value_set_boolean (value, meta.locked);
+  else if (field == name.slip)
+    g_value_set_int (value, meta.slip);
+  else if (field == name.lost_before)
+    g_value_set_uint64 (value, meta.lost_before);
+  else if (field == name.saturated)
+    g_value_set_uint64 (value, meta.saturated);
+  else if (field == name.bits)
+    g_value_set_int (value, meta.bits);
+  return TRUE;
+}
+
+void
+write_fields (GstStructure *structure, const FrameMeta &meta)
+{
+  const Names &name = names ();
+  gst_structure_id_set (structure, name.frame, G_TYPE_UINT64, meta.frame,
+      name.subframe, G_TYPE_INT, meta.subframe, name.exposure_start,
+      G_TYPE_UINT64, meta.exposure_start, name.exposure_duration, G_TYPE_UINT64,
+      meta.exposure_duration, name.locked, G_TYPE_BOOLEAN, meta.locked,
+      name.slip, G_TYPE_INT, meta.slip, name.lost_before, G_TYPE_UINT64,
+      meta.lost_before, name.saturated, G_TYPE_UINT64, meta.saturated,
+      name.bits, G_TYPE_INT, meta.bits, nullptr);
+}
+
 } // namespace
 
 void
@@ -89,20 +133,18 @@ set_frame_meta (GstBuffer *buffer, const FrameMeta &meta)
   GstCustomMeta *custom = find (buffer);
   if (!custom)
     custom = gst_buffer_add_custom_meta (buffer, kFrameMetaName);
-  const Names &name = names ();
   GstStructure *structure = gst_custom_meta_get_structure (custom);
-  if (!meta.pattern.empty ())
-    gst_structure_set (
-        structure, "pattern", G_TYPE_STRING, meta.pattern.c_str (), nullptr);
-  else if (gst_structure_has_field (structure, "pattern"))
+  const GQuark pattern = names ().pattern;
+  if (gst_structure_id_has_field (structure, pattern))
     gst_structure_remove_field (structure, "pattern");
-  gst_structure_id_set (structure, name.frame, G_TYPE_UINT64, meta.frame,
-      name.subframe, G_TYPE_INT, meta.subframe, name.exposure_start,
-      G_TYPE_UINT64, meta.exposure_start, name.exposure_duration, G_TYPE_UINT64,
-      meta.exposure_duration, name.locked, G_TYPE_BOOLEAN, meta.locked,
-      name.slip, G_TYPE_INT, meta.slip, name.lost_before, G_TYPE_UINT64,
-      meta.lost_before, name.saturated, G_TYPE_UINT64, meta.saturated,
-      name.bits, G_TYPE_INT, meta.bits, nullptr);
+  if (gst_structure_n_fields (structure) == kFields)
+    gst_structure_map_in_place (
+        structure, rewrite_field, const_cast<FrameMeta *> (&meta));
+  else
+    write_fields (structure, meta);
+  if (!meta.pattern.empty ())
+    gst_structure_id_set (
+        structure, pattern, G_TYPE_STRING, meta.pattern.c_str (), nullptr);
 }
 
 std::optional<FrameMeta>
@@ -115,8 +157,10 @@ get_frame_meta (GstBuffer *buffer)
   FrameMeta meta;
   const Names &name = names ();
   const GstStructure *structure = gst_custom_meta_get_structure (custom);
-  if (const gchar *pattern = gst_structure_get_string (structure, "pattern"))
-    meta.pattern = pattern;
+  if (const GValue *pattern =
+          gst_structure_id_get_value (structure, name.pattern))
+    meta.pattern =
+        G_VALUE_HOLDS_STRING (pattern) ? g_value_get_string (pattern) : "";
   gst_structure_id_get (structure, name.frame, G_TYPE_UINT64, &meta.frame,
       name.subframe, G_TYPE_INT, &meta.subframe, name.exposure_start,
       G_TYPE_UINT64, &meta.exposure_start, name.exposure_duration,

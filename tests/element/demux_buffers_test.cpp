@@ -2,6 +2,8 @@
 /* codedexposure-demux: memory, strides, pools and metas. */
 #include "harness.h"
 
+#include <set>
+
 #include "gstcodedexposuremeta.h"
 
 namespace
@@ -299,6 +301,28 @@ TEST (DemuxMemory, CodedFrameIsPassedOnInItsOwnMemory)
     EXPECT_EQ (GST_BUFFER_OFFSET (out.get ()), 77u);
     EXPECT_EQ (GST_BUFFER_PTS (out.get ()), GstClockTime (frame) * kPeriod);
   }
+}
+
+/* They are written at once, and would throw each other out of the cache. */
+TEST (DemuxMemory, SubframesStartAtDifferentPlacesOfAPage)
+{
+  ElementHarness demux (kLine);
+  demux.set_caps (gray_caps (512, 512, "25/1"));
+  ASSERT_EQ (demux.push (frame_of (draw<std::uint8_t> (512, 512,
+                                       [] (int x, int y) { return x ^ y; }),
+                 0)),
+      GST_FLOW_OK);
+  std::set<std::uintptr_t> places;
+  for (int k = 0; k < 4; k++) {
+    const BufferPtr out = demux.pull ();
+    GstMapInfo map;
+    ASSERT_TRUE (gst_buffer_map (out.get (), &map, GST_MAP_READ));
+    const auto at = reinterpret_cast<std::uintptr_t> (map.data);
+    gst_buffer_unmap (out.get (), &map);
+    EXPECT_EQ (at % 64, 0u);
+    places.insert (at % 4096);
+  }
+  EXPECT_EQ (places.size (), 4u);
 }
 
 TEST (DemuxMemory, OnlyWantedSubframesTakeBuffers)

@@ -90,6 +90,11 @@ select (const Block<T> &block, const Layout<T> &layout, const Planes<T> &to)
   /* The work on a row of so few pixels is less than what leads up to it. */
   if (layout.identity && block.width == 2 && block.height == 2)
     return run_in_registers<SelectInRegisters, 2, 2> (block, to, {});
+  /* Past the caches, whole cells are read and written more evenly. */
+  if (layout.identity && to.stream)
+    if (const auto own =
+            in_registers<SelectInRegisters, T> (block.width, block.height))
+      return own (block, to, {});
   return select_rows_of<T> (block.width, OwnWidths ()) (block, layout, to);
 }
 

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Extraction against a plain copy of the frame, the paper's sort and what
- * libraries offer. Prints the table of docs/performance.md: without arguments
- * all of it, else what a regular expression over WIDTHxHEIGHT/DEPTH/N picks. */
+ * libraries offer. Prints the tables of docs/performance.md: without arguments
+ * all of them, else what a regular expression over WIDTHxHEIGHT/DEPTH/N picks;
+ * with --target=NAME for one of the other instruction sets. */
 #include "extract/extractor.h"
 
 #include <algorithm>
@@ -36,12 +37,17 @@ struct Case {
   int depth;
   int columns;
   int rows;
+  std::string_view target;
 
   int n () const { return columns * rows; }
   std::string name () const
   {
-    return std::to_string (width) + "x" + std::to_string (height) + "/u" +
-           std::to_string (depth) + "/" + std::to_string (n ());
+    return size () + "/u" + std::to_string (depth) + "/" +
+           std::to_string (n ());
+  }
+  std::string size () const
+  {
+    return std::to_string (width) + "x" + std::to_string (height);
   }
   std::string tile () const
   {
@@ -68,7 +74,8 @@ public:
       auto view = coded_.back ().view ();
       for (int y = 0; y < c.height; y++)
         for (int x = 0; x < c.width; x++)
-          view.at (x, y) = Pixel (random () % std::numeric_limits<Pixel>::max ());
+          view.at (x, y) =
+              Pixel (random () % std::numeric_limits<Pixel>::max ());
 
       bytes_.emplace_back (plane * std::size_t (c.n ()) + 2 * 4096);
       auto *first = bytes_.back ().data ();
@@ -119,14 +126,20 @@ Body<Pixel>
 extraction (const Case &c, const std::string &code, ExtractOptions options,
     const std::string &tile = {})
 {
+  if (options.target.empty ())
+    options.target = c.target;
+  const auto fail = [] (const Error &error) {
+    std::fprintf (stderr, "%s\n", error.message.c_str ());
+    std::exit (1);
+  };
   const auto schedule =
       Schedule::from_preset (code + ":" + (tile.empty () ? c.tile () : tile));
-  if (!schedule) {
-    std::fprintf (stderr, "%s\n", schedule.error ().message.c_str ());
-    std::exit (1);
-  }
-  auto extractor = std::make_shared<Extractor<Pixel>> (
-      *Extractor<Pixel>::make (*schedule, c.width, c.height, options));
+  if (!schedule)
+    fail (schedule.error ());
+  auto made = Extractor<Pixel>::make (*schedule, c.width, c.height, options);
+  if (!made)
+    fail (made.error ());
+  const auto extractor = std::make_shared<Extractor<Pixel>> (std::move (*made));
   return [extractor] (Pool<Pixel> &pool) {
     extractor->run (pool.coded ().view (), pool.planes ());
   };
@@ -230,9 +243,54 @@ contenders (const Case &c)
   return all;
 }
 
+/** Ratios to memcpy: of a size, by contender, by n, of bytes and of 16 bits. */
+class Summary
+{
+public:
+  void add (const Case &c, const std::string &contender, double ratio)
+  {
+    if (std::ranges::find (contenders_, contender) == contenders_.end ())
+      contenders_.push_back (contender);
+    ratios_[c.size ()][contender][c.n ()][c.depth] = ratio;
+  }
+  void print () const
+  {
+    for (const auto &[size, rows] : ratios_) {
+      std::printf ("\n%s, u8 / u16, of memcpy\n\n| | n = 4 | 9 | 16 | 81 | "
+                   "256 |\n|---|---|---|---|---|---|\n",
+          size.c_str ());
+      for (const std::string &contender : contenders_)
+        if (const auto row = rows.find (contender); row != rows.end ())
+          print_row (contender, row->second);
+    }
+  }
+
+private:
+  using Row = std::map<int, std::map<int, double>>;
+
+  static void print_row (const std::string &contender, const Row &row)
+  {
+    std::printf ("| %s |", contender.c_str ());
+    for (const int n : {4, 9, 16, 81, 256}) {
+      const auto both = row.find (n);
+      const char *separator = " ";
+      for (const int depth : {8, 16})
+        if (both != row.end () && both->second.count (depth) > 0) {
+          std::printf ("%s%.2f", separator, both->second.at (depth));
+          separator = " / ";
+        }
+      std::printf (" |");
+    }
+    std::printf ("\n");
+  }
+
+  std::vector<std::string> contenders_;
+  std::map<std::string, std::map<std::string, Row>> ratios_;
+};
+
 template <typename Pixel>
 void
-run_case (const Case &c)
+run_case (const Case &c, Summary &summary)
 {
   Pool<Pixel> pool (c);
   const auto all = contenders<Pixel> (c);
@@ -257,9 +315,12 @@ run_case (const Case &c)
   std::printf ("|---|---|---|---|\n");
   for (const auto &[name, body] : all) {
     const double seconds = medians.seconds (name);
-    if (seconds > 0.0)
-      std::printf ("| %s | %.1f | %.3f | %.1f |\n", name.c_str (),
-          seconds * 1e6, copied / seconds, sorted / seconds);
+    if (seconds <= 0.0)
+      continue;
+    std::printf ("| %s | %.1f | %.3f | %.1f |\n", name.c_str (), seconds * 1e6,
+        copied / seconds, sorted / seconds);
+    if (name != "memcpy" && copied / seconds >= 0.01)
+      summary.add (c, name, copied / seconds);
   }
   std::fflush (stdout);
 }
@@ -271,8 +332,11 @@ main (int argc, char **argv)
 {
   auto arguments = bench::taking_turns (argv[0]);
   std::string picked = ".*";
+  std::string_view target = extract_targets ().front ();
   for (int i = 1; i < argc; i++) {
-    if (std::strncmp (argv[i], "--", 2) == 0)
+    if (std::strncmp (argv[i], "--target=", 9) == 0)
+      target = argv[i] + 9;
+    else if (std::strncmp (argv[i], "--", 2) == 0)
       arguments.push_back (argv[i]);
     else
       picked = argv[i];
@@ -281,18 +345,20 @@ main (int argc, char **argv)
   benchmark::Initialize (&count, const_cast<char **> (arguments.data ()));
 
   std::printf ("Extraction for %s, one thread, %d frames in the pools\n",
-      std::string (extract_targets ().front ()).c_str (), kRing);
+      std::string (target).c_str (), kRing);
+  Summary summary;
   for (const auto &[width, height] :
       {std::pair (768, 576), {1920, 1080}, {4096, 3072}})
     for (const int depth : {8, 16})
       for (const auto &[columns, rows] :
           {std::pair (2, 2), {3, 3}, {4, 4}, {9, 9}, {16, 16}}) {
-        const Case c = {width, height, depth, columns, rows};
+        const Case c = {width, height, depth, columns, rows, target};
         if (!std::regex_search (c.name (), std::regex (picked)))
           continue;
         if (depth == 8)
-          run_case<std::uint8_t> (c);
+          run_case<std::uint8_t> (c, summary);
         else
-          run_case<std::uint16_t> (c);
+          run_case<std::uint16_t> (c, summary);
       }
+  summary.print ();
 }

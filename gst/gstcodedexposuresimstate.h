@@ -89,6 +89,12 @@ struct SimState {
 
 SimState &state (GstCodedExposureSim *self);
 
+/* Properties. */
+constexpr const char *kDefaultSchedule = "sequential:2x2";
+void install_properties (GObjectClass *klass);
+/** Reads @p text, outside of the lock, and keeps both. */
+void set_schedule (GstCodedExposureSim *self, std::string text);
+
 /* Negotiation. */
 GstCaps *transform_caps (GstBaseTransform *trans, GstPadDirection direction,
     GstCaps *caps, GstCaps *filter);

@@ -2,26 +2,22 @@
 #include "moire/rectifier.h"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <new>
 #include <string>
 #include <vector>
 
-#include "moire/rectify_weights.h"
+#include "moire/rectify_filters.h"
+#include "moire/rectify_window.h"
 
 namespace cexp
 {
 
 namespace
 {
-
-/* Bound on the filters that are made, and on the parts into which a pixel is
- * divided for them. */
-constexpr int kMaxFilters = 1 << 15;
-constexpr int kMaxParts = 32;
 
 /* Pixels along a side of the window, for up to so many pixels a mirror. */
 constexpr struct {
@@ -43,44 +39,22 @@ struct Place {
   std::int32_t filter = kUnseen;
 };
 
-/* Windows of mirrors that bear the same elements all around have one number.
- */
-class Surroundings
+/* Of the scene's variance by that of noise: where one is exceeded, filters for
+ * so much noise are taken, else those for more. */
+using Limits = std::array<float, FilterBank::kNoises.size () - 1>;
+
+Limits
+limits_of (const Schedule &schedule)
 {
-public:
-  Surroundings (const Schedule &schedule, int reach);
-
-  int count () const { return int (first_.size ()); }
-  int of (int x, int y) const
-  {
-    return number_[std::size_t (
-        floor_mod (y, rows_) * columns_ + floor_mod (x, columns_))];
-  }
-  /* A mirror that has it. */
-  Offset first (int number) const { return first_[std::size_t (number)]; }
-
-private:
-  int columns_, rows_;
-  std::vector<int> number_;
-  std::vector<Offset> first_;
-};
-
-Surroundings::Surroundings (const Schedule &schedule, int reach)
-    : columns_ (schedule.tile ().period_x ()),
-      rows_ (schedule.tile ().period_y ())
-{
-  std::map<std::vector<int>, int> known;
-  for (int y = 0; y < rows_; y++)
-    for (int x = 0; x < columns_; x++) {
-      std::vector<int> elements;
-      for (int j = -reach; j <= reach; j++)
-        for (int i = -reach; i <= reach; i++)
-          elements.push_back (schedule.element_at (x + i, y + j));
-      const auto [at, made] = known.try_emplace (elements, count ());
-      if (made)
-        first_.push_back ({x, y});
-      number_.push_back (at->second);
-    }
+  Limits limits;
+  for (std::size_t i = 0; i < limits.size (); i++)
+    limits[i] =
+        float (1.0 / (FilterBank::kNoises[i] * FilterBank::kNoises[i + 1]));
+  /* Elements of different brightness differ without any scene. */
+  for (int e = 1; e < schedule.elements (); e++)
+    if (schedule.code ().open_slots (e) != schedule.code ().open_slots (0))
+      limits = {std::numeric_limits<float>::infinity (), -2e9f, -2e9f};
+  return limits;
 }
 
 } // namespace
@@ -90,7 +64,9 @@ struct Rectifier::Plan {
   int taps = 1;
   RectifyReport report;
   Image<Place> places;
-  std::vector<float> weights; // taps x taps for each filter
+  std::vector<float> weights, smoothness; // as FilterBank has them
+  float noise = 0.0f;                     // of white
+  Limits limits;
 
   template <typename Pixel>
   void run (ImageView<const Pixel> from, ImageView<Pixel> to, int first,
@@ -103,29 +79,30 @@ struct Rectifier::Plan {
 namespace
 {
 
-/* Makes a plan, mirror by mirror; a filter is made when the first mirror needs
- * it. */
+/* Makes a plan, row by row. */
 class Planner
 {
 public:
   Planner (const Mapping &mapping, const Schedule &schedule,
       const RectifyOptions &options, int taps)
-      : mapping_ (mapping), schedule_ (schedule), options_ (options),
-        view_ (view_of (mapping, taps)), reach_ (needed_reach (view_)),
-        surroundings_ (schedule, reach_),
+      : mapping_ (mapping), tolerance_ (options.tolerance),
+        coded_rows_ (mapping.mirrors ().height - schedule.pilot_rows ()),
         elements_ (element_covariance (schedule, options.persistence)),
+        bank_ (view_of (mapping, taps), schedule, elements_,
+            options.correlation_length),
         whole_ (mapping.one_to_one (options.tolerance)),
-        straight_ (own_share (view_, 0.0, 0.0))
+        single_ (taps == kWindows[0].taps),
+        straight_ (bank_.solver ().own_share (0.0, 0.0)),
+        seen_ (std::size_t (mapping.mirrors ().width))
   {
-    while (parts_ > 4 && surroundings_.count () * parts_ * parts_ > kMaxFilters)
-      parts_ /= 2;
-    filters_.assign (
-        std::size_t (surroundings_.count ()) * std::size_t (parts_ * parts_),
-        kUnseen);
   }
 
-  Place place (int x, int y, RectifyReport &report);
-  std::vector<float> weights () && { return std::move (weights_); }
+  void place_row (int y, Place *row, RectifyReport &report);
+  std::vector<float> weights () && { return std::move (bank_).weights (); }
+  std::vector<float> smoothness () &&
+  {
+    return std::move (bank_).smoothness ();
+  }
 
 private:
   static PixelView view_of (const Mapping &mapping, int taps)
@@ -135,52 +112,36 @@ private:
         mapping.slope_at (0.5 * (camera.width - 1), 0.5 * (camera.height - 1)),
         mapping.psf_sigma (), taps};
   }
-  std::int32_t filter (int x, int y, double fx, double fy);
+  Place place (Position seen, int around, bool coded, RectifyReport &report);
 
   const Mapping &mapping_;
-  const Schedule &schedule_;
-  const RectifyOptions &options_;
-  PixelView view_;
-  int reach_;
-  Surroundings surroundings_;
+  double tolerance_;
+  int coded_rows_;
   Matrix elements_;
+  FilterBank bank_;
   bool whole_;
+  bool single_; // pixel a mirror; of several, all are of use
   double straight_;
-  int parts_ = kMaxParts;
-  std::vector<std::int32_t> filters_;
-  std::vector<float> weights_;
-  std::map<int, Neighbourhood> neighbourhoods_;
+  std::vector<Position> seen_;
 };
 
-std::int32_t
-Planner::filter (int x, int y, double fx, double fy)
+void
+Planner::place_row (int y, Place *row, RectifyReport &report)
 {
-  const int around = surroundings_.of (x, y);
-  const auto part_of = [this] (double f) {
-    return std::clamp (int (std::floor ((f + 0.5) * parts_)), 0, parts_ - 1);
-  };
-  const int px = part_of (fx), py = part_of (fy);
-  std::int32_t &known =
-      filters_[std::size_t ((around * parts_ + py) * parts_ + px)];
-  if (known >= 0)
-    return known;
-
-  const Offset first = surroundings_.first (around);
-  const auto [at, made] = neighbourhoods_.try_emplace (around, schedule_,
-      elements_, first.x, first.y, reach_, options_.correlation_length);
-  const std::size_t size = std::size_t (view_.taps * view_.taps);
-  known = std::int32_t (weights_.size () / size);
-  weights_.resize (weights_.size () + size);
-  solve_weights (at->second, view_, (px + 0.5) / parts_ - 0.5,
-      (py + 0.5) / parts_ - 0.5, options_.noise,
-      std::span (weights_).last (size));
-  return known;
+  mapping_.camera_row (y, seen_);
+  const int *around = bank_.surroundings ().row (y);
+  const int period = bank_.surroundings ().period ();
+  int phase = 0;
+  for (const Position &seen : seen_) {
+    *row++ = place (seen, around[phase], y < coded_rows_, report);
+    if (++phase == period)
+      phase = 0;
+  }
 }
 
 Place
-Planner::place (int x, int y, RectifyReport &report)
+Planner::place (Position seen, int around, bool coded, RectifyReport &report)
 {
-  const Position seen = mapping_.camera_at ({double (x), double (y)});
   const Extent camera = mapping_.camera ();
   /* So written that not-a-number is outside, too. */
   if (!(seen.x > -0.5 && seen.x < camera.width - 0.5 && seen.y > -0.5 &&
@@ -188,23 +149,22 @@ Planner::place (int x, int y, RectifyReport &report)
     report.unseen++;
     return {};
   }
-  const int px = int (std::lround (seen.x)), py = int (std::lround (seen.y));
+  const int px = int (seen.x + 0.5), py = int (seen.y + 0.5);
   const double fx = seen.x - px, fy = seen.y - py;
-  const double share = own_share (view_, -fx, -fy);
+  const double share = bank_.solver ().own_share (-fx, -fy);
   const Place pixel = {std::int16_t (px), std::int16_t (py), kLookup};
-  if (whole_ || share > 1.0 - 2.0 * options_.tolerance) {
+  if (whole_ || (single_ && share > 1.0 - 2.0 * tolerance_)) {
     report.exact++;
     return pixel;
   }
   report.weighted++;
   report.mixed += share < kMixed * straight_;
-  const int half = view_.taps / 2;
-  const int rows = mapping_.mirrors ().height - schedule_.pilot_rows ();
+  const int half = bank_.solver ().taps () / 2;
   if (px < half || py < half || px + half >= camera.width ||
-      py + half >= camera.height || y >= rows)
+      py + half >= camera.height || !coded)
     return pixel;
   return {std::int16_t (px - half), std::int16_t (py - half),
-      filter (x, y, fx, fy)};
+      bank_.filter (around, fx, fy)};
 }
 
 Result<void>
@@ -214,7 +174,7 @@ check (const RectifyOptions &o)
     const char *what;
     double value, low, high;
   } ranges[] = {{"tolerance (mirrors)", o.tolerance, 0.0, 0.5},
-      {"noise", o.noise, 1e-3, 10.0},
+      {"noise (of white)", o.noise, 1e-5, 1.0},
       {"correlation length (mirrors)", o.correlation_length, 0.1, 1000.0},
       {"persistence", o.persistence, 0.0, 0.9999}};
   for (const auto &range : ranges)
@@ -253,12 +213,15 @@ Rectifier::make (const Mapping &mapping, const Schedule &schedule,
                  " pixels a mirror cannot be corrected; 0.75 to 3.5 can"};
   plan->camera = mapping.camera ();
   plan->mirrors = mapping.mirrors ();
+  plan->noise = float (
+      options.noise * std::sqrt (schedule.slots () / schedule.white_slots ()));
+  plan->limits = limits_of (schedule);
   try {
     Planner planner (mapping, schedule, options, plan->taps);
     plan->places = Image<Place> (plan->mirrors.width, plan->mirrors.height);
     for (int y = 0; y < plan->mirrors.height; y++)
-      for (int x = 0; x < plan->mirrors.width; x++)
-        plan->places.at (x, y) = planner.place (x, y, plan->report);
+      planner.place_row (y, plan->places.view ().row (y), plan->report);
+    plan->smoothness = std::move (planner).smoothness ();
     plan->weights = std::move (planner).weights ();
   } catch (const std::bad_alloc &) {
     return Error{"there is no memory for the weights of a mapping"};
@@ -301,24 +264,31 @@ void
 Rectifier::Plan::filter_row (ImageView<const Pixel> from, const Place *row,
     Pixel *to, float largest) const
 {
+  using Seen = Window<kTaps, Pixel>;
+  constexpr int kNoises = int (FilterBank::kNoises.size ());
+  const float to_noise = 0.5f / (noise * noise * largest * largest);
+  Pixel copy[kTaps * Seen::kRead] = {};
   for (int x = 0; x < mirrors.width; x++) {
     const Place &place = row[x];
     if (place.filter < 0) {
       to[x] = place.filter == kLookup ? from.at (place.x, place.y) : Pixel (0);
       continue;
     }
-    const float *weight =
-        weights.data () + std::ptrdiff_t (place.filter) * kTaps * kTaps;
-    const Pixel *pixel = from.row (place.y) + place.x;
-    float sum = 0.5f;
-    for (int j = 0; j < kTaps; j++) {
-      for (int i = 0; i < kTaps; i++)
-        sum += weight[i] * float (pixel[i]);
-      weight += kTaps;
-      pixel = reinterpret_cast<const Pixel *> (
-          reinterpret_cast<const std::byte *> (pixel) + from.stride);
+    Seen window = {from.row (place.y) + place.x, from.stride};
+    if (place.x + Seen::kRead > from.width) {
+      for (int y = 0; y < kTaps; y++)
+        std::copy_n (window.row (y), kTaps, copy + y * Seen::kRead);
+      window = {copy, sizeof (Pixel) * Seen::kRead};
     }
-    to[x] = Pixel (std::int32_t (std::clamp (sum, 0.0f, largest)));
+    /* What differs by more than noise is the scene. */
+    const float scene = (window.roughness () * to_noise - 1.0f) *
+                        smoothness[std::size_t (place.filter)];
+    std::ptrdiff_t filter = std::ptrdiff_t (place.filter) * kNoises;
+    for (const float limit : limits)
+      filter += scene <= limit;
+    const float sum =
+        window.filtered (weights.data () + filter * kTaps * Seen::kLength);
+    to[x] = Pixel (std::int32_t (std::clamp (sum + 0.5f, 0.0f, largest)));
   }
 }
 

@@ -17,17 +17,19 @@ namespace cexp
 struct RectifyOptions {
   /** Mirrors, within which a pixel counts as looking at its own mirror only. */
   double tolerance = 0.05;
-  /** Noise of a pixel, rms, as a part of the scene's variation. */
-  double noise = 0.08;
+  /** Noise of a pixel, rms, as a part of white, where all slots are open: codes
+   * that pass less light have more. */
+  double noise = 0.006;
   /** Mirrors over which a scene is much the same. */
-  double correlation_length = 2.5;
+  double correlation_length = 2.0;
   /** Correlation of a scene with itself a slot later. */
-  double persistence = 0.9;
+  double persistence = 0.8;
 };
 
 /** How well the camera sees the mirrors; numbers of mirrors. */
 struct RectifyReport {
-  std::uint64_t exact = 0;    ///< looked up: one pixel sees this mirror only
+  /** Looked up: there is one pixel a mirror, and it sees this one only. */
+  std::uint64_t exact = 0;
   std::uint64_t weighted = 0; ///< from pixels that see neighbours, too
   /** Of those, where even the best pixel gets less than half of its light from
    * this mirror: what is said of them is much of it said by neighbours. */
@@ -43,8 +45,10 @@ struct RectifyReport {
  * pixel collects light of several mirrors, which show different slots; each
  * mirror is then estimated from the pixels around it by the weights of least
  * mean square error, which know which pixel sees how much of which mirror (the
- * mapping, its blur) and when that is open (the schedule). Brightness is kept:
- * a still, flat scene comes out as an aligned camera has it.
+ * mapping, its blur) and when that is open (the schedule). The more pixels
+ * differ from their neighbours, the less their noise matters, and the more of
+ * what is mixed is separated. Brightness is kept: a still, flat scene comes out
+ * as an aligned camera has it.
  *
  * Weights are made once, for fractions of a pixel. run () is const, may be
  * called from several threads, and allocates nothing.

@@ -3,8 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
+#include "base/cholesky.h"
 #include "moire/response.h"
+#include "stats/matern.h"
 
 namespace cexp
 {
@@ -15,93 +18,15 @@ namespace
 /* Shares below are none. */
 constexpr double kLeastShare = 1e-4;
 
-struct Share {
-  std::size_t mirror;
-  double part;
-};
-
-double
-side_x (const PixelView &view)
-{
-  return std::hypot (view.slope[0], view.slope[1]);
-}
-
-double
-side_y (const PixelView &view)
-{
-  return std::hypot (view.slope[2], view.slope[3]);
-}
-
-/* What the pixel @dx, @dy pixels from where the middle mirror is seen gets of
- * each mirror; parts add up to 1. */
-std::vector<Share>
-shares_of (
-    const Neighbourhood &mirrors, const PixelView &view, double dx, double dy)
-{
-  const double at_x = view.slope[0] * dx + view.slope[1] * dy;
-  const double at_y = view.slope[2] * dx + view.slope[3] * dy;
-  const int reach = mirrors.reach ();
-  const std::size_t side = std::size_t (2 * reach + 1);
-  std::vector<double> across (side), down (side);
-  for (std::size_t i = 0; i < side; i++) {
-    const double mirror = double (i) - reach;
-    across[i] =
-        mirror_share (at_x - mirror, side_x (view), view.sigma * side_x (view));
-    down[i] =
-        mirror_share (at_y - mirror, side_y (view), view.sigma * side_y (view));
-  }
-  std::vector<Share> shares;
-  double sum = 0.0;
-  for (std::size_t j = 0; j < side; j++)
-    for (std::size_t i = 0; i < side; i++)
-      if (const double part = across[i] * down[j]; part > kLeastShare) {
-        shares.push_back ({j * side + i, part});
-        sum += part;
-      }
-  for (Share &share : shares)
-    share.part /= sum;
-  return shares;
-}
-
-/* Solves A x = b for two right sides at once, A symmetric and positive, n x n;
- * A is overwritten (Cholesky). */
-void
-solve_both (std::vector<double> &a, std::size_t n, std::vector<double> &b,
-    std::vector<double> &c)
-{
-  for (std::size_t j = 0; j < n; j++) {
-    for (std::size_t i = j; i < n; i++) {
-      double sum = a[i * n + j];
-      for (std::size_t k = 0; k < j; k++)
-        sum -= a[i * n + k] * a[j * n + k];
-      a[i * n + j] =
-          i == j ? std::sqrt (std::max (sum, 1e-12)) : sum / a[j * n + j];
-    }
-  }
-  for (std::vector<double> *x : {&b, &c}) {
-    for (std::size_t i = 0; i < n; i++) {
-      for (std::size_t k = 0; k < i; k++)
-        (*x)[i] -= a[i * n + k] * (*x)[k];
-      (*x)[i] /= a[i * n + i];
-    }
-    for (std::size_t i = n; i-- > 0;) {
-      for (std::size_t k = i + 1; k < n; k++)
-        (*x)[i] -= a[k * n + i] * (*x)[k];
-      (*x)[i] /= a[i * n + i];
-    }
-  }
-}
-
-double
-dot (const std::vector<double> &a, const std::vector<double> &b)
-{
-  double sum = 0.0;
-  for (std::size_t i = 0; i < a.size (); i++)
-    sum += a[i] * b[i];
-  return sum;
-}
-
 } // namespace
+
+SpaceCorrelation::SpaceCorrelation (int reach, double length) : far_ (2 * reach)
+{
+  for (int dy = -far_; dy <= far_; dy++)
+    for (int dx = -far_; dx <= far_; dx++)
+      values_.push_back (
+          matern_3_2 (std::numbers::sqrt3 * std::hypot (dx, dy) / length));
+}
 
 Matrix
 element_covariance (const Schedule &schedule, double persistence)
@@ -122,93 +47,171 @@ element_covariance (const Schedule &schedule, double persistence)
   for (std::size_t e = 0; e < n; e++)
     for (std::size_t f = 0; f < n; f++)
       for (std::size_t s = 0; s < slots; s++)
-        covariance[e * n + f] += later[e * slots + s] * open (f, s);
+        covariance[e * n + f] += open (e, s) * later[f * slots + s];
   return covariance;
 }
 
 Neighbourhood::Neighbourhood (const Schedule &schedule, const Matrix &elements,
-    int x, int y, int reach, double correlation_length)
+    int x, int y, int reach, const SpaceCorrelation &space)
     : reach_ (reach)
 {
-  const std::size_t side = std::size_t (2 * reach + 1);
   const std::size_t n = std::size_t (schedule.elements ());
   std::vector<std::size_t> element;
+  std::vector<Offset> at;
   for (int j = -reach; j <= reach; j++)
     for (int i = -reach; i <= reach; i++) {
       const int e = schedule.element_at (x + i, y + j);
       const int open = schedule.code ().open_slots (e);
       element.push_back (std::size_t (e));
+      at.push_back ({i, j});
       light_.push_back (open + schedule.leak () * (schedule.slots () - open));
     }
-  covariance_.resize (element.size () * element.size ());
-  for (std::size_t a = 0; a < element.size (); a++)
-    for (std::size_t b = 0; b < element.size (); b++) {
-      const double dx = double (a % side) - double (b % side);
-      const double dy = double (a / side) - double (b / side);
-      const double r =
-          std::sqrt (3.0) * std::hypot (dx, dy) / correlation_length;
-      covariance_[a * element.size () + b] =
-          elements[element[a] * n + element[b]] * (1.0 + r) * std::exp (-r);
-    }
+  covariance_.reserve (at.size () * at.size ());
+  for (std::size_t a = 0; a < at.size (); a++)
+    for (std::size_t b = 0; b < at.size (); b++)
+      covariance_.push_back (elements[element[a] * n + element[b]] *
+                             space.at (at[a].x - at[b].x, at[a].y - at[b].y));
 }
 
-double
-own_share (const PixelView &view, double dx, double dy)
+ShareProfile::ShareProfile (double side, double sigma)
 {
-  return mirror_share (view.slope[0] * dx + view.slope[1] * dy, side_x (view),
-             view.sigma * side_x (view)) *
-         mirror_share (view.slope[2] * dx + view.slope[3] * dy, side_y (view),
-             view.sigma * side_y (view));
+  do
+    values_.push_back (
+        mirror_share (double (values_.size ()) / kSteps, side, sigma));
+  while (values_.back () > kLeastShare);
+}
+
+WeightSolver::WeightSolver (const PixelView &view)
+    : view_ (view), across_ (std::hypot (view.slope[0], view.slope[1]),
+                        view.sigma * std::hypot (view.slope[0], view.slope[1])),
+      down_ (std::hypot (view.slope[2], view.slope[3]),
+          view.sigma * std::hypot (view.slope[2], view.slope[3]))
+{
 }
 
 int
-needed_reach (const PixelView &view)
+WeightSolver::reach () const
 {
-  const double pixels = 0.5 * view.taps + 0.5 + 2.5 * view.sigma;
-  const double along_x = std::abs (view.slope[0]) + std::abs (view.slope[1]);
-  const double along_y = std::abs (view.slope[2]) + std::abs (view.slope[3]);
+  const auto &slope = view_.slope;
+  const double pixels = 0.5 * view_.taps + 0.5 + 2.5 * view_.sigma;
+  const double along_x = std::abs (slope[0]) + std::abs (slope[1]);
+  const double along_y = std::abs (slope[2]) + std::abs (slope[3]);
   return int (std::ceil (pixels * std::max (along_x, along_y)));
 }
 
-void
-solve_weights (const Neighbourhood &mirrors, const PixelView &view, double fx,
-    double fy, double noise, std::span<float> weights)
+double
+WeightSolver::own_share (double dx, double dy) const
 {
-  const std::size_t taps = std::size_t (view.taps);
-  const std::size_t pixels = taps * taps;
+  return across_.at (view_.slope[0] * dx + view_.slope[1] * dy) *
+         down_.at (view_.slope[2] * dx + view_.slope[3] * dy);
+}
+
+/* What the pixel @dx, @dy pixels from where the middle mirror is seen gets of
+ * each mirror; parts add up to 1. */
+std::vector<WeightSolver::Share>
+WeightSolver::shares_of (
+    const Neighbourhood &mirrors, double dx, double dy) const
+{
+  const double at_x = view_.slope[0] * dx + view_.slope[1] * dy;
+  const double at_y = view_.slope[2] * dx + view_.slope[3] * dy;
+  const int reach = mirrors.reach ();
+  std::vector<Share> shares;
+  double sum = 0.0;
+  for (int j = -reach; j <= reach; j++) {
+    const double down = down_.at (at_y - j);
+    for (int i = -reach; down > 0.0 && i <= reach; i++) {
+      const double part = down * across_.at (at_x - i);
+      if (part <= kLeastShare)
+        continue;
+      shares.push_back (
+          {std::size_t ((j + reach) * (2 * reach + 1) + i + reach), part});
+      sum += part;
+    }
+  }
+  for (Share &share : shares)
+    share.part /= sum;
+  return shares;
+}
+
+WeightSolver::System
+WeightSolver::system_of (
+    const Neighbourhood &mirrors, double fx, double fy) const
+{
+  const std::size_t taps = std::size_t (view_.taps), pixels = taps * taps;
   const std::size_t count = mirrors.count ();
-  const std::size_t middle = count / 2;
-  const double half = 0.5 * (view.taps - 1);
-
+  const double half = 0.5 * (view_.taps - 1);
   std::vector<std::vector<Share>> shares;
-  std::vector<double> with_mirrors (pixels * count);
-  for (std::size_t p = 0; p < pixels; p++) {
-    shares.push_back (shares_of (mirrors, view, double (p % taps) - half - fx,
-        double (p / taps) - half - fy));
-    for (std::size_t m = 0; m < count; m++)
-      for (const Share &share : shares[p])
-        with_mirrors[p * count + m] +=
-            share.part * mirrors.covariance (share.mirror, m);
-  }
-
-  std::vector<double> matrix (pixels * pixels), wanted (pixels), flat (pixels);
-  for (std::size_t p = 0; p < pixels; p++) {
-    for (std::size_t q = 0; q < pixels; q++)
-      for (const Share &share : shares[q])
-        matrix[p * pixels + q] +=
-            share.part * with_mirrors[p * count + share.mirror];
-    matrix[p * pixels + p] +=
-        noise * noise * mirrors.covariance (middle, middle);
-    wanted[p] = with_mirrors[p * count + middle];
-    for (const Share &share : shares[p])
-      flat[p] += share.part * mirrors.light (share.mirror);
-  }
-  const std::vector<double> brightness = flat;
-  solve_both (matrix, pixels, wanted, flat);
-  const double factor = (mirrors.light (middle) - dot (brightness, wanted)) /
-                        dot (brightness, flat);
   for (std::size_t p = 0; p < pixels; p++)
-    weights[p] = float (wanted[p] + factor * flat[p]);
+    shares.push_back (shares_of (
+        mirrors, double (p % taps) - half - fx, double (p / taps) - half - fy));
+
+  System system;
+  system.matrix.resize (pixels * pixels);
+  std::vector<double> with;
+  for (std::size_t p = 0; p < pixels; p++) {
+    with.assign (count, 0.0);
+    double flat = 0.0;
+    for (const Share &share : shares[p]) {
+      const double *covariances = mirrors.covariances (share.mirror);
+      for (std::size_t m = 0; m < count; m++)
+        with[m] += share.part * covariances[m];
+      flat += share.part * mirrors.light (share.mirror);
+    }
+    system.right.insert (system.right.end (), {with[count / 2], flat});
+    for (std::size_t q = p; q < pixels; q++)
+      for (const Share &share : shares[q])
+        system.matrix[p * pixels + q] += share.part * with[share.mirror];
+  }
+  return system;
+}
+
+/* With C the covariance of the pixels, c theirs with the mirror and f their
+ * light in a flat scene: w = C^-1 (c + lambda f) such that f w is the mirror's
+ * light. */
+std::vector<float>
+WeightSolver::solve (const Neighbourhood &mirrors, double fx, double fy,
+    std::span<const double> noises) const
+{
+  const System system = system_of (mirrors, fx, fy);
+  const std::vector<double> &right = system.right;
+  const std::size_t pixels = right.size () / 2, middle = mirrors.count () / 2;
+  std::vector<float> weights;
+  for (const double noise : noises) {
+    std::vector<double> matrix = system.matrix, solved = right;
+    for (std::size_t p = 0; p < pixels; p++)
+      matrix[p * pixels + p] +=
+          noise * noise * mirrors.covariances (middle)[middle];
+    Cholesky (std::move (matrix), int (pixels)).solve (solved, 2);
+    double light = 0.0, flat = 0.0;
+    for (std::size_t p = 0; p < pixels; p++) {
+      light += right[2 * p + 1] * solved[2 * p];
+      flat += right[2 * p + 1] * solved[2 * p + 1];
+    }
+    const double lambda = (mirrors.light (middle) - light) / flat;
+    for (std::size_t p = 0; p < pixels; p++)
+      weights.push_back (float (solved[2 * p] + lambda * solved[2 * p + 1]));
+  }
+  weights.push_back (
+      float (roughness (system.matrix) / mirrors.covariances (middle)[middle]));
+  return weights;
+}
+
+double
+WeightSolver::roughness (const std::vector<double> &matrix) const
+{
+  constexpr int kSteps = 4;
+  const int taps = view_.taps, first = taps / 2 - kSteps / 2;
+  const auto covariance = [&] (int p, int q) {
+    return matrix[std::size_t (p * taps * taps + q)];
+  };
+  double sum = 0.0;
+  for (int y = first; y < first + kSteps; y++)
+    for (int x = first; x < first + kSteps; x++) {
+      const int p = y * taps + x;
+      for (const int q : {p + 1, p + taps})
+        sum += covariance (p, p) + covariance (q, q) - 2.0 * covariance (p, q);
+    }
+  return sum / (4.0 * kSteps * kSteps);
 }
 
 } // namespace cexp

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <span>
 #include <vector>
 
@@ -12,25 +13,48 @@
 namespace cexp
 {
 
+/** Correlations of the light of two mirrors, by how far they are apart: as a
+ * scene's in space (Matern, 3/2). */
+class SpaceCorrelation
+{
+public:
+  /** For mirrors within @p reach of one, to each side. */
+  SpaceCorrelation (int reach, double length);
+
+  double at (int dx, int dy) const
+  {
+    return values_[std::size_t ((dy + far_) * (2 * far_ + 1) + dx + far_)];
+  }
+
+private:
+  int far_;
+  std::vector<double> values_;
+};
+
+/** Covariance of the elements' light, n x n, of a scene that correlates with
+ * itself a slot later by @p persistence. */
+Matrix element_covariance (const Schedule &schedule, double persistence);
+
 /**
  * Which element each mirror around one of them is, and what is known of their
- * light together: mirrors correlate as a scene does in space (Matern, 3/2) and
- * as the slots in which they are open do in time.
+ * light together: mirrors correlate in space as a scene does, and in time as
+ * the slots do in which they are open.
  */
 class Neighbourhood
 {
 public:
   /** Around mirror (@p x, @p y), @p reach mirrors to each side. */
   Neighbourhood (const Schedule &schedule, const Matrix &elements, int x, int y,
-      int reach, double correlation_length);
+      int reach, const SpaceCorrelation &space);
 
   int reach () const { return reach_; }
   std::size_t count () const { return light_.size (); }
   /** Mean light of a mirror in a flat scene, in slots. */
   double light (std::size_t mirror) const { return light_[mirror]; }
-  double covariance (std::size_t a, std::size_t b) const
+  /** Of one mirror with each. */
+  const double *covariances (std::size_t mirror) const
   {
-    return covariance_[a * light_.size () + b];
+    return covariance_.data () + mirror * light_.size ();
   }
 
 private:
@@ -39,10 +63,6 @@ private:
   std::vector<double> covariance_;
 };
 
-/** Covariance of the elements' light, n x n, of a scene that correlates with
- * itself a slot later by @p persistence. */
-Matrix element_covariance (const Schedule &schedule, double persistence);
-
 /** How pixels look at mirrors around a place. */
 struct PixelView {
   std::array<double, 4> slope; ///< d mirror / d camera
@@ -50,20 +70,69 @@ struct PixelView {
   int taps;                    ///< pixels along a side of the window
 };
 
-/** Part of the light of the pixel @p dx, @p dy pixels from where the mirror is
- * seen that is of this mirror. */
-double own_share (const PixelView &view, double dx, double dy);
+/** mirror_share () along one axis, from a table. */
+class ShareProfile
+{
+public:
+  ShareProfile (double side, double sigma);
 
-/** Mirrors to each side of which the pixels of a window see anything. */
-int needed_reach (const PixelView &view);
+  /** 0 where it is next to nothing. */
+  double at (double distance) const
+  {
+    const double step = kSteps * (distance < 0.0 ? -distance : distance);
+    if (!(step < double (values_.size () - 1)))
+      return 0.0;
+    const std::size_t low = std::size_t (step);
+    return values_[low] +
+           (step - double (low)) * (values_[low + 1] - values_[low]);
+  }
+
+private:
+  static constexpr int kSteps = 64; // a mirror
+  std::vector<double> values_;
+};
 
 /**
- * The weights of least mean square error of the pixels in a window, row by row,
- * for the mirror in the middle of @p mirrors. The mirror is seen @p fx, @p fy
- * pixels from the window's middle one. A still, flat scene keeps its
- * brightness.
+ * Finds the weights of least mean square error of the pixels in a window, for
+ * the mirror in its middle.
  */
-void solve_weights (const Neighbourhood &mirrors, const PixelView &view,
-    double fx, double fy, double noise, std::span<float> weights);
+class WeightSolver
+{
+public:
+  explicit WeightSolver (const PixelView &view);
+
+  int taps () const { return view_.taps; }
+  /** Mirrors to each side of which the pixels of a window see anything. */
+  int reach () const;
+  /** Part of the light of the pixel @p dx, @p dy pixels from where the mirror
+   * is seen that is of this mirror. */
+  double own_share (double dx, double dy) const;
+  /** Weights, row by row, for the mirror in the middle of @p mirrors, seen
+   * @p fx, @p fy pixels from the window's middle one; one set after the other
+   * for each of @p noises, a pixel's rms as a part of the scene's variation. A
+   * still, flat scene keeps its brightness. At last how rough the window looks:
+   * half the mean squared difference of the 5 x 5 pixels in its middle from
+   * their neighbours, as a part of the scene's variance. */
+  std::vector<float> solve (const Neighbourhood &mirrors, double fx, double fy,
+      std::span<const double> noises) const;
+
+private:
+  struct Share {
+    std::size_t mirror;
+    double part;
+  };
+  /** Covariances of the pixels, upper triangle; a row of two for each pixel:
+   * its covariance with the mirror, and its light in a flat scene. */
+  struct System {
+    std::vector<double> matrix, right;
+  };
+  std::vector<Share> shares_of (
+      const Neighbourhood &mirrors, double dx, double dy) const;
+  System system_of (const Neighbourhood &mirrors, double fx, double fy) const;
+  double roughness (const std::vector<double> &matrix) const;
+
+  PixelView view_;
+  ShareProfile across_, down_;
+};
 
 } // namespace cexp

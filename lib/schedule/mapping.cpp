@@ -320,6 +320,32 @@ Mapping::camera_at (Position mirror) const
   return {p.x, p.y};
 }
 
+void
+Mapping::camera_row (int y, std::span<Position> seen) const
+{
+  const Homography back = inverse_of (parts_.homography);
+  double x = 0.0;
+  if (!parts_.displacement) {
+    for (Position &at : seen) {
+      const Projected p = project (back, x++, y);
+      at = {p.x, p.y};
+    }
+    return;
+  }
+  /* A mirror's displacement is nearly that of the one before. */
+  const Position first = camera_at ({0.0, double (y)});
+  Position d = displaced (first.x, first.y);
+  for (Position &at : seen) {
+    Projected p = project (back, x - d.x, y - d.y);
+    for (int round = 0; round < 2; round++) {
+      d = displaced (p.x, p.y);
+      p = project (back, x - d.x, y - d.y);
+    }
+    at = {p.x, p.y};
+    x++;
+  }
+}
+
 std::array<double, 4>
 Mapping::slope_at (double x, double y) const
 {

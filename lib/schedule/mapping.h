@@ -4,6 +4,7 @@
 
 #include <array>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -125,6 +126,9 @@ public:
   /** The camera place that looks at @p mirror; the inverse of mirror_at () to
    * 1e-9 pixels. */
   Position camera_at (Position mirror) const;
+  /** camera_at () of mirrors (0, @p y), (1, @p y) ..., in less time: to 1e-3
+   * pixels, where the displacement changes by less than 0.1 a pixel. */
+  void camera_row (int y, std::span<Position> seen) const;
   /** d mirror / d camera: xx, xy, yx, yy. */
   std::array<double, 4> slope_at (double x, double y) const;
   /** Whether that place is a mirror of the array, to half a mirror. */

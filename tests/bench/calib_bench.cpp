@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* What moirecalib costs a frame of 768x576: the streaming thread with and
- * without the overlay, reading the fringes, drawing the panel. */
+ * without the overlay, reading the fringes, drawing the panel. And what its
+ * mapping costs: once, and a frame. */
 #include <benchmark/benchmark.h>
 
 #include "gstcodedexposuremeta.h"
@@ -8,6 +9,8 @@
 #include "harness.h"
 #include "moire/gratings.h"
 #include "moire/live_moire.h"
+#include "moire/rectifier.h"
+#include "optics/lens.h"
 #include "overlay/panel.h"
 
 namespace
@@ -93,6 +96,39 @@ draw_all (benchmark::State &state)
     benchmark::DoNotOptimize (draw_panel (kSize, content).opaque.size ());
 }
 BENCHMARK (draw_all)->Unit (benchmark::kMicrosecond);
+
+Mapping
+askew ()
+{
+  const Affine m =
+      camera_to_mirrors ({0.4, 0.4, 0.5, 1.01}, kSize.width, kSize.height);
+  Mapping::Parts parts = {
+      kSize, kSize, {m.xx, m.xy, m.x0, m.yx, m.yy, m.y0, 0, 0, 1}};
+  parts.psf_sigma = 0.5;
+  return *Mapping::make (parts);
+}
+
+void
+follow_mapping (benchmark::State &state)
+{
+  const Mapping mapping = askew ();
+  for (auto _ : state)
+    benchmark::DoNotOptimize (Rectifier::make (mapping, Schedule ()).ok ());
+}
+BENCHMARK (follow_mapping)->Unit (benchmark::kMillisecond);
+
+template <typename Pixel>
+void
+rectify (benchmark::State &state)
+{
+  const auto rectifier = Rectifier::make (askew (), Schedule ());
+  const auto picture = grating<Pixel> ();
+  auto mirrors = picture;
+  for (auto _ : state)
+    rectifier->run (picture.view (), mirrors.view ());
+}
+BENCHMARK (rectify<std::uint8_t>)->Unit (benchmark::kMillisecond);
+BENCHMARK (rectify<std::uint16_t>)->Unit (benchmark::kMillisecond);
 
 } // namespace
 

@@ -16,11 +16,11 @@ using namespace cexp::quality;
 namespace
 {
 
-/* dB that a rectified camera may be worse than an aligned one, if its blur is
- * that of a usual lens. A sharper one mixes mirrors, where it looks between
- * them, more than it does aligned. */
+/* dB that a rectified camera may be worse than an aligned one, if its lens is
+ * not sharper than this. A sharp one mixes mirrors only where it looks between
+ * them. */
 constexpr double kWorse = 0.3;
-constexpr double kUsualBlur = 0.5;
+constexpr double kSharp = 0.3;
 
 bool
 print_row (const Scene &scene, const char *preset, double psf_sigma)
@@ -35,7 +35,7 @@ print_row (const Scene &scene, const char *preset, double psf_sigma)
       o.misaligned.point, o.misaligned.full, o.rectified.point,
       o.rectified.full, point, full, o.milliseconds);
   std::fflush (stdout);
-  return psf_sigma < kUsualBlur || (point >= -kWorse && full >= -kWorse);
+  return psf_sigma < kSharp || (point >= -kWorse && full >= -kWorse);
 }
 
 } // namespace

@@ -121,6 +121,30 @@ TEST (Mapping, PlacesGoBothWays)
   }
 }
 
+TEST (Mapping, RowsOfMirrorsAreSeenWhereEachIs)
+{
+  Mapping::Parts tilted = all_parts ();
+  tilted.displacement.reset ();
+  Mapping::Parts bent = tilted;
+  /* Changes by 0.1 mirrors a pixel where it is steepest. */
+  bent.displacement = {9, 2,
+      {0, 5, 0, -4, 4, 0, 5, -4, 3, 0, 2, 0, 9, 1, 0, 8, 0, 1},
+      {0, 1, -1, 0, 4, -4, 5, 0, 0, 1, 1, 0, 0, 3, -3, 3, 0, 0}};
+  std::vector<Position> seen (std::size_t (kMirrors.width));
+  for (const auto &[parts, error] :
+      {std::pair (tilted, 1e-9), std::pair (bent, 1e-3)}) {
+    const Mapping mapping = made (parts);
+    for (const int y : {0, 200, 767}) {
+      mapping.camera_row (y, seen);
+      for (int x = 0; x < kMirrors.width; x++) {
+        const Position at = mapping.camera_at ({double (x), double (y)});
+        ASSERT_NEAR (seen[std::size_t (x)].x, at.x, error) << x << ' ' << y;
+        ASSERT_NEAR (seen[std::size_t (x)].y, at.y, error) << x << ' ' << y;
+      }
+    }
+  }
+}
+
 TEST (Mapping, DisplacementIsBilinearBetweenTheCorners)
 {
   Mapping::Parts parts = {{101, 201}, {101, 201}};

@@ -31,13 +31,28 @@ mapping_of (const Alignment &alignment, double psf_sigma = 0.0)
   return *Mapping::make (parts);
 }
 
+/** Of an alignment without distortion. */
+Homography
+homography_of (const Alignment &alignment)
+{
+  const Affine m = camera_to_mirrors (alignment, kSize.width, kSize.height);
+  const double cx = 0.5 * (kSize.width - 1), cy = 0.5 * (kSize.height - 1);
+  const double zx = alignment.tilt_x / cx, zy = alignment.tilt_y / cy;
+  const double z0 = 1.0 - alignment.tilt_x - alignment.tilt_y;
+  const double x0 = cx + alignment.shift_x, y0 = cy + alignment.shift_y;
+  return {x0 * zx + m.xx, x0 * zy + m.xy, x0 * z0 - m.xx * cx - m.xy * cy,
+      y0 * zx + m.yx, y0 * zy + m.yy, y0 * z0 - m.yx * cx - m.yy * cy, zx, zy,
+      z0};
+}
+
 /** A coded frame of a scene whose brightness changes smoothly in space and
  * from slot to slot. */
 Image<std::uint8_t>
 coded (const Alignment &alignment, const Schedule &schedule,
-    double psf_sigma = 0.0, int texture = 1)
+    double psf_sigma = 0.0, int texture = 1, double full_well = 0.0)
 {
   BenchOptions options;
+  options.full_well = full_well;
   options.alignment = alignment;
   options.psf_sigma = psf_sigma;
   auto bench = OpticalBench::make (kSize.width, kSize.height, options);
@@ -77,10 +92,11 @@ rms (const Image<std::uint8_t> &a, const Image<std::uint8_t> &b, int border)
   return std::sqrt (squares / count);
 }
 
+/** For frames without noise. */
 Rectifier
 made (const Mapping &mapping, const Schedule &schedule)
 {
-  auto rectifier = Rectifier::make (mapping, schedule);
+  auto rectifier = Rectifier::make (mapping, schedule, {.noise = 0.001});
   EXPECT_TRUE (rectifier.ok ()) << rectifier.error ().message;
   return std::move (*rectifier);
 }
@@ -157,9 +173,61 @@ TEST (Rectifier, TakesSeveralPixelsAMirror)
   const auto mirrors = rectified (rectifier, coded (alignment, schedule));
   /* The camera sees the middle of the mirrors. */
   EXPECT_NEAR (double (rectifier.report ().unseen), 0.75 * 96 * 64, 300.0);
+  EXPECT_EQ (rectifier.report ().exact, 0u);
   for (int y = 20; y < 44; y++)
     for (int x = 28; x < 68; x++)
       ASSERT_NEAR (mirrors.at (x, y), aligned.at (x, y), 6) << x << ' ' << y;
+}
+
+TEST (Rectifier, TakesNinePixelsAMirror)
+{
+  const Schedule schedule = schedule_of ("sequential:2x2");
+  const Alignment alignment = {0.2, -0.4, 0.3, 3.0};
+  const auto rectifier = made (mapping_of (alignment), schedule);
+  EXPECT_NEAR (double (rectifier.report ().unseen), 96 * 64 * 8 / 9, 200.0);
+  const auto aligned = coded ({}, schedule);
+  const auto mirrors = rectified (rectifier, coded (alignment, schedule));
+  for (int y = 25; y < 39; y++)
+    for (int x = 35; x < 61; x++)
+      ASSERT_NEAR (mirrors.at (x, y), aligned.at (x, y), 3) << x << ' ' << y;
+
+  /* All nine see the light, so that their noise averages out. */
+  double alone = 0.0, together = 0.0;
+  for (const auto &[at, squares] :
+      {std::pair (Alignment (), &alone), std::pair (alignment, &together)}) {
+    const auto noisy = coded (at, schedule, 0.0, 0, 10000.0);
+    const auto flat = coded (at, schedule, 0.0, 0);
+    const bool several = at.scale > 1.0;
+    const auto a = several ? rectified (rectifier, noisy) : noisy;
+    const auto b = several ? rectified (rectifier, flat) : flat;
+    for (int y = 25; y < 39; y++)
+      for (int x = 35; x < 61; x++)
+        *squares += std::pow (double (a.at (x, y)) - double (b.at (x, y)), 2);
+  }
+  EXPECT_LT (together, 0.25 * alone);
+}
+
+TEST (Rectifier, FollowsATilt)
+{
+  const Schedule schedule = schedule_of ("sequential:2x2");
+  /* Mirrors that stand at a slant, as their light needs it. */
+  const Alignment alignment = {.shift_x = 0.3,
+      .shift_y = -0.2,
+      .rotation = 0.4,
+      .scale = 1.0,
+      .tilt_x = 0.05,
+      .tilt_y = -0.03};
+  Alignment plane = alignment;
+  plane.tilt_x = plane.tilt_y = 0.0;
+  Mapping::Parts parts = {kSize, kSize, homography_of (alignment)};
+  const auto tilted = made (*Mapping::make (parts), schedule);
+  const auto straight = made (mapping_of (plane), schedule);
+  const auto aligned = coded ({}, schedule);
+  const auto left = [&] (const Rectifier &by, const Alignment &of) {
+    return rms (rectified (by, coded (of, schedule)), aligned, 8);
+  };
+  EXPECT_LT (left (tilted, alignment), 1.4 * left (straight, plane));
+  EXPECT_GT (left (straight, alignment), 1.5 * left (tilted, alignment));
 }
 
 TEST (Rectifier, RowsAreThoseOfTheWhole)

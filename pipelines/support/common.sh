@@ -426,9 +426,15 @@ video_output ()
 }
 
 # Makes room for an output; the pictures of an earlier run are replaced as a
-# file would be.
+# file would be. What is read must not be written: it would be empty first.
 make_folder_for ()
 {
+  local read
+  for read in "${opt[input]:-}" "${args[@]}"; do
+    [ -z "$read" ] || [ ! "$1" -ef "$read" ] \
+      || usage_error "$1 is what is read: give the output another name"
+  done
+  ! is_set print || return 0
   if [[ $1 == */ ]]; then
     mkdir -p "$1"
     find "$1" -maxdepth 1 -name '[0-9][0-9][0-9][0-9][0-9][0-9].png' -delete

@@ -124,6 +124,9 @@ install_packages ()
     "and there is no sudo. As root, run:" \
     "apt-get install --no-install-recommends ${names[*]}"
   mkdir -p "$cache"
+  # Made by root, it could not be written by who reads the lists below.
+  rm -f "$cache/apt.log"
+  : > "$cache/apt.log"
   # A new system has no package lists, and old lists name files that are gone.
   if ! apt-cache show "${names[@]}" >/dev/null 2>&1 \
       || ! apt_install "${names[@]}"; then

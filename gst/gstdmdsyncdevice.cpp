@@ -57,6 +57,13 @@ reports (GstDmdSync *self)
     GST_ELEMENT_ERROR (self, RESOURCE, WRITE,
         ("The DMD failed: %s", error.message.c_str ()), (nullptr));
   };
+  reports.not_parked = [self] {
+    GST_ELEMENT_WARNING (self, RESOURCE, WRITE,
+        ("%s did not answer when it was told to stop, and may show masks on: "
+         "try \"codedexposure dmd stop\", or switch it off.",
+            state (self).runner->info ().name.c_str ()),
+        (nullptr));
+  };
   return reports;
 }
 

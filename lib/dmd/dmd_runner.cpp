@@ -27,6 +27,7 @@ DmdRunner::upload (const Schedule &schedule)
   {
     const std::lock_guard guard (lock_);
     run_ = Run::on;
+    interrupted_ = false;
   }
   ask_upload (schedule);
 }
@@ -133,6 +134,8 @@ DmdRunner::halt ()
   jobs_.clear ();
   jobs_.push_back ([this] (std::stop_token) {
     dmd_->stop ();
+    if (dmd_->running ())
+      reports_.not_parked ();
     return Result<void> ();
   });
   changed_.notify_all ();

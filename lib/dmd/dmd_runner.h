@@ -35,6 +35,9 @@ public:
     UploadProgress progress = [] (int, int) {};
     /** A job failed, other than by halt (). */
     std::function<void (const Error &)> failed = [] (const Error &) {};
+    /** The run is over, and the device did not answer when it was told to
+     * stop: its mirrors may move on. */
+    std::function<void ()> not_parked = [] {};
   };
 
   DmdRunner (std::unique_ptr<Dmd> dmd, Reports reports);

@@ -93,7 +93,12 @@ public:
       : device_ (std::move (device)), dmd_ (std::move (dmd))
   {
   }
-  ~GuardedDmd () override { stop (); }
+  /* What nobody here started is none of our business. */
+  ~GuardedDmd () override
+  {
+    if (guard_)
+      stop ();
+  }
 
   const DmdInfo &info () const override { return dmd_->info (); }
   Result<DmdStatus> status () override { return dmd_->status (); }

@@ -245,6 +245,20 @@ read_duration (Session &session, const Arguments &arguments,
   return parsed.ok ();
 }
 
+/** Parks the mirrors of @p dmd; false, with an error, when it does not answer.
+ */
+bool
+park (Session &session, Dmd &dmd)
+{
+  dmd.stop ();
+  if (dmd.running ())
+    session.fail (Exit::failed,
+        Error{dmd.info ().name + " did not answer when it was told to stop, "
+                                 "and may show masks on: try again, or switch "
+                                 "it off"});
+  return !dmd.running ();
+}
+
 /** Lets @p dmd show what it shows, until it is time to stop. */
 void
 run (Session &session, Dmd &dmd, std::optional<Nanoseconds> duration,
@@ -252,7 +266,8 @@ run (Session &session, Dmd &dmd, std::optional<Nanoseconds> duration,
 {
   session.say ("running; Ctrl-C stops it");
   const bool over = wait (session, duration);
-  dmd.stop ();
+  if (!park (session, dmd))
+    return;
   session.print (result);
   if (!over && duration)
     session.exit = Exit::interrupted;

@@ -21,6 +21,7 @@ struct Record {
   bool running = false;
   bool upload_waits = false; // until it is told to stop
   bool start_fails = false;
+  bool deaf = false; // to being told to stop
   std::promise<void> uploading;
 };
 
@@ -70,7 +71,7 @@ public:
   void stop () override
   {
     record_->calls.push_back ("stop");
-    record_->running = false;
+    record_->running = record_->running && record_->deaf;
   }
   bool running () const override { return record_->running; }
 
@@ -89,15 +90,16 @@ protected:
             .predicted = [this] (Nanoseconds time) { predicted = time; },
             .progress = [this] (int sent, int) { progress.push_back (sent); },
             .failed =
-                [this] (const Error &error) {
-                  failures.push_back (error.message);
-                }});
+                [this] (
+                    const Error &error) { failures.push_back (error.message); },
+            .not_parked = [this] { not_parked++; }});
   }
 
   std::shared_ptr<Record> record = std::make_shared<Record> ();
   Nanoseconds predicted = 0;
   std::vector<int> progress;
   std::vector<std::string> failures;
+  int not_parked = 0;
   const SlotPlan plan = *SlotPlan::fit ({}, 4, {25, 1});
 };
 
@@ -190,6 +192,34 @@ TEST_F (DmdRunnerTest, InterruptCutsAWaitShortAndLeavesTheJob)
   EXPECT_FALSE (runner->settle ());
   EXPECT_FALSE (runner->settled ());
   EXPECT_FALSE (runner->failed ());
+}
+
+TEST_F (DmdRunnerTest, AnInterruptEndsWithTheRun)
+{
+  const auto runner = make_runner ();
+  runner->upload (Schedule ());
+  runner->interrupt (true);
+  runner->halt ();
+  runner->upload (Schedule ());
+  EXPECT_TRUE (runner->settle ());
+}
+
+TEST_F (DmdRunnerTest, SaysThatADeviceDoesNotPark)
+{
+  const auto runner = make_runner ();
+  runner->upload (Schedule ());
+  runner->start (plan);
+  ASSERT_TRUE (runner->settle ());
+  runner->halt ();
+  EXPECT_EQ (not_parked, 0);
+
+  runner->upload (Schedule ());
+  runner->start (plan);
+  ASSERT_TRUE (runner->settle ());
+  record->deaf = true;
+  runner->halt ();
+  EXPECT_EQ (not_parked, 1);
+  record->deaf = false;
 }
 
 TEST_F (DmdRunnerTest, AFailureParksEndsTheRunAndIsReportedOnce)

@@ -261,6 +261,11 @@ TEST_F (Usb, TheToolStopsWhatSomebodyLeftRunning)
   bed.plug ("1-3", kDlpc350, "LCR2", survivor);
   ASSERT_TRUE (survivor->running ());
   int status = -1;
+  for (const char *question :
+      {"dmd status", "dmd info", "dmd upload usb: sequential:2x2 --predict"}) {
+    tool_says (question, status);
+    EXPECT_TRUE (survivor->running ()) << question;
+  }
   tool_says ("dmd stop", status);
   EXPECT_EQ (status, 0);
   EXPECT_FALSE (survivor->running ());

@@ -24,11 +24,11 @@ take_in (GstCodedExposureFuse *self, GstBuffer *inbuf, FrameMeta &meta)
   const Admitted admitted = admit (GST_ELEMENT (self), st.stream, st.counters,
       inbuf, st.stream.plan->period ());
   meta = admitted.meta;
-  st.stream.discont |= !admitted.follows;
   if (admitted.follows && !(GST_BUFFER_FLAGS (inbuf) & kUnfit))
     return GST_FLOW_OK;
   const GstFlowReturn flow = drain (self);
   forget_history (self);
+  st.stream.discont |= !admitted.follows;
   return flow;
 }
 

@@ -174,14 +174,14 @@ negotiate (GstCodedExposureFuse *self, GstBuffer *next)
 {
   FuseState &st = state (self);
   take_bits (st.stream, next);
-  bool changed;
   {
     const ObjectLock lock (self);
-    changed = std::exchange (st.settings_changed, false);
-    if (changed)
+    if (std::exchange (st.settings_changed, false)) {
       st.stream.settings = st.settings;
+      st.stream.stale = true;
+    }
   }
-  if (changed || st.stream.stale) {
+  if (st.stream.stale) {
     if (const GstFlowReturn flow = drain (self); flow != GST_FLOW_OK)
       return flow;
     auto proposal = propose (self);

@@ -4,8 +4,24 @@
 namespace cexp::gst
 {
 
+const char *const kFrameMetaName = "CodedExposureFrame";
+
 namespace
 {
+
+GType
+frame_meta_api ()
+{
+  static const GType api = gst_meta_get_info (kFrameMetaName)->api;
+  return api;
+}
+
+GstCustomMeta *
+find (GstBuffer *buffer)
+{
+  return reinterpret_cast<GstCustomMeta *> (
+      gst_buffer_get_meta (buffer, frame_meta_api ()));
+}
 
 struct MetaCopy {
   GstBuffer *to;
@@ -17,7 +33,9 @@ copy_meta (GstBuffer *from, GstMeta **meta, gpointer user_data)
 {
   auto &copy = *static_cast<MetaCopy *> (user_data);
   const GstMetaInfo *info = (*meta)->info;
-  if (!info->transform_func || info->api == GST_VIDEO_META_API_TYPE ||
+  const bool is_there = info->api == frame_meta_api () && find (copy.to);
+  if (is_there || !info->transform_func ||
+      info->api == GST_VIDEO_META_API_TYPE ||
       info->api == GST_VIDEO_CROP_META_API_TYPE ||
       info->api == GST_PARENT_BUFFER_META_API_TYPE ||
       gst_meta_api_type_has_tag (
@@ -36,8 +54,6 @@ copy_meta (GstBuffer *from, GstMeta **meta, gpointer user_data)
 }
 
 } // namespace
-
-const char *const kFrameMetaName = "CodedExposureFrame";
 
 /* A custom meta is copied by every element that copies {"video"} metas, also
  * through scalers and encoders in the same process. */
@@ -75,13 +91,6 @@ names ()
 {
   static const Names quarks;
   return quarks;
-}
-
-GstCustomMeta *
-find (GstBuffer *buffer)
-{
-  static const GType api = gst_meta_get_info (kFrameMetaName)->api;
-  return reinterpret_cast<GstCustomMeta *> (gst_buffer_get_meta (buffer, api));
 }
 
 /* A frame that is described anew has all fields, and making them again would

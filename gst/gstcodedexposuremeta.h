@@ -48,7 +48,8 @@ void set_frame_meta (GstBuffer *buffer, const FrameMeta &meta);
 std::optional<FrameMeta> get_frame_meta (GstBuffer *buffer);
 
 /** Copies the metas of @p from to the picture @p to that was made of it, but
- * those that describe memory. What speaks of places in the picture is scaled.
+ * those that describe memory, and the frame's where @p to has one. What speaks
+ * of places in the picture is scaled.
  */
 void copy_metas (GstBuffer *from, const GstVideoInfo &from_info, GstBuffer *to,
     const GstVideoInfo &to_info);

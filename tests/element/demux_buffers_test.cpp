@@ -448,6 +448,25 @@ TEST_F (DemuxOffers, VideoMetaThatThePeerOfCodedReads)
 
 /* ---------------------------------------------------------------- metas -- */
 
+TEST_F (DemuxBuffers, EverySubframeIsDescribedOnce)
+{
+  BufferPtr frame = frame_of (picture (), 0);
+  set_frame_meta (frame.get (), {.frame = 7, .locked = TRUE});
+  ASSERT_EQ (demux.push (std::move (frame)), GST_FLOW_OK);
+  for (int k = 0; k < 4; k++) {
+    const BufferPtr buffer = demux.pull ();
+    ASSERT_TRUE (buffer);
+    EXPECT_EQ (gst_buffer_get_n_meta (
+                   buffer.get (), gst_meta_get_info (kFrameMetaName)->api),
+        1u);
+    const auto meta = get_frame_meta (buffer.get ());
+    ASSERT_TRUE (meta);
+    EXPECT_EQ (meta->frame, 7u);
+    EXPECT_EQ (meta->subframe, k);
+    EXPECT_TRUE (meta->locked);
+  }
+}
+
 TEST_F (DemuxBuffers, MetasOfTheFrameAreOnEverySubframe)
 {
   static const gchar *tags[] = {"video", nullptr};

@@ -333,6 +333,15 @@ TEST_F (Fuse, LookaheadWaitsForAFrameAndSaysSo)
       pull_images (), expected ("sequential:lattice:4/2", {0, 1, 2}, options));
 }
 
+TEST_F (Fuse, ALossIsDiscontAlsoBehindWhatWaits)
+{
+  start ("schedule=sequential:lattice:4/2 lookahead=1");
+  push (0);
+  push (2, 2 * kPeriod);
+  ASSERT_TRUE (fuse->push_event (gst_event_new_eos ()));
+  EXPECT_EQ (disconts (), (std::vector<std::size_t>{0, 4}));
+}
+
 TEST_F (Fuse, WhatWaitsGoesBeforeTheEnd)
 {
   start ("schedule=sequential:lattice:4/2 lookahead=1");

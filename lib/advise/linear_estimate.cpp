@@ -84,12 +84,80 @@ shares_of (const ExposureModel &model)
   return shares;
 }
 
+/* Covariances of coded pixels with each other and with the truth of a slot, by
+ * |dx|, |dy| and their elements. */
+class CodedCovariances
+{
+public:
+  CodedCovariances (
+      const ExposureModel &model, const SceneStatistics &scene, int reach)
+      : side_ (reach + 1), elements_ (model.elements ()),
+        slots_ (model.slots ())
+  {
+    const Covariances covariances (model, scene, reach);
+    const auto shares = shares_of (model);
+    for (int dy = 0; dy < side_; dy++)
+      for (int dx = 0; dx < side_; dx++) {
+        const auto light = [&] (int slots) {
+          return covariances.light (dx, dy, slots);
+        };
+        const auto truth = [&] (int slots) {
+          return covariances.truth (dx, dy, slots);
+        };
+        const std::vector<double> with_light = with_slots (shares, light);
+        for (const auto &a : shares)
+          for (std::size_t b = 0; b < shares.size (); b++)
+            coded_.push_back (sum_of (a, [&] (int slot) {
+              return with_light[b * std::size_t (slots_) + std::size_t (slot)];
+            }));
+        for (const double covariance : with_slots (shares, truth))
+          truth_.push_back (covariance);
+      }
+  }
+  double coded (Offset apart, int a, int b) const
+  {
+    return coded_[place (apart) * std::size_t (elements_ * elements_) +
+                  std::size_t (a * elements_ + b)];
+  }
+  double truth (Offset apart, int element, int slot) const
+  {
+    return truth_[place (apart) * std::size_t (elements_ * slots_) +
+                  std::size_t (element * slots_ + slot)];
+  }
+
+private:
+  template <typename OfSlot>
+  static double sum_of (const std::vector<Share> &shares, OfSlot of_slot)
+  {
+    double sum = 0.0;
+    for (const auto &[slot, part] : shares)
+      sum += part * of_slot (slot);
+    return sum;
+  }
+  template <typename Between>
+  std::vector<double> with_slots (
+      const std::vector<std::vector<Share>> &shares, Between between) const
+  {
+    std::vector<double> result;
+    for (const auto &element : shares)
+      for (int slot = 0; slot < slots_; slot++)
+        result.push_back (
+            sum_of (element, [&] (int open) { return between (open - slot); }));
+    return result;
+  }
+  std::size_t place (Offset apart) const
+  {
+    return std::size_t (std::abs (apart.y) * side_ + std::abs (apart.x));
+  }
+  int side_, elements_, slots_;
+  std::vector<double> coded_, truth_;
+};
+
 /* What is known of the coded pixels at the places around a pixel. */
 struct Estimator {
   const ExposureModel &model;
   const SceneStatistics &scene;
-  Covariances covariances;
-  std::vector<std::vector<Share>> shares; ///< of each element
+  CodedCovariances covariances;
   const std::vector<Offset> &places;
 
   /** Covariances of the coded pixels with each other, upper triangle. */
@@ -97,16 +165,13 @@ struct Estimator {
   {
     const std::size_t n = places.size ();
     std::vector<double> result (n * n);
-    for (std::size_t i = 0; i < n; i++)
-      for (std::size_t j = i; j < n; j++) {
-        double sum = i == j ? model.variance (elements[i], scene.level) : 0.0;
-        for (const Share &a : shares[std::size_t (elements[i])])
-          for (const Share &b : shares[std::size_t (elements[j])])
-            sum += a.part * b.part *
-                   covariances.light (places[i].x - places[j].x,
-                       places[i].y - places[j].y, a.slot - b.slot);
-        result[i * n + j] = sum;
-      }
+    for (std::size_t i = 0; i < n; i++) {
+      for (std::size_t j = i; j < n; j++)
+        result[i * n + j] = covariances.coded (
+            {places[i].x - places[j].x, places[i].y - places[j].y}, elements[i],
+            elements[j]);
+      result[i * n + i] += model.variance (elements[i], scene.level);
+    }
     return result;
   }
   /** Covariances of the coded pixels with the truth, a column for each slot. */
@@ -114,12 +179,8 @@ struct Estimator {
   {
     std::vector<double> result;
     for (std::size_t i = 0; i < places.size (); i++)
-      for (int slot = 0; slot < model.slots (); slot++) {
-        double &sum = result.emplace_back (0.0);
-        for (const Share &a : shares[std::size_t (elements[i])])
-          sum += a.part *
-                 covariances.truth (places[i].x, places[i].y, a.slot - slot);
-      }
+      for (int slot = 0; slot < model.slots (); slot++)
+        result.push_back (covariances.truth (places[i], elements[i], slot));
     return result;
   }
 };
@@ -144,8 +205,7 @@ LinearEstimate::LinearEstimate (
       places_ (disc (std::max (5.0, 1.6 * std::sqrt (model.elements ()))))
 {
   const int reach = 2 * std::abs (places_.front ().y) + 1;
-  const Estimator estimator{
-      model, scene, {model, scene, reach}, shares_of (model), places_};
+  const Estimator estimator{model, scene, {model, scene, reach}, places_};
   const std::size_t n = places_.size ();
   weights_.resize (std::size_t (model.elements () * slots_) * n);
   for (const auto &[element, at] : representatives (model)) {

@@ -12,26 +12,28 @@ namespace cexp
 namespace
 {
 
-/* sum over s, t of a_s b_t c (s - t), c given for differences from 1 - n. */
-template <typename Correlation>
-double
-weigh (const Observation &observation, int a, int b, Correlation c)
+/* Adds what coded pixels have in common with slots and with each other, where
+ * slots that are d apart have between[d + n - 1]. */
+void
+add_pairs (const Observation &observation, const std::vector<double> &between,
+    std::vector<double> &cross, std::vector<double> &coded)
 {
-  double sum = 0.0;
-  for (const auto &[s, share_a] : observation.shares (a))
-    for (const auto &[t, share_b] : observation.shares (b))
-      sum += share_a * share_b * c (s - t);
-  return sum;
-}
-
-template <typename Correlation>
-double
-weigh_slot (const Observation &observation, int a, int slot, Correlation c)
-{
-  double sum = 0.0;
-  for (const auto &[s, share] : observation.shares (a))
-    sum += share * c (s - slot);
-  return sum;
+  const int n = observation.slots ();
+  const std::size_t first = cross.size ();
+  for (int a = 0; a < n; a++)
+    for (int slot = 0; slot < n; slot++) {
+      double sum = 0.0;
+      for (const auto &[s, share] : observation.shares (a))
+        sum += share * between[std::size_t (s - slot + n - 1)];
+      cross.push_back (sum);
+    }
+  for (int a = 0; a < n; a++)
+    for (int b = 0; b < n; b++) {
+      double sum = 0.0;
+      for (const auto &[slot, share] : observation.shares (b))
+        sum += share * cross[first + std::size_t (a * n + slot)];
+      coded.push_back (sum);
+    }
 }
 
 } // namespace
@@ -54,33 +56,22 @@ Covariance::fill_still (const SceneClass &patch, const Observation &observation)
   for (int dy = -reach_; dy <= reach_; dy++)
     for (int dx = -reach_; dx <= reach_; dx++)
       space_.push_back (scene_correlation (patch, dx, dy, 0));
-  const auto time = [&] (int slots) {
-    return std::pow (patch.correlation, std::abs (slots));
-  };
-  for (int a = 0; a < n_; a++) {
-    for (int b = 0; b < n_; b++) {
-      coded_.push_back (weigh (observation, a, b, time));
-      cross_.push_back (weigh_slot (observation, a, b, time));
-    }
-  }
+  std::vector<double> between;
+  for (int d = 1 - n_; d < n_; d++)
+    between.push_back (std::pow (patch.correlation, std::abs (d)));
+  add_pairs (observation, between, cross_, coded_);
 }
 
 void
 Covariance::fill_moving (
     const SceneClass &patch, const Observation &observation)
 {
-  std::vector<double> at (std::size_t (2 * n_ - 1));
   for (int dy = -reach_; dy <= reach_; dy++) {
     for (int dx = -reach_; dx <= reach_; dx++) {
+      std::vector<double> between;
       for (int d = 1 - n_; d < n_; d++)
-        at[std::size_t (d + n_ - 1)] = scene_correlation (patch, dx, dy, d);
-      const auto of = [&] (int d) { return at[std::size_t (d + n_ - 1)]; };
-      for (int a = 0; a < n_; a++) {
-        for (int b = 0; b < n_; b++) {
-          coded_.push_back (weigh (observation, a, b, of));
-          cross_.push_back (weigh_slot (observation, a, b, of));
-        }
-      }
+        between.push_back (scene_correlation (patch, dx, dy, d));
+      add_pairs (observation, between, cross_, coded_);
     }
   }
 }

@@ -45,7 +45,7 @@ Likeness::Likeness (const Schedule &schedule, const Observation &observation,
   sum_ = light_;
   scratch_.resize (slots * kBlock * kBlock * Field::kSlack);
   for (int y = -kBorder; y < height + kBorder; y++)
-    for (int x = -kBorder; x < width + kBorder; x++)
+    for (int x = -kBorder; x < int (stride_) - kBorder; x++)
       elements_[place (x, y)] = std::uint8_t (
           schedule.element_at (mirrored (x, width), mirrored (y, height)));
 }
@@ -63,7 +63,8 @@ Likeness::split (const Field &field, std::vector<float> &plane) const
 {
   for (int y = -kBorder; y < height_ + kBorder; y++) {
     const float *row = field.row (mirrored (y, height_));
-    for (int x = -kBorder; x < width_ + kBorder; x++)
+    /* To the end of the row: the last blocks reach beyond the border. */
+    for (int x = -kBorder; x < int (stride_) - kBorder; x++)
       plane[place (x, y)] = row[mirrored (x, width_)];
   }
 }

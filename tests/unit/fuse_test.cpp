@@ -441,23 +441,27 @@ TEST (Fuse, WhatRepeatsWithTheFrameRateIsNotTakenForStill)
 TEST (Fuse, ForgottenFramesHaveNoSay)
 {
   const Schedule schedule;
-  const auto scene = draw (32, 24, texture);
+  const auto scene = draw (40, 24, texture);
   const auto coded = take (schedule, 1, [&] (int) { return scene; });
-  auto fuser = Fuser<std::uint8_t>::make (schedule, 32, 24);
-  ASSERT_TRUE (fuser);
-  const auto once = [&] {
-    Pictures<> slots (4, Image<std::uint8_t> (32, 24));
-    std::vector<ImageView<std::uint8_t>> views;
-    for (auto &slot : slots)
-      views.push_back (slot.view ());
-    fuser->take (coded[0].view ());
-    fuser->fuse (views);
-    return slots;
-  };
-  const auto first = once ();
-  EXPECT_NE (once (), first);
-  fuser->forget ();
-  EXPECT_EQ (once (), first);
+  for (const FuseQuality quality : kQualities) {
+    FuseOptions options;
+    options.quality = quality;
+    auto fuser = Fuser<std::uint8_t>::make (schedule, 40, 24, options);
+    ASSERT_TRUE (fuser);
+    const auto once = [&] {
+      Pictures<> slots (4, Image<std::uint8_t> (40, 24));
+      std::vector<ImageView<std::uint8_t>> views;
+      for (auto &slot : slots)
+        views.push_back (slot.view ());
+      fuser->take (coded[0].view ());
+      fuser->fuse (views);
+      return slots;
+    };
+    const auto first = once ();
+    EXPECT_NE (once (), first);
+    fuser->forget ();
+    EXPECT_EQ (once (), first) << int (quality);
+  }
 }
 
 TEST (Fuse, SixteenBitsAreFinerThanEight)

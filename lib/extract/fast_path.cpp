@@ -305,6 +305,8 @@ std::uint64_t
 FastPath<Pixel>::decode (const ExtractPlan &plan, ImageView<const Pixel> coded,
     std::span<const ImageView<Pixel>> subframes, RowRange rows) const
 {
+  if (rows.count <= 0)
+    return 0;
   Chunk chunk;
   chunk.n = plan.grid.elements ();
   chunk.halo = plan.decoder->interpolates () ? 1 : 0;

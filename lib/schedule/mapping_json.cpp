@@ -4,8 +4,8 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
-#include <sstream>
 
+#include "base/file.h"
 #include "base/text.h"
 #include "schedule/json_forms.h"
 
@@ -188,12 +188,11 @@ Mapping::to_json () const
 Result<Mapping>
 Mapping::load (const std::string &path)
 {
-  std::ifstream file (path, std::ios::binary);
-  std::ostringstream text;
-  if (!file || !(text << file.rdbuf ()))
-    return Error{"the mapping file " + in_quotes (path, 200) +
-                 " cannot be read: " + std::strerror (errno)};
-  auto mapping = from_json (text.str ());
+  const auto text = read_file (path, kMaxJsonSize);
+  if (!text)
+    return Error{
+        "mapping file " + in_quotes (path, 200) + ": " + text.error ().message};
+  auto mapping = from_json (*text);
   if (!mapping)
     return Error{
         "file " + in_quotes (path, 200) + ": " + mapping.error ().message};

@@ -3,12 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cerrno>
-#include <cstdio>
-#include <memory>
 #include <numeric>
-#include <system_error>
 
+#include "base/file.h"
 #include "base/text.h"
 #include "schedule/schedule.h"
 
@@ -225,28 +222,6 @@ read_preset (std::string_view preset)
   if (const auto read = read_settings (pieces, parts); !read)
     return read.error ();
   return Schedule::make (std::move (parts));
-}
-
-/** Up to @p limit + 1 bytes of a file, so that the caller can tell when there
- * are too many. */
-Result<std::string>
-read_file (const std::string &path, std::size_t limit)
-{
-  const auto failure = [] (const char *what) {
-    return Error{
-        std::string (what) + ": " + std::generic_category ().message (errno)};
-  };
-  const std::unique_ptr<std::FILE, int (*) (std::FILE *)> file (
-      std::fopen (path.c_str (), "rb"), std::fclose);
-  if (!file)
-    return failure ("it cannot be opened");
-
-  std::string content (limit + 1, '\0');
-  content.resize (
-      std::fread (content.data (), 1, content.size (), file.get ()));
-  if (std::ferror (file.get ()) != 0)
-    return failure ("it cannot be read");
-  return content;
 }
 
 Result<Schedule>

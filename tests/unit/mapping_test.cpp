@@ -283,8 +283,10 @@ TEST (MappingJson, OfAFile)
   ASSERT_TRUE (read.ok ()) << read.error ().message;
   EXPECT_EQ (*read, mapping);
   EXPECT_EQ (Mapping::load ("/no/such/file").error ().message,
-      "the mapping file '/no/such/file' cannot be read: No such file or "
+      "mapping file '/no/such/file': it cannot be opened: No such file or "
       "directory");
+  EXPECT_NE (Mapping::load ("/dev/zero").error ().message.find ("more than"),
+      std::string::npos);
 }
 
 TEST (StreamSetup, CarriesAMappingBesideTheSchedule)

@@ -267,7 +267,7 @@ install_settings (GObjectClass *klass)
       g_param_spec_double ("gain", "Gain",
           "Factor on the light of a slot (method decode); 0: white in a slot "
           "is white out",
-          0.0, G_MAXDOUBLE, DEFAULT_GAIN, kReadWrite));
+          0.0, ExtractOptions::kMaxGain, DEFAULT_GAIN, kReadWrite));
   /**
    * codedexposure-demux:bits:
    *

@@ -106,7 +106,8 @@ Worker::begin (guint run)
   const auto pattern = Pattern::parse (
       settings_.pattern.empty () ? live_grating ().text () : settings_.pattern);
   const LiveMoire::Options options{
-      .period = pattern ? pattern->period : live_grating ().period};
+      .period = pattern ? pattern->period : live_grating ().period,
+      .bits = settings_.bits};
   Result<LiveMoire> live =
       LiveMoire::make (centred_mapping (geometry_.camera, geometry_.mirrors,
                            settings_.stage.pixels_per_mirror),

@@ -56,10 +56,11 @@ check_options (const ExtractOptions &options, int type_bits)
                  " of pixels that have " + std::to_string (type_bits) +
                  ": give 1 to " + std::to_string (type_bits) +
                  ", or 0 for all of them"};
-  if (!std::isfinite (options.gain) || options.gain < 0.0)
-    return Error{"gain " + std::to_string (options.gain) +
-                 " is not a factor on light: give a positive number, or 0 for "
-                 "the gain that keeps white white"};
+  if (!(options.gain >= 0.0 && options.gain <= ExtractOptions::kMaxGain))
+    return Error{"gain " + real_text (options.gain) +
+                 " is not a factor on light: give a positive number up to " +
+                 real_text (ExtractOptions::kMaxGain) +
+                 ", or 0 for the gain that keeps white white"};
   const auto targets = extract_targets ();
   if (!options.target.empty () &&
       std::ranges::find (targets, options.target) == targets.end ())

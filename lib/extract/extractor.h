@@ -28,9 +28,11 @@ Result<Method> parse_method (std::string_view name);
 
 /** How to extract; the zero value is the default everywhere. */
 struct ExtractOptions {
+  static constexpr double kMaxGain = 1e6;
+
   Method method = Method::kAuto;
   /** Factor on the light of a slot (decode only); 0: white in a slot is white
-   * out, i.e. Schedule::white_slots (). */
+   * out, i.e. Schedule::white_slots (). Up to kMaxGain. */
   double gain = 0.0;
   /** Significant bits of a pixel, 1..8 or 1..16; 0: all that the type has. */
   int bits = 0;

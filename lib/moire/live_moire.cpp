@@ -6,7 +6,6 @@
 #include <cassert>
 #include <cmath>
 #include <complex>
-#include <limits>
 #include <numbers>
 #include <optional>
 #include <string>
@@ -285,8 +284,7 @@ LiveMoire::State::find_grating (Phasors &phasors, const char *name)
   return Error{std::string ("no grating is seen in ") + name + ": show " +
                std::to_string (options.period) +
                "-mirror stripes, bring the mirrors into focus, and set "
-               "magnification and turn to what is expected within " +
-               std::to_string (int (options.search * 100 + 0.5)) + " %"};
+               "magnification and turn near to what is expected"};
 }
 
 Plane
@@ -469,9 +467,11 @@ LiveMoire::State::solve (ImageView<const Pixel> frame)
     for (std::size_t i = 0; i < phasors->at.size (); i++)
       shown += phasors->shows (i);
   reading.coverage = double (shown) / double (x.at.size () + y.at.size ());
+  const int bits = options.bits > 0 ? options.bits : 8 * int (sizeof (Pixel));
   for (int row = 0; row < frame.height; row++)
-    reading.saturated += std::uint64_t (std::count (frame.row (row),
-        frame.row (row) + frame.width, std::numeric_limits<Pixel>::max ()));
+    reading.saturated += std::uint64_t (
+        std::count_if (frame.row (row), frame.row (row) + frame.width,
+            [largest = (1 << bits) - 1] (Pixel p) { return p >= largest; }));
   return reading;
 }
 

@@ -42,9 +42,7 @@ class LiveMoire
 public:
   struct Options {
     int period = 4; ///< mirrors, as in live_grating ()
-    /** Largest deviation from the expected mapping that is searched, as a
-     * part in magnification, or radians. */
-    double search = 0.05;
+    int bits = 0;   ///< significant ones of a pixel; 0: all of its type
   };
 
   /** @p expected  where the camera is thought to stand; a Mapping (Extent) of

@@ -44,8 +44,8 @@ expose (const Schedule &schedule, int width, int height, const Scene &scene)
         light += scene (x, y, s) * (code.open (schedule.element_at (x, y), s)
                                            ? 1.0
                                            : schedule.leak ());
-      coded.at (x, y) = Pixel (
-          std::clamp (std::round (light / schedule.white_slots ()), 0.0, white));
+      coded.at (x, y) = Pixel (std::clamp (
+          std::round (light / schedule.white_slots ()), 0.0, white));
     }
   }
   return coded;
@@ -283,6 +283,7 @@ TEST (Extract, WhatCannotBeIsRefusedByNameRuleAndRemedy)
   EXPECT_NE (refusal ({.bits = 9}).find ("bits 9"), std::string::npos);
   EXPECT_NE (refusal ({.gain = -1.0}).find ("gain -1"), std::string::npos);
   EXPECT_NE (refusal ({.gain = NAN}).find ("gain"), std::string::npos);
+  EXPECT_NE (refusal ({.gain = 1e308}).find ("gain 1e+308"), std::string::npos);
   EXPECT_NE (refusal ({.target = "z80"}).find ("'z80'"), std::string::npos);
   EXPECT_NE (refusal ({}, "sequential:16x16").find ("no cell of 16x16"),
       std::string::npos);

@@ -110,6 +110,24 @@ TEST (LiveMoire, FringesVanishWhereAllIsAligned)
       ASSERT_NEAR (phase.at (x, y), 2 * M_PI * (0.7 - 0.5) / 4, 0.15);
 }
 
+TEST (LiveMoire, CountsPixelsAtTheLargestOfTheirBits)
+{
+  MoireBench bench ({}, 0.5, kSize);
+  const auto frame = bench.frame (live_grating (), 0);
+  Image<std::uint16_t> deep (kSize.width, kSize.height);
+  for (int y = 0; y < kSize.height; y++)
+    for (int x = 0; x < kSize.width; x++)
+      deep.at (x, y) = std::uint16_t (2 * frame.at (x, y));
+  for (int x = 0; x < 5; x++)
+    deep.at (x, 0) = 1023;
+  for (const auto &[bits, saturated] : {std::pair (10, 5u), {0, 0u}}) {
+    auto live = LiveMoire::make (Mapping (kSize), {.bits = bits});
+    const auto reading = live->solve (std::as_const (deep).view ());
+    ASSERT_TRUE (reading.ok ()) << reading.error ().message;
+    EXPECT_EQ (reading->saturated, saturated);
+  }
+}
+
 TEST (LiveMoire, SaysWhereThereIsNoGrating)
 {
   MoireBench bench ({}, 0.5, kSize);

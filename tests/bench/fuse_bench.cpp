@@ -1,0 +1,87 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Fusion of frames of 768x576 in which everything moves: the table of speed in
+ * docs/fusion.md. */
+#include "fuse/fuser.h"
+
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include <benchmark/benchmark.h>
+
+#include "base/image.h"
+
+namespace
+{
+
+using namespace cexp;
+
+constexpr int kWidth = 768;
+constexpr int kHeight = 576;
+constexpr double kFrameRate = 25.0;
+constexpr int kFrames = 4;
+
+/** Waves of several lengths that go by at 1.3 px a slot. */
+double
+scene (double x, double y, int slot)
+{
+  const double at = x - 1.3 * slot;
+  return 128.0 + 50.0 * std::sin (0.31 * at + 0.17 * y) +
+         40.0 * std::sin (0.12 * at - 0.23 * y) +
+         20.0 * std::cos (0.9 * at) * std::sin (0.7 * y);
+}
+
+std::vector<Image<std::uint8_t>>
+coded_frames (const Schedule &schedule)
+{
+  std::vector<Image<std::uint8_t>> frames;
+  for (int i = 0; i < kFrames; i++) {
+    auto &frame = frames.emplace_back (kWidth, kHeight);
+    for (int y = 0; y < kHeight; y++)
+      for (int x = 0; x < kWidth; x++)
+        frame.at (x, y) = std::uint8_t (
+            scene (x, y, i * schedule.slots () + schedule.element_at (x, y)));
+  }
+  return frames;
+}
+
+void
+fuse (benchmark::State &state, const char *preset, FuseQuality quality)
+{
+  const Schedule schedule = Schedule::from_preset (preset).value ();
+  FuseOptions options;
+  options.quality = quality;
+  auto fuser =
+      Fuser<std::uint8_t>::make (schedule, kWidth, kHeight, options).value ();
+  const auto frames = coded_frames (schedule);
+  std::vector<Image<std::uint8_t>> slots (
+      std::size_t (schedule.slots ()), Image<std::uint8_t> (kWidth, kHeight));
+  std::vector<ImageView<std::uint8_t>> views;
+  for (auto &slot : slots)
+    views.push_back (slot.view ());
+
+  std::size_t next = 0;
+  for (auto _ : state) {
+    fuser.take (frames[next++ % frames.size ()].view ());
+    fuser.fuse (views);
+  }
+  state.counters["x_real_time"] = benchmark::Counter (
+      double (state.iterations ()) / kFrameRate, benchmark::Counter::kIsRate);
+}
+
+constexpr const char *kFour = "sequential:lattice:4/2";
+constexpr const char *kEight = "sequential:lattice:8/3,order=bit-reversal";
+
+#define FUSE_BENCHMARK(name, preset, quality)                                  \
+  BENCHMARK_CAPTURE (fuse, name, preset, quality)                              \
+      ->Unit (benchmark::kMillisecond)
+FUSE_BENCHMARK (fast_4, kFour, FuseQuality::kFast);
+FUSE_BENCHMARK (fast_8, kEight, FuseQuality::kFast);
+FUSE_BENCHMARK (balanced_4, kFour, FuseQuality::kBalanced);
+FUSE_BENCHMARK (balanced_8, kEight, FuseQuality::kBalanced);
+FUSE_BENCHMARK (best_4, kFour, FuseQuality::kBest);
+FUSE_BENCHMARK (best_8, kEight, FuseQuality::kBest);
+
+} // namespace
+
+BENCHMARK_MAIN ();

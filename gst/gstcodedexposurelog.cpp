@@ -78,10 +78,14 @@ frame_line (GstBuffer *frame, guint64 counted, const GstSegment &segment)
     set_time (line, "exposure_start_ns", meta->exposure_start);
     if (GST_CLOCK_TIME_IS_VALID (meta->exposure_duration))
       line["exposure_duration_ns"] = meta->exposure_duration;
+    if (GST_CLOCK_TIME_IS_VALID (meta->time_uncertainty))
+      line["time_uncertainty_ns"] = meta->time_uncertainty;
     line["locked"] = bool (meta->locked);
     line["slip"] = meta->slip;
     line["lost_before"] = meta->lost_before;
     line["saturated"] = meta->saturated;
+    if (meta->bits > 0)
+      line["bits"] = meta->bits;
   }
   line["flags"] = flag_names (frame);
   return line.dump ();

@@ -79,12 +79,14 @@ struct Names {
   const GQuark locked = g_quark_from_static_string ("locked");
   const GQuark slip = g_quark_from_static_string ("slip");
   const GQuark lost_before = g_quark_from_static_string ("lost-before");
+  const GQuark time_uncertainty =
+      g_quark_from_static_string ("time-uncertainty");
   const GQuark bits = g_quark_from_static_string ("bits");
   const GQuark saturated = g_quark_from_static_string ("saturated");
   const GQuark pattern = g_quark_from_static_string ("pattern");
 };
 
-constexpr gint kFields = 9; ///< that are always there: all but the pattern
+constexpr gint kFields = 10; ///< that are always there: all but the pattern
 
 const Names &
 names ()
@@ -118,6 +120,8 @@ rewrite_field (GQuark field, GValue *value, gpointer user_data)
     g_value_set_uint64 (value, meta.saturated);
   else if (field == name.bits)
     g_value_set_int (value, meta.bits);
+  else if (field == name.time_uncertainty)
+    g_value_set_uint64 (value, meta.time_uncertainty);
   return TRUE;
 }
 
@@ -131,7 +135,8 @@ write_fields (GstStructure *structure, const FrameMeta &meta)
       meta.exposure_duration, name.locked, G_TYPE_BOOLEAN, meta.locked,
       name.slip, G_TYPE_INT, meta.slip, name.lost_before, G_TYPE_UINT64,
       meta.lost_before, name.saturated, G_TYPE_UINT64, meta.saturated,
-      name.bits, G_TYPE_INT, meta.bits, nullptr);
+      name.bits, G_TYPE_INT, meta.bits, name.time_uncertainty, G_TYPE_UINT64,
+      meta.time_uncertainty, nullptr);
 }
 
 } // namespace
@@ -178,6 +183,8 @@ get_frame_meta (GstBuffer *buffer)
       G_TYPE_UINT64, &meta.lost_before, name.saturated, G_TYPE_UINT64,
       &meta.saturated, nullptr);
   gst_structure_id_get (structure, name.bits, G_TYPE_INT, &meta.bits, nullptr);
+  gst_structure_id_get (structure, name.time_uncertainty, G_TYPE_UINT64,
+      &meta.time_uncertainty, nullptr);
   return meta;
 }
 

@@ -25,6 +25,9 @@ struct FrameMeta {
    * of the slot. */
   GstClockTime exposure_start = GST_CLOCK_TIME_NONE;
   GstClockTime exposure_duration = GST_CLOCK_TIME_NONE;
+  /** By how much exposure_start may be wrong (95 of 100 frames keep below);
+   * none where nobody says. */
+  GstClockTime time_uncertainty = GST_CLOCK_TIME_NONE;
   /** The masks are known to be in phase with the exposure. */
   gboolean locked = FALSE;
   /** Slots by which the masks were found late (> 0) or early; 0 when locked. */

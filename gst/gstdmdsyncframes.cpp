@@ -350,6 +350,8 @@ take_frame (GstDmdSync *self, BufferPtr buffer)
   meta.slip = frame.phase.slip;
   meta.lost_before = frame.step.lost;
   meta.pattern = frame.sight.pattern;
+  meta.time_uncertainty = stream.uncertainty;
+  say_uncertainty (self, meta.frame, meta.exposure_start);
   stamp (self, frame.buffer.get (), meta);
   /* A camera source may use the memory again while it is still held here. */
   if (repeats)

@@ -139,8 +139,9 @@ stats (const SyncState &st)
       counters.frames_skipped, "frames-repeated", G_TYPE_UINT64,
       counters.frames_repeated, "slips", G_TYPE_UINT64, counters.slips,
       "clock-restarts", G_TYPE_UINT64, counters.clock_restarts, "clock-drift",
-      G_TYPE_DOUBLE, counters.clock_drift, "locked", G_TYPE_BOOLEAN,
-      gboolean (st.locked), nullptr);
+      G_TYPE_DOUBLE, counters.clock_drift, "time-uncertainty", G_TYPE_UINT64,
+      counters.time_uncertainty, "locked", G_TYPE_BOOLEAN, gboolean (st.locked),
+      nullptr);
 }
 
 /* Everything that the streaming thread writes. */

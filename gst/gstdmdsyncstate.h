@@ -62,6 +62,8 @@ struct Counters {
   guint64 slips = 0;
   guint64 clock_restarts = 0;
   gdouble clock_drift = 0; ///< ppm by which the camera's clock is fast
+  /** By how much PTS may be wrong; none: not known. */
+  GstClockTime time_uncertainty = GST_CLOCK_TIME_NONE;
 };
 
 /** Everything that follows from the caps. */
@@ -86,6 +88,8 @@ struct Stream {
   GstClockTime max_hold = GST_CLOCK_TIME_NONE; ///< none: as long as one likes
   DeviceClock device_clock;
   GstClockTime last_arrival = GST_CLOCK_TIME_NONE;
+  GstClockTime uncertainty = GST_CLOCK_TIME_NONE; ///< of the last frame's time
+  std::optional<bool> time_known; ///< what was said of it; none: nothing
   std::optional<PhaseWatch> watch;
   std::optional<PhaseLock> lock;
   BufferPtr last;              ///< a copy, for on-loss=repeat
@@ -145,6 +149,9 @@ GstClockTimeDiff moved_back (const SyncState &st);
  * told from on the frame, which is writable. */
 GstClockTime pipeline_time (GstDmdSync *self, GstBuffer *frame);
 
+/** Says it when the times of frames become known well enough, or no longer are.
+ */
+void say_uncertainty (GstDmdSync *self, guint64 number, GstClockTime pts);
 /** Says it when the stream ends long after its last frame. */
 void note_end (GstDmdSync *self);
 /** Says it when frames come at another rate than that of the caps. */

@@ -13,6 +13,11 @@ namespace
 /* Latency grows in steps of this: every one makes a pipeline ask again. */
 constexpr GstClockTime kJitterStep = GST_MSECOND;
 
+/* Times that may be wrong by more than this are not known; they are known again
+ * below it. The margin is against saying so over and over. */
+constexpr GstClockTime kKnown = 50 * GST_USECOND;
+constexpr GstClockTime kNotKnown = 2 * kKnown;
+
 GstStaticCaps device_caps = GST_STATIC_CAPS ("timestamp/x-camera-device");
 GstStaticCaps arrival_caps = GST_STATIC_CAPS ("timestamp/x-arrival");
 
@@ -95,6 +100,7 @@ pipeline_time (GstDmdSync *self, GstBuffer *frame)
 {
   SyncState &st = state (self);
   const GstClockTime device = GST_BUFFER_PTS (frame);
+  st.stream.uncertainty = GST_CLOCK_TIME_NONE;
   {
     const ObjectLock lock (self);
     if (st.settings.timestamp_at != TimestampAt::device_clock)
@@ -115,13 +121,35 @@ pipeline_time (GstDmdSync *self, GstBuffer *frame)
       ", %" G_GINT64_FORMAT " ns late; its clock drifts by %.1f ppm",
       GST_TIME_ARGS (device), GST_TIME_ARGS (arrival), clock.lateness (),
       clock.drift () * 1e6);
+  if (const auto uncertainty = clock.uncertainty ())
+    st.stream.uncertainty = GstClockTime (*uncertainty);
   {
     const ObjectLock lock (self);
     st.counters.clock_restarts = clock.restarts ();
     st.counters.clock_drift = clock.drift () * 1e6;
+    st.counters.time_uncertainty = st.stream.uncertainty;
   }
   note_jitter (self, GstClockTime (clock.lateness ()));
   return GstClockTime (std::max<Nanoseconds> (0, time));
+}
+
+void
+say_uncertainty (GstDmdSync *self, guint64 number, GstClockTime pts)
+{
+  Stream &stream = state (self).stream;
+  if (!GST_CLOCK_TIME_IS_VALID (stream.last_arrival))
+    return;
+  const bool knew = stream.time_known.value_or (false);
+  const bool known = stream.uncertainty <= (knew ? kNotKnown : kKnown);
+  if (stream.time_known == known)
+    return;
+  stream.time_known = known;
+  gst_element_post_message (GST_ELEMENT (self),
+      gst_message_new_element (GST_OBJECT (self),
+          gst_structure_new ("dmdsync/time-uncertainty", "known",
+              G_TYPE_BOOLEAN, gboolean (known), "uncertainty", G_TYPE_UINT64,
+              stream.uncertainty, "frame", G_TYPE_UINT64, number, "pts",
+              G_TYPE_UINT64, pts, nullptr)));
 }
 
 void

@@ -2,11 +2,10 @@
 /* A camera's own clock, told by the pipeline's. */
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <optional>
-#include <vector>
 
+#include "clock/lower_edge.h"
 #include "schedule/timing.h"
 
 namespace cexp
@@ -19,11 +18,8 @@ namespace cexp
  * A frame arrives late by what is the same for all, exposure and transfer, and
  * by what differs, queues and schedulers. The latter only ever delays. So the
  * times that frames would have arrived at with none of it lie on a line below
- * all arrivals; of those lines, the one with the least sum of distances is
- * taken, which is an edge of the lower convex hull (Moon, Skelly and Towsley,
- * Estimation and removal of clock skew from network delay measurements, INFOCOM
- * 1999). No delay, however long, can pull it up, and it comes closer to the
- * truth with the number of frames, not its root.
+ * all arrivals, which LowerEdge estimates. No delay, however long, can pull it
+ * up, and it comes closer to the truth with the number of frames, not its root.
  *
  * The line is one through the last few thousand frames, so that it follows a
  * drift that changes within minutes. The common delay cannot be seen in it.
@@ -51,25 +47,19 @@ public:
 
   /** By how much the camera's clock is faster, as a part of it; 0 before there
    * are two frames. */
-  double drift () const { return -slope_ / (1 + slope_); }
+  double drift () const { return -line_.slope / (1 + line_.slope); }
   /** By how much the last frame arrived after its time, >= 0. */
   Nanoseconds lateness () const { return lateness_; }
+  /** What the error of the last frame's time stays below in 95 of 100 frames;
+   * none while there are too few to say. */
+  std::optional<Nanoseconds> uncertainty () const { return uncertainty_; }
   /** How often it began anew since it was made, the first time not counted. */
   std::uint64_t restarts () const { return restarts_; }
 
 private:
-  /* Relative to the first frame; delay grows as the camera's clock lags. */
-  struct Point {
-    double device;
-    double delay; // arrival - device
-  };
-
   void begin (Nanoseconds device, Nanoseconds arrival);
   bool is_anew (Nanoseconds device, Nanoseconds arrival) const;
-  void learn (Point point);
-  void forget_oldest ();
-  void add_to_hull (Point point);
-  void fit ();
+  void learn (LowerEdge::Point point);
   Nanoseconds told (Nanoseconds device) const;
 
   struct Mark {
@@ -80,10 +70,13 @@ private:
   std::optional<Mark> last_; // none: nothing was learned
   Nanoseconds origin_device_ = 0;
   Nanoseconds origin_arrival_ = 0;
-  std::vector<Point> points_; // one at least every kSpacing, the lowest there
-  std::vector<Point> hull_;
-  double slope_ = 0;  // of the delay
-  double height_ = 0; // of the line at device time 0
+  /* Delays, arrival - device, by device time, both since the first frame; they
+   * grow as the camera's clock lags. One point at least every kSpacing, the
+   * lowest there. */
+  LowerEdge edge_{kMostDrift};
+  LowerEdge::Line line_;
+  std::optional<double> deviation_; // of the line at the last frame
+  std::optional<Nanoseconds> uncertainty_;
   Nanoseconds lateness_ = 0;
   std::uint64_t restarts_ = 0;
 };

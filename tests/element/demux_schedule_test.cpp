@@ -539,4 +539,24 @@ TEST_F (DemuxSaturation, IsJudgedByTheSignificantBits)
   EXPECT_EQ (begun->pixels, 1u);
 }
 
+TEST_F (DemuxSaturation, IsJudgedByTheBitsThatFramesSay)
+{
+  demux = std::make_unique<ElementHarness> (
+      "codedexposure-demux schedule=sequential:2x2");
+  demux->set_caps (gray_caps (24, 24, "25/1", "GRAY16_LE"));
+  const auto image =
+      draw<std::uint16_t> (24, 24, [] (int, int) { return 1023; });
+  const int bits[] = {12, 10, 0};
+  const guint64 saturated[] = {0, 24 * 24, 0};
+  for (int k = 0; k < 3; k++) {
+    BufferPtr frame = frame_of (image, GstClockTime (k) * kPeriod);
+    set_frame_meta (frame.get (), {.frame = guint64 (k), .bits = bits[k]});
+    ASSERT_EQ (demux->push (std::move (frame)), GST_FLOW_OK);
+    for (int slot = 0; slot < 4; slot++)
+      EXPECT_EQ (
+          get_frame_meta (demux->pull ().get ())->saturated, saturated[k])
+          << bits[k] << " bits";
+  }
+}
+
 } // namespace

@@ -153,6 +153,22 @@ TEST (DmdsyncLoss, NobodyReadsTheCamerasMemoryWhenItIsGone)
   EXPECT_EQ (first_pixel (kept, caps), 77);
 }
 
+/** A frame as a camera packs it; aravissrc fills rows up to four bytes. */
+BufferPtr
+packed_frame (MonoFormat format, const Image<std::uint16_t> &values)
+{
+  const gsize row = (row_bytes (format, values.width ()) + 3) / 4 * 4;
+  BufferPtr packed (gst_buffer_new_and_alloc (row * gsize (values.height ())));
+  GstMapInfo map;
+  EXPECT_TRUE (gst_buffer_map (packed.get (), &map, GST_MAP_WRITE));
+  EXPECT_TRUE (pack_mono (format, values.view (),
+      {map.data, int (row), values.height (), std::ptrdiff_t (row)})
+                   .ok ());
+  gst_buffer_unmap (packed.get (), &map);
+  GST_BUFFER_PTS (packed.get ()) = 0;
+  return packed;
+}
+
 TEST (DmdsyncLoss, PackedPixelsAreUnpackedWithoutAShift)
 {
   for (const MonoFormat format :
@@ -169,17 +185,7 @@ TEST (DmdsyncLoss, PackedPixelsAreUnpackedWithoutAShift)
       for (int y = 0; y < kSyncHeight; y++)
         for (int x = 0; x < width; x++)
           values.at (x, y) = std::uint16_t ((x * 37 + y * 211) & mask);
-      /* aravissrc fills rows up to four bytes. */
-      const gsize row = (row_bytes (format, width) + 3) / 4 * 4;
-      BufferPtr packed (gst_buffer_new_and_alloc (row * gsize (kSyncHeight)));
-      GstMapInfo map;
-      ASSERT_TRUE (gst_buffer_map (packed.get (), &map, GST_MAP_WRITE));
-      ASSERT_TRUE (pack_mono (format, values.view (),
-          {map.data, int (row), kSyncHeight, std::ptrdiff_t (row)})
-                       .ok ());
-      gst_buffer_unmap (packed.get (), &map);
-      GST_BUFFER_PTS (packed.get ()) = 0;
-      ASSERT_EQ (sync.push (std::move (packed)), GST_FLOW_OK);
+      ASSERT_EQ (sync.push (packed_frame (format, values)), GST_FLOW_OK);
       const BufferPtr out = sync.pull ();
       ASSERT_TRUE (out);
       const auto caps = sync.pad_caps ();
@@ -189,6 +195,44 @@ TEST (DmdsyncLoss, PackedPixelsAreUnpackedWithoutAShift)
           ASSERT_EQ (image.at (x, y), values.at (x, y)) << x << "," << y;
       EXPECT_EQ (get_frame_meta (out.get ())->bits, significant_bits (format));
     }
+}
+
+/* What is white in 10 or 12 bits is white to the demux, and nothing is whiter.
+ */
+TEST (DmdsyncLoss, PackedFramesAreDecodedWithinTheirBits)
+{
+  for (const MonoFormat format :
+      {MonoFormat::mono10_packed, MonoFormat::mono12_packed,
+          MonoFormat::mono10p, MonoFormat::mono12p}) {
+    SCOPED_TRACE (mono_format_text (format));
+    const int white = (1 << significant_bits (format)) - 1;
+    const std::string caps =
+        gray_caps (kSyncWidth, kSyncHeight, "25/1", "GRAY16_LE");
+    SyncHarness sync (std::string ("schedule=staircase:2x2 pixel-format=") +
+                      mono_format_text (format));
+    sync.set_caps (caps);
+    /* All light in slot 2: elements 2 and 3 are white. */
+    ASSERT_EQ (sync.push (packed_frame (format,
+                   draw<std::uint16_t> (kSyncWidth, kSyncHeight,
+                       [white] (int, int y) { return y % 2 ? white : 0; }))),
+        GST_FLOW_OK);
+
+    ElementHarness demux ("codedexposure-demux schedule=staircase:2x2 "
+                          "method=decode");
+    demux.set_caps (caps);
+    ASSERT_EQ (demux.push (sync.pull ()), GST_FLOW_OK);
+    for (int slot = 0; slot < 4; slot++) {
+      SCOPED_TRACE (slot);
+      const BufferPtr out = demux.pull ();
+      ASSERT_TRUE (out);
+      const auto image =
+          image_of<std::uint16_t> (out.get (), demux.pad_caps ().get ());
+      EXPECT_EQ (image.at (9, 9), slot == 2 ? white : 0);
+      const FrameMeta meta = *get_frame_meta (out.get ());
+      EXPECT_EQ (meta.bits, significant_bits (format));
+      EXPECT_EQ (meta.saturated, guint64 (kSyncWidth * kSyncHeight / 2));
+    }
+  }
 }
 
 TEST (DmdsyncLoss, APixelFormatThatDoesNotFitTheCapsIsAnError)

@@ -59,11 +59,27 @@ protected:
   GstClockTime arrival_ = 0;
 };
 
+/** What was said of the times last; none: nothing since. */
+std::optional<bool>
+times_are_known (SyncHarness &sync)
+{
+  std::optional<bool> known;
+  while (const auto said = sync.element_message ("dmdsync/time-uncertainty")) {
+    gboolean value = FALSE;
+    EXPECT_TRUE (gst_structure_get_boolean (
+        gst_message_get_structure (said.get ()), "known", &value));
+    known = value;
+  }
+  return known;
+}
+
 TEST_P (DmdsyncDeviceClock, PtsIsTheStartOfTheExposureWithin50Microseconds)
 {
   std::mt19937 random (1);
   std::uniform_int_distribution<GstClockTime> delay (0, 5 * kMs);
-  const int settled = int (170 * GST_SECOND / GstClockTime (rate_.period ()));
+  const int settled = int (90 * GST_SECOND / GstClockTime (rate_.period ()));
+  int known_from = -1;
+  int beyond = 0;
   for (int k = 0; k < settled + 500; k++) {
     const BufferPtr frame = send (k, delay (random));
     ASSERT_TRUE (frame);
@@ -72,15 +88,25 @@ TEST_P (DmdsyncDeviceClock, PtsIsTheStartOfTheExposureWithin50Microseconds)
     ASSERT_EQ (
         GST_BUFFER_DURATION (frame.get ()), GstClockTime (rate_.period ()));
     ASSERT_EQ (GST_BUFFER_OFFSET (frame.get ()), guint64 (k));
-    if (k < settled)
-      continue;
-    ASSERT_LE (
-        std::abs (GST_CLOCK_DIFF (exposure (k), GST_BUFFER_PTS (frame.get ()))),
-        50 * GST_USECOND)
-        << k;
+    const GstClockTime uncertainty =
+        get_frame_meta (frame.get ())->time_uncertainty;
+    ASSERT_EQ (GST_CLOCK_TIME_IS_VALID (uncertainty), k >= 7);
+    if (const auto said = times_are_known (sync_)) {
+      ASSERT_EQ (*said, known_from < 0 && k > 0) << k;
+      known_from = *said ? k : -1;
+    }
+    const auto error = GstClockTime (std::abs (
+        GST_CLOCK_DIFF (exposure (k), GST_BUFFER_PTS (frame.get ()))));
+    beyond += known_from >= 0 && error > uncertainty;
+    ASSERT_TRUE (known_from < 0 || uncertainty <= 100 * GST_USECOND) << k;
+    ASSERT_TRUE (k < settled || error <= 50 * GST_USECOND) << k;
   }
+  ASSERT_GE (known_from, 0);
+  EXPECT_LT (known_from, settled / 2);
+  EXPECT_LT (beyond, settled / 5);
   EXPECT_EQ (sync_.counter ("frames-lost"), 0u);
   EXPECT_EQ (sync_.counter ("clock-restarts"), 0u);
+  EXPECT_LE (sync_.counter ("time-uncertainty"), 25 * GST_USECOND);
   /* Of the first frames, the times themselves were not known as well. */
   const GstClockTime latency = gst_harness_query_latency (sync_.get ());
   EXPECT_GE (latency, GstClockTime (rate_.period ()) + 5 * kMs);

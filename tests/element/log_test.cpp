@@ -113,6 +113,8 @@ TEST_F (LogTest, WritesWhatTheMetaSays)
   meta.slip = -1;
   meta.lost_before = 2;
   meta.saturated = 5;
+  meta.bits = 12;
+  meta.time_uncertainty = 47'000;
   set_frame_meta (buffer.get (), meta);
   GST_BUFFER_FLAG_SET (buffer.get (), GST_BUFFER_FLAG_DISCONT);
   GST_BUFFER_FLAG_SET (buffer.get (), GST_BUFFER_FLAG_CORRUPTED);
@@ -121,7 +123,8 @@ TEST_F (LogTest, WritesWhatTheMetaSays)
   ASSERT_EQ (lines ().size (), 1u);
   EXPECT_EQ (lines ()[0], Json::parse (R"({"frame": 7, "pts_ns": 80000000,
       "exposure_start_ns": 80000000, "exposure_duration_ns": 39200000,
-      "locked": true, "slip": -1, "lost_before": 2, "saturated": 5,
+      "time_uncertainty_ns": 47000, "locked": true, "slip": -1,
+      "lost_before": 2, "saturated": 5, "bits": 12,
       "flags": ["discont", "corrupted"]})"));
 }
 

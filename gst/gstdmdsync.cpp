@@ -44,6 +44,13 @@
  * is a duplicate and dropped; one at a time that was passed is late, and goes
  * on with DISCONT.
  *
+ * ## A camera that goes away
+ *
+ * A source that ends in an error, as aravissrc does when its camera is silent
+ * for two seconds, ends the pipeline. With #dmdsync:reconnect it is stopped and
+ * started anew instead, while the DMD runs on; what is behind sees a loss.
+ * Errors before the first frame, and those of other elements, stay errors.
+ *
  * ## Phase
  *
  * #dmdsync:slip-observable says whether a DMD that slips by whole slots can be
@@ -65,9 +72,10 @@
  *
  * Every frame bears the custom meta `CodedExposureFrame`. Element messages are
  * `dmdsync/frames-lost`, `dmdsync/frame-late`, `dmdsync/frame-dropped`,
- * `dmdsync/slip`, `dmdsync/locked`, `dmdsync/pattern-shown` and
- * `dmdsync/pattern-over`. The schedule goes downstream as stream
- * tag; another one in the stream is replaced, with a warning. QoS events go no
+ * `dmdsync/slip`, `dmdsync/locked`, `dmdsync/camera-lost`,
+ * `dmdsync/camera-back`, `dmdsync/time-uncertainty`, `dmdsync/pattern-shown`
+ * and `dmdsync/pattern-over`. The schedule goes downstream as stream tag;
+ * another one in the stream is replaced, with a warning. QoS events go no
  * further upstream: some camera sources stop their stream for them.
  *
  * ## Example pipelines
@@ -187,19 +195,26 @@ change_state (GstElement *element, GstStateChange transition)
     return GST_STATE_CHANGE_FAILURE;
   if (transition == GST_STATE_CHANGE_NULL_TO_READY && !sync::open_device (self))
     return GST_STATE_CHANGE_FAILURE;
-  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED)
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED) {
     begin_run (self);
-  /* First, because the streaming thread may be waiting for the DMD. */
-  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY)
+    sync::keep_source (self);
+  }
+  /* First, because the streaming thread may be waiting for the DMD, and who
+   * starts the source anew for that thread. */
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
     sync::park (self);
+    sync::release_source (self);
+  }
 
   const GstStateChangeReturn changed =
       GST_ELEMENT_CLASS (gst_dmd_sync_parent_class)
           ->change_state (element, transition);
 
   if (transition == GST_STATE_CHANGE_READY_TO_PAUSED &&
-      changed == GST_STATE_CHANGE_FAILURE)
+      changed == GST_STATE_CHANGE_FAILURE) {
     sync::park (self);
+    sync::release_source (self);
+  }
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY)
     forget_stream (self);
   if (transition == GST_STATE_CHANGE_READY_TO_NULL)

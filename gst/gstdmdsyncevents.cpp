@@ -215,6 +215,10 @@ sink_event (GstBaseTransform *trans, GstEvent *event)
 {
   auto *self = GST_DMD_SYNC (trans);
   SyncState &st = state (self);
+  if (is_of_return (self, event)) {
+    gst_event_unref (event);
+    return TRUE;
+  }
   switch (GST_EVENT_TYPE (event)) {
   case GST_EVENT_STREAM_START:
     /* Nothing flows before the masks are on the device: not even caps, for

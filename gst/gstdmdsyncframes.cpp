@@ -302,12 +302,34 @@ watch_phase (GstDmdSync *self, Frame &frame)
   say_phase (self, frame);
 }
 
+/** Numbers the frame; returns the PTS that it came with, by the pipeline's
+ * clock. */
+GstClockTime
+place (GstDmdSync *self, Frame &frame)
+{
+  Stream &stream = state (self).stream;
+  GstBuffer *buffer = frame.buffer.get ();
+  const GstClockTime came = GST_BUFFER_PTS (buffer);
+  GstClockTime time = 0;
+  if (!take_return (self, buffer, frame.step, time)) {
+    frame.step = stream.sequence->take (
+        Nanoseconds (came), GST_BASE_TRANSFORM (self)->segment.rate < 0);
+    if (frame.step.arrival == Arrival::restarted)
+      stream.device_clock.reset ();
+    time = pipeline_time (self, buffer);
+    watch_rate (self, came);
+  }
+  if (frame.step.arrival != Arrival::late &&
+      frame.step.arrival != Arrival::duplicate)
+    stream.last_time = time;
+  return time;
+}
+
 GstFlowReturn
 take_frame (GstDmdSync *self, BufferPtr buffer)
 {
   SyncState &st = state (self);
   Stream &stream = st.stream;
-  const GstClockTime came = GST_BUFFER_PTS (buffer.get ());
   GstClockTimeDiff back = 0;
   bool repeats = false;
   {
@@ -317,14 +339,9 @@ take_frame (GstDmdSync *self, BufferPtr buffer)
     st.counters.frames_in++;
   }
 
-  const GstSegment &segment = GST_BASE_TRANSFORM (self)->segment;
   Frame frame;
   frame.buffer.reset (gst_buffer_make_writable (buffer.release ()));
-  frame.step = stream.sequence->take (Nanoseconds (came), segment.rate < 0);
-  if (frame.step.arrival == Arrival::restarted)
-    stream.device_clock.reset ();
-  const GstClockTime time = pipeline_time (self, frame.buffer.get ());
-  watch_rate (self, came);
+  const GstClockTime time = place (self, frame);
   const bool too_early = back > 0 && GstClockTime (back) > time;
   frame.pts = too_early ? 0 : time - GstClockTime (back);
 

@@ -42,23 +42,14 @@ whole_size (const Stream &stream)
 GstClockTime
 ring_time (GstDmdSync *self)
 {
-  constexpr int kMostElements = 8;
-  ObjectPtr<GstPad> pad (
-      GST_PAD (gst_object_ref (GST_BASE_TRANSFORM_SINK_PAD (self))));
-  for (int k = 0; k < kMostElements && pad; k++) {
-    const ObjectPtr<GstPad> peer (gst_pad_get_peer (pad.get ()));
-    const ObjectPtr<GstElement> element (
-        peer ? gst_pad_get_parent_element (peer.get ()) : nullptr);
-    if (!element)
-      break;
-    if (g_object_class_find_property (
-            G_OBJECT_GET_CLASS (element.get ()), "num-arv-buffers")) {
-      gint buffers = 0;
-      g_object_get (element.get (), "num-arv-buffers", &buffers, nullptr);
-      const FrameRate rate = state (self).stream.time->rate;
-      return GstClockTime (rate.time_of (std::max (0, buffers / 2 - 1)));
-    }
-    pad.reset (gst_element_get_static_pad (element.get (), "sink"));
+  for (const auto &element : elements_before (self)) {
+    if (!g_object_class_find_property (
+            G_OBJECT_GET_CLASS (element.get ()), "num-arv-buffers"))
+      continue;
+    gint buffers = 0;
+    g_object_get (element.get (), "num-arv-buffers", &buffers, nullptr);
+    const FrameRate rate = state (self).stream.time->rate;
+    return GstClockTime (rate.time_of (std::max (0, buffers / 2 - 1)));
   }
   return GST_CLOCK_TIME_NONE;
 }

@@ -21,6 +21,7 @@ enum {
   PROP_ON_UNLOCK,
   PROP_MAX_HOLD,
   PROP_PIXEL_FORMAT,
+  PROP_RECONNECT,
   PROP_LOCKED,
   PROP_SLIP_OBSERVABLE,
   PROP_FRAMES_IN,
@@ -41,6 +42,7 @@ enum {
 #define DEFAULT_ON_UNLOCK int (OnUnlock::keep)
 #define DEFAULT_MAX_HOLD GST_CLOCK_TIME_NONE
 #define DEFAULT_PIXEL_FORMAT ""
+#define DEFAULT_RECONNECT 0
 
 /* Longer offsets are slips of the pen. */
 constexpr gint64 kMaxOffset = 3600 * GST_SECOND;
@@ -116,6 +118,10 @@ set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
       settings.pixel_format = format ? format : DEFAULT_PIXEL_FORMAT;
       break;
     }
+    case PROP_RECONNECT:
+      if (may_change (self, pspec, GST_STATE_READY))
+        settings.reconnect = g_value_get_uint (value);
+      break;
     default:
       G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
     }
@@ -138,8 +144,9 @@ stats (const SyncState &st)
       counters.frames_early, "frames-skipped", G_TYPE_UINT64,
       counters.frames_skipped, "frames-repeated", G_TYPE_UINT64,
       counters.frames_repeated, "slips", G_TYPE_UINT64, counters.slips,
-      "clock-restarts", G_TYPE_UINT64, counters.clock_restarts, "clock-drift",
-      G_TYPE_DOUBLE, counters.clock_drift, "time-uncertainty", G_TYPE_UINT64,
+      "reconnects", G_TYPE_UINT64, counters.reconnects, "clock-restarts",
+      G_TYPE_UINT64, counters.clock_restarts, "clock-drift", G_TYPE_DOUBLE,
+      counters.clock_drift, "time-uncertainty", G_TYPE_UINT64,
       counters.time_uncertainty, "locked", G_TYPE_BOOLEAN, gboolean (st.locked),
       nullptr);
 }
@@ -198,6 +205,8 @@ get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
     return g_value_set_uint64 (value, settings.max_hold);
   case PROP_PIXEL_FORMAT:
     return g_value_set_string (value, settings.pixel_format.c_str ());
+  case PROP_RECONNECT:
+    return g_value_set_uint (value, settings.reconnect);
   default:
     get_report (object, id, value, pspec);
   }
@@ -308,6 +317,19 @@ install_settings (GObjectClass *klass)
           "shift, and the significant bits said in the frame's meta; empty: "
           "what the caps say",
           DEFAULT_PIXEL_FORMAT, kReady));
+  /**
+   * dmdsync:reconnect:
+   *
+   * What becomes of a stream whose camera is unplugged or stops.
+   *
+   * Since: 0.1
+   */
+  g_object_class_install_property (klass, PROP_RECONNECT,
+      g_param_spec_uint ("reconnect", "Reconnect",
+          "How often, in a row, a source is started anew that ended in an "
+          "error after its first frame, a second or more apart; 0: never, its "
+          "error ends the pipeline",
+          0, G_MAXUINT, DEFAULT_RECONNECT, kReady));
 }
 
 void

@@ -8,6 +8,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <gst/gst.h>
 #include <gst/video/video.h>
@@ -23,6 +24,7 @@
 #include "gstdmdsync.h"
 #include "gstleasedmemory.h"
 #include "gstraii.h"
+#include "gstsourcekeeper.h"
 #include "schedule/schedule.h"
 
 GST_DEBUG_CATEGORY_EXTERN (dmdsync_debug);
@@ -46,6 +48,7 @@ struct Settings {
   OnUnlock on_unlock = OnUnlock::keep;
   GstClockTime max_hold = GST_CLOCK_TIME_NONE; ///< none: as the source has it
   std::string pixel_format;                    ///< empty: as the caps say
+  guint reconnect = 0; ///< tries to start a source that failed anew
 };
 
 struct Counters {
@@ -61,6 +64,7 @@ struct Counters {
   guint64 frames_spoilt = 0; ///< of these, copied too late for certainty
   guint64 slips = 0;
   guint64 clock_restarts = 0;
+  guint64 reconnects = 0;  ///< times that the camera came back
   gdouble clock_drift = 0; ///< ppm by which the camera's clock is fast
   /** By how much PTS may be wrong; none: not known. */
   GstClockTime time_uncertainty = GST_CLOCK_TIME_NONE;
@@ -88,6 +92,7 @@ struct Stream {
   GstClockTime max_hold = GST_CLOCK_TIME_NONE; ///< none: as long as one likes
   DeviceClock device_clock;
   GstClockTime last_arrival = GST_CLOCK_TIME_NONE;
+  GstClockTime last_time = 0; ///< of the newest frame, by the pipeline's clock
   GstClockTime uncertainty = GST_CLOCK_TIME_NONE; ///< of the last frame's time
   std::optional<bool> time_known; ///< what was said of it; none: nothing
   std::optional<PhaseWatch> watch;
@@ -128,6 +133,9 @@ struct SyncState {
   std::atomic<bool> uploading = false;
   std::atomic<bool> warned_held = false; ///< in this run
 
+  /** Null: none that is to be started anew. Changed like the runner. */
+  std::shared_ptr<SourceKeeper> source;
+
   /* Sink pad's stream lock. */
   Stream stream;
 
@@ -156,6 +164,21 @@ void say_uncertainty (GstDmdSync *self, guint64 number, GstClockTime pts);
 void note_end (GstDmdSync *self);
 /** Says it when frames come at another rate than that of the caps. */
 void watch_rate (GstDmdSync *self, GstClockTime time);
+
+/* A camera that goes away and comes back. */
+/** What the frames come through, the nearest first, the source last. */
+std::vector<ObjectPtr<GstElement>> elements_before (GstDmdSync *self);
+/** Sees to it, where the settings say so, that a source that fails is started
+ * anew. */
+void keep_source (GstDmdSync *self);
+void release_source (GstDmdSync *self);
+/** Whether @p event is of the end of a camera that is coming back, or of its
+ * return: who stands behind hears of neither. */
+bool is_of_return (GstDmdSync *self, GstEvent *event);
+/** Where @p frame is the first one of a camera that came back, its place among
+ * the others and its PTS by the pipeline's clock; false for all others. */
+bool take_return (
+    GstDmdSync *self, GstBuffer *frame, FrameStep &step, GstClockTime &time);
 
 /* Memory and pixels of frames. */
 /** What follows from the caps; false with @p why. */

@@ -29,6 +29,16 @@ FrameSequence::restart (Nanoseconds time, Arrival arrival)
 }
 
 FrameStep
+FrameSequence::take_after (Nanoseconds time, std::uint64_t lost)
+{
+  next_number_ += lost;
+  FrameStep step =
+      restart (time, lost > 0 ? Arrival::after_loss : Arrival::next);
+  step.lost = lost;
+  return step;
+}
+
+FrameStep
 FrameSequence::take (Nanoseconds time, bool reverse)
 {
   if (!last_)

@@ -45,6 +45,9 @@ public:
 
   /** @p time of the frame, any epoch; times fall when @p reverse. */
   FrameStep take (Nanoseconds time, bool reverse = false);
+  /** A frame of a camera that was away, at a time of another beginning: it
+   * follows, @p lost frames later. */
+  FrameStep take_after (Nanoseconds time, std::uint64_t lost);
   /** The next frame follows at whatever time it has: after a flush, or a new
    * segment. Numbers go on. */
   void resync ();

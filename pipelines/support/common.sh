@@ -13,7 +13,7 @@ scene_options='input input-rate scene pattern size frame-rate bits'
 bench_options='schedule psf-sigma full-well read-noise gain seed shift-x shift-y
   rotation scale'
 source_options="$scene_options $bench_options frames camera features source
-  device exposure trigger trigger-line trigger-edge pixel-format"
+  device exposure trigger trigger-line trigger-edge pixel-format reconnect"
 
 scene_help='Scene, one frame of it a slot of the exposure:
   --input FILE        any video; each of its frames becomes a slot
@@ -40,6 +40,7 @@ camera_help='Instead of the bench:
   --exposure US       exposure time, microseconds [as the camera has it]
   --pixel-format F    Mono8, Mono12, Mono12Packed ... [Mono8; Mono16]
   --features "A=1 ..."  camera features beyond these
+  --reconnect N       tries to start a camera that went away anew [0]
   --device DEV        the DMD [sim:bench on the bench]
   --source "GST"      any GStreamer source of coded frames'
 common_help='  --print             show the pipeline instead of running it
@@ -154,6 +155,7 @@ check_options ()
   check_option fuse 'fast|balanced|best' 'fast, balanced or best'
   check_option trigger 'dmd|camera' 'dmd or camera'
   check_option trigger-edge 'rising|falling' 'rising or falling'
+  check_option reconnect '[0-9]{1,9}' 'a number of tries'
   check_option exposure '[0-9]*\.?[0-9]+' 'a time in microseconds'
   check_option pixel-format 'Mono(8|16|1[02](Packed|p)?)' \
     'Mono8, Mono16, Mono10 or Mono12, these also with Packed or p'
@@ -370,7 +372,7 @@ coded_source ()
     local device=${opt[device]:-} timestamps=''
     is_set camera || is_set source || device=${device:-sim:bench}
     ! is_set camera \
-      || timestamps="timestamp-at=device-clock $(properties pixel-format)"
+      || timestamps="timestamp-at=device-clock $(properties pixel-format reconnect)"
     printf 'dmdsync name=sync device=%s schedule=%s %s! ' \
       "$(quoted "$device")" "$(quoted "$(schedule)")" "$timestamps"
   fi

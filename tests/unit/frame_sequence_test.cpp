@@ -131,3 +131,16 @@ TEST (FrameSequence, ResyncKeepsTheNumbersAndExpectsNothing)
   expect_steps (sequence,
       {{9000 * kMs, Arrival::first, 2, 0}, {9040 * kMs, Arrival::next, 3, 0}});
 }
+
+TEST (FrameSequence, FollowsACameraThatWasAway)
+{
+  FrameSequence sequence ({25, 1});
+  expect_steps (
+      sequence, {{0, Arrival::first, 0, 0}, {40 * kMs, Arrival::next, 1, 0}});
+  const FrameStep back = sequence.take_after (7, 50);
+  EXPECT_EQ (back.arrival, Arrival::after_loss);
+  EXPECT_EQ (back.number, 52u);
+  EXPECT_EQ (back.lost, 50u);
+  expect_steps (sequence, {{40 * kMs + 7, Arrival::next, 53, 0}});
+  EXPECT_EQ (sequence.take_after (1, 0).arrival, Arrival::next);
+}

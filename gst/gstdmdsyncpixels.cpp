@@ -153,13 +153,17 @@ void
 keep_whole (GstDmdSync *self, GstBuffer *frame, guint64 number)
 {
   SyncState &st = state (self);
-  const GstClockTime time = st.stream.max_hold;
+  GstClockTime time = st.stream.max_hold;
   const bool ours = st.stream.format && is_packed (*st.stream.format);
   if (ours || !GST_CLOCK_TIME_IS_VALID (time))
     return;
   if (!st.keeper)
     st.keeper = std::make_unique<LeaseKeeper> (
         [self] (const Overdue &overdue) { say_held (self, overdue); });
+  /* Frames that came late stood in the ring all the while, and left that much
+   * less of it to the camera. */
+  time -=
+      std::min (time, GstClockTime (st.stream.device_clock.lateness ()) / 2);
   st.keeper->lend (frame, number, std::chrono::nanoseconds (time));
 }
 

@@ -4,8 +4,11 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <iterator>
 #include <mutex>
+#include <optional>
 #include <random>
+#include <sstream>
 #include <thread>
 #include <vector>
 
@@ -23,6 +26,9 @@ namespace
 
 /* Where a client says whether it wants the trigger. */
 constexpr guint32 kTriggerMode = 0x400;
+/* And what its lines do, one after the other. */
+constexpr guint32 kLineMode = 0x440, kLineSource = 0x444, kLineInverter = 0x448;
+constexpr guint32 kNextLine = 0x20;
 
 struct Unref {
   void operator() (gpointer object) const { g_object_unref (object); }
@@ -73,17 +79,41 @@ set_entries (std::string &xml, const std::string &enumeration,
   return true;
 }
 
-/* A feature that a client may set and nothing comes of: what a line of the
- * camera puts out goes nowhere here. */
+constexpr const char *kSelector = "LineSelector";
+
+/* A choice of one of @p values, whose place is the number at @p node. */
 std::string
-choice (const std::string &name, const std::vector<std::string> &values)
+choice (const std::string &name, const std::vector<std::string> &values,
+    const std::string &node)
 {
   std::string text = "<Enumeration Name=\"" + name + "\">\n";
   for (std::size_t k = 0; k < values.size (); k++)
     text += "<EnumEntry Name=\"" + values[k] + "\"><Value>" +
             std::to_string (k) + "</Value></EnumEntry>\n";
-  return text + "<pValue>" + name + "Value</pValue></Enumeration>\n" +
-         "<Integer Name=\"" + name + "Value\"><Value>0</Value></Integer>\n";
+  return text + "<pValue>" + name + "Value</pValue></Enumeration>\n" + node;
+}
+
+/* Which line is meant, the client keeps to itself. */
+std::string
+line_selector ()
+{
+  const std::string name = kSelector;
+  return choice (name, {"Line0", "Line1"},
+      "<Integer Name=\"" + name + "Value\"><Value>0</Value></Integer>\n");
+}
+
+/* A choice for each line, in registers from @p address on. */
+std::string
+line_choice (const std::string &name, const std::vector<std::string> &values,
+    guint32 address)
+{
+  return choice (name, values,
+      "<IntReg Name=\"" + name + "Value\"><Address>" +
+          std::to_string (address) + "</Address><pIndex Offset=\"" +
+          std::to_string (kNextLine) + "\">" + kSelector +
+          "Value</pIndex><Length>4</Length><AccessMode>RW</AccessMode>"
+          "<pPort>Device</pPort><Sign>Unsigned</Sign>"
+          "<Endianess>BigEndian</Endianess></IntReg>\n");
 }
 
 /* What the camera says of itself: Aravis' own description, with the formats and
@@ -112,10 +142,11 @@ describe ()
   const auto end = xml.rfind ("<Port Name");
   if (mode == xml.npos || end == xml.npos || mode > end)
     return Error{"the description of Aravis' fake camera lacks its trigger"};
-  xml.insert (end, choice ("LineSelector", {"Line0", "Line1"}) +
-                       choice ("LineMode", {"Input", "Output"}) +
-                       choice ("LineSource", {"Off", "ExposureActive"}) +
-                       choice ("LineInverter", {"false", "true"}));
+  xml.insert (end,
+      line_selector () +
+          line_choice ("LineMode", {"Input", "Output"}, kLineMode) +
+          line_choice ("LineSource", {"Off", "ExposureActive"}, kLineSource) +
+          line_choice ("LineInverter", {"false", "true"}, kLineInverter));
   xml.replace (mode, theirs.size (), "<Address>0x400</Address>");
   return xml;
 }
@@ -128,6 +159,28 @@ monotonic_now ()
 
 } // namespace
 
+std::string
+camera_settings_text (const CameraSettings &settings)
+{
+  std::ostringstream text;
+  text << settings.width << "x" << settings.height << " "
+       << mono_format_text (settings.format) << ", " << settings.frame_rate
+       << " a second, exposure " << settings.exposure_us << " us, ";
+  if (settings.triggered)
+    text << "trigger Line" << settings.trigger_line
+         << (settings.trigger_falling ? " falling" : " rising");
+  else
+    text << "no trigger";
+  for (std::size_t k = 0; k < std::size (settings.lines); k++) {
+    const CameraSettings::Line &line = settings.lines[k];
+    if (line.output)
+      text << ", Line" << k << " puts out "
+           << (line.exposure_active ? "ExposureActive" : "nothing")
+           << (line.inverted ? ", inverted" : "");
+  }
+  return text.str ();
+}
+
 struct GigeCamera::State {
   GigeCameraOptions options;
   Expose expose;
@@ -139,6 +192,7 @@ struct GigeCamera::State {
   /* The camera's thread. */
   std::mt19937_64 random;
   double device_time = 1e9; // of the next frame, ns by the camera's clock
+  std::optional<CameraSettings> told; // of the frames before
   bool stopped = false;
   Image<std::uint16_t> picture;
   std::vector<std::uint8_t> packed;
@@ -174,6 +228,8 @@ struct GigeCamera::State {
     return triggered;
   }
 
+  CameraSettings settings ();
+  void tell_settings ();
   void send (ArvBuffer *buffer);
   void set_loss (double part)
   {
@@ -184,6 +240,38 @@ struct GigeCamera::State {
   void obey (const Fault &fault, ArvBuffer *buffer, std::size_t size);
   void hold_up (const Fault &fault);
 };
+
+CameraSettings
+GigeCamera::State::settings ()
+{
+  CameraSettings set;
+  set.format = format_of (get_register (ARV_FAKE_CAMERA_REGISTER_PIXEL_FORMAT));
+  set.width = int (get_register (ARV_FAKE_CAMERA_REGISTER_WIDTH));
+  set.height = int (get_register (ARV_FAKE_CAMERA_REGISTER_HEIGHT));
+  set.frame_rate = 1e9 / period ();
+  set.exposure_us = get_register (ARV_FAKE_CAMERA_REGISTER_EXPOSURE_TIME_US);
+  set.triggered = get_register (kTriggerMode) == 1;
+  set.trigger_line =
+      int (get_register (ARV_FAKE_CAMERA_REGISTER_TRIGGER_SOURCE));
+  set.trigger_falling =
+      get_register (ARV_FAKE_CAMERA_REGISTER_TRIGGER_ACTIVATION) == 1;
+  for (guint32 k = 0; k < std::size (set.lines); k++) {
+    set.lines[k].output = get_register (kLineMode + k * kNextLine) == 1;
+    set.lines[k].exposure_active =
+        get_register (kLineSource + k * kNextLine) == 1;
+    set.lines[k].inverted = get_register (kLineInverter + k * kNextLine) == 1;
+  }
+  return set;
+}
+
+void
+GigeCamera::State::tell_settings ()
+{
+  const CameraSettings now = settings ();
+  if (options.set_up && told != now)
+    options.set_up (now);
+  told = now;
+}
 
 /* Light for a part of the period only, in the bits of the format. */
 void
@@ -271,6 +359,7 @@ GigeCamera::State::send (ArvBuffer *buffer)
     sent.frame = next++;
     sent.fault = faults.at (sent.frame);
   }
+  tell_settings ();
   sent.host_time = monotonic_now ();
   sent.device_time = std::llround (device_time);
   device_time += period () * (1 + options.drift * 1e-6);
@@ -296,7 +385,13 @@ GigeCamera::GigeCamera (std::unique_ptr<State> state)
 {
 }
 
-GigeCamera::~GigeCamera () = default;
+/* The server runs until it is gone, but without what it would call here, and in
+ * silence. */
+GigeCamera::~GigeCamera ()
+{
+  state_->set_loss (1);
+  arv_fake_camera_set_fill_pattern (state_->camera, nullptr, nullptr);
+}
 
 namespace
 {

@@ -10,6 +10,7 @@
 #include "base/image.h"
 #include "base/result.h"
 #include "camera/fault_plan.h"
+#include "camera/packed_mono.h"
 #include "schedule/timing.h"
 
 namespace cexp
@@ -22,6 +23,34 @@ struct SentFrame {
   Nanoseconds host_time = 0;   ///< monotonic clock, when its exposure began
   Fault fault = {};
 };
+
+/** What a client has set, as the camera's registers say. */
+struct CameraSettings {
+  /** A line of the camera. */
+  struct Line {
+    bool output = false;
+    bool exposure_active = false; ///< puts out a level while it exposes
+    bool inverted = false;
+
+    bool operator== (const Line &) const = default;
+  };
+
+  MonoFormat format = MonoFormat::mono8;
+  int width = 0;
+  int height = 0;
+  double frame_rate = 0; ///< that of the trigger, where there is one
+  double exposure_us = 0;
+  bool triggered = false;
+  int trigger_line = 0;
+  bool trigger_falling = false;
+  Line lines[2];
+
+  bool operator== (const CameraSettings &) const = default;
+};
+
+/** "256x192 Mono8, 25 a second, exposure 5000 us, trigger Line0 rising"; lines
+ * that put something out follow. */
+std::string camera_settings_text (const CameraSettings &settings);
 
 struct GigeCameraOptions {
   /** Address or name of the network interface that it is on. */
@@ -43,6 +72,8 @@ struct GigeCameraOptions {
   FaultPlan faults = {};
   /** Called on the camera's thread. */
   std::function<void (const SentFrame &)> sent = {};
+  /** Called there before a frame for which it is set otherwise than before. */
+  std::function<void (const CameraSettings &)> set_up = {};
 };
 
 /**
@@ -62,7 +93,8 @@ using Expose =
  * bits; pictures are shifted to the format's bits, so that white stays white.
  * Triggers (Line0, Line1; either edge) and exposure are features: with a
  * trigger, frames come at its rate; an exposure time shorter than the frame
- * period lets through as much less light.
+ * period lets through as much less light. Lines can be set to put out that it
+ * exposes, which goes nowhere.
  *
  * Frame k is stamped with k frame periods by the camera's clock, however late
  * the host is: a host that lags makes jitter, not losses.

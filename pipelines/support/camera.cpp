@@ -193,6 +193,9 @@ serve (Arguments &arguments)
   options.bits = arguments.bits > 0  ? arguments.bits
                  : source.is_wide () ? 16
                                      : 8;
+  options.set_up = [] (const CameraSettings &settings) {
+    say ("sends " + camera_settings_text (settings));
+  };
   if (arguments.log)
     options.sent = log_frame;
 

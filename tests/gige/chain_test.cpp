@@ -3,6 +3,7 @@
  * driver uploads masks to a DLPC900 on the USB, the camera sees the scene
  * through the mirrors that the board shows, aravissrc reads it over the
  * network, and what is split, recorded and decoded again is the scene. */
+#include <atomic>
 #include <cstdio>
 #include <filesystem>
 #include <map>
@@ -13,6 +14,7 @@
 #include "linked_elements.h"
 #include "optics/bench.h"
 #include "own_network.h"
+#include "screen.h"
 #include "usb_bed.h"
 
 namespace
@@ -26,6 +28,10 @@ const auto *const linked =
 
 constexpr std::uint16_t kDlpc900 = 0xC900;
 constexpr int kDlp5500 = 5;
+/* The mirrors that the camera sees; the others would only take time to send. */
+const std::string kDevice =
+    "usb:1-2,guard=off,region=" + std::to_string (kCameraWidth) + "x" +
+    std::to_string (kCameraHeight) + "+0+0 ";
 constexpr const char *kSchedule = "sequential:2x2";
 constexpr const char *kWithPilot = "sequential:2x2,pilot=16";
 constexpr int kSlots = 4;
@@ -56,6 +62,8 @@ public:
   std::int64_t slip_before = -1;
   /** Number of the frame that came after the slip, from the first one on. */
   std::int64_t slipped = -1;
+  /** The scene stands as it is in frame 0. */
+  bool still = false;
 
   bool expose (std::uint64_t frame, ImageView<std::uint16_t> picture)
   {
@@ -75,7 +83,7 @@ public:
     for (int slot = 0; slot < kSlots; slot++) {
       for (int y = 0; y < kCameraHeight; y++)
         for (int x = 0; x < kCameraWidth; x++)
-          scene_.at (x, y) = scene_value (frame, slot, x, y);
+          scene_.at (x, y) = scene_value (still ? 0 : frame, slot, x, y);
       const auto view = scene_.view ();
       const auto line = std::size_t (shown_++) % masks_.size ();
       bench_.expose (ImageView<const std::uint8_t> (view), masks_[line], 1.0);
@@ -94,14 +102,23 @@ private:
     for (int line = 0; line < lines; line++) {
       const auto shown = board_.mirrors (line);
       int found = -1;
-      for (int mask = 0; mask < schedule_.masks (); mask++) {
-        Image<std::uint8_t> expected (shown.width (), shown.height ());
-        render_mask (schedule_, mask, expected.view ());
-        if (shown == expected)
+      for (int mask = 0; mask < schedule_.masks (); mask++)
+        if (shows (shown, mask))
           found = mask;
-      }
       masks_.push_back (found);
     }
+  }
+
+  /* Whether the mirrors that the camera sees are those of @p mask. */
+  bool shows (const Image<std::uint8_t> &mirrors, int mask) const
+  {
+    Image<std::uint8_t> expected (kCameraWidth, kCameraHeight);
+    render_mask (schedule_, mask, expected.view ());
+    for (int y = 0; y < kCameraHeight; y++)
+      if (!std::equal (expected.view ().row (y),
+              expected.view ().row (y) + kCameraWidth, mirrors.view ().row (y)))
+        return false;
+    return true;
   }
 
   EmulatedDlpc900 &board_;
@@ -164,10 +181,8 @@ TEST (Chain, WhatIsSplitRecordedAndDecodedIsTheScene)
     CameraPipeline pipeline (
         camera_source (
             "25/1", "GRAY8", "num-buffers=" + std::to_string (kFrames)) +
-            "dmdsync name=sync device=usb:1-2,guard=off "
-            "timestamp-at=device-clock "
-            "schedule=" +
-            kSchedule +
+            "dmdsync name=sync device=" + kDevice +
+            "timestamp-at=device-clock schedule=" + kSchedule +
             " ! codedexposure-demux name=demux demux.coded ! queue ! "
             "avenc_ffv1 ! matroskamux timecodescale=1000 ! filesink location=" +
             recording + " demux.src ! queue max-size-buffers=100 ! ",
@@ -217,11 +232,10 @@ TEST (Chain, ASlipIsFoundWithinThreeFramesAndMended)
     return optics.expose (frame, picture);
   });
   std::map<guint64, bool> locked;
-  CameraPipeline pipeline (camera_source ("25/1", "GRAY8", "num-buffers=60") +
-                               "dmdsync name=sync device=usb:1-2,guard=off "
-                               "timestamp-at=device-clock "
-                               "schedule=" +
-                               kWithPilot + " ! ",
+  CameraPipeline pipeline (
+      camera_source ("25/1", "GRAY8", "num-buffers=60") +
+          "dmdsync name=sync device=" + kDevice +
+          "timestamp-at=device-clock schedule=" + kWithPilot + " ! ",
       [&] (GstBuffer *buffer, const GstVideoInfo &) {
         const auto meta = *get_frame_meta (buffer);
         locked[meta.frame] = meta.locked;
@@ -244,6 +258,103 @@ TEST (Chain, ASlipIsFoundWithinThreeFramesAndMended)
       mended, locked.end (), [] (const auto &frame) { return frame.second; }));
   std::printf ("slip in frame %d, found in %d, locked again in %d\n",
       int (slip), int (first_unlocked->first), int (mended->first));
+}
+
+/** Where @p picture is one of the four subframes of the still scene: which;
+ * else -1. */
+int
+subframe_shown (const Image<int> &picture)
+{
+  for (int slot = 0; slot < kSlots; slot++) {
+    bool same = true;
+    for (int y = 0; y < picture.height () && same; y++)
+      for (int x = 0; x < picture.width () && same; x++)
+        same = picture.at (x, y) ==
+               scene_value (0, slot, 2 * x + slot % 2, 2 * y + slot / 2);
+    if (same)
+      return slot;
+  }
+  return -1;
+}
+
+TEST (Chain, TheWindowShowsTheScene)
+{
+  const Screen screen;
+  if (!screen.there ())
+    GTEST_SKIP () << "there is no Xvfb";
+  UsbBed bed;
+  const auto board = std::make_shared<EmulatedDlpc900> (kDlp5500);
+  bed.plug ("1-2", kDlpc900, "LCR", board);
+  Optics optics (*board);
+  optics.still = true;
+  std::atomic<int> frames = 0;
+  const auto camera = open_camera ({}, [&] (std::uint64_t frame, auto picture) {
+    return optics.expose (frame, picture);
+  });
+  CameraPipeline pipeline (
+      camera_source ("25/1") + "dmdsync device=" + kDevice +
+          "timestamp-at=device-clock schedule=" + kSchedule +
+          " ! codedexposure-demux ! tee name=both both. ! "
+          "queue leaky=downstream max-size-buffers=8 ! videoconvert ! "
+          "ximagesink both. ! queue ! ",
+      [&] (auto *, auto &) { frames++; });
+  pipeline.play ();
+  /* Every subframe is on the screen for 10 ms of 40. */
+  std::map<int, int> shown;
+  while (frames < kSlots * 500 && shown.size () < kSlots)
+    if (const int slot = subframe_shown (
+            screen.photograph (kCameraWidth / 2, kCameraHeight / 2));
+        slot >= 0)
+      shown[slot]++;
+  EXPECT_EQ (shown.size (), std::size_t (kSlots))
+      << "photographs of each subframe";
+  pipeline.stop ();
+}
+
+TEST (Chain, ACameraThatComesBackFindsTheMasksInPhase)
+{
+  UsbBed bed;
+  const auto board = std::make_shared<EmulatedDlpc900> (kDlp5500);
+  bed.plug ("1-2", kDlpc900, "LCR", board);
+  Optics optics (*board, kWithPilot);
+  const auto open = [&] {
+    return open_camera ({}, [&] (std::uint64_t frame, auto picture) {
+      return optics.expose (frame, picture);
+    });
+  };
+  auto camera = open ();
+  std::vector<FrameMeta> came;
+  std::atomic<int> frames = 0;
+  CameraPipeline pipeline (
+      camera_source ("25/1", "GRAY8", "num-buffers=30") +
+          "dmdsync name=sync device=" + kDevice +
+          "reconnect=10 timestamp-at=device-clock schedule=" + kWithPilot +
+          " ! ",
+      [&] (GstBuffer *buffer, const GstVideoInfo &) {
+        came.push_back (*get_frame_meta (buffer));
+        frames++;
+      });
+  pipeline.play ();
+  while (frames < 8)
+    g_usleep (1000);
+  const auto told = board->messages ();
+  camera.reset ();
+  camera = open ();
+  EXPECT_EQ (pipeline.wait_end (), "end");
+  EXPECT_TRUE (board->running ());
+  EXPECT_EQ (board->messages (), told) << "the masks went on by themselves";
+
+  const auto back = std::find_if (came.begin (), came.end (),
+      [] (const FrameMeta &meta) { return meta.lost_before > 25; });
+  ASSERT_NE (back, came.end ());
+  EXPECT_GT (came.end () - back, 20) << "num-buffers counts from there";
+  const auto locked = std::find_if (
+      back, came.end (), [] (const FrameMeta &meta) { return meta.locked; });
+  EXPECT_LT (locked - back, 10);
+  EXPECT_TRUE (std::all_of (
+      locked, came.end (), [] (const FrameMeta &meta) { return meta.locked; }));
+  std::printf ("away for %d frames, locked again in frame %d after them\n",
+      int (back->lost_before), int (locked - back));
 }
 
 } // namespace

@@ -2,6 +2,7 @@
 /* dmdsync behind the unmodified aravissrc, which reads a camera in software. */
 #include <cstdlib>
 #include <map>
+#include <mutex>
 
 #include "camera/packed_mono.h"
 #include "camera_rig.h"
@@ -294,6 +295,56 @@ TEST (Gige, ExposureAndLinesAreFeaturesOfTheCamera)
   pipeline.play ();
   EXPECT_EQ (pipeline.wait_end (), "end");
   EXPECT_EQ (level, 50) << "a quarter of the period's light";
+}
+
+/* As pipelines/record sets cameras up: aravissrc sets the frame rate first,
+ * which ends all triggers, and features last. */
+TEST (Gige, TheCameraIsSetUpAsItsSourceSays)
+{
+  const std::string by_dmd = "TriggerSelector=FrameStart TriggerSource=";
+  const std::string by_camera =
+      "TriggerSelector=FrameStart TriggerMode=Off LineSelector=";
+  const struct {
+    std::string format;
+    std::string features;
+    std::string expected;
+  } cases[] = {
+      {"Mono8", by_dmd + "Line0 TriggerActivation=RisingEdge TriggerMode=On",
+          "trigger Line0 rising"},
+      {"Mono16", by_dmd + "Line1 TriggerActivation=FallingEdge TriggerMode=On",
+          "trigger Line1 falling"},
+      {"Mono12",
+          by_camera + "Line0 LineMode=Output LineSource=ExposureActive "
+                      "LineInverter=false",
+          "no trigger, Line0 puts out ExposureActive"},
+      {"Mono12Packed",
+          by_camera + "Line1 LineMode=Output LineSource=ExposureActive "
+                      "LineInverter=true",
+          "no trigger, Line1 puts out ExposureActive, inverted"},
+      {"Mono12p", by_dmd + "Line0 TriggerActivation=FallingEdge TriggerMode=On",
+          "trigger Line0 falling"}};
+  for (const auto &[format, features, expected] : cases) {
+    SCOPED_TRACE (format);
+    std::mutex lock;
+    std::string set;
+    GigeCameraOptions options;
+    options.trigger_rate = 50;
+    options.set_up = [&] (const CameraSettings &settings) {
+      const std::lock_guard guard (lock);
+      set = camera_settings_text (settings);
+    };
+    const auto camera = open_camera (std::move (options));
+    CameraPipeline pipeline (
+        camera_source ("50/1", format == "Mono8" ? "GRAY8" : "GRAY16_LE",
+            "num-buffers=2 exposure=4000 features=\"" + features +
+                " PixelFormat=" + format + "\""),
+        [] (auto *, auto &) {});
+    pipeline.play ();
+    EXPECT_EQ (pipeline.wait_end (), "end");
+    const std::lock_guard guard (lock);
+    EXPECT_EQ (set,
+        "256x192 " + format + ", 50 a second, exposure 4000 us, " + expected);
+  }
 }
 
 TEST (Gige, ACameraThatStopsIsAnErrorAndACleanStop)

@@ -74,6 +74,20 @@ private:
   FrameRate rate_;
 };
 
+inline bool
+has_flag (const BufferPtr &buffer, GstBufferFlags flag)
+{
+  return GST_BUFFER_FLAG_IS_SET (buffer.get (), flag);
+}
+
+inline FrameMeta
+meta_of (const BufferPtr &buffer)
+{
+  const auto meta = get_frame_meta (buffer.get ());
+  EXPECT_TRUE (meta);
+  return meta.value_or (FrameMeta ());
+}
+
 inline guint64
 uint64_field (const MessagePtr &message, const char *name)
 {

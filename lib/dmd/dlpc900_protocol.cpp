@@ -112,7 +112,8 @@ encode_entry (const Entry &entry)
   Bytes bytes;
   append_le (bytes, entry.index, 2);
   append_le (bytes, entry.time.exposure, 3);
-  bytes.push_back (std::uint8_t (unsigned (entry.clear_after) | kWhite << 4 |
+  bytes.push_back (std::uint8_t (unsigned (entry.clear_after) |
+                                 unsigned (entry.bits - 1) << 1 | kWhite << 4 |
                                  unsigned (entry.wait_for_trigger) << 7));
   append_le (bytes, entry.time.dark, 3);
   bytes.push_back (entry.trigger_out_2 ? 0 : 1); // the bit disables

@@ -55,7 +55,8 @@ struct Entry {
   bool wait_for_trigger = false;
   bool clear_after = true;
   bool trigger_out_2 = true;
-  PlaneSlot plane = {};
+  PlaneSlot plane = {}; ///< the lowest, where there are several
+  int bits = 1;         ///< planes that make the pattern, 1 to 8
 
   bool operator== (const Entry &) const = default;
 };

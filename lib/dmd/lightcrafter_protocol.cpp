@@ -13,7 +13,6 @@ namespace
 
 constexpr std::size_t kMaxPayload = 65535;
 constexpr std::uint8_t kGreen = 1;
-constexpr std::uint8_t kRepeat = 1;
 
 constexpr std::array<const char *, 12> kErrors{"no error", "command failed",
     "command not supported", "invalid parameter", "out of resources",
@@ -71,7 +70,7 @@ encode_sequence (const Sequence &sequence, int bytes)
   append_le (data, sequence.exposure, 4);
   data.push_back (kGreen);
   if (bytes > 17)
-    data.push_back (kRepeat);
+    data.push_back (sequence.repeat ? 1 : 0);
   return data;
 }
 

@@ -45,6 +45,7 @@ struct Sequence {
   std::uint32_t delay = 0;
   std::uint32_t period = 0; ///< of the timer
   std::uint32_t exposure = 0;
+  bool repeat = true;
 };
 
 /** A whole message: packets of at most 65535 bytes of payload, end to end. */

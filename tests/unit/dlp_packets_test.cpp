@@ -222,7 +222,16 @@ TEST (Dlpc900Bytes, AreThoseOfTheDocument)
   EXPECT_EQ (write (0x12, kIdle, {0}), "40 12 03 00 01 02 00");
   EXPECT_EQ (write (0x12, kPark, {1}), "40 12 03 00 09 06 01");
   EXPECT_EQ (write (0x12, kPark, {0}), "40 12 03 00 09 06 00");
+}
+
+TEST (Dlpc900Bytes, OfCommandsThatTheDriverDoesNotUse)
+{
   EXPECT_EQ (write (0x12, {0x1A40, ""}, {0, 1}), "40 12 04 00 40 1A 00 01");
+  const HidCommand curtain{0x1100, ""};
+  EXPECT_EQ (read (0x11, curtain), "C0 11 02 00 00 11");
+  EXPECT_EQ (
+      request (HidKind::post, 0x12, curtain, from_hex ("FF 01 FF 01 FF 01")),
+      "00 12 08 00 00 11 FF 01 FF 01 FF 01");
 }
 
 TEST (Dlpc900Bytes, PatternEntries)
@@ -241,6 +250,8 @@ TEST (Dlpc900Bytes, PatternEntries)
       write (3, kDefine,
           encode_entry ({.index = 24, .time = {105, 0}, .plane = {1, 0}})),
       "40 03 0E 00 34 1A 18 00 69 00 00 71 00 00 00 00 01 00");
+  EXPECT_EQ (write (3, kDefine, encode_entry ({.time = {4046, 0}, .bits = 8})),
+      "40 03 0E 00 34 1A 00 00 CE 0F 00 7F 00 00 00 00 00 00");
   EXPECT_EQ (to_hex (encode_entry ({.index = 0x102,
                  .time = {0x123456, 0x654321},
                  .clear_after = false,

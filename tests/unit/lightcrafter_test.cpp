@@ -65,6 +65,11 @@ TEST (LightcrafterBytes, AreThoseOfTheDocument)
   EXPECT_EQ (write (kSequence, encode_sequence (timed, 19)),
       "02 04 80 00 13 00 01 18 00 00 01 00 00 00 00 F4 01 00 00 FA 00 00 00 01 "
       "01 A4");
+  const Sequence once{
+      .patterns = 24, .period = 500, .exposure = 250, .repeat = false};
+  EXPECT_EQ (write (kSequenceOld, encode_sequence (once, 18)),
+      "02 04 00 00 12 00 01 18 00 01 00 00 00 00 F4 01 00 00 FA 00 00 00 01 00 "
+      "22");
 }
 
 TEST (LightcrafterBytes, LongMessagesAreCutIntoPackets)

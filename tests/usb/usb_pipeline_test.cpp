@@ -2,6 +2,7 @@
 /* dmdsync with a board on the USB, in a pipeline: shown masks, cancelled
  * uploads, and a plug that is pulled. */
 #include "dmd/mirror_array.h"
+#include "emulated_dlpc350.h"
 #include "emulated_dlpc900.h"
 #include "sync_harness.h"
 #include "usb_bed.h"
@@ -15,23 +16,22 @@ using namespace cexp::test;
 const auto *const linked =
     ::testing::AddGlobalTestEnvironment (new LinkedElements);
 
-constexpr std::uint16_t kDlpc900 = 0xC900;
+constexpr std::uint16_t kDlpc350 = 0x6401, kDlpc900 = 0xC900;
 constexpr int kDlp5500 = 5;
 
 /** Coded frames of 25 frames/s through a dmdsync with a board at 1-2. */
-class UsbPipeline : public ::testing::Test
+class PipelineWithBoard : public ::testing::Test
 {
 protected:
-  void SetUp () override { bed.plug ("1-2", kDlpc900, "LCR", board); }
   void TearDown () override { set_state (GST_STATE_NULL); }
 
-  void make (const std::string &schedule)
+  void make (const std::string &schedule, const std::string &device = "usb:1-2")
   {
     const std::string text =
         "videotestsrc is-live=true ! "
         "video/x-raw,format=GRAY8,width=64,height=48,framerate=25/1 ! "
-        "dmdsync device=usb:1-2 schedule=" +
-        schedule + " ! fakesink sync=false";
+        "dmdsync device=" +
+        device + " schedule=" + schedule + " ! fakesink sync=false";
     pipeline.reset (GST_ELEMENT (
         gst_object_ref_sink (gst_parse_launch (text.c_str (), nullptr))));
     bus.reset (gst_element_get_bus (pipeline.get ()));
@@ -62,10 +62,17 @@ protected:
   }
 
   UsbBed bed;
-  std::shared_ptr<EmulatedDlpc900> board =
-      std::make_shared<EmulatedDlpc900> (kDlp5500);
   ObjectPtr<GstElement> pipeline;
   ObjectPtr<GstBus> bus;
+};
+
+class UsbPipeline : public PipelineWithBoard
+{
+protected:
+  void SetUp () override { bed.plug ("1-2", kDlpc900, "LCR", board); }
+
+  std::shared_ptr<EmulatedDlpc900> board =
+      std::make_shared<EmulatedDlpc900> (kDlp5500);
 };
 
 } // namespace
@@ -123,24 +130,61 @@ TEST_F (UsbPipeline, APulledPlugIsOneErrorAndACleanStop)
   set_state (GST_STATE_NULL);
 }
 
+TEST_F (PipelineWithBoard, ADlpc350ShowsTheMasksOfItsFlash)
+{
+  const auto board = std::make_shared<EmulatedDlpc350> ();
+  bed.plug ("1-2", kDlpc350, "LCR2", board);
+  make ("sequential:4x1", "usb:1-2,images=0");
+  set_state (GST_STATE_PLAYING);
+  ASSERT_NE (wait_message (GST_MESSAGE_ASYNC_DONE), nullptr);
+  EXPECT_TRUE (board->running ());
+  EXPECT_EQ (board->lines ().size (), 4u);
+  EXPECT_EQ (board->period (), 10'000u);
+  set_state (GST_STATE_NULL);
+  EXPECT_FALSE (board->running ());
+}
+
 /** In a pipeline, a fault is either mended or one error; the board is stopped
  * in the end. */
-class UsbPipelineFaults : public UsbPipeline,
-                          public ::testing::WithParamInterface<Fault>
+class UsbPipelineFaults
+    : public PipelineWithBoard,
+      public ::testing::WithParamInterface<std::tuple<std::uint16_t, Fault>>
 {
+protected:
+  void SetUp () override
+  {
+    if (product () == kDlpc900)
+      board = std::make_shared<EmulatedDlpc900> (kDlp5500);
+    else
+      board = std::make_shared<EmulatedDlpc350> ();
+    bed.plug ("1-2", product (), "LCR", board);
+  }
+
+  std::uint16_t product () const { return std::get<0> (GetParam ()); }
+  Fault fault () const { return std::get<1> (GetParam ()); }
+  /** Numbers of the messages that are struck, from the opening on: of the
+   * table, and the start. */
+  std::vector<int> struck () const
+  {
+    return product () == kDlpc900 ? std::vector{12, 24} : std::vector{9, 16};
+  }
+
+  std::shared_ptr<EmulatedHid> board;
 };
 
 TEST_P (UsbPipelineFaults, EndInOneErrorOrInMasks)
 {
-  // Struck: the first line of the table, and the start.
-  for (const int message : {12, 24}) {
-    board->faults = {{board->messages () + message, GetParam ()}};
-    make ("sequential:4x1");
+  for (const int message : struck ()) {
+    board->faults = {{board->messages () + message, fault ()}};
+    make ("sequential:4x1", std::string ("usb:1-2,patience=500ms") +
+                                (product () == kDlpc350 ? ",images=0" : ""));
     set_state (GST_STATE_PLAYING);
     const MessagePtr message_of_end (
         gst_bus_timed_pop_filtered (bus.get (), 60 * GST_SECOND,
             GstMessageType (GST_MESSAGE_ERROR | GST_MESSAGE_ASYNC_DONE)));
     ASSERT_NE (message_of_end, nullptr);
+    EXPECT_LT (board->faults.begin ()->first, board->messages ())
+        << "nothing was struck";
     set_state (GST_STATE_NULL);
     EXPECT_TRUE (board->gone () || !board->running ()) << message;
     int errors =
@@ -151,7 +195,7 @@ TEST_P (UsbPipelineFaults, EndInOneErrorOrInMasks)
       errors += GST_MESSAGE_SRC (more.get ()) ==
                 GST_MESSAGE_SRC (message_of_end.get ());
     EXPECT_LE (errors, 1) << message;
-    if (GetParam () == Fault::none || GetParam () == Fault::stale_reply) {
+    if (fault () == Fault::none || fault () == Fault::stale_reply) {
       EXPECT_EQ (errors, 0) << message;
     }
     if (board->gone ())
@@ -160,6 +204,7 @@ TEST_P (UsbPipelineFaults, EndInOneErrorOrInMasks)
 }
 
 INSTANTIATE_TEST_SUITE_P (All, UsbPipelineFaults,
-    ::testing::Values (Fault::none, Fault::refuse, Fault::lose_reply,
-        Fault::late_reply, Fault::stale_reply, Fault::short_reply, Fault::stall,
-        Fault::unplug));
+    ::testing::Combine (::testing::Values (kDlpc900, kDlpc350),
+        ::testing::Values (Fault::none, Fault::refuse, Fault::lose_reply,
+            Fault::late_reply, Fault::stale_reply, Fault::short_reply,
+            Fault::stall, Fault::unplug)));

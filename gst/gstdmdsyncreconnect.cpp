@@ -150,7 +150,7 @@ take_return (
   if (tries == 0)
     return false;
   const GstClockTime came = GST_BUFFER_PTS (frame);
-  stream.device_clock.reset ();
+  stream.device_clock.rejoin ();
   stream.rate_watch->resync ();
   stream.discont = true;
   begin_phase (self);

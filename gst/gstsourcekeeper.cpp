@@ -212,7 +212,6 @@ SourceKeeper::restart ()
     }
     reports_.stopping ();
     gst_element_set_state (source_.get (), GST_STATE_NULL);
-    forget_camera (source_.get ());
     {
       const std::lock_guard guard (lock_);
       due_ = false;
@@ -220,6 +219,7 @@ SourceKeeper::restart ()
         return;
       why_.clear ();
     }
+    forget_camera (source_.get ());
     /* Stopped elements forget them. */
     const ObjectPtr<GstClock> clock (gst_element_get_clock (owner_));
     gst_element_set_clock (source_.get (), clock.get ());

@@ -24,6 +24,10 @@ constexpr Nanoseconds kEarly = 20'000'000;
 constexpr Nanoseconds kEarlySettled = 1'000'000;
 constexpr std::size_t kSettled = 256;
 
+/* The drift is known as well as this where the line is known to 25 us. */
+constexpr double kSteady = 10e-6;
+constexpr double kKnown = 25e3;
+
 /* A step that is none of a camera's leaves only the order. */
 Nanoseconds
 least_step (Nanoseconds device_step)
@@ -37,6 +41,22 @@ void
 DeviceClock::reset ()
 {
   last_.reset ();
+  edge_.expect_any ();
+}
+
+void
+DeviceClock::rejoin ()
+{
+  remember_drift ();
+  last_.reset ();
+}
+
+/* What was learned before, where nothing better was since. */
+void
+DeviceClock::remember_drift ()
+{
+  if (deviation_ && *deviation_ < kKnown)
+    edge_.expect (line_.slope, kSteady);
 }
 
 void
@@ -89,6 +109,8 @@ DeviceClock::take (Nanoseconds device, Nanoseconds arrival)
 {
   const bool anew = last_ && is_anew (device, arrival);
   restarts_ += anew;
+  if (anew)
+    remember_drift ();
   if (!last_ || anew)
     begin (device, arrival);
   const bool late = last_ && !anew && device <= last_->device;

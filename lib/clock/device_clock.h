@@ -44,6 +44,9 @@ public:
   Nanoseconds take (Nanoseconds device, Nanoseconds arrival);
   /** Forgets everything: the next frame is the first. */
   void reset ();
+  /** The camera begins anew: the next frame is the first, of a clock whose
+   * drift is about the same, unless frames show another. */
+  void rejoin ();
 
   /** By how much the camera's clock is faster, as a part of it; 0 before there
    * are two frames. */
@@ -58,6 +61,7 @@ public:
 
 private:
   void begin (Nanoseconds device, Nanoseconds arrival);
+  void remember_drift ();
   bool is_anew (Nanoseconds device, Nanoseconds arrival) const;
   void learn (LowerEdge::Point point);
   Nanoseconds told (Nanoseconds device) const;

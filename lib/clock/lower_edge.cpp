@@ -14,6 +14,8 @@ namespace
 constexpr int kSlopes = 64;
 /* Lines that are less likely than the likeliest by exp (this) do not count. */
 constexpr double kNegligible = 20;
+/* Nor are lines believed in that are by exp (this) less likely than others. */
+constexpr double kIncredible = 10;
 /* No two points are told apart that are closer. */
 constexpr double kGrain = 1;
 
@@ -24,6 +26,19 @@ LowerEdge::clear ()
 {
   points_.clear ();
   hull_.clear ();
+}
+
+void
+LowerEdge::expect (double slope, double by)
+{
+  expected_ = Range{
+      std::max (slope - by, -steepest_), std::min (slope + by, steepest_)};
+}
+
+void
+LowerEdge::expect_any ()
+{
+  expected_.reset ();
 }
 
 void
@@ -77,15 +92,29 @@ LowerEdge::height_below (double slope) const
 /* That of the line which is highest in the middle: the edge of the hull there.
  */
 double
-LowerEdge::highest_slope () const
+LowerEdge::highest_slope (Range range) const
 {
   if (hull_.size () < 2)
-    return 0;
+    return (range.from + range.to) / 2;
   const auto right = std::upper_bound (hull_.begin () + 1, hull_.end () - 1,
       middle (), [] (double x, const Point &p) { return x < p.x; });
   const auto left = right - 1;
   return std::clamp (
-      (right->y - left->y) / (right->x - left->x), -steepest_, steepest_);
+      (right->y - left->y) / (right->x - left->x), range.from, range.to);
+}
+
+/* Those that lines can have. */
+LowerEdge::Range
+LowerEdge::slopes () const
+{
+  const Range all{-steepest_, steepest_};
+  if (!expected_)
+    return all;
+  const double any = highest_slope (all);
+  const double highest = height_below (any);
+  const auto density = this->density ({any, highest - any * middle ()});
+  const double loss = highest - height_below (highest_slope (*expected_));
+  return density && *density * loss > kIncredible ? all : *expected_;
 }
 
 /* How many points lie right above the line, per unit of height. The lowest
@@ -126,7 +155,8 @@ LowerEdge::last_slope (double from, double to, double least_height) const
 LowerEdge::Estimate
 LowerEdge::estimate () const
 {
-  const double best = highest_slope ();
+  const Range range = slopes ();
+  const double best = highest_slope (range);
   const double highest = height_below (best);
   const Line top{best, highest - best * middle ()};
   const auto density = this->density (top);
@@ -134,8 +164,8 @@ LowerEdge::estimate () const
     return {top, {}};
 
   const double least = highest - kNegligible / *density;
-  const double first = last_slope (best, -steepest_, least);
-  const double step = (last_slope (best, steepest_, least) - first) / kSlopes;
+  const double first = last_slope (best, range.from, least);
+  const double step = (last_slope (best, range.to, least) - first) / kSlopes;
   const double arm = points_.back ().x - middle ();
   double weights = 0, slopes = 0, heights = 0, ends = 0, squares = 0;
   for (int k = 0; k < kSlopes; k++) {

@@ -51,7 +51,12 @@ public:
   /** @p steepest  slope, up or down, that the line can have. */
   explicit LowerEdge (double steepest) : steepest_ (steepest) {}
 
+  /** Forgets all points. */
   void clear ();
+  /** Slopes are by no more than @p by away from @p slope, unless the points
+   * speak clearly against it. */
+  void expect (double slope, double by);
+  void expect_any ();
   /** @p point  to the right of all others. */
   void add (Point point);
   /** Puts @p point, lower and not further to the left, in the last one's place.
@@ -70,12 +75,18 @@ private:
   {
     return (points_.front ().x + points_.back ().x) / 2;
   }
+  struct Range {
+    double from;
+    double to;
+  };
   double height_below (double slope) const;
-  double highest_slope () const;
+  double highest_slope (Range range) const;
+  Range slopes () const;
   std::optional<double> density (const Line &highest) const;
   double last_slope (double from, double to, double least_height) const;
 
   double steepest_;
+  std::optional<Range> expected_;
   std::vector<Point> points_;
   std::vector<Point> hull_;
   mutable std::vector<double> above_; // scratch of density ()

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* A camera's clock told by the pipeline's, from jittery arrivals. */
 #include <cmath>
+#include <cstdio>
 #include <functional>
 #include <random>
 #include <string>
@@ -182,6 +183,43 @@ TEST (DeviceClock, BeginsAnewWithTheCamera)
           double (path.truth (k)), 2);
     EXPECT_EQ (clock.restarts (), 1u);
   }
+}
+
+/* Seconds until the times after a restart are known, and the largest error from
+ * then on; the camera has another drift after it. */
+std::pair<double, Nanoseconds>
+known_after_restart (double drift)
+{
+  Path before ({25, 1}, 200e-6, even);
+  Path after ({25, 1}, drift, even, 2);
+  DeviceClock clock;
+  for (int k = 0; k < 2000; k++)
+    clock.take (before.stamp (k), before.arrival (k));
+  clock.rejoin ();
+  int known = 0;
+  Nanoseconds error = 0;
+  for (int k = 0; k < 3000; k++) {
+    const Nanoseconds time = clock.take (after.stamp (k), after.arrival (k));
+    if (known == 0 && clock.uncertainty ().value_or (kSecond) < 50 * kUs)
+      known = k;
+    if (known > 0 && k > 2 * known)
+      error = std::max (error, std::abs (time - after.truth (k)));
+  }
+  EXPECT_GT (known, 0);
+  return {known / 25.0, error};
+}
+
+TEST (DeviceClock, KnowsTheDriftOfACameraThatComesBack)
+{
+  const auto [same, error] = known_after_restart (205e-6);
+  EXPECT_LT (same, 15);
+  EXPECT_LT (error, 100 * kUs);
+  const auto [other, error_of_other] = known_after_restart (-100e-6);
+  EXPECT_GT (other, same);
+  EXPECT_LT (error_of_other, 100 * kUs);
+  std::printf (
+      "times are known after %.1f s, with another drift after %.1f s\n", same,
+      other);
 }
 
 TEST (DeviceClock, ALateFrameTeachesNothing)

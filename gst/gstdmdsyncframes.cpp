@@ -325,6 +325,20 @@ place (GstDmdSync *self, Frame &frame)
   return time;
 }
 
+/** What a frame that goes on bears. */
+FrameMeta
+meta_of (GstDmdSync *self, const Frame &frame)
+{
+  const Stream &stream = state (self).stream;
+  FrameMeta meta = meta_of (*stream.time, frame.step.number, frame.pts);
+  meta.locked = frame.phase.locked;
+  meta.slip = frame.phase.slip;
+  meta.lost_before = frame.step.lost;
+  meta.pattern = frame.sight.pattern;
+  meta.time_uncertainty = stream.uncertainty;
+  return meta;
+}
+
 GstFlowReturn
 take_frame (GstDmdSync *self, BufferPtr buffer)
 {
@@ -362,14 +376,8 @@ take_frame (GstDmdSync *self, BufferPtr buffer)
     if (flow = take_unlocked (self, frame); flow != GST_FLOW_OK)
       return flow == GST_BASE_TRANSFORM_FLOW_DROPPED ? GST_FLOW_OK : flow;
 
-  FrameMeta meta = meta_of (*stream.time, frame.step.number, frame.pts);
-  meta.locked = frame.phase.locked;
-  meta.slip = frame.phase.slip;
-  meta.lost_before = frame.step.lost;
-  meta.pattern = frame.sight.pattern;
-  meta.time_uncertainty = stream.uncertainty;
-  say_uncertainty (self, meta.frame, meta.exposure_start);
-  stamp (self, frame.buffer.get (), meta);
+  say_uncertainty (self, frame.step.number, frame.pts);
+  stamp (self, frame.buffer.get (), meta_of (self, frame));
   /* A camera source may use the memory again while it is still held here. */
   if (repeats)
     stream.last.reset (gst_buffer_copy_deep (frame.buffer.get ()));

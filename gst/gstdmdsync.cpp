@@ -175,6 +175,7 @@ forget_stream (GstDmdSync *self)
   if (st.keeper)
     st.keeper->recall ();
   st.stream = sync::Stream ();
+  st.source.reset ();
   const ObjectLock lock (self);
   st.time.reset ();
   st.switches = 0;

@@ -116,7 +116,6 @@ release_source (GstDmdSync *self)
   SyncState &st = state (self);
   if (st.source)
     st.source->release ();
-  st.source.reset ();
 }
 
 bool

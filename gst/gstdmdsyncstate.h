@@ -171,6 +171,7 @@ std::vector<ObjectPtr<GstElement>> elements_before (GstDmdSync *self);
 /** Sees to it, where the settings say so, that a source that fails is started
  * anew. */
 void keep_source (GstDmdSync *self);
+/** Leaves it alone from now on. */
 void release_source (GstDmdSync *self);
 /** Whether @p event is of the end of a camera that is coming back, or of its
  * return: who stands behind hears of neither. */

@@ -22,10 +22,10 @@ namespace cexp
  * spread is its uncertainty. All depends on the lower convex hull alone, but
  * for the density, which the points next to the line tell.
  *
- * Both fall with the number of points, not with its root: n points, spread
- * evenly and up to J above the line, leave 3.1 J / n (rms) at its end. Where
- * the smallest amounts are rarer than larger ones, the line comes out too high,
- * and the uncertainty too small.
+ * Error and uncertainty fall with the number of points, not with its root: n
+ * points, spread evenly and up to J above the line, leave 3.1 J / n (rms) at its
+ * end. Where the smallest amounts are rarer than larger ones, the line comes out
+ * too high, and the uncertainty too small.
  */
 class LowerEdge
 {

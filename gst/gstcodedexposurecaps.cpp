@@ -278,6 +278,18 @@ unbind_caps (GstCaps *caps)
 }
 
 CapsPtr
+unbind_size (GstCaps *caps)
+{
+  if (gst_caps_is_any (caps))
+    return CapsPtr (gst_caps_ref (caps));
+  CapsPtr free (gst_caps_copy (caps));
+  for (guint i = 0; i < gst_caps_get_size (free.get ()); i++)
+    gst_structure_remove_fields (
+        gst_caps_get_structure (free.get (), i), "width", "height", nullptr);
+  return free;
+}
+
+CapsPtr
 intersect_caps (GstCaps *preferred, GstCaps *other)
 {
   return CapsPtr (

@@ -47,6 +47,8 @@ GstCaps *scale_caps (GstCaps *caps, const CapsScale &scale);
 
 /** @p caps without the fields that a schedule changes. */
 CapsPtr unbind_caps (GstCaps *caps);
+/** @p caps without those that a mapping changes. */
+CapsPtr unbind_size (GstCaps *caps);
 /** In the order of @p preferred. */
 CapsPtr intersect_caps (GstCaps *preferred, GstCaps *other);
 

@@ -37,13 +37,7 @@ convert (const Known &now, Output::Kind kind, GstCaps *caps, bool to_coded)
   const CapsScale scale =
       coded_to_subframes (*now.schedule, kind == Output::Kind::kAll);
   CapsPtr scaled (scale_caps (caps, to_coded ? scale.inverse () : scale));
-  if (!now.mapped || gst_caps_is_any (scaled.get ()))
-    return scaled;
-  CapsPtr any_size (gst_caps_copy (scaled.get ()));
-  for (guint i = 0; i < gst_caps_get_size (any_size.get ()); i++)
-    gst_structure_remove_fields (gst_caps_get_structure (any_size.get (), i),
-        "width", "height", nullptr);
-  return any_size;
+  return now.mapped ? unbind_size (scaled.get ()) : std::move (scaled);
 }
 
 } // namespace

@@ -97,11 +97,7 @@ slot_boundaries (FrameRate rate, int n)
 PadCaps
 output_caps (CodedFormat coded, Extent extracted, const Schedule &schedule)
 {
-  const CapsPtr with_aspect (gst_caps_copy (coded.caps.get ()));
-  gst_caps_set_simple (with_aspect.get (), "pixel-aspect-ratio",
-      GST_TYPE_FRACTION, coded.info.par_n, coded.info.par_d, "width",
-      G_TYPE_INT, extracted.width, "height", G_TYPE_INT, extracted.height,
-      nullptr);
+  const CapsPtr with_aspect = resized_caps (coded, extracted);
   PadCaps caps;
   caps.all.reset (
       scale_caps (with_aspect.get (), coded_to_subframes (schedule, true)));
@@ -152,7 +148,8 @@ propose (GstCodedExposureDemux *self)
   }
   std::shared_ptr<const Rectifier> rectifier;
   Extent size{info.width, info.height};
-  if (!find_rectifier (self, schedule, size, rectifier))
+  if (!find_rectifier (
+          element, stream, stream.settings, schedule, size, {}, rectifier))
     return std::nullopt;
   if (rectifier)
     size = rectifier->mirrors ();
@@ -186,7 +183,7 @@ install (GstCodedExposureDemux *self, Proposal proposal)
   stream.stale = false;
   stream.scratch.clear ();
   say_what_is_cropped (self, *stream.plan);
-  say_mapping (self);
+  say_mapping (GST_ELEMENT (self), st.counters, stream.plan->rectifier.get ());
 
   bool schedule_changed, method_changed;
   {
@@ -196,6 +193,7 @@ install (GstCodedExposureDemux *self, Proposal proposal)
         std::exchange (st.method, stream.plan->method) != stream.plan->method;
     st.in_force = std::make_shared<const Schedule> (stream.plan->schedule);
     st.assumed = proposal.assumed;
+    st.rectifies = stream.plan->rectifier != nullptr;
     st.caps = std::move (proposal.caps);
   }
   outputs (self)->each ([&] (const OutputRef &output) {

@@ -403,11 +403,7 @@ set_schedule (GstCodedExposureDemux *self, const std::string &text)
 void
 set_mapping (GstCodedExposureDemux *self, const std::string &path)
 {
-  std::shared_ptr<const Result<Mapping>> mapped;
-  if (!path.empty ())
-    mapped = std::make_shared<const Result<Mapping>> (Mapping::load (path));
-  if (mapped && !*mapped)
-    GST_WARNING_OBJECT (self, "%s", mapped->error ().message.c_str ());
+  auto mapped = read_mapping (GST_ELEMENT (self), path);
   const ObjectLock lock (self);
   state (self).settings.mapping = path;
   state (self).settings.mapped = std::move (mapped);

@@ -175,8 +175,8 @@ extract (const Extractor<Pixel> &extractor, Stream &stream, MappedFrame &coded,
     views.push_back (subframes[k] ? view_of<Pixel> (subframes[k])
                                   : scratch_view<Pixel> (stream, k));
   ImageView<const Pixel> light = view_of<const Pixel> (coded);
-  if (stream.plan->rectifier)
-    light = rectify (stream, light);
+  if (const Rectifier *rectifier = stream.plan->rectifier.get ())
+    light = rectify (stream, *rectifier, light, stream.bits_in_force ());
   return extractor.run (light, views);
 }
 

@@ -16,7 +16,6 @@
 #include "extract/extractor.h"
 #include "gstcodedexposuredemux.h"
 #include "gstcodedinput.h"
-#include "moire/rectifier.h"
 
 GST_DEBUG_CATEGORY_EXTERN (codedexposure_demux_debug);
 
@@ -25,9 +24,6 @@ namespace cexp::gst::demux
 
 /** What the user asked for. */
 struct Settings : CodedSettings {
-  std::string mapping;
-  /** Read from the file of that name; null where there is none. */
-  std::shared_ptr<const Result<Mapping>> mapped;
   ExtractOptions extract;
   bool qos = false;
 };
@@ -35,7 +31,6 @@ struct Settings : CodedSettings {
 struct Counters : CodedCounters {
   guint64 subframes_out = 0;
   guint64 subframes_dropped = 0;
-  RectifyReport rectified; ///< of the mapping in force
 };
 
 struct PoolRelease {
@@ -128,18 +123,8 @@ struct Plan {
   GstClockTime period () const { return boundaries.back (); }
 };
 
-/** Weights take a while to make: kept as long as they are right. */
-struct RectifierCache {
-  Mapping mapping;
-  Schedule schedule;
-  std::shared_ptr<const Rectifier> rectifier;
-};
-
 /** All that is forgotten from PAUSED to READY. Sink pad's stream lock. */
 struct Stream : CodedStream {
-  std::optional<RectifierCache> rectifiers;
-  Image<std::uint8_t> narrow; ///< a rectified frame, of either depth
-  Image<std::uint16_t> wide;
   Settings settings; ///< in force
   std::optional<Plan> plan;
   /** Significant bits: the property wins over the frames; 0: of the type. */
@@ -147,7 +132,6 @@ struct Stream : CodedStream {
   {
     return settings.extract.bits > 0 ? settings.extract.bits : bits;
   }
-  bool warned_of_mapping = false;
   std::optional<bool> live;       ///< asked for when first needed
   std::vector<std::byte> scratch; ///< subframes that no pad wants
 };
@@ -237,20 +221,6 @@ gboolean src_query (GstPad *pad, GstObject *parent, GstQuery *query) noexcept;
  * @p next  the frame that comes next, where there is one. */
 GstFlowReturn negotiate (
     GstCodedExposureDemux *self, GstBuffer *next = nullptr);
-/* Mapping. */
-/** Sets @p rectifier for frames of @p camera pixels, null where they are taken
- * as they are. Returns false, with an error on the bus, when the mapping that
- * was asked for cannot be used. */
-bool find_rectifier (GstCodedExposureDemux *self, const Schedule &schedule,
-    Extent camera, std::shared_ptr<const Rectifier> &rectifier);
-/** Says and counts what the mapping in force does to the mirrors. */
-void say_mapping (GstCodedExposureDemux *self);
-/** @p coded, one pixel a mirror; valid until the next call. */
-ImageView<const std::uint8_t> rectify (
-    Stream &stream, ImageView<const std::uint8_t> coded);
-ImageView<const std::uint16_t> rectify (
-    Stream &stream, ImageView<const std::uint16_t> coded);
-
 /** Whether the plan has a subframe for every pad of @p list; posts an error
  * where it has not. */
 bool check_pads (GstCodedExposureDemux *self, const Outputs &list);

@@ -37,6 +37,14 @@
  * tile will do; `sequential:lattice:4/2` and
  * `sequential:lattice:8/3,order=bit-reversal` give the truest pictures.
  *
+ * ## Mapping
+ *
+ * A camera that is not quite aligned with the mirrors is put right by a
+ * mapping: by the #codedexposure-fuse:mapping property, else by the stream's
+ * tag. Frames are rectified to one pixel a mirror before they are fused, and
+ * fused frames have the size of the mirrors. The element message
+ * `codedexposure/mapping` says how well the camera sees the mirrors.
+ *
  * ## Quality and speed
  *
  * `quality=fast` runs in real time: 768x576 from 25 to 100 frames/s take less
@@ -125,6 +133,7 @@ forget_stream (GstCodedExposureFuse *self)
   st.settings_changed = true;
   st.in_force.reset ();
   st.assumed = false;
+  st.rectifies = false;
   st.latency = 0;
 }
 

@@ -35,10 +35,14 @@ take_in (GstCodedExposureFuse *self, GstBuffer *inbuf, FrameMeta &meta)
 /* Returns the number of saturated pixels. */
 template <typename Pixel>
 guint64
-take_pixels (Fuser<Pixel> &fuser, ImageView<const Pixel> coded, int bits)
+take_pixels (Stream &stream, ImageView<const Pixel> coded)
 {
-  fuser.take (coded);
-  return count_saturated (coded, bits);
+  const int bits = stream.bits_in_force ();
+  const guint64 saturated = count_saturated (coded, bits);
+  if (const Rectifier *rectifier = stream.plan->rectifier.get ())
+    coded = rectify (stream, *rectifier, coded, bits);
+  std::get<Fuser<Pixel>> (stream.plan->fuser).take (coded);
+  return saturated;
 }
 
 /* Gives the pixels of @inbuf to the fuser and keeps the rest. */
@@ -58,13 +62,10 @@ take (GstCodedExposureFuse *self, GstBuffer *inbuf, FrameMeta meta)
         (nullptr));
     return GST_FLOW_ERROR;
   }
-  const int bits = stream.bits_in_force ();
-  if (auto *narrow = std::get_if<Fuser<std::uint8_t>> (&plan.fuser))
-    meta.saturated =
-        take_pixels (*narrow, view_of<const std::uint8_t> (coded), bits);
-  else
-    meta.saturated = take_pixels (std::get<Fuser<std::uint16_t>> (plan.fuser),
-        view_of<const std::uint16_t> (coded), bits);
+  meta.saturated =
+      GST_VIDEO_INFO_FORMAT (&plan.coded) == GST_VIDEO_FORMAT_GRAY8
+          ? take_pixels (stream, view_of<const std::uint8_t> (coded))
+          : take_pixels (stream, view_of<const std::uint16_t> (coded));
   if (!GST_BUFFER_FLAG_IS_SET (inbuf, GST_BUFFER_FLAG_GAP))
     note_saturation (
         GST_ELEMENT (self), stream, st.counters, GST_BUFFER_PTS (inbuf), meta);

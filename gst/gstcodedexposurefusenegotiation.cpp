@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* From caps, schedule and settings to a plan, and caps seen from either side.
  */
+#include <algorithm>
+#include <cmath>
+
 #include "gstcodedexposurefusestate.h"
 
 #define GST_CAT_DEFAULT codedexposure_fuse_debug
@@ -21,31 +24,46 @@ coded_to_fused (const Schedule &schedule)
   return scale;
 }
 
-/* Pixels are taken to see the mirror of their own place. */
-void
-warn_of_mapping (GstCodedExposureFuse *self)
+/* Noise of an ordinary exposure at a typical light, where the user says what
+ * camera it is. */
+RectifyOptions
+rectify_options (const SensorNoise &noise)
 {
-  Stream &stream = state (self).stream;
-  const bool mapped = stream.tagged && *stream.tagged &&
-                      stream.tagged->value ().mapping.has_value ();
-  if (!mapped || std::exchange (stream.warned_of_mapping, true))
-    return;
-  GST_ELEMENT_WARNING (self, STREAM, FORMAT,
-      ("The stream has a mapping, which fused frames do not follow: they show "
-       "the camera's misalignment. Align the camera (moirecalib), or take "
-       "subframes (codedexposure-demux)."),
-      (nullptr));
+  constexpr double kTypicalLight = 0.4;
+  RectifyOptions options;
+  if (noise.full_well > 0.0)
+    options.noise = std::clamp (
+        std::sqrt (noise.variance (kTypicalLight * noise.full_well, 0.0)) /
+            noise.full_well,
+        RectifyOptions::kLeastNoise, RectifyOptions::kMostNoise);
+  return options;
 }
 
 template <typename Pixel>
 Result<AnyFuser>
-make_fuser (const Schedule &schedule, const GstVideoInfo &info,
-    const FuseOptions &options)
+make_fuser (const Schedule &schedule, Extent size, const FuseOptions &options)
 {
-  auto made = Fuser<Pixel>::make (schedule, info.width, info.height, options);
+  auto made = Fuser<Pixel>::make (schedule, size.width, size.height, options);
   if (!made)
     return made.error ();
   return AnyFuser (std::move (*made));
+}
+
+/* For frames of @format that were rectified to @size. */
+std::optional<AnyFuser>
+make_fuser (GstCodedExposureFuse *self, const Schedule &schedule,
+    GstVideoFormat format, Extent size)
+{
+  const Stream &stream = state (self).stream;
+  FuseOptions options = stream.settings.options;
+  options.bits = stream.bits_in_force ();
+  auto fuser = format == GST_VIDEO_FORMAT_GRAY8
+                   ? make_fuser<std::uint8_t> (schedule, size, options)
+                   : make_fuser<std::uint16_t> (schedule, size, options);
+  if (fuser)
+    return std::move (*fuser);
+  refuse (GST_ELEMENT (self), fuser.error ().message);
+  return std::nullopt;
 }
 
 PoolPtr
@@ -86,17 +104,21 @@ propose (GstCodedExposureFuse *self)
     refuse (element, slots.error ().message);
     return std::nullopt;
   }
-  FuseOptions options = stream.settings.options;
-  options.bits = stream.bits_in_force ();
-  auto fuser = GST_VIDEO_INFO_FORMAT (&info) == GST_VIDEO_FORMAT_GRAY8
-                   ? make_fuser<std::uint8_t> (schedule, info, options)
-                   : make_fuser<std::uint16_t> (schedule, info, options);
-  if (!fuser) {
-    refuse (element, fuser.error ().message);
+  Extent size{info.width, info.height};
+  std::shared_ptr<const Rectifier> rectifier;
+  if (!find_rectifier (element, stream, stream.settings, schedule, size,
+          rectify_options (stream.settings.options.noise), rectifier))
     return std::nullopt;
-  }
+  if (rectifier)
+    size = rectifier->mirrors ();
+  auto fuser = make_fuser (self, schedule, GST_VIDEO_INFO_FORMAT (&info), size);
+  if (!fuser)
+    return std::nullopt;
 
-  CapsPtr caps (scale_caps (format->caps.get (), coded_to_fused (schedule)));
+  const CapsPtr rectified (rectifier
+                               ? resized_caps (*format, size)
+                               : CapsPtr (gst_caps_ref (format->caps.get ())));
+  CapsPtr caps (scale_caps (rectified.get (), coded_to_fused (schedule)));
   GstVideoInfo fused;
   gst_video_info_from_caps (&fused, caps.get ());
   PoolPtr pool = make_pool (caps.get (), fused);
@@ -107,7 +129,8 @@ propose (GstCodedExposureFuse *self)
     return std::nullopt;
   }
   return Proposal{Plan{schedule, info, fused, std::move (*fuser), rate, *slots,
-                      options.lookahead, std::move (pool)},
+                      stream.settings.options.lookahead, std::move (pool),
+                      std::move (rectifier)},
       std::move (caps), found->assumed};
 }
 
@@ -122,6 +145,7 @@ install (GstCodedExposureFuse *self, Proposal proposal)
   stream.plan = std::move (proposal.plan);
   stream.stale = false;
   const Plan &plan = *stream.plan;
+  say_mapping (GST_ELEMENT (self), st.counters, plan.rectifier.get ());
   const GstClockTime latency = GstClockTime (plan.lookahead) * plan.period ();
   bool schedule_changed, latency_changed;
   {
@@ -130,6 +154,7 @@ install (GstCodedExposureFuse *self, Proposal proposal)
     latency_changed = std::exchange (st.latency, latency) != latency;
     st.in_force = std::make_shared<const Schedule> (plan.schedule);
     st.assumed = proposal.assumed;
+    st.rectifies = plan.rectifier != nullptr;
   }
   const CapsPtr current (gst_pad_get_current_caps (st.srcpad));
   if (!current || !gst_caps_is_equal (current.get (), proposal.caps.get ()))
@@ -147,6 +172,7 @@ install (GstCodedExposureFuse *self, Proposal proposal)
 struct Known {
   ScheduleRef schedule; ///< null: any may come
   SaidRate rate;
+  bool mapped; ///< coded and fused frames can differ in size
 };
 
 Known
@@ -155,7 +181,7 @@ known (GstCodedExposureFuse *self)
   const FuseState &st = state (self);
   const ObjectLock lock (self);
   return {binding_schedule (st.settings, st.in_force, st.assumed),
-      st.settings.rate};
+      st.settings.rate, st.settings.mapped || st.rectifies};
 }
 
 CapsPtr
@@ -164,7 +190,8 @@ convert (const Known &now, GstCaps *caps, bool to_coded)
   if (!now.schedule)
     return unbind_caps (caps);
   const CapsScale scale = coded_to_fused (*now.schedule);
-  return CapsPtr (scale_caps (caps, to_coded ? scale.inverse () : scale));
+  CapsPtr scaled (scale_caps (caps, to_coded ? scale.inverse () : scale));
+  return now.mapped ? unbind_size (scaled.get ()) : std::move (scaled);
 }
 
 } // namespace
@@ -188,7 +215,6 @@ negotiate (GstCodedExposureFuse *self, GstBuffer *next)
     if (!proposal)
       return GST_FLOW_NOT_NEGOTIATED;
     install (self, std::move (*proposal));
-    warn_of_mapping (self);
   }
   settle_events (self);
   return GST_FLOW_OK;

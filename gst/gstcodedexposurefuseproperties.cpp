@@ -13,6 +13,7 @@ namespace
 enum {
   PROP_0,
   PROP_SCHEDULE,
+  PROP_MAPPING,
   PROP_QUALITY,
   PROP_LOOKAHEAD,
   PROP_FULL_WELL,
@@ -24,6 +25,8 @@ enum {
   PROP_FRAMES_LOST,
   PROP_FRAMES_CORRUPTED,
   PROP_SATURATED_FRAMES,
+  PROP_MIRRORS_MIXED,
+  PROP_MIRRORS_UNSEEN,
   PROP_SCHEDULE_IN_FORCE,
   PROP_STATS,
 };
@@ -64,12 +67,15 @@ set_property (
   auto *self = GST_CODED_EXPOSURE_FUSE (object);
   if (id == PROP_SCHEDULE)
     set_schedule (self, g_value_get_string (value) ?: "");
+  if (id == PROP_MAPPING)
+    set_mapping (self, g_value_get_string (value) ?: "");
 
   const ObjectLock lock (self);
   Settings &settings = state (self).settings;
   state (self).settings_changed = true;
   switch (id) {
   case PROP_SCHEDULE:
+  case PROP_MAPPING:
     break;
   case PROP_QUALITY:
     settings.options.quality = FuseQuality (g_value_get_enum (value));
@@ -103,7 +109,11 @@ stats (const Counters &counters)
       G_TYPE_UINT64, counters.frames_out, "frames-lost", G_TYPE_UINT64,
       counters.frames_lost, "frames-corrupted", G_TYPE_UINT64,
       counters.frames_corrupted, "saturated-frames", G_TYPE_UINT64,
-      counters.saturated_frames, nullptr);
+      counters.saturated_frames, "mirrors-exact", G_TYPE_UINT64,
+      guint64 (counters.rectified.exact), "mirrors-weighted", G_TYPE_UINT64,
+      guint64 (counters.rectified.weighted), "mirrors-mixed", G_TYPE_UINT64,
+      guint64 (counters.rectified.mixed), "mirrors-unseen", G_TYPE_UINT64,
+      guint64 (counters.rectified.unseen), nullptr);
 }
 
 void
@@ -117,6 +127,9 @@ get_property (
   switch (id) {
   case PROP_SCHEDULE:
     g_value_set_string (value, settings.schedule.c_str ());
+    break;
+  case PROP_MAPPING:
+    g_value_set_string (value, settings.mapping.c_str ());
     break;
   case PROP_QUALITY:
     g_value_set_enum (value, int (settings.options.quality));
@@ -150,6 +163,12 @@ get_property (
     break;
   case PROP_SATURATED_FRAMES:
     g_value_set_uint64 (value, st.counters.saturated_frames);
+    break;
+  case PROP_MIRRORS_MIXED:
+    g_value_set_uint64 (value, st.counters.rectified.mixed);
+    break;
+  case PROP_MIRRORS_UNSEEN:
+    g_value_set_uint64 (value, st.counters.rectified.unseen);
     break;
   case PROP_SCHEDULE_IN_FORCE:
     g_value_set_string (
@@ -234,6 +253,22 @@ install_settings (GObjectClass *klass)
           "what the stream's tag says, else sequential:2x2",
           "", kReadWrite));
   /**
+   * codedexposure-fuse:mapping:
+   *
+   * A file with the mapping from camera pixels to mirrors, as moirecalib writes
+   * it; wins over what the stream's tags say. Frames are then rectified to one
+   * pixel a mirror before they are fused, so that fused frames have the size of
+   * the mirrors. Empty: the mapping of the tags, or none. Applied at the next
+   * frame.
+   *
+   * Since: 0.1
+   */
+  g_object_class_install_property (klass, PROP_MAPPING,
+      g_param_spec_string ("mapping", "Mapping",
+          "File with the mapping from camera pixels to mirrors (moirecalib "
+          "writes one); empty: that of the stream's tags, or none",
+          "", kReadWrite));
+  /**
    * codedexposure-fuse:quality:
    *
    * How much work a frame is worth. Applied at the next frame.
@@ -284,6 +319,12 @@ install_reports (GObjectClass *klass)
   counter (PROP_SATURATED_FRAMES, "saturated-frames", "Saturated frames",
       "Coded frames with a pixel at the largest value; notifies when a "
       "stretch of them begins or ends");
+  counter (PROP_MIRRORS_MIXED, "mirrors-mixed", "Mirrors mixed",
+      "Mirrors of the mapping in force of which even the best pixel gets less "
+      "than half of its light; notifies");
+  counter (PROP_MIRRORS_UNSEEN, "mirrors-unseen", "Mirrors unseen",
+      "Mirrors of the mapping in force at which no pixel looks, black; "
+      "notifies");
   /**
    * codedexposure-fuse:schedule-in-force:
    *
@@ -317,6 +358,15 @@ set_schedule (GstCodedExposureFuse *self, const std::string &text)
   state (self).settings.schedule = text;
   state (self).settings.parsed = parsed;
   return parsed;
+}
+
+void
+set_mapping (GstCodedExposureFuse *self, const std::string &path)
+{
+  auto mapped = read_mapping (GST_ELEMENT (self), path);
+  const ObjectLock lock (self);
+  state (self).settings.mapping = path;
+  state (self).settings.mapped = std::move (mapped);
 }
 
 void

@@ -50,6 +50,8 @@ struct Plan {
   SlotPlan slots;
   int lookahead;
   PoolPtr pool;
+  /** Null: the camera stands as the schedule has it. */
+  std::shared_ptr<const Rectifier> rectifier = nullptr;
 
   GstClockTime period () const { return boundary (schedule.slots ()); }
   /** Start of slot @p k by even steps, from the frame's PTS. */
@@ -77,7 +79,6 @@ struct Stream : CodedStream {
   std::deque<Waiting> waiting; ///< as many as the fuser's pending ()
   bool discont = true;
   guint64 offset = 0;
-  bool warned_of_mapping = false;
 };
 
 /** Behind the GObject.
@@ -94,6 +95,7 @@ struct FuseState {
   Counters counters;
   ScheduleRef in_force;     ///< null before the first frame
   bool assumed = false;     ///< in_force came from nowhere
+  bool rectifies = false;   ///< a mapping is in force
   GstClockTime latency = 0; ///< that lookahead adds; from the plan
 
   /* Sink pad's stream lock. */
@@ -109,6 +111,9 @@ void install_properties (GObjectClass *klass);
  */
 std::shared_ptr<const Result<Schedule>> set_schedule (
     GstCodedExposureFuse *self, const std::string &text);
+
+/** Reads the file @p path, outside of the lock; none for an empty one. */
+void set_mapping (GstCodedExposureFuse *self, const std::string &path);
 
 /* Events and queries. */
 gboolean sink_event (GstPad *pad, GstObject *parent, GstEvent *event) noexcept;

@@ -103,6 +103,16 @@ find_format (GstElement *element, const CodedStream &stream,
   return format;
 }
 
+CapsPtr
+resized_caps (const CodedFormat &format, Extent size)
+{
+  CapsPtr caps (gst_caps_copy (format.caps.get ()));
+  gst_caps_set_simple (caps.get (), "pixel-aspect-ratio", GST_TYPE_FRACTION,
+      format.info.par_n, format.info.par_d, "width", G_TYPE_INT, size.width,
+      "height", G_TYPE_INT, size.height, nullptr);
+  return caps;
+}
+
 void
 take_bits (CodedStream &stream, GstBuffer *next)
 {

@@ -16,6 +16,7 @@
 #include "gstcodedexposurecaps.h"
 #include "gstcodedexposuremeta.h"
 #include "gstraii.h"
+#include "moire/rectifier.h"
 #include "schedule/schedule.h"
 #include "schedule/stream_setup.h"
 
@@ -29,6 +30,9 @@ struct CodedSettings {
   std::string schedule;
   /** The schedule read from the text; null where the text is empty. */
   std::shared_ptr<const Result<Schedule>> parsed;
+  std::string mapping;
+  /** Read from the file of that name; null where there is none. */
+  std::shared_ptr<const Result<Mapping>> mapped;
   SaidRate rate;
 };
 
@@ -38,6 +42,7 @@ struct CodedCounters {
   guint64 frames_lost = 0;
   guint64 frames_corrupted = 0;
   guint64 saturated_frames = 0;
+  RectifyReport rectified; ///< of the mapping in force
 };
 
 /** Saturated frames that follow each other. */
@@ -46,6 +51,14 @@ struct Burst {
   guint64 peak = 0; ///< most saturated pixels in one of them
   GstClockTime from = GST_CLOCK_TIME_NONE;
   GstClockTime to = GST_CLOCK_TIME_NONE;
+};
+
+/** Weights take a while to make: kept as long as they are right. */
+struct RectifierCache {
+  Mapping mapping;
+  Schedule schedule;
+  RectifyOptions options;
+  std::shared_ptr<const Rectifier> rectifier;
 };
 
 /** All that came, forgotten from PAUSED to READY. Sink pad's stream lock. */
@@ -69,6 +82,10 @@ struct CodedStream {
   Burst saturation;
   bool warned_assumed = false;
   bool warned_of_time = false;
+  bool warned_of_mapping = false;
+  std::optional<RectifierCache> rectifiers;
+  Image<std::uint8_t> narrow; ///< a rectified frame, of either depth
+  Image<std::uint16_t> wide;
 
   bool backwards () const { return segment.rate < 0; }
 };
@@ -109,11 +126,34 @@ struct CodedFormat {
 std::optional<CodedFormat> find_format (GstElement *element,
     const CodedStream &stream, const CodedSettings &settings);
 
+/** The caps of @p format, for frames of @p size pixels. */
+CapsPtr resized_caps (const CodedFormat &format, Extent size);
+
 /** Takes the significant bits from the meta of @p next, where it has one. */
 void take_bits (CodedStream &stream, GstBuffer *next);
 /** Frames are numbered anew, from where they were, when the rate changes. */
 void count_at_rate (
     CodedStream &stream, FrameRate rate, std::optional<FrameRate> before);
+
+/** Reads the file @p path, with a log where it cannot be read; null for an
+ * empty one. Not under a lock. */
+std::shared_ptr<const Result<Mapping>> read_mapping (
+    GstElement *element, const std::string &path);
+/** Sets @p rectifier for frames of @p camera pixels, null where they are taken
+ * as they are: the property wins over the stream's tag. Returns false, with an
+ * error on the bus, when the mapping that was asked for cannot be used. */
+bool find_rectifier (GstElement *element, CodedStream &stream,
+    const CodedSettings &settings, const Schedule &schedule, Extent camera,
+    const RectifyOptions &options, std::shared_ptr<const Rectifier> &rectifier);
+/** Says and counts what @p rectifier does to the mirrors; null: nothing. */
+void say_mapping (
+    GstElement *element, CodedCounters &counters, const Rectifier *rectifier);
+/** @p coded, one pixel a mirror, of @p bits significant bits; valid until the
+ * next call. */
+ImageView<const std::uint8_t> rectify (CodedStream &stream,
+    const Rectifier &rectifier, ImageView<const std::uint8_t> coded, int bits);
+ImageView<const std::uint16_t> rectify (CodedStream &stream,
+    const Rectifier &rectifier, ImageView<const std::uint16_t> coded, int bits);
 
 /** The CAPS query's answer @p own, as its filter wants it; takes @p own. */
 void answer_caps (GstQuery *query, GstCaps *own);

@@ -174,7 +174,7 @@ check (const RectifyOptions &o)
     const char *what;
     double value, low, high;
   } ranges[] = {{"tolerance (mirrors)", o.tolerance, 0.0, 0.5},
-      {"noise (of white)", o.noise, 1e-5, 1.0},
+      {"noise (of white)", o.noise, o.kLeastNoise, o.kMostNoise},
       {"correlation length (mirrors)", o.correlation_length, 0.1, 1000.0},
       {"persistence", o.persistence, 0.0, 0.9999}};
   for (const auto &range : ranges)

@@ -15,6 +15,8 @@ namespace cexp
 
 /** What is known of the light before it is seen, for the weights. */
 struct RectifyOptions {
+  static constexpr double kLeastNoise = 1e-5, kMostNoise = 1.0;
+
   /** Mirrors, within which a pixel counts as looking at its own mirror only. */
   double tolerance = 0.05;
   /** Noise of a pixel, rms, as a part of white, where all slots are open: codes
@@ -24,6 +26,8 @@ struct RectifyOptions {
   double correlation_length = 2.0;
   /** Correlation of a scene with itself a slot later. */
   double persistence = 0.8;
+
+  bool operator== (const RectifyOptions &) const = default;
 };
 
 /** How well the camera sees the mirrors; numbers of mirrors. */

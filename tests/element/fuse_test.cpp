@@ -250,24 +250,6 @@ TEST_F (Fuse, ScheduleComesFromTheTagUnlessThePropertySays)
   EXPECT_EQ (pull_images (), expected ("sequential:2x2", {0}));
 }
 
-TEST_F (Fuse, SaysThatItFollowsNoMapping)
-{
-  const Extent size{kWidth, kHeight};
-  const auto mapping = Mapping::make ({.camera = size,
-      .mirrors = size,
-      .homography = {1, 0, 2, 0, 1, 0, 0, 0, 1}});
-  ASSERT_TRUE (mapping.ok ());
-  start ("");
-  fuse->push_event (
-      setup_to_event ({schedule_of ("sequential:lattice:5/2"), *mapping}));
-  push (0);
-  push (1);
-  EXPECT_NE (fuse->warning ().find ("mapping"), std::string::npos);
-  EXPECT_EQ (fuse->warning (), "") << "it is said once";
-  EXPECT_EQ (text_property (fuse->element (), "schedule-in-force"),
-      "sequential:lattice:5/2");
-}
-
 TEST_F (Fuse, WarnsWhereItHasToAssumeASchedule)
 {
   start ("");

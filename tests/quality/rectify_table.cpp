@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Subframes of a misaligned camera: the table of docs/calibration.md. */
+/* Subframes and fused frames of a misaligned camera: the table of
+ * docs/calibration.md. */
+#include <algorithm>
 #include <cstdio>
 #include <string>
 #include <vector>
@@ -27,15 +29,17 @@ print_row (const Scene &scene, const char *preset, double psf_sigma)
 {
   const RectifyOutcome o =
       run_rectify (scene, schedule_of (preset), misaligned_bench (psf_sigma));
-  const double point = o.rectified.point - o.aligned.point;
-  const double full = o.rectified.full - o.aligned.full;
-  std::printf ("| %s | `%s` | %.1f | %.2f / %.2f | %.2f / %.2f | %.2f / %.2f | "
-               "%+.2f / %+.2f | %.1f |\n",
-      scene.name.c_str (), preset, psf_sigma, o.aligned.point, o.aligned.full,
-      o.misaligned.point, o.misaligned.full, o.rectified.point,
-      o.rectified.full, point, full, o.milliseconds);
+  const RectifyScore gain = {o.rectified.point - o.aligned.point,
+      o.rectified.full - o.aligned.full, o.rectified.fused - o.aligned.fused};
+  std::printf ("| %s | `%s` | %.1f ", scene.name.c_str (), preset, psf_sigma);
+  for (const RectifyScore *score : {&o.aligned, &o.misaligned, &o.rectified})
+    std::printf (
+        "| %.2f / %.2f / %.2f ", score->point, score->full, score->fused);
+  std::printf ("| %+.2f / %+.2f / %+.2f | %.1f |\n", gain.point, gain.full,
+      gain.fused, o.milliseconds);
   std::fflush (stdout);
-  return psf_sigma < kSharp || (point >= -kWorse && full >= -kWorse);
+  return psf_sigma < kSharp ||
+         std::min ({gain.point, gain.full, gain.fused}) >= -kWorse;
 }
 
 } // namespace

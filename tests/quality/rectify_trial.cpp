@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* How true subframes of a misaligned camera are, with its mapping and without.
- */
+/* How true subframes and fused frames of a misaligned camera are, with its
+ * mapping and without. */
 #include "rectify_trial.h"
 
 #include <chrono>
@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "extract/extractor.h"
+#include "fuse/fuser.h"
 #include "moire/calibration.h"
 #include "moire/rectifier.h"
 #include "moire_bench.h"
@@ -48,17 +49,53 @@ measure (Extent size, const BenchOptions &options)
   return must (run.solve ()).mapping;
 }
 
-struct Errors {
-  PooledError point, full;
+Fuser<std::uint8_t>
+make_fuser (const Schedule &schedule, Extent size, const BenchOptions &bench)
+{
+  FuseOptions options;
+  options.noise = {bench.full_well, bench.read_noise};
+  return must (
+      Fuser<std::uint8_t>::make (schedule, size.width, size.height, options));
+}
 
-  RectifyScore score () const { return {point.psnr (), full.psnr ()}; }
+/* Of the frames of one camera, one after the other. */
+struct Errors {
+  Fuser<std::uint8_t> fuser;
+  PooledError point = {}, full = {}, fused = {};
+
+  Errors (const Schedule &schedule, Extent size, const BenchOptions &options)
+      : fuser (make_fuser (schedule, size, options))
+  {
+  }
+  RectifyScore score () const
+  {
+    return {point.psnr (), full.psnr (), fused.psnr ()};
+  }
 };
+
+/* @slots: the scene in each slot of this exposure. */
+void
+compare_fused (const Picture &coded, const Picture *slots, Errors &errors)
+{
+  std::vector<Picture> frames (std::size_t (errors.fuser.slots ()),
+      Picture (coded.width (), coded.height ()));
+  std::vector<ImageView<std::uint8_t>> views;
+  for (Picture &frame : frames)
+    views.push_back (frame.view ());
+  errors.fuser.take (coded.view ());
+  errors.fuser.fuse (views);
+  for (std::size_t k = 0; k < frames.size (); k++)
+    for (int y = kBorder; y < coded.height () - kBorder; y++)
+      for (int x = kBorder; x < coded.width () - kBorder; x++)
+        errors.fused.add (frames[k].at (x, y), slots[k].at (x, y));
+}
 
 /* @slots: the scene in each slot of this exposure. */
 void
 compare (const Picture &coded, const Picture *slots, const Schedule &schedule,
     Errors &errors)
 {
+  compare_fused (coded, slots, errors);
   for (int y = kBorder; y < coded.height () - kBorder; y++)
     for (int x = kBorder; x < coded.width () - kBorder; x++)
       errors.point.add (
@@ -114,7 +151,9 @@ run_rectify (
   const auto rectifier =
       must (Rectifier::make (measure (size, options), schedule));
 
-  Errors on_aligned, on_crooked, on_rectified;
+  Errors on_aligned (schedule, size, options),
+      on_crooked = {schedule, size, options},
+      on_rectified = {schedule, size, options};
   RectifyOutcome outcome;
   const auto slots = std::size_t (schedule.slots ());
   Picture frame (size.width, size.height), mirrors = frame;

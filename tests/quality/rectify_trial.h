@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* How true subframes of a misaligned camera are, with its mapping and without.
- */
+/* How true subframes and fused frames of a misaligned camera are, with its
+ * mapping and without. */
 #pragma once
 
 #include "metrics.h"
@@ -15,6 +15,7 @@ namespace cexp::quality
 struct RectifyScore {
   double point = 0.0; ///< of the subframes' pixels
   double full = 0.0;  ///< of frames at full size, the gaps filled linearly
+  double fused = 0.0; ///< of frames that were fused (FuseQuality::kFast)
 };
 
 struct RectifyOutcome {

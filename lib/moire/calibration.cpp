@@ -3,10 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <complex>
 #include <limits>
 #include <new>
-#include <numbers>
 
 #include "moire/displacement_fit.h"
 #include "moire/gray_fit.h"
@@ -28,11 +26,6 @@ constexpr int kSmooth = 16;
 /* Squared residuals of blocks, of what noise leaves, above which there is a
  * displacement. */
 constexpr double kDisplaced = 1.3;
-
-/* Numbers of the camera. Rounding shifts the dark ends of a grating's edges;
- * this much of an edge's swing is left of it where all pixels look at the same
- * fraction of a mirror, as measured on the bench in software. */
-constexpr double kRounded = 0.005;
 
 constexpr int kRounds = 12;
 /* Mirrors; a step as short as this changes nothing. */
@@ -130,36 +123,6 @@ shifts_of (const PhaseFit &fit, const std::vector<PhaseFit::Block> &blocks)
   return shifts;
 }
 
-/* How much the fractions of mirrors that pixels look at are alike: 1 if all are
- * the same, 0 if they are spread evenly. */
-Position
-alike (const Mapping &mapping)
-{
-  std::complex<double> x = 0.0, y = 0.0;
-  double count = 0.0;
-  for (int py = 0; py < mapping.camera ().height; py += 4)
-    for (int px = 0; px < mapping.camera ().width; px += 4) {
-      const Position m = mapping.mirror_at (px, py);
-      x += std::polar (1.0, 2.0 * std::numbers::pi * m.x);
-      y += std::polar (1.0, 2.0 * std::numbers::pi * m.y);
-      count += 1.0;
-    }
-  return {std::abs (x) / count, std::abs (y) / count};
-}
-
-/* Adds what rounding does to a shift. */
-Mapping::Covariance
-with_rounding (const PhaseFit &fit, double swing)
-{
-  Mapping::Covariance covariance = fit.covariance;
-  const Position share = alike (fit.mapping);
-  covariance[2 * Mapping::kParameters + 2] +=
-      std::pow (share.x * kRounded / swing, 2);
-  covariance[5 * Mapping::kParameters + 5] +=
-      std::pow (share.y * kRounded / swing, 2);
-  return covariance;
-}
-
 /* What is known at the end of the fit. */
 Result<void>
 report (const PhaseFit &fit, CalibrationResult &result)
@@ -167,11 +130,9 @@ report (const PhaseFit &fit, CalibrationResult &result)
   const double magnification = fit.mapping.stance ().magnification;
   result.psf_sigma =
       magnification * std::sqrt (0.5 * (fit.blur_x + fit.blur_y));
-  const double swing =
-      double (std::max (1.0f, quantile (result.contrast, 0.5)));
-  auto mapping = Mapping::make ({fit.camera, fit.mirrors,
-      fit.mapping.homography (), with_rounding (fit, swing),
-      fit.mapping.displacement (), result.psf_sigma});
+  auto mapping =
+      Mapping::make ({fit.camera, fit.mirrors, fit.mapping.homography (),
+          fit.covariance, fit.mapping.displacement (), result.psf_sigma});
   if (!mapping)
     return mapping.error ();
   result.mapping = std::move (*mapping);
@@ -454,9 +415,12 @@ Calibration::State::solve (const CalibrationOptions &options) const
       white_smooth.view (), *start};
   fit.block_size = CalibrationResult::kBlock;
   std::vector<Image<float>> frames;
+  fit.frames = std::numeric_limits<int>::max ();
   for (const Axis axis : {Axis::x, Axis::y})
-    for (const Slot *slot : gratings (axis))
+    for (const Slot *slot : gratings (axis)) {
       frames.push_back (mean (*slot));
+      fit.frames = std::min (fit.frames, slot->frames);
+    }
   const std::size_t of_x = gratings (Axis::x).size ();
   for (std::size_t i = 0; i < frames.size (); i++)
     (i < of_x ? fit.x : fit.y)

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "moire/gratings.h"
 
@@ -20,10 +21,10 @@ constexpr double kUnlikely = 6.0;
  * focus, or sees something else. */
 constexpr float kFaintSwing = 0.3f;
 
-/* Numbers squared. Where there is hardly any light there is hardly any noise,
- * and rounding is no noise either: weights leave room for what it does there.
- */
-constexpr double kRounding = 2.0;
+/* Of the swing from dark to light. Where there is hardly any light there is
+ * hardly any noise, and what else is wrong there, as numbers that cannot be
+ * negative, is no noise: weights leave room for it. */
+constexpr float kRoom = 0.007f;
 
 /* Mirrors beyond the array's edge that still give light to a pixel. */
 double
@@ -32,15 +33,116 @@ reach (double side, double variance)
   return 0.5 * side + 4.0 * std::sqrt (variance);
 }
 
+typedef GratingResponse::Value Value;
+
+/* What rounding makes of numbers on average. Noise blurs its steps, but there
+ * is little of it in the dark. */
+class Rounding
+{
+public:
+  Rounding (const NoiseModel &noise, int frames);
+
+  /* Of numbers that are @number on average before. */
+  float mean (float number) const
+  {
+    const float step = (number - kFirst) * kSteps;
+    if (!(step >= 0.0f && step < float (means_.size ()) - 1.0f))
+      return number;
+    const std::size_t low = std::size_t (step);
+    return means_[low] + (step - float (low)) * (means_[low + 1] - means_[low]);
+  }
+
+private:
+  static constexpr int kSteps = 32; // a number
+  static constexpr float kFirst = -2.0f, kLast = 64.0f;
+  /* Standard deviations of noise that leave no step, and that are taken to be
+   * the least: with less, the model would have kinks. */
+  static constexpr double kBlurred = 0.6, kSharp = 0.12;
+
+  std::vector<float> means_;
+};
+
+/* A sawtooth, harmonic by harmonic, each as far as noise leaves it. @noise is
+ * of means of @frames numbers, with a twelfth by the rounding itself. */
+Rounding::Rounding (const NoiseModel &noise, int frames)
+{
+  for (float number = kFirst; number < kLast; number += 1.0f / kSteps) {
+    const double variance =
+        frames * (noise.floor + noise.slope * std::max (0.0, double (number))) -
+        1.0 / 12.0;
+    if (variance > kBlurred * kBlurred)
+      break;
+    double mean = double (number);
+    double sign = -1.0;
+    for (int h = 1; h <= 3; h++, sign = -sign) {
+      const double turn = 2.0 * std::numbers::pi * h;
+      mean +=
+          sign * 2.0 / turn * std::sin (turn * double (number)) *
+          std::exp (-0.5 * turn * turn * std::max (variance, kSharp * kSharp));
+    }
+    means_.push_back (float (mean));
+  }
+}
+
 /* Weighted sums over the phases of one pixel. */
 struct Sums {
   float w = 0, l = 0, ll = 0;                  // of 1, light
   float d = 0, dl = 0, dd = 0;                 // slope
   float b = 0, bl = 0, bb = 0, bd = 0;         // blur
   float y = 0, yl = 0, yd = 0, yb = 0, yy = 0; // number
+
+  void add (const Value &v, float rest, float weight)
+  {
+    const float wl = weight * v.light, wd = weight * v.slope;
+    const float wb = weight * v.blur;
+    w += weight;
+    l += wl;
+    ll += wl * v.light;
+    d += wd;
+    dl += wd * v.light;
+    dd += wd * v.slope;
+    b += wb;
+    bl += wb * v.light;
+    bb += wb * v.blur;
+    bd += wb * v.slope;
+    y += weight * rest;
+    yl += wl * rest;
+    yd += wd * rest;
+    yb += wb * rest;
+    yy += weight * rest * rest;
+  }
+  float inverse () const
+  {
+    const float determinant = w * ll - l * l;
+    return determinant > 0.0f ? 1.0f / determinant : 0.0f;
+  }
+  /* What the numbers' swing is more than was expected. */
+  float more_swing () const { return inverse () * (w * yl - l * y); }
+  PixelFinding finding (float swing) const;
 };
 
-typedef GratingResponse::Value Value;
+/* Dark level and swing are the pixel's own: sums are taken at right angles to
+ * both. */
+PixelFinding
+Sums::finding (float swing) const
+{
+  const float scale = inverse ();
+  /* Sum of products of two quantities, less what 1 and light explain of it. */
+  const auto rest = [&] (float pq, float p, float pl, float q, float ql) {
+    return pq - scale * (p * (ll * q - l * ql) + pl * (w * ql - l * q));
+  };
+  PixelFinding found;
+  found.swing = swing;
+  found.score = swing * rest (yd, y, yl, d, dl);
+  found.information = swing * swing * rest (dd, d, dl, d, dl);
+  found.blur_score = swing * rest (yb, y, yl, b, bl);
+  found.blur_information = swing * swing * rest (bb, b, bl, b, bl);
+  found.cross = swing * swing * rest (bd, b, bl, d, dl);
+  found.misfit = rest (yy, y, yl, y, yl);
+  if (found.information > 0.0f)
+    found.misfit -= found.score * found.score / found.information;
+  return found;
+}
 
 /* Where the table of @response is entered by a pixel that looks at @mirror. */
 struct Entry {
@@ -70,59 +172,24 @@ struct PixelLight {
   float dark, swing;
 };
 
-/* Everything that the frames of one axis say of pixel @x of their row @rows.
- * Dark level and swing of the pixel are its own: sums over the phases are taken
- * at right angles to both. */
+/* Everything that the frames of one axis say of pixel @x of their row @rows. */
 PixelFinding
 find (const float *const *rows, int x, const GratingResponse &response,
-    double mirror, PixelLight light, const NoiseModel &noise)
+    double mirror, PixelLight light, const NoiseModel &noise,
+    const Rounding &rounding)
 {
   const Entry entry (response, mirror);
-  const int phases = response.period ();
-  const float floor = float (noise.floor + kRounding);
+  const float room = kRoom * light.swing;
+  const float floor = float (noise.floor) + room * room;
   const float slope = float (noise.slope);
-  Sums s;
-  for (int k = 0; k < phases; k++) {
+  Sums sums;
+  for (int k = 0; k < response.period (); k++) {
     const Value v = entry.at (response, k);
     const float expected = light.dark + light.swing * v.light;
-    const float w = 1.0f / (floor + slope * std::max (0.0f, expected));
-    const float y = rows[k][x] - expected;
-    const float wl = w * v.light, wd = w * v.slope, wb = w * v.blur;
-    s.w += w;
-    s.l += wl;
-    s.ll += wl * v.light;
-    s.d += wd;
-    s.dl += wd * v.light;
-    s.dd += wd * v.slope;
-    s.b += wb;
-    s.bl += wb * v.light;
-    s.bb += wb * v.blur;
-    s.bd += wb * v.slope;
-    s.y += w * y;
-    s.yl += wl * y;
-    s.yd += wd * y;
-    s.yb += wb * y;
-    s.yy += w * y * y;
+    const float variance = floor + slope * std::max (0.0f, expected);
+    sums.add (v, rows[k][x] - rounding.mean (expected), 1.0f / variance);
   }
-  const float determinant = s.w * s.ll - s.l * s.l;
-  const float inverse = determinant > 0.0f ? 1.0f / determinant : 0.0f;
-  /* Sum of products of two quantities, less what 1 and light explain of it. */
-  const auto rest = [&] (float ab, float a, float al, float b, float bl) {
-    return ab -
-           inverse * (a * (s.ll * b - s.l * bl) + al * (s.w * bl - s.l * b));
-  };
-  PixelFinding found;
-  const float swing = light.swing + inverse * (s.w * s.yl - s.l * s.y);
-  found.swing = swing;
-  found.score = swing * rest (s.yd, s.y, s.yl, s.d, s.dl);
-  found.information = swing * swing * rest (s.dd, s.d, s.dl, s.d, s.dl);
-  found.blur_score = swing * rest (s.yb, s.y, s.yl, s.b, s.bl);
-  found.blur_information = swing * swing * rest (s.bb, s.b, s.bl, s.b, s.bl);
-  found.cross = swing * swing * rest (s.bd, s.b, s.bl, s.d, s.dl);
-  found.misfit = rest (s.yy, s.y, s.yl, s.y, s.yl);
-  if (found.information > 0.0f)
-    found.misfit -= found.score * found.score / found.information;
-  return found;
+  return sums.finding (light.swing + sums.more_swing ());
 }
 
 /* Squared residuals by expected number. */
@@ -317,6 +384,7 @@ sum_up (PhaseFit &p)
   const Conditions at (p);
   const CentredFrame frame (p.camera);
   const Homography centred = p.mapping.centred ();
+  const Rounding rounding (p.noise, p.frames);
   PhaseSums sums;
   for (int y = 0; y < p.camera.height; y++) {
     const auto rows_x = rows_of (p.x, y), rows_y = rows_of (p.y, y);
@@ -326,8 +394,10 @@ sum_up (PhaseFit &p)
         continue;
       const float low = p.dark.at (x, y);
       const PixelLight light = {low, p.white.at (x, y) - low};
-      const auto fx = find (rows_x.data (), x, at.x, m.x, light, p.noise);
-      const auto fy = find (rows_y.data (), x, at.y, m.y, light, p.noise);
+      const auto fx =
+          find (rows_x.data (), x, at.x, m.x, light, p.noise, rounding);
+      const auto fy =
+          find (rows_y.data (), x, at.y, m.y, light, p.noise, rounding);
       if (std::min (fx.swing, fy.swing) < kFaintSwing * light.swing) {
         p.faint.at (x, y) = 1;
       } else if (fx.misfit > at.limit_x || fy.misfit > at.limit_y) {

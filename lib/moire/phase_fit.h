@@ -49,6 +49,7 @@ struct PhaseFit {
   ImageView<const float> dark, white;
 
   Mapping mapping;
+  int frames = 1;                      ///< of which each number is the mean
   double blur_x = 0.25, blur_y = 0.25; ///< variances in mirrors squared
   NoiseModel noise = {};
   /** Mean squared residual in units of the noise; at first, nothing is too

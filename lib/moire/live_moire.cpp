@@ -153,6 +153,53 @@ struct Plane {
   Matrix covariance;
 };
 
+/* Of the places of a row: xi, and what is left of their phases. */
+struct RowSums {
+  double n = 0, x = 0, xx = 0, rest = 0, rest_x = 0, squares = 0;
+
+  void add (double xi, double left)
+  {
+    n += 1;
+    x += xi;
+    xx += xi * xi;
+    rest += left;
+    rest_x += left * xi;
+    squares += left * left;
+  }
+};
+
+/* Normal equations of a plane's numbers. */
+struct PlaneSums {
+  Matrix normal = Matrix (9);
+  std::array<double, 3> right = {};
+  double squares = 0.0;
+
+  void add (const RowSums &row, double eta)
+  {
+    const double sums[] = {row.xx, row.x * eta, row.x, row.x * eta,
+        row.n * eta * eta, row.n * eta, row.x, row.n * eta, row.n};
+    for (std::size_t i = 0; i < 9; i++)
+      normal[i] += sums[i];
+    right[0] += row.rest_x;
+    right[1] += row.rest * eta;
+    right[2] += row.rest;
+    squares += row.squares;
+  }
+  double variance () const { return squares / normal[8]; }
+};
+
+/* Sine of what is left of @z's phase when it is turned @back; beyond a quarter
+ * turn, 1. */
+double
+rest_of (Phasor z, Phasor back)
+{
+  const Phasor left = {z.real () * back.real () - z.imag () * back.imag (),
+      z.real () * back.imag () + z.imag () * back.real ()};
+  return left.real () > 0.0f
+             ? double (left.imag () / std::sqrt (std::norm (left)))
+             : std::copysign (1.0, double (left.imag ()));
+}
+
 } // namespace
 
 struct LiveMoire::State {
@@ -326,60 +373,32 @@ LiveMoire::State::refine (
   const double cx = 0.5 * (camera.width - 1), cy = 0.5 * (camera.height - 1);
   const double r = std::max (cx, cy);
   const double step = carrier.period / r;
-  Matrix normal (9);
-  std::array<double, 3> right = {};
-  double squares = 0.0, count = 0.0;
-  const std::complex<float> turn (std::polar (1.0, -sign * plane.at[0] * step));
+  const double xi0 = (phasors.first_x - cx) / r;
+  const Phasor turn (std::polar (1.0, -sign * plane.at[0] * step));
+  PlaneSums sums;
   for (int j = 0; j < phasors.rows; j++) {
     const double eta = (phasors.first_y - cy) / r + j * step;
-    const double xi0 = (phasors.first_x - cx) / r;
-    std::complex<float> back (std::polar (
+    Phasor back (std::polar (
         1.0, -sign * (plane.at[0] * xi0 + plane.at[1] * eta + plane.at[2])));
-    double n = 0, nx = 0, nxx = 0, s = 0, sx = 0;
+    RowSums row;
     for (int i = 0; i < phasors.columns; i++, back *= turn) {
       const std::size_t at = std::size_t (j * phasors.columns + i);
       if (!phasors.shows (at))
         continue;
-      const Phasor z = phasors.at[at];
-      const Phasor left = {z.real () * back.real () - z.imag () * back.imag (),
-          z.real () * back.imag () + z.imag () * back.real ()};
-      const float norm = std::norm (left);
-      const double rest = left.real () > 0.0f
-                              ? double (left.imag () / std::sqrt (norm))
-                              : std::copysign (1.0, double (left.imag ()));
-      if (std::abs (rest) > limit)
-        continue;
-      const double xi = xi0 + i * step;
-      n += 1;
-      nx += xi;
-      nxx += xi * xi;
-      s += rest;
-      sx += rest * xi;
-      squares += rest * rest;
+      if (const double rest = rest_of (phasors.at[at], back);
+          std::abs (rest) <= limit)
+        row.add (xi0 + i * step, rest);
     }
-    count += n;
-    const double sums[] = {nxx, nx * eta, nx, n * eta * eta, n * eta, n};
-    normal[0] += sums[0];
-    normal[1] += sums[1];
-    normal[2] += sums[2];
-    normal[4] += sums[3];
-    normal[5] += sums[4];
-    normal[8] += sums[5];
-    right[0] += sx;
-    right[1] += s * eta;
-    right[2] += s;
+    sums.add (row, eta);
   }
-  normal[3] = normal[1];
-  normal[6] = normal[2];
-  normal[7] = normal[5];
-  const auto inverse = inverted (normal, 3);
+  const auto inverse = inverted (sums.normal, 3);
   if (!inverse)
     return -1.0;
   for (std::size_t i = 0; i < 3; i++)
     for (std::size_t j = 0; j < 3; j++)
-      plane.at[i] += sign * (*inverse)[3 * i + j] * right[j];
+      plane.at[i] += sign * (*inverse)[3 * i + j] * sums.right[j];
   plane.covariance = *inverse;
-  return squares / count;
+  return sums.variance ();
 }
 
 Result<Plane>

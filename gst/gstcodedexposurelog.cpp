@@ -8,8 +8,9 @@
  * keeps the pictures and the schedule, but nothing that travels as meta; this
  * file, its sidecar, keeps the rest.
  *
- * The first line is the schedule in its JSON form, so that a recording that was
- * cut short, before its tags could be written, still decodes. Every line is
+ * The first line is the schedule in its JSON form, and the second one the
+ * mapping, if there is one, so that a recording that was cut short, before its
+ * tags could be written, still decodes. Every line is
  * handed to the system as soon as it is known: a crash costs one line at most.
  *
  * ## Example pipeline
@@ -33,7 +34,6 @@
 #include "gstcodedexposurelines.h"
 #include "gstcodedexposuremeta.h"
 #include "gstcodedexposuretag.h"
-#include "gstproperties.h"
 #include "gstraii.h"
 
 using namespace cexp::gst;
@@ -51,7 +51,9 @@ struct LogState {
   /* Streaming thread, and start and stop, which exclude it: */
   LineFile file;
   guint64 frames = 0;
-  std::optional<cexp::Schedule> schedule; // written last
+  /* Written last. */
+  std::optional<cexp::Schedule> schedule;
+  std::optional<cexp::Mapping> mapping;
 };
 
 enum { PROP_0, PROP_LOCATION };
@@ -85,6 +87,8 @@ frame_line (GstBuffer *frame, guint64 counted, const GstSegment &segment)
     line["slip"] = meta->slip;
     line["lost_before"] = meta->lost_before;
     line["saturated"] = meta->saturated;
+    if (!meta->pattern.empty ())
+      line["pattern"] = meta->pattern;
     if (meta->bits > 0)
       line["bits"] = meta->bits;
   }
@@ -116,34 +120,40 @@ gst_coded_exposure_log_transform_ip (GstBaseTransform *base, GstBuffer *frame)
   return state.file.write (line) ? GST_FLOW_OK : GST_FLOW_ERROR;
 }
 
-/* Tags repeat as they are merged on their way; the schedule is written once. */
+/* Tags repeat as they are merged on their way; what they say is written once.
+ */
 static void
-note_schedule (GstCodedExposureLog *self, GstEvent *event)
+note_setup (GstCodedExposureLog *self, GstEvent *event)
 {
   LogState &state = *self->state;
   GstTagList *tags = nullptr;
   gst_event_parse_tag (event, &tags);
-  const auto schedule = schedule_from_tags (tags);
-  if (!schedule)
+  const auto setup = setup_from_tags (tags);
+  if (!setup)
     return;
-  if (!*schedule) {
+  if (!*setup) {
     GST_ELEMENT_WARNING (self, STREAM, DECODE,
         ("The schedule of the stream is not recorded: %s",
-            schedule->error ().message.c_str ()),
+            setup->error ().message.c_str ()),
         (nullptr));
     return;
   }
-  if (state.schedule == schedule->value ())
-    return;
-  state.schedule = schedule->value ();
-  state.file.write (state.schedule->to_json ());
+  const cexp::StreamSetup &said = setup->value ();
+  if (!(state.schedule == said.schedule)) {
+    state.schedule = said.schedule;
+    state.file.write (state.schedule->to_json ());
+  }
+  if (said.mapping && !(state.mapping == said.mapping)) {
+    state.mapping = said.mapping;
+    state.file.write (state.mapping->to_json ());
+  }
 }
 
 static gboolean
 gst_coded_exposure_log_sink_event (GstBaseTransform *base, GstEvent *event)
 {
   if (GST_EVENT_TYPE (event) == GST_EVENT_TAG)
-    note_schedule (GST_CODED_EXPOSURE_LOG (base), event);
+    note_setup (GST_CODED_EXPOSURE_LOG (base), event);
   return GST_BASE_TRANSFORM_CLASS (parent_class)->sink_event (base, event);
 }
 
@@ -159,6 +169,7 @@ gst_coded_exposure_log_start (GstBaseTransform *base)
   }
   state.frames = 0;
   state.schedule.reset ();
+  state.mapping.reset ();
   if (location.empty ()) {
     GST_ELEMENT_ERROR (self, RESOURCE, NOT_FOUND,
         ("codedexposure-log has no file to write to: set location=FILE.jsonl"),
@@ -185,8 +196,10 @@ gst_coded_exposure_log_set_property (
     return;
   }
   const ObjectLock lock (self);
-  if (!may_set (self, pspec))
+  if (GST_STATE (self) > GST_STATE_READY) {
+    GST_WARNING_OBJECT (self, "location cannot change while frames flow");
     return;
+  }
   const gchar *location = g_value_get_string (value);
   self->state->location = location ? location : "";
 }

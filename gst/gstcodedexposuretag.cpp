@@ -88,12 +88,6 @@ schedule_from_tags (const GstTagList *tags)
 }
 
 GstTagList *
-tags_with_schedule (const GstTagList *tags, const Schedule &schedule)
-{
-  return tags_with_setup (tags, {schedule, {}});
-}
-
-GstTagList *
 tags_with_setup (const GstTagList *tags, const StreamSetup &setup)
 {
   GstTagList *ours = setup_to_tags (setup);

@@ -28,10 +28,7 @@ std::optional<Result<StreamSetup>> setup_from_tags (const GstTagList *tags);
  * where one does and cannot be read. */
 std::optional<Result<Schedule>> schedule_from_tags (const GstTagList *tags);
 
-/** @p tags with @p schedule in place of what they say of one; Transfer: full.
- */
-GstTagList *tags_with_schedule (
-    const GstTagList *tags, const Schedule &schedule);
+/** @p tags with @p setup in place of what they say of one; Transfer: full. */
 GstTagList *tags_with_setup (const GstTagList *tags, const StreamSetup &setup);
 
 } // namespace cexp::gst

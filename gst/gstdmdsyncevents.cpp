@@ -76,12 +76,11 @@ same_slots (const std::optional<Timebase> &before, const Timebase &now)
   return before && before->rate == now.rate;
 }
 
-/* @p first: number of the first one. */
 void
-begin_frames (GstDmdSync *self, std::uint64_t first)
+begin_frames (GstDmdSync *self)
 {
   Stream &stream = state (self).stream;
-  stream.sequence.emplace (stream.time->rate, first);
+  stream.sequence.emplace (stream.time->rate);
   stream.rate_watch.emplace (stream.time->rate);
   begin_phase (self);
   stream.last.reset ();
@@ -104,21 +103,25 @@ own_schedule (GstDmdSync *self, GstEvent *event)
   SyncState &st = state (self);
   GstTagList *tags = nullptr;
   gst_event_parse_tag (event, &tags);
-  const auto theirs = schedule_from_tags (tags);
-  if (theirs && (!*theirs || !(theirs->value () == st.schedule)) &&
+  const auto theirs = setup_from_tags (tags);
+  if (theirs && (!*theirs || !(theirs->value ().schedule == st.schedule)) &&
       !std::exchange (st.stream.warned_tag, true))
     GST_ELEMENT_WARNING (self, STREAM, WRONG_TYPE,
         ("The stream was tagged with the schedule %s, but the DMD shows %s: "
          "the tag now says the latter. Give both elements the same schedule.",
-            *theirs ? theirs->value ().text ().c_str () : "that is unreadable",
+            *theirs ? theirs->value ().schedule.text ().c_str ()
+                    : "that is unreadable",
             st.schedule.text ().c_str ()),
         (nullptr));
   if (gst_tag_list_get_scope (tags) == GST_TAG_SCOPE_GLOBAL && !theirs)
     return event;
 
   /* The last tags of a scope are those that a late link gets: ours are always
-   * among them. */
-  GstEvent *ours = gst_event_new_tag (tags_with_schedule (tags, st.schedule));
+   * among them. How the camera stands is not ours to say. */
+  if (theirs && *theirs)
+    st.stream.mapping = theirs->value ().mapping;
+  GstEvent *ours = gst_event_new_tag (
+      tags_with_setup (tags, {st.schedule, st.stream.mapping}));
   gst_event_set_seqnum (ours, gst_event_get_seqnum (event));
   gst_event_unref (event);
   return ours;
@@ -200,10 +203,7 @@ set_caps (GstBaseTransform *trans, GstCaps *incaps, GstCaps *)
     const ObjectLock lock (self);
     st.time = *time;
   }
-  /* Other caps are another stretch of the same stream. */
-  begin_frames (
-      self, st.stream.sequence ? st.stream.sequence->next_number () : 0);
-  st.stream.discont = true;
+  begin_frames (self);
   update_latency (self);
   give_back (self, "caps");
   if (!st.runner || !restart)
@@ -235,9 +235,8 @@ sink_event (GstBaseTransform *trans, GstEvent *event)
     st.stream.tag_due = true;
     st.stream.warned_tag = false;
     st.stream.discont = true;
-    st.stream.sequence.reset ();
     if (st.stream.time)
-      begin_frames (self, 0);
+      begin_frames (self);
     break;
   case GST_EVENT_SEGMENT:
     return take_segment (self, event);

@@ -26,6 +26,7 @@
 #include "gstraii.h"
 #include "gstsourcekeeper.h"
 #include "schedule/schedule.h"
+#include "schedule/stream_setup.h"
 
 GST_DEBUG_CATEGORY_EXTERN (dmdsync_debug);
 
@@ -88,9 +89,8 @@ struct Stream {
   std::optional<Timebase> time;
   std::optional<FrameSequence> sequence;
   std::optional<RateWatch> rate_watch;
-  std::optional<MonoFormat> format; ///< of the pixels, where known
-  /** How long the source's ring lets frames be kept; none: as one likes. */
-  GstClockTime ring = GST_CLOCK_TIME_NONE;
+  std::optional<MonoFormat> format;            ///< of the pixels, where known
+  GstClockTime max_hold = GST_CLOCK_TIME_NONE; ///< none: as long as one likes
   DeviceClock device_clock;
   GstClockTime last_arrival = GST_CLOCK_TIME_NONE;
   GstClockTime last_time = 0; ///< of the newest frame, by the pipeline's clock
@@ -106,6 +106,7 @@ struct Stream {
   bool discont = true;         ///< the next frame does not follow the last one
   bool tag_due = true;
   bool warned_tag = false;
+  std::optional<Mapping> mapping; ///< that upstream's tags say
   std::string refused; ///< what was said of the caps that were refused last
 };
 

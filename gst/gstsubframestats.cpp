@@ -48,7 +48,6 @@
 #include "gstcodedexposurecaps.h"
 #include "gstcodedexposurelines.h"
 #include "gstcodedexposuremeta.h"
-#include "gstproperties.h"
 #include "gstraii.h"
 #include "gstsubframestatsreport.h"
 
@@ -289,8 +288,6 @@ gst_subframe_stats_set_property (
     return std::string (given ? given : "");
   };
   const ObjectLock lock (self);
-  if (!may_set (self, pspec))
-    return;
   Settings &settings = self->state->settings;
   switch (id) {
   case PROP_LOCATION:

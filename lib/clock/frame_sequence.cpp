@@ -11,10 +11,7 @@ namespace
 constexpr Nanoseconds kRestartAfter = 1'000'000'000;
 }
 
-FrameSequence::FrameSequence (FrameRate rate, std::uint64_t first)
-    : period_ (rate.period ()), next_number_ (first)
-{
-}
+FrameSequence::FrameSequence (FrameRate rate) : period_ (rate.period ()) {}
 
 void
 FrameSequence::resync ()

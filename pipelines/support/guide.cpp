@@ -76,7 +76,7 @@ private:
   {
     auto *guide = static_cast<Guide *> (self);
     guide->status_.line ("stopped; the mirrors are given back");
-    guide->quit (kFailed);
+    guide->quit (guide->is_done () ? kDone : kFailed);
     return G_SOURCE_CONTINUE;
   }
   static gboolean on_key (gint, GIOCondition, gpointer self)
@@ -85,6 +85,7 @@ private:
   }
 
   gboolean take_key ();
+  bool is_done ();
   void on_message (GstMessage *message);
   void on_element (const GstStructure *structure);
   void on_state (const std::string &state);
@@ -102,6 +103,7 @@ private:
   GMainLoop *loop_;
   ObjectPtr<GstElement> pipeline_, calib_, stage_;
   int readings_ = 0;
+  std::string last_reading_;
   bool mapped_ = false;
   int code_ = kDone;
 };
@@ -136,6 +138,21 @@ Guide::take_key ()
     gst_util_set_object_arg (G_OBJECT (calib_.get ()), "mode", "map");
   }
   return G_SOURCE_CONTINUE;
+}
+
+/* Alignment alone is done when the person says so; its result is the last
+ * reading. */
+bool
+Guide::is_done ()
+{
+  GValue mode = G_VALUE_INIT;
+  g_object_get_property (G_OBJECT (calib_.get ()), "mode", &mode);
+  const CharPtr text (gst_value_serialize (&mode));
+  g_value_unset (&mode);
+  if (std::string_view (text.get ()) != "align" || last_reading_.empty ())
+    return mapped_;
+  status_.line (last_reading_);
+  return true;
 }
 
 void
@@ -176,6 +193,12 @@ Guide::on_reading (const GstStructure *reading)
       text_of (reading, "state").c_str (), arrow (x, "→", "←").c_str (), x,
       arrow (y, "↓", "↑").c_str (), y, arrow (theta, "↻", "↺").c_str (), theta,
       magnify, number_of (reading, "deviation")));
+  last_reading_ = format (
+      "%s: rotation %+.5f deg, magnification %.6f, offset %+.5f, %+.5f mirrors "
+      "(worst corner %.3f)",
+      text_of (reading, "state").c_str (), number_of (reading, "rotation"),
+      number_of (reading, "magnification"), number_of (reading, "offset-x"),
+      number_of (reading, "offset-y"), number_of (reading, "deviation"));
   if (stage_ && ++readings_ % kHandsOff == 0)
     turn_stage (reading);
 }

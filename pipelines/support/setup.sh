@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 # Installs what is missing and builds; sourced by pipelines/demo and tests/run.
 #
-#   install_packages run|report|tests   Debian packages; tests need all of them
+#   install_packages run|report|tests|rivals
+#                                Debian packages; tests need all but rivals
 #   build_tree DIR OPTION...     meson setup and compile
 #   sample_video                 path of the sample clip, fetched when needed
 #
@@ -38,6 +39,7 @@ iproute2|the network that it is alone on|tests
 umockdev|a USB in software for the tests of DMDs|tests
 xvfb|a screen for the window tests|tests
 shellcheck|checks the scripts|tests
+libopencv-video-dev|calibrations of others, to compare with|rivals
 '
 
 note ()
@@ -62,7 +64,8 @@ missing_packages ()
   local name reason who
   while IFS='|' read -r name reason who; do
     [ -n "$name" ] || continue
-    if [ "$who" = run ] || [ "$who" = "$1" ] || [ "$1" = tests ]; then
+    if [ "$who" = run ] || [ "$who" = "$1" ] \
+        || { [ "$1" = tests ] && [ "$who" != rivals ]; }; then
       is_installed "$name" || printf '%s|%s\n' "$name" "$reason"
     fi
   done <<< "$packages"

@@ -68,6 +68,28 @@ TEST (DmdsyncTag, ReplacesAnotherScheduleAndWarnsOnce)
   EXPECT_EQ (sync.warning (), "");
 }
 
+TEST (DmdsyncTag, KeepsTheMappingOfAnotherSchedule)
+{
+  SyncHarness sync ("schedule=staircase:2x2");
+  sync.start ();
+  ASSERT_TRUE (sync.pull_event (GST_EVENT_TAG));
+  const Mapping mapping (Extent{64, 48});
+  GstTagList *title = gst_tag_list_new (GST_TAG_TITLE, "milk drop", nullptr);
+  for (GstEvent *event :
+      {setup_to_event ({*Schedule::parse ("sequential:2x2"), mapping}),
+          gst_event_new_tag (title)}) {
+    sync.push_event (event);
+    const EventPtr passed = sync.pull_event (GST_EVENT_TAG);
+    ASSERT_TRUE (passed);
+    GstTagList *tags = nullptr;
+    gst_event_parse_tag (passed.get (), &tags);
+    const auto setup = setup_from_tags (tags);
+    ASSERT_TRUE (setup && *setup);
+    EXPECT_EQ (setup->value (),
+        (StreamSetup{*Schedule::parse ("staircase:2x2"), mapping}));
+  }
+}
+
 TEST (DmdsyncTag, StaysAmongTagsThatComeLater)
 {
   SyncHarness sync ("schedule=staircase:2x2");
@@ -116,44 +138,6 @@ TEST (DmdsyncCaps, ARateThatIsUnknownComesFromTheSlots)
   const BufferPtr frame = with.pull ();
   ASSERT_TRUE (frame);
   EXPECT_EQ (GST_BUFFER_DURATION (frame.get ()), 40 * kMs);
-}
-
-TEST (DmdsyncCaps, NumbersGoOnWhenTheyChange)
-{
-  SyncHarness sync;
-  sync.start ();
-  sync.send_frames (0, 3);
-  sync.set_caps ("video/x-raw,format=GRAY8,width=64,height=48,framerate=25/1,"
-                 "pixel-aspect-ratio=2/1");
-  ASSERT_EQ (sync.send (sync.time_of (3)), GST_FLOW_OK);
-  for (guint64 number = 0; number < 4; number++) {
-    const BufferPtr frame = sync.pull ();
-    ASSERT_TRUE (frame);
-    EXPECT_EQ (meta_of (frame).frame, number);
-    EXPECT_EQ (GST_BUFFER_OFFSET (frame.get ()), number);
-    EXPECT_EQ (has_flag (frame, GST_BUFFER_FLAG_DISCONT), number % 3 == 0);
-  }
-}
-
-TEST (DmdsyncCaps, RowsMayBeAsFarApartAsAFrameSays)
-{
-  constexpr int kOdd = 30, kRows = 20;
-  SyncHarness sync;
-  sync.set_caps (gray_caps (kOdd, kRows, "25/1"));
-  const auto push = [&] (gsize size, int number) {
-    BufferPtr frame (gst_buffer_new_and_alloc (size));
-    gsize offsets[GST_VIDEO_MAX_PLANES] = {0};
-    gint strides[GST_VIDEO_MAX_PLANES] = {kOdd};
-    gst_buffer_add_video_meta_full (frame.get (), GST_VIDEO_FRAME_FLAG_NONE,
-        GST_VIDEO_FORMAT_GRAY8, kOdd, kRows, 1, offsets, strides);
-    GST_BUFFER_PTS (frame.get ()) = GstClockTime (number) * 40 * kMs;
-    return sync.push (std::move (frame));
-  };
-  ASSERT_EQ (push (kOdd * kRows, 0), GST_FLOW_OK);
-  EXPECT_TRUE (sync.pull ());
-  ASSERT_EQ (push (kOdd * kRows - 1, 1), GST_FLOW_OK);
-  EXPECT_FALSE (sync.pull ());
-  EXPECT_EQ (sync.counter ("frames-incomplete"), 1u);
 }
 
 TEST (DmdsyncCaps, AFrameThatCannotHoldThePilotIsAnError)

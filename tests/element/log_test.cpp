@@ -115,6 +115,7 @@ TEST_F (LogTest, WritesWhatTheMetaSays)
   meta.saturated = 5;
   meta.bits = 12;
   meta.time_uncertainty = 47'000;
+  meta.pattern = "grating-both:4/0";
   set_frame_meta (buffer.get (), meta);
   GST_BUFFER_FLAG_SET (buffer.get (), GST_BUFFER_FLAG_DISCONT);
   GST_BUFFER_FLAG_SET (buffer.get (), GST_BUFFER_FLAG_CORRUPTED);
@@ -125,6 +126,7 @@ TEST_F (LogTest, WritesWhatTheMetaSays)
       "exposure_start_ns": 80000000, "exposure_duration_ns": 39200000,
       "time_uncertainty_ns": 47000, "locked": true, "slip": -1,
       "lost_before": 2, "saturated": 5, "bits": 12,
+      "pattern": "grating-both:4/0",
       "flags": ["discont", "corrupted"]})"));
 }
 
@@ -168,6 +170,21 @@ TEST_F (LogTest, ScheduleComesFirstAndOnce)
   const auto read_back = Schedule::from_json (lines ()[0].dump ());
   ASSERT_TRUE (read_back) << read_back.error ().message;
   EXPECT_EQ (*read_back, staircase);
+}
+
+TEST_F (LogTest, MappingFollowsTheSchedule)
+{
+  const StreamSetup mapped = {
+      *Schedule::from_preset ("staircase:2x2"), Mapping (Extent{16, 8})};
+  play (path_.get ());
+  gst_harness_push_event (harness_.get (), schedule_to_event (mapped.schedule));
+  for (int i = 0; i < 2; i++) {
+    gst_harness_push_event (harness_.get (), setup_to_event (mapped));
+    ASSERT_EQ (push (frame (GstClockTime (i) * 33'366'666)), GST_FLOW_OK);
+  }
+  ASSERT_EQ (lines ().size (), 4u);
+  EXPECT_EQ (lines ()[0], Json::parse (mapped.schedule.to_json ()));
+  EXPECT_EQ (lines ()[1], Json::parse (mapped.mapping->to_json ()));
 }
 
 TEST_F (LogTest, NewScheduleIsWrittenBeforeItsFrames)

@@ -15,8 +15,8 @@
  * shows Gray codes and gratings, one after the other, gives the mirrors back,
  * and finds the mapping from each pixel to its mirror. The mapping is the
  * #moirecalib:mapping property, an element message, the file
- * #moirecalib:location, and part of the stream tag that says the schedule; a
- * codedexposure-demux behind it uses it from then on.
+ * #moirecalib:location, and part of the stream tag that says the schedule;
+ * codedexposure-demux and codedexposure-fuse behind it use it from then on.
  *
  * Frames pass without waiting: a thread of its own solves and draws. While it
  * is busy, frames pass with the panel that was drawn last.
@@ -315,30 +315,101 @@ install_flag (GObjectClass *klass, guint id, const char *name, const char *nick,
 void
 install_run (GObjectClass *klass)
 {
+  /**
+   * moirecalib:mode:
+   *
+   * What is to be done. A change begins it anew, at the next frame.
+   *
+   * Since: 0.1
+   */
   g_object_class_install_property (klass, PROP_MODE,
       g_param_spec_enum ("mode", "Mode",
           "What is to be done; a change begins it anew",
           GST_TYPE_MOIRE_CALIB_MODE, int (kDefaults.mode), kPlaying));
+  /**
+   * moirecalib:location:
+   *
+   * The mapping is written there when it is found; empty: to no file.
+   *
+   * Since: 0.1
+   */
   install_text (klass, PROP_LOCATION, "location", "Location",
       "File to write the mapping to, JSON (docs/formats.md)");
+  /**
+   * moirecalib:report:
+   *
+   * A picture of what was found, for people; empty: none.
+   *
+   * Since: 0.1
+   */
   install_text (klass, PROP_REPORT, "report", "Report",
       "File to write a picture of fringes, residuals and pixels to, PNG");
+  /**
+   * moirecalib:pattern:
+   *
+   * For a DMD that takes no masks at run time. Nothing is asked of upstream
+   * then, and there is no mapping.
+   *
+   * Since: 0.1
+   */
   install_text (klass, PROP_PATTERN, "pattern", "Pattern",
       "Grating that the mirrors show without being asked, such as "
       "grating-both:4/0; empty: upstream is asked for patterns");
+  /**
+   * moirecalib:overlay:
+   *
+   * Without it frames pass as they are, and only messages tell.
+   *
+   * Since: 0.1
+   */
   install_flag (klass, PROP_OVERLAY, "overlay", "Overlay",
       "Lay fringes, numbers and arrows over the picture", kDefaults.overlay);
+  /**
+   * moirecalib:period:
+   *
+   * Longer periods take more patterns and stand more blur.
+   *
+   * Since: 0.1
+   */
   install_number (klass, PROP_PERIOD, "period", "Period",
       "Period of the gratings of a mapping, mirrors, even", 4, 64,
       kDefaults.period);
+  /**
+   * moirecalib:frames:
+   *
+   * More of them take longer and leave less noise.
+   *
+   * Since: 0.1
+   */
   install_number (klass, PROP_FRAMES, "frames", "Frames",
       "Frames of each pattern of a mapping, which are averaged", 1, 1000,
       kDefaults.frames);
+  /**
+   * moirecalib:bits:
+   *
+   * Where pixels are saturated depends on it.
+   *
+   * Since: 0.1
+   */
   install_number (klass, PROP_BITS, "bits", "Bits",
       "Significant bits of GRAY16_LE frames; 0: all", 0, 16, kDefaults.bits);
+  /**
+   * moirecalib:state:
+   *
+   * How far it is, as in the message `moirecalib/state`; notifies.
+   *
+   * Since: 0.1
+   */
   install_text (klass, PROP_STATE, "state", "State",
       "searching, coarse, fine, aligned, mapping, solving, mapped or failed",
       kReadOnly);
+  /**
+   * moirecalib:mapping:
+   *
+   * As in #moirecalib:location; notifies.
+   *
+   * Since: 0.1
+   */
   install_text (klass, PROP_MAPPING, "mapping", "Mapping",
       "The mapping that was found last, JSON (docs/formats.md); empty before",
       kReadOnly);
@@ -348,24 +419,67 @@ void
 install_stage (GObjectClass *klass)
 {
   const StageOptions &stage = kDefaults.stage;
+  /**
+   * moirecalib:tolerance:
+   *
+   * Where alignment ends.
+   *
+   * Since: 0.1
+   */
   g_object_class_install_property (klass, PROP_TOLERANCE,
       g_param_spec_double ("tolerance", "Tolerance",
           "Largest distance of any pixel from its place at which the bench is "
           "aligned, mirrors",
           0.001, 10, stage.tolerance, kPlaying));
+  /**
+   * moirecalib:mirror-pitch:
+   *
+   * Turns mirrors into micrometres of the stage.
+   *
+   * Since: 0.1
+   */
   g_object_class_install_property (klass, PROP_MIRROR_PITCH,
       g_param_spec_double ("mirror-pitch", "Mirror pitch",
           "Way of the camera's stage for one mirror, micrometres: the pitch of "
           "the mirrors times the magnification of the optics",
           0.01, 1000, stage.mirror_pitch, kPlaying));
+  /**
+   * moirecalib:pixels-per-mirror:
+   *
+   * The magnification that alignment aims at, and from which fringes are
+   * looked for.
+   *
+   * Since: 0.1
+   */
   g_object_class_install_property (klass, PROP_PIXELS_PER_MIRROR,
       g_param_spec_double ("pixels-per-mirror", "Pixels per mirror",
           "Magnification that is wanted", 0.25, 16, stage.pixels_per_mirror,
           kPlaying));
+  /**
+   * moirecalib:flip-x:
+   *
+   * For stages that run the other way; so are the other two.
+   *
+   * Since: 0.1
+   */
   install_flag (klass, PROP_FLIP_X, "flip-x", "Flip x",
       "The stage's x runs against the picture's", false);
+  /**
+   * moirecalib:flip-y:
+   *
+   * See #moirecalib:flip-x.
+   *
+   * Since: 0.1
+   */
   install_flag (klass, PROP_FLIP_Y, "flip-y", "Flip y",
       "The stage's y runs against the picture's", false);
+  /**
+   * moirecalib:flip-theta:
+   *
+   * See #moirecalib:flip-x.
+   *
+   * Since: 0.1
+   */
   install_flag (klass, PROP_FLIP_THETA, "flip-theta", "Flip theta",
       "The stage's angle runs anticlockwise in the picture", false);
 }

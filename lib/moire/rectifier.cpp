@@ -46,6 +46,7 @@ using Limits = std::array<float, FilterBank::kNoises.size () - 1>;
 Limits
 limits_of (const Schedule &schedule)
 {
+  constexpr float kAll = std::numeric_limits<float>::infinity ();
   Limits limits;
   for (std::size_t i = 0; i < limits.size (); i++)
     limits[i] =
@@ -53,7 +54,7 @@ limits_of (const Schedule &schedule)
   /* Elements of different brightness differ without any scene. */
   for (int e = 1; e < schedule.elements (); e++)
     if (schedule.code ().open_slots (e) != schedule.code ().open_slots (0))
-      limits = {std::numeric_limits<float>::infinity (), -2e9f, -2e9f};
+      limits = {kAll, -kAll, -kAll};
   return limits;
 }
 

@@ -21,18 +21,18 @@ struct Eight {
 
 typedef std::uint8_t Bytes __attribute__ ((vector_size (8)));
 typedef std::uint16_t Words __attribute__ ((vector_size (16)));
-typedef std::int32_t Ints __attribute__ ((vector_size (16)));
 
-/* Numbers are widened by zeros between them. */
 inline Eight
 to_floats (Words n)
 {
-  constexpr Words kZero = {};
-  return {__builtin_convertvector(Ints (__builtin_shufflevector (
-                                      n, kZero, 0, 8, 1, 9, 2, 10, 3, 11)),
+  typedef std::int32_t Ints __attribute__ ((vector_size (16)));
+  return {__builtin_convertvector(
+              __builtin_convertvector(
+                  __builtin_shufflevector (n, n, 0, 1, 2, 3), Ints),
               Four),
       __builtin_convertvector(
-          Ints (__builtin_shufflevector (n, kZero, 4, 12, 5, 13, 6, 14, 7, 15)),
+          __builtin_convertvector(
+              __builtin_shufflevector (n, n, 4, 5, 6, 7), Ints),
           Four)};
 }
 

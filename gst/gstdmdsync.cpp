@@ -200,6 +200,9 @@ change_state (GstElement *element, GstStateChange transition)
     begin_run (self);
     sync::keep_source (self);
   }
+  /* The source comes after this. */
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_PLAYING)
+    sync::free_source (self);
   /* First, because the streaming thread may be waiting for the DMD, and who
    * starts the source anew for that thread. */
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {

@@ -43,8 +43,7 @@ GstClockTime
 ring_time (GstDmdSync *self)
 {
   for (const auto &element : elements_before (self)) {
-    if (!g_object_class_find_property (
-            G_OBJECT_GET_CLASS (element.get ()), "num-arv-buffers"))
+    if (!is_aravissrc (element.get ()))
       continue;
     gint buffers = 0;
     g_object_get (element.get (), "num-arv-buffers", &buffers, nullptr);

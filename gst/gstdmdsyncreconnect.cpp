@@ -88,6 +88,29 @@ elements_before (GstDmdSync *self)
   return found;
 }
 
+bool
+is_aravissrc (GstElement *element)
+{
+  return g_object_class_find_property (
+      G_OBJECT_GET_CLASS (element), "num-arv-buffers");
+}
+
+/* Like every live source that stamps frames, aravissrc holds each until its
+ * time has come by the pipeline's clock: ever longer, where the camera's is
+ * fast. Without a clock it does not. */
+void
+free_source (GstDmdSync *self)
+{
+  {
+    const ObjectLock lock (self);
+    if (state (self).settings.timestamp_at != TimestampAt::device_clock)
+      return;
+  }
+  for (const auto &element : elements_before (self))
+    if (is_aravissrc (element.get ()))
+      gst_element_set_clock (element.get (), nullptr);
+}
+
 void
 keep_source (GstDmdSync *self)
 {
@@ -105,6 +128,7 @@ keep_source (GstDmdSync *self)
       SourceKeeper::keep (std::move (before.back ()), GST_ELEMENT (self), tries,
           {.lost = [self] (const std::string &why) { say_lost (self, why); },
               .stopping = [self] { let_go (self); },
+              .starting = [self] { free_source (self); },
               .gave_up =
                   [self, tries] (
                       const std::string &why) { give_up (self, tries, why); }});

@@ -167,9 +167,13 @@ void note_end (GstDmdSync *self);
 /** Says it when frames come at another rate than that of the caps. */
 void watch_rate (GstDmdSync *self, GstClockTime time);
 
-/* A camera that goes away and comes back. */
+/* The source, and a camera that goes away and comes back. */
 /** What the frames come through, the nearest first, the source last. */
 std::vector<ObjectPtr<GstElement>> elements_before (GstDmdSync *self);
+bool is_aravissrc (GstElement *element);
+/** Has frames come when they come, and not at the times that they bear, where
+ * that is told from when they arrive. */
+void free_source (GstDmdSync *self);
 /** Sees to it, where the settings say so, that a source that fails is started
  * anew. */
 void keep_source (GstDmdSync *self);

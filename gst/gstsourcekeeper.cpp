@@ -225,6 +225,7 @@ SourceKeeper::restart ()
     gst_element_set_clock (source_.get (), clock.get ());
     gst_element_set_base_time (
         source_.get (), gst_element_get_base_time (owner_));
+    reports_.starting ();
     if (gst_element_sync_state_with_parent (source_.get ()))
       return;
   }

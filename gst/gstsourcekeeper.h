@@ -37,6 +37,8 @@ public:
     std::function<void (const std::string &why)> lost;
     /** The source is about to be stopped, and its memory to go. */
     std::function<void ()> stopping;
+    /** It has clock and base time again, and is about to be started. */
+    std::function<void ()> starting;
     /** All tries were in vain. */
     std::function<void (const std::string &why)> gave_up;
   };

@@ -131,6 +131,25 @@ TEST (Gige, WideFormatsKeepTheirBits)
   }
 }
 
+/* A live source holds frames until their times have come by the pipeline's
+ * clock: those of a camera that is fast would seem to be right. */
+TEST (Gige, ACameraThatIsFastIsNeitherHeldUpNorBelieved)
+{
+  GigeCameraOptions options;
+  options.drift = 500;
+  const auto camera = open_camera (std::move (options));
+  CameraPipeline pipeline (
+      camera_source ("100/1", "GRAY8", "num-buffers=300") + kSync,
+      [] (auto *, auto &) {});
+  pipeline.play ();
+  EXPECT_EQ (pipeline.wait_end (), "end");
+  const auto sync = pipeline.element ("sync");
+  const StructurePtr stats (property<GstStructure *> (sync.get (), "stats"));
+  double drift = 0;
+  EXPECT_TRUE (gst_structure_get_double (stats.get (), "clock-drift", &drift));
+  EXPECT_NEAR (drift, 500, 150) << "ppm";
+}
+
 TEST (Gige, EveryFaultIsAccountedFor)
 {
   GigeCameraOptions options;

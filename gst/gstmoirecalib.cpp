@@ -158,6 +158,7 @@ set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
   switch (id) {
   case PROP_MODE:
     settings.mode = Mode (g_value_get_enum (value));
+    settings.turn++;
     break;
   case PROP_LOCATION:
     settings.location = text_of (value);
@@ -167,9 +168,6 @@ set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
     break;
   case PROP_PATTERN:
     settings.pattern = text_of (value);
-    if (!settings.pattern.empty () && !Pattern::parse (settings.pattern))
-      GST_WARNING_OBJECT (
-          object, "%s is no pattern", settings.pattern.c_str ());
     break;
   case PROP_OVERLAY:
     settings.overlay = g_value_get_boolean (value);
@@ -318,13 +316,14 @@ install_run (GObjectClass *klass)
   /**
    * moirecalib:mode:
    *
-   * What is to be done. A change begins it anew, at the next frame.
+   * What is to be done. Setting it begins it anew, at the next frame, also
+   * when it is what it was.
    *
    * Since: 0.1
    */
   g_object_class_install_property (klass, PROP_MODE,
       g_param_spec_enum ("mode", "Mode",
-          "What is to be done; a change begins it anew",
+          "What is to be done; setting it begins it anew",
           GST_TYPE_MOIRE_CALIB_MODE, int (kDefaults.mode), kPlaying));
   /**
    * moirecalib:location:

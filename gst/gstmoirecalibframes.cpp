@@ -125,6 +125,13 @@ begin (GstMoireCalib *self, const Settings &settings)
 {
   CalibState &st = state (self);
   Stream &stream = st.stream;
+  if (const auto shown = Pattern::parse (live_pattern (settings)); !shown) {
+    GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
+        ("The pattern property cannot be read: %s",
+            shown.error ().message.c_str ()),
+        (nullptr));
+    return false;
+  }
   const Mirrors mirrors = ask_mirrors (self);
   if (settings.pattern.empty () && !mirrors.patterns)
     return refuse (self, mirrors.reason);
@@ -147,7 +154,7 @@ begin (GstMoireCalib *self, const Settings &settings)
     st.exchange.aligned_readings = 0;
   }
   stream.begun = true;
-  stream.mode = settings.mode;
+  stream.turn = settings.turn;
   stream.mapping = false;
   set_stage (self, Stage::searching);
   return ask (self, live_pattern (settings));
@@ -331,7 +338,7 @@ transform_ip (GstBaseTransform *trans, GstBuffer *buffer)
   const Settings settings = settings_of (self);
   if (!stream.info)
     return GST_FLOW_NOT_NEGOTIATED;
-  if ((!stream.begun || stream.mode != settings.mode) &&
+  if ((!stream.begun || stream.turn != settings.turn) &&
       !begin (self, settings))
     return GST_FLOW_ERROR;
 

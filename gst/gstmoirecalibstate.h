@@ -43,6 +43,7 @@ enum class Stage {
 
 struct Settings {
   Mode mode = Mode::automatic;
+  guint turn = 0; ///< how often the mode was set
   std::string location;
   std::string report;
   std::string pattern;
@@ -94,12 +95,12 @@ struct Stream {
   std::optional<GstVideoInfo> info;
   std::optional<StreamSetup> setup; ///< that upstream said
   bool begun = false;
-  Mode mode = Mode::automatic; ///< that was begun
-  std::string asked;           ///< pattern that upstream shows for us, or will
-  bool mapping = false;        ///< not aligning
-  std::size_t next = 0;        ///< pattern of the calibration
-  int taken = 0;               ///< frames of it
-  guint64 frames = 0;          ///< since the last request
+  guint turn = 0;       ///< that was begun
+  std::string asked;    ///< pattern that upstream shows for us, or will
+  bool mapping = false; ///< not aligning
+  std::size_t next = 0; ///< pattern of the calibration
+  int taken = 0;        ///< frames of it
+  guint64 frames = 0;   ///< since the last request
 };
 
 /** Behind the GObject. The object lock is a leaf. */

@@ -76,7 +76,10 @@ private:
   void collect (const Sample &sample);
   void solve ();
   void finish (const CalibrationResult &result);
-  std::string write_files (
+  struct Written {
+    std::string location, report; ///< empty: not
+  };
+  Written write_files (
       const CalibrationResult &result, const Settings &settings);
   void fail (const std::string &why);
   void set (Stage stage);
@@ -96,6 +99,7 @@ private:
   std::optional<StageCorrection> correction_;
   int aligned_ = 0;
   int collected_ = 0;
+  bool failed_ = false; ///< in this run
 };
 
 void
@@ -125,6 +129,7 @@ Worker::begin (guint run)
   correction_.reset ();
   aligned_ = 0;
   collected_ = 0;
+  failed_ = false;
 }
 
 template <typename Use>
@@ -210,6 +215,8 @@ Worker::align (const Sample &sample)
 void
 Worker::collect (const Sample &sample)
 {
+  if (failed_)
+    return;
   const int total = int (geometry_.patterns.size ()) * settings_.frames;
   if (!calibration_) {
     settings_ = settings_of (self_);
@@ -238,9 +245,11 @@ Worker::collect (const Sample &sample)
   draw ("mapping", {text}, double (collected_) / std::max (1, total));
 }
 
+/* Once: what the next frames have to say would be the same. */
 void
 Worker::fail (const std::string &why)
 {
+  failed_ = true;
   calibration_.reset ();
   set (Stage::failed);
   draw ("no mapping", {why}, {});
@@ -263,15 +272,21 @@ Worker::solve ()
   calibration_.reset ();
 }
 
-/** Returns what could not be written, "" for nothing. */
-std::string
+Worker::Written
 Worker::write_files (const CalibrationResult &result, const Settings &settings)
 {
+  Written written;
+  const auto take = [this] (const std::string &path, const Result<void> &done) {
+    if (!done)
+      GST_ELEMENT_WARNING (self_, RESOURCE, WRITE,
+          ("%s", done.error ().message.c_str ()), (nullptr));
+    return done ? path : "";
+  };
   if (!settings.location.empty ())
-    if (const auto saved = result.mapping.save (settings.location); !saved)
-      return saved.error ().message;
+    written.location =
+        take (settings.location, result.mapping.save (settings.location));
   if (settings.report.empty ())
-    return "";
+    return written;
   const StageCorrection found = correct_stage (result.mapping, settings.stage);
   const Stance sigma = result.mapping.stance_sigma ();
   const CalibrationReport report{.title = "Camera against mirrors",
@@ -287,18 +302,16 @@ Worker::write_files (const CalibrationResult &result, const Settings &settings)
       .before = before_,
       .after = after_,
       .result = &result};
-  const auto written = write_report (settings.report, report);
-  return written ? "" : written.error ().message;
+  written.report =
+      take (settings.report, write_report (settings.report, report));
+  return written;
 }
 
 void
 Worker::finish (const CalibrationResult &result)
 {
   const Settings settings = settings_of (self_);
-  if (const std::string unwritten = write_files (result, settings);
-      !unwritten.empty ())
-    GST_ELEMENT_WARNING (
-        self_, RESOURCE, WRITE, ("%s", unwritten.c_str ()), (nullptr));
+  const Written written = write_files (result, settings);
   {
     const ObjectLock lock (self_);
     state (self_).mapping = result.mapping.to_json ();
@@ -322,7 +335,7 @@ Worker::finish (const CalibrationResult &result)
   say_progress (self_, GST_PROGRESS_TYPE_COMPLETE,
       "mapped with " + std::to_string (collected_) + " frames");
   g_object_notify (G_OBJECT (self_), "mapping");
-  say_mapping (self_, result, settings.location, settings.report);
+  say_mapping (self_, result, written.location, written.report);
 }
 
 void

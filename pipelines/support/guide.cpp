@@ -105,6 +105,8 @@ private:
   int readings_ = 0;
   std::string last_reading_;
   bool mapped_ = false;
+  bool unwritten_ = false; ///< a file that was asked for
+  bool listens_ = false;   ///< to keys
   int code_ = kDone;
 };
 
@@ -172,6 +174,10 @@ Guide::on_state (const std::string &state)
     status_.line ("showing patterns; touch nothing");
   else if (state == "solving")
     status_.line ("solving; the mirrors show the schedule again");
+  else if (state == "failed" && listens_)
+    status_.line ("no mapping: set the bench right; Enter tries again");
+  else if (state == "failed")
+    quit (kFailed);
 }
 
 std::string
@@ -239,9 +245,15 @@ Guide::on_mapping (const GstStructure *mapping)
   status_.line (format ("pixels: %" G_GUINT64_FORMAT " good, %" G_GUINT64_FORMAT
                         " see no mirror, %" G_GUINT64_FORMAT " saturated",
       good, uncovered, saturated));
-  for (const char *file : {"location", "report"})
-    if (const std::string path = text_of (mapping, file); !path.empty ())
+  for (const char *file : {"location", "report"}) {
+    const std::string path = text_of (mapping, file);
+    if (!path.empty ())
       status_.line ("wrote " + path);
+    gchar *asked = nullptr;
+    g_object_get (calib_.get (), file, &asked, nullptr);
+    unwritten_ |= path.empty () && asked && *asked;
+    g_free (asked);
+  }
   gst_element_send_event (pipeline_.get (), gst_event_new_eos ());
 }
 
@@ -264,7 +276,7 @@ Guide::on_message (GstMessage *message)
   gchar *text = nullptr;
   switch (GST_MESSAGE_TYPE (message)) {
   case GST_MESSAGE_EOS:
-    quit (mapped_ ? kDone : kFailed);
+    quit (mapped_ && !unwritten_ ? kDone : kFailed);
     return;
   case GST_MESSAGE_ERROR:
     gst_message_parse_error (message, &error, &text);
@@ -299,7 +311,8 @@ Guide::run ()
   gst_bus_add_watch (bus.get (), on_bus, this);
   const guint sources[] = {g_unix_signal_add (SIGINT, on_signal, this),
       g_unix_signal_add (SIGTERM, on_signal, this)};
-  if (isatty (STDIN_FILENO))
+  listens_ = isatty (STDIN_FILENO) != 0;
+  if (listens_)
     g_unix_fd_add (STDIN_FILENO, G_IO_IN, on_key, this);
   gst_element_set_state (pipeline_.get (), GST_STATE_PLAYING);
   g_main_loop_run (loop_);

@@ -156,6 +156,34 @@ TEST_F (MoireCalibTest, MapsAndTellsEverybody)
   EXPECT_TRUE (get_frame_meta (last.get ())->locked);
 }
 
+TEST_F (MoireCalibTest, NamesNoFileThatItCouldNotWrite)
+{
+  begin (
+      "mode=map frames=1 location=/proc/no/map.json report=/proc/no/map.png");
+  const MessagePtr said = wait_for ("moirecalib/mapping");
+  ASSERT_TRUE (said);
+  EXPECT_EQ (string_field (said, "location"), "");
+  EXPECT_EQ (string_field (said, "report"), "");
+  const std::string warnings = bench->warnings ();
+  EXPECT_NE (warnings.find ("/proc/no/map.json"), std::string::npos);
+  EXPECT_NE (warnings.find ("/proc/no/map.png"), std::string::npos);
+
+  /* The same once more, now with a place for the mapping. */
+  const auto file = std::filesystem::temp_directory_path () /
+                    ("cexp-again-" + std::to_string (getpid ()) + ".json");
+  g_object_set (calib.get (), "location", file.c_str (), nullptr);
+  gst_util_set_object_arg (G_OBJECT (calib.get ()), "mode", "map");
+  for (int i = 0; i < kPatience; i++) {
+    bench->next (white);
+    if (bench->messages ("moirecalib/mapping").size () == 2)
+      break;
+  }
+  EXPECT_EQ (
+      string_field (bench->messages ("moirecalib/mapping").back (), "location"),
+      file.string ());
+  EXPECT_TRUE (std::filesystem::remove (file));
+}
+
 TEST_F (MoireCalibTest, MapsByItselfOnceItIsAligned)
 {
   begin ("frames=1 tolerance=10");
@@ -210,6 +238,14 @@ TEST (MoireCalib, WithoutADmdsyncItSaysWhatToDo)
       "Nobody upstream shows patterns. Put a dmdsync with a device that takes "
       "masks at run time before moirecalib, or show a grating by other means "
       "and say which: pattern=grating-both:4/0.");
+}
+
+TEST (MoireCalib, RefusesWhatIsNoPattern)
+{
+  ElementHarness h ("moirecalib pattern=grating-both:4");
+  h.set_caps (gray_caps (kLargeWidth, kLargeHeight));
+  EXPECT_EQ (h.push (grating_frame (0)), GST_FLOW_ERROR);
+  EXPECT_EQ (h.error ().find ("The pattern property cannot be read: "), 0u);
 }
 
 TEST (MoireCalib, EveryFramePassesWithItsTimesWhateverTheWorkerDoes)

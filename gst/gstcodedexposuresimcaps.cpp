@@ -189,6 +189,9 @@ plan_for (
   const Result<int> inputs = count_inputs (in, out, schedule);
   if (!inputs)
     return inputs.error ();
+  if (const auto within = schedule.check_size (in.width, in.height); !within)
+    return Error{"The schedule does not suit the frames: " +
+                 within.error ().message + "."};
   const Result<SlotPlan> slots = SlotPlan::fit (
       schedule.timing (), schedule.slots (), {out.fps_n, out.fps_d});
   if (!slots)

@@ -23,21 +23,6 @@ constexpr const char *kMirrors = "dmdsync/mirrors";
 /* Who asks and is gone leaves the mirrors for so long: 10 s at 25 a second. */
 constexpr guint64 kFrames = 250;
 
-/** Slots for which the element is open that is open longest: patterns are as
- * bright as coded frames then, and no setting of the camera has to change. */
-int
-lit_slots (const Code &code)
-{
-  int most = 1;
-  for (int e = 0; e < code.slots (); e++) {
-    int open = 0;
-    for (int slot = 0; slot < code.slots (); slot++)
-      open += code.open (e, slot);
-    most = std::max (most, open);
-  }
-  return most;
-}
-
 /** Why no pattern can be shown; "": it can. */
 std::string
 obstacle (const SyncState &st)
@@ -92,7 +77,9 @@ show (GstDmdSync *self, const std::string &text, guint64 frames)
   st.runner->show (
       {.name = "the pattern " + text,
           .open = [p = *pattern] (int x, int y) { return p.on (x, y); },
-          .slots = lit_slots (st.schedule.code ())},
+          /* As bright as coded frames: no setting of the camera has to
+           * change. */
+          .slots = st.schedule.max_open_slots ()},
       time->plan);
   return TRUE;
 }

@@ -43,6 +43,10 @@ predict (const std::optional<Schedule> &schedule, const Conditions &conditions)
 {
   if (const auto good = conditions.scene.check (); !good)
     return good.error ();
+  if (const auto checked =
+          check_one_part (schedule.value_or (Schedule ()), "a prediction");
+      !checked)
+    return checked.error ();
   if (schedule && schedule->elements () > LinearEstimate::kMaxElements)
     return Error{"it has " + std::to_string (schedule->elements ()) +
                  " elements; predictions go up to " +

@@ -38,6 +38,12 @@ struct ImageView {
     return {row (y), width, count, stride};
   }
 
+  /** Columns [x, x + w) of rows [y, y + h). */
+  ImageView block (int x, int y, int w, int h) const
+  {
+    return {row (y) + x, w, h, stride};
+  }
+
   operator ImageView<const T> () const requires (!std::is_const_v<T>)
   {
     return {data, width, height, stride};

@@ -6,12 +6,25 @@
 namespace cexp
 {
 
+namespace
+{
+
+/** The levels of elements are those of the whole frame, which regions break;
+ * and those of a one-hot code show nothing that a flash could not. */
+bool
+has_signature (const Schedule &schedule)
+{
+  return schedule.regions ().empty () && !schedule.code ().one_hot ();
+}
+
+} // namespace
+
 SlipObservable
 slip_observable (const Schedule &schedule)
 {
   if (schedule.pilot_rows () > 0)
     return SlipObservable::always;
-  if (schedule.code ().one_hot () || !SlipSignature (schedule).distinct ())
+  if (!has_signature (schedule) || !SlipSignature (schedule).distinct ())
     return SlipObservable::never;
   return SlipObservable::in_the_frame;
 }
@@ -27,7 +40,8 @@ PhaseWatch::PhaseWatch (const Schedule &schedule, int width, int height)
   /* Beside a pilot even the signature of a one-hot code is worth reading: the
    * next frame tells a slip from a flash. */
   SlipSignature signature (schedule);
-  if (signature.distinct () && (pilot || !schedule.code ().one_hot ()))
+  if (signature.distinct () && schedule.regions ().empty () &&
+      (pilot || !schedule.code ().one_hot ()))
     signature_ = std::move (signature);
 }
 

@@ -59,6 +59,11 @@ check_limits (
                  " masks, the schedule " + schedule.text () + " has " +
                  std::to_string (schedule.masks ()) +
                  "; take a tile with fewer elements"};
+  if (info.array == Array::orthogonal)
+    if (const auto within =
+            schedule.check_size (info.shown ().width, info.shown ().height);
+        !within)
+      return Error{info.name + ": " + within.error ().message};
   if (plan.active () < info.minimum_active)
     return Error{slots + " need " + time_text (info.minimum_active) +
                  " each at least on " + info.name + "; " +

@@ -132,8 +132,7 @@ render_mirrors (const Schedule &schedule, int mask, const Placement &placement,
     for (int x = 0; x < region.size.width; x++) {
       const Offset pixel =
           tile_pixel (placement.layout, x, y, placement.odd_rows_left);
-      row[x] = y < pilot ? schedule.code ().open (
-                               schedule.element_at (pixel.x, pixel.y), slot)
+      row[x] = y < pilot ? schedule.open (pixel.x, pixel.y, slot)
                          : pilot_open (x, mask, schedule.slots ());
     }
   }

@@ -21,45 +21,73 @@ first_open_pixel (const Schedule &schedule, int slot)
   const Tile &tile = schedule.tile ();
   const int pixels = tile.period_x () * tile.period_y ();
   for (int at = 0; at < pixels; at++) {
-    const int element =
-        schedule.element_at (at % tile.period_x (), at / tile.period_x ());
-    if (schedule.code ().open (element, slot))
+    if (schedule.open (at % tile.period_x (), at / tile.period_x (), slot))
       return at;
   }
   return pixels;
 }
 
-/** The planes in which each element, and each of the pilot's columns, is open.
- */
+/** The planes in which the elements of the background and of every region, and
+ * the pilot's columns, are open. */
 class PixelTable
 {
 public:
   PixelTable (const Schedule &schedule, const PlanePlan &plan, int image)
-      : elements_ (std::size_t (schedule.elements ()), 0)
+      : schedule_ (schedule)
   {
+    add_part (schedule.code ());
+    for (const Region &region : schedule.regions ())
+      add_part (region.code);
     for (int mask = 0; mask < schedule.masks (); mask++) {
       const PlaneSlot at = plan.masks[std::size_t (mask)];
       if (at.image != image)
         continue;
       const PlanePixel plane = PlanePixel (1) << at.plane;
       const int slot = mask % schedule.slots ();
-      for (int e = 0; e < schedule.elements (); e++)
-        if (schedule.code ().open (e, slot))
-          elements_[std::size_t (e)] |= plane;
+      for (Part &part : parts_)
+        part.show (schedule.mask_of (part.code, slot), plane);
       for (int column = 0; column < kPilotColumns; column++)
         if (pilot_open (column, mask, schedule.slots ()))
           pilot_[std::size_t (column)] |= plane;
     }
   }
 
-  PlanePixel element (int e) const { return elements_[std::size_t (e)]; }
+  PlanePixel pixel (int x, int y) const
+  {
+    const int i = schedule_.region_at (x, y);
+    if (i < 0)
+      return parts_.front ()
+          .elements[std::size_t (schedule_.element_at (x, y))];
+    const Rect &rect = schedule_.regions ()[std::size_t (i)].rect;
+    const int e = schedule_.region (i).element_at (x - rect.x, y - rect.y);
+    return parts_[std::size_t (i) + 1].elements[std::size_t (e)];
+  }
   PlanePixel pilot (int column) const
   {
     return pilot_[std::size_t (column % kPilotColumns)];
   }
 
 private:
-  std::vector<PlanePixel> elements_;
+  struct Part {
+    const Code &code;
+    std::vector<PlanePixel> elements;
+
+    void show (int slot, PlanePixel plane)
+    {
+      for (std::size_t e = 0; e < elements.size (); e++)
+        if (code.open (int (e), slot))
+          elements[e] |= plane;
+    }
+  };
+
+  void add_part (const Code &code)
+  {
+    parts_.push_back (
+        {code, std::vector<PlanePixel> (std::size_t (code.elements ()))});
+  }
+
+  const Schedule &schedule_;
+  std::vector<Part> parts_; ///< the background, then the regions
   std::array<PlanePixel, kPilotColumns> pilot_{};
 };
 
@@ -75,9 +103,7 @@ fill_planes (const Schedule &schedule, const PixelTable &table,
     for (int x = 0; x < region.size.width; x++) {
       const Offset pixel =
           tile_pixel (placement.layout, x, y, placement.odd_rows_left);
-      row[x] = y < pilot
-                   ? table.element (schedule.element_at (pixel.x, pixel.y))
-                   : table.pilot (x);
+      row[x] = y < pilot ? table.pixel (pixel.x, pixel.y) : table.pilot (x);
     }
   }
 }
@@ -155,23 +181,50 @@ digest (ImageView<const PlanePixel> image)
   return sum;
 }
 
+namespace
+{
+
+/** Of a mask of digest @p sum in which a region shows one of digest @p part. */
+PlaneDigest
+joined (const PlaneDigest &sum, const Rect &rect, const PlaneDigest &part)
+{
+  const std::uint64_t words[] = {sum.high, sum.low, part.high, part.low,
+      std::uint64_t (rect.x) << 32 | std::uint64_t (rect.y),
+      std::uint64_t (rect.width) << 32 | std::uint64_t (rect.height)};
+  PlaneImage image (2 * int (std::size (words)), 1);
+  for (int i = 0; i < image.width (); i++)
+    image.at (i, 0) = PlanePixel (words[i / 2] >> (i % 2 * 32));
+  return digest (image.view ());
+}
+
+} // namespace
+
 PlaneDigest
 digest_mask (const Schedule &schedule, int mask)
 {
-  // One period of the tile and the pilot's columns say everything.
+  // One period of each tile and the pilot's columns say everything.
   const Tile &tile = schedule.tile ();
   const int width = tile.period_x (), height = tile.period_y ();
+  const int slot = mask % schedule.slots ();
+  const int own = schedule.mask_of (schedule.code (), slot);
   PlaneImage period (width + kPilotColumns + 1, height);
   for (int y = 0; y < height; y++)
     for (int x = 0; x < width; x++)
-      period.at (x, y) = schedule.code ().open (
-          schedule.element_at (x, y), mask % schedule.slots ());
+      period.at (x, y) =
+          schedule.code ().open (schedule.element_at (x, y), own);
   period.at (width, 0) = PlanePixel (schedule.pilot_rows ());
   if (schedule.pilot_rows () > 0)
     for (int column = 0; column < kPilotColumns; column++)
       period.at (width + 1 + column, 0) =
           pilot_open (column, mask, schedule.slots ());
-  return digest (period.view ());
+
+  PlaneDigest sum = digest (period.view ());
+  for (int i = 0; i < int (schedule.regions ().size ()); i++) {
+    const Schedule &region = schedule.region (i);
+    sum = joined (sum, schedule.regions ()[std::size_t (i)].rect,
+        digest_mask (region, schedule.mask_of (region.code (), slot)));
+  }
+  return sum;
 }
 
 } // namespace cexp

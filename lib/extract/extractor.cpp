@@ -149,6 +149,8 @@ Extractor<Pixel>::make (const Schedule &schedule, int width, int height,
   if (const auto checked = check_options (options, kTypeBits); !checked)
     return checked.error ();
 
+  if (const auto checked = check_one_part (schedule, "extraction"); !checked)
+    return checked.error ();
   const SampleGrid grid (schedule);
   const Extent size = grid.subframe_size (width, height);
   if (size.width < 1 || size.height < 1)
@@ -189,6 +191,13 @@ int
 Extractor<Pixel>::subframes () const
 {
   return plan_->grid.elements ();
+}
+
+template <typename Pixel>
+int
+Extractor<Pixel>::reach () const
+{
+  return plan_->decoder && plan_->decoder->interpolates () ? 1 : 0;
 }
 
 template <typename Pixel>

@@ -67,7 +67,8 @@ class Extractor
 public:
   /**
    * Error when the method needs what the code has not (decode of a singular
-   * code), when a number is out of range, or when the frame holds no cell.
+   * code), when a number is out of range, when the frame holds no cell, or when
+   * the schedule has regions: each part is extracted by itself (parts.h).
    * Select of a code that is not one-hot is allowed by name: subframe k is
    * element k then, and exposures have different lengths.
    */
@@ -83,6 +84,9 @@ public:
   /** The gain in force; 1 where it does not apply. */
   double gain () const;
   int subframes () const;
+  /** Cells around its own that a pixel depends on: 1 where decode interpolates,
+   * else 0. */
+  int reach () const;
   Extent subframe_size () const;
 
   /**

@@ -47,6 +47,8 @@ Result<std::unique_ptr<Engine>>
 Engine::make (const Schedule &schedule, int width, int height,
     const FuseOptions &options, double steps)
 {
+  if (const auto checked = check_one_part (schedule, "fusion"); !checked)
+    return checked.error ();
   const int rows = height - schedule.pilot_rows ();
   const Extent cell = schedule.cell ();
   if (width < cell.width || rows < cell.height)

@@ -206,6 +206,8 @@ Rectifier::make (const Mapping &mapping, const Schedule &schedule,
 {
   if (const auto checked = check (options); !checked)
     return checked.error ();
+  if (const auto checked = check_one_part (schedule, "rectification"); !checked)
+    return checked.error ();
   const double magnification = mapping.stance ().magnification;
   auto plan = std::make_unique<Plan> ();
   plan->taps = taps_for (magnification);

@@ -109,6 +109,9 @@ template <typename Pixel>
 Result<TilePhase>
 find (ImageView<const Pixel> frame, const Schedule &schedule)
 {
+  if (const auto checked = check_one_part (schedule, "the search for a phase");
+      !checked)
+    return checked.error ();
   const Extent period = {
       schedule.tile ().period_x (), schedule.tile ().period_y ()};
   if (frame.width < kZones * period.width ||

@@ -15,7 +15,8 @@ namespace cexp
 
 /**
  * What render_mask () gives, but made once per mask for one period of the tile
- * only, so that a change of mask costs little at any size.
+ * only, so that a change of mask costs little at any size; with regions, whose
+ * rows do not repeat, for all rows.
  */
 class MirrorRows
 {
@@ -34,16 +35,18 @@ public:
   {
     if (shown_ == kStillMask)
       return still_.view ().row (y);
-    return mirrors_.view ().row (
-        y < pilot_top_ ? y % elements_.height () : elements_.height ());
+    return mirrors_.view ().row (y < pilot_top_ ? y % rows_ : rows_);
   }
 
 private:
+  void show_code (int slot);
+
   Schedule schedule_;
-  int pilot_top_;
-  Image<std::uint8_t> elements_; // one period of rows
-  Image<std::uint8_t> mirrors_;  // the same and, last, a row of the pilot
-  int height_;
+  Extent size_;
+  int rows_;                     // one period of the tile, or all
+  int pilot_top_;                // all where rows_ holds the pilot, too
+  Image<std::uint8_t> elements_; // of a period
+  Image<std::uint8_t> mirrors_;  // of rows_ and, last, of the pilot
   std::shared_ptr<const StillMask> held_;
   Image<std::uint8_t> still_;
   int shown_;

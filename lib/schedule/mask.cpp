@@ -27,6 +27,25 @@ fill_periodic (ImageView<std::uint8_t> out, Extent period, Open open)
   }
 }
 
+void
+render_part (const Schedule &part, int slot, ImageView<std::uint8_t> out)
+{
+  const Tile &tile = part.tile ();
+  fill_periodic (out, {tile.period_x (), tile.period_y ()}, [&] (int x, int y) {
+    return part.code ().open (part.element_at (x, y), slot);
+  });
+}
+
+/** The pixels of @p rect that @p out has. */
+ImageView<std::uint8_t>
+within (ImageView<std::uint8_t> out, const Rect &rect)
+{
+  const int x = std::min (rect.x, out.width);
+  const int y = std::min (rect.y, out.height);
+  return out.block (x, y, std::min (rect.width, out.width - x),
+      std::min (rect.height, out.height - y));
+}
+
 } // namespace
 
 void
@@ -34,13 +53,14 @@ render_mask (const Schedule &schedule, int mask, ImageView<std::uint8_t> out)
 {
   const int slots = schedule.slots ();
   const int slot = mask % slots;
-  const Tile &tile = schedule.tile ();
   const int pilot_top = std::max (0, out.height - schedule.pilot_rows ());
 
-  fill_periodic (out.rows (0, pilot_top), {tile.period_x (), tile.period_y ()},
-      [&] (int x, int y) {
-        return schedule.code ().open (schedule.element_at (x, y), slot);
-      });
+  const ImageView<std::uint8_t> code = out.rows (0, pilot_top);
+  render_part (schedule, schedule.mask_of (schedule.code (), slot), code);
+  for (int i = 0; i < int (schedule.regions ().size ()); i++)
+    render_part (schedule.region (i),
+        schedule.mask_of (schedule.region (i).code (), slot),
+        within (code, schedule.regions ()[std::size_t (i)].rect));
   fill_periodic (out.rows (pilot_top, out.height - pilot_top),
       {kPilotColumns, 1},
       [&] (int x, int) { return pilot_open (x, mask, slots); });

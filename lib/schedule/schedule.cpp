@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "schedule/schedule.h"
 
+#include <algorithm>
 #include <numeric>
 
 #include "base/text.h"
@@ -77,10 +78,50 @@ default_parts ()
   return parts;
 }
 
+Error
+in_region (std::size_t i, const Rect &rect, const std::string &why)
+{
+  return {
+      "region " + std::to_string (i) + ", " + rect_text (rect) + ": " + why};
+}
+
+Result<void>
+check_rect (const Rect &rect, Extent cell)
+{
+  for (const int place : {rect.x, rect.y, rect.width, rect.height})
+    if (place < 0 || place > Schedule::kMaxMirrors)
+      return Error{"corner and size must lie in 0.." +
+                   std::to_string (Schedule::kMaxMirrors)};
+  if (rect.width < 1 || rect.height < 1)
+    return Error{"it holds no pixel; give it a width and a height"};
+  if (rect.width % cell.width != 0 || rect.height % cell.height != 0)
+    return Error{"its sides must be multiples of those of its cell, " +
+                 std::to_string (cell.width) + "x" +
+                 std::to_string (cell.height)};
+  return {};
+}
+
 } // namespace
 
+std::string
+rect_text (const Rect &rect)
+{
+  return std::to_string (rect.width) + "x" + std::to_string (rect.height) +
+         "+" + std::to_string (rect.x) + "+" + std::to_string (rect.y);
+}
+
+Result<void>
+check_one_part (const Schedule &schedule, const char *what)
+{
+  if (schedule.regions ().empty ())
+    return {};
+  return Error{std::string (what) + " knows one tile and one code, and " +
+               schedule.text () +
+               " has regions with others; take a schedule without regions"};
+}
+
 Schedule::Schedule (Parts parts, Extent cell)
-    : parts_ (std::move (parts)), cell_ (cell)
+    : parts_ (std::move (parts)), cell_ (cell), slots_ (parts_.code.slots ())
 {
 }
 
@@ -107,14 +148,115 @@ Schedule::make (Parts parts)
   const auto cell = parts.tile.cell (parts.phase);
   if (!cell)
     return cell.error ();
-  return Schedule (std::move (parts), *cell);
+  Schedule schedule (std::move (parts), *cell);
+  if (const auto added = schedule.add_regions (); !added)
+    return added.error ();
+  if (!schedule.regions ().empty () &&
+      schedule.to_json ().size () > kMaxJsonSize)
+    return Error{"tiles and codes of the regions take more than " +
+                 std::to_string (kMaxJsonSize) +
+                 " bytes to write out; name them, or take fewer"};
+  return schedule;
+}
+
+/** Makes and checks the parts that regions are, and counts the slots. */
+Result<void>
+Schedule::add_regions ()
+{
+  std::vector<Region> &regions = parts_.regions;
+  if (regions.size () > std::size_t (kMaxRegions))
+    return Error{std::to_string (regions.size ()) +
+                 " regions: " + std::to_string (kMaxRegions) + " are possible"};
+  for (std::size_t i = 0; i < regions.size (); i++) {
+    auto &[rect, tile, code, order, phase] = regions[i];
+    auto part = make ({tile, code, {}, order, phase, parts_.leak});
+    if (!part)
+      return in_region (i, rect, part.error ().message);
+    if (const auto checked = check_rect (rect, part->cell ()); !checked)
+      return in_region (i, rect, checked.error ().message);
+    for (std::size_t other = 0; other < i; other++)
+      if (rect.meets (regions[other].rect))
+        return in_region (i, rect,
+            "it overlaps region " + std::to_string (other) + ", " +
+                rect_text (regions[other].rect));
+    slots_ = std::lcm (slots_, code.slots ());
+    if (slots_ > kMaxSlots)
+      return in_region (i, rect,
+          "with its " + std::to_string (code.slots ()) +
+              " elements the exposure needs " + std::to_string (slots_) +
+              " slots, the least common multiple of all numbers of elements, "
+              "and " +
+              std::to_string (kMaxSlots) +
+              " are possible; take numbers that divide each other");
+    order = part->order ();
+    in_region_.push_back (*std::move (part));
+  }
+  return {};
+}
+
+Schedule
+Schedule::background () const
+{
+  Schedule alone (*this);
+  alone.parts_.regions.clear ();
+  alone.in_region_.clear ();
+  alone.slots_ = alone.parts_.code.slots ();
+  return alone;
+}
+
+int
+Schedule::region_at (int x, int y) const
+{
+  const auto found =
+      std::find_if (parts_.regions.begin (), parts_.regions.end (),
+          [x, y] (const Region &region) { return region.rect.holds (x, y); });
+  return found == parts_.regions.end () ? -1
+                                        : int (found - parts_.regions.begin ());
+}
+
+bool
+Schedule::open_in_part (int x, int y, int slot) const
+{
+  const int i = region_at (x, y);
+  if (i < 0)
+    return parts_.code.open (element_at (x, y), mask_of (parts_.code, slot));
+  const Schedule &part = region (i);
+  const Rect &rect = parts_.regions[std::size_t (i)].rect;
+  return part.open (x - rect.x, y - rect.y, mask_of (part.code (), slot));
+}
+
+Result<void>
+Schedule::check_size (int width, int height) const
+{
+  for (std::size_t i = 0; i < parts_.regions.size (); i++) {
+    const Rect &rect = parts_.regions[i].rect;
+    const int rows = height - parts_.pilot_rows;
+    if (rect.right () <= width && rect.bottom () <= rows)
+      continue;
+    std::string why = "it does not lie within the " + std::to_string (width) +
+                      "x" + std::to_string (height) + " pixels";
+    if (parts_.pilot_rows > 0)
+      why +=
+          " above the pilot's " + std::to_string (parts_.pilot_rows) + " rows";
+    return in_region (i, rect, why + "; move it, or make it smaller");
+  }
+  return {};
+}
+
+int
+Schedule::max_open_slots () const
+{
+  int most = parts_.code.max_open_slots () * (slots_ / parts_.code.slots ());
+  for (const Schedule &part : in_region_)
+    most = std::max (most, part.max_open_slots () * (slots_ / part.slots ()));
+  return most;
 }
 
 double
 Schedule::white_slots () const
 {
-  const int open = parts_.code.max_open_slots ();
-  return open + parts_.leak * (slots () - open);
+  const int open = max_open_slots ();
+  return open + parts_.leak * (slots_ - open);
 }
 
 } // namespace cexp

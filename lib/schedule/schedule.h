@@ -17,6 +17,21 @@ namespace cexp
 {
 
 /**
+ * An area of the frame with a tile and a code of its own, and so with a frame
+ * rate of its own. Its tile begins at its own corner: pixel (rect.x + x, rect.y
+ * + y) bears label tile.label (x + phase.x, y + phase.y).
+ */
+struct Region {
+  Rect rect;
+  Tile tile;
+  Code code;
+  std::vector<int> order = {}; ///< as in Schedule::Parts
+  Offset phase = {};
+
+  bool operator== (const Region &) const = default;
+};
+
+/**
  * Tile, code and timing of a coded exposure.
  *
  * The DMD driver renders masks from it, the simulator integrates light with
@@ -25,6 +40,13 @@ namespace cexp
  * A pixel's label, its place in the tile, becomes its element, its row of the
  * code, through the order. An immutable value: make () is the only way in, so
  * that every schedule there is can be shown and decoded.
+ *
+ * Regions have their own tile and code; tile and code of the schedule are those
+ * of the rest, the background. All share one exposure: it has as many slots as
+ * the least common multiple L of the codes' says, and a code of n slots holds
+ * each of its masks for L / n of them. background () and region () are the
+ * schedules of the parts, which pictures are extracted with; what shows masks
+ * or collects light takes the whole.
  */
 class Schedule
 {
@@ -32,6 +54,9 @@ public:
   /** Bound on pilot rows and on the phase: no array of mirrors is larger. */
   static constexpr int kMaxMirrors = 16384;
   static constexpr double kMaxLeak = 0.5;
+  static constexpr int kMaxRegions = 64;
+  /** Bound on the slots of an exposure, with regions as without. */
+  static constexpr int kMaxSlots = Tile::kMaxElements;
   /** Bound on the JSON form, in bytes. */
   static constexpr std::size_t kMaxJsonSize = std::size_t (1) << 20;
 
@@ -48,6 +73,8 @@ public:
     /** Rows at the bottom of the array that show the pilot (pilot.h) instead
      * of the code; 0: no pilot. */
     int pilot_rows = 0;
+    /** None overlaps another; sides are multiples of the region's cell. */
+    std::vector<Region> regions = {};
 
     bool operator== (const Parts &) const = default;
   };
@@ -55,7 +82,9 @@ public:
   /** sequential:2x2, which stands wherever nothing else is said. */
   Schedule ();
   /** Error when tile and code differ in n, the order is no permutation, the
-   * tile has no cell at this phase, or a number is out of its range. */
+   * tile has no cell at this phase, a number is out of its range, or regions
+   * overlap, are empty, hold a part of a cell, need too many slots or cannot
+   * be written in kMaxJsonSize bytes. */
   static Result<Schedule> make (Parts parts);
 
   /**
@@ -76,6 +105,8 @@ public:
    *   phase   x/y
    *   leak    0 to 0.5
    *   pilot   rows
+   *   region  WxH+X+Y:CODE:TILE[:order=...][:phase=x/y]; this key may stand
+   *           more than once
    */
   static Result<Schedule> from_preset (std::string_view preset);
   /** The strict, versioned text form: unknown, missing and doubled keys, other
@@ -94,14 +125,33 @@ public:
   Offset phase () const { return parts_.phase; }
   double leak () const { return parts_.leak; }
   int pilot_rows () const { return parts_.pilot_rows; }
+  const std::vector<Region> &regions () const { return parts_.regions; }
 
+  /** Region @p i as a schedule of its own, of the pixels of its rectangle. It
+   * has the leak, no timing, no pilot and no regions. */
+  const Schedule &region (int i) const { return in_region_[std::size_t (i)]; }
+  /** The schedule without its regions. */
+  Schedule background () const;
+  /** Region in which pixel (x, y) lies; -1: the background. */
+  int region_at (int x, int y) const;
+  /** Error where a region does not lie within @p width x @p height pixels,
+   * above the pilot. */
+  Result<void> check_size (int width, int height) const;
+
+  /** Of the tile, which is that of the background. */
   int elements () const { return parts_.tile.elements (); }
-  int slots () const { return parts_.code.slots (); }
+  /** Slots of the exposure: those of the code, or of all codes together. */
+  int slots () const { return slots_; }
+  /** Which mask of @p code, one of its parts', stands in a slot. */
+  int mask_of (const Code &code, int slot) const
+  {
+    return slot * code.slots () / slots_;
+  }
   /** The block of pixels that becomes one pixel of every subframe. Cells lie on
    * the grid that starts at the coded frame's pixel (0, 0). */
   Extent cell () const { return cell_; }
 
-  /** Element of the pixel (x, y), pilot or not. */
+  /** Element of the pixel (x, y) of the background, pilot or not. */
   int element_at (int x, int y) const
   {
     const int label =
@@ -109,13 +159,28 @@ public:
     return parts_.order[std::size_t (label)];
   }
 
+  /** Whether the mirror of pixel (x, y), no pilot's, is open in a slot. */
+  bool open (int x, int y, int slot) const
+  {
+    return in_region_.empty () ? parts_.code.open (element_at (x, y), slot)
+                               : open_in_part (x, y, slot);
+  }
+
   /** Masks in one period of what the DMD shows: N, or 2 N with a pilot. */
   int masks () const { return slots () * (parts_.pilot_rows > 0 ? 2 : 1); }
 
+  /** Slots in which the mirror is open that is open longest. */
+  int max_open_slots () const;
   /** Slots' worth of white light that make white in the coded frame, so that
    * the element with the most light just fills the range: its open slots, and
    * what leaks through in the others. */
   double white_slots () const;
+  /** The same counted in slots of @p part, one of this schedule's parts: with
+   * that gain its white is white, however much light other parts get. */
+  double white_slots_of (const Schedule &part) const
+  {
+    return white_slots () / (slots () / part.slots ());
+  }
 
   bool operator== (const Schedule &other) const
   {
@@ -124,10 +189,21 @@ public:
 
 private:
   Schedule (Parts parts, Extent cell);
+  Result<void> add_regions ();
+  bool open_in_part (int x, int y, int slot) const;
 
   Parts parts_;
   Extent cell_;
+  int slots_;
+  std::vector<Schedule> in_region_; ///< follow from parts_
 };
+
+/** "192x144+64+32": width, height and corner. */
+std::string rect_text (const Rect &rect);
+
+/** Error where @p schedule has regions. @p what, such as "rectification", is
+ * for the message. */
+Result<void> check_one_part (const Schedule &schedule, const char *what);
 
 /**
  * The mirrors of one mask.

@@ -105,13 +105,17 @@ read_timing (const Json &value, Timing &timing)
   return {};
 }
 
-/** The keys that may be left out. */
-Result<void>
-read_options (const Json &root, Schedule::Parts &parts)
+/** What a schedule and a region have alike: tile, code, order and phase. */
+Result<Schedule::Parts>
+read_pattern (const Json &root)
 {
-  if (root.contains ("timing"))
-    if (const auto read = read_timing (root["timing"], parts.timing); !read)
-      return read;
+  const auto tile = read_tile (root["tile"]);
+  if (!tile)
+    return tile.error ();
+  const auto code = read_code (root["code"], tile->elements ());
+  if (!code)
+    return code.error ();
+  Schedule::Parts parts{*tile, *code};
   if (root.contains ("order")) {
     const auto order =
         read_integers (root["order"], "order", Tile::kMaxElements - 1);
@@ -128,6 +132,61 @@ read_options (const Json &root, Schedule::Parts &parts)
       return phase.error ();
     parts.phase = *phase;
   }
+  return parts;
+}
+
+Result<Region>
+read_region (const Json &value)
+{
+  if (!value.is_object ())
+    return Error{
+        "it must be an object with rect, tile and code, not " + shown (value)};
+  if (const auto checked =
+          check_keys (value, "", {"rect", "tile", "code", "order", "phase"});
+      !checked)
+    return checked.error ();
+  for (const char *key : {"rect", "tile", "code"})
+    if (!value.contains (key))
+      return Error{"key '" + std::string (key) +
+                   "' is missing; a region needs at least rect, tile and code"};
+  const auto rect =
+      read_integers (value["rect"], "rect", Schedule::kMaxMirrors);
+  if (!rect)
+    return rect.error ();
+  if (rect->size () != 4)
+    return expected (
+        "rect", "four whole numbers, [x, y, width, height]", value["rect"]);
+  auto parts = read_pattern (value);
+  if (!parts)
+    return parts.error ();
+  return Region{{(*rect)[0], (*rect)[1], (*rect)[2], (*rect)[3]},
+      std::move (parts->tile), std::move (parts->code),
+      std::move (parts->order), parts->phase};
+}
+
+Result<std::vector<Region>>
+read_regions (const Json &value)
+{
+  if (!value.is_array () || value.empty ())
+    return expected ("regions", "a list of at least one region", value);
+  std::vector<Region> regions;
+  for (const Json &entry : value) {
+    auto region = read_region (entry);
+    if (!region)
+      return Error{"in regions[" + std::to_string (regions.size ()) +
+                   "]: " + region.error ().message};
+    regions.push_back (*std::move (region));
+  }
+  return regions;
+}
+
+/** The keys that may be left out and that regions do not have. */
+Result<void>
+read_options (const Json &root, Schedule::Parts &parts)
+{
+  if (root.contains ("timing"))
+    if (const auto read = read_timing (root["timing"], parts.timing); !read)
+      return read;
   if (root.contains ("leak")) {
     if (!root["leak"].is_number ())
       return expected ("leak", "a number from 0 to 0.5", root["leak"]);
@@ -140,6 +199,12 @@ read_options (const Json &root, Schedule::Parts &parts)
       return rows.error ();
     parts.pilot_rows = int (*rows);
   }
+  if (root.contains ("regions")) {
+    auto regions = read_regions (root["regions"]);
+    if (!regions)
+      return regions.error ();
+    parts.regions = *std::move (regions);
+  }
   return {};
 }
 
@@ -151,7 +216,7 @@ check_schedule_keys (const Json &root)
     return checked;
   if (const auto checked = check_keys (root, "",
           {"format", "version", "tile", "code", "timing", "order", "phase",
-              "leak", "pilot_rows"});
+              "leak", "pilot_rows", "regions"});
       !checked)
     return checked;
   for (const char *key : {"tile", "code"})
@@ -173,6 +238,36 @@ tile_json (const Tile &tile)
   return map;
 }
 
+OrderedJson
+code_json (const Code &code)
+{
+  if (code.is_named ())
+    return code.name ();
+  return {{"rows", code.rows ()}};
+}
+
+/** The keys order and phase, where they say anything. */
+void
+add_placing (const std::vector<int> &order, Offset phase, OrderedJson &pattern)
+{
+  if (!std::is_sorted (order.begin (), order.end ()))
+    pattern["order"] = order;
+  if (phase != Offset{})
+    pattern["phase"] = {phase.x, phase.y};
+}
+
+OrderedJson
+region_json (const Region &region)
+{
+  const Rect &rect = region.rect;
+  OrderedJson json;
+  json["rect"] = {rect.x, rect.y, rect.width, rect.height};
+  json["tile"] = tile_json (region.tile);
+  json["code"] = code_json (region.code);
+  add_placing (region.order, region.phase, json);
+  return json;
+}
+
 } // namespace
 
 Result<Schedule>
@@ -180,16 +275,12 @@ read_schedule (const Json &root)
 {
   if (const auto checked = check_schedule_keys (root); !checked)
     return checked.error ();
-  const auto tile = read_tile (root["tile"]);
-  if (!tile)
-    return tile.error ();
-  const auto code = read_code (root["code"], tile->elements ());
-  if (!code)
-    return code.error ();
-  Schedule::Parts parts{*tile, *code};
-  if (const auto read = read_options (root, parts); !read)
+  auto parts = read_pattern (root);
+  if (!parts)
+    return parts.error ();
+  if (const auto read = read_options (root, *parts); !read)
     return read.error ();
-  return Schedule::make (std::move (parts));
+  return Schedule::make (*std::move (parts));
 }
 
 Result<Schedule>
@@ -215,22 +306,18 @@ Schedule::to_json () const
   root["format"] = kFormat;
   root["version"] = kVersion;
   root["tile"] = tile_json (tile ());
-  if (code ().is_named ())
-    root["code"] = code ().name ();
-  else
-    root["code"]["rows"] = code ().rows ();
+  root["code"] = code_json (code ());
   if (timing () != Timing{})
     root["timing"] = {{"active_ns", timing ().active},
         {"switching_ns", timing ().switching},
         {"readout_ns", timing ().readout}};
-  if (!std::is_sorted (order ().begin (), order ().end ()))
-    root["order"] = order ();
-  if (phase () != Offset{})
-    root["phase"] = {phase ().x, phase ().y};
+  add_placing (order (), phase (), root);
   if (leak () != 0.0)
     root["leak"] = leak ();
   if (pilot_rows () != 0)
     root["pilot_rows"] = pilot_rows ();
+  for (const Region &region : regions ())
+    root["regions"].push_back (region_json (region));
   return root.dump ();
 }
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <numeric>
+#include <span>
 
 #include "base/file.h"
 #include "base/text.h"
@@ -127,12 +128,127 @@ read_pilot (std::string_view value, Schedule::Parts &parts)
   return {};
 }
 
+/** Tile and code of "CODE:TILE". */
+Result<Schedule::Parts>
+read_pattern (std::string_view text, const std::string &form)
+{
+  const std::size_t colon = text.find (':');
+  const std::string_view name = text.substr (0, colon);
+  if (std::find (kCodes.begin (), kCodes.end (), name) == kCodes.end ())
+    return Error{in_quotes (name) +
+                 " is no code; the codes are sequential, "
+                 "staircase and s-matrix, and any other is "
+                 "written out in a JSON file" +
+                 form};
+  if (colon == text.npos)
+    return Error{"the tile is missing" + form};
+  const auto tile = Tile::parse (text.substr (colon + 1));
+  if (!tile)
+    return tile.error ();
+  const auto code = Code::named (name, tile->elements ());
+  if (!code)
+    return code.error ();
+  return Schedule::Parts{*tile, *code};
+}
+
+/** "192x144+64+32" */
+std::optional<Rect>
+parse_rect (std::string_view text)
+{
+  const auto pieces = split (text, '+');
+  const auto sides = split (pieces.front (), 'x');
+  if (pieces.size () != 3 || sides.size () != 2)
+    return std::nullopt;
+  const auto x = parse_int (pieces[1]), y = parse_int (pieces[2]);
+  const auto width = parse_int (sides[0]), height = parse_int (sides[1]);
+  if (!x || !y || !width || !height)
+    return std::nullopt;
+  return Rect{*x, *y, *width, *height};
+}
+
 struct Key {
   std::string_view name;
   Result<void> (*read) (std::string_view value, Schedule::Parts &parts);
+  bool repeats = false;
 };
 
-constexpr std::array<Key, 7> kKeys{{
+/** What regions have as well. */
+constexpr Key kOrder{"order", read_order};
+constexpr Key kPhase{"phase", read_phase};
+
+std::string
+key_names (std::span<const Key> keys)
+{
+  std::string names;
+  for (const Key &key : keys)
+    names += (names.empty () ? "" : ", ") + std::string (key.name);
+  return names;
+}
+
+/** Reads every key=value of @p settings into @p parts. */
+Result<void>
+read_settings (std::span<const std::string_view> settings,
+    std::span<const Key> keys, const std::string &separator,
+    Schedule::Parts &parts)
+{
+  std::vector<bool> seen (keys.size ());
+  for (const std::string_view setting : settings) {
+    const std::size_t equals = setting.find ('=');
+    if (equals == setting.npos)
+      return Error{in_quotes (setting) + " after a " + separator +
+                   " is not of the form key=value; the keys are " +
+                   key_names (keys) +
+                   ", and lists are written with '/', as in order=0/2/1/3"};
+    const std::string_view name = setting.substr (0, equals);
+    const auto key = std::find_if (keys.begin (), keys.end (),
+        [name] (const Key &known) { return known.name == name; });
+    if (key == keys.end ())
+      return Error{"there is no key " + in_quotes (name) + "; the keys are " +
+                   key_names (keys)};
+
+    auto given = seen[std::size_t (key - keys.begin ())];
+    if (given && !key->repeats)
+      return Error{
+          "key " + in_quotes (name) + " is given twice; leave one out"};
+    given = true;
+    if (const auto read = key->read (setting.substr (equals + 1), parts); !read)
+      return read;
+  }
+  return {};
+}
+
+/** "192x144+64+32:sequential:4x2:order=bit-reversal" */
+Result<void>
+read_region (std::string_view value, Schedule::Parts &parts)
+{
+  const std::string form =
+      "; a region is WxH+X+Y:CODE:TILE, such as 192x144+64+32:sequential:4x2, "
+      "then :order= and :phase= where it has them";
+  const auto pieces = split (value, ':');
+  const auto rect = parse_rect (pieces.front ());
+  if (!rect || pieces.size () < 2)
+    return bad_value ("region", value,
+        in_quotes (pieces.front ()) + " is no area with a code" + form);
+
+  const auto settings = std::find_if (pieces.begin () + 1, pieces.end (),
+      [] (std::string_view piece) { return piece.find ('=') != piece.npos; });
+  std::string_view pattern = value.substr (pieces[0].size () + 1);
+  for (auto setting = settings; setting != pieces.end (); ++setting)
+    pattern.remove_suffix (std::min (setting->size () + 1, pattern.size ()));
+  auto region = read_pattern (pattern, form);
+  if (!region)
+    return bad_value ("region", value, region.error ().message);
+  const Key keys[] = {kOrder, kPhase};
+  if (const auto read =
+          read_settings ({settings, pieces.end ()}, keys, "colon", *region);
+      !read)
+    return bad_value ("region", value, read.error ().message);
+  parts.regions.push_back ({*rect, std::move (region->tile),
+      std::move (region->code), std::move (region->order), region->phase});
+  return {};
+}
+
+constexpr std::array<Key, 8> kKeys{{
     {"active",
         [] (std::string_view value, Schedule::Parts &parts) {
           return read_time ("active", value, parts.timing.active);
@@ -145,52 +261,12 @@ constexpr std::array<Key, 7> kKeys{{
         [] (std::string_view value, Schedule::Parts &parts) {
           return read_time ("readout", value, parts.timing.readout);
         }},
-    {"order", read_order},
-    {"phase", read_phase},
+    kOrder,
+    kPhase,
     {"leak", read_leak},
     {"pilot", read_pilot},
+    {"region", read_region, true},
 }};
-
-std::string
-key_names ()
-{
-  std::string names;
-  for (const Key &key : kKeys)
-    names += (names.empty () ? "" : ", ") + std::string (key.name);
-  return names;
-}
-
-/** Reads every key=value of @p settings into @p parts. */
-Result<void>
-read_settings (
-    const std::vector<std::string_view> &settings, Schedule::Parts &parts)
-{
-  std::array<bool, kKeys.size ()> seen{};
-  for (const std::string_view setting : settings) {
-    const std::size_t equals = setting.find ('=');
-    if (equals == setting.npos)
-      return Error{
-          in_quotes (setting) +
-          " after a comma is not of the form key=value; the keys are " +
-          key_names () +
-          ", and lists are written with '/', as in order=0/2/1/3"};
-    const std::string_view name = setting.substr (0, equals);
-    const auto key = std::find_if (kKeys.begin (), kKeys.end (),
-        [name] (const Key &known) { return known.name == name; });
-    if (key == kKeys.end ())
-      return Error{"there is no key " + in_quotes (name) + "; the keys are " +
-                   key_names ()};
-
-    bool &given = seen[std::size_t (key - kKeys.begin ())];
-    if (given)
-      return Error{
-          "key " + in_quotes (name) + " is given twice; leave one out"};
-    given = true;
-    if (const auto read = key->read (setting.substr (equals + 1), parts); !read)
-      return read;
-  }
-  return {};
-}
 
 Result<Schedule>
 read_preset (std::string_view preset)
@@ -198,30 +274,13 @@ read_preset (std::string_view preset)
   const std::string form = "; a preset is CODE:TILE[,key=value...], such as " +
                            std::string (kExample);
   auto pieces = split (preset, ',');
-  const std::string_view head = pieces.front ();
-  const std::size_t colon = head.find (':');
-  const std::string_view name = head.substr (0, colon);
-  if (std::find (kCodes.begin (), kCodes.end (), name) == kCodes.end ())
-    return Error{in_quotes (name) +
-                 " is no code; the codes are sequential, "
-                 "staircase and s-matrix, and any other is "
-                 "written out in a JSON file" +
-                 form};
-  if (colon == head.npos)
-    return Error{"the tile is missing" + form};
-
-  const auto tile = Tile::parse (head.substr (colon + 1));
-  if (!tile)
-    return tile.error ();
-  const auto code = Code::named (name, tile->elements ());
-  if (!code)
-    return code.error ();
-
-  Schedule::Parts parts{*tile, *code};
+  auto parts = read_pattern (pieces.front (), form);
+  if (!parts)
+    return parts.error ();
   pieces.erase (pieces.begin ());
-  if (const auto read = read_settings (pieces, parts); !read)
+  if (const auto read = read_settings (pieces, kKeys, "comma", *parts); !read)
     return read.error ();
-  return Schedule::make (std::move (parts));
+  return Schedule::make (*std::move (parts));
 }
 
 Result<Schedule>
@@ -242,18 +301,32 @@ read_json_file (std::string_view path)
   return schedule;
 }
 
+/** Order and phase, each after @p separator, where they say anything. */
 std::string
-order_text (const std::vector<int> &order)
+placing_text (
+    const std::vector<int> &order, Offset phase, const std::string &separator)
 {
   const int n = int (order.size ());
-  if (order == raster_order (n))
-    return "";
-  if (order == bit_reversed_order (n))
-    return ",order=bit-reversal";
   std::string text;
-  for (const int element : order)
-    text += (text.empty () ? ",order=" : "/") + std::to_string (element);
+  if (order == bit_reversed_order (n) && order != raster_order (n)) {
+    text = separator + "order=bit-reversal";
+  } else if (order != raster_order (n)) {
+    for (const int element : order)
+      text += (text.empty () ? separator + "order=" : "/") +
+              std::to_string (element);
+  }
+  if (phase != Offset{})
+    text += separator + "phase=" + std::to_string (phase.x) + "/" +
+            std::to_string (phase.y);
   return text;
+}
+
+std::string
+region_text (const Region &region)
+{
+  return ",region=" + rect_text (region.rect) + ":" + region.code.name () +
+         ":" + region.tile.name () +
+         placing_text (region.order, region.phase, ":");
 }
 
 } // namespace
@@ -291,14 +364,13 @@ Schedule::text () const
     text += ",switching=" + time_text (timing ().switching);
   if (timing ().readout != 0)
     text += ",readout=" + time_text (timing ().readout);
-  text += order_text (order ());
-  if (phase () != Offset{})
-    text += ",phase=" + std::to_string (phase ().x) + "/" +
-            std::to_string (phase ().y);
+  text += placing_text (order (), phase (), ",");
   if (leak () != 0.0)
     text += ",leak=" + real_text (leak ());
   if (pilot_rows () != 0)
     text += ",pilot=" + std::to_string (pilot_rows ());
+  for (const Region &region : regions ())
+    text += region_text (region);
   return text;
 }
 

@@ -26,6 +26,27 @@ struct Extent {
   bool operator== (const Extent &) const = default;
 };
 
+/** The pixels [x, x + width) by [y, y + height) of a frame. */
+struct Rect {
+  int x = 0;
+  int y = 0;
+  int width = 0;
+  int height = 0;
+
+  int right () const { return x + width; }
+  int bottom () const { return y + height; }
+  bool holds (int px, int py) const
+  {
+    return px >= x && px < right () && py >= y && py < bottom ();
+  }
+  bool meets (const Rect &other) const
+  {
+    return x < other.right () && other.x < right () && y < other.bottom () &&
+           other.y < bottom ();
+  }
+  bool operator== (const Rect &) const = default;
+};
+
 /** The remainder in [0, n) that belongs to floor division; n > 0. */
 constexpr int
 floor_mod (int a, int n)

@@ -300,9 +300,8 @@ still_mask (const Schedule &schedule, const std::string &name)
   if (name == "on" || name == "off")
     still.open = [on = name == "on"] (int, int) { return on; };
   else if (mask && *mask >= 0 && *mask < schedule.slots ())
-    still.open = [schedule, slot = *mask] (int x, int y) {
-      return schedule.code ().open (schedule.element_at (x, y), slot);
-    };
+    still.open = [schedule, slot = *mask] (
+                     int x, int y) { return schedule.open (x, y, slot); };
   else
     return Error{"cannot show mask " + in_quotes (name) + "; " +
                  schedule.text () + " has the masks 0 to " +

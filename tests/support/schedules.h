@@ -110,6 +110,11 @@ private:
           std::uniform_real_distribution (0.0, Schedule::kMaxLeak) (random_);
     if (below (2) == 0)
       parts.pilot_rows = below (Schedule::kMaxMirrors + 1);
+    if (below (4) == 0)
+      for (const int x : {0, 100})
+        parts.regions.push_back ({{x + below (90), below (100), 8, 4},
+            *Tile::lattice (4, 2), *Code::named ("staircase", 4),
+            permutation (4), {2 * below (10), below (10)}});
     return Schedule::make (std::move (parts));
   }
 

@@ -90,12 +90,12 @@ expect_exact (const Schedule &schedule)
   const Image<Pixel> coded = coded_frame<Pixel> (ideal, schedule, width, height,
       [&] (int slot) { return scene<Pixel> (width, height, slot); });
 
-  const int budget = schedule.code ().max_open_slots ();
+  const int budget = schedule.max_open_slots ();
   for (int y = 0; y < height; y++)
     for (int x = 0; x < width; x++) {
       std::int64_t light = 0;
       for (int slot = 0; slot < slots; slot++)
-        if (schedule.code ().open (schedule.element_at (x, y), slot))
+        if (schedule.open (x, y, slot))
           light += scene<Pixel> (width, height, slot).at (x, y);
       ASSERT_EQ (coded.at (x, y), (2 * light + budget) / (2 * budget))
           << "at " << x << ", " << y;
@@ -117,7 +117,9 @@ INSTANTIATE_TEST_SUITE_P (Schedules, Exact,
         "sequential:lattice:8/3,order=bit-reversal", "sequential:4x2,phase=1/3",
         "sequential:3x3", "staircase:2x2", "staircase:3x2",
         "staircase:lattice:8/3", "staircase:3x3", "s-matrix:lattice:7/2",
-        "sequential:16x16"));
+        "sequential:16x16",
+        "staircase:2x2,region=12x8+6+5:sequential:3x2,region=4x4+20+1:"
+        "staircase:2x1"));
 
 TEST (Bench, ReadsRowsThatLieApart)
 {
@@ -250,7 +252,8 @@ TEST (MirrorRows, AreTheRenderedMask)
 {
   for (const char *preset : {"staircase:3x2,phase=2/1",
            "sequential:lattice:8/3,order=bit-reversal", "sequential:diamond:13",
-           "sequential:2x2,pilot=6", "sequential:4x4,pilot=4"}) {
+           "sequential:2x2,pilot=6", "sequential:4x4,pilot=4",
+           "sequential:2x2,pilot=6,region=9x8+3+17:staircase:3x2"}) {
     SCOPED_TRACE (preset);
     const Schedule code = schedule (preset);
     const int width = 29, height = 31;

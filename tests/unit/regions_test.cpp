@@ -1,0 +1,406 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Schedules with regions: what is accepted, which mirror is open when, and the
+ * pictures that come out of each part. */
+#include <algorithm>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "clock/phase_watch.h"
+#include "dmd/dmd.h"
+#include "dmd/plane_image.h"
+#include "extract/parts.h"
+#include "optics/bench.h"
+#include "schedule/sample_grid.h"
+#include "schedule/schedule.h"
+
+using namespace cexp;
+
+namespace
+{
+
+constexpr const char *kTwo = "sequential:2x2,"
+                             "region=16x8+8+4:sequential:4x2,"
+                             "region=6x6+30+10:staircase:3x2:phase=1/1";
+
+Schedule
+preset (const std::string &text)
+{
+  const auto schedule = Schedule::from_preset (text);
+  EXPECT_TRUE (schedule.ok ()) << schedule.error ().message;
+  return schedule.ok () ? *schedule : Schedule ();
+}
+
+Schedule
+json (const std::string &regions)
+{
+  const auto schedule = Schedule::from_json (
+      R"({"format":"coded-exposure","version":1,"tile":"2x2",)"
+      R"("code":"sequential","regions":)" +
+      regions + "}");
+  EXPECT_TRUE (schedule.ok ()) << schedule.error ().message;
+  return schedule.ok () ? *schedule : Schedule ();
+}
+
+void
+expect_words (const Result<Schedule> &schedule, const std::string &what,
+    const std::vector<std::string> &words)
+{
+  ASSERT_FALSE (schedule.ok ()) << what << " was taken";
+  for (const std::string &word : words)
+    EXPECT_NE (schedule.error ().message.find (word), std::string::npos)
+        << what << ": " << schedule.error ().message << "\nlacks: " << word;
+}
+
+/** A scene that changes with every slot of the exposure. */
+std::uint8_t
+light (int x, int y, int slot)
+{
+  return std::uint8_t (x * 31 + y * 57 + slot * 101 + x * y * slot);
+}
+
+Image<std::uint8_t>
+coded_frame (const Schedule &schedule, int width, int height,
+    std::uint8_t (*scene) (int, int, int))
+{
+  auto bench = OpticalBench::make (width, height, {});
+  Image<std::uint8_t> image (width, height), coded (width, height);
+  bench->begin (schedule);
+  for (int slot = 0; slot < schedule.slots (); slot++) {
+    for (int y = 0; y < height; y++)
+      for (int x = 0; x < width; x++)
+        image.at (x, y) = scene (x, y, slot);
+    bench->expose (image.view (), slot, 1.0);
+  }
+  bench->read_out (0, coded.view ());
+  return coded;
+}
+
+std::vector<Image<std::uint8_t>>
+extract (const Schedule &whole, const Schedule &part,
+    ImageView<const std::uint8_t> coded, ExtractOptions options = {})
+{
+  const auto extractor = Extractor<std::uint8_t>::make (
+      part, coded.width, coded.height, options_for_part (whole, part, options));
+  EXPECT_TRUE (extractor.ok ()) << extractor.error ().message;
+  const Extent size = extractor->subframe_size ();
+  std::vector<Image<std::uint8_t>> subframes (
+      std::size_t (extractor->subframes ()),
+      Image<std::uint8_t> (size.width, size.height));
+  std::vector<ImageView<std::uint8_t>> views;
+  for (auto &subframe : subframes)
+    views.push_back (subframe.view ());
+  extractor->run (coded, views);
+  return subframes;
+}
+
+ImageView<const std::uint8_t>
+view (const Image<std::uint8_t> &image)
+{
+  return image.view ();
+}
+
+} // namespace
+
+TEST (Regions, ShareAnExposureOfTheLeastCommonMultiple)
+{
+  const Schedule schedule = preset (kTwo);
+  EXPECT_EQ (schedule.elements (), 4);
+  EXPECT_EQ (schedule.slots (), 24); // of 4, 8 and 6
+  EXPECT_EQ (schedule.masks (), 24);
+  EXPECT_EQ (schedule.region (0).slots (), 8);
+  EXPECT_EQ (schedule.region (1).slots (), 6);
+  EXPECT_EQ (schedule.background (), preset ("sequential:2x2"));
+  EXPECT_EQ (schedule.background ().slots (), 4);
+  EXPECT_EQ (preset ("sequential:2x2,leak=0.01,pilot=16,region=2x2+0+0:"
+                     "sequential:2x1")
+                 .region (0),
+      preset ("sequential:2x1,leak=0.01"));
+  EXPECT_EQ (preset (std::string (kTwo) + ",pilot=4").masks (), 48);
+}
+
+TEST (Regions, AreFoundByPlace)
+{
+  const Schedule schedule = preset (kTwo);
+  EXPECT_EQ (schedule.region_at (8, 4), 0);
+  EXPECT_EQ (schedule.region_at (23, 11), 0);
+  EXPECT_EQ (schedule.region_at (24, 11), -1);
+  EXPECT_EQ (schedule.region_at (23, 12), -1);
+  EXPECT_EQ (schedule.region_at (7, 4), -1);
+  EXPECT_EQ (schedule.region_at (30, 10), 1);
+  EXPECT_EQ (schedule.region_at (-1, -1), -1);
+}
+
+TEST (Regions, HoldEachMaskAndBeginAtTheirOwnCorner)
+{
+  const Schedule schedule = preset (kTwo);
+  for (int slot = 0; slot < 24; slot++) {
+    /* n = 4 holds each mask for 6 slots, n = 8 for 3, n = 6 for 4. */
+    for (int place = 0; place < 4; place++)
+      EXPECT_EQ (schedule.open (2 + place % 2, 2 + place / 2, slot),
+          slot / 6 == place);
+    for (int place = 0; place < 8; place++)
+      EXPECT_EQ (schedule.open (8 + place % 4, 4 + place / 4, slot),
+          slot / 3 == place);
+    /* phase 1/1: the corner bears label 4, which is open in 5 of 6. */
+    EXPECT_EQ (schedule.open (30, 10, slot), slot / 4 <= 4);
+  }
+}
+
+TEST (Regions, MasksOfEveryMakingAgree)
+{
+  const Schedule schedule = preset (std::string (kTwo) + ",pilot=3");
+  constexpr int kWidth = 41, kHeight = 25;
+  Image<std::uint8_t> mirrors (kWidth, kHeight), placed (kWidth, kHeight);
+  const PlanePlan plan = plan_planes (schedule);
+  std::set<std::pair<std::uint64_t, std::uint64_t>> digests;
+  std::set<std::vector<std::uint8_t>> different;
+  for (int mask = 0; mask < schedule.masks (); mask++) {
+    render_mask (schedule, mask, mirrors.view ());
+    render_mirrors (schedule, mask, {}, placed.view ());
+    ASSERT_EQ (mirrors, placed) << "mask " << mask;
+    const PlaneSlot at = plan.masks[std::size_t (mask)];
+    const PlaneImage planes =
+        render_planes (schedule, plan, at.image, {}, {kWidth, kHeight});
+    for (int y = 0; y < kHeight; y++)
+      for (int x = 0; x < kWidth; x++) {
+        ASSERT_EQ (planes.at (x, y) >> at.plane & 1, mirrors.at (x, y))
+            << "mask " << mask << " at " << x << ", " << y;
+        if (y < kHeight - 3) {
+          ASSERT_EQ (mirrors.at (x, y), schedule.open (x, y, mask % 24));
+        }
+      }
+    const PlaneDigest digest = digest_mask (schedule, mask);
+    digests.insert ({digest.high, digest.low});
+    different.emplace (
+        mirrors.view ().data, mirrors.view ().data + kWidth * kHeight);
+  }
+  EXPECT_EQ (digests.size (), different.size ());
+  EXPECT_GT (different.size (), 8u);
+  EXPECT_FALSE (
+      digest_mask (preset ("sequential:2x2"), 0) == digest_mask (schedule, 0));
+}
+
+TEST (Regions, AreCutAtTheBordersOfSmallArrays)
+{
+  const Schedule schedule = preset (kTwo);
+  Image<std::uint8_t> mirrors (12, 6);
+  for (int mask = 0; mask < 24; mask++) {
+    render_mask (schedule, mask, mirrors.view ());
+    for (int y = 0; y < 6; y++)
+      for (int x = 0; x < 12; x++)
+        ASSERT_EQ (mirrors.at (x, y), schedule.open (x, y, mask));
+  }
+}
+
+TEST (Regions, TextsReadBack)
+{
+  const char *texts[] = {kTwo,
+      "staircase:2x2,active=1ms,leak=0.01,pilot=16,region=8x8+0+0:sequential:"
+      "lattice:8/3:order=bit-reversal",
+      "sequential:2x2,region=4x4+0+0:s-matrix:2x2:order=3/1/2/0:phase=1/0"};
+  for (const char *text : texts) {
+    const Schedule schedule = preset (text);
+    EXPECT_EQ (preset (schedule.text ()), schedule) << schedule.text ();
+    const auto again = Schedule::from_json (schedule.to_json ());
+    ASSERT_TRUE (again.ok ()) << again.error ().message;
+    EXPECT_EQ (*again, schedule);
+  }
+  EXPECT_EQ (preset (kTwo).text (), kTwo);
+  EXPECT_EQ (preset ("sequential:2x2,region=8x4+2+6:sequential:4x2").to_json (),
+      R"({"format":"coded-exposure","version":1,"tile":"2x2",)"
+      R"("code":"sequential","regions":[{"rect":[2,6,8,4],"tile":"4x2",)"
+      R"("code":"sequential"}]})");
+  EXPECT_EQ (json (R"([{"rect":[2,6,8,4],"tile":"4x2","code":"sequential",)"
+                   R"("order":[0,1,2,3,4,5,6,7],"phase":[0,0]}])"),
+      preset ("sequential:2x2,region=8x4+2+6:sequential:4x2"));
+}
+
+TEST (Regions, WrongPresetsAreNamed)
+{
+  const struct {
+    const char *region;
+    std::vector<std::string> words;
+  } cases[] = {
+      {"", {"''", "WxH+X+Y:CODE:TILE"}},
+      {"8x8+0+0", {"'8x8+0+0'", "with a code", "WxH+X+Y"}},
+      {"8x8:sequential:2x2", {"'8x8'", "WxH+X+Y"}},
+      {"8x8+0-1:sequential:2x2", {"'8x8+0-1'"}},
+      {"8x8+-1+0:sequential:2x2", {"8x8+-1+0", "0..16384"}},
+      {"8x8+0+16385:sequential:2x2", {"0..16384"}},
+      {"0x8+0+0:sequential:2x2", {"region 0, 0x8+0+0", "no pixel"}},
+      {"7x8+0+0:sequential:2x2", {"multiples", "2x2"}},
+      {"8x8+0+0:sequential", {"the tile is missing"}},
+      {"8x8+0+0:order=0/1", {"'' is no code"}},
+      {"8x8+0+0:rolling:2x2", {"'rolling' is no code"}},
+      {"8x8+0+0:sequential:2x2:leak=0.1", {"no key 'leak'", "order, phase"}},
+      {"8x8+0+0:sequential:2x2:phase=0/0:x", {"'x' after a colon"}},
+      {"8x8+0+0:sequential:2x2:order=0/1/2/2", {"region 0", "permutation"}},
+      {"257x257+0+0:sequential:lattice:257/3", {"257 elements"}},
+      {"14x14+0+0:sequential:7x1,region=22x2+20+20:sequential:11x1",
+          {"region 1", "308 slots", "least common multiple", "256"}},
+      {"8x8+0+0:sequential:2x2,region=8x8+7+7:sequential:2x2",
+          {"region 1, 8x8+7+7", "overlaps region 0, 8x8+0+0"}},
+  };
+  for (const auto &c : cases)
+    expect_words (Schedule::from_preset (
+                      "sequential:2x2,region=" + std::string (c.region)),
+        c.region, c.words);
+  std::string many = "sequential:2x2";
+  for (int i = 0; i < 65; i++)
+    many += ",region=2x2+" + std::to_string (2 * i) + "+0:sequential:2x1";
+  expect_words (Schedule::from_preset (many), "65", {"65 regions", "64"});
+}
+
+TEST (Regions, WrongJsonIsNamed)
+{
+  const struct {
+    const char *regions;
+    std::vector<std::string> words;
+  } cases[] = {
+      {"[]", {"'regions'", "at least one"}},
+      {"{}", {"'regions'", "a list"}},
+      {"[1]", {"regions[0]", "an object"}},
+      {R"([{"tile":"2x2","code":"sequential"}])", {"'rect' is missing"}},
+      {R"([{"rect":[0,0,2,2],"code":"sequential"}])", {"'tile' is missing"}},
+      {R"([{"rect":[0,0,2,2],"tile":"2x2"}])", {"'code' is missing"}},
+      {R"([{"rect":[0,0,2],"tile":"2x2","code":"sequential"}])",
+          {"regions[0]", "[x, y, width, height]"}},
+      {R"([{"rect":[0,-2,2,2],"tile":"2x2","code":"sequential"}])",
+          {"rect[1]", "-2"}},
+      {R"([{"rect":[0,0,2,2],"tile":"2x2","code":"sequential","leak":0}])",
+          {"no key 'leak'", "rect"}},
+      {R"([{"rect":[0,0,3,2],"tile":"2x2","code":"sequential"}])",
+          {"region 0, 3x2+0+0", "multiples"}},
+  };
+  for (const auto &c : cases)
+    expect_words (Schedule::from_json (
+                      R"({"format":"coded-exposure","version":1,"tile":"2x2",)"
+                      R"("code":"sequential","regions":)" +
+                      std::string (c.regions) + "}"),
+        c.regions, c.words);
+}
+
+TEST (Regions, LieWithinTheFrameAboveThePilot)
+{
+  const Schedule schedule = preset (std::string (kTwo) + ",pilot=4");
+  EXPECT_TRUE (schedule.check_size (36, 20).ok ());
+  const auto narrow = schedule.check_size (35, 20);
+  ASSERT_FALSE (narrow.ok ());
+  EXPECT_NE (
+      narrow.error ().message.find ("region 1, 6x6+30+10"), std::string::npos)
+      << narrow.error ().message;
+  const auto low = schedule.check_size (36, 19);
+  ASSERT_FALSE (low.ok ());
+  EXPECT_NE (low.error ().message.find ("pilot's 4 rows"), std::string::npos);
+  EXPECT_TRUE (preset ("sequential:2x2").check_size (1, 1).ok ());
+}
+
+TEST (Regions, SlipsShowInThePilotOnly)
+{
+  const std::string staircase = "staircase:2x2";
+  const std::string region = ",region=8x8+0+0:sequential:4x2";
+  EXPECT_EQ (
+      slip_observable (preset (staircase)), SlipObservable::in_the_frame);
+  EXPECT_EQ (
+      slip_observable (preset (staircase + region)), SlipObservable::never);
+  EXPECT_EQ (slip_observable (preset (staircase + ",pilot=8" + region)),
+      SlipObservable::always);
+}
+
+TEST (Regions, WhatKnowsOnePartOnlySaysSo)
+{
+  const auto extractor = Extractor<std::uint8_t>::make (preset (kTwo), 64, 48);
+  ASSERT_FALSE (extractor.ok ());
+  EXPECT_NE (
+      extractor.error ().message.find ("without regions"), std::string::npos)
+      << extractor.error ().message;
+}
+
+/* Each part gives what was in front of its pixels while they were open. */
+TEST (Regions, PicturesOfEveryPartComeOut)
+{
+  const Schedule schedule =
+      preset ("sequential:2x2,region=16x8+8+4:sequential:4x2,region=8x8+30+8:"
+              "sequential:2x1");
+  const int width = 40, height = 24;
+  const auto coded = coded_frame (schedule, width, height, light);
+  ASSERT_EQ (schedule.slots (), 8);
+  ExtractOptions select;
+  select.method = Method::kSelect;
+
+  const auto &regions = schedule.regions ();
+  for (int i = 0; i < 2; i++) {
+    const Schedule &part = schedule.region (i);
+    const Rect &rect = regions[std::size_t (i)].rect;
+    const auto subframes = extract (schedule, part,
+        pixels_of (regions[std::size_t (i)], view (coded)), select);
+    ASSERT_EQ (int (subframes.size ()), part.slots ());
+    const SampleGrid grid (part);
+    for (int k = 0; k < part.slots (); k++)
+      for (int y = 0; y < subframes[std::size_t (k)].height (); y++)
+        for (int x = 0; x < subframes[std::size_t (k)].width (); x++) {
+          const Offset at = grid.offset (k, x, y);
+          const int cx = rect.x + x * part.cell ().width + at.x;
+          const int cy = rect.y + y * part.cell ().height + at.y;
+          ASSERT_EQ (subframes[std::size_t (k)].at (x, y), coded.at (cx, cy));
+        }
+  }
+  EXPECT_EQ (coded.at (8 + 1, 4),
+      (light (9, 4, 1) + 2) / 4); // one slot of the 4 that n = 2 has
+}
+
+TEST (Regions, WhiteIsWhiteInEveryPart)
+{
+  const Schedule schedule = preset (
+      "sequential:2x2,leak=0.01,region=16x8+8+4:staircase:4x2,region=8x8+30+8:"
+      "sequential:2x1");
+  const auto grey = [] (int, int, int) { return std::uint8_t (200); };
+  const auto coded = coded_frame (schedule, 40, 24, grey);
+  const auto near_grey = [] (const Image<std::uint8_t> &subframe, Rect but) {
+    for (int y = 0; y < subframe.height (); y++)
+      for (int x = 0; x < subframe.width (); x++)
+        if (!but.holds (x, y)) {
+          ASSERT_NEAR (subframe.at (x, y), 200, 8) << x << ", " << y;
+        }
+  };
+  for (int i = 0; i < 2; i++)
+    for (const auto &subframe : extract (schedule, schedule.region (i),
+             pixels_of (schedule.regions ()[std::size_t (i)], view (coded))))
+      near_grey (subframe, {});
+
+  /* All of the background's cells but those of regions, which are black. */
+  auto parts = preset ("sequential:2x2,leak=0.01");
+  for (auto &subframe : extract (schedule, parts, view (coded))) {
+    blacken_regions (schedule, 0, subframe.view ());
+    EXPECT_EQ (subframe.at (4, 2), 0);
+    EXPECT_EQ (subframe.at (11, 5), 0);
+    EXPECT_EQ (subframe.at (15, 4), 0);
+    EXPECT_GT (subframe.at (3, 2), 150);
+    EXPECT_GT (subframe.at (14, 4), 150);
+  }
+}
+
+TEST (Regions, CellsOfTheBackgroundThatTheyTouchAreBlack)
+{
+  const Schedule schedule =
+      preset ("sequential:2x2,region=6x6+3+5:sequential:3x2");
+  Image<std::uint8_t> subframe (8, 6);
+  for (int y = 0; y < 6; y++)
+    std::fill_n (subframe.view ().row (y), 8, std::uint8_t (9));
+  blacken_regions (schedule, 0, subframe.view ());
+  for (int y = 0; y < 6; y++)
+    for (int x = 0; x < 8; x++)
+      EXPECT_EQ (
+          subframe.at (x, y), x >= 1 && x <= 4 && y >= 2 && y <= 5 ? 0 : 9)
+          << x << ", " << y;
+  blacken_regions (schedule, 1, subframe.view ());
+  EXPECT_EQ (subframe.at (0, 1), 0);
+  EXPECT_EQ (subframe.at (5, 5), 0);
+  EXPECT_EQ (subframe.at (6, 5), 9);
+  EXPECT_EQ (subframe.at (0, 0), 9);
+}

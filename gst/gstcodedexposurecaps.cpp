@@ -236,7 +236,7 @@ CapsScale
 coded_to_subframes (const Schedule &schedule, bool raised_rate)
 {
   CapsScale scale;
-  scale.rate_num = raised_rate ? schedule.slots () : 1;
+  scale.rate_num = raised_rate ? schedule.code ().slots () : 1;
   scale.width_den = schedule.cell ().width;
   scale.height_den = schedule.cell ().height;
   scale.crop_rows = schedule.pilot_rows ();

@@ -31,8 +31,9 @@ struct CapsScale {
   CapsScale inverse () const;
 };
 
-/** Coded frames to the subframes of @p schedule: rate x N (only when
- * @p raised_rate), size divided by the cell, the pilot's rows cropped. */
+/** Coded frames to the subframes of @p schedule, or of its background: rate x N
+ * (only when @p raised_rate), size divided by the cell, the pilot's rows
+ * cropped. */
 CapsScale coded_to_subframes (const Schedule &schedule, bool raised_rate);
 
 /**

@@ -15,6 +15,9 @@
  *   lasts until the next one; OFFSET counts subframes.
  * - `subframe_0` to `subframe_<n-1>` (request): one subframe of every frame,
  *   at the camera's rate; the same memory as on `src`.
+ * - `region_<i>` (request): all subframes of region i of the schedule, at the
+ *   camera's rate times the region's own n; of a schedule without regions there
+ *   are none.
  * - `coded` (request): the coded frames, the same memory as they came in. It
  *   is served first, so that a recorder never waits for a display.
  *
@@ -38,6 +41,13 @@
  * because tags come after caps. Width and height are divided by the cell of the
  * tile, pixel-aspect-ratio follows; columns and rows that fill no cell, and the
  * pilot's rows, are cropped.
+ *
+ * Where the schedule has regions, areas with a tile and a code of their own,
+ * `src` and `subframe_<k>` show the background, which has the tile and the code
+ * of the schedule: their size and rate are its, and what a region touches is
+ * black. A region's subframes have its own size, rate and times. Pads are
+ * served in the order of time. All parts are brought to the same brightness;
+ * #codedexposure-demux:method=select by name keeps the camera's values.
  *
  * ## Flags, metas and messages
  *
@@ -112,6 +122,8 @@ GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE ("sink",
 GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC,
     GST_PAD_ALWAYS, GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
 GstStaticPadTemplate subframe_template = GST_STATIC_PAD_TEMPLATE ("subframe_%u",
+    GST_PAD_SRC, GST_PAD_REQUEST, GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
+GstStaticPadTemplate region_template = GST_STATIC_PAD_TEMPLATE ("region_%u",
     GST_PAD_SRC, GST_PAD_REQUEST, GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
 GstStaticPadTemplate coded_template = GST_STATIC_PAD_TEMPLATE ("coded",
     GST_PAD_SRC, GST_PAD_REQUEST, GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
@@ -195,8 +207,8 @@ gst_coded_exposure_demux_class_init (GstCodedExposureDemuxClass *klass)
   element->change_state = GST_DEBUG_FUNCPTR (change_state);
   element->request_new_pad = GST_DEBUG_FUNCPTR (demux::request_pad);
   element->release_pad = GST_DEBUG_FUNCPTR (demux::release_pad);
-  for (auto *pad_template :
-      {&sink_template, &src_template, &subframe_template, &coded_template})
+  for (auto *pad_template : {&sink_template, &src_template, &subframe_template,
+           &region_template, &coded_template})
     gst_element_class_add_static_pad_template (element, pad_template);
   gst_element_class_set_static_metadata (element,
       "Coded exposure demultiplexer", "Filter/Effect/Video",

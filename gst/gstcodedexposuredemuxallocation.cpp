@@ -109,12 +109,13 @@ prepare_allocation (GstCodedExposureDemux *self, Output &output, guint at_once)
     return;
 
   const CapsPtr caps = caps_for (self, output);
-  const Plan &plan = *state (self).stream.plan;
+  GstVideoInfo info;
+  gst_video_info_from_caps (&info, caps.get ());
   Offer offer = ask_downstream (pad, caps.get ());
   Allocation &allocation = output.allocation.emplace ();
   allocation.video_meta = offer.video_meta;
   allocation.pool.reset (choose_pool (
-      pad, offer, caps.get (), GST_VIDEO_INFO_SIZE (&plan.subframe), at_once));
+      pad, offer, caps.get (), GST_VIDEO_INFO_SIZE (&info), at_once));
   GST_DEBUG_OBJECT (pad, "pool %" GST_PTR_FORMAT ", video meta %s",
       allocation.pool.get (), allocation.video_meta ? "yes" : "no");
 }

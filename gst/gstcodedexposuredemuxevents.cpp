@@ -90,8 +90,15 @@ frames_a_frame (GstCodedExposureDemux *self, GstPad *pad)
   const auto list = outputs (self);
   const ObjectLock lock (self);
   const ScheduleRef &schedule = state (self).in_force;
-  const bool raised = list->all->pad.get () == pad && schedule;
-  return raised ? schedule->slots () : 1;
+  if (!schedule)
+    return 1;
+  if (list->all->pad.get () == pad)
+    return schedule->elements ();
+  const int regions = int (schedule->regions ().size ());
+  for (const auto &[index, output] : list->regions)
+    if (output->pad.get () == pad && index < regions)
+      return schedule->region (index).elements ();
+  return 1;
 }
 
 } // namespace

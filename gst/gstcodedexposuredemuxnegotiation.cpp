@@ -26,13 +26,12 @@ take_settings (GstCodedExposureDemux *self)
 template <typename Pixel>
 std::optional<AnyExtractor>
 make_extractor (
-    GstCodedExposureDemux *self, const Schedule &schedule, Extent size)
+    GstCodedExposureDemux *self, const Schedule &part, const Rect &rect)
 {
   const Stream &stream = state (self).stream;
   ExtractOptions options = stream.settings.extract;
   options.bits = stream.bits_in_force ();
-  auto made =
-      Extractor<Pixel>::make (schedule, size.width, size.height, options);
+  auto made = Extractor<Pixel>::make (part, rect.width, rect.height, options);
   if (made)
     return AnyExtractor (std::move (*made));
   refuse (GST_ELEMENT (self), made.error ().message);
@@ -73,14 +72,17 @@ slots_of (const Code &code, Method method, int k)
 }
 
 std::vector<Window>
-light_windows (const Schedule &schedule, Method method, const SlotPlan &slots)
+light_windows (const Schedule &part, Method method, const SlotPlan &slots)
 {
+  /* Slots of the exposure for which the part holds each of its masks. */
+  const int held = slots.slots () / part.slots ();
   std::vector<Window> windows;
-  for (int k = 0; k < schedule.slots (); k++) {
-    const auto [first, last] = slots_of (schedule.code (), method, k);
-    const Nanoseconds start = slots.start (first);
-    windows.push_back ({GstClockTime (start),
-        GstClockTime (slots.start (last) + slots.active () - start)});
+  for (int k = 0; k < part.slots (); k++) {
+    const auto [first, last] = slots_of (part.code (), method, k);
+    const Nanoseconds start = slots.start (first * held);
+    const Nanoseconds end =
+        slots.start (last * held + held - 1) + slots.active ();
+    windows.push_back ({GstClockTime (start), GstClockTime (end - start)});
   }
   return windows;
 }
@@ -94,15 +96,23 @@ slot_boundaries (FrameRate rate, int n)
   return boundaries;
 }
 
-PadCaps
-output_caps (CodedFormat coded, Extent extracted, const Schedule &schedule)
+/* Caps of coded frames as those of the part's subframes. */
+CapsPtr
+part_caps (const CodedFormat &coded, const Part &part, bool raised_rate)
 {
-  const CapsPtr with_aspect = resized_caps (coded, extracted);
+  const CapsPtr cut = resized_caps (coded, {part.rect.width, part.rect.height});
+  return CapsPtr (
+      scale_caps (cut.get (), coded_to_subframes (part.schedule, raised_rate)));
+}
+
+PadCaps
+output_caps (CodedFormat coded, const Plan &plan)
+{
   PadCaps caps;
-  caps.all.reset (
-      scale_caps (with_aspect.get (), coded_to_subframes (schedule, true)));
-  caps.one.reset (
-      scale_caps (with_aspect.get (), coded_to_subframes (schedule, false)));
+  caps.all = part_caps (coded, plan.background (), true);
+  caps.one = part_caps (coded, plan.background (), false);
+  for (std::size_t i = 1; i < plan.parts.size (); i++)
+    caps.regions.push_back (part_caps (coded, plan.parts[i], true));
   caps.coded = std::move (coded.caps);
   return caps;
 }
@@ -111,13 +121,78 @@ void
 say_what_is_cropped (GstCodedExposureDemux *self, const Plan &plan)
 {
   const Extent cell = plan.schedule.cell ();
-  const int columns = plan.extracted.width - plan.subframe.width * cell.width;
-  const int rows = plan.extracted.height - plan.subframe.height * cell.height;
+  const GstVideoInfo &subframe = plan.background ().subframe;
+  const int columns = plan.extracted.width - subframe.width * cell.width;
+  const int rows = plan.extracted.height - subframe.height * cell.height;
   if (columns > 0 || rows > 0)
     GST_INFO_OBJECT (self,
         "%d columns and %d rows (pilot: %d) of the coded frames are cropped: "
         "they fill no cell of %dx%d pixels",
         columns, rows, plan.schedule.pilot_rows (), cell.width, cell.height);
+}
+
+/* A recording of such a schedule may meet somebody who does not know it. */
+void
+say_regions (GstCodedExposureDemux *self, const Schedule &schedule)
+{
+  const std::size_t regions = schedule.regions ().size ();
+  if (regions == 0)
+    return;
+  const std::string text =
+      "Of " + schedule.text () +
+      " src and the subframe pads show the background; its " +
+      std::to_string (regions) +
+      " regions are black there and come out of pads region_0 to region_" +
+      std::to_string (regions - 1);
+  /* gst-launch shows the second text only. */
+  GST_ELEMENT_INFO (
+      self, STREAM, FORMAT, ("%s", text.c_str ()), ("%s", text.c_str ()));
+}
+
+/* @region -1: the background. */
+std::optional<Part>
+make_part (GstCodedExposureDemux *self, const CodedFormat &coded,
+    const SlotPlan &slots, const Schedule &whole, int region, const Rect &rect)
+{
+  const bool wide =
+      GST_VIDEO_INFO_FORMAT (&coded.info) == GST_VIDEO_FORMAT_GRAY16_LE;
+  const Schedule schedule =
+      region < 0 ? whole.background () : whole.region (region);
+  auto extractor = wide ? make_extractor<std::uint16_t> (self, schedule, rect)
+                        : make_extractor<std::uint8_t> (self, schedule, rect);
+  if (!extractor)
+    return std::nullopt;
+  const Method method =
+      std::visit ([] (const auto &e) { return e.method (); }, *extractor);
+  Part part{region, schedule, rect, {}, std::move (*extractor), method,
+      slot_boundaries ({coded.info.fps_n, coded.info.fps_d}, schedule.slots ()),
+      light_windows (schedule, method, slots)};
+  gst_video_info_from_caps (
+      &part.subframe, part_caps (coded, part, false).get ());
+  return part;
+}
+
+/* The background and the regions of a frame of @size pixels; none, with an
+ * error on the bus, where one of them cannot be taken apart. */
+std::vector<Part>
+make_parts (GstCodedExposureDemux *self, const CodedFormat &coded,
+    const SlotPlan &slots, const Schedule &schedule, Extent size)
+{
+  if (const auto within = schedule.check_size (size.width, size.height);
+      !within) {
+    refuse (GST_ELEMENT (self), within.error ().message);
+    return {};
+  }
+  std::vector<Part> parts;
+  for (int i = -1; i < int (schedule.regions ().size ()); i++) {
+    const Rect rect = i < 0 ? Rect{0, 0, size.width, size.height}
+                            : schedule.regions ()[std::size_t (i)].rect;
+    auto part = make_part (self, coded, slots, schedule, i, rect);
+    if (!part)
+      return {};
+    parts.push_back (std::move (*part));
+  }
+  return parts;
 }
 
 struct Proposal {
@@ -153,22 +228,13 @@ propose (GstCodedExposureDemux *self)
     return std::nullopt;
   if (rectifier)
     size = rectifier->mirrors ();
-  auto extractor = GST_VIDEO_INFO_FORMAT (&info) == GST_VIDEO_FORMAT_GRAY8
-                       ? make_extractor<std::uint8_t> (self, schedule, size)
-                       : make_extractor<std::uint16_t> (self, schedule, size);
-  if (!extractor)
+  auto parts = make_parts (self, *format, *slots, schedule, size);
+  if (parts.empty ())
     return std::nullopt;
-  const Method method =
-      std::visit ([] (const auto &e) { return e.method (); }, *extractor);
-
-  PadCaps caps = output_caps (std::move (*format), size, schedule);
-  GstVideoInfo subframe;
-  gst_video_info_from_caps (&subframe, caps.one.get ());
-  return Proposal{Plan{schedule, info, subframe, std::move (*extractor), method,
-                      rate, slot_boundaries (rate, schedule.slots ()),
-                      light_windows (schedule, method, *slots),
-                      std::move (rectifier), size},
-      std::move (caps), found->assumed};
+  Plan plan{
+      schedule, info, rate, std::move (parts), std::move (rectifier), size};
+  PadCaps caps = output_caps (std::move (*format), plan);
+  return Proposal{std::move (plan), std::move (caps), found->assumed};
 }
 
 /* Makes @proposal the plan in force. */
@@ -182,6 +248,7 @@ install (GstCodedExposureDemux *self, Proposal proposal)
   stream.plan = std::move (proposal.plan);
   stream.stale = false;
   stream.scratch.clear ();
+  const Part &background = stream.plan->background ();
   say_what_is_cropped (self, *stream.plan);
   say_mapping (GST_ELEMENT (self), st.counters, stream.plan->rectifier.get ());
 
@@ -190,7 +257,7 @@ install (GstCodedExposureDemux *self, Proposal proposal)
     const ObjectLock lock (self);
     schedule_changed = !st.in_force || !(*st.in_force == stream.plan->schedule);
     method_changed =
-        std::exchange (st.method, stream.plan->method) != stream.plan->method;
+        std::exchange (st.method, background.method) != background.method;
     st.in_force = std::make_shared<const Schedule> (stream.plan->schedule);
     st.assumed = proposal.assumed;
     st.rectifies = stream.plan->rectifier != nullptr;
@@ -202,13 +269,15 @@ install (GstCodedExposureDemux *self, Proposal proposal)
   });
   GST_INFO_OBJECT (self, "%s, %s, gain %g: %dx%d to %dx%d",
       stream.plan->schedule.text ().c_str (),
-      std::string (method_name (stream.plan->method)).c_str (),
+      std::string (method_name (background.method)).c_str (),
       std::visit (
-          [] (const auto &e) { return e.gain (); }, stream.plan->extractor),
+          [] (const auto &e) { return e.gain (); }, background.extractor),
       stream.plan->coded.width, stream.plan->coded.height,
-      stream.plan->subframe.width, stream.plan->subframe.height);
-  if (schedule_changed)
+      background.subframe.width, background.subframe.height);
+  if (schedule_changed) {
     notify (self, "schedule-in-force");
+    say_regions (self, stream.plan->schedule);
+  }
   if (method_changed)
     notify (self, "method-in-force");
 }
@@ -216,13 +285,17 @@ install (GstCodedExposureDemux *self, Proposal proposal)
 } // namespace
 
 GstCaps *
-PadCaps::of (Output::Kind kind) const
+PadCaps::of (const Output &output) const
 {
-  switch (kind) {
+  switch (output.kind) {
   case Output::Kind::kCoded:
     return coded.get ();
   case Output::Kind::kOne:
     return one.get ();
+  case Output::Kind::kRegion:
+    return output.index < int (regions.size ())
+               ? regions[std::size_t (output.index)].get ()
+               : nullptr;
   default:
     return all.get ();
   }
@@ -248,14 +321,19 @@ bool
 check_pads (GstCodedExposureDemux *self, const Outputs &list)
 {
   const Schedule &schedule = state (self).stream.plan->schedule;
-  const int n = schedule.elements ();
-  if (list.ones.empty () || list.ones.rbegin ()->first < n)
-    return true;
-  refuse (GST_ELEMENT (self),
-      "Pad subframe_" + std::to_string (list.ones.rbegin ()->first) +
-          " was requested, but " + schedule.text () +
-          " has subframe_0 to subframe_" + std::to_string (n - 1) + ".");
-  return false;
+  for (const auto *pads : {&list.ones, &list.regions}) {
+    if (pads->empty ())
+      continue;
+    const OutputRef &last = pads->rbegin ()->second;
+    if (last->index < numbered_pads (last->kind, &schedule))
+      continue;
+    const CharPtr name (gst_pad_get_name (last->pad.get ()));
+    refuse (GST_ELEMENT (self), "Pad " + std::string (name.get ()) +
+                                    " was requested, but " +
+                                    pads_text (last->kind, &schedule));
+    return false;
+  }
+  return true;
 }
 
 } // namespace cexp::gst::demux

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* The source pads: asked for, given back, and told of events. */
-#include <cstdio>
-
+#include "base/text.h"
 #include "gstcodedexposuredemuxstate.h"
 
 #define GST_CAT_DEFAULT codedexposure_demux_debug
@@ -60,7 +59,10 @@ translate (const Output &output, const PadCaps &caps, GstEvent *upstream)
   case GST_EVENT_STREAM_START:
     return stream_start_for (output.pad.get (), upstream);
   case GST_EVENT_CAPS: {
-    EventPtr event (gst_event_new_caps (caps.of (output.kind)));
+    GstCaps *own = caps.of (output);
+    if (!own)
+      return nullptr;
+    EventPtr event (gst_event_new_caps (own));
     gst_event_set_seqnum (event.get (), gst_event_get_seqnum (upstream));
     return event;
   }
@@ -84,7 +86,8 @@ replay_sticky (GstPad *, GstEvent **event, gpointer user_data)
   if (type == GST_EVENT_EOS || (!replay.caps && type != GST_EVENT_STREAM_START))
     return TRUE;
   const EventPtr own = translate (replay.output, replay.caps, *event);
-  gst_pad_store_sticky_event (replay.output.pad.get (), own.get ());
+  if (own)
+    gst_pad_store_sticky_event (replay.output.pad.get (), own.get ());
   return TRUE;
 }
 
@@ -109,9 +112,8 @@ enlist (GstCodedExposureDemux *self, const OutputRef &output)
   case Output::Kind::kCoded:
     list->coded = output;
     break;
-  case Output::Kind::kOne:
-    list->ones[output->index] = output;
-    break;
+  default:
+    list->numbered (output->kind)[output->index] = output;
   }
   st.outputs = std::move (list);
   gst_flow_combiner_add_pad (st.combiner.get (), output->pad.get ());
@@ -134,60 +136,84 @@ strike (GstCodedExposureDemux *self, GstPad *pad)
   if (found->kind == Output::Kind::kCoded)
     list->coded.reset ();
   else
-    list->ones.erase (found->index);
+    list->numbered (found->kind).erase (found->index);
   st.outputs = std::move (list);
   gst_flow_combiner_remove_pad (st.combiner.get (), pad);
   return found;
 }
 
-/* The index in "subframe_%u", or the lowest free one where no name is given;
- * -1 when the name is none. */
-int
-subframe_index (const Outputs &list, const gchar *name)
+/* Of pads that have a number; the template has the same and "%u". */
+const char *
+prefix_of (Output::Kind kind)
 {
-  if (!name || g_str_equal (name, "subframe_%u")) {
+  return kind == Output::Kind::kRegion ? "region_" : "subframe_";
+}
+
+/* The number in @name, or the lowest free one where no name is given; -1 when
+ * the name is none. */
+int
+index_in (const gchar *name, const std::string &prefix,
+    const std::map<int, OutputRef> &taken)
+{
+  if (!name || prefix + "%u" == name) {
     int index = 0;
-    while (list.ones.count (index) > 0)
+    while (taken.count (index) > 0)
       index++;
     return index;
   }
-  guint index = 0;
-  int end = 0;
-  if (std::sscanf (name, "subframe_%u%n", &index, &end) != 1 ||
-      name[end] != '\0' || index > G_MAXINT)
+  if (!g_str_has_prefix (name, prefix.c_str ()))
     return -1;
-  return int (index);
+  return parse_int (name + prefix.size ()).value_or (-1);
 }
 
 /* While a schedule is in force its range is known; before, the largest there
  * can be, and negotiate () looks again. */
 bool
-index_allowed (GstCodedExposureDemux *self, int index)
+index_allowed (GstCodedExposureDemux *self, Output::Kind kind, int index)
 {
   ScheduleRef schedule;
   {
     const ObjectLock lock (self);
     schedule = state (self).in_force;
   }
-  const int n = schedule ? schedule->elements () : Tile::kMaxElements;
-  if (index >= 0 && index < n)
+  if (index >= 0 && index < numbered_pads (kind, schedule.get ()))
     return true;
   GST_ELEMENT_WARNING (self, STREAM, WRONG_TYPE,
-      ("There is no pad subframe_%d: %s has subframe_0 to subframe_%d.", index,
-          schedule ? schedule->text ().c_str () : "the largest schedule",
-          n - 1),
+      ("There is no pad %s%d: %s", prefix_of (kind), index,
+          pads_text (kind, schedule.get ()).c_str ()),
       (nullptr));
   return false;
 }
 
 } // namespace
 
+int
+numbered_pads (Output::Kind kind, const Schedule *schedule)
+{
+  if (kind == Output::Kind::kRegion)
+    return schedule ? int (schedule->regions ().size ())
+                    : Schedule::kMaxRegions;
+  return schedule ? schedule->elements () : Tile::kMaxElements;
+}
+
+std::string
+pads_text (Output::Kind kind, const Schedule *schedule)
+{
+  const int n = numbered_pads (kind, schedule);
+  const std::string prefix = prefix_of (kind);
+  const std::string owner =
+      schedule ? schedule->text () : "the largest schedule";
+  return owner + (n == 0 ? " has no regions."
+                         : " has " + prefix + "0 to " + prefix +
+                               std::to_string (n - 1) + ".");
+}
+
 OutputRef
 add_output (GstCodedExposureDemux *self, GstPadTemplate *templ,
     Output::Kind kind, int index)
 {
-  const CharPtr name (kind == Output::Kind::kOne
-                          ? g_strdup_printf ("subframe_%d", index)
+  const CharPtr name (index >= 0
+                          ? g_strdup_printf ("%s%d", prefix_of (kind), index)
                           : g_strdup (GST_PAD_TEMPLATE_NAME_TEMPLATE (templ)));
   auto output = std::make_shared<Output> ();
   output->kind = kind;
@@ -220,15 +246,20 @@ request_pad (GstElement *element, GstPadTemplate *templ, const gchar *name,
     return add_output (self, templ, Output::Kind::kCoded, -1)->pad.get ();
   }
 
-  const int index = subframe_index (*list, name);
-  if (!index_allowed (self, index))
+  const auto kind =
+      g_str_equal (GST_PAD_TEMPLATE_NAME_TEMPLATE (templ), "region_%u")
+          ? Output::Kind::kRegion
+          : Output::Kind::kOne;
+  Outputs listed = *list;
+  const int index = index_in (name, prefix_of (kind), listed.numbered (kind));
+  if (!index_allowed (self, kind, index))
     return nullptr;
-  if (list->ones.count (index) > 0) {
-    GST_WARNING_OBJECT (
-        self, "pad subframe_%d exists: tee it to use it twice", index);
+  if (listed.numbered (kind).count (index) > 0) {
+    GST_WARNING_OBJECT (self, "pad %s%d exists: tee it to use it twice",
+        prefix_of (kind), index);
     return nullptr;
   }
-  return add_output (self, templ, Output::Kind::kOne, index)->pad.get ();
+  return add_output (self, templ, kind, index)->pad.get ();
 }
 
 void
@@ -275,7 +306,8 @@ CapsPtr
 caps_for (GstCodedExposureDemux *self, const Output &output)
 {
   const ObjectLock lock (self);
-  return CapsPtr (gst_caps_ref (state (self).caps.of (output.kind)));
+  GstCaps *caps = state (self).caps.of (output);
+  return CapsPtr (caps ? gst_caps_ref (caps) : nullptr);
 }
 
 void
@@ -283,6 +315,8 @@ push_caps (GstCodedExposureDemux *self, const Output &output)
 {
   const CapsPtr caps = caps_for (self, output);
   const CapsPtr current (gst_pad_get_current_caps (output.pad.get ()));
+  if (!caps)
+    return;
   if (current && gst_caps_is_equal (current.get (), caps.get ()))
     return;
   GstEvent *event = gst_event_new_caps (caps.get ());

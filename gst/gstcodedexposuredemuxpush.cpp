@@ -4,6 +4,8 @@
 #include <cstdlib>
 #include <numeric>
 
+#include "extract/parts.h"
+#include "extract/saturation.h"
 #include "gstcodedexposuredemuxstate.h"
 
 #define GST_CAT_DEFAULT codedexposure_demux_debug
@@ -97,6 +99,18 @@ is_late (GstCodedExposureDemux *self, const Output &output, GstClockTime pts,
          GST_CLOCK_TIME_IS_VALID (running) && running < earliest;
 }
 
+/* The subframes of one part of the frame, and where they go. */
+struct Work {
+  const Part *part;
+  std::vector<Targets> targets;
+
+  bool wanted () const
+  {
+    return std::any_of (targets.begin (), targets.end (),
+        [] (const Targets &target) { return target.owner (); });
+  }
+};
+
 /* Subframes in the order in which they are pushed. */
 std::vector<std::size_t>
 push_order (const Job &job, std::size_t n)
@@ -122,13 +136,25 @@ prepare_output (GstCodedExposureDemux *self, Output &output, guint at_once,
   return true;
 }
 
-/* Finds where every subframe has to go; says so where one is left out. */
-std::vector<Targets>
-find_targets (GstCodedExposureDemux *self, const Job &job, GstFlowReturn &flow)
+/* The pad that gets all subframes of @part; null where nobody asked for it. */
+Output *
+raised_output (const Job &job, const Part &part)
 {
-  const Plan &plan = *state (self).stream.plan;
-  const auto &bounds = plan.boundaries;
-  std::vector<Targets> targets (std::size_t (plan.subframes ()));
+  if (part.region < 0)
+    return job.outputs->all.get ();
+  const auto found = job.outputs->regions.find (part.region);
+  return found == job.outputs->regions.end () ? nullptr : found->second.get ();
+}
+
+/* Finds where every subframe of @part has to go; says so where one is left
+ * out. */
+Work
+find_targets (GstCodedExposureDemux *self, const Job &job, const Part &part,
+    GstFlowReturn &flow)
+{
+  const auto &bounds = part.boundaries;
+  Work work{&part, std::vector<Targets> (std::size_t (part.subframes ()))};
+  std::vector<Targets> &targets = work.targets;
   const auto aim = [&] (Output &output, std::size_t k, GstClockTime duration,
                        Output *&target) {
     const GstClockTime pts = job.pts + bounds[k];
@@ -138,57 +164,64 @@ find_targets (GstCodedExposureDemux *self, const Job &job, GstFlowReturn &flow)
       target = &output;
   };
 
-  Output &all = *job.outputs->all;
-  if (prepare_output (self, all, guint (targets.size ()), flow)) {
+  Output *const all = raised_output (job, part);
+  if (all && prepare_output (self, *all, guint (targets.size ()), flow)) {
     for (std::size_t k : push_order (job, targets.size ()))
-      aim (all, k, bounds[k + 1] - bounds[k], targets[k].all);
+      aim (*all, k, bounds[k + 1] - bounds[k], targets[k].all);
   }
+  if (part.region >= 0)
+    return work;
   for (const auto &[index, output] : job.outputs->ones) {
     const auto k = std::size_t (index);
     if (prepare_output (self, *output, 1, flow))
-      aim (*output, k, plan.period (), targets[k].one);
+      aim (*output, k, part.period (), targets[k].one);
   }
-  return targets;
+  return work;
 }
 
 /* Room for a subframe that nobody wants: the extractor writes all of them. */
 template <typename Pixel>
 ImageView<Pixel>
-scratch_view (Stream &stream, std::size_t k)
+scratch_view (Stream &stream, const Part &part, std::size_t k)
 {
-  const GstVideoInfo &info = stream.plan->subframe;
+  const GstVideoInfo &info = part.subframe;
   const std::size_t row = std::size_t (info.width) * sizeof (Pixel);
   const std::size_t plane = row * std::size_t (info.height);
-  stream.scratch.resize (plane * std::size_t (stream.plan->subframes ()));
+  const std::size_t size = plane * std::size_t (part.subframes ());
+  if (stream.scratch.size () < size)
+    stream.scratch.resize (size);
   return {reinterpret_cast<Pixel *> (stream.scratch.data () + k * plane),
       info.width, info.height, std::ptrdiff_t (row)};
 }
 
 template <typename Pixel>
 ExtractReport
-extract (const Extractor<Pixel> &extractor, Stream &stream, MappedFrame &coded,
-    std::vector<MappedFrame> &subframes)
+extract (const Extractor<Pixel> &extractor, Stream &stream, const Part &part,
+    ImageView<const Pixel> light, std::vector<MappedFrame> &subframes)
 {
   std::vector<ImageView<Pixel>> views;
   views.reserve (subframes.size ());
   for (std::size_t k = 0; k < subframes.size (); k++)
     views.push_back (subframes[k] ? view_of<Pixel> (subframes[k])
-                                  : scratch_view<Pixel> (stream, k));
-  ImageView<const Pixel> light = view_of<const Pixel> (coded);
-  if (const Rectifier *rectifier = stream.plan->rectifier.get ())
-    light = rectify (stream, *rectifier, light, stream.bits_in_force ());
-  return extractor.run (light, views);
+                                  : scratch_view<Pixel> (stream, part, k));
+  const Rect &rect = part.rect;
+  const ExtractReport report = extractor.run (
+      light.block (rect.x, rect.y, rect.width, rect.height), views);
+  if (part.region < 0)
+    for (const ImageView<Pixel> &view : views)
+      blacken_regions (stream.plan->schedule, extractor.reach (), view);
+  return report;
 }
 
 /* Takes a buffer for every subframe that has a target and maps it; a subframe
  * that has none is left unmapped. */
 GstFlowReturn
-map_subframes (GstCodedExposureDemux *self, std::vector<Targets> &targets,
+map_subframes (GstCodedExposureDemux *self, Work &work,
     std::vector<MappedFrame> &subframes)
 {
-  const GstVideoInfo &info = state (self).stream.plan->subframe;
-  subframes.reserve (targets.size ());
-  for (Targets &target : targets) {
+  const GstVideoInfo &info = work.part->subframe;
+  subframes.reserve (work.targets.size ());
+  for (Targets &target : work.targets) {
     if (!target.owner ()) {
       subframes.emplace_back ();
       continue;
@@ -209,9 +242,28 @@ map_subframes (GstCodedExposureDemux *self, std::vector<Targets> &targets,
   return GST_FLOW_OK;
 }
 
-/* Fills the buffers of @targets. */
+/* Fills the buffers of @work, which is wanted, from @light, one pixel a
+ * mirror. */
+template <typename Pixel>
 GstFlowReturn
-render (GstCodedExposureDemux *self, Job &job, std::vector<Targets> &targets)
+render_part (GstCodedExposureDemux *self, Job &job, Work &work,
+    ImageView<const Pixel> light)
+{
+  std::vector<MappedFrame> subframes;
+  const GstFlowReturn flow = map_subframes (self, work, subframes);
+  if (flow != GST_FLOW_OK)
+    return flow;
+  const auto &extractor = std::get<Extractor<Pixel>> (work.part->extractor);
+  job.meta.saturated =
+      extract (extractor, state (self).stream, *work.part, light, subframes)
+          .saturated;
+  return GST_FLOW_OK;
+}
+
+/* Fills the buffers of all @works. */
+template <typename Pixel>
+GstFlowReturn
+render (GstCodedExposureDemux *self, Job &job, std::vector<Work> &works)
 {
   Stream &stream = state (self).stream;
   const Plan &plan = *stream.plan;
@@ -225,34 +277,40 @@ render (GstCodedExposureDemux *self, Job &job, std::vector<Targets> &targets)
         (nullptr));
     return GST_FLOW_ERROR;
   }
-  std::vector<MappedFrame> subframes;
-  const GstFlowReturn flow = map_subframes (self, targets, subframes);
-  if (flow != GST_FLOW_OK)
-    return flow;
-  job.meta.saturated = std::visit (
-      [&] (const auto &extractor) {
-        return extract (extractor, stream, coded, subframes).saturated;
-      },
-      plan.extractor);
-  return GST_FLOW_OK;
+  ImageView<const Pixel> light = view_of<const Pixel> (coded);
+  if (plan.rectifier)
+    light = rectify (stream, *plan.rectifier, light, stream.bits_in_force ());
+  GstFlowReturn flow = GST_FLOW_OK;
+  for (Work &work : works)
+    if (work.wanted () && flow == GST_FLOW_OK)
+      flow = render_part (self, job, work, light);
+  /* Each extractor counts the cells of its own part. */
+  if (works.size () > 1)
+    job.meta.saturated = count_saturated (
+        light.rows (0, light.height - plan.schedule.pilot_rows ()),
+        stream.bits_in_force ());
+  return flow;
 }
 
 /* What all pads that get subframe @k see alike. */
 void
-describe_subframe (GstCodedExposureDemux *self, const Job &job, std::size_t k,
-    GstBuffer *outbuf)
+describe_subframe (GstCodedExposureDemux *self, const Job &job,
+    const Part &part, std::size_t k, GstBuffer *outbuf)
 {
-  const Plan &plan = *state (self).stream.plan;
   gst_buffer_copy_into (outbuf, job.inbuf, GST_BUFFER_COPY_FLAGS, 0, -1);
   GST_BUFFER_FLAG_UNSET (outbuf, GST_BUFFER_FLAG_MARKER);
-  copy_metas (job.inbuf, plan.coded, outbuf, plan.subframe);
+  if (part.region < 0)
+    copy_metas (
+        job.inbuf, state (self).stream.plan->coded, outbuf, part.subframe);
+  else
+    copy_metas_to_part (job.inbuf, outbuf);
 
   FrameMeta meta = job.meta;
   meta.subframe = gint (k);
-  meta.exposure_start = job.pts + plan.windows[k].start;
-  meta.exposure_duration = plan.windows[k].duration;
+  meta.exposure_start = job.pts + part.windows[k].start;
+  meta.exposure_duration = part.windows[k].duration;
   set_frame_meta (outbuf, meta);
-  GST_BUFFER_PTS (outbuf) = job.pts + plan.boundaries[k];
+  GST_BUFFER_PTS (outbuf) = job.pts + part.boundaries[k];
   GST_BUFFER_DTS (outbuf) = GST_CLOCK_TIME_NONE;
 }
 
@@ -285,46 +343,45 @@ push_on (GstCodedExposureDemux *self, Output &output, BufferPtr outbuf,
 /* @outbuf once more, in the same memory unless the peer of @output could not
  * read its layout. */
 BufferPtr
-share (const Plan &plan, const Output &output, GstBuffer *outbuf)
+share (const Part &part, const Output &output, GstBuffer *outbuf)
 {
   const GstVideoMeta *layout = gst_buffer_get_video_meta (outbuf);
   const bool plain =
-      !layout || (layout->offset[0] == plan.subframe.offset[0] &&
-                     layout->stride[0] == plan.subframe.stride[0]);
+      !layout || (layout->offset[0] == part.subframe.offset[0] &&
+                     layout->stride[0] == part.subframe.stride[0]);
   if (plain || output.allocation->video_meta)
     return BufferPtr (gst_buffer_copy (outbuf));
 
   BufferPtr packed (gst_buffer_new_allocate (
-      nullptr, GST_VIDEO_INFO_SIZE (&plan.subframe), nullptr));
+      nullptr, GST_VIDEO_INFO_SIZE (&part.subframe), nullptr));
   gst_buffer_copy_into (packed.get (), outbuf,
       GstBufferCopyFlags (GST_BUFFER_COPY_FLAGS | GST_BUFFER_COPY_TIMESTAMPS),
       0, -1);
-  copy_metas (outbuf, plan.subframe, packed.get (), plan.subframe);
-  MappedFrame from (plan.subframe, outbuf, GST_MAP_READ);
-  MappedFrame to (plan.subframe, packed.get (), GST_MAP_WRITE);
+  copy_metas (outbuf, part.subframe, packed.get (), part.subframe);
+  MappedFrame from (part.subframe, outbuf, GST_MAP_READ);
+  MappedFrame to (part.subframe, packed.get (), GST_MAP_WRITE);
   if (from && to)
     gst_video_frame_copy (to.frame (), from.frame ());
   return packed;
 }
 
 GstFlowReturn
-push_subframe (
-    GstCodedExposureDemux *self, const Job &job, std::size_t k, Targets target)
+push_subframe (GstCodedExposureDemux *self, const Job &job, const Part &part,
+    std::size_t k, Targets target)
 {
-  const Plan &plan = *state (self).stream.plan;
-  describe_subframe (self, job, k, target.buffer.get ());
+  describe_subframe (self, job, part, k, target.buffer.get ());
   BufferPtr second;
   if (target.all && target.one)
-    second = share (plan, *target.one, target.buffer.get ());
+    second = share (part, *target.one, target.buffer.get ());
 
   GstFlowReturn flow = GST_FLOW_OK;
   if (target.all)
     flow = push_on (self, *target.all, std::move (target.buffer),
-        plan.boundaries[k + 1] - plan.boundaries[k]);
+        part.boundaries[k + 1] - part.boundaries[k]);
   else
     second = std::move (target.buffer);
   if (target.one && !is_fatal (flow))
-    flow = push_on (self, *target.one, std::move (second), plan.period ());
+    flow = push_on (self, *target.one, std::move (second), part.period ());
   return flow;
 }
 
@@ -347,25 +404,55 @@ push_coded (GstCodedExposureDemux *self, const Job &job)
       self, *output, gst_pad_push (output->pad.get (), outbuf.release ()));
 }
 
+/* A subframe of one of several parts. */
+struct Turn {
+  GstClockTime at; ///< from the start of the frame
+  Work *work;
+  std::size_t k;
+};
+
+/* The subframes of all parts in the order of time, those of the background
+ * first; backwards where the stream plays so. */
+std::vector<Turn>
+take_turns (const Job &job, std::vector<Work> &works)
+{
+  std::vector<Turn> turns;
+  for (Work &work : works)
+    for (const std::size_t k : push_order (job, work.targets.size ()))
+      if (work.targets[k].owner ())
+        turns.push_back ({work.part->boundaries[k], &work, k});
+  if (works.size () > 1)
+    std::stable_sort (
+        turns.begin (), turns.end (), [&] (const Turn &a, const Turn &b) {
+          return job.backwards ? a.at > b.at : a.at < b.at;
+        });
+  return turns;
+}
+
 GstFlowReturn
 push_subframes (GstCodedExposureDemux *self, Job &job)
 {
+  Stream &stream = state (self).stream;
   GstFlowReturn flow = GST_FLOW_OK;
-  std::vector<Targets> targets = find_targets (self, job, flow);
-  if (std::none_of (targets.begin (), targets.end (),
-          [] (const Targets &target) { return target.owner (); }))
+  std::vector<Work> works;
+  for (const Part &part : stream.plan->parts)
+    works.push_back (find_targets (self, job, part, flow));
+  std::vector<Turn> turns = take_turns (job, works);
+  if (turns.empty ())
     return flow;
-  flow = render (self, job, targets);
+  flow = GST_VIDEO_INFO_FORMAT (&stream.plan->coded) == GST_VIDEO_FORMAT_GRAY8
+             ? render<std::uint8_t> (self, job, works)
+             : render<std::uint16_t> (self, job, works);
   if (flow != GST_FLOW_OK)
     return flow;
   if (!GST_BUFFER_FLAG_IS_SET (job.inbuf, GST_BUFFER_FLAG_GAP))
-    note_saturation (GST_ELEMENT (self), state (self).stream,
-        state (self).counters, job.pts, job.meta);
+    note_saturation (
+        GST_ELEMENT (self), stream, state (self).counters, job.pts, job.meta);
 
-  for (std::size_t k : push_order (job, targets.size ())) {
-    if (targets[k].owner () && !is_fatal (flow))
-      flow = push_subframe (self, job, k, std::move (targets[k]));
-  }
+  for (const auto &[at, work, k] : turns)
+    if (!is_fatal (flow))
+      flow = push_subframe (
+          self, job, *work->part, k, std::move (work->targets[k]));
   return flow;
 }
 

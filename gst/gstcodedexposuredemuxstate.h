@@ -53,10 +53,10 @@ struct Allocation {
 
 /** A source pad. */
 struct Output {
-  enum class Kind { kAll, kOne, kCoded };
+  enum class Kind { kAll, kOne, kRegion, kCoded };
 
   Kind kind;
-  int index; ///< of the subframe, for kOne
+  int index; ///< of the subframe, for kOne, or of the region
   ObjectPtr<GstPad> pad;
 
   /* Sink pad's stream lock. */
@@ -78,6 +78,7 @@ struct Outputs {
   OutputRef all;
   OutputRef coded; ///< null until requested
   std::map<int, OutputRef> ones;
+  std::map<int, OutputRef> regions;
 
   template <typename F>
   void each (F &&f) const
@@ -87,13 +88,22 @@ struct Outputs {
     f (all);
     for (const auto &[index, output] : ones)
       f (output);
+    for (const auto &[index, output] : regions)
+      f (output);
+  }
+  /** Numbered pads of one kind. */
+  std::map<int, OutputRef> &numbered (Output::Kind kind)
+  {
+    return kind == Output::Kind::kRegion ? regions : ones;
   }
 };
 
 /** What is pushed on each kind of pad. */
 struct PadCaps {
   CapsPtr coded, all, one;
-  GstCaps *of (Output::Kind kind) const;
+  std::vector<CapsPtr> regions;
+  /** Null for a region that there is not. */
+  GstCaps *of (const Output &output) const;
   explicit operator bool () const { return all != nullptr; }
 };
 
@@ -105,22 +115,34 @@ struct Window {
   GstClockTime start, duration;
 };
 
-/** Everything that follows from the caps, the schedule and the settings. */
-struct Plan {
+/** What is taken apart by one tile and one code. */
+struct Part {
+  int region; ///< -1: the background, or all there is
   Schedule schedule;
-  GstVideoInfo coded, subframe;
+  Rect rect; ///< of the frame that is taken apart
+  GstVideoInfo subframe;
   AnyExtractor extractor;
   Method method;
-  FrameRate rate;
   /** Slot boundaries, n + 1 of them, counted from the frame's PTS. */
   std::vector<GstClockTime> boundaries;
   std::vector<Window> windows;
-  /** Null: the camera stands as the schedule has it. */
-  std::shared_ptr<const Rectifier> rectifier = nullptr;
-  Extent extracted = {}; ///< size of what the extractor takes
 
   int subframes () const { return schedule.elements (); }
   GstClockTime period () const { return boundaries.back (); }
+};
+
+/** Everything that follows from the caps, the schedule and the settings. */
+struct Plan {
+  Schedule schedule;
+  GstVideoInfo coded;
+  FrameRate rate;
+  std::vector<Part> parts; ///< the background, then the regions
+  /** Null: the camera stands as the schedule has it. */
+  std::shared_ptr<const Rectifier> rectifier = nullptr;
+  Extent extracted = {}; ///< size of the frame that is taken apart
+
+  const Part &background () const { return parts.front (); }
+  GstClockTime period () const { return background ().period (); }
 };
 
 /** All that is forgotten from PAUSED to READY. Sink pad's stream lock. */
@@ -193,6 +215,11 @@ void notify (GstCodedExposureDemux *self, const char *property);
 /* Pads. */
 OutputRef add_output (GstCodedExposureDemux *self, GstPadTemplate *templ,
     Output::Kind kind, int index);
+/** How many pads there can be of a kind that has numbers; @p schedule may be
+ * null, if none is known. */
+int numbered_pads (Output::Kind kind, const Schedule *schedule);
+/** The same for people. */
+std::string pads_text (Output::Kind kind, const Schedule *schedule);
 GstPad *request_pad (GstElement *element, GstPadTemplate *templ,
     const gchar *name, const GstCaps *caps) noexcept;
 void release_pad (GstElement *element, GstPad *pad) noexcept;
@@ -221,8 +248,8 @@ gboolean src_query (GstPad *pad, GstObject *parent, GstQuery *query) noexcept;
  * @p next  the frame that comes next, where there is one. */
 GstFlowReturn negotiate (
     GstCodedExposureDemux *self, GstBuffer *next = nullptr);
-/** Whether the plan has a subframe for every pad of @p list; posts an error
- * where it has not. */
+/** Whether the plan has a subframe or a region for every pad of @p list; posts
+ * an error where it has not. */
 bool check_pads (GstCodedExposureDemux *self, const Outputs &list);
 /** Forwards the events that waited for the caps. */
 void settle_events (GstCodedExposureDemux *self);

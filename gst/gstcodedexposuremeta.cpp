@@ -26,6 +26,7 @@ find (GstBuffer *buffer)
 struct MetaCopy {
   GstBuffer *to;
   GstVideoInfo from_info, to_info;
+  bool whole; ///< the picture is of all of the other
 };
 
 gboolean
@@ -43,6 +44,8 @@ copy_meta (GstBuffer *from, GstMeta **meta, gpointer user_data)
     return TRUE;
   if (gst_meta_api_type_has_tag (info->api,
           g_quark_from_static_string (GST_META_TAG_VIDEO_SIZE_STR))) {
+    if (!copy.whole)
+      return TRUE;
     GstVideoMetaTransform scale{&copy.from_info, &copy.to_info};
     info->transform_func (copy.to, *meta, from,
         gst_video_meta_transform_scale_get_quark (), &scale);
@@ -192,7 +195,14 @@ void
 copy_metas (GstBuffer *from, const GstVideoInfo &from_info, GstBuffer *to,
     const GstVideoInfo &to_info)
 {
-  MetaCopy copy{to, from_info, to_info};
+  MetaCopy copy{to, from_info, to_info, true};
+  gst_buffer_foreach_meta (from, copy_meta, &copy);
+}
+
+void
+copy_metas_to_part (GstBuffer *from, GstBuffer *to)
+{
+  MetaCopy copy{to, {}, {}, false};
   gst_buffer_foreach_meta (from, copy_meta, &copy);
 }
 

@@ -56,5 +56,8 @@ std::optional<FrameMeta> get_frame_meta (GstBuffer *buffer);
  */
 void copy_metas (GstBuffer *from, const GstVideoInfo &from_info, GstBuffer *to,
     const GstVideoInfo &to_info);
+/** The same where @p to was made of a part of the picture; what speaks of
+ * places stays behind. */
+void copy_metas_to_part (GstBuffer *from, GstBuffer *to);
 
 } // namespace cexp::gst

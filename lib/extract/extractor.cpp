@@ -27,7 +27,8 @@ constexpr std::array<std::string_view, 4> kMethodNames = {
 Method
 method_for (const Schedule &schedule)
 {
-  if (schedule.code ().one_hot () && schedule.leak () == 0.0)
+  if (schedule.code ().one_hot () && schedule.leak () == 0.0 &&
+      schedule.white_slots () == 1.0)
     return Method::kSelect;
   return schedule.code ().inverse (schedule.leak ()) ? Method::kDecode
                                                      : Method::kRank;

@@ -16,7 +16,9 @@ namespace cexp
 {
 
 enum class Method {
-  kAuto,   ///< select for one-hot codes without leak, else decode, else rank
+  /** Select for one-hot codes without leak, else decode, else rank. A part of a
+   * schedule that gets less light than others is decoded for its brightness. */
+  kAuto,
   kRank,   ///< subframe k = k-th smallest of the group (paper, Section 3.3)
   kSelect, ///< subframe k = the element that is open in slot k
   kDecode, ///< solve the code for the light of each slot

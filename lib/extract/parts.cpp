@@ -7,20 +7,6 @@
 namespace cexp
 {
 
-ExtractOptions
-options_for_part (
-    const Schedule &whole, const Schedule &part, const ExtractOptions &options)
-{
-  ExtractOptions own = options;
-  const double gain = whole.white_slots_of (part);
-  if (options.gain > 0.0 || gain == part.white_slots ())
-    return own;
-  own.gain = gain;
-  if (own.method == Method::kAuto && part.code ().one_hot ())
-    own.method = Method::kDecode;
-  return own;
-}
-
 template <typename Pixel>
 void
 blacken_regions (const Schedule &whole, int reach, ImageView<Pixel> subframe)

@@ -47,8 +47,6 @@ Result<std::unique_ptr<Engine>>
 Engine::make (const Schedule &schedule, int width, int height,
     const FuseOptions &options, double steps)
 {
-  if (const auto checked = check_one_part (schedule, "fusion"); !checked)
-    return checked.error ();
   const int rows = height - schedule.pilot_rows ();
   const Extent cell = schedule.cell ();
   if (width < cell.width || rows < cell.height)
@@ -107,7 +105,7 @@ void
 Engine::map_noise (const Schedule &schedule)
 {
   noise_ = {Field (width_, height_), Field (width_, height_)};
-  if (!observation_.exact ())
+  if (observation_.gains ())
     gain_ = Field (width_, height_);
   for (int y = 0; y < height_; y++) {
     for (int x = 0; x < width_; x++) {

@@ -2,6 +2,7 @@
 #include "fuse/fuser.h"
 
 #include <algorithm>
+#include <cstdlib>
 
 #include "base/text.h"
 #include "fuse/engine.h"
@@ -23,6 +24,110 @@ write_row (const float *light, float scale, float largest, int width, Pixel *to)
     const float value = light[x] * scale + 0.5f;
     to[x] = Pixel (value < 0.0f ? 0.0f : value > largest ? largest : value);
   }
+}
+
+/** A part of the frame that is fused by itself. */
+struct Piece {
+  Rect rect;
+  int held; ///< slots of the exposure that are one of its own
+  std::unique_ptr<fuse::Engine> engine;
+};
+
+/** A pixel of the background that a region covers, and the one of the same
+ * element that stands for it. */
+struct Cover {
+  Offset at, from;
+};
+
+/** Steps of @p period from @p at that leave [from, to): to the left, or to the
+ * right where @p right. */
+int
+way_out (int at, int from, int to, int period, bool right)
+{
+  return right ? ((to - 1 - at) / period + 1) * period
+               : -((at - from) / period + 1) * period;
+}
+
+/** The nearest pixel of the same element, whole periods of the tile to one
+ * side, that no region covers; the pixel itself where there is none. */
+Offset
+uncovered_pixel (const Schedule &schedule, Extent size, Offset at)
+{
+  const Tile &tile = schedule.tile ();
+  const Rect frame{0, 0, size.width, size.height};
+  Offset best = at;
+  int least = size.width + size.height;
+  for (const bool across : {true, false}) {
+    for (const bool forward : {true, false}) {
+      Offset place = at;
+      while (frame.holds (place.x, place.y)) {
+        const int i = schedule.region_at (place.x, place.y);
+        const int away = std::abs (place.x - at.x) + std::abs (place.y - at.y);
+        if (i < 0 && away < least) {
+          least = away;
+          best = place;
+        }
+        if (i < 0)
+          break;
+        const Rect &rect = schedule.regions ()[std::size_t (i)].rect;
+        if (across)
+          place.x += way_out (
+              place.x, rect.x, rect.right (), tile.period_x (), forward);
+        else
+          place.y += way_out (
+              place.y, rect.y, rect.bottom (), tile.period_y (), forward);
+      }
+    }
+  }
+  return best;
+}
+
+std::vector<Cover>
+find_covers (const Schedule &schedule, Extent size)
+{
+  std::vector<Cover> covers;
+  for (const Region &region : schedule.regions ())
+    for (int y = region.rect.y; y < region.rect.bottom (); y++)
+      for (int x = region.rect.x; x < region.rect.right (); x++)
+        covers.push_back ({{x, y}, uncovered_pixel (schedule, size, {x, y})});
+  return covers;
+}
+
+Result<std::vector<Piece>>
+make_pieces (const Schedule &schedule, int width, int height,
+    const FuseOptions &options, double largest)
+{
+  std::vector<Piece> pieces;
+  for (int i = -1; i < int (schedule.regions ().size ()); i++) {
+    const Schedule part = i < 0 ? schedule.background () : schedule.region (i);
+    const Rect rect = i < 0 ? Rect{0, 0, width, height}
+                            : schedule.regions ()[std::size_t (i)].rect;
+    auto engine =
+        fuse::Engine::make (part, rect.width, rect.height, options, largest);
+    if (!engine)
+      return engine.error ();
+    pieces.push_back (
+        {rect, schedule.slots () / part.slots (), std::move (*engine)});
+  }
+  return pieces;
+}
+
+/** @p coded, where @p engine takes it. */
+template <typename Pixel>
+Field &
+light_of (fuse::Engine &engine, ImageView<const Pixel> coded, float scale)
+{
+  Field &light = engine.next ();
+  for (int y = 0; y < engine.height (); y++) {
+    const Pixel *from = coded.row (y);
+    float *to = light.row (y);
+    for (int x = 0; x < engine.width (); x++)
+      to[x] = float (from[x]) * scale;
+    if (const float *gain = engine.gain (y))
+      for (int x = 0; x < engine.width (); x++)
+        to[x] *= gain[x];
+  }
+  return light;
 }
 
 } // namespace
@@ -54,7 +159,10 @@ fuse_targets ()
 
 template <typename Pixel>
 struct Fuser<Pixel>::State {
-  std::unique_ptr<fuse::Engine> engine;
+  /** The background, or all there is, and the regions that cover it. */
+  std::vector<Piece> pieces;
+  std::vector<Cover> covers;
+  int slots;
   float largest;
 };
 
@@ -80,50 +188,53 @@ Fuser<Pixel>::make (
                  ": pixels have 1 to " + std::to_string (kBits) +
                  ", and 0 stands for all of them"};
   const int largest = (1 << (options.bits ? options.bits : kBits)) - 1;
-  auto engine = fuse::Engine::make (schedule, width, height, options, largest);
-  if (!engine)
-    return engine.error ();
-  return Fuser (std::make_unique<State> (std::move (*engine), float (largest)));
+  if (const auto within = schedule.check_size (width, height); !within)
+    return within.error ();
+  auto pieces = make_pieces (schedule, width, height, options, largest);
+  if (!pieces)
+    return pieces.error ();
+  auto state = std::make_unique<State> (State{std::move (*pieces),
+      find_covers (schedule, {width, height - schedule.pilot_rows ()}),
+      schedule.slots (), float (largest)});
+  return Fuser (std::move (state));
 }
 
 template <typename Pixel>
 int
 Fuser<Pixel>::slots () const
 {
-  return state_->engine->slots ();
+  return state_->slots;
 }
 
 template <typename Pixel>
 Extent
 Fuser<Pixel>::size () const
 {
-  return {state_->engine->width (), state_->engine->height ()};
+  const fuse::Engine &all = *state_->pieces.front ().engine;
+  return {all.width (), all.height ()};
 }
 
 template <typename Pixel>
 void
 Fuser<Pixel>::take (ImageView<const Pixel> coded)
 {
-  fuse::Engine &engine = *state_->engine;
-  Field &light = engine.next ();
   const float scale = kWhite / state_->largest;
-  for (int y = 0; y < engine.height (); y++) {
-    const Pixel *from = coded.row (y);
-    float *to = light.row (y);
-    for (int x = 0; x < engine.width (); x++)
-      to[x] = float (from[x]) * scale;
-    if (const float *gain = engine.gain (y))
-      for (int x = 0; x < engine.width (); x++)
-        to[x] *= gain[x];
+  for (Piece &piece : state_->pieces) {
+    const auto &[x, y, width, height] = piece.rect;
+    Field &light =
+        light_of (*piece.engine, coded.block (x, y, width, height), scale);
+    if (&piece == &state_->pieces.front ())
+      for (const auto &[at, from] : state_->covers)
+        light.row (at.y)[at.x] = light.row (from.y)[from.x];
+    piece.engine->take ();
   }
-  engine.take ();
 }
 
 template <typename Pixel>
 int
 Fuser<Pixel>::pending () const
 {
-  return state_->engine->pending ();
+  return state_->pieces.front ().engine->pending ();
 }
 
 template <typename Pixel>
@@ -131,18 +242,28 @@ void
 Fuser<Pixel>::fuse (std::span<const ImageView<Pixel>> frames)
 {
   const float scale = state_->largest / kWhite;
-  const int width = state_->engine->width ();
-  state_->engine->fuse ([&] (int y, const float *const *slots) {
-    for (std::size_t k = 0; k < frames.size (); k++)
-      write_row (slots[k], scale, state_->largest, width, frames[k].row (y));
-  });
+  for (Piece &piece : state_->pieces) {
+    const auto &[left, top, width, height] = piece.rect;
+    const std::size_t held = std::size_t (piece.held);
+    piece.engine->fuse ([&] (int y, const float *const *slots) {
+      const auto row = [&] (std::size_t k) {
+        return frames[k].row (top + y) + left;
+      };
+      for (std::size_t k = 0; k < frames.size (); k++)
+        if (k % held == 0)
+          write_row (slots[k / held], scale, state_->largest, width, row (k));
+        else
+          std::copy_n (row (k - 1), width, row (k));
+    });
+  }
 }
 
 template <typename Pixel>
 void
 Fuser<Pixel>::forget ()
 {
-  state_->engine->forget ();
+  for (Piece &piece : state_->pieces)
+    piece.engine->forget ();
 }
 
 template class Fuser<std::uint8_t>;

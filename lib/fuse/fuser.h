@@ -56,6 +56,10 @@ std::vector<std::string_view> fuse_targets ();
  * as it is, and pixels of a one-hot code without noise stay as they are in
  * their own slot.
  *
+ * Regions are fused each by itself, and so is the background around them. There
+ * is a picture for every slot of the exposure; a part of fewer slots shows each
+ * of its own for as many of them as it lasted.
+ *
  * Any code and tile will do for `fast`, as long as no more than kMaxPhases
  * pixels of the tile have different neighbourhoods; motion needs kMaxSlots
  * slots or fewer.

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "fuse/observation.h"
 
+#include <algorithm>
 #include <numeric>
 
 namespace cexp
@@ -24,6 +25,13 @@ Observation::Observation (
         shares.push_back ({s, light[std::size_t (s)] / total});
     gain_.push_back (schedule.white_slots () / total);
   }
+}
+
+bool
+Observation::gains () const
+{
+  return std::any_of (
+      gain_.begin (), gain_.end (), [] (double gain) { return gain != 1.0; });
 }
 
 double

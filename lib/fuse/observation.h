@@ -37,6 +37,8 @@ public:
     return shares_[std::size_t (element)];
   }
   double gain (int element) const { return gain_[std::size_t (element)]; }
+  /** Whether any is other than 1. */
+  bool gains () const;
   /** Variance of the noise of y where the light is @p light. */
   double variance (int element, double light) const;
   /** Every element passes one slot only: its pixel is the light of that slot.

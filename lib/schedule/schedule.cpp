@@ -123,6 +123,8 @@ check_one_part (const Schedule &schedule, const char *what)
 Schedule::Schedule (Parts parts, Extent cell)
     : parts_ (std::move (parts)), cell_ (cell), slots_ (parts_.code.slots ())
 {
+  const int open = parts_.code.max_open_slots ();
+  white_slots_ = open + parts_.leak * (slots_ - open);
 }
 
 Schedule::Schedule () : Schedule (default_parts (), {2, 2}) {}
@@ -191,6 +193,10 @@ Schedule::add_regions ()
     order = part->order ();
     in_region_.push_back (*std::move (part));
   }
+  const int open = max_open_slots ();
+  white_slots_ = open + parts_.leak * (slots_ - open);
+  for (Schedule &part : in_region_)
+    part.white_slots_ = white_slots_ / (slots_ / part.slots_);
   return {};
 }
 
@@ -201,6 +207,7 @@ Schedule::background () const
   alone.parts_.regions.clear ();
   alone.in_region_.clear ();
   alone.slots_ = alone.parts_.code.slots ();
+  alone.white_slots_ = white_slots_ / (slots_ / alone.slots_);
   return alone;
 }
 
@@ -250,13 +257,6 @@ Schedule::max_open_slots () const
   for (const Schedule &part : in_region_)
     most = std::max (most, part.max_open_slots () * (slots_ / part.slots ()));
   return most;
-}
-
-double
-Schedule::white_slots () const
-{
-  const int open = max_open_slots ();
-  return open + parts_.leak * (slots_ - open);
 }
 
 } // namespace cexp

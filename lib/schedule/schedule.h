@@ -128,9 +128,10 @@ public:
   const std::vector<Region> &regions () const { return parts_.regions; }
 
   /** Region @p i as a schedule of its own, of the pixels of its rectangle. It
-   * has the leak, no timing, no pilot and no regions. */
+   * has the leak and the white of the whole, no timing, no pilot and no
+   * regions. */
   const Schedule &region (int i) const { return in_region_[std::size_t (i)]; }
-  /** The schedule without its regions. */
+  /** The schedule without its regions, but with the white of the whole. */
   Schedule background () const;
   /** Region in which pixel (x, y) lies; -1: the background. */
   int region_at (int x, int y) const;
@@ -173,18 +174,13 @@ public:
   int max_open_slots () const;
   /** Slots' worth of white light that make white in the coded frame, so that
    * the element with the most light just fills the range: its open slots, and
-   * what leaks through in the others. */
-  double white_slots () const;
-  /** The same counted in slots of @p part, one of this schedule's parts: with
-   * that gain its white is white, however much light other parts get. */
-  double white_slots_of (const Schedule &part) const
-  {
-    return white_slots () / (slots () / part.slots ());
-  }
+   * what leaks through in the others. Of a part of another schedule, it is the
+   * white of that one, which may be more than any element of the part sees. */
+  double white_slots () const { return white_slots_; }
 
   bool operator== (const Schedule &other) const
   {
-    return parts_ == other.parts_;
+    return parts_ == other.parts_ && white_slots_ == other.white_slots_;
   }
 
 private:
@@ -194,8 +190,10 @@ private:
 
   Parts parts_;
   Extent cell_;
+  /* These follow from parts_, but for the white of a part. */
   int slots_;
-  std::vector<Schedule> in_region_; ///< follow from parts_
+  double white_slots_;
+  std::vector<Schedule> in_region_;
 };
 
 /** "192x144+64+32": width, height and corner. */

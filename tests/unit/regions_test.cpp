@@ -13,7 +13,9 @@
 #include "clock/phase_watch.h"
 #include "dmd/dmd.h"
 #include "dmd/plane_image.h"
+#include "extract/extractor.h"
 #include "extract/parts.h"
+#include "fuse/fuser.h"
 #include "optics/bench.h"
 #include "schedule/sample_grid.h"
 #include "schedule/schedule.h"
@@ -81,11 +83,11 @@ coded_frame (const Schedule &schedule, int width, int height,
 }
 
 std::vector<Image<std::uint8_t>>
-extract (const Schedule &whole, const Schedule &part,
-    ImageView<const std::uint8_t> coded, ExtractOptions options = {})
+extract (const Schedule &part, ImageView<const std::uint8_t> coded,
+    const ExtractOptions &options = {})
 {
   const auto extractor = Extractor<std::uint8_t>::make (
-      part, coded.width, coded.height, options_for_part (whole, part, options));
+      part, coded.width, coded.height, options);
   EXPECT_TRUE (extractor.ok ()) << extractor.error ().message;
   const Extent size = extractor->subframe_size ();
   std::vector<Image<std::uint8_t>> subframes (
@@ -114,13 +116,32 @@ TEST (Regions, ShareAnExposureOfTheLeastCommonMultiple)
   EXPECT_EQ (schedule.masks (), 24);
   EXPECT_EQ (schedule.region (0).slots (), 8);
   EXPECT_EQ (schedule.region (1).slots (), 6);
-  EXPECT_EQ (schedule.background (), preset ("sequential:2x2"));
+  EXPECT_EQ (schedule.background ().text (), "sequential:2x2");
   EXPECT_EQ (schedule.background ().slots (), 4);
   EXPECT_EQ (preset ("sequential:2x2,leak=0.01,pilot=16,region=2x2+0+0:"
                      "sequential:2x1")
                  .region (0),
       preset ("sequential:2x1,leak=0.01"));
   EXPECT_EQ (preset (std::string (kTwo) + ",pilot=4").masks (), 48);
+}
+
+TEST (Regions, KnowTheWhiteOfTheWhole)
+{
+  EXPECT_EQ (preset ("sequential:2x2").white_slots (), 1.0);
+  const Schedule schedule = preset ("sequential:2x2,region=8x8+0+0:sequential:"
+                                    "4x2,region=8x8+8+8:sequential:2x1");
+  /* 4 of 8 slots light the brightest part: that is 2 of 4, 4 of 8, 1 of 2. */
+  EXPECT_EQ (schedule.white_slots (), 4.0);
+  EXPECT_EQ (schedule.background ().white_slots (), 2.0);
+  EXPECT_EQ (schedule.region (0).white_slots (), 4.0);
+  EXPECT_EQ (schedule.region (1).white_slots (), 1.0);
+  EXPECT_EQ (schedule.region (1), preset ("sequential:2x1"));
+  EXPECT_FALSE (schedule.region (0) == preset ("sequential:4x2"));
+  const auto method = [] (const Schedule &part) {
+    return Extractor<std::uint8_t>::make (part, 8, 8)->method ();
+  };
+  EXPECT_EQ (method (schedule.region (1)), Method::kSelect);
+  EXPECT_EQ (method (schedule.region (0)), Method::kDecode);
 }
 
 TEST (Regions, AreFoundByPlace)
@@ -337,8 +358,8 @@ TEST (Regions, PicturesOfEveryPartComeOut)
   for (int i = 0; i < 2; i++) {
     const Schedule &part = schedule.region (i);
     const Rect &rect = regions[std::size_t (i)].rect;
-    const auto subframes = extract (schedule, part,
-        pixels_of (regions[std::size_t (i)], view (coded)), select);
+    const auto subframes = extract (
+        part, pixels_of (regions[std::size_t (i)], view (coded)), select);
     ASSERT_EQ (int (subframes.size ()), part.slots ());
     const SampleGrid grid (part);
     for (int k = 0; k < part.slots (); k++)
@@ -369,13 +390,12 @@ TEST (Regions, WhiteIsWhiteInEveryPart)
         }
   };
   for (int i = 0; i < 2; i++)
-    for (const auto &subframe : extract (schedule, schedule.region (i),
+    for (const auto &subframe : extract (schedule.region (i),
              pixels_of (schedule.regions ()[std::size_t (i)], view (coded))))
       near_grey (subframe, {});
 
   /* All of the background's cells but those of regions, which are black. */
-  auto parts = preset ("sequential:2x2,leak=0.01");
-  for (auto &subframe : extract (schedule, parts, view (coded))) {
+  for (auto &subframe : extract (schedule.background (), view (coded))) {
     blacken_regions (schedule, 0, subframe.view ());
     EXPECT_EQ (subframe.at (4, 2), 0);
     EXPECT_EQ (subframe.at (11, 5), 0);
@@ -403,4 +423,75 @@ TEST (Regions, CellsOfTheBackgroundThatTheyTouchAreBlack)
   EXPECT_EQ (subframe.at (5, 5), 0);
   EXPECT_EQ (subframe.at (6, 5), 9);
   EXPECT_EQ (subframe.at (0, 0), 9);
+}
+
+namespace
+{
+
+std::vector<Image<std::uint8_t>>
+fused (const Schedule &schedule, int width, int height,
+    std::uint8_t (*scene) (int, int, int))
+{
+  const auto coded = coded_frame (schedule, width, height, scene);
+  auto fuser = Fuser<std::uint8_t>::make (schedule, width, height);
+  EXPECT_TRUE (fuser.ok ()) << fuser.error ().message;
+  const Extent size = fuser->size ();
+  std::vector<Image<std::uint8_t>> frames (std::size_t (fuser->slots ()),
+      Image<std::uint8_t> (size.width, size.height));
+  std::vector<ImageView<std::uint8_t>> views;
+  for (auto &frame : frames)
+    views.push_back (frame.view ());
+  for (int i = 0; i < 3; i++) {
+    fuser->take (coded.view ());
+    fuser->fuse (views);
+  }
+  return frames;
+}
+
+} // namespace
+
+TEST (Regions, AreFusedIntoOnePicture)
+{
+  const Schedule schedule =
+      preset ("sequential:2x2,pilot=4,region=24x16+8+4:sequential:lattice:8/3,"
+              "region=16x16+40+24:sequential:2x1");
+  constexpr int kWidth = 64, kHeight = 52;
+  const auto still = [] (int x, int y, int) {
+    return std::uint8_t (40 + 2 * x + y);
+  };
+  const auto frames = fused (schedule, kWidth, kHeight, still);
+  ASSERT_EQ (frames.size (), 8u);
+  for (const auto &frame : frames) {
+    ASSERT_EQ (frame.width (), kWidth);
+    ASSERT_EQ (frame.height (), kHeight - 4);
+    for (int y = 0; y < kHeight - 4; y++)
+      for (int x = 0; x < kWidth; x++)
+        ASSERT_NEAR (frame.at (x, y), still (x, y, 0), 6) << x << ", " << y;
+  }
+}
+
+TEST (Regions, SlowerPartsAreHeldInTheFusedPicture)
+{
+  const Schedule schedule =
+      preset ("sequential:2x2,region=16x16+8+8:sequential:4x2");
+  const auto flash = [] (int, int, int slot) {
+    return std::uint8_t (slot >= 4 ? 200 : 40);
+  };
+  const auto frames = fused (schedule, 32, 32, flash);
+  ASSERT_EQ (frames.size (), 8u);
+  for (int k = 0; k < 8; k++) {
+    const auto &frame = frames[std::size_t (k)];
+    EXPECT_NEAR (frame.at (2, 2), k >= 4 ? 200 : 40, 20) << k;
+    EXPECT_NEAR (frame.at (16, 16), k >= 4 ? 200 : 40, 20) << k;
+    EXPECT_EQ (frame.at (2, 2), frames[std::size_t (k / 2 * 2)].at (2, 2));
+  }
+}
+
+TEST (Regions, ThatTheFusedFrameDoesNotHoldAreSaid)
+{
+  const auto fuser = Fuser<std::uint8_t>::make (preset (kTwo), 35, 20);
+  ASSERT_FALSE (fuser.ok ());
+  EXPECT_NE (
+      fuser.error ().message.find ("region 1, 6x6+30+10"), std::string::npos)
+      << fuser.error ().message;
 }

@@ -135,15 +135,12 @@ say_what_is_cropped (GstCodedExposureDemux *self, const Plan &plan)
 void
 say_regions (GstCodedExposureDemux *self, const Schedule &schedule)
 {
-  const std::size_t regions = schedule.regions ().size ();
-  if (regions == 0)
+  if (schedule.regions ().empty ())
     return;
   const std::string text =
-      "Of " + schedule.text () +
-      " src and the subframe pads show the background; its " +
-      std::to_string (regions) +
-      " regions are black there and come out of pads region_0 to region_" +
-      std::to_string (regions - 1);
+      "src and the subframe pads show the background; regions are black "
+      "there and have pads of their own: " +
+      pads_text (Output::Kind::kRegion, &schedule);
   /* gst-launch shows the second text only. */
   GST_ELEMENT_INFO (
       self, STREAM, FORMAT, ("%s", text.c_str ()), ("%s", text.c_str ()));

@@ -203,9 +203,10 @@ pads_text (Output::Kind kind, const Schedule *schedule)
   const std::string prefix = prefix_of (kind);
   const std::string owner =
       schedule ? schedule->text () : "the largest schedule";
-  return owner + (n == 0 ? " has no regions."
-                         : " has " + prefix + "0 to " + prefix +
-                               std::to_string (n - 1) + ".");
+  if (n == 0)
+    return owner + " has no regions.";
+  return owner + " has " + prefix + "0" +
+         (n > 1 ? " to " + prefix + std::to_string (n - 1) : "") + ".";
 }
 
 OutputRef

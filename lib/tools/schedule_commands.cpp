@@ -38,6 +38,13 @@ read (Session &session, const Arguments &arguments)
   return std::nullopt;
 }
 
+std::string
+cell_text (const Schedule &schedule)
+{
+  return std::to_string (schedule.cell ().width) + "x" +
+         std::to_string (schedule.cell ().height);
+}
+
 void
 show (Session &session, const Arguments &arguments)
 {
@@ -47,14 +54,19 @@ show (Session &session, const Arguments &arguments)
   if (session.json)
     return session.print (Json::parse (schedule->to_json ()));
   const Timing &timing = schedule->timing ();
-  session.print ({{"schedule", schedule->text ()},
-      {"slots", schedule->slots ()}, {"masks", schedule->masks ()},
-      {"cell", std::to_string (schedule->cell ().width) + "x" +
-                   std::to_string (schedule->cell ().height)},
+  Json lines{{"schedule", schedule->text ()}, {"slots", schedule->slots ()},
+      {"masks", schedule->masks ()}, {"cell", cell_text (*schedule)},
       {"active", timing.active > 0 ? time_text (timing.active)
                                    : "what the frame leaves"},
       {"switching", time_text (timing.switching)},
-      {"readout", time_text (timing.readout)}});
+      {"readout", time_text (timing.readout)}};
+  for (int i = 0; i < int (schedule->regions ().size ()); i++) {
+    const Schedule &region = schedule->region (i);
+    lines["region " + std::to_string (i)] =
+        rect_text (schedule->regions ()[std::size_t (i)].rect) + ", slots " +
+        std::to_string (region.slots ()) + ", cell " + cell_text (region);
+  }
+  session.print (lines);
 }
 
 void

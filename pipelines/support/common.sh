@@ -147,6 +147,7 @@ check_options ()
     'a rate such as 25 or 30000/1001'
   check_option frames '[1-9][0-9]{0,8}' 'a number of coded frames'
   check_option bits '[1-9]|1[0-6]' 'a number from 1 to 16'
+  check_option region '[0-9]{1,2}' 'the number of a region, from 0 on'
   check_option scene 'candle|blown-out|pour' 'candle, blown-out or pour'
   check_option port '[1-9][0-9]{0,4}' 'a TCP port'
   check_option wait '[0-9]+(\.[0-9]+)?' 'a number of seconds'

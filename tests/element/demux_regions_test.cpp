@@ -347,6 +347,16 @@ TEST (DemuxRegions, ThatTheFrameDoesNotHoldAreSaid)
   EXPECT_NE (error.find ("40x19"), std::string::npos) << error;
 }
 
+TEST (DemuxRegions, ThatTheBenchDoesNotHoldAreSaid)
+{
+  ElementHarness sim ("codedexposure-sim schedule=" + std::string (kSchedule));
+  sim.set_caps (gray_caps (40, 19, "200/1"));
+  EXPECT_NE (
+      sim.push (frame_of (draw<std::uint8_t> (40, 19, pixel), 0)), GST_FLOW_OK);
+  const std::string error = sim.error ();
+  EXPECT_NE (error.find ("region 1, 8x8+32+12"), std::string::npos) << error;
+}
+
 TEST (DemuxRegions, AreNotForgottenByWhoeverSeesTheBackgroundOnly)
 {
   ElementHarness demux (line ());

@@ -225,6 +225,24 @@ TEST_F (Fuse, MetaSaysWhenTheLightOfAFrameFell)
 
 /* ------------------------------------------------- schedules and caps -- */
 
+TEST_F (Fuse, RegionsBecomeOnePictureAtTheHighestRate)
+{
+  const char *schedule = "sequential:lattice:4/2,region=8x8+8+4:sequential:4x2";
+  start ("schedule=" + std::string (schedule));
+  push (0);
+  push (1);
+  EXPECT_TRUE (same_caps (
+      fuse->pad_caps ().get (), gray_caps (kWidth, kHeight, "200/1")));
+  EXPECT_EQ (pull_images (), expected (schedule, {0, 1}));
+}
+
+TEST_F (Fuse, SaysWhichRegionTheFrameDoesNotHold)
+{
+  start ("schedule=sequential:2x2,region=8x8+20+4:sequential:4x2");
+  EXPECT_EQ (fuse->push (frame_of (picture (0), 0)), GST_FLOW_NOT_NEGOTIATED);
+  EXPECT_NE (fuse->error ().find ("region 0, 8x8+20+4"), std::string::npos);
+}
+
 TEST_F (Fuse, RateIsRaisedSizeStaysAndThePilotIsCropped)
 {
   start ("schedule=sequential:lattice:4/2,pilot=4");

@@ -114,6 +114,31 @@ TEST (SimDmd, ScheduleThatComesWithANewStreamEndsTheExposure)
   EXPECT_EQ (sim.counter ("frames-out"), 1u);
 }
 
+TEST (SimDmd, ShowsTheMasksOfAllRegions)
+{
+  const char *text = "staircase:2x2,pilot=2,region=8x4+4+2:sequential:4x2";
+  const auto mirrors = SimulatedMirrors::find ("regions");
+  mirrors->program (*Schedule::parse (text));
+  mirrors->start ();
+  SimHarness driven ("dmd=sim:regions");
+  SimHarness alone ("schedule=" + std::string (text));
+  for (SimHarness *sim : {&driven, &alone}) {
+    sim->start (32, 12, 200);
+    for (int k = 0; k < 24; k++)
+      ASSERT_EQ (sim->send (k, 10 * (k % 8)), GST_FLOW_OK);
+  }
+  for (int frame = 0; frame < 3; frame++) {
+    const auto coded = driven.coded ();
+    EXPECT_EQ (coded, alone.coded ()) << "frame " << frame;
+    /* 8 slots make white; the region's are open in one, the background's
+     * darkest in two. */
+    EXPECT_EQ (coded.at (4, 3), 5);
+    EXPECT_EQ (coded.at (11, 3), 9);
+    EXPECT_EQ (coded.at (0, 0), 1);
+    EXPECT_EQ (coded.at (1, 1), 35);
+  }
+}
+
 TEST (SimDmd, PilotTakesTwoFramesForItsMasks)
 {
   const Schedule schedule = *Schedule::parse ("staircase:2x2,pilot=2");

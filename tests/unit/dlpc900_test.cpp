@@ -363,6 +363,19 @@ TEST (Dlpc900Upload, AnotherOrderOfTheSameMasksMovesLinesOnly)
   }
 }
 
+/* 8 masks, then 12 of which some come twice. */
+TEST (Dlpc900Upload, TakesTheMasksOfAllRegions)
+{
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open ()), "");
+  for (const char *region : {"sequential:4x2", "sequential:3x2"}) {
+    const Schedule schedule =
+        schedule_of ("sequential:2x2,region=24x12+8+4:" + std::string (region));
+    ASSERT_EQ (message_of (rig.show (schedule)), "") << region;
+    expect_masks (*rig.board, schedule);
+  }
+}
+
 TEST (Dlpc900Upload, OldFirmwareKnowsNoOrder)
 {
   Rig rig;

@@ -239,7 +239,9 @@ TEST_P (RenderedMirrors, ComeBackFromTheirPlanes)
 INSTANTIATE_TEST_SUITE_P (OfSchedules, RenderedMirrors,
     ::testing::Values ("sequential:2x2", "staircase:2x2,pilot=4",
         "sequential:lattice:8/3,order=bit-reversal", "s-matrix:7x1",
-        "sequential:6x5,phase=3/1"));
+        "sequential:6x5,phase=3/1",
+        "sequential:2x2,pilot=4,region=8x6+6+4:sequential:4x2,region=6x4+20+9:"
+        "staircase:3x2"));
 
 TEST (RenderedMirrors, ThePilotHasTheRowsOfTheTile)
 {

@@ -25,11 +25,13 @@ take_settings (GstCodedExposureDemux *self)
 
 template <typename Pixel>
 std::optional<AnyExtractor>
-make_extractor (
-    GstCodedExposureDemux *self, const Schedule &part, const Rect &rect)
+make_extractor (GstCodedExposureDemux *self, const Schedule &whole,
+    const Schedule &part, const Rect &rect)
 {
   const Stream &stream = state (self).stream;
   ExtractOptions options = stream.settings.extract;
+  /* The gain is for a slot of the background; others are longer or shorter. */
+  options.gain *= double (part.slots ()) / whole.code ().slots ();
   options.bits = stream.bits_in_force ();
   auto made = Extractor<Pixel>::make (part, rect.width, rect.height, options);
   if (made)
@@ -155,8 +157,9 @@ make_part (GstCodedExposureDemux *self, const CodedFormat &coded,
       GST_VIDEO_INFO_FORMAT (&coded.info) == GST_VIDEO_FORMAT_GRAY16_LE;
   const Schedule schedule =
       region < 0 ? whole.background () : whole.region (region);
-  auto extractor = wide ? make_extractor<std::uint16_t> (self, schedule, rect)
-                        : make_extractor<std::uint8_t> (self, schedule, rect);
+  auto extractor =
+      wide ? make_extractor<std::uint16_t> (self, whole, schedule, rect)
+           : make_extractor<std::uint8_t> (self, whole, schedule, rect);
   if (!extractor)
     return std::nullopt;
   const Method method =

@@ -161,6 +161,17 @@ TEST (DemuxRegions, GetTheirOwnPixelsAndLeaveBlackBehind)
   EXPECT_EQ (one[0], background (3));
 }
 
+/* Slots of the region are half as long as those that the gain is for. */
+TEST (DemuxRegions, AGainKeepsPartsAlike)
+{
+  ElementHarness demux (line ("method=decode gain=1"));
+  demux.request ("region_0");
+  demux.set_caps (gray_caps (kWidth, kHeight));
+  ASSERT_EQ (demux.push (coded_frame (0)), GST_FLOW_OK);
+  EXPECT_EQ (pull_images (demux)[0].at (0, 0), pixel (0, 0));
+  EXPECT_EQ (pull_images (demux, "region_0")[0].at (0, 0), 2 * pixel (8, 4));
+}
+
 /* The bench, the tag, and brightness that does not depend on the region. */
 TEST (DemuxRegions, ComeOutOfTheBenchAlikeInLight)
 {

@@ -63,13 +63,13 @@ private:
 };
 
 /* A sawtooth, harmonic by harmonic, each as far as noise leaves it. @noise is
- * of means of @frames numbers, with a twelfth by the rounding itself. */
+ * of means of @frames numbers; its floor was learned in the dark, where
+ * rounding hides noise rather than adding to it. */
 Rounding::Rounding (const NoiseModel &noise, int frames)
 {
   for (float number = kFirst; number < kLast; number += 1.0f / kSteps) {
     const double variance =
-        frames * (noise.floor + noise.slope * std::max (0.0, double (number))) -
-        1.0 / 12.0;
+        frames * (noise.floor + noise.slope * std::max (0.0, double (number)));
     if (variance > kBlurred * kBlurred)
       break;
     double mean = double (number);

@@ -34,6 +34,7 @@
 #include "gstcodedexposurelines.h"
 #include "gstcodedexposuremeta.h"
 #include "gstcodedexposuretag.h"
+#include "gstproperties.h"
 #include "gstraii.h"
 
 using namespace cexp::gst;
@@ -196,10 +197,8 @@ gst_coded_exposure_log_set_property (
     return;
   }
   const ObjectLock lock (self);
-  if (GST_STATE (self) > GST_STATE_READY) {
-    GST_WARNING_OBJECT (self, "location cannot change while frames flow");
+  if (!may_set (self, pspec))
     return;
-  }
   const gchar *location = g_value_get_string (value);
   self->state->location = location ? location : "";
 }

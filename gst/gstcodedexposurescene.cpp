@@ -27,6 +27,7 @@
 #include <memory>
 
 #include "gstcodedexposurecaps.h"
+#include "gstproperties.h"
 #include "gstraii.h"
 #include "scene/scene.h"
 
@@ -174,6 +175,8 @@ gst_coded_exposure_scene_set_property (
     return;
   }
   const ObjectLock lock (self);
+  if (!may_set (self, pspec))
+    return;
   self->state->kind = SceneKind (g_value_get_enum (value));
 }
 

@@ -127,8 +127,8 @@ count_at_rate (
 {
   if (before == rate)
     return;
-  stream.sequence.emplace (rate);
-  stream.first_number = stream.next_number;
+  stream.sequence.emplace (
+      rate, stream.sequence ? stream.sequence->next_number () : 0);
 }
 
 } // namespace cexp::gst

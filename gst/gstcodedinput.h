@@ -75,8 +75,6 @@ struct CodedStream {
   /** Serialised events that wait for the caps of the source pads. */
   std::vector<EventPtr> pending;
   std::optional<FrameSequence> sequence;
-  guint64 first_number = 0; ///< of the sequence
-  guint64 next_number = 0;
   GstClockTime last_pts = GST_CLOCK_TIME_NONE;
   bool was_late = false; ///< the last frame was
   Burst saturation;

@@ -62,12 +62,11 @@ warn_of_wrong_time (GstElement *element, CodedStream &stream, GstClockTime pts,
 }
 
 FrameMeta
-describe (CodedStream &stream, GstBuffer *frame, const FrameStep &step)
+describe (GstBuffer *frame, const FrameStep &step)
 {
   FrameMeta meta;
-  meta.frame = stream.first_number + step.number;
+  meta.frame = step.number;
   meta.lost_before = step.lost;
-  stream.next_number = std::max (stream.next_number, meta.frame + 1);
   return get_frame_meta (frame).value_or (meta);
 }
 
@@ -106,9 +105,9 @@ admit (GstElement *element, CodedStream &stream, CodedCounters &counters,
   stream.last_pts = pts;
   const bool after_late =
       std::exchange (stream.was_late, step.arrival == Arrival::late);
-  return {describe (stream, frame, step), step.arrival == Arrival::next &&
-                                              !after_late &&
-                                              !GST_BUFFER_IS_DISCONT (frame)};
+  return {describe (frame, step), step.arrival == Arrival::next &&
+                                      !after_late &&
+                                      !GST_BUFFER_IS_DISCONT (frame)};
 }
 
 void

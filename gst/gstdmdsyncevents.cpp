@@ -76,11 +76,12 @@ same_slots (const std::optional<Timebase> &before, const Timebase &now)
   return before && before->rate == now.rate;
 }
 
+/* @p first: number of the first one. */
 void
-begin_frames (GstDmdSync *self)
+begin_frames (GstDmdSync *self, std::uint64_t first)
 {
   Stream &stream = state (self).stream;
-  stream.sequence.emplace (stream.time->rate);
+  stream.sequence.emplace (stream.time->rate, first);
   stream.rate_watch.emplace (stream.time->rate);
   begin_phase (self);
   stream.last.reset ();
@@ -203,7 +204,10 @@ set_caps (GstBaseTransform *trans, GstCaps *incaps, GstCaps *)
     const ObjectLock lock (self);
     st.time = *time;
   }
-  begin_frames (self);
+  /* Other caps are another stretch of the same stream. */
+  begin_frames (
+      self, st.stream.sequence ? st.stream.sequence->next_number () : 0);
+  st.stream.discont = true;
   update_latency (self);
   give_back (self, "caps");
   if (!st.runner || !restart)
@@ -235,8 +239,9 @@ sink_event (GstBaseTransform *trans, GstEvent *event)
     st.stream.tag_due = true;
     st.stream.warned_tag = false;
     st.stream.discont = true;
+    st.stream.sequence.reset ();
     if (st.stream.time)
-      begin_frames (self);
+      begin_frames (self, 0);
     break;
   case GST_EVENT_SEGMENT:
     return take_segment (self, event);

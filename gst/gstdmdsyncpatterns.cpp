@@ -46,16 +46,13 @@ refuse (GstDmdSync *self, const std::string &pattern, const std::string &why)
   return FALSE;
 }
 
-gboolean
-show (GstDmdSync *self, const std::string &text, guint64 frames)
+/* False where there is no stream. The order's lock is given up before anybody
+ * is told: who is told may ask for the next pattern at once. */
+bool
+send (GstDmdSync *self, const Pattern &pattern, const std::string &text,
+    guint64 frames)
 {
   SyncState &st = state (self);
-  if (const std::string why = obstacle (st); !why.empty ())
-    return refuse (self, text, why);
-  const Result<Pattern> pattern = Pattern::parse (text);
-  if (!pattern)
-    return refuse (self, text, pattern.error ().message);
-
   const std::lock_guard order (st.pattern_order);
   std::optional<Timebase> time;
   {
@@ -63,11 +60,11 @@ show (GstDmdSync *self, const std::string &text, guint64 frames)
     time = st.time;
     if (time && st.pattern && st.pattern->text == text) {
       st.pattern->frames_left = frames;
-      return TRUE;
+      return true;
     }
   }
   if (!time || st.runner->halted () || st.runner->failed ())
-    return refuse (self, text, "there is no stream yet, or no more");
+    return false;
   {
     const ObjectLock lock (self);
     st.pattern = ShownPattern{text, frames};
@@ -76,12 +73,46 @@ show (GstDmdSync *self, const std::string &text, guint64 frames)
   GST_INFO_OBJECT (self, "shows %s", text.c_str ());
   st.runner->show (
       {.name = "the pattern " + text,
-          .open = [p = *pattern] (int x, int y) { return p.on (x, y); },
+          .open = [pattern] (int x, int y) { return pattern.on (x, y); },
           /* As bright as coded frames: no setting of the camera has to
            * change. */
           .slots = st.schedule.max_open_slots ()},
       time->plan);
+  return true;
+}
+
+gboolean
+show (GstDmdSync *self, const std::string &text, guint64 frames)
+{
+  if (const std::string why = obstacle (state (self)); !why.empty ())
+    return refuse (self, text, why);
+  const Result<Pattern> pattern = Pattern::parse (text);
+  if (!pattern)
+    return refuse (self, text, pattern.error ().message);
+  if (!send (self, *pattern, text, frames))
+    return refuse (self, text, "there is no stream yet, or no more");
   return TRUE;
+}
+
+/* The pattern that was shown and is no more; none where there was none. */
+std::optional<std::string>
+restore (GstDmdSync *self)
+{
+  SyncState &st = state (self);
+  const std::lock_guard order (st.pattern_order);
+  std::string pattern;
+  SlotPlan plan;
+  {
+    const ObjectLock lock (self);
+    if (!st.pattern || !st.time)
+      return std::nullopt;
+    pattern = st.pattern->text;
+    st.pattern.reset ();
+    st.switches++;
+    plan = st.time->plan;
+  }
+  st.runner->restore (st.schedule, plan);
+  return pattern;
 }
 
 template <typename Pixel>
@@ -161,25 +192,14 @@ answer_mirrors (GstDmdSync *self, GstQuery *query)
 void
 give_back (GstDmdSync *self, const char *reason)
 {
-  SyncState &st = state (self);
-  const std::lock_guard order (st.pattern_order);
-  std::string pattern;
-  SlotPlan plan;
-  {
-    const ObjectLock lock (self);
-    if (!st.pattern || !st.time)
-      return;
-    pattern = st.pattern->text;
-    st.pattern.reset ();
-    st.switches++;
-    plan = st.time->plan;
-  }
+  const std::optional<std::string> pattern = restore (self);
+  if (!pattern)
+    return;
   GST_INFO_OBJECT (self, "gives the mirrors back: %s", reason);
-  st.runner->restore (st.schedule, plan);
   gst_element_post_message (GST_ELEMENT (self),
       gst_message_new_element (GST_OBJECT (self),
           gst_structure_new ("dmdsync/pattern-over", "pattern", G_TYPE_STRING,
-              pattern.c_str (), "reason", G_TYPE_STRING, reason, nullptr)));
+              pattern->c_str (), "reason", G_TYPE_STRING, reason, nullptr)));
 }
 
 PatternSight

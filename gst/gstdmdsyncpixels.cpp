@@ -27,14 +27,20 @@ packed_stride (const Timebase &time, MonoFormat format, gsize size)
   return size >= filled * gsize (time.info.height) ? filled : row;
 }
 
+/* Bytes up to the last pixel, in the layout that the frame says it has. */
 gsize
-whole_size (const Stream &stream)
+whole_size (const Stream &stream, GstBuffer *frame)
 {
-  const Timebase &time = *stream.time;
+  const GstVideoInfo &info = stream.time->info;
   if (stream.format && is_packed (*stream.format))
-    return row_bytes (*stream.format, time.info.width) *
-           gsize (time.info.height);
-  return GST_VIDEO_INFO_SIZE (&time.info);
+    return row_bytes (*stream.format, info.width) * gsize (info.height);
+  const GstVideoMeta *layout = gst_buffer_get_video_meta (frame);
+  if (!layout)
+    return GST_VIDEO_INFO_SIZE (&info);
+  const gsize row =
+      gsize (info.width) * gsize (GST_VIDEO_INFO_COMP_PSTRIDE (&info, 0));
+  return layout->offset[0] + row +
+         gsize (std::max (layout->stride[0], 0)) * gsize (info.height - 1);
 }
 
 /* The ring of a source upstream: half of it, since the camera writes ahead of
@@ -85,14 +91,11 @@ plan_pixels (GstDmdSync *self, std::string &why)
   SyncState &st = state (self);
   Stream &stream = st.stream;
   std::string name;
-  GstClockTime max_hold = GST_CLOCK_TIME_NONE;
   {
     const ObjectLock lock (self);
     name = st.settings.pixel_format;
-    max_hold = st.settings.max_hold;
   }
-  stream.max_hold =
-      GST_CLOCK_TIME_IS_VALID (max_hold) ? max_hold : ring_time (self);
+  stream.ring = ring_time (self);
   stream.format.reset ();
   if (name.empty ())
     return true;
@@ -116,7 +119,7 @@ plan_pixels (GstDmdSync *self, std::string &why)
 bool
 is_whole (GstDmdSync *self, GstBuffer *frame)
 {
-  return gst_buffer_get_size (frame) >= whole_size (state (self).stream);
+  return gst_buffer_get_size (frame) >= whole_size (state (self).stream, frame);
 }
 
 BufferPtr
@@ -152,7 +155,13 @@ void
 keep_whole (GstDmdSync *self, GstBuffer *frame, guint64 number)
 {
   SyncState &st = state (self);
-  GstClockTime time = st.stream.max_hold;
+  GstClockTime time;
+  {
+    const ObjectLock lock (self);
+    time = st.settings.max_hold;
+  }
+  if (!GST_CLOCK_TIME_IS_VALID (time))
+    time = st.stream.ring;
   const bool ours = st.stream.format && is_packed (*st.stream.format);
   if (ours || !GST_CLOCK_TIME_IS_VALID (time))
     return;

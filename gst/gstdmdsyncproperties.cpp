@@ -2,6 +2,7 @@
 /* dmdsync's properties. */
 #include "gstdmdsyncenums.h"
 #include "gstdmdsyncstate.h"
+#include "gstproperties.h"
 
 #define GST_CAT_DEFAULT dmdsync_debug
 
@@ -68,35 +69,23 @@ set_schedule (GstDmdSync *self, const gchar *text)
     GST_WARNING_OBJECT (self, "%s", schedule.error ().message.c_str ());
 }
 
-/* Object lock. */
-bool
-may_change (GstDmdSync *self, const GParamSpec *pspec, GstState highest)
-{
-  if (GST_STATE (self) <= highest)
-    return true;
-  GST_WARNING_OBJECT (self,
-      "%s cannot change above the %s state; it stays as it is", pspec->name,
-      gst_element_state_get_name (highest));
-  return false;
-}
-
 void
 set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 {
   auto *self = GST_DMD_SYNC (object);
   {
     const ObjectLock lock (self);
+    if (!may_set (self, pspec))
+      return;
     Settings &settings = state (self).settings;
     switch (id) {
-    case PROP_DEVICE:
-      if (may_change (self, pspec, GST_STATE_NULL)) {
-        const gchar *device = g_value_get_string (value);
-        settings.device = device ? device : DEFAULT_DEVICE;
-      }
+    case PROP_DEVICE: {
+      const gchar *device = g_value_get_string (value);
+      settings.device = device ? device : DEFAULT_DEVICE;
       break;
+    }
     case PROP_SCHEDULE:
-      if (may_change (self, pspec, GST_STATE_READY))
-        set_schedule (self, g_value_get_string (value));
+      set_schedule (self, g_value_get_string (value));
       break;
     case PROP_TIMESTAMP_AT:
       settings.timestamp_at = TimestampAt (g_value_get_enum (value));
@@ -119,8 +108,7 @@ set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
       break;
     }
     case PROP_RECONNECT:
-      if (may_change (self, pspec, GST_STATE_READY))
-        settings.reconnect = g_value_get_uint (value);
+      settings.reconnect = g_value_get_uint (value);
       break;
     default:
       G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);

@@ -89,8 +89,9 @@ struct Stream {
   std::optional<Timebase> time;
   std::optional<FrameSequence> sequence;
   std::optional<RateWatch> rate_watch;
-  std::optional<MonoFormat> format;            ///< of the pixels, where known
-  GstClockTime max_hold = GST_CLOCK_TIME_NONE; ///< none: as long as one likes
+  std::optional<MonoFormat> format; ///< of the pixels, where known
+  /** How long the source's ring lets frames be kept; none: as one likes. */
+  GstClockTime ring = GST_CLOCK_TIME_NONE;
   DeviceClock device_clock;
   GstClockTime last_arrival = GST_CLOCK_TIME_NONE;
   GstClockTime last_time = 0; ///< of the newest frame, by the pipeline's clock

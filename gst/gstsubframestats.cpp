@@ -48,6 +48,7 @@
 #include "gstcodedexposurecaps.h"
 #include "gstcodedexposurelines.h"
 #include "gstcodedexposuremeta.h"
+#include "gstproperties.h"
 #include "gstraii.h"
 #include "gstsubframestatsreport.h"
 
@@ -288,6 +289,8 @@ gst_subframe_stats_set_property (
     return std::string (given ? given : "");
   };
   const ObjectLock lock (self);
+  if (!may_set (self, pspec))
+    return;
   Settings &settings = self->state->settings;
   switch (id) {
   case PROP_LOCATION:

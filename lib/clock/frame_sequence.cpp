@@ -11,7 +11,10 @@ namespace
 constexpr Nanoseconds kRestartAfter = 1'000'000'000;
 }
 
-FrameSequence::FrameSequence (FrameRate rate) : period_ (rate.period ()) {}
+FrameSequence::FrameSequence (FrameRate rate, std::uint64_t first)
+    : period_ (rate.period ()), next_number_ (first)
+{
+}
 
 void
 FrameSequence::resync ()

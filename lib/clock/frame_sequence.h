@@ -41,7 +41,11 @@ struct FrameStep {
 class FrameSequence
 {
 public:
-  explicit FrameSequence (FrameRate rate);
+  /** @p first  number of the first frame. */
+  explicit FrameSequence (FrameRate rate, std::uint64_t first = 0);
+
+  /** Number of the frame that comes next, if none is lost. */
+  std::uint64_t next_number () const { return next_number_; }
 
   /** @p time of the frame, any epoch; times fall when @p reverse. */
   FrameStep take (Nanoseconds time, bool reverse = false);

@@ -135,6 +135,18 @@ TEST (DmdsyncLoss, WhatIsGivenBackInTimeIsNotCopied)
   EXPECT_EQ (sync.get_property<guint64> ("frames-held"), 0u);
 }
 
+TEST (DmdsyncLoss, HowLongFramesAreKeptMayChangeAtAnyTime)
+{
+  Ring ring;
+  SyncHarness sync ("max-hold=3600000000000");
+  sync.start ();
+  g_object_set (sync.element (), "max-hold", guint64 (1000000), nullptr);
+  ASSERT_EQ (sync.push (ring.frame ()), GST_FLOW_OK);
+  const BufferPtr kept = sync.pull ();
+  ASSERT_TRUE (kept);
+  EXPECT_EQ (wait_held (sync, 1), 1u);
+}
+
 TEST (DmdsyncLoss, NobodyReadsTheCamerasMemoryWhenItIsGone)
 {
   BufferPtr kept;

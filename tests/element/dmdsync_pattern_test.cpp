@@ -202,6 +202,30 @@ TEST (DmdSyncPattern, GoesWithAFlush)
       "flush");
 }
 
+TEST (DmdSyncPattern, TheNextMayBeAskedForWhenOneIsOver)
+{
+  struct Asker {
+    SyncHarness h{"device=sim:again"};
+    bool accepted = false;
+  } asker;
+  asker.h.start ();
+  ASSERT_EQ (asker.h.send (0), GST_FLOW_OK);
+  ASSERT_TRUE (ask (asker.h, "grating-x:4/0"));
+  const ObjectPtr<GstBus> bus (gst_element_get_bus (asker.h.element ()));
+  gst_bus_set_sync_handler (
+      bus.get (),
+      [] (GstBus *, GstMessage *message, gpointer user_data) {
+        auto &self = *static_cast<Asker *> (user_data);
+        if (gst_message_has_name (message, "dmdsync/pattern-over"))
+          self.accepted = ask (self.h, "white");
+        return GST_BUS_PASS;
+      },
+      &asker, nullptr);
+  asker.h.set_caps (gray_caps (32, 24));
+  gst_bus_set_sync_handler (bus.get (), nullptr, nullptr, nullptr);
+  EXPECT_TRUE (asker.accepted);
+}
+
 TEST (DmdSyncPattern, IsRefusedWithoutADevice)
 {
   SyncHarness h;

@@ -140,6 +140,44 @@ TEST (DmdsyncCaps, ARateThatIsUnknownComesFromTheSlots)
   EXPECT_EQ (GST_BUFFER_DURATION (frame.get ()), 40 * kMs);
 }
 
+TEST (DmdsyncCaps, NumbersGoOnWhenTheyChange)
+{
+  SyncHarness sync;
+  sync.start ();
+  sync.send_frames (0, 3);
+  sync.set_caps ("video/x-raw,format=GRAY8,width=64,height=48,framerate=25/1,"
+                 "pixel-aspect-ratio=2/1");
+  ASSERT_EQ (sync.send (sync.time_of (3)), GST_FLOW_OK);
+  for (guint64 number = 0; number < 4; number++) {
+    const BufferPtr frame = sync.pull ();
+    ASSERT_TRUE (frame);
+    EXPECT_EQ (meta_of (frame).frame, number);
+    EXPECT_EQ (GST_BUFFER_OFFSET (frame.get ()), number);
+    EXPECT_EQ (has_flag (frame, GST_BUFFER_FLAG_DISCONT), number % 3 == 0);
+  }
+}
+
+TEST (DmdsyncCaps, RowsMayBeAsFarApartAsAFrameSays)
+{
+  constexpr int kOdd = 30, kRows = 20;
+  SyncHarness sync;
+  sync.set_caps (gray_caps (kOdd, kRows, "25/1"));
+  const auto push = [&] (gsize size, int number) {
+    BufferPtr frame (gst_buffer_new_and_alloc (size));
+    gsize offsets[GST_VIDEO_MAX_PLANES] = {0};
+    gint strides[GST_VIDEO_MAX_PLANES] = {kOdd};
+    gst_buffer_add_video_meta_full (frame.get (), GST_VIDEO_FRAME_FLAG_NONE,
+        GST_VIDEO_FORMAT_GRAY8, kOdd, kRows, 1, offsets, strides);
+    GST_BUFFER_PTS (frame.get ()) = GstClockTime (number) * 40 * kMs;
+    return sync.push (std::move (frame));
+  };
+  ASSERT_EQ (push (kOdd * kRows, 0), GST_FLOW_OK);
+  EXPECT_TRUE (sync.pull ());
+  ASSERT_EQ (push (kOdd * kRows - 1, 1), GST_FLOW_OK);
+  EXPECT_FALSE (sync.pull ());
+  EXPECT_EQ (sync.counter ("frames-incomplete"), 1u);
+}
+
 TEST (DmdsyncCaps, AFrameThatCannotHoldThePilotIsAnError)
 {
   SyncHarness sync ("schedule=sequential:2x2,pilot=4");

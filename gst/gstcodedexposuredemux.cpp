@@ -128,19 +128,6 @@ GstStaticPadTemplate region_template = GST_STATIC_PAD_TEMPLATE ("region_%u",
 GstStaticPadTemplate coded_template = GST_STATIC_PAD_TEMPLATE ("coded",
     GST_PAD_SRC, GST_PAD_REQUEST, GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
 
-/* A file may have changed since the property was set, and a schedule that
- * cannot be read should be known before anything runs. */
-bool
-read_schedule_again (GstCodedExposureDemux *self)
-{
-  std::string text;
-  {
-    const ObjectLock lock (self);
-    text = self->state->settings.schedule;
-  }
-  return check_schedule (GST_ELEMENT (self), demux::set_schedule (self, text));
-}
-
 void
 forget_stream (GstCodedExposureDemux *self)
 {
@@ -171,7 +158,7 @@ change_state (GstElement *element, GstStateChange transition) noexcept
 {
   auto *self = GST_CODED_EXPOSURE_DEMUX (element);
   if (transition == GST_STATE_CHANGE_NULL_TO_READY &&
-      !read_schedule_again (self))
+      !read_again (element, self->state->settings))
     return GST_STATE_CHANGE_FAILURE;
   /* The counters of a run can be read until the next one begins. */
   if (transition == GST_STATE_CHANGE_READY_TO_PAUSED) {

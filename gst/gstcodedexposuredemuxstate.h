@@ -199,13 +199,6 @@ struct DemuxState {
 
 /* Properties. */
 void install_properties (GObjectClass *klass);
-/** Reads @p text, outside of the lock, and keeps both; null for an empty one.
- */
-std::shared_ptr<const Result<Schedule>> set_schedule (
-    GstCodedExposureDemux *self, const std::string &text);
-
-/** Reads the file @p path, outside of the lock; none for an empty one. */
-void set_mapping (GstCodedExposureDemux *self, const std::string &path);
 
 DemuxState &state (GstCodedExposureDemux *self);
 std::shared_ptr<const Outputs> outputs (GstCodedExposureDemux *self);

@@ -110,20 +110,6 @@ GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE ("sink",
 GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC,
     GST_PAD_ALWAYS, GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
 
-/* A file may have changed since the property was set, and a schedule that
- * cannot be read should be known before anything runs. */
-bool
-read_schedule_again (GstCodedExposureFuse *self)
-{
-  std::string text;
-  {
-    const ObjectLock lock (self);
-    text = self->state->settings.schedule;
-  }
-  return check_schedule (
-      GST_ELEMENT (self), cexp::gst::fuse::set_schedule (self, text));
-}
-
 void
 forget_stream (GstCodedExposureFuse *self)
 {
@@ -142,7 +128,7 @@ change_state (GstElement *element, GstStateChange transition) noexcept
 {
   auto *self = GST_CODED_EXPOSURE_FUSE (element);
   if (transition == GST_STATE_CHANGE_NULL_TO_READY &&
-      !read_schedule_again (self))
+      !read_again (element, self->state->settings))
     return GST_STATE_CHANGE_FAILURE;
   /* The counters of a run can be read until the next one begins. */
   if (transition == GST_STATE_CHANGE_READY_TO_PAUSED) {

@@ -66,9 +66,11 @@ set_property (
 {
   auto *self = GST_CODED_EXPOSURE_FUSE (object);
   if (id == PROP_SCHEDULE)
-    set_schedule (self, g_value_get_string (value) ?: "");
+    set_schedule (GST_ELEMENT (self), state (self).settings,
+        g_value_get_string (value) ?: "");
   if (id == PROP_MAPPING)
-    set_mapping (self, g_value_get_string (value) ?: "");
+    set_mapping (GST_ELEMENT (self), state (self).settings,
+        g_value_get_string (value) ?: "");
 
   const ObjectLock lock (self);
   Settings &settings = state (self).settings;
@@ -349,25 +351,6 @@ install_reports (GObjectClass *klass)
 }
 
 } // namespace
-
-std::shared_ptr<const Result<Schedule>>
-set_schedule (GstCodedExposureFuse *self, const std::string &text)
-{
-  auto parsed = read_schedule (GST_ELEMENT (self), text);
-  const ObjectLock lock (self);
-  state (self).settings.schedule = text;
-  state (self).settings.parsed = parsed;
-  return parsed;
-}
-
-void
-set_mapping (GstCodedExposureFuse *self, const std::string &path)
-{
-  auto mapped = read_mapping (GST_ELEMENT (self), path);
-  const ObjectLock lock (self);
-  state (self).settings.mapping = path;
-  state (self).settings.mapped = std::move (mapped);
-}
 
 void
 install_properties (GObjectClass *klass)

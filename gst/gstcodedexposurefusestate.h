@@ -107,13 +107,6 @@ void notify (GstCodedExposureFuse *self, const char *property);
 
 /* Properties. */
 void install_properties (GObjectClass *klass);
-/** Reads @p text, outside of the lock, and keeps both; null for an empty one.
- */
-std::shared_ptr<const Result<Schedule>> set_schedule (
-    GstCodedExposureFuse *self, const std::string &text);
-
-/** Reads the file @p path, outside of the lock; none for an empty one. */
-void set_mapping (GstCodedExposureFuse *self, const std::string &path);
 
 /* Events and queries. */
 gboolean sink_event (GstPad *pad, GstObject *parent, GstEvent *event) noexcept;

@@ -13,29 +13,77 @@ refuse (GstElement *element, const std::string &why)
   GST_ELEMENT_ERROR (element, STREAM, FORMAT, ("%s", why.c_str ()), (nullptr));
 }
 
-std::shared_ptr<const Result<Schedule>>
-read_schedule (GstElement *element, const std::string &text)
+namespace
 {
-  if (text.empty ())
-    return nullptr;
-  auto parsed =
-      std::make_shared<const Result<Schedule>> (Schedule::parse (text));
-  if (!*parsed)
+
+/* Null for an empty text. */
+template <typename Read>
+auto
+read_unless_empty (GstElement *element, const std::string &text, Read read)
+{
+  using Parsed = decltype (read (text));
+  std::shared_ptr<const Parsed> parsed;
+  if (!text.empty ())
+    parsed = std::make_shared<const Parsed> (read (text));
+  if (parsed && !*parsed)
     GST_WARNING_OBJECT (element, "%s", parsed->error ().message.c_str ());
   return parsed;
 }
 
+template <typename Parsed>
 bool
-check_schedule (
-    GstElement *element, const std::shared_ptr<const Result<Schedule>> &parsed)
+check_read (GstElement *element, const char *property,
+    const std::shared_ptr<const Parsed> &parsed)
 {
   if (!parsed || *parsed)
     return true;
   GST_ELEMENT_ERROR (element, RESOURCE, SETTINGS,
-      ("The schedule property cannot be read: %s",
+      ("The %s property cannot be read: %s", property,
           parsed->error ().message.c_str ()),
       (nullptr));
   return false;
+}
+
+} // namespace
+
+void
+set_schedule (
+    GstElement *element, CodedSettings &settings, const std::string &text)
+{
+  auto parsed = read_unless_empty (element, text, Schedule::parse);
+  const ObjectLock lock (element);
+  settings.schedule = text;
+  settings.parsed = std::move (parsed);
+}
+
+void
+set_mapping (
+    GstElement *element, CodedSettings &settings, const std::string &path)
+{
+  auto mapped = read_unless_empty (element, path, Mapping::load);
+  const ObjectLock lock (element);
+  settings.mapping = path;
+  settings.mapped = std::move (mapped);
+}
+
+bool
+read_again (GstElement *element, CodedSettings &settings)
+{
+  std::string schedule, mapping;
+  {
+    const ObjectLock lock (element);
+    schedule = settings.schedule;
+    mapping = settings.mapping;
+  }
+  set_schedule (element, settings, schedule);
+  set_mapping (element, settings, mapping);
+  CodedSettings read;
+  {
+    const ObjectLock lock (element);
+    read = settings;
+  }
+  return check_read (element, "schedule", read.parsed) &&
+         check_read (element, "mapping", read.mapped);
 }
 
 std::optional<FoundSchedule>

@@ -91,13 +91,17 @@ struct CodedStream {
 /** Shows on the bus why the coded frames cannot be used. */
 void refuse (GstElement *element, const std::string &why);
 
-/** Reads @p text, a preset or a file, with a log where it cannot be read; null
- * for an empty one. Not under a lock. */
-std::shared_ptr<const Result<Schedule>> read_schedule (
-    GstElement *element, const std::string &text);
-/** Posts an error where @p parsed is one. */
-bool check_schedule (
-    GstElement *element, const std::shared_ptr<const Result<Schedule>> &parsed);
+/** Keeps @p text, a preset or a file, and what is read from it, with a log
+ * where it cannot be read. Takes the object lock. */
+void set_schedule (
+    GstElement *element, CodedSettings &settings, const std::string &text);
+/** The same of @p path, the file of a mapping. */
+void set_mapping (
+    GstElement *element, CodedSettings &settings, const std::string &path);
+/** Reads the files of @p settings again: they may have changed since, and what
+ * cannot be read should be known before anything runs. False, with an error on
+ * the bus, where that is so. Takes the object lock. */
+bool read_again (GstElement *element, CodedSettings &settings);
 
 /** A schedule, and whether somebody said so. */
 struct FoundSchedule {
@@ -133,10 +137,6 @@ void take_bits (CodedStream &stream, GstBuffer *next);
 void count_at_rate (
     CodedStream &stream, FrameRate rate, std::optional<FrameRate> before);
 
-/** Reads the file @p path, with a log where it cannot be read; null for an
- * empty one. Not under a lock. */
-std::shared_ptr<const Result<Mapping>> read_mapping (
-    GstElement *element, const std::string &path);
 /** Sets @p rectifier for frames of @p camera pixels, null where they are taken
  * as they are: the property wins over the stream's tag. Returns false, with an
  * error on the bus, when the mapping that was asked for cannot be used. */

@@ -72,17 +72,6 @@ rectify_into (Image<Pixel> &rectified, const Rectifier &rectifier,
 
 } // namespace
 
-std::shared_ptr<const Result<Mapping>>
-read_mapping (GstElement *element, const std::string &path)
-{
-  if (path.empty ())
-    return nullptr;
-  auto mapped = std::make_shared<const Result<Mapping>> (Mapping::load (path));
-  if (!*mapped)
-    GST_WARNING_OBJECT (element, "%s", mapped->error ().message.c_str ());
-  return mapped;
-}
-
 bool
 find_rectifier (GstElement *element, CodedStream &stream,
     const CodedSettings &settings, const Schedule &schedule, Extent camera,

@@ -208,10 +208,25 @@ TEST_F (DemuxMapping, OfOtherFramesInTheTagIsLeftOut)
 TEST_F (DemuxMapping, ThatCannotBeReadIsAnError)
 {
   for (const char *text : {"{}", "nonsense"}) {
-    ElementHarness demux (demux_with (save (text)));
+    ElementHarness demux ("codedexposure-demux schedule=sequential:2x2");
     demux.set_caps (gray_caps (kWidth, kHeight));
+    g_object_set (demux.element (), "mapping", save (text).c_str (), nullptr);
     EXPECT_EQ (demux.push (frame (0, 0)), GST_FLOW_NOT_NEGOTIATED);
     EXPECT_EQ (
         demux.error ().find ("The mapping property cannot be read: "), 0u);
   }
+}
+
+TEST_F (DemuxMapping, IsReadAgainWhenARunBegins)
+{
+  const std::string path = save ("nonsense");
+  const ObjectPtr<GstElement> demux (GST_ELEMENT (gst_object_ref_sink (
+      gst_element_factory_make ("codedexposure-demux", nullptr))));
+  g_object_set (demux.get (), "mapping", path.c_str (), nullptr);
+  EXPECT_EQ (gst_element_set_state (demux.get (), GST_STATE_READY),
+      GST_STATE_CHANGE_FAILURE);
+  EXPECT_EQ (save (shifted (1, 0).to_json ()), path);
+  EXPECT_EQ (gst_element_set_state (demux.get (), GST_STATE_READY),
+      GST_STATE_CHANGE_SUCCESS);
+  gst_element_set_state (demux.get (), GST_STATE_NULL);
 }

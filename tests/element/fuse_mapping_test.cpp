@@ -198,7 +198,9 @@ TEST_F (FuseMapping, OfOtherFramesInTheTagIsLeftOut)
 
 TEST_F (FuseMapping, ThatCannotBeReadIsAnError)
 {
-  start ("mapping=" + save ("nonsense"));
+  start ("");
+  g_object_set (
+      fuse->element (), "mapping", save ("nonsense").c_str (), nullptr);
   EXPECT_EQ (push_grey ({kWidth, kHeight}, 0), GST_FLOW_NOT_NEGOTIATED);
   EXPECT_EQ (fuse->error ().find ("The mapping property cannot be read: "), 0u);
 }

@@ -171,9 +171,9 @@ void
 forget_stream (GstDmdSync *self)
 {
   SyncState &st = *self->state;
-  /* The camera's memory goes with the camera. */
-  if (st.keeper)
-    st.keeper->recall ();
+  /* The camera's memory goes with the camera; and the keeper's thread speaks
+   * for the element, so it must not outlive it. */
+  st.keeper.reset ();
   st.stream = sync::Stream ();
   st.source.reset ();
   const ObjectLock lock (self);

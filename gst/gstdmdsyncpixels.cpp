@@ -64,12 +64,6 @@ void
 say_held (GstDmdSync *self, const Overdue &overdue)
 {
   SyncState &st = state (self);
-  {
-    const ObjectLock lock (self);
-    st.counters.frames_held++;
-    st.counters.frames_spoilt += overdue.spoilt;
-  }
-  notify (self, "frames-held");
   gst_element_post_message (GST_ELEMENT (self),
       gst_message_new_element (GST_OBJECT (self),
           gst_structure_new ("dmdsync/frame-held", "frame", G_TYPE_UINT64,
@@ -81,6 +75,12 @@ say_held (GstDmdSync *self, const Overdue &overdue)
          "source writes into their memory again; such frames are copied. Give "
          "the source more buffers (num-arv-buffers), or the queue fewer."),
         ("this is said once; the property frames-held counts them all"));
+  {
+    const ObjectLock lock (self);
+    st.counters.frames_held++;
+    st.counters.frames_spoilt += overdue.spoilt;
+  }
+  notify (self, "frames-held");
 }
 
 } // namespace

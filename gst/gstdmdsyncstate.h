@@ -142,7 +142,7 @@ struct SyncState {
   /* Sink pad's stream lock. */
   Stream stream;
 
-  std::unique_ptr<LeaseKeeper> keeper; ///< last: its thread uses the above
+  std::unique_ptr<LeaseKeeper> keeper; ///< of a run; its thread uses the above
 };
 
 SyncState &state (GstDmdSync *self);

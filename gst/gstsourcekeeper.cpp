@@ -142,8 +142,11 @@ SourceKeeper::take_message (GstBus *, GstMessage *message, gpointer data)
   const bool mended = keeper &&
                       GST_MESSAGE_TYPE (message) == GST_MESSAGE_ERROR &&
                       keeper->note_failure (message);
+  /* Who has a message dropped owns it. */
   if (!mended && hook->above)
-    gst_bus_post (hook->above.get (), gst_message_ref (message));
+    gst_bus_post (hook->above.get (), message);
+  else
+    gst_message_unref (message);
   return GST_BUS_DROP;
 }
 

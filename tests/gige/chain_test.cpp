@@ -13,7 +13,6 @@
 #include "emulated_dlpc900.h"
 #include "linked_elements.h"
 #include "optics/bench.h"
-#include "own_network.h"
 #include "screen.h"
 #include "usb_bed.h"
 
@@ -358,18 +357,3 @@ TEST (Chain, ACameraThatComesBackFindsTheMasksInPhase)
 }
 
 } // namespace
-
-int
-main (int argc, char **argv)
-{
-  const bool alone = enter_own_network ();
-  gst_init (&argc, &argv);
-  ::testing::InitGoogleTest (&argc, argv);
-  if (!alone) {
-    std::puts ("a network of its own is not allowed here: skipped");
-    return 77;
-  }
-  const int result = RUN_ALL_TESTS ();
-  gst_deinit ();
-  return result;
-}

@@ -7,7 +7,6 @@
 #include "camera/packed_mono.h"
 #include "camera_rig.h"
 #include "linked_elements.h"
-#include "own_network.h"
 
 namespace
 {
@@ -452,18 +451,3 @@ TEST (Gige, AnAddressThatIsNotHereIsAnError)
 }
 
 } // namespace
-
-int
-main (int argc, char **argv)
-{
-  const bool alone = enter_own_network ();
-  gst_init (&argc, &argv);
-  ::testing::InitGoogleTest (&argc, argv);
-  if (!alone) {
-    std::puts ("a network of its own is not allowed here: skipped");
-    return 77;
-  }
-  const int result = RUN_ALL_TESTS ();
-  gst_deinit ();
-  return result;
-}

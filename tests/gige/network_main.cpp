@@ -1,0 +1,23 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Runs tests of cameras in a network of their own. */
+#include <cstdio>
+
+#include <gst/gst.h>
+#include <gtest/gtest.h>
+
+#include "own_network.h"
+
+int
+main (int argc, char **argv)
+{
+  const bool alone = cexp::test::enter_own_network ();
+  gst_init (&argc, &argv);
+  ::testing::InitGoogleTest (&argc, argv);
+  if (!alone) {
+    std::puts ("a network of its own is not allowed here: skipped");
+    return 77;
+  }
+  const int result = RUN_ALL_TESTS ();
+  gst_deinit ();
+  return result;
+}

@@ -121,6 +121,9 @@ keep_source (GstDmdSync *self)
     tries = st.settings.reconnect;
   }
   auto before = elements_before (self);
+  /* It may have been started anew since the last run. */
+  for (const auto &element : before)
+    forget_camera (element.get ());
   if (tries == 0 || before.empty () ||
       !GST_OBJECT_FLAG_IS_SET (before.back ().get (), GST_ELEMENT_FLAG_SOURCE))
     return;

@@ -36,8 +36,8 @@ flow_of (GstMessage *message)
   return GstFlowReturn (flow);
 }
 
-/* aravissrc keeps the camera that it found, dead or alive, until it is named
- * anew. */
+} // namespace
+
 void
 forget_camera (GstElement *source)
 {
@@ -49,8 +49,6 @@ forget_camera (GstElement *source)
   const CharPtr owned (name);
   g_object_set (source, kName, name, nullptr);
 }
-
-} // namespace
 
 /** What a message finds, also when the keeper is no more. */
 struct SourceKeeper::Hook {

@@ -16,6 +16,10 @@
 namespace cexp::gst
 {
 
+/** aravissrc keeps the camera that it found, dead or alive, until it is named
+ * anew; so it is. Other sources are left alone. The source must not run. */
+void forget_camera (GstElement *source);
+
 /**
  * Starts a source anew that ended in an error of its own, as aravissrc does
  * when its camera is silent for two seconds or was unplugged.

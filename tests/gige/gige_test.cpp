@@ -388,7 +388,6 @@ TEST (Gige, ACameraThatStopsIsAnErrorAndACleanStop)
 
 TEST (Gige, ACameraThatRestartsIsLockedAtOnceInTheNextRun)
 {
-  auto camera = open_camera ({});
   std::vector<bool> locked;
   CameraPipeline pipeline (
       camera_source ("100/1", "GRAY8", "num-buffers=12") + kSync,

@@ -13,7 +13,8 @@ using namespace cexp;
 using namespace cexp::gst;
 using namespace cexp::test;
 
-/* Pictures and times of all buffers that pass a pad. */
+/* Pictures and times of all buffers that pass a pad; a flush forgets those
+ * before it, as it does downstream. */
 template <typename Pixel>
 class Watch
 {
@@ -21,10 +22,16 @@ public:
   explicit Watch (ObjectPtr<GstPad> pad) : pad_ (std::move (pad))
   {
     gst_pad_add_probe (
-        pad_.get (), GST_PAD_PROBE_TYPE_BUFFER,
+        pad_.get (),
+        static_cast<GstPadProbeType> (
+            GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_EVENT_FLUSH),
         [] (GstPad *from, GstPadProbeInfo *info, gpointer user_data) {
-          static_cast<Watch *> (user_data)->note (
-              from, GST_PAD_PROBE_INFO_BUFFER (info));
+          auto *watch = static_cast<Watch *> (user_data);
+          if (GST_PAD_PROBE_INFO_TYPE (info) & GST_PAD_PROBE_TYPE_BUFFER)
+            watch->note (from, GST_PAD_PROBE_INFO_BUFFER (info));
+          else if (GST_EVENT_TYPE (GST_PAD_PROBE_INFO_EVENT (info)) ==
+                   GST_EVENT_FLUSH_STOP)
+            watch->forget ();
           return GST_PAD_PROBE_OK;
         },
         this, nullptr);
@@ -38,6 +45,11 @@ private:
     const CapsPtr caps (gst_pad_get_current_caps (from));
     images.push_back (image_of<Pixel> (buffer, caps.get ()));
     times.push_back (GST_BUFFER_PTS (buffer));
+  }
+  void forget ()
+  {
+    images.clear ();
+    times.clear ();
   }
   ObjectPtr<GstPad> pad_;
 };

@@ -56,13 +56,17 @@ constexpr auto kPlaying = GParamFlags (
 constexpr auto kReadOnly =
     GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS);
 
-/* Object lock. */
+/* The text may name a file: read before the object lock. */
 void
-set_schedule (GstDmdSync *self, const gchar *text)
+set_schedule (GstDmdSync *self, const GParamSpec *pspec, const gchar *given)
 {
+  const std::string text = given && *given ? given : DEFAULT_SCHEDULE;
+  const Result<Schedule> schedule = Schedule::parse (text);
+  const ObjectLock lock (self);
+  if (!may_set (self, pspec))
+    return;
   SyncState &st = state (self);
-  st.settings.schedule = text && *text ? text : DEFAULT_SCHEDULE;
-  const Result<Schedule> schedule = Schedule::parse (st.settings.schedule);
+  st.settings.schedule = text;
   if (schedule)
     st.observable = slip_observable (*schedule);
   else
@@ -73,6 +77,8 @@ void
 set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 {
   auto *self = GST_DMD_SYNC (object);
+  if (id == PROP_SCHEDULE)
+    return set_schedule (self, pspec, g_value_get_string (value));
   {
     const ObjectLock lock (self);
     if (!may_set (self, pspec))
@@ -84,9 +90,6 @@ set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
       settings.device = device ? device : DEFAULT_DEVICE;
       break;
     }
-    case PROP_SCHEDULE:
-      set_schedule (self, g_value_get_string (value));
-      break;
     case PROP_TIMESTAMP_AT:
       settings.timestamp_at = TimestampAt (g_value_get_enum (value));
       break;

@@ -44,6 +44,22 @@ check_read (GstElement *element, const char *property,
   return false;
 }
 
+/** Says so where @p asked is not what the stream says of itself. */
+void
+say_overruled (GstElement *element, CodedStream &stream, const Schedule &asked)
+{
+  if (!stream.tagged || !*stream.tagged)
+    return;
+  const Schedule &tagged = stream.tagged->value ().schedule;
+  if (tagged == asked || stream.overruled == tagged)
+    return;
+  stream.overruled = tagged;
+  GST_ELEMENT_INFO (element, STREAM, FORMAT,
+      ("The schedule property, %s, is in force. The stream was made with %s.",
+          asked.text ().c_str (), tagged.text ().c_str ()),
+      (nullptr));
+}
+
 } // namespace
 
 void
@@ -91,8 +107,10 @@ find_schedule (
     GstElement *element, CodedStream &stream, const CodedSettings &settings)
 {
   if (const auto &asked = settings.parsed) {
-    if (*asked)
+    if (*asked) {
+      say_overruled (element, stream, asked->value ());
       return FoundSchedule{asked->value ()};
+    }
     refuse (element,
         "The schedule property cannot be read: " + asked->error ().message);
     return std::nullopt;

@@ -78,6 +78,7 @@ struct CodedStream {
   GstClockTime last_pts = GST_CLOCK_TIME_NONE;
   bool was_late = false; ///< the last frame was
   Burst saturation;
+  std::optional<Schedule> overruled; ///< of a tag, by the property; was said
   bool warned_assumed = false;
   bool warned_of_time = false;
   bool warned_of_mapping = false;

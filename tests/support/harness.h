@@ -2,6 +2,8 @@
 /* One element between pads of the test, with its bus in the test's hands. */
 #pragma once
 
+#include <algorithm>
+#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
@@ -146,7 +148,17 @@ public:
    * types stay. */
   MessagePtr message (GstMessageType type)
   {
-    return MessagePtr (gst_bus_pop_filtered (bus_.get (), type));
+    while (MessagePtr next{gst_bus_pop (bus_.get ())})
+      messages_.push_back (std::move (next));
+    const auto found = std::find_if (
+        messages_.begin (), messages_.end (), [type] (const MessagePtr &one) {
+          return GST_MESSAGE_TYPE (one.get ()) & type;
+        });
+    if (found == messages_.end ())
+      return nullptr;
+    MessagePtr taken = std::move (*found);
+    messages_.erase (found);
+    return taken;
   }
   /** The next element message named @p name. */
   MessagePtr element_message (const std::string &name)
@@ -157,9 +169,10 @@ public:
     }
     return nullptr;
   }
-  /** Text of the next error or warning on the bus; "" when there is none. */
+  /** Text of the next error, warning or info on the bus; "" when there is none. */
   std::string error () { return complaint (GST_MESSAGE_ERROR); }
   std::string warning () { return complaint (GST_MESSAGE_WARNING); }
+  std::string info () { return complaint (GST_MESSAGE_INFO); }
 
 private:
   std::string complaint (GstMessageType type)
@@ -170,14 +183,17 @@ private:
     GError *error = nullptr;
     if (type == GST_MESSAGE_ERROR)
       gst_message_parse_error (found.get (), &error, nullptr);
-    else
+    else if (type == GST_MESSAGE_WARNING)
       gst_message_parse_warning (found.get (), &error, nullptr);
+    else
+      gst_message_parse_info (found.get (), &error, nullptr);
     const std::string text = error->message;
     g_error_free (error);
     return text;
   }
 
   ObjectPtr<GstBus> bus_;
+  std::deque<MessagePtr> messages_; ///< off the bus, and not asked for yet
   ObjectPtr<GstElement> element_;
   HarnessPtr main_;
   std::map<std::string, HarnessPtr> pads_;

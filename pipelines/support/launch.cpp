@@ -199,11 +199,32 @@ Launch::find (const gchar *name)
               : nullptr;
 }
 
+/* Whether what lasts from the time of @frame on is asked for. A demuxer also
+ * sends what comes before a seek's start, for decoders to begin with. */
+bool
+is_within_segment (GstPad *pad, const GstBuffer *frame)
+{
+  const EventPtr sticky (gst_pad_get_sticky_event (pad, GST_EVENT_SEGMENT, 0));
+  const GstSegment *segment = nullptr;
+  if (!sticky || !GST_BUFFER_PTS_IS_VALID (frame))
+    return true;
+  gst_event_parse_segment (sticky.get (), &segment);
+  const GstClockTime end =
+      GST_BUFFER_DURATION_IS_VALID (frame)
+          ? GST_BUFFER_PTS (frame) + GST_BUFFER_DURATION (frame)
+          : GST_CLOCK_TIME_NONE;
+  guint64 from, to;
+  return gst_segment_clip (
+      segment, GST_FORMAT_TIME, GST_BUFFER_PTS (frame), end, &from, &to);
+}
+
 GstPadProbeReturn
-Launch::on_frame (GstPad *, GstPadProbeInfo *info, gpointer self)
+Launch::on_frame (GstPad *pad, GstPadProbeInfo *info, gpointer self)
 {
   auto *launch = static_cast<Launch *> (self);
   const GstBuffer *frame = GST_PAD_PROBE_INFO_BUFFER (info);
+  if (!is_within_segment (pad, frame))
+    return GST_PAD_PROBE_OK;
   launch->frames_++;
   if (GST_BUFFER_PTS_IS_VALID (frame))
     launch->last_pts_ = gint64 (GST_BUFFER_PTS (frame));
@@ -362,7 +383,11 @@ Launch::run ()
   if (code_ != kDone || !counted_)
     return code_;
   if (frames_ == 0) {
-    status_.line ("error: no coded frame came");
+    status_.line (options_.start > 0
+                      ? format ("error: no coded frame came: is %g s after the "
+                                "end?",
+                            options_.start)
+                      : "error: no coded frame came");
     return kFailed;
   }
   summarise ();
@@ -431,7 +456,7 @@ Launch::on_element_message (GstMessage *message)
   const GstStructure *structure = gst_message_get_structure (message);
   const std::string_view name = gst_structure_get_name (structure);
   if (name.substr (0, 14) != "codedexposure/" &&
-      name.substr (0, 8) != "dmdsync/")
+      name.substr (0, 8) != "dmdsync/" && name.substr (0, 11) != "moirecalib/")
     return;
   status_.line (fields_of (message));
 }

@@ -47,6 +47,21 @@ is_counter (const GParamSpec *spec)
          (type == G_TYPE_UINT64 || type == G_TYPE_UINT || type == G_TYPE_INT);
 }
 
+/* Texts as they can be given to a command again, and not as GStreamer escapes
+ * them. */
+std::string
+value_text (const GValue *value)
+{
+  if (G_VALUE_HOLDS_STRING (value)) {
+    const gchar *given = g_value_get_string (value);
+    const std::string text = given ? given : "";
+    return text.empty () || text.find (' ') != text.npos ? '"' + text + '"'
+                                                         : text;
+  }
+  const CharPtr text (gst_value_serialize (value));
+  return text ? text.get () : "?";
+}
+
 std::string
 numbers_of (GstElement *element)
 {
@@ -147,9 +162,8 @@ fields_of (GstMessage *message)
           gst_structure_get_name (structure));
   for (gint i = 0; i < gst_structure_n_fields (structure); i++) {
     const gchar *field = gst_structure_nth_field_name (structure, guint (i));
-    const CharPtr value (
-        gst_value_serialize (gst_structure_get_value (structure, field)));
-    text += format (" %s=%s", field, value ? value.get () : "?");
+    text += std::string (" ") + field + "=" +
+            value_text (gst_structure_get_value (structure, field));
   }
   return text;
 }

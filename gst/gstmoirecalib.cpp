@@ -24,10 +24,17 @@
  * Where the DMD takes no masks at run time, put a grating on it by other means
  * and name it (#moirecalib:pattern): alignment works, mapping does not.
  *
+ * Without any pattern, of a recording too, `mode=phase` finds which pixel of
+ * the tile the picture begins with, as long as mirrors and pixels are one to
+ * one, and the code gives its elements different light, as a staircase does.
+ * The `moirecalib/phase` message says how probable it is; the schedule with
+ * that phase is said downstream.
+ *
  * ## Messages
  *
- * `moirecalib/state`, `moirecalib/reading`, `moirecalib/mapping` and PROGRESS
- * messages with the code `mapping`; see docs/formats.md.
+ * `moirecalib/state`, `moirecalib/reading`, `moirecalib/mapping`,
+ * `moirecalib/phase` and PROGRESS messages with the code `mapping`; see
+ * docs/formats.md.
  *
  * ## Example pipeline
  *
@@ -76,6 +83,9 @@ gst_moire_calib_mode_get_type ()
           "auto"},
       {int (Mode::align), "Alignment only", "align"},
       {int (Mode::map), "The mapping at once", "map"},
+      {int (Mode::phase),
+          "Where the tile lies, from a coded frame of a staircase; no patterns",
+          "phase"},
       {0, nullptr, nullptr},
   };
   if (g_once_init_enter (&type))
@@ -93,6 +103,7 @@ enum {
   PROP_LOCATION,
   PROP_REPORT,
   PROP_PATTERN,
+  PROP_SCHEDULE,
   PROP_OVERLAY,
   PROP_PERIOD,
   PROP_FRAMES,
@@ -169,6 +180,9 @@ set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
   case PROP_PATTERN:
     settings.pattern = text_of (value);
     break;
+  case PROP_SCHEDULE:
+    settings.schedule = text_of (value);
+    break;
   case PROP_OVERLAY:
     settings.overlay = g_value_get_boolean (value);
     break;
@@ -231,6 +245,8 @@ get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
     return g_value_set_string (value, settings.report.c_str ());
   case PROP_PATTERN:
     return g_value_set_string (value, settings.pattern.c_str ());
+  case PROP_SCHEDULE:
+    return g_value_set_string (value, settings.schedule.c_str ());
   case PROP_OVERLAY:
     return g_value_set_boolean (value, settings.overlay);
   case PROP_PERIOD:
@@ -355,6 +371,16 @@ install_run (GObjectClass *klass)
       "Grating that the mirrors show without being asked, such as "
       "grating-both:4/0; empty: upstream is asked for patterns");
   /**
+   * moirecalib:schedule:
+   *
+   * For `mode=phase` of a stream that does not say it, or says another.
+   *
+   * Since: 0.1
+   */
+  install_text (klass, PROP_SCHEDULE, "schedule", "Schedule",
+      "Schedule whose tile mode=phase looks for, a preset or a JSON file; "
+      "empty: what the stream says");
+  /**
    * moirecalib:overlay:
    *
    * Without it frames pass as they are, and only messages tell.
@@ -400,7 +426,8 @@ install_run (GObjectClass *klass)
    * Since: 0.1
    */
   install_text (klass, PROP_STATE, "state", "State",
-      "searching, coarse, fine, aligned, mapping, solving, mapped or failed",
+      "searching, coarse, fine, aligned, mapping, solving, mapped, failed or "
+      "found",
       kReadOnly);
   /**
    * moirecalib:mapping:

@@ -120,30 +120,18 @@ begin_mapping (GstMoireCalib *self)
   return ask (self, first);
 }
 
-bool
-begin (GstMoireCalib *self, const Settings &settings)
+/** Hands the worker what a run begins with. */
+void
+begin_run (GstMoireCalib *self, const Settings &settings, Geometry geometry)
 {
   CalibState &st = state (self);
   Stream &stream = st.stream;
-  if (const auto shown = Pattern::parse (live_pattern (settings)); !shown) {
-    GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
-        ("The pattern property cannot be read: %s",
-            shown.error ().message.c_str ()),
-        (nullptr));
-    return false;
-  }
-  const Mirrors mirrors = ask_mirrors (self);
-  if (settings.pattern.empty () && !mirrors.patterns)
-    return refuse (self, mirrors.reason);
-  Geometry geometry;
-  geometry.info = *stream.info;
-  geometry.camera = {stream.info->width, stream.info->height};
-  geometry.mirrors = mirrors.size.width > 0 && mirrors.size.height > 0
-                         ? mirrors.size
-                         : geometry.camera;
-  geometry.patterns = calibration_patterns (geometry.mirrors, settings.period);
   {
     const std::lock_guard guard (st.exchange.lock);
+    if (geometry.mode == Mode::phase) {
+      st.exchange.schedule.reset ();
+      st.exchange.setup_due = false;
+    }
     st.exchange.geometry = std::move (geometry);
     st.exchange.run++;
     st.exchange.live.reset ();
@@ -157,6 +145,49 @@ begin (GstMoireCalib *self, const Settings &settings)
   stream.turn = settings.turn;
   stream.mapping = false;
   set_stage (self, Stage::searching);
+}
+
+/** The tile shows in what the schedule makes of the scene: no patterns. */
+bool
+begin_phase (GstMoireCalib *self, const Settings &settings)
+{
+  Stream &stream = state (self).stream;
+  if (!std::exchange (stream.asked, {}).empty ())
+    release_mirrors (self);
+  const Extent camera{stream.info->width, stream.info->height};
+  std::optional<Schedule> said;
+  if (stream.setup)
+    said = stream.setup->schedule;
+  begin_run (self, settings,
+      {settings.mode, *stream.info, camera, camera, {}, std::move (said)});
+  return true;
+}
+
+bool
+begin (GstMoireCalib *self, const Settings &settings)
+{
+  const Stream &stream = state (self).stream;
+  if (settings.mode == Mode::phase)
+    return begin_phase (self, settings);
+  if (const auto shown = Pattern::parse (live_pattern (settings)); !shown) {
+    GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
+        ("The pattern property cannot be read: %s",
+            shown.error ().message.c_str ()),
+        (nullptr));
+    return false;
+  }
+  const Mirrors mirrors = ask_mirrors (self);
+  if (settings.pattern.empty () && !mirrors.patterns)
+    return refuse (self, mirrors.reason);
+  Geometry geometry;
+  geometry.mode = settings.mode;
+  geometry.info = *stream.info;
+  geometry.camera = {stream.info->width, stream.info->height};
+  geometry.mirrors = mirrors.size.width > 0 && mirrors.size.height > 0
+                         ? mirrors.size
+                         : geometry.camera;
+  geometry.patterns = calibration_patterns (geometry.mirrors, settings.period);
+  begin_run (self, settings, std::move (geometry));
   return ask (self, live_pattern (settings));
 }
 
@@ -167,7 +198,29 @@ copy_of (GstBuffer *buffer, const std::string &pattern, guint64 number)
       GST_BUFFER_PTS (buffer)};
 }
 
-/** A frame of the live grating: for the worker, if that has nothing to do. */
+/** A frame for the worker, if that has nothing to do. Exchange's lock. */
+void
+offer (Exchange &exchange, GstBuffer *buffer, const std::string &pattern,
+    guint64 number)
+{
+  if (exchange.busy || exchange.live)
+    return;
+  exchange.live = copy_of (buffer, pattern, number);
+  exchange.changed.notify_all ();
+}
+
+/** A frame of the schedule. */
+bool
+find_phase (GstMoireCalib *self, GstBuffer *buffer, const FrameMeta &meta)
+{
+  Exchange &exchange = state (self).exchange;
+  const std::lock_guard guard (exchange.lock);
+  if (exchange.stage == Stage::searching && meta.pattern.empty ())
+    offer (exchange, buffer, {}, meta.frame);
+  return true;
+}
+
+/** A frame of the live grating. */
 bool
 align (GstMoireCalib *self, const Settings &settings, GstBuffer *buffer,
     const std::string &shown, guint64 number)
@@ -177,10 +230,7 @@ align (GstMoireCalib *self, const Settings &settings, GstBuffer *buffer,
   bool enough = false;
   if (shown == stream.asked) {
     const std::lock_guard guard (st.exchange.lock);
-    if (!st.exchange.busy && !st.exchange.live) {
-      st.exchange.live = copy_of (buffer, shown, number);
-      st.exchange.changed.notify_all ();
-    }
+    offer (st.exchange, buffer, shown, number);
     /* One look at the fringes, for the report. */
     enough = settings.mode == Mode::map
                  ? st.exchange.readings > 0
@@ -253,28 +303,39 @@ overlay (GstMoireCalib *self, GstBuffer *buffer)
     lay_over (*panel, view_of<guint16> (mapped));
 }
 
-/** Tells downstream of the mapping, in the tag that says the schedule. */
-void
-push_mapping (GstMoireCalib *self)
+/** What upstream says, corrected by what was found here. Exchange's lock. */
+std::optional<StreamSetup>
+corrected_setup (const CalibState &st)
 {
-  CalibState &st = state (self);
-  std::optional<Mapping> mapping;
-  {
-    const std::lock_guard guard (st.exchange.lock);
-    if (!std::exchange (st.exchange.mapping_due, false))
-      return;
-    mapping = st.exchange.mapping;
-  }
-  if (!st.stream.setup) {
-    GST_INFO_OBJECT (self, "no schedule to send the mapping with");
-    return;
-  }
-  st.stream.setup->mapping = *mapping;
-  gst_pad_push_event (
-      GST_BASE_TRANSFORM_SRC_PAD (self), setup_to_event (*st.stream.setup));
+  std::optional<StreamSetup> setup = st.stream.setup;
+  if (st.exchange.schedule)
+    setup = StreamSetup{*st.exchange.schedule};
+  else if (setup && st.exchange.mapping)
+    setup->mapping = st.exchange.mapping;
+  return setup;
 }
 
-/** Reads what a tag says, and adds the mapping that was found here. */
+/** Tells downstream what was found, in the tag that says the schedule. */
+void
+push_setup (GstMoireCalib *self)
+{
+  CalibState &st = state (self);
+  std::optional<StreamSetup> setup;
+  {
+    const std::lock_guard guard (st.exchange.lock);
+    if (!std::exchange (st.exchange.setup_due, false))
+      return;
+    setup = corrected_setup (st);
+  }
+  if (setup)
+    gst_pad_push_event (
+        GST_BASE_TRANSFORM_SRC_PAD (self), setup_to_event (*setup));
+  else
+    GST_INFO_OBJECT (self, "no schedule to send the mapping with");
+}
+
+/** Reads what a tag says, and corrects it by what was found here. A phase was
+ * found for one schedule, and is looked for anew with another. */
 GstEvent *
 take_tag (GstMoireCalib *self, GstEvent *event)
 {
@@ -284,14 +345,22 @@ take_tag (GstMoireCalib *self, GstEvent *event)
   const auto said = setup_from_tags (tags);
   if (!said || !*said)
     return event;
+  const bool other =
+      st.stream.setup && st.stream.setup->schedule != said->value ().schedule;
   st.stream.setup = said->value ();
+  std::optional<StreamSetup> setup;
   {
     const std::lock_guard guard (st.exchange.lock);
-    if (!st.exchange.mapping)
-      return event;
-    st.stream.setup->mapping = st.exchange.mapping;
+    if (other) {
+      st.exchange.schedule.reset ();
+      if (st.exchange.geometry && st.exchange.geometry->mode == Mode::phase)
+        begin_anew (self);
+    }
+    setup = corrected_setup (st);
   }
-  GstEvent *ours = gst_event_new_tag (tags_with_setup (tags, *st.stream.setup));
+  if (setup == st.stream.setup)
+    return event;
+  GstEvent *ours = gst_event_new_tag (tags_with_setup (tags, *setup));
   gst_event_set_seqnum (ours, gst_event_get_seqnum (event));
   gst_event_unref (event);
   return ours;
@@ -304,16 +373,24 @@ finish (GstMoireCalib *self)
   CalibState &st = state (self);
   Exchange &exchange = st.exchange;
   std::size_t patterns = 0;
+  bool lost_tile = false;
   {
     std::unique_lock guard (exchange.lock);
     exchange.changed.wait (guard, [&exchange] {
-      return exchange.quit ||
-             (!exchange.busy && !exchange.solve && exchange.samples.empty ());
+      return exchange.quit || (!exchange.busy && !exchange.solve &&
+                                  !exchange.live && exchange.samples.empty ());
     });
+    lost_tile = exchange.geometry && exchange.geometry->mode == Mode::phase &&
+                exchange.stage == Stage::searching;
     if (exchange.geometry)
       patterns = exchange.geometry->patterns.size ();
   }
-  push_mapping (self);
+  push_setup (self);
+  if (lost_tile)
+    GST_ELEMENT_WARNING (self, STREAM, FAILED,
+        ("The stream ended, and no frame told where the tile lies: take one of "
+         "a scene with more light in more of its parts, or calibrate."),
+        (nullptr));
   if (st.stream.mapping && st.stream.next < patterns)
     GST_ELEMENT_WARNING (self, STREAM, FAILED,
         ("The stream ended after %d of %d patterns: there is no mapping.",
@@ -345,11 +422,13 @@ transform_ip (GstBaseTransform *trans, GstBuffer *buffer)
   const FrameMeta meta = get_frame_meta (buffer).value_or (FrameMeta ());
   const std::string shown =
       settings.pattern.empty () ? meta.pattern : settings.pattern;
-  const bool went_on = (stream.mapping ? map : align) (
-      self, settings, buffer, shown, meta.frame);
+  const bool went_on = settings.mode == Mode::phase
+                           ? find_phase (self, buffer, meta)
+                           : (stream.mapping ? map : align) (
+                                 self, settings, buffer, shown, meta.frame);
   if (!went_on)
     return GST_FLOW_ERROR;
-  push_mapping (self);
+  push_setup (self);
   if (settings.overlay && gst_buffer_is_writable (buffer))
     overlay (self, buffer);
   return GST_FLOW_OK;

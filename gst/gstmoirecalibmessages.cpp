@@ -48,6 +48,8 @@ stage_text (Stage stage)
     return "mapped";
   case Stage::failed:
     return "failed";
+  case Stage::found:
+    return "found";
   default:
     return alignment_state_text (AlignmentState (stage));
   }
@@ -81,6 +83,18 @@ say_reading (GstMoireCalib *self, const Sample &sample,
       "saturated", G_TYPE_UINT64, guint64 (reading.saturated), nullptr);
   add_correction (structure, correction, reading.mapping.stance_sigma ());
   post (self, structure);
+}
+
+void
+say_phase (GstMoireCalib *self, const Sample &sample, const FoundPhase &found)
+{
+  const TilePhase &tile = found.tile;
+  post (self, gst_structure_new ("moirecalib/phase", "frame", G_TYPE_UINT64,
+                  sample.number, "pts", G_TYPE_UINT64, sample.pts, "phase-x",
+                  G_TYPE_INT, tile.phase.x, "phase-y", G_TYPE_INT, tile.phase.y,
+                  "confidence", G_TYPE_DOUBLE, tile.confidence, "contrast",
+                  G_TYPE_DOUBLE, tile.contrast, "schedule", G_TYPE_STRING,
+                  found.schedule.text ().c_str (), nullptr));
 }
 
 void

@@ -19,6 +19,7 @@
 #include "moire/calibration.h"
 #include "moire/live_moire.h"
 #include "moire/stage.h"
+#include "moire/tile_phase.h"
 #include "overlay/report.h"
 #include "schedule/stream_setup.h"
 
@@ -28,7 +29,7 @@ namespace cexp::gst::moire
 {
 
 /** What the user wants to be done. */
-enum class Mode { automatic, align, map };
+enum class Mode { automatic, align, map, phase };
 /** How far that is. The first four are AlignmentState's. */
 enum class Stage {
   searching,
@@ -39,6 +40,7 @@ enum class Stage {
   solving,
   mapped,
   failed,
+  found, ///< the phase of the tile
 };
 
 struct Settings {
@@ -47,6 +49,7 @@ struct Settings {
   std::string location;
   std::string report;
   std::string pattern;
+  std::string schedule; ///< whose tile is looked for; "": the stream's
   bool overlay = true;
   int period = 12;
   int frames = 4;
@@ -62,12 +65,14 @@ struct Sample {
   GstClockTime pts = 0;
 };
 
-/** Everything that follows from the caps and the mirrors. */
+/** What a run begins with. */
 struct Geometry {
+  Mode mode;
   GstVideoInfo info;
   Extent camera;
   Extent mirrors;
-  std::vector<Pattern> patterns; ///< of a calibration
+  std::vector<Pattern> patterns;    ///< of a calibration
+  std::optional<Schedule> schedule; ///< that the stream says
 };
 
 /** Between the streaming thread and the worker; its mutex covers all of it. */
@@ -86,8 +91,10 @@ struct Exchange {
   Stage stage = Stage::searching;
   int readings = 0;         ///< of the live grating
   int aligned_readings = 0; ///< in a row
+  /** Where the mirrors stand: of the two, what was found last. */
   std::optional<Mapping> mapping;
-  bool mapping_due = false; ///< downstream does not have it yet
+  std::optional<Schedule> schedule; ///< with the phase that was found
+  bool setup_due = false;           ///< downstream does not have it yet
 };
 
 /** All that is forgotten from PAUSED to READY. Sink pad's stream lock. */
@@ -130,11 +137,18 @@ gboolean set_caps (GstBaseTransform *trans, GstCaps *incaps, GstCaps *outcaps);
 gboolean sink_event (GstBaseTransform *trans, GstEvent *event);
 
 /* Messages. */
+/** A tile's phase, and the schedule that has it. */
+struct FoundPhase {
+  TilePhase tile;
+  Schedule schedule;
+};
 void set_stage (GstMoireCalib *self, Stage stage);
 void say_reading (GstMoireCalib *self, const Sample &sample,
     const LiveReading &reading, const StageCorrection &correction);
 void say_progress (
     GstMoireCalib *self, GstProgressType type, const std::string &text);
+void say_phase (
+    GstMoireCalib *self, const Sample &sample, const FoundPhase &found);
 void say_mapping (GstMoireCalib *self, const CalibrationResult &result,
     const std::string &location, const std::string &report);
 

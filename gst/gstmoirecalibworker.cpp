@@ -60,6 +60,22 @@ lines_of (const LiveReading &reading, const StageCorrection &todo)
   };
 }
 
+/* A phase of this probability is taken. */
+constexpr double kSure = 0.999;
+
+/** @p schedule with its tile at @p phase. */
+Result<Schedule>
+moved (const Schedule &schedule, Offset phase)
+{
+  return Schedule::make ({.tile = schedule.tile (),
+      .code = schedule.code (),
+      .timing = schedule.timing (),
+      .order = schedule.order (),
+      .phase = phase,
+      .leak = schedule.leak (),
+      .pilot_rows = schedule.pilot_rows ()});
+}
+
 class Worker
 {
 public:
@@ -72,6 +88,9 @@ public:
 
 private:
   void begin (guint run);
+  void begin_fringes ();
+  void begin_phase ();
+  void find_phase (const Sample &sample);
   void align (const Sample &sample);
   void collect (const Sample &sample);
   void solve ();
@@ -82,6 +101,7 @@ private:
   Written write_files (
       const CalibrationResult &result, const Settings &settings);
   void fail (const std::string &why);
+  void fail_phase (const std::string &why);
   void set (Stage stage);
   void draw (const std::string &title, const std::vector<std::string> &lines,
       std::optional<double> progress);
@@ -94,6 +114,7 @@ private:
   Settings settings_;
   Geometry geometry_;
   std::optional<LiveMoire> live_;
+  std::optional<Schedule> schedule_; ///< whose tile is looked for
   std::optional<Calibration> calibration_;
   std::optional<FringePair> before_, after_;
   std::optional<StageCorrection> correction_;
@@ -107,6 +128,24 @@ Worker::begin (guint run)
 {
   run_ = run;
   settings_ = settings_of (self_);
+  live_.reset ();
+  schedule_.reset ();
+  calibration_.reset ();
+  before_.reset ();
+  after_.reset ();
+  correction_.reset ();
+  aligned_ = 0;
+  collected_ = 0;
+  failed_ = false;
+  if (geometry_.mode == Mode::phase)
+    begin_phase ();
+  else
+    begin_fringes ();
+}
+
+void
+Worker::begin_fringes ()
+{
   const auto pattern = Pattern::parse (
       settings_.pattern.empty () ? live_grating ().text () : settings_.pattern);
   const LiveMoire::Options options{
@@ -116,20 +155,27 @@ Worker::begin (guint run)
       LiveMoire::make (centred_mapping (geometry_.camera, geometry_.mirrors,
                            settings_.stage.pixels_per_mirror),
           options);
-  live_.reset ();
   if (live)
     live_.emplace (*std::move (live));
   else
     GST_ELEMENT_WARNING (self_, STREAM, FORMAT,
         ("Fringes cannot be read: %s", live.error ().message.c_str ()),
         (nullptr));
-  calibration_.reset ();
-  before_.reset ();
-  after_.reset ();
-  correction_.reset ();
-  aligned_ = 0;
-  collected_ = 0;
-  failed_ = false;
+}
+
+void
+Worker::begin_phase ()
+{
+  schedule_ = geometry_.schedule;
+  if (!settings_.schedule.empty ()) {
+    const Result<Schedule> asked = Schedule::parse (settings_.schedule);
+    if (!asked)
+      return fail_phase (asked.error ().message);
+    schedule_ = *asked;
+  }
+  if (!schedule_)
+    fail_phase ("the stream says nothing of its schedule; set the schedule "
+                "property to what the mirrors show");
 }
 
 template <typename Use>
@@ -259,6 +305,47 @@ Worker::fail (const std::string &why)
 }
 
 void
+Worker::fail_phase (const std::string &why)
+{
+  failed_ = true;
+  set (Stage::failed);
+  draw ("no phase", {why}, {});
+  GST_ELEMENT_WARNING (self_, STREAM, FAILED,
+      ("The tile's phase cannot be found: %s", why.c_str ()), (nullptr));
+}
+
+void
+Worker::find_phase (const Sample &sample)
+{
+  if (failed_)
+    return;
+  const auto tile = with_pixels (sample,
+      [this] (auto pixels) { return find_tile_phase (pixels, *schedule_); });
+  if (!tile)
+    return fail_phase (tile.error ().message);
+  const bool sure = tile->confidence >= kSure;
+  draw (sure ? "tile found" : "searching for the tile",
+      {format ("phase %d/%d    probability %.4f    contrast %.2f",
+          tile->phase.x, tile->phase.y, tile->confidence, tile->contrast)},
+      {});
+  if (!sure)
+    return;
+  const Result<Schedule> found = moved (*schedule_, tile->phase);
+  if (!found)
+    return fail_phase (found.error ().message);
+  {
+    const std::lock_guard guard (exchange_.lock);
+    if (exchange_.run != run_)
+      return;
+    exchange_.schedule = *found;
+    exchange_.mapping.reset ();
+    exchange_.setup_due = true;
+  }
+  set (Stage::found);
+  say_phase (self_, sample, {*tile, *found});
+}
+
+void
 Worker::solve ()
 {
   if (!calibration_)
@@ -319,7 +406,8 @@ Worker::finish (const CalibrationResult &result)
   {
     const std::lock_guard guard (exchange_.lock);
     exchange_.mapping = result.mapping;
-    exchange_.mapping_due = true;
+    exchange_.schedule.reset ();
+    exchange_.setup_due = true;
   }
   set (Stage::mapped);
   correction_ = correct_stage (result.mapping, settings.stage);
@@ -376,6 +464,8 @@ Worker::run ()
       solve ();
     else if (collects)
       collect (*sample);
+    else if (geometry_.mode == Mode::phase)
+      find_phase (*sample);
     else
       align (*sample);
     guard.lock ();
@@ -394,7 +484,8 @@ start_worker (GstMoireCalib *self)
     exchange.quit = false;
     exchange.panel.reset ();
     exchange.mapping.reset ();
-    exchange.mapping_due = false;
+    exchange.schedule.reset ();
+    exchange.setup_due = false;
   }
   st.worker = std::thread ([self] { Worker (self).run (); });
 }

@@ -305,3 +305,84 @@ TEST (MoireCalib, GivesTheMirrorsBackWhenItStops)
   gst_element_set_state (h.element (), GST_STATE_NULL);
   EXPECT_EQ (asked, (std::vector<std::string>{"grating-both:4/0", ""}));
 }
+
+namespace
+{
+
+/** Texture that moves. */
+void
+scenery (std::int64_t slot, ImageView<std::uint8_t> out)
+{
+  for (int y = 0; y < out.height; y++)
+    for (int x = 0; x < out.width; x++)
+      out.at (x, y) = std::uint8_t (60 + (x * 7 + y * 13 + slot) % 97);
+}
+
+/** What a camera sees of a flat scene behind @p schedule. */
+BufferPtr
+flat_frame (const Schedule &schedule, std::uint8_t light)
+{
+  return frame_of (draw<std::uint8_t> (kWidth, kHeight,
+                       [&] (int x, int y) {
+                         int sum = 0;
+                         for (int slot = 0; slot < schedule.slots (); slot++)
+                           sum += schedule.open (x, y, slot) * light;
+                         return sum;
+                       }),
+      GstClockTime (FrameRate{30000, 1001}.time_of (0)));
+}
+
+} // namespace
+
+TEST (MoireCalibPhase, IsFoundInAFrameAndSaidDownstream)
+{
+  Bench bench ("staircase:2x2",
+      "codedexposure-sim schedule=staircase:2x2 shift-x=1 shift-y=2 ! "
+      "moirecalib name=calib mode=phase overlay=false");
+  for (int i = 0; i < 3; i++)
+    bench.next (scenery);
+  bench.end ();
+  const auto said = bench.messages ("moirecalib/phase");
+  ASSERT_EQ (said.size (), 1u) << bench.warnings ();
+  EXPECT_EQ (string_field (said[0], "schedule"), "staircase:2x2,phase=1/0");
+  EXPECT_GE (double_field (said[0], "confidence"), 0.999);
+  EXPECT_EQ (text_property (bench.find ("calib").get (), "state"), "found");
+  const auto setup = setup_from_tags (bench.tags ().get ());
+  ASSERT_TRUE (setup && *setup);
+  EXPECT_EQ (setup->value ().schedule.text (), "staircase:2x2,phase=1/0");
+}
+
+TEST (MoireCalibPhase, IsLookedForInAStreamThatSaysNoSchedule)
+{
+  ElementHarness h ("moirecalib mode=phase schedule=staircase:3x2");
+  h.set_caps (gray_caps (kWidth, kHeight, "30000/1001"));
+  const auto moved = Schedule::parse ("staircase:3x2,phase=2/1");
+  EXPECT_EQ (h.push (flat_frame (*moved, 40)), GST_FLOW_OK);
+  h.push_event (gst_event_new_eos ());
+  const MessagePtr said = h.element_message ("moirecalib/phase");
+  ASSERT_TRUE (said);
+  EXPECT_EQ (string_field (said, "schedule"), "staircase:3x2,phase=2/1");
+}
+
+TEST (MoireCalibPhase, WhatSaysNothingOfItIsWarnedOf)
+{
+  const struct {
+    const char *settings;
+    std::uint8_t light;
+    const char *warning;
+  } cases[] = {
+      {"schedule=sequential:2x2", 40, "get the same light"},
+      {"schedule=stairs:2x2", 40, "'stairs' is no code"},
+      {"", 40, "the stream says nothing of its schedule"},
+      {"schedule=staircase:2x2", 0, "no frame told where the tile lies"},
+  };
+  for (const auto &c : cases) {
+    ElementHarness h ("moirecalib mode=phase " + std::string (c.settings));
+    h.set_caps (gray_caps (kWidth, kHeight, "30000/1001"));
+    for (int i = 0; i < 3; i++)
+      EXPECT_EQ (h.push (flat_frame (Schedule (), c.light)), GST_FLOW_OK);
+    h.push_event (gst_event_new_eos ());
+    EXPECT_NE (h.warning ().find (c.warning), std::string::npos) << c.settings;
+    EXPECT_NE (text_property (h.element (), "state"), "found") << c.settings;
+  }
+}

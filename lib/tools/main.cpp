@@ -119,6 +119,17 @@ run (int argc, char **argv)
   add_schedule_commands (app, session);
   try {
     app.parse (argc, argv);
+  } catch (const CLI::RequiredError &error) {
+    /* A subcommand is missing, most often because of a wrong word. */
+    const auto words = app.remaining (true);
+    if (words.empty ())
+      app.exit (error);
+    else
+      std::fprintf (stderr,
+          "codedexposure: there is no subcommand or option %s here\n"
+          "Run with --help for more information.\n",
+          in_quotes (words.front ()).c_str ());
+    return int (Exit::usage);
   } catch (const CLI::ParseError &error) {
     const int code = app.exit (error);
     return code == 0 ? 0 : int (Exit::usage);

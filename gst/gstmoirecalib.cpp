@@ -417,7 +417,9 @@ install_run (GObjectClass *klass)
    * Since: 0.1
    */
   install_number (klass, PROP_BITS, "bits", "Bits",
-      "Significant bits of GRAY16_LE frames; 0: all", 0, 16, kDefaults.bits);
+      "Significant bits of GRAY16_LE frames; 0: what they say of themselves, "
+      "else all",
+      0, 16, kDefaults.bits);
   /**
    * moirecalib:state:
    *

@@ -149,7 +149,7 @@ begin_run (GstMoireCalib *self, const Settings &settings, Geometry geometry)
 
 /** The tile shows in what the schedule makes of the scene: no patterns. */
 bool
-begin_phase (GstMoireCalib *self, const Settings &settings)
+begin_phase (GstMoireCalib *self, const Settings &settings, int bits)
 {
   Stream &stream = state (self).stream;
   if (!std::exchange (stream.asked, {}).empty ())
@@ -159,16 +159,18 @@ begin_phase (GstMoireCalib *self, const Settings &settings)
   if (stream.setup)
     said = stream.setup->schedule;
   begin_run (self, settings,
-      {settings.mode, *stream.info, camera, camera, {}, std::move (said)});
+      {settings.mode, *stream.info, bits, camera, camera, {},
+          std::move (said)});
   return true;
 }
 
+/** @p bits: that the frames say. */
 bool
-begin (GstMoireCalib *self, const Settings &settings)
+begin (GstMoireCalib *self, const Settings &settings, int bits)
 {
   const Stream &stream = state (self).stream;
   if (settings.mode == Mode::phase)
-    return begin_phase (self, settings);
+    return begin_phase (self, settings, bits);
   if (const auto shown = Pattern::parse (live_pattern (settings)); !shown) {
     GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
         ("The pattern property cannot be read: %s",
@@ -182,6 +184,7 @@ begin (GstMoireCalib *self, const Settings &settings)
   Geometry geometry;
   geometry.mode = settings.mode;
   geometry.info = *stream.info;
+  geometry.bits = bits;
   geometry.camera = {stream.info->width, stream.info->height};
   geometry.mirrors = mirrors.size.width > 0 && mirrors.size.height > 0
                          ? mirrors.size
@@ -415,11 +418,11 @@ transform_ip (GstBaseTransform *trans, GstBuffer *buffer)
   const Settings settings = settings_of (self);
   if (!stream.info)
     return GST_FLOW_NOT_NEGOTIATED;
+  const FrameMeta meta = get_frame_meta (buffer).value_or (FrameMeta ());
   if ((!stream.begun || stream.turn != settings.turn) &&
-      !begin (self, settings))
+      !begin (self, settings, meta.bits))
     return GST_FLOW_ERROR;
 
-  const FrameMeta meta = get_frame_meta (buffer).value_or (FrameMeta ());
   const std::string shown =
       settings.pattern.empty () ? meta.pattern : settings.pattern;
   const bool went_on = settings.mode == Mode::phase

@@ -69,6 +69,7 @@ struct Sample {
 struct Geometry {
   Mode mode;
   GstVideoInfo info;
+  int bits = 0; ///< significant ones, as the frames say; 0: they do not
   Extent camera;
   Extent mirrors;
   std::vector<Pattern> patterns;    ///< of a calibration

@@ -87,6 +87,10 @@ public:
   void run ();
 
 private:
+  int bits () const
+  {
+    return settings_.bits > 0 ? settings_.bits : geometry_.bits;
+  }
   void begin (guint run);
   void begin_fringes ();
   void begin_phase ();
@@ -150,7 +154,7 @@ Worker::begin_fringes ()
       settings_.pattern.empty () ? live_grating ().text () : settings_.pattern);
   const LiveMoire::Options options{
       .period = pattern ? pattern->period : live_grating ().period,
-      .bits = settings_.bits};
+      .bits = bits ()};
   Result<LiveMoire> live =
       LiveMoire::make (centred_mapping (geometry_.camera, geometry_.mirrors,
                            settings_.stage.pixels_per_mirror),
@@ -273,12 +277,12 @@ Worker::collect (const Sample &sample)
     calibration_.emplace (*std::move (made));
   }
   const Pattern pattern = *Pattern::parse (sample.pattern);
-  const int bits = settings_.bits > 0 ? settings_.bits : 16;
+  const int significant = bits () > 0 ? bits () : 16;
   const auto added = with_pixels (sample, [&] (auto pixels) {
     if constexpr (sizeof (*pixels.data) == 1)
       return calibration_->add (pattern, pixels);
     else
-      return calibration_->add (pattern, pixels, bits);
+      return calibration_->add (pattern, pixels, significant);
   });
   if (!added)
     return fail (added.error ().message);

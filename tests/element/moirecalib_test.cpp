@@ -284,6 +284,29 @@ TEST (MoireCalib, LaysItsPanelOverThePictureOrLeavesItAlone)
   }
 }
 
+TEST (MoireCalib, KnowsTheBitsOfItsPixelsFromTheFrames)
+{
+  const Pattern pattern = live_grating ();
+  const auto picture =
+      draw<std::uint16_t> (kLargeWidth, kLargeHeight, [&] (int x, int y) {
+        return x < 5 && y == 0 ? 1023 : pattern.on (x, y) * 700;
+      });
+  for (const int bits : {10, 0}) {
+    ElementHarness h ("moirecalib pattern=grating-both:4/0 overlay=false");
+    h.set_caps (gray_caps (kLargeWidth, kLargeHeight, "25/1", "GRAY16_LE"));
+    BufferPtr frame = frame_of (picture, 0);
+    set_frame_meta (frame.get (), {.bits = bits});
+    ASSERT_EQ (h.push (std::move (frame)), GST_FLOW_OK);
+    h.push_event (gst_event_new_eos ());
+    const MessagePtr reading = h.element_message ("moirecalib/reading");
+    ASSERT_TRUE (reading);
+    guint64 saturated = 99;
+    gst_structure_get_uint64 (
+        gst_message_get_structure (reading.get ()), "saturated", &saturated);
+    EXPECT_EQ (saturated, bits == 10 ? 5u : 0u);
+  }
+}
+
 TEST (MoireCalib, GivesTheMirrorsBackWhenItStops)
 {
   ElementHarness h ("moirecalib");

@@ -41,22 +41,13 @@ struct Place {
 
 /* Of the scene's variance by that of noise: where one is exceeded, filters for
  * so much noise are taken, else those for more. */
-using Limits = std::array<float, FilterBank::kNoises.size () - 1>;
-
-Limits
-limits_of (const Schedule &schedule)
-{
-  constexpr float kAll = std::numeric_limits<float>::infinity ();
-  Limits limits;
+constexpr auto kLimits = [] {
+  std::array<float, FilterBank::kNoises.size () - 1> limits = {};
   for (std::size_t i = 0; i < limits.size (); i++)
     limits[i] =
         float (1.0 / (FilterBank::kNoises[i] * FilterBank::kNoises[i + 1]));
-  /* Elements of different brightness differ without any scene. */
-  for (int e = 1; e < schedule.elements (); e++)
-    if (schedule.code ().open_slots (e) != schedule.code ().open_slots (0))
-      limits = {kAll, -kAll, -kAll};
   return limits;
-}
+}();
 
 } // namespace
 
@@ -65,9 +56,9 @@ struct Rectifier::Plan {
   int taps = 1;
   RectifyReport report;
   Image<Place> places;
-  std::vector<float> weights, smoothness; // as FilterBank has them
-  float noise = 0.0f;                     // of white
-  Limits limits;
+  std::vector<float> weights; // as FilterBank has them
+  std::vector<FilterBank::Look> looks;
+  float noise = 0.0f; // of white
 
   template <typename Pixel>
   void run (ImageView<const Pixel> from, ImageView<Pixel> to, int first,
@@ -88,21 +79,20 @@ public:
       const RectifyOptions &options, int taps)
       : mapping_ (mapping), tolerance_ (options.tolerance),
         coded_rows_ (mapping.mirrors ().height - schedule.pilot_rows ()),
-        elements_ (element_covariance (schedule, options.persistence)),
-        bank_ (view_of (mapping, taps), schedule, elements_,
-            options.correlation_length),
+        elements_ (schedule, mapping.mirrors (), options.persistence),
+        bank_ (view_of (mapping, taps), elements_, options.correlation_length),
         whole_ (mapping.one_to_one (options.tolerance)),
         single_ (taps == kWindows[0].taps),
         straight_ (bank_.solver ().own_share (0.0, 0.0)),
-        seen_ (std::size_t (mapping.mirrors ().width))
+        seen_ (std::size_t (mapping.mirrors ().width)), around_ (seen_.size ())
   {
   }
 
   void place_row (int y, Place *row, RectifyReport &report);
   std::vector<float> weights () && { return std::move (bank_).weights (); }
-  std::vector<float> smoothness () &&
+  std::vector<FilterBank::Look> looks () &&
   {
-    return std::move (bank_).smoothness ();
+    return std::move (bank_).looks ();
   }
 
 private:
@@ -118,26 +108,23 @@ private:
   const Mapping &mapping_;
   double tolerance_;
   int coded_rows_;
-  Matrix elements_;
+  Elements elements_;
   FilterBank bank_;
   bool whole_;
   bool single_; // pixel a mirror; of several, all are of use
   double straight_;
   std::vector<Position> seen_;
+  std::vector<int> around_;
 };
 
 void
 Planner::place_row (int y, Place *row, RectifyReport &report)
 {
   mapping_.camera_row (y, seen_);
-  const int *around = bank_.surroundings ().row (y);
-  const int period = bank_.surroundings ().period ();
-  int phase = 0;
-  for (const Position &seen : seen_) {
-    *row++ = place (seen, around[phase], y < coded_rows_, report);
-    if (++phase == period)
-      phase = 0;
-  }
+  if (!whole_)
+    bank_.surroundings ().find_row (y, around_);
+  for (std::size_t x = 0; x < seen_.size (); x++)
+    row[x] = place (seen_[x], around_[x], y < coded_rows_, report);
 }
 
 Place
@@ -206,8 +193,10 @@ Rectifier::make (const Mapping &mapping, const Schedule &schedule,
 {
   if (const auto checked = check (options); !checked)
     return checked.error ();
-  if (const auto checked = check_one_part (schedule, "rectification"); !checked)
-    return checked.error ();
+  const Extent mirrors = mapping.mirrors ();
+  if (const auto within = schedule.check_size (mirrors.width, mirrors.height);
+      !within)
+    return within.error ();
   const double magnification = mapping.stance ().magnification;
   auto plan = std::make_unique<Plan> ();
   plan->taps = taps_for (magnification);
@@ -215,16 +204,15 @@ Rectifier::make (const Mapping &mapping, const Schedule &schedule,
     return Error{"a mapping with " + std::to_string (magnification) +
                  " pixels a mirror cannot be corrected; 0.75 to 3.5 can"};
   plan->camera = mapping.camera ();
-  plan->mirrors = mapping.mirrors ();
+  plan->mirrors = mirrors;
   plan->noise = float (
       options.noise * std::sqrt (schedule.slots () / schedule.white_slots ()));
-  plan->limits = limits_of (schedule);
   try {
     Planner planner (mapping, schedule, options, plan->taps);
     plan->places = Image<Place> (plan->mirrors.width, plan->mirrors.height);
     for (int y = 0; y < plan->mirrors.height; y++)
       planner.place_row (y, plan->places.view ().row (y), plan->report);
-    plan->smoothness = std::move (planner).smoothness ();
+    plan->looks = std::move (planner).looks ();
     plan->weights = std::move (planner).weights ();
   } catch (const std::bad_alloc &) {
     return Error{"there is no memory for the weights of a mapping"};
@@ -284,10 +272,12 @@ Rectifier::Plan::filter_row (ImageView<const Pixel> from, const Place *row,
       window = {copy, sizeof (Pixel) * Seen::kRead};
     }
     /* What differs by more than noise is the scene. */
-    const float scene = (window.roughness () * to_noise - 1.0f) *
-                        smoothness[std::size_t (place.filter)];
+    const FilterBank::Look &look = looks[std::size_t (place.filter)];
+    const float scene =
+        (window.roughness () * to_noise * look.darkness - 1.0f) *
+        look.smoothness;
     std::ptrdiff_t filter = std::ptrdiff_t (place.filter) * kNoises;
-    for (const float limit : limits)
+    for (const float limit : kLimits)
       filter += scene <= limit;
     const float sum =
         window.filtered (weights.data () + filter * kTaps * Seen::kLength);

@@ -2,9 +2,7 @@
 #include "moire/rectify_filters.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
-#include <numbers>
 
 namespace cexp
 {
@@ -54,32 +52,94 @@ struct Between {
 
 } // namespace
 
-Surroundings::Surroundings (const Schedule &schedule, int reach)
-    : period_ (schedule.tile ().period_x ()),
-      rows_ (schedule.tile ().period_y ())
+Surroundings::Surroundings (const Elements &elements, int reach)
+    : elements_ (elements), reach_ (reach)
 {
-  std::map<std::vector<int>, int> known;
-  for (int y = 0; y < rows_; y++)
-    for (int x = 0; x < period_; x++) {
-      std::vector<int> elements;
-      for (int j = -reach; j <= reach; j++)
-        for (int i = -reach; i <= reach; i++)
-          elements.push_back (schedule.element_at (x + i, y + j));
-      const auto [at, made] = known.try_emplace (elements, count ());
-      if (made)
-        first_.push_back ({x, y});
-      number_.push_back (at->second);
+  for (int i = 0; i < elements.parts (); i++)
+    add_part (i);
+  repeating_ = count ();
+}
+
+int
+Surroundings::number_of (std::vector<int> window)
+{
+  const auto [at, is_new] = numbers_.try_emplace (std::move (window), count ());
+  if (is_new)
+    windows_.push_back (&at->first);
+  return at->second;
+}
+
+void
+Surroundings::add_part (int part)
+{
+  const Tile &tile = elements_.tile (part);
+  const Rect &rect = elements_.rect (part);
+  std::vector<int> &numbers = parts_.emplace_back ();
+  for (int y = 0; y < tile.period_y (); y++)
+    for (int x = 0; x < tile.period_x (); x++) {
+      std::vector<int> window;
+      for (int j = -reach_; j <= reach_; j++)
+        for (int i = -reach_; i <= reach_; i++)
+          window.push_back (
+              elements_.at (part, rect.x + x + i, rect.y + y + j));
+      numbers.push_back (number_of (std::move (window)));
     }
 }
 
-FilterBank::FilterBank (const PixelView &view, const Schedule &schedule,
-    const Matrix &elements, double correlation_length)
-    : schedule_ (schedule), elements_ (elements), solver_ (view),
-      surroundings_ (schedule, solver_.reach ()),
+/* Of a mirror with nothing but @part around it. */
+int
+Surroundings::in_part (int part, int x, int y) const
+{
+  const Tile &tile = elements_.tile (part);
+  const Rect &rect = elements_.rect (part);
+  const int column = floor_mod (x - rect.x, tile.period_x ());
+  const int row = floor_mod (y - rect.y, tile.period_y ());
+  return parts_[std::size_t (part)]
+               [std::size_t (row * tile.period_x () + column)];
+}
+
+void
+Surroundings::find_row (int y, std::span<int> numbers)
+{
+  for (std::size_t x = 0; x < numbers.size (); x++)
+    numbers[x] = in_part (0, int (x), y);
+  for (int i = 1; i < elements_.parts (); i++)
+    find_border (i, y, numbers);
+}
+
+/* Of the mirrors of region @part, and of those that see it. */
+void
+Surroundings::find_border (int part, int y, std::span<int> numbers)
+{
+  const Rect &rect = elements_.rect (part);
+  if (y < rect.y - reach_ || y >= rect.bottom () + reach_)
+    return;
+  const Rect inner{rect.x + reach_, rect.y + reach_, rect.width - 2 * reach_,
+      rect.height - 2 * reach_};
+  const int first = std::max (0, rect.x - reach_);
+  const int end = std::min (int (numbers.size ()), rect.right () + reach_);
+  for (int x = first; x < end; x++) {
+    int &number = numbers[std::size_t (x)];
+    if (inner.holds (x, y)) {
+      number = in_part (part, x, y);
+      continue;
+    }
+    std::vector<int> window;
+    for (int j = -reach_; j <= reach_; j++)
+      for (int i = -reach_; i <= reach_; i++)
+        window.push_back (elements_.at (x + i, y + j));
+    number = number_of (std::move (window));
+  }
+}
+
+FilterBank::FilterBank (
+    const PixelView &view, const Elements &elements, double correlation_length)
+    : elements_ (elements), solver_ (view),
+      surroundings_ (elements, solver_.reach ()),
       space_ (solver_.reach (), correlation_length), parts_ (kMaxParts),
       steps_ (surroundings_.count () > kManySurroundings ? kFewSteps : kSteps)
 {
-  const int count = surroundings_.count ();
+  const int count = surroundings_.repeating ();
   while (parts_ > kMinParts && count * parts_ * parts_ > kMaxFilters)
     parts_ /= 2;
   filters_.assign (
@@ -88,14 +148,20 @@ FilterBank::FilterBank (const PixelView &view, const Schedule &schedule,
       std::size_t (count) * std::size_t ((steps_ + 1) * (steps_ + 1)));
 }
 
-const Neighbourhood &
-FilterBank::neighbourhood (int around)
+Neighbourhood
+FilterBank::neighbourhood (int around) const
 {
-  const Offset first = surroundings_.first (around);
-  return neighbourhoods_
-      .try_emplace (around, schedule_, elements_, first.x, first.y,
-          solver_.reach (), space_)
-      .first->second;
+  return {elements_, surroundings_.window (around), solver_.reach (), space_};
+}
+
+/* Where elements differ in brightness, a window looks rough without any scene,
+ * and there is no telling how much noise there is by it. */
+std::vector<float>
+FilterBank::solve (const Neighbourhood &mirrors, double fx, double fy) const
+{
+  static constexpr std::array<double, kNoises.size ()> kUneven = {
+      kNoises[1], kNoises[1], kNoises[1], kNoises[1]};
+  return solver_.solve (mirrors, fx, fy, mirrors.even () ? kNoises : kUneven);
 }
 
 const std::vector<float> &
@@ -103,10 +169,36 @@ FilterBank::node (int around, int i, int j)
 {
   std::vector<float> &weights =
       nodes_[std::size_t ((around * (steps_ + 1) + j) * (steps_ + 1) + i)];
-  if (weights.empty ())
-    weights = solver_.solve (neighbourhood (around), node_at (i, steps_),
-        node_at (j, steps_), kNoises);
+  if (weights.empty ()) {
+    const auto known =
+        neighbourhoods_.try_emplace (around, neighbourhood (around)).first;
+    weights = solve (known->second, node_at (i, steps_), node_at (j, steps_));
+  }
   return weights;
+}
+
+std::vector<float>
+FilterBank::between_nodes (int around, double fx, double fy)
+{
+  const Between x (fx, steps_), y (fy, steps_);
+  std::vector<float> sum;
+  for (std::size_t j = 0; j < y.parts.size (); j++)
+    for (std::size_t i = 0; i < x.parts.size (); i++) {
+      const float part = x.parts[i] * y.parts[j];
+      const auto &solved = node (around, x.first + int (i), y.first + int (j));
+      sum.resize (solved.size ());
+      for (std::size_t k = 0; k < solved.size (); k++)
+        sum[k] += part * solved[k];
+    }
+  return sum;
+}
+
+std::int32_t &
+FilterBank::known_filter (int around, int px, int py)
+{
+  if (around < surroundings_.repeating ())
+    return filters_[std::size_t ((around * parts_ + py) * parts_ + px)];
+  return others_.try_emplace ({around, px, py}, kUnknown).first->second;
 }
 
 std::int32_t
@@ -115,41 +207,35 @@ FilterBank::filter (int around, double fx, double fy)
   const auto part_of = [this] (double f) {
     return std::clamp (int ((f + 0.5) * parts_), 0, parts_ - 1);
   };
+  const auto middle_of = [this] (
+                             int part) { return (part + 0.5) / parts_ - 0.5; };
   const int px = part_of (fx), py = part_of (fy);
-  std::int32_t &known =
-      filters_[std::size_t ((around * parts_ + py) * parts_ + px)];
+  std::int32_t &known = known_filter (around, px, py);
   if (known == kUnknown) {
-    const int size = solver_.taps () * row_length (solver_.taps ());
-    known = std::int32_t (
-        weights_.size () / (kNoises.size () * std::size_t (size)));
-    append (around, px, py);
+    known = std::int32_t (looks_.size ());
+    const double x = middle_of (px), y = middle_of (py);
+    append (around, around < surroundings_.repeating ()
+                        ? between_nodes (around, x, y)
+                        : solve (neighbourhood (around), x, y));
   }
   return known;
 }
 
-/* For the middle of a part. */
+/* @solved: as a WeightSolver has it. */
 void
-FilterBank::append (int around, int px, int py)
+FilterBank::append (int around, const std::vector<float> &solved)
 {
-  const Between x ((px + 0.5) / parts_ - 0.5, steps_);
-  const Between y ((py + 0.5) / parts_ - 0.5, steps_);
   const int taps = solver_.taps (), length = row_length (taps);
-  const int rows = int (kNoises.size ()) * taps;
-  const std::size_t first = weights_.size ();
-  weights_.resize (first + std::size_t (rows * length));
-  float rough = 0.0f;
-  for (std::size_t j = 0; j < y.parts.size (); j++)
-    for (std::size_t i = 0; i < x.parts.size (); i++) {
-      const float part = x.parts[i] * y.parts[j];
-      const auto &solved = node (around, x.first + int (i), y.first + int (j));
-      const float *from = solved.data ();
-      float *to = weights_.data () + first;
-      for (int row = 0; row < rows; row++, from += taps, to += length)
-        for (int k = 0; k < taps; k++)
-          to[k] += part * from[k];
-      rough += part * solved.back ();
-    }
-  smoothness_.push_back (1.0f / std::max (rough, kLeastRough));
+  const float *from = solved.data ();
+  for (std::size_t row = 0; row < kNoises.size () * std::size_t (taps); row++) {
+    weights_.insert (weights_.end (), from, from + taps);
+    weights_.resize (weights_.size () + std::size_t (length - taps));
+    from += taps;
+  }
+  const auto &window = surroundings_.window (around);
+  const double light = elements_.light (window[window.size () / 2]);
+  looks_.push_back ({1.0f / std::max (solved.back (), kLeastRough),
+      float (elements_.most_light () / light)});
 }
 
 } // namespace cexp

@@ -28,49 +28,43 @@ SpaceCorrelation::SpaceCorrelation (int reach, double length) : far_ (2 * reach)
           matern_3_2 (std::numbers::sqrt3 * std::hypot (dx, dy) / length));
 }
 
-Matrix
-element_covariance (const Schedule &schedule, double persistence)
-{
-  const std::size_t n = std::size_t (schedule.elements ());
-  const std::size_t slots = std::size_t (schedule.slots ());
-  const auto open = [&] (std::size_t element, std::size_t slot) {
-    return schedule.code ().open (int (element), int (slot)) ? 1.0
-                                                             : schedule.leak ();
-  };
-  std::vector<double> later (n * slots);
-  for (std::size_t e = 0; e < n; e++)
-    for (std::size_t s = 0; s < slots; s++)
-      for (std::size_t t = 0; t < slots; t++)
-        later[e * slots + s] +=
-            open (e, t) * std::pow (persistence, std::abs (int (s) - int (t)));
-  Matrix covariance (n * n);
-  for (std::size_t e = 0; e < n; e++)
-    for (std::size_t f = 0; f < n; f++)
-      for (std::size_t s = 0; s < slots; s++)
-        covariance[e * n + f] += open (e, s) * later[f * slots + s];
-  return covariance;
-}
-
-Neighbourhood::Neighbourhood (const Schedule &schedule, const Matrix &elements,
-    int x, int y, int reach, const SpaceCorrelation &space)
+Neighbourhood::Neighbourhood (const Elements &elements,
+    const std::vector<int> &around, int reach, const SpaceCorrelation &space)
     : reach_ (reach)
 {
-  const std::size_t n = std::size_t (schedule.elements ());
-  std::vector<std::size_t> element;
-  std::vector<Offset> at;
-  for (int j = -reach; j <= reach; j++)
-    for (int i = -reach; i <= reach; i++) {
-      const int e = schedule.element_at (x + i, y + j);
-      const int open = schedule.code ().open_slots (e);
-      element.push_back (std::size_t (e));
-      at.push_back ({i, j});
-      light_.push_back (open + schedule.leak () * (schedule.slots () - open));
+  std::vector<int> kinds = around;
+  std::sort (kinds.begin (), kinds.end ());
+  kinds.erase (std::unique (kinds.begin (), kinds.end ()), kinds.end ());
+  std::vector<double> in_time;
+  for (const int e : kinds)
+    for (const int f : kinds)
+      in_time.push_back (elements.covariance (e, f));
+
+  std::vector<std::size_t> kind;
+  for (const int e : around) {
+    kind.push_back (std::size_t (
+        std::lower_bound (kinds.begin (), kinds.end (), e) - kinds.begin ()));
+    light_.push_back (elements.light (e));
+  }
+  covariance_.resize (around.size () * around.size ());
+  double *to = covariance_.data ();
+  const int side = 2 * reach + 1;
+  for (int a = 0; a < side * side; a++) {
+    const double *time =
+        in_time.data () + kind[std::size_t (a)] * kinds.size ();
+    auto other = kind.begin ();
+    for (int y = 0; y < side; y++) {
+      const double *correlation = space.row (-(a % side), y - a / side);
+      for (int x = 0; x < side; x++)
+        *to++ = time[*other++] * correlation[x];
     }
-  covariance_.reserve (at.size () * at.size ());
-  for (std::size_t a = 0; a < at.size (); a++)
-    for (std::size_t b = 0; b < at.size (); b++)
-      covariance_.push_back (elements[element[a] * n + element[b]] *
-                             space.at (at[a].x - at[b].x, at[a].y - at[b].y));
+  }
+}
+
+bool
+Neighbourhood::even () const
+{
+  return std::equal (light_.begin () + 1, light_.end (), light_.begin ());
 }
 
 ShareProfile::ShareProfile (double side, double sigma)

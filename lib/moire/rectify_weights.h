@@ -7,8 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "schedule/matrix.h"
-#include "schedule/schedule.h"
+#include "moire/rectify_elements.h"
 
 namespace cexp
 {
@@ -21,9 +20,10 @@ public:
   /** For mirrors within @p reach of one, to each side. */
   SpaceCorrelation (int reach, double length);
 
-  double at (int dx, int dy) const
+  /** At (@p dx, @p dy), (@p dx + 1, @p dy) ... */
+  const double *row (int dx, int dy) const
   {
-    return values_[std::size_t ((dy + far_) * (2 * far_ + 1) + dx + far_)];
+    return values_.data () + (dy + far_) * (2 * far_ + 1) + dx + far_;
   }
 
 private:
@@ -31,26 +31,25 @@ private:
   std::vector<double> values_;
 };
 
-/** Covariance of the elements' light, n x n, of a scene that correlates with
- * itself a slot later by @p persistence. */
-Matrix element_covariance (const Schedule &schedule, double persistence);
-
 /**
- * Which element each mirror around one of them is, and what is known of their
- * light together: mirrors correlate in space as a scene does, and in time as
- * the slots do in which they are open.
+ * What is known of the light of a mirror and of those around it together:
+ * mirrors correlate in space as a scene does, and in time as the slots do in
+ * which they are open.
  */
 class Neighbourhood
 {
 public:
-  /** Around mirror (@p x, @p y), @p reach mirrors to each side. */
-  Neighbourhood (const Schedule &schedule, const Matrix &elements, int x, int y,
+  /** @p around  elements of the mirrors up to @p reach to each side, row by
+   *             row. */
+  Neighbourhood (const Elements &elements, const std::vector<int> &around,
       int reach, const SpaceCorrelation &space);
 
   int reach () const { return reach_; }
   std::size_t count () const { return light_.size (); }
   /** Mean light of a mirror in a flat scene, in slots. */
   double light (std::size_t mirror) const { return light_[mirror]; }
+  /** Whether all get the same light of a flat scene. */
+  bool even () const;
   /** Of one mirror with each. */
   const double *covariances (std::size_t mirror) const
   {

@@ -2,8 +2,11 @@
 /* codedexposure-demux: schedules with regions, a pad for each. */
 #include "harness.h"
 
+#include <cmath>
+
 #include "gstcodedexposuremeta.h"
 #include "gstcodedexposuretag.h"
+#include "optics/bench.h"
 #include "pipeline.h"
 
 namespace
@@ -381,6 +384,132 @@ TEST (DemuxRegions, AreNotForgottenByWhoeverSeesTheBackgroundOnly)
       std::string::npos)
       << error->message;
   g_error_free (error);
+}
+
+/** A camera that may stand askew before mirrors with two regions. */
+class MappedRegions : public ::testing::Test
+{
+protected:
+  static constexpr int kSide = 96;
+
+  Mapping mapping (const Alignment &alignment, double psf_sigma) const
+  {
+    const Affine t = camera_to_mirrors (alignment, kSide, kSide);
+    return mapping ({t.xx, t.xy, t.x0, t.yx, t.yy, t.y0, 0, 0, 1}, psf_sigma);
+  }
+  Mapping mapping (const Homography &homography, double psf_sigma = 0.0) const
+  {
+    const auto made = Mapping::make ({.camera = {kSide, kSide},
+        .mirrors = {kSide, kSide},
+        .homography = homography,
+        .psf_sigma = psf_sigma});
+    EXPECT_TRUE (made.ok ());
+    return *made;
+  }
+  /** Of texture that moves by 3 pixels in an exposure. */
+  Image<std::uint8_t> coded (const BenchOptions &options, int number) const
+  {
+    auto bench = OpticalBench::make (kSide, kSide, options);
+    bench->begin (schedule);
+    for (int slot = 0; slot < schedule.slots (); slot++) {
+      const double shift = 3.0 * (number + double (slot) / schedule.slots ());
+      const auto light = draw<std::uint8_t> (kSide, kSide, [=] (int x, int y) {
+        return int (120 + 50 * std::sin (0.5 * (x - shift) + 0.3 * y) +
+                    30 * std::sin (0.8 * y));
+      });
+      bench->expose (light.view (), slot, 1.0);
+    }
+    Image<std::uint8_t> frame (kSide, kSide);
+    bench->read_out (std::uint64_t (number), frame.view ());
+    return frame;
+  }
+  /** The subframes of each pad. */
+  std::map<std::string, std::vector<Image<std::uint8_t>>> parts (
+      const std::vector<Image<std::uint8_t>> &frames,
+      std::optional<Mapping> mapping = std::nullopt) const
+  {
+    ElementHarness demux ("codedexposure-demux");
+    demux.request ("region_0");
+    demux.request ("region_1");
+    demux.push_event (gst_event_new_stream_start ("stream"));
+    demux.set_caps (gray_caps (kSide, kSide, "30000/1001"));
+    demux.push_event (setup_to_event ({schedule, mapping}));
+    for (std::size_t i = 0; i < frames.size (); i++)
+      EXPECT_EQ (
+          demux.push (frame_of (frames[i], i * GST_SECOND * 1001 / 30000)),
+          GST_FLOW_OK);
+    std::map<std::string, std::vector<Image<std::uint8_t>>> images;
+    for (const char *pad : {"", "region_0", "region_1"})
+      images[pad] = pull_images (demux, pad);
+    return images;
+  }
+
+  Schedule schedule =
+      *Schedule::from_preset ("sequential:2x2,region=36x27+13+9:staircase:3x3,"
+                              "region=32x32+53+26:sequential:lattice:4/2");
+};
+
+/** Of pixels that are @p border and more from the border. */
+double
+mean_square (const std::vector<Image<std::uint8_t>> &a,
+    const std::vector<Image<std::uint8_t>> &b, int border)
+{
+  EXPECT_EQ (a.size (), b.size ());
+  double squares = 0.0, count = 0.0;
+  for (std::size_t k = 0; k < a.size (); k++)
+    for (int y = border; y < a[k].height () - border; y++)
+      for (int x = border; x < a[k].width () - border; x++) {
+        squares += std::pow (double (a[k].at (x, y)) - b[k].at (x, y), 2);
+        count += 1.0;
+      }
+  return squares / count;
+}
+
+TEST_F (MappedRegions, OfAMisalignedBenchAreAsTrueAsOfAnAlignedOne)
+{
+  BenchOptions straight;
+  straight.psf_sigma = 0.4;
+  straight.full_well = 10000;
+  straight.read_noise = 5;
+  BenchOptions askew = straight;
+  askew.alignment = {0.4, 0.4, 0.5, 1.01};
+  std::vector<Image<std::uint8_t>> truth, aligned, seen;
+  for (int i = 0; i < 3; i++) {
+    truth.push_back (coded ({}, i));
+    aligned.push_back (coded (straight, i));
+    seen.push_back (coded (askew, i));
+  }
+  const auto exact = parts (truth), wanted = parts (aligned),
+             unmapped = parts (seen),
+             mapped = parts (seen, mapping (askew.alignment, 0.4));
+  const double within = std::pow (10.0, 0.03); // 0.3 dB
+  for (const auto &[pad, images] : exact) {
+    SCOPED_TRACE (pad);
+    const int border = pad.empty () ? 4 : 0; // that the camera may not see
+    const double error = mean_square (wanted.at (pad), images, border);
+    EXPECT_LT (mean_square (mapped.at (pad), images, border), error * within);
+    EXPECT_GT (mean_square (unmapped.at (pad), images, border), error * 2);
+  }
+}
+
+/* A region lies among the mirrors, however the camera sees them. */
+TEST_F (MappedRegions, OfACameraThatIsTurnedAreFoundExactly)
+{
+  const std::vector frames = {coded ({}, 0), coded ({}, 1)};
+  const auto wanted = parts (frames);
+  constexpr double kLast = kSide - 1;
+  const Homography turned[] = {{-1, 0, kLast, 0, -1, kLast, 0, 0, 1},
+      {0, 1, 0, -1, 0, kLast, 0, 0, 1}, {-1, 0, kLast, 0, 1, 0, 0, 0, 1}};
+  for (const Homography &h : turned) {
+    std::vector<Image<std::uint8_t>> seen;
+    for (const auto &frame : frames)
+      seen.push_back (draw<std::uint8_t> (kSide, kSide, [&] (int x, int y) {
+        return frame.at (
+            int (h[0] * x + h[1] * y + h[2]), int (h[3] * x + h[4] * y + h[5]));
+      }));
+    EXPECT_EQ (parts (seen, mapping (h)), wanted);
+    EXPECT_NE (parts (seen), wanted);
+  }
 }
 
 } // namespace

@@ -30,11 +30,11 @@ class FuseMapping : public ::testing::Test
 protected:
   ~FuseMapping () override { std::filesystem::remove (path); }
 
-  /** Texture that stands still below, and moves above. */
-  static Image<std::uint8_t> scene (int slot)
+  /** Texture that stands still below, and moves above; @p time in frames. */
+  static Image<std::uint8_t> scene (double time)
   {
     return draw<std::uint8_t> (kWidth, kHeight, [=] (int x, int y) {
-      const double at = x - (y < kHeight / 2 ? 0.7 * slot : 0.0);
+      const double at = x - (y < kHeight / 2 ? 2.8 * time : 0.0);
       return int (
           120 + 50 * std::sin (0.5 * at + 0.3 * y) + 30 * std::sin (0.8 * y));
     });
@@ -51,7 +51,7 @@ protected:
   }
   std::string mapped (Extent mirrors = {kWidth, kHeight})
   {
-    return "schedule=" + kSchedule.text () +
+    return "schedule=" + schedule.text () +
            " mapping=" + save (mapping (mirrors).to_json ());
   }
   std::string save (const std::string &text)
@@ -90,9 +90,9 @@ protected:
     options.read_noise = 5;
     auto bench = OpticalBench::make (kWidth, kHeight, options);
     for (int number = 0; number < kFrames; number++) {
-      bench->begin (kSchedule);
-      for (int slot = 0; slot < 4; slot++) {
-        const auto light = scene (4 * number + slot);
+      bench->begin (schedule);
+      for (int slot = 0; slot < schedule.slots (); slot++) {
+        const auto light = scene (number + double (slot) / schedule.slots ());
         bench->expose (light.view (), slot, 1.0);
       }
       Image<std::uint8_t> coded (kWidth, kHeight);
@@ -112,10 +112,10 @@ protected:
         sizeof (Pixel) == 1 ? "GRAY8" : "GRAY16_LE");
     expose<Pixel> (alignment);
     const auto images = pull_images<Pixel> ();
-    EXPECT_EQ (images.size (), std::size_t (4 * kFrames));
+    EXPECT_EQ (images.size (), std::size_t (schedule.slots () * kFrames));
     double squares = 0.0, count = 0.0;
     for (std::size_t k = 0; k < images.size (); k++) {
-      const auto truth = scene (int (k));
+      const auto truth = scene (double (k) / schedule.slots ());
       for (int y = 8; y < kHeight - 8; y++)
         for (int x = 8; x < kWidth - 8; x++) {
           const double seen =
@@ -127,6 +127,7 @@ protected:
     return 10.0 * std::log10 (255.0 * 255.0 * count / squares);
   }
 
+  Schedule schedule = kSchedule;
   std::unique_ptr<ElementHarness> fuse;
   std::filesystem::path path =
       std::filesystem::temp_directory_path () /
@@ -137,11 +138,23 @@ protected:
 
 TEST_F (FuseMapping, PutsAMisalignedBenchRight)
 {
-  const std::string schedule = "schedule=" + kSchedule.text ();
-  const double aligned = psnr (schedule, {});
+  const std::string unmapped = "schedule=" + schedule.text ();
+  const double aligned = psnr (unmapped, {});
   EXPECT_GT (psnr (mapped (), kAskew), aligned - 0.3);
-  EXPECT_LT (psnr (schedule, kAskew), aligned - 3.0);
+  EXPECT_LT (psnr (unmapped, kAskew), aligned - 3.0);
   EXPECT_GT (psnr<std::uint16_t> (mapped (), kAskew), aligned - 0.3);
+}
+
+TEST_F (FuseMapping, PutsRegionsRight)
+{
+  schedule =
+      *Schedule::from_preset ("sequential:2x2,"
+                              "region=36x27+13+9:staircase:3x3,"
+                              "region=32x32+53+26:sequential:lattice:4/2");
+  const std::string unmapped = "schedule=" + schedule.text ();
+  const double aligned = psnr (unmapped, {});
+  EXPECT_GT (psnr (mapped (), kAskew), aligned - 0.3);
+  EXPECT_LT (psnr (unmapped, kAskew), aligned - 3.0);
 }
 
 TEST_F (FuseMapping, ComesWithTheTag)

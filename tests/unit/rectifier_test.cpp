@@ -138,6 +138,36 @@ TEST (Rectifier, SeparatesWhatPixelsMix)
   }
 }
 
+/* Next to another part, too. */
+TEST (Rectifier, KnowsTheMasksOfEveryRegion)
+{
+  const Schedule schedule = schedule_of (
+      "sequential:2x2,region=27x18+8+9:staircase:3x3,region=32x24+52+26:"
+      "sequential:lattice:8/3");
+  const Alignment alignment = {0.4, 0.4, 0.5, 1.01};
+  const auto rectifier = made (mapping_of (alignment), schedule);
+  const auto aligned = coded ({}, schedule);
+  const auto seen = coded (alignment, schedule);
+  const auto mirrors = rectified (rectifier, seen);
+  const auto at_borders = [&] (const Image<std::uint8_t> &frame) {
+    double squares = 0.0, count = 0.0;
+    for (int y = 6; y < kSize.height - 6; y++)
+      for (int x = 6; x < kSize.width - 6; x++) {
+        const int part = schedule.region_at (x, y);
+        if (schedule.region_at (x - 2, y) == part &&
+            schedule.region_at (x + 2, y) == part &&
+            schedule.region_at (x, y - 2) == part &&
+            schedule.region_at (x, y + 2) == part)
+          continue;
+        squares += std::pow (double (frame.at (x, y)) - aligned.at (x, y), 2);
+        count += 1.0;
+      }
+    return std::sqrt (squares / count);
+  };
+  EXPECT_LT (rms (mirrors, aligned, 6), rms (seen, aligned, 6) / 4);
+  EXPECT_LT (at_borders (mirrors), at_borders (seen) / 4);
+}
+
 TEST (Rectifier, TakesBackTheBlur)
 {
   const Schedule schedule = schedule_of ("sequential:2x2");
@@ -254,6 +284,11 @@ TEST (Rectifier, RowsAreThoseOfTheWhole)
 
 TEST (Rectifier, RefusesWhatItCannotDo)
 {
+  const auto outside = Rectifier::make (mapping_of ({}),
+      schedule_of ("sequential:2x2,region=8x8+90+0:sequential:4x2"));
+  ASSERT_FALSE (outside.ok ());
+  EXPECT_NE (
+      outside.error ().message.find ("region 0, 8x8+90+0"), std::string::npos);
   const Schedule schedule;
   const auto far = Rectifier::make (mapping_of ({5000, 0, 0, 1}), schedule);
   ASSERT_FALSE (far.ok ());

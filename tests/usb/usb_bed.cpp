@@ -5,11 +5,13 @@
 #include <sys/ioctl.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
 #include <chrono>
 #include <cstddef>
 #include <cstdio>
 #include <cstring>
+#include <future>
 #include <mutex>
 #include <thread>
 #include <utility>
@@ -62,6 +64,49 @@ private:
   UMockdevIoctlData *data_ = nullptr;
 };
 
+struct Unref {
+  void operator() (gpointer object) const { g_object_unref (object); }
+};
+using ClientRef = std::unique_ptr<UMockdevIoctlClient, Unref>;
+
+ClientRef
+ref (UMockdevIoctlClient *client)
+{
+  return ClientRef (UMOCKDEV_IOCTL_CLIENT (g_object_ref (client)));
+}
+
+/** A process that has the node open, for as long as it has. */
+class Owner
+{
+public:
+  explicit Owner (UMockdevIoctlClient *client)
+  {
+    g_weak_ref_init (&client_, client);
+  }
+  ~Owner () { g_weak_ref_clear (&client_); }
+  Owner (const Owner &) = delete;
+  Owner &operator= (const Owner &) = delete;
+
+  bool is (const UMockdevIoctlClient *client)
+  {
+    return get ().get () == client;
+  }
+  bool gone () { return !get (); }
+
+private:
+  ClientRef get ()
+  {
+    auto *const client =
+        static_cast<UMockdevIoctlClient *> (g_weak_ref_get (&client_));
+    ClientRef held (client);
+    return client != nullptr && umockdev_ioctl_client_get_connected (client)
+               ? std::move (held)
+               : nullptr;
+  }
+
+  GWeakRef client_;
+};
+
 std::vector<std::uint8_t>
 descriptors (std::uint16_t product)
 {
@@ -88,12 +133,12 @@ public:
   {
     g_signal_connect_after (
         handler_, "handle-ioctl", G_CALLBACK (on_ioctl), this);
-    g_signal_connect (
-        handler_, "client-vanished", G_CALLBACK (on_vanished), this);
   }
   ~UsbPort ()
   {
     g_signal_handlers_disconnect_by_data (handler_, this);
+    if (GMainContext *const context = context_; context != nullptr)
+      g_main_context_unref (context);
     g_object_unref (handler_);
   }
 
@@ -122,8 +167,26 @@ public:
   }
   bool idle () const
   {
-    const std::unique_lock guard (lock_, std::try_to_lock);
-    return guard.owns_lock ();
+    // What comes last on the bed's thread runs when nobody has asked for
+    // anything that is not answered.
+    const auto answered = std::make_shared<std::promise<void>> ();
+    using Held = std::shared_ptr<std::promise<void>>;
+    GSource *const last = g_idle_source_new ();
+    g_source_set_priority (last, G_PRIORITY_LOW);
+    g_source_set_callback (
+        last,
+        [] (gpointer held) -> gboolean {
+          (*static_cast<Held *> (held))->set_value ();
+          return G_SOURCE_REMOVE;
+        },
+        new Held (answered),
+        [] (gpointer held) { delete static_cast<Held *> (held); });
+    g_source_attach (last, context_);
+    constexpr auto kPatience = std::chrono::milliseconds (100);
+    const auto seen = answered->get_future ().wait_for (kPatience);
+    g_source_destroy (last);
+    g_source_unref (last);
+    return seen == std::future_status::ready;
   }
   void occupy ()
   {
@@ -133,22 +196,17 @@ public:
 
 private:
   struct Urb {
+    std::unique_ptr<Owner> owner;
     Reference urb, buffer;
     gulong address = 0;
-    const UMockdevIoctlClient *client = nullptr;
     usbdevfs_urb *get () const { return urb.as<usbdevfs_urb> (); }
   };
-
-  struct Unref {
-    void operator() (gpointer object) const { g_object_unref (object); }
-  };
-  using ClientRef = std::unique_ptr<UMockdevIoctlClient, Unref>;
 
   static gboolean on_ioctl (
       UMockdevIoctlBase *, UMockdevIoctlClient *client, gpointer self)
   {
     /* A process may be killed in the middle of it. */
-    const ClientRef held (UMOCKDEV_IOCTL_CLIENT (g_object_ref (client)));
+    const ClientRef held = ref (client);
     int error = 0;
     const int result = static_cast<UsbPort *> (self)->handle (client, error);
     // To poll (), a node in software is always ready: whoever waits for
@@ -160,19 +218,6 @@ private:
     return TRUE;
   }
 
-  /** What a process had under way goes with it; the next one may be found at
-   * the same address. */
-  static void on_vanished (
-      UMockdevIoctlBase *, UMockdevIoctlClient *client, gpointer self)
-  {
-    auto *const port = static_cast<UsbPort *> (self);
-    const std::lock_guard guard (port->lock_);
-    const auto of_it = [client] (
-                           const Urb &urb) { return urb.client == client; };
-    std::erase_if (port->waiting_, of_it);
-    std::erase_if (port->done_, of_it);
-  }
-
   int fail (int &error, int code)
   {
     error = code;
@@ -182,6 +227,9 @@ private:
   int handle (UMockdevIoctlClient *client, int &error)
   {
     const std::lock_guard guard (lock_);
+    if (context_ == nullptr)
+      context_ = g_main_context_ref_thread_default ();
+    drop_orphans ();
     const auto request =
         std::uint32_t (umockdev_ioctl_client_get_request (client));
     const auto argument = [client] {
@@ -257,7 +305,7 @@ private:
       UMockdevIoctlClient *client, UMockdevIoctlData *argument, int &error)
   {
     Urb urb;
-    urb.client = client;
+    urb.owner = std::make_unique<Owner> (client);
     urb.urb = Reference (umockdev_ioctl_data_resolve (
         argument, 0, sizeof (usbdevfs_urb), nullptr));
     if (!urb.urb.get ())
@@ -334,7 +382,7 @@ private:
       UMockdevIoctlClient *client, UMockdevIoctlData *argument, int &error)
   {
     const auto found = std::find_if (done_.begin (), done_.end (),
-        [client] (const Urb &urb) { return urb.client == client; });
+        [client] (const Urb &urb) { return urb.owner->is (client); });
     if (found == done_.end ())
       return fail (error, board_->gone () ? ENODEV : EAGAIN);
     const Urb urb = std::move (*found);
@@ -360,6 +408,14 @@ private:
     return fail (error, EINVAL);
   }
 
+  /** What a process had under way goes with it. */
+  void drop_orphans ()
+  {
+    const auto orphaned = [] (const Urb &urb) { return urb.owner->gone (); };
+    std::erase_if (waiting_, orphaned);
+    std::erase_if (done_, orphaned);
+  }
+
   void drop_all (int status)
   {
     for (Urb &urb : waiting_)
@@ -371,6 +427,7 @@ private:
   const std::string serial_;
   const std::shared_ptr<EmulatedHid> board_;
   UMockdevIoctlBase *const handler_;
+  std::atomic<GMainContext *> context_ = nullptr; // of the bed's thread
   mutable std::mutex lock_; // covers everything below, and the board
   bool bound_ = true;
   bool occupied_ = false;

@@ -48,7 +48,9 @@ public:
   void occupy (const std::string &port);
   /** Whether the board at @p port shows masks; also while somebody uses it. */
   bool running (const std::string &port) const;
-  /** Whether no process is in the middle of a message to the board. */
+  /** Whether no process waits for the board: it has been asked for something
+   * before, and all that it was asked for is answered. True stays true while
+   * those who use it are stopped. */
   bool idle (const std::string &port) const;
 
 private:

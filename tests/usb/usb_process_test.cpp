@@ -9,7 +9,10 @@
 
 #include <chrono>
 #include <cstdlib>
+#include <fstream>
+#include <string>
 #include <thread>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -25,6 +28,12 @@ namespace
 constexpr std::uint16_t kDlpc350 = 0x6401, kDlpc900 = 0xC900;
 constexpr int kDlp5500 = 5;
 constexpr const char *kPort = "1-2";
+
+using namespace std::chrono_literals;
+using std::chrono::steady_clock;
+
+/** How long whatever has to come may take; then something hangs. */
+constexpr auto kPatience = 30s;
 
 /** A process that sees the bus of this one. */
 class Process
@@ -54,19 +63,20 @@ public:
    * @return as waitpid () has it. */
   int end_between_messages (const UsbBed &bed, int signal)
   {
-    using namespace std::chrono_literals;
-    for (int attempt = 0; attempt < 1000; attempt++) {
+    const auto deadline = steady_clock::now () + kPatience;
+    bool between = false;
+    while (!between && steady_clock::now () < deadline) {
       kill (id_, SIGSTOP);
-      int calm = 0;
-      while (calm < 20 && bed.idle (kPort)) {
+      int status = 0;
+      waitpid (id_, &status, WUNTRACED);
+      EXPECT_TRUE (WIFSTOPPED (status)) << "it ended by itself";
+      between = bed.idle (kPort);
+      if (!between) {
+        kill (id_, SIGCONT);
         std::this_thread::sleep_for (1ms);
-        calm++;
       }
-      if (calm == 20)
-        break;
-      kill (id_, SIGCONT);
-      std::this_thread::sleep_for (1ms);
     }
+    EXPECT_TRUE (between) << "it never was between two messages";
     kill (id_, signal);
     kill (id_, SIGCONT);
     return end_by (signal);
@@ -103,8 +113,24 @@ protected:
   /** Nobody uses the bus any more when it goes. */
   void TearDown () override
   {
-    while (waitpid (-1, nullptr, 0) > 0)
-      ;
+    const auto deadline = steady_clock::now () + kPatience;
+    pid_t ended = 0;
+    while ((ended = waitpid (-1, nullptr, WNOHANG)) >= 0)
+      if (ended == 0 && steady_clock::now () < deadline)
+        std::this_thread::sleep_for (1ms);
+      else if (ended == 0)
+        kill_children ();
+  }
+
+  static void kill_children ()
+  {
+    std::ifstream children (
+        "/proc/self/task/" + std::to_string (getpid ()) + "/children");
+    for (pid_t child = 0; children >> child;) {
+      ADD_FAILURE () << "process " << child << " does not end";
+      kill (child, SIGKILL);
+      waitpid (child, nullptr, 0);
+    }
   }
 
   std::string device () const
@@ -122,11 +148,10 @@ protected:
   {
     return {TOOL, "--quiet", "dmd", "start", device (), "sequential:4x1"};
   }
-  /** Whether the board gets there within half a minute. */
+  /** Whether the board gets there. */
   bool comes_to_be (bool running) const
   {
-    using namespace std::chrono;
-    const auto deadline = steady_clock::now () + 30s;
+    const auto deadline = steady_clock::now () + kPatience;
     while (bed.running (kPort) != running && steady_clock::now () < deadline)
       std::this_thread::sleep_for (1ms);
     return bed.running (kPort) == running;

@@ -146,8 +146,8 @@ raised_output (const Job &job, const Part &part)
   return found == job.outputs->regions.end () ? nullptr : found->second.get ();
 }
 
-/* Finds where every subframe of @part has to go; says so where one is left
- * out. */
+/* Finds where every subframe of @part has to go, but for those that are outside
+ * of the segment; says so where one is late, and left out. */
 Work
 find_targets (GstCodedExposureDemux *self, const Job &job, const Part &part,
     GstFlowReturn &flow)
@@ -158,6 +158,8 @@ find_targets (GstCodedExposureDemux *self, const Job &job, const Part &part,
   const auto aim = [&] (Output &output, std::size_t k, GstClockTime duration,
                        Output *&target) {
     const GstClockTime pts = job.pts + bounds[k];
+    if (!is_within (state (self).stream.segment, pts, duration))
+      return;
     if (is_late (self, output, pts, duration))
       skip (self, output, pts, duration);
     else
@@ -481,16 +483,19 @@ GstFlowReturn
 chain (GstPad *pad, GstObject *parent, GstBuffer *inbuf) noexcept
 {
   auto *self = GST_CODED_EXPOSURE_DEMUX (parent);
-  const BufferPtr frame (inbuf);
+  Stream &stream = state (self).stream;
+  BufferPtr frame (inbuf);
   GST_LOG_OBJECT (pad, "[IN] %" GST_PTR_FORMAT, inbuf);
-  GstFlowReturn flow =
-      check_stamp (GST_ELEMENT (self), state (self).stream, inbuf);
+  GstFlowReturn flow = check_stamp (GST_ELEMENT (self), stream, inbuf);
   if (flow == GST_FLOW_OK)
     flow = negotiate (self, inbuf);
-  if (flow != GST_FLOW_OK)
+  if (flow == GST_FLOW_OK)
+    frame = uncut (GST_ELEMENT (self), stream, std::move (frame),
+        stream.plan->period ());
+  if (flow != GST_FLOW_OK || !frame)
     return flow;
 
-  Job job = take_in (self, inbuf);
+  Job job = take_in (self, frame.get ());
   if (!check_pads (self, *job.outputs))
     return GST_FLOW_NOT_NEGOTIATED;
   flow = push_coded (self, job);

@@ -162,6 +162,11 @@ push_oldest (GstCodedExposureFuse *self)
   const int n = int (buffers.size ());
   for (int i = 0; i < n && flow == GST_FLOW_OK; i++) {
     const int k = st.stream.segment.rate < 0 ? n - 1 - i : i;
+    if (!is_within (st.stream.segment,
+            GST_BUFFER_PTS (coded.description.get ()) +
+                st.stream.plan->boundary (k),
+            st.stream.plan->boundary (k + 1) - st.stream.plan->boundary (k)))
+      continue;
     BufferPtr &outbuf = buffers[std::size_t (k)];
     describe (self, coded, k, outbuf.get ());
     GST_LOG_OBJECT (st.srcpad, "[OUT] %" GST_PTR_FORMAT, outbuf.get ());
@@ -199,13 +204,19 @@ GstFlowReturn
 chain (GstPad *pad, GstObject *parent, GstBuffer *inbuf) noexcept
 {
   auto *self = GST_CODED_EXPOSURE_FUSE (parent);
-  const BufferPtr frame (inbuf);
+  BufferPtr frame (inbuf);
   Stream &stream = state (self).stream;
   GST_LOG_OBJECT (pad, "[IN] %" GST_PTR_FORMAT, inbuf);
   FrameMeta meta;
   GstFlowReturn flow = check_stamp (GST_ELEMENT (self), stream, inbuf);
   if (flow == GST_FLOW_OK)
     flow = negotiate (self, inbuf);
+  if (flow == GST_FLOW_OK)
+    frame = uncut (
+        GST_ELEMENT (self), stream, std::move (frame), stream.plan->period ());
+  inbuf = frame.get ();
+  if (!inbuf)
+    return flow;
   if (flow == GST_FLOW_OK)
     flow = take_in (self, inbuf, meta);
   if (flow == GST_FLOW_OK)

@@ -89,6 +89,16 @@ struct CodedStream {
   bool backwards () const { return segment.rate < 0; }
 };
 
+/** Whether what is shown from @p pts on for @p duration was asked for: a seek
+ * may begin or end within a coded frame. */
+inline bool
+is_within (const GstSegment &segment, GstClockTime pts, GstClockTime duration)
+{
+  guint64 from, to;
+  return gst_segment_clip (
+      &segment, GST_FORMAT_TIME, pts, pts + duration, &from, &to);
+}
+
 /** Shows on the bus why the coded frames cannot be used. */
 void refuse (GstElement *element, const std::string &why);
 
@@ -213,6 +223,12 @@ private:
 /** GST_FLOW_OK where @p frame stands in time; else an error is on the bus. */
 GstFlowReturn check_stamp (
     GstElement *element, const CodedStream &stream, GstBuffer *frame);
+/** Decoders cut from the first frame of a segment what lies before it, in time
+ * only: its PTS is then that of the segment, its DURATION what is left of
+ * @p period. @p frame with the times that it had; null, with a warning, where
+ * it is cut at both ends and its start cannot be known. */
+BufferPtr uncut (GstElement *element, const CodedStream &stream,
+    BufferPtr frame, GstClockTime period);
 /** A frame that came in. */
 struct Admitted {
   /** The meta that came with it, else by our own count. */

@@ -86,6 +86,33 @@ check_stamp (GstElement *element, const CodedStream &stream, GstBuffer *frame)
   return GST_FLOW_ERROR;
 }
 
+BufferPtr
+uncut (GstElement *element, const CodedStream &stream, BufferPtr frame,
+    GstClockTime period)
+{
+  /* Recordings round to a microsecond. */
+  constexpr GstClockTime kRounding = 10 * GST_USECOND;
+  const GstSegment &segment = stream.segment;
+  const GstClockTime pts = GST_BUFFER_PTS (frame.get ());
+  const GstClockTime duration = GST_BUFFER_DURATION (frame.get ());
+  if (pts != segment.start || !GST_CLOCK_TIME_IS_VALID (duration) ||
+      duration + kRounding >= period || pts + duration < period)
+    return frame;
+  if (pts + duration == segment.stop) {
+    GST_ELEMENT_WARNING (element, STREAM, FORMAT,
+        ("From %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT
+         " is the inside of one coded frame, whose start is not known: there "
+         "is no picture of it. Seek to a stretch that begins or ends outside.",
+            GST_TIME_ARGS (segment.start), GST_TIME_ARGS (segment.stop)),
+        (nullptr));
+    return nullptr;
+  }
+  BufferPtr whole (gst_buffer_make_writable (frame.release ()));
+  GST_BUFFER_PTS (whole.get ()) = pts + duration - period;
+  GST_BUFFER_DURATION (whole.get ()) = period;
+  return whole;
+}
+
 Admitted
 admit (GstElement *element, CodedStream &stream, CodedCounters &counters,
     GstBuffer *frame, GstClockTime period)

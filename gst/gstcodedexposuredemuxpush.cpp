@@ -309,6 +309,7 @@ describe_subframe (GstCodedExposureDemux *self, const Job &job,
 
   FrameMeta meta = job.meta;
   meta.subframe = gint (k);
+  meta.bits = state (self).stream.bits_in_force ();
   meta.exposure_start = job.pts + part.windows[k].start;
   meta.exposure_duration = part.windows[k].duration;
   set_frame_meta (outbuf, meta);
@@ -490,8 +491,8 @@ chain (GstPad *pad, GstObject *parent, GstBuffer *inbuf) noexcept
   if (flow == GST_FLOW_OK)
     flow = negotiate (self, inbuf);
   if (flow == GST_FLOW_OK)
-    frame = uncut (GST_ELEMENT (self), stream, std::move (frame),
-        stream.plan->period ());
+    frame = uncut (
+        GST_ELEMENT (self), stream, std::move (frame), stream.plan->period ());
   if (flow != GST_FLOW_OK || !frame)
     return flow;
 

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <utility>
 
+#include "gstcodedexposuremeta.h"
 #include "gstcodedexposuresimstate.h"
 #include "gstcodedexposuretag.h"
 
@@ -191,6 +192,7 @@ begin_exposure (GstCodedExposureSim *self, GstBuffer *inbuf)
   Exposure exposure;
   exposure.start = GST_BUFFER_PTS (inbuf);
   exposure.frame = next_frame (stream, exposure.start);
+  exposure.lost_before = exposure.frame - stream.last_frame - 1;
   /* The output buffer takes flags and metas of the first input frame. */
   auto *trans = GST_BASE_TRANSFORM (self);
   GstBuffer *outbuf = nullptr;
@@ -270,6 +272,20 @@ read_out (GstCodedExposureSim *self, const Exposure &exposure)
   return GST_FLOW_OK;
 }
 
+/* What a camera of fewer bits than its pixels could hold says of its frames. */
+void
+describe (const Stream &stream, const Exposure &exposure)
+{
+  if (stream.optics.bits == 0)
+    return;
+  FrameMeta meta;
+  meta.frame = guint64 (exposure.frame);
+  meta.lost_before = guint64 (exposure.lost_before);
+  meta.locked = !stream.mirrors;
+  meta.bits = stream.optics.bits;
+  set_frame_meta (exposure.outbuf.get (), meta);
+}
+
 GstBuffer *
 stamp (GstCodedExposureSim *self, Exposure exposure)
 {
@@ -278,7 +294,9 @@ stamp (GstCodedExposureSim *self, Exposure exposure)
     const ObjectLock lock (self);
     number = state (self).counters.frames_out++;
   }
-  const GstVideoInfo &info = state (self).stream.plan->out;
+  const Stream &stream = state (self).stream;
+  const GstVideoInfo &info = stream.plan->out;
+  describe (stream, exposure);
   GstBuffer *outbuf = exposure.outbuf.release ();
   GST_BUFFER_PTS (outbuf) = exposure.start;
   GST_BUFFER_DTS (outbuf) = GST_CLOCK_TIME_NONE;

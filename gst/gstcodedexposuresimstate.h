@@ -51,6 +51,7 @@ struct Exposure {
   BufferPtr outbuf;
   GstClockTime start = GST_CLOCK_TIME_NONE; ///< PTS of the first input frame
   std::int64_t frame = 0;
+  std::int64_t lost_before = 0; ///< frames that had no light
   std::vector<int> masks; ///< of each slot; negative: the DMD is parked
   int taken = 0;          ///< input frames
 };

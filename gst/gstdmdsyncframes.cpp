@@ -79,6 +79,8 @@ stamp (GstDmdSync *self, GstBuffer *buffer, FrameMeta meta)
     GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DISCONT);
   if (stream.format)
     meta.bits = significant_bits (*stream.format);
+  else if (const auto said = get_frame_meta (buffer))
+    meta.bits = said->bits;
   set_frame_meta (buffer, meta);
 }
 

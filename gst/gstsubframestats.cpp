@@ -172,7 +172,7 @@ gst_subframe_stats_stop (GstBaseTransform *base)
 
 template <typename Pixel>
 static bool
-make_meter (GstSubframeStats *self)
+make_meter_of (GstSubframeStats *self)
 {
   StatsState &state = *self->state;
   auto made = cexp::StatsMeter<Pixel>::make (
@@ -188,6 +188,14 @@ make_meter (GstSubframeStats *self)
   return true;
 }
 
+static bool
+make_meter (GstSubframeStats *self)
+{
+  return GST_VIDEO_INFO_FORMAT (&self->state->info) == GST_VIDEO_FORMAT_GRAY8
+             ? make_meter_of<guint8> (self)
+             : make_meter_of<guint16> (self);
+}
+
 static gboolean
 gst_subframe_stats_set_caps (GstBaseTransform *base, GstCaps *caps, GstCaps *)
 {
@@ -195,9 +203,19 @@ gst_subframe_stats_set_caps (GstBaseTransform *base, GstCaps *caps, GstCaps *)
   StatsState &state = *self->state;
   if (!gst_video_info_from_caps (&state.info, caps))
     return FALSE;
-  return GST_VIDEO_INFO_FORMAT (&state.info) == GST_VIDEO_FORMAT_GRAY8
-             ? make_meter<guint8> (self)
-             : make_meter<guint16> (self);
+  return make_meter (self);
+}
+
+/* Pictures say how many of their bits count, where the user does not. */
+static bool
+follow_bits (GstSubframeStats *self, GstBuffer *frame)
+{
+  StatsState &state = *self->state;
+  const auto meta = get_frame_meta (frame);
+  if (state.in_force.bits > 0 || !meta || meta->bits == state.options.bits)
+    return true;
+  state.options.bits = meta->bits;
+  return make_meter (self);
 }
 
 /* The statistics of @frame; null where its pixels cannot be read. */
@@ -273,6 +291,8 @@ gst_subframe_stats_generate_output (GstBaseTransform *base, GstBuffer **outbuf)
       gst_buffer_make_writable (std::exchange (base->queued_buf, nullptr)));
   if (std::holds_alternative<std::monostate> (self->state->meter))
     return GST_FLOW_NOT_NEGOTIATED;
+  if (!follow_bits (self, frame.get ()))
+    return GST_FLOW_ERROR;
   const GstFlowReturn flow = describe (self, frame.get ());
   if (flow == GST_FLOW_OK)
     *outbuf = frame.release ();
@@ -411,7 +431,7 @@ install_properties (GObjectClass *klass)
   g_object_class_install_property (klass, PROP_BITS,
       g_param_spec_int ("bits", "Significant Bits",
           "Significant bits of a pixel, whose largest value is saturation; 0: "
-          "all of the format's",
+          "what the pictures say, else all of their format",
           0, 16, defaults.bits, kReady));
   /**
    * GstSubframeStats:histogram-bins:

@@ -8,6 +8,7 @@
 #include "gstcodedexposuremeta.h"
 #include "gstcodedexposurescene.h"
 #include "gstcodedexposuresim.h"
+#include "gstcodedexposureview.h"
 #include "gstdmdsync.h"
 #include "gstmoirecalib.h"
 #include "gstsubframestats.h"
@@ -23,6 +24,7 @@ plugin_init (GstPlugin *plugin)
          GST_ELEMENT_REGISTER (codedexposure_log, plugin) &&
          GST_ELEMENT_REGISTER (codedexposure_scene, plugin) &&
          GST_ELEMENT_REGISTER (codedexposure_sim, plugin) &&
+         GST_ELEMENT_REGISTER (codedexposure_view, plugin) &&
          GST_ELEMENT_REGISTER (dmdsync, plugin) &&
          GST_ELEMENT_REGISTER (moirecalib, plugin) &&
          GST_ELEMENT_REGISTER (subframestats, plugin);

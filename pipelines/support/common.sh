@@ -403,13 +403,29 @@ lossless_video ()
     "$(quoted "$1")"
 }
 
-# Frames to a file by its ending: FFV1, H.264, or a folder of PNG.
+# What fills a part of the pixels' 16 bits stays in it.
+bits_of_sidecar ()
+{
+  local sidecar
+  sidecar=$(sidecar_of "$1")
+  [ ! -r "$sidecar" ] || sed -nE 's/.*"bits":([0-9]+).*/\1/p;10q' "$sidecar" | head -n 1
+}
+
+# Frames as a person sees them, whatever their bits.
+to_look_at ()
+{
+  printf 'codedexposure-view %s! ' "$(properties bits)"
+}
+
+# Frames to a file by its ending: FFV1, H.264, or a folder of PNG. PNG keeps all
+# numbers as they are, unless view is set.
 video_output ()
 {
   case $1 in
     *.mkv) lossless_video "$1" ;;
     *.mp4)
       # 4:2:0 with even sides is what every player and browser opens.
+      to_look_at
       printf 'videoconvert ! videoscale ! %s ! ' \
         'video/x-raw,format=I420,width=[2,65536,2],height=[2,65536,2]'
       printf 'x264enc pass=qual quantizer=18 speed-preset=veryfast ! '
@@ -418,7 +434,10 @@ video_output ()
     */ | *%*d*.png)
       local pattern=$1
       [[ $1 != */ ]] || pattern=$1%06d.png
-      printf 'videoconvert ! pngenc snapshot=false ! '
+      ! is_set view || to_look_at
+      # Left to itself, videoconvert makes colours of 8 bits of 16 grey ones.
+      printf 'videoconvert ! video/x-raw,format={GRAY8,GRAY16_BE} ! '
+      printf 'pngenc snapshot=false ! '
       printf 'multifilesink location=%s ' "$(quoted "$pattern")"
       ;;
     *)
@@ -452,7 +471,8 @@ display ()
 {
   local sink=${opt[sink]:-autovideosink}
   local latest='leaky=downstream max-size-bytes=0 max-size-time=0'
-  local exact='videoconvert ! video/x-raw,format=BGRx'
+  local exact
+  exact="$(to_look_at)videoconvert ! video/x-raw,format=BGRx"
   printf '%s ! queue name=fast %s max-size-buffers=%d ! %s ! view.sink_0 ' \
     "$1" "$latest" $((2 * slots)) "$exact"
   printf '%s ! queue name=beside %s max-size-buffers=2 ! %s ! view.sink_1 ' \

@@ -189,6 +189,29 @@ TEST (DemuxPipeline, TwoInOneProcessDoNotKnowOfEachOther)
   EXPECT_EQ (frames ("nine"), 4u);
 }
 
+TEST (DemuxPipeline, TwelveBitsAreKnownAllTheWay)
+{
+  Pipeline pipeline (
+      "videotestsrc num-buffers=8 pattern=white ! "
+      "video/x-raw,format=GRAY16_LE,width=16,height=16,framerate=100/1 ! "
+      "codedexposure-sim bits=12 gain=16 ! dmdsync ! codedexposure-demux "
+      "name=demux ! "
+      "subframestats name=stats post-messages=false ! "
+      "codedexposure-view name=view ! fakesink");
+  Watch<std::uint16_t> raw (pipeline.pad ("demux", "src"));
+  Watch<std::uint8_t> seen (pipeline.pad ("view", "src"));
+  ASSERT_EQ (pipeline.play (), "");
+  ASSERT_EQ (raw.images.size (), 8u);
+  ASSERT_EQ (seen.images.size (), 8u);
+  EXPECT_EQ (raw.images.back ().at (3, 5), 4095);
+  EXPECT_EQ (seen.images.back ().at (3, 5), 255);
+  const auto saturated = [&] (const char *name) {
+    return property<guint64> (pipeline[name].get (), "saturated-frames");
+  };
+  EXPECT_EQ (saturated ("demux"), 2u);
+  EXPECT_EQ (saturated ("stats"), 8u);
+}
+
 TEST (DemuxPipeline, SeekStartsANewStretchOfTime)
 {
   Pipeline pipeline (

@@ -1,0 +1,92 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* codedexposure-view: what pictures of any depth look like. */
+#include "gstcodedexposuremeta.h"
+#include "harness.h"
+
+namespace
+{
+
+using namespace cexp;
+using namespace cexp::gst;
+using namespace cexp::test;
+
+constexpr int kWidth = 7, kHeight = 3;
+
+std::string
+caps (const char *format)
+{
+  return gray_caps (kWidth, kHeight, "30000/1001", format);
+}
+
+/** What is shown of a picture with @p value everywhere. */
+template <typename Pixel>
+int
+shown (const std::string &settings, int value, int meta_bits)
+{
+  ElementHarness h ("codedexposure-view " + settings);
+  h.set_caps (caps (sizeof (Pixel) == 1 ? "GRAY8" : "GRAY16_LE"));
+  BufferPtr picture = frame_of (
+      draw<Pixel> (kWidth, kHeight, [value] (int, int) { return value; }),
+      GST_SECOND);
+  set_frame_meta (picture.get (), {.frame = 9, .bits = meta_bits});
+  EXPECT_EQ (h.push (std::move (picture)), GST_FLOW_OK);
+  const BufferPtr out = h.pull ();
+  EXPECT_TRUE (same_caps (h.pad_caps ().get (), caps ("GRAY8")));
+  EXPECT_EQ (GST_BUFFER_PTS (out.get ()), GST_SECOND);
+  EXPECT_EQ (get_frame_meta (out.get ())->frame, 9u);
+  const auto image = image_of<std::uint8_t> (out.get (), h.pad_caps ().get ());
+  for (int y = 0; y < kHeight; y++)
+    for (int x = 0; x < kWidth; x++)
+      EXPECT_EQ (image.at (x, y), image.at (0, 0));
+  return image.at (0, 0);
+}
+
+} // namespace
+
+TEST (View, WhiteIsTheLargestValueOfTheBitsThatCount)
+{
+  for (const int bits : {1, 2, 7, 8, 9, 10, 12, 14, 15, 16}) {
+    const int white = (1 << bits) - 1;
+    const std::string set = "bits=" + std::to_string (bits);
+    EXPECT_EQ (shown<std::uint16_t> (set, white, 0), 255) << bits;
+    EXPECT_EQ (shown<std::uint16_t> ("", white, bits), 255) << bits;
+    EXPECT_EQ (shown<std::uint16_t> ("", 0, bits), 0) << bits;
+    const int half = white / 2;
+    EXPECT_NEAR (
+        shown<std::uint16_t> ("", half, bits), 255.0 * half / white, 0.51)
+        << bits;
+  }
+  EXPECT_EQ (shown<std::uint16_t> ("", 65535, 0), 255);
+  EXPECT_EQ (shown<std::uint16_t> ("", 32768, 0), 128);
+}
+
+TEST (View, TheUserKnowsBetterThanThePicture)
+{
+  EXPECT_EQ (shown<std::uint16_t> ("bits=10", 1023, 12), 255);
+}
+
+TEST (View, WhatIsBrighterThanWhiteIsWhite)
+{
+  EXPECT_EQ (shown<std::uint16_t> ("bits=10", 65535, 0), 255);
+}
+
+TEST (View, EightBitsStayAndFewerAreStretched)
+{
+  for (const int value : {0, 1, 127, 255}) {
+    EXPECT_EQ (shown<std::uint8_t> ("", value, 0), value);
+    EXPECT_EQ (shown<std::uint8_t> ("", value, 12), value);
+    EXPECT_EQ (shown<std::uint8_t> ("bits=12", value, 0), value);
+  }
+  EXPECT_EQ (shown<std::uint8_t> ("bits=4", 15, 0), 255);
+}
+
+TEST (View, SaysThatItsPicturesHaveEightBits)
+{
+  ElementHarness h ("codedexposure-view");
+  h.set_caps (caps ("GRAY16_LE"));
+  BufferPtr picture = frame_of (
+      draw<std::uint16_t> (kWidth, kHeight, [] (int, int) { return 4095; }), 0);
+  set_frame_meta (picture.get (), {.bits = 12});
+  ASSERT_EQ (h.push (std::move (picture)), GST_FLOW_OK);
+  EXPECT_EQ (get_frame_meta (h.pull ().get ())->bits, 8);
+}

@@ -25,11 +25,13 @@
  */
 #include "gstcodedexposurelog.h"
 
+#include <algorithm>
 #include <optional>
 #include <string>
 
 #include <nlohmann/json.hpp>
 
+#include "extract/saturation.h"
 #include "gstcodedexposurecaps.h"
 #include "gstcodedexposurelines.h"
 #include "gstcodedexposuremeta.h"
@@ -52,6 +54,7 @@ struct LogState {
   /* Streaming thread, and start and stop, which exclude it: */
   LineFile file;
   guint64 frames = 0;
+  GstVideoInfo info = {};
   /* Written last. */
   std::optional<cexp::Schedule> schedule;
   std::optional<cexp::Mapping> mapping;
@@ -62,9 +65,34 @@ enum { PROP_0, PROP_LOCATION };
 constexpr auto kReadyFlags = GParamFlags (
     G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY);
 
+template <typename Pixel>
+guint64
+count_saturated_in (const LogState &state, MappedFrame &mapped, int bits)
+{
+  const auto all = view_of<const Pixel> (mapped);
+  const int pilot = state.schedule ? state.schedule->pilot_rows () : 0;
+  return cexp::count_saturated (
+      all.rows (0, std::max (0, all.height - pilot)), bits);
+}
+
+/** Pixels of a coded frame at the largest value; nobody has counted them yet.
+ * Those of a subframe's coded frame have been. */
+guint64
+saturated_pixels (
+    const LogState &state, GstBuffer *frame, const FrameMeta &meta)
+{
+  MappedFrame mapped (state.info, frame, GST_MAP_READ);
+  if (meta.subframe >= 0 || !mapped)
+    return meta.saturated;
+  const int depth = GST_VIDEO_INFO_COMP_DEPTH (&state.info, 0);
+  const int bits = std::min (meta.bits, depth);
+  return depth == 8 ? count_saturated_in<guint8> (state, mapped, bits)
+                    : count_saturated_in<guint16> (state, mapped, bits);
+}
+
 /** One line of JSON, keys in this order; unknown values are left out. */
 std::string
-frame_line (GstBuffer *frame, guint64 counted, const GstSegment &segment)
+frame_line (const LogState &state, GstBuffer *frame, const GstSegment &segment)
 {
   const auto meta = get_frame_meta (frame);
   const auto set_time = [&segment] (nlohmann::ordered_json &line,
@@ -76,7 +104,7 @@ frame_line (GstBuffer *frame, guint64 counted, const GstSegment &segment)
   };
 
   nlohmann::ordered_json line;
-  line["frame"] = meta ? meta->frame : counted;
+  line["frame"] = meta ? meta->frame : state.frames;
   set_time (line, "pts_ns", GST_BUFFER_PTS (frame));
   if (meta) {
     set_time (line, "exposure_start_ns", meta->exposure_start);
@@ -87,7 +115,7 @@ frame_line (GstBuffer *frame, guint64 counted, const GstSegment &segment)
     line["locked"] = bool (meta->locked);
     line["slip"] = meta->slip;
     line["lost_before"] = meta->lost_before;
-    line["saturated"] = meta->saturated;
+    line["saturated"] = saturated_pixels (state, frame, *meta);
     if (!meta->pattern.empty ())
       line["pattern"] = meta->pattern;
     if (meta->bits > 0)
@@ -116,9 +144,17 @@ static GstFlowReturn
 gst_coded_exposure_log_transform_ip (GstBaseTransform *base, GstBuffer *frame)
 {
   LogState &state = *GST_CODED_EXPOSURE_LOG (base)->state;
-  const std::string line = frame_line (frame, state.frames, base->segment);
+  const std::string line = frame_line (state, frame, base->segment);
   state.frames++;
   return state.file.write (line) ? GST_FLOW_OK : GST_FLOW_ERROR;
+}
+
+static gboolean
+gst_coded_exposure_log_set_caps (
+    GstBaseTransform *base, GstCaps *caps, GstCaps *)
+{
+  LogState &state = *GST_CODED_EXPOSURE_LOG (base)->state;
+  return gst_video_info_from_caps (&state.info, caps);
 }
 
 /* Tags repeat as they are merged on their way; what they say is written once.
@@ -268,6 +304,8 @@ gst_coded_exposure_log_class_init (GstCodedExposureLogClass *klass)
 
   transform_class->start = GST_DEBUG_FUNCPTR (gst_coded_exposure_log_start);
   transform_class->stop = GST_DEBUG_FUNCPTR (gst_coded_exposure_log_stop);
+  transform_class->set_caps =
+      GST_DEBUG_FUNCPTR (gst_coded_exposure_log_set_caps);
   transform_class->sink_event =
       GST_DEBUG_FUNCPTR (gst_coded_exposure_log_sink_event);
   transform_class->transform_ip =

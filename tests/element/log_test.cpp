@@ -105,6 +105,8 @@ TEST_F (LogTest, WritesWhatTheMetaSays)
 {
   play (path_.get ());
   BufferPtr buffer = frame (80 * GST_MSECOND);
+  gst_buffer_memset (buffer.get (), 0, 254, 64);
+  gst_buffer_memset (buffer.get (), 20, 255, 5);
   FrameMeta meta;
   meta.frame = 7;
   meta.exposure_start = 80 * GST_MSECOND;
@@ -112,8 +114,7 @@ TEST_F (LogTest, WritesWhatTheMetaSays)
   meta.locked = TRUE;
   meta.slip = -1;
   meta.lost_before = 2;
-  meta.saturated = 5;
-  meta.bits = 12;
+  meta.bits = 8;
   meta.time_uncertainty = 47'000;
   meta.pattern = "grating-both:4/0";
   set_frame_meta (buffer.get (), meta);
@@ -125,7 +126,7 @@ TEST_F (LogTest, WritesWhatTheMetaSays)
   EXPECT_EQ (lines ()[0], Json::parse (R"({"frame": 7, "pts_ns": 80000000,
       "exposure_start_ns": 80000000, "exposure_duration_ns": 39200000,
       "time_uncertainty_ns": 47000, "locked": true, "slip": -1,
-      "lost_before": 2, "saturated": 5, "bits": 12,
+      "lost_before": 2, "saturated": 5, "bits": 8,
       "pattern": "grating-both:4/0",
       "flags": ["discont", "corrupted"]})"));
 }

@@ -115,10 +115,15 @@ next_frame (const Stream &stream, GstClockTime start)
   return stream.last_frame + std::max<std::int64_t> (1, periods);
 }
 
+/* Mirrors that have moved belong to a dmdsync, which parks them now and then to
+ * change their masks. */
 void
-warn_of_parked_mirrors (GstCodedExposureSim *self)
+watch_mirrors (GstCodedExposureSim *self, const std::vector<int> &masks)
 {
-  if (std::exchange (state (self).stream.warned_parked, true))
+  Stream &stream = state (self).stream;
+  stream.mirrors_moved |= std::any_of (
+      masks.begin (), masks.end (), [] (int mask) { return mask >= 0; });
+  if (stream.mirrors_moved || std::exchange (stream.warned_parked, true))
     return;
   GST_ELEMENT_WARNING (self, RESOURCE, NOT_FOUND,
       ("The mirrors of the simulated DMD are parked: coded frames are dark "
@@ -140,8 +145,7 @@ find_masks (GstCodedExposureSim *self, std::int64_t frame)
                          ? stream.mirrors->mask_in_slot (counted).value_or (-1)
                          : int (counted % stream.schedule->masks ()));
   }
-  if (std::find (masks.begin (), masks.end (), -1) != masks.end ())
-    warn_of_parked_mirrors (self);
+  watch_mirrors (self, masks);
   return masks;
 }
 

@@ -70,6 +70,7 @@ struct Stream {
   std::int64_t last_frame = -1;
   bool discont = true; ///< the next coded frame does not follow the last one
   bool tag_due = true;
+  bool mirrors_moved = false;
   bool warned_parked = false;
   bool warned_dropped = false;
 };

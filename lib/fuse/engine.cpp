@@ -25,6 +25,11 @@ constexpr double kLeastNoise = 1e-3;
 constexpr SceneClass kStill{0.0, 0.0, 5.0, 1.5, 1.0};
 constexpr SceneClass kMoved{0.0, 0.0, 5.0, 1.5, 0.6};
 
+/* Mean squared error, in grey levels, that means nothing. */
+constexpr float kErrorFloor = 0.5f;
+/* Weight below which a model has no say. */
+constexpr float kLeastWeight = 0.01f;
+
 /* Of the taps: far enough to see every slot several times. */
 int
 tap_radius (int slots)
@@ -92,9 +97,8 @@ Engine::Engine (const Schedule &schedule, int width, int height,
       observation_ (schedule, options.noise, steps), phases_ (schedule),
       kernels_ (*find_kernels (options.target)),
       radius_ (tap_radius (schedule.slots ())),
-      predictions_ (phases_, disc (radius_ - 2), 2), if_still_ (width, height),
-      if_moved_ (width, height),
-      stillness_ (width, height, schedule.cell (), !observation_.noise_free ())
+      stillness_ (width, height, Stillness::radius_of (schedule.cell ()),
+          !observation_.noise_free ())
 {
   map_noise (schedule);
   find_margin (schedule);
@@ -172,36 +176,39 @@ Engine::prepare (const Schedule &schedule, const FuseOptions &options)
   for (int e = 0; e < slots (); e++)
     noise.push_back (std::max (
         observation_.variance (e, kTypicalLight) / scene, kLeastNoise));
-  const auto each_phase = [&] (const SceneClass &patch,
-                              std::span<const Offset> taps, auto use) {
-    const Covariance covariance (patch, observation_, 2 * radius_);
-    for (int row = 0; row < phases_.rows (); row++)
-      for (int x = 0; x < phases_.period (); x++)
-        use (row, x,
-            solve_phase (
-                covariance, observation_, phases_, row, x, taps, noise));
-  };
-  const std::vector<Offset> near = disc (radius_ - 2);
-  for (const int output : {0, 1})
-    each_phase (output == 0 ? kStill : kMoved, near,
-        [&] (int row, int x, const KrigingFilter &filter) {
-          predictions_.set (row, x, output, filter.residual);
-        });
-  if (options.quality != FuseQuality::kFast) {
-    const bool best = options.quality == FuseQuality::kBest;
-    motion_.emplace (phases_, observation_, motion_classes (), radius_, noise);
-    if (best)
-      likeness_.emplace (schedule, observation_, width_, height_);
-    light_.assign (std::size_t (slots ()), Field (width_, height_));
-    return;
+  std::vector<SceneClass> models;
+  if (options.quality == FuseQuality::kFast)
+    models = slots () > Fuser<std::uint8_t>::kMaxSlots
+                 ? std::vector{options.scene.plain}
+                 : std::vector{options.scene.creeping, options.scene.moving};
+  std::vector<SceneClass> predicted{kStill, kMoved};
+  if (models.size () > 1) {
+    predicted.insert (predicted.end (), models.begin (), models.end ());
+    creeping_ = Field (width_, height_);
   }
+  predictions_.emplace (phases_, observation_, predicted, radius_ - 2,
+      Stillness::radius_of (schedule.cell ()), Extent{width_, height_}, noise);
+  for (const SceneClass &model : models)
+    prepare_plain (model, noise);
+  if (!models.empty ())
+    return;
+  motion_.emplace (phases_, observation_, motion_classes (), radius_, noise);
+  if (options.quality == FuseQuality::kBest)
+    likeness_.emplace (schedule, observation_, width_, height_);
+  light_.assign (std::size_t (slots ()), Field (width_, height_));
+}
 
+void
+Engine::prepare_plain (const SceneClass &model, std::span<const double> noise)
+{
   const std::vector<Offset> taps = disc (radius_);
-  plain_.emplace (phases_, taps, slots ());
-  each_phase (options.scene.plain, taps,
-      [&] (int row, int x, const KrigingFilter &filter) {
-        plain_->set_all (row, x, filter.slots);
-      });
+  const Covariance covariance (model, observation_, 2 * radius_);
+  FilterBank &filters = plain_.emplace_back (phases_, taps, slots ());
+  for (int row = 0; row < phases_.rows (); row++)
+    for (int x = 0; x < phases_.period (); x++)
+      filters.set_all (row, x,
+          solve_phase (covariance, observation_, phases_, row, x, taps, noise)
+              .slots);
 }
 
 Field &
@@ -227,19 +234,35 @@ Engine::take ()
   queue_.push_back (std::exchange (spare_, Field ()));
 }
 
+/* And which model of fast fits around each pixel. */
 void
 Engine::find_stillness (const Field &coded)
 {
-  const std::vector<std::ptrdiff_t> offsets = predictions_.offsets (coded);
-  for (int y = 0; y < height_; y++) {
-    float *errors[] = {if_still_.row (y), if_moved_.row (y)};
-    kernels_.filter (predictions_.row (phases_, coded, y, offsets), errors);
-    for (float *error : errors)
-      for (int x = 0; x < width_; x++)
-        error[x] *= error[x];
+  predictions_->run (kernels_, coded, [&] (int y, const float *const *errors) {
+    stillness_.doubt (y, errors[0], errors[1]);
+    if (plain_.size () > 1)
+      choose (y, errors[2], errors[3]);
+  });
+  stillness_.take (
+      kernels_, coded, queue_.size () > 1 ? &queue_[1] : nullptr, noise_);
+}
+
+/* Weights as the inverse of the models' errors to the power of 8, which stands
+ * for the number of independent errors in a square. */
+void
+Engine::choose (int y, const float *creeping, const float *moving)
+{
+  const float side = float (2 * stillness_.radius () + 1);
+  const float floor = kErrorFloor * side * side;
+  float *if_creeping = creeping_.row (y);
+  for (int x = 0; x < width_; x++) {
+    const float ratio =
+        std::min ((creeping[x] + floor) / (moving[x] + floor), 1e3f);
+    const float fourth = ratio * ratio * ratio * ratio;
+    const float share = 1.0f / (1.0f + fourth * fourth);
+    if_creeping[x] = std::clamp (
+        (share - kLeastWeight) / (1.0f - 2.0f * kLeastWeight), 0.0f, 1.0f);
   }
-  stillness_.take (coded, queue_.size () > 1 ? &queue_[1] : nullptr, noise_,
-      if_still_, if_moved_);
 }
 
 /* Where the picture stands still it is the same in every slot. */
@@ -252,17 +275,44 @@ Engine::blend (int y, float *const *rows) const
       rows[s][x] += weight[x] * (light[x] - rows[s][x]);
 }
 
+/* shares[model] = how far row @y is to be what the model says; the rest is
+ * still. */
+void
+Engine::share_out (int y, Field &shares) const
+{
+  const float *still = stillness_.weight (y);
+  float *first = shares.row (0);
+  for (int x = 0; x < width_; x++)
+    first[x] = 1.0f - still[x];
+  if (plain_.size () == 1)
+    return;
+  const float *creeping = creeping_.row (y);
+  float *second = shares.row (1);
+  for (int x = 0; x < width_; x++) {
+    second[x] = first[x] * (1.0f - creeping[x]);
+    first[x] *= creeping[x];
+  }
+}
+
 void
 Engine::fuse_plainly (const Field &coded, const RowSink &sink)
 {
-  const std::vector<std::ptrdiff_t> offsets = plain_->offsets (coded);
+  const auto offsets = plain_[0].offsets (coded);
   Field rows_of_slots (width_, slots ());
+  Field shares (width_, int (plain_.size ()));
   std::vector<float *> rows;
   for (int s = 0; s < slots (); s++)
     rows.push_back (rows_of_slots.row (s));
   for (int y = 0; y < height_; y++) {
-    kernels_.filter (plain_->row (phases_, coded, y, offsets), rows.data ());
-    blend (y, rows.data ());
+    const float *weight = stillness_.weight (y), *light = stillness_.light (y);
+    for (int x = 0; x < width_; x++)
+      rows[0][x] = weight[x] * light[x];
+    for (std::size_t s = 1; s < rows.size (); s++)
+      std::copy_n (rows[0], width_, rows[s]);
+    share_out (y, shares);
+    for (std::size_t model = 0; model < plain_.size (); model++)
+      kernels_.filter_add (plain_[model].row (phases_, coded, y, offsets),
+          shares.row (int (model)), rows.data ());
     sink (y, rows.data ());
   }
 }
@@ -287,7 +337,7 @@ Engine::fuse (const RowSink &sink)
 {
   const Field &coded = queue_.front ();
   find_stillness (coded);
-  if (plain_)
+  if (!plain_.empty ())
     fuse_plainly (coded, sink);
   else
     fuse_motion (coded, sink);

@@ -14,6 +14,7 @@
 #include "fuse/fuser.h"
 #include "fuse/likeness.h"
 #include "fuse/motion.h"
+#include "fuse/predictions.h"
 #include "fuse/stillness.h"
 
 namespace cexp::fuse
@@ -51,7 +52,10 @@ private:
   void map_noise (const Schedule &schedule);
   void find_margin (const Schedule &schedule);
   void prepare (const Schedule &schedule, const FuseOptions &options);
+  void prepare_plain (const SceneClass &model, std::span<const double> noise);
   void find_stillness (const Field &coded);
+  void choose (int y, const float *creeping, const float *moving);
+  void share_out (int y, Field &shares) const;
   void blend (int y, float *const *rows) const;
   void fuse_plainly (const Field &coded, const RowSink &sink);
   void fuse_motion (const Field &coded, const RowSink &sink);
@@ -63,9 +67,9 @@ private:
   Phases phases_;
   const Kernels &kernels_;
   int radius_;
-  FilterBank predictions_;    ///< of a pixel by others: if still, if moved
-  Field if_still_, if_moved_; ///< their squared errors
-  std::optional<FilterBank> plain_; ///< fast: no motion
+  std::optional<Predictions> predictions_;
+  std::vector<FilterBank> plain_; ///< fast: of its one or two models
+  Field creeping_; ///< weight of the first of two, the second has the rest
   std::optional<Motion> motion_;
   std::optional<Likeness> likeness_;
   std::vector<Field> light_; ///< of each slot, unless fast

@@ -26,8 +26,9 @@ struct Add {
   }
 };
 
-/* Outputs first .. first + Outputs - 1 of Vectors neighbouring vectors. */
-template <int Outputs, int Vectors, typename Finish>
+/* Outputs first .. first + Outputs - 1 of Vectors neighbouring vectors; Alike:
+ * with the same weights. */
+template <int Outputs, int Vectors, bool Alike, typename Finish>
 CEXP_INLINE void
 filter_vectors (const fuse::FilterRow &row, int first, int x, Finish finish,
     float *const *outputs)
@@ -36,13 +37,17 @@ filter_vectors (const fuse::FilterRow &row, int first, int x, Finish finish,
   const float *weights[Vectors];
   for (int v = 0; v < Vectors; v++)
     weights[v] = row.weights + first * row.width +
-                 (row.phase + x + v * kFloats) % row.period;
+                 (row.phase + x + (Alike ? 0 : v * kFloats)) % row.period;
   for (int t = 0; t < row.taps; t++) {
     const float *from = row.source + x + row.offsets[t];
+    Floats weight[Outputs];
     for (int v = 0; v < Vectors; v++) {
       const Floats value = load (from + v * kFloats);
-      for (int k = 0; k < Outputs; k++)
-        sum[v][k] += load (weights[v] + k * row.width) * value;
+      for (int k = 0; k < Outputs; k++) {
+        if (!Alike || v == 0)
+          weight[k] = load (weights[v] + k * row.width);
+        sum[v][k] += weight[k] * value;
+      }
       weights[v] += row.outputs * row.width;
     }
   }
@@ -51,20 +56,32 @@ filter_vectors (const fuse::FilterRow &row, int first, int x, Finish finish,
       finish (outputs[first + k] + x + v * kFloats, x + v * kFloats, sum[v][k]);
 }
 
-/* A pair of vectors hides the latency of the sums where there are few. */
-template <int Outputs, typename Finish, typename Wanted>
+template <int Outputs, int Vectors, bool Alike, typename Finish,
+    typename Wanted>
+CEXP_INLINE void
+filter_along (const fuse::FilterRow &row, int first, Finish finish,
+    Wanted wanted, float *const *outputs)
+{
+  int x = 0;
+  for (; x + Vectors * kFloats <= row.count; x += Vectors * kFloats)
+    if (wanted (x, Vectors * kFloats))
+      filter_vectors<Outputs, Vectors, Alike> (row, first, x, finish, outputs);
+  for (; x < row.count; x += kFloats)
+    if (wanted (x, kFloats))
+      filter_vectors<Outputs, 1, Alike> (row, first, x, finish, outputs);
+}
+
+/* Where whole periods fill a vector, neighbouring vectors share their weights:
+ * as many as the registers hold sums of, as weights are read from further away
+ * than pixels. Elsewhere a pair hides the latency of the sums. */
+template <int Outputs, bool Alike, typename Finish, typename Wanted>
 CEXP_INLINE void
 filter_outputs (const fuse::FilterRow &row, int first, Finish finish,
     Wanted wanted, float *const *outputs)
 {
   constexpr int kPair = Outputs <= 4 ? 2 : 1;
-  int x = 0;
-  for (; x + kPair * kFloats <= row.count; x += kPair * kFloats)
-    if (wanted (x, kPair * kFloats))
-      filter_vectors<Outputs, kPair> (row, first, x, finish, outputs);
-  for (; x < row.count; x += kFloats)
-    if (wanted (x, kFloats))
-      filter_vectors<Outputs, 1> (row, first, x, finish, outputs);
+  constexpr int kVectors = Alike && kVectorBytes == 64 ? 4 : kPair;
+  filter_along<Outputs, kVectors, Alike> (row, first, finish, wanted, outputs);
 }
 
 template <typename Finish, typename Wanted>
@@ -72,13 +89,18 @@ CEXP_INLINE void
 filter_all (const fuse::FilterRow &row, Finish finish, Wanted wanted,
     float *const *outputs)
 {
+  const bool alike = kFloats % row.period == 0;
   int first = 0;
-  for (; first + 8 <= row.outputs; first += 8)
-    filter_outputs<8> (row, first, finish, wanted, outputs);
+  if (!alike)
+    for (; first + 8 <= row.outputs; first += 8)
+      filter_outputs<8, false> (row, first, finish, wanted, outputs);
   for (; first + 4 <= row.outputs; first += 4)
-    filter_outputs<4> (row, first, finish, wanted, outputs);
+    if (alike)
+      filter_outputs<4, true> (row, first, finish, wanted, outputs);
+    else
+      filter_outputs<4, false> (row, first, finish, wanted, outputs);
   for (; first < row.outputs; first++)
-    filter_outputs<1> (row, first, finish, wanted, outputs);
+    filter_outputs<1, false> (row, first, finish, wanted, outputs);
 }
 
 inline void

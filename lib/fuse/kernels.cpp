@@ -31,8 +31,8 @@ find_kernels ()
     found.push_back (fuse_avx2::kernels);
 #endif
   found.push_back (fuse_baseline::kernels);
-  found.push_back (
-      {"scalar", reference_filter, reference_filter_add, reference_shrink});
+  found.push_back ({"scalar", reference_filter, reference_filter_add,
+      reference_sum, reference_most, reference_shrink});
   return found;
 }
 

@@ -64,6 +64,10 @@ struct Kernels {
   /** outputs[k][x] += scale[x] * output k, where scale is not 0. */
   void (*filter_add) (
       const FilterRow &row, const float *scale, float *const *outputs);
+  /** to[x] = the sum of rows[i][x], in the order of the rows; the largest.
+   * As many as 15 more than @p count are read and written. */
+  void (*sum) (const float *const *rows, int rows_count, int count, float *to);
+  void (*most) (const float *const *rows, int rows_count, int count, float *to);
   /** Transforms each block (DCT in x and y, slot_transform over slots), drops
    * coefficients below the threshold but the mean, transforms back, and adds
    * it weighted with 1 / coefficients kept. */

@@ -1,12 +1,14 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* The kernels of one instruction set, compiled once for each. */
 #include "fuse/filter_kernel.h"
+#include "fuse/rows_kernel.h"
 #include "fuse/shrink_kernel.h"
 
 namespace cexp::CEXP_TARGET
 {
 
 extern const fuse::Kernels kernels;
-const fuse::Kernels kernels = {CEXP_TARGET_NAME, filter, filter_add, shrink};
+const fuse::Kernels kernels = {
+    CEXP_TARGET_NAME, filter, filter_add, sum, most, shrink};
 
 } // namespace cexp::CEXP_TARGET

@@ -41,12 +41,14 @@ add_pairs (const Observation &observation, const std::vector<double> &between,
 Covariance::Covariance (
     const SceneClass &patch, const Observation &observation, int reach)
     : n_ (observation.slots ()), reach_ (reach),
-      moving_ (patch.vx != 0.0 || patch.vy != 0.0)
+      moving_ (patch.vx != 0.0 || patch.vy != 0.0 || patch.spread > 0.0)
 {
-  if (moving_)
+  if (!moving_)
+    fill_still (patch, observation);
+  else if (patch.vx != 0.0 || patch.vy != 0.0)
     fill_moving (patch, observation);
   else
-    fill_still (patch, observation);
+    fill_astray (patch, observation);
 }
 
 /* Space and time part where nothing moves. */
@@ -71,6 +73,27 @@ Covariance::fill_moving (
       std::vector<double> between;
       for (int d = 1 - n_; d < n_; d++)
         between.push_back (scene_correlation (patch, dx, dy, d));
+      add_pairs (observation, between, cross_, coded_);
+    }
+  }
+}
+
+/* The same in all directions, so that one correlation a distance will do. */
+void
+Covariance::fill_astray (
+    const SceneClass &patch, const Observation &observation)
+{
+  const auto distances = std::size_t (2 * reach_ * reach_ + 1);
+  std::vector<std::vector<double>> by_square (distances);
+  std::vector<double> between (std::size_t (2 * n_ - 1));
+  for (int dy = -reach_; dy <= reach_; dy++) {
+    for (int dx = -reach_; dx <= reach_; dx++) {
+      auto &alike = by_square[std::size_t (dx * dx + dy * dy)];
+      for (int d = int (alike.size ()); d < n_; d++)
+        alike.push_back (scene_correlation (patch, dx, dy, d));
+      for (int d = 0; d < n_; d++)
+        between[std::size_t (n_ - 1 - d)] = between[std::size_t (n_ - 1 + d)] =
+            alike[std::size_t (d)];
       add_pairs (observation, between, cross_, coded_);
     }
   }

@@ -50,6 +50,7 @@ private:
   }
   void fill_still (const SceneClass &patch, const Observation &observation);
   void fill_moving (const SceneClass &patch, const Observation &observation);
+  void fill_astray (const SceneClass &patch, const Observation &observation);
 
   int n_;
   int reach_;

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "fuse/reference.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "fuse/dct.h"
@@ -155,6 +156,28 @@ reference_filter_add (
   for (int k = 0; k < row.outputs; k++)
     for (int x = 0; x < row.count; x++)
       outputs[k][x] += scale[x] * filtered (row, x, k);
+}
+
+void
+reference_sum (const float *const *rows, int rows_count, int count, float *to)
+{
+  for (int x = 0; x < count; x++) {
+    float sum = rows[0][x];
+    for (int i = 1; i < rows_count; i++)
+      sum += rows[i][x];
+    to[x] = sum;
+  }
+}
+
+void
+reference_most (const float *const *rows, int rows_count, int count, float *to)
+{
+  for (int x = 0; x < count; x++) {
+    float most = rows[0][x];
+    for (int i = 1; i < rows_count; i++)
+      most = std::max (most, rows[i][x]);
+    to[x] = most;
+  }
 }
 
 void

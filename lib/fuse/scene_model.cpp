@@ -2,6 +2,7 @@
 #include "fuse/scene_model.h"
 
 #include <cmath>
+#include <numbers>
 
 #include "stats/matern.h"
 
@@ -21,14 +22,40 @@ add_grid (std::vector<SceneClass> &classes, double reach, double step,
   }
 }
 
+double
+alike (const SceneClass &patch, double x, double y)
+{
+  const double r = std::hypot (x, y) / patch.length;
+  return patch.smoothness > 1.25 ? matern_3_2 (r) : matern_1 (r);
+}
+
+/* The mean over normally distributed displacements of @sigma along each axis,
+ * at points of equal weight. */
+double
+mean_around (const SceneClass &patch, double x, double y, double sigma)
+{
+  constexpr int kRings = 12, kDirections = 16;
+  double sum = 0.0;
+  for (int ring = 0; ring < kRings; ring++) {
+    const double beyond = 1.0 - (ring + 0.5) / kRings;
+    const double r = sigma * std::sqrt (-2.0 * std::log (beyond));
+    for (int k = 0; k < kDirections; k++) {
+      const double angle = 2.0 * std::numbers::pi * (k + 0.5) / kDirections;
+      sum += alike (patch, x - r * std::cos (angle), y - r * std::sin (angle));
+    }
+  }
+  return sum / (kRings * kDirections);
+}
+
 } // namespace
 
 double
 scene_correlation (const SceneClass &patch, double dx, double dy, double slots)
 {
-  const double r =
-      std::hypot (dx - patch.vx * slots, dy - patch.vy * slots) / patch.length;
-  return (patch.smoothness > 1.25 ? matern_3_2 (r) : matern_1 (r)) *
+  const double x = dx - patch.vx * slots, y = dy - patch.vy * slots;
+  const double astray = patch.spread * std::abs (slots);
+  return (astray > 0.0 ? mean_around (patch, x, y, astray)
+                       : alike (patch, x, y)) *
          std::pow (patch.correlation, std::abs (slots));
 }
 

@@ -9,17 +9,19 @@ namespace cexp
 {
 
 /**
- * A kind of patch: a stationary Gaussian process that moves at a constant
+ * A kind of patch: a stationary random process that moves at a constant
  * velocity and slowly becomes another.
  *
  * The correlation of two points is Matern (distance in the moving patch /
- * length) times correlation ^ |slots between them|.
+ * length) times correlation ^ |slots between them|; where the velocity is not
+ * known, its mean over velocities with a normal distribution about (vx, vy).
  */
 struct SceneClass {
   double vx = 0.0, vy = 0.0; ///< px per slot
   double length = 5.0;       ///< px
   double smoothness = 1.5;   ///< Matern order: 1 or 1.5
   double correlation = 0.85; ///< per slot, in (0, 1]
+  double spread = 0.0; ///< of velocities along each axis, rms, px per slot
 
   bool operator== (const SceneClass &) const = default;
 };
@@ -31,7 +33,11 @@ double scene_correlation (
 
 /** The classes that fusion chooses from. */
 struct SceneModel {
-  /** What `fast` takes everything for; codedexposure train finds it. */
+  /** What `fast` chooses between around each pixel. */
+  SceneClass creeping{.correlation = 0.97, .spread = 0.25};
+  SceneClass moving{.correlation = 0.85, .spread = 2.0};
+  /** What it takes everything for under schedules of more slots than motion is
+   * known for. */
   SceneClass plain;
   /** Standard deviation of a scene as a part of white: how far noise is
    * believed to be below the scene. */

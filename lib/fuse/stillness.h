@@ -2,6 +2,7 @@
 /* Where nothing moves: found by comparing coded frames with each other. */
 #pragma once
 
+#include "fuse/around.h"
 #include "fuse/field.h"
 #include "fuse/observation.h"
 
@@ -28,15 +29,19 @@ struct NoiseMap {
 class Stillness
 {
 public:
-  /** @p cell  of the tile: the surroundings hold every slot. */
-  Stillness (int width, int height, Extent cell, bool average);
+  /** @p radius  of the surroundings, which hold every slot. */
+  Stillness (int width, int height, int radius, bool average);
+  int radius () const { return radius_; }
+  /** The radius of a tile's surroundings. */
+  static int radius_of (Extent cell);
 
-  /** Takes the next coded frame; a frame after it, or null, as well.
-   * @p still, @p moved  squared errors of the predictions of each pixel by its
-   *                     neighbours, if the picture stands still and if every
-   *                     slot shows another. */
-  void take (const Field &coded, const Field *after, const NoiseMap &noise,
-      const Field &still, const Field &moved);
+  /** What speaks for repetition in row @p y of the frame that take () gets
+   * next: sums of squared errors of the predictions of the pixels around each,
+   * if the picture stands still and if every slot shows another. */
+  void doubt (int y, const float *still, const float *moved);
+  /** Takes the next coded frame; a frame after it, or null, as well. */
+  void take (const Kernels &kernels, const Field &coded, const Field *after,
+      const NoiseMap &noise);
   /** Forgets all frames. */
   void forget () { begun_ = false; }
 
@@ -46,17 +51,17 @@ public:
   const float *light (int y) const { return mean_.row (y); }
 
 private:
-  void compare (const Field &now, const Field &other, const Field *count,
-      const NoiseMap &noise);
-  void judge (Field &weight, bool raise);
-  void doubt (const Field &still, const Field &moved);
+  void judge (const Kernels &kernels, const Field &now, const Field &other,
+      const Field *count, const NoiseMap &noise, bool raise);
+  void weigh (int y, const float *sum, const float *most, bool raise);
 
   int radius_;
   bool average_;
   bool begun_ = false;
-  Field mean_;  ///< of the frames in which a pixel stood still
-  Field count_; ///< of these frames
-  Field change_, rows_sum_, rows_most_; ///< while judging
+  Field mean_;   ///< of the frames in which a pixel stood still
+  Field count_;  ///< of these frames
+  Field change_; ///< a row, while judging
+  Around sums_, mosts_;
   Field credible_; ///< 1 where nothing speaks for repetition
   Field weight_;
 };

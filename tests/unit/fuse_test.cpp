@@ -195,6 +195,28 @@ TEST (FuseKernels, FiltersEqualTheReference)
   }
 }
 
+TEST (FuseKernels, JoinedRowsEqualTheReference)
+{
+  const auto numbers = random_numbers (4096, 4);
+  const fuse::Kernels &oracle = fuse::supported_kernels ().back ();
+  for (const int rows_count : {1, 2, 7, 11}) {
+    std::vector<const float *> rows;
+    for (int i = 0; i < rows_count; i++)
+      rows.push_back (numbers.data () + 301 * i);
+    const auto joined = [&] (auto join) {
+      std::vector<float> to (128);
+      join (rows.data (), rows_count, 77, to.data ());
+      to.resize (77);
+      return to;
+    };
+    for (const fuse::Kernels &kernels : fuse::supported_kernels ()) {
+      SCOPED_TRACE (kernels.name);
+      EXPECT_EQ (joined (kernels.sum), joined (oracle.sum));
+      EXPECT_EQ (joined (kernels.most), joined (oracle.most));
+    }
+  }
+}
+
 /* Sums and weights after shrinking blocks of @slots planes. */
 std::vector<float>
 shrunk (const fuse::Kernels &kernels, int slots, float threshold)
@@ -394,6 +416,58 @@ disc_over_texture (int slot)
     return std::hypot (x - 8 - 3 * slot, y - 24) < 4.0 ? 1.0
                                                        : 0.5 * texture (x, y);
   });
+}
+
+/* Soft discs of several sizes and greys, one over the other, that go by at
+ * @speed px a slot. */
+Image<std::uint8_t>
+discs (double speed, int slot)
+{
+  const auto places = random_numbers (400, 6);
+  return draw (96, 64, [&] (int x, int y) {
+    double value = 0.5;
+    for (std::size_t i = 0; i + 3 < places.size (); i += 4) {
+      const double radius = 3.0 + std::abs (places[i + 2]) / 10.0;
+      const double away =
+          std::hypot (x - 48 - 0.7 * double (places[i]) - speed * slot,
+              y - 32 - 0.5 * double (places[i + 1]));
+      const double grey = 0.5 + double (places[i + 3]) / 250.0;
+      value += (grey - value) * std::clamp (radius - away, 0.0, 1.0);
+    }
+    return value;
+  });
+}
+
+/* PSNR of four slots of them, fused by models of what creeps and what moves. */
+double
+discs_fused (double speed, const SceneClass &creeping, const SceneClass &moving)
+{
+  const Schedule schedule = schedule_of ("sequential:lattice:4/2");
+  FuseOptions options;
+  options.scene.creeping = creeping;
+  options.scene.moving = moving;
+  const auto picture = [speed] (int slot) { return discs (speed, slot); };
+  const auto frames = fuse (take (schedule, 1, picture), schedule, options);
+  double sum = 0.0;
+  for (int slot = 0; slot < 4; slot++)
+    sum += psnr (frames[std::size_t (slot)], picture (slot));
+  return sum / 4.0;
+}
+
+TEST (Fuse, FastTakesTheModelThatFits)
+{
+  const SceneModel model;
+  for (const double speed : {0.1, 2.0}) {
+    const auto fused = [speed] (const SceneClass &a, const SceneClass &b) {
+      return discs_fused (speed, a, b);
+    };
+    const double both = fused (model.creeping, model.moving);
+    const double creeping = fused (model.creeping, model.creeping);
+    const double moving = fused (model.moving, model.moving);
+    EXPECT_EQ (creeping > moving, speed < 1.0) << speed;
+    EXPECT_GT (std::abs (creeping - moving), 2.0) << speed;
+    EXPECT_GT (both, (creeping + moving) / 2.0) << speed;
+  }
 }
 
 TEST (Fuse, WhatMovesLeavesNoGhosts)

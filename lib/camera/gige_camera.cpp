@@ -165,7 +165,11 @@ camera_settings_text (const CameraSettings &settings)
   std::ostringstream text;
   text << settings.width << "x" << settings.height << " "
        << mono_format_text (settings.format) << ", " << settings.frame_rate
-       << " a second, exposure " << settings.exposure_us << " us, ";
+       << " a second, exposure ";
+  if (settings.exposure_us * settings.frame_rate < 1e6)
+    text << settings.exposure_us << " us, ";
+  else
+    text << "all of the frame, ";
   if (settings.triggered)
     text << "trigger Line" << settings.trigger_line
          << (settings.trigger_falling ? " falling" : " rising");

@@ -48,8 +48,8 @@ struct CameraSettings {
   bool operator== (const CameraSettings &) const = default;
 };
 
-/** "256x192 Mono8, 25 a second, exposure 5000 us, trigger Line0 rising"; lines
- * that put something out follow. */
+/** "256x192 Mono8, 25 a second, exposure 5000 us, trigger Line0 rising", or
+ * "exposure all of the frame"; lines that put something out follow. */
 std::string camera_settings_text (const CameraSettings &settings);
 
 struct GigeCameraOptions {

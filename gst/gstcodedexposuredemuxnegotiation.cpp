@@ -23,15 +23,17 @@ take_settings (GstCodedExposureDemux *self)
   st.stream.stale = true;
 }
 
+/* @region -1: the background. */
 template <typename Pixel>
 std::optional<AnyExtractor>
-make_extractor (GstCodedExposureDemux *self, const Schedule &whole,
-    const Schedule &part, const Rect &rect)
+make_extractor (GstCodedExposureDemux *self, const Schedule &whole, int region,
+    const Rect &rect)
 {
+  const Schedule &part = region < 0 ? whole : whole.region (region);
   const Stream &stream = state (self).stream;
   ExtractOptions options = stream.settings.extract;
   /* The gain is for a slot of the background; others are longer or shorter. */
-  options.gain *= double (part.slots ()) / whole.code ().slots ();
+  options.gain *= double (part.code ().slots ()) / whole.code ().slots ();
   options.bits = stream.bits_in_force ();
   auto made = Extractor<Pixel>::make (part, rect.width, rect.height, options);
   if (made)
@@ -148,7 +150,6 @@ say_regions (GstCodedExposureDemux *self, const Schedule &schedule)
       self, STREAM, FORMAT, ("%s", text.c_str ()), ("%s", text.c_str ()));
 }
 
-/* @region -1: the background. */
 std::optional<Part>
 make_part (GstCodedExposureDemux *self, const CodedFormat &coded,
     const SlotPlan &slots, const Schedule &whole, int region, const Rect &rect)
@@ -158,8 +159,8 @@ make_part (GstCodedExposureDemux *self, const CodedFormat &coded,
   const Schedule schedule =
       region < 0 ? whole.background () : whole.region (region);
   auto extractor =
-      wide ? make_extractor<std::uint16_t> (self, whole, schedule, rect)
-           : make_extractor<std::uint8_t> (self, whole, schedule, rect);
+      wide ? make_extractor<std::uint16_t> (self, whole, region, rect)
+           : make_extractor<std::uint8_t> (self, whole, region, rect);
   if (!extractor)
     return std::nullopt;
   const Method method =

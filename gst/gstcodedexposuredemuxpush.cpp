@@ -4,7 +4,6 @@
 #include <cstdlib>
 #include <numeric>
 
-#include "extract/parts.h"
 #include "extract/saturation.h"
 #include "gstcodedexposuredemuxstate.h"
 
@@ -207,12 +206,8 @@ extract (const Extractor<Pixel> &extractor, Stream &stream, const Part &part,
     views.push_back (subframes[k] ? view_of<Pixel> (subframes[k])
                                   : scratch_view<Pixel> (stream, part, k));
   const Rect &rect = part.rect;
-  const ExtractReport report = extractor.run (
+  return extractor.run (
       light.block (rect.x, rect.y, rect.width, rect.height), views);
-  if (part.region < 0)
-    for (const ImageView<Pixel> &view : views)
-      blacken_regions (stream.plan->schedule, extractor.reach (), view);
-  return report;
 }
 
 /* Takes a buffer for every subframe that has a target and maps it; a subframe

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "base/text.h"
+#include "extract/covered_cells.h"
 #include "extract/fast_path.h"
 #include "extract/reference.h"
 #include "extract/targets.h"
@@ -124,9 +125,47 @@ extract_targets ()
 
 template <typename Pixel>
 struct Extractor<Pixel>::Plan : ExtractPlan {
+  CoveredCells covered;
   /** Empty: the reference does it. */
   std::optional<FastPath<Pixel>> fast = {};
+
+  ExtractReport run (ImageView<const Pixel> coded,
+      std::span<const ImageView<Pixel>> subframes, RowRange rows) const;
+  void leave_out_regions (ImageView<const Pixel> coded,
+      std::span<const ImageView<Pixel>> subframes, RowRange rows) const;
 };
+
+template <typename Pixel>
+ExtractReport
+Extractor<Pixel>::Plan::run (ImageView<const Pixel> coded,
+    std::span<const ImageView<Pixel>> subframes, RowRange rows) const
+{
+  if (fast)
+    return fast->run (*this, coded, subframes, rows);
+  switch (this->method) {
+  case Method::kDecode:
+    reference_decode (coded, grid, *decoder, largest, rows, subframes);
+    break;
+  case Method::kSelect:
+    reference_select<Pixel> (coded, grid, elements, rows, subframes);
+    break;
+  default:
+    reference_rank (coded, grid, rows, subframes);
+  }
+  return {reference_saturated (coded, grid, largest, rows)};
+}
+
+template <typename Pixel>
+void
+Extractor<Pixel>::Plan::leave_out_regions (ImageView<const Pixel> coded,
+    std::span<const ImageView<Pixel>> subframes, RowRange rows) const
+{
+  if (decoder && decoder->interpolates ())
+    reference_decode_beside (
+        coded, grid, *decoder, largest, covered, rows, subframes);
+  for (const ImageView<Pixel> &subframe : subframes)
+    covered.blacken (subframe, rows);
+}
 
 template <typename Pixel>
 Extractor<Pixel>::Extractor (std::unique_ptr<const Plan> plan)
@@ -143,15 +182,14 @@ Extractor<Pixel>::~Extractor () = default;
 
 template <typename Pixel>
 Result<Extractor<Pixel>>
-Extractor<Pixel>::make (const Schedule &schedule, int width, int height,
-    const ExtractOptions &options)
+Extractor<Pixel>::make (
+    const Schedule &whole, int width, int height, const ExtractOptions &options)
 {
   constexpr int kTypeBits = std::numeric_limits<Pixel>::digits;
   if (const auto checked = check_options (options, kTypeBits); !checked)
     return checked.error ();
 
-  if (const auto checked = check_one_part (schedule, "extraction"); !checked)
-    return checked.error ();
+  const Schedule schedule = whole.background ();
   const SampleGrid grid (schedule);
   const Extent size = grid.subframe_size (width, height);
   if (size.width < 1 || size.height < 1)
@@ -160,8 +198,10 @@ Extractor<Pixel>::make (const Schedule &schedule, int width, int height,
   const Method method =
       options.method == Method::kAuto ? method_for (schedule) : options.method;
   const int bits = options.bits > 0 ? options.bits : kTypeBits;
-  auto plan = std::make_unique<Plan> (Plan{{method, grid, size, (1 << bits) - 1,
-      elements_by_slot (schedule.code ())}});
+  auto plan =
+      std::make_unique<Plan> (Plan{{method, grid, size, (1 << bits) - 1,
+                                       elements_by_slot (schedule.code ())},
+          CoveredCells (whole, size)});
   if (method == Method::kDecode) {
     auto decoder = Decoder::make (schedule, options.gain, options.interpolate);
     if (!decoder)
@@ -195,13 +235,6 @@ Extractor<Pixel>::subframes () const
 }
 
 template <typename Pixel>
-int
-Extractor<Pixel>::reach () const
-{
-  return plan_->decoder && plan_->decoder->interpolates () ? 1 : 0;
-}
-
-template <typename Pixel>
 Extent
 Extractor<Pixel>::subframe_size () const
 {
@@ -221,22 +254,11 @@ ExtractReport
 Extractor<Pixel>::run_rows (ImageView<const Pixel> coded,
     std::span<const ImageView<Pixel>> subframes, int first_row, int rows) const
 {
-  const Plan &plan = *plan_;
   const RowRange range = {first_row, rows};
-  if (plan.fast)
-    return plan.fast->run (plan, coded, subframes, range);
-  switch (plan.method) {
-  case Method::kDecode:
-    reference_decode (
-        coded, plan.grid, *plan.decoder, plan.largest, range, subframes);
-    break;
-  case Method::kSelect:
-    reference_select<Pixel> (coded, plan.grid, plan.elements, range, subframes);
-    break;
-  default:
-    reference_rank (coded, plan.grid, range, subframes);
-  }
-  return {reference_saturated (coded, plan.grid, plan.largest, range)};
+  const ExtractReport report = plan_->run (coded, subframes, range);
+  if (plan_->covered.any ())
+    plan_->leave_out_regions (coded, subframes, range);
+  return report;
 }
 
 template class Extractor<std::uint8_t>;

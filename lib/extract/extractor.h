@@ -68,9 +68,13 @@ class Extractor
 {
 public:
   /**
+   * Of a schedule with regions, it extracts the background: pixels whose cells
+   * a region touches are black, and beside them decode interpolates with what
+   * there is. Each region is extracted by itself, with Schedule::region () and
+   * the pixels of its rectangle.
+   *
    * Error when the method needs what the code has not (decode of a singular
-   * code), when a number is out of range, when the frame holds no cell, or when
-   * the schedule has regions: each part is extracted by itself (parts.h).
+   * code), when a number is out of range, or when the frame holds no cell.
    * Select of a code that is not one-hot is allowed by name: subframe k is
    * element k then, and exposures have different lengths.
    */
@@ -86,9 +90,6 @@ public:
   /** The gain in force; 1 where it does not apply. */
   double gain () const;
   int subframes () const;
-  /** Cells around its own that a pixel depends on: 1 where decode interpolates,
-   * else 0. */
-  int reach () const;
   Extent subframe_size () const;
 
   /**

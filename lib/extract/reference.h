@@ -13,6 +13,8 @@
 namespace cexp
 {
 
+class CoveredCells;
+
 /** Rows of cells. */
 struct RowRange {
   int first = 0;
@@ -38,6 +40,15 @@ void reference_select (ImageView<const Pixel> coded, const SampleGrid &grid,
 template <typename Pixel>
 void reference_decode (ImageView<const Pixel> coded, const SampleGrid &grid,
     const Decoder &decoder, int largest, RowRange rows,
+    std::span<const ImageView<Pixel>> subframes);
+
+/** The same for the neighbours of @p covered cells in @p rows, without looking
+ * at those: a missing sample is the one beside it, as at the edge of the frame,
+ * and where that one is known on both sides, in the plane through all three. */
+template <typename Pixel>
+void reference_decode_beside (ImageView<const Pixel> coded,
+    const SampleGrid &grid, const Decoder &decoder, int largest,
+    const CoveredCells &covered, RowRange rows,
     std::span<const ImageView<Pixel>> subframes);
 
 /** Pixels of the cells in @p rows that are not below @p largest. */

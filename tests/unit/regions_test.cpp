@@ -14,7 +14,6 @@
 #include "dmd/dmd.h"
 #include "dmd/plane_image.h"
 #include "extract/extractor.h"
-#include "extract/parts.h"
 #include "fuse/fuser.h"
 #include "optics/bench.h"
 #include "schedule/sample_grid.h"
@@ -86,8 +85,8 @@ std::vector<Image<std::uint8_t>>
 extract (const Schedule &part, ImageView<const std::uint8_t> coded,
     const ExtractOptions &options = {})
 {
-  const auto extractor = Extractor<std::uint8_t>::make (
-      part, coded.width, coded.height, options);
+  const auto extractor =
+      Extractor<std::uint8_t>::make (part, coded.width, coded.height, options);
   EXPECT_TRUE (extractor.ok ()) << extractor.error ().message;
   const Extent size = extractor->subframe_size ();
   std::vector<Image<std::uint8_t>> subframes (
@@ -101,9 +100,9 @@ extract (const Schedule &part, ImageView<const std::uint8_t> coded,
 }
 
 ImageView<const std::uint8_t>
-view (const Image<std::uint8_t> &image)
+pixels_of (const Rect &rect, const Image<std::uint8_t> &coded)
 {
-  return image.view ();
+  return coded.view ().block (rect.x, rect.y, rect.width, rect.height);
 }
 
 } // namespace
@@ -333,15 +332,6 @@ TEST (Regions, SlipsShowInThePilotOnly)
       SlipObservable::always);
 }
 
-TEST (Regions, WhatKnowsOnePartOnlySaysSo)
-{
-  const auto extractor = Extractor<std::uint8_t>::make (preset (kTwo), 64, 48);
-  ASSERT_FALSE (extractor.ok ());
-  EXPECT_NE (
-      extractor.error ().message.find ("without regions"), std::string::npos)
-      << extractor.error ().message;
-}
-
 /* Each part gives what was in front of its pixels while they were open. */
 TEST (Regions, PicturesOfEveryPartComeOut)
 {
@@ -358,8 +348,7 @@ TEST (Regions, PicturesOfEveryPartComeOut)
   for (int i = 0; i < 2; i++) {
     const Schedule &part = schedule.region (i);
     const Rect &rect = regions[std::size_t (i)].rect;
-    const auto subframes = extract (
-        part, pixels_of (regions[std::size_t (i)], view (coded)), select);
+    const auto subframes = extract (part, pixels_of (rect, coded), select);
     ASSERT_EQ (int (subframes.size ()), part.slots ());
     const SampleGrid grid (part);
     for (int k = 0; k < part.slots (); k++)
@@ -391,12 +380,11 @@ TEST (Regions, WhiteIsWhiteInEveryPart)
   };
   for (int i = 0; i < 2; i++)
     for (const auto &subframe : extract (schedule.region (i),
-             pixels_of (schedule.regions ()[std::size_t (i)], view (coded))))
+             pixels_of (schedule.regions ()[std::size_t (i)].rect, coded)))
       near_grey (subframe, {});
 
   /* All of the background's cells but those of regions, which are black. */
-  for (auto &subframe : extract (schedule.background (), view (coded))) {
-    blacken_regions (schedule, 0, subframe.view ());
+  for (const auto &subframe : extract (schedule, coded.view ())) {
     EXPECT_EQ (subframe.at (4, 2), 0);
     EXPECT_EQ (subframe.at (11, 5), 0);
     EXPECT_EQ (subframe.at (15, 4), 0);
@@ -405,24 +393,88 @@ TEST (Regions, WhiteIsWhiteInEveryPart)
   }
 }
 
+namespace
+{
+
+/** Brightness that lasts and is linear over the frame. */
+std::uint8_t
+ramp (int x, int y, int)
+{
+  return std::uint8_t (20 + 6 * x + 4 * y);
+}
+
+/** Cells of 2x2 that the region 6x6+3+5 touches. */
+bool
+covered (int x, int y)
+{
+  return x >= 1 && x <= 4 && y >= 2 && y <= 5;
+}
+
+} // namespace
+
 TEST (Regions, CellsOfTheBackgroundThatTheyTouchAreBlack)
 {
+  for (const char *background : {"sequential:2x2", "staircase:2x2"}) {
+    const Schedule schedule =
+        preset (std::string (background) + ",region=6x6+3+5:sequential:3x2");
+    const auto coded = coded_frame (schedule, 16, 14, ramp);
+    for (const auto &subframe : extract (schedule, coded.view ()))
+      for (int y = 0; y < 7; y++)
+        for (int x = 0; x < 8; x++)
+          EXPECT_EQ (subframe.at (x, y) == 0, covered (x, y))
+              << background << ": " << x << ", " << y;
+  }
+}
+
+/* A region is no border of the light: what the next cells have of it is left
+ * out, and nothing else changes. */
+TEST (Regions, DecodeInterpolatesWithoutThem)
+{
+  const Schedule plain = preset ("staircase:2x2");
   const Schedule schedule =
-      preset ("sequential:2x2,region=6x6+3+5:sequential:3x2");
-  Image<std::uint8_t> subframe (8, 6);
-  for (int y = 0; y < 6; y++)
-    std::fill_n (subframe.view ().row (y), 8, std::uint8_t (9));
-  blacken_regions (schedule, 0, subframe.view ());
-  for (int y = 0; y < 6; y++)
-    for (int x = 0; x < 8; x++)
-      EXPECT_EQ (
-          subframe.at (x, y), x >= 1 && x <= 4 && y >= 2 && y <= 5 ? 0 : 9)
-          << x << ", " << y;
-  blacken_regions (schedule, 1, subframe.view ());
-  EXPECT_EQ (subframe.at (0, 1), 0);
-  EXPECT_EQ (subframe.at (5, 5), 0);
-  EXPECT_EQ (subframe.at (6, 5), 9);
-  EXPECT_EQ (subframe.at (0, 0), 9);
+      preset ("staircase:2x2,region=6x6+3+5:staircase:2x2");
+  const auto coded = coded_frame (plain, 16, 14, ramp);
+  auto spoilt = coded;
+  for (int y = 4; y < 12; y++)
+    std::fill_n (spoilt.view ().row (y) + 2, 8, std::uint8_t (255));
+  for (const std::string_view target : extract_targets ()) {
+    ExtractOptions options;
+    options.target = target;
+    const auto wanted = extract (plain, coded.view (), options);
+    const auto found = extract (schedule, coded.view (), options);
+    EXPECT_EQ (extract (schedule, spoilt.view (), options), found) << target;
+    for (std::size_t k = 0; k < found.size (); k++)
+      for (int y = 0; y < 7; y++)
+        for (int x = 0; x < 8; x++) {
+          const bool beside = x <= 5 && y >= 1;
+          const int value = found[k].at (x, y), whole = wanted[k].at (x, y);
+          if (covered (x, y))
+            EXPECT_EQ (value, 0);
+          else if (beside)
+            EXPECT_NEAR (value, whole, 16) << x << ", " << y;
+          else
+            EXPECT_EQ (value, whole) << x << ", " << y;
+        }
+    /* At a corner of the region the plane through the others goes on. */
+    EXPECT_EQ (found[1].at (0, 1), wanted[1].at (0, 1));
+    EXPECT_EQ (found[3].at (5, 6), wanted[3].at (5, 6));
+  }
+}
+
+TEST (Regions, RowsOfTheBackgroundAreThoseOfTheWhole)
+{
+  const Schedule schedule =
+      preset ("staircase:2x2,region=6x6+3+5:sequential:3x2");
+  const auto coded = coded_frame (schedule, 16, 14, light);
+  const auto whole = extract (schedule, coded.view ());
+  const auto extractor = Extractor<std::uint8_t>::make (schedule, 16, 14);
+  auto rows = std::vector (4, Image<std::uint8_t> (8, 7));
+  std::vector<ImageView<std::uint8_t>> views;
+  for (auto &subframe : rows)
+    views.push_back (subframe.view ());
+  for (const auto &[first, count] : {std::pair (0, 3), {3, 1}, {4, 3}})
+    extractor->run_rows (coded.view (), views, first, count);
+  EXPECT_EQ (rows, whole);
 }
 
 namespace

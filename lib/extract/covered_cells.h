@@ -1,0 +1,44 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Cells of the background that regions touch. */
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "base/image.h"
+#include "extract/reference.h"
+#include "schedule/schedule.h"
+
+namespace cexp
+{
+
+/**
+ * The cells whose pixels, or some of them, are a region's: another code shut
+ * and opened them, so they are no picture in the background's.
+ */
+class CoveredCells
+{
+public:
+  /** Of subframes of @p size pixels. */
+  CoveredCells (const Schedule &whole, Extent size);
+
+  bool any () const { return !rects_.empty (); }
+  /** Whether the cell of subframe pixel (@p i, @p j) is one. */
+  bool at (int i, int j) const { return map_.at (i, j) != 0; }
+  /** Those that are none and have one among the eight around them, row by row.
+   */
+  std::span<const Offset> neighbours () const { return neighbours_; }
+  /** Blackens them in @p rows of @p subframe. */
+  template <typename Pixel>
+  void blacken (ImageView<Pixel> subframe, RowRange rows) const;
+
+private:
+  bool beside (int i, int j) const;
+
+  std::vector<Rect> rects_; // in cells
+  Image<std::uint8_t> map_; // empty where there are none
+  std::vector<Offset> neighbours_;
+};
+
+} // namespace cexp

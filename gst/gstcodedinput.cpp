@@ -54,10 +54,12 @@ say_overruled (GstElement *element, CodedStream &stream, const Schedule &asked)
   if (tagged == asked || stream.overruled == tagged)
     return;
   stream.overruled = tagged;
-  GST_ELEMENT_INFO (element, STREAM, FORMAT,
-      ("The schedule property, %s, is in force. The stream was made with %s.",
-          asked.text ().c_str (), tagged.text ().c_str ()),
-      (nullptr));
+  const std::string text = "The schedule property, " + asked.text () +
+                           ", is in force. The stream was made with " +
+                           tagged.text () + ".";
+  /* gst-launch shows the second text only. */
+  GST_ELEMENT_INFO (
+      element, STREAM, FORMAT, ("%s", text.c_str ()), ("%s", text.c_str ()));
 }
 
 } // namespace

@@ -471,15 +471,12 @@ Launch::on_message (GstMessage *message)
   case GST_MESSAGE_ERROR:
     on_error (message);
     break;
-  case GST_MESSAGE_WARNING: {
-    GError *error = nullptr;
-    gchar *detail = nullptr;
-    gst_message_parse_warning (message, &error, &detail);
-    status_.line ("warning: " + told (message, error, detail));
-    g_error_free (error);
-    g_free (detail);
+  case GST_MESSAGE_WARNING:
+    status_.line ("warning: " + warned (message));
     break;
-  }
+  case GST_MESSAGE_INFO:
+    status_.line ("info: " + noted (message));
+    break;
   case GST_MESSAGE_PROGRESS: {
     GstProgressType type;
     gchar *code = nullptr, *text = nullptr;

@@ -97,6 +97,14 @@ frames_shown_by (GstElement *sink)
       rendered, dropped);
 }
 
+/* What is not the place in the code; null where there is nothing. */
+const gchar *
+added (const gchar *debug)
+{
+  const gchar *end_of_place = debug ? std::strchr (debug, '\n') : nullptr;
+  return end_of_place ? end_of_place + 1 : nullptr;
+}
+
 bool
 is_video_sink (GstElement *element, GstElementFactory *factory)
 {
@@ -148,9 +156,36 @@ package_of (std::string_view element)
 std::string
 told (GstMessage *message, const GError *error, const gchar *debug)
 {
-  const gchar *detail = debug ? std::strchr (debug, '\n') : nullptr;
+  const gchar *detail = added (debug);
   return format ("%s: %s%s%s", GST_OBJECT_NAME (GST_MESSAGE_SRC (message)),
-      error->message, detail ? "\n    " : "", detail ? detail + 1 : "");
+      error->message, detail ? "\n    " : "", detail ? detail : "");
+}
+
+std::string
+warned (GstMessage *message)
+{
+  GError *error = nullptr;
+  gchar *debug = nullptr;
+  gst_message_parse_warning (message, &error, &debug);
+  const std::string text = told (message, error, debug);
+  g_error_free (error);
+  g_free (debug);
+  return text;
+}
+
+std::string
+noted (GstMessage *message)
+{
+  GError *error = nullptr;
+  gchar *debug = nullptr;
+  gst_message_parse_info (message, &error, &debug);
+  const gchar *detail = added (debug);
+  const std::string text =
+      format ("%s: %s", GST_OBJECT_NAME (GST_MESSAGE_SRC (message)),
+          detail ? detail : error->message);
+  g_error_free (error);
+  g_free (debug);
+  return text;
 }
 
 std::string

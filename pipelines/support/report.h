@@ -26,6 +26,11 @@ std::string package_of (std::string_view element);
 /** Source and text of an ERROR or WARNING message, and what its writer added
  * for experts; not the place in the code. */
 std::string told (GstMessage *message, const GError *error, const gchar *debug);
+/** The same of a WARNING message. */
+std::string warned (GstMessage *message);
+/** The same of an INFO message: what its writer added, as gst-launch has it,
+ * else the text. */
+std::string noted (GstMessage *message);
 
 /** "name: field=value ..." of an element message. */
 std::string fields_of (GstMessage *message);

@@ -10,6 +10,7 @@
 #include "figures.h"
 #include "footage.h"
 #include "metrics.h"
+#include "region_figures.h"
 #include "trial.h"
 
 namespace
@@ -84,6 +85,11 @@ TEST (QualityDocument, SaysWhatLeakAndShiftCost)
     expect_documented (table);
   for (const Table &table : shift_tables (synthetic (), [] (auto &) {}))
     expect_documented (table);
+}
+
+TEST (QualityDocument, SaysWhatBordersOfRegionsCost)
+{
+  expect_documented (regions_table (synthetic (), [] (auto &) {}));
 }
 
 TEST (QualityDocument, SaysWhatAStillSceneAndAFlatGreyShow)

@@ -11,6 +11,7 @@
 
 #include "figures.h"
 #include "footage.h"
+#include "region_figures.h"
 #include "scene.h"
 #include "table.h"
 
@@ -145,6 +146,7 @@ all_tables (const Scenes &scenes, const Progress &progress)
       leak_tables (scenes.all, progress), std::back_inserter (tables));
   std::ranges::move (
       shift_tables (scenes.all, progress), std::back_inserter (tables));
+  tables.push_back (regions_table (scenes.all, progress));
   tables.push_back (still_table (scenes.all));
   tables.push_back (light_table ());
   if (!scenes.compared.empty ())

@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "advise/advice.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "advise/linear_estimate.h"
 
 namespace cexp
@@ -38,15 +41,14 @@ Prediction::text () const
   return schedule ? schedule->text () : "none";
 }
 
-Result<Prediction>
-predict (const std::optional<Schedule> &schedule, const Conditions &conditions)
+namespace
 {
-  if (const auto good = conditions.scene.check (); !good)
-    return good.error ();
-  if (const auto checked =
-          check_one_part (schedule.value_or (Schedule ()), "a prediction");
-      !checked)
-    return checked.error ();
+
+/* Of a schedule without regions, or of a part of one. */
+Result<Prediction>
+predict_part (
+    const std::optional<Schedule> &schedule, const Conditions &conditions)
+{
   if (schedule && schedule->elements () > LinearEstimate::kMaxElements)
     return Error{"it has " + std::to_string (schedule->elements ()) +
                  " elements; predictions go up to " +
@@ -73,6 +75,76 @@ predict (const std::optional<Schedule> &schedule, const Conditions &conditions)
   prediction.psnr = LinearEstimate (*model, conditions.scene).psnr ();
   prediction.overexposed = model->overexposed ();
   return prediction;
+}
+
+/* Mean of what is said in dB below white, by @p shares of the pixels. */
+double
+mean_level (const std::vector<Prediction> &parts,
+    const std::vector<double> &shares, double Prediction::*level)
+{
+  double power = 0.0;
+  for (std::size_t i = 0; i < parts.size (); i++)
+    power += shares[i] * std::pow (10.0, -0.1 * (parts[i].*level));
+  return -10.0 * std::log10 (power);
+}
+
+Prediction
+joined (const Schedule &whole, std::vector<Prediction> parts,
+    const std::vector<double> &shares)
+{
+  Prediction all =
+      *std::ranges::min_element (parts, {}, &Prediction::frame_rate);
+  all.schedule = whole;
+  all.snr_white = mean_level (parts, shares, &Prediction::snr_white);
+  all.snr_grey = mean_level (parts, shares, &Prediction::snr_grey);
+  all.psnr = mean_level (parts, shares, &Prediction::psnr);
+  all.efficiency = 0.0;
+  for (std::size_t i = 0; i < parts.size (); i++) {
+    all.efficiency += shares[i] * parts[i].efficiency;
+    all.slot_electrons = std::min (all.slot_electrons, parts[i].slot_electrons);
+    all.overexposed = all.overexposed || parts[i].overexposed;
+  }
+  all.parts = std::move (parts);
+  return all;
+}
+
+Result<Prediction>
+predict_regions (const Schedule &whole, const Conditions &conditions)
+{
+  const Extent size = conditions.camera.size;
+  if (const auto within = whole.check_size (size.width, size.height); !within)
+    return within.error ();
+  auto background = predict_part (whole.background (), conditions);
+  if (!background)
+    return background;
+  std::vector<Prediction> parts = {*std::move (background)};
+  std::vector<double> shares = {1.0};
+  for (std::size_t i = 0; i < whole.regions ().size (); i++) {
+    const Rect &rect = whole.regions ()[i].rect;
+    Conditions inside = conditions;
+    inside.camera.size = {rect.width, rect.height};
+    auto part = predict_part (whole.region (int (i)), inside);
+    if (!part)
+      return Error{
+          "region " + std::to_string (i) + ": " + part.error ().message};
+    parts.push_back (*std::move (part));
+    shares.push_back (double (rect.width) * rect.height /
+                      (double (size.width) * size.height));
+    shares.front () -= shares.back ();
+  }
+  return joined (whole, std::move (parts), shares);
+}
+
+} // namespace
+
+Result<Prediction>
+predict (const std::optional<Schedule> &schedule, const Conditions &conditions)
+{
+  if (const auto good = conditions.scene.check (); !good)
+    return good.error ();
+  return schedule && !schedule->regions ().empty ()
+             ? predict_regions (*schedule, conditions)
+             : predict_part (schedule, conditions);
 }
 
 std::vector<Schedule>

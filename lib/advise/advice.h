@@ -34,6 +34,10 @@ struct Prediction {
   double snr_grey = 0.0;       ///< dB, at kGrey of white
   double psnr = 0.0;           ///< dB, LinearEstimate::psnr ()
   bool overexposed = false;
+  /** Of a schedule with regions, what each part would do: the background, then
+   * the regions. The whole has the rate and the subframes of the slowest part,
+   * the fewest electrons, and the means over all pixels of light and errors. */
+  std::vector<Prediction> parts = {};
 
   /** A photographer's middle grey. */
   static constexpr double kGrey = 0.18;

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "advise/exposure_model.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "base/range.h"
@@ -51,7 +50,7 @@ ExposureModel::make (
   model.noise_ = camera.noise;
   model.active_ = model.pitch_ = model.hold_ = period;
   model.open_ = {1.0};
-  double open_slots = 1.0;
+  double open_slots = 1.0, white_slots = 1.0;
   if (schedule) {
     const int n = model.n_ = schedule->slots ();
     const auto plan = SlotPlan::fit (schedule->timing (), n, camera.rate);
@@ -62,6 +61,7 @@ ExposureModel::make (
     model.hold_ = period / n;
     model.open_.clear ();
     open_slots = 0.0;
+    white_slots = schedule->white_slots ();
     for (int e = 0; e < n; e++) {
       open_slots += double (schedule->code ().open_slots (e)) / n;
       for (int s = 0; s < n; s++)
@@ -73,9 +73,7 @@ ExposureModel::make (
       camera.noise.full_well * light * model.active_ / period;
   model.efficiency_ = open_slots * model.active_ / period;
 
-  double white = 0.0;
-  for (int e = 0; e < model.n_; e++)
-    white = std::max (white, white_of (model, e) * model.slot_electrons_);
+  const double white = white_slots * model.slot_electrons_;
   model.overexposed_ = white > camera.noise.full_well * (1.0 + 1e-9);
   model.step_ = white / double ((1 << camera.bits) - 1);
   return model;

@@ -32,7 +32,9 @@ class ExposureModel
 {
 public:
   /**
-   * @p schedule  none: an ordinary exposure, one slot without mirrors.
+   * @p schedule  none: an ordinary exposure, one slot without mirrors. Without
+   *              regions, or a part of one with regions, by which the analog
+   *              gain is set.
    * @p light     electrons that white makes in a frame period of exposure
    *              without mirrors, as a part of the full well; > 0.
    * Error when a number is out of range, or the slots do not fit the camera's

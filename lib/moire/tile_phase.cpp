@@ -109,9 +109,11 @@ template <typename Pixel>
 Result<TilePhase>
 find (ImageView<const Pixel> frame, const Schedule &schedule)
 {
-  if (const auto checked = check_one_part (schedule, "the search for a phase");
-      !checked)
-    return checked.error ();
+  if (!schedule.regions ().empty ())
+    return Error{"the search for a phase knows one tile and one code, and " +
+                 schedule.text () +
+                 " has regions with others; show its background alone, or "
+                 "calibrate, as a mapping finds the regions, too"};
   const Extent period = {
       schedule.tile ().period_x (), schedule.tile ().period_y ()};
   if (frame.width < kZones * period.width ||

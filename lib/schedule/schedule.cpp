@@ -110,16 +110,6 @@ rect_text (const Rect &rect)
          "+" + std::to_string (rect.x) + "+" + std::to_string (rect.y);
 }
 
-Result<void>
-check_one_part (const Schedule &schedule, const char *what)
-{
-  if (schedule.regions ().empty ())
-    return {};
-  return Error{std::string (what) + " knows one tile and one code, and " +
-               schedule.text () +
-               " has regions with others; take a schedule without regions"};
-}
-
 Schedule::Schedule (Parts parts, Extent cell)
     : parts_ (std::move (parts)), cell_ (cell), slots_ (parts_.code.slots ())
 {
@@ -196,8 +186,19 @@ Schedule::add_regions ()
   const int open = max_open_slots ();
   white_slots_ = open + parts_.leak * (slots_ - open);
   for (Schedule &part : in_region_)
-    part.white_slots_ = white_slots_ / (slots_ / part.slots_);
+    part.fit_into (*this);
   return {};
+}
+
+/* A part holds each of its masks for some slots of the exposure. */
+void
+Schedule::fit_into (const Schedule &whole)
+{
+  const int held = whole.slots_ / slots_;
+  white_slots_ = whole.white_slots_ / held;
+  Timing &timing = parts_.timing = whole.timing ();
+  if (timing.active > 0)
+    timing.active = held * timing.active + (held - 1) * timing.switching;
 }
 
 Schedule
@@ -207,7 +208,7 @@ Schedule::background () const
   alone.parts_.regions.clear ();
   alone.in_region_.clear ();
   alone.slots_ = alone.parts_.code.slots ();
-  alone.white_slots_ = white_slots_ / (slots_ / alone.slots_);
+  alone.fit_into (*this);
   return alone;
 }
 

@@ -128,10 +128,11 @@ public:
   const std::vector<Region> &regions () const { return parts_.regions; }
 
   /** Region @p i as a schedule of its own, of the pixels of its rectangle. It
-   * has the leak and the white of the whole, no timing, no pilot and no
-   * regions. */
+   * has the leak and the white of the whole, slots as long as those for which
+   * the whole holds its masks, no pilot and no regions. */
   const Schedule &region (int i) const { return in_region_[std::size_t (i)]; }
-  /** The schedule without its regions, but with the white of the whole. */
+  /** The schedule without its regions, but with the white and the times of the
+   * whole, as region () has them. */
   Schedule background () const;
   /** Region in which pixel (x, y) lies; -1: the background. */
   int region_at (int x, int y) const;
@@ -186,6 +187,7 @@ public:
 private:
   Schedule (Parts parts, Extent cell);
   Result<void> add_regions ();
+  void fit_into (const Schedule &whole);
   bool open_in_part (int x, int y, int slot) const;
 
   Parts parts_;
@@ -198,10 +200,6 @@ private:
 
 /** "192x144+64+32": width, height and corner. */
 std::string rect_text (const Rect &rect);
-
-/** Error where @p schedule has regions. @p what, such as "rectification", is
- * for the message. */
-Result<void> check_one_part (const Schedule &schedule, const char *what);
 
 /**
  * The mirrors of one mask.

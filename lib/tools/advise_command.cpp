@@ -86,13 +86,9 @@ rounded (double value, int digits)
 }
 
 Json
-describe (const Finding &finding)
+describe (const Prediction &p)
 {
-  if (!finding.prediction)
-    return {{"schedule", finding.text}, {"fits", false},
-        {"trouble", finding.prediction.error ().message}};
-  const Prediction &p = *finding.prediction;
-  return {{"schedule", finding.text}, {"fits", true},
+  Json json = {{"schedule", p.text ()}, {"fits", true},
       {"frame_rate", rounded (p.frame_rate, 3)},
       {"subframe", {p.subframe.width, p.subframe.height}},
       {"light_efficiency", rounded (p.efficiency, 4)},
@@ -100,6 +96,27 @@ describe (const Finding &finding)
       {"snr_white_db", rounded (p.snr_white, 2)},
       {"snr_grey_db", rounded (p.snr_grey, 2)},
       {"psnr_db", rounded (p.psnr, 2)}, {"overexposed", p.overexposed}};
+  for (const Prediction &part : p.parts)
+    json["parts"].push_back (describe (part));
+  return json;
+}
+
+Json
+describe (const Finding &finding)
+{
+  if (!finding.prediction)
+    return {{"schedule", finding.text}, {"fits", false},
+        {"trouble", finding.prediction.error ().message}};
+  return describe (*finding.prediction);
+}
+
+void
+print_row (int column, const std::string &name, const Prediction &p)
+{
+  std::printf ("%-*s %8.5g %5dx%-4d %5.1f%% %6.1f dB %6.1f dB %6.1f dB%s\n",
+      column, name.c_str (), p.frame_rate, p.subframe.width, p.subframe.height,
+      100 * p.efficiency, p.snr_white, p.snr_grey, p.psnr,
+      p.overexposed ? "  too much light" : "");
 }
 
 void
@@ -117,11 +134,11 @@ print_table (const std::vector<Finding> &findings)
           finding.prediction.error ().message.c_str ());
       continue;
     }
-    const Prediction &p = *finding.prediction;
-    std::printf ("%-*s %8.5g %5dx%-4d %5.1f%% %6.1f dB %6.1f dB %6.1f dB%s\n",
-        column, finding.text.c_str (), p.frame_rate, p.subframe.width,
-        p.subframe.height, 100 * p.efficiency, p.snr_white, p.snr_grey, p.psnr,
-        p.overexposed ? "  too much light" : "");
+    print_row (column, finding.text, *finding.prediction);
+    for (std::size_t i = 0; i < finding.prediction->parts.size (); i++)
+      print_row (column,
+          i == 0 ? "  background" : "  region " + std::to_string (i - 1),
+          finding.prediction->parts[i]);
   }
 }
 

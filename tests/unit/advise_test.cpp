@@ -378,4 +378,49 @@ TEST (Advise, UsualSchedulesTakeTheTimesOfTheBench)
   EXPECT_TRUE (std::ranges::is_sorted (schedules, {}, &Schedule::slots));
 }
 
+/* Parts of one code, so that nothing but the division differs. */
+TEST (Advise, PredictsRegionsPartByPart)
+{
+  const Conditions conditions;
+  const auto plain = predict (schedule_of ("sequential:2x2"), conditions);
+  const auto divided = predict (
+      schedule_of ("sequential:2x2,region=192x144+64+32:sequential:2x2"),
+      conditions);
+  ASSERT_TRUE (divided) << divided.error ().message;
+  ASSERT_EQ (divided->parts.size (), 2u);
+  for (const Prediction &part : divided->parts) {
+    EXPECT_DOUBLE_EQ (part.psnr, plain->psnr);
+    EXPECT_DOUBLE_EQ (part.snr_grey, plain->snr_grey);
+  }
+  EXPECT_EQ (divided->parts[1].subframe, (Extent{96, 72}));
+  EXPECT_NEAR (divided->psnr, plain->psnr, 1e-9);
+  EXPECT_NEAR (divided->efficiency, plain->efficiency, 1e-12);
+
+  /* A part of n = 8 gets half the light of one of 4, and half the range. */
+  const auto mixed =
+      predict (schedule_of ("sequential:2x2,active=1ms,switching=100us,"
+                            "region=384x288+64+32:sequential:4x2"),
+          conditions);
+  ASSERT_TRUE (mixed) << mixed.error ().message;
+  const Prediction &background = mixed->parts[0], &region = mixed->parts[1];
+  EXPECT_DOUBLE_EQ (mixed->frame_rate, background.frame_rate);
+  EXPECT_DOUBLE_EQ (region.frame_rate, 2 * background.frame_rate);
+  EXPECT_DOUBLE_EQ (region.slot_electrons, mixed->slot_electrons);
+  EXPECT_NEAR (background.slot_electrons / region.slot_electrons, 2.1, 1e-9);
+  EXPECT_LT (
+      region.snr_white, predict (schedule_of ("sequential:4x2,active=1ms,"
+                                              "switching=100us"),
+                            conditions)
+                            ->snr_white);
+  EXPECT_NEAR (mixed->efficiency,
+      0.75 * background.efficiency + 0.25 * region.efficiency, 1e-12);
+
+  const auto outside =
+      predict (schedule_of ("sequential:2x2,region=8x8+764+0:sequential:2x2"),
+          conditions);
+  ASSERT_FALSE (outside);
+  EXPECT_NE (
+      outside.error ().message.find ("region 0, 8x8+764+0"), std::string::npos);
+}
+
 } // namespace

@@ -50,7 +50,7 @@
  * `quality=fast` runs in real time: 768x576 from 25 to 100 frames/s take less
  * than half of a core of a fast processor. `balanced` and `best` look for the
  * motion around each pixel, take a hundred times as long, and are for decoding
- * of recordings.
+ * of recordings; #codedexposure-fuse:threads share their work.
  * Tell the element about the camera's noise (#codedexposure-fuse:full-well,
  * #codedexposure-fuse:read-noise): it filters more where the noise is larger,
  * and knows what it may take for still.
@@ -134,7 +134,10 @@ change_state (GstElement *element, GstStateChange transition) noexcept
   if (transition == GST_STATE_CHANGE_READY_TO_PAUSED) {
     const ObjectLock lock (self);
     self->state->counters = cexp::gst::fuse::Counters ();
+    self->state->hurry = std::stop_source ();
   }
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY)
+    cexp::gst::fuse::hurry (self);
 
   const GstStateChangeReturn changed =
       GST_ELEMENT_CLASS (gst_coded_exposure_fuse_parent_class)
@@ -201,6 +204,20 @@ FuseState &
 state (GstCodedExposureFuse *self)
 {
   return *self->state;
+}
+
+void
+hurry (GstCodedExposureFuse *self)
+{
+  const ObjectLock lock (self);
+  state (self).hurry.request_stop ();
+}
+
+void
+take_time (GstCodedExposureFuse *self)
+{
+  const ObjectLock lock (self);
+  state (self).hurry = std::stop_source ();
 }
 
 void

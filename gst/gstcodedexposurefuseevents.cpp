@@ -94,8 +94,13 @@ settle_events (GstCodedExposureFuse *self)
 gboolean
 sink_event (GstPad *pad, GstObject *parent, GstEvent *raw) noexcept
 {
+  auto *self = GST_CODED_EXPOSURE_FUSE (parent);
   GST_LOG_OBJECT (pad, "%" GST_PTR_FORMAT, raw);
-  return Events (GST_CODED_EXPOSURE_FUSE (parent)).handle (EventPtr (raw));
+  if (GST_EVENT_TYPE (raw) == GST_EVENT_FLUSH_START)
+    hurry (self);
+  if (GST_EVENT_TYPE (raw) == GST_EVENT_FLUSH_STOP)
+    take_time (self);
+  return Events (self).handle (EventPtr (raw));
 }
 
 /* QoS stops here: aravissrc holds its object lock while it waits for a frame,

@@ -79,14 +79,16 @@ take (GstCodedExposureFuse *self, GstBuffer *inbuf, FrameMeta meta)
   return GST_FLOW_OK;
 }
 
+/* False when it was stopped. */
 template <typename Pixel>
-void
-fill (Fuser<Pixel> &fuser, std::vector<MappedFrame> &mapped)
+bool
+fill (
+    Fuser<Pixel> &fuser, std::vector<MappedFrame> &mapped, std::stop_token stop)
 {
   std::vector<ImageView<Pixel>> views;
   for (MappedFrame &frame : mapped)
     views.push_back (view_of<Pixel> (frame));
-  fuser.fuse (views);
+  return fuser.fuse (views, std::move (stop));
 }
 
 /* The frames of the oldest coded frame that waits; none on an error, which is
@@ -115,8 +117,16 @@ render (GstCodedExposureFuse *self, GstFlowReturn &flow)
     flow = GST_FLOW_ERROR;
     return {};
   }
-  std::visit ([&] (auto &fuser) { fill (fuser, mapped); }, plan.fuser);
-  return buffers;
+  const std::stop_token stop = [self] {
+    const ObjectLock lock (self);
+    return state (self).hurry.get_token ();
+  }();
+  const bool done = std::visit (
+      [&] (auto &fuser) { return fill (fuser, mapped, stop); }, plan.fuser);
+  if (done)
+    return buffers;
+  flow = GST_FLOW_FLUSHING;
+  return {};
 }
 
 void
@@ -160,6 +170,8 @@ push_oldest (GstCodedExposureFuse *self)
   std::vector<BufferPtr> buffers = render (self, flow);
   const Waiting coded = std::move (st.stream.waiting.front ());
   st.stream.waiting.pop_front ();
+  if (flow == GST_FLOW_FLUSHING)
+    forget_history (self);
   const int n = int (buffers.size ());
   for (int i = 0; i < n && flow == GST_FLOW_OK; i++) {
     const int k = st.stream.segment.rate < 0 ? n - 1 - i : i;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Properties of codedexposure-fuse: settings and reports. */
+#include "base/workers.h"
 #include "gstcodedexposurefusestate.h"
 
 #define GST_CAT_DEFAULT codedexposure_fuse_debug
@@ -16,6 +17,7 @@ enum {
   PROP_MAPPING,
   PROP_QUALITY,
   PROP_LOOKAHEAD,
+  PROP_THREADS,
   PROP_FULL_WELL,
   PROP_READ_NOISE,
   PROP_BITS,
@@ -85,6 +87,9 @@ set_property (
   case PROP_LOOKAHEAD:
     settings.options.lookahead = int (g_value_get_uint (value));
     break;
+  case PROP_THREADS:
+    settings.options.threads = int (g_value_get_uint (value));
+    break;
   case PROP_FULL_WELL:
     settings.options.noise.full_well = g_value_get_double (value);
     break;
@@ -138,6 +143,9 @@ get_property (
     break;
   case PROP_LOOKAHEAD:
     g_value_set_uint (value, guint (settings.options.lookahead));
+    break;
+  case PROP_THREADS:
+    g_value_set_uint (value, guint (settings.options.threads));
     break;
   case PROP_FULL_WELL:
     g_value_set_double (value, settings.options.noise.full_well);
@@ -297,6 +305,19 @@ install_settings (GObjectClass *klass)
           "still is then known from the first frame on; each adds a frame "
           "period to the latency",
           0, guint (Fuser<std::uint8_t>::kMaxLookahead), 0, kReadWrite));
+  /**
+   * codedexposure-fuse:threads:
+   *
+   * Threads that share the work of balanced and best. Applied at the next
+   * frame.
+   *
+   * Since: 0.1
+   */
+  g_object_class_install_property (klass, PROP_THREADS,
+      g_param_spec_uint ("threads", "Threads",
+          "Threads that balanced and best work on, which changes no pixel; 0: "
+          "one for each processor; fast works on the streaming thread",
+          0, guint (Workers::kMost), 0, kReadWrite));
   install_camera (klass);
 }
 

@@ -5,6 +5,7 @@
 #include <deque>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <variant>
 #include <vector>
@@ -97,12 +98,18 @@ struct FuseState {
   bool assumed = false;     ///< in_force came from nowhere
   bool rectifies = false;   ///< a mapping is in force
   GstClockTime latency = 0; ///< that lookahead adds; from the plan
+  std::stop_source hurry;   ///< for what nobody waits for any more
 
   /* Sink pad's stream lock. */
   Stream stream;
 };
 
 FuseState &state (GstCodedExposureFuse *self);
+/** Ends the fusion of a frame that is under way, which can take seconds. Any
+ * thread. */
+void hurry (GstCodedExposureFuse *self);
+/** Frames are wanted again. */
+void take_time (GstCodedExposureFuse *self);
 void notify (GstCodedExposureFuse *self, const char *property);
 
 /* Properties. */

@@ -317,12 +317,15 @@ Engine::fuse_plainly (const Field &coded, const RowSink &sink)
   }
 }
 
-void
-Engine::fuse_motion (const Field &coded, const RowSink &sink)
+bool
+Engine::fuse_motion (const Field &coded, const RowSink &sink, Workers &workers,
+    std::stop_token stop)
 {
-  motion_->run (kernels_, coded, light_);
-  if (likeness_)
-    likeness_->run (kernels_, coded, typical_noise (), light_);
+  if (!motion_->run (kernels_, coded, light_, workers, stop))
+    return false;
+  if (likeness_ && !likeness_->run (kernels_, coded, typical_noise (), light_,
+                       workers, stop))
+    return false;
   std::vector<float *> rows (light_.size ());
   for (int y = 0; y < height_; y++) {
     for (std::size_t s = 0; s < rows.size (); s++)
@@ -330,19 +333,22 @@ Engine::fuse_motion (const Field &coded, const RowSink &sink)
     blend (y, rows.data ());
     sink (y, rows.data ());
   }
+  return true;
 }
 
-void
-Engine::fuse (const RowSink &sink)
+bool
+Engine::fuse (const RowSink &sink, Workers &workers, std::stop_token stop)
 {
   const Field &coded = queue_.front ();
   find_stillness (coded);
+  bool done = true;
   if (!plain_.empty ())
     fuse_plainly (coded, sink);
   else
-    fuse_motion (coded, sink);
+    done = fuse_motion (coded, sink, workers, std::move (stop));
   spare_ = std::move (queue_.front ());
   queue_.pop_front ();
+  return done;
 }
 
 double

@@ -43,7 +43,8 @@ public:
   void take ();
 
   int pending () const { return int (queue_.size ()); }
-  void fuse (const RowSink &sink);
+  /** False when it was stopped; the frame is gone then. */
+  bool fuse (const RowSink &sink, Workers &workers, std::stop_token stop);
   void forget ();
 
 private:
@@ -58,7 +59,8 @@ private:
   void share_out (int y, Field &shares) const;
   void blend (int y, float *const *rows) const;
   void fuse_plainly (const Field &coded, const RowSink &sink);
-  void fuse_motion (const Field &coded, const RowSink &sink);
+  bool fuse_motion (const Field &coded, const RowSink &sink, Workers &workers,
+      std::stop_token stop);
   /** Standard deviation of coded pixels in grey levels. */
   double typical_noise () const;
 

@@ -164,6 +164,7 @@ struct Fuser<Pixel>::State {
   std::vector<Cover> covers;
   int slots;
   float largest;
+  std::unique_ptr<Workers> workers;
 };
 
 template <typename Pixel>
@@ -187,6 +188,10 @@ Fuser<Pixel>::make (
     return Error{"bits " + std::to_string (options.bits) +
                  ": pixels have 1 to " + std::to_string (kBits) +
                  ", and 0 stands for all of them"};
+  if (options.threads < 0 || options.threads > Workers::kMost)
+    return Error{"threads " + std::to_string (options.threads) +
+                 ": they must be 1 to " + std::to_string (Workers::kMost) +
+                 ", and 0 stands for one for each processor"};
   const int largest = (1 << (options.bits ? options.bits : kBits)) - 1;
   if (const auto within = schedule.check_size (width, height); !within)
     return within.error ();
@@ -195,7 +200,9 @@ Fuser<Pixel>::make (
     return pieces.error ();
   auto state = std::make_unique<State> (State{std::move (*pieces),
       find_covers (schedule, {width, height - schedule.pilot_rows ()}),
-      schedule.slots (), float (largest)});
+      schedule.slots (), float (largest),
+      std::make_unique<Workers> (
+          options.quality == FuseQuality::kFast ? 1 : options.threads)});
   return Fuser (std::move (state));
 }
 
@@ -238,14 +245,16 @@ Fuser<Pixel>::pending () const
 }
 
 template <typename Pixel>
-void
-Fuser<Pixel>::fuse (std::span<const ImageView<Pixel>> frames)
+bool
+Fuser<Pixel>::fuse (
+    std::span<const ImageView<Pixel>> frames, std::stop_token stop)
 {
   const float scale = state_->largest / kWhite;
+  bool done = true;
   for (Piece &piece : state_->pieces) {
     const auto &[left, top, width, height] = piece.rect;
     const std::size_t held = std::size_t (piece.held);
-    piece.engine->fuse ([&] (int y, const float *const *slots) {
+    const auto write = [&] (int y, const float *const *slots) {
       const auto row = [&] (std::size_t k) {
         return frames[k].row (top + y) + left;
       };
@@ -254,8 +263,10 @@ Fuser<Pixel>::fuse (std::span<const ImageView<Pixel>> frames)
           write_row (slots[k / held], scale, state_->largest, width, row (k));
         else
           std::copy_n (row (k - 1), width, row (k));
-    });
+    };
+    done &= piece.engine->fuse (write, *state_->workers, stop);
   }
+  return done;
 }
 
 template <typename Pixel>

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <stop_token>
 #include <string_view>
 #include <vector>
 
@@ -32,6 +33,9 @@ struct FuseOptions {
   int bits = 0;
   SensorNoise noise;
   SceneModel scene;
+  /** That balanced and best work on, 1..64; 0: one for each processor. The
+   * pixels do not depend on it. */
+  int threads = 0;
   /** One of fuse_targets (), which all give the same pixels; empty: the
    * fastest. */
   std::string_view target = {};
@@ -91,8 +95,13 @@ public:
   int pending () const;
   /** Fuses the oldest pending frame with those before and after it.
    * @p frames  slots () views of size (), in exposure order, fully
-   *            overwritten. */
-  void fuse (std::span<const ImageView<Pixel>> frames);
+   *            overwritten.
+   * @p stop    may be requested by another thread, where balanced and best
+   *            would take too long.
+   * @return    false when it was stopped: the frame is gone, the views hold
+   *            nothing of use, and forget () must be next. */
+  bool fuse (
+      std::span<const ImageView<Pixel>> frames, std::stop_token stop = {});
   /** What comes next has nothing to do with what was: frames were lost, or
    * another place was sought. Pending frames are dropped. */
   void forget ();

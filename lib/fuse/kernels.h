@@ -68,7 +68,7 @@ struct Kernels {
    * As many as 15 more than @p count are read and written. */
   void (*sum) (const float *const *rows, int rows_count, int count, float *to);
   void (*most) (const float *const *rows, int rows_count, int count, float *to);
-  /** Transforms each block (DCT in x and y, slot_transform over slots), drops
+  /** Transforms each block (slot_transform over slots, DCT in x and y), drops
    * coefficients below the threshold but the mean, transforms back, and adds
    * it weighted with 1 / coefficients kept. */
   void (*shrink) (const ShrinkRow &row);

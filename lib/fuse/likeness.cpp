@@ -18,6 +18,11 @@ constexpr int kIterations = 40;
  * noise; with noise, the last is as many standard deviations. */
 constexpr double kFirstThreshold = 30.0, kLastThreshold = 2.0;
 constexpr double kNoiseThreshold = 1.8;
+/* Rows of blocks that are shrunk, and rows of pixels that are mended, at a
+ * time. Strips of blocks overlap the next ones only. */
+constexpr int kStripBlocks = 6;
+constexpr int kStripRows = 24;
+static_assert (kStripBlocks * kBlockStep >= kBlock - kBlockStep);
 
 int
 round_up (int value, int step)
@@ -43,7 +48,6 @@ Likeness::Likeness (const Schedule &schedule, const Observation &observation,
   weight_.resize (area);
   light_.assign (slots, std::vector<float> (area));
   sum_ = light_;
-  scratch_.resize (slots * kBlock * kBlock * Field::kSlack);
   for (int y = -kBorder; y < height + kBorder; y++)
     for (int x = -kBorder; x < int (stride_) - kBorder; x++)
       elements_[place (x, y)] = std::uint8_t (
@@ -70,45 +74,75 @@ Likeness::split (const Field &field, std::vector<float> &plane) const
 }
 
 /* Blocks begin at another pixel in each iteration. */
-void
-Likeness::shrink (const Kernels &kernels, int iteration, float threshold)
-{
-  for (auto &sum : sum_)
-    std::fill (sum.begin (), sum.end (), 0.0f);
-  std::fill (weight_.begin (), weight_.end (), 0.0f);
+struct Likeness::Step {
+  const Kernels &kernels;
+  int shift_x, shift_y;
+  float threshold;
+};
 
-  const int shift_y = iteration % kBlockStep;
-  const int shift_x = (iteration / 2 + 2 * iteration) % kBlockStep;
+void
+Likeness::shrink_strip (const Step &step, int strip, float *scratch)
+{
   const std::size_t slots = light_.size ();
   std::vector<const float *> source (slots);
   std::vector<float *> sum (slots);
   const int blocks =
-      round_up ((width_ + kBorder - shift_x + kBlockStep - 1) / kBlockStep,
+      round_up ((width_ + kBorder - step.shift_x + kBlockStep - 1) / kBlockStep,
           Field::kSlack);
-  for (int y = shift_y; y + kBlock <= height_ + 2 * kBorder; y += kBlockStep) {
+  for (int i = 0; i < kStripBlocks; i++) {
+    const int y = step.shift_y + (strip * kStripBlocks + i) * kBlockStep;
+    if (y + kBlock > height_ + 2 * kBorder)
+      return;
     const std::ptrdiff_t start = y * stride_;
     for (std::size_t s = 0; s < slots; s++) {
       source[s] = light_[s].data () + start;
       sum[s] = sum_[s].data () + start;
     }
-    kernels.shrink ({source.data (), sum.data (), weight_.data () + start,
-        stride_, split_, shift_x, int (slots), transform_.data (), blocks,
-        threshold, scratch_.data ()});
-  }
-  for (std::size_t s = 0; s < slots; s++) {
-    float *light = light_[s].data ();
-    const float *total = sum_[s].data ();
-    for (std::size_t i = 0; i < weight_.size (); i++)
-      light[i] = weight_[i] > 0.0f ? total[i] / weight_[i] : light[i];
+    step.kernels.shrink ({source.data (), sum.data (), weight_.data () + start,
+        stride_, split_, step.shift_x, int (slots), transform_.data (), blocks,
+        step.threshold, scratch});
   }
 }
 
-/* Moves the light of each pixel's slots to where the coded pixel is what it
- * was. */
-void
-Likeness::put_back ()
+/* Every other strip first, then those between: sums are added up in the same
+ * order whoever does it, and by one at a time. */
+bool
+Likeness::shrink (const Step &step, Workers &workers, std::stop_token stop)
 {
-  for (std::size_t i = 0; i < coded_.size (); i++) {
+  const int rows = (height_ + 2 * kBorder - kBlock - step.shift_y) / kBlockStep;
+  const int strips = rows / kStripBlocks + 1;
+  for (const int odd : {0, 1})
+    if (!workers.run ((strips + 1 - odd) / 2,
+            [&] (int part, int worker) {
+              shrink_strip (
+                  step, 2 * part + odd, scratch_[std::size_t (worker)].data ());
+            },
+            stop))
+      return false;
+  const int height = height_ + 2 * kBorder;
+  return workers.run ((height + kStripRows - 1) / kStripRows,
+      [&] (int part, int) {
+        mend_rows (
+            part * kStripRows, std::min (height, (part + 1) * kStripRows));
+      },
+      stop);
+}
+
+/* The light of rows @first .. @end - 1 from the sums, which are cleared; and
+ * moved to where the coded pixels are what they were. */
+void
+Likeness::mend_rows (int first, int end)
+{
+  const auto from = std::size_t (first * stride_);
+  const auto to = std::size_t (end * stride_);
+  for (std::size_t s = 0; s < light_.size (); s++) {
+    float *light = light_[s].data (), *sum = sum_[s].data ();
+    for (std::size_t i = from; i < to; i++)
+      light[i] = weight_[i] > 0.0f ? sum[i] / weight_[i] : light[i];
+    std::fill (sum + from, sum + to, 0.0f);
+  }
+  std::fill (weight_.data () + from, weight_.data () + to, 0.0f);
+  for (std::size_t i = from; i < to; i++) {
     const auto &shares = observation_.shares (elements_[i]);
     double seen = 0.0, power = 0.0;
     for (const auto &[slot, response] : shares) {
@@ -121,21 +155,29 @@ Likeness::put_back ()
   }
 }
 
-void
+bool
 Likeness::run (const Kernels &kernels, const Field &coded, double noise,
-    std::span<Field> slots)
+    std::span<Field> slots, Workers &workers, std::stop_token stop)
 {
+  scratch_.resize (std::size_t (workers.count ()));
+  for (auto &scratch : scratch_)
+    scratch.resize (slots.size () * kBlock * kBlock * Field::kSlack);
   split (coded, coded_);
-  for (std::size_t s = 0; s < slots.size (); s++)
+  for (std::size_t s = 0; s < slots.size (); s++) {
     split (slots[s], light_[s]);
+    std::fill (sum_[s].begin (), sum_[s].end (), 0.0f);
+  }
+  std::fill (weight_.begin (), weight_.end (), 0.0f);
 
   const double last = std::max (kLastThreshold, kNoiseThreshold * noise);
   const double first = std::max (kFirstThreshold, 2.0 * last);
   for (int i = 0; i < kIterations; i++) {
     const double threshold =
         first * std::pow (last / first, double (i) / (kIterations - 1));
-    shrink (kernels, i, float (threshold));
-    put_back ();
+    if (!shrink ({kernels, (i / 2 + 2 * i) % kBlockStep, i % kBlockStep,
+                     float (threshold)},
+            workers, stop))
+      return false;
   }
   for (std::size_t s = 0; s < slots.size (); s++) {
     for (int y = 0; y < height_; y++) {
@@ -144,6 +186,7 @@ Likeness::run (const Kernels &kernels, const Field &coded, double noise,
         row[x] = 0.5f * (row[x] + light_[s][place (x, y)]);
     }
   }
+  return true;
 }
 
 } // namespace cexp::fuse

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "base/workers.h"
 #include "fuse/field.h"
 #include "fuse/kernels.h"
 #include "fuse/observation.h"
@@ -26,17 +27,21 @@ public:
       int height);
 
   /** Improves @p slots, a guess of the light of each slot, by @p coded.
-   * @p noise  standard deviation of the coded pixels' noise, grey levels. */
-  void run (const Kernels &kernels, const Field &coded, double noise,
-      std::span<Field> slots);
+   * The same by any number of workers.
+   * @p noise  standard deviation of the coded pixels' noise, grey levels.
+   * @return   false when it was stopped. */
+  bool run (const Kernels &kernels, const Field &coded, double noise,
+      std::span<Field> slots, Workers &workers, std::stop_token stop);
 
 private:
   /* Planes are split into every fourth column, as kernels want them, with a
    * mirrored border of a block. */
   std::size_t place (int x, int y) const;
   void split (const Field &field, std::vector<float> &plane) const;
-  void shrink (const Kernels &kernels, int iteration, float threshold);
-  void put_back ();
+  struct Step;
+  bool shrink (const Step &step, Workers &workers, std::stop_token stop);
+  void shrink_strip (const Step &step, int strip, float *scratch);
+  void mend_rows (int first, int end);
 
   const Observation &observation_;
   int width_, height_;
@@ -46,7 +51,7 @@ private:
   std::vector<float> coded_;
   std::vector<std::vector<float>> light_, sum_; ///< of each slot
   std::vector<float> weight_;
-  std::vector<float> scratch_;
+  std::vector<std::vector<float>> scratch_; ///< of each worker
 };
 
 } // namespace cexp::fuse

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
 #include "fuse/kriging.h"
 
@@ -179,30 +180,43 @@ Motion::weigh (Band &band) const
 }
 
 void
-Motion::run (
-    const Kernels &kernels, const Field &coded, std::span<Field> slots) const
+Motion::mix (const Kernels &kernels, const Field &coded, const Band &band,
+    std::span<Field> slots) const
 {
-  const int width = coded.width (), height = coded.height ();
-  Band band (width, filters_.size ());
   const auto offsets = filters_[0].offsets (coded);
   std::vector<float *> to (slots.size ());
-  for (band.first = 0; band.first < height; band.first += kBandRows) {
-    band.rows = std::min (kBandRows, height - band.first);
-    measure (kernels, coded, band);
-    weigh (band);
-    for (Field &slot : slots)
-      for (int y = 0; y < band.rows; y++)
-        std::fill_n (slot.row (band.first + y), width, 0.0f);
-    for (std::size_t c = 0; c < filters_.size (); c++) {
-      for (int y = 0; y < band.rows; y++) {
-        for (std::size_t s = 0; s < slots.size (); s++)
-          to[s] = slots[s].row (band.first + y);
-        kernels.filter_add (
-            filters_[c].row (phases_, coded, band.first + y, offsets),
-            band.fit[c].row (y), to.data ());
-      }
+  for (Field &slot : slots)
+    for (int y = 0; y < band.rows; y++)
+      std::fill_n (slot.row (band.first + y), coded.width (), 0.0f);
+  for (std::size_t c = 0; c < filters_.size (); c++) {
+    for (int y = 0; y < band.rows; y++) {
+      for (std::size_t s = 0; s < slots.size (); s++)
+        to[s] = slots[s].row (band.first + y);
+      kernels.filter_add (
+          filters_[c].row (phases_, coded, band.first + y, offsets),
+          band.fit[c].row (y), to.data ());
     }
   }
+}
+
+bool
+Motion::run (const Kernels &kernels, const Field &coded, std::span<Field> slots,
+    Workers &workers, std::stop_token stop) const
+{
+  const int height = coded.height ();
+  std::vector<std::optional<Band>> bands (std::size_t (workers.count ()));
+  return workers.run ((height + kBandRows - 1) / kBandRows,
+      [&] (int part, int worker) {
+        auto &band = bands[std::size_t (worker)];
+        if (!band)
+          band.emplace (coded.width (), filters_.size ());
+        band->first = part * kBandRows;
+        band->rows = std::min (kBandRows, height - band->first);
+        measure (kernels, coded, *band);
+        weigh (*band);
+        mix (kernels, coded, *band, slots);
+      },
+      stop);
 }
 
 } // namespace cexp::fuse

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "base/workers.h"
 #include "fuse/field.h"
 #include "fuse/filter_bank.h"
 #include "fuse/observation.h"
@@ -32,14 +33,16 @@ public:
       std::span<const double> noise);
 
   /** Writes the light of every slot to @p slots, fields of the size of
-   * @p coded. */
-  void run (
-      const Kernels &kernels, const Field &coded, std::span<Field> slots) const;
+   * @p coded, the same by any number of workers; false when it was stopped. */
+  bool run (const Kernels &kernels, const Field &coded, std::span<Field> slots,
+      Workers &workers, std::stop_token stop) const;
 
 private:
   struct Band;
   void measure (const Kernels &kernels, const Field &coded, Band &band) const;
   void weigh (Band &band) const;
+  void mix (const Kernels &kernels, const Field &coded, const Band &band,
+      std::span<Field> slots) const;
 
   const Phases &phases_;
   std::vector<float> penalties_;      ///< of fast motion, a factor on its error

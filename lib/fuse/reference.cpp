@@ -87,51 +87,55 @@ public:
       at (k, y, x) = sum;
     }
   }
+  /* Slots first. */
   void read ()
   {
-    for (int s = 0; s < row_.slots; s++) {
-      for (int y = 0; y < kBlock; y++)
-        for (int x = 0; x < kBlock; x++)
+    for (int y = 0; y < kBlock; y++) {
+      for (int x = 0; x < kBlock; x++) {
+        for (int s = 0; s < row_.slots; s++)
           at (s, y, x) = row_.source[s][place (y, x)];
+        transform_slots (y, x, false);
+      }
+    }
+    for (int k = 0; k < row_.slots; k++) {
       for (int y = 0; y < kBlock; y++)
-        dct (&at (s, y, 0), 1);
+        dct (&at (k, y, 0), 1);
       for (int x = 0; x < kBlock; x++)
-        dct (&at (s, 0, x), kBlock);
+        dct (&at (k, 0, x), kBlock);
     }
   }
   /* Returns how many coefficients are left. */
   int shrink ()
   {
     int kept = 0;
-    for (int y = 0; y < kBlock; y++) {
-      for (int x = 0; x < kBlock; x++) {
-        transform_slots (y, x, false);
-        for (int s = 0; s < row_.slots; s++) {
-          const bool mean = s == 0 && y == 0 && x == 0;
-          if (mean || std::abs (at (s, y, x)) > row_.threshold)
-            kept++;
-          else
-            at (s, y, x) = 0.0f;
-        }
-        transform_slots (y, x, true);
+    for (int k = 0; k < row_.slots; k++) {
+      for (int i = 0; i < kBlock * kBlock; i++) {
+        float &value = (&at (k, 0, 0))[i];
+        const bool mean = k == 0 && i == 0;
+        if (mean || std::abs (value) > row_.threshold)
+          kept++;
+        else
+          value = 0.0f;
       }
     }
     return kept;
   }
   void add (float weight)
   {
-    for (int s = 0; s < row_.slots; s++) {
+    for (int k = 0; k < row_.slots; k++) {
       for (int x = 0; x < kBlock; x++)
-        undo_dct (&at (s, 0, x), kBlock);
-      for (int y = 0; y < kBlock; y++) {
-        undo_dct (&at (s, y, 0), 1);
-        for (int x = 0; x < kBlock; x++)
+        undo_dct (&at (k, 0, x), kBlock);
+      for (int y = 0; y < kBlock; y++)
+        undo_dct (&at (k, y, 0), 1);
+    }
+    for (int y = 0; y < kBlock; y++) {
+      for (int x = 0; x < kBlock; x++) {
+        transform_slots (y, x, true);
+        for (int s = 0; s < row_.slots; s++)
           row_.sum[s][place (y, x)] += weight * at (s, y, x);
+        row_.weight[place (y, x)] += weight;
       }
     }
-    for (int y = 0; y < kBlock; y++)
-      for (int x = 0; x < kBlock; x++)
-        row_.weight[place (y, x)] += weight;
   }
 
 private:

@@ -12,17 +12,16 @@ namespace cexp::CEXP_TARGET
 using Ints = Vector<std::int32_t>;
 constexpr int kArea = fuse::kBlock * fuse::kBlock;
 
-/* Orthonormal DCT-II of 12 values that lie @p step apart, in place; the even
- * and the odd half of the output need only sums and differences. */
+/* Orthonormal DCT-II of 12 values; the even and the odd half of the output need
+ * only sums and differences. */
 CEXP_INLINE void
-dct (float *values, std::ptrdiff_t step)
+dct (Floats *values)
 {
   constexpr int kHalf = fuse::kBlock / 2;
   Floats sum[kHalf], difference[kHalf];
 #pragma GCC unroll 6
   for (int i = 0; i < kHalf; i++) {
-    const Floats a = load (values + i * step);
-    const Floats b = load (values + (fuse::kBlock - 1 - i) * step);
+    const Floats a = values[i], b = values[fuse::kBlock - 1 - i];
     sum[i] = a + b;
     difference[i] = a - b;
   }
@@ -34,20 +33,20 @@ dct (float *values, std::ptrdiff_t step)
       even += fuse::kDct.at[2 * k][i] * sum[i];
       odd += fuse::kDct.at[2 * k + 1][i] * difference[i];
     }
-    store (values + 2 * k * step, even);
-    store (values + (2 * k + 1) * step, odd);
+    values[2 * k] = even;
+    values[2 * k + 1] = odd;
   }
 }
 
 /* The inverse of dct (). */
 CEXP_INLINE void
-undo_dct (float *values, std::ptrdiff_t step)
+undo_dct (Floats *values)
 {
   constexpr int kHalf = fuse::kBlock / 2;
   Floats in[fuse::kBlock];
 #pragma GCC unroll 12
   for (int k = 0; k < fuse::kBlock; k++)
-    in[k] = load (values + k * step);
+    in[k] = values[k];
 #pragma GCC unroll 6
   for (int i = 0; i < kHalf; i++) {
     Floats even = {}, odd = {};
@@ -56,27 +55,44 @@ undo_dct (float *values, std::ptrdiff_t step)
       even += fuse::kDct.at[2 * k][i] * in[2 * k];
       odd += fuse::kDct.at[2 * k + 1][i] * in[2 * k + 1];
     }
-    store (values + i * step, even + odd);
-    store (values + (fuse::kBlock - 1 - i) * step, even - odd);
+    values[i] = even + odd;
+    values[fuse::kBlock - 1 - i] = even - odd;
   }
 }
 
-/* values[k] = sum over s of the transform's [k][s], or [s][k], times values[s],
- * which lie @p step apart. */
-template <bool Back>
+/* 12 values that lie @p step apart. */
 CEXP_INLINE void
-transform_slots (
-    float *values, std::ptrdiff_t step, const float *transform, int slots)
+load_line (const float *from, std::ptrdiff_t step, Floats *values)
 {
-  constexpr int kMost = 16;
-  Floats in[kMost];
+#pragma GCC unroll 12
+  for (int i = 0; i < fuse::kBlock; i++)
+    values[i] = load (from + i * step);
+}
+CEXP_INLINE void
+store_line (float *to, std::ptrdiff_t step, const Floats *values)
+{
+#pragma GCC unroll 12
+  for (int i = 0; i < fuse::kBlock; i++)
+    store (to + i * step, values[i]);
+}
+
+/* out (k) = sum over s of the transform's [k][s], or [s][k], times in (s).
+ * Slots: their number where it is known while compiling, else 0. */
+template <bool Back, int Slots, typename In, typename Out>
+CEXP_INLINE void
+transform_slots (const fuse::ShrinkRow &row, In in, Out out)
+{
+  constexpr int kMost = Slots ? Slots : 16;
+  const int slots = Slots ? Slots : row.slots;
+  Floats values[kMost];
   for (int s = 0; s < slots; s++)
-    in[s] = load (values + s * step);
+    values[s] = in (s);
   for (int k = 0; k < slots; k++) {
     Floats sum = {};
     for (int s = 0; s < slots; s++)
-      sum += transform[Back ? s * slots + k : k * slots + s] * in[s];
-    store (values + k * step, sum);
+      sum +=
+          row.slot_transform[Back ? s * slots + k : k * slots + s] * values[s];
+    out (k, sum);
   }
 }
 
@@ -88,59 +104,91 @@ column (const fuse::ShrinkRow &row, int x)
          (x + row.shift) / fuse::kBlockStep;
 }
 
+constexpr std::ptrdiff_t kRow = std::ptrdiff_t (fuse::kBlock) * kFloats;
+constexpr std::ptrdiff_t kPlane = std::ptrdiff_t (kArea) * kFloats;
+
+/* Shrinks a plane of the transform over slots; returns minus the number of
+ * coefficients that are left. Keep: the first of all stays. */
+template <bool Keep>
+CEXP_INLINE Ints
+shrink_plane (float *plane, Floats threshold)
+{
+  Floats line[fuse::kBlock];
+  for (int y = 0; y < fuse::kBlock; y++) {
+    load_line (plane + y * kRow, kFloats, line);
+    dct (line);
+    store_line (plane + y * kRow, kFloats, line);
+  }
+  Ints kept = {};
+  for (int x = 0; x < fuse::kBlock; x++) {
+    load_line (plane + x * kFloats, kRow, line);
+    dct (line);
+#pragma GCC unroll 12
+    for (int y = 0; y < fuse::kBlock; y++) {
+      const Ints keep = (line[y] > threshold) | (line[y] < -threshold) |
+                        (Ints{} - int (Keep && x == 0 && y == 0));
+      kept += keep;
+      line[y] = (Floats)((Ints)line[y] & keep);
+    }
+    undo_dct (line);
+    store_line (plane + x * kFloats, kRow, line);
+  }
+  for (int y = 0; y < fuse::kBlock; y++) {
+    load_line (plane + y * kRow, kFloats, line);
+    undo_dct (line);
+    store_line (plane + y * kRow, kFloats, line);
+  }
+  return kept;
+}
+
+/* Slots first: each plane of their transform is then shrunk by itself, in the
+ * nearest cache. */
+template <int Slots>
 CEXP_INLINE void
 shrink_vector (const fuse::ShrinkRow &row, int first)
 {
-  constexpr std::ptrdiff_t kRow = std::ptrdiff_t (fuse::kBlock) * kFloats;
-  constexpr std::ptrdiff_t kSlot = std::ptrdiff_t (kArea) * kFloats;
   float *const block = row.scratch;
-
-  for (int s = 0; s < row.slots; s++) {
-    float *plane = block + s * kSlot;
-    for (int y = 0; y < fuse::kBlock; y++) {
-      for (int x = 0; x < fuse::kBlock; x++)
-        store (plane + y * kRow + x * kFloats,
-            load (row.source[s] + y * row.stride + column (row, x) + first));
-      dct (plane + y * kRow, kFloats);
-    }
-    for (int x = 0; x < fuse::kBlock; x++)
-      dct (plane + x * kFloats, kRow);
-  }
-
-  Ints kept = {};
-  const Floats threshold = Floats{} + row.threshold;
-  for (int i = 0; i < kArea; i++) {
-    float *values = block + i * kFloats;
-    transform_slots<false> (values, kSlot, row.slot_transform, row.slots);
-    for (int s = 0; s < row.slots; s++) {
-      const Floats value = load (values + s * kSlot);
-      const Ints keep = (value > threshold) | (value < -threshold) |
-                        (Ints{} - int (i == 0 && s == 0));
-      kept -= keep;
-      store (values + s * kSlot, (Floats)((Ints)value & keep));
-    }
-    transform_slots<true> (values, kSlot, row.slot_transform, row.slots);
-  }
-
-  const Floats weight = 1.0f / __builtin_convertvector(kept, Floats);
-  for (int s = 0; s < row.slots; s++) {
-    float *plane = block + s * kSlot;
-    for (int x = 0; x < fuse::kBlock; x++)
-      undo_dct (plane + x * kFloats, kRow);
-    for (int y = 0; y < fuse::kBlock; y++) {
-      undo_dct (plane + y * kRow, kFloats);
-      for (int x = 0; x < fuse::kBlock; x++) {
-        float *to = row.sum[s] + y * row.stride + column (row, x) + first;
-        store (to, load (to) + weight * load (plane + y * kRow + x * kFloats));
-      }
-    }
-  }
   for (int y = 0; y < fuse::kBlock; y++) {
     for (int x = 0; x < fuse::kBlock; x++) {
-      float *to = row.weight + y * row.stride + column (row, x) + first;
+      const std::ptrdiff_t at = y * row.stride + column (row, x) + first;
+      float *to = block + y * kRow + x * kFloats;
+      transform_slots<false, Slots> (
+          row,
+          [&] (int s) CEXP_INLINE_BODY { return load (row.source[s] + at); },
+          [&] (int k, Floats value)
+              CEXP_INLINE_BODY { store (to + k * kPlane, value); });
+    }
+  }
+
+  const Floats threshold = Floats{} + row.threshold;
+  Ints kept = shrink_plane<true> (block, threshold);
+  for (int k = 1; k < row.slots; k++)
+    kept += shrink_plane<false> (block + k * kPlane, threshold);
+
+  const Floats weight = -1.0f / __builtin_convertvector(kept, Floats);
+  for (int y = 0; y < fuse::kBlock; y++) {
+    for (int x = 0; x < fuse::kBlock; x++) {
+      const std::ptrdiff_t at = y * row.stride + column (row, x) + first;
+      const float *from = block + y * kRow + x * kFloats;
+      transform_slots<true, Slots> (
+          row,
+          [&] (int k) CEXP_INLINE_BODY { return load (from + k * kPlane); },
+          [&] (int s, Floats value) CEXP_INLINE_BODY {
+            float *to = row.sum[s] + at;
+            store (to, load (to) + weight * value);
+          });
+      float *to = row.weight + at;
       store (to, load (to) + weight);
     }
   }
+}
+
+template <int Slots>
+CEXP_INLINE void
+shrink_all (const fuse::ShrinkRow &row)
+{
+  for (int first = row.blocks - kFloats; first >= 0; first -= kFloats)
+    shrink_vector<Slots> (row, first);
 }
 
 /* From the last to the first: a pixel then gets what its blocks have in the
@@ -148,8 +196,12 @@ shrink_vector (const fuse::ShrinkRow &row, int first)
 inline void
 shrink (const fuse::ShrinkRow &row)
 {
-  for (int first = row.blocks - kFloats; first >= 0; first -= kFloats)
-    shrink_vector (row, first);
+  if (row.slots == 4)
+    shrink_all<4> (row);
+  else if (row.slots == 8)
+    shrink_all<8> (row);
+  else
+    shrink_all<0> (row);
 }
 
 } // namespace cexp::CEXP_TARGET

@@ -51,6 +51,7 @@ fuse (benchmark::State &state, const char *preset, FuseQuality quality)
   const Schedule schedule = Schedule::from_preset (preset).value ();
   FuseOptions options;
   options.quality = quality;
+  options.threads = 1;
   auto fuser =
       Fuser<std::uint8_t>::make (schedule, kWidth, kHeight, options).value ();
   const auto frames = coded_frames (schedule);

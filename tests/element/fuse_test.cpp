@@ -365,6 +365,23 @@ TEST_F (Fuse, AFlushDropsWhatWaits)
   EXPECT_EQ (pull_images (), expected ("sequential:lattice:4/2", {7}));
 }
 
+/* A flush ends what is fused at that moment; what comes after it is not. */
+TEST_F (Fuse, FusesAgainAfterAFlush)
+{
+  start ("schedule=sequential:2x2 quality=balanced threads=2");
+  push (0);
+  pull_all ();
+  ASSERT_TRUE (fuse->push_event (gst_event_new_flush_start ()));
+  ASSERT_TRUE (fuse->push_event (gst_event_new_flush_stop (TRUE)));
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_TIME);
+  ASSERT_TRUE (fuse->push_event (gst_event_new_segment (&segment)));
+  push (7, 0);
+  FuseOptions options;
+  options.quality = FuseQuality::kBalanced;
+  EXPECT_EQ (pull_images (), expected ("sequential:2x2", {7}, options));
+}
+
 /* --------------------------------------------------------------- losses -- */
 
 TEST_F (Fuse, ALossIsSaidAndStartsHistoryAnew)

@@ -286,6 +286,55 @@ TEST (Fuse, AllTargetsGiveTheSamePixels)
   }
 }
 
+/* Enough rows for several bands of each kind. */
+TEST (Fuse, AnyNumberOfThreadsGivesTheSamePixels)
+{
+  const Schedule schedule = schedule_of ("sequential:lattice:4/2");
+  const auto coded = take (schedule, 1, [] (int slot) {
+    return draw (
+        24, 160, [slot] (int x, int y) { return texture (x - slot, y); });
+  });
+  for (const FuseQuality quality :
+      {FuseQuality::kBalanced, FuseQuality::kBest}) {
+    FuseOptions options = with_quality (quality);
+    options.threads = 1;
+    const auto expected = fuse (coded, schedule, options);
+    for (const int threads : {2, 3, 7}) {
+      options.threads = threads;
+      EXPECT_EQ (fuse (coded, schedule, options), expected)
+          << threads << ' ' << quality_name (quality);
+    }
+  }
+}
+
+TEST (Fuse, StopsWhenItIsAskedToAndBeginsAnew)
+{
+  const Schedule schedule = schedule_of ("sequential:2x2");
+  const auto coded = take (schedule, 1, [] (int slot) {
+    return draw (
+        24, 20, [slot] (int x, int y) { return texture (x - slot, y); });
+  });
+  for (const FuseQuality quality :
+      {FuseQuality::kBalanced, FuseQuality::kBest}) {
+    const FuseOptions options = with_quality (quality);
+    auto fuser = Fuser<std::uint8_t>::make (schedule, 24, 20, options);
+    ASSERT_TRUE (fuser);
+    Pictures<> slots (4, Image<std::uint8_t> (24, 20));
+    std::vector<ImageView<std::uint8_t>> views;
+    for (auto &slot : slots)
+      views.push_back (slot.view ());
+    std::stop_source stop;
+    stop.request_stop ();
+    fuser->take (coded[0].view ());
+    EXPECT_FALSE (fuser->fuse (views, stop.get_token ()));
+    EXPECT_EQ (fuser->pending (), 0);
+    fuser->forget ();
+    fuser->take (coded[0].view ());
+    EXPECT_TRUE (fuser->fuse (views));
+    EXPECT_EQ (slots, fuse (coded, schedule, options));
+  }
+}
+
 /* -------------------------------------------------------------- pixels -- */
 
 constexpr const char *kSchedules[] = {"sequential:2x2", "sequential:4x2",
@@ -573,6 +622,10 @@ TEST (Fuse, RefusesWhatItCannotDo)
   options = {};
   options.lookahead = 2;
   EXPECT_NE (error_of ("sequential:2x2", 8, 8, options).find ("lookahead 2"),
+      std::string::npos);
+  options = {};
+  options.threads = 65;
+  EXPECT_NE (error_of ("sequential:2x2", 8, 8, options).find ("threads 65"),
       std::string::npos);
   options = with_quality (FuseQuality::kBest);
   EXPECT_NE (error_of ("sequential:5x5", 32, 32, options).find ("quality=fast"),

@@ -8,11 +8,8 @@
 
 #include <unistd.h>
 
+#include "player.h"
 #include <glib-unix.h>
-#include <gst/gst.h>
-
-#include "gstraii.h"
-#include "report.h"
 
 namespace
 {
@@ -43,42 +40,15 @@ text_of (const GstStructure *structure, const char *field)
   return text ? text : "";
 }
 
-class Guide
+class Guide : public Player
 {
 public:
-  Guide (const char *what, const char *stage)
-      : status_ (what ? what : "guide"), stage_name_ (stage ? stage : ""),
-        loop_ (g_main_loop_new (nullptr, FALSE))
-  {
-  }
-  ~Guide ()
-  {
-    if (pipeline_) {
-      gst_element_set_state (pipeline_.get (), GST_STATE_NULL);
-      const ObjectPtr<GstBus> bus (gst_element_get_bus (pipeline_.get ()));
-      gst_bus_remove_watch (bus.get ());
-    }
-    g_main_loop_unref (loop_);
-  }
-  Guide (const Guide &) = delete;
-  Guide &operator= (const Guide &) = delete;
+  explicit Guide (const char *what) : Player (what ? what : "guide") {}
 
-  bool parse (const char *description);
-  int run ();
+  /** @p stage: the element that stands for a person's hand; null: a person. */
+  int run (const char *stage);
 
 private:
-  static gboolean on_bus (GstBus *, GstMessage *message, gpointer self)
-  {
-    static_cast<Guide *> (self)->on_message (message);
-    return G_SOURCE_CONTINUE;
-  }
-  static gboolean on_signal (gpointer self)
-  {
-    auto *guide = static_cast<Guide *> (self);
-    guide->status_.line ("stopped; the mirrors are given back");
-    guide->quit (guide->is_done () ? kDone : kFailed);
-    return G_SOURCE_CONTINUE;
-  }
   static gboolean on_key (gint, GIOCondition, gpointer self)
   {
     return static_cast<Guide *> (self)->take_key ();
@@ -86,46 +56,31 @@ private:
 
   gboolean take_key ();
   bool is_done ();
-  void on_message (GstMessage *message);
+  void begin () override
+  {
+    gst_element_set_state (pipeline_.get (), GST_STATE_PLAYING);
+  }
+  void on_signal () override;
+  void on_message (GstMessage *message) override;
   void on_element (const GstStructure *structure);
   void on_state (const std::string &state);
   void on_reading (const GstStructure *reading);
   void on_mapping (const GstStructure *mapping);
   void turn_stage (const GstStructure *reading);
-  void quit (int code)
-  {
-    code_ = code;
-    g_main_loop_quit (loop_);
-  }
 
-  Status status_;
-  std::string stage_name_;
-  GMainLoop *loop_;
-  ObjectPtr<GstElement> pipeline_, calib_, stage_;
+  ObjectPtr<GstElement> calib_, stage_;
   int readings_ = 0;
   std::string last_reading_;
   bool mapped_ = false;
   bool unwritten_ = false; ///< a file that was asked for
   bool listens_ = false;   ///< to keys
-  int code_ = kDone;
 };
 
-bool
-Guide::parse (const char *description)
+void
+Guide::on_signal ()
 {
-  GError *error = nullptr;
-  GstElement *parsed = gst_parse_launch_full (
-      description, nullptr, GST_PARSE_FLAG_FATAL_ERRORS, &error);
-  if (!parsed) {
-    status_.line (format ("the pipeline is wrong: %s", error->message));
-    g_clear_error (&error);
-    return false;
-  }
-  pipeline_.reset (GST_ELEMENT (gst_object_ref_sink (parsed)));
-  calib_.reset (gst_bin_get_by_name (GST_BIN (parsed), "calib"));
-  if (!stage_name_.empty ())
-    stage_.reset (gst_bin_get_by_name (GST_BIN (parsed), stage_name_.c_str ()));
-  return true;
+  status_.line ("stopped; the mirrors are given back");
+  quit (is_done () ? kDone : kFailed);
 }
 
 /* Enter: the person wants the mapping as the bench stands. */
@@ -284,8 +239,7 @@ Guide::on_message (GstMessage *message)
     quit (mapped_ ? kDone : kFailed);
     break;
   case GST_MESSAGE_WARNING:
-    gst_message_parse_warning (message, &error, &text);
-    status_.line ("warning: " + told (message, error, text));
+    status_.line ("warning: " + warned (message));
     break;
   case GST_MESSAGE_PROGRESS:
     gst_message_parse_progress (message, nullptr, nullptr, &text);
@@ -305,20 +259,14 @@ Guide::on_message (GstMessage *message)
 }
 
 int
-Guide::run ()
+Guide::run (const char *stage)
 {
-  const ObjectPtr<GstBus> bus (gst_element_get_bus (pipeline_.get ()));
-  gst_bus_add_watch (bus.get (), on_bus, this);
-  const guint sources[] = {g_unix_signal_add (SIGINT, on_signal, this),
-      g_unix_signal_add (SIGTERM, on_signal, this)};
+  calib_ = find ("calib");
+  stage_ = find (stage);
   listens_ = isatty (STDIN_FILENO) != 0;
   if (listens_)
     g_unix_fd_add (STDIN_FILENO, G_IO_IN, on_key, this);
-  gst_element_set_state (pipeline_.get (), GST_STATE_PLAYING);
-  g_main_loop_run (loop_);
-  for (const guint source : sources)
-    g_source_remove (source);
-  return code_;
+  return loop ();
 }
 
 } // namespace
@@ -334,24 +282,16 @@ main (int argc, char **argv)
           "codedexposure-sim to turn as a person would", "NAME"},
       {},
   };
-  GOptionContext *context = g_option_context_new ("PIPELINE");
-  g_option_context_add_main_entries (context, entries, nullptr);
-  g_option_context_add_group (context, gst_init_get_option_group ());
-  GError *error = nullptr;
-  const bool parsed = g_option_context_parse (context, &argc, &argv, &error);
-  g_option_context_free (context);
-  if (!parsed || argc != 2) {
-    std::fprintf (stderr, "codedexposure-guide: %s\n",
-        error ? error->message : "one PIPELINE is needed");
-    g_clear_error (&error);
+  const char *pipeline =
+      pipeline_argument ("codedexposure-guide", entries, argc, argv);
+  if (!pipeline)
     return kUsage;
-  }
 
   int code = kFailed;
   {
-    Guide guide (what, stage);
-    if (guide.parse (argv[1]))
-      code = guide.run ();
+    Guide guide (what);
+    if (guide.parse (pipeline))
+      code = guide.run (stage);
   }
   g_free (what);
   g_free (stage);

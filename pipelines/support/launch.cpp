@@ -3,18 +3,13 @@
  * how far it is, what went wrong and what was counted. */
 #include <atomic>
 #include <chrono>
-#include <csignal>
 #include <cstdio>
 #include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include <glib-unix.h>
-#include <gst/gst.h>
-
-#include "gstraii.h"
-#include "report.h"
+#include "player.h"
 
 namespace
 {
@@ -73,61 +68,31 @@ private:
   std::atomic<gint64> in_ = 0, out_ = 0;
 };
 
-class Launch
+class Launch : public Player
 {
 public:
-  Launch (const Options &options)
-      : options_ (options), status_ (options.what ? options.what : "launch"),
-        loop_ (g_main_loop_new (nullptr, FALSE))
+  explicit Launch (const Options &options)
+      : Player (options.what ? options.what : "launch"), options_ (options)
   {
   }
-  ~Launch ()
-  {
-    if (pipeline_) {
-      gst_element_set_state (pipeline_.get (), GST_STATE_NULL);
-      const ObjectPtr<GstBus> bus (gst_element_get_bus (pipeline_.get ()));
-      gst_bus_remove_watch (bus.get ());
-    }
-    g_main_loop_unref (loop_);
-  }
-  Launch (const Launch &) = delete;
-  Launch &operator= (const Launch &) = delete;
 
-  bool parse (const char *description);
   int run ();
 
 private:
-  GstElement *find (const gchar *name);
   bool connect_counter ();
   void watch_leaky_queues ();
   template <typename Visit>
   void for_each_element (Visit visit);
-  void start ();
+  void begin () override;
   bool has_receiver ();
   void seek ();
   void play ();
-  void interrupt ();
-  void on_message (GstMessage *message);
+  void on_signal () override;
+  void on_message (GstMessage *message) override;
   void on_error (GstMessage *message);
   void on_element_message (GstMessage *message);
   void tick ();
   void summarise ();
-  void quit (int code)
-  {
-    code_ = code;
-    g_main_loop_quit (loop_);
-  }
-
-  static gboolean on_bus (GstBus *, GstMessage *message, gpointer self)
-  {
-    static_cast<Launch *> (self)->on_message (message);
-    return G_SOURCE_CONTINUE;
-  }
-  static gboolean on_signal (gpointer self)
-  {
-    static_cast<Launch *> (self)->interrupt ();
-    return G_SOURCE_CONTINUE;
-  }
   static gboolean on_tick (gpointer self)
   {
     static_cast<Launch *> (self)->tick ();
@@ -146,9 +111,6 @@ private:
       GstPad *, GstPadProbeInfo *info, gpointer self);
 
   const Options &options_;
-  Status status_;
-  GMainLoop *loop_;
-  ObjectPtr<GstElement> pipeline_;
   ObjectPtr<GstPad> counted_;
   std::vector<std::unique_ptr<LeakyQueue>> leaky_queues_;
   std::atomic<gint64> frames_ = 0;
@@ -160,44 +122,7 @@ private:
   bool held_ = false;
   bool playing_ = false;
   bool interrupted_ = false;
-  int code_ = kDone;
 };
-
-bool
-Launch::parse (const char *description)
-{
-  GError *error = nullptr;
-  GstParseContext *context = gst_parse_context_new ();
-  GstElement *parsed = gst_parse_launch_full (
-      description, context, GST_PARSE_FLAG_FATAL_ERRORS, &error);
-  gchar **missing = gst_parse_context_get_missing_elements (context);
-  for (gchar **name = missing; name && *name; name++) {
-    const std::string package = package_of (*name);
-    status_.line (format ("there is no element \"%s\"%s%s", *name,
-        package.empty () ? "" : ": apt-get install ", package.c_str ()));
-  }
-  if (error && !missing)
-    status_.line (format ("the pipeline is wrong: %s", error->message));
-  g_strfreev (missing);
-  g_clear_error (&error);
-  gst_parse_context_free (context);
-  if (!parsed)
-    return false;
-  if (!GST_IS_PIPELINE (parsed)) { // a lone element is not wrapped
-    GstElement *pipeline = gst_pipeline_new (nullptr);
-    gst_bin_add (GST_BIN (pipeline), parsed);
-    parsed = pipeline;
-  }
-  pipeline_.reset (GST_ELEMENT (gst_object_ref_sink (parsed)));
-  return true;
-}
-
-GstElement *
-Launch::find (const gchar *name)
-{
-  return name ? gst_bin_get_by_name (GST_BIN (pipeline_.get ()), name)
-              : nullptr;
-}
 
 /* Whether what lasts from the time of @frame on is asked for. A demuxer also
  * sends what comes before a seek's start, for decoders to begin with. */
@@ -353,7 +278,7 @@ Launch::has_receiver ()
 }
 
 void
-Launch::start ()
+Launch::begin ()
 {
   retry_until_ = Clock::now () +
                  std::chrono::milliseconds (gint64 (options_.retry * 1000));
@@ -369,19 +294,11 @@ Launch::run ()
   if (!connect_counter ())
     return kFailed;
   watch_leaky_queues ();
-  const ObjectPtr<GstBus> bus (gst_element_get_bus (pipeline_.get ()));
-  gst_bus_add_watch (bus.get (), on_bus, this);
-  const guint sources[] = {g_unix_signal_add (SIGINT, on_signal, this),
-      g_unix_signal_add (SIGTERM, on_signal, this),
-      g_timeout_add (200, on_tick, this)};
-
-  start ();
-  g_main_loop_run (loop_);
-
-  for (const guint source : sources)
-    g_source_remove (source);
-  if (code_ != kDone || !counted_)
-    return code_;
+  const guint ticks = g_timeout_add (200, on_tick, this);
+  const int code = loop ();
+  g_source_remove (ticks);
+  if (code != kDone || !counted_)
+    return code;
   if (frames_ == 0) {
     status_.line (options_.start > 0
                       ? format ("error: no coded frame came: is %g s after the "
@@ -397,7 +314,7 @@ Launch::run ()
 /* The first request ends the stream, so that files are finished; the second
  * does not wait for that. */
 void
-Launch::interrupt ()
+Launch::on_signal ()
 {
   if (interrupted_ || !playing_) {
     status_.line ("stopped");
@@ -578,23 +495,15 @@ main (int argc, char **argv)
           "Let the first counted frame have this running time", "SECONDS"},
       {},
   };
-  GOptionContext *context = g_option_context_new ("PIPELINE");
-  g_option_context_add_main_entries (context, entries, nullptr);
-  g_option_context_add_group (context, gst_init_get_option_group ());
-  GError *error = nullptr;
-  const bool parsed = g_option_context_parse (context, &argc, &argv, &error);
-  g_option_context_free (context);
-  if (!parsed || argc != 2) {
-    std::fprintf (stderr, "codedexposure-launch: %s\n",
-        error ? error->message : "one PIPELINE is needed");
-    g_clear_error (&error);
+  const char *pipeline =
+      pipeline_argument ("codedexposure-launch", entries, argc, argv);
+  if (!pipeline)
     return kUsage;
-  }
 
   int code = kFailed;
   {
     Launch launch (options);
-    if (launch.parse (argv[1]))
+    if (launch.parse (pipeline))
       code = launch.run ();
   }
   g_free (options.what);

@@ -1,0 +1,122 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "player.h"
+
+#include <csignal>
+#include <cstdio>
+#include <string>
+
+#include <glib-unix.h>
+
+using namespace cexp::gst;
+using report::format;
+
+Player::Player (const char *what)
+    : status_ (what), loop_ (g_main_loop_new (nullptr, FALSE))
+{
+}
+
+Player::~Player ()
+{
+  if (pipeline_) {
+    gst_element_set_state (pipeline_.get (), GST_STATE_NULL);
+    const ObjectPtr<GstBus> bus (gst_element_get_bus (pipeline_.get ()));
+    gst_bus_remove_watch (bus.get ());
+  }
+  g_main_loop_unref (loop_);
+}
+
+bool
+Player::parse (const char *description)
+{
+  GError *error = nullptr;
+  GstParseContext *context = gst_parse_context_new ();
+  GstElement *parsed = gst_parse_launch_full (
+      description, context, GST_PARSE_FLAG_FATAL_ERRORS, &error);
+  if (!parsed && !say_missing (context))
+    status_.line (format ("the pipeline is wrong: %s", error->message));
+  g_clear_error (&error);
+  gst_parse_context_free (context);
+  if (!parsed)
+    return false;
+  if (!GST_IS_PIPELINE (parsed)) { // a lone element is not wrapped
+    GstElement *pipeline = gst_pipeline_new (nullptr);
+    gst_bin_add (GST_BIN (pipeline), parsed);
+    parsed = pipeline;
+  }
+  pipeline_.reset (GST_ELEMENT (gst_object_ref_sink (parsed)));
+  return true;
+}
+
+/* Names the elements that there are not, and what has them. The context also
+ * lists those that could not be set up. */
+bool
+Player::say_missing (GstParseContext *context)
+{
+  bool said = false;
+  gchar **names = gst_parse_context_get_missing_elements (context);
+  for (gchar **name = names; name && *name; name++) {
+    if (const ObjectPtr<GstElementFactory> found{
+            gst_element_factory_find (*name)})
+      continue;
+    const std::string package = report::package_of (*name);
+    status_.line (format ("there is no element \"%s\"%s%s", *name,
+        package.empty () ? "" : ": apt-get install ", package.c_str ()));
+    said = true;
+  }
+  g_strfreev (names);
+  return said;
+}
+
+int
+Player::loop ()
+{
+  const auto on_bus = [] (GstBus *, GstMessage *message, gpointer self) {
+    static_cast<Player *> (self)->on_message (message);
+    return gboolean (G_SOURCE_CONTINUE);
+  };
+  const auto on_unix_signal = [] (gpointer self) {
+    static_cast<Player *> (self)->on_signal ();
+    return gboolean (G_SOURCE_CONTINUE);
+  };
+  const ObjectPtr<GstBus> bus (gst_element_get_bus (pipeline_.get ()));
+  gst_bus_add_watch (bus.get (), on_bus, this);
+  const guint signals[] = {g_unix_signal_add (SIGINT, on_unix_signal, this),
+      g_unix_signal_add (SIGTERM, on_unix_signal, this)};
+  begin ();
+  g_main_loop_run (loop_);
+  for (const guint source : signals)
+    g_source_remove (source);
+  return code_;
+}
+
+void
+Player::quit (int code)
+{
+  code_ = code;
+  g_main_loop_quit (loop_);
+}
+
+ObjectPtr<GstElement>
+Player::find (const char *name) const
+{
+  return ObjectPtr<GstElement> (
+      name ? gst_bin_get_by_name (GST_BIN (pipeline_.get ()), name) : nullptr);
+}
+
+const char *
+pipeline_argument (
+    const char *program, const GOptionEntry *entries, int argc, char **argv)
+{
+  GOptionContext *context = g_option_context_new ("PIPELINE");
+  g_option_context_add_main_entries (context, entries, nullptr);
+  g_option_context_add_group (context, gst_init_get_option_group ());
+  GError *error = nullptr;
+  const bool parsed = g_option_context_parse (context, &argc, &argv, &error);
+  g_option_context_free (context);
+  if (parsed && argc == 2)
+    return argv[1];
+  std::fprintf (stderr, "%s: %s\n", program,
+      error ? error->message : "one PIPELINE is needed");
+  g_clear_error (&error);
+  return nullptr;
+}

@@ -1,7 +1,17 @@
 # shellcheck shell=bash disable=SC2154 # pipelines, out: of those who source it
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# The picture that explains one coded frame; sourced by pipelines/demo. Drawn by
-# GStreamer, panel by panel.
+# Pictures that GStreamer draws, panel by panel; sourced by pipelines/demo, for the
+# one that explains a coded frame, and by pipelines/report.
+
+# What is drawn without a word, unless it fails.
+play_quietly ()
+{
+  "$launcher" --what="$script" "$1" >"$out/log" 2>&1 || {
+    cat "$out/log" >&2
+    die "that failed"
+  }
+  rm "$out/log"
+}
 
 # A picture as the source of a stream of one frame.
 still ()
@@ -19,8 +29,8 @@ crop ()  # crop X Y W H of a frame of 768x576
 # Every pixel becomes a square; the result has that size.
 magnify_to ()
 {
-  printf 'videoscale method=nearest-neighbour ! video/x-raw,width=%d,height=%d ! ' \
-    "$1" "$2"
+  printf 'videoscale method=nearest-neighbour add-borders=false ! '
+  printf 'video/x-raw,width=%d,height=%d,pixel-aspect-ratio=1/1 ! ' "$1" "$2"
 }
 
 red_frame ()

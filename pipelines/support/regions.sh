@@ -1,0 +1,93 @@
+# shellcheck shell=bash disable=SC2154 # out: of those who source it
+# SPDX-License-Identifier: LGPL-2.1-or-later
+# The sheet that shows a frame with regions; sourced by pipelines/report, after
+# figure.sh. Drawn by GStreamer.
+
+sheet_width=1544 sheet_gap=8 sheet_most=32
+
+# The regions of the schedule in force, WxH+X+Y each, as the demux said.
+regions_said_in ()  # regions_said_in LOG
+{
+  grep 'info: demux: src and the subframe pads' "$1" \
+    | grep -oE 'region=[0-9]+x[0-9]+\+[0-9]+\+[0-9]+' | cut -d= -f2
+}
+
+size_of ()  # size_of FILE.png: WIDTH HEIGHT
+{
+  od -An -tu1 -j 16 -N 8 "$1" | awk '{ print $3 * 256 + $4, $7 * 256 + $8 }'
+}
+
+# place X Y BRANCH: lays what a branch makes on the sheet.
+place ()
+{
+  pads+="sink_$placed::xpos=$1 sink_$placed::ypos=$2 "
+  branches+="$3 page.sink_$placed "
+  placed=$((placed + 1))
+}
+
+heading ()  # heading X Y TEXT
+{
+  place "$1" "$2" "videotestsrc pattern=white num-buffers=1 !
+    video/x-raw,width=640,height=28,framerate=1/1 !
+    $(write_text "$3" 16px xpad=2 ypad=6 color=0xff202020 draw-outline=false \
+      draw-shadow=false)"
+}
+
+# All pictures of a folder, in rows, of the shape of a part of the frame; adds
+# to bottom what they take.
+strip ()  # strip FOLDER WIDTH HEIGHT TEXT
+{
+  local files file columns width height column=0
+  mapfile -t files < <(find "$1" -name '*.png' | sort | head -n "$sheet_most")
+  columns=$((${#files[@]} < 8 ? ${#files[@]} : 8))
+  width=$(((sheet_width - (columns - 1) * sheet_gap) / columns))
+  width=$((width < 380 ? width : 380))
+  height=$((width * $3 / $2))
+  heading 0 "$bottom" "$4"
+  bottom=$((bottom + 28))
+  for file in "${files[@]}"; do
+    if [ "$column" = "$columns" ]; then
+      column=0
+      bottom=$((bottom + height + sheet_gap))
+    fi
+    place $((column * (width + sheet_gap))) "$bottom" \
+      "$(still "$file") $(magnify_to "$width" "$height")"
+    column=$((column + 1))
+  done
+  bottom=$((bottom + height + sheet_gap))
+}
+
+# draw_regions FILE REGION...: the coded frame, the fused one, and the subframes
+# of every part, from the folders coded, fused, subframes and region-I in $out.
+draw_regions ()
+{
+  local file=$1 pads='' branches='' placed=0 bottom frame=() half i=0 rect
+  local coded=$out/coded/000000.png fused=$out/fused/000000.png w h x y
+  shift
+  read -r -a frame <<< "$(size_of "$fused")"
+  half=$(((sheet_width - sheet_gap) / 2))
+  bottom=$((28 + half * frame[1] / frame[0]))
+  heading 0 0 'One coded frame'
+  heading $((half + sheet_gap)) 0 \
+    'All parts in one picture: the first slot (fused); red: regions'
+  place 0 28 "$(still "$coded") $(magnify_to "$half" $((bottom - 28)))"
+  place $((half + sheet_gap)) 28 \
+    "$(still "$fused") $(magnify_to "$half" $((bottom - 28)))"
+  for rect; do
+    IFS='x+' read -r w h x y <<< "$rect"
+    place $((half + sheet_gap + x * half / frame[0] - 2)) \
+      $((26 + y * half / frame[0])) \
+      "$(still "$fused") videocrop left=$x top=$y \
+        right=$((frame[0] - x - w)) bottom=$((frame[1] - y - h)) !
+      $(magnify_to $((w * half / frame[0])) $((h * half / frame[0]))) $(red_frame)"
+  done
+  strip "$out/subframes" "${frame[@]}" 'The background, subframe by subframe'
+  for rect; do
+    strip "$out/region-$i" "${rect%%x*}" "$(sed 's/.*x//; s/+.*//' <<< "$rect")" \
+      "Region $i, $rect, subframe by subframe"
+    i=$((i + 1))
+  done
+  play_quietly "compositor name=page background=white $pads !
+    videoconvert ! video/x-raw,format=RGB ! pngenc compression-level=9 !
+    filesink location=$(quoted "$file") $branches"
+}

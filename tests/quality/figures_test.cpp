@@ -39,10 +39,11 @@ document ()
   return text;
 }
 
-/* Within one unit of the last printed digit: the C library's sine may differ.
- */
+/* Within one unit of the last printed digit, or @units: the C library's sine
+ * may differ. */
 void
-expect_same (const std::string &printed, const Cell &cell, int decimals)
+expect_same (const std::string &printed, const Cell &cell, int decimals,
+    double units = 1.5)
 {
   if (cell.is_text ())
     EXPECT_EQ (printed, cell.text);
@@ -50,13 +51,13 @@ expect_same (const std::string &printed, const Cell &cell, int decimals)
     EXPECT_EQ (printed, std::isinf (cell.number) ? "exact" : "-");
   else
     EXPECT_NEAR (
-        std::stod (printed), cell.number, 1.5 * std::pow (10.0, -decimals));
+        std::stod (printed), cell.number, units * std::pow (10.0, -decimals));
 }
 
 /* Rows of the document begin with the texts and numbers of @p table: those of
  * its first scene, the synthetic one, which everybody has. */
 void
-expect_documented (const Table &table)
+expect_documented (const Table &table, double units = 1.5)
 {
   SCOPED_TRACE (table.id);
   const auto printed = table_cells (document (), table.id);
@@ -67,7 +68,8 @@ expect_documented (const Table &table)
       if (table.columns[c].title == "mean")
         continue; // over other scenes
       ASSERT_LT (c, printed[r].size ());
-      expect_same (printed[r][c], table.rows[r][c], table.columns[c].decimals);
+      expect_same (
+          printed[r][c], table.rows[r][c], table.columns[c].decimals, units);
     }
   }
 }
@@ -89,7 +91,8 @@ TEST (QualityDocument, SaysWhatLeakAndShiftCost)
 
 TEST (QualityDocument, SaysWhatBordersOfRegionsCost)
 {
-  expect_documented (regions_table (synthetic (), [] (auto &) {}));
+  /* Half a decibel, as fusion is tuned from time to time. */
+  expect_documented (regions_table (synthetic (), [] (auto &) {}), 5.0);
 }
 
 TEST (QualityDocument, SaysWhatAStillSceneAndAFlatGreyShow)

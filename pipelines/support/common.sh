@@ -312,7 +312,7 @@ scene ()
 }
 
 # Ends the stream after --frames coded frames; identity counts the one it
-# refuses.
+# refuses, which codedexposure-launch spares.
 frame_limit ()
 {
   ! is_set frames \

@@ -80,6 +80,7 @@ public:
 
 private:
   bool connect_counter ();
+  void end_at_the_limit ();
   void watch_leaky_queues ();
   template <typename Visit>
   void for_each_element (Visit visit);
@@ -109,11 +110,14 @@ private:
       GstPad *, GstPadProbeInfo *info, gpointer self);
   static GstPadProbeReturn shift_first_frame (
       GstPad *, GstPadProbeInfo *info, gpointer self);
+  static GstPadProbeReturn on_limited_frame (
+      GstPad *pad, GstPadProbeInfo *info, gpointer self);
 
   const Options &options_;
   ObjectPtr<GstPad> counted_;
   std::vector<std::unique_ptr<LeakyQueue>> leaky_queues_;
   std::atomic<gint64> frames_ = 0;
+  gint64 left_ = 0; // frames until the limit; its streaming thread
   std::atomic<gint64> last_pts_ = -1; // ns, of the counted pad
   Clock::time_point began_ = Clock::now ();
   Clock::time_point retry_until_ = Clock::now ();
@@ -231,6 +235,40 @@ Launch::connect_counter ()
   return true;
 }
 
+/* An identity ends the stream when it refuses a frame, which was made or taken
+ * for nothing by then, and counted. Behind the last one that it lets through,
+ * the end is answered already. */
+void
+Launch::end_at_the_limit ()
+{
+  const ObjectPtr<GstElement> limit (
+      gst_bin_get_by_name (GST_BIN (pipeline_.get ()), "limit"));
+  if (!limit)
+    return;
+  gint refused = 0;
+  g_object_get (limit.get (), "eos-after", &refused, nullptr);
+  left_ = refused - 1;
+  const ObjectPtr<GstPad> src (
+      gst_element_get_static_pad (limit.get (), "src"));
+  gst_pad_add_probe (
+      src.get (), GST_PAD_PROBE_TYPE_BUFFER, on_limited_frame, this, nullptr);
+}
+
+GstPadProbeReturn
+Launch::on_limited_frame (GstPad *pad, GstPadProbeInfo *info, gpointer self)
+{
+  gint64 &left = static_cast<Launch *> (self)->left_;
+  if (--left != 0)
+    return GST_PAD_PROBE_OK;
+  /* The push comes by here again. */
+  GstBuffer *last = GST_PAD_PROBE_INFO_BUFFER (info);
+  GST_PAD_PROBE_INFO_DATA (info) = nullptr;
+  const GstFlowReturn flow = gst_pad_push (pad, last);
+  GST_PAD_PROBE_INFO_FLOW_RETURN (info) =
+      flow == GST_FLOW_OK ? GST_FLOW_EOS : flow;
+  return GST_PAD_PROBE_HANDLED;
+}
+
 template <typename Visit>
 void
 Launch::for_each_element (Visit visit)
@@ -294,6 +332,7 @@ Launch::run ()
   if (!connect_counter ())
     return kFailed;
   watch_leaky_queues ();
+  end_at_the_limit ();
   const guint ticks = g_timeout_add (200, on_tick, this);
   const int code = loop ();
   g_source_remove (ticks);

@@ -82,6 +82,7 @@ public:
   CameraPipeline (const CameraPipeline &) = delete;
   CameraPipeline &operator= (const CameraPipeline &) = delete;
 
+  void pause () { gst_element_set_state (pipeline_.get (), GST_STATE_PAUSED); }
   void play () { gst_element_set_state (pipeline_.get (), GST_STATE_PLAYING); }
   void stop () { gst_element_set_state (pipeline_.get (), GST_STATE_NULL); }
   GstElement *get () const { return pipeline_.get (); }

@@ -49,6 +49,14 @@
  * served in the order of time. All parts are brought to the same brightness;
  * #codedexposure-demux:method=select by name keeps the camera's values.
  *
+ * ## Mapping
+ *
+ * A camera that is not quite aligned with the mirrors is put right by a
+ * mapping: by the #codedexposure-demux:mapping property, else by the stream's
+ * tag. Frames are rectified to one pixel a mirror before they are taken apart;
+ * regions are places among the mirrors, wherever the camera sees them. The
+ * element message `codedexposure/mapping` says how well it sees them.
+ *
  * ## Flags, metas and messages
  *
  * A gap of more than one and a half periods between two frames is a loss: it is

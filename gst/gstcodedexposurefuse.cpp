@@ -42,8 +42,9 @@
  * A camera that is not quite aligned with the mirrors is put right by a
  * mapping: by the #codedexposure-fuse:mapping property, else by the stream's
  * tag. Frames are rectified to one pixel a mirror before they are fused, and
- * fused frames have the size of the mirrors. The element message
- * `codedexposure/mapping` says how well the camera sees the mirrors.
+ * fused frames have the size of the mirrors; regions are places among them. The
+ * element message `codedexposure/mapping` says how well the camera sees the
+ * mirrors.
  *
  * ## Quality and speed
  *

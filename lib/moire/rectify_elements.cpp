@@ -7,6 +7,14 @@
 namespace cexp
 {
 
+namespace
+{
+
+/* Elements of which all pairs are kept. */
+constexpr std::size_t kFew = 512;
+
+} // namespace
+
 Elements::Elements (
     const Schedule &schedule, Extent mirrors, double persistence)
 {
@@ -29,6 +37,10 @@ Elements::Elements (
       for (std::size_t t = 0; t < slots; t++)
         later[s] += open[t] * alike[s > t ? s - t : t - s];
   }
+  const int count = int (open_.size ());
+  for (int e = 0; e < count && open_.size () <= kFew; e++)
+    for (int f = 0; f < count; f++)
+      covariances_.push_back (covariance_of (e, f));
 }
 
 void
@@ -79,7 +91,7 @@ Elements::most_light () const
 }
 
 double
-Elements::covariance (int e, int f) const
+Elements::covariance_of (int e, int f) const
 {
   const Openness &open = open_[std::size_t (e)];
   const Openness &later = later_[std::size_t (f)];

@@ -6,6 +6,7 @@
 #include <map>
 #include <vector>
 
+#include "schedule/matrix.h"
 #include "schedule/schedule.h"
 
 namespace cexp
@@ -37,7 +38,13 @@ public:
   /** Of the brightest element. */
   double most_light () const;
   /** Covariance of the light of two elements at one place. */
-  double covariance (int e, int f) const;
+  double covariance (int e, int f) const
+  {
+    return covariances_.empty ()
+               ? covariance_of (e, f)
+               : covariances_[std::size_t (e) * open_.size () +
+                              std::size_t (f)];
+  }
 
 private:
   using Openness = std::vector<double>; // in each slot: 1, or the leak
@@ -50,11 +57,13 @@ private:
   const Part &get (int part) const { return parts_[std::size_t (part)]; }
   int part_at (int x, int y) const;
   void add_part (const Schedule &whole, int region, const Rect &rect);
+  double covariance_of (int e, int f) const;
 
   std::vector<Part> parts_;
   std::map<Openness, int> known_;
   std::vector<Openness> open_, later_; // later: what goes with a slot's light
   std::vector<double> light_;
+  Matrix covariances_; // empty where they are too many
 };
 
 } // namespace cexp

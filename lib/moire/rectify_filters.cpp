@@ -170,8 +170,9 @@ FilterBank::node (int around, int i, int j)
   std::vector<float> &weights =
       nodes_[std::size_t ((around * (steps_ + 1) + j) * (steps_ + 1) + i)];
   if (weights.empty ()) {
-    const auto known =
-        neighbourhoods_.try_emplace (around, neighbourhood (around)).first;
+    auto known = neighbourhoods_.find (around);
+    if (known == neighbourhoods_.end ())
+      known = neighbourhoods_.emplace (around, neighbourhood (around)).first;
     weights = solve (known->second, node_at (i, steps_), node_at (j, steps_));
   }
   return weights;

@@ -34,7 +34,7 @@ double scene_correlation (
 /** The classes that fusion chooses from. */
 struct SceneModel {
   /** What `fast` chooses between around each pixel. */
-  SceneClass creeping{.correlation = 0.97, .spread = 0.25};
+  SceneClass creeping{.correlation = 0.97, .spread = 0.2};
   SceneClass moving{.correlation = 0.85, .spread = 2.0};
   /** What it takes everything for under schedules of more slots than motion is
    * known for. */

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <functional>
+#include <utility>
 
 #include "baselines.h"
 
@@ -196,35 +197,52 @@ still_fusion_table (const std::vector<Scene> &scenes, const Progress &progress)
   return table;
 }
 
+/* Mean PSNR of fast over whole coded frames of @scenes. */
+static double
+fast_psnr (const std::vector<Scene> &scenes, int frames, int n,
+    const FuseOptions &options)
+{
+  const Schedule schedule = fusion_schedule (n);
+  double psnr = 0.0;
+  for (const Scene &scene : scenes) {
+    const Scene part = first_of (scene, frames, n);
+    psnr += compare (fuse (take (part, schedule, kClean), schedule, options),
+                part.frames)
+                .psnr /
+            double (scenes.size ());
+  }
+  return psnr;
+}
+
 Table
 training_table (
-    const std::vector<Scene> &scenes, int frames, const Progress &progress)
+    const std::vector<Scene> &clips, int frames, const Progress &progress)
 {
+  constexpr unsigned kDrawn = 12;
+  constexpr int kSize = 128;
   Table table{"fusion-training",
-      "fast, clean: mean PSNR (dB) by the model of scenes",
-      {{"length px"}, {"correlation per slot", 2}, {"n = 4", 2}, {"n = 8", 2}},
+      "fast, clean: mean PSNR (dB) by the speeds of its models",
+      {{"creeping px/slot", 2}, {"moving px/slot", 2}, {"drawn, n = 4", 2},
+          {"drawn, n = 8", 2}},
       {}};
-  for (const double length : {3.0, 4.0, 5.0, 6.0, 8.0}) {
-    for (const double correlation : {0.75, 0.8, 0.85, 0.9, 0.95}) {
-      progress ("length " + std::to_string (length));
-      auto &row =
-          table.rows.emplace_back (std::vector<Cell>{length, correlation});
-      for (const int n : {4, 8}) {
-        FuseOptions options;
-        options.scene.plain.length = length;
-        options.scene.plain.correlation = correlation;
-        double psnr = 0.0;
-        for (const Scene &scene : scenes) {
-          const Scene part = first_of (scene, frames, n);
-          const Schedule schedule = fusion_schedule (n);
-          psnr +=
-              compare (fuse (take (part, schedule, kClean), schedule, options),
-                  part.frames)
-                  .psnr /
-              double (scenes.size ());
-        }
-        row.push_back (psnr);
-      }
+  std::vector<Scene> drawn;
+  for (unsigned seed = 1; seed <= kDrawn; seed++)
+    drawn.push_back (leaves_scene (seed, kSize, frames));
+  if (!clips.empty ()) {
+    table.columns.push_back ({"clips, n = 4", 2});
+    table.columns.push_back ({"clips, n = 8", 2});
+  }
+  for (const double creeping : {0.1, 0.15, 0.2, 0.25, 0.3, 0.4}) {
+    for (const double moving : {1.0, 2.0, 3.0}) {
+      progress ("creeping " + std::to_string (creeping));
+      FuseOptions options;
+      options.scene.creeping.spread = creeping;
+      options.scene.moving.spread = moving;
+      auto &row = table.rows.emplace_back (std::vector<Cell>{creeping, moving});
+      for (const auto *scenes : {&std::as_const (drawn), &clips})
+        for (const int n : {4, 8})
+          if (!scenes->empty ())
+            row.push_back (fast_psnr (*scenes, frames, n, options));
     }
   }
   return table;

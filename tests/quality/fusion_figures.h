@@ -26,10 +26,10 @@ std::vector<Table> fusion_tables (
 Table still_fusion_table (
     const std::vector<Scene> &scenes, const Progress &progress);
 
-/** Mean PSNR of `fast` over the first @p frames frames of every scene for
- * models of scenes around the one in force, clean: to choose
- * SceneModel::plain by. */
+/** Mean PSNR of `fast` over the first @p frames frames of drawn scenes, and of
+ * @p clips where there are any, for models of scenes around those in force,
+ * clean: to choose the spreads of SceneModel by. */
 Table training_table (
-    const std::vector<Scene> &scenes, int frames, const Progress &progress);
+    const std::vector<Scene> &clips, int frames, const Progress &progress);
 
 } // namespace cexp::quality

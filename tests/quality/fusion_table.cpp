@@ -59,7 +59,7 @@ parse (int &argc, char **&argv, Options &options)
   return ok && argc == 1 && options.frames >= kLeastFrames;
 }
 
-/* The clips; a drawn scene where there are none. */
+/* The clips; where there are none, a drawn scene, unless others are drawn. */
 std::vector<Scene>
 find_scenes (const Options &options)
 {
@@ -70,6 +70,8 @@ find_scenes (const Options &options)
     });
   if (clips && !clips->empty ())
     return std::move (*clips);
+  if (options.train)
+    return {};
   std::cerr << "no clips"
             << (clips ? std::string () : ": " + clips.error ().message)
             << "; name a folder with --clips. Drawing a scene instead\n";

@@ -27,6 +27,14 @@ struct Scene {
  */
 Scene synthetic_scene (int width, int height, int frames);
 
+/**
+ * Textured discs of all sizes, one over the other, as things lie in pictures:
+ * their radii have the density r^-3. Half of them move with the camera, the
+ * others past it, at speeds spread evenly on a logarithmic scale from 0.03 to
+ * 2.5 px a slot.
+ */
+Scene leaves_scene (unsigned seed, int size, int frames);
+
 /** One picture that stands still for that many slots. */
 Scene still_scene (std::string name, const Picture &picture, int frames);
 

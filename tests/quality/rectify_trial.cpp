@@ -73,9 +73,30 @@ struct Errors {
   }
 };
 
+/* Slots of the exposure for which pixel (@x, @y) sees one mask. */
+int
+held_at (const Schedule &schedule, int x, int y)
+{
+  const int region = schedule.region_at (x, y);
+  const Schedule part =
+      region < 0 ? schedule.background () : schedule.region (region);
+  return schedule.slots () / part.slots ();
+}
+
+/* Mean of the scene at (@x, @y) over the slots of the mask in slot @k. */
+double
+mean_at (const Picture *slots, int x, int y, int k, int held)
+{
+  double sum = 0.0;
+  for (int s = k / held * held; s < (k / held + 1) * held; s++)
+    sum += slots[s].at (x, y);
+  return sum / held;
+}
+
 /* @slots: the scene in each slot of this exposure. */
 void
-compare_fused (const Picture &coded, const Picture *slots, Errors &errors)
+compare_fused (const Picture &coded, const Picture *slots,
+    const Schedule &schedule, Errors &errors)
 {
   std::vector<Picture> frames (std::size_t (errors.fuser.slots ()),
       Picture (coded.width (), coded.height ()));
@@ -84,10 +105,29 @@ compare_fused (const Picture &coded, const Picture *slots, Errors &errors)
     views.push_back (frame.view ());
   errors.fuser.take (coded.view ());
   errors.fuser.fuse (views);
-  for (std::size_t k = 0; k < frames.size (); k++)
-    for (int y = kBorder; y < coded.height () - kBorder; y++)
-      for (int x = kBorder; x < coded.width () - kBorder; x++)
-        errors.fused.add (frames[k].at (x, y), slots[k].at (x, y));
+  for (int y = kBorder; y < coded.height () - kBorder; y++)
+    for (int x = kBorder; x < coded.width () - kBorder; x++) {
+      const int held = held_at (schedule, x, y);
+      for (std::size_t k = 0; k < frames.size (); k++)
+        errors.fused.add (
+            frames[k].at (x, y), mean_at (slots, x, y, int (k), held));
+    }
+}
+
+/* Pixels of subframes, as bright as those of the brightest part. */
+void
+compare_points (const Picture &coded, const Picture *slots,
+    const Schedule &schedule, Errors &errors)
+{
+  for (int y = kBorder; y < coded.height () - kBorder; y++)
+    for (int x = kBorder; x < coded.width () - kBorder; x++) {
+      const int held = held_at (schedule, x, y);
+      int slot = 0;
+      while (!schedule.open (x, y, slot))
+        slot++;
+      errors.point.add (coded.at (x, y) * schedule.white_slots () / held,
+          mean_at (slots, x, y, slot, held));
+    }
 }
 
 /* @slots: the scene in each slot of this exposure. */
@@ -95,11 +135,10 @@ void
 compare (const Picture &coded, const Picture *slots, const Schedule &schedule,
     Errors &errors)
 {
-  compare_fused (coded, slots, errors);
-  for (int y = kBorder; y < coded.height () - kBorder; y++)
-    for (int x = kBorder; x < coded.width () - kBorder; x++)
-      errors.point.add (
-          coded.at (x, y), slots[schedule.element_at (x, y)].at (x, y));
+  compare_fused (coded, slots, schedule, errors);
+  compare_points (coded, slots, schedule, errors);
+  if (!schedule.regions ().empty ())
+    return;
 
   const auto extractor = must (Extractor<std::uint8_t>::make (
       schedule, coded.width (), coded.height ()));

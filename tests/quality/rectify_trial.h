@@ -14,7 +14,8 @@ namespace cexp::quality
 /** PSNR in dB, away from the border of the frame. */
 struct RectifyScore {
   double point = 0.0; ///< of the subframes' pixels
-  double full = 0.0;  ///< of frames at full size, the gaps filled linearly
+  double full = 0.0;  ///< of frames at full size, the gaps filled linearly; no
+                      ///< number where there are regions
   double fused = 0.0; ///< of frames that were fused (FuseQuality::kFast)
 };
 

@@ -225,8 +225,7 @@ chain (GstPad *pad, GstObject *parent, GstBuffer *inbuf) noexcept
   if (flow == GST_FLOW_OK)
     flow = negotiate (self, inbuf);
   if (flow == GST_FLOW_OK)
-    frame = uncut (
-        GST_ELEMENT (self), stream, std::move (frame), stream.plan->period ());
+    frame = uncut (pad, stream, std::move (frame), stream.plan->period ());
   inbuf = frame.get ();
   if (!inbuf)
     return flow;

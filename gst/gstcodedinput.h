@@ -3,6 +3,7 @@
  * stream say of them, which of them came, and which did not. */
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <string>
@@ -89,6 +90,10 @@ struct CodedStream {
   bool backwards () const { return segment.rate < 0; }
 };
 
+/** Times of recordings are rounded to a microsecond: what is shorter than this
+ * is nothing. */
+inline constexpr GstClockTime kRounding = 10 * GST_USECOND;
+
 /** Whether what is shown from @p pts on for @p duration was asked for: a seek
  * may begin or end within a coded frame. */
 inline bool
@@ -96,7 +101,8 @@ is_within (const GstSegment &segment, GstClockTime pts, GstClockTime duration)
 {
   guint64 from, to;
   return gst_segment_clip (
-      &segment, GST_FORMAT_TIME, pts, pts + duration, &from, &to);
+             &segment, GST_FORMAT_TIME, pts, pts + duration, &from, &to) &&
+         to - from > std::min (kRounding, duration / 2);
 }
 
 /** Shows on the bus why the coded frames cannot be used. */
@@ -225,10 +231,11 @@ GstFlowReturn check_stamp (
     GstElement *element, const CodedStream &stream, GstBuffer *frame);
 /** Decoders cut from the first frame of a segment what lies before it, in time
  * only: its PTS is then that of the segment, its DURATION what is left of
- * @p period. @p frame with the times that it had; null, with a warning, where
- * it is cut at both ends and its start cannot be known. */
-BufferPtr uncut (GstElement *element, const CodedStream &stream,
-    BufferPtr frame, GstClockTime period);
+ * @p period. @p frame with the times that it had; null where nothing but
+ * rounding is left of it, and, with a warning, where it seems to be cut at both
+ * ends, so that its start cannot be known. @p sinkpad that it came from. */
+BufferPtr uncut (GstPad *sinkpad, const CodedStream &stream, BufferPtr frame,
+    GstClockTime period);
 /** A frame that came in. */
 struct Admitted {
   /** The meta that came with it, else by our own count. */

@@ -61,6 +61,26 @@ warn_of_wrong_time (GstElement *element, CodedStream &stream, GstClockTime pts,
       ("this is said once"));
 }
 
+bool
+ends_with_stream (GstPad *sinkpad, GstClockTime stop)
+{
+  gint64 duration = -1;
+  return gst_pad_peer_query_duration (sinkpad, GST_FORMAT_TIME, &duration) &&
+         GstClockTime (duration) <= stop + kRounding;
+}
+
+void
+warn_of_inside (GstPad *sinkpad, const GstSegment &segment)
+{
+  const ObjectPtr<GstElement> element (gst_pad_get_parent_element (sinkpad));
+  GST_ELEMENT_WARNING (element.get (), STREAM, FORMAT,
+      ("From %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT
+       " there is one coded frame only, or a part of it, and which part is not "
+       "known: there is no picture of it. Seek to a longer stretch.",
+          GST_TIME_ARGS (segment.start), GST_TIME_ARGS (segment.stop)),
+      (nullptr));
+}
+
 FrameMeta
 describe (GstBuffer *frame, const FrameStep &step)
 {
@@ -87,24 +107,22 @@ check_stamp (GstElement *element, const CodedStream &stream, GstBuffer *frame)
 }
 
 BufferPtr
-uncut (GstElement *element, const CodedStream &stream, BufferPtr frame,
+uncut (GstPad *sinkpad, const CodedStream &stream, BufferPtr frame,
     GstClockTime period)
 {
-  /* Recordings round to a microsecond. */
-  constexpr GstClockTime kRounding = 10 * GST_USECOND;
   const GstSegment &segment = stream.segment;
   const GstClockTime pts = GST_BUFFER_PTS (frame.get ());
   const GstClockTime duration = GST_BUFFER_DURATION (frame.get ());
-  if (pts != segment.start || !GST_CLOCK_TIME_IS_VALID (duration) ||
-      duration + kRounding >= period || pts + duration < period)
+  if (!GST_CLOCK_TIME_IS_VALID (duration) || duration + kRounding >= period)
     return frame;
-  if (pts + duration == segment.stop) {
-    GST_ELEMENT_WARNING (element, STREAM, FORMAT,
-        ("From %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT
-         " is the inside of one coded frame, whose start is not known: there "
-         "is no picture of it. Seek to a stretch that begins or ends outside.",
-            GST_TIME_ARGS (segment.start), GST_TIME_ARGS (segment.stop)),
-        (nullptr));
+  const bool at_start = pts == segment.start;
+  const bool at_stop = pts + duration == segment.stop;
+  if ((at_start || at_stop) && duration <= kRounding)
+    return nullptr;
+  if (!at_start || pts + duration < period)
+    return frame;
+  if (at_stop && !ends_with_stream (sinkpad, segment.stop)) {
+    warn_of_inside (sinkpad, segment);
     return nullptr;
   }
   BufferPtr whole (gst_buffer_make_writable (frame.release ()));

@@ -44,6 +44,7 @@ class Guide : public Player
 {
 public:
   explicit Guide (const char *what) : Player (what ? what : "guide") {}
+  ~Guide () override { stop (); }
 
   /** @p stage: the element that stands for a person's hand; null: a person. */
   int run (const char *stage);
@@ -240,6 +241,9 @@ Guide::on_message (GstMessage *message)
     break;
   case GST_MESSAGE_WARNING:
     status_.line ("warning: " + warned (message));
+    break;
+  case GST_MESSAGE_INFO:
+    status_.line ("info: " + noted (message));
     break;
   case GST_MESSAGE_PROGRESS:
     gst_message_parse_progress (message, nullptr, nullptr, &text);

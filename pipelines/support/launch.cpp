@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure-launch: runs one pipeline for a script of this folder, and says
  * how far it is, what went wrong and what was counted. */
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cstdio>
@@ -75,6 +76,7 @@ public:
       : Player (options.what ? options.what : "launch"), options_ (options)
   {
   }
+  ~Launch () override { stop (); }
 
   int run ();
 
@@ -128,42 +130,33 @@ private:
   bool interrupted_ = false;
 };
 
-/* Whether what lasts from the time of @frame on is asked for. A demuxer also
- * sends what comes before a seek's start, for decoders to begin with. */
-bool
-is_within_segment (GstPad *pad, const GstBuffer *frame)
-{
-  const EventPtr sticky (gst_pad_get_sticky_event (pad, GST_EVENT_SEGMENT, 0));
-  const GstSegment *segment = nullptr;
-  if (!sticky || !GST_BUFFER_PTS_IS_VALID (frame))
-    return true;
-  gst_event_parse_segment (sticky.get (), &segment);
-  const GstClockTime end =
-      GST_BUFFER_DURATION_IS_VALID (frame)
-          ? GST_BUFFER_PTS (frame) + GST_BUFFER_DURATION (frame)
-          : GST_CLOCK_TIME_NONE;
-  guint64 from, to;
-  return gst_segment_clip (
-      segment, GST_FORMAT_TIME, GST_BUFFER_PTS (frame), end, &from, &to);
-}
-
-GstPadProbeReturn
-Launch::on_frame (GstPad *pad, GstPadProbeInfo *info, gpointer self)
-{
-  auto *launch = static_cast<Launch *> (self);
-  const GstBuffer *frame = GST_PAD_PROBE_INFO_BUFFER (info);
-  if (!is_within_segment (pad, frame))
-    return GST_PAD_PROBE_OK;
-  launch->frames_++;
-  if (GST_BUFFER_PTS_IS_VALID (frame))
-    launch->last_pts_ = gint64 (GST_BUFFER_PTS (frame));
-  return GST_PAD_PROBE_OK;
-}
-
 constexpr GstClockTime
 nanoseconds (double seconds)
 {
   return GstClockTime (seconds * 1e9 + 0.5);
+}
+
+/* Whether @frame ends before the time @start: a stream that is shorter is
+ * sought to its last frame. */
+bool
+is_before (const GstBuffer *frame, GstClockTime start)
+{
+  return GST_BUFFER_PTS_IS_VALID (frame) &&
+         GST_BUFFER_DURATION_IS_VALID (frame) &&
+         GST_BUFFER_PTS (frame) + GST_BUFFER_DURATION (frame) <= start;
+}
+
+GstPadProbeReturn
+Launch::on_frame (GstPad *, GstPadProbeInfo *info, gpointer self)
+{
+  auto *launch = static_cast<Launch *> (self);
+  const GstBuffer *frame = GST_PAD_PROBE_INFO_BUFFER (info);
+  if (is_before (frame, nanoseconds (launch->options_.start)))
+    return GST_PAD_PROBE_DROP;
+  launch->frames_++;
+  if (GST_BUFFER_PTS_IS_VALID (frame))
+    launch->last_pts_ = gint64 (GST_BUFFER_PTS (frame));
+  return GST_PAD_PROBE_OK;
 }
 
 GstPadProbeReturn
@@ -175,16 +168,36 @@ Launch::on_first_frame (GstPad *, GstPadProbeInfo *, gpointer self)
   return GST_PAD_PROBE_OK;
 }
 
+/* How long a frame of the caps at @pad lasts; 0 where they do not say. */
+GstClockTime
+frame_period (GstPad *pad)
+{
+  const CapsPtr caps (gst_pad_get_current_caps (pad));
+  gint num = 0, den = 1;
+  if (!caps ||
+      !gst_structure_get_fraction (
+          gst_caps_get_structure (caps.get (), 0), "framerate", &num, &den) ||
+      num <= 0)
+    return 0;
+  return gst_util_uint64_scale_int (GST_SECOND, den, num);
+}
+
 /* While the first frame is held no file has been begun and nothing is shown, so
- * the stream can be sent elsewhere without a trace. */
+ * the stream can be sent elsewhere without a trace. Frames are played from the
+ * start of one on, and one at least: a decoder would cut a piece out of it, of
+ * which nobody knows which. */
 void
 Launch::seek ()
 {
+  const GstClockTime start = nanoseconds (options_.start);
+  const GstClockTime length = std::max (
+      nanoseconds (options_.duration), frame_period (counted_.get ()));
   GstEvent *event = gst_event_new_seek (1.0, GST_FORMAT_TIME,
-      GstSeekFlags (GST_SEEK_FLAG_FLUSH | GST_SEEK_FLAG_ACCURATE),
-      GST_SEEK_TYPE_SET, gint64 (nanoseconds (options_.start)),
+      GstSeekFlags (GST_SEEK_FLAG_FLUSH | GST_SEEK_FLAG_KEY_UNIT |
+                    GST_SEEK_FLAG_SNAP_BEFORE),
+      GST_SEEK_TYPE_SET, gint64 (start),
       options_.duration > 0 ? GST_SEEK_TYPE_SET : GST_SEEK_TYPE_NONE,
-      gint64 (nanoseconds (options_.start + options_.duration)));
+      gint64 (start + length));
   if (!gst_pad_push_event (counted_.get (), event)) {
     status_.line ("error: this stream cannot be played from the middle");
     quit (kFailed);

@@ -17,11 +17,6 @@ Player::Player (const char *what)
 
 Player::~Player ()
 {
-  if (pipeline_) {
-    gst_element_set_state (pipeline_.get (), GST_STATE_NULL);
-    const ObjectPtr<GstBus> bus (gst_element_get_bus (pipeline_.get ()));
-    gst_bus_remove_watch (bus.get ());
-  }
   g_main_loop_unref (loop_);
 }
 
@@ -86,7 +81,15 @@ Player::loop ()
   g_main_loop_run (loop_);
   for (const guint source : signals)
     g_source_remove (source);
+  gst_bus_remove_watch (bus.get ());
   return code_;
+}
+
+void
+Player::stop ()
+{
+  if (pipeline_)
+    gst_element_set_state (pipeline_.get (), GST_STATE_NULL);
 }
 
 void

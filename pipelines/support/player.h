@@ -2,7 +2,6 @@
 /* A pipeline that is played in a main loop. */
 #pragma once
 
-#include <glib.h>
 #include <gst/gst.h>
 
 #include "gstraii.h"
@@ -15,6 +14,7 @@ class Player
 public:
   /** @p what stands in front of every line that is said. */
   explicit Player (const char *what);
+  /** Derived classes have stopped by then. */
   virtual ~Player ();
   Player (const Player &) = delete;
   Player &operator= (const Player &) = delete;
@@ -33,6 +33,8 @@ protected:
   /** Begins, and runs the main loop; the code that quit () was given. */
   int loop ();
   void quit (int code);
+  /** To NULL, after which nothing calls back any more. */
+  void stop ();
   /** The element of that name; null where there is none. */
   cexp::gst::ObjectPtr<GstElement> find (const char *name) const;
 

@@ -486,31 +486,6 @@ TEST_F (DemuxTime, NewSegmentIsGivenOnUnchangedAndNoLoss)
   EXPECT_EQ (segment->stop, 9 * GST_SECOND);
 }
 
-/* Decoders do so to the frames at the ends of a seek. */
-TEST_F (DemuxTime, AFrameThatWasCutIsPlacedWhereItWasAndGivesWhatWasAskedFor)
-{
-  const auto cut = [this] (GstClockTime pts, GstClockTime duration) {
-    BufferPtr frame = coded_frame (pts);
-    GST_BUFFER_DURATION (frame.get ()) = duration;
-    ASSERT_EQ (demux->push (std::move (frame)), GST_FLOW_OK);
-  };
-  start ();
-  push_segment (*demux, 1.0, 1095 * kMs, 1175 * kMs);
-  cut (1095 * kMs, 25 * kMs);
-  cut (1120 * kMs, 40 * kMs);
-  cut (1160 * kMs, 15 * kMs);
-  EXPECT_EQ (discont_times (), (std::vector<int>{-1090, 1100, 1110, 1120, 1130,
-                                   1140, 1150, 1160, 1170}));
-  EXPECT_EQ (counter ("frames-lost"), 0u);
-  EXPECT_EQ (demux->warning (), "");
-
-  push_segment (*demux, 1.0, 2095 * kMs, 2105 * kMs);
-  cut (2095 * kMs, 10 * kMs);
-  EXPECT_EQ (discont_times (), (std::vector<int>{}));
-  EXPECT_NE (
-      demux->warning ().find ("whose start is not known"), std::string::npos);
-}
-
 TEST_F (DemuxTime, SegmentThatIsNotInTimeIsAnError)
 {
   start ();

@@ -1,0 +1,144 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* codedexposure-demux behind a decoder that cuts frames at the ends of a
+ * segment, as all do: what was asked for comes out, at the times that it had.
+ */
+#include "schedule/timing.h"
+#include "gstcodedexposuremeta.h"
+#include "harness.h"
+
+namespace
+{
+
+using namespace cexp;
+using namespace cexp::gst;
+using namespace cexp::test;
+
+constexpr GstClockTime kStreamEnd = 2 * GST_SECOND;
+
+/** The time of a frame as a recording has it. */
+GstClockTime
+recorded (const FrameRate &rate, int number)
+{
+  return (GstClockTime (rate.time_of (number)) + 500) / 1000 * 1000;
+}
+
+class DemuxSeek : public ::testing::TestWithParam<FrameRate>
+{
+protected:
+  DemuxSeek () : demux ("codedexposure-demux schedule=sequential:2x2")
+  {
+    gst_pad_set_query_function (
+        demux.get ()->srcpad,
+        +[] (GstPad *pad, GstObject *parent, GstQuery *query) {
+          if (GST_QUERY_TYPE (query) != GST_QUERY_DURATION)
+            return gst_pad_query_default (pad, parent, query);
+          gst_query_set_duration (query, GST_FORMAT_TIME, kStreamEnd);
+          return gboolean (TRUE);
+        });
+    demux.request ("coded");
+    demux.set_caps (gray_caps (
+        16, 16, std::to_string (rate.num) + "/" + std::to_string (rate.den)));
+  }
+  /** Frames @p first to @p last as a decoder gives them from @p from to @p to.
+   */
+  void decode (int first, int last, GstClockTime from, GstClockTime to)
+  {
+    GstSegment segment;
+    gst_segment_init (&segment, GST_FORMAT_TIME);
+    segment.start = segment.position = from;
+    segment.stop = to;
+    ASSERT_TRUE (demux.push_event (gst_event_new_segment (&segment)));
+    for (int i = first; i <= last; i++) {
+      const GstClockTime pts = recorded (rate, i);
+      guint64 begin, end;
+      if (!gst_segment_clip (
+              &segment, GST_FORMAT_TIME, pts, pts + period, &begin, &end))
+        continue;
+      BufferPtr frame = frame_of (
+          draw<std::uint8_t> (16, 16, [i] (int, int) { return i; }), begin);
+      GST_BUFFER_DURATION (frame.get ()) = end - begin;
+      ASSERT_EQ (demux.push (std::move (frame)), GST_FLOW_OK);
+    }
+  }
+  /** (number of the frame, subframe) of all that came out; their times are as
+   * without a seek. */
+  std::vector<std::pair<int, int>> subframes ()
+  {
+    std::vector<std::pair<int, int>> all;
+    while (const BufferPtr out = demux.pull ()) {
+      const int i =
+          image_of<std::uint8_t> (out.get (), demux.pad_caps ().get ())
+              .at (0, 0);
+      const int k = get_frame_meta (out.get ())->subframe;
+      all.emplace_back (i, k);
+      EXPECT_NEAR (double (GST_BUFFER_PTS (out.get ())),
+          double (recorded (rate, i) + period * GstClockTime (k) / 4), 1000)
+          << i << ", " << k;
+    }
+    return all;
+  }
+  int coded_frames ()
+  {
+    int count = 0;
+    while (demux.pull ("coded"))
+      count++;
+    return count;
+  }
+
+  const FrameRate rate = GetParam ();
+  const GstClockTime period = GstClockTime (rate.period ());
+  ElementHarness demux;
+};
+
+INSTANTIATE_TEST_SUITE_P (Rates, DemuxSeek,
+    ::testing::Values (FrameRate{25, 1}, FrameRate{30000, 1001}),
+    [] (const auto &info) { return std::to_string (info.param.num); });
+
+using Subframes = std::vector<std::pair<int, int>>;
+
+} // namespace
+
+TEST_P (DemuxSeek, WithinFramesGivesWhatWasAskedFor)
+{
+  decode (9, 13, recorded (rate, 10) + period * 5 / 8,
+      recorded (rate, 12) + period * 3 / 8);
+  EXPECT_EQ (subframes (), (Subframes{{10, 2}, {10, 3}, {11, 0}, {11, 1},
+                               {11, 2}, {11, 3}, {12, 0}, {12, 1}}));
+  EXPECT_EQ (coded_frames (), 3);
+  EXPECT_EQ (property<guint64> (demux.element (), "frames-lost"), 0u);
+  EXPECT_EQ (demux.warning (), "");
+}
+
+/* Recorded times are rounded: a nanosecond of the frame before, or of the one
+ * behind, may lie within. */
+TEST_P (DemuxSeek, ToTheTimesOfFramesGivesTheseFramesAlone)
+{
+  for (int i = 1; i < 20; i++) {
+    decode (i - 1, i + 3, recorded (rate, i), recorded (rate, i + 2));
+    EXPECT_EQ (
+        subframes (), (Subframes{{i, 0}, {i, 1}, {i, 2}, {i, 3}, {i + 1, 0},
+                          {i + 1, 1}, {i + 1, 2}, {i + 1, 3}}));
+    EXPECT_EQ (coded_frames (), 2) << i;
+  }
+  EXPECT_EQ (demux.warning (), "");
+}
+
+TEST_P (DemuxSeek, IntoTheLastFrameGivesTheRestOfIt)
+{
+  const int last = int (kStreamEnd / period) - 1;
+  decode (last, last, recorded (rate, last) + period * 5 / 8,
+      recorded (rate, last) + period);
+  if (rate.den != 1) // this stream ends elsewhere
+    return;
+  EXPECT_EQ (subframes (), (Subframes{{last, 2}, {last, 3}}));
+  EXPECT_EQ (demux.warning (), "");
+}
+
+TEST_P (DemuxSeek, WithinOneFrameIsWarnedOfAndGivesNothing)
+{
+  decode (9, 11, recorded (rate, 10) + period / 4,
+      recorded (rate, 10) + period / 2);
+  EXPECT_EQ (subframes (), Subframes ());
+  EXPECT_NE (
+      demux.warning ().find ("Seek to a longer stretch"), std::string::npos);
+}

@@ -304,7 +304,7 @@ describe_subframe (GstCodedExposureDemux *self, const Job &job,
 
   FrameMeta meta = job.meta;
   meta.subframe = gint (k);
-  meta.bits = state (self).stream.bits_in_force ();
+  meta.bits = told_bits (state (self).stream.bits_in_force (), part.subframe);
   meta.exposure_start = job.pts + part.windows[k].start;
   meta.exposure_duration = part.windows[k].duration;
   set_frame_meta (outbuf, meta);

@@ -143,7 +143,7 @@ describe (
 
   FrameMeta meta = coded.meta;
   meta.subframe = k;
-  meta.bits = stream.bits_in_force ();
+  meta.bits = told_bits (stream.bits_in_force (), plan.fused);
   meta.exposure_start = pts + GstClockTime (plan.slots.start (k));
   meta.exposure_duration = GstClockTime (plan.slots.active ());
   set_frame_meta (outbuf, meta);

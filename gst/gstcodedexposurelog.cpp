@@ -77,17 +77,19 @@ count_saturated_in (const LogState &state, MappedFrame &mapped, int bits)
 
 /** Pixels of a coded frame at the largest value; nobody has counted them yet.
  * Those of a subframe's coded frame have been. */
-guint64
+std::optional<guint64>
 saturated_pixels (
     const LogState &state, GstBuffer *frame, const FrameMeta &meta)
 {
-  MappedFrame mapped (state.info, frame, GST_MAP_READ);
-  if (meta.subframe >= 0 || !mapped)
+  if (meta.subframe >= 0)
     return meta.saturated;
-  const int depth = GST_VIDEO_INFO_COMP_DEPTH (&state.info, 0);
-  const int bits = std::min (meta.bits, depth);
-  return depth == 8 ? count_saturated_in<guint8> (state, mapped, bits)
-                    : count_saturated_in<guint16> (state, mapped, bits);
+  MappedFrame mapped (state.info, frame, GST_MAP_READ);
+  if (!mapped)
+    return std::nullopt;
+  const int bits = told_bits (meta.bits, state.info);
+  return GST_VIDEO_INFO_FORMAT (&state.info) == GST_VIDEO_FORMAT_GRAY8
+             ? count_saturated_in<guint8> (state, mapped, bits)
+             : count_saturated_in<guint16> (state, mapped, bits);
 }
 
 /** One line of JSON, keys in this order; unknown values are left out. */
@@ -115,7 +117,8 @@ frame_line (const LogState &state, GstBuffer *frame, const GstSegment &segment)
     line["locked"] = bool (meta->locked);
     line["slip"] = meta->slip;
     line["lost_before"] = meta->lost_before;
-    line["saturated"] = saturated_pixels (state, frame, *meta);
+    if (const auto saturated = saturated_pixels (state, frame, *meta))
+      line["saturated"] = *saturated;
     if (!meta->pattern.empty ())
       line["pattern"] = meta->pattern;
     if (meta->bits > 0)

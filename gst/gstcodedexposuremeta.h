@@ -39,10 +39,18 @@ struct FrameMeta {
   std::string pattern = {};
   /** Pixels at the largest value. */
   guint64 saturated = 0;
-  /** Significant bits of a pixel, counted from the lowest; 0: not known, all of
-   * the format. */
+  /** Significant bits of a pixel, counted from the lowest, where they are fewer
+   * than the format's; 0: all of them, as far as is known. */
   gint bits = 0;
 };
+
+/** @p bits as FrameMeta says them of a picture of @p info. */
+inline int
+told_bits (int bits, const GstVideoInfo &info)
+{
+  return bits > 0 && bits < int (GST_VIDEO_INFO_COMP_DEPTH (&info, 0)) ? bits
+                                                                       : 0;
+}
 
 /** Registers the meta; call once from plugin_init. */
 void register_frame_meta ();

@@ -115,15 +115,21 @@ next_frame (const Stream &stream, GstClockTime start)
   return stream.last_frame + std::max<std::int64_t> (1, periods);
 }
 
-/* Mirrors that have moved belong to a dmdsync, which parks them now and then to
- * change their masks. */
+/* A dmdsync parks its mirrors for the time that it takes to change masks, so
+ * that only those are warned of that never moved, or not for a second. */
 void
 watch_mirrors (GstCodedExposureSim *self, const std::vector<int> &masks)
 {
   Stream &stream = state (self).stream;
-  stream.mirrors_moved |= std::any_of (
+  const bool moves = std::any_of (
       masks.begin (), masks.end (), [] (int mask) { return mask >= 0; });
-  if (stream.mirrors_moved || std::exchange (stream.warned_parked, true))
+  const GstVideoInfo &info = stream.plan->out;
+  stream.parked_frames = moves ? 0 : stream.parked_frames + 1;
+  stream.mirrors_moved |= moves;
+  if (moves ||
+      (stream.mirrors_moved && stream.parked_frames * info.fps_d < info.fps_n))
+    return;
+  if (std::exchange (stream.warned_parked, true))
     return;
   GST_ELEMENT_WARNING (self, RESOURCE, NOT_FOUND,
       ("The mirrors of the simulated DMD are parked: coded frames are dark "
@@ -280,13 +286,14 @@ read_out (GstCodedExposureSim *self, const Exposure &exposure)
 void
 describe (const Stream &stream, const Exposure &exposure)
 {
-  if (stream.optics.bits == 0)
+  const int bits = told_bits (stream.optics.bits, stream.plan->out);
+  if (bits == 0)
     return;
   FrameMeta meta;
   meta.frame = guint64 (exposure.frame);
   meta.lost_before = guint64 (exposure.lost_before);
   meta.locked = !stream.mirrors;
-  meta.bits = stream.optics.bits;
+  meta.bits = bits;
   set_frame_meta (exposure.outbuf.get (), meta);
 }
 

@@ -52,8 +52,8 @@ struct Exposure {
   GstClockTime start = GST_CLOCK_TIME_NONE; ///< PTS of the first input frame
   std::int64_t frame = 0;
   std::int64_t lost_before = 0; ///< frames that had no light
-  std::vector<int> masks; ///< of each slot; negative: the DMD is parked
-  int taken = 0;          ///< input frames
+  std::vector<int> masks;       ///< of each slot; negative: the DMD is parked
+  int taken = 0;                ///< input frames
 };
 
 /** All that is forgotten from PAUSED to READY. Sink pad's stream lock. */
@@ -71,6 +71,7 @@ struct Stream {
   bool discont = true; ///< the next coded frame does not follow the last one
   bool tag_due = true;
   bool mirrors_moved = false;
+  std::int64_t parked_frames = 0; ///< in a row
   bool warned_parked = false;
   bool warned_dropped = false;
 };

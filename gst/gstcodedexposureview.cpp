@@ -66,7 +66,7 @@ significant_bits (GstCodedExposureView *self, GstBuffer *picture, int depth)
   if (bits == 0)
     if (const auto meta = get_frame_meta (picture))
       bits = meta->bits;
-  return bits == 0 ? depth : std::min (bits, depth);
+  return bits <= 0 ? depth : std::min (bits, depth);
 }
 
 /** 0 to black, 2^@p bits - 1 and more to 255. */
@@ -138,7 +138,7 @@ transform_frame (
   else
     show (view_of_frame<const guint16> (picture), bits, to);
   if (auto meta = get_frame_meta (shown->buffer)) {
-    meta->bits = kShown;
+    meta->bits = 0;
     set_frame_meta (shown->buffer, *meta);
   }
   return GST_FLOW_OK;

@@ -185,7 +185,8 @@ void
 take_bits (CodedStream &stream, GstBuffer *next)
 {
   const auto meta = next ? get_frame_meta (next) : std::nullopt;
-  if (meta && std::exchange (stream.bits, meta->bits) != meta->bits)
+  const int bits = meta ? std::max (0, meta->bits) : 0;
+  if (meta && std::exchange (stream.bits, bits) != bits)
     stream.stale = true;
 }
 

@@ -78,7 +78,8 @@ stamp (GstDmdSync *self, GstBuffer *buffer, FrameMeta meta)
   if (std::exchange (stream.discont, false))
     GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DISCONT);
   if (stream.format)
-    meta.bits = significant_bits (*stream.format);
+    meta.bits =
+        told_bits (significant_bits (*stream.format), stream.time->info);
   else if (const auto said = get_frame_meta (buffer))
     meta.bits = said->bits;
   set_frame_meta (buffer, meta);

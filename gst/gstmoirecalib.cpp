@@ -268,7 +268,7 @@ void
 before_transform (GstBaseTransform *trans, GstBuffer *)
 {
   gst_base_transform_set_passthrough (
-      trans, !moire::settings_of (GST_MOIRE_CALIB (trans)).overlay);
+      trans, !moire::settings_of (GST_MOIRE_CALIB (trans)).lays_over ());
 }
 
 GstStateChangeReturn
@@ -379,7 +379,7 @@ install_run (GObjectClass *klass)
    */
   install_text (klass, PROP_SCHEDULE, "schedule", "Schedule",
       "Schedule whose tile mode=phase looks for, a preset or a JSON file; "
-      "empty: what the stream says");
+      "empty: what the stream says. Read when the mode is set");
   /**
    * moirecalib:overlay:
    *
@@ -388,7 +388,8 @@ install_run (GObjectClass *klass)
    * Since: 0.1
    */
   install_flag (klass, PROP_OVERLAY, "overlay", "Overlay",
-      "Lay fringes, numbers and arrows over the picture", kDefaults.overlay);
+      "Lay fringes, numbers and arrows over the picture, but for mode=phase",
+      kDefaults.overlay);
   /**
    * moirecalib:period:
    *

@@ -130,7 +130,7 @@ begin_run (GstMoireCalib *self, const Settings &settings, Geometry geometry)
     const std::lock_guard guard (st.exchange.lock);
     if (geometry.mode == Mode::phase) {
       st.exchange.schedule.reset ();
-      st.exchange.setup_due = false;
+      st.exchange.panel.reset ();
     }
     st.exchange.geometry = std::move (geometry);
     st.exchange.run++;
@@ -349,15 +349,18 @@ take_tag (GstMoireCalib *self, GstEvent *event)
   if (!said || !*said)
     return event;
   const bool other =
-      st.stream.setup && st.stream.setup->schedule != said->value ().schedule;
+      !st.stream.setup || st.stream.setup->schedule != said->value ().schedule;
   st.stream.setup = said->value ();
   std::optional<StreamSetup> setup;
   {
     const std::lock_guard guard (st.exchange.lock);
     if (other) {
       st.exchange.schedule.reset ();
-      if (st.exchange.geometry && st.exchange.geometry->mode == Mode::phase)
+      if (st.exchange.geometry && st.exchange.geometry->mode == Mode::phase) {
+        st.exchange.run++;
+        st.exchange.live.reset ();
         begin_anew (self);
+      }
     }
     setup = corrected_setup (st);
   }
@@ -432,7 +435,7 @@ transform_ip (GstBaseTransform *trans, GstBuffer *buffer)
   if (!went_on)
     return GST_FLOW_ERROR;
   push_setup (self);
-  if (settings.overlay && gst_buffer_is_writable (buffer))
+  if (settings.lays_over () && gst_buffer_is_writable (buffer))
     overlay (self, buffer);
   return GST_FLOW_OK;
 }

@@ -55,6 +55,9 @@ struct Settings {
   int frames = 4;
   int bits = 0;
   StageOptions stage;
+
+  /** Without patterns the frames are pictures, which others take apart. */
+  bool lays_over () const { return overlay && mode != Mode::phase; }
 };
 
 /** A frame for the worker: a copy, since a camera may use its memory again. */

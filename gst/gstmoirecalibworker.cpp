@@ -313,7 +313,6 @@ Worker::fail_phase (const std::string &why)
 {
   failed_ = true;
   set (Stage::failed);
-  draw ("no phase", {why}, {});
   GST_ELEMENT_WARNING (self_, STREAM, FAILED,
       ("The tile's phase cannot be found: %s", why.c_str ()), (nullptr));
 }
@@ -327,12 +326,7 @@ Worker::find_phase (const Sample &sample)
       [this] (auto pixels) { return find_tile_phase (pixels, *schedule_); });
   if (!tile)
     return fail_phase (tile.error ().message);
-  const bool sure = tile->confidence >= kSure;
-  draw (sure ? "tile found" : "searching for the tile",
-      {format ("phase %d/%d    probability %.4f    contrast %.2f",
-          tile->phase.x, tile->phase.y, tile->confidence, tile->contrast)},
-      {});
-  if (!sure)
+  if (tile->confidence < kSure)
     return;
   const Result<Schedule> found = moved (*schedule_, tile->phase);
   if (!found)
@@ -486,6 +480,8 @@ start_worker (GstMoireCalib *self)
   {
     const std::lock_guard guard (exchange.lock);
     exchange.quit = false;
+    exchange.geometry.reset ();
+    exchange.stage = Stage::searching;
     exchange.panel.reset ();
     exchange.mapping.reset ();
     exchange.schedule.reset ();

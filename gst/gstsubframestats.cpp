@@ -203,6 +203,7 @@ gst_subframe_stats_set_caps (GstBaseTransform *base, GstCaps *caps, GstCaps *)
   StatsState &state = *self->state;
   if (!gst_video_info_from_caps (&state.info, caps))
     return FALSE;
+  state.options.bits = state.in_force.bits;
   return make_meter (self);
 }
 
@@ -212,9 +213,10 @@ follow_bits (GstSubframeStats *self, GstBuffer *frame)
 {
   StatsState &state = *self->state;
   const auto meta = get_frame_meta (frame);
-  if (state.in_force.bits > 0 || !meta || meta->bits == state.options.bits)
+  const int bits = meta ? told_bits (meta->bits, state.info) : 0;
+  if (state.in_force.bits > 0 || bits == state.options.bits)
     return true;
-  state.options.bits = meta->bits;
+  state.options.bits = bits;
   return make_meter (self);
 }
 

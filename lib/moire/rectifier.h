@@ -54,9 +54,9 @@ struct RectifyReport {
  * what is mixed is separated. Brightness is kept: a still, flat scene comes out
  * as an aligned camera has it.
  *
- * Weights are made once, for fractions of a pixel; along the borders of regions,
- * where pixels mix two codes, for each mirror. run () is const, may be called
- * from several threads, and allocates nothing.
+ * Weights are made once, for fractions of a pixel; along the borders of
+ * regions, where pixels mix two codes, for each mirror. run () is const, may be
+ * called from several threads, and allocates nothing.
  */
 class Rectifier
 {

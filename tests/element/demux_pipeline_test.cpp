@@ -197,7 +197,9 @@ TEST (DemuxPipeline, TwelveBitsAreKnownAllTheWay)
       "codedexposure-sim bits=12 gain=16 ! dmdsync ! codedexposure-demux "
       "name=demux ! "
       "subframestats name=stats post-messages=false ! "
-      "codedexposure-view name=view ! fakesink");
+      "codedexposure-view name=view ! videoconvert ! "
+      "video/x-raw,format=GRAY16_LE ! videoconvert ! "
+      "video/x-raw,format=GRAY8 ! subframestats name=converted ! fakesink");
   Watch<std::uint16_t> raw (pipeline.pad ("demux", "src"));
   Watch<std::uint8_t> seen (pipeline.pad ("view", "src"));
   ASSERT_EQ (pipeline.play (), "");
@@ -210,6 +212,7 @@ TEST (DemuxPipeline, TwelveBitsAreKnownAllTheWay)
   };
   EXPECT_EQ (saturated ("demux"), 2u);
   EXPECT_EQ (saturated ("stats"), 8u);
+  EXPECT_EQ (saturated ("converted"), 8u);
 }
 
 TEST (DemuxPipeline, SeekStartsANewStretchOfTime)

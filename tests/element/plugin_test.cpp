@@ -57,9 +57,9 @@ is_ours (const GParamSpec *spec)
 
 TEST (Plugin, HasTheElementsOfTheBench)
 {
-  for (const char *name :
-      {"codedexposure-sim", "codedexposure-demux", "codedexposure-log",
-          "codedexposure-scene", "codedexposure-view", "dmdsync", "moirecalib", "subframestats"}) {
+  for (const char *name : {"codedexposure-sim", "codedexposure-demux",
+           "codedexposure-log", "codedexposure-scene", "codedexposure-view",
+           "dmdsync", "moirecalib", "subframestats"}) {
     const std::unique_ptr<GstElementFactory, ObjectUnref> factory (
         gst_element_factory_find (name));
     EXPECT_NE (factory, nullptr) << name;

@@ -80,7 +80,28 @@ TEST (View, EightBitsStayAndFewerAreStretched)
   EXPECT_EQ (shown<std::uint8_t> ("bits=4", 15, 0), 255);
 }
 
-TEST (View, SaysThatItsPicturesHaveEightBits)
+TEST (View, PassesEightBitsAsTheyAreAndTakesOtherCapsWhenTheyCome)
+{
+  ElementHarness h ("codedexposure-view");
+  h.set_caps (caps ("GRAY8"));
+  BufferPtr plain = frame_of (
+      draw<std::uint8_t> (kWidth, kHeight, [] (int x, int y) { return x + y; }),
+      0);
+  GstBuffer *const same = plain.get ();
+  ASSERT_EQ (h.push (std::move (plain)), GST_FLOW_OK);
+  EXPECT_EQ (h.pull ().get (), same);
+
+  h.set_caps (caps ("GRAY16_LE"));
+  ASSERT_EQ (h.push (frame_of (draw<std::uint16_t> (kWidth, kHeight,
+                                   [] (int, int) { return 65535; }),
+                 0)),
+      GST_FLOW_OK);
+  const BufferPtr out = h.pull ();
+  EXPECT_EQ (
+      image_of<std::uint8_t> (out.get (), h.pad_caps ().get ()).at (6, 2), 255);
+}
+
+TEST (View, SaysThatAllBitsOfItsPicturesCount)
 {
   ElementHarness h ("codedexposure-view");
   h.set_caps (caps ("GRAY16_LE"));
@@ -88,5 +109,5 @@ TEST (View, SaysThatItsPicturesHaveEightBits)
       draw<std::uint16_t> (kWidth, kHeight, [] (int, int) { return 4095; }), 0);
   set_frame_meta (picture.get (), {.bits = 12});
   ASSERT_EQ (h.push (std::move (picture)), GST_FLOW_OK);
-  EXPECT_EQ (get_frame_meta (h.pull ().get ())->bits, 8);
+  EXPECT_EQ (get_frame_meta (h.pull ().get ())->bits, 0);
 }

@@ -169,7 +169,8 @@ public:
     }
     return nullptr;
   }
-  /** Text of the next error, warning or info on the bus; "" when there is none. */
+  /** Text of the next error, warning or info on the bus; "" when there is none.
+   */
   std::string error () { return complaint (GST_MESSAGE_ERROR); }
   std::string warning () { return complaint (GST_MESSAGE_WARNING); }
   std::string info () { return complaint (GST_MESSAGE_INFO); }

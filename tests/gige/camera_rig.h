@@ -148,4 +148,15 @@ private:
   ObjectPtr<GstBus> bus_;
 };
 
+/** One of the counters of the pipeline's dmdsync, whose name is "sync". */
+inline guint64
+counter (const CameraPipeline &pipeline, const char *name)
+{
+  const auto sync = pipeline.element ("sync");
+  const StructurePtr stats (property<GstStructure *> (sync.get (), "stats"));
+  guint64 value = 0;
+  EXPECT_TRUE (gst_structure_get_uint64 (stats.get (), name, &value)) << name;
+  return value;
+}
+
 } // namespace cexp::test

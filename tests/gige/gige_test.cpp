@@ -66,16 +66,6 @@ struct Received {
   }
 };
 
-guint64
-counter (const CameraPipeline &pipeline, const char *name)
-{
-  const auto sync = pipeline.element ("sync");
-  const StructurePtr stats (property<GstStructure *> (sync.get (), "stats"));
-  guint64 value = 0;
-  EXPECT_TRUE (gst_structure_get_uint64 (stats.get (), name, &value)) << name;
-  return value;
-}
-
 /** Frames that dmdsync was given, and that are not lost on purpose. */
 guint64
 came (const CameraPipeline &pipeline, const Received &received)

@@ -2,6 +2,7 @@
 #include "base/workers.h"
 
 #include <algorithm>
+#include <system_error>
 
 namespace cexp
 {
@@ -11,10 +12,14 @@ Workers::Workers (int count)
   const int processors =
       std::max (1, int (std::thread::hardware_concurrency ()));
   const int threads = std::clamp (count > 0 ? count : processors, 1, kMost);
-  for (int worker = 1; worker < threads; worker++)
-    threads_.emplace_back ([this, worker] (std::stop_token quit) {
-      serve (std::move (quit), worker);
-    });
+  try {
+    for (int worker = 1; worker < threads; worker++)
+      threads_.emplace_back ([this, worker] (std::stop_token quit) {
+        serve (std::move (quit), worker);
+      });
+  } catch (const std::system_error &) {
+    /* The system gives no more of them: those that there are do it all. */
+  }
 }
 
 Workers::~Workers () = default;

@@ -19,7 +19,8 @@ class Workers
 public:
   static constexpr int kMost = 64;
 
-  /** @p count  of threads, at most kMost; 0: one for each processor. */
+  /** @p count  of threads, at most kMost; 0: one for each processor. Fewer
+   * where the system gives no more. */
   explicit Workers (int count);
   ~Workers ();
 

@@ -256,10 +256,11 @@ Worker::align (const Sample &sample)
   if (!before_)
     before_ = fringes_of (*live_, "first look");
   aligned_ = correction_->state == AlignmentState::aligned ? aligned_ + 1 : 0;
+  /* Who waits for a state may then ask for the reading that made it. */
+  say_reading (self_, sample, *reading, *correction_);
   set (Stage (correction_->state));
   draw (alignment_state_text (correction_->state),
       lines_of (*reading, *correction_), {});
-  say_reading (self_, sample, *reading, *correction_);
 }
 
 void

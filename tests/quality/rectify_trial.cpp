@@ -4,7 +4,6 @@
 #include "rectify_trial.h"
 
 #include <chrono>
-#include <cstdlib>
 #include <iostream>
 #include <utility>
 
@@ -13,6 +12,7 @@
 #include "moire/calibration.h"
 #include "moire/rectifier.h"
 #include "moire_bench.h"
+#include "must.h"
 #include "upsample.h"
 
 namespace cexp::quality
@@ -22,17 +22,6 @@ namespace
 {
 
 constexpr int kBorder = 16;
-
-template <typename T>
-T
-must (Result<T> result)
-{
-  if (!result) {
-    std::cerr << result.error ().message << '\n';
-    std::abort ();
-  }
-  return std::move (*result);
-}
 
 Mapping
 measure (Extent size, const BenchOptions &options)

@@ -3,13 +3,12 @@
 #include "region_figures.h"
 
 #include <algorithm>
-#include <cstdlib>
 #include <functional>
-#include <iostream>
 #include <utility>
 
 #include "extract/extractor.h"
 #include "fuse/fuser.h"
+#include "must.h"
 #include "trial.h"
 
 namespace cexp::quality
@@ -28,17 +27,6 @@ struct Setup {
 };
 constexpr Setup kSetups[] = {{"staircase:2x2", "staircase:4x2", false},
     {"sequential:lattice:4/2", "sequential:lattice:8/3", true}};
-
-template <typename T>
-T
-must (Result<T> result)
-{
-  if (!result) {
-    std::cerr << result.error ().message << '\n';
-    std::abort ();
-  }
-  return std::move (*result);
-}
 
 Rect
 grown (const Rect &rect, int x, int y)

@@ -3,11 +3,11 @@
 #include "trial.h"
 
 #include <algorithm>
-#include <cstdlib>
 #include <iostream>
 #include <numeric>
 #include <utility>
 
+#include "must.h"
 #include "optics/bench.h"
 #include "schedule/sample_grid.h"
 #include "upsample.h"
@@ -19,18 +19,6 @@ namespace
 {
 
 using Values = Image<float>;
-
-/* What cannot fail with the schedules and numbers of this program. */
-template <typename T>
-T
-must (Result<T> result)
-{
-  if (!result) {
-    std::cerr << result.error ().message << '\n';
-    std::abort ();
-  }
-  return std::move (*result);
-}
 
 BenchOptions
 bench_options (const Condition &condition)

@@ -138,6 +138,7 @@ begin_run (GstMoireCalib *self, const Settings &settings, Geometry geometry)
     st.exchange.samples.clear ();
     st.exchange.solve = false;
     st.exchange.stage = Stage::searching;
+    st.exchange.confidence = 0.0;
     st.exchange.readings = 0;
     st.exchange.aligned_readings = 0;
   }
@@ -380,6 +381,7 @@ finish (GstMoireCalib *self)
   Exchange &exchange = st.exchange;
   std::size_t patterns = 0;
   bool lost_tile = false;
+  double confidence = 0.0;
   {
     std::unique_lock guard (exchange.lock);
     exchange.changed.wait (guard, [&exchange] {
@@ -388,14 +390,17 @@ finish (GstMoireCalib *self)
     });
     lost_tile = exchange.geometry && exchange.geometry->mode == Mode::phase &&
                 exchange.stage == Stage::searching;
+    confidence = exchange.confidence;
     if (exchange.geometry)
       patterns = exchange.geometry->patterns.size ();
   }
   push_setup (self);
   if (lost_tile)
     GST_ELEMENT_WARNING (self, STREAM, FAILED,
-        ("The stream ended, and no frame told where the tile lies: take one of "
-         "a scene with more light in more of its parts, or calibrate."),
+        ("The stream ended, and no frame told where the tile lies: a phase is "
+         "taken from a probability of %g on, and %g was the most. Take a scene "
+         "with more light in more of its parts, or calibrate.",
+            kSure, confidence),
         (nullptr));
   if (st.stream.mapping && st.stream.next < patterns)
     GST_ELEMENT_WARNING (self, STREAM, FAILED,

@@ -79,6 +79,9 @@ struct Geometry {
   std::optional<Schedule> schedule; ///< that the stream says
 };
 
+/** A phase of this probability is taken. */
+constexpr double kSure = 0.999;
+
 /** Between the streaming thread and the worker; its mutex covers all of it. */
 struct Exchange {
   std::mutex lock;
@@ -93,6 +96,7 @@ struct Exchange {
   /* From the worker: */
   std::shared_ptr<const Panel> panel;
   Stage stage = Stage::searching;
+  double confidence = 0.0;  ///< most that a frame told of the tile
   int readings = 0;         ///< of the live grating
   int aligned_readings = 0; ///< in a row
   /** Where the mirrors stand: of the two, what was found last. */

@@ -60,9 +60,6 @@ lines_of (const LiveReading &reading, const StageCorrection &todo)
   };
 }
 
-/* A phase of this probability is taken. */
-constexpr double kSure = 0.999;
-
 /** @p schedule with its tile at @p phase. */
 Result<Schedule>
 moved (const Schedule &schedule, Offset phase)
@@ -327,6 +324,10 @@ Worker::find_phase (const Sample &sample)
       [this] (auto pixels) { return find_tile_phase (pixels, *schedule_); });
   if (!tile)
     return fail_phase (tile.error ().message);
+  {
+    const std::lock_guard guard (exchange_.lock);
+    exchange_.confidence = std::max (exchange_.confidence, tile->confidence);
+  }
   if (tile->confidence < kSure)
     return;
   const Result<Schedule> found = moved (*schedule_, tile->phase);

@@ -2,24 +2,33 @@
 /* The plugin: registers its elements, nothing else. */
 #include <gst/gst.h>
 
-#include "gstcodedexposuredemux.h"
-#include "gstcodedexposurefuse.h"
-#include "gstcodedexposurelog.h"
-#include "gstcodedexposuremeta.h"
-#include "gstcodedexposurescene.h"
-#include "gstcodedexposuresim.h"
-#include "gstcodedexposureview.h"
-#include "gstdmdsync.h"
-#include "gstmoirecalib.h"
-#include "gstsubframestats.h"
-#include "gstsubframestatsreport.h"
+#include "bench/simulated_dmd.h"
+#include "camera/camerasrc.h"
+#include "camera/provider.h"
+#include "common/meta.h"
+#include "demux/demux.h"
+#include "dmdsync/dmdsync.h"
+#include "fuse/fuse.h"
+#include "log/log.h"
+#include "moirecalib/moirecalib.h"
+#include "scene/scene.h"
+#include "sim/sim.h"
+#include "stats/report.h"
+#include "stats/subframestats.h"
+#include "view/view.h"
 
 static gboolean
 plugin_init (GstPlugin *plugin)
 {
-  cexp::gst::register_frame_meta ();
-  cexp::gst::register_stats_meta ();
-  return GST_ELEMENT_REGISTER (codedexposure_demux, plugin) &&
+  codedexposure::gst::register_frame_meta ();
+  codedexposure::gst::register_stats_meta ();
+  codedexposure::serve_simulated_dmds ();
+#ifdef CODEDEXPOSURE_CAMERA_PROVIDER
+  if (!GST_DEVICE_PROVIDER_REGISTER (codedexposure_cameraprovider, plugin))
+    return FALSE;
+#endif
+  return GST_ELEMENT_REGISTER (codedexposure_camerasrc, plugin) &&
+         GST_ELEMENT_REGISTER (codedexposure_demux, plugin) &&
          GST_ELEMENT_REGISTER (codedexposure_fuse, plugin) &&
          GST_ELEMENT_REGISTER (codedexposure_log, plugin) &&
          GST_ELEMENT_REGISTER (codedexposure_scene, plugin) &&

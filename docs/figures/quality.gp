@@ -25,7 +25,7 @@ plot table("point-noisy") every ::0::8 using (column(9) / 2):0:( \
     "" every ::0::8 using (column(9) + 0.8):0:(sprintf("%.1f", column(9))) \
         with labels left font ",10"
 
-set title "Ranks of a staircase, nothing moves (noisy)"
+set title "Ranks of a staircase, static scenes (noisy)"
 set xrange [0.7:4.3]
 set yrange [0:160]
 set ytics 0, 20
@@ -33,7 +33,7 @@ set y2range [0:8]
 set ytics nomirror
 set y2tics
 unset grid
-set ylabel "mean grey"
+set ylabel "mean pixel value"
 set y2label "entropy (bits)"
 set xtics ("I1" 1, "I2" 2, "I3" 3, "I4" 4)
 set key top left font ",9"

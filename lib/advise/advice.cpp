@@ -6,14 +6,13 @@
 
 #include "advise/linear_estimate.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 namespace
 {
 
-/* Codes with one open slot for every kind of tile; and the others with cells
- * that lie close together. */
+/* One-hot codes for every kind of tile, and the others for compact cells. */
 constexpr const char *kUsual[] = {
     "sequential:2x1",
     "s-matrix:3x1",
@@ -77,7 +76,7 @@ predict_part (
   return prediction;
 }
 
-/* Mean of what is said in dB below white, by @p shares of the pixels. */
+/* Mean power, by the shares of the pixels, of levels in dB below white. */
 double
 mean_level (const std::vector<Prediction> &parts,
     const std::vector<double> &shares, double Prediction::*level)
@@ -125,8 +124,7 @@ predict_regions (const Schedule &whole, const Conditions &conditions)
     inside.camera.size = {rect.width, rect.height};
     auto part = predict_part (whole.region (int (i)), inside);
     if (!part)
-      return Error{
-          "region " + std::to_string (i) + ": " + part.error ().message};
+      return part.error ().with_prefix ("region " + std::to_string (i) + ": ");
     parts.push_back (*std::move (part));
     shares.push_back (double (rect.width) * rect.height /
                       (double (size.width) * size.height));
@@ -163,14 +161,14 @@ usual_schedules (Nanoseconds switching, Nanoseconds readout)
 }
 
 const Prediction *
-recommend (std::span<const Prediction> predictions, double least_rate)
+recommend (std::span<const Prediction> predictions, double min_rate)
 {
   const Prediction *best = nullptr;
   for (const Prediction &prediction : predictions)
-    if (!prediction.overexposed && prediction.frame_rate >= least_rate &&
+    if (!prediction.overexposed && prediction.frame_rate >= min_rate &&
         (!best || prediction.psnr > best->psnr))
       best = &prediction;
   return best;
 }
 
-} // namespace cexp
+} // namespace codedexposure

@@ -2,10 +2,11 @@
 #include "advise/exposure_model.h"
 
 #include <cmath>
+#include <vector>
 
 #include "base/range.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 namespace
@@ -26,16 +27,6 @@ check (const Camera &camera, double light)
   });
 }
 
-/* What an element collects when its light is white in every slot. */
-double
-white_of (const ExposureModel &model, int element)
-{
-  double sum = 0.0;
-  for (int s = 0; s < model.slots (); s++)
-    sum += model.open (element, s);
-  return sum;
-}
-
 } // namespace
 
 Result<ExposureModel>
@@ -44,46 +35,57 @@ ExposureModel::make (
 {
   if (const auto good = check (camera, light); !good)
     return good.error ();
-  ExposureModel model;
   const double period = double (camera.rate.den) / camera.rate.num;
-  model.schedule_ = schedule;
-  model.noise_ = camera.noise;
-  model.active_ = model.pitch_ = model.hold_ = period;
-  model.open_ = {1.0};
-  double open_slots = 1.0, white_slots = 1.0;
+  double active = period, pitch = period, on_slots = 1.0;
   if (schedule) {
-    const int n = model.n_ = schedule->slots ();
+    const int n = schedule->slots ();
     const auto plan = SlotPlan::fit (schedule->timing (), n, camera.rate);
     if (!plan)
       return plan.error ();
-    model.active_ = 1e-9 * double (plan->active ());
-    model.pitch_ = 1e-9 * double (plan->start (1) - plan->start (0));
-    model.hold_ = period / n;
-    model.open_.clear ();
-    open_slots = 0.0;
-    white_slots = schedule->white_slots ();
-    for (int e = 0; e < n; e++) {
-      open_slots += double (schedule->code ().open_slots (e)) / n;
-      for (int s = 0; s < n; s++)
-        model.open_.push_back (
-            schedule->code ().open (e, s) ? 1.0 : schedule->leak ());
-    }
+    active = 1e-9 * double (plan->active ());
+    pitch = 1e-9 * double (plan->start (1) - plan->start (0));
+    on_slots = 0.0;
+    for (int e = 0; e < n; e++)
+      on_slots += double (schedule->code ().on_slots (e)) / n;
   }
-  model.slot_electrons_ =
-      camera.noise.full_well * light * model.active_ / period;
-  model.efficiency_ = open_slots * model.active_ / period;
-
-  const double white = white_slots * model.slot_electrons_;
-  model.overexposed_ = white > camera.noise.full_well * (1.0 + 1e-9);
-  model.step_ = white / double ((1 << camera.bits) - 1);
+  const double full_well = camera.noise.full_well;
+  ExposureModel model (schedule, camera, full_well * light * active / period);
+  model.active_ = active;
+  model.pitch_ = pitch;
+  model.hold_ = period / model.slots ();
+  model.efficiency_ = on_slots * active / period;
+  model.overexposed_ =
+      model.white_slots_ * model.slot_electrons_ > full_well * (1.0 + 1e-9);
   return model;
+}
+
+ExposureModel::ExposureModel (const std::optional<Schedule> &schedule,
+    const Camera &camera, double slot_electrons)
+    : schedule_ (schedule),
+      white_slots_ (schedule ? schedule->white_slots () : 1.0),
+      slot_electrons_ (slot_electrons),
+      observation_ (schedule, camera.noise, white_slots_ * slot_electrons,
+          double ((1 << camera.bits) - 1))
+{
+}
+
+double
+ExposureModel::open (int element, int slot) const
+{
+  return schedule_ ? schedule_->light (element, slot) : 1.0;
+}
+
+double
+ExposureModel::light (int element) const
+{
+  return schedule_ ? schedule_->light (element) : 1.0;
 }
 
 double
 ExposureModel::variance (int element, double level) const
 {
-  const double photons = white_of (*this, element) * level * slot_electrons_;
-  return noise_.variance (photons, step_) / (slot_electrons_ * slot_electrons_);
+  const double light_squared = light (element) * light (element);
+  return light_squared * observation_.variance (element, level);
 }
 
 Result<double>
@@ -97,12 +99,13 @@ ExposureModel::snr (double level) const
     factors = *std::move (inverse);
   }
   double noise = 0.0;
-  for (int s = 0; s < n_; s++)
-    for (int e = 0; e < n_; e++) {
-      const double factor = factors[std::size_t (s * n_ + e)];
-      noise += factor * factor * variance (e, level) / n_;
+  const int n = slots ();
+  for (int s = 0; s < n; s++)
+    for (int e = 0; e < n; e++) {
+      const double factor = factors[std::size_t (s * n + e)];
+      noise += factor * factor * variance (e, level) / n;
     }
   return 10.0 * std::log10 (level * level / noise);
 }
 
-} // namespace cexp
+} // namespace codedexposure

@@ -1,32 +1,31 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* How much light of each slot a pixel gets, and how noisy that makes it. */
+/* The light of each slot in a pixel, and the noise of the pixel. */
 #pragma once
 
 #include <optional>
-#include <vector>
 
 #include "base/result.h"
+#include "estimate/observation.h"
 #include "schedule/schedule.h"
-#include "stats/sensor_noise.h"
 
-namespace cexp
+namespace codedexposure
 {
 
-/** What takes the coded frames. */
+/** The camera that records coded frames. */
 struct Camera {
   Extent size{768, 576};
   FrameRate rate;
-  SensorNoise noise{10000.0, 5.0}; ///< its full well is above 0
-  int bits = 8;                    ///< of the converter, 1..16
+  SensorNoise noise{10000.0, 5.0}; ///< the full well must be above 0
+  int bits = 8;                    ///< of a pixel, 1..16
 };
 
 /**
  * A coded exposure as a linear map from the light of the slots to pixels, with
  * the noise of photons, of reading and of rounding.
  *
- * Values are parts of what white makes in one slot. The analog gain is such
- * that white just makes the largest number for the element that is open
- * longest, as codedexposure-sim has it.
+ * Values are parts of white in one slot. With the analog gain, white has the
+ * largest pixel value for the element that is on longest, as in
+ * codedexposure-sim.
  */
 class ExposureModel
 {
@@ -35,38 +34,39 @@ public:
    * @p schedule  none: an ordinary exposure, one slot without mirrors. Without
    *              regions, or a part of one with regions, by which the analog
    *              gain is set.
-   * @p light     electrons that white makes in a frame period of exposure
-   *              without mirrors, as a part of the full well; > 0.
+   * @p light     electrons of white in one frame period of exposure without
+   *              mirrors, as a part of the full well; > 0.
    * Error when a number is out of range, or the slots do not fit the camera's
    * frame period.
    */
   static Result<ExposureModel> make (const std::optional<Schedule> &schedule,
       const Camera &camera, double light);
 
-  int elements () const { return n_; }
-  int slots () const { return n_; }
+  int elements () const { return observation_.slots (); }
+  int slots () const { return observation_.slots (); }
   /** Light of slot @p slot that an element lets through: 1, or the leak. */
-  double open (int element, int slot) const
-  {
-    return open_[std::size_t (element * n_ + slot)];
-  }
+  double open (int element, int slot) const;
+  /** Light of all slots together. */
+  double light (int element) const;
+  /** The same exposure in parts of the coded frame's white. */
+  const Observation &observation () const { return observation_; }
   /** Element of a pixel. */
   int element_at (int x, int y) const
   {
     return schedule_ ? schedule_->element_at (x, y) : 0;
   }
-  /** Seconds of a slot's light, between the middles of two slots, and for
-   * which a subframe stands. */
+  /** Duration of a slot's light, distance of two slots, and duration of a
+   * subframe, seconds. */
   double active () const { return active_; }
   double pitch () const { return pitch_; }
   double hold () const { return hold_; }
 
-  /** Electrons that white makes in one slot of an open mirror. */
+  /** Electrons of white in one slot of a mirror that is on. */
   double slot_electrons () const { return slot_electrons_; }
   /** Part of the light of a frame period that reaches the sensor, mean over
-   * the elements, leaked light left out. */
+   * the elements, without leaked light. */
   double efficiency () const { return efficiency_; }
-  /** White is more than a pixel holds. */
+  /** White exceeds the full well. */
   bool overexposed () const { return overexposed_; }
 
   /** Variance of an element's pixel where the scene is @p level of white in
@@ -80,17 +80,16 @@ public:
   Result<double> snr (double level) const;
 
 private:
-  ExposureModel () = default;
+  ExposureModel (const std::optional<Schedule> &schedule, const Camera &camera,
+      double slot_electrons);
 
   std::optional<Schedule> schedule_;
-  int n_ = 1;
-  std::vector<double> open_;
+  double white_slots_;
+  double slot_electrons_;
+  Observation observation_;
   double active_ = 0.0, pitch_ = 0.0, hold_ = 0.0;
-  double slot_electrons_ = 0.0;
-  SensorNoise noise_;
-  double step_ = 0.0; ///< electrons a number
   double efficiency_ = 0.0;
   bool overexposed_ = false;
 };
 
-} // namespace cexp
+} // namespace codedexposure

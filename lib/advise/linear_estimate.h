@@ -6,9 +6,9 @@
 
 #include "advise/exposure_model.h"
 #include "advise/scene_statistics.h"
-#include "schedule/tile.h"
+#include "base/geometry.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 /** A coded pixel at (x, y) from the estimated one, and its weight. */
@@ -18,31 +18,31 @@ struct EstimateTap {
 };
 
 /**
- * Simple kriging: each pixel of the full-size picture in each slot, estimated
- * from the coded pixels of one frame around it such that the expected squared
- * error is least, for a scene of which no more is known than its statistics.
+ * Simple kriging: each pixel of the full-size picture in each slot is estimated
+ * from the coded pixels around it in one frame, with the least expected squared
+ * error for a scene with given statistics.
  *
- * The truth is the scene at any time for which the slot's subframe stands, so
- * that the error holds what the slot blurs, what lies between the samples, what
- * moves until the next subframe, and the noise.
+ * The truth is the scene at any time within the duration of the slot's
+ * subframe. The error thus contains motion blur within the slot, aliasing,
+ * motion until the next subframe, and noise.
  */
 class LinearEstimate
 {
 public:
-  /** Filters for more elements would take minutes to find. */
+  /** Filters for more elements would take minutes to solve. */
   static constexpr int kMaxElements = 64;
 
-  /** @p model  of kMaxElements or fewer. Of a tile that is written out, each
-   * element stands for all of its pixels. */
+  /** @p model  of kMaxElements or fewer. Of a tile that is written out, one
+   * pixel of each element represents all others. */
   LinearEstimate (const ExposureModel &model, const SceneStatistics &scene);
 
-  /** Mean squared error over pixels and slots, white being 1. */
+  /** Mean squared error over pixels and slots; white is 1. */
   double error () const { return error_; }
   /** In dB. */
   double psnr () const;
-  /** The places of tap () around a pixel of element @p element, and what its
-   * weights are for @p slot. They apply to differences of coded pixels from
-   * their means, white in one slot being 1. */
+  /** The taps around a pixel of @p element and their weights for @p slot. They
+   * apply to differences of coded pixels from their means; white in one slot is
+   * 1. */
   std::vector<EstimateTap> taps (int element, int slot) const;
 
 private:
@@ -54,4 +54,4 @@ private:
   double error_ = 0.0;
 };
 
-} // namespace cexp
+} // namespace codedexposure

@@ -6,7 +6,7 @@
 #include <memory>
 #include <system_error>
 
-namespace cexp
+namespace codedexposure
 {
 
 Result<std::string>
@@ -14,7 +14,8 @@ read_file (const std::string &path, std::size_t limit)
 {
   const auto failure = [] (const char *what) {
     return Error{
-        std::string (what) + ": " + std::generic_category ().message (errno)};
+        std::string (what) + ": " + std::generic_category ().message (errno),
+        errno == ENOENT ? ErrorCode::not_found : ErrorCode::io};
   };
   const std::unique_ptr<std::FILE, int (*) (std::FILE *)> file (
       std::fopen (path.c_str (), "rb"), std::fclose);
@@ -29,4 +30,4 @@ read_file (const std::string &path, std::size_t limit)
   return content;
 }
 
-} // namespace cexp
+} // namespace codedexposure

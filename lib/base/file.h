@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Files that are read as a whole. */
+/* Reads whole files. */
 #pragma once
 
 #include <cstddef>
@@ -7,11 +7,12 @@
 
 #include "base/result.h"
 
-namespace cexp
+namespace codedexposure
 {
 
-/** Up to @p limit + 1 bytes of the file @p path, so that the caller can tell
- * when there are too many. The error says what failed, not of which file. */
+/** The first @p limit + 1 bytes of the file @p path: more than @p limit mean
+ * that it is too long. The error does not name the file; its code is not_found
+ * or io. */
 Result<std::string> read_file (const std::string &path, std::size_t limit);
 
-} // namespace cexp
+} // namespace codedexposure

@@ -6,7 +6,7 @@
 #include <type_traits>
 #include <vector>
 
-namespace cexp
+namespace codedexposure
 {
 
 /**
@@ -92,4 +92,4 @@ private:
   std::vector<T> pixels_;
 };
 
-} // namespace cexp
+} // namespace codedexposure

@@ -3,7 +3,7 @@
 
 #include "base/text.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 Result<void>
@@ -16,4 +16,4 @@ check_ranges (std::initializer_list<Range> ranges)
   return {};
 }
 
-} // namespace cexp
+} // namespace codedexposure

@@ -1,23 +1,23 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Numbers that users give, and the bounds of them. */
+/* Bounds of the numbers that users give. */
 #pragma once
 
 #include <initializer_list>
 
 #include "base/result.h"
 
-namespace cexp
+namespace codedexposure
 {
 
-/** A number, what it is, and the least and the largest that it may be. */
+/** A number and its bounds, which it may reach. */
 struct Range {
-  const char *what;
+  const char *what; ///< its name in the message
   double value;
   double low;
   double high;
 };
 
-/** Error that names the first number that is outside of its range, or none. */
+/** Error for the first number that is out of bounds, or not a number. */
 Result<void> check_ranges (std::initializer_list<Range> ranges);
 
-} // namespace cexp
+} // namespace codedexposure

@@ -1,22 +1,49 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* A value or the reason why there is none; nothing in lib/ throws across its
- * border. */
+/* A value, or an error with a code and a message.
+ *
+ * When memory runs out, functions that make objects or work on frames return
+ * ErrorCode::out_of_memory; copies of values and their texts throw
+ * std::bad_alloc, like standard containers. No other exception leaves the
+ * library, and none ends one of its threads. One case ends the program:
+ * nlohmann::json allocates memory to free a value, and that fails. */
 #pragma once
 
+#include <new>
 #include <string>
 #include <utility>
 #include <variant>
 
-namespace cexp
+namespace codedexposure
 {
 
-/** Why something could not be done: what was expected, what came, and what to
- * do about it, in one sentence a user can read on the bus. */
-struct Error {
-  std::string message;
+/** What kind of error it is, so that a program can act on it. */
+enum class ErrorCode {
+  invalid_argument, ///< a value is wrong or does not fit the others
+  parse,            ///< a text or file is not in the expected format
+  not_found,        ///< there is no such file or device
+  io,               ///< a file or a connection could not be read or written
+  device,           ///< a device refused a command or reported a fault
+  timeout,          ///< a device or a peer did not answer in time
+  cancelled,        ///< the caller asked to stop
+  unsupported,      ///< this build, machine or device cannot do it
+  out_of_memory,    ///< an allocation failed
 };
 
-/** Either a @p T or an Error. Test it before value() or error(). */
+/** Why something could not be done. The message is one sentence for the user:
+ * the value, the rule and the remedy. */
+struct Error {
+  std::string message;
+  ErrorCode code = ErrorCode::invalid_argument;
+
+  /** The same error with @p prefix, which says of what it is, before the
+   * message. */
+  Error with_prefix (const std::string &prefix) const
+  {
+    return {prefix + message, code};
+  }
+};
+
+/** Either a @p T or an Error. Test it before value () or error (). */
 template <typename T>
 class [[nodiscard]] Result
 {
@@ -42,7 +69,7 @@ private:
   std::variant<T, Error> state_;
 };
 
-/** Done, or the reason why not. */
+/** Success, or an Error. */
 template <>
 class [[nodiscard]] Result<void>
 {
@@ -59,4 +86,12 @@ private:
   bool ok_ = true;
 };
 
-} // namespace cexp
+/** What a function returns that caught std::bad_alloc. It allocates nothing:
+ * the text fits into the string itself. */
+inline Error
+out_of_memory () noexcept
+{
+  return {"out of memory", ErrorCode::out_of_memory};
+}
+
+} // namespace codedexposure

@@ -6,14 +6,14 @@
 #include <cmath>
 #include <cstdint>
 
-namespace cexp
+namespace codedexposure
 {
 
 namespace
 {
 
-/** Length of the UTF-8 character of more than one byte that @p text begins
- * with; 0 where it begins with none. */
+/** Bytes of the printable multi-byte UTF-8 character at the beginning of
+ * @p text; 0: there is none. */
 std::size_t
 multibyte_length (std::string_view text)
 {
@@ -120,4 +120,4 @@ split (std::string_view text, char separator)
   }
 }
 
-} // namespace cexp
+} // namespace codedexposure

@@ -3,8 +3,9 @@
 
 #include <algorithm>
 #include <system_error>
+#include <utility>
 
-namespace cexp
+namespace codedexposure
 {
 
 Workers::Workers (int count)
@@ -18,7 +19,7 @@ Workers::Workers (int count)
         serve (std::move (quit), worker);
       });
   } catch (const std::system_error &) {
-    /* The system gives no more of them: those that there are do it all. */
+    /* The threads that started do all the work. */
   }
 }
 
@@ -40,6 +41,8 @@ Workers::run (int parts, const Task &task, std::stop_token stop)
   work (0);
   std::unique_lock lock (mutex_);
   done_.wait (lock, [this] { return busy_ == 0; });
+  if (failure_)
+    std::rethrow_exception (std::exchange (failure_, nullptr));
   return !stop_.stop_requested ();
 }
 
@@ -68,8 +71,15 @@ Workers::work (int worker)
     const int part = next_++;
     if (part >= parts_)
       return;
-    (*task_) (part, worker);
+    try {
+      (*task_) (part, worker);
+    } catch (...) {
+      const std::lock_guard lock (mutex_);
+      next_ = parts_;
+      if (!failure_)
+        failure_ = std::current_exception ();
+    }
   }
 }
 
-} // namespace cexp
+} // namespace codedexposure

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "dmd/bitmap.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 namespace
@@ -44,16 +44,16 @@ headers (int width, int height, int bits, std::uint32_t colours)
 } // namespace
 
 Bytes
-encode_bitmap (ImageView<const std::uint8_t> mirrors)
+encode_bitmap (const MirrorRows<std::uint8_t> &mirrors)
 {
-  Bytes file = headers (mirrors.width, mirrors.height, 1, 2);
+  Bytes file = headers (mirrors.width (), mirrors.height (), 1, 2);
   append_le (file, 0x000000, 4);
   append_le (file, 0xFFFFFF, 4);
-  const std::size_t row_bytes = row_size (mirrors.width, 1);
-  for (int y = mirrors.height - 1; y >= 0; y--) {
+  const std::size_t row_bytes = row_size (mirrors.width (), 1);
+  for (int y = mirrors.height () - 1; y >= 0; y--) {
     const std::size_t start = file.size ();
     file.resize (start + row_bytes);
-    for (int x = 0; x < mirrors.width; x++)
+    for (int x = 0; x < mirrors.width (); x++)
       if (mirrors.row (y)[x] != 0)
         file[start + std::size_t (x / 8)] |= std::uint8_t (0x80 >> x % 8);
   }
@@ -61,13 +61,13 @@ encode_bitmap (ImageView<const std::uint8_t> mirrors)
 }
 
 Bytes
-encode_plane_bitmap (ImageView<const PlanePixel> planes)
+encode_plane_bitmap (const MirrorRows<PlanePixel> &planes)
 {
-  Bytes file = headers (planes.width, planes.height, 24, 0);
-  const std::size_t row_bytes = row_size (planes.width, 24);
-  for (int y = planes.height - 1; y >= 0; y--) {
+  Bytes file = headers (planes.width (), planes.height (), 24, 0);
+  const std::size_t row_bytes = row_size (planes.width (), 24);
+  for (int y = planes.height () - 1; y >= 0; y--) {
     const std::size_t start = file.size ();
-    for (int x = 0; x < planes.width; x++) {
+    for (int x = 0; x < planes.width (); x++) {
       const PlanePixel pixel = planes.row (y)[x];
       // In the file: blue, green, red.
       file.push_back (std::uint8_t (pixel >> 16));
@@ -79,4 +79,4 @@ encode_plane_bitmap (ImageView<const PlanePixel> planes)
   return file;
 }
 
-} // namespace cexp
+} // namespace codedexposure

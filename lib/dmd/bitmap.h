@@ -2,18 +2,17 @@
 /* Masks as Windows bitmap files, which TI's boards and programs take. */
 #pragma once
 
-#include "base/image.h"
 #include "dmd/erle.h"
 #include "dmd/little_endian.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 /** A binary mask, 1 bit a mirror, 1 is on. */
-Bytes encode_bitmap (ImageView<const std::uint8_t> mirrors);
+Bytes encode_bitmap (const MirrorRows<std::uint8_t> &mirrors);
 
 /** 24 planes in the channels in which a DLPC350 looks for them: planes 0..7 in
  * green, 8..15 in red, 16..23 in blue. */
-Bytes encode_plane_bitmap (ImageView<const PlanePixel> planes);
+Bytes encode_plane_bitmap (const MirrorRows<PlanePixel> &planes);
 
-} // namespace cexp
+} // namespace codedexposure

@@ -6,15 +6,13 @@
 
 #include "dmd/hid_packet.h"
 
-namespace cexp::dlp
+namespace codedexposure::dlp
 {
 
-constexpr HidCommand kPower{0x0200, "set the power mode"};
 constexpr HidCommand kVersion{0x0205, "read the firmware version"};
 constexpr HidCommand kHardwareStatus{0x1A0A, "read the hardware status"};
 constexpr HidCommand kMainStatus{0x1A0C, "read the main status"};
 constexpr HidCommand kDisplayMode{0x1A1B, "set the display mode"};
-constexpr HidCommand kTriggerOut1{0x1A1D, "set up trigger output 1"};
 constexpr HidCommand kTriggerOut2{0x1A1E, "set up trigger output 2"};
 constexpr HidCommand kRun{0x1A24, "start or stop the patterns"};
 constexpr HidCommand kTriggerIn1{0x1A35, "set up trigger input 1"};
@@ -28,4 +26,4 @@ constexpr std::uint8_t kSequencerRuns = 1 << 1;
 constexpr std::uint8_t kInitialised = 1 << 0;
 constexpr std::uint8_t kSecondController = 1 << 4;
 
-} // namespace cexp::dlp
+} // namespace codedexposure::dlp

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "dmd/dlp_controller.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 namespace
@@ -125,4 +125,4 @@ DlpController::check_health ()
   return {};
 }
 
-} // namespace cexp
+} // namespace codedexposure

@@ -9,7 +9,7 @@
 #include "dmd/dmd.h"
 #include "dmd/hid_link.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 /** A controller's command set over a link. Not thread-safe. */
@@ -70,4 +70,4 @@ private:
   Explain explain_;
 };
 
-} // namespace cexp
+} // namespace codedexposure

@@ -7,7 +7,7 @@
 #include "dmd/dlp_controller.h"
 #include "dmd/plane_image.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 namespace
@@ -87,9 +87,8 @@ Dlpc350::open ()
   info_.minimum_active = Nanoseconds (kMinimumExposure) * 1000;
   info_.resident_masks =
       options_.source == Source::flash ? kPreloadedPlanes : kVideoPlanes;
-  info_.run_time_upload = false;
   info_.triggers_camera = options_.master == Master::dmd;
-  info_.trigger_in = info_.trigger_out = info_.finite_run = true;
+  info_.trigger_in = info_.trigger_out = true;
   info_.minimum_dark = Nanoseconds (kMinimumDark) * 1000;
   return check_placement (options_.placement, info_.array, info_.size);
 }
@@ -124,12 +123,14 @@ Dlpc350::check_images (const Schedule &schedule)
   if (int (options_.images.size ()) != needed)
     return Error{
         info_.name +
-        " takes no masks over USB. Write them as images with "
-        "'codedexposure schedule render --planes', put these into its flash "
-        "with TI's LightCrafter 4500 software and say which they are: "
-        "images=0" +
-        (needed > 1 ? "/1" : "") +
-        "; or show them over HDMI and add source=video"};
+            " takes no masks over USB. Write them as images with "
+            "'codedexposure schedule render --planes', put these into its "
+            "flash with TI's LightCrafter 4500 software and say which they "
+            "are: "
+            "images=0" +
+            (needed > 1 ? "/1" : "") +
+            "; or show them over HDMI and add source=video",
+        ErrorCode::unsupported};
   const auto in_flash = board_.read_byte (kFlashImages);
   if (!in_flash)
     return in_flash.error ();
@@ -298,7 +299,7 @@ Dlpc350::start (const SlotPlan &plan, std::stop_token stop_token)
       {kMinimumExposure, kMaximumExposure, kMinimumDark, 0, kMinimumDark},
       options_.master);
   if (!time)
-    return Error{info_.name + ": " + time.error ().message};
+    return time.error ().with_prefix (info_.name + ": ");
   if (options_.source == Source::video && time->dark != 0)
     return Error{info_.name + ": masks from video follow each other without "
                               "dark time; give the schedule switching=0"};
@@ -329,4 +330,4 @@ open_dlpc350 (std::unique_ptr<HidLink> link, const DmdOptions &options)
   return std::unique_ptr<Dmd> (std::move (dmd));
 }
 
-} // namespace cexp
+} // namespace codedexposure

@@ -8,7 +8,7 @@
 #include "dmd/dmd_options.h"
 #include "dmd/hid_link.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 /**
@@ -23,4 +23,4 @@ namespace cexp
 Result<std::unique_ptr<Dmd>> open_dlpc350 (
     std::unique_ptr<HidLink> link, const DmdOptions &options);
 
-} // namespace cexp
+} // namespace codedexposure

@@ -3,7 +3,7 @@
 
 #include <array>
 
-namespace cexp::dlpc350
+namespace codedexposure::dlpc350
 {
 
 Bytes
@@ -62,7 +62,8 @@ parse_verdict (ByteView data)
   constexpr unsigned kBusy = 1 << 7;
   if (data.size () != 1)
     return Error{"the verdict on the pattern table comes in " +
-                 std::to_string (data.size ()) + " bytes, not in 1"};
+                     std::to_string (data.size ()) + " bytes, not in 1",
+        ErrorCode::device};
   Verdict verdict{(data[0] & kBusy) != 0, true, ""};
   for (const Finding &finding : kFindings) {
     if ((data[0] >> finding.bit & 1) == 0)
@@ -74,4 +75,4 @@ parse_verdict (ByteView data)
   return verdict;
 }
 
-} // namespace cexp::dlpc350
+} // namespace codedexposure::dlpc350

@@ -9,7 +9,7 @@
 #include "dmd/dlp_commands.h"
 #include "dmd/pattern_timing.h"
 
-namespace cexp::dlpc350
+namespace codedexposure::dlpc350
 {
 
 using namespace dlp;
@@ -78,4 +78,4 @@ struct Verdict {
 };
 Result<Verdict> parse_verdict (ByteView data);
 
-} // namespace cexp::dlpc350
+} // namespace codedexposure::dlpc350

@@ -2,6 +2,7 @@
 #include "dmd/dlpc900.h"
 
 #include <algorithm>
+#include <map>
 #include <numeric>
 #include <optional>
 
@@ -10,7 +11,7 @@
 #include "dmd/dlpc900_protocol.h"
 #include "dmd/plane_image.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 namespace
@@ -84,6 +85,60 @@ find_order (
   return order;
 }
 
+/** An encoded image: one half for each of the board's controllers. */
+using Halves = std::vector<PiecedBytes>;
+
+Halves
+encode_halves (const MirrorRows<PlanePixel> &image, int count, std::size_t unit)
+{
+  const int width = image.width () / count;
+  Halves halves;
+  for (int half = 0; half < count; half++)
+    halves.push_back (encode_image (image, half * width, width, unit));
+  return halves;
+}
+
+std::size_t
+packets_of (const Halves &halves)
+{
+  std::size_t packets = 0;
+  for (const PiecedBytes &half : halves)
+    packets += image_packets (half.size);
+  return packets;
+}
+
+/** The images of one schedule, each rendered and encoded once: for the time
+ * that they take, and to be sent. */
+class EncodedImages
+{
+public:
+  EncodedImages (const Schedule &schedule, Extent size, int controllers,
+      const DmdOptions &options)
+      : renderer_ (schedule, size, options.placement),
+        plan_ (plan_planes (schedule)), controllers_ (controllers),
+        unit_ (options.erle_unit)
+  {
+  }
+
+  const Schedule &schedule () const { return renderer_.schedule (); }
+  const Halves &get (int image)
+  {
+    const auto [found, is_new] = images_.try_emplace (image);
+    if (is_new)
+      found->second =
+          encode_halves (renderer_.render<PlanePixel> (plan_.of_image (image)),
+              controllers_, unit_);
+    return found->second;
+  }
+
+private:
+  MaskRenderer renderer_;
+  PlanePlan plan_;
+  int controllers_;
+  std::size_t unit_;
+  std::map<int, Halves> images_;
+};
+
 class Dlpc900 : public Dmd
 {
 public:
@@ -110,9 +165,9 @@ public:
 private:
   PatternLimits limits () const;
   bool dual () const { return (hardware_status_ & kSecondController) != 0; }
+  int controllers () const { return dual () ? 2 : 1; }
   UploadPlan plan_upload (const Schedule &schedule) const;
-  PlaneImage render (const Schedule &schedule, int image) const;
-  std::size_t packets_of (const PlaneImage &image) const;
+  EncodedImages &images_of (const Schedule &schedule);
 
   void forget ();
   void begin (std::stop_token stop = {});
@@ -123,10 +178,10 @@ private:
   Result<void> send_still (
       const StillMask &mask, const std::vector<PatternTime> &times);
   Result<void> send_images (const std::vector<int> &images,
-      const std::function<PlaneImage (int image)> &render,
+      const std::function<const Halves &(int image)> &encoded,
       const UploadProgress &progress);
   Result<void> send_half (const HidCommand &load, const HidCommand &data,
-      int index, ImageView<const PlanePixel> half,
+      int index, const Bytes &half,
       const std::function<void (std::size_t)> &sent);
   Result<void> run (
       const std::vector<PatternTime> &times, const SlotPlan &plan);
@@ -144,7 +199,8 @@ private:
   Residents residents_;    // empty when unknown
   std::vector<int> order_; // line of the table for each mask, empty: no masks
   int slots_ = 1;
-  std::vector<PatternTime> times_; // in the table, empty: other ones
+  std::vector<PatternTime> times_;      // in the table, empty: other ones
+  std::optional<EncodedImages> images_; // until they are sent
 };
 
 Dlpc900::~Dlpc900 ()
@@ -186,7 +242,7 @@ Dlpc900::open ()
   info_.resident_masks = std::min (kind_.planes, kMaxEntries);
   info_.triggers_camera = options_.master == Master::dmd;
   info_.still_masks = true;
-  info_.trigger_in = info_.trigger_out = info_.finite_run = true;
+  info_.trigger_in = info_.trigger_out = true;
   info_.minimum_dark = Nanoseconds (kind_.minimum_exposure) * 1000;
   // Firmware without this command has the minima of the table.
   if (const auto minima = board_.read (kMinimumExposures))
@@ -201,7 +257,8 @@ Dlpc900::open ()
   if (!options_.images.empty ())
     return Error{info_.name + ": takes its masks over USB; leave out images="};
   if (options_.placement.region)
-    info_.region = options_.placement.region->size;
+    info_.region = {
+        options_.placement.region->width, options_.placement.region->height};
   return check_placement (options_.placement, info_.array, info_.size);
 }
 
@@ -222,27 +279,16 @@ Dlpc900::status ()
     status->details.insert (status->details.begin (),
         {{"controller", "DLPC900"}, {"mirrors", kind_.name},
             {"firmware", version_.text ()},
-            {"controllers", dual () ? "2" : "1"}});
+            {"controllers", std::to_string (controllers ())}});
   return status;
 }
 
-std::size_t
-Dlpc900::packets_of (const PlaneImage &image) const
+EncodedImages &
+Dlpc900::images_of (const Schedule &schedule)
 {
-  const int parts = dual () ? 2 : 1;
-  const int width = image.width () / parts;
-  std::size_t packets = 0;
-  for (int part = 0; part < parts; part++)
-    packets += image_packets (encoded_size (
-        columns (image.view (), part * width, width), options_.erle_unit));
-  return packets;
-}
-
-PlaneImage
-Dlpc900::render (const Schedule &schedule, int image) const
-{
-  return render_planes (
-      schedule, plan_planes (schedule), image, options_.placement, info_.size);
+  if (!images_ || !(images_->schedule () == schedule))
+    images_.emplace (schedule, info_.size, controllers (), options_);
+  return *images_;
 }
 
 UploadPlan
@@ -287,7 +333,7 @@ Dlpc900::upload_time (const Schedule &schedule, std::stop_token stop_token)
   std::size_t packets = 0;
   for (const int image : plan_upload (schedule).images)
     if (!stop_token.stop_requested ())
-      packets += packets_of (render (schedule, image));
+      packets += packets_of (images_of (schedule).get (image));
   return Nanoseconds (packets) * kPacketTime;
 }
 
@@ -303,6 +349,7 @@ Dlpc900::upload (const Schedule &schedule, std::stop_token stop_token,
   touched_ = true;
   begin (stop_token);
   const auto sent = send (schedule, plan, progress);
+  images_.reset ();
   if (!sent) {
     forget ();
     prepared_ = false;
@@ -328,9 +375,10 @@ Dlpc900::send (const Schedule &schedule, const UploadPlan &plan,
     if (const auto table = send_table (times); !table)
       return table;
   }
-  return send_images (
-      plan.images, [&] (int image) { return render (schedule, image); },
-      progress);
+  const auto encoded = [this, &schedule] (int image) -> const Halves & {
+    return images_of (schedule).get (image);
+  };
+  return send_images (plan.images, encoded, progress);
 }
 
 /** There are no masks to start or to use again. */
@@ -413,7 +461,7 @@ Dlpc900::send_table (const std::vector<PatternTime> &times)
 
 Result<void>
 Dlpc900::send_images (const std::vector<int> &images,
-    const std::function<PlaneImage (int image)> &render,
+    const std::function<const Halves &(int image)> &encoded,
     const UploadProgress &progress)
 {
   const Error cancelled{info_.name + ": upload cancelled"};
@@ -421,7 +469,7 @@ Dlpc900::send_images (const std::vector<int> &images,
   for (const int index : images) {
     if (board_.link ().cancelled ())
       return cancelled;
-    total += packets_of (render (index));
+    total += packets_of (encoded (index));
   }
   total = std::max<std::size_t> (total, 1); // there is an end to tell of
   const auto sent = [&] (std::size_t packets) {
@@ -435,13 +483,12 @@ Dlpc900::send_images (const std::vector<int> &images,
 
   progress (0, int (total));
   for (const int index : images) {
-    const PlaneImage image = render (index);
-    const int width = dual () ? image.width () / 2 : image.width ();
+    const Halves &halves = encoded (index);
     auto half = send_half (
-        kLoadImage, kImageData, index, columns (image.view (), 0, width), sent);
+        kLoadImage, kImageData, index, halves.front ().joined (), sent);
     if (half && dual ())
-      half = send_half (kLoadSecond, kSecondData, index,
-          columns (image.view (), width, width), sent);
+      half = send_half (
+          kLoadSecond, kSecondData, index, halves.back ().joined (), sent);
     if (!half)
       return board_.link ().cancelled () ? cancelled : half;
   }
@@ -451,20 +498,18 @@ Dlpc900::send_images (const std::vector<int> &images,
 
 Result<void>
 Dlpc900::send_half (const HidCommand &load, const HidCommand &data, int index,
-    ImageView<const PlanePixel> half,
-    const std::function<void (std::size_t)> &sent)
+    const Bytes &half, const std::function<void (std::size_t)> &sent)
 {
-  const Bytes image = encode_image (half, options_.erle_unit);
   if (const auto announced =
-          board_.write (load, encode_load (index, image.size ()));
+          board_.write (load, encode_load (index, half.size ()));
       !announced)
     return announced;
   sent (1);
-  for (std::size_t at = 0; at < image.size (); at += kImageChunk) {
+  for (std::size_t at = 0; at < half.size (); at += kImageChunk) {
     if (board_.link ().cancelled ())
-      return Error{"cancelled"};
-    const auto chunk = ByteView (image).subspan (
-        at, std::min (kImageChunk, image.size () - at));
+      return Error{"cancelled", ErrorCode::cancelled};
+    const auto chunk =
+        ByteView (half).subspan (at, std::min (kImageChunk, half.size () - at));
     if (const auto posted = board_.link ().post (data, encode_chunk (chunk));
         !posted)
       return posted;
@@ -489,7 +534,7 @@ Dlpc900::start (const SlotPlan &plan, std::stop_token stop_token)
                  " slots, not for " + std::to_string (plan.slots ())};
   const auto times = fit_patterns (plan, limits (), options_.master);
   if (!times)
-    return Error{info_.name + ": " + times.error ().message};
+    return times.error ().with_prefix (info_.name + ": ");
   begin (std::move (stop_token));
   return run (*times, plan);
 }
@@ -525,7 +570,7 @@ Dlpc900::show (
 {
   const auto times = fit_patterns (plan, limits (), options_.master);
   if (!times)
-    return Error{info_.name + ": " + times.error ().message};
+    return times.error ().with_prefix (info_.name + ": ");
   touched_ = true;
   const std::vector<PatternTime> still{
       first_patterns (*times, mask.slots, limits ().minimum_dark)};
@@ -553,10 +598,11 @@ Dlpc900::send_still (
   if (options_.table_first)
     if (const auto table = send_table (times); !table)
       return table;
+  const Halves image = encode_halves (
+      render_still<PlanePixel> (mask, info_.size, options_.placement),
+      controllers (), options_.erle_unit);
   return send_images (
-      {0},
-      [&] (int) { return render_still (mask, options_.placement, info_.size); },
-      [] (int, int) {});
+      {0}, [&] (int) -> const Halves & { return image; }, [] (int, int) {});
 }
 
 void
@@ -576,4 +622,4 @@ open_dlpc900 (std::unique_ptr<HidLink> link, const DmdOptions &options)
   return std::unique_ptr<Dmd> (std::move (dmd));
 }
 
-} // namespace cexp
+} // namespace codedexposure

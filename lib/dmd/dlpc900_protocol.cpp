@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "dmd/dlpc900_protocol.h"
 
+#include <algorithm>
 #include <array>
 
-namespace cexp::dlpc900
+namespace codedexposure::dlpc900
 {
 
 namespace
@@ -55,32 +56,22 @@ plain_row (int width)
   return (bytes + kRowPadding - 1) / kRowPadding * kRowPadding;
 }
 
-std::size_t
-plain_size (ImageView<const PlanePixel> image)
+PiecedBytes
+plain_pixels (const MirrorRows<PlanePixel> &image, int x, int width)
 {
-  return plain_row (image.width) * std::size_t (image.height);
-}
-
-Bytes
-plain_pixels (ImageView<const PlanePixel> image)
-{
-  Bytes bytes;
-  bytes.reserve (plain_size (image));
-  for (int y = 0; y < image.height; y++) {
-    for (int x = 0; x < image.width; x++) {
-      const PlanePixel pixel = image.row (y)[x];
-      bytes.push_back (std::uint8_t (pixel >> 16));
-      bytes.push_back (std::uint8_t (pixel >> 8));
-      bytes.push_back (std::uint8_t (pixel));
-    }
-    bytes.resize (plain_row (image.width) * std::size_t (y + 1));
+  PiecedBytes pixels;
+  for (int i = 0; i < image.distinct.height (); i++) {
+    Bytes &row = pixels.pieces.emplace_back ();
+    append_pixels (row, image.distinct.view ().row (i) + x, width);
+    row.resize (plain_row (width));
   }
-  return bytes;
+  for (const int row : image.order)
+    pixels.add (row);
+  return pixels;
 }
 
 Bytes
-image_header (
-    ImageView<const PlanePixel> image, std::size_t size, std::uint8_t packing)
+image_header (Extent image, std::size_t size, std::uint8_t packing)
 {
   Bytes header{'S', 'p', 'l', 'd'};
   append_le (header, std::uint32_t (image.width), 2);
@@ -102,7 +93,8 @@ find_board (std::uint8_t type)
     if (board.type == type)
       return board;
   return Error{"hardware type " + std::to_string (type) +
-               " is no DMD that is known here (1..5)"};
+                   " is no DMD that is known here (1..5)",
+      ErrorCode::device};
 }
 
 Bytes
@@ -160,24 +152,20 @@ encode_trigger_in (int delay_us, bool falling)
   return bytes;
 }
 
-Bytes
-encode_image (ImageView<const PlanePixel> image, std::size_t unit)
+PiecedBytes
+encode_image (
+    const MirrorRows<PlanePixel> &image, int x, int width, std::size_t unit)
 {
-  Bytes body = encode_erle (image, unit);
+  PiecedBytes code = encode_erle (image, x, width, unit);
   std::uint8_t packing = kEnhancedRunLength;
-  if (body.size () > plain_size (image)) {
-    body = plain_pixels (image);
+  if (code.size > plain_row (width) * std::size_t (image.height ())) {
+    code = plain_pixels (image, x, width);
     packing = kNotCompressed;
   }
-  Bytes bytes = image_header (image, body.size (), packing);
-  append (bytes, body);
-  return bytes;
-}
-
-std::size_t
-encoded_size (ImageView<const PlanePixel> image, std::size_t unit)
-{
-  return kHeaderSize + std::min (erle_size (image, unit), plain_size (image));
+  const std::size_t size = code.size;
+  code.add (image_header ({width, image.height ()}, size, packing));
+  std::rotate (code.order.begin (), code.order.end () - 1, code.order.end ());
+  return code;
 }
 
 Bytes
@@ -226,12 +214,14 @@ parse_minimum_exposures (ByteView data)
   constexpr std::size_t kDepths = 8;
   if (data.size () != 2 * kDepths && data.size () != 4 * kDepths)
     return Error{"the shortest exposures come in " +
-                 std::to_string (data.size ()) + " bytes, not in 16 or 32"};
+                     std::to_string (data.size ()) + " bytes, not in 16 or 32",
+        ErrorCode::device};
   std::vector<std::uint32_t> exposures;
   for (std::size_t depth = 0; depth < kDepths; depth++)
     exposures.push_back (read_le (data, 2 * depth, 2));
   if (exposures.front () == 0)
-    return Error{"the device gives 0 as its shortest exposure"};
+    return Error{
+        "the device gives 0 as its shortest exposure", ErrorCode::device};
   return exposures;
 }
 
@@ -248,7 +238,8 @@ parse_version (ByteView data)
   constexpr std::size_t kSize = 16;
   if (data.size () != kSize)
     return Error{"the version comes in " + std::to_string (data.size ()) +
-                 " bytes, not in " + std::to_string (kSize)};
+                     " bytes, not in " + std::to_string (kSize),
+        ErrorCode::device};
   return Version{data[3], data[2], int (read_le (data, 0, 2))};
 }
 
@@ -261,4 +252,4 @@ needs_park_cycle (const Version &version)
   return is (4, 1) || is (4, 2) || version == Version{5, 0, 0};
 }
 
-} // namespace cexp::dlpc900
+} // namespace codedexposure::dlpc900

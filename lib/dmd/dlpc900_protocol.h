@@ -11,7 +11,7 @@
 #include "dmd/pattern_timing.h"
 #include "dmd/plane_image.h"
 
-namespace cexp::dlpc900
+namespace codedexposure::dlpc900
 {
 
 using namespace dlp;
@@ -35,7 +35,6 @@ constexpr std::uint8_t kModeOnTheFly = 3;
 /** Image bytes in one message: what its buffer of 512 leaves. */
 constexpr std::size_t kImageChunk = 504;
 constexpr int kMaxEntries = 400;
-constexpr int kMaxImages = 18;
 
 /** What a board is, by the hardware type that it reports. */
 struct Board {
@@ -72,13 +71,11 @@ Bytes encode_trigger_out (bool invert, int rising_us, int falling_us);
 /** @p delay_us  104 or more. */
 Bytes encode_trigger_in (int delay_us, bool falling);
 
-/** What the device is sent for one image: a header and the encoded pixels, or
- * plain pixels where these are fewer. @p unit  as in encode_erle (). */
-Bytes encode_image (
-    ImageView<const PlanePixel> image, std::size_t unit = kErleUnit);
-/** Its size. */
-std::size_t encoded_size (
-    ImageView<const PlanePixel> image, std::size_t unit = kErleUnit);
+/** What the device is sent for columns [x, x + width) of an image: a header and
+ * the encoded pixels, or plain pixels where these are fewer. @p unit  as in
+ * encode_erle (). */
+PiecedBytes encode_image (const MirrorRows<PlanePixel> &image, int x, int width,
+    std::size_t unit = kErleUnit);
 /** Data of kLoadImage for an image of @p size encoded bytes. */
 Bytes encode_load (int index, std::size_t size);
 /** Data of one kImageData with at most kImageChunk bytes. */
@@ -107,4 +104,4 @@ Result<Version> parse_version (ByteView data);
  * until they are parked and released (data sheet errata, DLPT028). */
 bool needs_park_cycle (const Version &version);
 
-} // namespace cexp::dlpc900
+} // namespace codedexposure::dlpc900

@@ -1,31 +1,51 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "dmd/dmd.h"
 
-#include <array>
+#include <algorithm>
+#include <mutex>
 
 #include "dmd/lightcrafter.h"
-#include "dmd/simulated_dmd.h"
 #include "dmd/usb_bus.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 namespace
 {
 
-struct Scheme {
-  std::string_view prefix;
-  std::string_view usage;
-  Result<std::unique_ptr<Dmd>> (*open) (std::string_view device);
-};
+/** Devices by the first word of their names. */
+class Schemes
+{
+public:
+  static Schemes &all ()
+  {
+    static Schemes schemes;
+    return schemes;
+  }
+  void add (const DmdScheme &scheme)
+  {
+    const std::lock_guard guard (lock_);
+    const auto same = [&scheme] (const DmdScheme &known) {
+      return known.prefix == scheme.prefix;
+    };
+    if (std::none_of (known_.begin (), known_.end (), same))
+      known_.insert (known_.begin (), scheme);
+  }
+  std::vector<DmdScheme> list () const
+  {
+    const std::lock_guard guard (lock_);
+    return known_;
+  }
 
-constexpr std::array kSchemes{
-    Scheme{"sim:", "sim:NAME (a simulated DMD)", open_simulated_dmd},
-    Scheme{"usb:", "usb:[PORT|SERIAL] (a LightCrafter 4500, 6500 or 9000)",
-        open_usb_dmd},
-    Scheme{"lightcrafter:",
-        "lightcrafter:[HOST[:PORT]] (the first LightCrafter, over TCP)",
-        open_lightcrafter}};
+private:
+  mutable std::mutex lock_;
+  std::vector<DmdScheme> known_{
+      {"usb:", "usb:[PORT|SERIAL] (a LightCrafter 4500, 6500 or 9000)",
+          open_usb_dmd},
+      {"lightcrafter:",
+          "lightcrafter:[HOST[:PORT]] (the first LightCrafter, over TCP)",
+          open_lightcrafter}};
+};
 
 } // namespace
 
@@ -33,20 +53,28 @@ Result<std::unique_ptr<Dmd>>
 open_dmd (std::string_view device)
 {
   std::string known;
-  for (const Scheme &scheme : kSchemes) {
-    if (device.substr (0, scheme.prefix.size ()) == scheme.prefix)
+  for (const DmdScheme &scheme : Schemes::all ().list ()) {
+    if (device.starts_with (scheme.prefix))
       return scheme.open (device);
-    known += (known.empty () ? "" : ", ") + std::string (scheme.usage);
+    known += (known.empty () ? "" : ", ") + scheme.usage;
   }
   return Error{"no driver serves the DMD '" + std::string (device) +
-               "'; devices are " + known};
+                   "'; devices are " + known,
+      ErrorCode::not_found};
+}
+
+void
+add_dmd_scheme (const DmdScheme &scheme)
+{
+  Schemes::all ().add (scheme);
 }
 
 Result<void>
 Dmd::show (const StillMask &mask, const SlotPlan &, std::stop_token)
 {
   return Error{info ().name + " cannot show " + mask.name +
-               ": it takes no single masks while it runs"};
+                   ": it takes no single masks while it runs",
+      ErrorCode::unsupported};
 }
 
 Result<void>
@@ -63,7 +91,7 @@ check_limits (
     if (const auto within =
             schedule.check_size (info.shown ().width, info.shown ().height);
         !within)
-      return Error{info.name + ": " + within.error ().message};
+      return within.error ().with_prefix (info.name + ": ");
   if (plan.active () < info.minimum_active)
     return Error{slots + " need " + time_text (info.minimum_active) +
                  " each at least on " + info.name + "; " +
@@ -78,4 +106,4 @@ check_limits (
   return {};
 }
 
-} // namespace cexp
+} // namespace codedexposure

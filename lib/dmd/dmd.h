@@ -11,11 +11,11 @@
 #include <vector>
 
 #include "base/result.h"
-#include "dmd/mirror_array.h"
+#include "schedule/mirror_array.h"
 #include "schedule/schedule.h"
 #include "schedule/still_mask.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 /** What a device can do, in its own numbers. */
@@ -25,12 +25,10 @@ struct DmdInfo {
   Nanoseconds minimum_active = 0; ///< shortest time a mask can be shown
   Nanoseconds minimum_switching = 0;
   int resident_masks = 0;       ///< masks the device holds at once
-  bool run_time_upload = true;  ///< masks can be sent while it is open
   bool still_masks = false;     ///< show () is served
   bool triggers_camera = false; ///< no frame is exposed while it is parked
   bool trigger_in = false;      ///< a camera can start its masks
   bool trigger_out = false;     ///< it can start a camera's exposures
-  bool finite_run = false;      ///< it can stop by itself after so many masks
   /** Shortest dark time between two masks, where there is any. */
   Nanoseconds minimum_dark = 0;
   Array array = Array::orthogonal;
@@ -110,14 +108,23 @@ public:
 };
 
 /**
- * Opens a device by name, "SCHEME:..."; "sim:NAME" is simulated_dmd.h's. Error
- * for a scheme that nobody serves, naming those that there are.
+ * Opens a device by name, "SCHEME:...". Error for a scheme that nobody serves,
+ * naming those that there are.
  */
 Result<std::unique_ptr<Dmd>> open_dmd (std::string_view device);
+
+/** How devices are opened whose names begin with @p prefix. */
+struct DmdScheme {
+  std::string prefix; ///< "usb:"
+  std::string usage;  ///< for people
+  Result<std::unique_ptr<Dmd>> (*open) (std::string_view device);
+};
+/** From now on, open_dmd () serves that scheme as well. Thread-safe. */
+void add_dmd_scheme (const DmdScheme &scheme);
 
 /** Whether a device of that kind can show @p schedule in the slots of @p plan;
  * the error tells the numbers on both sides. */
 Result<void> check_limits (
     const DmdInfo &info, const Schedule &schedule, const SlotPlan &plan);
 
-} // namespace cexp
+} // namespace codedexposure

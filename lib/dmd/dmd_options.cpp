@@ -5,7 +5,7 @@
 
 #include "base/text.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 namespace
@@ -67,7 +67,7 @@ constexpr std::array<Key, 17> kKeys{{
         }},
     {"region", "WxH[+X+Y]",
         [] (Text v, Options &o) {
-          return take (MirrorRegion::parse (v), o.placement.region);
+          return take (parse_region (v), o.placement.region);
         }},
     {"trigger-delay", "TIME",
         [] (Text v, Options &o) {
@@ -171,4 +171,4 @@ DmdOptions::parse (std::string_view text)
   return options;
 }
 
-} // namespace cexp
+} // namespace codedexposure

@@ -9,10 +9,10 @@
 #include "dmd/dlpc350_protocol.h"
 #include "dmd/erle.h"
 #include "dmd/hid_link.h"
-#include "dmd/mirror_array.h"
 #include "dmd/pattern_timing.h"
+#include "schedule/mirror_array.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 /**
@@ -63,4 +63,4 @@ struct DmdOptions {
   static Result<DmdOptions> parse (std::string_view text);
 };
 
-} // namespace cexp
+} // namespace codedexposure

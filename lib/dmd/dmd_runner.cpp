@@ -1,8 +1,29 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "dmd/dmd_runner.h"
 
-namespace cexp
+#include <new>
+#include <utility>
+
+namespace codedexposure
 {
+
+namespace
+{
+
+/** False when @p function ran out of memory, which must not end the thread. */
+template <typename Function>
+bool
+no_throw (const Function &function)
+{
+  try {
+    function ();
+    return true;
+  } catch (const std::bad_alloc &) {
+    return false;
+  }
+}
+
+} // namespace
 
 DmdRunner::DmdRunner (std::unique_ptr<Dmd> dmd, Reports reports)
     : dmd_ (std::move (dmd)), reports_ (std::move (reports)),
@@ -26,6 +47,8 @@ DmdRunner::upload (const Schedule &schedule)
 {
   {
     const std::lock_guard guard (lock_);
+    if (cancel_.stop_requested ())
+      cancel_ = std::stop_source ();
     run_ = Run::on;
     interrupted_ = false;
   }
@@ -132,15 +155,9 @@ DmdRunner::halt ()
   run_ = Run::none;
   cancel_.request_stop ();
   jobs_.clear ();
-  jobs_.push_back ([this] (std::stop_token) {
-    dmd_->stop ();
-    if (dmd_->running ())
-      reports_.not_parked ();
-    return Result<void> ();
-  });
+  parking_ = true;
   changed_.notify_all ();
   changed_.wait (guard, [this] { return idle (); });
-  cancel_ = std::stop_source ();
 }
 
 void
@@ -148,30 +165,52 @@ DmdRunner::work ()
 {
   std::unique_lock guard (lock_);
   while (true) {
-    changed_.wait (guard, [this] { return quit_ || !jobs_.empty (); });
-    if (jobs_.empty ())
+    changed_.wait (
+        guard, [this] { return quit_ || parking_ || !jobs_.empty (); });
+    if (!parking_ && jobs_.empty ())
       return;
-    const Job job = std::move (jobs_.front ());
-    jobs_.pop_front ();
-    const std::stop_token stop = cancel_.get_token ();
     working_ = true;
-
-    guard.unlock ();
-    const Result<void> done = job (stop);
-    if (!done) {
-      dmd_->stop ();
-      if (!stop.stop_requested ())
-        reports_.failed (done.error ());
-    }
-    guard.lock ();
-
+    if (std::exchange (parking_, false))
+      park (guard);
+    else
+      do_next (guard);
     working_ = false;
-    if (!done && run_ == Run::on) {
-      run_ = Run::failed;
-      jobs_.clear ();
-    }
     changed_.notify_all ();
   }
 }
 
-} // namespace cexp
+void
+DmdRunner::park (std::unique_lock<std::mutex> &guard)
+{
+  guard.unlock ();
+  no_throw ([this] { dmd_->stop (); });
+  no_throw ([this] {
+    if (dmd_->running ())
+      reports_.not_parked ();
+  });
+  guard.lock ();
+}
+
+void
+DmdRunner::do_next (std::unique_lock<std::mutex> &guard)
+{
+  const Job job = std::move (jobs_.front ());
+  jobs_.pop_front ();
+  const std::stop_token stop = cancel_.get_token ();
+  guard.unlock ();
+  Result<void> done;
+  if (!no_throw ([&] { done = job (stop); }))
+    done = out_of_memory ();
+  if (!done) {
+    no_throw ([this] { dmd_->stop (); });
+    if (!stop.stop_requested ())
+      no_throw ([&] { reports_.failed (done.error ()); });
+  }
+  guard.lock ();
+  if (!done && run_ == Run::on) {
+    run_ = Run::failed;
+    jobs_.clear ();
+  }
+}
+
+} // namespace codedexposure

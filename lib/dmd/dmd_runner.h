@@ -13,7 +13,7 @@
 
 #include "dmd/dmd.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 /**
@@ -22,8 +22,8 @@ namespace cexp
  *
  * A run lasts from upload () to halt (); its jobs are done in the order in
  * which they were asked for. One that fails parks the mirrors and ends the run.
- * What is asked for outside a run is not done. Thread-safe. The destructor
- * halts.
+ * What is asked for outside a run is not done. A job that runs out of memory
+ * fails like any other. Thread-safe. The destructor halts.
  */
 class DmdRunner
 {
@@ -82,7 +82,9 @@ private:
   void ask (Job job);
   void ask_upload (const Schedule &schedule);
   void work ();
-  bool idle () const { return jobs_.empty () && !working_; }
+  void park (std::unique_lock<std::mutex> &guard);
+  void do_next (std::unique_lock<std::mutex> &guard);
+  bool idle () const { return jobs_.empty () && !working_ && !parking_; }
   bool wait_is_over () const
   {
     return idle () || interrupted_ || run_ != Run::on;
@@ -97,10 +99,11 @@ private:
   std::stop_source cancel_;
   Run run_ = Run::none;
   bool working_ = false;
+  bool parking_ = false; ///< halt () waits for the mirrors to be parked
   bool interrupted_ = false;
   bool quit_ = false;
 
   std::thread thread_; // last: it uses all of the above
 };
 
-} // namespace cexp
+} // namespace codedexposure

@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <array>
 #include <cassert>
+#include <map>
+#include <utility>
 
-namespace cexp
+namespace codedexposure
 {
 
 namespace
@@ -14,56 +16,14 @@ namespace
 constexpr int kTwoByteCount = 128;
 constexpr int kMaxCount = 0x7FFF;
 
-/** Counts the bytes that it is given. */
-class ByteCounter
-{
-public:
-  void put (std::uint8_t) { size_++; }
-  void put_pixels (const PlanePixel *, int count)
-  {
-    size_ += 3 * std::size_t (count);
-  }
-  std::size_t size () const { return size_; }
-
-private:
-  std::size_t size_ = 0;
-};
-
-/** Keeps the bytes that it is given. */
-class ByteSink
-{
-public:
-  explicit ByteSink (std::size_t expected) { bytes_.reserve (expected); }
-
-  void put (std::uint8_t byte) { bytes_.push_back (byte); }
-  /** On the wire, planes 16..23 come first. */
-  void put_pixels (const PlanePixel *pixels, int count)
-  {
-    const std::size_t at = bytes_.size ();
-    bytes_.resize (at + 3 * std::size_t (count));
-    std::uint8_t *out = bytes_.data () + at;
-    for (int i = 0; i < count; i++) {
-      *out++ = std::uint8_t (pixels[i] >> 16);
-      *out++ = std::uint8_t (pixels[i] >> 8);
-      *out++ = std::uint8_t (pixels[i]);
-    }
-  }
-  std::size_t size () const { return bytes_.size (); }
-  Bytes take () { return std::move (bytes_); }
-
-private:
-  Bytes bytes_;
-};
-
-template <typename Sink>
 void
-put_count (Sink &sink, int count)
+put_count (Bytes &bytes, int count)
 {
   if (count < kTwoByteCount) {
-    sink.put (std::uint8_t (count));
+    bytes.push_back (std::uint8_t (count));
   } else {
-    sink.put (std::uint8_t ((count & 0x7F) | 0x80));
-    sink.put (std::uint8_t (count >> 7));
+    bytes.push_back (std::uint8_t ((count & 0x7F) | 0x80));
+    bytes.push_back (std::uint8_t (count >> 7));
   }
 }
 
@@ -97,67 +57,96 @@ literal_end (const PlanePixel *row, const PlanePixel *above, int x, int width)
   return end;
 }
 
-template <typename Sink>
-void
-encode_row (
-    Sink &sink, const PlanePixel *row, const PlanePixel *above, int width)
+Bytes
+encode_row (const PlanePixel *row, const PlanePixel *above, int width)
 {
+  Bytes bytes;
   for (int x = 0; x < width;) {
     const int copied = copy_end (row, above, x, width);
     const int repeated = copied < width ? run_end (row, x, width) : x;
     if (copied > x && copied >= repeated) {
-      sink.put (0);
-      sink.put (1);
-      put_count (sink, copied - x);
+      append (bytes, std::array<std::uint8_t, 2>{0, 1});
+      put_count (bytes, copied - x);
       x = copied;
       continue;
     }
     const int literal =
         repeated > x + 1 ? x + 1 : literal_end (row, above, x, width);
     if (literal == x + 1) { // a lone literal has no form of its own
-      put_count (sink, repeated - x);
-      sink.put_pixels (row + x, 1);
+      put_count (bytes, repeated - x);
+      append_pixels (bytes, row + x, 1);
       x = repeated;
     } else {
-      sink.put (0);
-      put_count (sink, literal - x);
-      sink.put_pixels (row + x, literal - x);
+      bytes.push_back (0);
+      put_count (bytes, literal - x);
+      append_pixels (bytes, row + x, literal - x);
       x = literal;
     }
   }
-}
-
-template <typename Sink>
-void
-encode (Sink &sink, ImageView<const PlanePixel> image, std::size_t unit)
-{
-  static constexpr std::array<std::uint8_t, 3> kEndOfImage{0, 1, 0};
-  assert (image.width >= 1 && image.width <= kMaxCount);
-  for (int y = 0; y < image.height; y++)
-    encode_row (
-        sink, image.row (y), y > 0 ? image.row (y - 1) : nullptr, image.width);
-  for (const std::uint8_t byte : kEndOfImage)
-    sink.put (byte);
-  while (sink.size () % unit != 0)
-    sink.put (0);
+  return bytes;
 }
 
 } // namespace
 
+void
+PiecedBytes::add (int piece)
+{
+  order.push_back (piece);
+  size += pieces[std::size_t (piece)].size ();
+}
+
+void
+PiecedBytes::add (Bytes piece)
+{
+  pieces.push_back (std::move (piece));
+  add (int (pieces.size ()) - 1);
+}
+
 Bytes
-encode_erle (ImageView<const PlanePixel> image, std::size_t unit)
+PiecedBytes::joined () const
 {
-  ByteSink sink (erle_size (image, unit));
-  encode (sink, image, unit);
-  return sink.take ();
+  Bytes bytes;
+  bytes.reserve (size);
+  for (const int piece : order)
+    append (bytes, pieces[std::size_t (piece)]);
+  return bytes;
 }
 
-std::size_t
-erle_size (ImageView<const PlanePixel> image, std::size_t unit)
+void
+append_pixels (Bytes &bytes, const PlanePixel *pixels, int count)
 {
-  ByteCounter counter;
-  encode (counter, image, unit);
-  return counter.size ();
+  const std::size_t at = bytes.size ();
+  bytes.resize (at + 3 * std::size_t (count));
+  std::uint8_t *out = bytes.data () + at;
+  for (int i = 0; i < count; i++) {
+    *out++ = std::uint8_t (pixels[i] >> 16);
+    *out++ = std::uint8_t (pixels[i] >> 8);
+    *out++ = std::uint8_t (pixels[i]);
+  }
 }
 
-} // namespace cexp
+PiecedBytes
+encode_erle (
+    const MirrorRows<PlanePixel> &image, int x, int width, std::size_t unit)
+{
+  assert (width >= 1 && width <= kMaxCount);
+  PiecedBytes code;
+  std::map<std::pair<int, int>, int> known; // by the row and the one above
+  int above = -1;
+  for (int y = 0; y < image.height (); y++) {
+    const int row = image.order[std::size_t (y)];
+    const auto [piece, is_new] =
+        known.try_emplace ({row, above}, int (code.pieces.size ()));
+    if (is_new)
+      code.pieces.push_back (encode_row (
+          image.row (y) + x, y > 0 ? image.row (y - 1) + x : nullptr, width));
+    code.add (piece->second);
+    above = row;
+  }
+  Bytes end{0, 1, 0};
+  end.resize (end.size () + (unit - (code.size + end.size ()) % unit) % unit);
+  code.add (std::move (end));
+  return code;
+}
+
+} // namespace codedexposure

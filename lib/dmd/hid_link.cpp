@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-namespace cexp
+namespace codedexposure
 {
 
 namespace
@@ -44,12 +44,14 @@ HidLink::post (const HidCommand &command, ByteView data)
 }
 
 Error
-HidLink::error (const std::string &what, const std::string &reason) const
+HidLink::error (
+    const std::string &what, const std::string &reason, ErrorCode code) const
 {
   if (gone ())
     return Error{name_ + " was unplugged or switched off; connect it, then "
-                         "open it again"};
-  return Error{name_ + ": cannot " + what + ": " + reason};
+                         "open it again",
+        ErrorCode::not_found};
+  return Error{name_ + ": cannot " + what + ": " + reason, code};
 }
 
 void
@@ -64,8 +66,9 @@ HidLink::pause (Milliseconds time)
 {
   for (; time > 0ms && !cancelled (); time -= kPiece)
     pipe_->pause (std::min (time, kPiece));
-  return cancelled () ? Result<void> (error ("go on", "cancelled"))
-                      : Result<void> ();
+  return cancelled ()
+             ? Result<void> (error ("go on", "cancelled", ErrorCode::cancelled))
+             : Result<void> ();
 }
 
 bool
@@ -100,7 +103,7 @@ HidLink::send (HidKind kind, const HidCommand &command, ByteView data)
   if (sent)
     return sent;
   patience_ -= timeout;
-  return error (command.name, sent.error ().message);
+  return error (command.name, sent.error ().message, sent.error ().code);
 }
 
 Result<HidReply>
@@ -111,11 +114,12 @@ HidLink::receive (const HidCommand &command)
   bool strays = false;
   while (left > 0ms) {
     if (cancelled ())
-      return error (command.name, "cancelled");
+      return error (command.name, "cancelled", ErrorCode::cancelled);
     const Milliseconds piece = std::min (left, kPiece);
     const auto packet = pipe_->read (piece);
     if (!packet)
-      return error (command.name, packet.error ().message);
+      return error (
+          command.name, packet.error ().message, packet.error ().code);
     const auto head = parse_reply_head (*packet);
     if (!head || head->sequence != sequence_) {
       // Nothing yet; or a late reply to an earlier request, or a piece of one.
@@ -126,13 +130,14 @@ HidLink::receive (const HidCommand &command)
     }
     auto rest = receive_rest (*head, *packet);
     if (!rest)
-      return error (command.name, rest.error ().message);
+      return error (command.name, rest.error ().message, rest.error ().code);
     return HidReply{head->refused, *std::move (rest)};
   }
   return error (command.name,
       strays ? "it sends only replies to other requests; is another program "
                "using it?"
-             : "no reply within " + std::to_string (limit.count ()) + " ms");
+             : "no reply within " + std::to_string (limit.count ()) + " ms",
+      ErrorCode::timeout);
 }
 
 Result<Bytes>
@@ -145,7 +150,8 @@ HidLink::receive_rest (HidReplyHead head, Bytes first)
       return more.error ();
     if (more->size () != kHidPacketSize)
       return Error{"the reply ends after " + std::to_string (data.size ()) +
-                   " of " + std::to_string (head.length) + " bytes"};
+                       " of " + std::to_string (head.length) + " bytes",
+          ErrorCode::device};
     append (data, *more);
   }
   data.resize (head.length);
@@ -162,4 +168,4 @@ HidLink::drain ()
   }
 }
 
-} // namespace cexp
+} // namespace codedexposure

@@ -9,7 +9,7 @@
 #include "dmd/hid_packet.h"
 #include "dmd/packet_pipe.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 /** What a device answered. */
@@ -59,7 +59,8 @@ public:
   const std::string &name () const { return name_; }
 
   /** "NAME: cannot WHAT: REASON". */
-  Error error (const std::string &what, const std::string &reason) const;
+  Error error (const std::string &what, const std::string &reason,
+      ErrorCode code = ErrorCode::device) const;
 
 private:
   Result<HidReply> transact (
@@ -77,4 +78,4 @@ private:
   bool unclean_ = true; // a reply to nobody may be waiting
 };
 
-} // namespace cexp
+} // namespace codedexposure

@@ -4,7 +4,7 @@
 #include <cassert>
 #include <string>
 
-namespace cexp
+namespace codedexposure
 {
 
 Bytes
@@ -29,14 +29,16 @@ parse_reply_head (ByteView packet)
   constexpr std::uint8_t kRefused = 0x20;
   if (packet.size () != kHidPacketSize)
     return Error{"a reply packet has " + std::to_string (packet.size ()) +
-                 " bytes instead of " + std::to_string (kHidPacketSize)};
+                     " bytes instead of " + std::to_string (kHidPacketSize),
+        ErrorCode::device};
   const HidReplyHead head{
       packet[1], (packet[0] & kRefused) != 0, read_le (packet, 2, 2)};
   if (head.length > kHidReplyData)
     return Error{"a reply announces " + std::to_string (head.length) +
-                 " bytes, more than the " + std::to_string (kHidReplyData) +
-                 " that a device can send"};
+                     " bytes, more than the " + std::to_string (kHidReplyData) +
+                     " that a device can send",
+        ErrorCode::device};
   return head;
 }
 
-} // namespace cexp
+} // namespace codedexposure

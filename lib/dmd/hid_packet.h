@@ -10,7 +10,7 @@
 #include "base/result.h"
 #include "dmd/little_endian.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 constexpr std::size_t kHidPacketSize = 64;
@@ -61,4 +61,4 @@ struct HidReplyHead {
 /** Error when @p packet is no packet that can begin a reply. */
 Result<HidReplyHead> parse_reply_head (ByteView packet);
 
-} // namespace cexp
+} // namespace codedexposure

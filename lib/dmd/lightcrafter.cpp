@@ -11,7 +11,7 @@
 #include "dmd/stop_guard.h"
 #include "dmd/tcp_stream.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 namespace
@@ -46,7 +46,7 @@ public:
     info_.minimum_switching = options_.gap;
     info_.resident_masks = kMaxPatterns;
     info_.triggers_camera = options_.master == Master::dmd;
-    info_.trigger_in = info_.trigger_out = info_.finite_run = true;
+    info_.trigger_in = info_.trigger_out = true;
     info_.minimum_dark = options_.gap;
   }
   ~Lightcrafter () override
@@ -79,7 +79,8 @@ private:
       std::chrono::milliseconds patience = kPatience);
   Result<void> connect ();
   bool pause (std::chrono::milliseconds time) const;
-  Error error (const char *what, const std::string &reason) const;
+  Error error (const char *what, const std::string &reason,
+      ErrorCode code = ErrorCode::device) const;
   Result<Reply> receive (std::uint16_t command);
   Result<Reply> ask (PacketType type, std::uint16_t command, ByteView payload);
   Result<void> write (
@@ -124,7 +125,8 @@ Lightcrafter::connect ()
   auto stream = TcpStream::connect (host_, port_, patience_);
   if (!stream)
     return Error{info_.name + ": " + stream.error ().message +
-                 "; is the board on, and this computer in its network?"};
+                     "; is the board on, and this computer in its network?",
+        stream.error ().code};
   stream_ = *std::move (stream);
   return {};
 }
@@ -140,9 +142,10 @@ Lightcrafter::pause (std::chrono::milliseconds time) const
 }
 
 Error
-Lightcrafter::error (const char *what, const std::string &reason) const
+Lightcrafter::error (
+    const char *what, const std::string &reason, ErrorCode code) const
 {
-  return Error{info_.name + ": cannot " + what + ": " + reason};
+  return Error{info_.name + ": cannot " + what + ": " + reason, code};
 }
 
 /** The reply to one packet; replies to other commands are late ones. */
@@ -162,7 +165,7 @@ Lightcrafter::receive (std::uint16_t command)
     Bytes packet = *head;
     append (packet, *rest);
     if (!checksum_holds (packet))
-      return Error{"the checksum of a reply is wrong"};
+      return Error{"the checksum of a reply is wrong", ErrorCode::device};
     if (parsed->command != command)
       continue;
     Reply reply{0, Bytes (rest->begin (), rest->end () - 1)};
@@ -173,7 +176,7 @@ Lightcrafter::receive (std::uint16_t command)
           reply.payload.empty () ? std::uint8_t (1) : reply.payload.front ();
     return reply;
   }
-  return Error{"it replies to other commands only"};
+  return Error{"it replies to other commands only", ErrorCode::device};
 }
 
 Result<Lightcrafter::Reply>
@@ -189,7 +192,7 @@ Lightcrafter::ask (PacketType type, std::uint16_t command, ByteView payload)
         break;
       patience_ -= kBusyPause;
       if (!pause (kBusyPause))
-        return Error{"cancelled"};
+        return Error{"cancelled", ErrorCode::cancelled};
     }
     if (!reply || reply->refused != 0)
       break;
@@ -202,7 +205,7 @@ Lightcrafter::write (const char *what, std::uint16_t command, ByteView payload)
 {
   const auto reply = ask (PacketType::write, command, payload);
   if (!reply)
-    return error (what, reply.error ().message);
+    return error (what, reply.error ().message, reply.error ().code);
   if (reply->refused != 0)
     return error (what, error_text (reply->refused));
   return {};
@@ -275,14 +278,13 @@ Lightcrafter::send_masks (
       !set)
     return set;
 
-  Image<std::uint8_t> mirrors (kMirrors.width, kMirrors.height);
+  const MaskRenderer renderer (schedule, kMirrors, options_.placement);
   for (int mask = 0; mask < masks_; mask++) {
     progress (mask, masks_);
     if (cancel_.stop_requested ())
-      return Error{info_.name + ": upload cancelled"};
-    render_mirrors (schedule, mask, options_.placement, mirrors.view ());
+      return Error{info_.name + ": upload cancelled", ErrorCode::cancelled};
     Bytes payload{std::uint8_t (mask)};
-    append (payload, encode_bitmap (mirrors.view ()));
+    append (payload, encode_bitmap (renderer.render (mask)));
     if (const auto sent = write ("send a mask", kPattern, payload); !sent)
       return sent;
   }
@@ -319,7 +321,7 @@ Lightcrafter::start (const SlotPlan &plan, std::stop_token stop_token)
   const auto time = fit_equal_patterns (
       plan, {kMinimumExposure, kMaximumExposure, gap, 0, gap}, options_.master);
   if (!time)
-    return Error{info_.name + ": " + time.error ().message};
+    return time.error ().with_prefix (info_.name + ": ");
   if (const auto begun = begin (std::move (stop_token)); !begun)
     return begun;
   if (const auto set = set_sequence (*time); !set)
@@ -329,7 +331,7 @@ Lightcrafter::start (const SlotPlan &plan, std::stop_token stop_token)
       !trigger)
     return trigger;
   if (!pause (std::chrono::milliseconds (plan.frame_period () / 1'000'000 + 1)))
-    return error ("start the sequence", "cancelled");
+    return error ("start the sequence", "cancelled", ErrorCode::cancelled);
   running_ = true;
   const Bytes on{1};
   return write ("start the sequence", kRun, on);
@@ -351,7 +353,7 @@ open_lightcrafter (std::string_view device)
   constexpr std::string_view kScheme = "lightcrafter:";
   const auto options = DmdOptions::parse (device.substr (kScheme.size ()));
   if (!options)
-    return Error{"DMD " + in_quotes (device) + ": " + options.error ().message};
+    return options.error ().with_prefix ("DMD " + in_quotes (device) + ": ");
   const auto parts = split (options->which, ':');
   constexpr int kPort = 21845, kMaxPort = 65535;
   const auto port = parts.size () < 2 ? kPort : parse_int (parts[1]);
@@ -369,4 +371,4 @@ open_lightcrafter (std::string_view device)
       std::string (kScheme) + host + ":" + std::to_string (*port));
 }
 
-} // namespace cexp
+} // namespace codedexposure

@@ -7,7 +7,7 @@
 
 #include "dmd/dmd.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 /**
@@ -20,4 +20,4 @@ namespace cexp
  */
 Result<std::unique_ptr<Dmd>> open_lightcrafter (std::string_view device);
 
-} // namespace cexp
+} // namespace codedexposure

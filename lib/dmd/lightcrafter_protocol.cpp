@@ -5,7 +5,7 @@
 #include <array>
 #include <numeric>
 
-namespace cexp::lightcrafter
+namespace codedexposure::lightcrafter
 {
 
 namespace
@@ -88,7 +88,8 @@ parse_head (ByteView head)
 {
   if (head.size () != kHeadSize)
     return Error{"a packet begins with " + std::to_string (head.size ()) +
-                 " bytes instead of 6"};
+                     " bytes instead of 6",
+        ErrorCode::device};
   const auto type = PacketType (head[0]);
   switch (type) {
   case PacketType::busy:
@@ -98,7 +99,8 @@ parse_head (ByteView head)
     break;
   default:
     return Error{"a packet of type " + std::to_string (head[0]) +
-                 " is none that the board sends"};
+                     " is none that the board sends",
+        ErrorCode::device};
   }
   return PacketHead{
       type, std::uint16_t (head[1] << 8 | head[2]), read_le (head, 4, 2)};
@@ -120,4 +122,4 @@ error_text (std::uint8_t code)
              : number;
 }
 
-} // namespace cexp::lightcrafter
+} // namespace codedexposure::lightcrafter

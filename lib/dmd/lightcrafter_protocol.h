@@ -9,7 +9,7 @@
 #include "base/result.h"
 #include "dmd/little_endian.h"
 
-namespace cexp::lightcrafter
+namespace codedexposure::lightcrafter
 {
 
 constexpr std::uint16_t kVersion = 0x0100;
@@ -71,4 +71,4 @@ bool checksum_holds (ByteView packet);
 
 std::string error_text (std::uint8_t code);
 
-} // namespace cexp::lightcrafter
+} // namespace codedexposure::lightcrafter

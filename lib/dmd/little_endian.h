@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-namespace cexp
+namespace codedexposure
 {
 
 using Bytes = std::vector<std::uint8_t>;
@@ -37,4 +37,4 @@ read_le (ByteView in, std::size_t at, int bytes)
   return value;
 }
 
-} // namespace cexp
+} // namespace codedexposure

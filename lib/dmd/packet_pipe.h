@@ -8,7 +8,7 @@
 #include "base/result.h"
 #include "dmd/little_endian.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 /** Packets out, packets in. Calls come from one thread at a time. */
@@ -30,4 +30,4 @@ public:
   virtual void pause (Milliseconds time) { std::this_thread::sleep_for (time); }
 };
 
-} // namespace cexp
+} // namespace codedexposure

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <string>
 
-namespace cexp
+namespace codedexposure
 {
 
 namespace
@@ -140,4 +140,4 @@ fit_equal_patterns (
   return fits ? time : Result<PatternTime> (fits.error ());
 }
 
-} // namespace cexp
+} // namespace codedexposure

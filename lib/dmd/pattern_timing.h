@@ -7,7 +7,7 @@
 #include "base/result.h"
 #include "schedule/timing.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 /** Who tells the other when an exposure starts. */
@@ -66,4 +66,4 @@ PatternTime first_patterns (const std::vector<PatternTime> &times, int slots,
 Result<PatternTime> fit_equal_patterns (
     const SlotPlan &plan, const PatternLimits &limits, Master master);
 
-} // namespace cexp
+} // namespace codedexposure

@@ -2,12 +2,11 @@
 #include "dmd/plane_image.h"
 
 #include <algorithm>
-#include <array>
 #include <numeric>
 
 #include "schedule/pilot.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 namespace
@@ -21,91 +20,10 @@ first_open_pixel (const Schedule &schedule, int slot)
   const Tile &tile = schedule.tile ();
   const int pixels = tile.period_x () * tile.period_y ();
   for (int at = 0; at < pixels; at++) {
-    if (schedule.open (at % tile.period_x (), at / tile.period_x (), slot))
+    if (schedule.on (at % tile.period_x (), at / tile.period_x (), slot))
       return at;
   }
   return pixels;
-}
-
-/** The planes in which the elements of the background and of every region, and
- * the pilot's columns, are open. */
-class PixelTable
-{
-public:
-  PixelTable (const Schedule &schedule, const PlanePlan &plan, int image)
-      : schedule_ (schedule)
-  {
-    add_part (schedule.code ());
-    for (const Region &region : schedule.regions ())
-      add_part (region.code);
-    for (int mask = 0; mask < schedule.masks (); mask++) {
-      const PlaneSlot at = plan.masks[std::size_t (mask)];
-      if (at.image != image)
-        continue;
-      const PlanePixel plane = PlanePixel (1) << at.plane;
-      const int slot = mask % schedule.slots ();
-      for (Part &part : parts_)
-        part.show (schedule.mask_of (part.code, slot), plane);
-      for (int column = 0; column < kPilotColumns; column++)
-        if (pilot_open (column, mask, schedule.slots ()))
-          pilot_[std::size_t (column)] |= plane;
-    }
-  }
-
-  PlanePixel pixel (int x, int y) const
-  {
-    const int i = schedule_.region_at (x, y);
-    if (i < 0)
-      return parts_.front ()
-          .elements[std::size_t (schedule_.element_at (x, y))];
-    const Rect &rect = schedule_.regions ()[std::size_t (i)].rect;
-    const int e = schedule_.region (i).element_at (x - rect.x, y - rect.y);
-    return parts_[std::size_t (i) + 1].elements[std::size_t (e)];
-  }
-  PlanePixel pilot (int column) const
-  {
-    return pilot_[std::size_t (column % kPilotColumns)];
-  }
-
-private:
-  struct Part {
-    const Code &code;
-    std::vector<PlanePixel> elements;
-
-    void show (int slot, PlanePixel plane)
-    {
-      for (std::size_t e = 0; e < elements.size (); e++)
-        if (code.open (int (e), slot))
-          elements[e] |= plane;
-    }
-  };
-
-  void add_part (const Code &code)
-  {
-    parts_.push_back (
-        {code, std::vector<PlanePixel> (std::size_t (code.elements ()))});
-  }
-
-  const Schedule &schedule_;
-  std::vector<Part> parts_; ///< the background, then the regions
-  std::array<PlanePixel, kPilotColumns> pilot_{};
-};
-
-void
-fill_planes (const Schedule &schedule, const PixelTable &table,
-    const Placement &placement, PlaneImage &image)
-{
-  const MirrorRegion region = placement.region.value_or (
-      MirrorRegion{{image.width (), image.height ()}, {}});
-  const int pilot = pilot_top (schedule, placement.layout, region.size.height);
-  for (int y = 0; y < region.size.height; y++) {
-    PlanePixel *row = image.view ().row (region.origin.y + y) + region.origin.x;
-    for (int x = 0; x < region.size.width; x++) {
-      const Offset pixel =
-          tile_pixel (placement.layout, x, y, placement.odd_rows_left);
-      row[x] = y < pilot ? table.pixel (pixel.x, pixel.y) : table.pilot (x);
-    }
-  }
 }
 
 } // namespace
@@ -132,36 +50,14 @@ plan_planes (const Schedule &schedule)
   return plan;
 }
 
-PlaneImage
-render_planes (const Schedule &schedule, const PlanePlan &plan, int image,
-    const Placement &placement, Extent size)
+std::vector<int>
+PlanePlan::of_image (int image) const
 {
-  PlaneImage planes (size.width, size.height);
-  fill_planes (schedule, PixelTable (schedule, plan, image), placement, planes);
-  return planes;
-}
-
-PlaneImage
-render_still (const StillMask &mask, const Placement &placement, Extent size)
-{
-  PlaneImage plane (size.width, size.height);
-  const MirrorRegion region =
-      placement.region.value_or (MirrorRegion{size, {}});
-  for (int y = 0; y < region.size.height; y++) {
-    PlanePixel *row = plane.view ().row (region.origin.y + y) + region.origin.x;
-    for (int x = 0; x < region.size.width; x++) {
-      const Offset pixel =
-          tile_pixel (placement.layout, x, y, placement.odd_rows_left);
-      row[x] = mask.open (pixel.x, pixel.y);
-    }
-  }
-  return plane;
-}
-
-ImageView<const PlanePixel>
-columns (ImageView<const PlanePixel> image, int x, int width)
-{
-  return {image.data + x, width, image.height, image.stride};
+  std::vector<int> found (kPlanesPerImage, -1);
+  for (std::size_t mask = 0; mask < masks.size (); mask++)
+    if (masks[mask].image == image)
+      found[std::size_t (masks[mask].plane)] = int (mask);
+  return found;
 }
 
 PlaneDigest
@@ -210,13 +106,12 @@ digest_mask (const Schedule &schedule, int mask)
   PlaneImage period (width + kPilotColumns + 1, height);
   for (int y = 0; y < height; y++)
     for (int x = 0; x < width; x++)
-      period.at (x, y) =
-          schedule.code ().open (schedule.element_at (x, y), own);
+      period.at (x, y) = schedule.code ().on (schedule.element_at (x, y), own);
   period.at (width, 0) = PlanePixel (schedule.pilot_rows ());
   if (schedule.pilot_rows () > 0)
     for (int column = 0; column < kPilotColumns; column++)
       period.at (width + 1 + column, 0) =
-          pilot_open (column, mask, schedule.slots ());
+          pilot_on (column, mask, schedule.slots ());
 
   PlaneDigest sum = digest (period.view ());
   for (int i = 0; i < int (schedule.regions ().size ()); i++) {
@@ -227,4 +122,4 @@ digest_mask (const Schedule &schedule, int mask)
   return sum;
 }
 
-} // namespace cexp
+} // namespace codedexposure

@@ -6,10 +6,9 @@
 #include <vector>
 
 #include "dmd/erle.h"
-#include "dmd/mirror_array.h"
-#include "schedule/still_mask.h"
+#include "schedule/schedule.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 constexpr int kPlanesPerImage = 24;
@@ -28,6 +27,9 @@ struct PlaneSlot {
 struct PlanePlan {
   std::vector<PlaneSlot> masks; ///< of each mask of the schedule
   int images = 0;
+
+  /** The mask in each plane of an image; -1: none. */
+  std::vector<int> of_image (int image) const;
 };
 
 /**
@@ -38,18 +40,6 @@ struct PlanePlan {
  * would light every row of every image.
  */
 PlanePlan plan_planes (const Schedule &schedule);
-
-/** The masks that @p plan puts into image @p image, on an array of @p size. */
-PlaneImage render_planes (const Schedule &schedule, const PlanePlan &plan,
-    int image, const Placement &placement, Extent size);
-
-/** One mask that stands still, in plane 0. */
-PlaneImage render_still (
-    const StillMask &mask, const Placement &placement, Extent size);
-
-/** Columns [x, x + width) of @p image. */
-ImageView<const PlanePixel> columns (
-    ImageView<const PlanePixel> image, int x, int width);
 
 /** A digest of the pixels (128 bits, for equality among a device's images; no
  * protection against forgery). */
@@ -64,4 +54,4 @@ PlaneDigest digest (ImageView<const PlanePixel> image);
  * are equal where their digests are, whatever schedules they belong to. */
 PlaneDigest digest_mask (const Schedule &schedule, int mask);
 
-} // namespace cexp
+} // namespace codedexposure

@@ -17,7 +17,7 @@
 #include "dmd/dmd.h"
 #include "dmd/tool_path.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 namespace
@@ -82,7 +82,7 @@ stop_board (const std::string &device)
   if (!now)
     return now.error ();
   if (now->running)
-    return Error{(*dmd)->info ().name + " does not stop"};
+    return Error{(*dmd)->info ().name + " does not stop", ErrorCode::device};
   return {};
 }
 
@@ -140,7 +140,7 @@ private:
       return {};
     auto guard = StopGuard::post (device_);
     if (!guard)
-      return Error{info ().name + ": " + guard.error ().message};
+      return guard.error ().with_prefix (info ().name + ": ");
     guard_ = *std::move (guard);
     guard_->tell (true);
     return {};
@@ -168,11 +168,13 @@ StopGuard::post (const std::string &device)
       return std::unique_ptr<StopGuard> (new StopGuard (ends[1], process));
     close (ends[1]);
   }
-  return Error{std::string ("cannot run '") + tool_path () +
-               "', which would stop the mirrors if this process were killed: " +
-               std::strerror (code) +
-               "; install it, say where it is in CODEDEXPOSURE_TOOL, or do "
-               "without it: guard=off"};
+  return Error{
+      std::string ("cannot run '") + tool_path () +
+          "', which would stop the mirrors if this process were killed: " +
+          std::strerror (code) +
+          "; install it, say where it is in CODEDEXPOSURE_TOOL, or do "
+          "without it: guard=off",
+      ErrorCode::not_found};
 }
 
 StopGuard::~StopGuard ()
@@ -223,4 +225,4 @@ guarded (std::unique_ptr<Dmd> dmd, std::string device)
   return std::make_unique<GuardedDmd> (std::move (dmd), std::move (device));
 }
 
-} // namespace cexp
+} // namespace codedexposure

@@ -10,7 +10,7 @@
 
 #include "base/result.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 class Dmd;
@@ -52,4 +52,4 @@ Result<void> stand_guard (int words, const std::string &device);
 /** @p dmd, which a guard stops as "@p device" if this process does not. */
 std::unique_ptr<Dmd> guarded (std::unique_ptr<Dmd> dmd, std::string device);
 
-} // namespace cexp
+} // namespace codedexposure

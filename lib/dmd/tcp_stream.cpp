@@ -13,7 +13,7 @@
 #include <cerrno>
 #include <cstring>
 
-namespace cexp
+namespace codedexposure
 {
 
 namespace
@@ -45,13 +45,14 @@ TcpStream::connect (const std::string &host, int port, Milliseconds timeout)
   if (const int code = getaddrinfo (
           host.c_str (), std::to_string (port).c_str (), &hints, &raw);
       code != 0)
-    return Error{"cannot find " + where + ": " + gai_strerror (code)};
+    return Error{"cannot find " + where + ": " + gai_strerror (code),
+        ErrorCode::not_found};
   const Addresses addresses (raw);
 
   const int socket = ::socket (raw->ai_family,
       raw->ai_socktype | SOCK_CLOEXEC | SOCK_NONBLOCK, raw->ai_protocol);
   if (socket < 0)
-    return Error{"cannot make a socket: " + errno_text (errno)};
+    return Error{"cannot make a socket: " + errno_text (errno), ErrorCode::io};
   std::unique_ptr<TcpStream> stream (new TcpStream (socket));
   int code = 0;
   if (::connect (socket, raw->ai_addr, raw->ai_addrlen) != 0)
@@ -59,12 +60,14 @@ TcpStream::connect (const std::string &host, int port, Milliseconds timeout)
   if (code == EINPROGRESS) {
     if (!stream->wait_for (POLLOUT, Clock::now () + timeout))
       return Error{"cannot connect to " + where + ": no answer within " +
-                   std::to_string (timeout.count ()) + " ms"};
+                       std::to_string (timeout.count ()) + " ms",
+          ErrorCode::timeout};
     socklen_t size = sizeof code;
     getsockopt (socket, SOL_SOCKET, SO_ERROR, &code, &size);
   }
   if (code != 0)
-    return Error{"cannot connect to " + where + ": " + errno_text (code)};
+    return Error{
+        "cannot connect to " + where + ": " + errno_text (code), ErrorCode::io};
   const int on = 1;
   setsockopt (socket, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
   return stream;
@@ -76,10 +79,10 @@ TcpStream::~TcpStream ()
 }
 
 Error
-TcpStream::fail (const std::string &message)
+TcpStream::fail (const std::string &message, ErrorCode code)
 {
   broken_ = true;
-  return Error{message};
+  return Error{message, code};
 }
 
 Result<void>
@@ -87,11 +90,11 @@ TcpStream::wait_for (short events, Clock::time_point deadline)
 {
   for (;;) {
     if (stop_.stop_requested ())
-      return fail ("cancelled");
+      return fail ("cancelled", ErrorCode::cancelled);
     const auto left =
         std::chrono::ceil<Milliseconds> (deadline - Clock::now ());
     if (left <= 0ms)
-      return fail ("no answer in time");
+      return fail ("no answer in time", ErrorCode::timeout);
     const auto wait = std::min<Milliseconds> (left, kPatience);
     pollfd poll_this{socket_, events, 0};
     const int ready = ::poll (&poll_this, 1, int (wait.count ()));
@@ -136,4 +139,4 @@ TcpStream::receive (std::size_t size, Milliseconds timeout)
   return bytes;
 }
 
-} // namespace cexp
+} // namespace codedexposure

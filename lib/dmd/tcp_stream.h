@@ -10,7 +10,7 @@
 #include "base/result.h"
 #include "dmd/little_endian.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 /** One connection, used from one thread at a time. */
@@ -42,11 +42,11 @@ private:
   using Clock = std::chrono::steady_clock;
 
   Result<void> wait_for (short events, Clock::time_point deadline);
-  Error fail (const std::string &message);
+  Error fail (const std::string &message, ErrorCode code = ErrorCode::io);
 
   const int socket_;
   std::stop_token stop_;
   bool broken_ = false;
 };
 
-} // namespace cexp
+} // namespace codedexposure

@@ -13,7 +13,7 @@
 #include "dmd/dlpc900.h"
 #include "dmd/stop_guard.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 namespace
@@ -44,7 +44,10 @@ usb_error (const std::string &what, int code)
             "the board again";
   if (code == LIBUSB_ERROR_BUSY)
     text += "; another program uses the board, such as TI's";
-  return Error{text};
+  return Error{text, code == LIBUSB_ERROR_TIMEOUT     ? ErrorCode::timeout
+                     : code == LIBUSB_ERROR_NO_DEVICE ? ErrorCode::not_found
+                     : code == LIBUSB_ERROR_NO_MEM    ? ErrorCode::out_of_memory
+                                                      : ErrorCode::io};
 }
 
 Result<Context>
@@ -162,7 +165,8 @@ find_endpoints (libusb_device *device)
   }
   libusb_free_config_descriptor (config);
   if (endpoints.in == 0 || endpoints.out == 0)
-    return Error{"its interface 0 has no endpoints in both directions"};
+    return Error{"its interface 0 has no endpoints in both directions",
+        ErrorCode::device};
   return endpoints;
 }
 
@@ -247,7 +251,7 @@ open_pipe (const Context &context, const Found &found)
   Handle handle (raw);
   const auto endpoints = find_endpoints (found.device.get ());
   if (!endpoints)
-    return Error{what + ": " + endpoints.error ().message};
+    return endpoints.error ().with_prefix (what + ": ");
   // The kernel takes these boards for keyboards and the like.
   libusb_set_auto_detach_kernel_driver (handle.get (), 1);
   if (const int code = libusb_claim_interface (handle.get (), kInterface);
@@ -273,7 +277,8 @@ choose (std::vector<Found> boards, const std::string &which)
 {
   if (boards.empty ())
     return Error{"no DMD is connected by USB; connect and switch on a "
-                 "LightCrafter 4500, 6500 or 9000 and look with lsusb"};
+                 "LightCrafter 4500, 6500 or 9000 and look with lsusb",
+        ErrorCode::not_found};
   std::vector<Found> chosen;
   for (Found &found : boards) {
     read_serial (found);
@@ -285,7 +290,8 @@ choose (std::vector<Found> boards, const std::string &which)
     return chosen.front ();
   if (chosen.empty ())
     return Error{"no DMD " + in_quotes (which) + " is connected; there is " +
-                 listed (boards)};
+                     listed (boards),
+        ErrorCode::not_found};
   return Error{"several DMDs are meant by 'usb:" + printable (which) +
                "'; choose one by its port: " + listed (chosen)};
 }
@@ -321,7 +327,7 @@ open_usb_dmd (std::string_view device)
   const auto options =
       DmdOptions::parse (device.substr (std::string_view ("usb:").size ()));
   if (!options)
-    return Error{"DMD " + in_quotes (device) + ": " + options.error ().message};
+    return options.error ().with_prefix ("DMD " + in_quotes (device) + ": ");
   const auto context = make_context ();
   if (!context)
     return context.error ();
@@ -344,4 +350,4 @@ open_usb_dmd (std::string_view device)
   return guarded (*std::move (dmd), name);
 }
 
-} // namespace cexp
+} // namespace codedexposure

@@ -10,7 +10,7 @@
 
 #include "dmd/dmd.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 enum class UsbController { dlpc350, dlpc900 };
@@ -37,4 +37,4 @@ Result<std::vector<UsbBoard>> list_usb_boards ();
  */
 Result<std::unique_ptr<Dmd>> open_usb_dmd (std::string_view device);
 
-} // namespace cexp
+} // namespace codedexposure

@@ -3,17 +3,17 @@
  * the compiler turns into vectors. */
 #pragma once
 
-#include "extract/cells.h"
+#include "base/vector.h"
 #include "extract/kernels.h"
+#include "extract/select.h"
 #include "extract/split.h"
-#include "extract/vector.h"
 
-namespace cexp::CEXP_TARGET
+namespace codedexposure::CODEDEXPOSURE_TARGET
 {
 
 /** Sum of all lanes, pairs of lanes added in lanes twice as wide. */
 template <typename T>
-CEXP_INLINE std::uint64_t
+CODEDEXPOSURE_INLINE std::uint64_t
 sum_of_lanes (Vector<T> v)
 {
   using Sums = Vector<std::uint64_t>;
@@ -57,43 +57,36 @@ fence ()
 #endif
 }
 
-/** Kernels::difference of elements that are in registers. */
+/** A step from one element to the next, times a gain. */
 template <typename T>
-struct DifferenceInRegisters {
+struct Step {
   int gain;
   T largest;
   T limit; ///< largest step that the gain leaves in range
 
-  CEXP_INLINE Vector<T> scaled (Vector<T> step) const
+  CODEDEXPOSURE_INLINE Vector<T> scaled (Vector<T> step) const
   {
     const Vector<T> bound = limit + Vector<T>{};
     const Vector<T> most = largest + Vector<T>{};
     return step > bound ? most : step * T (gain);
   }
-  CEXP_INLINE Vector<T> operator() (Vector<T> now, Vector<T> before) const
+  CODEDEXPOSURE_INLINE Vector<T> operator() (
+      Vector<T> now, Vector<T> before) const
   {
     return scaled (larger (now, before) - before);
-  }
-  template <int N, typename V, typename PutVector>
-  CEXP_INLINE void operator() (V (&wires)[N], PutVector put) const
-  {
-    put (0, scaled (wires[0]));
-#pragma GCC unroll 16
-    for (int k = 1; k < N; k++)
-      put (k, (*this) (wires[k], wires[k - 1]));
   }
 };
 
 /** Kernels::difference through a buffer. */
 template <typename T>
 T
-difference_any (const Block<T> &block, const Layout<T> &layout,
-    const DifferenceInRegisters<T> &work, const Planes<T> &to)
+difference_any (const Block<T> &block, const Layout<T> &layout, Step<T> step,
+    const Planes<T> &to)
 {
-  const auto strip = split_strip_of<T> (block.width);
+  const StripReader<T> strips (block);
   Wires<T> places (layout.n), elements (layout.n);
   T *order[256];
-  Vector<T> most = {};
+  T most = 0;
   for (int j = 0; j < block.rows; j++) {
     const std::uint8_t *element =
         layout.element + (j + layout.row) % layout.rows * layout.n;
@@ -102,23 +95,23 @@ difference_any (const Block<T> &block, const Layout<T> &layout,
         order[p] = elements.rows[element[p]];
     const std::ptrdiff_t row = j * to.stride / std::ptrdiff_t (sizeof (T));
     for_strips<T> (block.cells, to.rows[0] + row, to.stream,
-        [&] (int at, auto put) CEXP_INLINE_BODY {
+        [&] (int at, auto put) CODEDEXPOSURE_INLINE_BODY {
           if (layout.repeat == 1) {
-            most = larger (most, strip (block, j, at, order));
+            most = larger (most, strips.read (j, at, order));
           } else {
-            most = larger (most, strip (block, j, at, places.rows));
+            most = larger (most, strips.read (j, at, places.rows));
             relabel_strip (
                 layout, j, at, places.rows, elements.rows, 0, Put ());
           }
           Vector<T> before = {};
           for (int k = 0; k < layout.n; k++) {
             const Vector<T> now = load (elements.rows[k]);
-            put (to.rows[k] + row + at, work (now, before));
+            put (to.rows[k] + row + at, step (now, before));
             before = now;
           }
         });
   }
-  return largest_lane<T> (most);
+  return most;
 }
 
 /** The last elements of one row of all cells: the next row begins with the
@@ -130,40 +123,53 @@ struct LastOfRow {
 };
 
 /** Kernels::difference where every element is at the place of its own number,
- * in the order of select_rows (). Vectors at the end of a row are worked on
- * twice, so that what they start from is kept until the row is over. */
-template <int Width, typename T>
+ * of cells of Height rows; Height 0 stands for any and takes one row of all
+ * cells after the other, like select_rows (). Vectors at the end of a row are
+ * worked on twice, so that what they start from is kept until the row is over.
+ */
+template <int Width, int Height, typename T>
 T
-difference_rows (const Block<T> &block, const DifferenceInRegisters<T> &work,
-    const Planes<T> &to)
+difference_rows (const Block<T> &block, Step<T> step, const Planes<T> &to)
 {
+  constexpr int kTogether = Height > 0 ? Height : 1;
+  constexpr int kN = kTogether * Width;
   LastOfRow<T> last[2];
   Vector<T> most = {};
-  for (int y = 0; y < block.height; y++) {
+  for (int y = 0; y < (Height > 0 ? 1 : block.height); y++) {
     const LastOfRow<T> &above = last[y & 1];
     LastOfRow<T> &here = last[1 - (y & 1)];
     for (int j = 0; j < block.rows; j++) {
       const T *row = bytes_on (
           block.pixels, (std::ptrdiff_t (j) * block.height + y) * block.stride);
-      T *const *out = to.rows + y * Width;
-      const std::ptrdiff_t line = j * to.stride;
-      for_strips<T> (block.cells, bytes_on (out[0], line), to.stream,
-          [&] (int at, auto put) CEXP_INLINE_BODY {
-            const T *from = row + at * Width;
-            prefetch (bytes_on (from, block.height * block.stride),
-                Width * kVectorBytes);
-            Vector<T> parts[Width];
-            split_cells<Width, T> (from, parts);
-            Vector<T> before = {};
-            if (y > 0)
-              before = load (above.elements + j * block.cells + at);
+      T *out[kN];
+      for (int k = 0; k < kN; k++)
+        out[k] = bytes_on (to.rows[y * Width + k], j * to.stride);
+      for_strips<T> (block.cells, out[0], to.stream,
+          [&] (int at, auto put) CODEDEXPOSURE_INLINE_BODY {
+            Vector<T> wires[kN];
 #pragma GCC unroll 16
-            for (int x = 0; x < Width; x++) {
-              most = larger (most, parts[x]);
-              put (bytes_on (out[x], line) + at, work (parts[x], before));
-              before = parts[x];
+            for (int i = 0; i < kTogether; i++) {
+              const T *from = bytes_on (row, i * block.stride) + at * Width;
+              prefetch (bytes_on (from, block.height * block.stride),
+                  Width * kVectorBytes);
+              Vector<T> parts[Width];
+              split_cells<Width, T> (from, parts);
+#pragma GCC unroll 16
+              for (int x = 0; x < Width; x++) {
+                wires[i * Width + x] = parts[x];
+                most = larger (most, parts[x]);
+              }
             }
-            store (here.elements + j * block.cells + at, before);
+            if (Height == 0 && y > 0)
+              put (out[0] + at, step (wires[0], load (above.elements +
+                                                      j * block.cells + at)));
+            else
+              put (out[0] + at, step.scaled (wires[0]));
+#pragma GCC unroll 16
+            for (int k = 1; k < kN; k++)
+              put (out[k] + at, step (wires[k], wires[k - 1]));
+            if (Height == 0)
+              store (here.elements + j * block.cells + at, wires[kN - 1]);
           });
     }
   }
@@ -171,20 +177,50 @@ difference_rows (const Block<T> &block, const DifferenceInRegisters<T> &work,
 }
 
 template <typename T>
-using DifferenceRows = T (*) (
-    const Block<T> &, const DifferenceInRegisters<T> &, const Planes<T> &);
+using DifferenceRows = T (*) (const Block<T> &, Step<T>, const Planes<T> &);
 
-/** Null where cells are too wide, or too many for what is kept of a row. */
+template <int Width, typename T>
+constexpr DifferenceRows<T>
+difference_rows_or_null ()
+{
+  if constexpr (has_own_code (Width))
+    return difference_rows<Width, 0, T>;
+  else
+    return nullptr;
+}
+
+/** Null for cells whose width has no code of its own, and for too many. */
 template <typename T, int... Width>
 DifferenceRows<T>
 difference_rows_of (const Block<T> &block, std::integer_sequence<int, Width...>)
 {
+  struct Small {
+    int width, height;
+    DifferenceRows<T> run;
+  };
+  static constexpr Small kSmall[] = {
+      {2, 1, difference_rows<2, 1, T>},
+      {3, 1, difference_rows<3, 1, T>},
+      {2, 2, difference_rows<2, 2, T>},
+      {5, 1, difference_rows<5, 1, T>},
+      {3, 2, difference_rows<3, 2, T>},
+      {7, 1, difference_rows<7, 1, T>},
+      {4, 2, difference_rows<4, 2, T>},
+      {3, 3, difference_rows<3, 3, T>},
+      {5, 2, difference_rows<5, 2, T>},
+      {4, 3, difference_rows<4, 3, T>},
+      {5, 3, difference_rows<5, 3, T>},
+      {4, 4, difference_rows<4, 4, T>},
+  };
   static constexpr DifferenceRows<T> kAll[] = {
-      difference_rows<Width + 1, T>...};
+      difference_rows_or_null<Width, T> ()...};
+  for (const Small &small : kSmall)
+    if (small.width == block.width && small.height == block.height)
+      return small.run;
   const bool fits =
       std::ptrdiff_t (block.cells) * block.rows * std::ptrdiff_t (sizeof (T)) <=
       LastOfRow<T>::kBytes;
-  return block.width <= kOwnWidths && fits ? kAll[block.width - 1] : nullptr;
+  return fits && block.width <= kOwnWidths ? kAll[block.width] : nullptr;
 }
 
 template <typename T>
@@ -192,22 +228,18 @@ T
 difference (const Block<T> &block, const Layout<T> &layout, int gain, T largest,
     const Planes<T> &to)
 {
-  using Work = DifferenceInRegisters<T>;
-  const Work work = {gain, largest, T (largest / gain)};
-  if (layout.identity) {
-    if (const auto own = in_registers<Work, T> (block.width, block.height))
-      return own (block, to, work);
+  const Step<T> step = {gain, largest, T (largest / gain)};
+  if (layout.identity)
     if (const auto rows = difference_rows_of<T> (
-            block, std::make_integer_sequence<int, kOwnWidths> ()))
-      return rows (block, work, to);
-  }
-  return difference_any (block, layout, work, to);
+            block, std::make_integer_sequence<int, kOwnWidths + 1> ()))
+      return rows (block, step, to);
+  return difference_any (block, layout, step, to);
 }
 
 /** The element at the centre of the cell, 4 n times as large; @p between has
  * one cell more than @p values at either end. */
 template <typename Wide, typename T>
-CEXP_INLINE void
+CODEDEXPOSURE_INLINE void
 lerp_row (const ElementRow<T> &element, int cells, Wide *__restrict between,
     Wide *__restrict values)
 {
@@ -260,7 +292,7 @@ lerp_difference (
 constexpr int kDecodeBlock = 16;
 
 template <typename T>
-CEXP_INLINE void
+CODEDEXPOSURE_INLINE void
 decode_block (const ElementRow<T> *elements, const TermList *terms, int n,
     int at, int cells, T largest, T *const *out)
 {
@@ -304,4 +336,4 @@ decode (const ElementRow<T> *elements, const TermList *terms, int n, int cells,
     decode_block (elements, terms, n, at, cells - at, largest, out);
 }
 
-} // namespace cexp::CEXP_TARGET
+} // namespace codedexposure::CODEDEXPOSURE_TARGET

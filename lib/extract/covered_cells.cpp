@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-namespace cexp
+namespace codedexposure
 {
 
 namespace
@@ -63,4 +63,4 @@ CoveredCells::blacken (ImageView<Pixel> subframe, RowRange rows) const
 template void CoveredCells::blacken (ImageView<std::uint8_t>, RowRange) const;
 template void CoveredCells::blacken (ImageView<std::uint16_t>, RowRange) const;
 
-} // namespace cexp
+} // namespace codedexposure

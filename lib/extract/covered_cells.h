@@ -10,7 +10,7 @@
 #include "extract/reference.h"
 #include "schedule/schedule.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 /**
@@ -41,4 +41,4 @@ private:
   std::vector<Offset> neighbours_;
 };
 
-} // namespace cexp
+} // namespace codedexposure

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdlib>
 
-namespace cexp
+namespace codedexposure
 {
 
 namespace
@@ -61,4 +61,4 @@ Decoder::lerp (int position, int length) const
   return {2 * length - far, far, twice_to_centre < 0 ? -1 : 1};
 }
 
-} // namespace cexp
+} // namespace codedexposure

@@ -9,7 +9,7 @@
 #include "schedule/sample_grid.h"
 #include "schedule/schedule.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 /** One summand of a slot's light: factor times the value of an element. */
@@ -74,4 +74,4 @@ private:
   std::vector<std::size_t> starts_;
 };
 
-} // namespace cexp
+} // namespace codedexposure

@@ -10,12 +10,13 @@
 #include <string>
 
 #include "base/text.h"
+#include "base/view_check.h"
 #include "extract/covered_cells.h"
 #include "extract/fast_path.h"
 #include "extract/reference.h"
 #include "extract/targets.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 namespace
@@ -44,7 +45,7 @@ elements_by_slot (const Code &code)
   for (int s = 0; s < code.slots (); s++) {
     int &element = elements[std::size_t (s)] = s;
     if (code.one_hot ())
-      for (element = 0; !code.open (element, s); element++) {
+      for (element = 0; !code.on (element, s); element++) {
       }
   }
   return elements;
@@ -126,14 +127,44 @@ extract_targets ()
 template <typename Pixel>
 struct Extractor<Pixel>::Plan : ExtractPlan {
   CoveredCells covered;
+  Extent frame; ///< coded
   /** Empty: the reference does it. */
   std::optional<FastPath<Pixel>> fast = {};
 
+  Result<void> check (ImageView<const Pixel> coded,
+      std::span<const ImageView<Pixel>> subframes, RowRange rows) const;
   ExtractReport run (ImageView<const Pixel> coded,
       std::span<const ImageView<Pixel>> subframes, RowRange rows) const;
   void leave_out_regions (ImageView<const Pixel> coded,
       std::span<const ImageView<Pixel>> subframes, RowRange rows) const;
 };
+
+template <typename Pixel>
+Result<void>
+Extractor<Pixel>::Plan::check (ImageView<const Pixel> coded,
+    std::span<const ImageView<Pixel>> subframes, RowRange rows) const
+{
+  std::array<ViewBytes, Tile::kMaxElements> outputs;
+  if (int (subframes.size ()) != grid.elements ())
+    return Error{std::to_string (subframes.size ()) +
+                 " views of subframes instead of " +
+                 std::to_string (grid.elements ())};
+  const ViewBytes input = ViewBytes::of (coded);
+  if (auto checked =
+          check_view (input, "coded frame", frame.width, frame.height);
+      !checked)
+    return checked;
+  for (std::size_t k = 0; k < subframes.size (); k++) {
+    outputs[k] = ViewBytes::of (subframes[k]);
+    if (auto checked =
+            check_view (outputs[k], "subframe", size.width, size.height);
+        !checked)
+      return checked;
+  }
+  if (auto checked = check_rows (rows.first, rows.count, size.height); !checked)
+    return checked;
+  return check_apart (std::span (outputs).first (subframes.size ()), &input);
+}
 
 template <typename Pixel>
 ExtractReport
@@ -184,7 +215,7 @@ template <typename Pixel>
 Result<Extractor<Pixel>>
 Extractor<Pixel>::make (
     const Schedule &whole, int width, int height, const ExtractOptions &options)
-{
+try {
   constexpr int kTypeBits = std::numeric_limits<Pixel>::digits;
   if (const auto checked = check_options (options, kTypeBits); !checked)
     return checked.error ();
@@ -201,7 +232,7 @@ Extractor<Pixel>::make (
   auto plan =
       std::make_unique<Plan> (Plan{{method, grid, size, (1 << bits) - 1,
                                        elements_by_slot (schedule.code ())},
-          CoveredCells (whole, size)});
+          CoveredCells (whole, size), {width, height}});
   if (method == Method::kDecode) {
     auto decoder = Decoder::make (schedule, options.gain, options.interpolate);
     if (!decoder)
@@ -211,6 +242,8 @@ Extractor<Pixel>::make (
   if (options.target != kScalar)
     plan->fast = FastPath<Pixel>::make (*plan, targets_from (options.target));
   return Extractor (std::move (plan));
+} catch (const std::bad_alloc &) {
+  return out_of_memory ();
 }
 
 template <typename Pixel>
@@ -242,7 +275,7 @@ Extractor<Pixel>::subframe_size () const
 }
 
 template <typename Pixel>
-ExtractReport
+Result<ExtractReport>
 Extractor<Pixel>::run (ImageView<const Pixel> coded,
     std::span<const ImageView<Pixel>> subframes) const
 {
@@ -250,11 +283,13 @@ Extractor<Pixel>::run (ImageView<const Pixel> coded,
 }
 
 template <typename Pixel>
-ExtractReport
+Result<ExtractReport>
 Extractor<Pixel>::run_rows (ImageView<const Pixel> coded,
     std::span<const ImageView<Pixel>> subframes, int first_row, int rows) const
 {
   const RowRange range = {first_row, rows};
+  if (const auto checked = plan_->check (coded, subframes, range); !checked)
+    return checked.error ();
   const ExtractReport report = plan_->run (coded, subframes, range);
   if (plan_->covered.any ())
     plan_->leave_out_regions (coded, subframes, range);
@@ -264,4 +299,4 @@ Extractor<Pixel>::run_rows (ImageView<const Pixel> coded,
 template class Extractor<std::uint8_t>;
 template class Extractor<std::uint16_t>;
 
-} // namespace cexp
+} // namespace codedexposure

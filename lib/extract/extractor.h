@@ -12,7 +12,7 @@
 #include "base/result.h"
 #include "schedule/schedule.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 enum class Method {
@@ -96,6 +96,7 @@ public:
    * @p coded      width x height pixels.
    * @p subframes  subframes () views of subframe_size (), in exposure order,
    *               fully overwritten; none overlaps another or @p coded.
+   * Error when a view is not so.
    * Select and rank copy values. Decode rounds to nearest and clamps to
    * 0..2^bits - 1 (decoder.h has the arithmetic): of a still, flat scene, and
    * with interpolation of any that is linear over neighbouring cells, it gives
@@ -103,11 +104,11 @@ public:
    *   sum |factor| / 2 + 1/2, which is gain (1/2 + 1/2) + 1/2 for a staircase:
    * half a step from each coded pixel, half from the result.
    */
-  ExtractReport run (ImageView<const Pixel> coded,
+  Result<ExtractReport> run (ImageView<const Pixel> coded,
       std::span<const ImageView<Pixel>> subframes) const;
   /** The same for rows [@p first_row, @p first_row + @p rows) of the
    * subframes only, so that threads can share one frame. */
-  ExtractReport run_rows (ImageView<const Pixel> coded,
+  Result<ExtractReport> run_rows (ImageView<const Pixel> coded,
       std::span<const ImageView<Pixel>> subframes, int first_row,
       int rows) const;
 
@@ -120,4 +121,4 @@ private:
 extern template class Extractor<std::uint8_t>;
 extern template class Extractor<std::uint16_t>;
 
-} // namespace cexp
+} // namespace codedexposure

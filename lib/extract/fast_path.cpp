@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-namespace cexp
+namespace codedexposure
 {
 
 namespace
@@ -397,4 +397,4 @@ FastPath<Pixel>::saturated (const ExtractPlan &plan,
 template class FastPath<std::uint8_t>;
 template class FastPath<std::uint16_t>;
 
-} // namespace cexp
+} // namespace codedexposure

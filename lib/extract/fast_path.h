@@ -15,7 +15,7 @@
 #include "extract/targets.h"
 #include "schedule/sample_grid.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 /** A row of pixels for each element or rank. */
@@ -92,4 +92,4 @@ private:
   std::vector<int> row_steps_;
 };
 
-} // namespace cexp
+} // namespace codedexposure

@@ -8,7 +8,7 @@
 #include <span>
 #include <utility>
 
-namespace cexp
+namespace codedexposure
 {
 
 /** Groups smaller than this are sorted by insertion (paper, Fig. 7: k = 7). */
@@ -75,4 +75,4 @@ group_sort (std::span<T> values, Less &&less = {},
   insertion_sort (values, less);
 }
 
-} // namespace cexp
+} // namespace codedexposure

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace cexp
+namespace codedexposure
 {
 
 /**
@@ -126,4 +126,4 @@ struct Kernels {
 /** Bound on the cells of one call of lerp_difference. */
 constexpr int kMaxRowCells = 4096;
 
-} // namespace cexp
+} // namespace codedexposure

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* The kernels of one instruction set, compiled once for each. */
+#include "base/vector.h"
 #include "extract/combine.h"
 #include "extract/kernels.h"
 #include "extract/select.h"
 #include "extract/sort.h"
-#include "extract/vector.h"
 
-namespace cexp::CEXP_TARGET
+namespace codedexposure::CODEDEXPOSURE_TARGET
 {
 
 template <typename T>
@@ -17,4 +17,4 @@ extern const Kernels<std::uint8_t> *const kernels_u8 = &kKernels<std::uint8_t>;
 extern const Kernels<std::uint16_t> *const kernels_u16 =
     &kKernels<std::uint16_t>;
 
-} // namespace cexp::CEXP_TARGET
+} // namespace codedexposure::CODEDEXPOSURE_TARGET

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "extract/layout_table.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 template <typename Pixel>
@@ -26,4 +26,4 @@ LayoutTable<Pixel>::LayoutTable (const SampleGrid &grid, int lanes)
 template class LayoutTable<std::uint8_t>;
 template class LayoutTable<std::uint16_t>;
 
-} // namespace cexp
+} // namespace codedexposure

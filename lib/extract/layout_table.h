@@ -8,7 +8,7 @@
 #include "extract/kernels.h"
 #include "schedule/sample_grid.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 template <typename Pixel>
@@ -36,4 +36,4 @@ private:
   std::vector<Pixel> comb_;
 };
 
-} // namespace cexp
+} // namespace codedexposure

@@ -2,7 +2,7 @@
 /* Sorting networks of any size, made while compiling. */
 #pragma once
 
-namespace cexp
+namespace codedexposure
 {
 
 /**
@@ -251,4 +251,4 @@ private:
   List rank_ = {};
 };
 
-} // namespace cexp
+} // namespace codedexposure

@@ -4,7 +4,7 @@
 
 #include <cstddef>
 
-namespace cexp
+namespace codedexposure
 {
 
 /** Rows of subframes that start at multiples of this many bytes can be written
@@ -25,4 +25,4 @@ plane_stagger (int k)
   return std::size_t (k) * 192 % 4096;
 }
 
-} // namespace cexp
+} // namespace codedexposure

@@ -8,7 +8,7 @@
 #include "extract/covered_cells.h"
 #include "extract/group_sort.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 namespace
@@ -186,7 +186,7 @@ reference_saturated (ImageView<const Pixel> coded, const SampleGrid &grid,
   return count;
 }
 
-#define CEXP_INSTANTIATE(Pixel)                                                \
+#define CODEDEXPOSURE_INSTANTIATE(Pixel)                                       \
   template void reference_rank (ImageView<const Pixel>, const SampleGrid &,    \
       RowRange, std::span<const ImageView<Pixel>>);                            \
   template void reference_select (ImageView<const Pixel>, const SampleGrid &,  \
@@ -199,7 +199,7 @@ reference_saturated (ImageView<const Pixel> coded, const SampleGrid &grid,
   template std::uint64_t reference_saturated (                                 \
       ImageView<const Pixel>, const SampleGrid &, int, RowRange);
 
-CEXP_INSTANTIATE (std::uint8_t)
-CEXP_INSTANTIATE (std::uint16_t)
+CODEDEXPOSURE_INSTANTIATE (std::uint8_t)
+CODEDEXPOSURE_INSTANTIATE (std::uint16_t)
 
-} // namespace cexp
+} // namespace codedexposure

@@ -10,7 +10,7 @@
 #include "extract/decoder.h"
 #include "schedule/sample_grid.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 class CoveredCells;
@@ -56,4 +56,4 @@ template <typename Pixel>
 std::uint64_t reference_saturated (ImageView<const Pixel> coded,
     const SampleGrid &grid, int largest, RowRange rows);
 
-} // namespace cexp
+} // namespace codedexposure

@@ -3,7 +3,7 @@
 
 #include "extract/targets.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 template <typename Pixel>
@@ -23,4 +23,4 @@ count_saturated (ImageView<const Pixel> frame, int bits)
 template std::uint64_t count_saturated (ImageView<const std::uint8_t>, int);
 template std::uint64_t count_saturated (ImageView<const std::uint16_t>, int);
 
-} // namespace cexp
+} // namespace codedexposure

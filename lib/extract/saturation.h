@@ -6,7 +6,7 @@
 
 #include "base/image.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 /** Pixels of @p frame that are at 2^bits - 1 or above.
@@ -19,4 +19,4 @@ extern template std::uint64_t count_saturated (
 extern template std::uint64_t count_saturated (
     ImageView<const std::uint16_t>, int);
 
-} // namespace cexp
+} // namespace codedexposure

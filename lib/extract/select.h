@@ -2,41 +2,126 @@
 /* Elements to subframes, as they are. */
 #pragma once
 
-#include "extract/cells.h"
+#include "base/vector.h"
 #include "extract/kernels.h"
 #include "extract/split.h"
-#include "extract/vector.h"
 
-namespace cexp::CEXP_TARGET
+namespace codedexposure::CODEDEXPOSURE_TARGET
 {
 
-/** Kernels::select where elements stand at one place throughout a row. One row
- * of all cells after the other, so that only as many subframes are written at a
- * time as a cell is wide: many more than a hundred would be more pages than the
- * processor keeps at hand. */
-template <int Width, typename T>
+/** Kernels::select where elements stand at one place throughout a row. All
+ * cells of a row are worked on before the next Together of their pixel rows, so
+ * that only as many subframes are written at a time: many more than a hundred
+ * would be more pages than the processor keeps at hand. Together divides the
+ * height of a cell, and 0 stands for all of it; unless it is 1, every element
+ * is at the place of its own number. */
+template <int Width, int Together, typename T>
 T
 select_rows (
     const Block<T> &block, const Layout<T> &layout, const Planes<T> &to)
 {
+  const int together = Together > 0 ? Together : block.height;
   const int width = Width > 0 ? Width : block.width;
   Vector<T> most = {};
-  T *out[Width > 0 ? Width : 256];
-  for (int y = 0; y < block.height; y++) {
+  T *out[256];
+  for (int y = 0; y < block.height; y += together) {
     int repeat_row = layout.row;
     for (int j = 0; j < block.rows; j++) {
       const std::uint8_t *element =
           layout.element + repeat_row * layout.n + y * width;
-      for (int x = 0; x < width; x++)
-        out[x] = bytes_on (to.rows[element[x]], j * to.stride);
+      for (int p = 0; p < together * width; p++)
+        out[p] = bytes_on (
+            to.rows[Together == 1 ? element[p] : y * width + p], j * to.stride);
       repeat_row = repeat_row + 1 < layout.rows ? repeat_row + 1 : 0;
       const T *row = bytes_on (
           block.pixels, (std::ptrdiff_t (j) * block.height + y) * block.stride);
-      most = larger (most, split_row<Width, T> (row, width, block.cells, out,
-                               to.stream, block.height * block.stride));
+      for_strips<T> (block.cells, out[0], to.stream,
+          [&] (int at, auto put) CODEDEXPOSURE_INLINE_BODY {
+            for (int i = 0; i < together; i++)
+              most = larger (most,
+                  split_row<Width, T> (
+                      bytes_on (row, i * block.stride) + at * width, width,
+                      out + i * width, at, put, block.height * block.stride));
+          });
     }
   }
   return largest_lane<T> (most);
+}
+
+template <typename T>
+using SelectRows = T (*) (
+    const Block<T> &, const Layout<T> &, const Planes<T> &);
+
+template <int Together, typename T, int... Width>
+SelectRows<T>
+select_rows_of (int width, std::integer_sequence<int, Width...>)
+{
+  static constexpr SelectRows<T> kAll[] = {
+      select_rows < has_own_code (Width) ? Width : 0, Together, T > ...};
+  return kAll[width < int (sizeof...(Width)) ? width : 0];
+}
+
+template <typename T>
+SelectRows<T>
+select_rows_of (int width)
+{
+  return select_rows_of<1, T> (
+      width, std::make_integer_sequence<int, kOwnWidths + 1> ());
+}
+
+/** Brings single vectors of cells into vectors of a buffer, pixel by pixel. */
+template <typename T>
+class StripReader
+{
+public:
+  /** @p block  lasts as long as this. */
+  explicit StripReader (const Block<T> &block)
+      : block_ (block), run_ (select_rows_of<T> (block.width))
+  {
+    for (int p = 0; p < block.width * block.height; p++)
+      number_[p] = std::uint8_t (p);
+  }
+
+  /** places[p] takes pixel p of the cells from @p at on of row @p j. Returns
+   * the largest pixel. */
+  T read (int j, int at, T *const *places) const
+  {
+    const Block<T> strip = {
+        bytes_on (
+            block_.pixels, std::ptrdiff_t (j) * block_.height * block_.stride) +
+            at * block_.width,
+        block_.stride, block_.width, block_.height, kLanes<T>, 1};
+    const Layout<T> layout = {nullptr, block_.width * block_.height, 1, 1, 0, 0,
+        nullptr, true, number_};
+    return run_ (strip, layout, {places, 0});
+  }
+
+private:
+  const Block<T> &block_;
+  SelectRows<T> run_;
+  std::uint8_t number_[256];
+};
+
+/** Brings one vector of all places into the order of the elements where that
+ * differs from cell to cell: rows[e] takes element e. */
+template <typename T, typename PutVector>
+CODEDEXPOSURE_INLINE void
+relabel_strip (const Layout<T> &layout, int j, int at, const T *const *places,
+    T *const *rows, std::ptrdiff_t to, PutVector put)
+{
+  const int repeat = layout.repeat;
+  const std::uint8_t *place =
+      layout.place + (j + layout.row) % layout.rows * layout.n * repeat;
+  alignas (kVectorBytes) T masks[256 * kLanes<T>];
+  for (int c = 0; c < repeat; c++)
+    store (masks + c * kLanes<T>,
+        load (layout.comb + (at + layout.column + repeat - c) % repeat));
+  for (int e = 0; e < layout.n; e++) {
+    Vector<T> v = {};
+    for (int c = 0; c < repeat; c++)
+      v |= load (masks + c * kLanes<T>) & load (places[place[e * repeat + c]]);
+    put (rows[e] + to, v);
+  }
 }
 
 /** Kernels::select where the places of elements differ from cell to cell. */
@@ -45,40 +130,17 @@ T
 select_relabelled (
     const Block<T> &block, const Layout<T> &layout, const Planes<T> &to)
 {
-  const auto strip = split_strip_of<T> (block.width);
+  const StripReader<T> strips (block);
   Wires<T> wires (layout.n);
-  Vector<T> most = {};
+  T most = 0;
   for (int j = 0; j < block.rows; j++)
     for_strips<T> (block.cells, bytes_on (to.rows[0], j * to.stride), to.stream,
-        [&] (int at, auto put) CEXP_INLINE_BODY {
-          most = larger (most, strip (block, j, at, wires.rows));
+        [&] (int at, auto put) CODEDEXPOSURE_INLINE_BODY {
+          most = larger (most, strips.read (j, at, wires.rows));
           relabel_strip (layout, j, at, wires.rows, to.rows,
               at + j * to.stride / std::ptrdiff_t (sizeof (T)), put);
         });
-  return largest_lane<T> (most);
-}
-
-/** Kernels::select of cells that are in registers. */
-struct SelectInRegisters {
-  template <int N, typename V, typename PutVector>
-  CEXP_INLINE void operator() (V (&wires)[N], PutVector put) const
-  {
-#pragma GCC unroll 16
-    for (int k = 0; k < N; k++)
-      put (k, wires[k]);
-  }
-};
-
-template <typename T>
-using SelectRows = T (*) (
-    const Block<T> &, const Layout<T> &, const Planes<T> &);
-
-template <typename T, int... Width>
-SelectRows<T>
-select_rows_of (int width, std::integer_sequence<int, Width...>)
-{
-  static constexpr SelectRows<T> kAll[] = {select_rows<Width, T>...};
-  return kAll[width <= kOwnWidths ? width : 0];
+  return most;
 }
 
 template <typename T>
@@ -89,13 +151,13 @@ select (const Block<T> &block, const Layout<T> &layout, const Planes<T> &to)
     return select_relabelled (block, layout, to);
   /* The work on a row of so few pixels is less than what leads up to it. */
   if (layout.identity && block.width == 2 && block.height == 2)
-    return run_in_registers<SelectInRegisters, 2, 2> (block, to, {});
-  /* Past the caches, whole cells are read and written more evenly. */
-  if (layout.identity && to.stream)
-    if (const auto own =
-            in_registers<SelectInRegisters, T> (block.width, block.height))
-      return own (block, to, {});
-  return select_rows_of<T> (block.width, OwnWidths ()) (block, layout, to);
+    return select_rows<2, 2> (block, layout, to);
+  /* With non-temporal stores, whole cells are read and written more evenly. */
+  if constexpr (kVectorBytes == 64)
+    if (layout.identity && to.stream && layout.n <= 16 && block.width <= 5)
+      return select_rows_of<0, T> (block.width,
+          std::make_integer_sequence<int, 6> ()) (block, layout, to);
+  return select_rows_of<T> (block.width) (block, layout, to);
 }
 
-} // namespace cexp::CEXP_TARGET
+} // namespace codedexposure::CODEDEXPOSURE_TARGET

@@ -4,10 +4,10 @@
 
 #include <type_traits>
 
+#include "base/vector.h"
 #include "extract/kernels.h"
-#include "extract/vector.h"
 
-namespace cexp::CEXP_TARGET
+namespace codedexposure::CODEDEXPOSURE_TARGET
 {
 
 /** Every second lane of two vectors, from lane First on. */
@@ -36,7 +36,7 @@ struct InOrder {
 };
 
 template <int Width, int X, typename T, int... Source>
-CEXP_INLINE Vector<T>
+CODEDEXPOSURE_INLINE Vector<T>
 gather_odd (const Vector<T> (&in)[Width], std::integer_sequence<int, Source...>)
 {
   constexpr int kL = kLanes<T>;
@@ -57,13 +57,13 @@ smallest_factor (int n)
 }
 
 template <int Width, typename T>
-CEXP_INLINE void split_vectors (
+CODEDEXPOSURE_INLINE void split_vectors (
     const Vector<T> (&in)[Width], Vector<T> (&out)[Width]);
 
 /** One stage: the Width vectors become Factor streams of every Factor-th
  * pixel, which are split further. */
 template <int Width, int Factor, int X, typename T>
-CEXP_INLINE void
+CODEDEXPOSURE_INLINE void
 split_stream (const Vector<T> (&in)[Width], Vector<T> (&out)[Width])
 {
   constexpr int kRest = Width / Factor;
@@ -90,7 +90,7 @@ split_stream (const Vector<T> (&in)[Width], Vector<T> (&out)[Width])
 }
 
 template <int Width, typename T, int... X>
-CEXP_INLINE void
+CODEDEXPOSURE_INLINE void
 split_streams (const Vector<T> (&in)[Width], Vector<T> (&out)[Width],
     std::integer_sequence<int, X...>)
 {
@@ -99,7 +99,7 @@ split_streams (const Vector<T> (&in)[Width], Vector<T> (&out)[Width],
 
 /** out[x] lane i = pixel x of cell i. */
 template <int Width, typename T>
-CEXP_INLINE void
+CODEDEXPOSURE_INLINE void
 split_vectors (const Vector<T> (&in)[Width], Vector<T> (&out)[Width])
 {
   if constexpr (Width == 1)
@@ -111,7 +111,7 @@ split_vectors (const Vector<T> (&in)[Width], Vector<T> (&out)[Width])
 
 /** The same from memory, which is read once and no further. */
 template <int Width, typename T>
-CEXP_INLINE void
+CODEDEXPOSURE_INLINE void
 split_cells (const T *from, Vector<T> (&out)[Width])
 {
   Vector<T> in[Width];
@@ -122,7 +122,7 @@ split_cells (const T *from, Vector<T> (&out)[Width])
 }
 
 template <typename T>
-CEXP_INLINE T *
+CODEDEXPOSURE_INLINE T *
 bytes_on (T *p, std::ptrdiff_t bytes)
 {
   using Byte = std::conditional_t<std::is_const_v<T>, const char, char>;
@@ -131,83 +131,81 @@ bytes_on (T *p, std::ptrdiff_t bytes)
 
 /** Writes a vector. */
 struct Put {
-  static constexpr bool kStreams = false;
+  CODEDEXPOSURE_INLINE bool streams () const { return false; }
   template <typename T, typename V>
-  CEXP_INLINE void operator() (T *to, V v) const
+  CODEDEXPOSURE_INLINE void operator() (T *to, V v) const
   {
     store (to, v);
   }
 };
 
-#if CEXP_VECTOR_BYTES == 64
-/** Writes a vector past the caches. */
-struct PutPastCaches {
-  static constexpr bool kStreams = true;
-  template <typename T, typename V>
-  CEXP_INLINE void operator() (T *to, V v) const
-  {
-    stream (to, v);
-  }
-};
-
-/** Writes the lanes of a vector whose bits are set. */
-struct PutLanes {
-  static constexpr bool kStreams = false;
+#if CODEDEXPOSURE_VECTOR_BYTES == 64
+/** Writes a whole vector with a non-temporal store, or only the lanes whose
+ * bits are set. */
+struct PutStream {
   std::uint64_t lanes;
+  CODEDEXPOSURE_INLINE bool streams () const { return lanes + 1 == 0; }
   template <typename T, typename V>
-  CEXP_INLINE void operator() (T *to, V v) const
+  CODEDEXPOSURE_INLINE void operator() (T *to, V v) const
   {
-    if constexpr (sizeof (T) == 1)
+    if (streams ())
+      stream (to, v);
+    else if constexpr (sizeof (T) == 1)
       _mm512_mask_storeu_epi8 (to, lanes, __m512i (v));
     else
       _mm512_mask_storeu_epi16 (to, __mmask32 (lanes), __m512i (v));
   }
 };
 
-/** for_strips () past the caches. A line that is written both ways costs a trip
- * to memory, so what lies before the first whole line and after the last is
- * written by single lanes. */
+/** for_strips () with non-temporal stores. A line that is written both ways
+ * costs a trip to memory, so what lies before the first whole line and after
+ * the last is written by single lanes. */
 template <typename T, typename Body>
-CEXP_INLINE void
+CODEDEXPOSURE_INLINE void
 stream_strips (int cells, int lead, Body body)
 {
   constexpr int kL = kLanes<T>;
-  if (lead > 0)
-    body (0, PutLanes{(std::uint64_t (1) << lead) - 1});
-  int at = lead;
-  for (; at + kL <= cells; at += kL)
-    body (at, PutPastCaches ());
-  if (at < cells)
-    body (cells - kL, PutLanes{~std::uint64_t (0) << (kL - (cells - at))});
+  constexpr std::uint64_t kAll = ~std::uint64_t (0);
+  const int last = cells - kL;
+  for (int line = lead > 0 ? lead - kL : 0; line < cells; line += kL) {
+    const std::uint64_t lanes = line < 0      ? ~(kAll << lead)
+                                : line > last ? kAll << (line - last)
+                                              : kAll;
+    body (line < 0 ? 0 : line < last ? line : last, PutStream{lanes});
+  }
 }
 #endif
 
 /**
  * Calls body (at, put) for every vector of a row of cells whose first output
- * pixel is @p to; put (to, vector) writes past the caches where it may.
+ * pixel is @p to; put (to, vector) uses non-temporal stores where it may.
  */
 template <typename T, typename Body>
-CEXP_INLINE void
+CODEDEXPOSURE_INLINE void
 for_strips (int cells, [[maybe_unused]] const T *to,
     [[maybe_unused]] bool streams, Body body)
 {
   constexpr int kL = kLanes<T>;
-#if CEXP_VECTOR_BYTES == 64
+#if CODEDEXPOSURE_VECTOR_BYTES == 64
   const auto address = reinterpret_cast<std::uintptr_t> (to);
   const int lead = int (-address % kVectorBytes / sizeof (T));
   if (streams && lead + kL <= cells)
     return stream_strips<T> (cells, lead, body);
 #endif
-  int at = 0;
-  for (; at + kL <= cells; at += kL)
-    body (at, Put ());
-  if (at < cells)
-    body (cells - kL, Put ());
+  for (int at = 0; at < cells; at += kL)
+    body (at + kL <= cells ? at : cells - kL, Put ());
 }
 
-/* Cells wider than kOwnWidths are turned in square blocks of 16 bytes: a row of
- * a block is a piece of a cell, a column is a piece of an output row. */
+/* The widths of cells that have code of their own. Others are transposed in
+ * squares of 16 bytes: a row of a square is a piece of a cell, a column is a
+ * piece of an output row. */
 constexpr int kOwnWidths = 16;
+
+constexpr bool
+has_own_code (int width)
+{
+  return (width >= 1 && width <= 10) || width == 12 || width == 16;
+}
 
 template <typename T>
 struct SquareOf {
@@ -225,7 +223,8 @@ struct Interleave {
 };
 
 template <typename T>
-CEXP_INLINE void turn (typename SquareOf<T>::Row (&rows)[SquareOf<T>::kSize])
+CODEDEXPOSURE_INLINE void transpose (
+    typename SquareOf<T>::Row (&rows)[SquareOf<T>::kSize])
 {
   constexpr int kSize = SquareOf<T>::kSize;
   constexpr std::make_integer_sequence<int, kSize> lanes;
@@ -243,25 +242,44 @@ CEXP_INLINE void turn (typename SquareOf<T>::Row (&rows)[SquareOf<T>::kSize])
   }
 }
 
-/** One vector of cells @p width pixels wide, at least the size of a square:
- * out[x] + at takes pixel x. */
+/** The first pixels of a cell narrower than a square, with those before it in
+ * front and nothing of what follows: the last cell that may be read. */
 template <typename T>
-CEXP_INLINE Vector<T>
-split_wide (const T *from, int width, T *const *out, int at)
+CODEDEXPOSURE_INLINE typename SquareOf<T>::Row
+load_last (const T *cell, int width)
+{
+  constexpr int kSize = SquareOf<T>::kSize;
+  T padded[2 * kSize] = {};
+  __builtin_memcpy (padded, cell + width - kSize, 16);
+  typename SquareOf<T>::Row row;
+  __builtin_memcpy (&row, padded + kSize - width, 16);
+  return row;
+}
+
+/** One vector of cells @p width pixels wide: out[x] + at takes pixel x. Returns
+ * the largest pixels. */
+template <typename T>
+CODEDEXPOSURE_INLINE Vector<T>
+split_any (const T *from, int width, T *const *out, int at)
 {
   using Row = typename SquareOf<T>::Row;
   constexpr int kSize = SquareOf<T>::kSize;
+  const int columns = width < kSize ? width : kSize;
   Row most = {};
   for (int i = 0; i < kLanes<T>; i += kSize) {
     for (int x = 0; x < width; x += kSize) {
-      const int pixel = x + kSize <= width ? x : width - kSize;
+      const int pixel = x + columns <= width ? x : width - columns;
       Row square[kSize];
       for (int r = 0; r < kSize; r++) {
-        __builtin_memcpy (&square[r], from + (i + r) * width + pixel, 16);
+        const T *cell = from + (i + r) * width;
+        if (width < kSize && i + r == kLanes<T> - 1)
+          square[r] = load_last (cell, width);
+        else
+          __builtin_memcpy (&square[r], cell + pixel, 16);
         most = larger (most, square[r]);
       }
-      turn<T> (square);
-      for (int r = 0; r < kSize; r++)
+      transpose<T> (square);
+      for (int r = 0; r < columns; r++)
         __builtin_memcpy (out[pixel + r] + at + i, &square[r], 16);
     }
   }
@@ -270,93 +288,26 @@ split_wide (const T *from, int width, T *const *out, int at)
   return result;
 }
 
-/** All vectors of one row of pixels; Width 0: any. Fetches the row @p ahead
- * bytes further on. Returns the largest pixels. */
-template <int Width, typename T>
-CEXP_INLINE Vector<T>
-split_row (const T *row, int width, int cells, T *const *out, bool streams,
+/** One vector of cells, one row of their pixels; Width 0: any. Fetches the row
+ * @p ahead bytes further on. Returns the largest pixels. */
+template <int Width, typename T, typename PutVector>
+CODEDEXPOSURE_INLINE Vector<T>
+split_row (const T *from, int width, T *const *out, int at, PutVector put,
     std::ptrdiff_t ahead)
 {
-  Vector<T> most = {};
-  for_strips<T> (
-      cells, out[0], streams, [&] (int at, auto put) CEXP_INLINE_BODY {
-        prefetch (bytes_on (row, ahead) + at * width,
-            (Width > 0 ? Width : width) * kVectorBytes);
-        if constexpr (Width == 0) {
-          most =
-              larger (most, split_wide<T> (row + at * width, width, out, at));
-        } else {
-          Vector<T> parts[Width];
-          split_cells<Width, T> (row + at * Width, parts);
+  prefetch (bytes_on (from, ahead), (Width > 0 ? Width : width) * kVectorBytes);
+  if constexpr (Width == 0) {
+    return split_any (from, width, out, at);
+  } else {
+    Vector<T> parts[Width];
+    split_cells<Width, T> (from, parts);
+    Vector<T> most = {};
 #pragma GCC unroll 256
-          for (int x = 0; x < Width; x++) {
-            most = larger (most, parts[x]);
-            put (out[x] + at, parts[x]);
-          }
-        }
-      });
-  return most;
-}
-
-/** One vector of cells, all places of the cell: places[p] takes the pixels. */
-template <int Width, typename T>
-Vector<T>
-split_strip (const Block<T> &block, int j, int at, T *const *places)
-{
-  constexpr int kL = kLanes<T>;
-  Vector<T> most = {};
-  for (int y = 0; y < block.height; y++) {
-    const T *row = bytes_on (block.pixels,
-                       (std::ptrdiff_t (j) * block.height + y) * block.stride) +
-                   at * block.width;
-    most = larger (most,
-        split_row<Width, T> (row, block.width, kL, places + y * block.width,
-            false, block.height * block.stride));
-  }
-  return most;
-}
-
-/** Width 0 stands for any. */
-using OwnWidths = std::make_integer_sequence<int, kOwnWidths + 1>;
-
-template <typename T>
-using SplitStrip = Vector<T> (*) (
-    const Block<T> &, int j, int at, T *const *places);
-
-template <typename T, int... Width>
-SplitStrip<T>
-split_strip_of (int width, std::integer_sequence<int, Width...>)
-{
-  static constexpr SplitStrip<T> kAll[] = {split_strip<Width, T>...};
-  return kAll[width <= kOwnWidths ? width : 0];
-}
-
-template <typename T>
-SplitStrip<T>
-split_strip_of (int width)
-{
-  return split_strip_of<T> (width, OwnWidths ());
-}
-
-/** Brings one vector of all places into the order of the elements where that
- * differs from cell to cell: rows[e] takes element e. */
-template <typename T, typename PutVector>
-CEXP_INLINE void
-relabel_strip (const Layout<T> &layout, int j, int at, const T *const *places,
-    T *const *rows, std::ptrdiff_t to, PutVector put)
-{
-  const int repeat = layout.repeat;
-  const std::uint8_t *place =
-      layout.place + (j + layout.row) % layout.rows * layout.n * repeat;
-  alignas (kVectorBytes) T masks[256 * kLanes<T>];
-  for (int c = 0; c < repeat; c++)
-    store (masks + c * kLanes<T>,
-        load (layout.comb + (at + layout.column + repeat - c) % repeat));
-  for (int e = 0; e < layout.n; e++) {
-    Vector<T> v = {};
-    for (int c = 0; c < repeat; c++)
-      v |= load (masks + c * kLanes<T>) & load (places[place[e * repeat + c]]);
-    put (rows[e] + to, v);
+    for (int x = 0; x < Width; x++) {
+      most = larger (most, parts[x]);
+      put (out[x] + at, parts[x]);
+    }
+    return most;
   }
 }
 
@@ -373,4 +324,4 @@ struct Wires {
   }
 };
 
-} // namespace cexp::CEXP_TARGET
+} // namespace codedexposure::CODEDEXPOSURE_TARGET

@@ -3,26 +3,26 @@
 
 #include <vector>
 
-#define CEXP_DECLARE(target)                                                   \
-  namespace cexp::target                                                       \
+#define CODEDEXPOSURE_DECLARE(target)                                          \
+  namespace codedexposure::target                                              \
   {                                                                            \
   extern const Kernels<std::uint8_t> *const kernels_u8;                        \
   extern const Kernels<std::uint16_t> *const kernels_u16;                      \
   }
-#define CEXP_TARGET_ENTRY(target)                                              \
+#define CODEDEXPOSURE_TARGET_ENTRY(target)                                     \
   {                                                                            \
 #target, target::kernels_u8, target::kernels_u16                           \
   }
 
 #if defined __x86_64__
-CEXP_DECLARE (avx512)
-CEXP_DECLARE (avx512vl)
-CEXP_DECLARE (avx2)
-CEXP_DECLARE (sse4)
+CODEDEXPOSURE_DECLARE (avx512)
+CODEDEXPOSURE_DECLARE (avx512vl)
+CODEDEXPOSURE_DECLARE (avx2)
+CODEDEXPOSURE_DECLARE (sse4)
 #endif
-CEXP_DECLARE (baseline)
+CODEDEXPOSURE_DECLARE (baseline)
 
-namespace cexp
+namespace codedexposure
 {
 
 namespace
@@ -38,14 +38,14 @@ find_targets ()
       __builtin_cpu_supports ("avx512dq") &&
       __builtin_cpu_supports ("avx512vl") &&
       __builtin_cpu_supports ("avx512vbmi"))
-    targets.insert (targets.end (),
-        {CEXP_TARGET_ENTRY (avx512), CEXP_TARGET_ENTRY (avx512vl)});
+    targets.insert (targets.end (), {CODEDEXPOSURE_TARGET_ENTRY (avx512),
+                                        CODEDEXPOSURE_TARGET_ENTRY (avx512vl)});
   if (__builtin_cpu_supports ("avx2"))
-    targets.push_back (CEXP_TARGET_ENTRY (avx2));
+    targets.push_back (CODEDEXPOSURE_TARGET_ENTRY (avx2));
   if (__builtin_cpu_supports ("sse4.1") && __builtin_cpu_supports ("ssse3"))
-    targets.push_back (CEXP_TARGET_ENTRY (sse4));
+    targets.push_back (CODEDEXPOSURE_TARGET_ENTRY (sse4));
 #endif
-  targets.push_back (CEXP_TARGET_ENTRY (baseline));
+  targets.push_back (CODEDEXPOSURE_TARGET_ENTRY (baseline));
   return targets;
 }
 
@@ -58,4 +58,4 @@ supported_targets ()
   return targets;
 }
 
-} // namespace cexp
+} // namespace codedexposure

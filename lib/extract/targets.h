@@ -7,7 +7,7 @@
 
 #include "extract/kernels.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 struct Target {
@@ -28,4 +28,4 @@ struct Target {
 /** Those that this processor can run, widest first; found out once. */
 std::span<const Target> supported_targets ();
 
-} // namespace cexp
+} // namespace codedexposure

@@ -1,11 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "fuse/dct.h"
-#include "fuse/dct_matrix.h"
 
 #include <cmath>
 #include <numbers>
 
-namespace cexp::fuse
+namespace codedexposure::fuse
 {
 
 std::vector<float>
@@ -35,4 +34,4 @@ make_table ()
 
 const DctTable kDct = make_table ();
 
-} // namespace cexp::fuse
+} // namespace codedexposure::fuse

@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The cosines of the blocks' transform. */
+/* The orthonormal cosine transform. */
 #pragma once
+
+#include <vector>
 
 #include "fuse/kernels.h"
 
-namespace cexp::fuse
+namespace codedexposure::fuse
 {
 
 /** The first half of the rows of the orthonormal DCT-II of length kBlock: at
@@ -16,4 +18,7 @@ struct DctTable {
 
 extern const DctTable kDct;
 
-} // namespace cexp::fuse
+/** DCT-II of @p length values as a matrix, row-major, a frequency a row. */
+std::vector<float> dct_matrix (int length);
+
+} // namespace codedexposure::fuse

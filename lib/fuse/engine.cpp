@@ -5,9 +5,9 @@
 #include <cmath>
 
 #include "base/text.h"
-#include "fuse/kriging.h"
+#include "estimate/kriging.h"
 
-namespace cexp::fuse
+namespace codedexposure::fuse
 {
 
 namespace
@@ -18,19 +18,20 @@ constexpr double kWhite = 255.0;
 constexpr double kTypicalLight = 0.4;
 /* Noise of coded pixels, in units of the scene's variance, below which the
  * equations become ill-conditioned. */
-constexpr double kLeastNoise = 1e-3;
+constexpr double kMinNoise = 1e-3;
 
-/* Two scenes: all slots are alike; or they have less to do with each other than
- * in any scene. */
-constexpr SceneClass kStill{0.0, 0.0, 5.0, 1.5, 1.0};
-constexpr SceneClass kMoved{0.0, 0.0, 5.0, 1.5, 0.6};
+/* All slots are the same; or they are less correlated than in any real scene.
+ */
+constexpr SceneClass kStatic{0.0, 0.0, 5.0, 1.5, 1.0};
+constexpr SceneClass kMoving{0.0, 0.0, 5.0, 1.5, 0.6};
 
-/* Mean squared error, in grey levels, that means nothing. */
+/* Mean squared errors of this size, in grey levels squared, do not tell models
+ * apart. */
 constexpr float kErrorFloor = 0.5f;
-/* Weight below which a model has no say. */
-constexpr float kLeastWeight = 0.01f;
+/* Models with less weight are left out. */
+constexpr float kMinWeight = 0.01f;
 
-/* Of the taps: far enough to see every slot several times. */
+/* Of the taps: large enough to contain every slot several times. */
 int
 tap_radius (int slots)
 {
@@ -46,6 +47,48 @@ find_kernels (std::string_view target)
   return nullptr;
 }
 
+Result<void>
+check (const FuseOptions &options)
+{
+  if (options.lookahead < 0 || options.lookahead > 1)
+    return Error{"lookahead " + std::to_string (options.lookahead) +
+                 ": it must be 0 or 1 coded frames"};
+  if (!find_kernels (options.target))
+    return Error{"target " + in_quotes (options.target) +
+                 " does not run on this machine; leave it empty"};
+  const auto within = [] (double value, double max) {
+    return value >= 0.0 && value <= max;
+  };
+  if (!within (options.noise.full_well, SensorNoise::kMaxFullWell) ||
+      !within (options.noise.read_noise, SensorNoise::kMaxReadNoise))
+    return Error{"a full well of " + real_text (options.noise.full_well) +
+                 " and a read noise of " +
+                 real_text (options.noise.read_noise) +
+                 " electrons: they must lie in 0..1e7 and 0..1e5"};
+  return {};
+}
+
+Result<void>
+check (const Schedule &schedule, FuseQuality quality)
+{
+  constexpr int kMaxSlots = Fuser<std::uint8_t>::kMaxSlots;
+  constexpr int kMaxPhases = Fuser<std::uint8_t>::kMaxPhases;
+  if (quality != FuseQuality::kFast && schedule.slots () > kMaxSlots)
+    return Error{
+        schedule.text () + " has " + std::to_string (schedule.slots ()) +
+        " slots; quality=" + std::string (quality_name (quality)) + " takes " +
+        std::to_string (kMaxSlots) + " at most, use quality=fast"};
+  const Phases phases (schedule);
+  const int count = phases.rows () * phases.period ();
+  if (count > kMaxPhases)
+    return Error{"the tile of " + schedule.text () + " has " +
+                 std::to_string (count) +
+                 " pixels with different neighbours; fusion takes " +
+                 std::to_string (kMaxPhases) +
+                 " at most, use a tile with a smaller period"};
+  return {};
+}
+
 } // namespace
 
 Result<std::unique_ptr<Engine>>
@@ -58,35 +101,10 @@ Engine::make (const Schedule &schedule, int width, int height,
     return Error{"frames of " + std::to_string (width) + "x" +
                  std::to_string (height) + " pixels hold no cell of " +
                  schedule.text ()};
-  if (options.lookahead < 0 || options.lookahead > 1)
-    return Error{"lookahead " + std::to_string (options.lookahead) +
-                 ": it must be 0 or 1 coded frames"};
-  if (!find_kernels (options.target))
-    return Error{"target " + in_quotes (options.target) +
-                 " does not run on this machine; leave it empty"};
-  const auto within = [] (double value, double most) {
-    return value >= 0.0 && value <= most;
-  };
-  if (!within (options.noise.full_well, SensorNoise::kMaxFullWell) ||
-      !within (options.noise.read_noise, SensorNoise::kMaxReadNoise))
-    return Error{"a full well of " + real_text (options.noise.full_well) +
-                 " and a read noise of " +
-                 real_text (options.noise.read_noise) +
-                 " electrons: they must lie in 0..1e7 and 0..1e5"};
-  if (options.quality != FuseQuality::kFast &&
-      schedule.slots () > Fuser<std::uint8_t>::kMaxSlots)
-    return Error{"quality=" + std::string (quality_name (options.quality)) +
-                 " knows motion for " +
-                 std::to_string (Fuser<std::uint8_t>::kMaxSlots) +
-                 " slots at most, and " + schedule.text () + " has " +
-                 std::to_string (schedule.slots ()) + ": take quality=fast"};
-  const Phases phases (schedule);
-  if (phases.rows () * phases.period () > Fuser<std::uint8_t>::kMaxPhases)
-    return Error{"the tile of " + schedule.text () + " has " +
-                 std::to_string (phases.rows () * phases.period ()) +
-                 " pixels with different neighbours, and fusion is made for " +
-                 std::to_string (Fuser<std::uint8_t>::kMaxPhases) +
-                 ": take a tile with a smaller period"};
+  if (const auto checked = check (options); !checked)
+    return checked.error ();
+  if (const auto checked = check (schedule, options.quality); !checked)
+    return checked.error ();
   return std::unique_ptr<Engine> (
       new Engine (schedule, width, rows, options, steps));
 }
@@ -94,10 +112,12 @@ Engine::make (const Schedule &schedule, int width, int height,
 Engine::Engine (const Schedule &schedule, int width, int height,
     const FuseOptions &options, double steps)
     : width_ (width), height_ (height),
-      observation_ (schedule, options.noise, steps), phases_ (schedule),
-      kernels_ (*find_kernels (options.target)),
+      observation_ (schedule, options.noise,
+          options.noise.full_well * schedule.white_slots () / schedule.slots (),
+          steps),
+      phases_ (schedule), kernels_ (*find_kernels (options.target)),
       radius_ (tap_radius (schedule.slots ())),
-      stillness_ (width, height, Stillness::radius_of (schedule.cell ()),
+      static_pixels_ (width, height, StaticPixels::radius_of (schedule.cell ()),
           !observation_.noise_free ())
 {
   map_noise (schedule);
@@ -124,9 +144,9 @@ Engine::map_noise (const Schedule &schedule)
   }
 }
 
-/* The margin mirrors the frame. Where elements see several slots, a pixel of it
- * repeats the pixel of its own element that lies closest to its mirror image:
- * weights of both signs add up to a slot only while the code keeps its phase.
+/* The margin mirrors the frame. If elements see several slots, a pixel of the
+ * margin repeats the pixel of its own element that is closest to its mirror
+ * image: the weights of a slot have both signs and fit only the code's phase.
  */
 void
 Engine::find_margin (const Schedule &schedule)
@@ -136,15 +156,15 @@ Engine::find_margin (const Schedule &schedule)
       std::max (schedule.tile ().period_x (), schedule.tile ().period_y ());
   const auto closest = [&] (int x, int y, int element) {
     Offset best{x, y};
-    int least = 4 * reach * reach;
+    int shortest = 4 * reach * reach;
     for (int dy = -reach; dy <= reach; dy++) {
-      if (dy * dy >= least || y + dy < 0 || y + dy >= height_)
+      if (dy * dy >= shortest || y + dy < 0 || y + dy >= height_)
         continue;
       for (int dx = -reach; dx <= reach; dx++) {
         const int distance = dx * dx + dy * dy;
-        if (distance < least && x + dx >= 0 && x + dx < width_ &&
+        if (distance < shortest && x + dx >= 0 && x + dx < width_ &&
             schedule.element_at (x + dx, y + dy) == element) {
-          least = distance;
+          shortest = distance;
           best = {x + dx, y + dy};
         }
       }
@@ -167,48 +187,46 @@ Engine::find_margin (const Schedule &schedule)
   }
 }
 
-/* Filters of every phase under the plain model, and under those of motion. */
 void
 Engine::prepare (const Schedule &schedule, const FuseOptions &options)
 {
   const double scene = options.scene.contrast * options.scene.contrast;
   std::vector<double> noise;
   for (int e = 0; e < slots (); e++)
-    noise.push_back (std::max (
-        observation_.variance (e, kTypicalLight) / scene, kLeastNoise));
+    noise.push_back (
+        std::max (observation_.variance (e, kTypicalLight) / scene, kMinNoise));
   std::vector<SceneClass> models;
   if (options.quality == FuseQuality::kFast)
     models = slots () > Fuser<std::uint8_t>::kMaxSlots
                  ? std::vector{options.scene.plain}
-                 : std::vector{options.scene.creeping, options.scene.moving};
-  std::vector<SceneClass> predicted{kStill, kMoved};
+                 : std::vector{options.scene.slow, options.scene.moving};
+  std::vector<SceneClass> predicted{kStatic, kMoving};
   if (models.size () > 1) {
     predicted.insert (predicted.end (), models.begin (), models.end ());
-    creeping_ = Field (width_, height_);
+    slow_weight_ = Field (width_, height_);
   }
   predictions_.emplace (phases_, observation_, predicted, radius_ - 2,
-      Stillness::radius_of (schedule.cell ()), Extent{width_, height_}, noise);
+      StaticPixels::radius_of (schedule.cell ()), Extent{width_, height_},
+      noise);
   for (const SceneClass &model : models)
-    prepare_plain (model, noise);
+    prepare_linear (model, noise);
   if (!models.empty ())
     return;
   motion_.emplace (phases_, observation_, motion_classes (), radius_, noise);
   if (options.quality == FuseQuality::kBest)
-    likeness_.emplace (schedule, observation_, width_, height_);
+    collaborative_.emplace (schedule, observation_, width_, height_);
   light_.assign (std::size_t (slots ()), Field (width_, height_));
 }
 
 void
-Engine::prepare_plain (const SceneClass &model, std::span<const double> noise)
+Engine::prepare_linear (const SceneClass &model, std::span<const double> noise)
 {
-  const std::vector<Offset> taps = disc (radius_);
-  const Covariance covariance (model, observation_, 2 * radius_);
-  FilterBank &filters = plain_.emplace_back (phases_, taps, slots ());
-  for (int row = 0; row < phases_.rows (); row++)
-    for (int x = 0; x < phases_.period (); x++)
-      filters.set_all (row, x,
-          solve_phase (covariance, observation_, phases_, row, x, taps, noise)
-              .slots);
+  const std::vector<Offset> taps = disc (radius_ + 0.5);
+  FilterBank &filters = linear_.emplace_back (phases_, taps, slots ());
+  for_each_phase (phases_, observation_, model, taps, noise,
+      [&] (int row, int x, const PhaseWeights &weights) {
+        filters.set_all (row, x, weights.slots);
+      });
 }
 
 Field &
@@ -234,85 +252,86 @@ Engine::take ()
   queue_.push_back (std::exchange (spare_, Field ()));
 }
 
-/* And which model of fast fits around each pixel. */
+/* And of fast, which model fits around each pixel. */
 void
-Engine::find_stillness (const Field &coded)
+Engine::find_static_pixels (const Field &coded)
 {
   predictions_->run (kernels_, coded, [&] (int y, const float *const *errors) {
-    stillness_.doubt (y, errors[0], errors[1]);
-    if (plain_.size () > 1)
-      choose (y, errors[2], errors[3]);
+    static_pixels_.set_errors (y, errors[0], errors[1]);
+    if (linear_.size () > 1)
+      set_slow_weight (y, errors[2], errors[3]);
   });
-  stillness_.take (
+  static_pixels_.update (
       kernels_, coded, queue_.size () > 1 ? &queue_[1] : nullptr, noise_);
 }
 
-/* Weights as the inverse of the models' errors to the power of 8, which stands
+/* Weights are the inverse of the models' errors to the power of 8, which stands
  * for the number of independent errors in a square. */
 void
-Engine::choose (int y, const float *creeping, const float *moving)
+Engine::set_slow_weight (int y, const float *slow, const float *moving)
 {
-  const float side = float (2 * stillness_.radius () + 1);
+  const float side = float (2 * static_pixels_.radius () + 1);
   const float floor = kErrorFloor * side * side;
-  float *if_creeping = creeping_.row (y);
+  float *weight = slow_weight_.row (y);
   for (int x = 0; x < width_; x++) {
     const float ratio =
-        std::min ((creeping[x] + floor) / (moving[x] + floor), 1e3f);
+        std::min ((slow[x] + floor) / (moving[x] + floor), 1e3f);
     const float fourth = ratio * ratio * ratio * ratio;
     const float share = 1.0f / (1.0f + fourth * fourth);
-    if_creeping[x] = std::clamp (
-        (share - kLeastWeight) / (1.0f - 2.0f * kLeastWeight), 0.0f, 1.0f);
+    weight[x] = std::clamp (
+        (share - kMinWeight) / (1.0f - 2.0f * kMinWeight), 0.0f, 1.0f);
   }
 }
 
-/* Where the picture stands still it is the same in every slot. */
+/* Static pixels are the same in every slot. */
 void
 Engine::blend (int y, float *const *rows) const
 {
-  const float *weight = stillness_.weight (y), *light = stillness_.light (y);
+  const float *weight = static_pixels_.weight (y),
+              *light = static_pixels_.light (y);
   for (int s = 0; s < slots (); s++)
     for (int x = 0; x < width_; x++)
       rows[s][x] += weight[x] * (light[x] - rows[s][x]);
 }
 
-/* shares[model] = how far row @y is to be what the model says; the rest is
- * still. */
+/* Weight of each model in row @y; the rest is static. */
 void
-Engine::share_out (int y, Field &shares) const
+Engine::model_weights (int y, Field &weights) const
 {
-  const float *still = stillness_.weight (y);
-  float *first = shares.row (0);
+  const float *if_static = static_pixels_.weight (y);
+  float *first = weights.row (0);
   for (int x = 0; x < width_; x++)
-    first[x] = 1.0f - still[x];
-  if (plain_.size () == 1)
+    first[x] = 1.0f - if_static[x];
+  if (linear_.size () == 1)
     return;
-  const float *creeping = creeping_.row (y);
-  float *second = shares.row (1);
+  const float *slow = slow_weight_.row (y);
+  float *second = weights.row (1);
   for (int x = 0; x < width_; x++) {
-    second[x] = first[x] * (1.0f - creeping[x]);
-    first[x] *= creeping[x];
+    second[x] = first[x] * (1.0f - slow[x]);
+    first[x] *= slow[x];
   }
 }
 
 void
-Engine::fuse_plainly (const Field &coded, const RowSink &sink)
+Engine::fuse_linear (const Field &coded, const RowSink &sink)
 {
-  const auto offsets = plain_[0].offsets (coded);
+  const auto offsets = linear_[0].offsets (coded);
   Field rows_of_slots (width_, slots ());
-  Field shares (width_, int (plain_.size ()));
+  Field weights (width_, int (linear_.size ()));
   std::vector<float *> rows;
   for (int s = 0; s < slots (); s++)
     rows.push_back (rows_of_slots.row (s));
   for (int y = 0; y < height_; y++) {
-    const float *weight = stillness_.weight (y), *light = stillness_.light (y);
+    const float *weight = static_pixels_.weight (y),
+                *light = static_pixels_.light (y);
     for (int x = 0; x < width_; x++)
       rows[0][x] = weight[x] * light[x];
     for (std::size_t s = 1; s < rows.size (); s++)
       std::copy_n (rows[0], width_, rows[s]);
-    share_out (y, shares);
-    for (std::size_t model = 0; model < plain_.size (); model++)
-      kernels_.filter_add (plain_[model].row (phases_, coded, y, offsets),
-          shares.row (int (model)), rows.data ());
+    model_weights (y, weights);
+    for (std::size_t model = 0; model < linear_.size (); model++)
+      kernels_.filter_add (linear_[model].row (phases_, coded, y, offsets),
+          weights.row (int (model)), rows.data ());
     sink (y, rows.data ());
   }
 }
@@ -323,8 +342,8 @@ Engine::fuse_motion (const Field &coded, const RowSink &sink, Workers &workers,
 {
   if (!motion_->run (kernels_, coded, light_, workers, stop))
     return false;
-  if (likeness_ && !likeness_->run (kernels_, coded, typical_noise (), light_,
-                       workers, stop))
+  if (collaborative_ && !collaborative_->run (kernels_, coded, typical_noise (),
+                            light_, workers, stop))
     return false;
   std::vector<float *> rows (light_.size ());
   for (int y = 0; y < height_; y++) {
@@ -340,10 +359,10 @@ bool
 Engine::fuse (const RowSink &sink, Workers &workers, std::stop_token stop)
 {
   const Field &coded = queue_.front ();
-  find_stillness (coded);
+  find_static_pixels (coded);
   bool done = true;
-  if (!plain_.empty ())
-    fuse_plainly (coded, sink);
+  if (!linear_.empty ())
+    fuse_linear (coded, sink);
   else
     done = fuse_motion (coded, sink, workers, std::move (stop));
   spare_ = std::move (queue_.front ());
@@ -363,7 +382,7 @@ void
 Engine::forget ()
 {
   queue_.clear ();
-  stillness_.forget ();
+  static_pixels_.forget ();
 }
 
-} // namespace cexp::fuse
+} // namespace codedexposure::fuse

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Fusion of light, before and after it is pixels. */
+/* Fusion of light: the part of a Fuser that does not depend on the pixel type.
+ */
 #pragma once
 
 #include <deque>
@@ -9,15 +10,16 @@
 #include <vector>
 
 #include "base/result.h"
+#include "estimate/observation.h"
+#include "fuse/collaborative_filter.h"
 #include "fuse/field.h"
 #include "fuse/filter_bank.h"
 #include "fuse/fuser.h"
-#include "fuse/likeness.h"
 #include "fuse/motion.h"
 #include "fuse/predictions.h"
-#include "fuse/stillness.h"
+#include "fuse/static_pixels.h"
 
-namespace cexp::fuse
+namespace codedexposure::fuse
 {
 
 /** Row @p y of every slot, of the frame's width, 255 for white. */
@@ -36,14 +38,14 @@ public:
 
   /** A field to write the next coded frame to, times gain () row by row. */
   Field &next ();
-  /** What pixels of row @p y are to be multiplied by, beside 255 / white; null
-   * where that is 1. */
+  /** Factors of the pixels of row @p y, beside 255 / white; null where they are
+   * all 1. */
   const float *gain (int y) const;
-  /** next () has been written. */
+  /** Queues the frame in next (). */
   void take ();
 
   int pending () const { return int (queue_.size ()); }
-  /** False when it was stopped; the frame is gone then. */
+  /** False when it was stopped; the frame is dropped then. */
   bool fuse (const RowSink &sink, Workers &workers, std::stop_token stop);
   void forget ();
 
@@ -53,12 +55,12 @@ private:
   void map_noise (const Schedule &schedule);
   void find_margin (const Schedule &schedule);
   void prepare (const Schedule &schedule, const FuseOptions &options);
-  void prepare_plain (const SceneClass &model, std::span<const double> noise);
-  void find_stillness (const Field &coded);
-  void choose (int y, const float *creeping, const float *moving);
-  void share_out (int y, Field &shares) const;
+  void prepare_linear (const SceneClass &model, std::span<const double> noise);
+  void find_static_pixels (const Field &coded);
+  void set_slow_weight (int y, const float *slow, const float *moving);
+  void model_weights (int y, Field &weights) const;
   void blend (int y, float *const *rows) const;
-  void fuse_plainly (const Field &coded, const RowSink &sink);
+  void fuse_linear (const Field &coded, const RowSink &sink);
   bool fuse_motion (const Field &coded, const RowSink &sink, Workers &workers,
       std::stop_token stop);
   /** Standard deviation of coded pixels in grey levels. */
@@ -70,17 +72,16 @@ private:
   const Kernels &kernels_;
   int radius_;
   std::optional<Predictions> predictions_;
-  std::vector<FilterBank> plain_; ///< fast: of its one or two models
-  Field creeping_; ///< weight of the first of two, the second has the rest
-  std::optional<Motion> motion_;
-  std::optional<Likeness> likeness_;
+  std::vector<FilterBank> linear_; ///< fast: of its one or two models
+  Field slow_weight_; ///< of the first of two models; the second has the rest
+  std::optional<MotionFilter> motion_;
+  std::optional<CollaborativeFilter> collaborative_;
   std::vector<Field> light_; ///< of each slot, unless fast
   NoiseMap noise_;
-  Field gain_; ///< empty where it is 1 everywhere
-  Stillness stillness_;
+  Field gain_; ///< empty if it is 1 everywhere
+  StaticPixels static_pixels_;
 
-  /* Pixels of the margin and the pixels of the same element that they repeat.
-   */
+  /* Pixels of the margin and the pixels that they repeat. */
   struct Repeat {
     std::ptrdiff_t to, from;
   };
@@ -90,4 +91,4 @@ private:
   Field spare_;
 };
 
-} // namespace cexp::fuse
+} // namespace codedexposure::fuse

@@ -1,16 +1,17 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* A plane of light with a margin, so that filters need no border. */
+/* A plane of light with a margin, so that filters need no special case at the
+ * border. */
 #pragma once
 
 #include <algorithm>
 #include <cstddef>
 #include <vector>
 
-namespace cexp
+namespace codedexposure
 {
 
-/** A coordinate beyond 0 .. @p size - 1 mirrored at the border pixel, or at
- * the border itself where that is not far enough. */
+/** A coordinate beyond 0 .. @p size - 1 mirrored at the border pixel, and
+ * clamped where the image is smaller than the distance. */
 inline int
 mirrored (int at, int size)
 {
@@ -21,7 +22,7 @@ mirrored (int at, int size)
 
 /**
  * width x height floats, 255 for white, with @p margin more on every side and
- * kSlack after every row, which vectors may read and write in passing.
+ * kSlack after every row, which vectors may read and write.
  */
 class Field
 {
@@ -56,4 +57,4 @@ private:
   std::vector<float> values_;
 };
 
-} // namespace cexp
+} // namespace codedexposure

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "fuse/filter_bank.h"
 
-namespace cexp::fuse
+namespace codedexposure::fuse
 {
 
 FilterBank::FilterBank (
@@ -53,4 +53,4 @@ FilterBank::offsets (const Field &field) const
   return offsets;
 }
 
-} // namespace cexp::fuse
+} // namespace codedexposure::fuse

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Filters of every phase, laid out for the kernels. */
+/* Filters of every phase, in the layout of the kernels. */
 #pragma once
 
 #include <span>
@@ -7,9 +7,9 @@
 
 #include "fuse/field.h"
 #include "fuse/kernels.h"
-#include "fuse/observation.h"
+#include "fuse/phases.h"
 
-namespace cexp::fuse
+namespace codedexposure::fuse
 {
 
 /** For every pixel of a frame, @p outputs weighted sums over the same taps. */
@@ -22,11 +22,11 @@ public:
   void set (int row, int x, int output, std::span<const float> weights);
   /** Of all outputs, one after the other. */
   void set_all (int row, int x, std::span<const float> weights);
-  /** How to filter row @p y of @p source, whose margin holds the taps;
-   * @p offsets as offsets () gives them for a field of its size. */
+  /** The kernels' input for row @p y of @p source, whose margin is as large as
+   * the taps' radius; @p offsets from offsets () of a field of its size. */
   FilterRow row (const Phases &phases, const Field &source, int y,
       std::span<const std::ptrdiff_t> offsets) const;
-  /** Where the taps lie in @p field. */
+  /** Offsets of the taps in @p field. */
   std::vector<std::ptrdiff_t> offsets (const Field &field) const;
 
 private:
@@ -37,4 +37,4 @@ private:
   std::vector<float> weights_;
 };
 
-} // namespace cexp::fuse
+} // namespace codedexposure::fuse

@@ -2,25 +2,25 @@
 /* Filter banks with weights that repeat along the row. */
 #pragma once
 
-#include "extract/vector.h"
+#include "base/vector.h"
 #include "fuse/kernels.h"
 
-namespace cexp::CEXP_TARGET
+namespace codedexposure::CODEDEXPOSURE_TARGET
 {
 
 using Floats = Vector<float>;
 constexpr int kFloats = kLanes<float>;
 
-/* What becomes of a vector of an output. */
+/* What is done with a vector of an output. */
 struct Put {
-  CEXP_INLINE void operator() (float *to, int, Floats value) const
+  CODEDEXPOSURE_INLINE void operator() (float *to, int, Floats value) const
   {
     store (to, value);
   }
 };
 struct Add {
   const float *scale;
-  CEXP_INLINE void operator() (float *to, int x, Floats value) const
+  CODEDEXPOSURE_INLINE void operator() (float *to, int x, Floats value) const
   {
     store (to, load (to) + load (scale + x) * value);
   }
@@ -29,7 +29,7 @@ struct Add {
 /* Outputs first .. first + Outputs - 1 of Vectors neighbouring vectors; Alike:
  * with the same weights. */
 template <int Outputs, int Vectors, bool Alike, typename Finish>
-CEXP_INLINE void
+CODEDEXPOSURE_INLINE void
 filter_vectors (const fuse::FilterRow &row, int first, int x, Finish finish,
     float *const *outputs)
 {
@@ -58,7 +58,7 @@ filter_vectors (const fuse::FilterRow &row, int first, int x, Finish finish,
 
 template <int Outputs, int Vectors, bool Alike, typename Finish,
     typename Wanted>
-CEXP_INLINE void
+CODEDEXPOSURE_INLINE void
 filter_along (const fuse::FilterRow &row, int first, Finish finish,
     Wanted wanted, float *const *outputs)
 {
@@ -75,7 +75,7 @@ filter_along (const fuse::FilterRow &row, int first, Finish finish,
  * as many as the registers hold sums of, as weights are read from further away
  * than pixels. Elsewhere a pair hides the latency of the sums. */
 template <int Outputs, bool Alike, typename Finish, typename Wanted>
-CEXP_INLINE void
+CODEDEXPOSURE_INLINE void
 filter_outputs (const fuse::FilterRow &row, int first, Finish finish,
     Wanted wanted, float *const *outputs)
 {
@@ -85,7 +85,7 @@ filter_outputs (const fuse::FilterRow &row, int first, Finish finish,
 }
 
 template <typename Finish, typename Wanted>
-CEXP_INLINE void
+CODEDEXPOSURE_INLINE void
 filter_all (const fuse::FilterRow &row, Finish finish, Wanted wanted,
     float *const *outputs)
 {
@@ -123,4 +123,4 @@ filter_add (
   filter_all (row, Add{scale}, wanted, outputs);
 }
 
-} // namespace cexp::CEXP_TARGET
+} // namespace codedexposure::CODEDEXPOSURE_TARGET

@@ -2,12 +2,14 @@
 #include "fuse/fuser.h"
 
 #include <algorithm>
+#include <array>
 #include <cstdlib>
 
 #include "base/text.h"
+#include "base/view_check.h"
 #include "fuse/engine.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 namespace
@@ -26,55 +28,55 @@ write_row (const float *light, float scale, float largest, int width, Pixel *to)
   }
 }
 
-/** A part of the frame that is fused by itself. */
+/** A part of the frame that is fused separately. */
 struct Piece {
   Rect rect;
-  int held; ///< slots of the exposure that are one of its own
+  int held; ///< slots of the exposure per slot of the part
   std::unique_ptr<fuse::Engine> engine;
 };
 
-/** A pixel of the background that a region covers, and the one of the same
- * element that stands for it. */
+/** A pixel of the background that a region covers, and the pixel of the same
+ * element that replaces it. */
 struct Cover {
   Offset at, from;
 };
 
-/** Steps of @p period from @p at that leave [from, to): to the left, or to the
- * right where @p right. */
+/** The shortest distance, a multiple of @p period, that leads from @p at out of
+ * [from, to): to the left, or to the right if @p right. */
 int
-way_out (int at, int from, int to, int period, bool right)
+distance_out (int at, int from, int to, int period, bool right)
 {
   return right ? ((to - 1 - at) / period + 1) * period
                : -((at - from) / period + 1) * period;
 }
 
 /** The nearest pixel of the same element, whole periods of the tile to one
- * side, that no region covers; the pixel itself where there is none. */
+ * side, that no region covers; the pixel itself if there is none. */
 Offset
 uncovered_pixel (const Schedule &schedule, Extent size, Offset at)
 {
   const Tile &tile = schedule.tile ();
   const Rect frame{0, 0, size.width, size.height};
   Offset best = at;
-  int least = size.width + size.height;
+  int shortest = size.width + size.height;
   for (const bool across : {true, false}) {
     for (const bool forward : {true, false}) {
       Offset place = at;
       while (frame.holds (place.x, place.y)) {
         const int i = schedule.region_at (place.x, place.y);
         const int away = std::abs (place.x - at.x) + std::abs (place.y - at.y);
-        if (i < 0 && away < least) {
-          least = away;
+        if (i < 0 && away < shortest) {
+          shortest = away;
           best = place;
         }
         if (i < 0)
           break;
         const Rect &rect = schedule.regions ()[std::size_t (i)].rect;
         if (across)
-          place.x += way_out (
+          place.x += distance_out (
               place.x, rect.x, rect.right (), tile.period_x (), forward);
         else
-          place.y += way_out (
+          place.y += distance_out (
               place.y, rect.y, rect.bottom (), tile.period_y (), forward);
       }
     }
@@ -112,7 +114,7 @@ make_pieces (const Schedule &schedule, int width, int height,
   return pieces;
 }
 
-/** @p coded, where @p engine takes it. */
+/** Writes the light of @p coded to the next field of @p engine. */
 template <typename Pixel>
 Field &
 light_of (fuse::Engine &engine, ImageView<const Pixel> coded, float scale)
@@ -138,16 +140,6 @@ quality_name (FuseQuality quality)
   return kQualityNames[int (quality)];
 }
 
-Result<FuseQuality>
-parse_quality (std::string_view name)
-{
-  for (int i = 0; i < int (std::size (kQualityNames)); i++)
-    if (kQualityNames[i] == name)
-      return FuseQuality (i);
-  return Error{
-      "quality " + in_quotes (name) + ": it must be fast, balanced or best"};
-}
-
 std::vector<std::string_view>
 fuse_targets ()
 {
@@ -159,13 +151,111 @@ fuse_targets ()
 
 template <typename Pixel>
 struct Fuser<Pixel>::State {
-  /** The background, or all there is, and the regions that cover it. */
+  /** The background, or the whole frame, and the regions. */
   std::vector<Piece> pieces;
   std::vector<Cover> covers;
   int slots;
   float largest;
   std::unique_ptr<Workers> workers;
+
+  Result<void> take (ImageView<const Pixel> coded);
+  Result<void> check (
+      std::span<const ImageView<Pixel>> frames, Extent size) const;
+  /** False when it was stopped. */
+  bool fuse (std::span<const ImageView<Pixel>> frames, std::stop_token stop);
+  void forget ();
+  /** What @p function returns; when that is an error, the pieces may have
+   * gone different ways, and all forget. */
+  template <typename Function>
+  Result<void> or_forget (const Function &function);
 };
+
+template <typename Pixel>
+Result<void>
+Fuser<Pixel>::State::take (ImageView<const Pixel> coded)
+{
+  const float scale = kWhite / largest;
+  for (Piece &piece : pieces) {
+    const auto &[x, y, width, height] = piece.rect;
+    Field &light =
+        light_of (*piece.engine, coded.block (x, y, width, height), scale);
+    if (&piece == &pieces.front ())
+      for (const auto &[at, from] : covers)
+        light.row (at.y)[at.x] = light.row (from.y)[from.x];
+    piece.engine->take ();
+  }
+  return {};
+}
+
+template <typename Pixel>
+Result<void>
+Fuser<Pixel>::State::check (
+    std::span<const ImageView<Pixel>> frames, Extent size) const
+{
+  if (pieces.front ().engine->pending () == 0)
+    return Error{"no coded frame is pending; take () one first"};
+  if (int (frames.size ()) != slots)
+    return Error{std::to_string (frames.size ()) + " views instead of " +
+                 std::to_string (slots) + ", one for each slot"};
+  std::array<ViewBytes, Schedule::kMaxSlots> outputs;
+  for (std::size_t k = 0; k < frames.size (); k++) {
+    outputs[k] = ViewBytes::of (frames[k]);
+    if (auto checked =
+            check_view (outputs[k], "fused frame", size.width, size.height);
+        !checked)
+      return checked;
+  }
+  return check_apart (std::span (outputs).first (frames.size ()));
+}
+
+template <typename Pixel>
+bool
+Fuser<Pixel>::State::fuse (
+    std::span<const ImageView<Pixel>> frames, std::stop_token stop)
+{
+  const float scale = largest / kWhite;
+  bool done = true;
+  for (Piece &piece : pieces) {
+    const auto &[left, top, width, height] = piece.rect;
+    const std::size_t held = std::size_t (piece.held);
+    const auto write = [&] (int y, const float *const *rows) {
+      const auto row = [&] (std::size_t k) {
+        return frames[k].row (top + y) + left;
+      };
+      for (std::size_t k = 0; k < frames.size (); k++)
+        if (k % held == 0)
+          write_row (rows[k / held], scale, largest, width, row (k));
+        else
+          std::copy_n (row (k - 1), width, row (k));
+    };
+    done &= piece.engine->fuse (write, *workers, stop);
+  }
+  return done;
+}
+
+template <typename Pixel>
+void
+Fuser<Pixel>::State::forget ()
+{
+  for (Piece &piece : pieces)
+    piece.engine->forget ();
+}
+
+template <typename Pixel>
+template <typename Function>
+Result<void>
+Fuser<Pixel>::State::or_forget (const Function &function)
+{
+  try {
+    Result<void> done = function ();
+    if (!done)
+      forget ();
+    return done;
+  } catch (const std::bad_alloc &) {
+    forget ();
+    return out_of_memory ();
+  }
+}
 
 template <typename Pixel>
 Fuser<Pixel>::Fuser (std::unique_ptr<State> state) : state_ (std::move (state))
@@ -182,7 +272,7 @@ template <typename Pixel>
 Result<Fuser<Pixel>>
 Fuser<Pixel>::make (
     const Schedule &schedule, int width, int height, const FuseOptions &options)
-{
+try {
   constexpr int kBits = 8 * int (sizeof (Pixel));
   if (options.bits < 0 || options.bits > kBits)
     return Error{"bits " + std::to_string (options.bits) +
@@ -204,6 +294,8 @@ Fuser<Pixel>::make (
       std::make_unique<Workers> (
           options.quality == FuseQuality::kFast ? 1 : options.threads)});
   return Fuser (std::move (state));
+} catch (const std::bad_alloc &) {
+  return out_of_memory ();
 }
 
 template <typename Pixel>
@@ -222,19 +314,15 @@ Fuser<Pixel>::size () const
 }
 
 template <typename Pixel>
-void
+Result<void>
 Fuser<Pixel>::take (ImageView<const Pixel> coded)
 {
-  const float scale = kWhite / state_->largest;
-  for (Piece &piece : state_->pieces) {
-    const auto &[x, y, width, height] = piece.rect;
-    Field &light =
-        light_of (*piece.engine, coded.block (x, y, width, height), scale);
-    if (&piece == &state_->pieces.front ())
-      for (const auto &[at, from] : state_->covers)
-        light.row (at.y)[at.x] = light.row (from.y)[from.x];
-    piece.engine->take ();
-  }
+  const Rect &whole = state_->pieces.front ().rect;
+  if (auto checked = check_view (
+          ViewBytes::of (coded), "coded frame", whole.width, whole.height);
+      !checked)
+    return checked;
+  return state_->or_forget ([&] { return state_->take (coded); });
 }
 
 template <typename Pixel>
@@ -245,39 +333,27 @@ Fuser<Pixel>::pending () const
 }
 
 template <typename Pixel>
-bool
+Result<void>
 Fuser<Pixel>::fuse (
     std::span<const ImageView<Pixel>> frames, std::stop_token stop)
 {
-  const float scale = state_->largest / kWhite;
-  bool done = true;
-  for (Piece &piece : state_->pieces) {
-    const auto &[left, top, width, height] = piece.rect;
-    const std::size_t held = std::size_t (piece.held);
-    const auto write = [&] (int y, const float *const *slots) {
-      const auto row = [&] (std::size_t k) {
-        return frames[k].row (top + y) + left;
-      };
-      for (std::size_t k = 0; k < frames.size (); k++)
-        if (k % held == 0)
-          write_row (slots[k / held], scale, state_->largest, width, row (k));
-        else
-          std::copy_n (row (k - 1), width, row (k));
-    };
-    done &= piece.engine->fuse (write, *state_->workers, stop);
-  }
-  return done;
+  if (auto checked = state_->check (frames, size ()); !checked)
+    return checked;
+  return state_->or_forget ([&] () -> Result<void> {
+    if (state_->fuse (frames, std::move (stop)))
+      return {};
+    return Error{"stopped", ErrorCode::cancelled};
+  });
 }
 
 template <typename Pixel>
 void
 Fuser<Pixel>::forget ()
 {
-  for (Piece &piece : state_->pieces)
-    piece.engine->forget ();
+  state_->forget ();
 }
 
 template class Fuser<std::uint8_t>;
 template class Fuser<std::uint16_t>;
 
-} // namespace cexp
+} // namespace codedexposure

@@ -11,42 +11,41 @@
 
 #include "base/image.h"
 #include "base/result.h"
-#include "fuse/observation.h"
-#include "fuse/scene_model.h"
+#include "estimate/sensor_noise.h"
+#include "estimate/scene_model.h"
 #include "schedule/schedule.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 /** How much work a frame is worth. */
 enum class FuseQuality {
   kFast,     ///< one linear filter a pixel, for live pictures
   kBalanced, ///< the filter of the motion that fits around each pixel
-  kBest,     ///< more motions, and what is alike in space and time made alike
+  kBest,     ///< balanced, then collaborative filtering
 };
 
 struct FuseOptions {
   FuseQuality quality = FuseQuality::kFast;
-  /** Coded frames that are waited for before one is fused: 0 or 1. */
+  /** Later coded frames that are used to fuse one: 0 or 1. */
   int lookahead = 0;
   /** Significant bits of a pixel, 1..8 or 1..16; 0: all that the type has. */
   int bits = 0;
   SensorNoise noise;
   SceneModel scene;
-  /** That balanced and best work on, 1..64; 0: one for each processor. The
-   * pixels do not depend on it. */
+  /** Threads of balanced and best, 1..64; 0: one per processor. The pixels do
+   * not depend on it. */
   int threads = 0;
-  /** One of fuse_targets (), which all give the same pixels; empty: the
+  /** One of fuse_targets (), all of which give the same pixels; empty: the
    * fastest. */
   std::string_view target = {};
 };
 
 /** "fast", "balanced" or "best". */
 std::string_view quality_name (FuseQuality quality);
-Result<FuseQuality> parse_quality (std::string_view name);
 
 /** The instruction sets that fusion can use on this machine, fastest first; the
- * last one is always "scalar", the readable reference. */
+ * last one is always "scalar", the reference. */
 std::vector<std::string_view> fuse_targets ();
 
 /**
@@ -56,17 +55,16 @@ std::vector<std::string_view> fuse_targets ();
  * Where nothing moves, the coded frame is the picture. Elsewhere each pixel of
  * each slot is the best linear estimate from the coded pixels around it, which
  * saw other slots, under a model of scenes (scene_model.h), the code and the
- * camera's noise: ordinary kriging in space and time. Light that is flat stays
- * as it is, and pixels of a one-hot code without noise stay as they are in
- * their own slot.
+ * camera's noise: ordinary kriging in space and time. Flat light is kept, and
+ * without noise a pixel of a one-hot code keeps its value in its own slot.
  *
- * Regions are fused each by itself, and so is the background around them. There
- * is a picture for every slot of the exposure; a part of fewer slots shows each
- * of its own for as many of them as it lasted.
+ * Each region is fused separately, and so is the background. There is a picture
+ * for every slot of the exposure; a part with fewer slots repeats each of its
+ * pictures for the slots of the exposure that it covers.
  *
- * Any code and tile will do for `fast`, as long as no more than kMaxPhases
- * pixels of the tile have different neighbourhoods; motion needs kMaxSlots
- * slots or fewer.
+ * `fast` takes every code and tile with at most kMaxPhases pixels of the tile
+ * that have different neighbourhoods; `balanced` and `best` take up to
+ * kMaxSlots slots.
  */
 template <typename Pixel> // std::uint8_t or std::uint16_t (host order)
 class Fuser
@@ -89,21 +87,24 @@ public:
   /** Of the fused frames: the coded frame's without the pilot's rows. */
   Extent size () const;
 
-  /** Takes the coded frame that follows the last one. */
-  void take (ImageView<const Pixel> coded);
-  /** Coded frames that were taken and not fused. */
+  /** Queues the coded frame that follows the last one. Error when the view does
+   * not have the size of make (); the stream is unchanged then. After
+   * ErrorCode::out_of_memory it is as after forget (). */
+  Result<void> take (ImageView<const Pixel> coded);
+  /** Queued coded frames. */
   int pending () const;
   /** Fuses the oldest pending frame with those before and after it.
    * @p frames  slots () views of size (), in exposure order, fully
-   *            overwritten.
-   * @p stop    may be requested by another thread, where balanced and best
-   *            would take too long.
-   * @return    false when it was stopped: the frame is gone, the views hold
-   *            nothing of use, and forget () must be next. */
-  bool fuse (
+   *            overwritten; none overlaps another.
+   * @p stop    another thread can request it if balanced or best take too long.
+   * Error when no frame is pending or a view is wrong; the frame stays pending
+   * then. ErrorCode::cancelled when it was stopped: then, and after
+   * ErrorCode::out_of_memory, the contents of the views are undefined, and the
+   * stream is as after forget (). */
+  Result<void> fuse (
       std::span<const ImageView<Pixel>> frames, std::stop_token stop = {});
-  /** What comes next has nothing to do with what was: frames were lost, or
-   * another place was sought. Pending frames are dropped. */
+  /** Starts anew after lost frames or a seek: the next frame does not continue
+   * the previous ones. Pending frames are dropped. */
   void forget ();
 
 private:
@@ -115,4 +116,4 @@ private:
 extern template class Fuser<std::uint8_t>;
 extern template class Fuser<std::uint16_t>;
 
-} // namespace cexp
+} // namespace codedexposure

@@ -5,19 +5,19 @@
 
 #include "fuse/reference.h"
 
-#define CEXP_DECLARE(target)                                                   \
-  namespace cexp::target                                                       \
+#define CODEDEXPOSURE_DECLARE(target)                                          \
+  namespace codedexposure::target                                              \
   {                                                                            \
   extern const fuse::Kernels kernels;                                          \
   }
 
 #if defined __x86_64__
-CEXP_DECLARE (fuse_avx512)
-CEXP_DECLARE (fuse_avx2)
+CODEDEXPOSURE_DECLARE (fuse_avx512)
+CODEDEXPOSURE_DECLARE (fuse_avx2)
 #endif
-CEXP_DECLARE (fuse_baseline)
+CODEDEXPOSURE_DECLARE (fuse_baseline)
 
-namespace cexp::fuse
+namespace codedexposure::fuse
 {
 
 static std::vector<Kernels>
@@ -32,7 +32,7 @@ find_kernels ()
 #endif
   found.push_back (fuse_baseline::kernels);
   found.push_back ({"scalar", reference_filter, reference_filter_add,
-      reference_sum, reference_most, reference_shrink});
+      reference_sum, reference_max, reference_shrink});
   return found;
 }
 
@@ -43,4 +43,4 @@ supported_kernels ()
   return kernels;
 }
 
-} // namespace cexp::fuse
+} // namespace codedexposure::fuse

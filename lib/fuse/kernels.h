@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* What an instruction set offers to fusion: the border between the plan and
- * the files that are compiled once per instruction set. */
+/* The kernels of fusion, which are compiled once per instruction set. */
 #pragma once
 
 #include <cstddef>
@@ -8,18 +7,19 @@
 #include <span>
 #include <string_view>
 
-namespace cexp::fuse
+namespace codedexposure::fuse
 {
 
 /**
- * One row through a filter bank whose weights repeat along it: output k at x is
+ * One row through a filter bank whose weights repeat along the row. Output k at
+ * x is
  *
  *   sum over taps t of weights[(t outputs + k) width + (phase + x) mod period]
  *                      * source[x + offsets[t]],
  *
- * summed in the order of the taps, a product rounded before it is added. A row
- * of weights goes on for at least 15 after its period. As many as 15 more
- * pixels than @p count are read and written.
+ * summed in the order of the taps; each product is rounded before it is added.
+ * A row of weights continues for at least 15 values after its period. Up to 15
+ * pixels more than @p count are read and written.
  */
 struct FilterRow {
   const float *source;
@@ -34,8 +34,8 @@ struct FilterRow {
 };
 
 /**
- * Overlapping blocks of kBlock x kBlock pixels x slots, kBlockStep apart, as
- * many side by side as a vector has lanes: column x of row y of block l is at
+ * Overlapping blocks of kBlock x kBlock pixels x slots, kBlockStep apart. A
+ * vector has one block per lane: column x of row y of block l is at
  * source[slot][y * stride + ((x + shift) mod kBlockStep) * split
  *              + (x + shift) / kBlockStep + l].
  */
@@ -56,7 +56,7 @@ struct ShrinkRow {
   float *scratch; ///< slots * kBlock^2 * 16 floats
 };
 
-/** The kernels of one instruction set; all give the same numbers. */
+/** The kernels of one instruction set; all give the same values. */
 struct Kernels {
   std::string_view name;
   /** outputs[k][x] = output k. */
@@ -64,18 +64,18 @@ struct Kernels {
   /** outputs[k][x] += scale[x] * output k, where scale is not 0. */
   void (*filter_add) (
       const FilterRow &row, const float *scale, float *const *outputs);
-  /** to[x] = the sum of rows[i][x], in the order of the rows; the largest.
-   * As many as 15 more than @p count are read and written. */
+  /** to[x] = the sum of rows[i][x], in the order of the rows, or the largest.
+   * Up to 15 values more than @p count are read and written. */
   void (*sum) (const float *const *rows, int rows_count, int count, float *to);
-  void (*most) (const float *const *rows, int rows_count, int count, float *to);
-  /** Transforms each block (slot_transform over slots, DCT in x and y), drops
-   * coefficients below the threshold but the mean, transforms back, and adds
-   * it weighted with 1 / coefficients kept. */
+  void (*max) (const float *const *rows, int rows_count, int count, float *to);
+  /** Transforms each block (slot_transform over slots, DCT in x and y), sets
+   * all coefficients below the threshold but the mean to 0, transforms back,
+   * and adds the block weighted with 1 / number of coefficients kept. */
   void (*shrink) (const ShrinkRow &row);
 };
 
-/** Those that this processor can run, widest first; the last is the scalar
- * reference. */
+/** The kernels that this processor can run, widest first; the last ones are the
+ * scalar reference. */
 std::span<const Kernels> supported_kernels ();
 
-} // namespace cexp::fuse
+} // namespace codedexposure::fuse

@@ -4,11 +4,11 @@
 #include "fuse/rows_kernel.h"
 #include "fuse/shrink_kernel.h"
 
-namespace cexp::CEXP_TARGET
+namespace codedexposure::CODEDEXPOSURE_TARGET
 {
 
 extern const fuse::Kernels kernels;
 const fuse::Kernels kernels = {
-    CEXP_TARGET_NAME, filter, filter_add, sum, most, shrink};
+    CODEDEXPOSURE_TARGET_NAME, filter, filter_add, sum, max, shrink};
 
-} // namespace cexp::CEXP_TARGET
+} // namespace codedexposure::CODEDEXPOSURE_TARGET

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <optional>
 
-#include "fuse/kriging.h"
+#include "estimate/kriging.h"
 
-namespace cexp::fuse
+namespace codedexposure::fuse
 {
 
 namespace
@@ -17,15 +17,16 @@ namespace
 /* Surroundings over which the error of a class is averaged. */
 constexpr double kSigma = 2.5;
 constexpr int kReach = 8;
-/* Rows that are worked on at a time. */
+/* Rows that a worker takes at a time. */
 constexpr int kBandRows = 48;
-/* Classes whose error is measured at a time: those that one pass of a filter
- * yields. */
+/* Classes whose error is measured at a time: the outputs of one pass of a
+ * filter.
+ */
 constexpr std::size_t kChunk = 8;
-/* Error, in grey levels squared, that means nothing. */
+/* Errors of this size, in grey levels squared, do not tell classes apart. */
 constexpr float kErrorFloor = 1.0f;
-/* Weight relative to the best class below which one has no say. */
-constexpr float kLeastWeight = 0.01f;
+/* Classes with less weight relative to the best one are left out. */
+constexpr float kMinWeight = 0.01f;
 
 std::vector<float>
 gaussian ()
@@ -67,8 +68,8 @@ private:
 
 } // namespace
 
-/* Rows first .. first + rows - 1 of a frame on their way. */
-struct Motion::Band {
+/* Rows first .. first + rows - 1 of a frame that is being filtered. */
+struct MotionFilter::Band {
   Band (int width, std::size_t classes)
       : fit (classes, Field (width, kBandRows)),
         squares (kChunk, Field (width, kBandRows, kReach)),
@@ -79,15 +80,15 @@ struct Motion::Band {
   int first = 0, rows = 0;
   std::vector<Field> fit;     ///< of each class: error, then weight
   std::vector<Field> squares; ///< of a chunk: squared residuals
-  Field along;                ///< blurred along rows
+  Field along;                ///< blurred along x
 };
 
-Motion::Motion (const Phases &phases, const Observation &observation,
-    std::span<const SceneClass> classes, int radius,
-    std::span<const double> noise)
+MotionFilter::MotionFilter (const Phases &phases,
+    const Observation &observation, std::span<const SceneClass> classes,
+    int radius, std::span<const double> noise)
     : phases_ (phases)
 {
-  const std::vector<Offset> taps = disc (radius);
+  const std::vector<Offset> taps = disc (radius + 0.5);
   for (std::size_t c = 0; c < classes.size (); c++) {
     const SceneClass &patch = classes[c];
     if (c % kChunk == 0)
@@ -95,21 +96,18 @@ Motion::Motion (const Phases &phases, const Observation &observation,
           phases, taps, int (std::min (kChunk, classes.size () - c)));
     penalties_.push_back (float (1.0 + 0.1 * std::hypot (patch.vx, patch.vy)));
     filters_.emplace_back (phases, taps, observation.slots ());
-    const Covariance covariance (patch, observation, 2 * radius);
-    for (int row = 0; row < phases.rows (); row++) {
-      for (int x = 0; x < phases.period (); x++) {
-        const KrigingFilter filter =
-            solve_phase (covariance, observation, phases, row, x, taps, noise);
-        filters_.back ().set_all (row, x, filter.slots);
-        residuals_.back ().set (row, x, int (c % kChunk), filter.residual);
-      }
-    }
+    for_each_phase (phases, observation, patch, taps, noise,
+        [&] (int row, int x, const PhaseWeights &weights) {
+          filters_.back ().set_all (row, x, weights.slots);
+          residuals_.back ().set (row, x, int (c % kChunk), weights.residual);
+        });
   }
 }
 
 /* The squared error of every class around each pixel of the band. */
 void
-Motion::measure (const Kernels &kernels, const Field &coded, Band &band) const
+MotionFilter::measure (
+    const Kernels &kernels, const Field &coded, Band &band) const
 {
   const Blur blur;
   const int width = coded.width (), height = coded.height ();
@@ -146,7 +144,7 @@ Motion::measure (const Kernels &kernels, const Field &coded, Band &band) const
 /* Weights (best error / error) ^ 12.5, the number of independent errors in the
  * surroundings being some 25. */
 void
-Motion::weigh (Band &band) const
+MotionFilter::set_weights (Band &band) const
 {
   const int width = band.along.width ();
   Field room (width, 2);
@@ -167,7 +165,7 @@ Motion::weigh (Band &band) const
         const float ratio = best[x] / fit[x];
         const float fourth = ratio * ratio * ratio * ratio;
         const float weight = fourth * fourth * fourth * std::sqrt (ratio);
-        fit[x] = weight < kLeastWeight ? 0.0f : weight;
+        fit[x] = weight < kMinWeight ? 0.0f : weight;
         sum[x] += fit[x];
       }
     }
@@ -180,7 +178,7 @@ Motion::weigh (Band &band) const
 }
 
 void
-Motion::mix (const Kernels &kernels, const Field &coded, const Band &band,
+MotionFilter::mix (const Kernels &kernels, const Field &coded, const Band &band,
     std::span<Field> slots) const
 {
   const auto offsets = filters_[0].offsets (coded);
@@ -200,8 +198,8 @@ Motion::mix (const Kernels &kernels, const Field &coded, const Band &band,
 }
 
 bool
-Motion::run (const Kernels &kernels, const Field &coded, std::span<Field> slots,
-    Workers &workers, std::stop_token stop) const
+MotionFilter::run (const Kernels &kernels, const Field &coded,
+    std::span<Field> slots, Workers &workers, std::stop_token stop) const
 {
   const int height = coded.height ();
   std::vector<std::optional<Band>> bands (std::size_t (workers.count ()));
@@ -213,10 +211,10 @@ Motion::run (const Kernels &kernels, const Field &coded, std::span<Field> slots,
         band->first = part * kBandRows;
         band->rows = std::min (kBandRows, height - band->first);
         measure (kernels, coded, *band);
-        weigh (*band);
+        set_weights (*band);
         mix (kernels, coded, *band, slots);
       },
       stop);
 }
 
-} // namespace cexp::fuse
+} // namespace codedexposure::fuse

@@ -1,27 +1,24 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "fuse/predictions.h"
 
-#include "fuse/kriging.h"
+#include "estimate/kriging.h"
 
-namespace cexp::fuse
+namespace codedexposure::fuse
 {
 
 Predictions::Predictions (const Phases &phases, const Observation &observation,
     std::span<const SceneClass> classes, int taps, int around, Extent size,
     std::span<const double> noise)
-    : phases_ (phases), filters_ (phases, disc (taps), int (classes.size ())),
+    : phases_ (phases),
+      filters_ (phases, disc (taps + 0.5), int (classes.size ())),
       rows_ (size.width, int (classes.size ()), around),
-      sums_ (classes.size (), Around (size.width, size.height, around))
+      sums_ (classes.size (), BoxFilter (size.width, size.height, around))
 {
-  const std::vector<Offset> places = disc (taps);
-  for (std::size_t k = 0; k < classes.size (); k++) {
-    const Covariance covariance (classes[k], observation, 2 * taps);
-    for (int row = 0; row < phases.rows (); row++)
-      for (int x = 0; x < phases.period (); x++)
-        filters_.set (row, x, int (k),
-            solve_phase (covariance, observation, phases, row, x, places, noise)
-                .residual);
-  }
+  for (std::size_t k = 0; k < classes.size (); k++)
+    for_each_phase (phases, observation, classes[k], disc (taps + 0.5), noise,
+        [&] (int row, int x, const PhaseWeights &weights) {
+          filters_.set (row, x, int (k), weights.residual);
+        });
 }
 
 void
@@ -42,15 +39,15 @@ Predictions::run (const Kernels &kernels, const Field &coded, const Use &use)
         for (int x = 0; x < width; x++)
           errors[k][x] *= errors[k][x];
         sums_[k].extend (errors[k]);
-        sums_[k].take (kernels.sum, y, errors[k]);
+        sums_[k].add_row (kernels.sum, y, errors[k]);
       }
     }
     if (y >= around) {
       for (std::size_t k = 0; k < sums_.size (); k++)
-        sums[k] = sums_[k].square (kernels.sum, y - around);
+        sums[k] = sums_[k].result (kernels.sum, y - around);
       use (y - around, sums.data ());
     }
   }
 }
 
-} // namespace cexp::fuse
+} // namespace codedexposure::fuse

@@ -1,31 +1,30 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* How well what lies around each pixel predicts it, under several models of
- * scenes. */
+/* How well its neighbours predict each pixel, under several models of scenes.
+ */
 #pragma once
 
 #include <functional>
 #include <span>
 #include <vector>
 
-#include "fuse/around.h"
+#include "fuse/box_filter.h"
 #include "fuse/field.h"
 #include "fuse/filter_bank.h"
-#include "fuse/scene_model.h"
 
-namespace cexp::fuse
+namespace codedexposure::fuse
 {
 
 /**
- * A coded pixel is predicted from its neighbours, which saw other slots, as if
- * the scene were of each class in turn. The class that is true predicts best,
- * whatever the aliasing.
+ * A coded pixel is predicted from its neighbours, which saw other slots, under
+ * each class of scenes in turn. The true class predicts best, in spite of
+ * aliasing.
  */
 class Predictions
 {
 public:
-  /** @p taps    radius of the neighbours, px, which the margin of coded frames
-   *            must hold.
-   *  @p around  radius of the squares over which errors are summed.
+  /** @p taps    radius of the neighbours, px; coded frames have a margin of
+   * this size.
+   *  @p around  radius of the squares over which errors are summed, px.
    *  @p noise   variance of each element in units of the scene's variance. */
   Predictions (const Phases &phases, const Observation &observation,
       std::span<const SceneClass> classes, int taps, int around, Extent size,
@@ -38,8 +37,8 @@ public:
 private:
   const Phases &phases_;
   FilterBank filters_;
-  Field rows_; ///< of squared errors: a class each
-  std::vector<Around> sums_;
+  Field rows_; ///< of squared errors, one of each class
+  std::vector<BoxFilter> sums_;
 };
 
-} // namespace cexp::fuse
+} // namespace codedexposure::fuse

@@ -6,7 +6,7 @@
 
 #include "fuse/dct.h"
 
-namespace cexp::fuse
+namespace codedexposure::fuse
 {
 
 namespace
@@ -57,7 +57,7 @@ undo_dct (float *values, int step)
     values[i * step] = out[i];
 }
 
-/* A block of its own: value of slot s at (x, y). */
+/* The block of one lane: value of slot s at (x, y). */
 class Block
 {
 public:
@@ -104,7 +104,7 @@ public:
         dct (&at (k, 0, x), kBlock);
     }
   }
-  /* Returns how many coefficients are left. */
+  /* Returns the number of coefficients that are kept. */
   int shrink ()
   {
     int kept = 0;
@@ -174,13 +174,13 @@ reference_sum (const float *const *rows, int rows_count, int count, float *to)
 }
 
 void
-reference_most (const float *const *rows, int rows_count, int count, float *to)
+reference_max (const float *const *rows, int rows_count, int count, float *to)
 {
   for (int x = 0; x < count; x++) {
-    float most = rows[0][x];
+    float largest = rows[0][x];
     for (int i = 1; i < rows_count; i++)
-      most = std::max (most, rows[i][x]);
-    to[x] = most;
+      largest = std::max (largest, rows[i][x]);
+    to[x] = largest;
   }
 }
 
@@ -194,4 +194,4 @@ reference_shrink (const ShrinkRow &row)
   }
 }
 
-} // namespace cexp::fuse
+} // namespace codedexposure::fuse

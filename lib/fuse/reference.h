@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The kernels number by number: slow, readable, and the truth that the others
- * must equal bit for bit. */
+/* The kernels value by value: slow and readable. All others must give the same
+ * bits. */
 #pragma once
 
 #include "fuse/kernels.h"
 
-namespace cexp::fuse
+namespace codedexposure::fuse
 {
 
 void reference_filter (const FilterRow &row, float *const *outputs);
@@ -13,8 +13,8 @@ void reference_filter_add (
     const FilterRow &row, const float *scale, float *const *outputs);
 void reference_sum (
     const float *const *rows, int rows_count, int count, float *to);
-void reference_most (
+void reference_max (
     const float *const *rows, int rows_count, int count, float *to);
 void reference_shrink (const ShrinkRow &row);
 
-} // namespace cexp::fuse
+} // namespace codedexposure::fuse

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Rows added up, and their largest. */
+/* Sums and maxima over rows. */
 #pragma once
 
 #include "fuse/filter_kernel.h"
 
-namespace cexp::CEXP_TARGET
+namespace codedexposure::CODEDEXPOSURE_TARGET
 {
 
 template <typename Join>
-CEXP_INLINE void
+CODEDEXPOSURE_INLINE void
 join_rows (
     const float *const *rows, int rows_count, int count, float *to, Join join)
 {
@@ -34,14 +34,15 @@ inline void
 sum (const float *const *rows, int rows_count, int count, float *to)
 {
   join_rows (rows, rows_count, count, to,
-      [] (Floats a, Floats b) CEXP_INLINE_BODY { return a + b; });
+      [] (Floats a, Floats b) CODEDEXPOSURE_INLINE_BODY { return a + b; });
 }
 
 inline void
-most (const float *const *rows, int rows_count, int count, float *to)
+max (const float *const *rows, int rows_count, int count, float *to)
 {
   join_rows (rows, rows_count, count, to,
-      [] (Floats a, Floats b) CEXP_INLINE_BODY { return larger (a, b); });
+      [] (Floats a, Floats b)
+          CODEDEXPOSURE_INLINE_BODY { return larger (a, b); });
 }
 
-} // namespace cexp::CEXP_TARGET
+} // namespace codedexposure::CODEDEXPOSURE_TARGET

@@ -1,20 +1,20 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Hard thresholding of transformed blocks, a block to a lane. */
+/* Hard thresholding of transformed blocks, one block per lane. */
 #pragma once
 
-#include "extract/vector.h"
+#include "base/vector.h"
 #include "fuse/dct.h"
 #include "fuse/filter_kernel.h"
 
-namespace cexp::CEXP_TARGET
+namespace codedexposure::CODEDEXPOSURE_TARGET
 {
 
 using Ints = Vector<std::int32_t>;
 constexpr int kArea = fuse::kBlock * fuse::kBlock;
 
-/* Orthonormal DCT-II of 12 values; the even and the odd half of the output need
- * only sums and differences. */
-CEXP_INLINE void
+/* Orthonormal DCT-II of 12 values. The even half of the output needs only sums,
+ * the odd half only differences. */
+CODEDEXPOSURE_INLINE void
 dct (Floats *values)
 {
   constexpr int kHalf = fuse::kBlock / 2;
@@ -39,7 +39,7 @@ dct (Floats *values)
 }
 
 /* The inverse of dct (). */
-CEXP_INLINE void
+CODEDEXPOSURE_INLINE void
 undo_dct (Floats *values)
 {
   constexpr int kHalf = fuse::kBlock / 2;
@@ -60,15 +60,15 @@ undo_dct (Floats *values)
   }
 }
 
-/* 12 values that lie @p step apart. */
-CEXP_INLINE void
+/* 12 values, @p step apart. */
+CODEDEXPOSURE_INLINE void
 load_line (const float *from, std::ptrdiff_t step, Floats *values)
 {
 #pragma GCC unroll 12
   for (int i = 0; i < fuse::kBlock; i++)
     values[i] = load (from + i * step);
 }
-CEXP_INLINE void
+CODEDEXPOSURE_INLINE void
 store_line (float *to, std::ptrdiff_t step, const Floats *values)
 {
 #pragma GCC unroll 12
@@ -77,14 +77,14 @@ store_line (float *to, std::ptrdiff_t step, const Floats *values)
 }
 
 /* out (k) = sum over s of the transform's [k][s], or [s][k], times in (s).
- * Slots: their number where it is known while compiling, else 0. */
+ * Slots: their number if it is known at compile time, else 0. */
 template <bool Back, int Slots, typename In, typename Out>
-CEXP_INLINE void
+CODEDEXPOSURE_INLINE void
 transform_slots (const fuse::ShrinkRow &row, In in, Out out)
 {
-  constexpr int kMost = Slots ? Slots : 16;
+  constexpr int kMaxSlots = Slots ? Slots : 16;
   const int slots = Slots ? Slots : row.slots;
-  Floats values[kMost];
+  Floats values[kMaxSlots];
   for (int s = 0; s < slots; s++)
     values[s] = in (s);
   for (int k = 0; k < slots; k++) {
@@ -97,7 +97,7 @@ transform_slots (const fuse::ShrinkRow &row, In in, Out out)
 }
 
 /* Where column @p x of the blocks begins. */
-CEXP_INLINE std::ptrdiff_t
+CODEDEXPOSURE_INLINE std::ptrdiff_t
 column (const fuse::ShrinkRow &row, int x)
 {
   return ((x + row.shift) % fuse::kBlockStep) * row.split +
@@ -108,9 +108,9 @@ constexpr std::ptrdiff_t kRow = std::ptrdiff_t (fuse::kBlock) * kFloats;
 constexpr std::ptrdiff_t kPlane = std::ptrdiff_t (kArea) * kFloats;
 
 /* Shrinks a plane of the transform over slots; returns minus the number of
- * coefficients that are left. Keep: the first of all stays. */
+ * coefficients that are kept. Keep: the first coefficient is always kept. */
 template <bool Keep>
-CEXP_INLINE Ints
+CODEDEXPOSURE_INLINE Ints
 shrink_plane (float *plane, Floats threshold)
 {
   Floats line[fuse::kBlock];
@@ -141,10 +141,10 @@ shrink_plane (float *plane, Floats threshold)
   return kept;
 }
 
-/* Slots first: each plane of their transform is then shrunk by itself, in the
- * nearest cache. */
+/* Slots are transformed first: each plane of their transform is then shrunk on
+ * its own and fits into the first-level cache. */
 template <int Slots>
-CEXP_INLINE void
+CODEDEXPOSURE_INLINE void
 shrink_vector (const fuse::ShrinkRow &row, int first)
 {
   float *const block = row.scratch;
@@ -154,9 +154,10 @@ shrink_vector (const fuse::ShrinkRow &row, int first)
       float *to = block + y * kRow + x * kFloats;
       transform_slots<false, Slots> (
           row,
-          [&] (int s) CEXP_INLINE_BODY { return load (row.source[s] + at); },
+          [&] (int s)
+              CODEDEXPOSURE_INLINE_BODY { return load (row.source[s] + at); },
           [&] (int k, Floats value)
-              CEXP_INLINE_BODY { store (to + k * kPlane, value); });
+              CODEDEXPOSURE_INLINE_BODY { store (to + k * kPlane, value); });
     }
   }
 
@@ -172,8 +173,9 @@ shrink_vector (const fuse::ShrinkRow &row, int first)
       const float *from = block + y * kRow + x * kFloats;
       transform_slots<true, Slots> (
           row,
-          [&] (int k) CEXP_INLINE_BODY { return load (from + k * kPlane); },
-          [&] (int s, Floats value) CEXP_INLINE_BODY {
+          [&] (int k)
+              CODEDEXPOSURE_INLINE_BODY { return load (from + k * kPlane); },
+          [&] (int s, Floats value) CODEDEXPOSURE_INLINE_BODY {
             float *to = row.sum[s] + at;
             store (to, load (to) + weight * value);
           });
@@ -184,15 +186,15 @@ shrink_vector (const fuse::ShrinkRow &row, int first)
 }
 
 template <int Slots>
-CEXP_INLINE void
+CODEDEXPOSURE_INLINE void
 shrink_all (const fuse::ShrinkRow &row)
 {
   for (int first = row.blocks - kFloats; first >= 0; first -= kFloats)
     shrink_vector<Slots> (row, first);
 }
 
-/* From the last to the first: a pixel then gets what its blocks have in the
- * same order, whatever the width of vectors. */
+/* From the last block to the first: every vector width then adds the blocks of
+ * a pixel in the same order. */
 inline void
 shrink (const fuse::ShrinkRow &row)
 {
@@ -204,4 +206,4 @@ shrink (const fuse::ShrinkRow &row)
     shrink_all<0> (row);
 }
 
-} // namespace cexp::CEXP_TARGET
+} // namespace codedexposure::CODEDEXPOSURE_TARGET

@@ -12,7 +12,7 @@
 #include "schedule/matrix.h"
 #include "schedule/tile.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 namespace
@@ -23,40 +23,40 @@ using Bits = std::vector<std::uint8_t>;
 Bits
 sequential_bits (int n)
 {
-  Bits open (std::size_t (n * n));
+  Bits on (std::size_t (n * n));
   for (int e = 0; e < n; e++)
-    open[std::size_t (e * n + e)] = 1;
-  return open;
+    on[std::size_t (e * n + e)] = 1;
+  return on;
 }
 
 Bits
 staircase_bits (int n)
 {
-  Bits open (std::size_t (n * n));
+  Bits on (std::size_t (n * n));
   for (int e = 0; e < n; e++)
-    std::fill_n (open.begin () + e * n, e + 1, std::uint8_t (1));
-  return open;
+    std::fill_n (on.begin () + e * n, e + 1, std::uint8_t (1));
+  return on;
 }
 
 /** What a normalised Hadamard matrix of order n + 1 leaves without its first
- * row and column, -1 being open, or (H + J) / 2 of one of order n; none where
+ * row and column, -1 being on, or (H + J) / 2 of one of order n; none where
  * there is neither. */
 std::optional<Bits>
 s_matrix_bits (int n)
 {
-  Bits open;
-  open.reserve (std::size_t (n * n));
+  Bits on;
+  on.reserve (std::size_t (n * n));
   if (const auto hadamard = hadamard_matrix (n + 1)) {
     for (int e = 1; e <= n; e++)
       for (int s = 1; s <= n; s++)
-        open.push_back (hadamard->at (e, s) < 0);
-    return open;
+        on.push_back (hadamard->at (e, s) < 0);
+    return on;
   }
   if (const auto hadamard = hadamard_matrix (n)) {
     std::transform (hadamard->signs.begin (), hadamard->signs.end (),
-        std::back_inserter (open),
+        std::back_inserter (on),
         [] (std::int8_t sign) { return std::uint8_t (sign > 0); });
-    return open;
+    return on;
   }
   return std::nullopt;
 }
@@ -101,14 +101,14 @@ worst_residual (const Matrix &a, const Matrix &b, std::size_t n)
 
 } // namespace
 
-Code::Code (std::string name, int n, std::vector<std::uint8_t> open)
-    : name_ (std::move (name)), n_ (n), open_ (std::move (open))
+Code::Code (std::string name, int n, std::vector<std::uint8_t> on)
+    : name_ (std::move (name)), n_ (n), on_ (std::move (on))
 {
 }
 
 Result<Code>
 Code::named (std::string_view name, int elements)
-{
+try {
   const int n = elements;
   if (n < 2 || n > Tile::kMaxElements)
     return Error{"code " + in_quotes (name) + " for " + std::to_string (n) +
@@ -119,24 +119,26 @@ Code::named (std::string_view name, int elements)
   if (name == "staircase")
     return Code ("staircase", n, staircase_bits (n));
   if (name == "s-matrix") {
-    if (auto open = s_matrix_bits (n))
-      return Code ("s-matrix", n, *std::move (open));
+    if (auto on = s_matrix_bits (n))
+      return Code ("s-matrix", n, *std::move (on));
     return no_s_matrix (n);
   }
   return Error{"code " + in_quotes (name) +
                " is none of sequential, staircase and s-matrix"};
+} catch (const std::bad_alloc &) {
+  return out_of_memory ();
 }
 
 Result<Code>
 Code::from_rows (const std::vector<std::string> &rows)
-{
+try {
   const std::size_t n = rows.size ();
   if (n < 2 || n > std::size_t (Tile::kMaxElements))
     return Error{"code with " + std::to_string (n) + " rows: 2 to " +
                  std::to_string (Tile::kMaxElements) + " are possible"};
 
-  Bits open;
-  open.reserve (n * n);
+  Bits on;
+  on.reserve (n * n);
   for (std::size_t e = 0; e < n; e++) {
     const std::string row = "row " + std::to_string (e) + " of the code";
     if (rows[e].size () != n)
@@ -145,14 +147,16 @@ Code::from_rows (const std::vector<std::string> &rows)
                    " elements has as many slots"};
     if (rows[e].find_first_not_of ("01") != std::string::npos)
       return Error{row + " is " + in_quotes (rows[e]) +
-                   "; only 0 (shut) and 1 (open) can stand in it"};
+                   "; only 0 (off) and 1 (on) can stand in it"};
     if (rows[e].find ('1') == std::string::npos)
-      return Error{row + " is never open; every element must see light in at "
+      return Error{row + " is never on; every element must see light in at "
                          "least one slot"};
     for (const char bit : rows[e])
-      open.push_back (bit == '1');
+      on.push_back (bit == '1');
   }
-  return Code ("matrix", int (n), std::move (open));
+  return Code ("matrix", int (n), std::move (on));
+} catch (const std::bad_alloc &) {
+  return out_of_memory ();
 }
 
 std::vector<std::string>
@@ -162,24 +166,24 @@ Code::rows () const
   for (int e = 0; e < n_; e++) {
     std::string &row = rows.emplace_back ();
     for (int s = 0; s < n_; s++)
-      row += open (e, s) ? '1' : '0';
+      row += on (e, s) ? '1' : '0';
   }
   return rows;
 }
 
 int
-Code::open_slots (int element) const
+Code::on_slots (int element) const
 {
-  const auto row = open_.begin () + element * n_;
+  const auto row = on_.begin () + element * n_;
   return std::accumulate (row, row + n_, 0);
 }
 
 int
-Code::max_open_slots () const
+Code::max_on_slots () const
 {
   int most = 0;
   for (int e = 0; e < n_; e++)
-    most = std::max (most, open_slots (e));
+    most = std::max (most, on_slots (e));
   return most;
 }
 
@@ -189,8 +193,8 @@ Code::one_hot () const
   for (int i = 0; i < n_; i++) {
     int in_slot = 0;
     for (int e = 0; e < n_; e++)
-      in_slot += open (e, i);
-    if (in_slot != 1 || open_slots (i) != 1)
+      in_slot += on (e, i);
+    if (in_slot != 1 || on_slots (i) != 1)
       return false;
   }
   return true;
@@ -200,9 +204,11 @@ Result<std::vector<double>>
 Code::inverse (double leak) const
 {
   const std::size_t n = std::size_t (n_);
-  Matrix light (n * n);
-  std::transform (open_.begin (), open_.end (), light.begin (),
-      [leak] (std::uint8_t open) { return open != 0 ? 1.0 : leak; });
+  Matrix light;
+  light.reserve (n * n);
+  for (int e = 0; e < n_; e++)
+    for (int s = 0; s < n_; s++)
+      light.push_back (this->light (e, s, leak));
   auto inverse = inverted (light, n);
   if (!inverse || worst_residual (light, *inverse, n) > kMaxResidual)
     return Error{"code '" + name_ + "' of " + std::to_string (n_) +
@@ -214,4 +220,4 @@ Code::inverse (double leak) const
   return *std::move (inverse);
 }
 
-} // namespace cexp
+} // namespace codedexposure

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The binary matrix that says in which slots each element is open. */
+/* The binary matrix that says in which slots each element is on. */
 #pragma once
 
 #include <cstdint>
@@ -9,15 +9,15 @@
 
 #include "base/result.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 /**
- * A square binary matrix: open (element, slot), n elements by n slots.
+ * A square binary matrix: on (element, slot), n elements by n slots.
  *
  * Named forms:
- *   "sequential"  element e is open in slot e only (paper, Fig. 4b)
- *   "staircase"   element e is open in slots 0..e (paper, Fig. 8)
+ *   "sequential"  element e is on in slot e only (paper, Fig. 4b)
+ *   "staircase"   element e is on in slots 0..e (paper, Fig. 8)
  *   "s-matrix"    Hadamard multiplexing: the S-matrix of order n where a
  *                 Hadamard matrix of order n + 1 can be built, else (H + J) / 2
  *                 of a Hadamard matrix of order n (Harwit & Sloane, Hadamard
@@ -28,7 +28,7 @@ class Code
 public:
   static Result<Code> named (std::string_view name, int elements);
   /** @p rows: n strings of n characters '0' or '1', one row an element. Every
-   * element must be open in at least one slot. */
+   * element must be on in at least one slot. */
   static Result<Code> from_rows (const std::vector<std::string> &rows);
 
   /** The named form, or "matrix". */
@@ -38,22 +38,28 @@ public:
 
   int elements () const { return n_; }
   int slots () const { return n_; }
-  bool open (int element, int slot) const
+  bool on (int element, int slot) const
   {
-    return open_[std::size_t (element * n_ + slot)] != 0;
+    return on_[std::size_t (element * n_ + slot)] != 0;
   }
 
-  /** Slots in which an element is open. */
-  int open_slots (int element) const;
-  /** The largest open_slots (): that element's exposure fills the range. */
-  int max_open_slots () const;
-  /** Every element is open in one slot, and every slot opens one element. */
+  /** Light that an element lets through in a slot: 1 when it is on, else @p
+   * leak, the off/on contrast of the mirrors. */
+  double light (int element, int slot, double leak) const
+  {
+    return on (element, slot) ? 1.0 : leak;
+  }
+
+  /** Slots in which an element is on. */
+  int on_slots (int element) const;
+  /** The largest on_slots (): that element's exposure fills the range. */
+  int max_on_slots () const;
+  /** Every element is on in one slot, and in every slot one element is on. */
   bool one_hot () const;
 
   /**
    * The matrix that turns the light of the elements into the light of the
-   * slots, row-major, n slots by n elements: the inverse of C + leak (1 - C).
-   * @p leak  off/on contrast of the mirrors, 0 <= leak < 1.
+   * slots, row-major, n slots by n elements: the inverse of light ().
    * Error when the code cannot be inverted.
    */
   Result<std::vector<double>> inverse (double leak) const;
@@ -61,11 +67,11 @@ public:
   bool operator== (const Code &) const = default;
 
 private:
-  Code (std::string name, int n, std::vector<std::uint8_t> open);
+  Code (std::string name, int n, std::vector<std::uint8_t> on);
 
   std::string name_;
   int n_;
-  std::vector<std::uint8_t> open_;
+  std::vector<std::uint8_t> on_;
 };
 
-} // namespace cexp
+} // namespace codedexposure

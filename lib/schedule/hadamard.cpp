@@ -3,7 +3,7 @@
 
 #include <cstddef>
 
-namespace cexp
+namespace codedexposure
 {
 
 namespace
@@ -125,4 +125,4 @@ hadamard_matrix (int order)
   return std::nullopt;
 }
 
-} // namespace cexp
+} // namespace codedexposure

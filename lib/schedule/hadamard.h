@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-namespace cexp
+namespace codedexposure
 {
 
 /** A square matrix of +1 and -1. */
@@ -28,4 +28,4 @@ struct SignMatrix {
  */
 std::optional<SignMatrix> hadamard_matrix (int order);
 
-} // namespace cexp
+} // namespace codedexposure

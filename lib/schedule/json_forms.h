@@ -2,14 +2,14 @@
 /* Readers of JSON that was parsed already; for the sources of lib/ only. */
 #pragma once
 
-#include "schedule/mapping.h"
+#include "base/json.h"
+#include "mapping/mapping.h"
 #include "schedule/schedule.h"
-#include "schedule/strict_json.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 Result<Schedule> read_schedule (const Json &root);
 Result<Mapping> read_mapping (const Json &root);
 
-} // namespace cexp
+} // namespace codedexposure

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-namespace cexp
+namespace codedexposure
 {
 
 namespace
@@ -63,4 +63,4 @@ inverted (Matrix a, std::size_t n)
   return b;
 }
 
-} // namespace cexp
+} // namespace codedexposure

@@ -6,14 +6,14 @@
 #include <optional>
 #include <vector>
 
-namespace cexp
+namespace codedexposure
 {
 
 /** Square and row-major. */
 using Matrix = std::vector<double>;
 
-/** The inverse of @p a, n x n, by Gauss-Jordan with partial pivoting; none where
- * a pivot vanishes. */
+/** The inverse of @p a, n x n, by Gauss-Jordan with partial pivoting; none
+ * where a pivot vanishes. */
 std::optional<Matrix> inverted (Matrix a, std::size_t n);
 
-} // namespace cexp
+} // namespace codedexposure

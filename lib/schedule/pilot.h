@@ -5,14 +5,14 @@
 
 #include <bit>
 
-namespace cexp
+namespace codedexposure
 {
 
 /**
  * The sum of the masks over a whole exposure does not depend on their order:
  * on a still scene a code of one frame cannot show that the masks are shifted
  * by whole slots. The pilot therefore has a period of two frames. Each of its
- * columns is open in one mask out of 2 N. In phase, a frame lights columns of
+ * columns is on in one mask out of 2 N. In phase, a frame lights columns of
  * masks 0 .. N-1 only or of masks N .. 2N-1 only, whatever the light does;
  * masks that come late light columns at the end of the other half as well,
  * those that come early columns at its start.
@@ -26,7 +26,7 @@ namespace cexp
 constexpr int kPilotColumns = 32;
 
 /** The mask out of 2 @p slots in which the pilot's mirrors in column @p column
- * are open: 2^k - 1 masks from a border, no farther than half a frame. */
+ * are on: 2^k - 1 masks from a border, no farther than half a frame. */
 constexpr int
 pilot_mask (int column, int slots)
 {
@@ -40,12 +40,12 @@ pilot_mask (int column, int slots)
   return frame * slots + (at_start ? depth : slots - 1 - depth);
 }
 
-/** Whether the pilot's mirrors in column @p x are open in mask @p mask of
+/** Whether the pilot's mirrors in column @p x are on in mask @p mask of
  * 2 @p slots. */
 constexpr bool
-pilot_open (int x, int mask, int slots)
+pilot_on (int x, int mask, int slots)
 {
   return pilot_mask (x % kPilotColumns, slots) == mask;
 }
 
-} // namespace cexp
+} // namespace codedexposure

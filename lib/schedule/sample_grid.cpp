@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-namespace cexp
+namespace codedexposure
 {
 
 SampleGrid::SampleGrid (const Schedule &schedule)
@@ -31,4 +31,4 @@ SampleGrid::subframe_size (int coded_width, int coded_height) const
       std::max (0, coded_height - pilot_rows_) / cell_.height};
 }
 
-} // namespace cexp
+} // namespace codedexposure

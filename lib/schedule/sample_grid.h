@@ -6,7 +6,7 @@
 
 #include "schedule/schedule.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 /**
@@ -42,4 +42,4 @@ private:
   std::vector<Offset> offsets_;
 };
 
-} // namespace cexp
+} // namespace codedexposure

@@ -6,7 +6,7 @@
 
 #include "base/text.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 namespace
@@ -55,8 +55,8 @@ check_numbers (const Schedule::Parts &parts)
 
   if (!(parts.leak >= 0.0 && parts.leak <= Schedule::kMaxLeak))
     return Error{"leak " + real_text (parts.leak) +
-                 ": the light of a shut mirror as a part of an open one's "
-                 "must lie in 0..0.5"};
+                 ": the light of a mirror that is off as a part of one that is "
+                 "on must lie in 0..0.5"};
   for (const int shift : {parts.phase.x, parts.phase.y})
     if (shift < 0 || shift > Schedule::kMaxMirrors)
       return Error{"phase " + std::to_string (parts.phase.x) + "/" +
@@ -69,11 +69,16 @@ check_numbers (const Schedule::Parts &parts)
   return {};
 }
 
-/** sequential:2x2, spelt out: its parts are known to be good. */
+/** sequential:2x2, spelt out: nothing but a lack of memory speaks against it.
+ */
 Schedule::Parts
 default_parts ()
 {
-  Schedule::Parts parts{*Tile::raster (2, 2), *Code::named ("sequential", 4)};
+  auto tile = Tile::raster (2, 2);
+  auto code = Code::named ("sequential", 4);
+  if (!tile || !code)
+    throw std::bad_alloc ();
+  Schedule::Parts parts{*std::move (tile), *std::move (code)};
   parts.order = {0, 1, 2, 3};
   return parts;
 }
@@ -103,25 +108,17 @@ check_rect (const Rect &rect, Extent cell)
 
 } // namespace
 
-std::string
-rect_text (const Rect &rect)
-{
-  return std::to_string (rect.width) + "x" + std::to_string (rect.height) +
-         "+" + std::to_string (rect.x) + "+" + std::to_string (rect.y);
-}
-
 Schedule::Schedule (Parts parts, Extent cell)
     : parts_ (std::move (parts)), cell_ (cell), slots_ (parts_.code.slots ())
 {
-  const int open = parts_.code.max_open_slots ();
-  white_slots_ = open + parts_.leak * (slots_ - open);
+  white_slots_ = light_of (parts_.code.max_on_slots ());
 }
 
 Schedule::Schedule () : Schedule (default_parts (), {2, 2}) {}
 
 Result<Schedule>
 Schedule::make (Parts parts)
-{
+try {
   const int elements = parts.tile.elements ();
   if (parts.code.elements () != elements)
     return Error{"code '" + parts.code.name () + "' has " +
@@ -149,6 +146,8 @@ Schedule::make (Parts parts)
                  std::to_string (kMaxJsonSize) +
                  " bytes to write out; name them, or take fewer"};
   return schedule;
+} catch (const std::bad_alloc &) {
+  return out_of_memory ();
 }
 
 /** Makes and checks the parts that regions are, and counts the slots. */
@@ -183,8 +182,7 @@ Schedule::add_regions ()
     order = part->order ();
     in_region_.push_back (*std::move (part));
   }
-  const int open = max_open_slots ();
-  white_slots_ = open + parts_.leak * (slots_ - open);
+  white_slots_ = light_of (max_on_slots ());
   for (Schedule &part : in_region_)
     part.fit_into (*this);
   return {};
@@ -223,14 +221,14 @@ Schedule::region_at (int x, int y) const
 }
 
 bool
-Schedule::open_in_part (int x, int y, int slot) const
+Schedule::on_in_part (int x, int y, int slot) const
 {
   const int i = region_at (x, y);
   if (i < 0)
-    return parts_.code.open (element_at (x, y), mask_of (parts_.code, slot));
+    return parts_.code.on (element_at (x, y), mask_of (parts_.code, slot));
   const Schedule &part = region (i);
   const Rect &rect = parts_.regions[std::size_t (i)].rect;
-  return part.open (x - rect.x, y - rect.y, mask_of (part.code (), slot));
+  return part.on (x - rect.x, y - rect.y, mask_of (part.code (), slot));
 }
 
 Result<void>
@@ -251,13 +249,20 @@ Schedule::check_size (int width, int height) const
   return {};
 }
 
-int
-Schedule::max_open_slots () const
+double
+Schedule::light (int element) const
 {
-  int most = parts_.code.max_open_slots () * (slots_ / parts_.code.slots ());
+  const Code &code = parts_.code;
+  return light_of (code.on_slots (element) * (slots_ / code.slots ()));
+}
+
+int
+Schedule::max_on_slots () const
+{
+  int most = parts_.code.max_on_slots () * (slots_ / parts_.code.slots ());
   for (const Schedule &part : in_region_)
-    most = std::max (most, part.max_open_slots () * (slots_ / part.slots ()));
+    most = std::max (most, part.max_on_slots () * (slots_ / part.slots ()));
   return most;
 }
 
-} // namespace cexp
+} // namespace codedexposure

@@ -7,13 +7,12 @@
 #include <string_view>
 #include <vector>
 
-#include "base/image.h"
 #include "base/result.h"
 #include "schedule/code.h"
 #include "schedule/tile.h"
 #include "schedule/timing.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 /**
@@ -161,22 +160,37 @@ public:
     return parts_.order[std::size_t (label)];
   }
 
-  /** Whether the mirror of pixel (x, y), no pilot's, is open in a slot. */
-  bool open (int x, int y, int slot) const
+  /** Whether the mirror of pixel (x, y), no pilot's, is on in a slot. */
+  bool on (int x, int y, int slot) const
   {
-    return in_region_.empty () ? parts_.code.open (element_at (x, y), slot)
-                               : open_in_part (x, y, slot);
+    return in_region_.empty () ? parts_.code.on (element_at (x, y), slot)
+                               : on_in_part (x, y, slot);
   }
 
   /** Masks in one period of what the DMD shows: N, or 2 N with a pilot. */
   int masks () const { return slots () * (parts_.pilot_rows > 0 ? 2 : 1); }
 
-  /** Slots in which the mirror is open that is open longest. */
-  int max_open_slots () const;
+  /** Light that an element of the background lets through in a slot, of what a
+   * mirror that is on does: 1, or the leak. */
+  double light (int element, int slot) const
+  {
+    const Code &code = parts_.code;
+    return code.light (element, mask_of (code, slot), parts_.leak);
+  }
+  /** The same in all slots. */
+  double light (int element) const;
+  /** Of a mirror that is on in @p on_slots of the slots. */
+  double light_of (int on_slots) const
+  {
+    return on_slots + parts_.leak * (slots_ - on_slots);
+  }
+
+  /** Slots in which the mirror is on that is on longest. */
+  int max_on_slots () const;
   /** Slots' worth of white light that make white in the coded frame, so that
-   * the element with the most light just fills the range: its open slots, and
-   * what leaks through in the others. Of a part of another schedule, it is the
-   * white of that one, which may be more than any element of the part sees. */
+   * the element with the most light () just fills the range. Of a part of
+   * another schedule, it is the white of that one, which may be more than any
+   * element of the part sees. */
   double white_slots () const { return white_slots_; }
 
   bool operator== (const Schedule &other) const
@@ -188,7 +202,7 @@ private:
   Schedule (Parts parts, Extent cell);
   Result<void> add_regions ();
   void fit_into (const Schedule &whole);
-  bool open_in_part (int x, int y, int slot) const;
+  bool on_in_part (int x, int y, int slot) const;
 
   Parts parts_;
   Extent cell_;
@@ -198,17 +212,4 @@ private:
   std::vector<Schedule> in_region_;
 };
 
-/** "192x144+64+32": width, height and corner. */
-std::string rect_text (const Rect &rect);
-
-/**
- * The mirrors of one mask.
- *
- * @p mask  index in 0..masks () - 1; mask s + N (frame mod 2) belongs to slot
- *          s where a pilot makes two frames differ.
- * @p out   one byte a mirror, 1 on and 0 off; any size.
- */
-void render_mask (
-    const Schedule &schedule, int mask, ImageView<std::uint8_t> out);
-
-} // namespace cexp
+} // namespace codedexposure

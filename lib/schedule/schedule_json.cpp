@@ -5,7 +5,7 @@
 #include "schedule/json_forms.h"
 #include "schedule/schedule.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 namespace
@@ -173,8 +173,8 @@ read_regions (const Json &value)
   for (const Json &entry : value) {
     auto region = read_region (entry);
     if (!region)
-      return Error{"in regions[" + std::to_string (regions.size ()) +
-                   "]: " + region.error ().message};
+      return region.error ().with_prefix (
+          "in regions[" + std::to_string (regions.size ()) + "]: ");
     regions.push_back (*std::move (region));
   }
   return regions;
@@ -285,18 +285,20 @@ read_schedule (const Json &root)
 
 Result<Schedule>
 Schedule::from_json (std::string_view json)
-{
+try {
   const std::string what = "schedule JSON: ";
   if (json.size () > kMaxJsonSize)
     return Error{what + "more than " + std::to_string (kMaxJsonSize) +
                  " bytes; no schedule is that long"};
   const auto root = parse_strictly (json, "schedule");
   if (!root)
-    return Error{what + root.error ().message};
+    return root.error ().with_prefix (what);
   auto schedule = read_schedule (*root);
   if (!schedule)
-    return Error{what + schedule.error ().message};
+    return schedule.error ().with_prefix (what);
   return schedule;
+} catch (const std::bad_alloc &) {
+  return out_of_memory ();
 }
 
 std::string
@@ -321,4 +323,4 @@ Schedule::to_json () const
   return root.dump ();
 }
 
-} // namespace cexp
+} // namespace codedexposure

@@ -10,7 +10,7 @@
 #include "base/text.h"
 #include "schedule/schedule.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 namespace
@@ -67,7 +67,7 @@ read_time (std::string_view key, std::string_view value, Nanoseconds &out)
 {
   const auto time = parse_time (value);
   if (!time)
-    return Error{std::string (key) + ": " + time.error ().message};
+    return time.error ().with_prefix (std::string (key) + ": ");
   out = *time;
   return {};
 }
@@ -111,8 +111,8 @@ read_leak (std::string_view value, Schedule::Parts &parts)
   const auto leak = parse_real (value);
   if (!leak)
     return bad_value ("leak", value,
-        "it must be a number from 0 to 0.5, the light of a shut mirror as a "
-        "part of an open one's, as in leak=0.01");
+        "it must be a number from 0 to 0.5, the light of a mirror that is off "
+        "as a part of one that is on, as in leak=0.01");
   parts.leak = *leak;
   return {};
 }
@@ -149,21 +149,6 @@ read_pattern (std::string_view text, const std::string &form)
   if (!code)
     return code.error ();
   return Schedule::Parts{*tile, *code};
-}
-
-/** "192x144+64+32" */
-std::optional<Rect>
-parse_rect (std::string_view text)
-{
-  const auto pieces = split (text, '+');
-  const auto sides = split (pieces.front (), 'x');
-  if (pieces.size () != 3 || sides.size () != 2)
-    return std::nullopt;
-  const auto x = parse_int (pieces[1]), y = parse_int (pieces[2]);
-  const auto width = parse_int (sides[0]), height = parse_int (sides[1]);
-  if (!x || !y || !width || !height)
-    return std::nullopt;
-  return Rect{*x, *y, *width, *height};
 }
 
 struct Key {
@@ -226,7 +211,8 @@ read_region (std::string_view value, Schedule::Parts &parts)
       "then :order= and :phase= where it has them";
   const auto pieces = split (value, ':');
   const auto rect = parse_rect (pieces.front ());
-  if (!rect || pieces.size () < 2)
+  const bool has_corner = pieces.front ().find ('+') != value.npos;
+  if (!rect || !has_corner || pieces.size () < 2)
     return bad_value ("region", value,
         in_quotes (pieces.front ()) + " is no area with a code" + form);
 
@@ -291,13 +277,15 @@ read_json_file (std::string_view path)
     return Error{what + "a path holds no zero bytes"};
   const auto content = read_file (std::string (path), Schedule::kMaxJsonSize);
   if (!content)
-    return Error{what + content.error ().message +
-                 "; a text with '/' or ending in .json is the path of a JSON "
-                 "file unless it begins with sequential:, staircase: or "
-                 "s-matrix:"};
+    return Error{
+        what + content.error ().message +
+            "; a text with '/' or ending in .json is the path of a JSON "
+            "file unless it begins with sequential:, staircase: or "
+            "s-matrix:",
+        content.error ().code};
   auto schedule = Schedule::from_json (*content);
   if (!schedule)
-    return Error{what + schedule.error ().message};
+    return schedule.error ().with_prefix (what);
   return schedule;
 }
 
@@ -333,7 +321,7 @@ region_text (const Region &region)
 
 Result<Schedule>
 Schedule::parse (std::string_view preset_or_path)
-{
+try {
   if (preset_or_path.empty ())
     return Error{"the schedule is empty; write a preset, such as " +
                  std::string (kExample) + ", or the path of a JSON file"};
@@ -342,16 +330,20 @@ Schedule::parse (std::string_view preset_or_path)
   if (path_like && !begins_with_code (preset_or_path))
     return read_json_file (preset_or_path);
   return from_preset (preset_or_path);
+} catch (const std::bad_alloc &) {
+  return out_of_memory ();
 }
 
 Result<Schedule>
 Schedule::from_preset (std::string_view preset)
-{
+try {
   auto schedule = read_preset (preset);
   if (!schedule)
-    return Error{
-        "schedule " + in_quotes (preset) + ": " + schedule.error ().message};
+    return schedule.error ().with_prefix (
+        "schedule " + in_quotes (preset) + ": ");
   return schedule;
+} catch (const std::bad_alloc &) {
+  return out_of_memory ();
 }
 
 std::string
@@ -374,4 +366,4 @@ Schedule::text () const
   return text;
 }
 
-} // namespace cexp
+} // namespace codedexposure

@@ -5,23 +5,23 @@
 #include <functional>
 #include <string>
 
-namespace cexp
+namespace codedexposure
 {
 
 /** One mask in place of a schedule's, the same in every exposure. */
 struct StillMask {
   std::string name; ///< for people
-  /** Whether pixel (x, y) of the tile is open; x, y >= 0. Called from other
+  /** Whether pixel (x, y) of the tile is on; x, y >= 0. Called from other
    * threads, also at the same time. */
-  std::function<bool (int x, int y)> open;
+  std::function<bool (int x, int y)> on;
   /** Slots of the schedule, from the first on, for which it stands in every
-   * exposure; the mirrors are shut in the others. */
+   * exposure; the mirrors are off in the others. */
   int slots = 1;
 };
 
 /** Index of the still mask where those of a schedule are 0, 1, ... */
 constexpr int kStillMask = 1 << 20;
-/** Index of no mask: every mirror is shut, but not for want of a start. */
-constexpr int kShutMask = -2;
+/** Index of no mask: every mirror is off, but not for want of a start. */
+constexpr int kOffMask = -2;
 
-} // namespace cexp
+} // namespace codedexposure

@@ -8,7 +8,7 @@
 
 #include "base/text.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 namespace
@@ -91,7 +91,7 @@ Tile::Tile (std::string name, int elements, int period_x, int period_y,
 
 Result<Tile>
 Tile::raster (int columns, int rows)
-{
+try {
   const std::string name = to_string (columns) + "x" + to_string (rows);
   if (columns < 1 || rows < 1 || columns > kMaxElements ||
       rows > kMaxElements || columns * rows < 2 ||
@@ -104,11 +104,13 @@ Tile::raster (int columns, int rows)
   std::vector<std::uint8_t> labels (std::size_t (columns * rows));
   std::iota (labels.begin (), labels.end (), std::uint8_t (0));
   return Tile (name, columns * rows, columns, rows, std::move (labels));
+} catch (const std::bad_alloc &) {
+  return out_of_memory ();
 }
 
 Result<Tile>
 Tile::lattice (int elements, int step)
-{
+try {
   const std::string name =
       "lattice:" + to_string (elements) + "/" + to_string (step);
   if (elements < 2 || elements > kMaxElements)
@@ -120,11 +122,13 @@ Tile::lattice (int elements, int step)
   const int period_y = elements / std::gcd (elements, step);
   return Tile (name, elements, elements, period_y,
       linear_labels (elements, step, period_y));
+} catch (const std::bad_alloc &) {
+  return out_of_memory ();
 }
 
 Result<Tile>
 Tile::diamond (int elements)
-{
+try {
   const std::string name = "diamond:" + to_string (elements);
   const std::optional<int> radius = diamond_radius (elements);
   if (!radius)
@@ -136,11 +140,13 @@ Tile::diamond (int elements)
   const int period_y = elements / std::gcd (elements, step);
   return Tile (name, elements, elements, period_y,
       linear_labels (elements, step, period_y));
+} catch (const std::bad_alloc &) {
+  return out_of_memory ();
 }
 
 Result<Tile>
 Tile::from_labels (int period_x, int period_y, std::vector<std::uint8_t> labels)
-{
+try {
   if (period_x < 1 || period_y < 1 || period_x > kMaxPeriod ||
       period_y > kMaxPeriod)
     return Error{"label map of " + to_string (period_x) + " x " +
@@ -164,11 +170,13 @@ Tile::from_labels (int period_x, int period_y, std::vector<std::uint8_t> labels)
   if (elements < 2)
     return bad_elements ("labels", elements);
   return Tile ("labels", elements, period_x, period_y, std::move (labels));
+} catch (const std::bad_alloc &) {
+  return out_of_memory ();
 }
 
 Result<Tile>
 Tile::parse (std::string_view text)
-{
+try {
   const Error malformed{
       "tile " + in_quotes (text) +
       " is none of WxH, lattice:N/B and diamond:N, such as 2x2, lattice:8/3 "
@@ -196,6 +204,8 @@ Tile::parse (std::string_view text)
   }
   const auto [columns, rows] = pair (text, 'x');
   return columns && rows ? raster (*columns, *rows) : malformed;
+} catch (const std::bad_alloc &) {
+  return out_of_memory ();
 }
 
 Result<Extent>
@@ -222,4 +232,4 @@ Tile::cell (Offset phase) const
                "exactly once"};
 }
 
-} // namespace cexp
+} // namespace codedexposure

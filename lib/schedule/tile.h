@@ -7,53 +7,11 @@
 #include <string_view>
 #include <vector>
 
+#include "base/geometry.h"
 #include "base/result.h"
 
-namespace cexp
+namespace codedexposure
 {
-
-/** A pixel position or displacement, in pixels, x to the right, y down. */
-struct Offset {
-  int x = 0;
-  int y = 0;
-  bool operator== (const Offset &) const = default;
-};
-
-/** A block of pixels. */
-struct Extent {
-  int width = 1;
-  int height = 1;
-  bool operator== (const Extent &) const = default;
-};
-
-/** The pixels [x, x + width) by [y, y + height) of a frame. */
-struct Rect {
-  int x = 0;
-  int y = 0;
-  int width = 0;
-  int height = 0;
-
-  int right () const { return x + width; }
-  int bottom () const { return y + height; }
-  bool holds (int px, int py) const
-  {
-    return px >= x && px < right () && py >= y && py < bottom ();
-  }
-  bool meets (const Rect &other) const
-  {
-    return x < other.right () && other.x < right () && y < other.bottom () &&
-           other.y < bottom ();
-  }
-  bool operator== (const Rect &) const = default;
-};
-
-/** The remainder in [0, n) that belongs to floor division; n > 0. */
-constexpr int
-floor_mod (int a, int n)
-{
-  const int r = a % n;
-  return r < 0 ? r + n : r;
-}
 
 /**
  * A doubly periodic map of labels 0..n-1, n = elements ().
@@ -119,4 +77,4 @@ private:
   std::vector<std::uint8_t> labels_;
 };
 
-} // namespace cexp
+} // namespace codedexposure

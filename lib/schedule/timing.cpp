@@ -6,7 +6,7 @@
 
 #include "base/text.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 namespace
@@ -151,4 +151,4 @@ time_text (Nanoseconds time)
   return text + std::string (unit->suffix);
 }
 
-} // namespace cexp
+} // namespace codedexposure

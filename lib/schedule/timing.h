@@ -8,7 +8,7 @@
 
 #include "base/result.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 using Nanoseconds = std::int64_t;
@@ -80,4 +80,4 @@ Result<Nanoseconds> parse_time (std::string_view text);
  * back to @p time; @p time >= 0. */
 std::string time_text (Nanoseconds time);
 
-} // namespace cexp
+} // namespace codedexposure

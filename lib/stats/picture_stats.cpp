@@ -7,7 +7,7 @@
 #include <span>
 #include <string>
 
-namespace cexp
+namespace codedexposure
 {
 
 namespace
@@ -18,7 +18,7 @@ constexpr std::size_t
     kLevels = std::size_t (std::numeric_limits<Pixel>::max ()) + 1;
 
 /* Equal neighbours, as in flat parts of a picture, would wait for each other at
- * one counter. Counts of 16-bit levels would not stay in the cache. */
+ * one counter. Several counts of 16-bit levels would not fit into the cache. */
 template <typename Pixel>
 constexpr std::size_t kCounts = sizeof (Pixel) == 1 ? 4 : 1;
 
@@ -34,8 +34,8 @@ StatsMeter<Pixel>::make (Extent size, const StatsOptions &options)
                  std::to_string (size.height) + " has no statistics"};
   if (options.bits < 0 || options.bits > kBits)
     return Error{"bits = " + std::to_string (options.bits) +
-                 " is no number of bits of a pixel; it has 1 to " +
-                 std::to_string (kBits) + ", 0 for all"};
+                 " is out of range; a pixel has 1 to " +
+                 std::to_string (kBits) + ", 0 means all"};
   if (options.bins < 0)
     return Error{"a histogram cannot have " + std::to_string (options.bins) +
                  " bins; 0 leaves it out"};
@@ -129,11 +129,11 @@ StatsMeter<Pixel>::measure (ImageView<const Pixel> picture)
   summarise ();
   fill_histogram ();
   std::ranges::transform (points_, stats_.profile.begin (),
-      [&] (PicturePoint at) { return value_at (picture, at); });
+      [&] (Position at) { return value_at (picture, at); });
   return stats_;
 }
 
 template class StatsMeter<std::uint8_t>;
 template class StatsMeter<std::uint16_t>;
 
-} // namespace cexp
+} // namespace codedexposure

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* What a picture's grey levels say of it: intensity, entropy, profile. */
+/* Statistics of a picture: intensity, entropy, histogram, line profile. */
 #pragma once
 
 #include <cstdint>
@@ -10,15 +10,15 @@
 #include "base/result.h"
 #include "stats/profile_line.h"
 
-namespace cexp
+namespace codedexposure
 {
 
-/** What is to be measured; the zero value is all but a line. */
+/** What is measured; the default is everything but a profile. */
 struct StatsOptions {
-  /** Significant bits of a pixel, 1..8 or 1..16; 0: all that the type has. */
+  /** Significant bits of a pixel, 1..8 or 1..16; 0: all bits of the type. */
   int bits = 0;
-  /** Bins of the histogram, of equal width over all levels; 0: none; more than
-   * there are levels: one a level. */
+  /** Bins of the histogram, of equal width over all levels; 0: no histogram;
+   * more than the number of levels: one per level. */
   int bins = 256;
   std::optional<ProfileLine> line = {};
 };
@@ -26,18 +26,18 @@ struct StatsOptions {
 /** The figures of a picture (paper, Figs. 9c, 10c and 11c). */
 struct PictureStats {
   std::uint64_t pixels = 0;
-  double mean = 0.0;           ///< counts
-  unsigned minimum = 0;        ///< counts
-  unsigned maximum = 0;        ///< counts
-  double entropy = 0.0;        ///< of the grey levels (Shannon), bits a pixel
+  double mean = 0.0;           ///< DN
+  unsigned minimum = 0;        ///< DN
+  unsigned maximum = 0;        ///< DN
+  double entropy = 0.0;        ///< of the grey levels (Shannon), bits per pixel
   std::uint64_t saturated = 0; ///< pixels at 2^bits - 1, or above
   std::vector<std::uint64_t> histogram; ///< pixels in each bin
   std::vector<double> profile;          ///< values along the line
 };
 
 /**
- * Measures pictures of one size, one after the other. Everything but the
- * profile comes from one count of the grey levels, in one pass.
+ * Measures pictures of one size. Everything but the profile is computed from
+ * the counts of the grey levels, which take one pass.
  */
 template <typename Pixel> // std::uint8_t or std::uint16_t (host order)
 class StatsMeter
@@ -57,7 +57,7 @@ private:
   void fill_histogram ();
 
   int bits_ = 0;
-  std::vector<PicturePoint> points_;
+  std::vector<Position> points_;
   /** Pixels of each level; several counts side by side for bytes. */
   std::vector<std::uint32_t> levels_;
   PictureStats stats_;
@@ -66,4 +66,4 @@ private:
 extern template class StatsMeter<std::uint8_t>;
 extern template class StatsMeter<std::uint16_t>;
 
-} // namespace cexp
+} // namespace codedexposure

@@ -6,7 +6,7 @@
 
 #include "base/text.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 double
@@ -21,11 +21,11 @@ ProfileLine::parse_coordinate (std::string_view text)
   const bool relative = text.ends_with ('%');
   const auto number =
       parse_real (relative ? text.substr (0, text.size () - 1) : text);
-  const double most = relative ? 100.0 : 1e6;
-  if (!number || *number < 0.0 || *number > most)
+  const double largest = relative ? 100.0 : 1e6;
+  if (!number || *number < 0.0 || *number > largest)
     return Error{in_quotes (text) +
-                 " is no place in a picture; write pixels, such as 143, or a "
-                 "part, 0% to 100%"};
+                 " is not a coordinate; use pixels, such as 143, or a "
+                 "percentage, 0% to 100%"};
   return Coordinate{relative ? *number / 100.0 : *number, relative};
 }
 
@@ -55,8 +55,8 @@ ProfileLine::parse (std::string_view text)
     parts = split (text, '/');
   }
   if (parts.size () != count)
-    return Error{"cannot use " + in_quotes (text) +
-                 " as a line; write row:Y, column:X or X0/Y0/X1/Y1, each in "
+    return Error{in_quotes (text) +
+                 " is not a line; use row:Y, column:X or X0/Y0/X1/Y1, in "
                  "pixels or in %"};
   for (std::size_t i = 0; i < count; i++) {
     const auto coordinate = parse_coordinate (parts[i]);
@@ -67,11 +67,11 @@ ProfileLine::parse (std::string_view text)
   return line;
 }
 
-Result<std::vector<PicturePoint>>
+Result<std::vector<Position>>
 ProfileLine::points (Extent size) const
 {
-  PicturePoint from{x0_.in (size.width), y0_.in (size.height)};
-  PicturePoint to{x1_.in (size.width), y1_.in (size.height)};
+  Position from{x0_.in (size.width), y0_.in (size.height)};
+  Position to{x1_.in (size.width), y1_.in (size.height)};
   if (kind_ == Kind::kRow) {
     from = {0.0, std::round (from.y)};
     to = {double (size.width - 1), from.y};
@@ -88,11 +88,11 @@ ProfileLine::points (Extent size) const
                  std::to_string (size.height) + "; its last pixel is (" +
                  std::to_string (size.width - 1) + ", " +
                  std::to_string (size.height - 1) +
-                 "), and parts such as 50% fit every size"};
+                 "); percentages such as 50% fit every size"};
 
   const int steps = std::max (
       1, int (std::lround (std::hypot (to.x - from.x, to.y - from.y))));
-  std::vector<PicturePoint> points;
+  std::vector<Position> points;
   if (from == to)
     return std::vector{from};
   for (int i = 0; i <= steps; i++) {
@@ -103,4 +103,4 @@ ProfileLine::points (Extent size) const
   return points;
 }
 
-} // namespace cexp
+} // namespace codedexposure

@@ -1,52 +1,44 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* A straight line across a picture, along which its pixels are read. */
+/* A straight line across a picture, along which a profile is measured. */
 #pragma once
 
 #include <cmath>
 #include <string_view>
 #include <vector>
 
+#include "base/geometry.h"
 #include "base/image.h"
 #include "base/result.h"
-#include "schedule/tile.h"
 
-namespace cexp
+namespace codedexposure
 {
 
-/** A place in a picture; pixel centres have whole coordinates. */
-struct PicturePoint {
-  double x = 0.0;
-  double y = 0.0;
-  bool operator== (const PicturePoint &) const = default;
-};
-
 /**
- * A line that is known before the size of the picture is: each coordinate is a
- * number of pixels, or a part of the way from the first pixel to the last one,
- * so that the same line fits coded frames and subframes.
+ * A line that can be given before the size of the picture is known. Each
+ * coordinate is in pixels, or relative to the distance from the first to the
+ * last pixel, so that the same line fits coded frames and subframes.
  */
 class ProfileLine
 {
 public:
   /**
-   * "row:Y", "column:X" or "X0/Y0/X1/Y1". Every coordinate is a number of
-   * pixels from the first one, such as 143 or 10.5, or 0% to 100% of the way
-   * from the first to the last. Rows and columns are rounded to whole ones.
+   * "row:Y", "column:X" or "X0/Y0/X1/Y1". A coordinate is in pixels from the
+   * first one, such as 143 or 10.5, or 0% to 100% of the distance from the
+   * first to the last pixel. Rows and columns are rounded to integers.
    */
   static Result<ProfileLine> parse (std::string_view text);
 
   /**
-   * The points of the line in a picture of that size, evenly spaced, both ends
-   * included: the pixels of a row or column; of any other line as many as are
-   * as nearly as possible a pixel apart. Error when the line leaves the
-   * picture.
+   * The points of the line in a picture of this size, evenly spaced, including
+   * both ends: the pixels of a row or column; otherwise points that are about
+   * one pixel apart. Error when the line leaves the picture.
    */
-  Result<std::vector<PicturePoint>> points (Extent size) const;
+  Result<std::vector<Position>> points (Extent size) const;
 
 private:
   struct Coordinate {
     double value = 0.0;
-    bool relative = false; ///< value is the part of the way, 0..1
+    bool relative = false; ///< to the distance of first and last pixel
     double in (int length) const;
   };
   enum class Kind { kRow, kColumn, kFree };
@@ -61,7 +53,7 @@ private:
  * pixels around it; @p at lies within the centres of the outermost pixels. */
 template <typename Pixel>
 double
-value_at (ImageView<const Pixel> picture, PicturePoint at)
+value_at (ImageView<const Pixel> picture, Position at)
 {
   const int x = int (at.x), y = int (at.y);
   const double fx = at.x - x, fy = at.y - y;
@@ -74,4 +66,4 @@ value_at (ImageView<const Pixel> picture, PicturePoint at)
   return std::lerp (across (y), across (below), fy);
 }
 
-} // namespace cexp
+} // namespace codedexposure

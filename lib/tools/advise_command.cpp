@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* codedexposure advise: which schedule to take. */
+/* codedexposure advise: recommends a schedule. */
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -10,7 +10,7 @@
 #include "tools/board_kinds.h"
 #include "tools/tool.h"
 
-namespace cexp::tool
+namespace codedexposure::tool
 {
 
 namespace
@@ -25,10 +25,10 @@ struct Arguments {
   std::string rate = "25";
   std::string board = "dlp6500";
   std::string readout = "0";
-  double least_rate = 0.0;
+  double min_rate = 0.0;
 };
 
-/** What was found of a schedule: what it would do, or why it cannot. */
+/** The prediction for a schedule, or the reason why it cannot be used. */
 struct Finding {
   std::string text;
   Result<Prediction> prediction;
@@ -43,10 +43,10 @@ parse_size (const std::string &text)
   if (sides.size () == 2 && width && height)
     return Extent{*width, *height};
   return Error{"cannot use " + in_quotes (text) +
-               " as a size; write WIDTHxHEIGHT, such as 768x576"};
+               " as a size; use WIDTHxHEIGHT, such as 768x576"};
 }
 
-/** The schedules to look at: those that were named, else the usual ones. */
+/** The schedules to compare: those on the command line, else the usual ones. */
 Result<std::vector<Schedule>>
 candidates (const Arguments &arguments, const DmdInfo &board)
 {
@@ -116,7 +116,7 @@ print_row (int column, const std::string &name, const Prediction &p)
   std::printf ("%-*s %8.5g %5dx%-4d %5.1f%% %6.1f dB %6.1f dB %6.1f dB%s\n",
       column, name.c_str (), p.frame_rate, p.subframe.width, p.subframe.height,
       100 * p.efficiency, p.snr_white, p.snr_grey, p.psnr,
-      p.overexposed ? "  too much light" : "");
+      p.overexposed ? "  overexposed" : "");
 }
 
 void
@@ -142,23 +142,23 @@ print_table (const std::vector<Finding> &findings)
   }
 }
 
-/* Why that one, or why none. */
+/* Explains the recommendation. */
 std::string
 reason (const Prediction *best, const Arguments &arguments)
 {
   char text[200];
   if (!best)
     std::snprintf (text, sizeof text,
-        "none of these reaches %g frames/s without being overexposed; ask for "
-        "less, or let in less light",
-        arguments.least_rate);
+        "none of these reaches %g frames/s without overexposure; use a lower "
+        "--min-rate or less light",
+        arguments.min_rate);
   else if (!best->schedule)
     std::snprintf (text, sizeof text,
-        "take no mask at all: at %g pixels/s the camera is fast enough",
+        "recommended: no masks; at %g pixels/s the camera is fast enough",
         arguments.conditions.scene.speed);
   else
     std::snprintf (text, sizeof text,
-        "take %s: of these it is truest to a scene of %g pixels/s",
+        "recommended: %s; it has the highest PSNR for a scene of %g pixels/s",
         best->text ().c_str (), arguments.conditions.scene.speed);
   return text;
 }
@@ -174,7 +174,7 @@ show (Session &session, const Arguments &arguments,
       predictions.push_back (*finding.prediction);
     list.push_back (describe (finding));
   }
-  const Prediction *best = recommend (predictions, arguments.least_rate);
+  const Prediction *best = recommend (predictions, arguments.min_rate);
   const std::string why = reason (best, arguments);
   if (session.json) {
     session.print ({{"schedules", list},
@@ -202,7 +202,7 @@ advise (Session &session, Arguments arguments)
   conditions.camera.size = *size;
   conditions.camera.rate = *rate;
   const auto schedules = candidates (arguments, *board);
-  /* An ordinary exposure fails only where the question is wrong. */
+  /* The prediction without masks fails only if the conditions are invalid. */
   const auto none = predict (std::nullopt, conditions);
   if (!schedules || !none)
     return session.fail (
@@ -224,38 +224,41 @@ void
 add_advise_command (CLI::App &app, Session &session)
 {
   auto *sub = app.add_subcommand (
-      "advise", "Predict what schedules are worth, and recommend one");
+      "advise", "Predict the accuracy of schedules and recommend one");
   const auto arguments = std::make_shared<Arguments> ();
   Conditions &conditions = arguments->conditions;
   sub->add_option ("schedules", arguments->schedules,
-      "CODE:TILE[,key=value...] or JSON files; without any, the usual ones");
-  sub->add_option ("--size", arguments->size, "WIDTHxHEIGHT of the camera");
-  sub->add_option ("--rate", arguments->rate, "Frames/s of the camera");
+      "CODE:TILE[,key=value...] or JSON files; default: the usual ones");
+  sub->add_option (
+      "--size", arguments->size, "Size of the camera, WIDTHxHEIGHT");
+  sub->add_option (
+      "--rate", arguments->rate, "Frame rate of the camera, frames/s");
   sub->add_option ("--full-well", conditions.camera.noise.full_well,
-      "Electrons that a pixel holds");
+      "Full-well capacity of a pixel, e-");
   sub->add_option (
-      "--read-noise", conditions.camera.noise.read_noise, "Electrons rms");
-  sub->add_option ("--bits", conditions.camera.bits, "Of the converter");
+      "--read-noise", conditions.camera.noise.read_noise, "Read noise, e- rms");
+  sub->add_option ("--bits", conditions.camera.bits, "Bits of a pixel");
   sub->add_option ("--readout", arguments->readout,
-      "Time at the end of a frame in which the camera is blind, such as 500us");
+      "Dead time of the camera at the end of a frame, such as 500us");
   sub->add_option (
-      "--dmd", arguments->board, "dlp3000, dlp4500, dlp6500 or dlp9000");
+      "--dmd", arguments->board, "DMD: dlp3000, dlp4500, dlp6500 or dlp9000");
   sub->add_option ("--light", conditions.light,
-      "Of white, in a frame without masks, as a part of the full well");
+      "Electrons at white in a frame without masks, as a part of the full "
+      "well");
   sub->add_option ("--speed", conditions.scene.speed,
-      "Of what moves, in pixels of the coded frame a second");
+      "Speed of motion, pixels of the coded frame per second");
   sub->add_option ("--detail", conditions.scene.detail,
-      "Size of details, in pixels of the coded frame");
+      "Size of details, pixels of the coded frame");
   sub->add_option ("--contrast", conditions.scene.contrast,
-      "Standard deviation of the scene, part of white");
+      "Standard deviation of the scene, as a part of white");
+  sub->add_option ("--level", conditions.scene.level,
+      "Mean of the scene, as a part of white");
   sub->add_option (
-      "--level", conditions.scene.level, "Mean of the scene, part of white");
-  sub->add_option (
-      "--least-rate", arguments->least_rate, "Subframes/s that there must be");
+      "--min-rate,--least-rate", arguments->min_rate, "Min subframes/s");
   for (CLI::Option *option : sub->get_options ())
     if (option->get_name () != "--help" && option->get_name () != "schedules")
       option->capture_default_str ();
   sub->callback ([&session, arguments] { advise (session, *arguments); });
 }
 
-} // namespace cexp::tool
+} // namespace codedexposure::tool

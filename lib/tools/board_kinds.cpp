@@ -5,7 +5,7 @@
 
 #include "base/text.h"
 
-namespace cexp::tool
+namespace codedexposure::tool
 {
 
 Result<DmdInfo>
@@ -32,8 +32,8 @@ find_kind (const std::string &name)
           .minimum_switching = kind.minimum_switching,
           .resident_masks = kind.masks,
           .array = kind.array};
-  return Error{"no DMD is called " + in_quotes (name) +
-               "; there are dlp3000, dlp4500, dlp6500 and dlp9000"};
+  return Error{"unknown DMD " + in_quotes (name) +
+               "; use dlp3000, dlp4500, dlp6500 or dlp9000"};
 }
 
-} // namespace cexp::tool
+} // namespace codedexposure::tool

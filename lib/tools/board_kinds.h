@@ -7,10 +7,10 @@
 #include "base/result.h"
 #include "dmd/dmd.h"
 
-namespace cexp::tool
+namespace codedexposure::tool
 {
 
 /** What a board of that name can do: dlp3000, dlp4500, dlp6500 or dlp9000. */
 Result<DmdInfo> find_kind (const std::string &name);
 
-} // namespace cexp::tool
+} // namespace codedexposure::tool

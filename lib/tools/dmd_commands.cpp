@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* codedexposure dmd: boards that are there, and what they do. */
+/* codedexposure dmd: lists and controls the connected boards. */
 #include <chrono>
 #include <condition_variable>
 #include <csignal>
@@ -16,7 +16,7 @@
 #include "dmd/usb_bus.h"
 #include "tools/tool.h"
 
-namespace cexp::tool
+namespace codedexposure::tool
 {
 
 namespace
@@ -42,7 +42,7 @@ seconds_text (double seconds)
   return text;
 }
 
-/** Shows how far an upload is, and how long it still takes. */
+/** Shows the progress of an upload and the remaining time. */
 class ProgressLine
 {
 public:
@@ -91,10 +91,9 @@ describe (const DmdInfo &info)
       {"shortest-mask", time_text (info.minimum_active)},
       {"shortest-pause", time_text (info.minimum_switching)},
       {"shortest-dark-time", time_text (info.minimum_dark)},
-      {"masks", info.resident_masks}, {"takes-masks", info.run_time_upload},
-      {"trigger-input", info.trigger_in}, {"trigger-output", info.trigger_out},
-      {"triggers-camera", info.triggers_camera},
-      {"finite-run", info.finite_run}};
+      {"masks", info.resident_masks}, {"trigger-input", info.trigger_in},
+      {"trigger-output", info.trigger_out},
+      {"triggers-camera", info.triggers_camera}};
 }
 
 void
@@ -113,7 +112,7 @@ list (Session &session)
     result.push_back (std::move (entry));
   }
   if (boards->empty ())
-    session.say ("no DMD is connected by USB");
+    session.say ("no DMD is connected to the USB");
   session.print (result);
 }
 
@@ -143,8 +142,9 @@ stop (Session &session, const Arguments &arguments)
   if (!now)
     return session.fail (Exit::failed, now.error ());
   if (now->running)
-    return session.fail (
-        Exit::failed, Error{dmd->info ().name + " does not stop"});
+    return session.fail (Exit::failed,
+        Error{
+            dmd->info ().name + " did not stop; try again, or switch it off"});
   session.print ({{"device", dmd->info ().name}, {"running", false}});
 }
 
@@ -180,8 +180,8 @@ send (Session &session, Dmd &dmd, const Schedule &schedule, Json &result)
   const Nanoseconds predicted = dmd.upload_time (schedule);
   result["upload-predicted"] = time_text (predicted);
   if (predicted > 0)
-    session.say ("the upload takes " + seconds_text (double (predicted) / 1e9) +
-                 " or more");
+    session.say (
+        "the upload takes at least " + seconds_text (double (predicted) / 1e9));
   ProgressLine line (session);
   const auto start = Clock::now ();
   const auto sent = dmd.upload (schedule, session.stop,
@@ -213,7 +213,8 @@ upload (Session &session, const Arguments &arguments)
   session.print (result);
 }
 
-/** Until the user stops it, or the time is over: then true. */
+/** Waits until @p duration is over, or until the user stops the program:
+ * false. */
 bool
 wait (const Session &session, std::optional<Nanoseconds> duration)
 {
@@ -229,8 +230,7 @@ wait (const Session &session, std::optional<Nanoseconds> duration)
   return !session.stop.stop_requested ();
 }
 
-/** The time after which to stop, none where the user is to say when; false when
- * it cannot be read. */
+/** Parses --for; false, with an error, if it is invalid. */
 bool
 read_duration (Session &session, const Arguments &arguments,
     std::optional<Nanoseconds> &duration)
@@ -253,18 +253,17 @@ park (Session &session, Dmd &dmd)
   dmd.stop ();
   if (dmd.running ())
     session.fail (Exit::failed,
-        Error{dmd.info ().name + " did not answer when it was told to stop, "
-                                 "and may show masks on: try again, or switch "
-                                 "it off"});
+        Error{dmd.info ().name + " did not acknowledge the stop and may still "
+                                 "show masks; try again, or switch it off"});
   return !dmd.running ();
 }
 
-/** Lets @p dmd show what it shows, until it is time to stop. */
+/** Waits while @p dmd shows masks, then stops it. */
 void
 run (Session &session, Dmd &dmd, std::optional<Nanoseconds> duration,
     const Json &result)
 {
-  session.say ("running; Ctrl-C stops it");
+  session.say ("running; press Ctrl-C to stop");
   const bool over = wait (session, duration);
   if (!park (session, dmd))
     return;
@@ -291,22 +290,22 @@ start (Session &session, const Arguments &arguments)
   run (session, *dmd, duration, result);
 }
 
-/** "on", "off", or a mask of the schedule by its number; in all slots. */
+/** A mask that is shown in all slots: "on", "off", or a number of a mask of the
+ * schedule. */
 Result<StillMask>
 still_mask (const Schedule &schedule, const std::string &name)
 {
   StillMask still{"mirrors " + name, {}, schedule.slots ()};
   const auto mask = parse_int (name);
   if (name == "on" || name == "off")
-    still.open = [on = name == "on"] (int, int) { return on; };
+    still.on = [on = name == "on"] (int, int) { return on; };
   else if (mask && *mask >= 0 && *mask < schedule.slots ())
-    still.open = [schedule, slot = *mask] (
-                     int x, int y) { return schedule.open (x, y, slot); };
+    still.on = [schedule, slot = *mask] (
+                   int x, int y) { return schedule.on (x, y, slot); };
   else
-    return Error{"cannot show mask " + in_quotes (name) + "; " +
-                 schedule.text () + " has the masks 0 to " +
-                 std::to_string (schedule.slots () - 1) +
-                 ", and there are on and off"};
+    return Error{"cannot show mask " + in_quotes (name) + "; use 0 to " +
+                 std::to_string (schedule.slots () - 1) + " for " +
+                 schedule.text () + ", or on, or off"};
   return still;
 }
 
@@ -331,19 +330,19 @@ show (Session &session, const Arguments &arguments)
   run (session, *dmd, duration, result);
 }
 
-/** Ends when its standard input does: another process started the board, and is
- * no more. */
+/** Waits until standard input ends, which means that the process that started
+ * the board has ended. */
 void
 guard (Session &session, const Arguments &arguments)
 {
-  std::signal (SIGHUP, SIG_IGN); // others are taken as requests to stop
+  std::signal (SIGHUP, SIG_IGN); // other signals request a stop
   if (const auto stopped = stand_guard (STDIN_FILENO, arguments.device);
       !stopped)
     session.fail (Exit::failed, stopped.error ());
 }
 
-/** Shows a schedule that uploads fast, and looks whether the board does what
- * it is told. */
+/** Uploads, starts and stops a schedule that uploads fast, and checks the state
+ * of the board each time. */
 void
 selftest (Session &session, Arguments arguments)
 {
@@ -369,8 +368,8 @@ selftest (Session &session, Arguments arguments)
   if (!running->running || stopped->running)
     return session.fail (Exit::failed,
         Error{dmd->info ().name + (running->running
-                                          ? " does not stop"
-                                          : " says that it does not run")});
+                                          ? " did not stop"
+                                          : " reports that it does not run")});
   result["selftest"] = "passed";
   session.print (result);
 }
@@ -380,7 +379,7 @@ selftest (Session &session, Arguments arguments)
 void
 add_dmd_commands (CLI::App &app, Session &session)
 {
-  auto *dmd = app.add_subcommand ("dmd", "Boards, and what they show");
+  auto *dmd = app.add_subcommand ("dmd", "Control DMD boards");
   dmd->require_subcommand (1);
   const auto arguments = std::make_shared<Arguments> ();
   const auto add = [&] (const char *name, const char *help, auto command) {
@@ -398,31 +397,35 @@ add_dmd_commands (CLI::App &app, Session &session)
     with_device (sub);
     sub->add_option ("schedule", arguments->schedule,
         "CODE:TILE[,key=value...] or a JSON file");
-    sub->add_option ("--rate", arguments->rate, "Frames/s of the camera");
+    sub->add_option (
+        "--rate", arguments->rate, "Frame rate of the camera, frames/s");
     return sub;
   };
 
-  add ("list", "The boards that are connected by USB",
+  add ("list", "List the boards on the USB",
       [] (Session &s, const Arguments &) { list (s); });
-  with_device (
-      add ("info", "What a board can do", [] (Session &s, const Arguments &a) {
+  with_device (add ("info", "Show the limits of a board",
+      [] (Session &s, const Arguments &a) {
         if (const auto opened = open (s, a.device))
           s.print (describe (opened->info ()));
       }));
-  with_device (add ("status", "What a board says of itself", status));
-  with_schedule (add ("upload", "Send the masks of a schedule", upload))
+  with_device (add ("status", "Show the state of a board", status));
+  with_schedule (add ("upload", "Upload the masks of a schedule", upload))
       ->add_flag (
-          "--predict", arguments->predict, "Only say how long it would take");
-  with_schedule (add ("start", "Send masks and show them until Ctrl-C", start))
-      ->add_option ("--for", arguments->duration, "Stop after that time");
-  auto *shown = with_schedule (
-      add ("show", "Show one mask that stands still, to align by", show));
+          "--predict", arguments->predict, "Only predict the upload time");
+  with_schedule (
+      add ("start", "Upload masks and show them until Ctrl-C", start))
+      ->add_option (
+          "--for", arguments->duration, "Stop after this time, such as 10s");
+  auto *shown =
+      with_schedule (add ("show", "Show one static mask, for alignment", show));
   shown->add_option ("--mask", arguments->mask,
       "Number of a mask of the schedule, on, or off");
-  shown->add_option ("--for", arguments->duration, "Stop after that time");
-  with_device (add ("stop", "Stop what a board shows", stop));
+  shown->add_option (
+      "--for", arguments->duration, "Stop after this time, such as 10s");
+  with_device (add ("stop", "Stop a board", stop));
   with_device (add ("guard", "", guard))->group (""); // StopGuard's other side
-  with_device (add ("selftest", "Try upload, start and stop", selftest));
+  with_device (add ("selftest", "Test upload, start and stop", selftest));
 }
 
-} // namespace cexp::tool
+} // namespace codedexposure::tool

@@ -8,9 +8,10 @@
 #include <thread>
 
 #include "base/text.h"
+#include "bench/simulated_dmd.h"
 #include "tools/tool.h"
 
-namespace cexp::tool
+namespace codedexposure::tool
 {
 
 void
@@ -67,14 +68,15 @@ parse_rate (const std::string &text)
   if (rate.num > 0 && rate.den > 0)
     return rate;
   return Error{"cannot use " + in_quotes (text) +
-               " as a frame rate; write 25 or 30000/1001"};
+               " as a frame rate; use a number or a fraction, such as 25 or "
+               "30000/1001"};
 }
 
 namespace
 {
 
-/** Requests a stop at SIGINT and SIGTERM, on a thread of its own so that
- * everything may be done then. */
+/** Requests a stop at SIGINT and SIGTERM. A thread waits for the signals,
+ * because a signal handler could do almost nothing. */
 class Interruption
 {
 public:
@@ -106,27 +108,28 @@ run (int argc, char **argv)
   const Interruption interruption;
   Session session;
   session.stop = interruption.token ();
+  serve_simulated_dmds ();
 
-  CLI::App app ("Digital micromirror devices and the schedules they show.\n"
-                "See codedexposure(1).");
+  CLI::App app ("Controls digital micromirror devices (DMDs) and checks "
+                "schedules.\nSee codedexposure(1).");
   app.require_subcommand (1);
   app.fallthrough ();
   app.set_version_flag ("--version", "codedexposure " VERSION);
   app.add_flag ("--json", session.json, "Print results as JSON");
-  app.add_flag ("--quiet", session.quiet, "Say nothing on the way");
+  app.add_flag ("--quiet", session.quiet, "Do not print progress");
   add_advise_command (app, session);
   add_dmd_commands (app, session);
   add_schedule_commands (app, session);
   try {
     app.parse (argc, argv);
   } catch (const CLI::RequiredError &error) {
-    /* A subcommand is missing, most often because of a wrong word. */
+    /* Most often, the subcommand is misspelt. */
     const auto words = app.remaining (true);
     if (words.empty ())
       app.exit (error);
     else
       std::fprintf (stderr,
-          "codedexposure: there is no subcommand or option %s here\n"
+          "codedexposure: unknown subcommand or option %s\n"
           "Run with --help for more information.\n",
           in_quotes (words.front ()).c_str ());
     return int (Exit::usage);
@@ -139,10 +142,10 @@ run (int argc, char **argv)
 
 } // namespace
 
-} // namespace cexp::tool
+} // namespace codedexposure::tool
 
 int
 main (int argc, char **argv)
 {
-  return cexp::tool::run (argc, argv);
+  return codedexposure::tool::run (argc, argv);
 }

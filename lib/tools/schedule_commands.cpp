@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* codedexposure schedule: what schedules say, and their masks as pictures. */
+/* codedexposure schedule: shows schedules, checks them, and writes their masks.
+ */
 #include <fstream>
 #include <memory>
 
@@ -10,7 +11,7 @@
 #include "tools/board_kinds.h"
 #include "tools/tool.h"
 
-namespace cexp::tool
+namespace codedexposure::tool
 {
 
 namespace
@@ -57,7 +58,7 @@ show (Session &session, const Arguments &arguments)
   Json lines{{"schedule", schedule->text ()}, {"slots", schedule->slots ()},
       {"masks", schedule->masks ()}, {"cell", cell_text (*schedule)},
       {"active", timing.active > 0 ? time_text (timing.active)
-                                   : "what the frame leaves"},
+                                   : "the rest of the frame"},
       {"switching", time_text (timing.switching)},
       {"readout", time_text (timing.readout)}};
   for (int i = 0; i < int (schedule->regions ().size ()); i++) {
@@ -100,7 +101,7 @@ placement_of (const Arguments &arguments, const DmdInfo &kind)
     return layout.error ();
   placement.layout = *layout;
   if (!arguments.region.empty ()) {
-    const auto region = MirrorRegion::parse (arguments.region);
+    const auto region = parse_region (arguments.region);
     if (!region)
       return region.error ();
     placement.region = *region;
@@ -118,7 +119,8 @@ write_file (const std::string &path, const Bytes &bytes)
   file.close ();
   return file ? Result<void> ()
               : Error{"cannot write " + in_quotes (path) +
-                      "; is there room, and the folder?"};
+                      "; check that the folder exists and the disk has "
+                      "space"};
 }
 
 void
@@ -135,21 +137,16 @@ render (Session &session, const Arguments &arguments)
   const PlanePlan plan = plan_planes (*schedule);
   const int pictures = arguments.planes ? plan.images : schedule->masks ();
   Json files = Json::array ();
-  Image<std::uint8_t> mirrors (kind->size.width, kind->size.height);
+  const MaskRenderer renderer (*schedule, kind->size, *placement);
   for (int picture = 0; picture < pictures; picture++) {
     if (session.stop.stop_requested ())
       return session.fail (Exit::interrupted, Error{"interrupted"});
     const std::string path =
         arguments.prefix + std::to_string (picture) + ".bmp";
-    Bytes bytes;
-    if (arguments.planes) {
-      bytes = encode_plane_bitmap (
-          render_planes (*schedule, plan, picture, *placement, kind->size)
-              .view ());
-    } else {
-      render_mirrors (*schedule, picture, *placement, mirrors.view ());
-      bytes = encode_bitmap (mirrors.view ());
-    }
+    const Bytes bytes = arguments.planes
+                            ? encode_plane_bitmap (renderer.render<PlanePixel> (
+                                  plan.of_image (picture)))
+                            : encode_bitmap (renderer.render (picture));
     if (const auto written = write_file (path, bytes); !written)
       return session.fail (Exit::failed, written.error ());
     files.push_back (path);
@@ -163,8 +160,7 @@ render (Session &session, const Arguments &arguments)
 void
 add_schedule_commands (CLI::App &app, Session &session)
 {
-  auto *schedule =
-      app.add_subcommand ("schedule", "Schedules, and their masks");
+  auto *schedule = app.add_subcommand ("schedule", "Show and check schedules");
   schedule->require_subcommand (1);
   const auto arguments = std::make_shared<Arguments> ();
   const auto add = [&] (const char *name, const char *help, auto command) {
@@ -177,23 +173,25 @@ add_schedule_commands (CLI::App &app, Session &session)
   };
   const auto with_board = [&] (CLI::App *sub) {
     sub->add_option (
-        "--dmd", arguments->board, "dlp3000, dlp4500, dlp6500 or dlp9000");
+        "--dmd", arguments->board, "DMD: dlp3000, dlp4500, dlp6500 or dlp9000");
     return sub;
   };
 
-  add ("show", "Say what a schedule is", show);
-  with_board (add ("check", "Does it fit a DMD and a frame rate", check))
-      ->add_option ("--rate", arguments->rate, "Frames/s of the camera");
+  add ("show", "Show what a schedule means", show);
+  with_board (
+      add ("check", "Check whether it fits a DMD and a frame rate", check))
+      ->add_option (
+          "--rate", arguments->rate, "Frame rate of the camera, frames/s");
   auto *pictures =
       with_board (add ("render", "Write the masks as bitmap files", render));
   pictures->add_option ("--layout", arguments->layout,
-      "Of the tile on a diamond array: address, lattice or cell");
+      "Layout of the tile on a diamond array: address, lattice or cell");
   pictures->add_option (
-      "--region", arguments->region, "WxH[+X+Y], mirrors that show masks");
+      "--region", arguments->region, "Mirrors that show masks, WxH[+X+Y]");
   pictures->add_option (
-      "--output", arguments->prefix, "What the files' names begin with");
+      "--output", arguments->prefix, "Prefix of the file names");
   pictures->add_flag ("--planes", arguments->planes,
-      "24 masks a file, for the flash or the video of a LightCrafter 4500");
+      "24 masks per file, for the flash or the video of a LightCrafter 4500");
 }
 
-} // namespace cexp::tool
+} // namespace codedexposure::tool

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* codedexposure: what its commands share, and the commands. */
+/* The commands of the tool codedexposure, and what they share. */
 #pragma once
 
 #include <optional>
@@ -12,31 +12,31 @@
 #include "base/result.h"
 #include "schedule/schedule.h"
 
-namespace cexp::tool
+namespace codedexposure::tool
 {
 
 /** Exit status; the man page lists them. */
 enum class Exit {
   done = 0,
-  failed = 1,        ///< the device did not do it
+  failed = 1,        ///< the device failed
   usage = 2,         ///< the command line or a schedule is wrong
-  no_device = 3,     ///< the device is not there or cannot be opened
-  does_not_fit = 4,  ///< the schedule is not for this device or frame rate
+  no_device = 3,     ///< there is no such device, or it cannot be opened
+  does_not_fit = 4,  ///< the schedule does not fit the device or the rate
   interrupted = 130, ///< by SIGINT or SIGTERM
 };
 
-/** What the user said to all commands, and what became of it. */
+/** The options that all commands share, and the exit status. */
 struct Session {
   bool json = false;
   bool quiet = false;
-  std::stop_token stop; ///< SIGINT or SIGTERM came
+  std::stop_token stop; ///< requested by SIGINT or SIGTERM
   Exit exit = Exit::done;
 
-  /** Notes why the program is going to fail, and says it. */
+  /** Sets the exit status and prints the error. */
   void fail (Exit code, const Error &error);
-  /** Prints a result: as JSON, or as "name  value" lines. */
+  /** Prints a result as JSON, or as lines "name  value". */
   void print (const nlohmann::ordered_json &object) const;
-  /** One line about what goes on, on standard error. */
+  /** Prints a line of progress to standard error, unless --quiet. */
   void say (const std::string &line) const;
 };
 
@@ -47,4 +47,4 @@ void add_advise_command (CLI::App &app, Session &session);
 void add_dmd_commands (CLI::App &app, Session &session);
 void add_schedule_commands (CLI::App &app, Session &session);
 
-} // namespace cexp::tool
+} // namespace codedexposure::tool

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* codedexposure-camera: serves the coded frames of any GStreamer pipeline as a
- * GigE Vision camera does. */
+/* codedexposure-camera: an emulated GigE Vision camera that serves the coded
+ * frames of a GStreamer pipeline. */
 #include <atomic>
 #include <csignal>
 #include <cstdio>
@@ -13,11 +13,11 @@
 #include <gst/app/gstappsink.h>
 #include <gst/gst.h>
 
-#include "camera/gige_camera.h"
-#include "gstraii.h"
+#include "bench/gige_camera.h"
+#include "common/raii.h"
 
-using namespace cexp;
-using namespace cexp::gst;
+using namespace codedexposure;
+using namespace codedexposure::gst;
 
 namespace
 {
@@ -38,7 +38,7 @@ say (const std::string &text)
   std::fprintf (stderr, "codedexposure-camera: %s\n", text.c_str ());
 }
 
-/* The coded frames of a pipeline, one after the other. */
+/* Reads the coded frames of a pipeline one by one. */
 class Frames
 {
 public:
@@ -162,9 +162,9 @@ log_frame (const SentFrame &sent)
   std::fflush (stdout);
 }
 
-/* Faults that are typed or piped in; the thread ends with the process. */
+/* Adds faults from standard input; the thread ends with the process. */
 void
-obey_stdin (GigeCamera &camera)
+read_faults (GigeCamera &camera)
 {
   std::thread ([&camera] {
     for (std::string line; std::getline (std::cin, line);)
@@ -199,7 +199,7 @@ serve (Arguments &arguments)
   if (arguments.log)
     options.sent = log_frame;
 
-  /* Before the camera's thread begins, so that it takes none of them. */
+  /* Blocked before the thread of the camera starts, which inherits this. */
   sigset_t ends;
   sigemptyset (&ends);
   sigaddset (&ends, SIGINT);
@@ -216,7 +216,7 @@ serve (Arguments &arguments)
   say ("serving " + std::to_string (options.width) + "x" +
        std::to_string (options.height) + " as Aravis-Fake-" + options.serial +
        " at " + options.address);
-  obey_stdin (**camera);
+  read_faults (**camera);
   const timespec moment{0, 100'000'000};
   while (!source.ended () && sigtimedwait (&ends, nullptr, &moment) < 0)
     ;
@@ -234,10 +234,10 @@ main (int argc, char **argv)
   Arguments arguments;
   GigeCameraOptions &camera = arguments.camera;
   CLI::App app{"Serves the coded frames of a GStreamer pipeline as a GigE "
-               "Vision camera, each when the camera exposes. Faults can also "
-               "be typed while it runs, as in lose@now:3."};
-  app.add_option ("pipeline", arguments.pipeline,
-         "GStreamer launch line whose frames are served")
+               "Vision camera, one for each exposure of the camera. Faults can "
+               "also be entered on standard input, such as lose@now:3."};
+  app.add_option (
+         "pipeline", arguments.pipeline, "GStreamer pipeline description")
       ->required ();
   app.add_option ("--address", camera.address, "address of the interface")
       ->capture_default_str ();
@@ -246,23 +246,22 @@ main (int argc, char **argv)
   app.add_option ("--bits", arguments.bits, "significant bits of the frames")
       ->check (CLI::Range (1, 16));
   app.add_option ("--trigger-rate", camera.trigger_rate,
-         "triggers a second on its lines")
+         "rate of the trigger on its lines, 1/s")
       ->check (CLI::Range (0.1, 1000.0))
       ->capture_default_str ();
-  app.add_option ("--drift", camera.drift, "ppm by which its clock is fast")
+  app.add_option ("--drift", camera.drift, "how much its clock is fast, ppm")
       ->check (CLI::Range (-500.0, 500.0));
-  app.add_option ("--jitter", arguments.jitter,
-      "time up to which frames are held up at random, such as 5ms");
+  app.add_option (
+      "--jitter", arguments.jitter, "max random delay of frames, such as 5ms");
   app.add_option ("--packet-loss", camera.packet_loss,
-         "part of the packets that is lost")
+         "part of the packets that is lost, 0 to 1")
       ->check (CLI::Range (0.0, 1.0));
-  app.add_option ("--seed", camera.seed, "of the jitter");
+  app.add_option ("--seed", camera.seed, "seed of the jitter");
   app.add_option ("--faults", arguments.faults,
-      "what befalls frames: lose@10:3 incomplete@20 delay@30:5ms duplicate@40 "
+      "faults of frames: lose@10:3 incomplete@20 delay@30:5ms duplicate@40 "
       "late@50 stop@60");
-  app.add_flag ("--loop", arguments.loop, "begin again where it ends");
-  app.add_flag (
-      "--log", arguments.log, "a line of JSON on every frame to the output");
+  app.add_flag ("--loop", arguments.loop, "restart the pipeline at its end");
+  app.add_flag ("--log", arguments.log, "print a line of JSON for every frame");
   CLI11_PARSE (app, argc, argv);
   const int result = serve (arguments);
   gst_deinit ();

@@ -1,6 +1,6 @@
 # shellcheck shell=bash disable=SC2034 # most of this is used by the scripts
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# What the scripts share: options, the plugin, and the parts of their pipelines.
+# Options, search for the plugin, and parts of pipelines that the scripts share.
 # Sourced; a script defines usage () first.
 
 set -euo pipefail
@@ -15,36 +15,37 @@ bench_options='schedule psf-sigma full-well read-noise gain seed shift-x shift-y
 source_options="$scene_options $bench_options frames camera features source
   device exposure trigger trigger-line trigger-edge pixel-format reconnect"
 
-scene_help='Scene, one frame of it a slot of the exposure:
-  --input FILE        any video; each of its frames becomes a slot
-  --input-rate R      frames a second of the input, where the file does not say
-  --scene NAME        a drawn scene instead: candle, blown-out or pour
-  --pattern NAME      or a moving test picture, as of videotestsrc [ball]
+scene_help='Scene (each frame is one slot of the exposure):
+  --input FILE        video file; each frame becomes one slot
+  --input-rate R      frame rate of the input, if the file does not have one
+  --scene NAME        a drawn scene: candle, blown-out or pour
+  --pattern NAME      a moving test picture, as of videotestsrc [ball]
   --size WxH          size of scene and camera [that of the input; 768x576]
   --bits N            significant bits of the camera, 8 or 9..16 [8]'
 bench_help='Bench:
   --schedule S        CODE:TILE[,key=value...] or a JSON file [sequential:2x2]
-  --frame-rate R      coded frames a second, 25 or 30000/1001 [25]
+  --frame-rate R      coded frames/s, such as 25 or 30000/1001 [25]
   --frames N          stop after N coded frames
-  --full-well E       electrons at white; 0: no noise [0]
-  --read-noise E      electrons rms [0]
+  --full-well E       electrons at white, e-; 0: no noise [0]
+  --read-noise E      read noise, e- rms [0]
   --psf-sigma P       blur of the lens, pixels [0]
-  --gain G            light to grey values; 0: white is white [0]
-  --seed N            of the noise [0]
+  --gain G            gain; 0: automatic, white maps to the largest value [0]
+  --seed N            seed of the noise [0]
   --shift-x P, --shift-y P, --rotation DEG, --scale F   misalignment'
 camera_help='Instead of the bench:
-  --camera NAME       a GenICam camera, as arv-tool-0.8 lists it
-  --trigger M         who is the master, dmd or camera [dmd]
+  --camera NAME       a GenICam camera, as "gst-device-monitor-1.0 Source/Video"
+                      lists it
+  --trigger M         which device triggers: dmd, camera, or none [dmd]
   --trigger-line L    line of the camera to or from the DMD [Line0; Line1]
   --trigger-edge E    rising or falling [rising]
   --exposure US       exposure time, microseconds [as the camera has it]
   --pixel-format F    Mono8, Mono12, Mono12Packed ... [Mono8; Mono16]
   --features "A=1 ..."  camera features beyond these
-  --reconnect N       tries to start a camera that went away anew [0]
+  --reconnect N       tries to restart a camera that went away [0]
   --device DEV        the DMD [sim:bench on the bench]
   --source "GST"      any GStreamer source of coded frames'
-common_help='  --print             show the pipeline instead of running it
-  -h, --help          this text'
+common_help='  --print             print the pipeline and do not run it
+  -h, --help          show this help'
 
 say ()
 {
@@ -57,7 +58,7 @@ die ()
   exit 1
 }
 
-# How another script is called from where this one was.
+# The command that runs another script, in the form of the call of this one.
 sibling ()
 {
   if [[ $script == codedexposure-* ]]; then
@@ -79,7 +80,7 @@ args=()
 
 # parse_options "NAMES THAT TAKE A VALUE" "FLAGS" "$@"
 # fills opt[NAME] (a flag: 1) and args. With command_follows set, the first word
-# that is no option begins a command, whose own options are left to it.
+# that is not an option begins a command, and its options are not parsed.
 parse_options ()
 {
   local valued=" ${1//$'\n'/ } " flags=" $2 print help " name
@@ -109,10 +110,10 @@ parse_options ()
         elif [[ $flags == *" $name "* && $1 != *=* ]]; then
           opt[$name]=1
         else
-          usage_error "there is no option $1"
+          usage_error "unknown option $1"
         fi
         ;;
-      -?*) usage_error "there is no option $1" ;;
+      -?*) usage_error "unknown option $1" ;;
       *)
         if [ -n "${command_follows:-}" ]; then
           args+=("$@")
@@ -130,7 +131,7 @@ is_set ()
   [ -n "${opt[$1]:-}" ]
 }
 
-# check_number NAME REGEX "WHAT IT MUST BE"
+# check_option NAME REGEX "WHAT IT MUST BE"
 check_option ()
 {
   ! is_set "$1" || [[ ${opt[$1]} =~ ^($2)$ ]] \
@@ -154,7 +155,7 @@ check_options ()
   check_option start '[0-9]+(\.[0-9]+)?' 'a number of seconds'
   check_option duration '[0-9]+(\.[0-9]+)?' 'a number of seconds'
   check_option fuse 'fast|balanced|best' 'fast, balanced or best'
-  check_option trigger 'dmd|camera' 'dmd or camera'
+  check_option trigger 'dmd|camera|none' 'dmd, camera or none'
   check_option trigger-edge 'rising|falling' 'rising or falling'
   check_option reconnect '[0-9]{1,9}' 'a number of tries'
   check_option exposure '[0-9]*\.?[0-9]+' 'a time in microseconds'
@@ -162,7 +163,7 @@ check_options ()
     'Mono8, Mono16, Mono10 or Mono12, these also with Packed or p'
   check_option method 'auto|rank|select|decode' 'auto, rank, select or decode'
   for name in psf-sigma full-well read-noise gain scale; do
-    check_option "$name" '[0-9]*\.?[0-9]+' 'a number that is not negative'
+    check_option "$name" '[0-9]*\.?[0-9]+' 'a number of at least 0'
   done
   for name in shift-x shift-y rotation; do
     check_option "$name" '-?[0-9]*\.?[0-9]+' 'a number'
@@ -170,8 +171,8 @@ check_options ()
   check_option seed '[0-9]+' 'a whole number'
 }
 
-# Where the plugin and the programs are: beside this folder in the build tree,
-# or where they were installed to.
+# Finds the plugin and the programs: in the build tree beside this folder, or
+# where they were installed.
 find_plugin ()
 {
   local build=${CODEDEXPOSURE_BUILD:-$pipelines/../build}
@@ -191,10 +192,10 @@ find_plugin ()
       [ ! -e "$folder/libgstcodedexposure.so" ] || libs=$folder
     done
   else
-    die "the plugin is not built: run $pipelines/demo, or" \
+    die "the plugin is not built; run $pipelines/demo, or" \
       "meson setup build && meson compile -C build"
   fi
-  # Installed where GStreamer looks, it needs no help.
+  # GStreamer finds a plugin in its own folder without this path.
   [ -z "$libs" ] || export \
     GST_PLUGIN_PATH_1_0="$libs${GST_PLUGIN_PATH_1_0:+:$GST_PLUGIN_PATH_1_0}"
 }
@@ -257,16 +258,17 @@ probe_video ()
     <<< "$caps"
 }
 
-# Sets slots, frame_rate and scene_rate (N times it) as fractions, width, height.
+# Sets slots, width and height, and the fractions frame_rate and scene_rate (N
+# times frame_rate).
 plan_scene ()
 {
-  slots=$(schedule_slots) || usage_error "--schedule names no schedule"
+  slots=$(schedule_slots) || usage_error "--schedule $(schedule) is not valid"
   frame_rate=${opt[frame-rate]:-25}
   [[ $frame_rate == */* ]] || frame_rate=$frame_rate/1
   scene_rate=$((${frame_rate%/*} * slots))/${frame_rate#*/}
   width=768 height=576
   ! is_set input || ! is_set scene \
-    || usage_error "--input and --scene: which of the two?"
+    || usage_error "--input and --scene exclude each other; use one of them"
   if is_set input; then
     local facts num den
     facts=$(probe_video "${opt[input]}")
@@ -274,7 +276,7 @@ plan_scene ()
     input_rate=${opt[input-rate]:-$num/$den}
     [[ $input_rate == */* ]] || input_rate=$input_rate/1
     [ "${input_rate%/*}" != 0 ] \
-      || usage_error "${opt[input]} has no fixed rate: give --input-rate"
+      || usage_error "${opt[input]} has no fixed frame rate; set --input-rate"
   fi
   if is_set size; then
     width=${opt[size]%x*} height=${opt[size]#*x}
@@ -288,8 +290,8 @@ scene ()
   caps="video/x-raw,format=$(grey_format),width=$width,height=$height"
   caps+=",framerate=$scene_rate"
   if is_set input; then
-    # Every frame of the file becomes one slot: its times are stretched.
-    # videorate reckons them from 0, which is not where every file begins.
+    # Every frame of the file becomes one slot, so its times are scaled.
+    # videorate counts them from 0, and not every file begins at 0.
     local speed
     speed=$(awk -v s="$scene_rate" -v i="$input_rate" 'BEGIN {
       split(s, a, "/"); split(i, b, "/")
@@ -311,15 +313,15 @@ scene ()
   fi
 }
 
-# Ends the stream after --frames coded frames; identity counts the one it
-# refuses, which codedexposure-launch spares.
+# Ends the stream after --frames coded frames. identity also counts the frame
+# that it refuses; codedexposure-launch ends the stream before that one is made.
 frame_limit ()
 {
   ! is_set frames \
     || printf 'identity name=limit eos-after=%d ! ' $((opt[frames] + 1))
 }
 
-# The optical bench in software; its masks come from the schedule.
+# The simulated bench; its masks come from the schedule.
 simulation ()
 {
   scene "$@"
@@ -330,64 +332,40 @@ simulation ()
   printf 'video/x-raw,framerate=%s ! ' "$frame_rate"
 }
 
-# Features that make the camera follow the DMD's trigger, or give it one. They
-# come in the order that Aravis needs: it sets the frame rate first, which ends
-# all triggers, and what belongs to a selector follows that.
-camera_features ()
-{
-  local falling=
-  [ "${opt[trigger-edge]:-rising}" = rising ] || falling=1
-  if [ "${opt[trigger]:-dmd}" = dmd ]; then
-    printf 'TriggerSelector=FrameStart TriggerSource=%s TriggerActivation=%s ' \
-      "${opt[trigger-line]:-Line0}" \
-      "$([ -n "$falling" ] && echo FallingEdge || echo RisingEdge)"
-    printf 'TriggerMode=On'
-  else
-    printf 'TriggerSelector=FrameStart TriggerMode=Off LineSelector=%s ' \
-      "${opt[trigger-line]:-Line1}"
-    printf 'LineMode=Output LineSource=ExposureActive LineInverter=%s' \
-      "$([ -n "$falling" ] && echo true || echo false)"
-  fi
-  ! is_set pixel-format || printf ' PixelFormat=%s' "${opt[pixel-format]}"
-  ! is_set features || printf ' %s' "${opt[features]}"
-}
-
 # Coded frames of a camera, of any source, or of the bench with its DMD.
 coded_source ()
 {
-  local caps features
   if is_set camera; then
-    caps="video/x-raw,format=$(grey_format),width=$width,height=$height"
-    caps+=",framerate=$frame_rate"
-    features=$(camera_features)
-    printf 'aravissrc camera-name=%s num-arv-buffers=150 features=%s %s! %s ! ' \
-      "$(quoted "${opt[camera]}")" "$(quoted "$features")" \
-      "$(properties exposure)" "$caps"
+    printf 'codedexposure-camerasrc camera-name=%s trigger=%s ' \
+      "$(quoted "${opt[camera]}")" "${opt[trigger]:-dmd}"
+    ! is_set exposure || printf 'exposure-time=%s ' "${opt[exposure]}"
+    properties trigger-line trigger-edge pixel-format features reconnect
+    printf 'source::num-arv-buffers=150 ! video/x-raw,format=%s,' "$(grey_format)"
+    printf 'width=%d,height=%d,framerate=%s ! ' "$width" "$height" "$frame_rate"
   elif is_set source; then
     printf '%s ! ' "${opt[source]}"
   else
     simulation "$@" | sed 's/codedexposure-sim /&dmd=sim:bench /'
   fi
-  # A source of one's own may come with a schedule and times.
+  # The frames of a user's source may already have a schedule and times.
   if ! is_set source || is_set device || is_set schedule; then
     local device=${opt[device]:-} timestamps=''
     is_set camera || is_set source || device=${device:-sim:bench}
-    ! is_set camera \
-      || timestamps="timestamp-at=device-clock $(properties pixel-format reconnect)"
+    ! is_set camera || timestamps='timestamp-at=device-clock '
     printf 'dmdsync name=sync device=%s schedule=%s %s! ' \
       "$(quoted "$device")" "$(quoted "$(schedule)")" "$timestamps"
   fi
   frame_limit
 }
 
-# Where a coded recording's frames are described.
+# The file with the metadata of a recording.
 sidecar_of ()
 {
   printf '%s.jsonl' "${1%.mkv}"
 }
 
-# Coded frames to FFV1 in Matroska, their description to the sidecar. Every
-# frame is decodable alone, and at 1 us a tick a cluster of its own.
+# Writes coded frames to FFV1 in Matroska, and their metadata to the sidecar.
+# Every frame can be decoded alone; with ticks of 1 µs it has its own cluster.
 coded_recording ()
 {
   printf 'codedexposure-log name=log location=%s ! ' \
@@ -403,7 +381,7 @@ lossless_video ()
     "$(quoted "$1")"
 }
 
-# What fills a part of the pixels' 16 bits stays in it.
+# The significant bits of the pixels, if the sidecar has them.
 bits_of_sidecar ()
 {
   local sidecar
@@ -411,21 +389,21 @@ bits_of_sidecar ()
   [ ! -r "$sidecar" ] || sed -nE 's/.*"bits":([0-9]+).*/\1/p;10q' "$sidecar" | head -n 1
 }
 
-# Frames as a person sees them, whatever their bits.
-to_look_at ()
+# Scales frames of any bit depth to 8 bits, for display.
+for_display ()
 {
   printf 'codedexposure-view %s! ' "$(properties bits)"
 }
 
-# Frames to a file by its ending: FFV1, H.264, or a folder of PNG. PNG keeps all
-# numbers as they are, unless view is set.
+# Writes frames to a file by its ending: FFV1, H.264, or a folder of PNG. PNG
+# keeps the pixel values, unless view is set.
 video_output ()
 {
   case $1 in
     *.mkv) lossless_video "$1" ;;
     *.mp4)
-      # 4:2:0 with even sides is what every player and browser opens.
-      to_look_at
+      # All players and browsers support 4:2:0 with even sides.
+      for_display
       printf 'videoconvert ! videoscale ! %s ! ' \
         'video/x-raw,format=I420,width=[2,65536,2],height=[2,65536,2]'
       printf 'x264enc pass=qual quantizer=18 speed-preset=veryfast ! '
@@ -434,8 +412,8 @@ video_output ()
     */ | *%*d*.png)
       local pattern=$1
       [[ $1 != */ ]] || pattern=$1%06d.png
-      ! is_set view || to_look_at
-      # Left to itself, videoconvert makes colours of 8 bits of 16 grey ones.
+      ! is_set view || for_display
+      # Without these caps, videoconvert makes 8-bit colours of 16-bit grey.
       printf 'videoconvert ! video/x-raw,format={GRAY8,GRAY16_BE} ! '
       printf 'pngenc snapshot=false ! '
       printf 'multifilesink location=%s ' "$(quoted "$pattern")"
@@ -447,14 +425,14 @@ video_output ()
   esac
 }
 
-# Makes room for an output; the pictures of an earlier run are replaced as a
-# file would be. What is read must not be written: it would be empty first.
+# Creates the folder of an output and deletes the pictures of an earlier run. The
+# output must not be the input, which would be truncated before it is read.
 make_folder_for ()
 {
   local read
   for read in "${opt[input]:-}" "${args[@]}"; do
     [ -z "$read" ] || [ ! "$1" -ef "$read" ] \
-      || usage_error "$1 is what is read: give the output another name"
+      || usage_error "$1 is the input; use another name for the output"
   done
   ! is_set print || return 0
   if [[ $1 == */ ]]; then
@@ -465,14 +443,14 @@ make_folder_for ()
   fi
 }
 
-# display FAST CODED: the frames of two pads in a window, the fast ones on the
-# right; it shows the latest and never holds up what feeds it.
+# display FAST CODED: shows the frames of two pads in a window, the fast ones on
+# the right. It shows the latest frames and never blocks its sources.
 display ()
 {
   local sink=${opt[sink]:-autovideosink}
   local latest='leaky=downstream max-size-bytes=0 max-size-time=0'
   local exact
-  exact="$(to_look_at)videoconvert ! video/x-raw,format=BGRx"
+  exact="$(for_display)videoconvert ! video/x-raw,format=BGRx"
   printf '%s ! queue name=fast %s max-size-buffers=%d ! %s ! view.sink_0 ' \
     "$1" "$latest" $((2 * slots)) "$exact"
   printf '%s ! queue name=beside %s max-size-buffers=2 ! %s ! view.sink_1 ' \

@@ -1,19 +1,19 @@
 # shellcheck shell=bash disable=SC2154 # pipelines, out: of those who source it
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# Pictures that GStreamer draws, panel by panel; sourced by pipelines/demo, for the
-# one that explains a coded frame, and by pipelines/report.
+# Draws pictures panel by panel with GStreamer. Sourced by pipelines/demo, for
+# the picture that explains a coded frame, and by pipelines/report.
 
-# What is drawn without a word, unless it fails.
+# Runs a pipeline that draws; prints its log only if it fails.
 play_quietly ()
 {
   "$launcher" --what="$script" "$1" >"$out/log" 2>&1 || {
     cat "$out/log" >&2
-    die "that failed"
+    die "could not draw the figure; see the log above"
   }
   rm "$out/log"
 }
 
-# A picture as the source of a stream of one frame.
+# A stream with the picture as its only frame.
 still ()
 {
   printf 'filesrc location=%s ! pngdec ! videoconvert ! ' "$(quoted "$1")"
@@ -26,7 +26,7 @@ crop ()  # crop X Y W H of a frame of 768x576
     "$1" "$2" $((768 - $1 - $3)) $((576 - $2 - $4))
 }
 
-# Every pixel becomes a square; the result has that size.
+# Magnifies every pixel to a square, to a picture of that size.
 magnify_to ()
 {
   printf 'videoscale method=nearest-neighbour add-borders=false ! '
@@ -47,7 +47,7 @@ write_text ()  # write_text TEXT SIZE OPTION...
     "$2" "${*:3}"
 }
 
-# panel FILE HEADING PADS BRANCHES: what the branches lay on the pads of a
+# panel FILE HEADING PADS BRANCHES: composes the branches on the pads of a
 # compositor named page, under a heading.
 panel ()
 {
@@ -60,7 +60,7 @@ panel ()
     $4"
 }
 
-# Where four pictures lie, two by two.
+# The positions of four pictures, two by two.
 two_by_two ()  # two_by_two WIDTH HEIGHT
 {
   printf 'sink_1::xpos=%d sink_2::ypos=%d sink_3::xpos=%d sink_3::ypos=%d' \
@@ -78,7 +78,7 @@ captioned ()  # captioned FOLDER CAPTION...
   done
 }
 
-# The pictures that the figure shows, into a folder.
+# Decodes the pictures of the figure into a folder.
 take_pictures ()  # take_pictures FOLDER SECONDS BENCH-OPTION...
 {
   local folder=$1 at=$2
@@ -92,27 +92,27 @@ take_pictures ()  # take_pictures FOLDER SECONDS BENCH-OPTION...
     --output "$folder/select/" --coded "$folder/coded/"
 }
 
-# draw_figure FILE SECONDS X Y BENCH-OPTION...: the coded frame at that time of
-# $out/coded.mkv, what lies around that pixel, its subframes, and those of the
-# paper's method.
+# draw_figure FILE SECONDS X Y BENCH-OPTION...: draws the coded frame of
+# $out/coded.mkv at that time, the area around that pixel, its subframes, and
+# those of the method of the paper.
 draw_figure ()
 {
   local file=$1 at=$2 x=$3 y=$4 work
   work=$(mktemp -d)
   take_pictures "$work" "$at" "${@:5}" >"$out/log" 2>&1 || {
     cat "$out/log" >&2
-    die "a picture of the figure could not be taken"
+    die "could not decode the pictures of the figure; see the log above"
   }
 
   local coded=$work/coded/000000.png zoom=12 width=64 height=48
-  panel "$work/a.png" "One coded frame: 768x576 pixels, an exposure of 40 ms" \
+  panel "$work/a.png" "One coded frame: 768x576 pixels, exposure 40 ms" \
     "sink_1::xpos=$((x - 2)) sink_1::ypos=$((y - 2))" \
     "$(still "$coded") page.sink_0
      $(still "$coded") $(crop "$x" "$y" $width $height) $(red_frame) page.sink_1"
 
   local middle_x=$((width * zoom / 2)) middle_y=$((height * zoom / 2))
   panel "$work/b.png" \
-    "The framed part, magnified: the 2x2 pixels of a group saw four moments" \
+    "The red part, magnified: 2x2 pixels of an exposure group, four slots" \
     "sink_1::xpos=$((middle_x - 2)) sink_1::ypos=$((middle_y - 2))" \
     "$(still "$coded") $(crop "$x" "$y" $width $height)
        $(magnify_to $((width * zoom)) $((height * zoom))) page.sink_0
@@ -121,11 +121,11 @@ draw_figure ()
        $(magnify_to $((2 * zoom)) $((2 * zoom))) $(red_frame) page.sink_1"
 
   panel "$work/c.png" \
-    "Its four subframes, one every 10 ms (sequential code, select)" \
+    "Its four subframes, one every 10 ms (code sequential, method select)" \
     "$(two_by_two 384 288)" \
     "$(captioned "$work/select" '0 ms' '10 ms' '20 ms' '30 ms')"
   panel "$work/d.png" \
-    "The paper's way: staircase code, values sorted by rank" \
+    "The method of the paper: code staircase, method rank" \
     "$(two_by_two 384 288)" \
     "$(captioned "$work/rank" 'darkest' 'second' 'third' 'brightest')"
 

@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 # Draws the figures of pipelines/report:
 #   gnuplot -c figures.gp FOLDER SUBFRAMES FROM TO
-# FOLDER holds the first columns of what subframestats writes: coded.csv,
-# subframes.csv and shown.csv (the coded frame that is shown, then its
-# subframes); and profiles.csv, a block of place,value for each of the latter.
-# FROM and TO: times of that frame in seconds. The pictures go to the folder,
-# too.
+# FOLDER contains the first columns of the files of subframestats: coded.csv,
+# subframes.csv and shown.csv (the coded frame to show, then its subframes); and
+# profiles.csv, one block of position,value for each row of shown.csv. FROM and TO
+# are the times of that frame in s. The pictures are written into the folder.
 
 folder = ARG1
 n = int(ARG2)
@@ -27,11 +26,11 @@ set key outside below horizontal samplen 2
 set bmargin 5.5
 step = n > 20 ? 8 : (n > 8 ? 2 : 1)
 
-# Two panels: the whole recording, and the frame that is shown.
+# Two panels: the whole recording, and one frame.
 set terminal pngcairo size 1200,440 font "DejaVu Sans,11" background "white"
 do for [figure in "intensity entropy"] {
   field = figure eq "intensity" ? 4 : 7
-  label = figure eq "intensity" ? "mean grey value" : "entropy (bits a pixel)"
+  label = figure eq "intensity" ? "mean pixel value" : "entropy (bits per pixel)"
   set output file(figure . ".png")
   set multiplot layout 1,2
   set yrange [*:*]
@@ -50,7 +49,7 @@ do for [figure in "intensity entropy"] {
       file("coded.csv") every ::1 using ($3 / 1e9 + (to - from) / 2):(column(field)) \
           with points ls 1 pt 7 ps 0.5 title "coded frames"
   unset object 1
-  set title "The coded frame that is shown, and its subframes"
+  set title "The coded frame and its subframes"
   set yrange [0:*]
   set offsets graph 0, graph 0, graph 0.08, graph 0
   set xlabel "subframe"
@@ -73,9 +72,9 @@ do for [figure in "intensity entropy"] {
 set terminal pngcairo size 1200,480 font "DejaVu Sans,11" background "white"
 set output file("profile.png")
 set offsets 0, 0, 0, 0
-set title "Along the line: the coded frame that is shown, and its subframes"
-set xlabel "place along the line (pixels of the coded frame)"
-set ylabel "grey value"
+set title "Profiles along the line: the coded frame and its subframes"
+set xlabel "position along the line (pixels of the coded frame)"
+set ylabel "pixel value (DN)"
 set xrange [*:*]
 set yrange [0:*]
 set xtics auto

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* codedexposure-guide: runs a pipeline with a moirecalib, and tells a person at
- * the terminal what to turn, how far it is, and what came out. */
+/* codedexposure-guide: runs a pipeline with a moirecalib element and prints on
+ * the terminal how to move the stage, the progress and the result. */
 #include <cmath>
 #include <cstdio>
 #include <string>
@@ -14,16 +14,16 @@
 namespace
 {
 
-using namespace cexp::gst;
+using namespace codedexposure::gst;
 using namespace report;
 
 enum ExitCode { kDone = 0, kFailed = 1, kUsage = 2 };
 
-/* Readings between two turns of the simulated stage: those that were taken
- * before the last turn have passed by then. */
-constexpr int kHandsOff = 8;
-/* Part of the way that a hand gets right at once. */
-constexpr double kHandsSkill = 0.9;
+/* Readings between two moves of the simulated stage, so that none is from
+ * before the last move. */
+constexpr int kReadingsPerMove = 8;
+/* Part of the required travel that one move of the simulated stage makes. */
+constexpr double kMovePart = 0.9;
 
 double
 number_of (const GstStructure *structure, const char *field)
@@ -46,7 +46,7 @@ public:
   explicit Guide (const char *what) : Player (what ? what : "guide") {}
   ~Guide () override { stop (); }
 
-  /** @p stage: the element that stands for a person's hand; null: a person. */
+  /** @p stage: the simulated bench to move; null: a person moves the stage. */
   int run (const char *stage);
 
 private:
@@ -67,24 +67,24 @@ private:
   void on_state (const std::string &state);
   void on_reading (const GstStructure *reading);
   void on_mapping (const GstStructure *mapping);
-  void turn_stage (const GstStructure *reading);
+  void move_stage (const GstStructure *reading);
 
   ObjectPtr<GstElement> calib_, stage_;
   int readings_ = 0;
   std::string last_reading_;
   bool mapped_ = false;
-  bool unwritten_ = false; ///< a file that was asked for
-  bool listens_ = false;   ///< to keys
+  bool unwritten_ = false;  ///< a requested file could not be written
+  bool takes_keys_ = false; ///< standard input is a terminal
 };
 
 void
 Guide::on_signal ()
 {
-  status_.line ("stopped; the mirrors are given back");
+  status_.line ("stopped; the mirrors show the schedule again");
   quit (is_done () ? kDone : kFailed);
 }
 
-/* Enter: the person wants the mapping as the bench stands. */
+/* Enter starts the mapping without further alignment. */
 gboolean
 Guide::take_key ()
 {
@@ -92,14 +92,14 @@ Guide::take_key ()
   if (read (STDIN_FILENO, keys, sizeof keys) <= 0)
     return G_SOURCE_REMOVE;
   if (calib_ && !mapped_) {
-    status_.line ("mapping the bench as it stands");
+    status_.line ("mapping without further alignment");
     gst_util_set_object_arg (G_OBJECT (calib_.get ()), "mode", "map");
   }
   return G_SOURCE_CONTINUE;
 }
 
-/* Alignment alone is done when the person says so; its result is the last
- * reading. */
+/* With mode=align, the user ends the program, and the last reading is the
+ * result. */
 bool
 Guide::is_done ()
 {
@@ -117,21 +117,22 @@ void
 Guide::on_state (const std::string &state)
 {
   if (state == "searching")
-    status_.line ("looking for the grating: focus, and put the camera roughly "
-                  "before the mirrors");
+    status_.line ("searching for the grating: focus, and place the camera "
+                  "roughly in front of the mirrors");
   else if (state == "coarse")
-    status_.line ("coarse: turn the stage as the arrows say, the angle first; "
-                  "Enter maps the bench as it stands");
+    status_.line ("coarse: move the stage as the arrows show, the angle first; "
+                  "press Enter to start the mapping now");
   else if (state == "fine")
-    status_.line ("fine: every pixel is within one mirror; go on");
+    status_.line ("fine: no pixel is off by more than one mirror; continue");
   else if (state == "aligned")
-    status_.line ("aligned: hands off");
+    status_.line ("aligned: do not touch the stage");
   else if (state == "mapping")
-    status_.line ("showing patterns; touch nothing");
+    status_.line ("showing patterns; do not touch the bench");
   else if (state == "solving")
     status_.line ("solving; the mirrors show the schedule again");
-  else if (state == "failed" && listens_)
-    status_.line ("no mapping: set the bench right; Enter tries again");
+  else if (state == "failed" && takes_keys_)
+    status_.line ("the mapping failed; correct the bench and press Enter to "
+                  "try again");
   else if (state == "failed")
     quit (kFailed);
 }
@@ -150,7 +151,7 @@ Guide::on_reading (const GstStructure *reading)
   const double theta = number_of (reading, "stage-theta");
   const double magnify = number_of (reading, "magnify");
   status_.progress (format (
-      "%s  %s %+.2f um  %s %+.2f um  %s %+.1f mdeg  magnify %+.2f per mille  "
+      "%s  %s %+.2f µm  %s %+.2f µm  %s %+.1f mdeg  magnify %+.2f per mille  "
       "(worst corner %.3f mirrors)",
       text_of (reading, "state").c_str (), arrow (x, "→", "←").c_str (), x,
       arrow (y, "↓", "↑").c_str (), y, arrow (theta, "↻", "↺").c_str (), theta,
@@ -161,13 +162,13 @@ Guide::on_reading (const GstStructure *reading)
       text_of (reading, "state").c_str (), number_of (reading, "rotation"),
       number_of (reading, "magnification"), number_of (reading, "offset-x"),
       number_of (reading, "offset-y"), number_of (reading, "deviation"));
-  if (stage_ && ++readings_ % kHandsOff == 0)
-    turn_stage (reading);
+  if (stage_ && ++readings_ % kReadingsPerMove == 0)
+    move_stage (reading);
 }
 
-/* Turns the bench in software as a person turns a stage. */
+/* Moves the simulated bench as a person would move the stage. */
 void
-Guide::turn_stage (const GstStructure *reading)
+Guide::move_stage (const GstStructure *reading)
 {
   if (text_of (reading, "state") == "aligned")
     return;
@@ -177,10 +178,10 @@ Guide::turn_stage (const GstStructure *reading)
       "scale", &scale, nullptr);
   const double magnify = number_of (reading, "magnify") / 1000.0;
   g_object_set (stage, "shift-x",
-      x - kHandsSkill * number_of (reading, "offset-x"), "shift-y",
-      y - kHandsSkill * number_of (reading, "offset-y"), "rotation",
-      rotation - kHandsSkill * number_of (reading, "rotation"), "scale",
-      scale * (1.0 + kHandsSkill * magnify), nullptr);
+      x - kMovePart * number_of (reading, "offset-x"), "shift-y",
+      y - kMovePart * number_of (reading, "offset-y"), "rotation",
+      rotation - kMovePart * number_of (reading, "rotation"), "scale",
+      scale * (1.0 + kMovePart * magnify), nullptr);
 }
 
 void
@@ -267,8 +268,8 @@ Guide::run (const char *stage)
 {
   calib_ = find ("calib");
   stage_ = find (stage);
-  listens_ = isatty (STDIN_FILENO) != 0;
-  if (listens_)
+  takes_keys_ = isatty (STDIN_FILENO) != 0;
+  if (takes_keys_)
     g_unix_fd_add (STDIN_FILENO, G_IO_IN, on_key, this);
   return loop ();
 }
@@ -280,10 +281,10 @@ main (int argc, char **argv)
 {
   gchar *what = nullptr, *stage = nullptr;
   const GOptionEntry entries[] = {
-      {"what", 0, 0, G_OPTION_ARG_STRING, &what, "Word in front of every line",
+      {"what", 0, 0, G_OPTION_ARG_STRING, &what, "Prefix of every line",
           "WORD"},
       {"stage", 0, 0, G_OPTION_ARG_STRING, &stage,
-          "codedexposure-sim to turn as a person would", "NAME"},
+          "Element codedexposure-sim whose stage to move", "NAME"},
       {},
   };
   const char *pipeline =

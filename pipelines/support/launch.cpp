@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* codedexposure-launch: runs one pipeline for a script of this folder, and says
- * how far it is, what went wrong and what was counted. */
+/* codedexposure-launch: runs one pipeline for a script of this folder and
+ * prints its progress, errors and counters. */
 #include <algorithm>
 #include <atomic>
 #include <chrono>
@@ -15,25 +15,25 @@
 namespace
 {
 
-using namespace cexp::gst;
+using namespace codedexposure::gst;
 using namespace report;
 using Clock = std::chrono::steady_clock;
 
-/* What the scripts learn from the exit status. */
+/* Exit status; the scripts use it. */
 enum ExitCode { kDone = 0, kFailed = 1, kUsage = 2, kNobodyListens = 4 };
 
 struct Options {
-  gchar *what = nullptr;     // the word in front of every line
-  gchar *count = nullptr;    // element whose sink pad sees every coded frame
-  gint64 total = 0;          // coded frames that are expected, 0: unknown
+  gchar *what = nullptr;     // prefix of every line
+  gchar *count = nullptr;    // element at whose sink pad frames are counted
+  gint64 total = 0;          // expected coded frames, 0: unknown
   gchar *receiver = nullptr; // tcpserversink to wait for
-  gdouble retry = 0;         // seconds to go on trying to connect
-  gdouble start = 0;         // first second of the stream to play
-  gdouble duration = 0;      // seconds to play, 0: all
-  gdouble shift_to = -1;     // running time of the first frame, -1: its own
+  gdouble retry = 0;         // time for which to try to connect, s
+  gdouble start = 0;         // time at which to start, s
+  gdouble duration = 0;      // time to play, s; 0: all
+  gdouble shift_to = -1; // running time of the first frame, s; -1: unchanged
 };
 
-/** A queue that drops what it cannot hold, and does not say so. */
+/** Counts the frames that a leaky queue drops, because the queue does not. */
 class LeakyQueue
 {
 public:
@@ -136,8 +136,8 @@ nanoseconds (double seconds)
   return GstClockTime (seconds * 1e9 + 0.5);
 }
 
-/* Whether @frame ends before the time @start: a stream that is shorter is
- * sought to its last frame. */
+/* Whether @frame ends before the time @start, which happens if a seek goes
+ * beyond the end of a stream. */
 bool
 is_before (const GstBuffer *frame, GstClockTime start)
 {
@@ -168,7 +168,7 @@ Launch::on_first_frame (GstPad *, GstPadProbeInfo *, gpointer self)
   return GST_PAD_PROBE_OK;
 }
 
-/* How long a frame of the caps at @pad lasts; 0 where they do not say. */
+/* The frame period of the caps at @pad, or 0. */
 GstClockTime
 frame_period (GstPad *pad)
 {
@@ -182,10 +182,10 @@ frame_period (GstPad *pad)
   return gst_util_uint64_scale_int (GST_SECOND, den, num);
 }
 
-/* While the first frame is held no file has been begun and nothing is shown, so
- * the stream can be sent elsewhere without a trace. Frames are played from the
- * start of one on, and one at least: a decoder would cut a piece out of it, of
- * which nobody knows which. */
+/* The first frame is held, so no file is started and nothing is shown before
+ * the seek. The segment begins at the start of a frame and has at least one,
+ * because decoders clip a coded frame to the segment and its slots would be
+ * lost. */
 void
 Launch::seek ()
 {
@@ -199,13 +199,14 @@ Launch::seek ()
       options_.duration > 0 ? GST_SEEK_TYPE_SET : GST_SEEK_TYPE_NONE,
       gint64 (start + length));
   if (!gst_pad_push_event (counted_.get (), event)) {
-    status_.line ("error: this stream cannot be played from the middle");
+    status_.line ("error: cannot seek in this stream; leave out --start and "
+                  "--duration");
     quit (kFailed);
   }
   gst_pad_remove_probe (counted_.get (), std::exchange (hold_, 0));
 }
 
-/* A stream that is joined late would be shown as late as it was joined. */
+/* Otherwise, a receiver that joins late would show frames late. */
 GstPadProbeReturn
 Launch::shift_first_frame (GstPad *pad, GstPadProbeInfo *info, gpointer self)
 {
@@ -233,7 +234,8 @@ Launch::connect_counter ()
   if (element)
     counted_.reset (gst_element_get_static_pad (element.get (), "sink"));
   if (!counted_) {
-    status_.line (format ("no element named %s to count at", options_.count));
+    status_.line (format (
+        "the pipeline has no element %s to count frames at", options_.count));
     return false;
   }
   if (options_.start > 0 || options_.duration > 0)
@@ -248,9 +250,9 @@ Launch::connect_counter ()
   return true;
 }
 
-/* An identity ends the stream when it refuses a frame, which was made or taken
- * for nothing by then, and counted. Behind the last one that it lets through,
- * the end is answered already. */
+/* An identity ends the stream when it refuses a frame, which was already
+ * produced and counted. This probe ends the stream directly after the last
+ * frame. */
 void
 Launch::end_at_the_limit ()
 {
@@ -273,7 +275,7 @@ Launch::on_limited_frame (GstPad *pad, GstPadProbeInfo *info, gpointer self)
   gint64 &left = static_cast<Launch *> (self)->left_;
   if (--left != 0)
     return GST_PAD_PROBE_OK;
-  /* The push comes by here again. */
+  /* The push calls this probe again. */
   GstBuffer *last = GST_PAD_PROBE_INFO_BUFFER (info);
   GST_PAD_PROBE_INFO_DATA (info) = nullptr;
   const GstFlowReturn flow = gst_pad_push (pad, last);
@@ -317,8 +319,7 @@ Launch::play ()
   gst_element_set_state (pipeline_.get (), GST_STATE_PLAYING);
 }
 
-/* A paused sink already takes receivers, so that none of them misses the first
- * frame. */
+/* A paused sink accepts receivers, so they do not miss the first frame. */
 bool
 Launch::has_receiver ()
 {
@@ -353,18 +354,18 @@ Launch::run ()
     return code;
   if (frames_ == 0) {
     status_.line (options_.start > 0
-                      ? format ("error: no coded frame came: is %g s after the "
-                                "end?",
+                      ? format ("error: no coded frame arrived; check whether "
+                                "%g s is after the end",
                             options_.start)
-                      : "error: no coded frame came");
+                      : "error: no coded frame arrived");
     return kFailed;
   }
   summarise ();
   return kDone;
 }
 
-/* The first request ends the stream, so that files are finished; the second
- * does not wait for that. */
+/* The first signal ends the stream, so that files are finished; the second
+ * stops immediately. */
 void
 Launch::on_signal ()
 {
@@ -374,7 +375,7 @@ Launch::on_signal ()
     return;
   }
   interrupted_ = true;
-  status_.line ("stopping; once more to stop at once");
+  status_.line ("stopping; press Ctrl-C again to stop immediately");
   gst_element_send_event (pipeline_.get (), gst_event_new_eos ());
 }
 
@@ -413,12 +414,12 @@ Launch::on_error (GstMessage *message)
   status_.line ("error: " + told (message, error, detail));
   if (kind == "aravissrc" && error->domain == GST_STREAM_ERROR)
     status_.line (
-        "the camera sent nothing for 2 s or more: is the DMD running, "
-        "and on the camera's trigger line?");
+        "the camera sent nothing for 2 s; check that the DMD runs and is "
+        "wired to the camera's trigger line");
   quit (kFailed);
 }
 
-/* What the plugin's elements report: locks, slips, lost frames. */
+/* Prints the messages of this plugin: synchronisation, slips, lost frames. */
 void
 Launch::on_element_message (GstMessage *message)
 {
@@ -508,7 +509,7 @@ Launch::summarise ()
   const double cpu = cpu_seconds () - cpu_at_start_;
   status_.line (
       format ("%" G_GINT64_FORMAT
-              " coded frames in %.1f s, %.1f a second, %.0f %% of one "
+              " coded frames in %.1f s, %.1f frames/s, %.0f %% of one "
               "processor core",
           frames_.load (), seconds, double (frames_) / seconds,
           100 * cpu / seconds));
@@ -529,22 +530,23 @@ main (int argc, char **argv)
 {
   Options options;
   const GOptionEntry entries[] = {
-      {"what", 0, 0, G_OPTION_ARG_STRING, &options.what,
-          "Word in front of every line", "WORD"},
+      {"what", 0, 0, G_OPTION_ARG_STRING, &options.what, "Prefix of every line",
+          "WORD"},
       {"count", 0, 0, G_OPTION_ARG_STRING, &options.count,
           "Element at whose sink pad the coded frames are counted", "NAME"},
       {"total", 0, 0, G_OPTION_ARG_INT64, &options.total,
-          "Coded frames that are expected", "N"},
+          "Expected number of coded frames", "N"},
       {"start-with-receiver", 0, 0, G_OPTION_ARG_STRING, &options.receiver,
-          "Stay paused until this tcpserversink has a receiver", "NAME"},
+          "Wait until this tcpserversink has a receiver", "NAME"},
       {"retry", 0, 0, G_OPTION_ARG_DOUBLE, &options.retry,
-          "Go on trying to connect; status 4 when nobody listens", "SECONDS"},
+          "Time for which to try to connect; status 4 if nobody listens",
+          "SECONDS"},
       {"start", 0, 0, G_OPTION_ARG_DOUBLE, &options.start,
-          "First second of the stream to play", "SECONDS"},
+          "Time of the stream at which to start", "SECONDS"},
       {"duration", 0, 0, G_OPTION_ARG_DOUBLE, &options.duration,
-          "How much of the stream to play", "SECONDS"},
+          "Duration to play", "SECONDS"},
       {"shift-to", 0, 0, G_OPTION_ARG_DOUBLE, &options.shift_to,
-          "Let the first counted frame have this running time", "SECONDS"},
+          "Running time for the first counted frame", "SECONDS"},
       {},
   };
   const char *pipeline =

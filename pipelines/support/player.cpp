@@ -7,7 +7,7 @@
 
 #include <glib-unix.h>
 
-using namespace cexp::gst;
+using namespace codedexposure::gst;
 using report::format;
 
 Player::Player (const char *what)
@@ -28,7 +28,7 @@ Player::parse (const char *description)
   GstElement *parsed = gst_parse_launch_full (
       description, context, GST_PARSE_FLAG_FATAL_ERRORS, &error);
   if (!parsed && !say_missing (context))
-    status_.line (format ("the pipeline is wrong: %s", error->message));
+    status_.line (format ("the pipeline is invalid: %s", error->message));
   g_clear_error (&error);
   gst_parse_context_free (context);
   if (!parsed)
@@ -42,8 +42,8 @@ Player::parse (const char *description)
   return true;
 }
 
-/* Names the elements that there are not, and what has them. The context also
- * lists those that could not be set up. */
+/* Prints the missing elements and their packages. The context also lists
+ * elements that exist but could not be set up. */
 bool
 Player::say_missing (GstParseContext *context)
 {
@@ -54,8 +54,8 @@ Player::say_missing (GstParseContext *context)
             gst_element_factory_find (*name)})
       continue;
     const std::string package = report::package_of (*name);
-    status_.line (format ("there is no element \"%s\"%s%s", *name,
-        package.empty () ? "" : ": apt-get install ", package.c_str ()));
+    status_.line (format ("the element \"%s\" is missing%s%s", *name,
+        package.empty () ? "" : "; run apt-get install ", package.c_str ()));
     said = true;
   }
   g_strfreev (names);
@@ -119,7 +119,7 @@ pipeline_argument (
   if (parsed && argc == 2)
     return argv[1];
   std::fprintf (stderr, "%s: %s\n", program,
-      error ? error->message : "one PIPELINE is needed");
+      error ? error->message : "give one PIPELINE");
   g_clear_error (&error);
   return nullptr;
 }

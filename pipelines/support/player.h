@@ -1,45 +1,46 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* A pipeline that is played in a main loop. */
+/* Plays a pipeline in a main loop. */
 #pragma once
 
 #include <gst/gst.h>
 
-#include "gstraii.h"
+#include "common/raii.h"
 #include "report.h"
 
-/** Plays a pipeline until it is told to quit, and takes it to NULL in the end.
- * Everything happens on the thread that runs it. */
+/** Plays a pipeline until quit (), then sets it to NULL. All callbacks run on
+ * the thread of loop (). */
 class Player
 {
 public:
-  /** @p what stands in front of every line that is said. */
+  /** @p what  prefix of every printed line. */
   explicit Player (const char *what);
-  /** Derived classes have stopped by then. */
+  /** The destructors of derived classes call stop (). */
   virtual ~Player ();
   Player (const Player &) = delete;
   Player &operator= (const Player &) = delete;
 
-  /** False where @p description is no pipeline, and why is said. */
+  /** False, with a printed reason, if @p description is not a pipeline. */
   bool parse (const char *description);
 
 protected:
-  /** Sets the pipeline going. Signals are taken from then on, so that a device
-   * is not left open by one that comes while it is opened. */
+  /** Starts the pipeline. Signals are handled before, so a signal during the
+   * opening of a device does not leave it open. */
   virtual void begin () = 0;
   virtual void on_message (GstMessage *message) = 0;
   /** SIGINT or SIGTERM. */
   virtual void on_signal () = 0;
 
-  /** Begins, and runs the main loop; the code that quit () was given. */
+  /** Starts the pipeline and runs the main loop; returns the code of quit ().
+   */
   int loop ();
   void quit (int code);
-  /** To NULL, after which nothing calls back any more. */
+  /** Sets the pipeline to NULL; no callback runs after that. */
   void stop ();
-  /** The element of that name; null where there is none. */
-  cexp::gst::ObjectPtr<GstElement> find (const char *name) const;
+  /** The element of that name, or null. */
+  codedexposure::gst::ObjectPtr<GstElement> find (const char *name) const;
 
   report::Status status_;
-  cexp::gst::ObjectPtr<GstElement> pipeline_;
+  codedexposure::gst::ObjectPtr<GstElement> pipeline_;
 
 private:
   bool say_missing (GstParseContext *context);
@@ -48,7 +49,7 @@ private:
   int code_ = 0;
 };
 
-/** The PIPELINE among the arguments of @p program, whose options go where
- * @p entries say; null, and why is said, where they are wrong. */
+/** Parses the arguments of @p program into @p entries and returns its PIPELINE;
+ * null, with a printed reason, if they are invalid. */
 const char *pipeline_argument (
     const char *program, const GOptionEntry *entries, int argc, char **argv);

@@ -1,11 +1,11 @@
 # shellcheck shell=bash disable=SC2154 # out: of those who source it
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# The sheet that shows a frame with regions; sourced by pipelines/report, after
-# figure.sh. Drawn by GStreamer.
+# Draws the picture of a frame with regions. Sourced by pipelines/report, after
+# figure.sh.
 
-sheet_width=1544 sheet_gap=8 sheet_most=32
+sheet_width=1544 sheet_gap=8 sheet_max=32
 
-# The regions of the schedule in force, WxH+X+Y each, as the demux said.
+# Prints the regions of the schedule, WxH+X+Y each, from the log of the demux.
 regions_said_in ()  # regions_said_in LOG
 {
   grep 'info: demux: src and the subframe pads' "$1" \
@@ -17,7 +17,7 @@ size_of ()  # size_of FILE.png: WIDTH HEIGHT
   od -An -tu1 -j 16 -N 8 "$1" | awk '{ print $3 * 256 + $4, $7 * 256 + $8 }'
 }
 
-# place X Y BRANCH: lays what a branch makes on the sheet.
+# place X Y BRANCH: adds the picture of a branch to the sheet.
 place ()
 {
   pads+="sink_$placed::xpos=$1 sink_$placed::ypos=$2 "
@@ -33,12 +33,12 @@ heading ()  # heading X Y TEXT
       draw-shadow=false)"
 }
 
-# All pictures of a folder, in rows, of the shape of a part of the frame; adds
-# to bottom what they take.
+# Adds all pictures of a folder in rows, with the aspect ratio of a part of the
+# frame, and moves bottom below them.
 strip ()  # strip FOLDER WIDTH HEIGHT TEXT
 {
   local files file columns width height column=0
-  mapfile -t files < <(find "$1" -name '*.png' | sort | head -n "$sheet_most")
+  mapfile -t files < <(find "$1" -name '*.png' | sort | head -n "$sheet_max")
   columns=$((${#files[@]} < 8 ? ${#files[@]} : 8))
   width=$(((sheet_width - (columns - 1) * sheet_gap) / columns))
   width=$((width < 380 ? width : 380))
@@ -57,8 +57,9 @@ strip ()  # strip FOLDER WIDTH HEIGHT TEXT
   bottom=$((bottom + height + sheet_gap))
 }
 
-# draw_regions FILE REGION...: the coded frame, the fused one, and the subframes
-# of every part, from the folders coded, fused, subframes and region-I in $out.
+# draw_regions FILE REGION...: draws the coded frame, the fused frame and the
+# subframes of every part, from the folders coded, fused, subframes and region-I
+# in $out.
 draw_regions ()
 {
   local file=$1 pads='' branches='' placed=0 bottom frame=() half i=0 rect
@@ -69,7 +70,7 @@ draw_regions ()
   bottom=$((28 + half * frame[1] / frame[0]))
   heading 0 0 'One coded frame'
   heading $((half + sheet_gap)) 0 \
-    'All parts in one picture: the first slot (fused); red: regions'
+    'All parts in one picture: first slot, fused; red: regions'
   place 0 28 "$(still "$coded") $(magnify_to "$half" $((bottom - 28)))"
   place $((half + sheet_gap)) 28 \
     "$(still "$fused") $(magnify_to "$half" $((bottom - 28)))"
@@ -81,10 +82,10 @@ draw_regions ()
         right=$((frame[0] - x - w)) bottom=$((frame[1] - y - h)) !
       $(magnify_to $((w * half / frame[0])) $((h * half / frame[0]))) $(red_frame)"
   done
-  strip "$out/subframes" "${frame[@]}" 'The background, subframe by subframe'
+  strip "$out/subframes" "${frame[@]}" 'Background: its subframes'
   for rect; do
     strip "$out/region-$i" "${rect%%x*}" "$(sed 's/.*x//; s/+.*//' <<< "$rect")" \
-      "Region $i, $rect, subframe by subframe"
+      "Region $i, $rect: its subframes"
     i=$((i + 1))
   done
   play_quietly "compositor name=page background=white $pads !

@@ -9,7 +9,7 @@
 #include <cstring>
 #include <utility>
 
-#include "gstraii.h"
+#include "common/raii.h"
 
 namespace report
 {
@@ -17,9 +17,9 @@ namespace report
 namespace
 {
 
-using namespace cexp::gst;
+using namespace codedexposure::gst;
 
-/** Elements that are not in GStreamer's base package, and what has them. */
+/** Elements outside of GStreamer's base package, and their Debian packages. */
 struct Provider {
   std::string_view element, package;
 };
@@ -39,16 +39,8 @@ constexpr Provider kProviders[] = {
     {"ximagesink", "gstreamer1.0-x"},
 };
 
-bool
-is_counter (const GParamSpec *spec)
-{
-  const GType type = spec->value_type;
-  return !(spec->flags & G_PARAM_WRITABLE) &&
-         (type == G_TYPE_UINT64 || type == G_TYPE_UINT || type == G_TYPE_INT);
-}
-
-/* Texts as they can be given to a command again, and not as GStreamer escapes
- * them. */
+/* Texts are quoted as in a shell command, without GStreamer's escapes; the
+ * largest number means that a value is not known. */
 std::string
 value_text (const GValue *value)
 {
@@ -58,26 +50,56 @@ value_text (const GValue *value)
     return text.empty () || text.find (' ') != text.npos ? '"' + text + '"'
                                                          : text;
   }
+  if (G_VALUE_HOLDS_UINT64 (value) && g_value_get_uint64 (value) == G_MAXUINT64)
+    return "unknown";
   const CharPtr text (gst_value_serialize (value));
   return text ? text.get () : "?";
 }
 
+bool
+is_integer (GType type)
+{
+  return type == G_TYPE_UINT64 || type == G_TYPE_UINT || type == G_TYPE_INT;
+}
+
+StructurePtr
+stats_of (GstElement *element)
+{
+  GstStructure *stats = nullptr;
+  if (g_object_class_find_property (G_OBJECT_GET_CLASS (element), "stats"))
+    g_object_get (element, "stats", &stats, nullptr);
+  return StructurePtr (stats);
+}
+
+/* The counters in the property stats. */
 std::string
-numbers_of (GstElement *element)
+numbers_in (const GstStructure *stats)
+{
+  std::string text;
+  for (gint i = 0; i < gst_structure_n_fields (stats); i++) {
+    const gchar *field = gst_structure_nth_field_name (stats, guint (i));
+    const GValue *value = gst_structure_get_value (stats, field);
+    if (is_integer (G_VALUE_TYPE (value)))
+      text += std::string (" ") + field + "=" + value_text (value);
+  }
+  return text;
+}
+
+/* The counters of an element without stats, which are read-only properties. */
+std::string
+read_only_numbers (GstElement *element)
 {
   std::string text;
   guint n = 0;
   GParamSpec **specs =
       g_object_class_list_properties (G_OBJECT_GET_CLASS (element), &n);
   for (guint i = 0; i < n; i++) {
-    if (!is_counter (specs[i]))
+    if ((specs[i]->flags & G_PARAM_WRITABLE) ||
+        !is_integer (specs[i]->value_type))
       continue;
-    GValue value = G_VALUE_INIT, printed = G_VALUE_INIT;
+    GValue value = G_VALUE_INIT;
     g_object_get_property (G_OBJECT (element), specs[i]->name, &value);
-    g_value_init (&printed, G_TYPE_STRING);
-    g_value_transform (&value, &printed);
-    text += format (" %s=%s", specs[i]->name, g_value_get_string (&printed));
-    g_value_unset (&printed);
+    text += std::string (" ") + specs[i]->name + "=" + value_text (&value);
     g_value_unset (&value);
   }
   g_free (specs);
@@ -85,11 +107,16 @@ numbers_of (GstElement *element)
 }
 
 std::string
+numbers_of (GstElement *element)
+{
+  const StructurePtr stats = stats_of (element);
+  return stats ? numbers_in (stats.get ()) : read_only_numbers (element);
+}
+
+std::string
 frames_shown_by (GstElement *sink)
 {
-  GstStructure *taken = nullptr;
-  g_object_get (sink, "stats", &taken, nullptr);
-  const StructurePtr stats (taken);
+  const StructurePtr stats = stats_of (sink);
   guint64 rendered = 0, dropped = 0;
   gst_structure_get (stats.get (), "rendered", G_TYPE_UINT64, &rendered,
       "dropped", G_TYPE_UINT64, &dropped, nullptr);
@@ -97,7 +124,7 @@ frames_shown_by (GstElement *sink)
       rendered, dropped);
 }
 
-/* What is not the place in the code; null where there is nothing. */
+/* The details of a debug text after the position in the code, or null. */
 const gchar *
 added (const gchar *debug)
 {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* What codedexposure-launch says on its terminal, and where it has it from. */
+/* Texts that codedexposure-launch and -guide print: messages, counters,
+ * progress. */
 #pragma once
 
 #include <chrono>
@@ -20,31 +21,32 @@ std::string minutes (double seconds);
 /** Processor time of this process so far, in seconds. */
 double cpu_seconds ();
 
-/** The Debian package that has @p element; empty where that is not known. */
+/** The Debian package of @p element; empty if not known. */
 std::string package_of (std::string_view element);
 
-/** Source and text of an ERROR or WARNING message, and what its writer added
- * for experts; not the place in the code. */
+/** Source and text of an ERROR or WARNING message with its details, without the
+ * position in the code. */
 std::string told (GstMessage *message, const GError *error, const gchar *debug);
 /** The same of a WARNING message. */
 std::string warned (GstMessage *message);
-/** The same of an INFO message: what its writer added, as gst-launch has it,
- * else the text. */
+/** The same for an INFO message: its details, as gst-launch-1.0 prints them, or
+ * its text. */
 std::string noted (GstMessage *message);
 
 /** "name: field=value ..." of an element message. */
 std::string fields_of (GstMessage *message);
 
-/** "name: counter=value ...": the read-only numbers of an element of the
- * plugin, shown and late frames of a video sink; empty for any other. */
+/** "name: counter=value ...": the counters in the property stats of an element
+ * of this plugin (without stats: its read-only numbers), or the shown and late
+ * frames of a video sink; empty for other elements. */
 std::string counters_of (GstElement *element);
 
-/** Lines on stderr, the last of which may be progress: rewritten on a terminal,
- * one every ten seconds in a log. */
+/** Prints lines to stderr. Progress rewrites the last line on a terminal, and
+ * is one line every ten seconds in a log. */
 class Status
 {
 public:
-  /** @p what  stands in front of every line. */
+  /** @p what  prefix of every line. */
   explicit Status (std::string what);
   void progress (const std::string &text);
   void line (const std::string &text);
@@ -54,7 +56,7 @@ private:
 
   std::string what_;
   bool terminal_;
-  bool open_ = false; // the terminal's line is progress
+  bool open_ = false; // the last line on the terminal is progress
   Clock::time_point next_ = Clock::now () + std::chrono::seconds (2);
 };
 

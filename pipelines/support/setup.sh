@@ -22,6 +22,7 @@ libgstreamer-plugins-base1.0-dev|GStreamer video library|run
 nlohmann-json3-dev|schedules and sidecars are JSON|run
 libcairo2-dev|letters and arrows over the picture of a calibration|run
 libusb-1.0-0-dev|DMD boards on the USB|run
+libeigen3-dev|linear algebra of estimates and calibrations|run
 libcli11-dev|options of the command-line tool|run
 gstreamer1.0-tools|gst-launch-1.0, gst-inspect-1.0|run
 gstreamer1.0-plugins-base|test scenes, conversion, TCP, compositor|run

@@ -1,23 +1,24 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* What moirecalib costs a frame of 768x576: the streaming thread with and
- * without the overlay, reading the fringes, drawing the panel. And what its
- * mapping costs: once, and a frame. */
+/* Cost of moirecalib for a frame of 768x576: the streaming thread with and
+ * without the overlay, the reading of the fringes and the drawing of the panel;
+ * and the cost of its mapping, once and for each frame. */
 #include <benchmark/benchmark.h>
 
-#include "gstcodedexposuremeta.h"
-#include "gstmoirecalib.h"
+#include "../quality/must.h"
+#include "bench/lens.h"
+#include "calibrate/gratings.h"
+#include "calibrate/live_moire.h"
+#include "common/meta.h"
 #include "harness.h"
-#include "moire/gratings.h"
-#include "moire/live_moire.h"
-#include "moire/rectifier.h"
-#include "optics/lens.h"
-#include "overlay/panel.h"
+#include "moirecalib/moirecalib.h"
+#include "moirecalib/panel.h"
+#include "rectify/rectifier.h"
 
 namespace
 {
 
-using namespace cexp;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::test;
 
 constexpr Extent kSize{768, 576};
 
@@ -100,10 +101,8 @@ BENCHMARK (draw_all)->Unit (benchmark::kMicrosecond);
 Mapping
 askew ()
 {
-  const Affine m =
-      camera_to_mirrors ({0.4, 0.4, 0.5, 1.01}, kSize.width, kSize.height);
-  Mapping::Parts parts = {
-      kSize, kSize, {m.xx, m.xy, m.x0, m.yx, m.yy, m.y0, 0, 0, 1}};
+  Mapping::Parts parts = {kSize, kSize,
+      camera_to_mirrors ({0.4, 0.4, 0.5, 1.01}, kSize.width, kSize.height)};
   parts.psf_sigma = 0.5;
   return *Mapping::make (parts);
 }
@@ -125,7 +124,7 @@ rectify (benchmark::State &state)
   const auto picture = grating<Pixel> ();
   auto mirrors = picture;
   for (auto _ : state)
-    rectifier->run (picture.view (), mirrors.view ());
+    quality::must (rectifier->run (picture.view (), mirrors.view ()));
 }
 BENCHMARK (rectify<std::uint8_t>)->Unit (benchmark::kMillisecond);
 BENCHMARK (rectify<std::uint16_t>)->Unit (benchmark::kMillisecond);

@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The whole element in a pipeline, from one pad to the next, with the frames of
- * a camera's pool: codedexposure-demux beside the kernel that it calls, a plain
- * push, and elements that everybody knows. Prints the last table of
- * docs/performance.md. */
+/* codedexposure-demux in a pipeline, from pad to pad, with the frames of a
+ * camera's pool, compared with its kernel, a plain push and common elements.
+ * Prints the last table of docs/performance.md. */
 #include <cstdio>
 #include <cstring>
 #include <memory>
@@ -12,22 +11,23 @@
 
 #include <benchmark/benchmark.h>
 
+#include "../quality/must.h"
+#include "common/meta.h"
+#include "common/raii.h"
+#include "demux/demux.h"
 #include "extract/extractor.h"
-#include "gstcodedexposuredemux.h"
-#include "gstcodedexposuremeta.h"
-#include "gstraii.h"
 #include "medians.h"
 
 namespace
 {
 
-using namespace cexp;
-using namespace cexp::gst;
+using namespace codedexposure;
+using namespace codedexposure::gst;
 
-constexpr guint kRing = 4; ///< frames that a camera's pool holds
+constexpr guint kRing = 4; ///< frames in a camera's pool
 constexpr int kCameraRate = 25;
 
-/** An element between a source pad and a sink pad of ours. */
+/** An element between a source pad and a sink pad of the benchmark. */
 class Line
 {
 public:
@@ -186,7 +186,7 @@ public:
   void run ()
   {
     at_ = (at_ + 1) % kRing;
-    extractor_.run (coded_[at_].view (), views_[at_]);
+    quality::must (extractor_.run (coded_[at_].view (), views_[at_]));
   }
 
 private:

@@ -7,23 +7,23 @@
 
 #include <benchmark/benchmark.h>
 
-#include "dmd/plane_image.h"
+#include "mirrors.h"
 
 namespace
 {
 
-using namespace cexp;
+using namespace codedexposure;
 
 constexpr Extent kSize{1920, 1080};
 
-PlaneImage
+MirrorRows<PlanePixel>
 planes_of (const char *preset)
 {
   const Schedule schedule = Schedule::parse (preset).value ();
-  return render_planes (schedule, plan_planes (schedule), 0, {}, kSize);
+  return test::rendered_planes (schedule, plan_planes (schedule), 0, kSize);
 }
 
-PlaneImage
+MirrorRows<PlanePixel>
 random_planes ()
 {
   PlaneImage image (kSize.width, kSize.height);
@@ -31,15 +31,15 @@ random_planes ()
   for (int y = 0; y < kSize.height; y++)
     for (int x = 0; x < kSize.width; x++)
       image.at (x, y) = random () & 0xFFFFFF;
-  return image;
+  return test::rows_of (image);
 }
 
 void
-encode (benchmark::State &state, const PlaneImage &image)
+encode (benchmark::State &state, const MirrorRows<PlanePixel> &image)
 {
   std::size_t size = 0;
   for (auto _ : state) {
-    const Bytes bytes = encode_erle (image.view ());
+    const Bytes bytes = encode_erle (image, 0, kSize.width).joined ();
     size = bytes.size ();
     benchmark::DoNotOptimize (bytes.data ());
   }

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Extraction against a plain copy of the frame, the paper's sort and what
- * libraries offer. Prints the tables of docs/performance.md: without arguments
- * all of them, else what a regular expression over WIDTHxHEIGHT/DEPTH/N picks;
- * with --target=NAME for one of the other instruction sets. */
+/* Extraction compared with a plain copy of the frame, the sort of the paper and
+ * libraries. Prints the tables of docs/performance.md: all of them without
+ * arguments, else those that a regular expression over WIDTHxHEIGHT/DEPTH/N
+ * selects; --target=NAME selects the instruction set. */
+#include "../quality/must.h"
 #include "extract/extractor.h"
 
 #include <algorithm>
@@ -26,7 +27,7 @@
 namespace
 {
 
-using namespace cexp;
+using namespace codedexposure;
 
 /** Frames in flight at either side of an element, as buffer pools keep them. */
 constexpr int kRing = 4;
@@ -64,7 +65,7 @@ public:
       : width_ (c.width / c.columns), height_ (c.height / c.rows)
   {
     std::mt19937_64 random (1);
-    /* What a video buffer has by default. */
+    /* The default stride of a video buffer. */
     const std::size_t stride =
         (std::size_t (width_) * sizeof (Pixel) + 3) / 4 * 4;
     const std::size_t plane =
@@ -141,7 +142,7 @@ extraction (const Case &c, const std::string &code, ExtractOptions options,
     fail (made.error ());
   const auto extractor = std::make_shared<Extractor<Pixel>> (std::move (*made));
   return [extractor] (Pool<Pixel> &pool) {
-    extractor->run (pool.coded ().view (), pool.planes ());
+    quality::must (extractor->run (pool.coded ().view (), pool.planes ()));
   };
 }
 
@@ -208,7 +209,7 @@ cv_sort (const Case &c, Pool<Pixel> &pool)
 }
 #endif
 
-/** Lattices of as many elements as a raster of the table. */
+/** Lattices with as many elements as the rasters of the table. */
 const std::map<int, std::string> kLattices = {
     {4, "lattice:4/2"}, {9, "lattice:9/3"}, {16, "lattice:16/4"}};
 
@@ -243,7 +244,7 @@ contenders (const Case &c)
   return all;
 }
 
-/** Ratios to memcpy: of a size, by contender, by n, of bytes and of 16 bits. */
+/** Ratios to memcpy by size, method, n and depth. */
 class Summary
 {
 public:

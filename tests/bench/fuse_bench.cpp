@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Fusion of frames of 768x576 in which everything moves: the table of speed in
  * docs/fusion.md. */
+#include "../quality/must.h"
 #include "fuse/fuser.h"
 
 #include <cmath>
@@ -14,14 +15,14 @@
 namespace
 {
 
-using namespace cexp;
+using namespace codedexposure;
 
 constexpr int kWidth = 768;
 constexpr int kHeight = 576;
 constexpr double kFrameRate = 25.0;
 constexpr int kFrames = 4;
 
-/** Waves of several lengths that go by at 1.3 px a slot. */
+/** Waves of several lengths that move by 1.3 px per slot. */
 double
 scene (double x, double y, int slot)
 {
@@ -63,8 +64,8 @@ fuse (benchmark::State &state, const char *preset, FuseQuality quality)
 
   std::size_t next = 0;
   for (auto _ : state) {
-    fuser.take (frames[next++ % frames.size ()].view ());
-    fuser.fuse (views);
+    quality::must (fuser.take (frames[next++ % frames.size ()].view ()));
+    quality::must (fuser.fuse (views));
   }
   state.counters["x_real_time"] = benchmark::Counter (
       double (state.iterations ()) / kFrameRate, benchmark::Counter::kIsRate);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Contenders that take turns, and the median time of each. */
+/* Runs methods in turn and takes the median time of each. */
 #pragma once
 
 #include <algorithm>
@@ -9,11 +9,11 @@
 
 #include <benchmark/benchmark.h>
 
-namespace cexp::bench
+namespace codedexposure::bench
 {
 
-/** Arguments by which contenders take turns, so that what disturbs one disturbs
- * all; those of the command line, which win, come after them. */
+/** Options that run methods in turn, so that a disturbance affects all of them.
+ * Options of the command line follow and override them. */
 inline std::vector<const char *>
 taking_turns (const char *program)
 {
@@ -21,7 +21,7 @@ taking_turns (const char *program)
       "--benchmark_enable_random_interleaving=true"};
 }
 
-/** Keeps the median processor time of one round of each contender. */
+/** Records the median processor time of one round of each method. */
 class Medians : public benchmark::BenchmarkReporter
 {
 public:
@@ -33,7 +33,7 @@ public:
         times_[run.run_name.function_name].push_back (
             run.cpu_accumulated_time / double (run.iterations));
   }
-  /** 0 when the contender was not run. */
+  /** 0 if the method was not run. */
   double seconds (const std::string &contender)
   {
     auto &times = times_[contender];
@@ -48,4 +48,4 @@ private:
   std::map<std::string, std::vector<double>> times_;
 };
 
-} // namespace cexp::bench
+} // namespace codedexposure::bench

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The optical bench against real time: coded frames of 768x576 at 25 fps. */
-#include "optics/bench.h"
+/* Speed of the simulated bench compared with real time: coded frames of 768x576
+ * at 25 fps. */
+#include "bench/bench.h"
 
 #include <limits>
 
@@ -9,7 +10,7 @@
 namespace
 {
 
-using namespace cexp;
+using namespace codedexposure;
 
 constexpr int kWidth = 768;
 constexpr int kHeight = 576;

@@ -1,14 +1,15 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* codedexposure-sim against real time: 768x576, 100 to 25 frames/s. */
+/* Speed of codedexposure-sim compared with real time: 768x576, 100 to 25
+ * frames/s. */
 #include <benchmark/benchmark.h>
 
-#include "gstcodedexposuresim.h"
+#include "sim/sim.h"
 #include "sim_harness.h"
 
 namespace
 {
 
-using namespace cexp::test;
+using namespace codedexposure::test;
 
 void
 coded_frames (benchmark::State &state, const char *properties)

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The paper's cost model of sorting a group, Eqs. 9-21, evaluated exactly, and
- * the comparisons that sorts really make. Prints the tables of docs/sorting.md;
- * given that page, says whether it carries them. */
+/* The cost model of the paper for sorting a group, Eqs. 9-21, evaluated
+ * exactly, and the comparisons that sorts really need. Prints the tables of
+ * docs/sorting.md; with that page as argument, checks that it contains them. */
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -61,29 +61,29 @@ eq9 (int n)
   return cost[std::size_t (n)];
 }
 
-/** Eq. 14, the closed form that the paper draws from Eqs. 9-13. */
+/** Eq. 14, the closed form that the paper derives from Eqs. 9-13. */
 double
 eq14 (int n)
 {
   return 2.0 * (n + 1) * harmonic_from_2 (n) + 3.0 - 1.5 * (n + 1);
 }
 
-/** Left of Eq. 17 for each element: insertion in groups of k. */
+/** Left side of Eq. 17 for each element: insertion sort in groups of k. */
 double
 eq17_cost (int k)
 {
   return (k + 4.0) * (k - 1.0) / (4.0 * k);
 }
 
-/** Right of Eq. 17 for each element: what the paper takes as its bound. */
+/** Right side of Eq. 17 for each element: the bound of the paper. */
 double
 eq17_bound (int k)
 {
   return k / 4.0 + 3.0 / 16.0;
 }
 
-/** What insertion below k saves; @p sum is the sum of 1 / i, i = 2..k, in Eq.
- * 19 and ln k in Eq. 20. */
+/** Comparisons that insertion sort below k saves; @p sum is the sum of 1 / i, i
+ * = 2..k, in Eq. 19 and ln k in Eq. 20. */
 double
 saving (int n, int k, double sum)
 {
@@ -126,7 +126,7 @@ best_k (F f, int n)
   return best;
 }
 
-/** Counts what it is asked. */
+/** Counts comparisons. */
 struct Counter {
   std::uint64_t asked = 0;
   bool operator() (int a, int b)
@@ -136,7 +136,7 @@ struct Counter {
   }
 };
 
-/** The quicksort of Eq. 9: the first value parts the group. */
+/** The quicksort of Eq. 9: the first value is the pivot. */
 void
 first_pivot_sort (std::span<int> values, Counter &less)
 {
@@ -160,7 +160,7 @@ first_pivot_sort (std::span<int> values, Counter &less)
   first_pivot_sort (values.subspan (high + 1), less);
 }
 
-/** Mean comparisons over groups of random bytes or of rising ones. */
+/** Mean comparisons over groups of random or of ascending bytes. */
 template <typename Sort>
 double
 measured (int n, bool rising, Sort sort)
@@ -181,10 +181,10 @@ template <int N>
 int
 network_size ()
 {
-  return cexp::Network<N>::sort ().size ();
+  return codedexposure::Network<N>::sort ().size ();
 }
 
-/* 256 wires would only take long to compile: two halves and their merge. */
+/* A network of 256 wires takes long to compile: two halves and their merge. */
 constexpr int kMergeOf128And128 = 897;
 
 int
@@ -256,11 +256,11 @@ measured_table (bool rising)
         number (measured (n, rising, first_pivot_sort)),
         number (measured (n, rising,
             [] (std::span<int> group, Counter &less) {
-              cexp::group_sort (group, less);
+              codedexposure::group_sort (group, less);
             })),
         number (measured (n, rising,
             [] (std::span<int> group, Counter &less) {
-              cexp::insertion_sort (group, less);
+              codedexposure::insertion_sort (group, less);
             })),
         number (measured (n, rising,
             [] (std::span<int> group, Counter &less) {

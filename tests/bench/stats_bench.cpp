@@ -1,22 +1,22 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* What subframestats costs a subframe of 384x288: its arithmetic alone, and
- * with all that it says. */
+/* Cost of subframestats for a subframe of 384x288: the computation alone, and
+ * with all outputs. */
 #include <benchmark/benchmark.h>
 
-#include "gstcodedexposuremeta.h"
-#include "gstsubframestats.h"
-#include "gstsubframestatsreport.h"
+#include "common/meta.h"
 #include "harness.h"
 #include "stats/picture_stats.h"
+#include "stats/report.h"
+#include "stats/subframestats.h"
 
 namespace
 {
 
-using namespace cexp;
-using namespace cexp::gst;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::gst;
+using namespace codedexposure::test;
 
-/* Shades with noise, as a camera's. */
+/* A gradient with noise, as from a camera. */
 template <typename Pixel>
 Image<Pixel>
 subframe ()

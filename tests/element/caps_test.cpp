@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* scale_caps: coded caps to subframe caps and back. */
-#include "gstcodedexposurecaps.h"
+#include "common/caps.h"
 
 #include <gtest/gtest.h>
 
-#include "gstraii.h"
+#include "common/raii.h"
 
 namespace
 {
 
-using namespace cexp::gst;
+using namespace codedexposure::gst;
 
 CapsScale
 raster (int columns, int rows, bool raised_rate = true, int pilot_rows = 0)

@@ -1,17 +1,18 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure-demux: memory, strides, pools and metas. */
+#include "downstream.h"
 #include "harness.h"
 
 #include <set>
 
-#include "gstcodedexposuremeta.h"
+#include "common/meta.h"
 
 namespace
 {
 
-using namespace cexp;
-using namespace cexp::gst;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::gst;
+using namespace codedexposure::test;
 
 constexpr char kLine[] = "codedexposure-demux schedule=sequential:2x2";
 constexpr int kWidth = 30, kHeight = 20;
@@ -58,7 +59,7 @@ odd_pool_options (GstBufferPool *)
   return options;
 }
 
-/* Rows of an odd stride behind a few bytes of something else. */
+/* Rows with an odd stride after a few bytes of other data. */
 GstFlowReturn
 odd_pool_alloc (
     GstBufferPool *pool, GstBuffer **buffer, GstBufferPoolAcquireParams *)
@@ -96,35 +97,6 @@ new_odd_pool ()
   return ObjectPtr<GstBufferPool> (GST_BUFFER_POOL (
       gst_object_ref_sink (g_object_new (odd_pool_get_type (), nullptr))));
 }
-
-/* What the peer of a pad says to the ALLOCATION query. */
-struct Downstream {
-  explicit Downstream (GstHarness *h)
-  {
-    gst_pad_add_probe (
-        h->sinkpad, GST_PAD_PROBE_TYPE_QUERY_DOWNSTREAM, answer, this, nullptr);
-  }
-  static GstPadProbeReturn answer (
-      GstPad *, GstPadProbeInfo *info, gpointer user_data)
-  {
-    GstQuery *query = GST_PAD_PROBE_INFO_QUERY (info);
-    if (GST_QUERY_TYPE (query) != GST_QUERY_ALLOCATION)
-      return GST_PAD_PROBE_OK;
-    auto &self = *static_cast<Downstream *> (user_data);
-    self.queries++;
-    if (self.video_meta)
-      gst_query_add_allocation_meta (query, GST_VIDEO_META_API_TYPE, nullptr);
-    if (self.pool)
-      gst_query_add_allocation_pool (
-          query, self.pool.get (), 0, self.min, self.max);
-    return GST_PAD_PROBE_HANDLED;
-  }
-
-  ObjectPtr<GstBufferPool> pool;
-  guint min = 0, max = 0;
-  bool video_meta = true;
-  int queries = 0;
-};
 
 class DemuxBuffers : public ::testing::Test
 {
@@ -303,7 +275,7 @@ TEST (DemuxMemory, CodedFrameIsPassedOnInItsOwnMemory)
   }
 }
 
-/* They are written at once, and would throw each other out of the cache. */
+/* They are written together and must not evict each other from the cache. */
 TEST (DemuxMemory, SubframesStartAtDifferentPlacesOfAPage)
 {
   ElementHarness demux (kLine);
@@ -338,7 +310,7 @@ TEST (DemuxMemory, OnlyWantedSubframesTakeBuffers)
   EXPECT_EQ (buffer->pool, downstream.pool.get ());
   const CapsPtr caps = demux.pad_caps ("subframe_3");
   EXPECT_EQ (image_of<std::uint8_t> (buffer.get (), caps.get ()), subframe (3));
-  EXPECT_EQ (property<guint64> (demux.element (), "subframes-out"), 1u);
+  EXPECT_EQ (counter_of (demux.element (), "subframes-out"), 1u);
 }
 
 /* ---------------------------------------------------------------- input -- */

@@ -3,14 +3,14 @@
  * and renegotiation. */
 #include "harness.h"
 
-#include "gstcodedexposuretag.h"
+#include "common/tag.h"
 
 namespace
 {
 
-using namespace cexp;
-using namespace cexp::gst;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::gst;
+using namespace codedexposure::test;
 
 constexpr GstClockTime kPeriod = 40 * GST_MSECOND;
 
@@ -210,7 +210,7 @@ PrintTo (const QueryCase &c, std::ostream *os)
 #define ANY_SIZE "width=[1,2147483647],height=[1,2147483647]"
 #define ANY_RATE "framerate=(fraction)[0/1,2147483647/1]"
 
-/* What the sink pad takes, for caps that the peer of "src" takes. */
+/* Caps that the sink pad accepts, for caps that the peer of "src" accepts. */
 class DemuxSinkQuery : public ::testing::TestWithParam<QueryCase>
 {
 };
@@ -261,8 +261,8 @@ TEST_P (DemuxSinkQuery, AnswersForDownstream)
   EXPECT_TRUE (same_caps (answer.get (), c.answer));
 }
 
-/* A schedule that is only assumed must not keep upstream from sending what the
- * schedule of its tag needs; one that the stream has told binds. */
+/* An assumed schedule must not reject caps that the schedule of a later tag
+ * needs; a schedule from the stream is binding. */
 TEST (DemuxCaps, QueryIsBoundByTheTagButNotByAnAssumption)
 {
   ElementHarness demux ("codedexposure-demux");
@@ -320,7 +320,8 @@ TEST (DemuxCaps, RequestPadBindsTheSinkOnlyWhenLinked)
   gst_object_unref (sink);
 }
 
-/* What "src" can give, for caps that the peer of the sink pad can give. */
+/* Caps that "src" can produce, for caps that the peer of the sink pad can
+ * produce. */
 class DemuxSrcQuery : public ::testing::TestWithParam<QueryCase>
 {
 };
@@ -457,8 +458,8 @@ TEST (DemuxCaps, CapsEventsBearTheSequenceNumberOfUpstream)
   }
 }
 
-/* Tags follow caps, so the caps of source pads wait for the first frame; what
- * comes between must still follow them. */
+/* Tags follow caps, so source pads send caps with the first frame; events in
+ * between must still follow the caps. */
 TEST (DemuxCaps, EventsComeInTheOrderThatDownstreamNeeds)
 {
   ElementHarness demux ("codedexposure-demux schedule=sequential:2x2");

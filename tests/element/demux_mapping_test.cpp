@@ -1,24 +1,25 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* codedexposure-demux with a mapping: by property and by tag, what it says, and
- * what it refuses. */
+/* codedexposure-demux with a mapping: by property and by tag, messages and
+ * errors. */
 #include <filesystem>
 #include <fstream>
 
 #include <unistd.h>
 
-#include "gstcodedexposuremeta.h"
-#include "gstcodedexposuretag.h"
+#include "common/messages.h"
+#include "common/meta.h"
+#include "common/tag.h"
 #include "harness.h"
 
 namespace
 {
 
-using namespace cexp;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::test;
 
 constexpr int kWidth = 64, kHeight = 48;
 
-/** Of a camera that looks @p x, @p y mirrors further right and down. */
+/** Mapping of a camera that sees @p x, @p y mirrors further right and down. */
 Mapping
 shifted (double x, double y)
 {
@@ -30,14 +31,14 @@ shifted (double x, double y)
   return *mapping;
 }
 
-/** What mirror (x, y) shows. */
+/** Pixel value of mirror (x, y). */
 int
 light (int x, int y)
 {
   return (x * 7 + y * 13 + (x % 2 + 2 * (y % 2)) * 50) % 200 + 20;
 }
 
-/** Frame of a camera that looks (dx, dy) mirrors further. */
+/** Frame of a camera that sees (dx, dy) mirrors further. */
 BufferPtr
 frame (int dx, int dy)
 {
@@ -84,17 +85,6 @@ protected:
       ("cexp-demux-mapping-" + std::to_string (getpid ()) + ".json");
 };
 
-guint64
-field (const MessagePtr &message, const char *name)
-{
-  guint64 value = G_MAXUINT64;
-  EXPECT_TRUE (
-      message && gst_structure_get_uint64 (
-                     gst_message_get_structure (message.get ()), name, &value))
-      << name;
-  return value;
-}
-
 } // namespace
 
 TEST_F (DemuxMapping, OfAnAlignedBenchChangesNothing)
@@ -102,10 +92,11 @@ TEST_F (DemuxMapping, OfAnAlignedBenchChangesNothing)
   ElementHarness demux (demux_with (save (shifted (0, 0).to_json ())));
   demux.set_caps (gray_caps (kWidth, kHeight));
   EXPECT_EQ (subframe (demux, frame (0, 0)), aligned ());
-  const MessagePtr said = demux.element_message ("codedexposure/mapping");
-  EXPECT_EQ (field (said, "exact"), guint64 (kWidth * kHeight));
-  EXPECT_EQ (field (said, "mixed"), 0u);
-  EXPECT_EQ (property<guint64> (demux.element (), "mirrors-mixed"), 0u);
+  const auto said = demux.posted<MirrorsSeen> ();
+  ASSERT_TRUE (said);
+  EXPECT_EQ (said->exact, guint64 (kWidth * kHeight));
+  EXPECT_EQ (said->mixed, 0u);
+  EXPECT_EQ (counter_of (demux.element (), "mirrors-mixed"), 0u);
 }
 
 TEST_F (DemuxMapping, FindsElementsThatStandElsewhere)
@@ -116,16 +107,16 @@ TEST_F (DemuxMapping, FindsElementsThatStandElsewhere)
   const Image<std::uint8_t> wanted = aligned ();
   ASSERT_EQ (found.width (), wanted.width ());
   ASSERT_EQ (found.height (), wanted.height ());
-  /* The first mirrors are out of sight: 5 columns and 3 rows of them. */
+  /* The camera does not see the first 5 columns and 3 rows of mirrors. */
   for (int y = 2; y < wanted.height (); y++)
     for (int x = 3; x < wanted.width (); x++)
       ASSERT_EQ (found.at (x, y), wanted.at (x, y)) << x << ", " << y;
-  const MessagePtr said = demux.element_message ("codedexposure/mapping");
-  EXPECT_EQ (field (said, "exact"), guint64 ((kWidth - 5) * (kHeight - 3)));
-  EXPECT_EQ (field (said, "unseen"),
-      guint64 (kWidth * kHeight - (kWidth - 5) * (kHeight - 3)));
-  EXPECT_EQ (property<guint64> (demux.element (), "mirrors-unseen"),
-      field (said, "unseen"));
+  const auto said = demux.posted<MirrorsSeen> ();
+  ASSERT_TRUE (said);
+  EXPECT_EQ (said->exact, guint64 ((kWidth - 5) * (kHeight - 3)));
+  EXPECT_EQ (
+      said->unseen, guint64 (kWidth * kHeight - (kWidth - 5) * (kHeight - 3)));
+  EXPECT_EQ (counter_of (demux.element (), "mirrors-unseen"), said->unseen);
 }
 
 TEST_F (DemuxMapping, KeepsWithinTheBitsThatFramesSay)
@@ -156,11 +147,11 @@ TEST_F (DemuxMapping, SaysThatPixelsSeeSeveralMirrors)
   ElementHarness demux (demux_with (save (shifted (0.5, 0.5).to_json ())));
   demux.set_caps (gray_caps (kWidth, kHeight));
   subframe (demux, frame (0, 0));
-  const MessagePtr said = demux.element_message ("codedexposure/mapping");
-  EXPECT_EQ (field (said, "exact"), 0u);
-  EXPECT_GT (field (said, "mixed"), guint64 ((kWidth - 2) * (kHeight - 2)));
-  EXPECT_EQ (property<guint64> (demux.element (), "mirrors-mixed"),
-      field (said, "mixed"));
+  const auto said = demux.posted<MirrorsSeen> ();
+  ASSERT_TRUE (said);
+  EXPECT_EQ (said->exact, 0u);
+  EXPECT_GT (said->mixed, guint64 ((kWidth - 2) * (kHeight - 2)));
+  EXPECT_EQ (counter_of (demux.element (), "mirrors-mixed"), said->mixed);
 }
 
 TEST_F (DemuxMapping, ComesWithTheTag)

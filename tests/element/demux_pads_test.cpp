@@ -1,19 +1,19 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* codedexposure-demux: pads that come and go, what they are told, and what
- * they say together. */
+/* codedexposure-demux: pads that are added and removed, their events and their
+ * combined flow. */
 #include "harness.h"
 
 #include <atomic>
 #include <thread>
 
-#include "gstcodedexposuretag.h"
+#include "common/tag.h"
 
 namespace
 {
 
-using namespace cexp;
-using namespace cexp::gst;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::gst;
+using namespace codedexposure::test;
 
 constexpr GstClockTime kPeriod = 40 * GST_MSECOND;
 constexpr char kLine[] = "codedexposure-demux schedule=sequential:2x2";
@@ -40,7 +40,7 @@ request (ElementHarness &demux, const char *name)
       gst_element_request_pad_simple (demux.element (), name));
 }
 
-/* A sink pad that takes buffers, notes them, and returns what it is told to. */
+/* A sink pad that records buffers and returns a given flow. */
 class FlowSink
 {
 public:
@@ -459,7 +459,7 @@ TEST (DemuxStress, PadsComeAndGoWhileFramesPass)
     ASSERT_EQ (demux.push (coded_frame (frame)), GST_FLOW_OK);
   EXPECT_GT (gst_harness_stress_thread_stop (ones), 1u);
   EXPECT_GT (gst_harness_stress_thread_stop (codeds), 1u);
-  EXPECT_EQ (property<guint64> (demux.element (), "frames-in"), kStressFrames);
+  EXPECT_EQ (counter_of (demux.element (), "frames-in"), kStressFrames);
   EXPECT_EQ (demux.error (), "");
 }
 
@@ -493,7 +493,7 @@ TEST (DemuxStress, PropertiesChangeWhileFramesPass)
   for (GstHarnessThread *thread : threads)
     EXPECT_GT (gst_harness_stress_thread_stop (thread), 1u);
   EXPECT_EQ (demux.error (), "");
-  EXPECT_EQ (property<guint64> (demux.element (), "frames-lost"), 0u);
+  EXPECT_EQ (counter_of (demux.element (), "frames-lost"), 0u);
 }
 
 TEST (DemuxStress, ReportsAreReadWhileFramesPass)

@@ -2,19 +2,19 @@
 /* codedexposure-demux in pipelines of real elements. */
 #include "harness.h"
 
-#include "gstcodedexposuremeta.h"
+#include "common/meta.h"
 #include "pipeline.h"
 #include "schedule/sample_grid.h"
 
 namespace
 {
 
-using namespace cexp;
-using namespace cexp::gst;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::gst;
+using namespace codedexposure::test;
 
-/* Pictures and times of all buffers that pass a pad; a flush forgets those
- * before it, as it does downstream. */
+/* Pictures and times of all buffers that pass a pad; a flush discards those
+ * before it, as downstream does. */
 template <typename Pixel>
 class Watch
 {
@@ -98,8 +98,8 @@ check_bench (const BenchCase &c)
   ASSERT_EQ (out.images.size (), in.images.size ());
   for (std::size_t i = 0; i < in.images.size (); i++) {
     SCOPED_TRACE (i);
-    /* The demux has the time of the coded frame and the rate, both rounded to
-     * a nanosecond; the source has rounded the time of each frame itself. */
+    /* The demux computes times from that of the coded frame and the rate, both
+     * rounded to a ns; the source rounds the time of each frame. */
     EXPECT_NEAR (double (out.times[i]), double (in.times[i]), 1.0);
     const int slot = int (i) % schedule.slots ();
     EXPECT_EQ (
@@ -181,7 +181,7 @@ TEST (DemuxPipeline, TwoInOneProcessDoNotKnowOfEachOther)
     return text_property (pipeline[name].get (), "schedule-in-force");
   };
   const auto frames = [&] (const char *name) {
-    return property<guint64> (pipeline[name].get (), "frames-in");
+    return counter_of (pipeline[name].get (), "frames-in");
   };
   EXPECT_EQ (in_force ("four"), "sequential:2x2");
   EXPECT_EQ (in_force ("nine"), "sequential:3x3");
@@ -210,7 +210,7 @@ TEST (DemuxPipeline, TwelveBitsAreKnownAllTheWay)
   const auto saturated = [&] (const char *name) {
     return property<guint64> (pipeline[name].get (), "saturated-frames");
   };
-  EXPECT_EQ (saturated ("demux"), 2u);
+  EXPECT_EQ (counter_of (pipeline["demux"].get (), "saturated-frames"), 2u);
   EXPECT_EQ (saturated ("stats"), 8u);
   EXPECT_EQ (saturated ("converted"), 8u);
 }
@@ -237,7 +237,7 @@ TEST (DemuxPipeline, SeekStartsANewStretchOfTime)
   ASSERT_EQ (out.times.size (), 100u);
   EXPECT_EQ (out.times.front (), 4 * GST_SECOND);
   EXPECT_EQ (out.times.back (), 5 * GST_SECOND - 10 * GST_MSECOND);
-  EXPECT_EQ (property<guint64> (demux.get (), "frames-lost"), 0u);
+  EXPECT_EQ (counter_of (demux.get (), "frames-lost"), 0u);
 }
 
 TEST (DemuxPipeline, ErrorReachesTheBusOnceAndStopsThePipeline)

@@ -5,9 +5,9 @@
 namespace
 {
 
-using namespace cexp;
-using namespace cexp::gst;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::gst;
+using namespace codedexposure::test;
 
 constexpr GstClockTime kMs = GST_MSECOND;
 constexpr char kLine[] = "codedexposure-demux schedule=sequential:2x2";
@@ -74,7 +74,8 @@ protected:
   {
     ASSERT_EQ (demux->push (coded_frame (pts)), GST_FLOW_OK);
   }
-  /** The sink behind @p pad got what ran at @p time late by @p lateness. */
+  /** Reports that the sink of @p pad received a buffer of running time @p time
+   * late by @p lateness. */
   void report_late (
       GstClockTime time, GstClockTimeDiff lateness, const std::string &pad = "")
   {
@@ -90,7 +91,7 @@ protected:
   }
   guint64 counter (const char *name)
   {
-    return property<guint64> (demux->element (), name);
+    return counter_of (demux->element (), name);
   }
   std::unique_ptr<ElementHarness> demux;
   std::unique_ptr<Upstream> upstream;
@@ -155,7 +156,8 @@ TEST_F (DemuxQos, LateSubframesOfOnePadAreLeftOutAndSaid)
   times ();
   times ("subframe_1");
   times ("coded");
-  /* 40 ms ran at 40 + 25: what runs before 65 ms cannot be in time. */
+  /* The buffer of 40 ms was shown at 65 ms: earlier buffers cannot be in time.
+   */
   report_late (40 * kMs, 25 * kMs);
   push (40 * kMs);
 
@@ -264,6 +266,24 @@ TEST_F (DemuxQos, LatenessIsInRunningTime)
   report_late (5 * GST_SECOND + 40 * kMs, 15 * kMs);
   push (GST_SECOND + 40 * kMs);
   EXPECT_EQ (times (), (std::vector<int>{1060, 1070}));
+}
+
+/* In reverse playback, a subframe begins at its end. */
+TEST_F (DemuxQos, LatenessIsThatOfTheDirectionOfPlayback)
+{
+  start ("qos=true");
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_TIME);
+  segment.rate = -1.0;
+  segment.stop = segment.position = GST_SECOND;
+  demux->push_event (gst_event_new_segment (&segment));
+  push (960 * kMs);
+  times ();
+  /* 950 to 960 ms run 40 ms after the start, 920 to 930 ms 70 ms after it. */
+  report_late (40 * kMs, 25 * kMs);
+  push (920 * kMs);
+  EXPECT_EQ (times (), std::vector<int>{920});
+  EXPECT_EQ (counter ("subframes-dropped"), 3u);
 }
 
 TEST_F (DemuxQos, SegmentAndFlushForgetLateness)

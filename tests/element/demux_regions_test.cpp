@@ -4,17 +4,17 @@
 
 #include <cmath>
 
-#include "gstcodedexposuremeta.h"
-#include "gstcodedexposuretag.h"
-#include "optics/bench.h"
+#include "bench/bench.h"
+#include "common/meta.h"
+#include "common/tag.h"
 #include "pipeline.h"
 
 namespace
 {
 
-using namespace cexp;
-using namespace cexp::gst;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::gst;
+using namespace codedexposure::test;
 
 /* n = 4 in the background, 8 at (8, 4), 2 at (32, 12). */
 constexpr char kSchedule[] = "sequential:2x2,region=16x8+8+4:sequential:4x2,"
@@ -113,7 +113,7 @@ TEST (DemuxRegions, LightLastsForAllSlotsThatAMaskIsHeld)
   demux.request ("region_0");
   demux.set_caps (gray_caps (kWidth, kHeight));
   ASSERT_EQ (demux.push (coded_frame (0)), GST_FLOW_OK);
-  /* 8 slots of 5 ms; the background holds each of its masks for 2. */
+  /* 8 slots of 5 ms; the background shows each of its masks for 2. */
   for (const auto &[pad, light, step] :
       {std::tuple ("", 9, 10), std::tuple ("region_0", 4, 5)}) {
     for (int k = 0; const BufferPtr buffer = demux.pull (pad); k++) {
@@ -164,7 +164,7 @@ TEST (DemuxRegions, GetTheirOwnPixelsAndLeaveBlackBehind)
   EXPECT_EQ (one[0], background (3));
 }
 
-/* Slots of the region are half as long as those that the gain is for. */
+/* Slots of the region are half as long as those of the gain. */
 TEST (DemuxRegions, AGainKeepsPartsAlike)
 {
   ElementHarness demux (line ("method=decode gain=1"));
@@ -247,7 +247,7 @@ TEST (DemuxRegions, PadsThatNoRegionStandsBehindAreRefused)
     ElementHarness demux (
         "codedexposure-demux schedule=" + std::string (schedule));
     const ObjectPtr<GstPad> pad = request (demux, "region_2");
-    ASSERT_TRUE (pad); // who knows what schedule comes
+    ASSERT_TRUE (pad); // the schedule is not known yet
     demux.set_caps (gray_caps (kWidth, kHeight));
     EXPECT_EQ (demux.push (coded_frame (0)), GST_FLOW_NOT_NEGOTIATED);
     const std::string error = demux.error ();
@@ -386,7 +386,27 @@ TEST (DemuxRegions, AreNotForgottenByWhoeverSeesTheBackgroundOnly)
   g_error_free (error);
 }
 
-/** A camera that may stand askew before mirrors with two regions. */
+/* The pilot may be saturated. */
+TEST (DemuxRegions, PixelsOfThePilotAreNotCountedAsSaturated)
+{
+  constexpr int kPilot = 4;
+  ElementHarness demux ("codedexposure-demux schedule=sequential:2x2,pilot=4,"
+                        "region=16x8+8+4:sequential:4x2");
+  demux.request ("region_0");
+  demux.set_caps (gray_caps (kWidth, kHeight));
+  const auto frame = draw<std::uint8_t> (kWidth, kHeight, [] (int x, int y) {
+    const bool white = (x == 9 && y == 5) || (x == 0 && y < 2);
+    return white || y >= kHeight - kPilot ? 255 : 100;
+  });
+  ASSERT_EQ (demux.push (frame_of (frame, 0)), GST_FLOW_OK);
+  for (const char *pad : {"", "region_0"}) {
+    const BufferPtr buffer = demux.pull (pad);
+    ASSERT_TRUE (buffer);
+    EXPECT_EQ (get_frame_meta (buffer.get ())->saturated, 3u) << pad;
+  }
+}
+
+/** A camera, possibly misaligned, and mirrors with two regions. */
 class MappedRegions : public ::testing::Test
 {
 protected:
@@ -394,8 +414,7 @@ protected:
 
   Mapping mapping (const Alignment &alignment, double psf_sigma) const
   {
-    const Affine t = camera_to_mirrors (alignment, kSide, kSide);
-    return mapping ({t.xx, t.xy, t.x0, t.yx, t.yy, t.y0, 0, 0, 1}, psf_sigma);
+    return mapping (camera_to_mirrors (alignment, kSide, kSide), psf_sigma);
   }
   Mapping mapping (const Homography &homography, double psf_sigma = 0.0) const
   {
@@ -406,7 +425,7 @@ protected:
     EXPECT_TRUE (made.ok ());
     return *made;
   }
-  /** Of texture that moves by 3 pixels in an exposure. */
+  /** Coded frames of a texture that moves by 3 pixels in an exposure. */
   Image<std::uint8_t> coded (const BenchOptions &options, int number) const
   {
     auto bench = OpticalBench::make (kSide, kSide, options);
@@ -449,7 +468,7 @@ protected:
                               "region=32x32+53+26:sequential:lattice:4/2");
 };
 
-/** Of pixels that are @p border and more from the border. */
+/** PSNR of pixels at least @p border from the border. */
 double
 mean_square (const std::vector<Image<std::uint8_t>> &a,
     const std::vector<Image<std::uint8_t>> &b, int border)
@@ -492,7 +511,7 @@ TEST_F (MappedRegions, OfAMisalignedBenchAreAsTrueAsOfAnAlignedOne)
   }
 }
 
-/* A region lies among the mirrors, however the camera sees them. */
+/* A region is a rectangle of mirrors, however the camera sees them. */
 TEST_F (MappedRegions, OfACameraThatIsTurnedAreFoundExactly)
 {
   const std::vector frames = {coded ({}, 0), coded ({}, 1)};

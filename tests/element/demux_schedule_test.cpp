@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* codedexposure-demux: where the schedule comes from, and what the pixels of
- * the subframes are. */
+/* codedexposure-demux: sources of the schedule, and pixel values of the
+ * subframes. */
 #include "harness.h"
 
 #include <cstdio>
@@ -8,20 +8,21 @@
 
 #include <glib/gstdio.h>
 
+#include "common/messages.h"
+#include "common/meta.h"
+#include "common/tag.h"
 #include "extract/extractor.h"
-#include "gstcodedexposuremeta.h"
-#include "gstcodedexposuretag.h"
 
 namespace
 {
 
-using namespace cexp;
-using namespace cexp::gst;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::gst;
+using namespace codedexposure::test;
 
 constexpr GstClockTime kPeriod = 40 * GST_MSECOND;
 
-/* Every pixel says where it comes from. */
+/* Every pixel encodes its position. */
 template <typename Pixel = std::uint8_t>
 Image<Pixel>
 picture (int width = 24, int height = 24)
@@ -52,7 +53,7 @@ expected (const std::string &preset, const Image<Pixel> &coded, Method method)
   std::vector<ImageView<Pixel>> views;
   for (auto &subframe : subframes)
     views.push_back (subframe.view ());
-  extractor->run (coded.view (), views);
+  EXPECT_TRUE (extractor->run (coded.view (), views));
   return subframes;
 }
 
@@ -226,7 +227,7 @@ TEST_F (DemuxSchedule, MayBeAFile)
   ASSERT_EQ (push (0), GST_FLOW_OK);
   EXPECT_EQ (in_force (*demux), "sequential:3x2");
 
-  /* What the file says at the start of a run counts. */
+  /* The file is read at the start of a run. */
   gst_element_set_state (demux->element (), GST_STATE_NULL);
   std::ofstream (name) << schedule_of ("sequential:3x3").to_json ();
   gst_element_set_state (demux->element (), GST_STATE_PLAYING);
@@ -409,7 +410,7 @@ TEST (DemuxPixels, GainAndInterpolationReachTheDecoder)
   ElementHarness demux (
       "codedexposure-demux schedule=staircase:2x2 gain=1 interpolate=false");
   demux.set_caps (gray_caps (8, 8));
-  /* A still scene of value 10 in each slot: elements hold 10, 20, 30, 40. */
+  /* A static scene of value 10 in each slot: elements are 10, 20, 30, 40. */
   const auto coded = draw<std::uint8_t> (
       8, 8, [] (int x, int y) { return 10 * (1 + x % 2 + 2 * (y % 2)); });
   ASSERT_EQ (demux.push (frame_of (coded, 0)), GST_FLOW_OK);
@@ -428,13 +429,9 @@ TEST (DemuxPixels, GainAndInterpolationReachTheDecoder)
 class DemuxSaturation : public DemuxSchedule
 {
 protected:
-  /* No saturation for a second ends a stretch. */
+  /* A second without saturation ends the sequence. */
   static constexpr int kCalmFrames = int (GST_SECOND / kPeriod);
 
-  struct Said {
-    bool active;
-    guint64 frames, pixels, from, to;
-  };
   void push_frame (int frame, int saturated)
   {
     auto image = picture ();
@@ -443,23 +440,7 @@ protected:
     ASSERT_EQ (demux->push (frame_of (image, GstClockTime (frame) * kPeriod)),
         GST_FLOW_OK);
   }
-  std::optional<Said> said ()
-  {
-    const MessagePtr message =
-        demux->element_message ("codedexposure/saturated");
-    if (!message)
-      return std::nullopt;
-    const GstStructure *s = gst_message_get_structure (message.get ());
-    Said found{};
-    gboolean active = FALSE;
-    EXPECT_TRUE (gst_structure_get_boolean (s, "active", &active));
-    found.active = active;
-    gst_structure_get_uint64 (s, "frames", &found.frames);
-    gst_structure_get_uint64 (s, "pixels", &found.pixels);
-    gst_structure_get_uint64 (s, "from", &found.from);
-    gst_structure_get_uint64 (s, "to", &found.to);
-    return found;
-  }
+  std::optional<Saturated> said () { return demux->posted<Saturated> (); }
 };
 
 TEST_F (DemuxSaturation, IsSaidWhenAStretchBeginsAndEnds)
@@ -488,7 +469,7 @@ TEST_F (DemuxSaturation, IsSaidWhenAStretchBeginsAndEnds)
   EXPECT_EQ (ended->pixels, 5u);
   EXPECT_EQ (ended->from, kPeriod);
   EXPECT_EQ (ended->to, 3 * kPeriod);
-  EXPECT_EQ (property<guint64> (demux->element (), "saturated-frames"), 3u);
+  EXPECT_EQ (counter_of (demux->element (), "saturated-frames"), 3u);
 }
 
 TEST_F (DemuxSaturation, IsOneStretchWhereFramesFlicker)
@@ -517,6 +498,42 @@ TEST_F (DemuxSaturation, EosEndsAStretch)
   ASSERT_TRUE (ended);
   EXPECT_FALSE (ended->active);
   EXPECT_EQ (ended->frames, 1u);
+}
+
+TEST_F (DemuxSaturation, AFlushEndsAStretch)
+{
+  start ("schedule=sequential:2x2");
+  push_frame (0, 1);
+  push_frame (1, 2);
+  ASSERT_TRUE (said ());
+  demux->push_event (gst_event_new_flush_start ());
+  demux->push_event (gst_event_new_flush_stop (TRUE));
+  const auto ended = said ();
+  ASSERT_TRUE (ended);
+  EXPECT_FALSE (ended->active);
+  EXPECT_EQ (ended->frames, 2u);
+  EXPECT_EQ (ended->pixels, 2u);
+  EXPECT_EQ (ended->from, 0u);
+  EXPECT_EQ (ended->to, kPeriod);
+}
+
+/* A repeated frame has no information on the light. */
+TEST_F (DemuxSaturation, FramesThatFillAGapDoNotCount)
+{
+  start ("schedule=sequential:2x2");
+  push_frame (0, 1);
+  auto image = picture ();
+  image.at (0, 0) = 255;
+  BufferPtr filler = frame_of (image, kPeriod);
+  GST_BUFFER_FLAG_SET (filler.get (), GST_BUFFER_FLAG_GAP);
+  ASSERT_EQ (demux->push (std::move (filler)), GST_FLOW_OK);
+  demux->push_event (gst_event_new_eos ());
+  ASSERT_TRUE (said ());
+  const auto ended = said ();
+  ASSERT_TRUE (ended);
+  EXPECT_EQ (ended->frames, 1u);
+  EXPECT_EQ (ended->to, 0u);
+  EXPECT_EQ (counter_of (demux->element (), "saturated-frames"), 1u);
 }
 
 TEST_F (DemuxSaturation, IsCountedInTheMetaOfTheSubframes)

@@ -1,21 +1,21 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* codedexposure-demux behind a decoder that cuts frames at the ends of a
- * segment, as all do: what was asked for comes out, at the times that it had.
- */
-#include "schedule/timing.h"
-#include "gstcodedexposuremeta.h"
+/* codedexposure-demux after a decoder that clips frames to the segment, as all
+ * decoders do: exactly the requested subframes are pushed, at their original
+ * times. */
+#include "common/meta.h"
 #include "harness.h"
+#include "schedule/timing.h"
 
 namespace
 {
 
-using namespace cexp;
-using namespace cexp::gst;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::gst;
+using namespace codedexposure::test;
 
 constexpr GstClockTime kStreamEnd = 2 * GST_SECOND;
 
-/** The time of a frame as a recording has it. */
+/** The time of a frame in a recording. */
 GstClockTime
 recorded (const FrameRate &rate, int number)
 {
@@ -39,8 +39,8 @@ protected:
     demux.set_caps (gray_caps (
         16, 16, std::to_string (rate.num) + "/" + std::to_string (rate.den)));
   }
-  /** Frames @p first to @p last as a decoder gives them from @p from to @p to.
-   */
+  /** Frames @p first to @p last, as a decoder pushes them for a segment from @p
+   * from to @p to. */
   void decode (int first, int last, GstClockTime from, GstClockTime to)
   {
     GstSegment segment;
@@ -60,7 +60,7 @@ protected:
       ASSERT_EQ (demux.push (std::move (frame)), GST_FLOW_OK);
     }
   }
-  /** (number of the frame, subframe) of all that came out; their times are as
+  /** (frame number, subframe) of all pushed subframes; their times are those
    * without a seek. */
   std::vector<std::pair<int, int>> subframes ()
   {
@@ -105,8 +105,20 @@ TEST_P (DemuxSeek, WithinFramesGivesWhatWasAskedFor)
   EXPECT_EQ (subframes (), (Subframes{{10, 2}, {10, 3}, {11, 0}, {11, 1},
                                {11, 2}, {11, 3}, {12, 0}, {12, 1}}));
   EXPECT_EQ (coded_frames (), 3);
-  EXPECT_EQ (property<guint64> (demux.element (), "frames-lost"), 0u);
+  EXPECT_EQ (counter_of (demux.element (), "frames-lost"), 0u);
   EXPECT_EQ (demux.warning (), "");
+}
+
+/* It can be recorded or decoded again like any other. */
+TEST_P (DemuxSeek, CodedFrameThatBeginsBeforeTheSegmentIsWhole)
+{
+  decode (9, 13, recorded (rate, 10) + period * 5 / 8,
+      recorded (rate, 12) + period * 3 / 8);
+  const BufferPtr first = demux.pull ("coded");
+  ASSERT_TRUE (first);
+  EXPECT_NEAR (double (GST_BUFFER_PTS (first.get ())),
+      double (recorded (rate, 10)), 1000);
+  EXPECT_EQ (GST_BUFFER_DURATION (first.get ()), period);
 }
 
 /* Recorded times are rounded: a nanosecond of the frame before, or of the one

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* dmdsync behind the simulated bench whose mirrors it drives: a DMD that slips
- * is seen, said, flagged and mended. */
-#include "dmd/simulated_dmd.h"
+/* dmdsync after the simulated bench whose mirrors it controls: a slip of the
+ * DMD is detected, reported, flagged and corrected. */
+#include "bench/simulated_dmd.h"
 #include "sync_bench.h"
 
 namespace
 {
 
-using namespace cexp;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::test;
 
 const auto *const linked =
     ::testing::AddGlobalTestEnvironment (new LinkedElements);
@@ -16,7 +16,7 @@ const auto *const linked =
 constexpr const char *kOptics =
     " full-well=10000 read-noise=5 psf-sigma=0.5 seed=3 ";
 
-/** A bench with a DMD of its own that slips, and one that never does. */
+/** A bench with a DMD that slips, and one that does not. */
 struct Benches {
   Bench slipping;
   Bench steady;
@@ -52,7 +52,7 @@ is_locked (const BufferPtr &frame)
   return locked;
 }
 
-/** What a slip in frame @p at does to a run. */
+/** Checks a run with a slip in frame @p at. */
 void
 expect_noticed_and_mended (
     Benches &benches, const Scene &scene, int at, int blind_frames)
@@ -118,7 +118,7 @@ class PilotSlip : public ::testing::TestWithParam<std::pair<int, int>>
 {
 };
 
-/* Right at a border of two exposures, too, where nothing else shows it. */
+/* Also exactly between two exposures, where only the pilot shows the slip. */
 TEST_P (PilotSlip, AnywhereIsNoticedWithinThreeFramesAndMended)
 {
   const auto [slot, by] = GetParam ();
@@ -164,7 +164,7 @@ TEST (DmdsyncBench, SceneAndLightRaiseNoAlarm)
   }
 }
 
-/** The pictures of a film, a slot each; it holds one at a time. */
+/** The pictures of a film, one for each slot; it stores one at a time. */
 class Film
 {
 public:

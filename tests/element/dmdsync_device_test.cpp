@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* dmdsync and its DMD: states, upload, limits, failures, and that the mirrors
- * are parked whenever nobody needs them. */
+/* dmdsync and its DMD: states, upload, limits and failures; the mirrors are
+ * parked whenever they are not needed. */
 #include <algorithm>
 #include <atomic>
 #include <deque>
@@ -8,19 +8,19 @@
 
 #include <gst/base/gstbasesrc.h>
 
-#include "dmd/simulated_dmd.h"
+#include "bench/simulated_dmd.h"
 #include "sync_harness.h"
 
 namespace
 {
 
-using namespace cexp;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::test;
 
 const auto *const linked =
     ::testing::AddGlobalTestEnvironment (new LinkedElements);
 
-/** A dmdsync outside of any pipeline, whose states the test changes. */
+/** A dmdsync without a pipeline, whose states the test changes. */
 class Device
 {
 public:
@@ -42,7 +42,7 @@ public:
   {
     return gst_element_set_state (element_.get (), state);
   }
-  /** The first message of @p type that was not taken yet, or null. */
+  /** The next message of @p type, or null. */
   MessagePtr message (GstMessageType type)
   {
     while (GstMessage *next = gst_bus_pop (bus_.get ()))
@@ -155,7 +155,7 @@ TEST (DmdsyncDevice, RunsAgain)
     sync.start ();
     sync.send_frames (0, 3);
     EXPECT_TRUE (mirrors->running ());
-    EXPECT_EQ (sync.get_property<guint64> ("frames-in"), 3u);
+    EXPECT_EQ (sync.counter ("frames-in"), 3u);
     BufferPtr first = sync.pull ();
     ASSERT_TRUE (first);
     EXPECT_EQ (GST_BUFFER_OFFSET (first.get ()), 0u);
@@ -304,8 +304,8 @@ TEST (DmdsyncDevice, IsParkedAfterEveryChangeOfStateUnderStress)
   gst_bus_set_sync_handler (
       bus.get (),
       [] (GstBus *, GstMessage *message, gpointer errors) {
-        /* A source whose first events meet pads that are being stopped calls
-         * that an error. */
+        /* A source reports an error if its first events meet pads that are
+         * being stopped. */
         if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_ERROR &&
             !GST_IS_BASE_SRC (GST_MESSAGE_SRC (message)))
           ++*static_cast<std::atomic<int> *> (errors);

@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* dmdsync shows patterns that are asked for from downstream, says from which
- * frame on, and gives the mirrors back. */
-#include "dmd/simulated_dmd.h"
-#include "moire/gratings.h"
+/* dmdsync shows patterns on request from downstream, marks their frames, and
+ * returns to the schedule. */
+#include "bench/simulated_dmd.h"
+#include "calibrate/gratings.h"
 #include "sync_bench.h"
 
 namespace
 {
 
-using namespace cexp;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::test;
 
 const auto *const linked =
     ::testing::AddGlobalTestEnvironment (new LinkedElements);
@@ -52,8 +52,8 @@ protected:
     return frame ? get_frame_meta (frame.get ()).value_or (FrameMeta ())
                  : FrameMeta ();
   }
-  /** The first frame that is said to show @p pattern; none before it is said
-   * to show anything. */
+  /** The first frame with metadata of @p pattern; frames before have no
+   * pattern. */
   FrameMeta wait_for (const std::string &pattern)
   {
     for (int i = 0; i < kPatience; i++) {
@@ -101,7 +101,7 @@ INSTANTIATE_TEST_SUITE_P (Schedules, PatternTest,
 
 TEST_P (PatternTest, IsShownOneAfterTheOtherAndTheMirrorsComeBack)
 {
-  /* Two, since a pilot makes two frames differ. */
+  /* Two frames, because the pattern of a pilot has two. */
   std::array<Image<std::uint8_t>, 2> coded;
   for (int i = 0; i < 2; i++) {
     const FrameMeta meta = next ();

@@ -1,14 +1,13 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* dmdsync without a DMD: what it says and asks of a stream: tags, caps, phase.
- */
-#include "gstcodedexposuretag.h"
+/* dmdsync without a DMD: tags, caps and synchronisation of a stream. */
+#include "common/tag.h"
 #include "sync_harness.h"
 
 namespace
 {
 
-using namespace cexp;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::test;
 
 constexpr GstClockTime kMs = GST_MSECOND;
 
@@ -102,6 +101,24 @@ TEST (DmdsyncTag, StaysAmongTagsThatComeLater)
   EXPECT_EQ (sync.warning (), "");
 }
 
+/* Downstream keeps global tags and stream tags separate. */
+TEST (DmdsyncTag, KeepsTheScopeOfTheTagsThatItCorrects)
+{
+  for (const GstTagScope scope : {GST_TAG_SCOPE_GLOBAL, GST_TAG_SCOPE_STREAM}) {
+    SyncHarness sync ("schedule=staircase:2x2");
+    sync.start ();
+    ASSERT_TRUE (sync.pull_event (GST_EVENT_TAG));
+    GstTagList *tags = schedule_to_tags (*Schedule::parse ("sequential:2x2"));
+    gst_tag_list_set_scope (tags, scope);
+    sync.push_event (gst_event_new_tag (tags));
+    const EventPtr passed = sync.pull_event (GST_EVENT_TAG);
+    EXPECT_EQ (tagged_schedule (passed), *Schedule::parse ("staircase:2x2"));
+    GstTagList *corrected = nullptr;
+    gst_event_parse_tag (passed.get (), &corrected);
+    EXPECT_EQ (gst_tag_list_get_scope (corrected), scope);
+  }
+}
+
 TEST (DmdsyncTag, TheSameScheduleIsNoReasonToWarn)
 {
   SyncHarness sync ("schedule=staircase:2x2");
@@ -134,7 +151,7 @@ TEST (DmdsyncCaps, ARateThatIsUnknownComesFromTheSlots)
   ASSERT_EQ (with.send (0), GST_FLOW_OK);
   ASSERT_EQ (with.send (80 * kMs), GST_FLOW_OK);
   EXPECT_EQ (with.error (), "");
-  EXPECT_EQ (with.get_property<guint64> ("frames-lost"), 1u);
+  EXPECT_EQ (with.counter ("frames-lost"), 1u);
   const BufferPtr frame = with.pull ();
   ASSERT_TRUE (frame);
   EXPECT_EQ (GST_BUFFER_DURATION (frame.get ()), 40 * kMs);
@@ -210,8 +227,8 @@ TEST (DmdsyncPhase, TellsWhatCanBeSeen)
   }
 }
 
-/** Levels of staircase:2x2 in phase, and with one slot too late from slot 2 on.
- */
+/** Levels of staircase:2x2 when synchronised, and with a slip of one slot from
+ * slot 2 on. */
 constexpr std::array<int, 4> kInPhase{50, 100, 150, 200};
 constexpr std::array<int, 4> kSlipped{50, 150, 200, 200};
 
@@ -243,7 +260,7 @@ TEST (DmdsyncPhase, ASlipIsFlaggedInItsFrameAndStaysWithoutADmd)
   EXPECT_EQ (int_field (slip, "slots"), 1);
   EXPECT_FALSE (sync.element_message ("dmdsync/slip"));
   EXPECT_FALSE (sync.get_property<gboolean> ("locked"));
-  EXPECT_EQ (sync.get_property<guint64> ("slips"), 1u);
+  EXPECT_EQ (sync.counter ("slips"), 1u);
   EXPECT_EQ (notified, 2) << "locked once, lost once";
 }
 
@@ -268,6 +285,24 @@ TEST (DmdsyncPhase, FramesOutOfPhaseCanBeSkipped)
   ASSERT_TRUE (gap);
   gst_event_parse_gap (gap.get (), &from, nullptr);
   EXPECT_EQ (from, 120 * kMs);
+}
+
+TEST (DmdsyncPhase, TheFrameAfterSkippedOnesIsDiscont)
+{
+  SyncHarness sync ("schedule=staircase:2x2 on-unlock=skip");
+  sync.start ();
+  for (int k = 0; k < 6; k++) {
+    if (k == 5)
+      gst_util_set_object_arg (G_OBJECT (sync.element ()), "on-unlock", "keep");
+    ASSERT_EQ (
+        sync.send_levels (sync.time_of (k), k == 3 ? kSlipped : kInPhase),
+        GST_FLOW_OK);
+  }
+  std::vector<guint64> disconts;
+  while (const BufferPtr frame = sync.pull ())
+    if (has_flag (frame, GST_BUFFER_FLAG_DISCONT))
+      disconts.push_back (GST_BUFFER_OFFSET (frame.get ()));
+  EXPECT_EQ (disconts, (std::vector<guint64>{0, 5}));
 }
 
 TEST (DmdsyncPhase, FramesOutOfPhaseCanEndTheStream)

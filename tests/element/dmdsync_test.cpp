@@ -5,8 +5,8 @@
 namespace
 {
 
-using namespace cexp;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::test;
 
 const auto *const linked =
     ::testing::AddGlobalTestEnvironment (new LinkedElements);
@@ -45,8 +45,8 @@ TEST_P (DmdsyncTime, StampsAndNumbersEveryFrameExactly)
     EXPECT_EQ (meta.slip, 0);
     EXPECT_EQ (meta.lost_before, 0u);
   }
-  EXPECT_EQ (sync.get_property<guint64> ("frames-in"), 100u);
-  EXPECT_EQ (sync.get_property<guint64> ("frames-lost"), 0u);
+  EXPECT_EQ (sync.counter ("frames-in"), 100u);
+  EXPECT_EQ (sync.counter ("frames-lost"), 0u);
   EXPECT_EQ (sync.error () + sync.warning (), "");
 }
 
@@ -125,7 +125,7 @@ TEST (Dmdsync, ALossIsCountedFlaggedAndSaid)
     EXPECT_EQ (meta_of (frame).lost_before, k == 5 ? 3u : 0u);
     EXPECT_TRUE (meta_of (frame).locked);
   }
-  EXPECT_EQ (sync.get_property<guint64> ("frames-lost"), 3u);
+  EXPECT_EQ (sync.counter ("frames-lost"), 3u);
 
   const EventPtr gap = sync.pull_event (GST_EVENT_GAP);
   ASSERT_TRUE (gap);
@@ -152,7 +152,7 @@ TEST (Dmdsync, LostFramesCanBeRepeatedFromMemoryOfOurOwn)
   GstBuffer *of_camera = gst_buffer_ref (reused.get ());
   ASSERT_EQ (sync.push (std::move (reused)), GST_FLOW_OK);
   ASSERT_TRUE (sync.pull ());
-  /* The camera source writes the next frame into memory it has handed out. */
+  /* The camera source writes the next frame into the memory of this one. */
   gst_buffer_memset (of_camera, 0, 5, gst_buffer_get_size (of_camera));
   gst_buffer_unref (of_camera);
 
@@ -225,9 +225,9 @@ TEST (Dmdsync, DuplicatesAreDroppedAndLateFramesFlagged)
         has_flag (frame, GST_BUFFER_FLAG_DISCONT), ms != 40 && ms != 160);
   }
   EXPECT_FALSE (sync.pull ());
-  EXPECT_EQ (sync.get_property<guint64> ("frames-duplicate"), 1u);
-  EXPECT_EQ (sync.get_property<guint64> ("frames-late"), 1u);
-  EXPECT_EQ (sync.get_property<guint64> ("frames-lost"), 1u);
+  EXPECT_EQ (sync.counter ("frames-duplicate"), 1u);
+  EXPECT_EQ (sync.counter ("frames-late"), 1u);
+  EXPECT_EQ (sync.counter ("frames-lost"), 1u);
 
   const MessagePtr dropped = sync.element_message ("dmdsync/frame-dropped");
   EXPECT_EQ (string_field (dropped, "reason"), "duplicate");
@@ -254,7 +254,7 @@ TEST (Dmdsync, AFlushIsNotALossAndNumbersGoOn)
   ASSERT_TRUE (frame);
   EXPECT_EQ (meta_of (frame).frame, 2u);
   EXPECT_TRUE (has_flag (frame, GST_BUFFER_FLAG_DISCONT));
-  EXPECT_EQ (sync.get_property<guint64> ("frames-lost"), 0u);
+  EXPECT_EQ (sync.counter ("frames-lost"), 0u);
 }
 
 TEST (Dmdsync, ReversePlaybackLosesNothing)
@@ -268,8 +268,8 @@ TEST (Dmdsync, ReversePlaybackLosesNothing)
   sync.push_event (gst_event_new_segment (&segment));
   for (const int frame : {9, 8, 7, 4})
     ASSERT_EQ (sync.send (sync.time_of (frame)), GST_FLOW_OK);
-  EXPECT_EQ (sync.get_property<guint64> ("frames-lost"), 2u);
-  EXPECT_EQ (sync.get_property<guint64> ("frames-late"), 0u);
+  EXPECT_EQ (sync.counter ("frames-lost"), 2u);
+  EXPECT_EQ (sync.counter ("frames-late"), 0u);
 }
 
 TEST (Dmdsync, ANewStreamIsCountedFromZero)
@@ -288,15 +288,34 @@ TEST (Dmdsync, ANewStreamIsCountedFromZero)
   EXPECT_TRUE (has_flag (frame, GST_BUFFER_FLAG_DISCONT));
 }
 
-TEST (Dmdsync, NeverTouchesPixels)
+/* A frame of a buffer pool, whose source waits until it is released. */
+BufferPtr
+pooled_frame ()
+{
+  GstVideoInfo info;
+  gst_video_info_set_format (
+      &info, GST_VIDEO_FORMAT_GRAY8, kSyncWidth, kSyncHeight);
+  const CapsPtr caps (gst_video_info_to_caps (&info));
+  const ObjectPtr<GstBufferPool> pool (gst_video_buffer_pool_new ());
+  GstStructure *config = gst_buffer_pool_get_config (pool.get ());
+  gst_buffer_pool_config_set_params (
+      config, caps.get (), guint (GST_VIDEO_INFO_SIZE (&info)), 1, 1);
+  EXPECT_TRUE (gst_buffer_pool_set_config (pool.get (), config));
+  gst_buffer_pool_set_active (pool.get (), TRUE);
+  GstBuffer *frame = nullptr;
+  gst_buffer_pool_acquire_buffer (pool.get (), &frame, nullptr);
+  GST_BUFFER_PTS (frame) = 0;
+  gst_buffer_pool_set_active (pool.get (), FALSE);
+  return BufferPtr (frame);
+}
+
+TEST (Dmdsync, NeverTouchesPixelsOfAPool)
 {
   SyncHarness sync;
   sync.start ();
-  BufferPtr frame = frame_of (draw<std::uint8_t> (kSyncWidth, kSyncHeight,
-                                  [] (int x, int) { return x; }),
-      0);
+  BufferPtr frame = pooled_frame ();
   GstMemory *memory = gst_buffer_peek_memory (frame.get (), 0);
-  /* Somebody else holds the frame, too: it must not be written to. */
+  /* Another owner has a reference, so the frame must not be written to. */
   const BufferPtr shared (gst_buffer_ref (frame.get ()));
   ASSERT_EQ (sync.push (std::move (frame)), GST_FLOW_OK);
   const BufferPtr out = sync.pull ();
@@ -341,12 +360,12 @@ TEST (Dmdsync, LatencyMovesMinimumAndMaximumAndIsSaid)
   g_object_set (sync.element (), "on-loss", 0, nullptr);
   EXPECT_FALSE (sync.message (GST_MESSAGE_LATENCY));
 
-  /* Nothing that a later change of the offset moves is a loss. */
+  /* A later change of the offset does not cause a loss. */
   sync.send_frames (3, 5);
   g_object_set (
       sync.element (), "exposure-offset", gint64 (50'000'000), nullptr);
   sync.send_frames (5, 7);
-  EXPECT_EQ (sync.get_property<guint64> ("frames-lost"), 0u);
+  EXPECT_EQ (sync.counter ("frames-lost"), 0u);
 }
 
 gboolean
@@ -384,7 +403,7 @@ TEST (Dmdsync, QosStaysDownstream)
   EXPECT_TRUE (gst_harness_push_upstream_event (sync.get (),
       gst_event_new_qos (GST_QOS_TYPE_UNDERFLOW, 2.0, 40 * GST_MSECOND, 0)));
   EXPECT_FALSE (gst_harness_try_pull_upstream_event (sync.get ()));
-  /* And no frame is dropped for it. */
+  /* It also drops no frame. */
   sync.send_frames (1, 3);
   for (int k = 0; k < 3; k++)
     EXPECT_TRUE (sync.pull ()) << k;

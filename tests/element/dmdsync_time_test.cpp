@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* dmdsync behind a camera that stamps frames by a clock of its own. */
+/* dmdsync after a camera that stamps frames with its own clock. */
 #include <cmath>
 #include <random>
 
@@ -8,15 +8,15 @@
 namespace
 {
 
-using namespace cexp;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::test;
 
 const auto *const linked =
     ::testing::AddGlobalTestEnvironment (new LinkedElements);
 
 constexpr GstClockTime kMs = GST_MSECOND;
 
-/** A time that a frame bears, of the clock that @p caps name. */
+/** The reference timestamp of a frame for the clock in @p caps. */
 GstClockTime
 reference_time (const BufferPtr &frame, const char *caps)
 {
@@ -59,7 +59,7 @@ protected:
   GstClockTime arrival_ = 0;
 };
 
-/** What was said of the times last; none: nothing since. */
+/** The last message on the uncertainty; none if there was none since. */
 std::optional<bool>
 times_are_known (SyncHarness &sync)
 {
@@ -93,6 +93,9 @@ TEST_P (DmdsyncDeviceClock, PtsIsTheStartOfTheExposureWithin50Microseconds)
     ASSERT_EQ (GST_CLOCK_TIME_IS_VALID (uncertainty), k >= 7);
     if (const auto said = times_are_known (sync_)) {
       ASSERT_EQ (*said, known_from < 0 && k > 0) << k;
+      ASSERT_TRUE (*said ? uncertainty <= 50 * GST_USECOND
+                         : uncertainty > 100 * GST_USECOND)
+          << "known below one bound and lost above the other: " << k;
       known_from = *said ? k : -1;
     }
     const auto error = GstClockTime (std::abs (
@@ -107,7 +110,7 @@ TEST_P (DmdsyncDeviceClock, PtsIsTheStartOfTheExposureWithin50Microseconds)
   EXPECT_EQ (sync_.counter ("frames-lost"), 0u);
   EXPECT_EQ (sync_.counter ("clock-restarts"), 0u);
   EXPECT_LE (sync_.counter ("time-uncertainty"), 25 * GST_USECOND);
-  /* Of the first frames, the times themselves were not known as well. */
+  /* The times of the first frames were less certain. */
   const GstClockTime latency = gst_harness_query_latency (sync_.get ());
   EXPECT_GE (latency, GstClockTime (rate_.period ()) + 5 * kMs);
   EXPECT_LE (latency, GstClockTime (rate_.period ()) + 6 * kMs);
@@ -127,7 +130,7 @@ TEST_P (DmdsyncDeviceClock, LatencyIsAnnouncedWhenItGrows)
   EXPECT_TRUE (sync_.message (GST_MESSAGE_LATENCY));
   EXPECT_EQ (gst_harness_query_latency (sync_.get ()), transfer + 3 * kMs);
 
-  /* A frame that was held up for seconds is no jitter. */
+  /* A delay of seconds does not count as jitter. */
   ASSERT_TRUE (send (3, 2 * GST_SECOND));
   EXPECT_FALSE (sync_.message (GST_MESSAGE_LATENCY));
   EXPECT_EQ (gst_harness_query_latency (sync_.get ()), transfer + 3 * kMs);
@@ -141,7 +144,8 @@ TEST_P (DmdsyncDeviceClock, ANewSegmentIsANewClock)
   gst_segment_init (&segment, GST_FORMAT_TIME);
   sync_.push_event (gst_event_new_segment (&segment));
 
-  /* The camera was away; its first frame bears the time of its arrival. */
+  /* The camera was disconnected; its first frame has the time of its arrival.
+   */
   const GstClockTime back = exposure (900) + 7 * kMs;
   gst_harness_set_time (sync_.get (), back);
   ASSERT_EQ (sync_.send (back), GST_FLOW_OK);
@@ -149,6 +153,36 @@ TEST_P (DmdsyncDeviceClock, ANewSegmentIsANewClock)
   ASSERT_TRUE (frame);
   EXPECT_EQ (
       GST_BUFFER_PTS (frame.get ()), back - GstClockTime (rate_.period ()));
+}
+
+/* As codedexposure-camerasrc flags the first frame of a camera that was
+ * restarted, whose time begins at 0 again. */
+TEST_P (DmdsyncDeviceClock, AfterARestartFramesAreNumberedByWhenTheyArrive)
+{
+  for (int k = 0; k < 300; k++)
+    ASSERT_TRUE (send (k, 0));
+  for (int k = 900; k < 910; k++) {
+    SCOPED_TRACE (k);
+    BufferPtr frame = frame_of (draw<std::uint8_t> (kSyncWidth, kSyncHeight,
+                                    [] (int, int) { return 100; }),
+        stamp (k) - stamp (900));
+    if (k == 900)
+      GST_BUFFER_FLAG_SET (frame.get (), GST_BUFFER_FLAG_RESYNC);
+    gst_harness_set_time (
+        sync_.get (), exposure (k) + GstClockTime (rate_.period ()));
+    ASSERT_EQ (sync_.push (std::move (frame)), GST_FLOW_OK);
+    const BufferPtr out = sync_.pull ();
+    ASSERT_TRUE (out);
+    EXPECT_EQ (meta_of (out).frame, guint64 (k));
+    EXPECT_EQ (meta_of (out).lost_before, k == 900 ? 600u : 0u);
+    EXPECT_EQ (has_flag (out, GST_BUFFER_FLAG_DISCONT), k == 900);
+    EXPECT_FALSE (has_flag (out, GST_BUFFER_FLAG_RESYNC));
+    EXPECT_LE (
+        std::abs (GST_CLOCK_DIFF (exposure (k), GST_BUFFER_PTS (out.get ()))),
+        gint64 (50 * GST_USECOND));
+  }
+  EXPECT_EQ (sync_.counter ("frames-lost"), 600u);
+  EXPECT_EQ (sync_.counter ("frames-late"), 0u);
 }
 
 INSTANTIATE_TEST_SUITE_P (Rates, DmdsyncDeviceClock,

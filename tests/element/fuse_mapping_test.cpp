@@ -1,36 +1,38 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* codedexposure-fuse with a mapping: how true its frames are, what it says, and
- * what it refuses. */
+/* codedexposure-fuse with a mapping: accuracy of its frames, messages and
+ * errors. */
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 
 #include <unistd.h>
 
-#include "gstcodedexposuremeta.h"
-#include "gstcodedexposuretag.h"
+#include "bench/bench.h"
+#include "common/messages.h"
+#include "common/meta.h"
+#include "common/tag.h"
 #include "harness.h"
-#include "optics/bench.h"
 
 namespace
 {
 
-using namespace cexp;
-using namespace cexp::gst;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::gst;
+using namespace codedexposure::test;
 
 constexpr int kWidth = 96, kHeight = 72, kFrames = 4;
 const Schedule kSchedule = *Schedule::from_preset ("sequential:lattice:4/2");
 constexpr Alignment kAskew{0.4, 0.4, 0.5, 1.01};
 constexpr double kPsfSigma = 0.4;
 
-/** A bench in software, and what is fused of its frames. */
+/** A simulated bench and the fused frames of its coded frames. */
 class FuseMapping : public ::testing::Test
 {
 protected:
   ~FuseMapping () override { std::filesystem::remove (path); }
 
-  /** Texture that stands still below, and moves above; @p time in frames. */
+  /** Texture that is static in the lower half and moves in the upper; @p time
+   * in frames. */
   static Image<std::uint8_t> scene (double time)
   {
     return draw<std::uint8_t> (kWidth, kHeight, [=] (int x, int y) {
@@ -41,10 +43,9 @@ protected:
   }
   static Mapping mapping (Extent mirrors = {kWidth, kHeight})
   {
-    const Affine t = camera_to_mirrors (kAskew, kWidth, kHeight);
     auto made = Mapping::make ({.camera = {kWidth, kHeight},
         .mirrors = mirrors,
-        .homography = {t.xx, t.xy, t.x0, t.yx, t.yy, t.y0, 0, 0, 1},
+        .homography = camera_to_mirrors (kAskew, kWidth, kHeight),
         .psf_sigma = kPsfSigma});
     EXPECT_TRUE (made.ok ());
     return *made;
@@ -104,7 +105,7 @@ protected:
       ASSERT_EQ (fuse->push (frame_of (pixels, pts)), GST_FLOW_OK);
     }
   }
-  /** Of the fused frames against what the mirrors saw, dB. */
+  /** PSNR of the fused frames against the light on the mirrors, dB. */
   template <typename Pixel = std::uint8_t>
   double psnr (const std::string &settings, const Alignment &alignment)
   {
@@ -163,15 +164,11 @@ TEST_F (FuseMapping, ComesWithTheTag)
   fuse->push_event (setup_to_event ({kSchedule, mapping ()}));
   expose<std::uint8_t> (kAskew);
   const auto by_tag = pull_images ();
-  const MessagePtr said = fuse->element_message ("codedexposure/mapping");
+  const auto said = fuse->posted<MirrorsSeen> ();
   ASSERT_TRUE (said);
-  guint64 unseen = 0, mixed = 0;
-  EXPECT_TRUE (
-      gst_structure_get (gst_message_get_structure (said.get ()), "unseen",
-          G_TYPE_UINT64, &unseen, "mixed", G_TYPE_UINT64, &mixed, nullptr));
-  EXPECT_GT (unseen, 0u);
-  EXPECT_EQ (property<guint64> (fuse->element (), "mirrors-unseen"), unseen);
-  EXPECT_EQ (property<guint64> (fuse->element (), "mirrors-mixed"), mixed);
+  EXPECT_GT (said->unseen, 0u);
+  EXPECT_EQ (counter_of (fuse->element (), "mirrors-unseen"), said->unseen);
+  EXPECT_EQ (counter_of (fuse->element (), "mirrors-mixed"), said->mixed);
 
   start (mapped ());
   expose<std::uint8_t> (kAskew);

@@ -1,17 +1,19 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure-fuse: pixels, times, schedules, losses, flushes. */
+#include "downstream.h"
 #include "harness.h"
 
+#include "common/messages.h"
+#include "common/meta.h"
+#include "common/tag.h"
 #include "fuse/fuser.h"
-#include "gstcodedexposuremeta.h"
-#include "gstcodedexposuretag.h"
 
 namespace
 {
 
-using namespace cexp;
-using namespace cexp::gst;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::gst;
+using namespace codedexposure::test;
 
 constexpr GstClockTime kPeriod = 40 * GST_MSECOND;
 constexpr int kWidth = 24, kHeight = 20;
@@ -35,7 +37,7 @@ schedule_of (const std::string &preset)
   return *schedule;
 }
 
-/* What the library makes of the pictures @numbers, one after the other. */
+/* The frames that the library fuses from the pictures @numbers. */
 template <typename Pixel = std::uint8_t>
 std::vector<Image<Pixel>>
 expected (const std::string &preset, std::initializer_list<int> numbers,
@@ -51,11 +53,11 @@ expected (const std::string &preset, std::initializer_list<int> numbers,
     std::vector<ImageView<Pixel>> views;
     for (auto &slot : slots)
       views.push_back (slot.view ());
-    fuser->fuse (views);
+    EXPECT_TRUE (fuser->fuse (views));
     frames.insert (frames.end (), slots.begin (), slots.end ());
   };
   for (const int number : numbers) {
-    fuser->take (picture<Pixel> (number).view ());
+    EXPECT_TRUE (fuser->take (picture<Pixel> (number).view ()));
     if (fuser->pending () > options.lookahead)
       fuse_one ();
   }
@@ -96,7 +98,7 @@ protected:
       images.push_back (image_of<Pixel> (buffer.get (), caps.get ()));
     return images;
   }
-  /* Those of the frames that begin anew, by their place. */
+  /* Indices of the frames with DISCONT. */
   std::vector<std::size_t> disconts ()
   {
     std::vector<std::size_t> places;
@@ -365,7 +367,7 @@ TEST_F (Fuse, AFlushDropsWhatWaits)
   EXPECT_EQ (pull_images (), expected ("sequential:lattice:4/2", {7}));
 }
 
-/* A flush ends what is fused at that moment; what comes after it is not. */
+/* A flush cancels the current frame, but not later ones. */
 TEST_F (Fuse, FusesAgainAfterAFlush)
 {
   start ("schedule=sequential:2x2 quality=balanced threads=2");
@@ -390,17 +392,14 @@ TEST_F (Fuse, ALossIsSaidAndStartsHistoryAnew)
   push (0);
   push (0, kPeriod);
   push (0, 4 * kPeriod);
-  const MessagePtr message =
-      fuse->element_message ("codedexposure/frames-lost");
-  ASSERT_TRUE (message);
-  guint64 lost = 0;
-  gst_structure_get_uint64 (
-      gst_message_get_structure (message.get ()), "count", &lost);
-  EXPECT_EQ (lost, 2u);
-  EXPECT_EQ (property<guint64> (fuse->element (), "frames-lost"), 2u);
+  const auto lost = fuse->posted<FramesLost> ();
+  ASSERT_TRUE (lost);
+  EXPECT_EQ (lost->count, 2u);
+  EXPECT_EQ (counter_of (fuse->element (), "frames-lost"), 2u);
   const auto images = pull_images ();
   ASSERT_EQ (images.size (), 12u);
-  /* The second frame knows that nothing moved; the third starts again. */
+  /* The second frame detects static pixels; the third restarts the comparison.
+   */
   EXPECT_NE (images[4], images[0]);
   for (std::size_t k = 0; k < 4; k++)
     EXPECT_EQ (images[8 + k], images[k]);
@@ -415,6 +414,33 @@ TEST_F (Fuse, LossesAndBreaksAreDiscont)
   push (3, 5 * kPeriod, GST_BUFFER_FLAG_DISCONT);
   push (4, 6 * kPeriod);
   EXPECT_EQ (disconts (), (std::vector<std::size_t>{0, 8, 12}));
+}
+
+TEST_F (Fuse, ANewSegmentIsNoLoss)
+{
+  for (const bool flush : {false, true}) {
+    start ();
+    push (0);
+    push (0, kPeriod);
+    if (flush) {
+      ASSERT_TRUE (fuse->push_event (gst_event_new_flush_start ()));
+      ASSERT_TRUE (fuse->push_event (gst_event_new_flush_stop (TRUE)));
+    }
+    GstSegment segment;
+    gst_segment_init (&segment, GST_FORMAT_TIME);
+    segment.start = 10 * GST_SECOND;
+    ASSERT_TRUE (fuse->push_event (gst_event_new_segment (&segment)));
+    push (0, 10 * GST_SECOND);
+    EXPECT_EQ (counter_of (fuse->element (), "frames-lost"), 0u);
+    EXPECT_FALSE (fuse->posted<FramesLost> ());
+    const CapsPtr caps = fuse->pad_caps ();
+    const auto all = pull_all ();
+    ASSERT_EQ (all.size (), 12u);
+    EXPECT_TRUE (GST_BUFFER_IS_DISCONT (all[8].get ()));
+    EXPECT_EQ (image_of<std::uint8_t> (all[8].get (), caps.get ()),
+        image_of<std::uint8_t> (all[0].get (), caps.get ()))
+        << "it is compared with nothing";
+  }
 }
 
 TEST_F (Fuse, DamagedFramesPassTheirFlagsAndAreNotCompared)
@@ -440,7 +466,7 @@ TEST_F (Fuse, CountsDamagedFrames)
   start ();
   push (0);
   push (1, kPeriod, GST_BUFFER_FLAG_CORRUPTED);
-  EXPECT_EQ (property<guint64> (fuse->element (), "frames-corrupted"), 1u);
+  EXPECT_EQ (counter_of (fuse->element (), "frames-corrupted"), 1u);
 }
 
 TEST_F (Fuse, ALateFrameIsSaidAndComparedWithNothing)
@@ -467,15 +493,24 @@ TEST_F (Fuse, SaysWhenFramesAreSaturated)
     ASSERT_EQ (fuse->push (std::move (frame)), GST_FLOW_OK);
   };
   push_twelve (grey, 0);
-  EXPECT_FALSE (fuse->element_message ("codedexposure/saturated"));
+  EXPECT_FALSE (fuse->posted<Saturated> ());
   push_twelve (white, 1);
-  const MessagePtr message = fuse->element_message ("codedexposure/saturated");
-  ASSERT_TRUE (message);
-  guint64 pixels = 0;
-  gst_structure_get_uint64 (
-      gst_message_get_structure (message.get ()), "pixels", &pixels);
-  EXPECT_EQ (pixels, 1u);
-  EXPECT_EQ (property<guint64> (fuse->element (), "saturated-frames"), 1u);
+  const auto saturated = fuse->posted<Saturated> ();
+  ASSERT_TRUE (saturated);
+  EXPECT_EQ (saturated->pixels, 1u);
+  EXPECT_EQ (counter_of (fuse->element (), "saturated-frames"), 1u);
+}
+
+TEST_F (Fuse, FramesThatFillAGapAreNotCountedAsSaturated)
+{
+  start ();
+  const auto white =
+      draw<std::uint8_t> (kWidth, kHeight, [] (int, int) { return 255; });
+  BufferPtr filler = frame_of (white, 0);
+  GST_BUFFER_FLAG_SET (filler.get (), GST_BUFFER_FLAG_GAP);
+  ASSERT_EQ (fuse->push (std::move (filler)), GST_FLOW_OK);
+  EXPECT_EQ (counter_of (fuse->element (), "saturated-frames"), 0u);
+  EXPECT_FALSE (fuse->posted<Saturated> ());
 }
 
 TEST_F (Fuse, NeedsTimeStamps)
@@ -497,13 +532,56 @@ TEST_F (Fuse, QosEndsHere)
     EXPECT_NE (GST_EVENT_TYPE (event.get ()), GST_EVENT_QOS);
 }
 
+/* ---------------------------------------------------------- allocation -- */
+
+TEST_F (Fuse, BuffersComeFromThePoolOfDownstreamAndItIsAskedAgain)
+{
+  start ();
+  Downstream downstream (fuse->get ());
+  downstream.pool.reset (gst_video_buffer_pool_new ());
+  push (0);
+  push (1);
+  EXPECT_EQ (downstream.queries, 1);
+  for (int k = 0; k < 8; k++)
+    EXPECT_EQ (fuse->pull ()->pool, downstream.pool.get ());
+
+  const ObjectPtr<GstBufferPool> other (gst_video_buffer_pool_new ());
+  downstream.pool.reset (GST_BUFFER_POOL (gst_object_ref (other.get ())));
+  gst_harness_push_upstream_event (fuse->get (), gst_event_new_reconfigure ());
+  push (2);
+  EXPECT_EQ (downstream.queries, 2);
+  EXPECT_EQ (fuse->pull ()->pool, other.get ());
+}
+
+TEST_F (Fuse, BuffersComeFromAnotherPoolWhereDownstreamsIsTooSmall)
+{
+  start ();
+  Downstream downstream (fuse->get ());
+  downstream.pool.reset (gst_video_buffer_pool_new ());
+  downstream.min = 1;
+  downstream.max = 4;
+  push (0);
+  EXPECT_NE (fuse->pull ()->pool, downstream.pool.get ());
+}
+
+TEST_F (Fuse, OffersVideoMetaAndAPoolToUpstream)
+{
+  start ();
+  const CapsPtr caps = caps_of (gray_caps (kWidth, kHeight));
+  const QueryPtr query (gst_query_new_allocation (caps.get (), TRUE));
+  ASSERT_TRUE (gst_pad_peer_query (fuse->get ()->srcpad, query.get ()));
+  EXPECT_TRUE (gst_query_find_allocation_meta (
+      query.get (), GST_VIDEO_META_API_TYPE, nullptr));
+  EXPECT_EQ (gst_query_get_n_allocation_pools (query.get ()), 1u);
+}
+
 TEST_F (Fuse, CountersAgree)
 {
   start ();
   push (0);
   push (1);
-  EXPECT_EQ (property<guint64> (fuse->element (), "frames-in"), 2u);
-  EXPECT_EQ (property<guint64> (fuse->element (), "frames-out"), 8u);
+  EXPECT_EQ (counter_of (fuse->element (), "frames-in"), 2u);
+  EXPECT_EQ (counter_of (fuse->element (), "frames-out"), 8u);
 }
 
 } // namespace

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* codedexposure-log: one true line of JSON a frame, on disk at once. */
+/* codedexposure-log: one correct line of JSON for each frame, written
+ * immediately. */
 #include <cstdio>
 #include <fstream>
 #include <memory>
@@ -12,15 +13,15 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "gstcodedexposuremeta.h"
-#include "gstcodedexposuretag.h"
-#include "gstraii.h"
+#include "common/meta.h"
+#include "common/raii.h"
+#include "common/tag.h"
 
 namespace
 {
 
-using namespace cexp;
-using namespace cexp::gst;
+using namespace codedexposure;
+using namespace codedexposure::gst;
 using Json = nlohmann::json;
 using Harness = std::unique_ptr<GstHarness, decltype (&gst_harness_teardown)>;
 
@@ -75,7 +76,7 @@ protected:
   Harness harness_{nullptr, gst_harness_teardown};
 };
 
-/** What an element says on the bus when it is started, or nothing. */
+/** The error or warning of an element that is started, or nothing. */
 std::pair<GQuark, gint>
 error_at_start (const char *location)
 {
@@ -144,8 +145,8 @@ TEST_F (LogTest, CountsFramesWithoutMetaAndLeavesOutWhatIsUnknown)
   EXPECT_EQ (lines ()[2], Json::parse (R"({"frame": 2, "flags": []})"));
 }
 
-/* As the recording's timestamps: what an encoder adds to PTS and segment alike
- * is not in them. */
+/* Equal to the time stamps of the recording: an offset that an encoder adds to
+ * PTS and segment is not included. */
 TEST_F (LogTest, TimesAreRunningTimes)
 {
   play (path_.get ());
@@ -156,6 +157,30 @@ TEST_F (LogTest, TimesAreRunningTimes)
   gst_harness_push_event (harness_.get (), gst_event_new_segment (&segment));
   ASSERT_EQ (push (frame (kShift + 40 * GST_MSECOND)), GST_FLOW_OK);
   EXPECT_EQ (lines ().at (0).at ("pts_ns"), 40'000'000);
+}
+
+TEST_F (LogTest, ASecondRunBeginsAnew)
+{
+  const Schedule staircase = *Schedule::from_preset ("staircase:2x2");
+  play (path_.get ());
+  for (int run = 0; run < 2; run++) {
+    gst_harness_push_event (harness_.get (), schedule_to_event (staircase));
+    for (int i = 0; i < 2; i++)
+      ASSERT_EQ (
+          push (frame (GstClockTime (i) * 40 * GST_MSECOND)), GST_FLOW_OK);
+    ASSERT_EQ (lines ().size (), 3u) << "run " << run;
+    EXPECT_EQ (lines ()[0], Json::parse (staircase.to_json ()));
+    EXPECT_EQ (lines ()[1].at ("frame"), 0);
+    EXPECT_EQ (lines ()[2].at ("frame"), 1);
+    gst_element_set_state (harness_->element, GST_STATE_NULL);
+    gst_element_set_state (harness_->element, GST_STATE_PLAYING);
+    gst_harness_push_event (
+        harness_.get (), gst_event_new_stream_start ("again"));
+    gst_harness_set_src_caps_str (harness_.get (), kCaps);
+    GstSegment segment;
+    gst_segment_init (&segment, GST_FORMAT_TIME);
+    gst_harness_push_event (harness_.get (), gst_event_new_segment (&segment));
+  }
 }
 
 TEST_F (LogTest, ScheduleComesFirstAndOnce)

@@ -1,18 +1,19 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* moirecalib behind a simulated bench: readings, states, the mapping and where
- * it goes; and what it says where there is nobody to show patterns. */
+/* moirecalib after a simulated bench: readings, states and the mapping; and its
+ * errors without a dmdsync. */
 #include <filesystem>
 
-#include "gstcodedexposuretag.h"
-#include "moire/gratings.h"
-#include "optics/lens.h"
+#include "bench/lens.h"
+#include "calibrate/gratings.h"
+#include "common/events.h"
+#include "common/tag.h"
 #include "sync_bench.h"
 
 namespace
 {
 
-using namespace cexp;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::test;
 
 const auto *const linked =
     ::testing::AddGlobalTestEnvironment (new LinkedElements);
@@ -56,7 +57,8 @@ protected:
             " ! moirecalib name=calib " + settings);
     calib = bench->find ("calib");
   }
-  /** Exposes until there is a message of that name; the last of them. */
+  /** Exposes frames until a message of that name is posted; returns the last
+   * one. */
   MessagePtr wait_for (const char *name, const std::string &state = "")
   {
     for (int i = 0; i < kPatience; i++) {
@@ -78,14 +80,13 @@ protected:
 double
 worst_error (const Mapping &mapping)
 {
-  const Affine truth = camera_to_mirrors (kStand, kWidth, kHeight);
+  const Homography truth = camera_to_mirrors (kStand, kWidth, kHeight);
   double worst = 0.0;
   for (const double x : {0.0, kWidth - 1.0})
     for (const double y : {0.0, kHeight - 1.0}) {
       const Position found = mapping.mirror_at (x, y);
-      worst = std::max (
-          worst, std::hypot (found.x - (truth.xx * x + truth.xy * y + truth.x0),
-                     found.y - (truth.yx * x + truth.yy * y + truth.y0)));
+      const Projected seen = project (truth, x, y);
+      worst = std::max (worst, std::hypot (found.x - seen.x, found.y - seen.y));
     }
   return worst;
 }
@@ -144,7 +145,7 @@ TEST_F (MoireCalibTest, MapsAndTellsEverybody)
   ASSERT_TRUE (setup->value ().mapping);
   EXPECT_EQ (setup->value ().mapping->to_json (), json);
 
-  /* And the mirrors are back. */
+  /* The mirrors show the schedule again. */
   EXPECT_EQ (
       string_field (bench->messages ("dmdsync/pattern-over").back (), "reason"),
       "asked");
@@ -168,7 +169,7 @@ TEST_F (MoireCalibTest, NamesNoFileThatItCouldNotWrite)
   EXPECT_NE (warnings.find ("/proc/no/map.json"), std::string::npos);
   EXPECT_NE (warnings.find ("/proc/no/map.png"), std::string::npos);
 
-  /* The same once more, now with a place for the mapping. */
+  /* Again, with a location for the mapping. */
   const auto file = std::filesystem::temp_directory_path () /
                     ("cexp-again-" + std::to_string (getpid ()) + ".json");
   g_object_set (calib.get (), "location", file.c_str (), nullptr);
@@ -221,9 +222,7 @@ answer_as_dmdsync (GstPad *pad, GstObject *parent, GstQuery *query)
 {
   if (GST_QUERY_TYPE (query) != GST_QUERY_CUSTOM)
     return gst_pad_query_default (pad, parent, query);
-  gst_structure_set (gst_query_writable_structure (query), "width", G_TYPE_INT,
-      kLargeWidth, "height", G_TYPE_INT, kLargeHeight, "patterns",
-      G_TYPE_BOOLEAN, TRUE, nullptr);
+  answer_query (query, MirrorsAnswer{kLargeWidth, kLargeHeight, true});
   return TRUE;
 }
 
@@ -259,6 +258,40 @@ TEST (MoireCalib, EveryFramePassesWithItsTimesWhateverTheWorkerDoes)
     EXPECT_EQ (GST_BUFFER_PTS (out.get ()),
         GstClockTime (FrameRate{30000, 1001}.time_of (i)));
   }
+}
+
+TEST (MoireCalib, AsksAgainBeforeUpstreamTakesTheMirrorsBack)
+{
+  struct Request {
+    guint64 lease = 0;
+    guint64 age = 0; ///< frames since it was made
+    int made = 0;
+  } request;
+  ElementHarness h ("moirecalib overlay=false");
+  gst_pad_add_probe (
+      h.get ()->srcpad, GST_PAD_PROBE_TYPE_EVENT_UPSTREAM,
+      [] (GstPad *, GstPadProbeInfo *info, gpointer data) {
+        GstEvent *event = GST_PAD_PROBE_INFO_EVENT (info);
+        auto *seen = static_cast<Request *> (data);
+        if (gst_event_has_name (event, "dmdsync/pattern") &&
+            gst_structure_get_uint64 (
+                gst_event_get_structure (event), "frames", &seen->lease)) {
+          seen->age = 0;
+          seen->made++;
+        }
+        return GST_PAD_PROBE_OK;
+      },
+      &request, nullptr);
+  gst_pad_set_query_function (h.get ()->srcpad, answer_as_dmdsync);
+  h.set_caps (gray_caps (kLargeWidth, kLargeHeight, "30000/1001"));
+  const BufferPtr frame = grating_frame (0);
+  for (int i = 0; i < 300; i++) {
+    ASSERT_EQ (
+        h.push (BufferPtr (gst_buffer_copy (frame.get ()))), GST_FLOW_OK);
+    ASSERT_TRUE (h.pull ());
+    ASSERT_LT (request.age++, request.lease) << i;
+  }
+  EXPECT_GT (request.made, 1);
 }
 
 TEST (MoireCalib, LaysItsPanelOverThePictureOrLeavesItAlone)
@@ -341,7 +374,7 @@ scenery (std::int64_t slot, ImageView<std::uint8_t> out)
       out.at (x, y) = std::uint8_t (60 + (x * 7 + y * 13 + slot) % 97);
 }
 
-/** What a camera sees of a flat scene behind @p schedule. */
+/** Frame of a flat scene behind mirrors with @p schedule. */
 BufferPtr
 flat_frame (const Schedule &schedule, std::uint8_t light)
 {
@@ -349,7 +382,7 @@ flat_frame (const Schedule &schedule, std::uint8_t light)
                        [&] (int x, int y) {
                          int sum = 0;
                          for (int slot = 0; slot < schedule.slots (); slot++)
-                           sum += schedule.open (x, y, slot) * light;
+                           sum += schedule.on (x, y, slot) * light;
                          return sum;
                        }),
       GstClockTime (FrameRate{30000, 1001}.time_of (0)));
@@ -385,6 +418,24 @@ TEST (MoireCalibPhase, IsLookedForInAStreamThatSaysNoSchedule)
   const MessagePtr said = h.element_message ("moirecalib/phase");
   ASSERT_TRUE (said);
   EXPECT_EQ (string_field (said, "schedule"), "staircase:3x2,phase=2/1");
+}
+
+TEST (MoireCalibPhase, ChangesNothingElseOfTheSchedule)
+{
+  const std::string schedule =
+      "staircase:3x2,order=5/3/1/0/2/4,active=4ms,switching=100us,"
+      "readout=300us,leak=0.02,pilot=8";
+  ElementHarness h ("moirecalib mode=phase schedule=" + schedule);
+  h.set_caps (gray_caps (kWidth, kHeight, "30000/1001"));
+  const auto moved = Schedule::parse (schedule + ",phase=2/1");
+  ASSERT_TRUE (moved);
+  EXPECT_EQ (h.push (flat_frame (*moved, 40)), GST_FLOW_OK);
+  h.push_event (gst_event_new_eos ());
+  const MessagePtr said = h.element_message ("moirecalib/phase");
+  ASSERT_TRUE (said);
+  const auto found = Schedule::parse (string_field (said, "schedule"));
+  ASSERT_TRUE (found);
+  EXPECT_EQ (*found, *moved);
 }
 
 TEST (MoireCalibPhase, WhatSaysNothingOfItIsWarnedOf)

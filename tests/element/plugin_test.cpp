@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* What gst-inspect-1.0 shows is the manual: it must be complete. */
+/* The output of gst-inspect-1.0 is the manual, so it must be complete. */
 #include <memory>
 #include <string>
 
@@ -48,7 +48,7 @@ bool
 is_ours (const GParamSpec *spec)
 {
   const gchar *owner = g_type_name (spec->owner_type);
-  return g_str_has_prefix (owner, "GstCodedExposure") ||
+  return g_str_has_prefix (owner, "GstCoded") ||
          g_str_has_prefix (owner, "GstDmd") ||
          g_str_has_prefix (owner, "GstSubframe");
 }
@@ -57,12 +57,28 @@ is_ours (const GParamSpec *spec)
 
 TEST (Plugin, HasTheElementsOfTheBench)
 {
-  for (const char *name : {"codedexposure-sim", "codedexposure-demux",
-           "codedexposure-log", "codedexposure-scene", "codedexposure-view",
-           "dmdsync", "moirecalib", "subframestats"}) {
+  for (const char *name : {"codedexposure-camerasrc", "codedexposure-sim",
+           "codedexposure-demux", "codedexposure-log", "codedexposure-scene",
+           "codedexposure-view", "dmdsync", "moirecalib", "subframestats"}) {
     const std::unique_ptr<GstElementFactory, ObjectUnref> factory (
         gst_element_factory_find (name));
     EXPECT_NE (factory, nullptr) << name;
+  }
+}
+
+TEST (Plugin, ConsumersOfCodedFramesShareABaseClass)
+{
+  for (const char *name : {"codedexposure-demux", "codedexposure-fuse"}) {
+    const std::unique_ptr<GstElement, ObjectUnref> element (
+        gst_element_factory_make (name, nullptr));
+    ASSERT_NE (element, nullptr);
+    const GType base = g_type_parent (G_OBJECT_TYPE (element.get ()));
+    EXPECT_STREQ (g_type_name (base), "GstCodedFilter");
+    EXPECT_TRUE (G_TYPE_IS_ABSTRACT (base));
+    EXPECT_STREQ (g_type_name (g_type_parent (base)), "GstElement");
+    const std::unique_ptr<GstPad, ObjectUnref> src (
+        gst_element_get_static_pad (element.get (), "src"));
+    EXPECT_STREQ (G_OBJECT_TYPE_NAME (src.get ()), "GstCodedPad");
   }
 }
 

@@ -1,17 +1,17 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* codedexposure-scene: exact times, both depths, and what was drawn. */
+/* codedexposure-scene: exact times, both depths, and the drawn pictures. */
 #include <vector>
 
+#include "bench/scene.h"
 #include "harness.h"
 #include "pipeline.h"
-#include "scene/scene.h"
 
 namespace
 {
 
-using namespace cexp;
-using namespace cexp::gst;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::gst;
+using namespace codedexposure::test;
 
 /** The pictures that the element makes with these caps. */
 std::vector<BufferPtr>

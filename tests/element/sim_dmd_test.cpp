@@ -1,14 +1,15 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* codedexposure-sim behind a simulated DMD that the test drives. */
-#include "dmd/simulated_dmd.h"
+/* codedexposure-sim with a simulated DMD that the test controls. */
+#include "bench/simulated_dmd.h"
 #include "linked_elements.h"
+#include "mirrors.h"
 #include "sim_harness.h"
 
 namespace
 {
 
-using namespace cexp;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::test;
 
 const auto *const linked =
     ::testing::AddGlobalTestEnvironment (new LinkedElements);
@@ -155,7 +156,7 @@ TEST (SimDmd, PilotTakesTwoFramesForItsMasks)
     for (int frame = 0; frame < 3; frame++) {
       Image<std::uint8_t> light (width, height), mask (width, height);
       for (int slot = 0; slot < 4; slot++) {
-        render_mask (schedule, slot + 4 * (frame % 2), mask.view ());
+        expected_mask (schedule, slot + 4 * (frame % 2), mask.view ());
         for (int y = 0; y < height; y++)
           for (int x = 0; x < width; x++)
             light.at (x, y) =

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* codedexposure-sim: what the pixels of a coded frame hold. */
+/* codedexposure-sim: pixel values of coded frames. */
 #include <cmath>
 
 #include "schedule/schedule.h"
@@ -8,8 +8,8 @@
 namespace
 {
 
-using namespace cexp;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::test;
 
 struct Code {
   const char *preset;
@@ -20,7 +20,7 @@ class SimLight : public ::testing::TestWithParam<Code>
 {
 };
 
-/* The mean of the input frames of the open slots, rounded half up. */
+/* The mean of the input frames in slots that are on, rounded half up. */
 template <typename Pixel>
 void
 expect_exact (const Code &code, const std::string &format, int num, int den)
@@ -41,12 +41,12 @@ expect_exact (const Code &code, const std::string &format, int num, int den)
       ASSERT_EQ (sim.send (k, scene<Pixel> (width, height, k)), GST_FLOW_OK);
     }
     const Image<Pixel> coded = sim.coded<Pixel> ();
-    const int budget = schedule.code ().max_open_slots () * code.multiple;
+    const int budget = schedule.code ().max_on_slots () * code.multiple;
     for (int y = 0; y < height; y++)
       for (int x = 0; x < width; x++) {
         std::int64_t light = 0;
         for (int i = 0; i < inputs; i++)
-          if (schedule.code ().open (
+          if (schedule.code ().on (
                   schedule.element_at (x, y), i / code.multiple))
             light += scene<Pixel> (width, height, frame * inputs + i).at (x, y);
         ASSERT_EQ (coded.at (x, y), (2 * light + budget) / (2 * budget))
@@ -108,7 +108,7 @@ TEST (SimLight, SwitchingTakesItsTimeButNoWhite)
   SimHarness sim ("schedule=sequential:2x2,active=4ms,switching=6ms");
   gst_harness_set_sink_caps_str (sim.get (), gray_caps (2, 2).c_str ());
   sim.start (2, 2, 200, 1);
-  /* Slots open for 4 ms of the first of their two frames of 5 ms. */
+  /* Slots are active for 4 ms of the first of their two frames of 5 ms. */
   EXPECT_EQ (elements_of (sim, {255, 1, 101, 2, 50, 3, 77, 4}),
       (std::vector<int>{255, 101, 50, 77}));
 }

@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* codedexposure-sim: times, gaps, events, caps and what is said of them. */
-#include "gstcodedexposuretag.h"
+/* codedexposure-sim: times, gaps, events, caps and messages. */
+#include "common/meta.h"
+#include "common/tag.h"
 #include "sim_harness.h"
 
 namespace
 {
 
-using namespace cexp;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::test;
 
 void
 push_segment (SimHarness &sim, gdouble rate, GstClockTime start)
@@ -86,7 +87,7 @@ TEST_P (SimRates, CodedFramesAreStampedWithTheirFirstInputFrame)
   EXPECT_EQ (sim.counter ("frames-dropped"), 0u);
 }
 
-/* Matroska keeps milliseconds. */
+/* Matroska rounds times to ms. */
 TEST_P (SimRates, RoundedTimeStampsAreNoGaps)
 {
   const auto [num, den] = GetParam ();
@@ -274,6 +275,54 @@ TEST (SimTime, CorruptedInputMakesACorruptedFrame)
         corrupted);
 }
 
+/* A camera with fewer bits than its format also writes frame numbers. */
+TEST (SimTime, ExposuresThatHadNoLightAreCountedWhateverTheJitter)
+{
+  SimHarness sim ("bits=7");
+  sim.start (2, 2);
+  struct Numbered {
+    guint64 frame, lost_before;
+    bool operator== (const Numbered &) const = default;
+  };
+  std::vector<Numbered> numbers;
+  const struct {
+    int first;
+    GstClockTimeDiff jitter;
+  } exposures[] = {{0, 0}, {4, 0}, {12, -2'000'000}, {24, 2'000'000}};
+  for (const auto &[first, jitter] : exposures) {
+    for (int k = first; k < first + 4; k++)
+      ASSERT_EQ (sim.push (frame_of (flat<std::uint8_t> (2, 2, 0),
+                     sim.time (guint64 (k)) + GstClockTime (jitter))),
+          GST_FLOW_OK);
+    const BufferPtr coded = sim.pull ();
+    ASSERT_TRUE (coded);
+    const auto meta = get_frame_meta (coded.get ());
+    ASSERT_TRUE (meta);
+    EXPECT_EQ (meta->bits, 7);
+    numbers.push_back ({meta->frame, meta->lost_before});
+  }
+  EXPECT_EQ (numbers, (std::vector<Numbered>{{0, 0}, {1, 0}, {3, 1}, {6, 2}}));
+}
+
+/* A seek does not count as a gap. */
+TEST (SimTime, NoExposureIsLostInAFlush)
+{
+  SimHarness sim ("bits=7");
+  sim.start (2, 2);
+  sim.send_range (0, 4);
+  ASSERT_TRUE (sim.pull ());
+  sim.push_event (gst_event_new_flush_start ());
+  sim.push_event (gst_event_new_flush_stop (TRUE));
+  push_segment (sim, 1.0, sim.time (1000));
+  sim.send_range (1000, 1004);
+  const BufferPtr coded = sim.pull ();
+  ASSERT_TRUE (coded);
+  const auto meta = get_frame_meta (coded.get ());
+  ASSERT_TRUE (meta);
+  EXPECT_EQ (meta->frame, 1u);
+  EXPECT_EQ (meta->lost_before, 0u);
+}
+
 TEST (SimTime, FrameWithoutTimeStampIsAnError)
 {
   SimHarness sim;
@@ -441,7 +490,7 @@ INSTANTIATE_TEST_SUITE_P (Rates, SimRate,
         Negotiation{"240000/1001", "30000/1001", "30000/1001"},
         Negotiation{"200/1", "[1/1,30/1]", "25/1"}));
 
-/* What the bus says when a frame meets an element of @properties. */
+/* The error for a frame and an element with @properties. */
 std::string
 complaint (const std::string &properties, const std::string &caps,
     const std::string &downstream = "")

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* subframestats: the true figures of every picture, in all the forms in which
- * they are said. */
+/* subframestats: correct figures of every picture, in all output forms. */
 #include <cstdio>
 #include <fstream>
 #include <string>
@@ -9,20 +8,20 @@
 #include <glib/gstdio.h>
 #include <nlohmann/json.hpp>
 
-#include "gstcodedexposuremeta.h"
-#include "gstsubframestatsreport.h"
+#include "common/meta.h"
 #include "harness.h"
 #include "pipeline.h"
+#include "stats/report.h"
 
 namespace
 {
 
-using namespace cexp;
-using namespace cexp::gst;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::gst;
+using namespace codedexposure::test;
 using Json = nlohmann::json;
 
-/** A file's name that is free, and is free again afterwards. */
+/** An unused file name; the file is removed afterwards. */
 class Scratch
 {
 public:
@@ -99,8 +98,8 @@ stats_meta (GstBuffer *buffer)
   return meta ? gst_custom_meta_get_structure (meta) : nullptr;
 }
 
-/* What ramp (4, 2, 250) must give: 250, ..., 255, and 0 and 1, which the bytes
- * wrap to. */
+/* Expected values of ramp (4, 2, 250): 250, ..., 255, and 0 and 1 after the
+ * overflow of a byte. */
 void
 expect_ramp (const GstStructure *fields)
 {
@@ -236,15 +235,15 @@ TEST (SubframeStats, SaysWhatItCannotDo)
 {
   EXPECT_EQ (complaint (""), "");
   EXPECT_EQ (complaint ("line=diagonal"),
-      "The line property cannot be read: cannot use 'diagonal' as a line; "
-      "write row:Y, column:X or X0/Y0/X1/Y1, each in pixels or in %");
+      "The line property cannot be read: 'diagonal' is not a line; use "
+      "row:Y, column:X or X0/Y0/X1/Y1, in pixels or in %");
   EXPECT_EQ (complaint ("line=row:4"),
       "These pictures cannot be measured: the line reaches pixel (3, 4) of a "
-      "picture of 4x4; its last pixel is (3, 3), and parts such as 50% fit "
+      "picture of 4x4; its last pixel is (3, 3); percentages such as 50% fit "
       "every size");
   EXPECT_EQ (complaint ("bits=12"),
-      "These pictures cannot be measured: bits = 12 is no number of bits of a "
-      "pixel; it has 1 to 8, 0 for all");
+      "These pictures cannot be measured: bits = 12 is out of range; a pixel "
+      "has 1 to 8, 0 means all");
   EXPECT_EQ (complaint ("location=/nonexistent/stats.csv"),
       "Cannot open \"/nonexistent/stats.csv\" for writing: No such file or "
       "directory");

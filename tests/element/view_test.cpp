@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* codedexposure-view: what pictures of any depth look like. */
-#include "gstcodedexposuremeta.h"
+/* codedexposure-view: display values for all depths. */
+#include "common/meta.h"
 #include "harness.h"
 
 namespace
 {
 
-using namespace cexp;
-using namespace cexp::gst;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::gst;
+using namespace codedexposure::test;
 
 constexpr int kWidth = 7, kHeight = 3;
 
@@ -18,7 +18,7 @@ caps (const char *format)
   return gray_caps (kWidth, kHeight, "30000/1001", format);
 }
 
-/** What is shown of a picture with @p value everywhere. */
+/** The output for a picture with @p value everywhere. */
 template <typename Pixel>
 int
 shown (const std::string &settings, int value, int meta_bits)

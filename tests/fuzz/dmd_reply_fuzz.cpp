@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Any bytes as what a board sends: whatever it says, drivers end with a result
- * or a message that can be shown, and do not wait for ever. */
+/* Any bytes as replies of a board: drivers must end with a result or a
+ * printable message, and must not block forever. */
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
@@ -12,7 +12,7 @@
 #include "dmd/dlpc900.h"
 #include "dmd/lightcrafter_protocol.h"
 
-using namespace cexp;
+using namespace codedexposure;
 
 namespace
 {
@@ -26,8 +26,8 @@ require (bool holds, const char *what, const std::string &shown)
   std::abort ();
 }
 
-/** Answers each request with the next bytes, under the right sequence number
- * where the first of them is even; dumb when they are used up. */
+/** Answers each request with the next bytes, with the correct sequence number
+ * if the first of them is even; silent at their end. */
 class FuzzPipe : public PacketPipe
 {
 public:

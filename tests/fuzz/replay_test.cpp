@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Runs a fuzz target over its corpus and over a fixed set of mutations of it:
- * what every build can do without a fuzzer. */
+/* Runs a fuzz target over its corpus and a fixed set of mutations, which every
+ * build can do without a fuzzer. */
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Any bytes as a preset and as JSON: a good schedule or a good message. */
+/* Any bytes as a preset and as JSON must give a valid schedule or a message. */
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
@@ -9,7 +9,7 @@
 #include "schedule/sample_grid.h"
 #include "schedule/schedule.h"
 
-using namespace cexp;
+using namespace codedexposure;
 
 namespace
 {

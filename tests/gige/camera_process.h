@@ -14,7 +14,7 @@
 
 #include <gtest/gtest.h>
 
-namespace cexp::test
+namespace codedexposure::test
 {
 
 /** Serves coded frames from its construction on, and ends with it. */
@@ -95,4 +95,4 @@ private:
   FILE *said_ = nullptr;
 };
 
-} // namespace cexp::test
+} // namespace codedexposure::test

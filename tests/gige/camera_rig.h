@@ -10,11 +10,11 @@
 #include <utility>
 #include <vector>
 
-#include "camera/gige_camera.h"
-#include "gstcodedexposuremeta.h"
+#include "bench/gige_camera.h"
+#include "common/meta.h"
 #include "harness.h"
 
-namespace cexp::test
+namespace codedexposure::test
 {
 
 constexpr int kCameraWidth = 256;
@@ -54,6 +54,19 @@ camera_source (const std::string &rate = "100/1",
 {
   return "aravissrc camera-name=127.0.0.1 packet-resend=false " + more +
          " ! video/x-raw,format=" + format +
+         ",width=" + std::to_string (kCameraWidth) +
+         ",height=" + std::to_string (kCameraHeight) + ",framerate=" + rate +
+         " ! ";
+}
+
+/** The same through the bin, which names some of the properties otherwise. */
+inline std::string
+camera_bin (const std::string &rate = "100/1",
+    const std::string &format = "GRAY8", const std::string &more = "")
+{
+  return "codedexposure-camerasrc name=camera camera-name=127.0.0.1 "
+         "source::packet-resend=false " +
+         more + " ! video/x-raw,format=" + format +
          ",width=" + std::to_string (kCameraWidth) +
          ",height=" + std::to_string (kCameraHeight) + ",framerate=" + rate +
          " ! ";
@@ -159,4 +172,4 @@ counter (const CameraPipeline &pipeline, const char *name)
   return value;
 }
 
-} // namespace cexp::test
+} // namespace codedexposure::test

@@ -8,19 +8,20 @@
 #include <filesystem>
 #include <map>
 
+#include "bench/bench.h"
 #include "camera_rig.h"
 #include "dmd/dmd.h"
 #include "emulated_dlpc900.h"
 #include "linked_elements.h"
-#include "optics/bench.h"
+#include "mirrors.h"
 #include "screen.h"
 #include "usb_bed.h"
 
 namespace
 {
 
-using namespace cexp;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::test;
 
 const auto *const linked =
     ::testing::AddGlobalTestEnvironment (new LinkedElements);
@@ -112,7 +113,7 @@ private:
   bool shows (const Image<std::uint8_t> &mirrors, int mask) const
   {
     Image<std::uint8_t> expected (kCameraWidth, kCameraHeight);
-    render_mask (schedule_, mask, expected.view ());
+    expected_mask (schedule_, mask, expected.view ());
     for (int y = 0; y < kCameraHeight; y++)
       if (!std::equal (expected.view ().row (y),
               expected.view ().row (y) + kCameraWidth, mirrors.view ().row (y)))
@@ -322,10 +323,9 @@ TEST (Chain, ACameraThatComesBackFindsTheMasksInPhase)
   std::vector<FrameMeta> came;
   std::atomic<int> frames = 0;
   CameraPipeline pipeline (
-      camera_source ("25/1", "GRAY8", "num-buffers=30") +
+      camera_bin ("25/1", "GRAY8", "num-buffers=40 reconnect=10") +
           "dmdsync name=sync device=" + kDevice +
-          "reconnect=10 timestamp-at=device-clock schedule=" + kWithPilot +
-          " ! ",
+          "timestamp-at=device-clock schedule=" + kWithPilot + " ! ",
       [&] (GstBuffer *buffer, const GstVideoInfo &) {
         came.push_back (*get_frame_meta (buffer));
         frames++;
@@ -343,7 +343,7 @@ TEST (Chain, ACameraThatComesBackFindsTheMasksInPhase)
   const auto back = std::find_if (came.begin (), came.end (),
       [] (const FrameMeta &meta) { return meta.lost_before > 25; });
   ASSERT_NE (back, came.end ());
-  EXPECT_GT (came.end () - back, 20) << "num-buffers counts from there";
+  EXPECT_GT (came.end () - back, 20);
   const auto locked = std::find_if (
       back, came.end (), [] (const FrameMeta &meta) { return meta.locked; });
   EXPECT_LT (locked - back, 10);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* dmdsync behind the unmodified aravissrc, which reads a camera in software. */
+/* A camera in software, read by codedexposure-camerasrc and by the unmodified
+ * aravissrc, with dmdsync behind them. */
 #include <condition_variable>
 #include <cstdlib>
 #include <latch>
@@ -8,15 +9,15 @@
 
 #include <gst/check/gsttestclock.h>
 
-#include "camera/packed_mono.h"
+#include "base/packed_mono.h"
 #include "camera_rig.h"
 #include "linked_elements.h"
 
 namespace
 {
 
-using namespace cexp;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::test;
 
 const auto *const linked =
     ::testing::AddGlobalTestEnvironment (new LinkedElements);
@@ -89,12 +90,27 @@ sum_of (const CameraPipeline &pipeline, const char *message, const char *field)
 
 constexpr const char *kSync = "dmdsync name=sync timestamp-at=device-clock ! ";
 
-TEST (Gige, EveryPixelOfEveryFrameArrives)
+/** Tests of both sources. */
+class Gige : public ::testing::TestWithParam<bool>
+{
+protected:
+  static bool is_bin () { return GetParam (); }
+  static std::string source (const std::string &rate, const std::string &format,
+      const std::string &more = "")
+  {
+    return is_bin () ? camera_bin (rate, format, more)
+                     : camera_source (rate, format, more);
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P (Sources, Gige, ::testing::Bool (),
+    [] (const auto &info) { return info.param ? "bin" : "aravissrc"; });
+
+TEST_P (Gige, EveryPixelOfEveryFrameArrives)
 {
   const auto camera = open_camera ({});
   Received received;
-  CameraPipeline pipeline (
-      camera_source ("100/1", "GRAY8", "num-buffers=100") + kSync,
+  CameraPipeline pipeline (source ("100/1", "GRAY8", "num-buffers=100") + kSync,
       [&] (auto *buffer, auto &info) { received.take (buffer, info); });
   pipeline.play ();
   EXPECT_EQ (pipeline.wait_end (), "end");
@@ -103,7 +119,7 @@ TEST (Gige, EveryPixelOfEveryFrameArrives)
   EXPECT_EQ (counter (pipeline, "frames-lost"), 0u);
 }
 
-TEST (Gige, WideFormatsKeepTheirBits)
+TEST_P (Gige, WideFormatsKeepTheirBits)
 {
   const struct {
     int bits;
@@ -117,9 +133,12 @@ TEST (Gige, WideFormatsKeepTheirBits)
     std::uint64_t frames = 0;
     std::uint64_t first = 0;
     int wrong = 0;
-    CameraPipeline pipeline (camera_source ("100/1", "GRAY16_LE",
-                                 "num-buffers=10 features=\"PixelFormat=" +
-                                     std::string (format) + "\""),
+    const std::string assigned = std::string ("PixelFormat=") + format;
+    CameraPipeline pipeline (
+        source ("100/1", "GRAY16_LE",
+            "num-buffers=10 " + (is_bin ()
+                                        ? std::string ("pixel-format=") + format
+                                        : "features=" + assigned)),
         [&] (auto *buffer, auto &info) {
           const int mask = (1 << bits) - 1;
           const auto differs = [&] (std::uint64_t frame) {
@@ -137,8 +156,8 @@ TEST (Gige, WideFormatsKeepTheirBits)
 }
 
 /** A camera and a pipeline's clock that stands still from exposure to exposure,
- * each of which waits until the frame before has reached dmdsync: frames arrive
- * when they are exposed, however slow the machine. */
+ * each of which waits until dmdsync has passed the frame before on: frames
+ * arrive when they are exposed, however slow the machine. */
 class LockStep
 {
 public:
@@ -204,7 +223,7 @@ private:
 
 /* A live source holds frames until their times have come by the pipeline's
  * clock: those of a camera that is fast would seem to be right. */
-TEST (Gige, ACameraThatIsFastIsNeitherHeldUpNorBelieved)
+TEST (CameraBin, ACameraThatIsFastIsNeitherHeldUpNorBelieved)
 {
   constexpr GstClockTime kPeriod = 10 * GST_MSECOND;
   LockStep step (kPeriod);
@@ -217,13 +236,13 @@ TEST (Gige, ACameraThatIsFastIsNeitherHeldUpNorBelieved)
   GstClockTime first = GST_CLOCK_TIME_NONE;
   GstClockTime last = 0;
   CameraPipeline pipeline (
-      camera_source ("100/1", "GRAY8", "num-buffers=300") + kSync,
+      camera_bin ("100/1", "GRAY8", "num-buffers=300") + kSync,
       [&] (GstBuffer *buffer, const GstVideoInfo &) {
         last = GST_BUFFER_PTS (buffer);
         first = std::min (first, last);
       });
   gst_pipeline_use_clock (GST_PIPELINE (pipeline.get ()), step.clock ());
-  step.await_at (pipeline.element ("sync").get ());
+  step.await_at (pipeline.element ("sink").get ());
   pipeline.play ();
   step.begin ();
   EXPECT_EQ (pipeline.wait_end (), "end");
@@ -237,7 +256,7 @@ TEST (Gige, ACameraThatIsFastIsNeitherHeldUpNorBelieved)
   EXPECT_NEAR (double (last - first), double ((299 + lost) * kPeriod), 1000);
 }
 
-TEST (Gige, EveryFaultIsAccountedFor)
+TEST_P (Gige, EveryFaultIsAccountedFor)
 {
   GigeCameraOptions options;
   ASSERT_TRUE (options.faults
@@ -246,8 +265,7 @@ TEST (Gige, EveryFaultIsAccountedFor)
                    .ok ());
   const auto camera = open_camera (std::move (options));
   Received received;
-  CameraPipeline pipeline (
-      camera_source ("100/1", "GRAY8", "num-buffers=60") + kSync,
+  CameraPipeline pipeline (source ("100/1", "GRAY8", "num-buffers=60") + kSync,
       [&] (auto *buffer, auto &info) { received.take (buffer, info); });
   pipeline.play ();
   EXPECT_EQ (pipeline.wait_end (), "end");
@@ -270,14 +288,13 @@ TEST (Gige, EveryFaultIsAccountedFor)
   EXPECT_EQ (sum_of (pipeline, "dmdsync/frame-dropped", "frame"), 30 - first);
 }
 
-TEST (Gige, WithOnePercentOfThePacketsLostEveryGapIsAccountedFor)
+TEST_P (Gige, WithOnePercentOfThePacketsLostEveryGapIsAccountedFor)
 {
   GigeCameraOptions options;
   options.packet_loss = 0.01;
   const auto camera = open_camera (options);
   Received received;
-  CameraPipeline pipeline (
-      camera_source ("100/1", "GRAY8", "num-buffers=100") + kSync,
+  CameraPipeline pipeline (source ("100/1", "GRAY8", "num-buffers=100") + kSync,
       [&] (auto *buffer, auto &info) { received.take (buffer, info); });
   pipeline.play ();
   EXPECT_EQ (pipeline.wait_end (), "end");
@@ -291,13 +308,15 @@ TEST (Gige, WithOnePercentOfThePacketsLostEveryGapIsAccountedFor)
 }
 
 /* aravissrc gives memory to its camera again that it has handed out. */
-TEST (Gige, FramesThatAreKeptStayWhatTheyAre)
+TEST_P (Gige, FramesThatAreKeptStayWhatTheyAre)
 {
   const auto camera = open_camera ({});
   std::vector<BufferPtr> kept;
   GstVideoInfo info;
   CameraPipeline pipeline (
-      camera_source ("100/1", "GRAY8", "num-buffers=60 num-arv-buffers=20") +
+      source ("100/1", "GRAY8",
+          "num-buffers=60 " + std::string (is_bin () ? "source::" : "") +
+              "num-arv-buffers=20") +
           kSync + "queue max-size-buffers=20 ! ",
       [&] (GstBuffer *buffer, const GstVideoInfo &of_sink) {
         info = of_sink;
@@ -305,21 +324,16 @@ TEST (Gige, FramesThatAreKeptStayWhatTheyAre)
       });
   pipeline.play ();
   EXPECT_EQ (pipeline.wait_end (), "end");
-  const guint64 held = counter (pipeline, "frames-held");
-  const guint64 spoilt = counter (pipeline, "frames-spoilt");
   const guint64 early = counter (pipeline, "frames-early");
   pipeline.stop ();
   Received received;
   for (const BufferPtr &buffer : kept)
     received.take (buffer.get (), info);
   EXPECT_EQ (received.frames.size () + early, 60u);
-  /* A machine that is too busy to copy in time says so. */
-  EXPECT_LE (received.wrong, int (spoilt));
-  EXPECT_LT (spoilt, held);
-  EXPECT_GT (held, 20u);
+  EXPECT_EQ (received.wrong, 0);
 }
 
-TEST (Gige, PackedFormatsAreUnpackedWithTheirBits)
+TEST_P (Gige, PackedFormatsAreUnpackedWithTheirBits)
 {
   for (const char *format :
       {"Mono10Packed", "Mono12Packed", "Mono10p", "Mono12p"}) {
@@ -332,11 +346,12 @@ TEST (Gige, PackedFormatsAreUnpackedWithTheirBits)
     std::uint64_t first = 0; // of the camera, that is number 0
     int wrong = 0;
     CameraPipeline pipeline (
-        camera_source ("100/1", "GRAY16_LE",
-            "num-buffers=5 features=\"PixelFormat=" + std::string (format) +
-                "\"") +
-            "dmdsync name=sync timestamp-at=device-clock pixel-format=" +
-            format + " ! ",
+        source ("100/1", "GRAY16_LE",
+            std::string ("num-buffers=5 ") +
+                (is_bin () ? "pixel-format=" : "features=PixelFormat=") +
+                format) +
+            "dmdsync name=sync timestamp-at=device-clock " +
+            (is_bin () ? "" : std::string ("pixel-format=") + format) + " ! ",
         [&] (auto *buffer, auto &info) {
           const guint64 number = GST_BUFFER_OFFSET (buffer);
           const auto differs = [&] (std::uint64_t frame) {
@@ -356,17 +371,15 @@ TEST (Gige, PackedFormatsAreUnpackedWithTheirBits)
   }
 }
 
-TEST (Gige, ATriggerThatImposesAnotherRateIsSaid)
+TEST (CameraBin, ATriggerThatImposesAnotherRateIsSaid)
 {
   GigeCameraOptions options;
   options.trigger_rate = 80;
   const auto camera = open_camera (options);
-  CameraPipeline pipeline (
-      camera_source ("100/1", "GRAY8",
-          "num-buffers=70 features=\"TriggerSelector=FrameStart "
-          "TriggerSource=Line1 TriggerActivation=FallingEdge "
-          "TriggerMode=On\"") +
-          kSync,
+  CameraPipeline pipeline (camera_bin ("100/1", "GRAY8",
+                               "num-buffers=70 trigger=dmd trigger-line=Line1 "
+                               "trigger-edge=falling") +
+                               kSync,
       [] (auto *, auto &) {});
   pipeline.play ();
   EXPECT_EQ (pipeline.wait_end (), "end");
@@ -381,7 +394,7 @@ TEST (Gige, ATriggerThatImposesAnotherRateIsSaid)
   EXPECT_NEAR (measured, 80, 0.1);
 }
 
-TEST (Gige, ExposureAndLinesAreFeaturesOfTheCamera)
+TEST (CameraBin, ExposureAndLinesAreFeaturesOfTheCamera)
 {
   GigeCameraOptions options;
   const auto camera = open_camera (
@@ -392,10 +405,9 @@ TEST (Gige, ExposureAndLinesAreFeaturesOfTheCamera)
       });
   int level = 0;
   CameraPipeline pipeline (
-      camera_source ("50/1", "GRAY8",
-          "num-buffers=3 exposure=5000 features=\"TriggerSelector=FrameStart "
-          "TriggerMode=Off LineSelector=Line1 LineMode=Output "
-          "LineSource=ExposureActive LineInverter=true\""),
+      camera_bin ("50/1", "GRAY8",
+          "num-buffers=3 exposure-time=5000 trigger=camera "
+          "trigger-edge=falling"),
       [&] (GstBuffer *buffer, const GstVideoInfo &info) {
         MappedFrame mapped (info, buffer, GST_MAP_READ);
         level = view_of<std::uint8_t> (mapped).at (9, 9);
@@ -405,34 +417,28 @@ TEST (Gige, ExposureAndLinesAreFeaturesOfTheCamera)
   EXPECT_EQ (level, 50) << "a quarter of the period's light";
 }
 
-/* As pipelines/record sets cameras up: aravissrc sets the frame rate first,
- * which ends all triggers, and features last. */
-TEST (Gige, TheCameraIsSetUpAsItsSourceSays)
+/* aravissrc sets the frame rate first, which ends all triggers, and features
+ * last. */
+TEST (CameraBin, SetsTheCameraUpAsItsPropertiesSay)
 {
-  const std::string by_dmd = "TriggerSelector=FrameStart TriggerSource=";
-  const std::string by_camera =
-      "TriggerSelector=FrameStart TriggerMode=Off LineSelector=";
   const struct {
     std::string format;
-    std::string features;
+    std::string properties;
     std::string expected;
-  } cases[] = {
-      {"Mono8", by_dmd + "Line0 TriggerActivation=RisingEdge TriggerMode=On",
-          "trigger Line0 rising"},
-      {"Mono16", by_dmd + "Line1 TriggerActivation=FallingEdge TriggerMode=On",
+  } cases[] = {{"Mono8", "trigger=dmd", "trigger Line0 rising"},
+      {"Mono16", "trigger=dmd trigger-line=Line1 trigger-edge=falling",
           "trigger Line1 falling"},
-      {"Mono12",
-          by_camera + "Line0 LineMode=Output LineSource=ExposureActive "
-                      "LineInverter=false",
+      {"Mono12", "trigger=camera trigger-line=Line0",
           "no trigger, Line0 puts out ExposureActive"},
-      {"Mono12Packed",
-          by_camera + "Line1 LineMode=Output LineSource=ExposureActive "
-                      "LineInverter=true",
+      {"Mono12Packed", "trigger=camera trigger-edge=falling",
           "no trigger, Line1 puts out ExposureActive, inverted"},
-      {"Mono12p", by_dmd + "Line0 TriggerActivation=FallingEdge TriggerMode=On",
-          "trigger Line0 falling"}};
-  for (const auto &[format, features, expected] : cases) {
-    SCOPED_TRACE (format);
+      {"Mono12p", "trigger=dmd trigger-edge=falling", "trigger Line0 falling"},
+      {"Mono8",
+          "features=\"TriggerSelector=FrameStart TriggerSource=Line1 "
+          "TriggerMode=On\"",
+          "trigger Line1 rising"}};
+  for (const auto &[format, properties, expected] : cases) {
+    SCOPED_TRACE (format + " " + properties);
     std::mutex lock;
     std::string set;
     GigeCameraOptions options;
@@ -443,9 +449,9 @@ TEST (Gige, TheCameraIsSetUpAsItsSourceSays)
     };
     const auto camera = open_camera (std::move (options));
     CameraPipeline pipeline (
-        camera_source ("50/1", format == "Mono8" ? "GRAY8" : "GRAY16_LE",
-            "num-buffers=2 exposure=4000 features=\"" + features +
-                " PixelFormat=" + format + "\""),
+        camera_bin ("50/1", format == "Mono8" ? "GRAY8" : "GRAY16_LE",
+            "num-buffers=2 exposure-time=4000 pixel-format=" + format + " " +
+                properties),
         [] (auto *, auto &) {});
     pipeline.play ();
     EXPECT_EQ (pipeline.wait_end (), "end");
@@ -455,13 +461,13 @@ TEST (Gige, TheCameraIsSetUpAsItsSourceSays)
   }
 }
 
-TEST (Gige, ACameraThatStopsIsAnErrorAndACleanStop)
+TEST_P (Gige, ACameraThatStopsIsAnErrorAndACleanStop)
 {
   GigeCameraOptions options;
   ASSERT_TRUE (options.faults.add ("stop@20").ok ());
   const auto camera = open_camera (std::move (options));
   Received received;
-  CameraPipeline pipeline (camera_source () + kSync,
+  CameraPipeline pipeline (source ("100/1", "GRAY8") + kSync,
       [&] (auto *buffer, auto &info) { received.take (buffer, info); });
   pipeline.play ();
   const std::string error = pipeline.wait_end ();
@@ -476,11 +482,12 @@ TEST (Gige, ACameraThatStopsIsAnErrorAndACleanStop)
   pipeline.stop ();
 }
 
-TEST (Gige, ACameraThatRestartsIsLockedAtOnceInTheNextRun)
+/* A plain aravissrc keeps the camera that is no more. */
+TEST (CameraBin, ACameraThatRestartsIsLockedAtOnceInTheNextRun)
 {
   std::vector<bool> locked;
   CameraPipeline pipeline (
-      camera_source ("100/1", "GRAY8", "num-buffers=12") + kSync,
+      camera_bin ("100/1", "GRAY8", "num-buffers=12") + kSync,
       [&] (GstBuffer *buffer, const GstVideoInfo &) {
         locked.push_back (get_frame_meta (buffer)->locked);
       });
@@ -500,7 +507,7 @@ TEST (Gige, ACameraThatRestartsIsLockedAtOnceInTheNextRun)
 
 /* A packet socket hears every camera until its filter is set: none sends before
  * the sockets of both streams are there, which are opened while they pause. */
-TEST (Gige, TwoCamerasSideBySide)
+TEST (GigeCamera, TwoCamerasSideBySide)
 {
   constexpr int kCameras = 2;
   std::latch asked (kCameras);
@@ -528,7 +535,7 @@ TEST (Gige, TwoCamerasSideBySide)
   Received of_first;
   Received of_second;
   of_second.scene = 1000;
-  CameraPipeline one (camera_source ("50/1", "GRAY8", "num-buffers=50") + kSync,
+  CameraPipeline one (camera_bin ("50/1", "GRAY8", "num-buffers=50") + kSync,
       [&] (auto *buffer, auto &info) { of_first.take (buffer, info); });
   std::string line = camera_source ("50/1", "GRAY8", "num-buffers=50") + kSync;
   line.replace (line.find ("127.0.0.1"), 9, "127.0.0.2");
@@ -547,7 +554,7 @@ TEST (Gige, TwoCamerasSideBySide)
   EXPECT_EQ (of_second.wrong, 0);
 }
 
-TEST (Gige, AnAddressThatIsNotHereIsAnError)
+TEST (GigeCamera, AnAddressThatIsNotHereIsAnError)
 {
   GigeCameraOptions options;
   options.address = "192.0.2.1";
@@ -555,6 +562,105 @@ TEST (Gige, AnAddressThatIsNotHereIsAnError)
       options, [] (std::uint64_t, ImageView<std::uint16_t>) { return true; });
   ASSERT_FALSE (camera.ok ());
   EXPECT_NE (camera.error ().message.find ("'192.0.2.1'"), std::string::npos);
+}
+
+/** What the bus says first of a run with @p properties. */
+std::string
+said_of (const std::string &properties)
+{
+  CameraPipeline pipeline (
+      "codedexposure-camerasrc name=camera " + properties + " ! ",
+      [] (auto *, auto &) {});
+  pipeline.play ();
+  const std::string error = pipeline.wait_end ();
+  pipeline.stop ();
+  return error;
+}
+
+TEST (CameraBin, WhatCannotBeIsAnErrorThatNamesTheRemedy)
+{
+  const struct {
+    const char *properties;
+    const char *value;
+    const char *remedy;
+  } cases[] = {{"pixel-format=Mono14", "Mono14", "it is Mono8, Mono10"},
+      {"trigger=dmd trigger-line=\"Line 0\"", "Line 0", "arv-tool-0.8"},
+      {"trigger-line=Line1", "Line1", "trigger=dmd"},
+      {"features=\"Gain=1 PixelFormat=Mono12p\"", "PixelFormat=Mono12p",
+          "pixel-format=Mono12p"},
+      {"camera-name=127.0.0.9", "127.0.0.9", "find camera"}};
+  for (const auto &[properties, value, remedy] : cases) {
+    SCOPED_TRACE (properties);
+    const std::string error = said_of (properties);
+    EXPECT_NE (error.find (value), error.npos) << error;
+    EXPECT_NE (error.find (remedy), error.npos) << error;
+  }
+}
+
+TEST (CameraBin, AFeatureThatTheCameraHasNotIsAnError)
+{
+  const auto camera = open_camera ({});
+  const std::string error =
+      said_of ("camera-name=127.0.0.1 features=NoSuchFeature=1");
+  EXPECT_NE (error.find ("NoSuchFeature"), error.npos) << error;
+}
+
+TEST (CameraBin, TimesCountFromTheArrivalOfTheFirstFrame)
+{
+  const auto camera = open_camera ({});
+  std::vector<GstClockTime> times;
+  GstClockTime arrival = 0;
+  CameraPipeline pipeline (camera_bin ("100/1", "GRAY8", "num-buffers=20"),
+      [&] (GstBuffer *buffer, const GstVideoInfo &) {
+        EXPECT_NE (buffer->pool, nullptr);
+        if (times.empty ())
+          arrival = gst_element_get_current_running_time (pipeline.get ());
+        times.push_back (GST_BUFFER_PTS (buffer));
+      });
+  pipeline.play ();
+  EXPECT_EQ (pipeline.wait_end (), "end");
+  ASSERT_EQ (times.size (), 20u);
+  EXPECT_LE (times.front (), arrival);
+  EXPECT_GT (times.front (), 0u) << "a camera takes a while to start";
+  EXPECT_TRUE (std::is_sorted (times.begin (), times.end ()));
+}
+
+TEST (CameraBin, IsListedAsADevice)
+{
+  const auto camera = open_camera ({});
+  const ObjectPtr<GstDeviceMonitor> monitor (gst_device_monitor_new ());
+  gst_device_monitor_add_filter (monitor.get (), "Source/Video", nullptr);
+  ASSERT_TRUE (gst_device_monitor_start (monitor.get ()));
+  GList *devices = gst_device_monitor_get_devices (monitor.get ());
+  gst_device_monitor_stop (monitor.get ());
+  int found = 0;
+  for (GList *at = devices; at; at = at->next) {
+    auto *device = GST_DEVICE (at->data);
+    const StructurePtr facts (gst_device_get_properties (device));
+    const gchar *serial =
+        facts ? gst_structure_get_string (facts.get (), "serial") : nullptr;
+    if (g_strcmp0 (serial, "CE01") != 0)
+      continue;
+    found++;
+    EXPECT_STREQ (gst_structure_get_string (facts.get (), "vendor"), "Aravis");
+    EXPECT_STREQ (gst_structure_get_string (facts.get (), "model"), "Fake");
+    EXPECT_STREQ (
+        gst_structure_get_string (facts.get (), "address"), "127.0.0.1");
+    const CharPtr name (gst_device_get_display_name (device));
+    EXPECT_STREQ (name.get (), "Aravis Fake CE01");
+    const CapsPtr caps (gst_device_get_caps (device));
+    EXPECT_TRUE (gst_caps_can_intersect (
+        caps.get (), caps_of (gray_caps (64, 48)).get ()));
+    const ObjectPtr<GstElement> element (GST_ELEMENT (
+        gst_object_ref_sink (gst_device_create_element (device, "camera"))));
+    ASSERT_TRUE (element);
+    const CharPtr camera_name (
+        property<gchar *> (element.get (), "camera-name"));
+    EXPECT_STREQ (camera_name.get (), "Aravis-Fake-CE01");
+    EXPECT_TRUE (gst_device_reconfigure_element (device, element.get ()));
+  }
+  g_list_free_full (devices, gst_object_unref);
+  EXPECT_EQ (found, 1);
 }
 
 } // namespace

@@ -10,7 +10,7 @@
 int
 main (int argc, char **argv)
 {
-  const bool alone = cexp::test::enter_own_network ();
+  const bool alone = codedexposure::test::enter_own_network ();
   gst_init (&argc, &argv);
   ::testing::InitGoogleTest (&argc, argv);
   if (!alone) {

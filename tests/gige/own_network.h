@@ -13,7 +13,7 @@
 
 #include <cstring>
 
-namespace cexp::test
+namespace codedexposure::test
 {
 
 /** Moves the process there, with room for a camera at 127.0.0.1 and one at
@@ -41,4 +41,4 @@ enter_own_network ()
   return done;
 }
 
-} // namespace cexp::test
+} // namespace codedexposure::test

@@ -3,15 +3,15 @@
 #include <condition_variable>
 #include <mutex>
 
+#include "bench/simulated_dmd.h"
 #include "camera_process.h"
 #include "camera_rig.h"
-#include "dmd/simulated_dmd.h"
 
 namespace
 {
 
-using namespace cexp;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::test;
 
 constexpr const char *kSchedule = "sequential:2x2,pilot=16";
 constexpr GstClockTime kPeriod = 10 * GST_MSECOND;
@@ -27,20 +27,30 @@ protected:
     FrameMeta meta;
   };
 
+  static std::string camera (int tries)
+  {
+    return camera_bin ("100/1", "GRAY8", "reconnect=" + std::to_string (tries));
+  }
+  static std::string sync ()
+  {
+    return std::string ("dmdsync name=sync device=sim:reconnect schedule=") +
+           kSchedule + " timestamp-at=device-clock ";
+  }
   /** @p behind  what stands behind dmdsync. */
   void play (int tries, const std::string &behind = "")
   {
-    pipeline.emplace (
-        camera_source () +
-            "dmdsync name=sync device=sim:reconnect schedule=" + kSchedule +
-            " timestamp-at=device-clock reconnect=" + std::to_string (tries) +
-            " ! " + behind,
-        [this] (GstBuffer *buffer, const GstVideoInfo &) {
-          const std::lock_guard guard (lock);
-          came.push_back ({GST_BUFFER_OFFSET (buffer), GST_BUFFER_PTS (buffer),
-              GST_BUFFER_IS_DISCONT (buffer), *get_frame_meta (buffer)});
-          more.notify_all ();
-        });
+    play_line (
+        camera_bin ("100/1", "GRAY8", "reconnect=" + std::to_string (tries)) +
+        sync () + "! " + behind);
+  }
+  void play_line (const std::string &line)
+  {
+    pipeline.emplace (line, [this] (GstBuffer *buffer, const GstVideoInfo &) {
+      const std::lock_guard guard (lock);
+      came.push_back ({GST_BUFFER_OFFSET (buffer), GST_BUFFER_PTS (buffer),
+          GST_BUFFER_IS_DISCONT (buffer), *get_frame_meta (buffer)});
+      more.notify_all ();
+    });
     pipeline->play ();
   }
   /** Waits for @p count frames from now on, a minute at most. */
@@ -60,6 +70,10 @@ protected:
             gst_structure_copy (gst_message_get_structure (message.get ())));
     ADD_FAILURE () << name << " was never said";
     return nullptr;
+  }
+  guint reconnects ()
+  {
+    return property<guint> (pipeline->element ("camera").get (), "reconnects");
   }
   guint64 counter (const char *name)
   {
@@ -84,10 +98,10 @@ TEST_F (Reconnect, AKilledCameraThatComesBackIsLockedWithinTenFrames)
   ASSERT_TRUE (wait_frames (30));
   camera.reset ();
   camera.emplace (kSchedule);
-  const StructurePtr lost = wait_said ("dmdsync/camera-lost");
+  const StructurePtr lost = wait_said ("codedexposure/camera-lost");
   ASSERT_TRUE (lost);
   EXPECT_NE (gst_structure_get_string (lost.get (), "reason"), nullptr);
-  const StructurePtr back = wait_said ("dmdsync/camera-back");
+  const StructurePtr back = wait_said ("codedexposure/camera-back");
   ASSERT_TRUE (back);
   ASSERT_TRUE (wait_frames (30));
   const auto mirrors = SimulatedMirrors::find ("reconnect");
@@ -95,19 +109,22 @@ TEST_F (Reconnect, AKilledCameraThatComesBackIsLockedWithinTenFrames)
   pipeline->stop ();
   EXPECT_FALSE (mirrors->running ());
 
-  guint64 first = 0;
-  guint64 missing = 0;
-  EXPECT_TRUE (gst_structure_get_uint64 (back.get (), "frame", &first));
-  EXPECT_TRUE (gst_structure_get_uint64 (back.get (), "lost", &missing));
-  EXPECT_GE (missing, 100u) << "silent for two seconds at least";
-  EXPECT_EQ (counter ("reconnects"), 1u);
+  GstClockTime silent = 0;
+  guint tries = 0;
+  EXPECT_TRUE (gst_structure_get_uint64 (back.get (), "silent", &silent));
+  EXPECT_TRUE (gst_structure_get_uint (back.get (), "tries", &tries));
+  EXPECT_GT (tries, 0u);
+  EXPECT_EQ (reconnects (), 1u);
   EXPECT_EQ (counter ("slips"), 0u);
   const auto found = std::find_if (came.begin (), came.end (),
-      [first] (const Came &frame) { return frame.number == first; });
-  ASSERT_NE (found, came.end ());
+      [] (const Came &frame) { return frame.meta.lost_before >= 100; });
+  ASSERT_NE (found, came.end ()) << "silent for two seconds at least";
   ASSERT_NE (found, came.begin ());
   EXPECT_TRUE (found->discont);
-  EXPECT_EQ (found->meta.lost_before, missing);
+  const guint64 first = found->number;
+  const guint64 missing = found->meta.lost_before;
+  EXPECT_GE (silent, 100 * kPeriod);
+  EXPECT_EQ (counter ("frames-lost"), missing);
   const Came &last = *(found - 1);
   EXPECT_EQ (first, last.number + missing + 1);
   EXPECT_EQ ((found->pts - last.pts + kPeriod / 2) / kPeriod, missing + 1);
@@ -126,7 +143,7 @@ TEST_F (Reconnect, ACameraThatStaysSilentIsOneErrorAfterTheTries)
   play (1);
   ASSERT_TRUE (wait_frames (10));
   camera.type ("stop@now");
-  ASSERT_TRUE (wait_said ("dmdsync/camera-lost"));
+  ASSERT_TRUE (wait_said ("codedexposure/camera-lost"));
   const std::string error = pipeline->wait_end ();
   EXPECT_NE (error.find ("did not come back after 1 tries"), error.npos)
       << error;
@@ -140,7 +157,7 @@ TEST_F (Reconnect, ARunThatIsStoppedWhileTheCameraIsGoneEnds)
   play (1000);
   ASSERT_TRUE (wait_frames (10));
   camera.type ("stop@now");
-  ASSERT_TRUE (wait_said ("dmdsync/camera-lost"));
+  ASSERT_TRUE (wait_said ("codedexposure/camera-lost"));
   pipeline->stop ();
   EXPECT_FALSE (SimulatedMirrors::find ("reconnect")->running ());
 }
@@ -151,9 +168,28 @@ TEST_F (Reconnect, WhatFailsBehindItIsAnErrorAtOnce)
   play (1000, "identity error-after=20 ! ");
   const std::string error = pipeline->wait_end ();
   EXPECT_NE (error.find ("Failed after iterations"), error.npos) << error;
-  EXPECT_EQ (counter ("reconnects"), 0u);
+  EXPECT_EQ (reconnects (), 0u);
   EXPECT_EQ (came.size (), 19u);
   pipeline->stop ();
+}
+
+TEST_F (Reconnect, DmdsyncMayStandInABinAndFramesOfBothStartsAreCounted)
+{
+  CameraProcess camera (kSchedule);
+  play_line ("bin.( " + sync () + ") " +
+             camera_bin ("100/1", "GRAY8", "reconnect=10 num-buffers=60") +
+             "sync. sync. ! ");
+  ASSERT_TRUE (wait_frames (10));
+  camera.type ("lose@now:250");
+  ASSERT_TRUE (wait_said ("codedexposure/camera-lost"));
+  EXPECT_EQ (pipeline->wait_end (), "end");
+  EXPECT_EQ (reconnects (), 1u);
+  EXPECT_EQ (counter ("frames-in"), 60u);
+  EXPECT_EQ (counter ("frames-late"), 0u);
+  pipeline->stop ();
+  EXPECT_TRUE (came.back ().meta.locked);
+  EXPECT_TRUE (std::is_sorted (came.begin (), came.end (),
+      [] (const Came &one, const Came &two) { return one.pts < two.pts; }));
 }
 
 /* aravissrc takes ten seconds to let go of a camera that does not answer. */
@@ -163,7 +199,7 @@ TEST_F (Reconnect, DISABLED_ARunThatIsStoppedWhileTheCameraIsDeadEnds)
   play (1000);
   ASSERT_TRUE (wait_frames (10));
   camera.end (SIGKILL);
-  ASSERT_TRUE (wait_said ("dmdsync/camera-lost"));
+  ASSERT_TRUE (wait_said ("codedexposure/camera-lost"));
   pipeline->stop ();
   EXPECT_FALSE (SimulatedMirrors::find ("reconnect")->running ());
 }
@@ -188,9 +224,9 @@ TEST_F (Reconnect, DISABLED_ADeadCameraComesBackWithinItsTries)
   play (100);
   ASSERT_TRUE (wait_frames (10));
   camera.reset ();
-  ASSERT_TRUE (wait_said ("dmdsync/camera-lost"));
+  ASSERT_TRUE (wait_said ("codedexposure/camera-lost"));
   camera.emplace (kSchedule);
-  ASSERT_TRUE (wait_said ("dmdsync/camera-back"));
+  ASSERT_TRUE (wait_said ("codedexposure/camera-back"));
   ASSERT_TRUE (wait_frames (10));
   pipeline->stop ();
   EXPECT_TRUE (came.back ().meta.locked);

@@ -15,9 +15,9 @@
 #include <gtest/gtest.h>
 
 #include "base/image.h"
-#include "gstraii.h"
+#include "common/raii.h"
 
-namespace cexp::test
+namespace codedexposure::test
 {
 
 /** An X server that this process's windows are on from now on. */
@@ -107,4 +107,4 @@ private:
   bool there_ = false;
 };
 
-} // namespace cexp::test
+} // namespace codedexposure::test

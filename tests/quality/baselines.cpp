@@ -5,11 +5,11 @@
 #include <cmath>
 #include <random>
 
+#include "bench/sensor.h"
 #include "extract/extractor.h"
-#include "optics/sensor.h"
 #include "schedule/sample_grid.h"
 
-namespace cexp::quality
+namespace codedexposure::quality
 {
 
 namespace
@@ -65,8 +65,8 @@ lattice_of (const Schedule &schedule, int element)
   return lattice;
 }
 
-/* The sample nearest to the middle of those that were weighed says what is so
- * where hardly any are in the frame. */
+/* Near the border, where few samples are in the frame, the nearest sample is
+ * used. */
 double
 cubic_at (const Picture &coded, const Lattice &lattice, int x, int y)
 {
@@ -289,4 +289,4 @@ gap_tv_frames (const Scene &scene, int slots, const Condition &condition)
   return frames;
 }
 
-} // namespace cexp::quality
+} // namespace codedexposure::quality

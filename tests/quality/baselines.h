@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* What fused frames are compared with: simpler ways to full-size frames, and
+/* Methods that fused frames are compared with: simple interpolations and
  * another kind of coding. */
 #pragma once
 
@@ -9,7 +9,7 @@
 #include "schedule/schedule.h"
 #include "trial.h"
 
-namespace cexp::quality
+namespace codedexposure::quality
 {
 
 /** Every slot of every coded frame of a one-hot schedule by cubic convolution
@@ -18,9 +18,9 @@ namespace cexp::quality
 std::vector<Picture> bicubic_frames (
     const std::vector<Picture> &coded, const Schedule &schedule);
 
-/** What the paper shows: the ranks of a staircase, each enlarged by cubic
- * convolution around the centres of the cells. @p normalised: rank k times
- * n / k. */
+/** The method of the paper: the ranks of a staircase, each enlarged by cubic
+ * convolution around the centres of the cells. @p normalised: rank k times n /
+ * k. */
 std::vector<Picture> rank_frames (const std::vector<Picture> &coded,
     const Schedule &schedule, bool normalised);
 
@@ -33,4 +33,4 @@ std::vector<Picture> rank_frames (const std::vector<Picture> &coded,
 std::vector<Picture> gap_tv_frames (
     const Scene &scene, int slots, const Condition &condition);
 
-} // namespace cexp::quality
+} // namespace codedexposure::quality

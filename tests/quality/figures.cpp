@@ -10,7 +10,7 @@
 
 #include "trial.h"
 
-namespace cexp::quality
+namespace codedexposure::quality
 {
 
 namespace
@@ -105,7 +105,7 @@ const std::string kCellTitle =
 const std::string kFullTitle =
     "PSNR (dB) of full-size frames, subframes interpolated linearly";
 
-/* Not a number where only some are exact. */
+/* Not a number if only some scenes are exact. */
 double
 mean_over_scenes (const std::vector<double> &figures)
 {
@@ -199,7 +199,7 @@ leak_tables (const std::vector<Scene> &scenes, const Progress &progress)
     const Schedule tight = schedule_of (preset);
     const Schedule leaky = schedule_of (preset + ",leak=0.01");
     const double tight_gain =
-        double (tight.slots ()) / tight.code ().max_open_slots ();
+        double (tight.slots ()) / tight.code ().max_on_slots ();
     Way believing_tight = {"", leaky};
     believing_tight.believed = tight;
     runs.push_back ({{preset, "none"}, {"", tight}, kClean});
@@ -333,8 +333,8 @@ Table
 still_table (const std::vector<Scene> &scenes)
 {
   Table table{"still",
-      "Mean grey and entropy (bits a pixel) of I1..I4, staircase:2x2 and rank, "
-      "of scenes that stand still",
+      "Mean grey and entropy (bits per pixel) of I1..I4, staircase:2x2 and "
+      "rank, of static scenes",
       {{"scene"}, {"condition"}}, {}};
   for (const char *figure : {"mean", "entropy"}) {
     for (int k = 1; k <= 4; k++)
@@ -368,7 +368,7 @@ light_through (const Schedule &schedule)
 {
   int open = 0;
   for (int e = 0; e < schedule.elements (); e++)
-    open += schedule.code ().open_slots (e);
+    open += schedule.code ().on_slots (e);
   return 100.0 * open / (schedule.elements () * schedule.slots ());
 }
 
@@ -379,7 +379,7 @@ light_table ()
 {
   Table table{"light",
       "Light that passes the mirrors (% of an exposure without masks), and "
-      "signal to noise ratio (dB) of each subframe on a flat grey of 50 %, "
+      "signal-to-noise ratio (dB) of each subframe on a flat grey of 50 %, "
       "noisy",
       {{"schedule"}, {"method"}, {"light"}, {"I1"}, {"I2"}, {"I3"}, {"I4"}},
       {}};
@@ -399,4 +399,4 @@ light_table ()
   return table;
 }
 
-} // namespace cexp::quality
+} // namespace codedexposure::quality

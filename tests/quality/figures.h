@@ -9,10 +9,10 @@
 #include "scene.h"
 #include "table.h"
 
-namespace cexp::quality
+namespace codedexposure::quality
 {
 
-/** Told before each piece of work, for people who wait. */
+/** Called before each step, to report progress. */
 using Progress = std::function<void (const std::string &what)>;
 
 /** PSNR of every method and schedule on every scene, one table for each truth
@@ -20,15 +20,15 @@ using Progress = std::function<void (const std::string &what)>;
 std::vector<Table> method_tables (
     const std::vector<Scene> &scenes, const Progress &progress);
 
-/** The part of the pixels that rank takes for those of another slot. */
+/** The part of the pixels that rank assigns to the wrong slot. */
 Table mislabelled_table (
     const std::vector<Scene> &scenes, const Progress &progress);
 
-/** What mirrors that leak light when off cost, known and unknown. */
+/** The effect of off-state leakage, known and unknown. */
 std::vector<Table> leak_tables (
     const std::vector<Scene> &scenes, const Progress &progress);
 
-/** What mirrors that lie beside their pixels cost. */
+/** The effect of misaligned mirrors. */
 std::vector<Table> shift_tables (
     const std::vector<Scene> &scenes, const Progress &progress);
 
@@ -36,12 +36,12 @@ std::vector<Table> shift_tables (
  * beside the figures of an independent calculation. */
 Table comparison_table (const std::vector<Scene> &scenes);
 
-/** Mean grey and entropy of the ranks of a staircase, the first frame of each
- * scene standing still. */
+/** Mean grey and entropy of the ranks of a staircase, for the first frame of
+ * each scene as a static scene. */
 Table still_table (const std::vector<Scene> &scenes);
 
-/** Light that a code lets through, and the signal to noise ratio of its
- * subframes on a flat grey at the same light. */
+/** Light efficiency of a code, and the signal-to-noise ratio of its subframes
+ * on a flat grey at the same light. */
 Table light_table ();
 
-} // namespace cexp::quality
+} // namespace codedexposure::quality

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* docs/quality.md says what is so, and the facts it rests on are facts. */
+/* Checks the figures in docs/quality.md and the statements on which they are
+ * based. */
 #include <cmath>
 #include <fstream>
 #include <iterator>
@@ -16,8 +17,8 @@
 namespace
 {
 
-using namespace cexp;
-using namespace cexp::quality;
+using namespace codedexposure;
+using namespace codedexposure::quality;
 
 constexpr int kFrames = 32; // of the document
 
@@ -54,8 +55,8 @@ expect_same (const std::string &printed, const Cell &cell, int decimals,
         std::stod (printed), cell.number, units * std::pow (10.0, -decimals));
 }
 
-/* Rows of the document begin with the texts and numbers of @p table: those of
- * its first scene, the synthetic one, which everybody has. */
+/* Rows of the document begin with the texts and numbers of @p table for its
+ * first, synthetic scene, which is always available. */
 void
 expect_documented (const Table &table, double units = 1.5)
 {
@@ -100,7 +101,7 @@ TEST (QualityDocument, SaysWhatAStillSceneAndAFlatGreyShow)
   expect_documented (light_table ());
 }
 
-/* The clips come from elsewhere; see tests/quality/run. */
+/* The clips are optional; see tests/quality/run. */
 TEST (QualityDocument, AgreesWithTheIndependentCalculation)
 {
   auto clips = read_clips (QUALITY_CLIPS, 8);
@@ -148,7 +149,7 @@ TEST (Quality, SequentialSamplesAreExactWithoutNoise)
   }
 }
 
-/* Figs. 9c and 11c of the paper: nothing in front of this camera changes. */
+/* Figs. 9c and 11c of the paper, for a static scene. */
 TEST (Quality, RanksOfAStaircaseGrowBrighterAndRicherOnAStillScene)
 {
   const Scene still = still_scene ("still", synthetic ()[0].frames[0], 4);

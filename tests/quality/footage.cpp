@@ -13,15 +13,15 @@
 #include <gst/video/video.h>
 #include <nlohmann/json.hpp>
 
-#include "gstraii.h"
+#include "common/raii.h"
 
-namespace cexp::quality
+namespace codedexposure::quality
 {
 
 namespace
 {
 
-/* A pipeline that stops when it goes. */
+/* A pipeline that its destructor stops. */
 struct Stop {
   void operator() (GstElement *pipeline) const
   {
@@ -59,8 +59,8 @@ picture_of (GstSample *sample)
   return picture;
 }
 
-/* The next frame; none at the end of the file. A decoder that fails says so on
- * the bus only, and leaves the sink waiting. */
+/* The next frame; none at the end of the file. A decoder that fails only posts
+ * an error and leaves the sink waiting. */
 Result<SamplePtr>
 next_sample (const PipelinePtr &pipeline, GstAppSink *sink)
 {
@@ -159,4 +159,4 @@ read_clips (const std::string &folder, int frames)
   return scenes;
 }
 
-} // namespace cexp::quality
+} // namespace codedexposure::quality

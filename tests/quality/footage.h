@@ -8,11 +8,11 @@
 #include "base/result.h"
 #include "scene.h"
 
-namespace cexp::quality
+namespace codedexposure::quality
 {
 
-/** The first @p frames luma frames of a video file, all where it has fewer.
- * Needs gst_init (). Error when it is not there or cannot be decoded. */
+/** The first @p frames luma frames of a video file, or all if it has fewer.
+ * Needs gst_init (). Error if it does not exist or cannot be decoded. */
 Result<Scene> read_video (const std::string &path, int frames);
 
 /**
@@ -23,4 +23,4 @@ Result<Scene> read_video (const std::string &path, int frames);
  */
 Result<std::vector<Scene>> read_clips (const std::string &folder, int frames);
 
-} // namespace cexp::quality
+} // namespace codedexposure::quality

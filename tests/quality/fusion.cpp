@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "fusion.h"
+#include "must.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <iostream>
 
-namespace cexp::quality
+namespace codedexposure::quality
 {
 
 namespace
@@ -106,11 +107,11 @@ fuse (const std::vector<Picture> &coded, const Schedule &schedule,
     std::vector<ImageView<std::uint8_t>> views;
     for (Picture &slot : slots)
       views.push_back (slot.view ());
-    fuser->fuse (views);
+    must (fuser->fuse (views));
     std::ranges::move (slots, std::back_inserter (frames));
   };
   for (const Picture &frame : coded) {
-    fuser->take (frame.view ());
+    must (fuser->take (frame.view ()));
     if (fuser->pending () > options.lookahead)
       fuse_one ();
   }
@@ -119,4 +120,4 @@ fuse (const std::vector<Picture> &coded, const Schedule &schedule,
   return frames;
 }
 
-} // namespace cexp::quality
+} // namespace codedexposure::quality

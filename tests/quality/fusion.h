@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* How true fused frames are. */
+/* Accuracy of fused frames. */
 #pragma once
 
 #include <string>
@@ -9,11 +9,11 @@
 #include "scene.h"
 #include "trial.h"
 
-namespace cexp::quality
+namespace codedexposure::quality
 {
 
-/** Mean over frames of figures that are of one frame each, as the literature
- * on compressed video gives them. */
+/** Mean over frames of the figures of single frames, as in the literature on
+ * compressed video. */
 struct FrameMean {
   double psnr = 0.0; ///< dB, peak 255
   double ssim = 0.0;
@@ -30,4 +30,4 @@ FrameMean compare (
 std::vector<Picture> fuse (const std::vector<Picture> &coded,
     const Schedule &schedule, const FuseOptions &options);
 
-} // namespace cexp::quality
+} // namespace codedexposure::quality

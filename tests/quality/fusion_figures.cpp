@@ -7,7 +7,7 @@
 
 #include "baselines.h"
 
-namespace cexp::quality
+namespace codedexposure::quality
 {
 
 namespace
@@ -25,7 +25,7 @@ options_of (FuseQuality quality, const Condition &condition)
   return options;
 }
 
-/* A way from a scene to a frame for every slot of it. */
+/* A method that gives a frame for every slot of a scene. */
 struct FusionWay {
   std::string name;
   std::function<std::vector<Picture> (const Scene &, const Condition &)> frames;
@@ -72,7 +72,7 @@ ways (int n)
       fusion_way (n, FuseQuality::kBest)};
 }
 
-/* The first frames of @p scene that make whole coded frames. */
+/* The first frames of @p scene, as many as complete coded frames contain. */
 Scene
 first_of (const Scene &scene, int frames, int n)
 {
@@ -165,7 +165,7 @@ still_fusion_table (const std::vector<Scene> &scenes, const Progress &progress)
 {
   constexpr int kCoded = 3;
   Table table = empty_table ("fusion-still",
-      "What stands still, third coded frame: PSNR (dB), and standard deviation "
+      "Static pixels, third coded frame: PSNR (dB), and standard deviation "
       "over slots in grey levels",
       scenes, "levels", 2);
   table.columns.insert (table.columns.begin () + 1, {"condition"});
@@ -222,7 +222,7 @@ training_table (
   constexpr int kSize = 128;
   Table table{"fusion-training",
       "fast, clean: mean PSNR (dB) by the speeds of its models",
-      {{"creeping px/slot", 2}, {"moving px/slot", 2}, {"drawn, n = 4", 2},
+      {{"slow px/slot", 2}, {"moving px/slot", 2}, {"drawn, n = 4", 2},
           {"drawn, n = 8", 2}},
       {}};
   std::vector<Scene> drawn;
@@ -232,13 +232,13 @@ training_table (
     table.columns.push_back ({"clips, n = 4", 2});
     table.columns.push_back ({"clips, n = 8", 2});
   }
-  for (const double creeping : {0.1, 0.15, 0.2, 0.25, 0.3, 0.4}) {
+  for (const double slow : {0.1, 0.15, 0.2, 0.25, 0.3, 0.4}) {
     for (const double moving : {1.0, 2.0, 3.0}) {
-      progress ("creeping " + std::to_string (creeping));
+      progress ("slow " + std::to_string (slow));
       FuseOptions options;
-      options.scene.creeping.spread = creeping;
+      options.scene.slow.spread = slow;
       options.scene.moving.spread = moving;
-      auto &row = table.rows.emplace_back (std::vector<Cell>{creeping, moving});
+      auto &row = table.rows.emplace_back (std::vector<Cell>{slow, moving});
       for (const auto *scenes : {&std::as_const (drawn), &clips})
         for (const int n : {4, 8})
           if (!scenes->empty ())
@@ -248,4 +248,4 @@ training_table (
   return table;
 }
 
-} // namespace cexp::quality
+} // namespace codedexposure::quality

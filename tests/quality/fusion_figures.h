@@ -9,7 +9,7 @@
 #include "scene.h"
 #include "table.h"
 
-namespace cexp::quality
+namespace codedexposure::quality
 {
 
 /** The schedule that is measured for @p n slots, 4 or 8. */
@@ -21,15 +21,15 @@ Schedule fusion_schedule (int n);
 std::vector<Table> fusion_tables (
     const std::vector<Scene> &scenes, int frames, const Progress &progress);
 
-/** The first frame of every scene standing still: PSNR against it and standard
- * deviation over the slots of a frame, of the third coded frame. */
+/** The first frame of every scene as a static scene: PSNR and standard
+ * deviation over the slots of the third coded frame. */
 Table still_fusion_table (
     const std::vector<Scene> &scenes, const Progress &progress);
 
-/** Mean PSNR of `fast` over the first @p frames frames of drawn scenes, and of
- * @p clips where there are any, for models of scenes around those in force,
- * clean: to choose the spreads of SceneModel by. */
+/** Mean PSNR of `fast` over the first @p frames frames of drawn scenes and of
+ * @p clips, clean, for scene models near the current one: a basis for the
+ * choice of SceneModel. */
 Table training_table (
     const std::vector<Scene> &clips, int frames, const Progress &progress);
 
-} // namespace cexp::quality
+} // namespace codedexposure::quality

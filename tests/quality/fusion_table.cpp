@@ -12,8 +12,8 @@
 namespace
 {
 
-using namespace cexp;
-using namespace cexp::quality;
+using namespace codedexposure;
+using namespace codedexposure::quality;
 
 /* Two coded frames of 4 slots, one of 8. */
 constexpr int kLeastFrames = 8;
@@ -59,7 +59,7 @@ parse (int &argc, char **&argv, Options &options)
   return ok && argc == 1 && options.frames >= kLeastFrames;
 }
 
-/* The clips; where there are none, a drawn scene, unless others are drawn. */
+/* The clips, or a drawn scene if there are none and no other is drawn. */
 std::vector<Scene>
 find_scenes (const Options &options)
 {

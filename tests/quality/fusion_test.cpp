@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Fusion is as true as an independent calculation of the same methods, and
- * beats what it is compared with. */
+/* Fusion is as accurate as an independent calculation of the same methods, and
+ * better than the methods it is compared with. */
 #include <gtest/gtest.h>
 
 #include "baselines.h"
@@ -10,12 +10,12 @@
 namespace
 {
 
-using namespace cexp;
-using namespace cexp::quality;
+using namespace codedexposure;
+using namespace codedexposure::quality;
 
 constexpr Condition kNoisy = {.electrons = 10000.0, .read_noise = 5.0};
 
-/* The first 8 frames of one of the clips; none where they are not there. */
+/* The first 8 frames of one of the clips; none if it is not available. */
 Scene
 clip (const std::string &name)
 {
@@ -38,7 +38,7 @@ figure (const Scene &scene, int n, FuseQuality quality,
       scene.frames);
 }
 
-/* What the methods reach in an independent calculation, dB. */
+/* Accuracy of the methods in an independent calculation, dB. */
 struct Goal {
   const char *clip;
   int n;
@@ -66,7 +66,7 @@ TEST (FusionQuality, ReachesTheIndependentCalculation)
   }
 }
 
-/* A drawn scene that everybody has. */
+/* A drawn scene, which is always available. */
 TEST (FusionQuality, MotionIsTruerThanAFilterAndLikenessThanMotion)
 {
   const Scene scene = synthetic_scene (96, 80, 4);

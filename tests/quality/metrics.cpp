@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* How far pictures are from the truth, and what they hold. */
+/* Errors and statistics of pictures. */
 #include "metrics.h"
 
 #include <array>
 #include <cmath>
 #include <limits>
 
-namespace cexp::quality
+namespace codedexposure::quality
 {
 
 namespace
@@ -74,4 +74,4 @@ entropy_of (ImageView<const std::uint8_t> image)
   return bits;
 }
 
-} // namespace cexp::quality
+} // namespace codedexposure::quality

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* How far pictures are from the truth, and what they hold. */
+/* Errors and statistics of pictures. */
 #pragma once
 
 #include <cstdint>
 
 #include "base/image.h"
 
-namespace cexp::quality
+namespace codedexposure::quality
 {
 
 /**
@@ -44,4 +44,4 @@ double deviation_of (ImageView<const std::uint8_t> image);
 /** Shannon entropy of the histogram of grey levels, bits a pixel: 0..8. */
 double entropy_of (ImageView<const std::uint8_t> image);
 
-} // namespace cexp::quality
+} // namespace codedexposure::quality

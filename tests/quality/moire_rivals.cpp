@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* OpenCV's ways to find where a camera stands, on the same bench. */
+/* OpenCV's methods to measure the pose of a camera, on the same bench. */
 #include "moire_rivals.h"
 
 #include <cmath>
@@ -13,7 +13,7 @@
 #include <opencv2/video/tracking.hpp>
 #endif
 
-namespace cexp::quality
+namespace codedexposure::quality
 {
 
 #ifdef HAVE_OPENCV
@@ -24,7 +24,7 @@ namespace
 constexpr int kBlock = 4;   // of the random picture, mirrors
 constexpr int kSquare = 24; // of the chessboard, mirrors
 
-/* What a method is told before: the truth, this much off. */
+/* Error of the start value of a method. */
 constexpr double kShiftOff = 0.3;
 constexpr double kSlopeOff = 1e-3;
 
@@ -67,12 +67,12 @@ as_floats (const Image<std::uint8_t> &image)
 cv::Matx23d
 truth_of (const Alignment &alignment)
 {
-  const Affine t =
+  const Homography t =
       camera_to_mirrors (alignment, kMoireSize.width, kMoireSize.height);
-  return {t.xx, t.xy, t.x0, t.yx, t.yy, t.y0};
+  return {t[0], t[1], t[2], t[3], t[4], t[5]};
 }
 
-/* The truth as a method is told it. */
+/* The start value of a method. */
 cv::Matx23d
 guess_of (const MoireTrial &trial)
 {
@@ -120,7 +120,7 @@ ecc (const MoireTrial &trial)
 {
   const auto picture = random_blocks ();
   const auto frame = moire_frame (trial, picture.view (), 100);
-  /* From the picture's places to the frame's: the other way round. */
+  /* The inverse: from positions in the picture to those in the frame. */
   cv::Mat warp, back;
   cv::invertAffineTransform (cv::Mat (guess_of (trial)), back);
   back.convertTo (warp, CV_32F);
@@ -236,4 +236,4 @@ print_rivals (const std::vector<MoireTrial> &trials)
 
 #endif
 
-} // namespace cexp::quality
+} // namespace codedexposure::quality

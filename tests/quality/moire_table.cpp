@@ -13,13 +13,13 @@
 #include "moire_rivals.h"
 #include "moire_trial.h"
 
-using namespace cexp;
-using namespace cexp::quality;
+using namespace codedexposure;
+using namespace codedexposure::quality;
 
 namespace
 {
 
-/* What calibrations must reach. */
+/* Required accuracy of calibrations. */
 constexpr double kOfBound = 1.3;
 constexpr double kEverywhere = 2e-4;
 constexpr double kDistorted = 5e-3;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* One calibration on the simulated bench, and how good it can be at best. */
+/* One calibration on the simulated bench, and the bound of its accuracy. */
 #include "moire_trial.h"
 
 #include <algorithm>
@@ -8,11 +8,11 @@
 #include <numbers>
 #include <utility>
 
-#include "moire/homography_fit.h"
-#include "moire/response.h"
-#include "optics/sensor.h"
+#include "bench/sensor.h"
+#include "calibrate/homography_fit.h"
+#include "calibrate/response.h"
 
-namespace cexp::quality
+namespace codedexposure::quality
 {
 
 namespace
@@ -55,8 +55,8 @@ expose (Lens &lens, const Sensor &sensor, ImageView<const std::uint8_t> mirrors,
   return frame;
 }
 
-/* Information of a pixel on its place and on the blur, of the scores' variances
- * of all phases at right angles to 1 and light. */
+/* Information of a pixel on its position and on the blur, from the variances of
+ * the scores of all phases orthogonal to 1 and light. */
 HomographyFit::Observation
 information_at (const GratingResponse &response, double place)
 {
@@ -115,7 +115,7 @@ expected_fit (const MoireTrial &trial, const Mapping &truth)
     for (int x = 1; x < kMoireSize.width; x += 3) {
       const double xi = (x - frame.cx) / frame.r;
       const double eta = (y - frame.cy) / frame.r;
-      const CentredMirror m = centred_mirror (centred, xi, eta);
+      const Projected m = project (centred, xi, eta);
       if (m.x + 0.5 < margin || m.y + 0.5 < margin ||
           m.x > kMoireSize.width - 0.5 - margin ||
           m.y > kMoireSize.height - 0.5 - margin)
@@ -126,10 +126,36 @@ expected_fit (const MoireTrial &trial, const Mapping &truth)
   return fit;
 }
 
+/* Standard deviations of mirror_at () that the covariance makes. */
+Position
+sigma_at (const Mapping &mapping, double x, double y)
+{
+  const Mapping::Covariance &covariance = *mapping.covariance ();
+  constexpr std::size_t n = Mapping::kParameters;
+  const CentredFrame f (mapping.camera ());
+  const double xi = (x - f.cx) / f.r;
+  const double eta = (y - f.cy) / f.r;
+  const Projected p = project (mapping.homography (), x, y);
+  const auto sigma = [&] (double mirror, std::size_t first) {
+    std::array<double, n> gradient = {};
+    gradient[first] = xi / p.z;
+    gradient[first + 1] = eta / p.z;
+    gradient[first + 2] = 1.0 / p.z;
+    gradient[6] = -mirror * xi / p.z;
+    gradient[7] = -mirror * eta / p.z;
+    double variance = 0.0;
+    for (std::size_t i = 0; i < n; i++)
+      for (std::size_t j = 0; j < n; j++)
+        variance += gradient[i] * covariance[i * n + j] * gradient[j];
+    return std::sqrt (std::max (0.0, variance));
+  };
+  return {sigma (p.x, 0), sigma (p.y, 3)};
+}
+
 Deviation
 stated_by (const Mapping &mapping)
 {
-  const Stance sigma = mapping.stance_sigma ();
+  const Pose sigma = mapping.pose_sigma ();
   Deviation stated = {0.0, sigma.shift_x, sigma.shift_y,
       sigma.rotation * std::numbers::pi / 180.0, sigma.magnification};
   double squares = 0.0, count = 0.0;
@@ -137,7 +163,7 @@ stated_by (const Mapping &mapping)
     for (int x = 8; x < kMoireSize.width; x += 16) {
       if (!mapping.covers (mapping.mirror_at (x, y)))
         continue;
-      const Position s = mapping.sigma_at (x, y);
+      const Position s = sigma_at (mapping, x, y);
       squares += s.x * s.x + s.y * s.y;
       count += 2.0;
     }
@@ -165,10 +191,8 @@ bound_of (const HomographyFit &fit, std::size_t numbers, const Mapping &truth)
 Mapping
 affine_truth (const Alignment &alignment)
 {
-  const Affine t =
-      camera_to_mirrors (alignment, kMoireSize.width, kMoireSize.height);
-  return *Mapping::make (
-      {kMoireSize, kMoireSize, {t.xx, t.xy, t.x0, t.yx, t.yy, t.y0, 0, 0, 1}});
+  return *Mapping::make ({kMoireSize, kMoireSize,
+      camera_to_mirrors (alignment, kMoireSize.width, kMoireSize.height)});
 }
 
 Result<CalibrationResult>
@@ -183,7 +207,9 @@ calibrate (const MoireTrial &trial, double &seconds)
   Image<std::uint8_t> mirrors (kMoireSize.width, kMoireSize.height);
   std::uint64_t number = 0;
   for (const Pattern &pattern : patterns) {
-    render_pattern (pattern, mirrors.view ());
+    for (int y = 0; y < mirrors.height (); y++)
+      for (int x = 0; x < mirrors.width (); x++)
+        mirrors.at (x, y) = pattern.on (x, y);
     const auto frame =
         expose (lens, sensor, std::as_const (mirrors).view (), number++);
     if (const auto added = run->add (pattern, frame.view ()); !added)
@@ -236,12 +262,12 @@ run_moire (const MoireTrial &trial)
   outcome.error = deviation_of (
       [&] (double x, double y) { return mapping.mirror_at (x, y); },
       trial.alignment, &outcome.worst);
-  const Stance stance = mapping.stance ();
-  outcome.error.shift_x = stance.shift_x - trial.alignment.shift_x;
-  outcome.error.shift_y = stance.shift_y - trial.alignment.shift_y;
+  const Pose pose = mapping.pose ();
+  outcome.error.shift_x = pose.shift_x - trial.alignment.shift_x;
+  outcome.error.shift_y = pose.shift_y - trial.alignment.shift_y;
   outcome.error.rotation =
-      (stance.rotation - trial.alignment.rotation) * std::numbers::pi / 180.0;
-  outcome.error.scale = stance.magnification - trial.alignment.scale;
+      (pose.rotation - trial.alignment.rotation) * std::numbers::pi / 180.0;
+  outcome.error.scale = pose.magnification - trial.alignment.scale;
   outcome.stated = stated_by (mapping);
   outcome.displaced = mapping.displacement ().has_value ();
   const Mapping truth = affine_truth (trial.alignment);
@@ -259,4 +285,4 @@ moire_frame (const MoireTrial &trial, ImageView<const std::uint8_t> mirrors,
   return expose (lens, sensor_of (trial), mirrors, number);
 }
 
-} // namespace cexp::quality
+} // namespace codedexposure::quality

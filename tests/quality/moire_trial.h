@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* One calibration on the simulated bench, and how good it can be at best. */
+/* One calibration on the simulated bench, and the bound of its accuracy. */
 #pragma once
 
 #include <cstdint>
@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "moire/calibration.h"
-#include "optics/lens.h"
+#include "bench/lens.h"
+#include "calibrate/calibration.h"
 
-namespace cexp::quality
+namespace codedexposure::quality
 {
 
 /** Errors, or their standard deviations. */
@@ -28,7 +28,7 @@ struct MoireTrial {
   std::uint64_t seed = 0;
 };
 
-/** What came out of it. */
+/** The result. */
 struct MoireOutcome {
   std::string failure = {}; ///< empty: none
   Deviation error = {};
@@ -58,4 +58,4 @@ Deviation deviation_of (const std::function<Position (double, double)> &mapped,
 Image<std::uint8_t> moire_frame (const MoireTrial &trial,
     ImageView<const std::uint8_t> mirrors, std::uint64_t number);
 
-} // namespace cexp::quality
+} // namespace codedexposure::quality

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* What cannot fail with the schedules and numbers of these programs. */
+/* Results that cannot be errors with the schedules and numbers of these
+ * programs. */
 #pragma once
 
 #include <cstdlib>
@@ -8,11 +9,10 @@
 
 #include "base/result.h"
 
-namespace cexp::quality
+namespace codedexposure::quality
 {
 
-/** The value of @p result; ends the program with the error where there is none.
- */
+/** The value of @p result; on an error, prints it and ends the program. */
 template <typename T>
 T
 must (Result<T> result)
@@ -24,4 +24,13 @@ must (Result<T> result)
   return std::move (*result);
 }
 
-} // namespace cexp::quality
+inline void
+must (Result<void> result)
+{
+  if (result)
+    return;
+  std::cerr << result.error ().message << '\n';
+  std::abort ();
+}
+
+} // namespace codedexposure::quality

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Prints how true subframes are, method by method. */
+/* Prints the accuracy of subframes for each method. */
 #include <algorithm>
 #include <iostream>
 #include <iterator>
@@ -18,7 +18,7 @@
 namespace
 {
 
-using namespace cexp::quality;
+using namespace codedexposure::quality;
 
 struct Options {
   std::string video = "/usr/share/doc/opencv-doc/examples/data/vtest.avi";
@@ -102,7 +102,7 @@ struct Scenes {
   }
 };
 
-/* What is to be had, as many slots of it as make whole coded frames. */
+/* The available scenes, with as many slots as complete coded frames contain. */
 Scenes
 find_scenes (const Options &options)
 {

@@ -12,15 +12,15 @@
 #include "rectify_trial.h"
 #include "trial.h"
 
-using namespace cexp;
-using namespace cexp::quality;
+using namespace codedexposure;
+using namespace codedexposure::quality;
 
 namespace
 {
 
-/* dB that a rectified camera may be worse than an aligned one, if its lens is
- * not sharper than this. A sharp one mixes mirrors only where it looks between
- * them. */
+/* Max loss in dB of a rectified camera against an aligned one, unless its lens
+ * is sharper than this. A sharp lens mixes mirrors only for pixels that see the
+ * border between them. */
 constexpr double kWorse = 0.3;
 constexpr double kSharp = 0.3;
 

@@ -1,21 +1,21 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* How true subframes and fused frames of a misaligned camera are, with its
- * mapping and without. */
+/* Accuracy of subframes and fused frames of a misaligned camera, with and
+ * without its mapping. */
 #include "rectify_trial.h"
 
 #include <chrono>
 #include <iostream>
 #include <utility>
 
+#include "calibrate/calibration.h"
 #include "extract/extractor.h"
 #include "fuse/fuser.h"
-#include "moire/calibration.h"
-#include "moire/rectifier.h"
 #include "moire_bench.h"
 #include "must.h"
+#include "rectify/rectifier.h"
 #include "upsample.h"
 
-namespace cexp::quality
+namespace codedexposure::quality
 {
 
 namespace
@@ -92,8 +92,8 @@ compare_fused (const Picture &coded, const Picture *slots,
   std::vector<ImageView<std::uint8_t>> views;
   for (Picture &frame : frames)
     views.push_back (frame.view ());
-  errors.fuser.take (coded.view ());
-  errors.fuser.fuse (views);
+  must (errors.fuser.take (coded.view ()));
+  must (errors.fuser.fuse (views));
   for (int y = kBorder; y < coded.height () - kBorder; y++)
     for (int x = kBorder; x < coded.width () - kBorder; x++) {
       const int held = held_at (schedule, x, y);
@@ -112,7 +112,7 @@ compare_points (const Picture &coded, const Picture *slots,
     for (int x = kBorder; x < coded.width () - kBorder; x++) {
       const int held = held_at (schedule, x, y);
       int slot = 0;
-      while (!schedule.open (x, y, slot))
+      while (!schedule.on (x, y, slot))
         slot++;
       errors.point.add (coded.at (x, y) * schedule.white_slots () / held,
           mean_at (slots, x, y, slot, held));
@@ -137,7 +137,7 @@ compare (const Picture &coded, const Picture *slots, const Schedule &schedule,
   std::vector<ImageView<std::uint8_t>> views;
   for (Picture &subframe : subframes)
     views.push_back (subframe.view ());
-  extractor.run (coded.view (), views);
+  must (extractor.run (coded.view (), views));
 
   for (std::size_t k = 0; k < subframes.size (); k++) {
     Image<float> values (size.width, size.height);
@@ -198,7 +198,7 @@ run_rectify (
     }
     number++;
     const auto start = std::chrono::steady_clock::now ();
-    rectifier.run (std::as_const (frame).view (), mirrors.view ());
+    must (rectifier.run (std::as_const (frame).view (), mirrors.view ()));
     outcome.milliseconds += std::chrono::duration<double, std::milli> (
         std::chrono::steady_clock::now () - start)
                                 .count ();
@@ -211,4 +211,4 @@ run_rectify (
   return outcome;
 }
 
-} // namespace cexp::quality
+} // namespace codedexposure::quality

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* How true subframes and fused frames of a misaligned camera are, with its
- * mapping and without. */
+/* Accuracy of subframes and fused frames of a misaligned camera, with and
+ * without its mapping. */
 #pragma once
 
+#include "bench/bench.h"
 #include "metrics.h"
-#include "optics/bench.h"
 #include "scene.h"
 #include "schedule/schedule.h"
 
-namespace cexp::quality
+namespace codedexposure::quality
 {
 
 /** PSNR in dB, away from the border of the frame. */
@@ -31,8 +31,8 @@ struct RectifyOutcome {
 RectifyOutcome run_rectify (
     const Scene &scene, const Schedule &schedule, const BenchOptions &options);
 
-/** What the numbers of docs/calibration.md are about: turned by half a degree,
- * 1 % larger, 0.4 px aside; blur and noise of an ordinary camera. */
+/** The bench of docs/calibration.md: rotated by half a degree, magnified by 1
+ * %, shifted by 0.4 px; ordinary blur and noise. */
 BenchOptions misaligned_bench (double psf_sigma = 0.5);
 
-} // namespace cexp::quality
+} // namespace codedexposure::quality

@@ -11,7 +11,7 @@
 #include "must.h"
 #include "trial.h"
 
-namespace cexp::quality
+namespace codedexposure::quality
 {
 
 namespace
@@ -39,7 +39,7 @@ struct Errors {
   PooledError near, far;
 };
 
-/* Told of every value and what it should be, at the pixel where it begins. */
+/* Called with every value and its reference, at the pixel where it begins. */
 using Compared = std::function<void (int x, int y, double value, double truth)>;
 
 /** Adds up the errors of the part that is inside or outside of @p rect, @p
@@ -109,8 +109,8 @@ compare_subframes (const Schedule &schedule, int region, const Picture &coded,
   std::vector<ImageView<std::uint8_t>> views;
   for (Picture &subframe : subframes)
     views.push_back (subframe.view ());
-  extractor.run (
-      coded.view ().block (rect.x, rect.y, rect.width, rect.height), views);
+  must (extractor.run (
+      coded.view ().block (rect.x, rect.y, rect.width, rect.height), views));
   const Extent cell = {rect.width / size.width, rect.height / size.height};
   for (std::size_t k = 0; k < subframes.size (); k++)
     for (int j = 0; j < size.height; j++)
@@ -135,8 +135,8 @@ compare_fused (Fuser<std::uint8_t> &fuser, const Picture &coded,
   std::vector<ImageView<std::uint8_t>> views;
   for (Picture &frame : frames)
     views.push_back (frame.view ());
-  fuser.take (coded.view ());
-  fuser.fuse (views);
+  must (fuser.take (coded.view ()));
+  must (fuser.fuse (views));
   const std::size_t held = frames.size () / truths.size ();
   for (std::size_t k = 0; k < frames.size (); k++)
     for (int y = 0; y < coded.height (); y++)
@@ -238,4 +238,4 @@ regions_table (const std::vector<Scene> &scenes, const Progress &progress)
   return table;
 }
 
-} // namespace cexp::quality
+} // namespace codedexposure::quality

@@ -8,7 +8,7 @@
 #include "scene.h"
 #include "table.h"
 
-namespace cexp::quality
+namespace codedexposure::quality
 {
 
 /** PSNR of subframes and of fused frames beside the border of a region and away
@@ -16,4 +16,4 @@ namespace cexp::quality
 Table regions_table (
     const std::vector<Scene> &scenes, const Progress &progress);
 
-} // namespace cexp::quality
+} // namespace codedexposure::quality

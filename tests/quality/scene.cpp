@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The light in front of the bench: one picture a slot. */
+/* The light in front of the bench, one picture for each slot. */
 #include "scene.h"
 
 #include <algorithm>
@@ -8,7 +8,7 @@
 #include <random>
 #include <utility>
 
-namespace cexp::quality
+namespace codedexposure::quality
 {
 
 namespace
@@ -197,4 +197,4 @@ flat_scene (int width, int height, int frames, std::uint8_t level)
   return still_scene ("flat", picture, frames);
 }
 
-} // namespace cexp::quality
+} // namespace codedexposure::quality

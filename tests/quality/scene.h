@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The light in front of the bench: one picture a slot. */
+/* The light in front of the bench, one picture for each slot. */
 #pragma once
 
 #include <cstdint>
@@ -8,12 +8,12 @@
 
 #include "base/image.h"
 
-namespace cexp::quality
+namespace codedexposure::quality
 {
 
 using Picture = Image<std::uint8_t>;
 
-/** What a perfect fast camera would have seen, one frame a slot, linear. */
+/** The picture of a perfect fast camera, one linear frame for each slot. */
 struct Scene {
   std::string name;
   std::vector<Picture> frames;
@@ -35,10 +35,10 @@ Scene synthetic_scene (int width, int height, int frames);
  */
 Scene leaves_scene (unsigned seed, int size, int frames);
 
-/** One picture that stands still for that many slots. */
+/** One static picture for that many slots. */
 Scene still_scene (std::string name, const Picture &picture, int frames);
 
 /** The same grey everywhere, always. */
 Scene flat_scene (int width, int height, int frames, std::uint8_t level);
 
-} // namespace cexp::quality
+} // namespace codedexposure::quality

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Figures in rows and columns, for people, documents and programs. */
+/* Tables of figures for terminals, documents and programs. */
 #include "table.h"
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 
 #include <nlohmann/json.hpp>
 
-namespace cexp::quality
+namespace codedexposure::quality
 {
 
 namespace
@@ -206,4 +206,4 @@ table_cells (const std::string &document, const std::string &id)
   return rows;
 }
 
-} // namespace cexp::quality
+} // namespace codedexposure::quality

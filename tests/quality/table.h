@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Figures in rows and columns, for people, documents and programs. */
+/* Tables of figures for terminals, documents and programs. */
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@
 
 #include "base/result.h"
 
-namespace cexp::quality
+namespace codedexposure::quality
 {
 
 /** Text, or a number: infinite prints as "exact", not a number as "-". */
@@ -60,4 +60,4 @@ bool update_document (
 std::vector<std::vector<std::string>> table_cells (
     const std::string &document, const std::string &id);
 
-} // namespace cexp::quality
+} // namespace codedexposure::quality

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Metrics, tables, scenes and interpolation say what they promise. */
+/* Tests of metrics, tables, scenes and interpolation. */
 #include <cmath>
 #include <limits>
 
@@ -14,8 +14,8 @@
 namespace
 {
 
-using namespace cexp;
-using namespace cexp::quality;
+using namespace codedexposure;
+using namespace codedexposure::quality;
 
 Picture
 picture_of (int width, int height, std::initializer_list<int> values)

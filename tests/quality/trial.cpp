@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* One way to take and to split coded frames, and how true its subframes are. */
+/* One method to record and split coded frames, and its accuracy. */
 #include "trial.h"
 
 #include <algorithm>
@@ -7,12 +7,12 @@
 #include <numeric>
 #include <utility>
 
+#include "bench/bench.h"
 #include "must.h"
-#include "optics/bench.h"
 #include "schedule/sample_grid.h"
 #include "upsample.h"
 
-namespace cexp::quality
+namespace codedexposure::quality
 {
 
 namespace
@@ -130,7 +130,7 @@ split (const Picture &coded, const Extractor<std::uint8_t> &extractor)
   std::vector<ImageView<std::uint8_t>> views;
   for (Picture &subframe : subframes)
     views.push_back (subframe.view ());
-  extractor.run (coded.view (), views);
+  must (extractor.run (coded.view (), views));
   return subframes;
 }
 
@@ -223,4 +223,4 @@ score_scene (const Scene &scene, const Way &way, const Condition &condition)
   return sum;
 }
 
-} // namespace cexp::quality
+} // namespace codedexposure::quality

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* One way to take and to split coded frames, and how true its subframes are. */
+/* One method to record and split coded frames, and its accuracy. */
 #pragma once
 
 #include <optional>
@@ -12,26 +12,26 @@
 #include "scene.h"
 #include "schedule/schedule.h"
 
-namespace cexp::quality
+namespace codedexposure::quality
 {
 
 /** The schedule of a preset that is known to be good. */
 Schedule schedule_of (std::string_view preset);
 
-/** What is done to the subframes once they are out. */
+/** Scaling of the subframes. */
 enum class Reading {
   kAsShown,    ///< nothing
   kNormalised, ///< subframe k times n / (k + 1): all equally bright
   kDifference, ///< n times what subframe k has more than subframe k - 1
 };
 
-/** The way from light to subframes. */
+/** A method from light to subframes. */
 struct Way {
   std::string label = {}; ///< of its row in a table
   Schedule schedule = {}; ///< of the bench
   ExtractOptions extract = {};
   Reading reading = Reading::kAsShown;
-  /** The schedule that extraction believes in, where it is another. */
+  /** The schedule of extraction, if it differs from that of the bench. */
   std::optional<Schedule> believed = {};
 };
 
@@ -46,7 +46,7 @@ struct Condition {
   double shift = 0.0; ///< of mirrors against pixels, px, in x and in y
 };
 
-/** What a way made of a scene. */
+/** Scores of a method for a scene. */
 struct Score {
   /** Against the scene's pixel at the place of the subframe's element, in the
    * slot of the subframe. */
@@ -81,4 +81,4 @@ std::vector<Score> score_frames (
 Score score_scene (
     const Scene &scene, const Way &way, const Condition &condition);
 
-} // namespace cexp::quality
+} // namespace codedexposure::quality

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The picture between the samples of a subframe. */
+/* Interpolation between the samples of a subframe. */
 #include "upsample.h"
 
 #include <algorithm>
@@ -8,7 +8,7 @@
 
 #include "schedule/sample_grid.h"
 
-namespace cexp::quality
+namespace codedexposure::quality
 {
 
 namespace
@@ -89,4 +89,4 @@ Upsampler::at (ImageView<const float> subframe, int x, int y) const
   return corner + wa * sample (i + 1.0, j) + wb * sample (i, j + 1.0);
 }
 
-} // namespace cexp::quality
+} // namespace codedexposure::quality

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The picture between the samples of a subframe. */
+/* Interpolation between the samples of a subframe. */
 #pragma once
 
 #include "base/image.h"
 #include "schedule/schedule.h"
 
-namespace cexp::quality
+namespace codedexposure::quality
 {
 
 /**
@@ -36,4 +36,4 @@ private:
   int margin_ = 0;
 };
 
-} // namespace cexp::quality
+} // namespace codedexposure::quality

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* An emulated board, the wire to it and the driver in front. */
+/* An emulated board, the connection to it and its driver. */
 #pragma once
 
 #include <cstdlib>
@@ -11,7 +11,7 @@
 #include "dmd/hid_link.h"
 #include "emulated_pipe.h"
 
-namespace cexp::test
+namespace codedexposure::test
 {
 
 using OpenDriver = Result<std::unique_ptr<Dmd>> (*) (
@@ -46,8 +46,7 @@ ignore_progress (int, int)
 {
 }
 
-/** How many random sequences of faults a test goes through: FAULT_SEQUENCES of
- * them, @p few where nothing is said. */
+/** Number of random fault sequences of a test: FAULT_SEQUENCES, or @p few. */
 inline int
 fault_sequences (int few = 500)
 {
@@ -102,4 +101,4 @@ struct DmdRig {
   }
 };
 
-} // namespace cexp::test
+} // namespace codedexposure::test

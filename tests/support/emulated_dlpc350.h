@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* A LightCrafter 4500 in software: its registers, and what it refuses. Written
- * from the description of the controller, not from the driver. */
+/* An emulated LightCrafter 4500: its registers and the commands that it
+ * rejects. Written from the documentation of the controller, not from the
+ * driver. */
 #pragma once
 
 #include <array>
 
 #include "emulated_hid.h"
 
-namespace cexp::test
+namespace codedexposure::test
 {
 
 class EmulatedDlpc350 : public EmulatedHid
@@ -51,7 +52,7 @@ private:
     case 0x1A0C:
       return Data{std::uint8_t (running_ ? 2 : 0)};
     case 0x1A1A:
-      // It takes its time over it.
+      // The validation takes time.
       if (busy_ > 0 && busy_-- > 0)
         return Data{0x80};
       return Data{std::uint8_t (verdict ())};
@@ -67,8 +68,8 @@ private:
   bool execute (int command, const Data &data)
   {
     static const std::map<int, std::size_t> lengths{{0x1A1A, 1}, {0x1A1B, 1},
-        {0x1A1E, 2}, {0x1A22, 1}, {0x1A23, 1}, {0x1A24, 1}, {0x1A29, 8}, {0x1A31, 4},
-        {0x1A32, 1}, {0x1A33, 1}};
+        {0x1A1E, 2}, {0x1A22, 1}, {0x1A23, 1}, {0x1A24, 1}, {0x1A29, 8},
+        {0x1A31, 4}, {0x1A32, 1}, {0x1A33, 1}};
     const auto length = lengths.find (command);
     if (length != lengths.end () && data.size () != length->second)
       return false;
@@ -168,7 +169,7 @@ private:
       ignores_first_start = false;
       return true;
     }
-    // Without a good validation, it says yes and does nothing.
+    // Without a successful validation, it acknowledges and does nothing.
     running_ =
         mode_ == 1 && valid_ && mailbox_ == 0 && (source_ == 3 || video_locked);
     return true;
@@ -182,4 +183,4 @@ private:
   Data images_;
 };
 
-} // namespace cexp::test
+} // namespace codedexposure::test

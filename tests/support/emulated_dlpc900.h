@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* A LightCrafter 6500 or 9000 in software: its registers, its memory, and what
- * it refuses. Written from the description of the controller, not from the
- * driver. */
+/* An emulated LightCrafter 6500 or 9000: its registers, its memory and the
+ * commands that it rejects. Written from the documentation of the controller,
+ * not from the driver. */
 #pragma once
 
 #include <array>
@@ -9,7 +9,7 @@
 #include "emulated_hid.h"
 #include "spld_decoder.h"
 
-namespace cexp::test
+namespace codedexposure::test
 {
 
 class EmulatedDlpc900 : public EmulatedHid
@@ -34,6 +34,17 @@ public:
   int park_cycles () const { return park_cycles_; }
   int images_received () const { return images_received_; }
   bool dual () const { return type_ == 2; }
+
+  /** Loses its power and restarts, without a mode and without masks. */
+  void power_cycle ()
+  {
+    mode_ = 0;
+    idle_ = true;
+    running_ = configured_ = false;
+    lines_.clear ();
+    order_.clear ();
+    images_ = {};
+  }
 
   /** Lines of the table in the order in which they are shown. */
   std::vector<Line> shown () const
@@ -65,7 +76,7 @@ protected:
   {
     if (read)
       return answer (command);
-    // A read of the error code is about the command before it.
+    // The error code belongs to the previous command.
     error_ = 0;
     if (command == 0x1A2B || command == 0x1A2D) {
       take_data (command == 0x1A2B ? 0 : 1, data);
@@ -209,7 +220,7 @@ private:
     for (int line = 0; line < count; line++)
       if (!defined_.contains (line))
         return kBadNumber;
-    // Other planes make the images that are there worthless.
+    // A new number of planes invalidates the stored images.
     bool same = lines_.size () == std::size_t (count);
     for (int line = 0; same && line < count; line++)
       same = lines_[line].image == defined_[line].image &&
@@ -321,4 +332,4 @@ private:
   std::array<std::map<int, Pixels>, 2> images_;
 };
 
-} // namespace cexp::test
+} // namespace codedexposure::test

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* A controller on the other end of the wire, which misbehaves on command. */
+/* An emulated controller that fails on command. */
 #pragma once
 
 #include <algorithm>
@@ -9,22 +9,22 @@
 #include <optional>
 #include <vector>
 
-namespace cexp::test
+namespace codedexposure::test
 {
 
 using Packet = std::vector<std::uint8_t>;
 
-/** What goes wrong with a message, or with the reply to it. */
+/** A fault of a message or of the reply to it. */
 enum class Fault {
   none,
-  refuse,      ///< the message is not obeyed, and a NACK comes
-  lose_reply,  ///< obeyed, but nobody hears of it
-  late_reply,  ///< the reply comes when the next message does
-  stale_reply, ///< a reply to somebody else comes first
+  refuse,      ///< the message is ignored, and a NACK is sent
+  lose_reply,  ///< executed, but no reply is sent
+  late_reply,  ///< the reply is sent with that of the next message
+  stale_reply, ///< a reply with another sequence number comes first
   short_reply, ///< the packet ends early
-  wild_reply,  ///< a reply that announces more than there can be
+  wild_reply,  ///< a reply with a size above the limit
   stall,       ///< the host cannot send
-  unplug,      ///< gone, and does not come back
+  unplug,      ///< disconnected for good
 };
 constexpr int kFaults = int (Fault::unplug) + 1;
 
@@ -167,4 +167,4 @@ private:
   bool gone_ = false;
 };
 
-} // namespace cexp::test
+} // namespace codedexposure::test

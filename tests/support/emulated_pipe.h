@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The shortest wire: packets straight into an emulated controller, with a clock
- * of its own, so that waiting costs no time. */
+/* Passes packets directly to an emulated controller. It has its own clock, so
+ * that waiting takes no time. */
 #pragma once
 
 #include <functional>
@@ -9,13 +9,13 @@
 #include "dmd/packet_pipe.h"
 #include "emulated_hid.h"
 
-namespace cexp::test
+namespace codedexposure::test
 {
 
 class EmulatedPipe : public PacketPipe
 {
 public:
-  /** Time on the wire's clock, which only goes on where somebody waits. */
+  /** Time of this clock, which advances only while a caller waits. */
   struct Clock {
     Milliseconds now{0};
     Milliseconds wire{0}; ///< of it, packets were under way
@@ -63,4 +63,4 @@ private:
   std::shared_ptr<Clock> clock_;
 };
 
-} // namespace cexp::test
+} // namespace codedexposure::test

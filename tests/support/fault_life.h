@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* What a driver is put through while its board misbehaves. */
+/* A sequence of calls to a driver whose board fails. */
 #pragma once
 
 #include <chrono>
@@ -8,17 +8,17 @@
 
 #include "dmd_rig.h"
 
-namespace cexp::test
+namespace codedexposure::test
 {
 
-/** A life of opening, uploading, starting and stopping, whatever fails. */
+/** Opens, uploads, starts and stops, whatever fails. */
 class FaultLife
 {
 public:
   using Time = std::chrono::milliseconds;
   using Open = std::function<Result<std::unique_ptr<Dmd>> ()>;
 
-  /** No call may keep its caller for longer, beyond what the wire takes. */
+  /** Max duration of a call, without the time for packets. */
   static constexpr Time kLongestCall{3000};
 
   /** @p clock  time, without that for which packets are on the wire. */
@@ -107,4 +107,4 @@ life_of (Rig &rig, std::mt19937 &random)
       random, [clock = rig.clock] { return clock->now - clock->wire; });
 }
 
-} // namespace cexp::test
+} // namespace codedexposure::test

@@ -9,7 +9,7 @@ main (int argc, char **argv)
   /* A forked registry scanner cannot load the plugin of a sanitizer build. */
   gst_registry_fork_set_enabled (FALSE);
   gst_init (&argc, &argv);
-  /* Core warns where an element breaks its rules. */
+  /* GStreamer logs a warning if an element violates its rules. */
   g_log_set_always_fatal (GLogLevelFlags (
       G_LOG_FATAL_MASK | G_LOG_LEVEL_CRITICAL | G_LOG_LEVEL_WARNING));
   ::testing::InitGoogleTest (&argc, argv);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* One element between pads of the test, with its bus in the test's hands. */
+/* One element between pads of the test, which also reads its bus. */
 #pragma once
 
 #include <algorithm>
@@ -17,12 +17,13 @@
 #include <gtest/gtest.h>
 
 #include "base/image.h"
-#include "gstraii.h"
+#include "common/raii.h"
+#include "common/structure.h"
 
-namespace cexp::test
+namespace codedexposure::test
 {
 
-using namespace cexp::gst;
+using namespace codedexposure::gst;
 
 using MessagePtr = std::unique_ptr<GstMessage, MiniObjectUnref>;
 
@@ -69,6 +70,16 @@ text_property (gpointer object, const char *name)
   return CharPtr (property<gchar *> (object, name)).get ();
 }
 
+/** A counter in the stats of @p element. */
+inline guint64
+counter_of (gpointer element, const char *name)
+{
+  const StructurePtr stats (property<GstStructure *> (element, "stats"));
+  guint64 value = 0;
+  EXPECT_TRUE (gst_structure_get_uint64 (stats.get (), name, &value)) << name;
+  return value;
+}
+
 /** The element of a launch line, e.g. "codedexposure-demux method=rank",
  * between a source pad and any number of sink pads of the test. */
 class ElementHarness
@@ -95,7 +106,7 @@ public:
   GstElement *element () const { return element_.get (); }
   GstHarness *get () const { return main_.get (); }
 
-  /** Asks the element for a source pad and takes what comes out of it. */
+  /** Requests a source pad of the element and collects its output. */
   GstHarness *request (const std::string &pad)
   {
     HarnessPtr &harness = pads_[pad];
@@ -168,6 +179,18 @@ public:
         return found;
     }
     return nullptr;
+  }
+  /** The next element message that is a @p T; none where there is none. */
+  template <typename T>
+  std::optional<T> posted ()
+  {
+    const MessagePtr found = element_message (T::kName);
+    if (!found)
+      return std::nullopt;
+    const auto parsed = parse_message<T> (found.get ());
+    EXPECT_TRUE (parsed) << "a field is missing or of another type: "
+                         << found.get ();
+    return parsed;
   }
   /** Text of the next error, warning or info on the bus; "" when there is none.
    */
@@ -266,4 +289,4 @@ image_of (GstBuffer *buffer, GstCaps *caps)
   return image;
 }
 
-} // namespace cexp::test
+} // namespace codedexposure::test

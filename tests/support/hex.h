@@ -10,7 +10,7 @@
 
 #include <gtest/gtest.h>
 
-namespace cexp::test
+namespace codedexposure::test
 {
 
 /** "40 13 03" as bytes. */
@@ -49,4 +49,4 @@ packet_hex (std::vector<std::uint8_t> bytes, std::size_t shown)
   return to_hex (bytes);
 }
 
-} // namespace cexp::test
+} // namespace codedexposure::test

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The first LightCrafter as a server on this machine. Written from the
- * description of its protocol, not from the driver. */
+/* An emulated first LightCrafter as a server on this machine. Written from the
+ * documentation of its protocol, not from the driver. */
 #pragma once
 
 #include <arpa/inet.h>
@@ -18,10 +18,10 @@
 
 #include "base/image.h"
 
-namespace cexp::test
+namespace codedexposure::test
 {
 
-/** What a server does wrong. */
+/** Faults of the server. */
 struct LightcrafterFaults {
   bool knows_0480 = true;
   bool wants_repeat = true; ///< the 18-byte form, not that of 17
@@ -241,4 +241,4 @@ private:
   std::thread thread_; // last: it uses all of the above
 };
 
-} // namespace cexp::test
+} // namespace codedexposure::test

@@ -1,26 +1,35 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The elements as a part of the test, for those that share the mirrors of
- * simulated DMDs with them: what a plugin that is loaded holds is its own. */
+/* The elements linked into the test, so that both use the same simulated DMDs;
+ * a loaded plugin would have its own. */
 #pragma once
 
 #include <gtest/gtest.h>
 
-#include "gstcodedexposuredemux.h"
-#include "gstcodedexposuremeta.h"
-#include "gstcodedexposuresim.h"
-#include "gstdmdsync.h"
-#include "gstmoirecalib.h"
+#include "bench/simulated_dmd.h"
+#include "camera/camerasrc.h"
+#include "camera/provider.h"
+#include "common/meta.h"
+#include "demux/demux.h"
+#include "dmdsync/dmdsync.h"
+#include "moirecalib/moirecalib.h"
+#include "sim/sim.h"
 
-namespace cexp::test
+namespace codedexposure::test
 {
 
-/** Make one of these global in every program that runs linked elements. Such a
- * program must not find the plugin: types are registered once. */
+/** Define one global object of this type in every program with linked elements.
+ * The program must not find the plugin, because types are registered once. */
 class LinkedElements : public ::testing::Environment
 {
   void SetUp () override
   {
     gst::register_frame_meta ();
+    serve_simulated_dmds ();
+#ifdef CODEDEXPOSURE_CAMERA_PROVIDER
+    ASSERT_TRUE (
+        GST_DEVICE_PROVIDER_REGISTER (codedexposure_cameraprovider, nullptr));
+#endif
+    ASSERT_TRUE (GST_ELEMENT_REGISTER (codedexposure_camerasrc, nullptr));
     ASSERT_TRUE (GST_ELEMENT_REGISTER (codedexposure_demux, nullptr));
     ASSERT_TRUE (GST_ELEMENT_REGISTER (codedexposure_sim, nullptr));
     ASSERT_TRUE (GST_ELEMENT_REGISTER (dmdsync, nullptr));
@@ -28,4 +37,4 @@ class LinkedElements : public ::testing::Environment
   }
 };
 
-} // namespace cexp::test
+} // namespace codedexposure::test

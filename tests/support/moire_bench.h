@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* A camera that looks at calibration patterns. */
+/* A camera that sees calibration patterns. */
 #pragma once
 
 #include <utility>
 
-#include "moire/gratings.h"
-#include "optics/lens.h"
-#include "optics/sensor.h"
+#include "bench/lens.h"
+#include "bench/sensor.h"
+#include "calibrate/gratings.h"
 
-namespace cexp
+namespace codedexposure
 {
 
 /** A white target behind the mirrors, through the optical model. */
@@ -21,8 +21,7 @@ public:
       double light = 200.0 / 255.0)
       : size_ (size), on_ (float (light)),
         lens_ (alignment, psf_sigma, size.width, size.height),
-        mirrors_ (size.width, size.height), light_ (size.width, size.height),
-        seen_ (size.width, size.height)
+        light_ (size.width, size.height), seen_ (size.width, size.height)
   {
     sensor.full_well = 10000.0;
     sensor.read_noise = 5.0;
@@ -38,13 +37,12 @@ public:
     return numbers;
   }
 
-  /** What the sensor gets, before noise. */
+  /** The light on the sensor, without noise. */
   Image<float> &light (const Pattern &pattern)
   {
-    render_pattern (pattern, mirrors_.view ());
     for (int y = 0; y < size_.height; y++)
       for (int x = 0; x < size_.width; x++)
-        light_.at (x, y) = mirrors_.at (x, y) != 0 ? on_ : off;
+        light_.at (x, y) = pattern.on (x, y) ? on_ : off;
     lens_.image (std::as_const (light_).view (), seen_.view ());
     return seen_;
   }
@@ -56,8 +54,7 @@ private:
   Extent size_;
   float on_;
   Lens lens_;
-  Image<std::uint8_t> mirrors_;
   Image<float> light_, seen_;
 };
 
-} // namespace cexp
+} // namespace codedexposure

@@ -4,7 +4,7 @@
 
 #include "harness.h"
 
-namespace cexp::test
+namespace codedexposure::test
 {
 
 /* Long enough for a loaded machine; only a pipeline that hangs uses it up. */
@@ -34,7 +34,7 @@ public:
         gst_element_get_static_pad ((*this)[element].get (), name));
   }
 
-  /** Plays to the end; the error that ended it otherwise, or "". */
+  /** Plays to the end; returns the error that ended it, or "". */
   std::string play ()
   {
     gst_element_set_state (pipeline_.get (), GST_STATE_PLAYING);
@@ -56,4 +56,4 @@ private:
   ObjectPtr<GstBus> bus_;
 };
 
-} // namespace cexp::test
+} // namespace codedexposure::test

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Numbers without order, the same at every run. */
+/* Random numbers that are the same in every run. */
 #pragma once
 
 #include <random>
 #include <vector>
 
-namespace cexp::test
+namespace codedexposure::test
 {
 
 /** @p count numbers from -100 to 100, in steps of 0.1. */
@@ -19,4 +19,4 @@ random_numbers (std::size_t count, unsigned seed)
   return numbers;
 }
 
-} // namespace cexp::test
+} // namespace codedexposure::test

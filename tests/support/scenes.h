@@ -10,10 +10,10 @@
 
 #include "base/image.h"
 
-namespace cexp::test
+namespace codedexposure::test
 {
 
-/** Draws what stands before the camera during a slot. */
+/** Draws the scene during a slot. */
 using Scene =
     std::function<void (std::int64_t slot, ImageView<std::uint8_t> out)>;
 
@@ -82,4 +82,4 @@ inline const Scene kMains = lit_by ([] (std::int64_t slot) {
   return 0.8 + 0.2 * std::sin (0.754 * double (slot));
 });
 
-} // namespace cexp::test
+} // namespace codedexposure::test

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Schedules for tests: any that a text form must carry. */
+/* Random valid schedules for tests of the text forms. */
 #pragma once
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 
 #include "schedule/schedule.h"
 
-namespace cexp::test
+namespace codedexposure::test
 {
 
 /** Draws valid schedules; the same seed draws the same ones. */
@@ -121,4 +121,4 @@ private:
   std::mt19937 random_;
 };
 
-} // namespace cexp::test
+} // namespace codedexposure::test

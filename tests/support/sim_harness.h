@@ -6,7 +6,7 @@
 
 #include "harness.h"
 
-namespace cexp::test
+namespace codedexposure::test
 {
 
 constexpr GstClockTime kMs = GST_MSECOND;
@@ -97,4 +97,4 @@ elements_of (SimHarness &sim, const std::vector<int> &levels)
   return {coded.at (0, 0), coded.at (1, 0), coded.at (0, 1), coded.at (1, 1)};
 }
 
-} // namespace cexp::test
+} // namespace codedexposure::test

@@ -10,7 +10,7 @@
 
 #include "base/image.h"
 
-namespace cexp::test
+namespace codedexposure::test
 {
 
 using Pixels = Image<std::uint32_t>;
@@ -148,4 +148,4 @@ decode_spld (const std::vector<std::uint8_t> &bytes)
   return in.failed () ? std::nullopt : std::optional (image);
 }
 
-} // namespace cexp::test
+} // namespace codedexposure::test

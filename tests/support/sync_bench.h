@@ -10,7 +10,7 @@
 #include "scenes.h"
 #include "sync_harness.h"
 
-namespace cexp::test
+namespace codedexposure::test
 {
 
 constexpr int kWidth = 96;
@@ -139,7 +139,7 @@ public:
     g_error_free (error);
     return text;
   }
-  /** Texts of all warnings that were said, a line each. */
+  /** Texts of all warnings, one for each line. */
   std::string warnings ()
   {
     std::string all;
@@ -158,7 +158,10 @@ public:
   {
     const ObjectPtr<GstElement> sync (
         gst_bin_get_by_name (GST_BIN (pipeline_.get ()), "sync"));
-    return property<guint64> (sync.get (), name);
+    const StructurePtr stats (property<GstStructure *> (sync.get (), "stats"));
+    guint64 value = G_MAXUINT64;
+    EXPECT_TRUE (gst_structure_get_uint64 (stats.get (), name, &value)) << name;
+    return value;
   }
 
 private:
@@ -169,4 +172,4 @@ private:
   std::deque<MessagePtr> said_;
 };
 
-} // namespace cexp::test
+} // namespace codedexposure::test

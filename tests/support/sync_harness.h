@@ -3,12 +3,12 @@
  * DMDs are those of the test. */
 #pragma once
 
-#include "gstcodedexposuremeta.h"
+#include "common/meta.h"
 #include "harness.h"
 #include "linked_elements.h"
 #include "schedule/timing.h"
 
-namespace cexp::test
+namespace codedexposure::test
 {
 
 constexpr int kSyncWidth = 64;
@@ -23,7 +23,7 @@ public:
   {
   }
 
-  /** Says caps of 64x48 pixels at @p rate, and their segment. */
+  /** Sends caps of 64x48 pixels at @p rate and a segment. */
   void start (const FrameRate &rate = {25, 1})
   {
     rate_ = rate;
@@ -121,4 +121,4 @@ string_field (const MessagePtr &message, const char *name)
   return text ? text : "";
 }
 
-} // namespace cexp::test
+} // namespace codedexposure::test

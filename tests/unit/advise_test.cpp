@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* What is predicted of schedules against what the bench in software shows. */
+/* Predictions for schedules, compared with the simulated bench. */
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -13,13 +13,13 @@
 
 #include "advise/advice.h"
 #include "advise/linear_estimate.h"
+#include "bench/bench.h"
 #include "extract/extractor.h"
-#include "optics/bench.h"
 
 namespace
 {
 
-using namespace cexp;
+using namespace codedexposure;
 using Picture = Image<std::uint16_t>;
 
 Schedule
@@ -39,7 +39,7 @@ model_of (const Schedule &schedule, const Conditions &conditions)
   return *model;
 }
 
-/** The bench that the conditions speak of. */
+/** The bench of the conditions. */
 OpticalBench
 bench_of (const ExposureModel &model, const Conditions &conditions, int side)
 {
@@ -52,7 +52,7 @@ bench_of (const ExposureModel &model, const Conditions &conditions, int side)
   return *std::move (bench);
 }
 
-/* A flat scene: what differs from pixel to pixel of a subframe is noise. */
+/* A flat scene: differences between pixels of a subframe are noise. */
 double
 measured_snr (
     const Schedule &schedule, const Conditions &conditions, double level)
@@ -78,7 +78,7 @@ measured_snr (
   std::vector<ImageView<std::uint16_t>> views;
   for (Picture &subframe : subframes)
     views.push_back (subframe.view ());
-  extractor->run (std::as_const (coded).view (), views);
+  EXPECT_TRUE (extractor->run (std::as_const (coded).view (), views));
   double power = 0.0;
   const double most = (1 << conditions.camera.bits) - 1;
   for (const Picture &subframe : subframes)
@@ -90,9 +90,8 @@ measured_snr (
   return 10.0 * std::log10 (level * level / power);
 }
 
-/* 0.15 dB: 78,400 noisy pixels scatter by 0.02 dB, a subframe's pixel is
- * rounded once more when it is decoded, and the full well cuts off white's own
- * noise where it just fits. */
+/* 0.15 dB: 78,400 noisy pixels vary by 0.02 dB, decoding rounds a pixel once
+ * more, and the full well clips the noise of white. */
 TEST (Advise, SignalToNoiseIsThatOfTheBench)
 {
   Conditions bright, dark;
@@ -158,7 +157,7 @@ private:
   struct Wave {
     double x, y, phase, height;
   };
-  /* Turns from row to row, without a cosine for each pixel. */
+  /* Rotates from row to row, without a cosine for each pixel. */
   static void add (const Wave &wave, double phase, ImageView<float> light)
   {
     std::array<float, kSide> real, imaginary;
@@ -218,7 +217,8 @@ centred (const Schedule &schedule, const ExposureModel &model,
   return result;
 }
 
-/* Every estimated pixel of a slot against the texture at all its moments. */
+/* Every estimated pixel of a slot against the texture at all times of the slot.
+ */
 void
 compare (const Schedule &schedule, const LinearEstimate &estimate, int slot,
     double level, ImageView<const float> coded, const Image<float> *truth,
@@ -242,7 +242,7 @@ compare (const Schedule &schedule, const LinearEstimate &estimate, int slot,
     }
 }
 
-/* PSNR of the estimate over textures that move in six directions. */
+/* PSNR of the estimate for textures that move in six directions. */
 double
 measured_psnr (const Schedule &schedule, const Conditions &conditions)
 {
@@ -273,10 +273,10 @@ measured_psnr (const Schedule &schedule, const Conditions &conditions)
   return -10.0 * std::log10 (sum.squares / sum.count);
 }
 
-/* 0.4 dB: of the light of a slot the bench sees four moments where the model
- * has six or more, which is worth up to 0.3 dB where motion is all that
- * matters; and six textures of 56x56 pixels hold some 400 patches, so that a
- * mean square scatters by a few percent, 0.2 dB. */
+/* 0.4 dB: the bench integrates a slot at four times and the model at six or
+ * more, which changes the result by up to 0.3 dB where motion dominates; and
+ * six textures of 56x56 pixels have about 400 patches, so the mean square
+ * varies by a few percent, 0.2 dB. */
 TEST (Advise, PsnrIsThatOfMovingTexturesAndTheBestIsRecommended)
 {
   Conditions still, slow, fast, dark;
@@ -342,6 +342,16 @@ TEST (Advise, TooMuchLightIsNotRecommended)
   EXPECT_EQ (recommend (predictions, 101.0), nullptr);
 }
 
+TEST (Advise, TheRateThatIsAskedForIsEnough)
+{
+  const Conditions conditions;
+  const std::vector<Prediction> predictions{*predict (std::nullopt, conditions),
+      *predict (schedule_of ("sequential:2x2"), conditions)};
+  ASSERT_EQ (predictions[1].frame_rate, 100.0);
+  EXPECT_EQ (recommend (predictions, 100.0), &predictions[1]);
+  EXPECT_EQ (recommend (predictions, 100.001), nullptr);
+}
+
 TEST (Advise, SaysWhatIsOutOfRange)
 {
   const auto complaint = [] (const Conditions &conditions,
@@ -378,7 +388,7 @@ TEST (Advise, UsualSchedulesTakeTheTimesOfTheBench)
   EXPECT_TRUE (std::ranges::is_sorted (schedules, {}, &Schedule::slots));
 }
 
-/* Parts of one code, so that nothing but the division differs. */
+/* Parts with the same code, so that only the division differs. */
 TEST (Advise, PredictsRegionsPartByPart)
 {
   const Conditions conditions;
@@ -396,7 +406,8 @@ TEST (Advise, PredictsRegionsPartByPart)
   EXPECT_NEAR (divided->psnr, plain->psnr, 1e-9);
   EXPECT_NEAR (divided->efficiency, plain->efficiency, 1e-12);
 
-  /* A part of n = 8 gets half the light of one of 4, and half the range. */
+  /* A part with n = 8 receives half the light of one with n = 4, and half the
+   * range. */
   const auto mixed =
       predict (schedule_of ("sequential:2x2,active=1ms,switching=100us,"
                             "region=384x288+64+32:sequential:4x2"),

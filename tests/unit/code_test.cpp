@@ -9,7 +9,7 @@
 
 #include "schedule/tile.h"
 
-using namespace cexp;
+using namespace codedexposure;
 
 namespace
 {
@@ -43,20 +43,20 @@ worst_of_identity (const Code &code, double leak)
       double sum = slot == other ? -1.0 : 0.0;
       for (int e = 0; e < n; e++)
         sum += (*inverse)[std::size_t (slot * n + e)] *
-               (code.open (e, other) ? 1.0 : leak);
+               (code.on (e, other) ? 1.0 : leak);
       worst = std::max (worst, std::abs (sum));
     }
   }
   return worst;
 }
 
-/** Elements that are open in both slots, for every pair of rows. */
+/** Slots in which both elements are on, for every pair of rows. */
 int
 common_slots (const Code &code, int a, int b)
 {
   int common = 0;
   for (int s = 0; s < code.slots (); s++)
-    common += code.open (a, s) && code.open (b, s);
+    common += code.on (a, s) && code.on (b, s);
   return common;
 }
 
@@ -69,7 +69,7 @@ TEST (Code, SequentialOpensElementInItsOwnSlot)
   for (const int n : {2, 5, 16, 256}) {
     const Code code = named ("sequential", n);
     EXPECT_TRUE (code.one_hot ());
-    EXPECT_EQ (code.max_open_slots (), 1);
+    EXPECT_EQ (code.max_on_slots (), 1);
   }
 }
 
@@ -80,11 +80,11 @@ TEST (Code, StaircaseOpensFromTheFirstSlotOn)
   for (const int n : {2, 5, 16, 256}) {
     const Code code = named ("staircase", n);
     EXPECT_FALSE (code.one_hot ());
-    EXPECT_EQ (code.max_open_slots (), n);
+    EXPECT_EQ (code.max_on_slots (), n);
     for (int e = 0; e < n; e++) {
-      EXPECT_EQ (code.open_slots (e), e + 1);
+      EXPECT_EQ (code.on_slots (e), e + 1);
       for (int s = 0; s < n; s++)
-        EXPECT_EQ (code.open (e, s), s <= e);
+        EXPECT_EQ (code.on (e, s), s <= e);
     }
   }
 }
@@ -95,9 +95,9 @@ TEST (Code, SMatrixOfAHadamardOrderLessOne)
 {
   for (const int n : {3, 7, 11, 15, 19, 23, 27, 31, 35, 63, 127, 255}) {
     const Code code = named ("s-matrix", n);
-    EXPECT_EQ (code.max_open_slots (), (n + 1) / 2) << n;
+    EXPECT_EQ (code.max_on_slots (), (n + 1) / 2) << n;
     for (int a = 0; a < n; a++) {
-      ASSERT_EQ (code.open_slots (a), (n + 1) / 2) << n << " row " << a;
+      ASSERT_EQ (code.on_slots (a), (n + 1) / 2) << n << " row " << a;
       for (int b = 0; b < a; b++)
         ASSERT_EQ (common_slots (code, a, b), (n + 1) / 4)
             << n << " rows " << a << ", " << b;
@@ -114,7 +114,7 @@ TEST (Code, InverseOfAnSMatrixIsTheKnownOne)
     for (int s = 0; s < n; s++)
       for (int e = 0; e < n; e++)
         ASSERT_NEAR ((*inverse)[std::size_t (s * n + e)],
-            (code.open (e, s) ? 2.0 : -2.0) / (n + 1), 1e-12)
+            (code.on (e, s) ? 2.0 : -2.0) / (n + 1), 1e-12)
             << n;
   }
 }
@@ -125,9 +125,9 @@ TEST (Code, SMatrixOfAHadamardOrderIsHalfOfHPlusJ)
 {
   for (const int n : {4, 8, 12, 16, 20, 28, 256}) {
     const Code code = named ("s-matrix", n);
-    EXPECT_EQ (code.open_slots (0), n);
+    EXPECT_EQ (code.on_slots (0), n);
     for (int a = 1; a < n; a++) {
-      ASSERT_EQ (code.open_slots (a), n / 2) << n << " row " << a;
+      ASSERT_EQ (code.on_slots (a), n / 2) << n << " row " << a;
       for (int b = 1; b < a; b++)
         ASSERT_EQ (common_slots (code, a, b), n / 4)
             << n << " rows " << a << ", " << b;
@@ -161,12 +161,12 @@ TEST (Code, SMatrixExistsWhereTheFormatsSaySo)
     const bool possible = n == 2 || n % 4 == 0 || n % 4 == 3;
     ASSERT_EQ (code.ok (), possible && gaps.count (n) == 0) << n;
     if (code.ok ()) {
-      EXPECT_EQ (code->max_open_slots (), n % 2 != 0 ? (n + 1) / 2 : n) << n;
+      EXPECT_EQ (code->max_on_slots (), n % 2 != 0 ? (n + 1) / 2 : n) << n;
     }
   }
 }
 
-/* Recordings hold the name alone: it must stand for the same rows for ever. */
+/* Recordings contain only the name, so its rows must never change. */
 TEST (Code, NamedRowsStayAsTheyAre)
 {
   EXPECT_EQ (named ("s-matrix", 3).rows (), (Rows{"110", "011", "101"}));
@@ -212,7 +212,7 @@ TEST (Code, RowsAreKept)
   EXPECT_EQ (code->rows (), rows);
   EXPECT_EQ (code->name (), "matrix");
   EXPECT_FALSE (code->is_named ());
-  EXPECT_EQ (code->open_slots (0), 2);
+  EXPECT_EQ (code->on_slots (0), 2);
   EXPECT_FALSE (code->one_hot ());
   EXPECT_LT (worst_of_identity (*code, 0.02), 1e-9);
 
@@ -276,8 +276,8 @@ TEST (Code, WrongRowsAreNamed)
   expect_words (Code::from_rows ({"1"}), {"1 rows", "2 to 256"});
   expect_words (Code::from_rows (Rows (257, "1")), {"257 rows", "2 to 256"});
   expect_words (Code::from_rows ({"10", "011"}), {"row 1", "3 slots", "2"});
-  expect_words (Code::from_rows ({"10", "0x"}), {"row 1", "'0x'", "0 (shut)"});
-  expect_words (Code::from_rows ({"10", "00"}), {"row 1", "never open"});
+  expect_words (Code::from_rows ({"10", "0x"}), {"row 1", "'0x'", "0 (off)"});
+  expect_words (Code::from_rows ({"10", "00"}), {"row 1", "never on"});
   expect_words (Code::named ("cumulative", 4), {"'cumulative'", "staircase"});
   expect_words (Code::named ("sequential", 1), {"1 elements", "2 to 256"});
   expect_words (Code::named ("sequential", 257), {"257", "2 to 256"});

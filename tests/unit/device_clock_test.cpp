@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* A camera's clock told by the pipeline's, from jittery arrivals. */
+/* The clock of a camera, fitted to the pipeline clock from jittery arrivals. */
 #include <cmath>
 #include <cstdio>
 #include <functional>
@@ -8,9 +8,9 @@
 
 #include <gtest/gtest.h>
 
-#include "clock/device_clock.h"
+#include "sync/device_clock.h"
 
-using namespace cexp;
+using namespace codedexposure;
 
 namespace
 {
@@ -85,7 +85,8 @@ class DeviceClockTime : public ::testing::TestWithParam<Case>
 {
 };
 
-/* The line is known better with every frame, and how well is said. */
+/* The line becomes more accurate with every frame, and the stated uncertainty
+ * follows. */
 TEST_P (DeviceClockTime, IsWithin50MicrosecondsWhateverDriftAndJitter)
 {
   const Case &c = GetParam ();
@@ -165,6 +166,8 @@ TEST (DeviceClock, AFirstFrameThatWasHeldUpIsForgotten)
     const Nanoseconds time =
         clock.take (path.stamp (k), std::max (begin, path.truth (k)));
     EXPECT_GT (time, before) << "times never run back";
+    if (const auto uncertainty = clock.uncertainty ())
+      EXPECT_LE (std::abs (time - path.truth (k)), *uncertainty) << k;
     before = time;
   }
   EXPECT_EQ (before, path.truth (59));
@@ -185,8 +188,8 @@ TEST (DeviceClock, BeginsAnewWithTheCamera)
   }
 }
 
-/* Seconds until the times after a restart are known, and the largest error from
- * then on; the camera has another drift after it. */
+/* Time in s until the times after a restart are known, and the largest error
+ * from then on; the drift of the camera changes with the restart. */
 std::pair<double, Nanoseconds>
 known_after_restart (double drift)
 {

@@ -1,20 +1,23 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The simulated bench with mirrors that stand on their corners sees what the
- * masks that a device is sent would show. */
+/* The simulated bench with rotated mirrors images the masks that a device would
+ * show. */
 #include <cmath>
 
 #include <gtest/gtest.h>
 
+#include "bench/bench.h"
+#include "bench/simulated_dmd.h"
+#include "diamond.h"
 #include "dmd/plane_image.h"
-#include "dmd/simulated_dmd.h"
-#include "optics/bench.h"
+#include "mirrors.h"
 
-using namespace cexp;
+using namespace codedexposure;
+using namespace codedexposure::test;
 
 namespace
 {
 
-/** Pixels of the camera; the array has more mirrors, or as many. */
+/** Pixels of the camera; the array has at least as many mirrors. */
 constexpr int kWidth = 24, kHeight = 20;
 
 Schedule
@@ -25,7 +28,7 @@ parsed (const char *preset)
   return *schedule;
 }
 
-/** Addresses that are seen. */
+/** Addresses that the camera sees. */
 Extent
 array_of (MirrorLayout layout)
 {
@@ -38,8 +41,9 @@ sent_mirrors (const Schedule &schedule, int mask, const Placement &placement)
 {
   const PlanePlan plan = plan_planes (schedule);
   const PlaneSlot at = plan.masks[std::size_t (mask)];
-  const PlaneImage planes = render_planes (
-      schedule, plan, at.image, placement, array_of (placement.layout));
+  const PlaneImage planes = rendered_planes (
+      schedule, plan, at.image, array_of (placement.layout), placement)
+                                .image ();
   Image<std::uint8_t> mirrors (planes.width (), planes.height ());
   for (int y = 0; y < mirrors.height (); y++)
     for (int x = 0; x < mirrors.width (); x++)
@@ -47,21 +51,21 @@ sent_mirrors (const Schedule &schedule, int mask, const Placement &placement)
   return mirrors;
 }
 
-/** Whether a mirror that is on covers @p point, asked of every mirror. */
+/** Whether a mirror that is on covers @p point; tries every mirror. */
 bool
-lit (const Image<std::uint8_t> &mirrors, MirrorPoint point)
+lit (const Image<std::uint8_t> &mirrors, Position point)
 {
   for (int row = 0; row < mirrors.height (); row++)
     for (int column = 0; column < mirrors.width (); column++) {
-      const MirrorPoint at = mirror_position (Array::diamond, column, row);
-      // A square on its corner, half a pitch from centre to corner.
+      const Position at = mirror_position (Array::diamond, column, row);
+      // A square rotated by 45 degrees, half a pitch from centre to corner.
       if (std::abs (point.x - at.x) + std::abs (point.y - at.y) < 0.5)
         return mirrors.at (column, row) != 0;
     }
   return false;
 }
 
-/** What the bench makes of a mask in uniform light, 255 for all of a pixel. */
+/** The image of a mask in uniform light; 255 for a fully lit pixel. */
 Image<std::uint8_t>
 seen (const Schedule &schedule, int mask, MirrorLayout layout)
 {
@@ -129,7 +133,7 @@ TEST (DiamondLattice, EachPixelIsAMirrorOfItsOwn)
   const Schedule schedule = parsed ("staircase:2x2");
   Image<std::uint8_t> mask (kWidth, kHeight);
   for (int slot = 0; slot < schedule.masks (); slot++) {
-    render_mask (schedule, slot, mask.view ());
+    expected_mask (schedule, slot, mask.view ());
     const auto coded = seen (schedule, slot, MirrorLayout::lattice);
     for (int y = 0; y < kHeight; y++)
       for (int x = 0; x < kWidth; x++)
@@ -146,9 +150,8 @@ TEST (DiamondLattice, ATilePixelIsTheMirrorAtItsPlace)
         EXPECT_EQ (mirror_at (mirror_position (Array::diamond, column, row)),
             (Offset{column, row}));
         const Offset pixel = tile_pixel (layout, column, row);
-        const MirrorPoint centre = tile_place (layout, pixel.x, pixel.y);
-        const MirrorPoint mirror =
-            mirror_position (Array::diamond, column, row);
+        const Position centre = tile_place (layout, pixel.x, pixel.y);
+        const Position mirror = mirror_position (Array::diamond, column, row);
         EXPECT_LE (std::hypot (centre.x - mirror.x, centre.y - mirror.y), 0.36);
       }
 }

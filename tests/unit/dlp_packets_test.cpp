@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The bytes that DLPC350 and DLPC900 are sent, and what is read in replies. */
+/* The bytes of requests to DLPC350 and DLPC900, and the parsing of replies. */
 #include <functional>
 
 #include <gtest/gtest.h>
@@ -7,10 +7,11 @@
 #include "dmd/dlpc350_protocol.h"
 #include "dmd/dlpc900_protocol.h"
 #include "hex.h"
+#include "mirrors.h"
 #include "spld_decoder.h"
 
-using namespace cexp;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::test;
 
 namespace
 {
@@ -129,8 +130,8 @@ TEST (Dlpc350Bytes, AreThoseOfTheDocument)
   EXPECT_EQ (write (11, kMailbox, {kMailboxPatterns}), "40 0B 03 00 33 1A 02");
   EXPECT_EQ (write (0x11, kValidate, {0}), "40 11 03 00 1A 1A 00");
   EXPECT_EQ (read (0x12, kValidate), "C0 12 02 00 1A 1A");
-  EXPECT_EQ (write (0x14, kPower, {0}), "40 14 03 00 00 02 00");
-  EXPECT_EQ (write (0x16, kTriggerOut1, {0, 0xBB, 0xBB}),
+  EXPECT_EQ (write (0x14, {0x0200, ""}, {0}), "40 14 03 00 00 02 00");
+  EXPECT_EQ (write (0x16, {0x1A1D, ""}, {0, 0xBB, 0xBB}),
       "40 16 05 00 1D 1A 00 BB BB");
   EXPECT_EQ (
       write (0x16, kTriggerIn1, {0, 0, 0, 0}), "40 16 06 00 35 1A 00 00 00 00");
@@ -145,7 +146,7 @@ TEST (Dlpc350Bytes, OfCommandsThatTheDriverDoesNotUse)
   EXPECT_EQ (write (5, kTriggerMode, {std::uint8_t (TriggerMode::video)}),
       "40 05 03 00 23 1A 00");
   EXPECT_EQ (write (14, kMailbox, {kMailboxClosed}), "40 0E 03 00 33 1A 00");
-  EXPECT_EQ (write (0x14, kPower, {1}), "40 14 03 00 00 02 01");
+  EXPECT_EQ (write (0x14, {0x0200, ""}, {1}), "40 14 03 00 00 02 01");
   EXPECT_EQ (
       request (HidKind::post, 0x15, {0x0802, ""}, {}), "00 15 02 00 02 08");
   EXPECT_EQ (write (0x16, kTriggerOut2, {0, 0xBB}), "40 16 04 00 1E 1A 00 BB");
@@ -214,9 +215,9 @@ TEST (Dlpc900Bytes, AreThoseOfTheDocument)
       "40 06 08 00 2A 1A 00 00 14 11 00 00");
   EXPECT_EQ (write (0x12, kTriggerIn1, encode_trigger_in (105, false)),
       "40 12 05 00 35 1A 69 00 00");
-  EXPECT_EQ (write (0x12, kTriggerOut1, encode_trigger_out (false, 0, 0)),
+  EXPECT_EQ (write (0x12, {0x1A1D, ""}, encode_trigger_out (false, 0, 0)),
       "40 12 07 00 1D 1A 00 00 00 00 00");
-  EXPECT_EQ (write (0x12, kTriggerOut1, encode_trigger_out (false, -20, 0)),
+  EXPECT_EQ (write (0x12, {0x1A1D, ""}, encode_trigger_out (false, -20, 0)),
       "40 12 07 00 1D 1A 00 EC FF 00 00");
   EXPECT_EQ (write (0x12, kIdle, {1}), "40 12 03 00 01 02 01");
   EXPECT_EQ (write (0x12, kIdle, {0}), "40 12 03 00 01 02 00");
@@ -263,7 +264,8 @@ TEST (Dlpc900Bytes, PatternEntries)
 TEST (Dlpc900Image, IsTheDocumentsPackets)
 {
   using namespace dlpc900;
-  const Bytes image = encode_image (uniform_image (1920, 1080, 1).view ());
+  const Bytes image =
+      encode_image (rows_of (uniform_image (1920, 1080, 1)), 0, 1920).joined ();
   ASSERT_EQ (image.size (), 4372u);
   const Bytes first = encode_request (HidKind::post, 7, kImageData.word,
       encode_chunk (ByteView (image).first (kImageChunk)));
@@ -299,16 +301,17 @@ upload_bytes (
       plan.masks[std::size_t (mask)].image = -1;
   std::size_t bytes = 0;
   for (int image = 0; image < plan.images; image++)
-    bytes += dlpc900::encoded_size (
-        render_planes (*schedule, plan, image, placement, {1920, 1080})
-            .view ());
+    bytes += dlpc900::encode_image (
+        rendered_planes (*schedule, plan, image, {1920, 1080}, placement), 0,
+        1920)
+                 .size;
   return bytes;
 }
 
 Placement
 region_of (const char *text)
 {
-  return {.region = *MirrorRegion::parse (text)};
+  return {.region = *parse_region (text)};
 }
 
 } // namespace
@@ -342,10 +345,11 @@ TEST (Dlpc900Image, IsPlainWhereThatIsShorter)
   for (int y = 0; y < 4; y++)
     for (int x = 0; x < 16; x++)
       image.at (x, y) = PlanePixel (100 * y + x);
-  const Bytes bytes = encode_image (image.view ());
+  const PiecedBytes pieces = encode_image (rows_of (image), 0, image.width ());
+  const Bytes bytes = pieces.joined ();
   EXPECT_EQ (bytes[25], 0);
   EXPECT_EQ (bytes.size (), 48u + 16 * 4 * 3);
-  EXPECT_EQ (bytes.size (), encoded_size (image.view ()));
+  EXPECT_EQ (bytes.size (), pieces.size);
   EXPECT_EQ (decode_spld (bytes), image);
 }
 

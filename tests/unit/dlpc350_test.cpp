@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The DLPC350 driver against an emulated board: tables for flash and video and
- * for either master, what it cannot do, and faults. */
+/* The DLPC350 driver with an emulated board: tables for flash and video and for
+ * both triggers, limits, and faults. */
 #include <random>
 
 #include "dmd/dlpc350.h"
@@ -8,8 +8,8 @@
 #include "emulated_dlpc350.h"
 #include "fault_life.h"
 
-using namespace cexp;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::test;
 
 namespace
 {
@@ -45,8 +45,7 @@ TEST (Dlpc350, SaysWhatTheBoardIs)
   EXPECT_EQ (info.array, Array::diamond);
   EXPECT_EQ (info.minimum_active, 235'000);
   EXPECT_EQ (info.resident_masks, 48);
-  EXPECT_FALSE (info.run_time_upload);
-  EXPECT_TRUE (info.trigger_in && info.trigger_out && info.finite_run);
+  EXPECT_TRUE (info.trigger_in && info.trigger_out);
   EXPECT_EQ (info.minimum_dark, 230'000);
 }
 
@@ -217,7 +216,7 @@ TEST (Dlpc350Faults, WhateverHappensItStopsInTheEndAndHangsNowhere)
     FaultLife life = life_of (rig, random);
     life.draw (*rig.board, 100);
     auto dmd = life.live ([&] { return rig.make ("x,images=0"); }, schedule);
-    rig.board->faults.clear (); // what comes now is the end
+    rig.board->faults.clear (); // the destructor follows
     life.close (std::move (dmd));
     ASSERT_TRUE (rig.board->gone () || !rig.board->running ())
         << "sequence " << sequence;

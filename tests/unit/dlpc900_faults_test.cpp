@@ -1,19 +1,19 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* What the emulated DLPC900 refuses, and what the driver makes of refusals and
- * faults. */
+/* Commands that the emulated DLPC900 rejects, and the driver's handling of
+ * rejections and faults. */
 #include "dlpc900_rig.h"
 #include "dmd/dlpc900_protocol.h"
 #include "fault_life.h"
 
-using namespace cexp;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::test;
 
 namespace
 {
 
 using namespace std::chrono_literals;
 
-/** What a board says to a write: the code of its refusal, 0 for none. */
+/** The reply of a board to a write: the error code, 0 for none. */
 int
 verdict (EmulatedDlpc900 &board, const HidCommand &command, const Bytes &data)
 {
@@ -124,7 +124,7 @@ TEST (Dlpc900Faults, AStartIsCancelledWhereverItIs)
     Rig rig;
     ASSERT_EQ (message_of (rig.open ()), "");
     ASSERT_EQ (message_of (rig.upload (Schedule ())), "");
-    // Nothing answers any more, and a frame lasts 10 s.
+    // The board no longer answers, and a frame lasts 10 s.
     for (int lost = message + 1; lost < 20; lost++)
       rig.board->faults[rig.board->messages () + lost] = Fault::lose_reply;
     std::stop_source stop;
@@ -170,7 +170,7 @@ TEST (Dlpc900Faults, WhateverHappensItStopsInTheEndAndHangsNowhere)
     life.draw (*rig.board, 200);
     auto dmd =
         life.live ([&] { return rig.make ("x,region=32x16"); }, schedule);
-    rig.board->faults.clear (); // what comes now is the end
+    rig.board->faults.clear (); // the destructor follows
     life.close (std::move (dmd));
     ASSERT_TRUE (rig.board->gone () || !rig.board->running ())
         << "sequence " << sequence;

@@ -5,11 +5,12 @@
 #include "dmd/dlpc900.h"
 #include "dmd_rig.h"
 #include "emulated_dlpc900.h"
+#include "mirrors.h"
 
-namespace cexp::test
+namespace codedexposure::test
 {
 
-/* Types of boards, as they say themselves. */
+/* Types of boards, as they report them. */
 constexpr int kDlp6500 = 1, kDlp9000 = 2, kDlp5500 = 5;
 
 /** The driver and an emulated board. */
@@ -20,7 +21,7 @@ struct Rig : DmdRig<EmulatedDlpc900, open_dlpc900> {
   }
 };
 
-/** What the board shows is the masks of @p schedule. */
+/** Checks that the board shows the masks of @p schedule. */
 inline void
 expect_masks (const EmulatedDlpc900 &board, const Schedule &schedule,
     const Placement &placement = {})
@@ -29,9 +30,9 @@ expect_masks (const EmulatedDlpc900 &board, const Schedule &schedule,
   for (int mask = 0; mask < schedule.masks (); mask++) {
     const auto shown = board.mirrors (mask);
     Image<std::uint8_t> expected (shown.width (), shown.height ());
-    render_mirrors (schedule, mask, placement, expected.view ());
+    expected_mask (schedule, mask, expected.view (), placement);
     ASSERT_TRUE (shown == expected) << "mask " << mask;
   }
 }
 
-} // namespace cexp::test
+} // namespace codedexposure::test

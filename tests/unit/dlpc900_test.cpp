@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The DLPC900 driver against an emulated board: masks that arrive, tables for
- * either master, and what is not sent twice. */
+/* The DLPC900 driver with an emulated board: received masks, tables for both
+ * triggers, and data that is not sent twice. */
 #include "dlpc900_rig.h"
 #include "dmd/dlpc900_protocol.h"
 #include "hex.h"
 
-using namespace cexp;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::test;
 
 namespace
 {
@@ -43,9 +43,8 @@ TEST (Dlpc900, SaysWhatTheBoardIs)
   EXPECT_EQ (info.size, (Extent{1920, 1080}));
   EXPECT_EQ (info.minimum_active, 105'000);
   EXPECT_EQ (info.resident_masks, 400);
-  EXPECT_TRUE (info.run_time_upload);
   EXPECT_TRUE (info.triggers_camera);
-  EXPECT_TRUE (info.trigger_in && info.trigger_out && info.finite_run);
+  EXPECT_TRUE (info.trigger_in && info.trigger_out);
   EXPECT_EQ (info.minimum_dark, 105'000);
   EXPECT_EQ (info.array, Array::orthogonal);
 }
@@ -97,7 +96,7 @@ StillMask
 stripes (int slots)
 {
   return {.name = "stripes",
-      .open = [] (int x, int y) { return (x * 2 / 3 + y * 2 / 3) % 2 == 0; },
+      .on = [] (int x, int y) { return (x * 2 / 3 + y * 2 / 3) % 2 == 0; },
       .slots = slots};
 }
 
@@ -121,7 +120,7 @@ TEST (Dlpc900, AStillMaskStandsInItsSlotsOfEveryExposure)
     const auto mirrors = rig.board->mirrors (0);
     for (int y = 0; y < mirrors.height (); y++)
       for (int x = 0; x < mirrors.width (); x++)
-        ASSERT_EQ (mirrors.at (x, y), stripes (1).open (x, y));
+        ASSERT_EQ (mirrors.at (x, y), stripes (1).on (x, y));
   }
 }
 
@@ -149,7 +148,7 @@ TEST (Dlpc900, AStillMaskStartsInTheRegion)
   for (int y = 0; y < mirrors.height (); y++)
     for (int x = 0; x < mirrors.width (); x++) {
       const bool in = x >= 16 && x < 112 && y >= 8 && y < 72;
-      ASSERT_EQ (mirrors.at (x, y), in && stripes (1).open (x - 16, y - 8))
+      ASSERT_EQ (mirrors.at (x, y), in && stripes (1).on (x - 16, y - 8))
           << x << ", " << y;
     }
 }
@@ -187,8 +186,8 @@ TEST (Dlpc900, MirrorsOutsideTheRegionAreOff)
   Rig rig;
   ASSERT_EQ (message_of (rig.open ("x,region=101x50+7+20")), "");
   ASSERT_EQ (message_of (rig.show (Schedule ())), "");
-  expect_masks (*rig.board, Schedule (),
-      {MirrorLayout::address, MirrorRegion{{101, 50}, {7, 20}}});
+  expect_masks (
+      *rig.board, Schedule (), {MirrorLayout::address, Rect{7, 20, 101, 50}});
 }
 
 TEST (Dlpc900, AsMasterItPulsesOnceAFrame)
@@ -202,7 +201,7 @@ TEST (Dlpc900, AsMasterItPulsesOnceAFrame)
   EXPECT_EQ (flags (*rig.board, &EmulatedDlpc900::Line::waits), "00000000");
 }
 
-/** The table that was sent last, a line each. */
+/** The last table, one string for each line. */
 std::string
 last_table (EmulatedDlpc900 &board, std::size_t lines)
 {
@@ -321,7 +320,7 @@ TEST (Dlpc900Upload, TellsTimeAndProgress)
   EXPECT_EQ (Nanoseconds (told.back ().second) * 1'000'000, predicted);
   for (std::size_t i = 1; i < told.size (); i++)
     EXPECT_GT (told[i].first, told[i - 1].first);
-  // The wire takes a packet in 1 ms; the rest is tables and their replies.
+  // A packet takes 1 ms; the rest is tables and their replies.
   const auto spent = rig.clock->now - before;
   EXPECT_GE (spent, std::chrono::nanoseconds (predicted));
   EXPECT_LE (spent, std::chrono::nanoseconds (predicted) + 100ms);
@@ -416,6 +415,23 @@ TEST (Dlpc900Upload, IsCancelledWithinAFewMessages)
   EXPECT_EQ (message_of (rig.dmd->start (plan_of (Schedule ()))),
       "board (DLP5500): no masks to start; upload first");
   ASSERT_EQ (message_of (rig.show (Schedule ())), "");
+  expect_masks (*rig.board, Schedule ());
+}
+
+TEST (Dlpc900Upload, AfterOneThatWasCancelledBeginsFromTheStart)
+{
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open ()), "");
+  std::stop_source stop;
+  const auto cancelled = rig.dmd->upload (
+      Schedule (), stop.get_token (), [&] (int sent, int total) {
+        if (sent > total / 2)
+          stop.request_stop ();
+      });
+  EXPECT_NE (message_of (cancelled), "");
+  rig.board->power_cycle ();
+  ASSERT_EQ (message_of (rig.show (Schedule ())), "");
+  EXPECT_TRUE (rig.board->running ());
   expect_masks (*rig.board, Schedule ());
 }
 

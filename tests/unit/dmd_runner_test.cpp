@@ -10,16 +10,16 @@
 
 #include "dmd/dmd_runner.h"
 
-using namespace cexp;
+using namespace codedexposure;
 
 namespace
 {
 
-/** What was done to a RecordingDmd, and what it is to do. */
+/** Calls to a RecordingDmd, and its configured results. */
 struct Record {
   std::vector<std::string> calls;
   bool running = false;
-  bool upload_waits = false; // until it is told to stop
+  bool upload_waits = false; // until a stop is requested
   bool start_fails = false;
   bool deaf = false; // to being told to stop
   std::promise<void> uploading;
@@ -249,7 +249,7 @@ TEST_F (DmdRunnerTest, ShowsAMaskAndRestoresTheSchedule)
   runner->start (plan);
   ASSERT_TRUE (runner->settle ());
   record->calls.clear ();
-  runner->show ({.name = "stripes", .open = {}}, plan);
+  runner->show ({.name = "stripes", .on = {}}, plan);
   EXPECT_TRUE (runner->settle ());
   runner->restore (Schedule (), plan);
   EXPECT_TRUE (runner->settle ());
@@ -258,7 +258,7 @@ TEST_F (DmdRunnerTest, ShowsAMaskAndRestoresTheSchedule)
                          "upload sequential:2x2", "stop", "start 10ms"}));
   runner->halt ();
   record->calls.clear ();
-  runner->show ({.name = "stripes", .open = {}}, plan);
+  runner->show ({.name = "stripes", .on = {}}, plan);
   EXPECT_FALSE (runner->settle ());
   EXPECT_TRUE (record->calls.empty ());
 }

@@ -4,10 +4,10 @@
 
 #include <gtest/gtest.h>
 
+#include "bench/simulated_dmd.h"
 #include "dmd/dmd.h"
-#include "dmd/simulated_dmd.h"
 
-using namespace cexp;
+using namespace codedexposure;
 
 namespace
 {
@@ -128,7 +128,17 @@ TEST (SimulatedMirrors, AreSharedByNameWhileSomebodyHoldsThem)
   EXPECT_FALSE (SimulatedMirrors::find ("brief")->schedule ());
 }
 
-TEST (OpenDmd, NamesTheDevicesThereAre)
+class OpenDmd : public ::testing::Test
+{
+protected:
+  void SetUp () override { serve_simulated_dmds (); }
+};
+
+class SimulatedDmd : public OpenDmd
+{
+};
+
+TEST_F (OpenDmd, NamesTheDevicesThereAre)
 {
   const auto opened = open_dmd ("tape:1-2");
   ASSERT_FALSE (opened);
@@ -136,7 +146,7 @@ TEST (OpenDmd, NamesTheDevicesThereAre)
   EXPECT_NE (opened.error ().message.find ("sim:NAME"), std::string::npos);
 }
 
-TEST (OpenDmd, TellsWhichOptionCannotBeUsed)
+TEST_F (OpenDmd, TellsWhichOptionCannotBeUsed)
 {
   for (const char *bad :
       {"sim:", "sim:,size=2x2", "sim:b,size=2", "sim:b,size=0x3",
@@ -150,7 +160,7 @@ TEST (OpenDmd, TellsWhichOptionCannotBeUsed)
   }
 }
 
-TEST (OpenDmd, ReadsTheOptionsOfASimulatedDevice)
+TEST_F (OpenDmd, ReadsTheOptionsOfASimulatedDevice)
 {
   const auto dmd = open_dmd ("sim:options,size=1920x1080,masks=400,"
                              "min-active=105us,min-switching=20us");
@@ -163,7 +173,7 @@ TEST (OpenDmd, ReadsTheOptionsOfASimulatedDevice)
   EXPECT_EQ (info.minimum_switching, 20'000);
 }
 
-TEST (SimulatedDmd, ProgramsStartsAndParksItsMirrors)
+TEST_F (SimulatedDmd, ProgramsStartsAndParksItsMirrors)
 {
   const auto mirrors = SimulatedMirrors::find ("life");
   {
@@ -181,13 +191,13 @@ TEST (SimulatedDmd, ProgramsStartsAndParksItsMirrors)
   EXPECT_FALSE (mirrors->running ());
 }
 
-TEST (SimulatedDmd, CannotStartWithoutMasks)
+TEST_F (SimulatedDmd, CannotStartWithoutMasks)
 {
   const auto dmd = *open_dmd ("sim:empty");
   EXPECT_FALSE (dmd->start (plan_of (Schedule ())));
 }
 
-TEST (SimulatedDmd, FailsWhereItIsAskedTo)
+TEST_F (SimulatedDmd, FailsWhereItIsAskedTo)
 {
   const SlotPlan plan = plan_of (Schedule ());
   EXPECT_FALSE (open_dmd ("sim:fails,fail=open"));
@@ -204,7 +214,7 @@ TEST (SimulatedDmd, FailsWhereItIsAskedTo)
   EXPECT_FALSE (restarts->start (plan));
 }
 
-TEST (SimulatedDmd, UploadEndsWhenToldToStop)
+TEST_F (SimulatedDmd, UploadEndsWhenToldToStop)
 {
   const auto dmd = *open_dmd ("sim:slow,mask-time=3000s");
   std::stop_source stop;

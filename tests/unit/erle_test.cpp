@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The run-length code of images: every image comes back, in streams that
- * controllers are known to read. */
+/* The run-length code of images: every image is restored, and the streams use
+ * only what controllers are known to read. */
 #include <algorithm>
 #include <random>
 
@@ -8,10 +8,11 @@
 
 #include "dmd/erle.h"
 #include "hex.h"
+#include "mirrors.h"
 #include "spld_decoder.h"
 
-using namespace cexp;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::test;
 
 namespace
 {
@@ -35,18 +36,25 @@ row_of (std::initializer_list<PlanePixel> pixels)
       int (pixels.size ()), 1, [&] (int x, int) { return pixels.begin ()[x]; });
 }
 
+Bytes
+code_of_rows (const Pixels &image)
+{
+  return encode_erle (rows_of (image), 0, image.width ()).joined ();
+}
+
 std::string
 code_of (const Pixels &image)
 {
-  return to_hex (encode_erle (image.view ()));
+  return to_hex (code_of_rows (image));
 }
 
 void
 expect_round_trip (const Pixels &image)
 {
-  const Bytes code = encode_erle (image.view ());
+  const PiecedBytes pieces = encode_erle (rows_of (image), 0, image.width ());
+  const Bytes code = pieces.joined ();
   EXPECT_EQ (code.size () % 4, 0u);
-  EXPECT_EQ (code.size (), erle_size (image.view ()));
+  EXPECT_EQ (code.size (), pieces.size);
   Pixels decoded (image.width (), image.height ());
   ByteReader in (code, 0);
   ASSERT_TRUE (decode_erle (in, decoded));
@@ -83,7 +91,7 @@ TEST (Erle, CopiesARowFromTheOneAbove)
 TEST (Erle, AllEqualImageIsTheDocumentsStream)
 {
   const Bytes code =
-      encode_erle (image_of (1920, 1080, [] (int, int) { return 1u; }).view ());
+      code_of_rows (image_of (1920, 1080, [] (int, int) { return 1u; }));
   ASSERT_EQ (code.size (), 4324u);
   EXPECT_EQ (to_hex (ByteView (code).first (13)),
       "80 0F 00 00 01 00 01 80 0F 00 01 80 0F");
@@ -102,7 +110,7 @@ TEST_P (ErleRunLengths, RunsLiteralsAndCopiesComeBack)
       image_of (n, 3, [] (int x, int) { return PlanePixel (x); }));
   expect_round_trip (
       image_of (n, 3, [] (int x, int y) { return PlanePixel (x + 7 * y); }));
-  // One pixel before and one behind what has that length.
+  // One pixel before and one after the run of that length.
   expect_round_trip (image_of (n + 2, 3, [n] (int x, int y) {
     return x == 0 || x == n + 1 ? PlanePixel (y) : 0x808080u;
   }));
@@ -142,13 +150,26 @@ TEST (Erle, ImagesOfAnyMakeComeBack)
   }
 }
 
-TEST (Erle, RowsMayBePadded)
+TEST (Erle, TakesAPartOfTheColumns)
 {
   const Pixels wide =
       image_of (10, 4, [] (int x, int y) { return PlanePixel (x * y); });
   const Pixels narrow =
       image_of (6, 4, [] (int x, int y) { return PlanePixel (x * y); });
-  ImageView<const PlanePixel> view = wide.view ();
-  view.width = 6;
-  EXPECT_EQ (encode_erle (view), encode_erle (narrow.view ()));
+  EXPECT_EQ (
+      encode_erle (rows_of (wide), 0, 6).joined (), code_of_rows (narrow));
+}
+
+TEST (Erle, RowsThatRepeatAreEncodedOnce)
+{
+  const Pixels image = image_of (
+      40, 30, [] (int x, int y) { return PlanePixel (x * 3 + y % 3); });
+  MirrorRows<PlanePixel> rows;
+  rows.distinct =
+      image_of (40, 3, [] (int x, int y) { return PlanePixel (x * 3 + y); });
+  for (int y = 0; y < 30; y++)
+    rows.order.push_back (y % 3);
+  const PiecedBytes pieces = encode_erle (rows, 0, 40);
+  EXPECT_EQ (pieces.pieces.size (), 5u); // the first, three, the end
+  EXPECT_EQ (pieces.joined (), code_of_rows (image));
 }

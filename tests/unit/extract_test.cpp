@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* What extraction promises: exact samples, decoding within its quantisation
- * bound, ranks in order. */
+/* Extraction: exact samples, decoding within its quantisation bound, ordered
+ * ranks. */
 #include "extract/extractor.h"
 
 #include <cmath>
@@ -16,7 +16,7 @@
 namespace
 {
 
-using namespace cexp;
+using namespace codedexposure;
 using Scene = std::function<double (int x, int y, int slot)>;
 
 Schedule
@@ -28,8 +28,8 @@ preset (std::string_view text)
   return schedule ? *schedule : Schedule ();
 }
 
-/** The coded frame of a scene: white in the fully used slots of the code is
- * white, pixels are rounded and clamped. */
+/** The coded frame of a scene: white in the slots of the brightest element is
+ * the largest value; pixels are rounded and clamped. */
 template <typename Pixel>
 Image<Pixel>
 expose (const Schedule &schedule, int width, int height, const Scene &scene)
@@ -41,9 +41,9 @@ expose (const Schedule &schedule, int width, int height, const Scene &scene)
     for (int x = 0; x < width; x++) {
       double light = 0.0;
       for (int s = 0; s < code.slots (); s++)
-        light += scene (x, y, s) * (code.open (schedule.element_at (x, y), s)
-                                           ? 1.0
-                                           : schedule.leak ());
+        light +=
+            scene (x, y, s) *
+            (code.on (schedule.element_at (x, y), s) ? 1.0 : schedule.leak ());
       coded.at (x, y) = Pixel (std::clamp (
           std::round (light / schedule.white_slots ()), 0.0, white));
     }
@@ -75,7 +75,7 @@ extract (const Schedule &schedule, const Image<Pixel> &coded,
     out.subframes.emplace_back (size.width, size.height);
   for (auto &subframe : out.subframes)
     views.push_back (subframe.view ());
-  out.report = extractor->run (coded.view (), views);
+  out.report = extractor->run (coded.view (), views).value ();
   return out;
 }
 

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Faults of a camera by the frames that they befall. */
+/* Faults of a camera, by frame number. */
 #include <gtest/gtest.h>
 
-#include "camera/fault_plan.h"
+#include "bench/fault_plan.h"
 
-using namespace cexp;
+using namespace codedexposure;
 using Kind = Fault::Kind;
 
 TEST (FaultPlan, EveryWordBefallsItsFrames)

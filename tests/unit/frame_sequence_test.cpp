@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Numbers of frames from their times. */
+/* Frame numbers from frame times. */
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include "clock/frame_sequence.h"
+#include "sync/frame_sequence.h"
 
-using namespace cexp;
+using namespace codedexposure;
 
 namespace
 {

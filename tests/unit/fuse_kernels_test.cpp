@@ -1,21 +1,21 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Fusion's kernels, of every target that the processor has, against their
- * scalar oracle. */
+/* Kernels of fusion: every instruction set of the processor, compared with the
+ * scalar reference. */
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include "fuse/dct_matrix.h"
+#include "fuse/dct.h"
 #include "fuse/kernels.h"
 #include "random_numbers.h"
 
 namespace
 {
 
-using namespace cexp;
+using namespace codedexposure;
 using test::random_numbers;
 
-/* What a kernel makes of @row in each of its outputs. */
+/* The outputs of a kernel for @row. */
 std::vector<std::vector<float>>
 outputs_of (const fuse::Kernels &kernels, const fuse::FilterRow &row,
     const std::vector<float> *scale)
@@ -81,7 +81,7 @@ TEST (FuseKernels, JoinedRowsEqualTheReference)
     for (const fuse::Kernels &kernels : fuse::supported_kernels ()) {
       SCOPED_TRACE (kernels.name);
       EXPECT_EQ (joined (kernels.sum), joined (oracle.sum));
-      EXPECT_EQ (joined (kernels.most), joined (oracle.most));
+      EXPECT_EQ (joined (kernels.max), joined (oracle.max));
     }
   }
 }
@@ -122,7 +122,8 @@ TEST (FuseKernels, ShrinkingEqualsTheReference)
 
 TEST (FuseKernels, NothingIsLostBelowAThresholdOfNothing)
 {
-  /* Every coefficient is kept, so the blocks come back times their weight. */
+  /* All coefficients are kept, so the result is the blocks times their weight.
+   */
   for (const fuse::Kernels &kernels : fuse::supported_kernels ()) {
     SCOPED_TRACE (kernels.name);
     const auto sums = shrunk (kernels, 4, -1.0f);

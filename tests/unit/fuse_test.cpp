@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Fusion: what users rely on. */
+/* Fusion: accuracy, limits and errors. */
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -8,14 +8,14 @@
 
 #include <gtest/gtest.h>
 
+#include "bench/bench.h"
 #include "fuse/fuser.h"
-#include "optics/bench.h"
 #include "random_numbers.h"
 
 namespace
 {
 
-using namespace cexp;
+using namespace codedexposure;
 using test::random_numbers;
 
 template <typename Pixel = std::uint8_t>
@@ -85,11 +85,11 @@ fuse (const Pictures<Pixel> &coded, const Schedule &schedule,
     std::vector<ImageView<Pixel>> views;
     for (auto &slot : slots)
       views.push_back (slot.view ());
-    fuser->fuse (views);
+    EXPECT_TRUE (fuser->fuse (views));
     std::move (slots.begin (), slots.end (), std::back_inserter (frames));
   };
   for (const auto &frame : coded) {
-    fuser->take (frame.view ());
+    EXPECT_TRUE (fuser->take (frame.view ()));
     if (fuser->pending () > options.lookahead)
       fuse_one ();
   }
@@ -190,11 +190,11 @@ TEST (Fuse, StopsWhenItIsAskedToAndBeginsAnew)
       views.push_back (slot.view ());
     std::stop_source stop;
     stop.request_stop ();
-    fuser->take (coded[0].view ());
+    EXPECT_TRUE (fuser->take (coded[0].view ()));
     EXPECT_FALSE (fuser->fuse (views, stop.get_token ()));
     EXPECT_EQ (fuser->pending (), 0);
     fuser->forget ();
-    fuser->take (coded[0].view ());
+    EXPECT_TRUE (fuser->take (coded[0].view ()));
     EXPECT_TRUE (fuser->fuse (views));
     EXPECT_EQ (slots, fuse (coded, schedule, options));
   }
@@ -322,7 +322,31 @@ TEST (Fuse, StillLightIsAveragedOverFramesWhereNoiseIsKnown)
   EXPECT_LT (psnr (coded.back (), scene), 39.0);
 }
 
-/* A small disc crosses a still texture. */
+/* Like a lamp that warms up: static pixels must not lag. */
+TEST (Fuse, StillLightThatGrowsSlowlyIsFollowed)
+{
+  constexpr double kGrowth = 0.03 / 255.0; // a frame
+  constexpr int kFrames = 120;
+  const Schedule schedule = schedule_of ("sequential:lattice:4/2");
+  const auto n = schedule.slots ();
+  const auto scene = [&] (int slot) {
+    return draw<std::uint16_t> (48, 32, [&] (int x, int y) {
+      return 0.7 * texture (x, y) + kGrowth * (slot / n);
+    });
+  };
+  const auto frames = fuse (take<std::uint16_t> (schedule, kFrames, scene),
+      schedule, with_quality (FuseQuality::kFast, true));
+  const auto truth = scene (kFrames * n - 1);
+  double sum = 0.0;
+  for (int y = 4; y < 28; y++)
+    for (int x = 4; x < 44; x++)
+      sum += frames.back ().at (x, y) - double (truth.at (x, y));
+  const double lag = -sum / (24 * 40) / 257.0; // grey levels of 255
+  EXPECT_LT (lag, 0.6) << "some sixteen frames";
+  EXPECT_GT (lag, 0.2) << "it is averaged";
+}
+
+/* A small disc crosses a static texture. */
 Image<std::uint8_t>
 disc_over_texture (int slot)
 {
@@ -332,8 +356,8 @@ disc_over_texture (int slot)
   });
 }
 
-/* Soft discs of several sizes and greys, one over the other, that go by at
- * @speed px a slot. */
+/* Overlapping soft discs of several sizes and greys that move by @speed px per
+ * slot. */
 Image<std::uint8_t>
 discs (double speed, int slot)
 {
@@ -352,13 +376,13 @@ discs (double speed, int slot)
   });
 }
 
-/* PSNR of four slots of them, fused by models of what creeps and what moves. */
+/* PSNR of four slots of them, fused by models of slow and of fast motion. */
 double
-discs_fused (double speed, const SceneClass &creeping, const SceneClass &moving)
+discs_fused (double speed, const SceneClass &slow, const SceneClass &moving)
 {
   const Schedule schedule = schedule_of ("sequential:lattice:4/2");
   FuseOptions options;
-  options.scene.creeping = creeping;
+  options.scene.slow = slow;
   options.scene.moving = moving;
   const auto picture = [speed] (int slot) { return discs (speed, slot); };
   const auto frames = fuse (take (schedule, 1, picture), schedule, options);
@@ -375,12 +399,12 @@ TEST (Fuse, FastTakesTheModelThatFits)
     const auto fused = [speed] (const SceneClass &a, const SceneClass &b) {
       return discs_fused (speed, a, b);
     };
-    const double both = fused (model.creeping, model.moving);
-    const double creeping = fused (model.creeping, model.creeping);
+    const double both = fused (model.slow, model.moving);
+    const double slow = fused (model.slow, model.slow);
     const double moving = fused (model.moving, model.moving);
-    EXPECT_EQ (creeping > moving, speed < 1.0) << speed;
-    EXPECT_GT (std::abs (creeping - moving), 2.0) << speed;
-    EXPECT_GT (both, (creeping + moving) / 2.0) << speed;
+    EXPECT_EQ (slow > moving, speed < 1.0) << speed;
+    EXPECT_GT (std::abs (slow - moving), 2.0) << speed;
+    EXPECT_GT (both, (slow + moving) / 2.0) << speed;
   }
 }
 
@@ -407,7 +431,7 @@ TEST (Fuse, WhatMovesLeavesNoGhosts)
   }
 }
 
-/* Stripes that come back to where they were with every coded frame. */
+/* Stripes that return to the same position in every coded frame. */
 Image<std::uint8_t>
 stripes (int slot)
 {
@@ -441,8 +465,8 @@ TEST (Fuse, ForgottenFramesHaveNoSay)
       std::vector<ImageView<std::uint8_t>> views;
       for (auto &slot : slots)
         views.push_back (slot.view ());
-      fuser->take (coded[0].view ());
-      fuser->fuse (views);
+      EXPECT_TRUE (fuser->take (coded[0].view ()));
+      EXPECT_TRUE (fuser->fuse (views));
       return slots;
     };
     const auto first = once ();
@@ -498,7 +522,7 @@ TEST (Fuse, RefusesWhatItCannotDo)
   EXPECT_EQ (error_of ("sequential:5x5", 32, 32), "");
 }
 
-/* Groups of 2x2 whose elements are mixed anew in each. */
+/* 2x2 groups, each with another order of elements. */
 TEST (Fuse, RefusesTilesThatHardlyRepeat)
 {
   constexpr int kPeriod = 80;
@@ -518,13 +542,6 @@ TEST (Fuse, RefusesTilesThatHardlyRepeat)
       Fuser<std::uint8_t>::make (*Schedule::make (parts), 160, 160);
   ASSERT_FALSE (made);
   EXPECT_NE (made.error ().message.find ("smaller period"), std::string::npos);
-}
-
-TEST (Fuse, QualitiesHaveNames)
-{
-  for (const FuseQuality quality : kQualities)
-    EXPECT_EQ (*parse_quality (quality_name (quality)), quality);
-  EXPECT_FALSE (parse_quality ("finest"));
 }
 
 } // namespace

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Patterns of a calibration: their names, their mirrors, the whole run. */
-#include "moire/gratings.h"
+/* Calibration patterns: names, mirrors and the complete sequence. */
+#include "calibrate/gratings.h"
 
 #include <algorithm>
 #include <set>
 
 #include <gtest/gtest.h>
 
-using namespace cexp;
+using namespace codedexposure;
 
 namespace
 {
@@ -17,11 +17,9 @@ row_of (const char *text, int width, int y = 0)
 {
   const auto pattern = Pattern::parse (text);
   EXPECT_TRUE (pattern.ok ()) << pattern.error ().message;
-  Image<std::uint8_t> mirrors (width, y + 1);
-  render_pattern (*pattern, mirrors.view ());
   std::string row;
   for (int x = 0; x < width; x++)
-    row += char ('0' + mirrors.at (x, y));
+    row += pattern->on (x, y) ? '1' : '0';
   return row;
 }
 
@@ -62,7 +60,7 @@ TEST (Gratings, WrongNamesAreExplained)
       {"grating-x:4/4", "its phase must be"},
       {"gray-x:0/1", "1 to 256 mirrors wide"},
       {"gray-x:4/14", "its bit must be 0 to 13"},
-      {"gray-both:4/1", "a Gray code is of x or of y"},
+      {"gray-both:4/1", "the axis of a Gray code must be x or y"},
   };
   for (const auto &[text, why] : cases) {
     const auto pattern = Pattern::parse (text);

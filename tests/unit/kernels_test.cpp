@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Every instruction set of this machine gives the pixels of the scalar
- * reference, bit for bit, and writes nowhere else. */
+ * reference, bit for bit, and writes no other bytes. */
 #include "extract/extractor.h"
 
 #include <algorithm>
@@ -15,10 +15,10 @@
 namespace
 {
 
-using namespace cexp;
+using namespace codedexposure;
 
-/** Views into a block of bytes that starts off any alignment, has padded rows
- * and shows every write beside the pixels. */
+/** Views into a block of bytes that is not aligned, has padded rows and detects
+ * writes outside the pixels. */
 template <typename Pixel>
 class Guarded
 {
@@ -49,7 +49,8 @@ public:
   }
 
 private:
-  /* Frames that bypass the caches do so where all planes lie alike to lines. */
+  /* Non-temporal stores are used only if all planes have the same alignment to
+   * cache lines. */
   static std::uint8_t *line_in (std::vector<std::uint8_t> &bytes)
   {
     const auto at = reinterpret_cast<std::uintptr_t> (bytes.data ());
@@ -89,7 +90,7 @@ struct Case {
   ExtractOptions options;
 };
 
-/** A frame through one target. */
+/** Extracts a frame with one instruction set. */
 template <typename Pixel>
 struct Run {
   std::vector<Guarded<Pixel>> subframes;
@@ -115,7 +116,7 @@ run (const Schedule &schedule, ImageView<const Pixel> coded,
     result.subframes.emplace_back (size.width, size.height, offset, padding);
   for (auto &subframe : result.subframes)
     views.push_back (subframe.view ());
-  result.report = extractor->run (coded, views);
+  result.report = extractor->run (coded, views).value ();
   return result;
 }
 
@@ -129,7 +130,7 @@ same_pixels (ImageView<Pixel> a, ImageView<Pixel> b)
   return true;
 }
 
-/** Compares all targets on a frame of @p columns cells a row. */
+/** Compares all instruction sets for a frame with @p columns cells per row. */
 template <typename Pixel>
 void
 expect_equal (const Case &c, const Content &content, int columns, int rows)
@@ -251,7 +252,7 @@ TYPED_TEST (Kernels, RankEqualsTheReferenceForEveryGroupSize)
 
 TYPED_TEST (Kernels, EqualTheReferenceOnFramesThatBypassTheCaches)
 {
-  /* Just above the size from which frames do, in bytes. */
+  /* Just above the size from which non-temporal stores are used, in bytes. */
   const int rows = 750 / int (sizeof (TypeParam));
   for (const char *schedule : {"sequential:4x2", "sequential:lattice:8/3"})
     expect_equal<TypeParam> (
@@ -288,20 +289,21 @@ TYPED_TEST (Kernels, BandsOfRowsMakeTheWholeFrame)
       to_banded.push_back (banded[k].view ());
     }
     const Image<TypeParam> &frame = coded;
-    const auto truth = extractor->run (frame.view (), to_whole);
+    const auto truth = extractor->run (frame.view (), to_whole).value ();
     std::uint64_t saturated = 0;
     const int end = size.height;
     for (const auto &[first, rows] :
         {std::pair (13, 7), {0, 13}, {7, 0}, {end, 0}})
-      saturated +=
-          extractor->run_rows (frame.view (), to_banded, first, rows).saturated;
+      saturated += extractor->run_rows (frame.view (), to_banded, first, rows)
+                       .value ()
+                       .saturated;
     EXPECT_EQ (saturated, truth.saturated);
     EXPECT_EQ (whole, banded) << method_name (method);
   }
 }
 
-/** 0-1 principle (Knuth, The Art of Computer Programming 3, 5.3.4): what sorts
- * all sequences of zeros and ones sorts everything. */
+/** 0-1 principle (Knuth, The Art of Computer Programming 3, 5.3.4): a network
+ * that sorts all sequences of zeros and ones sorts everything. */
 template <int N>
 void
 expect_sorts_zeros_and_ones ()

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The DLP3000 driver: its bytes, and a board that is a server on this machine.
- */
+/* The DLP3000 driver: its bytes, and an emulated board as a server on this
+ * machine. */
 #include "dmd/lightcrafter.h"
 
 #include "dmd/bitmap.h"
@@ -9,9 +9,10 @@
 #include "dmd_rig.h"
 #include "hex.h"
 #include "lightcrafter_server.h"
+#include "mirrors.h"
 
-using namespace cexp;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::test;
 
 namespace
 {
@@ -27,7 +28,7 @@ packet (PacketType type, std::uint16_t command, const Bytes &payload)
   return to_hex (packets.front ());
 }
 
-/** switching is what the board needs between two masks. */
+/** switching is the time that the board needs between two masks. */
 const char *const kPreset = "sequential:2x2,switching=250us";
 
 Result<std::unique_ptr<Dmd>>
@@ -88,7 +89,7 @@ TEST (LightcrafterBytes, AMaskIsOnePacket)
 {
   const Image<std::uint8_t> mirrors (608, 684);
   Bytes payload{0};
-  append (payload, encode_bitmap (mirrors.view ()));
+  append (payload, encode_bitmap (rows_of (mirrors)));
   const auto packets = encode_message (PacketType::write, 0x0401, payload);
   ASSERT_EQ (packets.size (), 1u);
   EXPECT_EQ (
@@ -101,7 +102,7 @@ TEST (PlaneBitmap, HasThePlanesInTheChannelsOfTheController)
   PlaneImage planes (1, 2);
   planes.at (0, 0) = 1 << 0 | 1 << 9;
   planes.at (0, 1) = 1 << 18;
-  const Bytes file = encode_plane_bitmap (planes.view ());
+  const Bytes file = encode_plane_bitmap (rows_of (planes));
   ASSERT_EQ (file.size (), 54u + 2 * 4);
   EXPECT_EQ (to_hex (ByteView (file).first (2)), "42 4D");
   EXPECT_EQ (to_hex (ByteView (file).subspan (54)), "04 00 00 00 00 01 02 00");
@@ -137,8 +138,8 @@ TEST_P (LightcrafterLayouts, MasksArriveMirrorByMirror)
   ASSERT_EQ (masks.size (), 4u);
   Image<std::uint8_t> expected (608, 684);
   for (const auto &[index, mirrors] : masks) {
-    render_mirrors (
-        schedule, index, {*parse_layout (GetParam ()), {}}, expected.view ());
+    expected_mask (
+        schedule, index, expected.view (), {*parse_layout (GetParam ()), {}});
     EXPECT_TRUE (mirrors == expected) << index;
   }
   dmd->reset ();

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Mappings: places both ways, what they say of a bench, their JSON form. */
-#include "schedule/mapping.h"
+/* Mappings: both directions, the derived pose, and the JSON form. */
+#include "mapping/mapping.h"
 
 #include <cmath>
 #include <cstdio>
@@ -8,9 +8,9 @@
 
 #include <gtest/gtest.h>
 
-#include "schedule/stream_setup.h"
+#include "mapping/stream_setup.h"
 
-using namespace cexp;
+using namespace codedexposure;
 
 namespace
 {
@@ -33,7 +33,7 @@ refusal (Mapping::Parts parts)
   return mapping.ok () ? "" : mapping.error ().message;
 }
 
-/** Turned by @p degrees, @p scale pixels a mirror, centre on centre. */
+/** Rotated by @p degrees, @p scale pixels per mirror, centre on centre. */
 Homography
 turned (double degrees, double scale, double shift_x = 0, double shift_y = 0)
 {
@@ -81,7 +81,7 @@ TEST (Mapping, OfTheSameSizeIsTheIdentity)
   const Mapping mapping (kCamera);
   EXPECT_EQ (mapping.mirror_at (12.25, 7.5), (Position{12.25, 7.5}));
   EXPECT_TRUE (mapping.one_to_one ());
-  EXPECT_EQ (mapping.stance ().magnification, 1.0);
+  EXPECT_EQ (mapping.pose ().magnification, 1.0);
   EXPECT_FALSE (made ({kCamera, kMirrors, turned (0, 1, 0.25)}).one_to_one ());
   EXPECT_TRUE (made ({kCamera, kMirrors, turned (0, 1, 0.04)}).one_to_one ());
   EXPECT_FALSE (
@@ -90,8 +90,8 @@ TEST (Mapping, OfTheSameSizeIsTheIdentity)
 
 TEST (Mapping, SaysHowTheCameraStands)
 {
-  const Stance s =
-      made ({kCamera, kMirrors, turned (0.5, 1.01, 3.25, -2)}).stance ();
+  const Pose s =
+      made ({kCamera, kMirrors, turned (0.5, 1.01, 3.25, -2)}).pose ();
   EXPECT_NEAR (s.shift_x, 3.25, 1e-9);
   EXPECT_NEAR (s.shift_y, -2.0, 1e-9);
   EXPECT_NEAR (s.rotation, 0.5, 1e-12);
@@ -102,8 +102,8 @@ TEST (Mapping, SaysHowTheCameraStands)
 
 TEST (Mapping, TellsAFlipAndAStretch)
 {
-  const Stance s =
-      made ({kCamera, kMirrors, {-1.02, 0, 900, 0, 1, 96, 0, 0, 1}}).stance ();
+  const Pose s =
+      made ({kCamera, kMirrors, {-1.02, 0, 900, 0, 1, 96, 0, 0, 1}}).pose ();
   EXPECT_TRUE (s.flipped);
   EXPECT_NEAR (s.rotation, 0.0, 1e-12);
   EXPECT_NEAR (s.stretch, 0.02, 1e-12);
@@ -172,6 +172,23 @@ TEST (Mapping, SlopeIsThatOfThePlaces)
   EXPECT_NEAR (slope[2], r.y - l.y, 1e-7);
 }
 
+TEST (Mapping, SlopeFollowsTheDisplacement)
+{
+  Mapping::Parts parts = {
+      {101, 201}, {101, 201}, {0.98, 0.03, 5, -0.02, 1.01, 7, 0, 0, 1}};
+  parts.displacement = {2, 3, {0, 1, 2, -1, 0, 3}, {4, 1, 0, 2, 5, -2}};
+  const Mapping mapping = made (parts);
+  const auto slope = mapping.slope_at (40, 70);
+  const Position left = mapping.mirror_at (39.5, 70);
+  const Position right = mapping.mirror_at (40.5, 70);
+  const Position up = mapping.mirror_at (40, 69.5);
+  const Position down = mapping.mirror_at (40, 70.5);
+  EXPECT_NEAR (slope[0], right.x - left.x, 1e-9);
+  EXPECT_NEAR (slope[1], down.x - up.x, 1e-9);
+  EXPECT_NEAR (slope[2], right.y - left.y, 1e-9);
+  EXPECT_NEAR (slope[3], down.y - up.y, 1e-9);
+}
+
 TEST (Mapping, CentredFormIsTheSameMapping)
 {
   const Mapping mapping = made (
@@ -193,12 +210,7 @@ TEST (Mapping, UncertaintyOfAShiftAndATurn)
   covariance[1 * 8 + 1] = 0.02 * 0.02; // of x against y
   parts.covariance = covariance;
   const Mapping mapping = made (parts);
-  EXPECT_NEAR (mapping.sigma_at (383.5, 287.5).x, 0.01, 1e-12);
-  EXPECT_NEAR (mapping.sigma_at (383.5, 287.5).y, 0.0, 1e-12);
-  /* One r below the centre both count. */
-  EXPECT_NEAR (mapping.sigma_at (383.5, 287.5 + 383.5).x,
-      std::hypot (0.01, 0.02), 1e-12);
-  const Stance sigma = mapping.stance_sigma ();
+  const Pose sigma = mapping.pose_sigma ();
   EXPECT_NEAR (sigma.shift_x, 0.01, 1e-12);
   EXPECT_NEAR (sigma.rotation, 0.01 / 383.5 * 180 / std::numbers::pi, 1e-7);
   EXPECT_NEAR (sigma.magnification, 0.0, 1e-7);

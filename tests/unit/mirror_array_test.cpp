@@ -8,10 +8,11 @@
 
 #include <gtest/gtest.h>
 
-#include "dmd/mirror_array.h"
-#include "dmd/plane_image.h"
+#include "diamond.h"
+#include "mirrors.h"
 
-using namespace cexp;
+using namespace codedexposure;
+using namespace codedexposure::test;
 
 namespace
 {
@@ -19,7 +20,7 @@ namespace
 constexpr Extent kSmallDiamond{12, 24};
 
 double
-distance (MirrorPoint a, MirrorPoint b)
+distance (Position a, Position b)
 {
   return std::hypot (a.x - b.x, a.y - b.y);
 }
@@ -40,7 +41,7 @@ groups_of (MirrorLayout layout)
   return groups;
 }
 
-MirrorPoint
+Position
 diamond_position (Offset address)
 {
   return mirror_position (Array::diamond, address.x, address.y);
@@ -58,10 +59,10 @@ parsed (const char *preset)
 
 TEST (MirrorPosition, RowsOfADiamondLieHalfAColumnApartAndAreShifted)
 {
-  const MirrorPoint even = mirror_position (Array::diamond, 3, 4);
+  const Position even = mirror_position (Array::diamond, 3, 4);
   EXPECT_EQ (even.x, 3.0);
   EXPECT_EQ (even.y, 2.0);
-  const MirrorPoint odd = mirror_position (Array::diamond, 3, 5);
+  const Position odd = mirror_position (Array::diamond, 3, 5);
   EXPECT_EQ (odd.x, 3.5);
   EXPECT_EQ (odd.y, 2.5);
   EXPECT_EQ (mirror_position (Array::diamond, 3, 5, -0.5).x, 2.5);
@@ -73,13 +74,13 @@ TEST (Lattice, IsTheDocumentsFormulaAndItsInverse)
 {
   for (int row = 0; row < 20; row++)
     for (int column = 0; column < 20; column++) {
-      const LatticePoint point = lattice_of (column, row);
-      EXPECT_EQ (point.u, column + int (std::ceil (row / 2.0)));
-      EXPECT_EQ (point.v, column - int (std::floor (row / 2.0)));
+      const Offset point = lattice_of (column, row);
+      EXPECT_EQ (point.x, column + int (std::ceil (row / 2.0)));
+      EXPECT_EQ (point.y, column - int (std::floor (row / 2.0)));
       EXPECT_EQ (address_of (point), (Offset{column, row}));
-      const MirrorPoint at = diamond_position ({column, row});
-      EXPECT_EQ (at.x, (point.u + point.v) / 2.0);
-      EXPECT_EQ (at.y, (point.u - point.v) / 2.0);
+      const Position at = diamond_position ({column, row});
+      EXPECT_EQ (at.x, (point.x + point.y) / 2.0);
+      EXPECT_EQ (at.y, (point.x - point.y) / 2.0);
     }
 }
 
@@ -87,14 +88,13 @@ TEST (Lattice, OddRowsMayBeShiftedToTheLeft)
 {
   for (int row = 0; row < 20; row++)
     for (int column = 0; column < 20; column++) {
-      const LatticePoint point = lattice_of (column, row, true);
+      const Offset point = lattice_of (column, row, true);
       EXPECT_EQ (address_of (point, true), (Offset{column, row}));
-      const MirrorPoint at =
-          mirror_position (Array::diamond, column, row, -0.5);
-      EXPECT_EQ (at.x, (point.u + point.v) / 2.0);
-      EXPECT_EQ (at.y, (point.u - point.v) / 2.0);
+      const Position at = mirror_position (Array::diamond, column, row, -0.5);
+      EXPECT_EQ (at.x, (point.x + point.y) / 2.0);
+      EXPECT_EQ (at.y, (point.x - point.y) / 2.0);
       EXPECT_EQ (tile_pixel (MirrorLayout::lattice, column, row, true),
-          (Offset{point.u, point.v}));
+          (Offset{point.x, point.y}));
     }
 }
 
@@ -102,10 +102,9 @@ TEST (Lattice, NeighboursShareAnEdge)
 {
   const double edge = std::sqrt (0.5);
   for (const Offset address : {Offset{5, 8}, Offset{5, 9}}) {
-    const LatticePoint at = lattice_of (address.x, address.y);
-    for (const LatticePoint next :
-        {LatticePoint{at.u + 1, at.v}, LatticePoint{at.u - 1, at.v},
-            LatticePoint{at.u, at.v + 1}, LatticePoint{at.u, at.v - 1}})
+    const Offset at = lattice_of (address.x, address.y);
+    for (const Offset next : {Offset{at.x + 1, at.y}, Offset{at.x - 1, at.y},
+             Offset{at.x, at.y + 1}, Offset{at.x, at.y - 1}})
       EXPECT_DOUBLE_EQ (distance (diamond_position (address),
                             diamond_position (address_of (next))),
           edge);
@@ -173,17 +172,15 @@ TEST (GroupsOnADiamond, CellsAreFourRowsOfTwoMirrors)
 
 TEST (Placement, RegionsAreReadAndChecked)
 {
-  EXPECT_EQ (*MirrorRegion::parse ("768x576+576+252"),
-      (MirrorRegion{{768, 576}, {576, 252}}));
-  EXPECT_EQ (*MirrorRegion::parse ("8x4"), (MirrorRegion{{8, 4}, {0, 0}}));
+  EXPECT_EQ (*parse_region ("768x576+576+252"), (Rect{576, 252, 768, 576}));
+  EXPECT_EQ (*parse_region ("8x4"), (Rect{0, 0, 8, 4}));
   for (const char *wrong :
       {"", "8", "8x", "x8", "0x4", "8x4+1", "8x4+1+-1", "8x4+1+1+1", "8x4 "})
-    EXPECT_FALSE (MirrorRegion::parse (wrong).ok ()) << wrong;
+    EXPECT_FALSE (parse_region (wrong).ok ()) << wrong;
 
   const auto check = [] (const char *region, Array array) {
     return check_placement (
-        {MirrorLayout::address, *MirrorRegion::parse (region)}, array,
-        {912, 1140});
+        {MirrorLayout::address, *parse_region (region)}, array, {912, 1140});
   };
   EXPECT_TRUE (check ("912x1140", Array::diamond).ok ());
   EXPECT_FALSE (check ("912x1140+0+2", Array::diamond).ok ());
@@ -199,15 +196,22 @@ class RenderedMirrors : public ::testing::TestWithParam<const char *>
 {
 };
 
-TEST_P (RenderedMirrors, InAddressOrderAreTheSchedulesMasks)
+TEST_P (RenderedMirrors, AreTheSchedulesMaskMirrorByMirror)
 {
   const Schedule schedule = parsed (GetParam ());
-  Image<std::uint8_t> expected (40, 30), mirrors (40, 30);
-  for (int mask = 0; mask < schedule.masks (); mask++) {
-    render_mask (schedule, mask, expected.view ());
-    render_mirrors (schedule, mask, {}, mirrors.view ());
-    EXPECT_EQ (mirrors, expected) << mask;
-  }
+  for (const MirrorLayout layout :
+      {MirrorLayout::address, MirrorLayout::lattice, MirrorLayout::cell})
+    for (const bool odd_rows_left : {false, true})
+      for (const auto region : {std::optional<Rect> (), {Rect{6, 4, 30, 20}}}) {
+        const Placement placement{layout, region, odd_rows_left};
+        const MaskRenderer renderer (schedule, {40, 30}, placement);
+        Image<std::uint8_t> expected (40, 30);
+        for (int mask = 0; mask < schedule.masks (); mask++) {
+          expected_mask (schedule, mask, expected.view (), placement);
+          EXPECT_EQ (renderer.render (mask).image (), expected)
+              << layout_text (layout) << " " << mask;
+        }
+      }
 }
 
 TEST_P (RenderedMirrors, ComeBackFromTheirPlanes)
@@ -215,18 +219,19 @@ TEST_P (RenderedMirrors, ComeBackFromTheirPlanes)
   const Schedule schedule = parsed (GetParam ());
   for (const MirrorLayout layout :
       {MirrorLayout::address, MirrorLayout::lattice, MirrorLayout::cell}) {
-    const Placement placement{layout, MirrorRegion{{30, 20}, {6, 4}}};
+    const Placement placement{layout, Rect{6, 4, 30, 20}};
     const PlanePlan plan = plan_planes (schedule);
     ASSERT_EQ (int (plan.masks.size ()), schedule.masks ());
     EXPECT_EQ (plan.images, (schedule.masks () + 23) / 24);
     std::vector<PlaneImage> images;
     for (int image = 0; image < plan.images; image++)
       images.push_back (
-          render_planes (schedule, plan, image, placement, {40, 30}));
+          rendered_planes (schedule, plan, image, {40, 30}, placement)
+              .image ());
     Image<std::uint8_t> mirrors (40, 30), plane (40, 30);
     for (int mask = 0; mask < schedule.masks (); mask++) {
       const PlaneSlot slot = plan.masks[std::size_t (mask)];
-      render_mirrors (schedule, mask, placement, mirrors.view ());
+      expected_mask (schedule, mask, mirrors.view (), placement);
       for (int y = 0; y < 30; y++)
         for (int x = 0; x < 40; x++)
           plane.at (x, y) =
@@ -239,7 +244,9 @@ TEST_P (RenderedMirrors, ComeBackFromTheirPlanes)
 INSTANTIATE_TEST_SUITE_P (OfSchedules, RenderedMirrors,
     ::testing::Values ("sequential:2x2", "staircase:2x2,pilot=4",
         "sequential:lattice:8/3,order=bit-reversal", "s-matrix:7x1",
-        "sequential:6x5,phase=3/1",
+        "sequential:6x5,phase=3/1", "sequential:diamond:13",
+        "staircase:3x2,phase=2/1", "sequential:4x4,pilot=4",
+        "sequential:2x2,pilot=6,region=9x8+3+17:staircase:3x2",
         "sequential:2x2,pilot=4,region=8x6+6+4:sequential:4x2,region=6x4+20+9:"
         "staircase:3x2"));
 
@@ -259,7 +266,7 @@ TEST (PlaneOrder, KeepsMasksOfNeighbouringRowsInOneImage)
   ASSERT_EQ (plan.images, 3);
   for (int index = 0; index < plan.images; index++) {
     const PlaneImage image =
-        render_planes (schedule, plan, index, {}, {64, 64});
+        rendered_planes (schedule, plan, index, {64, 64}).image ();
     int lit_rows = 0;
     for (int y = 0; y < 8; y++)
       lit_rows += image.at (0, y) != 0;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The optical bench: what a coded frame holds of the scene, to the number. */
-#include "optics/bench.h"
+/* The simulated bench: exact pixel values of coded frames. */
+#include "bench/bench.h"
 
 #include <cmath>
 #include <functional>
@@ -9,13 +9,12 @@
 
 #include <gtest/gtest.h>
 
-#include "optics/light_share.h"
-#include "optics/mirror_rows.h"
+#include "bench/light_share.h"
 
 namespace
 {
 
-using namespace cexp;
+using namespace codedexposure;
 
 Schedule
 schedule (const char *preset)
@@ -90,12 +89,12 @@ expect_exact (const Schedule &schedule)
   const Image<Pixel> coded = coded_frame<Pixel> (ideal, schedule, width, height,
       [&] (int slot) { return scene<Pixel> (width, height, slot); });
 
-  const int budget = schedule.max_open_slots ();
+  const int budget = schedule.max_on_slots ();
   for (int y = 0; y < height; y++)
     for (int x = 0; x < width; x++) {
       std::int64_t light = 0;
       for (int slot = 0; slot < slots; slot++)
-        if (schedule.open (x, y, slot))
+        if (schedule.on (x, y, slot))
           light += scene<Pixel> (width, height, slot).at (x, y);
       ASSERT_EQ (coded.at (x, y), (2 * light + budget) / (2 * budget))
           << "at " << x << ", " << y;
@@ -153,10 +152,10 @@ TEST (Bench, WhiteIsWhiteWithLeakAndEveryCode)
     OpticalBench ideal = bench (18, 14);
     const Image<std::uint8_t> coded =
         still (ideal, code, flat<std::uint8_t> (18, 14, 255));
-    const int most = code.code ().max_open_slots ();
+    const int most = code.code ().max_on_slots ();
     for (int y = 0; y < 14; y++)
       for (int x = 0; x < 18; x++)
-        if (code.code ().open_slots (code.element_at (x, y)) == most) {
+        if (code.code ().on_slots (code.element_at (x, y)) == most) {
           ASSERT_EQ (coded.at (x, y), 255);
         }
   }
@@ -248,29 +247,6 @@ TEST (Bench, SaysWhichOptionIsWrong)
   EXPECT_FALSE (OpticalBench::make (0, 4, {}));
 }
 
-TEST (MirrorRows, AreTheRenderedMask)
-{
-  for (const char *preset : {"staircase:3x2,phase=2/1",
-           "sequential:lattice:8/3,order=bit-reversal", "sequential:diamond:13",
-           "sequential:2x2,pilot=6", "sequential:4x4,pilot=4",
-           "sequential:2x2,pilot=6,region=9x8+3+17:staircase:3x2"}) {
-    SCOPED_TRACE (preset);
-    const Schedule code = schedule (preset);
-    const int width = 29, height = 31;
-    MirrorRows rows (code, width, height);
-    Image<std::uint8_t> mask (width, height);
-    for (int m = -1; m < code.masks (); m++) {
-      if (m >= 0)
-        render_mask (code, m, mask.view ());
-      rows.show (m);
-      for (int y = 0; y < height; y++)
-        ASSERT_TRUE (std::equal (
-            rows.row (y), rows.row (y) + width, mask.view ().row (y)))
-            << "mask " << m << " row " << y;
-    }
-  }
-}
-
 SlotPlan
 plan (const Timing &timing, int slots, FrameRate rate)
 {
@@ -345,7 +321,7 @@ TEST (LightShare, EverySlotGetsAllItsLight)
     }
 }
 
-/* Bench of one open mask: what the lens makes of a picture. */
+/* A bench with one mask that is on everywhere: the picture after the lens. */
 Image<std::uint8_t>
 seen (const Image<std::uint8_t> &picture, const Alignment &alignment,
     double psf_sigma = 0.0)
@@ -471,7 +447,7 @@ TEST (Lens, TiltAndDistortionMoveWhatIsSeen)
 
 TEST (Lens, ABlurReachesBeyondTheFrame)
 {
-  /* All mirrors are bright, and the camera looks at their middle. */
+  /* All mirrors are bright, and the camera sees their middle. */
   Image<float> mirrors (64, 64), seen (64, 64);
   for (int y = 0; y < 64; y++)
     for (int x = 0; x < 64; x++)
@@ -485,9 +461,9 @@ TEST (Lens, ABlurReachesBeyondTheFrame)
 
 TEST (Lens, MappingSaysWhereEachPixelLooks)
 {
-  const Affine m = camera_to_mirrors ({1.5, -2.5, 90.0, 2.0}, 101, 51);
+  const Homography m = camera_to_mirrors ({1.5, -2.5, 90.0, 2.0}, 101, 51);
   const auto look = [&m] (double x, double y) {
-    return std::pair (m.xx * x + m.xy * y + m.x0, m.yx * x + m.yy * y + m.y0);
+    return std::pair (m[0] * x + m[1] * y + m[2], m[3] * x + m[4] * y + m[5]);
   };
   EXPECT_NEAR (look (50, 25).first, 51.5, 1e-12);
   EXPECT_NEAR (look (50, 25).second, 22.5, 1e-12);
@@ -508,9 +484,9 @@ TEST (Lens, FlatLightStaysFlatAwayFromTheBorder)
     }
 }
 
-/* What a pixel sees @u mirrors from the centre of a wave of @f periods a
- * mirror. Mirrors show the wave's samples, so that all of f + k are there; each
- * passes the mirror's box, the Gaussian and the pixel's box. */
+/* The light of a pixel @u mirrors from the centre of a wave of @f periods per
+ * mirror. Mirrors show samples of the wave, so all frequencies f + k occur;
+ * each passes the box of the mirror, the Gaussian and the box of the pixel. */
 double
 wave_seen (double u, double f, double sigma, double scale)
 {
@@ -533,7 +509,7 @@ TEST (Lens, ShowsWavesAsTheoryDemands)
   const int side = 81, centre = side / 2;
   for (const Alignment &alignment : {Alignment{}, Alignment{0.3, 0.0, 0.0, 1.0},
            Alignment{0.3, 0.1, 2.0, 0.98}, Alignment{-1.7, 0.4, -1.0, 1.02}}) {
-    const Affine m = camera_to_mirrors (alignment, side, side);
+    const Homography m = camera_to_mirrors (alignment, side, side);
     for (const double sigma : {0.3, 0.5, 0.7, 2.5})
       for (const double f : {0.03, 0.125, 0.25}) {
         Lens lens (alignment, sigma, side, side);
@@ -541,7 +517,7 @@ TEST (Lens, ShowsWavesAsTheoryDemands)
         lens.image (waves (side, side, f).view (), out.view ());
         for (int y = centre - 10; y <= centre + 10; y++)
           for (int x = centre - 10; x <= centre + 10; x++) {
-            const double u = m.xx * x + m.xy * y + m.x0 - centre;
+            const double u = m[0] * x + m[1] * y + m[2] - centre;
             ASSERT_NEAR (
                 out.at (x, y), wave_seen (u, f, sigma, alignment.scale), 5e-4)
                 << "sigma " << sigma << " f " << f << " scale "

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Packed grey values: known bytes, the oracle, and there and back. */
+/* Packed grey values: known bytes, the reference, and both directions. */
 #include <random>
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include "camera/packed_mono.h"
+#include "base/packed_mono.h"
 
-using namespace cexp;
+using namespace codedexposure;
 
 namespace
 {
@@ -33,6 +33,27 @@ unpacked (MonoFormat format, const Bytes &bytes, int width)
       unpack_mono (format, rows_of (bytes), {out.data (), width, 1, 2 * width});
   EXPECT_TRUE (done.ok ());
   return out;
+}
+
+/** One pixel of a packed row, bit by bit: what unpack_mono () must match. */
+std::uint16_t
+packed_pixel (MonoFormat format, const std::uint8_t *row, int x)
+{
+  const int bits = significant_bits (format);
+  const bool triples = format == MonoFormat::mono10_packed ||
+                       format == MonoFormat::mono12_packed;
+  std::uint16_t value = 0;
+  for (int bit = 0; bit < bits; bit++) {
+    int at = x * stored_bits (format) + bit;
+    if (triples) {
+      const int low = bits - 8;
+      const int first = x / 2 * 24;
+      at = bit < low ? first + 8 + x % 2 * 4 + bit
+                     : first + x % 2 * 16 + bit - low;
+    }
+    value = std::uint16_t (value | (row[at / 8] >> (at % 8) & 1) << bit);
+  }
+  return value;
 }
 
 } // namespace

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* What is laid over the picture, and the report. */
+/* The overlay of the picture, and the report. */
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -7,10 +7,10 @@
 
 #include <gtest/gtest.h>
 
-#include "overlay/panel.h"
-#include "overlay/report.h"
+#include "moirecalib/panel.h"
+#include "moirecalib/report.h"
 
-using namespace cexp;
+using namespace codedexposure;
 
 namespace
 {

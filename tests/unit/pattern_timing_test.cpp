@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Slots in whole microseconds, within what controllers and triggers leave. */
+/* Slots in whole microseconds, within the limits of controllers and triggers.
+ */
 #include <gtest/gtest.h>
 
 #include "dmd/pattern_timing.h"
 
-using namespace cexp;
+using namespace codedexposure;
 
 namespace
 {
@@ -110,5 +111,7 @@ TEST (PatternTiming, OneMaskInTheFirstSlotsIsDarkInTheOthers)
   EXPECT_EQ (first_patterns (times, 1, 105), (PatternTime{9800, 30200}));
   EXPECT_EQ (first_patterns (times, 3, 105), (PatternTime{29800, 10200}));
   EXPECT_EQ (first_patterns (times, 4, 105), (PatternTime{39800, 200}));
+  EXPECT_EQ (first_patterns (times, 4, 200), (PatternTime{39800, 200}));
+  EXPECT_EQ (first_patterns (times, 4, 201), (PatternTime{40000, 0}));
   EXPECT_EQ (first_patterns (times, 4, 300), (PatternTime{40000, 0}));
 }

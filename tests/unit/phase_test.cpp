@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The phase of the masks, read from frames that a small bench exposes. */
+/* Synchronisation of the masks, measured from frames of a small bench. */
 #include <cmath>
 #include <deque>
 #include <functional>
@@ -7,14 +7,14 @@
 
 #include <gtest/gtest.h>
 
-#include "clock/phase_lock.h"
-#include "clock/phase_watch.h"
-#include "dmd/simulated_dmd.h"
-#include "optics/bench.h"
+#include "bench/bench.h"
+#include "bench/simulated_dmd.h"
 #include "scenes.h"
+#include "sync/phase_lock.h"
+#include "sync/phase_watch.h"
 
-using namespace cexp;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::test;
 
 namespace
 {
@@ -32,7 +32,7 @@ schedule_of (const char *preset)
 constexpr int kWidth = 96;
 constexpr int kHeight = 72;
 
-/** A camera that looks at a scene through the masks of simulated mirrors. */
+/** A camera that sees a scene through the masks of simulated mirrors. */
 class Camera
 {
 public:
@@ -233,7 +233,7 @@ TEST (PilotPhase, ReadsEveryPhaseOfEverySchedule)
     const int slots = schedule_of (preset).slots ();
     for (int by = -slots; by <= slots; by++) {
       SCOPED_TRACE (testing::Message () << preset << " slip " << by);
-      /* At a border of two exposures, where only the pilot sees it. */
+      /* Exactly between two exposures, where only the pilot shows it. */
       const auto seen = sights (preset, moving, 8, 4 * slots, by);
       const int late = floor_mod (by, slots);
       for (int f = 0; f < 8; f++) {
@@ -294,15 +294,15 @@ TEST (PhaseWatch, SeesParkedMirrors)
 namespace
 {
 
-/** What became of a run of frames between camera and lock. */
+/** The result of a run. */
 struct Course {
   int slips = 0;
   int locks = 0;
   std::optional<std::uint64_t> noticed; // first frame that is not locked
-  std::uint64_t said = 0;               // frame on which the slip was said
-  std::uint64_t first_frame = 0;        // in which it was seen, as was said
+  std::uint64_t said = 0;               // frame that reported the slip
+  std::uint64_t first_frame = 0;        // frame of the slip, as reported
   std::uint64_t relocked = 0;
-  int wrongly_locked = 0; // frames out of phase after the slip was noticed
+  int wrongly_locked = 0; // frames without synchronisation after the detection
 };
 
 /**

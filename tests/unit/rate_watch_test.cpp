@@ -1,17 +1,17 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The rate of frames against the one that was said. */
+/* The measured frame rate, compared with that of the caps. */
 #include <random>
 
 #include <gtest/gtest.h>
 
-#include "clock/rate_watch.h"
+#include "sync/rate_watch.h"
 
-using namespace cexp;
+using namespace codedexposure;
 
 namespace
 {
 
-/* What is told of frames of one rate with jitter and losses. */
+/* The report for frames of one rate with jitter and losses. */
 std::vector<double>
 told (FrameRate said, FrameRate real, double jitter_ms, double loss)
 {

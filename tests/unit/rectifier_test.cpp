@@ -1,14 +1,15 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Frames of a misaligned camera, brought back to the mirrors. */
-#include "moire/rectifier.h"
+/* Frames of a misaligned camera, resampled to the mirrors. */
+#include "rectify/rectifier.h"
 
 #include <cmath>
 
 #include <gtest/gtest.h>
 
-#include "optics/bench.h"
+#include "bench/bench.h"
+#include "estimate/mirror_share.h"
 
-using namespace cexp;
+using namespace codedexposure;
 
 namespace
 {
@@ -24,9 +25,8 @@ schedule_of (const char *preset)
 Mapping
 mapping_of (const Alignment &alignment, double psf_sigma = 0.0)
 {
-  const Affine t = camera_to_mirrors (alignment, kSize.width, kSize.height);
   Mapping::Parts parts = {
-      kSize, kSize, {t.xx, t.xy, t.x0, t.yx, t.yy, t.y0, 0, 0, 1}};
+      kSize, kSize, camera_to_mirrors (alignment, kSize.width, kSize.height)};
   parts.psf_sigma = psf_sigma;
   return *Mapping::make (parts);
 }
@@ -35,13 +35,13 @@ mapping_of (const Alignment &alignment, double psf_sigma = 0.0)
 Homography
 homography_of (const Alignment &alignment)
 {
-  const Affine m = camera_to_mirrors (alignment, kSize.width, kSize.height);
+  const Homography m = camera_to_mirrors (alignment, kSize.width, kSize.height);
   const double cx = 0.5 * (kSize.width - 1), cy = 0.5 * (kSize.height - 1);
   const double zx = alignment.tilt_x / cx, zy = alignment.tilt_y / cy;
   const double z0 = 1.0 - alignment.tilt_x - alignment.tilt_y;
   const double x0 = cx + alignment.shift_x, y0 = cy + alignment.shift_y;
-  return {x0 * zx + m.xx, x0 * zy + m.xy, x0 * z0 - m.xx * cx - m.xy * cy,
-      y0 * zx + m.yx, y0 * zy + m.yy, y0 * z0 - m.yx * cx - m.yy * cy, zx, zy,
+  return {x0 * zx + m[0], x0 * zy + m[1], x0 * z0 - m[0] * cx - m[1] * cy,
+      y0 * zx + m[3], y0 * zy + m[4], y0 * z0 - m[3] * cx - m[4] * cy, zx, zy,
       z0};
 }
 
@@ -76,7 +76,7 @@ rectified (const Rectifier &rectifier, const Image<std::uint8_t> &frame)
 {
   Image<std::uint8_t> mirrors (
       rectifier.mirrors ().width, rectifier.mirrors ().height);
-  rectifier.run (frame.view (), mirrors.view ());
+  EXPECT_TRUE (rectifier.run (frame.view (), mirrors.view ()));
   return mirrors;
 }
 
@@ -221,7 +221,7 @@ TEST (Rectifier, TakesNinePixelsAMirror)
     for (int x = 35; x < 61; x++)
       ASSERT_NEAR (mirrors.at (x, y), aligned.at (x, y), 3) << x << ' ' << y;
 
-  /* All nine see the light, so that their noise averages out. */
+  /* All nine pixels see the light, so their noise averages out. */
   double alone = 0.0, together = 0.0;
   for (const auto &[at, squares] :
       {std::pair (Alignment (), &alone), std::pair (alignment, &together)}) {
@@ -269,17 +269,72 @@ TEST (Rectifier, RowsAreThoseOfTheWhole)
   const auto whole = rectified (rectifier, frame);
   Image<std::uint8_t> parts (kSize.width, kSize.height);
   for (int y = 0; y < kSize.height; y += 16)
-    rectifier.run_rows (frame.view (), parts.view (), y, 16);
+    EXPECT_TRUE (rectifier.run_rows (frame.view (), parts.view (), y, 16));
   EXPECT_EQ (parts, whole);
 
   Image<std::uint16_t> wide (kSize.width, kSize.height), out = wide;
   for (int y = 0; y < kSize.height; y++)
     for (int x = 0; x < kSize.width; x++)
       wide.at (x, y) = frame.at (x, y);
-  rectifier.run (std::as_const (wide).view (), out.view (), 255);
+  EXPECT_TRUE (rectifier.run (std::as_const (wide).view (), out.view (), 255));
   for (int y = 0; y < kSize.height; y++)
     for (int x = 0; x < kSize.width; x++)
       ASSERT_EQ (out.at (x, y), whole.at (x, y));
+}
+
+TEST (Rectifier, NothingComesOverFromTheOtherSideOfTheFrame)
+{
+  const Schedule schedule = schedule_of ("sequential:2x2");
+  for (const double scale : {1.01, 2.0, 3.0}) {
+    const Alignment alignment = {0.4, 0.4, 0.5, scale};
+    const auto rectifier = made (mapping_of (alignment), schedule);
+    const auto frame = coded (alignment, schedule);
+    const auto mirrors = rectified (rectifier, frame);
+    for (const bool columns : {true, false}) {
+      const int length = columns ? kSize.width : kSize.height;
+      for (const bool low : {true, false}) {
+        Image<std::uint8_t> lit = frame;
+        for (int y = 0; y < kSize.height; y++)
+          for (int x = 0; x < kSize.width; x++)
+            if (const int at = columns ? x : y; low ? at < 8 : at >= length - 8)
+              lit.at (x, y) = 255;
+        const auto changed = rectified (rectifier, lit);
+        int differ = 0;
+        for (int y = 0; y < kSize.height; y++)
+          for (int x = 0; x < kSize.width; x++) {
+            const int at = columns ? x : y;
+            const bool far = low ? at >= length / 2 : at < length / 2;
+            const bool same = changed.at (x, y) == mirrors.at (x, y);
+            differ += !same;
+            ASSERT_TRUE (same || !far) << scale << ": " << x << ' ' << y;
+          }
+        EXPECT_GT (differ, 0);
+      }
+    }
+  }
+}
+
+/* Also with a large rotation; pixels are as large as mirrors. */
+TEST (Rectifier, MixedMirrorsAreThoseThatNoPixelLooksAt)
+{
+  const Mapping mapping = mapping_of ({0.3, 0.1, 20, 1});
+  const auto report = made (mapping, schedule_of ("sequential:2x2")).report ();
+  const auto share = [] (double across, double down) {
+    return mirror_share (across, 1, 0) * mirror_share (down, 1, 0);
+  };
+  int seen = 0, mixed = 0;
+  for (int y = 0; y < kSize.height; y++)
+    for (int x = 0; x < kSize.width; x++) {
+      const Position at = mapping.camera_at ({double (x), double (y)});
+      const double px = std::round (at.x), py = std::round (at.y);
+      if (px < 0 || py < 0 || px >= kSize.width || py >= kSize.height)
+        continue;
+      seen++;
+      const Position nearest = mapping.mirror_at (px, py);
+      mixed += share (nearest.x - x, nearest.y - y) < 0.6 * share (0, 0);
+    }
+  EXPECT_EQ (report.exact + report.weighted, std::uint64_t (seen));
+  EXPECT_NEAR (double (report.mixed), mixed, 0.01 * mixed);
 }
 
 TEST (Rectifier, RefusesWhatItCannotDo)
@@ -296,7 +351,7 @@ TEST (Rectifier, RefusesWhatItCannotDo)
       std::string::npos);
   const auto small = Rectifier::make (mapping_of ({0, 0, 0, 0.5}), schedule);
   ASSERT_FALSE (small.ok ());
-  EXPECT_EQ (small.error ().message,
-      "a mapping with 0.500000 pixels a mirror cannot be corrected; 0.75 to "
-      "3.5 can");
+  EXPECT_EQ (small.error ().message, "a mapping with 0.500000 pixels per "
+                                     "mirror cannot be corrected; use one of "
+                                     "0.75 to 3.5");
 }

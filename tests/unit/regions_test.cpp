@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Schedules with regions: what is accepted, which mirror is open when, and the
- * pictures that come out of each part. */
+/* Schedules with regions: valid ones, the states of mirrors, and the pictures
+ * of each part. */
 #include <algorithm>
 #include <memory>
 #include <optional>
@@ -10,16 +10,17 @@
 
 #include <gtest/gtest.h>
 
-#include "clock/phase_watch.h"
+#include "bench/bench.h"
 #include "dmd/dmd.h"
-#include "dmd/plane_image.h"
 #include "extract/extractor.h"
 #include "fuse/fuser.h"
-#include "optics/bench.h"
+#include "mirrors.h"
 #include "schedule/sample_grid.h"
 #include "schedule/schedule.h"
+#include "sync/phase_watch.h"
 
-using namespace cexp;
+using namespace codedexposure;
+using namespace codedexposure::test;
 
 namespace
 {
@@ -95,7 +96,7 @@ extract (const Schedule &part, ImageView<const std::uint8_t> coded,
   std::vector<ImageView<std::uint8_t>> views;
   for (auto &subframe : subframes)
     views.push_back (subframe.view ());
-  extractor->run (coded, views);
+  EXPECT_TRUE (extractor->run (coded, views));
   return subframes;
 }
 
@@ -161,13 +162,13 @@ TEST (Regions, HoldEachMaskAndBeginAtTheirOwnCorner)
   for (int slot = 0; slot < 24; slot++) {
     /* n = 4 holds each mask for 6 slots, n = 8 for 3, n = 6 for 4. */
     for (int place = 0; place < 4; place++)
-      EXPECT_EQ (schedule.open (2 + place % 2, 2 + place / 2, slot),
-          slot / 6 == place);
+      EXPECT_EQ (
+          schedule.on (2 + place % 2, 2 + place / 2, slot), slot / 6 == place);
     for (int place = 0; place < 8; place++)
-      EXPECT_EQ (schedule.open (8 + place % 4, 4 + place / 4, slot),
-          slot / 3 == place);
+      EXPECT_EQ (
+          schedule.on (8 + place % 4, 4 + place / 4, slot), slot / 3 == place);
     /* phase 1/1: the corner bears label 4, which is open in 5 of 6. */
-    EXPECT_EQ (schedule.open (30, 10, slot), slot / 4 <= 4);
+    EXPECT_EQ (schedule.on (30, 10, slot), slot / 4 <= 4);
   }
 }
 
@@ -175,23 +176,24 @@ TEST (Regions, MasksOfEveryMakingAgree)
 {
   const Schedule schedule = preset (std::string (kTwo) + ",pilot=3");
   constexpr int kWidth = 41, kHeight = 25;
-  Image<std::uint8_t> mirrors (kWidth, kHeight), placed (kWidth, kHeight);
+  Image<std::uint8_t> expected (kWidth, kHeight);
   const PlanePlan plan = plan_planes (schedule);
   std::set<std::pair<std::uint64_t, std::uint64_t>> digests;
   std::set<std::vector<std::uint8_t>> different;
   for (int mask = 0; mask < schedule.masks (); mask++) {
-    render_mask (schedule, mask, mirrors.view ());
-    render_mirrors (schedule, mask, {}, placed.view ());
-    ASSERT_EQ (mirrors, placed) << "mask " << mask;
+    const Image<std::uint8_t> mirrors =
+        rendered_mask (schedule, mask, {kWidth, kHeight});
+    expected_mask (schedule, mask, expected.view ());
+    ASSERT_EQ (mirrors, expected) << "mask " << mask;
     const PlaneSlot at = plan.masks[std::size_t (mask)];
     const PlaneImage planes =
-        render_planes (schedule, plan, at.image, {}, {kWidth, kHeight});
+        rendered_planes (schedule, plan, at.image, {kWidth, kHeight}).image ();
     for (int y = 0; y < kHeight; y++)
       for (int x = 0; x < kWidth; x++) {
         ASSERT_EQ (planes.at (x, y) >> at.plane & 1, mirrors.at (x, y))
             << "mask " << mask << " at " << x << ", " << y;
         if (y < kHeight - 3) {
-          ASSERT_EQ (mirrors.at (x, y), schedule.open (x, y, mask % 24));
+          ASSERT_EQ (mirrors.at (x, y), schedule.on (x, y, mask % 24));
         }
       }
     const PlaneDigest digest = digest_mask (schedule, mask);
@@ -208,12 +210,35 @@ TEST (Regions, MasksOfEveryMakingAgree)
 TEST (Regions, AreCutAtTheBordersOfSmallArrays)
 {
   const Schedule schedule = preset (kTwo);
-  Image<std::uint8_t> mirrors (12, 6);
   for (int mask = 0; mask < 24; mask++) {
-    render_mask (schedule, mask, mirrors.view ());
+    const Image<std::uint8_t> mirrors = rendered_mask (schedule, mask, {12, 6});
     for (int y = 0; y < 6; y++)
       for (int x = 0; x < 12; x++)
-        ASSERT_EQ (mirrors.at (x, y), schedule.open (x, y, mask));
+        ASSERT_EQ (mirrors.at (x, y), schedule.on (x, y, mask));
+  }
+}
+
+/* A mask that is shown for several slots also lights the pauses between them.
+ */
+TEST (Regions, HaveTheTimesOfTheirOwnMasks)
+{
+  const Schedule schedule = preset ("sequential:4x2,active=4ms,switching=1ms,"
+                                    "region=8x8+0+0:sequential:2x2,"
+                                    "region=8x8+8+0:staircase:2x1");
+  const auto plan = [] (const Schedule &part) {
+    return *SlotPlan::fit (part.timing (), part.slots (), {25, 1});
+  };
+  const SlotPlan whole = plan (schedule);
+  for (const Schedule &part :
+      {schedule.region (0), schedule.region (1), schedule.background ()}) {
+    const int held = schedule.slots () / part.slots ();
+    const SlotPlan own = plan (part);
+    for (int slot = 0; slot < part.slots (); slot++) {
+      EXPECT_EQ (own.start (slot), whole.start (slot * held));
+      EXPECT_EQ (own.start (slot) + own.active (),
+          whole.start (slot * held + held - 1) + whole.active ())
+          << part.text ();
+    }
   }
 }
 
@@ -332,7 +357,7 @@ TEST (Regions, SlipsShowInThePilotOnly)
       SlipObservable::always);
 }
 
-/* Each part gives what was in front of its pixels while they were open. */
+/* Each part gives the scene at its pixels while their mirrors were on. */
 TEST (Regions, PicturesOfEveryPartComeOut)
 {
   const Schedule schedule =
@@ -383,7 +408,7 @@ TEST (Regions, WhiteIsWhiteInEveryPart)
              pixels_of (schedule.regions ()[std::size_t (i)].rect, coded)))
       near_grey (subframe, {});
 
-  /* All of the background's cells but those of regions, which are black. */
+  /* All cells of the background; those that regions touch are black. */
   for (const auto &subframe : extract (schedule, coded.view ())) {
     EXPECT_EQ (subframe.at (4, 2), 0);
     EXPECT_EQ (subframe.at (11, 5), 0);
@@ -396,7 +421,7 @@ TEST (Regions, WhiteIsWhiteInEveryPart)
 namespace
 {
 
-/** Brightness that lasts and is linear over the frame. */
+/** Brightness that is constant in time and linear over the frame. */
 std::uint8_t
 ramp (int x, int y, int)
 {
@@ -426,8 +451,8 @@ TEST (Regions, CellsOfTheBackgroundThatTheyTouchAreBlack)
   }
 }
 
-/* A region is no border of the light: what the next cells have of it is left
- * out, and nothing else changes. */
+/* A region does not change the light: the parts of the next cells inside it are
+ * left out, and nothing else changes. */
 TEST (Regions, DecodeInterpolatesWithoutThem)
 {
   const Schedule plain = preset ("staircase:2x2");
@@ -455,7 +480,8 @@ TEST (Regions, DecodeInterpolatesWithoutThem)
           else
             EXPECT_EQ (value, whole) << x << ", " << y;
         }
-    /* At a corner of the region the plane through the others goes on. */
+    /* At a corner of the region, the plane through the other cells is
+     * extrapolated. */
     EXPECT_EQ (found[1].at (0, 1), wanted[1].at (0, 1));
     EXPECT_EQ (found[3].at (5, 6), wanted[3].at (5, 6));
   }
@@ -473,7 +499,7 @@ TEST (Regions, RowsOfTheBackgroundAreThoseOfTheWhole)
   for (auto &subframe : rows)
     views.push_back (subframe.view ());
   for (const auto &[first, count] : {std::pair (0, 3), {3, 1}, {4, 3}})
-    extractor->run_rows (coded.view (), views, first, count);
+    EXPECT_TRUE (extractor->run_rows (coded.view (), views, first, count));
   EXPECT_EQ (rows, whole);
 }
 
@@ -494,8 +520,8 @@ fused (const Schedule &schedule, int width, int height,
   for (auto &frame : frames)
     views.push_back (frame.view ());
   for (int i = 0; i < 3; i++) {
-    fuser->take (coded.view ());
-    fuser->fuse (views);
+    EXPECT_TRUE (fuser->take (coded.view ()));
+    EXPECT_TRUE (fuser->fuse (views));
   }
   return frames;
 }

@@ -1,17 +1,17 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The drawn scenes: the same at every run, and lit as they should be. */
+/* The drawn scenes: the same in every run, with the correct brightness. */
 #include <algorithm>
 #include <numeric>
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include "scene/scene.h"
+#include "bench/scene.h"
 
 namespace
 {
 
-using namespace cexp;
+using namespace codedexposure;
 
 constexpr Extent kSize{96, 72};
 

@@ -6,7 +6,7 @@
 
 #include "schedules.h"
 
-using namespace cexp;
+using namespace codedexposure;
 
 namespace
 {
@@ -14,7 +14,7 @@ namespace
 constexpr const char *kHead =
     R"({"format":"coded-exposure","version":1,"tile":"2x2","code":"sequential")";
 
-/** A good schedule with @p more keys. */
+/** A valid schedule with @p more keys. */
 std::string
 with (const std::string &more)
 {
@@ -228,7 +228,7 @@ TEST (ScheduleJson, WrongTextsAreNamed)
       {with_code (R"({"rows":[]})"), {"0 rows"}},
       {with_code (R"({"rows":["10","1"]})"), {"row 1", "1 slots"}},
       {with_code (R"({"rows":["10","0 "]})"), {"row 1", "'0 '"}},
-      {with_code (R"({"rows":["10","00"]})"), {"row 1", "never open"}},
+      {with_code (R"({"rows":["10","00"]})"), {"row 1", "never on"}},
       {with_code (R"({"rows":["100","010","001"]})"),
           {"'matrix' has 3", "'2x1' has 2"}},
       /* the rest */

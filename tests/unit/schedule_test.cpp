@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The schedule as a value, its masks and where its samples lie. */
+/* The schedule as a value, its masks and its sample positions. */
 #include "schedule/schedule.h"
 
 #include <cmath>
@@ -7,10 +7,11 @@
 
 #include <gtest/gtest.h>
 
-#include "schedule/pilot.h"
+#include "mirrors.h"
 #include "schedule/sample_grid.h"
 
-using namespace cexp;
+using namespace codedexposure;
+using namespace codedexposure::test;
 
 namespace
 {
@@ -35,14 +36,6 @@ parts_of (const char *tile, const char *code)
 {
   const Tile parsed = *Tile::parse (tile);
   return {parsed, *Code::named (code, parsed.elements ())};
-}
-
-Image<std::uint8_t>
-mask_of (const Schedule &schedule, int mask, Extent size)
-{
-  Image<std::uint8_t> image (size.width, size.height);
-  render_mask (schedule, mask, image.view ());
-  return image;
 }
 
 void
@@ -151,11 +144,11 @@ TEST (Mask, EveryMirrorFollowsTheCode)
     for (const Extent size : kSizes) {
       const int lit_rows = size.height - schedule.pilot_rows ();
       for (int mask = 0; mask < schedule.masks (); mask++) {
-        const auto image = mask_of (schedule, mask, size);
+        const auto image = rendered_mask (schedule, mask, size);
         for (int y = 0; y < lit_rows; y++)
           for (int x = 0; x < size.width; x++)
             ASSERT_EQ (image.at (x, y),
-                schedule.code ().open (
+                schedule.code ().on (
                     schedule.element_at (x, y), mask % schedule.slots ()))
                 << text << " mask " << mask << " mirror " << x << ", " << y;
       }
@@ -167,7 +160,7 @@ TEST (Mask, OfTheDefaultSchedule)
 {
   const Schedule schedule;
   for (int mask = 0; mask < 4; mask++) {
-    const auto image = mask_of (schedule, mask, {5, 3});
+    const auto image = rendered_mask (schedule, mask, {5, 3});
     for (int y = 0; y < 3; y++)
       for (int x = 0; x < 5; x++)
         EXPECT_EQ (image.at (x, y), x % 2 + 2 * (y % 2) == mask ? 1 : 0);
@@ -181,7 +174,7 @@ TEST (Mask, SumOverSlotsIsTheExposureOfTheElement)
     for (const Extent size : kSizes) {
       Image<int> sum (size.width, size.height);
       for (int mask = 0; mask < schedule.slots (); mask++) {
-        const auto image = mask_of (schedule, mask, size);
+        const auto image = rendered_mask (schedule, mask, size);
         for (int y = 0; y < size.height; y++)
           for (int x = 0; x < size.width; x++)
             sum.at (x, y) += image.at (x, y);
@@ -189,21 +182,10 @@ TEST (Mask, SumOverSlotsIsTheExposureOfTheElement)
       for (int y = 0; y < size.height - schedule.pilot_rows (); y++)
         for (int x = 0; x < size.width; x++)
           ASSERT_EQ (sum.at (x, y),
-              schedule.code ().open_slots (schedule.element_at (x, y)))
+              schedule.code ().on_slots (schedule.element_at (x, y)))
               << text;
     }
   }
-}
-
-TEST (Mask, WritesNothingOutsideItsRows)
-{
-  Image<std::uint8_t> image (8, 4);
-  for (int y = 0; y < 4; y++)
-    std::fill_n (image.view ().row (y), 8, std::uint8_t (99));
-  render_mask (preset ("staircase:2x2"), 3, {image.view ().data, 5, 3, 8});
-  for (int y = 0; y < 4; y++)
-    for (int x = 0; x < 8; x++)
-      EXPECT_EQ (image.at (x, y) == 99, x >= 5 || y >= 3);
 }
 
 TEST (Pilot, ColumnsOfTheTwoByTwoSchedule)
@@ -211,7 +193,7 @@ TEST (Pilot, ColumnsOfTheTwoByTwoSchedule)
   const Schedule schedule = preset ("sequential:2x2,pilot=1");
   const std::string open_in = "00001111222233334444555566667777";
   for (int mask = 0; mask < 8; mask++) {
-    const auto image = mask_of (schedule, mask, {40, 5});
+    const auto image = rendered_mask (schedule, mask, {40, 5});
     for (int x = 0; x < 40; x++)
       EXPECT_EQ (image.at (x, 4), open_in[std::size_t (x % 32)] == '0' + mask)
           << "mask " << mask << " column " << x;
@@ -224,7 +206,7 @@ TEST (Pilot, EveryColumnIsOpenInOneMaskOfTwoFrames)
     for (int x = 0; x < kPilotColumns; x++) {
       int open = 0;
       for (int mask = 0; mask < 2 * slots; mask++)
-        open += pilot_open (x, mask, slots);
+        open += pilot_on (x, mask, slots);
       EXPECT_EQ (open, 1) << slots << " slots, column " << x;
     }
 }
@@ -237,7 +219,7 @@ TEST (Pilot, BothFramesAreLitOutOfPhaseOnly)
       for (int slot = 0; slot < slots; slot++)
         for (int x = 0; x < kPilotColumns; x++)
           lit[x * 2 / kPilotColumns] |=
-              pilot_open (x, (first + slot) % (2 * slots), slots);
+              pilot_on (x, (first + slot) % (2 * slots), slots);
       EXPECT_EQ (lit[0] && lit[1], first % slots != 0)
           << slots << " slots, mask " << first << " first";
     }
@@ -245,10 +227,11 @@ TEST (Pilot, BothFramesAreLitOutOfPhaseOnly)
 
 TEST (Pilot, TallerThanTheArrayCoversIt)
 {
-  const auto image = mask_of (preset ("staircase:2x2,pilot=9"), 0, {4, 3});
+  const auto image =
+      rendered_mask (preset ("staircase:2x2,pilot=9"), 0, {4, 3});
   for (int y = 0; y < 3; y++)
     for (int x = 0; x < 4; x++)
-      EXPECT_EQ (image.at (x, y), pilot_open (x, 0, 4));
+      EXPECT_EQ (image.at (x, y), pilot_on (x, 0, 4));
 }
 
 TEST (SampleGrid, EverySampleIsAPixelOfItsElement)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Presets, paths, and what is said of wrong ones. */
+/* Presets, paths, and the messages for invalid ones. */
 #include "schedule/schedule.h"
 
 #include <cstdio>
@@ -10,7 +10,7 @@
 
 #include "schedules.h"
 
-using namespace cexp;
+using namespace codedexposure;
 
 namespace
 {
@@ -33,7 +33,7 @@ expect_words (const Result<Schedule> &schedule, const std::string &text,
         << "'" << word << "' in: " << schedule.error ().message;
 }
 
-/** A folder of its own for a test, removed with its content. */
+/** A temporary folder for a test, removed with its content. */
 class ScheduleFile : public testing::Test
 {
 protected:

@@ -1,19 +1,19 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* The sensor's noise against theory. Seeds are fixed, so that limits at five
  * standard errors cannot fail by chance. */
-#include "optics/sensor.h"
+#include "bench/sensor.h"
 
 #include <cmath>
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include "optics/random.h"
+#include "bench/random.h"
 
 namespace
 {
 
-using namespace cexp;
+using namespace codedexposure;
 
 constexpr int kSide = 1000;
 constexpr double kCount = kSide * double (kSide);

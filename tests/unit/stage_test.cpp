@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* What to turn, from where the camera stands. */
+/* The required stage travel, from the pose of the camera. */
 #include <cmath>
 
 #include <gtest/gtest.h>
 
-#include "moire/stage.h"
-#include "optics/lens.h"
+#include "bench/lens.h"
+#include "calibrate/stage.h"
 
-using namespace cexp;
+using namespace codedexposure;
 
 namespace
 {
@@ -17,9 +17,8 @@ constexpr Extent kSize{768, 576};
 Mapping
 mapping_of (const Alignment &alignment)
 {
-  const Affine a = camera_to_mirrors (alignment, kSize.width, kSize.height);
-  const Result<Mapping> mapping = Mapping::make (
-      {kSize, kSize, {a.xx, a.xy, a.x0, a.yx, a.yy, a.y0, 0, 0, 1}, {}, {}});
+  const Result<Mapping> mapping = Mapping::make ({kSize, kSize,
+      camera_to_mirrors (alignment, kSize.width, kSize.height), {}, {}});
   EXPECT_TRUE (mapping.ok ());
   return *mapping;
 }
@@ -84,6 +83,15 @@ TEST (Stage, FlipsTurnTheSignsOfTheStage)
   EXPECT_DOUBLE_EQ (flipped.stage_y, -plain.stage_y);
   EXPECT_DOUBLE_EQ (flipped.stage_theta, -plain.stage_theta);
   EXPECT_DOUBLE_EQ (flipped.offset.x, plain.offset.x);
+
+  const StageCorrection x = correct_stage (mapping, {.flip_x = true});
+  EXPECT_DOUBLE_EQ (x.stage_x, -plain.stage_x);
+  EXPECT_DOUBLE_EQ (x.stage_y, plain.stage_y);
+  EXPECT_DOUBLE_EQ (x.stage_theta, plain.stage_theta);
+  const StageCorrection y = correct_stage (mapping, {.flip_y = true});
+  EXPECT_DOUBLE_EQ (y.stage_x, plain.stage_x);
+  EXPECT_DOUBLE_EQ (y.stage_y, -plain.stage_y);
+  EXPECT_DOUBLE_EQ (y.stage_theta, plain.stage_theta);
 }
 
 TEST (Stage, SeveralPixelsAMirrorAreAlignedBorderOnBorder)

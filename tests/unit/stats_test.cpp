@@ -12,8 +12,8 @@
 namespace
 {
 
-using namespace cexp;
-using Points = std::vector<PicturePoint>;
+using namespace codedexposure;
+using Points = std::vector<Position>;
 
 template <typename Pixel>
 Image<Pixel>
@@ -155,7 +155,7 @@ TEST (Stats, RefusesWhatItCannotMeasure)
   EXPECT_EQ (complaint ({4, 4}, {}), "");
   EXPECT_EQ (complaint ({0, 4}, {}), "a picture of 0x4 has no statistics");
   EXPECT_EQ (complaint ({4, 4}, {.bits = 9}),
-      "bits = 9 is no number of bits of a pixel; it has 1 to 8, 0 for all");
+      "bits = 9 is out of range; a pixel has 1 to 8, 0 means all");
   EXPECT_EQ (complaint ({4, 4}, {.bins = -1}),
       "a histogram cannot have -1 bins; 0 leaves it out");
   EXPECT_NE (complaint ({4, 4}, {.line = line_of ("row:4")}), "");
@@ -177,7 +177,7 @@ TEST (ProfileLine, SaysWhereItLeavesThePicture)
 {
   EXPECT_EQ (complaint_about ("row:288", {384, 288}),
       "the line reaches pixel (383, 288) of a picture of 384x288; its last "
-      "pixel is (383, 287), and parts such as 50% fit every size");
+      "pixel is (383, 287); percentages such as 50% fit every size");
   EXPECT_EQ (complaint_about ("row:287", {384, 288}), "");
   EXPECT_EQ (complaint_about ("0/0/100%/100%", {384, 288}), "");
   EXPECT_NE (complaint_about ("400/0/0/0", {384, 288}), "");
@@ -189,10 +189,10 @@ TEST (ProfileLine, RefusesWhatIsNoLine)
            "column:x", "1/2/3", "1/2/3/4/5", "1/2/3/nan", "rows:1", "row:1e9"})
     EXPECT_FALSE (ProfileLine::parse (text)) << text;
   EXPECT_EQ (ProfileLine::parse ("line").error ().message,
-      "cannot use 'line' as a line; write row:Y, column:X or X0/Y0/X1/Y1, "
-      "each in pixels or in %");
+      "'line' is not a line; use row:Y, column:X or X0/Y0/X1/Y1, in pixels or "
+      "in %");
   EXPECT_EQ (ProfileLine::parse ("row:120%").error ().message,
-      "'120%' is no place in a picture; write pixels, such as 143, or a part, "
+      "'120%' is not a coordinate; use pixels, such as 143, or a percentage, "
       "0% to 100%");
 }
 

@@ -1,17 +1,17 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The frame from which on a DMD shows something else. */
+/* The first frame that shows the new pattern of a DMD. */
 #include <gtest/gtest.h>
 
-#include "clock/switch_watch.h"
+#include "sync/switch_watch.h"
 
-using namespace cexp;
+using namespace codedexposure;
 
 namespace
 {
 
 constexpr double kLight = 100.0, kHalf = 50.0, kDark = 1.0;
 
-/** Has seen the frames of a schedule, and is to see something else. */
+/** A watch that has seen frames of a schedule and waits for a pattern. */
 SwitchWatch
 switching (bool gap_shows = false)
 {

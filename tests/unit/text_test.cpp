@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Display of strange text, and numbers out of text. */
+/* Printing of untrusted text, and parsing of numbers. */
 #include "base/text.h"
 
 #include <cmath>
 
 #include <gtest/gtest.h>
 
-using namespace cexp;
+using namespace codedexposure;
 
 TEST (Text, PrintableKeepsWhatCanBeShown)
 {

@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Where the tile lies, told by a coded frame. */
-#include "moire/tile_phase.h"
+/* The phase of the tile, measured from a coded frame. */
+#include "calibrate/tile_phase.h"
 
 #include <cmath>
 #include <random>
 
 #include <gtest/gtest.h>
 
-#include "optics/bench.h"
+#include "bench/bench.h"
 
-using namespace cexp;
+using namespace codedexposure;
 
 namespace
 {
@@ -62,7 +62,7 @@ TEST (TilePhase, FoundInOneFrameOfAStaircase)
       const auto frame = coded (truth, 90, 3);
       const auto found = find_tile_phase (frame.view (), schedule_of (preset));
       ASSERT_TRUE (found.ok ()) << found.error ().message;
-      /* Of a lattice several phases are the same arrangement. */
+      /* Several phases of a lattice are the same arrangement. */
       EXPECT_EQ (truth.tile ().label (found->phase.x, found->phase.y),
           truth.tile ().label (phase.x, phase.y))
           << preset;

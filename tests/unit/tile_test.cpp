@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-using namespace cexp;
+using namespace codedexposure;
 
 namespace
 {

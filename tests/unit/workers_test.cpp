@@ -9,7 +9,7 @@
 namespace
 {
 
-using namespace cexp;
+using namespace codedexposure;
 
 TEST (Workers, EveryPartIsDoneOnce)
 {
@@ -28,7 +28,7 @@ TEST (Workers, EveryPartIsDoneOnce)
   }
 }
 
-/* Each waits for the other to have begun. */
+/* Each task waits until the other has started. */
 TEST (Workers, ThreadsWorkSideBySide)
 {
   Workers workers (2);

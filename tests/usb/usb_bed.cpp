@@ -17,7 +17,7 @@
 #include <utility>
 #include <vector>
 
-namespace cexp::test
+namespace codedexposure::test
 {
 
 namespace
@@ -359,7 +359,7 @@ private:
     }
   }
 
-  /** Strings are all that is asked for on endpoint 0. */
+  /** Only string descriptors are requested on endpoint 0. */
   void finish_control (Urb urb)
   {
     constexpr int kSetup = 8;
@@ -408,7 +408,7 @@ private:
     return fail (error, EINVAL);
   }
 
-  /** What a process had under way goes with it. */
+  /** Discards the pending transfers of a process that ended. */
   void drop_orphans ()
   {
     const auto orphaned = [] (const Urb &urb) { return urb.owner->gone (); };
@@ -521,4 +521,4 @@ UsbBed::occupy (const std::string &port)
   ports_.at (port)->occupy ();
 }
 
-} // namespace cexp::test
+} // namespace codedexposure::test

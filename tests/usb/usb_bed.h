@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* A USB in software under the unmodified libusb: boards that are plugged in and
- * pulled out. */
+/* An emulated USB for the unmodified libusb, with boards that are connected and
+ * disconnected. */
 #pragma once
 
 #include <cstdint>
@@ -13,13 +13,13 @@
 
 #include "emulated_hid.h"
 
-namespace cexp::test
+namespace codedexposure::test
 {
 
 class UsbPort;
 
-/** What a process has to load first to see the bus; a sanitizer wants to come
- * before all. */
+/** Library that a process must preload to see the bus; a sanitizer must come
+ * first. */
 #ifdef __SANITIZE_ADDRESS__
 inline constexpr const char *kPreload = "libasan.so.8 libumockdev-preload.so.0";
 #else
@@ -38,9 +38,9 @@ public:
   /** @p port  such as "1-2", the 2 in 1..9; @p product  0x6401 or 0xC900. */
   void plug (const std::string &port, std::uint16_t product,
       const std::string &serial, std::shared_ptr<EmulatedHid> board);
-  /** Pulls the plug, with whatever is in flight. */
+  /** Disconnects the board, even during a transfer. */
   void unplug (const std::string &port);
-  /** Nobody has a board open any more that was pulled. */
+  /** Waits until no process has a disconnected board open. */
   void forget_pulled ();
   /** Whether the kernel's own driver has the board. */
   bool kernel_driver_bound (const std::string &port) const;
@@ -60,4 +60,4 @@ private:
   std::vector<std::unique_ptr<UsbPort>> pulled_;
 };
 
-} // namespace cexp::test
+} // namespace codedexposure::test

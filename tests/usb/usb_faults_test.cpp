@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Random faults of boards under the unmodified libusb: no call hangs, nothing
- * is left behind, and the mirrors stand still in the end. */
+ * leaks, and the mirrors are stopped at the end. */
 #include <filesystem>
 #include <fstream>
 #include <thread>
@@ -10,8 +10,8 @@
 #include "fault_life.h"
 #include "usb_bed.h"
 
-using namespace cexp;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::test;
 
 namespace
 {
@@ -26,8 +26,8 @@ entries (const char *folder)
       std::filesystem::directory_iterator ());
 }
 
-/** For how long threads of this process were ready to run and did not, because
- * others did. */
+/** Time for which threads of this process were ready but other processes ran.
+ */
 std::chrono::nanoseconds
 kept_waiting ()
 {
@@ -54,7 +54,7 @@ settles (const char *folder, std::ptrdiff_t most)
   return entries (folder) <= most;
 }
 
-/** A clock that stands still where the machine is busy with others. */
+/** A clock that stops while other processes use the machine. */
 FaultLife::Time
 now ()
 {
@@ -79,7 +79,7 @@ live (UsbBed &bed, FaultLife &life, std::uint16_t product, const char *options)
   const auto open = [&] { return open_dmd (device); };
   life.close (life.live (open, schedule_of ("sequential:2x1")));
   if (!board->gone () && board->running ()) {
-    // Both its stops were struck: what whoever comes next does.
+    // Both stops failed, so the next user stops the board.
     board->faults.clear ();
     const auto next = open_dmd ("usb:");
     ASSERT_EQ (message_of (next), "");
@@ -113,7 +113,7 @@ TEST (UsbFaults, WhateverHappensItStopsInTheEndAndHangsNowhere)
         return;
       ASSERT_LE (life.longest (), FaultLife::kLongestCall)
           << "sequence " << sequence << " of " << std::hex << product;
-      if (sequence == 0) { // what libraries keep once and for all
+      if (sequence == 0) { // allocated once by libraries
         files = entries ("/proc/self/fd");
         threads = entries ("/proc/self/task");
       }

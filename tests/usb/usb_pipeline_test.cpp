@@ -1,17 +1,17 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* dmdsync with a board on the USB, in a pipeline: shown masks, cancelled
- * uploads, and a plug that is pulled. */
-#include "dmd/mirror_array.h"
+/* dmdsync with a board on the USB in a pipeline: masks, cancelled uploads and a
+ * board that is disconnected. */
 #include "emulated_dlpc350.h"
 #include "emulated_dlpc900.h"
+#include "mirrors.h"
 #include "sync_harness.h"
 #include "usb_bed.h"
 
 namespace
 {
 
-using namespace cexp;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::test;
 
 const auto *const linked =
     ::testing::AddGlobalTestEnvironment (new LinkedElements);
@@ -91,7 +91,7 @@ TEST_F (UsbPipeline, ShowsTheMasksOfTheScheduleUntilItStops)
   for (int mask = 0; mask < schedule->masks (); mask++) {
     const auto shown = board->mirrors (mask);
     Image<std::uint8_t> expected (shown.width (), shown.height ());
-    render_mask (*schedule, mask, expected.view ());
+    expected_mask (*schedule, mask, expected.view ());
     EXPECT_TRUE (shown == expected) << mask;
   }
 }
@@ -144,8 +144,8 @@ TEST_F (PipelineWithBoard, ADlpc350ShowsTheMasksOfItsFlash)
   EXPECT_FALSE (board->running ());
 }
 
-/** In a pipeline, a fault is either mended or one error; the board is stopped
- * in the end. */
+/** In a pipeline, a fault is either corrected or causes one error; the board is
+ * stopped at the end. */
 class UsbPipelineFaults
     : public PipelineWithBoard,
       public ::testing::WithParamInterface<std::tuple<std::uint16_t, Fault>>
@@ -189,7 +189,7 @@ TEST_P (UsbPipelineFaults, EndInOneErrorOrInMasks)
     EXPECT_TRUE (board->gone () || !board->running ()) << message;
     int errors =
         GST_MESSAGE_TYPE (message_of_end.get ()) == GST_MESSAGE_ERROR ? 1 : 0;
-    /* The source may speak of a stream that ended, too. */
+    /* The source may also report the end of its stream. */
     while (const MessagePtr more{
         gst_bus_pop_filtered (bus.get (), GST_MESSAGE_ERROR)})
       errors += GST_MESSAGE_SRC (more.get ()) ==

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Processes that end while a board shows masks: by a signal that they take, and
- * by one that nobody can take. The board is stopped all the same. */
+/* Processes that end while a board shows masks, by a signal that they handle or
+ * by SIGKILL. The board is stopped in both cases. */
 #include <signal.h>
 #include <spawn.h>
 #include <sys/prctl.h>
@@ -20,7 +20,7 @@
 #include "emulated_dlpc900.h"
 #include "usb_bed.h"
 
-using namespace cexp::test;
+using namespace codedexposure::test;
 
 namespace
 {
@@ -32,7 +32,7 @@ constexpr const char *kPort = "1-2";
 using namespace std::chrono_literals;
 using std::chrono::steady_clock;
 
-/** How long whatever has to come may take; then something hangs. */
+/** Time limit of events; after it, the test fails. */
 constexpr auto kPatience = 30s;
 
 /** A process that sees the bus of this one. */
@@ -58,9 +58,8 @@ public:
       end_by (SIGKILL);
   }
 
-  /** Kills it while it is in no message to the board: the bus in software, as
-   * opposed to a real one, does not survive half a message.
-   * @return as waitpid () has it. */
+  /** Kills the process between two messages to the board: unlike a real bus,
+   * the emulated one does not survive half a message. @return as waitpid (). */
   int end_between_messages (const UsbBed &bed, int signal)
   {
     const auto deadline = steady_clock::now () + kPatience;
@@ -110,7 +109,7 @@ protected:
       bed.plug (kPort, kDlpc350, "LCR2", std::make_shared<EmulatedDlpc350> ());
   }
 
-  /** Nobody uses the bus any more when it goes. */
+  /** No process uses the bus when it is destroyed. */
   void TearDown () override
   {
     const auto deadline = steady_clock::now () + kPatience;

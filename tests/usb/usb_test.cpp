@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The USB transport under the unmodified libusb: boards that are found, taken
- * from the kernel, shown masks, and pulled out. */
+/* The USB transport under the unmodified libusb: boards are found, detached
+ * from the kernel driver, show masks and are disconnected. */
 #include <sys/wait.h>
 
 #include <cstdio>
@@ -9,10 +9,11 @@
 #include "dmd_rig.h"
 #include "emulated_dlpc350.h"
 #include "emulated_dlpc900.h"
+#include "mirrors.h"
 #include "usb_bed.h"
 
-using namespace cexp;
-using namespace cexp::test;
+using namespace codedexposure;
+using namespace codedexposure::test;
 
 namespace
 {
@@ -97,7 +98,7 @@ TEST_F (Usb, MasksArriveMirrorByMirror)
   for (int mask = 0; mask < schedule.masks (); mask++) {
     const auto shown = board->mirrors (mask);
     Image<std::uint8_t> expected (shown.width (), shown.height ());
-    render_mask (schedule, mask, expected.view ());
+    expected_mask (schedule, mask, expected.view ());
     EXPECT_TRUE (shown == expected) << mask;
   }
   dmd->reset ();
@@ -238,7 +239,7 @@ TEST_F (Usb, TheToolListsShowsAndStops)
   EXPECT_EQ (status, 2);
   const std::string info = tool_says ("dmd info", status);
   for (const char *key :
-      {"trigger-input", "trigger-output", "finite-run", "shortest-dark-time"})
+      {"trigger-input", "trigger-output", "shortest-dark-time"})
     EXPECT_NE (info.find (key), info.npos) << key;
 
   tool_says ("dmd start usb: sequential:2x2,active=12ms", status);
@@ -254,7 +255,7 @@ TEST_F (Usb, TheToolStopsWhatSomebodyLeftRunning)
   auto dmd = open_dmd ("usb:,images=0");
   ASSERT_EQ (message_of (dmd), "");
   ASSERT_EQ (message_of (show (**dmd, Schedule ())), "");
-  // Its program ends without a word.
+  // The program crashes.
   const auto survivor = std::make_shared<EmulatedDlpc350> (*board);
   dmd->reset ();
   bed.unplug ("1-2");

@@ -1,0 +1,131 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* codedexposure-camerasrc, frame by frame: memory, pixels, time. */
+#include "common/meta.h"
+#include "state.h"
+
+#define GST_CAT_DEFAULT camerasrc_debug
+
+namespace codedexposure::gst::camera
+{
+
+namespace
+{
+
+bool
+take_caps (GstCodedExposureCameraSrc *self, GstCaps *caps)
+{
+  Stream &stream = state (self).stream;
+  std::string format;
+  {
+    const ObjectLock lock (self);
+    format = state (self).settings.pixel_format;
+  }
+  GstVideoInfo info;
+  if (!gst_video_info_from_caps (&info, caps))
+    return true; // downstream refuses them
+  Result<OwnedFrames> frames = OwnedFrames::make (info, format);
+  if (!frames) {
+    GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
+        ("%s", frames.error ().message.c_str ()), (nullptr));
+    return false;
+  }
+  stream.frames = *std::move (frames);
+  stream.caps.reset (gst_caps_ref (caps));
+  return true;
+}
+
+/* A restarted source begins a stream of its own; to downstream it is the same
+ * one. Returns whether @p event goes on. */
+bool
+passes (GstCodedExposureCameraSrc *self, GstEvent *event)
+{
+  Stream &stream = state (self).stream;
+  switch (GST_EVENT_TYPE (event)) {
+  case GST_EVENT_EOS:
+    return !is_away (self);
+  case GST_EVENT_STREAM_START:
+    return !std::exchange (stream.started, true);
+  case GST_EVENT_CAPS: {
+    GstCaps *caps = nullptr;
+    gst_event_parse_caps (event, &caps);
+    return !(stream.caps && gst_caps_is_equal (caps, stream.caps.get ())) &&
+           take_caps (self, caps);
+  }
+  case GST_EVENT_SEGMENT: {
+    const GstSegment *segment = nullptr;
+    gst_event_parse_segment (event, &segment);
+    if (stream.segment && gst_segment_is_equal (segment, &*stream.segment))
+      return false;
+    stream.segment = *segment;
+    return true;
+  }
+  case GST_EVENT_QOS:
+    return false;
+  default:
+    return true;
+  }
+}
+
+/* aravissrc counts from the first frame, whenever that came. */
+void
+set_time (GstCodedExposureCameraSrc *self, GstBuffer *frame)
+{
+  Stream &stream = state (self).stream;
+  const GstClockTime now =
+      gst_element_get_current_running_time (GST_ELEMENT (self));
+  if (std::exchange (stream.first, false)) {
+    const GstClockTime device = GST_BUFFER_PTS (frame);
+    const bool known = GST_CLOCK_TIME_IS_VALID (now) && now > device;
+    stream.origin = known ? now - device : 0;
+    GST_BUFFER_FLAG_SET (frame, GST_BUFFER_FLAG_DISCONT);
+    if (GST_CLOCK_TIME_IS_VALID (stream.last))
+      GST_BUFFER_FLAG_SET (frame, GST_BUFFER_FLAG_RESYNC);
+  }
+  if (GST_BUFFER_PTS_IS_VALID (frame))
+    GST_BUFFER_PTS (frame) += stream.origin;
+  const bool timed = GST_CLOCK_TIME_IS_VALID (now) &&
+                     GST_CLOCK_TIME_IS_VALID (stream.last) && now > stream.last;
+  note_frame (self, timed ? now - stream.last : 0);
+  stream.last = GST_CLOCK_TIME_IS_VALID (now) ? now : 0;
+}
+
+/* An incomplete frame stays as it is, apart from its memory: what it lacks is
+ * for downstream to judge. */
+BufferPtr
+own (const OwnedFrames &frames, BufferPtr frame)
+{
+  if (!frames.is_whole (frame.get ())) {
+    BufferPtr copy (gst_buffer_copy_deep (frame.get ()));
+    GST_BUFFER_FLAG_SET (copy.get (), GST_BUFFER_FLAG_CORRUPTED);
+    return copy;
+  }
+  BufferPtr owned = frames.own (frame.get ());
+  if (owned && frames.bits () > 0) {
+    FrameMeta meta;
+    meta.bits = frames.bits ();
+    set_frame_meta (owned.get (), meta);
+  }
+  return owned;
+}
+
+} // namespace
+
+GstPadProbeReturn
+take_item (GstPad *, GstPadProbeInfo *info, gpointer data)
+{
+  auto *self = GST_CODED_EXPOSURE_CAMERA_SRC (data);
+  if (!(info->type & GST_PAD_PROBE_TYPE_BUFFER))
+    return passes (self, GST_PAD_PROBE_INFO_EVENT (info)) ? GST_PAD_PROBE_OK
+                                                          : GST_PAD_PROBE_DROP;
+  const auto &frames = state (self).stream.frames;
+  if (!frames)
+    return GST_PAD_PROBE_OK;
+  BufferPtr frame = own (*frames, BufferPtr (GST_PAD_PROBE_INFO_BUFFER (info)));
+  info->data = frame.get ();
+  if (!frame)
+    return GST_PAD_PROBE_HANDLED;
+  set_time (self, frame.release ());
+  return GST_PAD_PROBE_OK;
+}
+
+} // namespace codedexposure::gst::camera

@@ -1,0 +1,124 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "provider.h"
+
+#include <arv.h>
+
+#include "camerasrc.h"
+#include "common/caps.h"
+#include "common/raii.h"
+
+using namespace codedexposure::gst;
+
+struct _GstCodedExposureCameraProvider {
+  GstDeviceProvider parent;
+};
+
+G_DEFINE_TYPE (GstCodedExposureCameraProvider,
+    gst_coded_exposure_camera_provider, GST_TYPE_DEVICE_PROVIDER)
+GST_DEVICE_PROVIDER_REGISTER_DEFINE (codedexposure_cameraprovider,
+    "codedexposure-cameraprovider", GST_RANK_PRIMARY,
+    GST_TYPE_CODED_EXPOSURE_CAMERA_PROVIDER)
+
+/* A camera in the list. Its name is in the property "id" of its properties. */
+#define GST_TYPE_CODED_EXPOSURE_CAMERA (gst_coded_exposure_camera_get_type ())
+G_DECLARE_FINAL_TYPE (GstCodedExposureCamera, gst_coded_exposure_camera, GST,
+    CODED_EXPOSURE_CAMERA, GstDevice)
+struct _GstCodedExposureCamera {
+  GstDevice parent;
+};
+G_DEFINE_TYPE (
+    GstCodedExposureCamera, gst_coded_exposure_camera, GST_TYPE_DEVICE)
+
+namespace
+{
+
+constexpr const char *kId = "id";
+
+bool
+set_name (GstDevice *device, GstElement *element)
+{
+  const StructurePtr facts (gst_device_get_properties (device));
+  g_object_set (element, "camera-name",
+      gst_structure_get_string (facts.get (), kId), nullptr);
+  return true;
+}
+
+GstElement *
+create_element (GstDevice *device, const gchar *name)
+{
+  GstElement *element =
+      gst_element_factory_make ("codedexposure-camerasrc", name);
+  if (element)
+    set_name (device, element);
+  return element;
+}
+
+gboolean
+reconfigure_element (GstDevice *device, GstElement *element)
+{
+  return GST_IS_CODED_EXPOSURE_CAMERA_SRC (element) &&
+         set_name (device, element);
+}
+
+/* The size and rate of a camera are known once it is opened, which takes it
+ * from whoever uses it: so a list says what any camera may have. */
+GstDevice *
+make_device (guint number)
+{
+  const auto known = [] (const char *text) { return text ? text : ""; };
+  const std::string vendor = known (arv_get_device_vendor (number));
+  const std::string model = known (arv_get_device_model (number));
+  const std::string serial = known (arv_get_device_serial_nbr (number));
+  const StructurePtr facts (gst_structure_new ("genicam-camera", kId,
+      G_TYPE_STRING, arv_get_device_id (number), "vendor", G_TYPE_STRING,
+      vendor.c_str (), "model", G_TYPE_STRING, model.c_str (), "serial",
+      G_TYPE_STRING, serial.c_str (), "address", G_TYPE_STRING,
+      known (arv_get_device_address (number)), "protocol", G_TYPE_STRING,
+      known (arv_get_device_protocol (number)), nullptr));
+  const CapsPtr caps (gst_caps_from_string (CODED_EXPOSURE_VIDEO_CAPS));
+  const std::string name = vendor + " " + model + " " + serial;
+  return GST_DEVICE (g_object_new (GST_TYPE_CODED_EXPOSURE_CAMERA,
+      "display-name", name.c_str (), "device-class", "Source/Video", "caps",
+      caps.get (), "properties", facts.get (), nullptr));
+}
+
+/* Searching takes a second, and a broadcast to all networks of the machine. */
+GList *
+probe (GstDeviceProvider *)
+{
+  GList *devices = nullptr;
+  arv_update_device_list ();
+  for (guint number = arv_get_n_devices (); number-- > 0;)
+    devices = g_list_prepend (devices, make_device (number));
+  return devices;
+}
+
+} // namespace
+
+static void
+gst_coded_exposure_camera_class_init (GstCodedExposureCameraClass *klass)
+{
+  GST_DEVICE_CLASS (klass)->create_element = create_element;
+  GST_DEVICE_CLASS (klass)->reconfigure_element = reconfigure_element;
+}
+
+static void
+gst_coded_exposure_camera_init (GstCodedExposureCamera *)
+{
+}
+
+static void
+gst_coded_exposure_camera_provider_class_init (
+    GstCodedExposureCameraProviderClass *klass)
+{
+  GST_DEVICE_PROVIDER_CLASS (klass)->probe = probe;
+  gst_device_provider_class_set_static_metadata (
+      GST_DEVICE_PROVIDER_CLASS (klass), "GenICam cameras",
+      "Source/Video/Hardware", "Lists GenICam cameras that Aravis finds",
+      "The gst-codedexposure authors");
+}
+
+static void
+gst_coded_exposure_camera_provider_init (GstCodedExposureCameraProvider *)
+{
+}

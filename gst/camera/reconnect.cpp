@@ -1,0 +1,215 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* codedexposure-camerasrc and a camera that goes away and comes back. */
+#include "state.h"
+
+#define GST_CAT_DEFAULT camerasrc_debug
+
+namespace codedexposure::gst::camera
+{
+
+namespace
+{
+
+constexpr std::chrono::seconds kPause{1};
+
+std::string
+text_of (GstMessage *message)
+{
+  GError *error = nullptr;
+  gst_message_parse_error (message, &error, nullptr);
+  const std::string text = error->message;
+  g_error_free (error);
+  return text;
+}
+
+/* Whether aravissrc ended its stream by itself. What it pushed last was taken:
+ * so downstream is not the reason. */
+bool
+is_own_failure (const CameraState &st, GstMessage *message)
+{
+  const GstStructure *details = nullptr;
+  gst_message_parse_error_details (message, &details);
+  gint flow = GST_FLOW_ERROR;
+  if (details)
+    gst_structure_get_int (details, "flow-return", &flow);
+  const ObjectPtr<GstPad> pad (gst_element_get_static_pad (st.source, "src"));
+  return GST_MESSAGE_SRC (message) == GST_OBJECT (st.source) &&
+         flow == GST_FLOW_ERROR &&
+         gst_pad_get_last_flow_return (pad.get ()) == GST_FLOW_OK;
+}
+
+void
+post (GstCodedExposureCameraSrc *self, GstStructure *structure)
+{
+  gst_element_post_message (GST_ELEMENT (self),
+      gst_message_new_element (GST_OBJECT (self), structure));
+}
+
+void
+say_lost (GstCodedExposureCameraSrc *self, const std::string &why)
+{
+  post (self, gst_structure_new ("codedexposure/camera-lost", "reason",
+                  G_TYPE_STRING, why.c_str (), nullptr));
+  GST_ELEMENT_WARNING (self, RESOURCE, READ,
+      ("The camera is gone: %s It is restarted until it comes back (property "
+       "reconnect).",
+          why.c_str ()),
+      (nullptr));
+}
+
+void
+give_up (GstCodedExposureCameraSrc *self, guint tries)
+{
+  CameraState &st = state (self);
+  std::string why;
+  {
+    const std::lock_guard guard (st.lock);
+    why = st.why;
+  }
+  GST_ELEMENT_ERROR (self, RESOURCE, READ,
+      ("The camera did not come back after %u tries to restart it (property "
+       "reconnect): %s Check its cable, its power and its trigger.",
+          tries, why.c_str ()),
+      (nullptr));
+  const ObjectPtr<GstPad> pad (
+      gst_element_get_static_pad (GST_ELEMENT (self), "src"));
+  gst_pad_push_event (pad.get (), gst_event_new_eos ());
+}
+
+/* One try. Returns whether a frame came; else the source has failed again, or
+ * @p stop was requested. The source is locked against the states of the bin
+ * while it is stopped, which takes seconds for a camera that does not answer.
+ */
+bool
+try_restart (GstCodedExposureCameraSrc *self, const std::stop_token &stop)
+{
+  CameraState &st = state (self);
+  gst_element_set_locked_state (st.source, TRUE);
+  gst_element_set_state (st.source, GST_STATE_NULL);
+  {
+    const std::lock_guard guard (st.lock);
+    st.why.clear ();
+    st.failed = false;
+    st.tries++;
+  }
+  if (stop.stop_requested () || !set_up_source (self))
+    return false;
+  gst_element_set_locked_state (st.source, FALSE);
+  if (!gst_element_sync_state_with_parent (st.source))
+    return false;
+  std::unique_lock guard (st.lock);
+  st.changed.wait (guard, stop, [&st] { return !st.away || st.failed; });
+  return !st.away;
+}
+
+void
+bring_back (GstCodedExposureCameraSrc *self, const std::stop_token &stop)
+{
+  CameraState &st = state (self);
+  guint most = 0;
+  {
+    const ObjectLock lock (self);
+    most = st.settings.reconnect;
+  }
+  for (guint tries = 0; tries < most; tries++) {
+    std::unique_lock guard (st.lock);
+    if (tries > 0)
+      st.changed.wait_for (guard, stop, kPause, [] { return false; });
+    guard.unlock ();
+    if (stop.stop_requested () || try_restart (self, stop))
+      return;
+  }
+  if (!stop.stop_requested ())
+    give_up (self, most);
+}
+
+} // namespace
+
+void
+begin_watch (GstCodedExposureCameraSrc *self)
+{
+  CameraState &st = state (self);
+  const ObjectLock lock (self);
+  const std::lock_guard guard (st.lock);
+  st.watching = st.settings.reconnect > 0;
+  st.seen = st.away = st.failed = false;
+  st.frames_left = st.settings.num_buffers;
+  st.why.clear ();
+}
+
+void
+end_watch (GstCodedExposureCameraSrc *self)
+{
+  CameraState &st = state (self);
+  std::jthread ended;
+  {
+    const std::lock_guard guard (st.lock);
+    st.watching = false;
+    ended = std::move (st.restarts);
+  }
+  if (!ended.joinable ())
+    return;
+  ended.request_stop ();
+  ended.join ();
+  gst_element_set_locked_state (st.source, FALSE);
+}
+
+bool
+take_failure (GstCodedExposureCameraSrc *self, GstMessage *message)
+{
+  CameraState &st = state (self);
+  const bool own = is_own_failure (st, message);
+  {
+    const std::lock_guard guard (st.lock);
+    if (!st.watching || (!st.away && !(own && st.seen)))
+      return false;
+    if (st.why.empty ())
+      st.why = text_of (message);
+    st.failed = st.failed || own;
+    if (std::exchange (st.away, true)) {
+      st.changed.notify_all ();
+      return true;
+    }
+    st.tries = 0;
+  }
+  say_lost (self, text_of (message));
+  std::jthread before; // it has ended, or is about to
+  const std::lock_guard guard (st.lock);
+  before = std::move (st.restarts);
+  if (st.watching)
+    st.restarts = std::jthread (
+        [self] (const std::stop_token &stop) { bring_back (self, stop); });
+  return true;
+}
+
+bool
+is_away (GstCodedExposureCameraSrc *self)
+{
+  CameraState &st = state (self);
+  const std::lock_guard guard (st.lock);
+  return st.away;
+}
+
+void
+note_frame (GstCodedExposureCameraSrc *self, GstClockTime silent)
+{
+  CameraState &st = state (self);
+  guint tries = 0;
+  {
+    const std::lock_guard guard (st.lock);
+    st.seen = true;
+    st.frames_left -= st.frames_left > 0;
+    if (!std::exchange (st.away, false))
+      return;
+    tries = st.tries;
+  }
+  st.changed.notify_all ();
+  {
+    const ObjectLock lock (self);
+    st.reconnects++;
+  }
+  post (self, gst_structure_new ("codedexposure/camera-back", "silent",
+                  G_TYPE_UINT64, silent, "tries", G_TYPE_UINT, tries, nullptr));
+}
+
+} // namespace codedexposure::gst::camera

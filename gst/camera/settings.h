@@ -1,0 +1,43 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* What a user says of a camera, and the GenICam features that follow. */
+#pragma once
+
+#include <string>
+
+#include "base/result.h"
+
+namespace codedexposure::gst
+{
+
+/** Which device starts an exposure. */
+enum class CameraTrigger { none, dmd, camera };
+enum class TriggerEdge { rising, falling };
+
+struct CameraSettings {
+  std::string name;         ///< as Aravis lists it; empty: the first one
+  std::string pixel_format; ///< GenICam name; empty: as the caps say
+  CameraTrigger trigger = CameraTrigger::none;
+  std::string trigger_line; ///< empty: Line0 for an input, Line1 for an output
+  TriggerEdge trigger_edge = TriggerEdge::rising;
+  double exposure_time = 0; ///< microseconds; 0: as the camera has it
+  std::string features;     ///< assignments beyond these
+  int num_buffers = -1;     ///< frames until EOS; -1: no end
+  unsigned reconnect = 0;   ///< tries to restart a camera that went away
+};
+
+/** An error that names the value, the rule and the remedy. */
+Result<void> check_settings (const CameraSettings &settings);
+
+/**
+ * Assignments in the order that a camera needs: a selector before what it
+ * selects, and the user's own last. Aravis makes them after it has set the
+ * frame rate, which ends all triggers.
+ *
+ * @p settings  checked.
+ */
+std::string feature_assignments (const CameraSettings &settings);
+
+/** Caps of the frames that come with a pixel format. */
+std::string caps_of_format (const std::string &pixel_format);
+
+} // namespace codedexposure::gst

@@ -1,0 +1,63 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Caps of coded frames and subframes: one from the other. */
+#pragma once
+
+#include <gst/gst.h>
+#include <gst/video/video.h>
+
+#include "raii.h"
+#include "schedule/schedule.h"
+
+/** Template of every pad of the plugin: GRAY8 and GRAY16_LE at any size and
+ * rate. */
+#define CODED_EXPOSURE_VIDEO_CAPS GST_VIDEO_CAPS_MAKE ("{ GRAY8, GRAY16_LE }")
+
+namespace codedexposure::gst
+{
+
+/** What happens to a stream between two pads: each field is multiplied by its
+ * num and divided by its den. */
+struct CapsScale {
+  int rate_num = 1, rate_den = 1;
+  int width_num = 1, width_den = 1;
+  int height_num = 1, height_den = 1;
+  /** Rows taken off before the height is divided, or put back after it is
+   * multiplied. */
+  int crop_rows = 0;
+
+  CapsScale inverse () const;
+};
+
+/** Coded frames to the subframes of @p schedule, or of its background: rate x N
+ * (only when @p raised_rate), size divided by the cell, the pilot's rows
+ * cropped. */
+CapsScale coded_to_subframes (const Schedule &schedule, bool raised_rate);
+
+/**
+ * @p caps with framerate, width, height and pixel-aspect-ratio scaled.
+ *
+ * Takes fixed values, ranges and lists, and caps without a field. A division
+ * rounds down (what is left over is cropped), so the inverse of a fixed size
+ * is the range of sizes that give it. Values saturate at G_MAXINT. A framerate
+ * of 0/1 stays. Transfer: full.
+ */
+GstCaps *scale_caps (GstCaps *caps, const CapsScale &scale);
+
+/** @p caps without the fields that a schedule changes. */
+CapsPtr unbind_caps (GstCaps *caps);
+/** @p caps without those that a mapping changes. */
+CapsPtr unbind_size (GstCaps *caps);
+/** In the order of @p preferred. */
+CapsPtr intersect_caps (GstCaps *preferred, GstCaps *other);
+
+/** The frame rate that the user gives to coded frames whose caps have none;
+ * 0/1: none. */
+struct RateOverride {
+  int num = 0, den = 1;
+};
+/** @p caps, and with @p rate also those without a rate. */
+CapsPtr admit_unknown_rate (RateOverride rate, CapsPtr caps);
+/** @p caps, with @p rate where they have none. */
+CapsPtr fill_in_rate (RateOverride rate, GstCaps *caps);
+
+} // namespace codedexposure::gst

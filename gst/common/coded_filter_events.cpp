@@ -1,0 +1,358 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Events and queries of what consumes coded frames. */
+#include "coded_filter.h"
+
+#include <utility>
+
+#include "tag.h"
+
+GST_DEBUG_CATEGORY_EXTERN (coded_filter_debug);
+#define GST_CAT_DEFAULT coded_filter_debug
+
+namespace codedexposure::gst
+{
+
+namespace
+{
+
+bool
+has_flag (const EventPtr &event, GstEventTypeFlags flag)
+{
+  return gst_event_type_get_flags (GST_EVENT_TYPE (event.get ())) & flag;
+}
+
+} // namespace
+
+/* Source pads get their caps with the first frame, because the schedule may
+ * come in a tag, and tags follow the caps. Until then events wait. */
+gboolean
+CodedFilter::sink_event (EventPtr event)
+{
+  GST_LOG_OBJECT (sinkpad_, "%" GST_PTR_FORMAT, event.get ());
+  const GstEventType type = GST_EVENT_TYPE (event.get ());
+  const bool in_turn = has_flag (event, GST_EVENT_TYPE_SERIALIZED);
+  if (type == GST_EVENT_FLUSH_START)
+    cancel ();
+  if (type == GST_EVENT_FLUSH_STOP)
+    resume ();
+  else if (in_turn)
+    drain ();
+  switch (type) {
+  case GST_EVENT_STREAM_START:
+    return on_stream_start (std::move (event));
+  case GST_EVENT_CAPS:
+    return on_caps (event);
+  case GST_EVENT_SEGMENT:
+    return on_segment (std::move (event));
+  case GST_EVENT_TAG:
+    return on_tag (std::move (event));
+  case GST_EVENT_GAP:
+    return on_gap (std::move (event));
+  case GST_EVENT_EOS:
+    return on_eos (std::move (event));
+  case GST_EVENT_FLUSH_STOP:
+    return on_flush_stop (std::move (event));
+  default:
+    return in_turn ? forward_in_turn (std::move (event))
+                   : forward (std::move (event));
+  }
+}
+
+/* Forwards the events that waited for the caps; forgets them where no caps
+ * came. */
+void
+CodedFilter::settle_events ()
+{
+  for (EventPtr &event : std::exchange (stream_.pending, {})) {
+    if (has_format ())
+      forward (std::move (event));
+  }
+}
+
+gboolean
+CodedFilter::forward_in_turn (EventPtr event)
+{
+  if (!stream_.stale && stream_.pending.empty ())
+    return forward (std::move (event));
+  stream_.pending.push_back (std::move (event));
+  return TRUE;
+}
+
+gboolean
+CodedFilter::on_stream_start (EventPtr event)
+{
+  settle_events ();
+  stream_.tagged.reset ();
+  stream_.stale = true;
+  return forward (std::move (event));
+}
+
+gboolean
+CodedFilter::on_caps (const EventPtr &event)
+{
+  GstCaps *caps = nullptr;
+  gst_event_parse_caps (event.get (), &caps);
+  if (!stream_.caps || !gst_caps_is_equal (stream_.caps.get (), caps))
+    stream_.stale = true;
+  stream_.caps.reset (gst_caps_ref (caps));
+  stream_.caps_seqnum = gst_event_get_seqnum (event.get ());
+  return TRUE;
+}
+
+gboolean
+CodedFilter::on_segment (EventPtr event)
+{
+  gst_event_copy_segment (event.get (), &stream_.segment);
+  if (stream_.segment.format != GST_FORMAT_TIME) {
+    post_error (std::string ("The coded frames come in a segment of format ") +
+                gst_format_get_name (stream_.segment.format) +
+                ": what is made of them needs times.");
+    return FALSE;
+  }
+  break_time ();
+  return forward_in_turn (std::move (event));
+}
+
+gboolean
+CodedFilter::on_tag (EventPtr event)
+{
+  GstTagList *tags = nullptr;
+  gst_event_parse_tag (event.get (), &tags);
+  if (auto tagged = setup_from_tags (tags)) {
+    if (!*tagged || !stream_.tagged || !*stream_.tagged || !has_format () ||
+        !(tagged->value () == stream_.tagged->value ()))
+      stream_.stale = true;
+    stream_.tagged = std::move (tagged);
+  }
+  return forward_in_turn (std::move (event));
+}
+
+/* A gap stands for a frame, so downstream has to know the caps. */
+gboolean
+CodedFilter::on_gap (EventPtr event)
+{
+  break_history ();
+  if (!stream_.caps)
+    return forward_in_turn (std::move (event));
+  return negotiate () == GST_FLOW_OK && forward (std::move (event));
+}
+
+/* A muxer downstream needs caps even of a stream without a frame. */
+gboolean
+CodedFilter::on_eos (EventPtr event)
+{
+  end_saturation ();
+  if (stream_.caps && !has_format ())
+    negotiate ();
+  settle_events ();
+  return forward (std::move (event));
+}
+
+/* A flush drops the segment and what was in flight. Other sticky events that
+ * wait stay true. */
+gboolean
+CodedFilter::on_flush_stop (EventPtr event)
+{
+  std::erase_if (stream_.pending, [] (const EventPtr &waiting) {
+    return !has_flag (waiting, GST_EVENT_TYPE_STICKY) ||
+           GST_EVENT_TYPE (waiting.get ()) == GST_EVENT_SEGMENT;
+  });
+  gst_segment_init (&stream_.segment, GST_FORMAT_UNDEFINED);
+  end_saturation ();
+  break_time ();
+  const gboolean done = forward (std::move (event));
+  flushed ();
+  return done;
+}
+
+void
+CodedFilter::break_time ()
+{
+  if (stream_.sequence)
+    stream_.sequence->resync ();
+  break_history ();
+  each_pad ([this] (GstCodedPad *pad) {
+    pad->coded.discont = true;
+    const ObjectLock lock (element_);
+    forget_lateness (pad);
+  });
+}
+
+/* QoS stops here: aravissrc holds its object lock while it waits for a frame,
+ * so that a sink that reports to it waits, too, and loses frames. */
+gboolean
+CodedFilter::src_event (GstCodedPad *pad, GstEvent *event)
+{
+  if (GST_EVENT_TYPE (event) != GST_EVENT_QOS)
+    return gst_pad_event_default (GST_PAD (pad), GST_OBJECT (element_), event);
+  const EventPtr owned (event);
+  const ObjectLock lock (element_);
+  note_lateness (pad, event);
+  return TRUE;
+}
+
+/* --------------------------------------------------------------- queries -- */
+
+namespace
+{
+
+/* Takes @own. */
+void
+answer_caps (GstQuery *query, CapsPtr own)
+{
+  GstCaps *filter = nullptr;
+  gst_query_parse_caps (query, &filter);
+  if (filter)
+    own = intersect_caps (filter, own.get ());
+  gst_query_set_caps_result (query, own.get ());
+}
+
+} // namespace
+
+gboolean
+CodedFilter::sink_query (GstQuery *query)
+{
+  switch (GST_QUERY_TYPE (query)) {
+  case GST_QUERY_CAPS:
+    answer_caps (query, sink_caps ());
+    return TRUE;
+  case GST_QUERY_ALLOCATION:
+    return answer_allocation (query);
+  default:
+    return gst_pad_query_default (sinkpad_, GST_OBJECT (element_), query);
+  }
+}
+
+/* Picture k is due k slots after its coded frame, which adds no latency. Time
+ * for computing is what the processing deadline of sinks stands for. */
+gboolean
+CodedFilter::src_query (GstCodedPad *pad, GstQuery *query)
+{
+  if (GST_QUERY_TYPE (query) == GST_QUERY_CAPS) {
+    answer_caps (query, src_caps (pad));
+    return TRUE;
+  }
+  if (!gst_pad_query_default (GST_PAD (pad), GST_OBJECT (element_), query))
+    return FALSE;
+  if (GST_QUERY_TYPE (query) == GST_QUERY_LATENCY)
+    add_latency (query);
+  scale_frames (pad, query);
+  return TRUE;
+}
+
+/* The property binds, else what is in force; a schedule that was only assumed
+ * binds nothing, because the tag may still come. */
+CodedFilter::CapsContext
+CodedFilter::caps_context () const
+{
+  const ObjectLock lock (element_);
+  const auto &asked = settings_.schedule.read;
+  ScheduleRef schedule = assumed_ ? nullptr : in_force_;
+  if (asked && *asked)
+    schedule = {asked, &asked->value ()};
+  return {schedule, settings_.rate, settings_.mapping.read || rectifies_};
+}
+
+CapsPtr
+CodedFilter::convert_caps (const CapsContext &context, const GstCodedPad *pad,
+    GstCaps *caps, bool to_coded) const
+{
+  if (!context.schedule)
+    return unbind_caps (caps);
+  const CapsScale scale = scale_for (*context.schedule, pad);
+  CapsPtr scaled (scale_caps (caps, to_coded ? scale.inverse () : scale));
+  return context.mapped ? unbind_size (scaled.get ()) : std::move (scaled);
+}
+
+/* A pad that is not linked limits nothing: without a peer, ANY comes back. */
+CapsPtr
+CodedFilter::sink_caps () const
+{
+  const CapsContext context = caps_context ();
+  CapsPtr caps (gst_pad_get_pad_template_caps (sinkpad_));
+  each_pad ([&] (GstCodedPad *pad) {
+    const CapsPtr peer (gst_pad_peer_query_caps (GST_PAD (pad), nullptr));
+    const CapsPtr coded = convert_caps (context, pad, peer.get (), true);
+    caps = intersect_caps (coded.get (), caps.get ());
+  });
+  return admit_unknown_rate (context.rate, std::move (caps));
+}
+
+CapsPtr
+CodedFilter::src_caps (GstCodedPad *pad) const
+{
+  const CapsContext context = caps_context ();
+  const CapsPtr templ (gst_pad_get_pad_template_caps (GST_PAD (pad)));
+  const CapsPtr peer (gst_pad_peer_query_caps (sinkpad_, nullptr));
+  const CapsPtr coded = intersect_caps (peer.get (), templ.get ());
+  const CapsPtr filled = fill_in_rate (context.rate, coded.get ());
+  const CapsPtr own = convert_caps (context, pad, filled.get (), false);
+  return intersect_caps (own.get (), templ.get ());
+}
+
+/* A pad that hands on upstream's own memory limits it to strides that the
+ * pad's peer reads, too. */
+gboolean
+CodedFilter::answer_allocation (GstQuery *query) const
+{
+  GstCaps *caps = nullptr;
+  gst_query_parse_allocation (query, &caps, nullptr);
+  GstVideoInfo info;
+  if (!caps || !gst_video_info_from_caps (&info, caps))
+    return FALSE;
+
+  const auto coded = coded_pad ();
+  if (!coded || !is_wanted (coded.get ()) ||
+      peer_reads_video_meta (coded.get (), caps))
+    gst_query_add_allocation_meta (query, GST_VIDEO_META_API_TYPE, nullptr);
+
+  const ObjectPtr<GstBufferPool> pool (gst_video_buffer_pool_new ());
+  GstStructure *config = gst_buffer_pool_get_config (pool.get ());
+  const guint size = guint (GST_VIDEO_INFO_SIZE (&info));
+  gst_buffer_pool_config_set_params (config, caps, size, 0, 0);
+  if (gst_buffer_pool_set_config (pool.get (), config))
+    gst_query_add_allocation_pool (query, pool.get (), size, 0, 0);
+  return TRUE;
+}
+
+void
+CodedFilter::add_latency (GstQuery *query) const
+{
+  gboolean live;
+  GstClockTime min, max;
+  gst_query_parse_latency (query, &live, &min, &max);
+  {
+    const ObjectLock lock (element_);
+    min += latency_;
+    if (GST_CLOCK_TIME_IS_VALID (max))
+      max += latency_;
+  }
+  gst_query_set_latency (query, live, min, max);
+}
+
+/* DURATION and POSITION count upstream's frames; @pad has more of them. */
+void
+CodedFilter::scale_frames (GstCodedPad *pad, GstQuery *query) const
+{
+  const bool duration = GST_QUERY_TYPE (query) == GST_QUERY_DURATION;
+  if (!duration && GST_QUERY_TYPE (query) != GST_QUERY_POSITION)
+    return;
+  GstFormat format;
+  gint64 frames;
+  if (duration)
+    gst_query_parse_duration (query, &format, &frames);
+  else
+    gst_query_parse_position (query, &format, &frames);
+  if (format != GST_FORMAT_DEFAULT || frames < 0)
+    return;
+  {
+    const ObjectLock lock (element_);
+    frames *= in_force_ ? pictures_a_frame (pad) : 1;
+  }
+  if (duration)
+    gst_query_set_duration (query, format, frames);
+  else
+    gst_query_set_position (query, format, frames);
+}
+
+} // namespace codedexposure::gst

@@ -1,0 +1,286 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* What coded frames are decoded with: format, schedule and mapping, from
+ * properties, caps and tags. */
+#include "coded_filter.h"
+
+#include <algorithm>
+#include <utility>
+
+GST_DEBUG_CATEGORY_EXTERN (coded_filter_debug);
+#define GST_CAT_DEFAULT coded_filter_debug
+
+namespace codedexposure::gst
+{
+
+namespace
+{
+
+std::string
+text_of (Extent size)
+{
+  return std::to_string (size.width) + "x" + std::to_string (size.height);
+}
+
+/* gst-launch shows the second text only. */
+void
+post_info (GstElement *element, const std::string &text)
+{
+  GST_ELEMENT_INFO (
+      element, STREAM, FORMAT, ("%s", text.c_str ()), ("%s", text.c_str ()));
+}
+
+} // namespace
+
+CapsPtr
+CodedFormat::resized (Extent other) const
+{
+  CapsPtr changed (gst_caps_copy (caps.get ()));
+  gst_caps_set_simple (changed.get (), "pixel-aspect-ratio", GST_TYPE_FRACTION,
+      info.par_n, info.par_d, "width", G_TYPE_INT, other.width, "height",
+      G_TYPE_INT, other.height, nullptr);
+  return changed;
+}
+
+GstFlowReturn
+CodedFilter::negotiate (GstBuffer *next)
+{
+  const auto meta = next ? get_frame_meta (next) : std::nullopt;
+  const int bits = meta ? std::max (0, meta->bits) : 0;
+  if (meta && std::exchange (stream_.bits, bits) != bits)
+    stream_.stale = true;
+  {
+    const ObjectLock lock (element_);
+    if (std::exchange (settings_changed_, false)) {
+      stream_.settings = settings_;
+      take_settings ();
+      stream_.stale = true;
+    }
+  }
+  if (stream_.stale) {
+    if (const GstFlowReturn flow = drain (); flow != GST_FLOW_OK)
+      return flow;
+    auto format = find_format ();
+    if (!format || !plan (*format))
+      return GST_FLOW_NOT_NEGOTIATED;
+    adopt (std::move (*format));
+  }
+  settle_events ();
+  return GST_FLOW_OK;
+}
+
+std::optional<CodedFormat>
+CodedFilter::find_format ()
+{
+  if (!stream_.caps) {
+    post_error ("Coded frames came without caps.");
+    return std::nullopt;
+  }
+  CodedFormat format{};
+  format.caps = fill_in_rate (stream_.settings.rate, stream_.caps.get ());
+  GstVideoInfo &info = format.info;
+  if (!gst_video_info_from_caps (&info, format.caps.get ())) {
+    post_error ("The caps of the coded frames cannot be read.");
+    return std::nullopt;
+  }
+  if (GST_VIDEO_INFO_IS_INTERLACED (&info)) {
+    post_error (
+        "The coded frames are interlaced: a coded exposure needs a camera "
+        "that exposes all rows together (progressive, global shutter).");
+    return std::nullopt;
+  }
+  if (info.fps_n == 0) {
+    post_error (
+        "The coded frames have no frame rate, so what is made of them has no "
+        "length: set the frame-rate property, for example frame-rate=25/1.");
+    return std::nullopt;
+  }
+  format.rate = {info.fps_n, info.fps_d};
+  format.size = {info.width, info.height};
+  if (!find_schedule (format))
+    return std::nullopt;
+  auto slots = SlotPlan::fit (
+      format.schedule.timing (), format.schedule.slots (), format.rate);
+  if (!slots) {
+    post_error (slots.error ().message);
+    return std::nullopt;
+  }
+  format.slots = *slots;
+  if (!find_rectifier (format))
+    return std::nullopt;
+  return format;
+}
+
+/* The property wins over the stream's tag, which wins over the default. */
+bool
+CodedFilter::find_schedule (CodedFormat &format)
+{
+  if (const auto &asked = stream_.settings.schedule.read) {
+    if (!*asked) {
+      post_error (
+          "The schedule property cannot be read: " + asked->error ().message);
+      return false;
+    }
+    format.schedule = asked->value ();
+    report_overruled (format.schedule);
+    return true;
+  }
+  if (const auto &tagged = stream_.tagged) {
+    if (!*tagged) {
+      post_error ("The schedule in the stream's tags cannot be read: " +
+                  tagged->error ().message);
+      return false;
+    }
+    format.schedule = tagged->value ().schedule;
+    return true;
+  }
+  format.assumed = true;
+  if (!std::exchange (stream_.warned_assumed, true))
+    GST_ELEMENT_WARNING (element_, STREAM, FORMAT,
+        ("The stream says nothing of its schedule: assuming %s. Set the "
+         "schedule property if it is another.",
+            format.schedule.text ().c_str ()),
+        (nullptr));
+  return true;
+}
+
+void
+CodedFilter::report_overruled (const Schedule &asked)
+{
+  if (!stream_.tagged || !*stream_.tagged)
+    return;
+  const Schedule &tagged = stream_.tagged->value ().schedule;
+  if (tagged == asked || stream_.overruled == tagged)
+    return;
+  stream_.overruled = tagged;
+  post_info (element_, "The schedule property, " + asked.text () +
+                           ", is in force. The stream was made with " +
+                           tagged.text () + ".");
+}
+
+/* The property wins over the stream's tag. Frames that were scaled or cropped
+ * since they were mapped are taken as they are. */
+bool
+CodedFilter::find_mapping (Extent camera, std::optional<Mapping> &mapping)
+{
+  if (const auto &asked = stream_.settings.mapping.read) {
+    if (!*asked) {
+      post_error (
+          "The mapping property cannot be read: " + asked->error ().message);
+      return false;
+    }
+    mapping = asked->value ();
+    if (mapping->camera () == camera)
+      return true;
+    post_error ("The mapping " + stream_.settings.mapping.text +
+                " is of frames of " + text_of (mapping->camera ()) +
+                " pixels, these have " + text_of (camera) +
+                ": map the camera as it is set now (moirecalib).");
+    return false;
+  }
+  if (stream_.tagged && *stream_.tagged)
+    mapping = stream_.tagged->value ().mapping;
+  if (!mapping || mapping->camera () == camera)
+    return true;
+  if (!std::exchange (stream_.warned_of_mapping, true))
+    GST_ELEMENT_WARNING (element_, STREAM, FORMAT,
+        ("The mapping in the stream's tags is of frames of %s pixels; these "
+         "have %s, and are taken as they are. Do not scale coded frames.",
+            text_of (mapping->camera ()).c_str (), text_of (camera).c_str ()),
+        (nullptr));
+  mapping.reset ();
+  return true;
+}
+
+bool
+CodedFilter::find_rectifier (CodedFormat &format)
+{
+  std::optional<Mapping> mapping;
+  if (!find_mapping (format.size, mapping))
+    return false;
+  if (!mapping)
+    return true;
+
+  const RectifyOptions options = rectify_options ();
+  auto &cache = stream_.rectifiers;
+  if (!cache || !(cache->mapping == *mapping) ||
+      !(cache->schedule == format.schedule) || !(cache->options == options)) {
+    auto made = Rectifier::make (*mapping, format.schedule, options);
+    if (!made) {
+      post_error ("The mapping cannot be used: " + made.error ().message);
+      return false;
+    }
+    cache.emplace (RectifierCache{*mapping, format.schedule, options,
+        std::make_shared<const Rectifier> (*std::move (made))});
+  }
+  format.rectifier = cache->rectifier;
+  format.size = format.rectifier->mirrors ();
+  return true;
+}
+
+/* Makes @format, for which the subclass has a plan, the one in force. */
+void
+CodedFilter::adopt (CodedFormat format)
+{
+  if (!has_format () || !(stream_.format->rate == format.rate))
+    stream_.sequence.emplace (
+        format.rate, stream_.sequence ? stream_.sequence->next_number () : 0);
+  stream_.format = std::move (format);
+  stream_.stale = false;
+  report_mirrors ();
+  const CodedFormat &adopted = *stream_.format;
+  bool schedule_changed;
+  {
+    const ObjectLock lock (element_);
+    schedule_changed = !in_force_ || !(*in_force_ == adopted.schedule);
+    in_force_ = std::make_shared<const Schedule> (adopted.schedule);
+    assumed_ = adopted.assumed;
+    rectifies_ = adopted.rectifier != nullptr;
+  }
+  each_pad ([this] (GstCodedPad *pad) {
+    pad->coded.allocation.reset ();
+    push_caps (pad);
+  });
+  GST_INFO_OBJECT (element_, "%s: %dx%d", adopted.schedule.text ().c_str (),
+      adopted.size.width, adopted.size.height);
+  if (schedule_changed)
+    notify ("schedule-in-force");
+  planned (schedule_changed);
+}
+
+void
+CodedFilter::push_caps (GstCodedPad *pad)
+{
+  const CapsPtr caps = caps_for (pad);
+  const CapsPtr current (gst_pad_get_current_caps (GST_PAD (pad)));
+  if (!caps || (current && gst_caps_is_equal (current.get (), caps.get ())))
+    return;
+  GstEvent *event = gst_event_new_caps (caps.get ());
+  gst_event_set_seqnum (event, stream_.caps_seqnum);
+  gst_pad_push_event (GST_PAD (pad), event);
+}
+
+void
+CodedFilter::report_mirrors ()
+{
+  const auto &rectifier = stream_.format->rectifier;
+  const RectifyReport report =
+      rectifier ? rectifier->report () : RectifyReport ();
+  const MirrorsSeen mirrors{
+      report.exact, report.weighted, report.mixed, report.unseen};
+  {
+    const ObjectLock lock (element_);
+    counters_.mirrors = mirrors;
+  }
+  if (!rectifier)
+    return;
+  notify ("stats");
+  post_message (element_, mirrors);
+}
+
+int
+CodedFilter::significant_bits () const
+{
+  return stream_.settings.bits > 0 ? stream_.settings.bits : stream_.bits;
+}
+
+} // namespace codedexposure::gst

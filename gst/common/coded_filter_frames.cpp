@@ -1,0 +1,314 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Coded frames come in: lost, corrupted, saturated and ill-timed ones are
+ * counted and reported; pictures go out. */
+#include "coded_filter.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <utility>
+
+GST_DEBUG_CATEGORY_EXTERN (coded_filter_debug);
+#define GST_CAT_DEFAULT coded_filter_debug
+
+namespace codedexposure::gst
+{
+
+namespace
+{
+
+/* Recordings round times to a microsecond; what is shorter than this is
+ * nothing. */
+constexpr GstClockTime kRounding = 10 * GST_USECOND;
+
+bool
+ends_with_stream (GstPad *sinkpad, GstClockTime stop)
+{
+  gint64 duration = -1;
+  return gst_pad_peer_query_duration (sinkpad, GST_FORMAT_TIME, &duration) &&
+         GstClockTime (duration) <= stop + kRounding;
+}
+
+} // namespace
+
+GstFlowReturn
+CodedFilter::chain (BufferPtr frame)
+{
+  GST_LOG_OBJECT (sinkpad_, "[IN] %" GST_PTR_FORMAT, frame.get ());
+  GstFlowReturn flow = check_time_stamp (frame.get ());
+  if (flow == GST_FLOW_OK)
+    flow = negotiate (frame.get ());
+  if (flow == GST_FLOW_OK)
+    frame = restore_clipped_frame (std::move (frame));
+  if (flow != GST_FLOW_OK || !frame)
+    return flow;
+  CodedFrame coded = admit (std::move (frame));
+  if (!coded.follows)
+    flow = break_off ();
+  return flow == GST_FLOW_OK ? process (std::move (coded)) : flow;
+}
+
+/* The next frame does not follow the last one. */
+GstFlowReturn
+CodedFilter::break_off ()
+{
+  const GstFlowReturn flow = drain ();
+  break_history ();
+  each_pad ([] (GstCodedPad *pad) { pad->coded.discont = true; });
+  return flow;
+}
+
+GstFlowReturn
+CodedFilter::check_time_stamp (GstBuffer *frame) const
+{
+  if (stream_.segment.format != GST_FORMAT_TIME)
+    return GST_FLOW_ERROR;
+  if (GST_BUFFER_PTS_IS_VALID (frame))
+    return GST_FLOW_OK;
+  post_error (
+      "A coded frame has no time stamp (PTS), so what is made of it cannot be "
+      "placed in time: let the source set one, for example with "
+      "do-timestamp=true.");
+  return GST_FLOW_ERROR;
+}
+
+/* Decoders clip the first frame of a segment to it, in time only: its PTS is
+ * then that of the segment, its DURATION what is left of the period. Returns
+ * the frame with the times that it had; null where only rounding is left of it,
+ * and, with a warning, where it seems to be clipped at both ends, so that its
+ * start cannot be known. */
+BufferPtr
+CodedFilter::restore_clipped_frame (BufferPtr frame) const
+{
+  const GstClockTime period = format ().period ();
+  const GstClockTime pts = GST_BUFFER_PTS (frame.get ());
+  const GstClockTime duration = GST_BUFFER_DURATION (frame.get ());
+  if (!GST_CLOCK_TIME_IS_VALID (duration) || duration + kRounding >= period)
+    return frame;
+  const bool at_start = pts == segment ().start;
+  const bool at_stop = pts + duration == segment ().stop;
+  if ((at_start || at_stop) && duration <= kRounding)
+    return nullptr;
+  if (!at_start || pts + duration < period)
+    return frame;
+  if (at_stop && !ends_with_stream (sinkpad_, segment ().stop)) {
+    GST_ELEMENT_WARNING (element_, STREAM, FORMAT,
+        ("From %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT
+         " there is one coded frame only, or a part of it, and which part is "
+         "not known: there is no picture of it. Seek to a longer stretch.",
+            GST_TIME_ARGS (segment ().start), GST_TIME_ARGS (segment ().stop)),
+        (nullptr));
+    return nullptr;
+  }
+  BufferPtr whole (gst_buffer_make_writable (frame.release ()));
+  GST_BUFFER_PTS (whole.get ()) = pts + duration - period;
+  GST_BUFFER_DURATION (whole.get ()) = period;
+  return whole;
+}
+
+void
+CodedFilter::count (guint64 CodedCounters::*counter, guint64 by)
+{
+  const ObjectLock lock (element_);
+  counters_.*counter += by;
+}
+
+/* Numbers the frame by its time; counts and reports what is lost or corrupted.
+ */
+CodedFrame
+CodedFilter::admit (BufferPtr frame)
+{
+  const GstClockTime pts = GST_BUFFER_PTS (frame.get ());
+  count (&CodedCounters::frames_in);
+  if (GST_BUFFER_FLAG_IS_SET (frame.get (), GST_BUFFER_FLAG_CORRUPTED)) {
+    count (&CodedCounters::frames_corrupted);
+    notify ("stats");
+  }
+  const FrameStep step =
+      stream_.sequence->take (Nanoseconds (pts), backwards ());
+  if (step.arrival == Arrival::after_loss)
+    report_loss (pts, step.lost);
+  else if (step.arrival != Arrival::next && step.arrival != Arrival::first)
+    warn_of_wrong_time (pts);
+  stream_.last_pts = pts;
+  const bool after_late =
+      std::exchange (stream_.was_late, step.arrival == Arrival::late);
+  const bool follows = step.arrival == Arrival::next && !after_late &&
+                       !GST_BUFFER_IS_DISCONT (frame.get ());
+  FrameMeta counted;
+  counted.frame = step.number;
+  counted.lost_before = step.lost;
+  counted = get_frame_meta (frame.get ()).value_or (counted);
+  return {std::move (frame), std::move (counted), follows};
+}
+
+void
+CodedFilter::report_loss (GstClockTime pts, guint64 lost)
+{
+  const GstClockTime period = format ().period ();
+  const GstClockTime last = stream_.last_pts;
+  const GstClockTime from =
+      backwards () ? last - std::min (last, period) : last + period;
+  GST_WARNING_OBJECT (element_,
+      "%" G_GUINT64_FORMAT " coded frames lost from %" GST_TIME_FORMAT
+      " to %" GST_TIME_FORMAT,
+      lost, GST_TIME_ARGS (from), GST_TIME_ARGS (pts));
+  count (&CodedCounters::frames_lost, lost);
+  post_message (element_, FramesLost{lost, from, pts});
+  notify ("stats");
+}
+
+void
+CodedFilter::warn_of_wrong_time (GstClockTime pts)
+{
+  if (std::exchange (stream_.warned_of_time, true))
+    return;
+  GST_ELEMENT_WARNING (element_, STREAM, FORMAT,
+      ("A coded frame at %" GST_TIME_FORMAT " follows one at %" GST_TIME_FORMAT
+       ", where frames are %" GST_TIME_FORMAT " apart: what is made of it "
+       "overlaps with others in time.",
+          GST_TIME_ARGS (pts), GST_TIME_ARGS (stream_.last_pts),
+          GST_TIME_ARGS (format ().period ())),
+      ("this is said once"));
+}
+
+void
+CodedFilter::note_saturation (const CodedFrame &frame)
+{
+  /* Noise lifts a bright pixel to white in one frame and not in the next. */
+  constexpr GstClockTimeDiff kCalm = GST_SECOND;
+  if (frame.has_flags (GST_BUFFER_FLAG_GAP))
+    return;
+  const GstClockTime pts = frame.pts ();
+  Burst &burst = stream_.saturation;
+  if (frame.meta.saturated == 0) {
+    if (burst.frames > 0 && std::abs (GST_CLOCK_DIFF (burst.to, pts)) >= kCalm)
+      end_saturation ();
+    return;
+  }
+  count (&CodedCounters::saturated_frames);
+  burst.to = pts;
+  burst.peak = std::max (burst.peak, frame.meta.saturated);
+  if (burst.frames++ > 0)
+    return;
+  burst.from = pts;
+  post_message (element_, Saturated{.active = true,
+                              .frame = frame.meta.frame,
+                              .frames = {},
+                              .from = pts,
+                              .to = {},
+                              .pixels = frame.meta.saturated});
+  notify ("stats");
+}
+
+void
+CodedFilter::end_saturation ()
+{
+  const Burst burst = std::exchange (stream_.saturation, {});
+  if (burst.frames == 0)
+    return;
+  post_message (element_, Saturated{.active = false,
+                              .frame = {},
+                              .frames = burst.frames,
+                              .from = burst.from,
+                              .to = burst.to,
+                              .pixels = burst.peak});
+  notify ("stats");
+}
+
+MappedFrame
+CodedFilter::map_coded (GstBuffer *frame) const
+{
+  const GstVideoInfo &info = format ().info;
+  MappedFrame coded (info, frame, GST_MAP_READ);
+  if (!coded)
+    GST_ELEMENT_ERROR (element_, STREAM, FORMAT,
+        ("A coded frame of %" G_GSIZE_FORMAT " bytes cannot be read as %dx%d "
+         "pixels, which take %" G_GSIZE_FORMAT ".",
+            gst_buffer_get_size (frame), info.width, info.height,
+            GST_VIDEO_INFO_SIZE (&info)),
+        (nullptr));
+  return coded;
+}
+
+template <typename Pixel>
+Result<ImageView<const Pixel>>
+CodedFilter::rectify (ImageView<const Pixel> coded)
+{
+  const Rectifier *rectifier = format ().rectifier.get ();
+  if (!rectifier)
+    return coded;
+  Image<Pixel> &rectified =
+      std::get<Image<Pixel> &> (std::tie (stream_.narrow, stream_.wide));
+  const Extent size = rectifier->mirrors ();
+  if (rectified.width () != size.width || rectified.height () != size.height)
+    rectified = Image<Pixel> (size.width, size.height);
+  const int bits = significant_bits ();
+  if (const auto done = rectifier->run (
+          coded, rectified.view (), bits > 0 ? (1 << bits) - 1 : 0);
+      !done)
+    return done.error ();
+  return ImageView<const Pixel> (rectified.view ());
+}
+
+template Result<ImageView<const std::uint8_t>> CodedFilter::rectify (
+    ImageView<const std::uint8_t>);
+template Result<ImageView<const std::uint16_t>> CodedFilter::rectify (
+    ImageView<const std::uint16_t>);
+
+/* A seek may begin or end within a coded frame. */
+bool
+CodedFilter::is_within (GstClockTime pts, GstClockTime duration) const
+{
+  guint64 from, to;
+  return gst_segment_clip (
+             &segment (), GST_FORMAT_TIME, pts, pts + duration, &from, &to) &&
+         to - from > std::min (kRounding, duration / 2);
+}
+
+GstFlowReturn
+CodedFilter::acquire_picture (GstCodedPad *pad, const GstVideoInfo &info,
+    BufferPtr &buffer, MappedFrame &mapped) const
+{
+  const GstFlowReturn flow = acquire (pad, buffer);
+  if (flow == GST_FLOW_FLUSHING)
+    return flow;
+  if (buffer)
+    mapped.map (info, buffer.get (), GST_MAP_WRITE);
+  if (buffer && mapped)
+    return GST_FLOW_OK;
+  GST_ELEMENT_ERROR (element_, RESOURCE, NO_SPACE_LEFT,
+      ("No buffer for a picture of %dx%d pixels.", info.width, info.height),
+      ("pool %" GST_PTR_FORMAT, pad->coded.allocation->pool.get ()));
+  return GST_FLOW_ERROR;
+}
+
+void
+CodedFilter::describe (GstBuffer *outbuf, GstBuffer *coded, FrameMeta meta,
+    const Picture &picture) const
+{
+  gst_buffer_copy_into (outbuf, coded, GST_BUFFER_COPY_FLAGS, 0, -1);
+  GST_BUFFER_FLAG_UNSET (outbuf, GST_BUFFER_FLAG_MARKER);
+  if (picture.of_region)
+    copy_metas_to_part (coded, outbuf);
+  else
+    copy_metas (coded, format ().info, outbuf, picture.info);
+
+  meta.subframe = picture.index;
+  meta.bits = significant_bits_of (significant_bits (), picture.info);
+  meta.exposure_start = picture.exposure_start;
+  meta.exposure_duration = picture.exposure_duration;
+  set_frame_meta (outbuf, meta);
+  GST_BUFFER_PTS (outbuf) = picture.pts;
+  GST_BUFFER_DTS (outbuf) = GST_CLOCK_TIME_NONE;
+}
+
+GstFlowReturn
+CodedFilter::push (GstCodedPad *pad, BufferPtr outbuf, GstClockTime duration)
+{
+  const GstFlowReturn flow = push_picture (pad, std::move (outbuf), duration);
+  if (flow == GST_FLOW_OK)
+    count (&CodedCounters::pictures_out);
+  return flow;
+}
+
+} // namespace codedexposure::gst

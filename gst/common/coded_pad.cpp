@@ -1,0 +1,218 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Buffers of source pads: from downstream's pool where it offers one, else from
+ * an own pool. */
+#include "coded_pad.h"
+
+#include <algorithm>
+#include <new>
+#include <utility>
+
+#include "pool.h"
+
+GST_DEBUG_CATEGORY_EXTERN (coded_filter_debug);
+#define GST_CAT_DEFAULT coded_filter_debug
+
+G_DEFINE_TYPE (GstCodedPad, gst_coded_pad, GST_TYPE_PAD)
+
+static void
+gst_coded_pad_finalize (GObject *object)
+{
+  using codedexposure::gst::CodedPad;
+  GST_CODED_PAD (object)->coded.~CodedPad ();
+  G_OBJECT_CLASS (gst_coded_pad_parent_class)->finalize (object);
+}
+
+static void
+gst_coded_pad_class_init (GstCodedPadClass *klass)
+{
+  G_OBJECT_CLASS (klass)->finalize = gst_coded_pad_finalize;
+}
+
+static void
+gst_coded_pad_init (GstCodedPad *self)
+{
+  new (&self->coded) codedexposure::gst::CodedPad;
+}
+
+namespace codedexposure::gst
+{
+
+namespace
+{
+
+/* What the peer of a pad asks for. */
+struct Offer {
+  ObjectPtr<GstBufferPool> pool;
+  guint size = 0, min = 0, max = 0;
+  ObjectPtr<GstAllocator> allocator;
+  GstAllocationParams params;
+  bool video_meta = false;
+};
+
+Offer
+ask_downstream (GstPad *pad, GstCaps *caps)
+{
+  Offer offer;
+  gst_allocation_params_init (&offer.params);
+  const QueryPtr query (gst_query_new_allocation (caps, TRUE));
+  if (!gst_pad_peer_query (pad, query.get ())) {
+    GST_DEBUG_OBJECT (pad, "downstream does not answer ALLOCATION");
+    return offer;
+  }
+  offer.video_meta = gst_query_find_allocation_meta (
+      query.get (), GST_VIDEO_META_API_TYPE, nullptr);
+  if (gst_query_get_n_allocation_params (query.get ()) > 0) {
+    GstAllocator *allocator = nullptr;
+    gst_query_parse_nth_allocation_param (
+        query.get (), 0, &allocator, &offer.params);
+    offer.allocator.reset (allocator);
+  }
+  if (gst_query_get_n_allocation_pools (query.get ()) > 0) {
+    GstBufferPool *pool = nullptr;
+    gst_query_parse_nth_allocation_pool (
+        query.get (), 0, &pool, &offer.size, &offer.min, &offer.max);
+    offer.pool.reset (pool);
+  }
+  return offer;
+}
+
+/* @at_once buffers are in use at the same time, beside those that downstream
+ * holds. */
+bool
+configure (GstBufferPool *pool, const Offer &offer, GstCaps *caps, guint size,
+    guint at_once)
+{
+  const guint min = offer.min + at_once;
+  GstStructure *config = gst_buffer_pool_get_config (pool);
+  gst_buffer_pool_config_set_params (config, caps, size, min, offer.max);
+  gst_buffer_pool_config_set_allocator (
+      config, offer.allocator.get (), &offer.params);
+  if (offer.video_meta &&
+      gst_buffer_pool_has_option (pool, GST_BUFFER_POOL_OPTION_VIDEO_META))
+    gst_buffer_pool_config_add_option (
+        config, GST_BUFFER_POOL_OPTION_VIDEO_META);
+  if (gst_buffer_pool_set_config (pool, config))
+    return true;
+
+  /* The pool has changed the configuration to what it can do. */
+  config = gst_buffer_pool_get_config (pool);
+  if (gst_buffer_pool_config_validate_params (
+          config, caps, size, min, offer.max))
+    return gst_buffer_pool_set_config (pool, config);
+  gst_structure_free (config);
+  return false;
+}
+
+/* All pictures of a coded frame are written together, so a pool that cannot
+ * give them all at once would never give the last one. */
+GstBufferPool *
+choose_pool (
+    GstPad *pad, Offer &offer, GstCaps *caps, gsize frame_size, guint at_once)
+{
+  const guint size = std::max (guint (frame_size), offer.size);
+  if (offer.pool) {
+    if (offer.max != 0 && offer.max < offer.min + at_once)
+      GST_INFO_OBJECT (
+          pad, "downstream's pool holds %u buffers, too few", offer.max);
+    else if (configure (offer.pool.get (), offer, caps, size, at_once))
+      return offer.pool.release ();
+    offer.min = offer.max = 0;
+  }
+  GstBufferPool *pool = make_picture_pool ();
+  if (configure (pool, offer, caps, size, 0))
+    return pool;
+  gst_object_unref (pool);
+  return nullptr;
+}
+
+} // namespace
+
+bool
+is_wanted (GstPad *pad)
+{
+  return gst_pad_is_linked (pad) || gst_pad_is_blocked (pad);
+}
+
+bool
+peer_reads_video_meta (GstPad *pad, GstCaps *caps)
+{
+  return ask_downstream (pad, caps).video_meta;
+}
+
+void
+prepare_allocation (GstCodedPad *coded, GstCaps *caps, guint at_once)
+{
+  GstPad *pad = GST_PAD (coded);
+  std::optional<Allocation> &allocation = coded->coded.allocation;
+  if (gst_pad_check_reconfigure (pad))
+    allocation.reset ();
+  if (allocation)
+    return;
+
+  GstVideoInfo info;
+  gst_video_info_from_caps (&info, caps);
+  Offer offer = ask_downstream (pad, caps);
+  allocation.emplace ();
+  allocation->video_meta = offer.video_meta;
+  allocation->pool.reset (
+      choose_pool (pad, offer, caps, GST_VIDEO_INFO_SIZE (&info), at_once));
+  GST_DEBUG_OBJECT (pad, "pool %" GST_PTR_FORMAT ", video meta %s",
+      allocation->pool.get (), allocation->video_meta ? "yes" : "no");
+}
+
+GstFlowReturn
+acquire (GstCodedPad *pad, BufferPtr &outbuf)
+{
+  Allocation &allocation = *pad->coded.allocation;
+  if (!allocation.active && allocation.pool)
+    allocation.active =
+        gst_buffer_pool_set_active (allocation.pool.get (), TRUE);
+  if (!allocation.active)
+    return GST_FLOW_ERROR;
+  GstBuffer *buffer = nullptr;
+  const GstFlowReturn flow =
+      gst_buffer_pool_acquire_buffer (allocation.pool.get (), &buffer, nullptr);
+  outbuf.reset (buffer);
+  return flow;
+}
+
+GstFlowReturn
+push_picture (GstCodedPad *pad, BufferPtr outbuf, GstClockTime duration)
+{
+  CodedPad &coded = pad->coded;
+  GST_BUFFER_DURATION (outbuf.get ()) = duration;
+  GST_BUFFER_OFFSET (outbuf.get ()) = coded.offset++;
+  GST_BUFFER_OFFSET_END (outbuf.get ()) = coded.offset;
+  /* Flags of the coded frame are not those of each picture. */
+  if (std::exchange (coded.discont, false)) {
+    GST_BUFFER_FLAG_SET (outbuf.get (), GST_BUFFER_FLAG_DISCONT);
+  } else {
+    GST_BUFFER_FLAG_UNSET (outbuf.get (), GST_BUFFER_FLAG_DISCONT);
+    GST_BUFFER_FLAG_UNSET (outbuf.get (), GST_BUFFER_FLAG_RESYNC);
+  }
+  GST_LOG_OBJECT (pad, "[OUT] %" GST_PTR_FORMAT, outbuf.get ());
+  return gst_pad_push (GST_PAD (pad), outbuf.release ());
+}
+
+void
+note_lateness (GstCodedPad *pad, GstEvent *event)
+{
+  CodedPad &coded = pad->coded;
+  GstQOSType type;
+  GstClockTime time = GST_CLOCK_TIME_NONE;
+  gst_event_parse_qos (event, &type, &coded.proportion, &coded.jitter, &time);
+  coded.earliest =
+      GST_CLOCK_TIME_IS_VALID (time)
+          ? GstClockTime (std::max<gint64> (gint64 (time) + coded.jitter, 0))
+          : GST_CLOCK_TIME_NONE;
+}
+
+void
+forget_lateness (GstCodedPad *pad)
+{
+  pad->coded.earliest = GST_CLOCK_TIME_NONE;
+  pad->coded.proportion = 1.0;
+  pad->coded.jitter = 0;
+}
+
+} // namespace codedexposure::gst

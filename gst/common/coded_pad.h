@@ -1,0 +1,94 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The source pads of what consumes coded frames. */
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include <gst/gst.h>
+
+#include "raii.h"
+
+G_BEGIN_DECLS
+
+#define GST_TYPE_CODED_PAD (gst_coded_pad_get_type ())
+G_DECLARE_FINAL_TYPE (GstCodedPad, gst_coded_pad, GST, CODED_PAD, GstPad)
+
+G_END_DECLS
+
+namespace codedexposure::gst
+{
+
+/** Where the buffers of a pad come from. */
+struct Allocation {
+  PoolPtr pool;
+  /** Only a pool that is used is active, because starting it allocates. */
+  bool active = false;
+  /** The peer reads strides and offsets from the GstVideoMeta. */
+  bool video_meta = false;
+};
+
+/** What a pad gets for each coded frame. */
+enum class PadKind {
+  coded,  ///< the coded frame
+  all,    ///< all pictures, at the raised rate
+  one,    ///< one picture, at the rate of coded frames
+  region, ///< all pictures of one region
+};
+
+struct CodedPad {
+  PadKind kind = PadKind::all;
+  int index = -1; ///< of the picture or the region
+
+  /* Stream lock of the sink pad. */
+  bool discont = true;
+  guint64 offset = 0;
+  std::optional<Allocation> allocation;
+
+  /* Object lock of the element. */
+  bool released = false;
+  /** Running time before which a picture would be late. */
+  GstClockTime earliest = GST_CLOCK_TIME_NONE;
+  gdouble proportion = 1.0;
+  GstClockTimeDiff jitter = 0;
+};
+
+} // namespace codedexposure::gst
+
+struct _GstCodedPad {
+  GstPad parent;
+  codedexposure::gst::CodedPad coded;
+};
+
+namespace codedexposure::gst
+{
+
+/** Whether a buffer pushed there reaches anything: a peer, or a blocking probe
+ * that waits for data. */
+bool is_wanted (GstPad *pad);
+
+/** Whether the peer of @p pad reads strides and offsets from a GstVideoMeta. */
+bool peer_reads_video_meta (GstPad *pad, GstCaps *caps);
+
+/**
+ * Asks the peer for its pool, where that is due: at first, after a RECONFIGURE,
+ * and when the allocation was reset. Without one, buffers come from an own
+ * pool. Sink pad's stream lock.
+ *
+ * @p at_once  buffers of the pool that are in use at the same time.
+ */
+void prepare_allocation (GstCodedPad *pad, GstCaps *caps, guint at_once);
+/** A buffer from the pool of @p pad, which has been prepared. */
+GstFlowReturn acquire (GstCodedPad *pad, BufferPtr &outbuf);
+
+/** Pushes @p outbuf, which is writable, with what the pad knows: OFFSET counts
+ * buffers, DISCONT marks the first one and those after a break. */
+GstFlowReturn push_picture (
+    GstCodedPad *pad, BufferPtr outbuf, GstClockTime duration);
+
+/** Keeps what a QOS event says. What runs before the moment at which the sink
+ * was, could not be in time either. Object lock of the element. */
+void note_lateness (GstCodedPad *pad, GstEvent *event);
+void forget_lateness (GstCodedPad *pad);
+
+} // namespace codedexposure::gst

@@ -1,0 +1,42 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The plugin's custom events and queries: new_event (), parse_event (),
+ * new_query (), answer_query () and parse_query () build and read them. */
+#pragma once
+
+#include "structure.h"
+
+namespace codedexposure::gst
+{
+
+/** Any element downstream of dmdsync can request a pattern; it expires unless
+ * it is requested again. */
+struct PatternRequest {
+  static constexpr const char *kName = "dmdsync/pattern";
+  static constexpr GstEventType kType = GST_EVENT_CUSTOM_UPSTREAM;
+  std::optional<std::string> pattern; ///< none or empty: the schedule's masks
+  std::optional<guint64> frames;      ///< for how many; none: dmdsync's default
+
+  static auto fields ()
+  {
+    return std::tuple (field ("pattern", &PatternRequest::pattern),
+        field ("frames", &PatternRequest::frames));
+  }
+};
+
+/** Query: which mirrors dmdsync controls, and whether it can show patterns. */
+struct MirrorsAnswer {
+  static constexpr const char *kName = "dmdsync/mirrors";
+  gint width = 0, height = 0; ///< of the mirror array; 0: no device
+  bool patterns = false;      ///< PatternRequest is served
+  std::string reason = {};    ///< why not
+
+  static auto fields ()
+  {
+    return std::tuple (field ("width", &MirrorsAnswer::width),
+        field ("height", &MirrorsAnswer::height),
+        field ("patterns", &MirrorsAnswer::patterns),
+        field ("reason", &MirrorsAnswer::reason));
+  }
+};
+
+} // namespace codedexposure::gst

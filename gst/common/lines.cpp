@@ -1,0 +1,95 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "lines.h"
+
+#include <cerrno>
+#include <utility>
+
+#include <fcntl.h>
+#include <unistd.h>
+
+namespace codedexposure::gst
+{
+
+namespace
+{
+
+/** Writes all of @p text; 0, or the errno of the failure. */
+int
+write_all (int file, const std::string &text)
+{
+  std::size_t written = 0;
+  while (written < text.size ()) {
+    const ssize_t n =
+        ::write (file, text.data () + written, text.size () - written);
+    if (n < 0 && errno == EINTR)
+      continue;
+    if (n < 0)
+      return errno;
+    written += std::size_t (n);
+  }
+  return 0;
+}
+
+} // namespace
+
+bool
+LineFile::open (const std::string &location)
+{
+  location_ = location;
+  file_ = ::open (
+      location.c_str (), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  if (file_ >= 0)
+    return true;
+  GST_ELEMENT_ERROR (element_, RESOURCE, OPEN_WRITE,
+      ("Cannot open \"%s\" for writing: %s", location.c_str (),
+          g_strerror (errno)),
+      (nullptr));
+  return false;
+}
+
+bool
+LineFile::write (const std::string &line)
+{
+  const int failure = write_all (file_, line + "\n");
+  if (failure == 0)
+    return true;
+  gst_element_message_full (element_, GST_MESSAGE_ERROR, GST_RESOURCE_ERROR,
+      failure == ENOSPC ? GST_RESOURCE_ERROR_NO_SPACE_LEFT
+                        : GST_RESOURCE_ERROR_WRITE,
+      g_strdup_printf (
+          "Cannot write to \"%s\": %s. It holds the frames up to here.",
+          location_.c_str (), g_strerror (failure)),
+      nullptr, __FILE__, GST_FUNCTION, __LINE__);
+  return false;
+}
+
+void
+LineFile::close ()
+{
+  /* Network and quota errors may wait for the end. */
+  if (file_ >= 0 && ::close (std::exchange (file_, -1)) != 0)
+    GST_ELEMENT_ERROR (element_, RESOURCE, CLOSE,
+        ("Cannot finish \"%s\": %s", location_.c_str (), g_strerror (errno)),
+        (nullptr));
+}
+
+std::vector<const char *>
+flag_names (GstBuffer *buffer)
+{
+  static constexpr struct {
+    GstBufferFlags flag;
+    const char *name;
+  } kNames[] = {
+      {GST_BUFFER_FLAG_DISCONT, "discont"},
+      {GST_BUFFER_FLAG_CORRUPTED, "corrupted"},
+      {GST_BUFFER_FLAG_GAP, "gap"},
+      {GST_BUFFER_FLAG_DROPPABLE, "droppable"},
+  };
+  std::vector<const char *> names;
+  for (const auto &[flag, name] : kNames)
+    if (GST_BUFFER_FLAG_IS_SET (buffer, flag))
+      names.push_back (name);
+  return names;
+}
+
+} // namespace codedexposure::gst

@@ -1,0 +1,181 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* What elements say on the bus, by element messages; docs/formats.md describes
+ * them for users. post_message () sends one, parse_message () reads it. Times
+ * are in ns, on the clock of the PTS. */
+#pragma once
+
+#include "structure.h"
+
+namespace codedexposure::gst
+{
+
+/** Coded frames never arrived. */
+struct FramesLost {
+  static constexpr const char *kName = "codedexposure/frames-lost";
+  guint64 count = 0;
+  GstClockTime from = 0; ///< when the first of them was due
+  GstClockTime to = 0;   ///< of the frame that came instead
+
+  static auto fields ()
+  {
+    return std::tuple (field ("count", &FramesLost::count),
+        field ("from", &FramesLost::from), field ("to", &FramesLost::to));
+  }
+};
+
+/** A sequence of saturated frames begins or ends. */
+struct Saturated {
+  static constexpr const char *kName = "codedexposure/saturated";
+  bool active = false;           ///< it begins
+  std::optional<guint64> frame;  ///< at the beginning: its number
+  std::optional<guint64> frames; ///< at the end: how many there were
+  GstClockTime from = 0;
+  std::optional<GstClockTime> to; ///< at the end
+  /** Saturated pixels of the first frame; at the end, of the worst. */
+  guint64 pixels = 0;
+
+  static auto fields ()
+  {
+    return std::tuple (field ("active", &Saturated::active),
+        field ("frame", &Saturated::frame),
+        field ("frames", &Saturated::frames), field ("from", &Saturated::from),
+        field ("to", &Saturated::to), field ("pixels", &Saturated::pixels));
+  }
+};
+
+/** How well the camera sees the mirrors, in numbers of mirrors. */
+struct MirrorsSeen {
+  static constexpr const char *kName = "codedexposure/mapping";
+  guint64 exact = 0;    ///< one pixel sees the mirror, and nothing else
+  guint64 weighted = 0; ///< estimated from pixels that see neighbours, too
+  guint64 mixed = 0;    ///< of these, no pixel gets half of its light from it
+  guint64 unseen = 0;   ///< no pixel sees the mirror; black
+
+  static auto fields ()
+  {
+    return std::tuple (field ("exact", &MirrorsSeen::exact),
+        field ("weighted", &MirrorsSeen::weighted),
+        field ("mixed", &MirrorsSeen::mixed),
+        field ("unseen", &MirrorsSeen::unseen));
+  }
+};
+
+/** What moirecalib advises, and how sure it is. */
+struct StageMove {
+  gdouble offset_x = 0, offset_y = 0; ///< from the aligned position, mirrors
+  gdouble rotation = 0;               ///< degrees
+  gdouble magnification = 1;          ///< pixels a mirror
+  gdouble deviation = 0;              ///< largest distance of a corner, mirrors
+  gdouble stage_x = 0, stage_y = 0;   ///< µm
+  gdouble stage_theta = 0;            ///< thousandths of a degree
+  gdouble magnify = 0;                ///< thousandths
+  gdouble sigma_x = 0, sigma_y = 0, sigma_rotation = 0;
+  gdouble sigma_magnification = 0; ///< standard deviations
+
+  static auto fields ()
+  {
+    return std::tuple (field ("offset-x", &StageMove::offset_x),
+        field ("offset-y", &StageMove::offset_y),
+        field ("rotation", &StageMove::rotation),
+        field ("magnification", &StageMove::magnification),
+        field ("deviation", &StageMove::deviation),
+        field ("stage-x", &StageMove::stage_x),
+        field ("stage-y", &StageMove::stage_y),
+        field ("stage-theta", &StageMove::stage_theta),
+        field ("magnify", &StageMove::magnify),
+        field ("sigma-x", &StageMove::sigma_x),
+        field ("sigma-y", &StageMove::sigma_y),
+        field ("sigma-rotation", &StageMove::sigma_rotation),
+        field ("sigma-magnification", &StageMove::sigma_magnification));
+  }
+};
+
+/** moirecalib has come to another stage. */
+struct MoireState {
+  static constexpr const char *kName = "moirecalib/state";
+  std::string state, before;
+
+  static auto fields ()
+  {
+    return std::tuple (field ("state", &MoireState::state),
+        field ("before", &MoireState::before));
+  }
+};
+
+/** A frame of the live grating was read. */
+struct MoireReading : StageMove {
+  static constexpr const char *kName = "moirecalib/reading";
+  guint64 frame = 0;
+  GstClockTime pts = 0;
+  std::string state;
+  gdouble contrast_x = 0, contrast_y = 0; ///< 1: as sharp as can be
+  gdouble coverage = 0; ///< part of the frame that shows the grating
+  guint64 saturated = 0;
+
+  static auto fields ()
+  {
+    return std::tuple_cat (std::tuple (field ("frame", &MoireReading::frame),
+                               field ("pts", &MoireReading::pts),
+                               field ("state", &MoireReading::state),
+                               field ("contrast-x", &MoireReading::contrast_x),
+                               field ("contrast-y", &MoireReading::contrast_y),
+                               field ("coverage", &MoireReading::coverage),
+                               field ("saturated", &MoireReading::saturated)),
+        StageMove::fields ());
+  }
+};
+
+/** The phase of the tile was found. */
+struct MoirePhase {
+  static constexpr const char *kName = "moirecalib/phase";
+  guint64 frame = 0;
+  GstClockTime pts = 0;
+  gint phase_x = 0, phase_y = 0;
+  gdouble confidence = 0;
+  gdouble contrast = 0;
+  std::string schedule; ///< with this phase
+
+  static auto fields ()
+  {
+    return std::tuple (field ("frame", &MoirePhase::frame),
+        field ("pts", &MoirePhase::pts),
+        field ("phase-x", &MoirePhase::phase_x),
+        field ("phase-y", &MoirePhase::phase_y),
+        field ("confidence", &MoirePhase::confidence),
+        field ("contrast", &MoirePhase::contrast),
+        field ("schedule", &MoirePhase::schedule));
+  }
+};
+
+/** The mapping was found. */
+struct MoireMapping : StageMove {
+  static constexpr const char *kName = "moirecalib/mapping";
+  std::string mapping;          ///< JSON
+  std::string location, report; ///< files that were written; empty: none
+  gdouble shift_x = 0, shift_y = 0, stretch = 0;
+  gdouble psf_sigma = 0; ///< pixels
+  gdouble misfit = 0;
+  guint64 good = 0, uncovered = 0, low_contrast = 0, saturated = 0;
+  guint64 outlier = 0; ///< numbers of pixels
+
+  static auto fields ()
+  {
+    return std::tuple_cat (
+        std::tuple (field ("mapping", &MoireMapping::mapping),
+            field ("location", &MoireMapping::location),
+            field ("report", &MoireMapping::report),
+            field ("shift-x", &MoireMapping::shift_x),
+            field ("shift-y", &MoireMapping::shift_y),
+            field ("stretch", &MoireMapping::stretch),
+            field ("psf-sigma", &MoireMapping::psf_sigma),
+            field ("misfit", &MoireMapping::misfit),
+            field ("good", &MoireMapping::good),
+            field ("uncovered", &MoireMapping::uncovered),
+            field ("low-contrast", &MoireMapping::low_contrast),
+            field ("saturated", &MoireMapping::saturated),
+            field ("outlier", &MoireMapping::outlier)),
+        StageMove::fields ());
+  }
+};
+
+} // namespace codedexposure::gst

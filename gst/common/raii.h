@@ -1,0 +1,125 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Owners for GStreamer's references and locks, and the border for exceptions.
+ */
+#pragma once
+
+#include <memory>
+#include <utility>
+
+#include <gst/gst.h>
+#include <gst/video/video.h>
+
+#include "base/image.h"
+
+namespace codedexposure::gst
+{
+
+struct MiniObjectUnref {
+  void operator() (gpointer object) const
+  {
+    gst_mini_object_unref (GST_MINI_OBJECT_CAST (object));
+  }
+};
+using BufferPtr = std::unique_ptr<GstBuffer, MiniObjectUnref>;
+using CapsPtr = std::unique_ptr<GstCaps, MiniObjectUnref>;
+using EventPtr = std::unique_ptr<GstEvent, MiniObjectUnref>;
+using QueryPtr = std::unique_ptr<GstQuery, MiniObjectUnref>;
+
+struct ObjectUnref {
+  void operator() (gpointer object) const { gst_object_unref (object); }
+};
+template <typename T>
+using ObjectPtr = std::unique_ptr<T, ObjectUnref>;
+
+/** Stops a pool before it gives it up. */
+struct PoolRelease {
+  void operator() (GstBufferPool *pool) const
+  {
+    gst_buffer_pool_set_active (pool, FALSE);
+    gst_object_unref (pool);
+  }
+};
+using PoolPtr = std::unique_ptr<GstBufferPool, PoolRelease>;
+
+struct StructureFree {
+  void operator() (GstStructure *structure) const
+  {
+    gst_structure_free (structure);
+  }
+};
+using StructurePtr = std::unique_ptr<GstStructure, StructureFree>;
+
+struct GFree {
+  void operator() (gpointer memory) const { g_free (memory); }
+};
+using CharPtr = std::unique_ptr<gchar, GFree>;
+
+/** Holds the object lock for a scope. Never push, query or block inside. */
+class ObjectLock
+{
+public:
+  explicit ObjectLock (gpointer object) : object_ (object)
+  {
+    GST_OBJECT_LOCK (object_);
+  }
+  ~ObjectLock () { GST_OBJECT_UNLOCK (object_); }
+  ObjectLock (const ObjectLock &) = delete;
+  ObjectLock &operator= (const ObjectLock &) = delete;
+
+private:
+  gpointer object_;
+};
+
+/** A mapped video frame; test it before frame (). */
+class MappedFrame
+{
+public:
+  MappedFrame () = default;
+  MappedFrame (const GstVideoInfo &info, GstBuffer *buffer, GstMapFlags flags)
+  {
+    map (info, buffer, flags);
+  }
+  ~MappedFrame () { reset (); }
+  MappedFrame (MappedFrame &&other) noexcept
+      : frame_ (other.frame_), mapped_ (std::exchange (other.mapped_, false))
+  {
+  }
+  MappedFrame &operator= (MappedFrame &&) = delete;
+
+  /** Once, where it is not mapped. */
+  void map (const GstVideoInfo &info, GstBuffer *buffer, GstMapFlags flags)
+  {
+    mapped_ = gst_video_frame_map (&frame_, const_cast<GstVideoInfo *> (&info),
+        buffer,
+        GstMapFlags (int (flags) | int (GST_VIDEO_FRAME_MAP_FLAG_NO_REF)));
+  }
+  explicit operator bool () const { return mapped_; }
+  GstVideoFrame *frame () { return &frame_; }
+  void reset ()
+  {
+    if (std::exchange (mapped_, false))
+      gst_video_frame_unmap (&frame_);
+  }
+
+private:
+  GstVideoFrame frame_ = {};
+  bool mapped_ = false;
+};
+
+/** The pixels of a mapped grey frame, whatever its strides. */
+template <typename Pixel>
+ImageView<Pixel>
+view_of (GstVideoFrame *frame)
+{
+  return {static_cast<Pixel *> (GST_VIDEO_FRAME_PLANE_DATA (frame, 0)),
+      GST_VIDEO_FRAME_WIDTH (frame), GST_VIDEO_FRAME_HEIGHT (frame),
+      GST_VIDEO_FRAME_PLANE_STRIDE (frame, 0)};
+}
+template <typename Pixel>
+ImageView<Pixel>
+view_of (MappedFrame &mapped)
+{
+  return view_of<Pixel> (mapped.frame ());
+}
+
+} // namespace codedexposure::gst

@@ -1,0 +1,34 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The stream tag that carries a schedule and, if known, a mapping:
+ * GST_TAG_COMMENT = "coded-exposure={...}". */
+#pragma once
+
+#include <optional>
+
+#include <gst/gst.h>
+
+#include "base/result.h"
+#include "mapping/stream_setup.h"
+#include "schedule/schedule.h"
+
+namespace codedexposure::gst
+{
+
+/** A tag list that says the schedule; Transfer: full. */
+GstTagList *schedule_to_tags (const Schedule &schedule);
+/** A TAG event that says the schedule; Transfer: full. */
+GstEvent *schedule_to_event (const Schedule &schedule);
+
+/** The same with a mapping. */
+GstEvent *setup_to_event (const StreamSetup &setup);
+
+/** Schedule and mapping in @p tags; as schedule_from_tags (). */
+std::optional<Result<StreamSetup>> setup_from_tags (const GstTagList *tags);
+/** The schedule in @p tags: none where no comment speaks of one, an error
+ * where one does and cannot be read. */
+std::optional<Result<Schedule>> schedule_from_tags (const GstTagList *tags);
+
+/** @p tags with @p setup in place of what they say of one; Transfer: full. */
+GstTagList *tags_with_setup (const GstTagList *tags, const StreamSetup &setup);
+
+} // namespace codedexposure::gst

@@ -1,0 +1,533 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-codedexposure-demux
+ * @title: codedexposure-demux
+ * @short_description: Splits coded frames into subframes
+ *
+ * Takes the frames of a camera behind a micromirror device, in which
+ * neighbouring pixels saw different parts of the exposure, and gives n
+ * subframes for each: pictures of lower resolution at n times the frame rate.
+ *
+ * ## Pads
+ *
+ * - `src`: all subframes in the order of their exposure. Subframe k of a frame
+ *   at time P, of a camera with frame period T, has PTS P + floor (k T / n) and
+ *   lasts until the next one; OFFSET counts subframes.
+ * - `subframe_0` to `subframe_<n-1>` (request): one subframe of every frame,
+ *   at the camera's rate; the same memory as on `src`.
+ * - `region_<i>` (request): all subframes of region i of the schedule, at the
+ *   camera's rate times the region's own n.
+ * - `coded` (request): the coded frames, the same memory as they came in. It
+ *   is served first, so that a recorder never waits for a display.
+ *
+ * One thread serves all pads: put a `queue` after each.
+ *
+ * |[
+ *   coded frame   |P                              |P + T
+ *   src           |0      |1      |2      |3      |0 ...
+ *   subframe_2    |               |P + 2T/4, lasts T
+ * ]|
+ *
+ * The period comes from the caps, or from #GstCodedFilter:frame-rate
+ * where they have none; a lost frame never stretches its neighbours.
+ *
+ * ## Schedule
+ *
+ * The schedule defines which pixel saw which part of the exposure. It is the
+ * #GstCodedFilter:schedule property, else that of the stream's tag
+ * `comment=coded-exposure={...}`, else sequential:2x2 with a warning on the bus.
+ * Source pads get their caps with the first frame, because tags come after
+ * caps. Width and height are divided by the cell of the
+ * tile, pixel-aspect-ratio follows; columns and rows that fill no cell, and the
+ * pilot's rows, are cropped.
+ *
+ * Where the schedule has regions, areas with a tile and a code of their own,
+ * `src` and `subframe_<k>` show the background, which has the tile and the code
+ * of the schedule; pixels that a region touches are black. Subframes of a
+ * region have their own size, rate and times. Pads are served in the order of
+ * time. All parts get the same brightness, but #codedexposure-demux:method
+ * `select`, if it is set by name, keeps the camera's values.
+ *
+ * ## Mapping
+ *
+ * A mapping corrects a camera that is not exactly aligned with the mirrors. It
+ * is that of the #GstCodedFilter:mapping property, else that of the stream's
+ * tag. Frames are rectified to one pixel a mirror before they are split; regions
+ * are places among the mirrors, wherever the camera sees them. The element
+ * message `codedexposure/mapping` has how well it sees them.
+ *
+ * ## Flags, metas and messages
+ *
+ * A gap of more than one and a half periods between two frames is a loss: it is
+ * counted, the next subframe of every pad is DISCONT, and the element message
+ * `codedexposure/frames-lost` says `count`, `from` (when the first was due) and
+ * `to` (the frame that came). CORRUPTED and GAP pass to all subframes of a
+ * frame. `codedexposure/saturated` says when a stretch of frames with pixels at
+ * the largest value begins (`active` true), and when there were none for a
+ * second.
+ *
+ * Every subframe has the custom meta `CodedExposureFrame` with the number of
+ * its frame, its index and the time of its light; other metas of the frame are
+ * copied.
+ *
+ * ## Latency and quality of service
+ *
+ * The element adds no latency: it holds no frame back, and subframe k is due
+ * only k slots after its frame. It drops subframes only if
+ * #codedexposure-demux:qos is set and a sink would drop them, and posts a QoS
+ * message for each. QoS events are not forwarded upstream, because some camera
+ * sources stop their stream for them.
+ *
+ * ## Example pipelines
+ *
+ * |[
+ * gst-launch-1.0 videotestsrc num-buffers=400 pattern=ball \
+ *     ! video/x-raw,format=GRAY8,width=768,height=576,framerate=100/1 \
+ *     ! codedexposure-sim schedule=staircase:2x2 ! codedexposure-demux \
+ *     ! queue ! videoconvert ! autovideosink
+ * ]| A simulated bench, shown at the raised rate.
+ * |[
+ * gst-launch-1.0 videotestsrc num-buffers=400 pattern=ball \
+ *     ! video/x-raw,format=GRAY8,width=768,height=576,framerate=100/1 \
+ *     ! codedexposure-sim ! codedexposure-demux name=demux \
+ *     demux.src ! queue ! videoconvert ! autovideosink \
+ *     demux.coded ! queue ! avenc_ffv1 ! matroskamux ! filesink location=a.mkv
+ * ]| The same, and a recording of the coded frames.
+ *
+ * Since: 0.1
+ */
+#include "demux.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "extract/saturation.h"
+
+GST_DEBUG_CATEGORY (codedexposure_demux_debug);
+#define GST_CAT_DEFAULT codedexposure_demux_debug
+
+using namespace codedexposure;
+using namespace codedexposure::gst;
+using demux::Demux;
+
+struct _GstCodedExposureDemux {
+  GstCodedFilter parent;
+};
+
+G_DEFINE_TYPE_WITH_CODE (GstCodedExposureDemux, gst_coded_exposure_demux,
+    GST_TYPE_CODED_FILTER,
+    GST_DEBUG_CATEGORY_INIT (codedexposure_demux_debug, "codedexposure-demux",
+        0, "coded frames to subframes"))
+GST_ELEMENT_REGISTER_DEFINE (codedexposure_demux, "codedexposure-demux",
+    GST_RANK_NONE, GST_TYPE_CODED_EXPOSURE_DEMUX)
+
+namespace
+{
+
+GstStaticPadTemplate subframe_template = GST_STATIC_PAD_TEMPLATE ("subframe_%u",
+    GST_PAD_SRC, GST_PAD_REQUEST, GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
+GstStaticPadTemplate region_template = GST_STATIC_PAD_TEMPLATE ("region_%u",
+    GST_PAD_SRC, GST_PAD_REQUEST, GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
+GstStaticPadTemplate coded_template = GST_STATIC_PAD_TEMPLATE ("coded",
+    GST_PAD_SRC, GST_PAD_REQUEST, GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
+
+Demux &
+self (gpointer element)
+{
+  return static_cast<Demux &> (filter_of (element));
+}
+
+GstPad *
+request_pad (GstElement *element, GstPadTemplate *templ, const gchar *name,
+    const GstCaps *) noexcept
+{
+  return self (element).request_pad (templ, name);
+}
+
+void
+release_pad (GstElement *element, GstPad *pad) noexcept
+{
+  self (element).release_pad (pad);
+}
+
+} // namespace
+
+static void
+gst_coded_exposure_demux_class_init (GstCodedExposureDemuxClass *klass)
+{
+  Demux::install_properties (G_OBJECT_CLASS (klass));
+  auto *element = GST_ELEMENT_CLASS (klass);
+  element->request_new_pad = GST_DEBUG_FUNCPTR (request_pad);
+  element->release_pad = GST_DEBUG_FUNCPTR (release_pad);
+  for (auto *pad_template :
+      {&subframe_template, &region_template, &coded_template})
+    gst_element_class_add_static_pad_template_with_gtype (
+        element, pad_template, GST_TYPE_CODED_PAD);
+  gst_element_class_set_static_metadata (element,
+      "Coded exposure demultiplexer", "Filter/Effect/Video",
+      "Splits the frames of a camera behind a micromirror device into "
+      "subframes at a multiple of the frame rate",
+      "The gst-codedexposure authors");
+}
+
+static void
+gst_coded_exposure_demux_init (GstCodedExposureDemux *element)
+{
+  adopt_filter (GST_CODED_FILTER (element), std::make_unique<Demux> (element));
+}
+
+namespace codedexposure::gst::demux
+{
+
+/* One coded frame on its way through the element. */
+struct Demux::Job {
+  CodedFrame frame;
+  std::shared_ptr<const PadList> pads;
+};
+
+/* The pads that a subframe goes to; null where it does not. */
+struct Demux::Target {
+  GstCodedPad *all = nullptr;
+  GstCodedPad *one = nullptr;
+  BufferPtr buffer = nullptr;
+  GstCodedPad *owner () const { return all ? all : one; }
+};
+
+/* The subframes of one part of the frame. */
+struct Demux::Work {
+  std::vector<Target> targets;
+
+  bool wanted () const
+  {
+    return std::any_of (targets.begin (), targets.end (),
+        [] (const Target &target) { return target.owner (); });
+  }
+};
+
+namespace
+{
+
+/* NOT_LINKED and EOS of one pad leave the others to go on. */
+bool
+is_fatal (GstFlowReturn flow)
+{
+  return flow == GST_FLOW_FLUSHING || flow <= GST_FLOW_NOT_NEGOTIATED;
+}
+
+} // namespace
+
+Demux::Demux (GstCodedExposureDemux *element)
+    : CodedFilter (GST_CODED_FILTER (element),
+          {"application/x-codedexposure-demux-stats", "subframes-out",
+              "subframes-dropped"})
+{
+  add_pad ("src", PadKind::all, "src", -1);
+}
+
+/* The subframes of one coded frame, in the order of their exposure. One thread
+ * serves all pads, so that a sink that waits for its time makes the others
+ * wait: users put a queue after every pad. Buffers are pushed one by one,
+ * because a sink would show a whole list at the time of its first. */
+GstFlowReturn
+Demux::process (CodedFrame frame)
+{
+  Job job{std::move (frame), pads ()};
+  if (!check_pads (*job.pads))
+    return GST_FLOW_NOT_NEGOTIATED;
+  const GstFlowReturn flow = push_coded (job);
+  return is_fatal (flow) ? flow : push_subframes (job);
+}
+
+/* This pad comes first, because the recorder of coded frames must not wait for
+ * a display of subframes. */
+GstFlowReturn
+Demux::push_coded (const Job &job)
+{
+  GstCodedPad *pad = job.pads->find (PadKind::coded);
+  if (!pad)
+    return GST_FLOW_OK;
+  BufferPtr outbuf (gst_buffer_ref (job.frame.buffer.get ()));
+  if (std::exchange (pad->coded.discont, false) &&
+      !GST_BUFFER_IS_DISCONT (outbuf.get ())) {
+    outbuf.reset (gst_buffer_make_writable (outbuf.release ()));
+    GST_BUFFER_FLAG_SET (outbuf.get (), GST_BUFFER_FLAG_DISCONT);
+  }
+  GST_LOG_OBJECT (pad, "[OUT] %" GST_PTR_FORMAT, outbuf.get ());
+  return combine_flow (pad, gst_pad_push (GST_PAD (pad), outbuf.release ()));
+}
+
+GstFlowReturn
+Demux::push_subframes (Job &job)
+{
+  GstFlowReturn flow = GST_FLOW_OK;
+  std::vector<Work> works;
+  for (std::size_t i = 0; i < plan_->parts.size (); i++)
+    works.push_back (find_targets (job, i, flow));
+  if (std::none_of (works.begin (), works.end (),
+          [] (const Work &work) { return work.wanted (); }))
+    return flow;
+  flow = format ().wide () ? render<std::uint16_t> (job, works)
+                           : render<std::uint8_t> (job, works);
+  if (flow != GST_FLOW_OK)
+    return flow;
+  note_saturation (job.frame);
+
+  for (const SplitTurn &turn : plan_->turns[backwards ()]) {
+    Target &target = works[turn.part].targets[turn.subframe];
+    if (target.owner () && !is_fatal (flow))
+      flow = push_subframe (job, turn, std::move (target));
+  }
+  return flow;
+}
+
+/* --------------------------------------------------- where subframes go -- */
+
+/* Asked only for QoS messages. */
+bool
+Demux::is_live ()
+{
+  if (!live_) {
+    const QueryPtr query (gst_query_new_latency ());
+    gboolean live = FALSE;
+    if (gst_pad_peer_query (sinkpad (), query.get ()))
+      gst_query_parse_latency (query.get (), &live, nullptr, nullptr);
+    live_ = live;
+  }
+  return *live_;
+}
+
+/* Reports to @pad and on the bus that it goes without a subframe. */
+void
+Demux::skip (GstCodedPad *pad, GstClockTime pts, GstClockTime duration)
+{
+  const auto running =
+      gst_segment_to_running_time (&segment (), GST_FORMAT_TIME, pts);
+  const auto stream_time =
+      gst_segment_to_stream_time (&segment (), GST_FORMAT_TIME, pts);
+  GstMessage *message = gst_message_new_qos (
+      GST_OBJECT (element ()), is_live (), running, stream_time, pts, duration);
+  {
+    const ObjectLock lock (element ());
+    counters_.pictures_dropped++;
+    gst_message_set_qos_values (
+        message, pad->coded.jitter, pad->coded.proportion, 1000000);
+    gst_message_set_qos_stats (message, GST_FORMAT_BUFFERS,
+        counters_.pictures_out, counters_.pictures_dropped);
+  }
+  gst_element_post_message (element (), message);
+  pad->coded.discont = true;
+  gst_pad_push_event (GST_PAD (pad), gst_event_new_gap (pts, duration));
+}
+
+bool
+Demux::is_late (GstCodedPad *pad, GstClockTime pts, GstClockTime duration)
+{
+  if (!in_force_.qos)
+    return false;
+  GstClockTime earliest;
+  {
+    const ObjectLock lock (element ());
+    earliest = pad->coded.earliest;
+  }
+  const GstClockTime running = gst_segment_to_running_time (
+      &segment (), GST_FORMAT_TIME, backwards () ? pts + duration : pts);
+  return GST_CLOCK_TIME_IS_VALID (earliest) &&
+         GST_CLOCK_TIME_IS_VALID (running) && running < earliest;
+}
+
+/* No subframe is made for a pad that is not linked, but its flow counts. */
+bool
+Demux::prepare_pad (GstCodedPad *pad, guint at_once, GstFlowReturn &flow)
+{
+  if (is_wanted (GST_PAD (pad))) {
+    prepare_allocation (pad, caps_for (pad).get (), at_once);
+    return true;
+  }
+  flow = combine_flow (pad, GST_FLOW_NOT_LINKED);
+  return false;
+}
+
+/* Finds where every subframe of a part has to go, except those that are outside
+ * of the segment; reports each that is late and left out. */
+Demux::Work
+Demux::find_targets (
+    const Job &job, std::size_t part_index, GstFlowReturn &flow)
+{
+  const SplitPart &part = plan_->parts[part_index];
+  const auto n = std::size_t (part.subframes ());
+  Work work{std::vector<Target> (n)};
+  const auto aim = [&] (GstCodedPad *pad, std::size_t k, Nanoseconds duration,
+                       GstCodedPad *&target) {
+    const GstClockTime pts =
+        job.frame.pts () + GstClockTime (part.boundaries[k]);
+    if (!is_within (pts, GstClockTime (duration)))
+      return;
+    if (is_late (pad, pts, GstClockTime (duration)))
+      skip (pad, pts, GstClockTime (duration));
+    else
+      target = pad;
+  };
+
+  GstCodedPad *all = part.region < 0
+                         ? job.pads->find (PadKind::all)
+                         : job.pads->find (PadKind::region, part.region);
+  if (all && prepare_pad (all, guint (n), flow)) {
+    for (std::size_t i = 0; i < n; i++) {
+      const std::size_t k = backwards () ? n - 1 - i : i;
+      aim (all, k, part.boundaries[k + 1] - part.boundaries[k],
+          work.targets[k].all);
+    }
+  }
+  if (part.region >= 0)
+    return work;
+  for (GstCodedPad *one : job.pads->of_kind (PadKind::one)) {
+    const auto k = std::size_t (one->coded.index);
+    if (prepare_pad (one, 1, flow))
+      aim (one, k, part.period (), work.targets[k].one);
+  }
+  return work;
+}
+
+/* ---------------------------------------------------------------- pixels -- */
+
+/* Room for a subframe that no pad wants: the extractor writes all of them. */
+template <typename Pixel>
+ImageView<Pixel>
+Demux::scratch_view (std::size_t part, std::size_t k)
+{
+  const GstVideoInfo &info = plan_->infos[part];
+  const std::size_t row = std::size_t (info.width) * sizeof (Pixel);
+  const std::size_t plane = row * std::size_t (info.height);
+  const std::size_t size =
+      plane * std::size_t (plan_->parts[part].subframes ());
+  if (scratch_.size () < size)
+    scratch_.resize (size);
+  return {reinterpret_cast<Pixel *> (scratch_.data () + k * plane), info.width,
+      info.height, std::ptrdiff_t (row)};
+}
+
+/* Takes and maps a buffer for every subframe that has a target; the others stay
+ * unmapped. */
+GstFlowReturn
+Demux::map_subframes (
+    std::size_t part, Work &work, std::vector<MappedFrame> &subframes)
+{
+  subframes.reserve (work.targets.size ());
+  for (Target &target : work.targets) {
+    MappedFrame &mapped = subframes.emplace_back ();
+    if (!target.owner ())
+      continue;
+    const GstFlowReturn flow = acquire_picture (
+        target.owner (), plan_->infos[part], target.buffer, mapped);
+    if (flow != GST_FLOW_OK)
+      return flow;
+  }
+  return GST_FLOW_OK;
+}
+
+/* Fills the buffers of @work, which is wanted, from @light, one pixel a
+ * mirror. */
+template <typename Pixel>
+GstFlowReturn
+Demux::render_part (
+    Job &job, std::size_t part, Work &work, ImageView<const Pixel> light)
+{
+  std::vector<MappedFrame> subframes;
+  const GstFlowReturn flow = map_subframes (part, work, subframes);
+  if (flow != GST_FLOW_OK)
+    return flow;
+  std::vector<ImageView<Pixel>> views;
+  views.reserve (subframes.size ());
+  for (std::size_t k = 0; k < subframes.size (); k++)
+    views.push_back (subframes[k] ? view_of<Pixel> (subframes[k])
+                                  : scratch_view<Pixel> (part, k));
+  const auto &[x, y, width, height] = plan_->parts[part].rect;
+  const auto &extractor =
+      std::get<Extractor<Pixel>> (plan_->parts[part].extractor);
+  const auto report = extractor.run (light.block (x, y, width, height), views);
+  if (!report)
+    return post_decode_error (report.error ());
+  job.frame.meta.saturated = report->saturated;
+  return GST_FLOW_OK;
+}
+
+/* Fills the buffers of all @works. */
+template <typename Pixel>
+GstFlowReturn
+Demux::render (Job &job, std::vector<Work> &works)
+{
+  MappedFrame coded = map_coded (job.frame.buffer.get ());
+  if (!coded)
+    return GST_FLOW_ERROR;
+  const auto light = rectify (view_of<const Pixel> (coded));
+  if (!light)
+    return post_decode_error (light.error ());
+  GstFlowReturn flow = GST_FLOW_OK;
+  for (std::size_t i = 0; i < works.size (); i++)
+    if (works[i].wanted () && flow == GST_FLOW_OK)
+      flow = render_part (job, i, works[i], *light);
+  /* Each extractor counts the cells of its own part. */
+  if (works.size () > 1)
+    job.frame.meta.saturated = count_saturated (
+        light->rows (0, light->height - format ().schedule.pilot_rows ()),
+        significant_bits ());
+  return flow;
+}
+
+/* --------------------------------------------------------------- pushing -- */
+
+/* @outbuf for a second pad: in the same memory unless the peer of @pad could
+ * not read its layout. */
+BufferPtr
+Demux::share (
+    const GstVideoInfo &info, const GstCodedPad *pad, GstBuffer *outbuf)
+{
+  const GstVideoMeta *layout = gst_buffer_get_video_meta (outbuf);
+  const bool plain = !layout || (layout->offset[0] == info.offset[0] &&
+                                    layout->stride[0] == info.stride[0]);
+  if (plain || pad->coded.allocation->video_meta)
+    return BufferPtr (gst_buffer_copy (outbuf));
+
+  BufferPtr packed (
+      gst_buffer_new_allocate (nullptr, GST_VIDEO_INFO_SIZE (&info), nullptr));
+  gst_buffer_copy_into (packed.get (), outbuf,
+      GstBufferCopyFlags (GST_BUFFER_COPY_FLAGS | GST_BUFFER_COPY_TIMESTAMPS),
+      0, -1);
+  copy_metas (outbuf, info, packed.get (), info);
+  MappedFrame from (info, outbuf, GST_MAP_READ);
+  MappedFrame to (info, packed.get (), GST_MAP_WRITE);
+  if (from && to)
+    gst_video_frame_copy (to.frame (), from.frame ());
+  return packed;
+}
+
+GstFlowReturn
+Demux::push_subframe (const Job &job, SplitTurn turn, Target target)
+{
+  const SplitPart &part = plan_->parts[turn.part];
+  const GstVideoInfo &info = plan_->infos[turn.part];
+  const std::size_t k = turn.subframe;
+  const GstClockTime start = job.frame.pts ();
+  const LightWindow &light = part.windows[k];
+  describe (target.buffer.get (), job.frame.buffer.get (), job.frame.meta,
+      {info, int (k), start + GstClockTime (part.boundaries[k]),
+          start + GstClockTime (light.start), GstClockTime (light.duration),
+          part.region >= 0});
+  BufferPtr second;
+  if (target.all && target.one)
+    second = share (info, target.one, target.buffer.get ());
+
+  GstFlowReturn flow = GST_FLOW_OK;
+  if (target.all)
+    flow = combine_flow (target.all,
+        push (target.all, std::move (target.buffer),
+            GstClockTime (part.boundaries[k + 1] - part.boundaries[k])));
+  else
+    second = std::move (target.buffer);
+  if (target.one && !is_fatal (flow))
+    flow = combine_flow (target.one,
+        push (target.one, std::move (second), GstClockTime (part.period ())));
+  return flow;
+}
+
+} // namespace codedexposure::gst::demux

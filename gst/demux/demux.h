@@ -1,0 +1,171 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* codedexposure-demux: one coded frame in, n timed subframes out. */
+#pragma once
+
+#include <array>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <gst/base/gstflowcombiner.h>
+#include <gst/gst.h>
+
+#include "common/coded_filter.h"
+#include "extract/split_plan.h"
+
+G_BEGIN_DECLS
+
+#define GST_TYPE_CODED_EXPOSURE_DEMUX (gst_coded_exposure_demux_get_type ())
+G_DECLARE_FINAL_TYPE (GstCodedExposureDemux, gst_coded_exposure_demux, GST,
+    CODED_EXPOSURE_DEMUX, GstCodedFilter)
+
+GST_ELEMENT_REGISTER_DECLARE (codedexposure_demux);
+
+G_END_DECLS
+
+namespace codedexposure::gst::demux
+{
+
+/** What the user asked for. */
+struct Settings {
+  ExtractOptions extract;
+  bool qos = false;
+};
+
+using PadRef = std::shared_ptr<GstCodedPad>;
+
+/** All source pads at one moment, in the order in which they are served. */
+class PadList
+{
+public:
+  /** Null where there is none. */
+  GstCodedPad *find (PadKind kind, int index = -1) const;
+  void add (PadRef pad);
+  void remove (const GstPad *pad);
+  /** All of one kind, by their index. */
+  std::vector<GstCodedPad *> of_kind (PadKind kind) const;
+  auto begin () const { return pads_.begin (); }
+  auto end () const { return pads_.end (); }
+
+private:
+  std::vector<PadRef> pads_;
+};
+
+/** What is pushed on each kind of pad. */
+struct PadCaps {
+  CapsPtr coded, all, one;
+  std::vector<CapsPtr> regions;
+
+  /** Null for a region that does not exist. */
+  GstCaps *of (const CodedPad &pad) const;
+  explicit operator bool () const { return all != nullptr; }
+};
+
+/** Everything that follows from the format and the settings. */
+struct Plan {
+  std::vector<SplitPart> parts;    ///< the background, then the regions
+  std::vector<GstVideoInfo> infos; ///< of the subframes of each part
+  /** The order of all subframes, forwards and backwards. */
+  std::array<std::vector<SplitTurn>, 2> turns;
+
+  const SplitPart &background () const { return parts.front (); }
+};
+
+struct CombinerFree {
+  void operator() (GstFlowCombiner *combiner) const
+  {
+    gst_flow_combiner_free (combiner);
+  }
+};
+
+class Demux final : public CodedFilter
+{
+public:
+  explicit Demux (GstCodedExposureDemux *element);
+
+  GstPad *request_pad (GstPadTemplate *templ, const gchar *name);
+  void release_pad (GstPad *pad);
+  bool set_own (guint id, const GValue *value) override;
+  bool get_own (guint id, GValue *value) const override;
+  static void install_properties (GObjectClass *klass);
+
+private:
+  struct Job;
+  struct Target;
+  struct Work;
+
+  GstFlowReturn process (CodedFrame frame) override;
+  bool plan (const CodedFormat &format) override;
+  void planned (bool schedule_changed) override;
+  gboolean forward (EventPtr event) override;
+  void flushed () override;
+  void take_settings () override { in_force_ = settings_; }
+  void forget () override;
+  void each_pad (const PadVisitor &visit) const override;
+  CapsPtr caps_for (const GstCodedPad *pad) const override;
+  CapsScale scale_for (
+      const Schedule &schedule, const GstCodedPad *pad) const override;
+  CapsPtr convert_caps (const CapsContext &context, const GstCodedPad *pad,
+      GstCaps *caps, bool to_coded) const override;
+  int pictures_a_frame (const GstCodedPad *pad) const override;
+  ObjectPtr<GstPad> coded_pad () const override;
+
+  /* Pads. */
+  std::shared_ptr<const PadList> pads () const;
+  GstCodedPad *add_pad (
+      const char *templ, PadKind kind, const std::string &name, int index);
+  void enlist (PadRef pad);
+  PadRef strike (GstPad *pad);
+  bool index_allowed (PadKind kind, int index) const;
+  bool check_pads (const PadList &list) const;
+  /** The flow of all pads together after @p pad returned @p flow; NOT_LINKED
+   * where there was nothing to push. */
+  GstFlowReturn combine_flow (GstCodedPad *pad, GstFlowReturn flow);
+
+  /* Frames. */
+  bool is_live ();
+  bool is_late (GstCodedPad *pad, GstClockTime pts, GstClockTime duration);
+  void skip (GstCodedPad *pad, GstClockTime pts, GstClockTime duration);
+  bool prepare_pad (GstCodedPad *pad, guint at_once, GstFlowReturn &flow);
+  Work find_targets (const Job &job, std::size_t part, GstFlowReturn &flow);
+  template <typename Pixel>
+  ImageView<Pixel> scratch_view (std::size_t part, std::size_t k);
+  GstFlowReturn map_subframes (
+      std::size_t part, Work &work, std::vector<MappedFrame> &subframes);
+  template <typename Pixel>
+  GstFlowReturn render_part (
+      Job &job, std::size_t part, Work &work, ImageView<const Pixel> light);
+  template <typename Pixel>
+  GstFlowReturn render (Job &job, std::vector<Work> &works);
+  GstFlowReturn push_coded (const Job &job);
+  GstFlowReturn push_subframes (Job &job);
+  GstFlowReturn push_subframe (const Job &job, SplitTurn turn, Target target);
+  BufferPtr share (
+      const GstVideoInfo &info, const GstCodedPad *pad, GstBuffer *outbuf);
+
+  /* Object lock. */
+  Settings settings_;
+  /** Replaced, never changed: the streaming thread works on one while the
+   * application requests and releases pads. */
+  std::shared_ptr<const PadList> pads_ = std::make_shared<PadList> ();
+  std::unique_ptr<GstFlowCombiner, CombinerFree> combiner_{
+      gst_flow_combiner_new ()};
+  PadCaps caps_;
+  Method method_ = Method::kAuto; ///< in force
+  bool ended_ = false;            ///< EOS was forwarded
+
+  /* Sink pad's stream lock. */
+  Settings in_force_;
+  std::optional<Plan> plan_;
+  std::optional<bool> live_;       ///< asked for when first needed
+  std::vector<std::byte> scratch_; ///< subframes that no pad wants
+};
+
+/** How many pads there can be of a kind that has numbers; @p schedule may be
+ * null, where none is known. */
+int numbered_pads (PadKind kind, const Schedule *schedule);
+/** The same for people. */
+std::string pads_text (PadKind kind, const Schedule *schedule);
+
+} // namespace codedexposure::gst::demux

@@ -1,0 +1,345 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The source pads: requested, released, and told of events. */
+#include "demux.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "base/text.h"
+
+GST_DEBUG_CATEGORY_EXTERN (codedexposure_demux_debug);
+#define GST_CAT_DEFAULT codedexposure_demux_debug
+
+namespace codedexposure::gst::demux
+{
+
+namespace
+{
+
+bool
+is_sticky (const GstEvent *event)
+{
+  return gst_event_type_get_flags (GST_EVENT_TYPE (event)) &
+         GST_EVENT_TYPE_STICKY;
+}
+
+/* gst_pad_create_stream_id () needs the sink pad's sticky event, which is
+ * stored only after its handler has returned. */
+EventPtr
+stream_start_for (GstCodedPad *pad, GstEvent *upstream)
+{
+  const gchar *id = nullptr;
+  gst_event_parse_stream_start (upstream, &id);
+  const CharPtr name (gst_object_get_name (GST_OBJECT (pad)));
+  const std::string own = std::string (id) + "/" + name.get ();
+
+  EventPtr event (gst_event_new_stream_start (own.c_str ()));
+  gst_event_set_seqnum (event.get (), gst_event_get_seqnum (upstream));
+  GstStreamFlags flags = GST_STREAM_FLAG_NONE;
+  gst_event_parse_stream_flags (upstream, &flags);
+  gst_event_set_stream_flags (event.get (), flags);
+  guint group = GST_GROUP_ID_INVALID;
+  if (gst_event_parse_group_id (upstream, &group))
+    gst_event_set_group_id (event.get (), group);
+  return event;
+}
+
+struct Replay {
+  GstCodedPad *pad;
+  const PadCaps &caps;
+};
+
+/* Before the source pads have caps, only the start of the stream has passed
+ * them; everything else waits and comes to the new pad with the others. */
+gboolean
+replay_sticky (GstPad *, GstEvent **upstream, gpointer user_data)
+{
+  const auto &[pad, caps] = *static_cast<const Replay *> (user_data);
+  const GstEventType type = GST_EVENT_TYPE (*upstream);
+  if (type == GST_EVENT_EOS || (!caps && type != GST_EVENT_STREAM_START))
+    return TRUE;
+  EventPtr event;
+  if (type == GST_EVENT_STREAM_START) {
+    event = stream_start_for (pad, *upstream);
+  } else if (type != GST_EVENT_CAPS) {
+    event.reset (gst_event_ref (*upstream));
+  } else if (GstCaps *own = caps.of (pad->coded)) {
+    event.reset (gst_event_new_caps (own));
+    gst_event_set_seqnum (event.get (), gst_event_get_seqnum (*upstream));
+  }
+  if (event)
+    gst_pad_store_sticky_event (GST_PAD (pad), event.get ());
+  return TRUE;
+}
+
+/* Of pads that have a number; the template has the same and "%u". */
+const char *
+prefix_of (PadKind kind)
+{
+  return kind == PadKind::region ? "region_" : "subframe_";
+}
+
+/* The number in @name, or the lowest free one where no name is given; -1 when
+ * the name is none. */
+int
+index_in (const gchar *name, PadKind kind, const PadList &taken)
+{
+  const std::string prefix = prefix_of (kind);
+  if (!name || prefix + "%u" == name) {
+    int index = 0;
+    while (taken.find (kind, index))
+      index++;
+    return index;
+  }
+  if (!g_str_has_prefix (name, prefix.c_str ()))
+    return -1;
+  return parse_int (name + prefix.size ()).value_or (-1);
+}
+
+} // namespace
+
+/* ------------------------------------------------------------------ lists --
+ */
+
+GstCodedPad *
+PadList::find (PadKind kind, int index) const
+{
+  for (const PadRef &pad : pads_)
+    if (pad->coded.kind == kind && pad->coded.index == index)
+      return pad.get ();
+  return nullptr;
+}
+
+void
+PadList::add (PadRef pad)
+{
+  const auto rank = [] (const PadRef &one) {
+    return std::pair (one->coded.kind, one->coded.index);
+  };
+  const auto behind = std::find_if (pads_.begin (), pads_.end (),
+      [&] (const PadRef &other) { return rank (pad) < rank (other); });
+  pads_.insert (behind, std::move (pad));
+}
+
+void
+PadList::remove (const GstPad *pad)
+{
+  std::erase_if (pads_,
+      [pad] (const PadRef &other) { return GST_PAD (other.get ()) == pad; });
+}
+
+std::vector<GstCodedPad *>
+PadList::of_kind (PadKind kind) const
+{
+  std::vector<GstCodedPad *> found;
+  for (const PadRef &pad : pads_)
+    if (pad->coded.kind == kind)
+      found.push_back (pad.get ());
+  return found;
+}
+
+std::shared_ptr<const PadList>
+Demux::pads () const
+{
+  const ObjectLock lock (element ());
+  return pads_;
+}
+
+void
+Demux::each_pad (const PadVisitor &visit) const
+{
+  for (const PadRef &pad : *pads ())
+    visit (pad.get ());
+}
+
+ObjectPtr<GstPad>
+Demux::coded_pad () const
+{
+  const auto list = pads ();
+  GstCodedPad *pad = list->find (PadKind::coded);
+  return ObjectPtr<GstPad> (pad ? GST_PAD (gst_object_ref (pad)) : nullptr);
+}
+
+/* ------------------------------------------------- requests and releases -- */
+
+int
+numbered_pads (PadKind kind, const Schedule *schedule)
+{
+  if (kind == PadKind::region)
+    return schedule ? int (schedule->regions ().size ())
+                    : Schedule::kMaxRegions;
+  return schedule ? schedule->elements () : Tile::kMaxElements;
+}
+
+std::string
+pads_text (PadKind kind, const Schedule *schedule)
+{
+  const int n = numbered_pads (kind, schedule);
+  const std::string prefix = prefix_of (kind);
+  const std::string owner =
+      schedule ? schedule->text () : "the largest schedule";
+  if (n == 0)
+    return owner + " has no regions.";
+  return owner + " has " + prefix + "0" +
+         (n > 1 ? " to " + prefix + std::to_string (n - 1) : "") + ".";
+}
+
+/* While a schedule is in force its range is known; before, the largest there
+ * can be, and check_pads () looks again. */
+bool
+Demux::index_allowed (PadKind kind, int index) const
+{
+  ScheduleRef schedule;
+  {
+    const ObjectLock lock (element ());
+    schedule = schedule_in_force ();
+  }
+  if (index >= 0 && index < numbered_pads (kind, schedule.get ()))
+    return true;
+  GST_ELEMENT_WARNING (element (), STREAM, WRONG_TYPE,
+      ("There is no pad %s%d: %s", prefix_of (kind), index,
+          pads_text (kind, schedule.get ()).c_str ()),
+      (nullptr));
+  return false;
+}
+
+/* Whether the schedule has a subframe or a region for every pad of @list. */
+bool
+Demux::check_pads (const PadList &list) const
+{
+  const Schedule &schedule = format ().schedule;
+  for (const PadKind kind : {PadKind::one, PadKind::region}) {
+    const auto numbered = list.of_kind (kind);
+    if (numbered.empty () ||
+        numbered.back ()->coded.index < numbered_pads (kind, &schedule))
+      continue;
+    const CharPtr name (gst_object_get_name (GST_OBJECT (numbered.back ())));
+    post_error ("Pad " + std::string (name.get ()) + " was requested, but " +
+                pads_text (kind, &schedule));
+    return false;
+  }
+  return true;
+}
+
+GstCodedPad *
+Demux::add_pad (
+    const char *templ, PadKind kind, const std::string &name, int index)
+{
+  const PadRef pad (
+      new_source_pad (templ, name, kind, index).release (), ObjectUnref ());
+  gst_pad_set_active (GST_PAD (pad.get ()), TRUE);
+  enlist (pad);
+  gst_element_add_pad (element (), GST_PAD (pad.get ()));
+  return pad.get ();
+}
+
+/* Lists @pad and gives it what the others were told. Both under one lock, and
+ * forward () stores an event on the sink pad before it reads the list: an event
+ * that comes meanwhile reaches the pad in one way or the other. */
+void
+Demux::enlist (PadRef pad)
+{
+  const ObjectLock lock (element ());
+  Replay replay{pad.get (), caps_};
+  gst_pad_sticky_events_foreach (sinkpad (), replay_sticky, &replay);
+  if (const EventPtr eos (gst_event_new_eos ()); ended_)
+    gst_pad_store_sticky_event (GST_PAD (pad.get ()), eos.get ());
+  gst_flow_combiner_add_pad (combiner_.get (), GST_PAD (pad.get ()));
+  auto list = std::make_shared<PadList> (*pads_);
+  list->add (std::move (pad));
+  pads_ = std::move (list);
+}
+
+GstPad *
+Demux::request_pad (GstPadTemplate *templ, const gchar *name)
+{
+  const std::string kind_name = GST_PAD_TEMPLATE_NAME_TEMPLATE (templ);
+  const auto list = pads ();
+  PadKind kind = PadKind::coded;
+  int index = -1;
+  std::string own_name = kind_name;
+  if (kind_name != "coded") {
+    kind = kind_name == "region_%u" ? PadKind::region : PadKind::one;
+    index = index_in (name, kind, *list);
+    if (!index_allowed (kind, index))
+      return nullptr;
+    own_name = prefix_of (kind) + std::to_string (index);
+  }
+  if (list->find (kind, index)) {
+    GST_WARNING_OBJECT (
+        element (), "pad %s exists: tee it to use it twice", own_name.c_str ());
+    return nullptr;
+  }
+  return GST_PAD (add_pad (kind_name.c_str (), kind, own_name, index));
+}
+
+PadRef
+Demux::strike (GstPad *pad)
+{
+  const ObjectLock lock (element ());
+  const auto found = std::find_if (pads_->begin (), pads_->end (),
+      [pad] (const PadRef &one) { return GST_PAD (one.get ()) == pad; });
+  if (found == pads_->end ())
+    return nullptr;
+  PadRef struck = *found;
+  struck->coded.released = true;
+  auto list = std::make_shared<PadList> (*pads_);
+  list->remove (pad);
+  pads_ = std::move (list);
+  gst_flow_combiner_remove_pad (combiner_.get (), pad);
+  return struck;
+}
+
+void
+Demux::release_pad (GstPad *pad)
+{
+  if (const PadRef struck = strike (pad)) {
+    gst_pad_set_active (pad, FALSE);
+    gst_element_remove_pad (element (), pad);
+  }
+}
+
+/* -------------------------------------------------------- events and flow --
+ */
+
+/* Core stores a sticky event on the sink pad when its handler has returned,
+ * which would be too late for enlist (); EOS it stores only once. */
+gboolean
+Demux::forward (EventPtr event)
+{
+  const GstEventType type = GST_EVENT_TYPE (event.get ());
+  if (is_sticky (event.get ()) && type != GST_EVENT_EOS)
+    gst_pad_store_sticky_event (sinkpad (), event.get ());
+  if (type == GST_EVENT_EOS || type == GST_EVENT_STREAM_START ||
+      type == GST_EVENT_FLUSH_STOP) {
+    const ObjectLock lock (element ());
+    ended_ = type == GST_EVENT_EOS;
+  }
+  each_pad ([&] (GstCodedPad *pad) {
+    GstEvent *own = type == GST_EVENT_STREAM_START
+                        ? stream_start_for (pad, event.get ()).release ()
+                        : gst_event_ref (event.get ());
+    gst_pad_push_event (GST_PAD (pad), own);
+  });
+  return TRUE;
+}
+
+GstFlowReturn
+Demux::combine_flow (GstCodedPad *pad, GstFlowReturn flow)
+{
+  const ObjectLock lock (element ());
+  if (pad->coded.released)
+    return GST_FLOW_OK;
+  return gst_flow_combiner_update_pad_flow (
+      combiner_.get (), GST_PAD (pad), flow);
+}
+
+void
+Demux::flushed ()
+{
+  live_.reset ();
+  const ObjectLock lock (element ());
+  gst_flow_combiner_reset (combiner_.get ());
+}
+
+} // namespace codedexposure::gst::demux

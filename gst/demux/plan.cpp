@@ -1,0 +1,193 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* From the format and the settings to a plan, and to the caps of all pads. */
+#include "demux.h"
+
+#include <utility>
+
+GST_DEBUG_CATEGORY_EXTERN (codedexposure_demux_debug);
+#define GST_CAT_DEFAULT codedexposure_demux_debug
+
+namespace codedexposure::gst::demux
+{
+
+namespace
+{
+
+CapsPtr
+part_caps (const CodedFormat &format, const SplitPart &part, bool raised_rate)
+{
+  const CapsPtr cut = format.resized ({part.rect.width, part.rect.height});
+  return CapsPtr (
+      scale_caps (cut.get (), coded_to_subframes (part.schedule, raised_rate)));
+}
+
+/* @caps of the pad of region @i, whose size does not follow from that of the
+ * frames, as those of coded frames, or the other way. */
+CapsPtr
+convert_region (const Schedule &schedule, int i, GstCaps *caps, bool to_coded)
+{
+  if (i >= int (schedule.regions ().size ()))
+    return unbind_caps (caps);
+  const CapsScale scale = coded_to_subframes (schedule.region (i), true);
+  if (to_coded)
+    return unbind_size (CapsPtr (scale_caps (caps, scale.inverse ())).get ());
+  const Rect &rect = schedule.regions ()[std::size_t (i)].rect;
+  const CapsPtr cut (gst_caps_copy (caps));
+  gst_caps_set_simple (cut.get (), "width", G_TYPE_INT, rect.width, "height",
+      G_TYPE_INT, rect.height, nullptr);
+  return CapsPtr (scale_caps (cut.get (), scale));
+}
+
+void
+log_plan (GstElement *element, const CodedFormat &format, const Plan &plan)
+{
+  const SplitPart &background = plan.background ();
+  const GstVideoInfo &subframe = plan.infos.front ();
+  GST_INFO_OBJECT (element, "%s, gain %g: subframes of %dx%d",
+      std::string (method_name (background.method ())).c_str (),
+      background.gain (), subframe.width, subframe.height);
+  const Extent cell = format.schedule.cell ();
+  const int columns = format.size.width - subframe.width * cell.width;
+  const int rows = format.size.height - subframe.height * cell.height;
+  if (columns > 0 || rows > 0)
+    GST_INFO_OBJECT (element,
+        "%d columns and %d rows (pilot: %d) of the coded frames are cropped: "
+        "they fill no cell of %dx%d pixels",
+        columns, rows, format.schedule.pilot_rows (), cell.width, cell.height);
+}
+
+/* A recording of such a schedule may meet somebody who does not know it. */
+void
+report_regions (GstElement *element, const Schedule &schedule)
+{
+  if (schedule.regions ().empty ())
+    return;
+  const std::string text =
+      "src and the subframe pads show the background; regions are black "
+      "there and have pads of their own: " +
+      pads_text (PadKind::region, &schedule);
+  /* gst-launch shows the second text only. */
+  GST_ELEMENT_INFO (
+      element, STREAM, FORMAT, ("%s", text.c_str ()), ("%s", text.c_str ()));
+}
+
+} // namespace
+
+GstCaps *
+PadCaps::of (const CodedPad &pad) const
+{
+  switch (pad.kind) {
+  case PadKind::coded:
+    return coded.get ();
+  case PadKind::one:
+    return one.get ();
+  case PadKind::region:
+    return pad.index < int (regions.size ())
+               ? regions[std::size_t (pad.index)].get ()
+               : nullptr;
+  default:
+    return all.get ();
+  }
+}
+
+bool
+Demux::plan (const CodedFormat &format)
+{
+  ExtractOptions options = in_force_.extract;
+  options.bits = significant_bits ();
+  auto parts = make_split_plan (format.schedule,
+      {format.size, format.wide (), format.rate, format.slots}, options);
+  if (!parts) {
+    post_error (parts.error ().message);
+    return false;
+  }
+  Plan made{std::move (*parts), {}, {}};
+  PadCaps caps;
+  for (const SplitPart &part : made.parts) {
+    CapsPtr one = part_caps (format, part, false);
+    gst_video_info_from_caps (&made.infos.emplace_back (), one.get ());
+    CapsPtr all = part_caps (format, part, true);
+    if (part.region >= 0) {
+      caps.regions.push_back (std::move (all));
+    } else {
+      caps.all = std::move (all);
+      caps.one = std::move (one);
+    }
+  }
+  caps.coded.reset (gst_caps_ref (format.caps.get ()));
+  for (const bool backwards : {false, true})
+    made.turns[backwards] = order_subframes (made.parts, backwards);
+  log_plan (element (), format, made);
+  plan_ = std::move (made);
+  scratch_.clear ();
+  const ObjectLock lock (element ());
+  caps_ = std::move (caps);
+  return true;
+}
+
+void
+Demux::planned (bool schedule_changed)
+{
+  if (schedule_changed)
+    report_regions (element (), format ().schedule);
+  const Method method = plan_->background ().method ();
+  bool method_changed;
+  {
+    const ObjectLock lock (element ());
+    method_changed = std::exchange (method_, method) != method;
+  }
+  if (method_changed)
+    notify ("method-in-force");
+}
+
+void
+Demux::forget ()
+{
+  plan_.reset ();
+  live_.reset ();
+  scratch_.clear ();
+  const ObjectLock lock (element ());
+  caps_ = PadCaps ();
+  method_ = Method::kAuto;
+  ended_ = false;
+  gst_flow_combiner_reset (combiner_.get ());
+}
+
+CapsPtr
+Demux::caps_for (const GstCodedPad *pad) const
+{
+  const ObjectLock lock (element ());
+  GstCaps *caps = caps_.of (pad->coded);
+  return CapsPtr (caps ? gst_caps_ref (caps) : nullptr);
+}
+
+CapsScale
+Demux::scale_for (const Schedule &schedule, const GstCodedPad *pad) const
+{
+  return coded_to_subframes (schedule, pad->coded.kind == PadKind::all);
+}
+
+CapsPtr
+Demux::convert_caps (const CapsContext &context, const GstCodedPad *pad,
+    GstCaps *caps, bool to_coded) const
+{
+  if (pad->coded.kind == PadKind::coded)
+    return CapsPtr (gst_caps_ref (caps));
+  if (pad->coded.kind == PadKind::region && context.schedule)
+    return convert_region (*context.schedule, pad->coded.index, caps, to_coded);
+  return CodedFilter::convert_caps (context, pad, caps, to_coded);
+}
+
+int
+Demux::pictures_a_frame (const GstCodedPad *pad) const
+{
+  const ScheduleRef schedule = schedule_in_force ();
+  const auto &[kind, index] = std::tie (pad->coded.kind, pad->coded.index);
+  if (kind == PadKind::all)
+    return schedule->elements ();
+  return kind == PadKind::region && index < int (schedule->regions ().size ())
+             ? schedule->region (index).elements ()
+             : 1;
+}
+
+} // namespace codedexposure::gst::demux

@@ -1,0 +1,141 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* dmdsync and its DMD: opening, upload, parking. */
+#include "state.h"
+
+#define GST_CAT_DEFAULT dmdsync_debug
+
+namespace codedexposure::gst::sync
+{
+
+namespace
+{
+
+void
+post_progress (GstDmdSync *self, GstProgressType type, const std::string &text)
+{
+  gst_element_post_message (
+      GST_ELEMENT (self), gst_message_new_progress (GST_OBJECT (self), type,
+                              "upload", text.c_str ()));
+}
+
+/* Where an upload is that takes @predicted in all, or more. */
+std::string
+progress_text (const SyncState &st, int sent, int total, Nanoseconds predicted)
+{
+  constexpr Nanoseconds kTenth = GST_SECOND / 10;
+  const std::string masks = "masks of " + st.schedule.text ();
+  const std::string &dmd = st.runner->info ().name;
+  if (sent == total)
+    return "The " + masks + " are on " + dmd;
+  const Nanoseconds left = predicted / total * (total - sent) / kTenth * kTenth;
+  const std::string time =
+      left > 0 ? ", " + time_text (left) + " or more left" : "";
+  return std::to_string (std::int64_t (sent) * 100 / total) + " % of the " +
+         masks + " sent to " + dmd + time;
+}
+
+/* Reports come from the runner's thread. */
+DmdRunner::Reports
+reports (GstDmdSync *self)
+{
+  DmdRunner::Reports reports;
+  const auto predicted = std::make_shared<Nanoseconds> (0);
+  reports.predicted = [predicted] (Nanoseconds time) { *predicted = time; };
+  reports.progress = [self, predicted] (int sent, int total) {
+    SyncState &st = state (self);
+    const std::string text = progress_text (st, sent, total, *predicted);
+    st.uploading = sent < total;
+    post_progress (self,
+        sent == 0      ? GST_PROGRESS_TYPE_START
+        : sent < total ? GST_PROGRESS_TYPE_CONTINUE
+                       : GST_PROGRESS_TYPE_COMPLETE,
+        text);
+  };
+  reports.failed = [self] (const Error &error) {
+    if (state (self).uploading.exchange (false))
+      post_progress (self, GST_PROGRESS_TYPE_ERROR, error.message);
+    GST_ELEMENT_ERROR (self, RESOURCE, WRITE,
+        ("The DMD failed: %s", error.message.c_str ()), (nullptr));
+  };
+  reports.not_parked = [self] {
+    GST_ELEMENT_WARNING (self, RESOURCE, WRITE,
+        ("%s did not answer when it was told to stop, and may show masks on: "
+         "try \"codedexposure dmd stop\", or switch it off.",
+            state (self).runner->info ().name.c_str ()),
+        (nullptr));
+  };
+  return reports;
+}
+
+} // namespace
+
+bool
+read_schedule (GstDmdSync *self)
+{
+  SyncState &st = state (self);
+  std::string text;
+  {
+    const ObjectLock lock (self);
+    text = st.settings.schedule;
+  }
+  Result<Schedule> schedule = Schedule::parse (text);
+  if (!schedule) {
+    GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
+        ("The schedule property cannot be read: %s",
+            schedule.error ().message.c_str ()),
+        (nullptr));
+    return false;
+  }
+  st.schedule = *std::move (schedule);
+  return true;
+}
+
+bool
+open_device (GstDmdSync *self)
+{
+  SyncState &st = state (self);
+  std::string device;
+  {
+    const ObjectLock lock (self);
+    device = st.settings.device;
+  }
+  if (device.empty ())
+    return true;
+
+  Result<std::unique_ptr<Dmd>> dmd = open_dmd (device);
+  if (!dmd) {
+    GST_ELEMENT_ERROR (self, RESOURCE, OPEN_READ_WRITE,
+        ("Cannot open the DMD \"%s\": %s", device.c_str (),
+            dmd.error ().message.c_str ()),
+        (nullptr));
+    return false;
+  }
+  st.runner = std::make_unique<DmdRunner> (*std::move (dmd), reports (self));
+  GST_INFO_OBJECT (self, "opened %s", device.c_str ());
+  return true;
+}
+
+void
+begin_upload (GstDmdSync *self)
+{
+  SyncState &st = state (self);
+  if (st.runner)
+    st.runner->upload (st.schedule);
+}
+
+void
+park (GstDmdSync *self)
+{
+  SyncState &st = state (self);
+  if (!st.runner)
+    return;
+  st.runner->halt ();
+  {
+    const ObjectLock lock (self);
+    st.pattern.reset ();
+  }
+  if (st.uploading.exchange (false))
+    post_progress (self, GST_PROGRESS_TYPE_CANCELED, "Upload cancelled");
+}
+
+} // namespace codedexposure::gst::sync

@@ -1,0 +1,270 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-dmdsync
+ * @title: dmdsync
+ * @short_description: Drives the DMD, and makes time and phase of coded frames
+ * known
+ *
+ * Stands right behind the camera. It programs and starts the micromirror device
+ * (DMD), gives every coded frame the time and the number of its exposure, finds
+ * frames that are lost, late or doubled, and watches whether the masks are in
+ * phase with the exposure. Pixel values stay as they are.
+ *
+ * ## The DMD
+ *
+ * NULL to READY opens #dmdsync:device. READY to PAUSED sends the masks of
+ * #dmdsync:schedule from a thread of its own, with PROGRESS messages named
+ * `upload`; the stream begins when that is done, and a change of state cancels
+ * it. The mirrors start when the caps, and with them the frame period, are
+ * known, before caps go on: a camera that the DMD triggers waits for its first
+ * trigger then. Slots that fit neither the frame period nor the device are an
+ * error that tells the numbers. PAUSED to READY parks the mirrors, always.
+ *
+ * Without a device, the element watches and stamps the frames of a DMD that
+ * somebody else drives.
+ *
+ * ## Time
+ *
+ * The PTS of outgoing frames is the start of the exposure's first slot; see
+ * #dmdsync:timestamp-at and #dmdsync:exposure-offset. What PTS are moved back
+ * is latency, and answered as such. DURATION is the frame period of the caps,
+ * OFFSET the number of the frame since the start of the stream, lost ones
+ * counted. With `timestamp-at=device-clock` the stamps of the camera's own
+ * clock are fitted to the pipeline's; both stay on the frame as reference
+ * timestamps, `timestamp/x-camera-device` and `timestamp/x-arrival`.
+ *
+ * |[
+ *   mirrors   | slot 0 | slot 1 | ... | slot N-1 | readout | slot 0
+ *   PTS means ^ exposure-start                   ^         ^ arrival
+ *                                   exposure-end |
+ * ]|
+ *
+ * A step of more than one and a half periods is a loss. What takes the place of
+ * the lost frames says #dmdsync:on-loss. A frame at the time of the one before
+ * is a duplicate and dropped; one at a time that was passed is late, and goes
+ * on with DISCONT.
+ *
+ * A frame flagged RESYNC begins another stretch of the camera's time, as when
+ * codedexposure-camerasrc has restarted its camera: its number and PTS follow
+ * from when it arrives, and the frames in between are lost.
+ *
+ * ## Memory
+ *
+ * A frame that comes from no buffer pool is copied once, into a pool of the
+ * element: its source may overwrite the memory, as aravissrc does. All others
+ * pass untouched. So frames can be kept downstream as long as needed.
+ *
+ * ## Phase
+ *
+ * #dmdsync:slip-observable says whether a DMD that slips by whole slots can be
+ * seen with the schedule: `never` for codes that open every element in one
+ * slot, `in-the-frame` in which it happens for staircase and s-matrix, `always`
+ * with a pilot (`pilot=16` in the schedule). A frame out of phase is CORRUPTED,
+ * its meta says `locked` false; see #dmdsync:on-unlock. The DMD is started
+ * anew, and when frames show that, they are locked again.
+ *
+ * ## Patterns
+ *
+ * An element behind this one can have the mirrors show a grating or a code for
+ * a while, with an event (docs/formats.md, "Patterns on request"). Frames that
+ * show it bear its name in their meta; they are not coded frames and never
+ * locked. The mirrors are given back when that is asked for, or nobody asks any
+ * more.
+ *
+ * ## Metas, messages and tags
+ *
+ * Every frame bears the custom meta `CodedExposureFrame`. Element messages are
+ * `dmdsync/frames-lost`, `dmdsync/frame-late`, `dmdsync/frame-dropped`,
+ * `dmdsync/slip`, `dmdsync/locked`, `dmdsync/time-uncertainty`,
+ * `dmdsync/pattern-shown` and `dmdsync/pattern-over`. The schedule goes
+ * downstream as stream tag; another one in the stream is replaced, with a
+ * warning. QoS events go no further upstream: some camera sources stop their
+ * stream for them.
+ *
+ * ## Example pipelines
+ *
+ * |[
+ * gst-launch-1.0 -m videotestsrc num-buffers=800 pattern=ball !
+ * video/x-raw,format=GRAY8,width=768,height=576,framerate=100/1 !
+ * codedexposure-sim dmd=sim:bench !
+ * dmdsync device=sim:bench schedule=staircase:2x2 ! codedexposure-demux !
+ * queue ! videoconvert ! autovideosink
+ * ]| A simulated bench whose mirrors dmdsync drives.
+ * |[
+ * gst-launch-1.0 -m videotestsrc num-buffers=800 pattern=ball !
+ * video/x-raw,format=GRAY8,width=768,height=576,framerate=100/1 !
+ * codedexposure-sim dmd=sim:bench !
+ * dmdsync device=sim:bench,slip-at=401 schedule=sequential:2x2,pilot=16 !
+ * fakesink
+ * ]| The same with a DMD that misses a trigger in slot 401: `dmdsync/slip` and,
+ * after the DMD was started anew, `dmdsync/locked` appear among the messages.
+ *
+ * Since: 0.1
+ */
+#include "dmdsync.h"
+
+#include "common/caps.h"
+#include "state.h"
+
+GST_DEBUG_CATEGORY (dmdsync_debug);
+#define GST_CAT_DEFAULT dmdsync_debug
+
+using namespace codedexposure;
+using namespace codedexposure::gst;
+using sync::Counters;
+using sync::SyncState;
+
+struct _GstDmdSync {
+  GstBaseTransform parent;
+  SyncState *state;
+};
+
+G_DEFINE_TYPE_WITH_CODE (GstDmdSync, gst_dmd_sync, GST_TYPE_BASE_TRANSFORM,
+    GST_DEBUG_CATEGORY_INIT (
+        dmdsync_debug, "dmdsync", 0, "drives the DMD, times coded frames"))
+GST_ELEMENT_REGISTER_DEFINE (
+    dmdsync, "dmdsync", GST_RANK_NONE, GST_TYPE_DMD_SYNC)
+
+namespace
+{
+
+/* READY to PAUSED waits so long for an upload: most devices have their masks by
+ * then, and whatever begins with the frames finds them programmed. */
+constexpr std::chrono::milliseconds kQuickUpload{1000};
+
+GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE ("sink",
+    GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
+GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC,
+    GST_PAD_ALWAYS, GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
+
+void
+say_observable (GstDmdSync *self)
+{
+  const SyncState &st = *self->state;
+  if (slip_observable (st.schedule) != SlipObservable::never)
+    return;
+  const std::string schedule = st.schedule.text ();
+  const std::string text =
+      "A slip of the DMD by whole slots is not observable with " + schedule +
+      "; reserve some rows of mirrors for a pilot, as in " + schedule +
+      ",pilot=16, to see one";
+  /* gst-launch shows the second text only. */
+  GST_ELEMENT_INFO (
+      self, RESOURCE, SETTINGS, ("%s", text.c_str ()), ("%s", text.c_str ()));
+}
+
+void
+begin_run (GstDmdSync *self)
+{
+  SyncState &st = *self->state;
+  {
+    const ObjectLock lock (self);
+    st.counters = Counters ();
+    st.observable = slip_observable (st.schedule);
+  }
+  say_observable (self);
+  sync::begin_upload (self);
+  if (st.runner)
+    st.runner->settle_within (kQuickUpload);
+}
+
+void
+forget_stream (GstDmdSync *self)
+{
+  SyncState &st = *self->state;
+  st.stream = sync::Stream ();
+  const ObjectLock lock (self);
+  st.time.reset ();
+  st.switches = 0;
+  st.locked = false;
+  st.jitter = 0;
+  st.latency = 0;
+}
+
+GstStateChangeReturn
+change_state (GstElement *element, GstStateChange transition)
+{
+  auto *self = GST_DMD_SYNC (element);
+  /* A wrong schedule is told before a device is opened; it may be another one
+   * by the time that it is shown. */
+  const bool schedule_due = transition == GST_STATE_CHANGE_NULL_TO_READY ||
+                            transition == GST_STATE_CHANGE_READY_TO_PAUSED;
+  if (schedule_due && !sync::read_schedule (self))
+    return GST_STATE_CHANGE_FAILURE;
+  if (transition == GST_STATE_CHANGE_NULL_TO_READY && !sync::open_device (self))
+    return GST_STATE_CHANGE_FAILURE;
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED)
+    begin_run (self);
+  /* First, because the streaming thread may be waiting for the DMD. */
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY)
+    sync::park (self);
+
+  const GstStateChangeReturn changed =
+      GST_ELEMENT_CLASS (gst_dmd_sync_parent_class)
+          ->change_state (element, transition);
+
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED &&
+      changed == GST_STATE_CHANGE_FAILURE)
+    sync::park (self);
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY)
+    forget_stream (self);
+  if (transition == GST_STATE_CHANGE_READY_TO_NULL)
+    self->state->runner.reset ();
+  return changed;
+}
+
+void
+finalize (GObject *object)
+{
+  delete GST_DMD_SYNC (object)->state;
+  G_OBJECT_CLASS (gst_dmd_sync_parent_class)->finalize (object);
+}
+
+} // namespace
+
+namespace codedexposure::gst::sync
+{
+
+SyncState &
+state (GstDmdSync *self)
+{
+  return *self->state;
+}
+
+} // namespace codedexposure::gst::sync
+
+static void
+gst_dmd_sync_class_init (GstDmdSyncClass *klass)
+{
+  auto *object_class = G_OBJECT_CLASS (klass);
+  auto *element_class = GST_ELEMENT_CLASS (klass);
+  auto *transform_class = GST_BASE_TRANSFORM_CLASS (klass);
+
+  object_class->finalize = finalize;
+  sync::install_properties (object_class);
+
+  gst_element_class_set_static_metadata (element_class, "DMD synchroniser",
+      "Filter/Video",
+      "Drives the DMD of a coded exposure camera; times, counts and watches "
+      "its frames",
+      "The gst-codedexposure authors");
+  gst_element_class_add_static_pad_template (element_class, &sink_template);
+  gst_element_class_add_static_pad_template (element_class, &src_template);
+
+  element_class->change_state = GST_DEBUG_FUNCPTR (change_state);
+  transform_class->set_caps = GST_DEBUG_FUNCPTR (sync::set_caps);
+  transform_class->sink_event = GST_DEBUG_FUNCPTR (sync::sink_event);
+  transform_class->src_event = GST_DEBUG_FUNCPTR (sync::src_event);
+  transform_class->query = GST_DEBUG_FUNCPTR (sync::query);
+  transform_class->generate_output = GST_DEBUG_FUNCPTR (sync::generate_output);
+}
+
+static void
+gst_dmd_sync_init (GstDmdSync *self)
+{
+  self->state = new SyncState;
+  auto *transform = GST_BASE_TRANSFORM (self);
+  /* Pixels pass untouched: buffers are allocated as downstream wants them. */
+  gst_base_transform_set_passthrough (transform, TRUE);
+  gst_base_transform_set_qos_enabled (transform, FALSE);
+}

@@ -1,0 +1,324 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* dmdsync's caps, events and queries. */
+#include "common/tag.h"
+#include "state.h"
+
+#define GST_CAT_DEFAULT dmdsync_debug
+
+namespace codedexposure::gst::sync
+{
+
+namespace
+{
+
+GstBaseTransformClass *
+base_class ()
+{
+  return GST_BASE_TRANSFORM_CLASS (g_type_class_peek (GST_TYPE_BASE_TRANSFORM));
+}
+
+/** The rate of the caps, else that at which the schedule's own slots follow
+ * each other without a pause. */
+Result<FrameRate>
+frame_rate (const GstVideoInfo &info, const Schedule &schedule)
+{
+  if (info.fps_n > 0)
+    return FrameRate{info.fps_n, info.fps_d};
+
+  const Timing &timing = schedule.timing ();
+  const Nanoseconds cycle =
+      schedule.slots () * (timing.active + timing.switching) + timing.readout;
+  if (timing.active == 0 || cycle > G_MAXINT)
+    return Error{"the caps have no frame rate, and the schedule " +
+                 schedule.text () +
+                 " does not say how long its slots are; add "
+                 "framerate=25/1 to the caps, or active= to the schedule"};
+  return FrameRate{int (GST_SECOND), int (cycle)};
+}
+
+Result<Timebase>
+make_timebase (GstCaps *caps, const SyncState &st)
+{
+  Timebase time;
+  if (!gst_video_info_from_caps (&time.info, caps))
+    return Error{"caps that are no video"};
+  const Result<FrameRate> rate = frame_rate (time.info, st.schedule);
+  if (!rate)
+    return rate.error ();
+  time.rate = *rate;
+
+  const Result<SlotPlan> plan =
+      SlotPlan::fit (st.schedule.timing (), st.schedule.slots (), time.rate);
+  if (!plan)
+    return plan.error ();
+  time.plan = *plan;
+  if (st.runner)
+    if (const Result<void> fits =
+            check_limits (st.runner->info (), st.schedule, time.plan);
+        !fits)
+      return fits.error ();
+
+  const PhaseWatch watch (st.schedule, time.info.width, time.info.height);
+  if (st.schedule.pilot_rows () > 0 && !watch.complete ())
+    return Error{"frames of " + std::to_string (time.info.width) + "x" +
+                 std::to_string (time.info.height) +
+                 " cannot hold the pilot of " + st.schedule.text () +
+                 ", which is " + std::to_string (kPilotColumns) +
+                 " pixels wide and " +
+                 std::to_string (st.schedule.pilot_rows ()) + " rows high"};
+  return time;
+}
+
+std::string
+pixel_format (GstDmdSync *self)
+{
+  const ObjectLock lock (self);
+  return state (self).settings.pixel_format;
+}
+
+/** Whether the DMD can stay as it is. */
+bool
+same_slots (const std::optional<Timebase> &before, const Timebase &now)
+{
+  return before && before->rate == now.rate;
+}
+
+/* @p first: number of the first one. */
+void
+begin_frames (GstDmdSync *self, std::uint64_t first)
+{
+  Stream &stream = state (self).stream;
+  stream.sequence.emplace (stream.time->rate, first);
+  stream.rate_watch.emplace (stream.time->rate);
+  begin_phase (self);
+  stream.last.reset ();
+}
+
+bool
+push_tag (GstDmdSync *self)
+{
+  Stream &stream = state (self).stream;
+  if (!std::exchange (stream.tag_due, false))
+    return true;
+  return gst_pad_push_event (GST_BASE_TRANSFORM_SRC_PAD (self),
+      schedule_to_event (state (self).schedule));
+}
+
+/** @p event, or one in which our schedule takes the place of another. */
+GstEvent *
+own_schedule (GstDmdSync *self, GstEvent *event)
+{
+  SyncState &st = state (self);
+  GstTagList *tags = nullptr;
+  gst_event_parse_tag (event, &tags);
+  const auto theirs = setup_from_tags (tags);
+  if (theirs && (!*theirs || !(theirs->value ().schedule == st.schedule)) &&
+      !std::exchange (st.stream.warned_tag, true))
+    GST_ELEMENT_WARNING (self, STREAM, WRONG_TYPE,
+        ("The stream was tagged with the schedule %s, but the DMD shows %s: "
+         "the tag now says the latter. Give both elements the same schedule.",
+            *theirs ? theirs->value ().schedule.text ().c_str ()
+                    : "that is unreadable",
+            st.schedule.text ().c_str ()),
+        (nullptr));
+  if (gst_tag_list_get_scope (tags) == GST_TAG_SCOPE_GLOBAL && !theirs)
+    return event;
+
+  /* The last tags of a scope are those that a late link gets: ours are always
+   * among them. How the camera stands is not ours to say. */
+  if (theirs && *theirs)
+    st.stream.mapping = theirs->value ().mapping;
+  GstEvent *ours = gst_event_new_tag (
+      tags_with_setup (tags, {st.schedule, st.stream.mapping}));
+  gst_event_set_seqnum (ours, gst_event_get_seqnum (event));
+  gst_event_unref (event);
+  return ours;
+}
+
+gboolean
+take_segment (GstDmdSync *self, GstEvent *event)
+{
+  Stream &stream = state (self).stream;
+  const GstSegment *segment = nullptr;
+  gst_event_parse_segment (event, &segment);
+  if (segment->format != GST_FORMAT_TIME) {
+    GST_ELEMENT_ERROR (self, STREAM, FORMAT,
+        ("Frames must come in TIME, not in %s",
+            gst_format_get_name (segment->format)),
+        (nullptr));
+    gst_event_unref (event);
+    return FALSE;
+  }
+  if (stream.sequence) {
+    stream.sequence->resync ();
+    stream.rate_watch->resync ();
+  }
+  stream.device_clock.reset ();
+  const gboolean taken =
+      base_class ()->sink_event (GST_BASE_TRANSFORM (self), event);
+  return push_tag (self) && taken;
+}
+
+/* A source offers the same caps again before it gives up; the bus hears of it
+ * once. */
+void
+refuse (GstDmdSync *self, GstCaps *incaps, const std::string &why)
+{
+  if (std::exchange (state (self).stream.refused, why) != why)
+    GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
+        ("The frames do not fit the schedule: %s", why.c_str ()),
+        ("%" GST_PTR_FORMAT, (void *)incaps));
+}
+
+} // namespace
+
+void
+begin_phase (GstDmdSync *self)
+{
+  SyncState &st = state (self);
+  Stream &stream = st.stream;
+  const GstVideoInfo &info = stream.time->info;
+  const bool triggers = st.runner && st.runner->info ().triggers_camera;
+  stream.watch.emplace (st.schedule, info.width, info.height);
+  stream.lock.emplace (PhaseLock::Options{
+      .observable = stream.watch->complete () ? slip_observable (st.schedule)
+                                              : SlipObservable::never,
+      .can_restart = st.runner != nullptr,
+      .gap_shows_restart = triggers});
+  if (stream.coded)
+    stream.shown = SwitchWatch (triggers);
+}
+
+gboolean
+set_caps (GstBaseTransform *trans, GstCaps *incaps, GstCaps *)
+{
+  auto *self = GST_DMD_SYNC (trans);
+  SyncState &st = state (self);
+  const Result<Timebase> time = make_timebase (incaps, st);
+  if (!time) {
+    refuse (self, incaps, time.error ().message);
+    return FALSE;
+  }
+  const bool restart = !same_slots (st.stream.time, *time);
+  st.stream.time = *time;
+  Result<OwnedFrames> frames =
+      OwnedFrames::make (time->info, pixel_format (self));
+  if (!frames) {
+    st.stream.time.reset ();
+    refuse (self, incaps, frames.error ().message);
+    return FALSE;
+  }
+  st.stream.frames = *std::move (frames);
+  st.stream.refused.clear ();
+  {
+    const ObjectLock lock (self);
+    st.time = *time;
+  }
+  /* Other caps are another stretch of the same stream. */
+  begin_frames (
+      self, st.stream.sequence ? st.stream.sequence->next_number () : 0);
+  st.stream.discont = true;
+  update_latency (self);
+  give_back (self, "caps");
+  if (!st.runner || !restart)
+    return TRUE;
+  st.runner->start (time->plan);
+  st.runner->settle ();
+  /* A wait cut short by a flush or on the way down says nothing of the caps. */
+  return !st.runner->failed ();
+}
+
+gboolean
+sink_event (GstBaseTransform *trans, GstEvent *event)
+{
+  auto *self = GST_DMD_SYNC (trans);
+  SyncState &st = state (self);
+  switch (GST_EVENT_TYPE (event)) {
+  case GST_EVENT_STREAM_START:
+    /* Nothing flows before the masks are on the device: not even caps, for
+     * which a simulated bench needs to know them. On the way down, frames are
+     * refused as flushing; an event that fails would be an error. */
+    if (st.runner && !st.runner->settle () && !st.runner->halted ()) {
+      gst_event_unref (event);
+      return FALSE;
+    }
+    st.stream.tag_due = true;
+    st.stream.warned_tag = false;
+    st.stream.discont = true;
+    st.stream.sequence.reset ();
+    if (st.stream.time)
+      begin_frames (self, 0);
+    break;
+  case GST_EVENT_SEGMENT:
+    return take_segment (self, event);
+  case GST_EVENT_TAG:
+    event = own_schedule (self, event);
+    break;
+  case GST_EVENT_FLUSH_START:
+    if (st.runner)
+      st.runner->interrupt (true);
+    break;
+  case GST_EVENT_EOS:
+    note_end (self);
+    give_back (self, "eos");
+    break;
+  case GST_EVENT_FLUSH_STOP:
+    give_back (self, "flush");
+    if (st.runner)
+      st.runner->interrupt (false);
+    if (st.stream.sequence) {
+      st.stream.sequence->resync ();
+      st.stream.rate_watch->resync ();
+    }
+    st.stream.last.reset ();
+    st.stream.ready.clear ();
+    st.stream.discont = true;
+    break;
+  default:
+    break;
+  }
+  return base_class ()->sink_event (trans, event);
+}
+
+/* A camera source that waits for a frame with its object lock held, as
+ * aravissrc does, would keep a QoS event, and with it the sink, waiting. */
+gboolean
+src_event (GstBaseTransform *trans, GstEvent *event)
+{
+  if (GST_EVENT_TYPE (event) == GST_EVENT_QOS) {
+    gst_event_unref (event);
+    return TRUE;
+  }
+  if (is_pattern_event (event))
+    return take_pattern_event (GST_DMD_SYNC (trans), event);
+  return base_class ()->src_event (trans, event);
+}
+
+/* Frames that are given an earlier PTS are later by as much. What upstream can
+ * wait is counted from the PTS as well, so the maximum moves with the minimum.
+ */
+gboolean
+query (GstBaseTransform *trans, GstPadDirection direction, GstQuery *query)
+{
+  if (direction == GST_PAD_SRC && answer_mirrors (GST_DMD_SYNC (trans), query))
+    return TRUE;
+  if (!base_class ()->query (trans, direction, query))
+    return FALSE;
+  if (GST_QUERY_TYPE (query) != GST_QUERY_LATENCY || direction != GST_PAD_SRC)
+    return TRUE;
+
+  gboolean live = FALSE;
+  GstClockTime least = 0;
+  GstClockTime most = 0;
+  gst_query_parse_latency (query, &live, &least, &most);
+  GstClockTime own = 0;
+  {
+    const ObjectLock lock (trans);
+    own = state (GST_DMD_SYNC (trans)).latency;
+  }
+  gst_query_set_latency (query, live, least + own,
+      GST_CLOCK_TIME_IS_VALID (most) ? most + own : most);
+  return TRUE;
+}
+
+} // namespace codedexposure::gst::sync

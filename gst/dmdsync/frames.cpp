@@ -1,0 +1,461 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* dmdsync, frame by frame: time, number, phase. */
+#include "common/meta.h"
+#include "state.h"
+
+#define GST_CAT_DEFAULT dmdsync_debug
+
+namespace codedexposure::gst::sync
+{
+
+namespace
+{
+
+/* A longer gap is not filled with repeated frames: four seconds at 25 a second.
+ */
+constexpr guint64 kMostRepeats = 100;
+
+/** A frame on its way: what came, and what is known of it. */
+struct Frame {
+  BufferPtr buffer;
+  bool readable;
+  FrameStep step;
+  GstClockTime pts;
+  LockDecision phase;
+  PatternSight sight;
+};
+
+void
+post (GstDmdSync *self, GstStructure *structure)
+{
+  gst_element_post_message (GST_ELEMENT (self),
+      gst_message_new_element (GST_OBJECT (self), structure));
+}
+
+void
+count (GstDmdSync *self, guint64 Counters::*counter, guint64 more = 1)
+{
+  const ObjectLock lock (self);
+  state (self).counters.*counter += more;
+}
+
+void
+say_dropped (GstDmdSync *self, const Frame &frame, const char *reason)
+{
+  GST_DEBUG_OBJECT (self, "frame %" G_GUINT64_FORMAT " dropped: %s",
+      frame.step.number, reason);
+  post (self, gst_structure_new ("dmdsync/frame-dropped", "frame",
+                  G_TYPE_UINT64, frame.step.number, "pts", G_TYPE_UINT64,
+                  frame.pts, "reason", G_TYPE_STRING, reason, nullptr));
+}
+
+FrameMeta
+meta_of (const Timebase &time, guint64 number, GstClockTime pts)
+{
+  FrameMeta meta;
+  meta.frame = number;
+  meta.exposure_start = pts;
+  meta.exposure_duration = GstClockTime (time.plan.exposure ());
+  return meta;
+}
+
+/** Times, number and meta of a frame that is ready. @p buffer is writable. */
+void
+stamp (GstDmdSync *self, GstBuffer *buffer, FrameMeta meta)
+{
+  Stream &stream = state (self).stream;
+  GST_BUFFER_PTS (buffer) = meta.exposure_start;
+  GST_BUFFER_DTS (buffer) = GST_CLOCK_TIME_NONE;
+  /* What a camera source says is the distance to the frame before. */
+  GST_BUFFER_DURATION (buffer) = GstClockTime (stream.time->rate.period ());
+  GST_BUFFER_OFFSET (buffer) = meta.frame;
+  GST_BUFFER_OFFSET_END (buffer) = meta.frame + 1;
+  if (std::exchange (stream.discont, false))
+    GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DISCONT);
+  if (stream.frames->knows_bits ())
+    meta.bits = stream.frames->bits ();
+  else if (const auto said = get_frame_meta (buffer))
+    meta.bits = said->bits;
+  set_frame_meta (buffer, meta);
+}
+
+/** Fills the place of the frames that are missing before @p frame. */
+void
+fill_gap (GstDmdSync *self, const Frame &frame, OnLoss on_loss)
+{
+  Stream &stream = state (self).stream;
+  const FrameRate rate = stream.time->rate;
+  const guint64 lost = frame.step.lost;
+  const GstClockTime gap = GstClockTime (rate.time_of (gint64 (lost)));
+  const GstClockTime from = frame.pts - std::min (frame.pts, gap);
+
+  if (GST_BASE_TRANSFORM (self)->segment.rate < 0)
+    return;
+  if (on_loss != OnLoss::repeat || !stream.last || lost > kMostRepeats ||
+      gap > frame.pts) {
+    gst_pad_push_event (GST_BASE_TRANSFORM_SRC_PAD (self),
+        gst_event_new_gap (from, frame.pts - from));
+    return;
+  }
+  for (guint64 k = 0; k < lost; k++) {
+    BufferPtr filler (gst_buffer_copy (stream.last.get ()));
+    GST_BUFFER_FLAG_UNSET (filler.get (), GST_BUFFER_FLAG_DISCONT);
+    GST_BUFFER_FLAG_SET (
+        filler.get (), GST_BUFFER_FLAG_GAP | GST_BUFFER_FLAG_DROPPABLE);
+    stamp (self, filler.get (),
+        meta_of (*stream.time, frame.step.number - lost + k,
+            from + GstClockTime (rate.time_of (gint64 (k)))));
+    stream.ready.push_back (std::move (filler));
+  }
+  count (self, &Counters::frames_repeated, lost);
+}
+
+GstFlowReturn
+take_loss (GstDmdSync *self, const Frame &frame)
+{
+  SyncState &st = state (self);
+  const guint64 lost = frame.step.lost;
+  const GstClockTime gap =
+      GstClockTime (st.stream.time->rate.time_of (gint64 (lost)));
+  const GstClockTime from = frame.pts - std::min (frame.pts, gap);
+  OnLoss on_loss;
+  {
+    const ObjectLock lock (self);
+    on_loss = st.settings.on_loss;
+  }
+
+  st.stream.discont = true;
+  count (self, &Counters::frames_lost, lost);
+  GST_INFO_OBJECT (self,
+      "%" G_GUINT64_FORMAT " frames lost before %" GST_TIME_FORMAT, lost,
+      GST_TIME_ARGS (frame.pts));
+  post (self, gst_structure_new ("dmdsync/frames-lost", "count", G_TYPE_UINT64,
+                  lost, "from", G_TYPE_UINT64, from, "to", G_TYPE_UINT64,
+                  frame.pts, nullptr));
+  if (on_loss == OnLoss::error && st.stream.coded) {
+    GST_ELEMENT_ERROR (self, RESOURCE, READ,
+        ("%" G_GUINT64_FORMAT " frames were lost before %" GST_TIME_FORMAT
+         ", and on-loss=error says to stop",
+            lost, GST_TIME_ARGS (frame.pts)),
+        (nullptr));
+    return GST_FLOW_ERROR;
+  }
+  fill_gap (self, frame, on_loss);
+  return GST_FLOW_OK;
+}
+
+/** What the order of arrival says. Returns false when the frame goes no
+ * further; @p flow then says whether the stream does. */
+bool
+take_arrival (GstDmdSync *self, const Frame &frame, GstFlowReturn &flow)
+{
+  Stream &stream = state (self).stream;
+  switch (frame.step.arrival) {
+  case Arrival::duplicate:
+    count (self, &Counters::frames_duplicate);
+    say_dropped (self, frame, "duplicate");
+    return false;
+  case Arrival::after_loss:
+    flow = take_loss (self, frame);
+    return flow == GST_FLOW_OK;
+  case Arrival::late:
+    count (self, &Counters::frames_late);
+    post (
+        self, gst_structure_new ("dmdsync/frame-late", "frame", G_TYPE_UINT64,
+                  frame.step.number, "pts", G_TYPE_UINT64, frame.pts, nullptr));
+    stream.discont = true;
+    return true;
+  case Arrival::restarted:
+    GST_WARNING_OBJECT (
+        self, "time went back to %" GST_TIME_FORMAT, GST_TIME_ARGS (frame.pts));
+    stream.discont = true;
+    return true;
+  default:
+    return true;
+  }
+}
+
+/** Counts a frame of which a part is missing. Returns false when it goes no
+ * further. */
+bool
+take_whole (GstDmdSync *self, Frame &frame)
+{
+  Stream &stream = state (self).stream;
+  if (!frame.readable ||
+      GST_BUFFER_FLAG_IS_SET (frame.buffer.get (), GST_BUFFER_FLAG_CORRUPTED)) {
+    count (self, &Counters::frames_incomplete);
+    post (self,
+        gst_structure_new ("dmdsync/frame-incomplete", "frame", G_TYPE_UINT64,
+            frame.step.number, "pts", G_TYPE_UINT64, frame.pts, "bytes",
+            G_TYPE_UINT64, guint64 (gst_buffer_get_size (frame.buffer.get ())),
+            nullptr));
+  }
+  if (frame.readable)
+    return true;
+  say_dropped (self, frame, "incomplete");
+  stream.discont = true;
+  gst_pad_push_event (GST_BASE_TRANSFORM_SRC_PAD (self),
+      gst_event_new_gap (
+          frame.pts, GstClockTime (stream.time->rate.period ())));
+  return false;
+}
+
+PhaseSight
+look_at (GstDmdSync *self, GstBuffer *buffer)
+{
+  Stream &stream = state (self).stream;
+  MappedFrame mapped (stream.time->info, buffer, GST_MAP_READ);
+  if (!mapped) {
+    GST_WARNING_OBJECT (self, "frame cannot be read: its phase is not known");
+    return {};
+  }
+  const GstVideoFrame *frame = mapped.frame ();
+  const auto view = [frame]<typename Pixel> (const Pixel *) {
+    return ImageView<const Pixel>{
+        static_cast<const Pixel *> (GST_VIDEO_FRAME_PLANE_DATA (frame, 0)),
+        GST_VIDEO_FRAME_WIDTH (frame), GST_VIDEO_FRAME_HEIGHT (frame),
+        GST_VIDEO_FRAME_PLANE_STRIDE (frame, 0)};
+  };
+  if (GST_VIDEO_FRAME_FORMAT (frame) == GST_VIDEO_FORMAT_GRAY8)
+    return stream.watch->look (view (static_cast<const guint8 *> (nullptr)));
+  return stream.watch->look (view (static_cast<const guint16 *> (nullptr)));
+}
+
+void
+say_phase (GstDmdSync *self, const Frame &frame)
+{
+  SyncState &st = state (self);
+  const LockDecision &phase = frame.phase;
+  if (phase.slipped) {
+    count (self, &Counters::slips);
+    GST_WARNING_OBJECT (
+        self, "the DMD slipped by %d slots", phase.slipped->slots);
+    post (self, gst_structure_new ("dmdsync/slip", "frame", G_TYPE_UINT64,
+                    guint64 (phase.slipped->first_frame), "slots", G_TYPE_INT,
+                    phase.slipped->slots, "certain", G_TYPE_BOOLEAN,
+                    gboolean (phase.slipped->certain), "pts", G_TYPE_UINT64,
+                    frame.pts, nullptr));
+  }
+  if (phase.locked_now)
+    post (self, gst_structure_new ("dmdsync/locked", "frame", G_TYPE_UINT64,
+                    guint64 (frame.step.number), "pts", G_TYPE_UINT64,
+                    frame.pts, nullptr));
+
+  bool changed = false;
+  {
+    const ObjectLock lock (self);
+    changed = std::exchange (st.locked, phase.locked) != phase.locked;
+  }
+  if (changed)
+    g_object_notify (G_OBJECT (self), "locked");
+}
+
+/** What becomes of a frame whose phase is not known to be right. */
+GstFlowReturn
+take_unlocked (GstDmdSync *self, const Frame &frame)
+{
+  SyncState &st = state (self);
+  OnUnlock on_unlock;
+  {
+    const ObjectLock lock (self);
+    on_unlock = st.settings.on_unlock;
+  }
+  switch (on_unlock) {
+  case OnUnlock::skip:
+    count (self, &Counters::frames_skipped);
+    say_dropped (self, frame, "not-locked");
+    st.stream.discont = true;
+    gst_pad_push_event (GST_BASE_TRANSFORM_SRC_PAD (self),
+        gst_event_new_gap (
+            frame.pts, GstClockTime (st.stream.time->rate.period ())));
+    return GST_BASE_TRANSFORM_FLOW_DROPPED;
+  case OnUnlock::error:
+    GST_ELEMENT_ERROR (self, RESOURCE, FAILED,
+        ("The masks of the DMD are %d slots late in frame %" G_GUINT64_FORMAT
+         ", and on-unlock=error says to stop",
+            frame.phase.slip, guint64 (frame.step.number)),
+        (nullptr));
+    return GST_FLOW_ERROR;
+  default:
+    GST_BUFFER_FLAG_SET (frame.buffer.get (), GST_BUFFER_FLAG_CORRUPTED);
+    return GST_FLOW_OK;
+  }
+}
+
+/** Looks at the phase, and has the DMD started anew when it slipped. */
+void
+watch_phase (GstDmdSync *self, Frame &frame)
+{
+  SyncState &st = state (self);
+  if (!frame.sight.coded)
+    return say_phase (self, frame);
+  frame.phase = st.stream.lock->take (look_at (self, frame.buffer.get ()),
+      frame.step.number, frame.step.lost, st.runner && st.runner->settled ());
+  if (frame.phase.restart)
+    st.runner->start (st.stream.time->plan);
+  say_phase (self, frame);
+}
+
+/** A frame whose time stamps do not continue those before: by the pipeline's
+ * clock, it follows all the same. Returns the PTS that it came with, by that
+ * clock. */
+GstClockTime
+place_after_restart (GstDmdSync *self, Frame &frame)
+{
+  Stream &stream = state (self).stream;
+  GstBuffer *buffer = frame.buffer.get ();
+  const auto came = Nanoseconds (GST_BUFFER_PTS (buffer));
+  GST_BUFFER_FLAG_UNSET (buffer, GST_BUFFER_FLAG_RESYNC);
+  stream.device_clock.rejoin ();
+  stream.rate_watch->resync ();
+  stream.discont = true;
+  begin_phase (self);
+  const GstClockTime time = pipeline_time (self, buffer);
+
+  const auto away = Nanoseconds (time - std::min (time, stream.last_time));
+  const Nanoseconds period = stream.time->rate.period ();
+  const auto periods = guint64 ((away + period / 2) / period);
+  frame.step = stream.sequence->take_after (
+      came, periods - std::min<guint64> (periods, 1));
+  return time;
+}
+
+/** Numbers the frame; returns the PTS that it came with, by the pipeline's
+ * clock. */
+GstClockTime
+place (GstDmdSync *self, Frame &frame)
+{
+  Stream &stream = state (self).stream;
+  GstBuffer *buffer = frame.buffer.get ();
+  const GstClockTime came = GST_BUFFER_PTS (buffer);
+  GstClockTime time = 0;
+  if (GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_RESYNC) &&
+      stream.sequence->next_number () > 0) {
+    time = place_after_restart (self, frame);
+  } else {
+    frame.step = stream.sequence->take (
+        Nanoseconds (came), GST_BASE_TRANSFORM (self)->segment.rate < 0);
+    if (frame.step.arrival == Arrival::restarted)
+      stream.device_clock.reset ();
+    time = pipeline_time (self, buffer);
+    watch_rate (self, came);
+  }
+  if (frame.step.arrival != Arrival::late &&
+      frame.step.arrival != Arrival::duplicate)
+    stream.last_time = time;
+  return time;
+}
+
+/** What a frame that goes on bears. */
+FrameMeta
+meta_of (GstDmdSync *self, const Frame &frame)
+{
+  const Stream &stream = state (self).stream;
+  FrameMeta meta = meta_of (*stream.time, frame.step.number, frame.pts);
+  meta.locked = frame.phase.locked;
+  meta.slip = frame.phase.slip;
+  meta.lost_before = frame.step.lost;
+  meta.pattern = frame.sight.pattern;
+  meta.time_uncertainty = stream.uncertainty;
+  return meta;
+}
+
+/** Puts memory in place of @p frame's that its source cannot overwrite. False
+ * where it cannot be read. */
+bool
+own_memory (const OwnedFrames &frames, BufferPtr &frame)
+{
+  if (!frames.is_whole (frame.get ()))
+    return false;
+  BufferPtr owned = frames.own (frame.get ());
+  if (!owned)
+    return false;
+  frame = std::move (owned);
+  return true;
+}
+
+GstFlowReturn
+take_frame (GstDmdSync *self, BufferPtr buffer)
+{
+  SyncState &st = state (self);
+  Stream &stream = st.stream;
+  GstClockTimeDiff back = 0;
+  bool repeats = false;
+  {
+    const ObjectLock lock (self);
+    back = moved_back (st);
+    repeats = st.settings.on_loss == OnLoss::repeat;
+    st.counters.frames_in++;
+  }
+
+  Frame frame;
+  frame.readable = own_memory (*stream.frames, buffer);
+  frame.buffer.reset (gst_buffer_make_writable (buffer.release ()));
+  const GstClockTime time = place (self, frame);
+  const bool too_early = back > 0 && GstClockTime (back) > time;
+  frame.pts = too_early ? 0 : time - GstClockTime (back);
+
+  GstFlowReturn flow = GST_FLOW_OK;
+  if (!take_arrival (self, frame, flow))
+    return flow;
+  if (!take_whole (self, frame))
+    return GST_FLOW_OK;
+  frame.sight =
+      look_for_pattern (self, frame.buffer.get (), frame.step, frame.pts);
+  watch_phase (self, frame);
+  if (too_early) {
+    count (self, &Counters::frames_early);
+    say_dropped (self, frame, "before-start");
+    return GST_FLOW_OK;
+  }
+  if (!frame.phase.locked && frame.sight.coded)
+    if (flow = take_unlocked (self, frame); flow != GST_FLOW_OK)
+      return flow == GST_BASE_TRANSFORM_FLOW_DROPPED ? GST_FLOW_OK : flow;
+
+  say_uncertainty (self, frame.step.number, frame.pts);
+  stamp (self, frame.buffer.get (), meta_of (self, frame));
+  if (repeats)
+    stream.last.reset (gst_buffer_copy (frame.buffer.get ()));
+  stream.ready.push_back (std::move (frame.buffer));
+  return GST_FLOW_OK;
+}
+
+} // namespace
+
+GstFlowReturn
+generate_output (GstBaseTransform *trans, GstBuffer **outbuf)
+{
+  auto *self = GST_DMD_SYNC (trans);
+  SyncState &st = state (self);
+  Stream &stream = st.stream;
+  if (trans->queued_buf) {
+    BufferPtr buffer (std::exchange (trans->queued_buf, nullptr));
+    if (st.runner && st.runner->failed ())
+      return GST_FLOW_ERROR;
+    if (st.runner && st.runner->halted ())
+      return GST_FLOW_FLUSHING;
+    if (!stream.time)
+      return GST_FLOW_NOT_NEGOTIATED;
+    if (!GST_BUFFER_PTS_IS_VALID (buffer.get ())) {
+      GST_ELEMENT_ERROR (self, STREAM, FORMAT,
+          ("A frame has no time stamp, and nothing says when it was exposed; "
+           "let the source set one (do-timestamp=true)"),
+          (nullptr));
+      return GST_FLOW_ERROR;
+    }
+    GST_LOG_OBJECT (self, "[IN] %" GST_TIME_FORMAT,
+        GST_TIME_ARGS (GST_BUFFER_PTS (buffer.get ())));
+    if (const GstFlowReturn flow = take_frame (self, std::move (buffer));
+        flow != GST_FLOW_OK)
+      return flow;
+  }
+  if (!stream.ready.empty ()) {
+    *outbuf = stream.ready.front ().release ();
+    stream.ready.pop_front ();
+    GST_LOG_OBJECT (self, "[OUT] %" GST_TIME_FORMAT,
+        GST_TIME_ARGS (GST_BUFFER_PTS (*outbuf)));
+  }
+  return GST_FLOW_OK;
+}
+
+} // namespace codedexposure::gst::sync

@@ -1,0 +1,191 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* dmdsync's clocks: the camera's, the pipeline's, and what lies between. */
+#include "state.h"
+
+#define GST_CAT_DEFAULT dmdsync_debug
+
+namespace codedexposure::gst::sync
+{
+
+namespace
+{
+
+/* Latency grows in steps of this: every one makes a pipeline ask again. */
+constexpr GstClockTime kJitterStep = GST_MSECOND;
+
+/* Times that may be wrong by more than this are not known; they are known again
+ * below it. The margin is against saying so over and over. */
+constexpr GstClockTime kKnown = 50 * GST_USECOND;
+constexpr GstClockTime kNotKnown = 2 * kKnown;
+
+GstStaticCaps device_caps = GST_STATIC_CAPS ("timestamp/x-camera-device");
+GstStaticCaps arrival_caps = GST_STATIC_CAPS ("timestamp/x-arrival");
+
+void
+keep (GstBuffer *frame, GstStaticCaps &clock, GstClockTime time)
+{
+  const CapsPtr caps (gst_static_caps_get (&clock));
+  gst_buffer_add_reference_timestamp_meta (
+      frame, caps.get (), time, GST_CLOCK_TIME_NONE);
+}
+
+/** Now, as a PTS; none while there is no clock. */
+GstClockTime
+arrival_time (GstDmdSync *self)
+{
+  const ObjectPtr<GstClock> clock (gst_element_get_clock (GST_ELEMENT (self)));
+  if (!clock || GST_BASE_TRANSFORM (self)->segment.format != GST_FORMAT_TIME)
+    return GST_CLOCK_TIME_NONE;
+  const GstClockTime now = gst_clock_get_time (clock.get ());
+  const GstClockTime base = gst_element_get_base_time (GST_ELEMENT (self));
+  return now < base ? GST_CLOCK_TIME_NONE
+                    : gst_segment_position_from_running_time (
+                          &GST_BASE_TRANSFORM (self)->segment, GST_FORMAT_TIME,
+                          now - base);
+}
+
+/** What frames come late by is latency, unless they were held up by more than a
+ * frame period: that is no jitter. */
+void
+note_jitter (GstDmdSync *self, GstClockTime lateness)
+{
+  SyncState &st = state (self);
+  const GstClockTime steps =
+      (lateness + kJitterStep - 1) / kJitterStep * kJitterStep;
+  {
+    const ObjectLock lock (self);
+    if (steps <= st.jitter || steps > GstClockTime (st.time->rate.period ()))
+      return;
+    st.jitter = steps;
+  }
+  update_latency (self);
+}
+
+} // namespace
+
+GstClockTimeDiff
+moved_back (const SyncState &st)
+{
+  if (!st.time)
+    return 0;
+  const SlotPlan &plan = st.time->plan;
+  switch (st.settings.timestamp_at) {
+  case TimestampAt::exposure_end:
+    return plan.exposure () + st.settings.exposure_offset;
+  case TimestampAt::arrival:
+  case TimestampAt::device_clock:
+    return plan.frame_period () + st.settings.exposure_offset;
+  default:
+    return st.settings.exposure_offset;
+  }
+}
+
+void
+update_latency (GstDmdSync *self)
+{
+  SyncState &st = state (self);
+  {
+    const ObjectLock lock (self);
+    const auto latency = GstClockTime (std::max<GstClockTimeDiff> (
+        0, moved_back (st) + GstClockTimeDiff (st.jitter)));
+    if (std::exchange (st.latency, latency) == latency)
+      return;
+  }
+  gst_element_post_message (
+      GST_ELEMENT (self), gst_message_new_latency (GST_OBJECT (self)));
+}
+
+GstClockTime
+pipeline_time (GstDmdSync *self, GstBuffer *frame)
+{
+  SyncState &st = state (self);
+  const GstClockTime device = GST_BUFFER_PTS (frame);
+  st.stream.uncertainty = GST_CLOCK_TIME_NONE;
+  {
+    const ObjectLock lock (self);
+    if (st.settings.timestamp_at != TimestampAt::device_clock)
+      return device;
+  }
+  keep (frame, device_caps, device);
+  const GstClockTime arrival = arrival_time (self);
+  if (!GST_CLOCK_TIME_IS_VALID (arrival))
+    return device;
+  keep (frame, arrival_caps, arrival);
+  st.stream.last_arrival = arrival;
+
+  DeviceClock &clock = st.stream.device_clock;
+  const Nanoseconds time =
+      clock.take (Nanoseconds (device), Nanoseconds (arrival));
+  GST_LOG_OBJECT (self,
+      "camera %" GST_TIME_FORMAT " arrived %" GST_TIME_FORMAT
+      ", %" G_GINT64_FORMAT " ns late; its clock drifts by %.1f ppm",
+      GST_TIME_ARGS (device), GST_TIME_ARGS (arrival), clock.lateness (),
+      clock.drift () * 1e6);
+  if (const auto uncertainty = clock.uncertainty ())
+    st.stream.uncertainty = GstClockTime (*uncertainty);
+  {
+    const ObjectLock lock (self);
+    st.counters.clock_restarts = clock.restarts ();
+    st.counters.clock_drift = clock.drift () * 1e6;
+    st.counters.time_uncertainty = st.stream.uncertainty;
+  }
+  note_jitter (self, GstClockTime (clock.lateness ()));
+  return GstClockTime (std::max<Nanoseconds> (0, time));
+}
+
+void
+say_uncertainty (GstDmdSync *self, guint64 number, GstClockTime pts)
+{
+  Stream &stream = state (self).stream;
+  if (!GST_CLOCK_TIME_IS_VALID (stream.last_arrival))
+    return;
+  const bool knew = stream.time_known.value_or (false);
+  const bool known = stream.uncertainty <= (knew ? kNotKnown : kKnown);
+  if (stream.time_known == known)
+    return;
+  stream.time_known = known;
+  gst_element_post_message (GST_ELEMENT (self),
+      gst_message_new_element (GST_OBJECT (self),
+          gst_structure_new ("dmdsync/time-uncertainty", "known",
+              G_TYPE_BOOLEAN, gboolean (known), "uncertainty", G_TYPE_UINT64,
+              stream.uncertainty, "frame", G_TYPE_UINT64, number, "pts",
+              G_TYPE_UINT64, pts, nullptr)));
+}
+
+void
+note_end (GstDmdSync *self)
+{
+  constexpr GstClockTime kSilence = GST_SECOND;
+  const GstClockTime last = state (self).stream.last_arrival;
+  const GstClockTime now = arrival_time (self);
+  if (!GST_CLOCK_TIME_IS_VALID (last) || !GST_CLOCK_TIME_IS_VALID (now) ||
+      now < last + kSilence)
+    return;
+  GST_ELEMENT_WARNING (self, RESOURCE, READ,
+      ("The stream ends %.1f s after its last frame: the camera stopped, was "
+       "unplugged or gets no trigger. Look at its cable, at the DMD and at the "
+       "line between them.",
+          double (now - last) / GST_SECOND),
+      (nullptr));
+}
+
+void
+watch_rate (GstDmdSync *self, GstClockTime time)
+{
+  const Stream &stream = state (self).stream;
+  const auto rate = state (self).stream.rate_watch->take (Nanoseconds (time));
+  if (!rate)
+    return;
+  const FrameRate said = stream.time->rate;
+  gst_element_post_message (GST_ELEMENT (self),
+      gst_message_new_element (GST_OBJECT (self),
+          gst_structure_new ("dmdsync/frame-rate", "measured", G_TYPE_DOUBLE,
+              *rate, "caps", GST_TYPE_FRACTION, said.num, said.den, nullptr)));
+  GST_ELEMENT_WARNING (self, RESOURCE, SETTINGS,
+      ("Frames come at %.4g a second, the caps say %d/%d. Whoever triggers the "
+       "camera imposes its rate: set the caps and the trigger to the same.",
+          *rate, said.num, said.den),
+      (nullptr));
+}
+
+} // namespace codedexposure::gst::sync

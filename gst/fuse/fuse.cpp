@@ -1,0 +1,424 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-codedexposure-fuse
+ * @title: codedexposure-fuse
+ * @short_description: Full-resolution frames at N times the camera's rate
+ *
+ * Takes the frames of a camera behind a micromirror device, in which
+ * neighbouring pixels saw different parts of the exposure, and gives n frames
+ * for each: at n times the rate, and of the size of the coded frame. Where the
+ * picture stands still it keeps the resolution of the whole coded frame; where
+ * it moves, it follows the slots.
+ *
+ * codedexposure-demux gives what was measured, in n small pictures; this
+ * element estimates what lies between.
+ *
+ * ## Time
+ *
+ * Frame k of a coded frame at time P, of a camera with frame period T, has PTS
+ * P + floor (k T / n) and lasts until the next one; OFFSET counts frames. The
+ * period comes from the caps, or from #GstCodedFilter:frame-rate where they
+ * have none. A lost frame never stretches its neighbours.
+ *
+ * Without #codedexposure-fuse:lookahead a coded frame is fused as soon as it
+ * comes and nothing is added to the latency. With it, a coded frame waits for
+ * the next one, and T is added to the latency.
+ *
+ * What was seen before helps to tell what stands still. A lost, corrupted or
+ * late frame, a DISCONT, a seek and a new segment start that history anew.
+ *
+ * ## Schedule
+ *
+ * The schedule defines which pixel saw which part of the exposure. It is the
+ * #GstCodedFilter:schedule property, else that of the stream's tag
+ * `comment=coded-exposure={...}`, else sequential:2x2 with a warning on the bus.
+ * The source pad gets its caps with the first frame, because tags come after
+ * caps. The pilot's rows are cropped. Any code and any tile can be used;
+ * `sequential:lattice:4/2` and `sequential:lattice:8/3,order=bit-reversal` give
+ * the most accurate pictures.
+ *
+ * ## Mapping
+ *
+ * A mapping corrects a camera that is not exactly aligned with the mirrors. It
+ * is that of the #GstCodedFilter:mapping property, else that of the stream's
+ * tag. Frames are rectified to one pixel a mirror before they are fused, and
+ * fused frames have the size of the mirrors; regions are places among them. The
+ * element message `codedexposure/mapping` has how well the camera sees the
+ * mirrors.
+ *
+ * ## Quality and speed
+ *
+ * `quality=fast` runs in real time: 768x576 from 25 to 100 frames/s take less
+ * than half of a core of a fast processor. `balanced` and `best` look for the
+ * motion around each pixel, take a hundred times as long, and are for decoding
+ * of recordings; #codedexposure-fuse:threads share their work.
+ * Tell the element about the camera's noise (#codedexposure-fuse:full-well,
+ * #codedexposure-fuse:read-noise): it filters more where the noise is larger,
+ * and knows what it may take for still.
+ *
+ * ## Flags, metas and messages
+ *
+ * A gap of more than one and a half periods between two frames is a loss: it is
+ * counted, the next frame is DISCONT, and the element message
+ * `codedexposure/frames-lost` says `count`, `from` (when the first was due) and
+ * `to` (the frame that came). CORRUPTED and GAP pass to all frames of a coded
+ * frame. `codedexposure/saturated` says when a stretch of frames with pixels at
+ * the largest value begins (`active` true), and when there were none for a
+ * second. Every frame has the custom meta `CodedExposureFrame` with the
+ * number of its coded frame, its slot and the time of its light; other metas of
+ * the coded frame are copied. QoS events are not forwarded upstream, because
+ * some camera sources stop their stream for them.
+ *
+ * ## Example pipelines
+ *
+ * |[
+ * gst-launch-1.0 videotestsrc num-buffers=400 pattern=ball \
+ *     ! video/x-raw,format=GRAY8,width=768,height=576,framerate=100/1 \
+ *     ! codedexposure-sim schedule=sequential:lattice:4/2 full-well=10000 \
+ *     ! codedexposure-fuse full-well=10000 \
+ *     ! queue ! videoconvert ! autovideosink
+ * ]| A simulated bench, shown at full resolution and the raised rate.
+ *
+ * Since: 0.1
+ */
+#include "fuse.h"
+
+#include <cmath>
+#include <utility>
+
+#include "extract/saturation.h"
+
+GST_DEBUG_CATEGORY_STATIC (codedexposure_fuse_debug);
+#define GST_CAT_DEFAULT codedexposure_fuse_debug
+
+using namespace codedexposure;
+using namespace codedexposure::gst;
+
+struct _GstCodedExposureFuse {
+  GstCodedFilter parent;
+};
+
+G_DEFINE_TYPE_WITH_CODE (GstCodedExposureFuse, gst_coded_exposure_fuse,
+    GST_TYPE_CODED_FILTER,
+    GST_DEBUG_CATEGORY_INIT (codedexposure_fuse_debug, "codedexposure-fuse", 0,
+        "coded frames to full-resolution frames"))
+GST_ELEMENT_REGISTER_DEFINE (codedexposure_fuse, "codedexposure-fuse",
+    GST_RANK_NONE, GST_TYPE_CODED_EXPOSURE_FUSE)
+
+static void
+gst_coded_exposure_fuse_class_init (GstCodedExposureFuseClass *klass)
+{
+  gst::fuse::Fuse::install_properties (G_OBJECT_CLASS (klass));
+  gst_element_class_set_static_metadata (GST_ELEMENT_CLASS (klass),
+      "Coded exposure fusion", "Filter/Effect/Video",
+      "Reconstructs full-resolution frames at a multiple of the frame rate "
+      "from the frames of a camera behind a micromirror device",
+      "The gst-codedexposure authors");
+}
+
+static void
+gst_coded_exposure_fuse_init (GstCodedExposureFuse *element)
+{
+  adopt_filter (
+      GST_CODED_FILTER (element), std::make_unique<gst::fuse::Fuse> (element));
+}
+
+namespace codedexposure::gst::fuse
+{
+
+namespace
+{
+
+/* Flags of frames that are no picture, or none to compare others with. */
+constexpr guint kUnfit = GST_BUFFER_FLAG_CORRUPTED | GST_BUFFER_FLAG_GAP;
+
+} // namespace
+
+Fuse::Fuse (GstCodedExposureFuse *element)
+    : CodedFilter (GST_CODED_FILTER (element),
+          {"application/x-codedexposure-fuse-stats", "frames-out", nullptr}),
+      srcpad_ (new_source_pad ("src", "src", PadKind::all))
+{
+  gst_element_add_pad (this->element (), GST_PAD (srcpad_.get ()));
+}
+
+/* A coded frame is fused when enough of those after it have come. */
+GstFlowReturn
+Fuse::process (CodedFrame frame)
+{
+  const bool unfit = frame.has_flags (kUnfit);
+  GstFlowReturn flow = GST_FLOW_OK;
+  if (unfit) {
+    flow = drain ();
+    break_history ();
+  }
+  if (flow == GST_FLOW_OK)
+    flow = take (std::move (frame));
+  if (flow == GST_FLOW_OK && unfit) {
+    flow = drain ();
+    break_history ();
+  }
+  while (flow == GST_FLOW_OK && int (waiting_.size ()) > plan_->lookahead)
+    flow = push_oldest ();
+  return flow;
+}
+
+/* Returns the number of saturated pixels. */
+template <typename Pixel>
+Result<guint64>
+Fuse::take_pixels (MappedFrame &coded)
+{
+  const auto view = view_of<const Pixel> (coded);
+  const guint64 saturated = count_saturated (view, significant_bits ());
+  const auto rectified = rectify (view);
+  if (!rectified)
+    return rectified.error ();
+  if (const auto taken =
+          std::get<Fuser<Pixel>> (plan_->fuser).take (*rectified);
+      !taken)
+    return taken.error ();
+  return saturated;
+}
+
+/* Gives the pixels of @frame to the fuser and keeps the rest. */
+GstFlowReturn
+Fuse::take (CodedFrame frame)
+{
+  GstBuffer *buffer = frame.buffer.get ();
+  {
+    MappedFrame coded = map_coded (buffer);
+    if (!coded)
+      return GST_FLOW_ERROR;
+    const auto saturated = format ().wide ()
+                               ? take_pixels<std::uint16_t> (coded)
+                               : take_pixels<std::uint8_t> (coded);
+    if (!saturated)
+      return post_decode_error (saturated.error ());
+    frame.meta.saturated = *saturated;
+  }
+  note_saturation (frame);
+
+  BufferPtr description (gst_buffer_new ());
+  gst_buffer_copy_into (description.get (), buffer,
+      GstBufferCopyFlags (GST_BUFFER_COPY_FLAGS | GST_BUFFER_COPY_TIMESTAMPS),
+      0, -1);
+  copy_metas (buffer, format ().info, description.get (), format ().info);
+  frame.buffer = std::move (description);
+  waiting_.push_back (std::move (frame));
+  return GST_FLOW_OK;
+}
+
+/* Fuses the oldest coded frame that waits into @buffers; none on an error,
+ * which is posted unless it is a flush. */
+GstFlowReturn
+Fuse::render (std::vector<BufferPtr> &buffers)
+{
+  const auto n = std::size_t (format ().schedule.slots ());
+  prepare_allocation (
+      srcpad_.get (), caps_for (srcpad_.get ()).get (), guint (n));
+  std::vector<MappedFrame> mapped (n);
+  std::vector<BufferPtr> made (n);
+  for (std::size_t k = 0; k < n; k++) {
+    const GstFlowReturn flow =
+        acquire_picture (srcpad_.get (), plan_->fused, made[k], mapped[k]);
+    if (flow != GST_FLOW_OK)
+      return flow;
+  }
+  const std::stop_token stop = [this] {
+    const ObjectLock lock (element ());
+    return stop_.get_token ();
+  }();
+  const Result<void> done = std::visit (
+      [&]<typename Pixel> (Fuser<Pixel> &fuser) {
+        std::vector<ImageView<Pixel>> views;
+        for (MappedFrame &frame : mapped)
+          views.push_back (view_of<Pixel> (frame));
+        return fuser.fuse (views, stop);
+      },
+      plan_->fuser);
+  if (!done)
+    return done.error ().code == ErrorCode::cancelled
+               ? GST_FLOW_FLUSHING
+               : post_decode_error (done.error ());
+  buffers = std::move (made);
+  return GST_FLOW_OK;
+}
+
+/* Buffers are pushed one by one, because a sink would show a whole list at the
+ * time of its first. */
+GstFlowReturn
+Fuse::push_oldest ()
+{
+  std::vector<BufferPtr> buffers;
+  GstFlowReturn flow = render (buffers);
+  const CodedFrame coded = std::move (waiting_.front ());
+  waiting_.pop_front ();
+  if (flow == GST_FLOW_FLUSHING)
+    break_history ();
+  const int n = int (buffers.size ());
+  const SlotPlan &slots = format ().slots;
+  for (int i = 0; i < n && flow == GST_FLOW_OK; i++) {
+    const int k = backwards () ? n - 1 - i : i;
+    const GstClockTime pts = coded.pts () + boundary (k);
+    const GstClockTime duration = boundary (k + 1) - boundary (k);
+    if (!is_within (pts, duration))
+      continue;
+    BufferPtr &outbuf = buffers[std::size_t (k)];
+    describe (outbuf.get (), coded.buffer.get (), coded.meta,
+        {plan_->fused, k, pts, coded.pts () + GstClockTime (slots.start (k)),
+            GstClockTime (slots.active ())});
+    flow = push (srcpad_.get (), std::move (outbuf), duration);
+  }
+  return flow;
+}
+
+GstFlowReturn
+Fuse::drain ()
+{
+  GstFlowReturn flow = GST_FLOW_OK;
+  while (!waiting_.empty () && flow == GST_FLOW_OK)
+    flow = push_oldest ();
+  return flow;
+}
+
+void
+Fuse::break_history ()
+{
+  waiting_.clear ();
+  if (plan_)
+    std::visit ([] (auto &fuser) { fuser.forget (); }, plan_->fuser);
+}
+
+void
+Fuse::cancel ()
+{
+  const ObjectLock lock (element ());
+  stop_.request_stop ();
+}
+
+void
+Fuse::resume ()
+{
+  const ObjectLock lock (element ());
+  stop_ = std::stop_source ();
+}
+
+/* ------------------------------------------------------------------ plan -- */
+
+/* Noise of an ordinary exposure at a typical light, where the user says what
+ * camera it is. */
+RectifyOptions
+Fuse::rectify_options () const
+{
+  constexpr double kTypicalLight = 0.4;
+  const SensorNoise &noise = in_force_.noise;
+  RectifyOptions options;
+  if (noise.full_well > 0.0)
+    options.noise = std::clamp (
+        std::sqrt (noise.variance (kTypicalLight * noise.full_well, 0.0)) /
+            noise.full_well,
+        RectifyOptions::kMinNoise, RectifyOptions::kMaxNoise);
+  return options;
+}
+
+namespace
+{
+
+template <typename Pixel>
+Result<AnyFuser>
+make_fuser (const CodedFormat &format, const FuseOptions &options)
+{
+  auto made = Fuser<Pixel>::make (
+      format.schedule, format.size.width, format.size.height, options);
+  if (!made)
+    return made.error ();
+  return AnyFuser (std::move (*made));
+}
+
+/* Rate times N, and the pilot's rows cropped. */
+CapsScale
+coded_to_fused (const Schedule &schedule)
+{
+  CapsScale scale;
+  scale.rate_num = schedule.slots ();
+  scale.crop_rows = schedule.pilot_rows ();
+  return scale;
+}
+
+} // namespace
+
+bool
+Fuse::plan (const CodedFormat &format)
+{
+  FuseOptions options = in_force_;
+  options.bits = significant_bits ();
+  auto fuser = format.wide () ? make_fuser<std::uint16_t> (format, options)
+                              : make_fuser<std::uint8_t> (format, options);
+  if (!fuser) {
+    post_error (fuser.error ().message);
+    return false;
+  }
+  const CapsPtr rectified = format.rectifier
+                                ? format.resized (format.size)
+                                : CapsPtr (gst_caps_ref (format.caps.get ()));
+  CapsPtr caps (
+      scale_caps (rectified.get (), coded_to_fused (format.schedule)));
+  Plan made{std::move (*fuser), {}, options.lookahead};
+  gst_video_info_from_caps (&made.fused, caps.get ());
+  plan_ = std::move (made);
+  const ObjectLock lock (element ());
+  caps_ = std::move (caps);
+  return true;
+}
+
+void
+Fuse::planned (bool)
+{
+  const GstClockTime latency =
+      GstClockTime (plan_->lookahead) * boundary (format ().schedule.slots ());
+  bool changed;
+  {
+    const ObjectLock lock (element ());
+    changed = std::exchange (latency_, latency) != latency;
+  }
+  if (changed)
+    gst_element_post_message (
+        element (), gst_message_new_latency (GST_OBJECT (element ())));
+}
+
+GstClockTime
+Fuse::boundary (int k) const
+{
+  const CodedFormat &now = format ();
+  return GstClockTime (now.rate.time_of (0, k, now.schedule.slots ()));
+}
+
+void
+Fuse::forget ()
+{
+  waiting_.clear ();
+  plan_.reset ();
+  const ObjectLock lock (element ());
+  caps_.reset ();
+}
+
+gboolean
+Fuse::forward (EventPtr event)
+{
+  return gst_pad_push_event (GST_PAD (srcpad_.get ()), event.release ());
+}
+
+CapsPtr
+Fuse::caps_for (const GstCodedPad *) const
+{
+  const ObjectLock lock (element ());
+  return CapsPtr (caps_ ? gst_caps_ref (caps_.get ()) : nullptr);
+}
+
+CapsScale
+Fuse::scale_for (const Schedule &schedule, const GstCodedPad *) const
+{
+  return coded_to_fused (schedule);
+}
+
+} // namespace codedexposure::gst::fuse

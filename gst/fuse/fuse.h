@@ -1,0 +1,94 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* codedexposure-fuse: one coded frame in, n full-resolution frames out. */
+#pragma once
+
+#include <deque>
+#include <optional>
+#include <stop_token>
+#include <variant>
+#include <vector>
+
+#include <gst/gst.h>
+
+#include "common/coded_filter.h"
+#include "fuse/fuser.h"
+
+G_BEGIN_DECLS
+
+#define GST_TYPE_CODED_EXPOSURE_FUSE (gst_coded_exposure_fuse_get_type ())
+G_DECLARE_FINAL_TYPE (GstCodedExposureFuse, gst_coded_exposure_fuse, GST,
+    CODED_EXPOSURE_FUSE, GstCodedFilter)
+
+GST_ELEMENT_REGISTER_DECLARE (codedexposure_fuse);
+
+G_END_DECLS
+
+namespace codedexposure::gst::fuse
+{
+
+using AnyFuser = std::variant<Fuser<std::uint8_t>, Fuser<std::uint16_t>>;
+
+/** Everything that follows from the format and the settings. */
+struct Plan {
+  AnyFuser fuser;
+  GstVideoInfo fused;
+  int lookahead;
+};
+
+class Fuse final : public CodedFilter
+{
+public:
+  explicit Fuse (GstCodedExposureFuse *element);
+
+  bool set_own (guint id, const GValue *value) override;
+  bool get_own (guint id, GValue *value) const override;
+  static void install_properties (GObjectClass *klass);
+
+private:
+  GstFlowReturn process (CodedFrame frame) override;
+  bool plan (const CodedFormat &format) override;
+  void planned (bool schedule_changed) override;
+  GstFlowReturn drain () override;
+  void break_history () override;
+  gboolean forward (EventPtr event) override;
+  void take_settings () override { in_force_ = settings_; }
+  void forget () override;
+  void cancel () override;
+  void resume () override;
+  void each_pad (const PadVisitor &visit) const override
+  {
+    visit (srcpad_.get ());
+  }
+  CapsPtr caps_for (const GstCodedPad *pad) const override;
+  CapsScale scale_for (
+      const Schedule &schedule, const GstCodedPad *pad) const override;
+  int pictures_a_frame (const GstCodedPad *) const override
+  {
+    return schedule_in_force ()->slots ();
+  }
+  RectifyOptions rectify_options () const override;
+
+  template <typename Pixel>
+  Result<guint64> take_pixels (MappedFrame &coded);
+  GstFlowReturn take (CodedFrame frame);
+  GstFlowReturn render (std::vector<BufferPtr> &buffers);
+  GstFlowReturn push_oldest ();
+  /** Start of slot @p k by even steps, from the frame's PTS. */
+  GstClockTime boundary (int k) const;
+
+  const ObjectPtr<GstCodedPad> srcpad_;
+
+  /* Object lock. */
+  FuseOptions settings_;
+  CapsPtr caps_;
+  std::stop_source stop_; ///< of the fusion that is under way
+
+  /* Sink pad's stream lock. */
+  FuseOptions in_force_;
+  std::optional<Plan> plan_;
+  /** Coded frames that were taken, without their pixels; as many as the
+   * fuser's pending (). */
+  std::deque<CodedFrame> waiting_;
+};
+
+} // namespace codedexposure::gst::fuse

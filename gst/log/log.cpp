@@ -1,0 +1,317 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-codedexposure-log
+ * @title: codedexposure-log
+ *
+ * Passes coded frames on and writes one line of JSON for each to a file:
+ * number, time, exposure, synchronisation and lost frames. A recording keeps
+ * the pixels and the schedule, but not the frames' metadata; this file keeps
+ * them.
+ *
+ * The first line is the schedule in its JSON form; the second is the mapping,
+ * if there is one. With them a recording that ended before its tags were
+ * written can still be decoded. Each line goes to the system at once: a crash
+ * loses one line at most.
+ *
+ * ## Example pipeline
+ * |[
+ * gst-launch-1.0 -e videotestsrc num-buffers=100 !
+ * video/x-raw,format=GRAY8,framerate=100/1 ! codedexposure-sim !
+ * codedexposure-log location=coded.jsonl ! avenc_ffv1 ! matroskamux
+ * timecodescale=1000 ! filesink location=coded.mkv
+ * ]|
+ *
+ * Since: 0.1
+ */
+#include "log.h"
+
+#include <algorithm>
+#include <optional>
+#include <string>
+
+#include <nlohmann/json.hpp>
+
+#include "common/caps.h"
+#include "common/lines.h"
+#include "common/meta.h"
+#include "common/properties.h"
+#include "common/raii.h"
+#include "common/tag.h"
+#include "extract/saturation.h"
+
+using namespace codedexposure::gst;
+
+GST_DEBUG_CATEGORY_STATIC (codedexposure_log_debug);
+#define GST_CAT_DEFAULT codedexposure_log_debug
+
+namespace
+{
+
+struct LogState {
+  explicit LogState (gpointer element) : file (element) {}
+
+  std::string location; // object lock
+  /* Streaming thread, and start and stop, which exclude it: */
+  LineFile file;
+  guint64 frames = 0;
+  GstVideoInfo info = {};
+  /* As last written. */
+  std::optional<codedexposure::Schedule> schedule;
+  std::optional<codedexposure::Mapping> mapping;
+};
+
+enum { PROP_0, PROP_LOCATION };
+
+constexpr auto kReadyFlags = GParamFlags (
+    G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY);
+
+template <typename Pixel>
+guint64
+count_saturated_in (const LogState &state, MappedFrame &mapped, int bits)
+{
+  const auto all = view_of<const Pixel> (mapped);
+  const int pilot = state.schedule ? state.schedule->pilot_rows () : 0;
+  return codedexposure::count_saturated (
+      all.rows (0, std::max (0, all.height - pilot)), bits);
+}
+
+/** Pixels of a coded frame at the largest value. Those of a subframe were
+ * counted when it was extracted. */
+std::optional<guint64>
+saturated_pixels (
+    const LogState &state, GstBuffer *frame, const FrameMeta &meta)
+{
+  if (meta.subframe >= 0)
+    return meta.saturated;
+  MappedFrame mapped (state.info, frame, GST_MAP_READ);
+  if (!mapped)
+    return std::nullopt;
+  const int bits = significant_bits_of (meta.bits, state.info);
+  return GST_VIDEO_INFO_FORMAT (&state.info) == GST_VIDEO_FORMAT_GRAY8
+             ? count_saturated_in<guint8> (state, mapped, bits)
+             : count_saturated_in<guint16> (state, mapped, bits);
+}
+
+/** One line of JSON, keys in this order; unknown values are left out. */
+std::string
+frame_line (const LogState &state, GstBuffer *frame, const GstSegment &segment)
+{
+  const auto meta = get_frame_meta (frame);
+  const auto set_time = [&segment] (nlohmann::ordered_json &line,
+                            const char *key, GstClockTime time) {
+    const guint64 running =
+        gst_segment_to_running_time (&segment, GST_FORMAT_TIME, time);
+    if (GST_CLOCK_TIME_IS_VALID (running))
+      line[key] = running;
+  };
+
+  nlohmann::ordered_json line;
+  line["frame"] = meta ? meta->frame : state.frames;
+  set_time (line, "pts_ns", GST_BUFFER_PTS (frame));
+  if (meta) {
+    set_time (line, "exposure_start_ns", meta->exposure_start);
+    if (GST_CLOCK_TIME_IS_VALID (meta->exposure_duration))
+      line["exposure_duration_ns"] = meta->exposure_duration;
+    if (GST_CLOCK_TIME_IS_VALID (meta->time_uncertainty))
+      line["time_uncertainty_ns"] = meta->time_uncertainty;
+    line["locked"] = bool (meta->locked);
+    line["slip"] = meta->slip;
+    line["lost_before"] = meta->lost_before;
+    if (const auto saturated = saturated_pixels (state, frame, *meta))
+      line["saturated"] = *saturated;
+    if (!meta->pattern.empty ())
+      line["pattern"] = meta->pattern;
+    if (meta->bits > 0)
+      line["bits"] = meta->bits;
+  }
+  line["flags"] = flag_names (frame);
+  return line.dump ();
+}
+
+} // namespace
+
+struct _GstCodedExposureLog {
+  GstBaseTransform parent;
+  LogState *state;
+};
+
+#define gst_coded_exposure_log_parent_class parent_class
+G_DEFINE_TYPE_WITH_CODE (GstCodedExposureLog, gst_coded_exposure_log,
+    GST_TYPE_BASE_TRANSFORM,
+    GST_DEBUG_CATEGORY_INIT (codedexposure_log_debug, "codedexposure-log", 0,
+        "per-frame record of coded frames"))
+GST_ELEMENT_REGISTER_DEFINE (codedexposure_log, "codedexposure-log",
+    GST_RANK_NONE, GST_TYPE_CODED_EXPOSURE_LOG)
+
+static GstFlowReturn
+gst_coded_exposure_log_transform_ip (
+    GstBaseTransform *base, GstBuffer *frame) noexcept
+{
+  LogState &state = *GST_CODED_EXPOSURE_LOG (base)->state;
+  const std::string line = frame_line (state, frame, base->segment);
+  state.frames++;
+  return state.file.write (line) ? GST_FLOW_OK : GST_FLOW_ERROR;
+}
+
+static gboolean
+gst_coded_exposure_log_set_caps (
+    GstBaseTransform *base, GstCaps *caps, GstCaps *)
+{
+  LogState &state = *GST_CODED_EXPOSURE_LOG (base)->state;
+  return gst_video_info_from_caps (&state.info, caps);
+}
+
+/* Upstream repeats tags; each schedule and mapping is written once. */
+static void
+note_setup (GstCodedExposureLog *self, GstEvent *event)
+{
+  LogState &state = *self->state;
+  GstTagList *tags = nullptr;
+  gst_event_parse_tag (event, &tags);
+  const auto setup = setup_from_tags (tags);
+  if (!setup)
+    return;
+  if (!*setup) {
+    GST_ELEMENT_WARNING (self, STREAM, DECODE,
+        ("The schedule of the stream is not recorded: %s",
+            setup->error ().message.c_str ()),
+        (nullptr));
+    return;
+  }
+  const codedexposure::StreamSetup &said = setup->value ();
+  if (!(state.schedule == said.schedule)) {
+    state.schedule = said.schedule;
+    state.file.write (state.schedule->to_json ());
+  }
+  if (said.mapping && !(state.mapping == said.mapping)) {
+    state.mapping = said.mapping;
+    state.file.write (state.mapping->to_json ());
+  }
+}
+
+static gboolean
+gst_coded_exposure_log_sink_event (
+    GstBaseTransform *base, GstEvent *event) noexcept
+{
+  if (GST_EVENT_TYPE (event) == GST_EVENT_TAG)
+    note_setup (GST_CODED_EXPOSURE_LOG (base), event);
+  return GST_BASE_TRANSFORM_CLASS (parent_class)->sink_event (base, event);
+}
+
+static gboolean
+gst_coded_exposure_log_start (GstBaseTransform *base) noexcept
+{
+  auto *self = GST_CODED_EXPOSURE_LOG (base);
+  LogState &state = *self->state;
+  std::string location;
+  {
+    const ObjectLock lock (self);
+    location = state.location;
+  }
+  state.frames = 0;
+  state.schedule.reset ();
+  state.mapping.reset ();
+  if (location.empty ()) {
+    GST_ELEMENT_ERROR (self, RESOURCE, NOT_FOUND,
+        ("codedexposure-log has no file to write to: set location=FILE.jsonl"),
+        (nullptr));
+    return FALSE;
+  }
+  return state.file.open (location);
+}
+
+static gboolean
+gst_coded_exposure_log_stop (GstBaseTransform *base)
+{
+  GST_CODED_EXPOSURE_LOG (base)->state->file.close ();
+  return TRUE;
+}
+
+static void
+gst_coded_exposure_log_set_property (
+    GObject *object, guint id, const GValue *value, GParamSpec *pspec) noexcept
+{
+  auto *self = GST_CODED_EXPOSURE_LOG (object);
+  if (id != PROP_LOCATION) {
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+    return;
+  }
+  const ObjectLock lock (self);
+  if (!may_set (self, pspec))
+    return;
+  const gchar *location = g_value_get_string (value);
+  self->state->location = location ? location : "";
+}
+
+static void
+gst_coded_exposure_log_get_property (
+    GObject *object, guint id, GValue *value, GParamSpec *pspec)
+{
+  auto *self = GST_CODED_EXPOSURE_LOG (object);
+  if (id != PROP_LOCATION) {
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+    return;
+  }
+  const ObjectLock lock (self);
+  const std::string &location = self->state->location;
+  g_value_set_string (value, location.empty () ? nullptr : location.c_str ());
+}
+
+static void
+gst_coded_exposure_log_init (GstCodedExposureLog *self)
+{
+  self->state = new LogState (self);
+  gst_base_transform_set_passthrough (GST_BASE_TRANSFORM (self), TRUE);
+}
+
+static void
+gst_coded_exposure_log_finalize (GObject *object)
+{
+  delete GST_CODED_EXPOSURE_LOG (object)->state;
+  G_OBJECT_CLASS (parent_class)->finalize (object);
+}
+
+static void
+gst_coded_exposure_log_class_init (GstCodedExposureLogClass *klass)
+{
+  auto *object_class = G_OBJECT_CLASS (klass);
+  auto *element_class = GST_ELEMENT_CLASS (klass);
+  auto *transform_class = GST_BASE_TRANSFORM_CLASS (klass);
+
+  object_class->set_property = gst_coded_exposure_log_set_property;
+  object_class->get_property = gst_coded_exposure_log_get_property;
+  object_class->finalize = gst_coded_exposure_log_finalize;
+  /**
+   * GstCodedExposureLog:location:
+   *
+   * File to write, overwritten when it exists.
+   *
+   * Since: 0.1
+   */
+  g_object_class_install_property (object_class, PROP_LOCATION,
+      g_param_spec_string ("location", "File Location",
+          "File to write, one line of JSON a coded frame; overwritten when it "
+          "exists",
+          nullptr, kReadyFlags));
+
+  gst_element_class_set_static_metadata (element_class,
+      "Coded exposure frame log", "Filter/Analyzer/Video",
+      "Writes what is known of every coded frame to a file of JSON lines",
+      "The gst-codedexposure authors");
+  static GstStaticPadTemplate sink =
+      GST_STATIC_PAD_TEMPLATE ("sink", GST_PAD_SINK, GST_PAD_ALWAYS,
+          GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
+  static GstStaticPadTemplate src = GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC,
+      GST_PAD_ALWAYS, GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
+  gst_element_class_add_static_pad_template (element_class, &sink);
+  gst_element_class_add_static_pad_template (element_class, &src);
+
+  transform_class->start = GST_DEBUG_FUNCPTR (gst_coded_exposure_log_start);
+  transform_class->stop = GST_DEBUG_FUNCPTR (gst_coded_exposure_log_stop);
+  transform_class->set_caps =
+      GST_DEBUG_FUNCPTR (gst_coded_exposure_log_set_caps);
+  transform_class->sink_event =
+      GST_DEBUG_FUNCPTR (gst_coded_exposure_log_sink_event);
+  transform_class->transform_ip =
+      GST_DEBUG_FUNCPTR (gst_coded_exposure_log_transform_ip);
+}

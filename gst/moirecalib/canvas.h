@@ -1,0 +1,61 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Lines and letters on an image of greys; for the sources of lib/ only. */
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include <cairo.h>
+
+#include "base/image.h"
+#include "mapping/mapping.h"
+
+namespace codedexposure
+{
+
+struct CairoDestroy {
+  void operator() (cairo_t *cairo) const { cairo_destroy (cairo); }
+  void operator() (cairo_surface_t *surface) const
+  {
+    cairo_surface_destroy (surface);
+  }
+};
+using CairoPtr = std::unique_ptr<cairo_t, CairoDestroy>;
+using SurfacePtr = std::unique_ptr<cairo_surface_t, CairoDestroy>;
+
+/** Draws in a grey on what is there. The image is complete when the canvas is
+ * gone. */
+class Canvas
+{
+public:
+  explicit Canvas (ImageView<std::uint8_t> image);
+  ~Canvas ();
+  Canvas (const Canvas &) = delete;
+  Canvas &operator= (const Canvas &) = delete;
+
+  /** 0 black, 1 white; of all that follows. */
+  void grey (double level) { level_ = level; }
+  /** @p size  of a line; @p at is where its first letter stands. */
+  void text (Position at, double size, const std::string &words);
+  void text_centred (Position at, double size, const std::string &words);
+  /** White on a black ground. */
+  void label (Position at, double size, const std::string &words);
+  void arrow (Position from, Position to);
+  /** Part of a circle, angles in radians from x to y; with a head at its end.
+   */
+  void ring (Position centre, double radius, double from, double to, bool head);
+  void box (double x, double y, double width, double height, bool filled);
+
+private:
+  void head (Position at, double angle);
+  void font (double size);
+  /** Draws what was outlined. */
+  void ink (bool filled);
+
+  ImageView<std::uint8_t> image_;
+  SurfacePtr surface_;
+  CairoPtr cairo_;
+  double level_ = 1.0;
+};
+
+} // namespace codedexposure

@@ -1,0 +1,46 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Drawing in grey: fringes, arrows and text of the alignment. */
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/image.h"
+#include "calibrate/fringes.h"
+#include "calibrate/stage.h"
+
+namespace codedexposure
+{
+
+/** The content of a panel. */
+struct PanelContent {
+  std::string title = {};
+  std::vector<std::string> lines = {};
+  std::optional<double> progress = {};            ///< 0..1
+  std::optional<StageCorrection> correction = {}; ///< arrows
+  StageOptions stage = {};                        ///< that they are of
+  const Fringes *fringes_x = nullptr;             ///< null: none
+  const Fringes *fringes_y = nullptr;
+};
+
+struct Rectangle {
+  int x = 0, y = 0, width = 0, height = 0;
+};
+
+/** A drawing of the size of a picture, and the parts of it that hide that. */
+struct Panel {
+  Image<std::uint8_t> grey;
+  std::vector<Rectangle> opaque;
+};
+
+/** @p size  of the picture, 160x120 at least. */
+Panel draw_panel (Extent size, const PanelContent &content);
+
+/** Copies the opaque parts to @p out, of the panel's size, 255 becoming the
+ * largest value of the pixel type. */
+void lay_over (const Panel &panel, ImageView<std::uint8_t> out);
+void lay_over (const Panel &panel, ImageView<std::uint16_t> out);
+
+} // namespace codedexposure

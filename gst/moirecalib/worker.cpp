@@ -1,0 +1,447 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* moirecalib's thread: gives frames to the session, draws and posts results. */
+#include <algorithm>
+#include <new>
+#include <system_error>
+
+#include "state.h"
+
+#define GST_CAT_DEFAULT moirecalib_debug
+
+namespace codedexposure::gst::moire
+{
+
+namespace
+{
+
+class Worker
+{
+public:
+  explicit Worker (GstMoireCalib *self)
+      : self_ (self), exchange_ (state (self).exchange)
+  {
+  }
+
+  void run ();
+
+private:
+  void begin (guint run);
+  void expect_grating ();
+  void choose_schedule (std::optional<Schedule> &schedule);
+  void find_phase (const Sample &sample);
+  void align (const Sample &sample);
+  void collect (const Sample &sample);
+  void solve ();
+  void finish (const CalibrationResult &result);
+  struct Written {
+    std::string location, report; ///< paths; empty: not written
+  };
+  Written write_files (
+      const CalibrationResult &result, const Settings &settings);
+  void fail (const std::string &why);
+  void fail_phase (const std::string &why);
+  void fail_of_memory ();
+  void set (Stage stage);
+  void draw (const std::string &title, const std::vector<std::string> &lines,
+      std::optional<double> progress);
+  template <typename Use>
+  auto with_pixels (const Sample &sample, Use use);
+
+  /** What there is to do. */
+  struct Task {
+    guint run = 0;
+    std::optional<Geometry> geometry; ///< of a new run, which begins
+    std::optional<Sample> sample;
+    bool collects = false;
+    bool solves = false;
+  };
+  Task next_task ();
+  void work_on (const Task &task);
+
+  GstMoireCalib *self_;
+  Exchange &exchange_;
+  guint run_ = 0;
+  Settings settings_;
+  Geometry geometry_;
+  std::optional<CalibrationSession> session_; ///< of this run
+  std::optional<StageCorrection> correction_; ///< that the panel shows
+  bool failed_ = false;                       ///< in this run
+};
+
+void
+Worker::begin (guint run)
+{
+  run_ = run;
+  settings_ = settings_of (self_);
+  session_.reset ();
+  correction_.reset ();
+  failed_ = false;
+  std::optional<Schedule> schedule = geometry_.schedule;
+  if (geometry_.mode == Mode::phase)
+    choose_schedule (schedule);
+  session_.emplace (CalibrationSession::Options{.camera = geometry_.camera,
+      .mirrors = geometry_.mirrors,
+      .bits = settings_.bits > 0 ? settings_.bits : geometry_.bits,
+      .patterns = geometry_.patterns,
+      .schedule = std::move (schedule)});
+  if (geometry_.mode != Mode::phase)
+    expect_grating ();
+}
+
+void
+Worker::expect_grating ()
+{
+  const auto grating = Pattern::parse (
+      settings_.pattern.empty () ? live_grating ().text () : settings_.pattern);
+  const auto expected = session_->expect (
+      grating ? *grating : live_grating (), settings_.stage.pixels_per_mirror);
+  if (!expected)
+    GST_ELEMENT_WARNING (self_, STREAM, FORMAT,
+        ("Fringes cannot be read: %s", expected.error ().message.c_str ()),
+        (nullptr));
+}
+
+/** The one whose phase is sought: the property's, or else the stream's. */
+void
+Worker::choose_schedule (std::optional<Schedule> &schedule)
+{
+  if (!settings_.schedule.empty ()) {
+    const Result<Schedule> asked = Schedule::parse (settings_.schedule);
+    if (!asked)
+      return fail_phase (asked.error ().message);
+    schedule = *asked;
+  }
+  if (!schedule)
+    fail_phase ("the stream says nothing of its schedule; set the schedule "
+                "property to what the mirrors show");
+}
+
+template <typename Use>
+auto
+Worker::with_pixels (const Sample &sample, Use use)
+{
+  MappedFrame mapped (geometry_.info, sample.frame.get (), GST_MAP_READ);
+  using Said = decltype (use (ImageView<const guint8> ()));
+  if (!mapped)
+    return Said (Error{"a frame cannot be read"});
+  if (GST_VIDEO_INFO_FORMAT (&geometry_.info) == GST_VIDEO_FORMAT_GRAY8)
+    return use (view_of<const guint8> (mapped));
+  return use (view_of<const guint16> (mapped));
+}
+
+void
+Worker::set (Stage stage)
+{
+  {
+    const std::lock_guard guard (exchange_.lock);
+    if (exchange_.run != run_ || (exchange_.stage == Stage::mapping &&
+                                     int (stage) < int (Stage::mapping)))
+      return;
+    exchange_.stage = stage;
+    exchange_.aligned_readings = session_ ? session_->aligned () : 0;
+  }
+  set_stage (self_, stage);
+}
+
+void
+Worker::draw (const std::string &title, const std::vector<std::string> &lines,
+    std::optional<double> progress)
+{
+  if (!settings_.overlay || geometry_.camera.width < 160 ||
+      geometry_.camera.height < 120)
+    return;
+  PanelContent content{.title = title,
+      .lines = lines,
+      .progress = progress,
+      .correction = correction_,
+      .stage = settings_.stage};
+  if (correction_ && session_->last_fringes ()) {
+    content.fringes_x = &session_->last_fringes ()->x;
+    content.fringes_y = &session_->last_fringes ()->y;
+  }
+  auto panel =
+      std::make_shared<const Panel> (draw_panel (geometry_.camera, content));
+  const std::lock_guard guard (exchange_.lock);
+  exchange_.panel = std::move (panel);
+}
+
+void
+Worker::align (const Sample &sample)
+{
+  {
+    const std::lock_guard guard (exchange_.lock);
+    exchange_.readings += exchange_.run == run_;
+  }
+  settings_ = settings_of (self_);
+  const auto alignment = with_pixels (sample, [this] (auto pixels) {
+    return session_->align (pixels, settings_.stage);
+  });
+  if (!alignment) {
+    correction_.reset ();
+    set (Stage::searching);
+    return draw ("searching", {alignment.error ().message}, {});
+  }
+  if (!*alignment)
+    return;
+  const auto &[reading, correction] = **alignment;
+  correction_ = correction;
+  /* The reading comes first, so that a state follows its reason. */
+  say_reading (self_, sample, reading, correction);
+  set (Stage (correction.state));
+  draw (alignment_state_text (correction.state), alignment_lines (**alignment),
+      {});
+}
+
+void
+Worker::collect (const Sample &sample)
+{
+  if (failed_)
+    return;
+  if (session_->collected () == 0)
+    settings_ = settings_of (self_);
+  const int total = int (geometry_.patterns.size ()) * settings_.frames;
+  const Pattern pattern = *Pattern::parse (sample.pattern);
+  const auto added = with_pixels (sample,
+      [&] (auto pixels) { return session_->collect (pattern, pixels); });
+  if (!added)
+    return fail (added.error ().message);
+  const int collected = session_->collected ();
+  const std::string text = "frame " + std::to_string (collected) + " of " +
+                           std::to_string (total) + ", " + sample.pattern;
+  correction_.reset ();
+  if (collected % settings_.frames == 0)
+    say_progress (self_, GST_PROGRESS_TYPE_CONTINUE, text);
+  draw ("mapping", {text}, double (collected) / std::max (1, total));
+}
+
+/* Posted once: the next frames would fail in the same way. */
+void
+Worker::fail (const std::string &why)
+{
+  failed_ = true;
+  set (Stage::failed);
+  draw ("no mapping", {why}, {});
+  say_progress (self_, GST_PROGRESS_TYPE_ERROR, why);
+  GST_ELEMENT_WARNING (self_, STREAM, FAILED,
+      ("There is no mapping: %s", why.c_str ()), (nullptr));
+}
+
+void
+Worker::fail_phase (const std::string &why)
+{
+  failed_ = true;
+  set (Stage::failed);
+  GST_ELEMENT_WARNING (self_, STREAM, FAILED,
+      ("The tile's phase cannot be found: %s", why.c_str ()), (nullptr));
+}
+
+/* The run ends; setting the mode begins another. */
+void
+Worker::fail_of_memory ()
+{
+  session_.reset ();
+  failed_ = true;
+  set (Stage::failed);
+  GST_ELEMENT_WARNING (self_, RESOURCE, NO_SPACE_LEFT,
+      ("The calibration ended: out of memory."), (nullptr));
+}
+
+void
+Worker::find_phase (const Sample &sample)
+{
+  const auto found = with_pixels (
+      sample, [this] (auto pixels) { return session_->find_phase (pixels); });
+  if (!found)
+    return fail_phase (found.error ().message);
+  {
+    const std::lock_guard guard (exchange_.lock);
+    exchange_.confidence = session_->confidence ();
+    if (!*found || exchange_.run != run_)
+      return;
+    exchange_.schedule = (*found)->schedule;
+    exchange_.mapping.reset ();
+    exchange_.setup_due = true;
+  }
+  set (Stage::found);
+  say_phase (self_, sample, **found);
+}
+
+void
+Worker::solve ()
+{
+  if (failed_ || session_->collected () == 0)
+    return;
+  set (Stage::solving);
+  draw ("solving", {std::to_string (session_->collected ()) + " frames"}, 1.0);
+  const auto result = session_->solve ();
+  if (!result)
+    return fail (result.error ().message);
+  if (*result)
+    finish (**result);
+}
+
+Worker::Written
+Worker::write_files (const CalibrationResult &result, const Settings &settings)
+{
+  Written written;
+  const auto take = [this] (const std::string &path, const Result<void> &done) {
+    if (!done)
+      GST_ELEMENT_WARNING (self_, RESOURCE, WRITE,
+          ("%s", done.error ().message.c_str ()), (nullptr));
+    return done ? path : "";
+  };
+  if (!settings.location.empty ())
+    written.location =
+        take (settings.location, result.mapping.save (settings.location));
+  if (settings.report.empty ())
+    return written;
+  const CalibrationReport report{.title = "Camera against mirrors",
+      .lines =
+          report_lines (result, correct_stage (result.mapping, settings.stage)),
+      .before = session_->first_fringes (),
+      .after = session_->last_fringes (),
+      .result = &result};
+  written.report =
+      take (settings.report, write_report (settings.report, report));
+  return written;
+}
+
+void
+Worker::finish (const CalibrationResult &result)
+{
+  const Settings settings = settings_of (self_);
+  const Written written = write_files (result, settings);
+  {
+    const ObjectLock lock (self_);
+    state (self_).mapping = result.mapping.to_json ();
+  }
+  {
+    const std::lock_guard guard (exchange_.lock);
+    exchange_.mapping = result.mapping;
+    exchange_.schedule.reset ();
+    exchange_.setup_due = true;
+  }
+  set (Stage::mapped);
+  correction_ = correct_stage (result.mapping, settings.stage);
+  draw ("mapped", mapping_lines (result, *correction_), 1.0);
+  say_progress (self_, GST_PROGRESS_TYPE_COMPLETE,
+      "mapped with " + std::to_string (session_->collected ()) + " frames");
+  g_object_notify (G_OBJECT (self_), "mapping");
+  say_mapping (self_, result, written.location, written.report);
+}
+
+/** The next one; the exchange's lock is held. Collected frames come first, and
+ * are solved when there are no more. */
+Worker::Task
+Worker::next_task ()
+{
+  Task task;
+  task.run = exchange_.run;
+  if (exchange_.run != run_)
+    task.geometry = exchange_.geometry;
+  if (!exchange_.samples.empty ()) {
+    task.collects = true;
+    task.sample = std::move (exchange_.samples.front ());
+    exchange_.samples.pop_front ();
+  } else if (exchange_.solve) {
+    task.solves = std::exchange (exchange_.solve, false);
+  } else {
+    task.sample = std::exchange (exchange_.live, std::nullopt);
+  }
+  return task;
+}
+
+void
+Worker::work_on (const Task &task)
+{
+  if (task.geometry) {
+    geometry_ = *task.geometry;
+    begin (task.run);
+  }
+  if (!session_)
+    return;
+  if (task.solves)
+    solve ();
+  else if (task.collects)
+    collect (*task.sample);
+  else if (geometry_.mode != Mode::phase)
+    align (*task.sample);
+  else if (!failed_)
+    find_phase (*task.sample);
+}
+
+void
+Worker::run ()
+{
+  std::unique_lock guard (exchange_.lock);
+  while (true) {
+    exchange_.busy = false;
+    exchange_.changed.notify_all ();
+    exchange_.changed.wait (guard, [this] {
+      return exchange_.quit || exchange_.live || exchange_.solve ||
+             !exchange_.samples.empty ();
+    });
+    if (exchange_.quit)
+      return;
+    exchange_.busy = true;
+    bool enough = true;
+    try {
+      const Task task = next_task ();
+      guard.unlock ();
+      work_on (task);
+    } catch (const std::bad_alloc &) {
+      enough = false;
+    }
+    if (guard.owns_lock ())
+      guard.unlock ();
+    if (!enough)
+      fail_of_memory ();
+    guard.lock ();
+  }
+}
+
+} // namespace
+
+bool
+start_worker (GstMoireCalib *self)
+{
+  CalibState &st = state (self);
+  Exchange &exchange = st.exchange;
+  {
+    const std::lock_guard guard (exchange.lock);
+    exchange.quit = false;
+    exchange.geometry.reset ();
+    exchange.stage = Stage::searching;
+    exchange.panel.reset ();
+    exchange.mapping.reset ();
+    exchange.schedule.reset ();
+    exchange.setup_due = false;
+  }
+  try {
+    st.worker = std::thread ([self] { Worker (self).run (); });
+  } catch (const std::system_error &failure) {
+    GST_ELEMENT_ERROR (self, RESOURCE, FAILED,
+        ("No thread for the calibration: %s", failure.what ()), (nullptr));
+    return false;
+  }
+  return true;
+}
+
+void
+stop_worker (GstMoireCalib *self)
+{
+  CalibState &st = state (self);
+  if (!st.worker.joinable ())
+    return;
+  {
+    const std::lock_guard guard (st.exchange.lock);
+    st.exchange.quit = true;
+    st.exchange.live.reset ();
+    st.exchange.samples.clear ();
+    st.exchange.solve = false;
+  }
+  st.exchange.changed.notify_all ();
+  st.worker.join ();
+}
+
+} // namespace codedexposure::gst::moire

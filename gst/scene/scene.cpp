@@ -1,0 +1,239 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-codedexposure-scene
+ * @title: codedexposure-scene
+ * @short_description: Synthetic scenes with fast motion
+ *
+ * Draws a flickering candle, a candle that is blown out after half a second, or
+ * dark liquid that is poured into a glass of clear liquid, at any size and
+ * frame rate: the scenes of the paper's Figs. 9 to 11. Pixel values are linear
+ * in light. A picture depends only on its time, so every run gives the same
+ * pictures.
+ *
+ * ## Example pipeline
+ * |[
+ * gst-launch-1.0 codedexposure-scene scene=blown-out num-buffers=100 !
+ * video/x-raw,format=GRAY8,width=768,height=576,framerate=100/1 !
+ * codedexposure-sim full-well=10000 ! codedexposure-demux ! queue !
+ * videoconvert ! autovideosink
+ * ]|
+ *
+ * Since: 0.1
+ */
+#include "scene.h"
+
+#include <algorithm>
+#include <limits>
+#include <memory>
+
+#include "bench/scene.h"
+#include "common/caps.h"
+#include "common/properties.h"
+#include "common/raii.h"
+
+using namespace codedexposure::gst;
+using codedexposure::SceneKind;
+
+namespace
+{
+
+struct SceneState {
+  SceneKind kind = SceneKind::kCandle; // object lock
+
+  /* Streaming thread, and start and stop, which exclude it. */
+  SceneKind drawn = SceneKind::kCandle; ///< in force
+  GstVideoInfo info;
+  std::unique_ptr<codedexposure::SyntheticScene> scene;
+  codedexposure::Image<float> light;
+  guint64 frame = 0;
+};
+
+enum { PROP_0, PROP_SCENE };
+
+template <typename Pixel>
+void
+expose (codedexposure::ImageView<const float> light,
+    codedexposure::ImageView<Pixel> out)
+{
+  constexpr float kWhite = std::numeric_limits<Pixel>::max ();
+  for (int y = 0; y < out.height; y++)
+    std::transform (
+        light.row (y), light.row (y) + out.width, out.row (y), [] (float l) {
+          return Pixel (std::clamp (l, 0.0f, 1.0f) * kWhite + 0.5f);
+        });
+}
+
+} // namespace
+
+struct _GstCodedExposureScene {
+  GstPushSrc parent;
+  SceneState *state;
+};
+
+#define gst_coded_exposure_scene_parent_class parent_class
+G_DEFINE_TYPE (
+    GstCodedExposureScene, gst_coded_exposure_scene, GST_TYPE_PUSH_SRC)
+GST_ELEMENT_REGISTER_DEFINE (codedexposure_scene, "codedexposure-scene",
+    GST_RANK_NONE, GST_TYPE_CODED_EXPOSURE_SCENE)
+
+G_DEFINE_ENUM_TYPE (GstCodedExposureSceneKind, gst_coded_exposure_scene_kind,
+    {int (SceneKind::kCandle), "A candle that flickers", "candle"},
+    {int (SceneKind::kBlownOut), "A candle that is blown out after 0.5 s",
+        "blown-out"},
+    {int (SceneKind::kPour), "Liquid that is poured into a glass", "pour"})
+
+static gboolean
+gst_coded_exposure_scene_start (GstBaseSrc *base)
+{
+  auto *self = GST_CODED_EXPOSURE_SCENE (base);
+  SceneState &state = *self->state;
+  const ObjectLock lock (self);
+  state.drawn = state.kind;
+  state.frame = 0;
+  return TRUE;
+}
+
+static GstCaps *
+gst_coded_exposure_scene_fixate (GstBaseSrc *base, GstCaps *caps)
+{
+  caps = gst_caps_make_writable (caps);
+  GstStructure *fields = gst_caps_get_structure (caps, 0);
+  gst_structure_fixate_field_nearest_int (fields, "width", 768);
+  gst_structure_fixate_field_nearest_int (fields, "height", 576);
+  gst_structure_fixate_field_nearest_fraction (fields, "framerate", 100, 1);
+  return GST_BASE_SRC_CLASS (parent_class)->fixate (base, caps);
+}
+
+static gboolean
+gst_coded_exposure_scene_set_caps (GstBaseSrc *base, GstCaps *caps) noexcept
+{
+  auto *self = GST_CODED_EXPOSURE_SCENE (base);
+  SceneState &state = *self->state;
+  if (!gst_video_info_from_caps (&state.info, caps))
+    return FALSE;
+  if (state.info.fps_n == 0) {
+    GST_ELEMENT_ERROR (self, STREAM, FORMAT,
+        ("A scene that moves needs a frame rate: write one behind it, such as "
+         "video/x-raw,framerate=100/1."),
+        (nullptr));
+    return FALSE;
+  }
+  const codedexposure::Extent size{state.info.width, state.info.height};
+  state.scene = codedexposure::SyntheticScene::make (state.drawn, size);
+  state.light = codedexposure::Image<float> (size.width, size.height);
+  return TRUE;
+}
+
+static GstFlowReturn
+gst_coded_exposure_scene_create (GstPushSrc *base, GstBuffer **outbuf) noexcept
+{
+  auto *self = GST_CODED_EXPOSURE_SCENE (base);
+  SceneState &state = *self->state;
+  if (!state.scene)
+    return GST_FLOW_NOT_NEGOTIATED;
+  const auto time_of = [&state] (guint64 frame) {
+    return gst_util_uint64_scale (frame,
+        guint64 (state.info.fps_d) * GST_SECOND, guint64 (state.info.fps_n));
+  };
+  BufferPtr buffer (gst_buffer_new_allocate (
+      nullptr, GST_VIDEO_INFO_SIZE (&state.info), nullptr));
+  const GstClockTime time = time_of (state.frame);
+  state.scene->draw (double (time) * 1e-9, state.light.view ());
+  {
+    MappedFrame mapped (state.info, buffer.get (), GST_MAP_WRITE);
+    const auto light = std::as_const (state.light).view ();
+    if (GST_VIDEO_INFO_FORMAT (&state.info) == GST_VIDEO_FORMAT_GRAY8)
+      expose (light, view_of<guint8> (mapped));
+    else
+      expose (light, view_of<guint16> (mapped));
+  }
+  GST_BUFFER_PTS (buffer.get ()) = time;
+  GST_BUFFER_OFFSET (buffer.get ()) = state.frame++;
+  GST_BUFFER_OFFSET_END (buffer.get ()) = state.frame;
+  GST_BUFFER_DURATION (buffer.get ()) = time_of (state.frame) - time;
+  *outbuf = buffer.release ();
+  return GST_FLOW_OK;
+}
+
+static void
+gst_coded_exposure_scene_set_property (
+    GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+{
+  auto *self = GST_CODED_EXPOSURE_SCENE (object);
+  if (id != PROP_SCENE) {
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+    return;
+  }
+  const ObjectLock lock (self);
+  if (!may_set (self, pspec))
+    return;
+  self->state->kind = SceneKind (g_value_get_enum (value));
+}
+
+static void
+gst_coded_exposure_scene_get_property (
+    GObject *object, guint id, GValue *value, GParamSpec *pspec)
+{
+  auto *self = GST_CODED_EXPOSURE_SCENE (object);
+  if (id != PROP_SCENE) {
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+    return;
+  }
+  const ObjectLock lock (self);
+  g_value_set_enum (value, int (self->state->kind));
+}
+
+static void
+gst_coded_exposure_scene_init (GstCodedExposureScene *self)
+{
+  self->state = new SceneState;
+  gst_base_src_set_format (GST_BASE_SRC (self), GST_FORMAT_TIME);
+}
+
+static void
+gst_coded_exposure_scene_finalize (GObject *object)
+{
+  delete GST_CODED_EXPOSURE_SCENE (object)->state;
+  G_OBJECT_CLASS (parent_class)->finalize (object);
+}
+
+static void
+gst_coded_exposure_scene_class_init (GstCodedExposureSceneClass *klass)
+{
+  auto *object_class = G_OBJECT_CLASS (klass);
+  auto *element_class = GST_ELEMENT_CLASS (klass);
+  auto *base_class = GST_BASE_SRC_CLASS (klass);
+
+  object_class->set_property = gst_coded_exposure_scene_set_property;
+  object_class->get_property = gst_coded_exposure_scene_get_property;
+  object_class->finalize = gst_coded_exposure_scene_finalize;
+  /**
+   * GstCodedExposureScene:scene:
+   *
+   * What is drawn.
+   *
+   * Since: 0.1
+   */
+  g_object_class_install_property (object_class, PROP_SCENE,
+      g_param_spec_enum ("scene", "Scene to Draw",
+          "What is drawn; takes effect when the stream starts",
+          GST_TYPE_CODED_EXPOSURE_SCENE_KIND, int (SceneKind::kCandle),
+          GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
+                       GST_PARAM_MUTABLE_READY)));
+  gst_type_mark_as_plugin_api (
+      GST_TYPE_CODED_EXPOSURE_SCENE_KIND, GstPluginAPIFlags (0));
+
+  gst_element_class_set_static_metadata (element_class,
+      "Coded exposure test scene", "Source/Video",
+      "Draws a candle, a candle that is blown out, or liquid that is poured",
+      "The gst-codedexposure authors");
+  static GstStaticPadTemplate src = GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC,
+      GST_PAD_ALWAYS, GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
+  gst_element_class_add_static_pad_template (element_class, &src);
+
+  base_class->start = GST_DEBUG_FUNCPTR (gst_coded_exposure_scene_start);
+  base_class->fixate = GST_DEBUG_FUNCPTR (gst_coded_exposure_scene_fixate);
+  base_class->set_caps = GST_DEBUG_FUNCPTR (gst_coded_exposure_scene_set_caps);
+  GST_PUSH_SRC_CLASS (klass)->create =
+      GST_DEBUG_FUNCPTR (gst_coded_exposure_scene_create);
+}

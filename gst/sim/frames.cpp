@@ -1,0 +1,523 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Input frames come in, a coded frame goes out with the last of an exposure.
+ *
+ * An exposure begins with any input frame and takes those that follow it
+ * without a gap. It is dropped as soon as one is missing, since light that was
+ * lost cannot be made up for, and the next begins with the frame that came.
+ */
+#include <algorithm>
+#include <string_view>
+#include <utility>
+
+#include "common/meta.h"
+#include "common/tag.h"
+#include "state.h"
+
+#define GST_CAT_DEFAULT codedexposure_sim_debug
+
+namespace codedexposure::gst::sim
+{
+
+namespace
+{
+
+void
+use_schedule (GstCodedExposureSim *self, ScheduleRef schedule)
+{
+  Stream &stream = state (self).stream;
+  stream.schedule = schedule;
+  stream.tag_due = true;
+  const ObjectLock lock (self);
+  state (self).schedule = std::move (schedule);
+}
+
+/* The schedule that the DMD was programmed with, else that of the property.
+ * Null, with an error on the bus, when that one cannot be read. */
+ScheduleRef
+wanted_schedule (GstCodedExposureSim *self)
+{
+  const Stream &stream = state (self).stream;
+  if (stream.mirrors)
+    if (std::optional<Schedule> programmed = stream.mirrors->schedule ())
+      return std::make_shared<const Schedule> (*std::move (programmed));
+
+  std::shared_ptr<const Result<Schedule>> parsed;
+  {
+    const ObjectLock lock (self);
+    parsed = state (self).settings.parsed;
+  }
+  if (parsed->ok ())
+    return ScheduleRef (parsed, &parsed->value ());
+  GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
+      ("The schedule property cannot be read: %s",
+          parsed->error ().message.c_str ()),
+      (nullptr));
+  return nullptr;
+}
+
+} // namespace
+
+bool
+follow_schedule (GstCodedExposureSim *self)
+{
+  Stream &stream = state (self).stream;
+  ScheduleRef wanted = wanted_schedule (self);
+  if (!wanted)
+    return false;
+  if (wanted == stream.schedule || *wanted == *stream.schedule)
+    return true;
+  GST_INFO_OBJECT (self, "schedule is now %s", wanted->text ().c_str ());
+  use_schedule (self, std::move (wanted));
+  /* Another number of slots means another frame rate. */
+  stream.plan.reset ();
+  gst_base_transform_reconfigure_src (GST_BASE_TRANSFORM (self));
+  return true;
+}
+
+namespace
+{
+
+GstClockTime
+input_time (const Plan &plan, guint64 inputs)
+{
+  return gst_util_uint64_scale (
+      inputs, guint64 (plan.in.fps_d) * GST_SECOND, plan.in.fps_n);
+}
+
+/* Whether a frame at @pts is the one that follows @inputs input frames from
+ * @start on; time stamps may be off by less than half a frame. */
+bool
+follows (const Plan &plan, GstClockTime start, int inputs, GstClockTime pts)
+{
+  const GstClockTimeDiff off =
+      GST_CLOCK_DIFF (start + input_time (plan, inputs), pts);
+  return GstClockTime (ABS (off)) < input_time (plan, 1) / 2;
+}
+
+bool
+continues (const Plan &plan, const Exposure &exposure, GstBuffer *inbuf)
+{
+  return !GST_BUFFER_IS_DISCONT (inbuf) &&
+         follows (plan, exposure.start, exposure.taken, GST_BUFFER_PTS (inbuf));
+}
+
+/* Exposures are counted in frame periods, so that the DMD's slots go on through
+ * gaps. */
+std::int64_t
+next_frame (const Stream &stream, GstClockTime start)
+{
+  if (!GST_CLOCK_TIME_IS_VALID (stream.last_start) ||
+      start <= stream.last_start)
+    return stream.last_frame + 1;
+  const guint64 periods = gst_util_uint64_scale_round (
+      start - stream.last_start, stream.plan->out.fps_n,
+      guint64 (stream.plan->out.fps_d) * GST_SECOND);
+  return stream.last_frame + std::max<std::int64_t> (1, periods);
+}
+
+/* A dmdsync parks its mirrors for the time that it takes to change masks, so
+ * that only those are warned of that never moved, or not for a second. */
+void
+watch_mirrors (GstCodedExposureSim *self, const std::vector<int> &masks)
+{
+  Stream &stream = state (self).stream;
+  const bool moves = std::any_of (
+      masks.begin (), masks.end (), [] (int mask) { return mask >= 0; });
+  const GstVideoInfo &info = stream.plan->out;
+  stream.parked_frames = moves ? 0 : stream.parked_frames + 1;
+  stream.mirrors_moved |= moves;
+  if (moves ||
+      (stream.mirrors_moved && stream.parked_frames * info.fps_d < info.fps_n))
+    return;
+  if (std::exchange (stream.warned_parked, true))
+    return;
+  GST_ELEMENT_WARNING (self, RESOURCE, NOT_FOUND,
+      ("The mirrors of the simulated DMD are parked: coded frames are dark "
+       "until a dmdsync with the same device starts them."),
+      ("this is said once"));
+}
+
+/* The masks of every slot, asked for at the start of the exposure, where the
+ * DMD begins to step. */
+std::vector<int>
+find_masks (GstCodedExposureSim *self, std::int64_t frame)
+{
+  const Stream &stream = state (self).stream;
+  const int slots = stream.schedule->slots ();
+  std::vector<int> masks;
+  for (int slot = 0; slot < slots; slot++) {
+    const std::int64_t counted = frame * slots + slot;
+    masks.push_back (stream.mirrors
+                         ? stream.mirrors->mask_in_slot (counted).value_or (-1)
+                         : int (counted % stream.schedule->masks ()));
+  }
+  watch_mirrors (self, masks);
+  return masks;
+}
+
+/* Sets up the bench where it is missing or its settings changed. */
+bool
+prepare_bench (GstCodedExposureSim *self)
+{
+  Stream &stream = state (self).stream;
+  BenchOptions optics;
+  {
+    const ObjectLock lock (self);
+    optics = state (self).settings.optics;
+    if (stream.mirrors)
+      optics.diamond = stream.mirrors->diamond ();
+  }
+  if (stream.bench && optics == stream.optics)
+    return true;
+
+  const GstVideoInfo &info = stream.plan->in;
+  const int bits = GST_VIDEO_FORMAT_INFO_BITS (info.finfo);
+  if (optics.bits > bits) {
+    GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
+        ("bits = %d is more than the %d bits of %s; set fewer, or 0 for all.",
+            optics.bits, bits, GST_VIDEO_INFO_NAME (&info)),
+        (nullptr));
+    return false;
+  }
+  Result<OpticalBench> made =
+      OpticalBench::make (info.width, info.height, optics);
+  if (!made) {
+    GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
+        ("The bench cannot be set up: %s.", made.error ().message.c_str ()),
+        (nullptr));
+    return false;
+  }
+  stream.bench = *std::move (made);
+  stream.optics = optics;
+  return true;
+}
+
+GstFlowReturn
+begin_exposure (GstCodedExposureSim *self, GstBuffer *inbuf)
+{
+  Stream &stream = state (self).stream;
+  if (!prepare_bench (self))
+    return GST_FLOW_ERROR;
+
+  Exposure exposure;
+  exposure.start = GST_BUFFER_PTS (inbuf);
+  exposure.frame = next_frame (stream, exposure.start);
+  exposure.lost_before = exposure.frame - stream.last_frame - 1;
+  /* The output buffer takes flags and metas of the first input frame. */
+  auto *trans = GST_BASE_TRANSFORM (self);
+  GstBuffer *outbuf = nullptr;
+  const GstFlowReturn flow =
+      GST_BASE_TRANSFORM_GET_CLASS (self)->prepare_output_buffer (
+          trans, inbuf, &outbuf);
+  exposure.outbuf.reset (outbuf);
+  if (flow != GST_FLOW_OK)
+    return flow;
+
+  if (stream.discont || !follows (*stream.plan, stream.last_start,
+                            stream.plan->inputs, exposure.start))
+    GST_BUFFER_FLAG_SET (outbuf, GST_BUFFER_FLAG_DISCONT);
+  exposure.masks = find_masks (self, exposure.frame);
+  stream.discont = false;
+  stream.last_start = exposure.start;
+  stream.last_frame = exposure.frame;
+  stream.bench->begin (
+      *stream.schedule, stream.mirrors ? stream.mirrors->held () : nullptr);
+  stream.exposure = std::move (exposure);
+  return GST_FLOW_OK;
+}
+
+bool
+is_wide (const GstVideoInfo &info)
+{
+  return GST_VIDEO_INFO_FORMAT (&info) == GST_VIDEO_FORMAT_GRAY16_LE;
+}
+
+GstFlowReturn
+map_failed (GstCodedExposureSim *self, const GstVideoInfo &info)
+{
+  GST_ELEMENT_ERROR (self, STREAM, FORMAT,
+      ("A buffer does not hold a frame of %s %dx%d.",
+          GST_VIDEO_INFO_NAME (&info), info.width, info.height),
+      (nullptr));
+  return GST_FLOW_ERROR;
+}
+
+GstFlowReturn
+collect_light (GstCodedExposureSim *self, GstBuffer *inbuf)
+{
+  Stream &stream = state (self).stream;
+  const Plan &plan = *stream.plan;
+  Exposure &exposure = *stream.exposure;
+  const auto &shares = plan.shares[std::size_t (exposure.taken++)];
+  if (GST_BUFFER_FLAG_IS_SET (inbuf, GST_BUFFER_FLAG_CORRUPTED))
+    GST_BUFFER_FLAG_SET (exposure.outbuf.get (), GST_BUFFER_FLAG_CORRUPTED);
+
+  MappedFrame scene (plan.in, inbuf, GST_MAP_READ);
+  if (!scene)
+    return map_failed (self, plan.in);
+  for (const LightShare &share : shares) {
+    const int mask = exposure.masks[std::size_t (share.slot)];
+    if (is_wide (plan.in))
+      stream.bench->expose (
+          view_of<const std::uint16_t> (scene), mask, share.slots);
+    else
+      stream.bench->expose (
+          view_of<const std::uint8_t> (scene), mask, share.slots);
+  }
+  return GST_FLOW_OK;
+}
+
+GstFlowReturn
+read_out (GstCodedExposureSim *self, const Exposure &exposure)
+{
+  Stream &stream = state (self).stream;
+  GstBuffer *outbuf = exposure.outbuf.get ();
+  MappedFrame coded (stream.plan->out, outbuf, GST_MAP_WRITE);
+  if (!coded)
+    return map_failed (self, stream.plan->out);
+  if (is_wide (stream.plan->out))
+    stream.bench->read_out (exposure.frame, view_of<std::uint16_t> (coded));
+  else
+    stream.bench->read_out (exposure.frame, view_of<std::uint8_t> (coded));
+  return GST_FLOW_OK;
+}
+
+/* What a camera of fewer bits than its pixels could hold says of its frames. */
+void
+describe (const Stream &stream, const Exposure &exposure)
+{
+  const int bits = significant_bits_of (stream.optics.bits, stream.plan->out);
+  if (bits == 0)
+    return;
+  FrameMeta meta;
+  meta.frame = guint64 (exposure.frame);
+  meta.lost_before = guint64 (exposure.lost_before);
+  meta.locked = !stream.mirrors;
+  meta.bits = bits;
+  set_frame_meta (exposure.outbuf.get (), meta);
+}
+
+GstBuffer *
+stamp (GstCodedExposureSim *self, Exposure exposure)
+{
+  guint64 number;
+  {
+    const ObjectLock lock (self);
+    number = state (self).counters.frames_out++;
+  }
+  const Stream &stream = state (self).stream;
+  const GstVideoInfo &info = stream.plan->out;
+  describe (stream, exposure);
+  GstBuffer *outbuf = exposure.outbuf.release ();
+  GST_BUFFER_PTS (outbuf) = exposure.start;
+  GST_BUFFER_DTS (outbuf) = GST_CLOCK_TIME_NONE;
+  GST_BUFFER_DURATION (outbuf) =
+      gst_util_uint64_scale (GST_SECOND, info.fps_d, info.fps_n);
+  GST_BUFFER_OFFSET (outbuf) = number;
+  GST_BUFFER_OFFSET_END (outbuf) = number + 1;
+  GST_LOG_OBJECT (self, "[OUT] %" GST_TIME_FORMAT " frame %" G_GINT64_FORMAT,
+      GST_TIME_ARGS (exposure.start), exposure.frame);
+  return outbuf;
+}
+
+/* The mirrors of "sim:NAME"; what follows a comma is for the driver. Null for
+ * anything else. */
+std::shared_ptr<SimulatedMirrors>
+find_mirrors (std::string_view device)
+{
+  constexpr std::string_view scheme = "sim:";
+  if (!device.starts_with (scheme))
+    return nullptr;
+  device.remove_prefix (scheme.size ());
+  const std::string name (device.substr (0, device.find (',')));
+  return name.empty () ? nullptr : SimulatedMirrors::find (name);
+}
+
+} // namespace
+
+bool
+begin_stream (GstCodedExposureSim *self)
+{
+  Stream &stream = state (self).stream;
+  std::string dmd;
+  {
+    const ObjectLock lock (self);
+    dmd = state (self).settings.dmd;
+    state (self).counters = Counters ();
+  }
+  if (!dmd.empty () && !(stream.mirrors = find_mirrors (dmd))) {
+    GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
+        ("dmd '%s' is no simulated DMD; write sim:NAME, with the name that "
+         "dmdsync's device has.",
+            dmd.c_str ()),
+        (nullptr));
+    return false;
+  }
+  ScheduleRef schedule = wanted_schedule (self);
+  if (!schedule)
+    return false;
+  use_schedule (self, std::move (schedule));
+  return true;
+}
+
+GstFlowReturn
+submit_input_buffer (
+    GstBaseTransform *trans, gboolean is_discont, GstBuffer *inbuf)
+{
+  auto *self = GST_CODED_EXPOSURE_SIM (trans);
+  Stream &stream = state (self).stream;
+  BufferPtr owned (inbuf);
+  GST_LOG_OBJECT (
+      self, "[IN] %" GST_TIME_FORMAT, GST_TIME_ARGS (GST_BUFFER_PTS (inbuf)));
+  if (!GST_BUFFER_PTS_IS_VALID (inbuf)) {
+    GST_ELEMENT_ERROR (self, STREAM, FORMAT,
+        ("An input frame has no time stamp, and nothing says which slot it "
+         "belongs to; let the source set one (do-timestamp=true), or put "
+         "videorate before codedexposure-sim."),
+        (nullptr));
+    return GST_FLOW_ERROR;
+  }
+  if (trans->segment.rate < 0.0) {
+    GST_ELEMENT_ERROR (self, STREAM, NOT_IMPLEMENTED,
+        ("Light cannot be collected backwards; play at a positive rate."),
+        (nullptr));
+    return GST_FLOW_ERROR;
+  }
+
+  if (stream.exposure && !continues (*stream.plan, *stream.exposure, inbuf))
+    drop_exposure (self, Drop::kGap);
+  if (!stream.exposure && !follow_schedule (self))
+    return GST_FLOW_ERROR;
+
+  const GstFlowReturn flow =
+      GST_BASE_TRANSFORM_CLASS (g_type_class_peek (GST_TYPE_VIDEO_FILTER))
+          ->submit_input_buffer (trans, is_discont, owned.release ());
+  /* Where the caps stayed what they were, nobody made a plan. */
+  const GstVideoFilter *filter = GST_VIDEO_FILTER (trans);
+  if (flow == GST_FLOW_OK && !stream.plan &&
+      !make_plan (self, filter->in_info, filter->out_info))
+    return GST_FLOW_NOT_NEGOTIATED;
+  return flow;
+}
+
+GstFlowReturn
+generate_output (GstBaseTransform *trans, GstBuffer **outbuf)
+{
+  auto *self = GST_CODED_EXPOSURE_SIM (trans);
+  Stream &stream = state (self).stream;
+  const BufferPtr inbuf (std::exchange (trans->queued_buf, nullptr));
+  *outbuf = nullptr;
+  if (!inbuf)
+    return GST_FLOW_OK;
+
+  GstFlowReturn flow = GST_FLOW_OK;
+  if (!stream.exposure)
+    flow = begin_exposure (self, inbuf.get ());
+  if (flow == GST_FLOW_OK)
+    flow = collect_light (self, inbuf.get ());
+  if (flow != GST_FLOW_OK || stream.exposure->taken < stream.plan->inputs)
+    return flow;
+
+  Exposure exposure = std::move (*stream.exposure);
+  stream.exposure.reset ();
+  flow = read_out (self, exposure);
+  if (flow != GST_FLOW_OK)
+    return flow;
+  push_tag (self);
+  *outbuf = stamp (self, std::move (exposure));
+  return GST_FLOW_OK;
+}
+
+namespace
+{
+
+const char *
+name_of (Drop reason)
+{
+  switch (reason) {
+  case Drop::kGap:
+    return "gap";
+  case Drop::kSegment:
+    return "segment";
+  case Drop::kFlush:
+    return "flush";
+  case Drop::kCaps:
+    return "caps";
+  default:
+    return "eos";
+  }
+}
+
+/* What only happens when somebody asks for it is left to the message for
+ * programs. */
+void
+tell_user (GstCodedExposureSim *self, Drop reason, GstClockTime start,
+    const std::string &taken)
+{
+  Stream &stream = state (self).stream;
+  if (reason == Drop::kEos)
+    /* As debug text, since that is what gst-launch shows of an INFO. */
+    GST_ELEMENT_INFO (self, STREAM, FAILED, (nullptr),
+        ("The stream ended after %s of the coded frame at %" GST_TIME_FORMAT
+         ", which is dropped.",
+            taken.c_str (), GST_TIME_ARGS (start)));
+  if (reason == Drop::kGap && !std::exchange (stream.warned_dropped, true))
+    GST_ELEMENT_WARNING (self, STREAM, FAILED,
+        ("A gap in the input after %s of the coded frame at %" GST_TIME_FORMAT
+         ", which is dropped.",
+            taken.c_str (), GST_TIME_ARGS (start)),
+        ("this is said once; the property frames-dropped counts them all"));
+}
+
+} // namespace
+
+void
+drop_exposure (GstCodedExposureSim *self, Drop reason)
+{
+  Stream &stream = state (self).stream;
+  if (!stream.exposure)
+    return;
+  const Exposure exposure = std::move (*stream.exposure);
+  const int needed = stream.plan->inputs;
+  stream.exposure.reset ();
+  stream.discont = true;
+  guint64 dropped;
+  {
+    const ObjectLock lock (self);
+    dropped = ++state (self).counters.frames_dropped;
+  }
+  const std::string taken = std::to_string (exposure.taken) + " of " +
+                            std::to_string (needed) + " input frames";
+  GST_INFO_OBJECT (self,
+      "drop the coded frame at %" GST_TIME_FORMAT " after %s: %s",
+      GST_TIME_ARGS (exposure.start), taken.c_str (), name_of (reason));
+  gst_element_post_message (GST_ELEMENT (self),
+      gst_message_new_element (GST_OBJECT (self),
+          gst_structure_new ("codedexposure/frame-dropped", "reason",
+              G_TYPE_STRING, name_of (reason), "pts", G_TYPE_UINT64,
+              exposure.start, "inputs", G_TYPE_INT, exposure.taken, "needed",
+              G_TYPE_INT, needed, "frames-dropped", G_TYPE_UINT64, dropped,
+              nullptr)));
+  tell_user (self, reason, exposure.start, taken);
+  g_object_notify (G_OBJECT (self), "frames-dropped");
+}
+
+void
+restart (GstCodedExposureSim *self, Drop reason)
+{
+  drop_exposure (self, reason);
+  Stream &stream = state (self).stream;
+  stream.discont = true;
+  stream.last_start = GST_CLOCK_TIME_NONE;
+}
+
+void
+push_tag (GstCodedExposureSim *self)
+{
+  Stream &stream = state (self).stream;
+  if (std::exchange (stream.tag_due, false))
+    gst_pad_push_event (GST_BASE_TRANSFORM_SRC_PAD (self),
+        schedule_to_event (*stream.schedule));
+}
+
+} // namespace codedexposure::gst::sim

@@ -1,0 +1,295 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-codedexposure-sim
+ * @title: codedexposure-sim
+ * @short_description: An optical bench in software
+ *
+ * Plays a camera behind a micromirror device: shows the input to mirrors that
+ * step through the masks of a schedule, and gives what a slow camera would see
+ * of it, coded frames. With it everything runs that runs on a bench, and the
+ * truth is known.
+ *
+ * ## Rates
+ *
+ * A coded frame with N slots takes N m input frames, m a whole number: 100
+ * frames/s and 4 slots make 25 coded frames/s, 200 frames/s make 50, or 25
+ * where a caps filter behind the element asks for them. The largest rate that
+ * downstream takes is chosen.
+ *
+ * |[
+ *   input, m = 2   |0  |1  |2  |3  |4  |5  |6  |7  |8 ...
+ *   slots          |0      |1      |2      |3      |0 ...
+ *   coded frame    |PTS of input frame 0           |PTS of 8
+ * ]|
+ *
+ * An input frame is constant light from its time until that of the next one,
+ * as much in each pixel as its value says.
+ * Slots lie in the frame as the schedule's timing says (`active`, `switching`,
+ * `readout`) and collect what falls into their active time; while mirrors
+ * switch and while the camera reads out, light is lost.
+ *
+ * ## Optics
+ *
+ * Pixel p of the camera looks at mirror c + shift + R (p - c) / scale, where c
+ * is the centre of the picture and R turns by #codedexposure-sim:rotation from
+ * x to y, clockwise on the screen. The scene lies on the mirrors one pixel to
+ * one mirror; beyond it there is no light. Between mirrors and pixels, which
+ * are squares without gaps, light is blurred by a Gaussian of
+ * #codedexposure-sim:psf-sigma.
+ *
+ * ## Sensor
+ *
+ * White through all slots makes #codedexposure-sim:full-well electrons; a pixel
+ * that is open in one slot of four gets a quarter of them, and as much less
+ * signal to noise. Noise depends on #codedexposure-sim:seed, the frame's number
+ * and the pixel, and on nothing else: the same seed gives the same bytes. With
+ * #codedexposure-sim:gain at 0, white makes white for pixels that are open
+ * longest, whatever code, leak and timing are. With no noise, no blur and no
+ * misalignment, a `sequential` code gives each pixel its input's value exactly.
+ *
+ * ## DMD
+ *
+ * With #codedexposure-sim:dmd the masks are those of a simulated DMD that a
+ * dmdsync with the same device drives, and its schedule is in force; before
+ * somebody starts the mirrors, coded frames are dark. Else the masks step with
+ * the frames.
+ *
+ * ## Gaps, tags and messages
+ *
+ * A gap, DISCONT, a new segment, new caps, a flush or the end of the stream in
+ * the middle of an exposure drops that coded frame: it is counted, and the
+ * element message `codedexposure/frame-dropped` says `reason` ("gap",
+ * "segment", "caps", "flush" or "eos"), `pts`, `inputs` (frames it had),
+ * `needed` and `frames-dropped`. The next coded frame is DISCONT.
+ *
+ * The schedule goes downstream as the tag `comment=coded-exposure={...}`. A
+ * coded frame is complete with its last input frame, and is stamped with the
+ * first one: the difference is added to the latency.
+ *
+ * ## Example pipelines
+ *
+ * |[
+ * gst-launch-1.0 videotestsrc num-buffers=400 pattern=ball !
+ * video/x-raw,format=GRAY8,width=768,height=576,framerate=100/1 !
+ * codedexposure-sim full-well=10000 read-noise=5 psf-sigma=0.5 !
+ * codedexposure-demux ! queue ! videoconvert ! autovideosink
+ * ]| Coded at 25 frames/s, decoded to 100, with the noise of a real camera.
+ * |[
+ * gst-launch-1.0 videotestsrc num-buffers=400 pattern=ball !
+ * video/x-raw,format=GRAY8,width=768,height=576,framerate=200/1 !
+ * codedexposure-sim schedule=staircase:2x2,active=9.8ms,switching=0.2ms !
+ * video/x-raw,framerate=25/1 ! avenc_ffv1 ! matroskamux !
+ * filesink location=coded.mkv
+ * ]| Two input frames a slot, mirrors that take time to switch, recorded.
+ * |[
+ * gst-launch-1.0 videotestsrc num-buffers=400 pattern=ball !
+ * video/x-raw,format=GRAY8,width=768,height=576,framerate=100/1 !
+ * codedexposure-sim dmd=sim:bench ! dmdsync device=sim:bench !
+ * codedexposure-demux ! queue ! videoconvert ! autovideosink
+ * ]| The masks come from a simulated DMD, as on a bench.
+ *
+ * Since: 0.1
+ */
+#include "sim.h"
+
+#include "common/caps.h"
+#include "state.h"
+
+GST_DEBUG_CATEGORY (codedexposure_sim_debug);
+#define GST_CAT_DEFAULT codedexposure_sim_debug
+
+using namespace codedexposure;
+using namespace codedexposure::gst;
+using sim::SimState;
+
+struct _GstCodedExposureSim {
+  GstVideoFilter parent;
+  SimState *state;
+};
+
+G_DEFINE_TYPE_WITH_CODE (GstCodedExposureSim, gst_coded_exposure_sim,
+    GST_TYPE_VIDEO_FILTER,
+    GST_DEBUG_CATEGORY_INIT (codedexposure_sim_debug, "codedexposure-sim", 0,
+        "optical bench in software"))
+GST_ELEMENT_REGISTER_DEFINE (codedexposure_sim, "codedexposure-sim",
+    GST_RANK_NONE, GST_TYPE_CODED_EXPOSURE_SIM)
+
+namespace
+{
+
+GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE ("sink",
+    GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
+GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC,
+    GST_PAD_ALWAYS, GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
+
+gboolean
+start (GstBaseTransform *trans)
+{
+  auto *self = GST_CODED_EXPOSURE_SIM (trans);
+  std::string text;
+  {
+    const ObjectLock lock (self);
+    text = self->state->settings.schedule;
+  }
+  /* A file may have changed since the property was set. */
+  sim::set_schedule (self, std::move (text));
+  return sim::begin_stream (self);
+}
+
+gboolean
+stop (GstBaseTransform *trans)
+{
+  SimState &st = *GST_CODED_EXPOSURE_SIM (trans)->state;
+  st.stream = sim::Stream ();
+  const ObjectLock lock (trans);
+  st.schedule.reset ();
+  st.latency = 0;
+  return TRUE;
+}
+
+gboolean
+take_caps (GstCodedExposureSim *self, GstEvent *event)
+{
+  auto *parent = GST_BASE_TRANSFORM_CLASS (gst_coded_exposure_sim_parent_class);
+  const EventPtr kept (gst_event_ref (event));
+  if (parent->sink_event (GST_BASE_TRANSFORM (self), event))
+    return TRUE;
+  GstCaps *caps = nullptr;
+  gst_event_parse_caps (kept.get (), &caps);
+  sim::explain_refusal (self, caps);
+  return FALSE;
+}
+
+/* A dmdsync lets the start of a stream pass when the DMD has its masks. */
+gboolean
+take_stream_start (GstCodedExposureSim *self, GstEvent *event)
+{
+  auto *parent = GST_BASE_TRANSFORM_CLASS (gst_coded_exposure_sim_parent_class);
+  sim::restart (self, sim::Drop::kSegment);
+  self->state->stream.tag_due = true;
+  return parent->sink_event (GST_BASE_TRANSFORM (self), event) &&
+         sim::follow_schedule (self);
+}
+
+/* The tag follows the segment at once, since it is what the caps of a
+ * demultiplexer wait for. */
+gboolean
+take_segment (GstCodedExposureSim *self, GstEvent *event)
+{
+  auto *parent = GST_BASE_TRANSFORM_CLASS (gst_coded_exposure_sim_parent_class);
+  sim::restart (self, sim::Drop::kSegment);
+  if (!parent->sink_event (GST_BASE_TRANSFORM (self), event))
+    return FALSE;
+  sim::push_tag (self);
+  return TRUE;
+}
+
+gboolean
+sink_event (GstBaseTransform *trans, GstEvent *event)
+{
+  auto *self = GST_CODED_EXPOSURE_SIM (trans);
+  switch (GST_EVENT_TYPE (event)) {
+  case GST_EVENT_CAPS:
+    return take_caps (self, event);
+  case GST_EVENT_SEGMENT:
+    return take_segment (self, event);
+  case GST_EVENT_STREAM_START:
+    return take_stream_start (self, event);
+  case GST_EVENT_EOS:
+    sim::drop_exposure (self, sim::Drop::kEos);
+    break;
+  case GST_EVENT_FLUSH_STOP:
+    sim::restart (self, sim::Drop::kFlush);
+    break;
+  default:
+    break;
+  }
+  return GST_BASE_TRANSFORM_CLASS (gst_coded_exposure_sim_parent_class)
+      ->sink_event (trans, event);
+}
+
+/* A coded frame leaves with its last input frame, and is stamped with the
+ * first. */
+gboolean
+query (GstBaseTransform *trans, GstPadDirection direction, GstQuery *query)
+{
+  auto *self = GST_CODED_EXPOSURE_SIM (trans);
+  auto *parent = GST_BASE_TRANSFORM_CLASS (gst_coded_exposure_sim_parent_class);
+  if (!parent->query (trans, direction, query))
+    return FALSE;
+  if (direction != GST_PAD_SRC || GST_QUERY_TYPE (query) != GST_QUERY_LATENCY)
+    return TRUE;
+
+  GstClockTime own, min, max;
+  gboolean live;
+  {
+    const ObjectLock lock (self);
+    own = self->state->latency;
+  }
+  gst_query_parse_latency (query, &live, &min, &max);
+  gst_query_set_latency (
+      query, live, min + own, GST_CLOCK_TIME_IS_VALID (max) ? max + own : max);
+  return TRUE;
+}
+
+void
+finalize (GObject *object)
+{
+  delete GST_CODED_EXPOSURE_SIM (object)->state;
+  G_OBJECT_CLASS (gst_coded_exposure_sim_parent_class)->finalize (object);
+}
+
+} // namespace
+
+static void
+gst_coded_exposure_sim_class_init (GstCodedExposureSimClass *klass)
+{
+  auto *object = G_OBJECT_CLASS (klass);
+  object->finalize = GST_DEBUG_FUNCPTR (finalize);
+  sim::install_properties (object);
+
+  auto *transform = GST_BASE_TRANSFORM_CLASS (klass);
+  /* A video filter works in place where it can; a coded frame needs a buffer
+   * of its own while input frames come. */
+  transform->transform_ip = nullptr;
+  transform->start = GST_DEBUG_FUNCPTR (start);
+  transform->stop = GST_DEBUG_FUNCPTR (stop);
+  transform->transform_caps = GST_DEBUG_FUNCPTR (sim::transform_caps);
+  transform->fixate_caps = GST_DEBUG_FUNCPTR (sim::fixate_caps);
+  transform->sink_event = GST_DEBUG_FUNCPTR (sink_event);
+  transform->query = GST_DEBUG_FUNCPTR (query);
+  transform->submit_input_buffer = GST_DEBUG_FUNCPTR (sim::submit_input_buffer);
+  transform->generate_output = GST_DEBUG_FUNCPTR (sim::generate_output);
+  GST_VIDEO_FILTER_CLASS (klass)->set_info = GST_DEBUG_FUNCPTR (sim::set_info);
+
+  auto *element = GST_ELEMENT_CLASS (klass);
+  for (auto *pad_template : {&sink_template, &src_template})
+    gst_element_class_add_static_pad_template (element, pad_template);
+  gst_element_class_set_static_metadata (element, "Coded exposure simulator",
+      "Filter/Effect/Video",
+      "An optical bench in software: turns video into the coded frames of a "
+      "slow camera behind a micromirror device",
+      "The gst-codedexposure authors");
+}
+
+static void
+gst_coded_exposure_sim_init (GstCodedExposureSim *self)
+{
+  self->state = new SimState;
+  sim::set_schedule (self, sim::kDefaultSchedule);
+  auto *trans = GST_BASE_TRANSFORM (self);
+  gst_base_transform_set_prefer_passthrough (trans, FALSE);
+  /* An instrument drops nothing because it is late. */
+  gst_base_transform_set_qos_enabled (trans, FALSE);
+}
+
+namespace codedexposure::gst::sim
+{
+
+SimState &
+state (GstCodedExposureSim *self)
+{
+  return *self->state;
+}
+
+} // namespace codedexposure::gst::sim

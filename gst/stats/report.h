@@ -1,0 +1,41 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* What subframestats measured, as meta, message or line of a file;
+ * docs/formats.md describes the fields. */
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <gst/gst.h>
+
+#include "common/raii.h"
+#include "stats/picture_stats.h"
+
+namespace codedexposure::gst
+{
+
+/** Name of the custom meta, "CodedExposureStats"; tagged {"video"}. */
+extern const char *const kStatsMetaName;
+/** Registers the meta; call once from plugin_init. */
+void register_stats_meta ();
+
+/** The measurements of one picture. */
+struct StatsReport {
+  guint64 frame = 0;  ///< number of the coded frame
+  gint subframe = -1; ///< -1 on a coded frame, and where that is not known
+  GstClockTime pts = GST_CLOCK_TIME_NONE;
+  GstClockTime running_time = GST_CLOCK_TIME_NONE;
+  std::vector<const char *> flags; ///< flag_names () of the buffer
+  const PictureStats &stats;
+};
+
+/** Writes @p report to the meta of @p buffer, which must be writable, and
+ * returns the meta's structure; Transfer: none. */
+GstStructure *set_stats_meta (GstBuffer *buffer, const StatsReport &report);
+
+/** Lines of a file, without their ends. */
+std::string json_line (const StatsReport &report);
+std::string csv_line (const StatsReport &report);
+extern const char *const kCsvHead;
+
+} // namespace codedexposure::gst

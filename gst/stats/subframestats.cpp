@@ -1,0 +1,524 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-subframestats
+ * @title: subframestats
+ * @short_description: Intensity, entropy and line profile of every picture
+ *
+ * Passes pictures on and measures each: mean, minimum and maximum of the pixel
+ * values, entropy and histogram, the number of saturated pixels, and the values
+ * along a line. It works behind every pad of codedexposure-demux, `src`,
+ * `subframe_%u` or `coded`, and tells which subframe of which frame it
+ * measured.
+ *
+ * Each picture gets the custom meta `CodedExposureStats`; with
+ * #subframestats:post-messages the bus gets the same fields as the element
+ * message `subframestats/stats`; with #subframestats:location they go to a file
+ * as lines of JSON or CSV. docs/formats.md describes the fields.
+ *
+ * Entropy is the Shannon entropy of the pixel values, in bits a pixel, whatever
+ * #subframestats:histogram-bins is. Noise and exposure raise it as texture
+ * does.
+ *
+ * The numbers describe the picture as it was here: the meta stays on a picture
+ * that is scaled or converted later.
+ *
+ * ## Example pipelines
+ * |[
+ * gst-launch-1.0 filesrc location=coded.mkv ! matroskademux ! avdec_ffv1 !
+ * codedexposure-demux name=demux ! queue !
+ * subframestats location=subframes.csv format=csv line=row:50% ! fakesink
+ * demux.coded ! queue ! subframestats location=coded.csv format=csv ! fakesink
+ * ]|
+ * |[
+ * gst-launch-1.0 -m videotestsrc num-buffers=8 !
+ * video/x-raw,format=GRAY8,framerate=100/1 ! codedexposure-sim !
+ * codedexposure-demux ! subframestats post-messages=true histogram-bins=8 !
+ * fakesink
+ * ]|
+ *
+ * Since: 0.1
+ */
+#include "subframestats.h"
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+
+#include "common/caps.h"
+#include "common/lines.h"
+#include "common/meta.h"
+#include "common/properties.h"
+#include "common/raii.h"
+#include "report.h"
+
+using namespace codedexposure::gst;
+
+GST_DEBUG_CATEGORY_STATIC (subframestats_debug);
+#define GST_CAT_DEFAULT subframestats_debug
+
+namespace
+{
+
+enum class Format { json, csv };
+
+using Meter = std::variant<std::monostate, codedexposure::StatsMeter<guint8>,
+    codedexposure::StatsMeter<guint16>>;
+
+struct Settings {
+  std::string location;
+  Format format = Format::json;
+  std::string line;
+  int bits = 0;
+  int bins = 256;
+  bool post_messages = true;
+};
+
+struct StatsState {
+  explicit StatsState (gpointer element) : file (element) {}
+
+  /* Object lock. */
+  Settings settings;
+  guint64 frames_in = 0;
+  guint64 saturated_frames = 0;
+
+  /* Streaming thread, and start and stop, which exclude it. */
+  Settings in_force;
+  codedexposure::StatsOptions options;
+  GstVideoInfo info;
+  Meter meter;
+  LineFile file;
+};
+
+enum {
+  PROP_0,
+  PROP_LOCATION,
+  PROP_FORMAT,
+  PROP_LINE,
+  PROP_BITS,
+  PROP_HISTOGRAM_BINS,
+  PROP_POST_MESSAGES,
+  PROP_FRAMES_IN,
+  PROP_SATURATED_FRAMES,
+};
+
+} // namespace
+
+struct _GstSubframeStats {
+  GstBaseTransform parent;
+  StatsState *state;
+};
+
+#define gst_subframe_stats_parent_class parent_class
+G_DEFINE_TYPE_WITH_CODE (GstSubframeStats, gst_subframe_stats,
+    GST_TYPE_BASE_TRANSFORM,
+    GST_DEBUG_CATEGORY_INIT (
+        subframestats_debug, "subframestats", 0, "statistics of subframes"))
+GST_ELEMENT_REGISTER_DEFINE (
+    subframestats, "subframestats", GST_RANK_NONE, GST_TYPE_SUBFRAME_STATS)
+
+G_DEFINE_ENUM_TYPE (GstSubframeStatsFormat, gst_subframe_stats_format,
+    {int (Format::json), "Lines of JSON", "json"},
+    {int (Format::csv), "Comma-separated values, with a head", "csv"})
+
+static gboolean
+gst_subframe_stats_start (GstBaseTransform *base) noexcept
+{
+  auto *self = GST_SUBFRAME_STATS (base);
+  StatsState &state = *self->state;
+  {
+    const ObjectLock lock (self);
+    state.in_force = state.settings;
+    state.frames_in = state.saturated_frames = 0;
+  }
+  const Settings &settings = state.in_force;
+  state.options = {settings.bits, settings.bins, {}};
+  if (!settings.line.empty ()) {
+    const auto line = codedexposure::ProfileLine::parse (settings.line);
+    if (!line) {
+      GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
+          ("The line property cannot be read: %s",
+              line.error ().message.c_str ()),
+          (nullptr));
+      return FALSE;
+    }
+    state.options.line = *line;
+  }
+  if (settings.location.empty ())
+    return TRUE;
+  return state.file.open (settings.location) &&
+         (settings.format != Format::csv || state.file.write (kCsvHead));
+}
+
+static gboolean
+gst_subframe_stats_stop (GstBaseTransform *base)
+{
+  StatsState &state = *GST_SUBFRAME_STATS (base)->state;
+  state.file.close ();
+  state.meter = {};
+  return TRUE;
+}
+
+template <typename Pixel>
+static bool
+make_meter_of (GstSubframeStats *self)
+{
+  StatsState &state = *self->state;
+  auto made = codedexposure::StatsMeter<Pixel>::make (
+      {state.info.width, state.info.height}, state.options);
+  if (!made) {
+    GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
+        ("These pictures cannot be measured: %s",
+            made.error ().message.c_str ()),
+        (nullptr));
+    return false;
+  }
+  state.meter = *std::move (made);
+  return true;
+}
+
+static bool
+make_meter (GstSubframeStats *self)
+{
+  return GST_VIDEO_INFO_FORMAT (&self->state->info) == GST_VIDEO_FORMAT_GRAY8
+             ? make_meter_of<guint8> (self)
+             : make_meter_of<guint16> (self);
+}
+
+static gboolean
+gst_subframe_stats_set_caps (
+    GstBaseTransform *base, GstCaps *caps, GstCaps *) noexcept
+{
+  auto *self = GST_SUBFRAME_STATS (base);
+  StatsState &state = *self->state;
+  if (!gst_video_info_from_caps (&state.info, caps))
+    return FALSE;
+  state.options.bits = state.in_force.bits;
+  return make_meter (self);
+}
+
+/* Where the user does not set the significant bits, the pictures tell them. */
+static bool
+follow_bits (GstSubframeStats *self, GstBuffer *frame)
+{
+  StatsState &state = *self->state;
+  const auto meta = get_frame_meta (frame);
+  const int bits = meta ? significant_bits_of (meta->bits, state.info) : 0;
+  if (state.in_force.bits > 0 || bits == state.options.bits)
+    return true;
+  state.options.bits = bits;
+  return make_meter (self);
+}
+
+/* The statistics of @frame; null where its pixels cannot be read. */
+static const codedexposure::PictureStats *
+measure (GstSubframeStats *self, GstBuffer *frame)
+{
+  StatsState &state = *self->state;
+  MappedFrame mapped (state.info, frame, GST_MAP_READ);
+  if (!mapped) {
+    GST_ELEMENT_ERROR (self, STREAM, FORMAT,
+        ("A picture of %" G_GSIZE_FORMAT " bytes cannot be read as %dx%d "
+         "pixels, which take %" G_GSIZE_FORMAT ".",
+            gst_buffer_get_size (frame), state.info.width, state.info.height,
+            GST_VIDEO_INFO_SIZE (&state.info)),
+        (nullptr));
+    return nullptr;
+  }
+  if (auto *meter =
+          std::get_if<codedexposure::StatsMeter<guint8>> (&state.meter))
+    return &meter->measure (view_of<guint8> (mapped));
+  return &std::get<codedexposure::StatsMeter<guint16>> (state.meter)
+              .measure (view_of<guint16> (mapped));
+}
+
+/* Counts the picture. Returns its number, for pictures without metadata. */
+static guint64
+count (GstSubframeStats *self, bool saturated)
+{
+  const ObjectLock lock (self);
+  self->state->saturated_frames += saturated;
+  return self->state->frames_in++;
+}
+
+/* @frame: writable. */
+static GstFlowReturn
+describe (GstSubframeStats *self, GstBuffer *frame)
+{
+  StatsState &state = *self->state;
+  const codedexposure::PictureStats *stats = measure (self, frame);
+  if (!stats)
+    return GST_FLOW_ERROR;
+  const guint64 counted = count (self, stats->saturated > 0);
+  const auto meta = get_frame_meta (frame);
+  const GstClockTime pts = GST_BUFFER_PTS (frame);
+  const StatsReport report{meta ? meta->frame : counted,
+      meta ? meta->subframe : -1, pts,
+      gst_segment_to_running_time (
+          &GST_BASE_TRANSFORM (self)->segment, GST_FORMAT_TIME, pts),
+      flag_names (frame), *stats};
+
+  const GstStructure *fields = set_stats_meta (frame, report);
+  if (state.in_force.post_messages) {
+    GstStructure *message = gst_structure_copy (fields);
+    gst_structure_set_name (message, "subframestats/stats");
+    gst_element_post_message (GST_ELEMENT (self),
+        gst_message_new_element (GST_OBJECT (self), message));
+  }
+  const bool csv = state.in_force.format == Format::csv;
+  if (state.file.is_open () &&
+      !state.file.write (csv ? csv_line (report) : json_line (report)))
+    return GST_FLOW_ERROR;
+  return GST_FLOW_OK;
+}
+
+/* The pixels pass untouched, and yet the buffer must be writable, for its
+ * meta. */
+static GstFlowReturn
+gst_subframe_stats_generate_output (
+    GstBaseTransform *base, GstBuffer **outbuf) noexcept
+{
+  auto *self = GST_SUBFRAME_STATS (base);
+  if (!base->queued_buf)
+    return GST_FLOW_OK;
+  BufferPtr frame (
+      gst_buffer_make_writable (std::exchange (base->queued_buf, nullptr)));
+  if (std::holds_alternative<std::monostate> (self->state->meter))
+    return GST_FLOW_NOT_NEGOTIATED;
+  if (!follow_bits (self, frame.get ()))
+    return GST_FLOW_ERROR;
+  const GstFlowReturn flow = describe (self, frame.get ());
+  if (flow == GST_FLOW_OK)
+    *outbuf = frame.release ();
+  return flow;
+}
+
+static void
+gst_subframe_stats_set_property (
+    GObject *object, guint id, const GValue *value, GParamSpec *pspec) noexcept
+{
+  auto *self = GST_SUBFRAME_STATS (object);
+  const auto text = [value] {
+    const gchar *given = g_value_get_string (value);
+    return std::string (given ? given : "");
+  };
+  const ObjectLock lock (self);
+  if (!may_set (self, pspec))
+    return;
+  Settings &settings = self->state->settings;
+  switch (id) {
+  case PROP_LOCATION:
+    settings.location = text ();
+    break;
+  case PROP_FORMAT:
+    settings.format = Format (g_value_get_enum (value));
+    break;
+  case PROP_LINE:
+    settings.line = text ();
+    break;
+  case PROP_BITS:
+    settings.bits = g_value_get_int (value);
+    break;
+  case PROP_HISTOGRAM_BINS:
+    settings.bins = g_value_get_int (value);
+    break;
+  case PROP_POST_MESSAGES:
+    settings.post_messages = g_value_get_boolean (value);
+    break;
+  default:
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+  }
+}
+
+static void
+gst_subframe_stats_get_property (
+    GObject *object, guint id, GValue *value, GParamSpec *pspec) noexcept
+{
+  auto *self = GST_SUBFRAME_STATS (object);
+  const ObjectLock lock (self);
+  const StatsState &state = *self->state;
+  const Settings &settings = state.settings;
+  const auto set_text = [value] (const std::string &text) {
+    g_value_set_string (value, text.empty () ? nullptr : text.c_str ());
+  };
+  switch (id) {
+  case PROP_LOCATION:
+    set_text (settings.location);
+    break;
+  case PROP_FORMAT:
+    g_value_set_enum (value, int (settings.format));
+    break;
+  case PROP_LINE:
+    set_text (settings.line);
+    break;
+  case PROP_BITS:
+    g_value_set_int (value, settings.bits);
+    break;
+  case PROP_HISTOGRAM_BINS:
+    g_value_set_int (value, settings.bins);
+    break;
+  case PROP_POST_MESSAGES:
+    g_value_set_boolean (value, settings.post_messages);
+    break;
+  case PROP_FRAMES_IN:
+    g_value_set_uint64 (value, state.frames_in);
+    break;
+  case PROP_SATURATED_FRAMES:
+    g_value_set_uint64 (value, state.saturated_frames);
+    break;
+  default:
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+  }
+}
+
+static void
+install_properties (GObjectClass *klass)
+{
+  constexpr auto kReady = GParamFlags (
+      G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY);
+  constexpr auto kRead =
+      GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS);
+  const Settings defaults;
+  /**
+   * GstSubframeStats:location:
+   *
+   * File to write, a line a picture; overwritten when it exists. None: no file.
+   *
+   * Since: 0.1
+   */
+  g_object_class_install_property (klass, PROP_LOCATION,
+      g_param_spec_string ("location", "File Location",
+          "File to write, a line a picture; overwritten when it exists",
+          nullptr, kReady));
+  /**
+   * GstSubframeStats:format:
+   *
+   * What the lines of the file are.
+   *
+   * Since: 0.1
+   */
+  g_object_class_install_property (klass, PROP_FORMAT,
+      g_param_spec_enum ("format", "File Format",
+          "What the lines of the file are", GST_TYPE_SUBFRAME_STATS_FORMAT,
+          int (defaults.format), kReady));
+  /**
+   * GstSubframeStats:line:
+   *
+   * Line whose values are the profile: row:Y, column:X or X0/Y0/X1/Y1, in
+   * pixels of the picture or in percent of it, which suit coded frames and
+   * subframes alike. None: no profile.
+   *
+   * Since: 0.1
+   */
+  g_object_class_install_property (klass, PROP_LINE,
+      g_param_spec_string ("line", "Profile Line",
+          "Line whose values are the profile: row:Y, column:X or X0/Y0/X1/Y1, "
+          "in pixels or as row:50%; none: no profile",
+          nullptr, kReady));
+  /**
+   * GstSubframeStats:bits:
+   *
+   * Significant bits of a pixel, whose largest value is saturation.
+   *
+   * Since: 0.1
+   */
+  g_object_class_install_property (klass, PROP_BITS,
+      g_param_spec_int ("bits", "Significant Bits",
+          "Significant bits of a pixel; their largest value is saturation. 0: "
+          "as the frame metadata say, or all bits of the format",
+          0, 16, defaults.bits, kReady));
+  /**
+   * GstSubframeStats:histogram-bins:
+   *
+   * Bins of the histogram, of equal width over all levels.
+   *
+   * Since: 0.1
+   */
+  g_object_class_install_property (klass, PROP_HISTOGRAM_BINS,
+      g_param_spec_int ("histogram-bins", "Bins of the Histogram",
+          "Bins of the histogram, of equal width over all grey levels; 0: no "
+          "histogram",
+          0, 65536, defaults.bins, kReady));
+  /**
+   * GstSubframeStats:post-messages:
+   *
+   * Posts subframestats/stats for every picture.
+   *
+   * Since: 0.1
+   */
+  g_object_class_install_property (klass, PROP_POST_MESSAGES,
+      g_param_spec_boolean ("post-messages", "Post Messages",
+          "Post the element message subframestats/stats for every picture",
+          defaults.post_messages, kReady));
+  /**
+   * GstSubframeStats:frames-in:
+   *
+   * Pictures that were measured in this run.
+   *
+   * Since: 0.1
+   */
+  g_object_class_install_property (klass, PROP_FRAMES_IN,
+      g_param_spec_uint64 ("frames-in", "Pictures Measured",
+          "Pictures that were measured in this run", 0, G_MAXUINT64, 0, kRead));
+  /**
+   * GstSubframeStats:saturated-frames:
+   *
+   * Pictures with pixels at the largest value.
+   *
+   * Since: 0.1
+   */
+  g_object_class_install_property (klass, PROP_SATURATED_FRAMES,
+      g_param_spec_uint64 ("saturated-frames", "Saturated Pictures",
+          "Pictures with pixels at the largest value, in this run", 0,
+          G_MAXUINT64, 0, kRead));
+}
+
+static void
+gst_subframe_stats_init (GstSubframeStats *self)
+{
+  self->state = new StatsState (self);
+  auto *base = GST_BASE_TRANSFORM (self);
+  gst_base_transform_set_passthrough (base, TRUE);
+  gst_base_transform_set_qos_enabled (base, FALSE);
+}
+
+static void
+gst_subframe_stats_finalize (GObject *object)
+{
+  delete GST_SUBFRAME_STATS (object)->state;
+  G_OBJECT_CLASS (parent_class)->finalize (object);
+}
+
+static void
+gst_subframe_stats_class_init (GstSubframeStatsClass *klass)
+{
+  auto *object_class = G_OBJECT_CLASS (klass);
+  auto *element_class = GST_ELEMENT_CLASS (klass);
+  auto *transform_class = GST_BASE_TRANSFORM_CLASS (klass);
+
+  object_class->set_property = gst_subframe_stats_set_property;
+  object_class->get_property = gst_subframe_stats_get_property;
+  object_class->finalize = gst_subframe_stats_finalize;
+  install_properties (object_class);
+  gst_type_mark_as_plugin_api (
+      GST_TYPE_SUBFRAME_STATS_FORMAT, GstPluginAPIFlags (0));
+
+  gst_element_class_set_static_metadata (element_class, "Subframe statistics",
+      "Filter/Analyzer/Video",
+      "Measures intensity, entropy, histogram and a line profile of every "
+      "picture",
+      "The gst-codedexposure authors");
+  static GstStaticPadTemplate sink =
+      GST_STATIC_PAD_TEMPLATE ("sink", GST_PAD_SINK, GST_PAD_ALWAYS,
+          GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
+  static GstStaticPadTemplate src = GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC,
+      GST_PAD_ALWAYS, GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
+  gst_element_class_add_static_pad_template (element_class, &sink);
+  gst_element_class_add_static_pad_template (element_class, &src);
+
+  transform_class->start = GST_DEBUG_FUNCPTR (gst_subframe_stats_start);
+  transform_class->stop = GST_DEBUG_FUNCPTR (gst_subframe_stats_stop);
+  transform_class->set_caps = GST_DEBUG_FUNCPTR (gst_subframe_stats_set_caps);
+  transform_class->generate_output =
+      GST_DEBUG_FUNCPTR (gst_subframe_stats_generate_output);
+}

@@ -1,0 +1,202 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-codedexposure-view
+ * @title: codedexposure-view
+ *
+ * Converts pictures of any bit depth to 8 bits for display. A 12-bit camera
+ * uses a sixteenth of the range of GRAY16_LE, so other converters show its
+ * pictures almost black; here the largest value of the significant bits becomes
+ * white.
+ *
+ * The #codedexposure-view:bits property sets the number of significant bits. If
+ * it is 0, the frame metadata of dmdsync and codedexposure-sim tell the number,
+ * and without them the format. GRAY8 pictures with 8 significant bits pass
+ * unchanged.
+ *
+ * ## Example pipeline
+ * |[
+ * gst-launch-1.0 videotestsrc ! video/x-raw,format=GRAY16_LE,framerate=100/1 !
+ * codedexposure-sim bits=12 ! codedexposure-demux ! codedexposure-view !
+ * videoconvert ! autovideosink
+ * ]| Shows the pictures of a 12-bit camera.
+ *
+ * Since: 0.1
+ */
+#include "view.h"
+
+#include <algorithm>
+
+#include "common/caps.h"
+#include "common/meta.h"
+#include "common/raii.h"
+
+using namespace codedexposure;
+using namespace codedexposure::gst;
+
+GST_DEBUG_CATEGORY_STATIC (codedexposure_view_debug);
+#define GST_CAT_DEFAULT codedexposure_view_debug
+
+struct _GstCodedExposureView {
+  GstVideoFilter parent;
+  gint bits; // object lock
+};
+
+#define gst_coded_exposure_view_parent_class parent_class
+G_DEFINE_TYPE_WITH_CODE (GstCodedExposureView, gst_coded_exposure_view,
+    GST_TYPE_VIDEO_FILTER,
+    GST_DEBUG_CATEGORY_INIT (codedexposure_view_debug, "codedexposure-view", 0,
+        "pictures of any depth to look at"))
+GST_ELEMENT_REGISTER_DEFINE (codedexposure_view, "codedexposure-view",
+    GST_RANK_NONE, GST_TYPE_CODED_EXPOSURE_VIEW)
+
+namespace
+{
+
+enum { PROP_0, PROP_BITS };
+
+constexpr int kShown = 8;
+
+/** Significant bits of @p picture, up to the @p depth of its format. */
+int
+significant_bits (GstCodedExposureView *self, GstBuffer *picture, int depth)
+{
+  int bits;
+  {
+    const ObjectLock lock (self);
+    bits = self->bits;
+  }
+  if (bits == 0)
+    if (const auto meta = get_frame_meta (picture))
+      bits = meta->bits;
+  return bits <= 0 ? depth : std::min (bits, depth);
+}
+
+/** 0 to black, 2^@p bits - 1 and more to 255. */
+template <typename Pixel>
+void
+show (ImageView<const Pixel> from, int bits, ImageView<guint8> to)
+{
+  constexpr int kFraction = 24;
+  const guint64 white = (guint64 (1) << bits) - 1;
+  const guint64 scale = ((guint64 (255) << kFraction) + white / 2) / white;
+  constexpr guint64 kHalf = guint64 (1) << (kFraction - 1);
+  for (int y = 0; y < to.height; y++)
+    for (int x = 0; x < to.width; x++)
+      to.at (x, y) = guint8 (std::min<guint64> (
+          255, (from.at (x, y) * scale + kHalf) >> kFraction));
+}
+
+GstCaps *
+transform_caps (GstBaseTransform *, GstPadDirection direction, GstCaps *caps,
+    GstCaps *filter)
+{
+  const bool to_shown = direction == GST_PAD_SINK;
+  GValue formats = G_VALUE_INIT;
+  g_value_init (&formats, to_shown ? G_TYPE_STRING : GST_TYPE_LIST);
+  gst_value_deserialize (&formats, to_shown ? "GRAY8" : "{ GRAY8, GRAY16_LE }");
+  CapsPtr other (gst_caps_copy (caps));
+  gst_caps_set_value (other.get (), "format", &formats);
+  g_value_unset (&formats);
+  return filter ? gst_caps_intersect_full (
+                      filter, other.get (), GST_CAPS_INTERSECT_FIRST)
+                : other.release ();
+}
+
+void
+before_transform (GstBaseTransform *base, GstBuffer *picture)
+{
+  auto *self = GST_CODED_EXPOSURE_VIEW (base);
+  const GstVideoInfo &in = GST_VIDEO_FILTER (base)->in_info;
+  const bool as_it_is = GST_VIDEO_INFO_FORMAT (&in) == GST_VIDEO_FORMAT_GRAY8 &&
+                        significant_bits (self, picture, kShown) == kShown;
+  gst_base_transform_set_passthrough (base, as_it_is);
+}
+
+GstFlowReturn
+transform_frame (
+    GstVideoFilter *filter, GstVideoFrame *picture, GstVideoFrame *shown)
+{
+  auto *self = GST_CODED_EXPOSURE_VIEW (filter);
+  const int depth = GST_VIDEO_FRAME_COMP_DEPTH (picture, 0);
+  const int bits = significant_bits (self, picture->buffer, depth);
+  const auto to = view_of<guint8> (shown);
+  if (depth == kShown)
+    show (view_of<const guint8> (picture), bits, to);
+  else
+    show (view_of<const guint16> (picture), bits, to);
+  if (auto meta = get_frame_meta (shown->buffer)) {
+    meta->bits = 0;
+    set_frame_meta (shown->buffer, *meta);
+  }
+  return GST_FLOW_OK;
+}
+
+void
+set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+{
+  const ObjectLock lock (object);
+  if (id == PROP_BITS)
+    GST_CODED_EXPOSURE_VIEW (object)->bits = g_value_get_int (value);
+  else
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+}
+
+void
+get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
+{
+  const ObjectLock lock (object);
+  if (id == PROP_BITS)
+    g_value_set_int (value, GST_CODED_EXPOSURE_VIEW (object)->bits);
+  else
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+}
+
+} // namespace
+
+static void
+gst_coded_exposure_view_init (GstCodedExposureView *)
+{
+}
+
+static void
+gst_coded_exposure_view_class_init (GstCodedExposureViewClass *klass)
+{
+  auto *object_class = G_OBJECT_CLASS (klass);
+  auto *element_class = GST_ELEMENT_CLASS (klass);
+  auto *transform_class = GST_BASE_TRANSFORM_CLASS (klass);
+
+  object_class->set_property = set_property;
+  object_class->get_property = get_property;
+  /**
+   * GstCodedExposureView:bits:
+   *
+   * 2^bits - 1 becomes white.
+   *
+   * Since: 0.1
+   */
+  g_object_class_install_property (object_class, PROP_BITS,
+      g_param_spec_int ("bits", "Significant Bits",
+          "Significant bits of a pixel; their largest value becomes white. 0: "
+          "as "
+          "the frame metadata say, or all bits of the format",
+          0, 16, 0,
+          GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
+                       GST_PARAM_MUTABLE_PLAYING)));
+
+  gst_element_class_set_static_metadata (element_class, "Coded exposure view",
+      "Filter/Converter/Video",
+      "Converts pictures of any bit depth to 8 bits for display",
+      "The gst-codedexposure authors");
+  static GstStaticPadTemplate sink =
+      GST_STATIC_PAD_TEMPLATE ("sink", GST_PAD_SINK, GST_PAD_ALWAYS,
+          GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
+  static GstStaticPadTemplate src = GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC,
+      GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_VIDEO_CAPS_MAKE ("GRAY8")));
+  gst_element_class_add_static_pad_template (element_class, &sink);
+  gst_element_class_add_static_pad_template (element_class, &src);
+
+  transform_class->transform_caps = GST_DEBUG_FUNCPTR (transform_caps);
+  transform_class->before_transform = GST_DEBUG_FUNCPTR (before_transform);
+  GST_VIDEO_FILTER_CLASS (klass)->transform_frame =
+      GST_DEBUG_FUNCPTR (transform_frame);
+}

@@ -1,0 +1,91 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "base/view_check.h"
+
+#include <string>
+
+namespace codedexposure
+{
+
+namespace
+{
+
+/** One past the last byte. */
+std::uintptr_t
+end_of (const ViewBytes &view)
+{
+  return view.begin + std::uintptr_t ((view.height - 1) * view.stride +
+                                      view.width * view.pixel);
+}
+
+bool
+share_pixels (const ViewBytes &a, const ViewBytes &b)
+{
+  if (a.begin > b.begin)
+    return share_pixels (b, a);
+  if (end_of (a) <= b.begin)
+    return false;
+  if (a.stride != b.stride)
+    return true;
+  /* Images side by side in one larger image: b begins in row @rows of a, @left
+   * bytes to the right, and its rows may reach into the row below. */
+  const auto distance = std::ptrdiff_t (b.begin - a.begin);
+  const std::ptrdiff_t rows = distance / a.stride, left = distance % a.stride;
+  return (left < a.width * a.pixel && rows < a.height) ||
+         (left + b.width * b.pixel > a.stride && rows + 1 < a.height);
+}
+
+std::string
+size_text (int width, int height)
+{
+  return std::to_string (width) + "x" + std::to_string (height);
+}
+
+} // namespace
+
+Result<void>
+check_view (const ViewBytes &view, const char *what, int width, int height)
+{
+  const auto error = [what] (const std::string &why) {
+    return Error{std::string ("the ") + what + ' ' + why};
+  };
+  if (view.width != width || view.height != height)
+    return error ("has " + size_text (view.width, view.height) +
+                  " pixels instead of " + size_text (width, height));
+  if (view.begin == 0)
+    return error ("has no memory");
+  if (view.stride < view.width * view.pixel)
+    return error ("has a stride of " + std::to_string (view.stride) +
+                  " bytes; its rows take " +
+                  std::to_string (view.width * view.pixel));
+  if (view.begin % std::uintptr_t (view.pixel) != 0 ||
+      view.stride % view.pixel != 0)
+    return error ("has rows that are not aligned to its pixels");
+  return {};
+}
+
+Result<void>
+check_apart (std::span<const ViewBytes> outputs, const ViewBytes *input)
+{
+  for (std::size_t i = 0; i < outputs.size (); i++) {
+    if (input && share_pixels (outputs[i], *input))
+      return Error{"output " + std::to_string (i) + " overlaps the input"};
+    for (std::size_t j = 0; j < i; j++)
+      if (share_pixels (outputs[i], outputs[j]))
+        return Error{"output " + std::to_string (i) + " overlaps output " +
+                     std::to_string (j)};
+  }
+  return {};
+}
+
+Result<void>
+check_rows (int first, int count, int height)
+{
+  if (first >= 0 && count >= 0 && first <= height - count)
+    return {};
+  return Error{"rows " + std::to_string (first) + " to " +
+               std::to_string (first + std::int64_t (count) - 1) +
+               " are not among the " + std::to_string (height) +
+               " of the image"};
+}
+
+} // namespace codedexposure

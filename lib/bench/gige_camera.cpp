@@ -1,0 +1,490 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "bench/gige_camera.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <iterator>
+#include <mutex>
+#include <optional>
+#include <random>
+#include <sstream>
+#include <thread>
+#include <vector>
+
+#include <arv.h>
+#include <glib/gstdio.h>
+
+#include "base/packed_mono.h"
+#include "base/text.h"
+
+namespace codedexposure
+{
+
+namespace
+{
+
+/* Where a client says whether it wants the trigger. */
+constexpr guint32 kTriggerMode = 0x400;
+/* And what its lines do, one after the other. */
+constexpr guint32 kLineMode = 0x440, kLineSource = 0x444, kLineInverter = 0x448;
+constexpr guint32 kNextLine = 0x20;
+
+struct Unref {
+  void operator() (gpointer object) const { g_object_unref (object); }
+};
+
+struct WireFormat {
+  MonoFormat format;
+  ArvPixelFormat code;
+};
+
+/* Aravis has no names for the streams of bits. */
+constexpr WireFormat kWireFormats[] = {
+    {MonoFormat::mono8, ARV_PIXEL_FORMAT_MONO_8},
+    {MonoFormat::mono10, ARV_PIXEL_FORMAT_MONO_10},
+    {MonoFormat::mono12, ARV_PIXEL_FORMAT_MONO_12},
+    {MonoFormat::mono16, ARV_PIXEL_FORMAT_MONO_16},
+    {MonoFormat::mono10_packed, ARV_PIXEL_FORMAT_MONO_10_PACKED},
+    {MonoFormat::mono12_packed, ARV_PIXEL_FORMAT_MONO_12_PACKED},
+    {MonoFormat::mono10p, 0x010a0046u},
+    {MonoFormat::mono12p, 0x010c0047u},
+};
+
+MonoFormat
+format_of (guint32 code)
+{
+  for (const WireFormat &wire : kWireFormats)
+    if (wire.code == code)
+      return wire.format;
+  return MonoFormat::mono8;
+}
+
+/* Puts @p entries in the place of those of an enumeration. False when there is
+ * none of that name. */
+bool
+set_entries (std::string &xml, const std::string &enumeration,
+    const std::vector<std::pair<std::string, guint32>> &entries)
+{
+  const auto node = xml.find ("<Enumeration Name=\"" + enumeration + "\"");
+  const auto first = xml.find ("<EnumEntry", node);
+  const auto end = xml.find ("<pValue>", node);
+  if (node == xml.npos || first == xml.npos || end == xml.npos || first > end)
+    return false;
+  std::string text;
+  for (const auto &[name, value] : entries)
+    text += "<EnumEntry Name=\"" + name + "\" NameSpace=\"Standard\"><Value>" +
+            std::to_string (value) + "</Value></EnumEntry>\n";
+  xml.replace (first, end - first, text);
+  return true;
+}
+
+constexpr const char *kSelector = "LineSelector";
+
+/* A choice of one of @p values, whose place is the number at @p node. */
+std::string
+choice (const std::string &name, const std::vector<std::string> &values,
+    const std::string &node)
+{
+  std::string text = "<Enumeration Name=\"" + name + "\">\n";
+  for (std::size_t k = 0; k < values.size (); k++)
+    text += "<EnumEntry Name=\"" + values[k] + "\"><Value>" +
+            std::to_string (k) + "</Value></EnumEntry>\n";
+  return text + "<pValue>" + name + "Value</pValue></Enumeration>\n" + node;
+}
+
+/* Which line is meant, the client keeps to itself. */
+std::string
+line_selector ()
+{
+  const std::string name = kSelector;
+  return choice (name, {"Line0", "Line1"},
+      "<Integer Name=\"" + name + "Value\"><Value>0</Value></Integer>\n");
+}
+
+/* A choice for each line, in registers from @p address on. */
+std::string
+line_choice (const std::string &name, const std::vector<std::string> &values,
+    guint32 address)
+{
+  return choice (name, values,
+      "<IntReg Name=\"" + name + "Value\"><Address>" +
+          std::to_string (address) + "</Address><pIndex Offset=\"" +
+          std::to_string (kNextLine) + "\">" + kSelector +
+          "Value</pIndex><Length>4</Length><AccessMode>RW</AccessMode>"
+          "<pPort>Device</pPort><Sign>Unsigned</Sign>"
+          "<Endianess>BigEndian</Endianess></IntReg>\n");
+}
+
+/* What the camera says of itself: Aravis' own description, with the formats and
+ * lines of this one. */
+Result<std::string>
+describe ()
+{
+  const std::unique_ptr<ArvFakeCamera, Unref> model (
+      arv_fake_camera_new ("model"));
+  size_t size = 0;
+  const char *text = arv_fake_camera_get_genicam_xml (model.get (), &size);
+  std::string xml (text ? text : "", text ? size : 0);
+
+  std::vector<std::pair<std::string, guint32>> formats;
+  for (const WireFormat &wire : kWireFormats)
+    formats.emplace_back (mono_format_text (wire.format), wire.code);
+  if (!set_entries (xml, "PixelFormat", formats) ||
+      !set_entries (xml, "TriggerSource", {{"Line0", 0}, {"Line1", 1}}) ||
+      !set_entries (
+          xml, "TriggerActivation", {{"RisingEdge", 0}, {"FallingEdge", 1}}))
+    return Error{"the description of Aravis' fake camera is another than that "
+                 "of version 0.8.26; the simulated camera needs that one"};
+  /* Aravis' camera waits for a software trigger only: it shall know of none. */
+  const std::string theirs = "<Address>0x300</Address>";
+  const auto mode = xml.find (theirs);
+  const auto end = xml.rfind ("<Port Name");
+  if (mode == xml.npos || end == xml.npos || mode > end)
+    return Error{"the description of Aravis' fake camera lacks its trigger"};
+  xml.insert (end,
+      line_selector () +
+          line_choice ("LineMode", {"Input", "Output"}, kLineMode) +
+          line_choice ("LineSource", {"Off", "ExposureActive"}, kLineSource) +
+          line_choice ("LineInverter", {"false", "true"}, kLineInverter));
+  xml.replace (mode, theirs.size (), "<Address>0x400</Address>");
+  return xml;
+}
+
+Nanoseconds
+monotonic_now ()
+{
+  return g_get_monotonic_time () * 1000;
+}
+
+} // namespace
+
+std::string
+camera_settings_text (const CameraSettings &settings)
+{
+  std::ostringstream text;
+  text << settings.width << "x" << settings.height << " "
+       << mono_format_text (settings.format) << ", " << settings.frame_rate
+       << " a second, exposure ";
+  if (settings.exposure_us * settings.frame_rate < 1e6)
+    text << settings.exposure_us << " us, ";
+  else
+    text << "all of the frame, ";
+  if (settings.triggered)
+    text << "trigger Line" << settings.trigger_line
+         << (settings.trigger_falling ? " falling" : " rising");
+  else
+    text << "no trigger";
+  for (std::size_t k = 0; k < std::size (settings.lines); k++) {
+    const CameraSettings::Line &line = settings.lines[k];
+    if (line.output)
+      text << ", Line" << k << " puts out "
+           << (line.exposure_active ? "ExposureActive" : "nothing")
+           << (line.inverted ? ", inverted" : "");
+  }
+  return text.str ();
+}
+
+struct GigeCamera::State {
+  GigeCameraOptions options;
+  Expose expose;
+
+  mutable std::mutex lock; // covers the next two
+  FaultPlan faults;
+  std::uint64_t next = 0;
+
+  /* The camera's thread. */
+  std::mt19937_64 random;
+  double device_time = 1e9; // of the next frame, ns by the camera's clock
+  std::optional<CameraSettings> told; // of the frames before
+  bool stopped = false;
+  Image<std::uint16_t> picture;
+  std::vector<std::uint8_t> packed;
+  struct Kept {
+    std::vector<std::uint8_t> bytes;
+    guint64 stamp = 0;
+    Fault::Kind fault = Fault::Kind::none;
+    int frames_ago = 0;
+  };
+  Kept kept; // of a frame that comes again, or late
+
+  ArvFakeCamera *camera = nullptr; // of the server
+  /* Last: its thread uses all of the above. */
+  std::unique_ptr<ArvGvFakeCamera, Unref> server;
+
+  guint32 get_register (guint32 address) const
+  {
+    guint32 value = 0;
+    arv_fake_camera_read_register (camera, address, &value);
+    return value;
+  }
+
+  /* The trigger imposes its rate, whatever the client asked for. */
+  double period ()
+  {
+    constexpr guint32 kPeriod =
+        ARV_FAKE_CAMERA_REGISTER_ACQUISITION_FRAME_PERIOD_US;
+    if (get_register (kTriggerMode) != 1)
+      return 1e3 * get_register (kPeriod);
+    const double triggered = 1e9 / options.trigger_rate;
+    arv_fake_camera_write_register (
+        camera, kPeriod, guint32 (std::lround (triggered / 1e3)));
+    return triggered;
+  }
+
+  CameraSettings settings ();
+  void tell_settings ();
+  void send (ArvBuffer *buffer);
+  void set_loss (double part)
+  {
+    g_object_set (server.get (), "gvsp-lost-ratio", part, nullptr);
+  }
+  void take_light (MonoFormat format);
+  void pack (MonoFormat format, int width, int height);
+  void obey (const Fault &fault, ArvBuffer *buffer, std::size_t size);
+  void hold_up (const Fault &fault);
+};
+
+CameraSettings
+GigeCamera::State::settings ()
+{
+  CameraSettings set;
+  set.format = format_of (get_register (ARV_FAKE_CAMERA_REGISTER_PIXEL_FORMAT));
+  set.width = int (get_register (ARV_FAKE_CAMERA_REGISTER_WIDTH));
+  set.height = int (get_register (ARV_FAKE_CAMERA_REGISTER_HEIGHT));
+  set.frame_rate = 1e9 / period ();
+  set.exposure_us = get_register (ARV_FAKE_CAMERA_REGISTER_EXPOSURE_TIME_US);
+  set.triggered = get_register (kTriggerMode) == 1;
+  set.trigger_line =
+      int (get_register (ARV_FAKE_CAMERA_REGISTER_TRIGGER_SOURCE));
+  set.trigger_falling =
+      get_register (ARV_FAKE_CAMERA_REGISTER_TRIGGER_ACTIVATION) == 1;
+  for (guint32 k = 0; k < std::size (set.lines); k++) {
+    set.lines[k].output = get_register (kLineMode + k * kNextLine) == 1;
+    set.lines[k].exposure_active =
+        get_register (kLineSource + k * kNextLine) == 1;
+    set.lines[k].inverted = get_register (kLineInverter + k * kNextLine) == 1;
+  }
+  return set;
+}
+
+void
+GigeCamera::State::tell_settings ()
+{
+  const CameraSettings now = settings ();
+  if (options.set_up && told != now)
+    options.set_up (now);
+  told = now;
+}
+
+/* Light for a part of the period only, in the bits of the format. */
+void
+GigeCamera::State::take_light (MonoFormat format)
+{
+  const double exposure =
+      1e3 * get_register (ARV_FAKE_CAMERA_REGISTER_EXPOSURE_TIME_US);
+  const double light = std::min (1.0, exposure / period ());
+  const int shift = significant_bits (format) - options.bits;
+  if (light == 1.0 && shift == 0)
+    return;
+  for (int y = 0; y < picture.height (); y++)
+    for (int x = 0; x < picture.width (); x++) {
+      std::uint16_t &pixel = picture.at (x, y);
+      const auto value = std::uint32_t (std::lround (light * pixel));
+      pixel = std::uint16_t (shift >= 0 ? value << shift : value >> -shift);
+    }
+}
+
+/* The picture to packed bytes of what the client asked for: cut, or with black
+ * at the right and the bottom. */
+void
+GigeCamera::State::pack (MonoFormat format, int width, int height)
+{
+  const std::size_t row = row_bytes (format, width);
+  packed.assign (row * std::size_t (height), 0);
+  const int columns = std::min (width, picture.width ());
+  const int rows = std::min (height, picture.height ());
+  const ImageView<std::uint8_t> out{
+      packed.data (), int (row), rows, std::ptrdiff_t (row)};
+  const auto whole = picture.view ();
+  /* Fits by construction. */
+  (void)pack_mono (format, {whole.data, columns, rows, whole.stride}, out);
+}
+
+void
+GigeCamera::State::hold_up (const Fault &fault)
+{
+  Nanoseconds time = fault.delay;
+  if (options.jitter > 0)
+    time +=
+        std::uniform_int_distribution<Nanoseconds> (0, options.jitter) (random);
+  if (time > 0)
+    std::this_thread::sleep_for (std::chrono::nanoseconds (time));
+}
+
+/* What is sent in the end: this frame, another one, or none of it. */
+void
+GigeCamera::State::obey (
+    const Fault &fault, ArvBuffer *buffer, std::size_t size)
+{
+  using Kind = Fault::Kind;
+  stopped |= fault.kind == Kind::stop;
+  kept.frames_ago++;
+  const bool again = (kept.fault == Kind::duplicate && kept.frames_ago == 1) ||
+                     (kept.fault == Kind::late && kept.frames_ago == 2);
+  const guint64 stamp = arv_buffer_get_timestamp (buffer);
+  auto *data = static_cast<std::uint8_t *> (
+      const_cast<void *> (arv_buffer_get_data (buffer, nullptr)));
+
+  if (fault.kind == Kind::duplicate || fault.kind == Kind::late)
+    kept = {packed, stamp, fault.kind, 0};
+  else if (again) {
+    packed.swap (kept.bytes);
+    arv_buffer_set_timestamp (buffer, kept.stamp);
+    kept = {};
+  }
+  std::copy_n (packed.begin (), std::min (size, packed.size ()), data);
+
+  double loss = options.packet_loss;
+  if (stopped || fault.kind == Kind::lose || fault.kind == Kind::late)
+    loss = 1;
+  else if (fault.kind == Kind::incomplete)
+    loss = 0.5;
+  set_loss (loss);
+  hold_up (fault);
+}
+
+void
+GigeCamera::State::send (ArvBuffer *buffer)
+{
+  SentFrame sent;
+  {
+    const std::lock_guard guard (lock);
+    sent.frame = next++;
+    sent.fault = faults.at (sent.frame);
+  }
+  tell_settings ();
+  sent.host_time = monotonic_now ();
+  sent.device_time = std::llround (device_time);
+  device_time += period () * (1 + options.drift * 1e-6);
+
+  const MonoFormat format =
+      format_of (get_register (ARV_FAKE_CAMERA_REGISTER_PIXEL_FORMAT));
+  /* The buffer itself says nothing of its size before it was received. */
+  const std::size_t size = arv_fake_camera_get_payload (camera);
+  arv_buffer_set_timestamp (buffer, guint64 (sent.device_time));
+  if (expose (sent.frame, picture.view ())) {
+    take_light (format);
+    pack (format, int (get_register (ARV_FAKE_CAMERA_REGISTER_WIDTH)),
+        int (get_register (ARV_FAKE_CAMERA_REGISTER_HEIGHT)));
+    obey (sent.fault, buffer, size);
+  } else
+    set_loss (1);
+  if (options.sent)
+    options.sent (sent);
+}
+
+GigeCamera::GigeCamera (std::unique_ptr<State> state)
+    : state_ (std::move (state))
+{
+}
+
+/* The server runs until it is gone, but without what it would call here, and in
+ * silence. */
+GigeCamera::~GigeCamera ()
+{
+  state_->set_loss (1);
+  arv_fake_camera_set_fill_pattern (state_->camera, nullptr, nullptr);
+}
+
+namespace
+{
+
+struct TemporaryFile {
+  std::string path;
+  ~TemporaryFile ()
+  {
+    if (!path.empty ())
+      g_unlink (path.c_str ());
+  }
+};
+
+Result<void>
+write_description (TemporaryFile &file)
+{
+  const Result<std::string> xml = describe ();
+  if (!xml)
+    return xml.error ();
+  gchar *path = nullptr;
+  const int descriptor =
+      g_file_open_tmp ("codedexposure-XXXXXX.xml", &path, nullptr);
+  if (descriptor < 0)
+    return Error{"no temporary file can be written for the description of the "
+                 "simulated camera"};
+  file.path = path;
+  g_free (path);
+  g_close (descriptor, nullptr);
+  if (!g_file_set_contents (
+          file.path.c_str (), xml->data (), gssize (xml->size ()), nullptr))
+    return Error{"cannot write " + file.path};
+  return {};
+}
+
+} // namespace
+
+Result<std::unique_ptr<GigeCamera>>
+GigeCamera::open (GigeCameraOptions options, Expose expose)
+{
+  TemporaryFile description;
+  if (const Result<void> written = write_description (description); !written)
+    return written.error ();
+
+  auto state = std::make_unique<State> ();
+  State &st = *state;
+  st.options = std::move (options);
+  st.expose = std::move (expose);
+  st.faults = st.options.faults;
+  st.random.seed (st.options.seed);
+  st.picture = Image<std::uint16_t> (st.options.width, st.options.height);
+  st.server.reset (arv_gv_fake_camera_new_full (st.options.address.c_str (),
+      st.options.serial.c_str (), description.path.c_str ()));
+  if (!st.server || !arv_gv_fake_camera_is_running (st.server.get ()))
+    return Error{"no camera can be at " + in_quotes (st.options.address) +
+                 ", which is no address of this machine"};
+
+  st.camera = arv_gv_fake_camera_get_fake_camera (st.server.get ());
+  const auto set = [&] (guint32 address, double value) {
+    arv_fake_camera_write_register (
+        st.camera, address, guint32 (std::lround (value)));
+  };
+  set (ARV_FAKE_CAMERA_REGISTER_SENSOR_WIDTH, st.options.width);
+  set (ARV_FAKE_CAMERA_REGISTER_SENSOR_HEIGHT, st.options.height);
+  set (ARV_FAKE_CAMERA_REGISTER_WIDTH, st.options.width);
+  set (ARV_FAKE_CAMERA_REGISTER_HEIGHT, st.options.height);
+  set (ARV_FAKE_CAMERA_REGISTER_PIXEL_FORMAT,
+      st.options.bits > 8 ? ARV_PIXEL_FORMAT_MONO_16 : ARV_PIXEL_FORMAT_MONO_8);
+  set (ARV_FAKE_CAMERA_REGISTER_EXPOSURE_TIME_US, 10e6);
+  arv_fake_camera_set_fill_pattern (
+      st.camera,
+      [] (ArvBuffer *buffer, void *self, guint32, guint32, ArvPixelFormat) {
+        static_cast<State *> (self)->send (buffer);
+      },
+      &st);
+  return std::unique_ptr<GigeCamera> (new GigeCamera (std::move (state)));
+}
+
+Result<void>
+GigeCamera::add_faults (std::string_view text)
+{
+  const std::lock_guard guard (state_->lock);
+  return state_->faults.add (text, state_->next);
+}
+
+std::uint64_t
+GigeCamera::next_frame () const
+{
+  const std::lock_guard guard (state_->lock);
+  return state_->next;
+}
+
+} // namespace codedexposure

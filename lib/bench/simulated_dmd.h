@@ -1,0 +1,104 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* A DMD in this process, for the optical bench in software. */
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include "dmd/dmd.h"
+
+namespace codedexposure
+{
+
+/**
+ * The mirrors of a simulated DMD, shared by name between the driver that
+ * programs them and the bench that looks through them. Thread-safe.
+ *
+ * Its clock is the bench's exposure clock: the bench counts slots from its
+ * first frame, and asks in order which mask stands in each. Exposures start at
+ * whole multiples of the schedule's slots.
+ */
+class SimulatedMirrors
+{
+public:
+  /** The mirrors of that name in this process; made at the first call, gone
+   * when nobody holds them. */
+  static std::shared_ptr<SimulatedMirrors> find (const std::string &name);
+
+  /** Parks the mirrors and takes the masks of @p schedule. */
+  void program (const Schedule &schedule);
+  /** Takes one mask that stands still, until the next program (). */
+  void hold (StillMask mask);
+  void start ();
+  void stop ();
+  bool running () const;
+
+  /** How the tile lies on a diamond array; none: an orthogonal one. */
+  void lay (std::optional<MirrorLayout> diamond);
+  std::optional<MirrorLayout> diamond () const;
+
+  /** What was programmed last; none before the first upload. */
+  std::optional<Schedule> schedule () const;
+
+  /**
+   * Index of the mask (MaskRenderer) that stands in slot @p slot counted from
+   * the bench's first exposure, none while the mirrors are parked. They step
+   * from the first exposure after start () on, which shows mask 0 or, where a
+   * pilot makes two frames differ, the mask of that frame's parity; one whole
+   * exposure later if they stood still for less than that since stop (). A mask
+   * that is held is kStillMask in its slots, kOffMask in the others.
+   */
+  std::optional<int> mask_in_slot (std::int64_t slot);
+
+  /** The mask that is held in the exposure for whose slots was asked last; null
+   * where it is the schedule's. */
+  std::shared_ptr<const StillMask> held () const;
+
+  /** From slot @p slot on, the masks come @p by slots late (> 0) or early
+   * (< 0): a missed or a spurious trigger. Slips add up, and are given in the
+   * order of their slots; start () mends those that were. */
+  void slip_at (std::int64_t slot, int by);
+
+private:
+  enum class Motion { parked, armed, stepping };
+  struct Slip {
+    std::int64_t slot;
+    int by;
+  };
+
+  void begin_exposure ();
+
+  mutable std::mutex lock_; // covers everything below; a leaf lock
+  std::optional<Schedule> schedule_;
+  std::optional<MirrorLayout> diamond_;
+  std::shared_ptr<const StillMask> hold_, held_; // from now on; since it began
+  Motion motion_ = Motion::parked;
+  bool owes_dark_exposure_ = false;
+  std::deque<Slip> slips_;
+  std::int64_t offset_ = 0;
+};
+
+/**
+ * Opens "sim:NAME[,key=value...]", whose mirrors are SimulatedMirrors::find
+ * (NAME). The keys say what the device can do and how it misbehaves:
+ *   size=WxH            mirrors, default 1024x768
+ *   layout=address|lattice|cell  they stand on their corners, and the tile lies
+ *                       on them so; without it, an orthogonal array
+ *   masks=N             masks it holds, default 512
+ *   min-active=TIME     default 0
+ *   min-switching=TIME  default 0
+ *   mask-time=TIME      time to send one mask, default 0
+ *   still=yes|no        whether it shows patterns on request, default yes
+ *   slip-at=SLOT[:BY]   slips by BY slots (default 1: late) in slot SLOT of the
+ *                       bench; may be given again, for a later slot
+ *   fail=open|upload|start|restart  what goes wrong
+ */
+Result<std::unique_ptr<Dmd>> open_simulated_dmd (std::string_view device);
+/** From now on, open_dmd () opens them, too. */
+void serve_simulated_dmds ();
+
+} // namespace codedexposure

@@ -1,0 +1,474 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "calibrate/calibration.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <new>
+
+#include "calibrate/displacement_fit.h"
+#include "calibrate/gray_fit.h"
+#include "calibrate/phase_fit.h"
+
+namespace codedexposure
+{
+
+namespace
+{
+
+/* A pixel that gets less than this part of the light of the bright ones sees no
+ * mirrors. */
+constexpr float kCovered = 0.2f;
+
+/* Side of the squares over which light is averaged for the weights. */
+constexpr int kSmooth = 16;
+
+/* Reduced chi-square of blocks above which a displacement grid is fitted. */
+constexpr double kDisplaced = 1.3;
+
+constexpr int kRounds = 12;
+/* Mirrors; shorter steps end the fit. */
+constexpr double kConverged = 1e-7;
+
+} // namespace
+
+struct Calibration::State {
+  struct Slot {
+    Pattern pattern;
+    Image<float> sum;
+    int frames = 0;
+  };
+  Extent camera, mirrors;
+  std::vector<Slot> slots;
+  Image<std::uint8_t> saturated;
+
+  Slot *find (const Pattern &pattern)
+  {
+    const auto at = std::find_if (slots.begin (), slots.end (),
+        [&] (const Slot &s) { return s.pattern == pattern; });
+    return at == slots.end () ? nullptr : &*at;
+  }
+  template <typename Pixel>
+  Result<void> add (
+      const Pattern &pattern, ImageView<const Pixel> frame, int largest);
+
+  Image<float> mean (const Slot &slot) const;
+  const Slot *find (Pattern::Kind kind) const;
+  std::optional<GrayCode> gray_code (Axis axis) const;
+  std::vector<const Slot *> gratings (Axis axis) const;
+  Result<Image<std::uint8_t>> usable_pixels (CalibrationResult &result) const;
+  Result<Mapping> coarse_mapping (
+      ImageView<const std::uint8_t> usable, bool affine) const;
+  Result<CalibrationResult> solve (const CalibrationOptions &options) const;
+};
+
+namespace
+{
+
+/* Every pixel is the mean of its kSmooth x kSmooth square. */
+Image<float>
+smoothed (const Image<float> &image)
+{
+  Image<float> out (image.width (), image.height ());
+  for (int y0 = 0; y0 < image.height (); y0 += kSmooth)
+    for (int x0 = 0; x0 < image.width (); x0 += kSmooth) {
+      const int y1 = std::min (image.height (), y0 + kSmooth);
+      const int x1 = std::min (image.width (), x0 + kSmooth);
+      double sum = 0.0;
+      for (int y = y0; y < y1; y++)
+        for (int x = x0; x < x1; x++)
+          sum += double (image.at (x, y));
+      const float mean = float (sum / ((y1 - y0) * (x1 - x0)));
+      for (int y = y0; y < y1; y++)
+        std::fill (out.view ().row (y) + x0, out.view ().row (y) + x1, mean);
+    }
+  return out;
+}
+
+/* The value that @part of an image's pixels do not exceed. */
+float
+quantile (const Image<float> &image, double part)
+{
+  std::vector<float> values;
+  for (int y = 0; y < image.height (); y += 2)
+    for (int x = y / 2 % 2; x < image.width (); x += 2)
+      values.push_back (image.at (x, y));
+  if (values.empty ())
+    return image.at (0, 0);
+  const auto at =
+      values.begin () + std::ptrdiff_t (part * double (values.size () - 1));
+  std::nth_element (values.begin (), at, values.end ());
+  return *at;
+}
+
+Image<float>
+difference (Image<float> a, const Image<float> &b)
+{
+  for (int y = 0; y < a.height (); y++)
+    for (int x = 0; x < a.width (); x++)
+      a.at (x, y) -= b.at (x, y);
+  return a;
+}
+
+/* Mean residuals of blocks, in mirrors. */
+Image<float>
+shifts_of (const PhaseFit &fit, const std::vector<PhaseFit::Block> &blocks)
+{
+  Image<float> shifts (fit.blocks_across (), fit.blocks_down ());
+  std::transform (blocks.begin (), blocks.end (), shifts.view ().data,
+      [] (const PhaseFit::Block &b) {
+        return b.information > 0.0 ? float (b.score / b.information) : 0.0f;
+      });
+  return shifts;
+}
+
+/* Copies the result of the fit. */
+Result<void>
+report (const PhaseFit &fit, CalibrationResult &result)
+{
+  const double magnification = fit.mapping.pose ().magnification;
+  result.psf_sigma =
+      magnification * std::sqrt (0.5 * (fit.blur_x + fit.blur_y));
+  auto mapping =
+      Mapping::make ({fit.camera, fit.mirrors, fit.mapping.homography (),
+          fit.covariance, fit.mapping.displacement (), result.psf_sigma});
+  if (!mapping)
+    return mapping.error ();
+  result.mapping = std::move (*mapping);
+  result.noise_floor = fit.noise.floor;
+  result.noise_slope = fit.noise.slope;
+  result.misfit =
+      std::sqrt (0.5 * (reduced_chi_square (fit.blocks_x, fit.noise_ratio) +
+                           reduced_chi_square (fit.blocks_y, fit.noise_ratio)));
+  for (int y = 0; y < fit.camera.height; y++)
+    for (int x = 0; x < fit.camera.width; x++) {
+      PixelQuality &quality = result.quality.at (x, y);
+      if (quality != PixelQuality::good)
+        continue;
+      if (!result.mapping.covers (result.mapping.mirror_at (x, y)))
+        quality = PixelQuality::uncovered;
+      else if (fit.faint.at (x, y) != 0)
+        quality = PixelQuality::low_contrast;
+      else if (fit.outlier.at (x, y) != 0)
+        quality = PixelQuality::outlier;
+    }
+  return {};
+}
+
+/* Repeats rounds until they converge; the noise is estimated with them. */
+Result<void>
+converge (PhaseFit &fit, std::size_t numbers)
+{
+  double before = std::numeric_limits<double>::infinity ();
+  for (int round = 0; round < kRounds; round++) {
+    const auto step = fit.round (numbers);
+    if (!step)
+      return Error{"the gratings do not determine a mapping; check light and "
+                   "focus, and that each frame shows its own pattern"};
+    if (*step < kConverged || (round > 3 && *step > 0.5 * before))
+      break;
+    before = *step;
+    if (round < 4)
+      fit.estimate_noise ();
+  }
+  return {};
+}
+
+/* Adds a displacement grid if the residuals of blocks exceed the noise. */
+Result<void>
+displace (PhaseFit &fit, int node_distance)
+{
+  if (std::max (reduced_chi_square (fit.blocks_x, fit.noise_ratio),
+          reduced_chi_square (fit.blocks_y, fit.noise_ratio)) < kDisplaced)
+    return {};
+  const auto nodes = [node_distance] (int size) {
+    return std::clamp (
+        1 + (size + node_distance / 2) / node_distance, 3, Mapping::kMaxNodes);
+  };
+  Displacement grid;
+  grid.columns = nodes (fit.camera.width);
+  grid.rows = nodes (fit.camera.height);
+  grid.x.resize (std::size_t (grid.columns) * std::size_t (grid.rows));
+  grid.y = grid.x;
+  for (int round = 0; round < 3; round++) {
+    add_displacement (grid, grid.x, fit.blocks_x, fit.block_size, fit.camera);
+    add_displacement (grid, grid.y, fit.blocks_y, fit.block_size, fit.camera);
+    auto made = Mapping::make (
+        {fit.camera, fit.mirrors, fit.mapping.homography (), {}, grid});
+    if (!made)
+      return made.error ();
+    fit.mapping = std::move (*made);
+    if (!fit.round (0))
+      return Error{"the gratings do not determine a displacement grid"};
+  }
+  return {};
+}
+
+} // namespace
+
+Result<Calibration>
+Calibration::make (
+    Extent camera, Extent mirrors, std::span<const Pattern> patterns)
+try {
+  if (const auto checked = Mapping::make ({camera, mirrors}); !checked)
+    return checked.error ();
+  if (std::min (camera.width, camera.height) < 32)
+    return Error{"a calibration needs frames of 32x32 pixels or more, not " +
+                 std::to_string (camera.width) + "x" +
+                 std::to_string (camera.height)};
+  auto state = std::make_unique<State> ();
+  state->camera = camera;
+  state->mirrors = mirrors;
+  state->saturated = Image<std::uint8_t> (camera.width, camera.height);
+  for (const Pattern &pattern : patterns) {
+    if (state->find (pattern) != nullptr)
+      return Error{"pattern " + pattern.text () +
+                   " is listed twice; list each pattern of a calibration once"};
+    state->slots.push_back ({pattern, {}, 0});
+  }
+  for (const Axis axis : {Axis::x, Axis::y}) {
+    const auto gratings = state->gratings (axis);
+    const bool whole = !gratings.empty () &&
+                       int (gratings.size ()) == gratings[0]->pattern.period &&
+                       gratings.size () >= 4;
+    if (!whole || !state->gray_code (axis) ||
+        state->find (Pattern::Kind::dark) == nullptr ||
+        state->find (Pattern::Kind::white) == nullptr)
+      return Error{"a calibration needs dark, white, the Gray codes of x and y "
+                   "with their inverses and gratings of one period, 4 or "
+                   "more, at all phases, as calibration_patterns () has them"};
+  }
+  return Calibration (std::move (state));
+} catch (const std::bad_alloc &) {
+  return out_of_memory ();
+}
+
+Calibration::Calibration (std::unique_ptr<State> state)
+    : state_ (std::move (state))
+{
+}
+
+Calibration::Calibration (Calibration &&) noexcept = default;
+Calibration &Calibration::operator= (Calibration &&) noexcept = default;
+Calibration::~Calibration () = default;
+
+template <typename Pixel>
+Result<void>
+Calibration::State::add (
+    const Pattern &pattern, ImageView<const Pixel> frame, int largest)
+{
+  Slot *slot = find (pattern);
+  if (slot == nullptr)
+    return Error{
+        "pattern " + pattern.text () + " is not part of this calibration"};
+  if (frame.width != camera.width || frame.height != camera.height)
+    return Error{"a calibration frame has " + std::to_string (frame.width) +
+                 "x" + std::to_string (frame.height) + " pixels; " +
+                 std::to_string (camera.width) + "x" +
+                 std::to_string (camera.height) + " are expected"};
+  if (slot->frames++ == 0)
+    slot->sum = Image<float> (camera.width, camera.height);
+  for (int y = 0; y < frame.height; y++) {
+    const Pixel *in = frame.row (y);
+    float *sum = slot->sum.view ().row (y);
+    std::uint8_t *full = saturated.view ().row (y);
+    for (int x = 0; x < frame.width; x++) {
+      sum[x] += float (in[x]);
+      full[x] |= in[x] >= largest;
+    }
+  }
+  return {};
+}
+
+Result<void>
+Calibration::add (const Pattern &pattern, ImageView<const std::uint8_t> frame)
+try {
+  return state_->add (pattern, frame, 255);
+} catch (const std::bad_alloc &) {
+  return out_of_memory ();
+}
+
+Result<void>
+Calibration::add (
+    const Pattern &pattern, ImageView<const std::uint16_t> frame, int bits)
+try {
+  return state_->add (
+      pattern, frame, (1 << std::clamp (bits > 0 ? bits : 16, 1, 16)) - 1);
+} catch (const std::bad_alloc &) {
+  return out_of_memory ();
+}
+
+std::vector<Pattern>
+Calibration::missing () const
+{
+  std::vector<Pattern> patterns;
+  for (const auto &slot : state_->slots)
+    if (slot.frames == 0)
+      patterns.push_back (slot.pattern);
+  return patterns;
+}
+
+Image<float>
+Calibration::State::mean (const Slot &slot) const
+{
+  Image<float> mean = slot.sum;
+  const float part = 1.0f / float (slot.frames);
+  for (int y = 0; y < camera.height; y++)
+    for (int x = 0; x < camera.width; x++)
+      mean.at (x, y) *= part;
+  return mean;
+}
+
+const Calibration::State::Slot *
+Calibration::State::find (Pattern::Kind kind) const
+{
+  const auto at = std::find_if (slots.begin (), slots.end (),
+      [kind] (const Slot &s) { return s.pattern.kind == kind; });
+  return at == slots.end () ? nullptr : &*at;
+}
+
+/* None if a bit is missing. Bits whose patterns have no frames are empty. */
+std::optional<GrayCode>
+Calibration::State::gray_code (Axis axis) const
+{
+  GrayCode code;
+  for (int bit = 0;; bit++) {
+    const Slot *pair[2] = {};
+    for (const Slot &slot : slots)
+      if (slot.pattern.kind == Pattern::Kind::gray &&
+          slot.pattern.axis == axis && slot.pattern.bit == bit)
+        pair[slot.pattern.inverse ? 1 : 0] = &slot;
+    if (pair[0] == nullptr || pair[1] == nullptr)
+      break;
+    code.width = pair[0]->pattern.period;
+    const bool seen = pair[0]->frames > 0 && pair[1]->frames > 0;
+    code.bits.push_back (
+        seen ? difference (mean (*pair[0]), mean (*pair[1])) : Image<float> ());
+  }
+  const int size = axis == Axis::x ? mirrors.width : mirrors.height;
+  const bool all =
+      !code.bits.empty () && (size - 1) / code.width < 1 << code.bits.size ();
+  return all ? std::optional (std::move (code)) : std::nullopt;
+}
+
+/* Sorted by phase. */
+std::vector<const Calibration::State::Slot *>
+Calibration::State::gratings (Axis axis) const
+{
+  std::vector<const Slot *> found;
+  for (const Slot &slot : slots)
+    if (slot.pattern.kind == Pattern::Kind::grating &&
+        slot.pattern.axis == axis)
+      found.push_back (&slot);
+  std::sort (found.begin (), found.end (), [] (const Slot *a, const Slot *b) {
+    return a->pattern.phase < b->pattern.phase;
+  });
+  return found;
+}
+
+/* The pixels that dark and white show to be usable. */
+Result<Image<std::uint8_t>>
+Calibration::State::usable_pixels (CalibrationResult &result) const
+{
+  const float covered =
+      std::max (1.0f, kCovered * quantile (result.contrast, 0.9));
+  Image<std::uint8_t> usable (camera.width, camera.height);
+  for (int y = 0; y < camera.height; y++)
+    for (int x = 0; x < camera.width; x++) {
+      PixelQuality &quality = result.quality.at (x, y);
+      quality = result.contrast.at (x, y) < covered ? PixelQuality::uncovered
+                : saturated.at (x, y) != 0          ? PixelQuality::saturated
+                                                    : PixelQuality::good;
+      usable.at (x, y) = quality == PixelQuality::good;
+    }
+  if (result.pixels (PixelQuality::saturated) >
+      std::uint64_t (camera.width) * std::uint64_t (camera.height) / 2)
+    return Error{"more than half of the pixels have the largest value; "
+                 "reduce light, exposure or gain, and calibrate again"};
+  return usable;
+}
+
+Result<Mapping>
+Calibration::State::coarse_mapping (
+    ImageView<const std::uint8_t> usable, bool affine) const
+{
+  const auto coarse = fit_gray_codes (
+      *gray_code (Axis::x), *gray_code (Axis::y), usable, affine);
+  if (!coarse)
+    return coarse.error ();
+  return Mapping::from_centred (camera, mirrors, *coarse);
+}
+
+Result<CalibrationResult>
+Calibration::State::solve (const CalibrationOptions &options) const
+{
+  const Image<float> dark = mean (*find (Pattern::Kind::dark));
+  const Image<float> white = mean (*find (Pattern::Kind::white));
+  const Image<float> dark_smooth = smoothed (dark);
+  const Image<float> white_smooth = smoothed (white);
+  CalibrationResult result = {Mapping (camera), 0, 0, 0, 0,
+      Image<PixelQuality> (camera.width, camera.height),
+      difference (white, dark), {}, {}};
+  const auto usable = usable_pixels (result);
+  if (!usable)
+    return usable.error ();
+  const bool affine = options.model == FitModel::affine;
+  const auto start = coarse_mapping (usable->view (), affine);
+  if (!start)
+    return start.error ();
+
+  PhaseFit fit = {camera, mirrors, {}, {}, usable->view (), dark_smooth.view (),
+      white_smooth.view (), *start};
+  fit.block_size = CalibrationResult::kBlock;
+  std::vector<Image<float>> frames;
+  fit.frames = std::numeric_limits<int>::max ();
+  for (const Axis axis : {Axis::x, Axis::y})
+    for (const Slot *slot : gratings (axis)) {
+      frames.push_back (mean (*slot));
+      fit.frames = std::min (fit.frames, slot->frames);
+    }
+  const std::size_t of_x = gratings (Axis::x).size ();
+  for (std::size_t i = 0; i < frames.size (); i++)
+    (i < of_x ? fit.x : fit.y)
+        .frames.push_back (std::as_const (frames[i]).view ());
+
+  if (const auto converged = converge (fit, affine ? 6 : 8); !converged)
+    return converged.error ();
+  result.residual_x = shifts_of (fit, fit.blocks_x);
+  result.residual_y = shifts_of (fit, fit.blocks_y);
+  if (options.model == FitModel::displaced)
+    if (const auto displaced = displace (fit, options.node_distance);
+        !displaced)
+      return displaced.error ();
+  if (const auto reported = report (fit, result); !reported)
+    return reported.error ();
+  return result;
+}
+
+Result<CalibrationResult>
+Calibration::solve (const CalibrationOptions &options) const
+try {
+  if (const auto patterns = missing (); !patterns.empty ())
+    return Error{std::to_string (patterns.size ()) +
+                 " patterns of the calibration have no frame, the first is " +
+                 patterns.front ().text () + "; add their frames"};
+  if (options.node_distance < 4)
+    return Error{"the nodes of a displacement grid must be 4 pixels apart or "
+                 "more, not " +
+                 std::to_string (options.node_distance)};
+  return state_->solve (options);
+} catch (const std::bad_alloc &) {
+  return out_of_memory ();
+}
+
+std::uint64_t
+CalibrationResult::pixels (PixelQuality what) const
+{
+  std::uint64_t count = 0;
+  for (int y = 0; y < quality.height (); y++)
+    count += std::uint64_t (std::count (quality.view ().row (y),
+        quality.view ().row (y) + quality.width (), what));
+  return count;
+}
+
+} // namespace codedexposure

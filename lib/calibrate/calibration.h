@@ -1,0 +1,103 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Solves for the mapping from the frames of calibration_patterns (). */
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "base/image.h"
+#include "base/result.h"
+#include "calibrate/gratings.h"
+#include "mapping/mapping.h"
+
+namespace codedexposure
+{
+
+/** Whether a pixel took part in the fit, and why not. */
+enum class PixelQuality : std::uint8_t {
+  good,
+  uncovered,    ///< it sees no mirror or gets no light
+  low_contrast, ///< the gratings are blurred: out of focus
+  saturated,    ///< it had the largest value
+  outlier,      ///< it does not fit its neighbours: dust, a stuck mirror
+};
+
+/** What is fitted. */
+enum class FitModel {
+  affine,
+  homography,
+  /** A homography and, if the residuals exceed the noise, a displacement grid.
+   */
+  displaced,
+};
+
+struct CalibrationOptions {
+  FitModel model = FitModel::displaced;
+  /** Pixels between the nodes of a displacement grid. */
+  int node_distance = 32;
+};
+
+struct CalibrationResult {
+  Mapping mapping;
+  /** Blur between mirrors and pixels, standard deviation in pixels of a
+   * Gaussian that explains the gratings. */
+  double psf_sigma = 0.0;
+  /** Variance of a pixel with the value N: noise_floor + noise_slope N. */
+  double noise_floor = 0.0;
+  double noise_slope = 0.0;
+  /** Root of the reduced chi-square of the mean residuals of blocks: 1 if the
+   * mapping explains everything but noise. */
+  double misfit = 0.0;
+  Image<PixelQuality> quality;
+  /** Difference between on and off of each pixel, DN. */
+  Image<float> contrast;
+  /** Mean residual of each block of kBlock x kBlock pixels, in mirrors, before
+   * a displacement grid was added; 0 for blocks without good pixels. */
+  Image<float> residual_x, residual_y;
+  static constexpr int kBlock = 16;
+
+  std::uint64_t pixels (PixelQuality what) const;
+};
+
+/**
+ * Collects the frames of a calibration run, then solves.
+ *
+ * Gray codes give the mirror of each pixel to within half a stripe, which
+ * resolves the period. The gratings, moved mirror by mirror through a whole
+ * period, refine it: the mapping is the maximum likelihood estimate from all
+ * pixels and frames, where each pixel has its own brightness
+ * (docs/calibration.md).
+ */
+class Calibration
+{
+public:
+  /** Error when @p patterns lack one that is needed or contain one twice, or a
+   * size is out of range. */
+  static Result<Calibration> make (
+      Extent camera, Extent mirrors, std::span<const Pattern> patterns);
+  Calibration (Calibration &&) noexcept;
+  Calibration &operator= (Calibration &&) noexcept;
+  ~Calibration ();
+
+  /** Frame of @p pattern, of the camera's size; several frames of the same
+   * pattern are averaged. Error for a pattern of another run. */
+  Result<void> add (
+      const Pattern &pattern, ImageView<const std::uint8_t> frame);
+  Result<void> add (
+      const Pattern &pattern, ImageView<const std::uint16_t> frame, int bits);
+  /** Patterns without a frame. */
+  std::vector<Pattern> missing () const;
+
+  /** Takes seconds. Error when frames are missing or show no mirrors. */
+  Result<CalibrationResult> solve (
+      const CalibrationOptions &options = {}) const;
+
+private:
+  struct State;
+  explicit Calibration (std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+} // namespace codedexposure

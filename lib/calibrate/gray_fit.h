@@ -1,0 +1,32 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Fits the mapping to Gray codes, to a fraction of a stripe; for this folder
+ * only.
+ */
+#pragma once
+
+#include <vector>
+
+#include "base/image.h"
+#include "base/result.h"
+#include "mapping/mapping.h"
+
+namespace codedexposure
+{
+
+/** The frames of the Gray code of one axis. */
+struct GrayCode {
+  int width = 1; ///< of a stripe, mirrors
+  /** Of each bit, the finest first: frame minus frame of the inverse. */
+  std::vector<Image<float>> bits;
+
+  /** Centre of the stripe that a pixel sees, in mirrors. */
+  double mirror_at (int x, int y) const;
+};
+
+/** A centred homography, with @p affine one whose numbers 6 and 7 are 0, by
+ * least squares over the pixels that are marked @p usable. Outliers are left
+ * out. Error when fewer than half of the pixels agree with one mapping. */
+Result<Homography> fit_gray_codes (const GrayCode &x, const GrayCode &y,
+    ImageView<const std::uint8_t> usable, bool affine);
+
+} // namespace codedexposure

@@ -1,0 +1,56 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Least squares for a homography, one observation at a time; for this folder
+ * only. */
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+
+#include "mapping/mapping.h"
+
+namespace codedexposure
+{
+
+/**
+ * Normal equations of the eight numbers of a centred homography and of one
+ * extra number for x and for y.
+ */
+class HomographyFit
+{
+public:
+  static constexpr std::size_t kExtra = 8; ///< index of the one for x
+  static constexpr std::size_t kNumbers = 10;
+
+  /** Likelihood of the mirror of one pixel along one axis. */
+  struct Observation {
+    double score;       ///< derivative of the log-likelihood, by the mirror
+    double information; ///< its variance
+    double extra_score = 0.0;
+    double extra_information = 0.0;
+    double cross = 0.0; ///< of both
+  };
+
+  void add_x (
+      double xi, double eta, const Projected &at, const Observation &seen);
+  void add_y (
+      double xi, double eta, const Projected &at, const Observation &seen);
+
+  /** The step to the maximum and its covariance. The first @p numbers of the
+   * homography are free (6: affine, 8: all), and the extra ones if @p extra.
+   * None if the observations do not determine them. */
+  struct Step {
+    std::array<double, kNumbers> change = {};
+    std::array<double, kNumbers *kNumbers> covariance = {};
+  };
+  std::optional<Step> solve (std::size_t numbers, bool extra) const;
+
+private:
+  void add (std::size_t first, double mirror, double xi, double eta, double z,
+      const Observation &seen);
+
+  std::array<double, kNumbers *kNumbers> normal_ = {}; // lower triangle
+  std::array<double, kNumbers> right_ = {};
+};
+
+} // namespace codedexposure

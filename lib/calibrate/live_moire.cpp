@@ -1,0 +1,580 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "calibrate/live_moire.h"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <complex>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Cholesky>
+
+namespace codedexposure
+{
+
+namespace
+{
+
+using Phasor = std::complex<float>;
+constexpr double kTwoPi = 2.0 * std::numbers::pi;
+
+constexpr int kMinSampling = 3;
+constexpr int kMaxSampling = 64;
+constexpr int kMinPeriods = 8;
+
+/* Blocks with less than this part of the reference amplitude show no grating.
+ */
+constexpr float kFaint = 0.4f;
+
+/* Required correlation of neighbouring phasors. */
+constexpr double kCoherent = 0.5;
+
+double
+sinc (double x)
+{
+  const double a = std::numbers::pi * x;
+  return std::abs (a) < 1e-9 ? 1.0 : std::sin (a) / a;
+}
+
+/* cos and sin of 2 pi t / T, and both times t / T. Linear interpolation between
+ * every T-th sample weights samples by a triangle: its rising side is t / T,
+ * its falling side 1 - t / T. */
+struct Carrier {
+  int period;
+  std::vector<float> cosine, sine, rising_cosine, rising_sine;
+
+  explicit Carrier (int samples) : period (samples)
+  {
+    for (int t = 0; t < samples; t++) {
+      const double angle = kTwoPi * t / samples;
+      const double part = double (t) / samples;
+      cosine.push_back (float (std::cos (angle)));
+      sine.push_back (float (std::sin (angle)));
+      rising_cosine.push_back (float (part * std::cos (angle)));
+      rising_sine.push_back (float (part * std::sin (angle)));
+    }
+  }
+
+  /* Of T values: without a weight, and with the rising side. */
+  void demodulate (const float *values, std::size_t step, Phasor &whole,
+      Phasor &rising) const
+  {
+    float wc = 0, ws = 0, rc = 0, rs = 0;
+    for (std::size_t t = 0; t < std::size_t (period); t++) {
+      const float value = values[t * step];
+      wc += cosine[t] * value;
+      ws += sine[t] * value;
+      rc += rising_cosine[t] * value;
+      rs += rising_sine[t] * value;
+    }
+    whole = {wc, -ws};
+    rising = {rc, -rs};
+  }
+
+  /* Correction of variances for the pixels that neighbouring windows share. */
+  double overlap () const
+  {
+    double squares = 0.0;
+    for (int t = -period; t <= period; t++)
+      squares += std::pow (1.0 - std::abs (double (t) / period), 2);
+    return period / squares;
+  }
+};
+
+/* Phasors of one grating, one per block of T x T pixels. */
+struct Phasors {
+  int columns = 0, rows = 0;
+  double first_x = 0, first_y = 0; // centre of the first one, pixels
+  std::vector<Phasor> at;
+  Image<float> phase, amplitude;
+  float reference = 0.0f; // amplitude of blocks that show the grating
+  double power = 0.0;
+
+  void resize (int width, int height)
+  {
+    columns = width;
+    rows = height;
+    at.resize (std::size_t (width) * std::size_t (height));
+    phase = amplitude = Image<float> (width, height);
+  }
+  const Phasor *row (int r) const
+  {
+    return at.data () + std::ptrdiff_t (r) * columns;
+  }
+  Phasor *row (int r) { return at.data () + std::ptrdiff_t (r) * columns; }
+  bool shows (std::size_t i) const
+  {
+    return std::norm (at[i]) > kFaint * kFaint * reference * reference;
+  }
+
+  std::complex<double> product (int lag_x, int lag_y) const;
+  double slope (bool along_y) const;
+};
+
+/* Sum of the products of each phasor with the one @lag_x, @lag_y further. */
+std::complex<double>
+Phasors::product (int lag_x, int lag_y) const
+{
+  std::complex<double> sum = 0.0;
+  for (int r = 0; r + lag_y < rows; r++) {
+    const Phasor *here = row (r);
+    const Phasor *there = row (r + lag_y) + lag_x;
+    float re = 0.0f, im = 0.0f;
+    for (int c = 0; c + lag_x < columns; c++) {
+      re += here[c].real () * there[c].real () +
+            here[c].imag () * there[c].imag ();
+      im += here[c].real () * there[c].imag () -
+            here[c].imag () * there[c].real ();
+    }
+    sum += std::complex<double> (re, im);
+  }
+  return sum;
+}
+
+/* Radians from block to block, from longer and longer baselines. */
+double
+Phasors::slope (bool along_y) const
+{
+  double slope = 0.0;
+  for (int lag = 1; lag <= (along_y ? rows : columns) / 2; lag *= 4) {
+    const auto sum = along_y ? product (0, lag) : product (lag, 0);
+    slope += std::arg (sum * std::polar (1.0, -lag * slope)) / lag;
+  }
+  return slope;
+}
+
+/* phase = a xi + b eta + c, in coordinates relative to the frame's centre. */
+struct Plane {
+  std::array<double, 3> at = {};
+  std::array<double, 9> covariance = {};
+};
+
+/* Sums over the blocks of a row: xi, and the residuals of the phases. */
+struct RowSums {
+  double n = 0, x = 0, xx = 0, rest = 0, rest_x = 0, squares = 0;
+
+  void add (double xi, double residual)
+  {
+    n += 1;
+    x += xi;
+    xx += xi * xi;
+    rest += residual;
+    rest_x += residual * xi;
+    squares += residual * residual;
+  }
+};
+
+/* Normal equations of a plane's numbers. */
+struct PlaneSums {
+  std::array<double, 9> normal = {};
+  std::array<double, 3> right = {};
+  double squares = 0.0;
+
+  void add (const RowSums &row, double eta)
+  {
+    const double sums[] = {row.xx, row.x * eta, row.x, row.x * eta,
+        row.n * eta * eta, row.n * eta, row.x, row.n * eta, row.n};
+    for (std::size_t i = 0; i < 9; i++)
+      normal[i] += sums[i];
+    right[0] += row.rest_x;
+    right[1] += row.rest * eta;
+    right[2] += row.rest;
+    squares += row.squares;
+  }
+  double variance () const { return squares / normal[8]; }
+  std::optional<Plane> solve () const;
+};
+
+/* None if the blocks do not determine a plane. */
+std::optional<Plane>
+PlaneSums::solve () const
+{
+  constexpr double kMinPivot = 1e-12;
+  using Matrix = Eigen::Matrix3d;
+  const Eigen::LDLT<Matrix> factor (Eigen::Map<const Matrix> (normal.data ()));
+  const Eigen::Vector3d pivots = factor.vectorD ();
+  if (!(pivots.minCoeff () > kMinPivot * pivots.maxCoeff ()))
+    return std::nullopt;
+  Plane plane;
+  Eigen::Map<Eigen::Vector3d> (plane.at.data ()) =
+      factor.solve (Eigen::Map<const Eigen::Vector3d> (right.data ()));
+  Eigen::Map<Matrix> (plane.covariance.data ()) =
+      factor.solve (Matrix::Identity ());
+  return plane;
+}
+
+/* Sine of the phase of @z after a rotation by @back; beyond 90 degrees, 1. */
+double
+rest_of (Phasor z, Phasor back)
+{
+  const Phasor left = {z.real () * back.real () - z.imag () * back.imag (),
+      z.real () * back.imag () + z.imag () * back.real ()};
+  return left.real () > 0.0f
+             ? double (left.imag () / std::sqrt (std::norm (left)))
+             : std::copysign (1.0, double (left.imag ()));
+}
+
+} // namespace
+
+struct LiveMoire::State {
+  State (const Mapping &where, const Options &how, int samples)
+      : expected (where), options (how), carrier (samples)
+  {
+    const Extent camera = where.camera ();
+    blocks_x = camera.width / samples;
+    blocks_y = camera.height / samples;
+    const double middle = 0.5 * (samples - 1);
+    x.resize (blocks_x - 1, blocks_y);
+    x.first_x = samples;
+    x.first_y = middle;
+    y.resize (blocks_x, blocks_y - 1);
+    y.first_x = middle;
+    y.first_y = samples;
+    columns.resize (std::size_t (blocks_x * samples));
+    row_sums.resize (std::size_t (blocks_x * samples));
+    rising.resize (std::size_t (blocks_x));
+    sorted.reserve (std::max (x.at.size (), y.at.size ()));
+  }
+
+  Mapping expected;
+  Options options;
+  Carrier carrier;
+  int blocks_x, blocks_y;
+  Phasors x, y;
+  double sum = 0.0;            // of the numbers in whole blocks
+  std::vector<float> columns;  // sums over the rows of a block
+  std::vector<float> row_sums; // of a block's T rows, T by T
+  std::vector<Phasor> rising;
+  std::vector<float> sorted;
+
+  template <typename Pixel>
+  void collect (ImageView<const Pixel> frame);
+  void demodulate_x (int block_row);
+  void demodulate_y (int block_row);
+  Result<void> find_grating (Phasors &phasors, const char *name);
+  Plane start (const Phasors &phasors, double sign, bool along_y) const;
+  Result<Plane> fit (const Phasors &phasors, double sign, bool along_y) const;
+  double refine (
+      const Phasors &phasors, Plane &plane, double sign, double limit) const;
+  Result<Mapping> combine (const Plane &px, const Plane &py) const;
+  template <typename Pixel>
+  Result<LiveReading> solve (ImageView<const Pixel> frame);
+};
+
+/* Phasors of the whole frame, T rows at a time. */
+template <typename Pixel>
+void
+LiveMoire::State::collect (ImageView<const Pixel> frame)
+{
+  const int samples = carrier.period;
+  const int width = blocks_x * samples;
+  sum = 0.0;
+  for (int r = 0; r < blocks_y; r++) {
+    std::fill (columns.begin (), columns.end (), 0.0f);
+    for (int t = 0; t < samples; t++) {
+      const Pixel *row = frame.row (r * samples + t);
+      float *sums = row_sums.data () + std::ptrdiff_t (t) * blocks_x;
+      for (int i = 0; i < width; i++)
+        columns[std::size_t (i)] += float (row[i]);
+      for (int c = 0; c < blocks_x; c++) {
+        std::uint32_t total = 0;
+        for (int i = 0; i < samples; i++)
+          total += row[c * samples + i];
+        sums[c] = float (total);
+      }
+    }
+    for (int c = 0; c < width; c++)
+      sum += double (columns[std::size_t (c)]);
+    demodulate_x (r);
+    demodulate_y (r);
+  }
+}
+
+void
+LiveMoire::State::demodulate_x (int block_row)
+{
+  Phasor *out = x.row (block_row);
+  Phasor before = 0.0f;
+  for (int c = 0; c < blocks_x; c++) {
+    Phasor whole, rise;
+    carrier.demodulate (columns.data () + c * carrier.period, 1, whole, rise);
+    if (c > 0)
+      out[c - 1] = before + whole - rise;
+    before = rise;
+  }
+}
+
+void
+LiveMoire::State::demodulate_y (int block_row)
+{
+  for (int c = 0; c < blocks_x; c++) {
+    Phasor whole, rise;
+    carrier.demodulate (
+        row_sums.data () + c, std::size_t (blocks_x), whole, rise);
+    if (block_row > 0)
+      y.row (block_row - 1)[c] = rising[std::size_t (c)] + whole - rise;
+    rising[std::size_t (c)] = rise;
+  }
+}
+
+/* Fills the maps of phase and amplitude; error if there is no grating. */
+Result<void>
+LiveMoire::State::find_grating (Phasors &phasors, const char *name)
+{
+  const float to_amplitude = 2.0f / float (carrier.period * carrier.period);
+  phasors.power = 0.0;
+  sorted.clear ();
+  for (int r = 0; r < phasors.rows; r++)
+    for (int c = 0; c < phasors.columns; c++) {
+      const Phasor z = phasors.row (r)[c];
+      const float norm = std::norm (z);
+      const float size = std::sqrt (norm);
+      phasors.power += double (norm);
+      phasors.phase.at (c, r) = std::atan2 (z.imag (), z.real ());
+      phasors.amplitude.at (c, r) = to_amplitude * size;
+      sorted.push_back (size);
+    }
+  const auto high = sorted.begin () + std::ptrdiff_t (sorted.size () * 9 / 10);
+  std::nth_element (sorted.begin (), high, sorted.end ());
+  phasors.reference = *high;
+
+  const double common =
+      std::abs (phasors.product (1, 0)) + std::abs (phasors.product (0, 1));
+  if (phasors.power > 0.0 && common > 2.0 * kCoherent * phasors.power)
+    return {};
+  return Error{std::string ("no grating is seen in ") + name +
+               ": show a grating with a period of " +
+               std::to_string (options.period) +
+               " mirrors, focus on the mirrors, and bring magnification and "
+               "rotation close to the expected ones"};
+}
+
+Plane
+LiveMoire::State::start (
+    const Phasors &phasors, double sign, bool along_y) const
+{
+  const Extent camera = expected.camera ();
+  const double cx = 0.5 * (camera.width - 1), cy = 0.5 * (camera.height - 1);
+  const double r = std::max (cx, cy);
+  double slope_x = phasors.slope (false), slope_y = phasors.slope (true);
+  const double step = carrier.period;
+
+  std::complex<double> mean = 0.0;
+  for (int j = 0; j < phasors.rows; j++)
+    for (int i = 0; i < phasors.columns; i++)
+      mean += std::complex<double> (phasors.row (j)[i]) *
+              std::polar (1.0, -(slope_x * i + slope_y * j));
+  const double origin = std::arg (mean) -
+                        slope_x * (phasors.first_x - cx) / step -
+                        slope_y * (phasors.first_y - cy) / step;
+  /* One period of the carrier per block is invisible in the phasors. */
+  (along_y ? slope_y : slope_x) += kTwoPi;
+  Plane plane;
+  plane.at = {sign * slope_x / step * r, sign * slope_y / step * r,
+      sign *
+          (origin +
+              kTwoPi * (along_y ? cy - phasors.first_y : cx - phasors.first_x) /
+                  step)};
+  return plane;
+}
+
+/* One round of least squares on the residuals of @plane below @limit; returns
+ * their variance, or -1 where they do not determine a plane. */
+double
+LiveMoire::State::refine (
+    const Phasors &phasors, Plane &plane, double sign, double limit) const
+{
+  const Extent camera = expected.camera ();
+  const double cx = 0.5 * (camera.width - 1), cy = 0.5 * (camera.height - 1);
+  const double r = std::max (cx, cy);
+  const double step = carrier.period / r;
+  const double xi0 = (phasors.first_x - cx) / r;
+  const Phasor rotation (std::polar (1.0, -sign * plane.at[0] * step));
+  PlaneSums sums;
+  for (int j = 0; j < phasors.rows; j++) {
+    const double eta = (phasors.first_y - cy) / r + j * step;
+    Phasor back (std::polar (
+        1.0, -sign * (plane.at[0] * xi0 + plane.at[1] * eta + plane.at[2])));
+    RowSums row;
+    for (int i = 0; i < phasors.columns; i++, back *= rotation) {
+      const std::size_t at = std::size_t (j * phasors.columns + i);
+      if (!phasors.shows (at))
+        continue;
+      if (const double rest = rest_of (phasors.at[at], back);
+          std::abs (rest) <= limit)
+        row.add (xi0 + i * step, rest);
+    }
+    sums.add (row, eta);
+  }
+  const auto change = sums.solve ();
+  if (!change)
+    return -1.0;
+  for (std::size_t i = 0; i < 3; i++)
+    plane.at[i] += sign * change->at[i];
+  plane.covariance = change->covariance;
+  return sums.variance ();
+}
+
+Result<Plane>
+LiveMoire::State::fit (const Phasors &phasors, double sign, bool along_y) const
+{
+  Plane plane = start (phasors, sign, along_y);
+  /* The limit shrinks, so that blocks at the edge of the array are left out. */
+  double variance = 1.0;
+  for (int round = 0; round < 4 && variance >= 0.0; round++)
+    variance = refine (phasors, plane, sign, 3.0 * std::sqrt (variance));
+  if (!(variance >= 0.0))
+    return Error{"the grating is seen in too small a part of the frame"};
+  for (double &entry : plane.covariance)
+    entry *= variance * carrier.overlap ();
+  return plane;
+}
+
+/* The mapping from the phases of both gratings. */
+Result<Mapping>
+LiveMoire::State::combine (const Plane &px, const Plane &py) const
+{
+  const double to_mirrors = options.period / kTwoPi;
+  /* Mirror of phase 0: the middle of those that are on. */
+  const double origin = 0.5 * (options.period / 2 - 1);
+  const Homography known = expected.centred ();
+  Homography h = {0, 0, 0, 0, 0, 0, 0, 0, 1};
+  Mapping::Covariance covariance = {};
+  const Plane *planes[] = {&px, &py};
+  for (std::size_t d = 0; d < 2; d++) {
+    for (std::size_t i = 0; i < 3; i++) {
+      h[3 * d + i] = to_mirrors * planes[d]->at[i];
+      for (std::size_t j = 0; j < 3; j++)
+        covariance[(3 * d + i) * Mapping::kParameters + 3 * d + j] =
+            to_mirrors * to_mirrors *
+            (planes[d]->covariance[3 * i + j] +
+                planes[d]->covariance[3 * j + i]) /
+            2.0;
+    }
+    double &offset = h[3 * d + 2];
+    offset += origin;
+    offset += options.period *
+              std::round ((known[3 * d + 2] - offset) / options.period);
+  }
+  auto mapping =
+      Mapping::from_centred (expected.camera (), expected.mirrors (), h);
+  if (!mapping)
+    return mapping.error ();
+  return Mapping::make ({expected.camera (), expected.mirrors (),
+      mapping->homography (), covariance});
+}
+
+template <typename Pixel>
+Result<LiveReading>
+LiveMoire::State::solve (ImageView<const Pixel> frame)
+{
+  assert (frame.width == expected.camera ().width &&
+          frame.height == expected.camera ().height);
+  collect (frame);
+  for (const auto &[phasors, name] : {std::pair (&x, "x"), std::pair (&y, "y")})
+    if (const auto found = find_grating (*phasors, name); !found)
+      return found.error ();
+
+  const Homography known = expected.centred ();
+  const auto fit_x = fit (x, known[0] < 0.0 ? -1.0 : 1.0, false);
+  if (!fit_x)
+    return fit_x.error ();
+  const auto fit_y = fit (y, known[4] < 0.0 ? -1.0 : 1.0, true);
+  if (!fit_y)
+    return fit_y.error ();
+  const auto mapping = combine (*fit_x, *fit_y);
+  if (!mapping)
+    return mapping.error ();
+
+  LiveReading reading = {*mapping, {}, 0.0, 0};
+  const double pixels =
+      double (blocks_x) * blocks_y * carrier.period * carrier.period;
+  const double largest =
+      sum / pixels * 4.0 / std::numbers::pi * sinc (1.0 / carrier.period);
+  const double to_contrast =
+      2.0 / (carrier.period * carrier.period * std::max (1e-9, largest));
+  reading.contrast = {
+      to_contrast * double (x.reference), to_contrast * double (y.reference)};
+  std::size_t shown = 0;
+  for (const Phasors *phasors : {&x, &y})
+    for (std::size_t i = 0; i < phasors->at.size (); i++)
+      shown += phasors->shows (i);
+  reading.coverage = double (shown) / double (x.at.size () + y.at.size ());
+  const int bits = options.bits > 0 ? options.bits : 8 * int (sizeof (Pixel));
+  for (int row = 0; row < frame.height; row++)
+    reading.saturated += std::uint64_t (
+        std::count_if (frame.row (row), frame.row (row) + frame.width,
+            [largest = (1 << bits) - 1] (Pixel p) { return p >= largest; }));
+  return reading;
+}
+
+Result<LiveMoire>
+LiveMoire::make (const Mapping &expected)
+{
+  return make (expected, Options{});
+}
+
+Result<LiveMoire>
+LiveMoire::make (const Mapping &expected, const Options &options)
+try {
+  const Pose pose = expected.pose ();
+  const double pixels = options.period * pose.magnification;
+  const int samples = int (std::lround (pixels));
+  if (options.period < 2 || options.period % 2 != 0)
+    return Error{"the period of the live grating is " +
+                 std::to_string (options.period) +
+                 " mirrors; it must be even and 2 or more"};
+  if (samples < kMinSampling || samples > kMaxSampling)
+    return Error{"a period of the live grating has " +
+                 std::to_string (samples) + " pixels; it must have " +
+                 std::to_string (kMinSampling) + " to " +
+                 std::to_string (kMaxSampling) + ", use another period"};
+  const Extent camera = expected.camera ();
+  if (std::min (camera.width, camera.height) < kMinPeriods * samples)
+    return Error{"a frame of " + std::to_string (camera.width) + "x" +
+                 std::to_string (camera.height) + " pixels holds less than " +
+                 std::to_string (kMinPeriods) + " periods of the live grating"};
+  return LiveMoire (std::make_unique<State> (expected, options, samples));
+} catch (const std::bad_alloc &) {
+  return out_of_memory ();
+}
+
+LiveMoire::LiveMoire (std::unique_ptr<State> state) : state_ (std::move (state))
+{
+}
+
+LiveMoire::LiveMoire (LiveMoire &&) noexcept = default;
+LiveMoire &LiveMoire::operator= (LiveMoire &&) noexcept = default;
+LiveMoire::~LiveMoire () = default;
+
+Result<LiveReading>
+LiveMoire::solve (ImageView<const std::uint8_t> frame)
+{
+  return state_->solve (frame);
+}
+
+Result<LiveReading>
+LiveMoire::solve (ImageView<const std::uint16_t> frame)
+{
+  return state_->solve (frame);
+}
+
+ImageView<const float>
+LiveMoire::phase (bool y) const
+{
+  const Phasors &phasors = y ? state_->y : state_->x;
+  return phasors.phase.view ();
+}
+
+ImageView<const float>
+LiveMoire::amplitude (bool y) const
+{
+  const Phasors &phasors = y ? state_->y : state_->x;
+  return phasors.amplitude.view ();
+}
+
+} // namespace codedexposure

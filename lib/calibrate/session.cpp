@@ -1,0 +1,209 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "calibrate/session.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdarg>
+#include <cstdio>
+#include <utility>
+
+namespace codedexposure
+{
+
+namespace
+{
+
+[[gnu::format (printf, 1, 2)]] std::string
+format (const char *text, ...)
+{
+  std::array<char, 256> line;
+  va_list args;
+  va_start (args, text);
+  std::vsnprintf (line.data (), line.size (), text, args);
+  va_end (args);
+  return line.data ();
+}
+
+/** @p schedule with its tile at @p phase. */
+Result<Schedule>
+moved (const Schedule &schedule, Offset phase)
+{
+  return Schedule::make ({.tile = schedule.tile (),
+      .code = schedule.code (),
+      .timing = schedule.timing (),
+      .order = schedule.order (),
+      .phase = phase,
+      .leak = schedule.leak (),
+      .pilot_rows = schedule.pilot_rows ()});
+}
+
+} // namespace
+
+const char *
+session_stage_text (SessionStage stage)
+{
+  switch (stage) {
+  case SessionStage::mapping:
+    return "mapping";
+  case SessionStage::solving:
+    return "solving";
+  case SessionStage::mapped:
+    return "mapped";
+  case SessionStage::failed:
+    return "failed";
+  case SessionStage::found:
+    return "found";
+  default:
+    return alignment_state_text (AlignmentState (stage));
+  }
+}
+
+Result<void>
+CalibrationSession::expect (const Pattern &grating, double pixels_per_mirror)
+{
+  Result<LiveMoire> live = LiveMoire::make (
+      centred_mapping (options_.camera, options_.mirrors, pixels_per_mirror),
+      {.period = grating.period, .bits = options_.bits});
+  if (!live)
+    return live.error ();
+  live_.emplace (*std::move (live));
+  return {};
+}
+
+template <typename Pixel>
+Result<std::optional<CalibrationSession::Alignment>>
+CalibrationSession::align (
+    ImageView<const Pixel> frame, const StageOptions &stage)
+{
+  if (!live_)
+    return std::optional<Alignment> ();
+  Result<LiveReading> reading = live_->solve (frame);
+  if (!reading) {
+    aligned_ = 0;
+    last_.reset ();
+    return reading.error ();
+  }
+  const StageCorrection correction = correct_stage (reading->mapping, stage);
+  aligned_ = correction.state == AlignmentState::aligned ? aligned_ + 1 : 0;
+  last_ = fringes_of (*live_, "after");
+  if (!first_)
+    first_ = fringes_of (*live_, "before");
+  return std::optional (Alignment{*std::move (reading), correction});
+}
+
+template <typename Pixel>
+Result<void>
+CalibrationSession::collect (
+    const Pattern &pattern, ImageView<const Pixel> frame)
+{
+  if (!calibration_) {
+    Result<Calibration> made = Calibration::make (
+        options_.camera, options_.mirrors, options_.patterns);
+    if (!made)
+      return made.error ();
+    calibration_.emplace (*std::move (made));
+  }
+  Result<void> added;
+  if constexpr (sizeof (Pixel) == 1)
+    added = calibration_->add (pattern, frame);
+  else
+    added = calibration_->add (
+        pattern, frame, options_.bits > 0 ? options_.bits : 16);
+  if (added)
+    collected_++;
+  else
+    calibration_.reset ();
+  return added;
+}
+
+Result<std::optional<CalibrationResult>>
+CalibrationSession::solve ()
+{
+  if (!calibration_)
+    return std::optional<CalibrationResult> ();
+  Result<CalibrationResult> result = calibration_->solve ();
+  calibration_.reset ();
+  if (!result)
+    return result.error ();
+  return std::optional (*std::move (result));
+}
+
+template <typename Pixel>
+Result<std::optional<CalibrationSession::Phase>>
+CalibrationSession::find_phase (ImageView<const Pixel> frame)
+{
+  if (!options_.schedule)
+    return Error{"there is no schedule whose phase could be found"};
+  const auto tile = find_tile_phase (frame, *options_.schedule);
+  if (!tile)
+    return tile.error ();
+  confidence_ = std::max (confidence_, tile->confidence);
+  if (tile->confidence < kSure)
+    return std::optional<Phase> ();
+  const Result<Schedule> found = moved (*options_.schedule, tile->phase);
+  if (!found)
+    return found.error ();
+  return std::optional (Phase{*tile, *found});
+}
+
+#define INSTANTIATE(Pixel)                                                     \
+  template Result<std::optional<CalibrationSession::Alignment>>                \
+  CalibrationSession::align (ImageView<const Pixel>, const StageOptions &);    \
+  template Result<void> CalibrationSession::collect (                          \
+      const Pattern &, ImageView<const Pixel>);                                \
+  template Result<std::optional<CalibrationSession::Phase>>                    \
+      CalibrationSession::find_phase (ImageView<const Pixel>);
+INSTANTIATE (std::uint8_t)
+INSTANTIATE (std::uint16_t)
+
+std::vector<std::string>
+alignment_lines (const CalibrationSession::Alignment &alignment)
+{
+  const LiveReading &reading = alignment.reading;
+  const StageCorrection &todo = alignment.correction;
+  const Pose sigma = reading.mapping.pose_sigma ();
+  return {
+      format ("rotation %+.4f ± %.0e°    magnification %.5f ± %.0e",
+          todo.rotation, sigma.rotation, todo.magnification,
+          sigma.magnification),
+      format ("offset x %+.4f  y %+.4f ± %.0e mirrors    worst corner %.3f",
+          todo.offset.x, todo.offset.y, sigma.shift_x, todo.deviation),
+      format ("stage: x %+.2f µm   y %+.2f µm   θ %+.1f m°   magnify %+.2f ‰",
+          todo.stage_x, todo.stage_y, todo.stage_theta, todo.magnify),
+      format ("contrast x %.2f  y %.2f    covered %.0f %%%s",
+          reading.contrast.x, reading.contrast.y, 100 * reading.coverage,
+          reading.saturated > 0 ? "    SATURATED: less light" : ""),
+  };
+}
+
+std::vector<std::string>
+mapping_lines (
+    const CalibrationResult &result, const StageCorrection &correction)
+{
+  const Pose sigma = result.mapping.pose_sigma ();
+  return {format ("rotation %+.5f ± %.0e°    magnification %.6f ± %.0e",
+              correction.rotation, sigma.rotation, correction.magnification,
+              sigma.magnification),
+      format ("offset x %+.5f  y %+.5f ± %.0e mirrors    worst corner %.3f",
+          correction.offset.x, correction.offset.y, sigma.shift_x,
+          correction.deviation)};
+}
+
+std::vector<std::string>
+report_lines (
+    const CalibrationResult &result, const StageCorrection &correction)
+{
+  const Pose sigma = result.mapping.pose_sigma ();
+  return {
+      format ("rotation %+.5f ± %.0e°", correction.rotation, sigma.rotation),
+      format ("magnification %.6f ± %.0e pixels a mirror",
+          correction.magnification, sigma.magnification),
+      format ("from the nearest aligned position: x %+.5f, y %+.5f ± %.0e "
+              "mirrors; worst corner %.4f",
+          correction.offset.x, correction.offset.y, sigma.shift_x,
+          correction.deviation),
+      format ("blur of the optics %.2f pixels; misfit %.2f", result.psf_sigma,
+          result.misfit)};
+}
+
+} // namespace codedexposure

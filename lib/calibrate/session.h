@@ -1,0 +1,120 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* One run of a calibration, frame by frame. */
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/image.h"
+#include "base/result.h"
+#include "calibrate/calibration.h"
+#include "calibrate/fringes.h"
+#include "calibrate/gratings.h"
+#include "calibrate/live_moire.h"
+#include "calibrate/stage.h"
+#include "calibrate/tile_phase.h"
+#include "schedule/schedule.h"
+
+namespace codedexposure
+{
+
+/** How far a run has come. The first four are those of AlignmentState. */
+enum class SessionStage {
+  searching,
+  coarse,
+  fine,
+  aligned,
+  mapping, ///< the patterns of a calibration are shown, one after the other
+  solving,
+  mapped,
+  failed,
+  found, ///< the phase of the tile
+};
+const char *session_stage_text (SessionStage stage);
+
+/**
+ * Takes the frames of a run, in any of three ways: align () reads fringes until
+ * the bench is aligned, collect () and solve () find the mapping, find_phase ()
+ * finds the phase of a tile without patterns.
+ *
+ * Pixel is std::uint8_t or std::uint16_t, of frames of the camera's size.
+ */
+class CalibrationSession
+{
+public:
+  /** A phase with this probability is accepted. */
+  static constexpr double kSure = 0.999;
+
+  struct Options {
+    Extent camera;
+    Extent mirrors;
+    int bits = 0; ///< significant ones of a pixel; 0: all of its type
+    std::vector<Pattern> patterns = {};    ///< of the mapping
+    std::optional<Schedule> schedule = {}; ///< whose phase is sought
+  };
+  explicit CalibrationSession (Options options) : options_ (std::move (options))
+  {
+  }
+
+  /** Which grating align () will see, and at which magnification. Error when
+   * its fringes cannot be read. */
+  Result<void> expect (const Pattern &grating, double pixels_per_mirror);
+
+  struct Alignment {
+    LiveReading reading;
+    StageCorrection correction;
+  };
+  /** What a frame of the grating says. None where no grating was expected;
+   * error when none is seen. */
+  template <typename Pixel>
+  Result<std::optional<Alignment>> align (
+      ImageView<const Pixel> frame, const StageOptions &stage);
+  /** Alignments in a row, up to the last frame, that were within tolerance. */
+  int aligned () const { return aligned_; }
+  /** Fringes of the first and the last frame in which a grating was seen; no
+   * last ones while none is seen. */
+  const std::optional<FringePair> &first_fringes () const { return first_; }
+  const std::optional<FringePair> &last_fringes () const { return last_; }
+
+  /** Adds a frame of @p pattern, which is one of the patterns of the run. After
+   * an error, the run has failed. */
+  template <typename Pixel>
+  Result<void> collect (const Pattern &pattern, ImageView<const Pixel> frame);
+  int collected () const { return collected_; } ///< frames
+  /** The mapping from all frames; once. None where none was collected. */
+  Result<std::optional<CalibrationResult>> solve ();
+
+  /** A tile's phase, and the schedule that has it. */
+  struct Phase {
+    TilePhase tile;
+    Schedule schedule;
+  };
+  /** None while no frame makes it sure; confidence () says how near the best
+   * one came. */
+  template <typename Pixel>
+  Result<std::optional<Phase>> find_phase (ImageView<const Pixel> frame);
+  double confidence () const { return confidence_; }
+
+private:
+  Options options_;
+  std::optional<LiveMoire> live_;
+  std::optional<Calibration> calibration_;
+  std::optional<FringePair> first_, last_;
+  int aligned_ = 0;
+  int collected_ = 0;
+  double confidence_ = 0.0;
+};
+
+/** What an alignment says, in lines of text for people. */
+std::vector<std::string> alignment_lines (
+    const CalibrationSession::Alignment &alignment);
+/** What a mapping says, briefly and in full; @p correction is of its mapping.
+ */
+std::vector<std::string> mapping_lines (
+    const CalibrationResult &result, const StageCorrection &correction);
+std::vector<std::string> report_lines (
+    const CalibrationResult &result, const StageCorrection &correction);
+
+} // namespace codedexposure

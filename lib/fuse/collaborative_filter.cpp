@@ -1,0 +1,194 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "fuse/collaborative_filter.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "fuse/dct.h"
+
+namespace codedexposure::fuse
+{
+
+namespace
+{
+
+constexpr int kBorder = kBlock;
+constexpr int kIterations = 40;
+/* Thresholds of the first and the last iteration, in grey levels; with noise,
+ * the last one is kNoiseThreshold standard deviations at least. */
+constexpr double kFirstThreshold = 30.0, kLastThreshold = 2.0;
+constexpr double kNoiseThreshold = 1.8;
+/* Rows of blocks that are shrunk, and rows of pixels that are updated, at a
+ * time. Strips of blocks overlap the next ones only. */
+constexpr int kStripBlocks = 6;
+constexpr int kStripRows = 24;
+static_assert (kStripBlocks * kBlockStep >= kBlock - kBlockStep);
+
+int
+round_up (int value, int step)
+{
+  return (value + step - 1) / step * step;
+}
+
+} // namespace
+
+CollaborativeFilter::CollaborativeFilter (const Schedule &schedule,
+    const Observation &observation, int width, int height)
+    : observation_ (observation), width_ (width), height_ (height),
+      split_ (round_up (width + 2 * kBorder, kBlockStep * Field::kSlack) /
+                  kBlockStep +
+              kBlock / kBlockStep + 1),
+      stride_ (split_ * kBlockStep),
+      transform_ (dct_matrix (observation.slots ()))
+{
+  const auto area = std::size_t (stride_) * std::size_t (height + 2 * kBorder);
+  const auto slots = std::size_t (observation.slots ());
+  elements_.resize (area);
+  coded_.resize (area);
+  weight_.resize (area);
+  light_.assign (slots, std::vector<float> (area));
+  sum_ = light_;
+  for (int y = -kBorder; y < height + kBorder; y++)
+    for (int x = -kBorder; x < int (stride_) - kBorder; x++)
+      elements_[place (x, y)] = std::uint8_t (
+          schedule.element_at (mirrored (x, width), mirrored (y, height)));
+}
+
+std::size_t
+CollaborativeFilter::place (int x, int y) const
+{
+  const int column = x + kBorder;
+  return std::size_t ((y + kBorder) * stride_ + (column % kBlockStep) * split_ +
+                      column / kBlockStep);
+}
+
+void
+CollaborativeFilter::split (const Field &field, std::vector<float> &plane) const
+{
+  for (int y = -kBorder; y < height_ + kBorder; y++) {
+    const float *row = field.row (mirrored (y, height_));
+    /* To the end of the row, as the last blocks reach beyond the border. */
+    for (int x = -kBorder; x < int (stride_) - kBorder; x++)
+      plane[place (x, y)] = row[mirrored (x, width_)];
+  }
+}
+
+/* Blocks begin at a different pixel in each iteration. */
+struct CollaborativeFilter::Step {
+  const Kernels &kernels;
+  int shift_x, shift_y;
+  float threshold;
+};
+
+void
+CollaborativeFilter::shrink_strip (const Step &step, int strip, float *scratch)
+{
+  const std::size_t slots = light_.size ();
+  std::vector<const float *> source (slots);
+  std::vector<float *> sum (slots);
+  const int blocks =
+      round_up ((width_ + kBorder - step.shift_x + kBlockStep - 1) / kBlockStep,
+          Field::kSlack);
+  for (int i = 0; i < kStripBlocks; i++) {
+    const int y = step.shift_y + (strip * kStripBlocks + i) * kBlockStep;
+    if (y + kBlock > height_ + 2 * kBorder)
+      return;
+    const std::ptrdiff_t start = y * stride_;
+    for (std::size_t s = 0; s < slots; s++) {
+      source[s] = light_[s].data () + start;
+      sum[s] = sum_[s].data () + start;
+    }
+    step.kernels.shrink ({source.data (), sum.data (), weight_.data () + start,
+        stride_, split_, step.shift_x, int (slots), transform_.data (), blocks,
+        step.threshold, scratch});
+  }
+}
+
+/* Every other strip first, then those between: no two workers add to the same
+ * pixel, and each pixel's sum has the same order with any number of them. */
+bool
+CollaborativeFilter::shrink (
+    const Step &step, Workers &workers, std::stop_token stop)
+{
+  const int rows = (height_ + 2 * kBorder - kBlock - step.shift_y) / kBlockStep;
+  const int strips = rows / kStripBlocks + 1;
+  for (const int odd : {0, 1})
+    if (!workers.run ((strips + 1 - odd) / 2,
+            [&] (int part, int worker) {
+              shrink_strip (
+                  step, 2 * part + odd, scratch_[std::size_t (worker)].data ());
+            },
+            stop))
+      return false;
+  const int height = height_ + 2 * kBorder;
+  return workers.run ((height + kStripRows - 1) / kStripRows,
+      [&] (int part, int) {
+        update_rows (
+            part * kStripRows, std::min (height, (part + 1) * kStripRows));
+      },
+      stop);
+}
+
+/* The light of rows @first .. @end - 1 from the sums, which are cleared, and
+ * then corrected so that it gives the coded pixels that were measured. */
+void
+CollaborativeFilter::update_rows (int first, int end)
+{
+  const auto from = std::size_t (first * stride_);
+  const auto to = std::size_t (end * stride_);
+  for (std::size_t s = 0; s < light_.size (); s++) {
+    float *light = light_[s].data (), *sum = sum_[s].data ();
+    for (std::size_t i = from; i < to; i++)
+      light[i] = weight_[i] > 0.0f ? sum[i] / weight_[i] : light[i];
+    std::fill (sum + from, sum + to, 0.0f);
+  }
+  std::fill (weight_.data () + from, weight_.data () + to, 0.0f);
+  for (std::size_t i = from; i < to; i++) {
+    const auto &shares = observation_.shares (elements_[i]);
+    double seen = 0.0, power = 0.0;
+    for (const auto &[slot, response] : shares) {
+      seen += response * light_[std::size_t (slot)][i];
+      power += response * response;
+    }
+    const double step = (coded_[i] - seen) / power;
+    for (const auto &[slot, response] : shares)
+      light_[std::size_t (slot)][i] += float (step * response);
+  }
+}
+
+bool
+CollaborativeFilter::run (const Kernels &kernels, const Field &coded,
+    double noise, std::span<Field> slots, Workers &workers,
+    std::stop_token stop)
+{
+  scratch_.resize (std::size_t (workers.count ()));
+  for (auto &scratch : scratch_)
+    scratch.resize (slots.size () * kBlock * kBlock * Field::kSlack);
+  split (coded, coded_);
+  for (std::size_t s = 0; s < slots.size (); s++) {
+    split (slots[s], light_[s]);
+    std::fill (sum_[s].begin (), sum_[s].end (), 0.0f);
+  }
+  std::fill (weight_.begin (), weight_.end (), 0.0f);
+
+  const double last = std::max (kLastThreshold, kNoiseThreshold * noise);
+  const double first = std::max (kFirstThreshold, 2.0 * last);
+  for (int i = 0; i < kIterations; i++) {
+    const double threshold =
+        first * std::pow (last / first, double (i) / (kIterations - 1));
+    if (!shrink ({kernels, (i / 2 + 2 * i) % kBlockStep, i % kBlockStep,
+                     float (threshold)},
+            workers, stop))
+      return false;
+  }
+  for (std::size_t s = 0; s < slots.size (); s++) {
+    for (int y = 0; y < height_; y++) {
+      float *row = slots[s].row (y);
+      for (int x = 0; x < width_; x++)
+        row[x] = 0.5f * (row[x] + light_[s][place (x, y)]);
+    }
+  }
+  return true;
+}
+
+} // namespace codedexposure::fuse

@@ -1,0 +1,57 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Collaborative filtering: shrinkage of 3-D cosine transforms. */
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "base/workers.h"
+#include "estimate/observation.h"
+#include "fuse/field.h"
+#include "fuse/kernels.h"
+
+namespace codedexposure::fuse
+{
+
+/**
+ * Iterated shrinkage. Overlapping blocks of 12x12 pixels x all slots have few
+ * large coefficients under a cosine transform if they show one object that is
+ * static or moves evenly. Each iteration sets small coefficients to 0, restores
+ * the light that the coded frame has measured, and lowers the threshold.
+ */
+class CollaborativeFilter
+{
+public:
+  CollaborativeFilter (const Schedule &schedule, const Observation &observation,
+      int width, int height);
+
+  /** Improves @p slots, an estimate of the light of each slot, by @p coded. The
+   * result does not depend on the number of workers.
+   * @p noise  standard deviation of the coded pixels' noise, grey levels.
+   * @return   false when it was stopped. */
+  bool run (const Kernels &kernels, const Field &coded, double noise,
+      std::span<Field> slots, Workers &workers, std::stop_token stop);
+
+private:
+  /* Planes are split into every fourth column, as the kernels expect, with a
+   * mirrored border of one block. */
+  std::size_t place (int x, int y) const;
+  void split (const Field &field, std::vector<float> &plane) const;
+  struct Step;
+  bool shrink (const Step &step, Workers &workers, std::stop_token stop);
+  void shrink_strip (const Step &step, int strip, float *scratch);
+  void update_rows (int first, int end);
+
+  const Observation &observation_;
+  int width_, height_;
+  std::ptrdiff_t split_, stride_;
+  std::vector<float> transform_;
+  std::vector<std::uint8_t> elements_; ///< at every place
+  std::vector<float> coded_;
+  std::vector<std::vector<float>> light_, sum_; ///< of each slot
+  std::vector<float> weight_;
+  std::vector<std::vector<float>> scratch_; ///< of each worker
+};
+
+} // namespace codedexposure::fuse

@@ -1,0 +1,72 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Detection of static pixels, by comparing coded frames with each other. */
+#pragma once
+
+#include "estimate/observation.h"
+#include "fuse/box_filter.h"
+#include "fuse/field.h"
+
+namespace codedexposure::fuse
+{
+
+/** Noise of every pixel of a frame: variance = slope * light + offset, in
+ * units of the fields (255 for white). */
+struct NoiseMap {
+  Field slope, offset;
+};
+
+/**
+ * A pixel sees the same slots of every frame. If neither the pixel nor the
+ * pixels around it, which see all other slots, have changed by more than noise
+ * explains, the scene is static there, and the coded frame is the picture,
+ * whatever its texture. A scene that repeats with the frame rate shows no
+ * changes either. There, neighbours of the same slot predict a pixel better
+ * than the closest neighbours do, and the pixel does not count as static.
+ *
+ * If the noise is known, the light of static pixels is averaged over the frames
+ * since they became static.
+ */
+class StaticPixels
+{
+public:
+  /** @p radius   of the surroundings, which contain every slot, px.
+   *  @p average  over frames. */
+  StaticPixels (int width, int height, int radius, bool average);
+  int radius () const { return radius_; }
+  /** The radius for a tile with this cell. */
+  static int radius_of (Extent cell);
+
+  /** Prediction errors of row @p y of the next frame of update (), by which
+   * repetition is detected: sums of squared errors around each pixel, under the
+   * assumption that the scene is static and that every slot shows a different
+   * picture. */
+  void set_errors (int y, const float *if_static, const float *if_moving);
+  /** Takes the next coded frame, and the frame after it or null. */
+  void update (const Kernels &kernels, const Field &coded, const Field *after,
+      const NoiseMap &noise);
+  /** Forgets all frames. */
+  void forget () { begun_ = false; }
+
+  /** Weight of light (): 0, moving, to 1, static. */
+  const float *weight (int y) const { return weight_.row (y); }
+  /** The picture of static pixels. */
+  const float *light (int y) const { return mean_.row (y); }
+
+private:
+  void compare_frames (const Kernels &kernels, const Field &now,
+      const Field &other, const Field *count, const NoiseMap &noise,
+      bool raise);
+  void rate_row (int y, const float *sum, const float *max, bool raise);
+
+  int radius_;
+  bool average_;
+  bool begun_ = false;
+  Field mean_;   ///< of the frames in which a pixel was static
+  Field count_;  ///< of these frames
+  Field change_; ///< one row
+  BoxFilter sums_, maxima_;
+  Field unrepeated_; ///< 1 where no repetition is detected
+  Field weight_;
+};
+
+} // namespace codedexposure::fuse

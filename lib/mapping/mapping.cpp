@@ -1,0 +1,408 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "mapping/mapping.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numbers>
+
+#include "base/text.h"
+
+namespace codedexposure
+{
+
+namespace
+{
+
+double
+determinant (const Homography &h)
+{
+  return h[0] * (h[4] * h[8] - h[5] * h[7]) -
+         h[1] * (h[3] * h[8] - h[5] * h[6]) +
+         h[2] * (h[3] * h[7] - h[4] * h[6]);
+}
+
+/* Up to a factor. */
+Homography
+inverse_of (const Homography &h)
+{
+  return {h[4] * h[8] - h[5] * h[7], h[2] * h[7] - h[1] * h[8],
+      h[1] * h[5] - h[2] * h[4], h[5] * h[6] - h[3] * h[8],
+      h[0] * h[8] - h[2] * h[6], h[2] * h[3] - h[0] * h[5],
+      h[3] * h[7] - h[4] * h[6], h[1] * h[6] - h[0] * h[7],
+      h[0] * h[4] - h[1] * h[3]};
+}
+
+/* d mirror / d camera of the homography alone. */
+std::array<double, 4>
+slope_of (const Homography &h, double x, double y)
+{
+  const Projected p = project (h, x, y);
+  return {(h[0] - p.x * h[6]) / p.z, (h[1] - p.x * h[7]) / p.z,
+      (h[3] - p.y * h[6]) / p.z, (h[4] - p.y * h[7]) / p.z};
+}
+
+Error
+bad_number (const std::string &what, double value, const std::string &rule)
+{
+  return Error{what + " is " + real_text (value) + "; " + rule};
+}
+
+Result<void>
+check_size (const char *what, Extent size)
+{
+  if (std::min (size.width, size.height) >= 1 &&
+      std::max (size.width, size.height) <= Mapping::kMaxSize)
+    return {};
+  return Error{std::string ("a mapping's ") + what + " of " +
+               std::to_string (size.width) + "x" +
+               std::to_string (size.height) + " must be from 1x1 to " +
+               std::to_string (Mapping::kMaxSize) + "x" +
+               std::to_string (Mapping::kMaxSize)};
+}
+
+Result<void>
+check_finite (const char *what, const double *numbers, std::size_t count)
+{
+  for (std::size_t i = 0; i < count; i++)
+    if (!std::isfinite (numbers[i]))
+      return bad_number (std::string (what) + "[" + std::to_string (i) + "]",
+          numbers[i], "it must be finite");
+  return {};
+}
+
+/* Scales @h so that Z is 1 at the centre of the frame. */
+Result<void>
+normalise (Homography &h, Extent camera)
+{
+  if (const auto checked = check_finite ("homography", h.data (), h.size ());
+      !checked)
+    return checked;
+  const CentredFrame frame (camera);
+  const double z = h[6] * frame.cx + h[7] * frame.cy + h[8];
+  /* What is right to the last digits stays as it is written. */
+  if (std::abs (z - 1.0) > 1e-12)
+    for (double &number : h)
+      number /= z;
+  if (z == 0.0 || !check_finite ("homography", h.data (), h.size ()).ok ())
+    return bad_number ("the homography's Z at the centre of the frame", z,
+        "the horizon must lie outside of the frame");
+  for (const double x : {0.0, 2.0 * frame.cx})
+    for (const double y : {0.0, 2.0 * frame.cy})
+      if (const double corner = h[6] * x + h[7] * y + h[8]; !(corner > 1e-3))
+        return bad_number ("the homography's Z in a corner of the frame, of "
+                           "that at the centre,",
+            corner, "the horizon must lie outside of the frame");
+  if (!(std::abs (determinant (h)) > 1e-9))
+    return bad_number ("the determinant of the homography", determinant (h),
+        "it must have an inverse");
+  return {};
+}
+
+Result<void>
+check_displacement (const Displacement &grid)
+{
+  for (const auto &[what, count] :
+      {std::pair ("columns", grid.columns), std::pair ("rows", grid.rows)})
+    if (count < 2 || count > Mapping::kMaxNodes)
+      return bad_number (std::string ("displacement.") + what, count,
+          "it must be 2 to " + std::to_string (Mapping::kMaxNodes));
+  const std::size_t nodes =
+      std::size_t (grid.columns) * std::size_t (grid.rows);
+  for (const auto &[what, numbers] : {std::pair ("displacement.x", &grid.x),
+           std::pair ("displacement.y", &grid.y)}) {
+    if (numbers->size () != nodes)
+      return bad_number (std::string ("the count of ") + what,
+          double (numbers->size ()),
+          "it must be columns x rows = " + std::to_string (nodes));
+    if (const auto checked =
+            check_finite (what, numbers->data (), numbers->size ());
+        !checked)
+      return checked;
+  }
+  return {};
+}
+
+Result<void>
+check_covariance (const Mapping::Covariance &covariance)
+{
+  constexpr std::size_t n = Mapping::kParameters;
+  if (const auto checked =
+          check_finite ("covariance", covariance.data (), covariance.size ());
+      !checked)
+    return checked;
+  for (std::size_t i = 0; i < n; i++) {
+    if (covariance[i * n + i] < 0.0)
+      return bad_number ("variance " + std::to_string (i) + " of the mapping",
+          covariance[i * n + i], "no variance is negative");
+    for (std::size_t j = 0; j < i; j++)
+      if (covariance[i * n + j] != covariance[j * n + i])
+        return Error{"the covariance of a mapping must be symmetric; rows " +
+                     std::to_string (j) + " and " + std::to_string (i) +
+                     " are not"};
+  }
+  return {};
+}
+
+Homography
+centred_of (const Homography &h, Extent camera)
+{
+  const CentredFrame f (camera);
+  Homography c;
+  for (std::size_t row = 0; row < 9; row += 3) {
+    c[row] = h[row] * f.r;
+    c[row + 1] = h[row + 1] * f.r;
+    c[row + 2] = h[row] * f.cx + h[row + 1] * f.cy + h[row + 2];
+  }
+  return c;
+}
+
+Homography
+uncentred (const Homography &c, Extent camera)
+{
+  const CentredFrame f (camera);
+  Homography h;
+  for (std::size_t row = 0; row < 9; row += 3) {
+    h[row] = c[row] / f.r;
+    h[row + 1] = c[row + 1] / f.r;
+    h[row + 2] = c[row + 2] - h[row] * f.cx - h[row + 1] * f.cy;
+  }
+  return h;
+}
+
+Pose
+pose_of (const std::array<double, 4> &slope)
+{
+  Pose s;
+  auto [xx, xy, yx, yy] = slope;
+  s.flipped = xx * yy - xy * yx < 0.0;
+  if (s.flipped) {
+    xx = -xx;
+    yx = -yx;
+  }
+  s.rotation = std::atan2 (yx - xy, xx + yy) * 180.0 / std::numbers::pi;
+  s.magnification = 1.0 / std::sqrt (std::abs (xx * yy - xy * yx));
+  /* Singular values: half of |similarity part| +- |the rest|. */
+  const double alike = std::hypot (xx + yy, yx - xy);
+  const double other = std::hypot (xx - yy, yx + xy);
+  s.stretch = 2.0 * other / (alike - other);
+  return s;
+}
+
+/* Standard deviation of @value (parameters) that @covariance makes. */
+double
+propagate (const Mapping::Covariance &covariance, const Homography &at,
+    const std::function<double (const Homography &)> &value)
+{
+  constexpr std::size_t n = Mapping::kParameters;
+  std::array<double, n> gradient;
+  for (std::size_t i = 0; i < n; i++) {
+    const double step = 1e-4;
+    Homography up = at, down = at;
+    up[i] += step;
+    down[i] -= step;
+    gradient[i] = (value (up) - value (down)) / (2.0 * step);
+  }
+  double variance = 0.0;
+  for (std::size_t i = 0; i < n; i++)
+    for (std::size_t j = 0; j < n; j++)
+      variance += gradient[i] * covariance[i * n + j] * gradient[j];
+  return std::sqrt (std::max (0.0, variance));
+}
+
+} // namespace
+
+Mapping::Mapping (Extent both) : parts_{both, both} {}
+
+Result<Mapping>
+Mapping::make (Parts parts)
+try {
+  for (const auto &[what, size] : {std::pair ("camera", parts.camera),
+           std::pair ("mirrors", parts.mirrors)})
+    if (const auto checked = check_size (what, size); !checked)
+      return checked.error ();
+  if (const auto checked = normalise (parts.homography, parts.camera); !checked)
+    return checked.error ();
+  if (!(parts.psf_sigma >= 0.0 && parts.psf_sigma <= kMaxPsfSigma))
+    return bad_number ("psf_sigma", parts.psf_sigma,
+        "it must be 0 to " + real_text (kMaxPsfSigma) + " pixels");
+  if (parts.covariance)
+    if (const auto checked = check_covariance (*parts.covariance); !checked)
+      return checked.error ();
+  if (parts.displacement)
+    if (const auto checked = check_displacement (*parts.displacement); !checked)
+      return checked.error ();
+  return Mapping (std::move (parts));
+} catch (const std::bad_alloc &) {
+  return out_of_memory ();
+}
+
+Result<Mapping>
+Mapping::from_centred (Extent camera, Extent mirrors, const Homography &centred)
+try {
+  return make ({camera, mirrors, uncentred (centred, camera)});
+} catch (const std::bad_alloc &) {
+  return out_of_memory ();
+}
+
+Position
+Mapping::displaced (double x, double y) const
+{
+  const Displacement &d = *parts_.displacement;
+  struct Node {
+    int low;
+    double part;
+    Node (double at, int last, int nodes)
+    {
+      const double node =
+          std::clamp (at / std::max (1, last), 0.0, 1.0) * (nodes - 1);
+      low = std::min (int (node), nodes - 2);
+      part = node - low;
+    }
+  };
+  const Node i (x, parts_.camera.width - 1, d.columns);
+  const Node j (y, parts_.camera.height - 1, d.rows);
+  const std::size_t at = std::size_t (j.low * d.columns + i.low);
+  const auto blend = [&] (const std::vector<double> &v) {
+    const std::size_t below = at + std::size_t (d.columns);
+    const double top = v[at] + i.part * (v[at + 1] - v[at]);
+    const double bottom = v[below] + i.part * (v[below + 1] - v[below]);
+    return top + j.part * (bottom - top);
+  };
+  return {blend (d.x), blend (d.y)};
+}
+
+Position
+Mapping::mirror_at (double x, double y) const
+{
+  const Projected p = project (parts_.homography, x, y);
+  if (!parts_.displacement)
+    return {p.x, p.y};
+  const Position d = displaced (x, y);
+  return {p.x + d.x, p.y + d.y};
+}
+
+Position
+Mapping::camera_at (Position mirror) const
+{
+  const Homography back = inverse_of (parts_.homography);
+  Position wanted = mirror;
+  Projected p = project (back, wanted.x, wanted.y);
+  /* The displacement changes little from pixel to pixel: a few rounds do. */
+  for (int i = 0; parts_.displacement && i < 50; i++) {
+    const Position d = displaced (p.x, p.y);
+    wanted = {mirror.x - d.x, mirror.y - d.y};
+    const Projected next = project (back, wanted.x, wanted.y);
+    const double change = std::hypot (next.x - p.x, next.y - p.y);
+    p = next;
+    if (change < 1e-11)
+      break;
+  }
+  return {p.x, p.y};
+}
+
+void
+Mapping::camera_row (int y, std::span<Position> seen) const
+{
+  const Homography back = inverse_of (parts_.homography);
+  double x = 0.0;
+  if (!parts_.displacement) {
+    for (Position &at : seen) {
+      const Projected p = project (back, x++, y);
+      at = {p.x, p.y};
+    }
+    return;
+  }
+  /* A mirror's displacement is nearly that of the one before. */
+  const Position first = camera_at ({0.0, double (y)});
+  Position d = displaced (first.x, first.y);
+  for (Position &at : seen) {
+    Projected p = project (back, x - d.x, y - d.y);
+    for (int round = 0; round < 2; round++) {
+      d = displaced (p.x, p.y);
+      p = project (back, x - d.x, y - d.y);
+    }
+    at = {p.x, p.y};
+    x++;
+  }
+}
+
+std::array<double, 4>
+Mapping::slope_at (double x, double y) const
+{
+  std::array<double, 4> slope = slope_of (parts_.homography, x, y);
+  if (parts_.displacement) {
+    const Position left = displaced (x - 0.5, y),
+                   right = displaced (x + 0.5, y);
+    const Position up = displaced (x, y - 0.5), down = displaced (x, y + 0.5);
+    slope[0] += right.x - left.x;
+    slope[1] += down.x - up.x;
+    slope[2] += right.y - left.y;
+    slope[3] += down.y - up.y;
+  }
+  return slope;
+}
+
+bool
+Mapping::covers (Position mirror) const
+{
+  return mirror.x >= -0.5 && mirror.x < parts_.mirrors.width - 0.5 &&
+         mirror.y >= -0.5 && mirror.y < parts_.mirrors.height - 0.5;
+}
+
+Homography
+Mapping::centred () const
+{
+  return centred_of (parts_.homography, parts_.camera);
+}
+
+Pose
+Mapping::pose () const
+{
+  const CentredFrame camera (parts_.camera), mirrors (parts_.mirrors);
+  Pose s = pose_of (slope_of (parts_.homography, camera.cx, camera.cy));
+  const Position centre = mirror_at (camera.cx, camera.cy);
+  s.shift_x = centre.x - mirrors.cx;
+  s.shift_y = centre.y - mirrors.cy;
+  return s;
+}
+
+Pose
+Mapping::pose_sigma () const
+{
+  Pose sigma;
+  sigma.magnification = 0.0;
+  if (!parts_.covariance)
+    return sigma;
+  const auto of = [this] (auto what) {
+    return propagate (
+        *parts_.covariance, centred (), [&] (const Homography &c) {
+          const CentredFrame f (parts_.camera);
+          const Homography h = uncentred (c, parts_.camera);
+          return what (pose_of (slope_of (h, f.cx, f.cy)));
+        });
+  };
+  sigma.shift_x = std::sqrt ((*parts_.covariance)[2 * kParameters + 2]);
+  sigma.shift_y = std::sqrt ((*parts_.covariance)[5 * kParameters + 5]);
+  sigma.rotation = of ([] (const Pose &s) { return s.rotation; });
+  sigma.magnification = of ([] (const Pose &s) { return s.magnification; });
+  sigma.stretch = of ([] (const Pose &s) { return s.stretch; });
+  return sigma;
+}
+
+bool
+Mapping::one_to_one (double tolerance) const
+{
+  for (int y = 0; y < parts_.camera.height; y++)
+    for (int x = 0; x < parts_.camera.width; x++) {
+      const Position m = mirror_at (x, y);
+      if (std::abs (m.x - std::round (m.x)) > tolerance ||
+          std::abs (m.y - std::round (m.y)) > tolerance)
+        return false;
+    }
+  /* Whole mirrors, and not every second one, nor two pixels to one. */
+  const Pose s = pose ();
+  return std::abs (s.magnification - 1.0) < 0.25;
+}
+
+} // namespace codedexposure

@@ -1,0 +1,30 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* What a stream says of itself: its schedule and, if known, its mapping. */
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "base/result.h"
+#include "mapping/mapping.h"
+#include "schedule/schedule.h"
+
+namespace codedexposure
+{
+
+/** All that was decided and measured before the exposure. */
+struct StreamSetup {
+  Schedule schedule;
+  std::optional<Mapping> mapping = {};
+
+  /** The JSON form of the schedule with one key more that may be left out,
+   * "mapping", which holds the JSON form of a mapping. */
+  static Result<StreamSetup> from_json (std::string_view json);
+  /** One line. Without a mapping it is schedule.to_json (). */
+  std::string to_json () const;
+
+  bool operator== (const StreamSetup &) const = default;
+};
+
+} // namespace codedexposure

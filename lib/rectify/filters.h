@@ -1,0 +1,113 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The filters of all mirrors of a frame; for this folder only. */
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <span>
+#include <vector>
+
+#include "rectify/weights.h"
+
+namespace codedexposure
+{
+
+/** Numbers the windows around mirrors: windows with the same elements have the
+ * same number. */
+class Surroundings
+{
+public:
+  /** @p reach  of the windows, mirrors to each side.
+   * @p elements outlive this. */
+  Surroundings (const Elements &elements, int reach);
+
+  /** Sets @p numbers to those of the windows around mirrors (0, @p y), (1, @p
+   * y)
+   * ... */
+  void find_row (int y, std::span<int> numbers);
+  /** The elements of a window, row by row. */
+  const std::vector<int> &window (int number) const
+  {
+    return *windows_[std::size_t (number)];
+  }
+  int count () const { return int (windows_.size ()); }
+  /** Windows within one part repeat with its tile and have the first numbers:
+   * as many as this. */
+  int repeating () const { return repeating_; }
+
+private:
+  int number_of (std::vector<int> window);
+  void add_part (int part);
+  int inside_part (int part, int x, int y) const;
+  void find_border (int part, int y, std::span<int> numbers);
+
+  const Elements &elements_;
+  int reach_, repeating_;
+  std::map<std::vector<int>, int> numbers_;
+  std::vector<const std::vector<int> *> windows_;
+  std::vector<std::vector<int>>
+      parts_; // numbers in one period of each part's tile
+};
+
+/**
+ * Filters for every surroundings and fraction of a pixel, made when they are
+ * first requested, each for several amounts of noise.
+ *
+ * Weights change smoothly with the fraction, except for a kink where the centre
+ * of a pixel falls on the centre of a mirror. They are solved on a coarse grid
+ * of fractions, which contains the kink, and interpolated between. Next to
+ * another part of the schedule, where few mirrors have the same surroundings,
+ * each filter is solved.
+ */
+class FilterBank
+{
+public:
+  /** @p scene  statistics of the mirrors' light. */
+  FilterBank (
+      const PixelView &view, const Elements &elements, const SceneClass &scene);
+
+  const WeightSolver &solver () const { return solver_; }
+  Surroundings &surroundings () { return surroundings_; }
+  /** Noise of a pixel, rms, in units of the scene's standard deviation. */
+  static constexpr std::array<double, 4> kNoises = {0.05, 0.11, 0.25, 0.55};
+  /** Number of the filters for mirrors with surroundings @p around that are
+   * seen
+   * @p fx, @p fy pixels, -0.5 to 0.5, from the centre of their window. */
+  std::int32_t filter (int around, double fx, double fy);
+
+  /** How a filter's window shows the scene. */
+  struct WindowScale {
+    float smoothness; ///< 1 / roughness (WeightSolver)
+    float darkness;   ///< light of the brightest element / that of the mirror
+  };
+  /** Of each filter. */
+  std::vector<WindowScale> scales () && { return std::move (scales_); }
+  /** Filter after filter, for each of kNoises, row by row; each row is filled
+   * up with zeros to row_length (). */
+  std::vector<float> weights () && { return std::move (weights_); }
+  static constexpr int row_length (int taps) { return (taps + 3) / 4 * 4; }
+
+private:
+  Neighbourhood neighbourhood (int around) const;
+  std::vector<float> solve (
+      const Neighbourhood &mirrors, double fx, double fy) const;
+  const std::vector<float> &node (int around, int i, int j);
+  std::vector<float> interpolated (int around, double fx, double fy);
+  std::int32_t &known_filter (int around, int px, int py);
+  void append (int around, const std::vector<float> &solved);
+
+  const Elements &elements_;
+  WeightSolver solver_;
+  Surroundings surroundings_;
+  CodedCovariance covariance_;
+  int parts_, steps_; // per pixel: filters, and intervals of the solved grid
+  std::map<int, Neighbourhood> neighbourhoods_;
+  std::vector<std::vector<float>> nodes_;
+  std::vector<std::int32_t> filters_; // of repeating surroundings
+  std::map<std::array<int, 3>, std::int32_t> other_filters_;
+  std::vector<float> weights_;
+  std::vector<WindowScale> scales_;
+};
+
+} // namespace codedexposure

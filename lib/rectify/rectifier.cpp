@@ -1,0 +1,347 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "rectify/rectifier.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <new>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "base/range.h"
+#include "base/view_check.h"
+#include "rectify/filters.h"
+#include "rectify/window.h"
+
+namespace codedexposure
+{
+
+namespace
+{
+
+/* Pixels along a side of the window, up to this number of pixels per mirror. */
+constexpr struct {
+  double magnification;
+  int taps;
+} kWindows[] = {{1.3, 5}, {2.3, 7}, {3.5, 9}};
+constexpr double kMinMagnification = 0.75;
+
+/* A mirror is mixed if no pixel gets this part of the light that a pixel
+ * centred on it gets. */
+constexpr double kMixed = 0.6;
+
+constexpr std::int32_t kLookup = -1;
+constexpr std::int32_t kUnseen = -2;
+
+/* The first pixel of a mirror's window, or the pixel to copy. */
+struct Place {
+  std::int16_t x = 0, y = 0;
+  std::int32_t filter = kUnseen;
+};
+
+/* Ratios of the scene's variance and the noise's: below each limit, the filters
+ * for the next larger noise are used. */
+constexpr auto kLimits = [] {
+  std::array<float, FilterBank::kNoises.size () - 1> limits = {};
+  for (std::size_t i = 0; i < limits.size (); i++)
+    limits[i] =
+        float (1.0 / (FilterBank::kNoises[i] * FilterBank::kNoises[i + 1]));
+  return limits;
+}();
+
+} // namespace
+
+struct Rectifier::Plan {
+  Extent camera, mirrors;
+  int taps = 1;
+  RectifyReport report;
+  Image<Place> places;
+  std::vector<float> weights; // from FilterBank::weights ()
+  std::vector<FilterBank::WindowScale> scales;
+  float noise = 0.0f; // rms, as a part of white
+
+  template <typename Pixel>
+  Result<void> run (ImageView<const Pixel> from, ImageView<Pixel> to, int first,
+      int rows, int largest) const;
+  template <int kTaps, typename Pixel>
+  void filter_row (ImageView<const Pixel> from, const Place *places, Pixel *to,
+      float largest) const;
+};
+
+namespace
+{
+
+/* Makes a plan row by row. */
+class Planner
+{
+public:
+  Planner (const Mapping &mapping, const Schedule &schedule,
+      const RectifyOptions &options, int taps)
+      : mapping_ (mapping), tolerance_ (options.tolerance),
+        coded_rows_ (mapping.mirrors ().height - schedule.pilot_rows ()),
+        elements_ (schedule, mapping.mirrors ()),
+        bank_ (view_of (mapping, taps), elements_, scene_of (options)),
+        whole_ (mapping.one_to_one (options.tolerance)),
+        single_ (taps == kWindows[0].taps),
+        best_share_ (bank_.solver ().own_share (0.0, 0.0)),
+        seen_ (std::size_t (mapping.mirrors ().width)), around_ (seen_.size ())
+  {
+  }
+
+  void place_row (int y, Place *row, RectifyReport &report);
+  std::vector<float> weights () && { return std::move (bank_).weights (); }
+  std::vector<FilterBank::WindowScale> scales () &&
+  {
+    return std::move (bank_).scales ();
+  }
+
+private:
+  static PixelView view_of (const Mapping &mapping, int taps)
+  {
+    const Extent camera = mapping.camera ();
+    return {
+        mapping.slope_at (0.5 * (camera.width - 1), 0.5 * (camera.height - 1)),
+        mapping.psf_sigma (), taps};
+  }
+  /* Persistence is that of the part with the shortest slots. */
+  SceneClass scene_of (const RectifyOptions &options) const
+  {
+    const double slots = double (elements_.most_slots ()) / elements_.slots ();
+    return {.length = options.correlation_length / std::numbers::sqrt3,
+        .correlation = std::pow (options.persistence, slots)};
+  }
+  Place place (Position seen, int around, bool coded, RectifyReport &report);
+
+  const Mapping &mapping_;
+  double tolerance_;
+  int coded_rows_;
+  Elements elements_;
+  FilterBank bank_;
+  bool whole_;
+  bool single_;       // pixel per mirror; of several, all are used
+  double best_share_; // of a pixel centred on its mirror
+  std::vector<Position> seen_;
+  std::vector<int> around_;
+};
+
+void
+Planner::place_row (int y, Place *row, RectifyReport &report)
+{
+  mapping_.camera_row (y, seen_);
+  if (!whole_)
+    bank_.surroundings ().find_row (y, around_);
+  for (std::size_t x = 0; x < seen_.size (); x++)
+    row[x] = place (seen_[x], around_[x], y < coded_rows_, report);
+}
+
+Place
+Planner::place (Position seen, int around, bool coded, RectifyReport &report)
+{
+  const Extent camera = mapping_.camera ();
+  /* NaN must count as outside, too. */
+  if (!(seen.x > -0.5 && seen.x < camera.width - 0.5 && seen.y > -0.5 &&
+          seen.y < camera.height - 0.5)) {
+    report.unseen++;
+    return {};
+  }
+  const int px = int (seen.x + 0.5), py = int (seen.y + 0.5);
+  const double fx = seen.x - px, fy = seen.y - py;
+  const double share = bank_.solver ().own_share (-fx, -fy);
+  const Place pixel = {std::int16_t (px), std::int16_t (py), kLookup};
+  if (whole_ || (single_ && share > 1.0 - 2.0 * tolerance_)) {
+    report.exact++;
+    return pixel;
+  }
+  report.weighted++;
+  report.mixed += share < kMixed * best_share_;
+  const int half = bank_.solver ().taps () / 2;
+  if (px < half || py < half || px + half >= camera.width ||
+      py + half >= camera.height || !coded)
+    return pixel;
+  return {std::int16_t (px - half), std::int16_t (py - half),
+      bank_.filter (around, fx, fy)};
+}
+
+Result<void>
+check (const RectifyOptions &o)
+{
+  return check_ranges ({{"tolerance (mirrors)", o.tolerance, 0.0, 0.5},
+      {"noise (of white)", o.noise, o.kMinNoise, o.kMaxNoise},
+      {"correlation length (mirrors)", o.correlation_length, 0.1, 1000.0},
+      {"persistence", o.persistence, 0.0, 0.9999}});
+}
+
+/* 0 for a magnification out of range. */
+int
+taps_for (double magnification)
+{
+  if (magnification >= kMinMagnification)
+    for (const auto &window : kWindows)
+      if (magnification <= window.magnification)
+        return window.taps;
+  return 0;
+}
+
+} // namespace
+
+Result<Rectifier>
+Rectifier::make (const Mapping &mapping, const Schedule &schedule,
+    const RectifyOptions &options)
+try {
+  if (const auto checked = check (options); !checked)
+    return checked.error ();
+  const Extent mirrors = mapping.mirrors ();
+  if (const auto within = schedule.check_size (mirrors.width, mirrors.height);
+      !within)
+    return within.error ();
+  const double magnification = mapping.pose ().magnification;
+  auto plan = std::make_unique<Plan> ();
+  plan->taps = taps_for (magnification);
+  if (plan->taps == 0)
+    return Error{
+        "a mapping with " + std::to_string (magnification) +
+        " pixels per mirror cannot be corrected; use one of 0.75 to 3.5"};
+  plan->camera = mapping.camera ();
+  plan->mirrors = mirrors;
+  plan->noise = float (
+      options.noise * std::sqrt (schedule.slots () / schedule.white_slots ()));
+  Planner planner (mapping, schedule, options, plan->taps);
+  plan->places = Image<Place> (plan->mirrors.width, plan->mirrors.height);
+  for (int y = 0; y < plan->mirrors.height; y++)
+    planner.place_row (y, plan->places.view ().row (y), plan->report);
+  plan->scales = std::move (planner).scales ();
+  plan->weights = std::move (planner).weights ();
+  if (plan->report.exact + plan->report.weighted == 0)
+    return Error{"with this mapping the camera sees none of the mirrors; use "
+                 "the mapping of this bench"};
+  return Rectifier (std::move (plan));
+} catch (const std::bad_alloc &) {
+  return out_of_memory ();
+}
+
+Rectifier::Rectifier (std::unique_ptr<const Plan> plan)
+    : plan_ (std::move (plan))
+{
+}
+
+Rectifier::Rectifier (Rectifier &&) noexcept = default;
+Rectifier &Rectifier::operator= (Rectifier &&) noexcept = default;
+Rectifier::~Rectifier () = default;
+
+Extent
+Rectifier::camera () const
+{
+  return plan_->camera;
+}
+
+Extent
+Rectifier::mirrors () const
+{
+  return plan_->mirrors;
+}
+
+const RectifyReport &
+Rectifier::report () const
+{
+  return plan_->report;
+}
+
+template <int kTaps, typename Pixel>
+void
+Rectifier::Plan::filter_row (ImageView<const Pixel> from, const Place *row,
+    Pixel *to, float largest) const
+{
+  using Seen = Window<kTaps, Pixel>;
+  constexpr int kNoises = int (FilterBank::kNoises.size ());
+  const float to_noise = 0.5f / (noise * noise * largest * largest);
+  Pixel copy[kTaps * Seen::kRead] = {};
+  for (int x = 0; x < mirrors.width; x++) {
+    const Place &place = row[x];
+    if (place.filter < 0) {
+      to[x] = place.filter == kLookup ? from.at (place.x, place.y) : Pixel (0);
+      continue;
+    }
+    Seen window = {from.row (place.y) + place.x, from.stride};
+    if (place.x + Seen::kRead > from.width) {
+      for (int y = 0; y < kTaps; y++)
+        std::copy_n (window.row (y), kTaps, copy + y * Seen::kRead);
+      window = {copy, sizeof (Pixel) * Seen::kRead};
+    }
+    /* Differences beyond the noise are the scene's. */
+    const FilterBank::WindowScale &scale = scales[std::size_t (place.filter)];
+    const float scene =
+        (window.roughness () * to_noise * scale.darkness - 1.0f) *
+        scale.smoothness;
+    std::ptrdiff_t filter = std::ptrdiff_t (place.filter) * kNoises;
+    for (const float limit : kLimits)
+      filter += scene <= limit;
+    const float sum =
+        window.filtered (weights.data () + filter * kTaps * Seen::kLength);
+    to[x] = Pixel (std::int32_t (std::clamp (sum + 0.5f, 0.0f, largest)));
+  }
+}
+
+template <typename Pixel>
+Result<void>
+Rectifier::Plan::run (ImageView<const Pixel> from, ImageView<Pixel> to,
+    int first, int rows, int largest) const
+{
+  const ViewBytes input = ViewBytes::of (from), output = ViewBytes::of (to);
+  if (auto checked =
+          check_view (input, "camera frame", camera.width, camera.height);
+      !checked)
+    return checked;
+  if (auto checked =
+          check_view (output, "output", mirrors.width, mirrors.height);
+      !checked)
+    return checked;
+  if (auto checked = check_rows (first, rows, mirrors.height); !checked)
+    return checked;
+  if (auto checked = check_apart ({&output, 1}, &input); !checked)
+    return checked;
+  if (largest <= 0)
+    largest = std::numeric_limits<Pixel>::max ();
+  for (int y = first; y < first + rows; y++) {
+    const Place *row = places.view ().row (y);
+    if (taps == 5)
+      filter_row<5> (from, row, to.row (y), float (largest));
+    else if (taps == 7)
+      filter_row<7> (from, row, to.row (y), float (largest));
+    else
+      filter_row<9> (from, row, to.row (y), float (largest));
+  }
+  return {};
+}
+
+Result<void>
+Rectifier::run (ImageView<const std::uint8_t> camera,
+    ImageView<std::uint8_t> mirrors, int largest) const
+{
+  return plan_->run (camera, mirrors, 0, mirrors.height, largest);
+}
+
+Result<void>
+Rectifier::run (ImageView<const std::uint16_t> camera,
+    ImageView<std::uint16_t> mirrors, int largest) const
+{
+  return plan_->run (camera, mirrors, 0, mirrors.height, largest);
+}
+
+Result<void>
+Rectifier::run_rows (ImageView<const std::uint8_t> camera,
+    ImageView<std::uint8_t> mirrors, int first_row, int rows, int largest) const
+{
+  return plan_->run (camera, mirrors, first_row, rows, largest);
+}
+
+Result<void>
+Rectifier::run_rows (ImageView<const std::uint16_t> camera,
+    ImageView<std::uint16_t> mirrors, int first_row, int rows,
+    int largest) const
+{
+  return plan_->run (camera, mirrors, first_row, rows, largest);
+}
+
+} // namespace codedexposure

@@ -1,0 +1,134 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "sync/device_clock.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace codedexposure
+{
+
+namespace
+{
+
+/* Points of the window: 5 ms of jitter leave 4 us (rms) with as many. */
+constexpr std::size_t kMostPoints = 4096;
+/* That many go at once, so that the hull is made anew once for all of them. */
+constexpr std::size_t kForgotten = 512;
+/* Frames that come faster share a point, and the window lasts as long. */
+constexpr double kSpacing = 40e6;
+
+constexpr Nanoseconds kClockWentBack = 1'000'000'000;
+/* A frame that is early by this tells of another clock; the line is known
+ * better with kSettled points than before. */
+constexpr Nanoseconds kEarly = 20'000'000;
+constexpr Nanoseconds kEarlySettled = 1'000'000;
+constexpr std::size_t kSettled = 256;
+
+/* The drift is known as well as this where the line is known to 25 us. */
+constexpr double kSteady = 10e-6;
+constexpr double kKnown = 25e3;
+
+/* A step that is none of a camera's leaves only the order. */
+Nanoseconds
+least_step (Nanoseconds device_step)
+{
+  return device_step > 0 && device_step <= kClockWentBack ? device_step / 2 : 1;
+}
+
+} // namespace
+
+void
+DeviceClock::reset ()
+{
+  last_.reset ();
+  edge_.expect_any ();
+}
+
+void
+DeviceClock::rejoin ()
+{
+  remember_drift ();
+  last_.reset ();
+}
+
+/* What was learned before, where nothing better was since. */
+void
+DeviceClock::remember_drift ()
+{
+  if (deviation_ && *deviation_ < kKnown)
+    edge_.expect (line_.slope, kSteady);
+}
+
+void
+DeviceClock::begin (Nanoseconds device, Nanoseconds arrival)
+{
+  origin_device_ = device;
+  origin_arrival_ = arrival;
+  edge_.clear ();
+  line_ = {};
+  deviation_.reset ();
+}
+
+Nanoseconds
+DeviceClock::told (Nanoseconds device) const
+{
+  const Nanoseconds since = device - origin_device_;
+  return origin_arrival_ + since + std::llround (line_.at (double (since)));
+}
+
+bool
+DeviceClock::is_anew (Nanoseconds device, Nanoseconds arrival) const
+{
+  const Nanoseconds early =
+      edge_.points ().size () < kSettled ? kEarly : kEarlySettled;
+  return device < last_->device - kClockWentBack ||
+         arrival < told (device) - early;
+}
+
+void
+DeviceClock::learn (LowerEdge::Point point)
+{
+  const auto &points = edge_.points ();
+  const bool shares =
+      points.size () > 1 && point.x - points[points.size () - 2].x < kSpacing;
+  if (!shares)
+    edge_.add (point);
+  else if (point.y < points.back ().y)
+    edge_.lower_last (point);
+  else
+    return;
+  if (points.size () > kMostPoints)
+    edge_.forget (kForgotten);
+  const LowerEdge::Estimate estimate = edge_.estimate ();
+  line_ = estimate.line;
+  deviation_ = estimate.deviation;
+}
+
+Nanoseconds
+DeviceClock::take (Nanoseconds device, Nanoseconds arrival)
+{
+  const bool anew = last_ && is_anew (device, arrival);
+  restarts_ += anew;
+  if (anew)
+    remember_drift ();
+  if (!last_ || anew)
+    begin (device, arrival);
+  const bool late = last_ && !anew && device <= last_->device;
+  if (!late)
+    learn ({double (device - origin_device_),
+        double ((arrival - origin_arrival_) - (device - origin_device_))});
+  const Nanoseconds likeliest = told (device);
+  lateness_ = std::max<Nanoseconds> (0, arrival - likeliest);
+  Nanoseconds time = likeliest;
+  if (!late) {
+    if (last_)
+      time = std::max (time, last_->told + least_step (device - last_->device));
+    last_ = Mark{device, time};
+  }
+  uncertainty_.reset ();
+  if (deviation_)
+    uncertainty_ = time - likeliest + std::llround (2 * *deviation_);
+  return time;
+}
+
+} // namespace codedexposure

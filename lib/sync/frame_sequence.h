@@ -1,0 +1,68 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* From the times of frames to their numbers: what was lost, late or doubled. */
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "schedule/timing.h"
+
+namespace codedexposure
+{
+
+/** How a frame follows the one before. */
+enum class Arrival {
+  first,      ///< nothing came before it
+  next,       ///< one frame period later
+  after_loss, ///< more than 1.5 frame periods later
+  duplicate,  ///< at the time of the frame before
+  late,       ///< at a time that was passed already
+  restarted,  ///< the camera's time began anew
+};
+
+struct FrameStep {
+  Arrival arrival = Arrival::first;
+  /** Number of the frame, lost ones counted. A late frame has the number that
+   * was counted as lost, a duplicate that of the frame before. */
+  std::uint64_t number = 0;
+  /** Frames missing right before this one. */
+  std::uint64_t lost = 0;
+};
+
+/**
+ * Numbers frames by their times.
+ *
+ * The period comes from the frame rate, never from the distance of two frames.
+ * A step of less than a quarter of a period makes a duplicate, one of more than
+ * 1.5 periods a loss; all between is jitter. A time that runs backward is one
+ * late frame, or a new start of the camera when the next one is behind as well
+ * or it lies more than a second back.
+ */
+class FrameSequence
+{
+public:
+  /** @p first  number of the first frame. */
+  explicit FrameSequence (FrameRate rate, std::uint64_t first = 0);
+
+  /** Number of the frame that comes next, if none is lost. */
+  std::uint64_t next_number () const { return next_number_; }
+
+  /** @p time of the frame, any epoch; times fall when @p reverse. */
+  FrameStep take (Nanoseconds time, bool reverse = false);
+  /** A frame of a camera that was away, at a time of another beginning: it
+   * follows, @p lost frames later. */
+  FrameStep take_after (Nanoseconds time, std::uint64_t lost);
+  /** The next frame follows at whatever time it has: after a flush, or a new
+   * segment. Numbers go on. */
+  void resync ();
+
+private:
+  FrameStep restart (Nanoseconds time, Arrival arrival);
+
+  Nanoseconds period_;
+  std::optional<Nanoseconds> last_; // of the frame with the largest number
+  std::uint64_t next_number_ = 0;
+  bool last_was_late_ = false;
+};
+
+} // namespace codedexposure

@@ -1,0 +1,192 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "sync/lower_edge.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace codedexposure
+{
+
+namespace
+{
+
+/* Slopes over which lines are weighed. */
+constexpr int kSlopes = 64;
+/* Lines that are less likely than the likeliest by exp (this) do not count. */
+constexpr double kNegligible = 20;
+/* Nor are lines believed in that are by exp (this) less likely than others. */
+constexpr double kIncredible = 10;
+/* No two points are told apart that are closer. */
+constexpr double kGrain = 1;
+
+} // namespace
+
+void
+LowerEdge::clear ()
+{
+  points_.clear ();
+  hull_.clear ();
+}
+
+void
+LowerEdge::expect (double slope, double by)
+{
+  expected_ = Range{
+      std::max (slope - by, -steepest_), std::min (slope + by, steepest_)};
+}
+
+void
+LowerEdge::expect_any ()
+{
+  expected_.reset ();
+}
+
+void
+LowerEdge::add_to_hull (Point point)
+{
+  const auto is_above = [&] (const Point &a, const Point &b) {
+    return (b.y - a.y) * (point.x - a.x) >= (point.y - a.y) * (b.x - a.x);
+  };
+  while (
+      hull_.size () > 1 && is_above (hull_[hull_.size () - 2], hull_.back ()))
+    hull_.pop_back ();
+  hull_.push_back (point);
+}
+
+void
+LowerEdge::add (Point point)
+{
+  points_.push_back (point);
+  add_to_hull (point);
+}
+
+void
+LowerEdge::lower_last (Point point)
+{
+  points_.back () = point;
+  add_to_hull (point);
+}
+
+void
+LowerEdge::forget (std::size_t count)
+{
+  points_.erase (points_.begin (), points_.begin () + std::ptrdiff_t (count));
+  hull_.clear ();
+  for (const Point &point : points_)
+    add_to_hull (point);
+}
+
+/* Where the highest line of that slope below all points is in the middle of
+ * them: it touches the hull where edges become steeper than itself. */
+double
+LowerEdge::height_below (double slope) const
+{
+  const auto touched = std::partition_point (
+      hull_.begin (), hull_.end () - 1, [slope] (const Point &point) {
+        const Point &next = *(&point + 1);
+        return next.y - point.y < slope * (next.x - point.x);
+      });
+  return touched->y + slope * (middle () - touched->x);
+}
+
+/* That of the line which is highest in the middle: the edge of the hull there.
+ */
+double
+LowerEdge::highest_slope (Range range) const
+{
+  if (hull_.size () < 2)
+    return (range.from + range.to) / 2;
+  const auto right = std::upper_bound (hull_.begin () + 1, hull_.end () - 1,
+      middle (), [] (double x, const Point &p) { return x < p.x; });
+  const auto left = right - 1;
+  return std::clamp (
+      (right->y - left->y) / (right->x - left->x), range.from, range.to);
+}
+
+/* Those that lines can have. */
+LowerEdge::Range
+LowerEdge::slopes () const
+{
+  const Range all{-steepest_, steepest_};
+  if (!expected_)
+    return all;
+  const double any = highest_slope (all);
+  const double highest = height_below (any);
+  const auto density = this->density ({any, highest - any * middle ()});
+  const double loss = highest - height_below (highest_slope (*expected_));
+  return density && *density * loss > kIncredible ? all : *expected_;
+}
+
+/* How many points lie right above the line, per unit of height. The lowest
+ * sixteenth of all tells, or more where that is few: higher up, they may be as
+ * rare as they like. Two are spent on the line itself, which touches them. */
+std::optional<double>
+LowerEdge::density (const Line &highest) const
+{
+  constexpr std::ptrdiff_t kTouching = 2;
+  constexpr std::ptrdiff_t kEnough = 16;
+  if (points_.size () < kFewest)
+    return std::nullopt;
+  above_.clear ();
+  for (const Point &point : points_)
+    above_.push_back (point.y - highest.at (point.x));
+  const auto all = std::ptrdiff_t (points_.size ());
+  const std::ptrdiff_t counted =
+      std::max ({kTouching + 1, std::min (kEnough, all / 4), all / 16});
+  const auto last = above_.begin () + counted;
+  std::nth_element (above_.begin (), last, above_.end ());
+  return double (counted + 1 - kTouching) / std::max (*last, kGrain);
+}
+
+/* The slope farthest from @p from towards @p to of which a line is as high. */
+double
+LowerEdge::last_slope (double from, double to, double least_height) const
+{
+  constexpr int kHalvings = 40;
+  if (height_below (to) >= least_height)
+    return to;
+  for (int k = 0; k < kHalvings; k++) {
+    const double half = (from + to) / 2;
+    (height_below (half) >= least_height ? from : to) = half;
+  }
+  return from;
+}
+
+LowerEdge::Estimate
+LowerEdge::estimate () const
+{
+  const Range range = slopes ();
+  const double best = highest_slope (range);
+  const double highest = height_below (best);
+  const Line top{best, highest - best * middle ()};
+  const auto density = this->density (top);
+  if (!density)
+    return {top, {}};
+
+  const double least = highest - kNegligible / *density;
+  const double first = last_slope (best, range.from, least);
+  const double step = (last_slope (best, range.to, least) - first) / kSlopes;
+  const double arm = points_.back ().x - middle ();
+  double weights = 0, slopes = 0, heights = 0, ends = 0, squares = 0;
+  for (int k = 0; k < kSlopes; k++) {
+    const double slope = first + (k + 0.5) * step;
+    const double height = height_below (slope);
+    const double weight = std::exp (*density * (height - highest));
+    /* Against those of the top line: small numbers keep their digits. */
+    const double end = height - highest + (slope - best) * arm;
+    weights += weight;
+    slopes += weight * slope;
+    heights += weight * (height - highest);
+    ends += weight * end;
+    squares += weight * end * end;
+  }
+  const double mean_slope = slopes / weights;
+  const double below = 1 / *density; // of all heights of one slope
+  const double mean_height = highest + heights / weights - below;
+  const double mean_end = ends / weights;
+  const double spread = squares / weights - mean_end * mean_end;
+  return {{mean_slope, mean_height - mean_slope * middle ()},
+      std::sqrt (std::max (0.0, spread) + below * below)};
+}
+
+} // namespace codedexposure

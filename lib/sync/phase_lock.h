@@ -1,0 +1,80 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Whether the masks are in phase with the exposure, frame by frame. */
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "sync/phase_watch.h"
+
+namespace codedexposure
+{
+
+/** What is decided on one frame. */
+struct LockDecision {
+  bool locked = false;
+  /** Slots by which the masks come late (> 0) or early; 0 when locked. */
+  int slip = 0;
+
+  /** Set on the frame on which a slip is established. */
+  struct Slip {
+    std::uint64_t first_frame; ///< in which it was seen
+    int slots;
+    bool certain; ///< of the number of slots
+  };
+  std::optional<Slip> slipped;
+  /** The phase is known from this frame on, and was not before. */
+  bool locked_now = false;
+  /** The DMD is to be started anew. */
+  bool restart = false;
+};
+
+/**
+ * The states of the lock:
+ *
+ *   started --any frame--> locked --slip--> slipped --restart--> awaiting
+ *                            ^ \--suspicion--> suspected            |
+ *                            +--------------------------------------+
+ *
+ * A DMD that was started is in phase until a frame shows otherwise. After a
+ * slip it is started anew where that can be done, and no frame is locked until
+ * the restart has been seen: by the pilot, or else by an exposure with parked
+ * mirrors (in which a DMD that triggers the camera shows as a gap) followed by
+ * a frame in phase. Frames that were exposed before the restart and arrive
+ * after it look like those after it, however many there are.
+ */
+class PhaseLock
+{
+public:
+  struct Options {
+    SlipObservable observable = SlipObservable::never;
+    bool can_restart = false;
+    /** The camera gets its trigger from the DMD. */
+    bool gap_shows_restart = false;
+  };
+  explicit PhaseLock (const Options &options) : options_ (options) {}
+
+  /** @p sight  of frame @p number, before which @p lost frames are missing.
+   *  @p restarted  the DMD has no restart to do. */
+  LockDecision take (const PhaseSight &sight, std::uint64_t number,
+      std::uint64_t lost, bool restarted);
+
+private:
+  enum class State { started, locked, suspected, slipped, awaiting };
+
+  void watch (
+      const PhaseSight &sight, std::uint64_t number, LockDecision &decision);
+  void await (
+      const PhaseSight &sight, std::uint64_t lost, LockDecision &decision);
+  void establish (const PhaseReading &slip, LockDecision &decision);
+
+  Options options_;
+  State state_ = State::started;
+  int slip_ = 0;
+  std::uint64_t first_frame_ = 0; // of the slip, or of its suspicion
+  int awaited_ = 0;               // frames since the restart
+  bool restart_seen_ = false;
+  int unopposed_ = 0; // frames since then that speak against nothing
+};
+
+} // namespace codedexposure

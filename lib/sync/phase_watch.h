@@ -1,0 +1,63 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* From a coded frame to what it shows of the phase of the masks. */
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "base/image.h"
+#include "schedule/schedule.h"
+#include "sync/level_meter.h"
+#include "sync/phase_reading.h"
+#include "sync/slip_signature.h"
+
+namespace codedexposure
+{
+
+/** When a slip of the DMD by whole slots shows itself. */
+enum class SlipObservable {
+  never,        ///< in no frame
+  in_the_frame, ///< in the frame during which it happens, if it happens inside
+                ///< the exposure; in none after that
+  always,       ///< in every frame while it lasts
+};
+
+/**
+ * With a pilot, always. Without one, in the frame where the code has a level
+ * signature; a code of one slot an element has none that could be told from a
+ * flash of light in one slot.
+ */
+SlipObservable slip_observable (const Schedule &schedule);
+
+/** What a frame shows, and how far that can be trusted. */
+struct PhaseSight {
+  PhaseReading reading;
+  /** The next frame shows for certain whether a slip that was read is one. */
+  bool next_frame_tells = false;
+};
+
+/** Joins the pilot and the signature of the levels; frames of one size. */
+class PhaseWatch
+{
+public:
+  PhaseWatch (const Schedule &schedule, int width, int height);
+
+  /** Whether the frames are large enough to hold every element, and the pilot
+   * where there is one. */
+  bool complete () const { return meter_.complete (); }
+
+  template <typename Pixel>
+  PhaseSight look (ImageView<const Pixel> frame)
+  {
+    return judge (meter_.measure (frame));
+  }
+
+private:
+  PhaseSight judge (const Levels &levels);
+
+  LevelMeter meter_;
+  std::optional<SlipSignature> signature_;
+  int pilot_slots_ = 0; // 0: no pilot
+};
+
+} // namespace codedexposure

@@ -1,0 +1,93 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Checks from the #include lines which room of lib/ and gst/ uses which.
+
+Usage: include_order.py SOURCE_ROOT
+A file of lib/ may include its own room, the rooms that stand above it in ORDER,
+and nothing of GStreamer. A file of gst/ may include its own room, common/ and
+lib/, but of lib/bench only where BENCH names it.
+"""
+
+import pathlib
+import re
+import sys
+
+ORDER = ["base", "schedule", "mapping", "estimate", "extract", "rectify",
+         "fuse", "calibrate", "sync", "dmd", "bench", "stats", "advise",
+         "tools"]
+# The emulated bench: the elements that emulate, and the plugin, which registers
+# the simulated DMD.
+BENCH = ["gst/sim/", "gst/scene/", "gst/plugin.cpp"]
+INCLUDE = re.compile(r'\s*#\s*include\s*(["<])([^">]+)[">]')
+# What still stands against the order, FILE INCLUDED each.
+KNOWN = {
+    ("lib/schedule/json_forms.h", "mapping/mapping.h"),
+}
+
+
+def target(root, file, name):
+    """The file that '#include "NAME"' in FILE means, as lib/... or gst/..."""
+    for folder in (file.parent, root / "lib", root / "gst"):
+        if (folder / name).is_file():
+            return (folder / name).resolve().relative_to(root).as_posix()
+    # A header that the build makes.
+    return "lib/" + name if name.split("/")[0] in ORDER else None
+
+
+def fault(file, included):
+    """Why FILE must not include INCLUDED, both relative to the root; or None."""
+    hall, room = file.split("/")[:2]
+    other_hall, other_room = included.split("/")[:2]
+    if hall == "lib":
+        if other_hall != "lib":
+            return "lib/ uses nothing of gst/"
+        if ORDER.index(other_room) > ORDER.index(room):
+            return f"{other_room} stands below {room}"
+        return None
+    if other_hall == "lib":
+        if other_room in ("advise", "tools"):
+            return f"gst/ does not use lib/{other_room}"
+        if other_room == "bench" and not file.startswith(tuple(BENCH)):
+            return "only what emulates a bench uses lib/bench"
+        return None
+    if file != "gst/plugin.cpp" and other_room not in (room, "common"):
+        return f"{other_room} is another element's room"
+    return None
+
+
+def faults_of(root, file):
+    name = file.relative_to(root).as_posix()
+    for number, line in enumerate(file.read_text().splitlines(), 1):
+        match = INCLUDE.match(line)
+        if not match:
+            continue
+        quote, included = match.groups()
+        why = None
+        if quote == "<":
+            if name.startswith("lib/") and included.startswith("gst/"):
+                why = "lib/ knows nothing of GStreamer"
+        elif found := target(root, file, included):
+            why = fault(name, found)
+        if why and (name, included) not in KNOWN:
+            yield f"{name}:{number}: includes {included}: {why}"
+
+
+def main():
+    root = pathlib.Path(sys.argv[1]).resolve()
+    files = [file for hall in ("lib", "gst")
+             for file in sorted((root / hall).rglob("*"))
+             if file.suffix in (".h", ".cpp")]
+    rooms = {file.relative_to(root).parts[1] for file in files
+             if file.is_relative_to(root / "lib")}
+    faults = [f"lib/{room}: no room of that name is in the order"
+              for room in sorted(rooms - set(ORDER))]
+    if not faults:
+        faults = [text for file in files for text in faults_of(root, file)]
+    for text in faults:
+        print(text)
+    print(f"{len(files)} files, {len(faults)} against the order")
+    return 1 if faults or len(files) < 100 else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -3,6 +3,7 @@
  */
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <utility>
 
@@ -120,6 +121,26 @@ ImageView<Pixel>
 view_of (MappedFrame &mapped)
 {
   return view_of<Pixel> (mapped.frame ());
+}
+
+/** Calls @p use with the pixels of @p mapped, of the type that its format has;
+ * they may be written where the frame was mapped for it. */
+template <typename Use>
+auto
+write_pixels (MappedFrame &mapped, Use use)
+{
+  if (GST_VIDEO_FRAME_FORMAT (mapped.frame ()) == GST_VIDEO_FORMAT_GRAY8)
+    return use (view_of<std::uint8_t> (mapped));
+  return use (view_of<std::uint16_t> (mapped));
+}
+template <typename Use>
+auto
+read_pixels (MappedFrame &mapped, Use use)
+{
+  return write_pixels (
+      mapped, [&use]<typename Pixel> (const ImageView<Pixel> &pixels) {
+        return use (ImageView<const Pixel> (pixels));
+      });
 }
 
 } // namespace codedexposure::gst

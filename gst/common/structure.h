@@ -68,6 +68,10 @@ struct Wire<guint>
     : PlainWire<G_TYPE_UINT, g_value_set_uint, g_value_get_uint> {
 };
 template <>
+struct Wire<gint64>
+    : PlainWire<G_TYPE_INT64, g_value_set_int64, g_value_get_int64> {
+};
+template <>
 struct Wire<bool>
     : PlainWire<G_TYPE_BOOLEAN, g_value_set_boolean, g_value_get_boolean> {
 };
@@ -85,6 +89,24 @@ struct Wire<std::string> {
   static std::string get (const GValue *value)
   {
     return g_value_get_string (value) ?: "";
+  }
+};
+/** Of a registered type; in properties only. */
+template <typename T>
+requires std::is_enum_v<T>
+struct Wire<T> {
+  static void set (GValue *value, T choice)
+  {
+    g_value_set_enum (value, int (choice));
+  }
+  static T get (const GValue *value) { return T (g_value_get_enum (value)); }
+};
+/** What is set is given away; in properties only. */
+template <>
+struct Wire<GstStructure *> {
+  static void set (GValue *value, GstStructure *structure)
+  {
+    g_value_take_boxed (value, structure);
   }
 };
 template <>

@@ -6,7 +6,8 @@
  * input's, taken is the largest that divides it.
  */
 #include "common/caps.h"
-#include "state.h"
+#include "common/element.h"
+#include "sim.h"
 
 #define GST_CAT_DEFAULT codedexposure_sim_debug
 
@@ -78,33 +79,6 @@ widen_rate (GstStructure *structure, GstPadDirection made_for)
         den, G_MAXINT, 1, nullptr);
 }
 
-} // namespace
-
-GstCaps *
-transform_caps (GstBaseTransform *trans, GstPadDirection direction,
-    GstCaps *caps, GstCaps *filter)
-{
-  auto *self = GST_CODED_EXPOSURE_SIM (trans);
-  CapsScale scale;
-  scale.rate_den = schedule_of (self)->slots ();
-  const GstPadDirection made_for =
-      direction == GST_PAD_SINK ? GST_PAD_SRC : GST_PAD_SINK;
-  CapsPtr made (
-      scale_caps (caps, made_for == GST_PAD_SRC ? scale : scale.inverse ()));
-  if (!gst_caps_is_any (made.get ())) {
-    made.reset (gst_caps_make_writable (made.release ()));
-    for (guint i = 0; i < gst_caps_get_size (made.get ()); i++)
-      widen_rate (gst_caps_get_structure (made.get (), i), made_for);
-  }
-  if (filter)
-    made.reset (gst_caps_intersect_full (
-        filter, made.get (), GST_CAPS_INTERSECT_FIRST));
-  return made.release ();
-}
-
-namespace
-{
-
 /* Whether @structure can have the frame rate @num / @den. */
 bool
 allows_rate (const GstStructure *structure, int num, int den)
@@ -117,39 +91,6 @@ allows_rate (const GstStructure *structure, int num, int den)
   g_value_unset (&rate);
   return allows;
 }
-
-} // namespace
-
-GstCaps *
-fixate_caps (GstBaseTransform *trans, GstPadDirection direction, GstCaps *caps,
-    GstCaps *othercaps)
-{
-  const int slots = schedule_of (GST_CODED_EXPOSURE_SIM (trans))->slots ();
-  othercaps = gst_caps_make_writable (gst_caps_truncate (othercaps));
-  GstStructure *other = gst_caps_get_structure (othercaps, 0);
-  int num = 0, den = 1;
-  gst_structure_get_fraction (
-      gst_caps_get_structure (caps, 0), "framerate", &num, &den);
-
-  /* A pad that is not linked yet is no reason to refuse. */
-  const bool bound = gst_pad_is_linked (GST_BASE_TRANSFORM_SRC_PAD (trans));
-  if (direction == GST_PAD_SINK && num > 0)
-    for (int inputs = slots; inputs <= kMaxInputs; inputs += slots) {
-      int coded_num, coded_den;
-      if (!gst_util_fraction_multiply (
-              num, den, 1, inputs, &coded_num, &coded_den))
-        break;
-      if (!bound || allows_rate (other, coded_num, coded_den)) {
-        gst_structure_set (other, "framerate", GST_TYPE_FRACTION, coded_num,
-            coded_den, nullptr);
-        break;
-      }
-    }
-  return gst_caps_fixate (othercaps);
-}
-
-namespace
-{
 
 /* How many input frames make a coded frame: a whole multiple of the slots. */
 Result<int>
@@ -200,18 +141,6 @@ plan_for (
   return Plan{in, out, *inputs, share_light (*slots, *inputs)};
 }
 
-void
-set_latency (GstCodedExposureSim *self, GstClockTime latency)
-{
-  {
-    const ObjectLock lock (self);
-    if (std::exchange (state (self).latency, latency) == latency)
-      return;
-  }
-  gst_element_post_message (
-      GST_ELEMENT (self), gst_message_new_latency (GST_OBJECT (self)));
-}
-
 /* A source offers the same caps again and again before it gives up; the bus
  * hears of it once. */
 void
@@ -222,6 +151,56 @@ refuse (GstCodedExposureSim *self, const std::string &why)
 }
 
 } // namespace
+
+GstCaps *
+transform_caps (GstBaseTransform *trans, GstPadDirection direction,
+    GstCaps *caps, GstCaps *filter)
+{
+  auto *self = GST_CODED_EXPOSURE_SIM (trans);
+  CapsScale scale;
+  scale.rate_den = schedule_of (self)->slots ();
+  const GstPadDirection made_for =
+      direction == GST_PAD_SINK ? GST_PAD_SRC : GST_PAD_SINK;
+  CapsPtr made (
+      scale_caps (caps, made_for == GST_PAD_SRC ? scale : scale.inverse ()));
+  if (!gst_caps_is_any (made.get ())) {
+    made.reset (gst_caps_make_writable (made.release ()));
+    for (guint i = 0; i < gst_caps_get_size (made.get ()); i++)
+      widen_rate (gst_caps_get_structure (made.get (), i), made_for);
+  }
+  if (filter)
+    made.reset (gst_caps_intersect_full (
+        filter, made.get (), GST_CAPS_INTERSECT_FIRST));
+  return made.release ();
+}
+
+GstCaps *
+fixate_caps (GstBaseTransform *trans, GstPadDirection direction, GstCaps *caps,
+    GstCaps *othercaps)
+{
+  const int slots = schedule_of (GST_CODED_EXPOSURE_SIM (trans))->slots ();
+  othercaps = gst_caps_make_writable (gst_caps_truncate (othercaps));
+  GstStructure *other = gst_caps_get_structure (othercaps, 0);
+  int num = 0, den = 1;
+  gst_structure_get_fraction (
+      gst_caps_get_structure (caps, 0), "framerate", &num, &den);
+
+  /* A pad that is not linked yet is no reason to refuse. */
+  const bool bound = gst_pad_is_linked (GST_BASE_TRANSFORM_SRC_PAD (trans));
+  if (direction == GST_PAD_SINK && num > 0)
+    for (int inputs = slots; inputs <= kMaxInputs; inputs += slots) {
+      int coded_num, coded_den;
+      if (!gst_util_fraction_multiply (
+              num, den, 1, inputs, &coded_num, &coded_den))
+        break;
+      if (!bound || allows_rate (other, coded_num, coded_den)) {
+        gst_structure_set (other, "framerate", GST_TYPE_FRACTION, coded_num,
+            coded_den, nullptr);
+        break;
+      }
+    }
+  return gst_caps_fixate (othercaps);
+}
 
 bool
 make_plan (
@@ -238,8 +217,15 @@ make_plan (
   stream.plan = *std::move (made);
   stream.refused.clear ();
   const guint64 held = stream.plan->inputs - 1;
-  set_latency (
-      self, gst_util_uint64_scale (GST_SECOND, held * in.fps_d, in.fps_n));
+  const GstClockTime latency =
+      gst_util_uint64_scale (GST_SECOND, held * in.fps_d, in.fps_n);
+  bool changed = false;
+  {
+    const ObjectLock lock (self);
+    changed = std::exchange (state (self).latency, latency) != latency;
+  }
+  if (changed)
+    post_latency (self);
   return true;
 }
 

@@ -9,9 +9,10 @@
 #include <string_view>
 #include <utility>
 
+#include "common/element.h"
 #include "common/meta.h"
 #include "common/tag.h"
-#include "state.h"
+#include "sim.h"
 
 #define GST_CAT_DEFAULT codedexposure_sim_debug
 
@@ -54,28 +55,6 @@ wanted_schedule (GstCodedExposureSim *self)
       (nullptr));
   return nullptr;
 }
-
-} // namespace
-
-bool
-follow_schedule (GstCodedExposureSim *self)
-{
-  Stream &stream = state (self).stream;
-  ScheduleRef wanted = wanted_schedule (self);
-  if (!wanted)
-    return false;
-  if (wanted == stream.schedule || *wanted == *stream.schedule)
-    return true;
-  GST_INFO_OBJECT (self, "schedule is now %s", wanted->text ().c_str ());
-  use_schedule (self, std::move (wanted));
-  /* Another number of slots means another frame rate. */
-  stream.plan.reset ();
-  gst_base_transform_reconfigure_src (GST_BASE_TRANSFORM (self));
-  return true;
-}
-
-namespace
-{
 
 GstClockTime
 input_time (const Plan &plan, guint64 inputs)
@@ -226,12 +205,6 @@ begin_exposure (GstCodedExposureSim *self, GstBuffer *inbuf)
   return GST_FLOW_OK;
 }
 
-bool
-is_wide (const GstVideoInfo &info)
-{
-  return GST_VIDEO_INFO_FORMAT (&info) == GST_VIDEO_FORMAT_GRAY16_LE;
-}
-
 GstFlowReturn
 map_failed (GstCodedExposureSim *self, const GstVideoInfo &info)
 {
@@ -257,12 +230,9 @@ collect_light (GstCodedExposureSim *self, GstBuffer *inbuf)
     return map_failed (self, plan.in);
   for (const LightShare &share : shares) {
     const int mask = exposure.masks[std::size_t (share.slot)];
-    if (is_wide (plan.in))
-      stream.bench->expose (
-          view_of<const std::uint16_t> (scene), mask, share.slots);
-    else
-      stream.bench->expose (
-          view_of<const std::uint8_t> (scene), mask, share.slots);
+    read_pixels (scene, [&] (auto pixels) {
+      stream.bench->expose (pixels, mask, share.slots);
+    });
   }
   return GST_FLOW_OK;
 }
@@ -275,10 +245,8 @@ read_out (GstCodedExposureSim *self, const Exposure &exposure)
   MappedFrame coded (stream.plan->out, outbuf, GST_MAP_WRITE);
   if (!coded)
     return map_failed (self, stream.plan->out);
-  if (is_wide (stream.plan->out))
-    stream.bench->read_out (exposure.frame, view_of<std::uint16_t> (coded));
-  else
-    stream.bench->read_out (exposure.frame, view_of<std::uint8_t> (coded));
+  write_pixels (coded,
+      [&] (auto pixels) { stream.bench->read_out (exposure.frame, pixels); });
   return GST_FLOW_OK;
 }
 
@@ -333,7 +301,52 @@ find_mirrors (std::string_view device)
   return name.empty () ? nullptr : SimulatedMirrors::find (name);
 }
 
+const char *
+name_of (Drop reason)
+{
+  constexpr const char *kNames[] = {"gap", "segment", "flush", "caps", "eos"};
+  return kNames[int (reason)];
+}
+
+/* What only happens when somebody asks for it is left to the message for
+ * programs. */
+void
+tell_user (GstCodedExposureSim *self, Drop reason, GstClockTime start,
+    const std::string &taken)
+{
+  Stream &stream = state (self).stream;
+  if (reason == Drop::kEos)
+    /* As debug text, since that is what gst-launch shows of an INFO. */
+    GST_ELEMENT_INFO (self, STREAM, FAILED, (nullptr),
+        ("The stream ended after %s of the coded frame at %" GST_TIME_FORMAT
+         ", which is dropped.",
+            taken.c_str (), GST_TIME_ARGS (start)));
+  if (reason == Drop::kGap && !std::exchange (stream.warned_dropped, true))
+    GST_ELEMENT_WARNING (self, STREAM, FAILED,
+        ("A gap in the input after %s of the coded frame at %" GST_TIME_FORMAT
+         ", which is dropped.",
+            taken.c_str (), GST_TIME_ARGS (start)),
+        ("this is said once; the property frames-dropped counts them all"));
+}
+
 } // namespace
+
+bool
+follow_schedule (GstCodedExposureSim *self)
+{
+  Stream &stream = state (self).stream;
+  ScheduleRef wanted = wanted_schedule (self);
+  if (!wanted)
+    return false;
+  if (wanted == stream.schedule || *wanted == *stream.schedule)
+    return true;
+  GST_INFO_OBJECT (self, "schedule is now %s", wanted->text ().c_str ());
+  use_schedule (self, std::move (wanted));
+  /* Another number of slots means another frame rate. */
+  stream.plan.reset ();
+  gst_base_transform_reconfigure_src (GST_BASE_TRANSFORM (self));
+  return true;
+}
 
 bool
 begin_stream (GstCodedExposureSim *self)
@@ -428,49 +441,6 @@ generate_output (GstBaseTransform *trans, GstBuffer **outbuf)
   return GST_FLOW_OK;
 }
 
-namespace
-{
-
-const char *
-name_of (Drop reason)
-{
-  switch (reason) {
-  case Drop::kGap:
-    return "gap";
-  case Drop::kSegment:
-    return "segment";
-  case Drop::kFlush:
-    return "flush";
-  case Drop::kCaps:
-    return "caps";
-  default:
-    return "eos";
-  }
-}
-
-/* What only happens when somebody asks for it is left to the message for
- * programs. */
-void
-tell_user (GstCodedExposureSim *self, Drop reason, GstClockTime start,
-    const std::string &taken)
-{
-  Stream &stream = state (self).stream;
-  if (reason == Drop::kEos)
-    /* As debug text, since that is what gst-launch shows of an INFO. */
-    GST_ELEMENT_INFO (self, STREAM, FAILED, (nullptr),
-        ("The stream ended after %s of the coded frame at %" GST_TIME_FORMAT
-         ", which is dropped.",
-            taken.c_str (), GST_TIME_ARGS (start)));
-  if (reason == Drop::kGap && !std::exchange (stream.warned_dropped, true))
-    GST_ELEMENT_WARNING (self, STREAM, FAILED,
-        ("A gap in the input after %s of the coded frame at %" GST_TIME_FORMAT
-         ", which is dropped.",
-            taken.c_str (), GST_TIME_ARGS (start)),
-        ("this is said once; the property frames-dropped counts them all"));
-}
-
-} // namespace
-
 void
 drop_exposure (GstCodedExposureSim *self, Drop reason)
 {
@@ -491,13 +461,11 @@ drop_exposure (GstCodedExposureSim *self, Drop reason)
   GST_INFO_OBJECT (self,
       "drop the coded frame at %" GST_TIME_FORMAT " after %s: %s",
       GST_TIME_ARGS (exposure.start), taken.c_str (), name_of (reason));
-  gst_element_post_message (GST_ELEMENT (self),
-      gst_message_new_element (GST_OBJECT (self),
-          gst_structure_new ("codedexposure/frame-dropped", "reason",
-              G_TYPE_STRING, name_of (reason), "pts", G_TYPE_UINT64,
-              exposure.start, "inputs", G_TYPE_INT, exposure.taken, "needed",
-              G_TYPE_INT, needed, "frames-dropped", G_TYPE_UINT64, dropped,
-              nullptr)));
+  post_structure (self,
+      gst_structure_new ("codedexposure/frame-dropped", "reason", G_TYPE_STRING,
+          name_of (reason), "pts", G_TYPE_UINT64, exposure.start, "inputs",
+          G_TYPE_INT, exposure.taken, "needed", G_TYPE_INT, needed,
+          "frames-dropped", G_TYPE_UINT64, dropped, nullptr));
   tell_user (self, reason, exposure.start, taken);
   g_object_notify (G_OBJECT (self), "frames-dropped");
 }

@@ -37,6 +37,9 @@
  * are squares without gaps, light is blurred by a Gaussian of
  * #codedexposure-sim:psf-sigma.
  *
+ * Settings are applied at the next coded frame, #codedexposure-sim:dmd at the
+ * next start.
+ *
  * ## Sensor
  *
  * White through all slots makes #codedexposure-sim:full-well electrons; a pixel
@@ -92,8 +95,7 @@
  */
 #include "sim.h"
 
-#include "common/caps.h"
-#include "state.h"
+#include "common/element.h"
 
 GST_DEBUG_CATEGORY (codedexposure_sim_debug);
 #define GST_CAT_DEFAULT codedexposure_sim_debug
@@ -101,11 +103,6 @@ GST_DEBUG_CATEGORY (codedexposure_sim_debug);
 using namespace codedexposure;
 using namespace codedexposure::gst;
 using sim::SimState;
-
-struct _GstCodedExposureSim {
-  GstVideoFilter parent;
-  SimState *state;
-};
 
 G_DEFINE_TYPE_WITH_CODE (GstCodedExposureSim, gst_coded_exposure_sim,
     GST_TYPE_VIDEO_FILTER,
@@ -117,10 +114,11 @@ GST_ELEMENT_REGISTER_DEFINE (codedexposure_sim, "codedexposure-sim",
 namespace
 {
 
-GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE ("sink",
-    GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
-GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC,
-    GST_PAD_ALWAYS, GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
+GstBaseTransformClass *
+parent_class ()
+{
+  return GST_BASE_TRANSFORM_CLASS (gst_coded_exposure_sim_parent_class);
+}
 
 gboolean
 start (GstBaseTransform *trans)
@@ -148,40 +146,15 @@ stop (GstBaseTransform *trans)
 }
 
 gboolean
-take_caps (GstCodedExposureSim *self, GstEvent *event)
+take_caps (GstBaseTransform *trans, GstEvent *event)
 {
-  auto *parent = GST_BASE_TRANSFORM_CLASS (gst_coded_exposure_sim_parent_class);
   const EventPtr kept (gst_event_ref (event));
-  if (parent->sink_event (GST_BASE_TRANSFORM (self), event))
+  if (parent_class ()->sink_event (trans, event))
     return TRUE;
   GstCaps *caps = nullptr;
   gst_event_parse_caps (kept.get (), &caps);
-  sim::explain_refusal (self, caps);
+  sim::explain_refusal (GST_CODED_EXPOSURE_SIM (trans), caps);
   return FALSE;
-}
-
-/* A dmdsync lets the start of a stream pass when the DMD has its masks. */
-gboolean
-take_stream_start (GstCodedExposureSim *self, GstEvent *event)
-{
-  auto *parent = GST_BASE_TRANSFORM_CLASS (gst_coded_exposure_sim_parent_class);
-  sim::restart (self, sim::Drop::kSegment);
-  self->state->stream.tag_due = true;
-  return parent->sink_event (GST_BASE_TRANSFORM (self), event) &&
-         sim::follow_schedule (self);
-}
-
-/* The tag follows the segment at once, since it is what the caps of a
- * demultiplexer wait for. */
-gboolean
-take_segment (GstCodedExposureSim *self, GstEvent *event)
-{
-  auto *parent = GST_BASE_TRANSFORM_CLASS (gst_coded_exposure_sim_parent_class);
-  sim::restart (self, sim::Drop::kSegment);
-  if (!parent->sink_event (GST_BASE_TRANSFORM (self), event))
-    return FALSE;
-  sim::push_tag (self);
-  return TRUE;
 }
 
 gboolean
@@ -190,11 +163,20 @@ sink_event (GstBaseTransform *trans, GstEvent *event)
   auto *self = GST_CODED_EXPOSURE_SIM (trans);
   switch (GST_EVENT_TYPE (event)) {
   case GST_EVENT_CAPS:
-    return take_caps (self, event);
-  case GST_EVENT_SEGMENT:
-    return take_segment (self, event);
+    return take_caps (trans, event);
   case GST_EVENT_STREAM_START:
-    return take_stream_start (self, event);
+    sim::restart (self, sim::Drop::kSegment);
+    self->state->stream.tag_due = true;
+    /* A dmdsync lets the start of a stream pass when the DMD has its masks. */
+    return parent_class ()->sink_event (trans, event) &&
+           sim::follow_schedule (self);
+  case GST_EVENT_SEGMENT:
+    sim::restart (self, sim::Drop::kSegment);
+    if (!parent_class ()->sink_event (trans, event))
+      return FALSE;
+    /* At once, since it is what the caps of a demultiplexer wait for. */
+    sim::push_tag (self);
+    return TRUE;
   case GST_EVENT_EOS:
     sim::drop_exposure (self, sim::Drop::kEos);
     break;
@@ -204,8 +186,7 @@ sink_event (GstBaseTransform *trans, GstEvent *event)
   default:
     break;
   }
-  return GST_BASE_TRANSFORM_CLASS (gst_coded_exposure_sim_parent_class)
-      ->sink_event (trans, event);
+  return parent_class ()->sink_event (trans, event);
 }
 
 /* A coded frame leaves with its last input frame, and is stamped with the
@@ -213,22 +194,12 @@ sink_event (GstBaseTransform *trans, GstEvent *event)
 gboolean
 query (GstBaseTransform *trans, GstPadDirection direction, GstQuery *query)
 {
-  auto *self = GST_CODED_EXPOSURE_SIM (trans);
-  auto *parent = GST_BASE_TRANSFORM_CLASS (gst_coded_exposure_sim_parent_class);
-  if (!parent->query (trans, direction, query))
+  if (!parent_class ()->query (trans, direction, query))
     return FALSE;
-  if (direction != GST_PAD_SRC || GST_QUERY_TYPE (query) != GST_QUERY_LATENCY)
-    return TRUE;
-
-  GstClockTime own, min, max;
-  gboolean live;
-  {
-    const ObjectLock lock (self);
-    own = self->state->latency;
+  if (direction == GST_PAD_SRC && GST_QUERY_TYPE (query) == GST_QUERY_LATENCY) {
+    const ObjectLock lock (trans);
+    add_latency (query, sim::state (trans).latency);
   }
-  gst_query_parse_latency (query, &live, &min, &max);
-  gst_query_set_latency (
-      query, live, min + own, GST_CLOCK_TIME_IS_VALID (max) ? max + own : max);
   return TRUE;
 }
 
@@ -244,9 +215,8 @@ finalize (GObject *object)
 static void
 gst_coded_exposure_sim_class_init (GstCodedExposureSimClass *klass)
 {
-  auto *object = G_OBJECT_CLASS (klass);
-  object->finalize = GST_DEBUG_FUNCPTR (finalize);
-  sim::install_properties (object);
+  G_OBJECT_CLASS (klass)->finalize = finalize;
+  sim::install_own_properties (G_OBJECT_CLASS (klass));
 
   auto *transform = GST_BASE_TRANSFORM_CLASS (klass);
   /* A video filter works in place where it can; a coded frame needs a buffer
@@ -262,14 +232,10 @@ gst_coded_exposure_sim_class_init (GstCodedExposureSimClass *klass)
   transform->generate_output = GST_DEBUG_FUNCPTR (sim::generate_output);
   GST_VIDEO_FILTER_CLASS (klass)->set_info = GST_DEBUG_FUNCPTR (sim::set_info);
 
-  auto *element = GST_ELEMENT_CLASS (klass);
-  for (auto *pad_template : {&sink_template, &src_template})
-    gst_element_class_add_static_pad_template (element, pad_template);
-  gst_element_class_set_static_metadata (element, "Coded exposure simulator",
+  describe_element (GST_ELEMENT_CLASS (klass), "Coded exposure simulator",
       "Filter/Effect/Video",
       "An optical bench in software: turns video into the coded frames of a "
-      "slow camera behind a micromirror device",
-      "The gst-codedexposure authors");
+      "slow camera behind a micromirror device");
 }
 
 static void
@@ -282,14 +248,3 @@ gst_coded_exposure_sim_init (GstCodedExposureSim *self)
   /* An instrument drops nothing because it is late. */
   gst_base_transform_set_qos_enabled (trans, FALSE);
 }
-
-namespace codedexposure::gst::sim
-{
-
-SimState &
-state (GstCodedExposureSim *self)
-{
-  return *self->state;
-}
-
-} // namespace codedexposure::gst::sim

@@ -1,10 +1,22 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* codedexposure-sim: an optical bench in software, video in, coded frames out.
- */
+/* codedexposure-sim: what a slow camera behind a DMD would see of a video. */
 #pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include <gst/gst.h>
 #include <gst/video/gstvideofilter.h>
+#include <gst/video/video.h>
+
+#include "base/result.h"
+#include "bench/bench.h"
+#include "bench/light_share.h"
+#include "bench/simulated_dmd.h"
+#include "common/raii.h"
+#include "schedule/schedule.h"
 
 G_BEGIN_DECLS
 
@@ -15,3 +27,132 @@ G_DECLARE_FINAL_TYPE (GstCodedExposureSim, gst_coded_exposure_sim, GST,
 GST_ELEMENT_REGISTER_DECLARE (codedexposure_sim);
 
 G_END_DECLS
+
+GST_DEBUG_CATEGORY_EXTERN (codedexposure_sim_debug);
+
+namespace codedexposure::gst::sim
+{
+
+using ScheduleRef = std::shared_ptr<const Schedule>;
+
+/** What the user asked for. */
+struct Settings {
+  std::string schedule;
+  std::shared_ptr<const Result<Schedule>> parsed; ///< never null
+  std::string dmd;
+  BenchOptions optics;
+};
+
+struct Counters {
+  guint64 frames_out = 0;
+  guint64 frames_dropped = 0;
+};
+
+/** Everything that follows from the caps and the schedule. */
+struct Plan {
+  GstVideoInfo in, out;
+  int inputs; ///< input frames in a coded frame
+  /** What the slots collect of each of them. */
+  std::vector<std::vector<LightShare>> shares;
+};
+
+/** The coded frame that is being made. */
+struct Exposure {
+  BufferPtr outbuf;
+  GstClockTime start = GST_CLOCK_TIME_NONE; ///< PTS of the first input frame
+  std::int64_t frame = 0;
+  std::int64_t lost_before = 0; ///< frames that had no light
+  std::vector<int> masks;       ///< of each slot; negative: the DMD is parked
+  int taken = 0;                ///< input frames
+};
+
+/** All that is forgotten from PAUSED to READY. Sink pad's stream lock. */
+struct Stream {
+  std::shared_ptr<SimulatedMirrors> mirrors; ///< null: masks in step
+  ScheduleRef schedule;                      ///< of the plan and the tag
+  std::optional<Plan> plan;
+  std::string refused; ///< why there can be no plan, as the bus was told
+  std::optional<OpticalBench> bench;
+  BenchOptions optics; ///< of the bench
+  std::optional<Exposure> exposure;
+  /** The exposure that was begun last, kept or dropped. */
+  GstClockTime last_start = GST_CLOCK_TIME_NONE;
+  std::int64_t last_frame = -1;
+  bool discont = true; ///< the next coded frame does not follow the last one
+  bool tag_due = true;
+  bool mirrors_moved = false;
+  std::int64_t parked_frames = 0; ///< in a row
+  bool warned_parked = false;
+  bool warned_dropped = false;
+};
+
+/** The object lock of the element is never held while pushing, querying or
+ * posting. */
+struct SimState {
+  /* Object lock. */
+  Settings settings;
+  Counters counters;
+  /** What caps are made with: that of the stream, else that of the settings. */
+  ScheduleRef schedule;
+  GstClockTime latency = 0; ///< our own
+
+  /* Sink pad's stream lock. */
+  Stream stream;
+};
+
+} // namespace codedexposure::gst::sim
+
+struct _GstCodedExposureSim {
+  GstVideoFilter parent;
+  codedexposure::gst::sim::SimState *state;
+};
+
+namespace codedexposure::gst::sim
+{
+
+inline SimState &
+state (gpointer element)
+{
+  return *GST_CODED_EXPOSURE_SIM (element)->state;
+}
+
+/* Properties. */
+constexpr const char *kDefaultSchedule = "sequential:2x2";
+void install_own_properties (GObjectClass *klass);
+/** Reads @p text, outside the lock, and keeps both. */
+void set_schedule (GstCodedExposureSim *self, std::string text);
+
+/* Negotiation. */
+GstCaps *transform_caps (GstBaseTransform *trans, GstPadDirection direction,
+    GstCaps *caps, GstCaps *filter);
+GstCaps *fixate_caps (GstBaseTransform *trans, GstPadDirection direction,
+    GstCaps *caps, GstCaps *othercaps);
+gboolean set_info (GstVideoFilter *filter, GstCaps *incaps,
+    GstVideoInfo *in_info, GstCaps *outcaps, GstVideoInfo *out_info);
+/** Makes the plan for the schedule of the stream. Returns false when there can
+ * be none, with an error on the bus that is not repeated. */
+bool make_plan (
+    GstCodedExposureSim *self, const GstVideoInfo &in, const GstVideoInfo &out);
+/** Says on the bus when it is downstream that has no caps for @incaps. */
+void explain_refusal (GstCodedExposureSim *self, GstCaps *incaps);
+
+/* Frames. */
+/** Looks for the DMD and for what is to be done first; posts an error and
+ * returns false when a setting is wrong. */
+bool begin_stream (GstCodedExposureSim *self);
+/** Takes over a schedule that was changed since the last exposure, or was sent
+ * to the DMD. Returns false, with an error on the bus, when there is none. */
+bool follow_schedule (GstCodedExposureSim *self);
+GstFlowReturn submit_input_buffer (
+    GstBaseTransform *trans, gboolean is_discont, GstBuffer *inbuf);
+GstFlowReturn generate_output (GstBaseTransform *trans, GstBuffer **outbuf);
+enum class Drop { kGap, kSegment, kFlush, kCaps, kEos };
+/** Gives up the coded frame that is being made, if there is one, and says so.
+ */
+void drop_exposure (GstCodedExposureSim *self, Drop reason);
+/** The next frame begins a stretch of time of its own. */
+void restart (GstCodedExposureSim *self, Drop reason);
+/** Says the schedule downstream where that is due. */
+void push_tag (GstCodedExposureSim *self);
+
+} // namespace codedexposure::gst::sim

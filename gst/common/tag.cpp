@@ -87,9 +87,11 @@ schedule_from_tags (const GstTagList *tags)
                 : Result<Schedule> (setup->error ());
 }
 
-GstTagList *
-tags_with_setup (const GstTagList *tags, const StreamSetup &setup)
+GstEvent *
+replace_setup (GstEvent *event, const StreamSetup &setup)
 {
+  GstTagList *tags = nullptr;
+  gst_event_parse_tag (event, &tags);
   GstTagList *ours = setup_to_tags (setup);
   gst_tag_list_set_scope (ours, gst_tag_list_get_scope (tags));
   for (const std::string &comment : comments_of (tags))
@@ -99,7 +101,10 @@ tags_with_setup (const GstTagList *tags, const StreamSetup &setup)
 
   /* Other tags only: comments are there already, and are kept. */
   gst_tag_list_insert (ours, tags, GST_TAG_MERGE_KEEP);
-  return ours;
+  GstEvent *replaced = gst_event_new_tag (ours);
+  gst_event_set_seqnum (replaced, gst_event_get_seqnum (event));
+  gst_event_unref (event);
+  return replaced;
 }
 
 } // namespace codedexposure::gst

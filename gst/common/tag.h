@@ -28,7 +28,8 @@ std::optional<Result<StreamSetup>> setup_from_tags (const GstTagList *tags);
  * where one does and cannot be read. */
 std::optional<Result<Schedule>> schedule_from_tags (const GstTagList *tags);
 
-/** @p tags with @p setup in place of what they say of one; Transfer: full. */
-GstTagList *tags_with_setup (const GstTagList *tags, const StreamSetup &setup);
+/** The TAG event @p event with @p setup in place of the one in its tags;
+ * Transfer: full, of both. */
+GstEvent *replace_setup (GstEvent *event, const StreamSetup &setup);
 
 } // namespace codedexposure::gst

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* dmdsync and its DMD: opening, upload, parking. */
-#include "state.h"
+#include "common/element.h"
+#include "dmdsync.h"
 
 #define GST_CAT_DEFAULT dmdsync_debug
 
@@ -10,13 +11,7 @@ namespace codedexposure::gst::sync
 namespace
 {
 
-void
-post_progress (GstDmdSync *self, GstProgressType type, const std::string &text)
-{
-  gst_element_post_message (
-      GST_ELEMENT (self), gst_message_new_progress (GST_OBJECT (self), type,
-                              "upload", text.c_str ()));
-}
+constexpr const char *kUpload = "upload";
 
 /* Where an upload is that takes @predicted in all, or more. */
 std::string
@@ -49,11 +44,11 @@ reports (GstDmdSync *self)
         sent == 0      ? GST_PROGRESS_TYPE_START
         : sent < total ? GST_PROGRESS_TYPE_CONTINUE
                        : GST_PROGRESS_TYPE_COMPLETE,
-        text);
+        kUpload, text);
   };
   reports.failed = [self] (const Error &error) {
     if (state (self).uploading.exchange (false))
-      post_progress (self, GST_PROGRESS_TYPE_ERROR, error.message);
+      post_progress (self, GST_PROGRESS_TYPE_ERROR, kUpload, error.message);
     GST_ELEMENT_ERROR (self, RESOURCE, WRITE,
         ("The DMD failed: %s", error.message.c_str ()), (nullptr));
   };
@@ -69,16 +64,18 @@ reports (GstDmdSync *self)
 
 } // namespace
 
+Settings
+settings_of (GstDmdSync *self)
+{
+  const ObjectLock lock (self);
+  return state (self).settings;
+}
+
 bool
 read_schedule (GstDmdSync *self)
 {
   SyncState &st = state (self);
-  std::string text;
-  {
-    const ObjectLock lock (self);
-    text = st.settings.schedule;
-  }
-  Result<Schedule> schedule = Schedule::parse (text);
+  Result<Schedule> schedule = Schedule::parse (settings_of (self).schedule);
   if (!schedule) {
     GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
         ("The schedule property cannot be read: %s",
@@ -94,11 +91,7 @@ bool
 open_device (GstDmdSync *self)
 {
   SyncState &st = state (self);
-  std::string device;
-  {
-    const ObjectLock lock (self);
-    device = st.settings.device;
-  }
+  const std::string device = settings_of (self).device;
   if (device.empty ())
     return true;
 
@@ -116,14 +109,6 @@ open_device (GstDmdSync *self)
 }
 
 void
-begin_upload (GstDmdSync *self)
-{
-  SyncState &st = state (self);
-  if (st.runner)
-    st.runner->upload (st.schedule);
-}
-
-void
 park (GstDmdSync *self)
 {
   SyncState &st = state (self);
@@ -135,7 +120,8 @@ park (GstDmdSync *self)
     st.pattern.reset ();
   }
   if (st.uploading.exchange (false))
-    post_progress (self, GST_PROGRESS_TYPE_CANCELED, "Upload cancelled");
+    post_progress (
+        self, GST_PROGRESS_TYPE_CANCELED, kUpload, "Upload cancelled");
 }
 
 } // namespace codedexposure::gst::sync

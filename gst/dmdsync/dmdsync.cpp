@@ -103,8 +103,7 @@
  */
 #include "dmdsync.h"
 
-#include "common/caps.h"
-#include "state.h"
+#include "common/element.h"
 
 GST_DEBUG_CATEGORY (dmdsync_debug);
 #define GST_CAT_DEFAULT dmdsync_debug
@@ -113,11 +112,6 @@ using namespace codedexposure;
 using namespace codedexposure::gst;
 using sync::Counters;
 using sync::SyncState;
-
-struct _GstDmdSync {
-  GstBaseTransform parent;
-  SyncState *state;
-};
 
 G_DEFINE_TYPE_WITH_CODE (GstDmdSync, gst_dmd_sync, GST_TYPE_BASE_TRANSFORM,
     GST_DEBUG_CATEGORY_INIT (
@@ -131,11 +125,6 @@ namespace
 /* READY to PAUSED waits so long for an upload: most devices have their masks by
  * then, and whatever begins with the frames finds them programmed. */
 constexpr std::chrono::milliseconds kQuickUpload{1000};
-
-GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE ("sink",
-    GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
-GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC,
-    GST_PAD_ALWAYS, GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
 
 void
 say_observable (GstDmdSync *self)
@@ -163,9 +152,10 @@ begin_run (GstDmdSync *self)
     st.observable = slip_observable (st.schedule);
   }
   say_observable (self);
-  sync::begin_upload (self);
-  if (st.runner)
-    st.runner->settle_within (kQuickUpload);
+  if (!st.runner)
+    return;
+  st.runner->upload (st.schedule);
+  st.runner->settle_within (kQuickUpload);
 }
 
 void
@@ -222,35 +212,17 @@ finalize (GObject *object)
 
 } // namespace
 
-namespace codedexposure::gst::sync
-{
-
-SyncState &
-state (GstDmdSync *self)
-{
-  return *self->state;
-}
-
-} // namespace codedexposure::gst::sync
-
 static void
 gst_dmd_sync_class_init (GstDmdSyncClass *klass)
 {
-  auto *object_class = G_OBJECT_CLASS (klass);
   auto *element_class = GST_ELEMENT_CLASS (klass);
   auto *transform_class = GST_BASE_TRANSFORM_CLASS (klass);
 
-  object_class->finalize = finalize;
-  sync::install_properties (object_class);
-
-  gst_element_class_set_static_metadata (element_class, "DMD synchroniser",
-      "Filter/Video",
+  G_OBJECT_CLASS (klass)->finalize = finalize;
+  sync::install_own_properties (G_OBJECT_CLASS (klass));
+  describe_element (element_class, "DMD synchroniser", "Filter/Video",
       "Drives the DMD of a coded exposure camera; times, counts and watches "
-      "its frames",
-      "The gst-codedexposure authors");
-  gst_element_class_add_static_pad_template (element_class, &sink_template);
-  gst_element_class_add_static_pad_template (element_class, &src_template);
-
+      "its frames");
   element_class->change_state = GST_DEBUG_FUNCPTR (change_state);
   transform_class->set_caps = GST_DEBUG_FUNCPTR (sync::set_caps);
   transform_class->sink_event = GST_DEBUG_FUNCPTR (sync::sink_event);

@@ -2,8 +2,30 @@
 /* dmdsync: drives the DMD, and makes time and phase of coded frames known. */
 #pragma once
 
+#include <atomic>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
 #include <gst/base/gstbasetransform.h>
 #include <gst/gst.h>
+#include <gst/video/video.h>
+
+#include "common/events.h"
+#include "common/owned_frames.h"
+#include "common/raii.h"
+#include "dmd/dmd_runner.h"
+#include "mapping/stream_setup.h"
+#include "schedule/schedule.h"
+#include "sync/device_clock.h"
+#include "sync/frame_sequence.h"
+#include "sync/phase_lock.h"
+#include "sync/phase_watch.h"
+#include "sync/rate_watch.h"
+#include "sync/switch_watch.h"
 
 G_BEGIN_DECLS
 
@@ -13,3 +35,180 @@ G_DECLARE_FINAL_TYPE (GstDmdSync, gst_dmd_sync, GST, DMD_SYNC, GstBaseTransform)
 GST_ELEMENT_REGISTER_DECLARE (dmdsync);
 
 G_END_DECLS
+
+GST_DEBUG_CATEGORY_EXTERN (dmdsync_debug);
+
+namespace codedexposure::gst::sync
+{
+
+/** The instant of an exposure that the PTS of incoming frames mean. */
+enum class TimestampAt { exposure_start, exposure_end, arrival, device_clock };
+/** What takes the place of lost frames. */
+enum class OnLoss { gap, repeat, error };
+/** What becomes of frames that are not locked. */
+enum class OnUnlock { keep, skip, error };
+
+struct Settings {
+  std::string device;
+  std::string schedule = "sequential:2x2";
+  TimestampAt timestamp_at = TimestampAt::exposure_start;
+  GstClockTimeDiff exposure_offset = 0;
+  OnLoss on_loss = OnLoss::gap;
+  OnUnlock on_unlock = OnUnlock::keep;
+  std::string pixel_format; ///< empty: as the caps say
+};
+
+struct Counters {
+  guint64 frames_in = 0;
+  guint64 frames_lost = 0;
+  guint64 frames_incomplete = 0;
+  guint64 frames_late = 0;
+  guint64 frames_duplicate = 0;
+  guint64 frames_early = 0; ///< dropped: exposed before the stream's time 0
+  guint64 frames_skipped = 0;
+  guint64 frames_repeated = 0;
+  guint64 slips = 0;
+  guint64 clock_restarts = 0;
+  gdouble clock_drift = 0; ///< ppm by which the camera's clock is fast
+  /** By how much PTS may be wrong; none: not known. */
+  GstClockTime time_uncertainty = GST_CLOCK_TIME_NONE;
+};
+
+/** Everything that follows from the caps. */
+struct Timebase {
+  GstVideoInfo info;
+  FrameRate rate;
+  SlotPlan plan;
+};
+
+/** A pattern that stands in place of the schedule, or is about to. */
+struct ShownPattern {
+  std::string text;
+  guint64 frames_left; ///< until the mirrors are given back unasked
+};
+
+/** All that is forgotten from PAUSED to READY. Sink pad's stream lock. */
+struct Stream {
+  std::optional<Timebase> time;
+  std::optional<FrameSequence> sequence;
+  std::optional<RateWatch> rate_watch;
+  std::optional<OwnedFrames> frames; ///< follows from the caps
+  DeviceClock device_clock;
+  GstClockTime last_arrival = GST_CLOCK_TIME_NONE;
+  GstClockTime last_time = 0; ///< of the newest frame, by the pipeline's clock
+  GstClockTime uncertainty = GST_CLOCK_TIME_NONE; ///< of the last frame's time
+  std::optional<bool> time_known; ///< what was said of it; none: nothing
+  std::optional<PhaseWatch> watch;
+  std::optional<PhaseLock> lock;
+  BufferPtr last;              ///< for on-loss=repeat
+  std::deque<BufferPtr> ready; ///< to be pushed
+  SwitchWatch shown;           ///< since the last change of the mirrors
+  guint switches = 0;          ///< of which this stream knows
+  bool coded = true;           ///< frames are those of the schedule
+  bool discont = true;         ///< the next frame does not follow the last one
+  bool tag_due = true;
+  bool warned_tag = false;
+  std::optional<Mapping> mapping; ///< that upstream's tags say
+  std::string refused; ///< what was said of the caps that were refused last
+};
+
+/** The object lock of the element is never held while pushing, querying or
+ * posting. */
+struct SyncState {
+  /* Object lock. */
+  Settings settings;
+  Counters counters;
+  bool locked = false;
+  SlipObservable observable = SlipObservable::never; ///< of the schedule
+  std::optional<Timebase> time;                      ///< that of the stream
+  GstClockTime jitter = 0;  ///< most by which frames came after their time
+  GstClockTime latency = 0; ///< our own
+  std::optional<ShownPattern> pattern; ///< none: the schedule
+  guint switches = 0;                  ///< between schedule and patterns
+
+  /** Keeps what is asked of the runner in the order of the patterns; taken
+   * before the object lock. */
+  std::mutex pattern_order;
+
+  /* Changed by changes of state only, while nothing flows or is uploaded. */
+  Schedule schedule;
+  std::unique_ptr<DmdRunner> runner; ///< null: no DMD is driven
+
+  std::atomic<bool> uploading = false;
+
+  /* Sink pad's stream lock. */
+  Stream stream;
+};
+
+} // namespace codedexposure::gst::sync
+
+struct _GstDmdSync {
+  GstBaseTransform parent;
+  codedexposure::gst::sync::SyncState *state;
+};
+
+namespace codedexposure::gst::sync
+{
+
+inline SyncState &
+state (gpointer element)
+{
+  return *GST_DMD_SYNC (element)->state;
+}
+/** A copy, by the object lock. */
+Settings settings_of (GstDmdSync *self);
+
+/* Time. */
+/** Follows the settings, the caps and the jitter; posts a message when the
+ * latency that they make has changed. */
+void update_latency (GstDmdSync *self);
+/** By how much PTS are moved back for the settings. Object lock. */
+GstClockTimeDiff moved_back (const SyncState &st);
+/** The PTS that @p frame came with, by the pipeline's clock. Leaves what it was
+ * told from on the frame, which is writable. */
+GstClockTime pipeline_time (GstDmdSync *self, GstBuffer *frame);
+
+/** Says it when the times of frames become known well enough, or no longer are.
+ */
+void say_uncertainty (GstDmdSync *self, guint64 number, GstClockTime pts);
+/** Says it when the stream ends long after its last frame. */
+void note_end (GstDmdSync *self);
+/** Says it when frames come at another rate than that of the caps. */
+void watch_rate (GstDmdSync *self, GstClockTime time);
+
+/* Properties. */
+void install_own_properties (GObjectClass *klass);
+
+/* What the properties name; false with an error on the bus. */
+bool read_schedule (GstDmdSync *self);
+bool open_device (GstDmdSync *self);
+/** Parks the mirrors, whatever they are at. */
+void park (GstDmdSync *self);
+
+/* Patterns, which elements downstream request. */
+/** False when the pattern cannot be shown, with a warning that says why. */
+bool take_request (GstDmdSync *self, const PatternRequest &request);
+MirrorsAnswer describe_mirrors (const SyncState &st);
+/** Shows the schedule again. */
+void give_back (GstDmdSync *self, const char *reason);
+/** What a frame shows. */
+struct PatternSight {
+  bool coded = true;
+  std::string pattern = {}; ///< "" while that is not known
+};
+PatternSight look_for_pattern (GstDmdSync *self, GstBuffer *buffer,
+    const FrameStep &step, GstClockTime pts);
+
+/* Negotiation and events. */
+/** Forgets what frames have shown of the phase. */
+void begin_phase (GstDmdSync *self);
+gboolean set_caps (GstBaseTransform *trans, GstCaps *incaps, GstCaps *outcaps);
+gboolean sink_event (GstBaseTransform *trans, GstEvent *event);
+gboolean src_event (GstBaseTransform *trans, GstEvent *event);
+gboolean query (
+    GstBaseTransform *trans, GstPadDirection direction, GstQuery *query);
+
+/* Frames. */
+GstFlowReturn generate_output (GstBaseTransform *trans, GstBuffer **outbuf);
+
+} // namespace codedexposure::gst::sync

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* dmdsync's caps, events and queries. */
+#include "common/element.h"
 #include "common/tag.h"
-#include "state.h"
+#include "dmdsync.h"
 
 #define GST_CAT_DEFAULT dmdsync_debug
 
@@ -10,12 +11,6 @@ namespace codedexposure::gst::sync
 
 namespace
 {
-
-GstBaseTransformClass *
-base_class ()
-{
-  return GST_BASE_TRANSFORM_CLASS (g_type_class_peek (GST_TYPE_BASE_TRANSFORM));
-}
 
 /** The rate of the caps, else that at which the schedule's own slots follow
  * each other without a pause. */
@@ -69,20 +64,6 @@ make_timebase (GstCaps *caps, const SyncState &st)
   return time;
 }
 
-std::string
-pixel_format (GstDmdSync *self)
-{
-  const ObjectLock lock (self);
-  return state (self).settings.pixel_format;
-}
-
-/** Whether the DMD can stay as it is. */
-bool
-same_slots (const std::optional<Timebase> &before, const Timebase &now)
-{
-  return before && before->rate == now.rate;
-}
-
 /* @p first: number of the first one. */
 void
 begin_frames (GstDmdSync *self, std::uint64_t first)
@@ -92,6 +73,15 @@ begin_frames (GstDmdSync *self, std::uint64_t first)
   stream.rate_watch.emplace (stream.time->rate);
   begin_phase (self);
   stream.last.reset ();
+}
+
+void
+resync (Stream &stream)
+{
+  if (!stream.sequence)
+    return;
+  stream.sequence->resync ();
+  stream.rate_watch->resync ();
 }
 
 bool
@@ -128,11 +118,7 @@ own_schedule (GstDmdSync *self, GstEvent *event)
    * among them. How the camera stands is not ours to say. */
   if (theirs && *theirs)
     st.stream.mapping = theirs->value ().mapping;
-  GstEvent *ours = gst_event_new_tag (
-      tags_with_setup (tags, {st.schedule, st.stream.mapping}));
-  gst_event_set_seqnum (ours, gst_event_get_seqnum (event));
-  gst_event_unref (event);
-  return ours;
+  return replace_setup (event, {st.schedule, st.stream.mapping});
 }
 
 gboolean
@@ -149,13 +135,10 @@ take_segment (GstDmdSync *self, GstEvent *event)
     gst_event_unref (event);
     return FALSE;
   }
-  if (stream.sequence) {
-    stream.sequence->resync ();
-    stream.rate_watch->resync ();
-  }
+  resync (stream);
   stream.device_clock.reset ();
   const gboolean taken =
-      base_class ()->sink_event (GST_BASE_TRANSFORM (self), event);
+      base_transform_class ()->sink_event (GST_BASE_TRANSFORM (self), event);
   return push_tag (self) && taken;
 }
 
@@ -199,10 +182,10 @@ set_caps (GstBaseTransform *trans, GstCaps *incaps, GstCaps *)
     refuse (self, incaps, time.error ().message);
     return FALSE;
   }
-  const bool restart = !same_slots (st.stream.time, *time);
+  const bool restart = !st.stream.time || st.stream.time->rate != time->rate;
   st.stream.time = *time;
   Result<OwnedFrames> frames =
-      OwnedFrames::make (time->info, pixel_format (self));
+      OwnedFrames::make (time->info, settings_of (self).pixel_format);
   if (!frames) {
     st.stream.time.reset ();
     refuse (self, incaps, frames.error ().message);
@@ -266,10 +249,7 @@ sink_event (GstBaseTransform *trans, GstEvent *event)
     give_back (self, "flush");
     if (st.runner)
       st.runner->interrupt (false);
-    if (st.stream.sequence) {
-      st.stream.sequence->resync ();
-      st.stream.rate_watch->resync ();
-    }
+    resync (st.stream);
     st.stream.last.reset ();
     st.stream.ready.clear ();
     st.stream.discont = true;
@@ -277,7 +257,7 @@ sink_event (GstBaseTransform *trans, GstEvent *event)
   default:
     break;
   }
-  return base_class ()->sink_event (trans, event);
+  return base_transform_class ()->sink_event (trans, event);
 }
 
 /* A camera source that waits for a frame with its object lock held, as
@@ -289,35 +269,28 @@ src_event (GstBaseTransform *trans, GstEvent *event)
     gst_event_unref (event);
     return TRUE;
   }
-  if (is_pattern_event (event))
-    return take_pattern_event (GST_DMD_SYNC (trans), event);
-  return base_class ()->src_event (trans, event);
+  if (const auto request = parse_event<PatternRequest> (event)) {
+    gst_event_unref (event);
+    return take_request (GST_DMD_SYNC (trans), *request);
+  }
+  return base_transform_class ()->src_event (trans, event);
 }
 
-/* Frames that are given an earlier PTS are later by as much. What upstream can
- * wait is counted from the PTS as well, so the maximum moves with the minimum.
- */
+/* Frames that are given an earlier PTS are later by as much. */
 gboolean
 query (GstBaseTransform *trans, GstPadDirection direction, GstQuery *query)
 {
-  if (direction == GST_PAD_SRC && answer_mirrors (GST_DMD_SYNC (trans), query))
+  const SyncState &st = state (trans);
+  if (direction == GST_PAD_SRC && is_query<MirrorsAnswer> (query)) {
+    answer_query (query, describe_mirrors (st));
     return TRUE;
-  if (!base_class ()->query (trans, direction, query))
-    return FALSE;
-  if (GST_QUERY_TYPE (query) != GST_QUERY_LATENCY || direction != GST_PAD_SRC)
-    return TRUE;
-
-  gboolean live = FALSE;
-  GstClockTime least = 0;
-  GstClockTime most = 0;
-  gst_query_parse_latency (query, &live, &least, &most);
-  GstClockTime own = 0;
-  {
-    const ObjectLock lock (trans);
-    own = state (GST_DMD_SYNC (trans)).latency;
   }
-  gst_query_set_latency (query, live, least + own,
-      GST_CLOCK_TIME_IS_VALID (most) ? most + own : most);
+  if (!base_transform_class ()->query (trans, direction, query))
+    return FALSE;
+  if (GST_QUERY_TYPE (query) == GST_QUERY_LATENCY && direction == GST_PAD_SRC) {
+    const ObjectLock lock (trans);
+    add_latency (query, st.latency);
+  }
   return TRUE;
 }
 

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* dmdsync, frame by frame: time, number, phase. */
+#include "common/element.h"
 #include "common/meta.h"
-#include "state.h"
+#include "dmdsync.h"
 
 #define GST_CAT_DEFAULT dmdsync_debug
 
@@ -18,19 +19,12 @@ constexpr guint64 kMostRepeats = 100;
 /** A frame on its way: what came, and what is known of it. */
 struct Frame {
   BufferPtr buffer;
-  bool readable;
+  bool readable = false;
   FrameStep step;
   GstClockTime pts;
   LockDecision phase;
   PatternSight sight;
 };
-
-void
-post (GstDmdSync *self, GstStructure *structure)
-{
-  gst_element_post_message (GST_ELEMENT (self),
-      gst_message_new_element (GST_OBJECT (self), structure));
-}
 
 void
 count (GstDmdSync *self, guint64 Counters::*counter, guint64 more = 1)
@@ -39,14 +33,43 @@ count (GstDmdSync *self, guint64 Counters::*counter, guint64 more = 1)
   state (self).counters.*counter += more;
 }
 
+/** Posts a message of @p frame; @p more  other fields: name, type, value. */
+template <typename... More>
 void
-say_dropped (GstDmdSync *self, const Frame &frame, const char *reason)
+say (GstDmdSync *self, const char *name, const Frame &frame, More... more)
+{
+  post_structure (self, gst_structure_new (name, "frame", G_TYPE_UINT64,
+                            guint64 (frame.step.number), "pts", G_TYPE_UINT64,
+                            frame.pts, more..., nullptr));
+}
+
+/** Says that @p frame goes no further, which GST_BASE_TRANSFORM_FLOW_DROPPED
+ * means here. */
+GstFlowReturn
+drop (GstDmdSync *self, const Frame &frame, const char *reason)
 {
   GST_DEBUG_OBJECT (self, "frame %" G_GUINT64_FORMAT " dropped: %s",
       frame.step.number, reason);
-  post (self, gst_structure_new ("dmdsync/frame-dropped", "frame",
-                  G_TYPE_UINT64, frame.step.number, "pts", G_TYPE_UINT64,
-                  frame.pts, "reason", G_TYPE_STRING, reason, nullptr));
+  say (self, "dmdsync/frame-dropped", frame, "reason", G_TYPE_STRING, reason);
+  return GST_BASE_TRANSFORM_FLOW_DROPPED;
+}
+
+void
+push_gap (GstDmdSync *self, GstClockTime from, GstClockTime duration)
+{
+  gst_pad_push_event (
+      GST_BASE_TRANSFORM_SRC_PAD (self), gst_event_new_gap (from, duration));
+}
+
+/** The same for a frame whose time is left empty. */
+GstFlowReturn
+drop_with_gap (GstDmdSync *self, const Frame &frame, const char *reason)
+{
+  Stream &stream = state (self).stream;
+  drop (self, frame, reason);
+  stream.discont = true;
+  push_gap (self, frame.pts, GstClockTime (stream.time->rate.period ()));
+  return GST_BASE_TRANSFORM_FLOW_DROPPED;
 }
 
 FrameMeta
@@ -79,24 +102,20 @@ stamp (GstDmdSync *self, GstBuffer *buffer, FrameMeta meta)
   set_frame_meta (buffer, meta);
 }
 
-/** Fills the place of the frames that are missing before @p frame. */
+/** Fills the place of the frames that are missing before @p frame, the first
+ * of which was due at @p from. */
 void
-fill_gap (GstDmdSync *self, const Frame &frame, OnLoss on_loss)
+fill_gap (
+    GstDmdSync *self, const Frame &frame, GstClockTime from, OnLoss on_loss)
 {
   Stream &stream = state (self).stream;
   const FrameRate rate = stream.time->rate;
   const guint64 lost = frame.step.lost;
-  const GstClockTime gap = GstClockTime (rate.time_of (gint64 (lost)));
-  const GstClockTime from = frame.pts - std::min (frame.pts, gap);
-
   if (GST_BASE_TRANSFORM (self)->segment.rate < 0)
     return;
   if (on_loss != OnLoss::repeat || !stream.last || lost > kMostRepeats ||
-      gap > frame.pts) {
-    gst_pad_push_event (GST_BASE_TRANSFORM_SRC_PAD (self),
-        gst_event_new_gap (from, frame.pts - from));
-    return;
-  }
+      GstClockTime (rate.time_of (gint64 (lost))) > frame.pts)
+    return push_gap (self, from, frame.pts - from);
   for (guint64 k = 0; k < lost; k++) {
     BufferPtr filler (gst_buffer_copy (stream.last.get ()));
     GST_BUFFER_FLAG_UNSET (filler.get (), GST_BUFFER_FLAG_DISCONT);
@@ -113,26 +132,22 @@ fill_gap (GstDmdSync *self, const Frame &frame, OnLoss on_loss)
 GstFlowReturn
 take_loss (GstDmdSync *self, const Frame &frame)
 {
-  SyncState &st = state (self);
+  Stream &stream = state (self).stream;
   const guint64 lost = frame.step.lost;
   const GstClockTime gap =
-      GstClockTime (st.stream.time->rate.time_of (gint64 (lost)));
+      GstClockTime (stream.time->rate.time_of (gint64 (lost)));
   const GstClockTime from = frame.pts - std::min (frame.pts, gap);
-  OnLoss on_loss;
-  {
-    const ObjectLock lock (self);
-    on_loss = st.settings.on_loss;
-  }
+  const OnLoss on_loss = settings_of (self).on_loss;
 
-  st.stream.discont = true;
+  stream.discont = true;
   count (self, &Counters::frames_lost, lost);
   GST_INFO_OBJECT (self,
       "%" G_GUINT64_FORMAT " frames lost before %" GST_TIME_FORMAT, lost,
       GST_TIME_ARGS (frame.pts));
-  post (self, gst_structure_new ("dmdsync/frames-lost", "count", G_TYPE_UINT64,
-                  lost, "from", G_TYPE_UINT64, from, "to", G_TYPE_UINT64,
-                  frame.pts, nullptr));
-  if (on_loss == OnLoss::error && st.stream.coded) {
+  post_structure (self, gst_structure_new ("dmdsync/frames-lost", "count",
+                            G_TYPE_UINT64, lost, "from", G_TYPE_UINT64, from,
+                            "to", G_TYPE_UINT64, frame.pts, nullptr));
+  if (on_loss == OnLoss::error && stream.coded) {
     GST_ELEMENT_ERROR (self, RESOURCE, READ,
         ("%" G_GUINT64_FORMAT " frames were lost before %" GST_TIME_FORMAT
          ", and on-loss=error says to stop",
@@ -140,64 +155,49 @@ take_loss (GstDmdSync *self, const Frame &frame)
         (nullptr));
     return GST_FLOW_ERROR;
   }
-  fill_gap (self, frame, on_loss);
+  fill_gap (self, frame, from, on_loss);
   return GST_FLOW_OK;
 }
 
-/** What the order of arrival says. Returns false when the frame goes no
- * further; @p flow then says whether the stream does. */
-bool
-take_arrival (GstDmdSync *self, const Frame &frame, GstFlowReturn &flow)
+/** What the order of arrival says. */
+GstFlowReturn
+take_arrival (GstDmdSync *self, const Frame &frame)
 {
   Stream &stream = state (self).stream;
   switch (frame.step.arrival) {
   case Arrival::duplicate:
     count (self, &Counters::frames_duplicate);
-    say_dropped (self, frame, "duplicate");
-    return false;
+    return drop (self, frame, "duplicate");
   case Arrival::after_loss:
-    flow = take_loss (self, frame);
-    return flow == GST_FLOW_OK;
+    return take_loss (self, frame);
   case Arrival::late:
     count (self, &Counters::frames_late);
-    post (
-        self, gst_structure_new ("dmdsync/frame-late", "frame", G_TYPE_UINT64,
-                  frame.step.number, "pts", G_TYPE_UINT64, frame.pts, nullptr));
+    say (self, "dmdsync/frame-late", frame);
     stream.discont = true;
-    return true;
+    return GST_FLOW_OK;
   case Arrival::restarted:
     GST_WARNING_OBJECT (
         self, "time went back to %" GST_TIME_FORMAT, GST_TIME_ARGS (frame.pts));
     stream.discont = true;
-    return true;
+    return GST_FLOW_OK;
   default:
-    return true;
+    return GST_FLOW_OK;
   }
 }
 
-/** Counts a frame of which a part is missing. Returns false when it goes no
- * further. */
-bool
-take_whole (GstDmdSync *self, Frame &frame)
+/** Counts a frame of which a part is missing. */
+GstFlowReturn
+take_whole (GstDmdSync *self, const Frame &frame)
 {
-  Stream &stream = state (self).stream;
+  GstBuffer *buffer = frame.buffer.get ();
   if (!frame.readable ||
-      GST_BUFFER_FLAG_IS_SET (frame.buffer.get (), GST_BUFFER_FLAG_CORRUPTED)) {
+      GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_CORRUPTED)) {
     count (self, &Counters::frames_incomplete);
-    post (self,
-        gst_structure_new ("dmdsync/frame-incomplete", "frame", G_TYPE_UINT64,
-            frame.step.number, "pts", G_TYPE_UINT64, frame.pts, "bytes",
-            G_TYPE_UINT64, guint64 (gst_buffer_get_size (frame.buffer.get ())),
-            nullptr));
+    say (self, "dmdsync/frame-incomplete", frame, "bytes", G_TYPE_UINT64,
+        guint64 (gst_buffer_get_size (buffer)));
   }
-  if (frame.readable)
-    return true;
-  say_dropped (self, frame, "incomplete");
-  stream.discont = true;
-  gst_pad_push_event (GST_BASE_TRANSFORM_SRC_PAD (self),
-      gst_event_new_gap (
-          frame.pts, GstClockTime (stream.time->rate.period ())));
-  return false;
+  return frame.readable ? GST_FLOW_OK
+                        : drop_with_gap (self, frame, "incomplete");
 }
 
 PhaseSight
@@ -209,16 +209,8 @@ look_at (GstDmdSync *self, GstBuffer *buffer)
     GST_WARNING_OBJECT (self, "frame cannot be read: its phase is not known");
     return {};
   }
-  const GstVideoFrame *frame = mapped.frame ();
-  const auto view = [frame]<typename Pixel> (const Pixel *) {
-    return ImageView<const Pixel>{
-        static_cast<const Pixel *> (GST_VIDEO_FRAME_PLANE_DATA (frame, 0)),
-        GST_VIDEO_FRAME_WIDTH (frame), GST_VIDEO_FRAME_HEIGHT (frame),
-        GST_VIDEO_FRAME_PLANE_STRIDE (frame, 0)};
-  };
-  if (GST_VIDEO_FRAME_FORMAT (frame) == GST_VIDEO_FORMAT_GRAY8)
-    return stream.watch->look (view (static_cast<const guint8 *> (nullptr)));
-  return stream.watch->look (view (static_cast<const guint16 *> (nullptr)));
+  return read_pixels (
+      mapped, [&] (auto pixels) { return stream.watch->look (pixels); });
 }
 
 void
@@ -230,16 +222,15 @@ say_phase (GstDmdSync *self, const Frame &frame)
     count (self, &Counters::slips);
     GST_WARNING_OBJECT (
         self, "the DMD slipped by %d slots", phase.slipped->slots);
-    post (self, gst_structure_new ("dmdsync/slip", "frame", G_TYPE_UINT64,
-                    guint64 (phase.slipped->first_frame), "slots", G_TYPE_INT,
-                    phase.slipped->slots, "certain", G_TYPE_BOOLEAN,
-                    gboolean (phase.slipped->certain), "pts", G_TYPE_UINT64,
-                    frame.pts, nullptr));
+    post_structure (
+        self, gst_structure_new ("dmdsync/slip", "frame", G_TYPE_UINT64,
+                  guint64 (phase.slipped->first_frame), "slots", G_TYPE_INT,
+                  phase.slipped->slots, "certain", G_TYPE_BOOLEAN,
+                  gboolean (phase.slipped->certain), "pts", G_TYPE_UINT64,
+                  frame.pts, nullptr));
   }
   if (phase.locked_now)
-    post (self, gst_structure_new ("dmdsync/locked", "frame", G_TYPE_UINT64,
-                    guint64 (frame.step.number), "pts", G_TYPE_UINT64,
-                    frame.pts, nullptr));
+    say (self, "dmdsync/locked", frame);
 
   bool changed = false;
   {
@@ -254,21 +245,10 @@ say_phase (GstDmdSync *self, const Frame &frame)
 GstFlowReturn
 take_unlocked (GstDmdSync *self, const Frame &frame)
 {
-  SyncState &st = state (self);
-  OnUnlock on_unlock;
-  {
-    const ObjectLock lock (self);
-    on_unlock = st.settings.on_unlock;
-  }
-  switch (on_unlock) {
+  switch (settings_of (self).on_unlock) {
   case OnUnlock::skip:
     count (self, &Counters::frames_skipped);
-    say_dropped (self, frame, "not-locked");
-    st.stream.discont = true;
-    gst_pad_push_event (GST_BASE_TRANSFORM_SRC_PAD (self),
-        gst_event_new_gap (
-            frame.pts, GstClockTime (st.stream.time->rate.period ())));
-    return GST_BASE_TRANSFORM_FLOW_DROPPED;
+    return drop_with_gap (self, frame, "not-locked");
   case OnUnlock::error:
     GST_ELEMENT_ERROR (self, RESOURCE, FAILED,
         ("The masks of the DMD are %d slots late in frame %" G_GUINT64_FORMAT
@@ -360,20 +340,6 @@ meta_of (GstDmdSync *self, const Frame &frame)
   return meta;
 }
 
-/** Puts memory in place of @p frame's that its source cannot overwrite. False
- * where it cannot be read. */
-bool
-own_memory (const OwnedFrames &frames, BufferPtr &frame)
-{
-  if (!frames.is_whole (frame.get ()))
-    return false;
-  BufferPtr owned = frames.own (frame.get ());
-  if (!owned)
-    return false;
-  frame = std::move (owned);
-  return true;
-}
-
 GstFlowReturn
 take_frame (GstDmdSync *self, BufferPtr buffer)
 {
@@ -389,28 +355,31 @@ take_frame (GstDmdSync *self, BufferPtr buffer)
   }
 
   Frame frame;
-  frame.readable = own_memory (*stream.frames, buffer);
+  if (stream.frames->is_whole (buffer.get ()))
+    if (BufferPtr owned = stream.frames->own (buffer.get ())) {
+      buffer = std::move (owned);
+      frame.readable = true;
+    }
   frame.buffer.reset (gst_buffer_make_writable (buffer.release ()));
   const GstClockTime time = place (self, frame);
   const bool too_early = back > 0 && GstClockTime (back) > time;
   frame.pts = too_early ? 0 : time - GstClockTime (back);
 
-  GstFlowReturn flow = GST_FLOW_OK;
-  if (!take_arrival (self, frame, flow))
+  GstFlowReturn flow = take_arrival (self, frame);
+  if (flow == GST_FLOW_OK)
+    flow = take_whole (self, frame);
+  if (flow != GST_FLOW_OK)
     return flow;
-  if (!take_whole (self, frame))
-    return GST_FLOW_OK;
   frame.sight =
       look_for_pattern (self, frame.buffer.get (), frame.step, frame.pts);
   watch_phase (self, frame);
   if (too_early) {
     count (self, &Counters::frames_early);
-    say_dropped (self, frame, "before-start");
-    return GST_FLOW_OK;
+    return drop (self, frame, "before-start");
   }
   if (!frame.phase.locked && frame.sight.coded)
     if (flow = take_unlocked (self, frame); flow != GST_FLOW_OK)
-      return flow == GST_BASE_TRANSFORM_FLOW_DROPPED ? GST_FLOW_OK : flow;
+      return flow;
 
   say_uncertainty (self, frame.step.number, frame.pts);
   stamp (self, frame.buffer.get (), meta_of (self, frame));
@@ -446,7 +415,7 @@ generate_output (GstBaseTransform *trans, GstBuffer **outbuf)
     GST_LOG_OBJECT (self, "[IN] %" GST_TIME_FORMAT,
         GST_TIME_ARGS (GST_BUFFER_PTS (buffer.get ())));
     if (const GstFlowReturn flow = take_frame (self, std::move (buffer));
-        flow != GST_FLOW_OK)
+        flow != GST_FLOW_OK && flow != GST_BASE_TRANSFORM_FLOW_DROPPED)
       return flow;
   }
   if (!stream.ready.empty ()) {

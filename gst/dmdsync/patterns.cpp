@@ -1,14 +1,13 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* dmdsync shows patterns that others ask for, and gives the mirrors back.
+/* Patterns that elements downstream request.
  *
- * An event from downstream asks for a pattern, from any thread; the runner
- * sends it; the streaming thread finds the frame from which on it is to be
- * seen, and says so in that frame's meta. Nobody waits for the device.
+ * An event requests one, from any thread; the runner sends it; the streaming
+ * thread finds the first frame that shows it and names it in the meta of that
+ * frame and the next ones. Nobody waits for the device.
  */
-#include <numeric>
-
 #include "calibrate/gratings.h"
-#include "state.h"
+#include "common/element.h"
+#include "dmdsync.h"
 
 #define GST_CAT_DEFAULT dmdsync_debug
 
@@ -18,9 +17,8 @@ namespace codedexposure::gst::sync
 namespace
 {
 
-constexpr const char *kRequest = "dmdsync/pattern";
-constexpr const char *kMirrors = "dmdsync/mirrors";
-/* Who asks and is gone leaves the mirrors for so long: 10 s at 25 a second. */
+/* A request that is not renewed expires after this many frames: 10 s at 25
+ * frames/s. */
 constexpr guint64 kFrames = 250;
 
 /** Why no pattern can be shown; "": it can. */
@@ -37,13 +35,13 @@ obstacle (const SyncState &st)
   return "";
 }
 
-gboolean
+bool
 refuse (GstDmdSync *self, const std::string &pattern, const std::string &why)
 {
   GST_ELEMENT_WARNING (self, RESOURCE, SETTINGS,
       ("Cannot show the pattern %s: %s", pattern.c_str (), why.c_str ()),
       (nullptr));
-  return FALSE;
+  return false;
 }
 
 /* False where there is no stream. The order's lock is given up before anybody
@@ -81,7 +79,7 @@ send (GstDmdSync *self, const Pattern &pattern, const std::string &text,
   return true;
 }
 
-gboolean
+bool
 show (GstDmdSync *self, const std::string &text, guint64 frames)
 {
   if (const std::string why = obstacle (state (self)); !why.empty ())
@@ -91,7 +89,7 @@ show (GstDmdSync *self, const std::string &text, guint64 frames)
     return refuse (self, text, pattern.error ().message);
   if (!send (self, *pattern, text, frames))
     return refuse (self, text, "there is no stream yet, or no more");
-  return TRUE;
+  return true;
 }
 
 /* The pattern that was shown and is no more; none where there was none. */
@@ -115,78 +113,34 @@ restore (GstDmdSync *self)
   return pattern;
 }
 
-template <typename Pixel>
-double
-mean_of (ImageView<const Pixel> image)
-{
-  double sum = 0.0;
-  for (int y = 0; y < image.height; y++)
-    sum += double (std::accumulate (
-        image.row (y), image.row (y) + image.width, std::uint64_t (0)));
-  return sum / (double (image.width) * image.height);
-}
-
 double
 level_of (const GstVideoInfo &info, GstBuffer *buffer)
 {
   MappedFrame mapped (info, buffer, GST_MAP_READ);
   if (!mapped)
     return 0.0;
-  if (GST_VIDEO_INFO_FORMAT (&info) == GST_VIDEO_FORMAT_GRAY8)
-    return mean_of (view_of<const guint8> (mapped));
-  return mean_of (view_of<const guint16> (mapped));
-}
-
-void
-say_shown (GstDmdSync *self, const std::string &pattern, const FrameStep &step,
-    GstClockTime pts)
-{
-  gst_element_post_message (GST_ELEMENT (self),
-      gst_message_new_element (GST_OBJECT (self),
-          gst_structure_new ("dmdsync/pattern-shown", "pattern", G_TYPE_STRING,
-              pattern.c_str (), "frame", G_TYPE_UINT64, guint64 (step.number),
-              "pts", G_TYPE_UINT64, pts, nullptr)));
+  return read_pixels (mapped, [] (auto pixels) { return mean_level (pixels); });
 }
 
 } // namespace
 
 bool
-is_pattern_event (GstEvent *event)
+take_request (GstDmdSync *self, const PatternRequest &request)
 {
-  return GST_EVENT_TYPE (event) == GST_EVENT_CUSTOM_UPSTREAM &&
-         gst_event_has_name (event, kRequest);
-}
-
-gboolean
-take_pattern_event (GstDmdSync *self, GstEvent *event)
-{
-  const EventPtr owned (event);
-  const GstStructure *structure = gst_event_get_structure (event);
-  const gchar *pattern = gst_structure_get_string (structure, "pattern");
-  if (!pattern || !*pattern) {
-    give_back (self, "asked");
-    return TRUE;
-  }
-  guint64 frames = kFrames;
-  gst_structure_get_uint64 (structure, "frames", &frames);
-  return show (self, pattern, std::max<guint64> (1, frames));
-}
-
-bool
-answer_mirrors (GstDmdSync *self, GstQuery *query)
-{
-  if (GST_QUERY_TYPE (query) != GST_QUERY_CUSTOM)
-    return false;
-  GstStructure *structure = gst_query_writable_structure (query);
-  if (!gst_structure_has_name (structure, kMirrors))
-    return false;
-  const SyncState &st = state (self);
-  const std::string why = obstacle (st);
-  const Extent size = st.runner ? st.runner->info ().shown () : Extent ();
-  gst_structure_set (structure, "width", G_TYPE_INT, size.width, "height",
-      G_TYPE_INT, size.height, "patterns", G_TYPE_BOOLEAN,
-      gboolean (why.empty ()), "reason", G_TYPE_STRING, why.c_str (), nullptr);
+  const std::string pattern = request.pattern.value_or ("");
+  if (!pattern.empty ())
+    return show (self, pattern,
+        std::max<guint64> (1, request.frames.value_or (kFrames)));
+  give_back (self, "asked");
   return true;
+}
+
+MirrorsAnswer
+describe_mirrors (const SyncState &st)
+{
+  const std::string why = obstacle (st);
+  const Extent size = st.runner ? st.runner->info ().shown () : Extent{0, 0};
+  return {size.width, size.height, why.empty (), why};
 }
 
 void
@@ -196,10 +150,9 @@ give_back (GstDmdSync *self, const char *reason)
   if (!pattern)
     return;
   GST_INFO_OBJECT (self, "gives the mirrors back: %s", reason);
-  gst_element_post_message (GST_ELEMENT (self),
-      gst_message_new_element (GST_OBJECT (self),
-          gst_structure_new ("dmdsync/pattern-over", "pattern", G_TYPE_STRING,
-              pattern->c_str (), "reason", G_TYPE_STRING, reason, nullptr)));
+  post_structure (
+      self, gst_structure_new ("dmdsync/pattern-over", "pattern", G_TYPE_STRING,
+                pattern->c_str (), "reason", G_TYPE_STRING, reason, nullptr));
 }
 
 PatternSight
@@ -233,7 +186,10 @@ look_for_pattern (GstDmdSync *self, GstBuffer *buffer, const FrameStep &step,
     return {};
   }
   if (waited)
-    say_shown (self, pattern->text, step, pts);
+    post_structure (
+        self, gst_structure_new ("dmdsync/pattern-shown", "pattern",
+                  G_TYPE_STRING, pattern->text.c_str (), "frame", G_TYPE_UINT64,
+                  guint64 (step.number), "pts", G_TYPE_UINT64, pts, nullptr));
 
   bool over = false;
   {

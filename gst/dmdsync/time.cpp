@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* dmdsync's clocks: the camera's, the pipeline's, and what lies between. */
-#include "state.h"
+#include "common/element.h"
+#include "dmdsync.h"
 
 #define GST_CAT_DEFAULT dmdsync_debug
 
@@ -91,8 +92,7 @@ update_latency (GstDmdSync *self)
     if (std::exchange (st.latency, latency) == latency)
       return;
   }
-  gst_element_post_message (
-      GST_ELEMENT (self), gst_message_new_latency (GST_OBJECT (self)));
+  post_latency (self);
 }
 
 GstClockTime
@@ -144,12 +144,10 @@ say_uncertainty (GstDmdSync *self, guint64 number, GstClockTime pts)
   if (stream.time_known == known)
     return;
   stream.time_known = known;
-  gst_element_post_message (GST_ELEMENT (self),
-      gst_message_new_element (GST_OBJECT (self),
-          gst_structure_new ("dmdsync/time-uncertainty", "known",
-              G_TYPE_BOOLEAN, gboolean (known), "uncertainty", G_TYPE_UINT64,
-              stream.uncertainty, "frame", G_TYPE_UINT64, number, "pts",
-              G_TYPE_UINT64, pts, nullptr)));
+  post_structure (self,
+      gst_structure_new ("dmdsync/time-uncertainty", "known", G_TYPE_BOOLEAN,
+          gboolean (known), "uncertainty", G_TYPE_UINT64, stream.uncertainty,
+          "frame", G_TYPE_UINT64, number, "pts", G_TYPE_UINT64, pts, nullptr));
 }
 
 void
@@ -177,10 +175,9 @@ watch_rate (GstDmdSync *self, GstClockTime time)
   if (!rate)
     return;
   const FrameRate said = stream.time->rate;
-  gst_element_post_message (GST_ELEMENT (self),
-      gst_message_new_element (GST_OBJECT (self),
-          gst_structure_new ("dmdsync/frame-rate", "measured", G_TYPE_DOUBLE,
-              *rate, "caps", GST_TYPE_FRACTION, said.num, said.den, nullptr)));
+  post_structure (
+      self, gst_structure_new ("dmdsync/frame-rate", "measured", G_TYPE_DOUBLE,
+                *rate, "caps", GST_TYPE_FRACTION, said.num, said.den, nullptr));
   GST_ELEMENT_WARNING (self, RESOURCE, SETTINGS,
       ("Frames come at %.4g a second, the caps say %d/%d. Whoever triggers the "
        "camera imposes its rate: set the caps and the trigger to the same.",

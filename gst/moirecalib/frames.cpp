@@ -353,10 +353,7 @@ take_tag (GstMoireCalib *self, GstEvent *event)
   }
   if (setup == st.stream.setup)
     return event;
-  GstEvent *ours = gst_event_new_tag (tags_with_setup (tags, *setup));
-  gst_event_set_seqnum (ours, gst_event_get_seqnum (event));
-  gst_event_unref (event);
-  return ours;
+  return replace_setup (event, *setup);
 }
 
 /** At the end of the stream: waits for the worker, and warns about what is not

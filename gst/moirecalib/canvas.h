@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Lines and letters on an image of greys; for the sources of lib/ only. */
+/* Lines and letters on an image of greys. */
 #pragma once
 
 #include <memory>

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* moirecalib, frame by frame: requests patterns, gives copies of frames to the
  * worker, draws the panel over the picture. Nothing here waits or solves. */
+#include "common/element.h"
 #include "common/events.h"
 #include "common/meta.h"
 #include "common/tag.h"
-#include "state.h"
+#include "moirecalib.h"
 
 #define GST_CAT_DEFAULT moirecalib_debug
 
@@ -20,12 +21,6 @@ constexpr guint64 kLease = 250, kRenewal = 100;
 constexpr std::size_t kMostSamples = 32;
 /* Readings in a row that make an alignment: one second at 25 a second. */
 constexpr int kSteady = 25;
-
-GstBaseTransformClass *
-base_class ()
-{
-  return GST_BASE_TRANSFORM_CLASS (g_type_class_peek (GST_TYPE_BASE_TRANSFORM));
-}
 
 gboolean
 send_request (GstMoireCalib *self, const std::string &pattern)
@@ -77,12 +72,6 @@ ask_mirrors (GstMoireCalib *self)
   return {.reason = "no element upstream knows of mirrors"};
 }
 
-std::string
-live_pattern (const Settings &settings)
-{
-  return settings.pattern.empty () ? live_grating ().text () : settings.pattern;
-}
-
 bool
 begin_mapping (GstMoireCalib *self)
 {
@@ -93,14 +82,14 @@ begin_mapping (GstMoireCalib *self)
     const std::lock_guard guard (st.exchange.lock);
     first = st.exchange.geometry->patterns.front ().text ();
     count = st.exchange.geometry->patterns.size ();
-    st.exchange.live.reset ();
-    st.exchange.stage = Stage::mapping;
+    st.exchange.queue.live.reset ();
+    st.exchange.progress.stage = Stage::mapping;
   }
   st.stream.mapping = true;
   st.stream.next = 0;
   st.stream.taken = 0;
   set_stage (self, Stage::mapping);
-  say_progress (self, GST_PROGRESS_TYPE_START,
+  post_progress (self, GST_PROGRESS_TYPE_START, "mapping",
       "mapping with " + std::to_string (count) + " patterns");
   return ask (self, first);
 }
@@ -114,18 +103,13 @@ begin_run (GstMoireCalib *self, const Settings &settings, Geometry geometry)
   {
     const std::lock_guard guard (st.exchange.lock);
     if (geometry.mode == Mode::phase) {
-      st.exchange.schedule.reset ();
+      st.exchange.found.schedule.reset ();
       st.exchange.panel.reset ();
     }
     st.exchange.geometry = std::move (geometry);
     st.exchange.run++;
-    st.exchange.live.reset ();
-    st.exchange.samples.clear ();
-    st.exchange.solve = false;
-    st.exchange.stage = Stage::searching;
-    st.exchange.confidence = 0.0;
-    st.exchange.readings = 0;
-    st.exchange.aligned_readings = 0;
+    st.exchange.queue = {};
+    st.exchange.progress = {};
   }
   stream.begun = true;
   stream.turn = settings.turn;
@@ -134,30 +118,31 @@ begin_run (GstMoireCalib *self, const Settings &settings, Geometry geometry)
 }
 
 /** Needs no patterns: the schedule itself shows the tile in the scene. */
-bool
-begin_phase (GstMoireCalib *self, const Settings &settings, int bits)
+void
+begin_phase (GstMoireCalib *self, const Settings &settings, Geometry geometry)
 {
   Stream &stream = state (self).stream;
   if (!std::exchange (stream.asked, {}).empty ())
     release_mirrors (self);
-  const Extent camera{stream.info->width, stream.info->height};
-  std::optional<Schedule> said;
   if (stream.setup)
-    said = stream.setup->schedule;
-  begin_run (self, settings,
-      {settings.mode, *stream.info, bits, camera, camera, {},
-          std::move (said)});
-  return true;
+    geometry.schedule = stream.setup->schedule;
+  begin_run (self, settings, std::move (geometry));
 }
 
 /** @p bits: significant ones, from the frame metadata. */
 bool
 begin (GstMoireCalib *self, const Settings &settings, int bits)
 {
-  const Stream &stream = state (self).stream;
-  if (settings.mode == Mode::phase)
-    return begin_phase (self, settings, bits);
-  if (const auto shown = Pattern::parse (live_pattern (settings)); !shown) {
+  Geometry geometry;
+  geometry.mode = settings.mode;
+  geometry.info = *state (self).stream.info;
+  geometry.bits = bits;
+  geometry.mirrors = geometry.camera ();
+  if (settings.mode == Mode::phase) {
+    begin_phase (self, settings, std::move (geometry));
+    return true;
+  }
+  if (const auto shown = Pattern::parse (settings.live_pattern ()); !shown) {
     GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
         ("The pattern property cannot be read: %s",
             shown.error ().message.c_str ()),
@@ -167,17 +152,11 @@ begin (GstMoireCalib *self, const Settings &settings, int bits)
   const MirrorsAnswer mirrors = ask_mirrors (self);
   if (settings.pattern.empty () && !mirrors.patterns)
     return refuse (self, mirrors.reason);
-  Geometry geometry;
-  geometry.mode = settings.mode;
-  geometry.info = *stream.info;
-  geometry.bits = bits;
-  geometry.camera = {stream.info->width, stream.info->height};
-  geometry.mirrors = mirrors.width > 0 && mirrors.height > 0
-                         ? Extent{mirrors.width, mirrors.height}
-                         : geometry.camera;
+  if (mirrors.width > 0 && mirrors.height > 0)
+    geometry.mirrors = {mirrors.width, mirrors.height};
   geometry.patterns = calibration_patterns (geometry.mirrors, settings.period);
   begin_run (self, settings, std::move (geometry));
-  return ask (self, live_pattern (settings));
+  return ask (self, settings.live_pattern ());
 }
 
 Sample
@@ -192,9 +171,9 @@ void
 offer (Exchange &exchange, GstBuffer *buffer, const std::string &pattern,
     guint64 number)
 {
-  if (exchange.busy || exchange.live)
+  if (exchange.busy || exchange.queue.live)
     return;
-  exchange.live = copy_of (buffer, pattern, number);
+  exchange.queue.live = copy_of (buffer, pattern, number);
   exchange.changed.notify_all ();
 }
 
@@ -204,7 +183,7 @@ find_phase (GstMoireCalib *self, GstBuffer *buffer, const FrameMeta &meta)
 {
   Exchange &exchange = state (self).exchange;
   const std::lock_guard guard (exchange.lock);
-  if (exchange.stage == Stage::searching && meta.pattern.empty ())
+  if (exchange.progress.stage == Stage::searching && meta.pattern.empty ())
     offer (exchange, buffer, {}, meta.frame);
   return true;
 }
@@ -222,9 +201,9 @@ align (GstMoireCalib *self, const Settings &settings, GstBuffer *buffer,
     offer (st.exchange, buffer, shown, number);
     /* The report shows the fringes of one reading. */
     enough = settings.mode == Mode::map
-                 ? st.exchange.readings > 0
+                 ? st.exchange.progress.readings > 0
                  : settings.mode == Mode::automatic &&
-                       st.exchange.aligned_readings >= kSteady;
+                       st.exchange.progress.aligned_readings >= kSteady;
   }
   if (enough && settings.pattern.empty ())
     return begin_mapping (self);
@@ -248,16 +227,16 @@ map (GstMoireCalib *self, const Settings &settings, GstBuffer *buffer,
   std::string following;
   {
     const std::lock_guard guard (st.exchange.lock);
-    if (st.exchange.samples.size () >= kMostSamples)
+    if (st.exchange.queue.samples.size () >= kMostSamples)
       return true;
-    st.exchange.samples.push_back (copy_of (buffer, shown, number));
+    st.exchange.queue.samples.push_back (copy_of (buffer, shown, number));
     if (++stream.taken >= settings.frames) {
       stream.taken = 0;
       const auto &patterns = st.exchange.geometry->patterns;
       if (++stream.next < patterns.size ())
         following = patterns[stream.next].text ();
       else
-        st.exchange.solve = true;
+        st.exchange.queue.solve = true;
     }
     st.exchange.changed.notify_all ();
   }
@@ -286,10 +265,7 @@ overlay (GstMoireCalib *self, GstBuffer *buffer)
   MappedFrame mapped (info, buffer, GstMapFlags (GST_MAP_READWRITE));
   if (!mapped)
     return;
-  if (GST_VIDEO_INFO_FORMAT (&info) == GST_VIDEO_FORMAT_GRAY8)
-    lay_over (*panel, view_of<guint8> (mapped));
-  else
-    lay_over (*panel, view_of<guint16> (mapped));
+  write_pixels (mapped, [&] (auto pixels) { lay_over (*panel, pixels); });
 }
 
 /** The setup from upstream with the phase or mapping that was found here.
@@ -298,10 +274,10 @@ std::optional<StreamSetup>
 corrected_setup (const CalibState &st)
 {
   std::optional<StreamSetup> setup = st.stream.setup;
-  if (st.exchange.schedule)
-    setup = StreamSetup{*st.exchange.schedule};
-  else if (setup && st.exchange.mapping)
-    setup->mapping = st.exchange.mapping;
+  if (st.exchange.found.schedule)
+    setup = StreamSetup{*st.exchange.found.schedule};
+  else if (setup && st.exchange.found.mapping)
+    setup->mapping = st.exchange.found.mapping;
   return setup;
 }
 
@@ -313,7 +289,7 @@ push_setup (GstMoireCalib *self)
   std::optional<StreamSetup> setup;
   {
     const std::lock_guard guard (st.exchange.lock);
-    if (!std::exchange (st.exchange.setup_due, false))
+    if (!std::exchange (st.exchange.found.due, false))
       return;
     setup = corrected_setup (st);
   }
@@ -342,10 +318,10 @@ take_tag (GstMoireCalib *self, GstEvent *event)
   {
     const std::lock_guard guard (st.exchange.lock);
     if (other) {
-      st.exchange.schedule.reset ();
+      st.exchange.found.schedule.reset ();
       if (st.exchange.geometry && st.exchange.geometry->mode == Mode::phase) {
         st.exchange.run++;
-        st.exchange.live.reset ();
+        st.exchange.queue.live.reset ();
         begin_anew (self);
       }
     }
@@ -369,12 +345,11 @@ finish (GstMoireCalib *self)
   {
     std::unique_lock guard (exchange.lock);
     exchange.changed.wait (guard, [&exchange] {
-      return exchange.quit || (!exchange.busy && !exchange.solve &&
-                                  !exchange.live && exchange.samples.empty ());
+      return exchange.quit || (!exchange.busy && exchange.queue.empty ());
     });
     lost_tile = exchange.geometry && exchange.geometry->mode == Mode::phase &&
-                exchange.stage == Stage::searching;
-    confidence = exchange.confidence;
+                exchange.progress.stage == Stage::searching;
+    confidence = exchange.progress.confidence;
     if (exchange.geometry)
       patterns = exchange.geometry->patterns.size ();
   }
@@ -458,7 +433,7 @@ sink_event (GstBaseTransform *trans, GstEvent *event) noexcept
   default:
     break;
   }
-  return base_class ()->sink_event (trans, event);
+  return base_transform_class ()->sink_event (trans, event);
 }
 
 } // namespace codedexposure::gst::moire

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* What moirecalib says on the bus; fields: docs/formats.md. */
 #include "common/messages.h"
-#include "state.h"
+#include "moirecalib.h"
 
 #define GST_CAT_DEFAULT moirecalib_debug
 
@@ -56,15 +56,6 @@ say_phase (GstMoireCalib *self, const Sample &sample,
   post_message (
       self, MoirePhase{sample.number, sample.pts, tile.phase.x, tile.phase.y,
                 tile.confidence, tile.contrast, found.schedule.text ()});
-}
-
-void
-say_progress (
-    GstMoireCalib *self, GstProgressType type, const std::string &text)
-{
-  gst_element_post_message (
-      GST_ELEMENT (self), gst_message_new_progress (GST_OBJECT (self), type,
-                              "mapping", text.c_str ()));
 }
 
 void

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
+#include <limits>
 #include <numbers>
 
 #include "canvas.h"
@@ -160,25 +160,19 @@ draw_panel (Extent size, const PanelContent &content)
   return panel;
 }
 
+template <typename Pixel>
 void
-lay_over (const Panel &panel, ImageView<std::uint8_t> out)
+lay_over (const Panel &panel, ImageView<Pixel> out)
 {
-  const auto grey = panel.grey.view ();
-  for (const Rectangle &at : panel.opaque)
-    for (int y = at.y; y < at.y + at.height; y++)
-      std::memcpy (
-          out.row (y) + at.x, grey.row (y) + at.x, std::size_t (at.width));
-}
-
-void
-lay_over (const Panel &panel, ImageView<std::uint16_t> out)
-{
+  constexpr int kStep = std::numeric_limits<Pixel>::max () / 255;
   const auto grey = panel.grey.view ();
   for (const Rectangle &at : panel.opaque)
     for (int y = at.y; y < at.y + at.height; y++)
       std::transform (grey.row (y) + at.x, grey.row (y) + at.x + at.width,
           out.row (y) + at.x,
-          [] (std::uint8_t level) { return std::uint16_t (level * 257); });
+          [] (std::uint8_t level) { return Pixel (level * kStep); });
 }
+template void lay_over (const Panel &, ImageView<std::uint8_t>);
+template void lay_over (const Panel &, ImageView<std::uint16_t>);
 
 } // namespace codedexposure

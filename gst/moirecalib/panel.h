@@ -40,7 +40,7 @@ Panel draw_panel (Extent size, const PanelContent &content);
 
 /** Copies the opaque parts to @p out, of the panel's size, 255 becoming the
  * largest value of the pixel type. */
-void lay_over (const Panel &panel, ImageView<std::uint8_t> out);
-void lay_over (const Panel &panel, ImageView<std::uint16_t> out);
+template <typename Pixel>
+void lay_over (const Panel &panel, ImageView<Pixel> out);
 
 } // namespace codedexposure

@@ -4,7 +4,8 @@
 #include <new>
 #include <system_error>
 
-#include "state.h"
+#include "common/element.h"
+#include "moirecalib.h"
 
 #define GST_CAT_DEFAULT moirecalib_debug
 
@@ -13,6 +14,8 @@ namespace codedexposure::gst::moire
 
 namespace
 {
+
+constexpr const char *kMapping = "mapping"; // code of PROGRESS messages
 
 class Worker
 {
@@ -39,7 +42,6 @@ private:
   Written write_files (
       const CalibrationResult &result, const Settings &settings);
   void fail (const std::string &why);
-  void fail_phase (const std::string &why);
   void fail_of_memory ();
   void set (Stage stage);
   void draw (const std::string &title, const std::vector<std::string> &lines,
@@ -79,7 +81,7 @@ Worker::begin (guint run)
   std::optional<Schedule> schedule = geometry_.schedule;
   if (geometry_.mode == Mode::phase)
     choose_schedule (schedule);
-  session_.emplace (CalibrationSession::Options{.camera = geometry_.camera,
+  session_.emplace (CalibrationSession::Options{.camera = geometry_.camera (),
       .mirrors = geometry_.mirrors,
       .bits = settings_.bits > 0 ? settings_.bits : geometry_.bits,
       .patterns = geometry_.patterns,
@@ -91,8 +93,7 @@ Worker::begin (guint run)
 void
 Worker::expect_grating ()
 {
-  const auto grating = Pattern::parse (
-      settings_.pattern.empty () ? live_grating ().text () : settings_.pattern);
+  const auto grating = Pattern::parse (settings_.live_pattern ());
   const auto expected = session_->expect (
       grating ? *grating : live_grating (), settings_.stage.pixels_per_mirror);
   if (!expected)
@@ -108,12 +109,12 @@ Worker::choose_schedule (std::optional<Schedule> &schedule)
   if (!settings_.schedule.empty ()) {
     const Result<Schedule> asked = Schedule::parse (settings_.schedule);
     if (!asked)
-      return fail_phase (asked.error ().message);
+      return fail (asked.error ().message);
     schedule = *asked;
   }
   if (!schedule)
-    fail_phase ("the stream says nothing of its schedule; set the schedule "
-                "property to what the mirrors show");
+    fail ("the stream says nothing of its schedule; set the schedule "
+          "property to what the mirrors show");
 }
 
 template <typename Use>
@@ -122,11 +123,8 @@ Worker::with_pixels (const Sample &sample, Use use)
 {
   MappedFrame mapped (geometry_.info, sample.frame.get (), GST_MAP_READ);
   using Said = decltype (use (ImageView<const guint8> ()));
-  if (!mapped)
-    return Said (Error{"a frame cannot be read"});
-  if (GST_VIDEO_INFO_FORMAT (&geometry_.info) == GST_VIDEO_FORMAT_GRAY8)
-    return use (view_of<const guint8> (mapped));
-  return use (view_of<const guint16> (mapped));
+  return mapped ? read_pixels (mapped, use)
+                : Said (Error{"a frame cannot be read"});
 }
 
 void
@@ -134,11 +132,11 @@ Worker::set (Stage stage)
 {
   {
     const std::lock_guard guard (exchange_.lock);
-    if (exchange_.run != run_ || (exchange_.stage == Stage::mapping &&
+    if (exchange_.run != run_ || (exchange_.progress.stage == Stage::mapping &&
                                      int (stage) < int (Stage::mapping)))
       return;
-    exchange_.stage = stage;
-    exchange_.aligned_readings = session_ ? session_->aligned () : 0;
+    exchange_.progress.stage = stage;
+    exchange_.progress.aligned_readings = session_ ? session_->aligned () : 0;
   }
   set_stage (self_, stage);
 }
@@ -147,8 +145,8 @@ void
 Worker::draw (const std::string &title, const std::vector<std::string> &lines,
     std::optional<double> progress)
 {
-  if (!settings_.overlay || geometry_.camera.width < 160 ||
-      geometry_.camera.height < 120)
+  if (!settings_.overlay || geometry_.camera ().width < 160 ||
+      geometry_.camera ().height < 120)
     return;
   PanelContent content{.title = title,
       .lines = lines,
@@ -160,7 +158,7 @@ Worker::draw (const std::string &title, const std::vector<std::string> &lines,
     content.fringes_y = &session_->last_fringes ()->y;
   }
   auto panel =
-      std::make_shared<const Panel> (draw_panel (geometry_.camera, content));
+      std::make_shared<const Panel> (draw_panel (geometry_.camera (), content));
   const std::lock_guard guard (exchange_.lock);
   exchange_.panel = std::move (panel);
 }
@@ -170,7 +168,7 @@ Worker::align (const Sample &sample)
 {
   {
     const std::lock_guard guard (exchange_.lock);
-    exchange_.readings += exchange_.run == run_;
+    exchange_.progress.readings += exchange_.run == run_;
   }
   settings_ = settings_of (self_);
   const auto alignment = with_pixels (sample, [this] (auto pixels) {
@@ -210,7 +208,7 @@ Worker::collect (const Sample &sample)
                            std::to_string (total) + ", " + sample.pattern;
   correction_.reset ();
   if (collected % settings_.frames == 0)
-    say_progress (self_, GST_PROGRESS_TYPE_CONTINUE, text);
+    post_progress (self_, GST_PROGRESS_TYPE_CONTINUE, kMapping, text);
   draw ("mapping", {text}, double (collected) / std::max (1, total));
 }
 
@@ -218,21 +216,18 @@ Worker::collect (const Sample &sample)
 void
 Worker::fail (const std::string &why)
 {
+  const bool maps = geometry_.mode != Mode::phase;
   failed_ = true;
   set (Stage::failed);
-  draw ("no mapping", {why}, {});
-  say_progress (self_, GST_PROGRESS_TYPE_ERROR, why);
+  if (maps) {
+    draw ("no mapping", {why}, {});
+    post_progress (self_, GST_PROGRESS_TYPE_ERROR, kMapping, why);
+  }
   GST_ELEMENT_WARNING (self_, STREAM, FAILED,
-      ("There is no mapping: %s", why.c_str ()), (nullptr));
-}
-
-void
-Worker::fail_phase (const std::string &why)
-{
-  failed_ = true;
-  set (Stage::failed);
-  GST_ELEMENT_WARNING (self_, STREAM, FAILED,
-      ("The tile's phase cannot be found: %s", why.c_str ()), (nullptr));
+      ("%s: %s",
+          maps ? "There is no mapping" : "The tile's phase cannot be found",
+          why.c_str ()),
+      (nullptr));
 }
 
 /* The run ends; setting the mode begins another. */
@@ -252,15 +247,15 @@ Worker::find_phase (const Sample &sample)
   const auto found = with_pixels (
       sample, [this] (auto pixels) { return session_->find_phase (pixels); });
   if (!found)
-    return fail_phase (found.error ().message);
+    return fail (found.error ().message);
   {
     const std::lock_guard guard (exchange_.lock);
-    exchange_.confidence = session_->confidence ();
+    exchange_.progress.confidence = session_->confidence ();
     if (!*found || exchange_.run != run_)
       return;
-    exchange_.schedule = (*found)->schedule;
-    exchange_.mapping.reset ();
-    exchange_.setup_due = true;
+    exchange_.found.schedule = (*found)->schedule;
+    exchange_.found.mapping.reset ();
+    exchange_.found.due = true;
   }
   set (Stage::found);
   say_phase (self_, sample, **found);
@@ -317,14 +312,14 @@ Worker::finish (const CalibrationResult &result)
   }
   {
     const std::lock_guard guard (exchange_.lock);
-    exchange_.mapping = result.mapping;
-    exchange_.schedule.reset ();
-    exchange_.setup_due = true;
+    exchange_.found.mapping = result.mapping;
+    exchange_.found.schedule.reset ();
+    exchange_.found.due = true;
   }
   set (Stage::mapped);
   correction_ = correct_stage (result.mapping, settings.stage);
   draw ("mapped", mapping_lines (result, *correction_), 1.0);
-  say_progress (self_, GST_PROGRESS_TYPE_COMPLETE,
+  post_progress (self_, GST_PROGRESS_TYPE_COMPLETE, kMapping,
       "mapped with " + std::to_string (session_->collected ()) + " frames");
   g_object_notify (G_OBJECT (self_), "mapping");
   say_mapping (self_, result, written.location, written.report);
@@ -339,14 +334,14 @@ Worker::next_task ()
   task.run = exchange_.run;
   if (exchange_.run != run_)
     task.geometry = exchange_.geometry;
-  if (!exchange_.samples.empty ()) {
+  if (!exchange_.queue.samples.empty ()) {
     task.collects = true;
-    task.sample = std::move (exchange_.samples.front ());
-    exchange_.samples.pop_front ();
-  } else if (exchange_.solve) {
-    task.solves = std::exchange (exchange_.solve, false);
+    task.sample = std::move (exchange_.queue.samples.front ());
+    exchange_.queue.samples.pop_front ();
+  } else if (exchange_.queue.solve) {
+    task.solves = std::exchange (exchange_.queue.solve, false);
   } else {
-    task.sample = std::exchange (exchange_.live, std::nullopt);
+    task.sample = std::exchange (exchange_.queue.live, std::nullopt);
   }
   return task;
 }
@@ -377,10 +372,8 @@ Worker::run ()
   while (true) {
     exchange_.busy = false;
     exchange_.changed.notify_all ();
-    exchange_.changed.wait (guard, [this] {
-      return exchange_.quit || exchange_.live || exchange_.solve ||
-             !exchange_.samples.empty ();
-    });
+    exchange_.changed.wait (
+        guard, [this] { return exchange_.quit || !exchange_.queue.empty (); });
     if (exchange_.quit)
       return;
     exchange_.busy = true;
@@ -411,11 +404,9 @@ start_worker (GstMoireCalib *self)
     const std::lock_guard guard (exchange.lock);
     exchange.quit = false;
     exchange.geometry.reset ();
-    exchange.stage = Stage::searching;
     exchange.panel.reset ();
-    exchange.mapping.reset ();
-    exchange.schedule.reset ();
-    exchange.setup_due = false;
+    exchange.progress.stage = Stage::searching;
+    exchange.found = {};
   }
   try {
     st.worker = std::thread ([self] { Worker (self).run (); });
@@ -436,9 +427,7 @@ stop_worker (GstMoireCalib *self)
   {
     const std::lock_guard guard (st.exchange.lock);
     st.exchange.quit = true;
-    st.exchange.live.reset ();
-    st.exchange.samples.clear ();
-    st.exchange.solve = false;
+    st.exchange.queue = {};
   }
   st.exchange.changed.notify_all ();
   st.worker.join ();

@@ -17,7 +17,7 @@
 #include "common/events.h"
 #include "common/owned_frames.h"
 #include "common/raii.h"
-#include "dmd/dmd_runner.h"
+#include "dmd/runner.h"
 #include "mapping/stream_setup.h"
 #include "schedule/schedule.h"
 #include "sync/device_clock.h"

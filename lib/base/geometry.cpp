@@ -19,6 +19,16 @@ rect_text (const Rect &rect)
          "+" + std::to_string (rect.y);
 }
 
+std::optional<Extent>
+parse_size (std::string_view text)
+{
+  const auto rect = parse_rect (text);
+  if (!rect || split (text, '+').size () != 1 || rect->width < 1 ||
+      rect->height < 1)
+    return std::nullopt;
+  return Extent{rect->width, rect->height};
+}
+
 std::optional<Rect>
 parse_rect (std::string_view text)
 {

@@ -54,6 +54,8 @@ struct Rect {
 
 /** "192x144" */
 std::string size_text (Extent size);
+/** The inverse of size_text () for sizes of 1 or more; none for another text. */
+std::optional<Extent> parse_size (std::string_view text);
 /** "192x144+64+32": width, height and corner. */
 std::string rect_text (const Rect &rect);
 /** The inverse of rect_text (); "192x144" starts at 0, 0. None for another

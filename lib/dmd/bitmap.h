@@ -2,8 +2,8 @@
 /* Masks as Windows bitmap files, which TI's boards and programs take. */
 #pragma once
 
+#include "dmd/bytes.h"
 #include "dmd/erle.h"
-#include "dmd/little_endian.h"
 
 namespace codedexposure
 {

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-#include "dmd/dlpc350.h"
-
+/* The LightCrafter 4500. */
 #include <algorithm>
-#include <optional>
 
-#include "dmd/dlp_controller.h"
+#include "base/try.h"
+#include "dmd/dlpc350_protocol.h"
+#include "dmd/dlpc_board.h"
 #include "dmd/plane_image.h"
 
 namespace codedexposure
@@ -14,6 +14,7 @@ namespace
 {
 
 using namespace dlpc350;
+using namespace std::chrono_literals;
 
 constexpr Extent kMirrors{912, 1140};
 /** Of the hardware status: resets, forced swap, sequencer. */
@@ -22,15 +23,11 @@ constexpr int kStartAttempts = 3;
 /** Masks in one frame of video. */
 constexpr int kVideoPlanes = kPlanesPerImage;
 
-class Dlpc350 : public Dmd
+class Dlpc350 final : public DlpcBoard
 {
 public:
   Dlpc350 (std::unique_ptr<HidLink> link, const DmdOptions &options)
-      : options_ (options),
-        board_ (std::move (link), kFailures, [] (DlpController &) {
-          return std::string ("refused; the board is in another mode, or its "
-                              "firmware does not know this");
-        })
+      : DlpcBoard (std::move (link), options, kFailures)
   {
   }
   ~Dlpc350 () override
@@ -41,19 +38,18 @@ public:
 
   Result<void> open ();
 
-  const DmdInfo &info () const override { return info_; }
   Result<DmdStatus> status () override;
   Result<void> upload (const Schedule &schedule, std::stop_token stop,
       const UploadProgress &progress) override;
   Result<void> start (const SlotPlan &plan, std::stop_token stop) override;
-  void stop () override { running_ = !board_.stop () && running_; }
-  bool running () const override { return running_; }
 
 private:
-  void begin (std::stop_token stop = {})
+  std::string explain () override
   {
-    board_.link ().begin (std::move (stop), options_.patience);
+    return "refused; the board is in another mode, or its firmware does not "
+           "know this";
   }
+  bool video () const { return options_.source == Source::video; }
   Result<void> check_images (const Schedule &schedule);
   Result<void> prepare ();
   std::vector<Entry> entries () const;
@@ -62,34 +58,19 @@ private:
   Result<void> validate ();
   Result<void> run ();
 
-  DmdOptions options_;
-  DlpController board_;
-  DmdInfo info_;
   std::vector<PlaneSlot> masks_; // empty: nothing to start
   int slots_ = 1;
-  bool touched_ = false;
-  bool running_ = false;
 };
 
 Result<void>
 Dlpc350::open ()
 {
   begin ();
-  const auto version = board_.read (kVersion, 16);
-  if (!version)
-    return version.error ();
-  const auto status = board_.read_byte (kHardwareStatus);
-  if (!status)
-    return status.error ();
-  info_.name = board_.link ().name () + " (DLP4500)";
-  info_.size = kMirrors;
+  RETURN_IF_ERROR (read (kVersion, 16));
+  RETURN_IF_ERROR (read_byte (kHardwareStatus));
+  set_info ("DLP4500", kMirrors, kMinimumExposure, kMinimumDark,
+      video () ? kVideoPlanes : kPreloadedPlanes);
   info_.array = Array::diamond;
-  info_.minimum_active = Nanoseconds (kMinimumExposure) * 1000;
-  info_.resident_masks =
-      options_.source == Source::flash ? kPreloadedPlanes : kVideoPlanes;
-  info_.triggers_camera = options_.master == Master::dmd;
-  info_.trigger_in = info_.trigger_out = true;
-  info_.minimum_dark = Nanoseconds (kMinimumDark) * 1000;
   return check_placement (options_.placement, info_.array, info_.size);
 }
 
@@ -97,18 +78,12 @@ Result<DmdStatus>
 Dlpc350::status ()
 {
   begin ();
-  const auto images = board_.read_byte (kFlashImages);
-  if (!images)
-    return images.error ();
-  auto status = board_.status ();
-  if (status)
-    status->details.insert (status->details.begin (),
-        {{"controller", "DLPC350"}, {"mirrors", "DLP4500"},
-            {"images-in-flash", std::to_string (*images)}});
-  return status;
+  ASSIGN_OR_RETURN (const std::uint8_t images, read_byte (kFlashImages));
+  return state ({{"controller", "DLPC350"}, {"mirrors", "DLP4500"},
+      {"images-in-flash", std::to_string (images)}});
 }
 
-/** Whether the user said where the masks are, and it can be so. */
+/** Whether the user said where the masks are, and whether they can be there. */
 Result<void>
 Dlpc350::check_images (const Schedule &schedule)
 {
@@ -116,8 +91,8 @@ Dlpc350::check_images (const Schedule &schedule)
     return Error{info_.name + " shows " +
                  std::to_string (info_.resident_masks) + " masks, not " +
                  std::to_string (schedule.masks ()) +
-                 "; take a tile with fewer elements"};
-  if (options_.source == Source::video)
+                 "; use a tile with fewer elements"};
+  if (video ())
     return {};
   const int needed = plan_planes (schedule).images;
   if (int (options_.images.size ()) != needed)
@@ -125,18 +100,15 @@ Dlpc350::check_images (const Schedule &schedule)
         info_.name +
             " takes no masks over USB. Write them as images with "
             "'codedexposure schedule render --planes', put these into its "
-            "flash with TI's LightCrafter 4500 software and say which they "
-            "are: "
+            "flash with TI's LightCrafter 4500 software and name them: "
             "images=0" +
             (needed > 1 ? "/1" : "") +
             "; or show them over HDMI and add source=video",
         ErrorCode::unsupported};
-  const auto in_flash = board_.read_byte (kFlashImages);
-  if (!in_flash)
-    return in_flash.error ();
+  ASSIGN_OR_RETURN (const int in_flash, read_byte (kFlashImages));
   for (const int image : options_.images)
-    if (image >= *in_flash)
-      return Error{info_.name + " has " + std::to_string (*in_flash) +
+    if (image >= in_flash)
+      return Error{info_.name + " has " + std::to_string (in_flash) +
                    " images in flash, there is no image " +
                    std::to_string (image)};
   return {};
@@ -148,8 +120,7 @@ Dlpc350::upload (const Schedule &schedule, std::stop_token stop_token,
 {
   masks_.clear ();
   begin (std::move (stop_token));
-  if (const auto there = check_images (schedule); !there)
-    return there;
+  RETURN_IF_ERROR (check_images (schedule));
   progress (0, 1);
   touched_ = true;
   if (const auto ready = prepare (); !ready) {
@@ -165,26 +136,20 @@ Dlpc350::upload (const Schedule &schedule, std::stop_token stop_token,
 Result<void>
 Dlpc350::prepare ()
 {
-  if (const auto stopped = board_.halt (); !stopped)
-    return stopped;
-  running_ = false;
-  if (const auto entered = board_.enter (kModePattern); !entered)
-    return entered;
+  RETURN_IF_ERROR (halt ());
+  RETURN_IF_ERROR (enter (kModePattern));
   // After a reset, pulses are high and come without delay.
   if (options_.pulse_low)
-    if (const auto set = board_.write (
-            kTriggerOut2, encode_low_pulse (options_.polarity_bit));
-        !set)
-      return set;
-  return board_.write_byte (kSource, std::uint8_t (options_.source));
+    RETURN_IF_ERROR (
+        write (kTriggerOut2, encode_low_pulse (options_.polarity_bit)));
+  return write_byte (kSource, std::uint8_t (options_.source));
 }
 
 std::vector<Entry>
 Dlpc350::entries () const
 {
-  const bool video = options_.source == Source::video;
   const Trigger edge =
-      options_.falling_edge && !video ? Trigger::falling : Trigger::rising;
+      options_.falling_edge && !video () ? Trigger::falling : Trigger::rising;
   const bool camera = options_.master == Master::camera;
   std::vector<Entry> entries;
   int image = -1;
@@ -192,7 +157,7 @@ Dlpc350::entries () const
     const PlaneSlot at = masks_[mask];
     Entry entry{.plane = at.plane, .next_image = at.image != image};
     image = at.image;
-    if (video)
+    if (video ())
       entry.trigger = mask == 0 ? edge : Trigger::none;
     else if (camera)
       entry.trigger = mask % std::size_t (slots_) == 0 ? edge : Trigger::none;
@@ -204,90 +169,71 @@ Dlpc350::entries () const
 Result<void>
 Dlpc350::fill_mailbox (std::uint8_t mailbox, const Bytes &data)
 {
-  if (const auto opened = board_.write_byte (kMailbox, mailbox); !opened)
-    return opened;
-  auto filled = board_.write_byte (kMailboxOffset, 0);
-  if (filled)
-    filled = board_.write (kMailboxData, data);
+  RETURN_IF_ERROR (write_byte (kMailbox, mailbox));
+  const auto filled = write_all ({{kMailboxOffset, {0}}, {kMailboxData, data}});
   // A mailbox left open would swallow the next table.
-  const auto closed = board_.write_byte (kMailbox, kMailboxClosed);
+  const auto closed = write_byte (kMailbox, kMailboxClosed);
   return filled ? closed : filled;
 }
 
 Result<void>
 Dlpc350::send_tables (const PatternTime &time)
 {
-  const bool video = options_.source == Source::video;
   std::vector<Entry> patterns = entries ();
   Bytes images;
   for (std::size_t mask = 0; mask < patterns.size (); mask++)
-    if (patterns[mask].next_image && !video)
+    if (patterns[mask].next_image && !video ())
       images.push_back (
           std::uint8_t (options_.images[std::size_t (masks_[mask].image)]));
   if (options_.swap_image_pair && images.size () == 2)
     std::swap (images[0], images[1]);
 
   const TriggerMode mode =
-      video ? TriggerMode::video : TriggerMode::timer_or_input;
+      video () ? TriggerMode::video : TriggerMode::timer_or_input;
   const std::size_t image_entries = std::max<std::size_t> (1, images.size ());
   if (image_entries > std::size_t (kMaxImages))
     return Error{info_.name + ": the masks alternate between images more "
                               "often than its image table allows"};
-  const std::pair<HidCommand, Bytes> settings[] = {
-      {kConfigure, encode_configuration (int (patterns.size ()), true, slots_,
-                       int (image_entries))},
-      {kTriggerMode, {std::uint8_t (mode)}},
-      {kTimes, encode_times (time)},
-  };
-  for (const auto &[command, data] : settings)
-    if (const auto set = board_.write (command, data); !set)
-      return set;
-  if (!video)
-    if (const auto filled = fill_mailbox (kMailboxImages, images); !filled)
-      return filled;
+  RETURN_IF_ERROR (write_all ({{kConfigure,
+                                   encode_configuration (int (patterns.size ()),
+                                       slots_, int (image_entries))},
+      {kTriggerMode, {std::uint8_t (mode)}}, {kTimes, encode_times (time)}}));
+  if (!video ())
+    RETURN_IF_ERROR (fill_mailbox (kMailboxImages, images));
   return fill_mailbox (kMailboxPatterns, encode_entries (patterns));
 }
 
 Result<void>
 Dlpc350::validate ()
 {
-  if (const auto asked = board_.write_byte (kValidate, 0); !asked)
-    return asked;
+  RETURN_IF_ERROR (write_byte (kValidate, 0));
   do {
-    const auto data = board_.read (kValidate);
-    if (!data)
-      return data.error ();
-    const auto verdict = parse_verdict (*data);
-    if (!verdict)
-      return board_.link ().error (kValidate.name, verdict.error ().message);
-    if (!verdict->busy && !verdict->good)
-      return board_.link ().error ("show these masks", verdict->text);
-    if (!verdict->busy)
+    ASSIGN_OR_RETURN (const std::uint8_t byte, read_byte (kValidate));
+    const Verdict verdict = parse_verdict (byte);
+    if (!verdict.busy && !verdict.good)
+      return error ("show these masks", verdict.text);
+    if (!verdict.busy)
       return {};
-  } while (board_.link ().wait (std::chrono::milliseconds (10)));
-  return board_.link ().error (kValidate.name, "it is busy with it for ever");
+  } while (link_->wait (10ms));
+  return error (kValidate.name, "it does not finish");
 }
 
-/** Out of video mode, the first start may be ignored. */
 Result<void>
 Dlpc350::run ()
 {
   running_ = true;
+  // After video mode, the board may ignore the first start.
   for (int attempt = 0; attempt < kStartAttempts; attempt++) {
-    if (const auto asked = board_.write_byte (kRun, kRunStart); !asked)
-      return asked;
-    const auto status = board_.read_byte (kMainStatus);
-    if (!status)
-      return status.error ();
-    if ((*status & kSequencerRuns) != 0)
-      return board_.check_health ();
-    if (!board_.link ().wait (std::chrono::milliseconds (100)))
+    RETURN_IF_ERROR (write_byte (kRun, kRunStart));
+    ASSIGN_OR_RETURN (const std::uint8_t status, read_byte (kMainStatus));
+    if ((status & kSequencerRuns) != 0)
+      return check_health ();
+    if (!link_->wait (100ms))
       break;
   }
-  return board_.link ().error ("start the patterns",
-      options_.source == Source::video
-          ? "it does not; is a 912x1140 signal on its HDMI input?"
-          : "it does not");
+  return error ("start the patterns",
+      video () ? "it does not run; is a 912x1140 signal on its HDMI input?"
+               : "it does not run");
 }
 
 Result<void>
@@ -300,22 +246,15 @@ Dlpc350::start (const SlotPlan &plan, std::stop_token stop_token)
       options_.master);
   if (!time)
     return time.error ().with_prefix (info_.name + ": ");
-  if (options_.source == Source::video && time->dark != 0)
+  if (video () && time->dark != 0)
     return Error{info_.name + ": masks from video follow each other without "
                               "dark time; give the schedule switching=0"};
-  // After every stop, it wants its tables anew, and validated.
   begin (std::move (stop_token));
-  if (const auto stopped = board_.halt (); !stopped)
-    return stopped;
-  running_ = false;
-  if (const auto sent = send_tables (*time); !sent)
-    return sent;
-  if (const auto valid = validate (); !valid)
-    return valid;
-  if (const auto passed = board_.link ().pause (
-          std::chrono::milliseconds (plan.frame_period () / 1'000'000 + 1));
-      !passed)
-    return passed;
+  // After every stop, the board needs its tables and their validation again.
+  RETURN_IF_ERROR (halt ());
+  RETURN_IF_ERROR (send_tables (*time));
+  RETURN_IF_ERROR (validate ());
+  RETURN_IF_ERROR (pause_frame (plan));
   return run ();
 }
 
@@ -325,8 +264,7 @@ Result<std::unique_ptr<Dmd>>
 open_dlpc350 (std::unique_ptr<HidLink> link, const DmdOptions &options)
 {
   auto dmd = std::make_unique<Dlpc350> (std::move (link), options);
-  if (const auto opened = dmd->open (); !opened)
-    return opened.error ();
+  RETURN_IF_ERROR (dmd->open ());
   return std::unique_ptr<Dmd> (std::move (dmd));
 }
 

@@ -15,17 +15,17 @@ encode_entries (const std::vector<Entry> &entries)
   for (const Entry &entry : entries)
     append_le (bytes,
         std::uint32_t (entry.trigger) | std::uint32_t (entry.plane) << 2 |
-            kOneBit | kWhite | std::uint32_t (entry.black_after) << 17 |
-            std::uint32_t (entry.next_image) << 18,
+            kOneBit | kWhite | std::uint32_t (entry.next_image) << 18,
         3);
   return bytes;
 }
 
 Bytes
-encode_configuration (int entries, bool repeat, int per_trigger, int images)
+encode_configuration (int entries, int per_trigger, int images)
 {
-  return {std::uint8_t (entries - 1), std::uint8_t (repeat),
-      std::uint8_t (per_trigger - 1), std::uint8_t (images - 1)};
+  constexpr std::uint8_t kRepeat = 1;
+  return {std::uint8_t (entries - 1), kRepeat, std::uint8_t (per_trigger - 1),
+      std::uint8_t (images - 1)};
 }
 
 Bytes
@@ -44,8 +44,8 @@ encode_low_pulse (int polarity_bit)
   return {std::uint8_t (1 << polarity_bit), kNoDelay};
 }
 
-Result<Verdict>
-parse_verdict (ByteView data)
+Verdict
+parse_verdict (std::uint8_t byte)
 {
   struct Finding {
     std::uint8_t bit;
@@ -59,14 +59,9 @@ parse_verdict (ByteView data)
       {3, false, "no black before a triggered pattern"},
       {4, false, "less than 230 us of dark time"},
   }};
-  constexpr unsigned kBusy = 1 << 7;
-  if (data.size () != 1)
-    return Error{"the verdict on the pattern table comes in " +
-                     std::to_string (data.size ()) + " bytes, not in 1",
-        ErrorCode::device};
-  Verdict verdict{(data[0] & kBusy) != 0, true, ""};
+  Verdict verdict{(byte & 1 << 7) != 0, true, ""};
   for (const Finding &finding : kFindings) {
-    if ((data[0] >> finding.bit & 1) == 0)
+    if ((byte >> finding.bit & 1) == 0)
       continue;
     verdict.good &= !finding.error;
     verdict.text += (verdict.text.empty () ? "" : "; ");

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "dmd/dlp_commands.h"
+#include "dmd/hid_packet.h"
 #include "dmd/pattern_timing.h"
 
 namespace codedexposure::dlpc350
@@ -29,25 +29,24 @@ constexpr std::uint8_t kMailboxClosed = 0;
 constexpr std::uint8_t kMailboxImages = 1;
 constexpr std::uint8_t kMailboxPatterns = 2;
 
-constexpr int kMaxPatterns = 128;
 constexpr int kMaxImages = 64;
 /** Masks in the two buffers, shown without reading flash meanwhile. */
 constexpr int kPreloadedPlanes = 48;
 constexpr std::uint32_t kMinimumExposure = 235;
-/** A black mask takes this long to load: period and exposure differ by it at
- * least, or not at all. */
+/** A black mask takes this long to load: period and exposure differ by at least
+ * this time, or not at all. */
 constexpr std::uint32_t kMinimumDark = 230;
 constexpr std::uint32_t kMaximumExposure = 200'000'000;
 
 enum class Source : std::uint8_t { video = 0, flash = 3 };
-/** What lets the table go on: the frames of the video, or a timer or the
+/** What steps through the table: the frames of the video; or a timer or the
  * trigger input, entry by entry. */
 enum class TriggerMode : std::uint8_t { video = 0, timer_or_input = 1 };
 enum class Trigger : std::uint8_t {
   timer = 0,
   rising = 1,
   falling = 2,
-  none = 3, ///< goes on from the pattern before
+  none = 3, ///< continues the pattern before
 };
 
 /** One line of the pattern table: a binary plane, all LEDs as they are. */
@@ -55,14 +54,12 @@ struct Entry {
   Trigger trigger = Trigger::timer;
   int plane = 0;           ///< of the image: 0..7 green, 8..15 red, 16..23 blue
   bool next_image = false; ///< takes the next image of the image table first
-  bool black_after = false;
 };
 /** 3 bytes each, end to end. */
 Bytes encode_entries (const std::vector<Entry> &entries);
 
 /** @p per_trigger  patterns from one pulse of trigger output 2 to the next. */
-Bytes encode_configuration (
-    int entries, bool repeat, int per_trigger, int images);
+Bytes encode_configuration (int entries, int per_trigger, int images);
 /** Exposure and frame period, us. */
 Bytes encode_times (const PatternTime &time);
 
@@ -70,12 +67,12 @@ Bytes encode_times (const PatternTime &time);
  * 0 or 1: documents disagree on which it is. */
 Bytes encode_low_pulse (int polarity_bit);
 
-/** What validation said. */
+/** The result of the validation. */
 struct Verdict {
   bool busy;
-  bool good;        ///< no error; warnings do not keep it from starting
-  std::string text; ///< errors and warnings, "" where there are none
+  bool good;        ///< no error; it starts in spite of warnings
+  std::string text; ///< errors and warnings, or ""
 };
-Result<Verdict> parse_verdict (ByteView data);
+Verdict parse_verdict (std::uint8_t byte);
 
 } // namespace codedexposure::dlpc350

@@ -1,14 +1,16 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-#include "dmd/dlpc900.h"
-
+/* The LightCrafter 6500 and 9000. */
 #include <algorithm>
+#include <array>
+#include <functional>
 #include <map>
 #include <numeric>
 #include <optional>
 
 #include "base/text.h"
-#include "dmd/dlp_controller.h"
+#include "base/try.h"
 #include "dmd/dlpc900_protocol.h"
+#include "dmd/dlpc_board.h"
 #include "dmd/plane_image.h"
 
 namespace codedexposure
@@ -21,32 +23,14 @@ using namespace dlpc900;
 
 constexpr Nanoseconds kPacketTime = 1'000'000; // full-speed interrupt transfer
 constexpr std::uint32_t kLongestTime = 0xFFFFFF;
-/** Black that it puts before a mask that waits for the camera, us. */
+/** Black that it inserts before a mask that waits for the camera, us. */
 constexpr std::uint32_t kTriggerDark = 105;
-constexpr int kShortestTriggerDelay = 104;
-/** Entries whose order fits in one message. */
+constexpr int kMinTriggerDelay = 104;
+/** Masks whose order fits in one message. */
 constexpr int kMaxOrder = int (kHidRequestData - 6) / 2;
 /** Of the hardware status: DMD of another kind, resets, forced swap, sequencer.
  */
 constexpr std::uint8_t kFailures = 0xCE;
-
-/** The reason of a refusal: a number, and a text if the board has one. */
-std::string
-explain (DlpController &board)
-{
-  const auto code = board.link ().read (kErrorCode);
-  if (!code || code->refused || code->data.empty ())
-    return "refused, for a reason that it does not tell";
-  std::string reason = error_text (code->data.front ());
-  const auto text = board.link ().read (kErrorText);
-  if (text && !text->refused) {
-    const std::string own (text->data.begin (),
-        std::find (text->data.begin (), text->data.end (), 0));
-    if (!own.empty ())
-      reason += ", " + in_quotes (own);
-  }
-  return reason;
-}
 
 /** Where the masks of a schedule are on the board. */
 struct Residents {
@@ -61,11 +45,11 @@ struct UploadPlan {
   bool new_table = true;
   std::vector<int> order = {};  ///< line of the table for each mask
   Residents residents = {};     ///< after the upload
-  std::vector<int> images = {}; ///< that are sent
+  std::vector<int> images = {}; ///< to send, the highest first
 };
 
-/** Which of the masks that a board has is each of those that are wanted, where
- * they are the same ones in another order that fits in one message. */
+/** The line of the table with each of the masks @p wants, if the board @p has
+ * the same masks in another order that fits in one message. */
 std::optional<std::vector<int>>
 find_order (
     const std::vector<PlaneDigest> &has, const std::vector<PlaneDigest> &wants)
@@ -107,8 +91,8 @@ packets_of (const Halves &halves)
   return packets;
 }
 
-/** The images of one schedule, each rendered and encoded once: for the time
- * that they take, and to be sent. */
+/** The images of one schedule, each rendered and encoded once: to predict the
+ * time of an upload, and to be sent. */
 class EncodedImages
 {
 public:
@@ -139,18 +123,17 @@ private:
   std::map<int, Halves> images_;
 };
 
-class Dlpc900 : public Dmd
+class Dlpc900 final : public DlpcBoard
 {
 public:
   Dlpc900 (std::unique_ptr<HidLink> link, const DmdOptions &options)
-      : options_ (options), board_ (std::move (link), kFailures, explain)
+      : DlpcBoard (std::move (link), options, kFailures)
   {
   }
   ~Dlpc900 () override;
 
   Result<void> open ();
 
-  const DmdInfo &info () const override { return info_; }
   Result<DmdStatus> status () override;
   Nanoseconds upload_time (
       const Schedule &schedule, std::stop_token stop) override;
@@ -159,42 +142,40 @@ public:
   Result<void> start (const SlotPlan &plan, std::stop_token stop) override;
   Result<void> show (const StillMask &mask, const SlotPlan &plan,
       std::stop_token stop) override;
-  void stop () override;
-  bool running () const override { return running_; }
 
 private:
-  PatternLimits limits () const;
-  bool dual () const { return (hardware_status_ & kSecondController) != 0; }
-  int controllers () const { return dual () ? 2 : 1; }
+  /** An image and its place on the board. */
+  using Indexed = std::pair<int, const Halves *>;
+
+  std::string explain () override;
+  Result<std::vector<PatternTime>> times_of (const SlotPlan &plan) const;
   UploadPlan plan_upload (const Schedule &schedule) const;
   EncodedImages &images_of (const Schedule &schedule);
+  Error cancelled () const
+  {
+    return Error{info_.name + ": upload cancelled", ErrorCode::cancelled};
+  }
 
   void forget ();
-  void begin (std::stop_token stop = {});
+  Result<void> stop_after (Result<void> failed);
   Result<void> prepare ();
   Result<void> send (const Schedule &schedule, const UploadPlan &plan,
       const UploadProgress &progress);
   Result<void> send_table (const std::vector<PatternTime> &times);
   Result<void> send_still (
       const StillMask &mask, const std::vector<PatternTime> &times);
-  Result<void> send_images (const std::vector<int> &images,
-      const std::function<const Halves &(int image)> &encoded,
-      const UploadProgress &progress);
+  Result<void> send_images (
+      const std::vector<Indexed> &images, const UploadProgress &progress);
   Result<void> send_half (const HidCommand &load, const HidCommand &data,
       int index, const Bytes &half,
       const std::function<void (std::size_t)> &sent);
   Result<void> run (
       const std::vector<PatternTime> &times, const SlotPlan &plan);
 
-  DmdOptions options_;
-  DlpController board_;
-  DmdInfo info_;
   Board kind_ = {};
   Version version_;
-  std::uint8_t hardware_status_ = 0;
+  int controllers_ = 1;
 
-  bool touched_ = false; // it shows, or may show, what it was told here
-  bool running_ = false;
   bool prepared_ = false;
   Residents residents_;    // empty when unknown
   std::vector<int> order_; // line of the table for each mask, empty: no masks
@@ -208,86 +189,89 @@ Dlpc900::~Dlpc900 ()
   if (!touched_)
     return;
   stop ();
-  // Mirrors live longer when they move while nothing is shown.
-  if (!running_ && !board_.link ().gone ())
-    (void)board_.write_byte (kIdle, 1);
+  // Mirrors last longer if they move while nothing is shown.
+  if (!running_ && !link_->gone ())
+    (void)write_byte (kIdle, 1);
+}
+
+/** An error number, and a text if the board has one. */
+std::string
+Dlpc900::explain ()
+{
+  const auto code = link_->read (kErrorCode);
+  if (!code || code->refused || code->data.empty ())
+    return "refused, without a reason";
+  std::string reason = error_text (code->data.front ());
+  const auto text = link_->read (kErrorText);
+  if (text && !text->refused) {
+    const std::string own (text->data.begin (),
+        std::find (text->data.begin (), text->data.end (), 0));
+    if (!own.empty ())
+      reason += ", " + in_quotes (own);
+  }
+  return reason;
 }
 
 Result<void>
 Dlpc900::open ()
 {
   begin ();
-  const auto version = board_.read (kVersion);
-  if (!version)
-    return version.error ();
-  const auto parsed = parse_version (*version);
-  const auto hardware = board_.read_byte (kHardware);
-  if (!hardware)
-    return hardware.error ();
-  const auto kind = find_board (*hardware);
-  for (const auto &wrong : {parsed ? "" : parsed.error ().message,
-           kind ? "" : kind.error ().message})
-    if (!wrong.empty ())
-      return board_.link ().error ("open it", wrong);
-  version_ = *parsed;
+  ASSIGN_OR_RETURN (const Bytes version, read (kVersion, kVersionSize));
+  version_ = parse_version (version);
+  ASSIGN_OR_RETURN (const std::uint8_t type, read_byte (kHardware));
+  const auto kind = find_board (type);
+  if (!kind)
+    return error ("open it", kind.error ().message);
   kind_ = *kind;
-  const auto status = board_.read_byte (kHardwareStatus);
-  if (!status)
-    return status.error ();
-  hardware_status_ = *status;
+  ASSIGN_OR_RETURN (const std::uint8_t status, read_byte (kHardwareStatus));
+  controllers_ = (status & kSecondController) != 0 ? 2 : 1;
 
-  info_.name = board_.link ().name () + " (" + kind_.name + ")";
-  info_.size = kind_.size;
-  info_.minimum_active = Nanoseconds (kind_.minimum_exposure) * 1000;
-  info_.resident_masks = std::min (kind_.planes, kMaxEntries);
-  info_.triggers_camera = options_.master == Master::dmd;
+  // Firmware without this command has the minimum of the table.
+  std::uint32_t min_active = kind_.minimum_exposure;
+  if (const auto minima = read (kMinimumExposures, kMinimumExposuresSize))
+    if (const std::uint32_t binary = read_le (*minima, 0, 2); binary > 0)
+      min_active = binary;
+  set_info (
+      kind_.name, kind_.size, min_active, kind_.minimum_exposure, kMaxEntries);
   info_.still_masks = true;
-  info_.trigger_in = info_.trigger_out = true;
-  info_.minimum_dark = Nanoseconds (kind_.minimum_exposure) * 1000;
-  // Firmware without this command has the minima of the table.
-  if (const auto minima = board_.read (kMinimumExposures))
-    if (const auto exposures = parse_minimum_exposures (*minima))
-      info_.minimum_active = Nanoseconds (exposures->front ()) * 1000;
 
-  if (options_.trigger_delay < kShortestTriggerDelay * 1000 ||
+  if (options_.trigger_delay < kMinTriggerDelay * 1000 ||
       options_.trigger_delay > 0xFFFF * 1000)
-    return Error{info_.name + ": a trigger-delay of " +
-                 time_text (options_.trigger_delay) +
-                 " cannot be had; give it 104us to 65535us"};
+    return Error{info_.name + ": trigger-delay is " +
+                 time_text (options_.trigger_delay) + "; use 104us to 65535us"};
   if (!options_.images.empty ())
     return Error{info_.name + ": takes its masks over USB; leave out images="};
-  if (options_.placement.region)
-    info_.region = {
-        options_.placement.region->width, options_.placement.region->height};
+  if (const auto &region = options_.placement.region)
+    info_.region = {region->width, region->height};
   return check_placement (options_.placement, info_.array, info_.size);
 }
 
-PatternLimits
-Dlpc900::limits () const
+Result<std::vector<PatternTime>>
+Dlpc900::times_of (const SlotPlan &plan) const
 {
-  return {std::uint32_t (info_.minimum_active / 1000), kLongestTime,
-      kind_.minimum_exposure, std::uint32_t (options_.trigger_delay / 1000),
-      kTriggerDark};
+  const PatternLimits limits{std::uint32_t (info_.minimum_active / 1000),
+      kLongestTime, kind_.minimum_exposure,
+      std::uint32_t (options_.trigger_delay / 1000), kTriggerDark};
+  const auto times = fit_patterns (plan, limits, options_.master);
+  if (!times)
+    return times.error ().with_prefix (info_.name + ": ");
+  return times;
 }
 
 Result<DmdStatus>
 Dlpc900::status ()
 {
   begin ();
-  auto status = board_.status ();
-  if (status)
-    status->details.insert (status->details.begin (),
-        {{"controller", "DLPC900"}, {"mirrors", kind_.name},
-            {"firmware", version_.text ()},
-            {"controllers", std::to_string (controllers ())}});
-  return status;
+  return state ({{"controller", "DLPC900"}, {"mirrors", kind_.name},
+      {"firmware", version_.text ()},
+      {"controllers", std::to_string (controllers_)}});
 }
 
 EncodedImages &
 Dlpc900::images_of (const Schedule &schedule)
 {
   if (!images_ || !(images_->schedule () == schedule))
-    images_.emplace (schedule, info_.size, controllers (), options_);
+    images_.emplace (schedule, info_.size, controllers_, options_);
   return *images_;
 }
 
@@ -322,7 +306,7 @@ Dlpc900::plan_upload (const Schedule &schedule) const
     for (std::size_t mask = 0; same && mask < wants.size (); mask++)
       same = planes.masks[mask].image != image || has[mask] == wants[mask];
     if (!same)
-      plan.images.push_back (image); // the highest first
+      plan.images.push_back (image);
   }
   return plan;
 }
@@ -350,38 +334,34 @@ Dlpc900::upload (const Schedule &schedule, std::stop_token stop_token,
   begin (stop_token);
   const auto sent = send (schedule, plan, progress);
   images_.reset ();
-  if (!sent) {
-    forget ();
-    prepared_ = false;
-    stop ();
-  }
-  return sent;
+  return sent ? sent : stop_after (sent);
 }
 
 Result<void>
 Dlpc900::send (const Schedule &schedule, const UploadPlan &plan,
     const UploadProgress &progress)
 {
-  forget (); // until all is sent, nobody knows what the board holds
-  if (const auto ready = prepare (); !ready)
-    return ready;
+  forget (); // until all is sent, it is unknown what the board holds
+  RETURN_IF_ERROR (prepare ());
   residents_ = plan.residents;
   order_ = plan.order;
   slots_ = schedule.slots ();
   if (plan.new_table && options_.table_first) {
-    // Times that every board keeps, until start () knows better.
+    // Times that every board accepts, until start () knows the real ones.
     const std::vector<PatternTime> times (
         std::size_t (slots_), PatternTime{10'000, 0});
-    if (const auto table = send_table (times); !table)
-      return table;
+    RETURN_IF_ERROR (send_table (times));
   }
-  const auto encoded = [this, &schedule] (int image) -> const Halves & {
-    return images_of (schedule).get (image);
-  };
-  return send_images (plan.images, encoded, progress);
+  std::vector<Indexed> images;
+  for (const int index : plan.images) {
+    if (link_->cancelled ())
+      return cancelled ();
+    images.emplace_back (index, &images_of (schedule).get (index));
+  }
+  return send_images (images, progress);
 }
 
-/** There are no masks to start or to use again. */
+/** Leaves no masks to start or to use again. */
 void
 Dlpc900::forget ()
 {
@@ -390,39 +370,34 @@ Dlpc900::forget ()
   times_.clear ();
 }
 
-void
-Dlpc900::begin (std::stop_token stop_token)
+Result<void>
+Dlpc900::stop_after (Result<void> failed)
 {
-  board_.link ().begin (std::move (stop_token), options_.patience);
+  forget ();
+  prepared_ = false;
+  stop ();
+  return failed;
 }
 
 /** Brings the board into the mode in which it takes masks. */
 Result<void>
 Dlpc900::prepare ()
 {
-  if (const auto stopped = board_.halt (); !stopped || prepared_)
+  if (const auto stopped = halt (); !stopped || prepared_)
     return stopped;
-  running_ = false;
-  if (const auto awake = board_.write_byte (kIdle, 0); !awake)
-    return awake;
-  if (const auto entered = board_.enter (kModeOnTheFly); !entered)
-    return entered;
+  RETURN_IF_ERROR (write_byte (kIdle, 0));
+  RETURN_IF_ERROR (enter (kModeOnTheFly));
   constexpr int kPulse = 20; // us
-  const Bytes pulse = options_.pulse_low
-                          ? encode_trigger_out (true, kPulse, 0)
-                          : encode_trigger_out (false, 0, kPulse);
-  std::vector<std::pair<HidCommand, Bytes>> steps;
-  if (needs_park_cycle (version_)) {
-    steps.push_back ({kPark, {1}});
-    steps.push_back ({kPark, {0}});
-  }
-  steps.push_back ({kTriggerOut2, pulse});
-  steps.push_back (
-      {kTriggerIn1, encode_trigger_in (int (options_.trigger_delay / 1000),
-                        options_.falling_edge)});
-  for (const auto &[command, data] : steps)
-    if (const auto done = board_.write (command, data); !done)
-      return done;
+  std::vector<Setting> settings;
+  if (needs_park_cycle (version_))
+    settings = {{kPark, {1}}, {kPark, {0}}};
+  settings.emplace_back (
+      kTriggerOut2, options_.pulse_low ? encode_trigger_out (true, kPulse, 0)
+                                       : encode_trigger_out (false, 0, kPulse));
+  settings.emplace_back (
+      kTriggerIn1, encode_trigger_in (int (options_.trigger_delay / 1000),
+                       options_.falling_edge));
+  RETURN_IF_ERROR (write_all (settings));
   prepared_ = true;
   return {};
 }
@@ -444,34 +419,23 @@ Dlpc900::send_table (const std::vector<PatternTime> &times)
         .plane = residents_.planes[line]};
   }
   for (const Entry &entry : entries)
-    if (const auto done = board_.write (kDefine, encode_entry (entry)); !done)
-      return done;
-  const auto taken = board_.write (
-      kConfigure, encode_configuration (int (entries.size ()), 0));
-  if (!taken)
-    return taken;
+    RETURN_IF_ERROR (write (kDefine, encode_entry (entry)));
+  RETURN_IF_ERROR (
+      write (kConfigure, encode_configuration (int (entries.size ()))));
   if (!std::is_sorted (order_.begin (), order_.end ()))
-    if (const auto moved =
-            board_.link ().post (kReorder, encode_order (order_, 0));
-        !moved)
-      return moved;
+    RETURN_IF_ERROR (link_->post (kReorder, encode_order (order_)));
   times_ = times;
   return {};
 }
 
 Result<void>
-Dlpc900::send_images (const std::vector<int> &images,
-    const std::function<const Halves &(int image)> &encoded,
-    const UploadProgress &progress)
+Dlpc900::send_images (
+    const std::vector<Indexed> &images, const UploadProgress &progress)
 {
-  const Error cancelled{info_.name + ": upload cancelled"};
   std::size_t total = 0, done = 0, told = 0;
-  for (const int index : images) {
-    if (board_.link ().cancelled ())
-      return cancelled;
-    total += packets_of (encoded (index));
-  }
-  total = std::max<std::size_t> (total, 1); // there is an end to tell of
+  for (const auto &[index, halves] : images)
+    total += packets_of (*halves);
+  total = std::max<std::size_t> (total, 1); // the end is always reported
   const auto sent = [&] (std::size_t packets) {
     constexpr std::size_t kSteps = 200;
     done += packets;
@@ -481,17 +445,15 @@ Dlpc900::send_images (const std::vector<int> &images,
     }
   };
 
+  constexpr std::array<HidCommand, 2> kLoad{kLoadImage, kLoadSecond};
+  constexpr std::array<HidCommand, 2> kData{kImageData, kSecondData};
   progress (0, int (total));
-  for (const int index : images) {
-    const Halves &halves = encoded (index);
-    auto half = send_half (
-        kLoadImage, kImageData, index, halves.front ().joined (), sent);
-    if (half && dual ())
-      half = send_half (
-          kLoadSecond, kSecondData, index, halves.back ().joined (), sent);
-    if (!half)
-      return board_.link ().cancelled () ? cancelled : half;
-  }
+  for (const auto &[index, halves] : images)
+    for (std::size_t half = 0; half < halves->size (); half++)
+      if (const auto result = send_half (
+              kLoad[half], kData[half], index, (*halves)[half].joined (), sent);
+          !result)
+        return link_->cancelled () ? cancelled () : result.error ();
   progress (int (total), int (total));
   return {};
 }
@@ -500,27 +462,20 @@ Result<void>
 Dlpc900::send_half (const HidCommand &load, const HidCommand &data, int index,
     const Bytes &half, const std::function<void (std::size_t)> &sent)
 {
-  if (const auto announced =
-          board_.write (load, encode_load (index, half.size ()));
-      !announced)
-    return announced;
+  RETURN_IF_ERROR (write (load, encode_load (index, half.size ())));
   sent (1);
   for (std::size_t at = 0; at < half.size (); at += kImageChunk) {
-    if (board_.link ().cancelled ())
-      return Error{"cancelled", ErrorCode::cancelled};
+    if (link_->cancelled ())
+      return cancelled ();
     const auto chunk =
         ByteView (half).subspan (at, std::min (kImageChunk, half.size () - at));
-    if (const auto posted = board_.link ().post (data, encode_chunk (chunk));
-        !posted)
-      return posted;
-    sent ((chunk.size () + 8 + kHidPacketSize - 1) / kHidPacketSize);
+    RETURN_IF_ERROR (link_->post (data, encode_chunk (chunk)));
+    sent (hid_packets (kChunkHead + chunk.size ()));
   }
-  // Data is not acknowledged; whether it could be unpacked is in the code.
-  const auto code = board_.read_byte (kErrorCode);
-  if (!code)
-    return code.error ();
-  if (*code != 0)
-    return board_.link ().error ("upload masks", error_text (*code));
+  // The board does not acknowledge data; the code tells if it was unpacked.
+  ASSIGN_OR_RETURN (const std::uint8_t code, read_byte (kErrorCode));
+  if (code != 0)
+    return error ("upload masks", error_text (code));
   return {};
 }
 
@@ -532,57 +487,37 @@ Dlpc900::start (const SlotPlan &plan, std::stop_token stop_token)
   if (plan.slots () != slots_)
     return Error{info_.name + ": the masks are for " + std::to_string (slots_) +
                  " slots, not for " + std::to_string (plan.slots ())};
-  const auto times = fit_patterns (plan, limits (), options_.master);
-  if (!times)
-    return times.error ().with_prefix (info_.name + ": ");
+  ASSIGN_OR_RETURN (const auto times, times_of (plan));
   begin (std::move (stop_token));
-  return run (*times, plan);
+  return run (times, plan);
 }
 
 /** @p times  of the lines of one frame; @p plan  of that frame. */
 Result<void>
 Dlpc900::run (const std::vector<PatternTime> &times, const SlotPlan &plan)
 {
-  if (const auto stopped = board_.halt (); !stopped)
-    return stopped;
-  running_ = false;
+  RETURN_IF_ERROR (halt ());
   if (times != times_)
-    if (const auto table = send_table (times); !table)
-      return table;
-  // A whole exposure without masks, or without a trigger.
-  if (const auto passed = board_.link ().pause (
-          std::chrono::milliseconds (plan.frame_period () / 1'000'000 + 1));
-      !passed)
-    return passed;
+    RETURN_IF_ERROR (send_table (times));
+  RETURN_IF_ERROR (pause_frame (plan));
   running_ = true;
-  if (const auto asked = board_.write_byte (kRun, kRunStart); !asked)
-    return asked;
-  if (const auto runs = board_.await (
-          kMainStatus, kSequencerRuns, kSequencerRuns, "start the patterns");
-      !runs)
-    return runs;
-  return board_.check_health ();
+  RETURN_IF_ERROR (write_byte (kRun, kRunStart));
+  RETURN_IF_ERROR (await (
+      kMainStatus, kSequencerRuns, kSequencerRuns, "start the patterns"));
+  return check_health ();
 }
 
 Result<void>
 Dlpc900::show (
     const StillMask &mask, const SlotPlan &plan, std::stop_token stop_token)
 {
-  const auto times = fit_patterns (plan, limits (), options_.master);
-  if (!times)
-    return times.error ().with_prefix (info_.name + ": ");
+  ASSIGN_OR_RETURN (const auto times, times_of (plan));
   touched_ = true;
   const std::vector<PatternTime> still{
-      first_patterns (*times, mask.slots, limits ().minimum_dark)};
+      first_patterns (times, mask.slots, kind_.minimum_exposure)};
   begin (std::move (stop_token));
   const auto sent = send_still (mask, still);
-  if (!sent) {
-    forget ();
-    prepared_ = false;
-    stop ();
-    return sent;
-  }
-  return run (still, plan);
+  return sent ? run (still, plan) : stop_after (sent);
 }
 
 Result<void>
@@ -590,25 +525,16 @@ Dlpc900::send_still (
     const StillMask &mask, const std::vector<PatternTime> &times)
 {
   forget ();
-  if (const auto ready = prepare (); !ready)
-    return ready;
+  RETURN_IF_ERROR (prepare ());
   residents_.planes = {{0, 0}}; // no schedule has one mask: it stays unknown
   order_ = {0};
   slots_ = 1;
   if (options_.table_first)
-    if (const auto table = send_table (times); !table)
-      return table;
+    RETURN_IF_ERROR (send_table (times));
   const Halves image = encode_halves (
       render_still<PlanePixel> (mask, info_.size, options_.placement),
-      controllers (), options_.erle_unit);
-  return send_images (
-      {0}, [&] (int) -> const Halves & { return image; }, [] (int, int) {});
-}
-
-void
-Dlpc900::stop ()
-{
-  running_ = !board_.stop () && running_;
+      controllers_, options_.erle_unit);
+  return send_images ({{0, &image}}, [] (int, int) {});
 }
 
 } // namespace
@@ -617,8 +543,7 @@ Result<std::unique_ptr<Dmd>>
 open_dlpc900 (std::unique_ptr<HidLink> link, const DmdOptions &options)
 {
   auto dmd = std::make_unique<Dlpc900> (std::move (link), options);
-  if (const auto opened = dmd->open (); !opened)
-    return opened.error ();
+  RETURN_IF_ERROR (dmd->open ());
   return std::unique_ptr<Dmd> (std::move (dmd));
 }
 

@@ -17,37 +17,22 @@ constexpr std::uint8_t kEnhancedRunLength = 2;
 constexpr std::size_t kRowPadding = 16;
 
 constexpr std::array<Board, 5> kBoards{{
-    {1, "DLP6500", {1920, 1080}, 400, 105},
-    {2, "DLP9000", {2560, 1600}, 480, 105},
-    {3, "DLP670S", {2716, 1600}, 400, 105},
-    {4, "DLP500YX", {2048, 1200}, 800, 62},
-    {5, "DLP5500", {1024, 768}, 1024, 105},
+    {1, "DLP6500", {1920, 1080}, 105},
+    {2, "DLP9000", {2560, 1600}, 105},
+    {3, "DLP670S", {2716, 1600}, 105},
+    {4, "DLP500YX", {2048, 1200}, 62},
+    {5, "DLP5500", {1024, 768}, 105},
 }};
 
-struct ErrorName {
-  std::uint8_t code;
-  const char *text;
-};
-constexpr std::array<ErrorName, 18> kErrors{{
-    {1, "batch file checksum"},
-    {2, "device failure"},
-    {3, "invalid command number"},
-    {4, "controller and DMD do not belong together"},
-    {5, "command not allowed in the current mode"},
-    {6, "invalid parameter"},
-    {7, "item not found"},
-    {8, "out of resources"},
-    {9, "invalid compression of an image"},
-    {10, "bit position out of range"},
-    {11, "image not in flash"},
-    {12, "dark time out of range"},
-    {13, "delay out of range"},
-    {14, "exposure out of range"},
-    {15, "pattern number out of range"},
-    {16, "invalid pattern definition"},
-    {17, "pattern memory address out of range"},
-    {255, "internal error"},
-}};
+/** By error code. */
+constexpr const char *kErrors[] = {"", "batch file checksum", "device failure",
+    "invalid command number", "controller and DMD do not belong together",
+    "command not allowed in the current mode", "invalid parameter",
+    "item not found", "out of resources", "invalid compression of an image",
+    "bit position out of range", "image not in flash", "dark time out of range",
+    "delay out of range", "exposure out of range",
+    "pattern number out of range", "invalid pattern definition",
+    "pattern memory address out of range"};
 
 std::size_t
 plain_row (int width)
@@ -92,21 +77,21 @@ find_board (std::uint8_t type)
   for (const Board &board : kBoards)
     if (board.type == type)
       return board;
-  return Error{"hardware type " + std::to_string (type) +
-                   " is no DMD that is known here (1..5)",
+  return Error{
+      "hardware type " + std::to_string (type) + " is not a known DMD (1..5)",
       ErrorCode::device};
 }
 
 Bytes
 encode_entry (const Entry &entry)
 {
-  constexpr unsigned kWhite = 7;
+  // One bit in white; the image is cleared after the exposure.
+  constexpr unsigned kWhite = 7 << 4, kClear = 1;
   Bytes bytes;
   append_le (bytes, entry.index, 2);
   append_le (bytes, entry.time.exposure, 3);
-  bytes.push_back (std::uint8_t (unsigned (entry.clear_after) |
-                                 unsigned (entry.bits - 1) << 1 | kWhite << 4 |
-                                 unsigned (entry.wait_for_trigger) << 7));
+  bytes.push_back (
+      std::uint8_t (kClear | kWhite | unsigned (entry.wait_for_trigger) << 7));
   append_le (bytes, entry.time.dark, 3);
   bytes.push_back (entry.trigger_out_2 ? 0 : 1); // the bit disables
   append_le (bytes,
@@ -117,18 +102,18 @@ encode_entry (const Entry &entry)
 }
 
 Bytes
-encode_configuration (int entries, std::uint32_t shown)
+encode_configuration (int entries)
 {
   Bytes bytes;
   append_le (bytes, std::uint32_t (entries), 2);
-  append_le (bytes, shown, 4);
+  append_le (bytes, 0, 4); // patterns until it stops by itself: for ever
   return bytes;
 }
 
 Bytes
-encode_order (const std::vector<int> &order, std::uint32_t shown)
+encode_order (const std::vector<int> &order)
 {
-  Bytes bytes = encode_configuration (int (order.size ()), shown);
+  Bytes bytes = encode_configuration (int (order.size ()));
   for (const int entry : order)
     append_le (bytes, std::uint32_t (entry), 2);
   return bytes;
@@ -190,39 +175,16 @@ encode_chunk (ByteView bytes)
 std::size_t
 image_packets (std::size_t size)
 {
-  constexpr std::size_t kMessageHead = 8; // flags .. command, and the count
   const std::size_t rest = size % kImageChunk;
-  const std::size_t tail =
-      rest == 0 ? 0
-                : (kMessageHead + rest + kHidPacketSize - 1) / kHidPacketSize;
-  return 1 + size / kImageChunk * (kHidMessageSize / kHidPacketSize) + tail;
+  return 1 + size / kImageChunk * hid_packets (kHidMessageSize) +
+         (rest == 0 ? 0 : hid_packets (kChunkHead + rest));
 }
 
 std::string
 error_text (std::uint8_t code)
 {
-  for (const ErrorName &error : kErrors)
-    if (error.code == code)
-      return std::string (error.text) + " (error " + std::to_string (code) +
-             ")";
-  return "error " + std::to_string (code);
-}
-
-Result<std::vector<std::uint32_t>>
-parse_minimum_exposures (ByteView data)
-{
-  constexpr std::size_t kDepths = 8;
-  if (data.size () != 2 * kDepths && data.size () != 4 * kDepths)
-    return Error{"the shortest exposures come in " +
-                     std::to_string (data.size ()) + " bytes, not in 16 or 32",
-        ErrorCode::device};
-  std::vector<std::uint32_t> exposures;
-  for (std::size_t depth = 0; depth < kDepths; depth++)
-    exposures.push_back (read_le (data, 2 * depth, 2));
-  if (exposures.front () == 0)
-    return Error{
-        "the device gives 0 as its shortest exposure", ErrorCode::device};
-  return exposures;
+  return code == 0xFF ? "internal error (error 255)"
+                      : codedexposure::error_text (kErrors, code);
 }
 
 std::string
@@ -232,15 +194,10 @@ Version::text () const
          std::to_string (patch);
 }
 
-Result<Version>
+Version
 parse_version (ByteView data)
 {
-  constexpr std::size_t kSize = 16;
-  if (data.size () != kSize)
-    return Error{"the version comes in " + std::to_string (data.size ()) +
-                     " bytes, not in " + std::to_string (kSize),
-        ErrorCode::device};
-  return Version{data[3], data[2], int (read_le (data, 0, 2))};
+  return {data[3], data[2], int (read_le (data, 0, 2))};
 }
 
 bool

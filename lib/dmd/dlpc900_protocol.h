@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "base/result.h"
-#include "dmd/dlp_commands.h"
+#include "dmd/hid_packet.h"
 #include "dmd/pattern_timing.h"
 #include "dmd/plane_image.h"
 
@@ -29,22 +29,26 @@ constexpr HidCommand kConfigure{
     0x1A31, "take the pattern table", std::chrono::seconds (10)};
 constexpr HidCommand kReorder{0x1A32, "set the order of patterns"};
 constexpr HidCommand kDefine{0x1A34, "define a pattern"};
-constexpr HidCommand kMinimumExposures{0x1A42, "read the shortest exposures"};
+constexpr HidCommand kMinimumExposures{0x1A42, "read the min exposures"};
 
 constexpr std::uint8_t kModeOnTheFly = 3;
-/** Image bytes in one message: what its buffer of 512 leaves. */
-constexpr std::size_t kImageChunk = 504;
+/** Image bytes in one message, after flags, command and their count. */
+constexpr std::size_t kChunkHead = 8;
+constexpr std::size_t kImageChunk = kHidMessageSize - kChunkHead;
+/** Lines of the pattern table; every board holds more planes. */
 constexpr int kMaxEntries = 400;
+/** Bytes of these replies. */
+constexpr std::size_t kVersionSize = 16;
+constexpr std::size_t kMinimumExposuresSize = 16; // 8 depths, the binary first
 
 /** What a board is, by the hardware type that it reports. */
 struct Board {
   std::uint8_t type;
   const char *name;
   Extent size;
-  int planes;                     ///< that it holds
   std::uint32_t minimum_exposure; ///< of a binary mask, us
 };
-/** Error for a type that is not in the table. */
+/** Fails for a type that is not in the table. */
 Result<Board> find_board (std::uint8_t type);
 
 /** One line of the pattern table. Exposure and dark time are below 2^24 us. */
@@ -52,27 +56,23 @@ struct Entry {
   std::uint16_t index = 0;
   PatternTime time = {};
   bool wait_for_trigger = false;
-  bool clear_after = true;
   bool trigger_out_2 = true;
-  PlaneSlot plane = {}; ///< the lowest, where there are several
-  int bits = 1;         ///< planes that make the pattern, 1 to 8
-
-  bool operator== (const Entry &) const = default;
+  PlaneSlot plane = {};
 };
 Bytes encode_entry (const Entry &entry);
 
-/** @p shown  patterns until it stops by itself; 0: for ever. */
-Bytes encode_configuration (int entries, std::uint32_t shown);
-/** The same, showing entry order[k] in place k. */
-Bytes encode_order (const std::vector<int> &order, std::uint32_t shown);
+/** Repeated until it is stopped. */
+Bytes encode_configuration (int entries);
+/** The same, with entry order[k] in place k. */
+Bytes encode_order (const std::vector<int> &order);
 
-/** Delays of a trigger output against the exposure, -20..20000 us. */
+/** Delays of a trigger output from the exposure, -20..20000 us. */
 Bytes encode_trigger_out (bool invert, int rising_us, int falling_us);
 /** @p delay_us  104 or more. */
 Bytes encode_trigger_in (int delay_us, bool falling);
 
-/** What the device is sent for columns [x, x + width) of an image: a header and
- * the encoded pixels, or plain pixels where these are fewer. @p unit  as in
+/** What the device gets for columns [x, x + width) of an image: a header and
+ * the encoded pixels, or plain pixels if these are fewer. @p unit  as in
  * encode_erle (). */
 PiecedBytes encode_image (const MirrorRows<PlanePixel> &image, int x, int width,
     std::size_t unit = kErleUnit);
@@ -80,28 +80,26 @@ PiecedBytes encode_image (const MirrorRows<PlanePixel> &image, int x, int width,
 Bytes encode_load (int index, std::size_t size);
 /** Data of one kImageData with at most kImageChunk bytes. */
 Bytes encode_chunk (ByteView bytes);
-/** Packets in which an image of @p size encoded bytes comes, its announcement
- * included. A full-speed interrupt endpoint takes one in 1 ms. */
+/** Packets of an image of @p size encoded bytes and its announcement. A
+ * full-speed interrupt endpoint takes one in 1 ms. */
 std::size_t image_packets (std::size_t size);
 
-/** What the error code that follows a refusal means. */
+/** The meaning of the error code that follows a refusal. */
 std::string error_text (std::uint8_t code);
-
-/** Shortest exposures of 1 to 8 bit patterns, us. */
-Result<std::vector<std::uint32_t>> parse_minimum_exposures (ByteView data);
 
 struct Version {
   int major = 0;
   int minor = 0;
   int patch = 0;
-  auto operator<=> (const Version &) const = default;
+  bool operator== (const Version &) const = default;
   std::string text () const;
 };
-/** The application's version, first of the four of a version reply. */
-Result<Version> parse_version (ByteView data);
+/** The version of the application, the first of the four in a version reply of
+ * kVersionSize bytes. */
+Version parse_version (ByteView data);
 
-/** After a change of mode, some firmware can leave a block of mirrors locked
- * until they are parked and released (data sheet errata, DLPT028). */
+/** Whether a change of mode can leave a block of mirrors locked until they are
+ * parked and released (data sheet errata, DLPT028). */
 bool needs_park_cycle (const Version &version);
 
 } // namespace codedexposure::dlpc900

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "dmd/little_endian.h"
+#include "dmd/bytes.h"
 #include "schedule/mask_renderer.h"
 
 namespace codedexposure

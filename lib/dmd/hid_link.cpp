@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "base/try.h"
+
 namespace codedexposure
 {
 
@@ -11,7 +13,8 @@ namespace
 
 using namespace std::chrono_literals;
 
-/** Waits are cut into such pieces, between which a stop is noticed. */
+/** Waits are cut into pieces of this length, between which a stop is noticed.
+ */
 constexpr std::chrono::milliseconds kPiece{50};
 constexpr std::chrono::milliseconds kDrainTime{5};
 /** The packets of one reply follow each other. */
@@ -19,29 +22,6 @@ constexpr std::chrono::milliseconds kRestTime{200};
 constexpr int kMaxStrayPackets = 64;
 
 } // namespace
-
-HidLink::HidLink (std::unique_ptr<PacketPipe> pipe, std::string name)
-    : pipe_ (std::move (pipe)), name_ (std::move (name))
-{
-}
-
-Result<HidReply>
-HidLink::read (const HidCommand &command, ByteView data)
-{
-  return transact (HidKind::read, command, data);
-}
-
-Result<HidReply>
-HidLink::write (const HidCommand &command, ByteView data)
-{
-  return transact (HidKind::write, command, data);
-}
-
-Result<void>
-HidLink::post (const HidCommand &command, ByteView data)
-{
-  return send (HidKind::post, command, data);
-}
 
 Error
 HidLink::error (
@@ -66,9 +46,9 @@ HidLink::pause (Milliseconds time)
 {
   for (; time > 0ms && !cancelled (); time -= kPiece)
     pipe_->pause (std::min (time, kPiece));
-  return cancelled ()
-             ? Result<void> (error ("go on", "cancelled", ErrorCode::cancelled))
-             : Result<void> ();
+  if (cancelled ())
+    return error ("go on", "cancelled", ErrorCode::cancelled);
+  return {};
 }
 
 bool
@@ -84,8 +64,7 @@ HidLink::wait (Milliseconds time)
 Result<HidReply>
 HidLink::transact (HidKind kind, const HidCommand &command, ByteView data)
 {
-  if (const auto sent = send (kind, command, data); !sent)
-    return sent.error ();
+  RETURN_IF_ERROR (send (kind, command, data));
   auto reply = receive (command);
   unclean_ = !reply.ok ();
   return reply;
@@ -103,7 +82,7 @@ HidLink::send (HidKind kind, const HidCommand &command, ByteView data)
   if (sent)
     return sent;
   patience_ -= timeout;
-  return error (command.name, sent.error ().message, sent.error ().code);
+  return error (command.name, sent.error ());
 }
 
 Result<HidReply>
@@ -118,8 +97,7 @@ HidLink::receive (const HidCommand &command)
     const Milliseconds piece = std::min (left, kPiece);
     const auto packet = pipe_->read (piece);
     if (!packet)
-      return error (
-          command.name, packet.error ().message, packet.error ().code);
+      return error (command.name, packet.error ());
     const auto head = parse_reply_head (*packet);
     if (!head || head->sequence != sequence_) {
       // Nothing yet; or a late reply to an earlier request, or a piece of one.
@@ -130,7 +108,7 @@ HidLink::receive (const HidCommand &command)
     }
     auto rest = receive_rest (*head, *packet);
     if (!rest)
-      return error (command.name, rest.error ().message, rest.error ().code);
+      return error (command.name, rest.error ());
     return HidReply{head->refused, *std::move (rest)};
   }
   return error (command.name,
@@ -145,14 +123,12 @@ HidLink::receive_rest (HidReplyHead head, Bytes first)
 {
   Bytes data (first.begin () + HidReplyHead::kSize, first.end ());
   for (std::size_t packet = 1; packet < head.packets (); packet++) {
-    const auto more = pipe_->read (kRestTime);
-    if (!more)
-      return more.error ();
-    if (more->size () != kHidPacketSize)
+    ASSIGN_OR_RETURN (const Bytes more, pipe_->read (kRestTime));
+    if (more.size () != kHidPacketSize)
       return Error{"the reply ends after " + std::to_string (data.size ()) +
                        " of " + std::to_string (head.length) + " bytes",
           ErrorCode::device};
-    append (data, *more);
+    append (data, more);
   }
   data.resize (head.length);
   return data;

@@ -2,57 +2,90 @@
 /* Requests and replies, one at a time, over a pipe that may fail. */
 #pragma once
 
+#include <chrono>
 #include <memory>
 #include <stop_token>
 #include <string>
+#include <thread>
 
+#include "base/result.h"
 #include "dmd/hid_packet.h"
-#include "dmd/packet_pipe.h"
 
 namespace codedexposure
 {
 
-/** What a device answered. */
+/** Packets to a device and back. Calls come from one thread at a time. */
+class PacketPipe
+{
+public:
+  using Milliseconds = std::chrono::milliseconds;
+
+  virtual ~PacketPipe () = default;
+
+  /** Sends whole packets: all of them, or fails. */
+  virtual Result<void> write (ByteView packets, Milliseconds timeout) = 0;
+  /** The next packet, of the length that the device sent; empty after the
+   * timeout. */
+  virtual Result<Bytes> read (Milliseconds timeout) = 0;
+  /** Whether the device has disappeared; it does not come back. */
+  virtual bool gone () const = 0;
+  /** Gives the device some time. */
+  virtual void pause (Milliseconds time) { std::this_thread::sleep_for (time); }
+};
+
+/** The answer of a device. */
 struct HidReply {
   bool refused = false;
   Bytes data = {};
 };
 
 /**
- * Talks to one controller: one request in flight, the reply of the same
- * sequence number, others dropped. For one thread at a time.
+ * Talks to one controller: one request in flight; replies with another sequence
+ * number are dropped. Not thread-safe.
  *
  * A job, which begin () begins, ends within 50 ms of a request to stop, and
- * when the device has kept it waiting for longer than its patience in all; a
- * message that was begun is always finished as far as the pipe allows, so that
- * the device is left between two messages.
+ * after the device has kept it waiting for longer than its patience in all. A
+ * message is always finished as far as the pipe allows, so that the device is
+ * left between two messages.
  */
 class HidLink
 {
 public:
   using Milliseconds = std::chrono::milliseconds;
 
-  /** What a job waits for a device that does not answer, or is not ready. */
+  /** How long a job waits for a device that does not answer or is not ready. */
   static constexpr Milliseconds kPatience{2000};
 
   /** @p name  of the device, for messages. Drops replies that wait from an
    * earlier conversation. */
-  HidLink (std::unique_ptr<PacketPipe> pipe, std::string name);
+  HidLink (std::unique_ptr<PacketPipe> pipe, std::string name)
+      : pipe_ (std::move (pipe)), name_ (std::move (name))
+  {
+  }
 
-  /** Data that the device answers. Error for a refusal, too. */
-  Result<HidReply> read (const HidCommand &command, ByteView data = {});
+  /** The data that the device answers. A refusal is an answer, too. */
+  Result<HidReply> read (const HidCommand &command, ByteView data = {})
+  {
+    return transact (HidKind::read, command, data);
+  }
   /** The device acknowledges, or refuses. */
-  Result<HidReply> write (const HidCommand &command, ByteView data);
-  /** Nothing is answered; a failure on the way is the only one known. */
-  Result<void> post (const HidCommand &command, ByteView data);
+  Result<HidReply> write (const HidCommand &command, ByteView data)
+  {
+    return transact (HidKind::write, command, data);
+  }
+  /** The device does not answer; only a failure of the pipe is reported. */
+  Result<void> post (const HidCommand &command, ByteView data)
+  {
+    return send (HidKind::post, command, data);
+  }
 
   /** @p stop  a token without a source: never. */
   void begin (std::stop_token stop = {}, Milliseconds patience = kPatience);
   bool cancelled () const { return stop_.stop_requested (); }
-  /** Lets time go by that the device was given; error when cancelled. */
+  /** Waits as long as the device was told to take; fails when cancelled. */
   Result<void> pause (Milliseconds time);
-  /** Gives the device time that it should not need; false when the job's
-   * patience is at its end. */
+  /** Waits for a device that is late; false at the end of the job's patience.
+   */
   bool wait (Milliseconds time);
 
   bool gone () const { return pipe_->gone (); }
@@ -68,6 +101,10 @@ private:
   Result<void> send (HidKind kind, const HidCommand &command, ByteView data);
   Result<HidReply> receive (const HidCommand &command);
   Result<Bytes> receive_rest (HidReplyHead head, Bytes first);
+  Error error (const char *what, const Error &reason) const
+  {
+    return error (what, reason.message, reason.code);
+  }
   void drain ();
 
   const std::unique_ptr<PacketPipe> pipe_;
@@ -75,7 +112,7 @@ private:
   std::stop_token stop_;
   Milliseconds patience_ = kPatience; // that is left to the job
   std::uint8_t sequence_ = 0;
-  bool unclean_ = true; // a reply to nobody may be waiting
+  bool unclean_ = true; // an unexpected reply may be waiting
 };
 
 } // namespace codedexposure

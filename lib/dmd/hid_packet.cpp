@@ -17,9 +17,7 @@ encode_request (
   append_le (message, std::uint32_t (kCommandSize + data.size ()), 2);
   append_le (message, command, 2);
   append (message, data);
-  const std::size_t packets =
-      (message.size () + kHidPacketSize - 1) / kHidPacketSize;
-  message.resize (packets * kHidPacketSize);
+  message.resize (hid_packets (message.size ()) * kHidPacketSize);
   return message;
 }
 

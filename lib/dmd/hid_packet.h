@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The packets in which DLPC350 and DLPC900 talk over USB. */
+/* The USB packets of DLPC350 and DLPC900, and the commands of both. */
 #pragma once
 
 #include <array>
@@ -8,7 +8,7 @@
 #include <cstdint>
 
 #include "base/result.h"
-#include "dmd/little_endian.h"
+#include "dmd/bytes.h"
 
 namespace codedexposure
 {
@@ -20,6 +20,13 @@ constexpr std::size_t kHidMessageSize = 512;
  * command) and of the longest reply (which has no command). */
 constexpr std::size_t kHidRequestData = kHidMessageSize - 6;
 constexpr std::size_t kHidReplyData = kHidMessageSize - 4;
+
+/** Packets that @p bytes fill. */
+constexpr std::size_t
+hid_packets (std::size_t bytes)
+{
+  return (bytes + kHidPacketSize - 1) / kHidPacketSize;
+}
 
 /** What a request asks of the device: the flag byte on the wire. */
 enum class HidKind : std::uint8_t {
@@ -52,13 +59,33 @@ struct HidReplyHead {
   std::size_t length;    ///< data bytes, at most kHidReplyData
 
   /** Packets of the reply, this one included. */
-  std::size_t packets () const
-  {
-    return (kSize + length + kHidPacketSize - 1) / kHidPacketSize;
-  }
+  std::size_t packets () const { return hid_packets (kSize + length); }
 };
 
-/** Error when @p packet is no packet that can begin a reply. */
+/** Fails if @p packet cannot begin a reply. */
 Result<HidReplyHead> parse_reply_head (ByteView packet);
+
+/** The commands that DLPC350 and DLPC900 have in common. */
+namespace dlp
+{
+
+constexpr HidCommand kVersion{0x0205, "read the firmware version"};
+constexpr HidCommand kHardwareStatus{0x1A0A, "read the hardware status"};
+constexpr HidCommand kMainStatus{0x1A0C, "read the main status"};
+constexpr HidCommand kDisplayMode{0x1A1B, "set the display mode"};
+constexpr HidCommand kTriggerOut2{0x1A1E, "set up trigger output 2"};
+constexpr HidCommand kRun{0x1A24, "start or stop the patterns"};
+constexpr HidCommand kTriggerIn1{0x1A35, "set up trigger input 1"};
+
+constexpr std::uint8_t kRunStop = 0;
+constexpr std::uint8_t kRunStart = 2;
+/** Main status. */
+constexpr std::uint8_t kParked = 1 << 0;
+constexpr std::uint8_t kSequencerRuns = 1 << 1;
+/** Hardware status. */
+constexpr std::uint8_t kInitialised = 1 << 0;
+constexpr std::uint8_t kSecondController = 1 << 4;
+
+} // namespace dlp
 
 } // namespace codedexposure

@@ -5,9 +5,10 @@
 #include <thread>
 
 #include "base/text.h"
+#include "base/try.h"
 #include "dmd/bitmap.h"
-#include "dmd/dmd_options.h"
 #include "dmd/lightcrafter_protocol.h"
+#include "dmd/options.h"
 #include "dmd/stop_guard.h"
 #include "dmd/tcp_stream.h"
 
@@ -24,13 +25,13 @@ constexpr Extent kMirrors{608, 684};
 constexpr std::uint32_t kMinimumExposure = 250;
 constexpr std::uint32_t kMaximumExposure = 2'000'000;
 constexpr std::uint32_t kCameraPulse = 100;
-/** What a job waits for a board that is silent or busy, and a stop. */
+/** How long a job, and a stop, waits for a board that is silent or busy. */
 constexpr std::chrono::milliseconds kPatience{2000};
 constexpr std::chrono::milliseconds kStopPatience{800};
 constexpr std::chrono::milliseconds kBusyPause{500};
 constexpr std::uint8_t kBusy = 6; // error code
 constexpr int kMaxStrayReplies = 16;
-/** What a mask of 52 kB takes over the board's network port, about. */
+/** Of a mask of 52 kB over the board's network port, about. */
 constexpr Nanoseconds kMaskTime = 50'000'000;
 
 class Lightcrafter : public Dmd
@@ -83,6 +84,7 @@ private:
       ErrorCode code = ErrorCode::device) const;
   Result<Reply> receive (std::uint16_t command);
   Result<Reply> ask (PacketType type, std::uint16_t command, ByteView payload);
+  Result<Bytes> payload_of (const char *what, Result<Reply> reply) const;
   Result<void> write (
       const char *what, std::uint16_t command, ByteView payload);
   Result<void> set_sequence (const PatternTime &time);
@@ -102,16 +104,15 @@ private:
   bool running_ = false;
 };
 
-/** Begins a job. A wait that was cut short has left the connection of the last
- * one in mid-packet: then there is another one. */
+/** Begins a job. If the last one was cancelled within a packet, it gets a new
+ * connection. */
 Result<void>
 Lightcrafter::begin (
     std::stop_token stop_token, std::chrono::milliseconds patience)
 {
   cancel_ = std::move (stop_token);
   patience_ = patience;
-  if (const auto connected = connect (); !connected)
-    return connected;
+  RETURN_IF_ERROR (connect ());
   stream_->cancel_on (cancel_);
   return {};
 }
@@ -153,25 +154,19 @@ Result<Lightcrafter::Reply>
 Lightcrafter::receive (std::uint16_t command)
 {
   for (int replies = 0; replies <= kMaxStrayReplies; replies++) {
-    Result<Bytes> head = stream_->receive (kHeadSize, patience_);
-    if (!head)
-      return head.error ();
-    const auto parsed = parse_head (*head);
-    if (!parsed)
-      return parsed.error ();
-    const auto rest = stream_->receive (parsed->payload + 1, patience_);
-    if (!rest)
-      return rest.error ();
-    Bytes packet = *head;
-    append (packet, *rest);
+    ASSIGN_OR_RETURN (Bytes packet, stream_->receive (kHeadSize, patience_));
+    ASSIGN_OR_RETURN (const PacketHead head, parse_head (packet));
+    ASSIGN_OR_RETURN (
+        const Bytes rest, stream_->receive (head.payload + 1, patience_));
+    append (packet, rest);
     if (!checksum_holds (packet))
       return Error{"the checksum of a reply is wrong", ErrorCode::device};
-    if (parsed->command != command)
+    if (head.command != command)
       continue;
-    Reply reply{0, Bytes (rest->begin (), rest->end () - 1)};
-    if (parsed->type == PacketType::busy)
+    Reply reply{0, Bytes (rest.begin (), rest.end () - 1)};
+    if (head.type == PacketType::busy)
       reply.refused = kBusy;
-    if (parsed->type == PacketType::error)
+    if (head.type == PacketType::error)
       reply.refused =
           reply.payload.empty () ? std::uint8_t (1) : reply.payload.front ();
     return reply;
@@ -182,48 +177,47 @@ Lightcrafter::receive (std::uint16_t command)
 Result<Lightcrafter::Reply>
 Lightcrafter::ask (PacketType type, std::uint16_t command, ByteView payload)
 {
-  Result<Reply> reply = Reply{};
-  for (const Bytes &packet : encode_message (type, command, payload)) {
-    for (;;) {
-      if (const auto sent = stream_->send (packet, patience_); !sent)
-        return sent.error ();
-      reply = receive (command);
-      if (!reply || reply->refused != kBusy || patience_ <= kBusyPause)
-        break;
-      patience_ -= kBusyPause;
-      if (!pause (kBusyPause))
-        return Error{"cancelled", ErrorCode::cancelled};
-    }
-    if (!reply || reply->refused != 0)
-      break;
+  const Bytes packet = encode_message (type, command, payload);
+  for (;;) {
+    RETURN_IF_ERROR (stream_->send (packet, patience_));
+    const auto reply = receive (command);
+    if (!reply || reply->refused != kBusy || patience_ <= kBusyPause)
+      return reply;
+    patience_ -= kBusyPause;
+    if (!pause (kBusyPause))
+      return Error{"cancelled", ErrorCode::cancelled};
   }
-  return reply;
+}
+
+/** The payload of a reply, or why the board cannot do @p what. */
+Result<Bytes>
+Lightcrafter::payload_of (const char *what, Result<Reply> reply) const
+{
+  if (!reply)
+    return error (what, reply.error ().message, reply.error ().code);
+  if (reply->refused != 0)
+    return error (what, error_text (reply->refused));
+  return std::move (reply->payload);
 }
 
 Result<void>
 Lightcrafter::write (const char *what, std::uint16_t command, ByteView payload)
 {
-  const auto reply = ask (PacketType::write, command, payload);
-  if (!reply)
-    return error (what, reply.error ().message, reply.error ().code);
-  if (reply->refused != 0)
-    return error (what, error_text (reply->refused));
+  RETURN_IF_ERROR (
+      payload_of (what, ask (PacketType::write, command, payload)));
   return {};
 }
 
 Result<void>
 Lightcrafter::open ()
 {
-  if (const auto begun = begin (); !begun)
-    return begun;
+  RETURN_IF_ERROR (begin ());
   const Bytes of_system{0x00};
-  const auto version = ask (PacketType::read, kVersion, of_system);
-  if (!version)
-    return error ("read its version", version.error ().message);
-  if (version->refused != 0)
-    return error ("read its version", error_text (version->refused));
-  version_ = printable (std::string (version->payload.begin (),
-      std::find (version->payload.begin (), version->payload.end (), 0)));
+  ASSIGN_OR_RETURN (
+      const Bytes version, payload_of ("read its version",
+                               ask (PacketType::read, kVersion, of_system)));
+  version_ = printable (std::string (
+      version.begin (), std::find (version.begin (), version.end (), 0)));
   return check_placement (options_.placement, info_.array, info_.size);
 }
 
@@ -253,10 +247,7 @@ Lightcrafter::set_sequence (const PatternTime &time)
         (reply->refused == kNotSupported || reply->refused == kInvalid))
       reply = ask (
           PacketType::write, kSequenceOld, encode_sequence (sequence, bytes));
-  if (!reply)
-    return error ("set up the sequence", reply.error ().message);
-  if (reply->refused != 0)
-    return error ("set up the sequence", error_text (reply->refused));
+  RETURN_IF_ERROR (payload_of ("set up the sequence", std::move (reply)));
   return {};
 }
 
@@ -265,18 +256,13 @@ Lightcrafter::send_masks (
     const Schedule &schedule, const UploadProgress &progress)
 {
   const Bytes off{0}, sequence_mode{kModeSequence};
-  if (const auto stopped = write ("stop the sequence", kRun, off); !stopped)
-    return stopped;
+  RETURN_IF_ERROR (write ("stop the sequence", kRun, off));
   running_ = false;
-  if (const auto mode =
-          write ("change the display mode", kDisplayMode, sequence_mode);
-      !mode)
-    return mode;
+  RETURN_IF_ERROR (
+      write ("change the display mode", kDisplayMode, sequence_mode));
   masks_ = schedule.masks ();
-  if (const auto set =
-          set_sequence ({10'000, std::uint32_t (options_.gap / 1000)});
-      !set)
-    return set;
+  RETURN_IF_ERROR (
+      set_sequence ({10'000, std::uint32_t (options_.gap / 1000)}));
 
   const MaskRenderer renderer (schedule, kMirrors, options_.placement);
   for (int mask = 0; mask < masks_; mask++) {
@@ -285,8 +271,7 @@ Lightcrafter::send_masks (
       return Error{info_.name + ": upload cancelled", ErrorCode::cancelled};
     Bytes payload{std::uint8_t (mask)};
     append (payload, encode_bitmap (renderer.render (mask)));
-    if (const auto sent = write ("send a mask", kPattern, payload); !sent)
-      return sent;
+    RETURN_IF_ERROR (write ("send a mask", kPattern, payload));
   }
   progress (masks_, masks_);
   return {};
@@ -300,9 +285,8 @@ Lightcrafter::upload (const Schedule &schedule, std::stop_token stop_token,
     return Error{info_.name + " holds " +
                  std::to_string (info_.resident_masks) + " masks, not " +
                  std::to_string (schedule.masks ()) +
-                 "; take a tile with fewer elements"};
-  if (const auto begun = begin (std::move (stop_token)); !begun)
-    return begun;
+                 "; use a tile with fewer elements"};
+  RETURN_IF_ERROR (begin (std::move (stop_token)));
   touched_ = true;
   const auto sent = send_masks (schedule, progress);
   if (!sent) {
@@ -322,14 +306,10 @@ Lightcrafter::start (const SlotPlan &plan, std::stop_token stop_token)
       plan, {kMinimumExposure, kMaximumExposure, gap, 0, gap}, options_.master);
   if (!time)
     return time.error ().with_prefix (info_.name + ": ");
-  if (const auto begun = begin (std::move (stop_token)); !begun)
-    return begun;
-  if (const auto set = set_sequence (*time); !set)
-    return set;
-  if (const auto trigger = write ("set up the trigger output", kCameraTrigger,
-          encode_camera_trigger (options_.master == Master::dmd, kCameraPulse));
-      !trigger)
-    return trigger;
+  RETURN_IF_ERROR (begin (std::move (stop_token)));
+  RETURN_IF_ERROR (set_sequence (*time));
+  RETURN_IF_ERROR (write ("set up the trigger output", kCameraTrigger,
+      encode_camera_trigger (options_.master == Master::dmd, kCameraPulse)));
   if (!pause (std::chrono::milliseconds (plan.frame_period () / 1'000'000 + 1)))
     return error ("start the sequence", "cancelled", ErrorCode::cancelled);
   running_ = true;
@@ -350,11 +330,8 @@ Lightcrafter::stop ()
 Result<std::unique_ptr<Dmd>>
 open_lightcrafter (std::string_view device)
 {
-  constexpr std::string_view kScheme = "lightcrafter:";
-  const auto options = DmdOptions::parse (device.substr (kScheme.size ()));
-  if (!options)
-    return options.error ().with_prefix ("DMD " + in_quotes (device) + ": ");
-  const auto parts = split (options->which, ':');
+  ASSIGN_OR_RETURN (const DmdOptions options, DmdOptions::parse (device));
+  const auto parts = split (options.which, ':');
   constexpr int kPort = 21845, kMaxPort = 65535;
   const auto port = parts.size () < 2 ? kPort : parse_int (parts[1]);
   if (parts.size () > 2 || !port || *port < 1 || *port > kMaxPort)
@@ -362,13 +339,12 @@ open_lightcrafter (std::string_view device)
                  ": write lightcrafter:HOST or lightcrafter:HOST:PORT"};
   const std::string host =
       parts[0].empty () ? "192.168.1.100" : std::string (parts[0]);
-  auto dmd = std::make_unique<Lightcrafter> (host, *port, *options);
-  if (const auto opened = dmd->open (); !opened)
-    return opened.error ();
-  if (!options->guard)
+  auto dmd = std::make_unique<Lightcrafter> (host, *port, options);
+  RETURN_IF_ERROR (dmd->open ());
+  if (!options.guard)
     return std::unique_ptr<Dmd> (std::move (dmd));
-  return guarded (std::move (dmd),
-      std::string (kScheme) + host + ":" + std::to_string (*port));
+  return guarded (
+      std::move (dmd), "lightcrafter:" + host + ":" + std::to_string (*port));
 }
 
 } // namespace codedexposure

@@ -11,12 +11,12 @@ namespace codedexposure
 {
 
 /**
- * Opens "lightcrafter:[HOST[:PORT]][,key=value...]", see dmd_options.h; the
- * board is at 192.168.1.100, port 21845, unless something else is said.
+ * Opens "lightcrafter:[HOST[:PORT]][,key=value...]", see options.h; the
+ * defaults are 192.168.1.100 and port 21845.
  *
- * Its sequences know no frames: with the DMD as master, its trigger output
- * pulses once a mask, and the camera must divide by the number of slots; with
- * the camera as master, it wants one edge a slot.
+ * Its sequences have no frames: with the DMD as master, its trigger output
+ * pulses once per mask, and the camera must divide by the number of slots; with
+ * the camera as master, it needs one edge per slot.
  */
 Result<std::unique_ptr<Dmd>> open_lightcrafter (std::string_view device);
 

@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "dmd/lightcrafter_protocol.h"
 
-#include <algorithm>
-#include <array>
 #include <numeric>
 
 namespace codedexposure::lightcrafter
@@ -11,22 +9,13 @@ namespace codedexposure::lightcrafter
 namespace
 {
 
-constexpr std::size_t kMaxPayload = 65535;
 constexpr std::uint8_t kGreen = 1;
 
-constexpr std::array<const char *, 12> kErrors{"no error", "command failed",
+/** By error code. */
+constexpr const char *kErrors[] = {"no error", "command failed",
     "command not supported", "invalid parameter", "out of resources",
     "device failure", "busy", "not initialised", "not found", "checksum",
     "packet format", "continuation of a packet"};
-
-/** Where in a message a packet stands: the flag byte. */
-std::uint8_t
-place_of (bool first, bool last)
-{
-  if (first)
-    return last ? 0 : 1;
-  return last ? 3 : 2;
-}
 
 std::uint8_t
 checksum (ByteView bytes)
@@ -36,25 +25,17 @@ checksum (ByteView bytes)
 
 } // namespace
 
-std::vector<Bytes>
+Bytes
 encode_message (PacketType type, std::uint16_t command, ByteView payload)
 {
-  std::vector<Bytes> packets;
-  std::size_t at = 0;
-  do {
-    const auto piece =
-        payload.subspan (at, std::min (kMaxPayload, payload.size () - at));
-    const bool last = at + piece.size () == payload.size ();
-    Bytes packet{std::uint8_t (type), std::uint8_t (command >> 8),
-        std::uint8_t (command), place_of (at == 0, last)};
-    packet.reserve (kHeadSize + piece.size () + 1);
-    append_le (packet, std::uint32_t (piece.size ()), 2);
-    append (packet, piece);
-    packet.push_back (checksum (packet));
-    packets.push_back (std::move (packet));
-    at += piece.size ();
-  } while (at < payload.size ());
-  return packets;
+  constexpr std::uint8_t kWhole = 0; // not a part of a longer message
+  Bytes packet{std::uint8_t (type), std::uint8_t (command >> 8),
+      std::uint8_t (command), kWhole};
+  packet.reserve (kHeadSize + payload.size () + 1);
+  append_le (packet, std::uint32_t (payload.size ()), 2);
+  append (packet, payload);
+  packet.push_back (checksum (packet));
+  return packet;
 }
 
 Bytes
@@ -65,12 +46,12 @@ encode_sequence (const Sequence &sequence, int bytes)
   append_le (data, std::uint32_t (sequence.patterns), extended ? 2 : 1);
   data.push_back (0); // no inverse patterns in between
   data.push_back (std::uint8_t (sequence.trigger));
-  append_le (data, sequence.delay, 4);
+  append_le (data, 0, 4); // delay
   append_le (data, sequence.period, 4);
   append_le (data, sequence.exposure, 4);
   data.push_back (kGreen);
   if (bytes > 17)
-    data.push_back (sequence.repeat ? 1 : 0);
+    data.push_back (1); // repeat
   return data;
 }
 
@@ -99,7 +80,7 @@ parse_head (ByteView head)
     break;
   default:
     return Error{"a packet of type " + std::to_string (head[0]) +
-                     " is none that the board sends",
+                     " is not one that the board sends",
         ErrorCode::device};
   }
   return PacketHead{
@@ -116,10 +97,7 @@ checksum_holds (ByteView packet)
 std::string
 error_text (std::uint8_t code)
 {
-  const std::string number = "error " + std::to_string (code);
-  return code < kErrors.size ()
-             ? std::string (kErrors[code]) + " (" + number + ")"
-             : number;
+  return codedexposure::error_text (kErrors, code);
 }
 
 } // namespace codedexposure::lightcrafter

@@ -4,10 +4,9 @@
 
 #include <cstdint>
 #include <string>
-#include <vector>
 
 #include "base/result.h"
-#include "dmd/little_endian.h"
+#include "dmd/bytes.h"
 
 namespace codedexposure::lightcrafter
 {
@@ -38,19 +37,16 @@ enum class Trigger : std::uint8_t {
   falling = 3,
 };
 
-/** What the sequence is like, microseconds. */
+/** A sequence, which repeats; times in microseconds. */
 struct Sequence {
   int patterns = 1;
   Trigger trigger = Trigger::timer;
-  std::uint32_t delay = 0;
   std::uint32_t period = 0; ///< of the timer
   std::uint32_t exposure = 0;
-  bool repeat = true;
 };
 
-/** A whole message: packets of at most 65535 bytes of payload, end to end. */
-std::vector<Bytes> encode_message (
-    PacketType type, std::uint16_t command, ByteView payload);
+/** A message of one packet. @p payload  at most 65535 bytes. */
+Bytes encode_message (PacketType type, std::uint16_t command, ByteView payload);
 
 /** @p bytes 19: for kSequence; 18 or 17: for kSequenceOld. */
 Bytes encode_sequence (const Sequence &sequence, int bytes);
@@ -64,7 +60,7 @@ struct PacketHead {
   std::uint16_t command;
   std::size_t payload;
 };
-/** @p head  kHeadSize bytes. Error for what no board sends. */
+/** @p head  kHeadSize bytes. Fails for a type that no board sends. */
 Result<PacketHead> parse_head (ByteView head);
 /** Whether the last byte of @p packet is the sum of the others. */
 bool checksum_holds (ByteView packet);

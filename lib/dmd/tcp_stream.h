@@ -8,7 +8,7 @@
 #include <string>
 
 #include "base/result.h"
-#include "dmd/little_endian.h"
+#include "dmd/bytes.h"
 
 namespace codedexposure
 {

@@ -9,8 +9,8 @@
 #include <libusb.h>
 
 #include "base/text.h"
-#include "dmd/dlpc350.h"
-#include "dmd/dlpc900.h"
+#include "base/try.h"
+#include "dmd/dlpc_board.h"
 #include "dmd/stop_guard.h"
 
 namespace codedexposure
@@ -94,24 +94,30 @@ recognise (libusb_device *device)
   return std::nullopt;
 }
 
+Result<Handle>
+open_handle (const Found &found, const std::string &what)
+{
+  libusb_device_handle *raw = nullptr;
+  if (const int code = libusb_open (found.device.get (), &raw); code != 0)
+    return usb_error (what, code);
+  return Handle (raw);
+}
+
 void
 read_serial (Found &found)
 {
-  libusb_device_handle *raw = nullptr;
-  if (const int code = libusb_open (found.device.get (), &raw); code != 0) {
-    found.board.trouble = usb_error ("cannot open it", code).message;
+  const auto handle = open_handle (found, "cannot open it");
+  if (!handle) {
+    found.board.trouble = handle.error ().message;
     return;
   }
-  const Handle handle (raw);
   std::array<unsigned char, 256> text{};
-  const int length = found.descriptor.iSerialNumber == 0
-                         ? 0
-                         : libusb_get_string_descriptor_ascii (handle.get (),
-                               found.descriptor.iSerialNumber, text.data (),
-                               int (text.size ()));
-  for (int i = 0; i < length; i++)
-    found.board.serial += char (text[std::size_t (i)]);
-  found.board.serial = printable (found.board.serial);
+  if (found.descriptor.iSerialNumber == 0)
+    return;
+  const int length = libusb_get_string_descriptor_ascii (handle->get (),
+      found.descriptor.iSerialNumber, text.data (), int (text.size ()));
+  found.board.serial = printable (
+      std::string (text.begin (), text.begin () + std::max (length, 0)));
 }
 
 Result<std::vector<Found>>
@@ -132,7 +138,7 @@ find_boards (const Context &context)
   return found;
 }
 
-/** The two endpoints of the interface, whose type the descriptor tells. */
+/** The two endpoints of the interface and their type. */
 struct Endpoints {
   std::uint8_t out = 0;
   std::uint8_t in = 0;
@@ -192,7 +198,7 @@ public:
     const int code = transfer (endpoints_.out, bytes, sent, timeout);
     if (code == 0 && sent == int (bytes.size ()))
       return {};
-    // Half a message: the device must not take the next for the rest of it.
+    // Half a message: the device must not take the next one for its rest.
     if (code == LIBUSB_ERROR_PIPE)
       libusb_clear_halt (handle_.get (), endpoints_.out);
     return failure (code, "it took " + std::to_string (sent) + " of " +
@@ -224,7 +230,7 @@ private:
       return LIBUSB_ERROR_NO_DEVICE;
     const auto run =
         endpoints_.interrupt ? libusb_interrupt_transfer : libusb_bulk_transfer;
-    // To libusb, 0 is for ever.
+    // For libusb, 0 means no timeout.
     return run (handle_.get (), endpoint, bytes.data (), int (bytes.size ()),
         &done, unsigned (std::max<std::int64_t> (1, timeout.count ())));
   }
@@ -245,14 +251,11 @@ Result<std::unique_ptr<PacketPipe>>
 open_pipe (const Context &context, const Found &found)
 {
   const std::string what = "cannot open the board at USB " + found.board.port;
-  libusb_device_handle *raw = nullptr;
-  if (const int code = libusb_open (found.device.get (), &raw); code != 0)
-    return usb_error (what, code);
-  Handle handle (raw);
+  ASSIGN_OR_RETURN (Handle handle, open_handle (found, what));
   const auto endpoints = find_endpoints (found.device.get ());
   if (!endpoints)
     return endpoints.error ().with_prefix (what + ": ");
-  // The kernel takes these boards for keyboards and the like.
+  // The kernel's HID driver binds to these boards.
   libusb_set_auto_detach_kernel_driver (handle.get (), 1);
   if (const int code = libusb_claim_interface (handle.get (), kInterface);
       code != 0)
@@ -289,10 +292,10 @@ choose (std::vector<Found> boards, const std::string &which)
   if (chosen.size () == 1)
     return chosen.front ();
   if (chosen.empty ())
-    return Error{"no DMD " + in_quotes (which) + " is connected; there is " +
+    return Error{"no DMD " + in_quotes (which) + " is connected; found " +
                      listed (boards),
         ErrorCode::not_found};
-  return Error{"several DMDs are meant by 'usb:" + printable (which) +
+  return Error{"several DMDs match 'usb:" + printable (which) +
                "'; choose one by its port: " + listed (chosen)};
 }
 
@@ -307,14 +310,10 @@ controller_text (UsbController controller)
 Result<std::vector<UsbBoard>>
 list_usb_boards ()
 {
-  const auto context = make_context ();
-  if (!context)
-    return context.error ();
-  auto found = find_boards (*context);
-  if (!found)
-    return found.error ();
+  ASSIGN_OR_RETURN (const Context context, make_context ());
+  ASSIGN_OR_RETURN (std::vector<Found> found, find_boards (context));
   std::vector<UsbBoard> boards;
-  for (Found &each : *found) {
+  for (Found &each : found) {
     read_serial (each);
     boards.push_back (each.board);
   }
@@ -324,28 +323,18 @@ list_usb_boards ()
 Result<std::unique_ptr<Dmd>>
 open_usb_dmd (std::string_view device)
 {
-  const auto options =
-      DmdOptions::parse (device.substr (std::string_view ("usb:").size ()));
-  if (!options)
-    return options.error ().with_prefix ("DMD " + in_quotes (device) + ": ");
-  const auto context = make_context ();
-  if (!context)
-    return context.error ();
-  auto boards = find_boards (*context);
-  if (!boards)
-    return boards.error ();
-  const auto found = choose (*std::move (boards), options->which);
-  if (!found)
-    return found.error ();
-  auto pipe = open_pipe (*context, *found);
-  if (!pipe)
-    return pipe.error ();
-  const std::string name = "usb:" + found->board.port;
-  auto link = std::make_unique<HidLink> (*std::move (pipe), name);
-  auto dmd = found->board.controller == UsbController::dlpc350
-                 ? open_dlpc350 (std::move (link), *options)
-                 : open_dlpc900 (std::move (link), *options);
-  if (!dmd || !options->guard)
+  ASSIGN_OR_RETURN (const DmdOptions options, DmdOptions::parse (device));
+  ASSIGN_OR_RETURN (const Context context, make_context ());
+  ASSIGN_OR_RETURN (std::vector<Found> boards, find_boards (context));
+  ASSIGN_OR_RETURN (
+      const Found found, choose (std::move (boards), options.which));
+  ASSIGN_OR_RETURN (auto pipe, open_pipe (context, found));
+  const std::string name = "usb:" + found.board.port;
+  auto link = std::make_unique<HidLink> (std::move (pipe), name);
+  auto dmd = found.board.controller == UsbController::dlpc350
+                 ? open_dlpc350 (std::move (link), options)
+                 : open_dlpc900 (std::move (link), options);
+  if (!dmd || !options.guard)
     return dmd;
   return guarded (*std::move (dmd), name);
 }

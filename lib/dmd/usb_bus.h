@@ -20,7 +20,7 @@ struct UsbBoard {
   UsbController controller = UsbController::dlpc900;
   std::string port;   ///< bus and ports on the way to it: "1-2.3"
   std::string serial; ///< often empty or the same on several boards
-  /** Why nothing more is known or can be done, such as rights; or "". */
+  /** Why it cannot be opened, such as missing rights; or "". */
   std::string trouble;
 };
 
@@ -31,9 +31,9 @@ const char *controller_text (UsbController controller);
 Result<std::vector<UsbBoard>> list_usb_boards ();
 
 /**
- * Opens "usb:[PORT|SERIAL][,key=value...]", see dmd_options.h; "usb:" is the
- * only board that is connected. The kernel's driver gives the board away, and
- * gets it back when the Dmd is gone.
+ * Opens "usb:[PORT|SERIAL][,key=value...]", see options.h; "usb:" is the
+ * only board that is connected. The kernel's driver is detached from the board
+ * until the Dmd is destroyed.
  */
 Result<std::unique_ptr<Dmd>> open_usb_dmd (std::string_view device);
 

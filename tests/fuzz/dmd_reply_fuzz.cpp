@@ -8,8 +8,8 @@
 #include <cstdlib>
 
 #include "base/text.h"
-#include "dmd/dlpc350.h"
-#include "dmd/dlpc900.h"
+#include "dmd/dlpc_board.h"
+#include "dmd/dlpc_board.h"
 #include "dmd/lightcrafter_protocol.h"
 
 using namespace codedexposure;

@@ -7,8 +7,8 @@
 #include <gtest/gtest.h>
 
 #include "dmd/dmd.h"
-#include "dmd/dmd_options.h"
 #include "dmd/hid_link.h"
+#include "dmd/options.h"
 #include "emulated_pipe.h"
 
 namespace codedexposure::test
@@ -20,7 +20,7 @@ using OpenDriver = Result<std::unique_ptr<Dmd>> (*) (
 inline DmdOptions
 options_of (std::string_view text)
 {
-  const auto options = DmdOptions::parse (text);
+  const auto options = DmdOptions::parse ("usb:" + std::string (text));
   EXPECT_TRUE (options.ok ()) << options.error ().message;
   return *options;
 }

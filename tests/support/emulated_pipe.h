@@ -6,7 +6,7 @@
 #include <functional>
 #include <memory>
 
-#include "dmd/packet_pipe.h"
+#include "dmd/hid_link.h"
 #include "emulated_hid.h"
 
 namespace codedexposure::test

@@ -3,8 +3,8 @@
  * both triggers, limits, and faults. */
 #include <random>
 
-#include "dmd/dlpc350.h"
 #include "dmd/dlpc350_protocol.h"
+#include "dmd/dlpc_board.h"
 #include "emulated_dlpc350.h"
 #include "fault_life.h"
 
@@ -169,12 +169,12 @@ TEST (EmulatedDlpc350, StartsNothingThatWasNotValidatedOrIsWrong)
   };
   const auto verdict_of = [&] (std::uint32_t exposure, int entries) {
     write (kTimes, encode_times ({exposure, 0}));
-    write (kConfigure, encode_configuration (entries, true, 2, 1));
+    write (kConfigure, encode_configuration (entries, 2, 1));
     write (kValidate, {0});
     for (;;)
-      if (const auto said = parse_verdict (link.read (kValidate)->data);
-          !said->busy)
-        return *said;
+      if (const auto said = parse_verdict (link.read (kValidate)->data.at (0));
+          !said.busy)
+        return said;
   };
   EXPECT_TRUE (write (kDisplayMode, {kModePattern}));
   for (const auto &[mailbox, data] : {std::pair{kMailboxImages, Bytes{0}},
@@ -201,8 +201,8 @@ TEST (Dlpc350, WithoutAVideoSignalSaysSo)
   rig.board->video_locked = false;
   ASSERT_EQ (message_of (rig.open ("x,source=video")), "");
   EXPECT_EQ (message_of (rig.show (Schedule ())),
-      "board: cannot start the patterns: it does not; is a 912x1140 signal on "
-      "its HDMI input?");
+      "board: cannot start the patterns: it does not run; is a 912x1140 signal "
+      "on its HDMI input?");
 }
 
 TEST (Dlpc350Faults, WhateverHappensItStopsInTheEndAndHangsNowhere)

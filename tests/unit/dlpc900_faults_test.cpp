@@ -49,9 +49,9 @@ TEST (EmulatedDlpc900, RefusesWhatTheControllerRefuses)
   EXPECT_EQ (verdict (board, kTriggerIn1, encode_trigger_in (103, false)), 13);
   EXPECT_EQ (verdict (board, kDefine, line (0, 105)), 0);
   EXPECT_EQ (verdict (board, kDefine, line (1, 105)), 0);
-  EXPECT_EQ (verdict (board, kConfigure, encode_configuration (3, 0)), 15)
+  EXPECT_EQ (verdict (board, kConfigure, encode_configuration (3)), 15)
       << "more lines than were sent";
-  EXPECT_EQ (verdict (board, kConfigure, encode_configuration (2, 0)), 0);
+  EXPECT_EQ (verdict (board, kConfigure, encode_configuration (2)), 0);
   EXPECT_EQ (verdict (board, kLoadImage, encode_load (0, 500)), 0);
   EXPECT_EQ (verdict (board, kLoadImage, encode_load (1, 500)), 15)
       << "not from the highest down";

@@ -61,8 +61,7 @@ TEST (Dlpc900, UnknownHardwareIsAnError)
 {
   Rig rig (9);
   EXPECT_EQ (message_of (rig.open ()),
-      "board: cannot open it: hardware type 9 is no DMD that is known here "
-      "(1..5)");
+      "board: cannot open it: hardware type 9 is not a known DMD (1..5)");
 }
 
 TEST (Dlpc900, OpeningDisturbsNothing)
@@ -122,6 +121,24 @@ TEST (Dlpc900, AStillMaskStandsInItsSlotsOfEveryExposure)
       for (int x = 0; x < mirrors.width (); x++)
         ASSERT_EQ (mirrors.at (x, y), stripes (1).on (x, y));
   }
+}
+
+TEST (Dlpc900, AStillMaskIsRenderedOnce)
+{
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open ()), "");
+  int asked = 0;
+  const StillMask counted{.name = "counted",
+      .on =
+          [&] (int, int) {
+            asked++;
+            return true;
+          },
+      .slots = 1};
+  ASSERT_EQ (
+      message_of (rig.dmd->show (counted, plan_of (Schedule ()), {})), "");
+  const Extent size = rig.dmd->info ().size;
+  EXPECT_EQ (asked, size.width * size.height);
 }
 
 TEST (Dlpc900, AfterAStillMaskTheScheduleIsSentOnceMore)

@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "dmd/dmd_runner.h"
+#include "dmd/runner.h"
 
 using namespace codedexposure;
 

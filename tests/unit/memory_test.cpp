@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "base/workers.h"
-#include "dmd/dmd_runner.h"
+#include "dmd/runner.h"
 #include "extract/extractor.h"
 #include "fuse/fuser.h"
 #include "mapping/mapping.h"

@@ -76,10 +76,10 @@ TEST_F (Usb, OneOfSeveralIsChosenByPortOrSerial)
   plug_dlpc900 ("1-2", "first");
   plug_dlpc900 ("1-3", "second");
   EXPECT_EQ (message_of (open_dmd ("usb:")),
-      "several DMDs are meant by 'usb:'; choose one by its port: usb:1-2 "
+      "several DMDs match 'usb:'; choose one by its port: usb:1-2 "
       "(first), usb:1-3 (second)");
   EXPECT_EQ (message_of (open_dmd ("usb:1-9")),
-      "no DMD '1-9' is connected; there is usb:1-2 (first), usb:1-3 (second)");
+      "no DMD '1-9' is connected; found usb:1-2 (first), usb:1-3 (second)");
   for (const char *name : {"usb:1-3", "usb:second"}) {
     const auto dmd = open_dmd (name);
     ASSERT_EQ (message_of (dmd), "");

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-#include "dmd/dmd_runner.h"
+#include "dmd/runner.h"
 
 #include <new>
 #include <utility>

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Little-endian fields in messages of devices. */
+/* Messages of devices as bytes, with little-endian fields. */
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 namespace codedexposure
@@ -35,6 +36,16 @@ read_le (ByteView in, std::size_t at, int bytes)
   for (int i = 0; i < bytes; i++)
     value |= std::uint32_t (in[at + std::size_t (i)]) << (8 * i);
   return value;
+}
+
+/** "NAME (error 3)", or "error 77" for a @p code without a name. */
+inline std::string
+error_text (std::span<const char *const> names, std::uint8_t code)
+{
+  const std::string number = "error " + std::to_string (code);
+  return code < names.size () && *names[code] != 0
+             ? std::string (names[code]) + " (" + number + ")"
+             : number;
 }
 
 } // namespace codedexposure

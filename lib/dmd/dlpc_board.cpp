@@ -1,0 +1,150 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "dmd/dlpc_board.h"
+
+#include "base/try.h"
+
+namespace codedexposure
+{
+
+using namespace dlp;
+using namespace std::chrono_literals;
+
+void
+DlpcBoard::set_info (const char *mirrors, Extent size, std::uint32_t active,
+    std::uint32_t dark, int masks)
+{
+  info_.name = link_->name () + " (" + mirrors + ")";
+  info_.size = size;
+  info_.minimum_active = Nanoseconds (active) * 1000;
+  info_.minimum_dark = Nanoseconds (dark) * 1000;
+  info_.resident_masks = masks;
+  info_.triggers_camera = options_.master == Master::dmd;
+  info_.trigger_in = info_.trigger_out = true;
+}
+
+Result<Bytes>
+DlpcBoard::data_of (const HidCommand &command, Result<HidReply> reply)
+{
+  if (!reply)
+    return reply.error ();
+  if (reply->refused)
+    return error (command.name, explain ());
+  return std::move (reply->data);
+}
+
+Result<Bytes>
+DlpcBoard::read (const HidCommand &command, std::size_t min)
+{
+  auto data = data_of (command, link_->read (command));
+  if (data && data->size () < min)
+    return error (
+        command.name, "the reply has " + std::to_string (data->size ()) +
+                          " bytes instead of " + std::to_string (min));
+  return data;
+}
+
+Result<std::uint8_t>
+DlpcBoard::read_byte (const HidCommand &command)
+{
+  ASSIGN_OR_RETURN (const Bytes data, read (command));
+  return data.front ();
+}
+
+Result<void>
+DlpcBoard::write (const HidCommand &command, ByteView data)
+{
+  RETURN_IF_ERROR (data_of (command, link_->write (command, data)));
+  return {};
+}
+
+Result<void>
+DlpcBoard::write_byte (const HidCommand &command, std::uint8_t value)
+{
+  return write (command, ByteView (&value, 1));
+}
+
+Result<void>
+DlpcBoard::write_all (const std::vector<Setting> &settings)
+{
+  for (const auto &[command, data] : settings)
+    RETURN_IF_ERROR (write (command, data));
+  return {};
+}
+
+Result<void>
+DlpcBoard::await (const HidCommand &command, std::uint8_t mask,
+    std::uint8_t value, const std::string &what)
+{
+  do {
+    ASSIGN_OR_RETURN (const std::uint8_t byte, read_byte (command));
+    if ((byte & mask) == value)
+      return {};
+  } while (link_->wait (10ms));
+  return error (what, link_->cancelled () ? "cancelled" : "it takes too long");
+}
+
+Result<void>
+DlpcBoard::enter (std::uint8_t mode)
+{
+  RETURN_IF_ERROR (write_byte (kDisplayMode, mode));
+  return await (kDisplayMode, 0xFF, mode, "change the display mode");
+}
+
+Result<void>
+DlpcBoard::halt ()
+{
+  RETURN_IF_ERROR (write_byte (kRun, kRunStop));
+  RETURN_IF_ERROR (await (kMainStatus, kSequencerRuns, 0, "stop the patterns"));
+  running_ = false;
+  return {};
+}
+
+void
+DlpcBoard::stop ()
+{
+  link_->begin ({}, 800ms);
+  HidCommand run = kRun;
+  run.timeout = 400ms;
+  bool stopped = false;
+  for (int attempt = 0; attempt < 2 && !stopped && !link_->gone (); attempt++)
+    stopped = write_byte (run, kRunStop).ok ();
+  if (stopped || link_->gone ())
+    running_ = false;
+}
+
+Result<void>
+DlpcBoard::pause_frame (const SlotPlan &plan)
+{
+  return link_->pause (
+      std::chrono::milliseconds (plan.frame_period () / 1'000'000 + 1));
+}
+
+bool
+DlpcBoard::healthy (std::uint8_t hardware) const
+{
+  return (hardware & kInitialised) != 0 && (hardware & failures_) == 0;
+}
+
+Result<DmdStatus>
+DlpcBoard::state (decltype (DmdStatus::details) details)
+{
+  ASSIGN_OR_RETURN (const std::uint8_t main, read_byte (kMainStatus));
+  ASSIGN_OR_RETURN (const std::uint8_t hardware, read_byte (kHardwareStatus));
+  details.emplace_back ("health",
+      healthy (hardware) ? "good" : "hardware status reports a failure");
+  details.emplace_back ("parked", (main & kParked) != 0 ? "yes" : "no");
+  return DmdStatus{(main & kSequencerRuns) != 0, std::move (details)};
+}
+
+Result<void>
+DlpcBoard::check_health ()
+{
+  ASSIGN_OR_RETURN (const std::uint8_t hardware, read_byte (kHardwareStatus));
+  if (healthy (hardware))
+    return {};
+  return error (
+      "show masks", "its hardware status is " + std::to_string (hardware) +
+                        ", which reports a failure; switch it off and on");
+}
+
+} // namespace codedexposure

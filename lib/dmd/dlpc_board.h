@@ -1,0 +1,105 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* LightCrafter boards with a DLPC350 or a DLPC900, over USB. */
+#pragma once
+
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "dmd/dmd.h"
+#include "dmd/hid_link.h"
+#include "dmd/options.h"
+
+namespace codedexposure
+{
+
+/**
+ * Opens the LightCrafter 4500 behind @p link. The board continues with what it
+ * does until the first upload (); from then on, the destructor stops it.
+ *
+ * The board takes no masks over USB. The user writes the images that
+ * "codedexposure schedule render --planes" makes into its flash, or shows them
+ * over HDMI, and names them (images=, source=): upload () then only sets up the
+ * table of patterns, and fails otherwise.
+ */
+Result<std::unique_ptr<Dmd>> open_dlpc350 (
+    std::unique_ptr<HidLink> link, const DmdOptions &options);
+
+/**
+ * The same for the LightCrafter 6500 or 9000, which takes masks as planes of
+ * 24-bit images. The driver knows by digest which masks the board holds: images
+ * on the board are not sent again, and a schedule with the same masks in
+ * another order only moves lines of the pattern table.
+ */
+Result<std::unique_ptr<Dmd>> open_dlpc900 (
+    std::unique_ptr<HidLink> link, const DmdOptions &options);
+
+/** What both drivers share: commands, and a sequencer that starts and stops. */
+class DlpcBoard : public Dmd
+{
+public:
+  const DmdInfo &info () const override { return info_; }
+  void stop () override;
+  bool running () const override { return running_; }
+
+protected:
+  using Setting = std::pair<HidCommand, Bytes>;
+
+  /** @p failures  bits of the hardware status that report a failure. */
+  DlpcBoard (std::unique_ptr<HidLink> link, const DmdOptions &options,
+      std::uint8_t failures)
+      : options_ (options), link_ (std::move (link)), failures_ (failures)
+  {
+  }
+
+  /** Why the board refused the last command. */
+  virtual std::string explain () = 0;
+
+  /** Begins a job, which ends soon after a request to @p stop. */
+  void begin (std::stop_token stop = {})
+  {
+    link_->begin (std::move (stop), options_.patience);
+  }
+  /** Data of the reply, at least @p min bytes. */
+  Result<Bytes> read (const HidCommand &command, std::size_t min = 1);
+  Result<std::uint8_t> read_byte (const HidCommand &command);
+  Result<void> write (const HidCommand &command, ByteView data);
+  Result<void> write_byte (const HidCommand &command, std::uint8_t value);
+  Result<void> write_all (const std::vector<Setting> &settings);
+
+  /** Reads until the bits @p mask of a byte are @p value. */
+  Result<void> await (const HidCommand &command, std::uint8_t mask,
+      std::uint8_t value, const std::string &what);
+  /** Changes the display mode and waits until the board reports it. */
+  Result<void> enter (std::uint8_t mode);
+  /** Stops the sequencer and waits until it has stopped. */
+  Result<void> halt ();
+  /** Leaves one whole exposure without masks, or without a trigger. */
+  Result<void> pause_frame (const SlotPlan &plan);
+  /** Fails if the hardware status reports a failure. */
+  Result<void> check_health ();
+  /** The state of the board, after the @p details of the driver. */
+  Result<DmdStatus> state (decltype (DmdStatus::details) details);
+  /** Sets what boards differ in. @p active, @p dark  min times in us. */
+  void set_info (const char *mirrors, Extent size, std::uint32_t active,
+      std::uint32_t dark, int masks);
+  Error error (const std::string &what, const std::string &reason) const
+  {
+    return link_->error (what, reason);
+  }
+
+  const DmdOptions options_;
+  const std::unique_ptr<HidLink> link_;
+  DmdInfo info_;
+  bool touched_ = false; // it shows, or may show, what it was told here
+  bool running_ = false;
+
+private:
+  Result<Bytes> data_of (const HidCommand &command, Result<HidReply> reply);
+  bool healthy (std::uint8_t hardware) const;
+
+  const std::uint8_t failures_;
+};
+
+} // namespace codedexposure

@@ -2,11 +2,15 @@
 #include "base/json.h"
 
 #include <algorithm>
+#include <optional>
 #include <set>
 
 #include "base/text.h"
 
 namespace codedexposure
+{
+
+namespace
 {
 
 std::string
@@ -15,74 +19,51 @@ shown (const Json &value)
   return printable (value.dump ());
 }
 
-Error
-expected (const std::string &key, const std::string &rule, const Json &value)
+[[noreturn]] void
+refuse (const std::string &message)
 {
-  return {"key '" + key + "' must be " + rule + ", not " + shown (value),
-      ErrorCode::parse};
+  throw Error{message, ErrorCode::parse};
 }
 
-Result<void>
-check_head (const Json &root, std::string_view format, int version,
-    const std::string &what)
+/* Before the keys are checked: the message for a text of another kind names its
+ * kind and not its first unknown key. */
+void
+check_head (const Json &root, const JsonHead &head)
 {
-  const std::string head =
-      "; a " + what + " begins with {\"format\":\"" + std::string (format) +
-      "\",\"version\":" + std::to_string (version) + ",...";
+  const std::string form = "; a " + head.what + " begins with {\"format\":\"" +
+                           std::string (head.format) +
+                           "\",\"version\":" + std::to_string (head.version) +
+                           ",...";
   if (!root.is_object ())
-    return Error{
-        "it must be an object, not " + shown (root) + head, ErrorCode::parse};
+    refuse ("it must be an object, not " + shown (root) + form);
   for (const char *key : {"format", "version"})
     if (!root.contains (key))
-      return Error{"key '" + std::string (key) + "' is missing" + head,
-          ErrorCode::parse};
-  if (root["format"] != format)
-    return Error{"format " + shown (root["format"]) + " is not known" + head,
-        ErrorCode::parse};
-  if (!root["version"].is_number_integer () || root["version"] != version)
-    return Error{"version " + shown (root["version"]) +
-                     " is not known; this program reads version " +
-                     std::to_string (version),
-        ErrorCode::parse};
-  return {};
+      refuse ("key '" + std::string (key) + "' is missing" + form);
+  if (root["format"] != head.format)
+    refuse ("format " + shown (root["format"]) + " is not known" + form);
+  if (!root["version"].is_number_integer () || root["version"] != head.version)
+    refuse ("version " + shown (root["version"]) +
+            " is not known; this program reads version " +
+            std::to_string (head.version));
 }
 
-Result<void>
-check_keys (const Json &object, const std::string &where,
-    std::initializer_list<std::string_view> known)
-{
-  for (const auto &item : object.items ()) {
-    if (std::find (known.begin (), known.end (), item.key ()) != known.end ())
-      continue;
-    std::string names;
-    for (const std::string_view name : known)
-      names += (names.empty () ? "" : ", ") + std::string (name);
-    return Error{"there is no key " + in_quotes (item.key ()) + where +
-                     "; the keys are " + names,
-        ErrorCode::parse};
-  }
-  return {};
-}
-
-namespace
-{
-
-std::optional<std::int64_t>
-as_integer (const Json &value, std::int64_t highest)
+std::int64_t
+integer (const Json &value, const std::string &key, std::int64_t highest)
 {
   const bool fits =
       value.is_number_unsigned ()
           ? value.get<std::uint64_t> () <= std::uint64_t (highest)
           : value.is_number_integer () && value.get<std::int64_t> () == 0;
   if (!fits)
-    return std::nullopt;
+    throw expected (
+        key, "a whole number from 0 to " + std::to_string (highest), value);
   return value.get<std::int64_t> ();
 }
 
 std::string
-integer_rule (std::int64_t highest)
+entry_of (const std::string &key, std::size_t i)
 {
-  return "a whole number from 0 to " + std::to_string (highest);
+  return key + "[" + std::to_string (i) + "]";
 }
 
 /* Refuses, while the parser runs, what it would accept: see parse_strictly ().
@@ -97,16 +78,14 @@ public:
     using Event = Json::parse_event_t;
     if (event == Event::object_start || event == Event::array_start) {
       if (depth >= kMaxDepth)
-        throw Error{"brackets nest deeper than " + std::to_string (kMaxDepth) +
-                        " levels; no " + *what_ + " does",
-            ErrorCode::parse};
+        refuse ("brackets nest deeper than " + std::to_string (kMaxDepth) +
+                " levels; no " + *what_ + " does");
       keys_.resize (std::size_t (depth) + 1);
       keys_.back ().clear ();
     } else if (event == Event::key) {
       const auto &key = parsed.get_ref<const std::string &> ();
       if (!keys_[std::size_t (depth) - 1].insert (key).second)
-        throw Error{"key " + in_quotes (key) + " stands twice; leave one out",
-            ErrorCode::parse};
+        refuse ("key " + in_quotes (key) + " stands twice; leave one out");
     }
     return true;
   }
@@ -120,65 +99,126 @@ private:
 
 } // namespace
 
-Result<std::int64_t>
-read_integer (const Json &value, const std::string &key, std::int64_t highest)
+Error
+expected (const std::string &key, const std::string &rule, const Json &value)
 {
-  if (const auto number = as_integer (value, highest))
-    return *number;
-  return expected (key, integer_rule (highest), value);
+  return {"key '" + key + "' must be " + rule + ", not " + shown (value),
+      ErrorCode::parse};
 }
 
-Result<std::vector<int>>
-read_integers (const Json &value, const std::string &key, int highest)
+void
+read_keys (const Json &object, const std::string &name,
+    const std::string &needs, const JsonKeys &keys)
 {
-  if (!value.is_array ())
-    return expected (key, "a list of whole numbers", value);
-  std::vector<int> numbers;
-  numbers.reserve (value.size ());
-  for (const Json &entry : value) {
-    const auto number = as_integer (entry, highest);
-    if (!number)
-      return expected (key + "[" + std::to_string (numbers.size ()) + "]",
-          integer_rule (highest), entry);
-    numbers.push_back (int (*number));
+  if (!object.is_object ()) {
+    if (name.empty ())
+      refuse ("it must be an object, not " + shown (object) + "; " + needs);
+    throw expected (name, "an object", object);
   }
-  return numbers;
-}
-
-Result<std::vector<double>>
-read_reals (const Json &value, const std::string &key, std::size_t count)
-{
-  const std::string rule = std::to_string (count) + " numbers in a list";
-  if (!value.is_array () || value.size () != count)
-    return expected (key, rule, value);
-  std::vector<double> numbers;
-  numbers.reserve (count);
-  for (const Json &entry : value) {
-    if (!entry.is_number ())
-      return expected (key + "[" + std::to_string (numbers.size ()) + "]",
-          "a number", entry);
-    numbers.push_back (entry.get<double> ());
+  for (const auto &item : object.items ()) {
+    if (std::ranges::find (keys, item.key (), &JsonKey::name) != keys.end ())
+      continue;
+    std::string names;
+    for (const JsonKey &key : keys)
+      names += (names.empty () ? "" : ", ") + std::string (key.name);
+    refuse ("there is no key " + in_quotes (item.key ()) +
+            (name.empty () ? "" : " in " + name) + "; the keys are " + names);
   }
-  return numbers;
+  const std::string prefix = name.empty () ? "" : name + ".";
+  for (const JsonKey &key : keys)
+    if (key.needed && !object.contains (key.name))
+      refuse (
+          "key '" + prefix + std::string (key.name) + "' is missing; " + needs);
+  for (const auto &[key, read, needed] : keys)
+    if (const auto at = object.find (key); read && at != object.end ())
+      read (*at, prefix + std::string (key));
 }
 
-Result<Json>
+void
+read_versioned (const Json &root, const JsonHead &head,
+    const std::string &needs, JsonKeys keys)
+{
+  check_head (root, head);
+  keys.insert (keys.begin (), {{"format", {}}, {"version", {}}});
+  read_keys (root, "", needs, keys);
+}
+
+JsonReader
+integers_into (std::vector<int *> to, int highest, const std::string &rule)
+{
+  return [=] (const Json &value, const std::string &key) {
+    std::vector<int> numbers;
+    integers_into (numbers, highest) (value, key);
+    if (numbers.size () != to.size ())
+      throw expected (key, rule, value);
+    for (std::size_t i = 0; i < to.size (); i++)
+      *to[i] = numbers[i];
+  };
+}
+
+JsonReader
+integers_into (std::vector<int> &to, int highest)
+{
+  return [&to, highest] (const Json &value, const std::string &key) {
+    if (!value.is_array ())
+      throw expected (key, "a list of whole numbers", value);
+    to.clear ();
+    for (const Json &entry : value)
+      to.push_back (int (integer (entry, entry_of (key, to.size ()), highest)));
+  };
+}
+
+JsonReader
+integer_into (std::int64_t &to, std::int64_t highest)
+{
+  return [&to, highest] (const Json &value, const std::string &key) {
+    to = integer (value, key, highest);
+  };
+}
+
+JsonReader
+integer_into (int &to, int highest)
+{
+  return [&to, highest] (const Json &value, const std::string &key) {
+    to = int (integer (value, key, highest));
+  };
+}
+
+JsonReader
+numbers_into (std::span<double> to)
+{
+  return [to] (const Json &value, const std::string &key) {
+    if (!value.is_array () || value.size () != to.size ())
+      throw expected (
+          key, std::to_string (to.size ()) + " numbers in a list", value);
+    for (std::size_t i = 0; i < to.size (); i++)
+      number_into (to[i], "a number") (value[i], entry_of (key, i));
+  };
+}
+
+JsonReader
+number_into (double &to, const std::string &rule)
+{
+  return [&to, rule] (const Json &value, const std::string &key) {
+    if (!value.is_number ())
+      throw expected (key, rule, value);
+    to = value.get<double> ();
+  };
+}
+
+Json
 parse_strictly (std::string_view text, const std::string &what)
 {
   /* The parser takes a zero byte for the end and ignores what follows. */
   if (const std::size_t zero = text.find ('\0'); zero != text.npos)
-    return Error{"it is no valid JSON: a zero byte at " +
-                     std::to_string (zero) + "; remove it and what follows",
-        ErrorCode::parse};
+    refuse ("it is no valid JSON: a zero byte at " + std::to_string (zero) +
+            "; remove it and what follows");
   try {
     return Json::parse (text, Watch (what));
-  } catch (const Error &refused) {
-    return refused;
   } catch (const Json::exception &failure) {
     std::string_view why = failure.what ();
     why.remove_prefix (std::min (why.find ("] ") + 2, why.size ()));
-    return Error{
-        "it is no valid JSON: " + printable (why, 200), ErrorCode::parse};
+    refuse ("it is no valid JSON: " + printable (why, 200));
   }
 }
 

@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Reads JSON of unknown origin strictly; for source files of lib/ only. */
+/* Reads JSON of unknown origin strictly; for source files of lib/ only.
+ *
+ * What reads a value throws Error; read_json () turns that into a Result. */
 #pragma once
 
 #include <cstdint>
-#include <initializer_list>
-#include <optional>
+#include <functional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -19,40 +21,90 @@ namespace codedexposure
 using Json = nlohmann::json;
 using OrderedJson = nlohmann::ordered_json;
 
-/** @p value as text for a message. */
-std::string shown (const Json &value);
+/** The value of @p result. Throws its error. */
+template <typename T>
+T
+or_throw (Result<T> result)
+{
+  if (!result)
+    throw result.error ();
+  return *std::move (result);
+}
 
 /** "key KEY must be RULE, not VALUE". */
 Error expected (
     const std::string &key, const std::string &rule, const Json &value);
 
-/** Error unless @p root has this format and version. Call it before check_keys
- * (), so that the message for a text of another kind names its kind and not its
- * first unknown key. @p what, such as "schedule", is for the message. */
-Result<void> check_head (const Json &root, std::string_view format, int version,
-    const std::string &what);
+/** Takes a value; @p key names it in messages. */
+using JsonReader =
+    std::function<void (const Json &value, const std::string &key)>;
 
-/** Error for the first key of @p object that is not @p known; @p where, such as
- * " in tile", is for the message. */
-Result<void> check_keys (const Json &object, const std::string &where,
-    std::initializer_list<std::string_view> known);
+/** A key of an object. */
+struct JsonKey {
+  std::string_view name;
+  JsonReader read;
+  bool needed = false;
+};
+using JsonKeys = std::vector<JsonKey>;
 
-/** Integers from 0 to @p highest, written without a fraction. */
-Result<std::int64_t> read_integer (
-    const Json &value, const std::string &key, std::int64_t highest);
-Result<std::vector<int>> read_integers (
-    const Json &value, const std::string &key, int highest);
+/** Reads the keys of @p object in the order of @p keys. Throws where it is no
+ * object or has a key that is not among them, or where a needed one is missing.
+ * @p name   of the object, which stands before its keys in messages; empty: a
+ *           whole text.
+ * @p needs  what it needs, for the message: "a tile has a period and labels".
+ */
+void read_keys (const Json &object, const std::string &name,
+    const std::string &needs, const JsonKeys &keys);
 
-/** Finite numbers, @p count of them. */
-Result<std::vector<double>> read_reals (
-    const Json &value, const std::string &key, std::size_t count);
+/** How a versioned text begins. */
+struct JsonHead {
+  std::string what; ///< "schedule"
+  std::string_view format;
+  int version;
+};
+/** read_keys () of a whole text with the keys "format" and "version", which
+ * must have the values of @p head. */
+void read_versioned (const Json &root, const JsonHead &head,
+    const std::string &needs, JsonKeys keys);
 
-/**
- * Parses one JSON text. Also refuses what the parser would accept: a key that
+/** Integers from 0 to @p highest, written without a fraction, as many as there
+ * are in @p to. @p rule says what they are: "two integers, x and y". */
+JsonReader integers_into (
+    std::vector<int *> to, int highest, const std::string &rule);
+/** A list of any length. */
+JsonReader integers_into (std::vector<int> &to, int highest);
+JsonReader integer_into (std::int64_t &to, std::int64_t highest);
+JsonReader integer_into (int &to, int highest);
+
+/** Finite numbers, as many as there are in @p to. */
+JsonReader numbers_into (std::span<double> to);
+/** One. @p rule says what it is: "a number of pixels". */
+JsonReader number_into (double &to, const std::string &rule);
+
+/** Parses one JSON text. Also refuses what the parser would accept: a key that
  * an object has twice, because readers disagree on which one counts; nesting
  * deeper than any text of this project has, because recursive functions read
- * it; and a zero byte. @p what, such as "schedule", is for the message.
- */
-Result<Json> parse_strictly (std::string_view text, const std::string &what);
+ * it; and a zero byte. @p what, such as "schedule", is for the message. */
+Json parse_strictly (std::string_view text, const std::string &what);
+
+/** What @p read makes of the JSON text @p text of at most @p limit bytes.
+ * @p what, such as "schedule", is for the message. */
+template <typename T>
+Result<T>
+read_json (std::string_view text, const std::string &what, std::size_t limit,
+    const std::function<T (Json root)> &read)
+try {
+  try {
+    if (text.size () > limit)
+      throw Error{"more than " + std::to_string (limit) + " bytes; no " + what +
+                      " is that long",
+          ErrorCode::parse};
+    return read (parse_strictly (text, what));
+  } catch (const Error &refused) {
+    return refused.with_prefix (what + " JSON: ");
+  }
+} catch (const std::bad_alloc &) {
+  return out_of_memory ();
+}
 
 } // namespace codedexposure

@@ -218,8 +218,8 @@ TEST (ScheduleJson, WrongTextsAreNamed)
       {with_code ("1"), {"'code'", "not 1"}},
       {with_code (R"("cumulative")"), {"'cumulative'", "none of"}},
       {with_code (R"("matrix")"), {"'matrix'", "none of"}},
-      {with_code ("{}"), {"'code'", "rows"}},
-      {with_code (R"({"rows":"10"})"), {"'code'", "rows"}},
+      {with_code ("{}"), {"'code.rows'", "rows"}},
+      {with_code (R"({"rows":"10"})"), {"'code.rows'", "rows"}},
       {with_code (R"({"rows":["10",1]})"), {"'code.rows[1]'", "not 1"}},
       {with_code (R"({"rows":["10","01"],"n":2})"), {"no key 'n' in code"}},
       {R"({"format":"coded-exposure","version":1,"tile":{"period":[2,1],)"

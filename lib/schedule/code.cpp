@@ -2,13 +2,12 @@
 #include "schedule/code.h"
 
 #include <algorithm>
-#include <cmath>
-#include <iterator>
 #include <numeric>
 #include <optional>
 
+#include <Eigen/Core>
+
 #include "base/text.h"
-#include "schedule/hadamard.h"
 #include "schedule/matrix.h"
 #include "schedule/tile.h"
 
@@ -18,47 +17,109 @@ namespace codedexposure
 namespace
 {
 
-using Bits = std::vector<std::uint8_t>;
+using Eigen::Index;
+using Eigen::MatrixXi;
 
-Bits
-sequential_bits (int n)
+bool
+is_prime (int value)
 {
-  Bits on (std::size_t (n * n));
-  for (int e = 0; e < n; e++)
-    on[std::size_t (e * n + e)] = 1;
-  return on;
+  for (int d = 2; d * d <= value; d++)
+    if (value % d == 0)
+      return false;
+  return value > 1;
 }
 
-Bits
-staircase_bits (int n)
+/** The quadratic characters, 0, 1 or -1, of column less row modulo the prime
+ * @p q. */
+MatrixXi
+jacobsthal (int q)
 {
-  Bits on (std::size_t (n * n));
-  for (int e = 0; e < n; e++)
-    std::fill_n (on.begin () + e * n, e + 1, std::uint8_t (1));
-  return on;
+  Eigen::VectorXi character = Eigen::VectorXi::Constant (q, -1);
+  character[0] = 0;
+  for (int x = 1; x < q; x++)
+    character[x * x % q] = 1;
+  return MatrixXi::NullaryExpr (q, q, [&] (Index row, Index column) {
+    return character[(column - row + q) % q];
+  });
 }
 
-/** What a normalised Hadamard matrix of order n + 1 leaves without its first
- * row and column, -1 being on, or (H + J) / 2 of one of order n; none where
- * there is neither. */
-std::optional<Bits>
-s_matrix_bits (int n)
+/** I + S with the skew conference matrix S of order q + 1, q = 3 mod 4. */
+MatrixXi
+paley_one (int q)
 {
-  Bits on;
-  on.reserve (std::size_t (n * n));
-  if (const auto hadamard = hadamard_matrix (n + 1)) {
-    for (int e = 1; e <= n; e++)
-      for (int s = 1; s <= n; s++)
-        on.push_back (hadamard->at (e, s) < 0);
-    return on;
-  }
-  if (const auto hadamard = hadamard_matrix (n)) {
-    std::transform (hadamard->signs.begin (), hadamard->signs.end (),
-        std::back_inserter (on),
-        [] (std::int8_t sign) { return std::uint8_t (sign > 0); });
-    return on;
-  }
+  MatrixXi matrix = MatrixXi::Ones (q + 1, q + 1);
+  matrix.col (0).tail (q).setConstant (-1);
+  matrix.bottomRightCorner (q, q) = jacobsthal (q) + MatrixXi::Identity (q, q);
+  return matrix;
+}
+
+/** The symmetric conference matrix of order q + 1, q = 1 mod 4, with its zeros
+ * and signs replaced by 2 x 2 blocks. */
+MatrixXi
+paley_two (int q)
+{
+  const Eigen::Matrix2i zero{{1, -1}, {-1, -1}}, one{{1, 1}, {1, -1}};
+  MatrixXi conference = MatrixXi::Ones (q + 1, q + 1);
+  conference (0, 0) = 0;
+  conference.bottomRightCorner (q, q) = jacobsthal (q);
+  MatrixXi matrix (2 * q + 2, 2 * q + 2);
+  for (int i = 0; i <= q; i++)
+    for (int j = 0; j <= q; j++)
+      matrix.block<2, 2> (2 * i, 2 * j) =
+          i == j ? zero : Eigen::Matrix2i (conference (i, j) * one);
+  return matrix;
+}
+
+/** Sylvester's construction. */
+MatrixXi
+doubled (const MatrixXi &half)
+{
+  MatrixXi matrix (2 * half.rows (), 2 * half.rows ());
+  matrix << half, half, half, -half;
+  return matrix;
+}
+
+/** With +1 in the first row and column. */
+MatrixXi
+normalised (const MatrixXi &matrix)
+{
+  const MatrixXi columns = matrix * matrix.row (0).asDiagonal ();
+  return columns.col (0).asDiagonal () * columns;
+}
+
+/**
+ * A Hadamard matrix of +1 and -1 of that order, H H^T = order I, normalised.
+ * Built from Paley's two constructions over prime fields (R. E. A. C. Paley, On
+ * orthogonal matrices, 1933) and Sylvester's doubling; none where these do not
+ * reach.
+ */
+std::optional<MatrixXi>
+hadamard_matrix (int order)
+{
+  if (order == 1)
+    return MatrixXi::Ones (1, 1);
+  if (order == 2)
+    return doubled (MatrixXi::Ones (1, 1));
+  if (order < 4 || order % 4 != 0)
+    return std::nullopt;
+  if (is_prime (order - 1))
+    return normalised (paley_one (order - 1));
+  if (const auto half = hadamard_matrix (order / 2))
+    return normalised (doubled (*half));
+  if (is_prime (order / 2 - 1) && (order / 2 - 1) % 4 == 1)
+    return normalised (paley_two (order / 2 - 1));
   return std::nullopt;
+}
+
+/** Positive where an element is on: what a normalised Hadamard matrix of order
+ * n + 1 leaves without its first row and column, with the signs changed, or
+ * one of order n; none where there is neither. */
+std::optional<MatrixXi>
+s_matrix (int n)
+{
+  if (const auto hadamard = hadamard_matrix (n + 1))
+    return -hadamard->bottomRightCorner (n, n);
+  return hadamard_matrix (n);
 }
 
 /** Names the nearest numbers of elements that have an S-matrix; 2 and 256
@@ -68,7 +129,7 @@ no_s_matrix (int n)
 {
   const auto nearest = [n] (int step) {
     int other = n + step;
-    while (!s_matrix_bits (other))
+    while (!s_matrix (other))
       other += step;
     return std::to_string (other);
   };
@@ -78,32 +139,14 @@ no_s_matrix (int n)
           nearest (-1) + " and " + nearest (1)};
 }
 
-/** What an inverse may be off from one, at any element, to be of use. */
-constexpr double kMaxResidual = 1e-6;
-
-/** The largest element of a b - 1. */
-double
-worst_residual (const Matrix &a, const Matrix &b, std::size_t n)
-{
-  double worst = 0.0;
-  std::vector<double> row (n);
-  for (std::size_t r = 0; r < n; r++) {
-    std::fill (row.begin (), row.end (), 0.0);
-    row[r] = -1.0;
-    for (std::size_t k = 0; k < n; k++)
-      for (std::size_t c = 0; c < n; c++)
-        row[c] += a[r * n + k] * b[k * n + c];
-    for (const double element : row)
-      worst = std::max (worst, std::abs (element));
-  }
-  return worst;
-}
-
 } // namespace
 
-Code::Code (std::string name, int n, std::vector<std::uint8_t> on)
-    : name_ (std::move (name)), n_ (n), on_ (std::move (on))
+Code::Code (std::string name, int n, const std::function<bool (int, int)> &on)
+    : name_ (std::move (name)), n_ (n)
 {
+  for (int e = 0; e < n; e++)
+    for (int s = 0; s < n; s++)
+      on_.push_back (on (e, s));
 }
 
 Result<Code>
@@ -115,13 +158,15 @@ try {
                  " elements: 2 to " + std::to_string (Tile::kMaxElements) +
                  " are possible"};
   if (name == "sequential")
-    return Code ("sequential", n, sequential_bits (n));
+    return Code ("sequential", n, std::equal_to ());
   if (name == "staircase")
-    return Code ("staircase", n, staircase_bits (n));
+    return Code ("staircase", n, std::greater_equal ());
   if (name == "s-matrix") {
-    if (auto on = s_matrix_bits (n))
-      return Code ("s-matrix", n, *std::move (on));
-    return no_s_matrix (n);
+    const auto matrix = s_matrix (n);
+    if (!matrix)
+      return no_s_matrix (n);
+    return Code ("s-matrix", n,
+        [&matrix] (int e, int s) { return (*matrix) (e, s) > 0; });
   }
   return Error{"code " + in_quotes (name) +
                " is none of sequential, staircase and s-matrix"};
@@ -137,8 +182,6 @@ try {
     return Error{"code with " + std::to_string (n) + " rows: 2 to " +
                  std::to_string (Tile::kMaxElements) + " are possible"};
 
-  Bits on;
-  on.reserve (n * n);
   for (std::size_t e = 0; e < n; e++) {
     const std::string row = "row " + std::to_string (e) + " of the code";
     if (rows[e].size () != n)
@@ -151,10 +194,10 @@ try {
     if (rows[e].find ('1') == std::string::npos)
       return Error{row + " is never on; every element must see light in at "
                          "least one slot"};
-    for (const char bit : rows[e])
-      on.push_back (bit == '1');
   }
-  return Code ("matrix", int (n), std::move (on));
+  return Code ("matrix", int (n), [&rows] (int e, int s) {
+    return rows[std::size_t (e)][std::size_t (s)] == '1';
+  });
 } catch (const std::bad_alloc &) {
   return out_of_memory ();
 }
@@ -203,14 +246,12 @@ Code::one_hot () const
 Result<std::vector<double>>
 Code::inverse (double leak) const
 {
-  const std::size_t n = std::size_t (n_);
   Matrix light;
-  light.reserve (n * n);
   for (int e = 0; e < n_; e++)
     for (int s = 0; s < n_; s++)
       light.push_back (this->light (e, s, leak));
-  auto inverse = inverted (light, n);
-  if (!inverse || worst_residual (light, *inverse, n) > kMaxResidual)
+  auto inverse = inverted (light, std::size_t (n_));
+  if (!inverse)
     return Error{"code '" + name_ + "' of " + std::to_string (n_) +
                  " elements cannot be inverted at a leak of " +
                  real_text (leak) +

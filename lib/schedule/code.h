@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -67,7 +68,8 @@ public:
   bool operator== (const Code &) const = default;
 
 private:
-  Code (std::string name, int n, std::vector<std::uint8_t> on);
+  /** @p on  of each element and slot. */
+  Code (std::string name, int n, const std::function<bool (int, int)> &on);
 
   std::string name_;
   int n_;

@@ -12,8 +12,8 @@ namespace codedexposure
 /** Square and row-major. */
 using Matrix = std::vector<double>;
 
-/** The inverse of @p a, n x n, by Gauss-Jordan with partial pivoting; none
- * where a pivot vanishes. */
-std::optional<Matrix> inverted (Matrix a, std::size_t n);
+/** The inverse of @p a, n x n; none where it is singular, or so nearly that an
+ * element of the product of both is off by more than 1e-6. */
+std::optional<Matrix> inverted (const Matrix &a, std::size_t n);
 
 } // namespace codedexposure

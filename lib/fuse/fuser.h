@@ -44,8 +44,7 @@ struct FuseOptions {
 /** "fast", "balanced" or "best". */
 std::string_view quality_name (FuseQuality quality);
 
-/** The instruction sets that fusion can use on this machine, fastest first; the
- * last one is always "scalar", the reference. */
+/** The instruction sets that fusion can use on this machine, fastest first. */
 std::vector<std::string_view> fuse_targets ();
 
 /**

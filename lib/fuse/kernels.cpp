@@ -3,8 +3,6 @@
 
 #include <vector>
 
-#include "fuse/reference.h"
-
 #define CODEDEXPOSURE_DECLARE(target)                                          \
   namespace codedexposure::target                                              \
   {                                                                            \
@@ -31,8 +29,6 @@ find_kernels ()
     found.push_back (fuse_avx2::kernels);
 #endif
   found.push_back (fuse_baseline::kernels);
-  found.push_back ({"scalar", reference_filter, reference_filter_add,
-      reference_sum, reference_max, reference_shrink});
   return found;
 }
 

@@ -74,8 +74,7 @@ struct Kernels {
   void (*shrink) (const ShrinkRow &row);
 };
 
-/** The kernels that this processor can run, widest first; the last ones are the
- * scalar reference. */
+/** The kernels that this processor can run, widest first. */
 std::span<const Kernels> supported_kernels ();
 
 } // namespace codedexposure::fuse

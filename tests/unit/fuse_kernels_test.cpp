@@ -1,18 +1,20 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Kernels of fusion: every instruction set of the processor, compared with the
- * scalar reference. */
+ * reference. */
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "fuse/dct.h"
 #include "fuse/kernels.h"
+#include "fuse_reference.h"
 #include "random_numbers.h"
 
 namespace
 {
 
 using namespace codedexposure;
+using test::kReference;
 using test::random_numbers;
 
 /* The outputs of a kernel for @row. */
@@ -52,13 +54,12 @@ TEST (FuseKernels, FiltersEqualTheReference)
       std::vector<float> scale (256, 0.0f);
       for (std::size_t x = 20; x < 60; x += 3)
         scale[x] = 0.25f * float (x % 5);
-      const fuse::Kernels &oracle = fuse::supported_kernels ().back ();
       for (const fuse::Kernels &kernels : fuse::supported_kernels ()) {
         SCOPED_TRACE (kernels.name);
         EXPECT_EQ (outputs_of (kernels, row, nullptr),
-            outputs_of (oracle, row, nullptr));
+            outputs_of (kReference, row, nullptr));
         EXPECT_EQ (outputs_of (kernels, row, &scale),
-            outputs_of (oracle, row, &scale));
+            outputs_of (kReference, row, &scale));
       }
     }
   }
@@ -67,7 +68,6 @@ TEST (FuseKernels, FiltersEqualTheReference)
 TEST (FuseKernels, JoinedRowsEqualTheReference)
 {
   const auto numbers = random_numbers (4096, 4);
-  const fuse::Kernels &oracle = fuse::supported_kernels ().back ();
   for (const int rows_count : {1, 2, 7, 11}) {
     std::vector<const float *> rows;
     for (int i = 0; i < rows_count; i++)
@@ -80,8 +80,8 @@ TEST (FuseKernels, JoinedRowsEqualTheReference)
     };
     for (const fuse::Kernels &kernels : fuse::supported_kernels ()) {
       SCOPED_TRACE (kernels.name);
-      EXPECT_EQ (joined (kernels.sum), joined (oracle.sum));
-      EXPECT_EQ (joined (kernels.max), joined (oracle.max));
+      EXPECT_EQ (joined (kernels.sum), joined (kReference.sum));
+      EXPECT_EQ (joined (kernels.max), joined (kReference.max));
     }
   }
 }
@@ -112,11 +112,11 @@ shrunk (const fuse::Kernels &kernels, int slots, float threshold)
 
 TEST (FuseKernels, ShrinkingEqualsTheReference)
 {
-  const fuse::Kernels &oracle = fuse::supported_kernels ().back ();
   for (const fuse::Kernels &kernels : fuse::supported_kernels ()) {
     SCOPED_TRACE (kernels.name);
     for (const int slots : {2, 4, 5, 8, 16})
-      EXPECT_EQ (shrunk (kernels, slots, 70.0f), shrunk (oracle, slots, 70.0f));
+      EXPECT_EQ (
+          shrunk (kernels, slots, 70.0f), shrunk (kReference, slots, 70.0f));
   }
 }
 

@@ -1,18 +1,20 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-#include "fuse/reference.h"
+/* The kernels of fusion value by value: slow and readable. All others must give
+ * the same bits. */
+#pragma once
 
 #include <algorithm>
 #include <cmath>
 
 #include "fuse/dct.h"
+#include "fuse/kernels.h"
 
-namespace codedexposure::fuse
+namespace codedexposure::test
 {
 
-namespace
-{
+using namespace fuse;
 
-float
+inline float
 filtered (const FilterRow &row, int x, int k)
 {
   float sum = 0.0f;
@@ -23,7 +25,7 @@ filtered (const FilterRow &row, int x, int k)
   return sum;
 }
 
-void
+inline void
 dct (float *values, int step)
 {
   constexpr int kHalf = kBlock / 2;
@@ -41,7 +43,7 @@ dct (float *values, int step)
   }
 }
 
-void
+inline void
 undo_dct (float *values, int step)
 {
   constexpr int kHalf = kBlock / 2;
@@ -143,9 +145,7 @@ private:
   int lane_;
 };
 
-} // namespace
-
-void
+inline void
 reference_filter (const FilterRow &row, float *const *outputs)
 {
   for (int k = 0; k < row.outputs; k++)
@@ -153,7 +153,7 @@ reference_filter (const FilterRow &row, float *const *outputs)
       outputs[k][x] = filtered (row, x, k);
 }
 
-void
+inline void
 reference_filter_add (
     const FilterRow &row, const float *scale, float *const *outputs)
 {
@@ -162,7 +162,7 @@ reference_filter_add (
       outputs[k][x] += scale[x] * filtered (row, x, k);
 }
 
-void
+inline void
 reference_sum (const float *const *rows, int rows_count, int count, float *to)
 {
   for (int x = 0; x < count; x++) {
@@ -173,7 +173,7 @@ reference_sum (const float *const *rows, int rows_count, int count, float *to)
   }
 }
 
-void
+inline void
 reference_max (const float *const *rows, int rows_count, int count, float *to)
 {
   for (int x = 0; x < count; x++) {
@@ -184,7 +184,7 @@ reference_max (const float *const *rows, int rows_count, int count, float *to)
   }
 }
 
-void
+inline void
 reference_shrink (const ShrinkRow &row)
 {
   for (int lane = row.blocks - 1; lane >= 0; lane--) {
@@ -194,4 +194,7 @@ reference_shrink (const ShrinkRow &row)
   }
 }
 
-} // namespace codedexposure::fuse
+inline constexpr Kernels kReference{"reference", reference_filter,
+    reference_filter_add, reference_sum, reference_max, reference_shrink};
+
+} // namespace codedexposure::test

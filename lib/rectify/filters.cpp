@@ -50,19 +50,37 @@ struct Interpolation {
   }
 };
 
+std::vector<SlotShares>
+shares_of (const ElementMap &elements)
+{
+  std::vector<SlotShares> shares (std::size_t (elements.elements ()));
+  for (int e = 0; e < elements.elements (); e++)
+    for (int slot = 0; slot < elements.schedule ().slots (); slot++)
+      if (const double light = elements.light (e, slot); light > 0.0)
+        shares[std::size_t (e)].push_back ({slot, light});
+  return shares;
+}
+
 } // namespace
 
-Surroundings::Surroundings (const Elements &elements, int reach)
-    : elements_ (elements), reach_ (reach)
+Surroundings::Surroundings (
+    const ElementMap &elements, Extent mirrors, int reach)
+    : elements_ (elements), mirrors_ (mirrors), reach_ (reach)
 {
   for (int i = 0; i < elements.parts (); i++)
     add_part (i);
   repeating_ = count ();
 }
 
+/* Of the window around mirror @x, @y. */
+template <typename ElementAt>
 int
-Surroundings::number_of (std::vector<int> window)
+Surroundings::number_of (int x, int y, const ElementAt &element_at)
 {
+  std::vector<int> window;
+  for (int j = y - reach_; j <= y + reach_; j++)
+    for (int i = x - reach_; i <= x + reach_; i++)
+      window.push_back (element_at (i, j));
   const auto [at, is_new] = numbers_.try_emplace (std::move (window), count ());
   if (is_new)
     windows_.push_back (&at->first);
@@ -72,28 +90,23 @@ Surroundings::number_of (std::vector<int> window)
 void
 Surroundings::add_part (int part)
 {
-  const Tile &tile = elements_.tile (part);
-  const Rect &rect = elements_.rect (part);
+  const Tile &tile = elements_.part (part).tile ();
+  const Offset corner = elements_.corner (part);
   std::vector<int> &numbers = parts_.emplace_back ();
   for (int y = 0; y < tile.period_y (); y++)
-    for (int x = 0; x < tile.period_x (); x++) {
-      std::vector<int> window;
-      for (int j = -reach_; j <= reach_; j++)
-        for (int i = -reach_; i <= reach_; i++)
-          window.push_back (
-              elements_.at (part, rect.x + x + i, rect.y + y + j));
-      numbers.push_back (number_of (std::move (window)));
-    }
+    for (int x = 0; x < tile.period_x (); x++)
+      numbers.push_back (number_of (corner.x + x, corner.y + y,
+          [&] (int i, int j) { return elements_.at (part, i, j); }));
 }
 
 /* The window lies within @part. */
 int
 Surroundings::inside_part (int part, int x, int y) const
 {
-  const Tile &tile = elements_.tile (part);
-  const Rect &rect = elements_.rect (part);
-  const int column = floor_mod (x - rect.x, tile.period_x ());
-  const int row = floor_mod (y - rect.y, tile.period_y ());
+  const Tile &tile = elements_.part (part).tile ();
+  const Offset corner = elements_.corner (part);
+  const int column = floor_mod (x - corner.x, tile.period_x ());
+  const int row = floor_mod (y - corner.y, tile.period_y ());
   return parts_[std::size_t (part)]
                [std::size_t (row * tile.period_x () + column)];
 }
@@ -111,33 +124,33 @@ Surroundings::find_row (int y, std::span<int> numbers)
 void
 Surroundings::find_border (int part, int y, std::span<int> numbers)
 {
-  const Rect &rect = elements_.rect (part);
+  const Rect &rect =
+      elements_.schedule ().regions ()[std::size_t (part) - 1].rect;
   if (y < rect.y - reach_ || y >= rect.bottom () + reach_)
     return;
   const Rect inner{rect.x + reach_, rect.y + reach_, rect.width - 2 * reach_,
       rect.height - 2 * reach_};
+  const auto element_at = [this] (int i, int j) {
+    const int part_there =
+        elements_.part_at (std::clamp (i, 0, mirrors_.width - 1),
+            std::clamp (j, 0, mirrors_.height - 1));
+    return elements_.at (part_there, i, j);
+  };
   const int first = std::max (0, rect.x - reach_);
   const int end = std::min (int (numbers.size ()), rect.right () + reach_);
   for (int x = first; x < end; x++) {
     int &number = numbers[std::size_t (x)];
-    if (inner.holds (x, y)) {
-      number = inside_part (part, x, y);
-      continue;
-    }
-    std::vector<int> window;
-    for (int j = -reach_; j <= reach_; j++)
-      for (int i = -reach_; i <= reach_; i++)
-        window.push_back (elements_.at (x + i, y + j));
-    number = number_of (std::move (window));
+    number = inner.holds (x, y) ? inside_part (part, x, y)
+                                : number_of (x, y, element_at);
   }
 }
 
-FilterBank::FilterBank (
-    const PixelView &view, const Elements &elements, const SceneClass &scene)
+FilterBank::FilterBank (const PixelView &view, const ElementMap &elements,
+    Extent mirrors, const SceneClass &scene)
     : elements_ (elements), solver_ (view),
-      surroundings_ (elements, solver_.reach ()),
-      covariance_ (
-          scene, elements.shares (), elements.slots (), 2 * solver_.reach ()),
+      surroundings_ (elements, mirrors, solver_.reach ()),
+      covariance_ (scene, shares_of (elements), elements.schedule ().slots (),
+          2 * solver_.reach ()),
       parts_ (kMaxParts),
       steps_ (surroundings_.count () > kManySurroundings ? kFewSteps : kSteps)
 {
@@ -148,6 +161,8 @@ FilterBank::FilterBank (
       std::size_t (count) * std::size_t (parts_ * parts_), kUnknown);
   nodes_.resize (
       std::size_t (count) * std::size_t ((steps_ + 1) * (steps_ + 1)));
+  for (int e = 0; e < elements.elements (); e++)
+    most_light_ = std::max (most_light_, elements.light (e));
 }
 
 Neighbourhood
@@ -238,7 +253,7 @@ FilterBank::append (int around, const std::vector<float> &solved)
   const auto &window = surroundings_.window (around);
   const double light = elements_.light (window[window.size () / 2]);
   scales_.push_back ({1.0f / std::max (solved.back (), kMinRoughness),
-      float (elements_.most_light () / light)});
+      float (most_light_ / light)});
 }
 
 } // namespace codedexposure

@@ -18,13 +18,13 @@ namespace codedexposure
 class Surroundings
 {
 public:
-  /** @p reach  of the windows, mirrors to each side.
-   * @p elements outlive this. */
-  Surroundings (const Elements &elements, int reach);
+  /** @p elements  outlive this.
+   *  @p mirrors   of the array; beyond it, tiles continue.
+   *  @p reach     of the windows, mirrors to each side. */
+  Surroundings (const ElementMap &elements, Extent mirrors, int reach);
 
-  /** Sets @p numbers to those of the windows around mirrors (0, @p y), (1, @p
-   * y)
-   * ... */
+  /** Sets @p numbers to those of the windows around mirrors (0, @p y),
+   * (1, @p y) ... */
   void find_row (int y, std::span<int> numbers);
   /** The elements of a window, row by row. */
   const std::vector<int> &window (int number) const
@@ -37,17 +37,18 @@ public:
   int repeating () const { return repeating_; }
 
 private:
-  int number_of (std::vector<int> window);
+  template <typename ElementAt>
+  int number_of (int x, int y, const ElementAt &element_at);
   void add_part (int part);
   int inside_part (int part, int x, int y) const;
   void find_border (int part, int y, std::span<int> numbers);
 
-  const Elements &elements_;
+  const ElementMap &elements_;
+  Extent mirrors_;
   int reach_, repeating_;
   std::map<std::vector<int>, int> numbers_;
   std::vector<const std::vector<int> *> windows_;
-  std::vector<std::vector<int>>
-      parts_; // numbers in one period of each part's tile
+  std::vector<std::vector<int>> parts_; // in one period of each tile
 };
 
 /**
@@ -64,16 +65,15 @@ class FilterBank
 {
 public:
   /** @p scene  statistics of the mirrors' light. */
-  FilterBank (
-      const PixelView &view, const Elements &elements, const SceneClass &scene);
+  FilterBank (const PixelView &view, const ElementMap &elements, Extent mirrors,
+      const SceneClass &scene);
 
   const WeightSolver &solver () const { return solver_; }
   Surroundings &surroundings () { return surroundings_; }
   /** Noise of a pixel, rms, in units of the scene's standard deviation. */
   static constexpr std::array<double, 4> kNoises = {0.05, 0.11, 0.25, 0.55};
   /** Number of the filters for mirrors with surroundings @p around that are
-   * seen
-   * @p fx, @p fy pixels, -0.5 to 0.5, from the centre of their window. */
+   * seen @p fx, @p fy pixels, -0.5 to 0.5, from the centre of their window. */
   std::int32_t filter (int around, double fx, double fy);
 
   /** How a filter's window shows the scene. */
@@ -97,11 +97,12 @@ private:
   std::int32_t &known_filter (int around, int px, int py);
   void append (int around, const std::vector<float> &solved);
 
-  const Elements &elements_;
+  const ElementMap &elements_;
   WeightSolver solver_;
   Surroundings surroundings_;
   CodedCovariance covariance_;
   int parts_, steps_; // per pixel: filters, and intervals of the solved grid
+  double most_light_ = 0.0; // of an element
   std::map<int, Neighbourhood> neighbourhoods_;
   std::vector<std::vector<float>> nodes_;
   std::vector<std::int32_t> filters_; // of repeating surroundings

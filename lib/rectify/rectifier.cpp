@@ -81,8 +81,8 @@ public:
       const RectifyOptions &options, int taps)
       : mapping_ (mapping), tolerance_ (options.tolerance),
         coded_rows_ (mapping.mirrors ().height - schedule.pilot_rows ()),
-        elements_ (schedule, mapping.mirrors ()),
-        bank_ (view_of (mapping, taps), elements_, scene_of (options)),
+        elements_ (schedule), bank_ (view_of (mapping, taps), elements_,
+                                  mapping.mirrors (), scene_of (options)),
         whole_ (mapping.one_to_one (options.tolerance)),
         single_ (taps == kWindows[0].taps),
         best_share_ (bank_.solver ().own_share (0.0, 0.0)),
@@ -108,16 +108,19 @@ private:
   /* Persistence is that of the part with the shortest slots. */
   SceneClass scene_of (const RectifyOptions &options) const
   {
-    const double slots = double (elements_.most_slots ()) / elements_.slots ();
+    int most = 1;
+    for (int i = 0; i < elements_.parts (); i++)
+      most = std::max (most, elements_.part (i).slots ());
     return {.length = options.correlation_length / std::numbers::sqrt3,
-        .correlation = std::pow (options.persistence, slots)};
+        .correlation = std::pow (options.persistence,
+            double (most) / elements_.schedule ().slots ())};
   }
   Place place (Position seen, int around, bool coded, RectifyReport &report);
 
   const Mapping &mapping_;
   double tolerance_;
   int coded_rows_;
-  Elements elements_;
+  ElementMap elements_;
   FilterBank bank_;
   bool whole_;
   bool single_;       // pixel per mirror; of several, all are used

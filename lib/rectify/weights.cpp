@@ -17,7 +17,7 @@ constexpr double kMinShare = 1e-4;
 
 } // namespace
 
-Neighbourhood::Neighbourhood (const Elements &elements,
+Neighbourhood::Neighbourhood (const ElementMap &elements,
     const CodedCovariance &covariances, const std::vector<int> &around)
     : reach ((int (std::lround (std::sqrt (around.size ()))) - 1) / 2)
 {

@@ -9,7 +9,7 @@
 
 #include "estimate/covariance.h"
 #include "estimate/kriging.h"
-#include "rectify/elements.h"
+#include "schedule/element_map.h"
 
 namespace codedexposure
 {
@@ -24,7 +24,7 @@ struct Neighbourhood {
   std::vector<double> covariance;
 
   /** @p around  elements of the mirrors. */
-  Neighbourhood (const Elements &elements, const CodedCovariance &covariance,
+  Neighbourhood (const ElementMap &elements, const CodedCovariance &covariance,
       const std::vector<int> &around);
 
   std::size_t count () const { return light.size (); }

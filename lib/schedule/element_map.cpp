@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "schedule/element_map.h"
 
+#include <algorithm>
+#include <map>
+
 namespace codedexposure
 {
 
@@ -9,10 +12,19 @@ ElementMap::ElementMap (const Schedule &schedule) : schedule_ (schedule)
   parts_.push_back (schedule.background ());
   for (int i = 0; i < int (schedule.regions ().size ()); i++)
     parts_.push_back (schedule.region (i));
-  for (int i = 0; i < parts (); i++) {
-    firsts_.push_back (elements ());
-    for (int e = 0; e < part (i).elements (); e++)
-      own_.push_back ({i, e});
+  std::map<std::vector<bool>, int> known;
+  for (const Schedule &part : parts_) {
+    std::vector<int> &numbers = numbers_.emplace_back ();
+    for (int e = 0; e < part.elements (); e++) {
+      std::vector<bool> on;
+      for (int slot = 0; slot < schedule.slots (); slot++)
+        on.push_back (
+            part.code ().on (e, schedule.mask_of (part.code (), slot)));
+      const auto [at, is_new] = known.try_emplace (on, elements ());
+      if (is_new)
+        on_.push_back (std::move (on));
+      numbers.push_back (at->second);
+    }
   }
 }
 
@@ -26,20 +38,10 @@ ElementMap::corner (int part) const
 }
 
 double
-ElementMap::light (int element, int slot) const
-{
-  const auto &[part, own] = own_[std::size_t (element)];
-  const Schedule &schedule = this->part (part);
-  return schedule.light (own, schedule_.mask_of (schedule.code (), slot));
-}
-
-double
 ElementMap::light (int element) const
 {
-  const auto &[part, own] = own_[std::size_t (element)];
-  const Code &code = this->part (part).code ();
-  const int held = schedule_.slots () / code.slots ();
-  return schedule_.light_of (code.on_slots (own) * held);
+  const std::vector<bool> &on = on_[std::size_t (element)];
+  return schedule_.light_of (int (std::count (on.begin (), on.end (), true)));
 }
 
 } // namespace codedexposure

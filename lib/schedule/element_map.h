@@ -11,8 +11,8 @@ namespace codedexposure
 
 /**
  * The elements of all parts of a schedule under one set of numbers: first those
- * of the background, then those of each region. Slots are those of the whole
- * exposure.
+ * of the background, then those of each region. Elements that are on in the
+ * same slots have the same number. Slots are those of the whole exposure.
  */
 class ElementMap
 {
@@ -20,7 +20,7 @@ public:
   explicit ElementMap (const Schedule &schedule);
 
   const Schedule &schedule () const { return schedule_; }
-  int elements () const { return int (own_.size ()); }
+  int elements () const { return int (on_.size ()); }
 
   /** Parts: the background is 0, region i is i + 1. */
   int parts () const { return int (parts_.size ()); }
@@ -36,30 +36,26 @@ public:
   int at (int part, int x, int y) const
   {
     const Offset from = corner (part);
-    return firsts_[std::size_t (part)] +
-           this->part (part).element_at (x - from.x, y - from.y);
+    return numbers_[std::size_t (part)][std::size_t (
+        this->part (part).element_at (x - from.x, y - from.y))];
   }
 
   bool on (int element, int slot) const
   {
-    const Own &own = own_[std::size_t (element)];
-    const Code &code = part (own.part).code ();
-    return code.on (own.element, schedule_.mask_of (code, slot));
+    return on_[std::size_t (element)][std::size_t (slot)];
   }
   /** Light that an element lets through, as Schedule::light (). */
-  double light (int element, int slot) const;
+  double light (int element, int slot) const
+  {
+    return on (element, slot) ? 1.0 : schedule_.leak ();
+  }
   double light (int element) const;
 
 private:
-  struct Own {
-    int part;
-    int element; // of the part
-  };
-
   Schedule schedule_;
   std::vector<Schedule> parts_;
-  std::vector<int> firsts_; // number of each part's element 0
-  std::vector<Own> own_;
+  std::vector<std::vector<int>> numbers_; ///< of each part's elements
+  std::vector<std::vector<bool>> on_;     ///< each element in each slot
 };
 
 } // namespace codedexposure

@@ -4,7 +4,6 @@
 
 #include "bench/simulated_dmd.h"
 #include "camera/camerasrc.h"
-#include "camera/provider.h"
 #include "common/meta.h"
 #include "demux/demux.h"
 #include "dmdsync/dmdsync.h"

@@ -47,9 +47,8 @@
  */
 #include "camerasrc.h"
 
-#include "common/caps.h"
+#include "common/element.h"
 #include "common/properties.h"
-#include "state.h"
 
 GST_DEBUG_CATEGORY (camerasrc_debug);
 #define GST_CAT_DEFAULT camerasrc_debug
@@ -58,11 +57,6 @@ using namespace codedexposure;
 using namespace codedexposure::gst;
 using camera::CameraState;
 
-struct _GstCodedExposureCameraSrc {
-  GstBin parent;
-  CameraState *state;
-};
-
 G_DEFINE_TYPE_WITH_CODE (GstCodedExposureCameraSrc,
     gst_coded_exposure_camera_src, GST_TYPE_BIN,
     GST_DEBUG_CATEGORY_INIT (camerasrc_debug, "codedexposure-camerasrc", 0,
@@ -70,273 +64,180 @@ G_DEFINE_TYPE_WITH_CODE (GstCodedExposureCameraSrc,
 GST_ELEMENT_REGISTER_DEFINE (codedexposure_camerasrc, "codedexposure-camerasrc",
     GST_RANK_NONE, GST_TYPE_CODED_EXPOSURE_CAMERA_SRC)
 
-#define GST_TYPE_CODED_EXPOSURE_CAMERA_TRIGGER                                 \
-  (gst_coded_exposure_camera_trigger_get_type ())
-static G_DEFINE_ENUM_TYPE (GstCodedExposureCameraTrigger,
+namespace
+{
+
+G_DEFINE_ENUM_TYPE (GstCodedExposureCameraTrigger,
     gst_coded_exposure_camera_trigger,
     {int (CameraTrigger::none), "As the camera is set up; it runs freely",
         "none"},
     {int (CameraTrigger::dmd), "The DMD triggers the camera", "dmd"},
     {int (CameraTrigger::camera), "The camera triggers the DMD", "camera"})
 
-#define GST_TYPE_CODED_EXPOSURE_TRIGGER_EDGE                                   \
-  (gst_coded_exposure_trigger_edge_get_type ())
-    static G_DEFINE_ENUM_TYPE (GstCodedExposureTriggerEdge,
-        gst_coded_exposure_trigger_edge,
-        {int (TriggerEdge::rising), "Rising edge; output high in the exposure",
-            "rising"},
-        {int (TriggerEdge::falling), "Falling edge; output low in the exposure",
-            "falling"})
+G_DEFINE_ENUM_TYPE (GstCodedExposureTriggerEdge,
+    gst_coded_exposure_trigger_edge,
+    {int (TriggerEdge::rising), "Rising edge; output high in the exposure",
+        "rising"},
+    {int (TriggerEdge::falling), "Falling edge; output low in the exposure",
+        "falling"})
 
-        namespace
+template <typename Member>
+Property<CameraState>
+own (GParamSpec *spec, Member CameraSettings::*place)
 {
+  return setting (spec, &CameraState::settings, place);
+}
 
-  enum {
-    PROP_0,
-    PROP_CAMERA_NAME,
-    PROP_PIXEL_FORMAT,
-    PROP_TRIGGER,
-    PROP_TRIGGER_LINE,
-    PROP_TRIGGER_EDGE,
-    PROP_EXPOSURE_TIME,
-    PROP_FEATURES,
-    PROP_NUM_BUFFERS,
-    PROP_RECONNECT,
-    PROP_RECONNECTS,
+Property<CameraState>
+text (const char *name, const char *nick, const char *blurb,
+    std::string CameraSettings::*place)
+{
+  return own (
+      g_param_spec_string (name, nick, blurb, "", kReadWriteReady), place);
+}
+
+const PropertyTable<CameraState> &
+properties ()
+{
+  static const PropertyTable<CameraState> table = {
+      text ("camera-name", "Camera name",
+          "Camera as \"arv-tool-0.8\" or \"gst-device-monitor-1.0 "
+          "Source/Video\" lists it, or its address; empty: the first one found",
+          &CameraSettings::name),
+      text ("pixel-format", "Pixel format",
+          "Mono8, Mono10, Mono12, Mono16, Mono10Packed, Mono12Packed, Mono10p "
+          "or Mono12p; packed ones are unpacked, without a shift; empty: Mono8 "
+          "or Mono16, as the caps downstream say",
+          &CameraSettings::pixel_format),
+      own (g_param_spec_enum ("trigger", "Trigger", "Which device triggers",
+               gst_coded_exposure_camera_trigger_get_type (),
+               int (CameraTrigger::none), kReadWriteReady),
+          &CameraSettings::trigger),
+      text ("trigger-line", "Trigger line",
+          "Line of the camera to or from the DMD; empty: Line0 with "
+          "trigger=dmd, Line1 with trigger=camera",
+          &CameraSettings::trigger_line),
+      own (g_param_spec_enum ("trigger-edge", "Trigger edge",
+               "Edge of the line at which an exposure starts",
+               gst_coded_exposure_trigger_edge_get_type (),
+               int (TriggerEdge::rising), kReadWriteReady),
+          &CameraSettings::trigger_edge),
+      own (g_param_spec_double ("exposure-time", "Exposure time",
+               "Exposure time in µs; 0: as the camera is set up", 0, 1e8, 0,
+               kReadWriteReady),
+          &CameraSettings::exposure_time),
+      text ("features", "Features",
+          "Assignments of other GenICam features, \"A=1 B=2\", made last",
+          &CameraSettings::features),
+      own (g_param_spec_int ("num-buffers", "Number of buffers",
+               "Frames until EOS, those before and after a restart together; "
+               "-1: unlimited",
+               -1, G_MAXINT, -1, kReadWriteReady),
+          &CameraSettings::num_buffers),
+      own (g_param_spec_uint ("reconnect", "Reconnect",
+               "Tries in a row, at least a second apart, to restart a camera "
+               "that failed after its first frame; 0: its error ends the "
+               "pipeline",
+               0, G_MAXUINT, 0, kReadWriteReady),
+          &CameraSettings::reconnect),
+      reading<CameraState> (
+          g_param_spec_uint ("reconnects", "Reconnects",
+              "Times that the camera came back, in this run or the last one", 0,
+              G_MAXUINT, 0, kReadOnly),
+          &CameraState::reconnects),
   };
+  return table;
+}
 
-  GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE ("src",
-      GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
-
-  std::string text_of (const GValue *value)
-  {
-    const gchar *text = g_value_get_string (value);
-    return text ? text : "";
+/* What can be known before there is a camera. */
+bool
+check (GstCodedExposureCameraSrc *self)
+{
+  if (!self->state->source) {
+    GST_ELEMENT_ERROR (self, CORE, MISSING_PLUGIN,
+        ("The GStreamer element aravissrc is not installed. It is in "
+         "Debian's package libaravis-0.8-0."),
+        (nullptr));
+    return false;
   }
+  const Result<void> good = check_settings (camera::settings_of (self));
+  if (!good)
+    GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
+        ("%s", good.error ().message.c_str ()), (nullptr));
+  return good.ok ();
+}
 
-  void set_property (
-      GObject * object, guint id, const GValue *value, GParamSpec *pspec)
+bool
+begin_run (GstCodedExposureCameraSrc *self)
+{
+  CameraState &st = *self->state;
+  st.stream = camera::Stream ();
   {
-    auto *self = GST_CODED_EXPOSURE_CAMERA_SRC (object);
     const ObjectLock lock (self);
-    if (!may_set (self, pspec))
-      return;
-    CameraSettings &settings = self->state->settings;
-    switch (id) {
-    case PROP_CAMERA_NAME:
-      settings.name = text_of (value);
-      break;
-    case PROP_PIXEL_FORMAT:
-      settings.pixel_format = text_of (value);
-      break;
-    case PROP_TRIGGER:
-      settings.trigger = CameraTrigger (g_value_get_enum (value));
-      break;
-    case PROP_TRIGGER_LINE:
-      settings.trigger_line = text_of (value);
-      break;
-    case PROP_TRIGGER_EDGE:
-      settings.trigger_edge = TriggerEdge (g_value_get_enum (value));
-      break;
-    case PROP_EXPOSURE_TIME:
-      settings.exposure_time = g_value_get_double (value);
-      break;
-    case PROP_FEATURES:
-      settings.features = text_of (value);
-      break;
-    case PROP_NUM_BUFFERS:
-      settings.num_buffers = g_value_get_int (value);
-      break;
-    case PROP_RECONNECT:
-      settings.reconnect = g_value_get_uint (value);
-      break;
-    default:
-      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-    }
+    st.reconnects = 0;
   }
+  camera::begin_watch (self);
+  return camera::set_up_source (self);
+}
 
-  void get_property (
-      GObject * object, guint id, GValue * value, GParamSpec * pspec)
-  {
-    auto *self = GST_CODED_EXPOSURE_CAMERA_SRC (object);
-    const ObjectLock lock (self);
-    const CameraSettings &settings = self->state->settings;
-    switch (id) {
-    case PROP_CAMERA_NAME:
-      return g_value_set_string (value, settings.name.c_str ());
-    case PROP_PIXEL_FORMAT:
-      return g_value_set_string (value, settings.pixel_format.c_str ());
-    case PROP_TRIGGER:
-      return g_value_set_enum (value, int (settings.trigger));
-    case PROP_TRIGGER_LINE:
-      return g_value_set_string (value, settings.trigger_line.c_str ());
-    case PROP_TRIGGER_EDGE:
-      return g_value_set_enum (value, int (settings.trigger_edge));
-    case PROP_EXPOSURE_TIME:
-      return g_value_set_double (value, settings.exposure_time);
-    case PROP_FEATURES:
-      return g_value_set_string (value, settings.features.c_str ());
-    case PROP_NUM_BUFFERS:
-      return g_value_set_int (value, settings.num_buffers);
-    case PROP_RECONNECT:
-      return g_value_set_uint (value, settings.reconnect);
-    case PROP_RECONNECTS:
-      return g_value_set_uint (value, self->state->reconnects);
-    default:
-      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-    }
-  }
+GstStateChangeReturn
+change_state (GstElement *element, GstStateChange transition)
+{
+  auto *self = GST_CODED_EXPOSURE_CAMERA_SRC (element);
+  if (transition == GST_STATE_CHANGE_NULL_TO_READY && !check (self))
+    return GST_STATE_CHANGE_FAILURE;
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED && !begin_run (self))
+    return GST_STATE_CHANGE_FAILURE;
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY)
+    camera::end_watch (self);
+  const GstStateChangeReturn changed =
+      GST_ELEMENT_CLASS (gst_coded_exposure_camera_src_parent_class)
+          ->change_state (element, transition);
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED &&
+      changed == GST_STATE_CHANGE_FAILURE)
+    camera::end_watch (self);
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY)
+    self->state->stream = camera::Stream ();
+  return changed;
+}
 
-  void install_properties (GObjectClass * klass)
-  {
-    klass->set_property = set_property;
-    klass->get_property = get_property;
-    constexpr auto kReady = GParamFlags (
-        G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY);
-    const auto install = [klass] (guint id, GParamSpec *pspec) {
-      g_object_class_install_property (klass, id, pspec);
-    };
-    install (PROP_CAMERA_NAME,
-        g_param_spec_string ("camera-name", "Camera name",
-            "Camera as \"arv-tool-0.8\" or \"gst-device-monitor-1.0 "
-            "Source/Video\" lists it, or its address; empty: the first one "
-            "found",
-            "", kReady));
-    install (
-        PROP_PIXEL_FORMAT, g_param_spec_string ("pixel-format", "Pixel format",
-                               "Mono8, Mono10, Mono12, Mono16, Mono10Packed, "
-                               "Mono12Packed, Mono10p "
-                               "or Mono12p; packed ones are unpacked, without "
-                               "a shift; empty: Mono8 "
-                               "or Mono16, as the caps downstream say",
-                               "", kReady));
-    install (PROP_TRIGGER,
-        g_param_spec_enum ("trigger", "Trigger", "Which device triggers",
-            GST_TYPE_CODED_EXPOSURE_CAMERA_TRIGGER, int (CameraTrigger::none),
-            kReady));
-    install (PROP_TRIGGER_LINE,
-        g_param_spec_string ("trigger-line", "Trigger line",
-            "Line of the camera to or from the DMD; empty: Line0 with "
-            "trigger=dmd, Line1 with trigger=camera",
-            "", kReady));
-    install (
-        PROP_TRIGGER_EDGE, g_param_spec_enum ("trigger-edge", "Trigger edge",
-                               "Edge of the line at which an exposure starts",
-                               GST_TYPE_CODED_EXPOSURE_TRIGGER_EDGE,
-                               int (TriggerEdge::rising), kReady));
-    install (PROP_EXPOSURE_TIME,
-        g_param_spec_double ("exposure-time", "Exposure time",
-            "Exposure time in µs; 0: as the camera is set up", 0, 1e8, 0,
-            kReady));
-    install (PROP_FEATURES,
-        g_param_spec_string ("features", "Features",
-            "Assignments of other GenICam features, \"A=1 B=2\", made last", "",
-            kReady));
-    install (PROP_NUM_BUFFERS,
-        g_param_spec_int ("num-buffers", "Number of buffers",
-            "Frames until EOS, those before and after a restart together; -1: "
-            "unlimited",
-            -1, G_MAXINT, -1, kReady));
-    install (PROP_RECONNECT,
-        g_param_spec_uint ("reconnect", "Reconnect",
-            "Tries in a row, at least a second apart, to restart a camera that "
-            "failed after its first frame; 0: its error ends the pipeline",
-            0, G_MAXUINT, 0, kReady));
-    install (PROP_RECONNECTS,
-        g_param_spec_uint ("reconnects", "Reconnects",
-            "Times that the camera came back, in this run or the last one", 0,
-            G_MAXUINT, 0,
-            GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
-  }
+void
+handle_message (GstBin *bin, GstMessage *message)
+{
+  if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_ERROR &&
+      camera::take_failure (GST_CODED_EXPOSURE_CAMERA_SRC (bin), message))
+    return gst_message_unref (message);
+  GST_BIN_CLASS (gst_coded_exposure_camera_src_parent_class)
+      ->handle_message (bin, message);
+}
 
-  /* What can be known before there is a camera. */
-  bool check (GstCodedExposureCameraSrc * self)
-  {
-    if (!self->state->source) {
-      GST_ELEMENT_ERROR (self, CORE, MISSING_PLUGIN,
-          ("The GStreamer element aravissrc is not installed. It is in "
-           "Debian's "
-           "package libaravis-0.8-0."),
-          (nullptr));
-      return false;
-    }
-    Result<void> good;
-    {
-      const ObjectLock lock (self);
-      good = check_settings (self->state->settings);
-    }
-    if (!good)
-      GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
-          ("%s", good.error ().message.c_str ()), (nullptr));
-    return good.ok ();
-  }
+/* Children get no clock: with one, aravissrc delays each frame until the time
+ * that its camera has stamped on it. */
+gboolean
+set_clock (GstElement *element, GstClock *clock)
+{
+  auto *base = GST_ELEMENT_CLASS (g_type_class_peek (GST_TYPE_ELEMENT));
+  return base->set_clock (element, clock);
+}
 
-  bool begin_run (GstCodedExposureCameraSrc * self)
-  {
-    CameraState &st = *self->state;
-    st.stream = camera::Stream ();
-    {
-      const ObjectLock lock (self);
-      st.reconnects = 0;
-    }
-    camera::begin_watch (self);
-    return camera::set_up_source (self);
-  }
-
-  GstStateChangeReturn change_state (
-      GstElement * element, GstStateChange transition)
-  {
-    auto *self = GST_CODED_EXPOSURE_CAMERA_SRC (element);
-    if (transition == GST_STATE_CHANGE_NULL_TO_READY && !check (self))
-      return GST_STATE_CHANGE_FAILURE;
-    if (transition == GST_STATE_CHANGE_READY_TO_PAUSED && !begin_run (self))
-      return GST_STATE_CHANGE_FAILURE;
-    if (transition == GST_STATE_CHANGE_PAUSED_TO_READY)
-      camera::end_watch (self);
-    const GstStateChangeReturn changed =
-        GST_ELEMENT_CLASS (gst_coded_exposure_camera_src_parent_class)
-            ->change_state (element, transition);
-    if (transition == GST_STATE_CHANGE_READY_TO_PAUSED &&
-        changed == GST_STATE_CHANGE_FAILURE)
-      camera::end_watch (self);
-    if (transition == GST_STATE_CHANGE_PAUSED_TO_READY)
-      self->state->stream = camera::Stream ();
-    return changed;
-  }
-
-  void handle_message (GstBin * bin, GstMessage * message)
-  {
-    if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_ERROR &&
-        camera::take_failure (GST_CODED_EXPOSURE_CAMERA_SRC (bin), message))
-      return gst_message_unref (message);
-    GST_BIN_CLASS (gst_coded_exposure_camera_src_parent_class)
-        ->handle_message (bin, message);
-  }
-
-  /* Children get no clock: with one, aravissrc delays each frame until the time
-   * that its camera has stamped on it. */
-  gboolean set_clock (GstElement * element, GstClock * clock)
-  {
-    auto *base = GST_ELEMENT_CLASS (g_type_class_peek (GST_TYPE_ELEMENT));
-    return base->set_clock (element, clock);
-  }
-
-  void finalize (GObject * object)
-  {
-    delete GST_CODED_EXPOSURE_CAMERA_SRC (object)->state;
-    G_OBJECT_CLASS (gst_coded_exposure_camera_src_parent_class)
-        ->finalize (object);
-  }
+void
+finalize (GObject *object)
+{
+  delete GST_CODED_EXPOSURE_CAMERA_SRC (object)->state;
+  G_OBJECT_CLASS (gst_coded_exposure_camera_src_parent_class)
+      ->finalize (object);
+}
 
 } // namespace
 
 namespace codedexposure::gst::camera
 {
 
-CameraState &
-state (GstCodedExposureCameraSrc *self)
+CameraSettings
+settings_of (GstCodedExposureCameraSrc *self)
 {
-  return *self->state;
+  const ObjectLock lock (self);
+  return self->state->settings;
 }
 
 /* The name comes first: it makes aravissrc look for the camera, and forget the
@@ -345,11 +246,7 @@ bool
 set_up_source (GstCodedExposureCameraSrc *self)
 {
   CameraState &st = *self->state;
-  CameraSettings settings;
-  {
-    const ObjectLock lock (self);
-    settings = st.settings;
-  }
+  const CameraSettings settings = settings_of (self);
   st.stream.first = true;
   const std::string &name = settings.name;
   g_object_set (st.source, "camera-name",
@@ -379,21 +276,17 @@ set_up_source (GstCodedExposureCameraSrc *self)
 static void
 gst_coded_exposure_camera_src_class_init (GstCodedExposureCameraSrcClass *klass)
 {
-  auto *object_class = G_OBJECT_CLASS (klass);
   auto *element_class = GST_ELEMENT_CLASS (klass);
 
-  object_class->finalize = finalize;
-  install_properties (object_class);
-  for (const GType type : {GST_TYPE_CODED_EXPOSURE_CAMERA_TRIGGER,
-           GST_TYPE_CODED_EXPOSURE_TRIGGER_EDGE})
+  G_OBJECT_CLASS (klass)->finalize = finalize;
+  install_properties<&properties, &camera::state> (G_OBJECT_CLASS (klass));
+  for (const GType type : {gst_coded_exposure_camera_trigger_get_type (),
+           gst_coded_exposure_trigger_edge_get_type ()})
     gst_type_mark_as_plugin_api (type, GstPluginAPIFlags (0));
-
-  gst_element_class_set_static_metadata (element_class, "GenICam camera",
-      "Source/Video/Hardware",
+  describe_element (element_class, "GenICam camera", "Source/Video/Hardware",
       "Frames of a GenICam camera: aravissrc with trigger set-up, unpacked "
       "pixels, memory of its own and reconnection",
-      "The gst-codedexposure authors");
-  gst_element_class_add_static_pad_template (element_class, &src_template);
+      false);
   element_class->change_state = GST_DEBUG_FUNCPTR (change_state);
   element_class->set_clock = GST_DEBUG_FUNCPTR (set_clock);
   GST_BIN_CLASS (klass)->handle_message = GST_DEBUG_FUNCPTR (handle_message);

@@ -2,7 +2,17 @@
 /* codedexposure-camerasrc: frames of a GenICam camera. */
 #pragma once
 
+#include <condition_variable>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+
 #include <gst/gst.h>
+
+#include "common/owned_frames.h"
+#include "common/raii.h"
+#include "settings.h"
 
 G_BEGIN_DECLS
 
@@ -12,5 +22,86 @@ G_DECLARE_FINAL_TYPE (GstCodedExposureCameraSrc, gst_coded_exposure_camera_src,
     GST, CODED_EXPOSURE_CAMERA_SRC, GstBin)
 
 GST_ELEMENT_REGISTER_DECLARE (codedexposure_camerasrc);
+/* It lists GenICam cameras. */
+GST_DEVICE_PROVIDER_REGISTER_DECLARE (codedexposure_cameraprovider);
 
 G_END_DECLS
+
+GST_DEBUG_CATEGORY_EXTERN (camerasrc_debug);
+
+namespace codedexposure::gst::camera
+{
+
+/** One run, from READY to PAUSED and back. Streaming thread of aravissrc. */
+struct Stream {
+  bool started = false; ///< STREAM_START was sent
+  CapsPtr caps;
+  std::optional<GstSegment> segment;
+  std::optional<OwnedFrames> frames;
+  bool first = true;       ///< the next frame is the first since a start
+  GstClockTime origin = 0; ///< running time at which the camera's clock began
+  GstClockTime last = GST_CLOCK_TIME_NONE; ///< arrival of the newest frame
+};
+
+struct CameraState {
+  /* Object lock. */
+  CameraSettings settings;
+  guint reconnects = 0; ///< times that the camera came back in this run
+
+  /* Set once. Null where aravissrc is not installed. */
+  GstElement *source = nullptr;
+  GstElement *filter = nullptr; ///< fixes the pixel format
+
+  Stream stream;
+
+  /** Protects what follows; taken after the object lock. Never held while
+   * pushing, querying or posting. */
+  std::mutex lock;
+  std::condition_variable_any changed;
+  bool watching = false; ///< errors may be ours to handle
+  bool seen = false;     ///< a frame came in this run
+  bool away = false;     ///< the camera failed, and no frame came since
+  bool failed = false;   ///< so did the last try
+  guint tries = 0;       ///< since it went away
+  std::string why;       ///< the last try failed
+  int frames_left = -1;  ///< until EOS; -1: no end
+  std::jthread restarts; ///< while the camera is away
+};
+
+} // namespace codedexposure::gst::camera
+
+struct _GstCodedExposureCameraSrc {
+  GstBin parent;
+  codedexposure::gst::camera::CameraState *state;
+};
+
+namespace codedexposure::gst::camera
+{
+
+inline CameraState &
+state (gpointer element)
+{
+  return *GST_CODED_EXPOSURE_CAMERA_SRC (element)->state;
+}
+/** A copy, by the object lock. */
+CameraSettings settings_of (GstCodedExposureCameraSrc *self);
+
+/** Sets all properties of aravissrc, which opens the camera. False where that
+ * fails; aravissrc has posted an error then. */
+bool set_up_source (GstCodedExposureCameraSrc *self);
+
+/** Sees every frame and event that aravissrc pushes. */
+GstPadProbeReturn take_item (GstPad *pad, GstPadProbeInfo *info, gpointer self);
+
+/* A camera that goes away. */
+void begin_watch (GstCodedExposureCameraSrc *self);
+/** Ends all tries; returns when nothing is done to aravissrc any more. */
+void end_watch (GstCodedExposureCameraSrc *self);
+/** Whether the error @p message of a child is handled by a restart. */
+bool take_failure (GstCodedExposureCameraSrc *self, GstMessage *message);
+/** Whether the camera is away. */
+bool is_away (GstCodedExposureCameraSrc *self);
+/** A frame came. @p silent  time since the one before. */
+void note_frame (GstCodedExposureCameraSrc *self, GstClockTime silent);
+
+} // namespace codedexposure::gst::camera

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure-camerasrc, frame by frame: memory, pixels, time. */
+#include "camerasrc.h"
 #include "common/meta.h"
-#include "state.h"
 
 #define GST_CAT_DEFAULT camerasrc_debug
 
@@ -15,15 +15,11 @@ bool
 take_caps (GstCodedExposureCameraSrc *self, GstCaps *caps)
 {
   Stream &stream = state (self).stream;
-  std::string format;
-  {
-    const ObjectLock lock (self);
-    format = state (self).settings.pixel_format;
-  }
   GstVideoInfo info;
   if (!gst_video_info_from_caps (&info, caps))
     return true; // downstream refuses them
-  Result<OwnedFrames> frames = OwnedFrames::make (info, format);
+  Result<OwnedFrames> frames =
+      OwnedFrames::make (info, settings_of (self).pixel_format);
   if (!frames) {
     GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
         ("%s", frames.error ().message.c_str ()), (nullptr));

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-#include "provider.h"
-
+/* Lists GenICam cameras as devices of codedexposure-camerasrc. */
 #include <arv.h>
 
 #include "camerasrc.h"
@@ -9,6 +8,11 @@
 
 using namespace codedexposure::gst;
 
+#define GST_TYPE_CODED_EXPOSURE_CAMERA_PROVIDER                                \
+  (gst_coded_exposure_camera_provider_get_type ())
+G_DECLARE_FINAL_TYPE (GstCodedExposureCameraProvider,
+    gst_coded_exposure_camera_provider, GST, CODED_EXPOSURE_CAMERA_PROVIDER,
+    GstDeviceProvider)
 struct _GstCodedExposureCameraProvider {
   GstDeviceProvider parent;
 };

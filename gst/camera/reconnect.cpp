@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure-camerasrc and a camera that goes away and comes back. */
-#include "state.h"
+#include "camerasrc.h"
+#include "common/element.h"
 
 #define GST_CAT_DEFAULT camerasrc_debug
 
@@ -39,17 +40,10 @@ is_own_failure (const CameraState &st, GstMessage *message)
 }
 
 void
-post (GstCodedExposureCameraSrc *self, GstStructure *structure)
-{
-  gst_element_post_message (GST_ELEMENT (self),
-      gst_message_new_element (GST_OBJECT (self), structure));
-}
-
-void
 say_lost (GstCodedExposureCameraSrc *self, const std::string &why)
 {
-  post (self, gst_structure_new ("codedexposure/camera-lost", "reason",
-                  G_TYPE_STRING, why.c_str (), nullptr));
+  post_structure (self, gst_structure_new ("codedexposure/camera-lost",
+                            "reason", G_TYPE_STRING, why.c_str (), nullptr));
   GST_ELEMENT_WARNING (self, RESOURCE, READ,
       ("The camera is gone: %s It is restarted until it comes back (property "
        "reconnect).",
@@ -106,11 +100,7 @@ void
 bring_back (GstCodedExposureCameraSrc *self, const std::stop_token &stop)
 {
   CameraState &st = state (self);
-  guint most = 0;
-  {
-    const ObjectLock lock (self);
-    most = st.settings.reconnect;
-  }
+  const guint most = settings_of (self).reconnect;
   for (guint tries = 0; tries < most; tries++) {
     std::unique_lock guard (st.lock);
     if (tries > 0)
@@ -208,8 +198,9 @@ note_frame (GstCodedExposureCameraSrc *self, GstClockTime silent)
     const ObjectLock lock (self);
     st.reconnects++;
   }
-  post (self, gst_structure_new ("codedexposure/camera-back", "silent",
-                  G_TYPE_UINT64, silent, "tries", G_TYPE_UINT, tries, nullptr));
+  post_structure (
+      self, gst_structure_new ("codedexposure/camera-back", "silent",
+                G_TYPE_UINT64, silent, "tries", G_TYPE_UINT, tries, nullptr));
 }
 
 } // namespace codedexposure::gst::camera

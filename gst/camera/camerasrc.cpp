@@ -56,6 +56,9 @@ GST_DEBUG_CATEGORY (camerasrc_debug);
 using namespace codedexposure;
 using namespace codedexposure::gst;
 using camera::CameraState;
+using camera::Edge;
+using camera::Settings;
+using camera::Trigger;
 
 G_DEFINE_TYPE_WITH_CODE (GstCodedExposureCameraSrc,
     gst_coded_exposure_camera_src, GST_TYPE_BIN,
@@ -69,28 +72,26 @@ namespace
 
 G_DEFINE_ENUM_TYPE (GstCodedExposureCameraTrigger,
     gst_coded_exposure_camera_trigger,
-    {int (CameraTrigger::none), "As the camera is set up; it runs freely",
-        "none"},
-    {int (CameraTrigger::dmd), "The DMD triggers the camera", "dmd"},
-    {int (CameraTrigger::camera), "The camera triggers the DMD", "camera"})
+    {int (Trigger::none), "As the camera is set up; it runs freely", "none"},
+    {int (Trigger::dmd), "The DMD triggers the camera", "dmd"},
+    {int (Trigger::camera), "The camera triggers the DMD", "camera"})
 
 G_DEFINE_ENUM_TYPE (GstCodedExposureTriggerEdge,
     gst_coded_exposure_trigger_edge,
-    {int (TriggerEdge::rising), "Rising edge; output high in the exposure",
-        "rising"},
-    {int (TriggerEdge::falling), "Falling edge; output low in the exposure",
+    {int (Edge::rising), "Rising edge; output high in the exposure", "rising"},
+    {int (Edge::falling), "Falling edge; output low in the exposure",
         "falling"})
 
 template <typename Member>
 Property<CameraState>
-own (GParamSpec *spec, Member CameraSettings::*place)
+own (GParamSpec *spec, Member Settings::*place)
 {
   return setting (spec, &CameraState::settings, place);
 }
 
 Property<CameraState>
 text (const char *name, const char *nick, const char *blurb,
-    std::string CameraSettings::*place)
+    std::string Settings::*place)
 {
   return own (
       g_param_spec_string (name, nick, blurb, "", kReadWriteReady), place);
@@ -103,43 +104,43 @@ properties ()
       text ("camera-name", "Camera name",
           "Camera as \"arv-tool-0.8\" or \"gst-device-monitor-1.0 "
           "Source/Video\" lists it, or its address; empty: the first one found",
-          &CameraSettings::name),
+          &Settings::name),
       text ("pixel-format", "Pixel format",
           "Mono8, Mono10, Mono12, Mono16, Mono10Packed, Mono12Packed, Mono10p "
           "or Mono12p; packed ones are unpacked, without a shift; empty: Mono8 "
           "or Mono16, as the caps downstream say",
-          &CameraSettings::pixel_format),
+          &Settings::pixel_format),
       own (g_param_spec_enum ("trigger", "Trigger", "Which device triggers",
                gst_coded_exposure_camera_trigger_get_type (),
-               int (CameraTrigger::none), kReadWriteReady),
-          &CameraSettings::trigger),
+               int (Trigger::none), kReadWriteReady),
+          &Settings::trigger),
       text ("trigger-line", "Trigger line",
           "Line of the camera to or from the DMD; empty: Line0 with "
           "trigger=dmd, Line1 with trigger=camera",
-          &CameraSettings::trigger_line),
+          &Settings::trigger_line),
       own (g_param_spec_enum ("trigger-edge", "Trigger edge",
                "Edge of the line at which an exposure starts",
-               gst_coded_exposure_trigger_edge_get_type (),
-               int (TriggerEdge::rising), kReadWriteReady),
-          &CameraSettings::trigger_edge),
+               gst_coded_exposure_trigger_edge_get_type (), int (Edge::rising),
+               kReadWriteReady),
+          &Settings::trigger_edge),
       own (g_param_spec_double ("exposure-time", "Exposure time",
                "Exposure time in µs; 0: as the camera is set up", 0, 1e8, 0,
                kReadWriteReady),
-          &CameraSettings::exposure_time),
+          &Settings::exposure_time),
       text ("features", "Features",
           "Assignments of other GenICam features, \"A=1 B=2\", made last",
-          &CameraSettings::features),
+          &Settings::features),
       own (g_param_spec_int ("num-buffers", "Number of buffers",
                "Frames until EOS, those before and after a restart together; "
                "-1: unlimited",
                -1, G_MAXINT, -1, kReadWriteReady),
-          &CameraSettings::num_buffers),
+          &Settings::num_buffers),
       own (g_param_spec_uint ("reconnect", "Reconnect",
                "Tries in a row, at least a second apart, to restart a camera "
                "that failed after its first frame; 0: its error ends the "
                "pipeline",
                0, G_MAXUINT, 0, kReadWriteReady),
-          &CameraSettings::reconnect),
+          &Settings::reconnect),
       reading<CameraState> (
           g_param_spec_uint ("reconnects", "Reconnects",
               "Times that the camera came back, in this run or the last one", 0,
@@ -233,7 +234,7 @@ finalize (GObject *object)
 namespace codedexposure::gst::camera
 {
 
-CameraSettings
+Settings
 settings_of (GstCodedExposureCameraSrc *self)
 {
   const ObjectLock lock (self);
@@ -246,7 +247,7 @@ bool
 set_up_source (GstCodedExposureCameraSrc *self)
 {
   CameraState &st = *self->state;
-  const CameraSettings settings = settings_of (self);
+  const Settings settings = settings_of (self);
   st.stream.first = true;
   const std::string &name = settings.name;
   g_object_set (st.source, "camera-name",

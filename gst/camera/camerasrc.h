@@ -45,7 +45,7 @@ struct Stream {
 
 struct CameraState {
   /* Object lock. */
-  CameraSettings settings;
+  Settings settings;
   guint reconnects = 0; ///< times that the camera came back in this run
 
   /* Set once. Null where aravissrc is not installed. */
@@ -84,7 +84,7 @@ state (gpointer element)
   return *GST_CODED_EXPOSURE_CAMERA_SRC (element)->state;
 }
 /** A copy, by the object lock. */
-CameraSettings settings_of (GstCodedExposureCameraSrc *self);
+Settings settings_of (GstCodedExposureCameraSrc *self);
 
 /** Sets all properties of aravissrc, which opens the camera. False where that
  * fails; aravissrc has posted an error then. */

@@ -6,24 +6,24 @@
 #include "base/text.h"
 #include "common/owned_frames.h"
 
-namespace codedexposure::gst
+namespace codedexposure::gst::camera
 {
 
 namespace
 {
 
 std::string
-line_of (const CameraSettings &settings)
+line_of (const Settings &settings)
 {
   if (!settings.trigger_line.empty ())
     return settings.trigger_line;
-  return settings.trigger == CameraTrigger::dmd ? "Line0" : "Line1";
+  return settings.trigger == Trigger::dmd ? "Line0" : "Line1";
 }
 
 } // namespace
 
 Result<void>
-check_settings (const CameraSettings &settings)
+check_settings (const Settings &settings)
 {
   if (!settings.pixel_format.empty ())
     if (const auto format = camera_format (settings.pixel_format); !format)
@@ -32,8 +32,7 @@ check_settings (const CameraSettings &settings)
     return Error{"trigger-line=\"" + settings.trigger_line +
                  "\" is no line of a camera: it is one word, such as Line0. "
                  "\"arv-tool-0.8 features\" lists those of the camera"};
-  if (!settings.trigger_line.empty () &&
-      settings.trigger == CameraTrigger::none)
+  if (!settings.trigger_line.empty () && settings.trigger == Trigger::none)
     return Error{"trigger-line=" + settings.trigger_line +
                  " has no effect with trigger=none: set trigger=dmd where the "
                  "DMD triggers the camera, trigger=camera where the camera "
@@ -48,15 +47,15 @@ check_settings (const CameraSettings &settings)
 }
 
 std::string
-feature_assignments (const CameraSettings &settings)
+feature_assignments (const Settings &settings)
 {
-  const bool falling = settings.trigger_edge == TriggerEdge::falling;
+  const bool falling = settings.trigger_edge == Edge::falling;
   std::string text;
-  if (settings.trigger == CameraTrigger::dmd)
+  if (settings.trigger == Trigger::dmd)
     text = "TriggerSelector=FrameStart TriggerSource=" + line_of (settings) +
            " TriggerActivation=" + (falling ? "FallingEdge" : "RisingEdge") +
            " TriggerMode=On";
-  else if (settings.trigger == CameraTrigger::camera)
+  else if (settings.trigger == Trigger::camera)
     text = "TriggerSelector=FrameStart TriggerMode=Off LineSelector=" +
            line_of (settings) +
            " LineMode=Output LineSource=ExposureActive LineInverter=" +
@@ -79,4 +78,4 @@ caps_of_format (const std::string &pixel_format)
                                             : "GRAY16_LE");
 }
 
-} // namespace codedexposure::gst
+} // namespace codedexposure::gst::camera

@@ -6,19 +6,19 @@
 
 #include "base/result.h"
 
-namespace codedexposure::gst
+namespace codedexposure::gst::camera
 {
 
 /** Which device starts an exposure. */
-enum class CameraTrigger { none, dmd, camera };
-enum class TriggerEdge { rising, falling };
+enum class Trigger { none, dmd, camera };
+enum class Edge { rising, falling };
 
-struct CameraSettings {
+struct Settings {
   std::string name;         ///< as Aravis lists it; empty: the first one
   std::string pixel_format; ///< GenICam name; empty: as the caps say
-  CameraTrigger trigger = CameraTrigger::none;
+  Trigger trigger = Trigger::none;
   std::string trigger_line; ///< empty: Line0 for an input, Line1 for an output
-  TriggerEdge trigger_edge = TriggerEdge::rising;
+  Edge trigger_edge = Edge::rising;
   double exposure_time = 0; ///< microseconds; 0: as the camera has it
   std::string features;     ///< assignments beyond these
   int num_buffers = -1;     ///< frames until EOS; -1: no end
@@ -26,7 +26,7 @@ struct CameraSettings {
 };
 
 /** An error that names the value, the rule and the remedy. */
-Result<void> check_settings (const CameraSettings &settings);
+Result<void> check_settings (const Settings &settings);
 
 /**
  * Assignments in the order that a camera needs: a selector before what it
@@ -35,9 +35,9 @@ Result<void> check_settings (const CameraSettings &settings);
  *
  * @p settings  checked.
  */
-std::string feature_assignments (const CameraSettings &settings);
+std::string feature_assignments (const Settings &settings);
 
 /** Caps of the frames that come with a pixel format. */
 std::string caps_of_format (const std::string &pixel_format);
 
-} // namespace codedexposure::gst
+} // namespace codedexposure::gst::camera

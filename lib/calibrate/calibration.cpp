@@ -6,6 +6,7 @@
 #include <limits>
 #include <new>
 
+#include "base/try.h"
 #include "calibrate/displacement_fit.h"
 #include "calibrate/gray_fit.h"
 #include "calibrate/phase_fit.h"
@@ -29,41 +30,6 @@ constexpr double kDisplaced = 1.3;
 constexpr int kRounds = 12;
 /* Mirrors; shorter steps end the fit. */
 constexpr double kConverged = 1e-7;
-
-} // namespace
-
-struct Calibration::State {
-  struct Slot {
-    Pattern pattern;
-    Image<float> sum;
-    int frames = 0;
-  };
-  Extent camera, mirrors;
-  std::vector<Slot> slots;
-  Image<std::uint8_t> saturated;
-
-  Slot *find (const Pattern &pattern)
-  {
-    const auto at = std::find_if (slots.begin (), slots.end (),
-        [&] (const Slot &s) { return s.pattern == pattern; });
-    return at == slots.end () ? nullptr : &*at;
-  }
-  template <typename Pixel>
-  Result<void> add (
-      const Pattern &pattern, ImageView<const Pixel> frame, int largest);
-
-  Image<float> mean (const Slot &slot) const;
-  const Slot *find (Pattern::Kind kind) const;
-  std::optional<GrayCode> gray_code (Axis axis) const;
-  std::vector<const Slot *> gratings (Axis axis) const;
-  Result<Image<std::uint8_t>> usable_pixels (CalibrationResult &result) const;
-  Result<Mapping> coarse_mapping (
-      ImageView<const std::uint8_t> usable, bool affine) const;
-  Result<CalibrationResult> solve (const CalibrationOptions &options) const;
-};
-
-namespace
-{
 
 /* Every pixel is the mean of its kSmooth x kSmooth square. */
 Image<float>
@@ -129,12 +95,9 @@ report (const PhaseFit &fit, CalibrationResult &result)
   const double magnification = fit.mapping.pose ().magnification;
   result.psf_sigma =
       magnification * std::sqrt (0.5 * (fit.blur_x + fit.blur_y));
-  auto mapping =
+  ASSIGN_OR_RETURN (result.mapping,
       Mapping::make ({fit.camera, fit.mirrors, fit.mapping.homography (),
-          fit.covariance, fit.mapping.displacement (), result.psf_sigma});
-  if (!mapping)
-    return mapping.error ();
-  result.mapping = std::move (*mapping);
+          fit.covariance, fit.mapping.displacement (), result.psf_sigma}));
   result.noise_floor = fit.noise.floor;
   result.noise_slope = fit.noise.slope;
   result.misfit =
@@ -193,11 +156,8 @@ displace (PhaseFit &fit, int node_distance)
   for (int round = 0; round < 3; round++) {
     add_displacement (grid, grid.x, fit.blocks_x, fit.block_size, fit.camera);
     add_displacement (grid, grid.y, fit.blocks_y, fit.block_size, fit.camera);
-    auto made = Mapping::make (
-        {fit.camera, fit.mirrors, fit.mapping.homography (), {}, grid});
-    if (!made)
-      return made.error ();
-    fit.mapping = std::move (*made);
+    ASSIGN_OR_RETURN (fit.mapping, Mapping::make ({fit.camera, fit.mirrors,
+                                       fit.mapping.homography (), {}, grid}));
     if (!fit.round (0))
       return Error{"the gratings do not determine a displacement grid"};
   }
@@ -210,68 +170,69 @@ Result<Calibration>
 Calibration::make (
     Extent camera, Extent mirrors, std::span<const Pattern> patterns)
 try {
-  if (const auto checked = Mapping::make ({camera, mirrors}); !checked)
-    return checked.error ();
+  RETURN_IF_ERROR (Mapping::make ({camera, mirrors}));
   if (std::min (camera.width, camera.height) < 32)
     return Error{"a calibration needs frames of 32x32 pixels or more, not " +
                  std::to_string (camera.width) + "x" +
                  std::to_string (camera.height)};
-  auto state = std::make_unique<State> ();
-  state->camera = camera;
-  state->mirrors = mirrors;
-  state->saturated = Image<std::uint8_t> (camera.width, camera.height);
+  Calibration made (camera, mirrors);
   for (const Pattern &pattern : patterns) {
-    if (state->find (pattern) != nullptr)
+    if (made.find (pattern) != nullptr)
       return Error{"pattern " + pattern.text () +
                    " is listed twice; list each pattern of a calibration once"};
-    state->slots.push_back ({pattern, {}, 0});
+    made.slots_.push_back ({pattern, {}, 0});
   }
   for (const Axis axis : {Axis::x, Axis::y}) {
-    const auto gratings = state->gratings (axis);
+    const auto gratings = made.gratings (axis);
     const bool whole = !gratings.empty () &&
                        int (gratings.size ()) == gratings[0]->pattern.period &&
                        gratings.size () >= 4;
-    if (!whole || !state->gray_code (axis) ||
-        state->find (Pattern::Kind::dark) == nullptr ||
-        state->find (Pattern::Kind::white) == nullptr)
+    if (!whole || !made.gray_code (axis) ||
+        made.find (Pattern::Kind::dark) == nullptr ||
+        made.find (Pattern::Kind::white) == nullptr)
       return Error{"a calibration needs dark, white, the Gray codes of x and y "
                    "with their inverses and gratings of one period, 4 or "
                    "more, at all phases, as calibration_patterns () has them"};
   }
-  return Calibration (std::move (state));
+  return made;
 } catch (const std::bad_alloc &) {
   return out_of_memory ();
 }
 
-Calibration::Calibration (std::unique_ptr<State> state)
-    : state_ (std::move (state))
+Calibration::Calibration (Extent camera, Extent mirrors)
+    : camera_ (camera), mirrors_ (mirrors),
+      saturated_ (camera.width, camera.height)
 {
 }
 
-Calibration::Calibration (Calibration &&) noexcept = default;
-Calibration &Calibration::operator= (Calibration &&) noexcept = default;
-Calibration::~Calibration () = default;
+Calibration::Slot *
+Calibration::find (const Pattern &pattern)
+{
+  const auto at = std::find_if (slots_.begin (), slots_.end (),
+      [&] (const Slot &s) { return s.pattern == pattern; });
+  return at == slots_.end () ? nullptr : &*at;
+}
 
 template <typename Pixel>
 Result<void>
-Calibration::State::add (
+Calibration::add_frame (
     const Pattern &pattern, ImageView<const Pixel> frame, int largest)
 {
   Slot *slot = find (pattern);
   if (slot == nullptr)
     return Error{
         "pattern " + pattern.text () + " is not part of this calibration"};
-  if (frame.width != camera.width || frame.height != camera.height)
+  if (frame.width != camera_.width || frame.height != camera_.height)
     return Error{"a calibration frame has " + std::to_string (frame.width) +
                  "x" + std::to_string (frame.height) + " pixels; " +
-                 std::to_string (camera.width) + "x" +
-                 std::to_string (camera.height) + " are expected"};
+                 std::to_string (camera_.width) + "x" +
+                 std::to_string (camera_.height) + " are expected"};
   if (slot->frames++ == 0)
-    slot->sum = Image<float> (camera.width, camera.height);
+    slot->sum = Image<float> (camera_.width, camera_.height);
   for (int y = 0; y < frame.height; y++) {
     const Pixel *in = frame.row (y);
     float *sum = slot->sum.view ().row (y);
-    std::uint8_t *full = saturated.view ().row (y);
+    std::uint8_t *full = saturated_.view ().row (y);
     for (int x = 0; x < frame.width; x++) {
       sum[x] += float (in[x]);
       full[x] |= in[x] >= largest;
@@ -283,7 +244,7 @@ Calibration::State::add (
 Result<void>
 Calibration::add (const Pattern &pattern, ImageView<const std::uint8_t> frame)
 try {
-  return state_->add (pattern, frame, 255);
+  return add_frame (pattern, frame, 255);
 } catch (const std::bad_alloc &) {
   return out_of_memory ();
 }
@@ -292,7 +253,7 @@ Result<void>
 Calibration::add (
     const Pattern &pattern, ImageView<const std::uint16_t> frame, int bits)
 try {
-  return state_->add (
+  return add_frame (
       pattern, frame, (1 << std::clamp (bits > 0 ? bits : 16, 1, 16)) - 1);
 } catch (const std::bad_alloc &) {
   return out_of_memory ();
@@ -302,39 +263,38 @@ std::vector<Pattern>
 Calibration::missing () const
 {
   std::vector<Pattern> patterns;
-  for (const auto &slot : state_->slots)
+  for (const auto &slot : slots_)
     if (slot.frames == 0)
       patterns.push_back (slot.pattern);
   return patterns;
 }
 
 Image<float>
-Calibration::State::mean (const Slot &slot) const
+Calibration::Slot::mean () const
 {
-  Image<float> mean = slot.sum;
-  const float part = 1.0f / float (slot.frames);
-  for (int y = 0; y < camera.height; y++)
-    for (int x = 0; x < camera.width; x++)
+  Image<float> mean = sum;
+  const float part = 1.0f / float (frames);
+  for (int y = 0; y < mean.height (); y++)
+    for (int x = 0; x < mean.width (); x++)
       mean.at (x, y) *= part;
   return mean;
 }
 
-const Calibration::State::Slot *
-Calibration::State::find (Pattern::Kind kind) const
+const Calibration::Slot *
+Calibration::find (Pattern::Kind kind) const
 {
-  const auto at = std::find_if (slots.begin (), slots.end (),
+  const auto at = std::find_if (slots_.begin (), slots_.end (),
       [kind] (const Slot &s) { return s.pattern.kind == kind; });
-  return at == slots.end () ? nullptr : &*at;
+  return at == slots_.end () ? nullptr : &*at;
 }
 
-/* None if a bit is missing. Bits whose patterns have no frames are empty. */
 std::optional<GrayCode>
-Calibration::State::gray_code (Axis axis) const
+Calibration::gray_code (Axis axis) const
 {
   GrayCode code;
   for (int bit = 0;; bit++) {
     const Slot *pair[2] = {};
-    for (const Slot &slot : slots)
+    for (const Slot &slot : slots_)
       if (slot.pattern.kind == Pattern::Kind::gray &&
           slot.pattern.axis == axis && slot.pattern.bit == bit)
         pair[slot.pattern.inverse ? 1 : 0] = &slot;
@@ -342,21 +302,20 @@ Calibration::State::gray_code (Axis axis) const
       break;
     code.width = pair[0]->pattern.period;
     const bool seen = pair[0]->frames > 0 && pair[1]->frames > 0;
-    code.bits.push_back (
-        seen ? difference (mean (*pair[0]), mean (*pair[1])) : Image<float> ());
+    code.bits.push_back (seen ? difference (pair[0]->mean (), pair[1]->mean ())
+                              : Image<float> ());
   }
-  const int size = axis == Axis::x ? mirrors.width : mirrors.height;
+  const int size = axis == Axis::x ? mirrors_.width : mirrors_.height;
   const bool all =
       !code.bits.empty () && (size - 1) / code.width < 1 << code.bits.size ();
   return all ? std::optional (std::move (code)) : std::nullopt;
 }
 
-/* Sorted by phase. */
-std::vector<const Calibration::State::Slot *>
-Calibration::State::gratings (Axis axis) const
+std::vector<const Calibration::Slot *>
+Calibration::gratings (Axis axis) const
 {
   std::vector<const Slot *> found;
-  for (const Slot &slot : slots)
+  for (const Slot &slot : slots_)
     if (slot.pattern.kind == Pattern::Kind::grating &&
         slot.pattern.axis == axis)
       found.push_back (&slot);
@@ -368,63 +327,59 @@ Calibration::State::gratings (Axis axis) const
 
 /* The pixels that dark and white show to be usable. */
 Result<Image<std::uint8_t>>
-Calibration::State::usable_pixels (CalibrationResult &result) const
+Calibration::usable_pixels (CalibrationResult &result) const
 {
   const float covered =
       std::max (1.0f, kCovered * quantile (result.contrast, 0.9));
-  Image<std::uint8_t> usable (camera.width, camera.height);
-  for (int y = 0; y < camera.height; y++)
-    for (int x = 0; x < camera.width; x++) {
+  Image<std::uint8_t> usable (camera_.width, camera_.height);
+  for (int y = 0; y < camera_.height; y++)
+    for (int x = 0; x < camera_.width; x++) {
       PixelQuality &quality = result.quality.at (x, y);
       quality = result.contrast.at (x, y) < covered ? PixelQuality::uncovered
-                : saturated.at (x, y) != 0          ? PixelQuality::saturated
+                : saturated_.at (x, y) != 0         ? PixelQuality::saturated
                                                     : PixelQuality::good;
       usable.at (x, y) = quality == PixelQuality::good;
     }
   if (result.pixels (PixelQuality::saturated) >
-      std::uint64_t (camera.width) * std::uint64_t (camera.height) / 2)
+      std::uint64_t (camera_.width) * std::uint64_t (camera_.height) / 2)
     return Error{"more than half of the pixels have the largest value; "
                  "reduce light, exposure or gain, and calibrate again"};
   return usable;
 }
 
 Result<Mapping>
-Calibration::State::coarse_mapping (
+Calibration::coarse_mapping (
     ImageView<const std::uint8_t> usable, bool affine) const
 {
-  const auto coarse = fit_gray_codes (
-      *gray_code (Axis::x), *gray_code (Axis::y), usable, affine);
-  if (!coarse)
-    return coarse.error ();
-  return Mapping::from_centred (camera, mirrors, *coarse);
+  ASSIGN_OR_RETURN (
+      const Homography coarse, fit_gray_codes (*gray_code (Axis::x),
+                                   *gray_code (Axis::y), usable, affine));
+  return Mapping::from_centred (camera_, mirrors_, coarse);
 }
 
 Result<CalibrationResult>
-Calibration::State::solve (const CalibrationOptions &options) const
+Calibration::fit (const CalibrationOptions &options) const
 {
-  const Image<float> dark = mean (*find (Pattern::Kind::dark));
-  const Image<float> white = mean (*find (Pattern::Kind::white));
+  const Image<float> dark = find (Pattern::Kind::dark)->mean ();
+  const Image<float> white = find (Pattern::Kind::white)->mean ();
   const Image<float> dark_smooth = smoothed (dark);
   const Image<float> white_smooth = smoothed (white);
-  CalibrationResult result = {Mapping (camera), 0, 0, 0, 0,
-      Image<PixelQuality> (camera.width, camera.height),
+  CalibrationResult result = {Mapping (camera_), 0, 0, 0, 0,
+      Image<PixelQuality> (camera_.width, camera_.height),
       difference (white, dark), {}, {}};
-  const auto usable = usable_pixels (result);
-  if (!usable)
-    return usable.error ();
+  ASSIGN_OR_RETURN (const Image<std::uint8_t> usable, usable_pixels (result));
   const bool affine = options.model == FitModel::affine;
-  const auto start = coarse_mapping (usable->view (), affine);
-  if (!start)
-    return start.error ();
+  ASSIGN_OR_RETURN (
+      const Mapping start, coarse_mapping (usable.view (), affine));
 
-  PhaseFit fit = {camera, mirrors, {}, {}, usable->view (), dark_smooth.view (),
-      white_smooth.view (), *start};
+  PhaseFit fit = {camera_, mirrors_, {}, {}, usable.view (),
+      dark_smooth.view (), white_smooth.view (), start};
   fit.block_size = CalibrationResult::kBlock;
   std::vector<Image<float>> frames;
   fit.frames = std::numeric_limits<int>::max ();
   for (const Axis axis : {Axis::x, Axis::y})
     for (const Slot *slot : gratings (axis)) {
-      frames.push_back (mean (*slot));
+      frames.push_back (slot->mean ());
       fit.frames = std::min (fit.frames, slot->frames);
     }
   const std::size_t of_x = gratings (Axis::x).size ();
@@ -432,16 +387,12 @@ Calibration::State::solve (const CalibrationOptions &options) const
     (i < of_x ? fit.x : fit.y)
         .frames.push_back (std::as_const (frames[i]).view ());
 
-  if (const auto converged = converge (fit, affine ? 6 : 8); !converged)
-    return converged.error ();
+  RETURN_IF_ERROR (converge (fit, affine ? 6 : 8));
   result.residual_x = shifts_of (fit, fit.blocks_x);
   result.residual_y = shifts_of (fit, fit.blocks_y);
   if (options.model == FitModel::displaced)
-    if (const auto displaced = displace (fit, options.node_distance);
-        !displaced)
-      return displaced.error ();
-  if (const auto reported = report (fit, result); !reported)
-    return reported.error ();
+    RETURN_IF_ERROR (displace (fit, options.node_distance));
+  RETURN_IF_ERROR (report (fit, result));
   return result;
 }
 
@@ -456,7 +407,7 @@ try {
     return Error{"the nodes of a displacement grid must be 4 pixels apart or "
                  "more, not " +
                  std::to_string (options.node_distance)};
-  return state_->solve (options);
+  return fit (options);
 } catch (const std::bad_alloc &) {
   return out_of_memory ();
 }

@@ -3,7 +3,7 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -61,6 +61,8 @@ struct CalibrationResult {
   std::uint64_t pixels (PixelQuality what) const;
 };
 
+struct GrayCode;
+
 /**
  * Collects the frames of a calibration run, then solves.
  *
@@ -77,10 +79,6 @@ public:
    * size is out of range. */
   static Result<Calibration> make (
       Extent camera, Extent mirrors, std::span<const Pattern> patterns);
-  Calibration (Calibration &&) noexcept;
-  Calibration &operator= (Calibration &&) noexcept;
-  ~Calibration ();
-
   /** Frame of @p pattern, of the camera's size; several frames of the same
    * pattern are averaged. Error for a pattern of another run. */
   Result<void> add (
@@ -95,9 +93,33 @@ public:
       const CalibrationOptions &options = {}) const;
 
 private:
-  struct State;
-  explicit Calibration (std::unique_ptr<State> state);
-  std::unique_ptr<State> state_;
+  struct Slot {
+    Pattern pattern;
+    Image<float> sum;
+    int frames = 0;
+
+    Image<float> mean () const;
+  };
+
+  Calibration (Extent camera, Extent mirrors);
+  Slot *find (const Pattern &pattern);
+  /** The first one; null if there is none. */
+  const Slot *find (Pattern::Kind kind) const;
+  /** None if a bit is missing. Bits whose patterns have no frames are empty. */
+  std::optional<GrayCode> gray_code (Axis axis) const;
+  /** Sorted by phase. */
+  std::vector<const Slot *> gratings (Axis axis) const;
+  template <typename Pixel>
+  Result<void> add_frame (
+      const Pattern &pattern, ImageView<const Pixel> frame, int largest);
+  Result<Image<std::uint8_t>> usable_pixels (CalibrationResult &result) const;
+  Result<Mapping> coarse_mapping (
+      ImageView<const std::uint8_t> usable, bool affine) const;
+  Result<CalibrationResult> fit (const CalibrationOptions &options) const;
+
+  Extent camera_, mirrors_;
+  std::vector<Slot> slots_;
+  Image<std::uint8_t> saturated_;
 };
 
 } // namespace codedexposure

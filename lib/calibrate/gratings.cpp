@@ -5,6 +5,7 @@
 #include <bit>
 
 #include "base/text.h"
+#include "base/try.h"
 
 namespace codedexposure
 {
@@ -95,10 +96,8 @@ Pattern::parse (std::string_view text)
     pattern.inverse = true;
     numbers.remove_suffix (kInverse.size ());
   }
-  if (const auto parsed = parse_numbers (numbers, pattern); !parsed)
-    return parsed.error ();
-  if (const auto checked = check_numbers (text, pattern); !checked)
-    return checked.error ();
+  RETURN_IF_ERROR (parse_numbers (numbers, pattern));
+  RETURN_IF_ERROR (check_numbers (text, pattern));
   return pattern;
 }
 

@@ -13,6 +13,8 @@
 
 #include <Eigen/Cholesky>
 
+#include "base/try.h"
+
 namespace codedexposure
 {
 
@@ -221,7 +223,7 @@ rest_of (Phasor z, Phasor back)
 } // namespace
 
 struct LiveMoire::State {
-  State (const Mapping &where, const Options &how, int samples)
+  State (const Mapping &where, const LiveMoireOptions &how, int samples)
       : expected (where), options (how), carrier (samples)
   {
     const Extent camera = where.camera ();
@@ -241,7 +243,7 @@ struct LiveMoire::State {
   }
 
   Mapping expected;
-  Options options;
+  LiveMoireOptions options;
   Carrier carrier;
   int blocks_x, blocks_y;
   Phasors x, y;
@@ -460,12 +462,10 @@ LiveMoire::State::combine (const Plane &px, const Plane &py) const
     offset += options.period *
               std::round ((known[3 * d + 2] - offset) / options.period);
   }
-  auto mapping =
-      Mapping::from_centred (expected.camera (), expected.mirrors (), h);
-  if (!mapping)
-    return mapping.error ();
+  ASSIGN_OR_RETURN (const Mapping mapping,
+      Mapping::from_centred (expected.camera (), expected.mirrors (), h));
   return Mapping::make ({expected.camera (), expected.mirrors (),
-      mapping->homography (), covariance});
+      mapping.homography (), covariance});
 }
 
 template <typename Pixel>
@@ -476,21 +476,16 @@ LiveMoire::State::solve (ImageView<const Pixel> frame)
           frame.height == expected.camera ().height);
   collect (frame);
   for (const auto &[phasors, name] : {std::pair (&x, "x"), std::pair (&y, "y")})
-    if (const auto found = find_grating (*phasors, name); !found)
-      return found.error ();
+    RETURN_IF_ERROR (find_grating (*phasors, name));
 
   const Homography known = expected.centred ();
-  const auto fit_x = fit (x, known[0] < 0.0 ? -1.0 : 1.0, false);
-  if (!fit_x)
-    return fit_x.error ();
-  const auto fit_y = fit (y, known[4] < 0.0 ? -1.0 : 1.0, true);
-  if (!fit_y)
-    return fit_y.error ();
-  const auto mapping = combine (*fit_x, *fit_y);
-  if (!mapping)
-    return mapping.error ();
+  ASSIGN_OR_RETURN (
+      const Plane plane_x, fit (x, known[0] < 0.0 ? -1.0 : 1.0, false));
+  ASSIGN_OR_RETURN (
+      const Plane plane_y, fit (y, known[4] < 0.0 ? -1.0 : 1.0, true));
+  ASSIGN_OR_RETURN (Mapping mapping, combine (plane_x, plane_y));
 
-  LiveReading reading = {*mapping, {}, 0.0, 0};
+  LiveReading reading = {std::move (mapping), {}, 0.0, 0};
   const double pixels =
       double (blocks_x) * blocks_y * carrier.period * carrier.period;
   const double largest =
@@ -513,13 +508,7 @@ LiveMoire::State::solve (ImageView<const Pixel> frame)
 }
 
 Result<LiveMoire>
-LiveMoire::make (const Mapping &expected)
-{
-  return make (expected, Options{});
-}
-
-Result<LiveMoire>
-LiveMoire::make (const Mapping &expected, const Options &options)
+LiveMoire::make (const Mapping &expected, const LiveMoireOptions &options)
 try {
   const Pose pose = expected.pose ();
   const double pixels = options.period * pose.magnification;
@@ -566,15 +555,13 @@ LiveMoire::solve (ImageView<const std::uint16_t> frame)
 ImageView<const float>
 LiveMoire::phase (bool y) const
 {
-  const Phasors &phasors = y ? state_->y : state_->x;
-  return phasors.phase.view ();
+  return std::as_const (y ? state_->y : state_->x).phase.view ();
 }
 
 ImageView<const float>
 LiveMoire::amplitude (bool y) const
 {
-  const Phasors &phasors = y ? state_->y : state_->x;
-  return phasors.amplitude.view ();
+  return std::as_const (y ? state_->y : state_->x).amplitude.view ();
 }
 
 } // namespace codedexposure

@@ -28,6 +28,11 @@ struct LiveReading {
   std::uint64_t saturated = 0; ///< pixels at the largest value
 };
 
+struct LiveMoireOptions {
+  int period = 4; ///< mirrors, as in live_grating ()
+  int bits = 0;   ///< significant ones of a pixel; 0: all of its type
+};
+
 /**
  * Sampling moiré of live_grating (): every T-th pixel at T shifts,
  * interpolated, where T is the period of the grating in pixels, rounded (Ri's
@@ -39,18 +44,12 @@ struct LiveReading {
 class LiveMoire
 {
 public:
-  struct Options {
-    int period = 4; ///< mirrors, as in live_grating ()
-    int bits = 0;   ///< significant ones of a pixel; 0: all of its type
-  };
-
   /** @p expected  approximate mapping; a Mapping (Extent) of the camera's size
    *               suffices if both are nearly aligned.
    * Error when a period has less than 3 or more than 64 pixels, or the frame
    * has less than 8 periods. */
-  static Result<LiveMoire> make (const Mapping &expected);
   static Result<LiveMoire> make (
-      const Mapping &expected, const Options &options);
+      const Mapping &expected, const LiveMoireOptions &options = {});
   LiveMoire (LiveMoire &&) noexcept;
   LiveMoire &operator= (LiveMoire &&) noexcept;
   ~LiveMoire ();

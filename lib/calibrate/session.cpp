@@ -7,6 +7,8 @@
 #include <cstdio>
 #include <utility>
 
+#include "base/try.h"
+
 namespace codedexposure
 {
 
@@ -61,12 +63,10 @@ session_stage_text (SessionStage stage)
 Result<void>
 CalibrationSession::expect (const Pattern &grating, double pixels_per_mirror)
 {
-  Result<LiveMoire> live = LiveMoire::make (
-      centred_mapping (options_.camera, options_.mirrors, pixels_per_mirror),
-      {.period = grating.period, .bits = options_.bits});
-  if (!live)
-    return live.error ();
-  live_.emplace (*std::move (live));
+  ASSIGN_OR_RETURN (
+      live_, LiveMoire::make (centred_mapping (options_.camera,
+                                  options_.mirrors, pixels_per_mirror),
+                 {.period = grating.period, .bits = options_.bits}));
   return {};
 }
 
@@ -97,11 +97,8 @@ CalibrationSession::collect (
     const Pattern &pattern, ImageView<const Pixel> frame)
 {
   if (!calibration_) {
-    Result<Calibration> made = Calibration::make (
-        options_.camera, options_.mirrors, options_.patterns);
-    if (!made)
-      return made.error ();
-    calibration_.emplace (*std::move (made));
+    ASSIGN_OR_RETURN (calibration_, Calibration::make (options_.camera,
+                                        options_.mirrors, options_.patterns));
   }
   Result<void> added;
   if constexpr (sizeof (Pixel) == 1)
@@ -134,16 +131,13 @@ CalibrationSession::find_phase (ImageView<const Pixel> frame)
 {
   if (!options_.schedule)
     return Error{"there is no schedule whose phase could be found"};
-  const auto tile = find_tile_phase (frame, *options_.schedule);
-  if (!tile)
-    return tile.error ();
-  confidence_ = std::max (confidence_, tile->confidence);
-  if (tile->confidence < kSure)
+  ASSIGN_OR_RETURN (
+      const TilePhase tile, find_tile_phase (frame, *options_.schedule));
+  confidence_ = std::max (confidence_, tile.confidence);
+  if (tile.confidence < kSure)
     return std::optional<Phase> ();
-  const Result<Schedule> found = moved (*options_.schedule, tile->phase);
-  if (!found)
-    return found.error ();
-  return std::optional (Phase{*tile, *found});
+  ASSIGN_OR_RETURN (Schedule found, moved (*options_.schedule, tile.phase));
+  return std::optional (Phase{tile, std::move (found)});
 }
 
 #define INSTANTIATE(Pixel)                                                     \

@@ -5,18 +5,18 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "base/image.h"
 #include "base/result.h"
+#include "bench/diamond_view.h"
 #include "bench/lens.h"
-#include "schedule/mirror_array.h"
-#include "schedule/schedule.h"
-#include "schedule/still_mask.h"
+#include "schedule/mask_renderer.h"
 
 namespace codedexposure
 {
 
-/** Camera and lens; the zero value is an ideal, aligned, noise-free bench. */
+/** Camera and lens; the default is an ideal, aligned, noise-free bench. */
 struct BenchOptions {
   static constexpr double kMaxPsfSigma = 16.0;
   static constexpr double kMaxFullWell = 1e7;
@@ -30,20 +30,20 @@ struct BenchOptions {
 
   /** Blur between mirrors and pixels, standard deviation in pixels. */
   double psf_sigma = 0.0;
-  /** Electrons that white makes when every slot is open, and the most that a
-   * pixel holds; 0: noise-free. The light does not depend on the code: a pixel
-   * that is open in one slot of N gets an Nth of it. */
+  /** Full-well capacity, and the electrons of white with the mirror on in every
+   * slot; 0: noise-free. The light does not depend on the code: a pixel that is
+   * on in one slot of N gets 1/N of it. */
   double full_well = 0.0;
   double read_noise = 0.0; ///< electrons rms; needs a full well
   int bits = 0; ///< significant bits; 0, or too many: all of the pixel's
-  /** At 1, white makes white when every slot is open; 0: OpticalBench::gain ()
-   */
+  /** At 1, white with the mirror on in every slot makes white; 0: the value of
+   * OpticalBench::gain (). */
   double gain = 0.0;
   std::uint64_t seed = 0;
   Alignment alignment;
-  /** The mirrors stand on their corners, the tile lies on them so, and the
-   * camera's pixels are the tile's (diamond_view.h); none: an orthogonal array.
-   * The lens, alignment and all, sees what lies between two pixels averaged. */
+  /** Layout of the tile on a diamond array, whose pixels are those of the tile
+   * (diamond_view.h); none: an orthogonal array. The lens sees the mean of two
+   * pixels between them. */
   std::optional<MirrorLayout> diamond = {};
 
   bool operator== (const BenchOptions &) const = default;
@@ -58,23 +58,20 @@ struct BenchOptions {
  * is linear in the scene's values, and white is the largest value of the pixel
  * type.
  *
- * With no blur, no misalignment and no noise, a pixel that was on for one
- * slot is, at gain 0 and no leak, the scene's value in that slot exactly.
+ * Without blur, misalignment and noise, a pixel that was on for one slot is, at
+ * gain 0 and no off-state leakage, exactly the scene's value in that slot.
  *
  * Pixels have 8 or 16 bits (host order), the same in all of an exposure.
  */
 class OpticalBench
 {
 public:
-  /** Error when an option is out of its range. */
+  /** Fails if an option is out of its range. */
   static Result<OpticalBench> make (
       int width, int height, const BenchOptions &options);
-  OpticalBench (OpticalBench &&) noexcept;
-  OpticalBench &operator= (OpticalBench &&) noexcept;
-  ~OpticalBench ();
 
   /** Empties the sensor for an exposure with the masks of @p schedule, and
-   * with @p still where expose () is told kStillMask. */
+   * with @p still where expose () gets kStillMask. */
   void begin (const Schedule &schedule,
       std::shared_ptr<const StillMask> still = nullptr);
   /**
@@ -85,26 +82,37 @@ public:
    *           one is the parked DMD: every mirror off.
    * @p slots  how long, in active times of a slot.
    */
-  void expose (ImageView<const std::uint8_t> scene, int mask, double slots);
-  void expose (ImageView<const std::uint16_t> scene, int mask, double slots);
+  template <typename Pixel>
+  void expose (ImageView<Pixel> scene, int mask, double slots);
   /**
    * Reads what was collected since begin ().
    * @p frame  number of the frame; it and the seed fix the noise.
    * @p coded  of the bench's size, fully overwritten.
    */
-  void read_out (std::uint64_t frame, ImageView<std::uint8_t> coded);
-  void read_out (std::uint64_t frame, ImageView<std::uint16_t> coded);
+  template <typename Pixel>
+  void read_out (std::uint64_t frame, ImageView<Pixel> coded);
 
-  /**
-   * The gain in force. Where the options leave it at 0, white makes white for
-   * the element that is on longest: N / schedule.white_slots ().
-   */
+  /** The gain in force. If the options leave it at 0, the element that is on
+   * longest makes white at white: N / schedule.white_slots (). */
   double gain () const;
 
 private:
-  struct State;
-  explicit OpticalBench (std::unique_ptr<State> state);
-  std::unique_ptr<State> state_;
+  OpticalBench (int width, int height, const BenchOptions &options);
+  const MirrorRows<std::uint8_t> &mirrors_of (int mask);
+
+  BenchOptions options_;
+  Lens lens_;
+  Image<float> light_; // on the mirrors, scene values times slots
+  Image<float> seen_;  // by the pixels
+  std::optional<MaskRenderer> masks_;
+  int shown_ = 0;                    // of the schedule's masks
+  MirrorRows<std::uint8_t> mirrors_; // of that mask
+  std::shared_ptr<const StillMask> held_;
+  MirrorRows<std::uint8_t> still_; // of the mask that is held
+  std::optional<DiamondView> diamond_;
+  std::vector<float> shares_; // of a row
+  double white_ = 0.0;        // of the scene
+  bool empty_ = true;         // light is yet to be overwritten
 };
 
 } // namespace codedexposure

@@ -17,6 +17,7 @@
 
 #include "base/packed_mono.h"
 #include "base/text.h"
+#include "base/try.h"
 
 namespace codedexposure
 {
@@ -24,9 +25,9 @@ namespace codedexposure
 namespace
 {
 
-/* Where a client says whether it wants the trigger. */
+/* Register in which a client enables the trigger. */
 constexpr guint32 kTriggerMode = 0x400;
-/* And what its lines do, one after the other. */
+/* Registers of the lines, one after the other. */
 constexpr guint32 kLineMode = 0x440, kLineSource = 0x444, kLineInverter = 0x448;
 constexpr guint32 kNextLine = 0x20;
 
@@ -60,8 +61,8 @@ format_of (guint32 code)
   return MonoFormat::mono8;
 }
 
-/* Puts @p entries in the place of those of an enumeration. False when there is
- * none of that name. */
+/* Replaces the entries of an enumeration; false if there is none of that name.
+ */
 bool
 set_entries (std::string &xml, const std::string &enumeration,
     const std::vector<std::pair<std::string, guint32>> &entries)
@@ -81,7 +82,7 @@ set_entries (std::string &xml, const std::string &enumeration,
 
 constexpr const char *kSelector = "LineSelector";
 
-/* A choice of one of @p values, whose place is the number at @p node. */
+/* An enumeration of @p values; @p node holds the index. */
 std::string
 choice (const std::string &name, const std::vector<std::string> &values,
     const std::string &node)
@@ -93,7 +94,7 @@ choice (const std::string &name, const std::vector<std::string> &values,
   return text + "<pValue>" + name + "Value</pValue></Enumeration>\n" + node;
 }
 
-/* Which line is meant, the client keeps to itself. */
+/* The selected line; the camera does not need it. */
 std::string
 line_selector ()
 {
@@ -102,7 +103,7 @@ line_selector ()
       "<Integer Name=\"" + name + "Value\"><Value>0</Value></Integer>\n");
 }
 
-/* A choice for each line, in registers from @p address on. */
+/* An enumeration for each line, in registers from @p address on. */
 std::string
 line_choice (const std::string &name, const std::vector<std::string> &values,
     guint32 address)
@@ -116,8 +117,8 @@ line_choice (const std::string &name, const std::vector<std::string> &values,
           "<Endianess>BigEndian</Endianess></IntReg>\n");
 }
 
-/* What the camera says of itself: Aravis' own description, with the formats and
- * lines of this one. */
+/* The GenICam description: that of Aravis, with the formats and lines of this
+ * camera. */
 Result<std::string>
 describe ()
 {
@@ -134,9 +135,11 @@ describe ()
       !set_entries (xml, "TriggerSource", {{"Line0", 0}, {"Line1", 1}}) ||
       !set_entries (
           xml, "TriggerActivation", {{"RisingEdge", 0}, {"FallingEdge", 1}}))
-    return Error{"the description of Aravis' fake camera is another than that "
-                 "of version 0.8.26; the simulated camera needs that one"};
-  /* Aravis' camera waits for a software trigger only: it shall know of none. */
+    return Error{
+        "the description of Aravis' fake camera is not that of version "
+        "0.8.26, which the simulated camera needs"};
+  /* Aravis' camera waits for software triggers only, so its own register stays
+   * off. */
   const std::string theirs = "<Address>0x300</Address>";
   const auto mode = xml.find (theirs);
   const auto end = xml.rfind ("<Port Name");
@@ -185,11 +188,22 @@ camera_settings_text (const CameraSettings &settings)
   return text.str ();
 }
 
-struct GigeCamera::State {
+namespace
+{
+
+struct SimulatedCamera final : public GigeCamera {
+  ~SimulatedCamera () override;
+  Result<void> start (GigeCameraOptions with, Expose light);
+  Result<void> add_faults (std::string_view text) override
+  {
+    const std::lock_guard guard (lock);
+    return faults.add (text, next);
+  }
+
   GigeCameraOptions options;
   Expose expose;
 
-  mutable std::mutex lock; // covers the next two
+  std::mutex lock; // covers the next two
   FaultPlan faults;
   std::uint64_t next = 0;
 
@@ -219,7 +233,7 @@ struct GigeCamera::State {
     return value;
   }
 
-  /* The trigger imposes its rate, whatever the client asked for. */
+  /* A trigger overrides the client's frame rate. */
   double period ()
   {
     constexpr guint32 kPeriod =
@@ -246,7 +260,7 @@ struct GigeCamera::State {
 };
 
 CameraSettings
-GigeCamera::State::settings ()
+SimulatedCamera::settings ()
 {
   CameraSettings set;
   set.format = format_of (get_register (ARV_FAKE_CAMERA_REGISTER_PIXEL_FORMAT));
@@ -269,7 +283,7 @@ GigeCamera::State::settings ()
 }
 
 void
-GigeCamera::State::tell_settings ()
+SimulatedCamera::tell_settings ()
 {
   const CameraSettings now = settings ();
   if (options.set_up && told != now)
@@ -277,9 +291,9 @@ GigeCamera::State::tell_settings ()
   told = now;
 }
 
-/* Light for a part of the period only, in the bits of the format. */
+/* Scales the light by exposure time / period, in the bits of the format. */
 void
-GigeCamera::State::take_light (MonoFormat format)
+SimulatedCamera::take_light (MonoFormat format)
 {
   const double exposure =
       1e3 * get_register (ARV_FAKE_CAMERA_REGISTER_EXPOSURE_TIME_US);
@@ -295,10 +309,10 @@ GigeCamera::State::take_light (MonoFormat format)
     }
 }
 
-/* The picture to packed bytes of what the client asked for: cut, or with black
+/* Packs the picture in the size that the client has set: cropped, or with black
  * at the right and the bottom. */
 void
-GigeCamera::State::pack (MonoFormat format, int width, int height)
+SimulatedCamera::pack (MonoFormat format, int width, int height)
 {
   const std::size_t row = row_bytes (format, width);
   packed.assign (row * std::size_t (height), 0);
@@ -312,7 +326,7 @@ GigeCamera::State::pack (MonoFormat format, int width, int height)
 }
 
 void
-GigeCamera::State::hold_up (const Fault &fault)
+SimulatedCamera::hold_up (const Fault &fault)
 {
   Nanoseconds time = fault.delay;
   if (options.jitter > 0)
@@ -322,10 +336,9 @@ GigeCamera::State::hold_up (const Fault &fault)
     std::this_thread::sleep_for (std::chrono::nanoseconds (time));
 }
 
-/* What is sent in the end: this frame, another one, or none of it. */
+/* Applies @fault: sends this frame, an earlier one, or nothing. */
 void
-GigeCamera::State::obey (
-    const Fault &fault, ArvBuffer *buffer, std::size_t size)
+SimulatedCamera::obey (const Fault &fault, ArvBuffer *buffer, std::size_t size)
 {
   using Kind = Fault::Kind;
   stopped |= fault.kind == Kind::stop;
@@ -355,7 +368,7 @@ GigeCamera::State::obey (
 }
 
 void
-GigeCamera::State::send (ArvBuffer *buffer)
+SimulatedCamera::send (ArvBuffer *buffer)
 {
   SentFrame sent;
   {
@@ -370,7 +383,7 @@ GigeCamera::State::send (ArvBuffer *buffer)
 
   const MonoFormat format =
       format_of (get_register (ARV_FAKE_CAMERA_REGISTER_PIXEL_FORMAT));
-  /* The buffer itself says nothing of its size before it was received. */
+  /* The buffer does not know its size before it is received. */
   const std::size_t size = arv_fake_camera_get_payload (camera);
   arv_buffer_set_timestamp (buffer, guint64 (sent.device_time));
   if (expose (sent.frame, picture.view ())) {
@@ -384,21 +397,15 @@ GigeCamera::State::send (ArvBuffer *buffer)
     options.sent (sent);
 }
 
-GigeCamera::GigeCamera (std::unique_ptr<State> state)
-    : state_ (std::move (state))
+/* The server runs until it is destroyed, but no longer calls this object or
+ * sends anything. */
+SimulatedCamera::~SimulatedCamera ()
 {
+  if (!camera)
+    return;
+  set_loss (1);
+  arv_fake_camera_set_fill_pattern (camera, nullptr, nullptr);
 }
-
-/* The server runs until it is gone, but without what it would call here, and in
- * silence. */
-GigeCamera::~GigeCamera ()
-{
-  state_->set_loss (1);
-  arv_fake_camera_set_fill_pattern (state_->camera, nullptr, nullptr);
-}
-
-namespace
-{
 
 struct TemporaryFile {
   std::string path;
@@ -412,9 +419,7 @@ struct TemporaryFile {
 Result<void>
 write_description (TemporaryFile &file)
 {
-  const Result<std::string> xml = describe ();
-  if (!xml)
-    return xml.error ();
+  ASSIGN_OR_RETURN (const std::string xml, describe ());
   gchar *path = nullptr;
   const int descriptor =
       g_file_open_tmp ("codedexposure-XXXXXX.xml", &path, nullptr);
@@ -425,8 +430,45 @@ write_description (TemporaryFile &file)
   g_free (path);
   g_close (descriptor, nullptr);
   if (!g_file_set_contents (
-          file.path.c_str (), xml->data (), gssize (xml->size ()), nullptr))
+          file.path.c_str (), xml.data (), gssize (xml.size ()), nullptr))
     return Error{"cannot write " + file.path};
+  return {};
+}
+
+Result<void>
+SimulatedCamera::start (GigeCameraOptions with, Expose light)
+{
+  TemporaryFile description;
+  RETURN_IF_ERROR (write_description (description));
+  options = std::move (with);
+  expose = std::move (light);
+  faults = options.faults;
+  random.seed (options.seed);
+  picture = Image<std::uint16_t> (options.width, options.height);
+  server.reset (arv_gv_fake_camera_new_full (options.address.c_str (),
+      options.serial.c_str (), description.path.c_str ()));
+  if (!server || !arv_gv_fake_camera_is_running (server.get ()))
+    return Error{"no camera can be at " + in_quotes (options.address) +
+                 ", which is no address of this machine"};
+
+  camera = arv_gv_fake_camera_get_fake_camera (server.get ());
+  const std::pair<guint32, guint32> settings[] = {
+      {ARV_FAKE_CAMERA_REGISTER_SENSOR_WIDTH, guint32 (options.width)},
+      {ARV_FAKE_CAMERA_REGISTER_SENSOR_HEIGHT, guint32 (options.height)},
+      {ARV_FAKE_CAMERA_REGISTER_WIDTH, guint32 (options.width)},
+      {ARV_FAKE_CAMERA_REGISTER_HEIGHT, guint32 (options.height)},
+      {ARV_FAKE_CAMERA_REGISTER_PIXEL_FORMAT, options.bits > 8
+                                                  ? ARV_PIXEL_FORMAT_MONO_16
+                                                  : ARV_PIXEL_FORMAT_MONO_8},
+      {ARV_FAKE_CAMERA_REGISTER_EXPOSURE_TIME_US, 10'000'000}};
+  for (const auto &[address, value] : settings)
+    arv_fake_camera_write_register (camera, address, value);
+  arv_fake_camera_set_fill_pattern (
+      camera,
+      [] (ArvBuffer *buffer, void *self, guint32, guint32, ArvPixelFormat) {
+        static_cast<SimulatedCamera *> (self)->send (buffer);
+      },
+      this);
   return {};
 }
 
@@ -435,56 +477,9 @@ write_description (TemporaryFile &file)
 Result<std::unique_ptr<GigeCamera>>
 GigeCamera::open (GigeCameraOptions options, Expose expose)
 {
-  TemporaryFile description;
-  if (const Result<void> written = write_description (description); !written)
-    return written.error ();
-
-  auto state = std::make_unique<State> ();
-  State &st = *state;
-  st.options = std::move (options);
-  st.expose = std::move (expose);
-  st.faults = st.options.faults;
-  st.random.seed (st.options.seed);
-  st.picture = Image<std::uint16_t> (st.options.width, st.options.height);
-  st.server.reset (arv_gv_fake_camera_new_full (st.options.address.c_str (),
-      st.options.serial.c_str (), description.path.c_str ()));
-  if (!st.server || !arv_gv_fake_camera_is_running (st.server.get ()))
-    return Error{"no camera can be at " + in_quotes (st.options.address) +
-                 ", which is no address of this machine"};
-
-  st.camera = arv_gv_fake_camera_get_fake_camera (st.server.get ());
-  const auto set = [&] (guint32 address, double value) {
-    arv_fake_camera_write_register (
-        st.camera, address, guint32 (std::lround (value)));
-  };
-  set (ARV_FAKE_CAMERA_REGISTER_SENSOR_WIDTH, st.options.width);
-  set (ARV_FAKE_CAMERA_REGISTER_SENSOR_HEIGHT, st.options.height);
-  set (ARV_FAKE_CAMERA_REGISTER_WIDTH, st.options.width);
-  set (ARV_FAKE_CAMERA_REGISTER_HEIGHT, st.options.height);
-  set (ARV_FAKE_CAMERA_REGISTER_PIXEL_FORMAT,
-      st.options.bits > 8 ? ARV_PIXEL_FORMAT_MONO_16 : ARV_PIXEL_FORMAT_MONO_8);
-  set (ARV_FAKE_CAMERA_REGISTER_EXPOSURE_TIME_US, 10e6);
-  arv_fake_camera_set_fill_pattern (
-      st.camera,
-      [] (ArvBuffer *buffer, void *self, guint32, guint32, ArvPixelFormat) {
-        static_cast<State *> (self)->send (buffer);
-      },
-      &st);
-  return std::unique_ptr<GigeCamera> (new GigeCamera (std::move (state)));
-}
-
-Result<void>
-GigeCamera::add_faults (std::string_view text)
-{
-  const std::lock_guard guard (state_->lock);
-  return state_->faults.add (text, state_->next);
-}
-
-std::uint64_t
-GigeCamera::next_frame () const
-{
-  const std::lock_guard guard (state_->lock);
-  return state_->next;
+  auto camera = std::make_unique<SimulatedCamera> ();
+  RETURN_IF_ERROR (camera->start (std::move (options), std::move (expose)));
+  return std::unique_ptr<GigeCamera> (std::move (camera));
 }
 
 } // namespace codedexposure

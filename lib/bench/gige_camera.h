@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* A GigE Vision camera in software, with pictures of one's own. */
+/* A simulated GigE Vision camera with given pictures. */
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@
 namespace codedexposure
 {
 
-/** What became of a frame of the camera. */
+/** What the camera did with a frame. */
 struct SentFrame {
   std::uint64_t frame = 0;
   Nanoseconds device_time = 0; ///< its stamp
@@ -24,12 +24,12 @@ struct SentFrame {
   Fault fault = {};
 };
 
-/** What a client has set, as the camera's registers say. */
+/** What a client has set in the camera's registers. */
 struct CameraSettings {
   /** A line of the camera. */
   struct Line {
     bool output = false;
-    bool exposure_active = false; ///< puts out a level while it exposes
+    bool exposure_active = false; ///< outputs a level during the exposure
     bool inverted = false;
 
     bool operator== (const Line &) const = default;
@@ -38,7 +38,7 @@ struct CameraSettings {
   MonoFormat format = MonoFormat::mono8;
   int width = 0;
   int height = 0;
-  double frame_rate = 0; ///< that of the trigger, where there is one
+  double frame_rate = 0; ///< of the trigger, if there is one
   double exposure_us = 0;
   bool triggered = false;
   int trigger_line = 0;
@@ -49,7 +49,7 @@ struct CameraSettings {
 };
 
 /** "256x192 Mono8, 25 a second, exposure 5000 us, trigger Line0 rising", or
- * "exposure all of the frame"; lines that put something out follow. */
+ * "exposure all of the frame"; lines that are outputs follow. */
 std::string camera_settings_text (const CameraSettings &settings);
 
 struct GigeCameraOptions {
@@ -60,64 +60,55 @@ struct GigeCameraOptions {
   int height = 576;
   /** Significant bits of the pictures, 1 to 16. */
   int bits = 8;
-  /** Frames a second that a hardware trigger makes. */
+  /** Frames per second of the hardware trigger. */
   double trigger_rate = 25;
   /** ppm by which the camera's clock is fast. */
   double drift = 0;
-  /** Every frame is held up by up to this, at random. */
+  /** Max random delay of a frame. */
   Nanoseconds jitter = 0;
-  /** Part of the packets that is lost, at random. */
+  /** Part of the packets that is lost at random. */
   double packet_loss = 0;
   std::uint64_t seed = 0; ///< of the jitter
   FaultPlan faults = {};
   /** Called on the camera's thread. */
   std::function<void (const SentFrame &)> sent = {};
-  /** Called there before a frame for which it is set otherwise than before. */
+  /** Called there before the first frame with other settings than before. */
   std::function<void (const CameraSettings &)> set_up = {};
 };
 
 /**
- * Fills @p picture with exposure number @p frame, counted from when the camera
- * began to send: what light the sensor saw, 0 .. 2^bits - 1. Called on the
- * camera's thread, which sends late when this takes long. False: there was no
- * exposure, as when the trigger does not come; none is sent.
+ * Fills @p picture with exposure number @p frame, counted from the first one
+ * that the camera sends: the light on the sensor, 0 .. 2^bits - 1. Called on
+ * the camera's thread, which sends late if this takes long. False: there was no
+ * exposure, for example no trigger, and nothing is sent.
  */
 using Expose =
     std::function<bool (std::uint64_t frame, ImageView<std::uint16_t> picture)>;
 
 /**
  * A monochrome camera that GigE Vision clients find, control and read: Aravis'
- * fake camera with pictures, pixel formats and a clock of its own.
+ * fake camera with its own pictures, pixel formats and clock.
  *
  * It offers Mono8, Mono10, Mono12, Mono16 and the packed formats of 10 and 12
- * bits; pictures are shifted to the format's bits, so that white stays white.
- * Triggers (Line0, Line1; either edge) and exposure are features: with a
+ * bits; pictures are shifted to the bits of the format, so that white stays
+ * white. Triggers (Line0, Line1; either edge) and exposure are features: with a
  * trigger, frames come at its rate; an exposure time shorter than the frame
- * period lets through as much less light. Lines can be set to put out that it
- * exposes, which goes nowhere.
+ * period reduces the light in proportion. Lines can be set as outputs of the
+ * exposure, without effect.
  *
- * Frame k is stamped with k frame periods by the camera's clock, however late
- * the host is: a host that lags makes jitter, not losses.
+ * The time stamp of frame k is k frame periods of the camera's clock, however
+ * late the host is: a slow host causes jitter, not losses.
  */
 class GigeCamera
 {
 public:
-  /** Begins to answer. An error where the address is not this machine's. */
+  /** Starts the camera. Fails if the address is not of this machine. */
   static Result<std::unique_ptr<GigeCamera>> open (
       GigeCameraOptions options, Expose expose);
-  ~GigeCamera ();
-  GigeCamera (const GigeCamera &) = delete;
-  GigeCamera &operator= (const GigeCamera &) = delete;
+  virtual ~GigeCamera () = default;
 
   /** Adds faults while it runs; FaultPlan::add (). Thread-safe. */
-  Result<void> add_faults (std::string_view text);
-  /** Number of the next frame. Thread-safe. */
-  std::uint64_t next_frame () const;
-
-private:
-  struct State;
-  explicit GigeCamera (std::unique_ptr<State> state);
-  std::unique_ptr<State> state_;
+  virtual Result<void> add_faults (std::string_view text) = 0;
 };
 
 } // namespace codedexposure

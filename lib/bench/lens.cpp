@@ -15,16 +15,15 @@ namespace codedexposure
 namespace
 {
 
-/* The Gaussian reaches this far; beyond lie 6e-5 of its light. */
+/* The Gaussian is cut here; 6e-5 of its light is beyond. */
 constexpr double kReach = 4.0;
 
-/* resample () blurs by this much at most, which leaves nothing of the picture
- * that the pixels could not carry, and blur () adds the rest: a window grows
- * with the square of the reach, taps with the reach. */
+/* resample () blurs by this much at most, which removes what the pixels cannot
+ * represent, and blur () adds the rest: the cost of a window grows with the
+ * square of its reach, that of separable taps with the reach. */
 constexpr double kResampleSigma = 0.75;
 
-/* Fractions of a mirror for which windows are made; between them, weights are
- * interpolated. */
+/* Windows are tabulated at these fractions of a mirror and interpolated. */
 constexpr int kFractions = 256;
 
 /* What the smallest scale and kResampleSigma need. */
@@ -56,8 +55,7 @@ response (double distance, double side, double sigma)
                ramp (distance - inner, sigma) + ramp (distance - outer, sigma));
 }
 
-/* @first and weights that add up to 1, without those at the ends that are too
- * small for any picture. */
+/* @first and weights that add up to 1, without negligible ones at the ends. */
 LensTaps
 make_taps (int first, const std::vector<double> &weights)
 {
@@ -178,12 +176,12 @@ Lens::image (ImageView<const float> mirrors, ImageView<float> camera)
     for (int y = 0; y < camera.height; y++)
       std::copy_n (mirrors.row (y), camera.width, camera.row (y));
   } else if (taps_ == 0) {
-    blur (mirrors, camera);
+    blur (mirrors, camera, 0);
   } else if (margin_ == 0) {
     resample (mirrors, camera);
   } else {
     resample (mirrors, wide_.view ());
-    blur_beyond (camera);
+    blur (wide_.view (), camera, margin_);
   }
 }
 
@@ -304,66 +302,46 @@ Lens::resample (ImageView<const float> mirrors, ImageView<float> camera) const
   }
 }
 
-/* Blurs wide_ into the frame in its middle. */
-void
-Lens::blur_beyond (ImageView<float> to)
+namespace
 {
-  const std::vector<float> &weights = horizontal_.weights;
+
+void
+add_row (float weight, const float *in, int width, float *out)
+{
+  for (int x = 0; x < width; x++)
+    out[x] += weight * in[x];
+}
+
+} // namespace
+
+/* @from reaches beyond @to by @margin pixels on each side. */
+void
+Lens::blur (ImageView<const float> from, ImageView<float> to, int margin)
+{
   const int width = to.width;
-  for (int y = 0; y < wide_.height (); y++) {
+  const int left = margin + horizontal_.first;
+  for (int y = 0; y < from.height; y++) {
+    /* padded_[x + i] is the neighbour of pixel x under tap i. */
+    std::fill (padded_.begin (), padded_.end (), 0.0f);
+    const int begin = std::clamp (left, 0, from.width);
+    const int end =
+        std::clamp (left + int (padded_.size ()), begin, from.width);
+    std::copy (from.row (y) + begin, from.row (y) + end,
+        padded_.data () + (begin - left));
+
     float *out = between_.view ().row (y);
     std::fill (out, out + width, 0.0f);
-    for (std::size_t i = 0; i < weights.size (); i++) {
-      const float *in = wide_.view ().row (y) + i;
-      for (int x = 0; x < width; x++)
-        out[x] += weights[i] * in[x];
-    }
+    for (std::size_t i = 0; i < horizontal_.weights.size (); i++)
+      add_row (horizontal_.weights[i], padded_.data () + i, width, out);
   }
   for (int y = 0; y < to.height; y++) {
     float *out = to.row (y);
     std::fill (out, out + width, 0.0f);
-    for (std::size_t i = 0; i < weights.size (); i++) {
-      const float *in = between_.view ().row (y + int (i));
-      for (int x = 0; x < width; x++)
-        out[x] += weights[i] * in[x];
-    }
-  }
-}
-
-void
-Lens::blur (ImageView<const float> from, ImageView<float> to)
-{
-  const int width = from.width;
-  const int height = from.height;
-  for (int y = 0; y < height; y++) {
-    /* padded_[x + i] is the neighbour of pixel x under tap i. */
-    std::fill (padded_.begin (), padded_.end (), 0.0f);
-    const int begin = std::clamp (horizontal_.first, 0, width);
-    const int end =
-        std::clamp (horizontal_.first + int (padded_.size ()), begin, width);
-    std::copy (from.row (y) + begin, from.row (y) + end,
-        padded_.data () + (begin - horizontal_.first));
-
-    float *out = between_.view ().row (y);
-    std::fill (out, out + width, 0.0f);
-    for (std::size_t i = 0; i < horizontal_.weights.size (); i++) {
-      const float weight = horizontal_.weights[i];
-      const float *in = padded_.data () + i;
-      for (int x = 0; x < width; x++)
-        out[x] += weight * in[x];
-    }
-  }
-  for (int y = 0; y < height; y++) {
-    float *out = to.row (y);
-    std::fill (out, out + width, 0.0f);
     for (int i = 0; i < int (vertical_.weights.size ()); i++) {
-      const int neighbour = y + vertical_.first + i;
-      if (neighbour < 0 || neighbour >= height)
-        continue;
-      const float weight = vertical_.weights[std::size_t (i)];
-      const float *in = between_.view ().row (neighbour);
-      for (int x = 0; x < width; x++)
-        out[x] += weight * in[x];
+      const int neighbour = y + margin + vertical_.first + i;
+      if (neighbour >= 0 && neighbour < from.height)
+        add_row (vertical_.weights[std::size_t (i)],
+            between_.view ().row (neighbour), width, out);
     }
   }
 }

@@ -10,21 +10,21 @@
 namespace codedexposure
 {
 
-/** Where the camera stands against the mirrors; see camera_to_mirrors (). */
+/** Pose of the camera relative to the mirrors; see camera_to_mirrors (). */
 struct Alignment {
   double shift_x = 0.0;  ///< mirrors, to the right
   double shift_y = 0.0;  ///< mirrors, downwards
   double rotation = 0.0; ///< degrees about the centre, from x to y
   double scale = 1.0;    ///< pixels a mirror
-  /** Perspective: what Z of the homography grows by from the centre to the
-   * right and to the lower border; the mirrors look smaller there. */
+  /** Perspective: how much Z of the homography grows from the centre to the
+   * right and to the lower border, where mirrors look smaller. */
   double tilt_x = 0.0;
   double tilt_y = 0.0;
-  /** Part by which a corner of the frame looks too far out, growing with the
-   * cube of the distance from the centre. */
+  /** Relative radial shift of a corner of the frame; it grows with the cube of
+   * the distance from the centre. */
   double distortion = 0.0;
 
-  /** Nothing but a shift, a turn and a scale. */
+  /** Only shift, rotation and scale. */
   bool affine () const
   {
     return tilt_x == 0.0 && tilt_y == 0.0 && distortion == 0.0;
@@ -38,8 +38,8 @@ struct Alignment {
  * 1) / 2, (h - 1) / 2) is the centre of both, centres of pixels and mirrors
  * have whole coordinates, and R turns x towards y, clockwise on a screen.
  *
- * So with shift_x = 1 pixel (x, y) sees mirror (x + 1, y), and the picture of
- * the mirrors stands one pixel further left.
+ * With shift_x = 1, pixel (x, y) sees mirror (x + 1, y): the image of the
+ * mirrors moves one pixel to the left.
  */
 Homography camera_to_mirrors (
     const Alignment &alignment, int width, int height);
@@ -63,13 +63,13 @@ struct LensTaps {
 /**
  * The light that each pixel gets from the mirrors.
  *
- * Mirrors and pixels are squares without gaps; between them the light is
- * blurred by a Gaussian. A pixel's share of a mirror's light is the integral of
- * the one over the other, in closed form: at no blur and a shift of half a
- * mirror, half of each of two. Where camera and mirrors are turned against each
- * other, the squares are taken as parallel; their turn matters in second order
- * only. Their sizes are those at the centre all over the frame. Beyond the
- * mirrors it is dark.
+ * Mirrors and pixels are squares without gaps; the light between them is
+ * blurred by a Gaussian. A pixel's part of a mirror's light is the integral
+ * over their overlap, in closed form: without blur and with a shift of half a
+ * mirror, half of each of two. If the camera is rotated, the squares are still
+ * taken as parallel, because the rotation has an effect of second order only.
+ * Their sizes are those at the centre of the frame. It is dark beyond the
+ * mirrors.
  */
 class Lens
 {
@@ -77,7 +77,7 @@ public:
   /** @p psf_sigma: standard deviation of the Gaussian, in pixels. */
   Lens (const Alignment &alignment, double psf_sigma, int width, int height);
 
-  /** Every pixel sees its own mirror, and that only. */
+  /** Every pixel sees only its own mirror. */
   bool ideal () const { return ideal_; }
   /** @p camera is overwritten; both of the lens's size, without overlap. */
   void image (ImageView<const float> mirrors, ImageView<float> camera);
@@ -87,15 +87,14 @@ private:
   void resample (ImageView<const float> mirrors, ImageView<float> camera) const;
   template <int kTaps>
   void resample (ImageView<const float> mirrors, ImageView<float> camera) const;
-  void blur (ImageView<const float> from, ImageView<float> to);
-  void blur_beyond (ImageView<float> to);
+  void blur (ImageView<const float> from, ImageView<float> to, int margin);
 
   bool ideal_ = false;
-  /* The whole lens where it is a shift and a blur; else what is left of the
-   * blur after resample (). */
+  /* The whole lens if it is a shift and a blur; else the blur that resample ()
+   * leaves. */
   LensTaps horizontal_, vertical_;
   Image<float> between_; // after the horizontal pass
-  /* Pixels with those around the frame, whose light a blur brings in. */
+  /* The frame with a margin, from which a blur brings light in. */
   Image<float> wide_;
   int margin_ = 0;
   std::vector<float> padded_;

@@ -1,10 +1,13 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "bench/simulated_dmd.h"
 
-#include <charconv>
-#include <condition_variable>
 #include <map>
 #include <vector>
+
+#include "base/text.h"
+#include "base/try.h"
+#include "base/wait.h"
+#include "dmd/options.h"
 
 namespace codedexposure
 {
@@ -143,7 +146,6 @@ struct Slip {
   int by = 1;
 };
 
-/** What the device string says. */
 struct Options {
   std::string mirrors;
   DmdInfo info;
@@ -215,15 +217,10 @@ public:
   bool running () const override { return mirrors_->running (); }
 
 private:
-  /** Takes as long as a mask takes; false when told to stop meanwhile. */
-  bool send_mask (std::stop_token stop) const
+  /** Takes as long as a mask takes; false if told to stop meanwhile. */
+  bool send_mask (const std::stop_token &stop) const
   {
-    std::mutex lock;
-    std::condition_variable_any never;
-    std::unique_lock guard (lock);
-    never.wait_for (guard, stop, std::chrono::nanoseconds (options_.mask_time),
-        [] { return false; });
-    return !stop.stop_requested ();
+    return wait_for (stop, std::chrono::nanoseconds (options_.mask_time));
   }
 
   Error failed (const char *what) const
@@ -238,127 +235,55 @@ private:
   bool started_ = false;
 };
 
-template <typename Number>
-bool
-parse_number (std::string_view text, Number lowest, Number &number)
+std::optional<int>
+parse_masks (std::string_view text)
 {
-  const char *end = text.data () + text.size ();
-  if (!text.empty () && text.front () == '+')
-    text.remove_prefix (1);
-  const auto parsed = std::from_chars (text.data (), end, number);
-  return parsed.ec == std::errc () && parsed.ptr == end && number >= lowest;
+  const auto masks = parse_int (text);
+  return masks.value_or (0) >= 1 ? masks : std::nullopt;
 }
 
 bool
-parse_time_into (std::string_view text, Nanoseconds &time)
+add_slip (std::string_view text, std::vector<Slip> &slips)
 {
-  const Result<Nanoseconds> parsed = parse_time (text);
-  if (parsed)
-    time = *parsed;
-  return parsed.ok ();
-}
-
-bool
-parse_size (std::string_view text, Extent &size)
-{
-  const std::size_t cross = text.find ('x');
-  return cross != text.npos &&
-         parse_number (text.substr (0, cross), 1, size.width) &&
-         parse_number (text.substr (cross + 1), 1, size.height);
-}
-
-bool
-parse_slip (std::string_view text, std::vector<Slip> &slips)
-{
-  const std::size_t colon = text.find (':');
-  Slip slip;
-  if (!parse_number (text.substr (0, colon), std::int64_t (0), slip.slot))
+  constexpr int kMaxSlip = 1024;
+  const auto parts = split (text, ':');
+  const auto slot = parse_int (parts.front ());
+  const auto by = parts.size () == 2 ? parse_int (parts.back ()) : 1;
+  if (parts.size () > 2 || !slot || *slot < 0 || !by || *by < -kMaxSlip ||
+      (!slips.empty () && slips.back ().slot > *slot))
     return false;
-  if (colon != text.npos &&
-      !parse_number (text.substr (colon + 1), -1024, slip.by))
-    return false;
-  slips.push_back (slip);
-  return slips.size () < 2 || slips[slips.size () - 2].slot <= slip.slot;
-}
-
-bool
-parse_failure (std::string_view text, Failure &failure)
-{
-  static const std::map<std::string_view, Failure> names{
-      {"open", Failure::open}, {"upload", Failure::upload},
-      {"start", Failure::start}, {"restart", Failure::restart}};
-  const auto found = names.find (text);
-  if (found != names.end ())
-    failure = found->second;
-  return found != names.end ();
-}
-
-bool
-set_option (Options &options, std::string_view key, std::string_view value)
-{
-  if (key == "size")
-    return parse_size (value, options.info.size);
-  if (key == "layout") {
-    const auto layout = parse_layout (value);
-    if (layout)
-      options.diamond = *layout;
-    options.info.array = Array::diamond;
-    return layout.ok ();
-  }
-  if (key == "masks")
-    return parse_number (value, 1, options.info.resident_masks);
-  if (key == "min-active")
-    return parse_time_into (value, options.info.minimum_active);
-  if (key == "min-switching")
-    return parse_time_into (value, options.info.minimum_switching);
-  if (key == "mask-time")
-    return parse_time_into (value, options.mask_time);
-  if (key == "still") {
-    options.info.still_masks = value == "yes";
-    return value == "yes" || value == "no";
-  }
-  if (key == "slip-at")
-    return parse_slip (value, options.slips);
-  if (key == "fail")
-    return parse_failure (value, options.failure);
-  return false;
+  slips.push_back ({*slot, *by});
+  return true;
 }
 
 Result<Options>
 parse_options (std::string_view device)
 {
-  Options options;
-  std::string_view rest = device.substr (std::string_view ("sim:").size ());
-  const std::size_t name_end = std::min (rest.find (','), rest.size ());
-  options.mirrors = std::string (rest.substr (0, name_end));
-  options.info.name = "sim:" + options.mirrors;
-  options.info.size = {1024, 768};
-  options.info.resident_masks = 512;
-  options.info.still_masks = true;
-  if (options.mirrors.empty ())
-    return Error{"DMD '" + std::string (device) +
-                 "' has no name; write sim:NAME, such as sim:bench"};
-
-  rest.remove_prefix (name_end);
-  while (!rest.empty ()) {
-    rest.remove_prefix (1);
-    const std::string_view option = rest.substr (0, rest.find (','));
-    const std::size_t equals = option.find ('=');
-    const std::string_view value =
-        equals == option.npos ? "" : option.substr (equals + 1);
-    if (!set_option (options, option.substr (0, equals), value))
-      return Error{
-          "DMD '" + std::string (device) + "': cannot use '" +
-          std::string (option) +
-          "'; options of a simulated DMD are size=WxH, "
-          "layout=address|lattice|cell, masks=N, "
-          "min-active=TIME, min-switching=TIME, mask-time=TIME, "
-          "still=yes|no, "
-          "slip-at=SLOT[:BY] (slots ascending), fail=open|upload|start|"
-          "restart"};
-    rest.remove_prefix (option.size ());
-  }
-  return options;
+  Options o;
+  DmdInfo &info = o.info;
+  info.size = {1024, 768};
+  info.resident_masks = 512;
+  info.still_masks = true;
+  const DeviceKey keys[] = {value_key ("size", "WxH", info.size, parse_size),
+      value_key ("layout", "address|lattice|cell", o.diamond, parse_layout),
+      value_key ("masks", "N", info.resident_masks, parse_masks),
+      value_key ("min-active", "TIME", info.minimum_active, parse_time),
+      value_key ("min-switching", "TIME", info.minimum_switching, parse_time),
+      value_key ("mask-time", "TIME", o.mask_time, parse_time),
+      choice_key ("still", info.still_masks, {{"yes", true}, {"no", false}}),
+      {"slip-at", "SLOT[:BY], slots ascending",
+          [&o] (std::string_view text) { return add_slip (text, o.slips); }},
+      choice_key ("fail", o.failure,
+          {{"open", Failure::open}, {"upload", Failure::upload},
+              {"start", Failure::start}, {"restart", Failure::restart}})};
+  ASSIGN_OR_RETURN (o.mirrors, parse_device (device, keys));
+  if (o.mirrors.empty ())
+    return Error{"DMD " + in_quotes (device) +
+                 " has no name; write sim:NAME, such as sim:bench"};
+  info.name = "sim:" + o.mirrors;
+  if (o.diamond)
+    info.array = Array::diamond;
+  return o;
 }
 
 } // namespace
@@ -366,15 +291,13 @@ parse_options (std::string_view device)
 Result<std::unique_ptr<Dmd>>
 open_simulated_dmd (std::string_view device)
 {
-  Result<Options> options = parse_options (device);
-  if (!options)
-    return options.error ();
-  if (options->failure == Failure::open)
+  ASSIGN_OR_RETURN (Options options, parse_options (device));
+  if (options.failure == Failure::open)
     return Error{
-        options->info.name + ": open failed, as its 'fail' option asks for",
+        options.info.name + ": open failed, as its 'fail' option asks for",
         ErrorCode::device};
   return std::unique_ptr<Dmd> (
-      std::make_unique<SimulatedDmd> (*std::move (options)));
+      std::make_unique<SimulatedDmd> (std::move (options)));
 }
 
 void

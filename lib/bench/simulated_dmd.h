@@ -16,51 +16,51 @@ namespace codedexposure
 
 /**
  * The mirrors of a simulated DMD, shared by name between the driver that
- * programs them and the bench that looks through them. Thread-safe.
+ * programs them and the bench that images them. Thread-safe.
  *
  * Its clock is the bench's exposure clock: the bench counts slots from its
- * first frame, and asks in order which mask stands in each. Exposures start at
- * whole multiples of the schedule's slots.
+ * first frame, and asks in order which mask is shown in each. Exposures start
+ * at whole multiples of the schedule's slots.
  */
 class SimulatedMirrors
 {
 public:
-  /** The mirrors of that name in this process; made at the first call, gone
-   * when nobody holds them. */
+  /** The mirrors of that name in this process, which exist as long as somebody
+   * holds them. */
   static std::shared_ptr<SimulatedMirrors> find (const std::string &name);
 
   /** Parks the mirrors and takes the masks of @p schedule. */
   void program (const Schedule &schedule);
-  /** Takes one mask that stands still, until the next program (). */
+  /** Takes one static mask, until the next program (). */
   void hold (StillMask mask);
   void start ();
   void stop ();
   bool running () const;
 
-  /** How the tile lies on a diamond array; none: an orthogonal one. */
+  /** Layout of the tile on a diamond array; none: an orthogonal array. */
   void lay (std::optional<MirrorLayout> diamond);
   std::optional<MirrorLayout> diamond () const;
 
-  /** What was programmed last; none before the first upload. */
+  /** The last programmed one; none before the first upload. */
   std::optional<Schedule> schedule () const;
 
   /**
-   * Index of the mask (MaskRenderer) that stands in slot @p slot counted from
-   * the bench's first exposure, none while the mirrors are parked. They step
-   * from the first exposure after start () on, which shows mask 0 or, where a
-   * pilot makes two frames differ, the mask of that frame's parity; one whole
-   * exposure later if they stood still for less than that since stop (). A mask
-   * that is held is kStillMask in its slots, kOffMask in the others.
+   * Index of the mask (MaskRenderer) in slot @p slot, counted from the bench's
+   * first exposure; none while the mirrors are parked. They step from the first
+   * exposure after start () on, which shows mask 0 or, with a pilot, the mask
+   * of that frame's parity; but not before one whole exposure has passed since
+   * stop (). A mask that is held is kStillMask in its slots, kOffMask in the
+   * others.
    */
   std::optional<int> mask_in_slot (std::int64_t slot);
 
-  /** The mask that is held in the exposure for whose slots was asked last; null
-   * where it is the schedule's. */
+  /** The mask that is held in the exposure of the last mask_in_slot (); null if
+   * the schedule's masks are shown. */
   std::shared_ptr<const StillMask> held () const;
 
   /** From slot @p slot on, the masks come @p by slots late (> 0) or early
-   * (< 0): a missed or a spurious trigger. Slips add up, and are given in the
-   * order of their slots; start () mends those that were. */
+   * (< 0): a missed or a spurious trigger. Slips add up, in the order of their
+   * slots; start () ends those before it. */
   void slip_at (std::int64_t slot, int by);
 
 private:
@@ -84,10 +84,10 @@ private:
 
 /**
  * Opens "sim:NAME[,key=value...]", whose mirrors are SimulatedMirrors::find
- * (NAME). The keys say what the device can do and how it misbehaves:
+ * (NAME). The keys say what the device can do and how it fails:
  *   size=WxH            mirrors, default 1024x768
- *   layout=address|lattice|cell  they stand on their corners, and the tile lies
- *                       on them so; without it, an orthogonal array
+ *   layout=address|lattice|cell  of the tile on a diamond array; default: an
+ *                       orthogonal array
  *   masks=N             masks it holds, default 512
  *   min-active=TIME     default 0
  *   min-switching=TIME  default 0
@@ -95,7 +95,7 @@ private:
  *   still=yes|no        whether it shows patterns on request, default yes
  *   slip-at=SLOT[:BY]   slips by BY slots (default 1: late) in slot SLOT of the
  *                       bench; may be given again, for a later slot
- *   fail=open|upload|start|restart  what goes wrong
+ *   fail=open|upload|start|restart  what fails
  */
 Result<std::unique_ptr<Dmd>> open_simulated_dmd (std::string_view device);
 /** From now on, open_dmd () opens them, too. */

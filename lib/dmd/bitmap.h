@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Masks as Windows bitmap files, which TI's boards and programs take. */
+/* Masks as Windows bitmap files, for TI's boards and programs. */
 #pragma once
 
 #include "dmd/bytes.h"

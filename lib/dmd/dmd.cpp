@@ -13,39 +13,27 @@ namespace codedexposure
 namespace
 {
 
-/** Devices by the first word of their names. */
-class Schemes
-{
-public:
-  static Schemes &all ()
-  {
-    static Schemes schemes;
-    return schemes;
-  }
-  void add (const DmdScheme &scheme)
-  {
-    const std::lock_guard guard (lock_);
-    const auto same = [&scheme] (const DmdScheme &known) {
-      return known.prefix == scheme.prefix;
-    };
-    if (std::none_of (known_.begin (), known_.end (), same))
-      known_.insert (known_.begin (), scheme);
-  }
-  std::vector<DmdScheme> list () const
-  {
-    const std::lock_guard guard (lock_);
-    return known_;
-  }
+std::mutex schemes_lock;
 
-private:
-  mutable std::mutex lock_;
-  std::vector<DmdScheme> known_{
+/** Guarded by schemes_lock. */
+std::vector<DmdScheme> &
+schemes ()
+{
+  static std::vector<DmdScheme> known{
       {"usb:", "usb:[PORT|SERIAL] (a LightCrafter 4500, 6500 or 9000)",
           open_usb_dmd},
       {"lightcrafter:",
           "lightcrafter:[HOST[:PORT]] (the first LightCrafter, over TCP)",
           open_lightcrafter}};
-};
+  return known;
+}
+
+std::vector<DmdScheme>
+list_schemes ()
+{
+  const std::lock_guard guard (schemes_lock);
+  return schemes ();
+}
 
 } // namespace
 
@@ -53,7 +41,7 @@ Result<std::unique_ptr<Dmd>>
 open_dmd (std::string_view device)
 {
   std::string known;
-  for (const DmdScheme &scheme : Schemes::all ().list ()) {
+  for (const DmdScheme &scheme : list_schemes ()) {
     if (device.starts_with (scheme.prefix))
       return scheme.open (device);
     known += (known.empty () ? "" : ", ") + scheme.usage;
@@ -66,7 +54,12 @@ open_dmd (std::string_view device)
 void
 add_dmd_scheme (const DmdScheme &scheme)
 {
-  Schemes::all ().add (scheme);
+  const std::lock_guard guard (schemes_lock);
+  auto &known = schemes ();
+  if (std::none_of (known.begin (), known.end (), [&] (const DmdScheme &other) {
+        return other.prefix == scheme.prefix;
+      }))
+    known.insert (known.begin (), scheme);
 }
 
 Result<void>
@@ -86,7 +79,7 @@ check_limits (
     return Error{info.name + " holds " + std::to_string (info.resident_masks) +
                  " masks, the schedule " + schedule.text () + " has " +
                  std::to_string (schedule.masks ()) +
-                 "; take a tile with fewer elements"};
+                 "; use a tile with fewer elements"};
   if (info.array == Array::orthogonal)
     if (const auto within =
             schedule.check_size (info.shown ().width, info.shown ().height);
@@ -97,7 +90,7 @@ check_limits (
                  " each at least on " + info.name + "; " +
                  time_text (plan.frame_period ()) + " a frame leaves " +
                  time_text (plan.active ()) +
-                 "; take fewer slots or a lower frame rate"};
+                 "; use fewer slots or a lower frame rate"};
   if (schedule.timing ().switching < info.minimum_switching)
     return Error{info.name + " needs " + time_text (info.minimum_switching) +
                  " to switch masks, the schedule leaves " +

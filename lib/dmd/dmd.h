@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* What every digital micromirror device can do for a coded exposure. */
+/* The interface of all digital micromirror devices. */
 #pragma once
 
 #include <functional>
@@ -18,44 +18,44 @@
 namespace codedexposure
 {
 
-/** What a device can do, in its own numbers. */
+/** The properties and limits of a device. */
 struct DmdInfo {
-  std::string name;               ///< as the user wrote it, "sim:bench"
+  std::string name;               ///< such as "sim:bench"
   Extent size = {};               ///< mirrors: columns by rows
-  Nanoseconds minimum_active = 0; ///< shortest time a mask can be shown
+  Nanoseconds minimum_active = 0; ///< min time of a mask
   Nanoseconds minimum_switching = 0;
   int resident_masks = 0;       ///< masks the device holds at once
   bool still_masks = false;     ///< show () is served
   bool triggers_camera = false; ///< no frame is exposed while it is parked
   bool trigger_in = false;      ///< a camera can start its masks
   bool trigger_out = false;     ///< it can start a camera's exposures
-  /** Shortest dark time between two masks, where there is any. */
+  /** Min dark time between two masks, if it is not 0. */
   Nanoseconds minimum_dark = 0;
   Array array = Array::orthogonal;
-  /** Mirrors that show masks, from the first that do; {}: all. */
+  /** Size of the region that shows masks; {}: all mirrors. */
   Extent region = {};
 
   Extent shown () const { return region == Extent () ? size : region; }
 };
 
-/** What a device says of itself now. */
+/** The state that a device reports. */
 struct DmdStatus {
   bool running = false;
-  /** Names and values for people: firmware, errors, what its triggers do. */
+  /** Names and values for people, such as firmware and errors. */
   std::vector<std::pair<std::string, std::string>> details = {};
 };
 
-/** Called during upload with what is sent and what there is to send, in units
- * of about equal time: first with 0, last with all of it. */
+/** Called during upload with the sent and the total units, each of about the
+ * same time: first with 0, last with the total. */
 using UploadProgress = std::function<void (int sent, int total)>;
 
 /**
- * A device that shows the masks of a schedule, over and over, one slot each.
+ * A device that repeats the masks of a schedule, one slot each.
  *
- * Life: open (a Dmd is open) -> upload () -> start () -> stop (), again from
- * upload () or start (). The destructor parks the mirrors. Calls come from one
- * thread at a time and may block on hardware; DmdRunner keeps them off the
- * threads that must not.
+ * An object is an open device; then upload () -> start () -> stop (), again
+ * from upload () or start (). The destructor parks the mirrors. Calls come from
+ * one thread at a time and may wait for hardware; DmdRunner makes them from a
+ * thread of its own.
  */
 class Dmd
 {
@@ -65,65 +65,62 @@ public:
   virtual const DmdInfo &info () const = 0;
   /** Asks the device. */
   virtual Result<DmdStatus> status () { return DmdStatus{running ()}; }
-  /** How long upload () is going to take at least, with what the device holds
-   * already. A request to @p stop ends the reckoning, with too short a time. */
+  /** Min time of upload (), given the masks that the device holds. A request to
+   * @p stop ends the calculation, with too short a time. */
   virtual Nanoseconds upload_time (const Schedule &, std::stop_token = {})
   {
     return 0;
   }
   /**
-   * Renders and sends every mask of the schedule; the mirrors are parked. Masks
-   * do not depend on the frame rate. Masks that the device holds already need
-   * not be sent again.
+   * Renders and sends every mask of the schedule that the device does not hold;
+   * the mirrors are parked. Masks do not depend on the frame rate.
    *
    * @p stop  a request ends the upload within 100 ms, with an error.
    */
   virtual Result<void> upload (const Schedule &schedule, std::stop_token stop,
       const UploadProgress &progress) = 0;
   /**
-   * Shows mask 0 from the start of an exposure on, each mask for its slot of
-   * @p plan. After a stop () one whole exposure at least passes with the
-   * mirrors parked (or, where the device triggers the camera, without a
-   * trigger): whoever watches the frames sees where the masks began anew.
+   * Shows each mask for its slot of @p plan, with mask 0 at the start of an
+   * exposure. After a stop (), at least one whole exposure passes with the
+   * mirrors parked (or without a trigger, if the device triggers the camera),
+   * so that frames show where the masks started again.
    *
    * @p stop  a request ends the start within 100 ms, with an error.
    */
   virtual Result<void> start (
       const SlotPlan &plan, std::stop_token stop = {}) = 0;
   /**
-   * Sends one mask and shows it in the first slots of every exposure, at the
-   * same trigger as a schedule's; like start (), after one whole exposure with
-   * the mirrors parked. The masks of the schedule are lost: what follows is
-   * another show (), or upload () and start ().
+   * Sends one mask and shows it in the first slots of every exposure, with the
+   * trigger of a schedule; like start (), after one whole exposure with the
+   * mirrors parked. The masks of the schedule are lost: another show (), or
+   * upload () and start () follow.
    *
-   * @p plan  of the schedule in whose place it stands. @p stop as in upload ().
+   * @p plan  of the schedule that it replaces. @p stop as in upload ().
    */
   virtual Result<void> show (
       const StillMask &mask, const SlotPlan &plan, std::stop_token stop);
   /** Parks the mirrors, all off. */
   virtual void stop () = 0;
-  /** Whether it shows masks, for all that is known: a device that did not
-   * answer when it was told to stop still does. */
+  /** Whether it may show masks: a device that did not acknowledge the stop
+   * still does. */
   virtual bool running () const = 0;
 };
 
-/**
- * Opens a device by name, "SCHEME:...". Error for a scheme that nobody serves,
- * naming those that there are.
- */
+/** Opens a device by name, "SCHEME:...". Fails for an unknown scheme, with the
+ * list of the known ones. */
 Result<std::unique_ptr<Dmd>> open_dmd (std::string_view device);
 
-/** How devices are opened whose names begin with @p prefix. */
+/** How devices are opened whose names begin with prefix. */
 struct DmdScheme {
   std::string prefix; ///< "usb:"
   std::string usage;  ///< for people
   Result<std::unique_ptr<Dmd>> (*open) (std::string_view device);
 };
-/** From now on, open_dmd () serves that scheme as well. Thread-safe. */
+/** Adds a scheme to open_dmd (). Thread-safe. */
 void add_dmd_scheme (const DmdScheme &scheme);
 
 /** Whether a device of that kind can show @p schedule in the slots of @p plan;
- * the error tells the numbers on both sides. */
+ * the error names the limit and the value. */
 Result<void> check_limits (
     const DmdInfo &info, const Schedule &schedule, const SlotPlan &plan);
 

@@ -27,7 +27,7 @@ put_count (Bytes &bytes, int count)
   }
 }
 
-/** Where in @p row, from @p x on, pixels stop to be the same as the first. */
+/** The end of the run of equal pixels that begins at @p x. */
 int
 run_end (const PlanePixel *row, int x, int width)
 {
@@ -37,7 +37,7 @@ run_end (const PlanePixel *row, int x, int width)
   return end;
 }
 
-/** Where pixels stop to be those of the row above; @p x without such a row. */
+/** The end of the pixels equal to the row above; @p x without such a row. */
 int
 copy_end (const PlanePixel *row, const PlanePixel *above, int x, int width)
 {
@@ -46,7 +46,7 @@ copy_end (const PlanePixel *row, const PlanePixel *above, int x, int width)
   return int (std::mismatch (row + x, row + width, above + x).first - row);
 }
 
-/** Where a run of two or a copy begins that ends a series of literals. */
+/** The end of the literals from @p x on: where a run or a copy begins. */
 int
 literal_end (const PlanePixel *row, const PlanePixel *above, int x, int width)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The run-length code in which a DLPC900 takes its images. */
+/* The run-length code of images for a DLPC900. */
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ namespace codedexposure
 /** The 24 bit-planes of a mirror: plane b is bit b. The top byte is 0. */
 using PlanePixel = std::uint32_t;
 
-/** To a multiple of so many bytes, an encoded image is padded. */
+/** An encoded image is padded to a multiple of this many bytes. */
 constexpr std::size_t kErleUnit = 4;
 
 /** Three bytes a pixel, as on the wire: planes 16..23 come first. */
@@ -33,14 +33,14 @@ struct PiecedBytes {
 
 /**
  * Enhanced run-length encoding: runs of one pixel, copies from the row above,
- * literals. No run crosses a row, so that the code of a row depends on itself
- * and the row above only. Padded with zeros to a multiple of @p unit bytes.
+ * literals. No run crosses a row, so that the code of a row depends only on the
+ * row and the one above. Padded with zeros to a multiple of @p unit bytes.
  *
- * @p image    columns [x, x + width) of it are taken.
+ * @p image    of which columns [x, x + width) are encoded.
  * @p width    1..32767.
  *
- * It packs what is constant along a row or a column. Masks whose period is
- * above 1 in both directions stay at 3 bytes a pixel.
+ * It compresses what is constant along a row or a column. Masks with a period
+ * above 1 in both directions stay at 3 bytes per pixel.
  */
 PiecedBytes encode_erle (const MirrorRows<PlanePixel> &image, int x, int width,
     std::size_t unit = kErleUnit);

@@ -2,10 +2,10 @@
 #include "dmd/lightcrafter.h"
 
 #include <algorithm>
-#include <thread>
 
 #include "base/text.h"
 #include "base/try.h"
+#include "base/wait.h"
 #include "dmd/bitmap.h"
 #include "dmd/lightcrafter_protocol.h"
 #include "dmd/options.h"
@@ -79,7 +79,6 @@ private:
   Result<void> begin (std::stop_token stop = {},
       std::chrono::milliseconds patience = kPatience);
   Result<void> connect ();
-  bool pause (std::chrono::milliseconds time) const;
   Error error (const char *what, const std::string &reason,
       ErrorCode code = ErrorCode::device) const;
   Result<Reply> receive (std::uint16_t command);
@@ -132,16 +131,6 @@ Lightcrafter::connect ()
   return {};
 }
 
-/** False when cancelled. */
-bool
-Lightcrafter::pause (std::chrono::milliseconds time) const
-{
-  constexpr std::chrono::milliseconds kPiece{10};
-  for (; time > 0ms && !cancel_.stop_requested (); time -= kPiece)
-    std::this_thread::sleep_for (std::min (time, kPiece));
-  return !cancel_.stop_requested ();
-}
-
 Error
 Lightcrafter::error (
     const char *what, const std::string &reason, ErrorCode code) const
@@ -184,7 +173,7 @@ Lightcrafter::ask (PacketType type, std::uint16_t command, ByteView payload)
     if (!reply || reply->refused != kBusy || patience_ <= kBusyPause)
       return reply;
     patience_ -= kBusyPause;
-    if (!pause (kBusyPause))
+    if (!wait_for (cancel_, kBusyPause))
       return Error{"cancelled", ErrorCode::cancelled};
   }
 }
@@ -310,7 +299,7 @@ Lightcrafter::start (const SlotPlan &plan, std::stop_token stop_token)
   RETURN_IF_ERROR (set_sequence (*time));
   RETURN_IF_ERROR (write ("set up the trigger output", kCameraTrigger,
       encode_camera_trigger (options_.master == Master::dmd, kCameraPulse)));
-  if (!pause (std::chrono::milliseconds (plan.frame_period () / 1'000'000 + 1)))
+  if (!wait_for (cancel_, std::chrono::nanoseconds (plan.frame_period ())))
     return error ("start the sequence", "cancelled", ErrorCode::cancelled);
   running_ = true;
   const Bytes on{1};

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <string>
 
+#include "base/try.h"
+
 namespace codedexposure
 {
 
@@ -32,12 +34,12 @@ split_slot (std::int64_t pitch, Nanoseconds switching, const SlotPlan &plan,
                  us_text (std::max<std::int64_t> (exposure, 0)) +
                  ", the DMD shows a mask for " +
                  us_text (limits.minimum_exposure) +
-                 " at least; take fewer slots or a lower frame rate"};
+                 " at least; use fewer slots or a lower frame rate"};
   if (exposure > limits.maximum_exposure)
     return Error{"each of " + std::to_string (plan.slots ()) + " slots lasts " +
                  us_text (exposure) + ", the DMD shows a mask for " +
                  us_text (limits.maximum_exposure) +
-                 " at most; take more slots or a higher frame rate"};
+                 " at most; use more slots or a higher frame rate"};
   return PatternTime{std::uint32_t (exposure), std::uint32_t (dark)};
 }
 
@@ -48,7 +50,7 @@ switching_of (const SlotPlan &plan)
                            : 0;
 }
 
-/** Error when a burst of @p length microseconds is not over, and the controller
+/** Fails if a burst of @p length microseconds is not over, and the controller
  * not ready, before the camera's next edge. */
 Result<void>
 check_burst (
@@ -81,19 +83,17 @@ fit_patterns (const SlotPlan &plan, const PatternLimits &limits, Master master)
     const Nanoseconds next = last ? end : plan.start (slot + 1);
     const std::int64_t pitch =
         next / kMicrosecond - plan.start (slot) / kMicrosecond;
-    // What follows the last slot's light is dark, however long it is.
+    // All of the time after the last slot's light is dark.
     const Nanoseconds dark =
         last ? next - plan.start (slot) - plan.active () : switching;
-    const auto time = split_slot (pitch, dark, plan, limits);
-    if (!time)
-      return time.error ();
-    times.push_back (*time);
-    length += time->exposure + (last ? 0 : time->dark);
+    ASSIGN_OR_RETURN (
+        const PatternTime time, split_slot (pitch, dark, plan, limits));
+    times.push_back (time);
+    length += time.exposure + (last ? 0 : time.dark);
   }
   if (master == Master::camera) {
     times.back ().dark = 0; // the controller adds its own before it waits
-    if (const auto fits = check_burst (length, plan, limits); !fits)
-      return fits.error ();
+    RETURN_IF_ERROR (check_burst (length, plan, limits));
   }
   return times;
 }
@@ -133,11 +133,11 @@ fit_equal_patterns (
                  time_text (slot) + " leave " + time_text (rest) +
                  " of the frame; give the schedule active=0 and readout=0, or "
                  "let the camera be master"};
-  const auto time = split_slot (pitch, switching, plan, limits);
-  if (!time || master == Master::dmd)
-    return time;
-  const auto fits = check_burst (pitch * plan.slots (), plan, limits);
-  return fits ? time : Result<PatternTime> (fits.error ());
+  ASSIGN_OR_RETURN (
+      const PatternTime time, split_slot (pitch, switching, plan, limits));
+  if (master == Master::camera)
+    RETURN_IF_ERROR (check_burst (pitch * plan.slots (), plan, limits));
+  return time;
 }
 
 } // namespace codedexposure

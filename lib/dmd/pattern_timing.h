@@ -10,7 +10,7 @@
 namespace codedexposure
 {
 
-/** Who tells the other when an exposure starts. */
+/** Which device triggers. */
 enum class Master {
   dmd,    ///< the DMD sends the camera one pulse per exposure
   camera, ///< each exposure of the camera starts the masks of that exposure
@@ -23,15 +23,15 @@ struct PatternTime {
   bool operator== (const PatternTime &) const = default;
 };
 
-/** What a controller can keep to, in microseconds. */
+/** Limits of a controller, in microseconds. */
 struct PatternLimits {
   std::uint32_t minimum_exposure = 0;
   std::uint32_t maximum_exposure = 0;
-  /** Shortest dark time other than none. */
+  /** Min dark time other than 0. */
   std::uint32_t minimum_dark = 0;
   /** From the camera's edge to light, with the camera as master. */
   std::uint32_t trigger_delay = 0;
-  /** Dark time that the controller adds before it waits for the next edge. */
+  /** Dark time that the controller inserts before it waits for an edge. */
   std::uint32_t trigger_dark = 0;
 };
 
@@ -39,29 +39,26 @@ struct PatternLimits {
  * The times of the N masks of one exposure.
  *
  * Slot starts are rounded down to microseconds, so that errors do not add up.
- * The switching time of the plan becomes dark time where the controller can
- * keep it; a shorter one is the movement of the mirrors itself, within the
- * exposure. With the DMD as master, the last mask lasts to the end of the
- * frame period, rounded down: the camera follows, by 1 us a frame at most.
+ * The switching time of the plan becomes dark time if the controller can do it;
+ * a shorter one is the movement of the mirrors, within the exposure. With the
+ * DMD as master, the last mask lasts to the end of the frame period, rounded
+ * down: the camera follows, by 1 us per frame at most.
  *
- * Error with the numbers when a mask is too short or too long, or, with the
- * camera as master, when its slots leave too little of the frame period for
- * the trigger.
+ * Fails if a mask is too short or too long, or, with the camera as master, if
+ * its slots leave too little of the frame period for the trigger.
  */
 Result<std::vector<PatternTime>> fit_patterns (
     const SlotPlan &plan, const PatternLimits &limits, Master master);
 
-/**
- * One mask in the first @p slots of the masks of one exposure, and dark until
- * the next exposure, or shown on where the dark time would be too short.
- */
+/** One mask in the first @p slots of an exposure, then dark until the next
+ * exposure, or without dark time if that would be too short. */
 PatternTime first_patterns (const std::vector<PatternTime> &times, int slots,
     std::uint32_t minimum_dark);
 
 /**
- * The same with one exposure and one dark time for all masks, for controllers
- * that know no others; slots are rounded down. With the DMD as master, the
- * slots must fill the frame period: such a controller knows no pause.
+ * The same for controllers with one exposure and one dark time for all masks;
+ * slots are rounded down. With the DMD as master, the slots must fill the frame
+ * period, because such a controller has no pause.
  */
 Result<PatternTime> fit_equal_patterns (
     const SlotPlan &plan, const PatternLimits &limits, Master master);

@@ -16,14 +16,14 @@ constexpr int kPlanesPerImage = 24;
 /** Up to 24 masks of one array. */
 using PlaneImage = Image<PlanePixel>;
 
-/** Where a mask is: a plane of an image. */
+/** A plane of an image. */
 struct PlaneSlot {
   int image = 0;
   int plane = 0;
   bool operator== (const PlaneSlot &) const = default;
 };
 
-/** How the masks of a schedule are packed into images. */
+/** The places of the masks of a schedule in images. */
 struct PlanePlan {
   std::vector<PlaneSlot> masks; ///< of each mask of the schedule
   int images = 0;
@@ -33,15 +33,15 @@ struct PlanePlan {
 };
 
 /**
- * Packs 24 masks an image, planes filled from 0, in the order of the first
- * pixel of the tile that they open. Where a code opens few elements at a time,
- * an image then has masks of neighbouring rows of the tile, and its other rows
- * are dark and cost nothing; in the order of the slots, a bit-reversed schedule
- * would light every row of every image.
+ * Packs 24 masks into each image, from plane 0 on, in the order of the first
+ * pixel of the tile that they turn on. If a code turns on few elements at a
+ * time, an image then has masks of neighbouring rows of the tile, and its other
+ * rows are off and take almost no bytes; in the order of the slots, a
+ * bit-reversed schedule would need every row of every image.
  */
 PlanePlan plan_planes (const Schedule &schedule);
 
-/** A digest of the pixels (128 bits, for equality among a device's images; no
+/** A digest of the pixels (128 bits, to compare the images of a device; no
  * protection against forgery). */
 struct PlaneDigest {
   std::uint64_t high = 0;
@@ -50,8 +50,8 @@ struct PlaneDigest {
 };
 PlaneDigest digest (ImageView<const PlanePixel> image);
 
-/** Of all mirrors of a mask, on an array of any one size and placement: masks
- * are equal where their digests are, whatever schedules they belong to. */
+/** Of all mirrors of a mask: on an array of one size and placement, masks of
+ * any schedules are equal if their digests are. */
 PlaneDigest digest_mask (const Schedule &schedule, int mask);
 
 } // namespace codedexposure

@@ -17,26 +17,26 @@ namespace codedexposure
 {
 
 /**
- * Drives a Dmd from a thread of its own, so that no other thread waits for
- * hardware unless it chooses to.
+ * Controls a Dmd from a thread of its own, so that other threads wait for
+ * hardware only in settle () and halt ().
  *
- * A run lasts from upload () to halt (); its jobs are done in the order in
- * which they were asked for. One that fails parks the mirrors and ends the run.
- * What is asked for outside a run is not done. A job that runs out of memory
- * fails like any other. Thread-safe. The destructor halts.
+ * A run lasts from upload () to halt (); its jobs are done in the order of the
+ * calls. A job that fails parks the mirrors and ends the run. Calls outside a
+ * run are ignored. A job that runs out of memory fails like any other.
+ * Thread-safe. The destructor halts.
  */
 class DmdRunner
 {
 public:
   /** Called on the runner's thread; they must not call the runner. */
   struct Reports {
-    /** Before an upload: how long it is going to take at least. */
+    /** Before an upload: its min time. */
     std::function<void (Nanoseconds)> predicted = [] (Nanoseconds) {};
     UploadProgress progress = [] (int, int) {};
     /** A job failed, other than by halt (). */
     std::function<void (const Error &)> failed = [] (const Error &) {};
-    /** The run is over, and the device did not answer when it was told to
-     * stop: its mirrors may move on. */
+    /** The run is over, but the device did not acknowledge the stop: its
+     * mirrors may still move. */
     std::function<void ()> not_parked = [] {};
   };
 
@@ -49,7 +49,7 @@ public:
 
   /** Begins a run. */
   void upload (const Schedule &schedule);
-  /** Starts, or starts anew, from mask 0. */
+  /** Starts, or restarts, from mask 0. */
   void start (const SlotPlan &plan);
 
   /** Shows @p mask instead, until the schedule is restored. */
@@ -59,8 +59,7 @@ public:
 
   /** Whether there is a run and all its jobs are done. */
   bool settled () const;
-  /** Waits for that. False when the run ended, or interrupt () cut the wait
-   * short. */
+  /** Waits for that. False if the run ended, or interrupt () ended the wait. */
   bool settle ();
   /** The same, but no longer than @p time. */
   bool settle_within (std::chrono::milliseconds time);

@@ -14,6 +14,7 @@
 #include <cstring>
 #include <thread>
 
+#include "base/try.h"
 #include "dmd/dmd.h"
 #include "dmd/tool_path.h"
 
@@ -74,15 +75,11 @@ spawn_tool (const std::string &device, int words, pid_t &process)
 Result<void>
 stop_board (const std::string &device)
 {
-  const auto dmd = open_dmd (device);
-  if (!dmd)
-    return dmd.error ();
-  (*dmd)->stop ();
-  const auto now = (*dmd)->status ();
-  if (!now)
-    return now.error ();
-  if (now->running)
-    return Error{(*dmd)->info ().name + " does not stop", ErrorCode::device};
+  ASSIGN_OR_RETURN (const auto dmd, open_dmd (device));
+  dmd->stop ();
+  ASSIGN_OR_RETURN (const DmdStatus now, dmd->status ());
+  if (now.running)
+    return Error{dmd->info ().name + " does not stop", ErrorCode::device};
   return {};
 }
 
@@ -93,7 +90,7 @@ public:
       : device_ (std::move (device)), dmd_ (std::move (dmd))
   {
   }
-  /* What nobody here started is none of our business. */
+  /* A board that was not started here continues. */
   ~GuardedDmd () override
   {
     if (guard_)
@@ -114,15 +111,13 @@ public:
   }
   Result<void> start (const SlotPlan &plan, std::stop_token stop_token) override
   {
-    if (const auto watched = watch (); !watched)
-      return watched;
+    RETURN_IF_ERROR (watch ());
     return dmd_->start (plan, std::move (stop_token));
   }
   Result<void> show (const StillMask &mask, const SlotPlan &plan,
       std::stop_token stop_token) override
   {
-    if (const auto watched = watch (); !watched)
-      return watched;
+    RETURN_IF_ERROR (watch ());
     return dmd_->show (mask, plan, std::move (stop_token));
   }
   void stop () override
@@ -172,15 +167,15 @@ StopGuard::post (const std::string &device)
       std::string ("cannot run '") + tool_path () +
           "', which would stop the mirrors if this process were killed: " +
           std::strerror (code) +
-          "; install it, say where it is in CODEDEXPOSURE_TOOL, or do "
-          "without it: guard=off",
+          "; install it, set CODEDEXPOSURE_TOOL to its path, or use "
+          "guard=off",
       ErrorCode::not_found};
 }
 
 StopGuard::~StopGuard ()
 {
   shutdown (words_, SHUT_WR);
-  // Where it has nothing to do but to end, it is waited for.
+  // Wait for a guard that has nothing to do but to end.
   constexpr int kPatience = 1000; // ms
   pollfd end{words_, 0, 0};
   const bool ending = !running_ && poll (&end, 1, kPatience) == 1;

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Stops a board when the process that started it ends without having done so.
- */
+/* Stops a board if the process that started it ends without stopping it. */
 #pragma once
 
 #include <sys/types.h>
@@ -16,25 +15,25 @@ namespace codedexposure
 class Dmd;
 
 /**
- * A process beside this one that is told when a board runs and when it stands.
- * Should this one end, be killed or crash while the board runs, it opens the
- * board and stops it.
+ * A process beside this one that knows whether a board runs. If this process
+ * ends, is killed or crashes while the board runs, it opens the board and stops
+ * it.
  *
  * It is the tool codedexposure (its command "dmd guard"), as installed or as
- * the environment's CODEDEXPOSURE_TOOL says, in a session of its own: signals
- * of the terminal do not reach it.
+ * the environment variable CODEDEXPOSURE_TOOL names it, in a session of its
+ * own: signals of the terminal do not reach it.
  */
 class StopGuard
 {
 public:
-  /** @p device  for open_dmd (), once this process has let go of it. */
+  /** @p device  for open_dmd (), after this process has closed it. */
   static Result<std::unique_ptr<StopGuard>> post (const std::string &device);
-  /** Relieves it; where the board runs, it stops the board now. */
+  /** Ends the process, which first stops the board if it runs. */
   ~StopGuard ();
   StopGuard (const StopGuard &) = delete;
   StopGuard &operator= (const StopGuard &) = delete;
 
-  /** False when the process is no more. */
+  /** Tells it whether the board runs; false if the process has ended. */
   bool tell (bool running);
 
 private:
@@ -42,14 +41,15 @@ private:
 
   const int words_;
   const pid_t process_;
-  bool running_ = false; ///< as it was told last
+  bool running_ = false; ///< the last message
 };
 
-/** What that process does: waits for the end of @p words, what tell () writes,
- * and stops the device unless it was said to stand. Error when it cannot. */
+/** The work of that process: reads what tell () writes from @p words to the end
+ * and then stops the device, unless it is known not to run. */
 Result<void> stand_guard (int words, const std::string &device);
 
-/** @p dmd, which a guard stops as "@p device" if this process does not. */
+/** @p dmd with a guard that stops it, as @p device, if this process does not.
+ */
 std::unique_ptr<Dmd> guarded (std::unique_ptr<Dmd> dmd, std::string device);
 
 } // namespace codedexposure

@@ -13,6 +13,8 @@
 #include <cerrno>
 #include <cstring>
 
+#include "base/try.h"
+
 namespace codedexposure
 {
 
@@ -22,12 +24,6 @@ namespace
 using namespace std::chrono_literals;
 
 constexpr auto kPatience = 50ms;
-
-std::string
-errno_text (int code)
-{
-  return std::strerror (code);
-}
 
 using Addresses = std::unique_ptr<addrinfo,
     std::integral_constant<decltype (&freeaddrinfo), freeaddrinfo>>;
@@ -52,7 +48,8 @@ TcpStream::connect (const std::string &host, int port, Milliseconds timeout)
   const int socket = ::socket (raw->ai_family,
       raw->ai_socktype | SOCK_CLOEXEC | SOCK_NONBLOCK, raw->ai_protocol);
   if (socket < 0)
-    return Error{"cannot make a socket: " + errno_text (errno), ErrorCode::io};
+    return Error{std::string ("cannot make a socket: ") + std::strerror (errno),
+        ErrorCode::io};
   std::unique_ptr<TcpStream> stream (new TcpStream (socket));
   int code = 0;
   if (::connect (socket, raw->ai_addr, raw->ai_addrlen) != 0)
@@ -66,8 +63,8 @@ TcpStream::connect (const std::string &host, int port, Milliseconds timeout)
     getsockopt (socket, SOL_SOCKET, SO_ERROR, &code, &size);
   }
   if (code != 0)
-    return Error{
-        "cannot connect to " + where + ": " + errno_text (code), ErrorCode::io};
+    return Error{"cannot connect to " + where + ": " + std::strerror (code),
+        ErrorCode::io};
   const int on = 1;
   setsockopt (socket, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
   return stream;
@@ -101,7 +98,7 @@ TcpStream::wait_for (short events, Clock::time_point deadline)
     if (ready > 0)
       return {};
     if (ready < 0 && errno != EINTR)
-      return fail (errno_text (errno));
+      return fail (std::strerror (errno));
   }
 }
 
@@ -110,12 +107,11 @@ TcpStream::send (ByteView bytes, Milliseconds timeout)
 {
   const auto deadline = Clock::now () + timeout;
   while (!bytes.empty ()) {
-    if (const auto ready = wait_for (POLLOUT, deadline); !ready)
-      return ready;
+    RETURN_IF_ERROR (wait_for (POLLOUT, deadline));
     const ssize_t sent =
         ::send (socket_, bytes.data (), bytes.size (), MSG_NOSIGNAL);
     if (sent < 0 && errno != EAGAIN && errno != EINTR)
-      return fail (errno_text (errno));
+      return fail (std::strerror (errno));
     bytes = bytes.subspan (std::size_t (std::max<ssize_t> (sent, 0)));
   }
   return {};
@@ -127,13 +123,12 @@ TcpStream::receive (std::size_t size, Milliseconds timeout)
   const auto deadline = Clock::now () + timeout;
   Bytes bytes (size);
   for (std::size_t at = 0; at < size;) {
-    if (const auto ready = wait_for (POLLIN, deadline); !ready)
-      return ready.error ();
+    RETURN_IF_ERROR (wait_for (POLLIN, deadline));
     const ssize_t got = ::recv (socket_, bytes.data () + at, size - at, 0);
     if (got == 0)
       return fail ("the board closed the connection");
     if (got < 0 && errno != EAGAIN && errno != EINTR)
-      return fail (errno_text (errno));
+      return fail (std::strerror (errno));
     at += std::size_t (std::max<ssize_t> (got, 0));
   }
   return bytes;

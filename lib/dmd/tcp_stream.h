@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* A TCP connection whose every wait has an end. */
+/* A TCP connection whose waits have a time limit. */
 #pragma once
 
 #include <chrono>
@@ -30,11 +30,11 @@ public:
   Result<void> send (ByteView bytes, Milliseconds timeout);
   /** Exactly @p size bytes; @p timeout for all of them. */
   Result<Bytes> receive (std::size_t size, Milliseconds timeout);
-  /** Whether the other side has closed, or a failure left the stream in the
-   * middle of something. */
+  /** Whether a failure or a cancelled wait left the stream within a message, or
+   * the other side has closed it. */
   bool broken () const { return broken_; }
 
-  /** Waits end within 50 ms of a request. */
+  /** Waits end within 50 ms of a request to @p stop. */
   void cancel_on (std::stop_token stop) { stop_ = std::move (stop); }
 
 private:

@@ -10,25 +10,25 @@ namespace codedexposure
 namespace
 {
 
-/* Points of the window: 5 ms of jitter leave 4 us (rms) with as many. */
-constexpr std::size_t kMostPoints = 4096;
-/* That many go at once, so that the hull is made anew once for all of them. */
+/* Points of the window: with 5 ms of jitter, the error is 4 us (rms). */
+constexpr std::size_t kMaxPoints = 4096;
+/* Points to drop at a time, because every drop rebuilds the hull. */
 constexpr std::size_t kForgotten = 512;
-/* Frames that come faster share a point, and the window lasts as long. */
+/* Faster frames share a point, so that the window covers the same time. */
 constexpr double kSpacing = 40e6;
 
 constexpr Nanoseconds kClockWentBack = 1'000'000'000;
-/* A frame that is early by this tells of another clock; the line is known
- * better with kSettled points than before. */
+/* A frame that is early by this belongs to another clock; from kSettled points
+ * on, the line is known better. */
 constexpr Nanoseconds kEarly = 20'000'000;
 constexpr Nanoseconds kEarlySettled = 1'000'000;
 constexpr std::size_t kSettled = 256;
 
-/* The drift is known as well as this where the line is known to 25 us. */
+/* Uncertainty of the drift once that of the line is below 25 us. */
 constexpr double kSteady = 10e-6;
 constexpr double kKnown = 25e3;
 
-/* A step that is none of a camera's leaves only the order. */
+/* If the step is not one of a camera, only the order is kept. */
 Nanoseconds
 least_step (Nanoseconds device_step)
 {
@@ -51,7 +51,7 @@ DeviceClock::rejoin ()
   last_.reset ();
 }
 
-/* What was learned before, where nothing better was since. */
+/* Keeps the drift for the next line, if it is known well enough. */
 void
 DeviceClock::remember_drift ()
 {
@@ -97,7 +97,7 @@ DeviceClock::learn (LowerEdge::Point point)
     edge_.lower_last (point);
   else
     return;
-  if (points.size () > kMostPoints)
+  if (points.size () > kMaxPoints)
     edge_.forget (kForgotten);
   const LowerEdge::Estimate estimate = edge_.estimate ();
   line_ = estimate.line;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* A camera's own clock, told by the pipeline's. */
+/* A camera's own clock, converted to the pipeline's. */
 #pragma once
 
 #include <cstdint>
@@ -12,51 +12,50 @@ namespace codedexposure
 {
 
 /**
- * Turns the times that a camera stamps by a clock of its own into those of the
- * pipeline's clock, from when its frames arrive.
+ * Converts the time stamps of a camera's clock to the pipeline's clock, from
+ * the arrival times of its frames.
  *
- * A frame arrives late by what is the same for all, exposure and transfer, and
- * by what differs, queues and schedulers. The latter only ever delays. So the
- * times that frames would have arrived at with none of it lie on a line below
- * all arrivals, which LowerEdge estimates. No delay, however long, can pull it
- * up, and it comes closer to the truth with the number of frames, not its root.
+ * A frame arrives with a common delay, from exposure and transfer, and with one
+ * that differs from frame to frame, from queues and schedulers. The latter is
+ * never negative, so the arrival times without it lie on a line below all
+ * arrivals, which LowerEdge estimates. No delay, however long, moves it up, and
+ * its error falls with the number of frames, not with the root of it.
  *
- * The line is one through the last few thousand frames, so that it follows a
- * drift that changes within minutes. The common delay cannot be seen in it.
+ * The line is fitted to the last few thousand frames and so follows a drift
+ * that changes within minutes. It does not show the common delay.
  */
 class DeviceClock
 {
 public:
-  /** Drifts beyond this are none of a clock: 500 ppm. */
-  static constexpr double kMostDrift = 500e-6;
+  /** Max drift of a clock: 500 ppm. */
+  static constexpr double kMaxDrift = 500e-6;
 
   /**
-   * The pipeline time at which a frame stamped @p device arrives when nothing
-   * holds it up. It never runs back from frame to frame, and where the line
-   * falls it does so by no more than half the distance of two frames at once.
+   * The pipeline time at which a frame stamped @p device arrives without the
+   * varying delay. It never decreases from frame to frame; if the line falls,
+   * the time lags by at most half the distance of two frames.
    *
-   * Begins anew by itself when the camera's clock does: where @p device lies a
-   * second back, or the frame arrives before it could. A frame that is stamped
-   * earlier than the one before is told its time, but teaches nothing.
+   * Restarts when the camera's clock does: if @p device steps back by a second,
+   * or the frame arrives before it could. A frame with an earlier stamp than
+   * the one before gets its time, but does not change the line.
    *
    * @p arrival  by the pipeline's clock.
    */
   Nanoseconds take (Nanoseconds device, Nanoseconds arrival);
   /** Forgets everything: the next frame is the first. */
   void reset ();
-  /** The camera begins anew: the next frame is the first, of a clock whose
-   * drift is about the same, unless frames show another. */
+  /** The camera restarts: the next frame is the first, of a clock with about
+   * the same drift, unless frames show another. */
   void rejoin ();
 
-  /** By how much the camera's clock is faster, as a part of it; 0 before there
-   * are two frames. */
+  /** By which part the camera's clock is faster; 0 before the second frame. */
   double drift () const { return -line_.slope / (1 + line_.slope); }
-  /** By how much the last frame arrived after its time, >= 0. */
+  /** Varying delay of the last frame, >= 0. */
   Nanoseconds lateness () const { return lateness_; }
-  /** What the error of the last frame's time stays below in 95 of 100 frames;
-   * none while there are too few to say. */
+  /** 95 % bound on the error of the last frame's time; none after too few
+   * frames. */
   std::optional<Nanoseconds> uncertainty () const { return uncertainty_; }
-  /** How often it began anew since it was made, the first time not counted. */
+  /** Number of restarts, without the first start. */
   std::uint64_t restarts () const { return restarts_; }
 
 private:
@@ -71,13 +70,13 @@ private:
     Nanoseconds told;
   };
 
-  std::optional<Mark> last_; // none: nothing was learned
+  std::optional<Mark> last_; // none: no frame yet
   Nanoseconds origin_device_ = 0;
   Nanoseconds origin_arrival_ = 0;
   /* Delays, arrival - device, by device time, both since the first frame; they
    * grow as the camera's clock lags. One point at least every kSpacing, the
    * lowest there. */
-  LowerEdge edge_{kMostDrift};
+  LowerEdge edge_{kMaxDrift};
   LowerEdge::Line line_;
   std::optional<double> deviation_; // of the line at the last frame
   std::optional<Nanoseconds> uncertainty_;

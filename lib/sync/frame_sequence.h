@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* From the times of frames to their numbers: what was lost, late or doubled. */
+/* Numbers of frames from their times: lost, late and duplicate frames. */
 #pragma once
 
 #include <cstdint>
@@ -16,13 +16,13 @@ enum class Arrival {
   next,       ///< one frame period later
   after_loss, ///< more than 1.5 frame periods later
   duplicate,  ///< at the time of the frame before
-  late,       ///< at a time that was passed already
-  restarted,  ///< the camera's time began anew
+  late,       ///< before the frame before
+  restarted,  ///< the camera's clock restarted
 };
 
 struct FrameStep {
   Arrival arrival = Arrival::first;
-  /** Number of the frame, lost ones counted. A late frame has the number that
+  /** Number of the frame, including lost ones. A late frame has the number that
    * was counted as lost, a duplicate that of the frame before. */
   std::uint64_t number = 0;
   /** Frames missing right before this one. */
@@ -32,11 +32,11 @@ struct FrameStep {
 /**
  * Numbers frames by their times.
  *
- * The period comes from the frame rate, never from the distance of two frames.
- * A step of less than a quarter of a period makes a duplicate, one of more than
- * 1.5 periods a loss; all between is jitter. A time that runs backward is one
- * late frame, or a new start of the camera when the next one is behind as well
- * or it lies more than a second back.
+ * The period comes from the frame rate, never from two frames. A step of less
+ * than a quarter of a period is a duplicate, one of more than 1.5 periods a
+ * loss; steps between are jitter. A step backward is one late frame, or a
+ * restart of the camera if the next one is behind as well or the step is longer
+ * than a second.
  */
 class FrameSequence
 {
@@ -49,11 +49,11 @@ public:
 
   /** @p time of the frame, any epoch; times fall when @p reverse. */
   FrameStep take (Nanoseconds time, bool reverse = false);
-  /** A frame of a camera that was away, at a time of another beginning: it
-   * follows, @p lost frames later. */
+  /** A frame of a camera that was disconnected, at a time of another epoch: it
+   * follows @p lost frames later. */
   FrameStep take_after (Nanoseconds time, std::uint64_t lost);
-  /** The next frame follows at whatever time it has: after a flush, or a new
-   * segment. Numbers go on. */
+  /** The next frame may follow at any time: after a flush, or a new segment.
+   * Numbers continue. */
   void resync ();
 
 private:

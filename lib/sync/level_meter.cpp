@@ -12,7 +12,7 @@ namespace
 constexpr int kCodeRows = 64;
 constexpr int kPilotRows = 16;
 
-/** At most @p wanted of the numbers 0..available - 1, evenly spread. */
+/** At most @p wanted of the numbers 0..available - 1, evenly spaced. */
 std::vector<int>
 spread (int available, int wanted)
 {
@@ -57,7 +57,7 @@ LevelMeter::LevelMeter (const Schedule &schedule, int width, int height)
         double (columns) * double (blocks_.size ());
   }
 
-  /* The row next to the code gets light from it through the lens. */
+  /* The lens blurs light of the code into the row next to it. */
   const int margin = schedule.pilot_rows () > 2 ? 1 : 0;
   pilot_rows_ =
       spread (std::min (height, schedule.pilot_rows ()) - margin, kPilotRows);

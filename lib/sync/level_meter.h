@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Mean levels of a coded frame: what the phase of the masks shows itself in. */
+/* Mean levels of a coded frame, which depend on the phase of the masks. */
 #pragma once
 
 #include <array>
@@ -13,16 +13,16 @@
 namespace codedexposure
 {
 
-/** Means over pixels, in counts. */
+/** Means over pixels, in digital numbers. */
 struct Levels {
   std::vector<double> elements;              ///< of each element of the code
   std::array<double, kPilotColumns> pilot{}; ///< of the pilot's columns
 };
 
 /**
- * Measures the levels of frames of one size, from a part of the rows that holds
- * every row of the tile equally often: some 64 rows of the code and 16 of the
- * pilot, spread over the frame.
+ * Measures the levels of frames of one size, from rows that contain every row
+ * of the tile equally often: about 64 rows of the code and 16 of the pilot,
+ * spread over the frame.
  */
 class LevelMeter
 {
@@ -33,7 +33,7 @@ public:
    * where there is one. */
   bool complete () const { return complete_; }
 
-  /** @p frame  of the size that was given. Valid until the next call. */
+  /** @p frame  of that size. The result is valid until the next call. */
   template <typename Pixel>
   const Levels &measure (ImageView<const Pixel> frame);
 

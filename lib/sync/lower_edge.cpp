@@ -10,13 +10,13 @@ namespace codedexposure
 namespace
 {
 
-/* Slopes over which lines are weighed. */
+/* Number of slopes to average over. */
 constexpr int kSlopes = 64;
-/* Lines that are less likely than the likeliest by exp (this) do not count. */
+/* Log likelihood below the maximum from which lines are ignored. */
 constexpr double kNegligible = 20;
-/* Nor are lines believed in that are by exp (this) less likely than others. */
+/* Log likelihood below the maximum at which an expected slope is dropped. */
 constexpr double kIncredible = 10;
-/* No two points are told apart that are closer. */
+/* Smallest distance between points that counts. */
 constexpr double kGrain = 1;
 
 } // namespace
@@ -76,8 +76,8 @@ LowerEdge::forget (std::size_t count)
     add_to_hull (point);
 }
 
-/* Where the highest line of that slope below all points is in the middle of
- * them: it touches the hull where edges become steeper than itself. */
+/* Height, in the middle of the points, of the highest line of that slope below
+ * all of them: it touches the hull where edges become steeper. */
 double
 LowerEdge::height_below (double slope) const
 {
@@ -89,8 +89,7 @@ LowerEdge::height_below (double slope) const
   return touched->y + slope * (middle () - touched->x);
 }
 
-/* That of the line which is highest in the middle: the edge of the hull there.
- */
+/* Slope of the line that is highest in the middle: an edge of the hull. */
 double
 LowerEdge::highest_slope (Range range) const
 {
@@ -103,7 +102,7 @@ LowerEdge::highest_slope (Range range) const
       (right->y - left->y) / (right->x - left->x), range.from, range.to);
 }
 
-/* Those that lines can have. */
+/* Possible slopes of lines. */
 LowerEdge::Range
 LowerEdge::slopes () const
 {
@@ -117,15 +116,15 @@ LowerEdge::slopes () const
   return density && *density * loss > kIncredible ? all : *expected_;
 }
 
-/* How many points lie right above the line, per unit of height. The lowest
- * sixteenth of all tells, or more where that is few: higher up, they may be as
- * rare as they like. Two are spent on the line itself, which touches them. */
+/* Points just above the line, per unit of height. Only the lowest sixteenth
+ * counts, or more if that is few: further up, any density is possible. Two are
+ * subtracted for the line itself, which touches them. */
 std::optional<double>
 LowerEdge::density (const Line &highest) const
 {
   constexpr std::ptrdiff_t kTouching = 2;
   constexpr std::ptrdiff_t kEnough = 16;
-  if (points_.size () < kFewest)
+  if (points_.size () < kMinPoints)
     return std::nullopt;
   above_.clear ();
   for (const Point &point : points_)
@@ -138,7 +137,7 @@ LowerEdge::density (const Line &highest) const
   return double (counted + 1 - kTouching) / std::max (*last, kGrain);
 }
 
-/* The slope farthest from @p from towards @p to of which a line is as high. */
+/* The last slope from @p from towards @p to whose line is as high. */
 double
 LowerEdge::last_slope (double from, double to, double least_height) const
 {
@@ -172,7 +171,7 @@ LowerEdge::estimate () const
     const double slope = first + (k + 0.5) * step;
     const double height = height_below (slope);
     const double weight = std::exp (*density * (height - highest));
-    /* Against those of the top line: small numbers keep their digits. */
+    /* Relative to the top line, to keep precision. */
     const double end = height - highest + (slope - best) * arm;
     weights += weight;
     slopes += weight * slope;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The line that points lie above, some of them closely. */
+/* The line below a set of points, some of which lie close to it. */
 #pragma once
 
 #include <cstddef>
@@ -10,22 +10,22 @@ namespace codedexposure
 {
 
 /**
- * Estimates a straight line from points that lie above it by amounts that are
- * independent of each other, and of which the smallest are as likely as those a
- * little larger: uniform or exponential ones, say.
+ * Estimates a straight line from points at independent distances above it, of
+ * which the smallest are as likely as slightly larger ones: for example uniform
+ * or exponential distances.
  *
- * Only lines below all points are possible, and of these one is the likelier
- * the higher it is: exp (density x area below it), with the density of the
- * points right above the line. The mean of all possible lines, so weighed, is
- * the estimate of the least mean square error that there is (Pitman's, for the
- * Poisson process which the lowest points tend to), without a bias; their
- * spread is its uncertainty. All depends on the lower convex hull alone, but
- * for the density, which the points next to the line tell.
+ * Only lines below all points are possible, and a line is the likelier the
+ * higher it is: exp (density x area below it), with the density of the points
+ * just above the line. The mean of all possible lines with these weights is the
+ * unbiased estimate of min mean square error (Pitman's, for the Poisson process
+ * that the lowest points approach); their spread is its uncertainty. All of it
+ * depends on the lower convex hull only, except for the density, which comes
+ * from the points next to the line.
  *
- * Error and uncertainty fall with the number of points, not with its root: n
- * points, spread evenly and up to J above the line, leave 3.1 J / n (rms) at
- * its end. Where the smallest amounts are rarer than larger ones, the line
- * comes out too high, and the uncertainty too small.
+ * Error and uncertainty fall with the number of points, not with the root of
+ * it: n points, spread evenly and up to J above the line, leave 3.1 J / n (rms)
+ * at its end. If the smallest distances are rarer than larger ones, the line is
+ * too high and the uncertainty too small.
  */
 class LowerEdge
 {
@@ -41,32 +41,31 @@ public:
   };
   struct Estimate {
     Line line;
-    /** Standard deviation of its height at the last point; none from fewer than
-     * kFewest points. */
+    /** Standard deviation of its height at the last point; none for fewer than
+     * kMinPoints points. */
     std::optional<double> deviation;
   };
 
-  static constexpr std::size_t kFewest = 8;
+  static constexpr std::size_t kMinPoints = 8;
 
-  /** @p steepest  slope, up or down, that the line can have. */
+  /** @p steepest  max slope of the line, up or down. */
   explicit LowerEdge (double steepest) : steepest_ (steepest) {}
 
   /** Forgets all points. */
   void clear ();
-  /** Slopes are by no more than @p by away from @p slope, unless the points
-   * speak clearly against it. */
+  /** Expects a slope within @p by of @p slope, unless the points clearly
+   * contradict it. */
   void expect (double slope, double by);
   void expect_any ();
   /** @p point  to the right of all others. */
   void add (Point point);
-  /** Puts @p point, lower and not further to the left, in the last one's place.
-   */
+  /** Replaces the last point by a lower one that is not further to the left. */
   void lower_last (Point point);
   /** Forgets the first @p count points. */
   void forget (std::size_t count);
 
   const std::vector<Point> &points () const { return points_; }
-  /** There has to be a point. */
+  /** Needs at least one point. */
   Estimate estimate () const;
 
 private:

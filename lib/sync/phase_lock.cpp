@@ -9,10 +9,10 @@ namespace
 
 using Kind = PhaseReading::Kind;
 
-/* A restart that was not seen by then is asked for again. More frames than a
- * camera driver keeps in flight. */
+/* A restart that is not visible by then is requested again. More frames than a
+ * camera driver buffers. */
 constexpr int kPatience = 64;
-/* Frames too unclear to show the phase that are believed after a restart. */
+/* Unclear frames after a restart that are taken as in phase. */
 constexpr int kUnopposed = 3;
 
 } // namespace

@@ -10,7 +10,7 @@
 namespace codedexposure
 {
 
-/** What is decided on one frame. */
+/** The decision on one frame. */
 struct LockDecision {
   bool locked = false;
   /** Slots by which the masks come late (> 0) or early; 0 when locked. */
@@ -18,14 +18,14 @@ struct LockDecision {
 
   /** Set on the frame on which a slip is established. */
   struct Slip {
-    std::uint64_t first_frame; ///< in which it was seen
+    std::uint64_t first_frame; ///< that showed it
     int slots;
     bool certain; ///< of the number of slots
   };
   std::optional<Slip> slipped;
   /** The phase is known from this frame on, and was not before. */
   bool locked_now = false;
-  /** The DMD is to be started anew. */
+  /** The DMD must be restarted. */
   bool restart = false;
 };
 
@@ -37,11 +37,10 @@ struct LockDecision {
  *                            +--------------------------------------+
  *
  * A DMD that was started is in phase until a frame shows otherwise. After a
- * slip it is started anew where that can be done, and no frame is locked until
- * the restart has been seen: by the pilot, or else by an exposure with parked
- * mirrors (in which a DMD that triggers the camera shows as a gap) followed by
- * a frame in phase. Frames that were exposed before the restart and arrive
- * after it look like those after it, however many there are.
+ * slip it is restarted if possible, and no frame is locked until the restart is
+ * visible: in the pilot, or as an exposure with parked mirrors (a gap, if the
+ * DMD triggers the camera) followed by a frame in phase. Frames exposed before
+ * the restart look like those after it, however many arrive late.
  */
 class PhaseLock
 {
@@ -55,7 +54,7 @@ public:
   explicit PhaseLock (const Options &options) : options_ (options) {}
 
   /** @p sight  of frame @p number, before which @p lost frames are missing.
-   *  @p restarted  the DMD has no restart to do. */
+   *  @p restarted  no restart is pending. */
   LockDecision take (const PhaseSight &sight, std::uint64_t number,
       std::uint64_t lost, bool restarted);
 
@@ -74,7 +73,7 @@ private:
   std::uint64_t first_frame_ = 0; // of the slip, or of its suspicion
   int awaited_ = 0;               // frames since the restart
   bool restart_seen_ = false;
-  int unopposed_ = 0; // frames since then that speak against nothing
+  int unopposed_ = 0; // frames since then without a contradiction
 };
 
 } // namespace codedexposure

@@ -1,6 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* What one frame shows of the phase of the masks against the exposure. */
+/* The phase of the masks in one frame, also as read from the pilot. */
 #pragma once
+
+#include <array>
+
+#include "schedule/pilot.h"
 
 namespace codedexposure
 {
@@ -8,9 +12,9 @@ namespace codedexposure
 struct PhaseReading {
   enum class Kind {
     unclear,  ///< too dark, or explained by neither
-    in_phase, ///< as the schedule has it
-    slipped,  ///< the masks stand in slots that are not theirs
-    parked,   ///< the mirrors show no mask at all
+    in_phase, ///< as in the schedule
+    slipped,  ///< the masks are shown in wrong slots
+    parked,   ///< the mirrors show no mask
   };
 
   Kind kind = Kind::unclear;
@@ -21,5 +25,19 @@ struct PhaseReading {
 
   bool operator== (const PhaseReading &) const = default;
 };
+
+/**
+ * The phase that the pilot of a frame shows.
+ *
+ * Lit columns are told from dark ones by comparison, so that neither the light
+ * of the scene nor off-state leakage matters. A frame whose lit columns have
+ * masks of one of the pilot's two frames is in phase; other columns are only
+ * lit by masks in wrong slots.
+ *
+ * @p slots  of the schedule.
+ * @p means  of the pilot's columns, in digital numbers.
+ */
+PhaseReading read_pilot (
+    int slots, const std::array<double, kPilotColumns> &means);
 
 } // namespace codedexposure

@@ -1,16 +1,14 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "sync/phase_watch.h"
 
-#include "sync/pilot_phase.h"
-
 namespace codedexposure
 {
 
 namespace
 {
 
-/** The levels of elements are those of the whole frame, which regions break;
- * and those of a one-hot code show nothing that a flash could not. */
+/** Regions change the levels of elements, which are means over the frame; those
+ * of a one-hot code cannot be told from a flash. */
 bool
 has_signature (const Schedule &schedule)
 {
@@ -37,8 +35,8 @@ PhaseWatch::PhaseWatch (const Schedule &schedule, int width, int height)
   const bool pilot = schedule.pilot_rows () > 0;
   if (pilot)
     pilot_slots_ = schedule.slots ();
-  /* Beside a pilot even the signature of a one-hot code is worth reading: the
-   * next frame tells a slip from a flash. */
+  /* With a pilot, the signature of a one-hot code is useful, too: the next
+   * frame distinguishes a slip from a flash. */
   SlipSignature signature (schedule);
   if (signature.distinct () && schedule.regions ().empty () &&
       (pilot || !schedule.code ().one_hot ()))

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* From a coded frame to what it shows of the phase of the masks. */
+/* The phase of the masks from a coded frame. */
 #pragma once
 
 #include <cstdint>
@@ -14,29 +14,26 @@
 namespace codedexposure
 {
 
-/** When a slip of the DMD by whole slots shows itself. */
+/** In which frames a slip of the DMD by whole slots is visible. */
 enum class SlipObservable {
   never,        ///< in no frame
-  in_the_frame, ///< in the frame during which it happens, if it happens inside
-                ///< the exposure; in none after that
+  in_the_frame, ///< only in the frame during whose exposure it happens
   always,       ///< in every frame while it lasts
 };
 
-/**
- * With a pilot, always. Without one, in the frame where the code has a level
- * signature; a code of one slot an element has none that could be told from a
- * flash of light in one slot.
- */
+/** With a pilot, always. Without one, in the frame if the code has a level
+ * signature; that of a one-hot code cannot be told from a flash of light in one
+ * slot. */
 SlipObservable slip_observable (const Schedule &schedule);
 
-/** What a frame shows, and how far that can be trusted. */
+/** What a frame shows, and whether it is certain. */
 struct PhaseSight {
   PhaseReading reading;
-  /** The next frame shows for certain whether a slip that was read is one. */
+  /** The next frame shows for certain whether this slip is real. */
   bool next_frame_tells = false;
 };
 
-/** Joins the pilot and the signature of the levels; frames of one size. */
+/** Combines the pilot and the signature of the levels; frames of one size. */
 class PhaseWatch
 {
 public:

@@ -13,8 +13,8 @@ namespace
 
 constexpr std::size_t kSteps = 64;
 
-/* Frames a second: steps over a loss are several periods of the usual step,
- * which is the median, and better known as the mean of those about it. */
+/* Frames per second: steps over a loss are several periods of the usual step,
+ * which is the median at first, then the mean of the steps near it. */
 double
 measure (std::vector<Nanoseconds> steps)
 {

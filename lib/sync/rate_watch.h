@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Whether frames come at the rate that was said. */
+/* Whether frames come at the announced rate. */
 #pragma once
 
 #include <optional>
@@ -11,30 +11,30 @@ namespace codedexposure
 {
 
 /**
- * Measures the frame rate from the times of frames, whatever their jitter and
- * losses, over 64 steps at a time. A camera that somebody else triggers may
- * well run at another rate than the one it was asked for.
+ * Measures the frame rate from the times of frames, in spite of jitter and
+ * losses, over 64 steps at a time. A camera with an external trigger may run at
+ * another rate than the requested one.
  */
 class RateWatch
 {
 public:
-  /** Rates that differ by less are the same: more than any clock is wrong by,
-   * and than jitter of a quarter period makes. */
+  /** Smaller relative differences are ignored: it is more than the error of any
+   * clock, and than the effect of a jitter of a quarter period. */
   static constexpr double kTolerance = 0.01;
 
   explicit RateWatch (FrameRate said) : said_ (said) {}
 
-  /** The rate that was measured, where it is another than was said, and than
-   * was returned last. @p time of the frame, rising; any epoch. */
+  /** The measured rate, if it differs from the announced one and from the last
+   * one returned. @p time of the frame, ascending; any epoch. */
   std::optional<double> take (Nanoseconds time);
-  /** The next frame follows at whatever time it has. */
+  /** The next frame may follow at any time. */
   void resync () { last_.reset (); }
 
 private:
   FrameRate said_;
   std::optional<Nanoseconds> last_;
   std::vector<Nanoseconds> steps_;
-  double told_ = 0; // 0: what was said
+  double told_ = 0; // 0: the announced one
 };
 
 } // namespace codedexposure

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* From which frame on a DMD shows what it was told to. */
+/* The first frame that shows a new mask of the DMD. */
 #pragma once
 
 #include <algorithm>
@@ -24,12 +24,12 @@ mean_level (ImageView<const Pixel> frame)
 }
 
 /**
- * A DMD that shows something else leaves one exposure dark, or without a
- * trigger, before it does (dmd.h). Frames that were exposed before may still
- * come after it was done; the dark frame, or the gap, is where they end.
+ * Before it shows something else, a DMD leaves one exposure dark, or without a
+ * trigger (dmd.h). Frames exposed before may still arrive after the switch; the
+ * dark frame, or the gap, ends them.
  *
- * What is dark itself shows no such border: it is believed after kPatience
- * frames, more than a camera keeps on the way.
+ * If the new mask is dark itself, that border is invisible: the switch counts
+ * after kPatience frames, more than a camera buffers.
  */
 class SwitchWatch
 {
@@ -40,7 +40,7 @@ public:
   explicit SwitchWatch (bool gap_shows = false) : gap_shows_ (gap_shows) {}
 
   bool waiting () const { return waiting_; }
-  /** Something else is asked for. */
+  /** A switch is requested. */
   void begin ()
   {
     waiting_ = true;
@@ -48,8 +48,8 @@ public:
     since_ = 0;
   }
   /**
-   * Whether a frame shows it.
-   * @p done   the device says that it does.
+   * Whether a frame shows the new mask.
+   * @p done   the device reports the switch.
    * @p level  mean_level () of the frame.
    * @p gap    frames are missing before this one.
    */
@@ -66,7 +66,7 @@ public:
   }
 
 private:
-  /* Gratings and codes keep above it, light that shut mirrors leak below. */
+  /* Gratings and codes are brighter, off-state leakage is darker. */
   static constexpr double kDarkPart = 8.0;
 
   bool gap_shows_;

@@ -15,30 +15,17 @@ namespace codedexposure::tool
 {
 
 void
-Session::fail (Exit code, const Error &error)
-{
-  exit = stop.stop_requested () ? Exit::interrupted : code;
-  if (json)
-    std::printf ("%s\n",
-        nlohmann::ordered_json{{"error", error.message}}.dump (2).c_str ());
-  std::fprintf (stderr, "codedexposure: %s\n", error.message.c_str ());
-}
-
-void
-Session::print (const nlohmann::ordered_json &object) const
+Session::print (const Json &object) const
 {
   if (json) {
     std::printf ("%s\n", object.dump (2).c_str ());
     return;
   }
-  const auto text = [] (const nlohmann::ordered_json &value) {
-    return value.is_string () ? value.get<std::string> () : value.dump ();
-  };
-  const auto lines =
-      object.is_array () ? object : nlohmann::ordered_json{object};
-  for (const auto &entry : lines)
+  for (const Json &entry : object.is_array () ? object : Json{object})
     for (const auto &[name, value] : entry.items ())
-      std::printf ("%-18s %s\n", name.c_str (), text (value).c_str ());
+      std::printf ("%-18s %s\n", name.c_str (),
+          (value.is_string () ? value.get<std::string> () : value.dump ())
+              .c_str ());
 }
 
 void
@@ -48,28 +35,93 @@ Session::say (const std::string &line) const
     std::fprintf (stderr, "%s\n", line.c_str ());
 }
 
-Result<FrameRate>
+FrameRate
 parse_rate (const std::string &text)
 {
   const auto parts = split (text, '/');
   constexpr int kPerSecond = 1000;
-  FrameRate rate;
+  FrameRate rate{0, 0};
   if (parts.size () == 2) {
     const auto num = parse_int (parts[0]), den = parse_int (parts[1]);
     rate = {num.value_or (0), den.value_or (0)};
   } else if (const auto real = parse_real (text);
-             real && parts.size () == 1 && *real > 0 && *real < 1e6) {
+             real && *real > 0 && *real < 1e6) {
     const int num = int (std::lround (*real * kPerSecond));
     const int common = std::gcd (num, kPerSecond);
     rate = {num / common, kPerSecond / common};
-  } else {
-    rate = {0, 0};
   }
   if (rate.num > 0 && rate.den > 0)
     return rate;
-  return Error{"cannot use " + in_quotes (text) +
-               " as a frame rate; use a number or a fraction, such as 25 or "
-               "30000/1001"};
+  throw Failure{Exit::usage,
+      Error{"cannot use " + in_quotes (text) +
+            " as a frame rate; use a number or a fraction, such as 25 or "
+            "30000/1001"}};
+}
+
+DmdInfo
+find_board (const std::string &name)
+{
+  const DmdInfo boards[] = {
+      {.name = "dlp3000",
+          .size = {608, 684},
+          .minimum_active = 250'000,
+          .minimum_switching = 250'000,
+          .resident_masks = 96,
+          .array = Array::diamond},
+      {.name = "dlp4500",
+          .size = {912, 1140},
+          .minimum_active = 235'000,
+          .resident_masks = 48,
+          .array = Array::diamond},
+      {.name = "dlp6500",
+          .size = {1920, 1080},
+          .minimum_active = 105'000,
+          .resident_masks = 400},
+      {.name = "dlp9000",
+          .size = {2560, 1600},
+          .minimum_active = 105'000,
+          .resident_masks = 400},
+  };
+  for (const DmdInfo &board : boards)
+    if (name == board.name)
+      return board;
+  throw Failure{
+      Exit::usage, Error{"unknown DMD " + in_quotes (name) +
+                         "; use dlp3000, dlp4500, dlp6500 or dlp9000"}};
+}
+
+Show
+fit (const Session &session, const DmdInfo &info)
+{
+  const FrameRate rate = parse_rate (session.rate);
+  Schedule schedule =
+      value_of (Schedule::parse (session.schedule), Exit::usage);
+  const SlotPlan plan =
+      value_of (SlotPlan::fit (schedule.timing (), schedule.slots (), rate),
+          Exit::does_not_fit);
+  value_of (check_limits (info, schedule, plan), Exit::does_not_fit);
+  return {std::move (schedule), plan};
+}
+
+void
+add_schedule_argument (CLI::App *command, Session &session)
+{
+  command->add_option (
+      "schedule", session.schedule, "CODE:TILE[,key=value...] or a JSON file");
+}
+
+void
+add_rate_option (CLI::App *command, Session &session)
+{
+  command->add_option (
+      "--rate", session.rate, "Frame rate of the camera, frames/s");
+}
+
+void
+add_board_option (CLI::App *command, Session &session)
+{
+  command->add_option (
+      "--dmd", session.board, "DMD: dlp3000, dlp4500, dlp6500 or dlp9000");
 }
 
 namespace
@@ -102,6 +154,17 @@ private:
   std::jthread thread_; // last: it uses all of the above
 };
 
+void
+report (Session &session, const Failure &failure)
+{
+  const std::string &message = failure.error.message;
+  session.exit =
+      session.stop.stop_requested () ? Exit::interrupted : failure.exit;
+  if (session.json)
+    std::printf ("%s\n", Json{{"error", message}}.dump (2).c_str ());
+  std::fprintf (stderr, "codedexposure: %s\n", message.c_str ());
+}
+
 int
 run (int argc, char **argv)
 {
@@ -122,6 +185,8 @@ run (int argc, char **argv)
   add_schedule_commands (app, session);
   try {
     app.parse (argc, argv);
+  } catch (const Failure &failure) {
+    report (session, failure);
   } catch (const CLI::RequiredError &error) {
     /* Most often, the subcommand is misspelt. */
     const auto words = app.remaining (true);
@@ -134,8 +199,7 @@ run (int argc, char **argv)
           in_quotes (words.front ()).c_str ());
     return int (Exit::usage);
   } catch (const CLI::ParseError &error) {
-    const int code = app.exit (error);
-    return code == 0 ? 0 : int (Exit::usage);
+    return app.exit (error) == 0 ? 0 : int (Exit::usage);
   }
   return int (session.exit);
 }

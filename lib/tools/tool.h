@@ -2,18 +2,20 @@
 /* The commands of the tool codedexposure, and what they share. */
 #pragma once
 
-#include <optional>
 #include <stop_token>
 #include <string>
+#include <type_traits>
 
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "base/result.h"
-#include "schedule/schedule.h"
+#include "dmd/dmd.h"
 
 namespace codedexposure::tool
 {
+
+using Json = nlohmann::ordered_json;
 
 /** Exit status; the man page lists them. */
 enum class Exit {
@@ -25,23 +27,57 @@ enum class Exit {
   interrupted = 130, ///< by SIGINT or SIGTERM
 };
 
-/** The options that all commands share, and the exit status. */
+/** Thrown by commands; main () prints the message. */
+struct Failure {
+  Exit exit;
+  Error error;
+};
+
+/** The value of @p result; throws a Failure if it has none. */
+template <typename T>
+T
+value_of (Result<T> result, Exit exit)
+{
+  if (!result)
+    throw Failure{exit, result.error ()};
+  if constexpr (!std::is_void_v<T>)
+    return *std::move (result);
+}
+
+/** The arguments of all commands, and the exit status. */
 struct Session {
   bool json = false;
   bool quiet = false;
+  std::string device = "usb:";
+  std::string schedule = "sequential:2x2";
+  std::string rate = "25";
+  std::string board = "dlp6500";
   std::stop_token stop; ///< requested by SIGINT or SIGTERM
   Exit exit = Exit::done;
 
-  /** Sets the exit status and prints the error. */
-  void fail (Exit code, const Error &error);
   /** Prints a result as JSON, or as lines "name  value". */
-  void print (const nlohmann::ordered_json &object) const;
+  void print (const Json &object) const;
   /** Prints a line of progress to standard error, unless --quiet. */
   void say (const std::string &line) const;
 };
 
 /** "25", "29.97" or "30000/1001" frames/s. */
-Result<FrameRate> parse_rate (const std::string &text);
+FrameRate parse_rate (const std::string &text);
+
+/** What a board can do: dlp3000, dlp4500, dlp6500 or dlp9000. */
+DmdInfo find_board (const std::string &name);
+
+/** A schedule, and its slots on a device that can show them. */
+struct Show {
+  Schedule schedule;
+  SlotPlan plan;
+};
+/** The schedule and frame rate of @p session on a device. */
+Show fit (const Session &session, const DmdInfo &info);
+
+void add_schedule_argument (CLI::App *command, Session &session);
+void add_rate_option (CLI::App *command, Session &session);
+void add_board_option (CLI::App *command, Session &session);
 
 void add_advise_command (CLI::App &app, Session &session);
 void add_dmd_commands (CLI::App &app, Session &session);

@@ -66,7 +66,7 @@ TEST (PatternTiming, MasksThatAreTooShortAreRefusedWithTheNumbers)
                  .error ()
                  .message,
       "each of 256 slots lasts 65us, the DMD shows a mask for 105us at least; "
-      "take fewer slots or a lower frame rate");
+      "use fewer slots or a lower frame rate");
 }
 
 TEST (PatternTiming, MasksThatAreTooLongAreRefused)

@@ -7,7 +7,7 @@
 
 #include "advise/advice.h"
 #include "base/text.h"
-#include "tools/board_kinds.h"
+#include "base/try.h"
 #include "tools/tool.h"
 
 namespace codedexposure::tool
@@ -16,14 +16,10 @@ namespace codedexposure::tool
 namespace
 {
 
-using Json = nlohmann::ordered_json;
-
 struct Arguments {
   Conditions conditions;
   std::vector<std::string> schedules;
   std::string size = "768x576";
-  std::string rate = "25";
-  std::string board = "dlp6500";
   std::string readout = "0";
   double min_rate = 0.0;
 };
@@ -34,47 +30,28 @@ struct Finding {
   Result<Prediction> prediction;
 };
 
-Result<Extent>
-parse_size (const std::string &text)
-{
-  const auto sides = split (text, 'x');
-  const auto width = parse_int (sides.front ());
-  const auto height = parse_int (sides.back ());
-  if (sides.size () == 2 && width && height)
-    return Extent{*width, *height};
-  return Error{"cannot use " + in_quotes (text) +
-               " as a size; use WIDTHxHEIGHT, such as 768x576"};
-}
-
 /** The schedules to compare: those on the command line, else the usual ones. */
-Result<std::vector<Schedule>>
+std::vector<Schedule>
 candidates (const Arguments &arguments, const DmdInfo &board)
 {
-  const auto readout = parse_time (arguments.readout);
-  if (!readout)
-    return readout.error ();
+  const Nanoseconds readout =
+      value_of (parse_time (arguments.readout), Exit::usage);
   if (arguments.schedules.empty ())
-    return usual_schedules (board.minimum_switching, *readout);
+    return usual_schedules (board.minimum_switching, readout);
   std::vector<Schedule> schedules;
-  for (const std::string &text : arguments.schedules) {
-    auto schedule = Schedule::parse (text);
-    if (!schedule)
-      return schedule.error ();
-    schedules.push_back (*std::move (schedule));
-  }
+  for (const std::string &text : arguments.schedules)
+    schedules.push_back (value_of (Schedule::parse (text), Exit::usage));
   return schedules;
 }
 
 Result<Prediction>
-look_at (const Schedule &schedule, const Conditions &conditions,
-    const DmdInfo &board)
+predict_on (const DmdInfo &board, const Schedule &schedule,
+    const Conditions &conditions)
 {
-  const auto plan = SlotPlan::fit (
-      schedule.timing (), schedule.slots (), conditions.camera.rate);
-  if (!plan)
-    return plan.error ();
-  if (const auto fits = check_limits (board, schedule, *plan); !fits)
-    return fits.error ();
+  ASSIGN_OR_RETURN (
+      const SlotPlan plan, SlotPlan::fit (schedule.timing (), schedule.slots (),
+                               conditions.camera.rate));
+  RETURN_IF_ERROR (check_limits (board, schedule, plan));
   return predict (schedule, conditions);
 }
 
@@ -193,27 +170,24 @@ advise (Session &session, Arguments arguments)
 {
   Conditions &conditions = arguments.conditions;
   const auto size = parse_size (arguments.size);
-  const auto rate = parse_rate (arguments.rate);
-  const auto board = find_kind (arguments.board);
-  if (!size || !rate)
-    return session.fail (Exit::usage, size ? rate.error () : size.error ());
-  if (!board)
-    return session.fail (Exit::usage, board.error ());
+  if (!size)
+    throw Failure{
+        Exit::usage, Error{"cannot use " + in_quotes (arguments.size) +
+                           " as a size; use WIDTHxHEIGHT, such as 768x576"}};
   conditions.camera.size = *size;
-  conditions.camera.rate = *rate;
-  const auto schedules = candidates (arguments, *board);
+  conditions.camera.rate = parse_rate (session.rate);
+  const DmdInfo board = find_board (session.board);
+  const auto schedules = candidates (arguments, board);
   /* The prediction without masks fails only if the conditions are invalid. */
-  const auto none = predict (std::nullopt, conditions);
-  if (!schedules || !none)
-    return session.fail (
-        Exit::usage, schedules ? none.error () : schedules.error ());
+  const Prediction none =
+      value_of (predict (std::nullopt, conditions), Exit::usage);
 
-  std::vector<Finding> findings{{none->text (), *none}};
-  for (const Schedule &schedule : *schedules) {
+  std::vector<Finding> findings{{none.text (), none}};
+  for (const Schedule &schedule : schedules) {
     if (session.stop.stop_requested ())
-      return session.fail (Exit::interrupted, Error{"interrupted"});
+      throw Failure{Exit::interrupted, Error{"interrupted"}};
     findings.push_back (
-        {schedule.text (), look_at (schedule, conditions, *board)});
+        {schedule.text (), predict_on (board, schedule, conditions)});
   }
   show (session, arguments, findings);
 }
@@ -231,8 +205,7 @@ add_advise_command (CLI::App &app, Session &session)
       "CODE:TILE[,key=value...] or JSON files; default: the usual ones");
   sub->add_option (
       "--size", arguments->size, "Size of the camera, WIDTHxHEIGHT");
-  sub->add_option (
-      "--rate", arguments->rate, "Frame rate of the camera, frames/s");
+  add_rate_option (sub, session);
   sub->add_option ("--full-well", conditions.camera.noise.full_well,
       "Full-well capacity of a pixel, e-");
   sub->add_option (
@@ -240,8 +213,7 @@ add_advise_command (CLI::App &app, Session &session)
   sub->add_option ("--bits", conditions.camera.bits, "Bits of a pixel");
   sub->add_option ("--readout", arguments->readout,
       "Dead time of the camera at the end of a frame, such as 500us");
-  sub->add_option (
-      "--dmd", arguments->board, "DMD: dlp3000, dlp4500, dlp6500 or dlp9000");
+  add_board_option (sub, session);
   sub->add_option ("--light", conditions.light,
       "Electrons at white in a frame without masks, as a part of the full "
       "well");

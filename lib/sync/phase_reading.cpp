@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-#include "sync/pilot_phase.h"
+#include "sync/phase_reading.h"
 
 #include <algorithm>
 #include <vector>
@@ -10,11 +10,11 @@ namespace codedexposure
 namespace
 {
 
-/* Lit masks stand out by at least so many counts, and by such a part. */
-constexpr double kLeastContrast = 2.0;
-constexpr double kLeastContrastPart = 0.1;
-/* A mask is lit when it has this part of the contrast, and of the light of
- * those beside it: more than the blur of a lens brings over from there. */
+/* Min contrast of lit masks, in digital numbers and as a part of the level. */
+constexpr double kMinContrast = 2.0;
+constexpr double kMinContrastPart = 0.1;
+/* A mask is lit if it has this part of the contrast and of the light of its
+ * neighbours: more than the blur of a lens brings from there. */
 constexpr double kLit = 0.35;
 
 struct Mask {
@@ -41,7 +41,7 @@ masks_of (int slots, const std::array<double, kPilotColumns> &means)
   return masks;
 }
 
-/** False when none stands out. */
+/** False if none has enough contrast. */
 bool
 find_lit (std::vector<Mask> &masks)
 {
@@ -52,7 +52,7 @@ find_lit (std::vector<Mask> &masks)
   std::sort (sorted.begin (), sorted.end ());
   const double dark = sorted[count / 8];
   const double contrast = sorted[count * 3 / 4] - dark;
-  if (contrast < std::max (kLeastContrast, kLeastContrastPart * dark))
+  if (contrast < std::max (kMinContrast, kMinContrastPart * dark))
     return false;
 
   for (std::size_t i = 0; i < count; i++) {
@@ -95,8 +95,8 @@ read_pilot (int slots, const std::array<double, kPilotColumns> &means)
   if (lit[other] == 0)
     return {PhaseReading::Kind::in_phase};
 
-  /* Between the masks of two columns, the nearer one is the last that is seen:
-   * after the one at distance d from the border comes the one at 2 d + 1. */
+  /* A slip between the masks of two columns lights the nearer one only: the
+   * mask at distance d from the border is followed by that at 2 d + 1. */
   const int seen = std::max (early[other], late[other]);
   const int farthest = std::min (2 * seen - 1, slots / 2);
   return {PhaseReading::Kind::slipped, late[other] > 0 ? seen : -seen,

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "advise/linear_estimate.h"
+#include "base/try.h"
 
 namespace codedexposure
 {
@@ -52,27 +53,22 @@ predict_part (
     return Error{"it has " + std::to_string (schedule->elements ()) +
                  " elements; predictions go up to " +
                  std::to_string (LinearEstimate::kMaxElements)};
-  const auto model =
-      ExposureModel::make (schedule, conditions.camera, conditions.light);
-  if (!model)
-    return model.error ();
-  const auto white = model->snr (1.0), grey = model->snr (Prediction::kGrey);
-  if (!white || !grey)
-    return white ? grey.error () : white.error ();
+  ASSIGN_OR_RETURN (const auto model,
+      ExposureModel::make (schedule, conditions.camera, conditions.light));
   const Extent cell = schedule ? schedule->cell () : Extent{};
   const Camera &camera = conditions.camera;
   Prediction prediction;
   prediction.schedule = schedule;
   prediction.frame_rate =
-      double (model->slots ()) * camera.rate.num / camera.rate.den;
+      double (model.slots ()) * camera.rate.num / camera.rate.den;
   prediction.subframe = {
       camera.size.width / cell.width, camera.size.height / cell.height};
-  prediction.efficiency = model->efficiency ();
-  prediction.slot_electrons = model->slot_electrons ();
-  prediction.snr_white = *white;
-  prediction.snr_grey = *grey;
-  prediction.psnr = LinearEstimate (*model, conditions.scene).psnr ();
-  prediction.overexposed = model->overexposed ();
+  prediction.efficiency = model.efficiency ();
+  prediction.slot_electrons = model.slot_electrons ();
+  ASSIGN_OR_RETURN (prediction.snr_white, model.snr (1.0));
+  ASSIGN_OR_RETURN (prediction.snr_grey, model.snr (Prediction::kGrey));
+  prediction.psnr = LinearEstimate (model, conditions.scene).psnr ();
+  prediction.overexposed = model.overexposed ();
   return prediction;
 }
 
@@ -111,12 +107,10 @@ Result<Prediction>
 predict_regions (const Schedule &whole, const Conditions &conditions)
 {
   const Extent size = conditions.camera.size;
-  if (const auto within = whole.check_size (size.width, size.height); !within)
-    return within.error ();
-  auto background = predict_part (whole.background (), conditions);
-  if (!background)
-    return background;
-  std::vector<Prediction> parts = {*std::move (background)};
+  RETURN_IF_ERROR (whole.check_size (size.width, size.height));
+  ASSIGN_OR_RETURN (
+      auto background, predict_part (whole.background (), conditions));
+  std::vector<Prediction> parts = {std::move (background)};
   std::vector<double> shares = {1.0};
   for (std::size_t i = 0; i < whole.regions ().size (); i++) {
     const Rect &rect = whole.regions ()[i].rect;
@@ -138,8 +132,7 @@ predict_regions (const Schedule &whole, const Conditions &conditions)
 Result<Prediction>
 predict (const std::optional<Schedule> &schedule, const Conditions &conditions)
 {
-  if (const auto good = conditions.scene.check (); !good)
-    return good.error ();
+  RETURN_IF_ERROR (conditions.scene.check ());
   return schedule && !schedule->regions ().empty ()
              ? predict_regions (*schedule, conditions)
              : predict_part (schedule, conditions);

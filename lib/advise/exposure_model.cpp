@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "base/range.h"
+#include "base/try.h"
 
 namespace codedexposure
 {
@@ -33,17 +34,15 @@ Result<ExposureModel>
 ExposureModel::make (
     const std::optional<Schedule> &schedule, const Camera &camera, double light)
 {
-  if (const auto good = check (camera, light); !good)
-    return good.error ();
+  RETURN_IF_ERROR (check (camera, light));
   const double period = double (camera.rate.den) / camera.rate.num;
   double active = period, pitch = period, on_slots = 1.0;
   if (schedule) {
     const int n = schedule->slots ();
-    const auto plan = SlotPlan::fit (schedule->timing (), n, camera.rate);
-    if (!plan)
-      return plan.error ();
-    active = 1e-9 * double (plan->active ());
-    pitch = 1e-9 * double (plan->start (1) - plan->start (0));
+    ASSIGN_OR_RETURN (
+        const auto plan, SlotPlan::fit (schedule->timing (), n, camera.rate));
+    active = 1e-9 * double (plan.active ());
+    pitch = 1e-9 * double (plan.start (1) - plan.start (0));
     on_slots = 0.0;
     for (int e = 0; e < n; e++)
       on_slots += double (schedule->code ().on_slots (e)) / n;
@@ -93,10 +92,7 @@ ExposureModel::snr (double level) const
 {
   std::vector<double> factors{1.0};
   if (schedule_) {
-    auto inverse = schedule_->code ().inverse (schedule_->leak ());
-    if (!inverse)
-      return inverse.error ();
-    factors = *std::move (inverse);
+    ASSIGN_OR_RETURN (factors, schedule_->code ().inverse (schedule_->leak ()));
   }
   double noise = 0.0;
   const int n = slots ();

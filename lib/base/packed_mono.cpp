@@ -6,35 +6,13 @@
 #include <cctype>
 #include <string>
 
+#include "base/try.h"
+
 namespace codedexposure
 {
 
 namespace
 {
-
-struct Named {
-  MonoFormat format;
-  const char *name;
-  int bits;
-  int stored;
-};
-
-constexpr std::array kFormats{
-    Named{MonoFormat::mono8, "Mono8", 8, 8},
-    Named{MonoFormat::mono10, "Mono10", 10, 16},
-    Named{MonoFormat::mono12, "Mono12", 12, 16},
-    Named{MonoFormat::mono16, "Mono16", 16, 16},
-    Named{MonoFormat::mono10_packed, "Mono10Packed", 10, 12},
-    Named{MonoFormat::mono12_packed, "Mono12Packed", 12, 12},
-    Named{MonoFormat::mono10p, "Mono10p", 10, 10},
-    Named{MonoFormat::mono12p, "Mono12p", 12, 12},
-};
-
-const Named &
-named (MonoFormat format)
-{
-  return kFormats[std::size_t (format)];
-}
 
 /* Each reads or writes one row; a row that ends inside a byte or a triple of
  * them needs no more bytes than row_bytes () says. */
@@ -71,7 +49,7 @@ pack_triples (const std::uint16_t *in, std::uint8_t *out, int width)
   }
 }
 
-/* A stream of bits, lowest first. */
+/* A stream of bits, lowest first; of 8 and 16 bits, little-endian words. */
 template <int kBits>
 void
 unpack_stream (const std::uint8_t *in, std::uint16_t *out, int width)
@@ -102,64 +80,44 @@ pack_stream (const std::uint16_t *in, std::uint8_t *out, int width)
     *out = std::uint8_t (held);
 }
 
-/* Little-endian words, as the wire has them. */
-void
-unpack_words (const std::uint8_t *in, std::uint16_t *out, int width)
+struct Named {
+  MonoFormat format;
+  const char *name;
+  int bits;
+  int stored;
+  void (*unpack) (const std::uint8_t *in, std::uint16_t *out, int width);
+  void (*pack) (const std::uint16_t *in, std::uint8_t *out, int width);
+};
+
+template <int kBits>
+constexpr Named
+stream (MonoFormat format, const char *name, int bits)
 {
-  for (int x = 0; x < width; x++)
-    out[x] = std::uint16_t (in[2 * x] | in[2 * x + 1] << 8);
+  return {format, name, bits, kBits, unpack_stream<kBits>, pack_stream<kBits>};
 }
 
-void
-pack_words (const std::uint16_t *in, std::uint8_t *out, int width)
+template <int kLow>
+constexpr Named
+triples (MonoFormat format, const char *name)
 {
-  for (int x = 0; x < width; x++) {
-    out[2 * x] = std::uint8_t (in[x]);
-    out[2 * x + 1] = std::uint8_t (in[x] >> 8);
-  }
+  return {format, name, 8 + kLow, 12, unpack_triples<kLow>, pack_triples<kLow>};
 }
 
-void
-unpack_row (
-    MonoFormat format, const std::uint8_t *in, std::uint16_t *out, int width)
-{
-  switch (format) {
-  case MonoFormat::mono8:
-    std::copy_n (in, width, out);
-    return;
-  case MonoFormat::mono10_packed:
-    return unpack_triples<2> (in, out, width);
-  case MonoFormat::mono12_packed:
-    return unpack_triples<4> (in, out, width);
-  case MonoFormat::mono10p:
-    return unpack_stream<10> (in, out, width);
-  case MonoFormat::mono12p:
-    return unpack_stream<12> (in, out, width);
-  default:
-    return unpack_words (in, out, width);
-  }
-}
+constexpr std::array kFormats{
+    stream<8> (MonoFormat::mono8, "Mono8", 8),
+    stream<16> (MonoFormat::mono10, "Mono10", 10),
+    stream<16> (MonoFormat::mono12, "Mono12", 12),
+    stream<16> (MonoFormat::mono16, "Mono16", 16),
+    triples<2> (MonoFormat::mono10_packed, "Mono10Packed"),
+    triples<4> (MonoFormat::mono12_packed, "Mono12Packed"),
+    stream<10> (MonoFormat::mono10p, "Mono10p", 10),
+    stream<12> (MonoFormat::mono12p, "Mono12p", 12),
+};
 
-void
-pack_row (
-    MonoFormat format, const std::uint16_t *in, std::uint8_t *out, int width)
+const Named &
+named (MonoFormat format)
 {
-  switch (format) {
-  case MonoFormat::mono8:
-    for (int x = 0; x < width; x++)
-      out[x] = std::uint8_t (in[x]);
-    return;
-  case MonoFormat::mono10_packed:
-    return pack_triples<2> (in, out, width);
-  case MonoFormat::mono12_packed:
-    return pack_triples<4> (in, out, width);
-  case MonoFormat::mono10p:
-    return pack_stream<10> (in, out, width);
-  case MonoFormat::mono12p:
-    return pack_stream<12> (in, out, width);
-  default:
-    return pack_words (in, out, width);
-  }
+  return kFormats[std::size_t (format)];
 }
 
 Result<void>
@@ -217,12 +175,10 @@ Result<void>
 unpack_mono (MonoFormat format, ImageView<const std::uint8_t> rows,
     ImageView<std::uint16_t> out)
 {
-  if (const Result<void> fits =
-          check_rows (format, rows.width, rows.height, out.width, out.height);
-      !fits)
-    return fits;
+  RETURN_IF_ERROR (
+      check_rows (format, rows.width, rows.height, out.width, out.height));
   for (int y = 0; y < out.height; y++)
-    unpack_row (format, rows.row (y), out.row (y), out.width);
+    named (format).unpack (rows.row (y), out.row (y), out.width);
   return {};
 }
 
@@ -230,12 +186,10 @@ Result<void>
 pack_mono (MonoFormat format, ImageView<const std::uint16_t> in,
     ImageView<std::uint8_t> rows)
 {
-  if (const Result<void> fits =
-          check_rows (format, rows.width, rows.height, in.width, in.height);
-      !fits)
-    return fits;
+  RETURN_IF_ERROR (
+      check_rows (format, rows.width, rows.height, in.width, in.height));
   for (int y = 0; y < in.height; y++)
-    pack_row (format, in.row (y), rows.row (y), in.width);
+    named (format).pack (in.row (y), rows.row (y), in.width);
   return {};
 }
 

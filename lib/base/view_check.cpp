@@ -3,6 +3,8 @@
 
 #include <string>
 
+#include "base/geometry.h"
+
 namespace codedexposure
 {
 
@@ -34,12 +36,6 @@ share_pixels (const ViewBytes &a, const ViewBytes &b)
          (left + b.width * b.pixel > a.stride && rows + 1 < a.height);
 }
 
-std::string
-size_text (int width, int height)
-{
-  return std::to_string (width) + "x" + std::to_string (height);
-}
-
 } // namespace
 
 Result<void>
@@ -49,8 +45,8 @@ check_view (const ViewBytes &view, const char *what, int width, int height)
     return Error{std::string ("the ") + what + ' ' + why};
   };
   if (view.width != width || view.height != height)
-    return error ("has " + size_text (view.width, view.height) +
-                  " pixels instead of " + size_text (width, height));
+    return error ("has " + size_text ({view.width, view.height}) +
+                  " pixels instead of " + size_text ({width, height}));
   if (view.begin == 0)
     return error ("has no memory");
   if (view.stride < view.width * view.pixel)

@@ -25,7 +25,7 @@ public:
 
   bool any () const { return !rects_.empty (); }
   /** Whether the cell of subframe pixel (@p i, @p j) is one. */
-  bool at (int i, int j) const { return map_.at (i, j) != 0; }
+  bool at (int i, int j) const { return any () && map_.at (i, j) != 0; }
   /** Those that are none and have one among the eight around them, row by row.
    */
   std::span<const Offset> neighbours () const { return neighbours_; }

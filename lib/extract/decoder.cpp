@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "base/try.h"
+
 namespace codedexposure
 {
 
@@ -25,9 +27,8 @@ snapped (double factor)
 Result<Decoder>
 Decoder::make (const Schedule &schedule, double gain, bool interpolate)
 {
-  const auto inverse = schedule.code ().inverse (schedule.leak ());
-  if (!inverse)
-    return inverse.error ();
+  ASSIGN_OR_RETURN (
+      const auto inverse, schedule.code ().inverse (schedule.leak ()));
 
   const SampleGrid grid (schedule);
   Decoder decoder;
@@ -42,7 +43,7 @@ Decoder::make (const Schedule &schedule, double gain, bool interpolate)
   for (int s = 0; s < n; s++) {
     for (int e = 0; e < n; e++) {
       const double factor =
-          snapped (decoder.gain_ * (*inverse)[std::size_t (s * n + e)] / unit);
+          snapped (decoder.gain_ * inverse[std::size_t (s * n + e)] / unit);
       if (factor != 0.0)
         decoder.terms_.push_back ({e, factor});
     }

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "base/text.h"
+#include "base/try.h"
 #include "base/view_check.h"
 #include "extract/covered_cells.h"
 #include "extract/fast_path.h"
@@ -150,19 +151,14 @@ Extractor<Pixel>::Plan::check (ImageView<const Pixel> coded,
                  " views of subframes instead of " +
                  std::to_string (grid.elements ())};
   const ViewBytes input = ViewBytes::of (coded);
-  if (auto checked =
-          check_view (input, "coded frame", frame.width, frame.height);
-      !checked)
-    return checked;
+  RETURN_IF_ERROR (
+      check_view (input, "coded frame", frame.width, frame.height));
   for (std::size_t k = 0; k < subframes.size (); k++) {
     outputs[k] = ViewBytes::of (subframes[k]);
-    if (auto checked =
-            check_view (outputs[k], "subframe", size.width, size.height);
-        !checked)
-      return checked;
+    RETURN_IF_ERROR (
+        check_view (outputs[k], "subframe", size.width, size.height));
   }
-  if (auto checked = check_rows (rows.first, rows.count, size.height); !checked)
-    return checked;
+  RETURN_IF_ERROR (check_rows (rows.first, rows.count, size.height));
   return check_apart (std::span (outputs).first (subframes.size ()), &input);
 }
 
@@ -175,7 +171,10 @@ Extractor<Pixel>::Plan::run (ImageView<const Pixel> coded,
     return fast->run (*this, coded, subframes, rows);
   switch (this->method) {
   case Method::kDecode:
-    reference_decode (coded, grid, *decoder, largest, rows, subframes);
+    for (int j = rows.first; j < rows.first + rows.count; j++)
+      for (int i = 0; i < size.width; i++)
+        reference_decode (
+            coded, grid, *decoder, largest, covered, {i, j}, subframes);
     break;
   case Method::kSelect:
     reference_select<Pixel> (coded, grid, elements, rows, subframes);
@@ -192,8 +191,10 @@ Extractor<Pixel>::Plan::leave_out_regions (ImageView<const Pixel> coded,
     std::span<const ImageView<Pixel>> subframes, RowRange rows) const
 {
   if (decoder && decoder->interpolates ())
-    reference_decode_beside (
-        coded, grid, *decoder, largest, covered, rows, subframes);
+    for (const Offset cell : covered.neighbours ())
+      if (cell.y >= rows.first && cell.y < rows.first + rows.count)
+        reference_decode (
+            coded, grid, *decoder, largest, covered, cell, subframes);
   for (const ImageView<Pixel> &subframe : subframes)
     covered.blacken (subframe, rows);
 }
@@ -217,8 +218,7 @@ Extractor<Pixel>::make (
     const Schedule &whole, int width, int height, const ExtractOptions &options)
 try {
   constexpr int kTypeBits = std::numeric_limits<Pixel>::digits;
-  if (const auto checked = check_options (options, kTypeBits); !checked)
-    return checked.error ();
+  RETURN_IF_ERROR (check_options (options, kTypeBits));
 
   const Schedule schedule = whole.background ();
   const SampleGrid grid (schedule);
@@ -234,10 +234,8 @@ try {
                                        elements_by_slot (schedule.code ())},
           CoveredCells (whole, size), {width, height}});
   if (method == Method::kDecode) {
-    auto decoder = Decoder::make (schedule, options.gain, options.interpolate);
-    if (!decoder)
-      return decoder.error ();
-    plan->decoder = std::move (*decoder);
+    ASSIGN_OR_RETURN (plan->decoder,
+        Decoder::make (schedule, options.gain, options.interpolate));
   }
   if (options.target != kScalar)
     plan->fast = FastPath<Pixel>::make (*plan, targets_from (options.target));
@@ -288,8 +286,7 @@ Extractor<Pixel>::run_rows (ImageView<const Pixel> coded,
     std::span<const ImageView<Pixel>> subframes, int first_row, int rows) const
 {
   const RowRange range = {first_row, rows};
-  if (const auto checked = plan_->check (coded, subframes, range); !checked)
-    return checked.error ();
+  RETURN_IF_ERROR (plan_->check (coded, subframes, range));
   const ExtractReport report = plan_->run (coded, subframes, range);
   if (plan_->covered.any ())
     plan_->leave_out_regions (coded, subframes, range);

@@ -28,38 +28,11 @@ struct Samples {
   }
 };
 
-/** Of an element in a cell, those beside it and the one between these. */
-struct Corners {
-  int here, beside_x, beside_y, across;
-};
-
-int
-blended (const Corners &p, const Lerp &x, const Lerp &y)
-{
-  return x.near * (y.near * p.here + y.far * p.beside_y) +
-         x.far * (y.near * p.beside_x + y.far * p.across);
-}
-
+/** The value of an element in cell (@p i, @p j), without looking at @p covered
+ * cells. */
 template <typename Pixel>
 int
 element_value (const Samples<Pixel> &samples, const Decoder &decoder,
-    Extent size, int element, int i, int j)
-{
-  const Offset offset = samples.grid.offset (element, i, j);
-  const Lerp x = decoder.lerp_x (offset);
-  const Lerp y = decoder.lerp_y (offset);
-  const int xi = std::clamp (i + x.step, 0, size.width - 1);
-  const int yj = std::clamp (j + y.step, 0, size.height - 1);
-  return blended (
-      {samples.at (element, i, j), samples.at (element, xi, j),
-          samples.at (element, i, yj), samples.at (element, xi, yj)},
-      x, y);
-}
-
-/** The same beside @p covered cells. */
-template <typename Pixel>
-int
-element_value_beside (const Samples<Pixel> &samples, const Decoder &decoder,
     Extent size, const CoveredCells &covered, int element, int i, int j)
 {
   const Offset offset = samples.grid.offset (element, i, j);
@@ -68,30 +41,14 @@ element_value_beside (const Samples<Pixel> &samples, const Decoder &decoder,
   const int xi = std::clamp (i + x.step, 0, size.width - 1);
   const int yj = std::clamp (j + y.step, 0, size.height - 1);
   const bool has_x = !covered.at (xi, j), has_y = !covered.at (i, yj);
-  Corners p;
-  p.here = samples.at (element, i, j);
-  p.beside_x = has_x ? samples.at (element, xi, j) : p.here;
-  p.beside_y = has_y ? samples.at (element, i, yj) : p.here;
-  p.across = has_x && has_y && !covered.at (xi, yj)
-                 ? samples.at (element, xi, yj)
-                 : p.beside_x + p.beside_y - p.here;
-  return blended (p, x, y);
-}
-
-/** Writes pixel (@p i, @p j) of the subframes from what the elements are there.
- */
-template <typename Pixel>
-void
-solve (const Decoder &decoder, std::span<const int> values, int largest, int i,
-    int j, std::span<const ImageView<Pixel>> subframes)
-{
-  for (int s = 0; s < decoder.slots (); s++) {
-    double light = 0.0;
-    for (const Term &term : decoder.terms (s))
-      light += term.factor * values[std::size_t (term.element)];
-    subframes[std::size_t (s)].at (i, j) =
-        Pixel (std::clamp (std::floor (light + 0.5), 0.0, double (largest)));
-  }
+  const int here = samples.at (element, i, j);
+  const int beside_x = has_x ? samples.at (element, xi, j) : here;
+  const int beside_y = has_y ? samples.at (element, i, yj) : here;
+  const int across = has_x && has_y && !covered.at (xi, yj)
+                         ? samples.at (element, xi, yj)
+                         : beside_x + beside_y - here;
+  return x.near * (y.near * here + y.far * beside_y) +
+         x.far * (y.near * beside_x + y.far * across);
 }
 
 } // namespace
@@ -132,40 +89,22 @@ reference_select (ImageView<const Pixel> coded, const SampleGrid &grid,
 template <typename Pixel>
 void
 reference_decode (ImageView<const Pixel> coded, const SampleGrid &grid,
-    const Decoder &decoder, int largest, RowRange rows,
-    std::span<const ImageView<Pixel>> subframes)
-{
-  const Samples<Pixel> samples{coded, grid};
-  const Extent size = {subframes[0].width, subframes[0].height};
-  std::array<int, Tile::kMaxElements> values;
-
-  for (int j = rows.first; j < rows.first + rows.count; j++) {
-    for (int i = 0; i < size.width; i++) {
-      for (int e = 0; e < grid.elements (); e++)
-        values[std::size_t (e)] =
-            element_value (samples, decoder, size, e, i, j);
-      solve<Pixel> (decoder, values, largest, i, j, subframes);
-    }
-  }
-}
-
-template <typename Pixel>
-void
-reference_decode_beside (ImageView<const Pixel> coded, const SampleGrid &grid,
     const Decoder &decoder, int largest, const CoveredCells &covered,
-    RowRange rows, std::span<const ImageView<Pixel>> subframes)
+    Offset cell, std::span<const ImageView<Pixel>> subframes)
 {
   const Samples<Pixel> samples{coded, grid};
   const Extent size = {subframes[0].width, subframes[0].height};
+  const auto [i, j] = cell;
   std::array<int, Tile::kMaxElements> values;
-
-  for (const auto &[i, j] : covered.neighbours ()) {
-    if (j < rows.first || j >= rows.first + rows.count)
-      continue;
-    for (int e = 0; e < grid.elements (); e++)
-      values[std::size_t (e)] =
-          element_value_beside (samples, decoder, size, covered, e, i, j);
-    solve<Pixel> (decoder, values, largest, i, j, subframes);
+  for (int e = 0; e < grid.elements (); e++)
+    values[std::size_t (e)] =
+        element_value (samples, decoder, size, covered, e, i, j);
+  for (int s = 0; s < decoder.slots (); s++) {
+    double light = 0.0;
+    for (const Term &term : decoder.terms (s))
+      light += term.factor * values[std::size_t (term.element)];
+    subframes[std::size_t (s)].at (i, j) =
+        Pixel (std::clamp (std::floor (light + 0.5), 0.0, double (largest)));
   }
 }
 
@@ -192,10 +131,8 @@ reference_saturated (ImageView<const Pixel> coded, const SampleGrid &grid,
   template void reference_select (ImageView<const Pixel>, const SampleGrid &,  \
       std::span<const int>, RowRange, std::span<const ImageView<Pixel>>);      \
   template void reference_decode (ImageView<const Pixel>, const SampleGrid &,  \
-      const Decoder &, int, RowRange, std::span<const ImageView<Pixel>>);      \
-  template void reference_decode_beside (ImageView<const Pixel>,               \
-      const SampleGrid &, const Decoder &, int, const CoveredCells &,          \
-      RowRange, std::span<const ImageView<Pixel>>);                            \
+      const Decoder &, int, const CoveredCells &, Offset,                      \
+      std::span<const ImageView<Pixel>>);                                      \
   template std::uint64_t reference_saturated (                                 \
       ImageView<const Pixel>, const SampleGrid &, int, RowRange);
 

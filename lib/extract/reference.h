@@ -22,8 +22,8 @@ struct RowRange {
 };
 
 /* In all of these: @p coded is the whole coded frame, @p subframes are n whole
- * subframes in exposure order, of which @p rows are written. Pixel is
- * std::uint8_t or std::uint16_t. */
+ * subframes in exposure order, of which @p rows or one pixel are written. Pixel
+ * is std::uint8_t or std::uint16_t. */
 
 /** Subframe k = k-th smallest of the group, by the paper's group_sort (). */
 template <typename Pixel>
@@ -36,20 +36,14 @@ void reference_select (ImageView<const Pixel> coded, const SampleGrid &grid,
     std::span<const int> elements, RowRange rows,
     std::span<const ImageView<Pixel>> subframes);
 
-/** Subframe k = light of slot k by @p decoder, clamped to 0..@p largest. */
+/** Pixel @p cell of subframe k = light of slot k by @p decoder, clamped to
+ * 0..@p largest, without looking at @p covered cells: a missing sample is the
+ * one beside it, as at the edge of the frame, and where that one is known on
+ * both sides, in the plane through all three. */
 template <typename Pixel>
 void reference_decode (ImageView<const Pixel> coded, const SampleGrid &grid,
-    const Decoder &decoder, int largest, RowRange rows,
-    std::span<const ImageView<Pixel>> subframes);
-
-/** The same for the neighbours of @p covered cells in @p rows, without looking
- * at those: a missing sample is the one beside it, as at the edge of the frame,
- * and where that one is known on both sides, in the plane through all three. */
-template <typename Pixel>
-void reference_decode_beside (ImageView<const Pixel> coded,
-    const SampleGrid &grid, const Decoder &decoder, int largest,
-    const CoveredCells &covered, RowRange rows,
-    std::span<const ImageView<Pixel>> subframes);
+    const Decoder &decoder, int largest, const CoveredCells &covered,
+    Offset cell, std::span<const ImageView<Pixel>> subframes);
 
 /** Pixels of the cells in @p rows that are not below @p largest. */
 template <typename Pixel>

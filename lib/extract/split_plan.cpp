@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-#include "split_plan.h"
+#include "extract/split_plan.h"
 
 #include <algorithm>
 #include <optional>
 #include <utility>
+
+#include "base/try.h"
 
 namespace codedexposure
 {
@@ -58,10 +60,9 @@ Result<AnyExtractor>
 make_extractor (
     const Schedule &part, Extent size, const ExtractOptions &options)
 {
-  auto made = Extractor<Pixel>::make (part, size.width, size.height, options);
-  if (!made)
-    return made.error ();
-  return AnyExtractor (std::move (*made));
+  ASSIGN_OR_RETURN (auto made,
+      Extractor<Pixel>::make (part, size.width, size.height, options));
+  return AnyExtractor (std::move (made));
 }
 
 /* @region -1: the background. */
@@ -75,13 +76,11 @@ make_part (const Schedule &whole, int region, const SplitFormat &format,
   const Schedule &decoded = region < 0 ? whole : whole.region (region);
   options.gain *= double (decoded.code ().slots ()) / whole.code ().slots ();
   const Extent size{rect.width, rect.height};
-  auto extractor = format.wide
-                       ? make_extractor<std::uint16_t> (decoded, size, options)
-                       : make_extractor<std::uint8_t> (decoded, size, options);
-  if (!extractor)
-    return extractor.error ();
+  ASSIGN_OR_RETURN (auto extractor,
+      format.wide ? make_extractor<std::uint16_t> (decoded, size, options)
+                  : make_extractor<std::uint8_t> (decoded, size, options));
   SplitPart part{region, region < 0 ? whole.background () : decoded, rect,
-      std::move (*extractor), {}, {}};
+      std::move (extractor), {}, {}};
   part.boundaries = even_steps (format.rate, part.schedule.slots ());
   part.windows = light_windows (part.schedule, part.method (), format.slots);
   return part;
@@ -121,16 +120,11 @@ Result<std::vector<SplitPart>>
 make_split_plan (const Schedule &schedule, const SplitFormat &format,
     const ExtractOptions &options)
 try {
-  if (const auto within =
-          schedule.check_size (format.size.width, format.size.height);
-      !within)
-    return within.error ();
+  RETURN_IF_ERROR (schedule.check_size (format.size.width, format.size.height));
   std::vector<SplitPart> parts;
   for (int i = -1; i < int (schedule.regions ().size ()); i++) {
-    auto part = make_part (schedule, i, format, options);
-    if (!part)
-      return part.error ();
-    parts.push_back (std::move (*part));
+    ASSIGN_OR_RETURN (auto part, make_part (schedule, i, format, options));
+    parts.push_back (std::move (part));
   }
   return parts;
 } catch (const std::bad_alloc &) {

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/text.h"
+#include "base/try.h"
 #include "estimate/kriging.h"
 
 namespace codedexposure::fuse
@@ -101,10 +102,8 @@ Engine::make (const Schedule &schedule, int width, int height,
     return Error{"frames of " + std::to_string (width) + "x" +
                  std::to_string (height) + " pixels hold no cell of " +
                  schedule.text ()};
-  if (const auto checked = check (options); !checked)
-    return checked.error ();
-  if (const auto checked = check (schedule, options.quality); !checked)
-    return checked.error ();
+  RETURN_IF_ERROR (check (options));
+  RETURN_IF_ERROR (check (schedule, options.quality));
   return std::unique_ptr<Engine> (
       new Engine (schedule, width, rows, options, steps));
 }

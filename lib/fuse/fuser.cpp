@@ -6,6 +6,7 @@
 #include <cstdlib>
 
 #include "base/text.h"
+#include "base/try.h"
 #include "base/view_check.h"
 #include "fuse/engine.h"
 
@@ -104,12 +105,10 @@ make_pieces (const Schedule &schedule, int width, int height,
     const Schedule part = i < 0 ? schedule.background () : schedule.region (i);
     const Rect rect = i < 0 ? Rect{0, 0, width, height}
                             : schedule.regions ()[std::size_t (i)].rect;
-    auto engine =
-        fuse::Engine::make (part, rect.width, rect.height, options, largest);
-    if (!engine)
-      return engine.error ();
+    ASSIGN_OR_RETURN (auto engine,
+        fuse::Engine::make (part, rect.width, rect.height, options, largest));
     pieces.push_back (
-        {rect, schedule.slots () / part.slots (), std::move (*engine)});
+        {rect, schedule.slots () / part.slots (), std::move (engine)});
   }
   return pieces;
 }
@@ -200,10 +199,8 @@ Fuser<Pixel>::State::check (
   std::array<ViewBytes, Schedule::kMaxSlots> outputs;
   for (std::size_t k = 0; k < frames.size (); k++) {
     outputs[k] = ViewBytes::of (frames[k]);
-    if (auto checked =
-            check_view (outputs[k], "fused frame", size.width, size.height);
-        !checked)
-      return checked;
+    RETURN_IF_ERROR (
+        check_view (outputs[k], "fused frame", size.width, size.height));
   }
   return check_apart (std::span (outputs).first (frames.size ()));
 }
@@ -283,12 +280,10 @@ try {
                  ": they must be 1 to " + std::to_string (Workers::kMost) +
                  ", and 0 stands for one for each processor"};
   const int largest = (1 << (options.bits ? options.bits : kBits)) - 1;
-  if (const auto within = schedule.check_size (width, height); !within)
-    return within.error ();
-  auto pieces = make_pieces (schedule, width, height, options, largest);
-  if (!pieces)
-    return pieces.error ();
-  auto state = std::make_unique<State> (State{std::move (*pieces),
+  RETURN_IF_ERROR (schedule.check_size (width, height));
+  ASSIGN_OR_RETURN (
+      auto pieces, make_pieces (schedule, width, height, options, largest));
+  auto state = std::make_unique<State> (State{std::move (pieces),
       find_covers (schedule, {width, height - schedule.pilot_rows ()}),
       schedule.slots (), float (largest),
       std::make_unique<Workers> (
@@ -318,10 +313,8 @@ Result<void>
 Fuser<Pixel>::take (ImageView<const Pixel> coded)
 {
   const Rect &whole = state_->pieces.front ().rect;
-  if (auto checked = check_view (
-          ViewBytes::of (coded), "coded frame", whole.width, whole.height);
-      !checked)
-    return checked;
+  RETURN_IF_ERROR (check_view (
+      ViewBytes::of (coded), "coded frame", whole.width, whole.height));
   return state_->or_forget ([&] { return state_->take (coded); });
 }
 
@@ -337,8 +330,7 @@ Result<void>
 Fuser<Pixel>::fuse (
     std::span<const ImageView<Pixel>> frames, std::stop_token stop)
 {
-  if (auto checked = state_->check (frames, size ()); !checked)
-    return checked;
+  RETURN_IF_ERROR (state_->check (frames, size ()));
   return state_->or_forget ([&] () -> Result<void> {
     if (state_->fuse (frames, std::move (stop)))
       return {};

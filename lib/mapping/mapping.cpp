@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "base/text.h"
+#include "base/try.h"
 
 namespace codedexposure
 {
@@ -75,9 +76,7 @@ check_finite (const char *what, const double *numbers, std::size_t count)
 Result<void>
 normalise (Homography &h, Extent camera)
 {
-  if (const auto checked = check_finite ("homography", h.data (), h.size ());
-      !checked)
-    return checked;
+  RETURN_IF_ERROR (check_finite ("homography", h.data (), h.size ()));
   const CentredFrame frame (camera);
   const double z = h[6] * frame.cx + h[7] * frame.cy + h[8];
   /* What is right to the last digits stays as it is written. */
@@ -115,10 +114,7 @@ check_displacement (const Displacement &grid)
       return bad_number (std::string ("the count of ") + what,
           double (numbers->size ()),
           "it must be columns x rows = " + std::to_string (nodes));
-    if (const auto checked =
-            check_finite (what, numbers->data (), numbers->size ());
-        !checked)
-      return checked;
+    RETURN_IF_ERROR (check_finite (what, numbers->data (), numbers->size ()));
   }
   return {};
 }
@@ -127,10 +123,8 @@ Result<void>
 check_covariance (const Mapping::Covariance &covariance)
 {
   constexpr std::size_t n = Mapping::kParameters;
-  if (const auto checked =
-          check_finite ("covariance", covariance.data (), covariance.size ());
-      !checked)
-    return checked;
+  RETURN_IF_ERROR (
+      check_finite ("covariance", covariance.data (), covariance.size ()));
   for (std::size_t i = 0; i < n; i++) {
     if (covariance[i * n + i] < 0.0)
       return bad_number ("variance " + std::to_string (i) + " of the mapping",
@@ -219,19 +213,15 @@ Mapping::make (Parts parts)
 try {
   for (const auto &[what, size] : {std::pair ("camera", parts.camera),
            std::pair ("mirrors", parts.mirrors)})
-    if (const auto checked = check_size (what, size); !checked)
-      return checked.error ();
-  if (const auto checked = normalise (parts.homography, parts.camera); !checked)
-    return checked.error ();
+    RETURN_IF_ERROR (check_size (what, size));
+  RETURN_IF_ERROR (normalise (parts.homography, parts.camera));
   if (!(parts.psf_sigma >= 0.0 && parts.psf_sigma <= kMaxPsfSigma))
     return bad_number ("psf_sigma", parts.psf_sigma,
         "it must be 0 to " + real_text (kMaxPsfSigma) + " pixels");
   if (parts.covariance)
-    if (const auto checked = check_covariance (*parts.covariance); !checked)
-      return checked.error ();
+    RETURN_IF_ERROR (check_covariance (*parts.covariance));
   if (parts.displacement)
-    if (const auto checked = check_displacement (*parts.displacement); !checked)
-      return checked.error ();
+    RETURN_IF_ERROR (check_displacement (*parts.displacement));
   return Mapping (std::move (parts));
 } catch (const std::bad_alloc &) {
   return out_of_memory ();

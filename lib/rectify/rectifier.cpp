@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/range.h"
+#include "base/try.h"
 #include "base/view_check.h"
 #include "rectify/filters.h"
 #include "rectify/window.h"
@@ -193,12 +194,9 @@ Result<Rectifier>
 Rectifier::make (const Mapping &mapping, const Schedule &schedule,
     const RectifyOptions &options)
 try {
-  if (const auto checked = check (options); !checked)
-    return checked.error ();
+  RETURN_IF_ERROR (check (options));
   const Extent mirrors = mapping.mirrors ();
-  if (const auto within = schedule.check_size (mirrors.width, mirrors.height);
-      !within)
-    return within.error ();
+  RETURN_IF_ERROR (schedule.check_size (mirrors.width, mirrors.height));
   const double magnification = mapping.pose ().magnification;
   auto plan = std::make_unique<Plan> ();
   plan->taps = taps_for (magnification);
@@ -292,18 +290,12 @@ Rectifier::Plan::run (ImageView<const Pixel> from, ImageView<Pixel> to,
     int first, int rows, int largest) const
 {
   const ViewBytes input = ViewBytes::of (from), output = ViewBytes::of (to);
-  if (auto checked =
-          check_view (input, "camera frame", camera.width, camera.height);
-      !checked)
-    return checked;
-  if (auto checked =
-          check_view (output, "output", mirrors.width, mirrors.height);
-      !checked)
-    return checked;
-  if (auto checked = check_rows (first, rows, mirrors.height); !checked)
-    return checked;
-  if (auto checked = check_apart ({&output, 1}, &input); !checked)
-    return checked;
+  RETURN_IF_ERROR (
+      check_view (input, "camera frame", camera.width, camera.height));
+  RETURN_IF_ERROR (
+      check_view (output, "output", mirrors.width, mirrors.height));
+  RETURN_IF_ERROR (check_rows (first, rows, mirrors.height));
+  RETURN_IF_ERROR (check_apart ({&output, 1}, &input));
   if (largest <= 0)
     largest = std::numeric_limits<Pixel>::max ();
   for (int y = first; y < first + rows; y++) {

@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "base/text.h"
+#include "base/try.h"
 
 namespace codedexposure
 {
@@ -50,8 +51,7 @@ check_numbers (const Schedule::Parts &parts)
   for (const auto &[name, time] : {std::pair ("active", timing.active),
            std::pair ("switching", timing.switching),
            std::pair ("readout", timing.readout)})
-    if (const auto checked = check_time (name, time); !checked)
-      return checked;
+    RETURN_IF_ERROR (check_time (name, time));
 
   if (!(parts.leak >= 0.0 && parts.leak <= Schedule::kMaxLeak))
     return Error{"leak " + real_text (parts.leak) +
@@ -129,17 +129,12 @@ try {
     parts.order.resize (std::size_t (elements));
     std::iota (parts.order.begin (), parts.order.end (), 0);
   }
-  if (const auto checked = check_order (parts.order, elements); !checked)
-    return checked.error ();
-  if (const auto checked = check_numbers (parts); !checked)
-    return checked.error ();
+  RETURN_IF_ERROR (check_order (parts.order, elements));
+  RETURN_IF_ERROR (check_numbers (parts));
 
-  const auto cell = parts.tile.cell (parts.phase);
-  if (!cell)
-    return cell.error ();
-  Schedule schedule (std::move (parts), *cell);
-  if (const auto added = schedule.add_regions (); !added)
-    return added.error ();
+  ASSIGN_OR_RETURN (const auto cell, parts.tile.cell (parts.phase));
+  Schedule schedule (std::move (parts), cell);
+  RETURN_IF_ERROR (schedule.add_regions ());
   if (!schedule.regions ().empty () &&
       schedule.to_json ().size () > kMaxJsonSize)
     return Error{"tiles and codes of the regions take more than " +

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <numeric>
 #include <span>
 
 #include "base/file.h"
 #include "base/text.h"
+#include "base/try.h"
 #include "schedule/schedule.h"
 
 namespace codedexposure
@@ -38,14 +38,6 @@ bit_reversed_order (int n)
   return order;
 }
 
-std::vector<int>
-raster_order (int n)
-{
-  std::vector<int> order (std::size_t (n), 0);
-  std::iota (order.begin (), order.end (), 0);
-  return order;
-}
-
 /** What stands before ':' in @p text, if it is the name of a code. */
 bool
 begins_with_code (std::string_view text)
@@ -62,28 +54,31 @@ bad_value (
   return {std::string (key) + "=" + printable (value) + ": " + rule};
 }
 
+template <Nanoseconds Timing::*kTime>
 Result<void>
-read_time (std::string_view key, std::string_view value, Nanoseconds &out)
+read_time (std::string_view key, std::string_view value, Schedule::Parts &parts)
 {
   const auto time = parse_time (value);
   if (!time)
     return time.error ().with_prefix (std::string (key) + ": ");
-  out = *time;
+  parts.timing.*kTime = *time;
   return {};
 }
 
 Result<void>
-read_order (std::string_view value, Schedule::Parts &parts)
+read_order (
+    std::string_view key, std::string_view value, Schedule::Parts &parts)
 {
-  const int n = parts.tile.elements ();
-  if (value == "raster" || value == "bit-reversal") {
-    parts.order = value == "raster" ? raster_order (n) : bit_reversed_order (n);
+  if (value == "raster")
+    return {};
+  if (value == "bit-reversal") {
+    parts.order = bit_reversed_order (parts.tile.elements ());
     return {};
   }
   for (const std::string_view entry : split (value, '/')) {
     const auto element = parse_int (entry);
     if (!element)
-      return bad_value ("order", value,
+      return bad_value (key, value,
           in_quotes (entry) +
               " is no element; write raster, bit-reversal or the element of "
               "each label, as in order=0/2/1/3");
@@ -93,24 +88,25 @@ read_order (std::string_view value, Schedule::Parts &parts)
 }
 
 Result<void>
-read_phase (std::string_view value, Schedule::Parts &parts)
+read_phase (
+    std::string_view key, std::string_view value, Schedule::Parts &parts)
 {
   const auto pieces = split (value, '/');
   const auto x = parse_int (pieces.front ());
   const auto y = parse_int (pieces.back ());
   if (pieces.size () != 2 || !x || !y)
-    return bad_value ("phase", value,
+    return bad_value (key, value,
         "it must be two whole numbers x/y, in pixels, as in phase=1/0");
   parts.phase = {*x, *y};
   return {};
 }
 
 Result<void>
-read_leak (std::string_view value, Schedule::Parts &parts)
+read_leak (std::string_view key, std::string_view value, Schedule::Parts &parts)
 {
   const auto leak = parse_real (value);
   if (!leak)
-    return bad_value ("leak", value,
+    return bad_value (key, value,
         "it must be a number from 0 to 0.5, the light of a mirror that is off "
         "as a part of one that is on, as in leak=0.01");
   parts.leak = *leak;
@@ -118,12 +114,13 @@ read_leak (std::string_view value, Schedule::Parts &parts)
 }
 
 Result<void>
-read_pilot (std::string_view value, Schedule::Parts &parts)
+read_pilot (
+    std::string_view key, std::string_view value, Schedule::Parts &parts)
 {
   const auto rows = parse_int (value);
   if (!rows)
-    return bad_value ("pilot", value,
-        "it must be a whole number of mirror rows, as in pilot=16");
+    return bad_value (
+        key, value, "it must be a whole number of mirror rows, as in pilot=16");
   parts.pilot_rows = *rows;
   return {};
 }
@@ -142,18 +139,15 @@ read_pattern (std::string_view text, const std::string &form)
                  form};
   if (colon == text.npos)
     return Error{"the tile is missing" + form};
-  const auto tile = Tile::parse (text.substr (colon + 1));
-  if (!tile)
-    return tile.error ();
-  const auto code = Code::named (name, tile->elements ());
-  if (!code)
-    return code.error ();
-  return Schedule::Parts{*tile, *code};
+  ASSIGN_OR_RETURN (const auto tile, Tile::parse (text.substr (colon + 1)));
+  ASSIGN_OR_RETURN (const auto code, Code::named (name, tile.elements ()));
+  return Schedule::Parts{tile, code};
 }
 
 struct Key {
   std::string_view name;
-  Result<void> (*read) (std::string_view value, Schedule::Parts &parts);
+  Result<void> (*read) (
+      std::string_view key, std::string_view value, Schedule::Parts &parts);
   bool repeats = false;
 };
 
@@ -196,15 +190,15 @@ read_settings (std::span<const std::string_view> settings,
       return Error{
           "key " + in_quotes (name) + " is given twice; leave one out"};
     given = true;
-    if (const auto read = key->read (setting.substr (equals + 1), parts); !read)
-      return read;
+    RETURN_IF_ERROR (key->read (name, setting.substr (equals + 1), parts));
   }
   return {};
 }
 
 /** "192x144+64+32:sequential:4x2:order=bit-reversal" */
 Result<void>
-read_region (std::string_view value, Schedule::Parts &parts)
+read_region (
+    std::string_view key, std::string_view value, Schedule::Parts &parts)
 {
   const std::string form =
       "; a region is WxH+X+Y:CODE:TILE, such as 192x144+64+32:sequential:4x2, "
@@ -213,7 +207,7 @@ read_region (std::string_view value, Schedule::Parts &parts)
   const auto rect = parse_rect (pieces.front ());
   const bool has_corner = pieces.front ().find ('+') != value.npos;
   if (!rect || !has_corner || pieces.size () < 2)
-    return bad_value ("region", value,
+    return bad_value (key, value,
         in_quotes (pieces.front ()) + " is no area with a code" + form);
 
   const auto settings = std::find_if (pieces.begin () + 1, pieces.end (),
@@ -223,30 +217,21 @@ read_region (std::string_view value, Schedule::Parts &parts)
     pattern.remove_suffix (std::min (setting->size () + 1, pattern.size ()));
   auto region = read_pattern (pattern, form);
   if (!region)
-    return bad_value ("region", value, region.error ().message);
+    return bad_value (key, value, region.error ().message);
   const Key keys[] = {kOrder, kPhase};
   if (const auto read =
           read_settings ({settings, pieces.end ()}, keys, "colon", *region);
       !read)
-    return bad_value ("region", value, read.error ().message);
+    return bad_value (key, value, read.error ().message);
   parts.regions.push_back ({*rect, std::move (region->tile),
       std::move (region->code), std::move (region->order), region->phase});
   return {};
 }
 
 constexpr std::array<Key, 8> kKeys{{
-    {"active",
-        [] (std::string_view value, Schedule::Parts &parts) {
-          return read_time ("active", value, parts.timing.active);
-        }},
-    {"switching",
-        [] (std::string_view value, Schedule::Parts &parts) {
-          return read_time ("switching", value, parts.timing.switching);
-        }},
-    {"readout",
-        [] (std::string_view value, Schedule::Parts &parts) {
-          return read_time ("readout", value, parts.timing.readout);
-        }},
+    {"active", read_time<&Timing::active>},
+    {"switching", read_time<&Timing::switching>},
+    {"readout", read_time<&Timing::readout>},
     kOrder,
     kPhase,
     {"leak", read_leak},
@@ -260,13 +245,10 @@ read_preset (std::string_view preset)
   const std::string form = "; a preset is CODE:TILE[,key=value...], such as " +
                            std::string (kExample);
   auto pieces = split (preset, ',');
-  auto parts = read_pattern (pieces.front (), form);
-  if (!parts)
-    return parts.error ();
+  ASSIGN_OR_RETURN (auto parts, read_pattern (pieces.front (), form));
   pieces.erase (pieces.begin ());
-  if (const auto read = read_settings (pieces, kKeys, "comma", *parts); !read)
-    return read.error ();
-  return Schedule::make (*std::move (parts));
+  RETURN_IF_ERROR (read_settings (pieces, kKeys, "comma", parts));
+  return Schedule::make (std::move (parts));
 }
 
 Result<Schedule>
@@ -294,14 +276,14 @@ std::string
 placing_text (
     const std::vector<int> &order, Offset phase, const std::string &separator)
 {
-  const int n = int (order.size ());
   std::string text;
-  if (order == bit_reversed_order (n) && order != raster_order (n)) {
-    text = separator + "order=bit-reversal";
-  } else if (order != raster_order (n)) {
-    for (const int element : order)
-      text += (text.empty () ? separator + "order=" : "/") +
-              std::to_string (element);
+  if (!std::ranges::is_sorted (order)) {
+    if (order == bit_reversed_order (int (order.size ())))
+      text = separator + "order=bit-reversal";
+    else
+      for (const int element : order)
+        text += (text.empty () ? separator + "order=" : "/") +
+                std::to_string (element);
   }
   if (phase != Offset{})
     text += separator + "phase=" + std::to_string (phase.x) + "/" +

@@ -23,18 +23,6 @@ bad_elements (const std::string &name, int elements)
           " elements; a tile has 2 to " + to_string (Tile::kMaxElements)};
 }
 
-/** The label map (step_x x + step_y y) mod n. */
-std::vector<std::uint8_t>
-linear_labels (int elements, int step_y, int period_y)
-{
-  std::vector<std::uint8_t> labels;
-  labels.reserve (std::size_t (elements * period_y));
-  for (int y = 0; y < period_y; y++)
-    for (int x = 0; x < elements; x++)
-      labels.push_back (std::uint8_t ((x + step_y * y) % elements));
-  return labels;
-}
-
 /** "diamond:N" is a tile for the N = 2r^2 + 2r + 1 with r >= 1. */
 std::optional<int>
 diamond_radius (int elements)
@@ -120,8 +108,11 @@ try {
                  " must lie in 0.." + to_string (elements - 1)};
 
   const int period_y = elements / std::gcd (elements, step);
-  return Tile (name, elements, elements, period_y,
-      linear_labels (elements, step, period_y));
+  std::vector<std::uint8_t> labels;
+  for (int y = 0; y < period_y; y++)
+    for (int x = 0; x < elements; x++)
+      labels.push_back (std::uint8_t ((x + step * y) % elements));
+  return Tile (name, elements, elements, period_y, std::move (labels));
 } catch (const std::bad_alloc &) {
   return out_of_memory ();
 }
@@ -136,10 +127,10 @@ try {
                  "': a diamond has 5, 13, 25, 41, 61, 85, "
                  "113, 145, 181 or 221 elements"};
 
-  const int step = 2 * *radius + 1;
-  const int period_y = elements / std::gcd (elements, step);
-  return Tile (name, elements, elements, period_y,
-      linear_labels (elements, step, period_y));
+  auto tile = lattice (elements, 2 * *radius + 1);
+  if (tile)
+    tile->name_ = name;
+  return tile;
 } catch (const std::bad_alloc &) {
   return out_of_memory ();
 }

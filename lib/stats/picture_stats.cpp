@@ -7,6 +7,8 @@
 #include <span>
 #include <string>
 
+#include "base/try.h"
+
 namespace codedexposure
 {
 
@@ -42,10 +44,7 @@ StatsMeter<Pixel>::make (Extent size, const StatsOptions &options)
   StatsMeter meter;
   meter.bits_ = options.bits > 0 ? options.bits : kBits;
   if (options.line) {
-    auto points = options.line->points (size);
-    if (!points)
-      return points.error ();
-    meter.points_ = *std::move (points);
+    ASSIGN_OR_RETURN (meter.points_, options.line->points (size));
   }
   meter.levels_.resize (kCounts<Pixel> * kLevels<Pixel>);
   meter.stats_.pixels =

@@ -5,6 +5,7 @@
 #include <array>
 
 #include "base/text.h"
+#include "base/try.h"
 
 namespace codedexposure
 {
@@ -59,10 +60,7 @@ ProfileLine::parse (std::string_view text)
                  " is not a line; use row:Y, column:X or X0/Y0/X1/Y1, in "
                  "pixels or in %"};
   for (std::size_t i = 0; i < count; i++) {
-    const auto coordinate = parse_coordinate (parts[i]);
-    if (!coordinate)
-      return coordinate.error ();
-    *wanted[i] = *coordinate;
+    ASSIGN_OR_RETURN (*wanted[i], parse_coordinate (parts[i]));
   }
   return line;
 }

@@ -168,7 +168,7 @@ Extractor<Pixel>::Plan::run (ImageView<const Pixel> coded,
     std::span<const ImageView<Pixel>> subframes, RowRange rows) const
 {
   if (fast)
-    return fast->run (*this, coded, subframes, rows);
+    return fast->run (coded, subframes, rows);
   switch (this->method) {
   case Method::kDecode:
     for (int j = rows.first; j < rows.first + rows.count; j++)

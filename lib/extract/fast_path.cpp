@@ -146,6 +146,25 @@ struct FastPath<Pixel>::Chunk {
 };
 
 template <typename Pixel>
+LayoutTable<Pixel>::LayoutTable (const SampleGrid &grid, int lanes)
+    : n_ (grid.elements ()), repeat_ (grid.repeat ()),
+      elements_ (std::size_t (n_ * repeat_.height)),
+      comb_ (std::size_t (repeat_.width + lanes))
+{
+  for (int j = 0; j < repeat_.height; j++)
+    for (int e = 0; e < n_; e++)
+      for (int i = 0; i < repeat_.width; i++) {
+        const Offset at = grid.offset (e, i, j);
+        const int place = at.y * grid.cell ().width + at.x;
+        places_.push_back (std::uint8_t (place));
+        elements_[std::size_t (j * n_ + place)] = std::uint8_t (e);
+        identity_ = identity_ && place == e;
+      }
+  for (std::size_t i = 0; i < comb_.size (); i += std::size_t (repeat_.width))
+    comb_[i] = Pixel (-1);
+}
+
+template <typename Pixel>
 std::optional<FastPath<Pixel>>
 FastPath<Pixel>::make (const ExtractPlan &plan, std::span<const Target> targets)
 {
@@ -160,12 +179,12 @@ FastPath<Pixel>::make (const ExtractPlan &plan, std::span<const Target> targets)
 template <typename Pixel>
 FastPath<Pixel>::FastPath (
     const ExtractPlan &plan, std::span<const Target> targets)
-    : targets_ (targets),
+    : plan_ (&plan), targets_ (targets),
       layout_ (plan.grid, targets.front ().kernels<Pixel> ().lanes)
 {
   if (plan.decoder) {
     take_terms (*plan.decoder);
-    take_weights (plan);
+    take_weights ();
   }
 }
 
@@ -197,12 +216,12 @@ FastPath<Pixel>::take_terms (const Decoder &decoder)
 
 template <typename Pixel>
 void
-FastPath<Pixel>::take_weights (const ExtractPlan &plan)
+FastPath<Pixel>::take_weights ()
 {
-  for (int e = 0; e < plan.grid.elements (); e++) {
-    const Offset offset = plan.grid.offset (e, 0, 0);
-    const Lerp x = plan.decoder->lerp_x (offset);
-    const Lerp y = plan.decoder->lerp_y (offset);
+  for (int e = 0; e < plan_->grid.elements (); e++) {
+    const Offset offset = plan_->grid.offset (e, 0, 0);
+    const Lerp x = plan_->decoder->lerp_x (offset);
+    const Lerp y = plan_->decoder->lerp_y (offset);
     weights_.push_back (
         {nullptr, nullptr, {x.near, x.far}, {y.near, y.far}, x.step});
     row_steps_.push_back (y.step);
@@ -211,29 +230,29 @@ FastPath<Pixel>::take_weights (const ExtractPlan &plan)
 
 template <typename Pixel>
 ExtractReport
-FastPath<Pixel>::run (const ExtractPlan &plan, ImageView<const Pixel> coded,
+FastPath<Pixel>::run (ImageView<const Pixel> coded,
     std::span<const ImageView<Pixel>> subframes, RowRange rows) const
 {
   const bool through_elements =
-      plan.method == Method::kDecode && form_ != DecodeForm::kDifference;
-  return {through_elements ? decode (plan, coded, subframes, rows)
-                           : run_bands (plan, coded, subframes, rows)};
+      plan_->method == Method::kDecode && form_ != DecodeForm::kDifference;
+  return {through_elements ? decode (coded, subframes, rows)
+                           : run_bands (coded, subframes, rows)};
 }
 
 template <typename Pixel>
 std::uint64_t
-FastPath<Pixel>::run_bands (const ExtractPlan &plan,
-    ImageView<const Pixel> coded, std::span<const ImageView<Pixel>> subframes,
-    RowRange rows) const
+FastPath<Pixel>::run_bands (ImageView<const Pixel> coded,
+    std::span<const ImageView<Pixel>> subframes, RowRange rows) const
 {
   const std::size_t n = subframes.size ();
   const std::size_t row_bytes =
-      n * std::size_t (plan.size.width) * sizeof (Pixel);
+      n * std::size_t (plan_->size.width) * sizeof (Pixel);
   const std::ptrdiff_t stride = subframes[0].stride;
   const bool one_stride = std::ranges::all_of (
       subframes, [stride] (const auto &s) { return s.stride == stride; });
   const int band = one_stride ? std::max (1, int (kBand / row_bytes)) : 1;
-  const bool large = row_bytes * std::size_t (plan.size.height) >= kLargeFrame;
+  const bool large =
+      row_bytes * std::size_t (plan_->size.height) >= kLargeFrame;
 
   std::uint64_t count = 0;
   bool streamed = false;
@@ -241,16 +260,15 @@ FastPath<Pixel>::run_bands (const ExtractPlan &plan,
   for (int j = rows.first; j < end; j += band) {
     RowPointers<Pixel> to;
     for (std::size_t k = 0; k < n; k++)
-      to[plan.method == Method::kSelect ? std::size_t (plan.elements[k]) : k] =
-          subframes[k].row (j);
+      to[plan_->method == Method::kSelect ? std::size_t (plan_->elements[k])
+                                          : k] = subframes[k].row (j);
     const bool stream =
         large && equally_aligned<Pixel> (std::span (to).first (n));
     streamed = streamed || stream;
 
     const RowRange part = {j, std::min (band, end - j)};
-    const Pixel peak =
-        run_band (plan, coded, part, {to.data (), stride, stream});
-    count += saturated (plan, coded, part, 0, plan.size.width, peak);
+    const Pixel peak = run_band (coded, part, {to.data (), stride, stream});
+    count += saturated (coded, part, 0, plan_->size.width, peak);
   }
   if (streamed)
     targets_.front ().kernels<Pixel> ().fence ();
@@ -259,13 +277,13 @@ FastPath<Pixel>::run_bands (const ExtractPlan &plan,
 
 template <typename Pixel>
 Pixel
-FastPath<Pixel>::run_band (const ExtractPlan &plan,
+FastPath<Pixel>::run_band (
     ImageView<const Pixel> coded, RowRange rows, const Planes<Pixel> &to) const
 {
-  const Extent cell = plan.grid.cell ();
-  const std::size_t n = std::size_t (plan.grid.elements ());
+  const Extent cell = plan_->grid.cell ();
+  const std::size_t n = std::size_t (plan_->grid.elements ());
   Pixel peak = 0;
-  for_segments<Pixel> (targets_, plan.size.width, !to.stream,
+  for_segments<Pixel> (targets_, plan_->size.width, !to.stream,
       [&] (const Kernels<Pixel> &kernels, int first, int count) {
         RowPointers<Pixel> moved;
         for (std::size_t k = 0; k < n; k++)
@@ -276,25 +294,25 @@ FastPath<Pixel>::run_band (const ExtractPlan &plan,
         const Block<Pixel> block = {
             coded.row (rows.first * cell.height) + first * cell.width,
             coded.stride, cell.width, cell.height, count, rows.count};
-        peak = std::max (peak,
-            run_block (plan, kernels, block, layout_.from (first, rows.first),
-                {moved.data (), to.stride, to.stream && whole_lines}));
+        peak = std::max (
+            peak, run_block (kernels, block, layout_.from (first, rows.first),
+                      {moved.data (), to.stride, to.stream && whole_lines}));
       });
   return peak;
 }
 
 template <typename Pixel>
 Pixel
-FastPath<Pixel>::run_block (const ExtractPlan &plan,
-    const Kernels<Pixel> &kernels, const Block<Pixel> &block,
-    const Layout<Pixel> &layout, const Planes<Pixel> &to) const
+FastPath<Pixel>::run_block (const Kernels<Pixel> &kernels,
+    const Block<Pixel> &block, const Layout<Pixel> &layout,
+    const Planes<Pixel> &to) const
 {
-  switch (plan.method) {
+  switch (plan_->method) {
   case Method::kRank:
     return kernels.rank (block, to);
   case Method::kDecode:
     return kernels.difference (block, layout,
-        int (plan.decoder->terms (0)[0].factor), Pixel (plan.largest), to);
+        int (plan_->decoder->terms (0)[0].factor), Pixel (plan_->largest), to);
   default:
     return kernels.select (block, layout, to);
   }
@@ -302,67 +320,68 @@ FastPath<Pixel>::run_block (const ExtractPlan &plan,
 
 template <typename Pixel>
 std::uint64_t
-FastPath<Pixel>::decode (const ExtractPlan &plan, ImageView<const Pixel> coded,
+FastPath<Pixel>::decode (ImageView<const Pixel> coded,
     std::span<const ImageView<Pixel>> subframes, RowRange rows) const
 {
   if (rows.count <= 0)
     return 0;
   Chunk chunk;
-  chunk.n = plan.grid.elements ();
-  chunk.halo = plan.decoder->interpolates () ? 1 : 0;
+  chunk.n = plan_->grid.elements ();
+  chunk.halo = plan_->decoder->interpolates () ? 1 : 0;
   const int most = Chunk::most_cells (chunk.n, chunk.halo > 0);
-  const int chunks = (plan.size.width + most - 1) / most;
-  chunk.pitch = (plan.size.width + chunks - 1) / chunks + 2 * chunk.halo;
+  const int chunks = (plan_->size.width + most - 1) / most;
+  chunk.pitch = (plan_->size.width + chunks - 1) / chunks + 2 * chunk.halo;
 
   std::uint64_t count = 0;
   for (int c = 0; c < chunks; c++) {
-    chunk.first = plan.size.width * c / chunks;
-    chunk.count = plan.size.width * (c + 1) / chunks - chunk.first;
-    count += decode_chunk (plan, coded, subframes, rows, chunk);
+    chunk.first = plan_->size.width * c / chunks;
+    chunk.count = plan_->size.width * (c + 1) / chunks - chunk.first;
+    count += decode_chunk (coded, subframes, rows, chunk);
   }
   return count;
 }
 
 template <typename Pixel>
 std::uint64_t
-FastPath<Pixel>::decode_chunk (const ExtractPlan &plan,
-    ImageView<const Pixel> coded, std::span<const ImageView<Pixel>> subframes,
-    RowRange rows, Chunk &chunk) const
+FastPath<Pixel>::decode_chunk (ImageView<const Pixel> coded,
+    std::span<const ImageView<Pixel>> subframes, RowRange rows,
+    Chunk &chunk) const
 {
-  const int width = plan.size.width;
-  const int height = plan.size.height;
+  const int width = plan_->size.width;
+  const int height = plan_->size.height;
   std::uint64_t count = 0;
   if (chunk.halo > 0)
     for (int j = std::max (rows.first - 1, 0); j <= rows.first; j++)
-      chunk.fill (targets_, layout_, plan.grid, coded, j, width);
+      chunk.fill (targets_, layout_, plan_->grid, coded, j, width);
 
   for (int j = rows.first; j < rows.first + rows.count; j++) {
     if (chunk.halo == 0)
-      chunk.fill (targets_, layout_, plan.grid, coded, j, width);
+      chunk.fill (targets_, layout_, plan_->grid, coded, j, width);
     else if (j + 1 < height)
-      chunk.fill (targets_, layout_, plan.grid, coded, j + 1, width);
+      chunk.fill (targets_, layout_, plan_->grid, coded, j + 1, width);
 
     RowPointers<Pixel> to;
     for (std::size_t k = 0; k < subframes.size (); k++)
       to[k] = subframes[k].row (j) + chunk.first;
-    decode_row (plan, chunk, j, to);
-    count += saturated (
-        plan, coded, {j, 1}, chunk.first, chunk.count, chunk.peak (j));
+    decode_row (chunk, j, to);
+    count +=
+        saturated (coded, {j, 1}, chunk.first, chunk.count, chunk.peak (j));
   }
   return count;
 }
 
 template <typename Pixel>
 void
-FastPath<Pixel>::decode_row (const ExtractPlan &plan, const Chunk &chunk, int j,
-    const RowPointers<Pixel> &to) const
+FastPath<Pixel>::decode_row (
+    const Chunk &chunk, int j, const RowPointers<Pixel> &to) const
 {
   const Kernels<Pixel> &kernels = targets_.front ().kernels<Pixel> ();
-  const Pixel largest = Pixel (plan.largest);
+  const Pixel largest = Pixel (plan_->largest);
   const std::size_t n = std::size_t (chunk.n);
   std::array<ElementRow<Pixel>, Tile::kMaxElements> rows;
   for (std::size_t e = 0; e < n; e++) {
-    const int beside = std::clamp (j + row_steps_[e], 0, plan.size.height - 1);
+    const int beside =
+        std::clamp (j + row_steps_[e], 0, plan_->size.height - 1);
     rows[e] = weights_[e];
     rows[e].here = chunk.row (j, int (e));
     rows[e].there = chunk.row (beside, int (e));
@@ -378,19 +397,18 @@ FastPath<Pixel>::decode_row (const ExtractPlan &plan, const Chunk &chunk, int j,
 /** Counts only where the largest pixel says that there is something to. */
 template <typename Pixel>
 std::uint64_t
-FastPath<Pixel>::saturated (const ExtractPlan &plan,
-    ImageView<const Pixel> coded, RowRange rows, int first, int count,
-    Pixel peak) const
+FastPath<Pixel>::saturated (ImageView<const Pixel> coded, RowRange rows,
+    int first, int count, Pixel peak) const
 {
-  if (peak < plan.largest)
+  if (peak < plan_->largest)
     return 0;
   const Kernels<Pixel> &kernels = targets_.front ().kernels<Pixel> ();
-  const Extent cell = plan.grid.cell ();
+  const Extent cell = plan_->grid.cell ();
   std::uint64_t found = 0;
   for (int y = 0; y < rows.count * cell.height; y++)
     found += kernels.count (
         coded.row (rows.first * cell.height + y) + first * cell.width,
-        count * cell.width, Pixel (plan.largest));
+        count * cell.width, Pixel (plan_->largest));
   return found;
 }
 

@@ -10,7 +10,7 @@
 #include "base/image.h"
 #include "extract/decoder.h"
 #include "extract/extractor.h"
-#include "extract/layout_table.h"
+#include "extract/kernels.h"
 #include "extract/reference.h"
 #include "extract/targets.h"
 #include "schedule/sample_grid.h"
@@ -21,6 +21,32 @@ namespace codedexposure
 /** A row of pixels for each element or rank. */
 template <typename Pixel>
 using RowPointers = std::array<Pixel *, Tile::kMaxElements>;
+
+/** The sample grid in the form that kernels read. */
+template <typename Pixel>
+class LayoutTable
+{
+public:
+  /** @p lanes  of the widest kernels that will read it. */
+  LayoutTable (const SampleGrid &grid, int lanes);
+
+  /** For a block that starts with cell (@p column, @p row); valid as long as
+   * the table. */
+  Layout<Pixel> from (int column, int row) const
+  {
+    return {places_.data (), n_, repeat_.width, repeat_.height,
+        column % repeat_.width, row % repeat_.height, comb_.data (), identity_,
+        elements_.data ()};
+  }
+
+private:
+  int n_;
+  Extent repeat_;
+  bool identity_ = true;
+  std::vector<std::uint8_t> places_;
+  std::vector<std::uint8_t> elements_; ///< as far as Layout says
+  std::vector<Pixel> comb_;
+};
 
 /** What is to be done, whoever does it. */
 struct ExtractPlan {
@@ -40,12 +66,13 @@ template <typename Pixel>
 class FastPath
 {
 public:
-  /** @p targets  the kernels that may be used, widest first; those that are
-   * too wide for the rows are left out. Nothing when all are. */
+  /** @p plan     outlives this.
+   *  @p targets  the kernels that may be used, widest first; those that are
+   *              too wide for the rows are left out. Nothing when all are. */
   static std::optional<FastPath> make (
       const ExtractPlan &plan, std::span<const Target> targets);
 
-  ExtractReport run (const ExtractPlan &plan, ImageView<const Pixel> coded,
+  ExtractReport run (ImageView<const Pixel> coded,
       std::span<const ImageView<Pixel>> subframes, RowRange rows) const;
 
 private:
@@ -59,27 +86,25 @@ private:
 
   FastPath (const ExtractPlan &plan, std::span<const Target> targets);
   void take_terms (const Decoder &decoder);
-  void take_weights (const ExtractPlan &plan);
+  void take_weights ();
 
-  std::uint64_t run_bands (const ExtractPlan &plan,
-      ImageView<const Pixel> coded, std::span<const ImageView<Pixel>> subframes,
-      RowRange rows) const;
-  Pixel run_band (const ExtractPlan &plan, ImageView<const Pixel> coded,
-      RowRange rows, const Planes<Pixel> &to) const;
-  Pixel run_block (const ExtractPlan &plan, const Kernels<Pixel> &kernels,
-      const Block<Pixel> &block, const Layout<Pixel> &layout,
-      const Planes<Pixel> &to) const;
-  std::uint64_t decode (const ExtractPlan &plan, ImageView<const Pixel> coded,
+  std::uint64_t run_bands (ImageView<const Pixel> coded,
       std::span<const ImageView<Pixel>> subframes, RowRange rows) const;
-  std::uint64_t decode_chunk (const ExtractPlan &plan,
-      ImageView<const Pixel> coded, std::span<const ImageView<Pixel>> subframes,
-      RowRange rows, Chunk &chunk) const;
-  void decode_row (const ExtractPlan &plan, const Chunk &chunk, int j,
-      const RowPointers<Pixel> &to) const;
-  std::uint64_t saturated (const ExtractPlan &plan,
-      ImageView<const Pixel> coded, RowRange rows, int first, int count,
-      Pixel peak) const;
+  Pixel run_band (ImageView<const Pixel> coded, RowRange rows,
+      const Planes<Pixel> &to) const;
+  Pixel run_block (const Kernels<Pixel> &kernels, const Block<Pixel> &block,
+      const Layout<Pixel> &layout, const Planes<Pixel> &to) const;
+  std::uint64_t decode (ImageView<const Pixel> coded,
+      std::span<const ImageView<Pixel>> subframes, RowRange rows) const;
+  std::uint64_t decode_chunk (ImageView<const Pixel> coded,
+      std::span<const ImageView<Pixel>> subframes, RowRange rows,
+      Chunk &chunk) const;
+  void decode_row (
+      const Chunk &chunk, int j, const RowPointers<Pixel> &to) const;
+  std::uint64_t saturated (ImageView<const Pixel> coded, RowRange rows,
+      int first, int count, Pixel peak) const;
 
+  const ExtractPlan *plan_;
   std::span<const Target> targets_;
   LayoutTable<Pixel> layout_;
   DecodeForm form_ = DecodeForm::kTerms;

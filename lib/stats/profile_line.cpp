@@ -2,7 +2,6 @@
 #include "stats/profile_line.h"
 
 #include <algorithm>
-#include <array>
 
 #include "base/text.h"
 #include "base/try.h"
@@ -34,32 +33,22 @@ Result<ProfileLine>
 ProfileLine::parse (std::string_view text)
 {
   ProfileLine line;
-  const auto rest_of = [text] (std::string_view prefix) {
-    return split (text.substr (prefix.size ()), '/');
-  };
-  constexpr std::string_view kRow = "row:", kColumn = "column:";
-  std::vector<std::string_view> parts;
-  std::array<Coordinate *, 4> wanted = {
+  std::vector<Coordinate *> wanted = {
       &line.x0_, &line.y0_, &line.x1_, &line.y1_};
-  std::size_t count = 4;
-  if (text.starts_with (kRow)) {
-    parts = rest_of (kRow);
-    wanted = {&line.y0_};
-    count = 1;
-  } else if (text.starts_with (kColumn)) {
-    line.kind_ = Kind::kColumn;
-    parts = rest_of (kColumn);
-    wanted = {&line.x0_};
-    count = 1;
-  } else {
-    line.kind_ = Kind::kFree;
-    parts = split (text, '/');
+  std::string_view coordinates = text;
+  line.kind_ = Kind::kFree;
+  if (text.starts_with ("row:") || text.starts_with ("column:")) {
+    const bool is_row = text.starts_with ("row:");
+    line.kind_ = is_row ? Kind::kRow : Kind::kColumn;
+    wanted = {is_row ? &line.y0_ : &line.x0_};
+    coordinates.remove_prefix (text.find (':') + 1);
   }
-  if (parts.size () != count)
+  const auto parts = split (coordinates, '/');
+  if (parts.size () != wanted.size ())
     return Error{in_quotes (text) +
                  " is not a line; use row:Y, column:X or X0/Y0/X1/Y1, in "
                  "pixels or in %"};
-  for (std::size_t i = 0; i < count; i++) {
+  for (std::size_t i = 0; i < parts.size (); i++) {
     ASSIGN_OR_RETURN (*wanted[i], parse_coordinate (parts[i]));
   }
   return line;

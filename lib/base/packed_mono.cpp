@@ -6,6 +6,7 @@
 #include <cctype>
 #include <string>
 
+#include "base/geometry.h"
 #include "base/try.h"
 
 namespace codedexposure
@@ -127,8 +128,8 @@ check_rows (MonoFormat format, int bytes, int byte_rows, int width, int height)
     return {};
   return Error{std::to_string (byte_rows) + " rows of " +
                std::to_string (bytes) + " bytes are not " +
-               std::to_string (width) + "x" + std::to_string (height) +
-               " pixels of " + mono_format_text (format) + ", which take " +
+               size_text ({width, height}) + " pixels of " +
+               mono_format_text (format) + ", which take " +
                std::to_string (row_bytes (format, width)) + " a row"};
 }
 

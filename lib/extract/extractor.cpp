@@ -87,10 +87,8 @@ Error
 no_cell (const Schedule &schedule, int width, int height)
 {
   const Extent cell = schedule.cell ();
-  std::string text = "frame of " + std::to_string (width) + "x" +
-                     std::to_string (height) + " pixels holds no cell of " +
-                     std::to_string (cell.width) + "x" +
-                     std::to_string (cell.height);
+  std::string text = "frame of " + size_text ({width, height}) +
+                     " pixels holds no cell of " + size_text (cell);
   if (schedule.pilot_rows () > 0)
     text += " above the pilot's " + std::to_string (schedule.pilot_rows ()) +
             " rows";

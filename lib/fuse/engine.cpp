@@ -99,9 +99,8 @@ Engine::make (const Schedule &schedule, int width, int height,
   const int rows = height - schedule.pilot_rows ();
   const Extent cell = schedule.cell ();
   if (width < cell.width || rows < cell.height)
-    return Error{"frames of " + std::to_string (width) + "x" +
-                 std::to_string (height) + " pixels hold no cell of " +
-                 schedule.text ()};
+    return Error{"frames of " + size_text ({width, height}) +
+                 " pixels hold no cell of " + schedule.text ()};
   RETURN_IF_ERROR (check (options));
   RETURN_IF_ERROR (check (schedule, options.quality));
   return std::unique_ptr<Engine> (

@@ -6,6 +6,8 @@
 #include <functional>
 #include <numbers>
 
+#include <Eigen/LU>
+
 #include "base/text.h"
 #include "base/try.h"
 
@@ -15,23 +17,20 @@ namespace codedexposure
 namespace
 {
 
-double
-determinant (const Homography &h)
+using Square = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+
+Eigen::Map<const Square>
+matrix_of (const Homography &h)
 {
-  return h[0] * (h[4] * h[8] - h[5] * h[7]) -
-         h[1] * (h[3] * h[8] - h[5] * h[6]) +
-         h[2] * (h[3] * h[7] - h[4] * h[6]);
+  return Eigen::Map<const Square> (h.data ());
 }
 
-/* Up to a factor. */
 Homography
 inverse_of (const Homography &h)
 {
-  return {h[4] * h[8] - h[5] * h[7], h[2] * h[7] - h[1] * h[8],
-      h[1] * h[5] - h[2] * h[4], h[5] * h[6] - h[3] * h[8],
-      h[0] * h[8] - h[2] * h[6], h[2] * h[3] - h[0] * h[5],
-      h[3] * h[7] - h[4] * h[6], h[1] * h[6] - h[0] * h[7],
-      h[0] * h[4] - h[1] * h[3]};
+  Homography inverse;
+  Eigen::Map<Square> (inverse.data ()) = matrix_of (h).inverse ();
+  return inverse;
 }
 
 /* d mirror / d camera of the homography alone. */
@@ -55,20 +54,18 @@ check_size (const char *what, Extent size)
   if (std::min (size.width, size.height) >= 1 &&
       std::max (size.width, size.height) <= Mapping::kMaxSize)
     return {};
-  return Error{std::string ("a mapping's ") + what + " of " +
-               std::to_string (size.width) + "x" +
-               std::to_string (size.height) + " must be from 1x1 to " +
-               std::to_string (Mapping::kMaxSize) + "x" +
-               std::to_string (Mapping::kMaxSize)};
+  return Error{std::string ("a mapping's ") + what + " of " + size_text (size) +
+               " must be from 1x1 to " +
+               size_text ({Mapping::kMaxSize, Mapping::kMaxSize})};
 }
 
 Result<void>
-check_finite (const char *what, const double *numbers, std::size_t count)
+check_finite (const std::string &what, std::span<const double> numbers)
 {
-  for (std::size_t i = 0; i < count; i++)
+  for (std::size_t i = 0; i < numbers.size (); i++)
     if (!std::isfinite (numbers[i]))
-      return bad_number (std::string (what) + "[" + std::to_string (i) + "]",
-          numbers[i], "it must be finite");
+      return bad_number (what + "[" + std::to_string (i) + "]", numbers[i],
+          "it must be finite");
   return {};
 }
 
@@ -76,14 +73,14 @@ check_finite (const char *what, const double *numbers, std::size_t count)
 Result<void>
 normalise (Homography &h, Extent camera)
 {
-  RETURN_IF_ERROR (check_finite ("homography", h.data (), h.size ()));
+  RETURN_IF_ERROR (check_finite ("homography", h));
   const CentredFrame frame (camera);
   const double z = h[6] * frame.cx + h[7] * frame.cy + h[8];
   /* What is right to the last digits stays as it is written. */
   if (std::abs (z - 1.0) > 1e-12)
     for (double &number : h)
       number /= z;
-  if (z == 0.0 || !check_finite ("homography", h.data (), h.size ()).ok ())
+  if (z == 0.0 || !check_finite ("homography", h).ok ())
     return bad_number ("the homography's Z at the centre of the frame", z,
         "the horizon must lie outside of the frame");
   for (const double x : {0.0, 2.0 * frame.cx})
@@ -92,8 +89,9 @@ normalise (Homography &h, Extent camera)
         return bad_number ("the homography's Z in a corner of the frame, of "
                            "that at the centre,",
             corner, "the horizon must lie outside of the frame");
-  if (!(std::abs (determinant (h)) > 1e-9))
-    return bad_number ("the determinant of the homography", determinant (h),
+  const double determinant = matrix_of (h).determinant ();
+  if (!(std::abs (determinant) > 1e-9))
+    return bad_number ("the determinant of the homography", determinant,
         "it must have an inverse");
   return {};
 }
@@ -114,7 +112,7 @@ check_displacement (const Displacement &grid)
       return bad_number (std::string ("the count of ") + what,
           double (numbers->size ()),
           "it must be columns x rows = " + std::to_string (nodes));
-    RETURN_IF_ERROR (check_finite (what, numbers->data (), numbers->size ()));
+    RETURN_IF_ERROR (check_finite (what, *numbers));
   }
   return {};
 }
@@ -123,8 +121,7 @@ Result<void>
 check_covariance (const Mapping::Covariance &covariance)
 {
   constexpr std::size_t n = Mapping::kParameters;
-  RETURN_IF_ERROR (
-      check_finite ("covariance", covariance.data (), covariance.size ()));
+  RETURN_IF_ERROR (check_finite ("covariance", covariance));
   for (std::size_t i = 0; i < n; i++) {
     if (covariance[i * n + i] < 0.0)
       return bad_number ("variance " + std::to_string (i) + " of the mapping",
@@ -136,19 +133,6 @@ check_covariance (const Mapping::Covariance &covariance)
                      " are not"};
   }
   return {};
-}
-
-Homography
-centred_of (const Homography &h, Extent camera)
-{
-  const CentredFrame f (camera);
-  Homography c;
-  for (std::size_t row = 0; row < 9; row += 3) {
-    c[row] = h[row] * f.r;
-    c[row + 1] = h[row + 1] * f.r;
-    c[row + 2] = h[row] * f.cx + h[row + 1] * f.cy + h[row + 2];
-  }
-  return c;
 }
 
 Homography
@@ -188,20 +172,18 @@ double
 propagate (const Mapping::Covariance &covariance, const Homography &at,
     const std::function<double (const Homography &)> &value)
 {
-  constexpr std::size_t n = Mapping::kParameters;
-  std::array<double, n> gradient;
-  for (std::size_t i = 0; i < n; i++) {
-    const double step = 1e-4;
+  constexpr int n = Mapping::kParameters;
+  constexpr double step = 1e-4;
+  Eigen::Vector<double, n> gradient;
+  for (int i = 0; i < n; i++) {
     Homography up = at, down = at;
-    up[i] += step;
-    down[i] -= step;
+    up[std::size_t (i)] += step;
+    down[std::size_t (i)] -= step;
     gradient[i] = (value (up) - value (down)) / (2.0 * step);
   }
-  double variance = 0.0;
-  for (std::size_t i = 0; i < n; i++)
-    for (std::size_t j = 0; j < n; j++)
-      variance += gradient[i] * covariance[i * n + j] * gradient[j];
-  return std::sqrt (std::max (0.0, variance));
+  const Eigen::Map<const Eigen::Matrix<double, n, n>> matrix (
+      covariance.data ());
+  return std::sqrt (std::max (0.0, gradient.dot (matrix * gradient)));
 }
 
 } // namespace
@@ -343,7 +325,15 @@ Mapping::covers (Position mirror) const
 Homography
 Mapping::centred () const
 {
-  return centred_of (parts_.homography, parts_.camera);
+  const Homography &h = parts_.homography;
+  const CentredFrame f (parts_.camera);
+  Homography c;
+  for (std::size_t row = 0; row < 9; row += 3) {
+    c[row] = h[row] * f.r;
+    c[row + 1] = h[row + 1] * f.r;
+    c[row + 2] = h[row] * f.cx + h[row + 1] * f.cy + h[row + 2];
+  }
+  return c;
 }
 
 Pose

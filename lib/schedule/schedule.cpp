@@ -101,8 +101,7 @@ check_rect (const Rect &rect, Extent cell)
     return Error{"it holds no pixel; give it a width and a height"};
   if (rect.width % cell.width != 0 || rect.height % cell.height != 0)
     return Error{"its sides must be multiples of those of its cell, " +
-                 std::to_string (cell.width) + "x" +
-                 std::to_string (cell.height)};
+                 size_text (cell)};
   return {};
 }
 
@@ -234,8 +233,8 @@ Schedule::check_size (int width, int height) const
     const int rows = height - parts_.pilot_rows;
     if (rect.right () <= width && rect.bottom () <= rows)
       continue;
-    std::string why = "it does not lie within the " + std::to_string (width) +
-                      "x" + std::to_string (height) + " pixels";
+    std::string why =
+        "it does not lie within the " + size_text ({width, height}) + " pixels";
     if (parts_.pilot_rows > 0)
       why +=
           " above the pilot's " + std::to_string (parts_.pilot_rows) + " rows";

@@ -80,7 +80,7 @@ Tile::Tile (std::string name, int elements, int period_x, int period_y,
 Result<Tile>
 Tile::raster (int columns, int rows)
 try {
-  const std::string name = to_string (columns) + "x" + to_string (rows);
+  const std::string name = size_text ({columns, rows});
   if (columns < 1 || rows < 1 || columns > kMaxElements ||
       rows > kMaxElements || columns * rows < 2 ||
       columns * rows > kMaxElements)

@@ -32,8 +32,7 @@ StatsMeter<Pixel>::make (Extent size, const StatsOptions &options)
 {
   constexpr int kBits = std::numeric_limits<Pixel>::digits;
   if (size.width < 1 || size.height < 1)
-    return Error{"a picture of " + std::to_string (size.width) + "x" +
-                 std::to_string (size.height) + " has no statistics"};
+    return Error{"a picture of " + size_text (size) + " has no statistics"};
   if (options.bits < 0 || options.bits > kBits)
     return Error{"bits = " + std::to_string (options.bits) +
                  " is out of range; a pixel has 1 to " +

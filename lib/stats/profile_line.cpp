@@ -70,11 +70,9 @@ ProfileLine::points (Extent size) const
   const double bottom = std::max (from.y, to.y);
   if (right > size.width - 1 || bottom > size.height - 1)
     return Error{"the line reaches pixel (" + real_text (right) + ", " +
-                 real_text (bottom) + ") of a picture of " +
-                 std::to_string (size.width) + "x" +
-                 std::to_string (size.height) + "; its last pixel is (" +
-                 std::to_string (size.width - 1) + ", " +
-                 std::to_string (size.height - 1) +
+                 real_text (bottom) + ") of a picture of " + size_text (size) +
+                 "; its last pixel is (" + std::to_string (size.width - 1) +
+                 ", " + std::to_string (size.height - 1) +
                  "); percentages such as 50% fit every size"};
 
   const int steps = std::max (

@@ -155,16 +155,14 @@ bool
 check (GstCodedExposureCameraSrc *self)
 {
   if (!self->state->source) {
-    GST_ELEMENT_ERROR (self, CORE, MISSING_PLUGIN,
-        ("The GStreamer element aravissrc is not installed. It is in "
-         "Debian's package libaravis-0.8-0."),
-        (nullptr));
+    POST_ERROR (self, CORE, MISSING_PLUGIN,
+        "The GStreamer element aravissrc is not installed. It is in Debian's "
+        "package libaravis-0.8-0.");
     return false;
   }
   const Result<void> good = check_settings (camera::settings_of (self));
   if (!good)
-    GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
-        ("%s", good.error ().message.c_str ()), (nullptr));
+    POST_ERROR (self, RESOURCE, SETTINGS, good.error ().message);
   return good.ok ();
 }
 

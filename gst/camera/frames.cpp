@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure-camerasrc, frame by frame: memory, pixels, time. */
 #include "camerasrc.h"
+#include "common/element.h"
 #include "common/meta.h"
 
 #define GST_CAT_DEFAULT camerasrc_debug
@@ -21,8 +22,7 @@ take_caps (GstCodedExposureCameraSrc *self, GstCaps *caps)
   Result<OwnedFrames> frames =
       OwnedFrames::make (info, settings_of (self).pixel_format);
   if (!frames) {
-    GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
-        ("%s", frames.error ().message.c_str ()), (nullptr));
+    POST_ERROR (self, RESOURCE, SETTINGS, frames.error ().message);
     return false;
   }
   stream.frames = *std::move (frames);

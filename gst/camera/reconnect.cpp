@@ -44,11 +44,9 @@ say_lost (GstCodedExposureCameraSrc *self, const std::string &why)
 {
   post_structure (self, gst_structure_new ("codedexposure/camera-lost",
                             "reason", G_TYPE_STRING, why.c_str (), nullptr));
-  GST_ELEMENT_WARNING (self, RESOURCE, READ,
-      ("The camera is gone: %s It is restarted until it comes back (property "
-       "reconnect).",
-          why.c_str ()),
-      (nullptr));
+  POST_WARNING (self, RESOURCE, READ,
+      "The camera is gone: " + why +
+          " It is restarted until it comes back (property reconnect).");
 }
 
 void
@@ -60,11 +58,10 @@ give_up (GstCodedExposureCameraSrc *self, guint tries)
     const std::lock_guard guard (st.lock);
     why = st.why;
   }
-  GST_ELEMENT_ERROR (self, RESOURCE, READ,
-      ("The camera did not come back after %u tries to restart it (property "
-       "reconnect): %s Check its cable, its power and its trigger.",
-          tries, why.c_str ()),
-      (nullptr));
+  POST_ERROR (self, RESOURCE, READ,
+      "The camera did not come back after " + std::to_string (tries) +
+          " tries to restart it (property reconnect): " + why +
+          " Check its cable, its power and its trigger.");
   const ObjectPtr<GstPad> pad (
       gst_element_get_static_pad (GST_ELEMENT (self), "src"));
   gst_pad_push_event (pad.get (), gst_event_new_eos ());

@@ -31,3 +31,12 @@ void post_progress (gpointer element, GstProgressType type, const char *code,
 void add_latency (GstQuery *query, GstClockTime own);
 
 } // namespace codedexposure::gst
+
+/** GST_ELEMENT_ERROR and GST_ELEMENT_WARNING with a std::string or a literal
+ * as their only text. */
+#define POST_ERROR(element, domain, code, text)                                \
+  GST_ELEMENT_ERROR (                                                          \
+      element, domain, code, ("%s", std::string (text).c_str ()), (nullptr))
+#define POST_WARNING(element, domain, code, text)                              \
+  GST_ELEMENT_WARNING (                                                        \
+      element, domain, code, ("%s", std::string (text).c_str ()), (nullptr))

@@ -49,15 +49,13 @@ reports (GstDmdSync *self)
   reports.failed = [self] (const Error &error) {
     if (state (self).uploading.exchange (false))
       post_progress (self, GST_PROGRESS_TYPE_ERROR, kUpload, error.message);
-    GST_ELEMENT_ERROR (self, RESOURCE, WRITE,
-        ("The DMD failed: %s", error.message.c_str ()), (nullptr));
+    POST_ERROR (self, RESOURCE, WRITE, "The DMD failed: " + error.message);
   };
   reports.not_parked = [self] {
-    GST_ELEMENT_WARNING (self, RESOURCE, WRITE,
-        ("%s did not answer when it was told to stop, and may show masks on: "
-         "try \"codedexposure dmd stop\", or switch it off.",
-            state (self).runner->info ().name.c_str ()),
-        (nullptr));
+    POST_WARNING (self, RESOURCE, WRITE,
+        state (self).runner->info ().name +
+            " did not answer when it was told to stop, and may show masks on: "
+            "try \"codedexposure dmd stop\", or switch it off.");
   };
   return reports;
 }
@@ -77,10 +75,8 @@ read_schedule (GstDmdSync *self)
   SyncState &st = state (self);
   Result<Schedule> schedule = Schedule::parse (settings_of (self).schedule);
   if (!schedule) {
-    GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
-        ("The schedule property cannot be read: %s",
-            schedule.error ().message.c_str ()),
-        (nullptr));
+    POST_ERROR (self, RESOURCE, SETTINGS,
+        "The schedule property cannot be read: " + schedule.error ().message);
     return false;
   }
   st.schedule = *std::move (schedule);
@@ -97,10 +93,8 @@ open_device (GstDmdSync *self)
 
   Result<std::unique_ptr<Dmd>> dmd = open_dmd (device);
   if (!dmd) {
-    GST_ELEMENT_ERROR (self, RESOURCE, OPEN_READ_WRITE,
-        ("Cannot open the DMD \"%s\": %s", device.c_str (),
-            dmd.error ().message.c_str ()),
-        (nullptr));
+    POST_ERROR (self, RESOURCE, OPEN_READ_WRITE,
+        "Cannot open the DMD \"" + device + "\": " + dmd.error ().message);
     return false;
   }
   st.runner = std::make_unique<DmdRunner> (*std::move (dmd), reports (self));

@@ -104,13 +104,13 @@ own_schedule (GstDmdSync *self, GstEvent *event)
   const auto theirs = setup_from_tags (tags);
   if (theirs && (!*theirs || !(theirs->value ().schedule == st.schedule)) &&
       !std::exchange (st.stream.warned_tag, true))
-    GST_ELEMENT_WARNING (self, STREAM, WRONG_TYPE,
-        ("The stream was tagged with the schedule %s, but the DMD shows %s: "
-         "the tag now says the latter. Give both elements the same schedule.",
-            *theirs ? theirs->value ().schedule.text ().c_str ()
-                    : "that is unreadable",
-            st.schedule.text ().c_str ()),
-        (nullptr));
+    POST_WARNING (self, STREAM, WRONG_TYPE,
+        "The stream was tagged with the schedule " +
+            (*theirs ? theirs->value ().schedule.text ()
+                     : "that is unreadable") +
+            ", but the DMD shows " + st.schedule.text () +
+            ": the tag now says the latter. Give both elements the same "
+            "schedule.");
   if (gst_tag_list_get_scope (tags) == GST_TAG_SCOPE_GLOBAL && !theirs)
     return event;
 
@@ -128,10 +128,9 @@ take_segment (GstDmdSync *self, GstEvent *event)
   const GstSegment *segment = nullptr;
   gst_event_parse_segment (event, &segment);
   if (segment->format != GST_FORMAT_TIME) {
-    GST_ELEMENT_ERROR (self, STREAM, FORMAT,
-        ("Frames must come in TIME, not in %s",
-            gst_format_get_name (segment->format)),
-        (nullptr));
+    POST_ERROR (self, STREAM, FORMAT,
+        "Frames must come in TIME, not in " +
+            std::string (gst_format_get_name (segment->format)));
     gst_event_unref (event);
     return FALSE;
   }

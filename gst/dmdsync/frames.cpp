@@ -406,10 +406,9 @@ generate_output (GstBaseTransform *trans, GstBuffer **outbuf)
     if (!stream.time)
       return GST_FLOW_NOT_NEGOTIATED;
     if (!GST_BUFFER_PTS_IS_VALID (buffer.get ())) {
-      GST_ELEMENT_ERROR (self, STREAM, FORMAT,
-          ("A frame has no time stamp, and nothing says when it was exposed; "
-           "let the source set one (do-timestamp=true)"),
-          (nullptr));
+      POST_ERROR (self, STREAM, FORMAT,
+          "A frame has no time stamp, and nothing says when it was exposed; "
+          "let the source set one (do-timestamp=true)");
       return GST_FLOW_ERROR;
     }
     GST_LOG_OBJECT (self, "[IN] %" GST_TIME_FORMAT,

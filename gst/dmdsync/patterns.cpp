@@ -38,9 +38,8 @@ obstacle (const SyncState &st)
 bool
 refuse (GstDmdSync *self, const std::string &pattern, const std::string &why)
 {
-  GST_ELEMENT_WARNING (self, RESOURCE, SETTINGS,
-      ("Cannot show the pattern %s: %s", pattern.c_str (), why.c_str ()),
-      (nullptr));
+  POST_WARNING (self, RESOURCE, SETTINGS,
+      "Cannot show the pattern " + pattern + ": " + why);
   return false;
 }
 

@@ -143,10 +143,8 @@ begin (GstMoireCalib *self, const Settings &settings, int bits)
     return true;
   }
   if (const auto shown = Pattern::parse (settings.live_pattern ()); !shown) {
-    GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
-        ("The pattern property cannot be read: %s",
-            shown.error ().message.c_str ()),
-        (nullptr));
+    POST_ERROR (self, RESOURCE, SETTINGS,
+        "The pattern property cannot be read: " + shown.error ().message);
     return false;
   }
   const MirrorsAnswer mirrors = ask_mirrors (self);
@@ -362,10 +360,10 @@ finish (GstMoireCalib *self)
             CalibrationSession::kSure, confidence),
         (nullptr));
   if (st.stream.mapping && st.stream.next < patterns)
-    GST_ELEMENT_WARNING (self, STREAM, FAILED,
-        ("The stream ended after %d of %d patterns: there is no mapping.",
-            int (st.stream.next), int (patterns)),
-        (nullptr));
+    POST_WARNING (self, STREAM, FAILED,
+        "The stream ended after " + std::to_string (int (st.stream.next)) +
+            " of " + std::to_string (int (patterns)) +
+            " patterns: there is no mapping.");
 }
 
 } // namespace

@@ -180,13 +180,7 @@ gboolean set_caps (
     GstBaseTransform *trans, GstCaps *incaps, GstCaps *outcaps) noexcept;
 gboolean sink_event (GstBaseTransform *trans, GstEvent *event) noexcept;
 
-/* Messages. */
+/** Posts a message when it is another one. */
 void set_stage (GstMoireCalib *self, Stage stage);
-void say_reading (GstMoireCalib *self, const Sample &sample,
-    const LiveReading &reading, const StageCorrection &correction);
-void say_phase (GstMoireCalib *self, const Sample &sample,
-    const CalibrationSession::Phase &found);
-void say_mapping (GstMoireCalib *self, const CalibrationResult &result,
-    const std::string &location, const std::string &report);
 
 } // namespace codedexposure::gst::moire

@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* moirecalib's thread: gives frames to the session, draws and posts results. */
+/* moirecalib's thread: gives frames to the session, draws and posts results.
+ * Fields of messages: docs/formats.md. */
 #include <algorithm>
 #include <new>
 #include <system_error>
 
 #include "common/element.h"
+#include "common/messages.h"
 #include "moirecalib.h"
 
 #define GST_CAT_DEFAULT moirecalib_debug
@@ -14,6 +16,55 @@ namespace codedexposure::gst::moire
 
 namespace
 {
+
+StageMove
+move_of (const StageCorrection &correction, const Pose &sigma)
+{
+  return {correction.offset.x, correction.offset.y, correction.rotation,
+      correction.magnification, correction.deviation, correction.stage_x,
+      correction.stage_y, correction.stage_theta, correction.magnify,
+      sigma.shift_x, sigma.shift_y, sigma.rotation, sigma.magnification};
+}
+
+void
+say_reading (GstMoireCalib *self, const Sample &sample,
+    const LiveReading &reading, const StageCorrection &correction)
+{
+  post_message (
+      self, MoireReading{{move_of (correction, reading.mapping.pose_sigma ())},
+                sample.number, sample.pts,
+                alignment_state_text (correction.state), reading.contrast.x,
+                reading.contrast.y, reading.coverage, reading.saturated});
+}
+
+void
+say_phase (GstMoireCalib *self, const Sample &sample,
+    const CalibrationSession::Phase &found)
+{
+  const TilePhase &tile = found.tile;
+  post_message (
+      self, MoirePhase{sample.number, sample.pts, tile.phase.x, tile.phase.y,
+                tile.confidence, tile.contrast, found.schedule.text ()});
+}
+
+void
+say_mapping (GstMoireCalib *self, const CalibrationResult &result,
+    const std::string &location, const std::string &report)
+{
+  const auto pixels = [&result] (PixelQuality what) {
+    return guint64 (result.pixels (what));
+  };
+  const Pose pose = result.mapping.pose ();
+  const StageCorrection correction =
+      correct_stage (result.mapping, settings_of (self).stage);
+  post_message (self,
+      MoireMapping{{move_of (correction, result.mapping.pose_sigma ())},
+          result.mapping.to_json (), location, report, pose.shift_x,
+          pose.shift_y, pose.stretch, result.psf_sigma, result.misfit,
+          pixels (PixelQuality::good), pixels (PixelQuality::uncovered),
+          pixels (PixelQuality::low_contrast), pixels (PixelQuality::saturated),
+          pixels (PixelQuality::outlier)});
+}
 
 constexpr const char *kMapping = "mapping"; // code of PROGRESS messages
 
@@ -97,9 +148,8 @@ Worker::expect_grating ()
   const auto expected = session_->expect (
       grating ? *grating : live_grating (), settings_.stage.pixels_per_mirror);
   if (!expected)
-    GST_ELEMENT_WARNING (self_, STREAM, FORMAT,
-        ("Fringes cannot be read: %s", expected.error ().message.c_str ()),
-        (nullptr));
+    POST_WARNING (self_, STREAM, FORMAT,
+        "Fringes cannot be read: " + expected.error ().message);
 }
 
 /** The one whose phase is sought: the property's, or else the stream's. */
@@ -223,11 +273,10 @@ Worker::fail (const std::string &why)
     draw ("no mapping", {why}, {});
     post_progress (self_, GST_PROGRESS_TYPE_ERROR, kMapping, why);
   }
-  GST_ELEMENT_WARNING (self_, STREAM, FAILED,
-      ("%s: %s",
-          maps ? "There is no mapping" : "The tile's phase cannot be found",
-          why.c_str ()),
-      (nullptr));
+  POST_WARNING (self_, STREAM, FAILED,
+      std::string (
+          maps ? "There is no mapping" : "The tile's phase cannot be found") +
+          ": " + why);
 }
 
 /* The run ends; setting the mode begins another. */
@@ -281,8 +330,7 @@ Worker::write_files (const CalibrationResult &result, const Settings &settings)
   Written written;
   const auto take = [this] (const std::string &path, const Result<void> &done) {
     if (!done)
-      GST_ELEMENT_WARNING (self_, RESOURCE, WRITE,
-          ("%s", done.error ().message.c_str ()), (nullptr));
+      POST_WARNING (self_, RESOURCE, WRITE, done.error ().message);
     return done ? path : "";
   };
   if (!settings.location.empty ())
@@ -395,6 +443,21 @@ Worker::run ()
 
 } // namespace
 
+void
+set_stage (GstMoireCalib *self, Stage stage)
+{
+  Stage before;
+  {
+    const ObjectLock lock (self);
+    before = std::exchange (state (self).stage, stage);
+  }
+  if (before == stage)
+    return;
+  post_message (self,
+      MoireState{session_stage_text (stage), session_stage_text (before)});
+  g_object_notify (G_OBJECT (self), "state");
+}
+
 bool
 start_worker (GstMoireCalib *self)
 {
@@ -411,8 +474,8 @@ start_worker (GstMoireCalib *self)
   try {
     st.worker = std::thread ([self] { Worker (self).run (); });
   } catch (const std::system_error &failure) {
-    GST_ELEMENT_ERROR (self, RESOURCE, FAILED,
-        ("No thread for the calibration: %s", failure.what ()), (nullptr));
+    POST_ERROR (self, RESOURCE, FAILED,
+        "No thread for the calibration: " + std::string (failure.what ()));
     return false;
   }
   return true;

@@ -147,7 +147,7 @@ void
 refuse (GstCodedExposureSim *self, const std::string &why)
 {
   if (std::exchange (state (self).stream.refused, why) != why)
-    GST_ELEMENT_ERROR (self, STREAM, FORMAT, ("%s", why.c_str ()), (nullptr));
+    POST_ERROR (self, STREAM, FORMAT, why);
 }
 
 } // namespace

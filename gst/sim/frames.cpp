@@ -49,10 +49,8 @@ wanted_schedule (GstCodedExposureSim *self)
   }
   if (parsed->ok ())
     return ScheduleRef (parsed, &parsed->value ());
-  GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
-      ("The schedule property cannot be read: %s",
-          parsed->error ().message.c_str ()),
-      (nullptr));
+  POST_ERROR (self, RESOURCE, SETTINGS,
+      "The schedule property cannot be read: " + parsed->error ().message);
   return nullptr;
 }
 
@@ -152,18 +150,18 @@ prepare_bench (GstCodedExposureSim *self)
   const GstVideoInfo &info = stream.plan->in;
   const int bits = GST_VIDEO_FORMAT_INFO_BITS (info.finfo);
   if (optics.bits > bits) {
-    GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
-        ("bits = %d is more than the %d bits of %s; set fewer, or 0 for all.",
-            optics.bits, bits, GST_VIDEO_INFO_NAME (&info)),
-        (nullptr));
+    POST_ERROR (self, RESOURCE, SETTINGS,
+        "bits = " + std::to_string (optics.bits) + " is more than the " +
+            std::to_string (bits) + " bits of " +
+            std::string (GST_VIDEO_INFO_NAME (&info)) +
+            "; set fewer, or 0 for all.");
     return false;
   }
   Result<OpticalBench> made =
       OpticalBench::make (info.width, info.height, optics);
   if (!made) {
-    GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
-        ("The bench cannot be set up: %s.", made.error ().message.c_str ()),
-        (nullptr));
+    POST_ERROR (self, RESOURCE, SETTINGS,
+        "The bench cannot be set up: " + made.error ().message + ".");
     return false;
   }
   stream.bench = *std::move (made);
@@ -208,10 +206,11 @@ begin_exposure (GstCodedExposureSim *self, GstBuffer *inbuf)
 GstFlowReturn
 map_failed (GstCodedExposureSim *self, const GstVideoInfo &info)
 {
-  GST_ELEMENT_ERROR (self, STREAM, FORMAT,
-      ("A buffer does not hold a frame of %s %dx%d.",
-          GST_VIDEO_INFO_NAME (&info), info.width, info.height),
-      (nullptr));
+  POST_ERROR (self, STREAM, FORMAT,
+      "A buffer does not hold a frame of " +
+          std::string (GST_VIDEO_INFO_NAME (&info)) + " " +
+          std::to_string (info.width) + "x" + std::to_string (info.height) +
+          ".");
   return GST_FLOW_ERROR;
 }
 
@@ -359,11 +358,10 @@ begin_stream (GstCodedExposureSim *self)
     state (self).counters = Counters ();
   }
   if (!dmd.empty () && !(stream.mirrors = find_mirrors (dmd))) {
-    GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
-        ("dmd '%s' is no simulated DMD; write sim:NAME, with the name that "
-         "dmdsync's device has.",
-            dmd.c_str ()),
-        (nullptr));
+    POST_ERROR (self, RESOURCE, SETTINGS,
+        "dmd '" + dmd +
+            "' is no simulated DMD; write sim:NAME, with the name that "
+            "dmdsync's device has.");
     return false;
   }
   ScheduleRef schedule = wanted_schedule (self);
@@ -383,17 +381,15 @@ submit_input_buffer (
   GST_LOG_OBJECT (
       self, "[IN] %" GST_TIME_FORMAT, GST_TIME_ARGS (GST_BUFFER_PTS (inbuf)));
   if (!GST_BUFFER_PTS_IS_VALID (inbuf)) {
-    GST_ELEMENT_ERROR (self, STREAM, FORMAT,
-        ("An input frame has no time stamp, and nothing says which slot it "
-         "belongs to; let the source set one (do-timestamp=true), or put "
-         "videorate before codedexposure-sim."),
-        (nullptr));
+    POST_ERROR (self, STREAM, FORMAT,
+        "An input frame has no time stamp, and nothing says which slot it "
+        "belongs to; let the source set one (do-timestamp=true), or put "
+        "videorate before codedexposure-sim.");
     return GST_FLOW_ERROR;
   }
   if (trans->segment.rate < 0.0) {
-    GST_ELEMENT_ERROR (self, STREAM, NOT_IMPLEMENTED,
-        ("Light cannot be collected backwards; play at a positive rate."),
-        (nullptr));
+    POST_ERROR (self, STREAM, NOT_IMPLEMENTED,
+        "Light cannot be collected backwards; play at a positive rate.");
     return GST_FLOW_ERROR;
   }
 

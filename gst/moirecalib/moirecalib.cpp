@@ -184,7 +184,7 @@ properties ()
               "failed or found, as in the message moirecalib/state; notifies",
               "", kReadOnly),
           [] (const CalibState &st) {
-            return std::string (session_stage_text (st.stage));
+            return std::string (stage_text (st.stage));
           }),
       reading<CalibState> (
           g_param_spec_string ("mapping", "Mapping",

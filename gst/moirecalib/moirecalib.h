@@ -37,7 +37,7 @@ namespace codedexposure::gst::moire
 
 /** What to do. */
 enum class Mode { automatic, align, map, phase };
-using Stage = SessionStage;
+using Stage = CalibrationStage;
 
 struct Settings {
   Mode mode = Mode::automatic;

@@ -38,7 +38,7 @@ lay_out (Extent size, std::size_t lines)
 
 void
 draw_fringes (
-    const Fringes &fringes, const Rectangle &at, ImageView<std::uint8_t> out)
+    const Fringes &fringes, const Rect &at, ImageView<std::uint8_t> out)
 {
   const float full = fringes.full_amplitude ();
   for (int y = 0; y < at.height; y++)
@@ -66,8 +66,8 @@ draw_move (Canvas &canvas, Position centre, double radius, double way,
 /** Directions are those of the picture: flips of the stage are in the numbers
  * only. */
 void
-draw_stage (Canvas &canvas, const Rectangle &at, const PanelContent &content,
-    double unit)
+draw_stage (
+    Canvas &canvas, const Rect &at, const PanelContent &content, double unit)
 {
   const StageCorrection &todo = *content.correction;
   const StageOptions &stage = content.stage;
@@ -76,7 +76,7 @@ draw_stage (Canvas &canvas, const Rectangle &at, const PanelContent &content,
   const double radius = std::min (at.width, at.height) / 2.0 - 1.7 * unit;
   canvas.grey (kFrame);
   canvas.ring (centre, radius * 1.12, 0.0, 2 * std::numbers::pi, false);
-  if (todo.state == AlignmentState::aligned) {
+  if (todo.state == CalibrationStage::aligned) {
     canvas.grey (kBright);
     canvas.text_centred (centre, unit * 1.3, "aligned");
     return;
@@ -97,7 +97,7 @@ draw_stage (Canvas &canvas, const Rectangle &at, const PanelContent &content,
 }
 
 void
-draw_progress (Canvas &canvas, const Rectangle &strip, double unit, double part)
+draw_progress (Canvas &canvas, const Rect &strip, double unit, double part)
 {
   const double left = strip.x + unit, width = strip.width - 2 * unit;
   const double top = strip.y + strip.height - unit * 0.75;
@@ -113,21 +113,19 @@ Panel
 draw_panel (Extent size, const PanelContent &content)
 {
   const Layout layout = lay_out (size, content.lines.size ());
-  const Rectangle strip{
-      0, layout.strip, size.width, size.height - layout.strip};
+  const Rect strip{0, layout.strip, size.width, size.height - layout.strip};
   Panel panel{Image<std::uint8_t> (size.width, size.height), {strip}};
   const auto picture = [&] (int place) {
-    return Rectangle{place * layout.picture, 0, layout.picture - 1, layout.top};
+    return Rect{place * layout.picture, 0, layout.picture - 1, layout.top};
   };
 
-  int place = 0;
-  for (const Fringes *fringes : {content.fringes_x, content.fringes_y}) {
-    if (fringes) {
-      panel.opaque.push_back (picture (place));
-      draw_fringes (*fringes, picture (place), panel.grey.view ());
+  const std::pair<const Fringes *, const char *> both[] = {
+      {content.fringes_x, "x fringes"}, {content.fringes_y, "y fringes"}};
+  for (int i = 0; i < 2; i++)
+    if (const Fringes *fringes = both[i].first) {
+      panel.opaque.push_back (picture (i));
+      draw_fringes (*fringes, picture (i), panel.grey.view ());
     }
-    place++;
-  }
   Canvas canvas (panel.grey.view ());
   const double unit = layout.unit;
   if (content.correction) {
@@ -137,15 +135,10 @@ draw_panel (Extent size, const PanelContent &content)
     canvas.text ({picture (2).x + unit / 2, layout.top - unit * 0.5},
         unit * 0.8, "move the camera so");
   }
-  place = 0;
-  for (const char *label : {"x fringes", "y fringes"}) {
-    if (place == 0 ? content.fringes_x : content.fringes_y) {
-      const Rectangle at = picture (place);
-      canvas.label (
-          {at.x + unit / 2, layout.top - unit * 0.5}, unit * 0.8, label);
-    }
-    place++;
-  }
+  for (int i = 0; i < 2; i++)
+    if (both[i].first)
+      canvas.label ({picture (i).x + unit / 2, layout.top - unit * 0.5},
+          unit * 0.8, both[i].second);
 
   canvas.grey (kBright);
   canvas.text ({unit, strip.y + unit * 1.15}, unit * 1.1, content.title);
@@ -166,7 +159,7 @@ lay_over (const Panel &panel, ImageView<Pixel> out)
 {
   constexpr int kStep = std::numeric_limits<Pixel>::max () / 255;
   const auto grey = panel.grey.view ();
-  for (const Rectangle &at : panel.opaque)
+  for (const Rect &at : panel.opaque)
     for (int y = at.y; y < at.y + at.height; y++)
       std::transform (grey.row (y) + at.x, grey.row (y) + at.x + at.width,
           out.row (y) + at.x,

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "base/geometry.h"
 #include "base/image.h"
 #include "calibrate/fringes.h"
 #include "calibrate/stage.h"
@@ -25,14 +26,10 @@ struct PanelContent {
   const Fringes *fringes_y = nullptr;
 };
 
-struct Rectangle {
-  int x = 0, y = 0, width = 0, height = 0;
-};
-
 /** A drawing of the size of a picture, and the parts of it that hide that. */
 struct Panel {
   Image<std::uint8_t> grey;
-  std::vector<Rectangle> opaque;
+  std::vector<Rect> opaque;
 };
 
 /** @p size  of the picture, 160x120 at least. */

@@ -32,9 +32,9 @@ say_reading (GstMoireCalib *self, const Sample &sample,
 {
   post_message (
       self, MoireReading{{move_of (correction, reading.mapping.pose_sigma ())},
-                sample.number, sample.pts,
-                alignment_state_text (correction.state), reading.contrast.x,
-                reading.contrast.y, reading.coverage, reading.saturated});
+                sample.number, sample.pts, stage_text (correction.state),
+                reading.contrast.x, reading.contrast.y, reading.coverage,
+                reading.saturated});
 }
 
 void
@@ -235,9 +235,8 @@ Worker::align (const Sample &sample)
   correction_ = correction;
   /* The reading comes first, so that a state follows its reason. */
   say_reading (self_, sample, reading, correction);
-  set (Stage (correction.state));
-  draw (alignment_state_text (correction.state), alignment_lines (**alignment),
-      {});
+  set (correction.state);
+  draw (stage_text (correction.state), alignment_lines (**alignment), {});
 }
 
 void
@@ -453,8 +452,7 @@ set_stage (GstMoireCalib *self, Stage stage)
   }
   if (before == stage)
     return;
-  post_message (self,
-      MoireState{session_stage_text (stage), session_stage_text (before)});
+  post_message (self, MoireState{stage_text (stage), stage_text (before)});
   g_object_notify (G_OBJECT (self), "state");
 }
 

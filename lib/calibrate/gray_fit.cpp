@@ -45,8 +45,7 @@ start_of (const std::vector<Sample> &samples)
   HomographyFit fit;
   for (const Sample &s : samples) {
     const Projected zero = {0.0, 0.0, 1.0};
-    fit.add_x (s.xi, s.eta, zero, {s.x, 1.0});
-    fit.add_y (s.xi, s.eta, zero, {s.y, 1.0});
+    fit.add (s.xi, s.eta, zero, {s.x, 1.0}, {s.y, 1.0});
   }
   Homography h = {0, 0, 0, 0, 0, 0, 0, 0, 1};
   if (const auto step = fit.solve (6, false))
@@ -95,8 +94,7 @@ fit_gray_codes (const GrayCode &gx, const GrayCode &gy,
         continue;
       agree++;
       squares += dx * dx + dy * dy;
-      fit.add_x (s.xi, s.eta, at, {dx, 1.0});
-      fit.add_y (s.xi, s.eta, at, {dy, 1.0});
+      fit.add (s.xi, s.eta, at, {dx, 1.0}, {dy, 1.0});
     }
     const auto step = fit.solve (affine || round < 4 ? 6 : 8, false);
     if (!step)

@@ -12,8 +12,8 @@ namespace codedexposure
 {
 
 void
-HomographyFit::add (std::size_t first, double mirror, double xi, double eta,
-    double z, const Observation &seen)
+HomographyFit::add_axis (std::size_t first, double mirror, double xi,
+    double eta, double z, const Observation &seen)
 {
   const std::size_t extra = kExtra + first / 3;
   const std::size_t at[] = {first, first + 1, first + 2, 6, 7};
@@ -31,17 +31,11 @@ HomographyFit::add (std::size_t first, double mirror, double xi, double eta,
 }
 
 void
-HomographyFit::add_x (
-    double xi, double eta, const Projected &at, const Observation &seen)
+HomographyFit::add (double xi, double eta, const Projected &at,
+    const Observation &x, const Observation &y)
 {
-  add (0, at.x, xi, eta, at.z, seen);
-}
-
-void
-HomographyFit::add_y (
-    double xi, double eta, const Projected &at, const Observation &seen)
-{
-  add (3, at.y, xi, eta, at.z, seen);
+  add_axis (0, at.x, xi, eta, at.z, x);
+  add_axis (3, at.y, xi, eta, at.z, y);
 }
 
 std::optional<HomographyFit::Step>

@@ -31,10 +31,10 @@ public:
     double cross = 0.0; ///< of both
   };
 
-  void add_x (
-      double xi, double eta, const Projected &at, const Observation &seen);
-  void add_y (
-      double xi, double eta, const Projected &at, const Observation &seen);
+  /** What a pixel at (@p xi, @p eta), which sees @p at by the homography, says
+   * of its mirror in x and in y. */
+  void add (double xi, double eta, const Projected &at, const Observation &x,
+      const Observation &y);
 
   /** The step to the maximum and its covariance. The first @p numbers of the
    * homography are free (6: affine, 8: all), and the extra ones if @p extra.
@@ -46,8 +46,8 @@ public:
   std::optional<Step> solve (std::size_t numbers, bool extra) const;
 
 private:
-  void add (std::size_t first, double mirror, double xi, double eta, double z,
-      const Observation &seen);
+  void add_axis (std::size_t first, double mirror, double xi, double eta,
+      double z, const Observation &seen);
 
   std::array<double, kNumbers *kNumbers> normal_ = {}; // lower triangle
   std::array<double, kNumbers> right_ = {};

@@ -298,9 +298,7 @@ struct Conditions {
   double margin_x, margin_y; // of mirrors whose pixels see the edge
   float limit_x, limit_y;    // of chi-square; outliers have more
 
-  explicit Conditions (const PhaseFit &fit)
-      : Conditions (fit, fit.mapping.slope_at (0.5 * (fit.camera.width - 1),
-                             0.5 * (fit.camera.height - 1)))
+  explicit Conditions (const PhaseFit &fit) : Conditions (fit, sides_of (fit))
   {
   }
 
@@ -311,19 +309,21 @@ struct Conditions {
   }
 
 private:
-  Conditions (const PhaseFit &fit, const std::array<double, 4> &slope)
-      : Conditions (fit, std::hypot (slope[0], slope[1]),
-            std::hypot (slope[2], slope[3]))
-  {
-  }
-  Conditions (const PhaseFit &fit, double side_x, double side_y)
-      : x (fit.x.period (), side_x, std::sqrt (fit.blur_x)),
-        y (fit.y.period (), side_y, std::sqrt (fit.blur_y)),
-        margin_x (reach (side_x, fit.blur_x)),
-        margin_y (reach (side_y, fit.blur_y)),
+  Conditions (const PhaseFit &fit, Position sides)
+      : x (fit.x.period (), sides.x, std::sqrt (fit.blur_x)),
+        y (fit.y.period (), sides.y, std::sqrt (fit.blur_y)),
+        margin_x (reach (sides.x, fit.blur_x)),
+        margin_y (reach (sides.y, fit.blur_y)),
         limit_x (limit (fit.reduced_chi_square, x.period ())),
         limit_y (limit (fit.reduced_chi_square, y.period ()))
   {
+  }
+  /* Of the pixel in the middle, in mirrors. */
+  static Position sides_of (const PhaseFit &fit)
+  {
+    const auto slope = fit.mapping.slope_at (
+        0.5 * (fit.camera.width - 1), 0.5 * (fit.camera.height - 1));
+    return {std::hypot (slope[0], slope[1]), std::hypot (slope[2], slope[3])};
   }
   static float limit (double reduced_chi_square, int phases)
   {
@@ -407,8 +407,7 @@ sum_up (PhaseFit &p)
         const double xi = (x - frame.cx) / frame.r;
         const double eta = (y - frame.cy) / frame.r;
         const Projected seen = project (centred, xi, eta);
-        sums.fit.add_x (xi, eta, seen, observation (fx));
-        sums.fit.add_y (xi, eta, seen, observation (fy));
+        sums.fit.add (xi, eta, seen, observation (fx), observation (fy));
         p.block_at (p.blocks_x, x, y).add (fx.score, fx.information);
         p.block_at (p.blocks_y, x, y).add (fy.score, fy.information);
       }

@@ -41,25 +41,6 @@ moved (const Schedule &schedule, Offset phase)
 
 } // namespace
 
-const char *
-session_stage_text (SessionStage stage)
-{
-  switch (stage) {
-  case SessionStage::mapping:
-    return "mapping";
-  case SessionStage::solving:
-    return "solving";
-  case SessionStage::mapped:
-    return "mapped";
-  case SessionStage::failed:
-    return "failed";
-  case SessionStage::found:
-    return "found";
-  default:
-    return alignment_state_text (AlignmentState (stage));
-  }
-}
-
 Result<void>
 CalibrationSession::expect (const Pattern &grating, double pixels_per_mirror)
 {
@@ -84,7 +65,7 @@ CalibrationSession::align (
     return reading.error ();
   }
   const StageCorrection correction = correct_stage (reading->mapping, stage);
-  aligned_ = correction.state == AlignmentState::aligned ? aligned_ + 1 : 0;
+  aligned_ = correction.state == CalibrationStage::aligned ? aligned_ + 1 : 0;
   last_ = fringes_of (*live_, "after");
   if (!first_)
     first_ = fringes_of (*live_, "before");

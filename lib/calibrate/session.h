@@ -20,20 +20,6 @@
 namespace codedexposure
 {
 
-/** How far a run has come. The first four are those of AlignmentState. */
-enum class SessionStage {
-  searching,
-  coarse,
-  fine,
-  aligned,
-  mapping, ///< the patterns of a calibration are shown, one after the other
-  solving,
-  mapped,
-  failed,
-  found, ///< the phase of the tile
-};
-const char *session_stage_text (SessionStage stage);
-
 /**
  * Takes the frames of a run, in any of three ways: align () reads fringes until
  * the bench is aligned, collect () and solve () find the mapping, find_phase ()

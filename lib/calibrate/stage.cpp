@@ -21,18 +21,11 @@ aligned_mirror (double pixel, double pixels_per_mirror)
 } // namespace
 
 const char *
-alignment_state_text (AlignmentState state)
+stage_text (CalibrationStage stage)
 {
-  switch (state) {
-  case AlignmentState::coarse:
-    return "coarse";
-  case AlignmentState::fine:
-    return "fine";
-  case AlignmentState::aligned:
-    return "aligned";
-  default:
-    return "searching";
-  }
+  constexpr const char *kTexts[] = {"searching", "coarse", "fine", "aligned",
+      "mapping", "solving", "mapped", "failed", "found"};
+  return kTexts[int (stage)];
 }
 
 StageCorrection
@@ -61,9 +54,9 @@ correct_stage (const Mapping &mapping, const StageOptions &options)
           std::hypot (corner.x - whole.x, corner.y - whole.y));
     }
   correction.state = correction.deviation <= options.tolerance
-                         ? AlignmentState::aligned
-                     : correction.deviation <= 1.0 ? AlignmentState::fine
-                                                   : AlignmentState::coarse;
+                         ? CalibrationStage::aligned
+                     : correction.deviation <= 1.0 ? CalibrationStage::fine
+                                                   : CalibrationStage::coarse;
 
   const double pitch = options.mirror_pitch;
   correction.stage_x = -correction.offset.x * (options.flip_x ? -pitch : pitch);

@@ -22,20 +22,27 @@ struct StageOptions {
   bool flip_theta = false; ///< its angle is anticlockwise on the screen
 };
 
-enum class AlignmentState {
+/** How far a calibration has come. */
+enum class CalibrationStage {
   searching, ///< no grating is seen
   coarse,    ///< a pixel is off by more than one mirror
   fine,
   aligned, ///< all pixels are within the tolerance
+  mapping, ///< the patterns of a calibration are shown, one after the other
+  solving,
+  mapped,
+  failed,
+  found, ///< the phase of the tile
 };
-const char *alignment_state_text (AlignmentState state);
+const char *stage_text (CalibrationStage stage);
 
 /**
  * How to move the stage. As all mirrors are the same, the target is the nearest
  * aligned position; the mapping contains which mirrors the camera sees there.
  */
 struct StageCorrection {
-  AlignmentState state = AlignmentState::searching;
+  /** coarse, fine or aligned. */
+  CalibrationStage state = CalibrationStage::coarse;
   /** From the aligned position to the mirror that the centre of the frame sees,
    * mirrors to the right and downwards. */
   Position offset;

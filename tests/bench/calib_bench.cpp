@@ -90,7 +90,7 @@ draw_all (benchmark::State &state)
   PanelContent content{.title = "coarse",
       .lines = {"one line of numbers", "another", "a third", "a fourth"},
       .correction = correct_stage (Mapping (kSize), {})};
-  content.correction->state = AlignmentState::coarse;
+  content.correction->state = CalibrationStage::coarse;
   content.correction->stage_x = 10.0;
   content.fringes_x = content.fringes_y = &fringes;
   for (auto _ : state)

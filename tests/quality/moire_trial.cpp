@@ -120,8 +120,7 @@ expected_fit (const MoireTrial &trial, const Mapping &truth)
           m.x > kMoireSize.width - 0.5 - margin ||
           m.y > kMoireSize.height - 0.5 - margin)
         continue;
-      fit.add_x (xi, eta, m, at_place (m.x));
-      fit.add_y (xi, eta, m, at_place (m.y));
+      fit.add (xi, eta, m, at_place (m.x), at_place (m.y));
     }
   return fit;
 }

@@ -48,7 +48,7 @@ TEST (Panel, ShowsFringesAsTheyAre)
   content.fringes_x = &fringes;
   const Panel panel = draw_panel ({768, 576}, content);
   ASSERT_EQ (panel.opaque.size (), 2u); // the fringes, and the text
-  const Rectangle at = panel.opaque[1];
+  const Rect at = panel.opaque[1];
   /* Two whole fringes: bright at the borders and in the middle. */
   EXPECT_GT (panel.grey.at (at.x, at.y), 250);
   EXPECT_LT (panel.grey.at (at.x + at.width / 4, at.y), 5);
@@ -78,7 +78,7 @@ TEST (Panel, HidesItsPartsOfThePictureAndLeavesTheRest)
     for (int y = 0; y < size.height; y++)
       for (int x = 0; x < size.width; x++) {
         bool hidden = false;
-        for (const Rectangle &at : panel.opaque)
+        for (const Rect &at : panel.opaque)
           hidden = hidden || (x >= at.x && x < at.x + at.width && y >= at.y &&
                                  y < at.y + at.height);
         const int level = panel.grey.at (x, y);

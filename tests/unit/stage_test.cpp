@@ -28,7 +28,7 @@ mapping_of (const Alignment &alignment)
 TEST (Stage, AnAlignedBenchHasNothingToDo)
 {
   const StageCorrection todo = correct_stage (mapping_of ({}), {});
-  EXPECT_EQ (todo.state, AlignmentState::aligned);
+  EXPECT_EQ (todo.state, CalibrationStage::aligned);
   EXPECT_NEAR (todo.deviation, 0.0, 1e-9);
   EXPECT_NEAR (todo.stage_x, 0.0, 1e-9);
   EXPECT_NEAR (todo.stage_theta, 0.0, 1e-9);
@@ -39,7 +39,7 @@ TEST (Stage, IsSentToTheNearestMirror)
 {
   const StageCorrection todo = correct_stage (
       mapping_of ({.shift_x = 17.25, .shift_y = -3.1}), {.mirror_pitch = 10});
-  EXPECT_EQ (todo.state, AlignmentState::fine);
+  EXPECT_EQ (todo.state, CalibrationStage::fine);
   EXPECT_NEAR (todo.offset.x, 0.25, 1e-9);
   EXPECT_NEAR (todo.offset.y, -0.1, 1e-9);
   EXPECT_NEAR (todo.stage_x, -2.5, 1e-8);
@@ -51,7 +51,7 @@ TEST (Stage, TurnsAndMagnifiesBack)
 {
   const StageCorrection todo =
       correct_stage (mapping_of ({.rotation = 0.5, .scale = 1.01}), {});
-  EXPECT_EQ (todo.state, AlignmentState::coarse);
+  EXPECT_EQ (todo.state, CalibrationStage::coarse);
   EXPECT_NEAR (todo.stage_theta, -500.0, 1e-6);
   EXPECT_NEAR (todo.magnify, (1 / 1.01 - 1) * 1000, 1e-6);
 }
@@ -69,7 +69,7 @@ TEST (Stage, DoingAsToldAligns)
     bench.scale *= 1 + todo.magnify / 1000;
   }
   EXPECT_EQ (
-      correct_stage (mapping_of (bench), {}).state, AlignmentState::aligned);
+      correct_stage (mapping_of (bench), {}).state, CalibrationStage::aligned);
 }
 
 TEST (Stage, FlipsTurnTheSignsOfTheStage)
@@ -99,6 +99,6 @@ TEST (Stage, SeveralPixelsAMirrorAreAlignedBorderOnBorder)
   const Mapping centred = centred_mapping ({768, 576}, {384, 288}, 2.0);
   const StageCorrection todo =
       correct_stage (centred, {.pixels_per_mirror = 2.0});
-  EXPECT_EQ (todo.state, AlignmentState::aligned);
+  EXPECT_EQ (todo.state, CalibrationStage::aligned);
   EXPECT_NEAR (centred.mirror_at (0, 0).x, -0.25, 1e-12);
 }

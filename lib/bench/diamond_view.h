@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* What a camera sees of mirrors that stand on their corners. */
+/* How a camera sees a diamond array. */
 #pragma once
 
 #include <array>
@@ -11,10 +11,10 @@ namespace codedexposure
 {
 
 /**
- * A diamond array behind a camera whose pixels are those of the tile: pixel (x,
- * y) looks at tile_place (layout, x, y). With MirrorLayout::lattice each pixel
- * is one mirror; with the others mirrors lie across the borders of pixels,
- * which therefore see some light of their neighbours.
+ * A diamond array and a camera with the pixels of the tile: pixel (x, y) looks
+ * at tile_place (layout, x, y). With MirrorLayout::lattice each pixel is one
+ * mirror; with the others, mirrors overlap the borders of pixels, which
+ * therefore get some light of their neighbours.
  */
 class DiamondView
 {
@@ -22,8 +22,8 @@ public:
   explicit DiamondView (MirrorLayout layout);
 
   /**
-   * The part of each pixel of row @p y that is covered by mirrors that are on,
-   * 0..1; beyond the mirrors it is dark.
+   * The part of each pixel of row @p y that mirrors cover which are on, 0..1;
+   * it is dark beyond the mirrors.
    * @p mirrors  by pixel of the tile.
    * @p share    mirrors.width () numbers.
    */

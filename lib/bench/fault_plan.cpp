@@ -11,7 +11,7 @@ namespace codedexposure
 namespace
 {
 
-constexpr int kMostFrames = 1'000'000;
+constexpr int kMaxFrames = 1'000'000;
 
 struct Named {
   std::string_view name;
@@ -36,7 +36,7 @@ bad_word (std::string_view word)
                "delay@10:5ms, duplicate@10, late@10 or stop@now"};
 }
 
-/* A word, as the frames that it befalls. */
+/* A word: the fault and its frames. */
 struct Word {
   Fault fault;
   std::uint64_t first = 0;
@@ -70,7 +70,7 @@ parse_word (std::string_view text, std::uint64_t now)
       word.fault.delay = *time;
     } else if (more) {
       const auto frames = parse_int (rest);
-      if (!kind.counts || !frames || *frames < 1 || *frames > kMostFrames)
+      if (!kind.counts || !frames || *frames < 1 || *frames > kMaxFrames)
         return bad_word (text);
       word.frames = *frames;
     }

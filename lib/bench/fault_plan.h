@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* What goes wrong on the way from a camera, and in which frame. */
+/* Faults of frames between a camera and its client. */
 #pragma once
 
 #include <cstdint>
@@ -17,11 +17,11 @@ struct Fault {
   enum class Kind {
     none,
     lose,       ///< none of its packets is sent
-    incomplete, ///< half of its packets is sent
-    delay,      ///< it is sent late by `delay`, and so may be those after it
-    duplicate,  ///< it comes once more, in place of the next one
-    late,       ///< it comes after the next one, in place of the one after that
-    stop,       ///< it is the first of which nothing comes any more
+    incomplete, ///< half of its packets are sent
+    delay,      ///< it is sent late by `delay`, which may delay the next ones
+    duplicate,  ///< it is sent again in place of the next one
+    late,       ///< it is sent after the next one, in place of the one after
+    stop,       ///< no packets are sent from this frame on
   };
 
   Kind kind = Kind::none;
@@ -29,8 +29,7 @@ struct Fault {
 };
 
 /**
- * Faults by the number of the frame that they befall, from a text of words
- * KIND@FRAME[:MORE]:
+ * Faults by the number of their frame, from a text of words KIND@FRAME[:MORE]:
  *
  *   lose@10 lose@10:3 incomplete@10 incomplete@10:3   (MORE: how many frames)
  *   delay@10:5ms  duplicate@10  late@10  stop@10
@@ -40,8 +39,8 @@ struct Fault {
 class FaultPlan
 {
 public:
-  /** Adds those of @p text; none of them when there is an error. @p now: the
-   * number of the next frame. */
+  /** Adds those of @p text, or none of them on an error. @p now: the number of
+   * the next frame. */
   Result<void> add (std::string_view text, std::uint64_t now = 0);
   Fault at (std::uint64_t frame) const;
 

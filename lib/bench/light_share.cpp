@@ -9,9 +9,9 @@ namespace codedexposure
 namespace
 {
 
-/* The part of @slot's active time that lies before edge @edge of @stretches.
- * The plan's times are whole nanoseconds, rounded down: an edge less than two
- * of them from where the slot opens or shuts is there. */
+/* The part of @slot's active time before edge @edge of @stretches. The plan's
+ * times are rounded down to nanoseconds, so that an edge within two of them
+ * counts as the start or the end of the slot. */
 double
 open_before (const SlotPlan &plan, int slot, int edge, int stretches)
 {

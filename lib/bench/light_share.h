@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Which slots collect the light of which part of a frame period. */
+/* The light that slots collect in parts of a frame period. */
 #pragma once
 
 #include <vector>
@@ -19,14 +19,14 @@ struct LightShare {
 };
 
 /**
- * Cuts a frame period into @p stretches of equal length, each of constant
- * light, and says what every slot collects of each: nothing while the mirrors
- * switch or the camera reads out.
+ * Divides a frame period into @p stretches of equal length, each of constant
+ * light, and returns what every slot collects of each: nothing while the
+ * mirrors switch or the camera reads out.
  *
- * Shares are multiples of 2^-20, and those of one slot add up to exactly 1: in
- * light that does not change, the plan's whole nanoseconds leave no trace.
+ * Shares are multiples of 2^-20, and those of one slot add up to exactly 1, so
+ * that rounding to nanoseconds has no effect in constant light.
  *
- * @return the shares of each stretch, by slot; none where no slot is open.
+ * @return the shares of each stretch, by slot; none if no slot is active.
  */
 std::vector<std::vector<LightShare>> share_light (
     const SlotPlan &plan, int stretches);

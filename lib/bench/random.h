@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Random words that depend on a counter and a key, and on nothing else. */
+/* Random words as a function of a counter and a key. */
 #pragma once
 
 #include <array>
@@ -10,8 +10,8 @@ namespace codedexposure
 
 /**
  * Philox4x32-10: 128 random bits for every value of a 128-bit counter, a
- * different sequence for every key. No state, so that pixels may be drawn in
- * any order and by any thread.
+ * different sequence for every key. Without state, so that pixels may be drawn
+ * in any order and by any thread.
  *
  * Source: Salmon, Moraes, Dror, Shaw, "Parallel random numbers: as easy as 1,
  * 2, 3", SC 2011.

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Drawn scenes that move as fast as those of the paper's figures. */
+/* Synthetic scenes as fast as those of the paper's figures. */
 #pragma once
 
 #include <memory>
@@ -19,9 +19,9 @@ enum class SceneKind {
 };
 
 /**
- * Light in front of the bench as a function of time, and of nothing else: the
- * same time gives the same picture, in any order. Lengths go with the height of
- * the picture, so that every size shows the same scene.
+ * Light in front of the bench as a function of time only: the same time gives
+ * the same picture, in any order. Lengths are relative to the height of the
+ * picture, so that every size shows the same scene.
  */
 class SyntheticScene
 {
@@ -32,8 +32,8 @@ public:
 
   /**
    * @p seconds  since the beginning of the scene.
-   * @p light    of the size that was given, fully overwritten: 0 is no light,
-   *             1 the brightest spot that the scene ever has; linear.
+   * @p light    of the given size, fully overwritten: linear, from 0 for no
+   *             light to 1 for the brightest spot of the scene at any time.
    */
   virtual void draw (double seconds, ImageView<float> light) = 0;
 };

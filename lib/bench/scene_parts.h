@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* What the scenes are drawn from. */
+/* Parts of scenes. */
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@ namespace codedexposure
 std::unique_ptr<SyntheticScene> make_candle (Extent size, bool blown_out);
 std::unique_ptr<SyntheticScene> make_pour (Extent size);
 
-/** A swing of that frequency and phase, from -1 to 1. */
+/** A sine of that frequency and phase. */
 inline double
 swing (double seconds, double hertz, double phase = 0.0)
 {
@@ -30,8 +30,8 @@ smooth_step (double from, double to, double x)
   return part * part * (3.0 - 2.0 * part);
 }
 
-/** Places in a picture whose height is 1, from its middle column and its top
- * row: from pixels to places and back. */
+/** Positions in a picture of height 1, relative to its middle column and top
+ * row: from pixels to positions and back. */
 struct SceneFrame {
   Extent size;
 
@@ -40,7 +40,7 @@ struct SceneFrame {
   {
     return {(x + 0.5 - size.width / 2.0) / unit (), (y + 0.5) / unit ()};
   }
-  /** First pixel whose centre is not before that place, and none outside. */
+  /** First pixel whose centre is not before that position, clamped. */
   int column (double x) const
   {
     return std::clamp (

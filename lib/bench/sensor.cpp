@@ -21,8 +21,8 @@ constexpr int kDraws = 32;
 constexpr int kBlock = 2 * kDraws;
 using Lanes = std::array<float, kBlock>;
 
-/* Below, Poisson numbers are drawn by inversion; the expansion above is good to
- * 5e-5 from here on. */
+/* Below this mean, Poisson numbers are drawn by inversion; above, the error of
+ * the expansion is less than 5e-5. */
 constexpr float kExactBelow = 16.0f;
 
 /* Words of the counter: draw, purpose, frame. */
@@ -128,7 +128,8 @@ draw_few (
     mean[i] = means[i] < kExactBelow ? means[i] : 0.0f;
     probability[i] = below[i] = decay_of (mean[i]);
   }
-  /* The bound is beyond all probability; it stops what rounding left open. */
+  /* The bound has negligible probability; it ends searches that rounding keeps
+   * open. */
   std::uint64_t searching = 1;
   for (int k = 1; searching != 0 && k < 100; k++) {
     searching = 0;
@@ -203,8 +204,8 @@ Sensor::read_out (ImageView<const float> light, double unit,
   const float largest = float ((1 << bits) - 1);
 
   if (full_well <= 0.0) {
-    /* A division: what lies halfway between two numbers is rounded up, and not
-     * by chance of a rounded factor. */
+    /* A division, because the error of a rounded factor could change how a
+     * value halfway between two numbers is rounded. */
     const float divisor = float (unit / (gain * largest));
     for (int y = 0; y < out.height; y++)
       std::transform (light.row (y), light.row (y) + out.width, out.row (y),

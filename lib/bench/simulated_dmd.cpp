@@ -45,27 +45,6 @@ SimulatedMirrors::hold (StillMask mask)
   hold_ = std::make_shared<const StillMask> (std::move (mask));
 }
 
-std::shared_ptr<const StillMask>
-SimulatedMirrors::held () const
-{
-  const std::lock_guard guard (lock_);
-  return held_;
-}
-
-void
-SimulatedMirrors::lay (std::optional<MirrorLayout> diamond)
-{
-  const std::lock_guard guard (lock_);
-  diamond_ = diamond;
-}
-
-std::optional<MirrorLayout>
-SimulatedMirrors::diamond () const
-{
-  const std::lock_guard guard (lock_);
-  return diamond_;
-}
-
 void
 SimulatedMirrors::start ()
 {
@@ -80,20 +59,6 @@ SimulatedMirrors::stop ()
   const std::lock_guard guard (lock_);
   owes_dark_exposure_ |= motion_ == Motion::stepping;
   motion_ = Motion::parked;
-}
-
-bool
-SimulatedMirrors::running () const
-{
-  const std::lock_guard guard (lock_);
-  return motion_ != Motion::parked;
-}
-
-std::optional<Schedule>
-SimulatedMirrors::schedule () const
-{
-  const std::lock_guard guard (lock_);
-  return schedule_;
 }
 
 void
@@ -127,13 +92,6 @@ SimulatedMirrors::mask_in_slot (std::int64_t slot)
   const std::int64_t masks = schedule_->masks ();
   const std::int64_t mask = (slot - offset_) % masks;
   return int (mask < 0 ? mask + masks : mask);
-}
-
-void
-SimulatedMirrors::slip_at (std::int64_t slot, int by)
-{
-  const std::lock_guard guard (lock_);
-  slips_.push_back ({slot, by});
 }
 
 namespace

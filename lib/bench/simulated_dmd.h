@@ -35,14 +35,30 @@ public:
   void hold (StillMask mask);
   void start ();
   void stop ();
-  bool running () const;
+  bool running () const
+  {
+    const std::lock_guard guard (lock_);
+    return motion_ != Motion::parked;
+  }
 
   /** Layout of the tile on a diamond array; none: an orthogonal array. */
-  void lay (std::optional<MirrorLayout> diamond);
-  std::optional<MirrorLayout> diamond () const;
+  void lay (std::optional<MirrorLayout> diamond)
+  {
+    const std::lock_guard guard (lock_);
+    diamond_ = diamond;
+  }
+  std::optional<MirrorLayout> diamond () const
+  {
+    const std::lock_guard guard (lock_);
+    return diamond_;
+  }
 
   /** The last programmed one; none before the first upload. */
-  std::optional<Schedule> schedule () const;
+  std::optional<Schedule> schedule () const
+  {
+    const std::lock_guard guard (lock_);
+    return schedule_;
+  }
 
   /**
    * Index of the mask (MaskRenderer) in slot @p slot, counted from the bench's
@@ -56,12 +72,20 @@ public:
 
   /** The mask that is held in the exposure of the last mask_in_slot (); null if
    * the schedule's masks are shown. */
-  std::shared_ptr<const StillMask> held () const;
+  std::shared_ptr<const StillMask> held () const
+  {
+    const std::lock_guard guard (lock_);
+    return held_;
+  }
 
   /** From slot @p slot on, the masks come @p by slots late (> 0) or early
    * (< 0): a missed or a spurious trigger. Slips add up, in the order of their
    * slots; start () ends those before it. */
-  void slip_at (std::int64_t slot, int by);
+  void slip_at (std::int64_t slot, int by)
+  {
+    const std::lock_guard guard (lock_);
+    slips_.push_back ({slot, by});
+  }
 
 private:
   enum class Motion { parked, armed, stepping };

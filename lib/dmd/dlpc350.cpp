@@ -87,11 +87,7 @@ Dlpc350::status ()
 Result<void>
 Dlpc350::check_images (const Schedule &schedule)
 {
-  if (schedule.masks () > info_.resident_masks)
-    return Error{info_.name + " shows " +
-                 std::to_string (info_.resident_masks) + " masks, not " +
-                 std::to_string (schedule.masks ()) +
-                 "; use a tile with fewer elements"};
+  RETURN_IF_ERROR (check_masks (info_, schedule));
   if (video ())
     return {};
   const int needed = plan_planes (schedule).images;
@@ -249,6 +245,7 @@ Dlpc350::start (const SlotPlan &plan, std::stop_token stop_token)
   if (video () && time->dark != 0)
     return Error{info_.name + ": masks from video follow each other without "
                               "dark time; give the schedule switching=0"};
+  RETURN_IF_ERROR (watch ());
   begin (std::move (stop_token));
   // After every stop, the board needs its tables and their validation again.
   RETURN_IF_ERROR (halt ());

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "dmd/hid_packet.h"
+#include "dmd/hid_link.h"
 #include "dmd/pattern_timing.h"
 
 namespace codedexposure::dlpc350

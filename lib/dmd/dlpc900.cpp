@@ -325,10 +325,7 @@ Result<void>
 Dlpc900::upload (const Schedule &schedule, std::stop_token stop_token,
     const UploadProgress &progress)
 {
-  if (schedule.masks () > info_.resident_masks)
-    return Error{info_.name + " holds " +
-                 std::to_string (info_.resident_masks) + " masks, not " +
-                 std::to_string (schedule.masks ())};
+  RETURN_IF_ERROR (check_masks (info_, schedule));
   const UploadPlan plan = plan_upload (schedule);
   touched_ = true;
   begin (stop_token);
@@ -488,6 +485,7 @@ Dlpc900::start (const SlotPlan &plan, std::stop_token stop_token)
     return Error{info_.name + ": the masks are for " + std::to_string (slots_) +
                  " slots, not for " + std::to_string (plan.slots ())};
   ASSIGN_OR_RETURN (const auto times, times_of (plan));
+  RETURN_IF_ERROR (watch ());
   begin (std::move (stop_token));
   return run (times, plan);
 }
@@ -512,6 +510,7 @@ Dlpc900::show (
     const StillMask &mask, const SlotPlan &plan, std::stop_token stop_token)
 {
   ASSIGN_OR_RETURN (const auto times, times_of (plan));
+  RETURN_IF_ERROR (watch ());
   touched_ = true;
   const std::vector<PatternTime> still{
       first_patterns (times, mask.slots, kind_.minimum_exposure)};

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "base/result.h"
-#include "dmd/hid_packet.h"
+#include "dmd/hid_link.h"
 #include "dmd/pattern_timing.h"
 #include "dmd/plane_image.h"
 

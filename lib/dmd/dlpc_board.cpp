@@ -18,8 +18,6 @@ DlpcBoard::set_info (const char *mirrors, Extent size, std::uint32_t active,
   info_.minimum_active = Nanoseconds (active) * 1000;
   info_.minimum_dark = Nanoseconds (dark) * 1000;
   info_.resident_masks = masks;
-  info_.triggers_camera = options_.master == Master::dmd;
-  info_.trigger_in = info_.trigger_out = true;
 }
 
 Result<Bytes>
@@ -99,8 +97,8 @@ DlpcBoard::halt ()
   return {};
 }
 
-void
-DlpcBoard::stop ()
+bool
+DlpcBoard::park ()
 {
   link_->begin ({}, 800ms);
   HidCommand run = kRun;
@@ -108,8 +106,7 @@ DlpcBoard::stop ()
   bool stopped = false;
   for (int attempt = 0; attempt < 2 && !stopped && !link_->gone (); attempt++)
     stopped = write_byte (run, kRunStop).ok ();
-  if (stopped || link_->gone ())
-    running_ = false;
+  return stopped || link_->gone ();
 }
 
 Result<void>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* LightCrafter boards with a DLPC350 or a DLPC900, over USB. */
+/* What the drivers of DLPC350 and DLPC900 share. */
 #pragma once
 
 #include <memory>
@@ -7,49 +7,23 @@
 #include <utility>
 #include <vector>
 
-#include "dmd/dmd.h"
-#include "dmd/hid_link.h"
-#include "dmd/options.h"
+#include "dmd/drivers.h"
+#include "dmd/stop_guard.h"
 
 namespace codedexposure
 {
 
-/**
- * Opens the LightCrafter 4500 behind @p link. The board continues with what it
- * does until the first upload (); from then on, the destructor stops it.
- *
- * The board takes no masks over USB. The user writes the images that
- * "codedexposure schedule render --planes" makes into its flash, or shows them
- * over HDMI, and names them (images=, source=): upload () then only sets up the
- * table of patterns, and fails otherwise.
- */
-Result<std::unique_ptr<Dmd>> open_dlpc350 (
-    std::unique_ptr<HidLink> link, const DmdOptions &options);
-
-/**
- * The same for the LightCrafter 6500 or 9000, which takes masks as planes of
- * 24-bit images. The driver knows by digest which masks the board holds: images
- * on the board are not sent again, and a schedule with the same masks in
- * another order only moves lines of the pattern table.
- */
-Result<std::unique_ptr<Dmd>> open_dlpc900 (
-    std::unique_ptr<HidLink> link, const DmdOptions &options);
-
-/** What both drivers share: commands, and a sequencer that starts and stops. */
-class DlpcBoard : public Dmd
+/** Commands, and a sequencer that starts and stops. */
+class DlpcBoard : public BoardDmd
 {
-public:
-  const DmdInfo &info () const override { return info_; }
-  void stop () override;
-  bool running () const override { return running_; }
-
 protected:
   using Setting = std::pair<HidCommand, Bytes>;
 
   /** @p failures  bits of the hardware status that report a failure. */
   DlpcBoard (std::unique_ptr<HidLink> link, const DmdOptions &options,
       std::uint8_t failures)
-      : options_ (options), link_ (std::move (link)), failures_ (failures)
+      : BoardDmd (options, link->name ()), link_ (std::move (link)),
+        failures_ (failures)
   {
   }
 
@@ -73,6 +47,7 @@ protected:
       std::uint8_t value, const std::string &what);
   /** Changes the display mode and waits until the board reports it. */
   Result<void> enter (std::uint8_t mode);
+  bool park () override;
   /** Stops the sequencer and waits until it has stopped. */
   Result<void> halt ();
   /** Leaves one whole exposure without masks, or without a trigger. */
@@ -89,11 +64,7 @@ protected:
     return link_->error (what, reason);
   }
 
-  const DmdOptions options_;
   const std::unique_ptr<HidLink> link_;
-  DmdInfo info_;
-  bool touched_ = false; // it shows, or may show, what it was told here
-  bool running_ = false;
 
 private:
   Result<Bytes> data_of (const HidCommand &command, Result<HidReply> reply);

@@ -4,7 +4,8 @@
 #include <algorithm>
 #include <mutex>
 
-#include "dmd/lightcrafter.h"
+#include "base/try.h"
+#include "dmd/drivers.h"
 #include "dmd/usb_bus.h"
 
 namespace codedexposure
@@ -71,15 +72,22 @@ Dmd::show (const StillMask &mask, const SlotPlan &, std::stop_token)
 }
 
 Result<void>
+check_masks (const DmdInfo &info, const Schedule &schedule)
+{
+  if (schedule.masks () <= info.resident_masks)
+    return {};
+  return Error{info.name + " holds " + std::to_string (info.resident_masks) +
+               " masks, the schedule " + schedule.text () + " has " +
+               std::to_string (schedule.masks ()) +
+               "; use a tile with fewer elements"};
+}
+
+Result<void>
 check_limits (
     const DmdInfo &info, const Schedule &schedule, const SlotPlan &plan)
 {
   const std::string slots = std::to_string (schedule.slots ()) + " slots";
-  if (schedule.masks () > info.resident_masks)
-    return Error{info.name + " holds " + std::to_string (info.resident_masks) +
-                 " masks, the schedule " + schedule.text () + " has " +
-                 std::to_string (schedule.masks ()) +
-                 "; use a tile with fewer elements"};
+  RETURN_IF_ERROR (check_masks (info, schedule));
   if (info.array == Array::orthogonal)
     if (const auto within =
             schedule.check_size (info.shown ().width, info.shown ().height);

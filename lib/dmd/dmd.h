@@ -119,6 +119,8 @@ struct DmdScheme {
 /** Adds a scheme to open_dmd (). Thread-safe. */
 void add_dmd_scheme (const DmdScheme &scheme);
 
+/** Whether the device can hold the masks of @p schedule. */
+Result<void> check_masks (const DmdInfo &info, const Schedule &schedule);
 /** Whether a device of that kind can show @p schedule in the slots of @p plan;
  * the error names the limit and the value. */
 Result<void> check_limits (

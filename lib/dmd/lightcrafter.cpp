@@ -1,14 +1,13 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-#include "dmd/lightcrafter.h"
-
+/* The first LightCrafter (DLP3000), over TCP. */
 #include <algorithm>
 
 #include "base/text.h"
 #include "base/try.h"
 #include "base/wait.h"
 #include "dmd/bitmap.h"
+#include "dmd/drivers.h"
 #include "dmd/lightcrafter_protocol.h"
-#include "dmd/options.h"
 #include "dmd/stop_guard.h"
 #include "dmd/tcp_stream.h"
 
@@ -34,11 +33,13 @@ constexpr int kMaxStrayReplies = 16;
 /** Of a mask of 52 kB over the board's network port, about. */
 constexpr Nanoseconds kMaskTime = 50'000'000;
 
-class Lightcrafter : public Dmd
+class Lightcrafter final : public BoardDmd
 {
 public:
   Lightcrafter (std::string host, int port, const DmdOptions &options)
-      : options_ (options), host_ (std::move (host)), port_ (port)
+      : BoardDmd (
+            options, "lightcrafter:" + host + ":" + std::to_string (port)),
+        host_ (std::move (host)), port_ (port)
   {
     info_.name = "lightcrafter:" + host_;
     info_.size = kMirrors;
@@ -46,8 +47,6 @@ public:
     info_.minimum_active = Nanoseconds (kMinimumExposure) * 1000;
     info_.minimum_switching = options_.gap;
     info_.resident_masks = kMaxPatterns;
-    info_.triggers_camera = options_.master == Master::dmd;
-    info_.trigger_in = info_.trigger_out = true;
     info_.minimum_dark = options_.gap;
   }
   ~Lightcrafter () override
@@ -58,7 +57,6 @@ public:
 
   Result<void> open ();
 
-  const DmdInfo &info () const override { return info_; }
   Result<DmdStatus> status () override;
   Nanoseconds upload_time (const Schedule &schedule, std::stop_token) override
   {
@@ -67,8 +65,6 @@ public:
   Result<void> upload (const Schedule &schedule, std::stop_token stop,
       const UploadProgress &progress) override;
   Result<void> start (const SlotPlan &plan, std::stop_token stop) override;
-  void stop () override;
-  bool running () const override { return running_; }
 
 private:
   struct Reply {
@@ -78,6 +74,7 @@ private:
 
   Result<void> begin (std::stop_token stop = {},
       std::chrono::milliseconds patience = kPatience);
+  bool park () override;
   Result<void> connect ();
   Error error (const char *what, const std::string &reason,
       ErrorCode code = ErrorCode::device) const;
@@ -90,17 +87,13 @@ private:
   Result<void> send_masks (
       const Schedule &schedule, const UploadProgress &progress);
 
-  const DmdOptions options_;
   const std::string host_;
   const int port_;
   std::unique_ptr<TcpStream> stream_;
-  DmdInfo info_;
   std::string version_;
   std::stop_token cancel_;
   std::chrono::milliseconds patience_ = kPatience; // that is left to the job
   int masks_ = 0;                                  // on the board, 0: none
-  bool touched_ = false;
-  bool running_ = false;
 };
 
 /** Begins a job. If the last one was cancelled within a packet, it gets a new
@@ -270,11 +263,7 @@ Result<void>
 Lightcrafter::upload (const Schedule &schedule, std::stop_token stop_token,
     const UploadProgress &progress)
 {
-  if (schedule.masks () > info_.resident_masks)
-    return Error{info_.name + " holds " +
-                 std::to_string (info_.resident_masks) + " masks, not " +
-                 std::to_string (schedule.masks ()) +
-                 "; use a tile with fewer elements"};
+  RETURN_IF_ERROR (check_masks (info_, schedule));
   RETURN_IF_ERROR (begin (std::move (stop_token)));
   touched_ = true;
   const auto sent = send_masks (schedule, progress);
@@ -295,6 +284,7 @@ Lightcrafter::start (const SlotPlan &plan, std::stop_token stop_token)
       plan, {kMinimumExposure, kMaximumExposure, gap, 0, gap}, options_.master);
   if (!time)
     return time.error ().with_prefix (info_.name + ": ");
+  RETURN_IF_ERROR (watch ());
   RETURN_IF_ERROR (begin (std::move (stop_token)));
   RETURN_IF_ERROR (set_sequence (*time));
   RETURN_IF_ERROR (write ("set up the trigger output", kCameraTrigger,
@@ -306,12 +296,11 @@ Lightcrafter::start (const SlotPlan &plan, std::stop_token stop_token)
   return write ("start the sequence", kRun, on);
 }
 
-void
-Lightcrafter::stop ()
+bool
+Lightcrafter::park ()
 {
   const Bytes off{0};
-  if (begin ({}, kStopPatience) && write ("stop the sequence", kRun, off))
-    running_ = false;
+  return begin ({}, kStopPatience) && write ("stop the sequence", kRun, off);
 }
 
 } // namespace
@@ -330,10 +319,7 @@ open_lightcrafter (std::string_view device)
       parts[0].empty () ? "192.168.1.100" : std::string (parts[0]);
   auto dmd = std::make_unique<Lightcrafter> (host, *port, options);
   RETURN_IF_ERROR (dmd->open ());
-  if (!options.guard)
-    return std::unique_ptr<Dmd> (std::move (dmd));
-  return guarded (
-      std::move (dmd), "lightcrafter:" + host + ":" + std::to_string (*port));
+  return std::unique_ptr<Dmd> (std::move (dmd));
 }
 
 } // namespace codedexposure

@@ -87,8 +87,11 @@ choice_key (std::string name, T &option,
     std::initializer_list<std::pair<std::string_view, T>> values)
 {
   DeviceKey key{std::move (name), "", {}};
-  for (const auto &value : values)
-    key.values += (key.values.empty () ? "" : "|") + std::string (value.first);
+  for (const auto &[known, value] : values) {
+    if (!key.values.empty ())
+      key.values += '|';
+    key.values += known;
+  }
   key.set = [&option, values = std::vector (values)] (std::string_view text) {
     for (const auto &[known, value] : values)
       if (text == known) {

@@ -41,17 +41,15 @@ struct PlanePlan {
  */
 PlanePlan plan_planes (const Schedule &schedule);
 
-/** A digest of the pixels (128 bits, to compare the images of a device; no
- * protection against forgery). */
+/** 128 bits that identify the mirrors of a mask; no protection against forgery.
+ */
 struct PlaneDigest {
   std::uint64_t high = 0;
   std::uint64_t low = 0;
   bool operator== (const PlaneDigest &) const = default;
 };
-PlaneDigest digest (ImageView<const PlanePixel> image);
-
-/** Of all mirrors of a mask: on an array of one size and placement, masks of
- * any schedules are equal if their digests are. */
+/** On an array of one size and placement, masks of any schedules are equal if
+ * their digests are. */
 PlaneDigest digest_mask (const Schedule &schedule, int mask);
 
 } // namespace codedexposure

@@ -15,7 +15,6 @@
 #include <thread>
 
 #include "base/try.h"
-#include "dmd/dmd.h"
 #include "dmd/tool_path.h"
 
 namespace codedexposure
@@ -82,69 +81,6 @@ stop_board (const std::string &device)
     return Error{dmd->info ().name + " does not stop", ErrorCode::device};
   return {};
 }
-
-class GuardedDmd final : public Dmd
-{
-public:
-  GuardedDmd (std::unique_ptr<Dmd> dmd, std::string device)
-      : device_ (std::move (device)), dmd_ (std::move (dmd))
-  {
-  }
-  /* A board that was not started here continues. */
-  ~GuardedDmd () override
-  {
-    if (guard_)
-      stop ();
-  }
-
-  const DmdInfo &info () const override { return dmd_->info (); }
-  Result<DmdStatus> status () override { return dmd_->status (); }
-  Nanoseconds upload_time (
-      const Schedule &schedule, std::stop_token stop_token) override
-  {
-    return dmd_->upload_time (schedule, std::move (stop_token));
-  }
-  Result<void> upload (const Schedule &schedule, std::stop_token stop_token,
-      const UploadProgress &progress) override
-  {
-    return dmd_->upload (schedule, std::move (stop_token), progress);
-  }
-  Result<void> start (const SlotPlan &plan, std::stop_token stop_token) override
-  {
-    RETURN_IF_ERROR (watch ());
-    return dmd_->start (plan, std::move (stop_token));
-  }
-  Result<void> show (const StillMask &mask, const SlotPlan &plan,
-      std::stop_token stop_token) override
-  {
-    RETURN_IF_ERROR (watch ());
-    return dmd_->show (mask, plan, std::move (stop_token));
-  }
-  void stop () override
-  {
-    dmd_->stop ();
-    if (guard_)
-      guard_->tell (dmd_->running ());
-  }
-  bool running () const override { return dmd_->running (); }
-
-private:
-  Result<void> watch ()
-  {
-    if (guard_ && guard_->tell (true))
-      return {};
-    auto guard = StopGuard::post (device_);
-    if (!guard)
-      return guard.error ().with_prefix (info ().name + ": ");
-    guard_ = *std::move (guard);
-    guard_->tell (true);
-    return {};
-  }
-
-  const std::string device_;
-  std::unique_ptr<StopGuard> guard_; // relieved when the device is closed
-  const std::unique_ptr<Dmd> dmd_;
-};
 
 } // namespace
 
@@ -214,10 +150,32 @@ stand_guard (int words, const std::string &device)
   return stopped;
 }
 
-std::unique_ptr<Dmd>
-guarded (std::unique_ptr<Dmd> dmd, std::string device)
+BoardDmd::BoardDmd (const DmdOptions &options, std::string device)
+    : options_ (options), device_ (std::move (device))
 {
-  return std::make_unique<GuardedDmd> (std::move (dmd), std::move (device));
+  info_.triggers_camera = options.master == Master::dmd;
+  info_.trigger_in = info_.trigger_out = true;
+}
+
+Result<void>
+BoardDmd::watch ()
+{
+  if (!options_.guard || (guard_ && guard_->tell (true)))
+    return {};
+  auto guard = StopGuard::post (device_);
+  if (!guard)
+    return guard.error ().with_prefix (info_.name + ": ");
+  guard_ = *std::move (guard);
+  guard_->tell (true);
+  return {};
+}
+
+void
+BoardDmd::stop ()
+{
+  running_ = !park () && running_;
+  if (guard_)
+    guard_->tell (running_);
 }
 
 } // namespace codedexposure

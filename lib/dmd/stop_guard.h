@@ -7,12 +7,11 @@
 #include <memory>
 #include <string>
 
-#include "base/result.h"
+#include "dmd/dmd.h"
+#include "dmd/options.h"
 
 namespace codedexposure
 {
-
-class Dmd;
 
 /**
  * A process beside this one that knows whether a board runs. If this process
@@ -48,8 +47,32 @@ private:
  * and then stops the device, unless it is known not to run. */
 Result<void> stand_guard (int words, const std::string &device);
 
-/** @p dmd with a guard that stops it, as @p device, if this process does not.
- */
-std::unique_ptr<Dmd> guarded (std::unique_ptr<Dmd> dmd, std::string device);
+/** A device on hardware: what all drivers share, such as the guard. */
+class BoardDmd : public Dmd
+{
+public:
+  const DmdInfo &info () const final { return info_; }
+  bool running () const final { return running_; }
+  void stop () final;
+
+protected:
+  /** @p device  as in StopGuard::post (). */
+  BoardDmd (const DmdOptions &options, std::string device);
+
+  /** Starts the guard; called before the board shows masks. */
+  Result<void> watch ();
+  /** Stops the board; false if it did not acknowledge it and may still run. */
+  virtual bool park () = 0;
+
+  const DmdOptions options_;
+  const std::string device_;
+  DmdInfo info_;
+  bool touched_ = false; // it shows, or may show, what it was told here
+  bool running_ = false;
+
+private:
+  std::unique_ptr<StopGuard>
+      guard_; // ends after the driver has closed the board
+};
 
 } // namespace codedexposure

@@ -10,8 +10,7 @@
 
 #include "base/text.h"
 #include "base/try.h"
-#include "dmd/dlpc_board.h"
-#include "dmd/stop_guard.h"
+#include "dmd/drivers.h"
 
 namespace codedexposure
 {
@@ -329,14 +328,11 @@ open_usb_dmd (std::string_view device)
   ASSIGN_OR_RETURN (
       const Found found, choose (std::move (boards), options.which));
   ASSIGN_OR_RETURN (auto pipe, open_pipe (context, found));
-  const std::string name = "usb:" + found.board.port;
-  auto link = std::make_unique<HidLink> (std::move (pipe), name);
-  auto dmd = found.board.controller == UsbController::dlpc350
-                 ? open_dlpc350 (std::move (link), options)
-                 : open_dlpc900 (std::move (link), options);
-  if (!dmd || !options.guard)
-    return dmd;
-  return guarded (*std::move (dmd), name);
+  auto link =
+      std::make_unique<HidLink> (std::move (pipe), "usb:" + found.board.port);
+  return found.board.controller == UsbController::dlpc350
+             ? open_dlpc350 (std::move (link), options)
+             : open_dlpc900 (std::move (link), options);
 }
 
 } // namespace codedexposure

@@ -15,36 +15,36 @@ namespace
 
 using Kind = PhaseReading::Kind;
 
-/* Slips by more slots than this are taken for light that changes. */
-constexpr int kFarthestSlip = 3;
-/* Beyond, the levels are not worth the time. */
-constexpr int kMostElements = 64;
-/* Part of a level that is the scene's and changes from frame to frame, and what
- * it may do to the slots in a code whose slips are distinct. */
+/* Slips by more slots count as changing light. */
+constexpr int kMaxSlip = 3;
+/* With more elements, the analysis takes too long. */
+constexpr int kMaxElements = 64;
+/* Relative change of levels by the scene from frame to frame, and its max
+ * effect on the slots in a code whose slips are distinct. */
 constexpr double kSceneUnrest = 0.003;
 constexpr double kDistinct = 0.1;
 
-/* Levels below this, in counts, are dark current and rounding. */
+/* Levels below this, in digital numbers, are dark current and rounding. */
 constexpr double kDark = 2.0;
-/* A mask stood for a whole number of slots when it is off by less than this,
- * and for one when by less than that. */
+/* Max deviation from a whole number of slots in a slip, and from one slot in a
+ * steady frame. */
 constexpr double kMatch = 0.25;
 constexpr double kSteady = 0.4;
-/* Slots that are this restless without a slip tell nothing about one. */
+/* If slots deviate this much without a slip, they cannot show one. */
 constexpr double kRestless = 0.15;
 constexpr double kFirstUnrest = 0.05;
 /* Between two frames the light changes by less than this factor. */
 constexpr double kLightChange = 1.5;
 
-/* Light that a pixel gets from the mirror beside its own; a Gaussian of half a
- * pixel brings 0.19. */
+/* Light that a pixel gets from each neighbouring mirror; 0.19 for a Gaussian of
+ * half a pixel. */
 constexpr double kBlurStep = 0.01;
-constexpr double kMostBlur = 0.2;
-/* A lens could have made levels that it explains but for this part. */
+constexpr double kMaxBlur = 0.2;
+/* A lens is likely if it explains the levels except for this part. */
 constexpr double kLikely = 0.005;
 
-/* The first frames are learned from as they come; later ones at these rates, in
- * step with the code and out of it. */
+/* The first frames are averaged; later ones are learned at these rates, if they
+ * are steady or not. */
 constexpr int kFirstFrames = 8;
 constexpr double kSteadyRate = 1.0 / 8;
 constexpr double kUnsteadyRate = 1.0 / 32;
@@ -80,8 +80,8 @@ unexplained (std::span<const double> levels, std::span<const double> expected)
       1 - both * both / (dot (levels, levels) * dot (expected, expected))));
 }
 
-/** Levels of the elements from the light of the slots, when @p blur of the
- * light of a mirror goes to each pixel beside its own. */
+/** Levels of the elements from the light of the slots, if the part @p blur of
+ * the light of a mirror goes to each neighbouring pixel. */
 Matrix
 levels_from_slots (const Schedule &schedule, double blur)
 {
@@ -105,7 +105,7 @@ levels_from_slots (const Schedule &schedule, double blur)
   return levels;
 }
 
-/** Of the slots that are farthest from one. */
+/** Max deviation from one slot. */
 double
 unrest_of (std::span<const double> slots)
 {
@@ -115,7 +115,7 @@ unrest_of (std::span<const double> slots)
   return unrest;
 }
 
-/** Whether light that is switched on or off once does the same. */
+/** Whether light that is switched on or off once has the same effect. */
 bool
 is_step (const std::vector<int> &stood)
 {
@@ -134,14 +134,14 @@ SlipSignature::SlipSignature (const Schedule &schedule)
     usual_.push_back (schedule.light (e));
   code_light_ = sum (usual_);
   parked_part_ = schedule.leak () * n * n / code_light_;
-  if (n > kMostElements)
+  if (n > kMaxElements)
     return;
 
-  for (double blur = 0; blur <= kMostBlur; blur += kBlurStep)
+  for (double blur = 0; blur <= kMaxBlur; blur += kBlurStep)
     add_lens (schedule, blur);
   if (lenses_.empty ())
     return;
-  for (int late = -kFarthestSlip; late <= kFarthestSlip; late++)
+  for (int late = -kMaxSlip; late <= kMaxSlip; late++)
     for (int from = 1; late != 0 && from < n; from++)
       add_slip (n, from, late);
 
@@ -182,23 +182,23 @@ SlipSignature::add_slip (int slots, int from, int late)
   if (same == slips_.end ()) {
     slips_.push_back ({stood, late, true});
   } else if (std::abs (late) < std::abs (same->slots)) {
-    /* Few slots are likelier than many, */
+    /* A slip by few slots is likelier than one by many, */
     *same = {stood, late, true};
   } else if (late == -same->slots) {
-    /* and a trigger that was missed than one too much. */
+    /* and a missed trigger is likelier than a spurious one. */
     same->slots = std::abs (late);
     same->certain = false;
   }
 }
 
-/** Slots for which each mask stood, were the lens @p lens. */
+/** Slots for which each mask was shown, by the lens @p lens. */
 SlipSignature::Vector
 SlipSignature::slots_stood (
     std::span<const double> levels, const Lens &lens) const
 {
   const Vector usual = product (lens.slots, usual_);
   Vector slots = product (lens.slots, levels);
-  /* A slip leaves the sum of all slots as it is. */
+  /* A slip does not change the sum of all slots. */
   const double light = sum (slots) / sum (usual);
   for (std::size_t s = 0; s < slots.size (); s++)
     slots[s] = slots[s] / light - usual[s] + 1.0;
@@ -275,8 +275,7 @@ SlipSignature::guess_usual (std::span<const double> levels)
   usual_ = likeliest->code;
 }
 
-/** Whether every mask stood for one slot, as far as the sharpest lens that
- * could be shows. */
+/** Whether every mask was shown for one slot, by the sharpest likely lens. */
 bool
 SlipSignature::is_steady () const
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The slip of a DMD seen in the mean levels of the elements. */
+/* Slips of a DMD in the mean levels of the elements. */
 #pragma once
 
 #include <cstdint>
@@ -14,25 +14,26 @@ namespace codedexposure
 {
 
 /**
- * Reads from the levels of the elements for how many slots each mask stood.
+ * Determines from the levels of the elements for how many slots each mask was
+ * shown.
  *
- * A slip inside an exposure shows one mask twice and another never; solving the
- * code for the slots gives 2 and 0 for these and 1 for all others. Light that
- * changes during the exposure moves the levels, too, but hardly ever to such
- * numbers: a slip is only read where they fit. In the frames after the one in
- * which it happened every mask stands for one slot again, and the slip is
- * invisible here: the sum of the masks does not depend on their order.
+ * After a slip within an exposure, one mask is shown twice and another never;
+ * solving the code for the slots gives 2 and 0 for these and 1 for all others.
+ * Light that changes during the exposure changes the levels, too, but hardly
+ * ever to such numbers: a slip is only reported if they fit. In later frames
+ * every mask is shown for one slot again, and the slip is invisible here,
+ * because the sum of the masks does not depend on their order.
  *
- * What texture in step with the tile does to the levels is learned from the
- * frames, and so is the blur of the lens where the code's own levels show it.
+ * The effect of texture that repeats with the tile is learned from the frames,
+ * as is the blur of the lens if the levels of the code show it.
  */
 class SlipSignature
 {
 public:
   explicit SlipSignature (const Schedule &schedule);
 
-  /** Whether a slip by one slot changes the levels of the code enough to be
-   * told from the scene, wherever inside the exposure it happens. */
+  /** Whether a slip by one slot, anywhere within the exposure, changes the
+   * levels more than the scene does. */
   bool distinct () const { return distinct_; }
 
   /** Reads one frame, and learns from it. @p levels: of each element. */
@@ -42,14 +43,14 @@ private:
   using Vector = std::vector<double>; // a value for each element, or each slot
 
   struct Lens {
-    Vector code;  // levels of the code, in light of 1 a slot
-    Matrix slots; // from the levels of the elements to the light of the slots
-    Vector stood; // slots for which each mask stood in this frame, by this lens
+    Vector code;   // levels of the code, in light of 1 a slot
+    Matrix slots;  // from the levels of the elements to the light of the slots
+    Vector stood;  // slots for which each mask was shown, by this lens
     double unrest; // of these in frames without a slip
-    bool likely;   // it could have made the usual levels
+    bool likely;   // it explains the usual levels
   };
   struct Slip {
-    std::vector<int> stood; // slots for which each mask stood
+    std::vector<int> stood; // slots for which each mask was shown
     int slots;
     bool certain;
   };
@@ -68,7 +69,7 @@ private:
   std::vector<Slip> slips_;
   bool distinct_ = false;
   double code_light_;  // sum of the levels in light of 1 a slot
-  double parked_part_; // of it that parked mirrors let through
+  double parked_part_; // of it with parked mirrors, by off-state leakage
 
   Vector usual_;          // levels in light of 1 a slot
   double brightness_ = 0; // light of a slot in the last frame in phase

@@ -8,8 +8,7 @@
 #include <cstdlib>
 
 #include "base/text.h"
-#include "dmd/dlpc_board.h"
-#include "dmd/dlpc_board.h"
+#include "dmd/drivers.h"
 #include "dmd/lightcrafter_protocol.h"
 
 using namespace codedexposure;

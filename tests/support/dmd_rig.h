@@ -20,7 +20,8 @@ using OpenDriver = Result<std::unique_ptr<Dmd>> (*) (
 inline DmdOptions
 options_of (std::string_view text)
 {
-  const auto options = DmdOptions::parse ("usb:" + std::string (text));
+  const auto options =
+      DmdOptions::parse ("usb:" + std::string (text) + ",guard=off");
   EXPECT_TRUE (options.ok ()) << options.error ().message;
   return *options;
 }

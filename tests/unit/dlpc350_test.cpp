@@ -4,7 +4,7 @@
 #include <random>
 
 #include "dmd/dlpc350_protocol.h"
-#include "dmd/dlpc_board.h"
+#include "dmd/drivers.h"
 #include "emulated_dlpc350.h"
 #include "fault_life.h"
 

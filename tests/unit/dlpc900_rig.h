@@ -2,7 +2,7 @@
 /* The DLPC900 driver on an emulated board. */
 #pragma once
 
-#include "dmd/dlpc_board.h"
+#include "dmd/drivers.h"
 #include "dmd_rig.h"
 #include "emulated_dlpc900.h"
 #include "mirrors.h"

@@ -457,5 +457,6 @@ TEST (Dlpc900Upload, MoreMasksThanItHoldsAreAnError)
   Rig rig;
   ASSERT_EQ (message_of (rig.open ()), "");
   EXPECT_EQ (message_of (rig.upload (schedule_of ("sequential:15x15,pilot=8"))),
-      "board (DLP5500) holds 400 masks, not 450");
+      "board (DLP5500) holds 400 masks, the schedule "
+      "sequential:15x15,pilot=8 has 450; use a tile with fewer elements");
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* The DLP3000 driver: its bytes, and an emulated board as a server on this
  * machine. */
-#include "dmd/lightcrafter.h"
+#include "dmd/drivers.h"
 
 #include "dmd/bitmap.h"
 #include "dmd/lightcrafter_protocol.h"

@@ -143,30 +143,6 @@ Sums::fit (float swing) const
   return found;
 }
 
-/* Position of a pixel that sees @mirror in the table of @response. */
-struct Entry {
-  std::size_t low;
-  float part;
-
-  Entry (const GratingResponse &response, double mirror)
-  {
-    const double periods = mirror / response.period ();
-    const double step = (periods - std::floor (periods)) * response.period () *
-                        GratingResponse::kSteps;
-    low = std::min (std::size_t (step),
-        std::size_t (response.period () * GratingResponse::kSteps - 1));
-    part = float (step - double (low));
-  }
-  Value at (const GratingResponse &response, int phase) const
-  {
-    const Value *v =
-        response.table () + low + std::size_t (phase * GratingResponse::kSteps);
-    return {v[0].light + part * (v[1].light - v[0].light),
-        v[0].slope + part * (v[1].slope - v[0].slope),
-        v[0].blur + part * (v[1].blur - v[0].blur), 0.0f};
-  }
-};
-
 struct PixelLight {
   float dark, swing;
 };
@@ -177,13 +153,13 @@ fit_pixel (const float *const *rows, int x, const GratingResponse &response,
     double mirror, PixelLight light, const NoiseModel &noise,
     const Rounding &rounding)
 {
-  const Entry entry (response, mirror);
+  const GratingResponse::Entry entry = response.entry (mirror);
   const float model_error = kModelError * light.swing;
   const float floor = float (noise.floor) + model_error * model_error;
   const float slope = float (noise.slope);
   Sums sums;
   for (int k = 0; k < response.period (); k++) {
-    const Value v = entry.at (response, k);
+    const Value v = response.at (entry, k);
     const float expected = light.dark + light.swing * v.light;
     const float variance = floor + slope * std::max (0.0f, expected);
     sums.add (v, rows[k][x] - rounding.mean (expected), 1.0f / variance);
@@ -242,12 +218,12 @@ find_noise (const float *const *rows, int x, const GratingResponse &response,
     double mirror, PixelLight light, const NoiseModel &noise, NoiseBins &bins)
 {
   constexpr std::size_t kTerms = 3;
-  const Entry entry (response, mirror);
+  const GratingResponse::Entry entry = response.entry (mirror);
   const std::size_t phases = std::size_t (response.period ());
   std::array<std::array<double, Pattern::kMaxPeriod>, kTerms> term;
   std::array<double, Pattern::kMaxPeriod> weight, rest, expected, freedom;
   for (std::size_t k = 0; k < phases; k++) {
-    const Value v = entry.at (response, int (k));
+    const Value v = response.at (entry, int (k));
     expected[k] = double (light.dark) + double (light.swing) * double (v.light);
     weight[k] = 1.0 / (noise.floor + noise.slope * std::max (0.0, expected[k]));
     rest[k] = double (rows[k][x]) - expected[k];

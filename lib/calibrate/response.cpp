@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "calibrate/response.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "estimate/mirror_share.h"
@@ -32,17 +33,14 @@ GratingResponse::GratingResponse (int period, double side, double sigma)
     table_[std::size_t (i)] = table_[std::size_t (i - steps)];
 }
 
-GratingResponse::Value
-GratingResponse::at (double place) const
+GratingResponse::Entry
+GratingResponse::entry (double place) const
 {
   const double periods = place / period_;
   const double step = (periods - std::floor (periods)) * period_ * kSteps;
-  const std::size_t low = std::size_t (step);
-  const float part = float (step - double (low));
-  const Value &a = table_[low], &b = table_[low + 1];
-  return {a.light + part * (b.light - a.light),
-      a.slope + part * (b.slope - a.slope), a.blur + part * (b.blur - a.blur),
-      0.0f};
+  const std::size_t low =
+      std::min (std::size_t (step), std::size_t (period_ * kSteps - 1));
+  return {low, float (step - double (low))};
 }
 
 } // namespace codedexposure

@@ -2,6 +2,7 @@
 /* The light that a pixel gets from a grating, by its place. */
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 namespace codedexposure
@@ -22,20 +23,33 @@ public:
     float blur = 0.0f;  ///< d light / d variance of the blur, 1 / mirrors^2
     float unused = 0.0f;
   };
-  static constexpr int kSteps = 128; ///< of the table, per mirror
+  /** Where a place lies in the table. */
+  struct Entry {
+    std::size_t low;
+    float part; ///< of the way to the next one
+  };
 
   /** @p period in mirrors; @p side of a pixel and @p sigma of the blur in
    * mirrors. */
   GratingResponse (int period, double side, double sigma);
 
   int period () const { return period_; }
-  /** Two periods and one step; entry i is the light at place i / kSteps. */
-  const Value *table () const { return table_.data (); }
-  Value at (double place) const;
+  /** @p place  in mirrors. */
+  Entry entry (double place) const;
+  /** Of the grating of @p phase. */
+  Value at (const Entry &entry, int phase = 0) const
+  {
+    const Value *v = table_.data () + entry.low + std::size_t (phase * kSteps);
+    return {v[0].light + entry.part * (v[1].light - v[0].light),
+        v[0].slope + entry.part * (v[1].slope - v[0].slope),
+        v[0].blur + entry.part * (v[1].blur - v[0].blur), 0.0f};
+  }
 
 private:
+  static constexpr int kSteps = 128; // of the table, per mirror
+
   int period_;
-  std::vector<Value> table_;
+  std::vector<Value> table_; // two periods and one step
 };
 
 } // namespace codedexposure

@@ -63,7 +63,8 @@ information_at (const GratingResponse &response, double place)
   double w = 0, l = 0, ll = 0, d = 0, dl = 0, dd = 0;
   double b = 0, bl = 0, bb = 0, bd = 0;
   for (int phase = 0; phase < response.period (); phase++) {
-    const GratingResponse::Value v = response.at (place + phase);
+    const GratingResponse::Value v =
+        response.at (response.entry (place + phase));
     const double light = double (v.light), slope = double (v.slope);
     const double blur = double (v.blur);
     const double electron = 255.0 / kMoireWell;

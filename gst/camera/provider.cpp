@@ -64,8 +64,8 @@ reconfigure_element (GstDevice *device, GstElement *element)
          set_name (device, element);
 }
 
-/* The size and rate of a camera are known once it is opened, which takes it
- * from whoever uses it: so a list says what any camera may have. */
+/* Size and rate are known only after a camera was opened, which another program
+ * may have done: the caps are those of any camera. */
 GstDevice *
 make_device (guint number)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* What a user says of a camera, and the GenICam features that follow. */
+/* Properties of a camera, and the GenICam features that follow from them. */
 #pragma once
 
 #include <string>

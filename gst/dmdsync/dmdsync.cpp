@@ -5,10 +5,10 @@
  * @short_description: Drives the DMD, and makes time and phase of coded frames
  * known
  *
- * Stands right behind the camera. It programs and starts the micromirror device
+ * Comes right after the camera. It programs and starts the micromirror device
  * (DMD), gives every coded frame the time and the number of its exposure, finds
- * frames that are lost, late or doubled, and watches whether the masks are in
- * phase with the exposure. Pixel values stay as they are.
+ * lost, late and duplicate frames, and checks whether the masks are
+ * synchronised with the exposure. Pixel values stay as they are.
  *
  * ## The DMD
  *
@@ -18,10 +18,10 @@
  * it. The mirrors start when the caps, and with them the frame period, are
  * known, before caps go on: a camera that the DMD triggers waits for its first
  * trigger then. Slots that fit neither the frame period nor the device are an
- * error that tells the numbers. PAUSED to READY parks the mirrors, always.
+ * error that names the numbers. PAUSED to READY parks the mirrors, always.
  *
- * Without a device, the element watches and stamps the frames of a DMD that
- * somebody else drives.
+ * Without a device, the element checks and stamps the frames of a DMD that
+ * another program controls.
  *
  * ## Time
  *
@@ -39,8 +39,8 @@
  *                                   exposure-end |
  * ]|
  *
- * A step of more than one and a half periods is a loss. What takes the place of
- * the lost frames says #dmdsync:on-loss. A frame at the time of the one before
+ * A step of more than one and a half periods is a loss; #dmdsync:on-loss
+ * decides what replaces the lost frames. A frame at the time of the one before
  * is a duplicate and dropped; one at a time that was passed is late, and goes
  * on with DISCONT.
  *
@@ -60,20 +60,19 @@
  * seen with the schedule: `never` for codes that open every element in one
  * slot, `in-the-frame` in which it happens for staircase and s-matrix, `always`
  * with a pilot (`pilot=16` in the schedule). A frame out of phase is CORRUPTED,
- * its meta says `locked` false; see #dmdsync:on-unlock. The DMD is started
- * anew, and when frames show that, they are locked again.
+ * its meta has `locked` false; see #dmdsync:on-unlock. dmdsync restarts the
+ * DMD, and frames are locked again as soon as they show the restart.
  *
  * ## Patterns
  *
- * An element behind this one can have the mirrors show a grating or a code for
- * a while, with an event (docs/formats.md, "Patterns on request"). Frames that
- * show it bear its name in their meta; they are not coded frames and never
- * locked. The mirrors are given back when that is asked for, or nobody asks any
- * more.
+ * Any downstream element can request a grating or a code with an event
+ * (docs/formats.md, "Patterns on request"). Frames that show it have its name
+ * in their meta; they are not coded frames and never locked. The schedule is
+ * shown again on request, or when the request expires.
  *
  * ## Metas, messages and tags
  *
- * Every frame bears the custom meta `CodedExposureFrame`. Element messages are
+ * Every frame has the custom meta `CodedExposureFrame`. Element messages are
  * `dmdsync/frames-lost`, `dmdsync/frame-late`, `dmdsync/frame-dropped`,
  * `dmdsync/slip`, `dmdsync/locked`, `dmdsync/time-uncertainty`,
  * `dmdsync/pattern-shown` and `dmdsync/pattern-over`. The schedule goes
@@ -97,7 +96,7 @@
  * dmdsync device=sim:bench,slip-at=401 schedule=sequential:2x2,pilot=16 !
  * fakesink
  * ]| The same with a DMD that misses a trigger in slot 401: `dmdsync/slip` and,
- * after the DMD was started anew, `dmdsync/locked` appear among the messages.
+ * after the restart of the DMD, `dmdsync/locked` appear among the messages.
  *
  * Since: 0.1
  */
@@ -175,8 +174,8 @@ GstStateChangeReturn
 change_state (GstElement *element, GstStateChange transition)
 {
   auto *self = GST_DMD_SYNC (element);
-  /* A wrong schedule is told before a device is opened; it may be another one
-   * by the time that it is shown. */
+  /* Before a device is opened, and again because the property may have
+   * changed. */
   const bool schedule_due = transition == GST_STATE_CHANGE_NULL_TO_READY ||
                             transition == GST_STATE_CHANGE_READY_TO_PAUSED;
   if (schedule_due && !sync::read_schedule (self))

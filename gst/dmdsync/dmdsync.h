@@ -81,7 +81,7 @@ struct Timebase {
   SlotPlan plan;
 };
 
-/** A pattern that stands in place of the schedule, or is about to. */
+/** A pattern that replaces the schedule, or is about to. */
 struct ShownPattern {
   std::string text;
   guint64 frames_left; ///< until the mirrors are given back unasked
@@ -97,7 +97,7 @@ struct Stream {
   GstClockTime last_arrival = GST_CLOCK_TIME_NONE;
   GstClockTime last_time = 0; ///< of the newest frame, by the pipeline's clock
   GstClockTime uncertainty = GST_CLOCK_TIME_NONE; ///< of the last frame's time
-  std::optional<bool> time_known; ///< what was said of it; none: nothing
+  std::optional<bool> time_known; ///< as was posted; none: nothing was
   std::optional<PhaseWatch> watch;
   std::optional<PhaseLock> lock;
   BufferPtr last;              ///< for on-loss=repeat
@@ -108,8 +108,8 @@ struct Stream {
   bool discont = true;         ///< the next frame does not follow the last one
   bool tag_due = true;
   bool warned_tag = false;
-  std::optional<Mapping> mapping; ///< that upstream's tags say
-  std::string refused; ///< what was said of the caps that were refused last
+  std::optional<Mapping> mapping; ///< of the tags from upstream
+  std::string refused; ///< the error of the caps that were refused last
 };
 
 /** The object lock of the element is never held while pushing, querying or
@@ -126,8 +126,8 @@ struct SyncState {
   std::optional<ShownPattern> pattern; ///< none: the schedule
   guint switches = 0;                  ///< between schedule and patterns
 
-  /** Keeps what is asked of the runner in the order of the patterns; taken
-   * before the object lock. */
+  /** Keeps the runner's jobs in the order of the requests; taken before the
+   * object lock, and not held while posting. */
   std::mutex pattern_order;
 
   /* Changed by changes of state only, while nothing flows or is uploaded. */

@@ -115,7 +115,7 @@ own_schedule (GstDmdSync *self, GstEvent *event)
     return event;
 
   /* The last tags of a scope are those that a late link gets: ours are always
-   * among them. How the camera stands is not ours to say. */
+   * among them. The mapping is upstream's. */
   if (theirs && *theirs)
     st.stream.mapping = theirs->value ().mapping;
   return replace_setup (event, {st.schedule, st.stream.mapping});
@@ -141,8 +141,8 @@ take_segment (GstDmdSync *self, GstEvent *event)
   return push_tag (self) && taken;
 }
 
-/* A source offers the same caps again before it gives up; the bus hears of it
- * once. */
+/* Posted once, although a source offers the same caps again before it gives up.
+ */
 void
 refuse (GstDmdSync *self, GstCaps *incaps, const std::string &why)
 {
@@ -206,7 +206,8 @@ set_caps (GstBaseTransform *trans, GstCaps *incaps, GstCaps *)
     return TRUE;
   st.runner->start (time->plan);
   st.runner->settle ();
-  /* A wait cut short by a flush or on the way down says nothing of the caps. */
+  /* A wait that a flush or a change of state cut short is no fault of the caps.
+   */
   return !st.runner->failed ();
 }
 

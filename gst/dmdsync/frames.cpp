@@ -43,8 +43,7 @@ say (GstDmdSync *self, const char *name, const Frame &frame, More... more)
                             frame.pts, more..., nullptr));
 }
 
-/** Says that @p frame goes no further, which GST_BASE_TRANSFORM_FLOW_DROPPED
- * means here. */
+/** Posts that @p frame is dropped. Returns GST_BASE_TRANSFORM_FLOW_DROPPED. */
 GstFlowReturn
 drop (GstDmdSync *self, const Frame &frame, const char *reason)
 {
@@ -89,7 +88,7 @@ stamp (GstDmdSync *self, GstBuffer *buffer, FrameMeta meta)
   Stream &stream = state (self).stream;
   GST_BUFFER_PTS (buffer) = meta.exposure_start;
   GST_BUFFER_DTS (buffer) = GST_CLOCK_TIME_NONE;
-  /* What a camera source says is the distance to the frame before. */
+  /* Of camera sources it is the distance to the frame before. */
   GST_BUFFER_DURATION (buffer) = GstClockTime (stream.time->rate.period ());
   GST_BUFFER_OFFSET (buffer) = meta.frame;
   GST_BUFFER_OFFSET_END (buffer) = meta.frame + 1;
@@ -159,7 +158,7 @@ take_loss (GstDmdSync *self, const Frame &frame)
   return GST_FLOW_OK;
 }
 
-/** What the order of arrival says. */
+/** Handles losses, duplicates and late frames. */
 GstFlowReturn
 take_arrival (GstDmdSync *self, const Frame &frame)
 {
@@ -262,7 +261,7 @@ take_unlocked (GstDmdSync *self, const Frame &frame)
   }
 }
 
-/** Looks at the phase, and has the DMD started anew when it slipped. */
+/** Checks the phase, and restarts the DMD after a slip. */
 void
 watch_phase (GstDmdSync *self, Frame &frame)
 {
@@ -326,7 +325,7 @@ place (GstDmdSync *self, Frame &frame)
   return time;
 }
 
-/** What a frame that goes on bears. */
+/** The meta of a frame that is pushed. */
 FrameMeta
 meta_of (GstDmdSync *self, const Frame &frame)
 {

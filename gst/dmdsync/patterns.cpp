@@ -43,8 +43,7 @@ refuse (GstDmdSync *self, const std::string &pattern, const std::string &why)
   return false;
 }
 
-/* False where there is no stream. The order's lock is given up before anybody
- * is told: who is told may ask for the next pattern at once. */
+/* False where there is no stream. */
 bool
 send (GstDmdSync *self, const Pattern &pattern, const std::string &text,
     guint64 frames)

@@ -11,7 +11,7 @@ namespace codedexposure::gst::sync
 namespace
 {
 
-/* Latency grows in steps of this: every one makes a pipeline ask again. */
+/* Latency grows in steps of this, since a pipeline is reconfigured for each. */
 constexpr GstClockTime kJitterStep = GST_MSECOND;
 
 /* Times that may be wrong by more than this are not known; they are known again
@@ -179,8 +179,9 @@ watch_rate (GstDmdSync *self, GstClockTime time)
       self, gst_structure_new ("dmdsync/frame-rate", "measured", G_TYPE_DOUBLE,
                 *rate, "caps", GST_TYPE_FRACTION, said.num, said.den, nullptr));
   GST_ELEMENT_WARNING (self, RESOURCE, SETTINGS,
-      ("Frames come at %.4g a second, the caps say %d/%d. Whoever triggers the "
-       "camera imposes its rate: set the caps and the trigger to the same.",
+      ("Frames come at %.4g a second, the caps say %d/%d. The device that "
+       "triggers the camera sets its rate: set the caps to the rate of the "
+       "trigger.",
           *rate, said.num, said.den),
       (nullptr));
 }

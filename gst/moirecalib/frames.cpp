@@ -34,7 +34,8 @@ bool
 refuse (GstMoireCalib *self, const std::string &why)
 {
   GST_ELEMENT_ERROR (self, RESOURCE, NOT_FOUND,
-      ("Nobody upstream shows patterns. Put a dmdsync with a device that takes "
+      ("No element upstream shows patterns. Put a dmdsync with a device that "
+       "takes "
        "masks at run time before moirecalib, or show a grating by other means "
        "and say which: pattern=%s.",
           live_grating ().text ().c_str ()),
@@ -354,9 +355,10 @@ finish (GstMoireCalib *self)
   push_setup (self);
   if (lost_tile)
     GST_ELEMENT_WARNING (self, STREAM, FAILED,
-        ("The stream ended, and no frame told where the tile lies: a phase is "
-         "taken from a probability of %g on, and %g was the most. Take a scene "
-         "with more light in more of its parts, or calibrate.",
+        ("The stream ended before the phase of the tile was found: a phase "
+         "needs "
+         "a probability of %g, and the largest was %g. Use a scene that is "
+         "bright in more of its parts, or calibrate.",
             CalibrationSession::kSure, confidence),
         (nullptr));
   if (st.stream.mapping && st.stream.next < patterns)

@@ -78,7 +78,7 @@ struct Geometry {
   int bits = 0; ///< significant ones, from the frame metadata; 0: unknown
   Extent mirrors;
   std::vector<Pattern> patterns;    ///< of a calibration
-  std::optional<Schedule> schedule; ///< that the stream says
+  std::optional<Schedule> schedule; ///< of the stream's tags
 
   Extent camera () const { return {info.width, info.height}; }
 };
@@ -140,7 +140,7 @@ struct Stream {
 struct CalibState {
   Settings settings;              ///< object lock
   std::string mapping;            ///< object lock: JSON, "" before
-  Stage stage = Stage::searching; ///< object lock: as properties say it
+  Stage stage = Stage::searching; ///< object lock: the property
 
   Exchange exchange;
   std::thread worker;
@@ -166,7 +166,7 @@ state (gpointer element)
 Settings settings_of (gpointer element);
 
 /* The worker. */
-/** False, with an error posted, when there is no thread to be had. */
+/** False, with an error posted, when no thread can be started. */
 bool start_worker (GstMoireCalib *self);
 void stop_worker (GstMoireCalib *self);
 

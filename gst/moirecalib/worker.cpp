@@ -163,8 +163,9 @@ Worker::choose_schedule (std::optional<Schedule> &schedule)
     schedule = *asked;
   }
   if (!schedule)
-    fail ("the stream says nothing of its schedule; set the schedule "
-          "property to what the mirrors show");
+    fail (
+        "the stream has no schedule in its tags; set the schedule property to "
+        "what the mirrors show");
 }
 
 template <typename Use>

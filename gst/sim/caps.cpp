@@ -2,8 +2,8 @@
 /* Input frames and coded frames: the rate of one from that of the other.
  *
  * A coded frame takes N slots times a whole number of input frames. The caps
- * of both sides say that number: offered is every rate up to an Nth of the
- * input's, taken is the largest that divides it.
+ * of both sides give that number: every rate up to an Nth of the input's is
+ * offered, the largest that divides it is taken.
  */
 #include "common/caps.h"
 #include "common/element.h"
@@ -141,8 +141,8 @@ plan_for (
   return Plan{in, out, *inputs, share_light (*slots, *inputs)};
 }
 
-/* A source offers the same caps again and again before it gives up; the bus
- * hears of it once. */
+/* Posted once, although a source offers the same caps again before it gives up.
+ */
 void
 refuse (GstCodedExposureSim *self, const std::string &why)
 {

@@ -111,11 +111,11 @@ watch_mirrors (GstCodedExposureSim *self, const std::vector<int> &masks)
   GST_ELEMENT_WARNING (self, RESOURCE, NOT_FOUND,
       ("The mirrors of the simulated DMD are parked: coded frames are dark "
        "until a dmdsync with the same device starts them."),
-      ("this is said once"));
+      ("this is posted once"));
 }
 
-/* The masks of every slot, asked for at the start of the exposure, where the
- * DMD begins to step. */
+/* The masks of all slots, at the start of the exposure, when the DMD begins to
+ * step. */
 std::vector<int>
 find_masks (GstCodedExposureSim *self, std::int64_t frame)
 {
@@ -249,7 +249,7 @@ read_out (GstCodedExposureSim *self, const Exposure &exposure)
   return GST_FLOW_OK;
 }
 
-/* What a camera of fewer bits than its pixels could hold says of its frames. */
+/* The meta of frames with fewer significant bits than their format. */
 void
 describe (const Stream &stream, const Exposure &exposure)
 {
@@ -307,8 +307,7 @@ name_of (Drop reason)
   return kNames[int (reason)];
 }
 
-/* What only happens when somebody asks for it is left to the message for
- * programs. */
+/* Drops that the user caused are only in the message for programs. */
 void
 tell_user (GstCodedExposureSim *self, Drop reason, GstClockTime start,
     const std::string &taken)
@@ -325,7 +324,7 @@ tell_user (GstCodedExposureSim *self, Drop reason, GstClockTime start,
         ("A gap in the input after %s of the coded frame at %" GST_TIME_FORMAT
          ", which is dropped.",
             taken.c_str (), GST_TIME_ARGS (start)),
-        ("this is said once; the property frames-dropped counts them all"));
+        ("this is posted once; the property frames-dropped counts them all"));
 }
 
 } // namespace
@@ -401,7 +400,7 @@ submit_input_buffer (
   const GstFlowReturn flow =
       GST_BASE_TRANSFORM_CLASS (g_type_class_peek (GST_TYPE_VIDEO_FILTER))
           ->submit_input_buffer (trans, is_discont, owned.release ());
-  /* Where the caps stayed what they were, nobody made a plan. */
+  /* No plan is made for caps that did not change. */
   const GstVideoFilter *filter = GST_VIDEO_FILTER (trans);
   if (flow == GST_FLOW_OK && !stream.plan &&
       !make_plan (self, filter->in_info, filter->out_info))

@@ -13,7 +13,7 @@
  *
  * A coded frame with N slots takes N m input frames, m a whole number: 100
  * frames/s and 4 slots make 25 coded frames/s, 200 frames/s make 50, or 25
- * where a caps filter behind the element asks for them. The largest rate that
+ * if a caps filter downstream requires them. The largest rate that
  * downstream takes is chosen.
  *
  * |[
@@ -23,7 +23,7 @@
  * ]|
  *
  * An input frame is constant light from its time until that of the next one,
- * as much in each pixel as its value says.
+ * in each pixel as much as its value.
  * Slots lie in the frame as the schedule's timing says (`active`, `switching`,
  * `readout`) and collect what falls into their active time; while mirrors
  * switch and while the camera reads out, light is lost.
@@ -54,14 +54,14 @@
  *
  * With #codedexposure-sim:dmd the masks are those of a simulated DMD that a
  * dmdsync with the same device drives, and its schedule is in force; before
- * somebody starts the mirrors, coded frames are dark. Else the masks step with
- * the frames.
+ * the mirrors start, coded frames are dark. Without it, the masks step with the
+ * frames.
  *
  * ## Gaps, tags and messages
  *
  * A gap, DISCONT, a new segment, new caps, a flush or the end of the stream in
  * the middle of an exposure drops that coded frame: it is counted, and the
- * element message `codedexposure/frame-dropped` says `reason` ("gap",
+ * element message `codedexposure/frame-dropped` has `reason` ("gap",
  * "segment", "caps", "flush" or "eos"), `pts`, `inputs` (frames it had),
  * `needed` and `frames-dropped`. The next coded frame is DISCONT.
  *

@@ -35,7 +35,7 @@ namespace codedexposure::gst::sim
 
 using ScheduleRef = std::shared_ptr<const Schedule>;
 
-/** What the user asked for. */
+/** Properties. */
 struct Settings {
   std::string schedule;
   std::shared_ptr<const Result<Schedule>> parsed; ///< never null
@@ -71,7 +71,7 @@ struct Stream {
   std::shared_ptr<SimulatedMirrors> mirrors; ///< null: masks in step
   ScheduleRef schedule;                      ///< of the plan and the tag
   std::optional<Plan> plan;
-  std::string refused; ///< why there can be no plan, as the bus was told
+  std::string refused; ///< why there can be no plan, as was posted
   std::optional<OpticalBench> bench;
   BenchOptions optics; ///< of the bench
   std::optional<Exposure> exposure;
@@ -147,8 +147,7 @@ GstFlowReturn submit_input_buffer (
     GstBaseTransform *trans, gboolean is_discont, GstBuffer *inbuf);
 GstFlowReturn generate_output (GstBaseTransform *trans, GstBuffer **outbuf);
 enum class Drop { kGap, kSegment, kFlush, kCaps, kEos };
-/** Gives up the coded frame that is being made, if there is one, and says so.
- */
+/** Drops the coded frame that is being made, if there is one, and posts it. */
 void drop_exposure (GstCodedExposureSim *self, Drop reason);
 /** The next frame begins a stretch of time of its own. */
 void restart (GstCodedExposureSim *self, Drop reason);

@@ -52,7 +52,7 @@ public:
     LiveReading reading;
     StageCorrection correction;
   };
-  /** What a frame of the grating says. None where no grating was expected;
+  /** Reads a frame of the grating. None where no grating was expected;
    * error when none is seen. */
   template <typename Pixel>
   Result<std::optional<Alignment>> align (
@@ -77,8 +77,7 @@ public:
     TilePhase tile;
     Schedule schedule;
   };
-  /** None while no frame makes it sure; confidence () says how near the best
-   * one came. */
+  /** None while no frame reaches kSure; confidence () is the largest so far. */
   template <typename Pixel>
   Result<std::optional<Phase>> find_phase (ImageView<const Pixel> frame);
   double confidence () const { return confidence_; }
@@ -93,10 +92,11 @@ private:
   double confidence_ = 0.0;
 };
 
-/** What an alignment says, in lines of text for people. */
+/** An alignment in lines of text. */
 std::vector<std::string> alignment_lines (
     const CalibrationSession::Alignment &alignment);
-/** What a mapping says, briefly and in full; @p correction is of its mapping.
+/** A mapping in lines of text, briefly and in full; @p correction is of its
+ * mapping.
  */
 std::vector<std::string> mapping_lines (
     const CalibrationResult &result, const StageCorrection &correction);

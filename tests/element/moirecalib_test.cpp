@@ -234,7 +234,7 @@ TEST (MoireCalib, WithoutADmdsyncItSaysWhatToDo)
   h.set_caps (gray_caps (kLargeWidth, kLargeHeight));
   EXPECT_EQ (h.push (grating_frame (0)), GST_FLOW_ERROR);
   EXPECT_EQ (h.error (),
-      "Nobody upstream shows patterns. Put a dmdsync with a device that takes "
+      "No element upstream shows patterns. Put a dmdsync with a device that takes "
       "masks at run time before moirecalib, or show a grating by other means "
       "and say which: pattern=grating-both:4/0.");
 }
@@ -447,10 +447,10 @@ TEST (MoireCalibPhase, WhatSaysNothingOfItIsWarnedOf)
   } cases[] = {
       {"schedule=sequential:2x2", 40, "get the same light"},
       {"schedule=stairs:2x2", 40, "'stairs' is no code"},
-      {"", 40, "the stream says nothing of its schedule"},
+      {"", 40, "the stream has no schedule in its tags"},
       {"schedule=staircase:2x2", 0,
-          "no frame told where the tile lies: a phase is taken from a "
-          "probability of 0.999 on, and 0.25 was the most"},
+          "before the phase of the tile was found: a phase needs a "
+          "probability of 0.999, and the largest was 0.25"},
   };
   for (const auto &c : cases) {
     ElementHarness h ("moirecalib mode=phase " + std::string (c.settings));

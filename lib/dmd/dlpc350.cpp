@@ -83,7 +83,7 @@ Dlpc350::status ()
       {"images-in-flash", std::to_string (images)}});
 }
 
-/** Whether the user said where the masks are, and whether they can be there. */
+/** Checks the options that name the images of the masks. */
 Result<void>
 Dlpc350::check_images (const Schedule &schedule)
 {
@@ -187,9 +187,6 @@ Dlpc350::send_tables (const PatternTime &time)
   const TriggerMode mode =
       video () ? TriggerMode::video : TriggerMode::timer_or_input;
   const std::size_t image_entries = std::max<std::size_t> (1, images.size ());
-  if (image_entries > std::size_t (kMaxImages))
-    return Error{info_.name + ": the masks alternate between images more "
-                              "often than its image table allows"};
   RETURN_IF_ERROR (write_all ({{kConfigure,
                                    encode_configuration (int (patterns.size ()),
                                        slots_, int (image_entries))},

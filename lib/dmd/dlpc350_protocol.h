@@ -29,8 +29,8 @@ constexpr std::uint8_t kMailboxClosed = 0;
 constexpr std::uint8_t kMailboxImages = 1;
 constexpr std::uint8_t kMailboxPatterns = 2;
 
-constexpr int kMaxImages = 64;
-/** Masks in the two buffers, shown without reading flash meanwhile. */
+/** Masks in the two buffers, shown without reading flash meanwhile; the table
+ * of images takes more. */
 constexpr int kPreloadedPlanes = 48;
 constexpr std::uint32_t kMinimumExposure = 235;
 /** A black mask takes this long to load: period and exposure differ by at least

@@ -106,7 +106,7 @@ encode_configuration (int entries)
 {
   Bytes bytes;
   append_le (bytes, std::uint32_t (entries), 2);
-  append_le (bytes, 0, 4); // patterns until it stops by itself: for ever
+  append_le (bytes, 0, 4); // patterns until it stops: no limit
   return bytes;
 }
 

@@ -102,18 +102,11 @@ DmdRunner::ask (Job job)
 }
 
 bool
-DmdRunner::settled () const
-{
-  const std::lock_guard guard (lock_);
-  return run_ == Run::on && idle ();
-}
-
-bool
 DmdRunner::settle ()
 {
   std::unique_lock guard (lock_);
   changed_.wait (guard, [this] { return wait_is_over (); });
-  return run_ == Run::on && idle () && !interrupted_;
+  return is_settled () && !interrupted_;
 }
 
 bool
@@ -121,21 +114,7 @@ DmdRunner::settle_within (std::chrono::milliseconds time)
 {
   std::unique_lock guard (lock_);
   changed_.wait_for (guard, time, [this] { return wait_is_over (); });
-  return run_ == Run::on && idle () && !interrupted_;
-}
-
-bool
-DmdRunner::failed () const
-{
-  const std::lock_guard guard (lock_);
-  return run_ == Run::failed;
-}
-
-bool
-DmdRunner::halted () const
-{
-  const std::lock_guard guard (lock_);
-  return run_ == Run::none;
+  return is_settled () && !interrupted_;
 }
 
 void

@@ -58,15 +58,27 @@ public:
   void restore (const Schedule &schedule, const SlotPlan &plan);
 
   /** Whether there is a run and all its jobs are done. */
-  bool settled () const;
+  bool settled () const
+  {
+    const std::lock_guard guard (lock_);
+    return is_settled ();
+  }
   /** Waits for that. False if the run ended, or interrupt () ended the wait. */
   bool settle ();
   /** The same, but no longer than @p time. */
   bool settle_within (std::chrono::milliseconds time);
   /** Whether a job failed in the last run. */
-  bool failed () const;
+  bool failed () const
+  {
+    const std::lock_guard guard (lock_);
+    return run_ == Run::failed;
+  }
   /** Whether there is no run, before upload () or after halt (). */
-  bool halted () const;
+  bool halted () const
+  {
+    const std::lock_guard guard (lock_);
+    return run_ == Run::none;
+  }
   /** While on, settle () does not wait. */
   void interrupt (bool on);
 
@@ -84,6 +96,7 @@ private:
   void park (std::unique_lock<std::mutex> &guard);
   void do_next (std::unique_lock<std::mutex> &guard);
   bool idle () const { return jobs_.empty () && !working_ && !parking_; }
+  bool is_settled () const { return run_ == Run::on && idle (); }
   bool wait_is_over () const
   {
     return idle () || interrupted_ || run_ != Run::on;

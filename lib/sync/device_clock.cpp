@@ -30,7 +30,7 @@ constexpr double kKnown = 25e3;
 
 /* If the step is not one of a camera, only the order is kept. */
 Nanoseconds
-least_step (Nanoseconds device_step)
+min_step (Nanoseconds device_step)
 {
   return device_step > 0 && device_step <= kClockWentBack ? device_step / 2 : 1;
 }
@@ -70,19 +70,19 @@ DeviceClock::begin (Nanoseconds device, Nanoseconds arrival)
 }
 
 Nanoseconds
-DeviceClock::told (Nanoseconds device) const
+DeviceClock::pipeline_time (Nanoseconds device) const
 {
   const Nanoseconds since = device - origin_device_;
   return origin_arrival_ + since + std::llround (line_.at (double (since)));
 }
 
 bool
-DeviceClock::is_anew (Nanoseconds device, Nanoseconds arrival) const
+DeviceClock::is_restart (Nanoseconds device, Nanoseconds arrival) const
 {
   const Nanoseconds early =
       edge_.points ().size () < kSettled ? kEarly : kEarlySettled;
   return device < last_->device - kClockWentBack ||
-         arrival < told (device) - early;
+         arrival < pipeline_time (device) - early;
 }
 
 void
@@ -107,27 +107,28 @@ DeviceClock::learn (LowerEdge::Point point)
 Nanoseconds
 DeviceClock::take (Nanoseconds device, Nanoseconds arrival)
 {
-  const bool anew = last_ && is_anew (device, arrival);
-  restarts_ += anew;
-  if (anew)
+  const bool restarted = last_ && is_restart (device, arrival);
+  restarts_ += restarted;
+  if (restarted)
     remember_drift ();
-  if (!last_ || anew)
+  if (!last_ || restarted)
     begin (device, arrival);
-  const bool late = last_ && !anew && device <= last_->device;
+  const bool late = last_ && !restarted && device <= last_->device;
   if (!late)
     learn ({double (device - origin_device_),
         double ((arrival - origin_arrival_) - (device - origin_device_))});
-  const Nanoseconds likeliest = told (device);
-  lateness_ = std::max<Nanoseconds> (0, arrival - likeliest);
-  Nanoseconds time = likeliest;
+  const Nanoseconds estimate = pipeline_time (device);
+  lateness_ = std::max<Nanoseconds> (0, arrival - estimate);
+  Nanoseconds time = estimate;
   if (!late) {
     if (last_)
-      time = std::max (time, last_->told + least_step (device - last_->device));
+      time = std::max (
+          time, last_->pipeline_time + min_step (device - last_->device));
     last_ = Mark{device, time};
   }
   uncertainty_.reset ();
   if (deviation_)
-    uncertainty_ = time - likeliest + std::llround (2 * *deviation_);
+    uncertainty_ = time - estimate + std::llround (2 * *deviation_);
   return time;
 }
 

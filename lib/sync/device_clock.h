@@ -61,13 +61,13 @@ public:
 private:
   void begin (Nanoseconds device, Nanoseconds arrival);
   void remember_drift ();
-  bool is_anew (Nanoseconds device, Nanoseconds arrival) const;
+  bool is_restart (Nanoseconds device, Nanoseconds arrival) const;
   void learn (LowerEdge::Point point);
-  Nanoseconds told (Nanoseconds device) const;
+  Nanoseconds pipeline_time (Nanoseconds device) const;
 
   struct Mark {
     Nanoseconds device;
-    Nanoseconds told;
+    Nanoseconds pipeline_time;
   };
 
   std::optional<Mark> last_; // none: no frame yet

@@ -139,14 +139,14 @@ LowerEdge::density (const Line &highest) const
 
 /* The last slope from @p from towards @p to whose line is as high. */
 double
-LowerEdge::last_slope (double from, double to, double least_height) const
+LowerEdge::last_slope (double from, double to, double min_height) const
 {
   constexpr int kHalvings = 40;
-  if (height_below (to) >= least_height)
+  if (height_below (to) >= min_height)
     return to;
   for (int k = 0; k < kHalvings; k++) {
     const double half = (from + to) / 2;
-    (height_below (half) >= least_height ? from : to) = half;
+    (height_below (half) >= min_height ? from : to) = half;
   }
   return from;
 }
@@ -162,9 +162,9 @@ LowerEdge::estimate () const
   if (!density)
     return {top, {}};
 
-  const double least = highest - kNegligible / *density;
-  const double first = last_slope (best, range.from, least);
-  const double step = (last_slope (best, range.to, least) - first) / kSlopes;
+  const double lowest = highest - kNegligible / *density;
+  const double first = last_slope (best, range.from, lowest);
+  const double step = (last_slope (best, range.to, lowest) - first) / kSlopes;
   const double arm = points_.back ().x - middle ();
   double weights = 0, slopes = 0, heights = 0, ends = 0, squares = 0;
   for (int k = 0; k < kSlopes; k++) {

@@ -82,7 +82,7 @@ private:
   double highest_slope (Range range) const;
   Range slopes () const;
   std::optional<double> density (const Line &highest) const;
-  double last_slope (double from, double to, double least_height) const;
+  double last_slope (double from, double to, double min_height) const;
 
   double steepest_;
   std::optional<Range> expected_;

@@ -23,11 +23,11 @@ measure (std::vector<Nanoseconds> steps)
   auto usual = double (*middle);
   double periods = 0;
   double span = 0;
-  for (const double most : {1.0, 1e9}) {
+  for (const double max_count : {1.0, 1e9}) {
     periods = span = 0;
     for (const Nanoseconds step : steps) {
       const double count = std::max (1.0, std::round (double (step) / usual));
-      if (count > most)
+      if (count > max_count)
         continue;
       periods += count;
       span += double (step);
@@ -55,10 +55,10 @@ RateWatch::take (Nanoseconds time)
     return std::nullopt;
 
   const double rate = measure (std::exchange (steps_, {}));
-  const double said = double (said_.num) / said_.den;
-  if (!differ (rate, told_ > 0 ? told_ : said))
+  const double announced = double (announced_.num) / announced_.den;
+  if (!differ (rate, reported_ > 0 ? reported_ : announced))
     return std::nullopt;
-  told_ = rate;
+  reported_ = rate;
   return rate;
 }
 

@@ -22,7 +22,7 @@ public:
    * clock, and than the effect of a jitter of a quarter period. */
   static constexpr double kTolerance = 0.01;
 
-  explicit RateWatch (FrameRate said) : said_ (said) {}
+  explicit RateWatch (FrameRate announced) : announced_ (announced) {}
 
   /** The measured rate, if it differs from the announced one and from the last
    * one returned. @p time of the frame, ascending; any epoch. */
@@ -31,10 +31,10 @@ public:
   void resync () { last_.reset (); }
 
 private:
-  FrameRate said_;
+  FrameRate announced_;
   std::optional<Nanoseconds> last_;
   std::vector<Nanoseconds> steps_;
-  double told_ = 0; // 0: the announced one
+  double reported_ = 0; // 0: the announced one
 };
 
 } // namespace codedexposure

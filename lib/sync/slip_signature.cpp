@@ -21,7 +21,7 @@ constexpr int kMaxSlip = 3;
 constexpr int kMaxElements = 64;
 /* Relative change of levels by the scene from frame to frame, and its max
  * effect on the slots in a code whose slips are distinct. */
-constexpr double kSceneUnrest = 0.003;
+constexpr double kSceneChange = 0.003;
 constexpr double kDistinct = 0.1;
 
 /* Levels below this, in digital numbers, are dark current and rounding. */
@@ -31,8 +31,8 @@ constexpr double kDark = 2.0;
 constexpr double kMatch = 0.25;
 constexpr double kSteady = 0.4;
 /* If slots deviate this much without a slip, they cannot show one. */
-constexpr double kRestless = 0.15;
-constexpr double kFirstUnrest = 0.05;
+constexpr double kMaxDeviation = 0.15;
+constexpr double kFirstDeviation = 0.05;
 /* Between two frames the light changes by less than this factor. */
 constexpr double kLightChange = 1.5;
 
@@ -107,21 +107,21 @@ levels_from_slots (const Schedule &schedule, double blur)
 
 /** Max deviation from one slot. */
 double
-unrest_of (std::span<const double> slots)
+deviation_of (std::span<const double> slots)
 {
-  double unrest = 0;
-  for (const double stood : slots)
-    unrest = std::max (unrest, std::abs (stood - 1.0));
-  return unrest;
+  double deviation = 0;
+  for (const double shown : slots)
+    deviation = std::max (deviation, std::abs (shown - 1.0));
+  return deviation;
 }
 
 /** Whether light that is switched on or off once has the same effect. */
 bool
-is_step (const std::vector<int> &stood)
+is_step (const std::vector<int> &shown)
 {
   int edges = 0;
-  for (std::size_t s = 1; s < stood.size (); s++)
-    edges += stood[s] != stood[s - 1];
+  for (std::size_t s = 1; s < shown.size (); s++)
+    edges += shown[s] != shown[s - 1];
   return edges <= 1;
 }
 
@@ -151,7 +151,7 @@ SlipSignature::SlipSignature (const Schedule &schedule)
     double squares = 0;
     for (std::size_t e = 0; e < std::size_t (n); e++)
       squares += std::pow (sharp.slots[s * std::size_t (n) + e] * usual_[e], 2);
-    worst = std::max (worst, kSceneUnrest * std::sqrt (squares));
+    worst = std::max (worst, kSceneChange * std::sqrt (squares));
   }
   distinct_ = n > 2 && worst <= kDistinct;
 }
@@ -164,26 +164,26 @@ SlipSignature::add_lens (const Schedule &schedule, double blur)
   std::optional<Matrix> slots = inverted (levels, n);
   if (slots)
     lenses_.push_back ({product (levels, Vector (n, 1.0)), *std::move (slots),
-        {}, kFirstUnrest, true});
+        {}, kFirstDeviation, true});
 }
 
 /** The masks come @p late slots late from slot @p from on. */
 void
 SlipSignature::add_slip (int slots, int from, int late)
 {
-  std::vector<int> stood (std::size_t (slots), 0);
+  std::vector<int> shown (std::size_t (slots), 0);
   for (int s = 0; s < slots; s++)
-    stood[std::size_t (s < from ? s : floor_mod (s - late, slots))]++;
-  if (is_step (stood))
+    shown[std::size_t (s < from ? s : floor_mod (s - late, slots))]++;
+  if (is_step (shown))
     return;
 
   const auto same = std::find_if (slips_.begin (), slips_.end (),
-      [&] (const Slip &slip) { return slip.stood == stood; });
+      [&] (const Slip &slip) { return slip.shown == shown; });
   if (same == slips_.end ()) {
-    slips_.push_back ({stood, late, true});
+    slips_.push_back ({shown, late, true});
   } else if (std::abs (late) < std::abs (same->slots)) {
     /* A slip by few slots is likelier than one by many, */
-    *same = {stood, late, true};
+    *same = {shown, late, true};
   } else if (late == -same->slots) {
     /* and a missed trigger is likelier than a spurious one. */
     same->slots = std::abs (late);
@@ -193,7 +193,7 @@ SlipSignature::add_slip (int slots, int from, int late)
 
 /** Slots for which each mask was shown, by the lens @p lens. */
 SlipSignature::Vector
-SlipSignature::slots_stood (
+SlipSignature::slots_shown (
     std::span<const double> levels, const Lens &lens) const
 {
   const Vector usual = product (lens.slots, usual_);
@@ -219,7 +219,7 @@ SlipSignature::read (std::span<const double> levels)
   if (is_parked (levels))
     return {Kind::parked};
   for (Lens &lens : lenses_)
-    lens.stood = slots_stood (levels, lens);
+    lens.shown = slots_shown (levels, lens);
   const PhaseReading slip = read_slip (light);
   if (slip.kind == Kind::slipped)
     return slip;
@@ -236,20 +236,20 @@ SlipSignature::read_slip (double light) const
     return {};
 
   PhaseReading reading;
-  double least = kMatch;
+  double min = kMatch;
   for (const Lens &lens : lenses_) {
-    if (!lens.likely || lens.unrest > kRestless)
+    if (!lens.likely || lens.deviation > kMaxDeviation)
       continue;
-    const Vector &stood = lens.stood;
-    if (unrest_of (stood) < 1 - kMatch)
+    const Vector &shown = lens.shown;
+    if (deviation_of (shown) < 1 - kMatch)
       continue;
     for (const Slip &slip : slips_) {
       double off = 0;
-      for (std::size_t s = 0; s < stood.size () && off < least; s++)
-        off = std::max (off, std::abs (stood[s] - slip.stood[s]));
-      if (off < least) {
+      for (std::size_t s = 0; s < shown.size () && off < min; s++)
+        off = std::max (off, std::abs (shown[s] - slip.shown[s]));
+      if (off < min) {
         reading = {Kind::slipped, slip.slots, slip.certain};
-        least = off;
+        min = off;
       }
     }
   }
@@ -281,14 +281,15 @@ SlipSignature::is_steady () const
 {
   const auto sharpest = std::find_if (lenses_.begin (), lenses_.end (),
       [] (const Lens &lens) { return lens.likely; });
-  return unrest_of (sharpest->stood) < kSteady;
+  return deviation_of (sharpest->shown) < kSteady;
 }
 
 void
 SlipSignature::learn (std::span<const double> levels, double light, bool steady)
 {
   for (Lens &lens : lenses_)
-    lens.unrest += kSteadyRate * (unrest_of (lens.stood) - lens.unrest);
+    lens.deviation +=
+        kSteadyRate * (deviation_of (lens.shown) - lens.deviation);
 
   const double rate = learned_ < kFirstFrames ? 1.0 / (learned_ + 1)
                       : steady                ? kSteadyRate
@@ -306,11 +307,11 @@ SlipSignature::learn (std::span<const double> levels, double light, bool steady)
 void
 SlipSignature::judge_lenses ()
 {
-  double least = 1.0;
+  double min = 1.0;
   for (const Lens &lens : lenses_)
-    least = std::min (least, unexplained (usual_, lens.code));
+    min = std::min (min, unexplained (usual_, lens.code));
   for (Lens &lens : lenses_)
-    lens.likely = unexplained (usual_, lens.code) <= least + kLikely;
+    lens.likely = unexplained (usual_, lens.code) <= min + kLikely;
 }
 
 } // namespace codedexposure

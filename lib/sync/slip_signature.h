@@ -43,21 +43,21 @@ private:
   using Vector = std::vector<double>; // a value for each element, or each slot
 
   struct Lens {
-    Vector code;   // levels of the code, in light of 1 a slot
-    Matrix slots;  // from the levels of the elements to the light of the slots
-    Vector stood;  // slots for which each mask was shown, by this lens
-    double unrest; // of these in frames without a slip
-    bool likely;   // it explains the usual levels
+    Vector code;  // levels of the code, in light of 1 a slot
+    Matrix slots; // from the levels of the elements to the light of the slots
+    Vector shown; // slots for which each mask was shown, by this lens
+    double deviation; // of these in frames without a slip
+    bool likely;      // it explains the usual levels
   };
   struct Slip {
-    std::vector<int> stood; // slots for which each mask was shown
+    std::vector<int> shown; // slots for which each mask was shown
     int slots;
     bool certain;
   };
 
   void add_lens (const Schedule &schedule, double blur);
   void add_slip (int slots, int from, int late);
-  Vector slots_stood (std::span<const double> levels, const Lens &lens) const;
+  Vector slots_shown (std::span<const double> levels, const Lens &lens) const;
   PhaseReading read_slip (double light) const;
   bool is_parked (std::span<const double> levels) const;
   void guess_usual (std::span<const double> levels);

@@ -166,8 +166,9 @@ TEST (DeviceClock, AFirstFrameThatWasHeldUpIsForgotten)
     const Nanoseconds time =
         clock.take (path.stamp (k), std::max (begin, path.truth (k)));
     EXPECT_GT (time, before) << "times never run back";
-    if (const auto uncertainty = clock.uncertainty ())
+    if (const auto uncertainty = clock.uncertainty ()) {
       EXPECT_LE (std::abs (time - path.truth (k)), *uncertainty) << k;
+    }
     before = time;
   }
   EXPECT_EQ (before, path.truth (59));

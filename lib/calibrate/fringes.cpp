@@ -7,20 +7,6 @@
 namespace codedexposure
 {
 
-namespace
-{
-
-Image<float>
-copy_of (ImageView<const float> view)
-{
-  Image<float> image (view.width, view.height);
-  for (int y = 0; y < view.height; y++)
-    std::copy_n (view.row (y), view.width, image.view ().row (y));
-  return image;
-}
-
-} // namespace
-
 float
 Fringes::full_amplitude () const
 {
@@ -37,13 +23,6 @@ Fringes::grey (int x, int y, float full) const
   const float contrast =
       full > 0.0f ? std::min (1.0f, amplitude.at (x, y) / full) : 0.0f;
   return std::uint8_t (127.5f * contrast * (1.0f + std::cos (phase.at (x, y))));
-}
-
-FringePair
-fringes_of (const LiveMoire &live, const std::string &caption)
-{
-  return {{copy_of (live.phase (false)), copy_of (live.amplitude (false))},
-      {copy_of (live.phase (true)), copy_of (live.amplitude (true))}, caption};
 }
 
 } // namespace codedexposure

@@ -6,14 +6,13 @@
 #include <string>
 
 #include "base/image.h"
-#include "calibrate/live_moire.h"
 
 namespace codedexposure
 {
 
-/** Moiré fringes by block, as LiveMoire gives them. */
+/** Moiré fringes, one value for each block of pixels. */
 struct Fringes {
-  Image<float> phase;     ///< radians
+  Image<float> phase;     ///< radians, -pi..pi
   Image<float> amplitude; ///< any unit
 
   /** Amplitude at which fringes are drawn with full contrast. */
@@ -26,10 +25,7 @@ struct Fringes {
 /** Fringes in both directions at one time. */
 struct FringePair {
   Fringes x, y;
-  std::string caption;
+  std::string caption = {};
 };
-
-/** Those of the frame that @p live solved last. */
-FringePair fringes_of (const LiveMoire &live, const std::string &caption);
 
 } // namespace codedexposure

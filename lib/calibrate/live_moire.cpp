@@ -92,7 +92,7 @@ struct Phasors {
   int columns = 0, rows = 0;
   double first_x = 0, first_y = 0; // centre of the first one, pixels
   std::vector<Phasor> at;
-  Image<float> phase, amplitude;
+  Fringes fringes;
   float reference = 0.0f; // amplitude of blocks that show the grating
   double power = 0.0;
 
@@ -101,7 +101,7 @@ struct Phasors {
     columns = width;
     rows = height;
     at.resize (std::size_t (width) * std::size_t (height));
-    phase = amplitude = Image<float> (width, height);
+    fringes.phase = fringes.amplitude = Image<float> (width, height);
   }
   const Phasor *row (int r) const
   {
@@ -336,8 +336,8 @@ LiveMoire::State::find_grating (Phasors &phasors, const char *name)
       const float norm = std::norm (z);
       const float size = std::sqrt (norm);
       phasors.power += double (norm);
-      phasors.phase.at (c, r) = std::atan2 (z.imag (), z.real ());
-      phasors.amplitude.at (c, r) = to_amplitude * size;
+      phasors.fringes.phase.at (c, r) = std::atan2 (z.imag (), z.real ());
+      phasors.fringes.amplitude.at (c, r) = to_amplitude * size;
       sorted.push_back (size);
     }
   const auto high = sorted.begin () + std::ptrdiff_t (sorted.size () * 9 / 10);
@@ -552,16 +552,10 @@ LiveMoire::solve (ImageView<const std::uint16_t> frame)
   return state_->solve (frame);
 }
 
-ImageView<const float>
-LiveMoire::phase (bool y) const
+FringePair
+LiveMoire::fringes () const
 {
-  return std::as_const (y ? state_->y : state_->x).phase.view ();
-}
-
-ImageView<const float>
-LiveMoire::amplitude (bool y) const
-{
-  return std::as_const (y ? state_->y : state_->x).amplitude.view ();
+  return {state_->x.fringes, state_->y.fringes};
 }
 
 } // namespace codedexposure

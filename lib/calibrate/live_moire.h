@@ -7,6 +7,7 @@
 
 #include "base/image.h"
 #include "base/result.h"
+#include "calibrate/fringes.h"
 #include "mapping/mapping.h"
 
 namespace codedexposure
@@ -59,10 +60,8 @@ public:
   Result<LiveReading> solve (ImageView<const std::uint8_t> frame);
   Result<LiveReading> solve (ImageView<const std::uint16_t> frame);
 
-  /** Of the last frame, for each block of T x T pixels: phase of the moiré
-   * fringes in x or y in radians, -pi..pi, and their amplitude in DN. */
-  ImageView<const float> phase (bool y) const;
-  ImageView<const float> amplitude (bool y) const;
+  /** Of the last frame; a block has T x T pixels, amplitudes are in DN. */
+  FringePair fringes () const;
 
 private:
   struct State;

@@ -66,9 +66,11 @@ CalibrationSession::align (
   }
   const StageCorrection correction = correct_stage (reading->mapping, stage);
   aligned_ = correction.state == CalibrationStage::aligned ? aligned_ + 1 : 0;
-  last_ = fringes_of (*live_, "after");
+  last_ = live_->fringes ();
   if (!first_)
-    first_ = fringes_of (*live_, "before");
+    first_ = last_;
+  first_->caption = "before";
+  last_->caption = "after";
   return std::optional (Alignment{*std::move (reading), correction});
 }
 

@@ -102,10 +102,10 @@ TEST (LiveMoire, FringesVanishWhereAllIsAligned)
   const auto frame = bench.frame (live_grating (), 0);
   const auto reading = live->solve (frame.view ());
   ASSERT_TRUE (reading.ok ()) << reading.error ().message;
-  const auto phase = live->phase (false);
+  const Image<float> phase = live->fringes ().x.phase;
   /* Within the third harmonic's alias, 0.05 mirrors of 4. */
-  for (int y = 2; y < phase.height - 2; y++)
-    for (int x = 2; x < phase.width - 2; x++)
+  for (int y = 2; y < phase.height () - 2; y++)
+    for (int x = 2; x < phase.width () - 2; x++)
       ASSERT_NEAR (phase.at (x, y), 2 * M_PI * (0.7 - 0.5) / 4, 0.15);
 }
 

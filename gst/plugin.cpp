@@ -3,18 +3,9 @@
 #include <gst/gst.h>
 
 #include "bench/simulated_dmd.h"
-#include "camera/camerasrc.h"
+#include "common/elements.h"
 #include "common/meta.h"
-#include "demux/demux.h"
-#include "dmdsync/dmdsync.h"
-#include "fuse/fuse.h"
-#include "log/log.h"
-#include "moirecalib/moirecalib.h"
-#include "scene/scene.h"
-#include "sim/sim.h"
 #include "stats/report.h"
-#include "stats/subframestats.h"
-#include "view/view.h"
 
 static gboolean
 plugin_init (GstPlugin *plugin)

@@ -48,6 +48,7 @@
 #include "camerasrc.h"
 
 #include "common/element.h"
+#include "common/elements.h"
 #include "common/properties.h"
 
 GST_DEBUG_CATEGORY (camerasrc_debug);
@@ -74,78 +75,58 @@ G_DEFINE_ENUM_TYPE (GstCodedExposureCameraTrigger,
     gst_coded_exposure_camera_trigger,
     {int (Trigger::none), "As the camera is set up; it runs freely", "none"},
     {int (Trigger::dmd), "The DMD triggers the camera", "dmd"},
-    {int (Trigger::camera), "The camera triggers the DMD", "camera"})
+    {int (Trigger::camera), "The camera triggers the DMD", "camera"});
 
 G_DEFINE_ENUM_TYPE (GstCodedExposureTriggerEdge,
     gst_coded_exposure_trigger_edge,
     {int (Edge::rising), "Rising edge; output high in the exposure", "rising"},
     {int (Edge::falling), "Falling edge; output low in the exposure",
-        "falling"})
-
-template <typename Member>
-Property<CameraState>
-own (GParamSpec *spec, Member Settings::*place)
-{
-  return setting (spec, &CameraState::settings, place);
-}
-
-Property<CameraState>
-text (const char *name, const char *nick, const char *blurb,
-    std::string Settings::*place)
-{
-  return own (
-      g_param_spec_string (name, nick, blurb, "", kReadWriteReady), place);
-}
+        "falling"});
 
 const PropertyTable<CameraState> &
 properties ()
 {
+  static const auto set = [] (auto member) {
+    return within (&CameraState::settings, member);
+  };
   static const PropertyTable<CameraState> table = {
-      text ("camera-name", "Camera name",
+      {"camera-name", "Camera name",
           "Camera as \"arv-tool-0.8\" or \"gst-device-monitor-1.0 "
           "Source/Video\" lists it, or its address; empty: the first one found",
-          &Settings::name),
-      text ("pixel-format", "Pixel format",
+          kReadWriteReady, set (&Settings::name)},
+      {"pixel-format", "Pixel format",
           "Mono8, Mono10, Mono12, Mono16, Mono10Packed, Mono12Packed, Mono10p "
           "or Mono12p; packed ones are unpacked, without a shift; empty: Mono8 "
           "or Mono16, as the caps downstream say",
-          &Settings::pixel_format),
-      own (g_param_spec_enum ("trigger", "Trigger", "Which device triggers",
-               gst_coded_exposure_camera_trigger_get_type (),
-               int (Trigger::none), kReadWriteReady),
-          &Settings::trigger),
-      text ("trigger-line", "Trigger line",
+          kReadWriteReady, set (&Settings::pixel_format)},
+      {"trigger", "Trigger", "Which device triggers", kReadWriteReady,
+          set (&Settings::trigger),
+          gst_coded_exposure_camera_trigger_get_type ()},
+      {"trigger-line", "Trigger line",
           "Line of the camera to or from the DMD; empty: Line0 with "
           "trigger=dmd, Line1 with trigger=camera",
-          &Settings::trigger_line),
-      own (g_param_spec_enum ("trigger-edge", "Trigger edge",
-               "Edge of the line at which an exposure starts",
-               gst_coded_exposure_trigger_edge_get_type (), int (Edge::rising),
-               kReadWriteReady),
-          &Settings::trigger_edge),
-      own (g_param_spec_double ("exposure-time", "Exposure time",
-               "Exposure time in µs; 0: as the camera is set up", 0, 1e8, 0,
-               kReadWriteReady),
-          &Settings::exposure_time),
-      text ("features", "Features",
+          kReadWriteReady, set (&Settings::trigger_line)},
+      {"trigger-edge", "Trigger edge",
+          "Edge of the line at which an exposure starts", kReadWriteReady,
+          set (&Settings::trigger_edge),
+          gst_coded_exposure_trigger_edge_get_type ()},
+      {"exposure-time", "Exposure time",
+          "Exposure time in µs; 0: as the camera is set up", kReadWriteReady,
+          set (&Settings::exposure_time), 0.0, 1e8},
+      {"features", "Features",
           "Assignments of other GenICam features, \"A=1 B=2\", made last",
-          &Settings::features),
-      own (g_param_spec_int ("num-buffers", "Number of buffers",
-               "Frames until EOS, those before and after a restart together; "
-               "-1: unlimited",
-               -1, G_MAXINT, -1, kReadWriteReady),
-          &Settings::num_buffers),
-      own (g_param_spec_uint ("reconnect", "Reconnect",
-               "Tries in a row, at least a second apart, to restart a camera "
-               "that failed after its first frame; 0: its error ends the "
-               "pipeline",
-               0, G_MAXUINT, 0, kReadWriteReady),
-          &Settings::reconnect),
-      reading<CameraState> (
-          g_param_spec_uint ("reconnects", "Reconnects",
-              "Times that the camera came back, in this run or the last one", 0,
-              G_MAXUINT, 0, kReadOnly),
-          &CameraState::reconnects),
+          kReadWriteReady, set (&Settings::features)},
+      {"num-buffers", "Number of buffers",
+          "Frames until EOS, those before and after a restart together; -1: "
+          "unlimited",
+          kReadWriteReady, set (&Settings::num_buffers), -1, G_MAXINT},
+      {"reconnect", "Reconnect",
+          "Tries in a row, at least a second apart, to restart a camera that "
+          "failed after its first frame; 0: its error ends the pipeline",
+          kReadWriteReady, set (&Settings::reconnect), 0u, G_MAXUINT},
+      {"reconnects", "Reconnects",
+          "Times that the camera came back, in this run or the last one",
+          kReadOnly, &CameraState::reconnects, 0u, G_MAXUINT},
   };
   return table;
 }
@@ -279,13 +260,10 @@ gst_coded_exposure_camera_src_class_init (GstCodedExposureCameraSrcClass *klass)
 
   G_OBJECT_CLASS (klass)->finalize = finalize;
   install_properties<&properties, &camera::state> (G_OBJECT_CLASS (klass));
-  for (const GType type : {gst_coded_exposure_camera_trigger_get_type (),
-           gst_coded_exposure_trigger_edge_get_type ()})
-    gst_type_mark_as_plugin_api (type, GstPluginAPIFlags (0));
-  describe_element (element_class, "GenICam camera", "Source/Video/Hardware",
+  describe_element (klass, "GenICam camera", "Source/Video/Hardware",
       "Frames of a GenICam camera: aravissrc with trigger set-up, unpacked "
       "pixels, memory of its own and reconnection",
-      false);
+      {"src"});
   element_class->change_state = GST_DEBUG_FUNCPTR (change_state);
   element_class->set_clock = GST_DEBUG_FUNCPTR (set_clock);
   GST_BIN_CLASS (klass)->handle_message = GST_DEBUG_FUNCPTR (handle_message);

@@ -21,10 +21,6 @@ G_BEGIN_DECLS
 G_DECLARE_FINAL_TYPE (GstCodedExposureCameraSrc, gst_coded_exposure_camera_src,
     GST, CODED_EXPOSURE_CAMERA_SRC, GstBin)
 
-GST_ELEMENT_REGISTER_DECLARE (codedexposure_camerasrc);
-/* It lists GenICam cameras. */
-GST_DEVICE_PROVIDER_REGISTER_DECLARE (codedexposure_cameraprovider);
-
 G_END_DECLS
 
 GST_DEBUG_CATEGORY_EXTERN (camerasrc_debug);

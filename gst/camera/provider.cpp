@@ -4,6 +4,7 @@
 
 #include "camerasrc.h"
 #include "common/caps.h"
+#include "common/elements.h"
 #include "common/raii.h"
 
 using namespace codedexposure::gst;

@@ -297,7 +297,7 @@ intersect_caps (GstCaps *preferred, GstCaps *other)
 }
 
 CapsPtr
-admit_unknown_rate (RateOverride rate, CapsPtr caps)
+admit_unknown_rate (FrameRate rate, CapsPtr caps)
 {
   if (rate.num == 0 || gst_caps_is_any (caps.get ()))
     return caps;
@@ -310,7 +310,7 @@ admit_unknown_rate (RateOverride rate, CapsPtr caps)
 }
 
 CapsPtr
-fill_in_rate (RateOverride rate, GstCaps *caps)
+fill_in_rate (FrameRate rate, GstCaps *caps)
 {
   CapsPtr filled (gst_caps_copy (caps));
   for (guint i = 0; i < gst_caps_get_size (filled.get ()); i++) {

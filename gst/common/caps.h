@@ -50,14 +50,9 @@ CapsPtr unbind_size (GstCaps *caps);
 /** In the order of @p preferred. */
 CapsPtr intersect_caps (GstCaps *preferred, GstCaps *other);
 
-/** The frame rate that the user gives to coded frames whose caps have none;
- * 0/1: none. */
-struct RateOverride {
-  int num = 0, den = 1;
-};
-/** @p caps, and with @p rate also those without a rate. */
-CapsPtr admit_unknown_rate (RateOverride rate, CapsPtr caps);
-/** @p caps, with @p rate where they have none. */
-CapsPtr fill_in_rate (RateOverride rate, GstCaps *caps);
+/** @p caps, and unless @p rate is 0/1 also those without a rate. */
+CapsPtr admit_unknown_rate (FrameRate rate, CapsPtr caps);
+/** @p caps, with @p rate where they have none, unless it is 0/1. */
+CapsPtr fill_in_rate (FrameRate rate, GstCaps *caps);
 
 } // namespace codedexposure::gst

@@ -17,6 +17,8 @@
 #include "mapping/stream_setup.h"
 #include "messages.h"
 #include "meta.h"
+#include "named.h"
+#include "properties.h"
 #include "raii.h"
 #include "rectify/rectifier.h"
 #include "schedule/schedule.h"
@@ -39,19 +41,12 @@ namespace codedexposure::gst
 
 using ScheduleRef = std::shared_ptr<const Schedule>;
 
-/** A property that names a file or a preset, and what was read from it. */
-template <typename T>
-struct Named {
-  std::string text;
-  std::shared_ptr<const Result<T>> read; ///< null where the text is empty
-};
-
 /** What the user says of coded frames. */
 struct CodedSettings {
   Named<Schedule> schedule;
   Named<Mapping> mapping;
-  int bits = 0; ///< significant ones; 0: as the frames say
-  RateOverride rate;
+  int bits = 0;         ///< significant ones; 0: as the frames say
+  FrameRate rate{0, 1}; ///< where caps have none; 0/1: none
 };
 
 struct CodedCounters {
@@ -66,9 +61,9 @@ struct CodedCounters {
 
 /** Names in the stats of an element. */
 struct StatsNames {
-  const char *structure;
-  const char *out;     ///< for pictures_out
-  const char *dropped; ///< for pictures_dropped; null: none ever is
+  const char *structure = nullptr;
+  const char *out = nullptr;     ///< for pictures_out
+  const char *dropped = nullptr; ///< for pictures_dropped; null: none ever is
 };
 
 /** What plans are made of: the caps, the schedule and the mapping together. */
@@ -140,16 +135,10 @@ public:
   gboolean src_event (GstCodedPad *pad, GstEvent *event);
   gboolean sink_query (GstQuery *query);
   gboolean src_query (GstCodedPad *pad, GstQuery *query);
-  bool before_state_change (GstStateChange transition);
-  void after_state_change (GstStateChange transition);
-  void set_property (guint id, const GValue *value, GParamSpec *pspec);
-  void get_property (guint id, GValue *value, GParamSpec *pspec) const;
-  /** Properties that a subclass installed; false where there is no such one.
-   * Object lock. */
-  virtual bool set_own (guint id, const GValue *value) = 0;
-  virtual bool get_own (guint id, GValue *value) const = 0;
-  void set_own_property (guint id, const GValue *value, GParamSpec *pspec);
-  void get_own_property (guint id, GValue *value, GParamSpec *pspec) const;
+
+  static void set_up_class (gpointer klass);
+  /** After a property of @p object was set. Object lock. */
+  static void settings_changed (GObject *object, const GParamSpec *);
 
 protected:
   /* What a subclass does. Unless said otherwise, on the streaming thread. */
@@ -195,7 +184,7 @@ protected:
   /** What answers about caps depend on, at one moment. */
   struct CapsContext {
     ScheduleRef schedule; ///< null: any may come
-    RateOverride rate;
+    FrameRate rate;
     bool mapped; ///< frames and pictures can be of any size
   };
   /** @p caps of @p pad as those of coded frames, or the other way. Any thread.
@@ -216,7 +205,6 @@ protected:
   bool backwards () const { return stream_.segment.rate < 0; }
   /** The property wins over the frames; 0: all bits of the format. */
   int significant_bits () const;
-  ScheduleRef schedule_in_force () const { return in_force_; }
   void post_error (const std::string &why) const;
   /** Posts that a frame could not be decoded. Returns GST_FLOW_ERROR. */
   GstFlowReturn post_decode_error (const Error &error) const;
@@ -245,7 +233,20 @@ protected:
   GstFlowReturn acquire_picture (GstCodedPad *pad, const GstVideoInfo &info,
       BufferPtr &buffer, MappedFrame &mapped) const;
 
-  CodedCounters counters_; ///< object lock
+  /** What other threads set and read. */
+  struct Shared {
+    StatsNames names;
+    CodedSettings settings;
+    bool settings_changed = true;
+    CodedCounters counters;
+    ScheduleRef schedule;     ///< in force; null before the first frame
+    bool assumed = false;     ///< nobody said which schedule it is
+    bool rectifies = false;   ///< a mapping is in force
+    GstClockTime latency = 0; ///< that frames which are held add
+
+    StructurePtr stats () const;
+  };
+  Shared shared_; ///< object lock
 
 private:
   /** Saturated frames that follow each other. */
@@ -290,7 +291,11 @@ private:
     Image<std::uint16_t> wide;
   };
 
+  static const PropertyTable<Shared> &properties ();
+  static Shared &shared_of (GObject *object);
   bool read_settings ();
+  bool before_state_change (GstStateChange transition);
+  void after_state_change (GstStateChange transition);
   /** Source pads get their caps and what waited for them; posts an error and
    * returns other than OK where there can be no plan.
    * @p next  the frame that comes next, where there is one. */
@@ -324,7 +329,6 @@ private:
   gboolean on_flush_stop (EventPtr event);
   void break_time ();
 
-  GstStructure *stats () const;
   CapsContext caps_context () const;
   CapsPtr sink_caps () const;
   CapsPtr src_caps (GstCodedPad *pad) const;
@@ -334,23 +338,9 @@ private:
 
   GstElement *element_;
   GstPad *sinkpad_;
-  const StatsNames names_;
   Stream stream_;
-
-  /* Object lock. */
-  CodedSettings settings_;
-  bool settings_changed_ = true;
-  ScheduleRef in_force_;   ///< null before the first frame
-  bool assumed_ = false;   ///< in_force_ came from nowhere
-  bool rectifies_ = false; ///< a mapping is in force
-
-protected:
-  GstClockTime latency_ = 0; ///< that frames which are held add; object lock
 };
 
-/** For the class of an element with properties of its own: those reach
- * set_own () and get_own (). */
-void use_own_properties (GObjectClass *klass);
 /** Gives @p element its C++ part; once, when the instance is made. */
 void adopt_filter (
     GstCodedFilter *element, std::unique_ptr<CodedFilter> filter);

@@ -246,11 +246,12 @@ CodedFilter::CapsContext
 CodedFilter::caps_context () const
 {
   const ObjectLock lock (element_);
-  const auto &asked = settings_.schedule.read;
-  ScheduleRef schedule = assumed_ ? nullptr : in_force_;
+  const auto &asked = shared_.settings.schedule.read;
+  ScheduleRef schedule = shared_.assumed ? nullptr : shared_.schedule;
   if (asked && *asked)
     schedule = {asked, &asked->value ()};
-  return {schedule, settings_.rate, settings_.mapping.read || rectifies_};
+  return {schedule, shared_.settings.rate,
+      shared_.settings.mapping.read || shared_.rectifies};
 }
 
 CapsPtr
@@ -323,9 +324,9 @@ CodedFilter::add_latency (GstQuery *query) const
   gst_query_parse_latency (query, &live, &min, &max);
   {
     const ObjectLock lock (element_);
-    min += latency_;
+    min += shared_.latency;
     if (GST_CLOCK_TIME_IS_VALID (max))
-      max += latency_;
+      max += shared_.latency;
   }
   gst_query_set_latency (query, live, min, max);
 }
@@ -347,7 +348,7 @@ CodedFilter::scale_frames (GstCodedPad *pad, GstQuery *query) const
     return;
   {
     const ObjectLock lock (element_);
-    frames *= in_force_ ? pictures_a_frame (pad) : 1;
+    frames *= shared_.schedule ? pictures_a_frame (pad) : 1;
   }
   if (duration)
     gst_query_set_duration (query, format, frames);

@@ -50,8 +50,8 @@ CodedFilter::negotiate (GstBuffer *next)
     stream_.stale = true;
   {
     const ObjectLock lock (element_);
-    if (std::exchange (settings_changed_, false)) {
-      stream_.settings = settings_;
+    if (std::exchange (shared_.settings_changed, false)) {
+      stream_.settings = shared_.settings;
       take_settings ();
       stream_.stale = true;
     }
@@ -231,10 +231,11 @@ CodedFilter::adopt (CodedFormat format)
   bool schedule_changed;
   {
     const ObjectLock lock (element_);
-    schedule_changed = !in_force_ || !(*in_force_ == adopted.schedule);
-    in_force_ = std::make_shared<const Schedule> (adopted.schedule);
-    assumed_ = adopted.assumed;
-    rectifies_ = adopted.rectifier != nullptr;
+    schedule_changed =
+        !shared_.schedule || !(*shared_.schedule == adopted.schedule);
+    shared_.schedule = std::make_shared<const Schedule> (adopted.schedule);
+    shared_.assumed = adopted.assumed;
+    shared_.rectifies = adopted.rectifier != nullptr;
   }
   each_pad ([this] (GstCodedPad *pad) {
     pad->coded.allocation.reset ();
@@ -269,7 +270,7 @@ CodedFilter::report_mirrors ()
       report.exact, report.weighted, report.mixed, report.unseen};
   {
     const ObjectLock lock (element_);
-    counters_.mirrors = mirrors;
+    shared_.counters.mirrors = mirrors;
   }
   if (!rectifier)
     return;

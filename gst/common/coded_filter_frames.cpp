@@ -109,7 +109,7 @@ void
 CodedFilter::count (guint64 CodedCounters::*counter, guint64 by)
 {
   const ObjectLock lock (element_);
-  counters_.*counter += by;
+  shared_.counters.*counter += by;
 }
 
 /* Numbers the frame by its time; counts and reports what is lost or corrupted.

@@ -1,33 +1,49 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "element.h"
 
-#include "caps.h"
-
 namespace codedexposure::gst
 {
 
-namespace
+bool
+may_set (gpointer element, const GParamSpec *pspec)
 {
-
-void
-add_pad (GstElementClass *klass, const char *name, GstPadDirection direction)
-{
-  const CapsPtr caps (gst_caps_from_string (CODED_EXPOSURE_VIDEO_CAPS));
-  gst_element_class_add_pad_template (klass,
-      gst_pad_template_new (name, direction, GST_PAD_ALWAYS, caps.get ()));
+  GstState highest = GST_STATE_NULL;
+  if (pspec->flags & GST_PARAM_MUTABLE_PLAYING)
+    highest = GST_STATE_PLAYING;
+  else if (pspec->flags & GST_PARAM_MUTABLE_PAUSED)
+    highest = GST_STATE_PAUSED;
+  else if (pspec->flags & GST_PARAM_MUTABLE_READY)
+    highest = GST_STATE_READY;
+  if (GST_STATE (element) <= highest)
+    return true;
+  GST_WARNING_OBJECT (element,
+      "%s cannot change above the %s state; it stays as it is", pspec->name,
+      gst_element_state_get_name (highest));
+  return false;
 }
 
-} // namespace
+void
+add_pad_template (gpointer klass, const char *name, const PadOptions &options)
+{
+  const CapsPtr caps (gst_caps_from_string (options.caps));
+  const auto direction =
+      g_str_equal (name, "sink") ? GST_PAD_SINK : GST_PAD_SRC;
+  gst_element_class_add_pad_template (GST_ELEMENT_CLASS (klass),
+      options.type == G_TYPE_NONE
+          ? gst_pad_template_new (
+                name, direction, options.presence, caps.get ())
+          : gst_pad_template_new_with_gtype (
+                name, direction, options.presence, caps.get (), options.type));
+}
 
 void
-describe_element (GstElementClass *klass, const char *name, const char *kind,
-    const char *description, bool has_sink)
+describe_element (gpointer klass, const char *name, const char *kind,
+    const char *description, std::initializer_list<const char *> pads)
 {
-  gst_element_class_set_static_metadata (
-      klass, name, kind, description, "The gst-codedexposure authors");
-  if (has_sink)
-    add_pad (klass, "sink", GST_PAD_SINK);
-  add_pad (klass, "src", GST_PAD_SRC);
+  gst_element_class_set_static_metadata (GST_ELEMENT_CLASS (klass), name, kind,
+      description, "The gst-codedexposure authors");
+  for (const char *pad : pads)
+    add_pad_template (klass, pad);
 }
 
 GstBaseTransformClass *

@@ -2,18 +2,59 @@
 /* What elements of several kinds do in the same way. */
 #pragma once
 
+#include <initializer_list>
 #include <string>
 
 #include <gst/base/gstbasetransform.h>
 #include <gst/gst.h>
 
+#include "caps.h"
+#include "properties.h"
+
 namespace codedexposure::gst
 {
 
-/** What gst-inspect-1.0 tells of an element, and its pads, which are always
- * there and take coded frames: "sink", if @p has_sink, and "src". */
-void describe_element (GstElementClass *klass, const char *name,
-    const char *kind, const char *description, bool has_sink = true);
+/** What is special about the pads of a template. */
+struct PadOptions {
+  GstPadPresence presence = GST_PAD_ALWAYS;
+  GType type = G_TYPE_NONE; ///< none: any pad
+  const char *caps = CODED_EXPOSURE_VIDEO_CAPS;
+};
+/** Adds a pad template to @p klass; "sink" is the name of a sink pad, all
+ * others are of source pads. */
+void add_pad_template (
+    gpointer klass, const char *name, const PadOptions &options = {});
+
+/** What gst-inspect-1.0 tells of an element, and its @p pads that are always
+ * there and take or give coded frames. */
+void describe_element (gpointer klass, const char *name, const char *kind,
+    const char *description,
+    std::initializer_list<const char *> pads = {"sink", "src"});
+
+/** The C++ state of an element whose struct has a pointer `state` to it. */
+template <typename Element>
+auto &
+state_in (gpointer element)
+{
+  return *static_cast<Element *> (element)->state;
+}
+
+/**
+ * Gives the class of a final type, whose instances make their `state` when they
+ * are made, the properties of @p Table, and deletes the state in the end.
+ */
+template <typename Element, auto Table>
+void
+install_state (gpointer klass)
+{
+  auto *object_class = G_OBJECT_CLASS (klass);
+  install_properties<Table, state_in<Element>> (object_class);
+  object_class->finalize = [] (GObject *object) noexcept {
+    delete &state_in<Element> (object);
+    G_OBJECT_CLASS (g_type_class_peek_parent (G_OBJECT_GET_CLASS (object)))
+        ->finalize (object);
+  };
+}
 
 /** What GstBaseTransform does by itself. */
 GstBaseTransformClass *base_transform_class ();

@@ -15,12 +15,7 @@ struct PatternRequest {
   static constexpr GstEventType kType = GST_EVENT_CUSTOM_UPSTREAM;
   std::optional<std::string> pattern; ///< none or empty: the schedule's masks
   std::optional<guint64> frames;      ///< for how many; none: dmdsync's default
-
-  static auto fields ()
-  {
-    return std::tuple (field ("pattern", &PatternRequest::pattern),
-        field ("frames", &PatternRequest::frames));
-  }
+  CODED_FIELDS (pattern, frames);
 };
 
 /** Query: which mirrors dmdsync controls, and whether it can show patterns. */
@@ -29,14 +24,7 @@ struct MirrorsAnswer {
   gint width = 0, height = 0; ///< of the mirror array; 0: no device
   bool patterns = false;      ///< PatternRequest is served
   std::string reason = {};    ///< why not
-
-  static auto fields ()
-  {
-    return std::tuple (field ("width", &MirrorsAnswer::width),
-        field ("height", &MirrorsAnswer::height),
-        field ("patterns", &MirrorsAnswer::patterns),
-        field ("reason", &MirrorsAnswer::reason));
-  }
+  CODED_FIELDS (width, height, patterns, reason);
 };
 
 } // namespace codedexposure::gst

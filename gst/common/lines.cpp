@@ -2,6 +2,7 @@
 #include "lines.h"
 
 #include <cerrno>
+#include <string_view>
 #include <utility>
 
 #include <fcntl.h>
@@ -15,17 +16,14 @@ namespace
 
 /** Writes all of @p text; 0, or the errno of the failure. */
 int
-write_all (int file, const std::string &text)
+write_all (int file, std::string_view text)
 {
-  std::size_t written = 0;
-  while (written < text.size ()) {
+  while (!text.empty ()) {
     const ssize_t n =
-        ::write (file, text.data () + written, text.size () - written);
-    if (n < 0 && errno == EINTR)
-      continue;
+        TEMP_FAILURE_RETRY (::write (file, text.data (), text.size ()));
     if (n < 0)
       return errno;
-    written += std::size_t (n);
+    text.remove_prefix (std::size_t (n));
   }
   return 0;
 }
@@ -33,8 +31,9 @@ write_all (int file, const std::string &text)
 } // namespace
 
 bool
-LineFile::open (const std::string &location)
+LineFile::open (gpointer element, const std::string &location)
 {
+  element_ = GST_ELEMENT (element);
   location_ = location;
   file_ = ::open (
       location.c_str (), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);

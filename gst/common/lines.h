@@ -12,25 +12,25 @@ namespace codedexposure::gst
 
 /**
  * Every line is handed to the system at once: a crash costs one line at most.
- * What fails is an error on the bus of the element that owns the file.
+ * What fails is an error on the bus of the element.
  */
 class LineFile
 {
 public:
-  explicit LineFile (gpointer element) : element_ (GST_ELEMENT (element)) {}
+  LineFile () = default;
   ~LineFile () { close (); }
   LineFile (const LineFile &) = delete;
   LineFile &operator= (const LineFile &) = delete;
 
-  /** Begins the file anew, also where it exists. */
-  bool open (const std::string &location);
+  /** Begins the file of @p element anew, also where it exists. */
+  bool open (gpointer element, const std::string &location);
   bool is_open () const { return file_ >= 0; }
   /** @p line without its end. */
   bool write (const std::string &line);
   void close ();
 
 private:
-  GstElement *element_;
+  GstElement *element_ = nullptr;
   std::string location_;
   int file_ = -1;
 };

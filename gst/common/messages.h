@@ -15,12 +15,7 @@ struct FramesLost {
   guint64 count = 0;
   GstClockTime from = 0; ///< when the first of them was due
   GstClockTime to = 0;   ///< of the frame that came instead
-
-  static auto fields ()
-  {
-    return std::tuple (field ("count", &FramesLost::count),
-        field ("from", &FramesLost::from), field ("to", &FramesLost::to));
-  }
+  CODED_FIELDS (count, from, to);
 };
 
 /** A sequence of saturated frames begins or ends. */
@@ -33,14 +28,7 @@ struct Saturated {
   std::optional<GstClockTime> to; ///< at the end
   /** Saturated pixels of the first frame; at the end, of the worst. */
   guint64 pixels = 0;
-
-  static auto fields ()
-  {
-    return std::tuple (field ("active", &Saturated::active),
-        field ("frame", &Saturated::frame),
-        field ("frames", &Saturated::frames), field ("from", &Saturated::from),
-        field ("to", &Saturated::to), field ("pixels", &Saturated::pixels));
-  }
+  CODED_FIELDS (active, frame, frames, from, to, pixels);
 };
 
 /** How well the camera sees the mirrors, in numbers of mirrors. */
@@ -50,14 +38,7 @@ struct MirrorsSeen {
   guint64 weighted = 0; ///< estimated from pixels that see neighbours, too
   guint64 mixed = 0;    ///< of these, no pixel gets half of its light from it
   guint64 unseen = 0;   ///< no pixel sees the mirror; black
-
-  static auto fields ()
-  {
-    return std::tuple (field ("exact", &MirrorsSeen::exact),
-        field ("weighted", &MirrorsSeen::weighted),
-        field ("mixed", &MirrorsSeen::mixed),
-        field ("unseen", &MirrorsSeen::unseen));
-  }
+  CODED_FIELDS (exact, weighted, mixed, unseen);
 };
 
 /** What moirecalib advises, and how sure it is. */
@@ -71,58 +52,30 @@ struct StageMove {
   gdouble magnify = 0;                ///< thousandths
   gdouble sigma_x = 0, sigma_y = 0, sigma_rotation = 0;
   gdouble sigma_magnification = 0; ///< standard deviations
-
-  static auto fields ()
-  {
-    return std::tuple (field ("offset-x", &StageMove::offset_x),
-        field ("offset-y", &StageMove::offset_y),
-        field ("rotation", &StageMove::rotation),
-        field ("magnification", &StageMove::magnification),
-        field ("deviation", &StageMove::deviation),
-        field ("stage-x", &StageMove::stage_x),
-        field ("stage-y", &StageMove::stage_y),
-        field ("stage-theta", &StageMove::stage_theta),
-        field ("magnify", &StageMove::magnify),
-        field ("sigma-x", &StageMove::sigma_x),
-        field ("sigma-y", &StageMove::sigma_y),
-        field ("sigma-rotation", &StageMove::sigma_rotation),
-        field ("sigma-magnification", &StageMove::sigma_magnification));
-  }
+  CODED_FIELDS (offset_x, offset_y, rotation, magnification, deviation, stage_x,
+      stage_y, stage_theta, magnify, sigma_x, sigma_y, sigma_rotation,
+      sigma_magnification);
 };
 
 /** moirecalib has come to another stage. */
 struct MoireState {
   static constexpr const char *kName = "moirecalib/state";
   std::string state, before;
-
-  static auto fields ()
-  {
-    return std::tuple (field ("state", &MoireState::state),
-        field ("before", &MoireState::before));
-  }
+  CODED_FIELDS (state, before);
 };
 
 /** A frame of the live grating was read. */
-struct MoireReading : StageMove {
+struct MoireReading {
   static constexpr const char *kName = "moirecalib/reading";
+  StageMove move;
   guint64 frame = 0;
   GstClockTime pts = 0;
   std::string state;
   gdouble contrast_x = 0, contrast_y = 0; ///< 1: as sharp as can be
   gdouble coverage = 0; ///< part of the frame that shows the grating
   guint64 saturated = 0;
-
-  static auto fields ()
-  {
-    return std::tuple_cat (std::tuple (field ("frame", &MoireReading::frame),
-                               field ("pts", &MoireReading::pts),
-                               field ("state", &MoireReading::state),
-                               field ("contrast-x", &MoireReading::contrast_x),
-                               field ("contrast-y", &MoireReading::contrast_y),
-                               field ("coverage", &MoireReading::coverage),
-                               field ("saturated", &MoireReading::saturated)),
-        StageMove::fields ());
-  }
+  CODED_FIELDS (
+      frame, pts, state, contrast_x, contrast_y, coverage, saturated, move);
 };
 
 /** The phase of the tile was found. */
@@ -134,22 +87,13 @@ struct MoirePhase {
   gdouble confidence = 0;
   gdouble contrast = 0;
   std::string schedule; ///< with this phase
-
-  static auto fields ()
-  {
-    return std::tuple (field ("frame", &MoirePhase::frame),
-        field ("pts", &MoirePhase::pts),
-        field ("phase-x", &MoirePhase::phase_x),
-        field ("phase-y", &MoirePhase::phase_y),
-        field ("confidence", &MoirePhase::confidence),
-        field ("contrast", &MoirePhase::contrast),
-        field ("schedule", &MoirePhase::schedule));
-  }
+  CODED_FIELDS (frame, pts, phase_x, phase_y, confidence, contrast, schedule);
 };
 
 /** The mapping was found. */
-struct MoireMapping : StageMove {
+struct MoireMapping {
   static constexpr const char *kName = "moirecalib/mapping";
+  StageMove move;
   std::string mapping;          ///< JSON
   std::string location, report; ///< files that were written; empty: none
   gdouble shift_x = 0, shift_y = 0, stretch = 0;
@@ -157,25 +101,8 @@ struct MoireMapping : StageMove {
   gdouble misfit = 0;
   guint64 good = 0, uncovered = 0, low_contrast = 0, saturated = 0;
   guint64 outlier = 0; ///< numbers of pixels
-
-  static auto fields ()
-  {
-    return std::tuple_cat (
-        std::tuple (field ("mapping", &MoireMapping::mapping),
-            field ("location", &MoireMapping::location),
-            field ("report", &MoireMapping::report),
-            field ("shift-x", &MoireMapping::shift_x),
-            field ("shift-y", &MoireMapping::shift_y),
-            field ("stretch", &MoireMapping::stretch),
-            field ("psf-sigma", &MoireMapping::psf_sigma),
-            field ("misfit", &MoireMapping::misfit),
-            field ("good", &MoireMapping::good),
-            field ("uncovered", &MoireMapping::uncovered),
-            field ("low-contrast", &MoireMapping::low_contrast),
-            field ("saturated", &MoireMapping::saturated),
-            field ("outlier", &MoireMapping::outlier)),
-        StageMove::fields ());
-  }
+  CODED_FIELDS (mapping, location, report, shift_x, shift_y, stretch, psf_sigma,
+      misfit, good, uncovered, low_contrast, saturated, outlier, move);
 };
 
 } // namespace codedexposure::gst

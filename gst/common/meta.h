@@ -46,18 +46,8 @@ struct FrameMeta {
   gint bits = 0;
 
   /** Those that are always there: all but the pattern. */
-  static auto fields ()
-  {
-    return std::tuple (field ("frame", &FrameMeta::frame),
-        field ("subframe", &FrameMeta::subframe),
-        field ("exposure-start", &FrameMeta::exposure_start),
-        field ("exposure-duration", &FrameMeta::exposure_duration),
-        field ("locked", &FrameMeta::locked), field ("slip", &FrameMeta::slip),
-        field ("lost-before", &FrameMeta::lost_before),
-        field ("saturated", &FrameMeta::saturated),
-        field ("bits", &FrameMeta::bits),
-        field ("time-uncertainty", &FrameMeta::time_uncertainty));
-  }
+  CODED_FIELDS (frame, subframe, exposure_start, exposure_duration, locked,
+      slip, lost_before, saturated, bits, time_uncertainty);
 };
 
 /** FrameMeta::bits of a picture of @p info with @p bits significant bits. */

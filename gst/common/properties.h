@@ -5,11 +5,12 @@
 
 #include <functional>
 #include <initializer_list>
+#include <type_traits>
 #include <vector>
 
 #include <gst/gst.h>
 
-#include "structure.h"
+#include "wire.h"
 
 namespace codedexposure::gst
 {
@@ -28,75 +29,84 @@ inline constexpr auto kReadWrite =
 
 /** Whether @p pspec, by its flags, may be set in the state that @p element is
  * in; a warning in the log where not. Object lock. */
-inline bool
-may_set (gpointer element, const GParamSpec *pspec)
+bool may_set (gpointer element, const GParamSpec *pspec);
+
+/** Access to a member of a member: within (&Settings::noise,
+ * &SensorNoise::full_well). */
+constexpr auto
+within (auto... members)
 {
-  GstState highest = GST_STATE_NULL;
-  if (pspec->flags & GST_PARAM_MUTABLE_PLAYING)
-    highest = GST_STATE_PLAYING;
-  else if (pspec->flags & GST_PARAM_MUTABLE_PAUSED)
-    highest = GST_STATE_PAUSED;
-  else if (pspec->flags & GST_PARAM_MUTABLE_READY)
-    highest = GST_STATE_READY;
-  if (GST_STATE (element) <= highest)
-    return true;
-  GST_WARNING_OBJECT (element,
-      "%s cannot change above the %s state; it stays as it is", pspec->name,
-      gst_element_state_get_name (highest));
-  return false;
+  return [=](auto &state) -> auto &
+  {
+    return (state.*....*members);
+  };
 }
 
-/** A property of an element whose values are in an @p Owner. */
-template <typename Owner>
-struct Property {
-  GParamSpec *spec;
-  std::function<void (Owner &, const GValue *)> set; ///< none: read-only
-  std::function<void (const Owner &, GValue *)> get;
+/**
+ * A property of an element that keeps its values in a @p State.
+ *
+ *     {"bits", "Bits", "Significant bits of a pixel", kReadWrite,
+ *         &Settings::bits, 0, 16}
+ *
+ * Access is a member, within (), or a function of a State; one that returns a
+ * value, not a reference, makes a property that cannot be set. Limits follow
+ * for numbers (smallest and largest, whose type is that of the property) and
+ * enums (the GType). The default is the value in State ().
+ */
+template <typename State>
+class Property
+{
+public:
+  template <typename Access, typename... Limits>
+  Property (const char *name, const char *nick, const char *blurb,
+      GParamFlags flags, Access access, Limits... limits)
+  {
+    using Kept = std::invoke_result_t<Access, State &>;
+    using T = std::remove_cvref_t<Kept>;
+    using Value = typename ValueOf<T, Limits...>::Type;
+    Value standard{};
+    if constexpr (std::is_reference_v<Kept>) {
+      State fresh = State ();
+      standard = Value (std::invoke (access, fresh));
+      read_ = [access] (const GValue *value) -> Assignment {
+        return [access, read = T (Wire<Value>::get (value))] (
+                   State &state) { std::invoke (access, state) = read; };
+      };
+    }
+    get_ = [access] (const State &state, GValue *value) {
+      Wire<Value>::set (value, Value (std::invoke (access, state)));
+    };
+    spec_ = Wire<Value>::spec (name, nick, blurb, limits..., standard, flags);
+  }
+
+  GParamSpec *spec () const { return spec_; }
+  void get (const State &state, GValue *value) const { get_ (state, value); }
+  /** Gives a State the value that was read. */
+  using Assignment = std::function<void (State &)>;
+  /** Reads @p value, and the file that it names where it does. */
+  Assignment read (const GValue *value) const { return read_ (value); }
+
+private:
+  template <typename T, typename...>
+  struct ValueOf {
+    using Type = T;
+  };
+  template <typename T, typename Low, typename High>
+  struct ValueOf<T, Low, High> {
+    using Type = Low;
+  };
+
+  GParamSpec *spec_;
+  std::function<void (const State &, GValue *)> get_;
+  std::function<Assignment (const GValue *)> read_;
 };
 
-/** owner.*first.*second... */
-template <typename Owner, typename... Path>
-auto &
-follow (Owner &owner, Path... path)
-{
-  return (owner.*....*path);
-}
-
-/** A property that is kept at the end of a path of members that begins in an
- * @p Owner. */
-template <typename Owner, typename First, typename... Path>
-Property<Owner>
-setting (GParamSpec *spec, First Owner::*first, Path... path)
-{
-  using T = std::remove_reference_t<decltype (follow (
-      std::declval<Owner &> (), first, path...))>;
-  return {spec,
-      [=] (Owner &owner, const GValue *value) {
-        follow (owner, first, path...) = Wire<T>::get (value);
-      },
-      [=] (const Owner &owner, GValue *value) {
-        Wire<T>::set (value, follow (owner, first, path...));
-      }};
-}
-
-/** A read-only property; @p read is a member of @p Owner, or a function that
- * takes one. */
-template <typename Owner, typename Read>
-Property<Owner>
-reading (GParamSpec *spec, Read read)
-{
-  using T = std::remove_cvref_t<std::invoke_result_t<Read, const Owner &>>;
-  return {spec, {}, [read] (const Owner &owner, GValue *value) {
-            Wire<T>::set (value, std::invoke (read, owner));
-          }};
-}
-
 /** All properties of a class, in the order of their ids, which begin at 1. */
-template <typename Owner>
+template <typename State>
 class PropertyTable
 {
 public:
-  PropertyTable (std::initializer_list<Property<Owner>> properties)
+  PropertyTable (std::initializer_list<Property<State>> properties)
       : properties_ (properties)
   {
   }
@@ -105,42 +115,42 @@ public:
   void install (GObjectClass *klass) const
   {
     guint id = 1;
-    for (const Property<Owner> &property : properties_)
-      g_object_class_install_property (klass, id++, property.spec);
+    for (const Property<State> &property : properties_)
+      g_object_class_install_property (klass, id++, property.spec ());
   }
-  void set (Owner &owner, guint id, const GValue *value) const
+  const Property<State> &operator[] (guint id) const
   {
-    properties_[id - 1].set (owner, value);
-  }
-  void get (const Owner &owner, guint id, GValue *value) const
-  {
-    properties_[id - 1].get (owner, value);
+    return properties_[id - 1];
   }
 
 private:
-  std::vector<Property<Owner>> properties_;
+  std::vector<Property<State>> properties_;
 };
 
 /**
  * Installs the properties of @p Table (), whose values are in
- * @p OwnerOf (object). They are set and read under the object lock, and set
- * only where may_set () allows it; an element that does more replaces
- * klass->set_property.
+ * @p StateOf (object). They are set and read under the object lock, and set
+ * only where may_set () allows it; then @p Changed (object, pspec) is called,
+ * under the lock. A file that a value names is read before.
  */
-template <auto Table, auto OwnerOf>
+template <auto Table, auto StateOf,
+    auto Changed = [] (GObject *, const GParamSpec *) {}>
 void
 install_properties (GObjectClass *klass)
 {
   klass->set_property = [] (GObject *object, guint id, const GValue *value,
-                            GParamSpec *pspec) {
+                            GParamSpec *pspec) noexcept {
+    const auto assign = Table ()[id].read (value);
     const ObjectLock lock (object);
-    if (may_set (object, pspec))
-      Table ().set (OwnerOf (object), id, value);
+    if (!may_set (object, pspec))
+      return;
+    assign (StateOf (object));
+    Changed (object, pspec);
   };
   klass->get_property = [] (GObject *object, guint id, GValue *value,
-                            GParamSpec *) {
+                            GParamSpec *) noexcept {
     const ObjectLock lock (object);
-    Table ().get (OwnerOf (object), id, value);
+    Table ()[id].get (StateOf (object), value);
   };
   Table ().install (klass);
 }

@@ -26,11 +26,16 @@ using CapsPtr = std::unique_ptr<GstCaps, MiniObjectUnref>;
 using EventPtr = std::unique_ptr<GstEvent, MiniObjectUnref>;
 using QueryPtr = std::unique_ptr<GstQuery, MiniObjectUnref>;
 
-struct ObjectUnref {
-  void operator() (gpointer object) const { gst_object_unref (object); }
+template <auto Free>
+struct FreeWith {
+  void operator() (auto *object) const { Free (object); }
 };
+using ObjectUnref = FreeWith<gst_object_unref>;
 template <typename T>
 using ObjectPtr = std::unique_ptr<T, ObjectUnref>;
+using StructurePtr =
+    std::unique_ptr<GstStructure, FreeWith<gst_structure_free>>;
+using CharPtr = std::unique_ptr<gchar, FreeWith<g_free>>;
 
 /** Stops a pool before it gives it up. */
 struct PoolRelease {
@@ -41,19 +46,6 @@ struct PoolRelease {
   }
 };
 using PoolPtr = std::unique_ptr<GstBufferPool, PoolRelease>;
-
-struct StructureFree {
-  void operator() (GstStructure *structure) const
-  {
-    gst_structure_free (structure);
-  }
-};
-using StructurePtr = std::unique_ptr<GstStructure, StructureFree>;
-
-struct GFree {
-  void operator() (gpointer memory) const { g_free (memory); }
-};
-using CharPtr = std::unique_ptr<gchar, GFree>;
 
 /** Holds the object lock for a scope. Never push, query or block inside. */
 class ObjectLock

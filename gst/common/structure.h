@@ -1,159 +1,77 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* C++ structs as GstStructures: the one way in which messages, events, queries
- * and statistics are built and parsed. */
+/* C++ structs as GstStructures: the one way in which messages, events, queries,
+ * metas and statistics are built and parsed. */
 #pragma once
 
 #include <optional>
-#include <string>
 #include <tuple>
+#include <vector>
 
 #include <gst/gst.h>
 
-#include "raii.h"
-#include "schedule/timing.h"
+#include "wire.h"
 
 namespace codedexposure::gst
 {
 
 /**
- * One field of a structure: its name on the wire and the member that holds it.
- *
- * A struct that travels has its name and its fields beside its members:
+ * Declares which members of a struct travel, in their order. The name of a
+ * field is that of its member with hyphens for underscores:
  *
  *     struct FrameLate {
  *       static constexpr const char *kName = "dmdsync/frame-late";
- *       guint64 frame = 0;
+ *       guint64 lost_before = 0; // "lost-before"
  *       GstClockTime pts = 0;
- *       static auto fields ()
- *       {
- *         return std::tuple (field ("frame", &FrameLate::frame),
- *             field ("pts", &FrameLate::pts));
- *       }
+ *       CODED_FIELDS (lost_before, pts);
  *     };
  *
- * Types of members: guint64, gint, guint, bool, gdouble, std::string and
- * FrameRate, and std::optional of one of them for a field that may be absent.
+ * A member of a member has its own name only: `stats.mean` is "mean". Types are
+ * those of Wire, std::optional of them for a field that may be absent, and
+ * structs with fields, which become fields of the whole.
  */
-template <typename Struct, typename Member>
-struct Field {
-  const char *name;
-  Member Struct::*member;
-};
+#define CODED_FIELDS(...)                                                      \
+  static constexpr const char *kFields = #__VA_ARGS__;                         \
+  auto members ()                                                              \
+  {                                                                            \
+    return std::tie (__VA_ARGS__);                                             \
+  }                                                                            \
+  auto members () const                                                        \
+  {                                                                            \
+    return std::tie (__VA_ARGS__);                                             \
+  }
 
-template <typename Struct, typename Member>
-constexpr Field<Struct, Member>
-field (const char *name, Member Struct::*member)
+/** The names of fields, from the text of their members. */
+std::vector<GQuark> field_names (const char *members);
+
+template <typename T>
+concept HasFields = requires
 {
-  return {name, member};
-}
-
-template <GType Type, auto Set, auto Get>
-struct PlainWire {
-  static GType type () { return Type; }
-  static constexpr auto set = Set;
-  static constexpr auto get = Get;
-};
-/** How a @p T travels in a GValue. */
-template <typename T>
-struct Wire;
-template <>
-struct Wire<guint64>
-    : PlainWire<G_TYPE_UINT64, g_value_set_uint64, g_value_get_uint64> {
-};
-template <>
-struct Wire<gint> : PlainWire<G_TYPE_INT, g_value_set_int, g_value_get_int> {
-};
-template <>
-struct Wire<guint>
-    : PlainWire<G_TYPE_UINT, g_value_set_uint, g_value_get_uint> {
-};
-template <>
-struct Wire<gint64>
-    : PlainWire<G_TYPE_INT64, g_value_set_int64, g_value_get_int64> {
-};
-template <>
-struct Wire<bool>
-    : PlainWire<G_TYPE_BOOLEAN, g_value_set_boolean, g_value_get_boolean> {
-};
-template <>
-struct Wire<gdouble>
-    : PlainWire<G_TYPE_DOUBLE, g_value_set_double, g_value_get_double> {
-};
-template <>
-struct Wire<std::string> {
-  static GType type () { return G_TYPE_STRING; }
-  static void set (GValue *value, const std::string &text)
-  {
-    g_value_set_string (value, text.c_str ());
-  }
-  static std::string get (const GValue *value)
-  {
-    return g_value_get_string (value) ?: "";
-  }
-};
-/** Of a registered type; in properties only. */
-template <typename T>
-requires std::is_enum_v<T>
-struct Wire<T> {
-  static void set (GValue *value, T choice)
-  {
-    g_value_set_enum (value, int (choice));
-  }
-  static T get (const GValue *value) { return T (g_value_get_enum (value)); }
-};
-/** What is set is given away; in properties only. */
-template <>
-struct Wire<GstStructure *> {
-  static void set (GValue *value, GstStructure *structure)
-  {
-    g_value_take_boxed (value, structure);
-  }
-};
-template <>
-struct Wire<FrameRate> {
-  static GType type () { return GST_TYPE_FRACTION; }
-  static void set (GValue *value, FrameRate rate)
-  {
-    gst_value_set_fraction (value, rate.num, rate.den);
-  }
-  static FrameRate get (const GValue *value)
-  {
-    return {gst_value_get_fraction_numerator (value),
-        gst_value_get_fraction_denominator (value)};
-  }
+  T::kFields;
 };
 
-template <typename T>
+/** Calls @p visit with the name and the member of each field of @p value. */
+template <typename Struct, typename Visit>
 void
-set_value (GValue *value, const T &member)
+each_field (Struct &value, Visit visit)
 {
-  Wire<T>::set (value, member);
-}
-
-/** False, with @p member as it was, where @p value is of another type. */
-template <typename T>
-bool
-get_value (const GValue *value, T &member)
-{
-  const bool fits = value && G_VALUE_HOLDS (value, Wire<T>::type ());
-  if (fits)
-    member = Wire<T>::get (value);
-  return fits;
+  static const auto names = field_names (Struct::kFields);
+  std::apply ([&, name = names.begin ()] (
+                  auto &...member) mutable { (visit (*name++, member), ...); },
+      value.members ());
 }
 
 template <typename T>
 void
-set_field (GstStructure *structure, const char *name, const T &member)
+set_field (GstStructure *structure, GQuark name, const T &member)
 {
   GValue value = G_VALUE_INIT;
   g_value_init (&value, Wire<T>::type ());
-  set_value (&value, member);
-  gst_structure_take_value (structure, name, &value);
+  Wire<T>::set (&value, member);
+  gst_structure_id_take_value (structure, name, &value);
 }
 template <typename T>
 void
-set_field (
-    GstStructure *structure, const char *name, const std::optional<T> &member)
+set_field (GstStructure *structure, GQuark name, const std::optional<T> &member)
 {
   if (member)
     set_field (structure, name, *member);
@@ -163,14 +81,17 @@ set_field (
  */
 template <typename T>
 bool
-get_field (const GstStructure *structure, const char *name, T &member)
+get_field (const GstStructure *structure, GQuark name, T &member)
 {
-  return get_value (gst_structure_get_value (structure, name), member);
+  const GValue *value = gst_structure_id_get_value (structure, name);
+  const bool fits = value && G_VALUE_HOLDS (value, Wire<T>::type ());
+  if (fits)
+    member = Wire<T>::get (value);
+  return fits;
 }
 template <typename T>
 bool
-get_field (
-    const GstStructure *structure, const char *name, std::optional<T> &member)
+get_field (const GstStructure *structure, GQuark name, std::optional<T> &member)
 {
   T read{};
   member.reset ();
@@ -184,11 +105,28 @@ template <typename T>
 void
 write_fields (GstStructure *structure, const T &value)
 {
-  std::apply (
-      [&] (const auto &...field) {
-        (set_field (structure, field.name, value.*field.member), ...);
-      },
-      T::fields ());
+  each_field (value, [=]<typename M> (GQuark name, const M &member) {
+    if constexpr (HasFields<M>)
+      write_fields (structure, member);
+    else
+      set_field (structure, name, member);
+  });
+}
+
+/** False where @p structure lacks a field that is not optional; members keep
+ * their value then. */
+template <typename T>
+bool
+read_fields (const GstStructure *structure, T &value)
+{
+  bool complete = true;
+  each_field (value, [&]<typename M> (GQuark name, M &member) {
+    if constexpr (HasFields<M>)
+      complete &= read_fields (structure, member);
+    else
+      complete &= get_field (structure, name, member);
+  });
+  return complete;
 }
 
 /** Transfer: full. */
@@ -210,12 +148,8 @@ from_structure (const GstStructure *structure)
   if (!structure || !gst_structure_has_name (structure, T::kName))
     return std::nullopt;
   T value;
-  const bool complete = std::apply (
-      [&] (const auto &...field) {
-        return (get_field (structure, field.name, value.*field.member) && ...);
-      },
-      T::fields ());
-  return complete ? std::optional (std::move (value)) : std::nullopt;
+  return read_fields (structure, value) ? std::optional (std::move (value))
+                                        : std::nullopt;
 }
 
 /** An element message of @p source; Transfer: full. */

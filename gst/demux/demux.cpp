@@ -35,8 +35,8 @@
  *
  * The schedule defines which pixel saw which part of the exposure. It is the
  * #GstCodedFilter:schedule property, else that of the stream's tag
- * `comment=coded-exposure={...}`, else sequential:2x2 with a warning on the bus.
- * Source pads get their caps with the first frame, because tags come after
+ * `comment=coded-exposure={...}`, else sequential:2x2 with a warning on the
+ * bus. Source pads get their caps with the first frame, because tags come after
  * caps. Width and height are divided by the cell of the
  * tile, pixel-aspect-ratio follows; columns and rows that fill no cell, and the
  * pilot's rows, are cropped.
@@ -52,9 +52,9 @@
  *
  * A mapping corrects a camera that is not exactly aligned with the mirrors. It
  * is that of the #GstCodedFilter:mapping property, else that of the stream's
- * tag. Frames are rectified to one pixel a mirror before they are split; regions
- * are places among the mirrors, wherever the camera sees them. The element
- * message `codedexposure/mapping` has how well it sees them.
+ * tag. Frames are rectified to one pixel a mirror before they are split;
+ * regions are places among the mirrors, wherever the camera sees them. The
+ * element message `codedexposure/mapping` has how well it sees them.
  *
  * ## Flags, metas and messages
  *
@@ -101,6 +101,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/element.h"
+#include "common/elements.h"
 #include "extract/saturation.h"
 
 GST_DEBUG_CATEGORY (codedexposure_demux_debug);
@@ -119,55 +121,12 @@ G_DEFINE_TYPE_WITH_CODE (GstCodedExposureDemux, gst_coded_exposure_demux,
     GST_DEBUG_CATEGORY_INIT (codedexposure_demux_debug, "codedexposure-demux",
         0, "coded frames to subframes"))
 GST_ELEMENT_REGISTER_DEFINE (codedexposure_demux, "codedexposure-demux",
-    GST_RANK_NONE, GST_TYPE_CODED_EXPOSURE_DEMUX)
-
-namespace
-{
-
-GstStaticPadTemplate subframe_template = GST_STATIC_PAD_TEMPLATE ("subframe_%u",
-    GST_PAD_SRC, GST_PAD_REQUEST, GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
-GstStaticPadTemplate region_template = GST_STATIC_PAD_TEMPLATE ("region_%u",
-    GST_PAD_SRC, GST_PAD_REQUEST, GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
-GstStaticPadTemplate coded_template = GST_STATIC_PAD_TEMPLATE ("coded",
-    GST_PAD_SRC, GST_PAD_REQUEST, GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
-
-Demux &
-self (gpointer element)
-{
-  return static_cast<Demux &> (filter_of (element));
-}
-
-GstPad *
-request_pad (GstElement *element, GstPadTemplate *templ, const gchar *name,
-    const GstCaps *) noexcept
-{
-  return self (element).request_pad (templ, name);
-}
-
-void
-release_pad (GstElement *element, GstPad *pad) noexcept
-{
-  self (element).release_pad (pad);
-}
-
-} // namespace
+    GST_RANK_NONE, gst_coded_exposure_demux_get_type ())
 
 static void
 gst_coded_exposure_demux_class_init (GstCodedExposureDemuxClass *klass)
 {
-  Demux::install_properties (G_OBJECT_CLASS (klass));
-  auto *element = GST_ELEMENT_CLASS (klass);
-  element->request_new_pad = GST_DEBUG_FUNCPTR (request_pad);
-  element->release_pad = GST_DEBUG_FUNCPTR (release_pad);
-  for (auto *pad_template :
-      {&subframe_template, &region_template, &coded_template})
-    gst_element_class_add_static_pad_template_with_gtype (
-        element, pad_template, GST_TYPE_CODED_PAD);
-  gst_element_class_set_static_metadata (element,
-      "Coded exposure demultiplexer", "Filter/Effect/Video",
-      "Splits the frames of a camera behind a micromirror device into "
-      "subframes at a multiple of the frame rate",
-      "The gst-codedexposure authors");
+  Demux::set_up_class (klass);
 }
 
 static void
@@ -178,6 +137,29 @@ gst_coded_exposure_demux_init (GstCodedExposureDemux *element)
 
 namespace codedexposure::gst::demux
 {
+
+void
+Demux::set_up_class (gpointer klass)
+{
+  install_properties<properties, settings_of, settings_changed> (
+      G_OBJECT_CLASS (klass));
+  describe_element (klass, "Coded exposure demultiplexer",
+      "Filter/Effect/Video",
+      "Splits the frames of a camera behind a micromirror device into "
+      "subframes at a multiple of the frame rate",
+      {});
+  for (const char *pad : {"subframe_%u", "region_%u", "coded"})
+    add_pad_template (
+        klass, pad, {.presence = GST_PAD_REQUEST, .type = GST_TYPE_CODED_PAD});
+  auto *element = GST_ELEMENT_CLASS (klass);
+  element->request_new_pad = [] (GstElement *self, GstPadTemplate *templ,
+                                 const gchar *name, const GstCaps *) noexcept {
+    return static_cast<Demux &> (filter_of (self)).request_pad (templ, name);
+  };
+  element->release_pad = [] (GstElement *self, GstPad *pad) noexcept {
+    static_cast<Demux &> (filter_of (self)).release_pad (pad);
+  };
+}
 
 /* One coded frame on its way through the element. */
 struct Demux::Job {
@@ -308,11 +290,11 @@ Demux::skip (GstCodedPad *pad, GstClockTime pts, GstClockTime duration)
       GST_OBJECT (element ()), is_live (), running, stream_time, pts, duration);
   {
     const ObjectLock lock (element ());
-    counters_.pictures_dropped++;
+    shared_.counters.pictures_dropped++;
     gst_message_set_qos_values (
         message, pad->coded.jitter, pad->coded.proportion, 1000000);
     gst_message_set_qos_stats (message, GST_FORMAT_BUFFERS,
-        counters_.pictures_out, counters_.pictures_dropped);
+        shared_.counters.pictures_out, shared_.counters.pictures_dropped);
   }
   gst_element_post_message (element (), message);
   pad->coded.discont = true;

@@ -16,21 +16,19 @@
 
 G_BEGIN_DECLS
 
-#define GST_TYPE_CODED_EXPOSURE_DEMUX (gst_coded_exposure_demux_get_type ())
 G_DECLARE_FINAL_TYPE (GstCodedExposureDemux, gst_coded_exposure_demux, GST,
     CODED_EXPOSURE_DEMUX, GstCodedFilter)
-
-GST_ELEMENT_REGISTER_DECLARE (codedexposure_demux);
 
 G_END_DECLS
 
 namespace codedexposure::gst::demux
 {
 
-/** What the user asked for. */
+/** What the user asked for, and what came of it. */
 struct Settings {
   ExtractOptions extract;
   bool qos = false;
+  Method method_in_force = Method::kAuto;
 };
 
 using PadRef = std::shared_ptr<GstCodedPad>;
@@ -72,13 +70,6 @@ struct Plan {
   const SplitPart &background () const { return parts.front (); }
 };
 
-struct CombinerFree {
-  void operator() (GstFlowCombiner *combiner) const
-  {
-    gst_flow_combiner_free (combiner);
-  }
-};
-
 class Demux final : public CodedFilter
 {
 public:
@@ -86,9 +77,7 @@ public:
 
   GstPad *request_pad (GstPadTemplate *templ, const gchar *name);
   void release_pad (GstPad *pad);
-  bool set_own (guint id, const GValue *value) override;
-  bool get_own (guint id, GValue *value) const override;
-  static void install_properties (GObjectClass *klass);
+  static void set_up_class (gpointer klass);
 
 private:
   struct Job;
@@ -102,6 +91,8 @@ private:
   void flushed () override;
   void take_settings () override { in_force_ = settings_; }
   void forget () override;
+  static const PropertyTable<Settings> &properties ();
+  static Settings &settings_of (GObject *object);
   void each_pad (const PadVisitor &visit) const override;
   CapsPtr caps_for (const GstCodedPad *pad) const override;
   CapsScale scale_for (
@@ -149,11 +140,10 @@ private:
   /** Replaced, never changed: the streaming thread works on one while the
    * application requests and releases pads. */
   std::shared_ptr<const PadList> pads_ = std::make_shared<PadList> ();
-  std::unique_ptr<GstFlowCombiner, CombinerFree> combiner_{
+  std::unique_ptr<GstFlowCombiner, FreeWith<gst_flow_combiner_free>> combiner_{
       gst_flow_combiner_new ()};
   PadCaps caps_;
-  Method method_ = Method::kAuto; ///< in force
-  bool ended_ = false;            ///< EOS was forwarded
+  bool ended_ = false; ///< EOS was forwarded
 
   /* Sink pad's stream lock. */
   Settings in_force_;

@@ -192,7 +192,7 @@ Demux::index_allowed (PadKind kind, int index) const
   ScheduleRef schedule;
   {
     const ObjectLock lock (element ());
-    schedule = schedule_in_force ();
+    schedule = shared_.schedule;
   }
   if (index >= 0 && index < numbered_pads (kind, schedule.get ()))
     return true;

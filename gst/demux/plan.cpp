@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* From the format and the settings to a plan, and to the caps of all pads. */
+/* The settings; from them and the format to a plan, and to the caps of all
+ * pads. */
 #include "demux.h"
 
 #include <utility>
@@ -9,6 +10,55 @@ GST_DEBUG_CATEGORY_EXTERN (codedexposure_demux_debug);
 
 namespace codedexposure::gst::demux
 {
+
+G_DEFINE_ENUM_TYPE (GstCodedExposureMethod, gst_coded_exposure_method,
+    {int (Method::kAuto),
+        "select for one-hot codes without leak, decode for other codes that "
+        "can be inverted, else rank",
+        "auto"},
+    {int (Method::kRank), "subframe k is the k-th smallest pixel of each group",
+        "rank"},
+    {int (Method::kSelect), "subframe k is the element that is on in slot k",
+        "select"},
+    {int (Method::kDecode), "solves the code for the light of each slot",
+        "decode"});
+
+const PropertyTable<Settings> &
+Demux::properties ()
+{
+  static const auto set = [] (auto member) {
+    return within (&Settings::extract, member);
+  };
+  static const GType method = gst_coded_exposure_method_get_type ();
+  static const PropertyTable<Settings> table{
+      {"method", "Method", "How subframes are found in a coded frame",
+          kReadWrite, set (&ExtractOptions::method), method},
+      {"gain", "Gain",
+          "Factor on the light of a slot (method decode); 0: automatic, white "
+          "in a slot is white out",
+          kReadWrite, set (&ExtractOptions::gain), 0.0,
+          ExtractOptions::kMaxGain},
+      {"interpolate", "Interpolate",
+          "Interpolate the elements to the centre of their cell before the "
+          "code is solved (method decode on raster tiles)",
+          kReadWrite, set (&ExtractOptions::interpolate)},
+      {"qos", "QoS",
+          "Leave out subframes that would reach their sink too late, and post "
+          "a QoS message for each; off: nothing is ever dropped",
+          kReadWrite, &Settings::qos},
+      {"method-in-force", "Method in force",
+          "The method that frames are split by; auto before the first frame; "
+          "notifies",
+          kReadOnly, &Settings::method_in_force, method},
+  };
+  return table;
+}
+
+Settings &
+Demux::settings_of (GObject *object)
+{
+  return static_cast<Demux &> (filter_of (object)).settings_;
+}
 
 namespace
 {
@@ -134,7 +184,8 @@ Demux::planned (bool schedule_changed)
   bool method_changed;
   {
     const ObjectLock lock (element ());
-    method_changed = std::exchange (method_, method) != method;
+    method_changed =
+        std::exchange (settings_.method_in_force, method) != method;
   }
   if (method_changed)
     notify ("method-in-force");
@@ -148,7 +199,7 @@ Demux::forget ()
   scratch_.clear ();
   const ObjectLock lock (element ());
   caps_ = PadCaps ();
-  method_ = Method::kAuto;
+  settings_.method_in_force = Method::kAuto;
   ended_ = false;
   gst_flow_combiner_reset (combiner_.get ());
 }
@@ -181,7 +232,7 @@ Demux::convert_caps (const CapsContext &context, const GstCodedPad *pad,
 int
 Demux::pictures_a_frame (const GstCodedPad *pad) const
 {
-  const ScheduleRef schedule = schedule_in_force ();
+  const ScheduleRef schedule = shared_.schedule;
   const auto &[kind, index] = std::tie (pad->coded.kind, pad->coded.index);
   if (kind == PadKind::all)
     return schedule->elements ();

@@ -103,6 +103,7 @@
 #include "dmdsync.h"
 
 #include "common/element.h"
+#include "common/elements.h"
 
 GST_DEBUG_CATEGORY (dmdsync_debug);
 #define GST_CAT_DEFAULT dmdsync_debug
@@ -219,7 +220,7 @@ gst_dmd_sync_class_init (GstDmdSyncClass *klass)
 
   G_OBJECT_CLASS (klass)->finalize = finalize;
   sync::install_own_properties (G_OBJECT_CLASS (klass));
-  describe_element (element_class, "DMD synchroniser", "Filter/Video",
+  describe_element (klass, "DMD synchroniser", "Filter/Video",
       "Drives the DMD of a coded exposure camera; times, counts and watches "
       "its frames");
   element_class->change_state = GST_DEBUG_FUNCPTR (change_state);

@@ -32,8 +32,6 @@ G_BEGIN_DECLS
 #define GST_TYPE_DMD_SYNC (gst_dmd_sync_get_type ())
 G_DECLARE_FINAL_TYPE (GstDmdSync, gst_dmd_sync, GST, DMD_SYNC, GstBaseTransform)
 
-GST_ELEMENT_REGISTER_DECLARE (dmdsync);
-
 G_END_DECLS
 
 GST_DEBUG_CATEGORY_EXTERN (dmdsync_debug);

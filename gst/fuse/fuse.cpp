@@ -31,9 +31,9 @@
  *
  * The schedule defines which pixel saw which part of the exposure. It is the
  * #GstCodedFilter:schedule property, else that of the stream's tag
- * `comment=coded-exposure={...}`, else sequential:2x2 with a warning on the bus.
- * The source pad gets its caps with the first frame, because tags come after
- * caps. The pilot's rows are cropped. Any code and any tile can be used;
+ * `comment=coded-exposure={...}`, else sequential:2x2 with a warning on the
+ * bus. The source pad gets its caps with the first frame, because tags come
+ * after caps. The pilot's rows are cropped. Any code and any tile can be used;
  * `sequential:lattice:4/2` and `sequential:lattice:8/3,order=bit-reversal` give
  * the most accurate pictures.
  *
@@ -86,6 +86,9 @@
 #include <cmath>
 #include <utility>
 
+#include "base/workers.h"
+#include "common/element.h"
+#include "common/elements.h"
 #include "extract/saturation.h"
 
 GST_DEBUG_CATEGORY_STATIC (codedexposure_fuse_debug);
@@ -103,17 +106,12 @@ G_DEFINE_TYPE_WITH_CODE (GstCodedExposureFuse, gst_coded_exposure_fuse,
     GST_DEBUG_CATEGORY_INIT (codedexposure_fuse_debug, "codedexposure-fuse", 0,
         "coded frames to full-resolution frames"))
 GST_ELEMENT_REGISTER_DEFINE (codedexposure_fuse, "codedexposure-fuse",
-    GST_RANK_NONE, GST_TYPE_CODED_EXPOSURE_FUSE)
+    GST_RANK_NONE, gst_coded_exposure_fuse_get_type ())
 
 static void
 gst_coded_exposure_fuse_class_init (GstCodedExposureFuseClass *klass)
 {
-  gst::fuse::Fuse::install_properties (G_OBJECT_CLASS (klass));
-  gst_element_class_set_static_metadata (GST_ELEMENT_CLASS (klass),
-      "Coded exposure fusion", "Filter/Effect/Video",
-      "Reconstructs full-resolution frames at a multiple of the frame rate "
-      "from the frames of a camera behind a micromirror device",
-      "The gst-codedexposure authors");
+  gst::fuse::Fuse::set_up_class (klass);
 }
 
 static void
@@ -125,6 +123,67 @@ gst_coded_exposure_fuse_init (GstCodedExposureFuse *element)
 
 namespace codedexposure::gst::fuse
 {
+
+G_DEFINE_ENUM_TYPE (GstCodedExposureQuality, gst_coded_exposure_quality,
+    {int (FuseQuality::kFast), "one linear filter a pixel, in real time",
+        "fast"},
+    {int (FuseQuality::kBalanced),
+        "the filter of the motion that fits around each pixel", "balanced"},
+    {int (FuseQuality::kBest),
+        "more motions, and collaborative filtering of similar blocks; for "
+        "recordings",
+        "best"});
+
+const PropertyTable<FuseOptions> &
+Fuse::properties ()
+{
+  static const PropertyTable<FuseOptions> table{
+      {"quality", "Quality",
+          "How much work a frame is worth; balanced and best are for up to 16 "
+          "slots",
+          kReadWrite, &FuseOptions::quality,
+          gst_coded_exposure_quality_get_type ()},
+      {"lookahead", "Lookahead",
+          "Coded frames that are waited for before one is fused: what stands "
+          "still is then known from the first frame on; each adds a frame "
+          "period to the latency",
+          kReadWrite, &FuseOptions::lookahead, 0u,
+          guint (Fuser<std::uint8_t>::kMaxLookahead)},
+      {"threads", "Threads",
+          "Threads that balanced and best work on, which changes no pixel; 0: "
+          "one for each processor; fast works on the streaming thread",
+          kReadWrite, &FuseOptions::threads, 0u, guint (Workers::kMost)},
+      {"full-well", "Full well",
+          "Electrons that white makes in a pixel that is open for the whole "
+          "exposure, as in codedexposure-sim; the noise of light follows from "
+          "it; 0: the frames are noise-free",
+          kReadWrite, within (&FuseOptions::noise, &SensorNoise::full_well),
+          0.0, SensorNoise::kMaxFullWell},
+      {"read-noise", "Read noise",
+          "Noise of the camera's electronics in electrons rms; counts only "
+          "with a full-well",
+          kReadWrite, within (&FuseOptions::noise, &SensorNoise::read_noise),
+          0.0, SensorNoise::kMaxReadNoise},
+  };
+  return table;
+}
+
+FuseOptions &
+Fuse::settings_of (GObject *object)
+{
+  return static_cast<Fuse &> (filter_of (object)).settings_;
+}
+
+void
+Fuse::set_up_class (gpointer klass)
+{
+  install_properties<properties, settings_of, settings_changed> (
+      G_OBJECT_CLASS (klass));
+  describe_element (klass, "Coded exposure fusion", "Filter/Effect/Video",
+      "Reconstructs full-resolution frames at a multiple of the frame rate "
+      "from the frames of a camera behind a micromirror device",
+      {});
+}
 
 namespace
 {
@@ -379,11 +438,10 @@ Fuse::planned (bool)
   bool changed;
   {
     const ObjectLock lock (element ());
-    changed = std::exchange (latency_, latency) != latency;
+    changed = std::exchange (shared_.latency, latency) != latency;
   }
   if (changed)
-    gst_element_post_message (
-        element (), gst_message_new_latency (GST_OBJECT (element ())));
+    post_latency (element ());
 }
 
 GstClockTime

@@ -15,11 +15,8 @@
 
 G_BEGIN_DECLS
 
-#define GST_TYPE_CODED_EXPOSURE_FUSE (gst_coded_exposure_fuse_get_type ())
 G_DECLARE_FINAL_TYPE (GstCodedExposureFuse, gst_coded_exposure_fuse, GST,
     CODED_EXPOSURE_FUSE, GstCodedFilter)
-
-GST_ELEMENT_REGISTER_DECLARE (codedexposure_fuse);
 
 G_END_DECLS
 
@@ -40,11 +37,12 @@ class Fuse final : public CodedFilter
 public:
   explicit Fuse (GstCodedExposureFuse *element);
 
-  bool set_own (guint id, const GValue *value) override;
-  bool get_own (guint id, GValue *value) const override;
-  static void install_properties (GObjectClass *klass);
+  static void set_up_class (gpointer klass);
 
 private:
+  static const PropertyTable<FuseOptions> &properties ();
+  static FuseOptions &settings_of (GObject *object);
+
   GstFlowReturn process (CodedFrame frame) override;
   bool plan (const CodedFormat &format) override;
   void planned (bool schedule_changed) override;
@@ -64,7 +62,7 @@ private:
       const Schedule &schedule, const GstCodedPad *pad) const override;
   int pictures_a_frame (const GstCodedPad *) const override
   {
-    return schedule_in_force ()->slots ();
+    return shared_.schedule->slots ();
   }
   RectifyOptions rectify_options () const override;
 

@@ -23,19 +23,17 @@
  *
  * Since: 0.1
  */
-#include "log.h"
-
 #include <algorithm>
 #include <optional>
 #include <string>
 
+#include <gst/base/gstbasetransform.h>
 #include <nlohmann/json.hpp>
 
-#include "common/caps.h"
+#include "common/element.h"
+#include "common/elements.h"
 #include "common/lines.h"
 #include "common/meta.h"
-#include "common/properties.h"
-#include "common/raii.h"
 #include "common/tag.h"
 #include "extract/saturation.h"
 
@@ -48,8 +46,6 @@ namespace
 {
 
 struct LogState {
-  explicit LogState (gpointer element) : file (element) {}
-
   std::string location; // object lock
   /* Streaming thread, and start and stop, which exclude it: */
   LineFile file;
@@ -59,11 +55,6 @@ struct LogState {
   std::optional<codedexposure::Schedule> schedule;
   std::optional<codedexposure::Mapping> mapping;
 };
-
-enum { PROP_0, PROP_LOCATION };
-
-constexpr auto kReadyFlags = GParamFlags (
-    G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY);
 
 template <typename Pixel>
 guint64
@@ -130,6 +121,9 @@ frame_line (const LogState &state, GstBuffer *frame, const GstSegment &segment)
 
 } // namespace
 
+G_DECLARE_FINAL_TYPE (GstCodedExposureLog, gst_coded_exposure_log, GST,
+    CODED_EXPOSURE_LOG, GstBaseTransform)
+
 struct _GstCodedExposureLog {
   GstBaseTransform parent;
   LogState *state;
@@ -141,7 +135,7 @@ G_DEFINE_TYPE_WITH_CODE (GstCodedExposureLog, gst_coded_exposure_log,
     GST_DEBUG_CATEGORY_INIT (codedexposure_log_debug, "codedexposure-log", 0,
         "per-frame record of coded frames"))
 GST_ELEMENT_REGISTER_DEFINE (codedexposure_log, "codedexposure-log",
-    GST_RANK_NONE, GST_TYPE_CODED_EXPOSURE_LOG)
+    GST_RANK_NONE, gst_coded_exposure_log_get_type ())
 
 static GstFlowReturn
 gst_coded_exposure_log_transform_ip (
@@ -217,7 +211,7 @@ gst_coded_exposure_log_start (GstBaseTransform *base) noexcept
         (nullptr));
     return FALSE;
   }
-  return state.file.open (location);
+  return state.file.open (self, location);
 }
 
 static gboolean
@@ -227,85 +221,31 @@ gst_coded_exposure_log_stop (GstBaseTransform *base)
   return TRUE;
 }
 
-static void
-gst_coded_exposure_log_set_property (
-    GObject *object, guint id, const GValue *value, GParamSpec *pspec) noexcept
+static const PropertyTable<LogState> &
+properties ()
 {
-  auto *self = GST_CODED_EXPOSURE_LOG (object);
-  if (id != PROP_LOCATION) {
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-    return;
-  }
-  const ObjectLock lock (self);
-  if (!may_set (self, pspec))
-    return;
-  const gchar *location = g_value_get_string (value);
-  self->state->location = location ? location : "";
-}
-
-static void
-gst_coded_exposure_log_get_property (
-    GObject *object, guint id, GValue *value, GParamSpec *pspec)
-{
-  auto *self = GST_CODED_EXPOSURE_LOG (object);
-  if (id != PROP_LOCATION) {
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-    return;
-  }
-  const ObjectLock lock (self);
-  const std::string &location = self->state->location;
-  g_value_set_string (value, location.empty () ? nullptr : location.c_str ());
+  static const PropertyTable<LogState> table{{"location", "File location",
+      "File to write, one line of JSON a coded frame; overwritten when it "
+      "exists",
+      kReadWriteReady, &LogState::location}};
+  return table;
 }
 
 static void
 gst_coded_exposure_log_init (GstCodedExposureLog *self)
 {
-  self->state = new LogState (self);
+  self->state = new LogState;
   gst_base_transform_set_passthrough (GST_BASE_TRANSFORM (self), TRUE);
-}
-
-static void
-gst_coded_exposure_log_finalize (GObject *object)
-{
-  delete GST_CODED_EXPOSURE_LOG (object)->state;
-  G_OBJECT_CLASS (parent_class)->finalize (object);
 }
 
 static void
 gst_coded_exposure_log_class_init (GstCodedExposureLogClass *klass)
 {
-  auto *object_class = G_OBJECT_CLASS (klass);
-  auto *element_class = GST_ELEMENT_CLASS (klass);
+  install_state<GstCodedExposureLog, properties> (klass);
+  describe_element (klass, "Coded exposure frame log", "Filter/Analyzer/Video",
+      "Writes what is known of every coded frame to a file of JSON lines");
+
   auto *transform_class = GST_BASE_TRANSFORM_CLASS (klass);
-
-  object_class->set_property = gst_coded_exposure_log_set_property;
-  object_class->get_property = gst_coded_exposure_log_get_property;
-  object_class->finalize = gst_coded_exposure_log_finalize;
-  /**
-   * GstCodedExposureLog:location:
-   *
-   * File to write, overwritten when it exists.
-   *
-   * Since: 0.1
-   */
-  g_object_class_install_property (object_class, PROP_LOCATION,
-      g_param_spec_string ("location", "File Location",
-          "File to write, one line of JSON a coded frame; overwritten when it "
-          "exists",
-          nullptr, kReadyFlags));
-
-  gst_element_class_set_static_metadata (element_class,
-      "Coded exposure frame log", "Filter/Analyzer/Video",
-      "Writes what is known of every coded frame to a file of JSON lines",
-      "The gst-codedexposure authors");
-  static GstStaticPadTemplate sink =
-      GST_STATIC_PAD_TEMPLATE ("sink", GST_PAD_SINK, GST_PAD_ALWAYS,
-          GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
-  static GstStaticPadTemplate src = GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC,
-      GST_PAD_ALWAYS, GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
-  gst_element_class_add_static_pad_template (element_class, &sink);
-  gst_element_class_add_static_pad_template (element_class, &src);
-
   transform_class->start = GST_DEBUG_FUNCPTR (gst_coded_exposure_log_start);
   transform_class->stop = GST_DEBUG_FUNCPTR (gst_coded_exposure_log_stop);
   transform_class->set_caps =

@@ -52,6 +52,7 @@
 #include "moirecalib.h"
 
 #include "common/element.h"
+#include "common/elements.h"
 #include "common/properties.h"
 
 GST_DEBUG_CATEGORY (moirecalib_debug);
@@ -80,132 +81,92 @@ G_DEFINE_ENUM_TYPE (GstMoireCalibMode, gst_moire_calib_mode,
     {int (Mode::map), "The mapping at once", "map"},
     {int (Mode::phase),
         "Phase of the tile, from a coded frame of a staircase; no patterns",
-        "phase"})
-
-const Settings kDefaults;
-
-Property<CalibState>
-text (const char *name, const char *nick, const char *blurb,
-    std::string Settings::*place)
-{
-  return setting (g_param_spec_string (name, nick, blurb, "", kReadWrite),
-      &CalibState::settings, place);
-}
-
-Property<CalibState>
-number (const char *name, const char *nick, const char *blurb, int min, int max,
-    int Settings::*place)
-{
-  return setting (g_param_spec_int (name, nick, blurb, min, max,
-                      kDefaults.*place, kReadWrite),
-      &CalibState::settings, place);
-}
-
-Property<CalibState>
-scale (const char *name, const char *nick, const char *blurb, double min,
-    double max, double StageOptions::*place)
-{
-  return setting (g_param_spec_double (name, nick, blurb, min, max,
-                      kDefaults.stage.*place, kReadWrite),
-      &CalibState::settings, &Settings::stage, place);
-}
-
-template <typename... Path>
-Property<CalibState>
-flag (const char *name, const char *nick, const char *blurb, Path... path)
-{
-  return setting (g_param_spec_boolean (name, nick, blurb,
-                      follow (kDefaults, path...), kReadWrite),
-      &CalibState::settings, path...);
-}
+        "phase"});
 
 const PropertyTable<CalibState> &
 properties ()
 {
+  static const auto set = [] (auto... path) {
+    return within (&CalibState::settings, path...);
+  };
+  static const auto stage = [] (auto member) {
+    return set (&Settings::stage, member);
+  };
   static const PropertyTable<CalibState> table = {
-      setting (g_param_spec_enum ("mode", "Mode",
-                   "What to do; setting it starts over at the next frame, even "
-                   "if the value does not change",
-                   gst_moire_calib_mode_get_type (), int (kDefaults.mode),
-                   kReadWrite),
-          &CalibState::settings, &Settings::mode),
-      text ("location", "Location",
+      {"mode", "Mode",
+          "What to do; setting it starts over at the next frame, even if the "
+          "value does not change",
+          kReadWrite, set (&Settings::mode), gst_moire_calib_mode_get_type ()},
+      {"location", "Location",
           "File to write the mapping to, JSON (docs/formats.md); empty: none",
-          &Settings::location),
-      text ("report", "Report",
+          kReadWrite, set (&Settings::location)},
+      {"report", "Report",
           "File for a picture of fringes, residuals and pixel quality, PNG; "
           "empty: none",
-          &Settings::report),
-      text ("pattern", "Pattern",
+          kReadWrite, set (&Settings::report)},
+      {"pattern", "Pattern",
           "Grating that the mirrors show all the time, such as "
           "grating-both:4/0, for a DMD that takes no masks at run time; no "
           "mapping is measured then; empty: request patterns from dmdsync",
-          &Settings::pattern),
-      text ("schedule", "Schedule",
+          kReadWrite, set (&Settings::pattern)},
+      {"schedule", "Schedule",
           "Schedule whose phase mode=phase finds, a preset or a JSON file; "
           "empty: the stream's. Read when the mode is set",
-          &Settings::schedule),
-      flag ("overlay", "Overlay",
+          kReadWrite, set (&Settings::schedule)},
+      {"overlay", "Overlay",
           "Draw fringes, numbers and arrows over the picture, except in "
           "mode=phase; if false, frames pass unchanged",
-          &Settings::overlay),
-      number ("period", "Period",
+          kReadWrite, set (&Settings::overlay)},
+      {"period", "Period",
           "Period of the gratings of a mapping, mirrors, even; longer ones "
           "take more patterns and tolerate more blur",
-          4, 64, &Settings::period),
-      number ("frames", "Frames",
-          "Frames of each pattern of a mapping, which are averaged", 1, 1000,
-          &Settings::frames),
-      number ("bits", "Bits",
+          kReadWrite, set (&Settings::period), 4, 64},
+      {"frames", "Frames",
+          "Frames of each pattern of a mapping, which are averaged", kReadWrite,
+          set (&Settings::frames), 1, 1000},
+      {"bits", "Bits",
           "Significant bits of GRAY16_LE frames, which decide what is "
           "saturated; 0: as the frame metadata say, or all 16",
-          0, 16, &Settings::bits),
-      scale ("tolerance", "Tolerance",
+          kReadWrite, set (&Settings::bits), 0, 16},
+      {"tolerance", "Tolerance",
           "The bench is aligned when every pixel is within this distance of "
           "its place, mirrors",
-          0.001, 10, &StageOptions::tolerance),
-      scale ("mirror-pitch", "Mirror pitch",
+          kReadWrite, stage (&StageOptions::tolerance), 0.001, 10.0},
+      {"mirror-pitch", "Mirror pitch",
           "Stage travel for one mirror, micrometres: the pitch of the mirrors "
           "times the magnification of the optics",
-          0.01, 1000, &StageOptions::mirror_pitch),
-      scale ("pixels-per-mirror", "Pixels per mirror",
-          "Target magnification, at which the search for fringes starts", 0.25,
-          16, &StageOptions::pixels_per_mirror),
-      flag ("flip-x", "Flip x", "The stage's x runs against the picture's",
-          &Settings::stage, &StageOptions::flip_x),
-      flag ("flip-y", "Flip y", "The stage's y runs against the picture's",
-          &Settings::stage, &StageOptions::flip_y),
-      flag ("flip-theta", "Flip theta",
-          "The stage's angle runs anticlockwise in the picture",
-          &Settings::stage, &StageOptions::flip_theta),
-      reading<CalibState> (
-          g_param_spec_string ("state", "State",
-              "searching, coarse, fine, aligned, mapping, solving, mapped, "
-              "failed or found, as in the message moirecalib/state; notifies",
-              "", kReadOnly),
+          kReadWrite, stage (&StageOptions::mirror_pitch), 0.01, 1000.0},
+      {"pixels-per-mirror", "Pixels per mirror",
+          "Target magnification, at which the search for fringes starts",
+          kReadWrite, stage (&StageOptions::pixels_per_mirror), 0.25, 16.0},
+      {"flip-x", "Flip x", "The stage's x runs against the picture's",
+          kReadWrite, stage (&StageOptions::flip_x)},
+      {"flip-y", "Flip y", "The stage's y runs against the picture's",
+          kReadWrite, stage (&StageOptions::flip_y)},
+      {"flip-theta", "Flip theta",
+          "The stage's angle runs anticlockwise in the picture", kReadWrite,
+          stage (&StageOptions::flip_theta)},
+      {"state", "State",
+          "searching, coarse, fine, aligned, mapping, solving, mapped, failed "
+          "or found, as in the message moirecalib/state; notifies",
+          kReadOnly,
           [] (const CalibState &st) {
             return std::string (stage_text (st.stage));
-          }),
-      reading<CalibState> (
-          g_param_spec_string ("mapping", "Mapping",
-              "The last mapping, JSON (docs/formats.md); empty: none yet; "
-              "notifies",
-              "", kReadOnly),
-          &CalibState::mapping),
+          }},
+      {"mapping", "Mapping",
+          "The last mapping, JSON (docs/formats.md); empty: none yet; notifies",
+          kReadOnly, &CalibState::mapping},
   };
   return table;
 }
 
 void
-set_property (
-    GObject *object, guint id, const GValue *value, GParamSpec *pspec) noexcept
+changed (GObject *object, const GParamSpec *pspec)
 {
-  const ObjectLock lock (object);
-  CalibState &st = moire::state (object);
-  properties ().set (st, id, value);
-  st.settings.period = st.settings.period / 2 * 2;
+  Settings &settings = moire::state (object).settings;
+  settings.period = settings.period / 2 * 2;
   if (g_str_equal (pspec->name, "mode"))
-    st.settings.turn++;
+    settings.turn++;
 }
 
 void
@@ -269,11 +230,8 @@ gst_moire_calib_class_init (GstMoireCalibClass *klass)
   auto *transform_class = GST_BASE_TRANSFORM_CLASS (klass);
 
   object_class->finalize = finalize;
-  install_properties<&properties, &moire::state> (object_class);
-  object_class->set_property = set_property;
-  gst_type_mark_as_plugin_api (
-      gst_moire_calib_mode_get_type (), GstPluginAPIFlags (0));
-  describe_element (element_class, "Moiré calibration", "Filter/Analyzer/Video",
+  install_properties<properties, moire::state, changed> (object_class);
+  describe_element (klass, "Moiré calibration", "Filter/Analyzer/Video",
       "Aligns a coded exposure camera with its mirrors and measures the "
       "mapping between them");
   element_class->change_state = GST_DEBUG_FUNCPTR (change_state);

@@ -26,8 +26,6 @@ G_BEGIN_DECLS
 G_DECLARE_FINAL_TYPE (
     GstMoireCalib, gst_moire_calib, GST, MOIRE_CALIB, GstBaseTransform)
 
-GST_ELEMENT_REGISTER_DECLARE (moirecalib);
-
 G_END_DECLS
 
 GST_DEBUG_CATEGORY_EXTERN (moirecalib_debug);

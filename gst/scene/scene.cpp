@@ -20,16 +20,15 @@
  *
  * Since: 0.1
  */
-#include "scene.h"
-
 #include <algorithm>
 #include <limits>
 #include <memory>
 
+#include <gst/base/gstpushsrc.h>
+
 #include "bench/scene.h"
-#include "common/caps.h"
-#include "common/properties.h"
-#include "common/raii.h"
+#include "common/element.h"
+#include "common/elements.h"
 
 using namespace codedexposure::gst;
 using codedexposure::SceneKind;
@@ -48,8 +47,6 @@ struct SceneState {
   guint64 frame = 0;
 };
 
-enum { PROP_0, PROP_SCENE };
-
 template <typename Pixel>
 void
 expose (codedexposure::ImageView<const float> light,
@@ -65,6 +62,9 @@ expose (codedexposure::ImageView<const float> light,
 
 } // namespace
 
+G_DECLARE_FINAL_TYPE (GstCodedExposureScene, gst_coded_exposure_scene, GST,
+    CODED_EXPOSURE_SCENE, GstPushSrc)
+
 struct _GstCodedExposureScene {
   GstPushSrc parent;
   SceneState *state;
@@ -74,13 +74,22 @@ struct _GstCodedExposureScene {
 G_DEFINE_TYPE (
     GstCodedExposureScene, gst_coded_exposure_scene, GST_TYPE_PUSH_SRC)
 GST_ELEMENT_REGISTER_DEFINE (codedexposure_scene, "codedexposure-scene",
-    GST_RANK_NONE, GST_TYPE_CODED_EXPOSURE_SCENE)
+    GST_RANK_NONE, gst_coded_exposure_scene_get_type ())
 
 G_DEFINE_ENUM_TYPE (GstCodedExposureSceneKind, gst_coded_exposure_scene_kind,
     {int (SceneKind::kCandle), "A candle that flickers", "candle"},
     {int (SceneKind::kBlownOut), "A candle that is blown out after 0.5 s",
         "blown-out"},
-    {int (SceneKind::kPour), "Liquid that is poured into a glass", "pour"})
+    {int (SceneKind::kPour), "Liquid that is poured into a glass", "pour"});
+
+static const PropertyTable<SceneState> &
+properties ()
+{
+  static const PropertyTable<SceneState> table{{"scene", "Scene to draw",
+      "What is drawn; takes effect when the stream starts", kReadWriteReady,
+      &SceneState::kind, gst_coded_exposure_scene_kind_get_type ()}};
+  return table;
+}
 
 static gboolean
 gst_coded_exposure_scene_start (GstBaseSrc *base)
@@ -156,34 +165,6 @@ gst_coded_exposure_scene_create (GstPushSrc *base, GstBuffer **outbuf) noexcept
 }
 
 static void
-gst_coded_exposure_scene_set_property (
-    GObject *object, guint id, const GValue *value, GParamSpec *pspec)
-{
-  auto *self = GST_CODED_EXPOSURE_SCENE (object);
-  if (id != PROP_SCENE) {
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-    return;
-  }
-  const ObjectLock lock (self);
-  if (!may_set (self, pspec))
-    return;
-  self->state->kind = SceneKind (g_value_get_enum (value));
-}
-
-static void
-gst_coded_exposure_scene_get_property (
-    GObject *object, guint id, GValue *value, GParamSpec *pspec)
-{
-  auto *self = GST_CODED_EXPOSURE_SCENE (object);
-  if (id != PROP_SCENE) {
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-    return;
-  }
-  const ObjectLock lock (self);
-  g_value_set_enum (value, int (self->state->kind));
-}
-
-static void
 gst_coded_exposure_scene_init (GstCodedExposureScene *self)
 {
   self->state = new SceneState;
@@ -191,46 +172,14 @@ gst_coded_exposure_scene_init (GstCodedExposureScene *self)
 }
 
 static void
-gst_coded_exposure_scene_finalize (GObject *object)
-{
-  delete GST_CODED_EXPOSURE_SCENE (object)->state;
-  G_OBJECT_CLASS (parent_class)->finalize (object);
-}
-
-static void
 gst_coded_exposure_scene_class_init (GstCodedExposureSceneClass *klass)
 {
-  auto *object_class = G_OBJECT_CLASS (klass);
-  auto *element_class = GST_ELEMENT_CLASS (klass);
-  auto *base_class = GST_BASE_SRC_CLASS (klass);
-
-  object_class->set_property = gst_coded_exposure_scene_set_property;
-  object_class->get_property = gst_coded_exposure_scene_get_property;
-  object_class->finalize = gst_coded_exposure_scene_finalize;
-  /**
-   * GstCodedExposureScene:scene:
-   *
-   * What is drawn.
-   *
-   * Since: 0.1
-   */
-  g_object_class_install_property (object_class, PROP_SCENE,
-      g_param_spec_enum ("scene", "Scene to Draw",
-          "What is drawn; takes effect when the stream starts",
-          GST_TYPE_CODED_EXPOSURE_SCENE_KIND, int (SceneKind::kCandle),
-          GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
-                       GST_PARAM_MUTABLE_READY)));
-  gst_type_mark_as_plugin_api (
-      GST_TYPE_CODED_EXPOSURE_SCENE_KIND, GstPluginAPIFlags (0));
-
-  gst_element_class_set_static_metadata (element_class,
-      "Coded exposure test scene", "Source/Video",
+  install_state<GstCodedExposureScene, properties> (klass);
+  describe_element (klass, "Coded exposure test scene", "Source/Video",
       "Draws a candle, a candle that is blown out, or liquid that is poured",
-      "The gst-codedexposure authors");
-  static GstStaticPadTemplate src = GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC,
-      GST_PAD_ALWAYS, GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
-  gst_element_class_add_static_pad_template (element_class, &src);
+      {"src"});
 
+  auto *base_class = GST_BASE_SRC_CLASS (klass);
   base_class->start = GST_DEBUG_FUNCPTR (gst_coded_exposure_scene_start);
   base_class->fixate = GST_DEBUG_FUNCPTR (gst_coded_exposure_scene_fixate);
   base_class->set_caps = GST_DEBUG_FUNCPTR (gst_coded_exposure_scene_set_caps);

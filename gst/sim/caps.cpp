@@ -27,8 +27,8 @@ schedule_of (GstCodedExposureSim *self)
   const SimState &st = state (self);
   if (st.schedule)
     return st.schedule;
-  if (st.settings.parsed->ok ())
-    return ScheduleRef (st.settings.parsed, &st.settings.parsed->value ());
+  if (const auto &read = st.settings.schedule.read; *read)
+    return {read, &read->value ()};
   return std::make_shared<const Schedule> ();
 }
 

@@ -45,7 +45,7 @@ wanted_schedule (GstCodedExposureSim *self)
   std::shared_ptr<const Result<Schedule>> parsed;
   {
     const ObjectLock lock (self);
-    parsed = state (self).settings.parsed;
+    parsed = state (self).settings.schedule.read;
   }
   if (parsed->ok ())
     return ScheduleRef (parsed, &parsed->value ());

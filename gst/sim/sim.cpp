@@ -96,6 +96,7 @@
 #include "sim.h"
 
 #include "common/element.h"
+#include "common/elements.h"
 
 GST_DEBUG_CATEGORY (codedexposure_sim_debug);
 #define GST_CAT_DEFAULT codedexposure_sim_debug
@@ -124,13 +125,7 @@ gboolean
 start (GstBaseTransform *trans)
 {
   auto *self = GST_CODED_EXPOSURE_SIM (trans);
-  std::string text;
-  {
-    const ObjectLock lock (self);
-    text = self->state->settings.schedule;
-  }
-  /* A file may have changed since the property was set. */
-  sim::set_schedule (self, std::move (text));
+  read_again (self, self->state->settings.schedule);
   return sim::begin_stream (self);
 }
 
@@ -232,8 +227,7 @@ gst_coded_exposure_sim_class_init (GstCodedExposureSimClass *klass)
   transform->generate_output = GST_DEBUG_FUNCPTR (sim::generate_output);
   GST_VIDEO_FILTER_CLASS (klass)->set_info = GST_DEBUG_FUNCPTR (sim::set_info);
 
-  describe_element (GST_ELEMENT_CLASS (klass), "Coded exposure simulator",
-      "Filter/Effect/Video",
+  describe_element (klass, "Coded exposure simulator", "Filter/Effect/Video",
       "An optical bench in software: turns video into the coded frames of a "
       "slow camera behind a micromirror device");
 }
@@ -242,7 +236,6 @@ static void
 gst_coded_exposure_sim_init (GstCodedExposureSim *self)
 {
   self->state = new SimState;
-  sim::set_schedule (self, sim::kDefaultSchedule);
   auto *trans = GST_BASE_TRANSFORM (self);
   gst_base_transform_set_prefer_passthrough (trans, FALSE);
   /* An instrument drops nothing because it is late. */

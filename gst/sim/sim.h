@@ -15,6 +15,7 @@
 #include "bench/bench.h"
 #include "bench/light_share.h"
 #include "bench/simulated_dmd.h"
+#include "common/named.h"
 #include "common/raii.h"
 #include "schedule/schedule.h"
 
@@ -23,8 +24,6 @@ G_BEGIN_DECLS
 #define GST_TYPE_CODED_EXPOSURE_SIM (gst_coded_exposure_sim_get_type ())
 G_DECLARE_FINAL_TYPE (GstCodedExposureSim, gst_coded_exposure_sim, GST,
     CODED_EXPOSURE_SIM, GstVideoFilter)
-
-GST_ELEMENT_REGISTER_DECLARE (codedexposure_sim);
 
 G_END_DECLS
 
@@ -37,8 +36,7 @@ using ScheduleRef = std::shared_ptr<const Schedule>;
 
 /** Properties. */
 struct Settings {
-  std::string schedule;
-  std::shared_ptr<const Result<Schedule>> parsed; ///< never null
+  Named<Schedule> schedule{"sequential:2x2"};
   std::string dmd;
   BenchOptions optics;
 };
@@ -117,10 +115,7 @@ state (gpointer element)
 }
 
 /* Properties. */
-constexpr const char *kDefaultSchedule = "sequential:2x2";
 void install_own_properties (GObjectClass *klass);
-/** Reads @p text, outside the lock, and keeps both. */
-void set_schedule (GstCodedExposureSim *self, std::string text);
 
 /* Negotiation. */
 GstCaps *transform_caps (GstBaseTransform *trans, GstPadDirection direction,

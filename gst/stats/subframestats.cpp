@@ -38,18 +38,17 @@
  *
  * Since: 0.1
  */
-#include "subframestats.h"
-
 #include <optional>
 #include <string>
 #include <utility>
 #include <variant>
 
-#include "common/caps.h"
+#include <gst/base/gstbasetransform.h>
+
+#include "common/element.h"
+#include "common/elements.h"
 #include "common/lines.h"
 #include "common/meta.h"
-#include "common/properties.h"
-#include "common/raii.h"
 #include "report.h"
 
 using namespace codedexposure::gst;
@@ -75,8 +74,6 @@ struct Settings {
 };
 
 struct StatsState {
-  explicit StatsState (gpointer element) : file (element) {}
-
   /* Object lock. */
   Settings settings;
   guint64 frames_in = 0;
@@ -90,36 +87,66 @@ struct StatsState {
   LineFile file;
 };
 
-enum {
-  PROP_0,
-  PROP_LOCATION,
-  PROP_FORMAT,
-  PROP_LINE,
-  PROP_BITS,
-  PROP_HISTOGRAM_BINS,
-  PROP_POST_MESSAGES,
-  PROP_FRAMES_IN,
-  PROP_SATURATED_FRAMES,
-};
-
 } // namespace
+
+G_DECLARE_FINAL_TYPE (
+    GstSubframeStats, gst_subframe_stats, GST, SUBFRAME_STATS, GstBaseTransform)
 
 struct _GstSubframeStats {
   GstBaseTransform parent;
   StatsState *state;
 };
 
-#define gst_subframe_stats_parent_class parent_class
 G_DEFINE_TYPE_WITH_CODE (GstSubframeStats, gst_subframe_stats,
     GST_TYPE_BASE_TRANSFORM,
     GST_DEBUG_CATEGORY_INIT (
         subframestats_debug, "subframestats", 0, "statistics of subframes"))
-GST_ELEMENT_REGISTER_DEFINE (
-    subframestats, "subframestats", GST_RANK_NONE, GST_TYPE_SUBFRAME_STATS)
+GST_ELEMENT_REGISTER_DEFINE (subframestats, "subframestats", GST_RANK_NONE,
+    gst_subframe_stats_get_type ())
 
 G_DEFINE_ENUM_TYPE (GstSubframeStatsFormat, gst_subframe_stats_format,
     {int (Format::json), "Lines of JSON", "json"},
-    {int (Format::csv), "Comma-separated values, with a head", "csv"})
+    {int (Format::csv), "Comma-separated values, with a head", "csv"});
+
+static const PropertyTable<StatsState> &
+properties ()
+{
+  static const auto set = [] (auto member) {
+    return within (&StatsState::settings, member);
+  };
+  static const PropertyTable<StatsState> table{
+      {"location", "File location",
+          "File to write, a line a picture; overwritten when it exists; empty: "
+          "no file",
+          kReadWriteReady, set (&Settings::location)},
+      {"format", "File format", "What the lines of the file are",
+          kReadWriteReady, set (&Settings::format),
+          gst_subframe_stats_format_get_type ()},
+      {"line", "Profile line",
+          "Line whose values are the profile: row:Y, column:X or X0/Y0/X1/Y1, "
+          "in pixels of the picture or in percent of it as in row:50%, which "
+          "suit coded frames and subframes alike; empty: no profile",
+          kReadWriteReady, set (&Settings::line)},
+      {"bits", "Significant bits",
+          "Significant bits of a pixel; their largest value is saturation. 0: "
+          "as the frame metadata say, or all bits of the format",
+          kReadWriteReady, set (&Settings::bits), 0, 16},
+      {"histogram-bins", "Bins of the histogram",
+          "Bins of the histogram, of equal width over all grey levels; 0: no "
+          "histogram",
+          kReadWriteReady, set (&Settings::bins), 0, 65536},
+      {"post-messages", "Post messages",
+          "Post the element message subframestats/stats for every picture",
+          kReadWriteReady, set (&Settings::post_messages)},
+      {"frames-in", "Pictures measured",
+          "Pictures that were measured in this run", kReadOnly,
+          &StatsState::frames_in, guint64 (0), G_MAXUINT64},
+      {"saturated-frames", "Saturated pictures",
+          "Pictures with pixels at the largest value, in this run", kReadOnly,
+          &StatsState::saturated_frames, guint64 (0), G_MAXUINT64},
+  };
+  return table;
+}
 
 static gboolean
 gst_subframe_stats_start (GstBaseTransform *base) noexcept
@@ -146,7 +173,7 @@ gst_subframe_stats_start (GstBaseTransform *base) noexcept
   }
   if (settings.location.empty ())
     return TRUE;
-  return state.file.open (settings.location) &&
+  return state.file.open (self, settings.location) &&
          (settings.format != Format::csv || state.file.write (kCsvHead));
 }
 
@@ -294,228 +321,23 @@ gst_subframe_stats_generate_output (
 }
 
 static void
-gst_subframe_stats_set_property (
-    GObject *object, guint id, const GValue *value, GParamSpec *pspec) noexcept
-{
-  auto *self = GST_SUBFRAME_STATS (object);
-  const auto text = [value] {
-    const gchar *given = g_value_get_string (value);
-    return std::string (given ? given : "");
-  };
-  const ObjectLock lock (self);
-  if (!may_set (self, pspec))
-    return;
-  Settings &settings = self->state->settings;
-  switch (id) {
-  case PROP_LOCATION:
-    settings.location = text ();
-    break;
-  case PROP_FORMAT:
-    settings.format = Format (g_value_get_enum (value));
-    break;
-  case PROP_LINE:
-    settings.line = text ();
-    break;
-  case PROP_BITS:
-    settings.bits = g_value_get_int (value);
-    break;
-  case PROP_HISTOGRAM_BINS:
-    settings.bins = g_value_get_int (value);
-    break;
-  case PROP_POST_MESSAGES:
-    settings.post_messages = g_value_get_boolean (value);
-    break;
-  default:
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-  }
-}
-
-static void
-gst_subframe_stats_get_property (
-    GObject *object, guint id, GValue *value, GParamSpec *pspec) noexcept
-{
-  auto *self = GST_SUBFRAME_STATS (object);
-  const ObjectLock lock (self);
-  const StatsState &state = *self->state;
-  const Settings &settings = state.settings;
-  const auto set_text = [value] (const std::string &text) {
-    g_value_set_string (value, text.empty () ? nullptr : text.c_str ());
-  };
-  switch (id) {
-  case PROP_LOCATION:
-    set_text (settings.location);
-    break;
-  case PROP_FORMAT:
-    g_value_set_enum (value, int (settings.format));
-    break;
-  case PROP_LINE:
-    set_text (settings.line);
-    break;
-  case PROP_BITS:
-    g_value_set_int (value, settings.bits);
-    break;
-  case PROP_HISTOGRAM_BINS:
-    g_value_set_int (value, settings.bins);
-    break;
-  case PROP_POST_MESSAGES:
-    g_value_set_boolean (value, settings.post_messages);
-    break;
-  case PROP_FRAMES_IN:
-    g_value_set_uint64 (value, state.frames_in);
-    break;
-  case PROP_SATURATED_FRAMES:
-    g_value_set_uint64 (value, state.saturated_frames);
-    break;
-  default:
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-  }
-}
-
-static void
-install_properties (GObjectClass *klass)
-{
-  constexpr auto kReady = GParamFlags (
-      G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY);
-  constexpr auto kRead =
-      GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS);
-  const Settings defaults;
-  /**
-   * GstSubframeStats:location:
-   *
-   * File to write, a line a picture; overwritten when it exists. None: no file.
-   *
-   * Since: 0.1
-   */
-  g_object_class_install_property (klass, PROP_LOCATION,
-      g_param_spec_string ("location", "File Location",
-          "File to write, a line a picture; overwritten when it exists",
-          nullptr, kReady));
-  /**
-   * GstSubframeStats:format:
-   *
-   * What the lines of the file are.
-   *
-   * Since: 0.1
-   */
-  g_object_class_install_property (klass, PROP_FORMAT,
-      g_param_spec_enum ("format", "File Format",
-          "What the lines of the file are", GST_TYPE_SUBFRAME_STATS_FORMAT,
-          int (defaults.format), kReady));
-  /**
-   * GstSubframeStats:line:
-   *
-   * Line whose values are the profile: row:Y, column:X or X0/Y0/X1/Y1, in
-   * pixels of the picture or in percent of it, which suit coded frames and
-   * subframes alike. None: no profile.
-   *
-   * Since: 0.1
-   */
-  g_object_class_install_property (klass, PROP_LINE,
-      g_param_spec_string ("line", "Profile Line",
-          "Line whose values are the profile: row:Y, column:X or X0/Y0/X1/Y1, "
-          "in pixels or as row:50%; none: no profile",
-          nullptr, kReady));
-  /**
-   * GstSubframeStats:bits:
-   *
-   * Significant bits of a pixel, whose largest value is saturation.
-   *
-   * Since: 0.1
-   */
-  g_object_class_install_property (klass, PROP_BITS,
-      g_param_spec_int ("bits", "Significant Bits",
-          "Significant bits of a pixel; their largest value is saturation. 0: "
-          "as the frame metadata say, or all bits of the format",
-          0, 16, defaults.bits, kReady));
-  /**
-   * GstSubframeStats:histogram-bins:
-   *
-   * Bins of the histogram, of equal width over all levels.
-   *
-   * Since: 0.1
-   */
-  g_object_class_install_property (klass, PROP_HISTOGRAM_BINS,
-      g_param_spec_int ("histogram-bins", "Bins of the Histogram",
-          "Bins of the histogram, of equal width over all grey levels; 0: no "
-          "histogram",
-          0, 65536, defaults.bins, kReady));
-  /**
-   * GstSubframeStats:post-messages:
-   *
-   * Posts subframestats/stats for every picture.
-   *
-   * Since: 0.1
-   */
-  g_object_class_install_property (klass, PROP_POST_MESSAGES,
-      g_param_spec_boolean ("post-messages", "Post Messages",
-          "Post the element message subframestats/stats for every picture",
-          defaults.post_messages, kReady));
-  /**
-   * GstSubframeStats:frames-in:
-   *
-   * Pictures that were measured in this run.
-   *
-   * Since: 0.1
-   */
-  g_object_class_install_property (klass, PROP_FRAMES_IN,
-      g_param_spec_uint64 ("frames-in", "Pictures Measured",
-          "Pictures that were measured in this run", 0, G_MAXUINT64, 0, kRead));
-  /**
-   * GstSubframeStats:saturated-frames:
-   *
-   * Pictures with pixels at the largest value.
-   *
-   * Since: 0.1
-   */
-  g_object_class_install_property (klass, PROP_SATURATED_FRAMES,
-      g_param_spec_uint64 ("saturated-frames", "Saturated Pictures",
-          "Pictures with pixels at the largest value, in this run", 0,
-          G_MAXUINT64, 0, kRead));
-}
-
-static void
 gst_subframe_stats_init (GstSubframeStats *self)
 {
-  self->state = new StatsState (self);
+  self->state = new StatsState;
   auto *base = GST_BASE_TRANSFORM (self);
   gst_base_transform_set_passthrough (base, TRUE);
   gst_base_transform_set_qos_enabled (base, FALSE);
 }
 
 static void
-gst_subframe_stats_finalize (GObject *object)
-{
-  delete GST_SUBFRAME_STATS (object)->state;
-  G_OBJECT_CLASS (parent_class)->finalize (object);
-}
-
-static void
 gst_subframe_stats_class_init (GstSubframeStatsClass *klass)
 {
-  auto *object_class = G_OBJECT_CLASS (klass);
-  auto *element_class = GST_ELEMENT_CLASS (klass);
-  auto *transform_class = GST_BASE_TRANSFORM_CLASS (klass);
-
-  object_class->set_property = gst_subframe_stats_set_property;
-  object_class->get_property = gst_subframe_stats_get_property;
-  object_class->finalize = gst_subframe_stats_finalize;
-  install_properties (object_class);
-  gst_type_mark_as_plugin_api (
-      GST_TYPE_SUBFRAME_STATS_FORMAT, GstPluginAPIFlags (0));
-
-  gst_element_class_set_static_metadata (element_class, "Subframe statistics",
-      "Filter/Analyzer/Video",
+  install_state<GstSubframeStats, properties> (klass);
+  describe_element (klass, "Subframe statistics", "Filter/Analyzer/Video",
       "Measures intensity, entropy, histogram and a line profile of every "
-      "picture",
-      "The gst-codedexposure authors");
-  static GstStaticPadTemplate sink =
-      GST_STATIC_PAD_TEMPLATE ("sink", GST_PAD_SINK, GST_PAD_ALWAYS,
-          GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
-  static GstStaticPadTemplate src = GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC,
-      GST_PAD_ALWAYS, GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
-  gst_element_class_add_static_pad_template (element_class, &sink);
-  gst_element_class_add_static_pad_template (element_class, &src);
+      "picture");
 
+  auto *transform_class = GST_BASE_TRANSFORM_CLASS (klass);
   transform_class->start = GST_DEBUG_FUNCPTR (gst_subframe_stats_start);
   transform_class->stop = GST_DEBUG_FUNCPTR (gst_subframe_stats_stop);
   transform_class->set_caps = GST_DEBUG_FUNCPTR (gst_subframe_stats_set_caps);

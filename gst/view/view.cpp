@@ -22,13 +22,13 @@
  *
  * Since: 0.1
  */
-#include "view.h"
-
 #include <algorithm>
 
-#include "common/caps.h"
+#include <gst/video/gstvideofilter.h>
+
+#include "common/element.h"
+#include "common/elements.h"
 #include "common/meta.h"
-#include "common/raii.h"
 
 using namespace codedexposure;
 using namespace codedexposure::gst;
@@ -36,23 +36,23 @@ using namespace codedexposure::gst;
 GST_DEBUG_CATEGORY_STATIC (codedexposure_view_debug);
 #define GST_CAT_DEFAULT codedexposure_view_debug
 
+G_DECLARE_FINAL_TYPE (GstCodedExposureView, gst_coded_exposure_view, GST,
+    CODED_EXPOSURE_VIEW, GstVideoFilter)
+
 struct _GstCodedExposureView {
   GstVideoFilter parent;
   gint bits; // object lock
 };
 
-#define gst_coded_exposure_view_parent_class parent_class
 G_DEFINE_TYPE_WITH_CODE (GstCodedExposureView, gst_coded_exposure_view,
     GST_TYPE_VIDEO_FILTER,
     GST_DEBUG_CATEGORY_INIT (codedexposure_view_debug, "codedexposure-view", 0,
         "pictures of any depth to look at"))
 GST_ELEMENT_REGISTER_DEFINE (codedexposure_view, "codedexposure-view",
-    GST_RANK_NONE, GST_TYPE_CODED_EXPOSURE_VIEW)
+    GST_RANK_NONE, gst_coded_exposure_view_get_type ())
 
 namespace
 {
-
-enum { PROP_0, PROP_BITS };
 
 constexpr int kShown = 8;
 
@@ -131,24 +131,21 @@ transform_frame (
   return GST_FLOW_OK;
 }
 
-void
-set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+const PropertyTable<GstCodedExposureView> &
+properties ()
 {
-  const ObjectLock lock (object);
-  if (id == PROP_BITS)
-    GST_CODED_EXPOSURE_VIEW (object)->bits = g_value_get_int (value);
-  else
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+  static const PropertyTable<GstCodedExposureView> table{
+      {"bits", "Significant bits",
+          "Significant bits of a pixel; their largest value becomes white. 0: "
+          "as the frame metadata say, or all bits of the format",
+          kReadWrite, &GstCodedExposureView::bits, 0, 16}};
+  return table;
 }
 
-void
-get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
+GstCodedExposureView &
+view (GObject *object)
 {
-  const ObjectLock lock (object);
-  if (id == PROP_BITS)
-    g_value_set_int (value, GST_CODED_EXPOSURE_VIEW (object)->bits);
-  else
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+  return *GST_CODED_EXPOSURE_VIEW (object);
 }
 
 } // namespace
@@ -161,40 +158,12 @@ gst_coded_exposure_view_init (GstCodedExposureView *)
 static void
 gst_coded_exposure_view_class_init (GstCodedExposureViewClass *klass)
 {
-  auto *object_class = G_OBJECT_CLASS (klass);
-  auto *element_class = GST_ELEMENT_CLASS (klass);
+  install_properties<properties, view> (G_OBJECT_CLASS (klass));
+  describe_element (klass, "Coded exposure view", "Filter/Converter/Video",
+      "Converts pictures of any bit depth to 8 bits for display", {"sink"});
+  add_pad_template (klass, "src", {.caps = GST_VIDEO_CAPS_MAKE ("GRAY8")});
+
   auto *transform_class = GST_BASE_TRANSFORM_CLASS (klass);
-
-  object_class->set_property = set_property;
-  object_class->get_property = get_property;
-  /**
-   * GstCodedExposureView:bits:
-   *
-   * 2^bits - 1 becomes white.
-   *
-   * Since: 0.1
-   */
-  g_object_class_install_property (object_class, PROP_BITS,
-      g_param_spec_int ("bits", "Significant Bits",
-          "Significant bits of a pixel; their largest value becomes white. 0: "
-          "as "
-          "the frame metadata say, or all bits of the format",
-          0, 16, 0,
-          GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
-                       GST_PARAM_MUTABLE_PLAYING)));
-
-  gst_element_class_set_static_metadata (element_class, "Coded exposure view",
-      "Filter/Converter/Video",
-      "Converts pictures of any bit depth to 8 bits for display",
-      "The gst-codedexposure authors");
-  static GstStaticPadTemplate sink =
-      GST_STATIC_PAD_TEMPLATE ("sink", GST_PAD_SINK, GST_PAD_ALWAYS,
-          GST_STATIC_CAPS (CODED_EXPOSURE_VIDEO_CAPS));
-  static GstStaticPadTemplate src = GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC,
-      GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_VIDEO_CAPS_MAKE ("GRAY8")));
-  gst_element_class_add_static_pad_template (element_class, &sink);
-  gst_element_class_add_static_pad_template (element_class, &src);
-
   transform_class->transform_caps = GST_DEBUG_FUNCPTR (transform_caps);
   transform_class->before_transform = GST_DEBUG_FUNCPTR (before_transform);
   GST_VIDEO_FILTER_CLASS (klass)->transform_frame =

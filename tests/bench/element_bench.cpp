@@ -12,9 +12,9 @@
 #include <benchmark/benchmark.h>
 
 #include "../quality/must.h"
+#include "common/elements.h"
 #include "common/meta.h"
 #include "common/raii.h"
-#include "demux/demux.h"
 #include "extract/extractor.h"
 #include "medians.h"
 

@@ -3,11 +3,11 @@
  * with all outputs. */
 #include <benchmark/benchmark.h>
 
+#include "common/elements.h"
 #include "common/meta.h"
 #include "harness.h"
 #include "stats/picture_stats.h"
 #include "stats/report.h"
-#include "stats/subframestats.h"
 
 namespace
 {

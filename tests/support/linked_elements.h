@@ -6,12 +6,8 @@
 #include <gtest/gtest.h>
 
 #include "bench/simulated_dmd.h"
-#include "camera/camerasrc.h"
+#include "common/elements.h"
 #include "common/meta.h"
-#include "demux/demux.h"
-#include "dmdsync/dmdsync.h"
-#include "moirecalib/moirecalib.h"
-#include "sim/sim.h"
 
 namespace codedexposure::test
 {

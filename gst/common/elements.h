@@ -1,0 +1,17 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The elements of the plugin, and what lists GenICam cameras. */
+#pragma once
+
+#include <gst/gst.h>
+
+GST_ELEMENT_REGISTER_DECLARE (codedexposure_camerasrc);
+GST_ELEMENT_REGISTER_DECLARE (codedexposure_demux);
+GST_ELEMENT_REGISTER_DECLARE (codedexposure_fuse);
+GST_ELEMENT_REGISTER_DECLARE (codedexposure_log);
+GST_ELEMENT_REGISTER_DECLARE (codedexposure_scene);
+GST_ELEMENT_REGISTER_DECLARE (codedexposure_sim);
+GST_ELEMENT_REGISTER_DECLARE (codedexposure_view);
+GST_ELEMENT_REGISTER_DECLARE (dmdsync);
+GST_ELEMENT_REGISTER_DECLARE (moirecalib);
+GST_ELEMENT_REGISTER_DECLARE (subframestats);
+GST_DEVICE_PROVIDER_REGISTER_DECLARE (codedexposure_cameraprovider);

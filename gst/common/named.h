@@ -1,0 +1,74 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Properties whose text names a preset or a file. */
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "base/result.h"
+#include "wire.h"
+
+namespace codedexposure::gst
+{
+
+/** The text of a property, and what was read from it. */
+template <typename T>
+struct Named {
+  Named () = default;
+  /** Reads @p name, or the file of this name; a warning in the log where that
+   * fails. */
+  explicit Named (std::string name) : text (std::move (name))
+  {
+    if (!text.empty ())
+      read = std::make_shared<const Result<T>> (read_named (text));
+    if (read && !*read)
+      GST_WARNING ("%s", read->error ().message.c_str ());
+  }
+
+  std::string text;
+  std::shared_ptr<const Result<T>> read; ///< null where the text is empty
+
+private:
+  static Result<T> read_named (const std::string &text)
+  {
+    if constexpr (requires { T::load (text); })
+      return T::load (text);
+    else
+      return T::parse (text);
+  }
+};
+
+/** Reads the file of a setting of @p element again, which may have changed
+ * since it was named. Takes the object lock. */
+template <typename T>
+Named<T>
+read_again (gpointer element, Named<T> &named)
+{
+  std::string text;
+  {
+    const ObjectLock lock (element);
+    text = named.text;
+  }
+  Named<T> fresh (std::move (text));
+  const ObjectLock lock (element);
+  return named = std::move (fresh);
+}
+
+template <typename T>
+struct Wire<Named<T>> {
+  static void set (GValue *value, const Named<T> &named)
+  {
+    Wire<std::string>::set (value, named.text);
+  }
+  static Named<T> get (const GValue *value)
+  {
+    return Named<T> (Wire<std::string>::get (value));
+  }
+  static GParamSpec *spec (const char *name, const char *nick,
+      const char *blurb, const Named<T> &standard, GParamFlags flags)
+  {
+    return Wire<std::string>::spec (name, nick, blurb, standard.text, flags);
+  }
+};
+
+} // namespace codedexposure::gst

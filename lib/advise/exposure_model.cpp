@@ -69,12 +69,6 @@ ExposureModel::ExposureModel (const std::optional<Schedule> &schedule,
 }
 
 double
-ExposureModel::open (int element, int slot) const
-{
-  return schedule_ ? schedule_->light (element, slot) : 1.0;
-}
-
-double
 ExposureModel::light (int element) const
 {
   return schedule_ ? schedule_->light (element) : 1.0;

@@ -44,8 +44,6 @@ public:
 
   int elements () const { return observation_.slots (); }
   int slots () const { return observation_.slots (); }
-  /** Light of slot @p slot that an element lets through: 1, or the leak. */
-  double open (int element, int slot) const;
   /** Light of all slots together. */
   double light (int element) const;
   /** The same exposure in parts of the coded frame's white. */

@@ -68,7 +68,7 @@ void read_versioned (const Json &root, const JsonHead &head,
     const std::string &needs, JsonKeys keys);
 
 /** Integers from 0 to @p highest, written without a fraction, as many as there
- * are in @p to. @p rule says what they are: "two integers, x and y". */
+ * are in @p to. @p rule describes them: "two integers, x and y". */
 JsonReader integers_into (
     std::vector<int *> to, int highest, const std::string &rule);
 /** A list of any length. */
@@ -78,11 +78,11 @@ JsonReader integer_into (int &to, int highest);
 
 /** Finite numbers, as many as there are in @p to. */
 JsonReader numbers_into (std::span<double> to);
-/** One. @p rule says what it is: "a number of pixels". */
+/** One. @p rule describes it: "a number of pixels". */
 JsonReader number_into (double &to, const std::string &rule);
 
 /** Parses one JSON text. Also refuses what the parser would accept: a key that
- * an object has twice, because readers disagree on which one counts; nesting
+ * an object has twice, because readers disagree on which one is valid; nesting
  * deeper than any text of this project has, because recursive functions read
  * it; and a zero byte. @p what, such as "schedule", is for the message. */
 Json parse_strictly (std::string_view text, const std::string &what);

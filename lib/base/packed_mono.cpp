@@ -16,7 +16,7 @@ namespace
 {
 
 /* Each reads or writes one row; a row that ends inside a byte or a triple of
- * them needs no more bytes than row_bytes () says. */
+ * them needs no more bytes than row_bytes (). */
 
 /* Two pixels in three bytes; kLow bits of each are in the middle byte. */
 template <int kLow>

@@ -35,7 +35,7 @@ struct Error {
   std::string message;
   ErrorCode code = ErrorCode::invalid_argument;
 
-  /** The same error with @p prefix, which says of what it is, before the
+  /** The same error with @p prefix, which names its subject, before the
    * message. */
   Error with_prefix (const std::string &prefix) const
   {

@@ -48,8 +48,8 @@ store (T *to, Vector<T> v)
   __builtin_memcpy (to, &v, kVectorBytes);
 }
 
-/** Past the caches where that pays, which is with vectors of a whole line; @p
- * to is aligned to a vector. */
+/** A non-temporal store where that is faster, which is with vectors of a whole
+ * line; @p to is aligned to a vector. */
 template <typename T>
 CODEDEXPOSURE_INLINE void
 stream (T *to, Vector<T> v)
@@ -103,7 +103,7 @@ largest_lane (Vector<T> v)
 }
 
 /** Fetches @p bytes bytes before they are needed: rows of large frames end with
- * their page, where the processor loses the trail. They need not exist. */
+ * their page, where the processor stops prefetching. They need not exist. */
 template <typename T>
 CODEDEXPOSURE_INLINE void
 prefetch (const T *from, int bytes)

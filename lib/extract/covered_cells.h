@@ -14,8 +14,8 @@ namespace codedexposure
 {
 
 /**
- * The cells whose pixels, or some of them, are a region's: another code shut
- * and opened them, so they are no picture in the background's.
+ * The cells of which a region has some pixels or all. Another code switched
+ * these, so that the background's code cannot decode them.
  */
 class CoveredCells
 {

@@ -12,14 +12,14 @@ namespace codedexposure
 namespace
 {
 
-/** Takes the dust of the inversion off a factor that is meant to be a multiple
+/** Removes the rounding error of the inversion from a factor that is a multiple
  * of a quarter, as those of a staircase are: such sums are exact. */
 double
 snapped (double factor)
 {
-  constexpr double kDust = 1e-9;
+  constexpr double kRounding = 1e-9;
   const double quarters = std::round (4.0 * factor) / 4.0;
-  return std::abs (factor - quarters) < kDust ? quarters : factor;
+  return std::abs (factor - quarters) < kRounding ? quarters : factor;
 }
 
 } // namespace

@@ -37,7 +37,7 @@ method_for (const Schedule &schedule)
                                                      : Method::kRank;
 }
 
-/** Element of each subframe: the one that is open in the slot of a one-hot
+/** Element of each subframe: the one that is on in the slot of a one-hot
  * code, else the element of that number. */
 std::vector<int>
 elements_by_slot (const Code &code)
@@ -101,16 +101,6 @@ std::string_view
 method_name (Method method)
 {
   return kMethodNames[std::size_t (method)];
-}
-
-Result<Method>
-parse_method (std::string_view name)
-{
-  const auto found = std::ranges::find (kMethodNames, name);
-  if (found == kMethodNames.end ())
-    return Error{"method " + in_quotes (name) +
-                 " is none of auto, rank, select and decode"};
-  return Method (found - kMethodNames.begin ());
 }
 
 std::vector<std::string_view>

@@ -20,13 +20,12 @@ enum class Method {
    * schedule that gets less light than others is decoded for its brightness. */
   kAuto,
   kRank,   ///< subframe k = k-th smallest of the group (paper, Section 3.3)
-  kSelect, ///< subframe k = the element that is open in slot k
+  kSelect, ///< subframe k = the element that is on in slot k
   kDecode, ///< solve the code for the light of each slot
 };
 
 /** "auto", "rank", "select" or "decode". */
 std::string_view method_name (Method method);
-Result<Method> parse_method (std::string_view name);
 
 /** How to extract; the zero value is the default everywhere. */
 struct ExtractOptions {
@@ -52,7 +51,7 @@ struct ExtractOptions {
  * the last one is always "scalar", the readable reference. */
 std::vector<std::string_view> extract_targets ();
 
-/** What one coded frame was seen to hold. */
+/** What was found in one coded frame. */
 struct ExtractReport {
   /** Pixels of the cells that stand at the largest value: their light is
    * unknown. */
@@ -69,12 +68,12 @@ class Extractor
 public:
   /**
    * Of a schedule with regions, it extracts the background: pixels whose cells
-   * a region touches are black, and beside them decode interpolates with what
-   * there is. Each region is extracted by itself, with Schedule::region () and
-   * the pixels of its rectangle.
+   * a region touches are black, and beside them decode interpolates with the
+   * cells that are left. Each region is extracted by itself, with
+   * Schedule::region () and the pixels of its rectangle.
    *
-   * Error when the method needs what the code has not (decode of a singular
-   * code), when a number is out of range, or when the frame holds no cell.
+   * Error when the method cannot be used with the code (decode of a singular
+   * one), when a number is out of range, or when the frame holds no cell.
    * Select of a code that is not one-hot is allowed by name: subframe k is
    * element k then, and exposures have different lengths.
    */
@@ -85,9 +84,9 @@ public:
   Extractor &operator= (Extractor &&) noexcept;
   ~Extractor ();
 
-  /** The method in force, never kAuto. */
+  /** The method that is used, never kAuto. */
   Method method () const;
-  /** The gain in force; 1 where it does not apply. */
+  /** The gain that is used; 1 where it does not apply. */
   double gain () const;
   int subframes () const;
   Extent subframe_size () const;

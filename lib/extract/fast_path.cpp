@@ -394,7 +394,7 @@ FastPath<Pixel>::decode_row (
         to.data ());
 }
 
-/** Counts only where the largest pixel says that there is something to. */
+/** Counts only if the largest pixel, @p peak, is saturated. */
 template <typename Pixel>
 std::uint64_t
 FastPath<Pixel>::saturated (ImageView<const Pixel> coded, RowRange rows,

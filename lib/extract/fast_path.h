@@ -44,11 +44,11 @@ private:
   Extent repeat_;
   bool identity_ = true;
   std::vector<std::uint8_t> places_;
-  std::vector<std::uint8_t> elements_; ///< as far as Layout says
+  std::vector<std::uint8_t> elements_; ///< Layout::element
   std::vector<Pixel> comb_;
 };
 
-/** What is to be done, whoever does it. */
+/** What is to be done, by kernels or by the reference. */
 struct ExtractPlan {
   Method method;
   SampleGrid grid;
@@ -59,8 +59,8 @@ struct ExtractPlan {
 };
 
 /**
- * The plan carried out by kernels: equal to the reference bit for bit. Holds
- * nothing that changes, so that threads can share it.
+ * The plan carried out by kernels: equal to the reference bit for bit. Nothing
+ * in it changes, so that threads can share it.
  */
 template <typename Pixel>
 class FastPath

@@ -51,7 +51,7 @@ group_sort (std::span<T> values, Less &&less = {},
         std::swap (middle, first);
     }
 
-    /* The ends already stand on their side of the median and stop the scans. */
+    /* The ends are already on their side of the median and stop the scans. */
     const T pivot = middle;
     std::size_t low = 0;
     std::size_t high = values.size () - 1;

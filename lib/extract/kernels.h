@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* What an instruction set offers to extraction: the border between the plan
- * and the files that are compiled once per instruction set. */
+/* The kernels of extraction: the interface between the plan and the files that
+ * are compiled once per instruction set. */
 #pragma once
 
 #include <cstddef>
@@ -32,7 +32,7 @@ template <typename Pixel>
 struct Planes {
   Pixel *const *rows;
   std::ptrdiff_t stride;
-  /** Write past the caches, with vectors of 64 bytes only; all rows[k] lie
+  /** Use non-temporal stores, with vectors of 64 bytes only; all rows[k] lie
    * equally to such lines. */
   bool stream = false;
 };
@@ -119,7 +119,7 @@ struct Kernels {
   /** Pixels that are not below @p largest. */
   std::uint64_t (*count) (const Pixel *row, int pixels, Pixel largest);
 
-  /** Makes streamed stores visible to the threads that are told of them. */
+  /** Makes non-temporal stores visible to other threads. */
   void (*fence) ();
 };
 

@@ -8,7 +8,7 @@ namespace codedexposure
 {
 
 /** Rows of subframes that start at multiples of this many bytes can be written
- * past the caches from the first pixel on. */
+ * with non-temporal stores from the first pixel on. */
 constexpr std::size_t kRowAlignment = 64;
 
 /**
@@ -16,8 +16,8 @@ constexpr std::size_t kRowAlignment = 64;
  *
  * A kernel writes the same place of all subframes at once. Where all of them
  * start at the same place of a 4 KiB page, as large allocations do, these
- * writes fall on the same set of the first-level cache and throw each other
- * out. Three lines from one subframe to the next use all 64 sets in turn.
+ * writes share one set of the first-level cache and evict each other. Three
+ * lines from one subframe to the next use all 64 sets in turn.
  */
 constexpr std::size_t
 plane_stagger (int k)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Extraction pixel by pixel: slow, readable, and the truth that the kernels
- * must equal bit for bit. */
+/* Extraction pixel by pixel: slow and readable. The kernels must equal it bit
+ * for bit. */
 #pragma once
 
 #include <cstdint>

@@ -12,7 +12,7 @@ namespace codedexposure::CODEDEXPOSURE_TARGET
 /** Kernels::select where elements stand at one place throughout a row. All
  * cells of a row are worked on before the next Together of their pixel rows, so
  * that only as many subframes are written at a time: many more than a hundred
- * would be more pages than the processor keeps at hand. Together divides the
+ * would be more pages than the TLB of the processor holds. Together divides the
  * height of a cell, and 0 stands for all of it; unless it is 1, every element
  * is at the place of its own number. */
 template <int Width, int Together, typename T>

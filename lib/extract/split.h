@@ -158,7 +158,7 @@ struct PutStream {
 };
 
 /** for_strips () with non-temporal stores. A line that is written both ways
- * costs a trip to memory, so what lies before the first whole line and after
+ * costs an access to memory, so what lies before the first whole line and after
  * the last is written by single lanes. */
 template <typename T, typename Body>
 CODEDEXPOSURE_INLINE void

@@ -76,9 +76,9 @@ make_part (const Schedule &whole, int region, const SplitFormat &format,
   const Schedule &decoded = region < 0 ? whole : whole.region (region);
   options.gain *= double (decoded.code ().slots ()) / whole.code ().slots ();
   const Extent size{rect.width, rect.height};
-  ASSIGN_OR_RETURN (auto extractor,
-      format.wide ? make_extractor<std::uint16_t> (decoded, size, options)
-                  : make_extractor<std::uint8_t> (decoded, size, options));
+  const auto make = format.wide ? make_extractor<std::uint16_t>
+                                : make_extractor<std::uint8_t>;
+  ASSIGN_OR_RETURN (auto extractor, make (decoded, size, options));
   SplitPart part{region, region < 0 ? whole.background () : decoded, rect,
       std::move (extractor), {}, {}};
   part.boundaries = even_steps (format.rate, part.schedule.slots ());

@@ -29,10 +29,10 @@ struct LightWindow {
  *
  * decode, and select of a one-hot code, give one slot; select and rank of
  * another code, all slots from the first to the last in which the element is
- * on; rank, where exposures are equally long and do not tell elements apart,
- * the whole exposure.
+ * on; rank, where exposures are equally long and elements cannot be
+ * distinguished, the whole exposure.
  *
- * @p method  the one in force, not kAuto.
+ * @p method  the one that is used, not kAuto.
  */
 std::vector<LightWindow> light_windows (
     const Schedule &part, Method method, const SlotPlan &slots);

@@ -15,10 +15,10 @@
 namespace codedexposure
 {
 
-/** What a homography adds to is this much off, in mirrors, on a grid of camera
- * places: node (i, j) stands at (i (w - 1) / (columns - 1), j (h - 1) / (rows -
- * 1)), so that the grid's corners are those of the frame. Between nodes it is
- * bilinear, beyond the frame that of the border. */
+/** What is added to the homography, in mirrors, on a grid of camera places:
+ * node (i, j) stands at (i (w - 1) / (columns - 1), j (h - 1) / (rows - 1)), so
+ * that the grid's corners are those of the frame. Between nodes it is bilinear,
+ * beyond the frame that of the border. */
 struct Displacement {
   int columns = 0;
   int rows = 0;
@@ -39,7 +39,7 @@ struct Pose {
   /** Part by which the mapping is no similarity there: ratio of the larger to
    * the smaller of the two magnifications, less 1. */
   double stretch = 0.0;
-  bool flipped = false; ///< one of both is seen as in a mirror
+  bool flipped = false; ///< the image is mirrored
 };
 
 /**
@@ -125,7 +125,7 @@ public:
 
   /** The homography on ((x - cx) / r, (y - cy) / r, 1), with (cx, cy) the
    * centre of the frame, r half its longer side, less one, and the last number
-   * 1. These are the parameters that the covariance speaks of. */
+   * 1. These are the parameters of the covariance. */
   Homography centred () const;
   static Result<Mapping> from_centred (
       Extent camera, Extent mirrors, const Homography &centred);

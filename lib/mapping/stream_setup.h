@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* What a stream says of itself: its schedule and, if known, its mapping. */
+/* What a stream carries in its tag: its schedule and, if known, its mapping. */
 #pragma once
 
 #include <optional>

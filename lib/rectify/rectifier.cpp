@@ -198,7 +198,7 @@ try {
   const Extent mirrors = mapping.mirrors ();
   RETURN_IF_ERROR (schedule.check_size (mirrors.width, mirrors.height));
   const double magnification = mapping.pose ().magnification;
-  auto plan = std::make_unique<Plan> ();
+  auto plan = std::make_shared<Plan> ();
   plan->taps = taps_for (magnification);
   if (plan->taps == 0)
     return Error{
@@ -222,14 +222,10 @@ try {
   return out_of_memory ();
 }
 
-Rectifier::Rectifier (std::unique_ptr<const Plan> plan)
+Rectifier::Rectifier (std::shared_ptr<const Plan> plan)
     : plan_ (std::move (plan))
 {
 }
-
-Rectifier::Rectifier (Rectifier &&) noexcept = default;
-Rectifier &Rectifier::operator= (Rectifier &&) noexcept = default;
-Rectifier::~Rectifier () = default;
 
 Extent
 Rectifier::camera () const

@@ -69,10 +69,6 @@ public:
    * camera sees none of them, or memory for the weights is not available. */
   static Result<Rectifier> make (const Mapping &mapping,
       const Schedule &schedule, const RectifyOptions &options = {});
-  Rectifier (Rectifier &&) noexcept;
-  Rectifier &operator= (Rectifier &&) noexcept;
-  ~Rectifier ();
-
   /** Sizes of the input and the output of run (). */
   Extent camera () const;
   Extent mirrors () const;
@@ -96,8 +92,8 @@ public:
 
 private:
   struct Plan;
-  explicit Rectifier (std::unique_ptr<const Plan> plan);
-  std::unique_ptr<const Plan> plan_;
+  explicit Rectifier (std::shared_ptr<const Plan> plan);
+  std::shared_ptr<const Plan> plan_;
 };
 
 } // namespace codedexposure

@@ -252,12 +252,12 @@ Code::inverse (double leak) const
       light.push_back (this->light (e, s, leak));
   auto inverse = inverted (light, std::size_t (n_));
   if (!inverse)
-    return Error{"code '" + name_ + "' of " + std::to_string (n_) +
-                 " elements cannot be inverted at a leak of " +
-                 real_text (leak) +
-                 ": its rows are not independent, or nearly so, and the light "
-                 "of single slots cannot be told; use rank, or a code such as "
-                 "sequential"};
+    return Error{
+        "code '" + name_ + "' of " + std::to_string (n_) +
+        " elements cannot be inverted at a leak of " + real_text (leak) +
+        ": its rows are not independent, or nearly so, and the light "
+        "of single slots cannot be solved for; use rank, or a code such as "
+        "sequential"};
   return *std::move (inverse);
 }
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The binary matrix that says in which slots each element is on. */
+/* The binary matrix of the slots in which each element is on. */
 #pragma once
 
 #include <cstdint>

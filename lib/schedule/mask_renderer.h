@@ -14,7 +14,7 @@
 namespace codedexposure
 {
 
-/** Rows of mirrors, of which each distinct one is there once. */
+/** Rows of mirrors; each distinct one is stored once. */
 template <typename Mirror>
 struct MirrorRows {
   Image<Mirror> distinct;

@@ -16,7 +16,7 @@ inverted (const Matrix &a, std::size_t n)
   const Eigen::Map<const Square> matrix (a.data (), size, size);
   const Square inverse = matrix.partialPivLu ().inverse ();
   const Square residual = matrix * inverse - Square::Identity (size, size);
-  /* Not so for what is no number, either. */
+  /* NaN must fail, too. */
   if (!(residual.array ().abs () <= kMaxResidual).all ())
     return std::nullopt;
   return Matrix (inverse.data (), inverse.data () + inverse.size ());

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* A strip of mirrors with a code of its own that makes the phase of the masks
- * visible on any scene. */
+/* A strip of mirrors with a code of its own, which shows the phase of the masks
+ * with any scene. */
 #pragma once
 
 #include <bit>
@@ -13,15 +13,15 @@ namespace codedexposure
  * on a still scene a code of one frame cannot show that the masks are shifted
  * by whole slots. The pilot therefore has a period of two frames. Each of its
  * columns is on in one mask out of 2 N. In phase, a frame lights columns of
- * masks 0 .. N-1 only or of masks N .. 2N-1 only, whatever the light does;
+ * masks 0 .. N-1 only or of masks N .. 2N-1 only, whatever the light;
  * masks that come late light columns at the end of the other half as well,
  * those that come early columns at its start.
  *
  * One slot a column, because that is what a sensor set for a one-hot code can
  * take. The columns repeat; in each turn their masks ascend, so that lit
  * columns lie side by side and the blur of a lens matters at two places only.
- * The masks lie close at the borders of the two frames, where a slip shows
- * first.
+ * The masks lie close at the borders of the two frames, where a loss of
+ * synchronisation shows first.
  */
 constexpr int kPilotColumns = 32;
 

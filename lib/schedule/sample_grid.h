@@ -30,8 +30,8 @@ public:
     const int at = (j % repeat_.height) * repeat_.width + i % repeat_.width;
     return offsets_[std::size_t (at * elements_ + element)];
   }
-  /** Size of the subframes of a coded frame; what is left over at the right
-   * and at the bottom, and the pilot's rows, belong to no subframe. */
+  /** Size of the subframes of a coded frame; columns and rows beyond
+   * the last whole cell, and the pilot's rows, belong to no subframe. */
   Extent subframe_size (int coded_width, int coded_height) const;
 
 private:

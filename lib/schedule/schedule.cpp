@@ -69,8 +69,7 @@ check_numbers (const Schedule::Parts &parts)
   return {};
 }
 
-/** sequential:2x2, spelt out: nothing but a lack of memory speaks against it.
- */
+/** sequential:2x2. It can fail only for lack of memory. */
 Schedule::Parts
 default_parts ()
 {

@@ -42,10 +42,10 @@ struct Region {
  *
  * Regions have their own tile and code; tile and code of the schedule are those
  * of the rest, the background. All share one exposure: it has as many slots as
- * the least common multiple L of the codes' says, and a code of n slots holds
- * each of its masks for L / n of them. background () and region () are the
- * schedules of the parts, which pictures are extracted with; what shows masks
- * or collects light takes the whole.
+ * the least common multiple L of those of all codes, and a code of n slots
+ * holds each of its masks for L / n of them. background () and region () are
+ * the schedules of the parts, which pictures are extracted with; what shows
+ * masks or collects light takes the whole.
  */
 class Schedule
 {
@@ -78,7 +78,7 @@ public:
     bool operator== (const Parts &) const = default;
   };
 
-  /** sequential:2x2, which stands wherever nothing else is said. */
+  /** sequential:2x2, the default everywhere. */
   Schedule ();
   /** Error when tile and code differ in n, the order is no permutation, the
    * tile has no cell at this phase, a number is out of its range, or regions

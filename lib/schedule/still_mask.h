@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* A mask that stands still: what mirrors show while a bench is measured. */
+/* A mask that does not change, for measuring a bench. */
 #pragma once
 
 #include <functional>
@@ -10,18 +10,18 @@ namespace codedexposure
 
 /** One mask in place of a schedule's, the same in every exposure. */
 struct StillMask {
-  std::string name; ///< for people
+  std::string name; ///< for messages
   /** Whether pixel (x, y) of the tile is on; x, y >= 0. Called from other
    * threads, also at the same time. */
   std::function<bool (int x, int y)> on;
-  /** Slots of the schedule, from the first on, for which it stands in every
+  /** Slots of the schedule, from the first on, for which it is shown in every
    * exposure; the mirrors are off in the others. */
   int slots = 1;
 };
 
 /** Index of the still mask where those of a schedule are 0, 1, ... */
 constexpr int kStillMask = 1 << 20;
-/** Index of no mask: every mirror is off, but not for want of a start. */
+/** Index of no mask: the DMD runs, but every mirror is off. */
 constexpr int kOffMask = -2;
 
 } // namespace codedexposure

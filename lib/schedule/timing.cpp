@@ -42,10 +42,11 @@ Result<SlotPlan>
 SlotPlan::fit (const Timing &timing, int slots, FrameRate rate)
 {
   if (rate.num <= 0 || rate.den <= 0)
-    return Error{"a frame rate of " + std::to_string (rate.num) + "/" +
-                 std::to_string (rate.den) +
-                 " leaves the length of the slots open; set a frame rate above "
-                 "0"};
+    return Error{
+        "a frame rate of " + std::to_string (rate.num) + "/" +
+        std::to_string (rate.den) +
+        " does not set the length of the slots; set a frame rate above "
+        "0"};
   const Nanoseconds period = rate.period ();
   const std::string at = " at " + std::to_string (rate.num) + "/" +
                          std::to_string (rate.den) + " frames/s (" +

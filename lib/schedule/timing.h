@@ -31,8 +31,8 @@ struct FrameRate {
 };
 
 /**
- * What a schedule fixes of its slots. The frame period belongs to the camera
- * and comes with the caps; fit () joins the two.
+ * What a schedule fixes of its slots. The frame period is the camera's
+ * and comes with the caps; fit () combines both.
  */
 struct Timing {
   /** Time for which a mask is shown, t_i; 0: all that the frame period leaves,
@@ -40,14 +40,15 @@ struct Timing {
   Nanoseconds active = 0;
   /** Time between two masks in which the mirrors move, t_r. */
   Nanoseconds switching = 0;
-  /** Time at the end of the frame in which the camera is blind. */
+  /** Time at the end of the frame in which the camera collects no light (dead
+   * time). */
   Nanoseconds readout = 0;
 
   bool operator== (const Timing &) const = default;
 };
 
-/** The slots of one frame: slot s is open in [start (s), start (s) + active),
- * counted from the start of the exposure. */
+/** The slots of one frame: the mask of slot s is shown in [start (s), start (s)
+ * + active), counted from the start of the exposure. */
 class SlotPlan
 {
 public:

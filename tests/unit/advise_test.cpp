@@ -210,8 +210,8 @@ centred (const Schedule &schedule, const ExposureModel &model,
     for (int x = 0; x < kSide; x++) {
       double value = coded.at (x, y) * white;
       for (int s = 0; s < model.slots (); s++)
-        value -=
-            model.open (schedule.element_at (x, y), s) * conditions.scene.level;
+        value -= schedule.light (schedule.element_at (x, y), s) *
+                 conditions.scene.level;
       result.at (x, y) = float (value);
     }
   return result;

@@ -287,8 +287,6 @@ TEST (Extract, WhatCannotBeIsRefusedByNameRuleAndRemedy)
   EXPECT_NE (refusal ({.target = "z80"}).find ("'z80'"), std::string::npos);
   EXPECT_NE (refusal ({}, "sequential:16x16").find ("no cell of 16x16"),
       std::string::npos);
-  EXPECT_FALSE (parse_method ("sort"));
-  EXPECT_EQ (*parse_method ("rank"), Method::kRank);
   EXPECT_EQ (method_name (Method::kDecode), "decode");
 }
 

@@ -179,12 +179,12 @@ difference_rows (const Block<T> &block, Step<T> step, const Planes<T> &to)
 template <typename T>
 using DifferenceRows = T (*) (const Block<T> &, Step<T>, const Planes<T> &);
 
-template <int Width, typename T>
+template <int Width, int Height, typename T>
 constexpr DifferenceRows<T>
 difference_rows_or_null ()
 {
   if constexpr (has_own_code (Width))
-    return difference_rows<Width, 0, T>;
+    return difference_rows<Width, Height, T>;
   else
     return nullptr;
 }
@@ -199,23 +199,24 @@ difference_rows_of (const Block<T> &block, std::integer_sequence<int, Width...>)
     DifferenceRows<T> run;
   };
   static constexpr Small kSmall[] = {
-      {2, 1, difference_rows<2, 1, T>},
-      {3, 1, difference_rows<3, 1, T>},
-      {2, 2, difference_rows<2, 2, T>},
-      {5, 1, difference_rows<5, 1, T>},
-      {3, 2, difference_rows<3, 2, T>},
-      {7, 1, difference_rows<7, 1, T>},
-      {4, 2, difference_rows<4, 2, T>},
-      {3, 3, difference_rows<3, 3, T>},
-      {5, 2, difference_rows<5, 2, T>},
-      {4, 3, difference_rows<4, 3, T>},
-      {5, 3, difference_rows<5, 3, T>},
-      {4, 4, difference_rows<4, 4, T>},
+      {2, 1, difference_rows_or_null<2, 1, T> ()},
+      {3, 1, difference_rows_or_null<3, 1, T> ()},
+      {2, 2, difference_rows_or_null<2, 2, T> ()},
+      {5, 1, difference_rows_or_null<5, 1, T> ()},
+      {3, 2, difference_rows_or_null<3, 2, T> ()},
+      {7, 1, difference_rows_or_null<7, 1, T> ()},
+      {4, 2, difference_rows_or_null<4, 2, T> ()},
+      {3, 3, difference_rows_or_null<3, 3, T> ()},
+      {5, 2, difference_rows_or_null<5, 2, T> ()},
+      {4, 3, difference_rows_or_null<4, 3, T> ()},
+      {5, 3, difference_rows_or_null<5, 3, T> ()},
+      {4, 4, difference_rows_or_null<4, 4, T> ()},
   };
   static constexpr DifferenceRows<T> kAll[] = {
-      difference_rows_or_null<Width, T> ()...};
+      difference_rows_or_null<Width, 0, T> ()...};
   for (const Small &small : kSmall)
-    if (small.width == block.width && small.height == block.height)
+    if (small.run && small.width == block.width &&
+        small.height == block.height)
       return small.run;
   const bool fits =
       std::ptrdiff_t (block.cells) * block.rows * std::ptrdiff_t (sizeof (T)) <=

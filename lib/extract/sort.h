@@ -266,30 +266,43 @@ rank_in_registers (const Block<T> &block, const Planes<T> &to)
 }
 
 template <typename T>
+using Rank = T (*) (const Block<T> &, const Planes<T> &);
+
+template <int Width, int Height, typename T>
+constexpr Rank<T>
+rank_or_null ()
+{
+  if constexpr (has_own_code (Width))
+    return rank_in_registers<Width, Height, T>;
+  else
+    return nullptr;
+}
+
+template <typename T>
 T
 rank (const Block<T> &block, const Planes<T> &to)
 {
   /* The squarest cells of 2 to 16 pixels. */
   struct Own {
     int width, height;
-    T (*run) (const Block<T> &, const Planes<T> &);
+    Rank<T> run;
   };
   static constexpr Own kOwn[] = {
-      {2, 1, rank_in_registers<2, 1, T>},
-      {3, 1, rank_in_registers<3, 1, T>},
-      {2, 2, rank_in_registers<2, 2, T>},
-      {5, 1, rank_in_registers<5, 1, T>},
-      {3, 2, rank_in_registers<3, 2, T>},
-      {7, 1, rank_in_registers<7, 1, T>},
-      {4, 2, rank_in_registers<4, 2, T>},
-      {3, 3, rank_in_registers<3, 3, T>},
-      {5, 2, rank_in_registers<5, 2, T>},
-      {4, 3, rank_in_registers<4, 3, T>},
-      {5, 3, rank_in_registers<5, 3, T>},
-      {4, 4, rank_in_registers<4, 4, T>},
+      {2, 1, rank_or_null<2, 1, T> ()},
+      {3, 1, rank_or_null<3, 1, T> ()},
+      {2, 2, rank_or_null<2, 2, T> ()},
+      {5, 1, rank_or_null<5, 1, T> ()},
+      {3, 2, rank_or_null<3, 2, T> ()},
+      {7, 1, rank_or_null<7, 1, T> ()},
+      {4, 2, rank_or_null<4, 2, T> ()},
+      {3, 3, rank_or_null<3, 3, T> ()},
+      {5, 2, rank_or_null<5, 2, T> ()},
+      {4, 3, rank_or_null<4, 3, T> ()},
+      {5, 3, rank_or_null<5, 3, T> ()},
+      {4, 4, rank_or_null<4, 4, T> ()},
   };
   for (const Own &own : kOwn)
-    if (own.width == block.width && own.height == block.height)
+    if (own.run && own.width == block.width && own.height == block.height)
       return own.run (block, to);
   return rank_any (block, to);
 }

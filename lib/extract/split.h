@@ -201,9 +201,18 @@ for_strips (int cells, [[maybe_unused]] const T *to,
  * piece of an output row. */
 constexpr int kOwnWidths = 16;
 
+/* Plain x86-64 cannot permute bytes: the compiler would move them one by one. */
+#if defined __SSE2__ && !defined __SSSE3__
+constexpr bool kPermutesBytes = false;
+#else
+constexpr bool kPermutesBytes = true;
+#endif
+
 constexpr bool
 has_own_code (int width)
 {
+  if (!kPermutesBytes)
+    return width == 1 || width == 2 || width == 4 || width == 8;
   return (width >= 1 && width <= 10) || width == 12 || width == 16;
 }
 

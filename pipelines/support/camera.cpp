@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure-camera: an emulated GigE Vision camera that serves the coded
  * frames of a GStreamer pipeline. */
+#include <algorithm>
 #include <atomic>
 #include <csignal>
 #include <cstdio>

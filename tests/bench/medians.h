@@ -29,7 +29,7 @@ public:
   void ReportRuns (const std::vector<Run> &runs) override
   {
     for (const Run &run : runs)
-      if (run.run_type == Run::RT_Iteration && !run.error_occurred)
+      if (run.run_type == Run::RT_Iteration && !was_skipped (run))
         times_[run.run_name.function_name].push_back (
             run.cpu_accumulated_time / double (run.iterations));
   }
@@ -45,6 +45,16 @@ public:
   }
 
 private:
+  /* The field got another name with version 1.8. */
+  template <typename AnyRun>
+  static bool was_skipped (const AnyRun &run)
+  {
+    if constexpr (requires { run.error_occurred; })
+      return run.error_occurred;
+    else
+      return bool (run.skipped);
+  }
+
   std::map<std::string, std::vector<double>> times_;
 };
 

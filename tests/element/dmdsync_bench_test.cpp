@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* dmdsync after the simulated bench whose mirrors it controls: a slip of the
  * DMD is detected, reported, flagged and corrected. */
+#include <algorithm>
+
 #include "bench/simulated_dmd.h"
 #include "sync_bench.h"
 

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* dmdsync with frames that are incomplete, packed, in reused memory, or at
  * another rate. */
+#include <algorithm>
+
 #include "base/packed_mono.h"
 #include "sync_harness.h"
 

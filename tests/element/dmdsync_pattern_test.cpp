@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* dmdsync shows patterns on request from downstream, marks their frames, and
  * returns to the schedule. */
+#include <algorithm>
+#include <array>
+
 #include "bench/simulated_dmd.h"
 #include "calibrate/gratings.h"
 #include "sync_bench.h"

@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* dmdsync without a DMD: tags, caps and synchronisation of a stream. */
+#include <array>
+
 #include "common/tag.h"
 #include "sync_harness.h"
 

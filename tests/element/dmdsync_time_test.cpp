@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* dmdsync after a camera that stamps frames with its own clock. */
 #include <cmath>
+#include <optional>
 #include <random>
 
 #include "sync_harness.h"

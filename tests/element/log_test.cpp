@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure-log: one correct line of JSON for each frame, written
  * immediately. */
+#include <algorithm>
 #include <cstdio>
 #include <fstream>
 #include <memory>

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* moirecalib after a simulated bench: readings, states and the mapping; and its
  * errors without a dmdsync. */
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 
 #include "bench/lens.h"

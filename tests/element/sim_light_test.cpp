@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure-sim: pixel values of coded frames. */
+#include <algorithm>
 #include <cmath>
 
 #include "schedule/schedule.h"

@@ -3,6 +3,7 @@
  * driver uploads masks to a DLPC900 on the USB, the camera sees the scene
  * through the mirrors that the board shows, aravissrc reads it over the
  * network, and what is split, recorded and decoded again is the scene. */
+#include <algorithm>
 #include <atomic>
 #include <cstdio>
 #include <filesystem>

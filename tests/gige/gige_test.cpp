@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* A camera in software, read by codedexposure-camerasrc and by the unmodified
  * aravissrc, with dmdsync behind them. */
+#include <algorithm>
+#include <chrono>
 #include <condition_variable>
 #include <cstdlib>
 #include <latch>

@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Cameras that stop, are killed and come back in the middle of a run. */
+#include <algorithm>
+#include <chrono>
 #include <condition_variable>
 #include <mutex>
 

@@ -2,6 +2,7 @@
 /* OpenCV's methods to measure the pose of a camera, on the same bench. */
 #include "moire_rivals.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Accuracy of calibrations on the simulated bench: the tables of
  * docs/calibration.md. */
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <iostream>

@@ -5,6 +5,8 @@
 #pragma once
 
 #include <array>
+#include <map>
+#include <optional>
 
 #include "emulated_hid.h"
 

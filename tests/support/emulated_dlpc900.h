@@ -4,7 +4,10 @@
  * not from the driver. */
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <map>
+#include <optional>
 
 #include "emulated_hid.h"
 #include "spld_decoder.h"

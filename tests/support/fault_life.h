@@ -2,8 +2,10 @@
 /* A sequence of calls to a driver whose board fails. */
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <functional>
+#include <memory>
 #include <random>
 
 #include "dmd_rig.h"

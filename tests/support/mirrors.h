@@ -2,6 +2,7 @@
 /* Masks, mirror by mirror: by the rule, and as the library renders them. */
 #pragma once
 
+#include <algorithm>
 #include <numeric>
 
 #include "dmd/plane_image.h"

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <deque>
+#include <memory>
 
 #include <gst/app/gstappsink.h>
 #include <gst/app/gstappsrc.h>

@@ -3,6 +3,8 @@
  * DMDs are those of the test. */
 #pragma once
 
+#include <array>
+
 #include "common/meta.h"
 #include "harness.h"
 #include "linked_elements.h"

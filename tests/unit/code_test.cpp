@@ -2,6 +2,7 @@
 /* Named and written codes, and their inverses. */
 #include "schedule/code.h"
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 

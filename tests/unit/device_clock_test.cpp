@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* The clock of a camera, fitted to the pipeline clock from jittery arrivals. */
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <functional>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* The bytes of requests to DLPC350 and DLPC900, and the parsing of replies. */
+#include <algorithm>
 #include <functional>
 
 #include <gtest/gtest.h>

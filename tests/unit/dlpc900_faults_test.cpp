@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Commands that the emulated DLPC900 rejects, and the driver's handling of
  * rejections and faults. */
+#include <memory>
+
 #include "dlpc900_rig.h"
 #include "dmd/dlpc900_protocol.h"
 #include "fault_life.h"

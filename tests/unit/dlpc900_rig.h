@@ -2,6 +2,8 @@
 /* The DLPC900 driver on an emulated board. */
 #pragma once
 
+#include <memory>
+
 #include "dmd/drivers.h"
 #include "dmd_rig.h"
 #include "emulated_dlpc900.h"

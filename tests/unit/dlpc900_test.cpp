@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* The DLPC900 driver with an emulated board: received masks, tables for both
  * triggers, and data that is not sent twice. */
+#include <chrono>
+
 #include "dlpc900_rig.h"
 #include "dmd/dlpc900_protocol.h"
 #include "hex.h"

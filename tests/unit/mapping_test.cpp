@@ -2,6 +2,7 @@
 /* Mappings: both directions, the derived pose, and the JSON form. */
 #include "mapping/mapping.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <numbers>

@@ -2,6 +2,7 @@
 /* The simulated bench: exact pixel values of coded frames. */
 #include "bench/bench.h"
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <numbers>

@@ -3,6 +3,7 @@
  * standard errors cannot fail by chance. */
 #include "bench/sensor.h"
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 

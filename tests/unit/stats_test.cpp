@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* The figures of pictures, and lines across them. */
+#include <algorithm>
 #include <cstdint>
 #include <numeric>
 #include <string>

@@ -2,6 +2,7 @@
 /* The phase of the tile, measured from a coded frame. */
 #include "calibrate/tile_phase.h"
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 

@@ -3,6 +3,7 @@
 #include "schedule/tile.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <optional>
 

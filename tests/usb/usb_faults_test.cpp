@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Random faults of boards under the unmodified libusb: no call hangs, nothing
  * leaks, and the mirrors are stopped at the end. */
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <thread>

@@ -194,43 +194,43 @@ advise (Session &session, Arguments arguments)
 
 } // namespace
 
-void
-add_advise_command (CLI::App &app, Session &session)
+Command
+advise_command (Session &session)
 {
-  auto *sub = app.add_subcommand (
-      "advise", "Predict the accuracy of schedules and recommend one");
   const auto arguments = std::make_shared<Arguments> ();
-  Conditions &conditions = arguments->conditions;
-  sub->add_option ("schedules", arguments->schedules,
-      "CODE:TILE[,key=value...] or JSON files; default: the usual ones");
-  sub->add_option (
-      "--size", arguments->size, "Size of the camera, WIDTHxHEIGHT");
-  add_rate_option (sub, session);
-  sub->add_option ("--full-well", conditions.camera.noise.full_well,
-      "Full-well capacity of a pixel, e-");
-  sub->add_option (
-      "--read-noise", conditions.camera.noise.read_noise, "Read noise, e- rms");
-  sub->add_option ("--bits", conditions.camera.bits, "Bits of a pixel");
-  sub->add_option ("--readout", arguments->readout,
-      "Dead time of the camera at the end of a frame, such as 500us");
-  add_board_option (sub, session);
-  sub->add_option ("--light", conditions.light,
-      "Electrons at white in a frame without masks, as a part of the full "
-      "well");
-  sub->add_option ("--speed", conditions.scene.speed,
-      "Speed of motion, pixels of the coded frame per second");
-  sub->add_option ("--detail", conditions.scene.detail,
-      "Size of details, pixels of the coded frame");
-  sub->add_option ("--contrast", conditions.scene.contrast,
-      "Standard deviation of the scene, as a part of white");
-  sub->add_option ("--level", conditions.scene.level,
-      "Mean of the scene, as a part of white");
-  sub->add_option (
-      "--min-rate,--least-rate", arguments->min_rate, "Min subframes/s");
-  for (CLI::Option *option : sub->get_options ())
-    if (option->get_name () != "--help" && option->get_name () != "schedules")
-      option->capture_default_str ();
-  sub->callback ([&session, arguments] { advise (session, *arguments); });
+  auto &[camera, light, scene] = arguments->conditions;
+  return {.name = "advise",
+      .help = "Predict the accuracy of schedules and recommend one",
+      .options =
+          {
+              {"schedules", &arguments->schedules,
+                  "CODE:TILE[,key=value...] or JSON files; default: the usual "
+                  "ones"},
+              {"--size", &arguments->size, "Size of the camera, WIDTHxHEIGHT"},
+              rate_option (session),
+              {"--full-well", &camera.noise.full_well,
+                  "Full-well capacity of a pixel, e-"},
+              {"--read-noise", &camera.noise.read_noise, "Read noise, e- rms"},
+              {"--bits", &camera.bits, "Bits of a pixel"},
+              {"--readout", &arguments->readout,
+                  "Dead time of the camera at the end of a frame, such as "
+                  "500us"},
+              board_option (session),
+              {"--light", &light,
+                  "Electrons at white in a frame without masks, as a part of "
+                  "the full well"},
+              {"--speed", &scene.speed,
+                  "Speed of motion, pixels of the coded frame per second"},
+              {"--detail", &scene.detail,
+                  "Size of details, pixels of the coded frame"},
+              {"--contrast", &scene.contrast,
+                  "Standard deviation of the scene, as a part of white"},
+              {"--level", &scene.level,
+                  "Mean of the scene, as a part of white"},
+              {"--min-rate,--least-rate", &arguments->min_rate,
+                  "Min subframes/s"},
+          },
+      .run = [&session, arguments] { advise (session, *arguments); }};
 }
 
 } // namespace codedexposure::tool

@@ -275,53 +275,50 @@ selftest (Session &session)
 
 } // namespace
 
-void
-add_dmd_commands (CLI::App &app, Session &session)
+Command
+dmd_commands (Session &session)
 {
-  auto *dmd = app.add_subcommand ("dmd", "Control DMD boards");
-  dmd->require_subcommand (1);
   const auto arguments = std::make_shared<Arguments> ();
-  const auto add = [&] (const char *name, const char *help, auto command) {
-    auto *sub = dmd->add_subcommand (name, help);
-    sub->callback ([&session, arguments, command] {
+  const auto calls = [&session, arguments] (auto command) {
+    return [&session, arguments, command] {
       if constexpr (std::is_invocable_v<decltype (command), Session &>)
         command (session);
       else
         command (session, *arguments);
-    });
-    return sub;
+    };
   };
-  const auto with_device = [&] (CLI::App *sub) {
-    sub->add_option ("device", session.device,
-        "usb:[PORT|SERIAL], lightcrafter:[HOST] or sim:NAME");
-    return sub;
+  const auto describe_board = [] (Session &s) {
+    s.print (describe (open (s)->info ()));
   };
-  const auto with_schedule = [&] (CLI::App *sub) {
-    add_schedule_argument (with_device (sub), session);
-    add_rate_option (sub, session);
-    return sub;
-  };
-  const auto with_duration = [&] (CLI::App *sub) {
-    with_schedule (sub)->add_option (
-        "--for", arguments->duration, "Stop after this time, such as 10s");
-    return sub;
-  };
-
-  add ("list", "List the boards on the USB", list);
-  with_device (add ("info", "Show the limits of a board",
-      [] (Session &s) { s.print (describe (open (s)->info ())); }));
-  with_device (add ("status", "Show the state of a board", status));
-  with_schedule (add ("upload", "Upload the masks of a schedule", upload))
-      ->add_flag (
-          "--predict", arguments->predict, "Only predict the upload time");
-  with_duration (
-      add ("start", "Upload masks and show them until Ctrl-C", start));
-  with_duration (add ("show", "Show one static mask, for alignment", show))
-      ->add_option ("--mask", arguments->mask,
-          "Number of a mask of the schedule, on, or off");
-  with_device (add ("stop", "Stop a board", stop));
-  with_device (add ("guard", "", guard))->group (""); // StopGuard's other side
-  with_device (add ("selftest", "Test upload, start and stop", selftest));
+  const Option device = {"device", &session.device,
+      "usb:[PORT|SERIAL], lightcrafter:[HOST] or sim:NAME"};
+  const Option schedule = schedule_argument (session);
+  const Option rate = rate_option (session);
+  const Option duration = {
+      "--for", &arguments->duration, "Stop after this time, such as 10s"};
+  const Option predict = {
+      "--predict", &arguments->predict, "Only predict the upload time"};
+  const Option mask = {"--mask", &arguments->mask,
+      "Number of a mask of the schedule, on, or off"};
+  return {.name = "dmd",
+      .help = "Control DMD boards",
+      .commands = {
+          {"list", "List the boards on the USB", {}, calls (list)},
+          {"info", "Show the limits of a board", {device},
+              calls (describe_board)},
+          {"status", "Show the state of a board", {device}, calls (status)},
+          {"upload", "Upload the masks of a schedule",
+              {device, schedule, rate, predict}, calls (upload)},
+          {"start", "Upload masks and show them until Ctrl-C",
+              {device, schedule, rate, duration}, calls (start)},
+          {"show", "Show one static mask, for alignment",
+              {device, schedule, rate, duration, mask}, calls (show)},
+          {"stop", "Stop a board", {device}, calls (stop)},
+          /* What StopGuard starts; not for users. */
+          {"guard", "", {device}, calls (guard)},
+          {"selftest", "Test upload, start and stop", {device},
+              calls (selftest)},
+      }};
 }
 
 } // namespace codedexposure::tool

@@ -7,6 +7,8 @@
 #include <numeric>
 #include <thread>
 
+#include <CLI/CLI.hpp>
+
 #include "base/text.h"
 #include "bench/simulated_dmd.h"
 #include "tools/tool.h"
@@ -103,25 +105,23 @@ fit (const Session &session, const DmdInfo &info)
   return {std::move (schedule), plan};
 }
 
-void
-add_schedule_argument (CLI::App *command, Session &session)
+Option
+schedule_argument (Session &session)
 {
-  command->add_option (
-      "schedule", session.schedule, "CODE:TILE[,key=value...] or a JSON file");
+  return {
+      "schedule", &session.schedule, "CODE:TILE[,key=value...] or a JSON file"};
 }
 
-void
-add_rate_option (CLI::App *command, Session &session)
+Option
+rate_option (Session &session)
 {
-  command->add_option (
-      "--rate", session.rate, "Frame rate of the camera, frames/s");
+  return {"--rate", &session.rate, "Frame rate of the camera, frames/s"};
 }
 
-void
-add_board_option (CLI::App *command, Session &session)
+Option
+board_option (Session &session)
 {
-  command->add_option (
-      "--dmd", session.board, "DMD: dlp3000, dlp4500, dlp6500 or dlp9000");
+  return {"--dmd", &session.board, "DMD: dlp3000, dlp4500, dlp6500 or dlp9000"};
 }
 
 namespace
@@ -132,26 +132,31 @@ namespace
 class Interruption
 {
 public:
-  Interruption ()
-  {
-    sigemptyset (&signals_);
-    sigaddset (&signals_, SIGINT);
-    sigaddset (&signals_, SIGTERM);
-    pthread_sigmask (SIG_BLOCK, &signals_, nullptr);
-    thread_ = std::jthread ([this] (std::stop_token quit) {
-      constexpr timespec kPatience{0, 50'000'000};
-      while (!quit.stop_requested ())
-        if (sigtimedwait (&signals_, nullptr, &kPatience) > 0)
-          source_.request_stop ();
-    });
-  }
-
   std::stop_token token () const { return source_.get_token (); }
 
 private:
-  sigset_t signals_;
+  /* Before any thread starts, as threads inherit it. */
+  static sigset_t block_signals ()
+  {
+    sigset_t signals;
+    sigemptyset (&signals);
+    sigaddset (&signals, SIGINT);
+    sigaddset (&signals, SIGTERM);
+    pthread_sigmask (SIG_BLOCK, &signals, nullptr);
+    return signals;
+  }
+
+  void watch (const std::stop_token &quit)
+  {
+    constexpr timespec kPatience{0, 50'000'000};
+    while (!quit.stop_requested ())
+      if (sigtimedwait (&signals_, nullptr, &kPatience) > 0)
+        source_.request_stop ();
+  }
+
+  const sigset_t signals_ = block_signals ();
   std::stop_source source_;
-  std::jthread thread_; // last: it uses all of the above
+  std::jthread thread_{[this] (const std::stop_token &quit) { watch (quit); }};
 };
 
 void
@@ -163,6 +168,37 @@ report (Session &session, const Failure &failure)
   if (session.json)
     std::printf ("%s\n", Json{{"error", message}}.dump (2).c_str ());
   std::fprintf (stderr, "codedexposure: %s\n", message.c_str ());
+}
+
+void
+add (CLI::App &app, const Option &option)
+{
+  const auto add_typed = [&] (auto *value) {
+    if constexpr (std::is_same_v<decltype (value), bool *>)
+      app.add_flag (option.name, *value, option.help);
+    else if constexpr (std::is_same_v<decltype (value),
+                           std::vector<std::string> *>)
+      app.add_option (option.name, *value, option.help);
+    else
+      app.add_option (option.name, *value, option.help)->capture_default_str ();
+  };
+  std::visit (add_typed, option.value);
+}
+
+void
+add (CLI::App &app, const Command &command)
+{
+  CLI::App *sub = app.add_subcommand (command.name, command.help);
+  if (command.help.empty ())
+    sub->group ("");
+  for (const Option &option : command.options)
+    add (*sub, option);
+  for (const Command &next : command.commands)
+    add (*sub, next);
+  if (command.commands.empty ())
+    sub->callback (command.run);
+  else
+    sub->require_subcommand (1);
 }
 
 int
@@ -180,9 +216,9 @@ run (int argc, char **argv)
   app.set_version_flag ("--version", "codedexposure " VERSION);
   app.add_flag ("--json", session.json, "Print results as JSON");
   app.add_flag ("--quiet", session.quiet, "Do not print progress");
-  add_advise_command (app, session);
-  add_dmd_commands (app, session);
-  add_schedule_commands (app, session);
+  add (app, advise_command (session));
+  add (app, dmd_commands (session));
+  add (app, schedule_commands (session));
   try {
     app.parse (argc, argv);
   } catch (const Failure &failure) {

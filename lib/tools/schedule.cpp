@@ -113,37 +113,35 @@ render (const Session &session, const Pictures &pictures)
 
 } // namespace
 
-void
-add_schedule_commands (CLI::App &app, Session &session)
+Command
+schedule_commands (Session &session)
 {
-  auto *schedule = app.add_subcommand ("schedule", "Show and check schedules");
-  schedule->require_subcommand (1);
-  const auto add = [&] (const char *name, const char *help) {
-    auto *sub = schedule->add_subcommand (name, help);
-    add_schedule_argument (sub, session);
-    return sub;
-  };
-
-  add ("show", "Show what a schedule means")->callback ([&session] {
-    show (session);
-  });
-  auto *checked = add ("check", "Check whether it fits a DMD and a frame rate");
-  add_board_option (checked, session);
-  add_rate_option (checked, session);
-  checked->callback ([&session] { check (session); });
-
+  const Option schedule = schedule_argument (session);
+  const Option board = board_option (session);
   const auto pictures = std::make_shared<Pictures> ();
-  auto *rendered = add ("render", "Write the masks as bitmap files");
-  add_board_option (rendered, session);
-  rendered->add_option ("--layout", pictures->layout,
-      "Layout of the tile on a diamond array: address, lattice or cell");
-  rendered->add_option (
-      "--region", pictures->region, "Mirrors that show masks, WxH[+X+Y]");
-  rendered->add_option (
-      "--output", pictures->prefix, "Prefix of the file names");
-  rendered->add_flag ("--planes", pictures->planes,
-      "24 masks per file, for the flash or the video of a LightCrafter 4500");
-  rendered->callback ([&session, pictures] { render (session, *pictures); });
+  const Command shown = {.name = "show",
+      .help = "Show what a schedule means",
+      .options = {schedule},
+      .run = [&session] { show (session); }};
+  const Command checked = {.name = "check",
+      .help = "Check whether it fits a DMD and a frame rate",
+      .options = {schedule, board, rate_option (session)},
+      .run = [&session] { check (session); }};
+  const Command rendered = {.name = "render",
+      .help = "Write the masks as bitmap files",
+      .options = {schedule, board,
+          {"--layout", &pictures->layout,
+              "Layout of the tile on a diamond array: address, lattice or "
+              "cell"},
+          {"--region", &pictures->region, "Mirrors that show masks, WxH[+X+Y]"},
+          {"--output", &pictures->prefix, "Prefix of the file names"},
+          {"--planes", &pictures->planes,
+              "24 masks per file, for the flash or the video of a "
+              "LightCrafter 4500"}},
+      .run = [&session, pictures] { render (session, *pictures); }};
+  return {.name = "schedule",
+      .help = "Show and check schedules",
+      .commands = {shown, checked, rendered}};
 }
 
 } // namespace codedexposure::tool

@@ -2,11 +2,13 @@
 /* The commands of the tool codedexposure, and what they share. */
 #pragma once
 
+#include <functional>
 #include <stop_token>
 #include <string>
 #include <type_traits>
+#include <variant>
+#include <vector>
 
-#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "base/result.h"
@@ -75,12 +77,31 @@ struct Show {
 /** The schedule and frame rate of @p session on a device. */
 Show fit (const Session &session, const DmdInfo &info);
 
-void add_schedule_argument (CLI::App *command, Session &session);
-void add_rate_option (CLI::App *command, Session &session);
-void add_board_option (CLI::App *command, Session &session);
+/** An option, or an argument if its name begins with a letter; a bool is a
+ * flag. What @p value points to has the default, which --help shows. */
+struct Option {
+  std::string name;
+  std::variant<bool *, int *, double *, std::string *,
+      std::vector<std::string> *>
+      value;
+  std::string help;
+};
 
-void add_advise_command (CLI::App &app, Session &session);
-void add_dmd_commands (CLI::App &app, Session &session);
-void add_schedule_commands (CLI::App &app, Session &session);
+/** A subcommand; one without help is not listed. */
+struct Command {
+  std::string name;
+  std::string help;
+  std::vector<Option> options = {};
+  std::function<void ()> run = {};
+  std::vector<Command> commands = {};
+};
+
+Option schedule_argument (Session &session);
+Option rate_option (Session &session);
+Option board_option (Session &session);
+
+Command advise_command (Session &session);
+Command dmd_commands (Session &session);
+Command schedule_commands (Session &session);
 
 } // namespace codedexposure::tool

@@ -27,24 +27,12 @@
  * What was seen before helps to tell what stands still. A lost, corrupted or
  * late frame, a DISCONT, a seek and a new segment start that history anew.
  *
- * ## Schedule
+ * ## Schedule and mapping
  *
- * The schedule defines which pixel saw which part of the exposure. It is the
- * #GstCodedFilter:schedule property, else that of the stream's tag
- * `comment=coded-exposure={...}`, else sequential:2x2 with a warning on the
- * bus. The source pad gets its caps with the first frame, because tags come
- * after caps. The pilot's rows are cropped. Any code and any tile can be used;
+ * Both are found as by codedexposure-demux. Any code and any tile can be used;
  * `sequential:lattice:4/2` and `sequential:lattice:8/3,order=bit-reversal` give
- * the most accurate pictures.
- *
- * ## Mapping
- *
- * A mapping corrects a camera that is not exactly aligned with the mirrors. It
- * is that of the #GstCodedFilter:mapping property, else that of the stream's
- * tag. Frames are rectified to one pixel a mirror before they are fused, and
- * fused frames have the size of the mirrors; regions are places among them. The
- * element message `codedexposure/mapping` has how well the camera sees the
- * mirrors.
+ * the most accurate pictures. The pilot's rows are cropped. With a mapping,
+ * fused frames have the size of the mirrors.
  *
  * ## Quality and speed
  *
@@ -58,16 +46,11 @@
  *
  * ## Flags, metas and messages
  *
- * A gap of more than one and a half periods between two frames is a loss: it is
- * counted, the next frame is DISCONT, and the element message
- * `codedexposure/frames-lost` says `count`, `from` (when the first was due) and
- * `to` (the frame that came). CORRUPTED and GAP pass to all frames of a coded
- * frame. `codedexposure/saturated` says when a stretch of frames with pixels at
- * the largest value begins (`active` true), and when there were none for a
- * second. Every frame has the custom meta `CodedExposureFrame` with the
- * number of its coded frame, its slot and the time of its light; other metas of
- * the coded frame are copied. QoS events are not forwarded upstream, because
- * some camera sources stop their stream for them.
+ * As those of codedexposure-demux: a lost, corrupted or saturated frame is
+ * counted and posted, and CORRUPTED and GAP pass to all frames of a coded
+ * frame. Every frame has the custom meta `CodedExposureFrame` with the number
+ * of its coded frame, its slot and the time of its light. QoS events are not
+ * forwarded upstream, because some camera sources stop their stream for them.
  *
  * ## Example pipelines
  *

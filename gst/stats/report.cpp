@@ -17,24 +17,6 @@ const char *const kCsvHead =
 namespace
 {
 
-/* Takes the array: Transfer full, as gst_structure_take_value () does. */
-template <typename T>
-void
-take_array (GstStructure *structure, const char *field,
-    const std::vector<T> &numbers, GType type,
-    void (*set) (GValue *value, T number))
-{
-  GValue array = G_VALUE_INIT;
-  gst_value_array_init (&array, guint (numbers.size ()));
-  for (const T number : numbers) {
-    GValue value = G_VALUE_INIT;
-    g_value_init (&value, type);
-    set (&value, number);
-    gst_value_array_append_and_take_value (&array, &value);
-  }
-  gst_structure_take_value (structure, field, &array);
-}
-
 /* Numbers in one field of a line of CSV. */
 template <typename T>
 std::string
@@ -69,19 +51,7 @@ set_stats_meta (GstBuffer *buffer, const StatsReport &report)
   if (!meta)
     meta = gst_buffer_add_custom_meta (buffer, kStatsMetaName);
   GstStructure *fields = gst_custom_meta_get_structure (meta);
-  const PictureStats &stats = report.stats;
-  gst_structure_set (fields, "frame", G_TYPE_UINT64, report.frame, "subframe",
-      G_TYPE_INT, report.subframe, "pts", G_TYPE_UINT64, report.pts, "mean",
-      G_TYPE_DOUBLE, stats.mean, "minimum", G_TYPE_UINT, stats.minimum,
-      "maximum", G_TYPE_UINT, stats.maximum, "entropy", G_TYPE_DOUBLE,
-      stats.entropy, "saturated", G_TYPE_UINT64, guint64 (stats.saturated),
-      "pixels", G_TYPE_UINT64, guint64 (stats.pixels), nullptr);
-  take_array<std::uint64_t> (fields, "histogram", stats.histogram,
-      G_TYPE_UINT64, [] (GValue *value, std::uint64_t number) {
-        g_value_set_uint64 (value, number);
-      });
-  take_array<double> (
-      fields, "profile", stats.profile, G_TYPE_DOUBLE, g_value_set_double);
+  write_fields (fields, report);
   return fields;
 }
 

@@ -8,7 +8,7 @@
 
 #include <gst/gst.h>
 
-#include "common/raii.h"
+#include "common/structure.h"
 #include "stats/picture_stats.h"
 
 namespace codedexposure::gst
@@ -27,6 +27,9 @@ struct StatsReport {
   GstClockTime running_time = GST_CLOCK_TIME_NONE;
   std::vector<const char *> flags; ///< flag_names () of the buffer
   const PictureStats &stats;
+  CODED_FIELDS (frame, subframe, pts, stats.mean, stats.minimum, stats.maximum,
+      stats.entropy, stats.saturated, stats.pixels, stats.histogram,
+      stats.profile);
 };
 
 /** Writes @p report to the meta of @p buffer, which must be writable, and

@@ -8,9 +8,9 @@
 #include "bench/lens.h"
 #include "calibrate/gratings.h"
 #include "calibrate/live_moire.h"
+#include "common/elements.h"
 #include "common/meta.h"
 #include "harness.h"
-#include "moirecalib/moirecalib.h"
 #include "moirecalib/panel.h"
 #include "rectify/rectifier.h"
 

@@ -3,7 +3,7 @@
  * frames/s. */
 #include <benchmark/benchmark.h>
 
-#include "sim/sim.h"
+#include "common/elements.h"
 #include "sim_harness.h"
 
 namespace

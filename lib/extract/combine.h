@@ -147,19 +147,7 @@ difference_rows (const Block<T> &block, Step<T> step, const Planes<T> &to)
       for_strips<T> (block.cells, out[0], to.stream,
           [&] (int at, auto put) CODEDEXPOSURE_INLINE_BODY {
             Vector<T> wires[kN];
-#pragma GCC unroll 16
-            for (int i = 0; i < kTogether; i++) {
-              const T *from = bytes_on (row, i * block.stride) + at * Width;
-              prefetch (bytes_on (from, block.height * block.stride),
-                  Width * kVectorBytes);
-              Vector<T> parts[Width];
-              split_cells<Width, T> (from, parts);
-#pragma GCC unroll 16
-              for (int x = 0; x < Width; x++) {
-                wires[i * Width + x] = parts[x];
-                most = larger (most, parts[x]);
-              }
-            }
+            most = read_cells<Width, kTogether> (block, row, at, wires, most);
             if (Height == 0 && y > 0)
               put (out[0] + at, step (wires[0], load (above.elements +
                                                       j * block.cells + at)));
@@ -179,12 +167,12 @@ difference_rows (const Block<T> &block, Step<T> step, const Planes<T> &to)
 template <typename T>
 using DifferenceRows = T (*) (const Block<T> &, Step<T>, const Planes<T> &);
 
-template <int Width, int Height, typename T>
+template <int Width, typename T>
 constexpr DifferenceRows<T>
 difference_rows_or_null ()
 {
   if constexpr (has_own_code (Width))
-    return difference_rows<Width, Height, T>;
+    return difference_rows<Width, 0, T>;
   else
     return nullptr;
 }
@@ -194,30 +182,13 @@ template <typename T, int... Width>
 DifferenceRows<T>
 difference_rows_of (const Block<T> &block, std::integer_sequence<int, Width...>)
 {
-  struct Small {
-    int width, height;
-    DifferenceRows<T> run;
+  constexpr auto whole_cells = []<int W, int H> () {
+    return &difference_rows<W, H, T>;
   };
-  static constexpr Small kSmall[] = {
-      {2, 1, difference_rows_or_null<2, 1, T> ()},
-      {3, 1, difference_rows_or_null<3, 1, T> ()},
-      {2, 2, difference_rows_or_null<2, 2, T> ()},
-      {5, 1, difference_rows_or_null<5, 1, T> ()},
-      {3, 2, difference_rows_or_null<3, 2, T> ()},
-      {7, 1, difference_rows_or_null<7, 1, T> ()},
-      {4, 2, difference_rows_or_null<4, 2, T> ()},
-      {3, 3, difference_rows_or_null<3, 3, T> ()},
-      {5, 2, difference_rows_or_null<5, 2, T> ()},
-      {4, 3, difference_rows_or_null<4, 3, T> ()},
-      {5, 3, difference_rows_or_null<5, 3, T> ()},
-      {4, 4, difference_rows_or_null<4, 4, T> ()},
-  };
+  if (const auto run = of_small_cells<whole_cells> (block.width, block.height))
+    return run;
   static constexpr DifferenceRows<T> kAll[] = {
-      difference_rows_or_null<Width, 0, T> ()...};
-  for (const Small &small : kSmall)
-    if (small.run && small.width == block.width &&
-        small.height == block.height)
-      return small.run;
+      difference_rows_or_null<Width, T> ()...};
   const bool fits =
       std::ptrdiff_t (block.cells) * block.rows * std::ptrdiff_t (sizeof (T)) <=
       LastOfRow<T>::kBytes;

@@ -242,19 +242,7 @@ rank_in_registers (const Block<T> &block, const Planes<T> &to)
     for_strips<T> (block.cells, out[0], to.stream,
         [&] (int at, auto put) CODEDEXPOSURE_INLINE_BODY {
           Vector<T> wires[kN];
-#pragma GCC unroll 16
-          for (int y = 0; y < Height; y++) {
-            const T *from = bytes_on (row, y * block.stride) + at * Width;
-            prefetch (
-                bytes_on (from, Height * block.stride), Width * kVectorBytes);
-            Vector<T> parts[Width];
-            split_cells<Width, T> (from, parts);
-#pragma GCC unroll 16
-            for (int x = 0; x < Width; x++) {
-              wires[y * Width + x] = parts[x];
-              most = larger (most, parts[x]);
-            }
-          }
+          most = read_cells<Width, Height> (block, row, at, wires, most);
           run_network<kSort<kN>> (
               wires, [] (Vector<T> *, int) CODEDEXPOSURE_INLINE_BODY {},
               [&] (int k, Vector<T> v)
@@ -266,44 +254,14 @@ rank_in_registers (const Block<T> &block, const Planes<T> &to)
 }
 
 template <typename T>
-using Rank = T (*) (const Block<T> &, const Planes<T> &);
-
-template <int Width, int Height, typename T>
-constexpr Rank<T>
-rank_or_null ()
-{
-  if constexpr (has_own_code (Width))
-    return rank_in_registers<Width, Height, T>;
-  else
-    return nullptr;
-}
-
-template <typename T>
 T
 rank (const Block<T> &block, const Planes<T> &to)
 {
-  /* The squarest cells of 2 to 16 pixels. */
-  struct Own {
-    int width, height;
-    Rank<T> run;
+  constexpr auto in_registers = []<int Width, int Height> () {
+    return &rank_in_registers<Width, Height, T>;
   };
-  static constexpr Own kOwn[] = {
-      {2, 1, rank_or_null<2, 1, T> ()},
-      {3, 1, rank_or_null<3, 1, T> ()},
-      {2, 2, rank_or_null<2, 2, T> ()},
-      {5, 1, rank_or_null<5, 1, T> ()},
-      {3, 2, rank_or_null<3, 2, T> ()},
-      {7, 1, rank_or_null<7, 1, T> ()},
-      {4, 2, rank_or_null<4, 2, T> ()},
-      {3, 3, rank_or_null<3, 3, T> ()},
-      {5, 2, rank_or_null<5, 2, T> ()},
-      {4, 3, rank_or_null<4, 3, T> ()},
-      {5, 3, rank_or_null<5, 3, T> ()},
-      {4, 4, rank_or_null<4, 4, T> ()},
-  };
-  for (const Own &own : kOwn)
-    if (own.run && own.width == block.width && own.height == block.height)
-      return own.run (block, to);
+  if (const auto run = of_small_cells<in_registers> (block.width, block.height))
+    return run (block, to);
   return rank_any (block, to);
 }
 

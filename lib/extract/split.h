@@ -320,6 +320,67 @@ split_row (const T *from, int width, T *const *out, int at, PutVector put,
   }
 }
 
+/** One vector of cells, Height rows of their pixels from @p row on, a wire for
+ * each pixel. Returns the largest pixels, those of @p most among them. */
+template <int Width, int Height, typename T>
+CODEDEXPOSURE_INLINE Vector<T>
+read_cells (const Block<T> &block, const T *row, int at,
+    Vector<T> (&wires)[Width * Height], Vector<T> most)
+{
+#pragma GCC unroll 16
+  for (int y = 0; y < Height; y++) {
+    const T *from = bytes_on (row, y * block.stride) + at * Width;
+    prefetch (
+        bytes_on (from, block.height * block.stride), Width * kVectorBytes);
+    Vector<T> parts[Width];
+    split_cells<Width, T> (from, parts);
+#pragma GCC unroll 16
+    for (int x = 0; x < Width; x++) {
+      wires[y * Width + x] = parts[x];
+      most = larger (most, parts[x]);
+    }
+  }
+  return most;
+}
+
+/** The function that Own<Width, Height> () gives for cells of this shape: the
+ * squarest of 2 to 16 pixels, which fit into the registers. Null for others,
+ * and for widths without code of their own. */
+template <auto Own>
+auto
+of_small_cells (int width, int height)
+{
+  using Run = decltype (Own.template operator()<2, 2> ());
+  struct Cell {
+    int width, height;
+    Run run;
+  };
+  constexpr auto cell = []<int Width, int Height> () -> Cell {
+    if constexpr (has_own_code (Width))
+      return {Width, Height, Own.template operator()<Width, Height> ()};
+    else
+      return {Width, Height, nullptr};
+  };
+  static constexpr Cell kCells[] = {
+      cell.template operator()<2, 1> (),
+      cell.template operator()<3, 1> (),
+      cell.template operator()<2, 2> (),
+      cell.template operator()<5, 1> (),
+      cell.template operator()<3, 2> (),
+      cell.template operator()<7, 1> (),
+      cell.template operator()<4, 2> (),
+      cell.template operator()<3, 3> (),
+      cell.template operator()<5, 2> (),
+      cell.template operator()<4, 3> (),
+      cell.template operator()<5, 3> (),
+      cell.template operator()<4, 4> (),
+  };
+  for (const Cell &own : kCells)
+    if (own.width == width && own.height == height)
+      return own.run;
+  return Run (nullptr);
+}
+
 /** A vector for each of up to 256 wires. */
 template <typename T>
 struct Wires {

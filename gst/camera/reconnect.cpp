@@ -2,6 +2,7 @@
 /* codedexposure-camerasrc and a camera that goes away and comes back. */
 #include "camerasrc.h"
 #include "common/element.h"
+#include "common/messages.h"
 
 #define GST_CAT_DEFAULT camerasrc_debug
 
@@ -42,8 +43,7 @@ is_own_failure (const CameraState &st, GstMessage *message)
 void
 say_lost (GstCodedExposureCameraSrc *self, const std::string &why)
 {
-  post_structure (self, gst_structure_new ("codedexposure/camera-lost",
-                            "reason", G_TYPE_STRING, why.c_str (), nullptr));
+  post_message (self, CameraLost{why});
   POST_WARNING (self, RESOURCE, READ,
       "The camera is gone: " + why +
           " It is restarted until it comes back (property reconnect).");
@@ -195,9 +195,7 @@ note_frame (GstCodedExposureCameraSrc *self, GstClockTime silent)
     const ObjectLock lock (self);
     st.reconnects++;
   }
-  post_structure (
-      self, gst_structure_new ("codedexposure/camera-back", "silent",
-                G_TYPE_UINT64, silent, "tries", G_TYPE_UINT, tries, nullptr));
+  post_message (self, CameraBack{silent, tries});
 }
 
 } // namespace codedexposure::gst::camera

@@ -53,13 +53,6 @@ base_transform_class ()
 }
 
 void
-post_structure (gpointer element, GstStructure *structure)
-{
-  gst_element_post_message (GST_ELEMENT (element),
-      gst_message_new_element (GST_OBJECT (element), structure));
-}
-
-void
 post_latency (gpointer element)
 {
   gst_element_post_message (

@@ -59,8 +59,6 @@ install_state (gpointer klass)
 /** What GstBaseTransform does by itself. */
 GstBaseTransformClass *base_transform_class ();
 
-/** Posts an element message; @p structure: Transfer: full. */
-void post_structure (gpointer element, GstStructure *structure);
 /** Posts that the latency has changed. */
 void post_latency (gpointer element);
 void post_progress (gpointer element, GstProgressType type, const char *code,

@@ -41,6 +41,109 @@ struct MirrorsSeen {
   CODED_FIELDS (exact, weighted, mixed, unseen);
 };
 
+/** dmdsync: numbers of frames are those of the camera, lost ones among them. */
+struct CameraFramesLost {
+  static constexpr const char *kName = "dmdsync/frames-lost";
+  guint64 count = 0;
+  GstClockTime from = 0; ///< when the first of them was due
+  GstClockTime to = 0;   ///< of the frame that came instead
+  CODED_FIELDS (count, from, to);
+};
+struct FrameDropped {
+  static constexpr const char *kName = "dmdsync/frame-dropped";
+  guint64 frame = 0;
+  GstClockTime pts = 0;
+  std::string reason;
+  CODED_FIELDS (frame, pts, reason);
+};
+struct FrameLate {
+  static constexpr const char *kName = "dmdsync/frame-late";
+  guint64 frame = 0;
+  GstClockTime pts = 0;
+  CODED_FIELDS (frame, pts);
+};
+struct FrameIncomplete {
+  static constexpr const char *kName = "dmdsync/frame-incomplete";
+  guint64 frame = 0;
+  GstClockTime pts = 0;
+  guint64 bytes = 0; ///< that came
+  CODED_FIELDS (frame, pts, bytes);
+};
+
+/** Masks and frames are in step from this frame on. */
+struct Locked {
+  static constexpr const char *kName = "dmdsync/locked";
+  guint64 frame = 0;
+  GstClockTime pts = 0;
+  CODED_FIELDS (frame, pts);
+};
+
+/** The DMD slipped against the camera. */
+struct Slip {
+  static constexpr const char *kName = "dmdsync/slip";
+  guint64 frame = 0;    ///< the first that is out of step
+  gint slots = 0;       ///< by which it slipped
+  bool certain = false; ///< no other number of slots explains the frames
+  GstClockTime pts = 0; ///< of the frame at which this was found
+  CODED_FIELDS (frame, slots, certain, pts);
+};
+
+/** Whether the time of frames is known has changed. */
+struct TimeUncertainty {
+  static constexpr const char *kName = "dmdsync/time-uncertainty";
+  bool known = false;
+  GstClockTime uncertainty = 0;
+  guint64 frame = 0;
+  GstClockTime pts = 0;
+  CODED_FIELDS (known, uncertainty, frame, pts);
+};
+
+/** Frames come at another rate than the caps say. */
+struct MeasuredRate {
+  static constexpr const char *kName = "dmdsync/frame-rate";
+  gdouble measured = 0; ///< frames/s
+  FrameRate caps;
+  CODED_FIELDS (measured, caps);
+};
+
+/** The first frame that shows a pattern. */
+struct PatternShown {
+  static constexpr const char *kName = "dmdsync/pattern-shown";
+  std::string pattern;
+  guint64 frame = 0;
+  GstClockTime pts = 0;
+  CODED_FIELDS (pattern, frame, pts);
+};
+/** The mirrors show the schedule again. */
+struct PatternOver {
+  static constexpr const char *kName = "dmdsync/pattern-over";
+  std::string pattern, reason;
+  CODED_FIELDS (pattern, reason);
+};
+
+/** codedexposure-camerasrc: the camera is gone, and is restarted. */
+struct CameraLost {
+  static constexpr const char *kName = "codedexposure/camera-lost";
+  std::string reason;
+  CODED_FIELDS (reason);
+};
+struct CameraBack {
+  static constexpr const char *kName = "codedexposure/camera-back";
+  GstClockTime silent = 0; ///< without frames
+  guint tries = 0;
+  CODED_FIELDS (silent, tries);
+};
+
+/** codedexposure-sim: an exposure that got too few input frames. */
+struct ExposureDropped {
+  static constexpr const char *kName = "codedexposure/frame-dropped";
+  std::string reason;
+  GstClockTime pts = 0;
+  gint inputs = 0, needed = 0; ///< input frames
+  guint64 frames_dropped = 0;  ///< since the start
+  CODED_FIELDS (reason, pts, inputs, needed, frames_dropped);
+};
+
 /** What moirecalib advises, and how sure it is. */
 struct StageMove {
   gdouble offset_x = 0, offset_y = 0; ///< from the aligned position, mirrors

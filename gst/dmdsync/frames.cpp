@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* dmdsync, frame by frame: time, number, phase. */
 #include "common/element.h"
+#include "common/messages.h"
 #include "common/meta.h"
 #include "dmdsync.h"
 
@@ -33,23 +34,14 @@ count (GstDmdSync *self, guint64 Counters::*counter, guint64 more = 1)
   state (self).counters.*counter += more;
 }
 
-/** Posts a message of @p frame; @p more  other fields: name, type, value. */
-template <typename... More>
-void
-say (GstDmdSync *self, const char *name, const Frame &frame, More... more)
-{
-  post_structure (self, gst_structure_new (name, "frame", G_TYPE_UINT64,
-                            guint64 (frame.step.number), "pts", G_TYPE_UINT64,
-                            frame.pts, more..., nullptr));
-}
-
 /** Posts that @p frame is dropped. Returns GST_BASE_TRANSFORM_FLOW_DROPPED. */
 GstFlowReturn
 drop (GstDmdSync *self, const Frame &frame, const char *reason)
 {
   GST_DEBUG_OBJECT (self, "frame %" G_GUINT64_FORMAT " dropped: %s",
       frame.step.number, reason);
-  say (self, "dmdsync/frame-dropped", frame, "reason", G_TYPE_STRING, reason);
+  post_message (
+      self, FrameDropped{guint64 (frame.step.number), frame.pts, reason});
   return GST_BASE_TRANSFORM_FLOW_DROPPED;
 }
 
@@ -143,9 +135,7 @@ take_loss (GstDmdSync *self, const Frame &frame)
   GST_INFO_OBJECT (self,
       "%" G_GUINT64_FORMAT " frames lost before %" GST_TIME_FORMAT, lost,
       GST_TIME_ARGS (frame.pts));
-  post_structure (self, gst_structure_new ("dmdsync/frames-lost", "count",
-                            G_TYPE_UINT64, lost, "from", G_TYPE_UINT64, from,
-                            "to", G_TYPE_UINT64, frame.pts, nullptr));
+  post_message (self, CameraFramesLost{lost, from, frame.pts});
   if (on_loss == OnLoss::error && stream.coded) {
     GST_ELEMENT_ERROR (self, RESOURCE, READ,
         ("%" G_GUINT64_FORMAT " frames were lost before %" GST_TIME_FORMAT
@@ -171,7 +161,7 @@ take_arrival (GstDmdSync *self, const Frame &frame)
     return take_loss (self, frame);
   case Arrival::late:
     count (self, &Counters::frames_late);
-    say (self, "dmdsync/frame-late", frame);
+    post_message (self, FrameLate{guint64 (frame.step.number), frame.pts});
     stream.discont = true;
     return GST_FLOW_OK;
   case Arrival::restarted:
@@ -192,8 +182,8 @@ take_whole (GstDmdSync *self, const Frame &frame)
   if (!frame.readable ||
       GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_CORRUPTED)) {
     count (self, &Counters::frames_incomplete);
-    say (self, "dmdsync/frame-incomplete", frame, "bytes", G_TYPE_UINT64,
-        guint64 (gst_buffer_get_size (buffer)));
+    post_message (self, FrameIncomplete{guint64 (frame.step.number), frame.pts,
+                            gst_buffer_get_size (buffer)});
   }
   return frame.readable ? GST_FLOW_OK
                         : drop_with_gap (self, frame, "incomplete");
@@ -221,15 +211,12 @@ say_phase (GstDmdSync *self, const Frame &frame)
     count (self, &Counters::slips);
     GST_WARNING_OBJECT (
         self, "the DMD slipped by %d slots", phase.slipped->slots);
-    post_structure (
-        self, gst_structure_new ("dmdsync/slip", "frame", G_TYPE_UINT64,
-                  guint64 (phase.slipped->first_frame), "slots", G_TYPE_INT,
-                  phase.slipped->slots, "certain", G_TYPE_BOOLEAN,
-                  gboolean (phase.slipped->certain), "pts", G_TYPE_UINT64,
-                  frame.pts, nullptr));
+    post_message (
+        self, Slip{guint64 (phase.slipped->first_frame), phase.slipped->slots,
+                  phase.slipped->certain, frame.pts});
   }
   if (phase.locked_now)
-    say (self, "dmdsync/locked", frame);
+    post_message (self, Locked{guint64 (frame.step.number), frame.pts});
 
   bool changed = false;
   {

@@ -7,6 +7,7 @@
  */
 #include "calibrate/gratings.h"
 #include "common/element.h"
+#include "common/messages.h"
 #include "dmdsync.h"
 
 #define GST_CAT_DEFAULT dmdsync_debug
@@ -148,9 +149,7 @@ give_back (GstDmdSync *self, const char *reason)
   if (!pattern)
     return;
   GST_INFO_OBJECT (self, "gives the mirrors back: %s", reason);
-  post_structure (
-      self, gst_structure_new ("dmdsync/pattern-over", "pattern", G_TYPE_STRING,
-                pattern->c_str (), "reason", G_TYPE_STRING, reason, nullptr));
+  post_message (self, PatternOver{*pattern, reason});
 }
 
 PatternSight
@@ -184,10 +183,8 @@ look_for_pattern (GstDmdSync *self, GstBuffer *buffer, const FrameStep &step,
     return {};
   }
   if (waited)
-    post_structure (
-        self, gst_structure_new ("dmdsync/pattern-shown", "pattern",
-                  G_TYPE_STRING, pattern->text.c_str (), "frame", G_TYPE_UINT64,
-                  guint64 (step.number), "pts", G_TYPE_UINT64, pts, nullptr));
+    post_message (
+        self, PatternShown{pattern->text, guint64 (step.number), pts});
 
   bool over = false;
   {

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* dmdsync's clocks: the camera's, the pipeline's, and what lies between. */
 #include "common/element.h"
+#include "common/messages.h"
 #include "dmdsync.h"
 
 #define GST_CAT_DEFAULT dmdsync_debug
@@ -144,10 +145,7 @@ say_uncertainty (GstDmdSync *self, guint64 number, GstClockTime pts)
   if (stream.time_known == known)
     return;
   stream.time_known = known;
-  post_structure (self,
-      gst_structure_new ("dmdsync/time-uncertainty", "known", G_TYPE_BOOLEAN,
-          gboolean (known), "uncertainty", G_TYPE_UINT64, stream.uncertainty,
-          "frame", G_TYPE_UINT64, number, "pts", G_TYPE_UINT64, pts, nullptr));
+  post_message (self, TimeUncertainty{known, stream.uncertainty, number, pts});
 }
 
 void
@@ -175,9 +173,7 @@ watch_rate (GstDmdSync *self, GstClockTime time)
   if (!rate)
     return;
   const FrameRate said = stream.time->rate;
-  post_structure (
-      self, gst_structure_new ("dmdsync/frame-rate", "measured", G_TYPE_DOUBLE,
-                *rate, "caps", GST_TYPE_FRACTION, said.num, said.den, nullptr));
+  post_message (self, MeasuredRate{*rate, said});
   GST_ELEMENT_WARNING (self, RESOURCE, SETTINGS,
       ("Frames come at %.4g a second, the caps say %d/%d. The device that "
        "triggers the camera sets its rate: set the caps to the rate of the "

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "common/element.h"
+#include "common/messages.h"
 #include "common/meta.h"
 #include "common/tag.h"
 #include "sim.h"
@@ -456,11 +457,8 @@ drop_exposure (GstCodedExposureSim *self, Drop reason)
   GST_INFO_OBJECT (self,
       "drop the coded frame at %" GST_TIME_FORMAT " after %s: %s",
       GST_TIME_ARGS (exposure.start), taken.c_str (), name_of (reason));
-  post_structure (self,
-      gst_structure_new ("codedexposure/frame-dropped", "reason", G_TYPE_STRING,
-          name_of (reason), "pts", G_TYPE_UINT64, exposure.start, "inputs",
-          G_TYPE_INT, exposure.taken, "needed", G_TYPE_INT, needed,
-          "frames-dropped", G_TYPE_UINT64, dropped, nullptr));
+  post_message (self, ExposureDropped{name_of (reason), exposure.start,
+                          exposure.taken, needed, dropped});
   tell_user (self, reason, exposure.start, taken);
   g_object_notify (G_OBJECT (self), "frames-dropped");
 }

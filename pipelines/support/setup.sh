@@ -19,8 +19,8 @@ g++|compiles C++20|run
 pkg-config|finds the libraries|run
 libgstreamer1.0-dev|GStreamer core and its test harness|run
 libgstreamer-plugins-base1.0-dev|GStreamer video library|run
-nlohmann-json3-dev|schedules and sidecars are JSON|run
-libcairo2-dev|letters and arrows over the picture of a calibration|run
+nlohmann-json3-dev|reads and writes JSON (schedules and sidecars)|run
+libcairo2-dev|draws the overlay of a calibration|run
 libusb-1.0-0-dev|DMD boards on the USB|run
 libeigen3-dev|linear algebra of estimates and calibrations|run
 libcli11-dev|options of the command-line tool|run
@@ -29,18 +29,18 @@ gstreamer1.0-plugins-base|test scenes, conversion, TCP, compositor|run
 gstreamer1.0-plugins-good|Matroska, AVI, PNG, window selection|run
 gstreamer1.0-plugins-bad|GDP for send and receive, H.264 in MP4|run
 gstreamer1.0-plugins-ugly|H.264 encoder|run
-gstreamer1.0-libav|FFV1, and reading most video files|run
+gstreamer1.0-libav|FFV1, and decoding most video files|run
 gstreamer1.0-x|windows under X, text in pictures|run
 gnuplot-nox|draws the figures of a report|report
 libgtest-dev|unit and element tests|tests
 libbenchmark-dev|benchmarks|tests
-libumockdev-dev|a USB in software for the tests of DMDs|tests
-libaravis-dev|the camera in software, and aravissrc|tests
-iproute2|the network that it is alone on|tests
-umockdev|a USB in software for the tests of DMDs|tests
-xvfb|a screen for the window tests|tests
+libumockdev-dev|an emulated USB for the DMD tests|tests
+libaravis-dev|the emulated camera, and aravissrc|tests
+iproute2|the private network of the emulated camera|tests
+umockdev|an emulated USB for the DMD tests|tests
+xvfb|a virtual screen for the window tests|tests
 shellcheck|checks the scripts|tests
-libopencv-video-dev|calibrations of others, to compare with|rivals
+libopencv-video-dev|calibration with OpenCV, for comparison|rivals
 '
 
 note ()
@@ -167,7 +167,7 @@ build_tree ()
 
 # Prints the path of vtest.avi: 768x576, 795 frames of people walking. It lies
 # in opencv-doc, which is 270 MB installed, so only this file is taken out of
-# the package. Fails when there is none to be had.
+# the package. Fails if it is not available.
 sample_video ()
 {
   local name=vtest.avi where=usr/share/doc/opencv-doc/examples/data deb

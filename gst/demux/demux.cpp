@@ -161,39 +161,22 @@ Demux::set_up_class (gpointer klass)
   };
 }
 
-/* One coded frame on its way through the element. */
-struct Demux::Job {
-  CodedFrame frame;
-  std::shared_ptr<const PadList> pads;
-};
-
-/* The pads that a subframe goes to; null where it does not. */
-struct Demux::Target {
-  GstCodedPad *all = nullptr;
-  GstCodedPad *one = nullptr;
-  BufferPtr buffer = nullptr;
-  GstCodedPad *owner () const { return all ? all : one; }
-};
-
-/* The subframes of one part of the frame. */
-struct Demux::Work {
-  std::vector<Target> targets;
-
-  bool wanted () const
-  {
-    return std::any_of (targets.begin (), targets.end (),
-        [] (const Target &target) { return target.owner (); });
-  }
-};
-
 namespace
 {
 
-/* NOT_LINKED and EOS of one pad leave the others to go on. */
+/* The others go on when one pad is NOT_LINKED or EOS. */
 bool
 is_fatal (GstFlowReturn flow)
 {
   return flow == GST_FLOW_FLUSHING || flow <= GST_FLOW_NOT_NEGOTIATED;
+}
+
+/* Whether any subframe of a part has a pad to go to. */
+bool
+any_wanted (const auto &targets)
+{
+  return std::ranges::any_of (
+      targets, [] (const auto &target) { return target.owner (); });
 }
 
 } // namespace
@@ -206,29 +189,28 @@ Demux::Demux (GstCodedExposureDemux *element)
   add_pad ("src", PadKind::all, "src", -1);
 }
 
-/* The subframes of one coded frame, in the order of their exposure. One thread
- * serves all pads, so that a sink that waits for its time makes the others
- * wait: users put a queue after every pad. Buffers are pushed one by one,
- * because a sink would show a whole list at the time of its first. */
+/* One thread serves all pads, so a sink that waits for its time delays the
+ * others: users put a queue after every pad. Buffers are pushed one by one,
+ * because a sink would show a whole list at the time of its first buffer. */
 GstFlowReturn
 Demux::process (CodedFrame frame)
 {
-  Job job{std::move (frame), pads ()};
-  if (!check_pads (*job.pads))
+  const auto served = pads ();
+  if (!check_pads (*served))
     return GST_FLOW_NOT_NEGOTIATED;
-  const GstFlowReturn flow = push_coded (job);
-  return is_fatal (flow) ? flow : push_subframes (job);
+  const GstFlowReturn flow = push_coded (frame, *served);
+  return is_fatal (flow) ? flow : push_subframes (frame, *served);
 }
 
 /* This pad comes first, because the recorder of coded frames must not wait for
  * a display of subframes. */
 GstFlowReturn
-Demux::push_coded (const Job &job)
+Demux::push_coded (const CodedFrame &frame, const PadMap &pads)
 {
-  GstCodedPad *pad = job.pads->find (PadKind::coded);
+  GstCodedPad *pad = find_pad (pads, PadKind::coded);
   if (!pad)
     return GST_FLOW_OK;
-  BufferPtr outbuf (gst_buffer_ref (job.frame.buffer.get ()));
+  BufferPtr outbuf (gst_buffer_ref (frame.buffer.get ()));
   if (std::exchange (pad->coded.discont, false) &&
       !GST_BUFFER_IS_DISCONT (outbuf.get ())) {
     outbuf.reset (gst_buffer_make_writable (outbuf.release ()));
@@ -239,32 +221,31 @@ Demux::push_coded (const Job &job)
 }
 
 GstFlowReturn
-Demux::push_subframes (Job &job)
+Demux::push_subframes (CodedFrame &frame, const PadMap &pads)
 {
   GstFlowReturn flow = GST_FLOW_OK;
-  std::vector<Work> works;
-  for (std::size_t i = 0; i < plan_->parts.size (); i++)
-    works.push_back (find_targets (job, i, flow));
-  if (std::none_of (works.begin (), works.end (),
-          [] (const Work &work) { return work.wanted (); }))
+  std::vector<Targets> parts;
+  for (const SplitPart &part : plan_->parts)
+    parts.push_back (find_targets (frame.pts (), pads, part, flow));
+  if (std::ranges::none_of (parts, any_wanted<Targets>))
     return flow;
-  flow = format ().wide () ? render<std::uint16_t> (job, works)
-                           : render<std::uint8_t> (job, works);
+  flow = format ().wide () ? render<std::uint16_t> (frame, parts)
+                           : render<std::uint8_t> (frame, parts);
   if (flow != GST_FLOW_OK)
     return flow;
-  note_saturation (job.frame);
+  note_saturation (frame);
 
   for (const SplitTurn &turn : plan_->turns[backwards ()]) {
-    Target &target = works[turn.part].targets[turn.subframe];
+    Target &target = parts[turn.part][turn.subframe];
     if (target.owner () && !is_fatal (flow))
-      flow = push_subframe (job, turn, std::move (target));
+      flow = push_subframe (frame, turn, std::move (target));
   }
   return flow;
 }
 
 /* --------------------------------------------------- where subframes go -- */
 
-/* Asked only for QoS messages. */
+/* QoS messages need it; nothing else does. */
 bool
 Demux::is_live ()
 {
@@ -278,7 +259,7 @@ Demux::is_live ()
   return *live_;
 }
 
-/* Reports to @pad and on the bus that it goes without a subframe. */
+/* Reports to @pad and on the bus that a subframe was dropped. */
 void
 Demux::skip (GstCodedPad *pad, GstClockTime pts, GstClockTime duration)
 {
@@ -317,7 +298,8 @@ Demux::is_late (GstCodedPad *pad, GstClockTime pts, GstClockTime duration)
          GST_CLOCK_TIME_IS_VALID (running) && running < earliest;
 }
 
-/* No subframe is made for a pad that is not linked, but its flow counts. */
+/* False if the pad is not linked: it gets no subframes, but its flow is
+ * combined with that of the others. */
 bool
 Demux::prepare_pad (GstCodedPad *pad, guint at_once, GstFlowReturn &flow)
 {
@@ -329,19 +311,18 @@ Demux::prepare_pad (GstCodedPad *pad, guint at_once, GstFlowReturn &flow)
   return false;
 }
 
-/* Finds where every subframe of a part has to go, except those that are outside
- * of the segment; reports each that is late and left out. */
-Demux::Work
-Demux::find_targets (
-    const Job &job, std::size_t part_index, GstFlowReturn &flow)
+/* Finds the pads of each subframe of a part, of a frame that starts at @start.
+ * Subframes outside of the segment have none; late ones are dropped and
+ * reported. */
+Demux::Targets
+Demux::find_targets (GstClockTime start, const PadMap &pads,
+    const SplitPart &part, GstFlowReturn &flow)
 {
-  const SplitPart &part = plan_->parts[part_index];
   const auto n = std::size_t (part.subframes ());
-  Work work{std::vector<Target> (n)};
+  Targets targets (n);
   const auto aim = [&] (GstCodedPad *pad, std::size_t k, Nanoseconds duration,
                        GstCodedPad *&target) {
-    const GstClockTime pts =
-        job.frame.pts () + GstClockTime (part.boundaries[k]);
+    const GstClockTime pts = start + GstClockTime (part.boundaries[k]);
     if (!is_within (pts, GstClockTime (duration)))
       return;
     if (is_late (pad, pts, GstClockTime (duration)))
@@ -351,28 +332,27 @@ Demux::find_targets (
   };
 
   GstCodedPad *all = part.region < 0
-                         ? job.pads->find (PadKind::all)
-                         : job.pads->find (PadKind::region, part.region);
+                         ? find_pad (pads, PadKind::all)
+                         : find_pad (pads, PadKind::region, part.region);
   if (all && prepare_pad (all, guint (n), flow)) {
     for (std::size_t i = 0; i < n; i++) {
       const std::size_t k = backwards () ? n - 1 - i : i;
-      aim (all, k, part.boundaries[k + 1] - part.boundaries[k],
-          work.targets[k].all);
+      aim (all, k, part.boundaries[k + 1] - part.boundaries[k], targets[k].all);
     }
   }
   if (part.region >= 0)
-    return work;
-  for (GstCodedPad *one : job.pads->of_kind (PadKind::one)) {
-    const auto k = std::size_t (one->coded.index);
-    if (prepare_pad (one, 1, flow))
-      aim (one, k, part.period (), work.targets[k].one);
+    return targets;
+  for (std::size_t k = 0; k < n; k++) {
+    GstCodedPad *one = find_pad (pads, PadKind::one, int (k));
+    if (one && prepare_pad (one, 1, flow))
+      aim (one, k, part.period (), targets[k].one);
   }
-  return work;
+  return targets;
 }
 
 /* ---------------------------------------------------------------- pixels -- */
 
-/* Room for a subframe that no pad wants: the extractor writes all of them. */
+/* Memory for a subframe that no pad wants: the extractor writes all of them. */
 template <typename Pixel>
 ImageView<Pixel>
 Demux::scratch_view (std::size_t part, std::size_t k)
@@ -388,14 +368,14 @@ Demux::scratch_view (std::size_t part, std::size_t k)
       info.height, std::ptrdiff_t (row)};
 }
 
-/* Takes and maps a buffer for every subframe that has a target; the others stay
+/* Acquires and maps a buffer for every subframe that has a pad; the others stay
  * unmapped. */
 GstFlowReturn
 Demux::map_subframes (
-    std::size_t part, Work &work, std::vector<MappedFrame> &subframes)
+    std::size_t part, Targets &targets, std::vector<MappedFrame> &subframes)
 {
-  subframes.reserve (work.targets.size ());
-  for (Target &target : work.targets) {
+  subframes.reserve (targets.size ());
+  for (Target &target : targets) {
     MappedFrame &mapped = subframes.emplace_back ();
     if (!target.owner ())
       continue;
@@ -407,15 +387,14 @@ Demux::map_subframes (
   return GST_FLOW_OK;
 }
 
-/* Fills the buffers of @work, which is wanted, from @light, one pixel a
- * mirror. */
+/* Fills the buffers of a part from @light, which has one pixel a mirror. */
 template <typename Pixel>
 GstFlowReturn
-Demux::render_part (
-    Job &job, std::size_t part, Work &work, ImageView<const Pixel> light)
+Demux::render_part (CodedFrame &frame, std::size_t part, Targets &targets,
+    ImageView<const Pixel> light)
 {
   std::vector<MappedFrame> subframes;
-  const GstFlowReturn flow = map_subframes (part, work, subframes);
+  const GstFlowReturn flow = map_subframes (part, targets, subframes);
   if (flow != GST_FLOW_OK)
     return flow;
   std::vector<ImageView<Pixel>> views;
@@ -429,28 +408,28 @@ Demux::render_part (
   const auto report = extractor.run (light.block (x, y, width, height), views);
   if (!report)
     return post_decode_error (report.error ());
-  job.frame.meta.saturated = report->saturated;
+  frame.meta.saturated = report->saturated;
   return GST_FLOW_OK;
 }
 
-/* Fills the buffers of all @works. */
+/* Fills the buffers of all parts. */
 template <typename Pixel>
 GstFlowReturn
-Demux::render (Job &job, std::vector<Work> &works)
+Demux::render (CodedFrame &frame, std::vector<Targets> &parts)
 {
-  MappedFrame coded = map_coded (job.frame.buffer.get ());
+  MappedFrame coded = map_coded (frame.buffer.get ());
   if (!coded)
     return GST_FLOW_ERROR;
   const auto light = rectify (view_of<const Pixel> (coded));
   if (!light)
     return post_decode_error (light.error ());
   GstFlowReturn flow = GST_FLOW_OK;
-  for (std::size_t i = 0; i < works.size (); i++)
-    if (works[i].wanted () && flow == GST_FLOW_OK)
-      flow = render_part (job, i, works[i], *light);
+  for (std::size_t i = 0; i < parts.size (); i++)
+    if (any_wanted (parts[i]) && flow == GST_FLOW_OK)
+      flow = render_part (frame, i, parts[i], *light);
   /* Each extractor counts the cells of its own part. */
-  if (works.size () > 1)
-    job.frame.meta.saturated = count_saturated (
+  if (parts.size () > 1)
+    frame.meta.saturated = count_saturated (
         light->rows (0, light->height - format ().schedule.pilot_rows ()),
         significant_bits ());
   return flow;
@@ -458,8 +437,8 @@ Demux::render (Job &job, std::vector<Work> &works)
 
 /* --------------------------------------------------------------- pushing -- */
 
-/* @outbuf for a second pad: in the same memory unless the peer of @pad could
- * not read its layout. */
+/* @outbuf for the second pad, @pad: the same memory, or a copy of the pixels if
+ * the pad's peer cannot read their layout. */
 BufferPtr
 Demux::share (
     const GstVideoInfo &info, const GstCodedPad *pad, GstBuffer *outbuf)
@@ -484,14 +463,14 @@ Demux::share (
 }
 
 GstFlowReturn
-Demux::push_subframe (const Job &job, SplitTurn turn, Target target)
+Demux::push_subframe (const CodedFrame &frame, SplitTurn turn, Target target)
 {
   const SplitPart &part = plan_->parts[turn.part];
   const GstVideoInfo &info = plan_->infos[turn.part];
   const std::size_t k = turn.subframe;
-  const GstClockTime start = job.frame.pts ();
+  const GstClockTime start = frame.pts ();
   const LightWindow &light = part.windows[k];
-  describe (target.buffer.get (), job.frame.buffer.get (), job.frame.meta,
+  describe (target.buffer.get (), frame.buffer.get (), frame.meta,
       {info, int (k), start + GstClockTime (part.boundaries[k]),
           start + GstClockTime (light.start), GstClockTime (light.duration),
           part.region >= 0});

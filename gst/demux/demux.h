@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -33,22 +34,8 @@ struct Settings {
 
 using PadRef = std::shared_ptr<GstCodedPad>;
 
-/** All source pads at one moment, in the order in which they are served. */
-class PadList
-{
-public:
-  /** Null where there is none. */
-  GstCodedPad *find (PadKind kind, int index = -1) const;
-  void add (PadRef pad);
-  void remove (const GstPad *pad);
-  /** All of one kind, by their index. */
-  std::vector<GstCodedPad *> of_kind (PadKind kind) const;
-  auto begin () const { return pads_.begin (); }
-  auto end () const { return pads_.end (); }
-
-private:
-  std::vector<PadRef> pads_;
-};
+/** The source pads by kind and index, in the order in which they are served. */
+using PadMap = std::map<std::pair<PadKind, int>, PadRef>;
 
 /** What is pushed on each kind of pad. */
 struct PadCaps {
@@ -80,9 +67,15 @@ public:
   static void set_up_class (gpointer klass);
 
 private:
-  struct Job;
-  struct Target;
-  struct Work;
+  /** The pads that a subframe goes to; null where it does not. */
+  struct Target {
+    GstCodedPad *all = nullptr;
+    GstCodedPad *one = nullptr;
+    BufferPtr buffer = nullptr;
+    GstCodedPad *owner () const { return all ? all : one; }
+  };
+  /** Of each subframe of a part. */
+  using Targets = std::vector<Target>;
 
   GstFlowReturn process (CodedFrame frame) override;
   bool plan (const CodedFormat &format) override;
@@ -103,13 +96,13 @@ private:
   ObjectPtr<GstPad> coded_pad () const override;
 
   /* Pads. */
-  std::shared_ptr<const PadList> pads () const;
+  std::shared_ptr<const PadMap> pads () const;
   GstCodedPad *add_pad (
       const char *templ, PadKind kind, const std::string &name, int index);
   void enlist (PadRef pad);
   PadRef strike (GstPad *pad);
   bool index_allowed (PadKind kind, int index) const;
-  bool check_pads (const PadList &list) const;
+  bool check_pads (const PadMap &pads) const;
   /** The flow of all pads together after @p pad returned @p flow; NOT_LINKED
    * where there was nothing to push. */
   GstFlowReturn combine_flow (GstCodedPad *pad, GstFlowReturn flow);
@@ -119,19 +112,21 @@ private:
   bool is_late (GstCodedPad *pad, GstClockTime pts, GstClockTime duration);
   void skip (GstCodedPad *pad, GstClockTime pts, GstClockTime duration);
   bool prepare_pad (GstCodedPad *pad, guint at_once, GstFlowReturn &flow);
-  Work find_targets (const Job &job, std::size_t part, GstFlowReturn &flow);
+  Targets find_targets (GstClockTime start, const PadMap &pads,
+      const SplitPart &part, GstFlowReturn &flow);
   template <typename Pixel>
   ImageView<Pixel> scratch_view (std::size_t part, std::size_t k);
   GstFlowReturn map_subframes (
-      std::size_t part, Work &work, std::vector<MappedFrame> &subframes);
+      std::size_t part, Targets &targets, std::vector<MappedFrame> &subframes);
   template <typename Pixel>
-  GstFlowReturn render_part (
-      Job &job, std::size_t part, Work &work, ImageView<const Pixel> light);
+  GstFlowReturn render_part (CodedFrame &frame, std::size_t part,
+      Targets &targets, ImageView<const Pixel> light);
   template <typename Pixel>
-  GstFlowReturn render (Job &job, std::vector<Work> &works);
-  GstFlowReturn push_coded (const Job &job);
-  GstFlowReturn push_subframes (Job &job);
-  GstFlowReturn push_subframe (const Job &job, SplitTurn turn, Target target);
+  GstFlowReturn render (CodedFrame &frame, std::vector<Targets> &parts);
+  GstFlowReturn push_coded (const CodedFrame &frame, const PadMap &pads);
+  GstFlowReturn push_subframes (CodedFrame &frame, const PadMap &pads);
+  GstFlowReturn push_subframe (
+      const CodedFrame &frame, SplitTurn turn, Target target);
   BufferPtr share (
       const GstVideoInfo &info, const GstCodedPad *pad, GstBuffer *outbuf);
 
@@ -139,7 +134,7 @@ private:
   Settings settings_;
   /** Replaced, never changed: the streaming thread works on one while the
    * application requests and releases pads. */
-  std::shared_ptr<const PadList> pads_ = std::make_shared<PadList> ();
+  std::shared_ptr<const PadMap> pads_ = std::make_shared<PadMap> ();
   std::unique_ptr<GstFlowCombiner, FreeWith<gst_flow_combiner_free>> combiner_{
       gst_flow_combiner_new ()};
   PadCaps caps_;
@@ -152,10 +147,12 @@ private:
   std::vector<std::byte> scratch_; ///< subframes that no pad wants
 };
 
-/** How many pads there can be of a kind that has numbers; @p schedule may be
- * null, where none is known. */
+/** Null if there is no such pad. */
+GstCodedPad *find_pad (const PadMap &pads, PadKind kind, int index = -1);
+
+/** How many numbered pads of @p kind @p schedule allows; null: any schedule. */
 int numbered_pads (PadKind kind, const Schedule *schedule);
-/** The same for people. */
+/** The names of these pads, in a sentence. */
 std::string pads_text (PadKind kind, const Schedule *schedule);
 
 } // namespace codedexposure::gst::demux

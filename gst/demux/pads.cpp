@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The source pads: requested, released, and told of events. */
+/* The source pads: requests, releases, events and flow. */
 #include "demux.h"
 
 #include <algorithm>
@@ -49,8 +49,8 @@ struct Replay {
   const PadCaps &caps;
 };
 
-/* Before the source pads have caps, only the start of the stream has passed
- * them; everything else waits and comes to the new pad with the others. */
+/* Before the source pads have caps, they have only STREAM_START; all other
+ * events wait and reach the new pad together with the others. */
 gboolean
 replay_sticky (GstPad *, GstEvent **upstream, gpointer user_data)
 {
@@ -72,22 +72,23 @@ replay_sticky (GstPad *, GstEvent **upstream, gpointer user_data)
   return TRUE;
 }
 
-/* Of pads that have a number; the template has the same and "%u". */
+/* Names of numbered pads begin with it; in the name of the template, "%u"
+ * follows. */
 const char *
 prefix_of (PadKind kind)
 {
   return kind == PadKind::region ? "region_" : "subframe_";
 }
 
-/* The number in @name, or the lowest free one where no name is given; -1 when
- * the name is none. */
+/* The number in @name, or the lowest free one if no name is given; -1 if the
+ * name is not valid. */
 int
-index_in (const gchar *name, PadKind kind, const PadList &taken)
+index_in (const gchar *name, PadKind kind, const PadMap &taken)
 {
   const std::string prefix = prefix_of (kind);
   if (!name || prefix + "%u" == name) {
     int index = 0;
-    while (taken.find (kind, index))
+    while (taken.contains ({kind, index}))
       index++;
     return index;
   }
@@ -98,47 +99,14 @@ index_in (const gchar *name, PadKind kind, const PadList &taken)
 
 } // namespace
 
-/* ------------------------------------------------------------------ lists --
- */
-
 GstCodedPad *
-PadList::find (PadKind kind, int index) const
+find_pad (const PadMap &pads, PadKind kind, int index)
 {
-  for (const PadRef &pad : pads_)
-    if (pad->coded.kind == kind && pad->coded.index == index)
-      return pad.get ();
-  return nullptr;
+  const auto found = pads.find ({kind, index});
+  return found == pads.end () ? nullptr : found->second.get ();
 }
 
-void
-PadList::add (PadRef pad)
-{
-  const auto rank = [] (const PadRef &one) {
-    return std::pair (one->coded.kind, one->coded.index);
-  };
-  const auto behind = std::find_if (pads_.begin (), pads_.end (),
-      [&] (const PadRef &other) { return rank (pad) < rank (other); });
-  pads_.insert (behind, std::move (pad));
-}
-
-void
-PadList::remove (const GstPad *pad)
-{
-  std::erase_if (pads_,
-      [pad] (const PadRef &other) { return GST_PAD (other.get ()) == pad; });
-}
-
-std::vector<GstCodedPad *>
-PadList::of_kind (PadKind kind) const
-{
-  std::vector<GstCodedPad *> found;
-  for (const PadRef &pad : pads_)
-    if (pad->coded.kind == kind)
-      found.push_back (pad.get ());
-  return found;
-}
-
-std::shared_ptr<const PadList>
+std::shared_ptr<const PadMap>
 Demux::pads () const
 {
   const ObjectLock lock (element ());
@@ -148,15 +116,15 @@ Demux::pads () const
 void
 Demux::each_pad (const PadVisitor &visit) const
 {
-  for (const PadRef &pad : *pads ())
+  for (const auto served = pads (); const auto &[key, pad] : *served)
     visit (pad.get ());
 }
 
 ObjectPtr<GstPad>
 Demux::coded_pad () const
 {
-  const auto list = pads ();
-  GstCodedPad *pad = list->find (PadKind::coded);
+  const auto served = pads ();
+  GstCodedPad *pad = find_pad (*served, PadKind::coded);
   return ObjectPtr<GstPad> (pad ? GST_PAD (gst_object_ref (pad)) : nullptr);
 }
 
@@ -184,8 +152,8 @@ pads_text (PadKind kind, const Schedule *schedule)
          (n > 1 ? " to " + prefix + std::to_string (n - 1) : "") + ".";
 }
 
-/* While a schedule is in force its range is known; before, the largest there
- * can be, and check_pads () looks again. */
+/* Before a schedule is in force, any number that a schedule can have is
+ * allowed; check_pads () checks again. */
 bool
 Demux::index_allowed (PadKind kind, int index) const
 {
@@ -203,19 +171,19 @@ Demux::index_allowed (PadKind kind, int index) const
   return false;
 }
 
-/* Whether the schedule has a subframe or a region for every pad of @list. */
+/* Whether the schedule has a subframe or a region for each of @pads. */
 bool
-Demux::check_pads (const PadList &list) const
+Demux::check_pads (const PadMap &pads) const
 {
   const Schedule &schedule = format ().schedule;
   for (const PadKind kind : {PadKind::one, PadKind::region}) {
-    const auto numbered = list.of_kind (kind);
-    if (numbered.empty () ||
-        numbered.back ()->coded.index < numbered_pads (kind, &schedule))
+    const auto beyond =
+        pads.lower_bound ({kind, numbered_pads (kind, &schedule)});
+    if (beyond == pads.end () || beyond->first.first != kind)
       continue;
-    const CharPtr name (gst_object_get_name (GST_OBJECT (numbered.back ())));
-    post_error ("Pad " + std::string (name.get ()) + " was requested, but " +
-                pads_text (kind, &schedule));
+    post_error ("Pad " +
+                (prefix_of (kind) + std::to_string (beyond->first.second)) +
+                " was requested, but " + pads_text (kind, &schedule));
     return false;
   }
   return true;
@@ -233,9 +201,9 @@ Demux::add_pad (
   return pad.get ();
 }
 
-/* Lists @pad and gives it what the others were told. Both under one lock, and
- * forward () stores an event on the sink pad before it reads the list: an event
- * that comes meanwhile reaches the pad in one way or the other. */
+/* Adds @pad to the map and gives it the sticky events of the others. No event
+ * is missed: both happen under one lock, and forward () stores an event on the
+ * sink pad before it reads the map. */
 void
 Demux::enlist (PadRef pad)
 {
@@ -245,27 +213,27 @@ Demux::enlist (PadRef pad)
   if (const EventPtr eos (gst_event_new_eos ()); ended_)
     gst_pad_store_sticky_event (GST_PAD (pad.get ()), eos.get ());
   gst_flow_combiner_add_pad (combiner_.get (), GST_PAD (pad.get ()));
-  auto list = std::make_shared<PadList> (*pads_);
-  list->add (std::move (pad));
-  pads_ = std::move (list);
+  auto changed = std::make_shared<PadMap> (*pads_);
+  changed->emplace (std::pair (pad->coded.kind, pad->coded.index), pad);
+  pads_ = std::move (changed);
 }
 
 GstPad *
 Demux::request_pad (GstPadTemplate *templ, const gchar *name)
 {
   const std::string kind_name = GST_PAD_TEMPLATE_NAME_TEMPLATE (templ);
-  const auto list = pads ();
+  const auto present = pads ();
   PadKind kind = PadKind::coded;
   int index = -1;
   std::string own_name = kind_name;
   if (kind_name != "coded") {
     kind = kind_name == "region_%u" ? PadKind::region : PadKind::one;
-    index = index_in (name, kind, *list);
+    index = index_in (name, kind, *present);
     if (!index_allowed (kind, index))
       return nullptr;
     own_name = prefix_of (kind) + std::to_string (index);
   }
-  if (list->find (kind, index)) {
+  if (present->contains ({kind, index})) {
     GST_WARNING_OBJECT (
         element (), "pad %s exists: tee it to use it twice", own_name.c_str ());
     return nullptr;
@@ -276,16 +244,16 @@ Demux::request_pad (GstPadTemplate *templ, const gchar *name)
 PadRef
 Demux::strike (GstPad *pad)
 {
+  const CodedPad &coded = GST_CODED_PAD (pad)->coded;
   const ObjectLock lock (element ());
-  const auto found = std::find_if (pads_->begin (), pads_->end (),
-      [pad] (const PadRef &one) { return GST_PAD (one.get ()) == pad; });
-  if (found == pads_->end ())
+  auto changed = std::make_shared<PadMap> (*pads_);
+  const auto found = changed->find ({coded.kind, coded.index});
+  if (found == changed->end () || GST_PAD (found->second.get ()) != pad)
     return nullptr;
-  PadRef struck = *found;
+  PadRef struck = std::move (found->second);
   struck->coded.released = true;
-  auto list = std::make_shared<PadList> (*pads_);
-  list->remove (pad);
-  pads_ = std::move (list);
+  changed->erase (found);
+  pads_ = std::move (changed);
   gst_flow_combiner_remove_pad (combiner_.get (), pad);
   return struck;
 }
@@ -299,11 +267,11 @@ Demux::release_pad (GstPad *pad)
   }
 }
 
-/* -------------------------------------------------------- events and flow --
- */
+/* ------------------------------------------------------- events and flow -- */
 
-/* Core stores a sticky event on the sink pad when its handler has returned,
- * which would be too late for enlist (); EOS it stores only once. */
+/* GStreamer stores a sticky event on the sink pad after its handler has
+ * returned, which is too late for enlist (). EOS can be stored only once, so it
+ * is left to GStreamer. */
 gboolean
 Demux::forward (EventPtr event)
 {

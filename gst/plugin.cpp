@@ -10,8 +10,9 @@
 static gboolean
 plugin_init (GstPlugin *plugin)
 {
-  codedexposure::gst::register_frame_meta ();
-  codedexposure::gst::register_stats_meta ();
+  using namespace codedexposure::gst;
+  register_meta (kFrameMetaName);
+  register_meta (kStatsMetaName);
   codedexposure::serve_simulated_dmds ();
 #ifdef CODEDEXPOSURE_CAMERA_PROVIDER
   if (!GST_DEVICE_PROVIDER_REGISTER (codedexposure_cameraprovider, plugin))

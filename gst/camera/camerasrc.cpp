@@ -200,14 +200,6 @@ set_clock (GstElement *element, GstClock *clock)
   return base->set_clock (element, clock);
 }
 
-void
-finalize (GObject *object)
-{
-  delete GST_CODED_EXPOSURE_CAMERA_SRC (object)->state;
-  G_OBJECT_CLASS (gst_coded_exposure_camera_src_parent_class)
-      ->finalize (object);
-}
-
 } // namespace
 
 namespace codedexposure::gst::camera
@@ -258,8 +250,7 @@ gst_coded_exposure_camera_src_class_init (GstCodedExposureCameraSrcClass *klass)
 {
   auto *element_class = GST_ELEMENT_CLASS (klass);
 
-  G_OBJECT_CLASS (klass)->finalize = finalize;
-  install_properties<&properties, &camera::state> (G_OBJECT_CLASS (klass));
+  install_state<GstCodedExposureCameraSrc, properties> (klass);
   describe_element (klass, "GenICam camera", "Source/Video/Hardware",
       "Frames of a GenICam camera: aravissrc with trigger set-up, unpacked "
       "pixels, memory of its own and reconnection",

@@ -10,6 +10,7 @@
 
 #include <gst/gst.h>
 
+#include "common/element.h"
 #include "common/owned_frames.h"
 #include "common/raii.h"
 #include "settings.h"
@@ -74,11 +75,7 @@ struct _GstCodedExposureCameraSrc {
 namespace codedexposure::gst::camera
 {
 
-inline CameraState &
-state (gpointer element)
-{
-  return *GST_CODED_EXPOSURE_CAMERA_SRC (element)->state;
-}
+inline constexpr auto &state = state_in<GstCodedExposureCameraSrc>;
 /** A copy, by the object lock. */
 Settings settings_of (GstCodedExposureCameraSrc *self);
 

@@ -13,7 +13,7 @@ namespace codedexposure::gst
 namespace
 {
 
-/* A GValue of its own, unset when it goes. */
+/* Owns a GValue. */
 class Value
 {
 public:
@@ -23,16 +23,7 @@ public:
       : value_ (std::exchange (other.value_, GValue G_VALUE_INIT))
   {
   }
-  Value &operator= (Value &&other) noexcept
-  {
-    std::swap (value_, other.value_);
-    return *this;
-  }
-  ~Value ()
-  {
-    if (G_IS_VALUE (&value_))
-      g_value_unset (&value_);
-  }
+  ~Value () { g_value_unset (&value_); }
   GValue *get () { return &value_; }
 
 private:
@@ -41,17 +32,13 @@ private:
 
 using MaybeValue = std::optional<Value>;
 
-/* An integer scale, with the crop of CapsScale. */
+/* The scale of a size, with the crop of CapsScale. */
 struct IntScale {
-  gint64 num, den;
+  Ratio ratio;
   gint64 crop;
 };
 
-struct FractionScale {
-  gint64 num, den;
-};
-
-/* Every value between low and high has to be expected. */
+/* All values from low to high. */
 struct IntSpan {
   gint64 low, high;
 };
@@ -62,25 +49,25 @@ saturate (gint64 value)
   return gint (std::min<gint64> (value, G_MAXINT));
 }
 
-/* What @value becomes: one size when it is divided, all sizes that division
- * would bring back to it when it is multiplied. G_MAXINT says "no bound" in
- * caps, and stays. */
+/* Division gives one size; multiplication gives all sizes that division turns
+ * into @value. G_MAXINT stays, because it means "no bound" in caps. */
 IntSpan
 scale_int (gint64 value, const IntScale &scale)
 {
+  const auto &[num, den] = scale.ratio;
   if (value == G_MAXINT)
     return {value, value};
   const gint64 from = value - std::max<gint64> (scale.crop, 0);
   const gint64 back = std::max<gint64> (-scale.crop, 0);
   if (from <= 0)
     return {0, 0};
-  const gint64 low = from * scale.num / scale.den + back;
-  if (scale.num <= scale.den)
+  const gint64 low = from * num / den + back;
+  if (num <= den)
     return {low, low};
-  return {low, ((from + 1) * scale.num - 1) / scale.den + back};
+  return {low, ((from + 1) * num - 1) / den + back};
 }
 
-/* The values of a span that a size can have. */
+/* The sizes in @span, which are at least 1. */
 MaybeValue
 int_value (IntSpan span)
 {
@@ -107,8 +94,8 @@ scale_one (const GValue *in, const IntScale &scale)
   return std::nullopt;
 }
 
-/* A positive fraction in lowest terms; the closest that two ints hold where
- * one of them would overflow. */
+/* A positive fraction in lowest terms, rounded where it does not fit into two
+ * ints. */
 Value
 fraction_value (gint64 num, gint64 den)
 {
@@ -128,10 +115,10 @@ fraction_value (gint64 num, gint64 den)
   return value;
 }
 
-/* 0/1, the unknown rate, stays; so does the largest fraction, which says "no
- * bound". */
+/* 0/1, the unknown rate, stays, and so does the largest fraction, which means
+ * "no bound". */
 Value
-scale_fraction (const GValue *in, const FractionScale &scale)
+scale_fraction (const GValue *in, const Ratio &scale)
 {
   const gint64 num = gst_value_get_fraction_numerator (in);
   const gint64 den = gst_value_get_fraction_denominator (in);
@@ -141,7 +128,7 @@ scale_fraction (const GValue *in, const FractionScale &scale)
 }
 
 MaybeValue
-scale_one (const GValue *in, const FractionScale &scale)
+scale_one (const GValue *in, const Ratio &scale)
 {
   if (GST_VALUE_HOLDS_FRACTION (in))
     return scale_fraction (in, scale);
@@ -165,19 +152,15 @@ scale_list (const GValue *in, const Scale &scale)
     MaybeValue item = scale_one (gst_value_list_get_value (in, i), scale);
     if (!item)
       continue;
-    if (!all) {
-      all = std::move (item);
-      continue;
-    }
     Value merged;
-    gst_value_list_merge (merged.get (), all->get (), item->get ());
-    all = std::move (merged);
+    if (all)
+      gst_value_list_merge (merged.get (), all->get (), item->get ());
+    all.emplace (std::move (all ? merged : *item));
   }
   return all;
 }
 
-/* Returns false when no value of the field is left; a field that is not there
- * stays away. */
+/* False if no value of the field is left. A field may be absent. */
 template <typename Scale>
 bool
 scale_field (GstStructure *structure, const char *name, const Scale &scale)
@@ -196,15 +179,12 @@ scale_field (GstStructure *structure, const char *name, const Scale &scale)
 bool
 scale_structure (GstStructure *structure, const CapsScale &scale)
 {
-  const FractionScale rate = {scale.rate_num, scale.rate_den};
-  const FractionScale aspect = {gint64 (scale.width_den) * scale.height_num,
-      gint64 (scale.width_num) * scale.height_den};
+  const auto &[rate, width, height, crop_rows] = scale;
+  const Ratio aspect{width.den * height.num, width.num * height.den};
   return scale_field (structure, "framerate", rate) &&
          scale_field (structure, "max-framerate", rate) &&
-         scale_field (structure, "width",
-             IntScale{scale.width_num, scale.width_den, 0}) &&
-         scale_field (structure, "height",
-             IntScale{scale.height_num, scale.height_den, scale.crop_rows}) &&
+         scale_field (structure, "width", IntScale{width, 0}) &&
+         scale_field (structure, "height", IntScale{height, crop_rows}) &&
          scale_field (structure, "pixel-aspect-ratio", aspect);
 }
 
@@ -233,26 +213,14 @@ has_rate (const GstStructure *structure)
 CapsScale
 CapsScale::inverse () const
 {
-  CapsScale other;
-  other.rate_num = rate_den;
-  other.rate_den = rate_num;
-  other.width_num = width_den;
-  other.width_den = width_num;
-  other.height_num = height_den;
-  other.height_den = height_num;
-  other.crop_rows = -crop_rows;
-  return other;
+  return {rate.inverse (), width.inverse (), height.inverse (), -crop_rows};
 }
 
 CapsScale
 coded_to_subframes (const Schedule &schedule, bool raised_rate)
 {
-  CapsScale scale;
-  scale.rate_num = raised_rate ? schedule.code ().slots () : 1;
-  scale.width_den = schedule.cell ().width;
-  scale.height_den = schedule.cell ().height;
-  scale.crop_rows = schedule.pilot_rows ();
-  return scale;
+  return {{raised_rate ? schedule.slots () : 1}, {1, schedule.cell ().width},
+      {1, schedule.cell ().height}, schedule.pilot_rows ()};
 }
 
 GstCaps *

@@ -15,14 +15,17 @@
 namespace codedexposure::gst
 {
 
-/** What happens to a stream between two pads: each field is multiplied by its
- * num and divided by its den. */
+/** A factor of num / den. */
+struct Ratio {
+  gint64 num = 1, den = 1;
+  Ratio inverse () const { return {den, num}; }
+};
+
+/** How rate and size change between two pads. */
 struct CapsScale {
-  int rate_num = 1, rate_den = 1;
-  int width_num = 1, width_den = 1;
-  int height_num = 1, height_den = 1;
-  /** Rows taken off before the height is divided, or put back after it is
-   * multiplied. */
+  Ratio rate = {}, width = {}, height = {};
+  /** Rows that are cropped before the height is scaled; negative: that many are
+   * added after it. */
   int crop_rows = 0;
 
   CapsScale inverse () const;

@@ -333,7 +333,6 @@ private:
   CapsPtr sink_caps () const;
   CapsPtr src_caps (GstCodedPad *pad) const;
   gboolean answer_allocation (GstQuery *query) const;
-  void add_latency (GstQuery *query) const;
   void scale_frames (GstCodedPad *pad, GstQuery *query) const;
 
   GstElement *element_;

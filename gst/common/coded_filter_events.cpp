@@ -4,6 +4,7 @@
 
 #include <utility>
 
+#include "element.h"
 #include "tag.h"
 
 GST_DEBUG_CATEGORY_EXTERN (coded_filter_debug);
@@ -234,8 +235,10 @@ CodedFilter::src_query (GstCodedPad *pad, GstQuery *query)
   }
   if (!gst_pad_query_default (GST_PAD (pad), GST_OBJECT (element_), query))
     return FALSE;
-  if (GST_QUERY_TYPE (query) == GST_QUERY_LATENCY)
-    add_latency (query);
+  if (GST_QUERY_TYPE (query) == GST_QUERY_LATENCY) {
+    const ObjectLock lock (element_);
+    add_latency (query, shared_.latency);
+  }
   scale_frames (pad, query);
   return TRUE;
 }
@@ -314,21 +317,6 @@ CodedFilter::answer_allocation (GstQuery *query) const
   if (gst_buffer_pool_set_config (pool.get (), config))
     gst_query_add_allocation_pool (query, pool.get (), size, 0, 0);
   return TRUE;
-}
-
-void
-CodedFilter::add_latency (GstQuery *query) const
-{
-  gboolean live;
-  GstClockTime min, max;
-  gst_query_parse_latency (query, &live, &min, &max);
-  {
-    const ObjectLock lock (element_);
-    min += shared_.latency;
-    if (GST_CLOCK_TIME_IS_VALID (max))
-      max += shared_.latency;
-  }
-  gst_query_set_latency (query, live, min, max);
 }
 
 /* DURATION and POSITION count upstream's frames; @pad has more of them. */

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "element.h"
+
 GST_DEBUG_CATEGORY_EXTERN (coded_filter_debug);
 #define GST_CAT_DEFAULT coded_filter_debug
 
@@ -19,14 +21,6 @@ std::string
 text_of (Extent size)
 {
   return std::to_string (size.width) + "x" + std::to_string (size.height);
-}
-
-/* gst-launch shows the second text only. */
-void
-post_info (GstElement *element, const std::string &text)
-{
-  GST_ELEMENT_INFO (
-      element, STREAM, FORMAT, ("%s", text.c_str ()), ("%s", text.c_str ()));
 }
 
 } // namespace
@@ -152,9 +146,9 @@ CodedFilter::report_overruled (const Schedule &asked)
   if (tagged == asked || stream_.overruled == tagged)
     return;
   stream_.overruled = tagged;
-  post_info (element_, "The schedule property, " + asked.text () +
-                           ", is in force. The stream was made with " +
-                           tagged.text () + ".");
+  POST_INFO (element_, STREAM, FORMAT,
+      "The schedule property, " + asked.text () +
+          ", is in force. The stream was made with " + tagged.text () + ".");
 }
 
 /* The property wins over the stream's tag. Frames that were scaled or cropped

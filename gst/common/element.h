@@ -40,15 +40,17 @@ state_in (gpointer element)
 }
 
 /**
- * Gives the class of a final type, whose instances make their `state` when they
- * are made, the properties of @p Table, and deletes the state in the end.
+ * For the class of a final type whose instances create their `state`: installs
+ * the properties of @p Table (), as install_properties (), and deletes the
+ * state with the instance.
  */
-template <typename Element, auto Table>
+template <typename Element, auto Table,
+    auto Changed = [] (GObject *, const GParamSpec *) {}>
 void
 install_state (gpointer klass)
 {
   auto *object_class = G_OBJECT_CLASS (klass);
-  install_properties<Table, state_in<Element>> (object_class);
+  install_properties<Table, state_in<Element>, Changed> (object_class);
   object_class->finalize = [] (GObject *object) noexcept {
     delete &state_in<Element> (object);
     G_OBJECT_CLASS (g_type_class_peek_parent (G_OBJECT_GET_CLASS (object)))
@@ -71,11 +73,15 @@ void add_latency (GstQuery *query, GstClockTime own);
 
 } // namespace codedexposure::gst
 
-/** GST_ELEMENT_ERROR and GST_ELEMENT_WARNING with a std::string or a literal
- * as their only text. */
+/** GST_ELEMENT_ERROR, _WARNING and _INFO with a std::string or a literal as
+ * their text. Of an INFO, gst-launch-1.0 shows the debug text only. */
 #define POST_ERROR(element, domain, code, text)                                \
   GST_ELEMENT_ERROR (                                                          \
       element, domain, code, ("%s", std::string (text).c_str ()), (nullptr))
 #define POST_WARNING(element, domain, code, text)                              \
   GST_ELEMENT_WARNING (                                                        \
       element, domain, code, ("%s", std::string (text).c_str ()), (nullptr))
+#define POST_INFO(element, domain, code, text)                                 \
+  GST_ELEMENT_INFO (element, domain, code,                                     \
+      ("%s", std::string (text).c_str ()),                                     \
+      ("%s", std::string (text).c_str ()))

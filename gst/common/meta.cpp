@@ -23,6 +23,13 @@ find (GstBuffer *buffer)
       gst_buffer_get_meta (buffer, frame_meta_api ()));
 }
 
+GQuark
+pattern_quark ()
+{
+  static const GQuark pattern = g_quark_from_static_string ("pattern");
+  return pattern;
+}
+
 struct MetaCopy {
   GstBuffer *to;
   GstVideoInfo from_info, to_info;
@@ -61,24 +68,12 @@ copy_meta (GstBuffer *from, GstMeta **meta, gpointer user_data)
 /* A custom meta is copied by every element that copies {"video"} metas, also
  * through scalers and encoders in the same process. */
 void
-register_frame_meta ()
+register_meta (const char *name)
 {
   static const gchar *tags[] = {"video", nullptr};
-  if (!gst_meta_get_info (kFrameMetaName))
-    gst_meta_register_custom (kFrameMetaName, tags, nullptr, nullptr, nullptr);
+  if (!gst_meta_get_info (name))
+    gst_meta_register_custom (name, tags, nullptr, nullptr, nullptr);
 }
-
-namespace
-{
-
-GQuark
-pattern_quark ()
-{
-  static const GQuark pattern = g_quark_from_static_string ("pattern");
-  return pattern;
-}
-
-} // namespace
 
 void
 set_frame_meta (GstBuffer *buffer, const FrameMeta &meta)

@@ -58,8 +58,9 @@ significant_bits_of (int bits, const GstVideoInfo &info)
                                                                        : 0;
 }
 
-/** Registers the meta; call once from plugin_init. */
-void register_frame_meta ();
+/** Registers the custom meta @p name, tagged {"video"}, unless it is
+ * registered. */
+void register_meta (const char *name);
 /** Writes @p meta to @p buffer, which must be writable, over what was there. */
 void set_frame_meta (GstBuffer *buffer, const FrameMeta &meta);
 std::optional<FrameMeta> get_frame_meta (GstBuffer *buffer);

@@ -5,6 +5,8 @@
 
 #include <utility>
 
+#include "common/element.h"
+
 GST_DEBUG_CATEGORY_EXTERN (codedexposure_demux_debug);
 #define GST_CAT_DEFAULT codedexposure_demux_debug
 
@@ -112,13 +114,10 @@ report_regions (GstElement *element, const Schedule &schedule)
 {
   if (schedule.regions ().empty ())
     return;
-  const std::string text =
+  POST_INFO (element, STREAM, FORMAT,
       "src and the subframe pads show the background; regions are black "
       "there and have pads of their own: " +
-      pads_text (PadKind::region, &schedule);
-  /* gst-launch shows the second text only. */
-  GST_ELEMENT_INFO (
-      element, STREAM, FORMAT, ("%s", text.c_str ()), ("%s", text.c_str ()));
+          pads_text (PadKind::region, &schedule));
 }
 
 } // namespace

@@ -133,13 +133,10 @@ say_observable (GstDmdSync *self)
   if (slip_observable (st.schedule) != SlipObservable::never)
     return;
   const std::string schedule = st.schedule.text ();
-  const std::string text =
+  POST_INFO (self, RESOURCE, SETTINGS,
       "A slip of the DMD by whole slots is not observable with " + schedule +
-      "; reserve some rows of mirrors for a pilot, as in " + schedule +
-      ",pilot=16, to see one";
-  /* gst-launch shows the second text only. */
-  GST_ELEMENT_INFO (
-      self, RESOURCE, SETTINGS, ("%s", text.c_str ()), ("%s", text.c_str ()));
+          "; reserve some rows of mirrors for a pilot, as in " + schedule +
+          ",pilot=16, to see one");
 }
 
 void
@@ -203,13 +200,6 @@ change_state (GstElement *element, GstStateChange transition)
   return changed;
 }
 
-void
-finalize (GObject *object)
-{
-  delete GST_DMD_SYNC (object)->state;
-  G_OBJECT_CLASS (gst_dmd_sync_parent_class)->finalize (object);
-}
-
 } // namespace
 
 static void
@@ -218,8 +208,7 @@ gst_dmd_sync_class_init (GstDmdSyncClass *klass)
   auto *element_class = GST_ELEMENT_CLASS (klass);
   auto *transform_class = GST_BASE_TRANSFORM_CLASS (klass);
 
-  G_OBJECT_CLASS (klass)->finalize = finalize;
-  sync::install_own_properties (G_OBJECT_CLASS (klass));
+  sync::install_own_state (klass);
   describe_element (klass, "DMD synchroniser", "Filter/Video",
       "Drives the DMD of a coded exposure camera; times, counts and watches "
       "its frames");

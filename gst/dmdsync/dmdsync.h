@@ -14,6 +14,7 @@
 #include <gst/gst.h>
 #include <gst/video/video.h>
 
+#include "common/element.h"
 #include "common/events.h"
 #include "common/owned_frames.h"
 #include "common/raii.h"
@@ -148,11 +149,7 @@ struct _GstDmdSync {
 namespace codedexposure::gst::sync
 {
 
-inline SyncState &
-state (gpointer element)
-{
-  return *GST_DMD_SYNC (element)->state;
-}
+inline constexpr auto &state = state_in<GstDmdSync>;
 /** A copy, by the object lock. */
 Settings settings_of (GstDmdSync *self);
 
@@ -174,8 +171,8 @@ void note_end (GstDmdSync *self);
 /** Says it when frames come at another rate than that of the caps. */
 void watch_rate (GstDmdSync *self, GstClockTime time);
 
-/* Properties. */
-void install_own_properties (GObjectClass *klass);
+/** The properties, and the end of the state. */
+void install_own_state (gpointer klass);
 
 /* What the properties name; false with an error on the bus. */
 bool read_schedule (GstDmdSync *self);

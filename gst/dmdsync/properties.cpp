@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* dmdsync's properties. */
-#include "common/properties.h"
 #include "dmdsync.h"
 
 #define GST_CAT_DEFAULT dmdsync_debug
@@ -167,10 +166,10 @@ set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 } // namespace
 
 void
-install_own_properties (GObjectClass *klass)
+install_own_state (gpointer klass)
 {
-  install_properties<&properties, &state> (klass);
-  klass->set_property = set_property;
+  install_state<GstDmdSync, properties> (klass);
+  G_OBJECT_CLASS (klass)->set_property = set_property;
 }
 
 } // namespace codedexposure::gst::sync

@@ -381,10 +381,7 @@ make_fuser (const CodedFormat &format, const FuseOptions &options)
 CapsScale
 coded_to_fused (const Schedule &schedule)
 {
-  CapsScale scale;
-  scale.rate_num = schedule.slots ();
-  scale.crop_rows = schedule.pilot_rows ();
-  return scale;
+  return {.rate = {schedule.slots ()}, .crop_rows = schedule.pilot_rows ()};
 }
 
 } // namespace

@@ -56,18 +56,8 @@ struct LogState {
   std::optional<codedexposure::Mapping> mapping;
 };
 
-template <typename Pixel>
-guint64
-count_saturated_in (const LogState &state, MappedFrame &mapped, int bits)
-{
-  const auto all = view_of<const Pixel> (mapped);
-  const int pilot = state.schedule ? state.schedule->pilot_rows () : 0;
-  return codedexposure::count_saturated (
-      all.rows (0, std::max (0, all.height - pilot)), bits);
-}
-
-/** Pixels of a coded frame at the largest value. Those of a subframe were
- * counted when it was extracted. */
+/** Pixels of a coded frame at the largest value, without the pilot's. Those of
+ * a subframe were counted when it was extracted. */
 std::optional<guint64>
 saturated_pixels (
     const LogState &state, GstBuffer *frame, const FrameMeta &meta)
@@ -77,10 +67,12 @@ saturated_pixels (
   MappedFrame mapped (state.info, frame, GST_MAP_READ);
   if (!mapped)
     return std::nullopt;
-  const int bits = significant_bits_of (meta.bits, state.info);
-  return GST_VIDEO_INFO_FORMAT (&state.info) == GST_VIDEO_FORMAT_GRAY8
-             ? count_saturated_in<guint8> (state, mapped, bits)
-             : count_saturated_in<guint16> (state, mapped, bits);
+  const int pilot = state.schedule ? state.schedule->pilot_rows () : 0;
+  return read_pixels (mapped, [&] (auto pixels) {
+    return codedexposure::count_saturated (
+        pixels.rows (0, std::max (0, pixels.height - pilot)),
+        significant_bits_of (meta.bits, state.info));
+  });
 }
 
 /** One line of JSON, keys in this order; unknown values are left out. */
@@ -129,7 +121,6 @@ struct _GstCodedExposureLog {
   LogState *state;
 };
 
-#define gst_coded_exposure_log_parent_class parent_class
 G_DEFINE_TYPE_WITH_CODE (GstCodedExposureLog, gst_coded_exposure_log,
     GST_TYPE_BASE_TRANSFORM,
     GST_DEBUG_CATEGORY_INIT (codedexposure_log_debug, "codedexposure-log", 0,
@@ -137,26 +128,27 @@ G_DEFINE_TYPE_WITH_CODE (GstCodedExposureLog, gst_coded_exposure_log,
 GST_ELEMENT_REGISTER_DEFINE (codedexposure_log, "codedexposure-log",
     GST_RANK_NONE, gst_coded_exposure_log_get_type ())
 
-static GstFlowReturn
-gst_coded_exposure_log_transform_ip (
-    GstBaseTransform *base, GstBuffer *frame) noexcept
+namespace
 {
-  LogState &state = *GST_CODED_EXPOSURE_LOG (base)->state;
+
+GstFlowReturn
+transform_ip (GstBaseTransform *base, GstBuffer *frame) noexcept
+{
+  LogState &state = state_in<GstCodedExposureLog> (base);
   const std::string line = frame_line (state, frame, base->segment);
   state.frames++;
   return state.file.write (line) ? GST_FLOW_OK : GST_FLOW_ERROR;
 }
 
-static gboolean
-gst_coded_exposure_log_set_caps (
-    GstBaseTransform *base, GstCaps *caps, GstCaps *)
+gboolean
+set_caps (GstBaseTransform *base, GstCaps *caps, GstCaps *)
 {
-  LogState &state = *GST_CODED_EXPOSURE_LOG (base)->state;
+  LogState &state = state_in<GstCodedExposureLog> (base);
   return gst_video_info_from_caps (&state.info, caps);
 }
 
 /* Upstream repeats tags; each schedule and mapping is written once. */
-static void
+void
 note_setup (GstCodedExposureLog *self, GstEvent *event)
 {
   LogState &state = *self->state;
@@ -166,10 +158,9 @@ note_setup (GstCodedExposureLog *self, GstEvent *event)
   if (!setup)
     return;
   if (!*setup) {
-    GST_ELEMENT_WARNING (self, STREAM, DECODE,
-        ("The schedule of the stream is not recorded: %s",
-            setup->error ().message.c_str ()),
-        (nullptr));
+    POST_WARNING (self, STREAM, DECODE,
+        "The schedule of the stream is not recorded: " +
+            setup->error ().message);
     return;
   }
   const codedexposure::StreamSetup &said = setup->value ();
@@ -183,17 +174,17 @@ note_setup (GstCodedExposureLog *self, GstEvent *event)
   }
 }
 
-static gboolean
-gst_coded_exposure_log_sink_event (
-    GstBaseTransform *base, GstEvent *event) noexcept
+gboolean
+sink_event (GstBaseTransform *base, GstEvent *event) noexcept
 {
   if (GST_EVENT_TYPE (event) == GST_EVENT_TAG)
     note_setup (GST_CODED_EXPOSURE_LOG (base), event);
-  return GST_BASE_TRANSFORM_CLASS (parent_class)->sink_event (base, event);
+  return GST_BASE_TRANSFORM_CLASS (gst_coded_exposure_log_parent_class)
+      ->sink_event (base, event);
 }
 
-static gboolean
-gst_coded_exposure_log_start (GstBaseTransform *base) noexcept
+gboolean
+start (GstBaseTransform *base) noexcept
 {
   auto *self = GST_CODED_EXPOSURE_LOG (base);
   LogState &state = *self->state;
@@ -206,22 +197,21 @@ gst_coded_exposure_log_start (GstBaseTransform *base) noexcept
   state.schedule.reset ();
   state.mapping.reset ();
   if (location.empty ()) {
-    GST_ELEMENT_ERROR (self, RESOURCE, NOT_FOUND,
-        ("codedexposure-log has no file to write to: set location=FILE.jsonl"),
-        (nullptr));
+    POST_ERROR (self, RESOURCE, NOT_FOUND,
+        "codedexposure-log has no file to write to: set location=FILE.jsonl");
     return FALSE;
   }
   return state.file.open (self, location);
 }
 
-static gboolean
-gst_coded_exposure_log_stop (GstBaseTransform *base)
+gboolean
+stop (GstBaseTransform *base)
 {
-  GST_CODED_EXPOSURE_LOG (base)->state->file.close ();
+  state_in<GstCodedExposureLog> (base).file.close ();
   return TRUE;
 }
 
-static const PropertyTable<LogState> &
+const PropertyTable<LogState> &
 properties ()
 {
   static const PropertyTable<LogState> table{{"location", "File location",
@@ -230,6 +220,8 @@ properties ()
       kReadWriteReady, &LogState::location}};
   return table;
 }
+
+} // namespace
 
 static void
 gst_coded_exposure_log_init (GstCodedExposureLog *self)
@@ -246,12 +238,9 @@ gst_coded_exposure_log_class_init (GstCodedExposureLogClass *klass)
       "Writes what is known of every coded frame to a file of JSON lines");
 
   auto *transform_class = GST_BASE_TRANSFORM_CLASS (klass);
-  transform_class->start = GST_DEBUG_FUNCPTR (gst_coded_exposure_log_start);
-  transform_class->stop = GST_DEBUG_FUNCPTR (gst_coded_exposure_log_stop);
-  transform_class->set_caps =
-      GST_DEBUG_FUNCPTR (gst_coded_exposure_log_set_caps);
-  transform_class->sink_event =
-      GST_DEBUG_FUNCPTR (gst_coded_exposure_log_sink_event);
-  transform_class->transform_ip =
-      GST_DEBUG_FUNCPTR (gst_coded_exposure_log_transform_ip);
+  transform_class->start = GST_DEBUG_FUNCPTR (start);
+  transform_class->stop = GST_DEBUG_FUNCPTR (stop);
+  transform_class->set_caps = GST_DEBUG_FUNCPTR (set_caps);
+  transform_class->sink_event = GST_DEBUG_FUNCPTR (sink_event);
+  transform_class->transform_ip = GST_DEBUG_FUNCPTR (transform_ip);
 }

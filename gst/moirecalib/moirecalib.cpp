@@ -201,13 +201,6 @@ change_state (GstElement *element, GstStateChange transition) noexcept
   return changed;
 }
 
-void
-finalize (GObject *object)
-{
-  delete GST_MOIRE_CALIB (object)->state;
-  G_OBJECT_CLASS (gst_moire_calib_parent_class)->finalize (object);
-}
-
 } // namespace
 
 namespace codedexposure::gst::moire
@@ -225,12 +218,10 @@ settings_of (gpointer element)
 static void
 gst_moire_calib_class_init (GstMoireCalibClass *klass)
 {
-  auto *object_class = G_OBJECT_CLASS (klass);
   auto *element_class = GST_ELEMENT_CLASS (klass);
   auto *transform_class = GST_BASE_TRANSFORM_CLASS (klass);
 
-  object_class->finalize = finalize;
-  install_properties<properties, moire::state, changed> (object_class);
+  install_state<GstMoireCalib, properties, changed> (klass);
   describe_element (klass, "Moiré calibration", "Filter/Analyzer/Video",
       "Aligns a coded exposure camera with its mirrors and measures the "
       "mapping between them");

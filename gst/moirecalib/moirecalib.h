@@ -16,6 +16,7 @@
 #include <gst/video/video.h>
 
 #include "calibrate/session.h"
+#include "common/element.h"
 #include "common/raii.h"
 #include "mapping/stream_setup.h"
 #include "report.h"
@@ -155,11 +156,7 @@ struct _GstMoireCalib {
 namespace codedexposure::gst::moire
 {
 
-inline CalibState &
-state (gpointer element)
-{
-  return *GST_MOIRE_CALIB (element)->state;
-}
+inline constexpr auto &state = state_in<GstMoireCalib>;
 /** A copy, by the object lock. */
 Settings settings_of (gpointer element);
 

@@ -70,7 +70,6 @@ struct _GstCodedExposureScene {
   SceneState *state;
 };
 
-#define gst_coded_exposure_scene_parent_class parent_class
 G_DEFINE_TYPE (
     GstCodedExposureScene, gst_coded_exposure_scene, GST_TYPE_PUSH_SRC)
 GST_ELEMENT_REGISTER_DEFINE (codedexposure_scene, "codedexposure-scene",
@@ -82,7 +81,10 @@ G_DEFINE_ENUM_TYPE (GstCodedExposureSceneKind, gst_coded_exposure_scene_kind,
         "blown-out"},
     {int (SceneKind::kPour), "Liquid that is poured into a glass", "pour"});
 
-static const PropertyTable<SceneState> &
+namespace
+{
+
+const PropertyTable<SceneState> &
 properties ()
 {
   static const PropertyTable<SceneState> table{{"scene", "Scene to draw",
@@ -91,8 +93,8 @@ properties ()
   return table;
 }
 
-static gboolean
-gst_coded_exposure_scene_start (GstBaseSrc *base)
+gboolean
+start (GstBaseSrc *base)
 {
   auto *self = GST_CODED_EXPOSURE_SCENE (base);
   SceneState &state = *self->state;
@@ -102,29 +104,29 @@ gst_coded_exposure_scene_start (GstBaseSrc *base)
   return TRUE;
 }
 
-static GstCaps *
-gst_coded_exposure_scene_fixate (GstBaseSrc *base, GstCaps *caps)
+GstCaps *
+fixate (GstBaseSrc *base, GstCaps *caps)
 {
   caps = gst_caps_make_writable (caps);
   GstStructure *fields = gst_caps_get_structure (caps, 0);
   gst_structure_fixate_field_nearest_int (fields, "width", 768);
   gst_structure_fixate_field_nearest_int (fields, "height", 576);
   gst_structure_fixate_field_nearest_fraction (fields, "framerate", 100, 1);
-  return GST_BASE_SRC_CLASS (parent_class)->fixate (base, caps);
+  return GST_BASE_SRC_CLASS (gst_coded_exposure_scene_parent_class)
+      ->fixate (base, caps);
 }
 
-static gboolean
-gst_coded_exposure_scene_set_caps (GstBaseSrc *base, GstCaps *caps) noexcept
+gboolean
+set_caps (GstBaseSrc *base, GstCaps *caps) noexcept
 {
   auto *self = GST_CODED_EXPOSURE_SCENE (base);
   SceneState &state = *self->state;
   if (!gst_video_info_from_caps (&state.info, caps))
     return FALSE;
   if (state.info.fps_n == 0) {
-    GST_ELEMENT_ERROR (self, STREAM, FORMAT,
-        ("A scene that moves needs a frame rate: write one behind it, such as "
-         "video/x-raw,framerate=100/1."),
-        (nullptr));
+    POST_ERROR (self, STREAM, FORMAT,
+        "A scene that moves needs a frame rate: write one behind it, such as "
+        "video/x-raw,framerate=100/1.");
     return FALSE;
   }
   const codedexposure::Extent size{state.info.width, state.info.height};
@@ -133,8 +135,8 @@ gst_coded_exposure_scene_set_caps (GstBaseSrc *base, GstCaps *caps) noexcept
   return TRUE;
 }
 
-static GstFlowReturn
-gst_coded_exposure_scene_create (GstPushSrc *base, GstBuffer **outbuf) noexcept
+GstFlowReturn
+create (GstPushSrc *base, GstBuffer **outbuf) noexcept
 {
   auto *self = GST_CODED_EXPOSURE_SCENE (base);
   SceneState &state = *self->state;
@@ -151,10 +153,7 @@ gst_coded_exposure_scene_create (GstPushSrc *base, GstBuffer **outbuf) noexcept
   {
     MappedFrame mapped (state.info, buffer.get (), GST_MAP_WRITE);
     const auto light = std::as_const (state.light).view ();
-    if (GST_VIDEO_INFO_FORMAT (&state.info) == GST_VIDEO_FORMAT_GRAY8)
-      expose (light, view_of<guint8> (mapped));
-    else
-      expose (light, view_of<guint16> (mapped));
+    write_pixels (mapped, [light] (auto pixels) { expose (light, pixels); });
   }
   GST_BUFFER_PTS (buffer.get ()) = time;
   GST_BUFFER_OFFSET (buffer.get ()) = state.frame++;
@@ -163,6 +162,8 @@ gst_coded_exposure_scene_create (GstPushSrc *base, GstBuffer **outbuf) noexcept
   *outbuf = buffer.release ();
   return GST_FLOW_OK;
 }
+
+} // namespace
 
 static void
 gst_coded_exposure_scene_init (GstCodedExposureScene *self)
@@ -180,9 +181,8 @@ gst_coded_exposure_scene_class_init (GstCodedExposureSceneClass *klass)
       {"src"});
 
   auto *base_class = GST_BASE_SRC_CLASS (klass);
-  base_class->start = GST_DEBUG_FUNCPTR (gst_coded_exposure_scene_start);
-  base_class->fixate = GST_DEBUG_FUNCPTR (gst_coded_exposure_scene_fixate);
-  base_class->set_caps = GST_DEBUG_FUNCPTR (gst_coded_exposure_scene_set_caps);
-  GST_PUSH_SRC_CLASS (klass)->create =
-      GST_DEBUG_FUNCPTR (gst_coded_exposure_scene_create);
+  base_class->start = GST_DEBUG_FUNCPTR (start);
+  base_class->fixate = GST_DEBUG_FUNCPTR (fixate);
+  base_class->set_caps = GST_DEBUG_FUNCPTR (set_caps);
+  GST_PUSH_SRC_CLASS (klass)->create = GST_DEBUG_FUNCPTR (create);
 }

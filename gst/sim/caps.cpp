@@ -157,8 +157,7 @@ transform_caps (GstBaseTransform *trans, GstPadDirection direction,
     GstCaps *caps, GstCaps *filter)
 {
   auto *self = GST_CODED_EXPOSURE_SIM (trans);
-  CapsScale scale;
-  scale.rate_den = schedule_of (self)->slots ();
+  const CapsScale scale{.rate = {1, schedule_of (self)->slots ()}};
   const GstPadDirection made_for =
       direction == GST_PAD_SINK ? GST_PAD_SRC : GST_PAD_SINK;
   CapsPtr made (
@@ -168,10 +167,8 @@ transform_caps (GstBaseTransform *trans, GstPadDirection direction,
     for (guint i = 0; i < gst_caps_get_size (made.get ()); i++)
       widen_rate (gst_caps_get_structure (made.get (), i), made_for);
   }
-  if (filter)
-    made.reset (gst_caps_intersect_full (
-        filter, made.get (), GST_CAPS_INTERSECT_FIRST));
-  return made.release ();
+  return (filter ? intersect_caps (filter, made.get ()) : std::move (made))
+      .release ();
 }
 
 GstCaps *

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Properties of codedexposure-sim: settings and counters. */
-#include "common/properties.h"
 #include "sim.h"
 
 #define GST_CAT_DEFAULT codedexposure_sim_debug
@@ -86,8 +85,8 @@ set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
   /* The DMD is looked up once, when the stream starts. */
   if (g_str_equal (pspec->name, "dmd") && GST_STATE (object) > GST_STATE_READY)
     GST_WARNING_OBJECT (object, "dmd is in force from the next start on");
-  Settings &settings = state (GST_CODED_EXPOSURE_SIM (object)).settings;
-  assign (state (GST_CODED_EXPOSURE_SIM (object)));
+  Settings &settings = state (object).settings;
+  assign (state (object));
   if (settings.schedule.text.empty ())
     settings.schedule = Settings ().schedule;
 }
@@ -95,10 +94,10 @@ set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 } // namespace
 
 void
-install_own_properties (GObjectClass *klass)
+install_own_state (gpointer klass)
 {
-  install_properties<&properties, &state> (klass);
-  klass->set_property = set_property;
+  install_state<GstCodedExposureSim, properties> (klass);
+  G_OBJECT_CLASS (klass)->set_property = set_property;
 }
 
 } // namespace codedexposure::gst::sim

@@ -198,20 +198,12 @@ query (GstBaseTransform *trans, GstPadDirection direction, GstQuery *query)
   return TRUE;
 }
 
-void
-finalize (GObject *object)
-{
-  delete GST_CODED_EXPOSURE_SIM (object)->state;
-  G_OBJECT_CLASS (gst_coded_exposure_sim_parent_class)->finalize (object);
-}
-
 } // namespace
 
 static void
 gst_coded_exposure_sim_class_init (GstCodedExposureSimClass *klass)
 {
-  G_OBJECT_CLASS (klass)->finalize = finalize;
-  sim::install_own_properties (G_OBJECT_CLASS (klass));
+  sim::install_own_state (klass);
 
   auto *transform = GST_BASE_TRANSFORM_CLASS (klass);
   /* A video filter works in place where it can; a coded frame needs a buffer

@@ -15,6 +15,7 @@
 #include "bench/bench.h"
 #include "bench/light_share.h"
 #include "bench/simulated_dmd.h"
+#include "common/element.h"
 #include "common/named.h"
 #include "common/raii.h"
 #include "schedule/schedule.h"
@@ -108,14 +109,10 @@ struct _GstCodedExposureSim {
 namespace codedexposure::gst::sim
 {
 
-inline SimState &
-state (gpointer element)
-{
-  return *GST_CODED_EXPOSURE_SIM (element)->state;
-}
+inline constexpr auto &state = state_in<GstCodedExposureSim>;
 
-/* Properties. */
-void install_own_properties (GObjectClass *klass);
+/** The properties, and the end of the state. */
+void install_own_state (gpointer klass);
 
 /* Negotiation. */
 GstCaps *transform_caps (GstBaseTransform *trans, GstPadDirection direction,

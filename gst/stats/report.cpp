@@ -36,14 +36,6 @@ listed (const std::vector<T> &numbers)
 
 } // namespace
 
-void
-register_stats_meta ()
-{
-  static const gchar *tags[] = {"video", nullptr};
-  if (!gst_meta_get_info (kStatsMetaName))
-    gst_meta_register_custom (kStatsMetaName, tags, nullptr, nullptr, nullptr);
-}
-
 GstStructure *
 set_stats_meta (GstBuffer *buffer, const StatsReport &report)
 {

@@ -16,8 +16,6 @@ namespace codedexposure::gst
 
 /** Name of the custom meta, "CodedExposureStats"; tagged {"video"}. */
 extern const char *const kStatsMetaName;
-/** Registers the meta; call once from plugin_init. */
-void register_stats_meta ();
 
 /** The measurements of one picture. */
 struct StatsReport {

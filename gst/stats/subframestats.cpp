@@ -51,6 +51,7 @@
 #include "common/meta.h"
 #include "report.h"
 
+using namespace codedexposure;
 using namespace codedexposure::gst;
 
 GST_DEBUG_CATEGORY_STATIC (subframestats_debug);
@@ -61,8 +62,8 @@ namespace
 
 enum class Format { json, csv };
 
-using Meter = std::variant<std::monostate, codedexposure::StatsMeter<guint8>,
-    codedexposure::StatsMeter<guint16>>;
+using Meter =
+    std::variant<std::monostate, StatsMeter<guint8>, StatsMeter<guint16>>;
 
 struct Settings {
   std::string location;
@@ -81,7 +82,7 @@ struct StatsState {
 
   /* Streaming thread, and start and stop, which exclude it. */
   Settings in_force;
-  codedexposure::StatsOptions options;
+  StatsOptions options;
   GstVideoInfo info;
   Meter meter;
   LineFile file;
@@ -108,7 +109,10 @@ G_DEFINE_ENUM_TYPE (GstSubframeStatsFormat, gst_subframe_stats_format,
     {int (Format::json), "Lines of JSON", "json"},
     {int (Format::csv), "Comma-separated values, with a head", "csv"});
 
-static const PropertyTable<StatsState> &
+namespace
+{
+
+const PropertyTable<StatsState> &
 properties ()
 {
   static const auto set = [] (auto member) {
@@ -148,8 +152,8 @@ properties ()
   return table;
 }
 
-static gboolean
-gst_subframe_stats_start (GstBaseTransform *base) noexcept
+gboolean
+start (GstBaseTransform *base) noexcept
 {
   auto *self = GST_SUBFRAME_STATS (base);
   StatsState &state = *self->state;
@@ -161,12 +165,10 @@ gst_subframe_stats_start (GstBaseTransform *base) noexcept
   const Settings &settings = state.in_force;
   state.options = {settings.bits, settings.bins, {}};
   if (!settings.line.empty ()) {
-    const auto line = codedexposure::ProfileLine::parse (settings.line);
+    const auto line = ProfileLine::parse (settings.line);
     if (!line) {
-      GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
-          ("The line property cannot be read: %s",
-              line.error ().message.c_str ()),
-          (nullptr));
+      POST_ERROR (self, RESOURCE, SETTINGS,
+          "The line property cannot be read: " + line.error ().message);
       return FALSE;
     }
     state.options.line = *line;
@@ -177,34 +179,32 @@ gst_subframe_stats_start (GstBaseTransform *base) noexcept
          (settings.format != Format::csv || state.file.write (kCsvHead));
 }
 
-static gboolean
-gst_subframe_stats_stop (GstBaseTransform *base)
+gboolean
+stop (GstBaseTransform *base)
 {
-  StatsState &state = *GST_SUBFRAME_STATS (base)->state;
+  StatsState &state = state_in<GstSubframeStats> (base);
   state.file.close ();
   state.meter = {};
   return TRUE;
 }
 
 template <typename Pixel>
-static bool
+bool
 make_meter_of (GstSubframeStats *self)
 {
   StatsState &state = *self->state;
-  auto made = codedexposure::StatsMeter<Pixel>::make (
+  auto made = StatsMeter<Pixel>::make (
       {state.info.width, state.info.height}, state.options);
   if (!made) {
-    GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
-        ("These pictures cannot be measured: %s",
-            made.error ().message.c_str ()),
-        (nullptr));
+    POST_ERROR (self, RESOURCE, SETTINGS,
+        "These pictures cannot be measured: " + made.error ().message);
     return false;
   }
   state.meter = *std::move (made);
   return true;
 }
 
-static bool
+bool
 make_meter (GstSubframeStats *self)
 {
   return GST_VIDEO_INFO_FORMAT (&self->state->info) == GST_VIDEO_FORMAT_GRAY8
@@ -212,9 +212,8 @@ make_meter (GstSubframeStats *self)
              : make_meter_of<guint16> (self);
 }
 
-static gboolean
-gst_subframe_stats_set_caps (
-    GstBaseTransform *base, GstCaps *caps, GstCaps *) noexcept
+gboolean
+set_caps (GstBaseTransform *base, GstCaps *caps, GstCaps *) noexcept
 {
   auto *self = GST_SUBFRAME_STATS (base);
   StatsState &state = *self->state;
@@ -225,7 +224,7 @@ gst_subframe_stats_set_caps (
 }
 
 /* Where the user does not set the significant bits, the pictures tell them. */
-static bool
+bool
 follow_bits (GstSubframeStats *self, GstBuffer *frame)
 {
   StatsState &state = *self->state;
@@ -238,7 +237,7 @@ follow_bits (GstSubframeStats *self, GstBuffer *frame)
 }
 
 /* The statistics of @frame; null where its pixels cannot be read. */
-static const codedexposure::PictureStats *
+const PictureStats *
 measure (GstSubframeStats *self, GstBuffer *frame)
 {
   StatsState &state = *self->state;
@@ -252,15 +251,14 @@ measure (GstSubframeStats *self, GstBuffer *frame)
         (nullptr));
     return nullptr;
   }
-  if (auto *meter =
-          std::get_if<codedexposure::StatsMeter<guint8>> (&state.meter))
-    return &meter->measure (view_of<guint8> (mapped));
-  return &std::get<codedexposure::StatsMeter<guint16>> (state.meter)
-              .measure (view_of<guint16> (mapped));
+  return read_pixels (
+      mapped, [&]<typename Pixel> (ImageView<const Pixel> pixels) {
+        return &std::get<StatsMeter<Pixel>> (state.meter).measure (pixels);
+      });
 }
 
 /* Counts the picture. Returns its number, for pictures without metadata. */
-static guint64
+guint64
 count (GstSubframeStats *self, bool saturated)
 {
   const ObjectLock lock (self);
@@ -269,11 +267,11 @@ count (GstSubframeStats *self, bool saturated)
 }
 
 /* @frame: writable. */
-static GstFlowReturn
+GstFlowReturn
 describe (GstSubframeStats *self, GstBuffer *frame)
 {
   StatsState &state = *self->state;
-  const codedexposure::PictureStats *stats = measure (self, frame);
+  const PictureStats *stats = measure (self, frame);
   if (!stats)
     return GST_FLOW_ERROR;
   const guint64 counted = count (self, stats->saturated > 0);
@@ -301,9 +299,8 @@ describe (GstSubframeStats *self, GstBuffer *frame)
 
 /* The pixels pass untouched, and yet the buffer must be writable, for its
  * meta. */
-static GstFlowReturn
-gst_subframe_stats_generate_output (
-    GstBaseTransform *base, GstBuffer **outbuf) noexcept
+GstFlowReturn
+generate_output (GstBaseTransform *base, GstBuffer **outbuf) noexcept
 {
   auto *self = GST_SUBFRAME_STATS (base);
   if (!base->queued_buf)
@@ -319,6 +316,8 @@ gst_subframe_stats_generate_output (
     *outbuf = frame.release ();
   return flow;
 }
+
+} // namespace
 
 static void
 gst_subframe_stats_init (GstSubframeStats *self)
@@ -338,9 +337,8 @@ gst_subframe_stats_class_init (GstSubframeStatsClass *klass)
       "picture");
 
   auto *transform_class = GST_BASE_TRANSFORM_CLASS (klass);
-  transform_class->start = GST_DEBUG_FUNCPTR (gst_subframe_stats_start);
-  transform_class->stop = GST_DEBUG_FUNCPTR (gst_subframe_stats_stop);
-  transform_class->set_caps = GST_DEBUG_FUNCPTR (gst_subframe_stats_set_caps);
-  transform_class->generate_output =
-      GST_DEBUG_FUNCPTR (gst_subframe_stats_generate_output);
+  transform_class->start = GST_DEBUG_FUNCPTR (start);
+  transform_class->stop = GST_DEBUG_FUNCPTR (stop);
+  transform_class->set_caps = GST_DEBUG_FUNCPTR (set_caps);
+  transform_class->generate_output = GST_DEBUG_FUNCPTR (generate_output);
 }

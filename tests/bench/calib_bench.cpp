@@ -135,7 +135,7 @@ int
 main (int argc, char **argv)
 {
   gst_init (&argc, &argv);
-  gst::register_frame_meta ();
+  gst::register_meta (gst::kFrameMetaName);
   GST_ELEMENT_REGISTER (moirecalib, nullptr);
   benchmark::Initialize (&argc, argv);
   benchmark::RunSpecifiedBenchmarks ();

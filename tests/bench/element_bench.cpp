@@ -301,7 +301,7 @@ int
 main (int argc, char **argv)
 {
   gst_init (&argc, &argv);
-  register_frame_meta ();
+  register_meta (kFrameMetaName);
   GST_ELEMENT_REGISTER (codedexposure_demux, nullptr);
   auto arguments = bench::taking_turns (argv[0]);
   arguments.insert (arguments.end (), argv + 1, argv + argc);

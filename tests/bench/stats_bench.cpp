@@ -73,8 +73,8 @@ int
 main (int argc, char **argv)
 {
   gst_init (&argc, &argv);
-  register_frame_meta ();
-  register_stats_meta ();
+  register_meta (kFrameMetaName);
+  register_meta (kStatsMetaName);
   GST_ELEMENT_REGISTER (subframestats, nullptr);
   benchmark::Initialize (&argc, argv);
   benchmark::RunSpecifiedBenchmarks ();

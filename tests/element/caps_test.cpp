@@ -14,12 +14,8 @@ using namespace codedexposure::gst;
 CapsScale
 raster (int columns, int rows, bool raised_rate = true, int pilot_rows = 0)
 {
-  CapsScale scale;
-  scale.rate_num = raised_rate ? columns * rows : 1;
-  scale.width_den = columns;
-  scale.height_den = rows;
-  scale.crop_rows = pilot_rows;
-  return scale;
+  return {
+      {raised_rate ? columns * rows : 1}, {1, columns}, {1, rows}, pilot_rows};
 }
 
 const CapsScale k2x2 = raster (2, 2);

@@ -18,7 +18,7 @@ class LinkedElements : public ::testing::Environment
 {
   void SetUp () override
   {
-    gst::register_frame_meta ();
+    gst::register_meta (gst::kFrameMetaName);
     serve_simulated_dmds ();
 #ifdef CODEDEXPOSURE_CAMERA_PROVIDER
     ASSERT_TRUE (

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Caps of coded frames and subframes: one from the other. */
+/* Converts caps between coded frames and subframes. */
 #pragma once
 
 #include <gst/gst.h>
@@ -39,23 +39,23 @@ CapsScale coded_to_subframes (const Schedule &schedule, bool raised_rate);
 /**
  * @p caps with framerate, width, height and pixel-aspect-ratio scaled.
  *
- * Takes fixed values, ranges and lists, and caps without a field. A division
- * rounds down (what is left over is cropped), so the inverse of a fixed size
- * is the range of sizes that give it. Values saturate at G_MAXINT. A framerate
- * of 0/1 stays. Transfer: full.
+ * Handles fixed values, ranges, lists and absent fields. Division rounds down,
+ * because leftover pixels are cropped, so the inverse of a fixed size is the
+ * range of sizes that give it. Values saturate at G_MAXINT. A framerate of 0/1
+ * stays. Transfer: full.
  */
 GstCaps *scale_caps (GstCaps *caps, const CapsScale &scale);
 
 /** @p caps without the fields that a schedule changes. */
 CapsPtr unbind_caps (GstCaps *caps);
-/** @p caps without those that a mapping changes. */
+/** @p caps without the size, which a mapping changes. */
 CapsPtr unbind_size (GstCaps *caps);
 /** In the order of @p preferred. */
 CapsPtr intersect_caps (GstCaps *preferred, GstCaps *other);
 
-/** @p caps, and unless @p rate is 0/1 also those without a rate. */
+/** @p caps, and unless @p rate is 0/1, those of this rate with 0/1 as well. */
 CapsPtr admit_unknown_rate (FrameRate rate, CapsPtr caps);
-/** @p caps, with @p rate where they have none, unless it is 0/1. */
+/** @p caps with @p rate in place of an unknown one, unless @p rate is 0/1. */
 CapsPtr fill_in_rate (FrameRate rate, GstCaps *caps);
 
 } // namespace codedexposure::gst

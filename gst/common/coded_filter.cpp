@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* GObject type, properties and states of what consumes coded frames.
+/* GstCodedFilter: type, properties and state changes.
  *
- * coded_filter_events.cpp takes its events and queries, coded_filter_format.cpp
- * finds what frames are decoded with, coded_filter_frames.cpp admits them. */
+ * coded_filter_events.cpp handles events and queries, coded_filter_format.cpp
+ * finds schedule and mapping, coded_filter_frames.cpp counts and reports
+ * frames. */
 #include "coded_filter.h"
 
 #include <utility>
@@ -22,7 +23,7 @@ G_DEFINE_ABSTRACT_TYPE_WITH_CODE (
     GstCodedFilter, gst_coded_filter, GST_TYPE_ELEMENT,
     G_ADD_PRIVATE (GstCodedFilter);
     GST_DEBUG_CATEGORY_INIT (coded_filter_debug, "codedexposure-filter", 0,
-        "what consumers of coded frames share"))
+        "base class of filters of coded frames"))
 
 static CodedFilter *&
 filter_in (gpointer element)
@@ -70,7 +71,7 @@ CodedFilter::properties ()
       {"schedule", "Schedule",
           "Schedule of the coded exposure: a preset such as "
           "\"sequential:2x2\" or \"staircase:2x2,active=9.8ms\", or the path "
-          "of a JSON file; empty: what the stream's tag says, else "
+          "of a JSON file; empty: that of the stream's tag, else "
           "sequential:2x2",
           kReadWrite, set (&CodedSettings::schedule)},
       {"mapping", "Mapping",
@@ -79,24 +80,24 @@ CodedFilter::properties ()
           kReadWrite, set (&CodedSettings::mapping)},
       {"bits", "Bits",
           "Significant bits of a pixel, counted from the lowest, for example "
-          "12 for a 12-bit camera in GRAY16_LE; they decide what is "
-          "saturated; 0: all bits of the format",
+          "12 for a 12-bit camera in GRAY16_LE; pixels at the largest value "
+          "are saturated; 0: all bits of the format",
           kReadWrite, set (&CodedSettings::bits), 0, 16},
       {"frame-rate", "Frame rate",
-          "Rate of the coded frames in 1/s, used where their caps have no "
-          "framerate or 0/1; 0/1: only from the caps",
+          "Rate of the coded frames in frames/s, used if their caps have no "
+          "framerate or 0/1; 0/1: from the caps only",
           kReadWrite, set (&CodedSettings::rate)},
       {"schedule-in-force", "Schedule in force",
-          "The schedule that frames are decoded by, from the property, the "
-          "tag or by default; empty before the first frame; notifies",
+          "The schedule that frames are decoded with: the property's, the "
+          "tag's or the default; empty before the first frame; notifies",
           kReadOnly,
           [] (const Shared &shared) {
             return shared.schedule ? shared.schedule->text () : std::string ();
           }},
       {"stats", "Statistics",
-          "All counters at one moment, which can be read until the next run "
-          "begins; notifies when frames are lost, corrupted or saturated, and "
-          "when a mapping comes into force",
+          "Snapshot of all counters, kept until the next run starts; notifies "
+          "when frames are lost, corrupted or saturated, and when a mapping "
+          "takes effect",
           kReadOnly, [] (const Shared &shared) { return shared.stats (); }},
   };
   return table;
@@ -182,8 +183,8 @@ CodedFilter::CodedFilter (GstCodedFilter *element, const StatsNames &names)
       sinkpad_, [] (GstPad *, GstObject *parent, GstQuery *query) noexcept {
         return filter_of (parent).sink_query (query);
       });
-  /* Caps without a frame rate are no subset of the template. An error about a
-   * missing rate comes with the first frame. */
+  /* Caps without a frame rate are not a subset of the template; a missing rate
+   * is reported with the first frame. */
   GST_PAD_SET_ACCEPT_INTERSECT (sinkpad_);
   GST_PAD_SET_ACCEPT_TEMPLATE (sinkpad_);
   gst_element_add_pad (element_, sinkpad_);
@@ -212,7 +213,7 @@ CodedFilter::new_source_pad (
 
 /* ---------------------------------------------------------------- states -- */
 
-/* What cannot be read should be known before anything runs. */
+/* Files that cannot be read should be reported before anything runs. */
 bool
 CodedFilter::read_settings ()
 {

@@ -41,12 +41,12 @@ namespace codedexposure::gst
 
 using ScheduleRef = std::shared_ptr<const Schedule>;
 
-/** What the user says of coded frames. */
+/** Properties of every filter of coded frames. */
 struct CodedSettings {
   Named<Schedule> schedule;
   Named<Mapping> mapping;
-  int bits = 0;         ///< significant ones; 0: as the frames say
-  FrameRate rate{0, 1}; ///< where caps have none; 0/1: none
+  int bits = 0;         ///< significant bits; 0: as the frames say
+  FrameRate rate{0, 1}; ///< used if caps have none; 0/1: none
 };
 
 struct CodedCounters {
@@ -63,19 +63,19 @@ struct CodedCounters {
 struct StatsNames {
   const char *structure = nullptr;
   const char *out = nullptr;     ///< for pictures_out
-  const char *dropped = nullptr; ///< for pictures_dropped; null: none ever is
+  const char *dropped = nullptr; ///< for pictures_dropped; null: never dropped
 };
 
-/** What plans are made of: the caps, the schedule and the mapping together. */
+/** How coded frames are decoded: caps, schedule and mapping. */
 struct CodedFormat {
-  CapsPtr caps; ///< of the coded frames, with a frame rate in any case
+  CapsPtr caps; ///< of the coded frames, always with a frame rate
   GstVideoInfo info;
   FrameRate rate;
   Schedule schedule;
-  bool assumed; ///< the schedule: nobody said which
+  bool assumed; ///< the schedule is the default
   SlotPlan slots;
   std::shared_ptr<const Rectifier> rectifier; ///< null: no mapping
-  Extent size; ///< of the frames that are decoded, after the rectifier
+  Extent size; ///< of the frames after the rectifier
 
   bool wide () const
   {
@@ -89,9 +89,9 @@ struct CodedFormat {
 /** A coded frame that was admitted. */
 struct CodedFrame {
   BufferPtr buffer;
-  /** The meta that came with it, else by our own count. */
+  /** Its meta; without one, its number by our own count. */
   FrameMeta meta;
-  /** It comes right after the frame before, in time and by its flags. */
+  /** It directly follows the frame before, by its time and flags. */
   bool follows;
 
   GstClockTime pts () const { return GST_BUFFER_PTS (buffer.get ()); }
@@ -101,26 +101,27 @@ struct CodedFrame {
   }
 };
 
-/** One picture that is made of a coded frame. */
+/** A picture made from a coded frame. */
 struct Picture {
   const GstVideoInfo &info;
   int index;
   GstClockTime pts;
-  /** Start and length of its light. */
+  /** When its light was collected. */
   GstClockTime exposure_start, exposure_duration;
-  bool of_region = false; ///< its places are not those of the coded frame
+  bool of_region = false; ///< its coordinates are not those of the coded frame
 };
 
 /**
- * What a GstCodedFilter does; a subclass decides what becomes of each frame.
+ * The implementation of a GstCodedFilter; a subclass makes pictures from
+ * frames.
  *
- * Everything that frames and serialised events change is under the stream lock
- * of the sink pad; what other threads read, under the object lock of the
- * element, which is never held while pushing, querying or posting. The stream
- * lock is taken before it, the object locks of pads after it.
+ * The sink pad's stream lock protects what frames and serialised events change;
+ * the element's object lock protects what other threads read. The object lock
+ * is never held while pushing, querying or posting. Order of locks: stream
+ * lock, object lock of the element, object locks of pads.
  *
- * What GStreamer calls is noexcept: lib/ returns its errors, and a lack of
- * memory ends the process, as in GLib.
+ * Callbacks are noexcept: lib/ returns errors as values, and lack of memory
+ * ends the process, as in GLib.
  */
 class CodedFilter
 {
@@ -141,60 +142,62 @@ public:
   static void settings_changed (GObject *object, const GParamSpec *);
 
 protected:
-  /* What a subclass does. Unless said otherwise, on the streaming thread. */
+  /* For subclasses to implement. Called on the streaming thread, unless noted.
+   */
 
-  /** Takes a frame, whose format () is in force. */
+  /** Handles a frame, which has format (). */
   virtual GstFlowReturn process (CodedFrame frame) = 0;
-  /** Prepares for frames of @p format; false, with an error posted and what
-   * was before in force, where that cannot be. */
+  /** Prepares for frames of @p format. On failure posts an error, keeps the
+   * plan in force and returns false. */
   virtual bool plan (const CodedFormat &format) = 0;
-  /** After source pads have the caps of the plan. */
+  /** Called after the source pads got the caps of the plan. */
   virtual void planned (bool /* schedule_changed */) {}
-  /** Pushes the frames that are held: what follows comes after them. */
+  /** Pushes all frames that are held. */
   virtual GstFlowReturn drain () { return GST_FLOW_OK; }
-  /** The next frame does not follow the last one. */
+  /** Forgets past frames: the next one does not follow them. */
   virtual void break_history () {}
   /** Pushes @p event on the source pads. */
   virtual gboolean forward (EventPtr event) = 0;
   /** After FLUSH_STOP went downstream. */
   virtual void flushed () {}
-  /** Copies own settings to where they are in force. Object lock. */
+  /** Puts the subclass's settings into force. Object lock. */
   virtual void take_settings () {}
   /** Forgets the stream; from PAUSED to READY. */
   virtual void forget () = 0;
 
-  /** Ends work that takes long, whose result nobody waits for. Any thread. */
+  /** Cancels long computations: their results are no longer needed. Any thread.
+   */
   virtual void cancel () {}
-  /** Work is wanted again. Any thread. */
+  /** Allows computations again. Any thread. */
   virtual void resume () {}
   /** Calls @p visit for each source pad. Any thread. */
   using PadVisitor = std::function<void (GstCodedPad *)>;
   virtual void each_pad (const PadVisitor &visit) const = 0;
-  /** The caps in force of @p pad, null before. Any thread. */
+  /** The caps in force of @p pad; null: none yet. Any thread. */
   virtual CapsPtr caps_for (const GstCodedPad *pad) const = 0;
-  /** What happens to the caps of coded frames on their way to @p pad. */
+  /** How the caps of @p pad follow from those of coded frames. */
   virtual CapsScale scale_for (
       const Schedule &schedule, const GstCodedPad *pad) const = 0;
   /** Pictures of @p pad for each coded frame. Object lock. */
   virtual int pictures_a_frame (const GstCodedPad *pad) const = 0;
-  /** The pad on which coded frames leave in their own memory; null: none. */
+  /** The pad that forwards coded frames without a copy; null: none. */
   virtual ObjectPtr<GstPad> coded_pad () const { return nullptr; }
   virtual RectifyOptions rectify_options () const { return {}; }
 
-  /** What answers about caps depend on, at one moment. */
+  /** A snapshot of what caps queries depend on. */
   struct CapsContext {
-    ScheduleRef schedule; ///< null: any may come
+    ScheduleRef schedule; ///< null: not known yet
     FrameRate rate;
     bool mapped; ///< frames and pictures can be of any size
   };
-  /** @p caps of @p pad as those of coded frames, or the other way. Any thread.
+  /** Converts @p caps of @p pad to those of coded frames, or back. Any thread.
    */
   virtual CapsPtr convert_caps (const CapsContext &context,
       const GstCodedPad *pad, GstCaps *caps, bool to_coded) const;
 
-  /* What a subclass uses. */
+  /* For subclasses to use. */
 
-  /** A source pad with the functions that all of them have. */
+  /** A new source pad that handles events and queries. */
   ObjectPtr<GstCodedPad> new_source_pad (const char *templ,
       const std::string &name, PadKind kind, int index = -1) const;
   GstElement *element () const { return element_; }
@@ -203,33 +206,32 @@ protected:
   const CodedFormat &format () const { return *stream_.format; }
   const GstSegment &segment () const { return stream_.segment; }
   bool backwards () const { return stream_.segment.rate < 0; }
-  /** The property wins over the frames; 0: all bits of the format. */
+  /** From the property, else from the frames; 0: all bits of the format. */
   int significant_bits () const;
   void post_error (const std::string &why) const;
   /** Posts that a frame could not be decoded. Returns GST_FLOW_ERROR. */
   GstFlowReturn post_decode_error (const Error &error) const;
   void notify (const char *property) const;
 
-  /** @p frame to read; not mapped, with an error posted, where it is too short.
-   */
+  /** Maps @p frame for reading; posts an error if it is too short. */
   MappedFrame map_coded (GstBuffer *frame) const;
-  /** The pixels of a coded frame, one a mirror where a mapping is in force;
-   * valid until the next call. */
+  /** The pixels of a coded frame; with a mapping, one pixel a mirror. Valid
+   * until the next call. */
   template <typename Pixel>
   Result<ImageView<const Pixel>> rectify (ImageView<const Pixel> coded);
-  /** Whether a seek asked for what is shown from @p pts for @p duration. */
+  /** Whether the segment contains the time from @p pts for @p duration. */
   bool is_within (GstClockTime pts, GstClockTime duration) const;
-  /** Posts when a sequence of saturated frames begins, and when there was none
-   * for a second. */
+  /** Posts a message when a sequence of saturated frames begins, and when there
+   * were none for a second. */
   void note_saturation (const CodedFrame &frame);
   /** Pushes @p outbuf, which is writable, and counts it. */
   GstFlowReturn push (
       GstCodedPad *pad, BufferPtr outbuf, GstClockTime duration);
-  /** Copies what is known of the frame @p coded to @p outbuf, made of it. */
+  /** Gives @p outbuf flags, metas and time of a picture made from @p coded. */
   void describe (GstBuffer *outbuf, GstBuffer *coded, FrameMeta meta,
       const Picture &picture) const;
-  /** Takes a buffer of @p info from the pool of @p pad and maps it for writing;
-   * where there is none, an error is posted, but not for a flush. */
+  /** Acquires a buffer from the pool of @p pad and maps it for writing. Posts
+   * an error on failure, except while flushing. */
   GstFlowReturn acquire_picture (GstCodedPad *pad, const GstVideoInfo &info,
       BufferPtr &buffer, MappedFrame &mapped) const;
 
@@ -240,40 +242,40 @@ protected:
     bool settings_changed = true;
     CodedCounters counters;
     ScheduleRef schedule;     ///< in force; null before the first frame
-    bool assumed = false;     ///< nobody said which schedule it is
+    bool assumed = false;     ///< the schedule is the default
     bool rectifies = false;   ///< a mapping is in force
-    GstClockTime latency = 0; ///< that frames which are held add
+    GstClockTime latency = 0; ///< added by frames that are held
 
     StructurePtr stats () const;
   };
   Shared shared_; ///< object lock
 
 private:
-  /** Saturated frames that follow each other. */
+  /** A sequence of saturated frames. */
   struct Burst {
     guint64 frames = 0;
     guint64 peak = 0; ///< most saturated pixels in one of them
     GstClockTime from = GST_CLOCK_TIME_NONE;
     GstClockTime to = GST_CLOCK_TIME_NONE;
   };
-  /** Kept as long as it is right, because weights take long to compute. */
+  /** Reused while its inputs are the same: weights take long to compute. */
   struct RectifierCache {
     Mapping mapping;
     Schedule schedule;
     RectifyOptions options;
     std::shared_ptr<const Rectifier> rectifier;
   };
-  /** Everything that is forgotten from PAUSED to READY. */
+  /** Reset from PAUSED to READY. */
   struct Stream {
     Stream () { gst_segment_init (&segment, GST_FORMAT_UNDEFINED); }
 
     CapsPtr caps;
     guint32 caps_seqnum = 0;
     GstSegment segment;
-    /** What the tags say; an error where they cannot be read. */
+    /** From the tags; an error if they cannot be read. */
     std::optional<Result<StreamSetup>> tagged;
-    int bits = 0;      ///< significant ones by the metas; 0: not said
-    bool stale = true; ///< the plan has to be made again
+    int bits = 0;      ///< significant bits by the metas; 0: unknown
+    bool stale = true; ///< the plan must be made again
     CodedSettings settings;
     std::optional<CodedFormat> format; ///< in force
     /** Serialised events that wait for the caps of the source pads. */
@@ -282,7 +284,7 @@ private:
     GstClockTime last_pts = GST_CLOCK_TIME_NONE;
     bool was_late = false; ///< the last frame was
     Burst saturation;
-    std::optional<Schedule> overruled; ///< by the property, as was posted
+    std::optional<Schedule> overruled; ///< tagged, and reported as overruled
     bool warned_assumed = false;
     bool warned_of_time = false;
     bool warned_of_mapping = false;
@@ -296,9 +298,8 @@ private:
   bool read_settings ();
   bool before_state_change (GstStateChange transition);
   void after_state_change (GstStateChange transition);
-  /** Source pads get their caps and what waited for them; posts an error and
-   * returns other than OK where there can be no plan.
-   * @p next  the frame that comes next, where there is one. */
+  /** Makes a new plan if it is stale, and sends caps and waiting events. Posts
+   * an error on failure. @p next: the frame that comes next; null: none. */
   GstFlowReturn negotiate (GstBuffer *next = nullptr);
   void push_caps (GstCodedPad *pad);
   std::optional<CodedFormat> find_format ();
@@ -340,10 +341,10 @@ private:
   Stream stream_;
 };
 
-/** Gives @p element its C++ part; once, when the instance is made. */
+/** Gives @p element its implementation; call once, from instance init. */
 void adopt_filter (
     GstCodedFilter *element, std::unique_ptr<CodedFilter> filter);
-/** The C++ part of @p element, an instance of a subclass. */
+/** The implementation of @p element. */
 CodedFilter &filter_of (gpointer element);
 
 } // namespace codedexposure::gst

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Events and queries of what consumes coded frames. */
+/* GstCodedFilter: events and queries. */
 #include "coded_filter.h"
 
 #include <utility>
@@ -25,7 +25,7 @@ has_flag (const EventPtr &event, GstEventTypeFlags flag)
 } // namespace
 
 /* Source pads get their caps with the first frame, because the schedule may
- * come in a tag, and tags follow the caps. Until then events wait. */
+ * come in a tag, and tags follow the caps. Other events wait until then. */
 gboolean
 CodedFilter::sink_event (EventPtr event)
 {
@@ -59,8 +59,8 @@ CodedFilter::sink_event (EventPtr event)
   }
 }
 
-/* Forwards the events that waited for the caps; forgets them where no caps
- * came. */
+/* Forwards the events that waited for the caps, or drops them if there were no
+ * caps. */
 void
 CodedFilter::settle_events ()
 {
@@ -105,9 +105,9 @@ CodedFilter::on_segment (EventPtr event)
 {
   gst_event_copy_segment (event.get (), &stream_.segment);
   if (stream_.segment.format != GST_FORMAT_TIME) {
-    post_error (std::string ("The coded frames come in a segment of format ") +
-                gst_format_get_name (stream_.segment.format) +
-                ": what is made of them needs times.");
+    post_error (
+        std::string ("The segment of the coded frames has the format ") +
+        gst_format_get_name (stream_.segment.format) + "; it must be TIME.");
     return FALSE;
   }
   break_time ();
@@ -128,7 +128,7 @@ CodedFilter::on_tag (EventPtr event)
   return forward_in_turn (std::move (event));
 }
 
-/* A gap stands for a frame, so downstream has to know the caps. */
+/* A gap replaces a frame, so downstream needs the caps first. */
 gboolean
 CodedFilter::on_gap (EventPtr event)
 {
@@ -138,7 +138,7 @@ CodedFilter::on_gap (EventPtr event)
   return negotiate () == GST_FLOW_OK && forward (std::move (event));
 }
 
-/* A muxer downstream needs caps even of a stream without a frame. */
+/* Muxers need caps even if no frame came. */
 gboolean
 CodedFilter::on_eos (EventPtr event)
 {
@@ -149,8 +149,8 @@ CodedFilter::on_eos (EventPtr event)
   return forward (std::move (event));
 }
 
-/* A flush drops the segment and what was in flight. Other sticky events that
- * wait stay true. */
+/* A flush drops the segment and events that are not sticky. Other sticky events
+ * that wait stay valid. */
 gboolean
 CodedFilter::on_flush_stop (EventPtr event)
 {
@@ -179,8 +179,8 @@ CodedFilter::break_time ()
   });
 }
 
-/* QoS stops here: aravissrc holds its object lock while it waits for a frame,
- * so that a sink that reports to it waits, too, and loses frames. */
+/* QoS events stop here: aravissrc holds its object lock while it waits for a
+ * frame, so a sink that sends it an event would wait, too, and lose frames. */
 gboolean
 CodedFilter::src_event (GstCodedPad *pad, GstEvent *event)
 {
@@ -224,8 +224,8 @@ CodedFilter::sink_query (GstQuery *query)
   }
 }
 
-/* Picture k is due k slots after its coded frame, which adds no latency. Time
- * for computing is what the processing deadline of sinks stands for. */
+/* Picture k is due k slots after its coded frame, which adds no latency. The
+ * processing deadline of sinks covers the time for computing. */
 gboolean
 CodedFilter::src_query (GstCodedPad *pad, GstQuery *query)
 {
@@ -243,8 +243,8 @@ CodedFilter::src_query (GstCodedPad *pad, GstQuery *query)
   return TRUE;
 }
 
-/* The property binds, else what is in force; a schedule that was only assumed
- * binds nothing, because the tag may still come. */
+/* The schedule of the property, else the one in force. A default schedule does
+ * not restrict caps, because the tag may still come. */
 CodedFilter::CapsContext
 CodedFilter::caps_context () const
 {
@@ -268,7 +268,8 @@ CodedFilter::convert_caps (const CapsContext &context, const GstCodedPad *pad,
   return context.mapped ? unbind_size (scaled.get ()) : std::move (scaled);
 }
 
-/* A pad that is not linked limits nothing: without a peer, ANY comes back. */
+/* A pad that is not linked restricts nothing: without a peer, the answer is
+ * ANY. */
 CapsPtr
 CodedFilter::sink_caps () const
 {
@@ -294,8 +295,8 @@ CodedFilter::src_caps (GstCodedPad *pad) const
   return intersect_caps (own.get (), templ.get ());
 }
 
-/* A pad that hands on upstream's own memory limits it to strides that the
- * pad's peer reads, too. */
+/* The coded pad forwards upstream's memory, so the strides must be readable by
+ * that pad's peer as well. */
 gboolean
 CodedFilter::answer_allocation (GstQuery *query) const
 {
@@ -319,7 +320,7 @@ CodedFilter::answer_allocation (GstQuery *query) const
   return TRUE;
 }
 
-/* DURATION and POSITION count upstream's frames; @pad has more of them. */
+/* DURATION and POSITION count upstream's frames; @pad has several for each. */
 void
 CodedFilter::scale_frames (GstCodedPad *pad, GstQuery *query) const
 {

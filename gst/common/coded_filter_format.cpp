@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* What coded frames are decoded with: format, schedule and mapping, from
- * properties, caps and tags. */
+/* GstCodedFilter: finds format, schedule and mapping in properties, caps and
+ * tags. */
 #include "coded_filter.h"
 
 #include <algorithm>
@@ -77,15 +77,14 @@ CodedFilter::find_format ()
     return std::nullopt;
   }
   if (GST_VIDEO_INFO_IS_INTERLACED (&info)) {
-    post_error (
-        "The coded frames are interlaced: a coded exposure needs a camera "
-        "that exposes all rows together (progressive, global shutter).");
+    post_error ("The coded frames are interlaced. A coded exposure needs a "
+                "progressive camera with a global shutter.");
     return std::nullopt;
   }
   if (info.fps_n == 0) {
     post_error (
-        "The coded frames have no frame rate, so what is made of them has no "
-        "length: set the frame-rate property, for example frame-rate=25/1.");
+        "The coded frames have no frame rate, so pictures have no duration. "
+        "Set the frame-rate property, for example frame-rate=25/1.");
     return std::nullopt;
   }
   format.rate = {info.fps_n, info.fps_d};
@@ -130,8 +129,8 @@ CodedFilter::find_schedule (CodedFormat &format)
   format.assumed = true;
   if (!std::exchange (stream_.warned_assumed, true))
     GST_ELEMENT_WARNING (element_, STREAM, FORMAT,
-        ("The stream says nothing of its schedule: assuming %s. Set the "
-         "schedule property if it is another.",
+        ("The stream has no schedule tag; assuming %s. Set the schedule "
+         "property if it is another.",
             format.schedule.text ().c_str ()),
         (nullptr));
   return true;
@@ -148,11 +147,11 @@ CodedFilter::report_overruled (const Schedule &asked)
   stream_.overruled = tagged;
   POST_INFO (element_, STREAM, FORMAT,
       "The schedule property, " + asked.text () +
-          ", is in force. The stream was made with " + tagged.text () + ".");
+          ", overrides the schedule of the stream, " + tagged.text () + ".");
 }
 
 /* The property wins over the stream's tag. Frames that were scaled or cropped
- * since they were mapped are taken as they are. */
+ * after calibration are decoded without the tag's mapping. */
 bool
 CodedFilter::find_mapping (Extent camera, std::optional<Mapping> &mapping)
 {
@@ -166,9 +165,9 @@ CodedFilter::find_mapping (Extent camera, std::optional<Mapping> &mapping)
     if (mapping->camera () == camera)
       return true;
     post_error ("The mapping " + stream_.settings.mapping.text +
-                " is of frames of " + text_of (mapping->camera ()) +
-                " pixels, these have " + text_of (camera) +
-                ": map the camera as it is set now (moirecalib).");
+                " is for frames of " + text_of (mapping->camera ()) +
+                " pixels, but these have " + text_of (camera) +
+                ". Measure a new mapping with moirecalib.");
     return false;
   }
   if (stream_.tagged && *stream_.tagged)
@@ -177,8 +176,9 @@ CodedFilter::find_mapping (Extent camera, std::optional<Mapping> &mapping)
     return true;
   if (!std::exchange (stream_.warned_of_mapping, true))
     GST_ELEMENT_WARNING (element_, STREAM, FORMAT,
-        ("The mapping in the stream's tags is of frames of %s pixels; these "
-         "have %s, and are taken as they are. Do not scale coded frames.",
+        ("The mapping in the stream's tags is for frames of %s pixels, but "
+         "these have %s; they are decoded without it. Do not scale or crop "
+         "coded frames.",
             text_of (mapping->camera ()).c_str (), text_of (camera).c_str ()),
         (nullptr));
   mapping.reset ();
@@ -211,7 +211,7 @@ CodedFilter::find_rectifier (CodedFormat &format)
   return true;
 }
 
-/* Makes @format, for which the subclass has a plan, the one in force. */
+/* Puts @format, for which the subclass has a plan, into force. */
 void
 CodedFilter::adopt (CodedFormat format)
 {

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Coded frames come in: lost, corrupted, saturated and ill-timed ones are
- * counted and reported; pictures go out. */
+/* GstCodedFilter: counts and reports coded frames; pushes pictures. */
 #include "coded_filter.h"
 
 #include <algorithm>
@@ -16,8 +15,7 @@ namespace codedexposure::gst
 namespace
 {
 
-/* Recordings round times to a microsecond; what is shorter than this is
- * nothing. */
+/* Recordings round times to a microsecond; shorter times are ignored. */
 constexpr GstClockTime kRounding = 10 * GST_USECOND;
 
 bool
@@ -64,18 +62,16 @@ CodedFilter::check_time_stamp (GstBuffer *frame) const
     return GST_FLOW_ERROR;
   if (GST_BUFFER_PTS_IS_VALID (frame))
     return GST_FLOW_OK;
-  post_error (
-      "A coded frame has no time stamp (PTS), so what is made of it cannot be "
-      "placed in time: let the source set one, for example with "
-      "do-timestamp=true.");
+  post_error ("A coded frame has no time stamp (PTS). Let the source set one, "
+              "for example with do-timestamp=true.");
   return GST_FLOW_ERROR;
 }
 
-/* Decoders clip the first frame of a segment to it, in time only: its PTS is
- * then that of the segment, its DURATION what is left of the period. Returns
- * the frame with the times that it had; null where only rounding is left of it,
- * and, with a warning, where it seems to be clipped at both ends, so that its
- * start cannot be known. */
+/* Decoders clip the times of the first frame of a segment: its PTS becomes the
+ * start of the segment, its DURATION the rest of the period. Returns the frame
+ * with its original times. Null if only a rounding error is left of it, or,
+ * with a warning, if it seems to be clipped at both ends, so that its start is
+ * unknown. */
 BufferPtr
 CodedFilter::restore_clipped_frame (BufferPtr frame) const
 {
@@ -93,8 +89,8 @@ CodedFilter::restore_clipped_frame (BufferPtr frame) const
   if (at_stop && !ends_with_stream (sinkpad_, segment ().stop)) {
     GST_ELEMENT_WARNING (element_, STREAM, FORMAT,
         ("From %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT
-         " there is one coded frame only, or a part of it, and which part is "
-         "not known: there is no picture of it. Seek to a longer stretch.",
+         " there is only a part of one coded frame, whose start is not known; "
+         "it is dropped. Seek to a longer segment.",
             GST_TIME_ARGS (segment ().start), GST_TIME_ARGS (segment ().stop)),
         (nullptr));
     return nullptr;
@@ -112,7 +108,7 @@ CodedFilter::count (guint64 CodedCounters::*counter, guint64 by)
   shared_.counters.*counter += by;
 }
 
-/* Numbers the frame by its time; counts and reports what is lost or corrupted.
+/* Numbers the frame by its time; counts and reports lost and corrupted frames.
  */
 CodedFrame
 CodedFilter::admit (BufferPtr frame)
@@ -164,17 +160,17 @@ CodedFilter::warn_of_wrong_time (GstClockTime pts)
     return;
   GST_ELEMENT_WARNING (element_, STREAM, FORMAT,
       ("A coded frame at %" GST_TIME_FORMAT " follows one at %" GST_TIME_FORMAT
-       ", where frames are %" GST_TIME_FORMAT " apart: what is made of it "
-       "overlaps with others in time.",
+       ", but frames are %" GST_TIME_FORMAT
+       " apart. Its time overlaps with that of others.",
           GST_TIME_ARGS (pts), GST_TIME_ARGS (stream_.last_pts),
           GST_TIME_ARGS (format ().period ())),
-      ("this is said once"));
+      ("posted once a stream"));
 }
 
 void
 CodedFilter::note_saturation (const CodedFrame &frame)
 {
-  /* Noise lifts a bright pixel to white in one frame and not in the next. */
+  /* Noise makes a bright pixel saturate in one frame and not in the next. */
   constexpr GstClockTimeDiff kCalm = GST_SECOND;
   if (frame.has_flags (GST_BUFFER_FLAG_GAP))
     return;

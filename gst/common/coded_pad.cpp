@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Buffers of source pads: from downstream's pool where it offers one, else from
- * an own pool. */
+/* Source pads take buffers from downstream's pool if it offers one, else from
+ * their own. */
 #include "coded_pad.h"
 
 #include <algorithm>
@@ -40,7 +40,7 @@ namespace codedexposure::gst
 namespace
 {
 
-/* What the peer of a pad asks for. */
+/* The answer of a pad's peer to an ALLOCATION query. */
 struct Offer {
   ObjectPtr<GstBufferPool> pool;
   guint size = 0, min = 0, max = 0;
@@ -76,8 +76,8 @@ ask_downstream (GstPad *pad, GstCaps *caps)
   return offer;
 }
 
-/* @at_once buffers are in use at the same time, beside those that downstream
- * holds. */
+/* @at_once buffers are in use at the same time, in addition to those that
+ * downstream holds. */
 bool
 configure (GstBufferPool *pool, const Offer &offer, GstCaps *caps, guint size,
     guint at_once)
@@ -94,7 +94,7 @@ configure (GstBufferPool *pool, const Offer &offer, GstCaps *caps, guint size,
   if (gst_buffer_pool_set_config (pool, config))
     return true;
 
-  /* The pool has changed the configuration to what it can do. */
+  /* The pool has adapted the configuration to its limits. */
   config = gst_buffer_pool_get_config (pool);
   if (gst_buffer_pool_config_validate_params (
           config, caps, size, min, offer.max))
@@ -103,8 +103,8 @@ configure (GstBufferPool *pool, const Offer &offer, GstCaps *caps, guint size,
   return false;
 }
 
-/* All pictures of a coded frame are written together, so a pool that cannot
- * give them all at once would never give the last one. */
+/* All pictures of a coded frame are written together, so a smaller pool would
+ * block for ever on the last one. */
 GstBufferPool *
 choose_pool (
     GstPad *pad, Offer &offer, GstCaps *caps, gsize frame_size, guint at_once)
@@ -183,7 +183,7 @@ push_picture (GstCodedPad *pad, BufferPtr outbuf, GstClockTime duration)
   GST_BUFFER_DURATION (outbuf.get ()) = duration;
   GST_BUFFER_OFFSET (outbuf.get ()) = coded.offset++;
   GST_BUFFER_OFFSET_END (outbuf.get ()) = coded.offset;
-  /* Flags of the coded frame are not those of each picture. */
+  /* A DISCONT of the coded frame does not apply to each of its pictures. */
   if (std::exchange (coded.discont, false)) {
     GST_BUFFER_FLAG_SET (outbuf.get (), GST_BUFFER_FLAG_DISCONT);
   } else {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The source pads of what consumes coded frames. */
+/* The source pads of a GstCodedFilter. */
 #pragma once
 
 #include <memory>
@@ -22,13 +22,13 @@ namespace codedexposure::gst
 /** Where the buffers of a pad come from. */
 struct Allocation {
   PoolPtr pool;
-  /** Only a pool that is used is active, because starting it allocates. */
+  /** Activated at first use, because that allocates memory. */
   bool active = false;
   /** The peer reads strides and offsets from the GstVideoMeta. */
   bool video_meta = false;
 };
 
-/** What a pad gets for each coded frame. */
+/** What a pad pushes for each coded frame. */
 enum class PadKind {
   coded,  ///< the coded frame
   all,    ///< all pictures, at the raised rate
@@ -63,17 +63,17 @@ struct _GstCodedPad {
 namespace codedexposure::gst
 {
 
-/** Whether a buffer pushed there reaches anything: a peer, or a blocking probe
- * that waits for data. */
+/** Whether a buffer pushed there is used, by a peer or by a blocking probe that
+ * waits for data. */
 bool is_wanted (GstPad *pad);
 
 /** Whether the peer of @p pad reads strides and offsets from a GstVideoMeta. */
 bool peer_reads_video_meta (GstPad *pad, GstCaps *caps);
 
 /**
- * Asks the peer for its pool, where that is due: at first, after a RECONFIGURE,
- * and when the allocation was reset. Without one, buffers come from an own
- * pool. Sink pad's stream lock.
+ * Asks the peer for a pool: the first time, after a RECONFIGURE event, and
+ * after the allocation was reset. If the peer offers none, the pad has its own.
+ * Sink pad's stream lock.
  *
  * @p at_once  buffers of the pool that are in use at the same time.
  */
@@ -81,13 +81,13 @@ void prepare_allocation (GstCodedPad *pad, GstCaps *caps, guint at_once);
 /** A buffer from the pool of @p pad, which has been prepared. */
 GstFlowReturn acquire (GstCodedPad *pad, BufferPtr &outbuf);
 
-/** Pushes @p outbuf, which is writable, with what the pad knows: OFFSET counts
- * buffers, DISCONT marks the first one and those after a break. */
+/** Pushes @p outbuf, which must be writable, with DURATION, OFFSET (a count of
+ * buffers) and DISCONT (on the first buffer and after a break). */
 GstFlowReturn push_picture (
     GstCodedPad *pad, BufferPtr outbuf, GstClockTime duration);
 
-/** Keeps what a QOS event says. What runs before the moment at which the sink
- * was, could not be in time either. Object lock of the element. */
+/** Stores the lateness from a QOS event: pictures due before the sink's current
+ * time would be late, too. Object lock of the element. */
 void note_lateness (GstCodedPad *pad, GstEvent *event);
 void forget_lateness (GstCodedPad *pad);
 

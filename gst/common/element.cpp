@@ -17,8 +17,8 @@ may_set (gpointer element, const GParamSpec *pspec)
   if (GST_STATE (element) <= highest)
     return true;
   GST_WARNING_OBJECT (element,
-      "%s cannot change above the %s state; it stays as it is", pspec->name,
-      gst_element_state_get_name (highest));
+      "%s cannot be set above the %s state; its value stays unchanged",
+      pspec->name, gst_element_state_get_name (highest));
   return false;
 }
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* What elements of several kinds do in the same way. */
+/* Helpers for elements of all kinds. */
 #pragma once
 
 #include <initializer_list>
@@ -14,10 +14,10 @@
 namespace codedexposure::gst
 {
 
-/** What is special about the pads of a template. */
+/** Options of a pad template. */
 struct PadOptions {
   GstPadPresence presence = GST_PAD_ALWAYS;
-  GType type = G_TYPE_NONE; ///< none: any pad
+  GType type = G_TYPE_NONE; ///< none: GstPad
   const char *caps = CODED_EXPOSURE_VIDEO_CAPS;
 };
 /** Adds a pad template to @p klass; "sink" is the name of a sink pad, all
@@ -25,13 +25,13 @@ struct PadOptions {
 void add_pad_template (
     gpointer klass, const char *name, const PadOptions &options = {});
 
-/** What gst-inspect-1.0 tells of an element, and its @p pads that are always
- * there and take or give coded frames. */
+/** Sets the description in gst-inspect-1.0 and adds the templates of @p pads,
+ * which are always there and carry grey video. */
 void describe_element (gpointer klass, const char *name, const char *kind,
     const char *description,
     std::initializer_list<const char *> pads = {"sink", "src"});
 
-/** The C++ state of an element whose struct has a pointer `state` to it. */
+/** The state of an element whose struct points to it by a member `state`. */
 template <typename Element>
 auto &
 state_in (gpointer element)
@@ -58,7 +58,7 @@ install_state (gpointer klass)
   };
 }
 
-/** What GstBaseTransform does by itself. */
+/** The class of GstBaseTransform, to call its default implementations. */
 GstBaseTransformClass *base_transform_class ();
 
 /** Posts that the latency has changed. */
@@ -66,9 +66,8 @@ void post_latency (gpointer element);
 void post_progress (gpointer element, GstProgressType type, const char *code,
     const std::string &text);
 
-/** Adds @p own to the latency in @p query, which upstream has answered. What
- * upstream can wait is counted from the PTS as well, so the maximum moves with
- * the minimum. */
+/** Adds @p own to the latency in @p query, which upstream has answered. The
+ * maximum moves with the minimum, because both count from the PTS. */
 void add_latency (GstQuery *query, GstClockTime own);
 
 } // namespace codedexposure::gst

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The elements of the plugin, and what lists GenICam cameras. */
+/* The elements of the plugin, and the device provider of GenICam cameras. */
 #pragma once
 
 #include <gst/gst.h>

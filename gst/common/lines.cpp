@@ -56,7 +56,7 @@ LineFile::write (const std::string &line)
       failure == ENOSPC ? GST_RESOURCE_ERROR_NO_SPACE_LEFT
                         : GST_RESOURCE_ERROR_WRITE,
       g_strdup_printf (
-          "Cannot write to \"%s\": %s. It holds the frames up to here.",
+          "Cannot write to \"%s\": %s. It contains the frames before this one.",
           location_.c_str (), g_strerror (failure)),
       nullptr, __FILE__, GST_FUNCTION, __LINE__);
   return false;
@@ -65,10 +65,10 @@ LineFile::write (const std::string &line)
 void
 LineFile::close ()
 {
-  /* Network and quota errors may wait for the end. */
+  /* Network and quota errors may be reported only here. */
   if (file_ >= 0 && ::close (std::exchange (file_, -1)) != 0)
     GST_ELEMENT_ERROR (element_, RESOURCE, CLOSE,
-        ("Cannot finish \"%s\": %s", location_.c_str (), g_strerror (errno)),
+        ("Cannot close \"%s\": %s", location_.c_str (), g_strerror (errno)),
         (nullptr));
 }
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* A file that an element writes line by line, a line a frame. */
+/* A text file that an element writes, one line a frame. */
 #pragma once
 
 #include <string>
@@ -11,8 +11,8 @@ namespace codedexposure::gst
 {
 
 /**
- * Every line is handed to the system at once: a crash costs one line at most.
- * What fails is an error on the bus of the element.
+ * Lines are not buffered: a crash loses one line at most. Failures are posted
+ * as errors of the element.
  */
 class LineFile
 {
@@ -22,10 +22,10 @@ public:
   LineFile (const LineFile &) = delete;
   LineFile &operator= (const LineFile &) = delete;
 
-  /** Begins the file of @p element anew, also where it exists. */
+  /** Creates or overwrites the file @p location of @p element. */
   bool open (gpointer element, const std::string &location);
   bool is_open () const { return file_ >= 0; }
-  /** @p line without its end. */
+  /** @p line: without a line end. */
   bool write (const std::string &line);
   void close ();
 
@@ -35,7 +35,7 @@ private:
   int file_ = -1;
 };
 
-/** Names of the flags of @p buffer that say how good it is: "discont",
+/** Names of the flags of @p buffer that describe its quality: "discont",
  * "corrupted", "gap", "droppable". */
 std::vector<const char *> flag_names (GstBuffer *buffer);
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* What elements say on the bus, by element messages; docs/formats.md describes
- * them for users. post_message () sends one, parse_message () reads it. Times
- * are in ns, on the clock of the PTS. */
+/* The element messages of the plugin; docs/formats.md describes them for users.
+ * post_message () sends one, parse_message () reads it. Times are in ns, on the
+ * clock of the PTS. */
 #pragma once
 
 #include "structure.h"
@@ -70,7 +70,7 @@ struct FrameIncomplete {
   CODED_FIELDS (frame, pts, bytes);
 };
 
-/** Masks and frames are in step from this frame on. */
+/** Masks and frames are synchronised from this frame on. */
 struct Locked {
   static constexpr const char *kName = "dmdsync/locked";
   guint64 frame = 0;
@@ -144,7 +144,7 @@ struct ExposureDropped {
   CODED_FIELDS (reason, pts, inputs, needed, frames_dropped);
 };
 
-/** What moirecalib advises, and how sure it is. */
+/** The stage travel that moirecalib recommends, with standard deviations. */
 struct StageMove {
   gdouble offset_x = 0, offset_y = 0; ///< from the aligned position, mirrors
   gdouble rotation = 0;               ///< degrees

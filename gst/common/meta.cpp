@@ -33,7 +33,7 @@ pattern_quark ()
 struct MetaCopy {
   GstBuffer *to;
   GstVideoInfo from_info, to_info;
-  bool whole; ///< the picture is of all of the other
+  bool whole; ///< the picture shows the whole frame
 };
 
 gboolean
@@ -65,8 +65,8 @@ copy_meta (GstBuffer *from, GstMeta **meta, gpointer user_data)
 
 } // namespace
 
-/* A custom meta is copied by every element that copies {"video"} metas, also
- * through scalers and encoders in the same process. */
+/* Elements that copy {"video"} metas copy custom ones with this tag, too, even
+ * scalers and encoders. */
 void
 register_meta (const char *name)
 {
@@ -84,8 +84,7 @@ set_frame_meta (GstBuffer *buffer, const FrameMeta &meta)
   GstStructure *structure = gst_custom_meta_get_structure (custom);
   if (gst_structure_id_has_field (structure, pattern_quark ()))
     gst_structure_remove_field (structure, "pattern");
-  /* Writing a value that is there takes a fraction of the time that making it
-   * again would. */
+  /* Overwriting a value is much faster than creating it again. */
   each_field (meta, [structure]<typename T> (GQuark name, const T &member) {
     if (const GValue *there = gst_structure_id_get_value (structure, name))
       Wire<T>::set (const_cast<GValue *> (there), member);

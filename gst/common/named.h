@@ -15,8 +15,8 @@ namespace codedexposure::gst
 template <typename T>
 struct Named {
   Named () = default;
-  /** Reads @p name, or the file of this name; a warning in the log where that
-   * fails. */
+  /** Parses @p name or reads the file of this name; logs a warning on failure.
+   */
   explicit Named (std::string name) : text (std::move (name))
   {
     if (!text.empty ())
@@ -38,8 +38,8 @@ private:
   }
 };
 
-/** Reads the file of a setting of @p element again, which may have changed
- * since it was named. Takes the object lock. */
+/** Reads the file of a setting of @p element again, because it may have
+ * changed. Takes the object lock. */
 template <typename T>
 Named<T>
 read_again (gpointer element, Named<T> &named)

@@ -9,8 +9,8 @@ namespace codedexposure::gst
 namespace
 {
 
-/* Distance of packed rows: aravissrc fills them up to four bytes, as GStreamer
- * has them, or leaves them as they are. */
+/* Bytes from one packed row to the next: aravissrc pads rows to four bytes, as
+ * GStreamer does, or does not pad them. */
 gsize
 packed_stride (const GstVideoInfo &info, MonoFormat format, gsize size)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Frames of a camera in memory of our own, one grey value a pixel. */
+/* Copies the frames of a camera, one grey value a pixel. */
 #pragma once
 
 #include <optional>
@@ -17,17 +17,17 @@ namespace codedexposure::gst
 /**
  * Copies frames into a buffer pool unless they come from one.
  *
- * A source without a pool may write into memory that it has handed out, as
- * aravissrc does. Frames of a pool stay untouched until they are released.
- * Packed pixels are unpacked on the way; Aravis calls all formats of more than
- * 8 bits GRAY16_LE, packed ones as well.
+ * A source without a pool, such as aravissrc, may overwrite memory that it has
+ * pushed. Frames of a pool stay unchanged until they are released. Packed
+ * pixels are unpacked; Aravis gives all formats of more than 8 bits the caps
+ * GRAY16_LE, packed ones, too.
  */
 class OwnedFrames
 {
 public:
   /** @p info  of the frames that come out.
    * @p pixel_format  GenICam name; empty: as @p info says.
-   * @return an error where the two do not agree. */
+   * @return an error if the two contradict each other. */
   static Result<OwnedFrames> make (
       const GstVideoInfo &info, const std::string &pixel_format);
 
@@ -35,7 +35,7 @@ public:
   int bits () const;
   /** Whether the pixel format says how many bits are significant. */
   bool knows_bits () const { return format_.has_value (); }
-  /** Whether @p frame has all of its bytes. */
+  /** Whether @p frame is complete. */
   bool is_whole (GstBuffer *frame) const;
   /** @p frame, which is whole, or a copy of it; null where it cannot be read.
    */
@@ -52,7 +52,7 @@ private:
   PoolPtr pool_;
 };
 
-/** The format of @p name, or an error that lists those there are. */
+/** The format of @p name, or an error that lists the valid names. */
 Result<MonoFormat> camera_format (const std::string &name);
 
 } // namespace codedexposure::gst

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Where subframes lie when nobody downstream has a place for them. */
+/* The buffer pool of subframes if downstream offers none. */
 #pragma once
 
 #include <gst/gst.h>
@@ -10,9 +10,10 @@ namespace codedexposure::gst
 /**
  * A pool of grey pictures. Transfer: full.
  *
- * Its buffers start at different places of a page, since all subframes of a
- * coded frame are written at once (plane_stagger ()). Each bears the meta
- * CodedExposureFrame for as long as it lives: whoever takes one sets it.
+ * Its buffers start at different offsets in a memory page, because all
+ * subframes of a coded frame are written at once (plane_stagger ()). Each
+ * buffer always has the meta CodedExposureFrame; set it after a buffer is
+ * acquired.
  */
 GstBufferPool *make_picture_pool ();
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The properties of an element as a table, their flags, and when they may be
+/* The properties of an element as a table, and the states in which they may be
  * set. */
 #pragma once
 
@@ -27,8 +27,8 @@ inline constexpr auto kReadWriteReady =
 inline constexpr auto kReadWrite =
     GParamFlags (kReadWriteNull | GST_PARAM_MUTABLE_PLAYING);
 
-/** Whether @p pspec, by its flags, may be set in the state that @p element is
- * in; a warning in the log where not. Object lock. */
+/** Whether the flags of @p pspec allow setting it in the state of @p element;
+ * logs a warning if not. Object lock. */
 bool may_set (gpointer element, const GParamSpec *pspec);
 
 /** Access to a member of a member: within (&Settings::noise,
@@ -45,13 +45,13 @@ within (auto... members)
 /**
  * A property of an element that keeps its values in a @p State.
  *
- *     {"bits", "Bits", "Significant bits of a pixel", kReadWrite,
- *         &Settings::bits, 0, 16}
+ * {"bits", "Bits", "Significant bits of a pixel", kReadWrite, &Settings::bits,
+ * 0, 16}
  *
  * Access is a member, within (), or a function of a State; one that returns a
  * value, not a reference, makes a property that cannot be set. Limits follow
- * for numbers (smallest and largest, whose type is that of the property) and
- * enums (the GType). The default is the value in State ().
+ * for numbers (min and max, whose type is that of the property) and enums (the
+ * GType). The default is the value in State ().
  */
 template <typename State>
 class Property
@@ -81,9 +81,9 @@ public:
 
   GParamSpec *spec () const { return spec_; }
   void get (const State &state, GValue *value) const { get_ (state, value); }
-  /** Gives a State the value that was read. */
+  /** Assigns the value that was read to a State. */
   using Assignment = std::function<void (State &)>;
-  /** Reads @p value, and the file that it names where it does. */
+  /** Reads @p value, and the file if it names one. */
   Assignment read (const GValue *value) const { return read_ (value); }
 
 private:
@@ -128,10 +128,10 @@ private:
 };
 
 /**
- * Installs the properties of @p Table (), whose values are in
- * @p StateOf (object). They are set and read under the object lock, and set
- * only where may_set () allows it; then @p Changed (object, pspec) is called,
- * under the lock. A file that a value names is read before.
+ * Installs the properties of @p Table (), whose values are in @p StateOf
+ * (object). They are set and read under the object lock, and set only where
+ * may_set () allows it; then @p Changed (object, pspec) is called, under the
+ * lock. A file that a value names is read before the lock is taken.
  */
 template <auto Table, auto StateOf,
     auto Changed = [] (GObject *, const GParamSpec *) {}>

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Owners for GStreamer's references and locks, and the border for exceptions.
- */
+/* Owners of GStreamer's references, locks and mapped frames. */
 #pragma once
 
 #include <cstdint>
@@ -37,7 +36,7 @@ using StructurePtr =
     std::unique_ptr<GstStructure, FreeWith<gst_structure_free>>;
 using CharPtr = std::unique_ptr<gchar, FreeWith<g_free>>;
 
-/** Stops a pool before it gives it up. */
+/** Deactivates a pool before it releases it. */
 struct PoolRelease {
   void operator() (GstBufferPool *pool) const
   {
@@ -79,7 +78,7 @@ public:
   }
   MappedFrame &operator= (MappedFrame &&) = delete;
 
-  /** Once, where it is not mapped. */
+  /** Call it only while nothing is mapped. */
   void map (const GstVideoInfo &info, GstBuffer *buffer, GstMapFlags flags)
   {
     mapped_ = gst_video_frame_map (&frame_, const_cast<GstVideoInfo *> (&info),
@@ -115,8 +114,8 @@ view_of (MappedFrame &mapped)
   return view_of<Pixel> (mapped.frame ());
 }
 
-/** Calls @p use with the pixels of @p mapped, of the type that its format has;
- * they may be written where the frame was mapped for it. */
+/** Calls @p use with the pixels of @p mapped, in the type of its format. Write
+ * to them only if the frame was mapped for writing. */
 template <typename Use>
 auto
 write_pixels (MappedFrame &mapped, Use use)

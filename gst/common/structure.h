@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* C++ structs as GstStructures: the one way in which messages, events, queries,
- * metas and statistics are built and parsed. */
+/* Converts C++ structs to GstStructures and back. Messages, events, queries,
+ * metas and statistics are built and parsed with it. */
 #pragma once
 
 #include <optional>
@@ -15,15 +15,12 @@ namespace codedexposure::gst
 {
 
 /**
- * Declares which members of a struct travel, in their order. The name of a
- * field is that of its member with hyphens for underscores:
+ * Declares which members of a struct become fields, in their order. The name of
+ * a field is that of its member with hyphens for underscores:
  *
- *     struct FrameLate {
- *       static constexpr const char *kName = "dmdsync/frame-late";
- *       guint64 lost_before = 0; // "lost-before"
- *       GstClockTime pts = 0;
- *       CODED_FIELDS (lost_before, pts);
- *     };
+ * struct FrameLate { static constexpr const char *kName = "dmdsync/frame-late";
+ * guint64 lost_before = 0; // "lost-before" GstClockTime pts = 0; CODED_FIELDS
+ * (lost_before, pts); };
  *
  * A member of a member has its own name only: `stats.mean` is "mean". Types are
  * those of Wire, std::optional of them for a field that may be absent, and
@@ -77,8 +74,7 @@ set_field (GstStructure *structure, GQuark name, const std::optional<T> &member)
     set_field (structure, name, *member);
 }
 
-/** False, with @p member as it was, where there is no such field of that type.
- */
+/** False, with @p member unchanged, if there is no such field of that type. */
 template <typename T>
 bool
 get_field (const GstStructure *structure, GQuark name, T &member)
@@ -113,8 +109,8 @@ write_fields (GstStructure *structure, const T &value)
   });
 }
 
-/** False where @p structure lacks a field that is not optional; members keep
- * their value then. */
+/** False if @p structure lacks a field that is not optional; its member keeps
+ * its value. */
 template <typename T>
 bool
 read_fields (const GstStructure *structure, T &value)
@@ -139,8 +135,8 @@ to_structure (const T &value)
   return structure;
 }
 
-/** None where @p structure, which may be null, has another name or lacks a
- * field that is not optional. */
+/** None if @p structure is null, has another name or lacks a field that is not
+ * optional. */
 template <typename T>
 std::optional<T>
 from_structure (const GstStructure *structure)
@@ -178,7 +174,7 @@ parse_message (GstMessage *message)
              : std::nullopt;
 }
 
-/** A custom event, whose type T has as kType; Transfer: full. */
+/** A custom event of type T::kType; Transfer: full. */
 template <typename T>
 GstEvent *
 new_event (const T &value)
@@ -222,7 +218,7 @@ answer_query (GstQuery *query, const T &value)
   write_fields (gst_query_writable_structure (query), value);
 }
 
-/** The answer to a query for a T; none where it was not answered. */
+/** The answer to a query for a T; none if it was not answered. */
 template <typename T>
 std::optional<T>
 parse_query (GstQuery *query)

@@ -30,15 +30,10 @@ comments_of (const GstTagList *tags)
 }
 
 bool
-says_schedule (std::string_view comment)
+has_setup (std::string_view comment)
 {
   return comment.substr (0, kPrefix.size ()) == kPrefix;
 }
-
-} // namespace
-
-namespace
-{
 
 GstTagList *
 setup_to_tags (const StreamSetup &setup)
@@ -71,7 +66,7 @@ std::optional<Result<StreamSetup>>
 setup_from_tags (const GstTagList *tags)
 {
   for (const std::string &comment : comments_of (tags))
-    if (says_schedule (comment))
+    if (has_setup (comment))
       return StreamSetup::from_json (
           std::string_view (comment).substr (kPrefix.size ()));
   return std::nullopt;
@@ -95,11 +90,11 @@ replace_setup (GstEvent *event, const StreamSetup &setup)
   GstTagList *ours = setup_to_tags (setup);
   gst_tag_list_set_scope (ours, gst_tag_list_get_scope (tags));
   for (const std::string &comment : comments_of (tags))
-    if (!says_schedule (comment))
+    if (!has_setup (comment))
       gst_tag_list_add (ours, GST_TAG_MERGE_APPEND, GST_TAG_COMMENT,
           comment.c_str (), nullptr);
 
-  /* Other tags only: comments are there already, and are kept. */
+  /* KEEP adds the other tags only, because there are comments already. */
   gst_tag_list_insert (ours, tags, GST_TAG_MERGE_KEEP);
   GstEvent *replaced = gst_event_new_tag (ours);
   gst_event_set_seqnum (replaced, gst_event_get_seqnum (event));

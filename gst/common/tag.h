@@ -14,18 +14,18 @@
 namespace codedexposure::gst
 {
 
-/** A tag list that says the schedule; Transfer: full. */
+/** A tag list with the schedule; Transfer: full. */
 GstTagList *schedule_to_tags (const Schedule &schedule);
-/** A TAG event that says the schedule; Transfer: full. */
+/** A TAG event with the schedule; Transfer: full. */
 GstEvent *schedule_to_event (const Schedule &schedule);
 
-/** The same with a mapping. */
+/** A TAG event with schedule and mapping; Transfer: full. */
 GstEvent *setup_to_event (const StreamSetup &setup);
 
 /** Schedule and mapping in @p tags; as schedule_from_tags (). */
 std::optional<Result<StreamSetup>> setup_from_tags (const GstTagList *tags);
-/** The schedule in @p tags: none where no comment speaks of one, an error
- * where one does and cannot be read. */
+/** The schedule in @p tags: none if no comment has one, an error if it cannot
+ * be read. */
 std::optional<Result<Schedule>> schedule_from_tags (const GstTagList *tags);
 
 /** The TAG event @p event with @p setup in place of the one in its tags;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* How C++ values travel in GValues: fields of structures, and properties. */
+/* Converts C++ values to GValues and back, for fields of structures and for
+ * properties. */
 #pragma once
 
 #include <concepts>
@@ -15,11 +16,11 @@ namespace codedexposure::gst
 {
 
 /**
- * How a @p T travels in a GValue.
+ * Converts a @p T to a GValue and back.
  *
- * type () is the type of the GValue; set () and get () write and read it.
- * spec (name, nick, blurb, limits..., standard, flags) describes a property:
- * numbers have a smallest and a largest value, enums the GType, others nothing.
+ * type () is the type of the GValue; set () and get () write and read it. spec
+ * (name, nick, blurb, limits..., standard, flags) describes a property: limits
+ * are min and max of numbers, the GType of enums, nothing for others.
  */
 template <typename T>
 struct Wire;
@@ -126,7 +127,7 @@ struct Wire<T> {
   }
 };
 
-/** Properties only, which cannot be set. */
+/** Read-only properties only. */
 template <>
 struct Wire<StructurePtr> {
   static void set (GValue *value, StructurePtr structure)

@@ -37,8 +37,8 @@
  * #GstCodedFilter:schedule property, else that of the stream's tag
  * `comment=coded-exposure={...}`, else sequential:2x2 with a warning on the
  * bus. Source pads get their caps with the first frame, because tags come after
- * caps. Width and height are divided by the cell of the
- * tile, pixel-aspect-ratio follows; columns and rows that fill no cell, and the
+ * caps. Width and height are divided by the cell of the tile, and
+ * pixel-aspect-ratio follows; columns and rows that fill no cell, and the
  * pilot's rows, are cropped.
  *
  * Where the schedule has regions, areas with a tile and a code of their own,
@@ -54,17 +54,17 @@
  * is that of the #GstCodedFilter:mapping property, else that of the stream's
  * tag. Frames are rectified to one pixel a mirror before they are split;
  * regions are places among the mirrors, wherever the camera sees them. The
- * element message `codedexposure/mapping` has how well it sees them.
+ * element message `codedexposure/mapping` reports how well it sees them.
  *
  * ## Flags, metas and messages
  *
  * A gap of more than one and a half periods between two frames is a loss: it is
  * counted, the next subframe of every pad is DISCONT, and the element message
- * `codedexposure/frames-lost` says `count`, `from` (when the first was due) and
+ * `codedexposure/frames-lost` has `count`, `from` (when the first was due) and
  * `to` (the frame that came). CORRUPTED and GAP pass to all subframes of a
- * frame. `codedexposure/saturated` says when a stretch of frames with pixels at
- * the largest value begins (`active` true), and when there were none for a
- * second.
+ * frame. `codedexposure/saturated` reports when a sequence of frames with
+ * pixels at the largest value begins (`active` true), and when there were none
+ * for a second.
  *
  * Every subframe has the custom meta `CodedExposureFrame` with the number of
  * its frame, its index and the time of its light; other metas of the frame are

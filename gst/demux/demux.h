@@ -25,7 +25,7 @@ G_END_DECLS
 namespace codedexposure::gst::demux
 {
 
-/** What the user asked for, and what came of it. */
+/** Properties. */
 struct Settings {
   ExtractOptions extract;
   bool qos = false;
@@ -37,7 +37,7 @@ using PadRef = std::shared_ptr<GstCodedPad>;
 /** The source pads by kind and index, in the order in which they are served. */
 using PadMap = std::map<std::pair<PadKind, int>, PadRef>;
 
-/** What is pushed on each kind of pad. */
+/** Caps of each kind of pad. */
 struct PadCaps {
   CapsPtr coded, all, one;
   std::vector<CapsPtr> regions;
@@ -99,12 +99,12 @@ private:
   std::shared_ptr<const PadMap> pads () const;
   GstCodedPad *add_pad (
       const char *templ, PadKind kind, const std::string &name, int index);
-  void enlist (PadRef pad);
-  PadRef strike (GstPad *pad);
+  void insert_pad (PadRef pad);
+  PadRef take_pad (GstPad *pad);
   bool index_allowed (PadKind kind, int index) const;
   bool check_pads (const PadMap &pads) const;
-  /** The flow of all pads together after @p pad returned @p flow; NOT_LINKED
-   * where there was nothing to push. */
+  /** Combines @p flow of @p pad with the flows of the others; NOT_LINKED if
+   * nothing was pushed. */
   GstFlowReturn combine_flow (GstCodedPad *pad, GstFlowReturn flow);
 
   /* Frames. */
@@ -132,7 +132,7 @@ private:
 
   /* Object lock. */
   Settings settings_;
-  /** Replaced, never changed: the streaming thread works on one while the
+  /** Replaced, never changed: the streaming thread uses a map while the
    * application requests and releases pads. */
   std::shared_ptr<const PadMap> pads_ = std::make_shared<PadMap> ();
   std::unique_ptr<GstFlowCombiner, FreeWith<gst_flow_combiner_free>> combiner_{
@@ -143,7 +143,7 @@ private:
   /* Sink pad's stream lock. */
   Settings in_force_;
   std::optional<Plan> plan_;
-  std::optional<bool> live_;       ///< asked for when first needed
+  std::optional<bool> live_;       ///< queried at first use
   std::vector<std::byte> scratch_; ///< subframes that no pad wants
 };
 

@@ -196,7 +196,7 @@ Demux::add_pad (
   const PadRef pad (
       new_source_pad (templ, name, kind, index).release (), ObjectUnref ());
   gst_pad_set_active (GST_PAD (pad.get ()), TRUE);
-  enlist (pad);
+  insert_pad (pad);
   gst_element_add_pad (element (), GST_PAD (pad.get ()));
   return pad.get ();
 }
@@ -205,7 +205,7 @@ Demux::add_pad (
  * is missed: both happen under one lock, and forward () stores an event on the
  * sink pad before it reads the map. */
 void
-Demux::enlist (PadRef pad)
+Demux::insert_pad (PadRef pad)
 {
   const ObjectLock lock (element ());
   Replay replay{pad.get (), caps_};
@@ -234,15 +234,15 @@ Demux::request_pad (GstPadTemplate *templ, const gchar *name)
     own_name = prefix_of (kind) + std::to_string (index);
   }
   if (present->contains ({kind, index})) {
-    GST_WARNING_OBJECT (
-        element (), "pad %s exists: tee it to use it twice", own_name.c_str ());
+    GST_WARNING_OBJECT (element (),
+        "pad %s exists; put a tee after it to use it twice", own_name.c_str ());
     return nullptr;
   }
   return GST_PAD (add_pad (kind_name.c_str (), kind, own_name, index));
 }
 
 PadRef
-Demux::strike (GstPad *pad)
+Demux::take_pad (GstPad *pad)
 {
   const CodedPad &coded = GST_CODED_PAD (pad)->coded;
   const ObjectLock lock (element ());
@@ -250,18 +250,18 @@ Demux::strike (GstPad *pad)
   const auto found = changed->find ({coded.kind, coded.index});
   if (found == changed->end () || GST_PAD (found->second.get ()) != pad)
     return nullptr;
-  PadRef struck = std::move (found->second);
-  struck->coded.released = true;
+  PadRef taken = std::move (found->second);
+  taken->coded.released = true;
   changed->erase (found);
   pads_ = std::move (changed);
   gst_flow_combiner_remove_pad (combiner_.get (), pad);
-  return struck;
+  return taken;
 }
 
 void
 Demux::release_pad (GstPad *pad)
 {
-  if (const PadRef struck = strike (pad)) {
+  if (const PadRef taken = take_pad (pad)) {
     gst_pad_set_active (pad, FALSE);
     gst_element_remove_pad (element (), pad);
   }
@@ -270,8 +270,8 @@ Demux::release_pad (GstPad *pad)
 /* ------------------------------------------------------- events and flow -- */
 
 /* GStreamer stores a sticky event on the sink pad after its handler has
- * returned, which is too late for enlist (). EOS can be stored only once, so it
- * is left to GStreamer. */
+ * returned, which is too late for insert_pad (). EOS can be stored only once,
+ * so it is left to GStreamer. */
 gboolean
 Demux::forward (EventPtr event)
 {

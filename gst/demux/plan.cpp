@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The settings; from them and the format to a plan, and to the caps of all
- * pads. */
+/* Properties; the plan and the caps of all pads, which follow from them and the
+ * format. */
 #include "demux.h"
 
 #include <utility>
@@ -15,8 +15,8 @@ namespace codedexposure::gst::demux
 
 G_DEFINE_ENUM_TYPE (GstCodedExposureMethod, gst_coded_exposure_method,
     {int (Method::kAuto),
-        "select for one-hot codes without leak, decode for other codes that "
-        "can be inverted, else rank",
+        "select for one-hot codes without off-state leakage, decode for other "
+        "invertible codes, else rank",
         "auto"},
     {int (Method::kRank), "subframe k is the k-th smallest pixel of each group",
         "rank"},
@@ -36,20 +36,20 @@ Demux::properties ()
       {"method", "Method", "How subframes are found in a coded frame",
           kReadWrite, set (&ExtractOptions::method), method},
       {"gain", "Gain",
-          "Factor on the light of a slot (method decode); 0: automatic, white "
-          "in a slot is white out",
+          "Gain of method decode; 0: automatic, white in a slot maps to the "
+          "largest value",
           kReadWrite, set (&ExtractOptions::gain), 0.0,
           ExtractOptions::kMaxGain},
       {"interpolate", "Interpolate",
-          "Interpolate the elements to the centre of their cell before the "
-          "code is solved (method decode on raster tiles)",
+          "Interpolate the elements to the centre of their cell before "
+          "decoding (method decode on raster tiles)",
           kReadWrite, set (&ExtractOptions::interpolate)},
       {"qos", "QoS",
-          "Leave out subframes that would reach their sink too late, and post "
-          "a QoS message for each; off: nothing is ever dropped",
+          "Drop subframes that would reach their sink too late, and post a QoS "
+          "message for each; if false, none is dropped",
           kReadWrite, &Settings::qos},
       {"method-in-force", "Method in force",
-          "The method that frames are split by; auto before the first frame; "
+          "The method that splits frames; auto before the first frame; "
           "notifies",
           kReadOnly, &Settings::method_in_force, method},
   };
@@ -73,8 +73,8 @@ part_caps (const CodedFormat &format, const SplitPart &part, bool raised_rate)
       scale_caps (cut.get (), coded_to_subframes (part.schedule, raised_rate)));
 }
 
-/* @caps of the pad of region @i, whose size does not follow from that of the
- * frames, as those of coded frames, or the other way. */
+/* Converts @caps of the pad of region @i to those of coded frames, or back. The
+ * size of a region does not follow from that of the frames. */
 CapsPtr
 convert_region (const Schedule &schedule, int i, GstCaps *caps, bool to_coded)
 {
@@ -108,7 +108,7 @@ log_plan (GstElement *element, const CodedFormat &format, const Plan &plan)
         columns, rows, format.schedule.pilot_rows (), cell.width, cell.height);
 }
 
-/* A recording of such a schedule may meet somebody who does not know it. */
+/* Users of a recording may not know that its schedule has regions. */
 void
 report_regions (GstElement *element, const Schedule &schedule)
 {

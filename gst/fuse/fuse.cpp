@@ -24,8 +24,8 @@
  * comes and nothing is added to the latency. With it, a coded frame waits for
  * the next one, and T is added to the latency.
  *
- * What was seen before helps to tell what stands still. A lost, corrupted or
- * late frame, a DISCONT, a seek and a new segment start that history anew.
+ * Earlier frames help to find what stands still. A lost, corrupted or late
+ * frame, a DISCONT, a seek and a new segment reset this history.
  *
  * ## Schedule and mapping
  *
@@ -42,7 +42,7 @@
  * of recordings; #codedexposure-fuse:threads share their work.
  * Tell the element about the camera's noise (#codedexposure-fuse:full-well,
  * #codedexposure-fuse:read-noise): it filters more where the noise is larger,
- * and knows what it may take for still.
+ * and tells motion from noise.
  *
  * ## Flags, metas and messages
  *
@@ -122,24 +122,23 @@ Fuse::properties ()
 {
   static const PropertyTable<FuseOptions> table{
       {"quality", "Quality",
-          "How much work a frame is worth; balanced and best are for up to 16 "
-          "slots",
+          "Quality against speed; balanced and best are for up to 16 slots",
           kReadWrite, &FuseOptions::quality,
           gst_coded_exposure_quality_get_type ()},
       {"lookahead", "Lookahead",
-          "Coded frames that are waited for before one is fused: what stands "
-          "still is then known from the first frame on; each adds a frame "
-          "period to the latency",
+          "Coded frames to wait for before one is fused; static pixels are "
+          "then known from the first frame on; each adds a frame period to the "
+          "latency",
           kReadWrite, &FuseOptions::lookahead, 0u,
           guint (Fuser<std::uint8_t>::kMaxLookahead)},
       {"threads", "Threads",
-          "Threads that balanced and best work on, which changes no pixel; 0: "
-          "one for each processor; fast works on the streaming thread",
+          "Threads of quality balanced and best, which do not change pixels; "
+          "0: one for each processor; fast uses the streaming thread",
           kReadWrite, &FuseOptions::threads, 0u, guint (Workers::kMost)},
       {"full-well", "Full well",
-          "Electrons that white makes in a pixel that is open for the whole "
-          "exposure, as in codedexposure-sim; the noise of light follows from "
-          "it; 0: the frames are noise-free",
+          "Electrons at white in a pixel that is on for the whole exposure, as "
+          "in codedexposure-sim; determines the shot noise; 0: the frames are "
+          "noise-free",
           kReadWrite, within (&FuseOptions::noise, &SensorNoise::full_well),
           0.0, SensorNoise::kMaxFullWell},
       {"read-noise", "Read noise",
@@ -171,7 +170,7 @@ Fuse::set_up_class (gpointer klass)
 namespace
 {
 
-/* Flags of frames that are no picture, or none to compare others with. */
+/* Flags of frames that others cannot be compared with. */
 constexpr guint kUnfit = GST_BUFFER_FLAG_CORRUPTED | GST_BUFFER_FLAG_GAP;
 
 } // namespace
@@ -287,7 +286,7 @@ Fuse::render (std::vector<BufferPtr> &buffers)
 }
 
 /* Buffers are pushed one by one, because a sink would show a whole list at the
- * time of its first. */
+ * time of its first buffer. */
 GstFlowReturn
 Fuse::push_oldest ()
 {
@@ -347,8 +346,8 @@ Fuse::resume ()
 
 /* ------------------------------------------------------------------ plan -- */
 
-/* Noise of an ordinary exposure at a typical light, where the user says what
- * camera it is. */
+/* Relative noise of a plain exposure at typical light, if the user has
+ * described the camera. */
 RectifyOptions
 Fuse::rectify_options () const
 {

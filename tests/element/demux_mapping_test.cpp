@@ -177,10 +177,10 @@ TEST_F (DemuxMapping, OfOtherFramesIsRefused)
                                        [] (int, int) { return 0; }),
                  0)),
       GST_FLOW_NOT_NEGOTIATED);
-  EXPECT_EQ (demux.error (),
-      "The mapping " + path.string () +
-          " is of frames of 64x48 pixels, these have 64x50: map the camera as "
-          "it is set now (moirecalib).");
+  EXPECT_EQ (
+      demux.error (), "The mapping " + path.string () +
+                          " is for frames of 64x48 pixels, but these have "
+                          "64x50. Measure a new mapping with moirecalib.");
 }
 
 TEST_F (DemuxMapping, OfOtherFramesInTheTagIsLeftOut)
@@ -192,8 +192,8 @@ TEST_F (DemuxMapping, OfOtherFramesInTheTagIsLeftOut)
                                        [] (int, int) { return 0; }),
                  0)),
       GST_FLOW_OK);
-  EXPECT_NE (
-      demux.warning ().find ("Do not scale coded frames"), std::string::npos);
+  EXPECT_NE (demux.warning ().find ("Do not scale or crop coded frames"),
+      std::string::npos);
 }
 
 TEST_F (DemuxMapping, ThatCannotBeReadIsAnError)

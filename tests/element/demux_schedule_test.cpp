@@ -118,8 +118,8 @@ TEST_F (DemuxSchedule, PropertyWinsOverTheTag)
   EXPECT_EQ (in_force (*demux), "sequential:2x2");
   EXPECT_EQ (pull_images (*demux).size (), 4u);
   EXPECT_EQ (demux->info (),
-      "The schedule property, sequential:2x2, is in force. The stream was made "
-      "with sequential:3x3.");
+      "The schedule property, sequential:2x2, overrides the schedule of the "
+      "stream, sequential:3x3.");
   demux->set_caps (gray_caps (24, 24, "50/1"));
   ASSERT_EQ (push (1), GST_FLOW_OK);
   EXPECT_EQ (demux->info (), "") << "once";

@@ -152,5 +152,5 @@ TEST_P (DemuxSeek, WithinOneFrameIsWarnedOfAndGivesNothing)
       recorded (rate, 10) + period / 2);
   EXPECT_EQ (subframes (), Subframes ());
   EXPECT_NE (
-      demux.warning ().find ("Seek to a longer stretch"), std::string::npos);
+      demux.warning ().find ("Seek to a longer segment"), std::string::npos);
 }

@@ -189,10 +189,10 @@ TEST_F (FuseMapping, OfOtherFramesIsRefused)
 {
   start ("mapping=" + save (mapping ().to_json ()), {24, 20});
   EXPECT_EQ (push_grey ({24, 20}, 0), GST_FLOW_NOT_NEGOTIATED);
-  EXPECT_EQ (fuse->error (),
-      "The mapping " + path.string () +
-          " is of frames of 96x72 pixels, these have 24x20: map the camera as "
-          "it is set now (moirecalib).");
+  EXPECT_EQ (
+      fuse->error (), "The mapping " + path.string () +
+                          " is for frames of 96x72 pixels, but these have "
+                          "24x20. Measure a new mapping with moirecalib.");
 }
 
 TEST_F (FuseMapping, OfOtherFramesInTheTagIsLeftOut)
@@ -201,8 +201,8 @@ TEST_F (FuseMapping, OfOtherFramesInTheTagIsLeftOut)
   fuse->push_event (setup_to_event ({kSchedule, mapping ()}));
   EXPECT_EQ (push_grey ({24, 20}, 0), GST_FLOW_OK);
   EXPECT_EQ (push_grey ({24, 20}, GST_SECOND * 1001 / 30000), GST_FLOW_OK);
-  EXPECT_NE (
-      fuse->warning ().find ("Do not scale coded frames"), std::string::npos);
+  EXPECT_NE (fuse->warning ().find ("Do not scale or crop coded frames"),
+      std::string::npos);
   EXPECT_EQ (fuse->warning (), "") << "it is said once";
 }
 

@@ -248,8 +248,8 @@ TEST (SubframeStats, SaysWhatItCannotDo)
       "Cannot open \"/nonexistent/stats.csv\" for writing: No such file or "
       "directory");
   EXPECT_EQ (complaint ("location=/dev/full"),
-      "Cannot write to \"/dev/full\": No space left on device. It holds the "
-      "frames up to here.");
+      "Cannot write to \"/dev/full\": No space left on device. It contains "
+      "the frames before this one.");
 }
 
 TEST (SubframeStats, RefusesTooFewBytes)

@@ -88,16 +88,6 @@ public:
     network.in_order_of_demand ();
     return network;
   }
-  /** Joins the sorted lists of wires 0..first-1 and first..Wires-1. */
-  static constexpr Network merge (int first)
-  {
-    Network network;
-    const List all = all_wires ();
-    network.rank_ =
-        network.merged (all.slice (0, first), all.slice (first, Wires - first));
-    network.in_order_of_demand ();
-    return network;
-  }
 
   constexpr int size () const { return size_; }
   constexpr Comparator operator[] (int i) const { return comparators_[i]; }

@@ -50,6 +50,7 @@ is_ours (const GParamSpec *spec)
   const gchar *owner = g_type_name (spec->owner_type);
   return g_str_has_prefix (owner, "GstCoded") ||
          g_str_has_prefix (owner, "GstDmd") ||
+         g_str_has_prefix (owner, "GstMoire") ||
          g_str_has_prefix (owner, "GstSubframe");
 }
 
@@ -57,9 +58,10 @@ is_ours (const GParamSpec *spec)
 
 TEST (Plugin, HasTheElementsOfTheBench)
 {
-  for (const char *name : {"codedexposure-camerasrc", "codedexposure-sim",
-           "codedexposure-demux", "codedexposure-log", "codedexposure-scene",
-           "codedexposure-view", "dmdsync", "moirecalib", "subframestats"}) {
+  for (const char *name :
+      {"codedexposure-camerasrc", "codedexposure-sim", "codedexposure-demux",
+          "codedexposure-fuse", "codedexposure-log", "codedexposure-scene",
+          "codedexposure-view", "dmdsync", "moirecalib", "subframestats"}) {
     const std::unique_ptr<GstElementFactory, ObjectUnref> factory (
         gst_element_factory_find (name));
     EXPECT_NE (factory, nullptr) << name;

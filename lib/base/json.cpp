@@ -209,6 +209,8 @@ number_into (double &to, const std::string &rule)
 Json
 parse_strictly (std::string_view text, const std::string &what)
 {
+  if (text.find_first_not_of (" \t\r\n") == text.npos)
+    refuse ("it is empty");
   /* The parser takes a zero byte for the end and ignores what follows. */
   if (const std::size_t zero = text.find ('\0'); zero != text.npos)
     refuse ("it is no valid JSON: a zero byte at " + std::to_string (zero) +

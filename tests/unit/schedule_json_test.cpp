@@ -138,7 +138,8 @@ TEST (ScheduleJson, WrongTextsAreNamed)
     std::vector<std::string> words;
   } cases[] = {
       /* no JSON */
-      {"", {"no valid JSON", "end of input"}},
+      {"", {"it is empty"}},
+      {" \n", {"it is empty"}},
       {"{", {"no valid JSON"}},
       {good.substr (0, good.size () - 1), {"no valid JSON", "end of input"}},
       {good + "}", {"no valid JSON"}},

@@ -220,10 +220,9 @@ CodedFilter::read_settings ()
   const auto check = [this] (const char *property, const auto &named) {
     if (!named.read || *named.read)
       return true;
-    GST_ELEMENT_ERROR (element_, RESOURCE, SETTINGS,
-        ("The %s property cannot be read: %s", property,
-            named.read->error ().message.c_str ()),
-        (nullptr));
+    POST_ERROR (element_, RESOURCE, SETTINGS,
+        std::string ("The ") + property +
+            " property cannot be read: " + named.read->error ().message);
     return false;
   };
   CodedSettings &settings = shared_.settings;
@@ -283,15 +282,14 @@ CodedFilter::notify (const char *property) const
 void
 CodedFilter::post_error (const std::string &why) const
 {
-  GST_ELEMENT_ERROR (element_, STREAM, FORMAT, ("%s", why.c_str ()), (nullptr));
+  POST_ERROR (element_, STREAM, FORMAT, why);
 }
 
 GstFlowReturn
 CodedFilter::post_decode_error (const Error &error) const
 {
-  GST_ELEMENT_ERROR (element_, STREAM, DECODE,
-      ("A coded frame could not be decoded: %s.", error.message.c_str ()),
-      (nullptr));
+  POST_ERROR (element_, STREAM, DECODE,
+      "A coded frame could not be decoded: " + error.message + ".");
   return GST_FLOW_ERROR;
 }
 

@@ -128,11 +128,9 @@ CodedFilter::find_schedule (CodedFormat &format)
   }
   format.assumed = true;
   if (!std::exchange (stream_.warned_assumed, true))
-    GST_ELEMENT_WARNING (element_, STREAM, FORMAT,
-        ("The stream has no schedule tag; assuming %s. Set the schedule "
-         "property if it is another.",
-            format.schedule.text ().c_str ()),
-        (nullptr));
+    POST_WARNING (element_, STREAM, FORMAT,
+        "The stream has no schedule tag; assuming " + format.schedule.text () +
+            ". Set the schedule property if it is another.");
   return true;
 }
 
@@ -175,12 +173,12 @@ CodedFilter::find_mapping (Extent camera, std::optional<Mapping> &mapping)
   if (!mapping || mapping->camera () == camera)
     return true;
   if (!std::exchange (stream_.warned_of_mapping, true))
-    GST_ELEMENT_WARNING (element_, STREAM, FORMAT,
-        ("The mapping in the stream's tags is for frames of %s pixels, but "
-         "these have %s; they are decoded without it. Do not scale or crop "
-         "coded frames.",
-            text_of (mapping->camera ()).c_str (), text_of (camera).c_str ()),
-        (nullptr));
+    POST_WARNING (element_, STREAM, FORMAT,
+        "The mapping in the stream's tags is for frames of " +
+            text_of (mapping->camera ()) + " pixels, but these have " +
+            text_of (camera) +
+            "; they are decoded without it. Do not scale or crop coded "
+            "frames.");
   mapping.reset ();
   return true;
 }

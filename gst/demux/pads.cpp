@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "base/text.h"
+#include "common/element.h"
 
 GST_DEBUG_CATEGORY_EXTERN (codedexposure_demux_debug);
 #define GST_CAT_DEFAULT codedexposure_demux_debug
@@ -164,10 +165,9 @@ Demux::index_allowed (PadKind kind, int index) const
   }
   if (index >= 0 && index < numbered_pads (kind, schedule.get ()))
     return true;
-  GST_ELEMENT_WARNING (element (), STREAM, WRONG_TYPE,
-      ("There is no pad %s%d: %s", prefix_of (kind), index,
-          pads_text (kind, schedule.get ()).c_str ()),
-      (nullptr));
+  POST_WARNING (element (), STREAM, WRONG_TYPE,
+      "There is no pad " + (prefix_of (kind) + std::to_string (index)) + ": " +
+          pads_text (kind, schedule.get ()));
   return false;
 }
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* What subframestats measured, as meta, message or line of a file;
+/* The measurements of subframestats as a meta, a message or a line of a file;
  * docs/formats.md describes the fields. */
 #pragma once
 
@@ -20,7 +20,7 @@ extern const char *const kStatsMetaName;
 /** The measurements of one picture. */
 struct StatsReport {
   guint64 frame = 0;  ///< number of the coded frame
-  gint subframe = -1; ///< -1 on a coded frame, and where that is not known
+  gint subframe = -1; ///< -1 on a coded frame, or unknown
   GstClockTime pts = GST_CLOCK_TIME_NONE;
   GstClockTime running_time = GST_CLOCK_TIME_NONE;
   std::vector<const char *> flags; ///< flag_names () of the buffer
@@ -34,7 +34,7 @@ struct StatsReport {
  * returns the meta's structure; Transfer: none. */
 GstStructure *set_stats_meta (GstBuffer *buffer, const StatsReport &report);
 
-/** Lines of a file, without their ends. */
+/** Lines of a file, without line ends. */
 std::string json_line (const StatsReport &report);
 std::string csv_line (const StatsReport &report);
 extern const char *const kCsvHead;

@@ -223,7 +223,7 @@ set_caps (GstBaseTransform *base, GstCaps *caps, GstCaps *) noexcept
   return make_meter (self);
 }
 
-/* Where the user does not set the significant bits, the pictures tell them. */
+/* Without the bits property, the metas set the significant bits. */
 bool
 follow_bits (GstSubframeStats *self, GstBuffer *frame)
 {
@@ -236,7 +236,7 @@ follow_bits (GstSubframeStats *self, GstBuffer *frame)
   return make_meter (self);
 }
 
-/* The statistics of @frame; null where its pixels cannot be read. */
+/* The statistics of @frame; null, with an error posted, if it is too short. */
 const PictureStats *
 measure (GstSubframeStats *self, GstBuffer *frame)
 {
@@ -297,8 +297,7 @@ describe (GstSubframeStats *self, GstBuffer *frame)
   return GST_FLOW_OK;
 }
 
-/* The pixels pass untouched, and yet the buffer must be writable, for its
- * meta. */
+/* Pixels pass unchanged, but the buffer must be writable for its meta. */
 GstFlowReturn
 generate_output (GstBaseTransform *base, GstBuffer **outbuf) noexcept
 {

@@ -47,7 +47,7 @@ struct _GstCodedExposureView {
 G_DEFINE_TYPE_WITH_CODE (GstCodedExposureView, gst_coded_exposure_view,
     GST_TYPE_VIDEO_FILTER,
     GST_DEBUG_CATEGORY_INIT (codedexposure_view_debug, "codedexposure-view", 0,
-        "pictures of any depth to look at"))
+        "8-bit pictures for display"))
 GST_ELEMENT_REGISTER_DEFINE (codedexposure_view, "codedexposure-view",
     GST_RANK_NONE, gst_coded_exposure_view_get_type ())
 
@@ -97,9 +97,8 @@ transform_caps (GstBaseTransform *, GstPadDirection direction, GstCaps *caps,
   CapsPtr other (gst_caps_copy (caps));
   gst_caps_set_value (other.get (), "format", &formats);
   g_value_unset (&formats);
-  return filter ? gst_caps_intersect_full (
-                      filter, other.get (), GST_CAPS_INTERSECT_FIRST)
-                : other.release ();
+  return (filter ? intersect_caps (filter, other.get ()) : std::move (other))
+      .release ();
 }
 
 void

@@ -83,10 +83,10 @@ T
 difference_any (const Block<T> &block, const Layout<T> &layout, Step<T> step,
     const Planes<T> &to)
 {
-  const StripReader<T> strips (block);
+  const auto split = split_strip_of<T> (block.width);
   Wires<T> places (layout.n), elements (layout.n);
   T *order[256];
-  T most = 0;
+  Vector<T> most = {};
   for (int j = 0; j < block.rows; j++) {
     const std::uint8_t *element =
         layout.element + (j + layout.row) % layout.rows * layout.n;
@@ -97,9 +97,9 @@ difference_any (const Block<T> &block, const Layout<T> &layout, Step<T> step,
     for_strips<T> (block.cells, to.rows[0] + row, to.stream,
         [&] (int at, auto put) CODEDEXPOSURE_INLINE_BODY {
           if (layout.repeat == 1) {
-            most = larger (most, strips.read (j, at, order));
+            most = larger (most, split (block, j, at, order));
           } else {
-            most = larger (most, strips.read (j, at, places.rows));
+            most = larger (most, split (block, j, at, places.rows));
             relabel_strip (
                 layout, j, at, places.rows, elements.rows, 0, Put ());
           }
@@ -111,7 +111,7 @@ difference_any (const Block<T> &block, const Layout<T> &layout, Step<T> step,
           }
         });
   }
-  return most;
+  return largest_lane<T> (most);
 }
 
 /** The last elements of one row of all cells: the next row begins with the

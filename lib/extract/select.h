@@ -61,46 +61,41 @@ select_rows_of (int width, std::integer_sequence<int, Width...>)
   return kAll[width < int (sizeof...(Width)) ? width : 0];
 }
 
-template <typename T>
-SelectRows<T>
-select_rows_of (int width)
+/** One vector of cells, all places of them: places[p] takes the pixels of place
+ * p of the cells from @p at on of row @p j. Returns the largest pixels. */
+template <int Width, typename T>
+Vector<T>
+split_strip (const Block<T> &block, int j, int at, T *const *places)
 {
-  return select_rows_of<1, T> (
-      width, std::make_integer_sequence<int, kOwnWidths + 1> ());
+  const int width = Width > 0 ? Width : block.width;
+  const T *row =
+      bytes_on (block.pixels, std::ptrdiff_t (j) * block.height * block.stride);
+  Vector<T> most = {};
+  for (int y = 0; y < block.height; y++)
+    most = larger (most,
+        split_row<Width, T> (bytes_on (row, y * block.stride) + at * width,
+            width, places + y * width, 0, Put (), block.height * block.stride));
+  return most;
 }
 
-/** Brings single vectors of cells into vectors of a buffer, pixel by pixel. */
 template <typename T>
-class StripReader
+using SplitStrip = Vector<T> (*) (const Block<T> &, int, int, T *const *);
+
+template <typename T, int... Width>
+SplitStrip<T>
+split_strip_of (int width, std::integer_sequence<int, Width...>)
 {
-public:
-  /** @p block  lasts as long as this. */
-  explicit StripReader (const Block<T> &block)
-      : block_ (block), run_ (select_rows_of<T> (block.width))
-  {
-    for (int p = 0; p < block.width * block.height; p++)
-      number_[p] = std::uint8_t (p);
-  }
-
-  /** places[p] takes pixel p of the cells from @p at on of row @p j. Returns
-   * the largest pixel. */
-  T read (int j, int at, T *const *places) const
-  {
-    const Block<T> strip = {
-        bytes_on (
-            block_.pixels, std::ptrdiff_t (j) * block_.height * block_.stride) +
-            at * block_.width,
-        block_.stride, block_.width, block_.height, kLanes<T>, 1};
-    const Layout<T> layout = {nullptr, block_.width * block_.height, 1, 1, 0, 0,
-        nullptr, true, number_};
-    return run_ (strip, layout, {places, 0});
-  }
-
-private:
-  const Block<T> &block_;
-  SelectRows<T> run_;
-  std::uint8_t number_[256];
-};
+  static constexpr SplitStrip<T> kAll[] = {
+      split_strip < has_own_code (Width) ? Width : 0, T > ...};
+  return kAll[width <= kOwnWidths ? width : 0];
+}
+template <typename T>
+SplitStrip<T>
+split_strip_of (int width)
+{
+  return split_strip_of<T> (
+      width, std::make_integer_sequence<int, kOwnWidths + 1> ());
+}
 
 /** Brings one vector of all places into the order of the elements where that
  * differs from cell to cell: rows[e] takes element e. */
@@ -130,17 +125,17 @@ T
 select_relabelled (
     const Block<T> &block, const Layout<T> &layout, const Planes<T> &to)
 {
-  const StripReader<T> strips (block);
+  const auto split = split_strip_of<T> (block.width);
   Wires<T> wires (layout.n);
-  T most = 0;
+  Vector<T> most = {};
   for (int j = 0; j < block.rows; j++)
     for_strips<T> (block.cells, bytes_on (to.rows[0], j * to.stride), to.stream,
         [&] (int at, auto put) CODEDEXPOSURE_INLINE_BODY {
-          most = larger (most, strips.read (j, at, wires.rows));
+          most = larger (most, split (block, j, at, wires.rows));
           relabel_strip (layout, j, at, wires.rows, to.rows,
               at + j * to.stride / std::ptrdiff_t (sizeof (T)), put);
         });
-  return most;
+  return largest_lane<T> (most);
 }
 
 template <typename T>
@@ -157,7 +152,8 @@ select (const Block<T> &block, const Layout<T> &layout, const Planes<T> &to)
     if (layout.identity && to.stream && layout.n <= 16 && block.width <= 5)
       return select_rows_of<0, T> (block.width,
           std::make_integer_sequence<int, 6> ()) (block, layout, to);
-  return select_rows_of<T> (block.width) (block, layout, to);
+  return select_rows_of<1, T> (block.width,
+      std::make_integer_sequence<int, kOwnWidths + 1> ()) (block, layout, to);
 }
 
 } // namespace codedexposure::CODEDEXPOSURE_TARGET

@@ -212,18 +212,18 @@ template <typename T>
 T
 rank_any (const Block<T> &block, const Planes<T> &to)
 {
-  const StripReader<T> strips (block);
+  const auto split = split_strip_of<T> (block.width);
   MergeSort<T> sort (block.width * block.height);
-  T most = 0;
+  Vector<T> most = {};
   for (int j = 0; j < block.rows; j++) {
     const std::ptrdiff_t row = j * to.stride / std::ptrdiff_t (sizeof (T));
     for_strips<T> (block.cells, to.rows[0] + row, to.stream,
         [&] (int at, auto put) CODEDEXPOSURE_INLINE_BODY {
-          most = larger (most, strips.read (j, at, sort.wires ()));
+          most = larger (most, split (block, j, at, sort.wires ()));
           sort.run ({to.rows, row + at, put.streams ()});
         });
   }
-  return most;
+  return largest_lane<T> (most);
 }
 
 /** Kernels::rank of cells that are small enough to be held in registers. */

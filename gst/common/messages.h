@@ -41,13 +41,10 @@ struct MirrorsSeen {
   CODED_FIELDS (exact, weighted, mixed, unseen);
 };
 
-/** dmdsync: numbers of frames are those of the camera, lost ones among them. */
-struct CameraFramesLost {
+/** The same for frames of the camera, said by dmdsync. Its numbers of frames
+ * count the lost ones, too. */
+struct CameraFramesLost : FramesLost {
   static constexpr const char *kName = "dmdsync/frames-lost";
-  guint64 count = 0;
-  GstClockTime from = 0; ///< when the first of them was due
-  GstClockTime to = 0;   ///< of the frame that came instead
-  CODED_FIELDS (count, from, to);
 };
 struct FrameDropped {
   static constexpr const char *kName = "dmdsync/frame-dropped";

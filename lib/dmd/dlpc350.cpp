@@ -132,12 +132,12 @@ Dlpc350::upload (const Schedule &schedule, std::stop_token stop_token,
 Result<void>
 Dlpc350::prepare ()
 {
+  RETURN_IF_ERROR (write_byte (kPower, kPowerNormal));
+  RETURN_IF_ERROR (await (kPower, 0xFF, kPowerNormal, kPower.name));
   RETURN_IF_ERROR (halt ());
   RETURN_IF_ERROR (enter (kModePattern));
-  // After a reset, pulses are high and come without delay.
-  if (options_.pulse_low)
-    RETURN_IF_ERROR (
-        write (kTriggerOut2, encode_low_pulse (options_.polarity_bit)));
+  RETURN_IF_ERROR (write (
+      kTriggerOut2, encode_pulse (options_.pulse_low, options_.polarity_bit)));
   return write_byte (kSource, std::uint8_t (options_.source));
 }
 

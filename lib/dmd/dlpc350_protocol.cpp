@@ -38,10 +38,10 @@ encode_times (const PatternTime &time)
 }
 
 Bytes
-encode_low_pulse (int polarity_bit)
+encode_pulse (bool low, int polarity_bit)
 {
   constexpr std::uint8_t kNoDelay = 0xBB;
-  return {std::uint8_t (1 << polarity_bit), kNoDelay};
+  return {std::uint8_t (unsigned (low) << polarity_bit), kNoDelay};
 }
 
 Verdict

@@ -14,6 +14,7 @@ namespace codedexposure::dlpc350
 
 using namespace dlp;
 
+constexpr HidCommand kPower{0x0200, "leave standby", std::chrono::seconds (10)};
 constexpr HidCommand kSource{0x1A22, "choose the source of patterns"};
 constexpr HidCommand kTriggerMode{0x1A23, "choose the trigger mode"};
 constexpr HidCommand kTimes{0x1A29, "set exposure and period"};
@@ -24,6 +25,7 @@ constexpr HidCommand kMailboxData{0x1A34, "fill the mailbox"};
 constexpr HidCommand kValidate{0x1A1A, "validate the pattern table"};
 constexpr HidCommand kFlashImages{0x1A42, "count the images in flash"};
 
+constexpr std::uint8_t kPowerNormal = 0;
 constexpr std::uint8_t kModePattern = 1;
 constexpr std::uint8_t kMailboxClosed = 0;
 constexpr std::uint8_t kMailboxImages = 1;
@@ -63,9 +65,9 @@ Bytes encode_configuration (int entries, int per_trigger, int images);
 /** Exposure and frame period, us. */
 Bytes encode_times (const PatternTime &time);
 
-/** Trigger output 2, without delay, as pulses to low level. @p polarity_bit
- * 0 or 1: documents disagree on which it is. */
-Bytes encode_low_pulse (int polarity_bit);
+/** Trigger output 2, without delay, as pulses to high or @p low level.
+ * @p polarity_bit  of low ones, 0 or 1: documents disagree on which it is. */
+Bytes encode_pulse (bool low, int polarity_bit);
 
 /** The result of the validation. */
 struct Verdict {

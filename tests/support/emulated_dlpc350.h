@@ -24,11 +24,14 @@ public:
   int flash_images = 2;
   bool video_locked = true;
   bool ignores_first_start = false;
+  bool standby = false;
 
   bool running () const override { return running_; }
   const std::vector<Line> &lines () const { return lines_; }
   const Data &images () const { return images_; }
   int source () const { return source_; }
+  /** Polarity and delay of trigger output 2. */
+  const Data &pulse () const { return pulse_; }
   int trigger_mode () const { return trigger_mode_; }
   std::uint32_t exposure () const { return exposure_; }
   std::uint32_t period () const { return period_; }
@@ -47,6 +50,11 @@ private:
   std::optional<Data> answer (int command)
   {
     switch (command) {
+    case 0x0200:
+      // Leaving standby takes time.
+      if (waking_ > 0 && --waking_ == 0)
+        standby = false;
+      return Data{std::uint8_t (standby ? 1 : 0)};
     case 0x0205:
       return Data (16, 4);
     case 0x1A0A:
@@ -69,11 +77,17 @@ private:
 
   bool execute (int command, const Data &data)
   {
-    static const std::map<int, std::size_t> lengths{{0x1A1A, 1}, {0x1A1B, 1},
-        {0x1A1E, 2}, {0x1A22, 1}, {0x1A23, 1}, {0x1A24, 1}, {0x1A29, 8},
-        {0x1A31, 4}, {0x1A32, 1}, {0x1A33, 1}};
+    static const std::map<int, std::size_t> lengths{{0x0200, 1}, {0x1A1A, 1},
+        {0x1A1B, 1}, {0x1A1E, 2}, {0x1A22, 1}, {0x1A23, 1}, {0x1A24, 1},
+        {0x1A29, 8}, {0x1A31, 4}, {0x1A32, 1}, {0x1A33, 1}};
     const auto length = lengths.find (command);
     if (length != lengths.end () && data.size () != length->second)
+      return false;
+    if (command == 0x0200) {
+      waking_ = standby && data[0] == 0 ? 3 : 0;
+      return true;
+    }
+    if (standby)
       return false;
     if (command == 0x1A24)
       return run (data[0]);
@@ -90,6 +104,7 @@ private:
       mode_ = data[0];
       return true;
     case 0x1A1E:
+      pulse_ = data;
       return true;
     case 0x1A22:
       source_ = data[0];
@@ -179,10 +194,12 @@ private:
 
   int mode_ = 0, source_ = 3, trigger_mode_ = 1, mailbox_ = 0;
   int entries_ = 0, per_trigger_ = 0, image_entries_ = 0, busy_ = 0;
+  int waking_ = 0;
   std::uint32_t exposure_ = 0, period_ = 0;
   bool valid_ = false, running_ = false;
   std::vector<Line> lines_;
   Data images_;
+  Data pulse_{0, 0xBB}; // after a reset
 };
 
 } // namespace codedexposure::test

@@ -131,7 +131,9 @@ TEST (Dlpc350Bytes, AreThoseOfTheDocument)
   EXPECT_EQ (write (11, kMailbox, {kMailboxPatterns}), "40 0B 03 00 33 1A 02");
   EXPECT_EQ (write (0x11, kValidate, {0}), "40 11 03 00 1A 1A 00");
   EXPECT_EQ (read (0x12, kValidate), "C0 12 02 00 1A 1A");
-  EXPECT_EQ (write (0x14, {0x0200, ""}, {0}), "40 14 03 00 00 02 00");
+  EXPECT_EQ (write (0x14, kPower, {kPowerNormal}), "40 14 03 00 00 02 00");
+  EXPECT_EQ (write (0x16, kTriggerOut2, encode_pulse (false, 0)),
+      "40 16 04 00 1E 1A 00 BB");
   EXPECT_EQ (write (0x16, {0x1A1D, ""}, {0, 0xBB, 0xBB}),
       "40 16 05 00 1D 1A 00 BB BB");
   EXPECT_EQ (
@@ -147,10 +149,9 @@ TEST (Dlpc350Bytes, OfCommandsThatTheDriverDoesNotUse)
   EXPECT_EQ (write (5, kTriggerMode, {std::uint8_t (TriggerMode::video)}),
       "40 05 03 00 23 1A 00");
   EXPECT_EQ (write (14, kMailbox, {kMailboxClosed}), "40 0E 03 00 33 1A 00");
-  EXPECT_EQ (write (0x14, {0x0200, ""}, {1}), "40 14 03 00 00 02 01");
+  EXPECT_EQ (write (0x14, kPower, {1}), "40 14 03 00 00 02 01");
   EXPECT_EQ (
       request (HidKind::post, 0x15, {0x0802, ""}, {}), "00 15 02 00 02 08");
-  EXPECT_EQ (write (0x16, kTriggerOut2, {0, 0xBB}), "40 16 04 00 1E 1A 00 BB");
 }
 
 TEST (Dlpc350Bytes, PatternEntries)

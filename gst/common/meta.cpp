@@ -30,6 +30,26 @@ pattern_quark ()
   return pattern;
 }
 
+/* Overwriting a value is much faster than creating it again. */
+template <typename T>
+void
+put_field (GstStructure *structure, GQuark name, const T &member)
+{
+  if (const GValue *there = gst_structure_id_get_value (structure, name))
+    Wire<T>::set (const_cast<GValue *> (there), member);
+  else
+    set_field (structure, name, member);
+}
+template <typename T>
+void
+put_field (GstStructure *structure, GQuark name, const std::optional<T> &member)
+{
+  if (member)
+    put_field (structure, name, *member);
+  else if (gst_structure_id_has_field (structure, name))
+    gst_structure_remove_field (structure, g_quark_to_string (name));
+}
+
 struct MetaCopy {
   GstBuffer *to;
   GstVideoInfo from_info, to_info;
@@ -84,12 +104,8 @@ set_frame_meta (GstBuffer *buffer, const FrameMeta &meta)
   GstStructure *structure = gst_custom_meta_get_structure (custom);
   if (gst_structure_id_has_field (structure, pattern_quark ()))
     gst_structure_remove_field (structure, "pattern");
-  /* Overwriting a value is much faster than creating it again. */
-  each_field (meta, [structure]<typename T> (GQuark name, const T &member) {
-    if (const GValue *there = gst_structure_id_get_value (structure, name))
-      Wire<T>::set (const_cast<GValue *> (there), member);
-    else
-      set_field (structure, name, member);
+  each_field (meta, [structure] (GQuark name, const auto &member) {
+    put_field (structure, name, member);
   });
   if (!meta.pattern.empty ())
     set_field (structure, pattern_quark (), meta.pattern);

@@ -30,9 +30,10 @@ struct FrameMeta {
   /** The error of exposure_start that 95 % of frames stay below; none: unknown.
    */
   GstClockTime time_uncertainty = GST_CLOCK_TIME_NONE;
-  /** The masks are known to be synchronised with the exposure. */
-  bool locked = false;
-  /** Slots by which the masks were found late (> 0) or early; 0 when locked. */
+  /** Whether the masks are synchronised with the exposure; none: unknown. */
+  std::optional<bool> locked = {};
+  /** Slots by which the masks were found late (> 0) or early; 0 unless locked
+   * is false. */
   gint slip = 0;
   /** Coded frames lost between this one and the one before. */
   guint64 lost_before = 0;
@@ -45,7 +46,7 @@ struct FrameMeta {
    * than the format's; 0: all, or unknown. */
   gint bits = 0;
 
-  /** The fields that are always present: all but the pattern. */
+  /** All but the pattern; always present, except locked. */
   CODED_FIELDS (frame, subframe, exposure_start, exposure_duration, locked,
       slip, lost_before, saturated, bits, time_uncertainty);
 };

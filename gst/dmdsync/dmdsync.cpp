@@ -163,7 +163,7 @@ forget_stream (GstDmdSync *self)
   const ObjectLock lock (self);
   st.time.reset ();
   st.switches = 0;
-  st.locked = false;
+  st.locked.reset ();
   st.jitter = 0;
   st.latency = 0;
 }

@@ -44,7 +44,7 @@ namespace codedexposure::gst::sync
 enum class TimestampAt { exposure_start, exposure_end, arrival, device_clock };
 /** What takes the place of lost frames. */
 enum class OnLoss { gap, repeat, error };
-/** What becomes of frames that are not locked. */
+/** What becomes of frames whose masks are not synchronised. */
 enum class OnUnlock { keep, skip, error };
 
 struct Settings {
@@ -117,7 +117,7 @@ struct SyncState {
   /* Object lock. */
   Settings settings;
   Counters counters;
-  bool locked = false;
+  std::optional<bool> locked; ///< of the last frame; none: unknown
   SlipObservable observable = SlipObservable::never; ///< of the schedule
   std::optional<Timebase> time;                      ///< that of the stream
   GstClockTime jitter = 0;  ///< most by which frames came after their time

@@ -227,7 +227,7 @@ say_phase (GstDmdSync *self, const Frame &frame)
     g_object_notify (G_OBJECT (self), "locked");
 }
 
-/** What becomes of a frame whose phase is not known to be right. */
+/** What becomes of a frame whose masks are not synchronised. */
 GstFlowReturn
 take_unlocked (GstDmdSync *self, const Frame &frame)
 {
@@ -253,8 +253,10 @@ void
 watch_phase (GstDmdSync *self, Frame &frame)
 {
   SyncState &st = state (self);
-  if (!frame.sight.coded)
+  if (!frame.sight.coded) {
+    frame.phase.locked = false;
     return say_phase (self, frame);
+  }
   frame.phase = st.stream.lock->take (look_at (self, frame.buffer.get ()),
       frame.step.number, frame.step.lost, st.runner && st.runner->settled ());
   if (frame.phase.restart)
@@ -363,7 +365,7 @@ take_frame (GstDmdSync *self, BufferPtr buffer)
     count (self, &Counters::frames_early);
     return drop (self, frame, "before-start");
   }
-  if (!frame.phase.locked && frame.sight.coded)
+  if (frame.phase.locked == false && frame.sight.coded)
     if (flow = take_unlocked (self, frame); flow != GST_FLOW_OK)
       return flow;
 

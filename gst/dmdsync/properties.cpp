@@ -66,8 +66,10 @@ stats (const SyncState &st)
   for (const auto &[name, number] : numbers)
     gst_structure_set (stats.get (), name, G_TYPE_UINT64, number, nullptr);
   gst_structure_set (stats.get (), "clock-drift", G_TYPE_DOUBLE,
-      counters.clock_drift, "locked", G_TYPE_BOOLEAN, gboolean (st.locked),
-      nullptr);
+      counters.clock_drift, nullptr);
+  if (st.locked)
+    gst_structure_set (
+        stats.get (), "locked", G_TYPE_BOOLEAN, gboolean (*st.locked), nullptr);
   return stats;
 }
 
@@ -101,8 +103,8 @@ properties ()
       {"on-loss", "On loss", "What replaces lost frames", kReadWrite,
           set (&Settings::on_loss), gst_dmd_sync_on_loss_get_type ()},
       {"on-unlock", "On unlock",
-          "What happens to a frame whose masks are not known to be "
-          "synchronised with the exposure",
+          "What happens to a frame whose masks are not synchronised with the "
+          "exposure; where this is unknown, the frame passes",
           kReadWrite, set (&Settings::on_unlock),
           gst_dmd_sync_on_unlock_get_type ()},
       {"pixel-format", "Pixel format",
@@ -112,10 +114,11 @@ properties ()
           "bits; empty: as the caps say",
           kReadWriteReady, set (&Settings::pixel_format)},
       {"locked", "Locked",
-          "The masks are synchronised with the exposure, as far as "
-          "slip-observable says: the DMD was started, and no slip was seen "
-          "since",
-          kReadOnly, &SyncState::locked},
+          "The masks are known to be synchronised with the exposure, as far as "
+          "slip-observable says: the DMD was started, or a pilot shows it, and "
+          "no slip was seen since",
+          kReadOnly,
+          [] (const SyncState &st) { return st.locked.value_or (false); }},
       {"slip-observable", "Slip observable",
           "In which frames a slip of the DMD by whole slots can be seen with "
           "the schedule",

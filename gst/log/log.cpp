@@ -75,7 +75,8 @@ saturated_pixels (
   });
 }
 
-/** One line of JSON, keys in this order; unknown values are left out. */
+/** One line of JSON, keys in this order; unknown values are left out, except
+ * `locked`, which is null then. */
 std::string
 frame_line (const LogState &state, GstBuffer *frame, const GstSegment &segment)
 {
@@ -97,7 +98,8 @@ frame_line (const LogState &state, GstBuffer *frame, const GstSegment &segment)
       line["exposure_duration_ns"] = meta->exposure_duration;
     if (GST_CLOCK_TIME_IS_VALID (meta->time_uncertainty))
       line["time_uncertainty_ns"] = meta->time_uncertainty;
-    line["locked"] = bool (meta->locked);
+    line["locked"] =
+        meta->locked ? nlohmann::json (*meta->locked) : nlohmann::json ();
     line["slip"] = meta->slip;
     line["lost_before"] = meta->lost_before;
     if (const auto saturated = saturated_pixels (state, frame, *meta))

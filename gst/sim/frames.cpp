@@ -260,7 +260,8 @@ describe (const Stream &stream, const Exposure &exposure)
   FrameMeta meta;
   meta.frame = guint64 (exposure.frame);
   meta.lost_before = guint64 (exposure.lost_before);
-  meta.locked = !stream.mirrors;
+  if (!stream.mirrors)
+    meta.locked = true;
   meta.bits = bits;
   set_frame_meta (exposure.outbuf.get (), meta);
 }

@@ -40,8 +40,14 @@ PhaseLock::take (const PhaseSight &sight, std::uint64_t number,
       state_ == State::suspected)
     watch (sight, number, decision);
 
-  decision.locked = state_ == State::locked;
-  decision.slip = decision.locked ? 0 : slip_;
+  const bool known =
+      options_.can_restart || options_.observable == SlipObservable::always;
+  if (state_ != State::locked)
+    decision.locked = false;
+  else if (known)
+    decision.locked = true;
+  decision.locked_now &= known;
+  decision.slip = state_ == State::locked ? 0 : slip_;
   return decision;
 }
 

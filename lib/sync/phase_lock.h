@@ -12,8 +12,10 @@ namespace codedexposure
 
 /** The decision on one frame. */
 struct LockDecision {
-  bool locked = false;
-  /** Slots by which the masks come late (> 0) or early; 0 when locked. */
+  /** Whether the masks are synchronised with the exposure; none: unknown. */
+  std::optional<bool> locked;
+  /** Slots by which the masks come late (> 0) or early; 0 unless locked is
+   * false. */
   int slip = 0;
 
   /** Set on the frame on which a slip is established. */
@@ -36,7 +38,8 @@ struct LockDecision {
  *                            ^ \--suspicion--> suspected            |
  *                            +--------------------------------------+
  *
- * A DMD that was started is in phase until a frame shows otherwise. After a
+ * A DMD that was started is in phase until a frame shows otherwise. Without a
+ * DMD, only a pilot shows the phase; otherwise it is unknown. After a
  * slip it is restarted if possible, and no frame is locked until the restart is
  * visible: in the pilot, or as an exposure with parked mirrors (a gap, if the
  * DMD triggers the camera) followed by a frame in phase. Frames exposed before

@@ -423,7 +423,7 @@ TEST_F (DemuxOffers, VideoMetaThatThePeerOfCodedReads)
 TEST_F (DemuxBuffers, EverySubframeIsDescribedOnce)
 {
   BufferPtr frame = frame_of (picture (), 0);
-  set_frame_meta (frame.get (), {.frame = 7, .locked = TRUE});
+  set_frame_meta (frame.get (), {.frame = 7, .locked = true});
   ASSERT_EQ (demux.push (std::move (frame)), GST_FLOW_OK);
   for (int k = 0; k < 4; k++) {
     const BufferPtr buffer = demux.pull ();
@@ -435,7 +435,7 @@ TEST_F (DemuxBuffers, EverySubframeIsDescribedOnce)
     ASSERT_TRUE (meta);
     EXPECT_EQ (meta->frame, 7u);
     EXPECT_EQ (meta->subframe, k);
-    EXPECT_TRUE (meta->locked);
+    EXPECT_EQ (meta->locked, true);
   }
 }
 

@@ -383,7 +383,7 @@ TEST_F (DemuxTime, MetaOfTheFrameIsKept)
   BufferPtr frame = coded_frame (0);
   FrameMeta given;
   given.frame = 1234;
-  given.locked = TRUE;
+  given.locked = true;
   given.slip = -2;
   given.lost_before = 5;
   set_frame_meta (frame.get (), given);
@@ -395,7 +395,7 @@ TEST_F (DemuxTime, MetaOfTheFrameIsKept)
     ASSERT_TRUE (meta);
     EXPECT_EQ (meta->frame, 1234u);
     EXPECT_EQ (meta->subframe, int (k));
-    EXPECT_TRUE (meta->locked);
+    EXPECT_EQ (meta->locked, true);
     EXPECT_EQ (meta->slip, -2);
     EXPECT_EQ (meta->lost_before, 5u);
     EXPECT_EQ (meta->exposure_start, k * 10 * kMs);

@@ -49,7 +49,7 @@ bool
 is_locked (const BufferPtr &frame)
 {
   const auto meta = get_frame_meta (frame.get ());
-  const bool locked = meta && meta->locked;
+  const bool locked = meta && meta->locked != false;
   EXPECT_EQ (GST_BUFFER_FLAG_IS_SET (frame.get (), GST_BUFFER_FLAG_CORRUPTED),
       !locked);
   return locked;

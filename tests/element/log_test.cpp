@@ -113,7 +113,7 @@ TEST_F (LogTest, WritesWhatTheMetaSays)
   meta.frame = 7;
   meta.exposure_start = 80 * GST_MSECOND;
   meta.exposure_duration = 39'200'000;
-  meta.locked = TRUE;
+  meta.locked = true;
   meta.slip = -1;
   meta.lost_before = 2;
   meta.bits = 8;
@@ -131,6 +131,23 @@ TEST_F (LogTest, WritesWhatTheMetaSays)
       "lost_before": 2, "saturated": 5, "bits": 8,
       "pattern": "grating-both:4/0",
       "flags": ["discont", "corrupted"]})"));
+}
+
+TEST_F (LogTest, LockedIsTrueFalseOrNull)
+{
+  play (path_.get ());
+  for (const std::optional<bool> locked :
+      {std::optional (true), std::optional (false), std::optional<bool> ()}) {
+    BufferPtr buffer = frame (0);
+    set_frame_meta (buffer.get (), {.locked = true});
+    set_frame_meta (buffer.get (), {.locked = locked});
+    EXPECT_EQ (get_frame_meta (buffer.get ())->locked, locked);
+    ASSERT_EQ (push (std::move (buffer)), GST_FLOW_OK);
+  }
+  ASSERT_EQ (lines ().size (), 3u);
+  EXPECT_EQ (lines ()[0].at ("locked"), Json (true));
+  EXPECT_EQ (lines ()[1].at ("locked"), Json (false));
+  EXPECT_EQ (lines ()[2].at ("locked"), Json (nullptr));
 }
 
 TEST_F (LogTest, CountsFramesWithoutMetaAndLeavesOutWhatIsUnknown)

@@ -236,7 +236,7 @@ TEST (Chain, ASlipIsFoundWithinThreeFramesAndMended)
           "timestamp-at=device-clock schedule=" + kWithPilot + " ! ",
       [&] (GstBuffer *buffer, const GstVideoInfo &) {
         const auto meta = *get_frame_meta (buffer);
-        locked[meta.frame] = meta.locked;
+        locked[meta.frame] = meta.locked == true;
       });
   pipeline.play ();
   EXPECT_EQ (pipeline.wait_end (), "end");
@@ -345,11 +345,11 @@ TEST (Chain, ACameraThatComesBackFindsTheMasksInPhase)
       [] (const FrameMeta &meta) { return meta.lost_before > 25; });
   ASSERT_NE (back, came.end ());
   EXPECT_GT (came.end () - back, 20);
-  const auto locked = std::find_if (
-      back, came.end (), [] (const FrameMeta &meta) { return meta.locked; });
+  const auto locked = std::find_if (back, came.end (),
+      [] (const FrameMeta &meta) { return meta.locked == true; });
   EXPECT_LT (locked - back, 10);
-  EXPECT_TRUE (std::all_of (
-      locked, came.end (), [] (const FrameMeta &meta) { return meta.locked; }));
+  EXPECT_TRUE (std::all_of (locked, came.end (),
+      [] (const FrameMeta &meta) { return meta.locked == true; }));
   std::printf ("away for %d frames, locked again in frame %d after them\n",
       int (back->lost_before), int (locked - back));
 }

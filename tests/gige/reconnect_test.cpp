@@ -130,11 +130,11 @@ TEST_F (Reconnect, AKilledCameraThatComesBackIsLockedWithinTenFrames)
   const Came &last = *(found - 1);
   EXPECT_EQ (first, last.number + missing + 1);
   EXPECT_EQ ((found->pts - last.pts + kPeriod / 2) / kPeriod, missing + 1);
-  const auto locked = std::find_if (
-      found, came.end (), [] (const Came &frame) { return frame.meta.locked; });
+  const auto locked = std::find_if (found, came.end (),
+      [] (const Came &frame) { return frame.meta.locked == true; });
   EXPECT_LT (locked - found, 10);
   EXPECT_TRUE (std::all_of (locked, came.end (),
-      [] (const Came &frame) { return frame.meta.locked; }));
+      [] (const Came &frame) { return frame.meta.locked == true; }));
   std::printf ("%d frames lost, locked again in frame %d after them\n",
       int (missing), int (locked - found));
 }
@@ -189,7 +189,7 @@ TEST_F (Reconnect, DmdsyncMayStandInABinAndFramesOfBothStartsAreCounted)
   EXPECT_EQ (counter ("frames-in"), 60u);
   EXPECT_EQ (counter ("frames-late"), 0u);
   pipeline->stop ();
-  EXPECT_TRUE (came.back ().meta.locked);
+  EXPECT_EQ (came.back ().meta.locked, true);
   EXPECT_TRUE (std::is_sorted (came.begin (), came.end (),
       [] (const Came &one, const Came &two) { return one.pts < two.pts; }));
 }
@@ -231,7 +231,7 @@ TEST_F (Reconnect, DISABLED_ADeadCameraComesBackWithinItsTries)
   ASSERT_TRUE (wait_said ("codedexposure/camera-back"));
   ASSERT_TRUE (wait_frames (10));
   pipeline->stop ();
-  EXPECT_TRUE (came.back ().meta.locked);
+  EXPECT_EQ (came.back ().meta.locked, true);
 }
 
 TEST_F (Reconnect, DISABLED_WithoutItADeadCameraIsAnErrorAndACleanStop)

@@ -330,7 +330,7 @@ run_lock (const char *preset, const Scene &scene, int frames, std::int64_t at,
     const std::uint64_t number = exposed - in_flight;
     const LockDecision decision =
         lock.take (queue.front ().first, number, 0, true);
-    if (!decision.locked && !run.noticed)
+    if (decision.locked == false && !run.noticed)
       run.noticed = number;
     if (decision.slipped) {
       run.slips++;
@@ -341,8 +341,8 @@ run_lock (const char *preset, const Scene &scene, int frames, std::int64_t at,
       run.relocked = number;
     run.locks += decision.locked_now;
     run.wrongly_locked +=
-        run.noticed && decision.locked && !queue.front ().second;
-    EXPECT_EQ (decision.slip == 0, decision.locked);
+        run.noticed && decision.locked != false && !queue.front ().second;
+    EXPECT_EQ (decision.slip == 0, decision.locked != false);
     if (decision.restart) {
       camera.mirrors.stop ();
       camera.mirrors.start ();
@@ -419,12 +419,12 @@ TEST (PhaseLock, AGapShowsTheRestartOfADmdThatTriggersTheCamera)
       .gap_shows_restart = true});
   const PhaseSight good{{Kind::in_phase}};
   const PhaseSight bad{{Kind::slipped, 1, true}};
-  EXPECT_TRUE (lock.take (good, 0, 0, true).locked);
+  EXPECT_NE (lock.take (good, 0, 0, true).locked, false);
   EXPECT_TRUE (lock.take (bad, 1, 0, true).restart);
-  EXPECT_FALSE (lock.take (good, 2, 0, false).locked);
-  EXPECT_FALSE (lock.take (good, 3, 0, true).locked);
+  EXPECT_EQ (lock.take (good, 2, 0, false).locked, false);
+  EXPECT_EQ (lock.take (good, 3, 0, true).locked, false);
   const LockDecision relocked = lock.take (good, 7, 3, true);
-  EXPECT_TRUE (relocked.locked);
+  EXPECT_NE (relocked.locked, false);
   EXPECT_TRUE (relocked.locked_now);
 }
 
@@ -438,7 +438,7 @@ TEST (PhaseLock, AsksAgainForARestartThatIsNotSeen)
   int restarts = 0;
   for (int f = 2; f < 300; f++) {
     const LockDecision decision = lock.take (good, std::uint64_t (f), 0, true);
-    EXPECT_FALSE (decision.locked);
+    EXPECT_EQ (decision.locked, false);
     EXPECT_FALSE (decision.slipped);
     restarts += decision.restart;
   }
@@ -456,8 +456,22 @@ TEST (PhaseLock, WithoutADmdOnlyAPilotBringsTheLockBack)
     const LockDecision slipped = lock.take (bad, 1, 0, true);
     EXPECT_FALSE (slipped.restart);
     EXPECT_EQ (slipped.slip, -1);
-    EXPECT_EQ (lock.take (good, 2, 0, true).locked,
+    EXPECT_EQ (lock.take (good, 2, 0, true).locked == true,
         observable == SlipObservable::always);
+  }
+}
+
+TEST (PhaseLock, WithoutADmdAndAPilotThePhaseIsUnknownUntilASlip)
+{
+  const PhaseSight good{{Kind::in_phase}};
+  for (const SlipObservable observable :
+      {SlipObservable::never, SlipObservable::in_the_frame}) {
+    PhaseLock lock ({.observable = observable});
+    const LockDecision first = lock.take (good, 0, 0, true);
+    EXPECT_EQ (first.locked, std::nullopt);
+    EXPECT_FALSE (first.locked_now);
+    EXPECT_EQ (
+        lock.take ({{Kind::slipped, 1, true}}, 1, 0, true).locked, false);
   }
 }
 
@@ -468,11 +482,11 @@ TEST (PhaseLock, ASuspicionThatTheNextFrameDeniesIsNoSlip)
   lock.take (good, 0, 0, true);
   const LockDecision suspected =
       lock.take ({{Kind::slipped, 1, true}, true}, 1, 0, true);
-  EXPECT_FALSE (suspected.locked);
+  EXPECT_EQ (suspected.locked, false);
   EXPECT_EQ (suspected.slip, 1);
   EXPECT_FALSE (suspected.slipped);
-  EXPECT_FALSE (lock.take ({}, 2, 0, true).locked);
+  EXPECT_EQ (lock.take ({}, 2, 0, true).locked, false);
   const LockDecision denied = lock.take (good, 3, 0, true);
-  EXPECT_TRUE (denied.locked);
+  EXPECT_EQ (denied.locked, true);
   EXPECT_FALSE (denied.locked_now);
 }

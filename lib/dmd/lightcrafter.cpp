@@ -78,7 +78,7 @@ private:
   Result<void> connect ();
   Error error (const char *what, const std::string &reason,
       ErrorCode code = ErrorCode::device) const;
-  Result<Reply> receive (std::uint16_t command);
+  Result<Reply> exchange (const Bytes &packet, std::uint16_t command);
   Result<Reply> ask (PacketType type, std::uint16_t command, ByteView payload);
   Result<Bytes> payload_of (const char *what, Result<Reply> reply) const;
   Result<void> write (
@@ -96,8 +96,7 @@ private:
   int masks_ = 0;                                  // on the board, 0: none
 };
 
-/** Begins a job. If the last one was cancelled within a packet, it gets a new
- * connection. */
+/** Begins a job, with a new connection if the last one failed. */
 Result<void>
 Lightcrafter::begin (
     std::stop_token stop_token, std::chrono::milliseconds patience)
@@ -112,10 +111,9 @@ Lightcrafter::begin (
 Result<void>
 Lightcrafter::connect ()
 {
-  if (stream_ && !stream_->broken ())
+  if (stream_)
     return {};
-  stream_.reset (); // the board serves one at a time
-  auto stream = TcpStream::connect (host_, port_, patience_);
+  auto stream = TcpStream::connect (host_, port_, patience_, cancel_);
   if (!stream)
     return Error{info_.name + ": " + stream.error ().message +
                      "; is the board on, and this computer in its network?",
@@ -131,17 +129,18 @@ Lightcrafter::error (
   return Error{info_.name + ": cannot " + what + ": " + reason, code};
 }
 
-/** The reply to one packet; replies to other commands are late ones. */
+/** The reply to @p packet; replies to other commands are late ones. */
 Result<Lightcrafter::Reply>
-Lightcrafter::receive (std::uint16_t command)
+Lightcrafter::exchange (const Bytes &packet, std::uint16_t command)
 {
+  RETURN_IF_ERROR (stream_->send (packet, patience_));
   for (int replies = 0; replies <= kMaxStrayReplies; replies++) {
-    ASSIGN_OR_RETURN (Bytes packet, stream_->receive (kHeadSize, patience_));
-    ASSIGN_OR_RETURN (const PacketHead head, parse_head (packet));
+    ASSIGN_OR_RETURN (Bytes answer, stream_->receive (kHeadSize, patience_));
+    ASSIGN_OR_RETURN (const PacketHead head, parse_head (answer));
     ASSIGN_OR_RETURN (
         const Bytes rest, stream_->receive (head.payload + 1, patience_));
-    append (packet, rest);
-    if (!checksum_holds (packet))
+    append (answer, rest);
+    if (!checksum_holds (answer))
       return Error{"the checksum of a reply is wrong", ErrorCode::device};
     if (head.command != command)
       continue;
@@ -161,8 +160,9 @@ Lightcrafter::ask (PacketType type, std::uint16_t command, ByteView payload)
 {
   const Bytes packet = encode_message (type, command, payload);
   for (;;) {
-    RETURN_IF_ERROR (stream_->send (packet, patience_));
-    const auto reply = receive (command);
+    auto reply = exchange (packet, command);
+    if (!reply) // what follows on this connection may begin within a packet
+      stream_.reset ();
     if (!reply || reply->refused != kBusy || patience_ <= kBusyPause)
       return reply;
     patience_ -= kBusyPause;

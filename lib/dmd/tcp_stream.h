@@ -13,15 +13,17 @@
 namespace codedexposure
 {
 
-/** One connection, used from one thread at a time. */
+/** One connection, used from one thread at a time. After a failure, it may
+ * stand within a message: close it. */
 class TcpStream
 {
 public:
   using Milliseconds = std::chrono::milliseconds;
 
-  /** @p host  a name or an address. */
-  static Result<std::unique_ptr<TcpStream>> connect (
-      const std::string &host, int port, Milliseconds timeout);
+  /** @p host  a name or an address. @p timeout  for all of it. @p stop  as in
+   * cancel_on (). */
+  static Result<std::unique_ptr<TcpStream>> connect (const std::string &host,
+      int port, Milliseconds timeout, std::stop_token stop = {});
   ~TcpStream ();
   TcpStream (const TcpStream &) = delete;
   TcpStream &operator= (const TcpStream &) = delete;
@@ -30,10 +32,6 @@ public:
   Result<void> send (ByteView bytes, Milliseconds timeout);
   /** Exactly @p size bytes; @p timeout for all of them. */
   Result<Bytes> receive (std::size_t size, Milliseconds timeout);
-  /** Whether a failure or a cancelled wait left the stream within a message, or
-   * the other side has closed it. */
-  bool broken () const { return broken_; }
-
   /** Waits end within 50 ms of a request to @p stop. */
   void cancel_on (std::stop_token stop) { stop_ = std::move (stop); }
 
@@ -42,11 +40,9 @@ private:
   using Clock = std::chrono::steady_clock;
 
   Result<void> wait_for (short events, Clock::time_point deadline);
-  Error fail (const std::string &message, ErrorCode code = ErrorCode::io);
 
   const int socket_;
   std::stop_token stop_;
-  bool broken_ = false;
 };
 
 } // namespace codedexposure

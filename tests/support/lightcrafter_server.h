@@ -24,10 +24,11 @@ namespace codedexposure::test
 /** Faults of the server. */
 struct LightcrafterFaults {
   bool knows_0480 = true;
-  bool wants_repeat = true; ///< the 18-byte form, not that of 17
-  int busy_replies = 0;     ///< before the next mask is taken
-  int silent_after = -1;    ///< masks after which it says no more
-  int close_after = -1;     ///< masks after which it hangs up
+  bool wants_repeat = true;  ///< the 18-byte form, not that of 17
+  int busy_replies = 0;      ///< before the next mask is taken
+  int silent_after = -1;     ///< masks after which it says no more
+  int close_after = -1;      ///< masks after which it hangs up
+  int stray_byte_after = -1; ///< masks after which one byte too many comes
   bool wrong_checksum = false;
 };
 
@@ -132,6 +133,11 @@ private:
     if (command == 0x0401 && faults_.busy_replies > 0) {
       faults_.busy_replies--;
       return reply (client, 0, command, {});
+    }
+    if (command == 0x0401 && faults_.stray_byte_after == int (masks_.size ())) {
+      faults_.stray_byte_after = -1;
+      const std::uint8_t stray = 0x55;
+      send (client, &stray, 1, MSG_NOSIGNAL);
     }
     const int error = intact ? execute (command, rest) : 9;
     if (error != 0)

@@ -1,11 +1,16 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* The DLP3000 driver: its bytes, and an emulated board as a server on this
  * machine. */
-#include "dmd/drivers.h"
+#include <dlfcn.h>
+#include <netdb.h>
+
+#include <latch>
 
 #include "dmd/bitmap.h"
+#include "dmd/drivers.h"
 #include "dmd/lightcrafter_protocol.h"
 #include "dmd/plane_image.h"
+#include "dmd/tcp_stream.h"
 #include "dmd_rig.h"
 #include "hex.h"
 #include "lightcrafter_server.h"
@@ -17,6 +22,7 @@ using namespace codedexposure::test;
 namespace
 {
 
+using namespace std::chrono_literals;
 using lightcrafter::encode_message;
 using lightcrafter::PacketType;
 
@@ -25,6 +31,10 @@ packet (PacketType type, std::uint16_t command, const Bytes &payload)
 {
   return to_hex (encode_message (type, command, payload));
 }
+
+constexpr char kSilentName[] = "silent.invalid";
+/** Until then, no name server answers for that name. */
+std::latch silence_is_over{1};
 
 /** switching is the time that the board needs between two masks. */
 const char *const kPreset = "sequential:2x2,switching=250us";
@@ -38,6 +48,21 @@ open (const LightcrafterServer &server, const std::string &options = "")
 }
 
 } // namespace
+
+/** In place of the C library's. */
+extern "C" int
+getaddrinfo (const char *node, const char *service, const addrinfo *hints,
+    addrinfo **found)
+{
+  if (std::string_view (node) == kSilentName) {
+    if ((hints->ai_flags & AI_NUMERICHOST) == 0)
+      silence_is_over.wait ();
+    return EAI_NONAME;
+  }
+  static const auto real = reinterpret_cast<decltype (&getaddrinfo)> (
+      dlsym (RTLD_NEXT, "getaddrinfo"));
+  return real (node, service, hints, found);
+}
 
 TEST (LightcrafterBytes, AreThoseOfTheDocument)
 {
@@ -219,6 +244,37 @@ TEST (Lightcrafter, AWrongChecksumIsAnError)
   EXPECT_EQ (message_of (open (server)),
       "lightcrafter:127.0.0.1: cannot read its version: the checksum of a "
       "reply is wrong");
+}
+
+TEST (Lightcrafter, AfterAByteTooManyTheNextUploadSucceeds)
+{
+  LightcrafterServer server ({.stray_byte_after = 2});
+  auto dmd = open (server);
+  ASSERT_EQ (message_of (dmd), "");
+  const Schedule schedule = schedule_of (kPreset);
+  EXPECT_EQ (message_of ((*dmd)->upload (schedule, {}, ignore_progress)),
+      "lightcrafter:127.0.0.1: cannot send a mask: a packet of type 85 is not "
+      "one that the board sends");
+  ASSERT_EQ (message_of ((*dmd)->upload (schedule, {}, ignore_progress)), "");
+  ASSERT_EQ (message_of ((*dmd)->start (plan_of (schedule))), "");
+  EXPECT_TRUE (server.running ());
+  (*dmd)->stop ();
+  EXPECT_FALSE (server.running ());
+}
+
+TEST (TcpStream, ANameIsLookedForNoLongerThanItWasTold)
+{
+  for (const auto &[timeout, code] : {std::pair{20ms, ErrorCode::timeout},
+           {3'600'000ms, ErrorCode::cancelled}}) {
+    std::stop_source stop;
+    if (code == ErrorCode::cancelled)
+      stop.request_stop ();
+    const auto stream =
+        TcpStream::connect (kSilentName, 1, timeout, stop.get_token ());
+    ASSERT_FALSE (stream.ok ());
+    EXPECT_EQ (stream.error ().code, code) << message_of (stream);
+  }
+  silence_is_over.count_down ();
 }
 
 TEST (Lightcrafter, NobodyThereIsAnError)

@@ -217,12 +217,7 @@ CodedFilter::map_coded (GstBuffer *frame) const
   const GstVideoInfo &info = format ().info;
   MappedFrame coded (info, frame, GST_MAP_READ);
   if (!coded)
-    GST_ELEMENT_ERROR (element_, STREAM, FORMAT,
-        ("A coded frame of %" G_GSIZE_FORMAT " bytes cannot be read as %dx%d "
-         "pixels, which take %" G_GSIZE_FORMAT ".",
-            gst_buffer_get_size (frame), info.width, info.height,
-            GST_VIDEO_INFO_SIZE (&info)),
-        (nullptr));
+    post_error (unreadable_text (info, frame));
   return coded;
 }
 

@@ -79,17 +79,10 @@ OwnedFrames::bits () const
 bool
 OwnedFrames::is_whole (GstBuffer *frame) const
 {
-  const gsize size = gst_buffer_get_size (frame);
   if (is_packed ())
-    return size >= row_bytes (*format_, info_.width) * gsize (info_.height);
-  const GstVideoMeta *layout = gst_buffer_get_video_meta (frame);
-  if (!layout)
-    return size >= GST_VIDEO_INFO_SIZE (&info_);
-  const gsize row =
-      gsize (info_.width) * gsize (GST_VIDEO_INFO_COMP_PSTRIDE (&info_, 0));
-  return size >=
-         layout->offset[0] + row +
-             gsize (std::max (layout->stride[0], 0)) * gsize (info_.height - 1);
+    return gst_buffer_get_size (frame) >=
+           row_bytes (*format_, info_.width) * gsize (info_.height);
+  return bool (layout_of (info_, frame));
 }
 
 bool

@@ -4,12 +4,14 @@
 
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <utility>
 
 #include <gst/gst.h>
 #include <gst/video/video.h>
 
 #include "base/image.h"
+#include "base/result.h"
 
 namespace codedexposure::gst
 {
@@ -62,7 +64,20 @@ private:
   gpointer object_;
 };
 
-/** A mapped video frame; test it before frame (). */
+/** Where the pixels of a grey frame lie in its buffer. */
+struct PixelLayout {
+  gsize offset;
+  gint stride;
+};
+/** By the buffer's video meta, or by GStreamer's own layout. Error unless all
+ * pixels lie within the size of the buffer; memory beyond it, as pools have,
+ * holds what was there before. */
+Result<PixelLayout> layout_of (const GstVideoInfo &info, GstBuffer *buffer);
+/** Why @p buffer could not be mapped as a frame of @p info, for the user. */
+std::string unreadable_text (const GstVideoInfo &info, GstBuffer *buffer);
+
+/** A mapped grey frame, all of whose pixels are in its memory; test it before
+ * frame (). Its buffer must outlive it. */
 class MappedFrame
 {
 public:
@@ -79,18 +94,13 @@ public:
   MappedFrame &operator= (MappedFrame &&) = delete;
 
   /** Call it only while nothing is mapped. */
-  void map (const GstVideoInfo &info, GstBuffer *buffer, GstMapFlags flags)
-  {
-    mapped_ = gst_video_frame_map (&frame_, const_cast<GstVideoInfo *> (&info),
-        buffer,
-        GstMapFlags (int (flags) | int (GST_VIDEO_FRAME_MAP_FLAG_NO_REF)));
-  }
+  void map (const GstVideoInfo &info, GstBuffer *buffer, GstMapFlags flags);
   explicit operator bool () const { return mapped_; }
   GstVideoFrame *frame () { return &frame_; }
   void reset ()
   {
     if (std::exchange (mapped_, false))
-      gst_video_frame_unmap (&frame_);
+      gst_buffer_unmap (frame_.buffer, &frame_.map[0]);
   }
 
 private:

@@ -205,13 +205,10 @@ begin_exposure (GstCodedExposureSim *self, GstBuffer *inbuf)
 }
 
 GstFlowReturn
-map_failed (GstCodedExposureSim *self, const GstVideoInfo &info)
+map_failed (
+    GstCodedExposureSim *self, const GstVideoInfo &info, GstBuffer *buffer)
 {
-  POST_ERROR (self, STREAM, FORMAT,
-      "A buffer does not hold a frame of " +
-          std::string (GST_VIDEO_INFO_NAME (&info)) + " " +
-          std::to_string (info.width) + "x" + std::to_string (info.height) +
-          ".");
+  POST_ERROR (self, STREAM, FORMAT, unreadable_text (info, buffer));
   return GST_FLOW_ERROR;
 }
 
@@ -227,7 +224,7 @@ collect_light (GstCodedExposureSim *self, GstBuffer *inbuf)
 
   MappedFrame scene (plan.in, inbuf, GST_MAP_READ);
   if (!scene)
-    return map_failed (self, plan.in);
+    return map_failed (self, plan.in, inbuf);
   for (const LightShare &share : shares) {
     const int mask = exposure.masks[std::size_t (share.slot)];
     read_pixels (scene, [&] (auto pixels) {
@@ -244,7 +241,7 @@ read_out (GstCodedExposureSim *self, const Exposure &exposure)
   GstBuffer *outbuf = exposure.outbuf.get ();
   MappedFrame coded (stream.plan->out, outbuf, GST_MAP_WRITE);
   if (!coded)
-    return map_failed (self, stream.plan->out);
+    return map_failed (self, stream.plan->out, outbuf);
   write_pixels (coded,
       [&] (auto pixels) { stream.bench->read_out (exposure.frame, pixels); });
   return GST_FLOW_OK;

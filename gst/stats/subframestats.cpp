@@ -243,12 +243,7 @@ measure (GstSubframeStats *self, GstBuffer *frame)
   StatsState &state = *self->state;
   MappedFrame mapped (state.info, frame, GST_MAP_READ);
   if (!mapped) {
-    GST_ELEMENT_ERROR (self, STREAM, FORMAT,
-        ("A picture of %" G_GSIZE_FORMAT " bytes cannot be read as %dx%d "
-         "pixels, which take %" G_GSIZE_FORMAT ".",
-            gst_buffer_get_size (frame), state.info.width, state.info.height,
-            GST_VIDEO_INFO_SIZE (&state.info)),
-        (nullptr));
+    POST_ERROR (self, STREAM, FORMAT, unreadable_text (state.info, frame));
     return nullptr;
   }
   return read_pixels (

@@ -112,20 +112,33 @@ before_transform (GstBaseTransform *base, GstBuffer *picture)
 }
 
 GstFlowReturn
-transform_frame (
-    GstVideoFilter *filter, GstVideoFrame *picture, GstVideoFrame *shown)
+refuse (GstCodedExposureView *self, const GstVideoInfo &info, GstBuffer *buffer)
 {
-  auto *self = GST_CODED_EXPOSURE_VIEW (filter);
-  const int depth = GST_VIDEO_FRAME_COMP_DEPTH (picture, 0);
-  const int bits = significant_bits (self, picture->buffer, depth);
-  const auto to = view_of<guint8> (shown);
-  if (depth == kShown)
-    show (view_of<const guint8> (picture), bits, to);
-  else
-    show (view_of<const guint16> (picture), bits, to);
-  if (auto meta = get_frame_meta (shown->buffer)) {
+  POST_ERROR (self, STREAM, FORMAT, unreadable_text (info, buffer));
+  return GST_FLOW_ERROR;
+}
+
+/* In place of the video filter's own, which passes a buffer that it cannot map
+ * on without pixels. */
+GstFlowReturn
+transform (GstBaseTransform *base, GstBuffer *picture, GstBuffer *shown)
+{
+  auto *self = GST_CODED_EXPOSURE_VIEW (base);
+  const GstVideoInfo &in = GST_VIDEO_FILTER (base)->in_info;
+  const GstVideoInfo &out = GST_VIDEO_FILTER (base)->out_info;
+  MappedFrame from (in, picture, GST_MAP_READ);
+  if (!from)
+    return refuse (self, in, picture);
+  MappedFrame to (out, shown, GST_MAP_WRITE);
+  if (!to)
+    return refuse (self, out, shown);
+  const int bits = significant_bits (
+      self, picture, int (GST_VIDEO_INFO_COMP_DEPTH (&in, 0)));
+  read_pixels (
+      from, [&] (auto pixels) { show (pixels, bits, view_of<guint8> (to)); });
+  if (auto meta = get_frame_meta (shown)) {
     meta->bits = 0;
-    set_frame_meta (shown->buffer, *meta);
+    set_frame_meta (shown, *meta);
   }
   return GST_FLOW_OK;
 }
@@ -165,6 +178,7 @@ gst_coded_exposure_view_class_init (GstCodedExposureViewClass *klass)
   auto *transform_class = GST_BASE_TRANSFORM_CLASS (klass);
   transform_class->transform_caps = GST_DEBUG_FUNCPTR (transform_caps);
   transform_class->before_transform = GST_DEBUG_FUNCPTR (before_transform);
-  GST_VIDEO_FILTER_CLASS (klass)->transform_frame =
-      GST_DEBUG_FUNCPTR (transform_frame);
+  /* A video filter works in place where it can; depths differ here. */
+  transform_class->transform_ip = nullptr;
+  transform_class->transform = GST_DEBUG_FUNCPTR (transform);
 }

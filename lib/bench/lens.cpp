@@ -119,8 +119,12 @@ mirror_seen (const Alignment &alignment, int width, int height, Position pixel)
   const double out = 1.0 + alignment.distortion * (dx * dx + dy * dy) /
                                std::max (1.0, cx * cx + cy * cy);
   const double qx = out * dx, qy = out * dy;
-  const double z = 1.0 + alignment.tilt_x * qx / std::max (1.0, cx) +
-                   alignment.tilt_y * qy / std::max (1.0, cy);
+  /* A blur brings in light from far beyond a small frame, where a tilted plane
+   * of mirrors may end at its horizon. */
+  constexpr double kHorizon = 0.05;
+  const double z =
+      std::max (kHorizon, 1.0 + alignment.tilt_x * qx / std::max (1.0, cx) +
+                              alignment.tilt_y * qy / std::max (1.0, cy));
   const Homography m = camera_to_mirrors (alignment, width, height);
   return {cx + alignment.shift_x + (m[0] * qx + m[1] * qy) / z,
       cy + alignment.shift_y + (m[3] * qx + m[4] * qy) / z};

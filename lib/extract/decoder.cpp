@@ -12,12 +12,13 @@ namespace codedexposure
 namespace
 {
 
+constexpr double kRounding = 1e-9;
+
 /** Removes the rounding error of the inversion from a factor that is a multiple
  * of a quarter, as those of a staircase are: such sums are exact. */
 double
 snapped (double factor)
 {
-  constexpr double kRounding = 1e-9;
   const double quarters = std::round (4.0 * factor) / 4.0;
   return std::abs (factor - quarters) < kRounding ? quarters : factor;
 }
@@ -42,10 +43,10 @@ Decoder::make (const Schedule &schedule, double gain, bool interpolate)
   decoder.starts_.push_back (0);
   for (int s = 0; s < n; s++) {
     for (int e = 0; e < n; e++) {
-      const double factor =
-          snapped (decoder.gain_ * inverse[std::size_t (s * n + e)] / unit);
-      if (factor != 0.0)
-        decoder.terms_.push_back ({e, factor});
+      /* Every slot has a term, even if its factor rounds to 0. */
+      const double light = inverse[std::size_t (s * n + e)];
+      if (std::abs (light) > kRounding)
+        decoder.terms_.push_back ({e, snapped (decoder.gain_ * light / unit)});
     }
     decoder.starts_.push_back (decoder.terms_.size ());
   }

@@ -193,7 +193,9 @@ TEST (SimError, ABufferThatIsTooSmallIsSaid)
   BufferPtr buffer (gst_buffer_new_allocate (nullptr, 10, nullptr));
   GST_BUFFER_PTS (buffer.get ()) = 0;
   EXPECT_EQ (sim.push (std::move (buffer)), GST_FLOW_ERROR);
-  EXPECT_EQ (sim.error (), "A buffer does not hold a frame of GRAY8 8x6.");
+  EXPECT_EQ (sim.error (),
+      "A buffer of 10 bytes cannot hold the 8x6 GRAY8 pixels of its caps: they "
+      "take 48 bytes. Correct the caps, or the element that made the buffer.");
 }
 
 TEST (SimAllocation, UpstreamMaySendVideoMeta)

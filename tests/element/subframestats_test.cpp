@@ -258,7 +258,8 @@ TEST (SubframeStats, RefusesTooFewBytes)
   h.set_caps (gray_caps (5, 4));
   EXPECT_EQ (h.push (frame_of (ramp (4, 4, 0), 0)), GST_FLOW_ERROR);
   EXPECT_EQ (h.error (),
-      "A picture of 16 bytes cannot be read as 5x4 pixels, which take 32.");
+      "A buffer of 16 bytes cannot hold the 5x4 GRAY8 pixels of its caps: they "
+      "take 32 bytes. Correct the caps, or the element that made the buffer.");
 }
 
 /* Every pad of the demux at once, at a rate whose periods are no whole ns. */

@@ -218,6 +218,23 @@ TEST (Extract, DecodeRestoresBrightnessAndClampsNoise)
   EXPECT_EQ (weak.subframes[3].at (0, 0), 63);
 }
 
+TEST (Extract, AGainThatIsTooSmallGivesBlack)
+{
+  const auto light = [] (int, int, int) { return 1.0; };
+  for (const char *text : {"staircase:2x2", "staircase:3x2,leak=0.01"})
+    for (const double gain : {1e-10, 5e-324})
+      for (const bool interpolate : {false, true}) {
+        const Schedule schedule = preset (text);
+        const auto out =
+            extract (schedule, expose<std::uint8_t> (schedule, 60, 60, light),
+                {.method = Method::kDecode,
+                    .gain = gain,
+                    .interpolate = interpolate});
+        for (const auto &subframe : out.subframes)
+          EXPECT_EQ (subframe.at (3, 3), 0) << text << " " << gain;
+      }
+}
+
 TEST (Extract, RankIsMonotonicAndKeepsTheGroup)
 {
   std::mt19937 random (1);

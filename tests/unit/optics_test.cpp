@@ -414,6 +414,23 @@ TEST (Lens, ScaleHalfGathersFourMirrors)
     }
 }
 
+/* With such a blur, light comes from pixels that see no mirror plane. */
+TEST (Lens, NothingIsSeenBeyondTheHorizon)
+{
+  Alignment alignment;
+  alignment.tilt_x = 0.25;
+  for (const double distortion : {0.0, 0.1}) {
+    alignment.distortion = distortion;
+    Image<float> mirrors (9, 9), seen (9, 9);
+    mirrors.at (4, 4) = 1.0f;
+    Lens (alignment, 16.0, 9, 9)
+        .image (std::as_const (mirrors).view (), seen.view ());
+    for (int y = 0; y < 9; y++)
+      for (int x = 0; x < 9; x++)
+        EXPECT_NEAR (seen.at (x, y), 0.0006, 0.0002);
+  }
+}
+
 TEST (Lens, TiltAndDistortionMoveWhatIsSeen)
 {
   Alignment alignment = {1.0, -2.0, 0.0, 1.0};

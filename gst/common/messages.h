@@ -67,9 +67,17 @@ struct FrameIncomplete {
   CODED_FIELDS (frame, pts, bytes);
 };
 
-/** Masks and frames are synchronised from this frame on. */
+/** The first frame that is known to be synchronised, of all or since a slip. */
 struct Locked {
   static constexpr const char *kName = "dmdsync/locked";
+  guint64 frame = 0;
+  GstClockTime pts = 0;
+  CODED_FIELDS (frame, pts);
+};
+
+/** Frames are no longer flagged after a slip: the DMD was restarted. */
+struct SlipOver {
+  static constexpr const char *kName = "dmdsync/slip-over";
   guint64 frame = 0;
   GstClockTime pts = 0;
   CODED_FIELDS (frame, pts);

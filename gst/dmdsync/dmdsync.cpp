@@ -61,7 +61,9 @@
  * slot, `in-the-frame` in which it happens for staircase and s-matrix, `always`
  * with a pilot (`pilot=16` in the schedule). A frame out of phase is CORRUPTED,
  * its meta has `locked` false; see #dmdsync:on-unlock. dmdsync restarts the
- * DMD, and frames are locked again as soon as they show the restart.
+ * DMD; frames that show the restart are not flagged any more. `locked` is true
+ * only on frames whose pilot shows all of their masks, and absent on frames of
+ * which nothing shows whether they are synchronised.
  *
  * ## Patterns
  *
@@ -74,11 +76,11 @@
  *
  * Every frame has the custom meta `CodedExposureFrame`. Element messages are
  * `dmdsync/frames-lost`, `dmdsync/frame-late`, `dmdsync/frame-dropped`,
- * `dmdsync/slip`, `dmdsync/locked`, `dmdsync/time-uncertainty`,
- * `dmdsync/pattern-shown` and `dmdsync/pattern-over`. The schedule goes
- * downstream as stream tag; another one in the stream is replaced, with a
- * warning. QoS events go no further upstream: some camera sources stop their
- * stream for them.
+ * `dmdsync/slip`, `dmdsync/slip-over`, `dmdsync/locked`,
+ * `dmdsync/time-uncertainty`, `dmdsync/pattern-shown` and
+ * `dmdsync/pattern-over`. The schedule goes downstream as stream tag; another
+ * one in the stream is replaced, with a warning. QoS events go no further
+ * upstream: some camera sources stop their stream for them.
  *
  * ## Example pipelines
  *
@@ -130,13 +132,18 @@ void
 say_observable (GstDmdSync *self)
 {
   const SyncState &st = *self->state;
-  if (slip_observable (st.schedule) != SlipObservable::never)
+  const SlipObservable observable = slip_observable (st.schedule);
+  if (observable == SlipObservable::always)
     return;
   const std::string schedule = st.schedule.text ();
+  const std::string which = observable == SlipObservable::never
+                                ? "by whole slots"
+                                : "between two exposures";
   POST_INFO (self, RESOURCE, SETTINGS,
-      "A slip of the DMD by whole slots is not observable with " + schedule +
-          "; reserve some rows of mirrors for a pilot, as in " + schedule +
-          ",pilot=16, to see one");
+      "A slip of the DMD " + which + " is not observable with " + schedule +
+          ", so no frame is known to be synchronised; reserve some rows of "
+          "mirrors for a pilot, as in " +
+          schedule + ",pilot=16, to see every slip");
 }
 
 void

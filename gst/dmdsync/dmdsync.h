@@ -107,6 +107,8 @@ struct Stream {
   bool discont = true;         ///< the next frame does not follow the last one
   bool tag_due = true;
   bool warned_tag = false;
+  int unproven = 0; ///< frames in a row whose pilot did not show the phase
+  bool warned_pilot = false;
   std::optional<Mapping> mapping; ///< of the tags from upstream
   std::string refused; ///< the error of the caps that were refused last
 };

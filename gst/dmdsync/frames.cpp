@@ -17,6 +17,9 @@ namespace
  */
 constexpr guint64 kMostRepeats = 100;
 
+/* Frames without a readable pilot until a warning: a second at 25 a second. */
+constexpr int kUnproven = 25;
+
 /** A frame on its way: what came, and what is known of it. */
 struct Frame {
   BufferPtr buffer;
@@ -215,6 +218,8 @@ say_phase (GstDmdSync *self, const Frame &frame)
         self, Slip{guint64 (phase.slipped->first_frame), phase.slipped->slots,
                   phase.slipped->certain, frame.pts});
   }
+  if (phase.slip_over)
+    post_message (self, SlipOver{guint64 (frame.step.number), frame.pts});
   if (phase.locked_now)
     post_message (self, Locked{guint64 (frame.step.number), frame.pts});
 
@@ -225,6 +230,26 @@ say_phase (GstDmdSync *self, const Frame &frame)
   }
   if (changed)
     g_object_notify (G_OBJECT (self), "locked");
+}
+
+/** Warns, once in a stream, if the pilot shows the phase of no frame. */
+void
+watch_pilot (GstDmdSync *self, const Frame &frame)
+{
+  SyncState &st = state (self);
+  Stream &stream = st.stream;
+  if (st.schedule.pilot_rows () == 0)
+    return;
+  stream.unproven = frame.phase.locked ? 0 : stream.unproven + 1;
+  if (stream.unproven < kUnproven || std::exchange (stream.warned_pilot, true))
+    return;
+  POST_WARNING (self, STREAM, DECODE,
+      "The pilot shows the phase of the masks in none of " +
+          std::to_string (kUnproven) +
+          " frames, which are not known to be synchronised: its " +
+          std::to_string (st.schedule.pilot_rows ()) +
+          " rows at the bottom are too dark in places. Light them evenly, "
+          "expose for longer, or reserve more rows.");
 }
 
 /** What becomes of a frame whose masks are not synchronised. */
@@ -262,6 +287,7 @@ watch_phase (GstDmdSync *self, Frame &frame)
   if (frame.phase.restart)
     st.runner->start (st.stream.time->plan);
   say_phase (self, frame);
+  watch_pilot (self, frame);
 }
 
 /** A frame whose time stamps do not continue those before: by the pipeline's

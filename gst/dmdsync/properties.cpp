@@ -114,9 +114,8 @@ properties ()
           "bits; empty: as the caps say",
           kReadWriteReady, set (&Settings::pixel_format)},
       {"locked", "Locked",
-          "The masks are known to be synchronised with the exposure, as far as "
-          "slip-observable says: the DMD was started, or a pilot shows it, and "
-          "no slip was seen since",
+          "The masks are known to be synchronised with the exposure: the pilot "
+          "of the last frame shows it",
           kReadOnly,
           [] (const SyncState &st) { return st.locked.value_or (false); }},
       {"slip-observable", "Slip observable",

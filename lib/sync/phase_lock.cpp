@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "sync/phase_lock.h"
 
+#include <utility>
+
 namespace codedexposure
 {
 
@@ -32,23 +34,30 @@ PhaseLock::take (const PhaseSight &sight, std::uint64_t number,
     if (!options_.can_restart &&
         options_.observable == SlipObservable::always &&
         sight.reading.kind == Kind::in_phase)
-      state_ = State::started;
+      follow (decision);
   } else if (state_ == State::awaiting) {
     await (sight, lost, decision);
   }
-  if (state_ == State::started || state_ == State::locked ||
-      state_ == State::suspected)
+  if (state_ == State::following || state_ == State::suspected)
     watch (sight, number, decision);
 
-  const bool known =
-      options_.can_restart || options_.observable == SlipObservable::always;
-  if (state_ != State::locked)
+  if (state_ != State::following) {
     decision.locked = false;
-  else if (known)
+    decision.slip = slip_;
+  } else if (is_proof (sight)) {
     decision.locked = true;
-  decision.locked_now &= known;
-  decision.slip = state_ == State::locked ? 0 : slip_;
+    decision.locked_now = !std::exchange (known_, true);
+  }
   return decision;
+}
+
+/** Whether the frame cannot have slipped. */
+bool
+PhaseLock::is_proof (const PhaseSight &sight) const
+{
+  return options_.observable == SlipObservable::always &&
+         sight.reading.kind == Kind::in_phase && sight.reading.certain &&
+         !sight.next_frame_tells;
 }
 
 void
@@ -64,18 +73,23 @@ PhaseLock::watch (
   } else if (slipped) {
     state_ = State::suspected;
     slip_ = sight.reading.slots;
-  } else if (state_ == State::started ||
-             (state_ == State::suspected &&
-                 sight.reading.kind == Kind::in_phase)) {
-    decision.locked_now = state_ == State::started;
-    state_ = State::locked;
+  } else if (sight.reading.kind == Kind::in_phase) {
+    state_ = State::following;
   }
+}
+
+void
+PhaseLock::follow (LockDecision &decision)
+{
+  state_ = State::following;
+  decision.slip_over = true;
 }
 
 void
 PhaseLock::establish (const PhaseReading &slip, LockDecision &decision)
 {
   state_ = State::slipped;
+  known_ = false;
   slip_ = slip.slots;
   decision.slipped = {first_frame_, slip.slots, slip.certain};
   decision.restart = options_.can_restart;
@@ -94,8 +108,7 @@ PhaseLock::await (
   const bool opposed = kind == Kind::parked || kind == Kind::slipped;
   unopposed_ = restart_seen_ && !opposed ? unopposed_ + 1 : 0;
   if (restart_seen_ && (kind == Kind::in_phase || unopposed_ >= kUnopposed)) {
-    state_ = State::locked;
-    decision.locked_now = true;
+    follow (decision);
   } else if (++awaited_ >= kPatience) {
     state_ = State::slipped;
     decision.restart = true;

@@ -25,8 +25,10 @@ struct LockDecision {
     bool certain; ///< of the number of slots
   };
   std::optional<Slip> slipped;
-  /** The phase is known from this frame on, and was not before. */
+  /** The first frame that is known to be in phase, of all or since a slip. */
   bool locked_now = false;
+  /** The first frame after a slip that is not flagged: a restart was seen. */
+  bool slip_over = false;
   /** The DMD must be restarted. */
   bool restart = false;
 };
@@ -34,13 +36,14 @@ struct LockDecision {
 /**
  * The states of the lock:
  *
- *   started --any frame--> locked --slip--> slipped --restart--> awaiting
- *                            ^ \--suspicion--> suspected            |
- *                            +--------------------------------------+
+ *   following --slip--> slipped --restart--> awaiting
+ *       ^ \--suspicion--> suspected              |
+ *       +----------------------------------------+
  *
- * A DMD that was started is in phase until a frame shows otherwise. Without a
- * DMD, only a pilot shows the phase; otherwise it is unknown. After a
- * slip it is restarted if possible, and no frame is locked until the restart is
+ * A DMD that was started is taken as in phase until a frame shows otherwise,
+ * but only a frame whose pilot shows every mask is known to be: any other may
+ * follow a slip between two exposures, which no code shows. After a slip it is
+ * restarted if possible, and all frames are flagged until the restart is
  * visible: in the pilot, or as an exposure with parked mirrors (a gap, if the
  * DMD triggers the camera) followed by a frame in phase. Frames exposed before
  * the restart look like those after it, however many arrive late.
@@ -62,16 +65,19 @@ public:
       std::uint64_t lost, bool restarted);
 
 private:
-  enum class State { started, locked, suspected, slipped, awaiting };
+  enum class State { following, suspected, slipped, awaiting };
 
   void watch (
       const PhaseSight &sight, std::uint64_t number, LockDecision &decision);
   void await (
       const PhaseSight &sight, std::uint64_t lost, LockDecision &decision);
+  bool is_proof (const PhaseSight &sight) const;
+  void follow (LockDecision &decision);
   void establish (const PhaseReading &slip, LockDecision &decision);
 
   Options options_;
-  State state_ = State::started;
+  State state_ = State::following;
+  bool known_ = false; // that a frame was in phase, since the last slip
   int slip_ = 0;
   std::uint64_t first_frame_ = 0; // of the slip, or of its suspicion
   int awaited_ = 0;               // frames since the restart

@@ -93,7 +93,7 @@ read_pilot (int slots, const std::array<double, kPilotColumns> &means)
   if (lit[own] < masks.size () / 4 || (early[other] > 0 && late[other] > 0))
     return {};
   if (lit[other] == 0)
-    return {PhaseReading::Kind::in_phase};
+    return {PhaseReading::Kind::in_phase, 0, lit[own] == masks.size () / 2};
 
   /* A slip between the masks of two columns lights the nearer one only: the
    * mask at distance d from the border is followed by that at 2 d + 1. */

@@ -20,7 +20,8 @@ struct PhaseReading {
   Kind kind = Kind::unclear;
   /** Slots by which the masks come late (> 0) or early (< 0), when slipped. */
   int slots = 0;
-  /** No other slip by as few slots explains the frame as well. */
+  /** No other slip by as few slots explains the frame as well. In phase: the
+   * pilot shows every mask of the frame, so that no slip can hide. */
   bool certain = true;
 
   bool operator== (const PhaseReading &) const = default;
@@ -32,7 +33,9 @@ struct PhaseReading {
  * Lit columns are told from dark ones by comparison, so that neither the light
  * of the scene nor off-state leakage matters. A frame whose lit columns have
  * masks of one of the pilot's two frames is in phase; other columns are only
- * lit by masks in wrong slots.
+ * lit by masks in wrong slots. If a mask of that frame is missing, the scene is
+ * dark there or, after a late slip within the exposure, it was not shown: the
+ * frame is in phase, but not for certain.
  *
  * @p slots  of the schedule.
  * @p means  of the pilot's columns, in digital numbers.

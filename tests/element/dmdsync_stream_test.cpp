@@ -225,7 +225,8 @@ TEST (DmdsyncPhase, TellsWhatCanBeSeen)
         expected);
     g_value_unset (&value);
     EXPECT_EQ (bool (sync.message (GST_MESSAGE_INFO)),
-        std::string (expected) == "never");
+        std::string (expected) != "always")
+        << "what cannot be seen is said beforehand";
   }
 }
 
@@ -321,6 +322,17 @@ TEST (DmdsyncPhase, AOneHotCodeNeverSaysSlip)
                    k == 3 ? doubled : std::array<int, 4>{100, 100, 100, 100}),
         GST_FLOW_OK);
   EXPECT_FALSE (sync.element_message ("dmdsync/slip"));
+}
+
+TEST (DmdsyncPhase, APilotThatCannotBeReadIsSaidOnce)
+{
+  SyncHarness sync ("schedule=sequential:2x2,pilot=4");
+  sync.start ();
+  sync.send_frames (0, 100);
+  while (const BufferPtr frame = sync.pull ())
+    EXPECT_EQ (meta_of (frame).locked, std::nullopt);
+  EXPECT_NE (sync.warning ().find ("4 rows at the bottom"), std::string::npos);
+  EXPECT_EQ (sync.warning (), "");
 }
 
 TEST (DmdsyncPhase, WithoutADmdAndAPilotItIsUnknown)

@@ -311,7 +311,7 @@ private:
   void report_mirrors ();
 
   GstFlowReturn check_time_stamp (GstBuffer *frame) const;
-  BufferPtr restore_clipped_frame (BufferPtr frame) const;
+  BufferPtr restore_clipped_frame (BufferPtr frame);
   CodedFrame admit (BufferPtr frame);
   GstFlowReturn break_off ();
   void report_loss (GstClockTime pts, guint64 lost);

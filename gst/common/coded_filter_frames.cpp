@@ -71,21 +71,29 @@ CodedFilter::check_time_stamp (GstBuffer *frame) const
  * start of the segment, its DURATION the rest of the period. Returns the frame
  * with its original times. Null if only a rounding error is left of it, or,
  * with a warning, if it seems to be clipped at both ends, so that its start is
- * unknown. */
+ * unknown. No frame starts before 0, and a clipped one keeps a DURATION: others
+ * with a DURATION that is too short are whole. */
 BufferPtr
-CodedFilter::restore_clipped_frame (BufferPtr frame) const
+CodedFilter::restore_clipped_frame (BufferPtr frame)
 {
   const GstClockTime period = format ().period ();
   const GstClockTime pts = GST_BUFFER_PTS (frame.get ());
   const GstClockTime duration = GST_BUFFER_DURATION (frame.get ());
-  if (!GST_CLOCK_TIME_IS_VALID (duration) || duration + kRounding >= period)
+  if (!GST_CLOCK_TIME_IS_VALID (duration) || duration == 0 ||
+      duration + kRounding >= period)
     return frame;
   const bool at_start = pts == segment ().start;
   const bool at_stop = pts + duration == segment ().stop;
-  if ((at_start || at_stop) && duration <= kRounding)
+  if (at_stop && !at_start && duration <= kRounding)
     return nullptr;
   if (!at_start || pts + duration < period)
     return frame;
+  if (duration <= kRounding) {
+    /* If it was whole after all, the frames after it show that it is lost. */
+    stream_.last_pts = pts + duration - period;
+    stream_.sequence->take (Nanoseconds (stream_.last_pts), backwards ());
+    return nullptr;
+  }
   if (at_stop && !ends_with_stream (sinkpad_, segment ().stop)) {
     GST_ELEMENT_WARNING (element_, STREAM, FORMAT,
         ("From %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT

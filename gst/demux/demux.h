@@ -103,6 +103,7 @@ private:
   PadRef take_pad (GstPad *pad);
   bool index_allowed (PadKind kind, int index) const;
   bool check_pads (const PadMap &pads) const;
+  EventPtr gap_for (const GstCodedPad *pad, GstEvent *gap) const;
   /** Combines @p flow of @p pad with the flows of the others; NOT_LINKED if
    * nothing was pushed. */
   GstFlowReturn combine_flow (GstCodedPad *pad, GstFlowReturn flow);

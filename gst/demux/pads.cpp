@@ -269,6 +269,26 @@ Demux::release_pad (GstPad *pad)
 
 /* ------------------------------------------------------- events and flow -- */
 
+/* Subframe k alone is pushed at the time of its slot, and so is what replaces
+ * it. */
+EventPtr
+Demux::gap_for (const GstCodedPad *pad, GstEvent *gap) const
+{
+  const auto k = std::size_t (pad->coded.index);
+  if (pad->coded.kind != PadKind::one || !plan_ ||
+      k >= plan_->background ().boundaries.size ())
+    return EventPtr (gst_event_ref (gap));
+  GstClockTime pts, duration;
+  GstGapFlags flags;
+  gst_event_parse_gap (gap, &pts, &duration);
+  gst_event_parse_gap_flags (gap, &flags);
+  EventPtr own (gst_event_new_gap (
+      pts + GstClockTime (plan_->background ().boundaries[k]), duration));
+  gst_event_set_gap_flags (own.get (), flags);
+  gst_event_set_seqnum (own.get (), gst_event_get_seqnum (gap));
+  return own;
+}
+
 /* GStreamer stores a sticky event on the sink pad after its handler has
  * returned, which is too late for insert_pad (). EOS can be stored only once,
  * so it is left to GStreamer. */
@@ -284,10 +304,11 @@ Demux::forward (EventPtr event)
     ended_ = type == GST_EVENT_EOS;
   }
   each_pad ([&] (GstCodedPad *pad) {
-    GstEvent *own = type == GST_EVENT_STREAM_START
-                        ? stream_start_for (pad, event.get ()).release ()
-                        : gst_event_ref (event.get ());
-    gst_pad_push_event (GST_PAD (pad), own);
+    EventPtr own =
+        type == GST_EVENT_STREAM_START ? stream_start_for (pad, event.get ())
+        : type == GST_EVENT_GAP        ? gap_for (pad, event.get ())
+                                : EventPtr (gst_event_ref (event.get ()));
+    gst_pad_push_event (GST_PAD (pad), own.release ());
   });
   return TRUE;
 }

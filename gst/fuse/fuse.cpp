@@ -25,7 +25,8 @@
  * the next one, and T is added to the latency.
  *
  * Earlier frames help to find what stands still. A lost, corrupted or late
- * frame, a DISCONT, a seek and a new segment reset this history.
+ * frame, a DISCONT, a seek and a new segment reset this history. At a negative
+ * rate there is none: each coded frame is fused alone.
  *
  * ## Schedule and mapping
  *
@@ -183,19 +184,20 @@ Fuse::Fuse (GstCodedExposureFuse *element)
   gst_element_add_pad (this->element (), GST_PAD (srcpad_.get ()));
 }
 
-/* A coded frame is fused when enough of those after it have come. */
+/* A coded frame is fused when enough of those after it have come. The fuser
+ * compares each with earlier ones, which come later at a negative rate. */
 GstFlowReturn
 Fuse::process (CodedFrame frame)
 {
-  const bool unfit = frame.has_flags (kUnfit);
+  const bool alone = frame.has_flags (kUnfit) || backwards ();
   GstFlowReturn flow = GST_FLOW_OK;
-  if (unfit) {
+  if (alone) {
     flow = drain ();
     break_history ();
   }
   if (flow == GST_FLOW_OK)
     flow = take (std::move (frame));
-  if (flow == GST_FLOW_OK && unfit) {
+  if (flow == GST_FLOW_OK && alone) {
     flow = drain ();
     break_history ();
   }

@@ -2,6 +2,7 @@
 /* codedexposure-demux after a decoder that clips frames to the segment, as all
  * decoders do: exactly the requested subframes are pushed, at their original
  * times. */
+#include "common/messages.h"
 #include "common/meta.h"
 #include "harness.h"
 #include "schedule/timing.h"
@@ -153,4 +154,37 @@ TEST_P (DemuxSeek, WithinOneFrameIsWarnedOfAndGivesNothing)
   EXPECT_EQ (subframes (), Subframes ());
   EXPECT_NE (
       demux.warning ().find ("Seek to a longer segment"), std::string::npos);
+}
+
+/* Sources set DURATION to 0, or to the distance from the frame before. */
+TEST_P (DemuxSeek, AShortDurationOfAWholeFirstFrameDoesNotMatter)
+{
+  for (const GstClockTime duration : {0, 1, 10000, 20000, 4000000}) {
+    decode (0, -1, 0, GST_CLOCK_TIME_NONE);
+    BufferPtr frame = frame_of (Image<std::uint8_t> (16, 16), 0);
+    GST_BUFFER_DURATION (frame.get ()) = duration;
+    ASSERT_EQ (demux.push (std::move (frame)), GST_FLOW_OK);
+    EXPECT_EQ (subframes (), (Subframes{{0, 0}, {0, 1}, {0, 2}, {0, 3}}))
+        << duration;
+    EXPECT_EQ (coded_frames (), 1);
+  }
+}
+
+/* A microsecond at the start of a segment looks like the rest of a clipped
+ * frame; the next frame tells. */
+TEST_P (DemuxSeek, AFirstFrameThatWasTakenForARestIsLost)
+{
+  const GstClockTime start = 5 * period;
+  for (const bool whole : {false, true}) {
+    decode (0, -1, start, GST_CLOCK_TIME_NONE);
+    const GstClockTime next = start + (whole ? period : 1000);
+    for (const GstClockTime pts : {start, next}) {
+      BufferPtr frame = frame_of (Image<std::uint8_t> (16, 16), pts);
+      GST_BUFFER_DURATION (frame.get ()) = pts == start ? 1000 : period;
+      ASSERT_EQ (demux.push (std::move (frame)), GST_FLOW_OK);
+    }
+    EXPECT_EQ (coded_frames (), 1);
+    const auto lost = demux.posted<FramesLost> ();
+    EXPECT_EQ (lost.value_or (FramesLost ()).count, guint64 (whole));
+  }
 }

@@ -365,14 +365,17 @@ TEST_F (DemuxTime, GapEventReachesEveryPadBehindItsCaps)
 {
   start ();
   demux->request ("subframe_0");
+  demux->request ("subframe_2");
+  demux->request ("coded");
   demux->push_event (gst_event_new_gap (0, 40 * kMs));
-  for (const char *pad : {"", "subframe_0"}) {
+  for (const char *pad : {"", "subframe_0", "subframe_2", "coded"}) {
     ASSERT_TRUE (demux->pull_event (GST_EVENT_CAPS, pad)) << pad;
     const EventPtr gap = demux->pull_event (GST_EVENT_GAP, pad);
     ASSERT_TRUE (gap) << pad;
     GstClockTime time, duration;
     gst_event_parse_gap (gap.get (), &time, &duration);
-    EXPECT_EQ (time, 0u);
+    /* When its subframe would have come. */
+    EXPECT_EQ (time, pad == std::string ("subframe_2") ? 20 * kMs : 0);
     EXPECT_EQ (duration, 40 * kMs);
   }
 }

@@ -461,6 +461,23 @@ TEST_F (Fuse, DamagedFramesPassTheirFlagsAndAreNotCompared)
   }
 }
 
+/* What comes after a frame was exposed before it. */
+TEST_F (Fuse, ComparesNothingAtANegativeRate)
+{
+  start ("schedule=sequential:lattice:4/2 lookahead=1");
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_TIME);
+  segment.rate = -1.0;
+  segment.stop = segment.position = GST_SECOND;
+  ASSERT_TRUE (fuse->push_event (gst_event_new_segment (&segment)));
+  for (const int number : {2, 1, 0}) {
+    push (number);
+    auto alone = expected ("sequential:lattice:4/2", {number});
+    std::reverse (alone.begin (), alone.end ());
+    EXPECT_EQ (pull_images (), alone) << number;
+  }
+}
+
 TEST_F (Fuse, CountsDamagedFrames)
 {
   start ();

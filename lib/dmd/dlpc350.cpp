@@ -132,8 +132,11 @@ Dlpc350::upload (const Schedule &schedule, std::stop_token stop_token,
 Result<void>
 Dlpc350::prepare ()
 {
-  RETURN_IF_ERROR (write_byte (kPower, kPowerNormal));
-  RETURN_IF_ERROR (await (kPower, 0xFF, kPowerNormal, kPower.name));
+  ASSIGN_OR_RETURN (const std::uint8_t power, read_byte (kPowerMode));
+  if (power != kPowerNormal) {
+    RETURN_IF_ERROR (write_byte (kPower, kPowerNormal));
+    RETURN_IF_ERROR (await (kPowerMode, 0xFF, kPowerNormal, kPower.name));
+  }
   RETURN_IF_ERROR (halt ());
   RETURN_IF_ERROR (enter (kModePattern));
   RETURN_IF_ERROR (write (
@@ -214,10 +217,9 @@ Dlpc350::validate ()
 Result<void>
 Dlpc350::run ()
 {
-  running_ = true;
   // After video mode, the board may ignore the first start.
   for (int attempt = 0; attempt < kStartAttempts; attempt++) {
-    RETURN_IF_ERROR (write_byte (kRun, kRunStart));
+    RETURN_IF_ERROR (launch ());
     ASSIGN_OR_RETURN (const std::uint8_t status, read_byte (kMainStatus));
     if ((status & kSequencerRuns) != 0)
       return check_health ();

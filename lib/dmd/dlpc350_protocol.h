@@ -15,6 +15,7 @@ namespace codedexposure::dlpc350
 using namespace dlp;
 
 constexpr HidCommand kPower{0x0200, "leave standby", std::chrono::seconds (10)};
+constexpr HidCommand kPowerMode{kPower.word, "read the power mode"};
 constexpr HidCommand kSource{0x1A22, "choose the source of patterns"};
 constexpr HidCommand kTriggerMode{0x1A23, "choose the trigger mode"};
 constexpr HidCommand kTimes{0x1A29, "set exposure and period"};

@@ -158,9 +158,9 @@ private:
 
   void forget ();
   Result<void> stop_after (Result<void> failed);
+  Result<void> check_code (const char *what);
   Result<void> prepare ();
-  Result<void> send (const Schedule &schedule, const UploadPlan &plan,
-      const UploadProgress &progress);
+  Result<void> send (const Schedule &schedule, const UploadProgress &progress);
   Result<void> send_table (const std::vector<PatternTime> &times);
   Result<void> send_still (
       const StillMask &mask, const std::vector<PatternTime> &times);
@@ -326,20 +326,19 @@ Dlpc900::upload (const Schedule &schedule, std::stop_token stop_token,
     const UploadProgress &progress)
 {
   RETURN_IF_ERROR (check_masks (info_, schedule));
-  const UploadPlan plan = plan_upload (schedule);
   touched_ = true;
   begin (stop_token);
-  const auto sent = send (schedule, plan, progress);
+  const auto sent = send (schedule, progress);
   images_.reset ();
   return sent ? sent : stop_after (sent);
 }
 
 Result<void>
-Dlpc900::send (const Schedule &schedule, const UploadPlan &plan,
-    const UploadProgress &progress)
+Dlpc900::send (const Schedule &schedule, const UploadProgress &progress)
 {
-  forget (); // until all is sent, it is unknown what the board holds
   RETURN_IF_ERROR (prepare ());
+  const UploadPlan plan = plan_upload (schedule);
+  forget (); // until all is sent, it is unknown what the board holds
   residents_ = plan.residents;
   order_ = plan.order;
   slots_ = schedule.slots ();
@@ -376,12 +375,28 @@ Dlpc900::stop_after (Result<void> failed)
   return failed;
 }
 
+/** Fails if the board reports that it could not do @p what, which it did not
+ * have to acknowledge. */
+Result<void>
+Dlpc900::check_code (const char *what)
+{
+  ASSIGN_OR_RETURN (const std::uint8_t code, read_byte (kErrorCode));
+  if (code != 0)
+    return error (what, error_text (code));
+  return {};
+}
+
 /** Brings the board into the mode in which it takes masks. */
 Result<void>
 Dlpc900::prepare ()
 {
-  if (const auto stopped = halt (); !stopped || prepared_)
-    return stopped;
+  RETURN_IF_ERROR (halt ());
+  if (prepared_) {
+    ASSIGN_OR_RETURN (const std::uint8_t mode, read_byte (kDisplayMode));
+    if (mode == kModeOnTheFly)
+      return {};
+  }
+  forget (); // a board that lost its power has no masks
   RETURN_IF_ERROR (write_byte (kIdle, 0));
   RETURN_IF_ERROR (enter (kModeOnTheFly));
   constexpr int kPulse = 20; // us
@@ -470,10 +485,7 @@ Dlpc900::send_half (const HidCommand &load, const HidCommand &data, int index,
     sent (hid_packets (kChunkHead + chunk.size ()));
   }
   // The board does not acknowledge data; the code tells if it was unpacked.
-  ASSIGN_OR_RETURN (const std::uint8_t code, read_byte (kErrorCode));
-  if (code != 0)
-    return error ("upload masks", error_text (code));
-  return {};
+  return check_code ("upload masks");
 }
 
 Result<void>
@@ -487,7 +499,8 @@ Dlpc900::start (const SlotPlan &plan, std::stop_token stop_token)
   ASSIGN_OR_RETURN (const auto times, times_of (plan));
   RETURN_IF_ERROR (watch ());
   begin (std::move (stop_token));
-  return run (times, plan);
+  const auto started = run (times, plan);
+  return started || link_->cancelled () ? started : stop_after (started);
 }
 
 /** @p times  of the lines of one frame; @p plan  of that frame. */
@@ -498,11 +511,11 @@ Dlpc900::run (const std::vector<PatternTime> &times, const SlotPlan &plan)
   if (times != times_)
     RETURN_IF_ERROR (send_table (times));
   RETURN_IF_ERROR (pause_frame (plan));
-  running_ = true;
-  RETURN_IF_ERROR (write_byte (kRun, kRunStart));
+  RETURN_IF_ERROR (launch ());
   RETURN_IF_ERROR (await (
       kMainStatus, kSequencerRuns, kSequencerRuns, "start the patterns"));
-  return check_health ();
+  RETURN_IF_ERROR (check_health ());
+  return check_code ("start the patterns");
 }
 
 Result<void>
@@ -515,8 +528,10 @@ Dlpc900::show (
   const std::vector<PatternTime> still{
       first_patterns (times, mask.slots, kind_.minimum_exposure)};
   begin (std::move (stop_token));
-  const auto sent = send_still (mask, still);
-  return sent ? run (still, plan) : stop_after (sent);
+  auto shown = send_still (mask, still);
+  if (shown)
+    shown = run (still, plan);
+  return shown ? shown : stop_after (shown);
 }
 
 Result<void>

@@ -38,6 +38,8 @@ DlpcBoard::read (const HidCommand &command, std::size_t min)
     return error (
         command.name, "the reply has " + std::to_string (data->size ()) +
                           " bytes instead of " + std::to_string (min));
+  if (data && command.word == kMainStatus.word)
+    running_ = (data->front () & kSequencerRuns) != 0;
   return data;
 }
 
@@ -92,20 +94,26 @@ Result<void>
 DlpcBoard::halt ()
 {
   RETURN_IF_ERROR (write_byte (kRun, kRunStop));
-  RETURN_IF_ERROR (await (kMainStatus, kSequencerRuns, 0, "stop the patterns"));
-  running_ = false;
+  return await (kMainStatus, kSequencerRuns, 0, "stop the patterns");
+}
+
+Result<void>
+DlpcBoard::launch ()
+{
+  auto reply = link_->write (kRun, Bytes{kRunStart});
+  running_ = !reply || !reply->refused;
+  RETURN_IF_ERROR (data_of (kRun, std::move (reply)));
   return {};
 }
 
 bool
 DlpcBoard::park ()
 {
-  link_->begin ({}, 800ms);
-  HidCommand run = kRun;
-  run.timeout = 400ms;
+  constexpr int kAttempts = 2;
+  link_->begin ({}, kAttempts * kRun.timeout);
   bool stopped = false;
-  for (int attempt = 0; attempt < 2 && !stopped && !link_->gone (); attempt++)
-    stopped = write_byte (run, kRunStop).ok ();
+  for (int i = 0; i < kAttempts && !stopped && !link_->gone (); i++)
+    stopped = write_byte (kRun, kRunStop).ok ();
   return stopped || link_->gone ();
 }
 

@@ -35,7 +35,8 @@ protected:
   {
     link_->begin (std::move (stop), options_.patience);
   }
-  /** Data of the reply, at least @p min bytes. */
+  /** Data of the reply, at least @p min bytes. The main status tells whether
+   * the board runs. */
   Result<Bytes> read (const HidCommand &command, std::size_t min = 1);
   Result<std::uint8_t> read_byte (const HidCommand &command);
   Result<void> write (const HidCommand &command, ByteView data);
@@ -50,6 +51,8 @@ protected:
   bool park () override;
   /** Stops the sequencer and waits until it has stopped. */
   Result<void> halt ();
+  /** Starts the sequencer, which does not run; it may take a moment. */
+  Result<void> launch ();
   /** Leaves one whole exposure without masks, or without a trigger. */
   Result<void> pause_frame (const SlotPlan &plan);
   /** Fails if the hardware status reports a failure. */

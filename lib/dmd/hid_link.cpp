@@ -18,6 +18,12 @@ using namespace std::chrono_literals;
  */
 constexpr std::chrono::milliseconds kPiece{50};
 constexpr std::chrono::milliseconds kDrainTime{5};
+/** The packets of a message follow each other as fast as the bus allows: a
+ * device that holds them up for this long is out of order. */
+constexpr std::chrono::milliseconds kWriteTime{2000};
+/** In which a device acknowledges a stop, unless it took the packet for the
+ * rest of another message. */
+constexpr std::chrono::milliseconds kAlignTime{200};
 /** The packets of one reply follow each other. */
 constexpr std::chrono::milliseconds kRestTime{200};
 constexpr int kMaxStrayPackets = 64;
@@ -106,39 +112,48 @@ HidLink::transact (HidKind kind, const HidCommand &command, ByteView data)
 Result<void>
 HidLink::send (HidKind kind, const HidCommand &command, ByteView data)
 {
+  await_last ();
+  if (due_ > 0ms)
+    return error (command.name, "cancelled", ErrorCode::cancelled);
+  if (cut_)
+    RETURN_IF_ERROR (realign ());
   if (unclean_)
     drain ();
-  const auto timeout = std::min (command.timeout, patience_);
-  const auto sent = pipe_->write (
-      encode_request (kind, ++sequence_, command.word, data), timeout);
+  const Bytes message = encode_request (kind, ++sequence_, command.word, data);
+  const auto sent = pipe_->write (message, kWriteTime);
   unclean_ = !sent;
   if (sent)
     return sent;
-  patience_ -= timeout;
+  cut_ = message.size () > kHidPacketSize;
+  patience_ -= kWriteTime;
   return error (command.name, sent.error ());
 }
 
 Result<HidReply>
 HidLink::receive (const HidCommand &command)
 {
-  const Milliseconds limit = std::min (command.timeout, patience_);
-  Milliseconds left = limit;
+  const bool slow = command.timeout > kPatience;
+  const Milliseconds limit = slow ? std::max (command.timeout, patience_)
+                                  : std::min (command.timeout, patience_);
+  due_ = std::max (command.timeout, limit);
   bool strays = false;
-  while (left > 0ms) {
+  for (Milliseconds left = limit; left > 0ms;) {
     if (cancelled ())
       return error (command.name, "cancelled", ErrorCode::cancelled);
     const Milliseconds piece = std::min (left, kPiece);
     const auto packet = pipe_->read (piece);
     if (!packet)
       return error (command.name, packet.error ());
-    const auto head = parse_reply_head (*packet);
-    if (!head || head->sequence != sequence_) {
+    const auto head = own_reply (*packet);
+    if (!head) {
       // Nothing yet; or a late reply to an earlier request, or a piece of one.
       strays |= !packet->empty ();
       left -= piece;
-      patience_ -= piece;
+      due_ -= piece;
+      patience_ -= slow ? 0ms : piece;
       continue;
     }
+    due_ = 0ms;
     auto rest = receive_rest (*head, *packet);
     if (!rest)
       return error (command.name, rest.error ());
@@ -149,6 +164,15 @@ HidLink::receive (const HidCommand &command)
                "using it?"
              : "no reply within " + std::to_string (limit.count ()) + " ms",
       ErrorCode::timeout);
+}
+
+/** The head of the reply to the last request, if @p packet has it. */
+std::optional<HidReplyHead>
+HidLink::own_reply (ByteView packet) const
+{
+  const auto head = parse_reply_head (packet);
+  return head && head->sequence == sequence_ ? std::optional (*head)
+                                             : std::nullopt;
 }
 
 Result<Bytes>
@@ -165,6 +189,49 @@ HidLink::receive_rest (HidReplyHead head, Bytes first)
   }
   data.resize (head.length);
   return data;
+}
+
+/** Waits for the reply that the last job did not wait for; whether it came. */
+bool
+HidLink::await_last ()
+{
+  while (due_ > 0ms && !cancelled () && !gone ()) {
+    const Milliseconds piece = std::min (due_, kPiece);
+    const auto packet = pipe_->read (piece);
+    if (packet && own_reply (*packet)) {
+      due_ = 0ms;
+      return true;
+    }
+    if (!packet)
+      pipe_->pause (piece);
+    due_ -= piece;
+  }
+  return false;
+}
+
+/** Brings the device to the start of a message. */
+Result<void>
+HidLink::realign ()
+{
+  const Bytes stop{dlp::kRunStop};
+  // The rest of the longest message, then one that is understood.
+  for (std::size_t i = 0; i < hid_packets (kHidMessageSize) && cut_; i++) {
+    drain ();
+    const auto sent = pipe_->write (
+        encode_request (HidKind::write, ++sequence_, dlp::kRun.word, stop),
+        kWriteTime);
+    if (!sent)
+      return error (dlp::kRun.name, sent.error ());
+    due_ = kAlignTime;
+    cut_ = !await_last ();
+    if (due_ > 0ms)
+      return error ("reach it", "cancelled", ErrorCode::cancelled);
+  }
+  if (cut_)
+    return error ("reach it",
+        "it takes no message since one was cut short; switch it off and on",
+        ErrorCode::timeout);
+  return {};
 }
 
 void

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <stop_token>
 #include <string>
 #include <thread>
@@ -43,6 +44,7 @@ enum class HidKind : std::uint8_t {
 struct HidCommand {
   std::uint16_t word;
   const char *name; ///< for messages: "start the sequence"
+  /** The device answers within this time, or not at all. */
   std::chrono::milliseconds timeout = std::chrono::seconds (2);
 };
 
@@ -122,9 +124,14 @@ struct HidReply {
  * number are dropped. Not thread-safe.
  *
  * A job, which begin () begins, ends within 50 ms of a request to stop, and
- * after the device has kept it waiting for longer than its patience in all. A
- * message is always finished as far as the pipe allows, so that the device is
- * left between two messages.
+ * after the device has kept it waiting for longer than its patience in all; a
+ * command that may take longer than kPatience has its own time. If a job does
+ * not wait for a reply to its end, the next request does, because controllers
+ * can hang when they get two at once.
+ *
+ * A message is always finished as far as the pipe allows. Where the pipe cuts
+ * one short, the next request first stops the patterns, as often as it takes
+ * until the device no longer takes the packets for the rest of that message.
  */
 class HidLink
 {
@@ -178,6 +185,9 @@ private:
       HidKind kind, const HidCommand &command, ByteView data);
   Result<void> send (HidKind kind, const HidCommand &command, ByteView data);
   Result<HidReply> receive (const HidCommand &command);
+  std::optional<HidReplyHead> own_reply (ByteView packet) const;
+  bool await_last ();
+  Result<void> realign ();
   Result<Bytes> receive_rest (HidReplyHead head, Bytes first);
   Error error (const char *what, const Error &reason) const
   {
@@ -191,6 +201,8 @@ private:
   Milliseconds patience_ = kPatience; // that is left to the job
   std::uint8_t sequence_ = 0;
   bool unclean_ = true; // an unexpected reply may be waiting
+  bool cut_ = false;    // the device may be waiting for the rest of a message
+  Milliseconds due_{0}; // time in which the last request may be answered
 };
 
 } // namespace codedexposure

@@ -30,8 +30,8 @@ namespace codedexposure
  *   edge=rising|falling  of the camera's signal
  *   pulse=high|low       level of the pulses to the camera (USB boards)
  *   patience=TIME        how long a job waits for a USB board that does not
- *                        answer or is not ready; default 2 s. A DLPC900 may
- *                        take longer for a table
+ *                        answer or is not ready; default 2 s. A DLPC900 has
+ *                        10 s or more for a table
  *   guard=on|off         stop_guard.h; default on
  * for boards whose masks come from elsewhere (DLPC350),
  *   images=A[/B...]      flash images that hold the masks, 24 each

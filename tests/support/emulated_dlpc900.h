@@ -44,8 +44,10 @@ public:
     mode_ = 0;
     idle_ = true;
     running_ = configured_ = false;
+    defined_.clear ();
     lines_.clear ();
     order_.clear ();
+    loading_ = {};
     images_ = {};
   }
 
@@ -89,10 +91,16 @@ protected:
     return error_ == 0 ? std::optional (Data{}) : std::nullopt;
   }
 
+  std::optional<Data> refuse () override
+  {
+    error_ = kInternal;
+    return std::nullopt;
+  }
+
 private:
   static constexpr int kNotNow = 5, kInvalid = 6, kBadPlane = 10, kNoImage = 11,
                        kBadDark = 12, kBadDelay = 13, kBadExposure = 14,
-                       kBadNumber = 15, kBadPattern = 16;
+                       kBadNumber = 15, kBadPattern = 16, kInternal = 255;
 
   struct Loading {
     int index = -1;

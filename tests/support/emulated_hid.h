@@ -23,6 +23,7 @@ enum class Fault {
   stale_reply, ///< a reply with another sequence number comes first
   short_reply, ///< the packet ends early
   wild_reply,  ///< a reply with a size above the limit
+  cut,         ///< only the first packet is taken before the host gives up
   stall,       ///< the host cannot send
   unplug,      ///< disconnected for good
 };
@@ -45,13 +46,23 @@ public:
   bool gone () const { return gone_; }
   void unplug () { gone_ = true; }
   int messages () const { return messages_; }
+  /** Messages that came before the reply to another was fetched. */
+  int overlaps () const { return overlaps_; }
   virtual bool running () const = 0;
+
+  /** Whether the last packet was not taken because the host is to wait. */
+  bool hesitates () const { return hesitates_; }
 
   /** The host sends one packet of 64 bytes; false when it cannot. */
   bool out (const Packet &packet)
   {
     if (pending_.empty () && !begin_message ())
       return false;
+    hesitates_ = !pending_.empty () && fault_ == Fault::cut;
+    if (hesitates_) {
+      fault_ = Fault::none;
+      return false;
+    }
     pending_.insert (pending_.end (), packet.begin (), packet.end ());
     const std::size_t needed = 4 + word (pending_, 2);
     if (pending_.size () < needed)
@@ -81,6 +92,9 @@ protected:
   virtual std::optional<Data> obey (
       bool read, int command, const Data &data) = 0;
 
+  /** Does nothing of what a message asks for. */
+  virtual std::optional<Data> refuse () { return std::nullopt; }
+
   static std::uint32_t number (const Data &data, std::size_t at, int bytes)
   {
     std::uint32_t value = 0;
@@ -99,6 +113,7 @@ private:
   {
     if (gone_)
       return false;
+    overlaps_ += !replies_.empty ();
     const auto found = faults.find (messages_++);
     fault_ = found == faults.end () ? Fault::none : found->second;
     if (fault_ == Fault::unplug)
@@ -116,7 +131,7 @@ private:
     if (!read && data.size () < 64)
       writes[int (word (message, 4))].push_back (data);
     const auto done = fault_ == Fault::refuse
-                          ? std::nullopt
+                          ? refuse ()
                           : obey (read, int (word (message, 4)), data);
     if ((message[0] & 0x40) == 0)
       return;
@@ -164,7 +179,9 @@ private:
   std::deque<Packet> late_;
   Fault fault_ = Fault::none;
   int messages_ = 0;
+  int overlaps_ = 0;
   bool gone_ = false;
+  bool hesitates_ = false;
 };
 
 } // namespace codedexposure::test

@@ -3,6 +3,7 @@
  * that waiting takes no time. */
 #pragma once
 
+#include <algorithm>
 #include <functional>
 #include <memory>
 
@@ -18,7 +19,8 @@ public:
   /** Time of this clock, which advances only while a caller waits. */
   struct Clock {
     Milliseconds now{0};
-    Milliseconds wire{0}; ///< of it, packets were under way
+    Milliseconds wire{0};         ///< of it, packets were under way
+    Milliseconds silent_until{0}; ///< the device works and sends nothing
     /** Called when packets are sent. */
     std::function<void ()> on_write = [] {};
   };
@@ -48,6 +50,10 @@ public:
   {
     if (device_->gone ())
       return Error{"it is gone"};
+    if (clock_->now < clock_->silent_until) {
+      clock_->now = std::min (clock_->now + timeout, clock_->silent_until);
+      return Bytes{};
+    }
     const auto packet = device_->in ();
     clock_->now += packet ? kPacket : timeout;
     clock_->wire += packet ? kPacket : Milliseconds (0);

@@ -20,8 +20,9 @@ public:
   using Time = std::chrono::milliseconds;
   using Open = std::function<Result<std::unique_ptr<Dmd>> ()>;
 
-  /** Max duration of a call, without the time for packets. */
-  static constexpr Time kLongestCall{3000};
+  /** Max duration of a call, without the time for packets: 10 s for a table of
+   * a DLPC900, 2 s for each of two stops, and the patience for all the rest. */
+  static constexpr Time kLongestCall{16'000};
 
   /** @p clock  time, without that for which packets are on the wire. */
   FaultLife (std::mt19937 &random, std::function<Time ()> clock)

@@ -216,6 +216,28 @@ TEST (Dlpc350, WithoutAVideoSignalSaysSo)
       "on its HDMI input?");
 }
 
+TEST (Dlpc350, ABoardThatDoesNotStartDoesNotRun)
+{
+  Rig rig;
+  rig.board->video_locked = false;
+  ASSERT_EQ (message_of (rig.open ("x,source=video")), "");
+  EXPECT_FALSE (rig.show (Schedule ()).ok ());
+  EXPECT_FALSE (rig.dmd->running ());
+}
+
+TEST (Dlpc350Faults, ATableThatWasCutSpoilsNoOther)
+{
+  const Schedule schedule = schedule_of ("sequential:6x5");
+  for (int message = 0; message < 30; message++) {
+    Rig rig;
+    ASSERT_EQ (message_of (rig.open ("x,images=0/1")), "");
+    rig.board->faults[rig.board->messages () + message] = Fault::cut;
+    (void)rig.show (schedule);
+    ASSERT_EQ (message_of (rig.show (schedule)), "") << message;
+    EXPECT_EQ (rig.board->lines ().size (), 30u);
+  }
+}
+
 TEST (Dlpc350Faults, WhateverHappensItStopsInTheEndAndHangsNowhere)
 {
   const int kSequences = fault_sequences ();

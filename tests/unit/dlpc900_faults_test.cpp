@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Commands that the emulated DLPC900 rejects, and the driver's handling of
  * rejections and faults. */
+#include <functional>
 #include <memory>
 
 #include "dlpc900_rig.h"
@@ -74,7 +75,8 @@ TEST (Dlpc900Faults, ARefusalIsToldWithItsReason)
       "board (DLP5500): the masks are for 4 slots, not for 2");
   rig.board->faults[rig.board->messages ()] = Fault::refuse;
   EXPECT_EQ (message_of (rig.dmd->start (plan_of (long_slots))),
-      "board: cannot start or stop the patterns: error 0, 'no'");
+      "board: cannot start or stop the patterns: internal error (error 255), "
+      "'no'");
 }
 
 TEST (Dlpc900Faults, StaleAndLateRepliesAreTakenForWhatTheyAre)
@@ -100,24 +102,154 @@ TEST (Dlpc900Faults, AnUnpluggedBoardIsOneClearErrorAtOnce)
   EXPECT_LE (rig.clock->now - before, 2s);
 }
 
-TEST (Dlpc900Faults, ATableThatIsNotAnsweredForIsGivenUpSoon)
+/** The message of an upload with the table. Before it: stop and its status,
+ * idle, mode and its status, two triggers, and the four lines. */
+constexpr int kTableMessage = 11;
+
+TEST (Dlpc900Faults, ATableMayTakeTenSecondsAndIsThenGivenUp)
 {
-  for (const auto &[options, least, most] :
-      {std::tuple{"x", 1900ms, 2900ms}, {"x,patience=9s", 8900ms, 9900ms}}) {
+  for (const auto &[options, limit] : {std::pair{"x", 10'000ms},
+           {"x,patience=300ms", 10'000ms}, {"x,patience=20s", 20'000ms}}) {
     Rig rig;
     ASSERT_EQ (message_of (rig.open (options)), "");
-    // Before it: stop and its status, idle, mode and its status, two triggers,
-    // and the four lines.
-    rig.board->faults[rig.board->messages () + 11] = Fault::lose_reply;
+    rig.board->faults[rig.board->messages () + kTableMessage] =
+        Fault::lose_reply;
     const auto before = rig.clock->now;
-    const std::string message = message_of (rig.upload (Schedule ()));
-    EXPECT_NE (
-        message.find ("take the pattern table: no reply within"), message.npos)
-        << message;
-    EXPECT_GE (rig.clock->now - before, least);
-    EXPECT_LE (rig.clock->now - before, most);
+    EXPECT_EQ (message_of (rig.upload (Schedule ())),
+        "board: cannot take the pattern table: no reply within " +
+            std::to_string (limit.count ()) + " ms");
+    EXPECT_GE (rig.clock->now - before, limit);
+    EXPECT_LE (rig.clock->now - before, limit + 500ms);
     EXPECT_FALSE (rig.board->running ());
   }
+}
+
+/** The board will work for @p time on the message that comes after @p message
+ * others; @p then is called when it comes. */
+void
+work_long (
+    Rig &rig, int message, std::chrono::milliseconds time,
+    std::function<void ()> then = [] {})
+{
+  const int number = rig.board->messages () + message;
+  rig.clock->on_write = [&rig, number, time, then] {
+    if (rig.board->messages () != number)
+      return;
+    rig.clock->silent_until = rig.clock->now + time;
+    then ();
+  };
+}
+
+TEST (Dlpc900Faults, ATableThatTakesNineSecondsIsWaitedFor)
+{
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open ()), "");
+  work_long (rig, kTableMessage, 9s);
+  ASSERT_EQ (message_of (rig.show (Schedule ())), "");
+  EXPECT_GE (rig.clock->now, 9s);
+  EXPECT_EQ (rig.board->overlaps (), 0);
+  expect_masks (*rig.board, Schedule ());
+}
+
+TEST (Dlpc900Faults, AStopWaitsUntilTheBoardHasDoneTheLastCommand)
+{
+  for (int message = 0; message <= kTableMessage; message++) {
+    Rig rig;
+    ASSERT_EQ (message_of (rig.open ()), "");
+    std::stop_source stop;
+    bool asked = false;
+    work_long (rig, message, message == kTableMessage ? 9000ms : 1900ms, [&] {
+      stop.request_stop ();
+      asked = true;
+    });
+    const auto uploaded =
+        rig.dmd->upload (Schedule (), stop.get_token (), ignore_progress);
+    EXPECT_FALSE (uploaded.ok ()) << message;
+    ASSERT_TRUE (asked) << message;
+    rig.dmd->stop ();
+    EXPECT_EQ (rig.board->overlaps (), 0) << message;
+    EXPECT_FALSE (rig.dmd->running ()) << message;
+  }
+}
+
+TEST (Dlpc900Faults, AMessageThatWasCutSpoilsNoOther)
+{
+  for (int message = 0; message < 40; message++) {
+    Rig rig;
+    ASSERT_EQ (message_of (rig.open ()), "");
+    rig.board->faults[rig.board->messages () + message] = Fault::cut;
+    const auto shown = rig.show (Schedule ());
+    if (shown.ok ()) // all of the message was in the first packet
+      expect_masks (*rig.board, Schedule ());
+    else
+      EXPECT_FALSE (rig.board->running ()) << message;
+    ASSERT_EQ (message_of (rig.show (Schedule ())), "") << message;
+    expect_masks (*rig.board, Schedule ());
+  }
+}
+
+TEST (Dlpc900Faults, NoRefusalGoesUnnoticed)
+{
+  const Schedule schedule = schedule_of ("sequential:4x1");
+  Rig whole;
+  ASSERT_EQ (message_of (whole.open ()), "");
+  const int first = whole.board->messages ();
+  ASSERT_EQ (message_of (whole.show (schedule)), "");
+  const int messages = whole.board->messages () - first;
+  for (int message = 0; message < messages; message++) {
+    Rig rig;
+    ASSERT_EQ (message_of (rig.open ()), "");
+    rig.board->faults[rig.board->messages () + message] = Fault::refuse;
+    EXPECT_FALSE (rig.show (schedule).ok ()) << message;
+    EXPECT_FALSE (rig.board->running ()) << message;
+    EXPECT_FALSE (rig.dmd->running ()) << message;
+    ASSERT_EQ (message_of (rig.show (schedule)), "") << message;
+    expect_masks (*rig.board, schedule);
+  }
+}
+
+TEST (Dlpc900Faults, APowerCutDuringAnUploadIsNoticed)
+{
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open ()), "");
+  bool cut = false;
+  const auto uploaded =
+      rig.dmd->upload (Schedule (), {}, [&] (int sent, int total) {
+        if (sent > total / 2 && !cut) {
+          rig.board->power_cycle ();
+          cut = true;
+        }
+      });
+  EXPECT_EQ (message_of (uploaded),
+      "board: cannot upload masks: invalid parameter (error 6)");
+  ASSERT_EQ (message_of (rig.show (Schedule ())), "");
+  expect_masks (*rig.board, Schedule ());
+}
+
+TEST (Dlpc900Faults, AfterAPowerCutTheMasksAreSentAgain)
+{
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open ()), "");
+  ASSERT_EQ (message_of (rig.show (Schedule ())), "");
+  rig.board->power_cycle ();
+  const auto status = rig.dmd->status ();
+  ASSERT_EQ (message_of (status), "");
+  EXPECT_FALSE (status->running);
+  EXPECT_FALSE (rig.dmd->running ());
+  ASSERT_EQ (message_of (rig.show (Schedule ())), "");
+  expect_masks (*rig.board, Schedule ());
+}
+
+TEST (Dlpc900Faults, AfterAStartThatFailedTheMasksAreSentAgain)
+{
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open ()), "");
+  ASSERT_EQ (message_of (rig.upload (Schedule ())), "");
+  rig.board->power_cycle ();
+  EXPECT_NE (message_of (rig.dmd->start (plan_of (Schedule ()))), "");
+  EXPECT_FALSE (rig.dmd->running ());
+  ASSERT_EQ (message_of (rig.show (Schedule ())), "");
+  expect_masks (*rig.board, Schedule ());
 }
 
 TEST (Dlpc900Faults, AStartIsCancelledWhereverItIs)

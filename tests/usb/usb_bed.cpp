@@ -199,6 +199,7 @@ private:
     std::unique_ptr<Owner> owner;
     Reference urb, buffer;
     gulong address = 0;
+    int sent = 0;
     usbdevfs_urb *get () const { return urb.as<usbdevfs_urb> (); }
   };
 
@@ -341,6 +342,11 @@ private:
     int sent = 0;
     while (sent < length && board_->out ({bytes + sent, bytes + sent + 64}))
       sent += 64;
+    if (sent < length && !board_->gone () && board_->hesitates ()) {
+      urb.sent = sent;
+      held_.push_back (std::move (urb)); // until it is discarded
+      return;
+    }
     const int status = sent == length ? 0 : board_->gone () ? -ENODEV : -EPIPE;
     finish (std::move (urb), status, sent);
   }
@@ -398,13 +404,15 @@ private:
   int discard (UMockdevIoctlData *argument, int &error)
   {
     const auto address = *reinterpret_cast<const gulong *> (argument->data);
-    for (std::size_t i = 0; i < waiting_.size (); i++)
-      if (waiting_[i].address == address) {
-        Urb urb = std::move (waiting_[i]);
-        waiting_.erase (waiting_.begin () + std::ptrdiff_t (i));
-        finish (std::move (urb), -ENOENT, 0);
-        return 0;
-      }
+    for (auto *const urbs : {&waiting_, &held_})
+      for (std::size_t i = 0; i < urbs->size (); i++)
+        if ((*urbs)[i].address == address) {
+          Urb urb = std::move ((*urbs)[i]);
+          urbs->erase (urbs->begin () + std::ptrdiff_t (i));
+          const int sent = urb.sent;
+          finish (std::move (urb), -ENOENT, sent);
+          return 0;
+        }
     return fail (error, EINVAL);
   }
 
@@ -413,14 +421,17 @@ private:
   {
     const auto orphaned = [] (const Urb &urb) { return urb.owner->gone (); };
     std::erase_if (waiting_, orphaned);
+    std::erase_if (held_, orphaned);
     std::erase_if (done_, orphaned);
   }
 
   void drop_all (int status)
   {
-    for (Urb &urb : waiting_)
-      finish (std::move (urb), status, 0);
-    waiting_.clear ();
+    for (auto *const urbs : {&waiting_, &held_}) {
+      for (Urb &urb : *urbs)
+        finish (std::move (urb), status, 0);
+      urbs->clear ();
+    }
   }
 
   const std::vector<std::uint8_t> descriptors_;
@@ -431,7 +442,9 @@ private:
   mutable std::mutex lock_; // covers everything below, and the board
   bool bound_ = true;
   bool occupied_ = false;
-  std::vector<Urb> waiting_, done_;
+  std::vector<Urb> waiting_; // for packets from the board
+  std::vector<Urb> held_;    // until the host gives them up
+  std::vector<Urb> done_;
 };
 
 UsbBed::UsbBed () : bed_ (umockdev_testbed_new ()) {}

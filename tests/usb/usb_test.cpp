@@ -173,6 +173,23 @@ TEST_F (Usb, AStallIsAnErrorAndTheBoardStopped)
   EXPECT_FALSE (board->running ());
 }
 
+TEST_F (Usb, AMessageThatATimeoutCutSpoilsNoOther)
+{
+  const auto board = plug_dlpc900 ("1-2");
+  auto dmd = open_dmd ("usb:");
+  ASSERT_EQ (message_of (dmd), "");
+  const Schedule schedule = schedule_of ("sequential:4x1");
+  // Behind the commands before it and the announcement: image data.
+  board->faults[board->messages () + 15] = Fault::cut;
+  const std::string message =
+      message_of ((*dmd)->upload (schedule, {}, ignore_progress));
+  EXPECT_NE (message.find ("send image data: it took 64 of 512 bytes"),
+      std::string::npos)
+      << message;
+  ASSERT_EQ (message_of (show (**dmd, schedule)), "");
+  EXPECT_TRUE (board->running ());
+}
+
 TEST_F (Usb, PulledAtAnyMessageItEnds)
 {
   for (int message = 0; message < 60; message += 3) {

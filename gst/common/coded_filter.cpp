@@ -96,7 +96,8 @@ CodedFilter::properties ()
           }},
       {"stats", "Statistics",
           "Snapshot of all counters, kept until the next run starts; notifies "
-          "when frames are lost, corrupted or saturated, and when a mapping "
+          "when frames are lost, corrupted, saturated or not coded, and when a "
+          "mapping "
           "takes effect",
           kReadOnly, [] (const Shared &shared) { return shared.stats (); }},
   };
@@ -112,6 +113,7 @@ CodedFilter::Shared::stats () const
       {names.out, counters.pictures_out},
       {"frames-lost", counters.frames_lost},
       {"frames-corrupted", counters.frames_corrupted},
+      {"frames-not-coded", counters.frames_not_coded},
       {names.dropped, counters.pictures_dropped},
       {"saturated-frames", counters.saturated_frames},
       {"mirrors-exact", counters.mirrors.exact},

@@ -53,6 +53,7 @@ struct CodedCounters {
   guint64 frames_in = 0;
   guint64 frames_lost = 0;
   guint64 frames_corrupted = 0;
+  guint64 frames_not_coded = 0; ///< show a pattern, or a switch to or from one
   guint64 saturated_frames = 0;
   guint64 pictures_out = 0;
   guint64 pictures_dropped = 0;
@@ -147,6 +148,11 @@ protected:
 
   /** Handles a frame, which has format (). */
   virtual GstFlowReturn process (CodedFrame frame) = 0;
+  /** Pushes @p frame, which is not decoded, on the pad for coded frames. */
+  virtual GstFlowReturn forward_coded (const CodedFrame & /* frame */)
+  {
+    return GST_FLOW_OK;
+  }
   /** Prepares for frames of @p format. On failure posts an error, keeps the
    * plan in force and returns false. */
   virtual bool plan (const CodedFormat &format) = 0;
@@ -283,6 +289,7 @@ private:
     std::optional<FrameSequence> sequence;
     GstClockTime last_pts = GST_CLOCK_TIME_NONE;
     bool was_late = false; ///< the last frame was
+    std::string pattern;   ///< that was said of frames that are not decoded
     Burst saturation;
     std::optional<Schedule> overruled; ///< tagged, and reported as overruled
     bool warned_assumed = false;
@@ -314,6 +321,7 @@ private:
   BufferPtr restore_clipped_frame (BufferPtr frame);
   CodedFrame admit (BufferPtr frame);
   GstFlowReturn break_off ();
+  GstFlowReturn skip (const CodedFrame &frame);
   void report_loss (GstClockTime pts, guint64 lost);
   void warn_of_wrong_time (GstClockTime pts);
   void end_saturation ();

@@ -42,7 +42,39 @@ CodedFilter::chain (BufferPtr frame)
   CodedFrame coded = admit (std::move (frame));
   if (!coded.follows)
     flow = break_off ();
-  return flow == GST_FLOW_OK ? process (std::move (coded)) : flow;
+  if (flow != GST_FLOW_OK)
+    return flow;
+  if (!coded.meta.pattern.empty ())
+    return skip (coded);
+  stream_.pattern.clear ();
+  return process (std::move (coded));
+}
+
+/* A frame that does not show the schedule: a GAP takes the place of its
+ * pictures. */
+GstFlowReturn
+CodedFilter::skip (const CodedFrame &frame)
+{
+  const std::string &pattern = frame.meta.pattern;
+  count (&CodedCounters::frames_not_coded);
+  notify ("stats");
+  if (pattern != stream_.pattern &&
+      (pattern != kSwitch || stream_.pattern.empty ())) {
+    stream_.pattern = pattern;
+    post_message (element_, NotCoded{pattern, frame.meta.frame, frame.pts ()});
+  }
+  const GstFlowReturn flow = drain ();
+  break_history ();
+  if (flow != GST_FLOW_OK)
+    return flow;
+  each_pad ([&] (GstCodedPad *pad) {
+    if (pad->coded.kind == PadKind::coded)
+      return;
+    pad->coded.discont = true;
+    gst_pad_push_event (
+        GST_PAD (pad), gst_event_new_gap (frame.pts (), format ().period ()));
+  });
+  return forward_coded (frame);
 }
 
 /* The next frame does not follow the last one. */

@@ -31,6 +31,15 @@ struct Saturated {
   CODED_FIELDS (active, frame, frames, from, to, pixels);
 };
 
+/** Coded frames give way to frames of a pattern, which are not decoded. */
+struct NotCoded {
+  static constexpr const char *kName = "codedexposure/not-coded";
+  std::string pattern; ///< as in the frame meta
+  guint64 frame = 0;   ///< the first that shows it
+  GstClockTime from = 0;
+  CODED_FIELDS (pattern, frame, from);
+};
+
 /** How well the camera sees the mirrors, in numbers of mirrors. */
 struct MirrorsSeen {
   static constexpr const char *kName = "codedexposure/mapping";

@@ -17,6 +17,10 @@ namespace codedexposure::gst
  * docs/formats.md. */
 extern const char *const kFrameMetaName;
 
+/** FrameMeta::pattern of a frame during which the mirrors may have changed from
+ * the schedule to a pattern, or back. */
+inline constexpr const char *kSwitch = "switch";
+
 struct FrameMeta {
   /** Number of the coded frame since the start of the stream, lost frames
    * counted. */
@@ -37,8 +41,8 @@ struct FrameMeta {
   gint slip = 0;
   /** Coded frames lost between this one and the one before. */
   guint64 lost_before = 0;
-  /** The pattern that the mirrors showed in place of the schedule; empty: the
-   * schedule, or unknown because they are about to change. */
+  /** The pattern that the mirrors showed in place of the schedule, or kSwitch;
+   * empty: the schedule. Only a frame of the schedule can be decoded. */
   std::string pattern = {};
   /** Pixels at the largest value. */
   guint64 saturated = 0;

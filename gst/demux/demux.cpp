@@ -62,7 +62,10 @@
  * counted, the next subframe of every pad is DISCONT, and the element message
  * `codedexposure/frames-lost` has `count`, `from` (when the first was due) and
  * `to` (the frame that came). CORRUPTED and GAP pass to all subframes of a
- * frame. `codedexposure/saturated` reports when a sequence of frames with
+ * frame. Frames whose meta names a pattern do not show the schedule: they pass
+ * on the `coded` pad only, a GAP event takes the place of their subframes, and
+ * `codedexposure/not-coded` names the pattern.
+ * `codedexposure/saturated` reports when a sequence of frames with
  * pixels at the largest value begins (`active` true), and when there were none
  * for a second.
  *
@@ -218,6 +221,12 @@ Demux::push_coded (const CodedFrame &frame, const PadMap &pads)
   }
   GST_LOG_OBJECT (pad, "[OUT] %" GST_PTR_FORMAT, outbuf.get ());
   return combine_flow (pad, gst_pad_push (GST_PAD (pad), outbuf.release ()));
+}
+
+GstFlowReturn
+Demux::forward_coded (const CodedFrame &frame)
+{
+  return push_coded (frame, *pads ());
 }
 
 GstFlowReturn

@@ -78,6 +78,7 @@ private:
   using Targets = std::vector<Target>;
 
   GstFlowReturn process (CodedFrame frame) override;
+  GstFlowReturn forward_coded (const CodedFrame &frame) override;
   bool plan (const CodedFormat &format) override;
   void planned (bool schedule_changed) override;
   gboolean forward (EventPtr event) override;

@@ -191,7 +191,7 @@ void give_back (GstDmdSync *self, const char *reason);
 /** What a frame shows. */
 struct PatternSight {
   bool coded = true;
-  std::string pattern = {}; ///< "" while that is not known
+  std::string pattern = {}; ///< as in the frame meta
 };
 PatternSight look_for_pattern (GstDmdSync *self, GstBuffer *buffer,
     const FrameStep &step, GstClockTime pts);

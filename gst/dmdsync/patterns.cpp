@@ -8,6 +8,7 @@
 #include "calibrate/gratings.h"
 #include "common/element.h"
 #include "common/messages.h"
+#include "common/meta.h"
 #include "dmdsync.h"
 
 #define GST_CAT_DEFAULT dmdsync_debug
@@ -176,7 +177,7 @@ look_for_pattern (GstDmdSync *self, GstBuffer *buffer, const FrameStep &step,
   const bool shown = stream.shown.take (st.runner->settled (),
       level_of (stream.time->info, buffer), step.lost > 0);
   if (!shown)
-    return {.coded = false};
+    return {.coded = false, .pattern = kSwitch};
   if (!pattern) {
     stream.coded = true;
     begin_phase (self);

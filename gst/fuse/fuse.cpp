@@ -49,9 +49,10 @@
  *
  * As those of codedexposure-demux: a lost, corrupted or saturated frame is
  * counted and posted, and CORRUPTED and GAP pass to all frames of a coded
- * frame. Every frame has the custom meta `CodedExposureFrame` with the number
- * of its coded frame, its slot and the time of its light. QoS events are not
- * forwarded upstream, because some camera sources stop their stream for them.
+ * frame. Frames that show a pattern are replaced by GAP events. Every frame has
+ * the custom meta `CodedExposureFrame` with the number of its coded frame, its
+ * slot and the time of its light. QoS events are not forwarded upstream,
+ * because some camera sources stop their stream for them.
  *
  * ## Example pipelines
  *

@@ -249,7 +249,7 @@ map (GstMoireCalib *self, const Settings &settings, GstBuffer *buffer,
 }
 
 void
-overlay (GstMoireCalib *self, GstBuffer *buffer)
+overlay (GstMoireCalib *self, GstBuffer *buffer, int bits)
 {
   CalibState &st = state (self);
   std::shared_ptr<const Panel> panel;
@@ -264,7 +264,7 @@ overlay (GstMoireCalib *self, GstBuffer *buffer)
   MappedFrame mapped (info, buffer, GstMapFlags (GST_MAP_READWRITE));
   if (!mapped)
     return;
-  write_pixels (mapped, [&] (auto pixels) { lay_over (*panel, pixels); });
+  write_pixels (mapped, [&] (auto pixels) { lay_over (*panel, pixels, bits); });
 }
 
 /** The setup from upstream with the phase or mapping that was found here.
@@ -399,8 +399,10 @@ transform_ip (GstBaseTransform *trans, GstBuffer *buffer) noexcept
   if (!went_on)
     return GST_FLOW_ERROR;
   push_setup (self);
-  if (settings.lays_over () && gst_buffer_is_writable (buffer))
-    overlay (self, buffer);
+  /* Frames of the schedule are decoded downstream, and stay as they are. */
+  if (settings.lays_over () && !shown.empty () &&
+      gst_buffer_is_writable (buffer))
+    overlay (self, buffer, settings.bits > 0 ? settings.bits : meta.bits);
   return GST_FLOW_OK;
 }
 

@@ -9,14 +9,15 @@
  * the camera against the mirrors from their moiré fringes (paper, Section 2.3).
  *
  * First it shows one grating and draws the fringes in x and y, the numbers, and
- * the correction of the camera's stage over the picture. #moirecalib:state goes
- * from `searching` over `coarse` and `fine` to `aligned`, where every pixel is
- * within #moirecalib:tolerance mirrors of its place. Then, or at once with
- * `mode=map`, it shows Gray codes and gratings one after the other, releases
- * the mirrors, and solves for the mapping from each pixel to its mirror. The
- * mapping is the #moirecalib:mapping property, an element message, the file
- * #moirecalib:location, and a part of the stream tag with the schedule;
- * codedexposure-demux and codedexposure-fuse downstream use it from then on.
+ * the correction of the camera's stage over frames that show a pattern.
+ * #moirecalib:state goes from `searching` over `coarse` and `fine` to
+ * `aligned`, where every pixel is within #moirecalib:tolerance mirrors of its
+ * place. Then, or at once with `mode=map`, it shows Gray codes and gratings one
+ * after the other, releases the mirrors, and solves for the mapping from each
+ * pixel to its mirror. The mapping is the #moirecalib:mapping property, an
+ * element message, the file #moirecalib:location, and a part of the stream tag
+ * with the schedule; codedexposure-demux and codedexposure-fuse downstream use
+ * it from then on.
  *
  * Frames pass without delay: a separate thread solves and draws. While it is
  * busy, frames pass with the last panel.
@@ -114,8 +115,8 @@ properties ()
           "empty: the stream's. Read when the mode is set",
           kReadWrite, set (&Settings::schedule)},
       {"overlay", "Overlay",
-          "Draw fringes, numbers and arrows over the picture, except in "
-          "mode=phase; if false, frames pass unchanged",
+          "Draw fringes, numbers and arrows over frames that show a pattern; "
+          "frames of the schedule, and all frames if false, pass unchanged",
           kReadWrite, set (&Settings::overlay)},
       {"period", "Period",
           "Period of the gratings of a mapping, mirrors, even; longer ones "

@@ -155,17 +155,18 @@ draw_panel (Extent size, const PanelContent &content)
 
 template <typename Pixel>
 void
-lay_over (const Panel &panel, ImageView<Pixel> out)
+lay_over (const Panel &panel, ImageView<Pixel> out, int bits)
 {
-  constexpr int kStep = std::numeric_limits<Pixel>::max () / 255;
+  constexpr int kBits = std::numeric_limits<Pixel>::digits;
+  const int white = (1 << (bits > 0 ? std::min (bits, kBits) : kBits)) - 1;
   const auto grey = panel.grey.view ();
   for (const Rect &at : panel.opaque)
     for (int y = at.y; y < at.y + at.height; y++)
       std::transform (grey.row (y) + at.x, grey.row (y) + at.x + at.width,
           out.row (y) + at.x,
-          [] (std::uint8_t level) { return Pixel (level * kStep); });
+          [white] (std::uint8_t level) { return Pixel (level * white / 255); });
 }
-template void lay_over (const Panel &, ImageView<std::uint8_t>);
-template void lay_over (const Panel &, ImageView<std::uint16_t>);
+template void lay_over (const Panel &, ImageView<std::uint8_t>, int);
+template void lay_over (const Panel &, ImageView<std::uint16_t>, int);
 
 } // namespace codedexposure

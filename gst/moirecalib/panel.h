@@ -36,8 +36,8 @@ struct Panel {
 Panel draw_panel (Extent size, const PanelContent &content);
 
 /** Copies the opaque parts to @p out, of the panel's size, 255 becoming the
- * largest value of the pixel type. */
+ * largest value of @p bits bits; 0: of the pixel type. */
 template <typename Pixel>
-void lay_over (const Panel &panel, ImageView<Pixel> out);
+void lay_over (const Panel &panel, ImageView<Pixel> out, int bits = 0);
 
 } // namespace codedexposure

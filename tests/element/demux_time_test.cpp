@@ -593,7 +593,8 @@ TEST_F (DemuxTime, StatsHoldAllCountersAtOneMoment)
   EXPECT_STREQ (CharPtr (gst_structure_to_string (stats.get ())).get (),
       "application/x-codedexposure-demux-stats, frames-in=(guint64)2, "
       "subframes-out=(guint64)8, frames-lost=(guint64)2, "
-      "frames-corrupted=(guint64)0, subframes-dropped=(guint64)0, "
+      "frames-corrupted=(guint64)0, frames-not-coded=(guint64)0, "
+      "subframes-dropped=(guint64)0, "
       "saturated-frames=(guint64)0, mirrors-exact=(guint64)0, "
       "mirrors-weighted=(guint64)0, mirrors-mixed=(guint64)0, "
       "mirrors-unseen=(guint64)0;");

@@ -55,13 +55,13 @@ protected:
     return frame ? get_frame_meta (frame.get ()).value_or (FrameMeta ())
                  : FrameMeta ();
   }
-  /** The first frame with metadata of @p pattern; frames before have no
-   * pattern. */
+  /** The first frame with metadata of @p pattern; frames before are those of
+   * the switch. */
   FrameMeta wait_for (const std::string &pattern)
   {
     for (int i = 0; i < kPatience; i++) {
       const FrameMeta meta = next ();
-      if (!meta.pattern.empty ()) {
+      if (meta.pattern != kSwitch) {
         EXPECT_EQ (meta.pattern, pattern);
         return meta;
       }
@@ -70,15 +70,17 @@ protected:
     ADD_FAILURE () << pattern << " never came";
     return {};
   }
-  void wait_for_lock ()
+  void wait_for_schedule ()
   {
     for (int i = 0; i < kPatience; i++) {
       const FrameMeta meta = next ();
-      EXPECT_EQ (meta.pattern, "");
-      if (meta.locked != false)
+      if (meta.pattern.empty ()) {
+        EXPECT_NE (meta.locked, false);
         return;
+      }
+      EXPECT_EQ (meta.pattern, kSwitch);
     }
-    ADD_FAILURE () << "never locked again";
+    ADD_FAILURE () << "the schedule never came back";
   }
   Image<std::uint8_t> pixels ()
   {
@@ -126,7 +128,7 @@ TEST_P (PatternTest, IsShownOneAfterTheOtherAndTheMirrorsComeBack)
     EXPECT_EQ (uint64_field (said.back (), "frame"), first.frame);
   }
   ASSERT_TRUE (bench.send_upstream (request ("")));
-  wait_for_lock ();
+  wait_for_schedule ();
   const FrameMeta last = next ();
   EXPECT_EQ (pixels (), coded[last.frame % 2]);
   EXPECT_EQ (bench.messages ("dmdsync/pattern-over").size (), 1u);
@@ -141,7 +143,7 @@ TEST_P (PatternTest, EndsAfterTheFramesThatWereAskedFor)
   wait_for ("white");
   EXPECT_EQ (next ().pattern, "white");
   EXPECT_EQ (next ().pattern, "white");
-  wait_for_lock ();
+  wait_for_schedule ();
   const auto over = bench.messages ("dmdsync/pattern-over");
   ASSERT_EQ (over.size (), 1u);
   EXPECT_EQ (string_field (over[0], "reason"), "frames");

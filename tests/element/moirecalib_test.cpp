@@ -236,7 +236,8 @@ TEST (MoireCalib, WithoutADmdsyncItSaysWhatToDo)
   h.set_caps (gray_caps (kLargeWidth, kLargeHeight));
   EXPECT_EQ (h.push (grating_frame (0)), GST_FLOW_ERROR);
   EXPECT_EQ (h.error (),
-      "No element upstream shows patterns. Put a dmdsync with a device that takes "
+      "No element upstream shows patterns. Put a dmdsync with a device that "
+      "takes "
       "masks at run time before moirecalib, or show a grating by other means "
       "and say which: pattern=grating-both:4/0.");
 }
@@ -317,6 +318,35 @@ TEST (MoireCalib, LaysItsPanelOverThePictureOrLeavesItAlone)
     }
     EXPECT_EQ (changed, overlay);
   }
+}
+
+TEST (MoireCalib, NeverDrawsOnAFrameOfTheSchedule)
+{
+  ElementHarness h ("moirecalib mode=align");
+  gst_pad_set_query_function (h.get ()->srcpad, answer_as_dmdsync);
+  gst_pad_set_event_function (h.get ()->srcpad,
+      [] (GstPad *, GstObject *, GstEvent *event) -> gboolean {
+        gst_event_unref (event);
+        return TRUE;
+      });
+  const std::string caps = gray_caps (kLargeWidth, kLargeHeight);
+  h.set_caps (caps);
+  const auto plain =
+      image_of<std::uint8_t> (grating_frame (0).get (), caps_of (caps).get ());
+  const auto drawn_on = [&] (int number, const std::string &pattern) {
+    BufferPtr frame = grating_frame (number);
+    set_frame_meta (frame.get (), {.pattern = pattern});
+    EXPECT_EQ (h.push (std::move (frame)), GST_FLOW_OK);
+    const BufferPtr out = h.pull ();
+    return !(
+        image_of<std::uint8_t> (out.get (), caps_of (caps).get ()) == plain);
+  };
+  int number = 0;
+  while (number < kPatience && !drawn_on (number++, live_grating ().text ()))
+    EXPECT_FALSE (drawn_on (number++, ""));
+  ASSERT_LT (number, kPatience) << "no panel";
+  EXPECT_FALSE (drawn_on (number++, ""));
+  EXPECT_TRUE (drawn_on (number++, live_grating ().text ()));
 }
 
 TEST (MoireCalib, KnowsTheBitsOfItsPixelsFromTheFrames)

@@ -73,8 +73,10 @@ TEST (Panel, HidesItsPartsOfThePictureAndLeavesTheRest)
         narrow.at (x, y) = 77;
         wide.at (x, y) = 7777;
       }
+    Image<std::uint16_t> ten_bits (size.width, size.height);
     lay_over (panel, narrow.view ());
     lay_over (panel, wide.view ());
+    lay_over (panel, ten_bits.view (), 10);
     for (int y = 0; y < size.height; y++)
       for (int x = 0; x < size.width; x++) {
         bool hidden = false;
@@ -84,6 +86,7 @@ TEST (Panel, HidesItsPartsOfThePictureAndLeavesTheRest)
         const int level = panel.grey.at (x, y);
         ASSERT_EQ (narrow.at (x, y), hidden ? level : 77);
         ASSERT_EQ (wide.at (x, y), hidden ? level * 257 : 7777);
+        ASSERT_EQ (ten_bits.at (x, y), hidden ? level * 1023 / 255 : 0);
       }
   }
 }

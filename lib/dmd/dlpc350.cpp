@@ -65,8 +65,7 @@ private:
 Result<void>
 Dlpc350::open ()
 {
-  begin ();
-  RETURN_IF_ERROR (read (kVersion, 16));
+  RETURN_IF_ERROR (greet ());
   RETURN_IF_ERROR (read_byte (kHardwareStatus));
   set_info ("DLP4500", kMirrors, kMinimumExposure, kMinimumDark,
       video () ? kVideoPlanes : kPreloadedPlanes);

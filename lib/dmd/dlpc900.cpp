@@ -215,8 +215,7 @@ Dlpc900::explain ()
 Result<void>
 Dlpc900::open ()
 {
-  begin ();
-  ASSIGN_OR_RETURN (const Bytes version, read (kVersion, kVersionSize));
+  ASSIGN_OR_RETURN (const Bytes version, greet ());
   version_ = parse_version (version);
   ASSIGN_OR_RETURN (const std::uint8_t type, read_byte (kHardware));
   const auto kind = find_board (type);
@@ -434,8 +433,10 @@ Dlpc900::send_table (const std::vector<PatternTime> &times)
     RETURN_IF_ERROR (write (kDefine, encode_entry (entry)));
   RETURN_IF_ERROR (
       write (kConfigure, encode_configuration (int (entries.size ()))));
-  if (!std::is_sorted (order_.begin (), order_.end ()))
+  if (!std::is_sorted (order_.begin (), order_.end ())) {
     RETURN_IF_ERROR (link_->post (kReorder, encode_order (order_)));
+    RETURN_IF_ERROR (check_code (kReorder.name));
+  }
   times_ = times;
   return {};
 }

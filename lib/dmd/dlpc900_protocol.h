@@ -38,7 +38,6 @@ constexpr std::size_t kImageChunk = kHidMessageSize - kChunkHead;
 /** Lines of the pattern table; every board holds more planes. */
 constexpr int kMaxEntries = 400;
 /** Bytes of these replies. */
-constexpr std::size_t kVersionSize = 16;
 constexpr std::size_t kMinimumExposuresSize = 16; // 8 depths, the binary first
 
 /** What a board is, by the hardware type that it reports. */

@@ -43,6 +43,20 @@ DlpcBoard::read (const HidCommand &command, std::size_t min)
   return data;
 }
 
+Result<Bytes>
+DlpcBoard::greet ()
+{
+  begin ();
+  auto version = read (kVersion, kVersionSize);
+  if (version || version.error ().code != ErrorCode::timeout)
+    return version;
+  // A program that was killed may have left the board within a message.
+  if (!link_->realign ())
+    return version;
+  begin ();
+  return read (kVersion, kVersionSize);
+}
+
 Result<std::uint8_t>
 DlpcBoard::read_byte (const HidCommand &command)
 {

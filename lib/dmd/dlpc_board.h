@@ -35,6 +35,8 @@ protected:
   {
     link_->begin (std::move (stop), options_.patience);
   }
+  /** The version reply of a board that was just opened. */
+  Result<Bytes> greet ();
   /** Data of the reply, at least @p min bytes. The main status tells whether
    * the board runs. */
   Result<Bytes> read (const HidCommand &command, std::size_t min = 1);

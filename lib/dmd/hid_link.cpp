@@ -21,8 +21,8 @@ constexpr std::chrono::milliseconds kDrainTime{5};
 /** The packets of a message follow each other as fast as the bus allows: a
  * device that holds them up for this long is out of order. */
 constexpr std::chrono::milliseconds kWriteTime{2000};
-/** In which a device acknowledges a stop, unless it took the packet for the
- * rest of another message. */
+/** In which a device answers a question, unless it took the packet for the rest
+ * of another message. */
 constexpr std::chrono::milliseconds kAlignTime{200};
 /** The packets of one reply follow each other. */
 constexpr std::chrono::milliseconds kRestTime{200};
@@ -209,29 +209,27 @@ HidLink::await_last ()
   return false;
 }
 
-/** Brings the device to the start of a message. */
 Result<void>
 HidLink::realign ()
 {
-  const Bytes stop{dlp::kRunStop};
   // The rest of the longest message, then one that is understood.
-  for (std::size_t i = 0; i < hid_packets (kHidMessageSize) && cut_; i++) {
+  for (std::size_t i = 0; i < hid_packets (kHidMessageSize); i++) {
     drain ();
     const auto sent = pipe_->write (
-        encode_request (HidKind::write, ++sequence_, dlp::kRun.word, stop),
+        encode_request (HidKind::read, ++sequence_, dlp::kVersion.word, {}),
         kWriteTime);
     if (!sent)
-      return error (dlp::kRun.name, sent.error ());
+      return error (dlp::kVersion.name, sent.error ());
     due_ = kAlignTime;
     cut_ = !await_last ();
+    if (!cut_)
+      return {};
     if (due_ > 0ms)
-      return error ("reach it", "cancelled", ErrorCode::cancelled);
+      return error (dlp::kVersion.name, "cancelled", ErrorCode::cancelled);
   }
-  if (cut_)
-    return error ("reach it",
-        "it takes no message since one was cut short; switch it off and on",
-        ErrorCode::timeout);
-  return {};
+  return error ("reach it",
+      "it takes no message since one was cut short; switch it off and on",
+      ErrorCode::timeout);
 }
 
 void

@@ -83,6 +83,8 @@ constexpr HidCommand kTriggerOut2{0x1A1E, "set up trigger output 2"};
 constexpr HidCommand kRun{0x1A24, "start or stop the patterns"};
 constexpr HidCommand kTriggerIn1{0x1A35, "set up trigger input 1"};
 
+/** Bytes of the version reply. */
+constexpr std::size_t kVersionSize = 16;
 constexpr std::uint8_t kRunStop = 0;
 constexpr std::uint8_t kRunStart = 2;
 /** Main status. */
@@ -130,8 +132,7 @@ struct HidReply {
  * can hang when they get two at once.
  *
  * A message is always finished as far as the pipe allows. Where the pipe cuts
- * one short, the next request first stops the patterns, as often as it takes
- * until the device no longer takes the packets for the rest of that message.
+ * one short, the next request first realigns.
  */
 class HidLink
 {
@@ -173,6 +174,11 @@ public:
    */
   bool wait (Milliseconds time);
 
+  /** Brings the device to the start of a message, if it may take the next
+   * packets for the rest of one that was cut short: asks for its version until
+   * it answers. */
+  Result<void> realign ();
+
   bool gone () const { return pipe_->gone (); }
   const std::string &name () const { return name_; }
 
@@ -187,7 +193,6 @@ private:
   Result<HidReply> receive (const HidCommand &command);
   std::optional<HidReplyHead> own_reply (ByteView packet) const;
   bool await_last ();
-  Result<void> realign ();
   Result<Bytes> receive_rest (HidReplyHead head, Bytes first);
   Error error (const char *what, const Error &reason) const
   {

@@ -291,9 +291,11 @@ Lightcrafter::start (const SlotPlan &plan, std::stop_token stop_token)
       encode_camera_trigger (options_.master == Master::dmd, kCameraPulse)));
   if (!wait_for (cancel_, std::chrono::nanoseconds (plan.frame_period ())))
     return error ("start the sequence", "cancelled", ErrorCode::cancelled);
-  running_ = true;
   const Bytes on{1};
-  return write ("start the sequence", kRun, on);
+  auto reply = ask (PacketType::write, kRun, on);
+  running_ = !reply || reply->refused == 0;
+  RETURN_IF_ERROR (payload_of ("start the sequence", std::move (reply)));
+  return {};
 }
 
 bool

@@ -24,10 +24,11 @@ namespace codedexposure::test
 /** Faults of the server. */
 struct LightcrafterFaults {
   bool knows_0480 = true;
-  bool wants_repeat = true;  ///< the 18-byte form, not that of 17
-  int busy_replies = 0;      ///< before the next mask is taken
-  int silent_after = -1;     ///< masks after which it says no more
-  int close_after = -1;      ///< masks after which it hangs up
+  bool wants_repeat = true; ///< the 18-byte form, not that of 17
+  int busy_replies = 0;     ///< before the next mask is taken
+  int silent_after = -1;    ///< masks after which it says no more
+  int close_after = -1;     ///< masks after which it hangs up
+  bool refuses_start = false;
   int stray_byte_after = -1; ///< masks after which one byte too many comes
   bool wrong_checksum = false;
 };
@@ -175,7 +176,8 @@ private:
       mode_ = data.at (0);
       return 0;
     case 0x0402:
-      if (data.at (0) == 1 && (mode_ != 4 || int (masks_.size ()) < wanted_))
+      if (data.at (0) == 1 && (mode_ != 4 || faults_.refuses_start ||
+                                  int (masks_.size ()) < wanted_))
         return 7;
       running_ = data.at (0) == 1;
       return 0;

@@ -208,6 +208,41 @@ TEST (Dlpc900Faults, NoRefusalGoesUnnoticed)
   }
 }
 
+TEST (Dlpc900Faults, AnOrderThatIsRefusedIsNoticed)
+{
+  const Schedule other = schedule_of ("sequential:2x2,order=bit-reversal");
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open ()), "");
+  ASSERT_EQ (message_of (rig.show (Schedule ())), "");
+  ASSERT_EQ (message_of (rig.upload (other)), "");
+  // Before it: stop and its status, four lines and the table.
+  rig.board->faults[rig.board->messages () + 7] = Fault::refuse;
+  EXPECT_EQ (message_of (rig.dmd->start (plan_of (other))),
+      "board: cannot set the order of patterns: internal error (error 255)");
+  EXPECT_FALSE (rig.board->running ());
+  ASSERT_EQ (message_of (rig.show (other)), "");
+  expect_masks (*rig.board, other);
+}
+
+TEST (Dlpc900Faults, ABoardThatIsLeftWithinAMessageIsOpened)
+{
+  Rig first;
+  ASSERT_EQ (message_of (first.open ()), "");
+  ASSERT_EQ (message_of (first.show (Schedule ())), "");
+  const Bytes message = encode_request (
+      HidKind::post, 1, dlpc900::kImageData.word, Bytes (kHidRequestData));
+  for (std::size_t packets = 1; packets < message.size () / 64; packets++) {
+    // The program is killed while it sends.
+    for (std::size_t at = 0; at < 64 * packets; at += 64)
+      first.board->out ({message.begin () + std::ptrdiff_t (at),
+          message.begin () + std::ptrdiff_t (at + 64)});
+    Rig next;
+    next.board = first.board;
+    EXPECT_EQ (message_of (next.open ()), "") << packets;
+    EXPECT_TRUE (first.board->running ()) << "a question disturbs nothing";
+  }
+}
+
 TEST (Dlpc900Faults, APowerCutDuringAnUploadIsNoticed)
 {
   Rig rig;

@@ -262,6 +262,17 @@ TEST (Lightcrafter, AfterAByteTooManyTheNextUploadSucceeds)
   EXPECT_FALSE (server.running ());
 }
 
+TEST (Lightcrafter, ABoardThatRefusesToStartDoesNotRun)
+{
+  LightcrafterServer server ({.refuses_start = true});
+  auto dmd = open (server);
+  ASSERT_EQ (message_of (dmd), "");
+  const Schedule schedule = schedule_of (kPreset);
+  ASSERT_EQ (message_of ((*dmd)->upload (schedule, {}, ignore_progress)), "");
+  EXPECT_NE (message_of ((*dmd)->start (plan_of (schedule))), "");
+  EXPECT_FALSE ((*dmd)->running ());
+}
+
 TEST (TcpStream, ANameIsLookedForNoLongerThanItWasTold)
 {
   for (const auto &[timeout, code] : {std::pair{20ms, ErrorCode::timeout},

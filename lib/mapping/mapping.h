@@ -91,8 +91,9 @@ public:
   static Result<Mapping> from_json (std::string_view json);
   /** One line; equal mappings have equal texts. */
   std::string to_json () const;
-  /** from_json () of a file, to_json () into one. */
+  /** from_json () of a file. */
   static Result<Mapping> load (const std::string &path);
+  /** to_json () into a file, which gets its name when it is complete. */
   Result<void> save (const std::string &path) const;
 
   Extent camera () const { return parts_.camera; }

@@ -44,7 +44,10 @@ camera_help='Instead of the bench:
   --reconnect N       tries to restart a camera that went away [0]
   --device DEV        the DMD [sim:bench on the bench]
   --source "GST"      any GStreamer source of coded frames'
+force_help='  --force             replace files that exist
+'
 common_help='  --print             print the pipeline and do not run it
+  --verbose           also print messages and counters of the elements
   -h, --help          show this help'
 
 say ()
@@ -83,7 +86,7 @@ args=()
 # that is not an option begins a command, and its options are not parsed.
 parse_options ()
 {
-  local valued=" ${1//$'\n'/ } " flags=" $2 print help " name
+  local valued=" ${1//$'\n'/ } " flags=" $2 print verbose help " name
   shift 2
   while [ $# -gt 0 ]; do
     case $1 in
@@ -200,14 +203,47 @@ find_plugin ()
     GST_PLUGIN_PATH_1_0="$libs${GST_PLUGIN_PATH_1_0:+:$GST_PLUGIN_PATH_1_0}"
 }
 
-# launch OPTION... PIPELINE
+# run COMMAND...: the signals that end this script end COMMAND, which finishes
+# its files. They arrive as SIGTERM, since a terminal sends its own to both.
+run ()
+{
+  local child status
+  "$@" <&0 &
+  child=$!
+  # shellcheck disable=SC2064 # the child of now
+  trap "stopped=1; kill -TERM $child 2>/dev/null || true" INT TERM HUP
+  while
+    status=0
+    wait "$child" || status=$?
+    kill -0 "$child" 2>/dev/null
+  do :; done
+  wait "$child" 2>/dev/null || status=$?
+  trap - INT TERM HUP
+  return "$status"
+}
+
+# run_step COMMAND...: the same for one of several; a signal ends the script.
+run_step ()
+{
+  run "$@" || return
+  [ -z "${stopped:-}" ] || die stopped
+}
+
+# launch OPTION... PIPELINE: sets no_frame if it failed because none arrived.
 launch ()
 {
+  local status=0
   if is_set print; then
     printf 'gst-launch-1.0 -e %s\n' "$(tr -s ' \n' '  ' <<< "${*: -1}")"
     exit 0
   fi
-  "$launcher" --what="$script" "$@"
+  run "$launcher" --what="$script" ${opt[force]:+--force} \
+    ${opt[verbose]:+--verbose} "$@" || status=$?
+  no_frame=
+  if [ "$status" = 5 ]; then
+    no_frame=1 status=1
+  fi
+  return "$status"
 }
 
 # A text as a value in a pipeline.
@@ -409,9 +445,10 @@ video_output ()
       printf 'x264enc pass=qual quantizer=18 speed-preset=veryfast ! '
       printf 'h264parse ! mp4mux ! filesink location=%s ' "$(quoted "$1")"
       ;;
-    */ | *%*d*.png)
+    */ | *%d*.png | *%0[1-9]d*.png)
+      # A folder may have any name; only the last part is a format.
       local pattern=$1
-      [[ $1 != */ ]] || pattern=$1%06d.png
+      [[ $1 != */ ]] || pattern=${1//%/%%}%06d.png
       ! is_set view || for_display
       # Without these caps, videoconvert makes 8-bit colours of 16-bit grey.
       printf 'videoconvert ! video/x-raw,format={GRAY8,GRAY16_BE} ! '
@@ -425,22 +462,51 @@ video_output ()
   esac
 }
 
-# Creates the folder of an output and deletes the pictures of an earlier run. The
-# output must not be the input, which would be truncated before it is read.
-make_folder_for ()
+# The output must not be the input, which would be replaced by itself.
+check_output ()
 {
   local read
   for read in "${opt[input]:-}" "${args[@]}"; do
     [ -z "$read" ] || [ ! "$1" -ef "$read" ] \
       || usage_error "$1 is the input; use another name for the output"
   done
-  ! is_set print || return 0
-  if [[ $1 == */ ]]; then
-    mkdir -p "$1"
-    find "$1" -maxdepth 1 -name '[0-9][0-9][0-9][0-9][0-9][0-9].png' -delete
-  else
-    mkdir -p "$(dirname "$1")"
-  fi
+}
+
+# A folder with files is only used with --force.
+check_folder ()
+{
+  [ ! -e "$1" ] || [ -d "$1" ] || die "$1 is a file; name a folder"
+  is_set force || [ -z "$(ls -A "$1" 2>/dev/null)" ] \
+    || die "$1 is not empty; choose another folder, or set --force to replace" \
+      "what an earlier run has written"
+}
+
+# claim_folder FOLDER: sets claimed to FOLDER.part, which is empty and which no
+# other run writes. publish_folder moves its content to FOLDER.
+claim_folder ()
+{
+  check_folder "$1"
+  claimed=$1.part
+  # awk takes an argument with a = for a variable, unless it is a path.
+  [[ $claimed == /* ]] || claimed=./$claimed
+  mkdir -p "$claimed" || die "cannot write $1; choose a folder that you can write to"
+  exec {claim}< "$claimed"
+  flock -n "$claim" || die "another run is writing $1; choose another folder," \
+    "or wait for its end"
+  find "$claimed" -mindepth 1 -delete
+}
+
+publish_folder ()
+{
+  local folder=${claimed%.part} table
+  mkdir -p "$folder"
+  # Pictures of an earlier run that the new ones would not replace.
+  for table in "$folder"/*/times.csv; do
+    [ ! -e "$table" ] || (cd "$(dirname "$table")" \
+      && cut -d, -f1 times.csv | grep -xE '[0-9]+\.png' | xargs -r rm -f)
+  done
+  cp -r "$claimed/." "$folder/"
+  rm -r "$claimed"
 }
 
 # display FAST CODED: shows the frames of two pads in a window, the fast ones on

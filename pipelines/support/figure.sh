@@ -6,11 +6,20 @@
 # Runs a pipeline that draws; prints its log only if it fails.
 play_quietly ()
 {
-  "$launcher" --what="$script" "$1" >"$out/log" 2>&1 || {
-    cat "$out/log" >&2
+  local log
+  log=$(mktemp)
+  run_step "$launcher" --what="$script" --force "$1" >"$log" 2>&1 || {
+    cat "$log" >&2
+    rm "$log"
     die "could not draw the figure; see the log above"
   }
-  rm "$out/log"
+  rm "$log"
+}
+
+first_picture ()  # first_picture FOLDER
+{
+  local files=("$1"/*.png)
+  printf '%s' "${files[0]}"
 }
 
 # A stream with the picture as its only frame.
@@ -70,9 +79,9 @@ two_by_two ()  # two_by_two WIDTH HEIGHT
 # Four pictures of a folder, each with a caption.
 captioned ()  # captioned FOLDER CAPTION...
 {
-  local k
+  local k files=("$1"/*.png)
   for k in 0 1 2 3; do
-    still "$1/00000$k.png"
+    still "${files[k]}"
     write_text "${@:k+2:1}" 24px xpad=6 ypad=6 shaded-background=true
     printf 'page.sink_%d ' "$k"
   done
@@ -83,12 +92,12 @@ take_pictures ()  # take_pictures FOLDER SECONDS BENCH-OPTION...
 {
   local folder=$1 at=$2
   shift 2
-  "$pipelines/simulate" "$@" --schedule staircase:2x2 \
+  run_step "$pipelines/simulate" "$@" --schedule staircase:2x2 \
     --frames "$(awk -v t="$at" 'BEGIN { print int(t * 25 + 1.5) }')" \
     --output "$folder/staircase.mkv"
-  "$pipelines/decode" "$folder/staircase.mkv" --method rank --start "$at" \
+  run_step "$pipelines/decode" "$folder/staircase.mkv" --method rank --start "$at" \
     --duration 0.04 --output "$folder/rank/"
-  "$pipelines/decode" "$out/coded.mkv" --start "$at" --duration 0.04 \
+  run_step "$pipelines/decode" "$out/coded.mkv" --start "$at" --duration 0.04 \
     --output "$folder/select/" --coded "$folder/coded/"
 }
 
@@ -99,12 +108,13 @@ draw_figure ()
 {
   local file=$1 at=$2 x=$3 y=$4 work
   work=$(mktemp -d)
-  take_pictures "$work" "$at" "${@:5}" >"$out/log" 2>&1 || {
-    cat "$out/log" >&2
+  take_pictures "$work" "$at" "${@:5}" >"$work/log" 2>&1 || {
+    cat "$work/log" >&2
     die "could not decode the pictures of the figure; see the log above"
   }
 
-  local coded=$work/coded/000000.png zoom=12 width=64 height=48
+  local coded zoom=12 width=64 height=48
+  coded=$(first_picture "$work/coded")
   panel "$work/a.png" "One coded frame: 768x576 pixels, exposure 40 ms" \
     "sink_1::xpos=$((x - 2)) sink_1::ypos=$((y - 2))" \
     "$(still "$coded") page.sink_0

@@ -43,11 +43,12 @@ text_of (const GstStructure *structure, const char *field)
 class Guide : public Player
 {
 public:
-  explicit Guide (const char *what) : Player (what ? what : "guide") {}
+  explicit Guide (const char *what) : Player (what ? what : "guide", false) {}
   ~Guide () override { stop (); }
 
-  /** @p stage: the simulated bench to move; null: a person moves the stage. */
-  int run (const char *stage);
+  /** @p stage: the simulated bench to move; null: a person moves the stage.
+   * @p replace: files that exist. */
+  int run (const char *stage, bool replace);
 
 private:
   static gboolean on_key (gint, GIOCondition, gpointer self)
@@ -61,7 +62,7 @@ private:
   {
     gst_element_set_state (pipeline_.get (), GST_STATE_PLAYING);
   }
-  void on_signal () override;
+  void on_signal (int times) override;
   void on_message (GstMessage *message) override;
   void on_element (const GstStructure *structure);
   void on_state (const std::string &state);
@@ -78,7 +79,7 @@ private:
 };
 
 void
-Guide::on_signal ()
+Guide::on_signal (int)
 {
   status_.line ("stopped; the mirrors show the schedule again");
   quit (is_done () ? kDone : kFailed);
@@ -204,8 +205,6 @@ Guide::on_mapping (const GstStructure *mapping)
       good, uncovered, saturated));
   for (const char *file : {"location", "report"}) {
     const std::string path = text_of (mapping, file);
-    if (!path.empty ())
-      status_.line ("wrote " + path);
     gchar *asked = nullptr;
     g_object_get (calib_.get (), file, &asked, nullptr);
     unwritten_ |= path.empty () && asked && *asked;
@@ -264,14 +263,21 @@ Guide::on_message (GstMessage *message)
 }
 
 int
-Guide::run (const char *stage)
+Guide::run (const char *stage, bool replace)
 {
+  if (!claim_outputs (replace))
+    return kFailed;
   calib_ = find ("calib");
   stage_ = find (stage);
   takes_keys_ = isatty (STDIN_FILENO) != 0;
   if (takes_keys_)
     g_unix_fd_add (STDIN_FILENO, G_IO_IN, on_key, this);
-  return loop ();
+  const int code = loop ();
+  if (!finish_outputs ())
+    return kFailed;
+  if (const std::string wrote = outputs_.summary ({}); !wrote.empty ())
+    status_.line ("wrote " + wrote);
+  return code;
 }
 
 } // namespace
@@ -280,11 +286,14 @@ int
 main (int argc, char **argv)
 {
   gchar *what = nullptr, *stage = nullptr;
+  gboolean force = FALSE;
   const GOptionEntry entries[] = {
       {"what", 0, 0, G_OPTION_ARG_STRING, &what, "Prefix of every line",
           "WORD"},
       {"stage", 0, 0, G_OPTION_ARG_STRING, &stage,
           "Element codedexposure-sim whose stage to move", "NAME"},
+      {"force", 0, 0, G_OPTION_ARG_NONE, &force, "Replace files that exist",
+          nullptr},
       {},
   };
   const char *pipeline =
@@ -296,7 +305,7 @@ main (int argc, char **argv)
   {
     Guide guide (what);
     if (guide.parse (pipeline))
-      code = guide.run (stage);
+      code = guide.run (stage, force);
   }
   g_free (what);
   g_free (stage);

@@ -10,6 +10,8 @@
 #include <string_view>
 #include <vector>
 
+#include "each_element.h"
+#include "leaky_queue.h"
 #include "player.h"
 
 namespace
@@ -20,7 +22,13 @@ using namespace report;
 using Clock = std::chrono::steady_clock;
 
 /* Exit status; the scripts use it. */
-enum ExitCode { kDone = 0, kFailed = 1, kUsage = 2, kNobodyListens = 4 };
+enum ExitCode {
+  kDone = 0,
+  kFailed = 1,
+  kUsage = 2,
+  kNobodyListens = 4,
+  kNoFrame = 5
+};
 
 struct Options {
   gchar *what = nullptr;     // prefix of every line
@@ -30,50 +38,18 @@ struct Options {
   gdouble retry = 0;         // time for which to try to connect, s
   gdouble start = 0;         // time at which to start, s
   gdouble duration = 0;      // time to play, s; 0: all
-  gdouble shift_to = -1; // running time of the first frame, s; -1: unchanged
-};
-
-/** Counts the frames that a leaky queue drops, because the queue does not. */
-class LeakyQueue
-{
-public:
-  explicit LeakyQueue (GstElement *queue) : name_ (GST_OBJECT_NAME (queue))
-  {
-    count (queue, "sink", in_);
-    count (queue, "src", out_);
-  }
-  LeakyQueue (const LeakyQueue &) = delete;
-  LeakyQueue &operator= (const LeakyQueue &) = delete;
-
-  std::string counters () const
-  {
-    return format ("%s: in=%" G_GINT64_FORMAT " skipped=%" G_GINT64_FORMAT,
-        name_.c_str (), in_.load (), in_.load () - out_.load ());
-  }
-
-private:
-  static void count (
-      GstElement *queue, const char *pad_name, std::atomic<gint64> &buffers)
-  {
-    const ObjectPtr<GstPad> pad (gst_element_get_static_pad (queue, pad_name));
-    gst_pad_add_probe (
-        pad.get (), GST_PAD_PROBE_TYPE_BUFFER,
-        [] (GstPad *, GstPadProbeInfo *, gpointer counter) {
-          (*static_cast<std::atomic<gint64> *> (counter))++;
-          return GST_PAD_PROBE_OK;
-        },
-        &buffers, nullptr);
-  }
-
-  std::string name_;
-  std::atomic<gint64> in_ = 0, out_ = 0;
+  gdouble shift_to = -1;    // running time of the first frame, s; -1: unchanged
+  gchar *need = nullptr;    // name of an element message that must come
+  gboolean force = FALSE;   // replace files that exist
+  gboolean verbose = FALSE; // also print messages and counters of elements
 };
 
 class Launch : public Player
 {
 public:
   explicit Launch (const Options &options)
-      : Player (options.what ? options.what : "launch"), options_ (options)
+      : Player (options.what ? options.what : "launch", options.verbose),
+        options_ (options)
   {
   }
   ~Launch () override { stop (); }
@@ -84,22 +60,27 @@ private:
   bool connect_counter ();
   void end_at_the_limit ();
   void watch_leaky_queues ();
-  template <typename Visit>
-  void for_each_element (Visit visit);
   void begin () override;
   bool has_receiver ();
   void seek ();
   void play ();
-  void on_signal () override;
+  void on_signal (int times) override;
   void on_message (GstMessage *message) override;
   void on_error (GstMessage *message);
   void on_element_message (GstMessage *message);
+  void end_after_error ();
   void tick ();
-  void summarise ();
+  int finish (int code);
+  void print_counters ();
   static gboolean on_tick (gpointer self)
   {
     static_cast<Launch *> (self)->tick ();
     return G_SOURCE_CONTINUE;
+  }
+  static gboolean on_end_timeout (gpointer self)
+  {
+    static_cast<Launch *> (self)->quit (kFailed);
+    return G_SOURCE_REMOVE;
   }
   static gboolean on_held (gpointer self)
   {
@@ -127,7 +108,10 @@ private:
   gulong hold_ = 0; // probe that holds the first frame until the seek
   bool held_ = false;
   bool playing_ = false;
+  std::string noticed_; // the last notice
   bool interrupted_ = false;
+  bool said_needed_ = false; // the needed message came
+  bool failed_ = false;      // the stream ends because of an error
 };
 
 constexpr GstClockTime
@@ -284,24 +268,10 @@ Launch::on_limited_frame (GstPad *pad, GstPadProbeInfo *info, gpointer self)
   return GST_PAD_PROBE_HANDLED;
 }
 
-template <typename Visit>
-void
-Launch::for_each_element (Visit visit)
-{
-  GstIterator *elements = gst_bin_iterate_recurse (GST_BIN (pipeline_.get ()));
-  GValue item = G_VALUE_INIT;
-  while (gst_iterator_next (elements, &item) == GST_ITERATOR_OK) {
-    visit (GST_ELEMENT (g_value_get_object (&item)));
-    g_value_reset (&item);
-  }
-  g_value_unset (&item);
-  gst_iterator_free (elements);
-}
-
 void
 Launch::watch_leaky_queues ()
 {
-  for_each_element ([this] (GstElement *element) {
+  for_each_element (pipeline_.get (), [this] (GstElement *element) {
     gint leaky = 0;
     if (g_object_class_find_property (G_OBJECT_GET_CLASS (element), "leaky"))
       g_object_get (element, "leaky", &leaky, nullptr);
@@ -313,10 +283,10 @@ Launch::watch_leaky_queues ()
 void
 Launch::play ()
 {
-  playing_ = true;
   began_ = Clock::now ();
   cpu_at_start_ = cpu_seconds ();
-  gst_element_set_state (pipeline_.get (), GST_STATE_PLAYING);
+  playing_ = gst_element_set_state (pipeline_.get (), GST_STATE_PLAYING) !=
+             GST_STATE_CHANGE_FAILURE;
 }
 
 /* A paused sink accepts receivers, so they do not miss the first frame. */
@@ -343,40 +313,82 @@ Launch::begin ()
 int
 Launch::run ()
 {
-  if (!connect_counter ())
+  if (!connect_counter () || !claim_outputs (options_.force, counted_.get ()))
     return kFailed;
   watch_leaky_queues ();
   end_at_the_limit ();
   const guint ticks = g_timeout_add (200, on_tick, this);
   const int code = loop ();
   g_source_remove (ticks);
-  if (code != kDone || !counted_)
-    return code;
-  if (frames_ == 0) {
+  return finish (code);
+}
+
+/* Prints the result and returns the exit status. */
+int
+Launch::finish (int code)
+{
+  if (code == kDone && counted_ && frames_ == 0) {
     status_.line (options_.start > 0
                       ? format ("error: no coded frame arrived; check whether "
                                 "%g s is after the end",
                             options_.start)
                       : "error: no coded frame arrived");
+    code = kNoFrame;
+  } else if (code == kFailed && counted_ && frames_ == 0)
+    code = kNoFrame;
+  if (options_.verbose && frames_ > 0)
+    print_counters ();
+  const std::string flaws = flaws_of (pipeline_.get ());
+  if (!finish_outputs ())
     return kFailed;
-  }
-  summarise ();
+  const std::string wrote = outputs_.summary (guint64 (frames_));
+  if (code != kDone && !wrote.empty ())
+    status_.line ("kept what was complete: " + wrote);
+  if (code == kDone && options_.need)
+    return said_needed_ ? kDone : kFailed;
+  if (code != kDone || (!counted_ && wrote.empty ()))
+    return code;
+  std::string result;
+  if (counted_)
+    result = format ("%" G_GINT64_FORMAT " coded frames", frames_.load ()) +
+             flaws + (wrote.empty () ? "" : "; ");
+  status_.line (result + (wrote.empty () ? "" : "wrote " + wrote));
   return kDone;
 }
 
 /* The first signal ends the stream, so that files are finished; the second
  * stops immediately. */
 void
-Launch::on_signal ()
+Launch::on_signal (int times)
 {
-  if (interrupted_ || !playing_) {
+  if (times > 1 || !playing_ || failed_) {
     status_.line ("stopped");
     quit (kFailed);
     return;
   }
-  interrupted_ = true;
+  if (std::exchange (interrupted_, true))
+    return;
   status_.line ("stopping; press Ctrl-C again to stop immediately");
   gst_element_send_event (pipeline_.get (), gst_event_new_eos ());
+}
+
+/* Ends the stream, so that the frames before the error are in finished files.
+ * A blocked element does not pass the end on. */
+void
+Launch::end_after_error ()
+{
+  constexpr guint kPatience = 5; // s
+  if (std::exchange (failed_, true))
+    return;
+  /* An error also ends a change of the state. */
+  if (!playing_ || outputs_.empty () ||
+      gst_element_set_state (pipeline_.get (), GST_STATE_PLAYING) ==
+          GST_STATE_CHANGE_FAILURE) {
+    quit (kFailed);
+    return;
+  }
+  gst_element_send_event (pipeline_.get (), gst_event_new_eos ());
+  g_timeout_add_seconds (kPatience, on_end_timeout, this);
 }
 
 void
@@ -416,19 +428,24 @@ Launch::on_error (GstMessage *message)
     status_.line (
         "the camera sent nothing for 2 s; check that the DMD runs and is "
         "wired to the camera's trigger line");
-  quit (kFailed);
+  end_after_error ();
 }
 
-/* Prints the messages of this plugin: synchronisation, slips, lost frames. */
+/* Losses are warnings; all messages of this plugin are for --verbose. */
 void
 Launch::on_element_message (GstMessage *message)
 {
   const GstStructure *structure = gst_message_get_structure (message);
   const std::string_view name = gst_structure_get_name (structure);
-  if (name.substr (0, 14) != "codedexposure/" &&
-      name.substr (0, 8) != "dmdsync/" && name.substr (0, 11) != "moirecalib/")
-    return;
-  status_.line (fields_of (message));
+  said_needed_ |= options_.need && name == options_.need;
+  if (options_.verbose &&
+      (name.starts_with ("codedexposure/") || name.starts_with ("dmdsync/") ||
+          name.starts_with ("moirecalib/")))
+    status_.line (fields_of (message));
+  const std::string text = notice (structure);
+  /* dmdsync and demux report the same loss. */
+  if (!text.empty () && std::exchange (noticed_, text) != text)
+    status_.line (text);
 }
 
 void
@@ -436,16 +453,18 @@ Launch::on_message (GstMessage *message)
 {
   switch (GST_MESSAGE_TYPE (message)) {
   case GST_MESSAGE_EOS:
-    quit (kDone);
+    quit (failed_ ? kFailed : kDone);
     break;
   case GST_MESSAGE_ERROR:
-    on_error (message);
+    if (!failed_) // others follow from the first
+      on_error (message);
     break;
   case GST_MESSAGE_WARNING:
     status_.line ("warning: " + warned (message));
     break;
   case GST_MESSAGE_INFO:
-    status_.line ("info: " + noted (message));
+    if (options_.verbose)
+      status_.line ("info: " + noted (message));
     break;
   case GST_MESSAGE_PROGRESS: {
     GstProgressType type;
@@ -502,19 +521,16 @@ Launch::tick ()
 }
 
 void
-Launch::summarise ()
+Launch::print_counters ()
 {
   const double seconds =
       std::chrono::duration<double> (Clock::now () - began_).count ();
   const double cpu = cpu_seconds () - cpu_at_start_;
   status_.line (
-      format ("%" G_GINT64_FORMAT
-              " coded frames in %.1f s, %.1f frames/s, %.0f %% of one "
-              "processor core",
-          frames_.load (), seconds, double (frames_) / seconds,
-          100 * cpu / seconds));
+      format ("%.1f s, %.1f coded frames/s, %.0f %% of one processor core",
+          seconds, double (frames_) / seconds, 100 * cpu / seconds));
 
-  for_each_element ([this] (GstElement *element) {
+  for_each_element (pipeline_.get (), [this] (GstElement *element) {
     const std::string counters = counters_of (element);
     if (!counters.empty ())
       status_.line (counters);
@@ -547,6 +563,12 @@ main (int argc, char **argv)
           "Duration to play", "SECONDS"},
       {"shift-to", 0, 0, G_OPTION_ARG_DOUBLE, &options.shift_to,
           "Running time for the first counted frame", "SECONDS"},
+      {"need", 0, 0, G_OPTION_ARG_STRING, &options.need,
+          "Element message without which the run has failed", "NAME"},
+      {"force", 0, 0, G_OPTION_ARG_NONE, &options.force,
+          "Replace files that exist", nullptr},
+      {"verbose", 0, 0, G_OPTION_ARG_NONE, &options.verbose,
+          "Print messages and counters of the elements", nullptr},
       {},
   };
   const char *pipeline =
@@ -563,6 +585,7 @@ main (int argc, char **argv)
   g_free (options.what);
   g_free (options.count);
   g_free (options.receiver);
+  g_free (options.need);
   gst_deinit ();
   return code;
 }

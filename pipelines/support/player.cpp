@@ -3,6 +3,7 @@
 
 #include <csignal>
 #include <cstdio>
+#include <iterator>
 #include <string>
 
 #include <glib-unix.h>
@@ -10,8 +11,8 @@
 using namespace codedexposure::gst;
 using report::format;
 
-Player::Player (const char *what)
-    : status_ (what), loop_ (g_main_loop_new (nullptr, FALSE))
+Player::Player (const char *what, bool verbose)
+    : status_ (what, verbose), loop_ (g_main_loop_new (nullptr, FALSE))
 {
 }
 
@@ -62,6 +63,35 @@ Player::say_missing (GstParseContext *context)
   return said;
 }
 
+bool
+Player::claim_outputs (bool replace, GstPad *coded)
+{
+  const auto errors = outputs_.claim (pipeline_.get (), coded, replace);
+  for (const std::string &error : errors)
+    status_.line ("error: " + error);
+  return errors.empty ();
+}
+
+bool
+Player::finish_outputs ()
+{
+  stop ();
+  const auto errors = outputs_.finish ();
+  for (const std::string &error : errors)
+    status_.line ("error: " + error);
+  return errors.empty ();
+}
+
+/* A script passes a signal on that its terminal has sent here as well; only the
+ * same signal again is another one. */
+gboolean
+Player::on_unix_signal (gpointer data)
+{
+  auto *signal = static_cast<Signal *> (data);
+  signal->player->on_signal (++signal->times);
+  return G_SOURCE_CONTINUE;
+}
+
 int
 Player::loop ()
 {
@@ -69,17 +99,18 @@ Player::loop ()
     static_cast<Player *> (self)->on_message (message);
     return gboolean (G_SOURCE_CONTINUE);
   };
-  const auto on_unix_signal = [] (gpointer self) {
-    static_cast<Player *> (self)->on_signal ();
-    return gboolean (G_SOURCE_CONTINUE);
-  };
   const ObjectPtr<GstBus> bus (gst_element_get_bus (pipeline_.get ()));
   gst_bus_add_watch (bus.get (), on_bus, this);
-  const guint signals[] = {g_unix_signal_add (SIGINT, on_unix_signal, this),
-      g_unix_signal_add (SIGTERM, on_unix_signal, this)};
+  /* The reader of the messages may be gone. */
+  std::signal (SIGPIPE, SIG_IGN);
+  Signal signals[] = {{this, SIGINT}, {this, SIGTERM}, {this, SIGHUP}};
+  guint sources[std::size (signals)];
+  for (std::size_t i = 0; i < std::size (signals); i++)
+    sources[i] =
+        g_unix_signal_add (signals[i].number, on_unix_signal, &signals[i]);
   begin ();
   g_main_loop_run (loop_);
-  for (const guint source : signals)
+  for (const guint source : sources)
     g_source_remove (source);
   gst_bus_remove_watch (bus.get ());
   return code_;

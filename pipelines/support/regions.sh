@@ -63,7 +63,9 @@ strip ()  # strip FOLDER WIDTH HEIGHT TEXT
 draw_regions ()
 {
   local file=$1 pads='' branches='' placed=0 bottom frame=() half i=0 rect
-  local coded=$out/coded/000000.png fused=$out/fused/000000.png w h x y
+  local coded fused w h x y
+  coded=$(first_picture "$out/coded")
+  fused=$(first_picture "$out/fused")
   shift
   read -r -a frame <<< "$(size_of "$fused")"
   half=$(((sheet_width - sheet_gap) / 2))

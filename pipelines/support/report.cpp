@@ -4,12 +4,14 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdarg>
 #include <cstdio>
 #include <cstring>
 #include <utility>
 
 #include "common/raii.h"
+#include "each_element.h"
 
 namespace report
 {
@@ -247,8 +249,79 @@ counters_of (GstElement *element)
                            : GST_OBJECT_NAME (element) + (":" + counters);
 }
 
-Status::Status (std::string what)
-    : what_ (std::move (what)), terminal_ (isatty (STDERR_FILENO) != 0)
+namespace
+{
+
+std::string
+number_in (const GstStructure *message, const char *field)
+{
+  const GValue *value = gst_structure_get_value (message, field);
+  return value ? value_text (value) : "?";
+}
+
+std::string
+seconds_in (const GstStructure *message, const char *field)
+{
+  guint64 time = 0;
+  gst_structure_get_uint64 (message, field, &time);
+  return format ("%.3f s", 1e-9 * double (time));
+}
+
+} // namespace
+
+std::string
+notice (const GstStructure *message)
+{
+  const std::string_view name = gst_structure_get_name (message);
+  const auto number = [&] (const char *field) {
+    return number_in (message, field);
+  };
+  if (name == "dmdsync/frames-lost" || name == "codedexposure/frames-lost")
+    return "warning: coded frames were lost before " +
+           seconds_in (message, "to") + ": " + number ("count");
+  if (name == "dmdsync/frame-incomplete")
+    return "warning: frame " + number ("frame") +
+           " arrived incomplete; check the connection of the camera";
+  if (name == "dmdsync/frame-late")
+    return "warning: frame " + number ("frame") + " arrived after the next one";
+  if (name == "dmdsync/slip")
+    return "warning: from frame " + number ("frame") + " on, the mirrors are " +
+           number ("slots") + " slots late; these frames are flagged";
+  if (name == "codedexposure/camera-back")
+    return "the camera sends frames again, after " +
+           seconds_in (message, "silent");
+  if (name == "moirecalib/phase")
+    return "phase found: --schedule " + number ("schedule");
+  return {};
+}
+
+std::string
+flaws_of (GstElement *pipeline)
+{
+  constexpr struct {
+    const char *counter, *text;
+  } kFlaws[] = {{"frames-lost", "lost"}, {"frames-corrupted", "corrupted"},
+      {"frames-incomplete", "incomplete"}, {"frames-late", "late"},
+      {"frames-duplicate", "duplicate"}, {"frames-skipped", "skipped"},
+      {"slips", "losses of synchronisation"}};
+  std::string text;
+  for (const auto &[counter, word] : kFlaws) {
+    guint64 most = 0; // several elements count the same frames
+    for_each_element (pipeline, [&] (GstElement *element) {
+      guint64 count = 0;
+      if (const StructurePtr stats = stats_of (element))
+        gst_structure_get_uint64 (stats.get (), counter, &count);
+      most = std::max (most, count);
+    });
+    if (most > 0)
+      text += format (", %" G_GUINT64_FORMAT " %s", most, word);
+  }
+  return text;
+}
+
+Status::Status (std::string what, bool verbose)
+    : what_ (std::move (what)), terminal_ (isatty (STDERR_FILENO) != 0),
+      verbose_ (verbose)
 {
 }
 
@@ -258,7 +331,7 @@ Status::progress (const std::string &text)
   if (terminal_) {
     std::fprintf (stderr, "\r%s: %s\033[K", what_.c_str (), text.c_str ());
     open_ = true;
-  } else if (Clock::now () >= next_) {
+  } else if (verbose_ && Clock::now () >= next_) {
     std::fprintf (stderr, "%s: %s\n", what_.c_str (), text.c_str ());
     next_ = Clock::now () + std::chrono::seconds (10);
   }

@@ -36,18 +36,26 @@ std::string noted (GstMessage *message);
 /** "name: field=value ..." of an element message. */
 std::string fields_of (GstMessage *message);
 
+/** An element message about frames that were lost or damaged, as a warning for
+ * the user; empty: it is about something else. */
+std::string notice (const GstStructure *message);
+
+/** ", 3 lost, 1 corrupted": coded frames of @p pipeline, from the counters of
+ * its elements; empty: none. */
+std::string flaws_of (GstElement *pipeline);
+
 /** "name: counter=value ...": the counters in the property stats of an element
  * of this plugin (without stats: its read-only numbers), or the shown and late
  * frames of a video sink; empty for other elements. */
 std::string counters_of (GstElement *element);
 
-/** Prints lines to stderr. Progress rewrites the last line on a terminal, and
- * is one line every ten seconds in a log. */
+/** Prints lines to stderr. Progress rewrites the last line on a terminal. In a
+ * log, it is a line every ten seconds if @p verbose. */
 class Status
 {
 public:
   /** @p what  prefix of every line. */
-  explicit Status (std::string what);
+  Status (std::string what, bool verbose);
   void progress (const std::string &text);
   void line (const std::string &text);
 
@@ -55,7 +63,7 @@ private:
   using Clock = std::chrono::steady_clock;
 
   std::string what_;
-  bool terminal_;
+  bool terminal_, verbose_;
   bool open_ = false; // the last line on the terminal is progress
   Clock::time_point next_ = Clock::now () + std::chrono::seconds (2);
 };

@@ -77,7 +77,7 @@ done_testing ()
 # Runs a pipeline, quietly.
 play ()
 {
-  "$programs/codedexposure-launch" "$*"
+  "$programs/codedexposure-launch" --force "$*"
 }
 
 # The pixels of a recording, one after the other.

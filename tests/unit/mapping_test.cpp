@@ -4,8 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <csignal>
 #include <cstdio>
 #include <numbers>
+
+#include <sys/resource.h>
 
 #include <gtest/gtest.h>
 
@@ -300,6 +303,28 @@ TEST (MappingJson, OfAFile)
       "directory");
   EXPECT_NE (Mapping::load ("/dev/zero").error ().message.find ("more than"),
       std::string::npos);
+}
+
+TEST (MappingJson, AFailedSaveKeepsTheFile)
+{
+  const std::string path = testing::TempDir () + "mapping_test_kept.json";
+  const Mapping mapping = made (all_parts ());
+  ASSERT_TRUE (mapping.save (path).ok ());
+  const auto handler = std::signal (SIGXFSZ, SIG_IGN);
+  rlimit limit = {};
+  getrlimit (RLIMIT_FSIZE, &limit);
+  const rlimit full = {16, limit.rlim_max}; // bytes
+  setrlimit (RLIMIT_FSIZE, &full);
+  const auto saved = mapping.save (path);
+  setrlimit (RLIMIT_FSIZE, &limit);
+  std::signal (SIGXFSZ, handler);
+  const auto read = Mapping::load (path);
+  std::remove (path.c_str ());
+  ASSERT_FALSE (saved.ok ());
+  EXPECT_NE (saved.error ().message.find ("too large"), std::string::npos)
+      << saved.error ().message;
+  ASSERT_TRUE (read.ok ()) << read.error ().message;
+  EXPECT_EQ (*read, mapping);
 }
 
 TEST (StreamSetup, CarriesAMappingBesideTheSchedule)

@@ -68,6 +68,14 @@ post_progress (gpointer element, GstProgressType type, const char *code,
                                  type, code, text.c_str ()));
 }
 
+GstClockTime
+running_time (const GstSegment &segment, GstClockTime time)
+{
+  return segment.format == GST_FORMAT_TIME
+             ? gst_segment_to_running_time (&segment, GST_FORMAT_TIME, time)
+             : GST_CLOCK_TIME_NONE;
+}
+
 void
 add_latency (GstQuery *query, GstClockTime own)
 {

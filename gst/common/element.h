@@ -58,6 +58,31 @@ install_state (gpointer klass)
   };
 }
 
+/**
+ * For the class of a final type: calls @p Begin from READY to PAUSED, before
+ * frames and events can come, and @p End from PAUSED to READY, when none can
+ * come any more. GstBaseTransform's start () and stop () run beside the
+ * streaming thread. If @p Begin returns false, it has posted an error.
+ */
+template <auto Begin, auto End>
+void
+install_run (gpointer klass)
+{
+  GST_ELEMENT_CLASS (klass)->change_state =
+      [] (GstElement *element, GstStateChange transition) noexcept {
+        const bool begins = transition == GST_STATE_CHANGE_READY_TO_PAUSED;
+        auto changed = GST_STATE_CHANGE_FAILURE;
+        if (!begins || Begin (element))
+          changed = GST_ELEMENT_CLASS (
+              g_type_class_peek_parent (G_OBJECT_GET_CLASS (element)))
+                        ->change_state (element, transition);
+        if (transition == GST_STATE_CHANGE_PAUSED_TO_READY ||
+            (begins && changed == GST_STATE_CHANGE_FAILURE))
+          End (element);
+        return changed;
+      };
+}
+
 /** The class of GstBaseTransform, to call its default implementations. */
 GstBaseTransformClass *base_transform_class ();
 
@@ -65,6 +90,9 @@ GstBaseTransformClass *base_transform_class ();
 void post_latency (gpointer element);
 void post_progress (gpointer element, GstProgressType type, const char *code,
     const std::string &text);
+
+/** The running time of @p time; none in a segment that does not count time. */
+GstClockTime running_time (const GstSegment &segment, GstClockTime time);
 
 /** Adds @p own to the latency in @p query, which upstream has answered. The
  * maximum moves with the minimum, because both count from the PTS. */

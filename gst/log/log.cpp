@@ -83,8 +83,7 @@ frame_line (const LogState &state, GstBuffer *frame, const GstSegment &segment)
   const auto meta = get_frame_meta (frame);
   const auto set_time = [&segment] (nlohmann::ordered_json &line,
                             const char *key, GstClockTime time) {
-    const guint64 running =
-        gst_segment_to_running_time (&segment, GST_FORMAT_TIME, time);
+    const GstClockTime running = running_time (segment, time);
     if (GST_CLOCK_TIME_IS_VALID (running))
       line[key] = running;
   };
@@ -185,10 +184,10 @@ sink_event (GstBaseTransform *base, GstEvent *event) noexcept
       ->sink_event (base, event);
 }
 
-gboolean
-start (GstBaseTransform *base) noexcept
+bool
+begin_run (GstElement *element)
 {
-  auto *self = GST_CODED_EXPOSURE_LOG (base);
+  auto *self = GST_CODED_EXPOSURE_LOG (element);
   LogState &state = *self->state;
   std::string location;
   {
@@ -201,16 +200,15 @@ start (GstBaseTransform *base) noexcept
   if (location.empty ()) {
     POST_ERROR (self, RESOURCE, NOT_FOUND,
         "codedexposure-log has no file to write to: set location=FILE.jsonl");
-    return FALSE;
+    return false;
   }
   return state.file.open (self, location);
 }
 
-gboolean
-stop (GstBaseTransform *base)
+void
+end_run (GstElement *element)
 {
-  state_in<GstCodedExposureLog> (base).file.close ();
-  return TRUE;
+  state_in<GstCodedExposureLog> (element).file.close ();
 }
 
 const PropertyTable<LogState> &
@@ -236,12 +234,11 @@ static void
 gst_coded_exposure_log_class_init (GstCodedExposureLogClass *klass)
 {
   install_state<GstCodedExposureLog, properties> (klass);
+  install_run<begin_run, end_run> (klass);
   describe_element (klass, "Coded exposure frame log", "Filter/Analyzer/Video",
       "Writes what is known of every coded frame to a file of JSON lines");
 
   auto *transform_class = GST_BASE_TRANSFORM_CLASS (klass);
-  transform_class->start = GST_DEBUG_FUNCPTR (start);
-  transform_class->stop = GST_DEBUG_FUNCPTR (stop);
   transform_class->set_caps = GST_DEBUG_FUNCPTR (set_caps);
   transform_class->sink_event = GST_DEBUG_FUNCPTR (sink_event);
   transform_class->transform_ip = GST_DEBUG_FUNCPTR (transform_ip);

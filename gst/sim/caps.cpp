@@ -27,7 +27,7 @@ schedule_of (GstCodedExposureSim *self)
   const SimState &st = state (self);
   if (st.schedule)
     return st.schedule;
-  if (const auto &read = st.settings.schedule.read; *read)
+  if (const auto &read = st.settings.schedule.read; read && *read)
     return {read, &read->value ()};
   return std::make_shared<const Schedule> ();
 }

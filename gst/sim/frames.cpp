@@ -33,8 +33,9 @@ use_schedule (GstCodedExposureSim *self, ScheduleRef schedule)
   state (self).schedule = std::move (schedule);
 }
 
-/* The schedule that the DMD was programmed with, else that of the property.
- * Null, with an error on the bus, when that one cannot be read. */
+/* The schedule that the DMD was programmed with, else that of the property,
+ * else the default. Null, with an error on the bus, when that one cannot be
+ * read. */
 ScheduleRef
 wanted_schedule (GstCodedExposureSim *self)
 {
@@ -48,6 +49,8 @@ wanted_schedule (GstCodedExposureSim *self)
     const ObjectLock lock (self);
     parsed = state (self).settings.schedule.read;
   }
+  if (!parsed)
+    return std::make_shared<const Schedule> ();
   if (parsed->ok ())
     return ScheduleRef (parsed, &parsed->value ());
   POST_ERROR (self, RESOURCE, SETTINGS,

@@ -121,23 +121,22 @@ parent_class ()
   return GST_BASE_TRANSFORM_CLASS (gst_coded_exposure_sim_parent_class);
 }
 
-gboolean
-start (GstBaseTransform *trans)
+bool
+begin_run (GstElement *element)
 {
-  auto *self = GST_CODED_EXPOSURE_SIM (trans);
+  auto *self = GST_CODED_EXPOSURE_SIM (element);
   read_again (self, self->state->settings.schedule);
   return sim::begin_stream (self);
 }
 
-gboolean
-stop (GstBaseTransform *trans)
+void
+end_run (GstElement *element)
 {
-  SimState &st = *GST_CODED_EXPOSURE_SIM (trans)->state;
+  SimState &st = *GST_CODED_EXPOSURE_SIM (element)->state;
   st.stream = sim::Stream ();
-  const ObjectLock lock (trans);
+  const ObjectLock lock (element);
   st.schedule.reset ();
   st.latency = 0;
-  return TRUE;
 }
 
 gboolean
@@ -204,13 +203,12 @@ static void
 gst_coded_exposure_sim_class_init (GstCodedExposureSimClass *klass)
 {
   sim::install_own_state (klass);
+  install_run<begin_run, end_run> (klass);
 
   auto *transform = GST_BASE_TRANSFORM_CLASS (klass);
   /* A video filter works in place where it can; a coded frame needs a buffer
    * of its own while input frames come. */
   transform->transform_ip = nullptr;
-  transform->start = GST_DEBUG_FUNCPTR (start);
-  transform->stop = GST_DEBUG_FUNCPTR (stop);
   transform->transform_caps = GST_DEBUG_FUNCPTR (sim::transform_caps);
   transform->fixate_caps = GST_DEBUG_FUNCPTR (sim::fixate_caps);
   transform->sink_event = GST_DEBUG_FUNCPTR (sink_event);

@@ -152,10 +152,10 @@ properties ()
   return table;
 }
 
-gboolean
-start (GstBaseTransform *base) noexcept
+bool
+begin_run (GstElement *element)
 {
-  auto *self = GST_SUBFRAME_STATS (base);
+  auto *self = GST_SUBFRAME_STATS (element);
   StatsState &state = *self->state;
   {
     const ObjectLock lock (self);
@@ -169,23 +169,22 @@ start (GstBaseTransform *base) noexcept
     if (!line) {
       POST_ERROR (self, RESOURCE, SETTINGS,
           "The line property cannot be read: " + line.error ().message);
-      return FALSE;
+      return false;
     }
     state.options.line = *line;
   }
   if (settings.location.empty ())
-    return TRUE;
+    return true;
   return state.file.open (self, settings.location) &&
          (settings.format != Format::csv || state.file.write (kCsvHead));
 }
 
-gboolean
-stop (GstBaseTransform *base)
+void
+end_run (GstElement *element)
 {
-  StatsState &state = state_in<GstSubframeStats> (base);
+  StatsState &state = state_in<GstSubframeStats> (element);
   state.file.close ();
   state.meter = {};
-  return TRUE;
 }
 
 template <typename Pixel>
@@ -193,6 +192,7 @@ bool
 make_meter_of (GstSubframeStats *self)
 {
   StatsState &state = *self->state;
+  state.meter = {};
   auto made = StatsMeter<Pixel>::make (
       {state.info.width, state.info.height}, state.options);
   if (!made) {
@@ -274,8 +274,7 @@ describe (GstSubframeStats *self, GstBuffer *frame)
   const GstClockTime pts = GST_BUFFER_PTS (frame);
   const StatsReport report{meta ? meta->frame : counted,
       meta ? meta->subframe : -1, pts,
-      gst_segment_to_running_time (
-          &GST_BASE_TRANSFORM (self)->segment, GST_FORMAT_TIME, pts),
+      running_time (GST_BASE_TRANSFORM (self)->segment, pts),
       flag_names (frame), *stats};
 
   const GstStructure *fields = set_stats_meta (frame, report);
@@ -326,13 +325,12 @@ static void
 gst_subframe_stats_class_init (GstSubframeStatsClass *klass)
 {
   install_state<GstSubframeStats, properties> (klass);
+  install_run<begin_run, end_run> (klass);
   describe_element (klass, "Subframe statistics", "Filter/Analyzer/Video",
       "Measures intensity, entropy, histogram and a line profile of every "
       "picture");
 
   auto *transform_class = GST_BASE_TRANSFORM_CLASS (klass);
-  transform_class->start = GST_DEBUG_FUNCPTR (start);
-  transform_class->stop = GST_DEBUG_FUNCPTR (stop);
   transform_class->set_caps = GST_DEBUG_FUNCPTR (set_caps);
   transform_class->generate_output = GST_DEBUG_FUNCPTR (generate_output);
 }

@@ -159,8 +159,9 @@ CodedFilter::admit (BufferPtr frame)
     count (&CodedCounters::frames_corrupted);
     notify ("stats");
   }
-  const FrameStep step =
-      stream_.sequence->take (Nanoseconds (pts), backwards ());
+  FrameStep step = stream_.sequence->take (Nanoseconds (pts), backwards ());
+  if (step.arrival == Arrival::behind)
+    step = stream_.sequence->restart (Nanoseconds (pts));
   if (step.arrival == Arrival::after_loss)
     report_loss (pts, step.lost);
   else if (step.arrival != Arrival::next && step.arrival != Arrival::first)

@@ -158,6 +158,7 @@ take_arrival (GstDmdSync *self, const Frame &frame)
   Stream &stream = state (self).stream;
   switch (frame.step.arrival) {
   case Arrival::duplicate:
+  case Arrival::behind:
     count (self, &Counters::frames_duplicate);
     return drop (self, frame, "duplicate");
   case Arrival::after_loss:
@@ -306,11 +307,8 @@ place_after_restart (GstDmdSync *self, Frame &frame)
   begin_phase (self);
   const GstClockTime time = pipeline_time (self, buffer);
 
-  const auto away = Nanoseconds (time - std::min (time, stream.last_time));
-  const Nanoseconds period = stream.time->rate.period ();
-  const auto periods = guint64 ((away + period / 2) / period);
   frame.step = stream.sequence->take_after (
-      came, periods - std::min<guint64> (periods, 1));
+      came, Nanoseconds (time - std::min (time, stream.last_time)));
   return time;
 }
 
@@ -335,6 +333,7 @@ place (GstDmdSync *self, Frame &frame)
     watch_rate (self, came);
   }
   if (frame.step.arrival != Arrival::late &&
+      frame.step.arrival != Arrival::behind &&
       frame.step.arrival != Arrival::duplicate)
     stream.last_time = time;
   return time;

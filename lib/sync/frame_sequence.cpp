@@ -16,63 +16,97 @@ FrameSequence::FrameSequence (FrameRate rate, std::uint64_t first)
 {
 }
 
+std::uint64_t
+FrameSequence::periods (Nanoseconds span) const
+{
+  return std::uint64_t ((span + period_ / 2) / period_);
+}
+
 void
 FrameSequence::resync ()
 {
   last_.reset ();
-  last_was_late_ = false;
+  stepped_back_ = false;
+  lost_.clear ();
 }
 
 FrameStep
-FrameSequence::restart (Nanoseconds time, Arrival arrival)
+FrameSequence::begin (Nanoseconds time, Arrival arrival)
 {
+  resync ();
   last_ = time;
-  last_was_late_ = false;
   return {.arrival = arrival, .number = next_number_++};
 }
 
 FrameStep
-FrameSequence::take_after (Nanoseconds time, std::uint64_t lost)
+FrameSequence::restart (Nanoseconds time)
 {
+  return begin (time, Arrival::restarted);
+}
+
+FrameStep
+FrameSequence::take_after (Nanoseconds time, Nanoseconds away)
+{
+  if (away < period_ / 4 * 3) {
+    resync ();
+    last_ = time;
+    return {.arrival = Arrival::duplicate,
+        .number = next_number_ - std::min<std::uint64_t> (next_number_, 1)};
+  }
+  const std::uint64_t lost = std::max<std::uint64_t> (periods (away), 1) - 1;
   next_number_ += lost;
-  FrameStep step =
-      restart (time, lost > 0 ? Arrival::after_loss : Arrival::next);
+  FrameStep step = begin (time, lost > 0 ? Arrival::after_loss : Arrival::next);
   step.lost = lost;
   return step;
+}
+
+FrameStep
+FrameSequence::step_back (Nanoseconds time, Nanoseconds by)
+{
+  if (stepped_back_ || by > kRestartAfter)
+    return restart (time);
+  stepped_back_ = true;
+  const std::uint64_t newest = next_number_ - 1;
+  const std::uint64_t number = newest - std::min (newest, periods (by));
+  return {.arrival = lost_.erase (number) > 0 ? Arrival::late : Arrival::behind,
+      .number = number};
+}
+
+/** Before the frame that comes next; those that are older than a restart never
+ * come. */
+void
+FrameSequence::note_lost (std::uint64_t lost)
+{
+  const std::uint64_t most = periods (kRestartAfter) + 1;
+  const std::uint64_t end = next_number_ + lost;
+  lost_.erase (lost_.begin (), lost_.lower_bound (end - std::min (end, most)));
+  for (std::uint64_t number = end - std::min (lost, most); number < end;
+       number++)
+    lost_.insert (number);
 }
 
 FrameStep
 FrameSequence::take (Nanoseconds time, bool reverse)
 {
   if (!last_)
-    return restart (time, Arrival::first);
+    return begin (time, Arrival::first);
 
   const Nanoseconds step = reverse ? *last_ - time : time - *last_;
-  const auto periods = [this] (Nanoseconds span) {
-    return std::uint64_t ((span + period_ / 2) / period_);
-  };
-
   if (std::max (step, -step) < period_ / 4)
     return {.arrival = Arrival::duplicate, .number = next_number_ - 1};
-
-  if (step < 0) {
-    if (last_was_late_ || -step > kRestartAfter)
-      return restart (time, Arrival::restarted);
-    last_was_late_ = true;
-    const std::uint64_t newest = next_number_ - 1;
-    return {.arrival = Arrival::late,
-        .number = newest - std::min (newest, periods (-step))};
-  }
+  if (step < 0)
+    return step_back (time, -step);
 
   FrameStep taken{.arrival = Arrival::next};
   if (step > period_ + period_ / 2) {
     taken.arrival = Arrival::after_loss;
     taken.lost = std::max<std::uint64_t> (periods (step), 2) - 1;
+    note_lost (taken.lost);
   }
   taken.number = next_number_ + taken.lost;
   next_number_ = taken.number + 1;
   last_ = time;
-  last_was_late_ = false;
+  stepped_back_ = false;
   return taken;
 }
 

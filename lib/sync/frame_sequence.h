@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <set>
 
 #include "schedule/timing.h"
 
@@ -16,14 +17,16 @@ enum class Arrival {
   next,       ///< one frame period later
   after_loss, ///< more than 1.5 frame periods later
   duplicate,  ///< at the time of the frame before
-  late,       ///< before the frame before
+  late,       ///< at an earlier time, at which a frame is missing
+  behind,     ///< at an earlier time, at which none is missing
   restarted,  ///< the camera's clock restarted
 };
 
 struct FrameStep {
   Arrival arrival = Arrival::first;
   /** Number of the frame, including lost ones. A late frame has the number that
-   * was counted as lost, a duplicate that of the frame before. */
+   * was counted as lost; a duplicate and one that is behind, that of the frame
+   * which was taken for this time. */
   std::uint64_t number = 0;
   /** Frames missing right before this one. */
   std::uint64_t lost = 0;
@@ -34,9 +37,9 @@ struct FrameStep {
  *
  * The period comes from the frame rate, never from two frames. A step of less
  * than a quarter of a period is a duplicate, one of more than 1.5 periods a
- * loss; steps between are jitter. A step backward is one late frame, or a
- * restart of the camera if the next one is behind as well or the step is longer
- * than a second.
+ * loss; steps between are jitter. A step backward is one frame that is late or
+ * behind, or a restart of the camera if the next one steps backward as well or
+ * the step is longer than a second.
  */
 class FrameSequence
 {
@@ -49,20 +52,27 @@ public:
 
   /** @p time of the frame, any epoch; times fall when @p reverse. */
   FrameStep take (Nanoseconds time, bool reverse = false);
-  /** A frame of a camera that was disconnected, at a time of another epoch: it
-   * follows @p lost frames later. */
-  FrameStep take_after (Nanoseconds time, std::uint64_t lost);
+  /** A frame of a camera that was disconnected, at a time of another epoch:
+   * @p away after the frame before. A duplicate if that is less than three
+   * quarters of a period, in which there is no other exposure. */
+  FrameStep take_after (Nanoseconds time, Nanoseconds away);
+  /** A frame from which on times count anew; it has the next number. */
+  FrameStep restart (Nanoseconds time);
   /** The next frame may follow at any time: after a flush, or a new segment.
    * Numbers continue. */
   void resync ();
 
 private:
-  FrameStep restart (Nanoseconds time, Arrival arrival);
+  std::uint64_t periods (Nanoseconds span) const;
+  FrameStep begin (Nanoseconds time, Arrival arrival);
+  FrameStep step_back (Nanoseconds time, Nanoseconds by);
+  void note_lost (std::uint64_t lost);
 
   Nanoseconds period_;
   std::optional<Nanoseconds> last_; // of the frame with the largest number
   std::uint64_t next_number_ = 0;
-  bool last_was_late_ = false;
+  bool stepped_back_ = false;    // the last frame did
+  std::set<std::uint64_t> lost_; // numbers that may come late
 };
 
 } // namespace codedexposure

@@ -13,28 +13,37 @@ namespace
 
 constexpr std::size_t kSteps = 64;
 
-/* Frames per second: steps over a loss are several periods of the usual step,
- * which is the median at first, then the mean of the steps near it. */
+/* Mean of the steps near their median, which skips those over a loss and those
+ * before and after a frame that came late. */
 double
-measure (std::vector<Nanoseconds> steps)
+usual_step (std::vector<Nanoseconds> steps)
 {
   const auto middle = steps.begin () + std::ptrdiff_t (steps.size () / 2);
   std::nth_element (steps.begin (), middle, steps.end ());
-  auto usual = double (*middle);
+  const auto median = double (*middle);
+  double sum = 0;
+  int count = 0;
+  for (const Nanoseconds step : steps)
+    if (std::abs (double (step) - median) <= median / 2) {
+      sum += double (step);
+      count++;
+    }
+  return sum / count;
+}
+
+/* Frames per second. A frame that comes late by more than half a period makes
+ * one step of two periods and one of none. */
+double
+measure (const std::vector<Nanoseconds> &steps)
+{
+  const double usual = usual_step (steps);
   double periods = 0;
   double span = 0;
-  for (const double max_count : {1.0, 1e9}) {
-    periods = span = 0;
-    for (const Nanoseconds step : steps) {
-      const double count = std::max (1.0, std::round (double (step) / usual));
-      if (count > max_count)
-        continue;
-      periods += count;
-      span += double (step);
-    }
-    usual = span / periods;
+  for (const Nanoseconds step : steps) {
+    periods += std::nearbyint (double (step) / usual);
+    span += double (step);
   }
-  return 1e9 / usual;
+  return 1e9 * periods / span;
 }
 
 bool

@@ -253,12 +253,23 @@ TEST_F (DemuxTime, TimeThatRunsBackwardsIsANewBeginningAndWarnedOfOnce)
 {
   start ();
   push_all ({400, 0, 40, 80, 0});
-  EXPECT_EQ (discont_times (),
-      (std::vector<int>{-400, 410, 420, 430, -1, 10, 20, 30, -40, 50, 60, 70,
-          80, 90, 100, 110, -1, 10, 20, 30}));
+  EXPECT_EQ (
+      discont_times (), (std::vector<int>{-400, 410, 420, 430, -1, 10, 20, 30,
+                            40, 50, 60, 70, 80, 90, 100, 110, -1, 10, 20, 30}));
   EXPECT_EQ (counter ("frames-lost"), 0u);
   EXPECT_NE (demux->warning ().find ("0:00:00.400000000"), std::string::npos);
   EXPECT_EQ (demux->warning (), "");
+}
+
+TEST_F (DemuxTime, NumbersAreNotReusedWhenTimeRunsBackwards)
+{
+  start ();
+  push_all ({0, 40, 80, 120, 160, 200, 0, 40, 80});
+  std::vector<guint64> numbers;
+  for (const BufferPtr &buffer : pull_all ())
+    if (const auto meta = get_frame_meta (buffer.get ()); meta->subframe == 0)
+      numbers.push_back (meta->frame);
+  EXPECT_EQ (numbers, (std::vector<guint64>{0, 1, 2, 3, 4, 5, 6, 7, 8}));
 }
 
 TEST_F (DemuxTime, FrameAfterALateOneIsANewBeginning)

@@ -237,6 +237,49 @@ TEST (Dmdsync, DuplicatesAreDroppedAndLateFramesFlagged)
   EXPECT_EQ (uint64_field (late, "pts"), 80 * kMs);
 }
 
+TEST (Dmdsync, TimeThatGoesBackGivesNoNumberTwice)
+{
+  SyncHarness sync;
+  sync.start ();
+  for (const int frame : {0, 1, 2, 3, 4, 5, 6, 7, 3, 4, 5})
+    ASSERT_EQ (sync.send (sync.time_of (frame)), GST_FLOW_OK);
+  for (guint64 number = 0; number < 10; number++) {
+    SCOPED_TRACE (number);
+    const BufferPtr frame = sync.pull ();
+    ASSERT_TRUE (frame);
+    EXPECT_EQ (meta_of (frame).frame, number);
+    EXPECT_EQ (
+        has_flag (frame, GST_BUFFER_FLAG_DISCONT), number == 0 || number == 8);
+  }
+  EXPECT_FALSE (sync.pull ());
+  const MessagePtr dropped = sync.element_message ("dmdsync/frame-dropped");
+  EXPECT_EQ (string_field (dropped, "reason"), "duplicate");
+  EXPECT_EQ (uint64_field (dropped, "frame"), 3u);
+}
+
+TEST (Dmdsync, AFrameOfARestartedCameraWithinTheLastExposureIsDropped)
+{
+  SyncHarness sync;
+  sync.start ();
+  sync.send_frames (0, 2);
+  for (const int ms : {60, 100}) {
+    BufferPtr frame = frame_of (
+        Image<std::uint8_t> (kSyncWidth, kSyncHeight), guint64 (ms) * kMs);
+    if (ms == 60)
+      GST_BUFFER_FLAG_SET (frame.get (), GST_BUFFER_FLAG_RESYNC);
+    ASSERT_EQ (sync.push (std::move (frame)), GST_FLOW_OK);
+  }
+  for (const GstClockTime ms : {0, 40, 100}) {
+    const BufferPtr frame = sync.pull ();
+    ASSERT_TRUE (frame);
+    EXPECT_EQ (GST_BUFFER_PTS (frame.get ()), ms * kMs);
+    EXPECT_EQ (has_flag (frame, GST_BUFFER_FLAG_DISCONT), ms != 40);
+  }
+  EXPECT_EQ (
+      string_field (sync.element_message ("dmdsync/frame-dropped"), "reason"),
+      "duplicate");
+}
+
 TEST (Dmdsync, AFlushIsNotALossAndNumbersGoOn)
 {
   SyncHarness sync;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Frame numbers from frame times. */
+#include <set>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -103,7 +104,7 @@ TEST (FrameSequence, TimeThatBeginsAnewIsFollowed)
   FrameSequence sequence ({25, 1});
   expect_steps (sequence,
       {{400 * kMs, Arrival::first, 0, 0}, {440 * kMs, Arrival::next, 1, 0},
-          {0, Arrival::late, 0, 0}, {40 * kMs, Arrival::restarted, 2, 0},
+          {0, Arrival::behind, 0, 0}, {40 * kMs, Arrival::restarted, 2, 0},
           {80 * kMs, Arrival::next, 3, 0}});
 
   FrameSequence far ({25, 1});
@@ -137,10 +138,56 @@ TEST (FrameSequence, FollowsACameraThatWasAway)
   FrameSequence sequence ({25, 1});
   expect_steps (
       sequence, {{0, Arrival::first, 0, 0}, {40 * kMs, Arrival::next, 1, 0}});
-  const FrameStep back = sequence.take_after (7, 50);
+  const FrameStep back = sequence.take_after (7, 51 * 40 * kMs - 3 * kMs);
   EXPECT_EQ (back.arrival, Arrival::after_loss);
   EXPECT_EQ (back.number, 52u);
   EXPECT_EQ (back.lost, 50u);
   expect_steps (sequence, {{40 * kMs + 7, Arrival::next, 53, 0}});
-  EXPECT_EQ (sequence.take_after (1, 0).arrival, Arrival::next);
+  EXPECT_EQ (sequence.take_after (1, 30 * kMs).arrival, Arrival::next);
+}
+
+TEST (FrameSequence, TwoFramesOfARestartAreNotWithinOneExposure)
+{
+  FrameSequence sequence ({25, 1});
+  expect_steps (
+      sequence, {{0, Arrival::first, 0, 0}, {40 * kMs, Arrival::next, 1, 0}});
+  const FrameStep close = sequence.take_after (7000 * kMs, 20 * kMs);
+  EXPECT_EQ (close.arrival, Arrival::duplicate);
+  EXPECT_EQ (close.number, 1u);
+  expect_steps (sequence, {{7040 * kMs, Arrival::next, 2, 0}});
+}
+
+TEST (FrameSequence, NoNumberIsGivenTwice)
+{
+  for (const int back : {1, 2, 5, 20}) {
+    SCOPED_TRACE (back);
+    FrameSequence sequence ({25, 1});
+    std::set<std::uint64_t> given;
+    Nanoseconds time = 0;
+    const auto take = [&] {
+      const FrameStep step = sequence.take (time);
+      if (step.arrival != Arrival::behind &&
+          step.arrival != Arrival::duplicate) {
+        EXPECT_TRUE (given.insert (step.number).second) << step.number;
+      }
+      time += 40 * kMs;
+    };
+    for (int k = 0; k < 60; k++) {
+      if (k == 30)
+        time -= (back + 1) * 40 * kMs;
+      take ();
+    }
+    EXPECT_GE (given.size (), 58u);
+    EXPECT_EQ (*given.rbegin (), given.size () - 1);
+  }
+}
+
+TEST (FrameSequence, ALateFrameComesOnce)
+{
+  FrameSequence sequence ({25, 1});
+  expect_steps (sequence,
+      {{0, Arrival::first, 0, 0}, {120 * kMs, Arrival::after_loss, 3, 2},
+          {40 * kMs, Arrival::late, 1, 0}, {160 * kMs, Arrival::next, 4, 0},
+          {40 * kMs, Arrival::behind, 1, 0}, {200 * kMs, Arrival::next, 5, 0},
+          {80 * kMs, Arrival::late, 2, 0}});
 }

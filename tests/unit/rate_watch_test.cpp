@@ -39,6 +39,32 @@ TEST (RateWatch, SaysNothingOfTheRateThatWasSaid)
     }
 }
 
+TEST (RateWatch, FramesThatAreHeldUpDoNotChangeTheRate)
+{
+  for (const double part : {0.01, 0.1})
+    for (const double delay : {0.4, 0.6, 0.9}) {
+      SCOPED_TRACE (delay);
+      RateWatch watch ({25, 1});
+      std::mt19937 random (1);
+      std::bernoulli_distribution held_up (part);
+      for (int k = 0; k < 6000; k++) {
+        const auto late =
+            Nanoseconds (held_up (random) ? delay * 40'000'000 : 0.0);
+        EXPECT_FALSE (watch.take (k * 40'000'000LL + late)) << k;
+      }
+    }
+}
+
+/* As dmdsync sees them: counted as lost, then at an earlier time. */
+TEST (RateWatch, FramesOutOfOrderDoNotChangeTheRate)
+{
+  RateWatch watch ({25, 1});
+  for (int k = 0; k < 6000; k++) {
+    const int frame = k % 100 == 50 ? k + 1 : k % 100 == 51 ? k - 1 : k;
+    EXPECT_FALSE (watch.take (frame * 40'000'000LL)) << k;
+  }
+}
+
 TEST (RateWatch, TellsAnotherRateOnce)
 {
   for (const FrameRate real : {FrameRate{24, 1}, FrameRate{30000, 1001},

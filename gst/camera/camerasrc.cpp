@@ -33,6 +33,10 @@
  * PTS counts from its arrival. Nothing else shows downstream. When all tries
  * fail, the error is posted, and EOS follows.
  *
+ * A process that was stopped for two seconds (Ctrl-Z, a debugger) gets the same
+ * error although its camera sends frames. The camera is then restarted even if
+ * #codedexposure-camerasrc:reconnect is 0.
+ *
  * ## Example pipeline
  *
  * |[

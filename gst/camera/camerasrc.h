@@ -14,6 +14,7 @@
 #include "common/owned_frames.h"
 #include "common/raii.h"
 #include "settings.h"
+#include "sync/pause_watch.h"
 
 G_BEGIN_DECLS
 
@@ -60,9 +61,11 @@ struct CameraState {
   bool away = false;     ///< the camera failed, and no frame came since
   bool failed = false;   ///< so did the last try
   guint tries = 0;       ///< since it went away
+  guint most_tries = 0;  ///< before it is given up
   std::string why;       ///< the last try failed
   int frames_left = -1;  ///< until EOS; -1: no end
-  std::jthread restarts; ///< while the camera is away
+  std::optional<PauseWatch> pauses; ///< during a run
+  std::jthread restarts;            ///< while the camera is away
 };
 
 } // namespace codedexposure::gst::camera

@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure-camerasrc and a camera that goes away and comes back. */
+#include <algorithm>
+
 #include "camerasrc.h"
 #include "common/element.h"
 #include "common/messages.h"
@@ -13,6 +15,11 @@ namespace
 {
 
 constexpr std::chrono::seconds kPause{1};
+/* aravissrc waits two seconds for a frame. A process that was stopped in that
+ * time did not see whether one came. */
+constexpr std::chrono::seconds kPatience{3};
+/* Tries to restart the camera after that, whatever the property says. */
+constexpr guint kTriesAfterStop = 10;
 
 std::string
 text_of (GstMessage *message)
@@ -40,9 +47,23 @@ is_own_failure (const CameraState &st, GstMessage *message)
          gst_pad_get_last_flow_return (pad.get ()) == GST_FLOW_OK;
 }
 
+/** @p stopped  for how long the process was; 0: it was not. */
 void
-say_lost (GstCodedExposureCameraSrc *self, const std::string &why)
+say_lost (GstCodedExposureCameraSrc *self, const std::string &why,
+    std::chrono::duration<double> stopped)
 {
+  if (stopped.count () > 0) {
+    char pause[32];
+    g_ascii_formatd (pause, sizeof pause, "%.1f s", stopped.count ());
+    const std::string reason =
+        "this process was stopped for " + std::string (pause);
+    post_message (self, CameraLost{reason});
+    POST_WARNING (self, RESOURCE, READ,
+        "Frames of the camera are lost: " + reason +
+            ". The camera is restarted. Do not stop a run by Ctrl-Z or a "
+            "debugger.");
+    return;
+  }
   post_message (self, CameraLost{why});
   POST_WARNING (self, RESOURCE, READ,
       "The camera is gone: " + why +
@@ -97,7 +118,11 @@ void
 bring_back (GstCodedExposureCameraSrc *self, const std::stop_token &stop)
 {
   CameraState &st = state (self);
-  const guint most = settings_of (self).reconnect;
+  guint most = 0;
+  {
+    const std::lock_guard guard (st.lock);
+    most = st.most_tries;
+  }
   for (guint tries = 0; tries < most; tries++) {
     std::unique_lock guard (st.lock);
     if (tries > 0)
@@ -118,7 +143,9 @@ begin_watch (GstCodedExposureCameraSrc *self)
   CameraState &st = state (self);
   const ObjectLock lock (self);
   const std::lock_guard guard (st.lock);
-  st.watching = st.settings.reconnect > 0;
+  st.watching = true;
+  st.most_tries = 0;
+  st.pauses.emplace ();
   st.seen = st.away = st.failed = false;
   st.frames_left = st.settings.num_buffers;
   st.why.clear ();
@@ -132,6 +159,7 @@ end_watch (GstCodedExposureCameraSrc *self)
   {
     const std::lock_guard guard (st.lock);
     st.watching = false;
+    st.pauses.reset ();
     ended = std::move (st.restarts);
   }
   if (!ended.joinable ())
@@ -146,10 +174,19 @@ take_failure (GstCodedExposureCameraSrc *self, GstMessage *message)
 {
   CameraState &st = state (self);
   const bool own = is_own_failure (st, message);
+  const guint reconnect = settings_of (self).reconnect;
+  PauseWatch::Clock::duration stopped{};
   {
     const std::lock_guard guard (st.lock);
-    if (!st.watching || (!st.away && !(own && st.seen)))
+    if (st.pauses)
+      stopped = st.pauses->recent (kPatience);
+    const guint tries = stopped.count () > 0
+                            ? std::max (reconnect, kTriesAfterStop)
+                            : reconnect;
+    if (!st.watching || (!st.away && !(own && st.seen && tries > 0)))
       return false;
+    if (!st.away)
+      st.most_tries = tries;
     if (st.why.empty ())
       st.why = text_of (message);
     st.failed = st.failed || own;
@@ -159,7 +196,7 @@ take_failure (GstCodedExposureCameraSrc *self, GstMessage *message)
     }
     st.tries = 0;
   }
-  say_lost (self, text_of (message));
+  say_lost (self, text_of (message), stopped);
   std::jthread before; // it has ended, or is about to
   const std::lock_guard guard (st.lock);
   before = std::move (st.restarts);

@@ -159,8 +159,8 @@ note_end (GstDmdSync *self)
     return;
   GST_ELEMENT_WARNING (self, RESOURCE, READ,
       ("The stream ends %.1f s after its last frame: the camera stopped, was "
-       "unplugged or gets no trigger. Look at its cable, at the DMD and at the "
-       "line between them.",
+       "unplugged or gets no trigger, or this process was stopped for so long. "
+       "Look at its cable, at the DMD and at the line between them.",
           double (now - last) / GST_SECOND),
       (nullptr));
 }

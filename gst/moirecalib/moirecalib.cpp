@@ -227,6 +227,11 @@ gst_moire_calib_class_init (GstMoireCalibClass *klass)
       "Aligns a coded exposure camera with its mirrors and measures the "
       "mapping between them");
   element_class->change_state = GST_DEBUG_FUNCPTR (change_state);
+  /* An application may drop its last reference without a change to NULL. */
+  G_OBJECT_CLASS (klass)->dispose = [] (GObject *object) noexcept {
+    moire::stop_worker (GST_MOIRE_CALIB (object));
+    G_OBJECT_CLASS (gst_moire_calib_parent_class)->dispose (object);
+  };
   transform_class->set_caps = GST_DEBUG_FUNCPTR (moire::set_caps);
   transform_class->sink_event = GST_DEBUG_FUNCPTR (moire::sink_event);
   transform_class->before_transform = GST_DEBUG_FUNCPTR (before_transform);

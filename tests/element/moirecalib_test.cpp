@@ -372,6 +372,28 @@ TEST (MoireCalib, KnowsTheBitsOfItsPixelsFromTheFrames)
   }
 }
 
+/* GStreamer complains, and goes on. */
+TEST (MoireCalib, DroppedWhileItPlaysItEndsItsThread)
+{
+  int complaints = 0;
+  const GLogLevelFlags fatal =
+      g_log_set_always_fatal (GLogLevelFlags (G_LOG_FATAL_MASK));
+  const guint handler = g_log_set_handler (
+      "GStreamer", G_LOG_LEVEL_CRITICAL,
+      [] (const gchar *, GLogLevelFlags, const gchar *, gpointer count) {
+        ++*static_cast<int *> (count);
+      },
+      &complaints);
+  GstElement *calib = gst_element_factory_make ("moirecalib", nullptr);
+  gst_object_ref_sink (calib);
+  EXPECT_NE (gst_element_set_state (calib, GST_STATE_PLAYING),
+      GST_STATE_CHANGE_FAILURE);
+  gst_object_unref (calib);
+  g_log_remove_handler ("GStreamer", handler);
+  g_log_set_always_fatal (fatal);
+  EXPECT_GT (complaints, 0);
+}
+
 TEST (MoireCalib, GivesTheMirrorsBackWhenItStops)
 {
   ElementHarness h ("moirecalib");

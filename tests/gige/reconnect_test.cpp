@@ -139,6 +139,44 @@ TEST_F (Reconnect, AKilledCameraThatComesBackIsLockedWithinTenFrames)
       int (missing), int (locked - found));
 }
 
+namespace
+{
+
+/** Stops this process for @p time, as Ctrl-Z does: a child of it lets it go on.
+ */
+void
+stop_process (std::chrono::microseconds time)
+{
+  const pid_t test = getpid ();
+  const pid_t child = fork ();
+  if (child == 0) {
+    kill (test, SIGSTOP);
+    usleep (useconds_t (time.count ()));
+    kill (test, SIGCONT);
+    _exit (0);
+  }
+  waitpid (child, nullptr, 0);
+}
+
+} // namespace
+
+TEST_F (Reconnect, AProcessThatWasStoppedGoesOnAndBlamesNoCamera)
+{
+  CameraProcess camera (kSchedule);
+  play (0);
+  ASSERT_TRUE (wait_frames (10));
+  stop_process (std::chrono::seconds (3));
+  const StructurePtr lost = wait_said ("codedexposure/camera-lost");
+  ASSERT_TRUE (lost);
+  const std::string reason = gst_structure_get_string (lost.get (), "reason");
+  EXPECT_NE (reason.find ("this process was stopped for 3."), reason.npos)
+      << reason;
+  ASSERT_TRUE (wait_said ("codedexposure/camera-back"));
+  ASSERT_TRUE (wait_frames (30));
+  pipeline->stop ();
+  EXPECT_GE (counter ("frames-lost"), 200u);
+}
+
 TEST_F (Reconnect, ACameraThatStaysSilentIsOneErrorAfterTheTries)
 {
   CameraProcess camera (kSchedule);

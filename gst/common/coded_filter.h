@@ -236,10 +236,11 @@ protected:
   /** Gives @p outbuf flags, metas and time of a picture made from @p coded. */
   void describe (GstBuffer *outbuf, GstBuffer *coded, FrameMeta meta,
       const Picture &picture) const;
-  /** Acquires a buffer from the pool of @p pad and maps it for writing. Posts
-   * an error on failure, except while flushing. */
+  /** Acquires a buffer from the pool of @p pad, for the @p first picture of a
+   * coded frame or another, and maps it for writing. Posts an error on failure,
+   * except while flushing. */
   GstFlowReturn acquire_picture (GstCodedPad *pad, const GstVideoInfo &info,
-      BufferPtr &buffer, MappedFrame &mapped) const;
+      bool first, BufferPtr &buffer, MappedFrame &mapped) const;
 
   /** What other threads set and read. */
   struct Shared {

@@ -299,9 +299,9 @@ CodedFilter::is_within (GstClockTime pts, GstClockTime duration) const
 
 GstFlowReturn
 CodedFilter::acquire_picture (GstCodedPad *pad, const GstVideoInfo &info,
-    BufferPtr &buffer, MappedFrame &mapped) const
+    bool first, BufferPtr &buffer, MappedFrame &mapped) const
 {
-  const GstFlowReturn flow = acquire (pad, buffer);
+  const GstFlowReturn flow = acquire (pad, info, first, buffer);
   if (flow == GST_FLOW_FLUSHING)
     return flow;
   if (buffer)

@@ -161,7 +161,8 @@ prepare_allocation (GstCodedPad *coded, GstCaps *caps, guint at_once)
 }
 
 GstFlowReturn
-acquire (GstCodedPad *pad, BufferPtr &outbuf)
+acquire (
+    GstCodedPad *pad, const GstVideoInfo &info, bool first, BufferPtr &outbuf)
 {
   Allocation &allocation = *pad->coded.allocation;
   if (!allocation.active && allocation.pool)
@@ -170,8 +171,17 @@ acquire (GstCodedPad *pad, BufferPtr &outbuf)
   if (!allocation.active)
     return GST_FLOW_ERROR;
   GstBuffer *buffer = nullptr;
-  const GstFlowReturn flow =
-      gst_buffer_pool_acquire_buffer (allocation.pool.get (), &buffer, nullptr);
+  GstBufferPoolAcquireParams params = {};
+  params.flags = first ? GST_BUFFER_POOL_ACQUIRE_FLAG_NONE
+                       : GST_BUFFER_POOL_ACQUIRE_FLAG_DONTWAIT;
+  GstFlowReturn flow =
+      gst_buffer_pool_acquire_buffer (allocation.pool.get (), &buffer, &params);
+  if (!first && flow == GST_FLOW_EOS) {
+    GST_LOG_OBJECT (pad, "the pool is empty");
+    buffer =
+        gst_buffer_new_allocate (nullptr, GST_VIDEO_INFO_SIZE (&info), nullptr);
+    flow = buffer ? GST_FLOW_OK : GST_FLOW_ERROR;
+  }
   outbuf.reset (buffer);
   return flow;
 }

@@ -78,8 +78,11 @@ bool peer_reads_video_meta (GstPad *pad, GstCaps *caps);
  * @p at_once  buffers of the pool that are in use at the same time.
  */
 void prepare_allocation (GstCodedPad *pad, GstCaps *caps, guint at_once);
-/** A buffer from the pool of @p pad, which has been prepared. */
-GstFlowReturn acquire (GstCodedPad *pad, BufferPtr &outbuf);
+/** A buffer from the pool of @p pad, which has been prepared. Only the @p first
+ * picture of a coded frame waits for the pool: it may have no more buffers
+ * before downstream gets those that are in use. @p info: of the picture. */
+GstFlowReturn acquire (
+    GstCodedPad *pad, const GstVideoInfo &info, bool first, BufferPtr &outbuf);
 
 /** Pushes @p outbuf, which must be writable, with DURATION, OFFSET (a count of
  * buffers) and DISCONT (on the first buffer and after a break). */

@@ -388,8 +388,9 @@ Demux::map_subframes (
     MappedFrame &mapped = subframes.emplace_back ();
     if (!target.owner ())
       continue;
+    const bool first = &target == &targets.front ();
     const GstFlowReturn flow = acquire_picture (
-        target.owner (), plan_->infos[part], target.buffer, mapped);
+        target.owner (), plan_->infos[part], first, target.buffer, mapped);
     if (flow != GST_FLOW_OK)
       return flow;
   }

@@ -263,8 +263,8 @@ Fuse::render (std::vector<BufferPtr> &buffers)
   std::vector<MappedFrame> mapped (n);
   std::vector<BufferPtr> made (n);
   for (std::size_t k = 0; k < n; k++) {
-    const GstFlowReturn flow =
-        acquire_picture (srcpad_.get (), plan_->fused, made[k], mapped[k]);
+    const GstFlowReturn flow = acquire_picture (
+        srcpad_.get (), plan_->fused, k == 0, made[k], mapped[k]);
     if (flow != GST_FLOW_OK)
       return flow;
   }

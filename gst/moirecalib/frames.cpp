@@ -331,8 +331,19 @@ take_tag (GstMoireCalib *self, GstEvent *event)
   return replace_setup (event, *setup);
 }
 
-/** At the end of the stream: waits for the worker, and warns about what is not
- * finished. */
+void
+set_flushing (GstMoireCalib *self, bool flushing)
+{
+  Exchange &exchange = state (self).exchange;
+  {
+    const std::lock_guard guard (exchange.lock);
+    exchange.flushing = flushing;
+  }
+  exchange.changed.notify_all ();
+}
+
+/** At the end of the stream: waits for the worker, unless a flush begins, and
+ * warns about what is not finished. */
 void
 finish (GstMoireCalib *self)
 {
@@ -344,8 +355,11 @@ finish (GstMoireCalib *self)
   {
     std::unique_lock guard (exchange.lock);
     exchange.changed.wait (guard, [&exchange] {
-      return exchange.quit || (!exchange.busy && exchange.queue.empty ());
+      return exchange.quit || exchange.flushing ||
+             (!exchange.busy && exchange.queue.empty ());
     });
+    if (exchange.flushing)
+      return;
     lost_tile = exchange.geometry && exchange.geometry->mode == Mode::phase &&
                 exchange.progress.stage == Stage::searching;
     confidence = exchange.progress.confidence;
@@ -426,7 +440,11 @@ sink_event (GstBaseTransform *trans, GstEvent *event) noexcept
   case GST_EVENT_TAG:
     event = take_tag (self, event);
     break;
+  case GST_EVENT_FLUSH_START:
+    set_flushing (self, true);
+    break;
   case GST_EVENT_FLUSH_STOP:
+    set_flushing (self, false);
     begin_anew (self);
     break;
   case GST_EVENT_EOS:

@@ -116,6 +116,7 @@ struct Exchange {
   Queue queue;
   bool busy = false;
   bool quit = false;
+  bool flushing = false; ///< between FLUSH_START and FLUSH_STOP
   /* From the worker: */
   std::shared_ptr<const Panel> panel;
   Progress progress;

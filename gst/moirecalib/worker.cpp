@@ -464,7 +464,7 @@ start_worker (GstMoireCalib *self)
   Exchange &exchange = st.exchange;
   {
     const std::lock_guard guard (exchange.lock);
-    exchange.quit = false;
+    exchange.quit = exchange.flushing = false;
     exchange.geometry.reset ();
     exchange.panel.reset ();
     exchange.progress.stage = Stage::searching;

@@ -188,6 +188,28 @@ taps_for (double magnification)
   return 0;
 }
 
+/* A camera may look at a small part of its mirrors, but the memory and the time
+ * for the rest are bounded. */
+Result<void>
+check_mirrors (const Mapping &mapping)
+{
+  /* More than the largest DMD has, 2560x1600. */
+  constexpr std::int64_t kAnyway = std::int64_t (1) << 22;
+  constexpr std::int64_t kForEachPixel = 16;
+  const auto area = [] (Extent size) {
+    return std::int64_t (size.width) * size.height;
+  };
+  const auto text = [] (Extent size) {
+    return std::to_string (size.width) + "x" + std::to_string (size.height);
+  };
+  const Extent camera = mapping.camera (), mirrors = mapping.mirrors ();
+  if (area (mirrors) <= std::max (kAnyway, kForEachPixel * area (camera)))
+    return {};
+  return Error{"a mapping to " + text (mirrors) +
+               " mirrors cannot be used for frames of " + text (camera) +
+               " pixels, which see few of them; use the mapping of this bench"};
+}
+
 } // namespace
 
 Result<Rectifier>
@@ -204,6 +226,7 @@ try {
     return Error{
         "a mapping with " + std::to_string (magnification) +
         " pixels per mirror cannot be corrected; use one of 0.75 to 3.5"};
+  RETURN_IF_ERROR (check_mirrors (mapping));
   plan->camera = mapping.camera ();
   plan->mirrors = mirrors;
   plan->noise = float (

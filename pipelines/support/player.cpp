@@ -3,13 +3,61 @@
 
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <iterator>
 #include <string>
 
+#include <dlfcn.h>
 #include <glib-unix.h>
 
 using namespace codedexposure::gst;
 using report::format;
+
+namespace
+{
+
+/* Whether the X display can be opened. GStreamer's sinks show nothing where it
+ * cannot, or crash. True where it is not known. */
+bool
+screen_opens ()
+{
+  void *library = dlopen ("libX11.so.6", RTLD_LAZY);
+  if (!library)
+    return true;
+  const auto prepare =
+      reinterpret_cast<int (*) ()> (dlsym (library, "XInitThreads"));
+  const auto open = reinterpret_cast<void *(*)(const char *)> (
+      dlsym (library, "XOpenDisplay"));
+  const auto close =
+      reinterpret_cast<int (*) (void *)> (dlsym (library, "XCloseDisplay"));
+  if (!prepare || !open || !close)
+    return true;
+  prepare ();
+  void *display = open (nullptr);
+  if (display)
+    close (display);
+  return display;
+}
+
+bool
+has_window (GstElement *pipeline)
+{
+  const std::unique_ptr<GstIterator, FreeWith<gst_iterator_free>> elements (
+      gst_bin_iterate_recurse (GST_BIN (pipeline)));
+  bool found = false;
+  const auto look = [] (const GValue *value, gpointer data) {
+    GstElementFactory *factory =
+        gst_element_get_factory (GST_ELEMENT (g_value_get_object (value)));
+    for (const char *sink :
+        {"autovideosink", "glimagesink", "ximagesink", "xvimagesink"})
+      *static_cast<bool *> (data) |=
+          factory && g_str_equal (GST_OBJECT_NAME (factory), sink);
+  };
+  gst_iterator_foreach (elements.get (), look, &found);
+  return found;
+}
+
+} // namespace
 
 Player::Player (const char *what, bool verbose)
     : status_ (what, verbose), loop_ (g_main_loop_new (nullptr, FALSE))
@@ -40,7 +88,23 @@ Player::parse (const char *description)
     parsed = pipeline;
   }
   pipeline_.reset (GST_ELEMENT (gst_object_ref_sink (parsed)));
-  return true;
+  return has_screen ();
+}
+
+/* False, with a printed reason, if a window has no screen. A sink for Wayland
+ * needs no X display. */
+bool
+Player::has_screen ()
+{
+  const char *display = std::getenv ("DISPLAY");
+  if (std::getenv ("WAYLAND_DISPLAY") || !display ||
+      !has_window (pipeline_.get ()) || screen_opens ())
+    return true;
+  status_.line (format ("error: the screen DISPLAY=%s cannot be opened. Run "
+                        "this in a desktop session or through ssh -X, or "
+                        "record and decode instead.",
+      display));
+  return false;
 }
 
 /* Prints the missing elements and their packages. The context also lists

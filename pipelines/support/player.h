@@ -58,6 +58,7 @@ private:
     int times = 0;
   };
   static gboolean on_unix_signal (gpointer signal);
+  bool has_screen ();
   bool say_missing (GstParseContext *context);
 
   GMainLoop *loop_;

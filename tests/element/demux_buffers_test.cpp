@@ -164,6 +164,27 @@ TEST_F (DemuxBuffers, ComeFromAnotherPoolWhereDownstreamsIsTooSmall)
   EXPECT_NE (buffer->pool, downstream.pool.get ());
 }
 
+/* A sink keeps the last buffer that it has shown until it shows another. */
+TEST_F (DemuxBuffers, NeedNotWaitForOneThatDownstreamKeeps)
+{
+  downstream.pool.reset (gst_video_buffer_pool_new ());
+  downstream.max = 4;
+  BufferPtr kept;
+  for (int frame = 0; frame < 3; frame++) {
+    ASSERT_EQ (push (demux, frame), GST_FLOW_OK);
+    const CapsPtr caps = demux.pad_caps ();
+    for (int k = 0; k < 4; k++) {
+      BufferPtr picture = demux.pull ();
+      ASSERT_TRUE (picture);
+      EXPECT_EQ (
+          image_of<std::uint8_t> (picture.get (), caps.get ()), subframe (k));
+      if (!kept)
+        kept = std::move (picture);
+    }
+  }
+  EXPECT_EQ (kept->pool, downstream.pool.get ());
+}
+
 TEST_F (DemuxBuffers, AskDownstreamOnceAndAgainWhenItWantsThat)
 {
   for (int frame = 0; frame < 3; frame++)

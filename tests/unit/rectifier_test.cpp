@@ -345,6 +345,17 @@ TEST (Rectifier, RefusesWhatItCannotDo)
   EXPECT_NE (
       outside.error ().message.find ("region 0, 8x8+90+0"), std::string::npos);
   const Schedule schedule;
+  const auto vast =
+      Mapping::make ({.camera = {64, 48}, .mirrors = {16384, 16384}});
+  ASSERT_TRUE (vast.ok ());
+  const auto refused = Rectifier::make (*vast, schedule);
+  ASSERT_FALSE (refused.ok ());
+  EXPECT_EQ (refused.error ().message,
+      "a mapping to 16384x16384 mirrors cannot be used for frames of 64x48 "
+      "pixels, which see few of them; use the mapping of this bench");
+  const auto large =
+      Mapping::make ({.camera = {64, 48}, .mirrors = {2560, 1600}});
+  EXPECT_TRUE (Rectifier::make (*large, schedule).ok ());
   const auto far = Rectifier::make (mapping_of ({5000, 0, 0, 1}), schedule);
   ASSERT_FALSE (far.ok ());
   EXPECT_NE (far.error ().message.find ("sees none of the mirrors"),

@@ -26,8 +26,9 @@ void
 add_pad_template (gpointer klass, const char *name, const PadOptions &options)
 {
   const CapsPtr caps (gst_caps_from_string (options.caps));
-  const auto direction =
-      g_str_equal (name, "sink") ? GST_PAD_SINK : GST_PAD_SRC;
+  GstPadDirection direction = options.direction;
+  if (direction == GST_PAD_UNKNOWN)
+    direction = g_str_equal (name, "sink") ? GST_PAD_SINK : GST_PAD_SRC;
   gst_element_class_add_pad_template (GST_ELEMENT_CLASS (klass),
       options.type == G_TYPE_NONE
           ? gst_pad_template_new (

@@ -19,9 +19,10 @@ struct PadOptions {
   GstPadPresence presence = GST_PAD_ALWAYS;
   GType type = G_TYPE_NONE; ///< none: GstPad
   const char *caps = CODED_EXPOSURE_VIDEO_CAPS;
+  /** Unknown: a sink pad if its name is "sink", else a source pad. */
+  GstPadDirection direction = GST_PAD_UNKNOWN;
 };
-/** Adds a pad template to @p klass; "sink" is the name of a sink pad, all
- * others are of source pads. */
+/** Adds a pad template to @p klass. */
 void add_pad_template (
     gpointer klass, const char *name, const PadOptions &options = {});
 

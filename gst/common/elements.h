@@ -8,6 +8,7 @@ GST_ELEMENT_REGISTER_DECLARE (codedexposure_camerasrc);
 GST_ELEMENT_REGISTER_DECLARE (codedexposure_demux);
 GST_ELEMENT_REGISTER_DECLARE (codedexposure_fuse);
 GST_ELEMENT_REGISTER_DECLARE (codedexposure_log);
+GST_ELEMENT_REGISTER_DECLARE (codedexposure_restore);
 GST_ELEMENT_REGISTER_DECLARE (codedexposure_scene);
 GST_ELEMENT_REGISTER_DECLARE (codedexposure_sim);
 GST_ELEMENT_REGISTER_DECLARE (codedexposure_view);

@@ -72,23 +72,4 @@ LineFile::close ()
         (nullptr));
 }
 
-std::vector<const char *>
-flag_names (GstBuffer *buffer)
-{
-  static constexpr struct {
-    GstBufferFlags flag;
-    const char *name;
-  } kNames[] = {
-      {GST_BUFFER_FLAG_DISCONT, "discont"},
-      {GST_BUFFER_FLAG_CORRUPTED, "corrupted"},
-      {GST_BUFFER_FLAG_GAP, "gap"},
-      {GST_BUFFER_FLAG_DROPPABLE, "droppable"},
-  };
-  std::vector<const char *> names;
-  for (const auto &[flag, name] : kNames)
-    if (GST_BUFFER_FLAG_IS_SET (buffer, flag))
-      names.push_back (name);
-  return names;
-}
-
 } // namespace codedexposure::gst

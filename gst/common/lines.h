@@ -3,7 +3,6 @@
 #pragma once
 
 #include <string>
-#include <vector>
 
 #include <gst/gst.h>
 
@@ -34,9 +33,5 @@ private:
   std::string location_;
   int file_ = -1;
 };
-
-/** Names of the flags of @p buffer that describe its quality: "discont",
- * "corrupted", "gap", "droppable". */
-std::vector<const char *> flag_names (GstBuffer *buffer);
 
 } // namespace codedexposure::gst

@@ -148,6 +148,33 @@ struct CameraBack {
   CODED_FIELDS (silent, tries);
 };
 
+/** codedexposure-restore: frames are not as they were recorded, or cannot be
+ * compared; they are CORRUPTED. Posted when a sequence of them begins, and when
+ * it is over. */
+struct FramesDamaged {
+  static constexpr const char *kName = "codedexposure/frames-damaged";
+  bool active = false;          ///< it begins
+  guint64 frame = 0;            ///< the first of them
+  std::optional<guint64> count; ///< at the end: how many there were
+  GstClockTime from = 0;
+  std::string reason; ///< of the first
+  CODED_FIELDS (active, frame, count, from, reason);
+};
+/** codedexposure-restore: the recording knows of frames that did not come. */
+struct FramesMissing {
+  static constexpr const char *kName = "codedexposure/frames-missing";
+  guint64 count = 0;
+  GstClockTime from = 0; ///< of the first of them
+  CODED_FIELDS (count, from);
+};
+/** codedexposure-restore: the stream ended without the last line of its track:
+ * a recording that was cut off, or a sender that was killed. */
+struct StreamCut {
+  static constexpr const char *kName = "codedexposure/stream-cut";
+  guint64 frames = 0; ///< that came
+  CODED_FIELDS (frames);
+};
+
 /** codedexposure-sim: an exposure that got too few input frames. */
 struct ExposureDropped {
   static constexpr const char *kName = "codedexposure/frame-dropped";

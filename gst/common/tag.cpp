@@ -14,6 +14,7 @@ namespace
 {
 
 constexpr std::string_view kPrefix = "coded-exposure=";
+constexpr std::string_view kDecodedPrefix = "coded-exposure-decoded=";
 
 /** The comments in @p tags, in their order. */
 std::vector<std::string>
@@ -29,17 +30,54 @@ comments_of (const GstTagList *tags)
   return comments;
 }
 
-bool
-has_setup (std::string_view comment)
+/** The JSON after @p prefix in one of the comments. */
+std::optional<std::string>
+comment_after (std::string_view prefix, const GstTagList *tags)
 {
-  return comment.substr (0, kPrefix.size ()) == kPrefix;
+  for (const std::string &comment : comments_of (tags))
+    if (comment.starts_with (prefix))
+      return comment.substr (prefix.size ());
+  return std::nullopt;
+}
+
+GstTagList *
+comment_to_tags (std::string_view prefix, const std::string &json)
+{
+  const std::string comment = std::string (prefix) + json;
+  return gst_tag_list_new (GST_TAG_COMMENT, comment.c_str (), nullptr);
 }
 
 GstTagList *
 setup_to_tags (const StreamSetup &setup)
 {
-  const std::string comment = std::string (kPrefix) + setup.to_json ();
-  return gst_tag_list_new (GST_TAG_COMMENT, comment.c_str (), nullptr);
+  return comment_to_tags (kPrefix, setup.to_json ());
+}
+
+/** The TAG event @p event with @p ours in place of its setup. Transfer: full,
+ * of all. */
+GstEvent *
+merge_others (GstTagList *ours, GstEvent *event)
+{
+  GstTagList *tags = nullptr;
+  gst_event_parse_tag (event, &tags);
+  gst_tag_list_set_scope (ours, gst_tag_list_get_scope (tags));
+  for (const std::string &comment : comments_of (tags))
+    if (!comment.starts_with (kPrefix))
+      gst_tag_list_add (ours, GST_TAG_MERGE_APPEND, GST_TAG_COMMENT,
+          comment.c_str (), nullptr);
+  const auto copy_other = [] (const GstTagList *from, const gchar *tag,
+                              gpointer to) {
+    for (guint i = 0; i < gst_tag_list_get_tag_size (from, tag); i++)
+      if (!g_str_equal (tag, GST_TAG_COMMENT))
+        gst_tag_list_add_value (static_cast<GstTagList *> (to),
+            GST_TAG_MERGE_APPEND, tag,
+            gst_tag_list_get_value_index (from, tag, i));
+  };
+  gst_tag_list_foreach (tags, copy_other, ours);
+  GstEvent *merged = gst_event_new_tag (ours);
+  gst_event_set_seqnum (merged, gst_event_get_seqnum (event));
+  gst_event_unref (event);
+  return merged;
 }
 
 } // namespace
@@ -65,11 +103,8 @@ setup_to_event (const StreamSetup &setup)
 std::optional<Result<StreamSetup>>
 setup_from_tags (const GstTagList *tags)
 {
-  for (const std::string &comment : comments_of (tags))
-    if (has_setup (comment))
-      return StreamSetup::from_json (
-          std::string_view (comment).substr (kPrefix.size ()));
-  return std::nullopt;
+  const auto json = comment_after (kPrefix, tags);
+  return json ? std::optional (StreamSetup::from_json (*json)) : std::nullopt;
 }
 
 std::optional<Result<Schedule>>
@@ -85,21 +120,33 @@ schedule_from_tags (const GstTagList *tags)
 GstEvent *
 replace_setup (GstEvent *event, const StreamSetup &setup)
 {
-  GstTagList *tags = nullptr;
-  gst_event_parse_tag (event, &tags);
-  GstTagList *ours = setup_to_tags (setup);
-  gst_tag_list_set_scope (ours, gst_tag_list_get_scope (tags));
-  for (const std::string &comment : comments_of (tags))
-    if (!has_setup (comment))
-      gst_tag_list_add (ours, GST_TAG_MERGE_APPEND, GST_TAG_COMMENT,
-          comment.c_str (), nullptr);
+  return merge_others (setup_to_tags (setup), event);
+}
 
-  /* KEEP adds the other tags only, because there are comments already. */
-  gst_tag_list_insert (ours, tags, GST_TAG_MERGE_KEEP);
-  GstEvent *replaced = gst_event_new_tag (ours);
-  gst_event_set_seqnum (replaced, gst_event_get_seqnum (event));
-  gst_event_unref (event);
-  return replaced;
+GstEvent *
+remove_setup (GstEvent *event)
+{
+  GstEvent *rest = merge_others (gst_tag_list_new_empty (), event);
+  GstTagList *tags = nullptr;
+  gst_event_parse_tag (rest, &tags);
+  if (!gst_tag_list_is_empty (tags))
+    return rest;
+  gst_event_unref (rest);
+  return nullptr;
+}
+
+GstEvent *
+provenance_to_event (const Provenance &provenance)
+{
+  return gst_event_new_tag (
+      comment_to_tags (kDecodedPrefix, provenance.to_json ()));
+}
+
+std::optional<Result<Provenance>>
+provenance_from_tags (const GstTagList *tags)
+{
+  const auto json = comment_after (kDecodedPrefix, tags);
+  return json ? std::optional (Provenance::from_json (*json)) : std::nullopt;
 }
 
 } // namespace codedexposure::gst

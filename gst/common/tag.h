@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The stream tag that carries a schedule and, if known, a mapping:
- * GST_TAG_COMMENT = "coded-exposure={...}". */
+/* The stream tags, each a GST_TAG_COMMENT: "coded-exposure={...}" on coded
+ * frames carries their schedule and, if known, their mapping;
+ * "coded-exposure-decoded={...}" on pictures says how they were made. */
 #pragma once
 
 #include <optional>
@@ -9,6 +10,7 @@
 
 #include "base/result.h"
 #include "mapping/stream_setup.h"
+#include "record/provenance.h"
 #include "schedule/schedule.h"
 
 namespace codedexposure::gst
@@ -31,5 +33,14 @@ std::optional<Result<Schedule>> schedule_from_tags (const GstTagList *tags);
 /** The TAG event @p event with @p setup in place of the one in its tags;
  * Transfer: full, of both. */
 GstEvent *replace_setup (GstEvent *event, const StreamSetup &setup);
+
+/** The TAG event @p event without a setup; null if nothing is left of it.
+ * Transfer: full, of both. */
+GstEvent *remove_setup (GstEvent *event);
+
+/** A TAG event, "coded-exposure-decoded={...}"; Transfer: full. */
+GstEvent *provenance_to_event (const Provenance &provenance);
+/** The provenance in @p tags; as schedule_from_tags (). */
+std::optional<Result<Provenance>> provenance_from_tags (const GstTagList *tags);
 
 } // namespace codedexposure::gst

@@ -3,40 +3,52 @@
  * SECTION:element-codedexposure-log
  * @title: codedexposure-log
  *
- * Passes coded frames on and writes one line of JSON for each to a file:
- * number, time, exposure, synchronisation and lost frames. A recording keeps
- * the pixels and the schedule, but not the frames' metadata; this file keeps
- * them.
+ * Passes coded frames on and writes one line of JSON for each: number, time,
+ * exposure, synchronisation, lost frames, flags, and a hash of the pixels. A
+ * video file keeps the pixels only; the lines keep the rest.
  *
- * The first line is the schedule in its JSON form; the second is the mapping,
- * if there is one. With them a recording that ended before its tags were
- * written can still be decoded. Each line goes to the system at once: a crash
- * loses one line at most.
+ * ## Pads
+ *
+ * - `src`: the frames, unchanged.
+ * - `track` (request): the lines as a text stream, for a container. Each has
+ *   the PTS and DURATION of its frame. The first line, and one a second, also
+ *   holds the schedule and the mapping; the last one says that the recording is
+ *   complete. #codedexposure-restore puts the lines back onto the frames and
+ *   checks the pixels.
+ *
+ * Put a `queue` after each pad.
+ *
+ * #codedexposure-log:location writes the lines to a file for other programs:
+ * first the schedule in its JSON form, then the mapping, if there is one, then
+ * the frames. Each line goes to the system at once: a crash loses one line at
+ * most.
  *
  * ## Example pipeline
  * |[
  * gst-launch-1.0 -e videotestsrc num-buffers=100 !
  * video/x-raw,format=GRAY8,framerate=100/1 ! codedexposure-sim !
- * codedexposure-log location=coded.jsonl ! avenc_ffv1 ! matroskamux
- * timecodescale=1000 ! filesink location=coded.mkv
+ * codedexposure-log name=log ! queue ! avenc_ffv1 ! mux.video_0
+ * log.track ! queue ! mux.subtitle_0
+ * matroskamux name=mux timecodescale=1000 ! filesink location=coded.mkv
  * ]|
  *
  * Since: 0.1
  */
-#include <algorithm>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include <gst/base/gstbasetransform.h>
-#include <nlohmann/json.hpp>
 
 #include "common/element.h"
 #include "common/elements.h"
 #include "common/lines.h"
-#include "common/meta.h"
+#include "common/record.h"
 #include "common/tag.h"
-#include "extract/saturation.h"
+#include "record/track.h"
+#include "track_pad.h"
 
+using namespace codedexposure;
 using namespace codedexposure::gst;
 
 GST_DEBUG_CATEGORY_STATIC (codedexposure_log_debug);
@@ -46,71 +58,24 @@ namespace
 {
 
 struct LogState {
+  explicit LogState (GstElement *element = nullptr) : track (element) {}
+
   std::string location; // object lock
   /* Streaming thread, and start and stop, which exclude it: */
   LineFile file;
+  TrackPad track;
   guint64 frames = 0;
   GstVideoInfo info = {};
-  /* As last written. */
-  std::optional<codedexposure::Schedule> schedule;
-  std::optional<codedexposure::Mapping> mapping;
+  GstClockTime end = 0; ///< of the last frame
+  /** Of the stream. */
+  std::optional<StreamSetup> setup;
+  /** As last written to the file. */
+  std::optional<Schedule> schedule;
+  std::optional<Mapping> mapping;
+  /** As last written to the track, and the PTS of that frame. */
+  std::optional<StreamSetup> tracked;
+  GstClockTime tracked_at = GST_CLOCK_TIME_NONE;
 };
-
-/** Pixels of a coded frame at the largest value, without the pilot's. Those of
- * a subframe were counted when it was extracted. */
-std::optional<guint64>
-saturated_pixels (
-    const LogState &state, GstBuffer *frame, const FrameMeta &meta)
-{
-  if (meta.subframe >= 0)
-    return meta.saturated;
-  MappedFrame mapped (state.info, frame, GST_MAP_READ);
-  if (!mapped)
-    return std::nullopt;
-  const int pilot = state.schedule ? state.schedule->pilot_rows () : 0;
-  return read_pixels (mapped, [&] (auto pixels) {
-    return codedexposure::count_saturated (
-        pixels.rows (0, std::max (0, pixels.height - pilot)),
-        significant_bits_of (meta.bits, state.info));
-  });
-}
-
-/** One line of JSON, keys in this order; unknown values are left out, except
- * `locked`, which is null then. */
-std::string
-frame_line (const LogState &state, GstBuffer *frame, const GstSegment &segment)
-{
-  const auto meta = get_frame_meta (frame);
-  const auto set_time = [&segment] (nlohmann::ordered_json &line,
-                            const char *key, GstClockTime time) {
-    const GstClockTime running = running_time (segment, time);
-    if (GST_CLOCK_TIME_IS_VALID (running))
-      line[key] = running;
-  };
-
-  nlohmann::ordered_json line;
-  line["frame"] = meta ? meta->frame : state.frames;
-  set_time (line, "pts_ns", GST_BUFFER_PTS (frame));
-  if (meta) {
-    set_time (line, "exposure_start_ns", meta->exposure_start);
-    if (GST_CLOCK_TIME_IS_VALID (meta->exposure_duration))
-      line["exposure_duration_ns"] = meta->exposure_duration;
-    if (GST_CLOCK_TIME_IS_VALID (meta->time_uncertainty))
-      line["time_uncertainty_ns"] = meta->time_uncertainty;
-    line["locked"] =
-        meta->locked ? nlohmann::json (*meta->locked) : nlohmann::json ();
-    line["slip"] = meta->slip;
-    line["lost_before"] = meta->lost_before;
-    if (const auto saturated = saturated_pixels (state, frame, *meta))
-      line["saturated"] = *saturated;
-    if (!meta->pattern.empty ())
-      line["pattern"] = meta->pattern;
-    if (meta->bits > 0)
-      line["bits"] = meta->bits;
-  }
-  line["flags"] = flag_names (frame);
-  return line.dump ();
-}
 
 } // namespace
 
@@ -132,13 +97,65 @@ GST_ELEMENT_REGISTER_DEFINE (codedexposure_log, "codedexposure-log",
 namespace
 {
 
+/* Receivers that join late, and recordings whose beginning is lost, need it
+ * again. */
+constexpr GstClockTime kRepeat = GST_SECOND;
+
+/** Whether the line of a frame at @p pts holds the setup. */
+bool
+repeats_setup (const LogState &state, GstClockTime pts)
+{
+  return state.setup &&
+         (!(state.tracked == state.setup) || pts < state.tracked_at ||
+             pts - state.tracked_at >= kRepeat);
+}
+
+/** How long a frame lasts. */
+GstClockTime
+duration_of (const LogState &state, GstBuffer *frame)
+{
+  if (GST_BUFFER_DURATION_IS_VALID (frame))
+    return GST_BUFFER_DURATION (frame);
+  return state.info.fps_n > 0
+             ? gst_util_uint64_scale_int (
+                   GST_SECOND, state.info.fps_d, state.info.fps_n)
+             : GST_CLOCK_TIME_NONE;
+}
+
+GstFlowReturn
+push_line (GstCodedExposureLog *self, GstBuffer *frame, FrameRecord record)
+{
+  LogState &state = *self->state;
+  const GstClockTime pts = GST_BUFFER_PTS (frame);
+  if (!GST_CLOCK_TIME_IS_VALID (pts)) {
+    POST_ERROR (self, STREAM, FORMAT,
+        "A coded frame has no time stamp (PTS), so its line could not be found "
+        "again. Let the source set one, for example with do-timestamp=true.");
+    return GST_FLOW_ERROR;
+  }
+  TrackLine line{.frame = std::move (record)};
+  if (repeats_setup (state, pts)) {
+    line.setup = state.tracked = state.setup;
+    state.tracked_at = pts;
+  }
+  const GstClockTime duration = duration_of (state, frame);
+  state.end = GST_CLOCK_TIME_IS_VALID (duration) ? pts + duration : pts;
+  return state.track.push (line.to_json (), pts, duration,
+      GST_BASE_TRANSFORM (self)->segment);
+}
+
 GstFlowReturn
 transform_ip (GstBaseTransform *base, GstBuffer *frame) noexcept
 {
-  LogState &state = state_in<GstCodedExposureLog> (base);
-  const std::string line = frame_line (state, frame, base->segment);
-  state.frames++;
-  return state.file.write (line) ? GST_FLOW_OK : GST_FLOW_ERROR;
+  auto *self = GST_CODED_EXPOSURE_LOG (base);
+  LogState &state = *self->state;
+  const int pilot = state.setup ? state.setup->schedule.pilot_rows () : 0;
+  FrameRecord record =
+      record_of (frame, state.info, base->segment, pilot, state.frames++);
+  if (state.file.is_open () && !state.file.write (record.to_json ()))
+    return GST_FLOW_ERROR;
+  return state.track.exists () ? push_line (self, frame, std::move (record))
+                               : GST_FLOW_OK;
 }
 
 gboolean
@@ -148,7 +165,7 @@ set_caps (GstBaseTransform *base, GstCaps *caps, GstCaps *)
   return gst_video_info_from_caps (&state.info, caps);
 }
 
-/* Upstream repeats tags; each schedule and mapping is written once. */
+/* Upstream repeats tags; the file holds each schedule and mapping once. */
 void
 note_setup (GstCodedExposureLog *self, GstEvent *event)
 {
@@ -164,22 +181,55 @@ note_setup (GstCodedExposureLog *self, GstEvent *event)
             setup->error ().message);
     return;
   }
-  const codedexposure::StreamSetup &said = setup->value ();
-  if (!(state.schedule == said.schedule)) {
-    state.schedule = said.schedule;
+  state.setup = setup->value ();
+  if (!state.file.is_open ())
+    return;
+  if (!(state.schedule == state.setup->schedule)) {
+    state.schedule = state.setup->schedule;
     state.file.write (state.schedule->to_json ());
   }
-  if (said.mapping && !(state.mapping == said.mapping)) {
-    state.mapping = said.mapping;
+  if (state.setup->mapping && !(state.mapping == state.setup->mapping)) {
+    state.mapping = state.setup->mapping;
     state.file.write (state.mapping->to_json ());
   }
+}
+
+/* The last line proves that no frame after it is missing. */
+void
+end_track (GstCodedExposureLog *self)
+{
+  LogState &state = *self->state;
+  if (state.frames > 0)
+    state.track.push (TrackLine{.end = state.frames}.to_json (), state.end,
+        GST_MSECOND, GST_BASE_TRANSFORM (self)->segment);
 }
 
 gboolean
 sink_event (GstBaseTransform *base, GstEvent *event) noexcept
 {
-  if (GST_EVENT_TYPE (event) == GST_EVENT_TAG)
-    note_setup (GST_CODED_EXPOSURE_LOG (base), event);
+  auto *self = GST_CODED_EXPOSURE_LOG (base);
+  TrackPad &track = self->state->track;
+  switch (GST_EVENT_TYPE (event)) {
+  case GST_EVENT_TAG:
+    note_setup (self, event);
+    break;
+  case GST_EVENT_STREAM_START:
+    track.restart (true);
+    break;
+  case GST_EVENT_SEGMENT:
+    track.restart (false);
+    break;
+  case GST_EVENT_EOS:
+    end_track (self);
+    track.forward (event);
+    break;
+  case GST_EVENT_FLUSH_START:
+  case GST_EVENT_FLUSH_STOP:
+    track.forward (event);
+    break;
+  default:
+    break;
+  }
   return GST_BASE_TRANSFORM_CLASS (gst_coded_exposure_log_parent_class)
       ->sink_event (base, event);
 }
@@ -195,14 +245,19 @@ begin_run (GstElement *element)
     location = state.location;
   }
   state.frames = 0;
+  state.setup.reset ();
   state.schedule.reset ();
   state.mapping.reset ();
-  if (location.empty ()) {
-    POST_ERROR (self, RESOURCE, NOT_FOUND,
-        "codedexposure-log has no file to write to: set location=FILE.jsonl");
-    return false;
-  }
-  return state.file.open (self, location);
+  state.tracked.reset ();
+  state.track.restart (true);
+  if (!location.empty ())
+    return state.file.open (self, location);
+  if (state.track.exists ())
+    return true;
+  POST_ERROR (self, RESOURCE, NOT_FOUND,
+      "codedexposure-log has nothing to write to: link its track pad, or set "
+      "location=FILE.jsonl");
+  return false;
 }
 
 void
@@ -211,12 +266,25 @@ end_run (GstElement *element)
   state_in<GstCodedExposureLog> (element).file.close ();
 }
 
+GstPad *
+request_new_pad (GstElement *element, GstPadTemplate *templ, const gchar *name,
+    const GstCaps *) noexcept
+{
+  return state_in<GstCodedExposureLog> (element).track.request (templ, name);
+}
+
+void
+release_pad (GstElement *element, GstPad *pad) noexcept
+{
+  state_in<GstCodedExposureLog> (element).track.release (pad);
+}
+
 const PropertyTable<LogState> &
 properties ()
 {
   static const PropertyTable<LogState> table{{"location", "File location",
       "File to write, one line of JSON a coded frame; overwritten when it "
-      "exists",
+      "exists; empty: none",
       kReadWriteReady, &LogState::location}};
   return table;
 }
@@ -226,7 +294,7 @@ properties ()
 static void
 gst_coded_exposure_log_init (GstCodedExposureLog *self)
 {
-  self->state = new LogState;
+  self->state = new LogState (GST_ELEMENT (self));
   gst_base_transform_set_passthrough (GST_BASE_TRANSFORM (self), TRUE);
 }
 
@@ -236,7 +304,12 @@ gst_coded_exposure_log_class_init (GstCodedExposureLogClass *klass)
   install_state<GstCodedExposureLog, properties> (klass);
   install_run<begin_run, end_run> (klass);
   describe_element (klass, "Coded exposure frame log", "Filter/Analyzer/Video",
-      "Writes what is known of every coded frame to a file of JSON lines");
+      "Writes what is known of every coded frame: as a text track for a "
+      "container, or to a file of JSON lines");
+  add_pad_template (klass, "track",
+      {.presence = GST_PAD_REQUEST, .caps = "text/x-raw,format=utf8"});
+  GST_ELEMENT_CLASS (klass)->request_new_pad = request_new_pad;
+  GST_ELEMENT_CLASS (klass)->release_pad = release_pad;
 
   auto *transform_class = GST_BASE_TRANSFORM_CLASS (klass);
   transform_class->set_caps = GST_DEBUG_FUNCPTR (set_caps);

@@ -49,6 +49,7 @@
 #include "common/elements.h"
 #include "common/lines.h"
 #include "common/meta.h"
+#include "common/record.h"
 #include "report.h"
 
 using namespace codedexposure;

@@ -23,6 +23,7 @@ nlohmann-json3-dev|reads and writes JSON (schedules and sidecars)|run
 libcairo2-dev|draws the overlay of a calibration|run
 libusb-1.0-0-dev|DMD boards on the USB|run
 libeigen3-dev|linear algebra of estimates and calibrations|run
+libxxhash-dev|hashes of recorded frames|run
 libcli11-dev|options of the command-line tool|run
 gstreamer1.0-tools|gst-launch-1.0, gst-inspect-1.0|run
 gstreamer1.0-plugins-base|test scenes, conversion, TCP, compositor|run

@@ -1,0 +1,47 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The pad of codedexposure-log that gives one line of text a frame. */
+#pragma once
+
+#include <string>
+
+#include <gst/gst.h>
+
+#include "common/raii.h"
+
+namespace codedexposure::gst
+{
+
+/** One buffer of text a frame, with the frame's PTS and DURATION, on the
+ * frames' streaming thread. Without a pad all calls do nothing. */
+class TrackPad
+{
+public:
+  explicit TrackPad (GstElement *element) : element_ (element) {}
+
+  /** Any thread. Null if there is one already. */
+  GstPad *request (GstPadTemplate *templ, const gchar *name);
+  void release (GstPad *pad);
+  bool exists () const;
+
+  /* Streaming thread: */
+
+  /** Text that belongs to @p segment. */
+  GstFlowReturn push (const std::string &text, GstClockTime pts,
+      GstClockTime duration, const GstSegment &segment);
+  /** The next text belongs to another segment or stream. */
+  void restart (bool stream);
+  /** Forwards EOS and flushes. */
+  void forward (GstEvent *event);
+
+private:
+  ObjectPtr<GstPad> pad () const;
+  void start (GstPad *pad, const GstSegment &segment);
+
+  GstElement *element_;
+  GstPad *pad_ = nullptr; ///< object lock; the element's
+  /* Streaming thread. */
+  bool stream_sent_ = false;
+  bool segment_sent_ = false;
+};
+
+} // namespace codedexposure::gst

@@ -1,0 +1,592 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-codedexposure-restore
+ * @title: codedexposure-restore
+ *
+ * Puts back onto recorded coded frames what #codedexposure-log wrote beside
+ * them: number, exact time, exposure, synchronisation, lost frames and flags,
+ * and the schedule and mapping as a tag. It compares the pixels of each frame
+ * with the hash of those that were recorded.
+ *
+ * ## Pads
+ *
+ * - `sink`, `src`: the frames.
+ * - `track` (request): the text track of the recording, directly from the
+ *   demuxer, without a queue.
+ *
+ * A frame whose pixels are not those that were recorded, or that has no line in
+ * the track, is CORRUPTED. The element messages `codedexposure/frames-damaged`
+ * (`active`, `frame`, `from`, `reason`, at the end `count`),
+ * `codedexposure/frames-missing` (`count`, `from`) and
+ * `codedexposure/stream-cut` (`frames`: the stream ended without its last line)
+ * report damage; #codedexposure-restore:stats counts it.
+ *
+ * The schedule of the track wins over that in the container's tags; a
+ * difference is a warning. A recording without a track passes unchanged, with a
+ * message: it is unknown whether its frames are synchronised or damaged.
+ *
+ * A frame is held until the next one comes if its line is not there yet.
+ *
+ * ## Example pipeline
+ * |[
+ * gst-launch-1.0 filesrc location=coded.mkv ! matroskademux name=file
+ * file.video_0 ! queue ! avdec_ffv1 ! codedexposure-restore name=restore !
+ * codedexposure-demux ! queue ! videoconvert ! autovideosink
+ * file.subtitle_0 ! restore.track
+ * ]|
+ *
+ * Since: 0.1
+ */
+#include <deque>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include <gst/gst.h>
+
+#include "common/element.h"
+#include "common/elements.h"
+#include "common/messages.h"
+#include "common/meta.h"
+#include "common/record.h"
+#include "common/tag.h"
+#include "record/track_reader.h"
+
+using namespace codedexposure;
+using namespace codedexposure::gst;
+
+GST_DEBUG_CATEGORY_STATIC (codedexposure_restore_debug);
+#define GST_CAT_DEFAULT codedexposure_restore_debug
+
+namespace
+{
+
+struct RestoreCounters {
+  guint64 frames = 0;
+  guint64 frames_damaged = 0; ///< their pixels are not those recorded
+  guint64 frames_unknown = 0; ///< without a line in the track
+  guint64 frames_missing = 0; ///< in the track only
+  guint64 lines_damaged = 0;
+};
+
+/** A sequence of frames that are not as recorded. */
+struct Damage {
+  guint64 frame = 0, count = 0;
+  GstClockTime from = 0;
+};
+
+struct RestoreState {
+  GstPad *sink = nullptr, *src = nullptr; ///< the element's
+
+  /* Object lock. */
+  GstPad *track = nullptr; ///< the element's
+  RestoreCounters counters;
+
+  /* Never held while pushing. */
+  std::mutex reader_lock;
+  TrackReader reader;
+  bool markup = false; ///< the text is escaped
+
+  /* Stream lock of the sink pad. */
+  GstVideoInfo info = {};
+  GstSegment segment = {};
+  std::deque<BufferPtr> held;
+  std::optional<StreamSetup> container; ///< setup of the container's tags
+  std::optional<StreamSetup> setup;     ///< in force
+  std::optional<guint64> last_frame;
+  Damage damage;
+  bool said_no_track = false;
+  bool said_setups_differ = false;
+};
+
+} // namespace
+
+G_DECLARE_FINAL_TYPE (GstCodedExposureRestore, gst_coded_exposure_restore, GST,
+    CODED_EXPOSURE_RESTORE, GstElement)
+
+struct _GstCodedExposureRestore {
+  GstElement parent;
+  RestoreState *state;
+};
+
+G_DEFINE_TYPE_WITH_CODE (GstCodedExposureRestore, gst_coded_exposure_restore,
+    GST_TYPE_ELEMENT,
+    GST_DEBUG_CATEGORY_INIT (codedexposure_restore_debug,
+        "codedexposure-restore", 0, "truth of recorded coded frames"))
+GST_ELEMENT_REGISTER_DEFINE (codedexposure_restore, "codedexposure-restore",
+    GST_RANK_NONE, gst_coded_exposure_restore_get_type ())
+
+namespace
+{
+
+using Self = GstCodedExposureRestore;
+
+void
+count (Self *self, guint64 RestoreCounters::*counter, guint64 by = 1)
+{
+  const ObjectLock lock (self);
+  self->state->counters.*counter += by;
+}
+
+bool
+has_track (Self *self)
+{
+  const ObjectLock lock (self);
+  return self->state->track != nullptr;
+}
+
+/* ---------------------------------------------------------------- setups -- */
+
+/* The schedule of the track is in force; @said is that of the container. */
+void
+warn_if_different (Self *self, const StreamSetup &said)
+{
+  RestoreState &state = *self->state;
+  if (!state.setup || said.schedule == state.setup->schedule ||
+      std::exchange (state.said_setups_differ, true))
+    return;
+  POST_WARNING (self, STREAM, FORMAT,
+      "The tags of the recording have the schedule " + said.schedule.text () +
+          ", but its frames were recorded with " +
+          state.setup->schedule.text () +
+          ", as their track says, which is used. To use another, set the "
+          "schedule property of the element that decodes.");
+}
+
+void
+use_setup (Self *self, const StreamSetup &setup)
+{
+  RestoreState &state = *self->state;
+  if (state.setup == setup)
+    return;
+  state.setup = setup;
+  gst_pad_push_event (state.src, setup_to_event (setup));
+}
+
+/* Before the frame to which @line, if it was found, belongs. */
+void
+settle_setup (Self *self, const TrackLine *line)
+{
+  RestoreState &state = *self->state;
+  if (line && line->setup)
+    use_setup (self, *line->setup);
+  else if (!state.setup && state.container)
+    use_setup (self, *state.container);
+  if (state.container)
+    warn_if_different (self, *state.container);
+}
+
+/* With a track, tags pass without their setup, which the track has. */
+gboolean
+on_tag (Self *self, EventPtr event)
+{
+  RestoreState &state = *self->state;
+  GstTagList *tags = nullptr;
+  gst_event_parse_tag (event.get (), &tags);
+  const auto said = setup_from_tags (tags);
+  if (!said || !*said || !has_track (self))
+    return gst_pad_push_event (state.src, event.release ());
+  state.container = said->value ();
+  warn_if_different (self, *state.container);
+  GstEvent *rest = state.setup
+                       ? replace_setup (event.release (), *state.setup)
+                       : remove_setup (event.release ());
+  return !rest || gst_pad_push_event (state.src, rest);
+}
+
+/* ---------------------------------------------------------------- frames -- */
+
+void
+end_damage (Self *self)
+{
+  const Damage over = std::exchange (self->state->damage, {});
+  if (over.count > 0)
+    post_message (self, FramesDamaged{.active = false,
+                            .frame = over.frame,
+                            .count = over.count,
+                            .from = over.from,
+                            .reason = {}});
+}
+
+void
+note_damage (Self *self, guint64 frame, GstClockTime pts, const char *reason)
+{
+  Damage &damage = self->state->damage;
+  if (damage.count++ > 0)
+    return;
+  damage.frame = frame;
+  damage.from = pts;
+  post_message (self, FramesDamaged{.active = true,
+                          .frame = frame,
+                          .count = {},
+                          .from = pts,
+                          .reason = reason});
+}
+
+void
+report_missing (Self *self, const TrackReader::Match &match)
+{
+  if (match.skipped == 0)
+    return;
+  count (self, &RestoreCounters::frames_missing, match.skipped);
+  post_message (self,
+      FramesMissing{match.skipped, GstClockTime (match.skipped_from)});
+}
+
+/* A frame without a line: nothing shows that it is as it was recorded. */
+void
+mark_unknown (Self *self, GstBuffer *frame)
+{
+  RestoreState &state = *self->state;
+  FrameMeta meta;
+  meta.frame = state.last_frame ? *state.last_frame + 1 : 0;
+  set_frame_meta (frame, meta);
+  state.last_frame = meta.frame;
+  GST_BUFFER_FLAG_SET (frame, GST_BUFFER_FLAG_CORRUPTED);
+  count (self, &RestoreCounters::frames_unknown);
+  note_damage (self, meta.frame, GST_BUFFER_PTS (frame),
+      "the track has no line for it");
+}
+
+void
+restore (Self *self, GstBuffer *frame, const TrackReader::Match &match)
+{
+  RestoreState &state = *self->state;
+  FrameRecord record = *match.line->frame;
+  record.lost_before += match.skipped;
+  apply_record (frame, record, match.offset);
+  if (match.skipped > 0)
+    GST_BUFFER_FLAG_SET (frame, GST_BUFFER_FLAG_DISCONT);
+  state.last_frame = record.frame;
+  if (!record.hash || record.hash == hash_of (frame, state.info)) {
+    end_damage (self);
+    return;
+  }
+  GST_BUFFER_FLAG_SET (frame, GST_BUFFER_FLAG_CORRUPTED);
+  count (self, &RestoreCounters::frames_damaged);
+  note_damage (self, record.frame, GST_BUFFER_PTS (frame),
+      "its pixels are not those that were recorded");
+}
+
+/* The match of the oldest frame that is held; none if its line may still
+ * come. */
+std::optional<TrackReader::Match>
+match_oldest (RestoreState &state, bool now)
+{
+  const auto pts = Nanoseconds (GST_BUFFER_PTS (state.held.front ().get ()));
+  const auto start = Nanoseconds (state.segment.start);
+  const std::lock_guard lock (state.reader_lock);
+  if (now)
+    return state.reader.take_now (pts, start);
+  return state.reader.take (pts, start);
+}
+
+/* Pushes the frames whose lines are there, or all. */
+GstFlowReturn
+release (Self *self, bool all)
+{
+  /* A demuxer interleaves a line and its frame more closely than this. */
+  constexpr std::size_t kMaxHeld = 8;
+  RestoreState &state = *self->state;
+  GstFlowReturn flow = GST_FLOW_OK;
+  while (!state.held.empty () && flow == GST_FLOW_OK) {
+    const auto match =
+        match_oldest (state, all || state.held.size () > kMaxHeld);
+    if (!match)
+      break;
+    BufferPtr frame = std::move (state.held.front ());
+    state.held.pop_front ();
+    frame.reset (gst_buffer_make_writable (frame.release ()));
+    settle_setup (self, match->line ? &*match->line : nullptr);
+    report_missing (self, *match);
+    if (match->line)
+      restore (self, frame.get (), *match);
+    else
+      mark_unknown (self, frame.get ());
+    state.segment.position = GST_BUFFER_PTS (frame.get ());
+    if (GST_BUFFER_DURATION_IS_VALID (frame.get ()))
+      state.segment.position += GST_BUFFER_DURATION (frame.get ());
+    flow = gst_pad_push (state.src, frame.release ());
+  }
+  return flow;
+}
+
+void
+say_no_track (Self *self)
+{
+  if (!std::exchange (self->state->said_no_track, true))
+    POST_INFO (self, STREAM, FORMAT,
+        "The stream has no track: it is unknown whether its frames are "
+        "synchronised or damaged. codedexposure-log writes a track when it "
+        "records.");
+}
+
+GstFlowReturn
+chain (GstPad *, GstObject *parent, GstBuffer *buffer) noexcept
+{
+  auto *self = GST_CODED_EXPOSURE_RESTORE (parent);
+  RestoreState &state = *self->state;
+  BufferPtr frame (buffer);
+  count (self, &RestoreCounters::frames);
+  if (!has_track (self) || !GST_BUFFER_PTS_IS_VALID (buffer)) {
+    say_no_track (self);
+    return gst_pad_push (state.src, frame.release ());
+  }
+  state.held.push_back (std::move (frame));
+  return release (self, false);
+}
+
+/* ---------------------------------------------------------------- events -- */
+
+/* A seek may end the stream before the last line. */
+bool
+ends_early (const RestoreState &state)
+{
+  return GST_CLOCK_TIME_IS_VALID (state.segment.stop) &&
+         GST_CLOCK_TIME_IS_VALID (state.segment.position) &&
+         state.segment.position >= state.segment.stop;
+}
+
+void
+check_end (Self *self)
+{
+  RestoreState &state = *self->state;
+  end_damage (self);
+  if (!has_track (self))
+    return;
+  TrackReader::Match rest;
+  bool complete;
+  {
+    const std::lock_guard lock (state.reader_lock);
+    rest = state.reader.take_rest (Nanoseconds (state.segment.start));
+    complete = state.reader.frames ().has_value ();
+  }
+  if (!ends_early (state) || complete)
+    report_missing (self, rest);
+  guint64 frames;
+  {
+    const ObjectLock lock (self);
+    frames = state.counters.frames;
+  }
+  if (!complete && !ends_early (state))
+    post_message (self, StreamCut{frames});
+}
+
+void
+forget_frames (RestoreState &state)
+{
+  state.held.clear ();
+  state.last_frame.reset ();
+  state.damage = {};
+  gst_segment_init (&state.segment, GST_FORMAT_TIME);
+}
+
+gboolean
+sink_event (GstPad *pad, GstObject *parent, GstEvent *owned) noexcept
+{
+  auto *self = GST_CODED_EXPOSURE_RESTORE (parent);
+  RestoreState &state = *self->state;
+  EventPtr event (owned);
+  const auto flags = gst_event_type_get_flags (GST_EVENT_TYPE (event.get ()));
+  if ((flags & GST_EVENT_TYPE_SERIALIZED) &&
+      GST_EVENT_TYPE (event.get ()) != GST_EVENT_FLUSH_STOP)
+    release (self, true);
+  switch (GST_EVENT_TYPE (event.get ())) {
+  case GST_EVENT_CAPS: {
+    GstCaps *caps = nullptr;
+    gst_event_parse_caps (event.get (), &caps);
+    if (!gst_video_info_from_caps (&state.info, caps))
+      return FALSE;
+    break;
+  }
+  case GST_EVENT_SEGMENT:
+    gst_event_copy_segment (event.get (), &state.segment);
+    break;
+  case GST_EVENT_TAG:
+    return on_tag (self, std::move (event));
+  case GST_EVENT_FLUSH_STOP:
+    forget_frames (state);
+    break;
+  case GST_EVENT_EOS:
+    check_end (self);
+    break;
+  default:
+    break;
+  }
+  return gst_pad_event_default (pad, parent, event.release ());
+}
+
+/* ----------------------------------------------------------------- track -- */
+
+GstFlowReturn
+track_chain (GstPad *, GstObject *parent, GstBuffer *buffer) noexcept
+{
+  auto *self = GST_CODED_EXPOSURE_RESTORE (parent);
+  RestoreState &state = *self->state;
+  const BufferPtr owned (buffer);
+  GstMapInfo map;
+  if (!gst_buffer_map (buffer, &map, GST_MAP_READ))
+    return GST_FLOW_ERROR;
+  std::string text (reinterpret_cast<const char *> (map.data), map.size);
+  gst_buffer_unmap (buffer, &map);
+
+  const auto time_of = [] (GstClockTime time) {
+    return GST_CLOCK_TIME_IS_VALID (time) ? Nanoseconds (time) : 0;
+  };
+  const Result<void> added = [&] {
+    const std::lock_guard lock (state.reader_lock);
+    return state.reader.add (state.markup ? unescape_markup (text) : text,
+        time_of (GST_BUFFER_PTS (buffer)),
+        time_of (GST_BUFFER_DURATION (buffer)));
+  }();
+  if (added)
+    return GST_FLOW_OK;
+  GST_WARNING_OBJECT (self, "%s", added.error ().message.c_str ());
+  count (self, &RestoreCounters::lines_damaged);
+  return GST_FLOW_OK;
+}
+
+gboolean
+track_event (GstPad *, GstObject *parent, GstEvent *owned) noexcept
+{
+  RestoreState &state = state_in<Self> (parent);
+  const EventPtr event (owned);
+  const std::lock_guard lock (state.reader_lock);
+  switch (GST_EVENT_TYPE (event.get ())) {
+  case GST_EVENT_CAPS: {
+    GstCaps *caps = nullptr;
+    gst_event_parse_caps (event.get (), &caps);
+    const GstStructure *structure = gst_caps_get_structure (caps, 0);
+    state.markup = g_strcmp0 (gst_structure_get_string (structure, "format"),
+                       "pango-markup") == 0;
+    break;
+  }
+  case GST_EVENT_FLUSH_STOP:
+    state.reader.clear ();
+    break;
+  case GST_EVENT_EOS:
+    state.reader.end ();
+    break;
+  default:
+    break;
+  }
+  return TRUE;
+}
+
+GstPad *
+request_new_pad (GstElement *element, GstPadTemplate *templ, const gchar *,
+    const GstCaps *) noexcept
+{
+  RestoreState &state = state_in<Self> (element);
+  ObjectPtr<GstPad> pad (GST_PAD (
+      gst_object_ref_sink (gst_pad_new_from_template (templ, "track"))));
+  gst_pad_set_chain_function (pad.get (), track_chain);
+  gst_pad_set_event_function (pad.get (), track_event);
+  {
+    const ObjectLock lock (element);
+    if (state.track)
+      return nullptr;
+    state.track = pad.get ();
+  }
+  gst_pad_set_active (pad.get (), TRUE);
+  gst_element_add_pad (element, pad.get ());
+  return pad.get ();
+}
+
+void
+release_pad (GstElement *element, GstPad *pad) noexcept
+{
+  {
+    const ObjectLock lock (element);
+    state_in<Self> (element).track = nullptr;
+  }
+  gst_pad_set_active (pad, FALSE);
+  gst_element_remove_pad (element, pad);
+}
+
+/* --------------------------------------------------------------- element -- */
+
+bool
+begin_run (GstElement *element)
+{
+  RestoreState &state = state_in<Self> (element);
+  forget_frames (state);
+  state.container.reset ();
+  state.setup.reset ();
+  state.said_no_track = state.said_setups_differ = false;
+  {
+    const std::lock_guard lock (state.reader_lock);
+    state.reader.clear ();
+  }
+  const ObjectLock lock (element);
+  state.counters = {};
+  return true;
+}
+
+void
+end_run (GstElement *element)
+{
+  forget_frames (state_in<Self> (element));
+}
+
+StructurePtr
+stats_of (const RestoreState &state)
+{
+  const RestoreCounters &counters = state.counters;
+  return StructurePtr (gst_structure_new (
+      "application/x-codedexposure-restore-stats", "frames", G_TYPE_UINT64,
+      counters.frames, "frames-damaged", G_TYPE_UINT64, counters.frames_damaged,
+      "frames-unknown", G_TYPE_UINT64, counters.frames_unknown,
+      "frames-missing", G_TYPE_UINT64, counters.frames_missing,
+      "lines-damaged", G_TYPE_UINT64, counters.lines_damaged, nullptr));
+}
+
+const PropertyTable<RestoreState> &
+properties ()
+{
+  static const PropertyTable<RestoreState> table{{"stats", "Statistics",
+      "frames, frames-damaged (their pixels are not those that were "
+      "recorded), frames-unknown (without a line in the track), "
+      "frames-missing (in the track only), lines-damaged",
+      kReadOnly, stats_of}};
+  return table;
+}
+
+} // namespace
+
+static void
+gst_coded_exposure_restore_init (GstCodedExposureRestore *self)
+{
+  self->state = new RestoreState;
+  auto *element_class = GST_ELEMENT_GET_CLASS (self);
+  const auto add = [&] (const char *name) {
+    GstPad *pad = gst_pad_new_from_template (
+        gst_element_class_get_pad_template (element_class, name), name);
+    GST_PAD_SET_PROXY_CAPS (pad);
+    GST_PAD_SET_PROXY_ALLOCATION (pad);
+    gst_element_add_pad (GST_ELEMENT (self), pad);
+    return pad;
+  };
+  self->state->sink = add ("sink");
+  gst_pad_set_chain_function (self->state->sink, chain);
+  gst_pad_set_event_function (self->state->sink, sink_event);
+  self->state->src = add ("src");
+}
+
+static void
+gst_coded_exposure_restore_class_init (GstCodedExposureRestoreClass *klass)
+{
+  install_state<GstCodedExposureRestore, properties> (klass);
+  install_run<begin_run, end_run> (klass);
+  describe_element (klass, "Coded exposure restorer", "Filter/Analyzer/Video",
+      "Puts back onto recorded coded frames what their track says, and checks "
+      "their pixels");
+  add_pad_template (klass, "track",
+      {.presence = GST_PAD_REQUEST,
+          .caps = "text/x-raw,format={utf8,pango-markup}",
+          .direction = GST_PAD_SINK});
+  auto *element_class = GST_ELEMENT_CLASS (klass);
+  element_class->request_new_pad = request_new_pad;
+  element_class->release_pad = release_pad;
+}

@@ -1,0 +1,40 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* What is known of one coded frame beside its pixels. */
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "schedule/timing.h"
+
+namespace codedexposure
+{
+
+/** Times are on the clock of the recording; what is unknown is absent.
+ * docs/formats.md, "Per-frame track". */
+struct FrameRecord {
+  std::uint64_t frame = 0; ///< its number, lost frames counted
+  std::optional<Nanoseconds> pts;
+  std::optional<Nanoseconds> duration;
+  std::optional<Nanoseconds> exposure_start;
+  std::optional<Nanoseconds> exposure_duration;
+  std::optional<Nanoseconds> time_uncertainty;
+  /** Whether masks and exposure were synchronised. */
+  std::optional<bool> locked;
+  int slip = 0;                  ///< slots by which the masks were late
+  std::uint64_t lost_before = 0; ///< frames
+  std::optional<std::uint64_t> saturated; ///< pixels
+  std::string pattern; ///< that the mirrors showed; empty: the schedule
+  int bits = 0;        ///< significant bits; 0: all of the format
+  std::vector<std::string> flags; ///< "discont", "corrupted", "gap" ...
+  std::optional<std::uint64_t> hash; ///< pixel_hash ()
+
+  /** One line; unknown values are left out, but `locked` is null. */
+  std::string to_json () const;
+
+  bool operator== (const FrameRecord &) const = default;
+};
+
+} // namespace codedexposure

@@ -1,0 +1,72 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "record/provenance.h"
+
+#include <limits>
+
+#include "base/json.h"
+#include "base/text.h"
+
+namespace codedexposure
+{
+
+namespace
+{
+
+const JsonHead kHead{"provenance", "coded-exposure-decoded", 1};
+
+Provenance
+read_provenance (const Json &root)
+{
+  Provenance read;
+  std::int64_t frame = 0;
+  read_versioned (root, kHead,
+      "a provenance needs format, version, setup, method, frame and slot",
+      {{"setup",
+           [&] (const Json &value, const std::string &) {
+             read.setup = or_throw (StreamSetup::from_json (value.dump ()));
+           },
+           true},
+          {"method",
+              [&] (const Json &value, const std::string &key) {
+                if (!value.is_string ())
+                  throw expected (key, "a text", value);
+                read.method = value.get<std::string> ();
+              },
+              true},
+          {"frame",
+              integer_into (frame, std::numeric_limits<std::int64_t>::max ()),
+              true},
+          {"slot", integer_into (read.first_slot, 255), true}});
+  read.first_frame = std::uint64_t (frame);
+  return read;
+}
+
+} // namespace
+
+std::string
+Provenance::to_json () const
+{
+  OrderedJson root;
+  root["format"] = kHead.format;
+  root["version"] = kHead.version;
+  root["method"] = method;
+  root["frame"] = first_frame;
+  root["slot"] = first_slot;
+  root["setup"] = OrderedJson::parse (setup.to_json ());
+  return root.dump ();
+}
+
+Result<Provenance>
+Provenance::from_json (std::string_view json)
+{
+  return read_json<Provenance> (json, kHead.what,
+      Schedule::kMaxJsonSize + Mapping::kMaxJsonSize + 4096, read_provenance);
+}
+
+std::string
+Provenance::text () const
+{
+  return setup.schedule.text () + " by " + printable (method);
+}
+
+} // namespace codedexposure

@@ -1,0 +1,41 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The text track that stands beside the coded frames in a container: one line
+ * of JSON a frame. */
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "base/result.h"
+#include "mapping/stream_setup.h"
+#include "record/frame_record.h"
+
+namespace codedexposure
+{
+
+/** A line of the track. docs/formats.md, "Per-frame track". */
+struct TrackLine {
+  static constexpr std::size_t kMaxSize =
+      Schedule::kMaxJsonSize + Mapping::kMaxJsonSize + 65536;
+
+  std::optional<FrameRecord> frame = {};
+  /** Valid from this frame on. */
+  std::optional<StreamSetup> setup = {};
+  /** The stream ended, complete, after so many frames. */
+  std::optional<std::uint64_t> end = {};
+
+  /** The last key, "check", is an XXH3 of the text before it. Contains no '<'
+   * and no '&', which some programs take for markup. */
+  std::string to_json () const;
+  /** An error if the text is not as it was written. */
+  static Result<TrackLine> from_json (std::string_view text);
+
+  bool operator== (const TrackLine &) const = default;
+};
+
+/** Text that a program has escaped as XML or Pango markup. */
+std::string unescape_markup (std::string_view text);
+
+} // namespace codedexposure

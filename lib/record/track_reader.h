@@ -1,0 +1,76 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Finds the line of each frame in a track. */
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "base/result.h"
+#include "record/track.h"
+#include "schedule/timing.h"
+
+namespace codedexposure
+{
+
+/** The lines of a track that no frame has taken yet. Lines come in the order of
+ * their times; so do frames. */
+class TrackReader
+{
+public:
+  /** Lines that wait for their frames; the oldest are dropped. */
+  static constexpr std::size_t kMaxLines = 1 << 16;
+
+  /** A text of the track with the container's times.
+   * @return an error if it cannot be read; its frame will have no line. */
+  Result<void> add (
+      std::string_view text, Nanoseconds pts, Nanoseconds duration);
+  /** No line follows. */
+  void end () { ended_ = true; }
+  void clear ();
+
+  struct Match {
+    /** Null: the track has no line for this frame. */
+    std::optional<TrackLine> line;
+    /** To add to the times of the record. */
+    Nanoseconds offset = 0;
+    /** Frames of the track between the one before and this one. */
+    std::uint64_t skipped = 0;
+    Nanoseconds skipped_from = 0; ///< PTS of the first of them
+  };
+  /**
+   * The line of the frame at @p pts, which is taken out together with those
+   * before it.
+   * @p start  of the segment: a frame there may be the rest of one that began
+   *           earlier, and lines that end before it are not counted as skipped.
+   * @return none if the line may still come.
+   */
+  std::optional<Match> take (Nanoseconds pts, Nanoseconds start);
+  /** The same when no line will be waited for. */
+  Match take_now (Nanoseconds pts, Nanoseconds start);
+  /** Frames of the track that did not come. */
+  Match take_rest (Nanoseconds start);
+
+  /** How many frames the last line says the stream has. */
+  std::optional<std::uint64_t> frames () const { return frames_; }
+
+private:
+  struct Line {
+    Nanoseconds pts, duration;
+    TrackLine line;
+    Nanoseconds stop () const { return pts + duration; }
+  };
+  using Place = std::deque<Line>::iterator;
+
+  Place find (Nanoseconds pts, Nanoseconds start);
+  Match take_until (Place place, Nanoseconds start);
+
+  std::deque<Line> lines_;
+  std::optional<std::uint64_t> frames_;
+  bool ended_ = false;
+};
+
+} // namespace codedexposure

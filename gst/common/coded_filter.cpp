@@ -74,6 +74,11 @@ CodedFilter::properties ()
           "of a JSON file; empty: that of the stream's tag, else "
           "sequential:2x2",
           kReadWrite, set (&CodedSettings::schedule)},
+      {"require-schedule", "Require a schedule",
+          "Refuse coded frames whose schedule is not known, instead of "
+          "assuming "
+          "sequential:2x2",
+          kReadWrite, set (&CodedSettings::require_schedule)},
       {"mapping", "Mapping",
           "File with the mapping from camera pixels to mirrors (moirecalib "
           "writes one); empty: that of the stream's tags, or none",
@@ -270,6 +275,7 @@ CodedFilter::after_state_change (GstStateChange transition)
   const ObjectLock lock (element_);
   shared_.settings_changed = true;
   shared_.schedule.reset ();
+  shared_.provenance.reset ();
   shared_.assumed = false;
   shared_.rectifies = false;
   shared_.latency = 0;

@@ -20,6 +20,7 @@
 #include "named.h"
 #include "properties.h"
 #include "raii.h"
+#include "record/provenance.h"
 #include "rectify/rectifier.h"
 #include "schedule/schedule.h"
 #include "sync/frame_sequence.h"
@@ -45,8 +46,9 @@ using ScheduleRef = std::shared_ptr<const Schedule>;
 struct CodedSettings {
   Named<Schedule> schedule;
   Named<Mapping> mapping;
-  int bits = 0;         ///< significant bits; 0: as the frames say
-  FrameRate rate{0, 1}; ///< used if caps have none; 0/1: none
+  int bits = 0;                  ///< significant bits; 0: as the frames say
+  bool require_schedule = false; ///< never assume the default
+  FrameRate rate{0, 1};          ///< used if caps have none; 0/1: none
 };
 
 struct CodedCounters {
@@ -189,6 +191,8 @@ protected:
   /** The pad that forwards coded frames without a copy; null: none. */
   virtual ObjectPtr<GstPad> coded_pad () const { return nullptr; }
   virtual RectifyOptions rectify_options () const { return {}; }
+  /** How pictures are made, for their provenance: "select". */
+  virtual std::string method_name () const = 0;
 
   /** A snapshot of what caps queries depend on. */
   struct CapsContext {
@@ -211,6 +215,10 @@ protected:
   bool has_format () const { return stream_.format.has_value (); }
   const CodedFormat &format () const { return *stream_.format; }
   const GstSegment &segment () const { return stream_.segment; }
+  /** @p event as @p pad is to have it: pictures say how they were made, where
+   * coded frames have their setup. Transfer: full, of both. */
+  static GstEvent *event_for (
+      const GstCodedPad *pad, GstEvent *event, const Provenance *provenance);
   bool backwards () const { return stream_.segment.rate < 0; }
   /** From the property, else from the frames; 0: all bits of the format. */
   int significant_bits () const;
@@ -248,8 +256,10 @@ protected:
     CodedSettings settings;
     bool settings_changed = true;
     CodedCounters counters;
-    ScheduleRef schedule;     ///< in force; null before the first frame
-    bool assumed = false;     ///< the schedule is the default
+    ScheduleRef schedule; ///< in force; null before the first frame
+    bool assumed = false; ///< the schedule is the default
+    /** Of the pictures; null before the first frame. */
+    std::shared_ptr<const Provenance> provenance;
     bool rectifies = false;   ///< a mapping is in force
     GstClockTime latency = 0; ///< added by frames that are held
 
@@ -281,8 +291,11 @@ private:
     GstSegment segment;
     /** From the tags; an error if they cannot be read. */
     std::optional<Result<StreamSetup>> tagged;
+    /** The frames are pictures that were decoded before: how. */
+    std::optional<std::string> decoded;
     int bits = 0;      ///< significant bits by the metas; 0: unknown
     bool stale = true; ///< the plan must be made again
+    bool provenance_due = false;
     CodedSettings settings;
     std::optional<CodedFormat> format; ///< in force
     /** Serialised events that wait for the caps of the source pads. */
@@ -314,7 +327,11 @@ private:
   bool find_schedule (CodedFormat &format);
   bool find_mapping (Extent camera, std::optional<Mapping> &mapping);
   bool find_rectifier (CodedFormat &format);
-  void adopt (CodedFormat format);
+  bool check_camera (const CodedFormat &format) const;
+  void adopt (CodedFormat format, GstBuffer *next);
+  void report_change (const Schedule &before, GstBuffer *next);
+  void set_provenance (GstBuffer *next);
+  void push_provenance ();
   void report_overruled (const Schedule &asked);
   void report_mirrors ();
 

@@ -65,6 +65,9 @@ void
 CodedFilter::settle_events ()
 {
   for (EventPtr &event : std::exchange (stream_.pending, {})) {
+    if (GST_EVENT_TYPE (event.get ()) == GST_EVENT_TAG &&
+        takes_provenance (event.get ()))
+      stream_.provenance_due = false;
     if (has_format ())
       forward (std::move (event));
   }
@@ -79,11 +82,22 @@ CodedFilter::forward_in_turn (EventPtr event)
   return TRUE;
 }
 
+GstEvent *
+CodedFilter::event_for (
+    const GstCodedPad *pad, GstEvent *event, const Provenance *provenance)
+{
+  if (GST_EVENT_TYPE (event) != GST_EVENT_TAG ||
+      pad->coded.kind == PadKind::coded || !provenance)
+    return event;
+  return replace_by_provenance (event, *provenance);
+}
+
 gboolean
 CodedFilter::on_stream_start (EventPtr event)
 {
   settle_events ();
   stream_.tagged.reset ();
+  stream_.decoded.reset ();
   stream_.stale = true;
   return forward (std::move (event));
 }
@@ -119,6 +133,10 @@ CodedFilter::on_tag (EventPtr event)
 {
   GstTagList *tags = nullptr;
   gst_event_parse_tag (event.get (), &tags);
+  if (const auto decoded = provenance_from_tags (tags)) {
+    stream_.decoded = *decoded ? decoded->value ().text () : "unknown";
+    stream_.stale = true;
+  }
   if (auto tagged = setup_from_tags (tags)) {
     if (!*tagged || !stream_.tagged || !*stream_.tagged || !has_format () ||
         !(tagged->value () == stream_.tagged->value ()))

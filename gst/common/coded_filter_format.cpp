@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "element.h"
+#include "tag.h"
 
 GST_DEBUG_CATEGORY_EXTERN (coded_filter_debug);
 #define GST_CAT_DEFAULT coded_filter_debug
@@ -56,9 +57,10 @@ CodedFilter::negotiate (GstBuffer *next)
     auto format = find_format ();
     if (!format || !plan (*format))
       return GST_FLOW_NOT_NEGOTIATED;
-    adopt (std::move (*format));
+    adopt (std::move (*format), next);
   }
   settle_events ();
+  push_provenance ();
   return GST_FLOW_OK;
 }
 
@@ -89,7 +91,13 @@ CodedFilter::find_format ()
   }
   format.rate = {info.fps_n, info.fps_d};
   format.size = {info.width, info.height};
-  if (!find_schedule (format))
+  if (stream_.decoded) {
+    post_error ("These frames are no coded frames: they were decoded before (" +
+                *stream_.decoded +
+                "). Decode the recording of the coded frames.");
+    return std::nullopt;
+  }
+  if (!find_schedule (format) || !check_camera (format))
     return std::nullopt;
   auto slots = SlotPlan::fit (
       format.schedule.timing (), format.schedule.slots (), format.rate);
@@ -126,12 +134,47 @@ CodedFilter::find_schedule (CodedFormat &format)
     format.schedule = tagged->value ().schedule;
     return true;
   }
+  if (stream_.settings.require_schedule) {
+    post_error ("The stream has no schedule, neither in its tags nor in its "
+                "track. Set the schedule property.");
+    return false;
+  }
   format.assumed = true;
   if (!std::exchange (stream_.warned_assumed, true))
     POST_WARNING (element_, STREAM, FORMAT,
         "The stream has no schedule tag; assuming " + format.schedule.text () +
             ". Set the schedule property if it is another.");
   return true;
+}
+
+/* Frames that were cropped, scaled or timed anew no longer show what the tag
+ * says. */
+bool
+CodedFilter::check_camera (const CodedFormat &format) const
+{
+  if (stream_.settings.schedule.read || !stream_.tagged || !*stream_.tagged)
+    return true;
+  const StreamSetup &camera = stream_.tagged->value ();
+  const std::string remedy =
+      " Decode the frames as the camera gave them, or set the schedule "
+      "property.";
+  if (camera.size && *camera.size != format.size) {
+    post_error ("The coded frames have " + text_of (format.size) +
+                " pixels, but the camera gave " + text_of (*camera.size) +
+                ": they were cropped or scaled." + remedy);
+    return false;
+  }
+  const FrameRate rate = camera.rate.value_or (format.rate);
+  if (std::int64_t (rate.num) * format.rate.den ==
+      std::int64_t (rate.den) * format.rate.num)
+    return true;
+  const auto text = [] (FrameRate of) {
+    return std::to_string (of.num) + "/" + std::to_string (of.den);
+  };
+  post_error ("The caps say " + text (format.rate) +
+              " coded frames a second, but the camera gave " + text (rate) +
+              "." + remedy);
+  return false;
 }
 
 void
@@ -209,10 +252,56 @@ CodedFilter::find_rectifier (CodedFormat &format)
   return true;
 }
 
-/* Puts @format, for which the subclass has a plan, into force. */
+/* Pictures before and after @next, the first frame of the new schedule, do not
+ * continue each other. */
 void
-CodedFilter::adopt (CodedFormat format)
+CodedFilter::report_change (const Schedule &before, GstBuffer *next)
 {
+  break_off ();
+  const std::string time =
+      next ? std::to_string (double (GST_BUFFER_PTS (next)) / GST_SECOND)
+           : "now";
+  POST_INFO (element_, STREAM, FORMAT,
+      "From " + time + " s on, coded frames have the schedule " +
+          format ().schedule.text () + ", before " + before.text () + ".");
+}
+
+void
+CodedFilter::set_provenance (GstBuffer *next)
+{
+  const auto meta = next ? get_frame_meta (next) : std::nullopt;
+  Provenance made{{format ().schedule, {}}, method_name (),
+      meta ? meta->frame : stream_.sequence->next_number (), 0};
+  if (format ().rectifier)
+    made.setup.mapping = stream_.rectifiers->mapping;
+  const GstVideoInfo &info = format ().info;
+  made.setup.size = Extent{info.width, info.height};
+  made.setup.rate = format ().rate;
+  stream_.provenance_due = true;
+  const ObjectLock lock (element_);
+  shared_.provenance = std::make_shared<const Provenance> (std::move (made));
+}
+
+/* After segment and tags from upstream. */
+void
+CodedFilter::push_provenance ()
+{
+  if (!std::exchange (stream_.provenance_due, false))
+    return;
+  each_pad ([this] (GstCodedPad *pad) {
+    if (pad->coded.kind != PadKind::coded)
+      gst_pad_push_event (
+          GST_PAD (pad), provenance_to_event (*shared_.provenance));
+  });
+}
+
+/* Puts @format, for which the subclass has a plan, into force from the frame
+ * @next on. */
+void
+CodedFilter::adopt (CodedFormat format, GstBuffer *next)
+{
+  const std::optional<Schedule> before =
+      has_format () ? std::optional (stream_.format->schedule) : std::nullopt;
   if (!has_format () || !(stream_.format->rate == format.rate))
     stream_.sequence.emplace (
         format.rate, stream_.sequence ? stream_.sequence->next_number () : 0);
@@ -220,6 +309,9 @@ CodedFilter::adopt (CodedFormat format)
   stream_.stale = false;
   report_mirrors ();
   const CodedFormat &adopted = *stream_.format;
+  if (before && !(*before == adopted.schedule))
+    report_change (*before, next);
+  set_provenance (next);
   bool schedule_changed;
   {
     const ObjectLock lock (element_);

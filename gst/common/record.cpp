@@ -70,8 +70,7 @@ hash_of (GstBuffer *frame, const GstVideoInfo &info)
   MappedFrame mapped (info, frame, GST_MAP_READ);
   if (!mapped)
     return std::nullopt;
-  return read_pixels (
-      mapped, [] (auto pixels) { return pixel_hash (pixels); });
+  return read_pixels (mapped, [] (auto pixels) { return pixel_hash (pixels); });
 }
 
 FrameRecord
@@ -128,8 +127,8 @@ apply_record (
   meta.exposure_duration = time_or_none (record.exposure_duration);
   meta.time_uncertainty = time_or_none (record.time_uncertainty);
   meta.locked = record.locked;
-  meta.slip = record.slip;
-  meta.lost_before = record.lost_before;
+  meta.slip = record.slip.value_or (0);
+  meta.lost_before = record.lost_before.value_or (0);
   meta.pattern = record.pattern;
   meta.saturated = record.saturated.value_or (0);
   meta.bits = record.bits;

@@ -3,7 +3,10 @@
 
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
+
+#include <gst/video/video.h>
 
 #include "raii.h"
 
@@ -94,6 +97,20 @@ schedule_to_event (const Schedule &schedule)
   return gst_event_new_tag (schedule_to_tags (schedule));
 }
 
+StreamSetup
+setup_at (GstPad *src, const Schedule &schedule, std::optional<Mapping> mapping)
+{
+  StreamSetup setup{schedule, std::move (mapping)};
+  const CapsPtr caps (gst_pad_get_current_caps (src));
+  GstVideoInfo info;
+  if (caps && gst_video_info_from_caps (&info, caps.get ())) {
+    setup.size = Extent{info.width, info.height};
+    if (info.fps_n > 0)
+      setup.rate = FrameRate{info.fps_n, info.fps_d};
+  }
+  return setup;
+}
+
 GstEvent *
 setup_to_event (const StreamSetup &setup)
 {
@@ -140,6 +157,26 @@ provenance_to_event (const Provenance &provenance)
 {
   return gst_event_new_tag (
       comment_to_tags (kDecodedPrefix, provenance.to_json ()));
+}
+
+bool
+takes_provenance (GstEvent *event)
+{
+  GstTagList *tags = nullptr;
+  gst_event_parse_tag (event, &tags);
+  return gst_tag_list_get_scope (tags) != GST_TAG_SCOPE_GLOBAL ||
+         comment_after (kPrefix, tags);
+}
+
+/* The last tags of a scope are those that a late link gets: the provenance is
+ * always among those of the stream. */
+GstEvent *
+replace_by_provenance (GstEvent *event, const Provenance &provenance)
+{
+  if (!takes_provenance (event))
+    return event;
+  return merge_others (
+      comment_to_tags (kDecodedPrefix, provenance.to_json ()), event);
 }
 
 std::optional<Result<Provenance>>

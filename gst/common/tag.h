@@ -21,6 +21,10 @@ GstTagList *schedule_to_tags (const Schedule &schedule);
 /** A TAG event with the schedule; Transfer: full. */
 GstEvent *schedule_to_event (const Schedule &schedule);
 
+/** The setup of frames that leave an element by @p src, whose caps have their
+ * size and rate. */
+StreamSetup setup_at (
+    GstPad *src, const Schedule &schedule, std::optional<Mapping> mapping = {});
 /** A TAG event with schedule and mapping; Transfer: full. */
 GstEvent *setup_to_event (const StreamSetup &setup);
 
@@ -40,6 +44,12 @@ GstEvent *remove_setup (GstEvent *event);
 
 /** A TAG event, "coded-exposure-decoded={...}"; Transfer: full. */
 GstEvent *provenance_to_event (const Provenance &provenance);
+/** Whether replace_by_provenance () changes the TAG event @p event: global tags
+ * without a setup stay as they are. */
+bool takes_provenance (GstEvent *event);
+/** The TAG event @p event with @p provenance in place of a setup; Transfer:
+ * full, of both. */
+GstEvent *replace_by_provenance (GstEvent *event, const Provenance &provenance);
 /** The provenance in @p tags; as schedule_from_tags (). */
 std::optional<Result<Provenance>> provenance_from_tags (const GstTagList *tags);
 

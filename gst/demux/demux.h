@@ -65,6 +65,7 @@ public:
   GstPad *request_pad (GstPadTemplate *templ, const gchar *name);
   void release_pad (GstPad *pad);
   static void set_up_class (gpointer klass);
+  using CodedFilter::event_for;
 
 private:
   /** The pads that a subframe goes to; null where it does not. */
@@ -95,6 +96,7 @@ private:
       GstCaps *caps, bool to_coded) const override;
   int pictures_a_frame (const GstCodedPad *pad) const override;
   ObjectPtr<GstPad> coded_pad () const override;
+  std::string method_name () const override;
 
   /* Pads. */
   std::shared_ptr<const PadMap> pads () const;

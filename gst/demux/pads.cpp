@@ -7,6 +7,7 @@
 
 #include "base/text.h"
 #include "common/element.h"
+#include "common/tag.h"
 
 GST_DEBUG_CATEGORY_EXTERN (codedexposure_demux_debug);
 #define GST_CAT_DEFAULT codedexposure_demux_debug
@@ -48,6 +49,8 @@ stream_start_for (GstCodedPad *pad, GstEvent *upstream)
 struct Replay {
   GstCodedPad *pad;
   const PadCaps &caps;
+  const Provenance *provenance;
+  bool tagged = false;
 };
 
 /* Before the source pads have caps, they have only STREAM_START; all other
@@ -55,7 +58,7 @@ struct Replay {
 gboolean
 replay_sticky (GstPad *, GstEvent **upstream, gpointer user_data)
 {
-  const auto &[pad, caps] = *static_cast<const Replay *> (user_data);
+  auto &[pad, caps, provenance, tagged] = *static_cast<Replay *> (user_data);
   const GstEventType type = GST_EVENT_TYPE (*upstream);
   if (type == GST_EVENT_EOS || (!caps && type != GST_EVENT_STREAM_START))
     return TRUE;
@@ -63,7 +66,8 @@ replay_sticky (GstPad *, GstEvent **upstream, gpointer user_data)
   if (type == GST_EVENT_STREAM_START) {
     event = stream_start_for (pad, *upstream);
   } else if (type != GST_EVENT_CAPS) {
-    event.reset (gst_event_ref (*upstream));
+    event.reset (Demux::event_for (pad, gst_event_ref (*upstream), provenance));
+    tagged |= type == GST_EVENT_TAG;
   } else if (GstCaps *own = caps.of (pad->coded)) {
     event.reset (gst_event_new_caps (own));
     gst_event_set_seqnum (event.get (), gst_event_get_seqnum (*upstream));
@@ -207,9 +211,14 @@ Demux::add_pad (
 void
 Demux::insert_pad (PadRef pad)
 {
+  const PadKind kind = pad->coded.kind;
   const ObjectLock lock (element ());
-  Replay replay{pad.get (), caps_};
+  Replay replay{pad.get (), caps_, shared_.provenance.get ()};
   gst_pad_sticky_events_foreach (sinkpad (), replay_sticky, &replay);
+  if (caps_ && shared_.provenance && !replay.tagged && kind != PadKind::coded) {
+    const EventPtr made (provenance_to_event (*shared_.provenance));
+    gst_pad_store_sticky_event (GST_PAD (pad.get ()), made.get ());
+  }
   if (const EventPtr eos (gst_event_new_eos ()); ended_)
     gst_pad_store_sticky_event (GST_PAD (pad.get ()), eos.get ());
   gst_flow_combiner_add_pad (combiner_.get (), GST_PAD (pad.get ()));
@@ -304,10 +313,12 @@ Demux::forward (EventPtr event)
     ended_ = type == GST_EVENT_EOS;
   }
   each_pad ([&] (GstCodedPad *pad) {
-    EventPtr own =
-        type == GST_EVENT_STREAM_START ? stream_start_for (pad, event.get ())
-        : type == GST_EVENT_GAP        ? gap_for (pad, event.get ())
-                                : EventPtr (gst_event_ref (event.get ()));
+    EventPtr own = type == GST_EVENT_STREAM_START
+                       ? stream_start_for (pad, event.get ())
+                   : type == GST_EVENT_GAP
+                       ? gap_for (pad, event.get ())
+                       : EventPtr (event_for (pad, gst_event_ref (event.get ()),
+                             shared_.provenance.get ()));
     gst_pad_push_event (GST_PAD (pad), own.release ());
   });
   return TRUE;

@@ -56,6 +56,15 @@ Demux::properties ()
   return table;
 }
 
+std::string
+Demux::method_name () const
+{
+  auto *methods =
+      G_ENUM_CLASS (g_type_class_peek (gst_coded_exposure_method_get_type ()));
+  return g_enum_get_value (methods, int (plan_->background ().method ()))
+      ->value_nick;
+}
+
 Settings &
 Demux::settings_of (GObject *object)
 {

@@ -90,8 +90,9 @@ push_tag (GstDmdSync *self)
   Stream &stream = state (self).stream;
   if (!std::exchange (stream.tag_due, false))
     return true;
-  return gst_pad_push_event (GST_BASE_TRANSFORM_SRC_PAD (self),
-      schedule_to_event (state (self).schedule));
+  GstPad *src = GST_BASE_TRANSFORM_SRC_PAD (self);
+  return gst_pad_push_event (
+      src, setup_to_event (setup_at (src, state (self).schedule)));
 }
 
 /** @p event, or one in which our schedule takes the place of another. */
@@ -118,7 +119,8 @@ own_schedule (GstDmdSync *self, GstEvent *event)
    * among them. The mapping is upstream's. */
   if (theirs && *theirs)
     st.stream.mapping = theirs->value ().mapping;
-  return replace_setup (event, {st.schedule, st.stream.mapping});
+  return replace_setup (event, setup_at (GST_BASE_TRANSFORM_SRC_PAD (self),
+                                   st.schedule, st.stream.mapping));
 }
 
 gboolean

@@ -349,6 +349,15 @@ Fuse::resume ()
 
 /* ------------------------------------------------------------------ plan -- */
 
+std::string
+Fuse::method_name () const
+{
+  auto *qualities =
+      G_ENUM_CLASS (g_type_class_peek (gst_coded_exposure_quality_get_type ()));
+  return std::string ("fuse ") +
+         g_enum_get_value (qualities, int (in_force_.quality))->value_nick;
+}
+
 /* Relative noise of a plain exposure at typical light, if the user has
  * described the camera. */
 RectifyOptions
@@ -445,7 +454,8 @@ Fuse::forget ()
 gboolean
 Fuse::forward (EventPtr event)
 {
-  return gst_pad_push_event (GST_PAD (srcpad_.get ()), event.release ());
+  return gst_pad_push_event (GST_PAD (srcpad_.get ()),
+      event_for (srcpad_.get (), event.release (), shared_.provenance.get ()));
 }
 
 CapsPtr

@@ -65,6 +65,7 @@ private:
     return shared_.schedule->slots ();
   }
   RectifyOptions rectify_options () const override;
+  std::string method_name () const override;
 
   template <typename Pixel>
   Result<guint64> take_pixels (MappedFrame &coded);

@@ -116,10 +116,9 @@ duration_of (const LogState &state, GstBuffer *frame)
 {
   if (GST_BUFFER_DURATION_IS_VALID (frame))
     return GST_BUFFER_DURATION (frame);
-  return state.info.fps_n > 0
-             ? gst_util_uint64_scale_int (
-                   GST_SECOND, state.info.fps_d, state.info.fps_n)
-             : GST_CLOCK_TIME_NONE;
+  return state.info.fps_n > 0 ? gst_util_uint64_scale_int (GST_SECOND,
+                                    state.info.fps_d, state.info.fps_n)
+                              : GST_CLOCK_TIME_NONE;
 }
 
 GstFlowReturn
@@ -140,8 +139,8 @@ push_line (GstCodedExposureLog *self, GstBuffer *frame, FrameRecord record)
   }
   const GstClockTime duration = duration_of (state, frame);
   state.end = GST_CLOCK_TIME_IS_VALID (duration) ? pts + duration : pts;
-  return state.track.push (line.to_json (), pts, duration,
-      GST_BASE_TRANSFORM (self)->segment);
+  return state.track.push (
+      line.to_json (), pts, duration, GST_BASE_TRANSFORM (self)->segment);
 }
 
 GstFlowReturn

@@ -40,8 +40,7 @@ ObjectPtr<GstPad>
 TrackPad::pad () const
 {
   const ObjectLock lock (element_);
-  return ObjectPtr<GstPad> (
-      pad_ ? GST_PAD (gst_object_ref (pad_)) : nullptr);
+  return ObjectPtr<GstPad> (pad_ ? GST_PAD (gst_object_ref (pad_)) : nullptr);
 }
 
 bool
@@ -81,8 +80,7 @@ TrackPad::push (const std::string &text, GstClockTime pts,
   if (!to)
     return GST_FLOW_OK;
   start (to.get (), segment);
-  GstBuffer *buffer =
-      gst_buffer_new_memdup (text.data (), text.size ());
+  GstBuffer *buffer = gst_buffer_new_memdup (text.data (), text.size ());
   GST_BUFFER_PTS (buffer) = pts;
   GST_BUFFER_DURATION (buffer) = duration;
   const GstFlowReturn flow = gst_pad_push (to.get (), buffer);

@@ -189,9 +189,8 @@ on_tag (Self *self, EventPtr event)
     return gst_pad_push_event (state.src, event.release ());
   state.container = said->value ();
   warn_if_different (self, *state.container);
-  GstEvent *rest = state.setup
-                       ? replace_setup (event.release (), *state.setup)
-                       : remove_setup (event.release ());
+  GstEvent *rest = state.setup ? replace_setup (event.release (), *state.setup)
+                               : remove_setup (event.release ());
   return !rest || gst_pad_push_event (state.src, rest);
 }
 
@@ -230,8 +229,8 @@ report_missing (Self *self, const TrackReader::Match &match)
   if (match.skipped == 0)
     return;
   count (self, &RestoreCounters::frames_missing, match.skipped);
-  post_message (self,
-      FramesMissing{match.skipped, GstClockTime (match.skipped_from)});
+  post_message (
+      self, FramesMissing{match.skipped, GstClockTime (match.skipped_from)});
 }
 
 /* A frame without a line: nothing shows that it is as it was recorded. */
@@ -245,8 +244,8 @@ mark_unknown (Self *self, GstBuffer *frame)
   state.last_frame = meta.frame;
   GST_BUFFER_FLAG_SET (frame, GST_BUFFER_FLAG_CORRUPTED);
   count (self, &RestoreCounters::frames_unknown);
-  note_damage (self, meta.frame, GST_BUFFER_PTS (frame),
-      "the track has no line for it");
+  note_damage (
+      self, meta.frame, GST_BUFFER_PTS (frame), "the track has no line for it");
 }
 
 void
@@ -254,7 +253,8 @@ restore (Self *self, GstBuffer *frame, const TrackReader::Match &match)
 {
   RestoreState &state = *self->state;
   FrameRecord record = *match.line->frame;
-  record.lost_before += match.skipped;
+  if (match.skipped > 0)
+    record.lost_before = record.lost_before.value_or (0) + match.skipped;
   apply_record (frame, record, match.offset);
   if (match.skipped > 0)
     GST_BUFFER_FLAG_SET (frame, GST_BUFFER_FLAG_DISCONT);
@@ -538,8 +538,8 @@ stats_of (const RestoreState &state)
       "application/x-codedexposure-restore-stats", "frames", G_TYPE_UINT64,
       counters.frames, "frames-damaged", G_TYPE_UINT64, counters.frames_damaged,
       "frames-unknown", G_TYPE_UINT64, counters.frames_unknown,
-      "frames-missing", G_TYPE_UINT64, counters.frames_missing,
-      "lines-damaged", G_TYPE_UINT64, counters.lines_damaged, nullptr));
+      "frames-missing", G_TYPE_UINT64, counters.frames_missing, "lines-damaged",
+      G_TYPE_UINT64, counters.lines_damaged, nullptr));
 }
 
 const PropertyTable<RestoreState> &

@@ -477,9 +477,9 @@ void
 push_tag (GstCodedExposureSim *self)
 {
   Stream &stream = state (self).stream;
+  GstPad *src = GST_BASE_TRANSFORM_SRC_PAD (self);
   if (std::exchange (stream.tag_due, false))
-    gst_pad_push_event (GST_BASE_TRANSFORM_SRC_PAD (self),
-        schedule_to_event (*stream.schedule));
+    gst_pad_push_event (src, setup_to_event (setup_at (src, *stream.schedule)));
 }
 
 } // namespace codedexposure::gst::sim

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "mapping/stream_setup.h"
 
+#include <utility>
+
 #include "mapping/json.h"
 #include "schedule/json.h"
 
@@ -10,19 +12,45 @@ namespace codedexposure
 namespace
 {
 
+constexpr int kMaxRate = 1'000'000'000;
+
+/* A pair of positive integers, which is taken out of @root. */
+std::optional<std::pair<int, int>>
+take_pair (Json &root, const char *key, int highest, const std::string &rule)
+{
+  const auto found = root.find (key);
+  if (found == root.end ())
+    return std::nullopt;
+  int first = 0, second = 0;
+  integers_into ({&first, &second}, highest, rule) (*found, key);
+  if (first < 1 || second < 1)
+    throw expected (key, rule, *found);
+  root.erase (found);
+  return std::pair (first, second);
+}
+
 StreamSetup
 read_setup (Json root)
 {
-  std::optional<Mapping> mapping;
-  if (root.is_object () && root.contains ("mapping")) {
-    try {
-      mapping = read_mapping (root["mapping"]);
-    } catch (const Error &refused) {
-      throw refused.with_prefix ("in key 'mapping': ");
+  StreamSetup setup;
+  if (root.is_object ()) {
+    if (root.contains ("mapping")) {
+      try {
+        setup.mapping = read_mapping (root["mapping"]);
+      } catch (const Error &refused) {
+        throw refused.with_prefix ("in key 'mapping': ");
+      }
+      root.erase ("mapping");
     }
-    root.erase ("mapping");
+    if (const auto size = take_pair (root, "size", Mapping::kMaxSize,
+            "two whole numbers, width and height"))
+      setup.size = Extent{size->first, size->second};
+    if (const auto rate = take_pair (root, "rate", kMaxRate,
+            "two whole numbers, frames in so many seconds"))
+      setup.rate = FrameRate{rate->first, rate->second};
   }
-  return {read_schedule (root), std::move (mapping)};
+  setup.schedule = read_schedule (root);
+  return setup;
 }
 
 } // namespace
@@ -38,10 +66,18 @@ std::string
 StreamSetup::to_json () const
 {
   std::string text = schedule.to_json ();
+  text.pop_back ();
+  const auto add_pair = [&text] (const char *key, int first, int second) {
+    text += std::string (",\"") + key + "\":[" + std::to_string (first) + "," +
+            std::to_string (second) + "]";
+  };
+  if (size)
+    add_pair ("size", size->width, size->height);
+  if (rate)
+    add_pair ("rate", rate->num, rate->den);
   if (mapping)
-    text.replace (
-        text.size () - 1, 1, ",\"mapping\":" + mapping->to_json () + "}");
-  return text;
+    text += ",\"mapping\":" + mapping->to_json ();
+  return text + "}";
 }
 
 } // namespace codedexposure

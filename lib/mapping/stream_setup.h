@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "base/geometry.h"
 #include "base/result.h"
 #include "mapping/mapping.h"
 #include "schedule/schedule.h"
@@ -17,11 +18,15 @@ namespace codedexposure
 struct StreamSetup {
   Schedule schedule;
   std::optional<Mapping> mapping = {};
+  /** Of the coded frames when they left the camera: what differs from it was
+   * cropped, scaled or timed anew. */
+  std::optional<Extent> size = {};
+  std::optional<FrameRate> rate = {};
 
-  /** The JSON form of the schedule with one key more that may be left out,
-   * "mapping", which holds the JSON form of a mapping. */
+  /** The JSON form of the schedule with keys more that may be left out:
+   * "mapping", which holds the JSON form of a mapping, "size" and "rate". */
   static Result<StreamSetup> from_json (std::string_view json);
-  /** One line. Without a mapping it is schedule.to_json (). */
+  /** One line. Without the others it is schedule.to_json (). */
   std::string to_json () const;
 
   bool operator== (const StreamSetup &) const = default;

@@ -76,8 +76,8 @@ std::string
 hex_text (std::uint64_t value, int digits)
 {
   char text[17];
-  std::snprintf (
-      text, sizeof text, "%0*llx", digits, static_cast<unsigned long long> (value));
+  std::snprintf (text, sizeof text, "%0*llx", digits,
+      static_cast<unsigned long long> (value));
   return text;
 }
 
@@ -108,8 +108,8 @@ record_json (const FrameRecord &record)
   set_known (line, "time_uncertainty_ns", record.time_uncertainty);
   line["locked"] = nullptr;
   set_known (line, "locked", record.locked);
-  line["slip"] = record.slip;
-  line["lost_before"] = record.lost_before;
+  set_known (line, "slip", record.slip);
+  set_known (line, "lost_before", record.lost_before);
   set_known (line, "saturated", record.saturated);
   if (!record.pattern.empty ())
     line["pattern"] = record.pattern;
@@ -137,11 +137,12 @@ read_record (const Json &object)
     if (value.is_boolean ())
       record.locked = value.get<bool> ();
   });
-  read_whole (object, "slip", record.slip);
-  read_whole (object, "lost_before", record.lost_before);
+  read_known (object, "slip", record.slip);
+  read_known (object, "lost_before", record.lost_before);
   read_known (object, "saturated", record.saturated);
-  with_key (object, "pattern",
-      [&] (const Json &value) { record.pattern = read_text (value, "pattern"); });
+  with_key (object, "pattern", [&] (const Json &value) {
+    record.pattern = read_text (value, "pattern");
+  });
   read_whole (object, "bits", record.bits);
   with_key (object, "flags", [&] (const Json &list) {
     if (!list.is_array ())

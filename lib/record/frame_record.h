@@ -23,12 +23,12 @@ struct FrameRecord {
   std::optional<Nanoseconds> time_uncertainty;
   /** Whether masks and exposure were synchronised. */
   std::optional<bool> locked;
-  int slip = 0;                  ///< slots by which the masks were late
-  std::uint64_t lost_before = 0; ///< frames
-  std::optional<std::uint64_t> saturated; ///< pixels
+  std::optional<int> slip; ///< slots by which the masks were late
+  std::optional<std::uint64_t> lost_before; ///< frames
+  std::optional<std::uint64_t> saturated;   ///< pixels
   std::string pattern; ///< that the mirrors showed; empty: the schedule
   int bits = 0;        ///< significant bits; 0: all of the format
-  std::vector<std::string> flags; ///< "discont", "corrupted", "gap" ...
+  std::vector<std::string> flags;    ///< "discont", "corrupted", "gap" ...
   std::optional<std::uint64_t> hash; ///< pixel_hash ()
 
   /** One line; unknown values are left out, but `locked` is null. */

@@ -47,15 +47,15 @@ checked_part (std::string_view line)
 {
   const std::size_t at = line.rfind (kCheckKey);
   if (at == line.npos)
-    throw Error{"it has no check at its end, so it may be damaged",
-        ErrorCode::parse};
+    throw Error{
+        "it has no check at its end, so it may be damaged", ErrorCode::parse};
   const std::string tail =
-      std::string (kCheckKey) + hex_text (check_of (line.substr (0, at)),
-                                    kCheckDigits) + "\"}";
+      std::string (kCheckKey) +
+      hex_text (check_of (line.substr (0, at)), kCheckDigits) + "\"}";
   if (line.substr (at) != tail)
-    throw Error{"its check differs, so it is damaged: " +
-                    in_quotes (line.substr (at)) + " in place of " +
-                    in_quotes (tail),
+    throw Error{
+        "its check differs, so it is damaged: " + in_quotes (line.substr (at)) +
+            " in place of " + in_quotes (tail),
         ErrorCode::parse};
   return line.substr (0, at);
 }

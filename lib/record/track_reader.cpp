@@ -83,8 +83,8 @@ TrackReader::take_until (Place place, Nanoseconds start)
 std::optional<TrackReader::Match>
 TrackReader::take (Nanoseconds pts, Nanoseconds start)
 {
-  const bool later = !lines_.empty () &&
-                     lines_.back ().pts > pts + tolerance (kRounding * 4);
+  const bool later =
+      !lines_.empty () && lines_.back ().pts > pts + tolerance (kRounding * 4);
   if (find (pts, start) == lines_.end () && !later && !ended_)
     return std::nullopt;
   return take_now (pts, start);

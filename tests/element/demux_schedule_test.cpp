@@ -198,7 +198,7 @@ TEST_F (DemuxSchedule, TagOfAnotherStreamIsForgotten)
   EXPECT_NE (demux->warning (), "");
 }
 
-TEST_F (DemuxSchedule, TagsAreGivenOnOnEveryPad)
+TEST_F (DemuxSchedule, PicturesSayHowTheyWereMadeAndCodedFramesWhatTheyAre)
 {
   start ("");
   demux->request ("subframe_0");
@@ -212,9 +212,67 @@ TEST_F (DemuxSchedule, TagsAreGivenOnOnEveryPad)
     GstTagList *tags = nullptr;
     gst_event_parse_tag (event.get (), &tags);
     const auto found = schedule_from_tags (tags);
-    ASSERT_TRUE (found && *found) << pad;
-    EXPECT_EQ (found->value (), schedule);
+    const auto made = provenance_from_tags (tags);
+    if (std::string (pad) == "coded") {
+      ASSERT_TRUE (found && *found);
+      EXPECT_EQ (found->value (), schedule);
+      EXPECT_FALSE (made);
+      continue;
+    }
+    EXPECT_FALSE (found) << pad;
+    ASSERT_TRUE (made && *made) << pad;
+    EXPECT_EQ (made->value ().setup.schedule, schedule);
+    EXPECT_EQ (made->value ().method, "select");
+    EXPECT_EQ (made->value ().first_frame, 0u);
   }
+}
+
+TEST_F (DemuxSchedule, WhatWasDecodedIsRefused)
+{
+  start ("");
+  demux->push_event (
+      provenance_to_event ({{schedule_of ("staircase:2x2")}, "decode", 12, 0}));
+  EXPECT_EQ (push (0), GST_FLOW_NOT_NEGOTIATED);
+  EXPECT_NE (
+      demux->error ().find ("staircase:2x2 by decode"), std::string::npos);
+}
+
+TEST_F (DemuxSchedule, FramesThatWereScaledOrTimedAnewAreRefused)
+{
+  StreamSetup setup{schedule_of ("sequential:2x2")};
+  for (const char *wrong : {"size", "rate"}) {
+    start ("");
+    setup.size = Extent{24, 24};
+    setup.rate = FrameRate{25, 1};
+    if (wrong == std::string ("size"))
+      setup.size->width = 48;
+    else
+      setup.rate->num = 30;
+    demux->push_event (setup_to_event (setup));
+    EXPECT_EQ (push (0), GST_FLOW_NOT_NEGOTIATED) << wrong;
+    EXPECT_NE (demux->error ().find ("the camera gave"), std::string::npos);
+  }
+}
+
+TEST_F (DemuxSchedule, MayBeRequired)
+{
+  start ("require-schedule=true");
+  EXPECT_EQ (push (0), GST_FLOW_NOT_NEGOTIATED);
+  EXPECT_NE (demux->error ().find ("schedule property"), std::string::npos);
+}
+
+TEST_F (DemuxSchedule, ANewOneInMidStreamIsSaidAndDiscontinuous)
+{
+  start ("");
+  demux->push_event (schedule_to_event (schedule_of ("sequential:2x2")));
+  ASSERT_EQ (push (0), GST_FLOW_OK);
+  demux->push_event (schedule_to_event (schedule_of ("sequential:3x3")));
+  while (demux->pull ()) {
+  }
+  ASSERT_EQ (push (1), GST_FLOW_OK);
+  const BufferPtr first = demux->pull ();
+  EXPECT_TRUE (GST_BUFFER_IS_DISCONT (first.get ()));
+  EXPECT_NE (demux->info ().find ("before sequential:2x2"), std::string::npos);
 }
 
 TEST_F (DemuxSchedule, MayBeAFile)

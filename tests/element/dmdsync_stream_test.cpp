@@ -86,8 +86,10 @@ TEST (DmdsyncTag, KeepsTheMappingOfAnotherSchedule)
     gst_event_parse_tag (passed.get (), &tags);
     const auto setup = setup_from_tags (tags);
     ASSERT_TRUE (setup && *setup);
-    EXPECT_EQ (setup->value (),
-        (StreamSetup{*Schedule::parse ("staircase:2x2"), mapping}));
+    EXPECT_EQ (setup->value ().schedule, *Schedule::parse ("staircase:2x2"));
+    EXPECT_EQ (setup->value ().mapping, mapping);
+    EXPECT_EQ (setup->value ().size, (Extent{64, 48}));
+    EXPECT_EQ (setup->value ().rate, (FrameRate{25, 1}));
   }
 }
 

@@ -55,6 +55,7 @@ protected:
   BufferPtr frame (GstClockTime pts)
   {
     GstBuffer *buffer = gst_harness_create_buffer (harness_.get (), 64);
+    gst_buffer_memset (buffer, 0, 0, 64);
     GST_BUFFER_PTS (buffer) = pts;
     return BufferPtr (buffer);
   }
@@ -130,7 +131,7 @@ TEST_F (LogTest, WritesWhatTheMetaSays)
       "time_uncertainty_ns": 47000, "locked": true, "slip": -1,
       "lost_before": 2, "saturated": 5, "bits": 8,
       "pattern": "grating-both:4/0",
-      "flags": ["discont", "corrupted"]})"));
+      "flags": ["discont", "corrupted"], "hash": "162b7b9d327aa515"})"));
 }
 
 TEST_F (LogTest, LockedIsTrueFalseOrNull)
@@ -159,8 +160,11 @@ TEST_F (LogTest, CountsFramesWithoutMetaAndLeavesOutWhatIsUnknown)
 
   ASSERT_EQ (lines ().size (), 3u);
   EXPECT_EQ (lines ()[1],
-      Json::parse (R"({"frame": 1, "pts_ns": 33366666, "flags": []})"));
-  EXPECT_EQ (lines ()[2], Json::parse (R"({"frame": 2, "flags": []})"));
+      Json::parse (R"({"frame": 1, "pts_ns": 33366666, "locked": null,
+          "flags": [], "hash": "2ffb6918c12c256e"})"));
+  EXPECT_EQ (
+      lines ()[2], Json::parse (R"({"frame": 2, "locked": null, "flags": [],
+          "hash": "2ffb6918c12c256e"})"));
 }
 
 /* Equal to the time stamps of the recording: an offset that an encoder adds to

@@ -1,0 +1,294 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* codedexposure-restore: what codedexposure-log wrote beside frames is on them
+ * again, and what is not as it was recorded is CORRUPTED. */
+#include "harness.h"
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/messages.h"
+#include "common/meta.h"
+#include "common/tag.h"
+#include "record/track.h"
+
+namespace
+{
+
+using namespace codedexposure;
+using namespace codedexposure::gst;
+using namespace codedexposure::test;
+
+constexpr GstClockTime kPeriod = 40 * GST_MSECOND;
+constexpr int kFrames = 6;
+
+BufferPtr
+picture (int frame)
+{
+  return frame_of (draw<std::uint8_t> (8, 8,
+                       [frame] (int x, int y) { return 9 * frame + x + y; }),
+      GstClockTime (frame) * kPeriod);
+}
+
+FrameMeta
+meta_of (int frame)
+{
+  FrameMeta meta;
+  meta.frame = 10 + guint64 (frame);
+  meta.exposure_start = GstClockTime (frame) * kPeriod + 3;
+  meta.exposure_duration = 39'200'000;
+  meta.locked = frame != 3;
+  meta.slip = frame == 3 ? 2 : 0;
+  meta.bits = 7;
+  return meta;
+}
+
+StreamSetup
+setup_of (const char *schedule)
+{
+  return {*Schedule::parse (schedule)};
+}
+
+/** A recording of kFrames frames: the third is CORRUPTED. */
+struct Recording {
+  std::vector<BufferPtr> frames, lines;
+
+  Recording ()
+  {
+    /* The file lets it start before the pad is requested. */
+    ElementHarness log ("codedexposure-log location=/dev/null");
+    log.request ("track");
+    log.set_caps (gray_caps (8, 8));
+    log.push_event (setup_to_event (setup_of ("staircase:2x2")));
+    for (int i = 0; i < kFrames; i++) {
+      BufferPtr frame = picture (i);
+      set_frame_meta (frame.get (), meta_of (i));
+      if (i == 2)
+        GST_BUFFER_FLAG_SET (frame.get (), GST_BUFFER_FLAG_CORRUPTED);
+      EXPECT_EQ (log.push (std::move (frame)), GST_FLOW_OK);
+      frames.push_back (picture (i));
+    }
+    log.push_event (gst_event_new_eos ());
+    while (BufferPtr line = log.pull ("track"))
+      lines.push_back (std::move (line));
+    EXPECT_EQ (lines.size (), std::size_t (kFrames + 1));
+  }
+};
+
+class Restore : public ::testing::Test
+{
+protected:
+  Restore ()
+  {
+    track.reset (
+        gst_harness_new_with_element (file.element (), "track", nullptr));
+    gst_harness_set_src_caps_str (track.get (), "text/x-raw,format=utf8");
+    file.set_caps (gray_caps (8, 8));
+  }
+  void push_line (int i)
+  {
+    gst_harness_push (
+        track.get (), recording.lines[std::size_t (i)].release ());
+  }
+  GstFlowReturn push_frame (int i)
+  {
+    return file.push (std::move (recording.frames[std::size_t (i)]));
+  }
+  void end ()
+  {
+    gst_harness_push_event (track.get (), gst_event_new_eos ());
+    file.push_event (gst_event_new_eos ());
+  }
+  /** All frames and lines, but the named ones. */
+  void play (int without_frame = -1, int without_line = -1)
+  {
+    for (int i = 0; i <= kFrames; i++) {
+      if (i != without_line)
+        push_line (i);
+      if (i < kFrames && i != without_frame)
+        push_frame (i);
+    }
+    end ();
+    while (BufferPtr frame = file.pull ())
+      restored.push_back (std::move (frame));
+  }
+  bool corrupted (int i) const
+  {
+    return GST_BUFFER_FLAG_IS_SET (
+        restored.at (std::size_t (i)).get (), GST_BUFFER_FLAG_CORRUPTED);
+  }
+  /** The schedule of the tag that came out last. */
+  std::string schedule ()
+  {
+    std::string text;
+    while (const EventPtr event = file.pull_event (GST_EVENT_TAG)) {
+      GstTagList *tags = nullptr;
+      gst_event_parse_tag (event.get (), &tags);
+      if (const auto setup = setup_from_tags (tags); setup && *setup)
+        text = setup->value ().schedule.text ();
+    }
+    return text;
+  }
+
+  Recording recording;
+  ElementHarness file{"codedexposure-restore"};
+  HarnessPtr track;
+  std::vector<BufferPtr> restored;
+};
+
+TEST_F (Restore, EverythingThatWasKnownIsKnownAgain)
+{
+  play ();
+  ASSERT_EQ (restored.size (), std::size_t (kFrames));
+  for (int i = 0; i < kFrames; i++) {
+    const auto meta = get_frame_meta (restored[std::size_t (i)].get ());
+    const FrameMeta told = meta_of (i);
+    ASSERT_TRUE (meta) << i;
+    EXPECT_EQ (meta->frame, told.frame);
+    EXPECT_EQ (meta->exposure_start, told.exposure_start);
+    EXPECT_EQ (meta->exposure_duration, told.exposure_duration);
+    EXPECT_EQ (meta->locked, told.locked);
+    EXPECT_EQ (meta->slip, told.slip);
+    EXPECT_EQ (meta->bits, told.bits);
+    EXPECT_EQ (corrupted (i), i == 2) << i;
+    EXPECT_EQ (GST_BUFFER_PTS (restored[std::size_t (i)].get ()),
+        GstClockTime (i) * kPeriod);
+  }
+  EXPECT_EQ (schedule (), "staircase:2x2");
+  EXPECT_FALSE (file.posted<FramesDamaged> ());
+  EXPECT_FALSE (file.posted<StreamCut> ());
+}
+
+TEST_F (Restore, OtherPixelsAreCorruptedAndCounted)
+{
+  for (const int i : {3, 4})
+    gst_buffer_memset (recording.frames[std::size_t (i)].get (), 63, 200, 1);
+  play ();
+  for (int i = 0; i < kFrames; i++)
+    EXPECT_EQ (corrupted (i), i == 2 || i == 3 || i == 4) << i;
+  EXPECT_EQ (counter_of (file.element (), "frames-damaged"), 2u);
+  const auto begin = file.posted<FramesDamaged> ();
+  ASSERT_TRUE (begin);
+  EXPECT_TRUE (begin->active);
+  EXPECT_EQ (begin->frame, 13u);
+  EXPECT_EQ (begin->from, 3 * kPeriod);
+  const auto over = file.posted<FramesDamaged> ();
+  ASSERT_TRUE (over);
+  EXPECT_FALSE (over->active);
+  EXPECT_EQ (over->count, 2u);
+}
+
+TEST_F (Restore, AFrameWithoutItsLineIsCorrupted)
+{
+  play (-1, 3);
+  ASSERT_EQ (restored.size (), std::size_t (kFrames));
+  for (int i = 0; i < kFrames; i++)
+    EXPECT_EQ (corrupted (i), i == 2 || i == 3) << i;
+  const auto meta = get_frame_meta (restored[3].get ());
+  ASSERT_TRUE (meta);
+  EXPECT_EQ (meta->frame, 13u);
+  EXPECT_FALSE (meta->locked);
+  EXPECT_EQ (counter_of (file.element (), "frames-unknown"), 1u);
+  ASSERT_TRUE (file.posted<FramesDamaged> ());
+}
+
+TEST_F (Restore, ADamagedLineIsCountedAndItsFrameCorrupted)
+{
+  gst_buffer_memset (recording.lines[4].get (), 9, '9', 1);
+  play ();
+  EXPECT_TRUE (corrupted (4));
+  EXPECT_EQ (counter_of (file.element (), "lines-damaged"), 1u);
+}
+
+TEST_F (Restore, AFrameThatIsMissingIsSaid)
+{
+  play (4);
+  ASSERT_EQ (restored.size (), std::size_t (kFrames - 1));
+  EXPECT_TRUE (GST_BUFFER_IS_DISCONT (restored[4].get ()));
+  EXPECT_EQ (get_frame_meta (restored[4].get ())->lost_before, 1u);
+  const auto missing = file.posted<FramesMissing> ();
+  ASSERT_TRUE (missing);
+  EXPECT_EQ (missing->count, 1u);
+  EXPECT_EQ (missing->from, 4 * kPeriod);
+}
+
+TEST_F (Restore, AMissingLastFrameIsSaid)
+{
+  play (kFrames - 1);
+  ASSERT_TRUE (file.posted<FramesMissing> ());
+}
+
+TEST_F (Restore, WithoutTheLastLineTheStreamWasCut)
+{
+  play (-1, kFrames);
+  const auto cut = file.posted<StreamCut> ();
+  ASSERT_TRUE (cut);
+  EXPECT_EQ (cut->frames, guint64 (kFrames));
+}
+
+TEST_F (Restore, LinesMayComeAfterTheirFrames)
+{
+  for (int i = 0; i < kFrames; i++) {
+    push_frame (i);
+    push_line (i);
+  }
+  push_line (kFrames);
+  end ();
+  for (int i = 0; i < kFrames; i++) {
+    restored.push_back (file.pull ());
+    ASSERT_TRUE (restored.back ()) << i;
+    EXPECT_EQ (corrupted (i), i == 2) << i;
+  }
+}
+
+TEST_F (Restore, TheScheduleOfTheTrackWinsAndADifferenceIsSaid)
+{
+  file.push_event (setup_to_event (setup_of ("sequential:4x1")));
+  play ();
+  EXPECT_EQ (schedule (), "staircase:2x2");
+  EXPECT_NE (file.warning ().find ("sequential:4x1"), std::string::npos);
+}
+
+TEST_F (Restore, WithoutALineTheContainersScheduleIsUsed)
+{
+  file.push_event (setup_to_event (setup_of ("sequential:4x1")));
+  play (-1, 0);
+  EXPECT_EQ (schedule (), "sequential:4x1");
+}
+
+TEST_F (Restore, MarkupIsUnescaped)
+{
+  gst_harness_set_src_caps_str (track.get (), "text/x-raw,format=pango-markup");
+  for (BufferPtr &line : recording.lines) {
+    GstMapInfo map;
+    gst_buffer_map (line.get (), &map, GST_MAP_READ);
+    const CharPtr escaped (g_markup_escape_text (
+        reinterpret_cast<const char *> (map.data), gssize (map.size)));
+    gst_buffer_unmap (line.get (), &map);
+    GstBuffer *text =
+        gst_buffer_new_memdup (escaped.get (), strlen (escaped.get ()));
+    gst_buffer_copy_into (text, line.get (), GST_BUFFER_COPY_TIMESTAMPS, 0, -1);
+    line.reset (text);
+  }
+  play ();
+  EXPECT_FALSE (corrupted (0));
+  EXPECT_EQ (schedule (), "staircase:2x2");
+}
+
+TEST (RestoreWithoutATrack, FramesPassAndItIsSaidOnce)
+{
+  ElementHarness file ("codedexposure-restore");
+  file.set_caps (gray_caps (8, 8));
+  file.push_event (setup_to_event (setup_of ("sequential:4x1")));
+  for (int i = 0; i < 2; i++)
+    ASSERT_EQ (file.push (picture (i)), GST_FLOW_OK);
+  EXPECT_TRUE (file.pull_event (GST_EVENT_TAG));
+  const BufferPtr frame = file.pull ();
+  EXPECT_FALSE (get_frame_meta (frame.get ()));
+  EXPECT_FALSE (
+      GST_BUFFER_FLAG_IS_SET (frame.get (), GST_BUFFER_FLAG_CORRUPTED));
+  EXPECT_NE (file.info ().find ("unknown"), std::string::npos);
+  EXPECT_EQ (file.info (), "");
+}
+
+} // namespace

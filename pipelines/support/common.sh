@@ -15,6 +15,11 @@ bench_options='schedule psf-sigma full-well read-noise gain seed shift-x shift-y
 source_options="$scene_options $bench_options frames camera features source
   device exposure trigger trigger-line trigger-edge pixel-format reconnect"
 
+patterns='ball bar black blink blue checkers-1 checkers-2 checkers-4 checkers-8
+chroma-zone-plate circular colors gamut gradient green pinwheel red smpte
+smpte-rp-219 smpte100 smpte75 snow solid-color spokes white zone-plate'
+patterns=${patterns//$'\n'/ }
+
 scene_help='Scene (each frame is one slot of the exposure):
   --input FILE        video file; each frame becomes one slot
   --input-rate R      frame rate of the input, if the file does not have one
@@ -151,6 +156,7 @@ check_options ()
     'a rate such as 25 or 30000/1001'
   check_option frames '[1-9][0-9]{0,8}' 'a number of coded frames'
   check_option bits '[1-9]|1[0-6]' 'a number from 1 to 16'
+  check_option pattern "${patterns// /|}" "one of $patterns"
   check_option region '[0-9]{1,2}' 'the number of a region, from 0 on'
   check_option scene 'candle|blown-out|pour' 'candle, blown-out or pour'
   check_option port '[1-9][0-9]{0,4}' 'a TCP port'
@@ -238,7 +244,7 @@ launch ()
     exit 0
   fi
   run "$launcher" --what="$script" ${opt[force]:+--force} \
-    ${opt[verbose]:+--verbose} "$@" || status=$?
+    ${opt[verbose]:+--verbose} ${opt[camera]:+--camera} "$@" || status=$?
   no_frame=
   if [ "$status" = 5 ]; then
     no_frame=1 status=1
@@ -267,9 +273,10 @@ schedule ()
   printf '%s' "${opt[schedule]:-sequential:2x2}"
 }
 
-schedule_slots ()
+# Prints a row of the description of the schedule, such as slots or cell.
+schedule_row ()
 {
-  "$tool" schedule show "$(schedule)" | awk '$1 == "slots" { print $2 }'
+  "$tool" schedule show "$(schedule)" | awk -v row="$1" '$1 == row { print $2 }'
 }
 
 grey_format ()
@@ -298,7 +305,7 @@ probe_video ()
 # times frame_rate).
 plan_scene ()
 {
-  slots=$(schedule_slots) || usage_error "--schedule $(schedule) is not valid"
+  slots=$(schedule_row slots) || usage_error "--schedule $(schedule) is not valid"
   frame_rate=${opt[frame-rate]:-25}
   [[ $frame_rate == */* ]] || frame_rate=$frame_rate/1
   scene_rate=$((${frame_rate%/*} * slots))/${frame_rate#*/}
@@ -316,6 +323,12 @@ plan_scene ()
   fi
   if is_set size; then
     width=${opt[size]%x*} height=${opt[size]#*x}
+  fi
+  local cell
+  cell=$(schedule_row cell)
+  if [ "$width" -lt "${cell%x*}" ] || [ "$height" -lt "${cell#*x}" ]; then
+    usage_error "${width}x$height pixels are less than one exposure group of" \
+      "$(schedule), $cell; set a larger --size"
   fi
 }
 
@@ -431,6 +444,31 @@ for_display ()
   printf 'codedexposure-view %s! ' "$(properties bits)"
 }
 
+# check_recording FILE: whether it is what record writes.
+check_recording ()
+{
+  local codec
+  if [ ! -f "$1" ] || [ ! -r "$1" ]; then
+    die "cannot read $1; give the name of a recording"
+  fi
+  [ "$(head -c 4 "$1" | od -An -tx1)" = ' 1a 45 df a3' ] \
+    || die "$1 is not a Matroska file; use a recording of" \
+      "$(sibling record) or $(sibling simulate)"
+  # The names of its codecs are at its beginning.
+  codec=$(head -c 100000 "$1" | LC_ALL=C grep -aoE '[VA]_[A-Z0-9/_]{3,30}|FFV1' \
+    | tr '\n' ' ') || true
+  [ -z "$codec" ] || [[ $codec == *FFV1* ]] \
+    || die "$1 has ${codec% }, but coded frames are recorded as FFV1; use a" \
+      "recording of $(sibling record) or $(sibling simulate)"
+}
+
+# check_recording_name OPTION: whether its value can be written.
+check_recording_name ()
+{
+  [[ ${opt[$1]} == *.mkv ]] || usage_error "--$1 ${opt[$1]}: coded frames are" \
+    "recorded as FFV1 in Matroska; end the name in .mkv"
+}
+
 # Writes frames to a file by its ending: FFV1, H.264, or a folder of PNG. PNG
 # keeps the pixel values, unless view is set.
 video_output ()
@@ -438,12 +476,19 @@ video_output ()
   case $1 in
     *.mkv) lossless_video "$1" ;;
     *.mp4)
-      # All players and browsers support 4:2:0 with even sides.
+      # All players and browsers support 4:2:0 with even sides and values from
+      # 16 to 235. From grey, videoconvert would not scale the values, so they go
+      # through colour, with 16 bits for exact values. Without its buffer, x264
+      # has no limit of the bit rate. The fragments of a file that was not
+      # finished can be played.
       for_display
-      printf 'videoconvert ! videoscale ! %s ! ' \
+      printf 'videoconvert ! video/x-raw,format=ARGB64 ! videoconvert ! '
+      printf 'videoscale ! %s ! ' \
         'video/x-raw,format=I420,width=[2,65536,2],height=[2,65536,2]'
-      printf 'x264enc pass=qual quantizer=18 speed-preset=veryfast ! '
-      printf 'h264parse ! mp4mux ! filesink location=%s ' "$(quoted "$1")"
+      printf 'x264enc pass=qual quantizer=18 vbv-buf-capacity=0 '
+      printf 'speed-preset=veryfast ! h264parse ! mp4mux fragment-duration=1000 '
+      printf 'fragment-mode=first-moov-then-finalise ! filesink location=%s ' \
+        "$(quoted "$1")"
       ;;
     */ | *%d*.png | *%0[1-9]d*.png)
       # A folder may have any name; only the last part is a format.

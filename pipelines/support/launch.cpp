@@ -38,10 +38,12 @@ struct Options {
   gdouble retry = 0;         // time for which to try to connect, s
   gdouble start = 0;         // time at which to start, s
   gdouble duration = 0;      // time to play, s; 0: all
-  gdouble shift_to = -1;    // running time of the first frame, s; -1: unchanged
-  gchar *need = nullptr;    // name of an element message that must come
-  gboolean force = FALSE;   // replace files that exist
-  gboolean verbose = FALSE; // also print messages and counters of elements
+  gdouble shift_to = -1;   // running time of the first frame, s; -1: unchanged
+  gchar *need = nullptr;   // name of an element message that must come
+  gboolean camera = FALSE; // frames come all the time
+  gboolean no_result = FALSE; // print no result
+  gboolean force = FALSE;     // replace files that exist
+  gboolean verbose = FALSE;   // also print messages and counters of elements
 };
 
 class Launch : public Player
@@ -70,6 +72,7 @@ private:
   void on_element_message (GstMessage *message);
   void end_after_error ();
   void tick ();
+  void watch_for_silence (gint64 frames);
   int finish (int code);
   void print_counters ();
   static gboolean on_tick (gpointer self)
@@ -100,9 +103,12 @@ private:
   ObjectPtr<GstPad> counted_;
   std::vector<std::unique_ptr<LeakyQueue>> leaky_queues_;
   std::atomic<gint64> frames_ = 0;
-  gint64 left_ = 0; // frames until the limit; its streaming thread
+  gint64 frames_before_ = -1; // at the last tick
+  bool silent_ = false;       // no frame came for a while, and that was said
+  gint64 left_ = 0;           // frames until the limit; its streaming thread
   std::atomic<gint64> last_pts_ = -1; // ns, of the counted pad
   Clock::time_point began_ = Clock::now ();
+  Clock::time_point heard_ = Clock::now (); // the last new frame
   Clock::time_point retry_until_ = Clock::now ();
   double cpu_at_start_ = 0;
   gulong hold_ = 0; // probe that holds the first frame until the seek
@@ -346,7 +352,7 @@ Launch::finish (int code)
     status_.line ("kept what was complete: " + wrote);
   if (code == kDone && options_.need)
     return said_needed_ ? kDone : kFailed;
-  if (code != kDone || (!counted_ && wrote.empty ()))
+  if (code != kDone || options_.no_result || (!counted_ && wrote.empty ()))
     return code;
   std::string result;
   if (counted_)
@@ -424,10 +430,9 @@ Launch::on_error (GstMessage *message)
     return;
   }
   status_.line ("error: " + told (message, error, detail));
-  if (kind == "aravissrc" && error->domain == GST_STREAM_ERROR)
-    status_.line (
-        "the camera sent nothing for 2 s; check that the DMD runs and is "
-        "wired to the camera's trigger line");
+  const std::string remedy = remedy_for (kind, error, detail);
+  if (!remedy.empty ())
+    status_.line (remedy);
   end_after_error ();
 }
 
@@ -486,6 +491,22 @@ Launch::on_message (GstMessage *message)
   }
 }
 
+/* A camera whose frames are all incomplete posts no error. */
+void
+Launch::watch_for_silence (gint64 frames)
+{
+  constexpr auto kSilence = std::chrono::seconds (5);
+  if (std::exchange (frames_before_, frames) != frames)
+    heard_ = Clock::now ();
+  if (!counted_ || !options_.camera || silent_ ||
+      Clock::now () - heard_ < kSilence)
+    return;
+  silent_ = true;
+  status_.line ("warning: no complete frame for 5 s; check the trigger of the "
+                "camera and its network, which loses packets if the frames "
+                "arrive incomplete");
+}
+
 void
 Launch::tick ()
 {
@@ -499,6 +520,7 @@ Launch::tick ()
   const double seconds =
       std::chrono::duration<double> (Clock::now () - began_).count ();
   const gint64 frames = frames_;
+  watch_for_silence (frames);
   if (!counted_ || frames == 0)
     return;
 
@@ -565,6 +587,10 @@ main (int argc, char **argv)
           "Running time for the first counted frame", "SECONDS"},
       {"need", 0, 0, G_OPTION_ARG_STRING, &options.need,
           "Element message without which the run has failed", "NAME"},
+      {"camera", 0, 0, G_OPTION_ARG_NONE, &options.camera,
+          "Warn if no frame comes for 5 s", nullptr},
+      {"no-result", 0, 0, G_OPTION_ARG_NONE, &options.no_result,
+          "Do not print the result", nullptr},
       {"force", 0, 0, G_OPTION_ARG_NONE, &options.force,
           "Replace files that exist", nullptr},
       {"verbose", 0, 0, G_OPTION_ARG_NONE, &options.verbose,

@@ -86,6 +86,10 @@ public:
     return frames_ > 0 && !part_.is_empty ();
   }
   const std::string &name () const override { return part_.name (); }
+  bool is_sidecar () const override
+  {
+    return !GST_OBJECT_FLAG_IS_SET (element_, GST_ELEMENT_FLAG_SINK);
+  }
 
 private:
   GstElement *element_; // of the pipeline, which outlives this
@@ -185,9 +189,16 @@ Outputs::claim (GstElement *pipeline, GstPad *coded, bool replace)
 std::vector<std::string>
 Outputs::finish ()
 {
+  bool only_sidecars = true, have_frames = false;
+  for (const auto &output : outputs_) {
+    only_sidecars &= output->is_sidecar ();
+    have_frames |= !output->is_sidecar () && output->has_content ();
+  }
   std::vector<std::string> errors;
   for (const auto &output : outputs_) {
-    if (!output->has_content ())
+    const bool described =
+        !output->is_sidecar () || only_sidecars || have_frames;
+    if (!output->has_content () || !described)
       output->discard ();
     else if (const auto published = output->publish (); !published)
       errors.push_back (published.error ().message);

@@ -31,6 +31,8 @@ public:
 
   virtual const std::string &name () const = 0;
   guint64 frames () const { return frames_; }
+  /** Whether it only describes the frames that other outputs have. */
+  virtual bool is_sidecar () const { return false; }
 
 protected:
   /** Frames that the element got. */

@@ -4,8 +4,8 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
-#include <iterator>
 #include <string>
+#include <vector>
 
 #include <dlfcn.h>
 #include <glib-unix.h>
@@ -55,6 +55,14 @@ has_window (GstElement *pipeline)
   };
   gst_iterator_foreach (elements.get (), look, &found);
   return found;
+}
+
+bool
+is_ignored (int signal)
+{
+  struct sigaction action = {};
+  return sigaction (signal, nullptr, &action) == 0 &&
+         action.sa_handler == SIG_IGN;
 }
 
 } // namespace
@@ -168,10 +176,11 @@ Player::loop ()
   /* The reader of the messages may be gone. */
   std::signal (SIGPIPE, SIG_IGN);
   Signal signals[] = {{this, SIGINT}, {this, SIGTERM}, {this, SIGHUP}};
-  guint sources[std::size (signals)];
-  for (std::size_t i = 0; i < std::size (signals); i++)
-    sources[i] =
-        g_unix_signal_add (signals[i].number, on_unix_signal, &signals[i]);
+  std::vector<guint> sources;
+  for (Signal &signal : signals)
+    if (signal.number != SIGHUP || !is_ignored (SIGHUP)) // nohup
+      sources.push_back (
+          g_unix_signal_add (signal.number, on_unix_signal, &signal));
   begin ();
   g_main_loop_run (loop_);
   for (const guint source : sources)

@@ -186,8 +186,39 @@ std::string
 told (GstMessage *message, const GError *error, const gchar *debug)
 {
   const gchar *detail = added (debug);
-  return format ("%s: %s%s%s", GST_OBJECT_NAME (GST_MESSAGE_SRC (message)),
+  gchar *file = nullptr;
+  GstObject *source = GST_MESSAGE_SRC (message);
+  if (error->domain == GST_RESOURCE_ERROR &&
+      g_object_class_find_property (G_OBJECT_GET_CLASS (source), "location"))
+    g_object_get (source, "location", &file, nullptr);
+  const CharPtr owned (file);
+  return format ("%s: %s%s%s", file ? file : GST_OBJECT_NAME (source),
       error->message, detail ? "\n    " : "", detail ? detail : "");
+}
+
+std::string
+remedy_for (std::string_view kind, const GError *error, const gchar *debug)
+{
+  const std::string_view detail = debug ? debug : "";
+  const bool unfit = detail.find ("not-negotiated") != detail.npos;
+  const bool of_camera =
+      kind == "aravissrc" || kind == "codedexposure-camerasrc";
+  if (g_error_matches (
+          error, GST_RESOURCE_ERROR, GST_RESOURCE_ERROR_NO_SPACE_LEFT))
+    return "the disk is full; delete files, or write to another disk";
+  if (unfit && of_camera)
+    return "the camera does not send such frames; check --size, --frame-rate, "
+           "--bits and --pixel-format";
+  if (unfit)
+    return "two elements do not agree on a format; check --size and --bits";
+  if (of_camera && std::string_view (error->message).find ("LineSelector") !=
+                       std::string_view::npos)
+    return "--trigger camera needs a camera with the feature LineSelector; for "
+           "others, use --trigger none and set their output with --features";
+  if (kind == "aravissrc" && error->domain == GST_STREAM_ERROR)
+    return "the camera sent nothing for 2 s; check that the DMD runs and is "
+           "wired to the camera's trigger line";
+  return {};
 }
 
 std::string

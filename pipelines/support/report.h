@@ -27,6 +27,10 @@ std::string package_of (std::string_view element);
 /** Source and text of an ERROR or WARNING message with its details, without the
  * position in the code. */
 std::string told (GstMessage *message, const GError *error, const gchar *debug);
+/** What the user can do about an error of an element of @p kind; empty: its
+ * text says it. */
+std::string remedy_for (
+    std::string_view kind, const GError *error, const gchar *debug);
 /** The same of a WARNING message. */
 std::string warned (GstMessage *message);
 /** The same for an INFO message: its details, as gst-launch-1.0 prints them, or

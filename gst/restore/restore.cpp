@@ -316,7 +316,7 @@ void
 say_no_track (Self *self)
 {
   if (!std::exchange (self->state->said_no_track, true))
-    POST_INFO (self, STREAM, FORMAT,
+    POST_WARNING (self, STREAM, FORMAT,
         "The stream has no track: it is unknown whether its frames are "
         "synchronised or damaged. codedexposure-log writes a track when it "
         "records.");

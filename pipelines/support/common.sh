@@ -159,6 +159,7 @@ check_options ()
   check_option pattern "${patterns// /|}" "one of $patterns"
   check_option region '[0-9]{1,2}' 'the number of a region, from 0 on'
   check_option scene 'candle|blown-out|pour' 'candle, blown-out or pour'
+  check_option codec 'raw|ffv1' 'raw or ffv1'
   check_option port '[1-9][0-9]{0,4}' 'a TCP port'
   check_option wait '[0-9]+(\.[0-9]+)?' 'a number of seconds'
   check_option start '[0-9]+(\.[0-9]+)?' 'a number of seconds'
@@ -413,14 +414,39 @@ sidecar_of ()
   printf '%s.jsonl' "${1%.mkv}"
 }
 
-# Writes coded frames to FFV1 in Matroska, and their metadata to the sidecar.
-# Every frame can be decoded alone; with ticks of 1 µs it has its own cluster.
+# Writes coded frames to FFV1 in Matroska with the track of what is known of each
+# frame, and the same to the sidecar. Every frame can be decoded alone; with
+# ticks of 1 µs it has its own cluster.
 coded_recording ()
 {
   printf 'codedexposure-log name=log location=%s ! ' \
     "$(quoted "$(sidecar_of "$1")")"
   printf 'queue max-size-buffers=75 max-size-bytes=0 max-size-time=0 ! '
-  lossless_video "$1"
+  printf 'avenc_ffv1 gop-size=1 slices=4 threads=auto ! matroskamux name=mux '
+  printf 'timecodescale=1000 ! filesink location=%s ' "$(quoted "$1")"
+  printf 'log.track ! queue max-size-buffers=0 max-size-time=0 ! mux.subtitle_0 '
+}
+
+# read_container SOURCE: the coded frames of a recording or of a sender, with
+# what its track says of them.
+read_container ()
+{
+  printf '%s ! matroskademux name=file ! decodebin ! ' "$1"
+  printf 'codedexposure-restore name=restore file.subtitle_0 ! restore.track '
+  printf 'restore. ! '
+}
+
+# launch_decoder FILE OPTION... PIPELINE reads FILE from front to back, if its
+# index is damaged; PIPELINE has @source@ for the source of the recording.
+launch_decoder ()
+{
+  local file=$1 pipeline=${*: -1} source status=0
+  source="filesrc location=$(quoted "$file")"
+  set -- "${@:2:$#-2}"
+  launch "$@" "${pipeline/@source@/$source}" || status=$?
+  [ "$status" = 6 ] || return "$status"
+  say "the index or the tags of $file are damaged; reading it from front to back"
+  launch --salvage "$@" "${pipeline/@source@/$source ! queue name=file-queue}"
 }
 
 lossless_video ()
@@ -428,14 +454,6 @@ lossless_video ()
   printf 'avenc_ffv1 gop-size=1 slices=4 threads=auto ! '
   printf 'matroskamux timecodescale=1000 ! filesink location=%s ' \
     "$(quoted "$1")"
-}
-
-# The significant bits of the pixels, if the sidecar has them.
-bits_of_sidecar ()
-{
-  local sidecar
-  sidecar=$(sidecar_of "$1")
-  [ ! -r "$sidecar" ] || sed -nE 's/.*"bits":([0-9]+).*/\1/p;10q' "$sidecar" | head -n 1
 }
 
 # Scales frames of any bit depth to 8 bits, for display.

@@ -26,8 +26,10 @@ enum ExitCode {
   kDone = 0,
   kFailed = 1,
   kUsage = 2,
+  kDamaged = 3, // done, but frames are missing or not as they were recorded
   kNobodyListens = 4,
-  kNoFrame = 5
+  kNoFrame = 5,
+  kContainer = 6 // the container of the recording is damaged
 };
 
 struct Options {
@@ -39,6 +41,8 @@ struct Options {
   gdouble start = 0;         // time at which to start, s
   gdouble duration = 0;      // time to play, s; 0: all
   gdouble shift_to = -1;   // running time of the first frame, s; -1: unchanged
+  gboolean keep_time = FALSE; // running time is the time of the recording
+  gboolean salvage = FALSE;   // go on after damage of the container
   gchar *need = nullptr;   // name of an element message that must come
   gboolean camera = FALSE; // frames come all the time
   gboolean no_result = FALSE; // print no result
@@ -70,6 +74,7 @@ private:
   void on_message (GstMessage *message) override;
   void on_error (GstMessage *message);
   void on_element_message (GstMessage *message);
+  bool take_container_error (std::string_view kind, const GstObject *source);
   void end_after_error ();
   void tick ();
   void watch_for_silence (gint64 frames);
@@ -118,6 +123,7 @@ private:
   bool interrupted_ = false;
   bool said_needed_ = false; // the needed message came
   bool failed_ = false;      // the stream ends because of an error
+  bool damaged_ = false;     // frames are missing or damaged
 };
 
 constexpr GstClockTime
@@ -196,22 +202,28 @@ Launch::seek ()
   gst_pad_remove_probe (counted_.get (), std::exchange (hold_, 0));
 }
 
-/* Otherwise, a receiver that joins late would show frames late. */
+/* Otherwise, a receiver that joins late would show frames late, and the times
+ * of a recording that is decoded would begin at 0. */
 GstPadProbeReturn
 Launch::shift_first_frame (GstPad *pad, GstPadProbeInfo *info, gpointer self)
 {
   const auto *launch = static_cast<Launch *> (self);
+  const GstClockTime pts = GST_BUFFER_PTS (GST_PAD_PROBE_INFO_BUFFER (info));
   const EventPtr sticky (gst_pad_get_sticky_event (pad, GST_EVENT_SEGMENT, 0));
   const GstSegment *segment = nullptr;
   gst_event_parse_segment (sticky.get (), &segment);
-  const guint64 running = gst_segment_to_running_time (segment, GST_FORMAT_TIME,
-      GST_BUFFER_PTS (GST_PAD_PROBE_INFO_BUFFER (info)));
+  const guint64 running =
+      gst_segment_to_running_time (segment, GST_FORMAT_TIME, pts);
+  if (!GST_CLOCK_TIME_IS_VALID (running))
+    return GST_PAD_PROBE_OK;
   const ObjectPtr<GstElement> element (gst_pad_get_parent_element (pad));
   const ObjectPtr<GstPad> src (
       gst_element_get_static_pad (element.get (), "src"));
-  if (GST_CLOCK_TIME_IS_VALID (running) && src)
-    gst_pad_set_offset (src.get (),
-        gint64 (nanoseconds (launch->options_.shift_to)) - gint64 (running));
+  const GstClockTime wanted = launch->options_.keep_time
+                                  ? pts
+                                  : nanoseconds (launch->options_.shift_to);
+  if (src)
+    gst_pad_set_offset (src.get (), gint64 (wanted) - gint64 (running));
   return GST_PAD_PROBE_REMOVE;
 }
 
@@ -232,7 +244,7 @@ Launch::connect_counter ()
     hold_ = gst_pad_add_probe (counted_.get (),
         GstPadProbeType (GST_PAD_PROBE_TYPE_BLOCK | GST_PAD_PROBE_TYPE_BUFFER),
         on_first_frame, this, nullptr);
-  if (options_.shift_to >= 0)
+  if (options_.shift_to >= 0 || options_.keep_time)
     gst_pad_add_probe (counted_.get (), GST_PAD_PROBE_TYPE_BUFFER,
         shift_first_frame, this, nullptr);
   gst_pad_add_probe (
@@ -345,7 +357,7 @@ Launch::finish (int code)
   if (options_.verbose && frames_ > 0)
     print_counters ();
   const std::string flaws = flaws_of (pipeline_.get ());
-  if (!finish_outputs ())
+  if (!finish_outputs (code != kContainer))
     return kFailed;
   const std::string wrote = outputs_.summary (guint64 (frames_));
   if (code != kDone && !wrote.empty ())
@@ -359,7 +371,7 @@ Launch::finish (int code)
     result = format ("%" G_GINT64_FORMAT " coded frames", frames_.load ()) +
              flaws + (wrote.empty () ? "" : "; ");
   status_.line (result + (wrote.empty () ? "" : "wrote " + wrote));
-  return kDone;
+  return damaged_ ? kDamaged : kDone;
 }
 
 /* The first signal ends the stream, so that files are finished; the second
@@ -376,6 +388,31 @@ Launch::on_signal (int times)
     return;
   status_.line ("stopping; press Ctrl-C again to stop immediately");
   gst_element_send_event (pipeline_.get (), gst_event_new_eos ());
+}
+
+/* A demuxer that finds a damaged index stops before the first frame. From front
+ * to back it reads all frames, and meets the damage at the end. */
+bool
+Launch::take_container_error (std::string_view kind, const GstObject *source)
+{
+  const bool of_container =
+      kind == "matroskademux" ||
+      std::string_view (GST_OBJECT_NAME (source)) == "file-queue";
+  if (!of_container)
+    return false;
+  if (!options_.salvage) {
+    quit (kContainer);
+    return true;
+  }
+  const ObjectPtr<GstElement> demuxer (find ("file"));
+  if (!demuxer || demuxer->numsrcpads == 0) {
+    status_.line ("error: the head of the recording is damaged, so its tracks "
+                  "cannot be found; if ffmpeg reads it, \"ffmpeg -i IN.mkv -map "
+                  "0 -c copy OUT.mkv\" writes a new one");
+    quit (kNoFrame);
+  }
+  damaged_ = true;
+  return true;
 }
 
 /* Ends the stream, so that the frames before the error are in finished files.
@@ -429,6 +466,8 @@ Launch::on_error (GstMessage *message)
     quit (kDone);
     return;
   }
+  if (take_container_error (kind, source))
+    return;
   status_.line ("error: " + told (message, error, detail));
   const std::string remedy = remedy_for (kind, error, detail);
   if (!remedy.empty ())
@@ -443,6 +482,9 @@ Launch::on_element_message (GstMessage *message)
   const GstStructure *structure = gst_message_get_structure (message);
   const std::string_view name = gst_structure_get_name (structure);
   said_needed_ |= options_.need && name == options_.need;
+  damaged_ |= name == "codedexposure/frames-damaged" ||
+              name == "codedexposure/frames-missing" ||
+              name == "codedexposure/stream-cut";
   if (options_.verbose &&
       (name.starts_with ("codedexposure/") || name.starts_with ("dmdsync/") ||
           name.starts_with ("moirecalib/")))
@@ -465,7 +507,11 @@ Launch::on_message (GstMessage *message)
       on_error (message);
     break;
   case GST_MESSAGE_WARNING:
-    status_.line ("warning: " + warned (message));
+    /* A recording without a track has none to link; codedexposure-restore says
+     * what follows from that. */
+    if (const std::string text = warned (message);
+        text.find ("subtitle_0") == text.npos)
+      status_.line ("warning: " + text);
     break;
   case GST_MESSAGE_INFO:
     if (options_.verbose)
@@ -583,6 +629,11 @@ main (int argc, char **argv)
           "Time of the stream at which to start", "SECONDS"},
       {"duration", 0, 0, G_OPTION_ARG_DOUBLE, &options.duration,
           "Duration to play", "SECONDS"},
+      {"keep-time", 0, 0, G_OPTION_ARG_NONE, &options.keep_time,
+          "Times of the output are those of the recording", nullptr},
+      {"salvage", 0, 0, G_OPTION_ARG_NONE, &options.salvage,
+          "Go on with the frames that are left after damage of the container",
+          nullptr},
       {"shift-to", 0, 0, G_OPTION_ARG_DOUBLE, &options.shift_to,
           "Running time for the first counted frame", "SECONDS"},
       {"need", 0, 0, G_OPTION_ARG_STRING, &options.need,

@@ -187,7 +187,7 @@ Outputs::claim (GstElement *pipeline, GstPad *coded, bool replace)
 }
 
 std::vector<std::string>
-Outputs::finish ()
+Outputs::finish (bool publish)
 {
   bool only_sidecars = true, have_frames = false;
   for (const auto &output : outputs_) {
@@ -198,7 +198,7 @@ Outputs::finish ()
   for (const auto &output : outputs_) {
     const bool described =
         !output->is_sidecar () || only_sidecars || have_frames;
-    if (!output->has_content () || !described)
+    if (!publish || !output->has_content () || !described)
       output->discard ();
     else if (const auto published = output->publish (); !published)
       errors.push_back (published.error ().message);

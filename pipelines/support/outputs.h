@@ -49,9 +49,9 @@ public:
   std::vector<std::string> claim (
       GstElement *pipeline, GstPad *coded, bool replace);
   bool empty () const { return outputs_.empty (); }
-  /** Publishes the outputs with frames and discards the others, after the
-   * pipeline has stopped. Errors: what could not be published. */
-  std::vector<std::string> finish ();
+  /** Publishes the outputs with frames, if @p publish, and discards the others,
+   * after the pipeline has stopped. Errors: what could not be published. */
+  std::vector<std::string> finish (bool publish);
   /** After finish (): "coded.mkv and fast.mkv (100 frames)", the outputs that
    * were published; with their frames if they are not @p usual. Empty: none. */
   std::string summary (std::optional<guint64> usual) const;

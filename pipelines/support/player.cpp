@@ -145,10 +145,10 @@ Player::claim_outputs (bool replace, GstPad *coded)
 }
 
 bool
-Player::finish_outputs ()
+Player::finish_outputs (bool publish)
 {
   stop ();
-  const auto errors = outputs_.finish ();
+  const auto errors = outputs_.finish (publish);
   for (const std::string &error : errors)
     status_.line ("error: " + error);
   return errors.empty ();

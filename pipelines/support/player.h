@@ -41,9 +41,9 @@ protected:
   void quit (int code);
   /** Sets the pipeline to NULL; no callback runs after that. */
   void stop ();
-  /** Stops, and gives the files that have frames their names. False, with
-   * printed reasons, if that fails. */
-  bool finish_outputs ();
+  /** Stops, and gives the files that have frames their names, or removes all
+   * unless @p publish. False, with printed reasons, if that fails. */
+  bool finish_outputs (bool publish = true);
   /** The element of that name, or null. */
   codedexposure::gst::ObjectPtr<GstElement> find (const char *name) const;
 

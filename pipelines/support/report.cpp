@@ -30,8 +30,6 @@ constexpr Provider kProviders[] = {
     {"autovideosink", "gstreamer1.0-plugins-good"},
     {"avdec_ffv1", "gstreamer1.0-libav"},
     {"avenc_ffv1", "gstreamer1.0-libav"},
-    {"gdpdepay", "gstreamer1.0-plugins-bad"},
-    {"gdppay", "gstreamer1.0-plugins-bad"},
     {"h264parse", "gstreamer1.0-plugins-bad"},
     {"matroskademux", "gstreamer1.0-plugins-good"},
     {"matroskamux", "gstreamer1.0-plugins-good"},
@@ -318,6 +316,21 @@ notice (const GstStructure *message)
   if (name == "dmdsync/slip")
     return "warning: from frame " + number ("frame") + " on, the mirrors are " +
            number ("slots") + " slots late; these frames are flagged";
+  gboolean active = TRUE;
+  gst_structure_get_boolean (message, "active", &active);
+  if (name == "codedexposure/frames-damaged" && active)
+    return "warning: from frame " + number ("frame") + " (" +
+           seconds_in (message, "from") + ") on, frames are flagged: " +
+           number ("reason");
+  if (name == "codedexposure/frames-damaged")
+    return "warning: frames that are flagged from frame " + number ("frame") +
+           " on: " + number ("count");
+  if (name == "codedexposure/frames-missing")
+    return "warning: from " + seconds_in (message, "from") +
+           " on, recorded frames are missing: " + number ("count");
+  if (name == "codedexposure/stream-cut")
+    return "warning: the stream ended without its last line: it was cut off, "
+           "its sender was stopped, or it is a segment of a longer recording";
   if (name == "codedexposure/camera-back")
     return "the camera sends frames again, after " +
            seconds_in (message, "silent");

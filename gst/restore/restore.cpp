@@ -42,6 +42,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <variant>
 
 #include <gst/gst.h>
 
@@ -76,6 +77,9 @@ struct Damage {
   GstClockTime from = 0;
 };
 
+/** A frame, or a serialised event that came after one that waits. */
+using Item = std::variant<BufferPtr, EventPtr>;
+
 struct RestoreState {
   GstPad *sink = nullptr, *src = nullptr; ///< the element's
 
@@ -91,7 +95,7 @@ struct RestoreState {
   /* Stream lock of the sink pad. */
   GstVideoInfo info = {};
   GstSegment segment = {};
-  std::deque<BufferPtr> held;
+  std::deque<Item> held;
   std::optional<StreamSetup> container; ///< setup of the container's tags
   std::optional<StreamSetup> setup;     ///< in force
   std::optional<guint64> last_frame;
@@ -272,9 +276,9 @@ restore (Self *self, GstBuffer *frame, const TrackReader::Match &match)
 /* The match of the oldest frame that is held; none if its line may still
  * come. */
 std::optional<TrackReader::Match>
-match_oldest (RestoreState &state, bool now)
+match_of (RestoreState &state, GstBuffer *frame, bool now)
 {
-  const auto pts = Nanoseconds (GST_BUFFER_PTS (state.held.front ().get ()));
+  const auto pts = Nanoseconds (GST_BUFFER_PTS (frame));
   const auto start = Nanoseconds (state.segment.start);
   const std::lock_guard lock (state.reader_lock);
   if (now)
@@ -282,70 +286,17 @@ match_oldest (RestoreState &state, bool now)
   return state.reader.take (pts, start);
 }
 
-/* Pushes the frames whose lines are there, or all. */
-GstFlowReturn
-release (Self *self, bool all)
-{
-  /* A demuxer interleaves a line and its frame more closely than this. */
-  constexpr std::size_t kMaxHeld = 8;
-  RestoreState &state = *self->state;
-  GstFlowReturn flow = GST_FLOW_OK;
-  while (!state.held.empty () && flow == GST_FLOW_OK) {
-    const auto match =
-        match_oldest (state, all || state.held.size () > kMaxHeld);
-    if (!match)
-      break;
-    BufferPtr frame = std::move (state.held.front ());
-    state.held.pop_front ();
-    frame.reset (gst_buffer_make_writable (frame.release ()));
-    settle_setup (self, match->line ? &*match->line : nullptr);
-    report_missing (self, *match);
-    if (match->line)
-      restore (self, frame.get (), *match);
-    else
-      mark_unknown (self, frame.get ());
-    state.segment.position = GST_BUFFER_PTS (frame.get ());
-    if (GST_BUFFER_DURATION_IS_VALID (frame.get ()))
-      state.segment.position += GST_BUFFER_DURATION (frame.get ());
-    flow = gst_pad_push (state.src, frame.release ());
-  }
-  return flow;
-}
-
-void
-say_no_track (Self *self)
-{
-  if (!std::exchange (self->state->said_no_track, true))
-    POST_WARNING (self, STREAM, FORMAT,
-        "The stream has no track: it is unknown whether its frames are "
-        "synchronised or damaged. codedexposure-log writes a track when it "
-        "records.");
-}
-
-GstFlowReturn
-chain (GstPad *, GstObject *parent, GstBuffer *buffer) noexcept
-{
-  auto *self = GST_CODED_EXPOSURE_RESTORE (parent);
-  RestoreState &state = *self->state;
-  BufferPtr frame (buffer);
-  count (self, &RestoreCounters::frames);
-  if (!has_track (self) || !GST_BUFFER_PTS_IS_VALID (buffer)) {
-    say_no_track (self);
-    return gst_pad_push (state.src, frame.release ());
-  }
-  state.held.push_back (std::move (frame));
-  return release (self, false);
-}
-
 /* ---------------------------------------------------------------- events -- */
 
-/* A seek may end the stream before the last line. */
+/* A seek may end the stream before the last line, after a frame of any length.
+ */
 bool
 ends_early (const RestoreState &state)
 {
+  constexpr GstClockTime kSlack = 100 * GST_MSECOND;
   return GST_CLOCK_TIME_IS_VALID (state.segment.stop) &&
          GST_CLOCK_TIME_IS_VALID (state.segment.position) &&
-         state.segment.position >= state.segment.stop;
+         state.segment.position + kSlack >= state.segment.stop;
 }
 
 void
@@ -382,16 +333,11 @@ forget_frames (RestoreState &state)
   gst_segment_init (&state.segment, GST_FORMAT_TIME);
 }
 
+/* A serialised event, in its turn. */
 gboolean
-sink_event (GstPad *pad, GstObject *parent, GstEvent *owned) noexcept
+take_event (Self *self, EventPtr event)
 {
-  auto *self = GST_CODED_EXPOSURE_RESTORE (parent);
   RestoreState &state = *self->state;
-  EventPtr event (owned);
-  const auto flags = gst_event_type_get_flags (GST_EVENT_TYPE (event.get ()));
-  if ((flags & GST_EVENT_TYPE_SERIALIZED) &&
-      GST_EVENT_TYPE (event.get ()) != GST_EVENT_FLUSH_STOP)
-    release (self, true);
   switch (GST_EVENT_TYPE (event.get ())) {
   case GST_EVENT_CAPS: {
     GstCaps *caps = nullptr;
@@ -405,16 +351,106 @@ sink_event (GstPad *pad, GstObject *parent, GstEvent *owned) noexcept
     break;
   case GST_EVENT_TAG:
     return on_tag (self, std::move (event));
-  case GST_EVENT_FLUSH_STOP:
-    forget_frames (state);
-    break;
   case GST_EVENT_EOS:
     check_end (self);
     break;
   default:
     break;
   }
-  return gst_pad_event_default (pad, parent, event.release ());
+  return gst_pad_event_default (
+      state.sink, GST_OBJECT (self), event.release ());
+}
+
+/* ---------------------------------------------------------------- frames -- */
+
+GstFlowReturn
+push_frame (Self *self, BufferPtr frame, const TrackReader::Match &match)
+{
+  RestoreState &state = *self->state;
+  frame.reset (gst_buffer_make_writable (frame.release ()));
+  settle_setup (self, match.line ? &*match.line : nullptr);
+  report_missing (self, match);
+  if (match.line)
+    restore (self, frame.get (), match);
+  else
+    mark_unknown (self, frame.get ());
+  state.segment.position = GST_BUFFER_PTS (frame.get ());
+  if (GST_BUFFER_DURATION_IS_VALID (frame.get ()))
+    state.segment.position += GST_BUFFER_DURATION (frame.get ());
+  return gst_pad_push (state.src, frame.release ());
+}
+
+/* Frames whose lines are there go on, or all; events follow the frames before
+ * them. */
+GstFlowReturn
+release (Self *self, bool all)
+{
+  /* A demuxer interleaves a line and its frame more closely than this. */
+  constexpr std::size_t kMaxHeld = 8;
+  RestoreState &state = *self->state;
+  GstFlowReturn flow = GST_FLOW_OK;
+  while (!state.held.empty () && flow == GST_FLOW_OK) {
+    std::optional<TrackReader::Match> match;
+    if (const auto *frame = std::get_if<BufferPtr> (&state.held.front ())) {
+      match =
+          match_of (state, frame->get (), all || state.held.size () > kMaxHeld);
+      if (!match)
+        break;
+    }
+    Item item = std::move (state.held.front ());
+    state.held.pop_front ();
+    if (auto *frame = std::get_if<BufferPtr> (&item))
+      flow = push_frame (self, std::move (*frame), *match);
+    else
+      take_event (self, std::move (std::get<EventPtr> (item)));
+  }
+  return flow;
+}
+
+void
+say_no_track (Self *self)
+{
+  if (!std::exchange (self->state->said_no_track, true))
+    POST_WARNING (self, STREAM, FORMAT,
+        "The stream has no track: it is unknown whether its frames are "
+        "synchronised or damaged. codedexposure-log writes a track when it "
+        "records.");
+}
+
+GstFlowReturn
+chain (GstPad *, GstObject *parent, GstBuffer *buffer) noexcept
+{
+  auto *self = GST_CODED_EXPOSURE_RESTORE (parent);
+  RestoreState &state = *self->state;
+  BufferPtr frame (buffer);
+  count (self, &RestoreCounters::frames);
+  if (!has_track (self) || !GST_BUFFER_PTS_IS_VALID (buffer)) {
+    say_no_track (self);
+    return gst_pad_push (state.src, frame.release ());
+  }
+  state.held.push_back (std::move (frame));
+  return release (self, false);
+}
+
+gboolean
+sink_event (GstPad *pad, GstObject *parent, GstEvent *owned) noexcept
+{
+  auto *self = GST_CODED_EXPOSURE_RESTORE (parent);
+  RestoreState &state = *self->state;
+  EventPtr event (owned);
+  const GstEventType type = GST_EVENT_TYPE (owned);
+  if (type == GST_EVENT_FLUSH_STOP)
+    forget_frames (state);
+  if (!(gst_event_type_get_flags (type) & GST_EVENT_TYPE_SERIALIZED) ||
+      type == GST_EVENT_FLUSH_STOP)
+    return gst_pad_event_default (pad, parent, event.release ());
+  /* No line follows the end. */
+  if (type == GST_EVENT_EOS)
+    release (self, true);
+  if (state.held.empty ())
+    return take_event (self, std::move (event));
+  state.held.push_back (std::move (event));
+  return TRUE;
 }
 
 /* ----------------------------------------------------------------- track -- */

@@ -15,7 +15,8 @@
  *   demuxer, without a queue.
  *
  * A frame whose pixels are not those that were recorded, or that has no line in
- * the track, is CORRUPTED. The element messages `codedexposure/frames-damaged`
+ * the track, or whose time was moved against the frames before, is CORRUPTED.
+ * The element messages `codedexposure/frames-damaged`
  * (`active`, `frame`, `from`, `reason`, at the end `count`),
  * `codedexposure/frames-missing` (`count`, `from`) and
  * `codedexposure/stream-cut` (`frames`: the stream ended without its last line)
@@ -53,6 +54,7 @@
 #include "common/record.h"
 #include "common/tag.h"
 #include "record/track_reader.h"
+#include "schedule/timing.h"
 
 using namespace codedexposure;
 using namespace codedexposure::gst;
@@ -101,6 +103,7 @@ struct RestoreState {
   std::optional<guint64> last_frame;
   Damage damage;
   bool said_no_track = false;
+  bool said_moved = false;
   bool said_setups_differ = false;
 };
 
@@ -252,6 +255,20 @@ mark_unknown (Self *self, GstBuffer *frame)
       self, meta.frame, GST_BUFFER_PTS (frame), "the track has no line for it");
 }
 
+/* Remuxing moves all frames alike; so does damage to the first times. */
+void
+say_moved (Self *self, const TrackReader::Match &match)
+{
+  if (match.offset == 0 || match.misplaced ||
+      std::exchange (self->state->said_moved, true))
+    return;
+  POST_INFO (self, STREAM, FORMAT,
+      "The frames are " + time_text (std::abs (match.offset)) +
+          (match.offset > 0 ? " later" : " earlier") +
+          " than when they were recorded: the recording was given other times, "
+          "or its first times are damaged.");
+}
+
 void
 restore (Self *self, GstBuffer *frame, const TrackReader::Match &match)
 {
@@ -263,14 +280,17 @@ restore (Self *self, GstBuffer *frame, const TrackReader::Match &match)
   if (match.skipped > 0)
     GST_BUFFER_FLAG_SET (frame, GST_BUFFER_FLAG_DISCONT);
   state.last_frame = record.frame;
-  if (!record.hash || record.hash == hash_of (frame, state.info)) {
+  say_moved (self, match);
+  const bool same = !record.hash || record.hash == hash_of (frame, state.info);
+  if (same && !match.misplaced) {
     end_damage (self);
     return;
   }
   GST_BUFFER_FLAG_SET (frame, GST_BUFFER_FLAG_CORRUPTED);
   count (self, &RestoreCounters::frames_damaged);
   note_damage (self, record.frame, GST_BUFFER_PTS (frame),
-      "its pixels are not those that were recorded");
+      same ? "its time is not that at which it was recorded"
+           : "its pixels are not those that were recorded");
 }
 
 /* The match of the oldest frame that is held; none if its line may still
@@ -346,9 +366,12 @@ take_event (Self *self, EventPtr event)
       return FALSE;
     break;
   }
-  case GST_EVENT_SEGMENT:
+  case GST_EVENT_SEGMENT: {
     gst_event_copy_segment (event.get (), &state.segment);
+    const std::lock_guard lock (state.reader_lock);
+    state.reader.next_segment ();
     break;
+  }
   case GST_EVENT_TAG:
     return on_tag (self, std::move (event));
   case GST_EVENT_EOS:
@@ -550,7 +573,7 @@ begin_run (GstElement *element)
   forget_frames (state);
   state.container.reset ();
   state.setup.reset ();
-  state.said_no_track = state.said_setups_differ = false;
+  state.said_no_track = state.said_setups_differ = state.said_moved = false;
   {
     const std::lock_guard lock (state.reader_lock);
     state.reader.clear ();

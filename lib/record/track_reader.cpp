@@ -69,10 +69,17 @@ TrackReader::take_until (Place place, Nanoseconds start)
       match.skipped_from = line->pts;
   }
   if (place != lines_.end ()) {
-    const auto said = place->line.frame->pts;
-    const bool exact =
-        said && std::abs (*said - place->pts) <= tolerance (place->duration);
-    match.offset = exact ? 0 : place->pts - said.value_or (place->pts);
+    const FrameRecord &record = *place->line.frame;
+    const Nanoseconds offset = place->pts - record.pts.value_or (place->pts);
+    const Nanoseconds rounding =
+        tolerance (record.duration.value_or (place->duration));
+    if (std::abs (offset) > rounding) {
+      match.offset = offset;
+      match.misplaced =
+          std::abs (offset - offset_.value_or (offset)) > 2 * rounding;
+      offset_ = offset_.value_or (offset);
+    }
+    offset_ = offset_.value_or (0);
     match.line = std::move (place->line);
     ++place;
   }

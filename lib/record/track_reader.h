@@ -31,12 +31,17 @@ public:
   /** No line follows. */
   void end () { ended_ = true; }
   void clear ();
+  /** Another recording may follow, with another offset. */
+  void next_segment () { offset_.reset (); }
 
   struct Match {
     /** Null: the track has no line for this frame. */
     std::optional<TrackLine> line;
     /** To add to the times of the record. */
     Nanoseconds offset = 0;
+    /** The offset is neither 0 nor that of the frames before: the container's
+     * time of this frame is wrong. */
+    bool misplaced = false;
     /** Frames of the track between the one before and this one. */
     std::uint64_t skipped = 0;
     Nanoseconds skipped_from = 0; ///< PTS of the first of them
@@ -70,6 +75,7 @@ private:
 
   std::deque<Line> lines_;
   std::optional<std::uint64_t> frames_;
+  std::optional<Nanoseconds> offset_; // of the first frame
   bool ended_ = false;
 };
 

@@ -24,6 +24,7 @@ PhaseLock::take (const PhaseSight &sight, std::uint64_t number,
     std::uint64_t lost, bool restarted)
 {
   LockDecision decision;
+  const bool alternating = alternates (sight, number);
   if (state_ == State::slipped && options_.can_restart && restarted) {
     state_ = State::awaiting;
     awaited_ = 0;
@@ -44,11 +45,22 @@ PhaseLock::take (const PhaseSight &sight, std::uint64_t number,
   if (state_ != State::following) {
     decision.locked = false;
     decision.slip = slip_;
-  } else if (is_proof (sight)) {
+  } else if (alternating && is_proof (sight)) {
     decision.locked = true;
     decision.locked_now = !std::exchange (known_, true);
   }
   return decision;
+}
+
+/** Whether the pilot's halves alternate with the numbers of the frames, as far
+ * as it shows. */
+bool
+PhaseLock::alternates (const PhaseSight &sight, std::uint64_t number)
+{
+  if (sight.reading.kind != Kind::in_phase || !sight.reading.half)
+    return true;
+  const int even = *sight.reading.half ^ int (number & 1);
+  return std::exchange (even_half_, even).value_or (even) == even;
 }
 
 /** Whether the frame cannot have slipped. */

@@ -42,7 +42,9 @@ struct LockDecision {
  *
  * A DMD that was started is taken as in phase until a frame shows otherwise,
  * but only a frame whose pilot shows every mask is known to be: any other may
- * follow a slip between two exposures, which no code shows. After a slip it is
+ * follow a slip between two exposures, which no code shows. A frame that shows
+ * the pilot's half of the frame before it may be an old picture with a new
+ * time, or not have the number that it is given. After a slip it is
  * restarted if possible, and all frames are flagged until the restart is
  * visible: in the pilot, or as an exposure with parked mirrors (a gap, if the
  * DMD triggers the camera) followed by a frame in phase. Frames exposed before
@@ -71,6 +73,7 @@ private:
       const PhaseSight &sight, std::uint64_t number, LockDecision &decision);
   void await (
       const PhaseSight &sight, std::uint64_t lost, LockDecision &decision);
+  bool alternates (const PhaseSight &sight, std::uint64_t number);
   bool is_proof (const PhaseSight &sight) const;
   void follow (LockDecision &decision);
   void establish (const PhaseReading &slip, LockDecision &decision);
@@ -82,6 +85,8 @@ private:
   std::uint64_t first_frame_ = 0; // of the slip, or of its suspicion
   int awaited_ = 0;               // frames since the restart
   bool restart_seen_ = false;
+  /* Half of the pilot in even frames, by the last frame that showed it. */
+  std::optional<int> even_half_;
   int unopposed_ = 0; // frames since then without a contradiction
 };
 

@@ -93,14 +93,15 @@ read_pilot (int slots, const std::array<double, kPilotColumns> &means)
   if (lit[own] < masks.size () / 4 || (early[other] > 0 && late[other] > 0))
     return {};
   if (lit[other] == 0)
-    return {PhaseReading::Kind::in_phase, 0, lit[own] == masks.size () / 2};
+    return {
+        PhaseReading::Kind::in_phase, 0, lit[own] == masks.size () / 2, own};
 
   /* A slip between the masks of two columns lights the nearer one only: the
    * mask at distance d from the border is followed by that at 2 d + 1. */
   const int seen = std::max (early[other], late[other]);
   const int farthest = std::min (2 * seen - 1, slots / 2);
   return {PhaseReading::Kind::slipped, late[other] > 0 ? seen : -seen,
-      seen >= farthest && lit[own] != lit[other]};
+      seen >= farthest && lit[own] != lit[other], std::nullopt};
 }
 
 } // namespace codedexposure

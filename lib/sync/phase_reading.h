@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 
 #include "schedule/pilot.h"
 
@@ -23,6 +24,8 @@ struct PhaseReading {
   /** No other slip by as few slots explains the frame as well. In phase: the
    * pilot shows every mask of the frame, so that no slip can hide. */
   bool certain = true;
+  /** In phase: the frame of the pilot that is shown, 0 or 1; they alternate. */
+  std::optional<int> half = {};
 
   bool operator== (const PhaseReading &) const = default;
 };

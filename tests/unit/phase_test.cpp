@@ -259,7 +259,8 @@ TEST (PilotPhase, AndSignatureFlagTheFrameOfTheSlipAndTheNextTells)
       SCOPED_TRACE (testing::Message () << by << " at " << boundary);
       const auto seen =
           sights ("sequential:2x2,pilot=8", moving, 7, 16 + boundary, by);
-      EXPECT_EQ (seen[3].reading, (PhaseReading{Kind::in_phase}));
+      EXPECT_EQ (seen[3].reading.kind, Kind::in_phase);
+      EXPECT_TRUE (seen[3].reading.certain);
       EXPECT_EQ (seen[4].reading.kind, Kind::slipped);
       EXPECT_EQ (seen[5].reading, (PhaseReading{Kind::slipped, by, true}));
       EXPECT_FALSE (seen[5].next_frame_tells);
@@ -490,6 +491,22 @@ TEST (PhaseLock, WithoutADmdOnlyAPilotBringsTheLockBack)
     EXPECT_EQ (lock.take (good, 2, 0, true).locked == true,
         observable == SlipObservable::always);
   }
+}
+
+/* A camera that sends its last picture once more, with the time of the next. */
+TEST (PhaseLock, AnOldPictureIsNotKnownToBeInPhase)
+{
+  PhaseLock lock ({.observable = SlipObservable::always});
+  const auto shows = [] (int half) {
+    return PhaseSight{{Kind::in_phase, 0, true, half}};
+  };
+  EXPECT_EQ (lock.take (shows (1), 0, 0, true).locked, true);
+  EXPECT_EQ (lock.take (shows (0), 1, 0, true).locked, true);
+  EXPECT_EQ (lock.take (shows (0), 2, 0, true).locked, std::nullopt);
+  EXPECT_EQ (lock.take (shows (0), 3, 0, true).locked, std::nullopt);
+  EXPECT_EQ (lock.take (shows (1), 4, 0, true).locked, true);
+  EXPECT_EQ (lock.take (shows (1), 6, 1, true).locked, true)
+      << "frame 5 is lost";
 }
 
 TEST (PhaseLock, WithoutAPilotThePhaseIsUnknownUntilASlip)

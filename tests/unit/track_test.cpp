@@ -206,6 +206,30 @@ TEST_F (Reader, TimesOfAFileThatWasMovedMoveWithIt)
   EXPECT_EQ (match->offset, 5 * kPeriod);
 }
 
+/* As by damage to the time of a cluster, or to the unit of all times. */
+TEST_F (Reader, AFrameThatMovedAgainstTheOthersIsMisplaced)
+{
+  const auto misplaced = [this] (std::uint64_t frame, Nanoseconds pts) {
+    FrameRecord record;
+    record.frame = frame;
+    record.pts = Nanoseconds (frame) * kPeriod;
+    EXPECT_TRUE (
+        reader.add (TrackLine{.frame = record}.to_json (), pts, kPeriod));
+    EXPECT_EQ (take (pts), std::int64_t (frame));
+    return match->misplaced;
+  };
+  constexpr Nanoseconds kLater = 250 * kPeriod;
+  EXPECT_FALSE (misplaced (0, kLater));
+  EXPECT_FALSE (misplaced (1, kLater + kPeriod + 400'000)) << "rounded";
+  EXPECT_TRUE (misplaced (2, kLater + 3 * kPeriod));
+  EXPECT_FALSE (misplaced (4, kLater + 4 * kPeriod));
+  reader.next_segment ();
+  EXPECT_FALSE (misplaced (0, kLater + 5 * kPeriod)) << "the next recording";
+  reader.clear ();
+  EXPECT_FALSE (misplaced (5, 5 * kPeriod));
+  EXPECT_TRUE (misplaced (6, 6 * kPeriod - kPeriod / 4));
+}
+
 /* A decoder clips the first frame of a segment to its start. */
 TEST_F (Reader, TheFirstFrameOfASegmentMayBeClipped)
 {

@@ -1,0 +1,36 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Recordings of the bench. */
+#pragma once
+
+#include <set>
+#include <string>
+
+#include "play.h"
+
+namespace codedexposure::campaign
+{
+
+std::string read_file (const std::string &path);
+void write_file (const std::string &path, const std::string &bytes);
+
+struct Recording {
+  std::string bytes;
+  std::int64_t slots = 0; ///< exposed
+  Reading reading = Reading::exact;
+  /** Wrong by a slip, and recorded as not known to be synchronised. */
+  std::set<std::int64_t> unjudged = {};
+};
+
+/** What follows dmdsync to record to @p path, and to show it as "out". */
+std::string record_tail (const std::string &path);
+/** A schedule that no element would assume; decoded by solving its code. */
+inline constexpr const char *kStaircase = "staircase:2x2,pilot=8";
+/** Records @p frames frames with a slip in the middle; frame @p lost never
+ * comes. */
+Recording record (const std::string &path, int frames, int lost,
+    const std::string &schedule = "sequential:2x2,pilot=8");
+/** Reads @p path again and judges it. */
+void decode (Row &row, const std::string &path, const Recording &recording,
+    bool push_mode);
+
+} // namespace codedexposure::campaign

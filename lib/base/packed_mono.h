@@ -53,7 +53,8 @@ std::size_t row_bytes (MonoFormat format, int width);
  */
 Result<void> unpack_mono (MonoFormat format, ImageView<const std::uint8_t> rows,
     ImageView<std::uint16_t> out);
-/** The inverse; bits above the significant ones are left out. */
+/** The inverse; where pixels are packed, bits above the significant ones are
+ * left out. */
 Result<void> pack_mono (MonoFormat format, ImageView<const std::uint16_t> in,
     ImageView<std::uint8_t> rows);
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <numbers>
 
 #include <Eigen/LU>
@@ -60,12 +61,16 @@ check_size (const char *what, Extent size)
 }
 
 Result<void>
-check_finite (const std::string &what, std::span<const double> numbers)
+check_finite (const std::string &what, std::span<const double> numbers,
+    double largest = std::numeric_limits<double>::max ())
 {
   for (std::size_t i = 0; i < numbers.size (); i++)
-    if (!std::isfinite (numbers[i]))
+    if (!(std::abs (numbers[i]) <= largest))
       return bad_number (what + "[" + std::to_string (i) + "]", numbers[i],
-          "it must be finite");
+          std::isfinite (numbers[i])
+              ? "it must be within -" + real_text (largest) + " and " +
+                    real_text (largest)
+              : "it must be finite");
   return {};
 }
 
@@ -83,6 +88,9 @@ normalise (Homography &h, Extent camera)
   if (z == 0.0 || !check_finite ("homography", h).ok ())
     return bad_number ("the homography's Z at the centre of the frame", z,
         "the horizon must lie outside of the frame");
+  RETURN_IF_ERROR (
+      check_finite ("with Z = 1 at the centre of the frame, homography", h,
+          Mapping::kMaxNumber));
   for (const double x : {0.0, 2.0 * frame.cx})
     for (const double y : {0.0, 2.0 * frame.cy})
       if (const double corner = h[6] * x + h[7] * y + h[8]; !(corner > 1e-3))
@@ -112,7 +120,7 @@ check_displacement (const Displacement &grid)
       return bad_number (std::string ("the count of ") + what,
           double (numbers->size ()),
           "it must be columns x rows = " + std::to_string (nodes));
-    RETURN_IF_ERROR (check_finite (what, *numbers));
+    RETURN_IF_ERROR (check_finite (what, *numbers, Mapping::kMaxNumber));
   }
   return {};
 }
@@ -226,8 +234,10 @@ Mapping::displaced (double x, double y) const
     double part;
     Node (double at, int last, int nodes)
     {
-      const double node =
-          std::clamp (at / std::max (1, last), 0.0, 1.0) * (nodes - 1);
+      // Nowhere, as the horizon of the mirrors is seen, counts as 0.
+      const double part_of_frame =
+          std::min (std::max (0.0, at / std::max (1, last)), 1.0);
+      const double node = part_of_frame * (nodes - 1);
       low = std::min (int (node), nodes - 2);
       part = node - low;
     }

@@ -60,6 +60,9 @@ public:
   static constexpr int kMaxNodes = 257;
   static constexpr std::size_t kMaxJsonSize = std::size_t (1) << 23;
   static constexpr double kMaxPsfSigma = 16.0;
+  /** Bound on a displacement, in mirrors, and on a number of a homography whose
+   * Z is 1 at the centre of the frame: places stay finite. */
+  static constexpr double kMaxNumber = 1e9;
 
   /** Symmetric, row by row, in mirrors squared: of the first eight numbers of
    * centred (). */
@@ -81,7 +84,7 @@ public:
 
   /** Pixel (x, y) looks at mirror (x, y). */
   explicit Mapping (Extent both);
-  /** Error when a size is out of its range, a number is not finite, the
+  /** Error when a size or a number is out of its range or not finite, the
    * homography has no inverse or its horizon crosses the frame, a variance is
    * negative, a blur is out of its range, or a grid has not as many numbers as
    * nodes. */

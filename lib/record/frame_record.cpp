@@ -14,6 +14,7 @@ namespace
 {
 
 constexpr int kHashDigits = 16;
+constexpr int kMaxBits = 16;
 
 template <typename T>
 void
@@ -44,7 +45,8 @@ read_whole (const Json &object, const char *key, T &to)
       to = T (value.get<std::uint64_t> ());
     else if (std::is_signed_v<T> && value.is_number_integer () &&
              value.get<std::int64_t> () < 0 &&
-             value.get<std::int64_t> () >= std::numeric_limits<T>::min ())
+             value.get<std::int64_t> () >=
+                 std::int64_t (std::numeric_limits<T>::min ()))
       to = T (value.get<std::int64_t> ());
     else
       throw expected (key, "a whole number", value);
@@ -143,7 +145,9 @@ read_record (const Json &object)
   with_key (object, "pattern", [&] (const Json &value) {
     record.pattern = read_text (value, "pattern");
   });
-  read_whole (object, "bits", record.bits);
+  with_key (object, "bits", [&] (const Json &value) {
+    integer_into (record.bits, kMaxBits) (value, "bits");
+  });
   with_key (object, "flags", [&] (const Json &list) {
     if (!list.is_array ())
       throw expected ("flags", "a list of texts", list);

@@ -13,6 +13,7 @@
 #include "each_element.h"
 #include "leaky_queue.h"
 #include "player.h"
+#include "whole_picture.h"
 
 namespace
 {
@@ -334,6 +335,7 @@ Launch::run ()
   if (!connect_counter () || !claim_outputs (options_.force, counted_.get ()))
     return kFailed;
   watch_leaky_queues ();
+  whole_picture::wait_for_inputs (pipeline_.get ());
   end_at_the_limit ();
   const guint ticks = g_timeout_add (200, on_tick, this);
   const int code = loop ();

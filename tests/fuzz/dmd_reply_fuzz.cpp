@@ -2,28 +2,16 @@
 /* Any bytes as replies of a board: drivers must end with a result or a
  * printable message, and must not block forever. */
 #include <algorithm>
-#include <cstddef>
-#include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 
-#include "base/text.h"
 #include "dmd/drivers.h"
 #include "dmd/lightcrafter_protocol.h"
+#include "fuzz_check.h"
 
 using namespace codedexposure;
+using namespace codedexposure::test;
 
 namespace
 {
-
-void
-require (bool holds, const char *what, const std::string &shown)
-{
-  if (holds)
-    return;
-  std::fprintf (stderr, "%s: %s\n", what, shown.c_str ());
-  std::abort ();
-}
 
 /** Answers each request with the next bytes, with the correct sequence number
  * if the first of them is even; silent at their end. */
@@ -63,15 +51,6 @@ private:
   int reads_ = 0;
 };
 
-void
-check (const Error &error)
-{
-  require (
-      !error.message.empty () && error.message.size () < 1000 &&
-          printable (error.message, error.message.size ()) == error.message,
-      "message cannot be shown", printable (error.message, 2000));
-}
-
 template <typename Open>
 void
 drive (Open open, const DmdOptions &options, ByteView bytes)
@@ -81,24 +60,20 @@ drive (Open open, const DmdOptions &options, ByteView bytes)
       options);
   if (!dmd)
     return check (dmd.error ());
-  const auto status = (*dmd)->status ();
-  if (!status)
-    check (status.error ());
+  check ((*dmd)->status ());
 }
 
 void
 read_lightcrafter (ByteView bytes)
 {
-  const auto head = lightcrafter::parse_head (
-      bytes.first (std::min (bytes.size (), lightcrafter::kHeadSize)));
-  if (!head)
-    check (head.error ());
+  check (lightcrafter::parse_head (
+      bytes.first (std::min (bytes.size (), lightcrafter::kHeadSize))));
+  if (!bytes.empty ())
+    check (Error{lightcrafter::error_text (bytes[0])});
   (void)lightcrafter::checksum_holds (bytes);
 }
 
 } // namespace
-
-extern "C" int LLVMFuzzerTestOneInput (const std::uint8_t *, std::size_t);
 
 extern "C" int
 LLVMFuzzerTestOneInput (const std::uint8_t *data, std::size_t size)

@@ -30,8 +30,9 @@ public:
     int number[2];
     if (pipe2 (number, O_CLOEXEC) != 0)
       return;
+    // A server that resets when its last client leaves refuses those that come.
     std::string words[] = {"Xvfb", "-displayfd", "3", "-screen", "0",
-        "640x480x24", "-nolisten", "tcp"};
+        "640x480x24", "-noreset", "-nolisten", "tcp"};
     char *arguments[std::size (words) + 1] = {};
     for (std::size_t k = 0; k < std::size (words); k++)
       arguments[k] = words[k].data ();

@@ -7,7 +7,8 @@ start_screen ()
 {
   command -v Xvfb >/dev/null || return 1
   mkfifo "$scratch/display"
-  Xvfb -displayfd 3 -screen 0 "$1x24" -nolisten tcp \
+  # A server that resets when its last client leaves refuses those that come.
+  Xvfb -displayfd 3 -screen 0 "$1x24" -noreset -nolisten tcp \
     3>"$scratch/display" >"$scratch/xvfb.log" 2>&1 &
   screen=$!
   trap 'kill "$screen"; wait "$screen" 2>/dev/null; rm -rf "$scratch"' EXIT

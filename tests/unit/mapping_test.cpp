@@ -240,6 +240,23 @@ TEST (Mapping, RefusesWhatNoBenchHas)
   (*parts.covariance)[9] = -1;
   EXPECT_NE (
       refusal (parts).find ("no variance is negative"), std::string::npos);
+  parts = all_parts ();
+  parts.displacement->y[1] = 2e9;
+  EXPECT_NE (refusal (parts).find ("displacement.y[1] is 2e+09; it must be "
+                                   "within -1e+09 and 1e+09"),
+      std::string::npos);
+  EXPECT_NE (refusal ({kCamera, kMirrors, {1, 0, 3e10, 0, 1, 0, 0, 0, 2}})
+                 .find ("homography[2] is 1.5e+10"),
+      std::string::npos);
+}
+
+TEST (Mapping, AMirrorThatIsSeenNowhereIsNotInTheFrame)
+{
+  Mapping::Parts parts = {kCamera, kMirrors, {1, 0, 0, 0, 0, 1, 0, 1, 10}};
+  parts.displacement = {2, 2, {0, 0, 0, 0}, {0, 0, 0, 0}};
+  const Position at = made (parts).camera_at ({0, 0});
+  EXPECT_FALSE (
+      at.x >= 0 && at.x < kCamera.width && at.y >= 0 && at.y < kCamera.height);
 }
 
 TEST (MappingJson, HoldsEveryKeyBothWays)

@@ -77,6 +77,17 @@ TEST (Track, ALineSurvivesEscapingForPango)
   EXPECT_EQ (*read, full_line ());
 }
 
+TEST (Track, NoFrameHasMoreThan16Bits)
+{
+  FrameRecord record;
+  record.bits = 99;
+  const auto read =
+      TrackLine::from_json (TrackLine{.frame = record}.to_json ());
+  ASSERT_FALSE (read);
+  EXPECT_NE (read.error ().message.find ("bits"), std::string::npos)
+      << read.error ().message;
+}
+
 /* A damaged line is refused, not misread. */
 TEST (Track, EveryFlippedBitIsNoticed)
 {

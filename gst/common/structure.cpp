@@ -7,6 +7,20 @@
 namespace codedexposure::gst
 {
 
+bool
+get_count (const GValue *value, guint64 &count)
+{
+  GValue whole = G_VALUE_INIT;
+  g_value_init (&whole, G_TYPE_INT64);
+  const GType type = G_VALUE_TYPE (value);
+  const bool counts =
+      (type == G_TYPE_INT || type == G_TYPE_UINT || type == G_TYPE_INT64) &&
+      g_value_transform (value, &whole) && g_value_get_int64 (&whole) >= 0;
+  if (counts)
+    count = guint64 (g_value_get_int64 (&whole));
+  return counts;
+}
+
 std::vector<GQuark>
 field_names (const char *members)
 {

@@ -74,12 +74,19 @@ set_field (GstStructure *structure, GQuark name, const std::optional<T> &member)
     set_field (structure, name, *member);
 }
 
+/** A count of another integer type, as other programs may write it; false if it
+ * is none. */
+bool get_count (const GValue *value, guint64 &count);
+
 /** False, with @p member unchanged, if there is no such field of that type. */
 template <typename T>
 bool
 get_field (const GstStructure *structure, GQuark name, T &member)
 {
   const GValue *value = gst_structure_id_get_value (structure, name);
+  if constexpr (std::is_same_v<T, guint64>)
+    if (value && !G_VALUE_HOLDS_UINT64 (value))
+      return get_count (value, member);
   const bool fits = value && G_VALUE_HOLDS (value, Wire<T>::type ());
   if (fits)
     member = Wire<T>::get (value);

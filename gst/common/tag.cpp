@@ -8,6 +8,7 @@
 
 #include <gst/video/video.h>
 
+#include "element.h"
 #include "raii.h"
 
 namespace codedexposure::gst
@@ -177,6 +178,18 @@ replace_by_provenance (GstEvent *event, const Provenance &provenance)
     return event;
   return merge_others (
       comment_to_tags (kDecodedPrefix, provenance.to_json ()), event);
+}
+
+void
+refuse_decoded (gpointer element, GstEvent *event)
+{
+  GstTagList *tags = nullptr;
+  gst_event_parse_tag (event, &tags);
+  if (const auto made = provenance_from_tags (tags))
+    POST_ERROR (element, STREAM, WRONG_TYPE,
+        "These frames are no coded frames: they were decoded before (" +
+            (*made ? made->value ().text () : "in an unknown way") +
+            "). Use the recording of the coded frames.");
 }
 
 std::optional<Result<Provenance>>

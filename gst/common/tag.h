@@ -53,4 +53,8 @@ GstEvent *replace_by_provenance (GstEvent *event, const Provenance &provenance);
 /** The provenance in @p tags; as schedule_from_tags (). */
 std::optional<Result<Provenance>> provenance_from_tags (const GstTagList *tags);
 
+/** Posts an error of @p element, which takes coded frames, if the tags of
+ * @p event say that its frames were decoded before. */
+void refuse_decoded (gpointer element, GstEvent *event);
+
 } // namespace codedexposure::gst

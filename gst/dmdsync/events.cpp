@@ -99,6 +99,7 @@ push_tag (GstDmdSync *self)
 GstEvent *
 own_schedule (GstDmdSync *self, GstEvent *event)
 {
+  refuse_decoded (self, event);
   SyncState &st = state (self);
   GstTagList *tags = nullptr;
   gst_event_parse_tag (event, &tags);

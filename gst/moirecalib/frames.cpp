@@ -304,6 +304,7 @@ push_setup (GstMoireCalib *self)
 GstEvent *
 take_tag (GstMoireCalib *self, GstEvent *event)
 {
+  refuse_decoded (self, event);
   CalibState &st = state (self);
   GstTagList *tags = nullptr;
   gst_event_parse_tag (event, &tags);

@@ -75,8 +75,12 @@ private:
   void on_message (GstMessage *message) override;
   void on_error (GstMessage *message);
   void on_element_message (GstMessage *message);
-  bool take_container_error (std::string_view kind, const GstObject *source);
+  bool take_container_error (std::string_view kind, const GstObject *source,
+      const std::string &text);
   void end_after_error ();
+  void watch_bytes ();
+  static GstPadProbeReturn on_bytes (
+      GstPad *, GstPadProbeInfo *info, gpointer self);
   void tick ();
   void watch_for_silence (gint64 frames);
   int finish (int code);
@@ -124,6 +128,8 @@ private:
   bool interrupted_ = false;
   bool said_needed_ = false; // the needed message came
   bool failed_ = false;      // the stream ends because of an error
+  gsize bytes_ = 0; // since the last frame; thread of the demuxer's sink pad
+  gint64 frames_of_bytes_ = 0; // frames when they were counted
   bool damaged_ = false;     // frames are missing or damaged
 };
 
@@ -336,6 +342,7 @@ Launch::run ()
     return kFailed;
   watch_leaky_queues ();
   whole_picture::wait_for_inputs (pipeline_.get ());
+  watch_bytes ();
   end_at_the_limit ();
   const guint ticks = g_timeout_add (200, on_tick, this);
   const int code = loop ();
@@ -395,7 +402,8 @@ Launch::on_signal (int times)
 /* A demuxer that finds a damaged index stops before the first frame. From front
  * to back it reads all frames, and meets the damage at the end. */
 bool
-Launch::take_container_error (std::string_view kind, const GstObject *source)
+Launch::take_container_error (std::string_view kind, const GstObject *source,
+    const std::string &text)
 {
   const bool of_container =
       kind == "matroskademux" ||
@@ -406,15 +414,50 @@ Launch::take_container_error (std::string_view kind, const GstObject *source)
     quit (kContainer);
     return true;
   }
+  status_.line ("warning: " + text);
   const ObjectPtr<GstElement> demuxer (find ("file"));
   if (!demuxer || demuxer->numsrcpads == 0) {
-    status_.line ("error: the head of the recording is damaged, so its tracks "
+    status_.line ("error: the head of the stream is damaged, so its tracks "
                   "cannot be found; if ffmpeg reads it, \"ffmpeg -i IN.mkv -map "
                   "0 -c copy OUT.mkv\" writes a new one");
     quit (kNoFrame);
   }
   damaged_ = true;
   return true;
+}
+
+/* matroskademux collects an element of any length that a stream claims. */
+GstPadProbeReturn
+Launch::on_bytes (GstPad *, GstPadProbeInfo *info, gpointer self)
+{
+  constexpr gsize kMostWithoutFrame = gsize (256) << 20;
+  auto *launch = static_cast<Launch *> (self);
+  if (std::exchange (launch->frames_of_bytes_, launch->frames_) !=
+      launch->frames_)
+    launch->bytes_ = 0;
+  launch->bytes_ += gst_buffer_get_size (GST_PAD_PROBE_INFO_BUFFER (info));
+  if (launch->bytes_ <= kMostWithoutFrame)
+    return GST_PAD_PROBE_OK;
+  const ObjectPtr<GstElement> demuxer (launch->find ("file"));
+  GST_ELEMENT_ERROR (demuxer.get (), STREAM, DEMUX,
+      ("256 MB arrived without a frame: this is no stream of coded frames, or "
+       "it is damaged."),
+      (nullptr));
+  /* The source then ends the stream. */
+  gst_clear_buffer (reinterpret_cast<GstBuffer **> (&info->data));
+  GST_PAD_PROBE_INFO_FLOW_RETURN (info) = GST_FLOW_ERROR;
+  return GST_PAD_PROBE_HANDLED;
+}
+
+void
+Launch::watch_bytes ()
+{
+  if (const ObjectPtr<GstElement> demuxer (find ("file")); demuxer) {
+    const ObjectPtr<GstPad> sink (
+        gst_element_get_static_pad (demuxer.get (), "sink"));
+    gst_pad_add_probe (
+        sink.get (), GST_PAD_PROBE_TYPE_BUFFER, on_bytes, this, nullptr);
+  }
 }
 
 /* Ends the stream, so that the frames before the error are in finished files.
@@ -468,7 +511,7 @@ Launch::on_error (GstMessage *message)
     quit (kDone);
     return;
   }
-  if (take_container_error (kind, source))
+  if (take_container_error (kind, source, told (message, error, detail)))
     return;
   status_.line ("error: " + told (message, error, detail));
   const std::string remedy = remedy_for (kind, error, detail);

@@ -210,7 +210,29 @@ Pictures::claim (bool replace)
         return GST_PAD_PROBE_OK;
       },
       this, nullptr);
+  watch_flags (pad.get ());
   return {};
+}
+
+/* An encoder drops the flags of its pictures, and gives each on at once. */
+void
+Pictures::watch_flags (GstPad *sink_pad)
+{
+  const ObjectPtr<GstPad> from (gst_pad_get_peer (sink_pad));
+  const ObjectPtr<GstElement> encoder (
+      from ? gst_pad_get_parent_element (from.get ()) : nullptr);
+  const ObjectPtr<GstPad> pad (
+      encoder ? gst_element_get_static_pad (encoder.get (), "sink") : nullptr);
+  if (!pad)
+    return;
+  gst_pad_add_probe (
+      pad.get (), GST_PAD_PROBE_TYPE_BUFFER,
+      [] (GstPad *, GstPadProbeInfo *info, gpointer self) {
+        static_cast<Pictures *> (self)->corrupted_ = GST_BUFFER_FLAG_IS_SET (
+            GST_PAD_PROBE_INFO_BUFFER (info), GST_BUFFER_FLAG_CORRUPTED);
+        return GST_PAD_PROBE_OK;
+      },
+      this, nullptr);
 }
 
 /* The slot of the recording; otherwise, the number after the last. */
@@ -240,8 +262,7 @@ Pictures::add (GstPad *pad, GstBuffer *picture)
       known.slot >= 0 ? std::to_string (known.slot).c_str () : "",
       time_text (stream_time (pad, GST_BUFFER_PTS (picture))).c_str (),
       time_text (GST_BUFFER_DURATION (picture)).c_str (), known.synchronised,
-      GST_BUFFER_FLAG_IS_SET (picture, GST_BUFFER_FLAG_CORRUPTED) ? "true"
-                                                                  : "false",
+      corrupted_ ? "true" : "false",
       known.lost_before);
   frames_++;
 }

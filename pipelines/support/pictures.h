@@ -45,6 +45,7 @@ private:
   struct Known;
 
   codedexposure::Result<void> check_names () const;
+  void watch_flags (GstPad *sink_pad);
   void add (GstPad *pad, GstBuffer *picture);
   gint next_index (GstPad *pad, const Known &known) const;
   void write_line (const std::string &line);
@@ -60,6 +61,7 @@ private:
   std::unique_ptr<std::FILE, int (*) (std::FILE *)> table_{
       nullptr, std::fclose};
   bool table_failed_ = false;
+  bool corrupted_ = false; // the picture that is being encoded
   std::string line_; // of the last picture, which is being written
   std::string last_; // its file
   gint index_ = -1;

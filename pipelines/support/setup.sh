@@ -19,7 +19,7 @@ g++|compiles C++20|run
 pkg-config|finds the libraries|run
 libgstreamer1.0-dev|GStreamer core and its test harness|run
 libgstreamer-plugins-base1.0-dev|GStreamer video library|run
-nlohmann-json3-dev|reads and writes JSON (schedules and sidecars)|run
+nlohmann-json3-dev|reads and writes JSON (schedules, tracks)|run
 libcairo2-dev|draws the overlay of a calibration|run
 libusb-1.0-0-dev|DMD boards on the USB|run
 libeigen3-dev|linear algebra of estimates and calibrations|run
@@ -28,7 +28,7 @@ libcli11-dev|options of the command-line tool|run
 gstreamer1.0-tools|gst-launch-1.0, gst-inspect-1.0|run
 gstreamer1.0-plugins-base|test scenes, conversion, TCP, compositor|run
 gstreamer1.0-plugins-good|Matroska, AVI, PNG, window selection|run
-gstreamer1.0-plugins-bad|GDP for send and receive, H.264 in MP4|run
+gstreamer1.0-plugins-bad|H.264 in MP4|run
 gstreamer1.0-plugins-ugly|H.264 encoder|run
 gstreamer1.0-libav|FFV1, and decoding most video files|run
 gstreamer1.0-x|windows under X, text in pictures|run

@@ -67,7 +67,7 @@ TEST (Messages, OfAnotherNameOrWithoutAFieldAreNotRead)
       echo<FramesLost> (
           "codedexposure/frames-lost, count=(guint64)3, from=(guint64)4;"),
       "");
-  EXPECT_EQ (echo<FramesLost> ("codedexposure/frames-lost, count=(int)3, "
+  EXPECT_EQ (echo<FramesLost> ("codedexposure/frames-lost, count=(int)-3, "
                                "from=(guint64)4, to=(guint64)5;"),
       "");
   EXPECT_FALSE (from_structure<FramesLost> (nullptr));
@@ -79,6 +79,11 @@ TEST (Events, PatternRequestsAreAsDocumented)
       "dmdsync/pattern, pattern=(string)x:4, frames=(guint64)50;";
   EXPECT_EQ (echo<PatternRequest> (request), request);
   EXPECT_EQ (echo<PatternRequest> ("dmdsync/pattern;"), "dmdsync/pattern;");
+
+  /* As programs write it that do not care about the size of integers. */
+  EXPECT_EQ (
+      echo<PatternRequest> ("dmdsync/pattern, pattern=x:4, frames=(int)50;"),
+      request);
 
   const EventPtr event (new_event (PatternRequest{"x:4", 50}));
   EXPECT_EQ (GST_EVENT_TYPE (event.get ()), GST_EVENT_CUSTOM_UPSTREAM);

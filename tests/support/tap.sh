@@ -51,6 +51,16 @@ check_status ()
   fi
 }
 
+# wait_for_bytes FILE: until it has some.
+wait_for_bytes ()
+{
+  for _ in {1..3000}; do
+    [ ! -s "$1" ] || return 0
+    sleep 0.02
+  done
+  return 1
+}
+
 # check_said NAME REGEX: the command before this said so.
 check_said ()
 {

@@ -58,11 +58,15 @@ struct Client {
   bool wait_frames (int count)
   {
     const auto wanted = judge.tally ().delivered + unsigned (count) * kSlots;
+    auto came = judge.tally ().delivered;
     for (int tries = 0; tries < 30'000; tries++) {
-      if (judge.tally ().delivered >= wanted)
+      const auto now = judge.tally ().delivered;
+      if (now >= wanted)
         return true;
       if (!play.poll ())
         return false;
+      if (std::exchange (came, now) != now)
+        tries = 0;
       g_usleep (2000);
     }
     play.hung = true;
@@ -123,7 +127,7 @@ packets (Scale scale)
                              " of the packets lost"});
     Camera camera (part);
     Client client;
-    client.wait_frames (scale == Scale::full ? 3000 : 50);
+    client.wait_frames (scale == Scale::full ? 1500 : 50);
     client.end (rows.back ());
   }
   return rows;
@@ -195,13 +199,13 @@ run_camera (const std::vector<std::string> &words)
   /* It stands still while no client wants frames, but the scene does not. */
   constexpr std::int64_t kStoodStill = 25; // frames; fewer: a busy machine
   std::int64_t first = 0;
+  std::int64_t last = -kStoodStill;
   auto camera = GigeCamera::open (
       options, [&] (std::uint64_t frame, ImageView<std::uint16_t> picture) {
-        const auto number = std::int64_t (frame);
         const auto now =
             std::int64_t ((gst_util_get_timestamp () - origin) / kTime);
-        if (number == 0 || now - first - number > kStoodStill)
-          first = now - number;
+        if (now - std::exchange (last, now) >= kStoodStill)
+          first = now - std::int64_t (frame);
         const auto slot = (first + std::int64_t (frame)) * kSlots;
         for (int y = 0; y < picture.height; y++)
           for (int x = 0; x < picture.width; x++)

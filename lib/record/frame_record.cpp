@@ -64,6 +64,14 @@ read_known (const Json &object, const char *key, std::optional<T> &to)
   }
 }
 
+void
+read_time (const Json &object, const char *key, std::optional<Nanoseconds> &to)
+{
+  read_known (object, key, to);
+  if (to && (*to < -kFarthestTime || *to > kFarthestTime))
+    throw expected (key, "a time within 73 years", object[key]);
+}
+
 std::string
 read_text (const Json &value, const char *key)
 {
@@ -128,11 +136,11 @@ read_record (const Json &object)
 {
   FrameRecord record;
   read_whole (object, "frame", record.frame);
-  read_known (object, "pts_ns", record.pts);
-  read_known (object, "duration_ns", record.duration);
-  read_known (object, "exposure_start_ns", record.exposure_start);
-  read_known (object, "exposure_duration_ns", record.exposure_duration);
-  read_known (object, "time_uncertainty_ns", record.time_uncertainty);
+  read_time (object, "pts_ns", record.pts);
+  read_time (object, "duration_ns", record.duration);
+  read_time (object, "exposure_start_ns", record.exposure_start);
+  read_time (object, "exposure_duration_ns", record.exposure_duration);
+  read_time (object, "time_uncertainty_ns", record.time_uncertainty);
   with_key (object, "locked", [&] (const Json &value) {
     if (!value.is_boolean () && !value.is_null ())
       throw expected ("locked", "true, false or null", value);

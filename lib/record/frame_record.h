@@ -12,6 +12,10 @@
 namespace codedexposure
 {
 
+/** No time of a recording is as far from 0 as 73 years, ns. Sums of few such
+ * times do not overflow. */
+constexpr Nanoseconds kFarthestTime = Nanoseconds (1) << 61;
+
 /** Times are on the clock of the recording; what is unknown is absent.
  * docs/formats.md, "Per-frame track". */
 struct FrameRecord {

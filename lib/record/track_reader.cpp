@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <string>
 
 namespace codedexposure
 {
@@ -31,6 +32,12 @@ TrackReader::add (std::string_view text, Nanoseconds pts, Nanoseconds duration)
     frames_ = line->end;
   if (!line->frame)
     return {};
+  if (pts < 0 || pts > kFarthestTime || duration < 0 ||
+      duration > kFarthestTime)
+    return Error{"line of the track: it is at " + std::to_string (pts) +
+                     " ns for " + std::to_string (duration) +
+                     " ns; its container is damaged",
+        ErrorCode::parse};
   if (lines_.size () == kMaxLines)
     lines_.pop_front ();
   lines_.push_back ({pts, duration, *std::move (line)});
@@ -63,7 +70,7 @@ TrackReader::take_until (Place place, Nanoseconds start)
 {
   Match match;
   for (Place line = lines_.begin (); line != place; ++line) {
-    if (line->stop () <= start + tolerance (line->duration))
+    if (line->stop () - tolerance (line->duration) <= start)
       continue;
     if (match.skipped++ == 0)
       match.skipped_from = line->pts;
@@ -91,7 +98,7 @@ std::optional<TrackReader::Match>
 TrackReader::take (Nanoseconds pts, Nanoseconds start)
 {
   const bool later =
-      !lines_.empty () && lines_.back ().pts > pts + tolerance (kRounding * 4);
+      !lines_.empty () && lines_.back ().pts - tolerance (kRounding * 4) > pts;
   if (find (pts, start) == lines_.end () && !later && !ended_)
     return std::nullopt;
   return take_now (pts, start);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* The per-frame track: its lines, the hash of pixels, and which line belongs to
  * which frame. */
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -86,6 +87,23 @@ TEST (Track, NoFrameHasMoreThan16Bits)
   ASSERT_FALSE (read);
   EXPECT_NE (read.error ().message.find ("bits"), std::string::npos)
       << read.error ().message;
+}
+
+TEST (Track, NoTimeIsFartherThan73Years)
+{
+  FrameRecord record;
+  record.exposure_start = kFarthestTime + 1;
+  EXPECT_FALSE (TrackLine::from_json (TrackLine{.frame = record}.to_json ()));
+  record.exposure_start = -kFarthestTime;
+  const std::string line = TrackLine{.frame = record}.to_json ();
+  EXPECT_TRUE (TrackLine::from_json (line));
+
+  TrackReader reader;
+  EXPECT_FALSE (reader.add (line, kFarthestTime + 1, kPeriod));
+  ASSERT_TRUE (reader.add (line, kFarthestTime, kPeriod));
+  constexpr Nanoseconds last = std::numeric_limits<Nanoseconds>::max ();
+  EXPECT_FALSE (reader.take (last, 0));
+  EXPECT_TRUE (reader.take (kFarthestTime, last)->line);
 }
 
 /* A damaged line is refused, not misread. */

@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* dmdsync's caps, events and queries. */
+#include <algorithm>
+
 #include "common/element.h"
 #include "common/tag.h"
 #include "dmdsync.h"
@@ -124,6 +126,25 @@ own_schedule (GstDmdSync *self, GstEvent *event)
                                    st.schedule, st.stream.mapping));
 }
 
+/** A gap in place of frames moves as they do. */
+GstEvent *
+moved_gap (GstDmdSync *self, GstEvent *event)
+{
+  GstClockTime pts = 0, duration = 0;
+  gst_event_parse_gap (event, &pts, &duration);
+  GstClockTimeDiff by;
+  {
+    const ObjectLock lock (self);
+    by = moved_back (state (self));
+  }
+  const GstClockTimeDiff start =
+      std::max<GstClockTimeDiff> (0, GstClockTimeDiff (pts) - by);
+  GstEvent *moved = gst_event_new_gap (GstClockTime (start), duration);
+  gst_event_set_seqnum (moved, gst_event_get_seqnum (event));
+  gst_event_unref (event);
+  return moved;
+}
+
 gboolean
 take_segment (GstDmdSync *self, GstEvent *event)
 {
@@ -239,6 +260,9 @@ sink_event (GstBaseTransform *trans, GstEvent *event)
     return take_segment (self, event);
   case GST_EVENT_TAG:
     event = own_schedule (self, event);
+    break;
+  case GST_EVENT_GAP:
+    event = moved_gap (self, event);
     break;
   case GST_EVENT_FLUSH_START:
     if (st.runner)

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "byte_watch.h"
 #include "each_element.h"
 #include "leaky_queue.h"
 #include "player.h"
@@ -41,11 +42,11 @@ struct Options {
   gdouble retry = 0;         // time for which to try to connect, s
   gdouble start = 0;         // time at which to start, s
   gdouble duration = 0;      // time to play, s; 0: all
-  gdouble shift_to = -1;   // running time of the first frame, s; -1: unchanged
+  gdouble shift_to = -1; // running time of the first frame, s; -1: unchanged
   gboolean keep_time = FALSE; // running time is the time of the recording
   gboolean salvage = FALSE;   // go on after damage of the container
-  gchar *need = nullptr;   // name of an element message that must come
-  gboolean camera = FALSE; // frames come all the time
+  gchar *need = nullptr;      // name of an element message that must come
+  gboolean camera = FALSE;    // frames come all the time
   gboolean no_result = FALSE; // print no result
   gboolean force = FALSE;     // replace files that exist
   gboolean verbose = FALSE;   // also print messages and counters of elements
@@ -75,12 +76,9 @@ private:
   void on_message (GstMessage *message) override;
   void on_error (GstMessage *message);
   void on_element_message (GstMessage *message);
-  bool take_container_error (std::string_view kind, const GstObject *source,
-      const std::string &text);
+  bool take_container_error (
+      std::string_view kind, const GstObject *source, const std::string &text);
   void end_after_error ();
-  void watch_bytes ();
-  static GstPadProbeReturn on_bytes (
-      GstPad *, GstPadProbeInfo *info, gpointer self);
   void tick ();
   void watch_for_silence (gint64 frames);
   int finish (int code);
@@ -113,6 +111,7 @@ private:
   ObjectPtr<GstPad> counted_;
   std::vector<std::unique_ptr<LeakyQueue>> leaky_queues_;
   std::atomic<gint64> frames_ = 0;
+  std::unique_ptr<ByteWatch> byte_watch_;
   gint64 frames_before_ = -1; // at the last tick
   bool silent_ = false;       // no frame came for a while, and that was said
   gint64 left_ = 0;           // frames until the limit; its streaming thread
@@ -128,8 +127,6 @@ private:
   bool interrupted_ = false;
   bool said_needed_ = false; // the needed message came
   bool failed_ = false;      // the stream ends because of an error
-  gsize bytes_ = 0; // since the last frame; thread of the demuxer's sink pad
-  gint64 frames_of_bytes_ = 0; // frames when they were counted
   bool damaged_ = false;     // frames are missing or damaged
 };
 
@@ -342,7 +339,8 @@ Launch::run ()
     return kFailed;
   watch_leaky_queues ();
   whole_picture::wait_for_inputs (pipeline_.get ());
-  watch_bytes ();
+  if (const ObjectPtr<GstElement> demuxer = find ("file"))
+    byte_watch_ = std::make_unique<ByteWatch> (demuxer.get (), frames_);
   end_at_the_limit ();
   const guint ticks = g_timeout_add (200, on_tick, this);
   const int code = loop ();
@@ -402,8 +400,8 @@ Launch::on_signal (int times)
 /* A demuxer that finds a damaged index stops before the first frame. From front
  * to back it reads all frames, and meets the damage at the end. */
 bool
-Launch::take_container_error (std::string_view kind, const GstObject *source,
-    const std::string &text)
+Launch::take_container_error (
+    std::string_view kind, const GstObject *source, const std::string &text)
 {
   const bool of_container =
       kind == "matroskademux" ||
@@ -417,47 +415,14 @@ Launch::take_container_error (std::string_view kind, const GstObject *source,
   status_.line ("warning: " + text);
   const ObjectPtr<GstElement> demuxer (find ("file"));
   if (!demuxer || demuxer->numsrcpads == 0) {
-    status_.line ("error: the head of the stream is damaged, so its tracks "
-                  "cannot be found; if ffmpeg reads it, \"ffmpeg -i IN.mkv -map "
-                  "0 -c copy OUT.mkv\" writes a new one");
+    status_.line (
+        "error: the head of the stream is damaged, so its tracks "
+        "cannot be found; if ffmpeg reads it, \"ffmpeg -i IN.mkv -map "
+        "0 -c copy OUT.mkv\" writes a new one");
     quit (kNoFrame);
   }
   damaged_ = true;
   return true;
-}
-
-/* matroskademux collects an element of any length that a stream claims. */
-GstPadProbeReturn
-Launch::on_bytes (GstPad *, GstPadProbeInfo *info, gpointer self)
-{
-  constexpr gsize kMostWithoutFrame = gsize (256) << 20;
-  auto *launch = static_cast<Launch *> (self);
-  if (std::exchange (launch->frames_of_bytes_, launch->frames_) !=
-      launch->frames_)
-    launch->bytes_ = 0;
-  launch->bytes_ += gst_buffer_get_size (GST_PAD_PROBE_INFO_BUFFER (info));
-  if (launch->bytes_ <= kMostWithoutFrame)
-    return GST_PAD_PROBE_OK;
-  const ObjectPtr<GstElement> demuxer (launch->find ("file"));
-  GST_ELEMENT_ERROR (demuxer.get (), STREAM, DEMUX,
-      ("256 MB arrived without a frame: this is no stream of coded frames, or "
-       "it is damaged."),
-      (nullptr));
-  /* The source then ends the stream. */
-  gst_clear_buffer (reinterpret_cast<GstBuffer **> (&info->data));
-  GST_PAD_PROBE_INFO_FLOW_RETURN (info) = GST_FLOW_ERROR;
-  return GST_PAD_PROBE_HANDLED;
-}
-
-void
-Launch::watch_bytes ()
-{
-  if (const ObjectPtr<GstElement> demuxer (find ("file")); demuxer) {
-    const ObjectPtr<GstPad> sink (
-        gst_element_get_static_pad (demuxer.get (), "sink"));
-    gst_pad_add_probe (
-        sink.get (), GST_PAD_PROBE_TYPE_BUFFER, on_bytes, this, nullptr);
-  }
 }
 
 /* Ends the stream, so that the frames before the error are in finished files.

@@ -262,8 +262,7 @@ Pictures::add (GstPad *pad, GstBuffer *picture)
       known.slot >= 0 ? std::to_string (known.slot).c_str () : "",
       time_text (stream_time (pad, GST_BUFFER_PTS (picture))).c_str (),
       time_text (GST_BUFFER_DURATION (picture)).c_str (), known.synchronised,
-      corrupted_ ? "true" : "false",
-      known.lost_before);
+      corrupted_ ? "true" : "false", known.lost_before);
   frames_++;
 }
 

@@ -452,4 +452,18 @@ TEST (Dmdsync, QosStaysDownstream)
     EXPECT_TRUE (sync.pull ()) << k;
 }
 
+TEST (Dmdsync, AGapMovesAsFramesDo)
+{
+  SyncHarness sync ("timestamp-at=arrival exposure-offset=1000000");
+  sync.start ();
+  ASSERT_EQ (sync.send (80 * GST_MSECOND), GST_FLOW_OK);
+  sync.push_event (gst_event_new_gap (120 * GST_MSECOND, 40 * GST_MSECOND));
+  const EventPtr gap = sync.pull_event (GST_EVENT_GAP);
+  ASSERT_TRUE (gap);
+  GstClockTime pts = 0, duration = 0;
+  gst_event_parse_gap (gap.get (), &pts, &duration);
+  EXPECT_EQ (pts, 79 * GST_MSECOND);
+  EXPECT_EQ (duration, 40 * GST_MSECOND);
+}
+
 } // namespace

@@ -98,7 +98,7 @@ namespace
 {
 
 /* Receivers that join late, and recordings whose beginning is lost, need it
- * again. */
+ * again; the second line has it for those whose first line is damaged. */
 constexpr GstClockTime kRepeat = GST_SECOND;
 
 /** Whether the line of a frame at @p pts holds the setup. */
@@ -106,8 +106,8 @@ bool
 repeats_setup (const LogState &state, GstClockTime pts)
 {
   return state.setup &&
-         (!(state.tracked == state.setup) || pts < state.tracked_at ||
-             pts - state.tracked_at >= kRepeat);
+         (state.frames <= 2 || !(state.tracked == state.setup) ||
+             pts < state.tracked_at || pts - state.tracked_at >= kRepeat);
 }
 
 /** How long a frame lasts. */

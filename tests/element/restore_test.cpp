@@ -252,8 +252,19 @@ TEST_F (Restore, TheScheduleOfTheTrackWinsAndADifferenceIsSaid)
 TEST_F (Restore, WithoutALineTheContainersScheduleIsUsed)
 {
   file.push_event (setup_to_event (setup_of ("sequential:4x1")));
-  play (-1, 0);
+  for (int i = 0; i < 2; i++)
+    recording.lines[std::size_t (i)].reset (gst_buffer_new ());
+  push_frame (0);
+  push_line (0);
+  push_line (2);
+  push_frame (1);
   EXPECT_EQ (schedule (), "sequential:4x1");
+}
+
+TEST_F (Restore, TheSecondLineHasTheScheduleAgain)
+{
+  play (-1, 0);
+  EXPECT_EQ (schedule (), "staircase:2x2");
 }
 
 TEST_F (Restore, MarkupIsUnescaped)

@@ -123,12 +123,6 @@ work_folder ()
   return folder.string ();
 }
 
-std::string
-own_path ()
-{
-  return std::filesystem::read_symlink ("/proc/self/exe").string ();
-}
-
 bool
 is_isolated ()
 {

@@ -16,7 +16,7 @@ namespace codedexposure::campaign
 
 Child::Child (const std::string &part, const std::vector<std::string> &words)
 {
-  std::vector<std::string> all{own_path (), "--child", part};
+  std::vector<std::string> all{"/proc/self/exe", "--child", part};
   all.insert (all.end (), words.begin (), words.end ());
   std::vector<char *> arguments;
   for (std::string &word : all)

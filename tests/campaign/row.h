@@ -70,8 +70,6 @@ int run_child (const std::string &part, const std::vector<std::string> &words);
 
 /** A folder that is removed at the end; for all files of the campaign. */
 std::string work_folder ();
-/** This program. */
-std::string own_path ();
 /** Whether the process has a network and mounts of its own. */
 bool is_isolated ();
 

@@ -286,6 +286,7 @@ private:
   struct Stream {
     Stream () { gst_segment_init (&segment, GST_FORMAT_UNDEFINED); }
 
+    std::string id;
     CapsPtr caps;
     guint32 caps_seqnum = 0;
     GstSegment segment;

@@ -96,9 +96,15 @@ gboolean
 CodedFilter::on_stream_start (EventPtr event)
 {
   settle_events ();
-  stream_.tagged.reset ();
-  stream_.decoded.reset ();
-  stream_.stale = true;
+  /* A pad whose offset changes sends its events again, but not always the tags
+   * that came at the same moment. */
+  const gchar *id = nullptr;
+  gst_event_parse_stream_start (event.get (), &id);
+  if (std::exchange (stream_.id, id ? id : "") != (id ? id : "")) {
+    stream_.tagged.reset ();
+    stream_.decoded.reset ();
+    stream_.stale = true;
+  }
   return forward (std::move (event));
 }
 

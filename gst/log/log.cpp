@@ -69,6 +69,7 @@ struct LogState {
   GstClockTime end = 0; ///< of the last frame
   /** Of the stream. */
   std::optional<StreamSetup> setup;
+  bool setup_is_short = false; ///< each line can have it
   /** As last written to the file. */
   std::optional<Schedule> schedule;
   std::optional<Mapping> mapping;
@@ -97,8 +98,8 @@ GST_ELEMENT_REGISTER_DEFINE (codedexposure_log, "codedexposure-log",
 namespace
 {
 
-/* Receivers that join late, and recordings whose beginning is lost, need it
- * again; the second line has it for those whose first line is damaged. */
+/* Receivers that join late, segments, and recordings of which a part is damaged
+ * need it again. */
 constexpr GstClockTime kRepeat = GST_SECOND;
 
 /** Whether the line of a frame at @p pts holds the setup. */
@@ -106,8 +107,9 @@ bool
 repeats_setup (const LogState &state, GstClockTime pts)
 {
   return state.setup &&
-         (state.frames <= 2 || !(state.tracked == state.setup) ||
-             pts < state.tracked_at || pts - state.tracked_at >= kRepeat);
+         (state.setup_is_short || state.frames <= 2 ||
+             !(state.tracked == state.setup) || pts < state.tracked_at ||
+             pts - state.tracked_at >= kRepeat);
 }
 
 /** How long a frame lasts. */
@@ -180,7 +182,9 @@ note_setup (GstCodedExposureLog *self, GstEvent *event)
             setup->error ().message);
     return;
   }
+  constexpr std::size_t kShort = 512;
   state.setup = setup->value ();
+  state.setup_is_short = state.setup->to_json ().size () <= kShort;
   if (!state.file.is_open ())
     return;
   if (!(state.schedule == state.setup->schedule)) {

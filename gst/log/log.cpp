@@ -270,10 +270,10 @@ end_run (GstElement *element)
 }
 
 GstPad *
-request_new_pad (GstElement *element, GstPadTemplate *templ, const gchar *name,
+request_new_pad (GstElement *element, GstPadTemplate *templ, const gchar *,
     const GstCaps *) noexcept
 {
-  return state_in<GstCodedExposureLog> (element).track.request (templ, name);
+  return state_in<GstCodedExposureLog> (element).track.request (templ);
 }
 
 void

@@ -7,46 +7,11 @@ namespace codedexposure::gst
 {
 
 GstPad *
-TrackPad::request (GstPadTemplate *templ, const gchar *)
+TrackPad::request (GstPadTemplate *templ)
 {
-  ObjectPtr<GstPad> pad (GST_PAD (
-      gst_object_ref_sink (gst_pad_new_from_template (templ, "track"))));
-  {
-    const ObjectLock lock (element_);
-    if (pad_)
-      return nullptr;
-    pad_ = pad.get ();
-  }
-  gst_pad_use_fixed_caps (pad.get ());
-  gst_pad_set_active (pad.get (), TRUE);
-  gst_element_add_pad (element_, pad.get ());
-  return pad.get ();
-}
-
-void
-TrackPad::release (GstPad *pad)
-{
-  {
-    const ObjectLock lock (element_);
-    if (pad_ != pad)
-      return;
-    pad_ = nullptr;
-  }
-  gst_pad_set_active (pad, FALSE);
-  gst_element_remove_pad (element_, pad);
-}
-
-ObjectPtr<GstPad>
-TrackPad::pad () const
-{
-  const ObjectLock lock (element_);
-  return ObjectPtr<GstPad> (pad_ ? GST_PAD (gst_object_ref (pad_)) : nullptr);
-}
-
-bool
-TrackPad::exists () const
-{
-  return pad () != nullptr;
+  GstPad *pad = gst_pad_new_from_template (templ, "track");
+  gst_pad_use_fixed_caps (pad);
+  return pad_.add (pad);
 }
 
 void
@@ -76,7 +41,7 @@ GstFlowReturn
 TrackPad::push (const std::string &text, GstClockTime pts,
     GstClockTime duration, const GstSegment &segment)
 {
-  const auto to = pad ();
+  const auto to = pad_.get ();
   if (!to)
     return GST_FLOW_OK;
   start (to.get (), segment);
@@ -90,7 +55,7 @@ TrackPad::push (const std::string &text, GstClockTime pts,
 void
 TrackPad::forward (GstEvent *event)
 {
-  if (const auto to = pad ())
+  if (const auto to = pad_.get ())
     gst_pad_push_event (to.get (), gst_event_ref (event));
 }
 

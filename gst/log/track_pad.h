@@ -6,7 +6,7 @@
 
 #include <gst/gst.h>
 
-#include "common/raii.h"
+#include "common/request_pad.h"
 
 namespace codedexposure::gst
 {
@@ -16,12 +16,14 @@ namespace codedexposure::gst
 class TrackPad
 {
 public:
-  explicit TrackPad (GstElement *element) : element_ (element) {}
+  explicit TrackPad (GstElement *element) : element_ (element), pad_ (element)
+  {
+  }
 
   /** Any thread. Null if there is one already. */
-  GstPad *request (GstPadTemplate *templ, const gchar *name);
-  void release (GstPad *pad);
-  bool exists () const;
+  GstPad *request (GstPadTemplate *templ);
+  void release (GstPad *pad) { pad_.release (pad); }
+  bool exists () const { return pad_.get () != nullptr; }
 
   /* Streaming thread: */
 
@@ -34,11 +36,10 @@ public:
   void forward (GstEvent *event);
 
 private:
-  ObjectPtr<GstPad> pad () const;
   void start (GstPad *pad, const GstSegment &segment);
 
   GstElement *element_;
-  GstPad *pad_ = nullptr; ///< object lock; the element's
+  RequestPad pad_;
   /* Streaming thread. */
   bool stream_sent_ = false;
   bool segment_sent_ = false;

@@ -39,9 +39,7 @@
  * Since: 0.1
  */
 #include <deque>
-#include <mutex>
 #include <optional>
-#include <string>
 #include <utility>
 #include <variant>
 
@@ -49,50 +47,34 @@
 
 #include "common/element.h"
 #include "common/elements.h"
-#include "common/messages.h"
 #include "common/meta.h"
 #include "common/record.h"
 #include "common/tag.h"
-#include "record/track_reader.h"
-#include "schedule/timing.h"
+#include "damage.h"
+#include "track_sink.h"
 
 using namespace codedexposure;
 using namespace codedexposure::gst;
 
-GST_DEBUG_CATEGORY_STATIC (codedexposure_restore_debug);
+GST_DEBUG_CATEGORY (codedexposure_restore_debug);
 #define GST_CAT_DEFAULT codedexposure_restore_debug
 
 namespace
 {
 
-struct RestoreCounters {
-  guint64 frames = 0;
-  guint64 frames_damaged = 0; ///< their pixels are not those recorded
-  guint64 frames_unknown = 0; ///< without a line in the track
-  guint64 frames_missing = 0; ///< in the track only
-  guint64 lines_damaged = 0;
-};
-
-/** A sequence of frames that are not as recorded. */
-struct Damage {
-  guint64 frame = 0, count = 0;
-  GstClockTime from = 0;
-};
-
 /** A frame, or a serialised event that came after one that waits. */
 using Item = std::variant<BufferPtr, EventPtr>;
 
 struct RestoreState {
+  explicit RestoreState (GstElement *element = nullptr)
+      : track (element), damage (element)
+  {
+  }
+
   GstPad *sink = nullptr, *src = nullptr; ///< the element's
 
-  /* Object lock. */
-  GstPad *track = nullptr; ///< the element's
-  RestoreCounters counters;
-
-  /* Never held while pushing. */
-  std::mutex reader_lock;
-  TrackReader reader;
-  bool markup = false; ///< the text is escaped
+  TrackSink track;
+  DamageReport damage;
 
   /* Stream lock of the sink pad. */
   GstVideoInfo info = {};
@@ -101,7 +83,6 @@ struct RestoreState {
   std::optional<StreamSetup> container; ///< setup of the container's tags
   std::optional<StreamSetup> setup;     ///< in force
   std::optional<guint64> last_frame;
-  Damage damage;
   bool said_no_track = false;
   bool said_moved = false;
   bool said_setups_differ = false;
@@ -128,20 +109,6 @@ namespace
 {
 
 using Self = GstCodedExposureRestore;
-
-void
-count (Self *self, guint64 RestoreCounters::*counter, guint64 by = 1)
-{
-  const ObjectLock lock (self);
-  self->state->counters.*counter += by;
-}
-
-bool
-has_track (Self *self)
-{
-  const ObjectLock lock (self);
-  return self->state->track != nullptr;
-}
 
 /* ---------------------------------------------------------------- setups -- */
 
@@ -192,7 +159,7 @@ on_tag (Self *self, EventPtr event)
   GstTagList *tags = nullptr;
   gst_event_parse_tag (event.get (), &tags);
   const auto said = setup_from_tags (tags);
-  if (!said || !*said || !has_track (self))
+  if (!said || !*said || !state.track.exists ())
     return gst_pad_push_event (state.src, event.release ());
   state.container = said->value ();
   warn_if_different (self, *state.container);
@@ -204,55 +171,22 @@ on_tag (Self *self, EventPtr event)
 /* ---------------------------------------------------------------- frames -- */
 
 void
-end_damage (Self *self)
+report_missing (RestoreState &state, const TrackReader::Match &match)
 {
-  const Damage over = std::exchange (self->state->damage, {});
-  if (over.count > 0)
-    post_message (self, FramesDamaged{.active = false,
-                            .frame = over.frame,
-                            .count = over.count,
-                            .from = over.from,
-                            .reason = {}});
-}
-
-void
-note_damage (Self *self, guint64 frame, GstClockTime pts, const char *reason)
-{
-  Damage &damage = self->state->damage;
-  if (damage.count++ > 0)
-    return;
-  damage.frame = frame;
-  damage.from = pts;
-  post_message (self, FramesDamaged{.active = true,
-                          .frame = frame,
-                          .count = {},
-                          .from = pts,
-                          .reason = reason});
-}
-
-void
-report_missing (Self *self, const TrackReader::Match &match)
-{
-  if (match.skipped == 0)
-    return;
-  count (self, &RestoreCounters::frames_missing, match.skipped);
-  post_message (
-      self, FramesMissing{match.skipped, GstClockTime (match.skipped_from)});
+  state.damage.frames_missing (
+      match.skipped, GstClockTime (match.skipped_from));
 }
 
 /* A frame without a line: nothing shows that it is as it was recorded. */
 void
-mark_unknown (Self *self, GstBuffer *frame)
+mark_unknown (RestoreState &state, GstBuffer *frame)
 {
-  RestoreState &state = *self->state;
   FrameMeta meta;
   meta.frame = state.last_frame ? *state.last_frame + 1 : 0;
   set_frame_meta (frame, meta);
   state.last_frame = meta.frame;
   GST_BUFFER_FLAG_SET (frame, GST_BUFFER_FLAG_CORRUPTED);
-  count (self, &RestoreCounters::frames_unknown);
-  note_damage (
-      self, meta.frame, GST_BUFFER_PTS (frame), "the track has no line for it");
+  state.damage.frame_unknown (meta.frame, GST_BUFFER_PTS (frame));
 }
 
 /* Remuxing moves all frames alike; so does damage to the first times. */
@@ -283,27 +217,13 @@ restore (Self *self, GstBuffer *frame, const TrackReader::Match &match)
   say_moved (self, match);
   const bool same = !record.hash || record.hash == hash_of (frame, state.info);
   if (same && !match.misplaced) {
-    end_damage (self);
+    state.damage.end_sequence ();
     return;
   }
   GST_BUFFER_FLAG_SET (frame, GST_BUFFER_FLAG_CORRUPTED);
-  count (self, &RestoreCounters::frames_damaged);
-  note_damage (self, record.frame, GST_BUFFER_PTS (frame),
+  state.damage.frame_damaged (record.frame, GST_BUFFER_PTS (frame),
       same ? "its time is not that at which it was recorded"
            : "its pixels are not those that were recorded");
-}
-
-/* The match of the oldest frame that is held; none if its line may still
- * come. */
-std::optional<TrackReader::Match>
-match_of (RestoreState &state, GstBuffer *frame, bool now)
-{
-  const auto pts = Nanoseconds (GST_BUFFER_PTS (frame));
-  const auto start = Nanoseconds (state.segment.start);
-  const std::lock_guard lock (state.reader_lock);
-  if (now)
-    return state.reader.take_now (pts, start);
-  return state.reader.take (pts, start);
 }
 
 /* ---------------------------------------------------------------- events -- */
@@ -320,28 +240,18 @@ ends_early (const RestoreState &state)
 }
 
 void
-check_end (Self *self)
+check_end (RestoreState &state)
 {
-  RestoreState &state = *self->state;
-  end_damage (self);
-  if (!has_track (self))
+  state.damage.end_sequence ();
+  if (!state.track.exists ())
     return;
-  TrackReader::Match rest;
-  bool complete;
-  {
-    const std::lock_guard lock (state.reader_lock);
-    rest = state.reader.take_rest (Nanoseconds (state.segment.start));
-    complete = state.reader.frames ().has_value ();
-  }
-  if (!ends_early (state) || complete)
-    report_missing (self, rest);
-  guint64 frames;
-  {
-    const ObjectLock lock (self);
-    frames = state.counters.frames;
-  }
-  if (!complete && !ends_early (state))
-    post_message (self, StreamCut{frames});
+  const auto [rest, complete] =
+      state.track.take_rest (Nanoseconds (state.segment.start));
+  if (!complete && ends_early (state))
+    return;
+  report_missing (state, rest);
+  if (!complete)
+    state.damage.stream_cut ();
 }
 
 void
@@ -349,7 +259,7 @@ forget_frames (RestoreState &state)
 {
   state.held.clear ();
   state.last_frame.reset ();
-  state.damage = {};
+  state.damage.forget ();
   gst_segment_init (&state.segment, GST_FORMAT_TIME);
 }
 
@@ -366,16 +276,14 @@ take_event (Self *self, EventPtr event)
       return FALSE;
     break;
   }
-  case GST_EVENT_SEGMENT: {
+  case GST_EVENT_SEGMENT:
     gst_event_copy_segment (event.get (), &state.segment);
-    const std::lock_guard lock (state.reader_lock);
-    state.reader.next_segment ();
+    state.track.next_segment ();
     break;
-  }
   case GST_EVENT_TAG:
     return on_tag (self, std::move (event));
   case GST_EVENT_EOS:
-    check_end (self);
+    check_end (state);
     break;
   default:
     break;
@@ -384,7 +292,7 @@ take_event (Self *self, EventPtr event)
       state.sink, GST_OBJECT (self), event.release ());
 }
 
-/* ---------------------------------------------------------------- frames -- */
+/* ----------------------------------------------------- frames and events -- */
 
 GstFlowReturn
 push_frame (Self *self, BufferPtr frame, const TrackReader::Match &match)
@@ -392,11 +300,11 @@ push_frame (Self *self, BufferPtr frame, const TrackReader::Match &match)
   RestoreState &state = *self->state;
   frame.reset (gst_buffer_make_writable (frame.release ()));
   settle_setup (self, match.line ? &*match.line : nullptr);
-  report_missing (self, match);
+  report_missing (state, match);
   if (match.line)
     restore (self, frame.get (), match);
   else
-    mark_unknown (self, frame.get ());
+    mark_unknown (state, frame.get ());
   state.segment.position = GST_BUFFER_PTS (frame.get ());
   if (GST_BUFFER_DURATION_IS_VALID (frame.get ()))
     state.segment.position += GST_BUFFER_DURATION (frame.get ());
@@ -415,8 +323,9 @@ release (Self *self, bool all)
   while (!state.held.empty () && flow == GST_FLOW_OK) {
     std::optional<TrackReader::Match> match;
     if (const auto *frame = std::get_if<BufferPtr> (&state.held.front ())) {
-      match =
-          match_of (state, frame->get (), all || state.held.size () > kMaxHeld);
+      match = state.track.take (Nanoseconds (GST_BUFFER_PTS (frame->get ())),
+          Nanoseconds (state.segment.start),
+          !all && state.held.size () <= kMaxHeld);
       if (!match)
         break;
     }
@@ -446,8 +355,8 @@ chain (GstPad *, GstObject *parent, GstBuffer *buffer) noexcept
   auto *self = GST_CODED_EXPOSURE_RESTORE (parent);
   RestoreState &state = *self->state;
   BufferPtr frame (buffer);
-  count (self, &RestoreCounters::frames);
-  if (!has_track (self) || !GST_BUFFER_PTS_IS_VALID (buffer)) {
+  state.damage.frame ();
+  if (!state.track.exists () || !GST_BUFFER_PTS_IS_VALID (buffer)) {
     say_no_track (self);
     return gst_pad_push (state.src, frame.release ());
   }
@@ -476,94 +385,6 @@ sink_event (GstPad *pad, GstObject *parent, GstEvent *owned) noexcept
   return TRUE;
 }
 
-/* ----------------------------------------------------------------- track -- */
-
-GstFlowReturn
-track_chain (GstPad *, GstObject *parent, GstBuffer *buffer) noexcept
-{
-  auto *self = GST_CODED_EXPOSURE_RESTORE (parent);
-  RestoreState &state = *self->state;
-  const BufferPtr owned (buffer);
-  GstMapInfo map;
-  if (!gst_buffer_map (buffer, &map, GST_MAP_READ))
-    return GST_FLOW_ERROR;
-  std::string text (reinterpret_cast<const char *> (map.data), map.size);
-  gst_buffer_unmap (buffer, &map);
-
-  const auto time_of = [] (GstClockTime time) {
-    return GST_CLOCK_TIME_IS_VALID (time) ? Nanoseconds (time) : 0;
-  };
-  const Result<void> added = [&] {
-    const std::lock_guard lock (state.reader_lock);
-    return state.reader.add (state.markup ? unescape_markup (text) : text,
-        time_of (GST_BUFFER_PTS (buffer)),
-        time_of (GST_BUFFER_DURATION (buffer)));
-  }();
-  if (added)
-    return GST_FLOW_OK;
-  GST_WARNING_OBJECT (self, "%s", added.error ().message.c_str ());
-  count (self, &RestoreCounters::lines_damaged);
-  return GST_FLOW_OK;
-}
-
-gboolean
-track_event (GstPad *, GstObject *parent, GstEvent *owned) noexcept
-{
-  RestoreState &state = state_in<Self> (parent);
-  const EventPtr event (owned);
-  const std::lock_guard lock (state.reader_lock);
-  switch (GST_EVENT_TYPE (event.get ())) {
-  case GST_EVENT_CAPS: {
-    GstCaps *caps = nullptr;
-    gst_event_parse_caps (event.get (), &caps);
-    const GstStructure *structure = gst_caps_get_structure (caps, 0);
-    state.markup = g_strcmp0 (gst_structure_get_string (structure, "format"),
-                       "pango-markup") == 0;
-    break;
-  }
-  case GST_EVENT_FLUSH_STOP:
-    state.reader.clear ();
-    break;
-  case GST_EVENT_EOS:
-    state.reader.end ();
-    break;
-  default:
-    break;
-  }
-  return TRUE;
-}
-
-GstPad *
-request_new_pad (GstElement *element, GstPadTemplate *templ, const gchar *,
-    const GstCaps *) noexcept
-{
-  RestoreState &state = state_in<Self> (element);
-  ObjectPtr<GstPad> pad (GST_PAD (
-      gst_object_ref_sink (gst_pad_new_from_template (templ, "track"))));
-  gst_pad_set_chain_function (pad.get (), track_chain);
-  gst_pad_set_event_function (pad.get (), track_event);
-  {
-    const ObjectLock lock (element);
-    if (state.track)
-      return nullptr;
-    state.track = pad.get ();
-  }
-  gst_pad_set_active (pad.get (), TRUE);
-  gst_element_add_pad (element, pad.get ());
-  return pad.get ();
-}
-
-void
-release_pad (GstElement *element, GstPad *pad) noexcept
-{
-  {
-    const ObjectLock lock (element);
-    state_in<Self> (element).track = nullptr;
-  }
-  gst_pad_set_active (pad, FALSE);
-  gst_element_remove_pad (element, pad);
-}
-
 /* --------------------------------------------------------------- element -- */
 
 bool
@@ -574,12 +395,8 @@ begin_run (GstElement *element)
   state.container.reset ();
   state.setup.reset ();
   state.said_no_track = state.said_setups_differ = state.said_moved = false;
-  {
-    const std::lock_guard lock (state.reader_lock);
-    state.reader.clear ();
-  }
-  const ObjectLock lock (element);
-  state.counters = {};
+  state.track.restart ();
+  state.damage.restart ();
   return true;
 }
 
@@ -589,16 +406,23 @@ end_run (GstElement *element)
   forget_frames (state_in<Self> (element));
 }
 
+GstPad *
+request_new_pad (GstElement *element, GstPadTemplate *templ, const gchar *,
+    const GstCaps *) noexcept
+{
+  return state_in<Self> (element).track.request (templ);
+}
+
+void
+release_pad (GstElement *element, GstPad *pad) noexcept
+{
+  state_in<Self> (element).track.release (pad);
+}
+
 StructurePtr
 stats_of (const RestoreState &state)
 {
-  const RestoreCounters &counters = state.counters;
-  return StructurePtr (gst_structure_new (
-      "application/x-codedexposure-restore-stats", "frames", G_TYPE_UINT64,
-      counters.frames, "frames-damaged", G_TYPE_UINT64, counters.frames_damaged,
-      "frames-unknown", G_TYPE_UINT64, counters.frames_unknown,
-      "frames-missing", G_TYPE_UINT64, counters.frames_missing, "lines-damaged",
-      G_TYPE_UINT64, counters.lines_damaged, nullptr));
+  return state.damage.stats (state.track.damaged ());
 }
 
 const PropertyTable<RestoreState> &
@@ -617,7 +441,7 @@ properties ()
 static void
 gst_coded_exposure_restore_init (GstCodedExposureRestore *self)
 {
-  self->state = new RestoreState;
+  self->state = new RestoreState (GST_ELEMENT (self));
   auto *element_class = GST_ELEMENT_GET_CLASS (self);
   const auto add = [&] (const char *name) {
     GstPad *pad = gst_pad_new_from_template (

@@ -57,8 +57,8 @@ setup_to_tags (const StreamSetup &setup)
   return comment_to_tags (kPrefix, setup.to_json ());
 }
 
-/** The TAG event @p event with @p ours in place of its setup. Transfer: full,
- * of all. */
+/** The TAG event @p event with @p ours in place of its setup and its
+ * provenance. Transfer: full, of all. */
 GstEvent *
 merge_others (GstTagList *ours, GstEvent *event)
 {
@@ -66,7 +66,7 @@ merge_others (GstTagList *ours, GstEvent *event)
   gst_event_parse_tag (event, &tags);
   gst_tag_list_set_scope (ours, gst_tag_list_get_scope (tags));
   for (const std::string &comment : comments_of (tags))
-    if (!comment.starts_with (kPrefix))
+    if (!comment.starts_with (kPrefix) && !comment.starts_with (kDecodedPrefix))
       gst_tag_list_add (ours, GST_TAG_MERGE_APPEND, GST_TAG_COMMENT,
           comment.c_str (), nullptr);
   const auto copy_other = [] (const GstTagList *from, const gchar *tag,
@@ -142,7 +142,7 @@ replace_setup (GstEvent *event, const StreamSetup &setup)
 }
 
 GstEvent *
-remove_setup (GstEvent *event)
+remove_setup_and_provenance (GstEvent *event)
 {
   GstEvent *rest = merge_others (gst_tag_list_new_empty (), event);
   GstTagList *tags = nullptr;
@@ -180,16 +180,25 @@ replace_by_provenance (GstEvent *event, const Provenance &provenance)
       comment_to_tags (kDecodedPrefix, provenance.to_json ()), event);
 }
 
-void
-refuse_decoded (gpointer element, GstEvent *event)
+std::optional<std::string>
+why_not_coded (GstEvent *event)
 {
   GstTagList *tags = nullptr;
   gst_event_parse_tag (event, &tags);
-  if (const auto made = provenance_from_tags (tags))
-    POST_ERROR (element, STREAM, WRONG_TYPE,
-        "These frames are no coded frames: they were decoded before (" +
-            (*made ? made->value ().text () : "in an unknown way") +
-            "). Use the recording of the coded frames.");
+  const auto made = provenance_from_tags (tags);
+  if (!made)
+    return std::nullopt;
+  return "The frames were decoded before (" +
+         (*made ? made->value ().text () : "in an unknown way") +
+         "). Only coded frames can be used here. Use the recording from which "
+         "they were decoded.";
+}
+
+void
+refuse_decoded (gpointer element, GstEvent *event)
+{
+  if (const auto why = why_not_coded (event))
+    POST_ERROR (element, STREAM, WRONG_TYPE, *why);
 }
 
 std::optional<Result<Provenance>>

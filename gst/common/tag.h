@@ -5,6 +5,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 
 #include <gst/gst.h>
 
@@ -34,27 +35,29 @@ std::optional<Result<StreamSetup>> setup_from_tags (const GstTagList *tags);
  * be read. */
 std::optional<Result<Schedule>> schedule_from_tags (const GstTagList *tags);
 
-/** The TAG event @p event with @p setup in place of the one in its tags;
- * Transfer: full, of both. */
+/** The TAG event @p event with @p setup in place of the setup and the
+ * provenance in its tags; Transfer: full, of both. */
 GstEvent *replace_setup (GstEvent *event, const StreamSetup &setup);
 
-/** The TAG event @p event without a setup; null if nothing is left of it.
- * Transfer: full, of both. */
-GstEvent *remove_setup (GstEvent *event);
+/** The TAG event @p event without setup and provenance; null if nothing is left
+ * of it. Transfer: full, of both. */
+GstEvent *remove_setup_and_provenance (GstEvent *event);
 
 /** A TAG event, "coded-exposure-decoded={...}"; Transfer: full. */
 GstEvent *provenance_to_event (const Provenance &provenance);
 /** Whether replace_by_provenance () changes the TAG event @p event: global tags
  * without a setup stay as they are. */
 bool takes_provenance (GstEvent *event);
-/** The TAG event @p event with @p provenance in place of a setup; Transfer:
- * full, of both. */
+/** The TAG event @p event with @p provenance in place of setup and provenance;
+ * Transfer: full, of both. */
 GstEvent *replace_by_provenance (GstEvent *event, const Provenance &provenance);
 /** The provenance in @p tags; as schedule_from_tags (). */
 std::optional<Result<Provenance>> provenance_from_tags (const GstTagList *tags);
 
-/** Posts an error of @p element, which takes coded frames, if the tags of
- * @p event say that its frames were decoded before. */
+/** If the tags of @p event say that its frames were decoded before: a message
+ * of an element that takes coded frames only. */
+std::optional<std::string> why_not_coded (GstEvent *event);
+/** Posts it as an error of @p element. */
 void refuse_decoded (gpointer element, GstEvent *event);
 
 } // namespace codedexposure::gst

@@ -164,7 +164,7 @@ on_tag (Self *self, EventPtr event)
   state.container = said->value ();
   warn_if_different (self, *state.container);
   GstEvent *rest = state.setup ? replace_setup (event.release (), *state.setup)
-                               : remove_setup (event.release ());
+                               : remove_setup_and_provenance (event.release ());
   return !rest || gst_pad_push_event (state.src, rest);
 }
 

@@ -65,7 +65,8 @@
  * "segment", "caps", "flush" or "eos"), `pts`, `inputs` (frames it had),
  * `needed` and `frames-dropped`. The next coded frame is DISCONT.
  *
- * The schedule goes downstream as the tag `comment=coded-exposure={...}`. A
+ * The schedule goes downstream as the tag `comment=coded-exposure={...}`; such
+ * a tag of the input, and one that says how it was decoded, are removed. A
  * coded frame is complete with its last input frame, and is stamped with the
  * first one: the difference is added to the latency.
  *
@@ -97,6 +98,7 @@
 
 #include "common/element.h"
 #include "common/elements.h"
+#include "common/tag.h"
 
 GST_DEBUG_CATEGORY (codedexposure_sim_debug);
 #define GST_CAT_DEFAULT codedexposure_sim_debug
@@ -151,6 +153,24 @@ take_caps (GstBaseTransform *trans, GstEvent *event)
   return FALSE;
 }
 
+/* The coded frames are new: what the tags of a scene say of coding ends here.
+ * The last tags of a scope are those that a late link gets, so those of the
+ * stream keep our schedule. */
+gboolean
+take_tags (GstBaseTransform *trans, GstEvent *event)
+{
+  const sim::Stream &stream = GST_CODED_EXPOSURE_SIM (trans)->state->stream;
+  GstTagList *tags = nullptr;
+  gst_event_parse_tag (event, &tags);
+  const bool global = gst_tag_list_get_scope (tags) == GST_TAG_SCOPE_GLOBAL;
+  if (global || stream.tag_due)
+    event = remove_setup_and_provenance (event);
+  else
+    event = replace_setup (
+        event, setup_at (GST_BASE_TRANSFORM_SRC_PAD (trans), *stream.schedule));
+  return !event || parent_class ()->sink_event (trans, event);
+}
+
 gboolean
 sink_event (GstBaseTransform *trans, GstEvent *event)
 {
@@ -158,6 +178,8 @@ sink_event (GstBaseTransform *trans, GstEvent *event)
   switch (GST_EVENT_TYPE (event)) {
   case GST_EVENT_CAPS:
     return take_caps (trans, event);
+  case GST_EVENT_TAG:
+    return take_tags (trans, event);
   case GST_EVENT_STREAM_START:
     sim::restart (self, sim::Drop::kSegment);
     self->state->stream.tag_due = true;

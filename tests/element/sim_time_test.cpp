@@ -391,6 +391,74 @@ TEST (SimTag, ANewScheduleIsSaidBeforeItsFirstFrame)
   EXPECT_EQ (schedule_in (event.get ()), "staircase:2x2");
 }
 
+/** The comments in the tags that come out, of all events. */
+std::vector<std::string>
+comments (SimHarness &sim)
+{
+  std::vector<std::string> found;
+  while (const EventPtr event = sim.pull_event (GST_EVENT_TAG)) {
+    GstTagList *tags = nullptr;
+    gst_event_parse_tag (event.get (), &tags);
+    for (guint i = 0; i < gst_tag_list_get_tag_size (tags, GST_TAG_COMMENT);
+         i++) {
+      gchar *text = nullptr;
+      gst_tag_list_get_string_index (tags, GST_TAG_COMMENT, i, &text);
+      found.emplace_back (CharPtr (text).get ());
+    }
+  }
+  return found;
+}
+
+/* Coded frames of a scene that was decoded, or is itself coded, are new. */
+TEST (SimTag, TheScheduleAndProvenanceOfTheSceneEndHere)
+{
+  const Schedule other = *Schedule::parse ("staircase:3x3");
+  for (const bool early : {true, false})
+    for (const GstTagScope scope :
+        {GST_TAG_SCOPE_STREAM, GST_TAG_SCOPE_GLOBAL}) {
+      SimHarness sim;
+      if (!early)
+        sim.start (2, 2);
+      for (GstEvent *event : {schedule_to_event (other),
+               provenance_to_event ({{other}, "select", 0, 0})}) {
+        GstTagList *tags = nullptr;
+        gst_event_parse_tag (event, &tags);
+        GstTagList *scene = gst_tag_list_copy (tags);
+        gst_event_unref (event);
+        gst_tag_list_set_scope (scene, scope);
+        gst_tag_list_add (scene, GST_TAG_MERGE_APPEND, GST_TAG_COMMENT,
+            "in the garden", nullptr);
+        sim.push_event (gst_event_new_tag (scene));
+      }
+      if (early)
+        sim.start (2, 2);
+      sim.send_range (0, 4);
+      int own = 0, passed = 0;
+      for (const std::string &comment : comments (sim)) {
+        const bool ours = comment.starts_with (
+            R"(coded-exposure={"format":"coded-exposure","version":1,)"
+            R"("tile":"2x2","code":"sequential","size":[2,2],)");
+        EXPECT_TRUE (ours || comment == "in the garden") << comment;
+        own += ours;
+        passed += comment == "in the garden";
+      }
+      EXPECT_GE (own, 1);
+      EXPECT_EQ (passed, 2);
+    }
+}
+
+TEST (SimTag, TheLastTagsOfTheStreamHaveTheSchedule)
+{
+  SimHarness sim;
+  sim.start (2, 2);
+  sim.push_event (
+      gst_event_new_tag (gst_tag_list_new (GST_TAG_TITLE, "a clip", nullptr)));
+  const EventPtr kept (
+      gst_pad_get_sticky_event (sim.get ()->sinkpad, GST_EVENT_TAG, 0));
+  ASSERT_TRUE (kept);
+  EXPECT_EQ (schedule_in (kept.get ()), "sequential:2x2");
+}
+
 TEST (SimTag, TagsOfUpstreamPass)
 {
   SimHarness sim;

@@ -292,8 +292,8 @@ private:
     GstSegment segment;
     /** From the tags; an error if they cannot be read. */
     std::optional<Result<StreamSetup>> tagged;
-    /** The frames are pictures that were decoded before: how. */
-    std::optional<std::string> decoded;
+    /** Why the frames are refused, if they were decoded before. */
+    std::optional<std::string> not_coded;
     int bits = 0;      ///< significant bits by the metas; 0: unknown
     bool stale = true; ///< the plan must be made again
     bool provenance_due = false;

@@ -102,7 +102,7 @@ CodedFilter::on_stream_start (EventPtr event)
   gst_event_parse_stream_start (event.get (), &id);
   if (std::exchange (stream_.id, id ? id : "") != (id ? id : "")) {
     stream_.tagged.reset ();
-    stream_.decoded.reset ();
+    stream_.not_coded.reset ();
     stream_.stale = true;
   }
   return forward (std::move (event));
@@ -139,8 +139,8 @@ CodedFilter::on_tag (EventPtr event)
 {
   GstTagList *tags = nullptr;
   gst_event_parse_tag (event.get (), &tags);
-  if (const auto decoded = provenance_from_tags (tags)) {
-    stream_.decoded = *decoded ? decoded->value ().text () : "unknown";
+  if (auto why = why_not_coded (event.get ())) {
+    stream_.not_coded = std::move (why);
     stream_.stale = true;
   }
   if (auto tagged = setup_from_tags (tags)) {

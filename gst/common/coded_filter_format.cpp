@@ -24,6 +24,13 @@ text_of (Extent size)
   return std::to_string (size.width) + "x" + std::to_string (size.height);
 }
 
+std::string
+text_of (GstClockTime time)
+{
+  return CharPtr (g_strdup_printf ("%" GST_TIME_FORMAT, GST_TIME_ARGS (time)))
+      .get ();
+}
+
 } // namespace
 
 CapsPtr
@@ -91,10 +98,8 @@ CodedFilter::find_format ()
   }
   format.rate = {info.fps_n, info.fps_d};
   format.size = {info.width, info.height};
-  if (stream_.decoded) {
-    post_error ("These frames are no coded frames: they were decoded before (" +
-                *stream_.decoded +
-                "). Decode the recording of the coded frames.");
+  if (stream_.not_coded) {
+    post_error (*stream_.not_coded);
     return std::nullopt;
   }
   if (!find_schedule (format) || !check_camera (format))
@@ -258,12 +263,12 @@ void
 CodedFilter::report_change (const Schedule &before, GstBuffer *next)
 {
   break_off ();
-  const std::string time =
-      next ? std::to_string (double (GST_BUFFER_PTS (next)) / GST_SECOND)
-           : "now";
   POST_INFO (element_, STREAM, FORMAT,
-      "From " + time + " s on, coded frames have the schedule " +
-          format ().schedule.text () + ", before " + before.text () + ".");
+      "The schedule changes from " + before.text () + " to " +
+          format ().schedule.text () +
+          (next ? " at " + text_of (GST_BUFFER_PTS (next))
+                : " with the next coded frame") +
+          ".");
 }
 
 void

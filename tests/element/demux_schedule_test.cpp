@@ -272,7 +272,21 @@ TEST_F (DemuxSchedule, ANewOneInMidStreamIsSaidAndDiscontinuous)
   ASSERT_EQ (push (1), GST_FLOW_OK);
   const BufferPtr first = demux->pull ();
   EXPECT_TRUE (GST_BUFFER_IS_DISCONT (first.get ()));
-  EXPECT_NE (demux->info ().find ("before sequential:2x2"), std::string::npos);
+  EXPECT_EQ (demux->info (),
+      "The schedule changes from sequential:2x2 to sequential:3x3 at "
+      "0:00:00.040000000.");
+}
+
+TEST_F (DemuxSchedule, ANewOneBeforeAGapIsSaidWithoutATime)
+{
+  start ("");
+  demux->push_event (schedule_to_event (schedule_of ("sequential:2x2")));
+  ASSERT_EQ (push (0), GST_FLOW_OK);
+  demux->push_event (schedule_to_event (schedule_of ("sequential:3x3")));
+  demux->push_event (gst_event_new_gap (40 * GST_MSECOND, 40 * GST_MSECOND));
+  EXPECT_EQ (demux->info (), "The schedule changes from sequential:2x2 to "
+                             "sequential:3x3 with the next "
+                             "coded frame.");
 }
 
 TEST_F (DemuxSchedule, MayBeAFile)

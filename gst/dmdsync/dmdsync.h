@@ -164,6 +164,8 @@ GstClockTimeDiff moved_back (const SyncState &st);
 /** The PTS that @p frame came with, by the pipeline's clock. Leaves what it was
  * told from on the frame, which is writable. */
 GstClockTime pipeline_time (GstDmdSync *self, GstBuffer *frame);
+/** The same for the @p time of a gap, at which no frame came. */
+GstClockTime pipeline_time_of_gap (GstDmdSync *self, GstClockTime time);
 
 /** Says it when the times of frames become known well enough, or no longer are.
  */

@@ -137,8 +137,8 @@ moved_gap (GstDmdSync *self, GstEvent *event)
     const ObjectLock lock (self);
     by = moved_back (state (self));
   }
-  const GstClockTimeDiff start =
-      std::max<GstClockTimeDiff> (0, GstClockTimeDiff (pts) - by);
+  const GstClockTimeDiff start = std::max<GstClockTimeDiff> (
+      0, GstClockTimeDiff (pipeline_time_of_gap (self, pts)) - by);
   GstEvent *moved = gst_event_new_gap (GstClockTime (start), duration);
   gst_event_set_seqnum (moved, gst_event_get_seqnum (event));
   gst_event_unref (event);

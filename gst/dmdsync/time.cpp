@@ -134,6 +134,21 @@ pipeline_time (GstDmdSync *self, GstBuffer *frame)
   return GstClockTime (std::max<Nanoseconds> (0, time));
 }
 
+GstClockTime
+pipeline_time_of_gap (GstDmdSync *self, GstClockTime time)
+{
+  const SyncState &st = state (self);
+  {
+    const ObjectLock lock (self);
+    if (st.settings.timestamp_at != TimestampAt::device_clock)
+      return time;
+  }
+  if (const auto known = st.stream.device_clock.time_of (Nanoseconds (time)))
+    return GstClockTime (std::max<Nanoseconds> (0, *known));
+  const GstClockTime now = arrival_time (self);
+  return GST_CLOCK_TIME_IS_VALID (now) ? now : time;
+}
+
 void
 say_uncertainty (GstDmdSync *self, guint64 number, GstClockTime pts)
 {

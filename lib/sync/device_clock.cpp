@@ -77,12 +77,17 @@ DeviceClock::pipeline_time (Nanoseconds device) const
 }
 
 bool
+DeviceClock::went_back (Nanoseconds device) const
+{
+  return device < last_->device - kClockWentBack;
+}
+
+bool
 DeviceClock::is_restart (Nanoseconds device, Nanoseconds arrival) const
 {
   const Nanoseconds early =
       edge_.points ().size () < kSettled ? kEarly : kEarlySettled;
-  return device < last_->device - kClockWentBack ||
-         arrival < pipeline_time (device) - early;
+  return went_back (device) || arrival < pipeline_time (device) - early;
 }
 
 void
@@ -130,6 +135,14 @@ DeviceClock::take (Nanoseconds device, Nanoseconds arrival)
   if (deviation_)
     uncertainty_ = time - estimate + std::llround (2 * *deviation_);
   return time;
+}
+
+std::optional<Nanoseconds>
+DeviceClock::time_of (Nanoseconds device) const
+{
+  if (!last_ || went_back (device))
+    return std::nullopt;
+  return pipeline_time (device);
 }
 
 } // namespace codedexposure

@@ -42,6 +42,9 @@ public:
    * @p arrival  by the pipeline's clock.
    */
   Nanoseconds take (Nanoseconds device, Nanoseconds arrival);
+  /** The same for a time at which no frame came: changes nothing. None before
+   * the first frame, and if @p device steps back by a second. */
+  std::optional<Nanoseconds> time_of (Nanoseconds device) const;
   /** Forgets everything: the next frame is the first. */
   void reset ();
   /** The camera restarts: the next frame is the first, of a clock with about
@@ -61,6 +64,7 @@ public:
 private:
   void begin (Nanoseconds device, Nanoseconds arrival);
   void remember_drift ();
+  bool went_back (Nanoseconds device) const;
   bool is_restart (Nanoseconds device, Nanoseconds arrival) const;
   void learn (LowerEdge::Point point);
   Nanoseconds pipeline_time (Nanoseconds device) const;

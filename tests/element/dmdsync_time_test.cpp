@@ -186,6 +186,34 @@ TEST_P (DmdsyncDeviceClock, AfterARestartFramesAreNumberedByWhenTheyArrive)
   EXPECT_EQ (sync_.counter ("frames-late"), 0u);
 }
 
+TEST_P (DmdsyncDeviceClock, AGapMovesAsFramesDo)
+{
+  /* A device that counts from another moment than the pipeline. */
+  constexpr GstClockTime kAhead = 1000 * GST_SECOND;
+  const auto period = GstClockTime (rate_.period ());
+  const auto gap_at = [&] (int k) {
+    sync_.push_event (gst_event_new_gap (kAhead + stamp (k), period));
+    GstClockTime pts = GST_CLOCK_TIME_NONE, duration = 0;
+    if (const EventPtr gap = sync_.pull_event (GST_EVENT_GAP))
+      gst_event_parse_gap (gap.get (), &pts, &duration);
+    EXPECT_EQ (duration, period);
+    return pts;
+  };
+  /* Before the first frame there is only the time at which it comes. */
+  gst_harness_set_time (sync_.get (), exposure (0) + period);
+  EXPECT_EQ (gap_at (0), exposure (0));
+  for (int k = 1; k < 300; k++) {
+    gst_harness_set_time (sync_.get (), exposure (k) + period);
+    ASSERT_EQ (sync_.send (kAhead + stamp (k)), GST_FLOW_OK);
+    ASSERT_TRUE (sync_.pull ());
+  }
+  for (const int k : {300, 290})
+    EXPECT_LE (std::abs (GST_CLOCK_DIFF (exposure (k), gap_at (k))),
+        gint64 (50 * GST_USECOND))
+        << k;
+  EXPECT_EQ (sync_.counter ("clock-restarts"), 0u);
+}
+
 INSTANTIATE_TEST_SUITE_P (Rates, DmdsyncDeviceClock,
     ::testing::Values (FrameRate{25, 1}, FrameRate{30000, 1001}),
     [] (const auto &info) { return "num" + std::to_string (info.param.num); });

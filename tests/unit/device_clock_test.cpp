@@ -241,6 +241,22 @@ TEST (DeviceClock, ALateFrameTeachesNothing)
   EXPECT_EQ (clock.restarts (), 0u);
 }
 
+TEST (DeviceClock, ATimeWithoutAFrameTeachesNothing)
+{
+  Path path ({25, 1}, 200e-6, [] (auto &) { return 0.0; });
+  DeviceClock clock;
+  EXPECT_FALSE (clock.time_of (path.stamp (0)));
+  for (int k = 0; k < 300; k++)
+    clock.take (path.stamp (k), path.truth (k));
+  for (const int k : {290, 320}) {
+    const auto time = clock.time_of (path.stamp (k));
+    ASSERT_TRUE (time);
+    EXPECT_NEAR (double (*time), double (path.truth (k)), 2);
+  }
+  EXPECT_FALSE (clock.time_of (0)) << "the camera's clock was set back";
+  EXPECT_EQ (clock.restarts (), 0u);
+}
+
 TEST (DeviceClock, AfterAResetTheNextFrameIsTheFirst)
 {
   Path path ({25, 1}, 200e-6, even);

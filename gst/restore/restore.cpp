@@ -125,7 +125,7 @@ warn_if_different (Self *self, const StreamSetup &said)
           ", but its frames were recorded with " +
           state.setup->schedule.text () +
           ", as their track says, which is used. To use another, set the "
-          "schedule property of the element that decodes.");
+          "schedule property where they are decoded.");
 }
 
 void

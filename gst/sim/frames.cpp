@@ -136,6 +136,28 @@ find_masks (GstCodedExposureSim *self, std::int64_t frame)
   return masks;
 }
 
+/* The scene lies on the mirrors, one pixel on each. The mirrors of a diamond
+ * array are addressed otherwise. */
+bool
+check_mirrors (GstCodedExposureSim *self, const SimulatedMirrors &mirrors)
+{
+  const GstVideoInfo &info = state (self).stream.plan->in;
+  const std::optional<Extent> size = mirrors.size ();
+  const auto text = [] (int width, int height) {
+    return std::to_string (width) + "x" + std::to_string (height);
+  };
+  if (!size || mirrors.diamond () ||
+      (size->width >= info.width && size->height >= info.height))
+    return true;
+  POST_ERROR (self, RESOURCE, SETTINGS,
+      "The simulated DMD has " + text (size->width, size->height) +
+          " mirrors, but the scene has " + text (info.width, info.height) +
+          " pixels, and each needs a mirror; set size=" +
+          text (info.width, info.height) +
+          " of its device, or leave the size out.");
+  return false;
+}
+
 /* Sets up the bench where it is missing or its settings changed. */
 bool
 prepare_bench (GstCodedExposureSim *self)
@@ -177,7 +199,8 @@ GstFlowReturn
 begin_exposure (GstCodedExposureSim *self, GstBuffer *inbuf)
 {
   Stream &stream = state (self).stream;
-  if (!prepare_bench (self))
+  if (!prepare_bench (self) ||
+      (stream.mirrors && !check_mirrors (self, *stream.mirrors)))
     return GST_FLOW_ERROR;
 
   Exposure exposure;

@@ -117,10 +117,10 @@ line_choice (const std::string &name, const std::vector<std::string> &values,
           "<Endianess>BigEndian</Endianess></IntReg>\n");
 }
 
-/* The GenICam description: that of Aravis, with the formats and lines of this
- * camera. */
+/* The GenICam description: that of Aravis, with the formats and, if it has
+ * @outputs, the lines of this camera. */
 Result<std::string>
-describe ()
+describe (bool outputs)
 {
   const std::unique_ptr<ArvFakeCamera, Unref> model (
       arv_fake_camera_new ("model"));
@@ -145,11 +145,12 @@ describe ()
   const auto end = xml.rfind ("<Port Name");
   if (mode == xml.npos || end == xml.npos || mode > end)
     return Error{"the description of Aravis' fake camera lacks its trigger"};
-  xml.insert (end,
-      line_selector () +
-          line_choice ("LineMode", {"Input", "Output"}, kLineMode) +
-          line_choice ("LineSource", {"Off", "ExposureActive"}, kLineSource) +
-          line_choice ("LineInverter", {"false", "true"}, kLineInverter));
+  if (outputs)
+    xml.insert (end,
+        line_selector () +
+            line_choice ("LineMode", {"Input", "Output"}, kLineMode) +
+            line_choice ("LineSource", {"Off", "ExposureActive"}, kLineSource) +
+            line_choice ("LineInverter", {"false", "true"}, kLineInverter));
   xml.replace (mode, theirs.size (), "<Address>0x400</Address>");
   return xml;
 }
@@ -417,9 +418,9 @@ struct TemporaryFile {
 };
 
 Result<void>
-write_description (TemporaryFile &file)
+write_description (TemporaryFile &file, bool outputs)
 {
-  ASSIGN_OR_RETURN (const std::string xml, describe ());
+  ASSIGN_OR_RETURN (const std::string xml, describe (outputs));
   gchar *path = nullptr;
   const int descriptor =
       g_file_open_tmp ("codedexposure-XXXXXX.xml", &path, nullptr);
@@ -439,7 +440,7 @@ Result<void>
 SimulatedCamera::start (GigeCameraOptions with, Expose light)
 {
   TemporaryFile description;
-  RETURN_IF_ERROR (write_description (description));
+  RETURN_IF_ERROR (write_description (description, with.outputs));
   options = std::move (with);
   expose = std::move (light);
   faults = options.faults;

@@ -69,6 +69,8 @@ struct GigeCameraOptions {
   /** Part of the packets that is lost at random. */
   double packet_loss = 0;
   std::uint64_t seed = 0; ///< of the jitter
+  /** Whether it has the feature LineSelector, for lines that are outputs. */
+  bool outputs = true;
   FaultPlan faults = {};
   /** Called on the camera's thread. */
   std::function<void (const SentFrame &)> sent = {};

@@ -107,6 +107,7 @@ struct Slip {
 struct Options {
   std::string mirrors;
   DmdInfo info;
+  std::optional<Extent> size;
   std::optional<MirrorLayout> diamond;
   Nanoseconds mask_time = 0;
   std::vector<Slip> slips;
@@ -121,6 +122,7 @@ public:
         mirrors_ (SimulatedMirrors::find (options_.mirrors))
   {
     mirrors_->lay (options_.diamond);
+    mirrors_->limit (options_.size);
     for (const Slip &slip : options_.slips)
       mirrors_->slip_at (slip.slot, slip.by);
   }
@@ -219,10 +221,9 @@ parse_options (std::string_view device)
 {
   Options o;
   DmdInfo &info = o.info;
-  info.size = {1024, 768};
   info.resident_masks = 512;
   info.still_masks = true;
-  const DeviceKey keys[] = {value_key ("size", "WxH", info.size, parse_size),
+  const DeviceKey keys[] = {value_key ("size", "WxH", o.size, parse_size),
       value_key ("layout", "address|lattice|cell", o.diamond, parse_layout),
       value_key ("masks", "N", info.resident_masks, parse_masks),
       value_key ("min-active", "TIME", info.minimum_active, parse_time),
@@ -239,6 +240,7 @@ parse_options (std::string_view device)
     return Error{"DMD " + in_quotes (device) +
                  " has no name; write sim:NAME, such as sim:bench"};
   info.name = "sim:" + o.mirrors;
+  info.size = o.size.value_or (Extent{1024, 768});
   if (o.diamond)
     info.array = Array::diamond;
   return o;

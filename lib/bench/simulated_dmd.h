@@ -53,6 +53,18 @@ public:
     return diamond_;
   }
 
+  /** Mirrors that the bench must not go beyond; none: as many as it needs. */
+  void limit (std::optional<Extent> size)
+  {
+    const std::lock_guard guard (lock_);
+    size_ = size;
+  }
+  std::optional<Extent> size () const
+  {
+    const std::lock_guard guard (lock_);
+    return size_;
+  }
+
   /** The last programmed one; none before the first upload. */
   std::optional<Schedule> schedule () const
   {
@@ -99,6 +111,7 @@ private:
   mutable std::mutex lock_; // covers everything below; a leaf lock
   std::optional<Schedule> schedule_;
   std::optional<MirrorLayout> diamond_;
+  std::optional<Extent> size_;
   std::shared_ptr<const StillMask> hold_, held_; // from now on; since it began
   Motion motion_ = Motion::parked;
   bool owes_dark_exposure_ = false;
@@ -109,7 +122,8 @@ private:
 /**
  * Opens "sim:NAME[,key=value...]", whose mirrors are SimulatedMirrors::find
  * (NAME). The keys say what the device can do and how it fails:
- *   size=WxH            mirrors, default 1024x768
+ *   size=WxH            mirrors, default 1024x768; a bench with more pixels
+ *                       refuses a size that is given
  *   layout=address|lattice|cell  of the tile on a diamond array; default: an
  *                       orthogonal array
  *   masks=N             masks it holds, default 512

@@ -261,6 +261,8 @@ main (int argc, char **argv)
   app.add_option ("--faults", arguments.faults,
       "faults of frames: lose@10:3 incomplete@20 delay@30:5ms duplicate@40 "
       "late@50 stop@60");
+  app.add_flag ("!--no-outputs", camera.outputs,
+      "no line is an output, and it has no feature LineSelector");
   app.add_flag ("--loop", arguments.loop, "restart the pipeline at its end");
   app.add_flag ("--log", arguments.log, "print a line of JSON for every frame");
   CLI11_PARSE (app, argc, argv);

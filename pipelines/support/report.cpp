@@ -8,6 +8,7 @@
 #include <cstdarg>
 #include <cstdio>
 #include <cstring>
+#include <regex>
 #include <utility>
 
 #include "common/raii.h"
@@ -132,6 +133,14 @@ added (const gchar *debug)
   return end_of_place ? end_of_place + 1 : nullptr;
 }
 
+/* An element names its property, but a script has an option for it. */
+std::string
+with_options (const char *text)
+{
+  static const std::regex property ("[Tt]he (schedule|mapping) property");
+  return std::regex_replace (text, property, "--$1");
+}
+
 bool
 is_video_sink (GstElement *element, GstElementFactory *factory)
 {
@@ -191,7 +200,8 @@ told (GstMessage *message, const GError *error, const gchar *debug)
     g_object_get (source, "location", &file, nullptr);
   const CharPtr owned (file);
   return format ("%s: %s%s%s", file ? file : GST_OBJECT_NAME (source),
-      error->message, detail ? "\n    " : "", detail ? detail : "");
+      with_options (error->message).c_str (), detail ? "\n    " : "",
+      detail ? detail : "");
 }
 
 std::string
@@ -209,8 +219,13 @@ remedy_for (std::string_view kind, const GError *error, const gchar *debug)
            "--bits and --pixel-format";
   if (unfit)
     return "two elements do not agree on a format; check --size and --bits";
-  if (of_camera && std::string_view (error->message).find ("LineSelector") !=
-                       std::string_view::npos)
+  const std::string_view text = error->message;
+  const bool of_lines = of_camera && text.find ("LineSelector") != text.npos;
+  const bool of_source = of_camera && text.find ("TriggerSource") != text.npos;
+  if ((of_lines || of_source) && text.find ("not an entry") != text.npos)
+    return "the camera has no such line; set --trigger-line to one that "
+           "\"arv-tool-0.8 features\" lists";
+  if (of_lines)
     return "--trigger camera needs a camera with the feature LineSelector; for "
            "others, use --trigger none and set their output with --features";
   if (kind == "aravissrc" && error->domain == GST_STREAM_ERROR)
@@ -320,8 +335,8 @@ notice (const GstStructure *message)
   gst_structure_get_boolean (message, "active", &active);
   if (name == "codedexposure/frames-damaged" && active)
     return "warning: from frame " + number ("frame") + " (" +
-           seconds_in (message, "from") + ") on, frames are flagged: " +
-           number ("reason");
+           seconds_in (message, "from") +
+           ") on, frames are flagged: " + number ("reason");
   if (name == "codedexposure/frames-damaged")
     return "warning: frames that are flagged from frame " + number ("frame") +
            " on: " + number ("count");

@@ -25,7 +25,7 @@ double cpu_seconds ();
 std::string package_of (std::string_view element);
 
 /** Source and text of an ERROR or WARNING message with its details, without the
- * position in the code. */
+ * position in the code; properties are named as the options of the scripts. */
 std::string told (GstMessage *message, const GError *error, const gchar *debug);
 /** What the user can do about an error of an element of @p kind; empty: its
  * text says it. */

@@ -27,6 +27,25 @@ TEST (SimDmd, ParkedMirrorsAreDarkAndSaidOnce)
   EXPECT_EQ (sim.warning (), "");
 }
 
+TEST (SimDmd, FewerMirrorsThanPixelsAreRefused)
+{
+  const auto small = *open_simulated_dmd ("sim:small,size=4x2");
+  SimHarness sim ("dmd=sim:small");
+  sim.start (4, 4);
+  EXPECT_EQ (sim.send (0, 200), GST_FLOW_ERROR);
+  const std::string error = sim.error ();
+  EXPECT_NE (error.find ("4x2 mirrors"), std::string::npos) << error;
+  EXPECT_NE (error.find ("set size=4x4"), std::string::npos) << error;
+}
+
+TEST (SimDmd, MoreMirrorsThanPixelsAreUsed)
+{
+  const auto large = *open_simulated_dmd ("sim:large,size=8x4");
+  SimHarness sim ("dmd=sim:large");
+  sim.start (4, 4);
+  EXPECT_EQ (sim.send (0, 200), GST_FLOW_OK);
+}
+
 TEST (SimDmd, ParkedMirrorsLeak)
 {
   const auto mirrors = SimulatedMirrors::find ("leaking");

@@ -46,16 +46,6 @@ request (ElementHarness &demux, const char *name)
       gst_element_request_pad_simple (demux.element (), name));
 }
 
-std::vector<Image<std::uint8_t>>
-pull_images (ElementHarness &demux, const std::string &pad = "")
-{
-  std::vector<Image<std::uint8_t>> images;
-  const CapsPtr caps = demux.pad_caps (pad);
-  while (const BufferPtr buffer = demux.pull (pad))
-    images.push_back (image_of<std::uint8_t> (buffer.get (), caps.get ()));
-  return images;
-}
-
 TEST (DemuxRegions, HaveASizeARateAndTimesOfTheirOwn)
 {
   for (const FrameRate rate : {FrameRate{25, 1}, FrameRate{30000, 1001}}) {

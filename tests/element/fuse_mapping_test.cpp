@@ -72,15 +72,6 @@ protected:
                                      [] (int, int) { return 99; }),
         pts));
   }
-  template <typename Pixel = std::uint8_t>
-  std::vector<Image<Pixel>> pull_images ()
-  {
-    std::vector<Image<Pixel>> images;
-    const CapsPtr caps = fuse->pad_caps ();
-    while (const BufferPtr buffer = fuse->pull ())
-      images.push_back (image_of<Pixel> (buffer.get (), caps.get ()));
-    return images;
-  }
   template <typename Pixel>
   void expose (const Alignment &alignment)
   {
@@ -112,7 +103,7 @@ protected:
     start ("full-well=10000 read-noise=5 " + settings, {kWidth, kHeight},
         sizeof (Pixel) == 1 ? "GRAY8" : "GRAY16_LE");
     expose<Pixel> (alignment);
-    const auto images = pull_images<Pixel> ();
+    const auto images = pull_images<Pixel> (*fuse);
     EXPECT_EQ (images.size (), std::size_t (schedule.slots () * kFrames));
     double squares = 0.0, count = 0.0;
     for (std::size_t k = 0; k < images.size (); k++) {
@@ -163,7 +154,7 @@ TEST_F (FuseMapping, ComesWithTheTag)
   start ("");
   fuse->push_event (setup_to_event ({kSchedule, mapping ()}));
   expose<std::uint8_t> (kAskew);
-  const auto by_tag = pull_images ();
+  const auto by_tag = pull_images (*fuse);
   const auto said = fuse->posted<MirrorsSeen> ();
   ASSERT_TRUE (said);
   EXPECT_GT (said->unseen, 0u);
@@ -172,14 +163,14 @@ TEST_F (FuseMapping, ComesWithTheTag)
 
   start (mapped ());
   expose<std::uint8_t> (kAskew);
-  EXPECT_EQ (pull_images (), by_tag);
+  EXPECT_EQ (pull_images (*fuse), by_tag);
 }
 
 TEST_F (FuseMapping, FusedFramesHaveTheSizeOfTheMirrors)
 {
   start (mapped ({80, 64}));
   expose<std::uint8_t> (kAskew);
-  for (const auto &image : pull_images ()) {
+  for (const auto &image : pull_images (*fuse)) {
     EXPECT_EQ (image.width (), 80);
     EXPECT_EQ (image.height (), 64);
   }

@@ -1,12 +1,11 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* codedexposure-fuse: pixels, times, schedules, losses, flushes. */
-#include "downstream.h"
-#include "harness.h"
+/* codedexposure-fuse: pixels, times, schedules and buffers. */
+#include "fuse_harness.h"
 
 #include "common/messages.h"
 #include "common/meta.h"
 #include "common/tag.h"
-#include "fuse/fuser.h"
+#include "downstream.h"
 
 namespace
 {
@@ -14,107 +13,6 @@ namespace
 using namespace codedexposure;
 using namespace codedexposure::gst;
 using namespace codedexposure::test;
-
-constexpr GstClockTime kPeriod = 40 * GST_MSECOND;
-constexpr int kWidth = 24, kHeight = 20;
-
-/* Frame @number of a moving texture. */
-template <typename Pixel = std::uint8_t>
-Image<Pixel>
-picture (int number)
-{
-  return draw<Pixel> (kWidth, kHeight, [number] (int x, int y) {
-    const int value = (7 * (x + 3 * number) + 31 * y) % 251;
-    return sizeof (Pixel) == 1 ? value : 257 * value;
-  });
-}
-
-Schedule
-schedule_of (const std::string &preset)
-{
-  auto schedule = Schedule::from_preset (preset);
-  EXPECT_TRUE (schedule) << preset;
-  return *schedule;
-}
-
-/* The frames that the library fuses from the pictures @numbers. */
-template <typename Pixel = std::uint8_t>
-std::vector<Image<Pixel>>
-expected (const std::string &preset, std::initializer_list<int> numbers,
-    const FuseOptions &options = {})
-{
-  auto fuser =
-      Fuser<Pixel>::make (schedule_of (preset), kWidth, kHeight, options);
-  EXPECT_TRUE (fuser) << fuser.error ().message;
-  std::vector<Image<Pixel>> frames;
-  const auto fuse_one = [&] {
-    std::vector<Image<Pixel>> slots (std::size_t (fuser->slots ()),
-        Image<Pixel> (fuser->size ().width, fuser->size ().height));
-    std::vector<ImageView<Pixel>> views;
-    for (auto &slot : slots)
-      views.push_back (slot.view ());
-    EXPECT_TRUE (fuser->fuse (views));
-    frames.insert (frames.end (), slots.begin (), slots.end ());
-  };
-  for (const int number : numbers) {
-    EXPECT_TRUE (fuser->take (picture<Pixel> (number).view ()));
-    if (fuser->pending () > options.lookahead)
-      fuse_one ();
-  }
-  while (fuser->pending () > 0)
-    fuse_one ();
-  return frames;
-}
-
-class Fuse : public ::testing::Test
-{
-protected:
-  void start (const std::string &settings = "schedule=sequential:lattice:4/2",
-      const std::string &rate = "25/1", const std::string &format = "GRAY8")
-  {
-    fuse = std::make_unique<ElementHarness> ("codedexposure-fuse " + settings);
-    fuse->set_caps (gray_caps (kWidth, kHeight, rate, format));
-  }
-  void push (int number, GstClockTime pts, int flags = 0)
-  {
-    BufferPtr frame = frame_of (picture (number), pts);
-    GST_BUFFER_FLAG_SET (frame.get (), flags);
-    ASSERT_EQ (fuse->push (std::move (frame)), GST_FLOW_OK);
-  }
-  void push (int number) { push (number, GstClockTime (number) * kPeriod); }
-  std::vector<BufferPtr> pull_all ()
-  {
-    std::vector<BufferPtr> all;
-    while (BufferPtr buffer = fuse->pull ())
-      all.push_back (std::move (buffer));
-    return all;
-  }
-  template <typename Pixel = std::uint8_t>
-  std::vector<Image<Pixel>> pull_images ()
-  {
-    std::vector<Image<Pixel>> images;
-    const CapsPtr caps = fuse->pad_caps ();
-    for (const BufferPtr &buffer : pull_all ())
-      images.push_back (image_of<Pixel> (buffer.get (), caps.get ()));
-    return images;
-  }
-  /* Indices of the frames with DISCONT. */
-  std::vector<std::size_t> disconts ()
-  {
-    std::vector<std::size_t> places;
-    const auto all = pull_all ();
-    for (std::size_t i = 0; i < all.size (); i++)
-      if (GST_BUFFER_IS_DISCONT (all[i].get ()))
-        places.push_back (i);
-    return places;
-  }
-  GstClockTime min_latency ()
-  {
-    gst_harness_set_upstream_latency (fuse->get (), 5 * GST_MSECOND);
-    return gst_harness_query_latency (fuse->get ());
-  }
-  std::unique_ptr<ElementHarness> fuse;
-};
 
 /* --------------------------------------------------------------- pixels -- */
 
@@ -225,6 +123,14 @@ TEST_F (Fuse, MetaSaysWhenTheLightOfAFrameFell)
   EXPECT_EQ (meta->exposure_duration, 9 * GST_MSECOND);
 }
 
+TEST_F (Fuse, NeedsTimeStamps)
+{
+  start ();
+  EXPECT_EQ (
+      fuse->push (frame_of (picture (0), GST_CLOCK_TIME_NONE)), GST_FLOW_ERROR);
+  EXPECT_NE (fuse->error ().find ("do-timestamp"), std::string::npos);
+}
+
 /* ------------------------------------------------- schedules and caps -- */
 
 TEST_F (Fuse, RegionsBecomeOnePictureAtTheHighestRate)
@@ -309,193 +215,7 @@ TEST_F (Fuse, ANewQualityHoldsFromTheNextFrameOn)
   EXPECT_FALSE (fuse->pull_event (GST_EVENT_CAPS));
 }
 
-/* ------------------------------------------------------------ lookahead -- */
-
-TEST_F (Fuse, AddsNoLatencyByDefault)
-{
-  start ();
-  push (0);
-  EXPECT_EQ (pull_all ().size (), 4u);
-  EXPECT_EQ (min_latency (), 5 * GST_MSECOND);
-}
-
-TEST_F (Fuse, LookaheadWaitsForAFrameAndSaysSo)
-{
-  start ("schedule=sequential:lattice:4/2 lookahead=1");
-  push (0);
-  EXPECT_TRUE (pull_all ().empty ());
-  EXPECT_TRUE (fuse->message (GST_MESSAGE_LATENCY));
-  EXPECT_EQ (min_latency (), 45 * GST_MSECOND);
-  push (1);
-  push (2);
-  ASSERT_TRUE (fuse->push_event (gst_event_new_eos ()));
-  FuseOptions options;
-  options.lookahead = 1;
-  EXPECT_EQ (
-      pull_images (), expected ("sequential:lattice:4/2", {0, 1, 2}, options));
-}
-
-TEST_F (Fuse, ALossIsDiscontAlsoBehindWhatWaits)
-{
-  start ("schedule=sequential:lattice:4/2 lookahead=1");
-  push (0);
-  push (2, 2 * kPeriod);
-  ASSERT_TRUE (fuse->push_event (gst_event_new_eos ()));
-  EXPECT_EQ (disconts (), (std::vector<std::size_t>{0, 4}));
-}
-
-TEST_F (Fuse, WhatWaitsGoesBeforeTheEnd)
-{
-  start ("schedule=sequential:lattice:4/2 lookahead=1");
-  push (0);
-  ASSERT_TRUE (fuse->push_event (gst_event_new_eos ()));
-  EXPECT_EQ (pull_all ().size (), 4u);
-  EXPECT_TRUE (fuse->pull_event (GST_EVENT_EOS));
-}
-
-TEST_F (Fuse, AFlushDropsWhatWaits)
-{
-  start ("schedule=sequential:lattice:4/2 lookahead=1");
-  push (0);
-  ASSERT_TRUE (fuse->push_event (gst_event_new_flush_start ()));
-  ASSERT_TRUE (fuse->push_event (gst_event_new_flush_stop (TRUE)));
-  GstSegment segment;
-  gst_segment_init (&segment, GST_FORMAT_TIME);
-  ASSERT_TRUE (fuse->push_event (gst_event_new_segment (&segment)));
-  push (7, 0);
-  ASSERT_TRUE (fuse->push_event (gst_event_new_eos ()));
-  EXPECT_EQ (pull_images (), expected ("sequential:lattice:4/2", {7}));
-}
-
-/* A flush cancels the current frame, but not later ones. */
-TEST_F (Fuse, FusesAgainAfterAFlush)
-{
-  start ("schedule=sequential:2x2 quality=balanced threads=2");
-  push (0);
-  pull_all ();
-  ASSERT_TRUE (fuse->push_event (gst_event_new_flush_start ()));
-  ASSERT_TRUE (fuse->push_event (gst_event_new_flush_stop (TRUE)));
-  GstSegment segment;
-  gst_segment_init (&segment, GST_FORMAT_TIME);
-  ASSERT_TRUE (fuse->push_event (gst_event_new_segment (&segment)));
-  push (7, 0);
-  FuseOptions options;
-  options.quality = FuseQuality::kBalanced;
-  EXPECT_EQ (pull_images (), expected ("sequential:2x2", {7}, options));
-}
-
-/* --------------------------------------------------------------- losses -- */
-
-TEST_F (Fuse, ALossIsSaidAndStartsHistoryAnew)
-{
-  start ();
-  push (0);
-  push (0, kPeriod);
-  push (0, 4 * kPeriod);
-  const auto lost = fuse->posted<FramesLost> ();
-  ASSERT_TRUE (lost);
-  EXPECT_EQ (lost->count, 2u);
-  EXPECT_EQ (counter_of (fuse->element (), "frames-lost"), 2u);
-  const auto images = pull_images ();
-  ASSERT_EQ (images.size (), 12u);
-  /* The second frame detects static pixels; the third restarts the comparison.
-   */
-  EXPECT_NE (images[4], images[0]);
-  for (std::size_t k = 0; k < 4; k++)
-    EXPECT_EQ (images[8 + k], images[k]);
-}
-
-TEST_F (Fuse, LossesAndBreaksAreDiscont)
-{
-  start ();
-  push (0);
-  push (1);
-  push (2, 4 * kPeriod);
-  push (3, 5 * kPeriod, GST_BUFFER_FLAG_DISCONT);
-  push (4, 6 * kPeriod);
-  EXPECT_EQ (disconts (), (std::vector<std::size_t>{0, 8, 12}));
-}
-
-TEST_F (Fuse, ANewSegmentIsNoLoss)
-{
-  for (const bool flush : {false, true}) {
-    start ();
-    push (0);
-    push (0, kPeriod);
-    if (flush) {
-      ASSERT_TRUE (fuse->push_event (gst_event_new_flush_start ()));
-      ASSERT_TRUE (fuse->push_event (gst_event_new_flush_stop (TRUE)));
-    }
-    GstSegment segment;
-    gst_segment_init (&segment, GST_FORMAT_TIME);
-    segment.start = 10 * GST_SECOND;
-    ASSERT_TRUE (fuse->push_event (gst_event_new_segment (&segment)));
-    push (0, 10 * GST_SECOND);
-    EXPECT_EQ (counter_of (fuse->element (), "frames-lost"), 0u);
-    EXPECT_FALSE (fuse->posted<FramesLost> ());
-    const CapsPtr caps = fuse->pad_caps ();
-    const auto all = pull_all ();
-    ASSERT_EQ (all.size (), 12u);
-    EXPECT_TRUE (GST_BUFFER_IS_DISCONT (all[8].get ()));
-    EXPECT_EQ (image_of<std::uint8_t> (all[8].get (), caps.get ()),
-        image_of<std::uint8_t> (all[0].get (), caps.get ()))
-        << "it is compared with nothing";
-  }
-}
-
-TEST_F (Fuse, DamagedFramesPassTheirFlagsAndAreNotCompared)
-{
-  start ();
-  push (0);
-  push (0, kPeriod, GST_BUFFER_FLAG_CORRUPTED);
-  push (0, 2 * kPeriod);
-  const auto all = pull_all ();
-  ASSERT_EQ (all.size (), 12u);
-  const CapsPtr caps = fuse->pad_caps ();
-  for (std::size_t i = 0; i < all.size (); i++) {
-    EXPECT_EQ (bool (GST_BUFFER_FLAG_IS_SET (
-                   all[i].get (), GST_BUFFER_FLAG_CORRUPTED)),
-        i / 4 == 1);
-    EXPECT_EQ (image_of<std::uint8_t> (all[i].get (), caps.get ()),
-        image_of<std::uint8_t> (all[i % 4].get (), caps.get ()));
-  }
-}
-
-/* What comes after a frame was exposed before it. */
-TEST_F (Fuse, ComparesNothingAtANegativeRate)
-{
-  start ("schedule=sequential:lattice:4/2 lookahead=1");
-  GstSegment segment;
-  gst_segment_init (&segment, GST_FORMAT_TIME);
-  segment.rate = -1.0;
-  segment.stop = segment.position = GST_SECOND;
-  ASSERT_TRUE (fuse->push_event (gst_event_new_segment (&segment)));
-  for (const int number : {2, 1, 0}) {
-    push (number);
-    auto alone = expected ("sequential:lattice:4/2", {number});
-    std::reverse (alone.begin (), alone.end ());
-    EXPECT_EQ (pull_images (), alone) << number;
-  }
-}
-
-TEST_F (Fuse, CountsDamagedFrames)
-{
-  start ();
-  push (0);
-  push (1, kPeriod, GST_BUFFER_FLAG_CORRUPTED);
-  EXPECT_EQ (counter_of (fuse->element (), "frames-corrupted"), 1u);
-}
-
-TEST_F (Fuse, ALateFrameIsSaidAndComparedWithNothing)
-{
-  start ();
-  push (0);
-  push (0, 3 * kPeriod);
-  push (0, kPeriod);
-  push (0, 4 * kPeriod);
-  EXPECT_NE (fuse->warning ().find ("overlaps"), std::string::npos);
-  EXPECT_EQ (disconts (), (std::vector<std::size_t>{0, 4, 8, 12}));
-}
+/* ----------------------------------------------------------- saturation -- */
 
 TEST_F (Fuse, SaysWhenFramesAreSaturated)
 {
@@ -528,25 +248,6 @@ TEST_F (Fuse, FramesThatFillAGapAreNotCountedAsSaturated)
   ASSERT_EQ (fuse->push (std::move (filler)), GST_FLOW_OK);
   EXPECT_EQ (counter_of (fuse->element (), "saturated-frames"), 0u);
   EXPECT_FALSE (fuse->posted<Saturated> ());
-}
-
-TEST_F (Fuse, NeedsTimeStamps)
-{
-  start ();
-  EXPECT_EQ (
-      fuse->push (frame_of (picture (0), GST_CLOCK_TIME_NONE)), GST_FLOW_ERROR);
-  EXPECT_NE (fuse->error ().find ("do-timestamp"), std::string::npos);
-}
-
-TEST_F (Fuse, QosEndsHere)
-{
-  start ();
-  push (0);
-  gst_harness_push_upstream_event (
-      fuse->get (), gst_event_new_qos (GST_QOS_TYPE_UNDERFLOW, 1.0, 5, 10));
-  while (
-      const EventPtr event{gst_harness_try_pull_upstream_event (fuse->get ())})
-    EXPECT_NE (GST_EVENT_TYPE (event.get ()), GST_EVENT_QOS);
 }
 
 /* ---------------------------------------------------------- allocation -- */
@@ -590,6 +291,17 @@ TEST_F (Fuse, OffersVideoMetaAndAPoolToUpstream)
   EXPECT_TRUE (gst_query_find_allocation_meta (
       query.get (), GST_VIDEO_META_API_TYPE, nullptr));
   EXPECT_EQ (gst_query_get_n_allocation_pools (query.get ()), 1u);
+}
+
+TEST_F (Fuse, QosEndsHere)
+{
+  start ();
+  push (0);
+  gst_harness_push_upstream_event (
+      fuse->get (), gst_event_new_qos (GST_QOS_TYPE_UNDERFLOW, 1.0, 5, 10));
+  while (
+      const EventPtr event{gst_harness_try_pull_upstream_event (fuse->get ())})
+    EXPECT_NE (GST_EVENT_TYPE (event.get ()), GST_EVENT_QOS);
 }
 
 TEST_F (Fuse, CountersAgree)

@@ -165,23 +165,12 @@ TEST (SimError, RefusesToStartWithWhatItCannotRead)
           std::pair ("dmd=dlpc350", "dmd 'dlpc350' is no simulated DMD"),
           std::pair ("dmd=sim:", "write sim:NAME")}) {
     SCOPED_TRACE (properties);
-    const ObjectPtr<GstBus> bus (gst_bus_new ());
     const ObjectPtr<GstElement> element (
         GST_ELEMENT (gst_object_ref_sink (gst_parse_launch (
             ("codedexposure-sim " + std::string (properties)).c_str (),
             nullptr))));
-    gst_element_set_bus (element.get (), bus.get ());
-    EXPECT_EQ (gst_element_set_state (element.get (), GST_STATE_PAUSED),
-        GST_STATE_CHANGE_FAILURE);
-    const MessagePtr message (
-        gst_bus_pop_filtered (bus.get (), GST_MESSAGE_ERROR));
-    ASSERT_TRUE (message);
-    GError *error = nullptr;
-    gst_message_parse_error (message.get (), &error, nullptr);
-    EXPECT_NE (std::string (error->message).find (words), std::string::npos)
-        << error->message;
-    g_error_free (error);
-    gst_element_set_bus (element.get (), nullptr);
+    const std::string text = refusal (element.get (), GST_STATE_PAUSED);
+    EXPECT_NE (text.find (words), std::string::npos) << text;
     gst_element_set_state (element.get (), GST_STATE_NULL);
   }
 }

@@ -46,6 +46,36 @@ text_of (const GstCaps *caps)
   return caps ? CharPtr (gst_caps_to_string (caps)).get () : "(null)";
 }
 
+/** Text of an error, warning or info. */
+inline std::string
+text_of (GstMessage *message)
+{
+  GError *error = nullptr;
+  if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_ERROR)
+    gst_message_parse_error (message, &error, nullptr);
+  else if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_WARNING)
+    gst_message_parse_warning (message, &error, nullptr);
+  else
+    gst_message_parse_info (message, &error, nullptr);
+  const std::string text = error->message;
+  g_error_free (error);
+  return text;
+}
+
+/** Text of the error with which @p element refuses to change to @p state. */
+inline std::string
+refusal (GstElement *element, GstState state)
+{
+  const ObjectPtr<GstBus> bus (gst_bus_new ());
+  gst_element_set_bus (element, bus.get ());
+  EXPECT_EQ (gst_element_set_state (element, state), GST_STATE_CHANGE_FAILURE);
+  gst_element_set_bus (element, nullptr);
+  const MessagePtr message (
+      gst_bus_pop_filtered (bus.get (), GST_MESSAGE_ERROR));
+  EXPECT_TRUE (message);
+  return message ? text_of (message.get ()) : "";
+}
+
 /** Succeeds when both mean the same, whatever the order of their fields. */
 inline ::testing::AssertionResult
 same_caps (GstCaps *caps, const std::string &expected)
@@ -138,6 +168,14 @@ public:
   {
     return BufferPtr (gst_harness_try_pull (pad (pad_name)));
   }
+  /** All buffers of @p pad that have come. */
+  std::vector<BufferPtr> pull_all (const std::string &pad_name = "")
+  {
+    std::vector<BufferPtr> all;
+    while (BufferPtr buffer = pull (pad_name))
+      all.push_back (std::move (buffer));
+    return all;
+  }
   /** The next event of @p type that came out of @p pad, null when there is
    * none; events before it are forgotten. */
   EventPtr pull_event (GstEventType type, const std::string &pad_name = "")
@@ -202,18 +240,7 @@ private:
   std::string complaint (GstMessageType type)
   {
     const MessagePtr found = message (type);
-    if (!found)
-      return "";
-    GError *error = nullptr;
-    if (type == GST_MESSAGE_ERROR)
-      gst_message_parse_error (found.get (), &error, nullptr);
-    else if (type == GST_MESSAGE_WARNING)
-      gst_message_parse_warning (found.get (), &error, nullptr);
-    else
-      gst_message_parse_info (found.get (), &error, nullptr);
-    const std::string text = error->message;
-    g_error_free (error);
-    return text;
+    return found ? text_of (found.get ()) : "";
   }
 
   ObjectPtr<GstBus> bus_;
@@ -287,6 +314,18 @@ image_of (GstBuffer *buffer, GstCaps *caps)
         image.at (x, y) = view.at (x, y);
   }
   return image;
+}
+
+/** The pixels of all buffers of @p pad that have come. */
+template <typename Pixel = std::uint8_t>
+std::vector<Image<Pixel>>
+pull_images (ElementHarness &harness, const std::string &pad = "")
+{
+  std::vector<Image<Pixel>> images;
+  const CapsPtr caps = harness.pad_caps (pad);
+  for (const BufferPtr &buffer : harness.pull_all (pad))
+    images.push_back (image_of<Pixel> (buffer.get (), caps.get ()));
+  return images;
 }
 
 } // namespace codedexposure::test

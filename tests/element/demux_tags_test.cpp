@@ -1,0 +1,180 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* codedexposure-demux: what the tags of a stream say of its frames, and what
+ * its own streams say. */
+#include "demux_schedule.h"
+
+#include "common/tag.h"
+
+namespace
+{
+
+using namespace codedexposure;
+using namespace codedexposure::gst;
+using namespace codedexposure::test;
+
+/* -------------------------------------------------------------- schedule -- */
+
+TEST_F (DemuxSchedule, ComesFromTheTagOfTheStream)
+{
+  start ("");
+  ASSERT_TRUE (
+      demux->push_event (schedule_to_event (schedule_of ("sequential:3x3"))));
+  ASSERT_EQ (push (0), GST_FLOW_OK);
+  EXPECT_EQ (in_force (*demux), "sequential:3x3");
+  EXPECT_EQ (pull_images (*demux),
+      expected ("sequential:3x3", picture (), Method::kSelect));
+  EXPECT_EQ (demux->warning (), "");
+}
+
+TEST_F (DemuxSchedule, PropertyWinsOverTheTag)
+{
+  start ("schedule=sequential:2x2");
+  demux->push_event (schedule_to_event (schedule_of ("sequential:3x3")));
+  ASSERT_EQ (push (0), GST_FLOW_OK);
+  EXPECT_EQ (in_force (*demux), "sequential:2x2");
+  EXPECT_EQ (pull_images (*demux).size (), 4u);
+  EXPECT_EQ (demux->info (),
+      "The schedule property, sequential:2x2, overrides the schedule of the "
+      "stream, sequential:3x3.");
+  demux->set_caps (gray_caps (24, 24, "50/1"));
+  ASSERT_EQ (push (1), GST_FLOW_OK);
+  EXPECT_EQ (demux->info (), "") << "once";
+}
+
+TEST_F (DemuxSchedule, PropertyMakesAnUnreadableTagHarmless)
+{
+  start ("schedule=sequential:2x2");
+  demux->push_event (gst_event_new_tag (
+      gst_tag_list_new (GST_TAG_COMMENT, "coded-exposure={nonsense", nullptr)));
+  EXPECT_EQ (push (0), GST_FLOW_OK);
+  EXPECT_EQ (demux->error (), "");
+}
+
+TEST_F (DemuxSchedule, UnreadableTagIsAnErrorThatSaysWhy)
+{
+  start ("");
+  demux->push_event (gst_event_new_tag (gst_tag_list_new (GST_TAG_COMMENT,
+      "coded-exposure={\"format\":\"coded-exposure\",\"version\":77}",
+      nullptr)));
+  EXPECT_NE (push (0), GST_FLOW_OK);
+  const std::string text = demux->error ();
+  EXPECT_NE (text.find ("tag"), std::string::npos) << text;
+  EXPECT_NE (text.find ("77"), std::string::npos) << text;
+  EXPECT_FALSE (demux->pull ());
+}
+
+TEST_F (DemuxSchedule, TagThatComesLaterChangesTheNumberOfSubframes)
+{
+  start ("");
+  ASSERT_EQ (push (0), GST_FLOW_OK);
+  EXPECT_EQ (pull_images (*demux).size (), 4u);
+  demux->push_event (
+      schedule_to_event (schedule_of ("sequential:lattice:8/3")));
+  ASSERT_EQ (push (1), GST_FLOW_OK);
+  EXPECT_TRUE (same_caps (demux->pad_caps ().get (),
+      "video/x-raw,format=GRAY8,width=3,height=24,framerate=200/1,"
+      "pixel-aspect-ratio=8/1"));
+  EXPECT_EQ (pull_images (*demux),
+      expected ("sequential:lattice:8/3", picture (), Method::kSelect));
+}
+
+TEST_F (DemuxSchedule, TagOfAnotherStreamIsForgotten)
+{
+  start ("");
+  demux->push_event (schedule_to_event (schedule_of ("sequential:3x3")));
+  ASSERT_EQ (push (0), GST_FLOW_OK);
+  EXPECT_EQ (demux->warning (), "");
+  demux->push_event (gst_event_new_stream_start ("another"));
+  demux->set_caps (gray_caps (24, 24));
+  ASSERT_EQ (push (0), GST_FLOW_OK);
+  EXPECT_EQ (in_force (*demux), "sequential:2x2");
+  EXPECT_NE (demux->warning (), "");
+}
+
+TEST_F (DemuxSchedule, ANewOneInMidStreamIsSaidAndDiscontinuous)
+{
+  start ("");
+  demux->push_event (schedule_to_event (schedule_of ("sequential:2x2")));
+  ASSERT_EQ (push (0), GST_FLOW_OK);
+  demux->push_event (schedule_to_event (schedule_of ("sequential:3x3")));
+  while (demux->pull ()) {
+  }
+  ASSERT_EQ (push (1), GST_FLOW_OK);
+  const BufferPtr first = demux->pull ();
+  EXPECT_TRUE (GST_BUFFER_IS_DISCONT (first.get ()));
+  EXPECT_EQ (demux->info (),
+      "The schedule changes from sequential:2x2 to sequential:3x3 at "
+      "0:00:00.040000000.");
+}
+
+TEST_F (DemuxSchedule, ANewOneBeforeAGapIsSaidWithoutATime)
+{
+  start ("");
+  demux->push_event (schedule_to_event (schedule_of ("sequential:2x2")));
+  ASSERT_EQ (push (0), GST_FLOW_OK);
+  demux->push_event (schedule_to_event (schedule_of ("sequential:3x3")));
+  demux->push_event (gst_event_new_gap (40 * GST_MSECOND, 40 * GST_MSECOND));
+  EXPECT_EQ (demux->info (), "The schedule changes from sequential:2x2 to "
+                             "sequential:3x3 with the next "
+                             "coded frame.");
+}
+
+/* ----------------------------------------------------------- provenance -- */
+
+TEST_F (DemuxSchedule, PicturesSayHowTheyWereMadeAndCodedFramesWhatTheyAre)
+{
+  start ("");
+  demux->request ("subframe_0");
+  demux->request ("coded");
+  const Schedule schedule = schedule_of ("sequential:3x3");
+  demux->push_event (schedule_to_event (schedule));
+  ASSERT_EQ (push (0), GST_FLOW_OK);
+  for (const char *pad : {"", "subframe_0", "coded"}) {
+    const EventPtr event = demux->pull_event (GST_EVENT_TAG, pad);
+    ASSERT_TRUE (event) << pad;
+    GstTagList *tags = nullptr;
+    gst_event_parse_tag (event.get (), &tags);
+    const auto found = schedule_from_tags (tags);
+    const auto made = provenance_from_tags (tags);
+    if (std::string (pad) == "coded") {
+      ASSERT_TRUE (found && *found);
+      EXPECT_EQ (found->value (), schedule);
+      EXPECT_FALSE (made);
+      continue;
+    }
+    EXPECT_FALSE (found) << pad;
+    ASSERT_TRUE (made && *made) << pad;
+    EXPECT_EQ (made->value ().setup.schedule, schedule);
+    EXPECT_EQ (made->value ().method, "select");
+    EXPECT_EQ (made->value ().first_frame, 0u);
+  }
+}
+
+TEST_F (DemuxSchedule, WhatWasDecodedIsRefused)
+{
+  start ("");
+  demux->push_event (
+      provenance_to_event ({{schedule_of ("staircase:2x2")}, "decode", 12, 0}));
+  EXPECT_EQ (push (0), GST_FLOW_NOT_NEGOTIATED);
+  EXPECT_NE (
+      demux->error ().find ("staircase:2x2 by decode"), std::string::npos);
+}
+
+TEST_F (DemuxSchedule, FramesThatWereScaledOrTimedAnewAreRefused)
+{
+  StreamSetup setup{schedule_of ("sequential:2x2")};
+  for (const char *wrong : {"size", "rate"}) {
+    start ("");
+    setup.size = Extent{24, 24};
+    setup.rate = FrameRate{25, 1};
+    if (wrong == std::string ("size"))
+      setup.size->width = 48;
+    else
+      setup.rate->num = 30;
+    demux->push_event (setup_to_event (setup));
+    EXPECT_EQ (push (0), GST_FLOW_NOT_NEGOTIATED) << wrong;
+    EXPECT_NE (demux->error ().find ("the camera gave"), std::string::npos);
+  }
+}
+
+} // namespace

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure-launch: runs one pipeline for a script of this folder and
  * prints its progress, errors and counters. */
-#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cstdio>
@@ -12,6 +11,8 @@
 
 #include "byte_watch.h"
 #include "each_element.h"
+#include "frame_counter.h"
+#include "frame_limit.h"
 #include "leaky_queue.h"
 #include "player.h"
 #include "whole_picture.h"
@@ -40,10 +41,7 @@ struct Options {
   gint64 total = 0;          // expected coded frames, 0: unknown
   gchar *receiver = nullptr; // tcpserversink to wait for
   gdouble retry = 0;         // time for which to try to connect, s
-  gdouble start = 0;         // time at which to start, s
-  gdouble duration = 0;      // time to play, s; 0: all
-  gdouble shift_to = -1; // running time of the first frame, s; -1: unchanged
-  gboolean keep_time = FALSE; // running time is the time of the recording
+  FrameCounter::Times times;
   gboolean salvage = FALSE;   // go on after damage of the container
   gchar *need = nullptr;      // name of an element message that must come
   gboolean camera = FALSE;    // frames come all the time
@@ -66,11 +64,10 @@ public:
 
 private:
   bool connect_counter ();
-  void end_at_the_limit ();
+  gint64 frames () const { return counter_ ? counter_->frames ().load () : 0; }
   void watch_leaky_queues ();
   void begin () override;
   bool has_receiver ();
-  void seek ();
   void play ();
   void on_signal (int times) override;
   void on_message (GstMessage *message) override;
@@ -78,7 +75,8 @@ private:
   void on_element_message (GstMessage *message);
   bool take_container_error (
       std::string_view kind, const GstObject *source, const std::string &text);
-  void end_after_error ();
+  bool set_playing ();
+  void end_after_error (GstObject *failed);
   void tick ();
   void watch_for_silence (gint64 frames);
   int finish (int code);
@@ -93,35 +91,18 @@ private:
     static_cast<Launch *> (self)->quit (kFailed);
     return G_SOURCE_REMOVE;
   }
-  static gboolean on_held (gpointer self)
-  {
-    static_cast<Launch *> (self)->seek ();
-    return G_SOURCE_REMOVE;
-  }
-  static GstPadProbeReturn on_first_frame (
-      GstPad *, GstPadProbeInfo *, gpointer self);
-  static GstPadProbeReturn on_frame (
-      GstPad *, GstPadProbeInfo *info, gpointer self);
-  static GstPadProbeReturn shift_first_frame (
-      GstPad *, GstPadProbeInfo *info, gpointer self);
-  static GstPadProbeReturn on_limited_frame (
-      GstPad *pad, GstPadProbeInfo *info, gpointer self);
 
   const Options &options_;
-  ObjectPtr<GstPad> counted_;
+  std::unique_ptr<FrameCounter> counter_;
   std::vector<std::unique_ptr<LeakyQueue>> leaky_queues_;
-  std::atomic<gint64> frames_ = 0;
   std::unique_ptr<ByteWatch> byte_watch_;
+  std::unique_ptr<FrameLimit> limit_;
   gint64 frames_before_ = -1; // at the last tick
   bool silent_ = false;       // no frame came for a while, and that was said
-  gint64 left_ = 0;           // frames until the limit; its streaming thread
-  std::atomic<gint64> last_pts_ = -1; // ns, of the counted pad
   Clock::time_point began_ = Clock::now ();
   Clock::time_point heard_ = Clock::now (); // the last new frame
   Clock::time_point retry_until_ = Clock::now ();
   double cpu_at_start_ = 0;
-  gulong hold_ = 0; // probe that holds the first frame until the seek
-  bool held_ = false;
   bool playing_ = false;
   std::string noticed_; // the last notice
   bool interrupted_ = false;
@@ -130,105 +111,14 @@ private:
   bool damaged_ = false;     // frames are missing or damaged
 };
 
-constexpr GstClockTime
-nanoseconds (double seconds)
-{
-  return GstClockTime (seconds * 1e9 + 0.5);
-}
-
-/* Whether @frame ends before the time @start, which happens if a seek goes
- * beyond the end of a stream. */
-bool
-is_before (const GstBuffer *frame, GstClockTime start)
-{
-  return GST_BUFFER_PTS_IS_VALID (frame) &&
-         GST_BUFFER_DURATION_IS_VALID (frame) &&
-         GST_BUFFER_PTS (frame) + GST_BUFFER_DURATION (frame) <= start;
-}
-
-GstPadProbeReturn
-Launch::on_frame (GstPad *, GstPadProbeInfo *info, gpointer self)
-{
-  auto *launch = static_cast<Launch *> (self);
-  const GstBuffer *frame = GST_PAD_PROBE_INFO_BUFFER (info);
-  if (is_before (frame, nanoseconds (launch->options_.start)))
-    return GST_PAD_PROBE_DROP;
-  launch->frames_++;
-  if (GST_BUFFER_PTS_IS_VALID (frame))
-    launch->last_pts_ = gint64 (GST_BUFFER_PTS (frame));
-  return GST_PAD_PROBE_OK;
-}
-
-GstPadProbeReturn
-Launch::on_first_frame (GstPad *, GstPadProbeInfo *, gpointer self)
-{
-  auto *launch = static_cast<Launch *> (self);
-  if (!std::exchange (launch->held_, true))
-    g_idle_add (on_held, launch);
-  return GST_PAD_PROBE_OK;
-}
-
-/* The frame period of the caps at @pad, or 0. */
-GstClockTime
-frame_period (GstPad *pad)
-{
-  const CapsPtr caps (gst_pad_get_current_caps (pad));
-  gint num = 0, den = 1;
-  if (!caps ||
-      !gst_structure_get_fraction (
-          gst_caps_get_structure (caps.get (), 0), "framerate", &num, &den) ||
-      num <= 0)
-    return 0;
-  return gst_util_uint64_scale_int (GST_SECOND, den, num);
-}
-
-/* The first frame is held, so no file is started and nothing is shown before
- * the seek. The segment begins at the start of a frame and has at least one,
- * because decoders clip a coded frame to the segment and its slots would be
- * lost. */
 void
-Launch::seek ()
+end_at_sources (GstElement *element, gpointer)
 {
-  const GstClockTime start = nanoseconds (options_.start);
-  const GstClockTime length = std::max (
-      nanoseconds (options_.duration), frame_period (counted_.get ()));
-  GstEvent *event = gst_event_new_seek (1.0, GST_FORMAT_TIME,
-      GstSeekFlags (GST_SEEK_FLAG_FLUSH | GST_SEEK_FLAG_KEY_UNIT |
-                    GST_SEEK_FLAG_SNAP_BEFORE),
-      GST_SEEK_TYPE_SET, gint64 (start),
-      options_.duration > 0 ? GST_SEEK_TYPE_SET : GST_SEEK_TYPE_NONE,
-      gint64 (start + length));
-  if (!gst_pad_push_event (counted_.get (), event)) {
-    status_.line ("error: cannot seek in this stream; leave out --start and "
-                  "--duration");
-    quit (kFailed);
-  }
-  gst_pad_remove_probe (counted_.get (), std::exchange (hold_, 0));
-}
-
-/* Otherwise, a receiver that joins late would show frames late, and the times
- * of a recording that is decoded would begin at 0. */
-GstPadProbeReturn
-Launch::shift_first_frame (GstPad *pad, GstPadProbeInfo *info, gpointer self)
-{
-  const auto *launch = static_cast<Launch *> (self);
-  const GstClockTime pts = GST_BUFFER_PTS (GST_PAD_PROBE_INFO_BUFFER (info));
-  const EventPtr sticky (gst_pad_get_sticky_event (pad, GST_EVENT_SEGMENT, 0));
-  const GstSegment *segment = nullptr;
-  gst_event_parse_segment (sticky.get (), &segment);
-  const guint64 running =
-      gst_segment_to_running_time (segment, GST_FORMAT_TIME, pts);
-  if (!GST_CLOCK_TIME_IS_VALID (running))
-    return GST_PAD_PROBE_OK;
-  const ObjectPtr<GstElement> element (gst_pad_get_parent_element (pad));
-  const ObjectPtr<GstPad> src (
-      gst_element_get_static_pad (element.get (), "src"));
-  const GstClockTime wanted = launch->options_.keep_time
-                                  ? pts
-                                  : nanoseconds (launch->options_.shift_to);
-  if (src)
-    gst_pad_set_offset (src.get (), gint64 (wanted) - gint64 (running));
-  return GST_PAD_PROBE_REMOVE;
+  const auto end = [] (GstElement *, GstPad *pad, gpointer) {
+    gst_pad_push_event (pad, gst_event_new_eos ());
+    return gboolean (TRUE);
+  };
+  gst_element_foreach_src_pad (element, end, nullptr);
 }
 
 bool
@@ -237,57 +127,20 @@ Launch::connect_counter ()
   if (!options_.count)
     return true;
   const ObjectPtr<GstElement> element (find (options_.count));
-  if (element)
-    counted_.reset (gst_element_get_static_pad (element.get (), "sink"));
-  if (!counted_) {
+  ObjectPtr<GstPad> sink (
+      element ? gst_element_get_static_pad (element.get (), "sink") : nullptr);
+  if (!sink) {
     status_.line (format (
         "the pipeline has no element %s to count frames at", options_.count));
     return false;
   }
-  if (options_.start > 0 || options_.duration > 0)
-    hold_ = gst_pad_add_probe (counted_.get (),
-        GstPadProbeType (GST_PAD_PROBE_TYPE_BLOCK | GST_PAD_PROBE_TYPE_BUFFER),
-        on_first_frame, this, nullptr);
-  if (options_.shift_to >= 0 || options_.keep_time)
-    gst_pad_add_probe (counted_.get (), GST_PAD_PROBE_TYPE_BUFFER,
-        shift_first_frame, this, nullptr);
-  gst_pad_add_probe (
-      counted_.get (), GST_PAD_PROBE_TYPE_BUFFER, on_frame, this, nullptr);
+  counter_ =
+      std::make_unique<FrameCounter> (std::move (sink), options_.times, [this] {
+        status_.line ("error: cannot seek in this stream; leave out --start "
+                      "and --duration");
+        quit (kFailed);
+      });
   return true;
-}
-
-/* An identity ends the stream when it refuses a frame, which was already
- * produced and counted. This probe ends the stream directly after the last
- * frame. */
-void
-Launch::end_at_the_limit ()
-{
-  const ObjectPtr<GstElement> limit (
-      gst_bin_get_by_name (GST_BIN (pipeline_.get ()), "limit"));
-  if (!limit)
-    return;
-  gint refused = 0;
-  g_object_get (limit.get (), "eos-after", &refused, nullptr);
-  left_ = refused - 1;
-  const ObjectPtr<GstPad> src (
-      gst_element_get_static_pad (limit.get (), "src"));
-  gst_pad_add_probe (
-      src.get (), GST_PAD_PROBE_TYPE_BUFFER, on_limited_frame, this, nullptr);
-}
-
-GstPadProbeReturn
-Launch::on_limited_frame (GstPad *pad, GstPadProbeInfo *info, gpointer self)
-{
-  gint64 &left = static_cast<Launch *> (self)->left_;
-  if (--left != 0)
-    return GST_PAD_PROBE_OK;
-  /* The push calls this probe again. */
-  GstBuffer *last = GST_PAD_PROBE_INFO_BUFFER (info);
-  GST_PAD_PROBE_INFO_DATA (info) = nullptr;
-  const GstFlowReturn flow = gst_pad_push (pad, last);
-  GST_PAD_PROBE_INFO_FLOW_RETURN (info) =
-      flow == GST_FLOW_OK ? GST_FLOW_EOS : flow;
-  return GST_PAD_PROBE_HANDLED;
 }
 
 void
@@ -307,8 +160,7 @@ Launch::play ()
 {
   began_ = Clock::now ();
   cpu_at_start_ = cpu_seconds ();
-  playing_ = gst_element_set_state (pipeline_.get (), GST_STATE_PLAYING) !=
-             GST_STATE_CHANGE_FAILURE;
+  playing_ = set_playing ();
 }
 
 /* A paused sink accepts receivers, so they do not miss the first frame. */
@@ -335,13 +187,16 @@ Launch::begin ()
 int
 Launch::run ()
 {
-  if (!connect_counter () || !claim_outputs (options_.force, counted_.get ()))
+  if (!connect_counter () ||
+      !claim_outputs (options_.force, counter_ ? counter_->pad () : nullptr))
     return kFailed;
   watch_leaky_queues ();
   whole_picture::wait_for_inputs (pipeline_.get ());
-  if (const ObjectPtr<GstElement> demuxer = find ("file"))
-    byte_watch_ = std::make_unique<ByteWatch> (demuxer.get (), frames_);
-  end_at_the_limit ();
+  if (const ObjectPtr<GstElement> demuxer = find ("file"); demuxer && counter_)
+    byte_watch_ =
+        std::make_unique<ByteWatch> (demuxer.get (), counter_->frames ());
+  if (const ObjectPtr<GstElement> limit = find ("limit"))
+    limit_ = std::make_unique<FrameLimit> (limit.get ());
   const guint ticks = g_timeout_add (200, on_tick, this);
   const int code = loop ();
   g_source_remove (ticks);
@@ -352,31 +207,31 @@ Launch::run ()
 int
 Launch::finish (int code)
 {
-  if (code == kDone && counted_ && frames_ == 0) {
-    status_.line (options_.start > 0
+  if (code == kDone && counter_ && frames () == 0) {
+    status_.line (options_.times.start > 0
                       ? format ("error: no coded frame arrived; check whether "
                                 "%g s is after the end",
-                            options_.start)
+                            options_.times.start)
                       : "error: no coded frame arrived");
     code = kNoFrame;
-  } else if (code == kFailed && counted_ && frames_ == 0)
+  } else if (code == kFailed && counter_ && frames () == 0)
     code = kNoFrame;
-  if (options_.verbose && frames_ > 0)
+  if (options_.verbose && frames () > 0)
     print_counters ();
   const std::string flaws = flaws_of (pipeline_.get ());
   if (!finish_outputs (code != kContainer))
     return kFailed;
-  const std::string wrote = outputs_.summary (guint64 (frames_));
+  const std::string wrote = outputs_.summary (guint64 (frames ()));
   if (code != kDone && !wrote.empty ())
     status_.line ("kept what was complete: " + wrote);
   if (code == kDone && options_.need)
     return said_needed_ ? kDone : kFailed;
-  if (code != kDone || options_.no_result || (!counted_ && wrote.empty ()))
+  if (code != kDone || options_.no_result || (!counter_ && wrote.empty ()))
     return code;
   std::string result;
-  if (counted_)
-    result = format ("%" G_GINT64_FORMAT " coded frames", frames_.load ()) +
-             flaws + (wrote.empty () ? "" : "; ");
+  if (counter_)
+    result = format ("%" G_GINT64_FORMAT " coded frames", frames ()) + flaws +
+             (wrote.empty () ? "" : "; ");
   status_.line (result + (wrote.empty () ? "" : "wrote " + wrote));
   return damaged_ ? kDamaged : kDone;
 }
@@ -395,6 +250,15 @@ Launch::on_signal (int times)
     return;
   status_.line ("stopping; press Ctrl-C again to stop immediately");
   gst_element_send_event (pipeline_.get (), gst_event_new_eos ());
+}
+
+/* An error also ends a change of the state, which sinks wait for that have
+ * their first frame. */
+bool
+Launch::set_playing ()
+{
+  return gst_element_set_state (pipeline_.get (), GST_STATE_PLAYING) !=
+         GST_STATE_CHANGE_FAILURE;
 }
 
 /* A demuxer that finds a damaged index stops before the first frame. From front
@@ -422,25 +286,27 @@ Launch::take_container_error (
     quit (kNoFrame);
   }
   damaged_ = true;
+  set_playing ();
   return true;
 }
 
 /* Ends the stream, so that the frames before the error are in finished files.
- * A blocked element does not pass the end on. */
+ * The element that @failed takes nothing more, so the end is also sent from
+ * it. A blocked element does not pass it on. */
 void
-Launch::end_after_error ()
+Launch::end_after_error (GstObject *failed)
 {
   constexpr guint kPatience = 5; // s
   if (std::exchange (failed_, true))
     return;
-  /* An error also ends a change of the state. */
-  if (!playing_ || outputs_.empty () ||
-      gst_element_set_state (pipeline_.get (), GST_STATE_PLAYING) ==
-          GST_STATE_CHANGE_FAILURE) {
+  if (!playing_ || outputs_.empty () || !set_playing ()) {
     quit (kFailed);
     return;
   }
   gst_element_send_event (pipeline_.get (), gst_event_new_eos ());
+  if (GST_IS_ELEMENT (failed))
+    gst_element_call_async (
+        GST_ELEMENT (failed), end_at_sources, nullptr, nullptr);
   g_timeout_add_seconds (kPatience, on_end_timeout, this);
 }
 
@@ -459,7 +325,7 @@ Launch::on_error (GstMessage *message)
                               : nullptr;
   const std::string_view kind = factory ? GST_OBJECT_NAME (factory) : "";
 
-  if (kind == "tcpclientsrc" && frames_ == 0 &&
+  if (kind == "tcpclientsrc" && frames () == 0 &&
       g_error_matches (
           error, GST_RESOURCE_ERROR, GST_RESOURCE_ERROR_OPEN_READ)) {
     gst_element_set_state (pipeline_.get (), GST_STATE_NULL);
@@ -471,7 +337,7 @@ Launch::on_error (GstMessage *message)
   if (factory && GST_OBJECT_FLAG_IS_SET (source, GST_ELEMENT_FLAG_SINK) &&
       g_error_matches (
           error, GST_RESOURCE_ERROR, GST_RESOURCE_ERROR_NOT_FOUND) &&
-      frames_ > 0) {
+      frames () > 0) {
     status_.line ("the window was closed");
     quit (kDone);
     return;
@@ -482,7 +348,7 @@ Launch::on_error (GstMessage *message)
   const std::string remedy = remedy_for (kind, error, detail);
   if (!remedy.empty ())
     status_.line (remedy);
-  end_after_error ();
+  end_after_error (source);
 }
 
 /* Losses are warnings; all messages of this plugin are for --verbose. */
@@ -513,7 +379,9 @@ Launch::on_message (GstMessage *message)
     quit (failed_ ? kFailed : kDone);
     break;
   case GST_MESSAGE_ERROR:
-    if (!failed_) // others follow from the first
+    if (failed_) // it follows from the first
+      set_playing ();
+    else
       on_error (message);
     break;
   case GST_MESSAGE_WARNING:
@@ -554,7 +422,7 @@ Launch::watch_for_silence (gint64 frames)
   constexpr auto kSilence = std::chrono::seconds (5);
   if (std::exchange (frames_before_, frames) != frames)
     heard_ = Clock::now ();
-  if (!counted_ || !options_.camera || silent_ ||
+  if (!counter_ || !options_.camera || silent_ ||
       Clock::now () - heard_ < kSilence)
     return;
   silent_ = true;
@@ -575,21 +443,12 @@ Launch::tick ()
   }
   const double seconds =
       std::chrono::duration<double> (Clock::now () - began_).count ();
-  const gint64 frames = frames_;
+  const gint64 frames = this->frames ();
   watch_for_silence (frames);
-  if (!counted_ || frames == 0)
+  if (!counter_ || frames == 0)
     return;
 
-  double done = 0;
-  gint64 duration = 0;
-  if (options_.total > 0)
-    done = double (frames) / double (options_.total);
-  else if (options_.duration > 0)
-    done = (1e-9 * double (last_pts_) - options_.start) / options_.duration;
-  else if (gst_pad_peer_query_duration (
-               counted_.get (), GST_FORMAT_TIME, &duration) &&
-           duration > 0 && last_pts_ >= 0)
-    done = double (last_pts_) / double (duration);
+  const double done = counter_->done (options_.total);
   std::string text = format ("%" G_GINT64_FORMAT " coded frames in %s", frames,
       minutes (seconds).c_str ());
   if (done > 0 && done <= 1)
@@ -606,7 +465,7 @@ Launch::print_counters ()
   const double cpu = cpu_seconds () - cpu_at_start_;
   status_.line (
       format ("%.1f s, %.1f coded frames/s, %.0f %% of one processor core",
-          seconds, double (frames_) / seconds, 100 * cpu / seconds));
+          seconds, double (frames ()) / seconds, 100 * cpu / seconds));
 
   for_each_element (pipeline_.get (), [this] (GstElement *element) {
     const std::string counters = counters_of (element);
@@ -635,16 +494,16 @@ main (int argc, char **argv)
       {"retry", 0, 0, G_OPTION_ARG_DOUBLE, &options.retry,
           "Time for which to try to connect; status 4 if nobody listens",
           "SECONDS"},
-      {"start", 0, 0, G_OPTION_ARG_DOUBLE, &options.start,
+      {"start", 0, 0, G_OPTION_ARG_DOUBLE, &options.times.start,
           "Time of the stream at which to start", "SECONDS"},
-      {"duration", 0, 0, G_OPTION_ARG_DOUBLE, &options.duration,
+      {"duration", 0, 0, G_OPTION_ARG_DOUBLE, &options.times.duration,
           "Duration to play", "SECONDS"},
-      {"keep-time", 0, 0, G_OPTION_ARG_NONE, &options.keep_time,
+      {"keep-time", 0, 0, G_OPTION_ARG_NONE, &options.times.keep_time,
           "Times of the output are those of the recording", nullptr},
       {"salvage", 0, 0, G_OPTION_ARG_NONE, &options.salvage,
           "Go on with the frames that are left after damage of the container",
           nullptr},
-      {"shift-to", 0, 0, G_OPTION_ARG_DOUBLE, &options.shift_to,
+      {"shift-to", 0, 0, G_OPTION_ARG_DOUBLE, &options.times.shift_to,
           "Running time for the first counted frame", "SECONDS"},
       {"need", 0, 0, G_OPTION_ARG_STRING, &options.need,
           "Element message without which the run has failed", "NAME"},

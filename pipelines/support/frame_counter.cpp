@@ -1,0 +1,153 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "frame_counter.h"
+
+#include <algorithm>
+#include <utility>
+
+using namespace codedexposure::gst;
+
+namespace
+{
+
+constexpr GstClockTime
+nanoseconds (double seconds)
+{
+  return GstClockTime (seconds * 1e9 + 0.5);
+}
+
+/* Whether @frame ends before the time @start, which happens if a seek goes
+ * beyond the end of a stream. */
+bool
+is_before (const GstBuffer *frame, GstClockTime start)
+{
+  return GST_BUFFER_PTS_IS_VALID (frame) &&
+         GST_BUFFER_DURATION_IS_VALID (frame) &&
+         GST_BUFFER_PTS (frame) + GST_BUFFER_DURATION (frame) <= start;
+}
+
+/* The frame period of the caps at @pad, or 0. */
+GstClockTime
+frame_period (GstPad *pad)
+{
+  const CapsPtr caps (gst_pad_get_current_caps (pad));
+  gint num = 0, den = 1;
+  if (!caps ||
+      !gst_structure_get_fraction (
+          gst_caps_get_structure (caps.get (), 0), "framerate", &num, &den) ||
+      num <= 0)
+    return 0;
+  return gst_util_uint64_scale_int (GST_SECOND, den, num);
+}
+
+} // namespace
+
+FrameCounter::FrameCounter (ObjectPtr<GstPad> sink, const Times &times,
+    std::function<void ()> cannot_seek)
+    : pad_ (std::move (sink)), times_ (times),
+      cannot_seek_ (std::move (cannot_seek))
+{
+  if (times.start > 0 || times.duration > 0)
+    hold_ = gst_pad_add_probe (pad (),
+        GstPadProbeType (GST_PAD_PROBE_TYPE_BLOCK | GST_PAD_PROBE_TYPE_BUFFER),
+        hold_first_frame, this, nullptr);
+  if (times.shift_to >= 0 || times.keep_time)
+    gst_pad_add_probe (
+        pad (), GST_PAD_PROBE_TYPE_BUFFER, shift_first_frame, this, nullptr);
+  gst_pad_add_probe (
+      pad (), GST_PAD_PROBE_TYPE_BUFFER, on_frame, this, nullptr);
+}
+
+FrameCounter::~FrameCounter ()
+{
+  g_idle_remove_by_data (this);
+}
+
+double
+FrameCounter::done (gint64 total) const
+{
+  gint64 length = 0;
+  if (total > 0)
+    return double (frames_) / double (total);
+  if (last_pts_ < 0)
+    return 0;
+  if (times_.duration > 0)
+    return (1e-9 * double (last_pts_) - times_.start) / times_.duration;
+  if (gst_pad_peer_query_duration (pad (), GST_FORMAT_TIME, &length) &&
+      length > 0)
+    return double (last_pts_) / double (length);
+  return 0;
+}
+
+/* The first frame is held, so no file is started and nothing is shown before
+ * the seek. The segment begins at the start of a frame and has at least one,
+ * because decoders clip a coded frame to the segment and its slots would be
+ * lost. */
+void
+FrameCounter::seek ()
+{
+  const GstClockTime start = nanoseconds (times_.start);
+  const GstClockTime length =
+      std::max (nanoseconds (times_.duration), frame_period (pad ()));
+  GstEvent *event = gst_event_new_seek (1.0, GST_FORMAT_TIME,
+      GstSeekFlags (GST_SEEK_FLAG_FLUSH | GST_SEEK_FLAG_KEY_UNIT |
+                    GST_SEEK_FLAG_SNAP_BEFORE),
+      GST_SEEK_TYPE_SET, gint64 (start),
+      times_.duration > 0 ? GST_SEEK_TYPE_SET : GST_SEEK_TYPE_NONE,
+      gint64 (start + length));
+  if (!gst_pad_push_event (pad (), event))
+    cannot_seek_ ();
+  gst_pad_remove_probe (pad (), std::exchange (hold_, 0));
+}
+
+gboolean
+FrameCounter::on_held (gpointer self)
+{
+  static_cast<FrameCounter *> (self)->seek ();
+  return G_SOURCE_REMOVE;
+}
+
+GstPadProbeReturn
+FrameCounter::hold_first_frame (GstPad *, GstPadProbeInfo *, gpointer self)
+{
+  if (!std::exchange (static_cast<FrameCounter *> (self)->held_, true))
+    g_idle_add (on_held, self);
+  return GST_PAD_PROBE_OK;
+}
+
+/* Otherwise, a receiver that joins late would show frames late, and the times
+ * of a recording that is decoded would begin at 0. */
+GstPadProbeReturn
+FrameCounter::shift_first_frame (
+    GstPad *pad, GstPadProbeInfo *info, gpointer self)
+{
+  const Times &times = static_cast<FrameCounter *> (self)->times_;
+  const GstClockTime pts = GST_BUFFER_PTS (GST_PAD_PROBE_INFO_BUFFER (info));
+  const EventPtr sticky (gst_pad_get_sticky_event (pad, GST_EVENT_SEGMENT, 0));
+  const GstSegment *segment = nullptr;
+  gst_event_parse_segment (sticky.get (), &segment);
+  const guint64 running =
+      gst_segment_to_running_time (segment, GST_FORMAT_TIME, pts);
+  if (!GST_CLOCK_TIME_IS_VALID (running))
+    return GST_PAD_PROBE_OK;
+  const ObjectPtr<GstElement> element (gst_pad_get_parent_element (pad));
+  const ObjectPtr<GstPad> src (
+      gst_element_get_static_pad (element.get (), "src"));
+  const GstClockTime wanted =
+      times.keep_time ? pts : nanoseconds (times.shift_to);
+  if (src)
+    gst_pad_set_offset (src.get (), gint64 (wanted) - gint64 (running));
+  return GST_PAD_PROBE_REMOVE;
+}
+
+GstPadProbeReturn
+FrameCounter::on_frame (GstPad *, GstPadProbeInfo *info, gpointer self)
+{
+  auto *counter = static_cast<FrameCounter *> (self);
+  const GstBuffer *frame = GST_PAD_PROBE_INFO_BUFFER (info);
+  if (is_before (frame, nanoseconds (counter->times_.start)))
+    return GST_PAD_PROBE_DROP;
+  counter->frames_++;
+  if (GST_BUFFER_PTS_IS_VALID (frame))
+    counter->last_pts_ = gint64 (GST_BUFFER_PTS (frame));
+  return GST_PAD_PROBE_OK;
+}

@@ -11,10 +11,15 @@
  *
  * - `src`: the frames, unchanged.
  * - `track` (request): the lines as a text stream, for a container. Each has
- *   the PTS and DURATION of its frame. The first line, and one a second, also
- *   holds the schedule and the mapping; the last one says that the recording is
- *   complete. #codedexposure-restore puts the lines back onto the frames and
- *   checks the pixels.
+ *   the PTS and DURATION of its frame. Lines also hold the schedule and the
+ *   mapping: each line if these take at most 512 bytes; else the first two
+ *   lines, one after each change, and one a second. The last line says that the
+ *   recording is complete. #codedexposure-restore puts the lines back onto the
+ *   frames and checks the pixels.
+ *
+ * With the pad `track`, the tag with the schedule says that a track accompanies
+ * the frames: if the track is missing in a recording,
+ * #codedexposure-restore reports damage.
  *
  * Put a `queue` after each pad.
  *
@@ -168,22 +173,10 @@ set_caps (GstBaseTransform *base, GstCaps *caps, GstCaps *)
 
 /* Upstream repeats tags; the file holds each schedule and mapping once. */
 void
-note_setup (GstCodedExposureLog *self, GstEvent *event)
+note_setup (LogState &state, const StreamSetup &setup)
 {
-  LogState &state = *self->state;
-  GstTagList *tags = nullptr;
-  gst_event_parse_tag (event, &tags);
-  const auto setup = setup_from_tags (tags);
-  if (!setup)
-    return;
-  if (!*setup) {
-    POST_WARNING (self, STREAM, DECODE,
-        "The schedule of the stream is not recorded: " +
-            setup->error ().message);
-    return;
-  }
   constexpr std::size_t kShort = 512;
-  state.setup = setup->value ();
+  state.setup = setup;
   state.setup_is_short = state.setup->to_json ().size () <= kShort;
   if (!state.file.is_open ())
     return;
@@ -195,6 +188,32 @@ note_setup (GstCodedExposureLog *self, GstEvent *event)
     state.mapping = state.setup->mapping;
     state.file.write (state.mapping->to_json ());
   }
+}
+
+/* The tags that go on say whether there is a track, where its own lines need
+ * not. Transfer: full, of both. */
+GstEvent *
+take_tags (GstCodedExposureLog *self, GstEvent *event)
+{
+  LogState &state = *self->state;
+  GstTagList *tags = nullptr;
+  gst_event_parse_tag (event, &tags);
+  const auto read = setup_from_tags (tags);
+  if (!read)
+    return event;
+  if (!*read) {
+    POST_WARNING (self, STREAM, DECODE,
+        "The schedule of the stream is not recorded: " +
+            read->error ().message);
+    return event;
+  }
+  StreamSetup setup = read->value ();
+  setup.track = false;
+  note_setup (state, setup);
+  if (!state.track.exists ())
+    return event;
+  setup.track = true;
+  return replace_setup (event, setup);
 }
 
 /* The last line proves that no frame after it is missing. */
@@ -214,7 +233,7 @@ sink_event (GstBaseTransform *base, GstEvent *event) noexcept
   TrackPad &track = self->state->track;
   switch (GST_EVENT_TYPE (event)) {
   case GST_EVENT_TAG:
-    note_setup (self, event);
+    event = take_tags (self, event);
     break;
   case GST_EVENT_STREAM_START:
     track.restart (true);

@@ -38,10 +38,11 @@ DamageReport::frame_damaged (
 }
 
 void
-DamageReport::frame_unknown (guint64 number, GstClockTime pts)
+DamageReport::frame_unknown (
+    guint64 number, GstClockTime pts, const char *reason)
 {
   count (&Counters::unknown);
-  extend (number, pts, "the track has no line for it");
+  extend (number, pts, reason);
 }
 
 void

@@ -26,8 +26,8 @@ public:
   void frame ();
   /** At @p pts; @p reason says what is not as recorded. */
   void frame_damaged (guint64 number, GstClockTime pts, const char *reason);
-  /** The track has no line for it. */
-  void frame_unknown (guint64 number, GstClockTime pts);
+  /** At @p pts; @p reason says why nothing is known of it. */
+  void frame_unknown (guint64 number, GstClockTime pts, const char *reason);
   /** @p count frames of the track, from @p from on, did not come; 0: says
    * nothing. */
   void frames_missing (guint64 count, GstClockTime from);

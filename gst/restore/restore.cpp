@@ -23,8 +23,10 @@
  * report damage; #codedexposure-restore:stats counts it.
  *
  * The schedule of the track wins over that in the container's tags; a
- * difference is a warning. A recording without a track passes unchanged, with a
- * message: it is unknown whether its frames are synchronised or damaged.
+ * difference is a warning. If the tags say that there is a track, a missing one
+ * is damage: all frames are CORRUPTED, with a warning. Any other recording
+ * without a track passes unchanged, with a warning: it is unknown whether its
+ * frames are synchronised or damaged.
  *
  * A frame is held until the next one comes if its line is not there yet.
  *
@@ -83,6 +85,8 @@ struct RestoreState {
   std::optional<StreamSetup> container; ///< setup of the container's tags
   std::optional<StreamSetup> setup;     ///< in force
   std::optional<guint64> last_frame;
+  bool announced = false; ///< the container's tags say that there is a track
+  bool found_line = false;
   bool said_no_track = false;
   bool said_moved = false;
   bool said_setups_differ = false;
@@ -159,9 +163,12 @@ on_tag (Self *self, EventPtr event)
   GstTagList *tags = nullptr;
   gst_event_parse_tag (event.get (), &tags);
   const auto said = setup_from_tags (tags);
+  if (said && *said)
+    state.announced |= said->value ().track;
   if (!said || !*said || !state.track.exists ())
     return gst_pad_push_event (state.src, event.release ());
   state.container = said->value ();
+  state.container->track = false;
   warn_if_different (self, *state.container);
   GstEvent *rest = state.setup ? replace_setup (event.release (), *state.setup)
                                : remove_setup_and_provenance (event.release ());
@@ -177,16 +184,39 @@ report_missing (RestoreState &state, const TrackReader::Match &match)
       match.skipped, GstClockTime (match.skipped_from));
 }
 
-/* A frame without a line: nothing shows that it is as it was recorded. */
+/* A frame without a line: nothing shows that it is as it was recorded. Without
+ * a track, elements downstream number the frames by their times. */
 void
 mark_unknown (RestoreState &state, GstBuffer *frame)
 {
+  const bool has_track = state.track.exists ();
   FrameMeta meta;
   meta.frame = state.last_frame ? *state.last_frame + 1 : 0;
-  set_frame_meta (frame, meta);
+  if (has_track)
+    set_frame_meta (frame, meta);
   state.last_frame = meta.frame;
   GST_BUFFER_FLAG_SET (frame, GST_BUFFER_FLAG_CORRUPTED);
-  state.damage.frame_unknown (meta.frame, GST_BUFFER_PTS (frame));
+  state.damage.frame_unknown (meta.frame, GST_BUFFER_PTS (frame),
+      has_track ? "the track has no line for it" : "its track is missing");
+}
+
+void
+say_no_track (Self *self)
+{
+  RestoreState &state = *self->state;
+  if (std::exchange (state.said_no_track, true))
+    return;
+  if (state.announced)
+    POST_WARNING (self, STREAM, DECODE,
+        "The recording has a track, as its tags say, but no line of it can be "
+        "read: it is damaged, or was copied without its track. It is unknown "
+        "whether its frames are synchronised or damaged; all are flagged. Use "
+        "another copy, with all tracks.");
+  else
+    POST_WARNING (self, STREAM, FORMAT,
+        "The stream has no track: it is unknown whether its frames are "
+        "synchronised or damaged. codedexposure-log writes a track when it "
+        "records.");
 }
 
 /* Remuxing moves all frames alike; so does damage to the first times. */
@@ -214,6 +244,7 @@ restore (Self *self, GstBuffer *frame, const TrackReader::Match &match)
   if (match.skipped > 0)
     GST_BUFFER_FLAG_SET (frame, GST_BUFFER_FLAG_DISCONT);
   state.last_frame = record.frame;
+  state.found_line = true;
   say_moved (self, match);
   const bool same = !record.hash || record.hash == hash_of (frame, state.info);
   if (same && !match.misplaced) {
@@ -240,9 +271,12 @@ ends_early (const RestoreState &state)
 }
 
 void
-check_end (RestoreState &state)
+check_end (Self *self)
 {
+  RestoreState &state = *self->state;
   state.damage.end_sequence ();
+  if (state.announced && state.last_frame && !state.found_line)
+    say_no_track (self);
   if (!state.track.exists ())
     return;
   const auto [rest, complete] =
@@ -283,7 +317,7 @@ take_event (Self *self, EventPtr event)
   case GST_EVENT_TAG:
     return on_tag (self, std::move (event));
   case GST_EVENT_EOS:
-    check_end (state);
+    check_end (self);
     break;
   default:
     break;
@@ -339,16 +373,6 @@ release (Self *self, bool all)
   return flow;
 }
 
-void
-say_no_track (Self *self)
-{
-  if (!std::exchange (self->state->said_no_track, true))
-    POST_WARNING (self, STREAM, FORMAT,
-        "The stream has no track: it is unknown whether its frames are "
-        "synchronised or damaged. codedexposure-log writes a track when it "
-        "records.");
-}
-
 GstFlowReturn
 chain (GstPad *, GstObject *parent, GstBuffer *buffer) noexcept
 {
@@ -358,6 +382,10 @@ chain (GstPad *, GstObject *parent, GstBuffer *buffer) noexcept
   state.damage.frame ();
   if (!state.track.exists () || !GST_BUFFER_PTS_IS_VALID (buffer)) {
     say_no_track (self);
+    if (state.announced) {
+      frame.reset (gst_buffer_make_writable (frame.release ()));
+      mark_unknown (state, frame.get ());
+    }
     return gst_pad_push (state.src, frame.release ());
   }
   state.held.push_back (std::move (frame));
@@ -394,6 +422,7 @@ begin_run (GstElement *element)
   forget_frames (state);
   state.container.reset ();
   state.setup.reset ();
+  state.announced = state.found_line = false;
   state.said_no_track = state.said_setups_differ = state.said_moved = false;
   state.track.restart ();
   state.damage.restart ();

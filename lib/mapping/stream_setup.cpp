@@ -29,6 +29,19 @@ take_pair (Json &root, const char *key, int highest, const std::string &rule)
   return std::pair (first, second);
 }
 
+bool
+take_track (Json &root)
+{
+  const auto found = root.find ("track");
+  if (found == root.end ())
+    return false;
+  if (!found->is_boolean ())
+    throw expected ("track", "true or false", *found);
+  const bool track = found->get<bool> ();
+  root.erase (found);
+  return track;
+}
+
 StreamSetup
 read_setup (Json root)
 {
@@ -48,6 +61,7 @@ read_setup (Json root)
     if (const auto rate = take_pair (root, "rate", kMaxRate,
             "two whole numbers, frames in so many seconds"))
       setup.rate = FrameRate{rate->first, rate->second};
+    setup.track = take_track (root);
   }
   setup.schedule = read_schedule (root);
   return setup;
@@ -75,6 +89,8 @@ StreamSetup::to_json () const
     add_pair ("size", size->width, size->height);
   if (rate)
     add_pair ("rate", rate->num, rate->den);
+  if (track)
+    text += ",\"track\":true";
   if (mapping)
     text += ",\"mapping\":" + mapping->to_json ();
   return text + "}";

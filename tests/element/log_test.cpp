@@ -247,6 +247,41 @@ TEST_F (LogTest, NewScheduleIsWrittenBeforeItsFrames)
   EXPECT_EQ (lines ()[2].at ("tile"), "lattice:8/3");
 }
 
+/* So that a recording whose track is lost does not pass for one without. */
+TEST_F (LogTest, TheTagSaysThatThereIsATrack)
+{
+  for (const bool track : {false, true}) {
+    play (path_.get ());
+    Harness lines (nullptr, gst_harness_teardown);
+    if (track)
+      lines.reset (
+          gst_harness_new_with_element (harness_->element, nullptr, "track"));
+    gst_harness_push_event (harness_.get (),
+        schedule_to_event (*Schedule::from_preset ("staircase:2x2")));
+    ASSERT_EQ (push (frame (0)), GST_FLOW_OK);
+
+    const EventPtr tag (
+        gst_pad_get_sticky_event (harness_->sinkpad, GST_EVENT_TAG, 0));
+    ASSERT_TRUE (tag);
+    GstTagList *tags = nullptr;
+    gst_event_parse_tag (tag.get (), &tags);
+    const auto setup = setup_from_tags (tags);
+    ASSERT_TRUE (setup && *setup);
+    EXPECT_EQ (setup->value ().track, track);
+    EXPECT_EQ (setup->value ().schedule.text (), "staircase:2x2");
+    if (!track)
+      continue;
+    const BufferPtr line (gst_harness_pull (lines.get ()));
+    GstMapInfo map;
+    ASSERT_TRUE (gst_buffer_map (line.get (), &map, GST_MAP_READ));
+    const std::string text (
+        reinterpret_cast<const char *> (map.data), map.size);
+    gst_buffer_unmap (line.get (), &map);
+    EXPECT_NE (text.find ("\"setup\""), std::string::npos);
+    EXPECT_EQ (text.find ("\"track\""), std::string::npos) << text;
+  }
+}
+
 TEST_F (LogTest, FramesPassUntouched)
 {
   play (path_.get ());

@@ -117,17 +117,22 @@ protected:
     return GST_BUFFER_FLAG_IS_SET (
         restored.at (std::size_t (i)).get (), GST_BUFFER_FLAG_CORRUPTED);
   }
-  /** The schedule of the tag that came out last. */
-  std::string schedule ()
+  /** The setup in the tags that came out last. */
+  std::optional<StreamSetup> setup ()
   {
-    std::string text;
+    std::optional<StreamSetup> last;
     while (const EventPtr event = file.pull_event (GST_EVENT_TAG)) {
       GstTagList *tags = nullptr;
       gst_event_parse_tag (event.get (), &tags);
       if (const auto setup = setup_from_tags (tags); setup && *setup)
-        text = setup->value ().schedule.text ();
+        last = setup->value ();
     }
-    return text;
+    return last;
+  }
+  std::string schedule ()
+  {
+    const auto last = setup ();
+    return last ? last->schedule.text () : "";
   }
 
   Recording recording;
@@ -284,6 +289,69 @@ TEST_F (Restore, MarkupIsUnescaped)
   play ();
   EXPECT_FALSE (corrupted (0));
   EXPECT_EQ (schedule (), "staircase:2x2");
+}
+
+/** A setup whose recording has a track. */
+StreamSetup
+with_track (const char *schedule)
+{
+  StreamSetup setup = setup_of (schedule);
+  setup.track = true;
+  return setup;
+}
+
+TEST_F (Restore, WhatFollowsHasNoTrack)
+{
+  file.push_event (setup_to_event (with_track ("staircase:2x2")));
+  play ();
+  const auto last = setup ();
+  ASSERT_TRUE (last);
+  EXPECT_FALSE (last->track);
+  EXPECT_EQ (file.warning (), "");
+  EXPECT_FALSE (file.posted<FramesDamaged> ());
+}
+
+TEST_F (Restore, ATrackWithoutAnyLineIsDamage)
+{
+  file.push_event (setup_to_event (with_track ("staircase:2x2")));
+  for (int i = 0; i < kFrames; i++)
+    push_frame (i);
+  end ();
+  for (int i = 0; i < kFrames; i++) {
+    restored.push_back (file.pull ());
+    ASSERT_TRUE (restored.back ()) << i;
+    EXPECT_TRUE (corrupted (i)) << i;
+  }
+  EXPECT_TRUE (file.posted<FramesDamaged> ());
+  EXPECT_NE (file.warning ().find ("another copy"), std::string::npos);
+}
+
+TEST (RestoreWithoutATrack, AMissingTrackIsDamageIfTheTagsSayThatThereIsOne)
+{
+  ElementHarness file ("codedexposure-restore");
+  file.set_caps (gray_caps (8, 8));
+  file.push_event (setup_to_event (with_track ("sequential:4x1")));
+  for (int i = 0; i < 2; i++)
+    ASSERT_EQ (file.push (picture (i)), GST_FLOW_OK);
+  file.push_event (gst_event_new_eos ());
+  for (int i = 0; i < 2; i++) {
+    const BufferPtr frame = file.pull ();
+    ASSERT_TRUE (frame);
+    EXPECT_TRUE (
+        GST_BUFFER_FLAG_IS_SET (frame.get (), GST_BUFFER_FLAG_CORRUPTED));
+    const auto meta = get_frame_meta (frame.get ());
+    EXPECT_FALSE (meta) << "its number and synchronisation are unknown";
+  }
+  EXPECT_EQ (counter_of (file.element (), "frames-unknown"), 2u);
+  const auto begin = file.posted<FramesDamaged> ();
+  ASSERT_TRUE (begin);
+  EXPECT_TRUE (begin->active);
+  EXPECT_EQ (begin->reason, std::string ("its track is missing"));
+  const auto over = file.posted<FramesDamaged> ();
+  ASSERT_TRUE (over);
+  EXPECT_EQ (over->count, 2u);
+  EXPECT_NE (file.warning ().find ("another copy"), std::string::npos);
+  EXPECT_EQ (file.warning (), "");
 }
 
 TEST (RestoreWithoutATrack, FramesPassAndItIsSaidOnce)

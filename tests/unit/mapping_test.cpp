@@ -354,6 +354,23 @@ TEST (StreamSetup, CarriesAMappingBesideTheSchedule)
   EXPECT_EQ (*StreamSetup::from_json (Schedule ().to_json ()), StreamSetup{});
 }
 
+TEST (StreamSetup, SaysWhetherATrackAccompaniesTheFrames)
+{
+  StreamSetup setup;
+  EXPECT_EQ (setup.to_json ().find ("track"), std::string::npos);
+  setup.track = true;
+  const std::string json = setup.to_json ();
+  EXPECT_NE (json.find (R"(,"track":true})"), std::string::npos) << json;
+  const auto read = StreamSetup::from_json (json);
+  ASSERT_TRUE (read.ok ()) << read.error ().message;
+  EXPECT_EQ (*read, setup);
+
+  std::string wrong = json;
+  wrong.replace (wrong.find ("true"), 4, "1");
+  EXPECT_EQ (StreamSetup::from_json (wrong).error ().message,
+      "schedule JSON: key 'track' must be true or false, not 1");
+}
+
 TEST (StreamSetup, NamesWhatIsWrongInside)
 {
   std::string json = Schedule ().to_json ();

@@ -2,33 +2,31 @@
 /* Another process of this program. */
 #pragma once
 
-#include <cstdio>
 #include <string>
 #include <vector>
 
-#include <sys/types.h>
+#include "child_process.h"
 
 namespace codedexposure::campaign
 {
 
-class Child
+/** Runs a part of run_child (), and is heard on its standard output. */
+class Child : public test::ChildProcess
 {
 public:
-  Child (const std::string &part, const std::vector<std::string> &words);
-  ~Child ();
-  Child (const Child &) = delete;
-  Child &operator= (const Child &) = delete;
-
-  /** Waits for a line with @p part on its standard output. */
-  bool await (const std::string &part);
-  /** Types a line. */
-  void type (const std::string &line);
-  void end (int signal);
+  Child (const std::string &part, const std::vector<std::string> &words)
+      : ChildProcess (command (part, words), STDOUT_FILENO)
+  {
+  }
 
 private:
-  pid_t id_ = 0;
-  FILE *in_ = nullptr;
-  FILE *out_ = nullptr;
+  static std::vector<std::string> command (
+      const std::string &part, const std::vector<std::string> &words)
+  {
+    std::vector<std::string> all{"/proc/self/exe", "--child", part};
+    all.insert (all.end (), words.begin (), words.end ());
+    return all;
+  }
 };
 
 } // namespace codedexposure::campaign

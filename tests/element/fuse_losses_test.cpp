@@ -60,11 +60,8 @@ TEST_F (Fuse, AFlushDropsWhatWaits)
 {
   start ("schedule=sequential:lattice:4/2 lookahead=1");
   push (0);
-  ASSERT_TRUE (fuse->push_event (gst_event_new_flush_start ()));
-  ASSERT_TRUE (fuse->push_event (gst_event_new_flush_stop (TRUE)));
-  GstSegment segment;
-  gst_segment_init (&segment, GST_FORMAT_TIME);
-  ASSERT_TRUE (fuse->push_event (gst_event_new_segment (&segment)));
+  flush ();
+  push_segment ();
   push (7, 0);
   ASSERT_TRUE (fuse->push_event (gst_event_new_eos ()));
   EXPECT_EQ (pull_images (), expected ("sequential:lattice:4/2", {7}));
@@ -76,11 +73,8 @@ TEST_F (Fuse, FusesAgainAfterAFlush)
   start ("schedule=sequential:2x2 quality=balanced threads=2");
   push (0);
   pull_all ();
-  ASSERT_TRUE (fuse->push_event (gst_event_new_flush_start ()));
-  ASSERT_TRUE (fuse->push_event (gst_event_new_flush_stop (TRUE)));
-  GstSegment segment;
-  gst_segment_init (&segment, GST_FORMAT_TIME);
-  ASSERT_TRUE (fuse->push_event (gst_event_new_segment (&segment)));
+  flush ();
+  push_segment ();
   push (7, 0);
   FuseOptions options;
   options.quality = FuseQuality::kBalanced;
@@ -121,18 +115,13 @@ TEST_F (Fuse, LossesAndBreaksAreDiscont)
 
 TEST_F (Fuse, ANewSegmentIsNoLoss)
 {
-  for (const bool flush : {false, true}) {
+  for (const bool with_flush : {false, true}) {
     start ();
     push (0);
     push (0, kPeriod);
-    if (flush) {
-      ASSERT_TRUE (fuse->push_event (gst_event_new_flush_start ()));
-      ASSERT_TRUE (fuse->push_event (gst_event_new_flush_stop (TRUE)));
-    }
-    GstSegment segment;
-    gst_segment_init (&segment, GST_FORMAT_TIME);
-    segment.start = 10 * GST_SECOND;
-    ASSERT_TRUE (fuse->push_event (gst_event_new_segment (&segment)));
+    if (with_flush)
+      flush ();
+    push_segment (10 * GST_SECOND);
     push (0, 10 * GST_SECOND);
     EXPECT_EQ (counter_of (fuse->element (), "frames-lost"), 0u);
     EXPECT_FALSE (fuse->posted<FramesLost> ());

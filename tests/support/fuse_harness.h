@@ -74,6 +74,18 @@ protected:
     ASSERT_EQ (fuse->push (std::move (frame)), GST_FLOW_OK);
   }
   void push (int number) { push (number, GstClockTime (number) * kPeriod); }
+  void push_segment (GstClockTime start = 0)
+  {
+    GstSegment segment;
+    gst_segment_init (&segment, GST_FORMAT_TIME);
+    segment.start = start;
+    ASSERT_TRUE (fuse->push_event (gst_event_new_segment (&segment)));
+  }
+  void flush ()
+  {
+    ASSERT_TRUE (fuse->push_event (gst_event_new_flush_start ()));
+    ASSERT_TRUE (fuse->push_event (gst_event_new_flush_stop (TRUE)));
+  }
   std::vector<BufferPtr> pull_all () { return fuse->pull_all (); }
   template <typename Pixel = std::uint8_t>
   std::vector<Image<Pixel>> pull_images ()

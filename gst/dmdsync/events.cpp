@@ -145,6 +145,18 @@ moved_gap (GstDmdSync *self, GstEvent *event)
   return moved;
 }
 
+/* The tag has the size and the rate; before a segment, it is due anyway. */
+gboolean
+take_caps (GstDmdSync *self, GstEvent *event)
+{
+  Stream &stream = state (self).stream;
+  const bool said = !stream.tag_due;
+  if (!base_transform_class ()->sink_event (GST_BASE_TRANSFORM (self), event))
+    return FALSE;
+  stream.tag_due |= said;
+  return !said || push_tag (self);
+}
+
 gboolean
 take_segment (GstDmdSync *self, GstEvent *event)
 {
@@ -256,6 +268,8 @@ sink_event (GstBaseTransform *trans, GstEvent *event)
     if (st.stream.time)
       begin_frames (self, 0);
     break;
+  case GST_EVENT_CAPS:
+    return take_caps (self, event);
   case GST_EVENT_SEGMENT:
     return take_segment (self, event);
   case GST_EVENT_TAG:

@@ -251,6 +251,8 @@ set_info (GstVideoFilter *filter, GstCaps *, GstVideoInfo *in_info, GstCaps *,
   auto *self = GST_CODED_EXPOSURE_SIM (filter);
   drop_exposure (self, Drop::kCaps);
   state (self).stream.bench.reset ();
+  /* The tag has the size and the rate. */
+  state (self).stream.tag_due = true;
   return make_plan (self, *in_info, *out_info);
 }
 

@@ -106,6 +106,23 @@ TEST (DmdsyncTag, StaysAmongTagsThatComeLater)
 }
 
 /* Downstream keeps global tags and stream tags separate. */
+TEST (DmdsyncTag, AnotherSizeIsSaidBeforeItsFirstFrame)
+{
+  SyncHarness sync;
+  sync.start ();
+  sync.send_frames (0, 1);
+  ASSERT_TRUE (sync.pull_event (GST_EVENT_TAG));
+  EXPECT_FALSE (sync.pull_event (GST_EVENT_TAG));
+  sync.set_caps (gray_caps (32, 48));
+  GstTagList *tags = nullptr;
+  const EventPtr event = sync.pull_event (GST_EVENT_TAG);
+  ASSERT_TRUE (event);
+  gst_event_parse_tag (event.get (), &tags);
+  const auto setup = setup_from_tags (tags);
+  ASSERT_TRUE (setup && *setup);
+  EXPECT_EQ (setup->value ().size, (Extent{32, 48}));
+}
+
 TEST (DmdsyncTag, KeepsTheScopeOfTheTagsThatItCorrects)
 {
   for (const GstTagScope scope : {GST_TAG_SCOPE_GLOBAL, GST_TAG_SCOPE_STREAM}) {

@@ -459,6 +459,20 @@ TEST (SimTag, TheLastTagsOfTheStreamHaveTheSchedule)
   EXPECT_EQ (schedule_in (kept.get ()), "sequential:2x2");
 }
 
+TEST (SimTag, AnotherSizeIsSaidBeforeItsFirstFrame)
+{
+  SimHarness sim;
+  sim.start (2, 2);
+  sim.send_range (0, 4);
+  sim.start (4, 2);
+  sim.send_range (4, 8);
+  EXPECT_EQ (sim.counter ("frames-out"), 2u);
+  const std::vector<std::string> said = comments (sim);
+  ASSERT_FALSE (said.empty ());
+  EXPECT_NE (said.back ().find (R"("size":[4,2])"), std::string::npos)
+      << said.back ();
+}
+
 TEST (SimTag, TagsOfUpstreamPass)
 {
   SimHarness sim;

@@ -40,11 +40,11 @@
  * ## Example pipeline
  *
  * |[
- * gst-launch-1.0 -m codedexposure-camerasrc camera-name=192.168.1.20
- * pixel-format=Mono12Packed trigger=dmd trigger-line=Line1 reconnect=60 !
- * video/x-raw,width=768,height=576,framerate=25/1 !
- * dmdsync device=usb: timestamp-at=device-clock ! codedexposure-demux !
- * queue ! codedexposure-view ! videoconvert ! autovideosink
+ * gst-launch-1.0 -m codedexposure-camerasrc camera-name=192.168.1.20 \
+ *     pixel-format=Mono12Packed trigger=dmd trigger-line=Line1 reconnect=60 \
+ *     ! video/x-raw,width=768,height=576,framerate=25/1 \
+ *     ! dmdsync device=usb: timestamp-at=device-clock ! codedexposure-demux \
+ *     ! queue ! codedexposure-view ! videoconvert ! autovideosink
  * ]|
  *
  * Since: 0.2

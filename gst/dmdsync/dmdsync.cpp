@@ -85,18 +85,18 @@
  * ## Example pipelines
  *
  * |[
- * gst-launch-1.0 -m videotestsrc num-buffers=800 pattern=ball !
- * video/x-raw,format=GRAY8,width=768,height=576,framerate=100/1 !
- * codedexposure-sim dmd=sim:bench !
- * dmdsync device=sim:bench schedule=staircase:2x2 ! codedexposure-demux !
- * queue ! videoconvert ! autovideosink
+ * gst-launch-1.0 -m videotestsrc num-buffers=800 pattern=ball \
+ *     ! video/x-raw,format=GRAY8,width=768,height=576,framerate=100/1 \
+ *     ! codedexposure-sim dmd=sim:bench \
+ *     ! dmdsync device=sim:bench schedule=staircase:2x2 ! codedexposure-demux \
+ *     ! queue ! videoconvert ! autovideosink
  * ]| A simulated bench whose mirrors dmdsync drives.
  * |[
- * gst-launch-1.0 -m videotestsrc num-buffers=800 pattern=ball !
- * video/x-raw,format=GRAY8,width=768,height=576,framerate=100/1 !
- * codedexposure-sim dmd=sim:bench !
- * dmdsync device=sim:bench,slip-at=401 schedule=sequential:2x2,pilot=16 !
- * fakesink
+ * gst-launch-1.0 -m videotestsrc num-buffers=800 pattern=ball \
+ *     ! video/x-raw,format=GRAY8,width=768,height=576,framerate=100/1 \
+ *     ! codedexposure-sim dmd=sim:bench \
+ *     ! dmdsync device=sim:bench,slip-at=401 schedule=sequential:2x2,pilot=16 \
+ *     ! fakesink
  * ]| The same with a DMD that misses a trigger in slot 401: `dmdsync/slip` and,
  * after the restart of the DMD, `dmdsync/locked` appear among the messages.
  *

@@ -30,11 +30,11 @@
  *
  * ## Example pipeline
  * |[
- * gst-launch-1.0 -e videotestsrc num-buffers=100 !
- * video/x-raw,format=GRAY8,framerate=100/1 ! codedexposure-sim !
- * codedexposure-log name=log ! queue ! avenc_ffv1 ! mux.video_0
- * log.track ! queue ! mux.subtitle_0
- * matroskamux name=mux timecodescale=1000 ! filesink location=coded.mkv
+ * gst-launch-1.0 -e videotestsrc num-buffers=100 \
+ *     ! video/x-raw,format=GRAY8,framerate=100/1 ! codedexposure-sim \
+ *     ! codedexposure-log name=log ! queue ! avenc_ffv1 ! mux.video_0 \
+ *     log.track ! queue ! mux.subtitle_0 \
+ *     matroskamux name=mux timecodescale=1000 ! filesink location=coded.mkv
  * ]|
  *
  * Since: 0.1

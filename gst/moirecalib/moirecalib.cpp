@@ -40,12 +40,12 @@
  * ## Example pipeline
  *
  * |[
- * gst-launch-1.0 -m videotestsrc pattern=white !
- * video/x-raw,format=GRAY8,width=768,height=576,framerate=100/1 !
- * codedexposure-sim dmd=sim:bench rotation=0.5 scale=1.01 !
- * dmdsync device=sim:bench,size=768x576 !
- * moirecalib mode=map location=mapping.json report=mapping.png !
- * videoconvert ! autovideosink
+ * gst-launch-1.0 -m videotestsrc num-buffers=1200 pattern=white \
+ *     ! video/x-raw,format=GRAY8,width=768,height=576,framerate=100/1 \
+ *     ! codedexposure-sim dmd=sim:bench rotation=0.5 scale=1.01 \
+ *     ! dmdsync device=sim:bench,size=768x576 \
+ *     ! moirecalib mode=map location=mapping.json report=mapping.png \
+ *     ! videoconvert ! autovideosink
  * ]| A simulated bench is mapped; the mapping is in mapping.json.
  *
  * Since: 0.1

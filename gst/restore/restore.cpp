@@ -32,10 +32,10 @@
  *
  * ## Example pipeline
  * |[
- * gst-launch-1.0 filesrc location=coded.mkv ! matroskademux name=file
- * file.video_0 ! queue ! avdec_ffv1 ! codedexposure-restore name=restore !
- * codedexposure-demux ! queue ! videoconvert ! autovideosink
- * file.subtitle_0 ! restore.track
+ * gst-launch-1.0 filesrc location=coded.mkv ! matroskademux name=file \
+ *     file.video_0 ! queue ! avdec_ffv1 ! codedexposure-restore name=restore \
+ *     ! codedexposure-demux ! queue ! videoconvert ! autovideosink \
+ *     file.subtitle_0 ! restore.track
  * ]|
  *
  * Since: 0.1

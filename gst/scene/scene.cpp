@@ -12,10 +12,10 @@
  *
  * ## Example pipeline
  * |[
- * gst-launch-1.0 codedexposure-scene scene=blown-out num-buffers=100 !
- * video/x-raw,format=GRAY8,width=768,height=576,framerate=100/1 !
- * codedexposure-sim full-well=10000 ! codedexposure-demux ! queue !
- * videoconvert ! autovideosink
+ * gst-launch-1.0 codedexposure-scene scene=blown-out num-buffers=100 \
+ *     ! video/x-raw,format=GRAY8,width=768,height=576,framerate=100/1 \
+ *     ! codedexposure-sim full-well=10000 ! codedexposure-demux ! queue \
+ *     ! videoconvert ! autovideosink
  * ]|
  *
  * Since: 0.1

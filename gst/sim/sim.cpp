@@ -73,23 +73,23 @@
  * ## Example pipelines
  *
  * |[
- * gst-launch-1.0 videotestsrc num-buffers=400 pattern=ball !
- * video/x-raw,format=GRAY8,width=768,height=576,framerate=100/1 !
- * codedexposure-sim full-well=10000 read-noise=5 psf-sigma=0.5 !
- * codedexposure-demux ! queue ! videoconvert ! autovideosink
+ * gst-launch-1.0 videotestsrc num-buffers=400 pattern=ball \
+ *     ! video/x-raw,format=GRAY8,width=768,height=576,framerate=100/1 \
+ *     ! codedexposure-sim full-well=10000 read-noise=5 psf-sigma=0.5 \
+ *     ! codedexposure-demux ! queue ! videoconvert ! autovideosink
  * ]| Coded at 25 frames/s, decoded to 100, with the noise of a real camera.
  * |[
- * gst-launch-1.0 videotestsrc num-buffers=400 pattern=ball !
- * video/x-raw,format=GRAY8,width=768,height=576,framerate=200/1 !
- * codedexposure-sim schedule=staircase:2x2,active=9.8ms,switching=0.2ms !
- * video/x-raw,framerate=25/1 ! avenc_ffv1 ! matroskamux !
- * filesink location=coded.mkv
+ * gst-launch-1.0 videotestsrc num-buffers=400 pattern=ball \
+ *     ! video/x-raw,format=GRAY8,width=768,height=576,framerate=200/1 \
+ *     ! codedexposure-sim schedule=staircase:2x2,active=9.8ms,switching=0.2ms \
+ *     ! video/x-raw,framerate=25/1 ! avenc_ffv1 ! matroskamux \
+ *     ! filesink location=staircase.mkv
  * ]| Two input frames a slot, mirrors that take time to switch, recorded.
  * |[
- * gst-launch-1.0 videotestsrc num-buffers=400 pattern=ball !
- * video/x-raw,format=GRAY8,width=768,height=576,framerate=100/1 !
- * codedexposure-sim dmd=sim:bench ! dmdsync device=sim:bench !
- * codedexposure-demux ! queue ! videoconvert ! autovideosink
+ * gst-launch-1.0 videotestsrc num-buffers=400 pattern=ball \
+ *     ! video/x-raw,format=GRAY8,width=768,height=576,framerate=100/1 \
+ *     ! codedexposure-sim dmd=sim:bench ! dmdsync device=sim:bench \
+ *     ! codedexposure-demux ! queue ! videoconvert ! autovideosink
  * ]| The masks come from a simulated DMD, as on a bench.
  *
  * Since: 0.1

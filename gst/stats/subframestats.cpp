@@ -24,16 +24,17 @@
  *
  * ## Example pipelines
  * |[
- * gst-launch-1.0 filesrc location=coded.mkv ! matroskademux ! avdec_ffv1 !
- * codedexposure-demux name=demux ! queue !
- * subframestats location=subframes.csv format=csv line=row:50% ! fakesink
- * demux.coded ! queue ! subframestats location=coded.csv format=csv ! fakesink
+ * gst-launch-1.0 filesrc location=coded.mkv ! matroskademux ! avdec_ffv1 \
+ *     ! codedexposure-demux name=demux ! queue \
+ *     ! subframestats location=subframes.csv format=csv line=row:50% \
+ *     ! fakesink demux.coded ! queue \
+ *     ! subframestats location=coded.csv format=csv ! fakesink
  * ]|
  * |[
- * gst-launch-1.0 -m videotestsrc num-buffers=8 !
- * video/x-raw,format=GRAY8,framerate=100/1 ! codedexposure-sim !
- * codedexposure-demux ! subframestats post-messages=true histogram-bins=8 !
- * fakesink
+ * gst-launch-1.0 -m videotestsrc num-buffers=8 \
+ *     ! video/x-raw,format=GRAY8,framerate=100/1 ! codedexposure-sim \
+ *     ! codedexposure-demux \
+ *     ! subframestats post-messages=true histogram-bins=8 ! fakesink
  * ]|
  *
  * Since: 0.1

@@ -15,9 +15,10 @@
  *
  * ## Example pipeline
  * |[
- * gst-launch-1.0 videotestsrc ! video/x-raw,format=GRAY16_LE,framerate=100/1 !
- * codedexposure-sim bits=12 ! codedexposure-demux ! codedexposure-view !
- * videoconvert ! autovideosink
+ * gst-launch-1.0 videotestsrc num-buffers=400 \
+ *     ! video/x-raw,format=GRAY16_LE,framerate=100/1 \
+ *     ! codedexposure-sim bits=12 ! codedexposure-demux ! codedexposure-view \
+ *     ! videoconvert ! autovideosink
  * ]| Shows the pictures of a 12-bit camera.
  *
  * Since: 0.1

@@ -495,15 +495,16 @@ video_output ()
     *.mkv) lossless_video "$1" ;;
     *.mp4)
       # All players and browsers support 4:2:0 with even sides and values from
-      # 16 to 235. From grey, videoconvert would not scale the values, so they go
-      # through colour, with 16 bits for exact values. Without its buffer, x264
-      # has no limit of the bit rate. The fragments of a file that was not
-      # finished can be played.
+      # 16 to 235. From grey, videoconvert would not scale the values, so they
+      # go through colour, with 16 bits for exact values. All other modes of
+      # x264 spend less on pictures that follow each other fast, but these are
+      # looked at one by one. The fragments of a file that was not finished can
+      # be played.
       for_display
       printf 'videoconvert ! video/x-raw,format=ARGB64 ! videoconvert ! '
       printf 'videoscale ! %s ! ' \
         'video/x-raw,format=I420,width=[2,65536,2],height=[2,65536,2]'
-      printf 'x264enc pass=qual quantizer=18 vbv-buf-capacity=0 '
+      printf 'x264enc pass=quant quantizer=18 vbv-buf-capacity=0 '
       printf 'speed-preset=veryfast ! h264parse ! mp4mux fragment-duration=1000 '
       printf 'fragment-mode=first-moov-then-finalise ! filesink location=%s ' \
         "$(quoted "$1")"

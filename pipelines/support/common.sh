@@ -221,7 +221,7 @@ run ()
   trap "stopped=1; kill -TERM $child 2>/dev/null || true" INT TERM HUP
   while
     status=0
-    wait "$child" || status=$?
+    wait "$child" 2>/dev/null || status=$?
     kill -0 "$child" 2>/dev/null
   do :; done
   wait "$child" 2>/dev/null || status=$?
@@ -246,6 +246,9 @@ launch ()
   fi
   run "$launcher" --what="$script" ${opt[force]:+--force} \
     ${opt[verbose]:+--verbose} ${opt[camera]:+--camera} "$@" || status=$?
+  [ "$status" -le 128 ] || say "the pipeline was ended by" \
+    "SIG$(kill -l "$status"); what it wrote is in files that end in .part," \
+    "which can be renamed and decoded"
   no_frame=
   if [ "$status" = 5 ]; then
     no_frame=1 status=1

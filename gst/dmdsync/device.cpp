@@ -97,9 +97,28 @@ open_device (GstDmdSync *self)
         "Cannot open the DMD \"" + device + "\": " + dmd.error ().message);
     return false;
   }
-  st.runner = std::make_unique<DmdRunner> (*std::move (dmd), reports (self));
+  auto runner = std::make_shared<DmdRunner> (*std::move (dmd), reports (self));
+  {
+    const ObjectLock lock (self);
+    st.runner = std::move (runner);
+  }
   GST_INFO_OBJECT (self, "opened %s", device.c_str ());
   return true;
+}
+
+std::shared_ptr<DmdRunner>
+runner_of (GstDmdSync *self)
+{
+  const ObjectLock lock (self);
+  return state (self).runner;
+}
+
+void
+close_device (GstDmdSync *self)
+{
+  std::shared_ptr<DmdRunner> runner;
+  const ObjectLock lock (self);
+  runner.swap (state (self).runner);
 }
 
 void

@@ -203,7 +203,7 @@ change_state (GstElement *element, GstStateChange transition)
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY)
     forget_stream (self);
   if (transition == GST_STATE_CHANGE_READY_TO_NULL)
-    self->state->runner.reset ();
+    sync::close_device (self);
   return changed;
 }
 

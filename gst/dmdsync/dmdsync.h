@@ -133,7 +133,10 @@ struct SyncState {
 
   /* Changed by changes of state only, while nothing flows or is uploaded. */
   Schedule schedule;
-  std::unique_ptr<DmdRunner> runner; ///< null: no DMD is driven
+  /** Null: no DMD is driven. Changed under the object lock; what may come while
+   * the element stops, from another thread than that of the frames, holds it by
+   * runner_of (). */
+  std::shared_ptr<DmdRunner> runner;
 
   std::atomic<bool> uploading = false;
 
@@ -183,11 +186,15 @@ bool read_schedule (GstDmdSync *self);
 bool open_device (GstDmdSync *self);
 /** Parks the mirrors, whatever they are at. */
 void park (GstDmdSync *self);
+/** Destroys the runner, or leaves that to whoever still holds it. */
+void close_device (GstDmdSync *self);
+/** For any thread: keeps the runner beyond a change of state. */
+std::shared_ptr<DmdRunner> runner_of (GstDmdSync *self);
 
 /* Patterns, which elements downstream request. */
 /** False when the pattern cannot be shown, with a warning that says why. */
 bool take_request (GstDmdSync *self, const PatternRequest &request);
-MirrorsAnswer describe_mirrors (const SyncState &st);
+MirrorsAnswer describe_mirrors (GstDmdSync *self);
 /** Shows the schedule again. */
 void give_back (GstDmdSync *self, const char *reason);
 /** What a frame shows. */

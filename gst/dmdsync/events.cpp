@@ -279,8 +279,8 @@ sink_event (GstBaseTransform *trans, GstEvent *event)
     event = moved_gap (self, event);
     break;
   case GST_EVENT_FLUSH_START:
-    if (st.runner)
-      st.runner->interrupt (true);
+    if (const auto runner = runner_of (self))
+      runner->interrupt (true);
     break;
   case GST_EVENT_EOS:
     note_end (self);
@@ -323,7 +323,7 @@ query (GstBaseTransform *trans, GstPadDirection direction, GstQuery *query)
 {
   const SyncState &st = state (trans);
   if (direction == GST_PAD_SRC && is_query<MirrorsAnswer> (query)) {
-    answer_query (query, describe_mirrors (st));
+    answer_query (query, describe_mirrors (GST_DMD_SYNC (trans)));
     return TRUE;
   }
   if (!base_transform_class ()->query (trans, direction, query))

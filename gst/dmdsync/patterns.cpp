@@ -25,11 +25,11 @@ constexpr guint64 kFrames = 250;
 
 /** Why no pattern can be shown; "": it can. */
 std::string
-obstacle (const SyncState &st)
+obstacle (const DmdRunner *runner)
 {
-  if (!st.runner)
+  if (!runner)
     return "dmdsync drives no DMD; set its device property";
-  const DmdInfo &info = st.runner->info ();
+  const DmdInfo &info = runner->info ();
   if (!info.still_masks)
     return info.name +
            " takes no masks at run time; put the pattern on the device by its "
@@ -47,8 +47,8 @@ refuse (GstDmdSync *self, const std::string &pattern, const std::string &why)
 
 /* False where there is no stream. */
 bool
-send (GstDmdSync *self, const Pattern &pattern, const std::string &text,
-    guint64 frames)
+send (GstDmdSync *self, DmdRunner &runner, const Pattern &pattern,
+    const std::string &text, guint64 frames)
 {
   SyncState &st = state (self);
   const std::lock_guard order (st.pattern_order);
@@ -61,7 +61,7 @@ send (GstDmdSync *self, const Pattern &pattern, const std::string &text,
       return true;
     }
   }
-  if (!time || st.runner->halted () || st.runner->failed ())
+  if (!time || runner.halted () || runner.failed ())
     return false;
   {
     const ObjectLock lock (self);
@@ -69,12 +69,11 @@ send (GstDmdSync *self, const Pattern &pattern, const std::string &text,
     st.switches++;
   }
   GST_INFO_OBJECT (self, "shows %s", text.c_str ());
-  st.runner->show (
-      {.name = "the pattern " + text,
-          .on = [pattern] (int x, int y) { return pattern.on (x, y); },
-          /* As bright as coded frames: no setting of the camera has to
-           * change. */
-          .slots = st.schedule.max_on_slots ()},
+  runner.show ({.name = "the pattern " + text,
+                   .on = [pattern] (int x, int y) { return pattern.on (x, y); },
+                   /* As bright as coded frames: no setting of the camera has to
+                    * change. */
+                   .slots = st.schedule.max_on_slots ()},
       time->plan);
   return true;
 }
@@ -82,12 +81,13 @@ send (GstDmdSync *self, const Pattern &pattern, const std::string &text,
 bool
 show (GstDmdSync *self, const std::string &text, guint64 frames)
 {
-  if (const std::string why = obstacle (state (self)); !why.empty ())
+  const auto runner = runner_of (self);
+  if (const std::string why = obstacle (runner.get ()); !why.empty ())
     return refuse (self, text, why);
   const Result<Pattern> pattern = Pattern::parse (text);
   if (!pattern)
     return refuse (self, text, pattern.error ().message);
-  if (!send (self, *pattern, text, frames))
+  if (!send (self, *runner, *pattern, text, frames))
     return refuse (self, text, "there is no stream yet, or no more");
   return true;
 }
@@ -98,18 +98,20 @@ restore (GstDmdSync *self)
 {
   SyncState &st = state (self);
   const std::lock_guard order (st.pattern_order);
+  std::shared_ptr<DmdRunner> runner;
   std::string pattern;
   SlotPlan plan;
   {
     const ObjectLock lock (self);
-    if (!st.pattern || !st.time)
+    if (!st.pattern || !st.time || !st.runner)
       return std::nullopt;
+    runner = st.runner;
     pattern = st.pattern->text;
     st.pattern.reset ();
     st.switches++;
     plan = st.time->plan;
   }
-  st.runner->restore (st.schedule, plan);
+  runner->restore (st.schedule, plan);
   return pattern;
 }
 
@@ -136,10 +138,11 @@ take_request (GstDmdSync *self, const PatternRequest &request)
 }
 
 MirrorsAnswer
-describe_mirrors (const SyncState &st)
+describe_mirrors (GstDmdSync *self)
 {
-  const std::string why = obstacle (st);
-  const Extent size = st.runner ? st.runner->info ().shown () : Extent{0, 0};
+  const auto runner = runner_of (self);
+  const std::string why = obstacle (runner.get ());
+  const Extent size = runner ? runner->info ().shown () : Extent{0, 0};
   return {size.width, size.height, why.empty (), why};
 }
 

@@ -244,7 +244,7 @@ collect_light (GstCodedExposureSim *self, GstBuffer *inbuf)
   Stream &stream = state (self).stream;
   const Plan &plan = *stream.plan;
   Exposure &exposure = *stream.exposure;
-  const auto &shares = plan.shares[std::size_t (exposure.taken++)];
+  const auto &shares = plan.shares[std::size_t (exposure.taken)];
   if (GST_BUFFER_FLAG_IS_SET (inbuf, GST_BUFFER_FLAG_CORRUPTED))
     GST_BUFFER_FLAG_SET (exposure.outbuf.get (), GST_BUFFER_FLAG_CORRUPTED);
 
@@ -257,6 +257,7 @@ collect_light (GstCodedExposureSim *self, GstBuffer *inbuf)
       stream.bench->expose (pixels, mask, share.slots);
     });
   }
+  exposure.taken++;
   return GST_FLOW_OK;
 }
 
@@ -448,6 +449,8 @@ generate_output (GstBaseTransform *trans, GstBuffer **outbuf)
     flow = begin_exposure (self, inbuf.get ());
   if (flow == GST_FLOW_OK)
     flow = collect_light (self, inbuf.get ());
+  if (flow != GST_FLOW_OK)
+    drop_exposure (self, Drop::kGap);
   if (flow != GST_FLOW_OK || stream.exposure->taken < stream.plan->inputs)
     return flow;
 

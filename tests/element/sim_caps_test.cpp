@@ -175,6 +175,26 @@ TEST (SimError, RefusesToStartWithWhatItCannotRead)
   }
 }
 
+TEST (SimError, AnExposureEndsAtAFrameThatCannotBeRead)
+{
+  SimHarness sim ("schedule=sequential:2x2");
+  sim.start (8, 6);
+  const auto push = [&] (int frame, int height) {
+    return sim.push (frame_of (
+        flat<std::uint8_t> (8, height, 100), GstClockTime (frame) * 10 * kMs));
+  };
+  for (int frame = 0; frame < 3; frame++)
+    ASSERT_EQ (push (frame, 6), GST_FLOW_OK);
+  EXPECT_EQ (push (3, 5), GST_FLOW_ERROR);
+  EXPECT_EQ (property<guint64> (sim.element (), "frames-dropped"), 1u);
+  for (int frame = 4; frame < 8; frame++)
+    ASSERT_EQ (push (frame, 6), GST_FLOW_OK);
+  const BufferPtr coded = sim.pull ();
+  ASSERT_TRUE (coded);
+  EXPECT_EQ (GST_BUFFER_PTS (coded.get ()), 40 * kMs);
+  EXPECT_FALSE (sim.pull ());
+}
+
 TEST (SimError, ABufferThatIsTooSmallIsSaid)
 {
   SimHarness sim;

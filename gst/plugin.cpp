@@ -14,7 +14,7 @@ plugin_init (GstPlugin *plugin)
   register_meta (kFrameMetaName);
   register_meta (kStatsMetaName);
   codedexposure::serve_simulated_dmds ();
-#ifdef CODEDEXPOSURE_CAMERA_PROVIDER
+#ifdef CODEDEXPOSURE_ARAVIS
   if (!GST_DEVICE_PROVIDER_REGISTER (codedexposure_cameraprovider, plugin))
     return FALSE;
 #endif

@@ -172,6 +172,8 @@ change_state (GstElement *element, GstStateChange transition)
     return GST_STATE_CHANGE_FAILURE;
   if (transition == GST_STATE_CHANGE_READY_TO_PAUSED && !begin_run (self))
     return GST_STATE_CHANGE_FAILURE;
+  if (transition == GST_STATE_CHANGE_PLAYING_TO_PAUSED)
+    camera::stop_silent_camera (self);
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY)
     camera::end_watch (self);
   const GstStateChangeReturn changed =
@@ -193,6 +195,28 @@ handle_message (GstBin *bin, GstMessage *message)
     return gst_message_unref (message);
   GST_BIN_CLASS (gst_coded_exposure_camera_src_parent_class)
       ->handle_message (bin, message);
+}
+
+/* aravissrc looks at an end only between two frames, and not while it is
+ * restarted. */
+gboolean
+send_event (GstElement *element, GstEvent *event)
+{
+  if (GST_EVENT_TYPE (event) != GST_EVENT_EOS ||
+      !GST_CODED_EXPOSURE_CAMERA_SRC (element)->state->filter)
+    return GST_ELEMENT_CLASS (gst_coded_exposure_camera_src_parent_class)
+        ->send_event (element, event);
+  const auto push = [] (GstElement *source, gpointer end) {
+    auto *self = GST_CODED_EXPOSURE_CAMERA_SRC (source);
+    camera::begin_end (self);
+    camera::stop_silent_camera (self);
+    const ObjectPtr<GstPad> pad (
+        gst_element_get_static_pad (self->state->filter, "src"));
+    gst_pad_push_event (pad.get (), gst_event_ref (GST_EVENT (end)));
+  };
+  gst_element_call_async (element, push, event,
+      [] (gpointer end) { gst_event_unref (GST_EVENT (end)); });
+  return TRUE;
 }
 
 /* Children get no clock: with one, aravissrc delays each frame until the time
@@ -231,7 +255,10 @@ set_up_source (GstCodedExposureCameraSrc *self)
   g_object_get (st.source, "camera", &found, nullptr);
   if (!found)
     return false;
-  g_object_unref (found);
+  {
+    const std::lock_guard guard (st.lock);
+    st.camera.reset (found);
+  }
 
   const CapsPtr caps (
       gst_caps_from_string (caps_of_format (settings.pixel_format).c_str ()));
@@ -260,6 +287,7 @@ gst_coded_exposure_camera_src_class_init (GstCodedExposureCameraSrcClass *klass)
       "pixels, memory of its own and reconnection",
       {"src"});
   element_class->change_state = GST_DEBUG_FUNCPTR (change_state);
+  element_class->send_event = GST_DEBUG_FUNCPTR (send_event);
   element_class->set_clock = GST_DEBUG_FUNCPTR (set_clock);
   GST_BIN_CLASS (klass)->handle_message = GST_DEBUG_FUNCPTR (handle_message);
 }
@@ -291,7 +319,8 @@ gst_coded_exposure_camera_src_init (GstCodedExposureCameraSrc *self)
   gst_ghost_pad_set_target (GST_GHOST_PAD (ghost), out.get ());
   const ObjectPtr<GstPad> pad (gst_element_get_static_pad (source, "src"));
   gst_pad_add_probe (pad.get (),
-      GstPadProbeType (
-          GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_EVENT_BOTH),
+      GstPadProbeType (GST_PAD_PROBE_TYPE_BUFFER |
+                       GST_PAD_PROBE_TYPE_EVENT_BOTH |
+                       GST_PAD_PROBE_TYPE_QUERY_UPSTREAM),
       camera::take_item, self, nullptr);
 }

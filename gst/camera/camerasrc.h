@@ -2,6 +2,7 @@
 /* codedexposure-camerasrc: frames of a GenICam camera. */
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <mutex>
 #include <optional>
@@ -56,6 +57,9 @@ struct CameraState {
    * pushing, querying or posting. */
   std::mutex lock;
   std::condition_variable_any changed;
+  ObjectPtr<GObject> camera;                    ///< of aravissrc, in this run
+  std::chrono::steady_clock::time_point newest; ///< frame, or start of the run
+  bool ending = false;                          ///< EOS was sent
   bool watching = false; ///< errors may be ours to handle
   bool seen = false;     ///< a frame came in this run
   bool away = false;     ///< the camera failed, and no frame came since
@@ -86,7 +90,7 @@ Settings settings_of (GstCodedExposureCameraSrc *self);
  * fails; aravissrc has posted an error then. */
 bool set_up_source (GstCodedExposureCameraSrc *self);
 
-/** Sees every frame and event that aravissrc pushes. */
+/** Sees every frame and event that aravissrc pushes, and every query to it. */
 GstPadProbeReturn take_item (GstPad *pad, GstPadProbeInfo *info, gpointer self);
 
 /* A camera that goes away. */
@@ -95,6 +99,12 @@ void begin_watch (GstCodedExposureCameraSrc *self);
 void end_watch (GstCodedExposureCameraSrc *self);
 /** Whether the error @p message of a child is handled by a restart. */
 bool take_failure (GstCodedExposureCameraSrc *self, GstMessage *message);
+/** From now on, the end of aravissrc is no error. */
+void begin_end (GstCodedExposureCameraSrc *self);
+/** Makes a camera stop that has sent no complete frame for a second, where the
+ * build has Aravis. aravissrc waits for one with its object locked, so that the
+ * state of the pipeline cannot change. Its own end follows in two seconds. */
+void stop_silent_camera (GstCodedExposureCameraSrc *self);
 /** Whether the camera is away. */
 bool is_away (GstCodedExposureCameraSrc *self);
 /** A frame came. @p silent  time since the one before. */

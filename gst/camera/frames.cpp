@@ -62,6 +62,23 @@ passes (GstCodedExposureCameraSrc *self, GstEvent *event)
   }
 }
 
+/* aravissrc answers some queries only between two frames; their answer, of a
+ * live camera, is no. */
+bool
+is_answered (const GstQuery *query)
+{
+  switch (GST_QUERY_TYPE (query)) {
+  case GST_QUERY_CONVERT:
+  case GST_QUERY_DURATION:
+  case GST_QUERY_POSITION:
+  case GST_QUERY_SEEKING:
+  case GST_QUERY_SEGMENT:
+    return false;
+  default:
+    return true;
+  }
+}
+
 /* aravissrc counts from the first frame, whenever that came. */
 void
 set_time (GstCodedExposureCameraSrc *self, GstBuffer *frame)
@@ -110,6 +127,9 @@ GstPadProbeReturn
 take_item (GstPad *, GstPadProbeInfo *info, gpointer data)
 {
   auto *self = GST_CODED_EXPOSURE_CAMERA_SRC (data);
+  if (info->type & GST_PAD_PROBE_TYPE_QUERY_BOTH)
+    return is_answered (GST_PAD_PROBE_INFO_QUERY (info)) ? GST_PAD_PROBE_OK
+                                                         : GST_PAD_PROBE_DROP;
   if (!(info->type & GST_PAD_PROBE_TYPE_BUFFER))
     return passes (self, GST_PAD_PROBE_INFO_EVENT (info)) ? GST_PAD_PROBE_OK
                                                           : GST_PAD_PROBE_DROP;

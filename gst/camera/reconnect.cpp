@@ -6,6 +6,10 @@
 #include "common/element.h"
 #include "common/messages.h"
 
+#ifdef CODEDEXPOSURE_ARAVIS
+#include <arv.h>
+#endif
+
 #define GST_CAT_DEFAULT camerasrc_debug
 
 namespace codedexposure::gst::camera
@@ -146,7 +150,8 @@ begin_watch (GstCodedExposureCameraSrc *self)
   st.watching = true;
   st.most_tries = 0;
   st.pauses.emplace ();
-  st.seen = st.away = st.failed = false;
+  st.seen = st.away = st.failed = st.ending = false;
+  st.newest = std::chrono::steady_clock::now ();
   st.frames_left = st.settings.num_buffers;
   st.why.clear ();
 }
@@ -160,6 +165,7 @@ end_watch (GstCodedExposureCameraSrc *self)
     const std::lock_guard guard (st.lock);
     st.watching = false;
     st.pauses.reset ();
+    st.camera.reset ();
     ended = std::move (st.restarts);
   }
   if (!ended.joinable ())
@@ -178,6 +184,8 @@ take_failure (GstCodedExposureCameraSrc *self, GstMessage *message)
   PauseWatch::Clock::duration stopped{};
   {
     const std::lock_guard guard (st.lock);
+    if (st.ending && own)
+      return true;
     if (st.pauses)
       stopped = st.pauses->recent (kPatience);
     const guint tries = stopped.count () > 0
@@ -206,6 +214,32 @@ take_failure (GstCodedExposureCameraSrc *self, GstMessage *message)
   return true;
 }
 
+void
+begin_end (GstCodedExposureCameraSrc *self)
+{
+  CameraState &st = state (self);
+  const std::lock_guard guard (st.lock);
+  st.ending = true;
+}
+
+void
+stop_silent_camera (GstCodedExposureCameraSrc *self)
+{
+  constexpr std::chrono::seconds kSilence{1};
+  CameraState &st = state (self);
+  ObjectPtr<GObject> camera;
+  {
+    const std::lock_guard guard (st.lock);
+    if (st.away || !st.camera ||
+        std::chrono::steady_clock::now () - st.newest < kSilence)
+      return;
+    camera.reset (G_OBJECT (g_object_ref (st.camera.get ())));
+  }
+#ifdef CODEDEXPOSURE_ARAVIS
+  arv_camera_stop_acquisition (ARV_CAMERA (camera.get ()), nullptr);
+#endif
+}
+
 bool
 is_away (GstCodedExposureCameraSrc *self)
 {
@@ -222,6 +256,7 @@ note_frame (GstCodedExposureCameraSrc *self, GstClockTime silent)
   {
     const std::lock_guard guard (st.lock);
     st.seen = true;
+    st.newest = std::chrono::steady_clock::now ();
     st.frames_left -= st.frames_left > 0;
     if (!std::exchange (st.away, false))
       return;

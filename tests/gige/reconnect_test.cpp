@@ -202,6 +202,18 @@ TEST_F (Reconnect, ARunThatIsStoppedWhileTheCameraIsGoneEnds)
   EXPECT_FALSE (SimulatedMirrors::find ("reconnect")->running ());
 }
 
+TEST_F (Reconnect, AnEndThatIsAskedForWhileTheCameraIsGoneComes)
+{
+  CameraProcess camera (kSchedule);
+  play (1000);
+  ASSERT_TRUE (wait_frames (10));
+  camera.type ("stop@now");
+  ASSERT_TRUE (wait_said ("codedexposure/camera-lost"));
+  EXPECT_TRUE (gst_element_send_event (pipeline->get (), gst_event_new_eos ()));
+  EXPECT_EQ (pipeline->wait_end (), "end");
+  pipeline->stop ();
+}
+
 TEST_F (Reconnect, WhatFailsBehindItIsAnErrorAtOnce)
 {
   CameraProcess camera (kSchedule);

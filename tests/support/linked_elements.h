@@ -20,7 +20,7 @@ class LinkedElements : public ::testing::Environment
   {
     gst::register_meta (gst::kFrameMetaName);
     serve_simulated_dmds ();
-#ifdef CODEDEXPOSURE_CAMERA_PROVIDER
+#ifdef CODEDEXPOSURE_ARAVIS
     ASSERT_TRUE (
         GST_DEVICE_PROVIDER_REGISTER (codedexposure_cameraprovider, nullptr));
 #endif

@@ -78,6 +78,19 @@ FrameCounter::done (gint64 total) const
   return 0;
 }
 
+void
+FrameCounter::end ()
+{
+  const ObjectPtr<GstElement> element (
+      gst_pad_get_parent_element (pad_.get ()));
+  /* A pad that is full takes the end later. */
+  const auto send = [] (GstElement *, gpointer pad) {
+    gst_pad_send_event (GST_PAD (pad), gst_event_new_eos ());
+  };
+  gst_element_call_async (
+      element.get (), send, gst_object_ref (pad_.get ()), gst_object_unref);
+}
+
 /* The first frame is held, so no file is started and nothing is shown before
  * the seek. The segment begins at the start of a frame and has at least one,
  * because decoders clip a coded frame to the segment and its slots would be

@@ -33,6 +33,8 @@ public:
   /** The share of the stream that was played, of @p total frames if above 0;
    * 0: unknown. */
   double done (gint64 total) const;
+  /** Ends the stream after the frames that were counted. */
+  void end ();
 
 private:
   void seek ();

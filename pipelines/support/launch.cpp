@@ -73,8 +73,8 @@ private:
   void on_message (GstMessage *message) override;
   void on_error (GstMessage *message);
   void on_element_message (GstMessage *message);
-  bool take_container_error (
-      std::string_view kind, const GstObject *source, const std::string &text);
+  bool take_container_error (std::string_view kind, const GstObject *source,
+      GQuark domain, const std::string &text);
   bool set_playing ();
   void end_after_error (GstObject *failed);
   void tick ();
@@ -106,6 +106,7 @@ private:
   bool playing_ = false;
   std::string noticed_; // the last notice
   bool interrupted_ = false;
+  bool reads_ = false;       // a recording, or from a sender
   bool said_needed_ = false; // the needed message came
   bool failed_ = false;      // the stream ends because of an error
   bool damaged_ = false;     // frames are missing or damaged
@@ -192,9 +193,12 @@ Launch::run ()
     return kFailed;
   watch_leaky_queues ();
   whole_picture::wait_for_inputs (pipeline_.get ());
-  if (const ObjectPtr<GstElement> demuxer = find ("file"); demuxer && counter_)
+  if (const ObjectPtr<GstElement> demuxer = find ("file");
+      demuxer && counter_) {
+    reads_ = true;
     byte_watch_ =
         std::make_unique<ByteWatch> (demuxer.get (), counter_->frames ());
+  }
   if (const ObjectPtr<GstElement> limit = find ("limit"))
     limit_ = std::make_unique<FrameLimit> (limit.get ());
   const guint ticks = g_timeout_add (200, on_tick, this);
@@ -207,14 +211,20 @@ Launch::run ()
 int
 Launch::finish (int code)
 {
-  if (code == kDone && counter_ && frames () == 0) {
+  const bool no_frame = counter_ && frames () == 0;
+  if (no_frame && damaged_ && code != kContainer) {
+    status_.line ("error: the head of the stream is damaged, so its tracks "
+                  "cannot be found; if ffmpeg reads it, \"ffmpeg -i IN.mkv "
+                  "-map 0 -c copy OUT.mkv\" writes a new one");
+    code = kNoFrame;
+  } else if (code == kDone && no_frame) {
     status_.line (options_.times.start > 0
                       ? format ("error: no coded frame arrived; check whether "
                                 "%g s is after the end",
                             options_.times.start)
                       : "error: no coded frame arrived");
     code = kNoFrame;
-  } else if (code == kFailed && counter_ && frames () == 0)
+  } else if (code == kFailed && no_frame)
     code = kNoFrame;
   if (options_.verbose && frames () > 0)
     print_counters ();
@@ -249,7 +259,11 @@ Launch::on_signal (int times)
   if (std::exchange (interrupted_, true))
     return;
   status_.line ("stopping; press Ctrl-C again to stop immediately");
-  gst_element_send_event (pipeline_.get (), gst_event_new_eos ());
+  /* Behind a recording, lines of the track are not yet matched to frames. */
+  if (reads_ && counter_)
+    counter_->end ();
+  else
+    gst_element_send_event (pipeline_.get (), gst_event_new_eos ());
 }
 
 /* An error also ends a change of the state, which sinks wait for that have
@@ -264,12 +278,13 @@ Launch::set_playing ()
 /* A demuxer that finds a damaged index stops before the first frame. From front
  * to back it reads all frames, and meets the damage at the end. */
 bool
-Launch::take_container_error (
-    std::string_view kind, const GstObject *source, const std::string &text)
+Launch::take_container_error (std::string_view kind, const GstObject *source,
+    GQuark domain, const std::string &text)
 {
   const bool of_container =
       kind == "matroskademux" ||
-      std::string_view (GST_OBJECT_NAME (source)) == "file-queue";
+      std::string_view (GST_OBJECT_NAME (source)) == "file-queue" ||
+      (kind == "filesrc" && domain == GST_STREAM_ERROR);
   if (!of_container)
     return false;
   if (!options_.salvage) {
@@ -277,15 +292,15 @@ Launch::take_container_error (
     return true;
   }
   status_.line ("warning: " + text);
+  damaged_ = true;
   const ObjectPtr<GstElement> demuxer (find ("file"));
   if (!demuxer || demuxer->numsrcpads == 0) {
-    status_.line (
-        "error: the head of the stream is damaged, so its tracks "
-        "cannot be found; if ffmpeg reads it, \"ffmpeg -i IN.mkv -map "
-        "0 -c copy OUT.mkv\" writes a new one");
     quit (kNoFrame);
+    return true;
   }
-  damaged_ = true;
+  /* A demuxer that has failed does not pass the end on. */
+  if (kind == "matroskademux")
+    gst_element_call_async (demuxer.get (), end_at_sources, nullptr, nullptr);
   set_playing ();
   return true;
 }
@@ -342,7 +357,8 @@ Launch::on_error (GstMessage *message)
     quit (kDone);
     return;
   }
-  if (take_container_error (kind, source, told (message, error, detail)))
+  if (take_container_error (
+          kind, source, error->domain, told (message, error, detail)))
     return;
   status_.line ("error: " + told (message, error, detail));
   const std::string remedy = remedy_for (kind, error, detail);
@@ -358,9 +374,12 @@ Launch::on_element_message (GstMessage *message)
   const GstStructure *structure = gst_message_get_structure (message);
   const std::string_view name = gst_structure_get_name (structure);
   said_needed_ |= options_.need && name == options_.need;
-  damaged_ |= name == "codedexposure/frames-damaged" ||
-              name == "codedexposure/frames-missing" ||
-              name == "codedexposure/stream-cut";
+  const bool damage = name == "codedexposure/frames-damaged" ||
+                      name == "codedexposure/frames-missing" ||
+                      name == "codedexposure/stream-cut";
+  if (damage && (interrupted_ || failed_)) // the stream was cut here
+    return;
+  damaged_ |= damage;
   if (options_.verbose &&
       (name.starts_with ("codedexposure/") || name.starts_with ("dmdsync/") ||
           name.starts_with ("moirecalib/")))

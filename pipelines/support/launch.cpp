@@ -104,7 +104,8 @@ private:
   Clock::time_point retry_until_ = Clock::now ();
   double cpu_at_start_ = 0;
   bool playing_ = false;
-  std::string noticed_; // the last notice
+  bool waiting_ = false; // for a receiver, or to try to connect again
+  std::string noticed_;  // the last notice
   bool interrupted_ = false;
   bool reads_ = false;       // a recording, or from a sender
   bool said_needed_ = false; // the needed message came
@@ -159,6 +160,7 @@ Launch::watch_leaky_queues ()
 void
 Launch::play ()
 {
+  waiting_ = false;
   began_ = Clock::now ();
   cpu_at_start_ = cpu_seconds ();
   playing_ = set_playing ();
@@ -179,7 +181,8 @@ Launch::begin ()
 {
   retry_until_ = Clock::now () +
                  std::chrono::milliseconds (gint64 (options_.retry * 1000));
-  if (options_.receiver)
+  waiting_ = options_.receiver != nullptr;
+  if (waiting_)
     gst_element_set_state (pipeline_.get (), GST_STATE_PAUSED);
   else
     play ();
@@ -345,6 +348,7 @@ Launch::on_error (GstMessage *message)
           error, GST_RESOURCE_ERROR, GST_RESOURCE_ERROR_OPEN_READ)) {
     gst_element_set_state (pipeline_.get (), GST_STATE_NULL);
     playing_ = false;
+    waiting_ = true;
     if (Clock::now () >= retry_until_)
       quit (kNobodyListens);
     return;
@@ -453,7 +457,7 @@ Launch::watch_for_silence (gint64 frames)
 void
 Launch::tick ()
 {
-  if (!playing_) {
+  if (waiting_) {
     if (!options_.receiver || has_receiver ())
       play ();
     else

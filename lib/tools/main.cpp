@@ -201,6 +201,14 @@ add (CLI::App &app, const Command &command)
     sub->require_subcommand (1);
 }
 
+constexpr const char *kExamples = R"(Examples:
+  Whether a board can show a schedule at a frame rate:
+    codedexposure schedule check sequential:16x16 --dmd dlp6500 --rate 25
+  The best schedule for a fast scene with little light:
+    codedexposure advise --speed 400 --light 0.3 --dmd dlp3000
+  A test of a board, here of the simulated one:
+    codedexposure dmd selftest sim:bench)";
+
 int
 run (int argc, char **argv)
 {
@@ -211,6 +219,7 @@ run (int argc, char **argv)
 
   CLI::App app ("Controls digital micromirror devices (DMDs) and checks "
                 "schedules.\nSee codedexposure(1).");
+  app.footer (kExamples);
   app.require_subcommand (1);
   app.fallthrough ();
   app.set_version_flag ("--version", "codedexposure " VERSION);

@@ -194,10 +194,10 @@ find_plugin ()
     camera_program=$build/pipelines/codedexposure-camera
     libs=$build/gst
     export GST_REGISTRY_1_0=$build/registry.bin
-  elif [ -x "$prefix/bin/codedexposure-launch" ]; then
-    launcher=$prefix/bin/codedexposure-launch
+  elif [ -x "$pipelines/codedexposure-launch" ]; then
+    launcher=$pipelines/codedexposure-launch
     tool=$prefix/bin/codedexposure
-    camera_program=$prefix/bin/codedexposure-camera
+    camera_program=$pipelines/codedexposure-camera
     for folder in "$prefix"/lib{,/*}/gstreamer-1.0; do
       [ ! -e "$folder/libgstcodedexposure.so" ] || libs=$folder
     done

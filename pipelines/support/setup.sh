@@ -41,6 +41,8 @@ iproute2|the private network of the emulated camera|tests
 umockdev|an emulated USB for the DMD tests|tests
 xvfb|a virtual screen for the window tests|tests
 shellcheck|checks the scripts|tests
+python3-gi|GStreamer in the Python package|tests
+python3-numpy|frames of the Python package|tests
 libopencv-video-dev|calibration with OpenCV, for comparison|rivals
 '
 

@@ -1,0 +1,17 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Reads recordings of coded exposures as numpy arrays.
+
+    import codedexposure
+
+    recording = codedexposure.open("coded.mkv")
+    for frame in recording.subframes():
+        print(frame.time, frame.image.mean())
+
+The frames come from the same GStreamer elements as those of the command line,
+so they are equal to what codedexposure-decode writes.
+"""
+from ._pipeline import Error, RecordingWarning
+from .frame import Frame
+from .recording import Recording, open  # pylint: disable=redefined-builtin
+
+__all__ = ["Error", "Frame", "Recording", "RecordingWarning", "open"]

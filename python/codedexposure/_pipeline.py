@@ -1,0 +1,227 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""GStreamer: finds the plugin, plays a pipeline, turns messages into exceptions
+and warnings."""
+from __future__ import annotations
+
+import os
+import pathlib
+import sys
+import warnings
+
+try:
+    import gi
+    gi.require_version("Gst", "1.0")
+    from gi.repository import GLib, Gst
+except (ImportError, ValueError) as missing:
+    raise ImportError(
+        f"{missing}: codedexposure needs PyGObject and GStreamer for this "
+        "interpreter; on Debian, use /usr/bin/python3 and apt-get install "
+        "python3-gi gir1.2-gstreamer-1.0") from missing
+
+
+class Error(Exception):
+    """What cannot be read or decoded, in the words of the element."""
+
+
+class RecordingWarning(UserWarning):
+    """Frames are lost, damaged or of unknown state, or the recording ended
+    early. To raise these as exceptions:
+    warnings.simplefilter("error", codedexposure.RecordingWarning)"""
+
+
+# Each loss is said, not only the first in a line of a script.
+warnings.simplefilter("always", RecordingWarning, append=True)
+
+
+def _has_plugin(folder: pathlib.Path | None = None) -> bool:
+    """Whether GStreamer finds the plugin, if need be in this folder."""
+    if folder and (folder / "libgstcodedexposure.so").exists():
+        Gst.Registry.get().scan_path(str(folder))
+    return bool(Gst.ElementFactory.find("codedexposure-demux"))
+
+
+def _find_plugin() -> None:
+    """In the build tree around this file, where GStreamer looks, or below the
+    prefix of PREFIX/lib/python3/dist-packages."""
+    Gst.init(None)
+    root = pathlib.Path(__file__).resolve().parents[2]
+    build = pathlib.Path(os.environ.get("CODEDEXPOSURE_BUILD", root / "build"))
+    if _has_plugin(build / "gst"):
+        return
+    if any(_has_plugin(folder) for pattern in ("", "*/")
+           for folder in root.parent.glob(pattern + "gstreamer-1.0")):
+        return
+    raise ImportError(
+        "GStreamer does not find the plugin codedexposure; install it, or set "
+        "GST_PLUGIN_PATH to the folder of libgstcodedexposure.so")
+
+
+_find_plugin()
+
+
+def quoted(text) -> str:
+    """A text as a value in a pipeline."""
+    text = str(text).replace("\\", "\\\\").replace('"', '\\"')
+    return f'"{text}"'
+
+
+_RANGES = {"bits": (0, 16), "full_well": (0, 1e7), "read_noise": (0, 1e5)}
+
+
+def properties(**values) -> str:
+    """name="value" for each value that is not None. GStreamer drops a number
+    that is out of range, so it is refused here."""
+    for name, (least, most) in _RANGES.items():
+        value = values.get(name)
+        if value is not None and not least <= value <= most:
+            raise ValueError(f"{name}={value} is not from {least} to {most}")
+    return " ".join(f"{name.replace('_', '-')}={quoted(value)}"
+                    for name, value in values.items() if value is not None)
+
+
+class ContainerError(Error):
+    """The index or the tags of a file are damaged."""
+
+
+def _text_of(message, error, debug) -> str:
+    source = message.src
+    name = source.get_name()
+    if error.matches(Gst.ResourceError.quark(), error.code) \
+            and source.find_property("location"):
+        name = source.get_property("location")
+    _, _, detail = (debug or "").partition("\n")
+    return f"{name}: {error.message}" + (f"\n    {detail}" if detail else "")
+
+
+def _error_of(message) -> Error:
+    error, debug = message.parse_error()
+    factory = getattr(message.src, "get_factory", lambda: None)()
+    kind = factory.get_name() if factory else ""
+    of_container = (
+        kind == "matroskademux" or message.src.get_name() == "file-queue"
+        or (kind == "filesrc"
+            and error.matches(Gst.StreamError.quark(), error.code)))
+    return (ContainerError if of_container else Error)(
+        _text_of(message, error, debug))
+
+
+def _loss_in(structure) -> str | None:
+    """What an element message says of lost or damaged frames."""
+    name, value = structure.get_name(), structure.get_value
+    if name == "codedexposure/frames-lost":
+        return (f"coded frames were lost before {value('to') * 1e-9:.3f} s: "
+                f"{value('count')}")
+    if name == "codedexposure/frames-damaged" and value("active"):
+        return (f"from frame {value('frame')} ({value('from') * 1e-9:.3f} s) "
+                f"on, frames are corrupted: {value('reason')}")
+    if name == "codedexposure/frames-damaged":
+        return (f"corrupted frames from frame {value('frame')} on: "
+                f"{value('count')}")
+    if name == "codedexposure/frames-missing":
+        return (f"from {value('from') * 1e-9:.3f} s on, recorded frames are "
+                f"missing: {value('count')}")
+    if name == "codedexposure/not-coded":
+        return (f"from {value('from') * 1e-9:.3f} s on, the mirrors show "
+                f"{value('pattern')} and frames are not decoded")
+    if name == "codedexposure/stream-cut":
+        return ("the stream ended without its last line: it was cut off, its "
+                "sender was stopped, or it is a segment of a longer recording")
+    return None
+
+
+def _end_at_pads(element) -> None:
+    for pad in element.srcpads:
+        pad.push_event(Gst.Event.new_eos())
+
+
+class Player:
+    """Plays a pipeline with an appsink named "out", whose samples are iterated.
+
+    Losses and warnings of the elements are RecordingWarnings with @p about,
+    errors are exceptions. With salvage, damage of the container ends the stream
+    with a warning. quiet drops the warnings.
+    """
+
+    def __init__(self, description: str, about: str, salvage: bool = False,
+                 quiet: bool = False):
+        self.about = about
+        self.quiet = quiet
+        self.salvage = salvage
+        try:
+            self.pipeline = Gst.parse_launch(description)
+        except GLib.Error as error:
+            raise Error(error.message) from None
+        self.out = self.pipeline.get_by_name("out")
+        self.bus = self.pipeline.get_bus()
+
+    def __enter__(self):
+        self.pipeline.set_state(Gst.State.PLAYING)
+        return self
+
+    def __exit__(self, *_):
+        self.pipeline.set_state(Gst.State.NULL)
+
+    def warn(self, text: str) -> None:
+        """A RecordingWarning."""
+        if self.quiet:
+            return
+        # At the line of the caller, outside of this package.
+        frame, level = sys._getframe(), 1
+        while frame.f_back and frame.f_globals["__name__"].startswith(
+                __package__):
+            frame, level = frame.f_back, level + 1
+        warnings.warn(f"{self.about}: {text}", RecordingWarning, level)
+
+    def _heed(self, message) -> None:
+        if message.type == Gst.MessageType.ERROR:
+            error = _error_of(message)
+            if not (self.salvage and isinstance(error, ContainerError)):
+                raise error
+            self.warn(str(error))
+            demuxer = self.pipeline.get_by_name("file")
+            if not demuxer.srcpads:
+                raise error
+            # A demuxer that has failed does not pass the end on. The pads may
+            # block until samples are pulled here.
+            demuxer.call_async(_end_at_pads)
+            # An error also ends the change of the state.
+            self.pipeline.set_state(Gst.State.PLAYING)
+        elif message.type == Gst.MessageType.WARNING:
+            error, debug = message.parse_warning()
+            text = _text_of(message, error, debug)
+            # A recording without a track has none to link; restore says so.
+            if "subtitle_0" not in text:
+                self.warn(text)
+        elif message.type == Gst.MessageType.ELEMENT:
+            text = _loss_in(message.get_structure())
+            if text:
+                self.warn(text)
+
+    def heed_messages(self) -> None:
+        """Raises and warns of what the elements have posted."""
+        kinds = (Gst.MessageType.ERROR | Gst.MessageType.WARNING
+                 | Gst.MessageType.ELEMENT)
+        while message := self.bus.pop_filtered(kinds):
+            self._heed(message)
+
+    def comments(self) -> list[str]:
+        """The comments in the tags of the stream."""
+        pad, found, i = self.out.get_static_pad("sink"), [], 0
+        while event := pad.get_sticky_event(Gst.EventType.TAG, i):
+            tags, i = event.parse_tag(), i + 1
+            found += [tags.get_string_index(Gst.TAG_COMMENT, k)[1]
+                      for k in range(tags.get_tag_size(Gst.TAG_COMMENT))]
+        return found
+
+    def __iter__(self):
+        # An element that fails may never end the stream, so the wait for a
+        # sample is limited and messages are read in between.
+        wait = 50 * Gst.MSECOND
+        while True:
+            self.heed_messages()
+            sample = self.out.emit("try-pull-sample", wait)
+            if sample:
+                yield sample
+            elif self.out.get_property("eos"):
+                self.heed_messages()
+                return

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""One picture, and what is known of it."""
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ._pipeline import Gst
+
+# Elements write this time where a time is not known.
+_NO_TIME = 2**64 - 1
+_TYPES = {"GRAY8": np.dtype("u1"), "GRAY16_LE": np.dtype("<u2")}
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A subframe, a full-size frame or a coded frame. Unknown values are None.
+
+    The array owns its memory: it stays valid as long as it is used. It is
+    read-only; use image.copy() to change it.
+    """
+    image: np.ndarray = field(repr=False, compare=False)
+    """Pixel values, shape (height, width), uint8 or uint16, never scaled."""
+    time_ns: int
+    """Start of its slot, or of its exposure, on the clock of the recording."""
+    duration_ns: int | None
+    """Time until the next frame, if none is lost."""
+    frame: int | None
+    """Number of the coded frame since the start; lost frames are counted."""
+    slot: int | None
+    """Index of the subframe in its coded frame, from 0; None: a coded frame."""
+    synchronised: bool | None
+    """Whether the masks were synchronised with the exposure."""
+    corrupted: bool
+    """The pixels may not be those of the scene in this slot."""
+    lost_before: int
+    """Coded frames lost between the previous coded frame and its own."""
+    saturated: int | None
+    """Pixels of the coded frame at the largest value."""
+    bits: int
+    """Significant bits of a pixel, counted from the lowest."""
+    exposure_start_ns: int | None
+    exposure_duration_ns: int | None
+    time_uncertainty_ns: int | None
+    """The error of exposure_start_ns that 95 % of frames stay below."""
+
+    @property
+    def time(self) -> float:
+        """time_ns in seconds."""
+        return self.time_ns * 1e-9
+
+
+def pixels_of(buffer, caps) -> np.ndarray:
+    """The picture, in memory of its own."""
+    kind = _TYPES[caps.get_value("format")]
+    width, height = caps.get_value("width"), caps.get_value("height")
+    data = buffer.extract_dup(0, buffer.get_size())
+    # Rows are padded to a multiple of four bytes.
+    rows = np.frombuffer(data, kind, height * (len(data) // height
+                                               // kind.itemsize))
+    return rows.reshape(height, -1)[:, :width]
+
+
+def frame_of(sample) -> Frame:
+    """The frame in a GstSample."""
+    buffer, segment = sample.get_buffer(), sample.get_segment()
+    caps = sample.get_caps().get_structure(0)
+    meta = buffer.get_custom_meta("CodedExposureFrame")
+    fields = meta.get_structure() if meta else None
+
+    def value(name):
+        return fields.get_value(name) if fields and fields.has_field(name) \
+            else None
+
+    def time(name):
+        return None if value(name) == _NO_TIME else value(name)
+
+    # A frame may begin nanoseconds before the segment, whose times are those of
+    # the container.
+    sign, start = segment.to_stream_time_full(Gst.Format.TIME, buffer.pts)
+    image = pixels_of(buffer, caps)
+    slot = value("subframe")
+    return Frame(
+        image=image,
+        time_ns=sign * start,
+        duration_ns=None if buffer.duration == _NO_TIME else buffer.duration,
+        frame=value("frame"),
+        slot=None if slot is None or slot < 0 else slot,
+        synchronised=value("locked"),
+        corrupted=buffer.has_flags(Gst.BufferFlags.CORRUPTED),
+        lost_before=value("lost-before") or 0,
+        saturated=value("saturated"),
+        bits=value("bits") or 8 * image.itemsize,
+        exposure_start_ns=time("exposure-start"),
+        exposure_duration_ns=time("exposure-duration"),
+        time_uncertainty_ns=time("time-uncertainty"))

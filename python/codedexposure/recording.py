@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""A recording of coded frames."""
+from __future__ import annotations
+
+import builtins
+import json
+import os
+import re
+from collections.abc import Iterator
+from contextlib import closing
+from fractions import Fraction
+
+from ._pipeline import ContainerError, Error, Player, properties, quoted
+from .frame import Frame, frame_of
+
+_SETUP = "coded-exposure="
+_NOT_OF_SCHEDULE = ("mapping", "size", "rate", "track")
+
+
+def open(path: str | os.PathLike) -> Recording:  # pylint: disable=W0622
+    """Opens a recording, a .mkv file of codedexposure-record or -simulate.
+
+    Raises OSError if the file cannot be read, and Error if it has no coded
+    frame.
+    """
+    return Recording(path)
+
+
+class Recording:
+    """The coded frames of a recording, and what can be decoded from them.
+
+    Every call that gives frames reads the file from its beginning. If frames
+    were lost or damaged, or the recording was cut off, a RecordingWarning says
+    so as soon as it is known, at the latest after the last frame.
+    """
+
+    def __init__(self, path: str | os.PathLike):
+        self.path = os.fspath(path)
+        self._check()
+        first, setup = self._look()
+        self.size: tuple[int, int] = (first.image.shape[1], first.image.shape[0])
+        """Width and height of the coded frames, pixels."""
+        self.schedule: dict | None = setup and {
+            key: value for key, value in setup.items()
+            if key not in _NOT_OF_SCHEDULE}
+        """The JSON form of the schedule; None: the recording has none, and
+        decoding needs the argument schedule."""
+        self.mapping: dict | None = setup and setup.get("mapping")
+        """The JSON form of the mapping from pixels to mirrors; None: not
+        known."""
+        rate = setup and setup.get("rate")
+        self.rate: Fraction | None = Fraction(*rate) if rate else None
+        """Coded frames per second; None: not known."""
+
+    def __repr__(self):
+        return f"<Recording {self.path}, {self.size[0]}x{self.size[1]}>"
+
+    def subframes(self, *, method: str | None = None, region: int | None = None,
+                  schedule: str | os.PathLike | None = None,
+                  mapping: str | os.PathLike | None = None,
+                  bits: int | None = None) -> Iterator[Frame]:
+        """The subframes in the order of their times.
+
+        method    auto, rank, select or decode
+        region    the subframes of this region, from 0 on, instead of the
+                  background
+        schedule  a preset or a JSON file, instead of that of the recording
+        mapping   a JSON file, instead of that of the recording
+        bits      significant bits of the pixels, instead of those of the
+                  recording
+        """
+        pad = "src" if region is None else f"region_{int(region)}"
+        return self._frames(
+            "queue max-size-buffers=8 ! codedexposure-demux name=demux "
+            "require-schedule=true "
+            + properties(method=method, schedule=schedule, mapping=mapping,
+                         bits=bits) + f" demux.{pad} !")
+
+    def fused(self, quality: str = "balanced", *, full_well: float | None = None,
+              read_noise: float | None = None,
+              schedule: str | os.PathLike | None = None,
+              mapping: str | os.PathLike | None = None,
+              bits: int | None = None) -> Iterator[Frame]:
+        """Full-size frames at the rate of the subframes.
+
+        quality     fast, balanced or best
+        full_well   noise of the camera: electrons at white, e-; 0: no noise
+        read_noise  noise of the camera, e- rms
+        The rest is as for subframes ().
+        """
+        return self._frames(
+            "queue max-size-buffers=1 ! codedexposure-fuse name=fuse "
+            "lookahead=1 require-schedule=true "
+            + properties(quality=quality, full_well=full_well,
+                         read_noise=read_noise, schedule=schedule,
+                         mapping=mapping, bits=bits) + " !")
+
+    def coded(self) -> Iterator[Frame]:
+        """The coded frames as the camera delivered them."""
+        return self._frames("")
+
+    # ---------------------------------------------------------------- file --
+
+    def _check(self) -> None:
+        with builtins.open(self.path, "rb") as file:
+            head = file.read(100000)
+        if head[:4] != b"\x1a\x45\xdf\xa3":
+            raise Error(f"{self.path} is not a Matroska file; use a recording "
+                        "of codedexposure-record or codedexposure-simulate")
+        codecs = re.findall(rb"[VA]_[A-Z0-9/_]{3,30}|FFV1", head)
+        if codecs and not any(b"FFV1" in codec for codec in codecs):
+            raise Error(f"{self.path} has {codecs[0].decode()}, but coded "
+                        "frames are recorded as FFV1")
+        self._cut = self._is_cut_short(head)
+
+    def _is_cut_short(self, head: bytes) -> bool:
+        """Whether the file is shorter than its header says. The header of a
+        file that was not finished has no size."""
+        at = head.find(b"\x18\x53\x80\x67", 0, 4096)
+        size = head[at + 4:at + 12]
+        if at < 0 or len(size) < 8 or size[0] != 1:
+            return True
+        return (at + 12 + int.from_bytes(size[1:], "big")
+                > os.path.getsize(self.path))
+
+    def _description(self, decoder: str, salvage: bool) -> str:
+        # The same as read_container in pipelines/support/common.sh.
+        front_to_back = "queue name=file-queue ! " if salvage else ""
+        return (
+            f"filesrc location={quoted(self.path)} ! {front_to_back}"
+            "matroskademux name=file ! decodebin ! codedexposure-restore "
+            "name=restore file.subtitle_0 ! restore.track restore. ! "
+            f"{decoder} appsink name=out sync=false max-buffers=8")
+
+    def _play(self, decoder: str,
+              quiet: bool = False) -> Iterator[tuple[Player, Frame]]:
+        last = None  # that was given out, ns
+        for salvage in (False, True):
+            player = Player(self._description(decoder, salvage), self.path,
+                            salvage, quiet)
+            try:
+                with player:
+                    for sample in player:
+                        frame = frame_of(sample)
+                        # The second run begins with those of the first.
+                        if last is None or frame.time_ns > last or not salvage:
+                            last = frame.time_ns
+                            yield player, frame
+                break
+            except ContainerError as damage:
+                if salvage:
+                    raise self._no_frame(damage) from None
+                player.warn("the index or the tags are damaged; reading the "
+                            "file from front to back")
+        if last is None:
+            raise self._no_frame()
+        if self._cut:
+            player.warn("the recording is cut off; what could be decoded was")
+
+    def _frames(self, decoder: str) -> Iterator[Frame]:
+        for _, frame in self._play(decoder):
+            yield frame
+
+    def _look(self) -> tuple[Frame, dict | None]:
+        """The first frame, and the setup in the stream tag. What is wrong is
+        said when frames are read."""
+        with closing(self._play("", quiet=True)) as frames:
+            player, frame = next(frames)
+            for comment in player.comments():
+                if comment.startswith(_SETUP):
+                    return frame, json.loads(comment.removeprefix(_SETUP))
+        return frame, None
+
+    def _no_frame(self, damage: Error | None = None) -> Error:
+        if self._cut:
+            return Error(f"{self.path} is cut off and has no complete frame")
+        return damage or Error(f"{self.path} has no coded frame")

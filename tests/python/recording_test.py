@@ -1,0 +1,226 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The Python package gives what pipelines/decode writes, and says what is lost."""
+import csv
+import unittest
+import warnings
+
+from rig import SCRATCH, clean, decoded, pixels, run, simulate
+import numpy as np
+import codedexposure
+from gi.repository import Gst
+
+
+def setUpModule():
+    simulate("plain.mkv", "--schedule", "staircase:2x2")
+
+
+def tearDownModule():
+    clean()
+
+
+def opened(name):
+    return codedexposure.open(SCRATCH / name)
+
+
+def read(name):
+    """The subframes, and the warnings."""
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        frames = list(opened(name).subframes())
+    return frames, "\n".join(str(warning.message) for warning in said)
+
+
+def record_without(lost, name):
+    """Records 8 coded frames, but not those with these numbers."""
+    pipeline = Gst.parse_launch(
+        "videotestsrc num-buffers=32 ! video/x-raw,format=GRAY8,width=96,"
+        "height=64,framerate=100/1 ! codedexposure-sim ! identity name=camera ! "
+        "dmdsync device=sim:bench ! codedexposure-log name=log ! queue ! "
+        "avenc_ffv1 gop-size=1 ! matroskamux name=mux timecodescale=1000 ! "
+        f"filesink location={SCRATCH / name} log.track ! queue ! "
+        "mux.subtitle_0")
+    numbers = iter(range(8))
+    pipeline.get_by_name("camera").get_static_pad("src").add_probe(
+        Gst.PadProbeType.BUFFER, lambda *_: Gst.PadProbeReturn.DROP
+        if next(numbers) in lost else Gst.PadProbeReturn.OK)
+    pipeline.set_state(Gst.State.PLAYING)
+    end = pipeline.get_bus().timed_pop_filtered(
+        60 * Gst.SECOND, Gst.MessageType.EOS | Gst.MessageType.ERROR)
+    pipeline.set_state(Gst.State.NULL)
+    assert end and end.type == Gst.MessageType.EOS
+
+
+class Pixels(unittest.TestCase):
+    """Frames are those of pipelines/decode, bit for bit."""
+
+    def test_subframes(self):
+        frames = list(opened("plain.mkv").subframes())
+        self.assertEqual(frames[0].image.shape, (32, 48))
+        self.assertEqual(frames[0].image.dtype, np.uint8)
+        self.assertEqual(pixels(frames), decoded("plain.mkv"))
+
+    def test_methods(self):
+        frames = opened("plain.mkv").subframes(method="rank")
+        self.assertEqual(pixels(frames),
+                         decoded("plain.mkv", "--method", "rank"))
+
+    def test_twelve_bits_and_rows_with_padding(self):
+        simulate("deep.mkv", "--bits", "12", "--size", "90x64")
+        frames = list(opened("deep.mkv").subframes())
+        self.assertEqual(frames[0].image.dtype, np.uint16)
+        self.assertEqual(frames[0].image.shape, (32, 45))
+        self.assertEqual(frames[0].bits, 12)
+        padded = np.frombuffer(decoded("deep.mkv"), np.uint16)
+        expected = padded.reshape(48, 32, 46)[:, :, :45]
+        self.assertTrue(np.array_equal([f.image for f in frames], expected))
+
+    def test_fused(self):
+        frames = list(opened("plain.mkv").fused("fast", full_well=10000))
+        self.assertEqual(frames[0].image.shape, (64, 96))
+        self.assertEqual(pixels(frames), decoded(
+            "plain.mkv", "--fuse", "fast", "--full-well", "10000"))
+
+    def test_regions(self):
+        simulate("regions.mkv", "--schedule",
+                 "sequential:2x2,region=32x32+32+16:sequential:4x2")
+        recording = opened("regions.mkv")
+        self.assertEqual(recording.schedule["regions"][0]["tile"], "4x2")
+        self.assertEqual(pixels(recording.subframes(region=0)),
+                         decoded("regions.mkv", "--region", "0"))
+
+    def test_coded(self):
+        coded = list(opened("plain.mkv").coded())
+        self.assertEqual([f.frame for f in coded], list(range(12)))
+        self.assertEqual({f.slot for f in coded}, {None})
+        self.assertEqual(coded[0].image.shape, (64, 96))
+
+    def test_frames_stay_as_they_are(self):
+        frames = list(opened("plain.mkv").subframes())
+        self.assertEqual(pixels(frames),
+                         pixels(opened("plain.mkv").subframes()))
+        self.assertFalse(frames[0].image.flags.writeable)
+
+
+class Facts(unittest.TestCase):
+    """What is known of a frame is what pipelines/decode says of it."""
+
+    def compare_table(self, name, status=0):
+        run("decode", name, "--force", "--output", "pictures/", status=status)
+        with open(SCRATCH / "pictures/times.csv", encoding="ascii") as table:
+            rows = list(csv.DictReader(table))
+        words = {True: "true", False: "false", None: "unknown"}
+        frames, said = read(name)
+        # The encoder of the pictures cuts off what is before time 0.
+        self.assertEqual(
+            [(str(f.frame), str(f.slot), str(max(f.time_ns, 0)),
+              str(f.duration_ns + min(f.time_ns, 0)), words[f.synchronised],
+              words[f.corrupted], str(f.lost_before)) for f in frames],
+            [tuple(row.values())[1:] for row in rows])
+        return frames, said
+
+    def test_times(self):
+        frames, said = self.compare_table("plain.mkv")
+        self.assertEqual(said, "")
+        self.assertAlmostEqual(frames[5].time, 0.05)
+
+    def test_synchronised(self):
+        run("record", "--frames", "12", "--size", "96x64", "--schedule",
+            "sequential:2x2,pilot=16", "--output", "pilot.mkv")
+        frames, _ = self.compare_table("pilot.mkv")
+        self.assertIs(frames[-1].synchronised, True)
+
+    def test_lost(self):
+        record_without({3, 4}, "lost.mkv")
+        frames, said = self.compare_table("lost.mkv")
+        self.assertIn("coded frames were lost before", said)
+        self.assertEqual([f.frame for f in frames if f.lost_before], [5] * 4)
+        self.assertEqual({f.lost_before for f in frames}, {0, 2})
+
+    def test_damaged(self):
+        data = bytearray((SCRATCH / "plain.mkv").read_bytes())
+        data[len(data) // 2] ^= 1
+        (SCRATCH / "damaged.mkv").write_bytes(data)
+        frames, said = self.compare_table("damaged.mkv", status=3)
+        self.assertIn("frames are corrupted", said)
+        self.assertEqual(sum(f.corrupted for f in frames), 4)
+
+    def test_damaged_index(self):
+        data = (SCRATCH / "plain.mkv").read_bytes()
+        at = data.index(b"\xbb\x01", data.rindex(b"\x1c\x53\xbb\x6b") + 20) + 8
+        (SCRATCH / "index.mkv").write_bytes(
+            data[:at] + bytes([data[at] ^ 4]) + data[at + 1:])
+        frames, said = read("index.mkv")
+        self.assertEqual(pixels(frames), decoded("index.mkv", status=3))
+        self.assertIn("the index or the tags are damaged", said)
+
+    def test_schedule(self):
+        recording = opened("plain.mkv")
+        self.assertEqual(recording.schedule["code"], "staircase")
+        self.assertEqual(recording.schedule["tile"], "2x2")
+        self.assertIsNone(recording.mapping)
+        self.assertEqual(recording.rate, 25)
+        self.assertEqual(recording.size, (96, 64))
+
+
+class Faults(unittest.TestCase):
+    """No file hangs, and none is silently taken for whole."""
+
+    def test_cut(self):
+        data = (SCRATCH / "plain.mkv").read_bytes()
+        (SCRATCH / "cut.mkv").write_bytes(data[:len(data) // 2])
+        frames, said = read("cut.mkv")
+        self.assertIn("the recording is cut off", said)
+        self.assertEqual(opened("cut.mkv").schedule["code"], "staircase")
+        self.assertGreater(len(frames), 8)
+        self.assertTrue(decoded("plain.mkv").startswith(pixels(frames)))
+
+    def test_strict(self):
+        data = (SCRATCH / "plain.mkv").read_bytes()
+        (SCRATCH / "cut.mkv").write_bytes(data[:len(data) // 2])
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", codedexposure.RecordingWarning)
+            with self.assertRaises(codedexposure.RecordingWarning):
+                list(opened("cut.mkv").subframes())
+
+    def test_no_frame(self):
+        (SCRATCH / "head.mkv").write_bytes(
+            (SCRATCH / "plain.mkv").read_bytes()[:400])
+        with self.assertRaisesRegex(codedexposure.Error,
+                                    "cut off and has no complete frame"):
+            opened("head.mkv")
+
+    def test_no_recording(self):
+        with self.assertRaises(FileNotFoundError):
+            opened("missing.mkv")
+        (SCRATCH / "text.mkv").write_text("no video")
+        with self.assertRaisesRegex(codedexposure.Error, "not a Matroska file"):
+            opened("text.mkv")
+
+    def test_decoded_before(self):
+        decoded("plain.mkv")
+        with self.assertRaisesRegex(codedexposure.Error, "were decoded before"), \
+                warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            list(opened("fast.mkv").subframes())
+
+    def test_wrong_values(self):
+        recording = opened("plain.mkv")
+        for text, options in {
+                "was requested, but": {"region": 1},
+                "'nix' is no code": {"schedule": "nix:2x2"},
+                "could not set property": {"method": "nix"}}.items():
+            with self.assertRaisesRegex(codedexposure.Error, text):
+                list(recording.subframes(**options))
+        with self.assertRaises(ValueError):
+            recording.subframes(bits=40)
+
+    def test_iteration_can_be_left(self):
+        for _ in range(3):
+            for frame in opened("plain.mkv").subframes():
+                self.assertEqual(frame.slot, 0)
+                break
+
+
+if __name__ == "__main__":
+    unittest.main()

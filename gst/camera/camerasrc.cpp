@@ -248,6 +248,7 @@ set_up_source (GstCodedExposureCameraSrc *self)
   CameraState &st = *self->state;
   const Settings settings = settings_of (self);
   st.stream.first = true;
+  keep_camera (self, nullptr);
   const std::string &name = settings.name;
   g_object_set (st.source, "camera-name",
       name.empty () ? nullptr : name.c_str (), nullptr);
@@ -255,10 +256,7 @@ set_up_source (GstCodedExposureCameraSrc *self)
   g_object_get (st.source, "camera", &found, nullptr);
   if (!found)
     return false;
-  {
-    const std::lock_guard guard (st.lock);
-    st.camera.reset (found);
-  }
+  keep_camera (self, ObjectPtr<GObject> (found));
 
   const CapsPtr caps (
       gst_caps_from_string (caps_of_format (settings.pixel_format).c_str ()));

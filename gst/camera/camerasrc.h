@@ -105,6 +105,9 @@ void begin_end (GstCodedExposureCameraSrc *self);
  * build has Aravis. aravissrc waits for one with its object locked, so that the
  * state of the pipeline cannot change. Its own end follows in two seconds. */
 void stop_silent_camera (GstCodedExposureCameraSrc *self);
+/** Takes the camera of aravissrc, for stop_silent_camera (), or lets go of it:
+ * it is controlled by the one who holds it. */
+void keep_camera (GstCodedExposureCameraSrc *self, ObjectPtr<GObject> camera);
 /** Whether the camera is away. */
 bool is_away (GstCodedExposureCameraSrc *self);
 /** A frame came. @p silent  time since the one before. */

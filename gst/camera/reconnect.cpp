@@ -165,14 +165,14 @@ end_watch (GstCodedExposureCameraSrc *self)
     const std::lock_guard guard (st.lock);
     st.watching = false;
     st.pauses.reset ();
-    st.camera.reset ();
     ended = std::move (st.restarts);
   }
-  if (!ended.joinable ())
-    return;
-  ended.request_stop ();
-  ended.join ();
-  gst_element_set_locked_state (st.source, FALSE);
+  if (ended.joinable ()) {
+    ended.request_stop ();
+    ended.join ();
+    gst_element_set_locked_state (st.source, FALSE);
+  }
+  keep_camera (self, nullptr);
 }
 
 bool
@@ -220,6 +220,14 @@ begin_end (GstCodedExposureCameraSrc *self)
   CameraState &st = state (self);
   const std::lock_guard guard (st.lock);
   st.ending = true;
+}
+
+void
+keep_camera (GstCodedExposureCameraSrc *self, ObjectPtr<GObject> camera)
+{
+  CameraState &st = state (self);
+  const std::lock_guard guard (st.lock);
+  st.camera.swap (camera);
 }
 
 void

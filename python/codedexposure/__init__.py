@@ -11,7 +11,9 @@ The frames come from the same GStreamer elements as those of the command line,
 so they are equal to what codedexposure-decode writes.
 """
 from ._pipeline import Error, RecordingWarning
+from .arrays import decode_array, fuse_array, simulate
 from .frame import Frame
 from .recording import Recording, open  # pylint: disable=redefined-builtin
 
-__all__ = ["Error", "Frame", "Recording", "RecordingWarning", "open"]
+__all__ = ["Error", "Frame", "Recording", "RecordingWarning", "decode_array",
+           "fuse_array", "open", "simulate"]

@@ -3,9 +3,12 @@
 and warnings."""
 from __future__ import annotations
 
+import hashlib
+import json
 import os
 import pathlib
 import sys
+import tempfile
 import warnings
 
 try:
@@ -65,18 +68,35 @@ def quoted(text) -> str:
     return f'"{text}"'
 
 
-_RANGES = {"bits": (0, 16), "full_well": (0, 1e7), "read_noise": (0, 1e5)}
+_files = tempfile.TemporaryDirectory(prefix="codedexposure-")
 
 
-def properties(**values) -> str:
-    """name="value" for each value that is not None. GStreamer drops a number
-    that is out of range, so it is refused here."""
-    for name, (least, most) in _RANGES.items():
-        value = values.get(name)
-        if value is not None and not least <= value <= most:
-            raise ValueError(f"{name}={value} is not from {least} to {most}")
-    return " ".join(f"{name.replace('_', '-')}={quoted(value)}"
-                    for name, value in values.items() if value is not None)
+def _value(value):
+    """What stands for a value in a pipeline: elements read JSON from files."""
+    if not isinstance(value, dict):
+        return value
+    text = json.dumps(value).encode()
+    path = pathlib.Path(_files.name) / f"{hashlib.sha1(text).hexdigest()}.json"
+    path.write_bytes(text)
+    return path
+
+
+def element(kind: str, **values) -> str:
+    """The element with its properties, as in a pipeline; None: the default.
+
+    GStreamer drops a number that is out of range, so it is refused here.
+    """
+    made, text = Gst.ElementFactory.make(kind), kind
+    for name, value in values.items():
+        if value is None:
+            continue
+        spec = made.find_property(name.replace("_", "-"))
+        least = getattr(spec, "minimum", None)
+        if least is not None and not least <= value <= spec.maximum:
+            raise ValueError(
+                f"{name} is from {least} to {spec.maximum}, not {value}")
+        text += f" {spec.name}={quoted(_value(value))}"
+    return text
 
 
 class ContainerError(Error):

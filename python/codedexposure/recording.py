@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import closing
 from fractions import Fraction
 
-from ._pipeline import ContainerError, Error, Player, properties, quoted
+from ._pipeline import ContainerError, Error, Player, element, quoted
 from .frame import Frame, frame_of
 
 _SETUP = "coded-exposure="
@@ -56,30 +56,31 @@ class Recording:
         return f"<Recording {self.path}, {self.size[0]}x{self.size[1]}>"
 
     def subframes(self, *, method: str | None = None, region: int | None = None,
-                  schedule: str | os.PathLike | None = None,
-                  mapping: str | os.PathLike | None = None,
+                  schedule: str | os.PathLike | dict | None = None,
+                  mapping: str | os.PathLike | dict | None = None,
                   bits: int | None = None) -> Iterator[Frame]:
         """The subframes in the order of their times.
 
         method    auto, rank, select or decode
         region    the subframes of this region, from 0 on, instead of the
                   background
-        schedule  a preset or a JSON file, instead of that of the recording
-        mapping   a JSON file, instead of that of the recording
+        schedule  a preset, a JSON file, or the dict of its JSON form, instead
+                  of that of the recording
+        mapping   a JSON file or its dict, instead of that of the recording
         bits      significant bits of the pixels, instead of those of the
                   recording
         """
         pad = "src" if region is None else f"region_{int(region)}"
         return self._frames(
-            "queue max-size-buffers=8 ! codedexposure-demux name=demux "
-            "require-schedule=true "
-            + properties(method=method, schedule=schedule, mapping=mapping,
-                         bits=bits) + f" demux.{pad} !")
+            "queue max-size-buffers=8 ! "
+            + element("codedexposure-demux", name="demux",
+                      require_schedule=True, method=method, schedule=schedule,
+                      mapping=mapping, bits=bits) + f" demux.{pad} !")
 
     def fused(self, quality: str = "balanced", *, full_well: float | None = None,
               read_noise: float | None = None,
-              schedule: str | os.PathLike | None = None,
-              mapping: str | os.PathLike | None = None,
+              schedule: str | os.PathLike | dict | None = None,
+              mapping: str | os.PathLike | dict | None = None,
               bits: int | None = None) -> Iterator[Frame]:
         """Full-size frames at the rate of the subframes.
 
@@ -89,11 +90,11 @@ class Recording:
         The rest is as for subframes ().
         """
         return self._frames(
-            "queue max-size-buffers=1 ! codedexposure-fuse name=fuse "
-            "lookahead=1 require-schedule=true "
-            + properties(quality=quality, full_well=full_well,
-                         read_noise=read_noise, schedule=schedule,
-                         mapping=mapping, bits=bits) + " !")
+            "queue max-size-buffers=1 ! "
+            + element("codedexposure-fuse", name="fuse", lookahead=1,
+                      require_schedule=True, quality=quality,
+                      full_well=full_well, read_noise=read_noise,
+                      schedule=schedule, mapping=mapping, bits=bits) + " !")
 
     def coded(self) -> Iterator[Frame]:
         """The coded frames as the camera delivered them."""

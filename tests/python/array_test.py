@@ -1,0 +1,75 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Arrays are simulated and decoded as the scripts do it."""
+import unittest
+
+from rig import SCRATCH, clean, pixels, play, simulate
+import numpy as np
+import codedexposure
+
+
+def setUpModule():
+    simulate("plain.mkv", "--schedule", "staircase:2x2")
+
+
+def tearDownModule():
+    clean()
+
+
+def scene_as_simulated():
+    play("codedexposure-scene scene=pour num-buffers=48 ! video/x-raw,"
+         "format=GRAY8,width=96,height=64,framerate=100/1 ! filesink "
+         "location=scene.raw")
+    return np.fromfile(SCRATCH / "scene.raw", np.uint8).reshape(48, 64, 96)
+
+
+class Arrays(unittest.TestCase):
+    def setUp(self):
+        self.recording = codedexposure.open(SCRATCH / "plain.mkv")
+        self.coded = np.stack([f.image for f in self.recording.coded()])
+
+    def test_simulate(self):
+        coded = codedexposure.simulate(scene_as_simulated(), "staircase:2x2")
+        self.assertTrue(np.array_equal(coded, self.coded))
+
+    def test_simulate_with_rows_of_any_length(self):
+        scene = np.random.default_rng(1).integers(
+            65536, size=(9, 6, 7), dtype=np.uint16)
+        coded = codedexposure.simulate(scene, "sequential:3x1")
+        self.assertEqual(coded.shape, (3, 6, 7))
+        for x in range(7):
+            self.assertTrue(np.array_equal(coded[:, :, x], scene[x % 3::3, :, x]))
+
+    def test_decode(self):
+        subframes = codedexposure.decode_array(self.coded,
+                                               self.recording.schedule)
+        self.assertEqual(subframes.shape, (12, 4, 32, 48))
+        self.assertEqual(subframes.tobytes(),
+                         pixels(self.recording.subframes()))
+
+    def test_select_is_slicing(self):
+        subframes = codedexposure.decode_array(self.coded, "sequential:2x2")
+        for slot in range(4):
+            self.assertTrue(np.array_equal(
+                subframes[:, slot],
+                self.coded[:, slot // 2::2, slot % 2::2]))
+
+    def test_fuse(self):
+        frames = codedexposure.fuse_array(self.coded, self.recording.schedule,
+                                          "fast")
+        self.assertEqual(frames.tobytes(), pixels(self.recording.fused("fast")))
+
+    def test_errors(self):
+        for array in (self.coded.astype(float), self.coded[0]):
+            with self.assertRaisesRegex(TypeError, "give uint8 or uint16"):
+                codedexposure.decode_array(array, "sequential:2x2")
+        with self.assertRaisesRegex(codedexposure.Error, "is no code"):
+            codedexposure.decode_array(self.coded, "nix:2x2")
+        with self.assertRaisesRegex(ValueError, "bits is from 0 to 16, not 40"):
+            codedexposure.decode_array(self.coded, "sequential:2x2", bits=40)
+        with self.assertRaisesRegex(ValueError, "3 pictures fill no"):
+            codedexposure.simulate(self.coded[:3])
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -490,8 +490,8 @@ check_recording_name ()
     "recorded as FFV1 in Matroska; end the name in .mkv"
 }
 
-# Writes frames to a file by its ending: FFV1, H.264, or a folder of PNG. PNG
-# keeps the pixel values, unless view is set.
+# Writes frames to a file by its ending: FFV1, H.264, a stack, or a folder of
+# PNG. PNG keeps the pixel values, unless view is set.
 video_output ()
 {
   case $1 in
@@ -512,6 +512,13 @@ video_output ()
       printf 'fragment-mode=first-moov-then-finalise ! filesink location=%s ' \
         "$(quoted "$1")"
       ;;
+    *.ome.tif | *.ome.tiff | *.h5)
+      gst-inspect-1.0 codedexposure-stack > /dev/null 2>&1 || die "$1:" \
+        "this build has neither libtiff nor HDF5; install libtiff-dev and" \
+        "libhdf5-dev, and build again"
+      printf 'codedexposure-stack %slocation=%s ' \
+        "${opt[deflate]:+deflate=true }" "$(quoted "$1")"
+      ;;
     */ | *%d*.png | *%0[1-9]d*.png)
       # A folder may have any name; only the last part is a format.
       local pattern=$1
@@ -524,7 +531,7 @@ video_output ()
       ;;
     *)
       usage_error "--output $1: end in .mkv (FFV1, lossless), .mp4 (H.264)," \
-        "/ (a folder of PNG) or %06d.png"
+        ".ome.tif, .h5, / (a folder of PNG) or %06d.png"
       ;;
   esac
 }

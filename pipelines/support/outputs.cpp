@@ -24,12 +24,29 @@ constexpr struct {
   const char *property;
 } kWriters[] = {
     {"codedexposure-log", "location"},
+    {"codedexposure-stack", "location"},
     {"filesink", "location"},
     {"moirecalib", "location"},
     {"moirecalib", "report"},
     {"multifilesink", "location"},
     {"subframestats", "location"},
 };
+
+std::string
+factory_of (GstElement *element)
+{
+  GstElementFactory *factory = gst_element_get_factory (element);
+  return factory ? GST_OBJECT_NAME (factory) : "";
+}
+
+std::string
+text_property (GstElement *element, const char *property)
+{
+  gchar *text = nullptr;
+  g_object_get (element, property, &text, nullptr);
+  const CharPtr owned (text);
+  return text ? text : "";
+}
 
 /* The pad at which frames for the file of @element are counted: of the muxer or
  * encoder before a filesink, whose own buffers are no frames. */
@@ -40,7 +57,7 @@ frames_pad (GstElement *element)
   const ObjectPtr<GstPad> peer (gst_pad_get_peer (own.get ()));
   const ObjectPtr<GstElement> before (
       peer ? gst_pad_get_parent_element (peer.get ()) : nullptr);
-  if (!before || !GST_OBJECT_FLAG_IS_SET (element, GST_ELEMENT_FLAG_SINK))
+  if (!before || factory_of (element) != "filesink")
     return own;
   for (const char *name : {"video_0", "sink"})
     if (ObjectPtr<GstPad> pad{gst_element_get_static_pad (before.get (), name)})
@@ -79,7 +96,18 @@ public:
         &frames_, nullptr);
     return {};
   }
-  Result<void> publish () override { return part_.publish (replace_); }
+  Result<void> publish () override
+  {
+    /* Of elements that finish a file only at its end. */
+    const bool may_fail =
+        g_object_class_find_property (G_OBJECT_GET_CLASS (element_), "problem");
+    if (may_fail && !text_property (element_, "problem").empty ())
+      return Error{part_.name () +
+                   " could not be finished; what was written "
+                   "is in " +
+                   part_.path ()};
+    return part_.publish (replace_);
+  }
   void discard () override { part_.discard (); }
   bool has_content () const override
   {
@@ -97,22 +125,6 @@ private:
   Part part_;
   bool replace_ = false;
 };
-
-std::string
-factory_of (GstElement *element)
-{
-  GstElementFactory *factory = gst_element_get_factory (element);
-  return factory ? GST_OBJECT_NAME (factory) : "";
-}
-
-std::string
-text_property (GstElement *element, const char *property)
-{
-  gchar *text = nullptr;
-  g_object_get (element, property, &text, nullptr);
-  const CharPtr owned (text);
-  return text ? text : "";
-}
 
 /* Null: @name is no file of its own, such as /dev/null. */
 std::unique_ptr<Output>

@@ -36,6 +36,10 @@ gnuplot-nox|draws the figures of a report|report
 libgtest-dev|unit and element tests|tests
 libbenchmark-dev|benchmarks|tests
 libumockdev-dev|an emulated USB for the DMD tests|tests
+libtiff-dev|decode to OME-TIFF|tests
+libhdf5-dev|decode to HDF5|tests
+python3-tifffile|reads OME-TIFF, to test it|tests
+python3-h5py|reads HDF5, to test it|tests
 libaravis-dev|the emulated camera, and aravissrc|tests
 iproute2|the private network of the emulated camera|tests
 umockdev|an emulated USB for the DMD tests|tests

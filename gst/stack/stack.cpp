@@ -1,0 +1,391 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-codedexposure-stack
+ * @title: codedexposure-stack
+ * @short_description: Pictures in one file for programs of the lab
+ *
+ * Writes pictures to an OME-TIFF file (.ome.tif, .ome.tiff) or an HDF5 file
+ * (.h5), with the time, the slot, the number and the synchronisation of each,
+ * and the schedule. No picture stays in memory. The file is finished at the end
+ * of the stream; until then it says that it is not.
+ *
+ * docs/formats.md describes the files.
+ *
+ * ## Example pipeline
+ * |[
+ * gst-launch-1.0 filesrc location=coded.mkv ! matroskademux ! avdec_ffv1 \
+ *     ! codedexposure-demux ! queue ! codedexposure-stack location=fast.ome.tif
+ * ]|
+ *
+ * Since: 0.1
+ */
+#include <cerrno>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include <gst/base/gstbasesink.h>
+
+#include "common/element.h"
+#include "common/meta.h"
+#include "common/tag.h"
+#include "stack_file.h"
+
+using namespace codedexposure;
+using namespace codedexposure::gst;
+
+G_DECLARE_FINAL_TYPE (GstCodedExposureStack, gst_coded_exposure_stack, GST,
+    CODED_EXPOSURE_STACK, GstBaseSink)
+
+namespace
+{
+
+struct Stack {
+  /* Object lock: */
+  std::string location;
+  bool deflate = false;
+  guint64 classic = G_GUINT64_CONSTANT (4'000'000'000);
+  std::string problem; // why the file could not be finished
+
+  /* Streaming thread: */
+  GstVideoInfo info = {};
+  std::string origin;         // of the pictures that come
+  std::string written_origin; // of those in the file
+  std::unique_ptr<StackFile> file;
+};
+
+} // namespace
+
+struct _GstCodedExposureStack {
+  GstBaseSink parent;
+  Stack *state;
+};
+
+G_DEFINE_TYPE (
+    GstCodedExposureStack, gst_coded_exposure_stack, GST_TYPE_BASE_SINK)
+
+namespace
+{
+
+using OpenFile = decltype (&open_ome_tiff);
+
+Stack &
+state_of (gpointer self)
+{
+  return *GST_CODED_EXPOSURE_STACK (self)->state;
+}
+
+/* Its name without the ending of a file that is not finished. */
+std::string
+final_name (const std::string &location)
+{
+  constexpr std::string_view kPart = ".part";
+  return location.ends_with (kPart)
+             ? location.substr (0, location.size () - kPart.size ())
+             : location;
+}
+
+bool
+is_hdf5 (const std::string &location)
+{
+  return final_name (location).ends_with (".h5");
+}
+
+/* Null, with an error: this build, or nobody, writes such a file. */
+OpenFile
+writer_of (GstElement *self, const std::string &location)
+{
+  const std::string name = final_name (location);
+  const bool hdf5 = is_hdf5 (location);
+  if (!hdf5 && !name.ends_with (".ome.tif") && !name.ends_with (".ome.tiff")) {
+    POST_ERROR (self, RESOURCE, SETTINGS,
+        name + " has another ending than .ome.tif, .ome.tiff or .h5; choose "
+               "one of these");
+    return nullptr;
+  }
+#ifndef CODEDEXPOSURE_TIFF
+  if (!hdf5) {
+    POST_ERROR (self, RESOURCE, SETTINGS,
+        "this build has no libtiff; install libtiff-dev and build again, or "
+        "write to .h5");
+    return nullptr;
+  }
+#endif
+#ifndef CODEDEXPOSURE_HDF5
+  if (hdf5) {
+    POST_ERROR (self, RESOURCE, SETTINGS,
+        "this build has no HDF5; install libhdf5-dev and build again, or "
+        "write to .ome.tif");
+    return nullptr;
+  }
+#endif
+#ifdef CODEDEXPOSURE_TIFF
+  if (!hdf5)
+    return open_ome_tiff;
+#endif
+#ifdef CODEDEXPOSURE_HDF5
+  if (hdf5)
+    return open_hdf5;
+#endif
+  return nullptr;
+}
+
+/* The bytes that the stream will have without compression; none if its length
+ * is not known. */
+std::optional<double>
+expected_size (GstBaseSink *sink, const StackFormat &format)
+{
+  constexpr double kDescription = 600; // bytes of a picture, at most
+  const GstSegment &segment = sink->segment;
+  gint64 length = 0;
+  if (GST_CLOCK_TIME_IS_VALID (segment.stop))
+    length = gint64 (segment.stop - segment.start);
+  else if (!gst_pad_peer_query_duration (
+               GST_BASE_SINK_PAD (sink), GST_FORMAT_TIME, &length))
+    return std::nullopt;
+  if (length <= 0 || format.rate.num <= 0)
+    return std::nullopt;
+  const double pictures =
+      2 + 1e-9 * double (length) * format.rate.num / format.rate.den;
+  return pictures *
+         (double (format.width) * format.height * format.bytes + kDescription);
+}
+
+/* Whether the file needs the 64-bit form of TIFF; says so. */
+bool
+needs_big (GstBaseSink *sink, const StackFormat &format, guint64 classic)
+{
+  const auto size = expected_size (sink, format);
+  if (size && *size <= double (classic))
+    return false;
+  POST_WARNING (sink, STREAM, FORMAT,
+      std::string (size ? "the pictures may need more than 4 GiB"
+                        : "the length of the stream is not known") +
+          ", so the file is a BigTIFF, which ImageJ cannot open without "
+          "Bio-Formats; write a shorter part for it, or .h5");
+  return true;
+}
+
+GstFlowReturn
+fail (GstBaseSink *sink, const Error &error)
+{
+  Stack &state = state_of (sink);
+  state.file.reset ();
+  {
+    const ObjectLock lock (sink);
+    state.problem = error.message;
+  }
+  if (error.message.find (g_strerror (ENOSPC)) != std::string::npos)
+    POST_ERROR (sink, RESOURCE, NO_SPACE_LEFT, error.message);
+  else
+    POST_ERROR (sink, RESOURCE, WRITE, error.message);
+  return GST_FLOW_ERROR;
+}
+
+void
+open_file (GstBaseSink *sink, const FrameMeta &meta)
+{
+  Stack &state = state_of (sink);
+  const GstVideoInfo &info = state.info;
+  const int depth = int (GST_VIDEO_INFO_COMP_DEPTH (&info, 0));
+  StackFormat format{.width = info.width,
+      .height = info.height,
+      .bytes = depth / 8,
+      .bits = meta.bits > 0 ? meta.bits : depth,
+      .rate = {info.fps_n, std::max (info.fps_d, 1)}};
+  std::string location;
+  guint64 classic = 0;
+  {
+    const ObjectLock lock (sink);
+    location = state.location;
+    classic = state.classic;
+    format.deflate = state.deflate;
+  }
+  format.big = !is_hdf5 (location) && needs_big (sink, format, classic);
+  state.file = writer_of (GST_ELEMENT (sink), location) (location, format);
+}
+
+StackRow
+row_of (GstBaseSink *sink, GstBuffer *picture)
+{
+  StackRow row;
+  row.pts = gst_segment_to_stream_time (
+      &sink->segment, GST_FORMAT_TIME, GST_BUFFER_PTS (picture));
+  row.duration = GST_BUFFER_DURATION (picture);
+  row.corrupted = GST_BUFFER_FLAG_IS_SET (picture, GST_BUFFER_FLAG_CORRUPTED);
+  if (const auto meta = get_frame_meta (picture)) {
+    row.frame = meta->frame;
+    row.slot = meta->subframe;
+    row.exposure = meta->exposure_duration;
+    row.synchronised = meta->locked;
+    row.lost_before = meta->lost_before;
+  }
+  return row;
+}
+
+GstFlowReturn
+render (GstBaseSink *sink, GstBuffer *picture) noexcept
+{
+  Stack &state = state_of (sink);
+  MappedFrame mapped (state.info, picture, GST_MAP_READ);
+  if (!mapped) {
+    POST_ERROR (sink, STREAM, FORMAT, unreadable_text (state.info, picture));
+    return GST_FLOW_ERROR;
+  }
+  try {
+    if (!state.file)
+      open_file (sink, get_frame_meta (picture).value_or (FrameMeta ()));
+    if (state.origin != state.written_origin) {
+      state.file->add_origin (state.origin);
+      state.written_origin = state.origin;
+    }
+    state.file->add (row_of (sink, picture),
+        static_cast<const guint8 *> (
+            GST_VIDEO_FRAME_PLANE_DATA (mapped.frame (), 0)),
+        gsize (GST_VIDEO_FRAME_PLANE_STRIDE (mapped.frame (), 0)));
+    return GST_FLOW_OK;
+  } catch (const Error &error) {
+    return fail (sink, error);
+  }
+}
+
+/* False, with an error: the file is not complete. */
+bool
+finish (GstBaseSink *sink)
+{
+  try {
+    if (const auto file = std::exchange (state_of (sink).file, nullptr))
+      file->finish ();
+    return true;
+  } catch (const Error &error) {
+    fail (sink, error);
+    return false;
+  }
+}
+
+/* Schedule and mapping of coded frames, or the provenance of pictures. */
+void
+take_origin (Stack &state, GstEvent *event)
+{
+  GstTagList *tags = nullptr;
+  gst_event_parse_tag (event, &tags);
+  if (const auto provenance = provenance_from_tags (tags);
+      provenance && *provenance)
+    state.origin = (*provenance)->to_json ();
+  else if (const auto setup = setup_from_tags (tags); setup && *setup)
+    state.origin = (*setup)->to_json ();
+}
+
+gboolean
+on_event (GstBaseSink *sink, GstEvent *event) noexcept
+{
+  if (GST_EVENT_TYPE (event) == GST_EVENT_TAG)
+    take_origin (state_of (sink), event);
+  if (GST_EVENT_TYPE (event) == GST_EVENT_EOS && !finish (sink)) {
+    gst_event_unref (event);
+    return FALSE;
+  }
+  return GST_BASE_SINK_CLASS (gst_coded_exposure_stack_parent_class)
+      ->event (sink, event);
+}
+
+gboolean
+set_caps (GstBaseSink *sink, GstCaps *caps) noexcept
+{
+  Stack &state = state_of (sink);
+  GstVideoInfo info;
+  if (!gst_video_info_from_caps (&info, caps))
+    return FALSE;
+  if (state.file &&
+      (info.width != state.info.width || info.height != state.info.height ||
+          GST_VIDEO_INFO_FORMAT (&info) !=
+              GST_VIDEO_INFO_FORMAT (&state.info))) {
+    POST_ERROR (sink, STREAM, FORMAT,
+        "the size or the depth of the pictures changes, but a stack has one "
+        "for all; write a folder of pictures");
+    return FALSE;
+  }
+  state.info = info;
+  return TRUE;
+}
+
+gboolean
+start (GstBaseSink *sink) noexcept
+{
+  Stack &state = state_of (sink);
+  std::string location;
+  {
+    const ObjectLock lock (sink);
+    state.problem.clear ();
+    location = state.location;
+  }
+  state.origin.clear ();
+  state.written_origin.clear ();
+  return writer_of (GST_ELEMENT (sink), location) != nullptr;
+}
+
+gboolean
+stop (GstBaseSink *sink) noexcept
+{
+  return finish (sink);
+}
+
+const PropertyTable<Stack> &
+properties ()
+{
+  static const PropertyTable<Stack> table{
+      {"location", "File",
+          "The file to write; its ending, .ome.tif, .ome.tiff or .h5, selects "
+          "the format. An ending .part after that is ignored",
+          kReadWriteReady, &Stack::location},
+      {"deflate", "Deflate",
+          "Compress the pictures without loss: smaller files, slower to read "
+          "and write",
+          kReadWriteReady, &Stack::deflate},
+      {"classic-size", "Largest classic TIFF",
+          "Bytes from which on a TIFF file is a BigTIFF, which ImageJ cannot "
+          "open without Bio-Formats",
+          kReadWriteReady, &Stack::classic, guint64 (0),
+          G_GUINT64_CONSTANT (4'000'000'000)},
+      {"problem", "Problem",
+          "Why the file could not be finished; empty: it was, or is still "
+          "written",
+          kReadOnly, [] (const Stack &state) { return state.problem; }}};
+  return table;
+}
+
+} // namespace
+
+static void
+gst_coded_exposure_stack_init (GstCodedExposureStack *self)
+{
+  self->state = new Stack ();
+  gst_base_sink_set_sync (GST_BASE_SINK (self), FALSE);
+}
+
+static void
+gst_coded_exposure_stack_class_init (GstCodedExposureStackClass *klass)
+{
+  install_state<GstCodedExposureStack, properties> (klass);
+  describe_element (klass, "Coded exposure stack", "Sink/File/Video",
+      "Writes pictures with their times to OME-TIFF or HDF5", {"sink"});
+  auto *sink_class = GST_BASE_SINK_CLASS (klass);
+  sink_class->set_caps = set_caps;
+  sink_class->event = on_event;
+  sink_class->render = render;
+  sink_class->start = start;
+  sink_class->stop = stop;
+}
+
+static gboolean
+plugin_init (GstPlugin *plugin)
+{
+  register_meta (kFrameMetaName);
+  return gst_element_register (plugin, "codedexposure-stack", GST_RANK_NONE,
+      gst_coded_exposure_stack_get_type ());
+}
+
+GST_PLUGIN_DEFINE (GST_VERSION_MAJOR, GST_VERSION_MINOR, codedexposurestack,
+    "Pictures of a coded exposure in files of the lab", plugin_init,
+    PACKAGE_VERSION, "LGPL", PACKAGE, "gst-codedexposure")

@@ -10,10 +10,13 @@
 The frames come from the same GStreamer elements as those of the command line,
 so they are equal to what codedexposure-decode writes.
 """
-from ._pipeline import Error, RecordingWarning
+from ._pipeline import BUILD, Error, RecordingWarning
 from .arrays import decode_array, fuse_array, simulate
 from .frame import Frame
 from .recording import Recording, open  # pylint: disable=redefined-builtin
 
 __all__ = ["Error", "Frame", "Recording", "RecordingWarning", "decode_array",
            "fuse_array", "open", "simulate"]
+
+# codedexposure.library is compiled.
+__path__.append(str(BUILD / "python"))

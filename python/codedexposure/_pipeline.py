@@ -36,6 +36,11 @@ class RecordingWarning(UserWarning):
 warnings.simplefilter("always", RecordingWarning, append=True)
 
 
+# Of the source tree around this file, if there is one.
+_ROOT = pathlib.Path(__file__).resolve().parents[2]
+BUILD = pathlib.Path(os.environ.get("CODEDEXPOSURE_BUILD", _ROOT / "build"))
+
+
 def _has_plugin(folder: pathlib.Path | None = None) -> bool:
     """Whether GStreamer finds the plugin, if need be in this folder."""
     if folder and (folder / "libgstcodedexposure.so").exists():
@@ -47,12 +52,10 @@ def _find_plugin() -> None:
     """In the build tree around this file, where GStreamer looks, or below the
     prefix of PREFIX/lib/python3/dist-packages."""
     Gst.init(None)
-    root = pathlib.Path(__file__).resolve().parents[2]
-    build = pathlib.Path(os.environ.get("CODEDEXPOSURE_BUILD", root / "build"))
-    if _has_plugin(build / "gst"):
+    if _has_plugin(BUILD / "gst"):
         return
     if any(_has_plugin(folder) for pattern in ("", "*/")
-           for folder in root.parent.glob(pattern + "gstreamer-1.0")):
+           for folder in _ROOT.parent.glob(pattern + "gstreamer-1.0")):
         return
     raise ImportError(
         "GStreamer does not find the plugin codedexposure; install it, or set "

@@ -175,6 +175,21 @@ class Faults(unittest.TestCase):
         self.assertGreater(len(frames), 8)
         self.assertTrue(decoded("plain.mkv").startswith(pixels(frames)))
 
+    def test_damage_anywhere(self):
+        data = (SCRATCH / "plain.mkv").read_bytes()
+        whole = [f.image.tobytes() for f in opened("plain.mkv").subframes()]
+        first = data.index(b"\x1f\x43\xb6\x75", 400) + 4
+        rng = np.random.default_rng(1)
+        for at in rng.integers(first, len(data), 15):
+            changed = bytearray(data)
+            changed[at] ^= 1 << rng.integers(8)
+            (SCRATCH / "flip.mkv").write_bytes(changed)
+            with self.subTest(byte=int(at)):
+                frames, said = read("flip.mkv")
+                intact = [f.image.tobytes() for f in frames if not f.corrupted]
+                self.assertLessEqual(set(intact), set(whole))
+                self.assertTrue(said or len(intact) == len(whole))
+
     def test_strict(self):
         data = (SCRATCH / "plain.mkv").read_bytes()
         (SCRATCH / "cut.mkv").write_bytes(data[:len(data) // 2])

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Compares a stack, read by tifffile or h5py, with the pixels and the table of
-times of the same pictures. stack_check.py STACK PIXELS TIMES.CSV"""
+times of the same pictures: NAME.ome.tif or NAME.h5 with NAME.mkv.raw and
+NAME/times.csv. stack_check.py STACK..."""
 import csv
 import json
 import sys
@@ -43,27 +44,32 @@ def read_hdf5(path):
                 file.attrs['significant_bits'])
 
 
-stack, raw, table = sys.argv[1:]
-pictures, rows, origin, bits = (
-    read_hdf5 if stack.endswith('.h5') else read_tiff)(stack)
+def check(stack):
+    name = stack.split('.')[0]
+    pictures, rows, origin, bits = (
+        read_hdf5 if stack.endswith('.h5') else read_tiff)(stack)
+    count, height, width = pictures.shape
+    bytes_per_row = (width * pictures.itemsize + 3) // 4 * 4
+    pixels = numpy.fromfile(f'{name}.mkv.raw', numpy.uint8)
+    pixels = pixels.reshape(count, height, bytes_per_row)
+    pixels = pixels[:, :, :width * pictures.itemsize].copy().view(pictures.dtype)
+    assert numpy.array_equal(pictures, pixels), 'other pixels'
+    assert pixels.std() > 0
 
-count, height, width = pictures.shape
-bytes_per_row = (width * pictures.itemsize + 3) // 4 * 4
-pixels = numpy.fromfile(raw, numpy.uint8).reshape(count, height, bytes_per_row)
-pixels = pixels[:, :, :width * pictures.itemsize].copy().view(pictures.dtype)
-assert numpy.array_equal(pictures, pixels), 'other pixels'
-assert pixels.std() > 0
+    with open(f'{name}/times.csv') as file:
+        expected = list(csv.DictReader(file))
+    for row in expected + rows:
+        row.pop('file', None)
+        row.pop('picture', None)
+    assert rows == expected, [x for x in zip(rows, expected) if x[0] != x[1]][:1]
 
-with open(table) as file:
-    expected = list(csv.DictReader(file))
-for row in expected + rows:
-    row.pop('file', None)
-    row.pop('picture', None)
-assert rows == expected, [x for x in zip(rows, expected) if x[0] != x[1]][:1]
+    setup = origin.get('setup', origin)
+    assert setup['code'] == 'sequential' and setup['tile'] == '2x2'
+    frames = {int(row['frame']) for row in rows}
+    gaps = max(frames) - min(frames) + 1 - len(frames)
+    print(f'{stack}: {pictures.shape} {pictures.dtype}, {bits} bits,'
+          f' {origin.get("method", "coded")}, {gaps} frames lost')
 
-setup = origin.get('setup', origin)
-assert setup['code'] == 'sequential' and setup['tile'] == '2x2'
-frames = {int(row['frame']) for row in rows}
-gaps = max(frames) - min(frames) + 1 - len(frames)
-print(f'{stack}: {pictures.shape} {pictures.dtype}, {bits} bits,'
-      f' {origin.get("method", "coded")}, {gaps} frames lost')
+
+for path in sys.argv[1:]:
+    check(path)

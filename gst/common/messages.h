@@ -174,6 +174,13 @@ struct StreamCut {
   guint64 frames = 0; ///< that came
   CODED_FIELDS (frames);
 };
+/** codedexposure-restore: the last line of the track counts more frames than
+ * came and were missed: the beginning is missing, or parts with their lines. */
+struct StreamIncomplete {
+  static constexpr const char *kName = "codedexposure/stream-incomplete";
+  guint64 count = 0;
+  CODED_FIELDS (count);
+};
 
 /** codedexposure-sim: an exposure that got too few input frames. */
 struct ExposureDropped {

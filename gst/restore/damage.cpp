@@ -91,6 +91,20 @@ DamageReport::stream_cut ()
   post_message (element_, StreamCut{frames});
 }
 
+void
+DamageReport::stream_ended (guint64 total)
+{
+  guint64 known;
+  {
+    const ObjectLock lock (element_);
+    known = counters_.frames + counters_.missing;
+  }
+  if (known >= total)
+    return;
+  count (&Counters::missing, total - known);
+  post_message (element_, StreamIncomplete{total - known});
+}
+
 StructurePtr
 DamageReport::stats (guint64 lines_damaged) const
 {

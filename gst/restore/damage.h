@@ -11,7 +11,8 @@ namespace codedexposure::gst
 
 /** Counts frames for the property `stats`, and posts the messages
  * frames-damaged, at both ends of a sequence of frames that are not as
- * recorded, frames-missing and stream-cut. Streaming thread of the frames. */
+ * recorded, frames-missing, stream-cut and stream-incomplete. Streaming thread
+ * of the frames. */
 class DamageReport
 {
 public:
@@ -35,6 +36,9 @@ public:
   void end_sequence ();
   /** The last line of the track did not come. */
   void stream_cut ();
+  /** At the end of a stream that began with its first frame: it was to have
+   * @p total frames. */
+  void stream_ended (guint64 total);
 
   /** Object lock. */
   StructurePtr stats (guint64 lines_damaged) const;

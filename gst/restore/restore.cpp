@@ -18,9 +18,10 @@
  * the track, or whose time was moved against the frames before, is CORRUPTED.
  * The element messages `codedexposure/frames-damaged`
  * (`active`, `frame`, `from`, `reason`, at the end `count`),
- * `codedexposure/frames-missing` (`count`, `from`) and
+ * `codedexposure/frames-missing` (`count`, `from`),
  * `codedexposure/stream-cut` (`frames`: the stream ended without its last line)
- * report damage; #codedexposure-restore:stats counts it.
+ * and `codedexposure/stream-incomplete` (`count`: frames are missing together
+ * with their lines) report damage; #codedexposure-restore:stats counts it.
  *
  * The schedule of the track wins over that in the container's tags; a
  * difference is a warning. If the tags say that there is a track, a missing one
@@ -87,6 +88,7 @@ struct RestoreState {
   std::optional<guint64> last_frame;
   bool announced = false; ///< the container's tags say that there is a track
   bool found_line = false;
+  bool whole = true; ///< no seek: the first frame is that of the stream
   bool said_no_track = false;
   bool said_moved = false;
   bool said_setups_differ = false;
@@ -279,13 +281,15 @@ check_end (Self *self)
     say_no_track (self);
   if (!state.track.exists ())
     return;
-  const auto [rest, complete] =
+  const auto [rest, frames] =
       state.track.take_rest (Nanoseconds (state.segment.start));
-  if (!complete && ends_early (state))
+  if (!frames && ends_early (state))
     return;
   report_missing (state, rest);
-  if (!complete)
+  if (!frames)
     state.damage.stream_cut ();
+  else if (state.whole)
+    state.damage.stream_ended (*frames);
 }
 
 void
@@ -399,8 +403,10 @@ sink_event (GstPad *pad, GstObject *parent, GstEvent *owned) noexcept
   RestoreState &state = *self->state;
   EventPtr event (owned);
   const GstEventType type = GST_EVENT_TYPE (owned);
-  if (type == GST_EVENT_FLUSH_STOP)
+  if (type == GST_EVENT_FLUSH_STOP) {
     forget_frames (state);
+    state.whole = false;
+  }
   if (!(gst_event_type_get_flags (type) & GST_EVENT_TYPE_SERIALIZED) ||
       type == GST_EVENT_FLUSH_STOP)
     return gst_pad_event_default (pad, parent, event.release ());
@@ -423,6 +429,7 @@ begin_run (GstElement *element)
   state.container.reset ();
   state.setup.reset ();
   state.announced = state.found_line = false;
+  state.whole = true;
   state.said_no_track = state.said_setups_differ = state.said_moved = false;
   state.track.restart ();
   state.damage.restart ();

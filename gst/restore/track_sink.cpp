@@ -119,7 +119,7 @@ TrackSink::Rest
 TrackSink::take_rest (Nanoseconds start)
 {
   const std::lock_guard lock (lock_);
-  return {reader_.take_rest (start), reader_.frames ().has_value ()};
+  return {reader_.take_rest (start), reader_.frames ()};
 }
 
 } // namespace codedexposure::gst

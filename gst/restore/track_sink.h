@@ -44,7 +44,8 @@ public:
       Nanoseconds pts, Nanoseconds start, bool wait);
   struct Rest {
     TrackReader::Match match;
-    bool complete; ///< the last line of the stream came
+    /** In the whole stream, if its last line came. */
+    std::optional<std::uint64_t> frames;
   };
   /** TrackReader::take_rest (). */
   Rest take_rest (Nanoseconds start);

@@ -378,9 +378,12 @@ Launch::on_element_message (GstMessage *message)
   const GstStructure *structure = gst_message_get_structure (message);
   const std::string_view name = gst_structure_get_name (structure);
   said_needed_ |= options_.need && name == options_.need;
-  const bool damage = name == "codedexposure/frames-damaged" ||
-                      name == "codedexposure/frames-missing" ||
-                      name == "codedexposure/stream-cut";
+  const bool damage =
+      name == "codedexposure/frames-damaged" ||
+      name == "codedexposure/frames-missing" ||
+      name == "codedexposure/stream-cut" ||
+      /* Who receives may have joined late. */
+      (name == "codedexposure/stream-incomplete" && options_.retry <= 0);
   if (damage && (interrupted_ || failed_)) // the stream was cut here
     return;
   damaged_ |= damage;

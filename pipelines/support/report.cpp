@@ -346,6 +346,11 @@ notice (const GstStructure *message)
   if (name == "codedexposure/stream-cut")
     return "warning: the stream ended without its last line: it was cut off, "
            "its sender was stopped, or it is a segment of a longer recording";
+  if (name == "codedexposure/stream-incomplete")
+    return "warning: recorded frames are missing with all that is known of "
+           "them: " +
+           number ("count") +
+           "; the recording is damaged, or this is not its first part";
   if (name == "codedexposure/camera-back")
     return "the camera sends frames again, after " +
            seconds_in (message, "silent");

@@ -149,6 +149,10 @@ def _loss_in(structure) -> str | None:
     if name == "codedexposure/stream-cut":
         return ("the stream ended without its last line: it was cut off, its "
                 "sender was stopped, or it is a segment of a longer recording")
+    if name == "codedexposure/stream-incomplete":
+        return ("recorded frames are missing with all that is known of them: "
+                f"{value('count')}; the recording is damaged, or this is not "
+                "its first part")
     return None
 
 

@@ -162,6 +162,7 @@ TEST_F (Restore, EverythingThatWasKnownIsKnownAgain)
   EXPECT_EQ (schedule (), "staircase:2x2");
   EXPECT_FALSE (file.posted<FramesDamaged> ());
   EXPECT_FALSE (file.posted<StreamCut> ());
+  EXPECT_FALSE (file.posted<StreamIncomplete> ());
 }
 
 TEST_F (Restore, OtherPixelsAreCorruptedAndCounted)
@@ -221,6 +222,28 @@ TEST_F (Restore, AMissingLastFrameIsSaid)
 {
   play (kFrames - 1);
   ASSERT_TRUE (file.posted<FramesMissing> ());
+}
+
+TEST_F (Restore, FramesThatAreMissingWithTheirLinesAreSaid)
+{
+  play (0, 0);
+  ASSERT_EQ (restored.size (), std::size_t (kFrames - 1));
+  const auto incomplete = file.posted<StreamIncomplete> ();
+  ASSERT_TRUE (incomplete);
+  EXPECT_EQ (incomplete->count, 1u);
+  EXPECT_EQ (counter_of (file.element (), "frames-missing"), 1u);
+  EXPECT_FALSE (file.posted<FramesMissing> ());
+}
+
+TEST_F (Restore, AfterASeekTheFramesBeforeItAreNotMissed)
+{
+  file.push_event (gst_event_new_flush_start ());
+  file.push_event (gst_event_new_flush_stop (TRUE));
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_TIME);
+  file.push_event (gst_event_new_segment (&segment));
+  play (0, 0);
+  EXPECT_FALSE (file.posted<StreamIncomplete> ());
 }
 
 TEST_F (Restore, WithoutTheLastLineTheStreamWasCut)

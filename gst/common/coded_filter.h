@@ -267,6 +267,9 @@ protected:
   };
   Shared shared_; ///< object lock
 
+  /** A flush comes from another thread than frames, and is forwarded, too. */
+  std::shared_ptr<const Provenance> provenance () const;
+
 private:
   /** A sequence of saturated frames. */
   struct Burst {

@@ -287,16 +287,23 @@ CodedFilter::set_provenance (GstBuffer *next)
   shared_.provenance = std::make_shared<const Provenance> (std::move (made));
 }
 
+std::shared_ptr<const Provenance>
+CodedFilter::provenance () const
+{
+  const ObjectLock lock (element_);
+  return shared_.provenance;
+}
+
 /* After segment and tags from upstream. */
 void
 CodedFilter::push_provenance ()
 {
   if (!std::exchange (stream_.provenance_due, false))
     return;
-  each_pad ([this] (GstCodedPad *pad) {
+  const auto made = provenance ();
+  each_pad ([&] (GstCodedPad *pad) {
     if (pad->coded.kind != PadKind::coded)
-      gst_pad_push_event (
-          GST_PAD (pad), provenance_to_event (*shared_.provenance));
+      gst_pad_push_event (GST_PAD (pad), provenance_to_event (*made));
   });
 }
 

@@ -312,13 +312,14 @@ Demux::forward (EventPtr event)
     const ObjectLock lock (element ());
     ended_ = type == GST_EVENT_EOS;
   }
+  const auto made = provenance ();
   each_pad ([&] (GstCodedPad *pad) {
-    EventPtr own = type == GST_EVENT_STREAM_START
-                       ? stream_start_for (pad, event.get ())
-                   : type == GST_EVENT_GAP
-                       ? gap_for (pad, event.get ())
-                       : EventPtr (event_for (pad, gst_event_ref (event.get ()),
-                             shared_.provenance.get ()));
+    EventPtr own =
+        type == GST_EVENT_STREAM_START ? stream_start_for (pad, event.get ())
+        : type == GST_EVENT_GAP
+            ? gap_for (pad, event.get ())
+            : EventPtr (
+                  event_for (pad, gst_event_ref (event.get ()), made.get ()));
     gst_pad_push_event (GST_PAD (pad), own.release ());
   });
   return TRUE;

@@ -455,7 +455,7 @@ gboolean
 Fuse::forward (EventPtr event)
 {
   return gst_pad_push_event (GST_PAD (srcpad_.get ()),
-      event_for (srcpad_.get (), event.release (), shared_.provenance.get ()));
+      event_for (srcpad_.get (), event.release (), provenance ().get ()));
 }
 
 CapsPtr

@@ -248,7 +248,7 @@ launch ()
     ${opt[verbose]:+--verbose} ${opt[camera]:+--camera} "$@" || status=$?
   [ "$status" -le 128 ] || say "the pipeline was ended by" \
     "SIG$(kill -l "$status"); what it wrote is in files that end in .part," \
-    "which can be renamed and decoded"
+    "which can be renamed and used"
   no_frame=
   if [ "$status" = 5 ]; then
     no_frame=1 status=1

@@ -247,6 +247,8 @@ render (GstBaseSink *sink, GstBuffer *picture) noexcept
     return GST_FLOW_OK;
   } catch (const Error &error) {
     return fail (sink, error);
+  } catch (const std::exception &error) {
+    return fail (sink, Error{error.what ()});
   }
 }
 
@@ -260,8 +262,10 @@ finish (GstBaseSink *sink)
     return true;
   } catch (const Error &error) {
     fail (sink, error);
-    return false;
+  } catch (const std::exception &error) {
+    fail (sink, Error{error.what ()});
   }
+  return false;
 }
 
 /* Schedule and mapping of coded frames, or the provenance of pictures. */

@@ -263,9 +263,9 @@ take_unlocked (GstDmdSync *self, const Frame &frame)
     return drop_with_gap (self, frame, "not-locked");
   case OnUnlock::error:
     GST_ELEMENT_ERROR (self, RESOURCE, FAILED,
-        ("The masks of the DMD are %d slots late in frame %" G_GUINT64_FORMAT
-         ", and on-unlock=error says to stop",
-            frame.phase.slip, guint64 (frame.step.number)),
+        ("The masks of the DMD are late in frame %" G_GUINT64_FORMAT
+         " (slots: %d), and on-unlock=error says to stop",
+            guint64 (frame.step.number), frame.phase.slip),
         (nullptr));
     return GST_FLOW_ERROR;
   default:

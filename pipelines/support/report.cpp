@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cstdarg>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <regex>
 #include <utility>
@@ -311,6 +312,16 @@ seconds_in (const GstStructure *message, const char *field)
   return format ("%.3f s", 1e-9 * double (time));
 }
 
+std::string
+slip_in (const GstStructure *message)
+{
+  gint slots = 0;
+  gst_structure_get_int (message, "slots", &slots);
+  const gint count = std::abs (slots);
+  return format ("%d slot%s %s", count, count == 1 ? "" : "s",
+      slots < 0 ? "early" : "late");
+}
+
 } // namespace
 
 std::string
@@ -330,7 +341,7 @@ notice (const GstStructure *message)
     return "warning: frame " + number ("frame") + " arrived after the next one";
   if (name == "dmdsync/slip")
     return "warning: from frame " + number ("frame") + " on, the mirrors are " +
-           number ("slots") + " slots late; these frames are flagged";
+           slip_in (message) + "; these frames are flagged";
   gboolean active = TRUE;
   gst_structure_get_boolean (message, "active", &active);
   if (name == "codedexposure/frames-damaged" && active)
@@ -363,13 +374,13 @@ std::string
 flaws_of (GstElement *pipeline)
 {
   constexpr struct {
-    const char *counter, *text;
+    const char *counter, *text, *text_of_one = text;
   } kFlaws[] = {{"frames-lost", "lost"}, {"frames-corrupted", "corrupted"},
       {"frames-incomplete", "incomplete"}, {"frames-late", "late"},
       {"frames-duplicate", "duplicate"}, {"frames-skipped", "skipped"},
-      {"slips", "losses of synchronisation"}};
+      {"slips", "losses of synchronisation", "loss of synchronisation"}};
   std::string text;
-  for (const auto &[counter, word] : kFlaws) {
+  for (const auto &[counter, text_of_many, text_of_one] : kFlaws) {
     guint64 most = 0; // several elements count the same frames
     for_each_element (pipeline, [&] (GstElement *element) {
       guint64 count = 0;
@@ -378,7 +389,8 @@ flaws_of (GstElement *pipeline)
       most = std::max (most, count);
     });
     if (most > 0)
-      text += format (", %" G_GUINT64_FORMAT " %s", most, word);
+      text += format (", %" G_GUINT64_FORMAT " %s", most,
+          most == 1 ? text_of_one : text_of_many);
   }
   return text;
 }

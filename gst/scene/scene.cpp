@@ -8,7 +8,8 @@
  * dark liquid that is poured into a glass of clear liquid, at any size and
  * frame rate: the scenes of the paper's Figs. 9 to 11. Pixel values are linear
  * in light. A picture depends only on its time, so every run gives the same
- * pictures.
+ * pictures. With #codedexposure-scene:repeat, the scene begins again after that
+ * time.
  *
  * ## Example pipeline
  * |[
@@ -38,9 +39,11 @@ namespace
 
 struct SceneState {
   SceneKind kind = SceneKind::kCandle; // object lock
+  guint64 repeat = 0;                  // ns; object lock
 
   /* Streaming thread, and start and stop, which exclude it. */
   SceneKind drawn = SceneKind::kCandle; ///< in force
+  GstClockTime period = 0;              ///< in force; 0: never repeated
   GstVideoInfo info;
   std::unique_ptr<codedexposure::SyntheticScene> scene;
   codedexposure::Image<float> light;
@@ -87,9 +90,15 @@ namespace
 const PropertyTable<SceneState> &
 properties ()
 {
-  static const PropertyTable<SceneState> table{{"scene", "Scene to draw",
-      "What is drawn; takes effect when the stream starts", kReadWriteReady,
-      &SceneState::kind, gst_coded_exposure_scene_kind_get_type ()}};
+  static const PropertyTable<SceneState> table{
+      {"scene", "Scene to draw",
+          "What is drawn; takes effect when the stream starts", kReadWriteReady,
+          &SceneState::kind, gst_coded_exposure_scene_kind_get_type ()},
+      {"repeat", "Repeat",
+          "Time after which the scene begins again, ns; 0: never. Takes effect "
+          "when the stream starts",
+          kReadWriteReady, &SceneState::repeat, guint64 (0),
+          guint64 (G_MAXINT64)}};
   return table;
 }
 
@@ -100,6 +109,7 @@ start (GstBaseSrc *base)
   SceneState &state = *self->state;
   const ObjectLock lock (self);
   state.drawn = state.kind;
+  state.period = state.repeat;
   state.frame = 0;
   return TRUE;
 }
@@ -149,7 +159,8 @@ create (GstPushSrc *base, GstBuffer **outbuf) noexcept
   BufferPtr buffer (gst_buffer_new_allocate (
       nullptr, GST_VIDEO_INFO_SIZE (&state.info), nullptr));
   const GstClockTime time = time_of (state.frame);
-  state.scene->draw (double (time) * 1e-9, state.light.view ());
+  const GstClockTime since = state.period > 0 ? time % state.period : time;
+  state.scene->draw (double (since) * 1e-9, state.light.view ());
   {
     MappedFrame mapped (state.info, buffer.get (), GST_MAP_WRITE);
     const auto light = std::as_const (state.light).view ();

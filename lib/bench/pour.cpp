@@ -44,9 +44,16 @@ class Pour : public SyntheticScene
 {
 public:
   explicit Pour (Extent size)
-      : frame_{size}, dye_ (size.width, size.height),
-        across_ (std::size_t (size.width))
+      : frame_{size}, lamp_ (size.width, size.height),
+        dye_ (size.width, size.height), across_ (std::size_t (size.width)),
+        glass_ (std::size_t (size.width)), top_ (std::size_t (size.width))
   {
+    for (int y = 0; y < size.height; y++)
+      for (int x = 0; x < size.width; x++)
+        lamp_.at (x, y) = lamp (frame_.at (x, y));
+    for (int x = 0; x < size.width; x++)
+      glass_[std::size_t (x)] =
+          0.90 - 0.25 * std::exp (-(kGlass - beside (x)) / 0.012);
   }
 
   void draw (double t, ImageView<float> light) override
@@ -59,10 +66,16 @@ public:
       add_puff (i, t, dye);
     for (int i = 0; i < kDrops; i++)
       add_drop (i, t, dye);
-    for (int y = 0; y < light.height; y++)
-      for (int x = 0; x < light.width; x++)
-        light.at (x, y) =
-            float (lamp (frame_.at (x, y), t)) * std::exp (-dye.at (x, y));
+    for (int x = 0; x < light.width; x++)
+      top_[std::size_t (x)] = surface (frame_.at (x, 0).x, t);
+    for (int y = 0; y < light.height; y++) {
+      const double *lamp = lamp_.view ().row (y);
+      for (int x = 0; x < light.width; x++) {
+        const float seen = float (lamp[x] * through (x, y));
+        const float dark = dye.at (x, y);
+        light.at (x, y) = dark > 0.0f ? seen * std::exp (-dark) : seen;
+      }
+    }
   }
 
 private:
@@ -78,19 +91,32 @@ private:
                swing (since, 9.0, -std::abs (x) / 0.11);
   }
 
-  /* A bright screen behind, seen through glass and liquid. */
-  double lamp (Position at, double t) const
+  double beside (int x) const { return std::abs (frame_.at (x, 0).x); }
+
+  /* A bright screen behind. */
+  static double lamp (Position at)
   {
     const double off = at.y - 0.5;
-    double light = 0.8 / (1.0 + 0.32 * (at.x * at.x + off * off)) +
-                   0.02 * std::sin (at.x * 60.0);
-    const double beside = std::abs (at.x);
-    const double top = surface (at.x, t);
-    if (beside < kGlass && at.y > top && at.y < kFloor)
-      light *= 0.90 - 0.25 * std::exp (-(kGlass - beside) / 0.012) -
-               0.45 * std::exp (-(at.y - top) / 0.006);
-    const bool wall = std::abs (beside - kGlass) < 0.007 && at.y > 0.3;
-    const bool bottom = beside < kGlass && at.y > kFloor && at.y < 0.97;
+    return 0.8 / (1.0 + 0.32 * (at.x * at.x + off * off)) +
+           0.02 * std::sin (at.x * 60.0);
+  }
+
+  /* The part of its light that glass and liquid pass. */
+  double through (int x, int y) const
+  {
+    constexpr double kEdge = 0.006;
+    constexpr double kNoEdge = 40.0 * kEdge; // exp (-40) changes no light
+    const double down = frame_.at (0, y).y;
+    const double out = beside (x);
+    const double top = top_[std::size_t (x)];
+    double light = 1.0;
+    if (out < kGlass && down > top && down < kFloor) {
+      light = glass_[std::size_t (x)];
+      if (down - top < kNoEdge)
+        light -= 0.45 * std::exp (-(down - top) / kEdge);
+    }
+    const bool wall = std::abs (out - kGlass) < 0.007 && down > 0.3;
+    const bool bottom = out < kGlass && down > kFloor && down < 0.97;
     return wall || bottom ? 0.45 * light : light;
   }
 
@@ -176,8 +202,11 @@ private:
   }
 
   SceneFrame frame_;
+  Image<double> lamp_;
   Image<float> dye_;
-  std::vector<float> across_;
+  std::vector<float> across_; ///< of a blot
+  std::vector<double> glass_; ///< passed by glass and liquid in a column
+  std::vector<double> top_;   ///< of the liquid in a column, now
 };
 
 } // namespace

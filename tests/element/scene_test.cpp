@@ -69,6 +69,22 @@ TEST (SceneElement, DrawsTheSceneThatIsAskedForInBothDepths)
   }
 }
 
+TEST (SceneElement, BeginsAgainAfterTheTimeToRepeat)
+{
+  const std::string caps = gray_caps (50, 30, "25/1");
+  const auto image = [&] (const BufferPtr &picture) {
+    return image_of<guint8> (picture.get (), caps_of (caps).get ());
+  };
+  const auto once = pictures ("pour", caps, 15);
+  const auto again = pictures ("pour repeat=400000000", caps, 15);
+  for (unsigned k = 0; k < 15; k++) {
+    EXPECT_EQ (image (again[k]), image (once[k % 10])) << k;
+    EXPECT_EQ (
+        GST_BUFFER_PTS (again[k].get ()), GST_BUFFER_PTS (once[k].get ()));
+  }
+  EXPECT_NE (image (once[10]), image (once[0]));
+}
+
 TEST (SceneElement, StandsInForTheBenchUnlessToldOtherwise)
 {
   const HarnessPtr h (gst_harness_new_parse ("codedexposure-scene"));

@@ -282,6 +282,8 @@ CodedFilter::set_provenance (GstBuffer *next)
   const GstVideoInfo &info = format ().info;
   made.setup.size = Extent{info.width, info.height};
   made.setup.rate = format ().rate;
+  if (stream_.tagged && *stream_.tagged)
+    made.setup.simulated = stream_.tagged->value ().simulated;
   stream_.provenance_due = true;
   const ObjectLock lock (element_);
   shared_.provenance = std::make_shared<const Provenance> (std::move (made));

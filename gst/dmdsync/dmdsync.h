@@ -110,6 +110,7 @@ struct Stream {
   int unproven = 0; ///< frames in a row whose pilot did not show the phase
   bool warned_pilot = false;
   std::optional<Mapping> mapping; ///< of the tags from upstream
+  bool simulated = false;         ///< as those tags say
   std::string refused; ///< the error of the caps that were refused last
 };
 

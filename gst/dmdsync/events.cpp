@@ -86,15 +86,25 @@ resync (Stream &stream)
   stream.rate_watch->resync ();
 }
 
+/** What the tag says: the schedule is ours, the rest is upstream's. */
+StreamSetup
+own_setup (GstDmdSync *self)
+{
+  SyncState &st = state (self);
+  StreamSetup setup = setup_at (
+      GST_BASE_TRANSFORM_SRC_PAD (self), st.schedule, st.stream.mapping);
+  setup.simulated = st.stream.simulated;
+  return setup;
+}
+
 bool
 push_tag (GstDmdSync *self)
 {
   Stream &stream = state (self).stream;
   if (!std::exchange (stream.tag_due, false))
     return true;
-  GstPad *src = GST_BASE_TRANSFORM_SRC_PAD (self);
   return gst_pad_push_event (
-      src, setup_to_event (setup_at (src, state (self).schedule)));
+      GST_BASE_TRANSFORM_SRC_PAD (self), setup_to_event (own_setup (self)));
 }
 
 /** @p event, or one in which our schedule takes the place of another. */
@@ -119,11 +129,12 @@ own_schedule (GstDmdSync *self, GstEvent *event)
     return event;
 
   /* The last tags of a scope are those that a late link gets: ours are always
-   * among them. The mapping is upstream's. */
-  if (theirs && *theirs)
+   * among them. */
+  if (theirs && *theirs) {
     st.stream.mapping = theirs->value ().mapping;
-  return replace_setup (event, setup_at (GST_BASE_TRANSFORM_SRC_PAD (self),
-                                   st.schedule, st.stream.mapping));
+    st.stream.simulated = theirs->value ().simulated;
+  }
+  return replace_setup (event, own_setup (self));
 }
 
 /** A gap in place of frames moves as they do. */

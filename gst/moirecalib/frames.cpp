@@ -273,9 +273,11 @@ std::optional<StreamSetup>
 corrected_setup (const CalibState &st)
 {
   std::optional<StreamSetup> setup = st.stream.setup;
-  if (st.exchange.found.schedule)
+  if (st.exchange.found.schedule) {
+    const bool simulated = setup && setup->simulated;
     setup = StreamSetup{*st.exchange.found.schedule};
-  else if (setup && st.exchange.found.mapping)
+    setup->simulated = simulated;
+  } else if (setup && st.exchange.found.mapping)
     setup->mapping = st.exchange.found.mapping;
   return setup;
 }

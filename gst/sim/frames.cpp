@@ -499,13 +499,21 @@ restart (GstCodedExposureSim *self, Drop reason)
   stream.last_start = GST_CLOCK_TIME_NONE;
 }
 
+StreamSetup
+own_setup (GstCodedExposureSim *self)
+{
+  StreamSetup setup = setup_at (
+      GST_BASE_TRANSFORM_SRC_PAD (self), *state (self).stream.schedule);
+  setup.simulated = true;
+  return setup;
+}
+
 void
 push_tag (GstCodedExposureSim *self)
 {
-  Stream &stream = state (self).stream;
-  GstPad *src = GST_BASE_TRANSFORM_SRC_PAD (self);
-  if (std::exchange (stream.tag_due, false))
-    gst_pad_push_event (src, setup_to_event (setup_at (src, *stream.schedule)));
+  if (std::exchange (state (self).stream.tag_due, false))
+    gst_pad_push_event (
+        GST_BASE_TRANSFORM_SRC_PAD (self), setup_to_event (own_setup (self)));
 }
 
 } // namespace codedexposure::gst::sim

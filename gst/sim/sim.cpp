@@ -166,8 +166,8 @@ take_tags (GstBaseTransform *trans, GstEvent *event)
   if (global || stream.tag_due)
     event = remove_setup_and_provenance (event);
   else
-    event = replace_setup (
-        event, setup_at (GST_BASE_TRANSFORM_SRC_PAD (trans), *stream.schedule));
+    event =
+        replace_setup (event, sim::own_setup (GST_CODED_EXPOSURE_SIM (trans)));
   return !event || parent_class ()->sink_event (trans, event);
 }
 

@@ -18,6 +18,7 @@
 #include "common/element.h"
 #include "common/named.h"
 #include "common/raii.h"
+#include "mapping/stream_setup.h"
 #include "schedule/schedule.h"
 
 G_BEGIN_DECLS
@@ -144,6 +145,8 @@ void drop_exposure (GstCodedExposureSim *self, Drop reason);
 /** The next frame begins a stretch of time of its own. */
 void restart (GstCodedExposureSim *self, Drop reason);
 /** Says the schedule downstream where that is due. */
+/** Schedule, size and rate of the coded frames. */
+StreamSetup own_setup (GstCodedExposureSim *self);
 void push_tag (GstCodedExposureSim *self);
 
 } // namespace codedexposure::gst::sim

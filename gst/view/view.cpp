@@ -11,7 +11,7 @@
  * The #codedexposure-view:bits property sets the number of significant bits. If
  * it is 0, the frame metadata of dmdsync and codedexposure-sim tell the number,
  * and without them the format. GRAY8 pictures with 8 significant bits pass
- * unchanged.
+ * unchanged. #codedexposure-view:white stretches the contrast of a dark scene.
  *
  * ## Example pipeline
  * |[
@@ -42,7 +42,7 @@ G_DECLARE_FINAL_TYPE (GstCodedExposureView, gst_coded_exposure_view, GST,
 
 struct _GstCodedExposureView {
   GstVideoFilter parent;
-  gint bits; // object lock
+  gint bits, white; // object lock
 };
 
 G_DEFINE_TYPE_WITH_CODE (GstCodedExposureView, gst_coded_exposure_view,
@@ -55,30 +55,33 @@ GST_ELEMENT_REGISTER_DEFINE (codedexposure_view, "codedexposure-view",
 namespace
 {
 
-constexpr int kShown = 8;
+constexpr int kShown = 8, kWhite = 255;
 
-/** Significant bits of @p picture, up to the @p depth of its format. */
-int
-significant_bits (GstCodedExposureView *self, GstBuffer *picture, int depth)
+/** The pixel value of @p picture, whose format has @p depth bits, that becomes
+ * white. */
+guint64
+white_of (GstCodedExposureView *self, GstBuffer *picture, int depth)
 {
-  int bits;
+  int bits, white;
   {
     const ObjectLock lock (self);
     bits = self->bits;
+    white = self->white;
   }
+  if (white > 0)
+    return guint64 (white);
   if (bits == 0)
     if (const auto meta = get_frame_meta (picture))
       bits = meta->bits;
-  return bits <= 0 ? depth : std::min (bits, depth);
+  return (guint64 (1) << (bits <= 0 ? depth : std::min (bits, depth))) - 1;
 }
 
-/** 0 to black, 2^@p bits - 1 and more to 255. */
+/** 0 to black, @p white and more to 255. */
 template <typename Pixel>
 void
-show (ImageView<const Pixel> from, int bits, ImageView<guint8> to)
+show (ImageView<const Pixel> from, guint64 white, ImageView<guint8> to)
 {
   constexpr int kFraction = 24;
-  const guint64 white = (guint64 (1) << bits) - 1;
   const guint64 scale = ((guint64 (255) << kFraction) + white / 2) / white;
   constexpr guint64 kHalf = guint64 (1) << (kFraction - 1);
   for (int y = 0; y < to.height; y++)
@@ -108,7 +111,7 @@ before_transform (GstBaseTransform *base, GstBuffer *picture)
   auto *self = GST_CODED_EXPOSURE_VIEW (base);
   const GstVideoInfo &in = GST_VIDEO_FILTER (base)->in_info;
   const bool as_it_is = GST_VIDEO_INFO_FORMAT (&in) == GST_VIDEO_FORMAT_GRAY8 &&
-                        significant_bits (self, picture, kShown) == kShown;
+                        white_of (self, picture, kShown) == kWhite;
   gst_base_transform_set_passthrough (base, as_it_is);
 }
 
@@ -133,10 +136,10 @@ transform (GstBaseTransform *base, GstBuffer *picture, GstBuffer *shown)
   MappedFrame to (out, shown, GST_MAP_WRITE);
   if (!to)
     return refuse (self, out, shown);
-  const int bits = significant_bits (
-      self, picture, int (GST_VIDEO_INFO_COMP_DEPTH (&in, 0)));
+  const guint64 white =
+      white_of (self, picture, int (GST_VIDEO_INFO_COMP_DEPTH (&in, 0)));
   read_pixels (
-      from, [&] (auto pixels) { show (pixels, bits, view_of<guint8> (to)); });
+      from, [&] (auto pixels) { show (pixels, white, view_of<guint8> (to)); });
   if (auto meta = get_frame_meta (shown)) {
     meta->bits = 0;
     set_frame_meta (shown, *meta);
@@ -151,7 +154,11 @@ properties ()
       {"bits", "Significant bits",
           "Significant bits of a pixel; their largest value becomes white. 0: "
           "as the frame metadata say, or all bits of the format",
-          kReadWrite, &GstCodedExposureView::bits, 0, 16}};
+          kReadWrite, &GstCodedExposureView::bits, 0, 16},
+      {"white", "White",
+          "Pixel value that becomes white, to see a dark scene; larger ones "
+          "are white, too. 0: the largest value of the significant bits",
+          kReadWrite, &GstCodedExposureView::white, 0, 65535}};
   return table;
 }
 

@@ -29,17 +29,18 @@ take_pair (Json &root, const char *key, int highest, const std::string &rule)
   return std::pair (first, second);
 }
 
+/* Taken out of @root; false if it is left out. */
 bool
-take_track (Json &root)
+take_bool (Json &root, const char *key)
 {
-  const auto found = root.find ("track");
+  const auto found = root.find (key);
   if (found == root.end ())
     return false;
   if (!found->is_boolean ())
-    throw expected ("track", "true or false", *found);
-  const bool track = found->get<bool> ();
+    throw expected (key, "true or false", *found);
+  const bool value = found->get<bool> ();
   root.erase (found);
-  return track;
+  return value;
 }
 
 StreamSetup
@@ -61,7 +62,8 @@ read_setup (Json root)
     if (const auto rate = take_pair (root, "rate", kMaxRate,
             "two whole numbers, frames in so many seconds"))
       setup.rate = FrameRate{rate->first, rate->second};
-    setup.track = take_track (root);
+    setup.track = take_bool (root, "track");
+    setup.simulated = take_bool (root, "simulated");
   }
   setup.schedule = read_schedule (root);
   return setup;
@@ -91,6 +93,8 @@ StreamSetup::to_json () const
     add_pair ("rate", rate->num, rate->den);
   if (track)
     text += ",\"track\":true";
+  if (simulated)
+    text += ",\"simulated\":true";
   if (mapping)
     text += ",\"mapping\":" + mapping->to_json ();
   return text + "}";

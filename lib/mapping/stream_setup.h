@@ -24,10 +24,12 @@ struct StreamSetup {
   std::optional<FrameRate> rate = {};
   /** A track with a line for each frame accompanies the frames. */
   bool track = false;
+  /** The frames are those of a simulated bench. */
+  bool simulated = false;
 
   /** The JSON form of the schedule with keys more that may be left out:
-   * "mapping", which holds the JSON form of a mapping, "size", "rate" and
-   * "track". */
+   * "mapping", which holds the JSON form of a mapping, "size", "rate",
+   * "track" and "simulated". */
   static Result<StreamSetup> from_json (std::string_view json);
   /** One line. Without the others it is schedule.to_json (). */
   std::string to_json () const;

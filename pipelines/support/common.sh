@@ -156,6 +156,7 @@ check_options ()
     'a rate such as 25 or 30000/1001'
   check_option frames '[1-9][0-9]{0,8}' 'a number of coded frames'
   check_option bits '[1-9]|1[0-6]' 'a number from 1 to 16'
+  check_option white '[1-9][0-9]{0,4}' 'a pixel value from 1 on'
   check_option pattern "${patterns// /|}" "one of $patterns"
   check_option region '[0-9]{1,2}' 'the number of a region, from 0 on'
   check_option scene 'candle|blown-out|pour' 'candle, blown-out or pour'
@@ -462,7 +463,7 @@ lossless_video ()
 # Scales frames of any bit depth to 8 bits, for display.
 for_display ()
 {
-  printf 'codedexposure-view %s! ' "$(properties bits)"
+  printf 'codedexposure-view %s! ' "$(properties bits white)"
 }
 
 # check_recording FILE: whether it is what record writes.

@@ -127,7 +127,8 @@ TEST_F (DemuxSchedule, PicturesSayHowTheyWereMadeAndCodedFramesWhatTheyAre)
   demux->request ("subframe_0");
   demux->request ("coded");
   const Schedule schedule = schedule_of ("sequential:3x3");
-  demux->push_event (schedule_to_event (schedule));
+  demux->push_event (
+      setup_to_event ({.schedule = schedule, .simulated = true}));
   ASSERT_EQ (push (0), GST_FLOW_OK);
   for (const char *pad : {"", "subframe_0", "coded"}) {
     const EventPtr event = demux->pull_event (GST_EVENT_TAG, pad);
@@ -145,6 +146,7 @@ TEST_F (DemuxSchedule, PicturesSayHowTheyWereMadeAndCodedFramesWhatTheyAre)
     EXPECT_FALSE (found) << pad;
     ASSERT_TRUE (made && *made) << pad;
     EXPECT_EQ (made->value ().setup.schedule, schedule);
+    EXPECT_TRUE (made->value ().setup.simulated);
     EXPECT_EQ (made->value ().method, "select");
     EXPECT_EQ (made->value ().first_frame, 0u);
   }

@@ -77,7 +77,9 @@ TEST (DmdsyncTag, KeepsTheMappingOfAnotherSchedule)
   const Mapping mapping (Extent{64, 48});
   GstTagList *title = gst_tag_list_new (GST_TAG_TITLE, "milk drop", nullptr);
   for (GstEvent *event :
-      {setup_to_event ({*Schedule::parse ("sequential:2x2"), mapping}),
+      {setup_to_event ({.schedule = *Schedule::parse ("sequential:2x2"),
+                      .mapping = mapping,
+                      .simulated = true}),
           gst_event_new_tag (title)}) {
     sync.push_event (event);
     const EventPtr passed = sync.pull_event (GST_EVENT_TAG);
@@ -88,6 +90,7 @@ TEST (DmdsyncTag, KeepsTheMappingOfAnotherSchedule)
     ASSERT_TRUE (setup && *setup);
     EXPECT_EQ (setup->value ().schedule, *Schedule::parse ("staircase:2x2"));
     EXPECT_EQ (setup->value ().mapping, mapping);
+    EXPECT_TRUE (setup->value ().simulated);
     EXPECT_EQ (setup->value ().size, (Extent{64, 48}));
     EXPECT_EQ (setup->value ().rate, (FrameRate{25, 1}));
   }

@@ -70,6 +70,16 @@ TEST (View, WhatIsBrighterThanWhiteIsWhite)
   EXPECT_EQ (shown<std::uint16_t> ("bits=10", 65535, 0), 255);
 }
 
+TEST (View, ADarkSceneIsStretchedToWhite)
+{
+  for (const int value : {0, 20, 40, 41, 200})
+    EXPECT_NEAR (shown<std::uint8_t> ("white=40", value, 0),
+        std::min (255.0, value * 255.0 / 40), 0.51)
+        << value;
+  EXPECT_NEAR (shown<std::uint16_t> ("white=1000", 500, 12), 127.5, 0.51);
+  EXPECT_EQ (shown<std::uint16_t> ("bits=12 white=1000", 1000, 0), 255);
+}
+
 TEST (View, EightBitsStayAndFewerAreStretched)
 {
   for (const int value : {0, 1, 127, 255}) {

@@ -159,6 +159,7 @@ class Facts(unittest.TestCase):
         self.assertEqual(recording.schedule["code"], "staircase")
         self.assertEqual(recording.schedule["tile"], "2x2")
         self.assertIsNone(recording.mapping)
+        self.assertTrue(recording.simulated)
         self.assertEqual(recording.rate, 25)
         self.assertEqual(recording.size, (96, 64))
 

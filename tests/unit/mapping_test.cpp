@@ -371,6 +371,18 @@ TEST (StreamSetup, SaysWhetherATrackAccompaniesTheFrames)
       "schedule JSON: key 'track' must be true or false, not 1");
 }
 
+TEST (StreamSetup, SaysWhetherTheFramesAreSimulated)
+{
+  StreamSetup setup;
+  EXPECT_EQ (setup.to_json ().find ("simulated"), std::string::npos);
+  setup.simulated = true;
+  const std::string json = setup.to_json ();
+  EXPECT_NE (json.find (R"(,"simulated":true})"), std::string::npos) << json;
+  const auto read = StreamSetup::from_json (json);
+  ASSERT_TRUE (read.ok ()) << read.error ().message;
+  EXPECT_EQ (*read, setup);
+}
+
 TEST (StreamSetup, NamesWhatIsWrongInside)
 {
   std::string json = Schedule ().to_json ();

@@ -57,22 +57,31 @@ strip ()  # strip FOLDER WIDTH HEIGHT TEXT
   bottom=$((bottom + height + sheet_gap))
 }
 
-# draw_regions FILE REGION...: draws the coded frame, the fused frame and the
+# subframes_in FOLDER RATE: how many there are of a coded frame, and their rate.
+subframes_in ()
+{
+  local count
+  count=$(find "$1" -name '*.png' | wc -l)
+  awk -v n="$count" -v rate="$2" \
+    'BEGIN { printf "%d subframes, %.6g frames/s", n, n * rate }'
+}
+
+# draw_regions FILE RATE REGION...: draws the coded frame, the fused frame and the
 # subframes of every part, from the folders coded, fused, subframes and region-I
-# in $out.
+# in $out. RATE: coded frames/s.
 draw_regions ()
 {
-  local file=$1 pads='' branches='' placed=0 bottom frame=() half i=0 rect
+  local file=$1 rate=$2 pads='' branches='' placed=0 bottom frame=() half i=0 rect
   local coded fused w h x y
   coded=$(first_picture "$out/coded")
   fused=$(first_picture "$out/fused")
-  shift
+  shift 2
   read -r -a frame <<< "$(size_of "$fused")"
   half=$(((sheet_width - sheet_gap) / 2))
   bottom=$((28 + half * frame[1] / frame[0]))
-  heading 0 0 'One coded frame'
-  heading $((half + sheet_gap)) 0 \
-    'All parts in one picture: first slot, fused; red: regions'
+  heading 0 0 "One coded frame, $rate frames/s"
+  heading $((half + sheet_gap)) 0 "All parts in one picture, \
+$(subframes_in "$out/fused" "$rate" | sed 's/.*, //'): first slot, fused; red: regions"
   place 0 28 "$(still "$coded") $(magnify_to "$half" $((bottom - 28)))"
   place $((half + sheet_gap)) 28 \
     "$(still "$fused") $(magnify_to "$half" $((bottom - 28)))"
@@ -84,10 +93,10 @@ draw_regions ()
         right=$((frame[0] - x - w)) bottom=$((frame[1] - y - h)) !
       $(magnify_to $((w * half / frame[0])) $((h * half / frame[0]))) $(red_frame)"
   done
-  strip "$out/subframes" "${frame[@]}" 'Background: its subframes'
+  strip "$out/subframes" "${frame[@]}" "Background: $(subframes_in "$out/subframes" "$rate")"
   for rect; do
     strip "$out/region-$i" "${rect%%x*}" "$(sed 's/.*x//; s/+.*//' <<< "$rect")" \
-      "Region $i, $rect: its subframes"
+      "Region $i, $rect: $(subframes_in "$out/region-$i" "$rate")"
     i=$((i + 1))
   done
   play_quietly "compositor name=page background=white $pads !

@@ -182,12 +182,27 @@ check_options ()
   check_option seed '[0-9]+' 'a whole number'
 }
 
+# Prints the folder of the installed programs: this one or, for the scripts of a
+# source tree, that of the same version among the user's commands.
+installed_programs ()
+{
+  local folder=$pipelines version
+  if [ ! -x "$folder/codedexposure-launch" ]; then
+    version=$(sed -nE "s/^ *version: '([^']+)'.*/\1/p" "$pipelines/../meson.build") \
+      && [ "$(codedexposure --version 2>/dev/null)" = "codedexposure $version" ] \
+      || return
+    folder=$(readlink -f "$(command -v codedexposure)")
+    folder=$(dirname "$(dirname "$folder")")/libexec/gst-codedexposure
+  fi
+  [ -x "$folder/codedexposure-launch" ] && printf '%s' "$folder"
+}
+
 # Finds the plugin and the programs: in the build tree beside this folder, or
 # where they were installed.
 find_plugin ()
 {
   local build=${CODEDEXPOSURE_BUILD:-$pipelines/../build}
-  local prefix=$pipelines/../.. libs='' folder
+  local installed prefix libs='' folder
   if [ -e "$build/gst/libgstcodedexposure.so" ]; then
     build=$(cd "$build" && pwd)
     launcher=$build/pipelines/codedexposure-launch
@@ -195,10 +210,11 @@ find_plugin ()
     camera_program=$build/pipelines/codedexposure-camera
     libs=$build/gst
     export GST_REGISTRY_1_0=$build/registry.bin
-  elif [ -x "$pipelines/codedexposure-launch" ]; then
-    launcher=$pipelines/codedexposure-launch
+  elif installed=$(installed_programs); then
+    prefix=$installed/../..
+    launcher=$installed/codedexposure-launch
     tool=$prefix/bin/codedexposure
-    camera_program=$pipelines/codedexposure-camera
+    camera_program=$installed/codedexposure-camera
     for folder in "$prefix"/lib{,/*}/gstreamer-1.0; do
       [ ! -e "$folder/libgstcodedexposure.so" ] || libs=$folder
     done
@@ -509,7 +525,7 @@ video_output ()
       printf 'videoscale ! %s ! ' \
         'video/x-raw,format=I420,width=[2,65536,2],height=[2,65536,2]'
       printf 'x264enc pass=quant quantizer=18 vbv-buf-capacity=0 '
-      printf 'speed-preset=veryfast ! h264parse ! mp4mux fragment-duration=1000 '
+      printf 'speed-preset=veryfast ! mp4mux fragment-duration=1000 '
       printf 'fragment-mode=first-moov-then-finalise ! filesink location=%s ' \
         "$(quoted "$1")"
       ;;

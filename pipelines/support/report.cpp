@@ -32,7 +32,6 @@ constexpr Provider kProviders[] = {
     {"autovideosink", "gstreamer1.0-plugins-good"},
     {"avdec_ffv1", "gstreamer1.0-libav"},
     {"avenc_ffv1", "gstreamer1.0-libav"},
-    {"h264parse", "gstreamer1.0-plugins-bad"},
     {"matroskademux", "gstreamer1.0-plugins-good"},
     {"matroskamux", "gstreamer1.0-plugins-good"},
     {"pngenc", "gstreamer1.0-plugins-good"},

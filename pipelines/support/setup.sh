@@ -1,34 +1,37 @@
 # shellcheck shell=bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# Installs what is missing and builds; sourced by pipelines/demo and tests/run.
+# Installs what is missing and builds; sourced by pipelines/demo, pipelines/package
+# and tests/run.
 #
-#   install_packages run|report|tests|rivals
-#                                Debian packages; tests need all but rivals
+#   install_packages PURPOSE     Debian packages: to run, for tests (all but
+#                                rivals), to package, or to check packages
 #   build_tree DIR OPTION...     meson setup and compile
-#   sample_video                 path of the sample clip, fetched when needed
+#   sample_video                 in sample.sh
 #
 # Nothing here asks the network for what is already there.
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 cache=$root/build/cache
+# shellcheck source-path=SCRIPTDIR source=sample.sh
+. "$root/pipelines/support/sample.sh"
 
-# package|what it is for|who needs it
+# package|what it is for|which purposes need it; the build is part of all
 packages='
-meson|configures the build (brings ninja)|run
-g++|compiles C++20|run
-pkg-config|finds the libraries|run
-libgstreamer1.0-dev|GStreamer core and its test harness|run
-libgstreamer-plugins-base1.0-dev|GStreamer video library|run
-nlohmann-json3-dev|reads and writes JSON (schedules, tracks)|run
-libcairo2-dev|draws the overlay of a calibration|run
-libusb-1.0-0-dev|DMD boards on the USB|run
-libeigen3-dev|linear algebra of estimates and calibrations|run
-libxxhash-dev|hashes of recorded frames|run
-libcli11-dev|options of the command-line tool|run
+meson|configures the build (brings ninja)|build
+g++|compiles C++20|build
+pkg-config|finds the libraries|build
+libgstreamer1.0-dev|GStreamer core and its test harness|build
+libgstreamer-plugins-base1.0-dev|GStreamer video library|build
+nlohmann-json3-dev|reads and writes JSON (schedules, tracks)|build
+libcairo2-dev|draws the overlay of a calibration|build
+libusb-1.0-0-dev|DMD boards on the USB|build
+libeigen3-dev|linear algebra of estimates and calibrations|build
+libxxhash-dev|hashes of recorded frames|build
+libcli11-dev|options of the command-line tool|build
 gstreamer1.0-tools|gst-launch-1.0, gst-inspect-1.0|run
 gstreamer1.0-plugins-base|test scenes, conversion, TCP, compositor|run
 gstreamer1.0-plugins-good|Matroska, AVI, PNG, window selection|run
-gstreamer1.0-plugins-bad|H.264 in MP4|run
+gstreamer1.0-plugins-bad|parses H.264 in tests|tests
 gstreamer1.0-plugins-ugly|H.264 encoder|run
 gstreamer1.0-libav|FFV1, and decoding most video files|run
 gstreamer1.0-x|windows under X, text in pictures|run
@@ -36,24 +39,25 @@ gnuplot-nox|draws the figures of a report|report
 libgtest-dev|unit and element tests|tests
 libbenchmark-dev|benchmarks|tests
 libumockdev-dev|an emulated USB for the DMD tests|tests
-libtiff-dev|decode to OME-TIFF|tests
-libhdf5-dev|decode to HDF5|tests
+libtiff-dev|decode to OME-TIFF|tests package
+libhdf5-dev|decode to HDF5|tests package
 python3-tifffile|reads OME-TIFF, to test it|tests
 python3-h5py|reads HDF5, to test it|tests
-libaravis-dev|the emulated camera, and aravissrc|tests
+libaravis-dev|the emulated camera, and aravissrc|tests package
 iproute2|the private network of the emulated camera|tests
 umockdev|an emulated USB for the DMD tests|tests
 xvfb|a virtual screen for the window tests|tests
 shellcheck|checks the scripts|tests
+pybind11-dev|the Python library for single arrays|tests package
+python3-dev|the Python library for single arrays|tests package
 python3-gi|GStreamer in the Python package|tests
 python3-numpy|frames of the Python package|tests
+build-essential|flags and programs of Debian packages|tests package
+debhelper|steps of building a Debian package|package
+dh-python|Debian package of the Python package|package
+lintian|checks Debian packages|check
 libopencv-video-dev|calibration with OpenCV, for comparison|rivals
 '
-
-note ()
-{
-  printf '== %s\n' "$*" >&2
-}
 
 give_up ()
 {
@@ -69,11 +73,14 @@ is_installed ()
 # Packages that a purpose needs and that are missing, a line each: name|reason.
 missing_packages ()
 {
-  local name reason who
-  while IFS='|' read -r name reason who; do
-    [ -n "$name" ] || continue
-    if [ "$who" = run ] || [ "$who" = "$1" ] \
-        || { [ "$1" = tests ] && [ "$who" != rivals ]; }; then
+  local name reason purposes needed=$1
+  case $1 in
+    tests) needed='run|report|tests' ;;
+    report | rivals) needed="run|$1" ;;
+    check) needed='package|check' ;;
+  esac
+  while IFS='|' read -r name reason purposes; do
+    if [[ " $purposes " =~ " "(build|$needed)" " ]]; then
       is_installed "$name" || printf '%s|%s\n' "$name" "$reason"
     fi
   done <<< "$packages"
@@ -131,22 +138,33 @@ install_packages ()
   note "these Debian packages are missing, and will be installed:"
   awk -F'|' '{ printf "     %-34s %s\n", $1, $2 }' <<< "$missing" >&2
   mapfile -t names < <(cut -d'|' -f1 <<< "$missing")
+  apt_get "${names[@]}"
+}
+
+# apt_get OPTION-OR-NAME-OR-FILE...: installs packages, with new package lists if
+# need be.
+apt_get ()
+{
+  local name names=()
+  for name; do
+    [[ $name == */* || $name == -* ]] || names+=("$name")
+  done
   [ "$(id -u)" = 0 ] || command -v sudo >/dev/null || give_up "this needs root," \
     "and there is no sudo. As root, run:" \
-    "apt-get install --no-install-recommends ${names[*]}"
+    "apt-get install --no-install-recommends $*"
   mkdir -p "$cache"
   # Made by root, it could not be written by who reads the lists below.
   rm -f "$cache/apt.log"
   : > "$cache/apt.log"
   # A new system has no package lists, and old lists name files that are gone.
-  if ! apt-cache show "${names[@]}" >/dev/null 2>&1 \
-      || ! apt_install "${names[@]}"; then
+  if { [ ${#names[@]} -gt 0 ] && ! apt-cache show "${names[@]}"; } >/dev/null 2>&1 \
+      || ! apt_install "$@"; then
     note "reading the package lists"
     as_root apt-get update -qq >"$cache/apt.log" 2>&1 || {
       cat "$cache/apt.log" >&2
       give_up "apt-get update failed; is there a network?"
     }
-    apt_install "${names[@]}" || {
+    apt_install "$@" || {
       tail -n 20 "$cache/apt.log" >&2
       give_up "apt-get failed; all it said is in $cache/apt.log"
     }
@@ -170,28 +188,4 @@ build_tree ()
   fi
   note "building $dir"
   meson compile -C "$dir" || give_up "the build failed"
-}
-
-# Prints the path of vtest.avi: 768x576, 795 frames of people walking. It lies
-# in opencv-doc, which is 270 MB installed, so only this file is taken out of
-# the package. Fails if it is not available.
-sample_video ()
-{
-  local name=vtest.avi where=usr/share/doc/opencv-doc/examples/data deb
-  for path in "$cache/$name" "/$where/$name"; do
-    if [ -f "$path" ]; then
-      printf '%s\n' "$path"
-      return
-    fi
-  done
-  note "fetching the sample clip $name out of the package opencv-doc (96 MB)"
-  mkdir -p "$cache/deb"
-  (cd "$cache/deb" && apt-get download -qq opencv-doc) >"$cache/deb.log" 2>&1 \
-    || return 1
-  for deb in "$cache"/deb/opencv-doc_*.deb; do
-    dpkg-deb --fsys-tarfile "$deb" \
-      | tar -x -C "$cache" --transform 's,.*/,,' "./$where/$name" || return 1
-  done
-  rm -r "$cache/deb"
-  printf '%s\n' "$cache/$name"
 }

@@ -15,14 +15,16 @@ namespace codedexposure
 
 struct CalibrationReport {
   std::string title = {};
+  std::string verdict = {}; ///< one line
+  bool within = false;      ///< the tolerance; the colour of the verdict
   std::vector<std::string> lines = {};
   std::optional<FringePair> before = {}; ///< the alignment
   std::optional<FringePair> after = {};
   const CalibrationResult *result = nullptr; ///< never null
 };
 
-/** Writes the picture, fringes, residuals and what each pixel is good for, as
- * PNG. Error when the file cannot be written. */
+/** Writes the picture, fringes, residuals and the use of each pixel, as PNG.
+ * Error when the file cannot be written. */
 Result<void> write_report (
     const std::string &path, const CalibrationReport &report);
 

@@ -338,12 +338,20 @@ Worker::write_files (const CalibrationResult &result, const Settings &settings)
         take (settings.location, result.mapping.save (settings.location));
   if (settings.report.empty ())
     return written;
-  const CalibrationReport report{.title = "Camera against mirrors",
-      .lines =
-          report_lines (result, correct_stage (result.mapping, settings.stage)),
+  const StageCorrection correction =
+      correct_stage (result.mapping, settings.stage);
+  const double tolerance = settings.stage.tolerance;
+  CalibrationReport report{.title = "Camera against mirrors",
+      .verdict = alignment_verdict (correction, tolerance),
+      .within = correction.deviation <= tolerance,
+      .lines = report_lines (result, correction),
       .before = session_->first_fringes (),
       .after = session_->last_fringes (),
       .result = &result};
+  if (const auto live = Pattern::parse (settings.live_pattern ()))
+    report.lines.push_back (
+        "Fringes: from white to white is a displacement of " +
+        std::to_string (live->period) + " mirrors");
   written.report =
       take (settings.report, write_report (settings.report, report));
   return written;

@@ -69,8 +69,8 @@ CalibrationSession::align (
   last_ = live_->fringes ();
   if (!first_)
     first_ = last_;
-  first_->caption = "before";
-  last_->caption = "after";
+  first_->caption = "Before alignment";
+  last_->caption = "After alignment";
   return std::optional (Alignment{*std::move (reading), correction});
 }
 
@@ -172,15 +172,35 @@ report_lines (
 {
   const Pose sigma = result.mapping.pose_sigma ();
   return {
-      format ("rotation %+.5f ± %.0e°", correction.rotation, sigma.rotation),
-      format ("magnification %.6f ± %.0e pixels a mirror",
-          correction.magnification, sigma.magnification),
-      format ("from the nearest aligned position: x %+.5f, y %+.5f ± %.0e "
-              "mirrors; worst corner %.4f",
-          correction.offset.x, correction.offset.y, sigma.shift_x,
-          correction.deviation),
-      format ("blur of the optics %.2f pixels; misfit %.2f", result.psf_sigma,
+      format ("Rotation %+.5f ± %.0e degrees; magnification %.6f ± %.0e pixels "
+              "per mirror",
+          correction.rotation, sigma.rotation, correction.magnification,
+          sigma.magnification),
+      format ("Offset from the nearest aligned position: x %+.5f, y %+.5f ± "
+              "%.0e mirrors",
+          correction.offset.x, correction.offset.y, sigma.shift_x),
+      format ("Stage travel that remains: x %+.2f µm, y %+.2f µm, θ %+.1f "
+              "thousandths of a degree",
+          correction.stage_x, correction.stage_y, correction.stage_theta),
+      format (
+          "Blur between mirrors and pixels: %.2f pixels (standard deviation)",
+          result.psf_sigma),
+      format ("Residuals divided by those that noise explains: %.2f (1: the "
+              "mapping explains all but noise)",
           result.misfit)};
+}
+
+std::string
+alignment_verdict (const StageCorrection &correction, double tolerance)
+{
+  if (correction.deviation <= tolerance)
+    return format ("Aligned: the worst corner is off by %.3f mirrors, within "
+                   "the tolerance of %g mirrors",
+        correction.deviation, tolerance);
+  return format ("Not aligned: the worst corner is off by %.3f mirrors, above "
+                 "the tolerance of %g mirrors. Decode with the mapping, or "
+                 "align again",
+      correction.deviation, tolerance);
 }
 
 } // namespace codedexposure

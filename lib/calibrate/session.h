@@ -102,5 +102,9 @@ std::vector<std::string> mapping_lines (
     const CalibrationResult &result, const StageCorrection &correction);
 std::vector<std::string> report_lines (
     const CalibrationResult &result, const StageCorrection &correction);
+/** Whether the camera is aligned to @p tolerance mirrors, and what to do
+ * otherwise: one line. */
+std::string alignment_verdict (
+    const StageCorrection &correction, double tolerance);
 
 } // namespace codedexposure

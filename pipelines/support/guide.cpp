@@ -203,6 +203,12 @@ Guide::on_mapping (const GstStructure *mapping)
   status_.line (format ("pixels: %" G_GUINT64_FORMAT " good, %" G_GUINT64_FORMAT
                         " see no mirror, %" G_GUINT64_FORMAT " saturated",
       good, uncovered, saturated));
+  double tolerance = 0;
+  g_object_get (calib_.get (), "tolerance", &tolerance, nullptr);
+  const double deviation = number_of (mapping, "deviation");
+  status_.line (format ("worst corner %.3f mirrors: %s the tolerance of %g%s",
+      deviation, deviation <= tolerance ? "within" : "above", tolerance,
+      deviation <= tolerance ? "" : "; decode with the mapping"));
   for (const char *file : {"location", "report"}) {
     const std::string path = text_of (mapping, file);
     gchar *asked = nullptr;

@@ -7,6 +7,8 @@
 
 #include <gtest/gtest.h>
 
+#include "calibrate/session.h"
+#include "moirecalib/canvas.h"
 #include "moirecalib/panel.h"
 #include "moirecalib/report.h"
 
@@ -104,6 +106,89 @@ TEST (Report, IsAPicture)
   file.read (head.data (), 8);
   EXPECT_EQ (head, "\x89PNG\r\n\x1a\n");
   std::filesystem::remove (path);
+}
+
+namespace
+{
+
+/** The sheet of @p report, as it is read from its file. */
+class Written
+{
+public:
+  explicit Written (const CalibrationReport &report)
+  {
+    const auto path = std::filesystem::temp_directory_path () /
+                      ("cexp-sheet-" + std::to_string (getpid ()) + ".png");
+    EXPECT_TRUE (write_report (path.string (), report).ok ());
+    surface_.reset (cairo_image_surface_create_from_png (path.c_str ()));
+    std::filesystem::remove (path);
+    EXPECT_EQ (cairo_surface_status (surface_.get ()), CAIRO_STATUS_SUCCESS);
+  }
+
+  /** 0xrrggbb. */
+  std::uint32_t at (int x, int y) const
+  {
+    const unsigned char *row =
+        cairo_image_surface_get_data (surface_.get ()) +
+        std::ptrdiff_t (y) * cairo_image_surface_get_stride (surface_.get ());
+    return reinterpret_cast<const std::uint32_t *> (row)[x] & 0xffffff;
+  }
+
+private:
+  SurfacePtr surface_;
+};
+
+} // namespace
+
+TEST (Report, ColoursTheVerdict)
+{
+  const CalibrationResult result = small_result ();
+  const auto square = [&] (bool within) {
+    return Written (
+        {.title = "report", .verdict = "", .within = within, .result = &result})
+        .at (28, 62);
+  };
+  EXPECT_EQ (square (true), 0x28783cu);
+  EXPECT_EQ (square (false), 0xbe3228u);
+}
+
+TEST (Report, TheWheelHasTheColoursOfTheResiduals)
+{
+  constexpr int kX = 1142, kY = 812,
+                kRadius = 46; // the wheel, and nearly its edge
+  constexpr int kPictureX = 900, kPictureY = 200;
+  for (const auto &[dx, dy] : {std::pair (1, 0), std::pair (-1, 0),
+           std::pair (0, 1), std::pair (0, -1)}) {
+    CalibrationResult result = small_result ();
+    for (int y = 0; y < 3; y++)
+      for (int x = 0; x < 4; x++) {
+        result.residual_x.at (x, y) = 1e-3f * float (dx);
+        result.residual_y.at (x, y) = 1e-3f * float (dy);
+      }
+    const Written sheet ({.title = "report", .result = &result});
+    for (const int shift : {16, 8, 0}) {
+      const auto part = [shift] (std::uint32_t pixel) {
+        return int (pixel >> shift & 0xff);
+      };
+      EXPECT_NEAR (part (sheet.at (kPictureX, kPictureY)),
+          part (sheet.at (kX + dx * kRadius, kY + dy * kRadius)), 10)
+          << dx << " " << dy;
+    }
+    EXPECT_EQ (sheet.at (kX, kY), 0x1e1e1eu); // no residual
+  }
+}
+
+TEST (Report, TheVerdictComparesWithTheTolerance)
+{
+  StageCorrection correction;
+  correction.deviation = 0.0443;
+  EXPECT_EQ (alignment_verdict (correction, 0.05),
+      "Aligned: the worst corner is off by 0.044 mirrors, within the tolerance "
+      "of 0.05 mirrors");
+  correction.deviation = 1.25;
+  EXPECT_EQ (alignment_verdict (correction, 0.05),
+      "Not aligned: the worst corner is off by 1.250 mirrors, above the "
+      "tolerance of 0.05 mirrors. Decode with the mapping, or align again");
 }
 
 TEST (Report, SaysThatItCannotBeWritten)

@@ -79,6 +79,7 @@ read_schedule (GstDmdSync *self)
         "The schedule property cannot be read: " + schedule.error ().message);
     return false;
   }
+  const ObjectLock lock (self);
   st.schedule = *std::move (schedule);
   return true;
 }

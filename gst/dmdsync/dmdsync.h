@@ -132,7 +132,8 @@ struct SyncState {
    * object lock, and not held while posting. */
   std::mutex pattern_order;
 
-  /* Changed by changes of state only, while nothing flows or is uploaded. */
+  /** Changed by changes of state only, while nothing flows or is uploaded, and
+   * under the object lock: requests of patterns may come at any time. */
   Schedule schedule;
   /** Null: no DMD is driven. Changed under the object lock; what may come while
    * the element stops, from another thread than that of the frames, holds it by

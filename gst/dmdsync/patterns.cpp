@@ -53,9 +53,11 @@ send (GstDmdSync *self, DmdRunner &runner, const Pattern &pattern,
   SyncState &st = state (self);
   const std::lock_guard order (st.pattern_order);
   std::optional<Timebase> time;
+  int slots = 0;
   {
     const ObjectLock lock (self);
     time = st.time;
+    slots = st.schedule.max_on_slots ();
     if (time && st.pattern && st.pattern->text == text) {
       st.pattern->frames_left = frames;
       return true;
@@ -73,7 +75,7 @@ send (GstDmdSync *self, DmdRunner &runner, const Pattern &pattern,
                    .on = [pattern] (int x, int y) { return pattern.on (x, y); },
                    /* As bright as coded frames: no setting of the camera has to
                     * change. */
-                   .slots = st.schedule.max_on_slots ()},
+                   .slots = slots},
       time->plan);
   return true;
 }
@@ -100,6 +102,7 @@ restore (GstDmdSync *self)
   const std::lock_guard order (st.pattern_order);
   std::shared_ptr<DmdRunner> runner;
   std::string pattern;
+  Schedule schedule;
   SlotPlan plan;
   {
     const ObjectLock lock (self);
@@ -109,9 +112,10 @@ restore (GstDmdSync *self)
     pattern = st.pattern->text;
     st.pattern.reset ();
     st.switches++;
+    schedule = st.schedule;
     plan = st.time->plan;
   }
-  runner->restore (st.schedule, plan);
+  runner->restore (schedule, plan);
   return pattern;
 }
 

@@ -199,7 +199,9 @@ mark_unknown (RestoreState &state, GstBuffer *frame)
   state.last_frame = meta.frame;
   GST_BUFFER_FLAG_SET (frame, GST_BUFFER_FLAG_CORRUPTED);
   state.damage.frame_unknown (meta.frame, GST_BUFFER_PTS (frame),
-      has_track ? "the track has no line for it" : "its track is missing");
+      !has_track                        ? "its track is missing"
+      : GST_BUFFER_PTS_IS_VALID (frame) ? "the track has no line for it"
+                                        : "it has no time to find its line by");
 }
 
 void
@@ -343,7 +345,8 @@ push_frame (Self *self, BufferPtr frame, const TrackReader::Match &match)
     restore (self, frame.get (), match);
   else
     mark_unknown (state, frame.get ());
-  state.segment.position = GST_BUFFER_PTS (frame.get ());
+  if (GST_BUFFER_PTS_IS_VALID (frame.get ()))
+    state.segment.position = GST_BUFFER_PTS (frame.get ());
   if (GST_BUFFER_DURATION_IS_VALID (frame.get ()))
     state.segment.position += GST_BUFFER_DURATION (frame.get ());
   return gst_pad_push (state.src, frame.release ());
@@ -361,9 +364,12 @@ release (Self *self, bool all)
   while (!state.held.empty () && flow == GST_FLOW_OK) {
     std::optional<TrackReader::Match> match;
     if (const auto *frame = std::get_if<BufferPtr> (&state.held.front ())) {
-      match = state.track.take (Nanoseconds (GST_BUFFER_PTS (frame->get ())),
-          Nanoseconds (state.segment.start),
-          !all && state.held.size () <= kMaxHeld);
+      match =
+          GST_BUFFER_PTS_IS_VALID (frame->get ())
+              ? state.track.take (Nanoseconds (GST_BUFFER_PTS (frame->get ())),
+                    Nanoseconds (state.segment.start),
+                    !all && state.held.size () <= kMaxHeld)
+              : TrackReader::Match ();
       if (!match)
         break;
     }
@@ -384,7 +390,7 @@ chain (GstPad *, GstObject *parent, GstBuffer *buffer) noexcept
   RestoreState &state = *self->state;
   BufferPtr frame (buffer);
   state.damage.frame ();
-  if (!state.track.exists () || !GST_BUFFER_PTS_IS_VALID (buffer)) {
+  if (!state.track.exists ()) {
     say_no_track (self);
     if (state.announced) {
       frame.reset (gst_buffer_make_writable (frame.release ()));

@@ -3,11 +3,14 @@
  * prints its progress, errors and counters. */
 #include <atomic>
 #include <chrono>
+#include <csignal>
 #include <cstdio>
 #include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include <sys/prctl.h>
 
 #include "byte_watch.h"
 #include "each_element.h"
@@ -547,6 +550,8 @@ main (int argc, char **argv)
       pipeline_argument ("codedexposure-launch", entries, argc, argv);
   if (!pipeline)
     return kUsage;
+  /* A script that is killed cannot pass that on. */
+  prctl (PR_SET_PDEATHSIG, SIGTERM);
 
   int code = kFailed;
   {

@@ -198,6 +198,17 @@ TEST_F (Restore, AFrameWithoutItsLineIsCorrupted)
   ASSERT_TRUE (file.posted<FramesDamaged> ());
 }
 
+TEST_F (Restore, AFrameWithoutATimeIsCorruptedAndKeepsItsPlace)
+{
+  GST_BUFFER_PTS (recording.frames[1].get ()) = GST_CLOCK_TIME_NONE;
+  play ();
+  ASSERT_EQ (restored.size (), std::size_t (kFrames));
+  EXPECT_FALSE (corrupted (0));
+  EXPECT_TRUE (corrupted (1));
+  EXPECT_FALSE (GST_BUFFER_PTS_IS_VALID (restored[1].get ()));
+  EXPECT_FALSE (corrupted (4));
+}
+
 TEST_F (Restore, ADamagedLineIsCountedAndItsFrameCorrupted)
 {
   gst_buffer_memset (recording.lines[4].get (), 9, '9', 1);

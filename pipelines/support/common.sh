@@ -49,6 +49,17 @@ camera_help='Instead of the bench:
   --reconnect N       tries to restart a camera that went away [0]
   --device DEV        the DMD [sim:bench on the bench]
   --source "GST"      any GStreamer source of coded frames'
+window_help='Keys in the window:
+  Space           pause at the subframe that is shown; again: live
+  Left, Right     pause, and go one subframe back or forward
+  L               loop the last second at 1/4 speed; again: live
+  S               write what is shown to live-frameN-slotK-TIMEs.png in the
+                  current folder; no file is replaced
+  Q               end, as Ctrl-C does
+The stream does not wait for the window: recording and counting go on in a pause
+or loop, and subframes are skipped if the screen is too slow. The window keeps
+the pictures of about one second, 8 bits deep and at most as large as shown:
+22 MB for 768x576 pixels at 25 frames/s, and N times 11 MB more if fused.'
 force_help='  --force             replace files that exist
 '
 common_help='  --print             print the pipeline and do not run it
@@ -373,7 +384,8 @@ scene ()
     [ "${1:-}" != live ] || printf 'clocksync ! '
     printf 'queue ! '
   elif is_set scene; then
-    printf 'codedexposure-scene scene=%s ! %s ! ' "${opt[scene]}" "$caps"
+    printf 'codedexposure-scene scene=%s %s! %s ! ' "${opt[scene]}" \
+      "${scene_repeat:+repeat=$scene_repeat }" "$caps"
     [ "${1:-}" != live ] || printf 'clocksync ! '
     printf 'queue ! '
   else
@@ -600,20 +612,42 @@ publish_folder ()
   rm -r "$claimed"
 }
 
-# display FAST CODED: shows the frames of two pads in a window, the fast ones on
-# the right. It shows the latest frames and never blocks its sources.
+# pane PAD NAME NUMBER FRAMES: a pane of the window shows the frames of PAD. The
+# first queue never blocks their source; the second one skips frames for which
+# the screen is too slow, when codedexposure-launch has remembered them.
+pane ()
+{
+  local latest='leaky=downstream max-size-bytes=0 max-size-time=0'
+  latest+=" max-size-buffers=$4"
+  printf '%s ! queue name=%s %s ! ' "$1" "$2" "$latest"
+  printf 'codedexposure-view name=%s-view qos=false %s! ' "$2" \
+    "$(properties bits)"
+  printf 'videoscale method=bilinear2 add-borders=false qos=false ! '
+  printf 'capsfilter name=%s-kept ! queue name=%s-late %s ! ' "$2" "$2" "$latest"
+  printf 'videoscale name=%s-enlarge method=nearest-neighbour ' "$2"
+  printf 'add-borders=false ! capsfilter name=%s-shown ! videoconvert ! ' "$2"
+  printf 'video/x-raw,format=BGRx ! view.sink_%d ' "$3"
+}
+
+# display CODED FAST [FULL]: shows the frames of two or three pads beside each
+# other. codedexposure-launch sets the sizes and draws captions and panel.
 display ()
 {
-  local sink=${opt[sink]:-autovideosink}
-  local latest='leaky=downstream max-size-bytes=0 max-size-time=0'
-  local exact
-  exact="$(for_display)videoconvert ! video/x-raw,format=BGRx"
-  printf '%s ! queue name=fast %s max-size-buffers=%d ! %s ! view.sink_0 ' \
-    "$1" "$latest" $((2 * slots)) "$exact"
-  printf '%s ! queue name=beside %s max-size-buffers=2 ! %s ! view.sink_1 ' \
-    "$2" "$latest" "$exact"
-  printf 'compositor name=view background=black sink_0::xpos=%d ! ' "$width"
-  printf 'queue max-size-buffers=4 ! %s ' "$sink"
+  local k
+  pane "$1" beside 0 4
+  pane "$2" fast 1 $((2 * slots))
+  [ $# = 2 ] || pane "$3" full 2 $((2 * slots))
+  printf 'compositor name=view background=black '
+  for ((k = 0; k < $#; k++)); do
+    printf 'sink_%d::xpos=%d sink_%d::width=%d sink_%d::height=%d ' \
+      $k $((k * width)) $k "$width" $k "$height"
+  done
+  # No screen shows more; fewer would make keys slow.
+  printf '! capsfilter name=window '
+  printf 'caps="video/x-raw,format=BGRx,framerate=[25/1,100/1]" ! '
+  printf 'cairooverlay name=panel ! queue max-size-buffers=4 ! '
+  printf 'videoconvert ! %s ' \
+    "${opt[sink]:-autovideosink}"
 }
 
 need_display ()

@@ -18,7 +18,9 @@
 #include "frame_limit.h"
 #include "leaky_queue.h"
 #include "player.h"
+#include "screen.h"
 #include "whole_picture.h"
+#include "window.h"
 
 namespace
 {
@@ -67,6 +69,7 @@ public:
 
 private:
   bool connect_counter ();
+  void add_window ();
   gint64 frames () const { return counter_ ? counter_->frames ().load () : 0; }
   void watch_leaky_queues ();
   void begin () override;
@@ -100,6 +103,7 @@ private:
   std::vector<std::unique_ptr<LeakyQueue>> leaky_queues_;
   std::unique_ptr<ByteWatch> byte_watch_;
   std::unique_ptr<FrameLimit> limit_;
+  std::unique_ptr<Window> window_;
   gint64 frames_before_ = -1; // at the last tick
   bool silent_ = false;       // no frame came for a while, and that was said
   Clock::time_point began_ = Clock::now ();
@@ -146,6 +150,22 @@ Launch::connect_counter ()
         quit (kFailed);
       });
   return true;
+}
+
+void
+Launch::add_window ()
+{
+  if (!counter_ || !Window::is_in (pipeline_.get ()))
+    return;
+  const auto said = [this] (const std::string &text, bool failed) {
+    if (failed)
+      status_.line ("error: " + text);
+    else
+      status_.output ("wrote " + text);
+  };
+  window_ = std::make_unique<Window> (pipeline_.get (), counter_->pad (),
+      find_screen ().room (), options_.what ? options_.what : "window",
+      Window::Calls{[this] { on_signal (1); }, said});
 }
 
 void
@@ -198,6 +218,7 @@ Launch::run ()
       !claim_outputs (options_.force, counter_ ? counter_->pad () : nullptr))
     return kFailed;
   watch_leaky_queues ();
+  add_window ();
   whole_picture::wait_for_inputs (pipeline_.get ());
   if (const ObjectPtr<GstElement> demuxer = find ("file");
       demuxer && counter_) {
@@ -217,6 +238,8 @@ Launch::run ()
 int
 Launch::finish (int code)
 {
+  if (window_)
+    window_->save_snapshots ();
   const bool no_frame = counter_ && frames () == 0;
   if (no_frame && damaged_ && code != kContainer) {
     status_.line ("error: the head of the stream is damaged, so its tracks "
@@ -476,6 +499,12 @@ Launch::tick ()
   watch_for_silence (frames);
   if (!counter_ || frames == 0)
     return;
+  if (window_) {
+    const std::string flaws = flaws_of (pipeline_.get ());
+    window_->tell (format ("%" G_GINT64_FORMAT " coded frames", frames) +
+                       (flaws.empty () ? ", none lost or corrupted" : flaws),
+        !flaws.empty ());
+  }
 
   const double done = counter_->done (options_.total);
   std::string text = format ("%" G_GINT64_FORMAT " coded frames in %s", frames,

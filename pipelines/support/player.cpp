@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "player.h"
 
+#include "screen.h"
+
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <string>
 #include <vector>
 
-#include <dlfcn.h>
 #include <glib-unix.h>
 
 using namespace codedexposure::gst;
@@ -15,29 +16,6 @@ using report::format;
 
 namespace
 {
-
-/* Whether the X display can be opened. GStreamer's sinks show nothing where it
- * cannot, or crash. True where it is not known. */
-bool
-screen_opens ()
-{
-  void *library = dlopen ("libX11.so.6", RTLD_LAZY);
-  if (!library)
-    return true;
-  const auto prepare =
-      reinterpret_cast<int (*) ()> (dlsym (library, "XInitThreads"));
-  const auto open = reinterpret_cast<void *(*)(const char *)> (
-      dlsym (library, "XOpenDisplay"));
-  const auto close =
-      reinterpret_cast<int (*) (void *)> (dlsym (library, "XCloseDisplay"));
-  if (!prepare || !open || !close)
-    return true;
-  prepare ();
-  void *display = open (nullptr);
-  if (display)
-    close (display);
-  return display;
-}
 
 bool
 has_window (GstElement *pipeline)
@@ -106,7 +84,7 @@ Player::has_screen ()
 {
   const char *display = std::getenv ("DISPLAY");
   if (std::getenv ("WAYLAND_DISPLAY") || !display ||
-      !has_window (pipeline_.get ()) || screen_opens ())
+      !has_window (pipeline_.get ()) || find_screen ().opens)
     return true;
   status_.line (format ("error: the screen DISPLAY=%s cannot be opened. Run "
                         "this in a desktop session or through ssh -X, or "

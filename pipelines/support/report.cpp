@@ -32,6 +32,7 @@ constexpr Provider kProviders[] = {
     {"autovideosink", "gstreamer1.0-plugins-good"},
     {"avdec_ffv1", "gstreamer1.0-libav"},
     {"avenc_ffv1", "gstreamer1.0-libav"},
+    {"cairooverlay", "gstreamer1.0-plugins-good"},
     {"matroskademux", "gstreamer1.0-plugins-good"},
     {"matroskamux", "gstreamer1.0-plugins-good"},
     {"pngenc", "gstreamer1.0-plugins-good"},
@@ -415,9 +416,23 @@ Status::progress (const std::string &text)
 void
 Status::line (const std::string &text)
 {
+  end_progress ();
+  std::fprintf (stderr, "%s: %s\n", what_.c_str (), text.c_str ());
+}
+
+void
+Status::output (const std::string &text)
+{
+  end_progress ();
+  std::printf ("%s: %s\n", what_.c_str (), text.c_str ());
+  std::fflush (stdout);
+}
+
+void
+Status::end_progress ()
+{
   if (std::exchange (open_, false))
     std::fprintf (stderr, "\r\033[K");
-  std::fprintf (stderr, "%s: %s\n", what_.c_str (), text.c_str ());
 }
 
 } // namespace report

@@ -62,9 +62,12 @@ public:
   Status (std::string what, bool verbose);
   void progress (const std::string &text);
   void line (const std::string &text);
+  /** A line on stdout. */
+  void output (const std::string &text);
 
 private:
   using Clock = std::chrono::steady_clock;
+  void end_progress ();
 
   std::string what_;
   bool terminal_, verbose_;

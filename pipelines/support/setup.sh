@@ -23,14 +23,14 @@ pkg-config|finds the libraries|build
 libgstreamer1.0-dev|GStreamer core and its test harness|build
 libgstreamer-plugins-base1.0-dev|GStreamer video library|build
 nlohmann-json3-dev|reads and writes JSON (schedules, tracks)|build
-libcairo2-dev|draws the overlay of a calibration|build
+libcairo2-dev|draws over pictures: calibration, window|build
 libusb-1.0-0-dev|DMD boards on the USB|build
 libeigen3-dev|linear algebra of estimates and calibrations|build
 libxxhash-dev|hashes of recorded frames|build
 libcli11-dev|options of the command-line tool|build
 gstreamer1.0-tools|gst-launch-1.0, gst-inspect-1.0|run
 gstreamer1.0-plugins-base|test scenes, conversion, TCP, compositor|run
-gstreamer1.0-plugins-good|Matroska, AVI, PNG, window selection|run
+gstreamer1.0-plugins-good|Matroska, AVI, PNG, window and its texts|run
 gstreamer1.0-plugins-bad|parses H.264 in tests|tests
 gstreamer1.0-plugins-ugly|H.264 encoder|run
 gstreamer1.0-libav|FFV1, and decoding most video files|run
@@ -47,6 +47,7 @@ libaravis-dev|the emulated camera, and aravissrc|tests package
 iproute2|the private network of the emulated camera|tests
 umockdev|an emulated USB for the DMD tests|tests
 xvfb|a virtual screen for the window tests|tests
+xdotool|presses keys in the window tests|tests
 shellcheck|checks the scripts|tests
 pybind11-dev|the Python library for single arrays|tests package
 python3-dev|the Python library for single arrays|tests package

@@ -1,0 +1,73 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Where things are in the window of live and receive. */
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+
+#include "base/geometry.h"
+
+/** Equal panes beside each other, captions above and a panel below. */
+struct WindowLayout {
+  using Extent = codedexposure::Extent;
+
+  static constexpr int kCaption = 24;   ///< height of the captions, pixels
+  static constexpr int kPanel = 114;    ///< height of the panel
+  static constexpr int kKeys = 26;      ///< height of its line of keys
+  static constexpr int kGap = 8;        ///< between panes
+  static constexpr int kMinWidth = 640; ///< in which the texts can be read
+  /** Where small pictures are enlarged to. */
+  static constexpr Extent kLarge{768, 576};
+
+  Extent pane;
+  int panes = 1;
+
+  int left (int index) const { return index * (pane.width + kGap); }
+  Extent size () const
+  {
+    return {std::max (kMinWidth, left (panes) - kGap),
+        kCaption + pane.height + kPanel};
+  }
+
+  /** The size of a picture in its pane, such that it lies on that of the
+   * camera: its pixels are as large as their cells, and rows of a pilot, which
+   * it lacks, stay free. A pixel is @p aspect_width / @p aspect_height times as
+   * wide as high, compared with one of the camera. */
+  Extent size_of (
+      Extent camera, Extent picture, int aspect_width, int aspect_height) const
+  {
+    const int across = camera.width / picture.width;
+    const int down = across * aspect_height / std::max (1, aspect_width);
+    const auto part = [] (int length, std::int64_t pixels, int all) {
+      return int (std::clamp<std::int64_t> (length * pixels / all, 1, length));
+    };
+    return {
+        part (pane.width, std::int64_t (picture.width) * across, camera.width),
+        part (
+            pane.height, std::int64_t (picture.height) * down, camera.height)};
+  }
+
+  /** Panes for pictures of the size @p camera: enlarged by a whole factor, or
+   * reduced to 3/4 or to a whole fraction, so that all fit into @p room. */
+  static WindowLayout fit (Extent camera, int panes, Extent room)
+  {
+    const Extent most{std::max (1, (room.width + kGap) / panes - kGap),
+        std::max (1, room.height - kCaption - kPanel)};
+    const auto scaled = [&] (int times, int parts) {
+      return Extent{std::max (1, camera.width * times / parts),
+          std::max (1, camera.height * times / parts)};
+    };
+    const auto fits = [] (Extent size, Extent limit) {
+      return size.width <= limit.width && size.height <= limit.height;
+    };
+    int times = 1, parts = 1;
+    while (fits (scaled (times + 1, 1), most) &&
+           fits (scaled (times + 1, 1), kLarge))
+      times++;
+    if (times == 1 && !fits (camera, most) && fits (scaled (3, 4), most))
+      times = 3, parts = 4;
+    while (!fits (scaled (times, parts), most) && parts < camera.width)
+      parts++;
+    return {scaled (times, parts), panes};
+  }
+};

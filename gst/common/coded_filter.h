@@ -14,7 +14,6 @@
 #include "base/result.h"
 #include "caps.h"
 #include "coded_pad.h"
-#include "mapping/stream_setup.h"
 #include "messages.h"
 #include "meta.h"
 #include "named.h"
@@ -23,6 +22,7 @@
 #include "record/provenance.h"
 #include "rectify/rectifier.h"
 #include "schedule/schedule.h"
+#include "setup/stream_setup.h"
 #include "sync/frame_sequence.h"
 
 G_BEGIN_DECLS

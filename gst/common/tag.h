@@ -10,9 +10,9 @@
 #include <gst/gst.h>
 
 #include "base/result.h"
-#include "mapping/stream_setup.h"
 #include "record/provenance.h"
 #include "schedule/schedule.h"
+#include "setup/stream_setup.h"
 
 namespace codedexposure::gst
 {

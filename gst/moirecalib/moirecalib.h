@@ -18,8 +18,8 @@
 #include "calibrate/session.h"
 #include "common/element.h"
 #include "common/raii.h"
-#include "mapping/stream_setup.h"
 #include "report.h"
+#include "setup/stream_setup.h"
 
 G_BEGIN_DECLS
 

@@ -18,7 +18,7 @@
 #include "common/element.h"
 #include "common/named.h"
 #include "common/raii.h"
-#include "mapping/stream_setup.h"
+#include "setup/stream_setup.h"
 #include "schedule/schedule.h"
 
 G_BEGIN_DECLS

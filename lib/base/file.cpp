@@ -3,8 +3,13 @@
 
 #include <cerrno>
 #include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
 #include <memory>
 #include <system_error>
+
+#include "base/text.h"
 
 namespace codedexposure
 {
@@ -28,6 +33,32 @@ read_file (const std::string &path, std::size_t limit)
   if (std::ferror (file.get ()) != 0)
     return failure ("it cannot be read");
   return content;
+}
+
+Result<void>
+write_file (const std::string &path, const std::string &content)
+{
+  /* A file that is there stays as it is until the new one is complete; what is
+   * no file, such as /dev/stdout, cannot be replaced. */
+  std::error_code ignored;
+  const bool replace = !std::filesystem::exists (path, ignored) ||
+                       std::filesystem::is_regular_file (path, ignored);
+  const std::string beside = replace ? path + ".new" : path;
+  std::ofstream file (beside, std::ios::binary | std::ios::trunc);
+  bool written = file && file << content && file.flush ();
+  if (written && replace) {
+    file.close ();
+    written = file && std::rename (beside.c_str (), path.c_str ()) == 0;
+  }
+  if (!written) {
+    Error error{"cannot be written to " + in_quotes (path, 200) + ": " +
+                    std::strerror (errno),
+        ErrorCode::io};
+    if (replace)
+      std::filesystem::remove (beside, ignored);
+    return error;
+  }
+  return {};
 }
 
 } // namespace codedexposure

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Reads whole files. */
+/* Reads and writes whole files. */
 #pragma once
 
 #include <cstddef>
@@ -14,5 +14,10 @@ namespace codedexposure
  * limit, it is too long. The error does not name the file; its code is
  * not_found or io. */
 Result<std::string> read_file (const std::string &path, std::size_t limit);
+
+/** Writes @p content to the file @p path, which gets its name when it is
+ * complete. The error, "cannot be written to 'PATH': why", is to follow the
+ * name of what is written. */
+Result<void> write_file (const std::string &path, const std::string &content);
 
 } // namespace codedexposure

@@ -2,12 +2,6 @@
 /* The versioned JSON form of mappings: docs/formats.md. */
 #include "mapping/json.h"
 
-#include <cerrno>
-#include <cstdio>
-#include <cstring>
-#include <filesystem>
-#include <fstream>
-
 #include "base/file.h"
 #include "base/text.h"
 
@@ -140,27 +134,8 @@ try {
 Result<void>
 Mapping::save (const std::string &path) const
 try {
-  /* A file that is there stays as it is until the new one is complete; what is
-   * no file, such as /dev/stdout, cannot be replaced. */
-  std::error_code ignored;
-  const bool replace = !std::filesystem::exists (path, ignored) ||
-                       std::filesystem::is_regular_file (path, ignored);
-  const std::string beside = replace ? path + ".new" : path;
-  std::ofstream file (beside, std::ios::binary | std::ios::trunc);
-  bool written = file && file << to_json () << '\n' && file.flush ();
-  if (written && replace) {
-    file.close ();
-    written = file && std::rename (beside.c_str (), path.c_str ()) == 0;
-  }
-  if (!written) {
-    Error error{"the mapping cannot be written to " + in_quotes (path, 200) +
-                    ": " + std::strerror (errno),
-        ErrorCode::io};
-    if (replace)
-      std::filesystem::remove (beside, ignored);
-    return error;
-  }
-  return {};
+  const auto written = write_file (path, to_json () + '\n');
+  return written ? written : written.error ().with_prefix ("the mapping ");
 } catch (const std::bad_alloc &) {
   return out_of_memory ();
 }

@@ -59,8 +59,8 @@ Provenance::to_json () const
 Result<Provenance>
 Provenance::from_json (std::string_view json)
 {
-  return read_json<Provenance> (json, kHead.what,
-      Schedule::kMaxJsonSize + Mapping::kMaxJsonSize + 4096, read_provenance);
+  return read_json<Provenance> (
+      json, kHead.what, StreamSetup::kMaxJsonSize + 4096, read_provenance);
 }
 
 std::string

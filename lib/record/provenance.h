@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "base/result.h"
-#include "mapping/stream_setup.h"
+#include "setup/stream_setup.h"
 
 namespace codedexposure
 {

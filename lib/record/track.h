@@ -9,16 +9,15 @@
 #include <string_view>
 
 #include "base/result.h"
-#include "mapping/stream_setup.h"
 #include "record/frame_record.h"
+#include "setup/stream_setup.h"
 
 namespace codedexposure
 {
 
 /** A line of the track. docs/formats.md, "Per-frame track". */
 struct TrackLine {
-  static constexpr std::size_t kMaxSize =
-      Schedule::kMaxJsonSize + Mapping::kMaxJsonSize + 65536;
+  static constexpr std::size_t kMaxSize = StreamSetup::kMaxJsonSize + 65536;
 
   std::optional<FrameRecord> frame = {};
   /** Valid from this frame on. */

@@ -224,6 +224,14 @@ Schedule::on_in_part (int x, int y, int slot) const
   return part.on (x - rect.x, y - rect.y, mask_of (part.code (), slot));
 }
 
+Result<Schedule>
+Schedule::with_leak (double leak) const
+{
+  Parts parts = parts_;
+  parts.leak = leak;
+  return make (std::move (parts));
+}
+
 Result<void>
 Schedule::check_size (int width, int height) const
 {

@@ -135,6 +135,8 @@ public:
   Schedule background () const;
   /** Region in which pixel (x, y) lies; -1: the background. */
   int region_at (int x, int y) const;
+  /** The same with another leak. */
+  Result<Schedule> with_leak (double leak) const;
   /** Error where a region does not lie within @p width x @p height pixels,
    * above the pilot. */
   Result<void> check_size (int width, int height) const;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Any bytes as the JSON of the tags that a stream or a file carries. */
 #include "fuzz_check.h"
-#include "mapping/stream_setup.h"
 #include "record/provenance.h"
+#include "setup/stream_setup.h"
 
 using namespace codedexposure;
 using namespace codedexposure::test;

@@ -12,7 +12,7 @@ import pathlib
 import re
 import sys
 
-ORDER = ["base", "schedule", "mapping", "record", "estimate", "extract", "rectify",
+ORDER = ["base", "schedule", "mapping", "setup", "record", "estimate", "extract", "rectify",
          "fuse", "calibrate", "sync", "dmd", "bench", "stats", "advise",
          "tools"]
 # The emulated bench: the elements that emulate, and the plugin, which registers

@@ -12,7 +12,7 @@
 
 #include <gtest/gtest.h>
 
-#include "mapping/stream_setup.h"
+#include "setup/stream_setup.h"
 
 using namespace codedexposure;
 

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-#include "mapping/stream_setup.h"
+#include "setup/stream_setup.h"
 
 #include <utility>
 
 #include "mapping/json.h"
 #include "schedule/json.h"
+#include "setup/json.h"
 
 namespace codedexposure
 {
@@ -29,7 +30,27 @@ take_pair (Json &root, const char *key, int highest, const std::string &rule)
   return std::pair (first, second);
 }
 
+<<<<<<< HEAD:lib/mapping/stream_setup.cpp
 /* Taken out of @root; false if it is left out. */
+=======
+/* An object of its own, which is taken out of @root. */
+template <typename T>
+std::optional<T>
+take_inner (Json &root, const char *key, T (*read) (const Json &))
+{
+  const auto found = root.find (key);
+  if (found == root.end ())
+    return std::nullopt;
+  try {
+    T inner = read (*found);
+    root.erase (found);
+    return inner;
+  } catch (const Error &refused) {
+    throw refused.with_prefix ("in key '" + std::string (key) + "': ");
+  }
+}
+
+>>>>>>> 9c4195d (A bench profile has the measured numbers of a bench, in strict JSON):lib/setup/stream_setup.cpp
 bool
 take_bool (Json &root, const char *key)
 {
@@ -48,14 +69,8 @@ read_setup (Json root)
 {
   StreamSetup setup;
   if (root.is_object ()) {
-    if (root.contains ("mapping")) {
-      try {
-        setup.mapping = read_mapping (root["mapping"]);
-      } catch (const Error &refused) {
-        throw refused.with_prefix ("in key 'mapping': ");
-      }
-      root.erase ("mapping");
-    }
+    setup.mapping = take_inner (root, "mapping", read_mapping);
+    setup.bench = take_inner (root, "bench", read_bench_profile);
     if (const auto size = take_pair (root, "size", Mapping::kMaxSize,
             "two whole numbers, width and height"))
       setup.size = Extent{size->first, size->second};
@@ -74,8 +89,7 @@ read_setup (Json root)
 Result<StreamSetup>
 StreamSetup::from_json (std::string_view json)
 {
-  return read_json<StreamSetup> (json, "schedule",
-      Schedule::kMaxJsonSize + Mapping::kMaxJsonSize, read_setup);
+  return read_json<StreamSetup> (json, "schedule", kMaxJsonSize, read_setup);
 }
 
 std::string
@@ -97,6 +111,8 @@ StreamSetup::to_json () const
     text += ",\"simulated\":true";
   if (mapping)
     text += ",\"mapping\":" + mapping->to_json ();
+  if (bench)
+    text += ",\"bench\":" + bench->to_json ();
   return text + "}";
 }
 

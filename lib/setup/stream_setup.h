@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* What a stream carries in its tag: its schedule and, if known, its mapping. */
+/* What a stream carries in its tag: its schedule and, if known, its mapping and
+ * the profile of its bench. */
 #pragma once
 
 #include <optional>
@@ -10,12 +11,18 @@
 #include "base/result.h"
 #include "mapping/mapping.h"
 #include "schedule/schedule.h"
+#include "setup/bench_profile.h"
 
 namespace codedexposure
 {
 
 /** All that was decided and measured before the exposure. */
 struct StreamSetup {
+  /** Bound on the JSON form, in bytes. */
+  static constexpr std::size_t kMaxJsonSize = Schedule::kMaxJsonSize +
+                                              Mapping::kMaxJsonSize +
+                                              BenchProfile::kMaxJsonSize;
+
   Schedule schedule;
   std::optional<Mapping> mapping = {};
   /** Of the coded frames when they left the camera: what differs from it was
@@ -24,12 +31,21 @@ struct StreamSetup {
   std::optional<FrameRate> rate = {};
   /** A track with a line for each frame accompanies the frames. */
   bool track = false;
+<<<<<<< HEAD:lib/mapping/stream_setup.h
   /** The frames are those of a simulated bench. */
   bool simulated = false;
 
   /** The JSON form of the schedule with keys more that may be left out:
    * "mapping", which holds the JSON form of a mapping, "size", "rate",
    * "track" and "simulated". */
+=======
+  /** Of the camera and the DMD. */
+  std::optional<BenchProfile> bench = {};
+
+  /** The JSON form of the schedule with keys more that may be left out:
+   * "mapping", which holds the JSON form of a mapping, "size", "rate", "track"
+   * and "bench", which holds that of a bench profile. */
+>>>>>>> 9c4195d (A bench profile has the measured numbers of a bench, in strict JSON):lib/setup/stream_setup.h
   static Result<StreamSetup> from_json (std::string_view json);
   /** One line. Without the others it is schedule.to_json (). */
   std::string to_json () const;

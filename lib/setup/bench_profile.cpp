@@ -1,0 +1,216 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "setup/bench_profile.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "base/file.h"
+#include "base/text.h"
+#include "base/try.h"
+
+namespace codedexposure
+{
+
+namespace
+{
+
+constexpr double kLongest = double (kTimeLimit);
+
+const struct {
+  std::optional<Measured> BenchProfile::*member;
+  const char *name, *unit;
+  double low, high;
+} kRanges[] = {
+    {&BenchProfile::conversion_gain, "conversion gain", " e-/DN", 1e-6, 1e6},
+    {&BenchProfile::full_well, "full well", " e-", 1.0, 1e7},
+    {&BenchProfile::read_noise, "read noise", " e-", 0.0, 1e5},
+    {&BenchProfile::black_level, "black level", " DN", 0.0, 65534.0},
+    {&BenchProfile::linearity_error, "linearity error", "", 0.0, 1.0},
+    {&BenchProfile::leak, "leak", "", 0.0, Schedule::kMaxLeak},
+    {&BenchProfile::trigger_delay, "trigger delay", " ns", -kLongest, kLongest},
+    {&BenchProfile::exposure, "exposure", " ns", 1.0, kLongest},
+    {&BenchProfile::psf_sigma, "psf_sigma", " pixels", 0.0,
+        Mapping::kMaxPsfSigma},
+};
+
+Result<void>
+check_numbers (const BenchProfile &profile)
+{
+  for (const auto &[member, name, unit, low, high] : kRanges) {
+    const auto &number = profile.*member;
+    if (!number)
+      continue;
+    const auto outside = [&] (const std::string &of, double value, double from,
+                             double to) {
+      return Error{of + " of " + real_text (value) + unit + " is outside of " +
+                   real_text (from) + " to " + real_text (to) + unit +
+                   "; leave out what was not measured"};
+    };
+    if (!(number->value >= low && number->value <= high))
+      return outside (std::string ("a ") + name, number->value, low, high);
+    if (!(number->sigma >= 0.0 &&
+            number->sigma <= std::numeric_limits<double>::max ()))
+      return outside (std::string ("a sigma of the ") + name, number->sigma,
+          0.0, std::numeric_limits<double>::max ());
+  }
+  return {};
+}
+
+Result<void>
+check_named (const std::string &what, const BenchProfile::Device &device)
+{
+  for (const std::string *name :
+      {&device.vendor, &device.model, &device.serial})
+    if (printable (*name, BenchProfile::kMaxName) != *name)
+      return Error{"a name of the " + what + ", " + in_quotes (*name) +
+                   ", is not one line of at most " +
+                   std::to_string (BenchProfile::kMaxName) + " bytes"};
+  const auto [width, height] = device.size;
+  if (std::min (width, height) < 1 ||
+      std::max (width, height) > Mapping::kMaxSize)
+    return Error{"a " + what + " of " + size_text (device.size) +
+                 " is none; sides are 1 to " +
+                 std::to_string (Mapping::kMaxSize)};
+  return {};
+}
+
+} // namespace
+
+Result<void>
+BenchProfile::check () const
+{
+  using namespace std::chrono;
+  const year_month_day day (floor<days> (measured));
+  if (int (day.year ()) < 0 || int (day.year ()) > 9999)
+    return Error{"the time of the measurement is in the year " +
+                 std::to_string (int (day.year ())) +
+                 "; it must be in 0 to 9999"};
+  RETURN_IF_ERROR (check_named ("camera", camera));
+  if (dmd)
+    RETURN_IF_ERROR (check_named ("DMD", *dmd));
+  if (printable (pixel_format, kMaxName) != pixel_format)
+    return Error{"the pixel format " + in_quotes (pixel_format) +
+                 " is no name, such as Mono12"};
+  if (bits < 1 || bits > 16)
+    return Error{std::to_string (bits) + " bits of a pixel are not 1 to 16"};
+  RETURN_IF_ERROR (check_numbers (*this));
+  if (black () >= largest ())
+    return Error{"a black level of " + real_text (black_level->value) +
+                 " DN leaves nothing of the " + std::to_string (bits) +
+                 " bits; measure it without light"};
+  if (mapping && !(mapping->camera () == camera.size))
+    return Error{"the mapping is for frames of " +
+                 size_text (mapping->camera ()) + " pixels, but the camera " +
+                 "has " + size_text (camera.size) + "; measure a new mapping"};
+  return {};
+}
+
+Result<BenchProfile>
+BenchProfile::parse (std::string_view json_or_path)
+try {
+  if (json_or_path.starts_with ('{'))
+    return from_json (json_or_path);
+  const std::string path (json_or_path);
+  const auto text = read_file (path, kMaxJsonSize);
+  if (!text)
+    return text.error ().with_prefix (
+        "bench profile " + in_quotes (path, 200) + ": ");
+  auto profile = from_json (*text);
+  if (!profile)
+    return profile.error ().with_prefix (
+        "file " + in_quotes (path, 200) + ": ");
+  return profile;
+} catch (const std::bad_alloc &) {
+  return out_of_memory ();
+}
+
+Result<void>
+BenchProfile::save (const std::string &path) const
+try {
+  RETURN_IF_ERROR (check ());
+  const auto written = write_file (path, to_json () + '\n');
+  return written ? written
+                 : written.error ().with_prefix ("the bench profile ");
+} catch (const std::bad_alloc &) {
+  return out_of_memory ();
+}
+
+/* --------------------------------------------------------- what follows -- */
+
+std::optional<double>
+BenchProfile::electrons_per_number () const
+{
+  if (conversion_gain)
+    return conversion_gain->value;
+  if (full_well)
+    return full_well->value / (largest () - black ());
+  return std::nullopt;
+}
+
+int
+BenchProfile::black () const
+{
+  return black_level ? int (std::lround (black_level->value)) : 0;
+}
+
+Result<Schedule>
+BenchProfile::with_leak (const Schedule &schedule) const
+{
+  return leak && schedule.leak () == 0.0 ? schedule.with_leak (leak->value)
+                                         : schedule;
+}
+
+/* ----------------------------------------------------- whose profile it is --
+ */
+
+Result<void>
+BenchProfile::check_frames (Extent size, int frame_bits) const
+{
+  const std::string remedy =
+      "; use the bench profile of this camera, or measure the bench again";
+  if (!(size == camera.size))
+    return Error{"the frames have " + size_text (size) +
+                 " pixels, but the camera of the bench profile has " +
+                 size_text (camera.size) + remedy};
+  if (frame_bits != 0 && frame_bits != bits)
+    return Error{"the frames have " + std::to_string (frame_bits) +
+                 " bits, but those of the bench profile have " +
+                 std::to_string (bits) + remedy};
+  return {};
+}
+
+Result<void>
+BenchProfile::check_device (
+    const std::string &what, const Device &profiled, const Device &found)
+{
+  if (profiled.serial.empty () || found.serial.empty () ||
+      profiled.serial == found.serial)
+    return {};
+  return Error{"the bench profile is of the " + what + " with the serial " +
+               "number " + in_quotes (profiled.serial) + ", but this is " +
+               in_quotes (found.serial) + "; use the bench profile of this " +
+               what + ", or measure the bench again"};
+}
+
+Result<void>
+BenchProfile::check_bench (const BenchProfile &other) const
+{
+  RETURN_IF_ERROR (check_device ("camera", camera, other.camera));
+  return dmd && other.dmd ? check_device ("DMD", *dmd, *other.dmd)
+                          : Result<void> ();
+}
+
+std::optional<std::string>
+BenchProfile::why_old (std::chrono::sys_seconds now) const
+{
+  const auto age = std::chrono::floor<std::chrono::days> (now - measured);
+  if (age <= kMaxAge)
+    return std::nullopt;
+  return "The bench profile was measured " + std::to_string (age.count ()) +
+         " days ago. After " + std::to_string (kMaxAge.count ()) +
+         " days it may no longer be that of the bench; measure the bench "
+         "again.";
+}
+
+} // namespace codedexposure

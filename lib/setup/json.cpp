@@ -1,0 +1,195 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The versioned JSON form of bench profiles: docs/formats.md. */
+#include "setup/json.h"
+
+#include <cstdio>
+
+#include "base/text.h"
+#include "mapping/json.h"
+
+namespace codedexposure
+{
+
+namespace
+{
+
+const JsonHead kHead{"bench profile", "coded-exposure-bench", 1};
+
+struct Quantity {
+  std::string_view key;
+  std::optional<Measured> BenchProfile::*member;
+};
+constexpr Quantity kQuantities[] = {
+    {"conversion_gain", &BenchProfile::conversion_gain},
+    {"full_well", &BenchProfile::full_well},
+    {"read_noise", &BenchProfile::read_noise},
+    {"black_level", &BenchProfile::black_level},
+    {"linearity_error", &BenchProfile::linearity_error},
+    {"leak", &BenchProfile::leak},
+    {"trigger_delay_ns", &BenchProfile::trigger_delay},
+    {"exposure_ns", &BenchProfile::exposure},
+    {"psf_sigma", &BenchProfile::psf_sigma},
+};
+
+JsonReader
+text_into (std::string &to)
+{
+  return [&to] (const Json &value, const std::string &key) {
+    if (!value.is_string ())
+      throw expected (key, "a text", value);
+    to = value.get<std::string> ();
+  };
+}
+
+/** A UTC time as in ISO 8601, to the second. */
+JsonReader
+time_into (std::chrono::sys_seconds &to)
+{
+  return [&to] (const Json &value, const std::string &key) {
+    using namespace std::chrono;
+    constexpr std::string_view form = "2026-03-14T09:26:53Z";
+    const std::string text =
+        value.is_string () ? value.get<std::string> () : "";
+    bool good = text.size () == form.size ();
+    for (std::size_t i = 0; good && i < form.size (); i++) {
+      const auto digit = [] (char c) { return c >= '0' && c <= '9'; };
+      good = digit (form[i]) ? digit (text[i]) : form[i] == text[i];
+    }
+    const auto number = [&] (std::size_t at, std::size_t digits) {
+      return parse_int (text.substr (at, digits)).value_or (0);
+    };
+    if (good) {
+      const year_month_day day{year (number (0, 4)), month (number (5, 2)),
+          std::chrono::day (number (8, 2))};
+      const int h = number (11, 2), m = number (14, 2), s = number (17, 2);
+      good = day.ok () && h < 24 && m < 60 && s < 60;
+      if (good)
+        to = sys_days (day) + hours (h) + minutes (m) + seconds (s);
+    }
+    if (!good)
+      throw expected (
+          key, "a UTC time such as \"" + std::string (form) + "\"", value);
+  };
+}
+
+std::string
+time_text (std::chrono::sys_seconds time)
+{
+  using namespace std::chrono;
+  const auto midnight = floor<days> (time);
+  const year_month_day day (midnight);
+  const hh_mm_ss clock (time - midnight);
+  char text[64];
+  std::snprintf (text, sizeof text, "%04d-%02u-%02uT%02d:%02d:%02dZ",
+      int (day.year ()), unsigned (day.month ()), unsigned (day.day ()),
+      int (clock.hours ().count ()), int (clock.minutes ().count ()),
+      int (clock.seconds ().count ()));
+  return text;
+}
+
+JsonReader
+device_into (BenchProfile::Device &to)
+{
+  return [&to] (const Json &value, const std::string &key) {
+    read_keys (value, key, "a device has a size, [width, height]",
+        {{"vendor", text_into (to.vendor)}, {"model", text_into (to.model)},
+            {"serial", text_into (to.serial)},
+            {"size",
+                integers_into ({&to.size.width, &to.size.height},
+                    Mapping::kMaxSize, "two whole numbers, width and height"),
+                true}});
+  };
+}
+
+OrderedJson
+device_json (const BenchProfile::Device &device)
+{
+  OrderedJson json;
+  if (!device.vendor.empty ())
+    json["vendor"] = device.vendor;
+  if (!device.model.empty ())
+    json["model"] = device.model;
+  if (!device.serial.empty ())
+    json["serial"] = device.serial;
+  json["size"] = {device.size.width, device.size.height};
+  return json;
+}
+
+Measured
+read_measured (const Json &value, const std::string &key)
+{
+  Measured measured;
+  read_keys (value, key, "a measured number has a value and a sigma",
+      {{"value", number_into (measured.value, "a number"), true},
+          {"sigma", number_into (measured.sigma, "a number"), true}});
+  return measured;
+}
+
+} // namespace
+
+BenchProfile
+read_bench_profile (const Json &root)
+{
+  BenchProfile profile;
+  JsonKeys keys = {
+      {"measured", time_into (profile.measured), true},
+      {"camera", device_into (profile.camera), true},
+      {"dmd",
+          [&profile] (const Json &value, const std::string &key) {
+            device_into (profile.dmd.emplace ()) (value, key);
+          }},
+      {"pixel_format", text_into (profile.pixel_format)},
+      {"bits", integer_into (profile.bits, 16), true},
+  };
+  for (const auto &[key, member] : kQuantities)
+    keys.push_back (
+        {key, [&profile, member] (const Json &value, const std::string &name) {
+           profile.*member = read_measured (value, name);
+         }});
+  keys.push_back (
+      {"mapping", [&profile] (const Json &value, const std::string &key) {
+         try {
+           profile.mapping = read_mapping (value);
+         } catch (const Error &refused) {
+           throw refused.with_prefix ("in key '" + key + "': ");
+         }
+       }});
+  read_versioned (root, kHead,
+      "a bench profile needs at least format, version, measured, camera and "
+      "bits",
+      keys);
+  if (const auto good = profile.check (); !good)
+    throw Error{good.error ().message, ErrorCode::parse};
+  return profile;
+}
+
+Result<BenchProfile>
+BenchProfile::from_json (std::string_view json)
+{
+  return read_json<BenchProfile> (
+      json, kHead.what, kMaxJsonSize, read_bench_profile);
+}
+
+std::string
+BenchProfile::to_json () const
+{
+  OrderedJson root;
+  root["format"] = kHead.format;
+  root["version"] = kHead.version;
+  root["measured"] = time_text (measured);
+  root["camera"] = device_json (camera);
+  if (dmd)
+    root["dmd"] = device_json (*dmd);
+  if (!pixel_format.empty ())
+    root["pixel_format"] = pixel_format;
+  root["bits"] = bits;
+  for (const auto &[key, member] : kQuantities)
+    if (const auto &number = this->*member)
+      root[std::string (key)] = {
+          {"value", number->value}, {"sigma", number->sigma}};
+  if (mapping)
+    root["mapping"] = OrderedJson::parse (mapping->to_json ());
+  return root.dump ();
+}
+
+} // namespace codedexposure

@@ -6,6 +6,7 @@
  * lost cannot be made up for, and the next begins with the frame that came.
  */
 #include <algorithm>
+#include <cmath>
 #include <string_view>
 #include <utility>
 
@@ -23,14 +24,24 @@ namespace codedexposure::gst::sim
 namespace
 {
 
-void
+bool
 use_schedule (GstCodedExposureSim *self, ScheduleRef schedule)
 {
   Stream &stream = state (self).stream;
+  Result<Schedule> lit =
+      stream.profile ? stream.profile->with_leak (*schedule) : *schedule;
+  if (!lit) {
+    POST_ERROR (self, RESOURCE, SETTINGS,
+        "The schedule cannot have the leak of the bench profile: " +
+            lit.error ().message);
+    return false;
+  }
+  stream.lit = *std::move (lit);
   stream.schedule = schedule;
   stream.tag_due = true;
   const ObjectLock lock (self);
   state (self).schedule = std::move (schedule);
+  return true;
 }
 
 /* The schedule that the DMD was programmed with, else that of the property,
@@ -158,6 +169,26 @@ check_mirrors (GstCodedExposureSim *self, const SimulatedMirrors &mirrors)
   return false;
 }
 
+/* Whether the profile, if there is one, is of a camera with such frames; @bits:
+ * significant ones, as they were set. */
+bool
+check_profile (GstCodedExposureSim *self, int bits)
+{
+  const Stream &stream = state (self).stream;
+  if (!stream.profile)
+    return true;
+  const GstVideoInfo &info = stream.plan->in;
+  const int all = GST_VIDEO_FORMAT_INFO_BITS (info.finfo);
+  if (bits == 0 && stream.profile->bits > all)
+    bits = all;
+  const auto good =
+      stream.profile->check_frames ({info.width, info.height}, bits);
+  if (!good)
+    POST_ERROR (self, RESOURCE, SETTINGS,
+        "The bench profile does not fit: " + good.error ().message + ".");
+  return good.ok ();
+}
+
 /* Sets up the bench where it is missing or its settings changed. */
 bool
 prepare_bench (GstCodedExposureSim *self)
@@ -167,12 +198,17 @@ prepare_bench (GstCodedExposureSim *self)
   {
     const ObjectLock lock (self);
     optics = state (self).settings.optics;
-    if (stream.mirrors)
-      optics.diamond = stream.mirrors->diamond ();
   }
+  const int set_bits = optics.bits;
+  optics = optics.completed (
+      stream.profile ? &*stream.profile : nullptr, stream.lit);
+  if (stream.mirrors)
+    optics.diamond = stream.mirrors->diamond ();
   if (stream.bench && optics == stream.optics)
     return true;
 
+  if (!check_profile (self, set_bits))
+    return false;
   const GstVideoInfo &info = stream.plan->in;
   const int bits = GST_VIDEO_FORMAT_INFO_BITS (info.finfo);
   if (optics.bits > bits) {
@@ -225,7 +261,7 @@ begin_exposure (GstCodedExposureSim *self, GstBuffer *inbuf)
   stream.last_start = exposure.start;
   stream.last_frame = exposure.frame;
   stream.bench->begin (
-      *stream.schedule, stream.mirrors ? stream.mirrors->held () : nullptr);
+      stream.lit, stream.mirrors ? stream.mirrors->held () : nullptr);
   stream.exposure = std::move (exposure);
   return GST_FLOW_OK;
 }
@@ -290,6 +326,18 @@ describe (const Stream &stream, const Exposure &exposure)
   set_frame_meta (exposure.outbuf.get (), meta);
 }
 
+/* By how much frames come after the first slot. Without a DMD, the masks step
+ * with the frames. */
+GstClockTime
+trigger_delay (const Stream &stream)
+{
+  const bool delayed =
+      stream.mirrors && stream.profile && stream.profile->trigger_delay;
+  return delayed ? GstClockTime (std::max (
+                       0.0, std::round (stream.profile->trigger_delay->value)))
+                 : 0;
+}
+
 GstBuffer *
 stamp (GstCodedExposureSim *self, Exposure exposure)
 {
@@ -302,7 +350,7 @@ stamp (GstCodedExposureSim *self, Exposure exposure)
   const GstVideoInfo &info = stream.plan->out;
   describe (stream, exposure);
   GstBuffer *outbuf = exposure.outbuf.release ();
-  GST_BUFFER_PTS (outbuf) = exposure.start;
+  GST_BUFFER_PTS (outbuf) = exposure.start + trigger_delay (stream);
   GST_BUFFER_DTS (outbuf) = GST_CLOCK_TIME_NONE;
   GST_BUFFER_DURATION (outbuf) =
       gst_util_uint64_scale (GST_SECOND, info.fps_d, info.fps_n);
@@ -365,7 +413,8 @@ follow_schedule (GstCodedExposureSim *self)
   if (wanted == stream.schedule || *wanted == *stream.schedule)
     return true;
   GST_INFO_OBJECT (self, "schedule is now %s", wanted->text ().c_str ());
-  use_schedule (self, std::move (wanted));
+  if (!use_schedule (self, std::move (wanted)))
+    return false;
   /* Another number of slots means another frame rate. */
   stream.plan.reset ();
   gst_base_transform_reconfigure_src (GST_BASE_TRANSFORM (self));
@@ -377,11 +426,20 @@ begin_stream (GstCodedExposureSim *self)
 {
   Stream &stream = state (self).stream;
   std::string dmd;
+  Named<BenchProfile> bench;
   {
     const ObjectLock lock (self);
     dmd = state (self).settings.dmd;
+    bench = state (self).settings.bench;
     state (self).counters = Counters ();
   }
+  if (bench.read && !*bench.read) {
+    POST_ERROR (self, RESOURCE, SETTINGS,
+        "The bench property cannot be read: " + bench.read->error ().message);
+    return false;
+  }
+  if (bench.read)
+    stream.profile = bench.read->value ();
   if (!dmd.empty () && !(stream.mirrors = find_mirrors (dmd))) {
     POST_ERROR (self, RESOURCE, SETTINGS,
         "dmd '" + dmd +
@@ -390,10 +448,7 @@ begin_stream (GstCodedExposureSim *self)
     return false;
   }
   ScheduleRef schedule = wanted_schedule (self);
-  if (!schedule)
-    return false;
-  use_schedule (self, std::move (schedule));
-  return true;
+  return schedule && use_schedule (self, std::move (schedule));
 }
 
 GstFlowReturn
@@ -505,6 +560,7 @@ own_setup (GstCodedExposureSim *self)
   StreamSetup setup = setup_at (
       GST_BASE_TRANSFORM_SRC_PAD (self), *state (self).stream.schedule);
   setup.simulated = true;
+  setup.bench = state (self).stream.profile;
   return setup;
 }
 

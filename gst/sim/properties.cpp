@@ -29,24 +29,37 @@ properties ()
           "dmdsync with the same device shows them; its schedule wins over "
           "the property; empty: masks step with the frames",
           kReadWriteReady, within (&SimState::settings, &Settings::dmd)},
+      {"bench", "Bench profile",
+          "Profile of a bench to simulate, a JSON file or its text "
+          "(docs/formats.md): noise, black level, bits, gain, leakage, blur, "
+          "mapping and trigger delay, for which other properties and the "
+          "schedule win; the tag has it",
+          kReadWriteReady, within (&SimState::settings, &Settings::bench)},
       {"psf-sigma", "PSF sigma",
-          "Standard deviation of the lens's Gaussian blur in pixels; 0: none",
-          kReadWrite, optics (&Optics::psf_sigma), 0.0, Optics::kMaxPsfSigma},
+          "Standard deviation of the lens's Gaussian blur in pixels; 0: none; "
+          "-1: that of the bench profile, or none",
+          kReadWrite, optics (&Optics::psf_sigma), Optics::kUnset,
+          Optics::kMaxPsfSigma},
       {"full-well", "Full well",
           "Electrons that white makes in a pixel open in every slot, and the "
-          "most it holds; gives shot noise; 0: no noise",
-          kReadWrite, optics (&Optics::full_well), 0.0, Optics::kMaxFullWell},
+          "most it holds; gives shot noise; 0: no noise; -1: by the bench "
+          "profile, or no noise",
+          kReadWrite, optics (&Optics::full_well), Optics::kUnset,
+          Optics::kMaxFullWell},
       {"read-noise", "Read noise",
-          "Noise of each reading in electrons rms; needs full-well", kReadWrite,
-          optics (&Optics::read_noise), 0.0, Optics::kMaxReadNoise},
+          "Noise of each reading in electrons rms; needs full-well; -1: that "
+          "of the bench profile, or none",
+          kReadWrite, optics (&Optics::read_noise), Optics::kUnset,
+          Optics::kMaxReadNoise},
       {"bits", "Bits",
           "Significant bits of a pixel, counted from the lowest, for example "
-          "12 for a 12-bit camera in GRAY16_LE; 0: all bits of the format",
+          "12 for a 12-bit camera in GRAY16_LE; 0: those of the bench profile, "
+          "or all bits of the format",
           kReadWrite, optics (&Optics::bits), 0, 16},
       {"gain", "Gain",
           "Factor on the light; at 1, white makes white in a pixel open in "
-          "every slot; 0: white makes white in the pixels that are open "
-          "longest",
+          "every slot; 0: by the bench profile, or such that white makes white "
+          "in the pixels that are open longest",
           kReadWrite, optics (&Optics::gain), 0.0, Optics::kMaxGain},
       {"seed", "Seed", "Start of the noise: the same seed gives the same bytes",
           kReadWrite, optics (&Optics::seed), guint64 (0), G_MAXUINT64},

@@ -50,6 +50,16 @@
  * longest, whatever code, leak and timing are. With no noise, no blur and no
  * misalignment, a `sequential` code gives each pixel its input's value exactly.
  *
+ * ## Bench profile
+ *
+ * With #codedexposure-sim:bench, the bench is the one that was measured: what
+ * its profile (docs/formats.md) says of noise, gain, well, black level, bits,
+ * leakage, blur and mapping is simulated, unless a property or the schedule
+ * says otherwise, and the tag has the profile. The light is such that white
+ * fills the range of the camera. The scene lies on the mirrors in the middle of
+ * the array. With #codedexposure-sim:dmd, frames come later by the trigger
+ * delay, for which dmdsync makes up.
+ *
  * ## DMD
  *
  * With #codedexposure-sim:dmd the masks are those of a simulated DMD that a
@@ -128,6 +138,7 @@ begin_run (GstElement *element)
 {
   auto *self = GST_CODED_EXPOSURE_SIM (element);
   read_again (self, self->state->settings.schedule);
+  read_again (self, self->state->settings.bench);
   return sim::begin_stream (self);
 }
 

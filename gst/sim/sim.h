@@ -20,6 +20,7 @@
 #include "common/raii.h"
 #include "setup/stream_setup.h"
 #include "schedule/schedule.h"
+#include "setup/stream_setup.h"
 
 G_BEGIN_DECLS
 
@@ -40,7 +41,11 @@ using ScheduleRef = std::shared_ptr<const Schedule>;
 struct Settings {
   Named<Schedule> schedule{"sequential:2x2"};
   std::string dmd;
-  BenchOptions optics;
+  Named<BenchProfile> bench;
+  /** As they were set; what was not is that of the profile. */
+  BenchOptions optics{.psf_sigma = BenchOptions::kUnset,
+      .full_well = BenchOptions::kUnset,
+      .read_noise = BenchOptions::kUnset};
 };
 
 struct Counters {
@@ -70,6 +75,8 @@ struct Exposure {
 struct Stream {
   std::shared_ptr<SimulatedMirrors> mirrors; ///< null: masks in step
   ScheduleRef schedule;                      ///< of the plan and the tag
+  std::optional<BenchProfile> profile;
+  Schedule lit; ///< the schedule with the leak of the profile
   std::optional<Plan> plan;
   std::string refused; ///< why there can be no plan, as was posted
   std::optional<OpticalBench> bench;
@@ -144,9 +151,9 @@ enum class Drop { kGap, kSegment, kFlush, kCaps, kEos };
 void drop_exposure (GstCodedExposureSim *self, Drop reason);
 /** The next frame begins a stretch of time of its own. */
 void restart (GstCodedExposureSim *self, Drop reason);
-/** Says the schedule downstream where that is due. */
-/** Schedule, size and rate of the coded frames. */
+/** What the tag of the coded frames says. */
 StreamSetup own_setup (GstCodedExposureSim *self);
+/** Says the schedule downstream where that is due. */
 void push_tag (GstCodedExposureSim *self);
 
 } // namespace codedexposure::gst::sim

@@ -7,6 +7,7 @@
 #include <new>
 #include <sstream>
 
+#include "base/text.h"
 #include "base/try.h"
 #include "bench/sensor.h"
 
@@ -28,6 +29,8 @@ check (const BenchOptions &options)
     double value, low, high;
   } ranges[] = {
       {"PSF sigma (pixels)", options.psf_sigma, 0.0, O::kMaxPsfSigma},
+      {"well (electrons)", options.well, 0.0, O::kMaxFullWell},
+      {"black level (DN)", options.black_level, 0.0, 65535.0},
       {"full well (electrons)", options.full_well, 0.0, O::kMaxFullWell},
       {"read noise (electrons)", options.read_noise, 0.0, O::kMaxReadNoise},
       {"bits", double (options.bits), 0.0, 16.0},
@@ -46,10 +49,26 @@ check (const BenchOptions &options)
       text << what << " = " << value << " is outside " << low << ".." << high;
       return Error{text.str ()};
     }
+  if (options.mapping) {
+    const double scale = options.mapping->pose ().magnification;
+    if (!(scale >= O::kMinScale && scale <= O::kMaxScale))
+      return Error{"a mapping with " + real_text (scale) +
+                   " pixels a mirror is outside 0.5..4"};
+  }
   if (options.read_noise > 0.0 && options.full_well == 0.0)
     return Error{"read noise is counted in electrons and needs a full well; "
                  "set it, 10000 for example"};
   return {};
+}
+
+/* The mirror of the first pixel of a scene of @size. */
+Offset
+first_mirror (const BenchOptions &options, Extent size)
+{
+  if (!options.mapping)
+    return {};
+  const Extent mirrors = options.mapping->mirrors ();
+  return {(mirrors.width - size.width) / 2, (mirrors.height - size.height) / 2};
 }
 
 /* One row: every mirror passes @on or @off of its light. */
@@ -78,6 +97,41 @@ collect_shares (const Pixel *scene, const float *share, int width, float on,
 
 } // namespace
 
+BenchOptions
+BenchOptions::completed (
+    const BenchProfile *profile, const Schedule &schedule) const
+{
+  BenchOptions made = *this;
+  const auto complete = [] (double &number,
+                            const std::optional<Measured> &measured) {
+    if (number == kUnset)
+      number = measured ? measured->value : 0.0;
+  };
+  if (profile) {
+    if (bits == 0)
+      made.bits = profile->bits;
+    made.black_level = profile->black_level ? profile->black_level->value : 0.0;
+    if (alignment == Alignment{})
+      made.mapping = profile->mapping;
+    const auto electrons = profile->electrons_per_number ();
+    if (full_well == kUnset && electrons) {
+      const double largest = profile->largest ();
+      double white = *electrons * (largest - made.black_level);
+      if (profile->full_well)
+        white = std::min (white, made.well = profile->full_well->value);
+      made.full_well = white * schedule.slots () / schedule.white_slots ();
+      if (gain == 0.0)
+        made.gain = made.full_well / (*electrons * largest);
+    }
+    complete (made.psf_sigma, profile->psf_sigma);
+    if (made.full_well > 0.0)
+      complete (made.read_noise, profile->read_noise);
+  }
+  for (double *number : {&made.psf_sigma, &made.full_well, &made.read_noise})
+    complete (*number, std::nullopt);
+  return made;
+}
+
 Result<OpticalBench>
 OpticalBench::make (int width, int height, const BenchOptions &options)
 {
@@ -85,6 +139,12 @@ OpticalBench::make (int width, int height, const BenchOptions &options)
     return Error{"a bench of " + std::to_string (width) + "x" +
                  std::to_string (height) + " mirrors has no picture"};
   RETURN_IF_ERROR (check (options));
+  if (const auto &mapping = options.mapping;
+      mapping && (mapping->mirrors ().width < width ||
+                     mapping->mirrors ().height < height))
+    return Error{"the mapping has " + size_text (mapping->mirrors ()) +
+                 " mirrors, but each pixel of a scene of " +
+                 size_text ({width, height}) + " needs one"};
   try {
     return OpticalBench (width, height, options);
   } catch (const std::bad_alloc &) {
@@ -96,8 +156,9 @@ OpticalBench::make (int width, int height, const BenchOptions &options)
 
 OpticalBench::OpticalBench (int width, int height, const BenchOptions &options)
     : options_ (options),
-      lens_ (options.alignment, options.psf_sigma, width, height),
-      light_ (width, height)
+      lens_ (options.alignment, options.psf_sigma, width, height,
+          options.mapping, first_mirror (options, {width, height})),
+      light_ (width, height), first_ (first_mirror (options, {width, height}))
 {
   if (!lens_.ideal ())
     seen_ = Image<float> (width, height);
@@ -111,7 +172,9 @@ void
 OpticalBench::begin (
     const Schedule &schedule, std::shared_ptr<const StillMask> still)
 {
-  const Extent size{light_.width (), light_.height ()};
+  const Extent size = options_.mapping
+                          ? options_.mapping->mirrors ()
+                          : Extent{light_.width (), light_.height ()};
   if (!masks_ || !(masks_->schedule () == schedule)) {
     masks_.emplace (schedule, size);
     mirrors_ = masks_->render (shown_ = kParked);
@@ -152,7 +215,8 @@ OpticalBench::expose (ImageView<Pixel> scene, int mask, double slots)
       collect_shared (
           scene.row (y), shares_.data (), scene.width, on, off, row);
     } else {
-      collect_row (scene.row (y), rows.row (y), scene.width, on, off, row);
+      collect_row (scene.row (y), rows.row (y + first_.y) + first_.x,
+          scene.width, on, off, row);
     }
   }
   white_ = std::numeric_limits<Pixel>::max ();
@@ -173,10 +237,16 @@ OpticalBench::read_out (std::uint64_t frame, ImageView<Pixel> coded)
     lens_.image (light_.view (), seen_.view ());
 
   const int all_bits = std::numeric_limits<Pixel>::digits;
+  const int bits =
+      options_.bits > 0 ? std::min (options_.bits, all_bits) : all_bits;
+  /* White is white above the black level, too. */
+  const double range = 1.0 - options_.black_level / ((1 << bits) - 1);
   const Sensor sensor{.full_well = options_.full_well,
+      .well = options_.well,
       .read_noise = options_.read_noise,
-      .gain = gain (),
-      .bits = options_.bits > 0 ? std::min (options_.bits, all_bits) : all_bits,
+      .gain = options_.gain > 0.0 ? options_.gain : gain () * range,
+      .black_level = options_.black_level,
+      .bits = bits,
       .seed = options_.seed};
   sensor.read_out<Pixel> (lens_.ideal () ? light_.view () : seen_.view (),
       white_ * masks_->schedule ().slots (), frame, coded);

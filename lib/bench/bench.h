@@ -11,7 +11,9 @@
 #include "base/result.h"
 #include "bench/diamond_view.h"
 #include "bench/lens.h"
+#include "mapping/mapping.h"
 #include "schedule/mask_renderer.h"
+#include "setup/bench_profile.h"
 
 namespace codedexposure
 {
@@ -19,7 +21,7 @@ namespace codedexposure
 /** Camera and lens; the default is an ideal, aligned, noise-free bench. */
 struct BenchOptions {
   static constexpr double kMaxPsfSigma = 16.0;
-  static constexpr double kMaxFullWell = 1e7;
+  static constexpr double kMaxFullWell = 1e9;
   static constexpr double kMaxReadNoise = 1e5;
   static constexpr double kMaxGain = 1000.0;
   static constexpr double kMaxShift = 10000.0;
@@ -35,6 +37,10 @@ struct BenchOptions {
    * on in one slot of N gets 1/N of it. */
   double full_well = 0.0;
   double read_noise = 0.0; ///< electrons rms; needs a full well
+  /** Most electrons that a pixel holds; 0: the full well, which a pixel that is
+   * not on in every slot never reaches. */
+  double well = 0.0;
+  double black_level = 0.0; ///< DN without light
   int bits = 0; ///< significant bits; 0, or too many: all of the pixel's
   /** At 1, white with the mirror on in every slot makes white; 0: the value of
    * OpticalBench::gain (). */
@@ -45,6 +51,20 @@ struct BenchOptions {
    * (diamond_view.h); none: an orthogonal array. The lens sees the mean of two
    * pixels between them. */
   std::optional<MirrorLayout> diamond = {};
+  /** Of the camera to the mirrors, in place of the alignment. The scene lies on
+   * the mirrors in the middle of the array, of which it needs as many as it has
+   * pixels. */
+  std::optional<Mapping> mapping = {};
+
+  /** A number that was not set: that of a profile. */
+  static constexpr double kUnset = -1.0;
+  /** These options with what @p profile, if there is one, says of numbers that
+   * are kUnset, of @p bits and gain where they are 0, and of an alignment that
+   * is the usual one. The light is such that white fills the range of the
+   * camera in pixels that are on longest. @p schedule: of the exposures, with
+   * its leak. */
+  BenchOptions completed (
+      const BenchProfile *profile, const Schedule &schedule) const;
 
   bool operator== (const BenchOptions &) const = default;
 };
@@ -113,6 +133,7 @@ private:
   std::vector<float> shares_; // of a row
   double white_ = 0.0;        // of the scene
   bool empty_ = true;         // light is yet to be overwritten
+  Offset first_;              // mirror of the scene's first pixel
 };
 
 } // namespace codedexposure

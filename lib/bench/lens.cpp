@@ -130,11 +130,34 @@ mirror_seen (const Alignment &alignment, int width, int height, Position pixel)
       cy + alignment.shift_y + (m[3] * qx + m[4] * qy) / z};
 }
 
-Lens::Lens (const Alignment &alignment, double psf_sigma, int width, int height)
-    : alignment_ (alignment), width_ (width), height_ (height),
-      to_mirrors_ (camera_to_mirrors (alignment, width, height))
+namespace
 {
-  if (alignment.rotation == 0.0 && alignment.scale == 1.0 &&
+
+/* The alignment of a mapping that only shifts, which needs no resampling; none
+ * for others. */
+std::optional<Alignment>
+shift_of (const Mapping &mapping, Offset first)
+{
+  const Homography &h = mapping.homography ();
+  const Homography shift = {1, 0, h[2], 0, 1, h[5], 0, 0, 1};
+  if (mapping.displacement () || h != shift)
+    return std::nullopt;
+  return Alignment{.shift_x = h[2] - first.x, .shift_y = h[5] - first.y};
+}
+
+} // namespace
+
+Lens::Lens (const Alignment &asked, double psf_sigma, int width, int height,
+    const std::optional<Mapping> &mapping, Offset first)
+    : alignment_ (asked), width_ (width), height_ (height), first_ (first)
+{
+  if (const auto shift = mapping ? shift_of (*mapping, first) : std::nullopt)
+    alignment_ = *shift;
+  else if ((mapping_ = mapping))
+    alignment_ = {.scale = mapping->pose ().magnification};
+  const Alignment &alignment = alignment_;
+  to_mirrors_ = camera_to_mirrors (alignment, width, height);
+  if (!mapping_ && alignment.rotation == 0.0 && alignment.scale == 1.0 &&
       alignment.affine ()) {
     horizontal_ = shifted_taps (alignment.shift_x, psf_sigma);
     vertical_ = shifted_taps (alignment.shift_y, psf_sigma);
@@ -281,21 +304,35 @@ gather_at_border (ImageView<const float> mirrors, const Place<kTaps> &x,
 
 } // namespace
 
+/* Where a pixel looks, by the picture of the mirrors. Beyond the frame, a
+ * mapping may have no place for it. */
+Position
+Lens::place_of (int x, int y) const
+{
+  constexpr double kNowhere = 1e6;
+  if (!mapping_)
+    return mirror_seen (alignment_, width_, height_, {double (x), double (y)});
+  const auto [seen_x, seen_y] = mapping_->mirror_at (x, y);
+  const Position place{seen_x - first_.x, seen_y - first_.y};
+  if (std::abs (place.x) < kNowhere && std::abs (place.y) < kNowhere)
+    return place;
+  return {-kNowhere, -kNowhere};
+}
+
 /* @camera may reach beyond the frame by margin_ pixels on each side. */
 template <int kTaps>
 void
 Lens::resample (ImageView<const float> mirrors, ImageView<float> camera) const
 {
   const Homography &m = to_mirrors_;
-  const bool affine = alignment_.affine ();
+  const bool affine = !mapping_ && alignment_.affine ();
   for (int row = 0; row < camera.height; row++) {
     const int py = row - margin_;
     float *out = camera.row (row);
     for (int px = -margin_; px < camera.width - margin_; px++) {
       const Position at = affine ? Position{m[0] * px + m[1] * py + m[2],
                                        m[3] * px + m[4] * py + m[5]}
-                                 : mirror_seen (alignment_, width_, height_,
-                                       {double (px), double (py)});
+                                 : place_of (px, py);
       const Place<kTaps> x (at.x, windows_);
       const Place<kTaps> y (at.y, windows_);
       const bool inside = x.first >= 0 && x.first + kTaps <= mirrors.width &&

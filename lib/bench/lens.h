@@ -2,6 +2,7 @@
 /* From the mirrors to the camera's pixels: misalignment and blur. */
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "base/image.h"
@@ -74,8 +75,11 @@ struct LensTaps {
 class Lens
 {
 public:
-  /** @p psf_sigma: standard deviation of the Gaussian, in pixels. */
-  Lens (const Alignment &alignment, double psf_sigma, int width, int height);
+  /** @p psf_sigma: standard deviation of the Gaussian, in pixels. @p mapping,
+   * if there is one, takes the place of the alignment; @p first is the mirror
+   * at the corner of the picture of the mirrors. */
+  Lens (const Alignment &alignment, double psf_sigma, int width, int height,
+      const std::optional<Mapping> &mapping = {}, Offset first = {});
 
   /** Every pixel sees only its own mirror. */
   bool ideal () const { return ideal_; }
@@ -83,6 +87,7 @@ public:
   void image (ImageView<const float> mirrors, ImageView<float> camera);
 
 private:
+  Position place_of (int x, int y) const;
   void make_windows (double scale, double sigma);
   void resample (ImageView<const float> mirrors, ImageView<float> camera) const;
   template <int kTaps>
@@ -102,6 +107,8 @@ private:
   Alignment alignment_;
   int width_, height_;
   Homography to_mirrors_;
+  std::optional<Mapping> mapping_;
+  Offset first_;
   int taps_ = 0;               // of a window, in x and in y; 0: shift only
   std::vector<float> windows_; // taps_ weights for each fraction of a mirror
 };

@@ -202,19 +202,22 @@ Sensor::read_out (ImageView<const float> light, double unit,
     std::uint64_t frame, ImageView<Pixel> out) const
 {
   const float largest = float ((1 << bits) - 1);
+  const float black = float (black_level);
 
   if (full_well <= 0.0) {
     /* A division, because the error of a rounded factor could change how a
      * value halfway between two numbers is rounded. */
     const float divisor = float (unit / (gain * largest));
     for (int y = 0; y < out.height; y++)
-      std::transform (light.row (y), light.row (y) + out.width, out.row (y),
-          [=] (float l) { return quantise<Pixel> (l / divisor, largest); });
+      std::transform (
+          light.row (y), light.row (y) + out.width, out.row (y), [=] (float l) {
+            return quantise<Pixel> (l / divisor + black, largest);
+          });
     return;
   }
 
   const NoiseKey key = {seed, frame};
-  const float well = float (full_well);
+  const float most = float (well > 0.0 ? well : full_well);
   const float to_electrons = float (full_well / unit);
   const float to_number = float (gain * largest / full_well);
   const float noise = float (read_noise);
@@ -234,7 +237,8 @@ Sensor::read_out (ImageView<const float> light, double unit,
       const Lanes electrons = draw_electrons (key, block, means, shot);
       for (std::size_t i = 0; i < count; i++)
         numbers[i] = quantise<Pixel> (
-            (std::min (electrons[i], well) + noise * read[i]) * to_number,
+            (std::min (electrons[i], most) + noise * read[i]) * to_number +
+                black,
             largest);
     }
 }

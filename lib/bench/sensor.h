@@ -14,16 +14,18 @@ namespace codedexposure
  * mirror on in every slot.
  */
 struct Sensor {
-  double full_well = 0.0;  ///< electrons at unit light; 0: noise-free
-  double read_noise = 0.0; ///< electrons rms
-  double gain = 1.0;       ///< at 1, unit light makes the largest DN
-  int bits = 8;            ///< of the converter, 1..16
+  double full_well = 0.0;   ///< electrons at unit light; 0: noise-free
+  double well = 0.0;        ///< most electrons that a pixel holds; 0: full_well
+  double read_noise = 0.0;  ///< electrons rms
+  double gain = 1.0;        ///< at 1, unit light makes the largest DN
+  double black_level = 0.0; ///< DN that is added to all pixels
+  int bits = 8;             ///< of the converter, 1..16
   std::uint64_t seed = 0;
 
   /**
-   * Digital numbers of frame @p frame: Poisson electrons, clamped to the full
-   * well, Gaussian read noise, gain, rounding (half up), clamp to 0..2^bits
-   * - 1.
+   * Digital numbers of frame @p frame: Poisson electrons, clamped to the well,
+   * Gaussian read noise, gain, black level, rounding (half up), clamp to
+   * 0..2^bits - 1.
    *
    * The noise of a pixel depends only on the seed, the frame and its position.
    * Poisson numbers are exact below a mean of 16 electrons; above, the error of

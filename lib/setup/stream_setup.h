@@ -31,21 +31,14 @@ struct StreamSetup {
   std::optional<FrameRate> rate = {};
   /** A track with a line for each frame accompanies the frames. */
   bool track = false;
-<<<<<<< HEAD:lib/mapping/stream_setup.h
   /** The frames are those of a simulated bench. */
   bool simulated = false;
-
-  /** The JSON form of the schedule with keys more that may be left out:
-   * "mapping", which holds the JSON form of a mapping, "size", "rate",
-   * "track" and "simulated". */
-=======
   /** Of the camera and the DMD. */
   std::optional<BenchProfile> bench = {};
 
   /** The JSON form of the schedule with keys more that may be left out:
-   * "mapping", which holds the JSON form of a mapping, "size", "rate", "track"
-   * and "bench", which holds that of a bench profile. */
->>>>>>> 9c4195d (A bench profile has the measured numbers of a bench, in strict JSON):lib/setup/stream_setup.h
+   * "mapping", which holds the JSON form of a mapping, "size", "rate", "track",
+   * "simulated" and "bench", which holds that of a bench profile. */
   static Result<StreamSetup> from_json (std::string_view json);
   /** One line. Without the others it is schedule.to_json (). */
   std::string to_json () const;

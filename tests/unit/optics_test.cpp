@@ -580,4 +580,73 @@ TEST (Bench, BlurMixesTheCodesOfNeighbours)
   EXPECT_NEAR (sum, 200, 2) << "no light is lost";
 }
 
+/* ------------------------------------------------------- bench profile -- */
+
+TEST (Black, IsAddedAndLeavesWhiteWhite)
+{
+  const int black = 15;
+  OpticalBench raised = bench (8, 4, {.black_level = black});
+  for (const int value : {0, 17, 128, 255}) {
+    const auto coded = still (raised, schedule ("sequential:2x2"),
+        flat<std::uint8_t> (8, 4, std::uint8_t (value)));
+    EXPECT_EQ (
+        coded.at (3, 1), int (value * (255.0 - black) / 255.0 + black + 0.5));
+  }
+}
+
+TEST (Mapping, SimulatesLikeItsAlignment)
+{
+  const int width = 64, height = 48;
+  const Schedule masks = schedule ("sequential:2x2");
+  for (const Alignment alignment : {Alignment{.shift_x = 1.0},
+           Alignment{.shift_x = 0.3, .rotation = 0.5, .scale = 1.02}}) {
+    BenchOptions aligned{.psf_sigma = 0.9, .alignment = alignment};
+    BenchOptions mapped{.psf_sigma = 0.9};
+    const Homography h = camera_to_mirrors (alignment, width, height);
+    mapped.mapping = *Mapping::make ({{width, height}, {width, height}, h});
+    /* The same place in a larger array, by whole tiles. */
+    BenchOptions larger = mapped;
+    Homography inside = h;
+    inside[2] += 8.0;
+    inside[5] += 4.0;
+    larger.mapping =
+        *Mapping::make ({{width, height}, {width + 16, height + 8}, inside});
+
+    OpticalBench first = bench (width, height, aligned);
+    const auto expected =
+        still (first, masks, scene<std::uint8_t> (width, height, 1));
+    for (const BenchOptions &options : {mapped, larger}) {
+      OpticalBench second = bench (width, height, options);
+      const auto coded =
+          still (second, masks, scene<std::uint8_t> (width, height, 1));
+      for (int y = 0; y < height; y++)
+        for (int x = 0; x < width; x++)
+          ASSERT_NEAR (coded.at (x, y), expected.at (x, y), 1)
+              << x << ", " << y;
+    }
+  }
+  EXPECT_FALSE (OpticalBench::make (
+      width, height, {.mapping = Mapping (Extent{32, 24})}));
+}
+
+/* A full well at which the camera has a number below the largest is where
+ * white is, and more light does not make more. */
+TEST (Profile, TheWellEndsTheRange)
+{
+  BenchProfile profile;
+  profile.camera.size = {8, 4};
+  profile.conversion_gain = Measured{100.0, 1.0};
+  profile.full_well = Measured{20000.0, 10.0};
+  const Schedule masks = schedule ("sequential:2x2");
+  const BenchOptions options =
+      BenchOptions{.full_well = BenchOptions::kUnset}.completed (
+          &profile, masks);
+  EXPECT_DOUBLE_EQ (options.full_well, 80000.0);
+  EXPECT_DOUBLE_EQ (options.gain, 80000.0 / (100.0 * 255.0));
+  EXPECT_EQ (options.psf_sigma, 0.0);
+  OpticalBench limited = bench (8, 4, options);
+  EXPECT_NEAR (
+      still (limited, masks, flat<std::uint8_t> (8, 4, 255)).at (0, 0), 200, 4);
+}
+
 } // namespace

@@ -83,10 +83,18 @@ CodedFilter::properties ()
           "File with the mapping from camera pixels to mirrors (moirecalib "
           "writes one); empty: that of the stream's tags, or none",
           kReadWrite, set (&CodedSettings::mapping)},
+      {"bench", "Bench profile",
+          "What was measured of the bench, a JSON file or its text "
+          "(docs/formats.md): leakage, black level, bits, noise and mapping, "
+          "for which other properties and a leak of the schedule win; empty: "
+          "that of the stream's tags, or none",
+          kReadWrite, set (&CodedSettings::bench)},
       {"bits", "Bits",
           "Significant bits of a pixel, counted from the lowest, for example "
           "12 for a 12-bit camera in GRAY16_LE; pixels at the largest value "
-          "are saturated; 0: all bits of the format",
+          "are saturated; 0: as the frames or the bench profile say, or all "
+          "bits "
+          "of the format",
           kReadWrite, set (&CodedSettings::bits), 0, 16},
       {"frame-rate", "Frame rate",
           "Rate of the coded frames in frames/s, used if their caps have no "
@@ -234,7 +242,8 @@ CodedFilter::read_settings ()
   };
   CodedSettings &settings = shared_.settings;
   return check ("schedule", read_again (element_, settings.schedule)) &&
-         check ("mapping", read_again (element_, settings.mapping));
+         check ("mapping", read_again (element_, settings.mapping)) &&
+         check ("bench", read_again (element_, settings.bench));
 }
 
 bool

@@ -46,6 +46,7 @@ using ScheduleRef = std::shared_ptr<const Schedule>;
 struct CodedSettings {
   Named<Schedule> schedule;
   Named<Mapping> mapping;
+  Named<BenchProfile> bench;
   int bits = 0;                  ///< significant bits; 0: as the frames say
   bool require_schedule = false; ///< never assume the default
   FrameRate rate{0, 1};          ///< used if caps have none; 0/1: none
@@ -190,7 +191,7 @@ protected:
   virtual int pictures_a_frame (const GstCodedPad *pad) const = 0;
   /** The pad that forwards coded frames without a copy; null: none. */
   virtual ObjectPtr<GstPad> coded_pad () const { return nullptr; }
-  virtual RectifyOptions rectify_options () const { return {}; }
+  virtual RectifyOptions rectify_options (const Schedule &) const { return {}; }
   /** How pictures are made, for their provenance: "select". */
   virtual std::string method_name () const = 0;
 
@@ -220,7 +221,13 @@ protected:
   static GstEvent *event_for (
       const GstCodedPad *pad, GstEvent *event, const Provenance *provenance);
   bool backwards () const { return stream_.segment.rate < 0; }
-  /** From the property, else from the frames; 0: all bits of the format. */
+  /** Of the bench; null: not known. */
+  const BenchProfile *bench () const
+  {
+    return stream_.bench ? &*stream_.bench : nullptr;
+  }
+  /** From the property, else from the frames, else from the bench profile; 0:
+   * all bits of the format. */
   int significant_bits () const;
   void post_error (const std::string &why) const;
   /** Posts that a frame could not be decoded. Returns GST_FLOW_ERROR. */
@@ -229,8 +236,8 @@ protected:
 
   /** Maps @p frame for reading; posts an error if it is too short. */
   MappedFrame map_coded (GstBuffer *frame) const;
-  /** The pixels of a coded frame; with a mapping, one pixel a mirror. Valid
-   * until the next call. */
+  /** The light of a coded frame, which is its pixels less the black level; with
+   * a mapping, one pixel a mirror. Valid until the next call. */
   template <typename Pixel>
   Result<ImageView<const Pixel>> rectify (ImageView<const Pixel> coded);
   /** Whether the segment contains the time from @p pts for @p duration. */
@@ -285,6 +292,14 @@ private:
     RectifyOptions options;
     std::shared_ptr<const Rectifier> rectifier;
   };
+  /** A frame of either depth. */
+  struct Scratch {
+    Image<std::uint8_t> narrow;
+    Image<std::uint16_t> wide;
+
+    template <typename Pixel>
+    Image<Pixel> &of (Extent size);
+  };
   /** Reset from PAUSED to READY. */
   struct Stream {
     Stream () { gst_segment_init (&segment, GST_FORMAT_UNDEFINED); }
@@ -302,6 +317,7 @@ private:
     bool provenance_due = false;
     CodedSettings settings;
     std::optional<CodedFormat> format; ///< in force
+    std::optional<BenchProfile> bench;
     /** Serialised events that wait for the caps of the source pads. */
     std::vector<EventPtr> pending;
     std::optional<FrameSequence> sequence;
@@ -313,9 +329,10 @@ private:
     bool warned_assumed = false;
     bool warned_of_time = false;
     bool warned_of_mapping = false;
+    bool warned_of_bench = false;
     std::optional<RectifierCache> rectifiers;
-    Image<std::uint8_t> narrow; ///< a rectified frame, of either depth
-    Image<std::uint16_t> wide;
+    Scratch light; ///< a frame without its black level
+    Scratch rectified;
   };
 
   static const PropertyTable<Shared> &properties ();
@@ -329,6 +346,8 @@ private:
   void push_caps (GstCodedPad *pad);
   std::optional<CodedFormat> find_format ();
   bool find_schedule (CodedFormat &format);
+  bool find_bench (CodedFormat &format);
+  Result<void> check_bench (const GstVideoInfo &info) const;
   bool find_mapping (Extent camera, std::optional<Mapping> &mapping);
   bool find_rectifier (CodedFormat &format);
   bool check_camera (const CodedFormat &format) const;

@@ -102,7 +102,7 @@ CodedFilter::find_format ()
     post_error (*stream_.not_coded);
     return std::nullopt;
   }
-  if (!find_schedule (format) || !check_camera (format))
+  if (!find_schedule (format) || !check_camera (format) || !find_bench (format))
     return std::nullopt;
   auto slots = SlotPlan::fit (
       format.schedule.timing (), format.schedule.slots (), format.rate);
@@ -196,8 +196,57 @@ CodedFilter::report_overruled (const Schedule &asked)
           ", overrides the schedule of the stream, " + tagged.text () + ".");
 }
 
-/* The property wins over the stream's tag. Frames that were scaled or cropped
- * after calibration are decoded without the tag's mapping. */
+/* Whether frames of @info can be those of the bench. */
+Result<void>
+CodedFilter::check_bench (const GstVideoInfo &info) const
+{
+  int bits = stream_.settings.bits > 0 ? stream_.settings.bits : stream_.bits;
+  if (const int all = GST_VIDEO_FORMAT_INFO_BITS (info.finfo);
+      bits == 0 && stream_.bench->bits > all)
+    bits = all;
+  return stream_.bench->check_frames ({info.width, info.height}, bits);
+}
+
+/* The property wins over the stream's tag. The leak of the profile becomes that
+ * of the schedule. */
+bool
+CodedFilter::find_bench (CodedFormat &format)
+{
+  stream_.bench.reset ();
+  const auto fits = [this] (const auto &good) {
+    if (!good)
+      post_error (
+          "The bench profile does not fit: " + good.error ().message + ".");
+    return good.ok ();
+  };
+  if (stream_.tagged && *stream_.tagged)
+    stream_.bench = stream_.tagged->value ().bench;
+  if (const auto &asked = stream_.settings.bench.read) {
+    if (!*asked) {
+      post_error (
+          "The bench property cannot be read: " + asked->error ().message);
+      return false;
+    }
+    const BenchProfile &given = asked->value ();
+    if (stream_.bench && !fits (given.check_bench (*stream_.bench)))
+      return false;
+    stream_.bench = given;
+    const auto old = given.why_old (now_utc ());
+    if (old && !std::exchange (stream_.warned_of_bench, true))
+      POST_WARNING (element_, RESOURCE, SETTINGS, *old);
+  }
+  if (!stream_.bench)
+    return true;
+  auto leaky = stream_.bench->with_leak (format.schedule);
+  if (!fits (check_bench (format.info)) || !fits (leaky))
+    return false;
+  format.schedule = *std::move (leaky);
+  return true;
+}
+
+/* The property wins over the stream's tag, and a mapping over that of a bench
+ * profile from the same place. Frames that were scaled or cropped after
+ * calibration are decoded without the tag's mapping. */
 bool
 CodedFilter::find_mapping (Extent camera, std::optional<Mapping> &mapping)
 {
@@ -216,8 +265,12 @@ CodedFilter::find_mapping (Extent camera, std::optional<Mapping> &mapping)
                 ". Measure a new mapping with moirecalib.");
     return false;
   }
-  if (stream_.tagged && *stream_.tagged)
+  if (stream_.settings.bench.read)
+    mapping = stream_.bench->mapping;
+  if (!mapping && stream_.tagged && *stream_.tagged)
     mapping = stream_.tagged->value ().mapping;
+  if (!mapping && stream_.bench)
+    mapping = stream_.bench->mapping;
   if (!mapping || mapping->camera () == camera)
     return true;
   if (!std::exchange (stream_.warned_of_mapping, true))
@@ -240,7 +293,7 @@ CodedFilter::find_rectifier (CodedFormat &format)
   if (!mapping)
     return true;
 
-  const RectifyOptions options = rectify_options ();
+  const RectifyOptions options = rectify_options (format.schedule);
   auto &cache = stream_.rectifiers;
   if (!cache || !(cache->mapping == *mapping) ||
       !(cache->schedule == format.schedule) || !(cache->options == options)) {
@@ -284,6 +337,8 @@ CodedFilter::set_provenance (GstBuffer *next)
   made.setup.rate = format ().rate;
   if (stream_.tagged && *stream_.tagged)
     made.setup.simulated = stream_.tagged->value ().simulated;
+  if ((made.setup.bench = stream_.bench))
+    made.setup.bench->mapping.reset ();
   stream_.provenance_due = true;
   const ObjectLock lock (element_);
   shared_.provenance = std::make_shared<const Provenance> (std::move (made));
@@ -379,7 +434,9 @@ CodedFilter::report_mirrors ()
 int
 CodedFilter::significant_bits () const
 {
-  return stream_.settings.bits > 0 ? stream_.settings.bits : stream_.bits;
+  if (stream_.settings.bits > 0)
+    return stream_.settings.bits;
+  return stream_.bits > 0 || !bench () ? stream_.bits : bench ()->bits;
 }
 
 } // namespace codedexposure::gst

@@ -263,18 +263,29 @@ CodedFilter::map_coded (GstBuffer *frame) const
 }
 
 template <typename Pixel>
+Image<Pixel> &
+CodedFilter::Scratch::of (Extent size)
+{
+  auto &image = std::get<Image<Pixel> &> (std::tie (narrow, wide));
+  if (image.width () != size.width || image.height () != size.height)
+    image = Image<Pixel> (size.width, size.height);
+  return image;
+}
+
+template <typename Pixel>
 Result<ImageView<const Pixel>>
 CodedFilter::rectify (ImageView<const Pixel> coded)
 {
+  const int bits = significant_bits ();
+  if (const int black = bench () ? bench ()->black () : 0; black > 0) {
+    auto &light = stream_.light.of<Pixel> ({coded.width, coded.height});
+    subtract_black (coded, black, bits, light.view ());
+    coded = light.view ();
+  }
   const Rectifier *rectifier = format ().rectifier.get ();
   if (!rectifier)
     return coded;
-  Image<Pixel> &rectified =
-      std::get<Image<Pixel> &> (std::tie (stream_.narrow, stream_.wide));
-  const Extent size = rectifier->mirrors ();
-  if (rectified.width () != size.width || rectified.height () != size.height)
-    rectified = Image<Pixel> (size.width, size.height);
-  const int bits = significant_bits ();
+  auto &rectified = stream_.rectified.of<Pixel> (rectifier->mirrors ());
   if (const auto done = rectifier->run (
           coded, rectified.view (), bits > 0 ? (1 << bits) - 1 : 0);
       !done)

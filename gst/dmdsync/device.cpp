@@ -107,6 +107,33 @@ open_device (GstDmdSync *self)
   return true;
 }
 
+bool
+read_bench (GstDmdSync *self)
+{
+  SyncState &st = state (self);
+  const auto given = read_again (self, st.settings.bench).read;
+  std::string refused;
+  if (given && !*given)
+    refused = "The bench property cannot be read: " + given->error ().message;
+  else if (given && given->value ().dmd && st.runner)
+    if (const auto same = BenchProfile::check_device (
+            "DMD", *given->value ().dmd, {.serial = st.runner->info ().serial});
+        !same)
+      refused = "The bench profile does not fit: " + same.error ().message;
+  if (!refused.empty ()) {
+    POST_ERROR (self, RESOURCE, SETTINGS, refused);
+    return false;
+  }
+  {
+    const ObjectLock lock (self);
+    st.bench = given ? std::optional (given->value ()) : std::nullopt;
+  }
+  if (st.bench)
+    if (const auto old = st.bench->why_old (now_utc ()))
+      POST_WARNING (self, RESOURCE, SETTINGS, *old);
+  return true;
+}
+
 std::shared_ptr<DmdRunner>
 runner_of (GstDmdSync *self)
 {

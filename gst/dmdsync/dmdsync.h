@@ -16,6 +16,7 @@
 
 #include "common/element.h"
 #include "common/events.h"
+#include "common/named.h"
 #include "common/owned_frames.h"
 #include "common/raii.h"
 #include "dmd/runner.h"
@@ -50,6 +51,7 @@ enum class OnUnlock { keep, skip, error };
 struct Settings {
   std::string device;
   std::string schedule = "sequential:2x2";
+  Named<BenchProfile> bench;
   TimestampAt timestamp_at = TimestampAt::exposure_start;
   GstClockTimeDiff exposure_offset = 0;
   OnLoss on_loss = OnLoss::gap;
@@ -109,8 +111,10 @@ struct Stream {
   bool warned_tag = false;
   int unproven = 0; ///< frames in a row whose pilot did not show the phase
   bool warned_pilot = false;
-  std::optional<Mapping> mapping; ///< of the tags from upstream
-  bool simulated = false;         ///< as those tags say
+  /* Of the tags from upstream. */
+  std::optional<Mapping> mapping;
+  std::optional<BenchProfile> bench;
+  bool simulated = false;
   std::string refused; ///< the error of the caps that were refused last
 };
 
@@ -135,6 +139,7 @@ struct SyncState {
   /** Changed by changes of state only, while nothing flows or is uploaded, and
    * under the object lock: requests of patterns may come at any time. */
   Schedule schedule;
+  std::optional<BenchProfile> bench;
   /** Null: no DMD is driven. Changed under the object lock; what may come while
    * the element stops, from another thread than that of the frames, holds it by
    * runner_of (). */
@@ -185,6 +190,8 @@ void install_own_state (gpointer klass);
 
 /* What the properties name; false with an error on the bus. */
 bool read_schedule (GstDmdSync *self);
+/** After open_device (), whose DMD must be that of the profile. */
+bool read_bench (GstDmdSync *self);
 bool open_device (GstDmdSync *self);
 /** Parks the mirrors, whatever they are at. */
 void park (GstDmdSync *self);

@@ -49,6 +49,14 @@ make_timebase (GstCaps *caps, const SyncState &st)
   if (!plan)
     return plan.error ();
   time.plan = *plan;
+  if (st.bench) {
+    const int bits = GST_VIDEO_FORMAT_INFO_BITS (time.info.finfo);
+    if (const auto fits =
+            st.bench->check_frames ({time.info.width, time.info.height},
+                st.bench->bits > bits ? bits : 0);
+        !fits)
+      return fits.error ();
+  }
   if (st.runner)
     if (const Result<void> fits =
             check_limits (st.runner->info (), st.schedule, time.plan);
@@ -86,7 +94,8 @@ resync (Stream &stream)
   stream.rate_watch->resync ();
 }
 
-/** What the tag says: the schedule is ours, the rest is upstream's. */
+/** What the tag says: the schedule is ours, the rest is upstream's; so is the
+ * bench profile of a bench that is simulated there. */
 StreamSetup
 own_setup (GstDmdSync *self)
 {
@@ -94,17 +103,32 @@ own_setup (GstDmdSync *self)
   StreamSetup setup = setup_at (
       GST_BASE_TRANSFORM_SRC_PAD (self), st.schedule, st.stream.mapping);
   setup.simulated = st.stream.simulated;
+  setup.bench = st.stream.bench ? st.stream.bench : st.bench;
   return setup;
 }
 
 bool
 push_tag (GstDmdSync *self)
 {
-  Stream &stream = state (self).stream;
-  if (!std::exchange (stream.tag_due, false))
+  if (!std::exchange (state (self).stream.tag_due, false))
     return true;
   return gst_pad_push_event (
       GST_BASE_TRANSFORM_SRC_PAD (self), setup_to_event (own_setup (self)));
+}
+
+/** Takes over what a setup of upstream says of its bench. */
+void
+take_bench (GstDmdSync *self, const StreamSetup &theirs)
+{
+  SyncState &st = state (self);
+  st.stream.mapping = theirs.mapping;
+  st.stream.simulated = theirs.simulated;
+  st.stream.bench = theirs.bench;
+  if (st.bench && theirs.bench)
+    if (const auto same = st.bench->check_bench (*theirs.bench); !same)
+      POST_ERROR (self, STREAM, WRONG_TYPE,
+          "The bench profile does not fit the stream's: " +
+              same.error ().message);
 }
 
 /** @p event, or one in which our schedule takes the place of another. */
@@ -130,10 +154,8 @@ own_schedule (GstDmdSync *self, GstEvent *event)
 
   /* The last tags of a scope are those that a late link gets: ours are always
    * among them. */
-  if (theirs && *theirs) {
-    st.stream.mapping = theirs->value ().mapping;
-    st.stream.simulated = theirs->value ().simulated;
-  }
+  if (theirs && *theirs)
+    take_bench (self, theirs->value ());
   return replace_setup (event, own_setup (self));
 }
 

@@ -90,6 +90,12 @@ properties ()
           "Tile, code and timing of the exposure: a preset such as "
           "staircase:2x2 or sequential:lattice:8/3,pilot=16, or a JSON file",
           kReadWriteReady, set (&Settings::schedule)},
+      {"bench", "Bench profile",
+          "What was measured of the bench, a JSON file or its text "
+          "(docs/formats.md), which goes downstream in the tag; its trigger "
+          "delay is the exposure-offset where that is 0; refused if it is of "
+          "another DMD",
+          kReadWriteReady, set (&Settings::bench)},
       {"timestamp-at", "Timestamp at",
           "The instant that PTS of incoming frames mean; outgoing ones mean "
           "the start of the exposure's first slot",
@@ -97,7 +103,8 @@ properties ()
           gst_dmd_sync_timestamp_at_get_type ()},
       {"exposure-offset", "Exposure offset",
           "Nanoseconds by which PTS are moved back beyond what timestamp-at "
-          "says (negative: forward), at most an hour; adds to the latency",
+          "says (negative: forward), at most an hour; adds to the latency; 0: "
+          "the trigger delay of the bench profile, or none",
           kReadWrite, set (&Settings::exposure_offset), -kMaxOffset,
           kMaxOffset},
       {"on-loss", "On loss", "What replaces lost frames", kReadWrite,
@@ -156,11 +163,12 @@ set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
   auto *self = GST_DMD_SYNC (object);
   if (g_str_equal (pspec->name, "schedule"))
     return set_schedule (self, value, pspec);
+  const auto assign = properties ()[id].read (value);
   {
     const ObjectLock lock (self);
     if (!may_set (self, pspec))
       return;
-    properties ()[id].read (value) (state (self));
+    assign (state (self));
   }
   update_latency (self);
 }

@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* dmdsync's clocks: the camera's, the pipeline's, and what lies between. */
+#include <cmath>
+
 #include "common/element.h"
 #include "common/messages.h"
 #include "dmdsync.h"
@@ -63,6 +65,14 @@ note_jitter (GstDmdSync *self, GstClockTime lateness)
   update_latency (self);
 }
 
+GstClockTimeDiff
+exposure_offset (const SyncState &st)
+{
+  if (st.settings.exposure_offset != 0 || !st.bench || !st.bench->trigger_delay)
+    return st.settings.exposure_offset;
+  return std::llround (st.bench->trigger_delay->value);
+}
+
 } // namespace
 
 GstClockTimeDiff
@@ -73,12 +83,12 @@ moved_back (const SyncState &st)
   const SlotPlan &plan = st.time->plan;
   switch (st.settings.timestamp_at) {
   case TimestampAt::exposure_end:
-    return plan.exposure () + st.settings.exposure_offset;
+    return plan.exposure () + exposure_offset (st);
   case TimestampAt::arrival:
   case TimestampAt::device_clock:
-    return plan.frame_period () + st.settings.exposure_offset;
+    return plan.frame_period () + exposure_offset (st);
   default:
-    return st.settings.exposure_offset;
+    return exposure_offset (st);
   }
 }
 

@@ -42,8 +42,9 @@
  * motion around each pixel, take a hundred times as long, and are for decoding
  * of recordings; #codedexposure-fuse:threads share their work.
  * Tell the element about the camera's noise (#codedexposure-fuse:full-well,
- * #codedexposure-fuse:read-noise): it filters more where the noise is larger,
- * and tells motion from noise.
+ * #codedexposure-fuse:read-noise), or give it a bench profile, which a
+ * recording may carry: it filters more where the noise is larger, and tells
+ * motion from noise.
  *
  * ## Flags, metas and messages
  *
@@ -119,10 +120,10 @@ G_DEFINE_ENUM_TYPE (GstCodedExposureQuality, gst_coded_exposure_quality,
         "recordings",
         "best"});
 
-const PropertyTable<FuseOptions> &
+const PropertyTable<Settings> &
 Fuse::properties ()
 {
-  static const PropertyTable<FuseOptions> table{
+  static const PropertyTable<Settings> table{
       {"quality", "Quality",
           "Quality against speed; balanced and best are for up to 16 slots",
           kReadWrite, &FuseOptions::quality,
@@ -140,19 +141,19 @@ Fuse::properties ()
       {"full-well", "Full well",
           "Electrons at white in a pixel that is on for the whole exposure, as "
           "in codedexposure-sim; determines the shot noise; 0: the frames are "
-          "noise-free",
+          "noise-free; -1: by the bench profile, or noise-free",
           kReadWrite, within (&FuseOptions::noise, &SensorNoise::full_well),
-          0.0, SensorNoise::kMaxFullWell},
+          Settings::kUnset, SensorNoise::kMaxFullWell},
       {"read-noise", "Read noise",
           "Noise of the camera's electronics in electrons rms; counts only "
-          "with a full-well",
+          "with a full-well; -1: that of the bench profile, or none",
           kReadWrite, within (&FuseOptions::noise, &SensorNoise::read_noise),
-          0.0, SensorNoise::kMaxReadNoise},
+          Settings::kUnset, SensorNoise::kMaxReadNoise},
   };
   return table;
 }
 
-FuseOptions &
+Settings &
 Fuse::settings_of (GObject *object)
 {
   return static_cast<Fuse &> (filter_of (object)).settings_;
@@ -358,13 +359,32 @@ Fuse::method_name () const
          g_enum_get_value (qualities, int (in_force_.quality))->value_nick;
 }
 
-/* Relative noise of a plain exposure at typical light, if the user has
- * described the camera. */
+/* A pixel at the largest value has seen the light of white_slots () slots. */
+SensorNoise
+Fuse::noise (const Schedule &schedule) const
+{
+  SensorNoise noise = in_force_.noise;
+  const BenchProfile *known = bench ();
+  if (noise.full_well == Settings::kUnset) {
+    const auto electrons =
+        known ? known->electrons_per_number () : std::nullopt;
+    noise.full_well = electrons.value_or (0.0) *
+                      (known ? known->largest () : 0) * schedule.slots () /
+                      schedule.white_slots ();
+  }
+  if (noise.read_noise == Settings::kUnset)
+    noise.read_noise =
+        known && known->read_noise ? known->read_noise->value : 0.0;
+  return noise;
+}
+
+/* Relative noise of a plain exposure at typical light, if the camera is
+ * described. */
 RectifyOptions
-Fuse::rectify_options () const
+Fuse::rectify_options (const Schedule &schedule) const
 {
   constexpr double kTypicalLight = 0.4;
-  const SensorNoise &noise = in_force_.noise;
+  const SensorNoise noise = this->noise (schedule);
   RectifyOptions options;
   if (noise.full_well > 0.0)
     options.noise = std::clamp (
@@ -402,6 +422,7 @@ Fuse::plan (const CodedFormat &format)
 {
   FuseOptions options = in_force_;
   options.bits = significant_bits ();
+  options.noise = noise (format.schedule);
   auto fuser = format.wide () ? make_fuser<std::uint16_t> (format, options)
                               : make_fuser<std::uint8_t> (format, options);
   if (!fuser) {

@@ -32,6 +32,12 @@ struct Plan {
   int lookahead;
 };
 
+/** Properties; noise that was not set is that of the bench profile. */
+struct Settings : FuseOptions {
+  static constexpr double kUnset = -1.0;
+  Settings () { noise = {kUnset, kUnset}; }
+};
+
 class Fuse final : public CodedFilter
 {
 public:
@@ -40,8 +46,8 @@ public:
   static void set_up_class (gpointer klass);
 
 private:
-  static const PropertyTable<FuseOptions> &properties ();
-  static FuseOptions &settings_of (GObject *object);
+  static const PropertyTable<Settings> &properties ();
+  static Settings &settings_of (GObject *object);
 
   GstFlowReturn process (CodedFrame frame) override;
   bool plan (const CodedFormat &format) override;
@@ -64,7 +70,8 @@ private:
   {
     return shared_.schedule->slots ();
   }
-  RectifyOptions rectify_options () const override;
+  RectifyOptions rectify_options (const Schedule &schedule) const override;
+  SensorNoise noise (const Schedule &schedule) const;
   std::string method_name () const override;
 
   template <typename Pixel>
@@ -78,12 +85,12 @@ private:
   const ObjectPtr<GstCodedPad> srcpad_;
 
   /* Object lock. */
-  FuseOptions settings_;
+  Settings settings_;
   CapsPtr caps_;
   std::stop_source stop_; ///< of the fusion that is under way
 
   /* Sink pad's stream lock. */
-  FuseOptions in_force_;
+  Settings in_force_;
   std::optional<Plan> plan_;
   /** Coded frames that were taken, without their pixels; as many as the
    * fuser's pending (). */

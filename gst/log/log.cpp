@@ -78,6 +78,7 @@ struct LogState {
   /** As last written to the file. */
   std::optional<Schedule> schedule;
   std::optional<Mapping> mapping;
+  std::optional<BenchProfile> bench;
   /** As last written to the track, and the PTS of that frame. */
   std::optional<StreamSetup> tracked;
   GstClockTime tracked_at = GST_CLOCK_TIME_NONE;
@@ -171,7 +172,8 @@ set_caps (GstBaseTransform *base, GstCaps *caps, GstCaps *)
   return gst_video_info_from_caps (&state.info, caps);
 }
 
-/* Upstream repeats tags; the file holds each schedule and mapping once. */
+/* Upstream repeats tags; the file holds each schedule, mapping and bench
+ * profile once. */
 void
 note_setup (LogState &state, const StreamSetup &setup)
 {
@@ -187,6 +189,10 @@ note_setup (LogState &state, const StreamSetup &setup)
   if (state.setup->mapping && !(state.mapping == state.setup->mapping)) {
     state.mapping = state.setup->mapping;
     state.file.write (state.mapping->to_json ());
+  }
+  if (state.setup->bench && !(state.bench == state.setup->bench)) {
+    state.bench = state.setup->bench;
+    state.file.write (state.bench->to_json ());
   }
 }
 

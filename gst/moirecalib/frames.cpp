@@ -274,9 +274,9 @@ corrected_setup (const CalibState &st)
 {
   std::optional<StreamSetup> setup = st.stream.setup;
   if (st.exchange.found.schedule) {
-    const bool simulated = setup && setup->simulated;
-    setup = StreamSetup{*st.exchange.found.schedule};
-    setup->simulated = simulated;
+    setup = StreamSetup{.schedule = *st.exchange.found.schedule,
+        .simulated = setup && setup->simulated,
+        .bench = setup ? setup->bench : std::nullopt};
   } else if (setup && st.exchange.found.mapping)
     setup->mapping = st.exchange.found.mapping;
   return setup;

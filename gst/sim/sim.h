@@ -18,7 +18,6 @@
 #include "common/element.h"
 #include "common/named.h"
 #include "common/raii.h"
-#include "setup/stream_setup.h"
 #include "schedule/schedule.h"
 #include "setup/stream_setup.h"
 

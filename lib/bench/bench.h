@@ -46,7 +46,7 @@ struct BenchOptions {
    * OpticalBench::gain (). */
   double gain = 0.0;
   std::uint64_t seed = 0;
-  Alignment alignment;
+  Alignment alignment = {};
   /** Layout of the tile on a diamond array, whose pixels are those of the tile
    * (diamond_view.h); none: an orthogonal array. The lens sees the mean of two
    * pixels between them. */

@@ -223,12 +223,16 @@ parse_options (std::string_view device)
   DmdInfo &info = o.info;
   info.resident_masks = 512;
   info.still_masks = true;
+  const auto parse_serial = [] (std::string_view text) {
+    return std::optional (std::string (text));
+  };
   const DeviceKey keys[] = {value_key ("size", "WxH", o.size, parse_size),
       value_key ("layout", "address|lattice|cell", o.diamond, parse_layout),
       value_key ("masks", "N", info.resident_masks, parse_masks),
       value_key ("min-active", "TIME", info.minimum_active, parse_time),
       value_key ("min-switching", "TIME", info.minimum_switching, parse_time),
       value_key ("mask-time", "TIME", o.mask_time, parse_time),
+      value_key ("serial", "TEXT", info.serial, parse_serial),
       choice_key ("still", info.still_masks, {{"yes", true}, {"no", false}}),
       {"slip-at", "SLOT[:BY], slots ascending",
           [&o] (std::string_view text) { return add_slip (text, o.slips); }},

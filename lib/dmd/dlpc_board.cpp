@@ -14,6 +14,7 @@ DlpcBoard::set_info (const char *mirrors, Extent size, std::uint32_t active,
     std::uint32_t dark, int masks)
 {
   info_.name = link_->name () + " (" + mirrors + ")";
+  info_.serial = link_->serial ();
   info_.size = size;
   info_.minimum_active = Nanoseconds (active) * 1000;
   info_.minimum_dark = Nanoseconds (dark) * 1000;

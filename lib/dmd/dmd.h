@@ -35,6 +35,8 @@ struct DmdInfo {
   /** Size of the region that shows masks; {}: all mirrors. */
   Extent region = {};
 
+  std::string serial = {}; ///< empty: not known
+
   Extent shown () const { return region == Extent () ? size : region; }
 };
 

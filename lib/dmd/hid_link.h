@@ -143,9 +143,11 @@ public:
   static constexpr Milliseconds kPatience{2000};
 
   /** @p name  of the device, for messages. Drops replies that wait from an
-   * earlier conversation. */
-  HidLink (std::unique_ptr<PacketPipe> pipe, std::string name)
-      : pipe_ (std::move (pipe)), name_ (std::move (name))
+   * earlier conversation. @p serial  empty: not known. */
+  HidLink (std::unique_ptr<PacketPipe> pipe, std::string name,
+      std::string serial = {})
+      : pipe_ (std::move (pipe)), name_ (std::move (name)),
+        serial_ (std::move (serial))
   {
   }
 
@@ -181,6 +183,7 @@ public:
 
   bool gone () const { return pipe_->gone (); }
   const std::string &name () const { return name_; }
+  const std::string &serial () const { return serial_; }
 
   /** "NAME: cannot WHAT: REASON". */
   Error error (const std::string &what, const std::string &reason,
@@ -201,7 +204,7 @@ private:
   void drain ();
 
   const std::unique_ptr<PacketPipe> pipe_;
-  const std::string name_;
+  const std::string name_, serial_;
   std::stop_token stop_;
   Milliseconds patience_ = kPatience; // that is left to the job
   std::uint8_t sequence_ = 0;

@@ -328,8 +328,8 @@ open_usb_dmd (std::string_view device)
   ASSIGN_OR_RETURN (
       const Found found, choose (std::move (boards), options.which));
   ASSIGN_OR_RETURN (auto pipe, open_pipe (context, found));
-  auto link =
-      std::make_unique<HidLink> (std::move (pipe), "usb:" + found.board.port);
+  auto link = std::make_unique<HidLink> (
+      std::move (pipe), "usb:" + found.board.port, found.board.serial);
   return found.board.controller == UsbController::dlpc350
              ? open_dlpc350 (std::move (link), options)
              : open_dlpc900 (std::move (link), options);

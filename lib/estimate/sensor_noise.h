@@ -7,7 +7,7 @@ namespace codedexposure
 
 /** Noise of a camera; the default is a camera without noise. */
 struct SensorNoise {
-  static constexpr double kMaxFullWell = 1e7;
+  static constexpr double kMaxFullWell = 1e9;
   static constexpr double kMaxReadNoise = 1e5;
 
   /** Full well of a pixel, electrons; 0: no noise. */

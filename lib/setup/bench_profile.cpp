@@ -136,6 +136,34 @@ try {
   return out_of_memory ();
 }
 
+std::vector<std::pair<std::string, std::string>>
+BenchProfile::rows () const
+{
+  const auto device = [] (const Device &of) {
+    std::string text;
+    for (const std::string *name : {&of.vendor, &of.model, &of.serial})
+      if (!name->empty ())
+        text += (text.empty () ? "" : " ") + *name;
+    return text.empty () ? "not known" : text;
+  };
+  std::vector<std::pair<std::string, std::string>> rows = {
+      {"camera", device (camera)}, {"size", size_text (camera.size)},
+      {"bits", std::to_string (bits)}};
+  if (!pixel_format.empty ())
+    rows.emplace_back ("pixel format", pixel_format);
+  if (dmd) {
+    rows.emplace_back ("DMD", device (*dmd));
+    rows.emplace_back ("mirrors", size_text (dmd->size));
+  }
+  for (const auto &[member, name, unit, low, high] : kRanges)
+    if (const auto &number = this->*member)
+      rows.emplace_back (name,
+          real_text (number->value) + " ± " + real_text (number->sigma) + unit);
+  rows.emplace_back ("mapping",
+      mapping ? size_text (mapping->mirrors ()) + " mirrors" : "not measured");
+  return rows;
+}
+
 /* --------------------------------------------------------- what follows -- */
 
 std::optional<double>

@@ -6,6 +6,8 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "base/geometry.h"
 #include "base/result.h"
@@ -78,6 +80,9 @@ struct BenchProfile {
    * another. */
   Result<void> check () const;
 
+  /** Names and values for people. */
+  std::vector<std::pair<std::string, std::string>> rows () const;
+
   /** The largest DN. */
   int largest () const { return (1 << bits) - 1; }
   /** The conversion gain, e-/DN; if it was not measured, that of a full well at
@@ -103,5 +108,13 @@ struct BenchProfile {
 
   bool operator== (const BenchProfile &) const = default;
 };
+
+/** The time by the clock of the machine. */
+inline std::chrono::sys_seconds
+now_utc ()
+{
+  return std::chrono::floor<std::chrono::seconds> (
+      std::chrono::system_clock::now ());
+}
 
 } // namespace codedexposure

@@ -40,8 +40,7 @@ inline BenchProfile
 profile_of (Extent size, int bits = 8)
 {
   BenchProfile profile;
-  profile.measured = std::chrono::floor<std::chrono::seconds> (
-      std::chrono::system_clock::now ());
+  profile.measured = now_utc ();
   profile.camera.size = size;
   profile.bits = bits;
   return profile;

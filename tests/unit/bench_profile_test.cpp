@@ -2,6 +2,7 @@
 /* Bench profiles: their JSON form, and which bench they are of. */
 #include "setup/bench_profile.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <fstream>
 #include <limits>
@@ -202,6 +203,18 @@ TEST (BenchProfile, RefusesAnotherBench)
   other.dmd->serial = "18";
   EXPECT_NE (profile.check_bench (other).error ().message.find ("DMD"),
       std::string::npos);
+}
+
+TEST (BenchProfile, ShowsItsNumbersToPeople)
+{
+  const auto rows = full ().rows ();
+  const auto has = [&] (const char *name, const char *text) {
+    return std::find (rows.begin (), rows.end (),
+               std::pair<std::string, std::string> (name, text)) != rows.end ();
+  };
+  EXPECT_TRUE (has ("size", "64x48"));
+  EXPECT_TRUE (has ("DMD", "LightCrafter 4500 17"));
+  EXPECT_TRUE (has ("full well", "9870 ± 40 e-"));
 }
 
 TEST (BenchProfile, SaysThatItIsOld)

@@ -1,0 +1,28 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "extract/black_level.h"
+
+#include <algorithm>
+
+namespace codedexposure
+{
+
+template <typename Pixel>
+void
+subtract_black (
+    ImageView<const Pixel> frame, int black, int bits, ImageView<Pixel> light)
+{
+  const int all = 8 * int (sizeof (Pixel));
+  const int largest = (1 << (bits > 0 && bits < all ? bits : all)) - 1;
+  for (int y = 0; y < frame.height; y++)
+    std::transform (frame.row (y), frame.row (y) + frame.width, light.row (y),
+        [=] (Pixel value) {
+          return value >= largest ? value : Pixel (std::max (value - black, 0));
+        });
+}
+
+template void subtract_black (
+    ImageView<const std::uint8_t>, int, int, ImageView<std::uint8_t>);
+template void subtract_black (
+    ImageView<const std::uint16_t>, int, int, ImageView<std::uint16_t>);
+
+} // namespace codedexposure

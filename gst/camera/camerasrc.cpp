@@ -51,6 +51,10 @@
  */
 #include "camerasrc.h"
 
+#ifdef CODEDEXPOSURE_ARAVIS
+#include <arv.h>
+#endif
+
 #include "common/element.h"
 #include "common/elements.h"
 #include "common/properties.h"
@@ -120,6 +124,10 @@ properties ()
       {"features", "Features",
           "Assignments of other GenICam features, \"A=1 B=2\", made last",
           kReadWriteReady, set (&Settings::features)},
+      {"bench", "Bench profile",
+          "What was measured of the bench, a JSON file or its text "
+          "(docs/formats.md); refused if it is of another camera",
+          kReadWriteReady, set (&Settings::bench)},
       {"num-buffers", "Number of buffers",
           "Frames until EOS, those before and after a restart together; -1: "
           "unlimited",
@@ -143,6 +151,12 @@ check (GstCodedExposureCameraSrc *self)
     POST_ERROR (self, CORE, MISSING_PLUGIN,
         "The GStreamer element aravissrc is not installed. It is in Debian's "
         "package libaravis-0.8-0.");
+    return false;
+  }
+  const auto bench = read_again (self, self->state->settings.bench).read;
+  if (bench && !*bench) {
+    POST_ERROR (self, RESOURCE, SETTINGS,
+        "The bench property cannot be read: " + bench->error ().message);
     return false;
   }
   const Result<void> good = check_settings (camera::settings_of (self));
@@ -240,6 +254,30 @@ settings_of (GstCodedExposureCameraSrc *self)
   return self->state->settings;
 }
 
+namespace
+{
+
+/* Whether @found may be the camera of the bench profile, if there is one. */
+bool
+check_camera (GstCodedExposureCameraSrc *self, const Named<BenchProfile> &bench,
+    [[maybe_unused]] GObject *found)
+{
+  const char *serial = nullptr;
+#ifdef CODEDEXPOSURE_ARAVIS
+  serial = arv_camera_get_device_serial_number (ARV_CAMERA (found), nullptr);
+#endif
+  if (!bench.read || !serial)
+    return true;
+  const auto same = BenchProfile::check_device (
+      "camera", bench.read->value ().camera, {.serial = serial});
+  if (!same)
+    POST_ERROR (self, RESOURCE, SETTINGS,
+        "The bench profile does not fit: " + same.error ().message);
+  return same.ok ();
+}
+
+} // namespace
+
 /* The name comes first: it makes aravissrc look for the camera, and forget the
  * one that it had, dead or alive. */
 bool
@@ -257,6 +295,8 @@ set_up_source (GstCodedExposureCameraSrc *self)
   if (!found)
     return false;
   keep_camera (self, ObjectPtr<GObject> (found));
+  if (!check_camera (self, settings.bench, found))
+    return false;
 
   const CapsPtr caps (
       gst_caps_from_string (caps_of_format (settings.pixel_format).c_str ()));

@@ -5,6 +5,8 @@
 #include <string>
 
 #include "base/result.h"
+#include "common/named.h"
+#include "setup/bench_profile.h"
 
 namespace codedexposure::gst::camera
 {
@@ -23,6 +25,7 @@ struct Settings {
   std::string features;     ///< assignments beyond these
   int num_buffers = -1;     ///< frames until EOS; -1: no end
   unsigned reconnect = 0;   ///< tries to restart a camera that went away
+  Named<BenchProfile> bench;
 };
 
 /** An error that names the value, the rule and the remedy. */

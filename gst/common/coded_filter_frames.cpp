@@ -6,6 +6,8 @@
 #include <cstdlib>
 #include <utility>
 
+#include "extract/black_level.h"
+
 GST_DEBUG_CATEGORY_EXTERN (coded_filter_debug);
 #define GST_CAT_DEFAULT coded_filter_debug
 

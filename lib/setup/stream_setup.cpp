@@ -30,9 +30,6 @@ take_pair (Json &root, const char *key, int highest, const std::string &rule)
   return std::pair (first, second);
 }
 
-<<<<<<< HEAD:lib/mapping/stream_setup.cpp
-/* Taken out of @root; false if it is left out. */
-=======
 /* An object of its own, which is taken out of @root. */
 template <typename T>
 std::optional<T>
@@ -50,7 +47,7 @@ take_inner (Json &root, const char *key, T (*read) (const Json &))
   }
 }
 
->>>>>>> 9c4195d (A bench profile has the measured numbers of a bench, in strict JSON):lib/setup/stream_setup.cpp
+/* Taken out of @root; false if it is left out. */
 bool
 take_bool (Json &root, const char *key)
 {

@@ -8,6 +8,7 @@
 #include "advise/advice.h"
 #include "base/text.h"
 #include "base/try.h"
+#include "setup/bench_profile.h"
 #include "tools/tool.h"
 
 namespace codedexposure::tool
@@ -21,6 +22,10 @@ struct Arguments {
   std::vector<std::string> schedules;
   std::string size = "768x576";
   std::string readout = "0";
+  std::string bench;
+  /** On the command line, and not to be taken from the bench profile. */
+  bool size_given = false, full_well_given = false, read_noise_given = false,
+       bits_given = false;
   double min_rate = 0.0;
 };
 
@@ -42,6 +47,27 @@ candidates (const Arguments &arguments, const DmdInfo &board)
   for (const std::string &text : arguments.schedules)
     schedules.push_back (value_of (Schedule::parse (text), Exit::usage));
   return schedules;
+}
+
+/** Takes over from the bench profile what is not on the command line. */
+void
+use_bench (Session &session, Arguments &arguments, const BenchProfile &bench)
+{
+  Camera &camera = arguments.conditions.camera;
+  if (!arguments.size_given)
+    arguments.size = size_text (bench.camera.size);
+  if (!arguments.bits_given)
+    camera.bits = bench.bits;
+  if (bench.read_noise && !arguments.read_noise_given)
+    camera.noise.read_noise = bench.read_noise->value;
+  if (!arguments.full_well_given) {
+    if (bench.full_well)
+      camera.noise.full_well = bench.full_well->value;
+    else if (const auto electrons = bench.electrons_per_number ())
+      camera.noise.full_well = *electrons * (bench.largest () - bench.black ());
+  }
+  if (const auto old = bench.why_old (now_utc ()))
+    session.say (*old);
 }
 
 Result<Prediction>
@@ -169,6 +195,11 @@ void
 advise (Session &session, Arguments arguments)
 {
   Conditions &conditions = arguments.conditions;
+  std::optional<BenchProfile> bench;
+  if (!arguments.bench.empty ()) {
+    bench = value_of (BenchProfile::parse (arguments.bench), Exit::usage);
+    use_bench (session, arguments, *bench);
+  }
   const auto size = parse_size (arguments.size);
   if (!size)
     throw Failure{
@@ -177,7 +208,10 @@ advise (Session &session, Arguments arguments)
   conditions.camera.size = *size;
   conditions.camera.rate = parse_rate (session.rate);
   const DmdInfo board = find_board (session.board);
-  const auto schedules = candidates (arguments, board);
+  auto schedules = candidates (arguments, board);
+  if (bench)
+    for (Schedule &schedule : schedules)
+      schedule = value_of (bench->with_leak (schedule), Exit::usage);
   /* The prediction without masks fails only if the conditions are invalid. */
   const Prediction none =
       value_of (predict (std::nullopt, conditions), Exit::usage);
@@ -206,12 +240,19 @@ advise_command (Session &session)
               {"schedules", &arguments->schedules,
                   "CODE:TILE[,key=value...] or JSON files; default: the usual "
                   "ones"},
-              {"--size", &arguments->size, "Size of the camera, WIDTHxHEIGHT"},
+              {"--bench", &arguments->bench,
+                  "Bench profile with size, bits, full well, read noise and "
+                  "leakage; other options and a leak of a schedule win"},
+              {"--size", &arguments->size, "Size of the camera, WIDTHxHEIGHT",
+                  &arguments->size_given},
               rate_option (session),
               {"--full-well", &camera.noise.full_well,
-                  "Full-well capacity of a pixel, e-"},
-              {"--read-noise", &camera.noise.read_noise, "Read noise, e- rms"},
-              {"--bits", &camera.bits, "Bits of a pixel"},
+                  "Full-well capacity of a pixel, e-",
+                  &arguments->full_well_given},
+              {"--read-noise", &camera.noise.read_noise, "Read noise, e- rms",
+                  &arguments->read_noise_given},
+              {"--bits", &camera.bits, "Bits of a pixel",
+                  &arguments->bits_given},
               {"--readout", &arguments->readout,
                   "Dead time of the camera at the end of a frame, such as "
                   "500us"},

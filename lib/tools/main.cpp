@@ -180,7 +180,12 @@ add (CLI::App &app, const Option &option)
                            std::vector<std::string> *>)
       app.add_option (option.name, *value, option.help);
     else
-      app.add_option (option.name, *value, option.help)->capture_default_str ();
+      app.add_option (option.name, *value, option.help)
+          ->capture_default_str ()
+          ->each ([given = option.given] (const std::string &) {
+            if (given)
+              *given = true;
+          });
   };
   std::visit (add_typed, option.value);
 }
@@ -226,6 +231,7 @@ run (int argc, char **argv)
   app.add_flag ("--json", session.json, "Print results as JSON");
   app.add_flag ("--quiet", session.quiet, "Do not print progress");
   add (app, advise_command (session));
+  add (app, bench_commands (session));
   add (app, dmd_commands (session));
   add (app, schedule_commands (session));
   try {

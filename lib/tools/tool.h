@@ -85,6 +85,7 @@ struct Option {
       std::vector<std::string> *>
       value;
   std::string help;
+  bool *given = nullptr; ///< set if it is on the command line
 };
 
 /** A subcommand; one without help is not listed. */
@@ -101,6 +102,7 @@ Option rate_option (Session &session);
 Option board_option (Session &session);
 
 Command advise_command (Session &session);
+Command bench_commands (Session &session);
 Command dmd_commands (Session &session);
 Command schedule_commands (Session &session);
 

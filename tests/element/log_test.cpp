@@ -220,6 +220,19 @@ TEST_F (LogTest, ScheduleComesFirstAndOnce)
   EXPECT_EQ (*read_back, staircase);
 }
 
+TEST_F (LogTest, TheBenchProfileFollowsTheScheduleOnce)
+{
+  StreamSetup measured = {*Schedule::from_preset ("staircase:2x2")};
+  measured.bench.emplace ().camera.size = {8, 8};
+  play (path_.get ());
+  for (int i = 0; i < 2; i++) {
+    gst_harness_push_event (harness_.get (), setup_to_event (measured));
+    ASSERT_EQ (push (frame (GstClockTime (i) * 33'366'666)), GST_FLOW_OK);
+  }
+  ASSERT_EQ (lines ().size (), 4u);
+  EXPECT_EQ (lines ()[1], Json::parse (measured.bench->to_json ()));
+}
+
 TEST_F (LogTest, MappingFollowsTheSchedule)
 {
   const StreamSetup mapped = {

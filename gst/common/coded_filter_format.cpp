@@ -208,7 +208,8 @@ CodedFilter::check_bench (const GstVideoInfo &info) const
 }
 
 /* The property wins over the stream's tag. The leak of the profile becomes that
- * of the schedule. */
+ * of the schedule. Frames that were cropped on purpose, as the schedule
+ * property says, are decoded without the tag's profile. */
 bool
 CodedFilter::find_bench (CodedFormat &format)
 {
@@ -234,6 +235,14 @@ CodedFilter::find_bench (CodedFormat &format)
     const auto old = given.why_old (now_utc ());
     if (old && !std::exchange (stream_.warned_of_bench, true))
       POST_WARNING (element_, RESOURCE, SETTINGS, *old);
+  } else if (stream_.bench && stream_.settings.schedule.read) {
+    const auto good = check_bench (format.info);
+    if (!good && !std::exchange (stream_.warned_of_bench, true))
+      POST_WARNING (element_, STREAM, FORMAT,
+          "The bench profile in the stream's tags is not used: " +
+              good.error ().message + ".");
+    if (!good)
+      stream_.bench.reset ();
   }
   if (!stream_.bench)
     return true;

@@ -326,16 +326,16 @@ describe (const Stream &stream, const Exposure &exposure)
   set_frame_meta (exposure.outbuf.get (), meta);
 }
 
-/* By how much frames come after the first slot. Without a DMD, the masks step
+/* When the camera says that the exposure began. Without a DMD, the masks step
  * with the frames. */
 GstClockTime
-trigger_delay (const Stream &stream)
+stamped_time (const Stream &stream, GstClockTime start)
 {
-  const bool delayed =
-      stream.mirrors && stream.profile && stream.profile->trigger_delay;
-  return delayed ? GstClockTime (std::max (
-                       0.0, std::round (stream.profile->trigger_delay->value)))
-                 : 0;
+  if (!stream.mirrors || !stream.profile || !stream.profile->trigger_delay)
+    return start;
+  const auto delay = std::llround (stream.profile->trigger_delay->value);
+  return GstClockTime (
+      std::max<GstClockTimeDiff> (0, GstClockTimeDiff (start) + delay));
 }
 
 GstBuffer *
@@ -350,7 +350,7 @@ stamp (GstCodedExposureSim *self, Exposure exposure)
   const GstVideoInfo &info = stream.plan->out;
   describe (stream, exposure);
   GstBuffer *outbuf = exposure.outbuf.release ();
-  GST_BUFFER_PTS (outbuf) = exposure.start + trigger_delay (stream);
+  GST_BUFFER_PTS (outbuf) = stamped_time (stream, exposure.start);
   GST_BUFFER_DTS (outbuf) = GST_CLOCK_TIME_NONE;
   GST_BUFFER_DURATION (outbuf) =
       gst_util_uint64_scale (GST_SECOND, info.fps_d, info.fps_n);

@@ -10,7 +10,7 @@ pipelines=$(cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.." && pwd)
 
 # Options of the scene and the bench, and of the coded stream's source.
 scene_options='input input-rate scene pattern size frame-rate bits'
-bench_options='schedule psf-sigma full-well read-noise gain seed shift-x shift-y
+bench_options='schedule bench psf-sigma full-well read-noise gain seed shift-x shift-y
   rotation scale'
 source_options="$scene_options $bench_options frames camera features source
   device exposure trigger trigger-line trigger-edge pixel-format reconnect"
@@ -31,6 +31,9 @@ bench_help='Bench:
   --schedule S        CODE:TILE[,key=value...] or a JSON file [sequential:2x2]
   --frame-rate R      coded frames/s, such as 25 or 30000/1001 [25]
   --frames N          stop after N coded frames
+  --bench FILE        bench profile (JSON) of camera and DMD: the simulated bench
+                      has its noise, black level, leakage, blur and mapping, and
+                      the recording carries it; other options win
   --full-well E       electrons at white, e-; 0: no noise [0]
   --read-noise E      read noise, e- rms [0]
   --psf-sigma P       blur of the lens, pixels [0]
@@ -333,10 +336,30 @@ probe_video ()
     <<< "$caps"
 }
 
+# Prints a row of the description of the bench profile, such as size or bits.
+bench_row ()
+{
+  "$tool" bench show "${opt[bench]}" | sed -n "s/^$1  *//p"
+}
+
+# Frames are those of the bench profile, where no option says otherwise.
+use_bench ()
+{
+  "$tool" bench show "${opt[bench]}" >/dev/null \
+    || usage_error "--bench ${opt[bench]} is not valid"
+  is_set size || opt[size]=$(bench_row size)
+  is_set bits || opt[bits]=$(bench_row bits)
+  ! is_set camera || is_set pixel-format \
+    || opt[pixel-format]=$(bench_row 'pixel format')
+  ! is_set source || is_set device || is_set schedule || usage_error \
+    "--bench with --source needs --schedule, or --device for the DMD"
+}
+
 # Sets slots, width and height, and the fractions frame_rate and scene_rate (N
 # times frame_rate).
 plan_scene ()
 {
+  ! is_set bench || use_bench
   slots=$(schedule_row slots) || usage_error "--schedule $(schedule) is not valid"
   frame_rate=${opt[frame-rate]:-25}
   [[ $frame_rate == */* ]] || frame_rate=$frame_rate/1
@@ -409,7 +432,7 @@ simulation ()
   scene "$@"
   printf 'codedexposure-sim name=bench schedule=%s %s ! ' \
     "$(quoted "$(schedule)")" \
-    "$(properties psf-sigma full-well read-noise bits gain seed \
+    "$(properties bench psf-sigma full-well read-noise bits gain seed \
       shift-x shift-y rotation scale)"
   printf 'video/x-raw,framerate=%s ! ' "$frame_rate"
 }
@@ -421,7 +444,7 @@ coded_source ()
     printf 'codedexposure-camerasrc camera-name=%s trigger=%s ' \
       "$(quoted "${opt[camera]}")" "${opt[trigger]:-dmd}"
     ! is_set exposure || printf 'exposure-time=%s ' "${opt[exposure]}"
-    properties trigger-line trigger-edge pixel-format features reconnect
+    properties trigger-line trigger-edge pixel-format features reconnect bench
     printf 'source::num-arv-buffers=150 ! video/x-raw,format=%s,' "$(grey_format)"
     printf 'width=%d,height=%d,framerate=%s ! ' "$width" "$height" "$frame_rate"
   elif is_set source; then
@@ -434,8 +457,9 @@ coded_source ()
     local device=${opt[device]:-} timestamps=''
     is_set camera || is_set source || device=${device:-sim:bench}
     ! is_set camera || timestamps='timestamp-at=device-clock '
-    printf 'dmdsync name=sync device=%s schedule=%s %s! ' \
-      "$(quoted "$device")" "$(quoted "$(schedule)")" "$timestamps"
+    printf 'dmdsync name=sync device=%s schedule=%s %s%s! ' \
+      "$(quoted "$device")" "$(quoted "$(schedule)")" "$timestamps" \
+      "$(properties bench)"
   fi
   frame_limit
 }

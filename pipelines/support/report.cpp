@@ -138,7 +138,7 @@ added (const gchar *debug)
 std::string
 with_options (const char *text)
 {
-  static const std::regex property ("[Tt]he (schedule|mapping) property");
+  static const std::regex property ("[Tt]he (schedule|mapping|bench) property");
   return std::regex_replace (text, property, "--$1");
 }
 

@@ -174,6 +174,21 @@ TEST (CodedProfile, OfAnotherBenchIsRefused)
       std::string::npos);
 }
 
+/* Frames that were cropped on purpose are decoded with the schedule property,
+ * and the tag cannot be changed. */
+TEST (CodedProfile, OfTheTagIsLeftOutForCroppedFrames)
+{
+  BenchProfile profile = profile_of ({48, 24});
+  profile.leak = Measured{0.05, 0.001};
+  ElementHarness demux ("codedexposure-demux schedule=sequential:2x2");
+  demux.set_caps (gray_caps (kFrame.width, kFrame.height));
+  demux.push_event (tag_with (profile, "sequential:2x2"));
+  ASSERT_EQ (demux.push (frame_of (picture (), 0)), GST_FLOW_OK);
+  EXPECT_EQ (in_force (demux), "sequential:2x2");
+  EXPECT_NE (demux.warning ().find ("is not used: the frames have 24x24"),
+      std::string::npos);
+}
+
 TEST (CodedProfile, IsSaidToBeOldOnce)
 {
   BenchProfile profile = profile_of (kFrame);

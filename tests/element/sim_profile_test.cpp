@@ -113,10 +113,14 @@ TEST (SimProfile, RefusesFramesOfAnotherCamera)
 
 TEST (SimProfile, RefusesAProfileThatCannotBeRead)
 {
-  SimHarness sim ("bench=no.json");
-  EXPECT_NE (sim.error ().find ("The bench property cannot be read: bench "
-                                "profile 'no.json'"),
+  const ObjectPtr<GstElement> sim (GST_ELEMENT (gst_object_ref_sink (
+      gst_element_factory_make ("codedexposure-sim", nullptr))));
+  g_object_set (sim.get (), "bench", "no.json", nullptr);
+  EXPECT_NE (refusal (sim.get (), GST_STATE_PAUSED)
+                 .find ("The bench property cannot be read: bench profile "
+                        "'no.json'"),
       std::string::npos);
+  gst_element_set_state (sim.get (), GST_STATE_NULL);
 }
 
 } // namespace

@@ -9,6 +9,7 @@
 
 #include "each_element.h"
 #include "pictures.h"
+#include "record/matroska.h"
 
 using namespace codedexposure::gst;
 using codedexposure::Error;
@@ -106,6 +107,8 @@ public:
                    " could not be finished; what was written "
                    "is in " +
                    part_.path ()};
+    if (auto tidied = codedexposure::tidy_matroska (part_.path ()); !tidied)
+      return tidied;
     return part_.publish (replace_);
   }
   void discard () override { part_.discard (); }

@@ -228,6 +228,29 @@ TEST (CameraBin, ACameraThatRestartsServesTheNextRun)
   }
 }
 
+TEST (CameraBin, LeavesNoSourceBehind)
+{
+  const auto camera = open_camera ({});
+  bool gone = false;
+  {
+    /* Without a property of the child, which GStreamer's parser would keep. */
+    CameraPipeline pipeline (
+        "codedexposure-camerasrc name=camera camera-name=127.0.0.1 "
+        "num-buffers=3 ! ",
+        [] (auto *, auto &) {});
+    const auto bin = pipeline.element ("camera");
+    const ObjectPtr<GstElement> source (
+        gst_bin_get_by_name (GST_BIN (bin.get ()), "source"));
+    g_object_weak_ref (
+        G_OBJECT (source.get ()),
+        [] (gpointer gone, GObject *) { *static_cast<bool *> (gone) = true; },
+        &gone);
+    pipeline.play ();
+    EXPECT_EQ (pipeline.wait_end (), "end");
+  }
+  EXPECT_TRUE (gone);
+}
+
 /** What the bus says first of a run with @p properties. */
 std::string
 said_of (const std::string &properties)

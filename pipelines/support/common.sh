@@ -31,9 +31,9 @@ bench_help='Bench:
   --schedule S        CODE:TILE[,key=value...] or a JSON file [sequential:2x2]
   --frame-rate R      coded frames/s, such as 25 or 30000/1001 [25]
   --frames N          stop after N coded frames
-  --bench FILE        bench profile (JSON) of camera and DMD: the simulated bench
-                      has its noise, black level, leakage, blur and mapping, and
-                      the recording carries it; other options win
+  --bench FILE        bench profile (JSON) of camera and DMD; the simulated
+                      bench has its noise, black level, leakage, blur and
+                      mapping, recordings carry it, and other options win
   --full-well E       electrons at white, e-; 0: no noise [0]
   --read-noise E      read noise, e- rms [0]
   --psf-sigma P       blur of the lens, pixels [0]

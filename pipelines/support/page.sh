@@ -71,7 +71,7 @@ row ()
 # What was recorded, how it was decoded, and how it is shown.
 head_of_page ()
 {
-  local coded subframe
+  local coded subframe measured
   coded=$(size_of "$(first_picture "$out/coded")")
   subframe=$(size_of "$(first_picture "$out/subframes")")
   printf '<dl>\n'
@@ -83,6 +83,8 @@ $(rate_text "$slots") subframes/s"
   row Method "$(provenance_of_pictures method) (--method ${opt[method]:-auto})"
   [ -z "$(provenance_of_pictures simulated)" ] \
     || row Source 'simulated bench; no camera recorded this'
+  measured=$(provenance_of_pictures measured)
+  [ -z "$measured" ] || row Bench "profile measured $measured"
   row Losses "$(losses)"
   row Shown "coded frame $(cut -d, -f1 < "$scratch/rows.csv" | head -n 1), from \
 $(seconds "$shown") s on"

@@ -14,7 +14,8 @@ from ._pipeline import ContainerError, Error, Player, element, quoted
 from .frame import Frame, frame_of
 
 _SETUP = "coded-exposure="
-_NOT_OF_SCHEDULE = ("mapping", "size", "rate", "track", "simulated")
+_NOT_OF_SCHEDULE = ("mapping", "size", "rate", "track", "simulated",
+                    "bench")
 
 
 def open(path: str | os.PathLike) -> Recording:  # pylint: disable=W0622
@@ -48,6 +49,8 @@ class Recording:
         self.mapping: dict | None = setup and setup.get("mapping")
         """The JSON form of the mapping from pixels to mirrors; None: not
         known."""
+        self.bench: dict | None = setup and setup.get("bench")
+        """The JSON form of the bench profile; None: not known."""
         self.simulated: bool = bool(setup and setup.get("simulated"))
         """The recording says that its frames are those of a simulated bench."""
         rate = setup and setup.get("rate")

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """The Python package gives what pipelines/decode writes, and says what is lost."""
 import csv
+import json
 import unittest
 import warnings
 
@@ -160,8 +161,21 @@ class Facts(unittest.TestCase):
         self.assertEqual(recording.schedule["tile"], "2x2")
         self.assertIsNone(recording.mapping)
         self.assertTrue(recording.simulated)
+        self.assertIsNone(recording.bench)
         self.assertEqual(recording.rate, 25)
         self.assertEqual(recording.size, (96, 64))
+
+
+    def test_bench_profile(self):
+        profile = {"format": "coded-exposure-bench", "version": 1,
+                   "measured": "2026-03-14T09:26:53Z",
+                   "camera": {"size": [96, 64]}, "bits": 8}
+        (SCRATCH / "bench.json").write_text(json.dumps(profile))
+        simulate("bench.mkv", "--bench", "bench.json")
+        recording = opened("bench.mkv")
+        self.assertEqual(recording.bench, profile)
+        again = recording.subframes(schedule=recording.schedule)
+        self.assertEqual(pixels(again), pixels(recording.subframes()))
 
 
 class Faults(unittest.TestCase):

@@ -62,7 +62,7 @@ window_help='Keys in the window:
 The stream does not wait for the window: recording and counting go on in a pause
 or loop, and subframes are skipped if the screen is too slow. The window keeps
 the pictures of about one second, 8 bits deep and at most as large as shown:
-22 MB for 768x576 pixels at 25 frames/s, and N times 11 MB more if fused.'
+25 MB for 768x576 pixels at 25 frames/s, and N times 14 MB more if fused.'
 force_help='  --force             replace files that exist
 '
 common_help='  --print             print the pipeline and do not run it

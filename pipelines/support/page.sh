@@ -104,11 +104,13 @@ figure{margin:0} figcaption{color:#555;font-size:13px}
 img{width:100%;image-rendering:pixelated} .plot img{image-rendering:auto}
 .badge{font-size:15px;background:#e4572e;color:#fff;border-radius:4px;
   padding:2px 8px;vertical-align:middle}
-dl{display:grid;grid-template-columns:max-content 1fr;gap:2px 14px} dd{margin:0}
+dl{display:grid;grid-template-columns:max-content minmax(0,1fr);gap:2px 14px}
+dd{margin:0;overflow-wrap:anywhere}
 dt{color:#555}
 .pair{display:grid;grid-template-columns:1fr 1fr;gap:12px}
 .grid{display:grid;gap:8px;align-content:start;grid-template-columns:
   repeat(auto-fill,minmax(max(84px,calc((100% - $((8 * ($1 - 1)))px)/$1)),1fr))}
+.wide>div{overflow-x:auto} .wide img{min-width:900px}
 .one,.many>figure{max-width:750px} .many>.grid{margin-top:8px}
 .frame img{display:block;aspect-ratio:$2}
 .frame div{position:relative} svg{position:absolute;inset:0;width:100%;height:100%}
@@ -148,7 +150,7 @@ $slow_motion times slower than they were exposed" 'frame one slow'
   if [ -f "$out/regions.png" ]; then
     printf '<h2>Regions</h2>\n'
     picture "$out/regions.png" \
-      'Each part separately, and all parts in one picture' plot
+      'Each part separately, and all parts in one picture' 'plot wide'
   fi
 }
 

@@ -2,6 +2,8 @@
 /* The black level of a camera, which is not light. */
 #pragma once
 
+#include <cstdint>
+
 #include "base/image.h"
 
 namespace codedexposure

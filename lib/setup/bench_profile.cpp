@@ -41,10 +41,10 @@ check_numbers (const BenchProfile &profile)
     const auto &number = profile.*member;
     if (!number)
       continue;
-    const auto outside = [&] (const std::string &of, double value, double from,
-                             double to) {
-      return Error{of + " of " + real_text (value) + unit + " is outside of " +
-                   real_text (from) + " to " + real_text (to) + unit +
+    const auto outside = [after = unit] (const std::string &of, double value,
+                             double from, double to) {
+      return Error{of + " of " + real_text (value) + after + " is outside of " +
+                   real_text (from) + " to " + real_text (to) + after +
                    "; leave out what was not measured"};
     };
     if (!(number->value >= low && number->value <= high))

@@ -136,16 +136,16 @@ read_bench_profile (const Json &root)
       {"camera", device_into (profile.camera), true},
       {"dmd",
           [&profile] (const Json &value, const std::string &key) {
-            device_into (profile.dmd.emplace ()) (value, key);
+            profile.dmd = BenchProfile::Device{};
+            device_into (*profile.dmd) (value, key);
           }},
       {"pixel_format", text_into (profile.pixel_format)},
       {"bits", integer_into (profile.bits, 16), true},
   };
-  for (const auto &[key, member] : kQuantities)
-    keys.push_back (
-        {key, [&profile, member] (const Json &value, const std::string &name) {
-           profile.*member = read_measured (value, name);
-         }});
+  for (const Quantity &quantity : kQuantities)
+    keys.push_back ({quantity.key,
+        [&number = profile.*quantity.member] (const Json &value,
+            const std::string &key) { number = read_measured (value, key); }});
   keys.push_back (
       {"mapping", [&profile] (const Json &value, const std::string &key) {
          try {

@@ -118,6 +118,15 @@ public:
       messages.push_back (std::move (message));
     }
   }
+  /** Whether an error comes within @p time. */
+  testing::AssertionResult has_failed (GstClockTime time)
+  {
+    const MessagePtr error (
+        gst_bus_timed_pop_filtered (bus_.get (), time, GST_MESSAGE_ERROR));
+    if (!error)
+      return testing::AssertionFailure ();
+    return testing::AssertionSuccess () << error_text (error);
+  }
   /** The text of the error that ends the stream; "end" when there is none. */
   std::string wait_end ()
   {

@@ -3,7 +3,7 @@
 #pragma once
 
 #include <algorithm>
-#include <cstdint>
+#include <cmath>
 
 #include "base/geometry.h"
 
@@ -31,20 +31,23 @@ struct WindowLayout {
 
   /** The size of a picture in its pane, such that it lies on that of the
    * camera: its pixels are as large as their cells, and rows of a pilot, which
-   * it lacks, stay free. A pixel is @p aspect_width / @p aspect_height times as
-   * wide as high, compared with one of the camera. */
+   * it lacks, stay free. A picture of the mirrors, which may be more than the
+   * pixels of the camera, is reduced to fit. A pixel is @p aspect_width /
+   * @p aspect_height times as wide as high, compared with one of the camera. */
   Extent size_of (
       Extent camera, Extent picture, int aspect_width, int aspect_height) const
   {
-    const int across = camera.width / picture.width;
-    const int down = across * aspect_height / std::max (1, aspect_width);
-    const auto part = [] (int length, std::int64_t pixels, int all) {
-      return int (std::clamp<std::int64_t> (length * pixels / all, 1, length));
+    const double across =
+        std::max (1.0, std::round (double (camera.width) / picture.width));
+    const double down =
+        std::max (1.0, across * aspect_height / std::max (1, aspect_width));
+    const double width = picture.width * across / camera.width;
+    const double height = picture.height * down / camera.height;
+    const double fit = std::max ({1.0, width, height});
+    const auto part = [fit] (int length, double share) {
+      return std::clamp (int (length * share / fit + 1e-6), 1, length);
     };
-    return {
-        part (pane.width, std::int64_t (picture.width) * across, camera.width),
-        part (
-            pane.height, std::int64_t (picture.height) * down, camera.height)};
+    return {part (pane.width, width), part (pane.height, height)};
   }
 
   /** Panes for pictures of the size @p camera: enlarged by a whole factor, or

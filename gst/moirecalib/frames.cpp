@@ -274,9 +274,10 @@ corrected_setup (const CalibState &st)
 {
   std::optional<StreamSetup> setup = st.stream.setup;
   if (st.exchange.found.schedule) {
-    setup = StreamSetup{.schedule = *st.exchange.found.schedule,
-        .simulated = setup && setup->simulated,
-        .bench = setup ? setup->bench : std::nullopt};
+    if (!setup)
+      setup.emplace ();
+    setup->schedule = *st.exchange.found.schedule;
+    setup->mapping.reset (); // the phase is that of an aligned camera
   } else if (setup && st.exchange.found.mapping)
     setup->mapping = st.exchange.found.mapping;
   return setup;

@@ -460,6 +460,9 @@ TEST (MoireCalibPhase, IsFoundInAFrameAndSaidDownstream)
   const auto setup = setup_from_tags (bench.tags ().get ());
   ASSERT_TRUE (setup && *setup);
   EXPECT_EQ (setup->value ().schedule.text (), "staircase:2x2,phase=1/0");
+  EXPECT_TRUE (setup->value ().simulated);
+  EXPECT_EQ (setup->value ().size, (Extent{kWidth, kHeight}));
+  EXPECT_TRUE (setup->value ().rate);
 }
 
 TEST (MoireCalibPhase, IsLookedForInAStreamThatSaysNoSchedule)

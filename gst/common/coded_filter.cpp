@@ -93,8 +93,7 @@ CodedFilter::properties ()
           "Significant bits of a pixel, counted from the lowest, for example "
           "12 for a 12-bit camera in GRAY16_LE; pixels at the largest value "
           "are saturated; 0: as the frames or the bench profile say, or all "
-          "bits "
-          "of the format",
+          "bits of the format",
           kReadWrite, set (&CodedSettings::bits), 0, 16},
       {"frame-rate", "Frame rate",
           "Rate of the coded frames in frames/s, used if their caps have no "

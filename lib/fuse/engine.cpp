@@ -65,7 +65,9 @@ check (const FuseOptions &options)
     return Error{"a full well of " + real_text (options.noise.full_well) +
                  " and a read noise of " +
                  real_text (options.noise.read_noise) +
-                 " electrons: they must lie in 0..1e7 and 0..1e5"};
+                 " electrons: they must lie in 0.." +
+                 real_text (SensorNoise::kMaxFullWell) + " and 0.." +
+                 real_text (SensorNoise::kMaxReadNoise)};
   return {};
 }
 

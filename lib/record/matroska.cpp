@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "record/matroska.h"
 
+#include <algorithm>
 #include <bit>
 #include <cstdint>
 #include <fstream>

@@ -48,10 +48,10 @@ check_numbers (const BenchProfile &profile)
                    "; leave out what was not measured"};
     };
     if (!(number->value >= low && number->value <= high))
-      return outside (std::string ("a ") + name, number->value, low, high);
+      return outside (std::string ("the ") + name, number->value, low, high);
     if (!(number->sigma >= 0.0 &&
             number->sigma <= std::numeric_limits<double>::max ()))
-      return outside (std::string ("a sigma of the ") + name, number->sigma,
+      return outside (std::string ("the sigma of the ") + name, number->sigma,
           0.0, std::numeric_limits<double>::max ());
   }
   return {};
@@ -189,8 +189,7 @@ BenchProfile::with_leak (const Schedule &schedule) const
                                          : schedule;
 }
 
-/* ----------------------------------------------------- whose profile it is --
- */
+/* ------------------------------------------------ whose profile it is -- */
 
 Result<void>
 BenchProfile::check_frames (Extent size, int frame_bits) const

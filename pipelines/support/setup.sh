@@ -3,8 +3,8 @@
 # Installs what is missing and builds; sourced by pipelines/demo, pipelines/package
 # and tests/run.
 #
-#   install_packages PURPOSE     Debian packages: to run, for tests (all but
-#                                rivals), to package, or to check packages
+#   install_packages PURPOSE     Debian packages for one of these: run, report,
+#                                tests (with both), rivals, package, check
 #   build_tree DIR OPTION...     meson setup and compile
 #   sample_video                 in sample.sh
 #
@@ -154,7 +154,7 @@ apt_get ()
     "and there is no sudo. As root, run:" \
     "apt-get install --no-install-recommends $*"
   mkdir -p "$cache"
-  # Made by root, it could not be written by who reads the lists below.
+  # A log that root made could not be written below.
   rm -f "$cache/apt.log"
   : > "$cache/apt.log"
   # A new system has no package lists, and old lists name files that are gone.

@@ -149,6 +149,7 @@ TEST (BenchProfile, RefusesNumbersOutOfRange)
       {&BenchProfile::psf_sigma, {nan, 0}, "psf_sigma of nan"},
       {&BenchProfile::psf_sigma, {1, -1}, "sigma of the psf_sigma of -1"},
       {&BenchProfile::exposure, {1, nan}, "sigma of the exposure of nan"},
+      {&BenchProfile::exposure, {0, 1}, "the exposure of 0 ns is outside"},
   };
   for (const auto &[number, wrong, words] : cases) {
     BenchProfile profile = plain ();

@@ -223,10 +223,11 @@ Window::set_pane (Pane &pane, const GstVideoInfo &picture)
     const std::lock_guard lock (mutex_);
     if (!layout_)
       return;
-    /* Aspect ratios of pixels are small numbers. */
+    const auto aspect = [] (const GstVideoInfo &info) {
+      return double (info.par_n) / info.par_d;
+    };
     size = pane.size = layout_->size_of ({camera_.width, camera_.height},
-        {picture.width, picture.height}, picture.par_n * camera_.par_d,
-        picture.par_d * camera_.par_n);
+        {picture.width, picture.height}, aspect (picture) / aspect (camera_));
     pane.caption = caption_of (kPanes[pane.index].caption, picture);
     captions_changed_ = true;
   }

@@ -32,15 +32,13 @@ struct WindowLayout {
   /** The size of a picture in its pane, such that it lies on that of the
    * camera: its pixels are as large as their cells, and rows of a pilot, which
    * it lacks, stay free. A picture of the mirrors, which may be more than the
-   * pixels of the camera, is reduced to fit. A pixel is @p aspect_width /
-   * @p aspect_height times as wide as high, compared with one of the camera. */
-  Extent size_of (
-      Extent camera, Extent picture, int aspect_width, int aspect_height) const
+   * pixels of the camera, is reduced to fit. A pixel is @p aspect times as wide
+   * as high, compared with one of the camera. */
+  Extent size_of (Extent camera, Extent picture, double aspect) const
   {
     const double across =
         std::max (1.0, std::round (double (camera.width) / picture.width));
-    const double down =
-        std::max (1.0, across * aspect_height / std::max (1, aspect_width));
+    const double down = std::max (1.0, across / std::clamp (aspect, 1e-3, 1e3));
     const double width = picture.width * across / camera.width;
     const double height = picture.height * down / camera.height;
     const double fit = std::max ({1.0, width, height});

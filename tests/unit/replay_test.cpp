@@ -206,8 +206,9 @@ TEST (WindowLayout, PutsAPictureWhereTheCameraHasItsPixels)
       {{768, 576}, {768, 576}, {388, 291}, 1, 1, {768, 576}},  // cells of them
   };
   for (const auto &[pane, camera, picture, wide, high, size] : cases)
-    EXPECT_EQ (
-        WindowLayout ({pane, 2}).size_of (camera, picture, wide, high), size)
+    EXPECT_EQ (WindowLayout ({pane, 2}).size_of (
+                   camera, picture, double (wide) / high),
+        size)
         << picture.width << "x" << picture.height;
 }
 

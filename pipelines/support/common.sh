@@ -14,8 +14,8 @@ window_help='Keys in the window:
   Space           pause at the subframe that is shown; again: live
   Left, Right     pause, and go one subframe back or forward
   L               loop the last second at 1/4 speed; again: live
-  S               write what is shown to a file in the current folder,
-                  '$script'-frameN-slotK-TIMEs.png; no file is replaced
+  S               write what is shown to the current folder, but replace no
+                  file: '$script'-frameN-slotK-TIMEs.png
   Q               end, as Ctrl-C does
 The stream does not wait for the window: recording and counting go on in a pause
 or loop, and subframes are skipped if the screen is too slow. The window keeps

@@ -8,6 +8,7 @@
 
 #include <unistd.h>
 
+#include "calibrate/session.h"
 #include "player.h"
 #include <glib-unix.h>
 
@@ -205,10 +206,9 @@ Guide::on_mapping (const GstStructure *mapping)
       good, uncovered, saturated));
   double tolerance = 0;
   g_object_get (calib_.get (), "tolerance", &tolerance, nullptr);
-  const double deviation = number_of (mapping, "deviation");
-  status_.line (format ("worst corner %.3f mirrors: %s the tolerance of %g%s",
-      deviation, deviation <= tolerance ? "within" : "above", tolerance,
-      deviation <= tolerance ? "" : "; decode with the mapping"));
+  codedexposure::StageCorrection remaining;
+  remaining.deviation = number_of (mapping, "deviation");
+  status_.line (codedexposure::alignment_verdict (remaining, tolerance));
   for (const char *file : {"location", "report"}) {
     const std::string path = text_of (mapping, file);
     gchar *asked = nullptr;

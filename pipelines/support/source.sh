@@ -73,9 +73,12 @@ probe_video ()
 {
   local caps
   [ -r "$1" ] || die "cannot read $1"
-  caps=$(gst-launch-1.0 -v filesrc location="$(quoted "$1")" ! decodebin ! \
-    videoconvert name=probe ! identity eos-after=2 ! fakesink 2>&1 \
-    | sed -n 's/.*probe.GstPad:sink: caps = //p' | head -n 1) || true
+  # It is stopped from here: after an early end, a queue may keep the end of the
+  # file to itself.
+  caps=$(exec 3< <(exec gst-launch-1.0 -v filesrc location="$(quoted "$1")" ! \
+      decodebin ! videoconvert name=probe ! fakesink sync=true 2>&1)
+    sed -n '/probe.GstPad:sink: caps = /{s/.*caps = //p;q}' <&3
+    kill $! 2>/dev/null) || true
   [ -n "$caps" ] || die "$1 is no video that the installed decoders can read"
   sed -E 's/.*width=\(int\)([0-9]+).*height=\(int\)([0-9]+).*framerate=\(fraction\)([0-9]+)\/([0-9]+).*/\1 \2 \3 \4/' \
     <<< "$caps"

@@ -87,7 +87,8 @@ SimulatedMirrors::mask_in_slot (std::int64_t slot)
   if (motion_ != Motion::stepping)
     return std::nullopt;
   if (held_)
-    return slot % schedule_->slots () < held_->slots ? kStillMask : kOffMask;
+    return held_->in_slot (int (slot % schedule_->slots ())) ? kStillMask
+                                                             : kOffMask;
 
   const std::int64_t masks = schedule_->masks ();
   const std::int64_t mask = (slot - offset_) % masks;

@@ -14,9 +14,15 @@ struct StillMask {
   /** Whether pixel (x, y) of the tile is on; x, y >= 0. Called from other
    * threads, also at the same time. */
   std::function<bool (int x, int y)> on;
-  /** Slots of the schedule, from the first on, for which it is shown in every
+  /** Slots of the schedule, from slot `first` on, in which it is shown in every
    * exposure; the mirrors are off in the others. */
   int slots = 1;
+  int first = 0;
+
+  bool in_slot (int slot) const
+  {
+    return slot >= first && slot < first + slots;
+  }
 };
 
 /** Index of the still mask where those of a schedule are 0, 1, ... */

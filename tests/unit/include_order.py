@@ -13,7 +13,7 @@ import re
 import sys
 
 ORDER = ["base", "schedule", "mapping", "setup", "record", "estimate", "extract", "rectify",
-         "fuse", "calibrate", "sync", "dmd", "bench", "stats", "advise",
+         "fuse", "calibrate", "sync", "dmd", "doctor", "bench", "stats", "advise",
          "tools"]
 # The emulated bench: the elements that emulate, and the plugin, which registers
 # the simulated DMD.

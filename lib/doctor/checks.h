@@ -1,0 +1,58 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The checks of a bench, in their order. */
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "doctor/finding.h"
+#include "doctor/rig.h"
+
+namespace codedexposure
+{
+
+/** What the checks before have found, for those after them. */
+struct Examination {
+  Rig &rig;
+  /** Filled as it is measured. */
+  BenchProfile profile = {};
+  /** Frames after show () that may still be of the mask before. */
+  int lag = 4;
+  /** The slots, of how many, that lie in the exposure as a whole; measured by
+   * the check of the trigger. */
+  struct Lit {
+    int first = 0, slots = 1, of = 1;
+  };
+  Lit inside = {};
+  /** Duration of the check of the whole, in seconds. */
+  double recording = 60.0;
+  /** Pictures of the page, or only numbers. */
+  bool exhibits = true;
+};
+
+/** Shows @p mask and returns @p frames of it: those after Examination::lag.
+ * Fewer if frames do not come. */
+Result<std::vector<SeenFrame>> look (
+    Examination &examination, const StillMask &mask, int slots, int frames);
+
+/** Every mirror on in slots [first, first + count) of an exposure. */
+StillMask lit (int first, int count);
+
+/** A check of the bench. An Error is a part that did not obey. */
+struct Check {
+  std::string name;  ///< such as "trigger", for --only
+  std::string title; ///< such as "Trigger and exposure"
+  /** Names of checks that must not have failed. */
+  std::vector<std::string> needs;
+  Result<Finding> (*run) (Examination &examination);
+};
+
+Result<Finding> check_trigger (Examination &examination);
+Result<Finding> check_light (Examination &examination);
+Result<Finding> check_sensor (Examination &examination);
+Result<Finding> check_mirrors (Examination &examination);
+Result<Finding> check_optics (Examination &examination);
+
+} // namespace codedexposure

@@ -1,0 +1,76 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The bench as the doctor sees it: mirrors that obey, and a camera that looks at
+ * them. */
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/image.h"
+#include "base/result.h"
+#include "dmd/dmd.h"
+#include "setup/bench_profile.h"
+
+namespace codedexposure
+{
+
+/** A frame as it came, with the pixel values of the camera. */
+struct SeenFrame {
+  /** By the camera's clock, which may be any epoch. The stamp of one frame to
+   * that of the next is the time between their exposures. */
+  Nanoseconds time = 0;
+  Nanoseconds arrival = 0; ///< by the clock of this machine
+  /** Packets of it are missing, and so are pixels. */
+  bool damaged = false;
+  Image<std::uint16_t> picture;
+};
+
+/** What can be known of the parts without a look at a frame. */
+struct RigParts {
+  BenchProfile::Device camera;
+  std::string pixel_format; ///< GenICam name
+  int bits = 8;             ///< significant ones, 1..16
+  DmdInfo dmd;
+  DmdStatus dmd_status;
+  BenchProfile::Device dmd_device;
+  FrameRate rate; ///< of the schedule, which the trigger gives
+  /** GenICam features of the camera that could be read, as texts. */
+  std::map<std::string, std::string> features;
+};
+
+/**
+ * Mirrors and camera of one bench. Calls come from one thread and may wait for
+ * hardware. An Error is a part that does not obey; a camera that sends nothing
+ * is none.
+ */
+class Rig
+{
+public:
+  virtual ~Rig () = default;
+
+  virtual const RigParts &parts () const = 0;
+
+  /**
+   * Shows one mask from now on, repeated with the trigger of every frame period
+   * of @p slots equal slots: @p mask in its own slots, all mirrors off in the
+   * others. Returns when the DMD runs; frames of the mask before may still be on
+   * their way.
+   */
+  virtual Result<void> show (const StillMask &mask, int slots) = 0;
+  /** Parks the mirrors. If the DMD triggers the camera, frames end. */
+  virtual void park () = 0;
+  /** Sets the exposure time of the camera; none: the longest at which a frame
+   * comes in every period. It holds from a later frame on. */
+  virtual Result<void> expose (std::optional<Nanoseconds> time) = 0;
+  /**
+   * The frames that come from now on, which are those after the last watch () if
+   * nothing was called in between. Fewer than @p frames if none came for two
+   * seconds, or for ten frame periods, whichever is longer.
+   */
+  virtual Result<std::vector<SeenFrame>> watch (int frames) = 0;
+};
+
+} // namespace codedexposure

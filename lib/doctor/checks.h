@@ -26,7 +26,9 @@ struct Examination {
     int first = 0, slots = 1, of = 1;
   };
   Lit inside = {};
-  /** Duration of the check of the whole, in seconds. */
+  /** What the bench is to record, and for how many seconds the check of the
+   * whole does. */
+  Schedule schedule = {};
   double recording = 60.0;
   /** Pictures of the page, or only numbers. */
   bool exhibits = true;
@@ -54,5 +56,6 @@ Result<Finding> check_light (Examination &examination);
 Result<Finding> check_sensor (Examination &examination);
 Result<Finding> check_mirrors (Examination &examination);
 Result<Finding> check_optics (Examination &examination);
+Result<Finding> check_whole (Examination &examination);
 
 } // namespace codedexposure

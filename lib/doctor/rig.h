@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -26,6 +27,19 @@ struct SeenFrame {
   /** Packets of it are missing, and so are pixels. */
   bool damaged = false;
   Image<std::uint16_t> picture;
+};
+
+/** A frame of a recording, with what is known of it. */
+struct RecordedFrame {
+  Nanoseconds time = 0;    ///< start of its exposure
+  Nanoseconds arrival = 0; ///< by the same clock
+  std::uint64_t lost_before = 0;
+  bool damaged = false;
+  /** Whether masks and camera are in step; none: not known yet. */
+  std::optional<bool> synchronised = {};
+  /** 95 % bound on the error of the time; none: not known yet. */
+  std::optional<Nanoseconds> uncertainty = {};
+  ImageView<const std::uint16_t> picture = {}; ///< valid during the call
 };
 
 /** What can be known of the parts without a look at a frame. */
@@ -71,6 +85,13 @@ public:
    * seconds, or for ten frame periods, whichever is longer.
    */
   virtual Result<std::vector<SeenFrame>> watch (int frames) = 0;
+  /**
+   * Records with @p schedule as a user would, for @p seconds, and hands each
+   * frame to @p take. Ends early if no frame comes, as watch () does. The mirrors
+   * are parked afterwards.
+   */
+  virtual Result<void> record (const Schedule &schedule, double seconds,
+      const std::function<void (const RecordedFrame &)> &take) = 0;
 };
 
 } // namespace codedexposure

@@ -148,6 +148,7 @@ private:
   using Indexed = std::pair<int, const Halves *>;
 
   std::string explain () override;
+  PatternLimits limits () const;
   Result<std::vector<PatternTime>> times_of (const SlotPlan &plan) const;
   UploadPlan plan_upload (const Schedule &schedule) const;
   EncodedImages &images_of (const Schedule &schedule);
@@ -245,13 +246,18 @@ Dlpc900::open ()
   return check_placement (options_.placement, info_.array, info_.size);
 }
 
+PatternLimits
+Dlpc900::limits () const
+{
+  return {std::uint32_t (info_.minimum_active / 1000), kLongestTime,
+      kind_.minimum_exposure, std::uint32_t (options_.trigger_delay / 1000),
+      kTriggerDark};
+}
+
 Result<std::vector<PatternTime>>
 Dlpc900::times_of (const SlotPlan &plan) const
 {
-  const PatternLimits limits{std::uint32_t (info_.minimum_active / 1000),
-      kLongestTime, kind_.minimum_exposure,
-      std::uint32_t (options_.trigger_delay / 1000), kTriggerDark};
-  const auto times = fit_patterns (plan, limits, options_.master);
+  const auto times = fit_patterns (plan, limits (), options_.master);
   if (!times)
     return times.error ().with_prefix (info_.name + ": ");
   return times;
@@ -523,27 +529,36 @@ Result<void>
 Dlpc900::show (
     const StillMask &mask, const SlotPlan &plan, std::stop_token stop_token)
 {
-  ASSIGN_OR_RETURN (const auto times, times_of (plan));
+  const auto still = fit_still (plan, mask, limits (), options_.master);
+  if (!still)
+    return still.error ().with_prefix (info_.name + ": ");
   RETURN_IF_ERROR (watch ());
   touched_ = true;
-  const std::vector<PatternTime> still{
-      first_patterns (times, mask.slots, kind_.minimum_exposure)};
+  std::vector<PatternTime> times{still->lit};
+  if (still->before > 0)
+    times.insert (times.begin (), {still->before, 0});
   begin (std::move (stop_token));
-  auto shown = send_still (mask, still);
+  auto shown = send_still (mask, times);
   if (shown)
-    shown = run (still, plan);
+    shown = run (times, plan);
   return shown ? shown : stop_after (shown);
 }
 
+/** @p times  of the mask, or of dark mirrors and the mask. */
 Result<void>
 Dlpc900::send_still (
     const StillMask &mask, const std::vector<PatternTime> &times)
 {
   forget ();
   RETURN_IF_ERROR (prepare ());
-  residents_.planes = {{0, 0}}; // no schedule has one mask: it stays unknown
-  order_ = {0};
-  slots_ = 1;
+  // Plane 1 of the image is empty. It stays unknown which masks these are.
+  constexpr PlaneSlot kMask{0, 0}, kDark{0, 1};
+  residents_.planes = {kMask};
+  if (times.size () > 1)
+    residents_.planes = {kDark, kMask};
+  slots_ = int (times.size ());
+  order_.resize (times.size ());
+  std::iota (order_.begin (), order_.end (), 0);
   if (options_.table_first)
     RETURN_IF_ERROR (send_table (times));
   const Halves image = encode_halves (

@@ -92,7 +92,7 @@ public:
   virtual Result<void> start (
       const SlotPlan &plan, std::stop_token stop = {}) = 0;
   /**
-   * Sends one mask and shows it in the first slots of every exposure, with the
+   * Sends one mask and shows it in its slots of every exposure, with the
    * trigger of a schedule; like start (), after one whole exposure with the
    * mirrors parked. The masks of the schedule are lost: another show (), or
    * upload () and start () follow.

@@ -98,23 +98,69 @@ fit_patterns (const SlotPlan &plan, const PatternLimits &limits, Master master)
   return times;
 }
 
-PatternTime
-first_patterns (const std::vector<PatternTime> &times, int slots,
-    std::uint32_t minimum_dark)
+namespace
 {
-  PatternTime first;
-  for (std::size_t slot = 0; slot < times.size (); slot++) {
-    const PatternTime &time = times[slot];
-    if (int (slot) < slots) {
-      first.exposure += first.dark + time.exposure;
-      first.dark = time.dark;
-    } else {
-      first.dark += time.exposure + time.dark;
-    }
-  }
-  if (first.dark < minimum_dark)
-    first = {first.exposure + first.dark, 0};
-  return first;
+
+/** "slot 3", "slots 3 to 5" */
+std::string
+slots_text (const StillMask &mask)
+{
+  if (mask.slots == 1)
+    return "slot " + std::to_string (mask.first);
+  return "slots " + std::to_string (mask.first) + " to " +
+         std::to_string (mask.first + mask.slots - 1);
+}
+
+/** Fails if @p time, for which the mask is @p what, is below @p least or above
+ * what the limits allow. */
+Result<void>
+check_stretch (const StillMask &mask, const SlotPlan &plan, const char *what,
+    std::int64_t time, std::int64_t least, const PatternLimits &limits)
+{
+  const bool too_short = time < least;
+  if (!too_short && time <= limits.maximum_exposure)
+    return {};
+  const std::int64_t limit = too_short ? least : limits.maximum_exposure;
+  return Error{mask.name + " in " + slots_text (mask) + " of " +
+               std::to_string (plan.slots ()) + " is " + what + " for " +
+               us_text (time) + ", the DMD does that for " + us_text (limit) +
+               (too_short ? " at least" : " at most") + "; use other slots"};
+}
+
+} // namespace
+
+Result<StillTimes>
+fit_still (const SlotPlan &plan, const StillMask &mask,
+    const PatternLimits &limits, Master master)
+{
+  const int after = mask.first + mask.slots;
+  if (mask.first < 0 || mask.slots < 1 || after > plan.slots ())
+    return Error{mask.name + " in " + slots_text (mask) +
+                 " does not fit an exposure of slots 0 to " +
+                 std::to_string (plan.slots () - 1)};
+  const auto us = [] (Nanoseconds time) { return time / kMicrosecond; };
+  const std::int64_t least = std::max (limits.minimum_dark, 1u);
+  const std::int64_t before = us (plan.start (mask.first));
+  const std::int64_t end =
+      us (master == Master::dmd ? plan.frame_period () : plan.exposure ());
+  const std::int64_t light_ends = us (plan.start (after - 1) + plan.active ());
+  const std::int64_t next =
+      after == plan.slots () ? end : us (plan.start (after));
+  // A shorter pause is the movement of the mirrors.
+  const std::int64_t lit_ends = next - light_ends < least ? next : light_ends;
+  const std::int64_t lit = lit_ends - before;
+  const std::int64_t dark = end - lit_ends;
+
+  RETURN_IF_ERROR (check_stretch (mask, plan, "off before its light", before,
+      before > 0 ? limits.minimum_exposure : 0, limits));
+  RETURN_IF_ERROR (
+      check_stretch (mask, plan, "on", lit, limits.minimum_exposure, limits));
+  RETURN_IF_ERROR (check_stretch (
+      mask, plan, "off after its light", dark, dark > 0 ? least : 0, limits));
+  if (master == Master::camera)
+    RETURN_IF_ERROR (check_burst (end, plan, limits));
+  return StillTimes{
+      std::uint32_t (before), {std::uint32_t (lit), std::uint32_t (dark)}};
 }
 
 Result<PatternTime>

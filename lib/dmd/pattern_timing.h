@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "base/result.h"
+#include "schedule/still_mask.h"
 #include "schedule/timing.h"
 
 namespace codedexposure
@@ -50,15 +51,29 @@ struct PatternLimits {
 Result<std::vector<PatternTime>> fit_patterns (
     const SlotPlan &plan, const PatternLimits &limits, Master master);
 
-/** One mask in the first @p slots of an exposure, then dark until the next
- * exposure, or without dark time if that would be too short. */
-PatternTime first_patterns (const std::vector<PatternTime> &times, int slots,
-    std::uint32_t minimum_dark);
+/** How a still mask stands in an exposure. */
+struct StillTimes {
+  /** All mirrors are off before it for that long; 0: it comes first. */
+  std::uint32_t before = 0;
+  PatternTime lit; ///< the mask, then dark until the next exposure
+  bool operator== (const StillTimes &) const = default;
+};
 
 /**
- * The same for controllers with one exposure and one dark time for all masks;
- * slots are rounded down. With the DMD as master, the slots must fill the frame
- * period, because such a controller has no pause.
+ * The times of one mask that is shown in slots [first, first + slots) of an
+ * exposure of @p plan. Slots may be shorter than the shortest time of a mask,
+ * as long as the mask and the dark around it are not. A dark time after the
+ * light of the last slot that is too short for the controller is left out.
+ *
+ * Fails if the plan does not have these slots, or like fit_patterns ().
+ */
+Result<StillTimes> fit_still (const SlotPlan &plan, const StillMask &mask,
+    const PatternLimits &limits, Master master);
+
+/**
+ * fit_patterns () for controllers with one exposure and one dark time for all
+ * masks; slots are rounded down. With the DMD as master, the slots must fill
+ * the frame period, because such a controller has no pause.
  */
 Result<PatternTime> fit_equal_patterns (
     const SlotPlan &plan, const PatternLimits &limits, Master master);

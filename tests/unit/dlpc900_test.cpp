@@ -94,11 +94,12 @@ TEST (Dlpc900, DestructorStopsAndLetsTheMirrorsMove)
 
 /** Stripes of one and a half rows and columns, so that nothing repeats. */
 StillMask
-stripes (int slots)
+stripes (int slots, int first = 0)
 {
   return {.name = "stripes",
       .on = [] (int x, int y) { return (x * 2 / 3 + y * 2 / 3) % 2 == 0; },
-      .slots = slots};
+      .slots = slots,
+      .first = first};
 }
 
 TEST (Dlpc900, AStillMaskStandsInItsSlotsOfEveryExposure)
@@ -123,6 +124,49 @@ TEST (Dlpc900, AStillMaskStandsInItsSlotsOfEveryExposure)
       for (int x = 0; x < mirrors.width (); x++)
         ASSERT_EQ (mirrors.at (x, y), stripes (1).on (x, y));
   }
+}
+
+TEST (Dlpc900, AStillMaskCanComeLaterInTheExposure)
+{
+  for (const char *options : {"", "x,master=camera"}) {
+    const bool slave = options[0] != '\0';
+    const Schedule schedule =
+        schedule_of (slave ? "sequential:2x2,readout=400us" : "sequential:2x2");
+    Rig rig;
+    ASSERT_EQ (message_of (rig.open (options)), "");
+    ASSERT_EQ (
+        message_of (rig.dmd->show (stripes (2, 1), plan_of (schedule), {})),
+        "");
+    EXPECT_TRUE (rig.board->running ());
+    EXPECT_EQ (exposures (*rig.board),
+        slave ? (std::vector<std::uint32_t>{9900, 19800})
+              : (std::vector<std::uint32_t>{10'000, 20'000}));
+    EXPECT_EQ (rig.board->shown ()[1].dark, slave ? 9900u : 10'000u);
+    EXPECT_EQ (flags (*rig.board, &EmulatedDlpc900::Line::pulses),
+        slave ? "11" : "10");
+    EXPECT_EQ (
+        flags (*rig.board, &EmulatedDlpc900::Line::waits), slave ? "10" : "00");
+    const auto dark = rig.board->mirrors (0), light = rig.board->mirrors (1);
+    for (int y = 0; y < light.height (); y++)
+      for (int x = 0; x < light.width (); x++) {
+        ASSERT_EQ (dark.at (x, y), 0);
+        ASSERT_EQ (light.at (x, y), stripes (1).on (x, y));
+      }
+  }
+}
+
+TEST (Dlpc900, AStillMaskThatIsTooShortIsRefusedAndChangesNothing)
+{
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open ()), "");
+  ASSERT_EQ (message_of (rig.show (Schedule ())), "");
+  const auto plan = SlotPlan::fit ({}, 400, {25, 1});
+  ASSERT_TRUE (plan.ok ());
+  EXPECT_EQ (message_of (rig.dmd->show (stripes (1, 9), *plan, {})),
+      "board (DLP5500): stripes in slot 9 of 400 is on for 100us, the DMD "
+      "does that for 105us at least; use other slots");
+  EXPECT_TRUE (rig.board->running ());
+  expect_masks (*rig.board, Schedule ());
 }
 
 TEST (Dlpc900, AStillMaskIsRenderedOnce)

@@ -105,13 +105,92 @@ TEST (EqualPatternTiming, AsMasterKnowsNoPause)
       (PatternTime{9900, 0}));
 }
 
-TEST (PatternTiming, OneMaskInTheFirstSlotsIsDarkInTheOthers)
+namespace
 {
-  const Times times{{9800, 200}, {9800, 200}, {9800, 200}, {9800, 200}};
-  EXPECT_EQ (first_patterns (times, 1, 105), (PatternTime{9800, 30200}));
-  EXPECT_EQ (first_patterns (times, 3, 105), (PatternTime{29800, 10200}));
-  EXPECT_EQ (first_patterns (times, 4, 105), (PatternTime{39800, 200}));
-  EXPECT_EQ (first_patterns (times, 4, 200), (PatternTime{39800, 200}));
-  EXPECT_EQ (first_patterns (times, 4, 201), (PatternTime{40000, 0}));
-  EXPECT_EQ (first_patterns (times, 4, 300), (PatternTime{40000, 0}));
+
+StillTimes
+still (const SlotPlan &plan, int first, int slots,
+    const PatternLimits &limits = kLimits, Master master = Master::dmd)
+{
+  const auto times = fit_still (plan,
+      {.name = "light", .on = {}, .slots = slots, .first = first}, limits,
+      master);
+  EXPECT_TRUE (times.ok ()) << times.error ().message;
+  return times ? *times : StillTimes{};
+}
+
+std::string
+refused (const SlotPlan &plan, int first, int slots)
+{
+  const auto times = fit_still (plan,
+      {.name = "light", .on = {}, .slots = slots, .first = first}, kLimits,
+      Master::dmd);
+  return times ? "" : times.error ().message;
+}
+
+const Timing kBench{.active = 9'800'000, .switching = 200'000};
+
+} // namespace
+
+TEST (StillTiming, AMaskInTheFirstSlotsIsDarkInTheOthers)
+{
+  const SlotPlan bench = plan (kBench, 4);
+  EXPECT_EQ (still (bench, 0, 1), (StillTimes{0, {9800, 30200}}));
+  EXPECT_EQ (still (bench, 0, 3), (StillTimes{0, {29800, 10200}}));
+  PatternLimits limits = kLimits;
+  for (const auto &[least, lit] :
+      {std::pair{105u, 39800u}, {200u, 39800u}, {201u, 40000u}}) {
+    limits.minimum_dark = least;
+    EXPECT_EQ (still (bench, 0, 4, limits), (StillTimes{0, {lit, 40000 - lit}}))
+        << least;
+  }
+}
+
+TEST (StillTiming, ALaterMaskComesAfterDarkTimeAndFillsThePeriod)
+{
+  EXPECT_EQ (still (plan ({}, 4), 1, 2), (StillTimes{10000, {20000, 10000}}));
+  EXPECT_EQ (still (plan ({}, 4), 3, 1), (StillTimes{30000, {10000, 0}}));
+  EXPECT_EQ (
+      still (plan (kBench, 4), 2, 1), (StillTimes{20000, {9800, 10200}}));
+  const SlotPlan odd = plan ({}, 7, {30000, 1001});
+  for (int first = 0; first < 7; first++) {
+    const StillTimes times = still (odd, first, 1);
+    EXPECT_EQ (times.before + times.lit.exposure + times.lit.dark, 33366u);
+    EXPECT_EQ (times.before, odd.start (first) / 1000);
+  }
+}
+
+TEST (StillTiming, SlotsMayBeShorterThanAMask)
+{
+  const SlotPlan fine = plan ({}, 2000);
+  EXPECT_EQ (still (fine, 7, 6), (StillTimes{140, {120, 39740}}));
+  EXPECT_EQ (refused (fine, 7, 5),
+      "light in slots 7 to 11 of 2000 is on for 100us, the DMD does that for "
+      "105us at least; use other slots");
+  EXPECT_EQ (refused (fine, 5, 10),
+      "light in slots 5 to 14 of 2000 is off before its light for 100us, the "
+      "DMD does that for 105us at least; use other slots");
+  EXPECT_EQ (refused (fine, 1985, 10),
+      "light in slots 1985 to 1994 of 2000 is off after its light for 100us, "
+      "the DMD does that for 105us at least; use other slots");
+}
+
+TEST (StillTiming, SlotsThatThePlanDoesNotHaveAreRefused)
+{
+  EXPECT_EQ (refused (plan ({}, 4), 3, 2),
+      "light in slots 3 to 4 does not fit an exposure of slots 0 to 3");
+  EXPECT_NE (refused (plan ({}, 4), -1, 2), "");
+  EXPECT_NE (refused (plan ({}, 4), 0, 0), "");
+}
+
+TEST (StillTiming, WithTheCameraAsMasterItLeavesTimeForTheTrigger)
+{
+  const SlotPlan roomy = plan ({.readout = 400'000}, 4);
+  EXPECT_EQ (still (roomy, 1, 1, kLimits, Master::camera),
+      (StillTimes{9900, {9900, 19800}}));
+  EXPECT_EQ (still (roomy, 3, 1, kLimits, Master::camera),
+      (StillTimes{29700, {9900, 0}}));
+  EXPECT_FALSE (fit_still (
+      plan ({}, 4), {.name = "light", .on = {}}, kLimits, Master::camera)
+                    .ok ());
 }

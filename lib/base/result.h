@@ -23,6 +23,8 @@ enum class ErrorCode {
   not_found,        ///< there is no such file or device
   io,               ///< a file or a connection could not be read or written
   device,           ///< a device refused a command or reported a fault
+  denied,           ///< the user has no right to do it
+  busy,             ///< another program uses the device
   timeout,          ///< a device or a peer did not answer in time
   cancelled,        ///< the caller asked to stop
   unsupported,      ///< this build, machine or device cannot do it

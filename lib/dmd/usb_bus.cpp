@@ -46,6 +46,8 @@ usb_error (const std::string &what, int code)
   return Error{text, code == LIBUSB_ERROR_TIMEOUT     ? ErrorCode::timeout
                      : code == LIBUSB_ERROR_NO_DEVICE ? ErrorCode::not_found
                      : code == LIBUSB_ERROR_NO_MEM    ? ErrorCode::out_of_memory
+                     : code == LIBUSB_ERROR_ACCESS    ? ErrorCode::denied
+                     : code == LIBUSB_ERROR_BUSY      ? ErrorCode::busy
                                                       : ErrorCode::io};
 }
 

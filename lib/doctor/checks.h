@@ -13,9 +13,17 @@
 namespace codedexposure
 {
 
+/** What is known of the machine that records. */
+struct HostFacts {
+  /** Sustained rate of writing, bytes/s. */
+  std::optional<Measured> disk_rate = {};
+  double socket_buffer = 0; ///< largest of a socket, bytes; 0: not known
+};
+
 /** What the checks before have found, for those after them. */
 struct Examination {
   Rig &rig;
+  HostFacts host = {};
   /** Filled as it is measured. */
   BenchProfile profile = {};
   /** Frames after show () that may still be of the mask before. */
@@ -51,6 +59,10 @@ struct Check {
   Result<Finding> (*run) (Examination &examination);
 };
 
+/** What is found where a part cannot be opened: the camera, or the DMD. */
+Finding part_missing (const Error &why, bool camera);
+
+Result<Finding> check_parts (Examination &examination);
 Result<Finding> check_trigger (Examination &examination);
 Result<Finding> check_light (Examination &examination);
 Result<Finding> check_sensor (Examination &examination);

@@ -36,7 +36,7 @@ struct Diagnosis {
 /** Points of a curve, in the order in which they are joined. */
 struct Plot {
   std::string title, x_axis, y_axis;
-  std::vector<Position> points;
+  std::vector<Position> points = {};
   std::vector<Position> model = {}; ///< a second curve; empty: none
 };
 
@@ -48,10 +48,12 @@ struct Exhibit {
 
 /** The result of a check. */
 struct Finding {
-  std::string check;     ///< such as "trigger"
-  std::string shown;     ///< what the mirrors showed, one sentence
-  bool skipped = false;  ///< what it depends on has failed
+  std::string check;    ///< such as "trigger"
+  std::string shown;    ///< what the mirrors showed, one sentence
+  bool skipped = false; ///< what it depends on has failed
   std::vector<Reading> readings = {};
+  /** What was found that is no number: name and text. */
+  std::vector<std::pair<std::string, std::string>> notes = {};
   /** The most likely one first. */
   std::vector<Diagnosis> diagnoses = {};
   std::vector<Plot> plots = {};

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The bench as the doctor sees it: mirrors that obey, and a camera that looks at
- * them. */
+/* The bench as the doctor sees it: mirrors that obey, and a camera that looks
+ * at them. */
 #pragma once
 
 #include <cstdint>
@@ -70,8 +70,8 @@ public:
   /**
    * Shows one mask from now on, repeated with the trigger of every frame period
    * of @p slots equal slots: @p mask in its own slots, all mirrors off in the
-   * others. Returns when the DMD runs; frames of the mask before may still be on
-   * their way.
+   * others. Returns when the DMD runs; frames of the mask before may still be
+   * on their way.
    */
   virtual Result<void> show (const StillMask &mask, int slots) = 0;
   /** Parks the mirrors. If the DMD triggers the camera, frames end. */
@@ -80,15 +80,15 @@ public:
    * comes in every period. It holds from a later frame on. */
   virtual Result<void> expose (std::optional<Nanoseconds> time) = 0;
   /**
-   * The frames that come from now on, which are those after the last watch () if
-   * nothing was called in between. Fewer than @p frames if none came for two
+   * The frames that come from now on, which are those after the last watch ()
+   * if nothing was called in between. Fewer than @p frames if none came for two
    * seconds, or for ten frame periods, whichever is longer.
    */
   virtual Result<std::vector<SeenFrame>> watch (int frames) = 0;
   /**
    * Records with @p schedule as a user would, for @p seconds, and hands each
-   * frame to @p take. Ends early if no frame comes, as watch () does. The mirrors
-   * are parked afterwards.
+   * frame to @p take. Ends early if no frame comes, as watch () does. The
+   * mirrors are parked afterwards.
    */
   virtual Result<void> record (const Schedule &schedule, double seconds,
       const std::function<void (const RecordedFrame &)> &take) = 0;

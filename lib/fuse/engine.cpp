@@ -15,6 +15,7 @@ namespace
 {
 
 constexpr double kWhite = 255.0;
+static_assert (StaticPixels::kMemory == Fuser<std::uint8_t>::kMaxHistory);
 /* Light, as a part of white, at which the noise of filters is taken. */
 constexpr double kTypicalLight = 0.4;
 /* Noise of coded pixels, in units of the scene's variance, below which the
@@ -46,6 +47,16 @@ find_kernels (std::string_view target)
     if (target.empty () || kernels.name == target)
       return &kernels;
   return nullptr;
+}
+
+/* Of a pixel, in grey levels times its gain. */
+float
+largest_light (const Observation &observation)
+{
+  double gain = 1.0;
+  for (int e = 0; e < observation.slots (); e++)
+    gain = std::max (gain, observation.gain (e));
+  return float (gain * kWhite);
 }
 
 Result<void>
@@ -118,7 +129,7 @@ Engine::Engine (const Schedule &schedule, int width, int height,
       phases_ (schedule), kernels_ (*find_kernels (options.target)),
       radius_ (tap_radius (schedule.slots ())),
       static_pixels_ (width, height, StaticPixels::radius_of (schedule.cell ()),
-          !observation_.noise_free ())
+          !observation_.noise_free (), largest_light (observation_))
 {
   map_noise (schedule);
   find_margin (schedule);

@@ -11,8 +11,8 @@
 
 #include "base/image.h"
 #include "base/result.h"
-#include "estimate/sensor_noise.h"
 #include "estimate/scene_model.h"
+#include "estimate/sensor_noise.h"
 #include "schedule/schedule.h"
 
 namespace codedexposure
@@ -72,6 +72,10 @@ public:
   static constexpr int kMaxPhases = 1024;
   static constexpr int kMaxSlots = 16;
   static constexpr int kMaxLookahead = 1;
+  /** Coded frames before a frame on which its pixels can depend, at most; 1 if
+   * the noise is 0. Fused with as many before it, and lookahead after it, a
+   * part of a stream gives the same pixels as the whole. */
+  static constexpr int kMaxHistory = 16;
 
   /** @p width, @p height  of the coded frames, the pilot's rows included.
    * Error when an option or the schedule is out of the bounds above. */

@@ -2,6 +2,9 @@
 /* Detection of static pixels, by comparing coded frames with each other. */
 #pragma once
 
+#include <cstdint>
+#include <vector>
+
 #include "estimate/observation.h"
 #include "fuse/box_filter.h"
 #include "fuse/field.h"
@@ -23,15 +26,21 @@ struct NoiseMap {
  * changes either. There, neighbours of the same slot predict a pixel better
  * than the closest neighbours do, and the pixel does not count as static.
  *
- * If the noise is known, the light of static pixels is averaged over the frames
- * since they became static.
+ * If the noise is known, the light of static pixels is averaged over up to
+ * kMemory frames, back to the last change between two neighbouring frames. The
+ * results depend on the kMemory frames before a frame and on nothing older, so
+ * that parts of a recording can be fused separately.
  */
 class StaticPixels
 {
 public:
+  /** Frames before a frame on which its results can depend. */
+  static constexpr int kMemory = 16;
+
   /** @p radius   of the surroundings, which contain every slot, px.
-   *  @p average  over frames. */
-  StaticPixels (int width, int height, int radius, bool average);
+   *  @p average  over frames.
+   *  @p largest  light of a pixel, 255 for white. */
+  StaticPixels (int width, int height, int radius, bool average, float largest);
   int radius () const { return radius_; }
   /** The radius for a tile with this cell. */
   static int radius_of (Extent cell);
@@ -45,28 +54,42 @@ public:
   void update (const Kernels &kernels, const Field &coded, const Field *after,
       const NoiseMap &noise);
   /** Forgets all frames. */
-  void forget () { begun_ = false; }
+  void forget () { frames_ = 0; }
 
   /** Weight of light (): 0, moving, to 1, static. */
   const float *weight (int y) const { return weight_.row (y); }
   /** The picture of static pixels. */
-  const float *light (int y) const { return mean_.row (y); }
+  const float *light (int y) const
+  {
+    return average_ ? light_.row (y) : last_.row (y);
+  }
 
 private:
   void compare_frames (const Kernels &kernels, const Field &now,
       const Field &other, const Field *count, const NoiseMap &noise,
-      bool raise);
-  void rate_row (int y, const float *sum, const float *max, bool raise);
+      Field &rating);
+  void rate_row (int y, const float *sum, const float *max, Field &rating);
+  void average_row (int y, const float *now);
+  std::uint16_t *past_row (std::int64_t frame, int y);
 
   int radius_;
   bool average_;
-  bool begun_ = false;
-  Field mean_;   ///< of the frames in which a pixel was static
-  Field count_;  ///< of these frames
+  float steps_;             ///< of past_, per grey level
+  std::int64_t frames_ = 0; ///< since the last forget ()
+  Field last_;              ///< frame
+  Field mean_;              ///< of the frames since the last change
+  Field count_;             ///< of these frames
+  Field light_;  ///< the mean, or the last frame where that differs from it
   Field change_; ///< one row
   BoxFilter sums_, maxima_;
   Field unrepeated_; ///< 1 where no repetition is detected
   Field weight_;
+  Field unchanged_;       ///< from the last frame to the next: 1, none changed
+  bool compared_ = false; ///< unchanged_ is of the next frame
+
+  /* Whole numbers, so that what is added can be taken away exactly. */
+  std::vector<std::uint16_t> past_; ///< the last kMemory frames
+  std::vector<std::uint32_t> sum_;  ///< of count_ frames
 };
 
 } // namespace codedexposure::fuse

@@ -2,11 +2,12 @@
 """One picture, and what is known of it."""
 from __future__ import annotations
 
+import ctypes
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from ._pipeline import Gst
+from ._pipeline import Error, Gst
 
 # Elements write this time where a time is not known.
 _NO_TIME = 2**64 - 1
@@ -17,8 +18,8 @@ _TYPES = {"GRAY8": np.dtype("u1"), "GRAY16_LE": np.dtype("<u2")}
 class Frame:
     """A subframe, a full-size frame or a coded frame. Unknown values are None.
 
-    The array owns its memory: it stays valid as long as it is used. It is
-    read-only; use image.copy() to change it.
+    The array is the memory in which the frame was decoded. It stays valid as
+    long as it is used. It is read-only; use image.copy() to change it.
     """
     image: np.ndarray = field(repr=False, compare=False)
     """Pixel values, shape (height, width), uint8 or uint16, never scaled."""
@@ -51,14 +52,49 @@ class Frame:
         return self.time_ns * 1e-9
 
 
+class _MapInfo(ctypes.Structure):  # pylint: disable=too-few-public-methods
+    """GstMapInfo. That of PyGObject copies the memory."""
+    _fields_ = [("memory", ctypes.c_void_p), ("flags", ctypes.c_int),
+                ("data", ctypes.c_void_p), ("size", ctypes.c_size_t),
+                ("maxsize", ctypes.c_size_t),
+                ("user_data", ctypes.c_void_p * 4),
+                ("reserved", ctypes.c_void_p * 4)]
+
+
+_gst = ctypes.CDLL("libgstreamer-1.0.so.0")
+for _call in (_gst.gst_buffer_map, _gst.gst_buffer_unmap):
+    _call.argtypes = [ctypes.c_void_p, ctypes.POINTER(_MapInfo)]
+_gst.gst_buffer_map.argtypes.append(ctypes.c_int)
+
+
+class _Mapped:  # pylint: disable=too-few-public-methods
+    """The bytes of a buffer, which stays mapped as long as an array of them is
+    used."""
+
+    def __init__(self, buffer):
+        self._buffer = buffer
+        self._info = _MapInfo()
+        # The hash of a GstBuffer is its address.
+        if not _gst.gst_buffer_map(hash(buffer), self._info,
+                                   int(Gst.MapFlags.READ)):
+            raise Error("the memory of a frame cannot be read")
+        self.__array_interface__ = {
+            "version": 3, "typestr": "|u1", "shape": (self._info.size,),
+            "data": (self._info.data, True)}
+
+    def __del__(self):
+        if self._info.data:
+            _gst.gst_buffer_unmap(hash(self._buffer), self._info)
+
+
 def pixels_of(buffer, caps) -> np.ndarray:
-    """The picture, in memory of its own."""
+    """The picture, in the memory of the buffer."""
     kind = _TYPES[caps.get_value("format")]
     width, height = caps.get_value("width"), caps.get_value("height")
-    data = buffer.extract_dup(0, buffer.get_size())
+    data = np.asarray(_Mapped(buffer))
     # Rows are padded to a multiple of four bytes.
-    rows = np.frombuffer(data, kind, height * (len(data) // height
-                                               // kind.itemsize))
+    stride = len(data) // height // kind.itemsize * kind.itemsize
+    rows = data[:height * stride].view(kind)
     return rows.reshape(height, -1)[:, :width]
 
 

@@ -9,6 +9,7 @@ import warnings
 from rig import SCRATCH, clean, decoded, pixels, run, simulate
 import numpy as np
 import codedexposure
+from codedexposure.frame import pixels_of
 from gi.repository import Gst
 
 
@@ -101,6 +102,19 @@ class Pixels(unittest.TestCase):
         self.assertEqual(pixels(frames),
                          pixels(opened("plain.mkv").subframes()))
         self.assertFalse(frames[0].image.flags.writeable)
+
+    def test_no_copy(self):
+        buffer = Gst.Buffer.new_wrapped(bytes(range(12)))
+        caps = Gst.Structure.new_from_string(
+            "video/x-raw,format=GRAY8,width=3,height=3")
+        image, again = pixels_of(buffer, caps), pixels_of(buffer, caps)
+        self.assertEqual(image.ctypes.data, again.ctypes.data)
+        row = image[0]
+        del image, again
+        # The one who writes gets other memory.
+        buffer.fill(0, b"\xff")
+        self.assertEqual(buffer.extract_dup(0, 1), b"\xff")
+        self.assertEqual(row.tolist(), [0, 1, 2])
 
 
 class Facts(unittest.TestCase):

@@ -137,6 +137,9 @@ check_options ()
   check_option wait '[0-9]+(\.[0-9]+)?' 'a number of seconds'
   check_option start '[0-9]+(\.[0-9]+)?' 'a number of seconds'
   check_option duration '[0-9]+(\.[0-9]+)?' 'a number of seconds'
+  check_option excerpt '[0-9]+(\.[0-9]+)?-([0-9]+(\.[0-9]+)?)?' \
+    'FROM-UNTIL in seconds, such as 10-20 or 10-'
+  check_option threads '[1-9]|[1-5][0-9]|6[0-4]' 'a number from 1 to 64'
   check_option fuse 'fast|balanced|best' 'fast, balanced or best'
   check_option trigger 'dmd|camera|none' 'dmd, camera or none'
   check_option trigger-edge 'rising|falling' 'rising or falling'
@@ -304,7 +307,8 @@ launch_decoder ()
 
 lossless_video ()
 {
-  printf 'avenc_ffv1 gop-size=1 slices=4 threads=auto ! '
+  printf 'avenc_ffv1 gop-size=1 slices=4 threads=%s ! ' \
+    "${opt[threads]:-auto}"
   printf 'matroskamux timecodescale=1000 ! filesink location=%s ' \
     "$(quoted "$1")"
 }

@@ -2,6 +2,7 @@
 #include "frame_counter.h"
 
 #include <algorithm>
+#include <tuple>
 #include <utility>
 
 using namespace codedexposure::gst;
@@ -46,7 +47,7 @@ FrameCounter::FrameCounter (ObjectPtr<GstPad> sink, const Times &times,
     : pad_ (std::move (sink)), times_ (times),
       cannot_seek_ (std::move (cannot_seek))
 {
-  if (times.start > 0 || times.duration > 0)
+  if (times.start > 0 || times.duration > 0 || times.excerpt)
     hold_ = gst_pad_add_probe (pad (),
         GstPadProbeType (GST_PAD_PROBE_TYPE_BLOCK | GST_PAD_PROBE_TYPE_BUFFER),
         hold_first_frame, this, nullptr);
@@ -70,6 +71,9 @@ FrameCounter::done (gint64 total) const
     return double (frames_) / double (total);
   if (last_pts_ < 0)
     return 0;
+  if (times_.excerpt && GST_CLOCK_TIME_IS_VALID (times_.excerpt->until))
+    return double (last_pts_ - gint64 (times_.excerpt->from)) /
+           double (times_.excerpt->until - times_.excerpt->from);
   if (times_.duration > 0)
     return (1e-9 * double (last_pts_) - times_.start) / times_.duration;
   if (gst_pad_peer_query_duration (pad (), GST_FORMAT_TIME, &length) &&
@@ -91,23 +95,32 @@ FrameCounter::end ()
       element.get (), send, gst_object_ref (pad_.get ()), gst_object_unref);
 }
 
-/* The first frame is held, so no file is started and nothing is shown before
- * the seek. The segment begins at the start of a frame and has at least one,
- * because decoders clip a coded frame to the segment and its slots would be
- * lost. */
-void
-FrameCounter::seek ()
+/* The segment begins at the start of a frame and has at least one, because
+ * decoders clip a coded frame to the segment and its slots would be lost. */
+GstEvent *
+FrameCounter::new_seek () const
 {
-  const GstClockTime start = nanoseconds (times_.start);
-  const GstClockTime length =
-      std::max (nanoseconds (times_.duration), frame_period (pad ()));
-  GstEvent *event = gst_event_new_seek (1.0, GST_FORMAT_TIME,
+  const GstClockTime period = frame_period (pad ());
+  GstClockTime start = nanoseconds (times_.start), stop = GST_CLOCK_TIME_NONE;
+  if (times_.excerpt) {
+    std::tie (start, stop) = times_.excerpt->read (period);
+  } else if (times_.duration > 0) {
+    stop = start + std::max (nanoseconds (times_.duration), period);
+  }
+  return gst_event_new_seek (1.0, GST_FORMAT_TIME,
       GstSeekFlags (GST_SEEK_FLAG_FLUSH | GST_SEEK_FLAG_KEY_UNIT |
                     GST_SEEK_FLAG_SNAP_BEFORE),
       GST_SEEK_TYPE_SET, gint64 (start),
-      times_.duration > 0 ? GST_SEEK_TYPE_SET : GST_SEEK_TYPE_NONE,
-      gint64 (start + length));
-  if (!gst_pad_push_event (pad (), event))
+      GST_CLOCK_TIME_IS_VALID (stop) ? GST_SEEK_TYPE_SET : GST_SEEK_TYPE_NONE,
+      gint64 (stop));
+}
+
+/* The first frame is held, so no file is started and nothing is shown before
+ * the seek. */
+void
+FrameCounter::seek ()
+{
+  if (!gst_pad_push_event (pad (), new_seek ()))
     cannot_seek_ ();
   gst_pad_remove_probe (pad (), std::exchange (hold_, 0));
 }
@@ -159,6 +172,9 @@ FrameCounter::on_frame (GstPad *, GstPadProbeInfo *info, gpointer self)
   const GstBuffer *frame = GST_PAD_PROBE_INFO_BUFFER (info);
   if (is_before (frame, nanoseconds (counter->times_.start)))
     return GST_PAD_PROBE_DROP;
+  if (const auto &excerpt = counter->times_.excerpt;
+      excerpt && !excerpt->holds (GST_BUFFER_PTS (frame)))
+    return GST_PAD_PROBE_OK;
   counter->frames_++;
   if (GST_BUFFER_PTS_IS_VALID (frame))
     counter->last_pts_ = gint64 (GST_BUFFER_PTS (frame));

@@ -3,10 +3,12 @@
 
 #include <atomic>
 #include <functional>
+#include <optional>
 
 #include <gst/gst.h>
 
 #include "common/raii.h"
+#include "excerpt.h"
 
 /** Counts the coded frames at a pad, and fits their times to what is wanted. */
 class FrameCounter
@@ -17,7 +19,8 @@ public:
     gdouble start = 0;     // of the stream, at which to start
     gdouble duration = 0;  // to play; 0: all
     gdouble shift_to = -1; // running time of the first frame; -1: unchanged
-    gboolean keep_time = FALSE; // running time is the time of the recording
+    gboolean keep_time = FALSE;     // running time is the time of the recording
+    std::optional<Excerpt> excerpt; // only its frames are counted; no duration
   };
 
   /** @p sink         the pad, before the pipeline plays.
@@ -38,6 +41,7 @@ public:
 
 private:
   void seek ();
+  GstEvent *new_seek () const;
   static gboolean on_held (gpointer self);
   static GstPadProbeReturn hold_first_frame (
       GstPad *, GstPadProbeInfo *, gpointer self);

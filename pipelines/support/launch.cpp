@@ -14,6 +14,7 @@
 
 #include "byte_watch.h"
 #include "each_element.h"
+#include "excerpt.h"
 #include "frame_counter.h"
 #include "frame_limit.h"
 #include "leaky_queue.h"
@@ -37,7 +38,8 @@ enum ExitCode {
   kDamaged = 3, // done, but frames are missing or not as they were recorded
   kNobodyListens = 4,
   kNoFrame = 5,
-  kContainer = 6 // the container of the recording is damaged
+  kContainer = 6, // the container of the recording is damaged
+  kEmpty = 7      // the excerpt has no frame
 };
 
 struct Options {
@@ -47,6 +49,8 @@ struct Options {
   gchar *receiver = nullptr; // tcpserversink to wait for
   gdouble retry = 0;         // time for which to try to connect, s
   FrameCounter::Times times;
+  gchar *excerpt = nullptr;   // FROM:UNTIL:BEFORE:AFTER, of Excerpt
+  gchar *ledger = nullptr;    // file for what came of each coded frame of it
   gboolean salvage = FALSE;   // go on after damage of the container
   gchar *need = nullptr;      // name of an element message that must come
   gboolean camera = FALSE;    // frames come all the time
@@ -103,6 +107,7 @@ private:
   std::vector<std::unique_ptr<LeakyQueue>> leaky_queues_;
   std::unique_ptr<ByteWatch> byte_watch_;
   std::unique_ptr<FrameLimit> limit_;
+  std::unique_ptr<ExcerptFilter> excerpt_;
   std::unique_ptr<Window> window_;
   gint64 frames_before_ = -1; // at the last tick
   bool silent_ = false;       // no frame came for a while, and that was said
@@ -217,6 +222,10 @@ Launch::run ()
   if (!connect_counter () ||
       !claim_outputs (options_.force, counter_ ? counter_->pad () : nullptr))
     return kFailed;
+  if (counter_ && options_.times.excerpt)
+    excerpt_ =
+        std::make_unique<ExcerptFilter> (pipeline_.get (), counter_->pad (),
+            *options_.times.excerpt, options_.ledger ? options_.ledger : "");
   watch_leaky_queues ();
   add_window ();
   whole_picture::wait_for_inputs (pipeline_.get ());
@@ -246,6 +255,9 @@ Launch::finish (int code)
                   "cannot be found; if ffmpeg reads it, \"ffmpeg -i IN.mkv "
                   "-map 0 -c copy OUT.mkv\" writes a new one");
     code = kNoFrame;
+  } else if (code == kDone && no_frame && excerpt_) {
+    status_.line ("no coded frame lies in the excerpt");
+    code = kEmpty;
   } else if (code == kDone && no_frame) {
     status_.line (options_.times.start > 0
                       ? format ("error: no coded frame arrived; check whether "
@@ -260,6 +272,10 @@ Launch::finish (int code)
   const std::string flaws = flaws_of (pipeline_.get ());
   if (!finish_outputs (code != kContainer))
     return kFailed;
+  if (excerpt_ && !excerpt_->finish ()) {
+    status_.line ("error: cannot write the ledger");
+    return kFailed;
+  }
   const std::string wrote = outputs_.summary (guint64 (frames ()));
   if (code != kDone && !wrote.empty ())
     status_.line ("kept what was complete: " + wrote);
@@ -556,6 +572,12 @@ main (int argc, char **argv)
           "Time of the stream at which to start", "SECONDS"},
       {"duration", 0, 0, G_OPTION_ARG_DOUBLE, &options.times.duration,
           "Duration to play", "SECONDS"},
+      {"excerpt", 0, 0, G_OPTION_ARG_STRING, &options.excerpt,
+          "Only the coded frames from FROM to UNTIL, ns, as in the whole "
+          "stream",
+          "FROM:UNTIL:BEFORE:AFTER"},
+      {"ledger", 0, 0, G_OPTION_ARG_STRING, &options.ledger,
+          "File for what came of each coded frame of the excerpt", "FILE"},
       {"keep-time", 0, 0, G_OPTION_ARG_NONE, &options.times.keep_time,
           "Times of the output are those of the recording", nullptr},
       {"salvage", 0, 0, G_OPTION_ARG_NONE, &options.salvage,
@@ -579,6 +601,14 @@ main (int argc, char **argv)
       pipeline_argument ("codedexposure-launch", entries, argc, argv);
   if (!pipeline)
     return kUsage;
+  if (options.excerpt &&
+      !(options.times.excerpt = Excerpt::parse (options.excerpt))) {
+    std::fprintf (stderr,
+        "codedexposure-launch: --excerpt %s is not "
+        "FROM:UNTIL:BEFORE:AFTER\n",
+        options.excerpt);
+    return kUsage;
+  }
   /* A script that is killed cannot pass that on. */
   prctl (PR_SET_PDEATHSIG, SIGTERM);
 
@@ -592,6 +622,8 @@ main (int argc, char **argv)
   g_free (options.count);
   g_free (options.receiver);
   g_free (options.need);
+  g_free (options.excerpt);
+  g_free (options.ledger);
   gst_deinit ();
   return code;
 }

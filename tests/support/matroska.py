@@ -1,0 +1,72 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Compares and damages Matroska files for tests.
+
+  matroska.py same A B          whether they are the same, but for the random
+                                identifiers and the date that each run writes
+  matroska.py lose IN OUT N...  a copy without the Nth clusters, from 0 on; in a
+                                recording, each is a coded frame with its line
+"""
+import sys
+
+SEGMENT, CLUSTER, VOID = 0x18538067, 0x1F43B675, 0xEC
+INFO, TRACKS, TRACK, TAGS, TAG, TARGETS = (
+    0x1549A966, 0x1654AE6B, 0xAE, 0x1254C367, 0x7373, 0x63C0)
+SEGMENT_UID, DATE, TRACK_UID, TAG_TRACK_UID = 0x73A4, 0x4461, 0x73C5, 0x63C5
+PARENTS = {SEGMENT, INFO, TRACKS, TRACK, TAGS, TAG, TARGETS}
+RANDOM = {SEGMENT_UID, DATE, TRACK_UID, TAG_TRACK_UID}
+
+
+def number(data, at, keep_marker):
+    length = 9 - data[at].bit_length()
+    value = int.from_bytes(data[at:at + length], 'big')
+    return (value if keep_marker else value & ~(1 << 7 * length)), at + length
+
+
+def elements(data, at, end):
+    """(id, start, start of the content, end) of each, also within others."""
+    while at < end:
+        name, body = number(data, at, True)
+        size, body = number(data, body, False)
+        stop = min(body + size, end)
+        yield name, at, body, stop
+        if name in PARENTS:
+            yield from elements(data, body, stop)
+        at = stop
+
+
+def without_random(name):
+    with open(name, 'rb') as file:
+        data = bytearray(file.read())
+    for kind, _, body, end in elements(bytes(data), 0, len(data)):
+        if kind in RANDOM:
+            data[body:end] = bytes(end - body)
+    return data
+
+
+def lose(source, target, numbers):
+    with open(source, 'rb') as file:
+        data = bytearray(file.read())
+    clusters = [at for kind, at, *_ in elements(bytes(data), 0, len(data))
+                if kind == CLUSTER]
+    for cluster in (clusters[n] for n in numbers):
+        # Void with a size of 8 bytes, over an identifier of 4 and its size.
+        size, body = number(data, cluster + 4, False)
+        rest = body + size - cluster - 9
+        data[cluster:cluster + 9] = bytes([VOID]) + (rest | 1 << 56).to_bytes(
+            8, 'big')
+    with open(target, 'wb') as file:
+        file.write(data)
+
+
+def main():
+    if sys.argv[1] == 'same':
+        a, b = (without_random(name) for name in sys.argv[2:])
+        if a != b:
+            sys.exit(f'{sys.argv[2]} ({len(a)} bytes) and {sys.argv[3]} '
+                     f'({len(b)} bytes) differ')
+    else:
+        lose(sys.argv[2], sys.argv[3], map(int, sys.argv[4:]))
+
+
+main()

@@ -57,6 +57,7 @@ build-essential|flags and programs of Debian packages|tests package
 debhelper|steps of building a Debian package|package
 dh-python|Debian package of the Python package|package
 lintian|checks Debian packages|check
+libopencv-calib3d-dev|a chessboard on the mirrors, for doctor|tests package
 libopencv-video-dev|calibration with OpenCV, for comparison|rivals
 '
 

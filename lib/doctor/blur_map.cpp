@@ -1,0 +1,347 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "doctor/blur_map.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <complex>
+#include <numbers>
+
+#include <Eigen/Dense>
+
+#include "calibrate/gratings.h"
+#include "calibrate/response.h"
+
+namespace codedexposure
+{
+
+namespace
+{
+
+constexpr int kBlock = 16;       // pixels, at least
+constexpr int kBlocks = 32;      // along a side, at most
+constexpr int kLeastPixels = 40; // of a block
+/* Places of a pixel between two mirrors that are told apart: as gratings move
+ * by whole mirrors, harmonics mix in a way that depends on it. */
+constexpr std::size_t kPlaces = 16;
+constexpr std::array kHarmonics = {1, 3, 5};
+constexpr std::size_t kTerms = kHarmonics.size ();
+/* Errors of the powers of harmonics and of the squared swing, relative. */
+constexpr double kPowerError = 0.01, kSwingError = 0.03;
+
+using Powers = std::array<double, kTerms>;
+/* Parts of a block's pixels by their place; they add up to 1. */
+using Places = std::array<double, kPlaces>;
+
+/* Amplitudes at the harmonics, squared; @light of each phase. */
+template <typename Light>
+double
+power_at (int harmonic, int period, Light light)
+{
+  std::complex<double> sum = 0.0;
+  for (int k = 0; k < period; k++)
+    sum += light (k) *
+           std::polar (1.0, -2.0 * std::numbers::pi * harmonic * k / period);
+  return std::norm (sum) * 4.0 / (double (period) * period);
+}
+
+/* What a grating gives at each blur, for light of 1. */
+class Expected
+{
+public:
+  Expected (int period, double side);
+
+  struct Entry {
+    double variance; // mirrors squared
+    std::array<Powers, kPlaces> powers;
+
+    Powers at (const Places &places) const
+    {
+      Powers sum = {};
+      for (std::size_t i = 0; i < kPlaces; i++)
+        for (std::size_t h = 0; h < kTerms; h++)
+          sum[h] += places[i] * powers[i][h];
+      return sum;
+    }
+  };
+  const std::vector<Entry> &entries () const { return entries_; }
+
+private:
+  std::vector<Entry> entries_;
+};
+
+Expected::Expected (int period, double side)
+{
+  for (double sigma = 0.05; sigma < 0.75 * period; sigma *= 1.06) {
+    const GratingResponse response (period, side, sigma);
+    Entry entry = {sigma * sigma, {}};
+    for (std::size_t i = 0; i < kPlaces; i++) {
+      const auto at = response.entry ((double (i) + 0.5) / kPlaces);
+      for (std::size_t h = 0; h < kTerms; h++)
+        entry.powers[i][h] = power_at (kHarmonics[h], period,
+            [&] (int k) { return double (response.at (at, k).light); });
+    }
+    entries_.push_back (entry);
+  }
+}
+
+/* Means over the pixels of a block. */
+struct BlockPowers {
+  Powers powers = {};
+  double noise = 0.0; // power of it in each harmonic
+  double swing = 0.0; // squared
+  double pixels = 0.0;
+  Places places = {};
+};
+
+/* The place of a coordinate between two mirrors. */
+std::size_t
+place_of (double mirror)
+{
+  return std::min (kPlaces - 1,
+      std::size_t ((mirror - std::floor (mirror)) * double (kPlaces)));
+}
+
+BlockPowers
+powers_of (Axis axis, const GratingStack &stack,
+    ImageView<const std::uint8_t> good, const Rect &block,
+    const Mapping *mapping)
+{
+  const auto &frames = axis == Axis::x ? stack.x : stack.y;
+  const int period = int (frames.size ());
+  BlockPowers sum;
+  for (int y = block.y; y < block.bottom (); y++)
+    for (int x = block.x; x < block.right (); x++) {
+      if (good.at (x, y) == 0)
+        continue;
+      const auto light = [&] (int k) {
+        return double (frames[std::size_t (k)].at (x, y));
+      };
+      for (std::size_t h = 0; h < kTerms; h++)
+        sum.powers[h] += power_at (kHarmonics[h], period, light);
+      /* Gratings that are on for half of a period have no even harmonics. */
+      sum.noise +=
+          0.5 * (power_at (2, period, light) + power_at (4, period, light));
+      const double swing =
+          double (stack.white.at (x, y)) - double (stack.dark.at (x, y));
+      sum.swing += swing * swing;
+      sum.pixels++;
+      if (mapping) {
+        const Position mirror = mapping->mirror_at (x, y);
+        sum.places[place_of (axis == Axis::x ? mirror.x : mirror.y)]++;
+      }
+    }
+  for (double &part : sum.places)
+    part = mapping ? part / std::max (1.0, sum.pixels) : 1.0 / kPlaces;
+  const double scale = 1.0 / std::max (1.0, sum.pixels);
+  for (double &power : sum.powers)
+    power = power * scale - sum.noise * scale;
+  sum.noise *= scale;
+  sum.swing *= scale;
+  return sum;
+}
+
+/* The blur whose harmonics fit best: variance in mirrors squared. */
+Measured
+variance_of (const BlockPowers &seen, const Expected &expected)
+{
+  const auto &entries = expected.entries ();
+  std::vector<double> misfits;
+  std::array<double, kTerms> weights;
+  for (std::size_t h = 0; h < kTerms; h++) {
+    const double power = std::max (0.0, seen.powers[h]);
+    const double error =
+        std::pow (kPowerError * seen.powers[0], 2.0) * 0.1 +
+        std::pow (kPowerError * power, 2.0) +
+        (2.0 * power * seen.noise + seen.noise * seen.noise) / seen.pixels;
+    weights[h] = 1.0 / std::max (1e-12, error);
+  }
+  const double swing_weight = 1.0 / std::pow (kSwingError * seen.swing, 2.0);
+  for (const Expected::Entry &entry : entries) {
+    double pp = swing_weight, ps = swing_weight * seen.swing;
+    double ss = swing_weight * seen.swing * seen.swing;
+    const Powers powers = entry.at (seen.places);
+    for (std::size_t h = 0; h < kTerms; h++) {
+      pp += weights[h] * powers[h] * powers[h];
+      ps += weights[h] * powers[h] * seen.powers[h];
+      ss += weights[h] * seen.powers[h] * seen.powers[h];
+    }
+    misfits.push_back (ss - ps * ps / pp);
+  }
+  const auto least = std::ranges::min_element (misfits);
+  const std::size_t at = std::size_t (least - misfits.begin ());
+  if (at == 0 || at + 1 == misfits.size ())
+    return {entries[at].variance, std::max (0.02, 0.2 * entries[at].variance)};
+  /* A parabola through three points that are not evenly spaced. */
+  const double x0 = entries[at - 1].variance, x1 = entries[at].variance,
+               x2 = entries[at + 1].variance;
+  const double y0 = misfits[at - 1], y1 = misfits[at], y2 = misfits[at + 1];
+  const double d01 = (y1 - y0) / (x1 - x0), d12 = (y2 - y1) / (x2 - x1);
+  const double curve = (d12 - d01) / (x2 - x0);
+  const double best = 0.5 * (x0 + x1 - d01 / std::max (1e-30, curve));
+  return {std::clamp (best, x0, x2), 1.0 / std::sqrt (std::max (1e-12, curve))};
+}
+
+} // namespace
+
+double
+BlurMap::median () const
+{
+  std::vector<float> known;
+  for (int y = 0; y < variance.height (); y++)
+    for (int x = 0; x < variance.width (); x++)
+      if (variance.at (x, y) >= 0.0f)
+        known.push_back (variance.at (x, y));
+  if (known.empty ())
+    return 0.0;
+  const auto middle = known.begin () + std::ptrdiff_t (known.size () / 2);
+  std::nth_element (known.begin (), middle, known.end ());
+  return std::sqrt (double (*middle));
+}
+
+BlurMap
+map_blur (const GratingStack &stack, ImageView<const std::uint8_t> good,
+    double magnification, const Mapping *mapping)
+{
+  BlurMap map;
+  map.block = std::max (
+      kBlock, (std::max (good.width, good.height) + kBlocks - 1) / kBlocks);
+  map.variance = Image<float> (std::max (1, good.width / map.block),
+      std::max (1, good.height / map.block));
+  map.sigma = map.variance;
+  const Expected of_x (int (stack.x.size ()), 1.0 / magnification);
+  const Expected of_y (int (stack.y.size ()), 1.0 / magnification);
+  const double scale = magnification * magnification;
+  for (int j = 0; j < map.variance.height (); j++)
+    for (int i = 0; i < map.variance.width (); i++) {
+      const Rect block = {i * map.block, j * map.block,
+          std::min (map.block, good.width - i * map.block),
+          std::min (map.block, good.height - j * map.block)};
+      const BlockPowers x = powers_of (Axis::x, stack, good, block, mapping);
+      const BlockPowers y = powers_of (Axis::y, stack, good, block, mapping);
+      map.variance.at (i, j) = -1.0f;
+      if (x.pixels < kLeastPixels)
+        continue;
+      const Measured vx = variance_of (x, of_x), vy = variance_of (y, of_y);
+      map.variance.at (i, j) = float (scale * 0.5 * (vx.value + vy.value));
+      map.sigma.at (i, j) =
+          float (scale * 0.5 * std::hypot (vx.sigma, vy.sigma));
+    }
+  return map;
+}
+
+namespace
+{
+
+using Focus = Eigen::Vector4d; // even variance; defocus, its slopes in x and y
+
+struct FocusPoint {
+  double x, y, variance, sigma; // place in half frames from the centre
+};
+
+double
+misfit (const std::vector<FocusPoint> &points, const Focus &f)
+{
+  double sum = 0.0;
+  for (const FocusPoint &p : points) {
+    const double z = f[1] + f[2] * p.x + f[3] * p.y;
+    sum += std::pow ((p.variance - f[0] - z * z) / p.sigma, 2.0);
+  }
+  return sum;
+}
+
+/* A step of Levenberg and Marquardt. */
+void
+improve (const std::vector<FocusPoint> &points, Focus &f, double &damping,
+    Eigen::Matrix4d &normal)
+{
+  Eigen::Vector4d right = Eigen::Vector4d::Zero ();
+  normal.setZero ();
+  for (const FocusPoint &p : points) {
+    const double z = f[1] + f[2] * p.x + f[3] * p.y;
+    const Eigen::Vector4d slope (1.0, 2.0 * z, 2.0 * z * p.x, 2.0 * z * p.y);
+    const double weight = 1.0 / (p.sigma * p.sigma);
+    normal += weight * slope * slope.transpose ();
+    right += weight * (p.variance - f[0] - z * z) * slope;
+  }
+  const double before = misfit (points, f);
+  for (int i = 0; i < 8; i++, damping *= 8.0) {
+    Eigen::Matrix4d damped = normal;
+    damped.diagonal () *= 1.0 + damping;
+    damped.diagonal ().array () += 1e-9;
+    Focus next = f + damped.ldlt ().solve (right);
+    next[0] = std::max (0.0, next[0]);
+    if (next.allFinite () && misfit (points, next) < before) {
+      f = next;
+      damping *= 0.2;
+      return;
+    }
+  }
+}
+
+} // namespace
+
+std::optional<FocusTilt>
+fit_focus (const BlurMap &map, Extent camera)
+{
+  std::vector<FocusPoint> points;
+  const double rx = 0.5 * camera.width, ry = 0.5 * camera.height;
+  for (int j = 0; j < map.variance.height (); j++)
+    for (int i = 0; i < map.variance.width (); i++)
+      if (map.variance.at (i, j) >= 0.0f)
+        points.push_back ({((i + 0.5) * map.block - rx) / rx,
+            ((j + 0.5) * map.block - ry) / ry, double (map.variance.at (i, j)),
+            std::max (0.02, double (map.sigma.at (i, j)))});
+  if (points.size () < 8)
+    return std::nullopt;
+  /* The plane that is found depends on the start where the focus lies in the
+   * middle of the frame. */
+  double best = 0.0;
+  Focus found = Focus::Zero ();
+  Eigen::Matrix4d normal = Eigen::Matrix4d::Identity ();
+  double least = points[0].variance;
+  for (const FocusPoint &p : points)
+    least = std::min (least, p.variance);
+  for (int start = 0; start < 8; start++) {
+    const double turn = start * std::numbers::pi / 4;
+    Focus f (least, 0.5, 0.5 * std::cos (turn), 0.5 * std::sin (turn));
+    Eigen::Matrix4d now;
+    double damping = 1e-2;
+    for (int round = 0; round < 40; round++)
+      improve (points, f, damping, now);
+    if (const double rest = misfit (points, f); start == 0 || rest < best) {
+      best = rest;
+      found = f;
+      normal = now;
+    }
+  }
+  if (found[1] < 0.0)
+    found.tail<3> () *= -1.0;
+  const double excess =
+      std::max (1.0, best / std::max (1.0, double (points.size ()) - 4.0));
+  normal.diagonal ().array () += 1e-9;
+  const Eigen::Matrix4d covariance = excess * normal.inverse ();
+  /* Slopes by pixel, so that the direction is one on the frame. */
+  const double sx = found[2] / rx, sy = found[3] / ry;
+  const double slope = std::hypot (sx, sy);
+  const double doubt = std::sqrt (
+      std::max (covariance (2, 2) / (rx * rx), covariance (3, 3) / (ry * ry)));
+  FocusTilt tilt;
+  const double degrees = 180.0 / std::numbers::pi;
+  tilt.direction = {std::atan2 (sy, sx) * degrees,
+      std::min (180.0, degrees * doubt / std::max (1e-12, slope))};
+  if (tilt.direction.value < 0.0)
+    tilt.direction.value += 360.0;
+  const double c = slope > 0.0 ? std::abs (sx) / slope : 1.0;
+  const double s = slope > 0.0 ? std::abs (sy) / slope : 0.0;
+  /* From corner to corner. */
+  const double across = 2.0 * (c * rx + s * ry);
+  tilt.growth = {slope * across, doubt * across};
+  /* The blur grows with the square of a small tilt. */
+  tilt.growth.sigma = std::min (tilt.growth.sigma,
+      std::sqrt (2.0 * tilt.growth.value * tilt.growth.sigma));
+  tilt.sharpest = std::sqrt (found[0]);
+  return tilt;
+}
+
+} // namespace codedexposure

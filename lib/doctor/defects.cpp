@@ -1,0 +1,286 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "doctor/defects.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace codedexposure
+{
+
+namespace
+{
+
+/* Side of the blocks whose medians are the light without defects. */
+constexpr int kBlock = 24;
+/* Pixels with less than this part of the bright ones' light see no mirrors. */
+constexpr double kCovered = 0.1;
+/* Part of the light by which a pixel differs that has a defect. */
+constexpr double kDiffers = 0.12;
+/* A dead pixel has less than this part of the light. */
+constexpr double kDead = 0.1;
+/* Light of a stuck mirror, in mirrors; more is dust. */
+constexpr double kMirrorMin = 0.3, kMirrorMax = 2.6;
+
+float
+median (std::vector<float> &values)
+{
+  if (values.empty ())
+    return 0.0f;
+  const auto middle = values.begin () + std::ptrdiff_t (values.size () / 2);
+  std::nth_element (values.begin (), middle, values.end ());
+  return *middle;
+}
+
+Image<float>
+difference (const Image<float> &a, const Image<float> &b)
+{
+  Image<float> result (a.width (), a.height ());
+  for (int y = 0; y < a.height (); y++)
+    for (int x = 0; x < a.width (); x++)
+      result.at (x, y) = a.at (x, y) - b.at (x, y);
+  return result;
+}
+
+/* A smooth picture: the medians of blocks, bilinear between their centres and
+ * beyond them. */
+Image<float>
+smooth (const Image<float> &image)
+{
+  const int columns = std::max (1, image.width () / kBlock);
+  const int rows = std::max (1, image.height () / kBlock);
+  const double wide = double (image.width ()) / columns;
+  const double high = double (image.height ()) / rows;
+  Image<float> medians (columns, rows);
+  std::vector<float> values;
+  for (int j = 0; j < rows; j++)
+    for (int i = 0; i < columns; i++) {
+      values.clear ();
+      for (int y = int (j * high); y < int ((j + 1) * high); y++)
+        for (int x = int (i * wide); x < int ((i + 1) * wide); x++)
+          values.push_back (image.at (x, y));
+      medians.at (i, j) = median (values);
+    }
+  const auto place = [] (double at, int count) {
+    const int low =
+        std::clamp (int (std::floor (at)), 0, std::max (0, count - 2));
+    return std::pair (low, count > 1 ? float (at - low) : 0.0f);
+  };
+  Image<float> result (image.width (), image.height ());
+  for (int y = 0; y < image.height (); y++)
+    for (int x = 0; x < image.width (); x++) {
+      const auto [i, u] = place ((x + 0.5) / wide - 0.5, columns);
+      const auto [j, v] = place ((y + 0.5) / high - 0.5, rows);
+      const int right = std::min (i + 1, columns - 1);
+      const int below = std::min (j + 1, rows - 1);
+      const float top = (1 - u) * medians.at (i, j) + u * medians.at (right, j);
+      const float bottom =
+          (1 - u) * medians.at (i, below) + u * medians.at (right, below);
+      result.at (x, y) = (1 - v) * top + v * bottom;
+    }
+  return result;
+}
+
+/* Pixels that touch, also at corners. */
+struct Group {
+  std::vector<Offset> pixels;
+  bool at_border = false;
+};
+
+/* The group of @p first; its pixels are 0 in @p marked afterwards. */
+Group
+take_group (Image<std::uint8_t> &marked, Offset first)
+{
+  Group group = {{first}};
+  marked.at (first.x, first.y) = 0;
+  for (std::size_t i = 0; i < group.pixels.size (); i++) {
+    const Offset at = group.pixels[i];
+    group.at_border |= at.x == 0 || at.y == 0 || at.x == marked.width () - 1 ||
+                       at.y == marked.height () - 1;
+    for (int y = std::max (0, at.y - 1);
+         y <= std::min (marked.height () - 1, at.y + 1); y++)
+      for (int x = std::max (0, at.x - 1);
+           x <= std::min (marked.width () - 1, at.x + 1); x++)
+        if (marked.at (x, y) != 0) {
+          marked.at (x, y) = 0;
+          group.pixels.push_back ({x, y});
+        }
+  }
+  return group;
+}
+
+std::vector<Group>
+groups_of (Image<std::uint8_t> marked)
+{
+  std::vector<Group> groups;
+  for (int y = 0; y < marked.height (); y++)
+    for (int x = 0; x < marked.width (); x++)
+      if (marked.at (x, y) != 0)
+        groups.push_back (take_group (marked, {x, y}));
+  return groups;
+}
+
+class Search
+{
+public:
+  Search (const Image<float> &off, const Image<float> &on, int largest,
+      double mirror)
+      : off_ (off), on_ (on), light_ (difference (on, off)),
+        dark_ (smooth (off)), field_ (smooth (light_)), largest_ (largest),
+        mirror_ (std::max (1.0, mirror))
+  {
+    found_.good = Image<std::uint8_t> (off.width (), off.height ());
+    found_.covered = found_.good;
+    known_ = found_.good;
+    part_ = Image<float> (off.width (), off.height ());
+  }
+
+  Defects run ();
+
+private:
+  void find_bright ();
+  void find_dim ();
+  void add_dim (const Group &group);
+  DefectSpot spot_of (const Group &group) const;
+  void know (const Group &group, int margin);
+  template <typename Use>
+  void each_pixel (Use use) const
+  {
+    for (int y = 0; y < off_.height (); y++)
+      for (int x = 0; x < off_.width (); x++)
+        use (x, y);
+  }
+
+  const Image<float> &off_, &on_;
+  Image<float> light_, dark_, field_;
+  int largest_;
+  double mirror_;
+  Image<float> part_;         // of its light that a pixel has too much or lacks
+  Image<std::uint8_t> known_; // pixels of defects, and those beside them
+  Defects found_;
+};
+
+void
+Search::know (const Group &group, int margin)
+{
+  for (const Offset &at : group.pixels)
+    for (int y = std::max (0, at.y - margin);
+         y <= std::min (known_.height () - 1, at.y + margin); y++)
+      for (int x = std::max (0, at.x - margin);
+           x <= std::min (known_.width () - 1, at.x + margin); x++)
+        known_.at (x, y) = 1;
+}
+
+DefectSpot
+Search::spot_of (const Group &group) const
+{
+  DefectSpot spot;
+  spot.pixels = int (group.pixels.size ());
+  for (const Offset &at : group.pixels) {
+    const double part = double (part_.at (at.x, at.y));
+    spot.centre.x += part * at.x;
+    spot.centre.y += part * at.y;
+    spot.light += part;
+  }
+  spot.centre.x /= spot.light;
+  spot.centre.y /= spot.light;
+  return spot;
+}
+
+void
+Search::find_bright ()
+{
+  Image<std::uint8_t> marked (off_.width (), off_.height ());
+  each_pixel ([&] (int x, int y) {
+    const float unit = std::max (0.1f * float (largest_), field_.at (x, y));
+    part_.at (x, y) = (off_.at (x, y) - dark_.at (x, y)) / unit;
+    marked.at (x, y) = part_.at (x, y) > 0.5f * float (kDiffers);
+  });
+  for (const Group &group : groups_of (marked)) {
+    const Offset peak = *std::ranges::max_element (group.pixels, {},
+        [&] (const Offset &at) { return off_.at (at.x, at.y); });
+    const double more =
+        double (off_.at (peak.x, peak.y) - dark_.at (peak.x, peak.y));
+    const double usual =
+        double (field_.at (peak.x, peak.y) + dark_.at (peak.x, peak.y));
+    const double brighter = double (on_.at (peak.x, peak.y)) - usual;
+    if (brighter > 0.5 * std::min (more, largest_ - usual)) {
+      for (const Offset &at : group.pixels)
+        found_.hot.push_back (at);
+      know (group, 0);
+      continue;
+    }
+    const DefectSpot spot = spot_of (group);
+    know (group, 2);
+    if (spot.light > kMirrorMin * mirror_)
+      found_.stuck_on.push_back (spot);
+  }
+}
+
+void
+Search::add_dim (const Group &group)
+{
+  const Offset first = group.pixels[0];
+  know (group, group.pixels.size () == 1 ? 0 : 2);
+  if (group.pixels.size () <= 2 &&
+      double (part_.at (first.x, first.y)) > 1.0 - kDead) {
+    for (const Offset &at : group.pixels)
+      found_.dead.push_back (at);
+    return;
+  }
+  const DefectSpot spot = spot_of (group);
+  if (group.at_border && spot.light > kMirrorMax * mirror_) {
+    for (const Offset &at : group.pixels)
+      if (double (part_.at (at.x, at.y)) > 0.5)
+        found_.covered.at (at.x, at.y) = 0;
+    return;
+  }
+  if (spot.light > kMirrorMax * mirror_)
+    found_.dust.push_back (spot);
+  else if (spot.light > kMirrorMin * mirror_)
+    found_.stuck_off.push_back (spot);
+}
+
+void
+Search::find_dim ()
+{
+  Image<std::uint8_t> marked (off_.width (), off_.height ());
+  each_pixel ([&] (int x, int y) {
+    const bool open = found_.covered.at (x, y) != 0 && known_.at (x, y) == 0;
+    part_.at (x, y) = open ? 1.0f - light_.at (x, y) / field_.at (x, y) : 0.0f;
+    marked.at (x, y) = part_.at (x, y) > float (kDiffers);
+  });
+  for (const Group &group : groups_of (marked))
+    add_dim (group);
+}
+
+Defects
+Search::run ()
+{
+  std::vector<float> values;
+  each_pixel ([&] (int x, int y) { values.push_back (field_.at (x, y)); });
+  const auto high = values.begin () + std::ptrdiff_t (values.size () * 9 / 10);
+  std::nth_element (values.begin (), high, values.end ());
+  const float least =
+      std::max (float (kCovered) * *high, 0.005f * float (largest_));
+  each_pixel ([&] (int x, int y) {
+    found_.covered.at (x, y) = field_.at (x, y) > least;
+  });
+  find_bright ();
+  find_dim ();
+  each_pixel ([&] (int x, int y) {
+    found_.good.at (x, y) =
+        found_.covered.at (x, y) != 0 && known_.at (x, y) == 0;
+  });
+  return std::move (found_);
+}
+
+} // namespace
+
+Defects
+find_defects (
+    const Image<float> &off, const Image<float> &on, int largest, double mirror)
+{
+  return Search (off, on, largest, mirror).run ();
+}
+
+} // namespace codedexposure

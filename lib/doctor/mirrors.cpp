@@ -1,0 +1,255 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Check "mirrors": off-state leakage, switching, orientation, stuck mirrors. */
+#include <algorithm>
+#include <cmath>
+
+#include "base/text.h"
+#include "base/try.h"
+#include "doctor/defects.h"
+#include "doctor/off_light.h"
+#include "doctor/stack.h"
+#include "doctor/switching.h"
+#include "doctor/view.h"
+
+namespace codedexposure
+{
+
+namespace
+{
+
+constexpr int kFrames = 16;
+constexpr Nanoseconds kShortest = 110'000; // of a slot
+constexpr double kFull = 0.002; // part of the values that may be the largest
+constexpr double kLeakWarn = 0.015, kLeakFail = 0.02;
+constexpr double kSlowWarn = 100.0, kSlowFail = 200.0; // us
+/* Stuck mirrors, of those seen. */
+constexpr double kStuckFail = 1e-3;
+
+class MirrorRun
+{
+public:
+  explicit MirrorRun (Examination &examination) : examination_ (examination) {}
+
+  Result<Finding> run ();
+
+private:
+  Result<void> see_light ();
+  Result<void> measure_leak ();
+  void diagnose_orientation ();
+  void diagnose_stuck (
+      const char *id, const char *what, const std::vector<DefectSpot> &spots);
+  void diagnose_leak (const Measured &leak);
+  Result<void> see_switching ();
+
+  Examination &examination_;
+  Finding finding_ = {"mirrors",
+      "all mirrors off and on, ramps in x and y, and mirrors that go off while "
+      "the camera exposes"};
+  Stack off_, on_;
+  double exposed_ = 1.0; // part of the exposure in which on_ has light
+  Defects defects_;
+  CoarseView view_;
+};
+
+Result<void>
+MirrorRun::see_light ()
+{
+  ASSIGN_OR_RETURN (
+      off_, look_at_light (examination_, no_light (), 1, kFrames));
+  const int largest = largest_number (examination_);
+  const Examination::Lit &inside = examination_.inside;
+  const double period = double (examination_.rig.parts ().rate.period ());
+  const double exposure = examination_.profile.exposure
+                              ? examination_.profile.exposure->value
+                              : period;
+  ASSIGN_OR_RETURN (
+      on_, look_at_light (examination_, lit (0, 1), 1, kFrames, &off_.mean));
+  defects_ = find_defects (off_.mean, on_.mean, largest);
+  for (int slots = inside.slots; slots > 0; slots /= 2) {
+    if (means_of (on_, defects_.good.view ()).full < kFull)
+      break;
+    ASSIGN_OR_RETURN (
+        on_, look_at_light (examination_, lit (inside.first, slots), inside.of,
+                 kFrames, &off_.mean));
+    exposed_ = slots * period / inside.of / exposure;
+    defects_ = find_defects (off_.mean, on_.mean, largest);
+  }
+  return {};
+}
+
+Result<void>
+MirrorRun::measure_leak ()
+{
+  const StackMeans off = means_of (off_, defects_.good.view ());
+  const StackMeans on = means_of (on_, defects_.good.view ());
+  const Examination::Lit fine = fine_slots (examination_, kShortest);
+  const double light = std::max (1e-3, on.mean - off.mean);
+  const double slot = light / exposed_ / fine.of;
+  /* Without a gain, a small part of the range must do as a pedestal. */
+  const double gain = examination_.profile.conversion_gain
+                          ? examination_.profile.conversion_gain->value
+                          : 0.3 * largest_number (examination_);
+  const int pedestal =
+      pedestal_for (fine, slot, gain, off.variance > 0.3 ? 1.0 : 0.0);
+  ASSIGN_OR_RETURN (const OffLight found,
+      measure_off_light (examination_, fine, pedestal, defects_.good.view (),
+          off_.mean, light_parts (off_.mean, on_.mean, defects_.good.view ()),
+          pedestal * slot));
+  /* Light with the mirrors on for all of the exposure. */
+  const double whole = light / exposed_ + found.light.value;
+  const Measured leak = {found.light.value / whole, found.light.sigma / whole};
+  examination_.profile.leak = {std::clamp (leak.value, 0.0, 0.5), leak.sigma};
+  diagnose_leak (leak);
+  return {};
+}
+
+void
+MirrorRun::diagnose_leak (const Measured &leak)
+{
+  finding_.readings.push_back (
+      {"off-state leakage", {100 * leak.value, 100 * leak.sigma}, "%",
+          "at most " + real_text (100 * kLeakWarn)});
+  finding_.readings.push_back ({"contrast ratio",
+      {1.0 / std::max (1e-6, leak.value),
+          leak.sigma / std::max (1e-12, leak.value * leak.value)},
+      ": 1"});
+  if (leak.value - 2 * leak.sigma < kLeakWarn)
+    return;
+  finding_.diagnoses.push_back ({"leak",
+      leak.value > kLeakFail ? Verdict::fail : Verdict::warn,
+      "mirrors that are off pass " + fixed (100 * leak.value, 1) +
+          " % of the light",
+      "block the light of the off direction with a trap, stop down the lens, "
+      "and look for stray light and reflections between lens and window"});
+}
+
+Result<void>
+MirrorRun::see_switching ()
+{
+  std::vector<SwitchPoint> points;
+  const auto time = measure_switching (
+      examination_, off_.mean, defects_.good.view (), points);
+  if (!time && time.error ().code == ErrorCode::invalid_argument) {
+    finding_.notes.push_back ({"switching", time.error ().message});
+    return {};
+  }
+  if (!time)
+    return time.error ();
+  const Measured us = {time->value * 1e6, time->sigma * 1e6};
+  finding_.readings.push_back (
+      {"switching time", us, "us", "at most " + real_text (kSlowWarn)});
+  Plot plot{"Mirrors that go off", "time, ms", "mean, DN"};
+  for (const SwitchPoint &point : points)
+    plot.points.push_back ({1e3 * point.time, point.light});
+  finding_.plots.push_back (std::move (plot));
+  if (us.value - 2 * us.sigma > kSlowWarn)
+    finding_.diagnoses.push_back ({"slow-mirrors",
+        us.value > kSlowFail ? Verdict::fail : Verdict::warn,
+        "the light takes " + fixed (us.value, 0) +
+            " us to go off, where mirrors need less than 20 us",
+        "check that nothing else shutters the light, such as a pulsed lamp or "
+        "a liquid crystal; give the schedule that much switching time"});
+  return {};
+}
+
+void
+MirrorRun::diagnose_orientation ()
+{
+  const ViewOrientation is = view_.orientation ();
+  finding_.notes.push_back ({"orientation",
+      std::string (is.flipped_x ? "flipped in x, " : "") +
+          (is.flipped_y ? "flipped in y, " : "") + "turned by " +
+          std::to_string (is.turned) + " degrees"});
+  if (is.turned != 0)
+    finding_.diagnoses.push_back ({"turned", Verdict::fail,
+        "the camera is turned against the mirrors by " +
+            std::to_string (is.turned) + " degrees",
+        is.turned == 180
+            ? "set ReverseX=true and ReverseY=true of the camera, or turn it"
+            : "turn the camera by 90 degrees"});
+  for (const auto &[flipped, id, feature] :
+      {std::tuple{is.flipped_x, "flipped-x", "ReverseX"},
+          std::tuple{is.flipped_y, "flipped-y", "ReverseY"}})
+    if (flipped)
+      finding_.diagnoses.push_back ({id, Verdict::fail,
+          "the picture is mirrored, " +
+              std::string (is.flipped_x ? "left to right" : "top to bottom"),
+          std::string ("change ") + feature +
+              " of the camera, or count the mirrors of the light path: an odd "
+              "number flips the picture"});
+}
+
+void
+MirrorRun::diagnose_stuck (
+    const char *id, const char *what, const std::vector<DefectSpot> &spots)
+{
+  const double mirror = view_.pixels_per_mirror ();
+  double light = 0.0;
+  std::string places;
+  for (const DefectSpot &spot : spots) {
+    light += std::max (1.0, std::round (spot.light / (mirror * mirror)));
+    const Position at = view_.mirror_at (spot.centre);
+    if (places.size () < 400)
+      places += (places.empty () ? "" : " ") +
+                std::to_string (std::lround (at.x)) + "," +
+                std::to_string (std::lround (at.y));
+  }
+  finding_.readings.push_back (
+      {"mirrors that are " + std::string (what), {light, 0.0}, "", "0"});
+  if (spots.empty ())
+    return;
+  finding_.notes.push_back (
+      {"mirrors that are " + std::string (what) + ", about", places});
+  const double seen =
+      std::abs (view_.area ()) * off_.mean.width () * off_.mean.height ();
+  finding_.diagnoses.push_back (
+      {id, light > kStuckFail * seen ? Verdict::fail : Verdict::warn,
+          fixed (light, 0) + " of the mirrors that the camera sees are " + what,
+          "let the mirrors run for an hour with changing masks; if they stay "
+          "stuck, use another part of the array or another board"});
+}
+
+Result<Finding>
+MirrorRun::run ()
+{
+  RETURN_IF_ERROR (see_light ());
+  const auto view =
+      look_where (examination_, off_.mean, on_.mean, defects_.good.view ());
+  if (view) {
+    view_ = *view;
+    const double mirror = view_.pixels_per_mirror ();
+    defects_ = find_defects (
+        off_.mean, on_.mean, largest_number (examination_), mirror * mirror);
+    diagnose_orientation ();
+  } else if (view.error ().code != ErrorCode::invalid_argument) {
+    return view.error ();
+  } else {
+    finding_.diagnoses.push_back ({"no-picture", Verdict::fail,
+        view.error ().message, "let light of the mirrors reach the camera"});
+    return std::move (finding_);
+  }
+  diagnose_stuck ("stuck-off", "stuck off", defects_.stuck_off);
+  diagnose_stuck ("stuck-on", "stuck on", defects_.stuck_on);
+  RETURN_IF_ERROR (see_switching ());
+  RETURN_IF_ERROR (measure_leak ());
+  std::ranges::stable_sort (
+      finding_.diagnoses, std::greater<> (), &Diagnosis::severity);
+  if (examination_.exhibits) {
+    const int largest = largest_number (examination_);
+    finding_.exhibits.push_back (
+        {"All mirrors on", picture_of (on_.mean, 0.0, largest)});
+    finding_.exhibits.push_back ({"All mirrors off, 20 times as bright",
+        picture_of (off_.mean, 0.0, 0.05 * largest)});
+  }
+  return std::move (finding_);
+}
+
+} // namespace
+
+Result<Finding>
+check_mirrors (Examination &examination)
+{
+  return MirrorRun (examination).run ();
+}
+
+} // namespace codedexposure

@@ -1,0 +1,98 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "doctor/off_light.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/try.h"
+#include "doctor/rounding.h"
+
+namespace codedexposure
+{
+
+namespace
+{
+
+constexpr int kFrames = 24;
+/* The short exposure, of the frame period. */
+constexpr int kShorter = 5;
+/* Variance of the noise with which rounding can be undone, DN squared. */
+constexpr double kEnough = 0.2;
+/* Error of a mean that is left where rounding was undone, and where not, DN. */
+constexpr double kUnrounded = 0.01, kRounded = 0.25;
+
+Measured
+mean_of (const StackMeans &means, const Offsets &offsets)
+{
+  const auto exact = unrounded ({means.mean, means.variance}, offsets);
+  const double noise =
+      std::sqrt (means.variance / std::max (1.0, means.values));
+  return exact ? Measured{exact->mean, kUnrounded + noise}
+               : Measured{means.mean, kRounded};
+}
+
+} // namespace
+
+Offsets
+offsets_of (const std::vector<double> &parts, double light)
+{
+  Offsets offsets;
+  for (const double part : parts)
+    offsets.push_back ((part - 1.0) * std::max (0.0, light));
+  return offsets;
+}
+
+int
+pedestal_for (
+    const Examination::Lit &fine, double slot, double gain, double variance)
+{
+  if (variance > kEnough || !(slot > 0.0))
+    return 0;
+  const int most =
+      std::max (1, std::min (fine.slots, fine.of / (2 * kShorter)));
+  return std::clamp (
+      int (std::ceil ((kEnough - variance) * gain / slot)), 1, most);
+}
+
+Result<OffLight>
+measure_off_light (Examination &examination, const Examination::Lit &fine,
+    int pedestal, ImageView<const std::uint8_t> good, const Image<float> &dark,
+    const std::vector<double> &parts, double pedestal_light)
+{
+  Rig &rig = examination.rig;
+  const StillMask mask =
+      pedestal > 0 ? lit (fine.first, pedestal) : no_light ();
+  const Image<float> *weights = pedestal > 0 ? &dark : nullptr;
+  const Nanoseconds period = rig.parts ().rate.period ();
+  const Nanoseconds shorter = period / kShorter;
+  const double longest = examination.profile.exposure
+                             ? examination.profile.exposure->value
+                             : double (period);
+  OffLight found;
+  ASSIGN_OR_RETURN (const Stack first,
+      look_at_light (examination, mask, fine.of, kFrames, weights));
+  RETURN_IF_ERROR (rig.expose (shorter));
+  /* The exposure time changes with a later frame than the mask. */
+  RETURN_IF_ERROR (rig.watch (examination.lag));
+  const auto second =
+      look_at_light (examination, mask, fine.of, kFrames, weights);
+  RETURN_IF_ERROR (rig.expose (std::nullopt));
+  RETURN_IF_ERROR (rig.watch (examination.lag));
+  if (!second)
+    return second.error ();
+
+  found.longest = means_of (first, good);
+  found.shorter = means_of (*second, good);
+  const Offsets offsets = offsets_of (parts, pedestal_light);
+  const Measured a = mean_of (found.longest, offsets);
+  const Measured b = mean_of (found.shorter, offsets);
+  found.part = double (shorter) / longest;
+  const double scale = 1.0 / (1.0 - found.part);
+  const double flicker =
+      std::hypot (first.scatter, second->scatter) / std::sqrt (kFrames);
+  found.light = {scale * (a.value - b.value),
+      scale * std::hypot (std::hypot (a.sigma, b.sigma), flicker)};
+  return found;
+}
+
+} // namespace codedexposure

@@ -1,0 +1,148 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "doctor/photon_transfer.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Dense>
+
+namespace codedexposure
+{
+
+namespace
+{
+
+/* Relative error of light that the levels have in common. */
+constexpr double kLightError = 0.005;
+
+/* A polynomial by weighted least squares. */
+struct Polynomial {
+  Eigen::VectorXd factors;
+  Eigen::MatrixXd covariance;
+  double excess = 1.0; ///< root of the reduced chi-square, at least 1
+
+  double at (double x) const
+  {
+    double sum = 0.0;
+    for (Eigen::Index i = factors.size (); i-- > 0;)
+      sum = sum * x + factors[i];
+    return sum;
+  }
+};
+
+struct Sample {
+  double x;
+  Measured y;
+};
+
+Polynomial
+fit (const std::vector<Sample> &samples, int degree)
+{
+  const Eigen::Index terms = degree + 1;
+  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero (terms, terms);
+  Eigen::VectorXd right = Eigen::VectorXd::Zero (terms);
+  const auto row_of = [terms] (double x) {
+    Eigen::VectorXd row (terms);
+    for (Eigen::Index i = 0; i < terms; i++)
+      row[i] = std::pow (x, double (i));
+    return row;
+  };
+  for (const Sample &s : samples) {
+    const Eigen::VectorXd row = row_of (s.x);
+    const double weight = 1.0 / std::max (1e-30, s.y.sigma * s.y.sigma);
+    normal += weight * row * row.transpose ();
+    right += weight * s.y.value * row;
+  }
+  Polynomial fitted;
+  fitted.covariance = normal.inverse ();
+  fitted.factors = fitted.covariance * right;
+  double squares = 0.0;
+  for (const Sample &s : samples)
+    squares += std::pow ((s.y.value - fitted.at (s.x)) / s.y.sigma, 2.0);
+  const double freedom = double (samples.size ()) - double (terms);
+  if (freedom > 0.0)
+    fitted.excess = std::max (1.0, std::sqrt (squares / freedom));
+  fitted.covariance *= fitted.excess * fitted.excess;
+  return fitted;
+}
+
+} // namespace
+
+Measured
+PhotonTransfer::deviation (
+    const std::vector<TransferPoint> &points, double largest) const
+{
+  /* Newton's method for the light of the largest number. */
+  double full = (largest - dark.value) / slope;
+  for (int i = 0; i < 20; i++) {
+    const double steep = std::max (0.2 * slope, slope + 2.0 * bow * full);
+    full -= (number_of (full) - largest) / steep;
+  }
+  const double line = (number_of (full) - dark.value) / full;
+  Measured worst = {
+      std::abs (bow) * full * full / 4.0, bow_sigma * full * full / 4.0};
+  for (const TransferPoint &point : points) {
+    const double rest =
+        std::abs (point.mean.value - dark.value - line * point.light);
+    if (rest - point.mean.sigma > worst.value)
+      worst = {rest, point.mean.sigma};
+  }
+  return worst;
+}
+
+std::optional<PhotonTransfer>
+fit_photon_transfer (const std::vector<TransferPoint> &points)
+{
+  double most = 0.0;
+  for (const TransferPoint &point : points)
+    most = std::max (most, point.light);
+  std::vector<Sample> means, variances;
+  for (const TransferPoint &point : points)
+    means.push_back ({point.light / most, point.mean});
+  if (means.size () < 4 || !(most > 0.0))
+    return std::nullopt;
+  const Polynomial response = fit (means, 2);
+
+  PhotonTransfer found;
+  found.dark = {response.factors[0], std::sqrt (response.covariance (0, 0))};
+  found.slope = response.factors[1] / most;
+  found.bow = response.factors[2] / (most * most);
+  found.bow_sigma = std::sqrt (response.covariance (2, 2)) / (most * most);
+
+  /* An electron counts more or less where the response is steep or flat. */
+  for (const TransferPoint &point : points) {
+    if (!point.variance)
+      continue;
+    const double steep = 1.0 + 2.0 * found.bow * point.light / found.slope;
+    const double unit = steep * steep;
+    variances.push_back ({found.slope * point.light,
+        {point.variance->value / unit, point.variance->sigma / unit}});
+  }
+  if (variances.size () < 4)
+    return std::nullopt;
+  const Polynomial noise = fit (variances, 1);
+  const double per_number = noise.factors[1];
+  if (!(per_number > 0.0))
+    return std::nullopt;
+  const double gain = 1.0 / per_number;
+  found.conversion_gain = {
+      gain, gain * gain * std::sqrt (noise.covariance (1, 1))};
+  /* Light that flickers at a multiple of the frame rate looks like a bow. */
+  found.conversion_gain.sigma =
+      std::hypot (found.conversion_gain.sigma, kLightError * gain);
+  const double floor = noise.factors[0];
+  /* The gain's own error changes electrons, and with them the noise. */
+  const double floor_sigma = std::hypot (std::sqrt (noise.covariance (0, 0)),
+      2.0 * floor * found.conversion_gain.sigma / gain);
+  found.read_variance = {gain * gain * floor, gain * gain * floor_sigma};
+  const double read = std::sqrt (std::max (0.0, found.read_variance.value));
+  const double more = std::sqrt (
+      std::max (0.0, found.read_variance.value + found.read_variance.sigma));
+  found.read_noise = {read,
+      read > 0.0 ? std::min (0.5 * found.read_variance.sigma / read,
+                       std::max (more, std::sqrt (found.read_variance.sigma)))
+                 : more};
+  return found;
+}
+
+} // namespace codedexposure

@@ -1,0 +1,94 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "doctor/rounding.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace codedexposure
+{
+
+namespace
+{
+
+/* Variance of rounding. */
+constexpr double kRounding = 1.0 / 12.0;
+/* Above this variance, rounding adds kRounding and does nothing else. */
+constexpr double kSmooth = 0.8;
+/* Below it, different noise makes the same values. */
+constexpr double kHidden = 0.12;
+constexpr int kSteps = 40; // of a bisection
+
+double
+below (double x)
+{
+  return 0.5 * std::erfc (-x / std::numbers::sqrt2);
+}
+
+Moments
+rounded_pixel (double mean, double sigma)
+{
+  const int first = std::max (0, int (std::floor (mean - 6 * sigma)));
+  const int last = std::max (first, int (std::ceil (mean + 6 * sigma)));
+  double sum = 0.0, squares = 0.0, before = 0.0;
+  for (int value = first; value <= last; value++) {
+    const double to =
+        value == last ? 1.0 : below ((value + 0.5 - mean) / sigma);
+    sum += value * (to - before);
+    squares += (value - mean) * (value - mean) * (to - before);
+    before = to;
+  }
+  return {sum, squares - (sum - mean) * (sum - mean)};
+}
+
+/* The exact mean that is rounded to @seen, by bisection. */
+double
+mean_behind (double seen, double variance, const Offsets &offsets)
+{
+  double low = seen - 2.0, high = seen + 1.0;
+  for (int i = 0; i < kSteps; i++) {
+    const double middle = 0.5 * (low + high);
+    (rounded ({middle, variance}, offsets).mean < seen ? low : high) = middle;
+  }
+  return 0.5 * (low + high);
+}
+
+} // namespace
+
+Moments
+rounded (const Moments &exact, const Offsets &offsets)
+{
+  const double sigma = std::sqrt (std::max (1e-12, exact.variance));
+  if (offsets.empty ())
+    return rounded_pixel (exact.mean, sigma);
+  Moments sum = {};
+  for (const double offset : offsets) {
+    const Moments one = rounded_pixel (exact.mean + offset, sigma);
+    sum.mean += one.mean;
+    sum.variance += one.variance;
+  }
+  return {sum.mean / double (offsets.size ()),
+      sum.variance / double (offsets.size ())};
+}
+
+std::optional<Moments>
+unrounded (const Moments &seen, const Offsets &offsets)
+{
+  if (seen.variance > kSmooth && seen.mean > 6 * std::sqrt (seen.variance))
+    return Moments{seen.mean, seen.variance - kRounding};
+  double low = kHidden, high = seen.variance + 1.0;
+  const auto excess = [&] (double variance) {
+    const double mean = mean_behind (seen.mean, variance, offsets);
+    return rounded ({mean, variance}, offsets).variance - seen.variance;
+  };
+  if (excess (low) > 0.0 || excess (high) < 0.0)
+    return std::nullopt;
+  for (int i = 0; i < kSteps; i++) {
+    const double middle = 0.5 * (low + high);
+    (excess (middle) < 0.0 ? low : high) = middle;
+  }
+  const double variance = 0.5 * (low + high);
+  return Moments{mean_behind (seen.mean, variance, offsets), variance};
+}
+
+} // namespace codedexposure

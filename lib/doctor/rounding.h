@@ -1,0 +1,31 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Mean and variance of pixel values before they were rounded to whole DN. */
+#pragma once
+
+#include <optional>
+#include <vector>
+
+namespace codedexposure
+{
+
+/** Of many pixels that get the same light, over many frames, in DN. */
+struct Moments {
+  double mean = 0.0;
+  /** Over time, the mean of that of the pixels. */
+  double variance = 0.0;
+};
+
+/** Differences of the pixels' means from their common mean, DN: equally many
+ * pixels have each. Empty: there are none. */
+using Offsets = std::vector<double>;
+
+/** What rounding makes of Gaussian noise. */
+Moments rounded (const Moments &exact, const Offsets &offsets);
+
+/**
+ * The inverse of rounded (). None where the noise is too small for that: less
+ * than 0.35 DN, which rounding hides.
+ */
+std::optional<Moments> unrounded (const Moments &seen, const Offsets &offsets);
+
+} // namespace codedexposure

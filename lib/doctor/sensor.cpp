@@ -1,0 +1,458 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Check "sensor": photon transfer, with grey levels that mirrors make. */
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+
+#include "base/text.h"
+#include "base/try.h"
+#include "doctor/defects.h"
+#include "doctor/off_light.h"
+#include "doctor/photon_transfer.h"
+#include "doctor/rounding.h"
+#include "doctor/stack.h"
+
+namespace codedexposure
+{
+
+namespace
+{
+
+constexpr int kFrames = 16;         // of a level
+constexpr int kDarkFrames = 24;     // of the dark
+constexpr int kReferenceFrames = 6; // of the level that shows drift
+constexpr int kLevelsPerReference = 4;
+/* Slots are at least that long: masks of DLPC900 take 105 us. */
+constexpr Nanoseconds kShortest = 110'000;
+/* Levels, as parts of the brightest, in an order in which drift is no bow. */
+constexpr std::array kLevels = {
+    0.5, 0.03, 0.9, 0.2, 0.7, 0.004, 0.4, 1.0, 0.1, 0.8, 0.3, 0.01, 0.6, 0.06};
+/* Part of the values that may be the largest DN at a level that counts. */
+constexpr double kFull = 0.001;
+/* Errors of levels, relative: light that the model does not know of. */
+constexpr double kLightError = 0.001, kVarianceError = 0.004;
+/* A variance below this part of the expected one is that of a full well. */
+constexpr double kFullWell = 0.4;
+
+/* Rules: of warnings and failures. */
+constexpr double kBowWarn = 0.01, kBowFail = 0.02;
+constexpr double kNoiseWarn = 20.0; // e-
+constexpr double kZerosWarn = 0.01, kZerosFail = 0.03;
+constexpr double kDefectsWarn = 1e-4, kDefectsFail = 0.01;
+constexpr double kFewDefects = 40;
+
+struct Level {
+  int slots = 0;
+  Stack stack;
+  StackMeans means;
+};
+
+/** The measurement, step by step. */
+class PhotonTransferRun
+{
+public:
+  explicit PhotonTransferRun (Examination &examination)
+      : examination_ (examination), fine_ (fine_slots (examination, kShortest)),
+        largest_ (largest_number (examination))
+  {
+  }
+
+  Result<Finding> run ();
+
+private:
+  Result<void> find_range ();
+  Result<void> see_levels ();
+  Result<void> see_reference ();
+  Result<void> see_off ();
+  std::vector<TransferPoint> points (std::optional<double> leak) const;
+  TransferPoint point_of (
+      const StackMeans &means, double slots, double scatter) const;
+  double drift_at (Nanoseconds time) const;
+  double signal (const StackMeans &means) const
+  {
+    return means.mean - dark_means_.mean;
+  }
+  bool evaluate ();
+  void report ();
+  void report_defects ();
+  void diagnose ();
+  void diagnose_range (double zeros);
+  void diagnose_defects (
+      const char *id, const char *what, const char *remedy, std::size_t count);
+  void plot ();
+  int missing_bits () const;
+
+  Examination &examination_;
+  Examination::Lit fine_;
+  int largest_;
+  Finding finding_ = {"sensor",
+      "all mirrors, on for parts of the exposure of different lengths"};
+
+  Stack dark_, bright_;
+  StackMeans dark_means_;
+  Defects defects_;
+  int top_ = 0;            // slots of the brightest level
+  bool saturates_ = false; // with all slots
+  std::vector<Level> levels_;
+  struct Reference {
+    double time, signal;
+  };
+  std::vector<Reference> references_;
+  double drift_ = 0.0, drift_from_ = 0.0; // 1/s, s
+  Nanoseconds start_ = 0;
+  double spread_ = 0.0;       // of the pixels' light, as a part of it
+  std::vector<double> parts_; // of the light that pixels get
+  OffLight off_;
+  int pedestal_ = 0;
+  std::optional<PhotonTransfer> transfer_;
+  Measured black_;
+  std::optional<double> plateau_; // DN of a full well below the largest DN
+};
+
+/* Darkness, and the longest light that does not saturate. */
+Result<void>
+PhotonTransferRun::find_range ()
+{
+  ASSIGN_OR_RETURN (
+      dark_, look_at_light (examination_, no_light (), fine_.of, kDarkFrames));
+  start_ = dark_.time;
+  for (top_ = fine_.slots;; top_ = std::max (1, top_ * 3 / 4)) {
+    ASSIGN_OR_RETURN (
+        bright_, look_at_light (examination_, lit (fine_.first, top_), fine_.of,
+                     kReferenceFrames, &dark_.mean));
+    defects_ = find_defects (dark_.mean, bright_.mean, largest_);
+    const StackMeans means = means_of (bright_, defects_.good.view ());
+    if (means.full < kFull || top_ < 4)
+      break;
+    saturates_ = true;
+  }
+  dark_means_ = means_of (dark_, defects_.good.view ());
+  const StackMeans bright = means_of (bright_, defects_.good.view ());
+  parts_ = light_parts (dark_.mean, bright_.mean, defects_.good.view ());
+  spread_ = bright.spread / std::max (1.0, signal (bright));
+  return {};
+}
+
+Result<void>
+PhotonTransferRun::see_reference ()
+{
+  ASSIGN_OR_RETURN (
+      const Stack stack, look_at_light (examination_, lit (fine_.first, top_),
+                             fine_.of, kReferenceFrames, &dark_.mean));
+  references_.push_back ({double (stack.time - start_) * 1e-9,
+      signal (means_of (stack, defects_.good.view ()))});
+  return {};
+}
+
+/* The line through the references. */
+void
+fit_drift (const auto &references, double &rate, double &from)
+{
+  double time = 0.0, signal = 0.0, products = 0.0, squares = 0.0;
+  for (const auto &r : references) {
+    time += r.time / double (references.size ());
+    signal += r.signal / double (references.size ());
+  }
+  for (const auto &r : references) {
+    products += (r.time - time) * (r.signal - signal);
+    squares += (r.time - time) * (r.time - time);
+  }
+  from = time;
+  rate = squares > 0.0 && signal > 0.0 ? products / squares / signal : 0.0;
+}
+
+Result<void>
+PhotonTransferRun::see_levels ()
+{
+  for (std::size_t i = 0; i < kLevels.size (); i++) {
+    if (i % kLevelsPerReference == 0)
+      RETURN_IF_ERROR (see_reference ());
+    const int slots = std::max (1, int (std::lround (kLevels[i] * top_)));
+    if (std::ranges::find (levels_, slots, &Level::slots) != levels_.end ())
+      continue;
+    ASSIGN_OR_RETURN (
+        Stack stack, look_at_light (examination_, lit (fine_.first, slots),
+                         fine_.of, kFrames, &dark_.mean));
+    const StackMeans means = means_of (stack, defects_.good.view ());
+    levels_.push_back ({slots, std::move (stack), means});
+    levels_.back ().stack.mean = {};
+    levels_.back ().stack.variance = {};
+    levels_.back ().stack.zeros = levels_.back ().stack.full = {};
+  }
+  RETURN_IF_ERROR (see_reference ());
+  std::ranges::sort (levels_, {}, &Level::slots);
+  fit_drift (references_, drift_, drift_from_);
+  return {};
+}
+
+double
+PhotonTransferRun::drift_at (Nanoseconds time) const
+{
+  return 1.0 + drift_ * (double (time - start_) * 1e-9 - drift_from_);
+}
+
+/* Two exposure times separate black from light of mirrors that are off. */
+Result<void>
+PhotonTransferRun::see_off ()
+{
+  const auto first = fit_photon_transfer (points ({}));
+  const double slot = first ? first->slope : 0.0;
+  const double gain = first ? first->conversion_gain.value : 0.0;
+  pedestal_ =
+      pedestal_for (fine_, slot, gain, dark_means_.variance > 0.3 ? 1.0 : 0.0);
+  ASSIGN_OR_RETURN (
+      off_, measure_off_light (examination_, fine_, pedestal_,
+                defects_.good.view (), dark_.mean, parts_, pedestal_ * slot));
+  return {};
+}
+
+TransferPoint
+PhotonTransferRun::point_of (
+    const StackMeans &means, double slots, double scatter) const
+{
+  const double light = std::max (0.0, signal (means));
+  const auto exact =
+      unrounded ({means.mean, means.variance}, offsets_of (parts_, light));
+  TransferPoint point = {slots, {means.mean, 0.0}};
+  double rounding = spread_ * light > 0.5 ? 0.02 : 0.25;
+  if (exact) {
+    point.mean.value = exact->mean;
+    rounding = 0.01;
+    const double relative =
+        std::hypot (kVarianceError, std::sqrt (2.0 / means.values));
+    point.variance = Measured{exact->variance,
+        relative * (means.variance + (means.variance < 0.8 ? 0.1 : 0.0))};
+  }
+  point.mean.sigma =
+      std::hypot (rounding, std::hypot (kLightError * light, scatter));
+  return point;
+}
+
+/* Light is counted in slots; mirrors that are off add @leak, if it is known. */
+std::vector<TransferPoint>
+PhotonTransferRun::points (std::optional<double> leak) const
+{
+  const double leak_slots = leak.value_or (0.0);
+  std::vector<TransferPoint> all = {point_of (dark_means_, leak_slots, 0.0)};
+  for (const Level &level : levels_)
+    if (level.means.full < kFull &&
+        (!plateau_ || level.means.mean < 0.9 * *plateau_))
+      all.push_back (point_of (level.means,
+          level.slots * drift_at (level.stack.time) + leak_slots,
+          level.stack.scatter / std::sqrt (level.stack.frames)));
+  if (leak) {
+    all.push_back (
+        point_of (off_.shorter, pedestal_ + off_.part * leak_slots, 0.02));
+    if (pedestal_ > 0)
+      all.push_back (point_of (off_.longest, pedestal_ + leak_slots, 0.02));
+  }
+  return all;
+}
+
+bool
+PhotonTransferRun::evaluate ()
+{
+  auto first = fit_photon_transfer (points ({}));
+  if (!first)
+    return false;
+  const Level &top = levels_.back ();
+  const double expected = signal (top.means) / first->conversion_gain.value;
+  if (top.means.full < kFull && top.means.variance < kFullWell * expected) {
+    plateau_ = top.means.mean;
+    first = fit_photon_transfer (points ({}));
+    if (!first)
+      return false;
+  }
+  transfer_ = fit_photon_transfer (points (off_.light.value / first->slope));
+  if (!transfer_)
+    return false;
+  black_ = {transfer_->dark.value,
+      std::hypot (transfer_->dark.sigma, off_.light.sigma)};
+  const double electrons_per_number = transfer_->conversion_gain.value;
+  transfer_->read_variance.sigma = std::hypot (
+      transfer_->read_variance.sigma, electrons_per_number * off_.light.sigma);
+  return true;
+}
+
+int
+PhotonTransferRun::missing_bits () const
+{
+  std::uint16_t seen = dark_.bits_seen;
+  for (const Level &level : levels_)
+    seen = std::uint16_t (seen | level.stack.bits_seen);
+  return seen == 0 ? 0 : std::countr_zero (seen);
+}
+
+void
+PhotonTransferRun::report ()
+{
+  BenchProfile &profile = examination_.profile;
+  const Measured gain = transfer_->conversion_gain;
+  const double range = largest_ - black_.value;
+  const double well = plateau_.value_or (largest_) - black_.value;
+  const Measured full_well = {gain.value * well,
+      std::hypot (gain.sigma * well, gain.value * black_.sigma)};
+  const Measured bow = transfer_->deviation (
+      points (off_.light.value / transfer_->slope), largest_);
+  const Measured linearity = {bow.value / range, bow.sigma / range};
+  profile.conversion_gain = gain;
+  profile.full_well = full_well;
+  profile.read_noise = transfer_->read_noise;
+  profile.black_level = black_;
+  profile.linearity_error = linearity;
+  finding_.readings = {{"conversion gain", gain, "e-/DN"},
+      {"full well", full_well, "e-"},
+      {"read noise", transfer_->read_noise, "e-",
+          "at most " + real_text (kNoiseWarn)},
+      {"black level", black_, "DN"},
+      {"linearity error", {100 * linearity.value, 100 * linearity.sigma},
+          "% of the range", "at most " + real_text (100 * kBowWarn)}};
+  finding_.notes.push_back ({"saturation",
+      plateau_ ? "The well is full at " + fixed (*plateau_, 0) + " DN."
+      : saturates_
+          ? "Pixels reach the largest DN."
+          : "The light does not saturate pixels: the full well is taken as "
+            "that of the largest DN."});
+}
+
+void
+PhotonTransferRun::report_defects ()
+{
+  finding_.readings.push_back (
+      {"hot pixels", {double (defects_.hot.size ()), 0.0}, ""});
+  finding_.readings.push_back (
+      {"dead pixels", {double (defects_.dead.size ()), 0.0}, ""});
+  std::string places;
+  for (const auto &[name, pixels] :
+      {std::pair{"hot", &defects_.hot}, std::pair{"dead", &defects_.dead}}) {
+    places.clear ();
+    for (std::size_t i = 0; i < std::min<std::size_t> (pixels->size (), 50);
+         i++)
+      places += (i > 0 ? " " : "") + std::to_string ((*pixels)[i].x) + "," +
+                std::to_string ((*pixels)[i].y);
+    if (!places.empty ())
+      finding_.notes.push_back ({std::string (name) + " pixels", places});
+  }
+}
+
+void
+PhotonTransferRun::diagnose_range (double zeros)
+{
+  const int bits = examination_.rig.parts ().bits;
+  if (const int missing = missing_bits (); missing > 0)
+    finding_.diagnoses.push_back ({"missing-bits", Verdict::fail,
+        "the lowest " + std::to_string (missing) + " of " +
+            std::to_string (bits) + " bits are always 0",
+        "set the pixel format to the number of bits that the sensor "
+        "delivers"});
+  if (zeros > kZerosWarn)
+    finding_.diagnoses.push_back (
+        {"black-clipped", zeros > kZerosFail ? Verdict::fail : Verdict::warn,
+            fixed (100 * zeros, 1) +
+                " % of the dark pixel values are 0, where noise is cut off",
+            "raise BlackLevel until no dark pixel is 0"});
+}
+
+void
+PhotonTransferRun::diagnose_defects (
+    const char *id, const char *what, const char *remedy, std::size_t count)
+{
+  const double pixels = double (dark_.mean.width ()) * dark_.mean.height ();
+  if (double (count) <= std::max (kFewDefects, kDefectsWarn * pixels))
+    return;
+  finding_.diagnoses.push_back ({id,
+      double (count) > kDefectsFail * pixels ? Verdict::fail : Verdict::warn,
+      std::to_string (count) + " pixels " + what, remedy});
+}
+
+void
+PhotonTransferRun::diagnose ()
+{
+  const double zeros = std::max (off_.shorter.zeros, dark_means_.zeros);
+  diagnose_range (pedestal_ > 0 ? dark_means_.zeros : zeros);
+  const bool known = finding_.diagnoses.empty ();
+  if (transfer_ && known) {
+    const Measured &bow = *examination_.profile.linearity_error;
+    if (bow.value - 2 * bow.sigma > kBowWarn)
+      finding_.diagnoses.push_back (
+          {"nonlinear", bow.value > kBowFail ? Verdict::fail : Verdict::warn,
+              "pixel values differ by up to " + fixed (100 * bow.value, 1) +
+                  " % of the range from a straight line",
+              "set Gamma=1 and switch off every look-up table and high dynamic "
+              "range mode of the camera"});
+    const Measured &noise = transfer_->read_noise;
+    if (noise.value - 2 * noise.sigma > kNoiseWarn)
+      finding_.diagnoses.push_back ({"noise", Verdict::warn,
+          "the read noise is " + fixed (noise.value, 0) +
+              " e-, where cameras of this kind have 2 to 15 e-",
+          "use a mode of the camera with a slower readout or a higher analog "
+          "gain"});
+  }
+  if (!transfer_ && known)
+    finding_.diagnoses.push_back ({"noise", Verdict::fail,
+        "noise does not grow with light as that of photons does",
+        "switch off noise reduction and other processing in the camera"});
+  diagnose_defects ("dead-pixels", "do not see light",
+      "clean the window of the sensor, or replace the camera",
+      defects_.dead.size ());
+  diagnose_defects ("hot-pixels", "have a signal without light",
+      "cool the camera or shorten the exposure; defect correction of the "
+      "camera may hide them, but mixes neighbours",
+      defects_.hot.size ());
+}
+
+void
+PhotonTransferRun::plot ()
+{
+  Plot response{"Response", "light, slots", "mean, DN"};
+  Plot noise{"Photon transfer", "mean, DN", "variance, DN^2"};
+  for (const TransferPoint &p : points (off_.light.value / transfer_->slope)) {
+    response.points.push_back ({p.light, p.mean.value});
+    response.model.push_back ({p.light, transfer_->number_of (p.light)});
+    if (!p.variance)
+      continue;
+    noise.points.push_back ({p.mean.value, p.variance->value});
+    const double gain = transfer_->conversion_gain.value;
+    noise.model.push_back (
+        {p.mean.value, (p.mean.value - black_.value) / gain +
+                           transfer_->read_variance.value / (gain * gain)});
+  }
+  for (Plot *each : {&response, &noise}) {
+    std::ranges::sort (each->points, {}, &Position::x);
+    std::ranges::sort (each->model, {}, &Position::x);
+    finding_.plots.push_back (std::move (*each));
+  }
+}
+
+Result<Finding>
+PhotonTransferRun::run ()
+{
+  RETURN_IF_ERROR (find_range ());
+  RETURN_IF_ERROR (see_levels ());
+  RETURN_IF_ERROR (see_off ());
+  if (evaluate ()) {
+    report ();
+    plot ();
+  }
+  report_defects ();
+  diagnose ();
+  if (examination_.exhibits) {
+    finding_.exhibits.push_back (
+        {"Dark frames, mean", picture_of (dark_.mean, dark_means_.mean - 2.0,
+                                  dark_means_.mean + 0.05 * largest_)});
+    finding_.exhibits.push_back (
+        {"Bright frames, mean", picture_of (bright_.mean, 0.0, largest_)});
+  }
+  return std::move (finding_);
+}
+
+} // namespace
+
+Result<Finding>
+check_sensor (Examination &examination)
+{
+  return PhotonTransferRun (examination).run ();
+}
+
+} // namespace codedexposure

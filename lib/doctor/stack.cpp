@@ -1,0 +1,218 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "doctor/stack.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+#include "base/try.h"
+
+namespace codedexposure
+{
+
+namespace
+{
+
+double
+mean_of (ImageView<const float> image)
+{
+  double sum = 0.0;
+  for (int y = 0; y < image.height; y++)
+    for (int x = 0; x < image.width; x++)
+      sum += double (image.at (x, y));
+  return sum / (double (image.width) * image.height);
+}
+
+/* Parts of a common change of light that pixels get; their mean is 1. */
+Image<float>
+weights_of (const Image<float> &mean, const Image<float> *dark, int largest)
+{
+  Image<float> weights (mean.width (), mean.height ());
+  const double light =
+      dark ? mean_of (mean.view ()) - mean_of (dark->view ()) : 0.0;
+  const bool lit = light > 0.02 * largest;
+  for (int y = 0; y < mean.height (); y++)
+    for (int x = 0; x < mean.width (); x++)
+      weights.at (x, y) =
+          lit ? float ((double (mean.at (x, y)) - double (dark->at (x, y))) /
+                       light)
+              : 1.0f;
+  return weights;
+}
+
+void
+add_frame (const Image<std::uint16_t> &frame, int largest, Stack &stack)
+{
+  for (int y = 0; y < frame.height (); y++) {
+    const std::uint16_t *row = frame.view ().row (y);
+    for (int x = 0; x < frame.width (); x++) {
+      stack.mean.at (x, y) += float (row[x]);
+      stack.zeros.at (x, y) =
+          std::uint16_t (stack.zeros.at (x, y) + (row[x] == 0));
+      stack.full.at (x, y) =
+          std::uint16_t (stack.full.at (x, y) + (row[x] >= largest));
+      stack.bits_seen = std::uint16_t (stack.bits_seen | row[x]);
+    }
+  }
+}
+
+} // namespace
+
+Stack
+stack_of (
+    const std::vector<SeenFrame> &frames, int largest, const Image<float> *dark)
+{
+  const Image<std::uint16_t> &first = frames.front ().picture;
+  const int width = first.width (), height = first.height ();
+  Stack stack = {int (frames.size ()), 0, {width, height}, {width, height},
+      {width, height}, {width, height}};
+  for (const SeenFrame &frame : frames) {
+    stack.time += (frame.time - frames[0].time) / stack.frames;
+    add_frame (frame.picture, largest, stack);
+  }
+  stack.time += frames[0].time;
+  for (int y = 0; y < height; y++)
+    for (int x = 0; x < width; x++)
+      stack.mean.at (x, y) /= float (stack.frames);
+
+  const Image<float> weights = weights_of (stack.mean, dark, largest);
+  double scatter = 0.0;
+  for (const SeenFrame &frame : frames) {
+    double sum = 0.0;
+    for (int y = 0; y < height; y++)
+      for (int x = 0; x < width; x++)
+        sum += double (frame.picture.at (x, y)) - double (stack.mean.at (x, y));
+    const double more = sum / (double (width) * height);
+    scatter += more * more;
+    for (int y = 0; y < height; y++)
+      for (int x = 0; x < width; x++) {
+        const float rest = float (frame.picture.at (x, y)) -
+                           stack.mean.at (x, y) -
+                           float (more) * weights.at (x, y);
+        stack.variance.at (x, y) += rest * rest / float (stack.frames - 1);
+      }
+  }
+  stack.scatter = std::sqrt (scatter / (stack.frames - 1));
+  return stack;
+}
+
+Result<Stack>
+look_at_light (Examination &examination, const StillMask &mask, int slots,
+    int frames, const Image<float> *dark)
+{
+  ASSIGN_OR_RETURN (auto seen, look (examination, mask, slots, frames));
+  const auto unusable = [&] (const SeenFrame &frame) {
+    return frame.damaged ||
+           frame.picture.width () != seen[0].picture.width () ||
+           frame.picture.height () != seen[0].picture.height () ||
+           (dark && (frame.picture.width () != dark->width () ||
+                        frame.picture.height () != dark->height ()));
+  };
+  std::vector<SeenFrame> good;
+  for (SeenFrame &frame : seen)
+    if (!unusable (frame))
+      good.push_back (frame);
+  if (int (good.size ()) < std::max (2, frames / 2))
+    return Error{"only " + std::to_string (good.size ()) + " of " +
+                     std::to_string (frames) +
+                     " frames came complete; see the check of the trigger",
+        ErrorCode::timeout};
+  return stack_of (good, largest_number (examination), dark);
+}
+
+StackMeans
+means_of (const Stack &stack, ImageView<const std::uint8_t> good)
+{
+  StackMeans sum;
+  double pixels = 0.0, squares = 0.0;
+  const double middle = mean_of (stack.mean.view ());
+  for (int y = 0; y < good.height; y++)
+    for (int x = 0; x < good.width; x++) {
+      if (good.at (x, y) == 0)
+        continue;
+      const double mean = double (stack.mean.at (x, y)) - middle;
+      pixels++;
+      sum.mean += mean;
+      squares += mean * mean;
+      sum.variance += double (stack.variance.at (x, y));
+      sum.zeros += stack.zeros.at (x, y);
+      sum.full += stack.full.at (x, y);
+    }
+  if (pixels < 1.0)
+    return {};
+  sum.values = pixels * stack.frames;
+  sum.mean /= pixels;
+  sum.variance /= pixels;
+  sum.zeros /= sum.values;
+  sum.full /= sum.values;
+  const double spread = squares / pixels - sum.mean * sum.mean;
+  sum.spread = std::sqrt (std::max (0.0, spread - sum.variance / stack.frames));
+  sum.mean += middle;
+  return sum;
+}
+
+std::vector<double>
+light_parts (const Image<float> &dark, const Image<float> &bright,
+    ImageView<const std::uint8_t> good)
+{
+  constexpr std::size_t kParts = 24;
+  std::vector<double> light;
+  for (int y = 0; y < good.height; y++)
+    for (int x = 0; x < good.width; x++)
+      if (good.at (x, y) != 0)
+        light.push_back (double (bright.at (x, y)) - double (dark.at (x, y)));
+  if (light.size () < kParts)
+    return {};
+  std::ranges::sort (light);
+  std::vector<double> parts (kParts);
+  double mean = 0.0;
+  for (std::size_t i = 0; i < light.size (); i++) {
+    parts[i * kParts / light.size ()] +=
+        light[i] * double (kParts) / double (light.size ());
+    mean += light[i] / double (light.size ());
+  }
+  for (double &part : parts)
+    part /= mean;
+  return parts;
+}
+
+StillMask
+no_light ()
+{
+  return {.name = "no light", .on = [] (int, int) { return false; }};
+}
+
+Examination::Lit
+fine_slots (const Examination &examination, Nanoseconds shortest)
+{
+  const RigParts &parts = examination.rig.parts ();
+  const Examination::Lit &inside = examination.inside;
+  const Nanoseconds slot = parts.rate.period () / std::max (1, inside.of);
+  const int pieces = int (std::clamp<Nanoseconds> (
+      slot / std::max ({shortest, parts.dmd.minimum_active, Nanoseconds (1)}),
+      1, 4096));
+  return {inside.first * pieces, inside.slots * pieces, inside.of * pieces};
+}
+
+Image<std::uint8_t>
+picture_of (const Image<float> &image, double low, double high)
+{
+  Image<std::uint8_t> picture (image.width (), image.height ());
+  const double scale = 255.0 / std::max (1e-9, high - low);
+  for (int y = 0; y < image.height (); y++)
+    for (int x = 0; x < image.width (); x++)
+      picture.at (x, y) = std::uint8_t (std::clamp (
+          std::lround (scale * (double (image.at (x, y)) - low)), 0l, 255l));
+  return picture;
+}
+
+std::string
+fixed (double value, int decimals)
+{
+  std::array<char, 64> text;
+  std::snprintf (text.data (), text.size (), "%.*f", decimals, value);
+  return text.data ();
+}
+
+} // namespace codedexposure

@@ -1,0 +1,79 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Frames of the same mask, put together. */
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "base/image.h"
+#include "base/result.h"
+#include "doctor/checks.h"
+
+namespace codedexposure
+{
+
+/** Mean and noise of each pixel over frames. */
+struct Stack {
+  int frames = 0;
+  Nanoseconds time = 0; ///< mean of the stamps
+  Image<float> mean;    ///< DN
+  /** Over time, without what all pixels have in common: flicker and drift are
+   * not noise of the sensor. */
+  Image<float> variance;
+  /** Frames in which a pixel was 0, and in which it had the largest DN. */
+  Image<std::uint16_t> zeros, full;
+  std::uint16_t bits_seen = 0; ///< that are set in a pixel of a frame
+  double scatter = 0.0;        ///< rms of the means of frames, DN
+};
+
+/**
+ * look () whose frames are complete. Error when fewer than half of them come.
+ *
+ * @p dark  mean without light, so that common changes of light are in
+ *          proportion to it; null: they are the same in each pixel.
+ */
+Result<Stack> look_at_light (Examination &examination, const StillMask &mask,
+    int slots, int frames, const Image<float> *dark = nullptr);
+
+/** Puts @p frames, at least two of the same size, together. */
+Stack stack_of (const std::vector<SeenFrame> &frames, int largest,
+    const Image<float> *dark = nullptr);
+
+/** Means over the pixels of @p stack that are not 0 in @p good. */
+struct StackMeans {
+  double mean = 0.0, variance = 0.0;
+  double spread = 0.0; ///< standard deviation of the pixels' means, DN
+  double zeros = 0.0;  ///< part of the values that are 0
+  double full = 0.0;   ///< part that is the largest DN
+  double values = 0.0; ///< pixels times frames
+};
+StackMeans means_of (const Stack &stack, ImageView<const std::uint8_t> good);
+
+/** Light of pixels, as parts of their mean light, from @p dark to @p bright:
+ * equally many pixels have each. */
+std::vector<double> light_parts (const Image<float> &dark,
+    const Image<float> &bright, ImageView<const std::uint8_t> good);
+
+/** Every mirror is off. */
+StillMask no_light ();
+
+/** The slots that lie in the exposure as a whole, in shorter ones: each is at
+ * least @p shortest long. */
+Examination::Lit fine_slots (
+    const Examination &examination, Nanoseconds shortest);
+
+/** The largest DN of the camera. */
+inline int
+largest_number (const Examination &examination)
+{
+  return (1 << examination.rig.parts ().bits) - 1;
+}
+
+/** 255 for @p high and more, 0 for @p low and less. */
+Image<std::uint8_t> picture_of (
+    const Image<float> &image, double low, double high);
+
+/** "1.50" */
+std::string fixed (double value, int decimals);
+
+} // namespace codedexposure

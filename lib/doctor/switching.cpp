@@ -1,0 +1,137 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "doctor/switching.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Dense>
+
+#include "base/try.h"
+
+namespace codedexposure
+{
+
+namespace
+{
+
+constexpr int kFrames = 6;
+constexpr Nanoseconds kStep = 25'000;      // of the places of a slot
+constexpr Nanoseconds kBefore = 2'500'000; // of the light that all points have
+/* Of the moments at which mirrors go off, from the end of the exposure on. */
+constexpr Nanoseconds kMoments[] = {-1'500'000, -1'000'000, -700'000, -500'000,
+    -350'000, -250'000, -175'000, -125'000, -75'000, -25'000, 25'000, 75'000,
+    150'000, 300'000, 600'000};
+/* Error of the light of a point, relative: flicker bends the line. */
+constexpr double kLightError = 0.001;
+constexpr double kLongest = 1.5e-3; // transition that points can show, s
+
+/* Light, in seconds, of mirrors that go off at @time, within @took, seen until
+ * the exposure's @end. */
+double
+light_of (double time, double took, double end)
+{
+  if (time >= end)
+    return end - 0.5 * took;
+  const double over = time + took - end;
+  return over > 0.0 ? time - 0.5 * over * over / std::max (1e-9, took) : time;
+}
+
+/* Chi-square of the best line through the points, for a bend. */
+double
+misfit (const std::vector<SwitchPoint> &points, double took, double end)
+{
+  Eigen::Matrix2d normal = Eigen::Matrix2d::Zero ();
+  Eigen::Vector2d right = Eigen::Vector2d::Zero ();
+  double squares = 0.0;
+  for (const SwitchPoint &point : points) {
+    const Eigen::Vector2d row (1.0, 1e3 * light_of (point.time, took, end));
+    const double weight = 1.0 / (point.sigma * point.sigma);
+    normal += weight * row * row.transpose ();
+    right += weight * point.light * row;
+    squares += weight * point.light * point.light;
+  }
+  const Eigen::Vector2d line = normal.ldlt ().solve (right);
+  return squares - right.dot (line);
+}
+
+/* The least misfit of all moments at which the exposure may end. */
+double
+best_misfit (const std::vector<SwitchPoint> &points, double took)
+{
+  double from = points.front ().time, to = points.back ().time;
+  double best = 0.0, at = 0.0;
+  for (int round = 0; round < 4; round++) {
+    const double step = (to - from) / 40;
+    best = misfit (points, took, at = from);
+    for (double end = from; end <= to; end += step)
+      if (const double now = misfit (points, took, end); now < best) {
+        best = now;
+        at = end;
+      }
+    from = at - step;
+    to = at + step;
+  }
+  return best;
+}
+
+} // namespace
+
+Measured
+fit_switching (const std::vector<SwitchPoint> &points)
+{
+  constexpr int kGrid = 100;
+  std::vector<double> values;
+  for (int i = 0; i <= kGrid; i++)
+    values.push_back (best_misfit (points, kLongest * i / kGrid));
+  const auto least = std::ranges::min_element (values);
+  const double freedom = std::max (1.0, double (points.size ()) - 4.0);
+  const double unit = std::max (1.0, *least / freedom);
+  /* One standard deviation is where chi-square has grown by one. */
+  int low = int (least - values.begin ()), high = low;
+  const int best = low;
+  while (low > 0 && values[std::size_t (low)] < *least + unit)
+    low--;
+  while (high < kGrid && values[std::size_t (high)] < *least + unit)
+    high++;
+  const double step = kLongest / kGrid;
+  return {best * step, std::max (step, 0.5 * (high - low) * step)};
+}
+
+Result<Measured>
+measure_switching (Examination &examination, const Image<float> &dark,
+    ImageView<const std::uint8_t> good, std::vector<SwitchPoint> &points)
+{
+  Rig &rig = examination.rig;
+  const Nanoseconds period = rig.parts ().rate.period ();
+  const int slots = int (std::clamp<Nanoseconds> (period / kStep, 8, 8192));
+  const auto slot_at = [&] (double time) {
+    return int (std::lround (time * slots / double (period)));
+  };
+  const double delay = examination.profile.trigger_delay
+                           ? examination.profile.trigger_delay->value
+                           : 0.0;
+  const double end = delay + 0.5 * double (period);
+  const int first = std::max (0, slot_at (end - double (kBefore)));
+
+  RETURN_IF_ERROR (rig.expose (period / 2));
+  RETURN_IF_ERROR (rig.watch (examination.lag));
+  for (const Nanoseconds moment : kMoments) {
+    const int last = slot_at (end + double (moment));
+    if (last <= first || last >= slots)
+      continue;
+    const auto stack = look_at_light (
+        examination, lit (first, last - first), slots, kFrames, &dark);
+    if (!stack)
+      return stack.error ();
+    const StackMeans means = means_of (*stack, good);
+    points.push_back ({double (last) * double (period) / slots * 1e-9,
+        means.mean, std::hypot (0.01, stack->scatter / std::sqrt (kFrames))});
+  }
+  RETURN_IF_ERROR (rig.expose (std::nullopt));
+  RETURN_IF_ERROR (rig.watch (examination.lag));
+  if (points.size () < 8)
+    return Error{"the frame period is too short to see mirrors move"};
+  return fit_switching (points);
+}
+
+} // namespace codedexposure

@@ -1,0 +1,114 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "doctor/view.h"
+
+#include <cmath>
+#include <cstdint>
+
+#include <Eigen/Dense>
+
+#include "base/try.h"
+
+namespace codedexposure
+{
+
+namespace
+{
+
+constexpr int kFrames = 3;
+constexpr double kFewPixels = 500;
+
+/* A number in 0..1 for each mirror, without any pattern. */
+double
+draw (int x, int y)
+{
+  std::uint64_t bits = std::uint64_t (std::uint32_t (x)) << 32 |
+                       std::uint64_t (std::uint32_t (y));
+  for (const std::uint64_t factor :
+      {0xbf58476d1ce4e5b9u, 0x94d049bb133111ebu, 0x9e3779b97f4a7c15u}) {
+    bits ^= bits >> 31;
+    bits *= factor;
+  }
+  return double (bits >> 11) * 0x1p-53;
+}
+
+StillMask
+ramp (bool along_x, Extent mirrors)
+{
+  return {.name = along_x ? "ramp in x" : "ramp in y",
+      .on = [along_x, mirrors] (int x, int y) {
+        const double part =
+            along_x ? (x + 0.5) / mirrors.width : (y + 0.5) / mirrors.height;
+        return draw (x, y) < part;
+      }};
+}
+
+/* A plane through the part of the light that pixels get. */
+Result<Eigen::Vector3d>
+plane_of (const Image<float> &seen, const Image<float> &off,
+    const Image<float> &on, ImageView<const std::uint8_t> good)
+{
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero ();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero ();
+  for (int y = 0; y < good.height; y++)
+    for (int x = 0; x < good.width; x++) {
+      if (good.at (x, y) == 0)
+        continue;
+      const double light = double (on.at (x, y)) - double (off.at (x, y));
+      const double part =
+          (double (seen.at (x, y)) - double (off.at (x, y))) / light;
+      const Eigen::Vector3d row (x, y, 1.0);
+      normal += row * row.transpose ();
+      right += part * row;
+    }
+  if (normal (2, 2) < kFewPixels)
+    return Error{"fewer than " + std::to_string (int (kFewPixels)) +
+                 " pixels see mirrors; check light, focus and alignment"};
+  return Eigen::Vector3d (normal.ldlt ().solve (right));
+}
+
+} // namespace
+
+Position
+CoarseView::camera_at (Position mirror) const
+{
+  const double dx = mirror.x - x0, dy = mirror.y - y0;
+  return {(yy * dx - xy * dy) / area (), (xx * dy - yx * dx) / area ()};
+}
+
+double
+CoarseView::pixels_per_mirror () const
+{
+  return 1.0 / std::sqrt (std::max (1e-12, std::abs (area ())));
+}
+
+ViewOrientation
+CoarseView::orientation () const
+{
+  const bool upright =
+      std::abs (xx) + std::abs (yy) > std::abs (xy) + std::abs (yx);
+  if (upright && area () > 0.0)
+    return {.turned = xx > 0.0 ? 0 : 180};
+  if (upright)
+    return {.flipped_x = xx<0.0, .flipped_y = xx> 0.0};
+  return {.flipped_x = area () < 0.0, .turned = yx > 0.0 ? 90 : 270};
+}
+
+Result<CoarseView>
+look_where (Examination &examination, const Image<float> &off,
+    const Image<float> &on, ImageView<const std::uint8_t> good)
+{
+  const Extent mirrors = examination.rig.parts ().dmd.shown ();
+  Eigen::Matrix<double, 3, 2> planes = Eigen::Matrix<double, 3, 2>::Zero ();
+  for (const bool along_x : {true, false}) {
+    ASSIGN_OR_RETURN (const Stack seen,
+        look_at_light (examination, ramp (along_x, mirrors), 1, kFrames));
+    ASSIGN_OR_RETURN (
+        const Eigen::Vector3d plane, plane_of (seen.mean, off, on, good));
+    planes.col (along_x ? 0 : 1) =
+        plane * (along_x ? mirrors.width : mirrors.height);
+  }
+  return CoarseView{planes (0, 0), planes (1, 0), planes (2, 0) - 0.5,
+      planes (0, 1), planes (1, 1), planes (2, 1) - 0.5};
+}
+
+} // namespace codedexposure

@@ -355,10 +355,13 @@ add_row (float weight, const float *in, int width, float *out)
 
 } // namespace
 
-/* @from reaches beyond @to by @margin pixels on each side. */
+/* @from reaches beyond @to by @margin pixels on each side, and at the right and
+ * the bottom perhaps more. */
 void
 Lens::blur (ImageView<const float> from, ImageView<float> to, int margin)
 {
+  if (between_.height () < from.height)
+    between_ = Image<float> (width_, from.height);
   const int width = to.width;
   const int left = margin + horizontal_.first;
   for (int y = 0; y < from.height; y++) {

@@ -83,7 +83,8 @@ public:
 
   /** Every pixel sees only its own mirror. */
   bool ideal () const { return ideal_; }
-  /** @p camera is overwritten; both of the lens's size, without overlap. */
+  /** @p camera is overwritten; both of the lens's size, without overlap. With a
+   * mapping, the picture of the mirrors may have another size. */
   void image (ImageView<const float> mirrors, ImageView<float> camera);
 
 private:

@@ -185,6 +185,13 @@ draw_electrons (const NoiseKey &key, std::uint32_t block, const Lanes &means,
   return drawn;
 }
 
+/* @number bent by a parabola that is 0 at 0 and at @range. */
+inline float
+bent (float number, float bow, float range)
+{
+  return number + 4.0f * bow * number * (1.0f - number / range);
+}
+
 /* Half up, then clamped; the sum is never negative, so truncation is floor. */
 template <typename Pixel>
 Pixel
@@ -235,11 +242,15 @@ Sensor::read_out (ImageView<const float> light, double unit,
         means[i] = in[i] * to_electrons;
       draw_normals (key, block, shot, read);
       const Lanes electrons = draw_electrons (key, block, means, shot);
+      Lanes amplified = {};
       for (std::size_t i = 0; i < count; i++)
-        numbers[i] = quantise<Pixel> (
-            (std::min (electrons[i], most) + noise * read[i]) * to_number +
-                black,
-            largest);
+        amplified[i] =
+            (std::min (electrons[i], most) + noise * read[i]) * to_number;
+      if (bow != 0.0)
+        for (std::size_t i = 0; i < count; i++)
+          amplified[i] = bent (amplified[i], float (bow), largest - black);
+      for (std::size_t i = 0; i < count; i++)
+        numbers[i] = quantise<Pixel> (amplified[i] + black, largest);
     }
 }
 

@@ -10,8 +10,8 @@ namespace codedexposure
 {
 
 /**
- * A linear sensor. Its unit of light is white during a whole exposure with the
- * mirror on in every slot.
+ * A sensor, linear unless it has a bow. Its unit of light is white during a
+ * whole exposure with the mirror on in every slot.
  */
 struct Sensor {
   double full_well = 0.0;   ///< electrons at unit light; 0: noise-free
@@ -21,6 +21,9 @@ struct Sensor {
   double black_level = 0.0; ///< DN that is added to all pixels
   int bits = 8;             ///< of the converter, 1..16
   std::uint64_t seed = 0;
+  /** How much more than linear half of the range is, as a part of the range;
+   * the error is a parabola. Without noise, not in force. */
+  double bow = 0.0;
 
   /**
    * Digital numbers of frame @p frame: Poisson electrons, clamped to the well,

@@ -1,0 +1,667 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "bench/sick_bench.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "base/try.h"
+#include "bench/random.h"
+#include "bench/sensor.h"
+
+namespace codedexposure
+{
+
+namespace
+{
+
+/* Masks that frames may still show. */
+constexpr std::size_t kRemembered = 32;
+constexpr std::size_t kPast = 32;
+
+/* What a number is drawn for. */
+enum Purpose : std::uint32_t {
+  kPhase,
+  kPlace,
+  kHeat,
+  kSensitivity,
+  kDust,
+  kJitter,
+  kLateness,
+  kLoss,
+};
+
+/** In 0..1, by the seed and what it is for. */
+double
+draw (const SickBenchOptions &options, Purpose purpose, std::uint64_t number)
+{
+  const Philox::Words words = Philox::draw (
+      {std::uint32_t (number), std::uint32_t (number >> 32), purpose, 0xBE7C},
+      {std::uint32_t (options.seed), std::uint32_t (options.seed >> 32)});
+  return (words[0] + 0.5) * 0x1p-32;
+}
+
+double
+draw_normal (
+    const SickBenchOptions &options, Purpose purpose, std::uint64_t number)
+{
+  const double u = draw (options, purpose, 2 * number);
+  const double v = draw (options, purpose, 2 * number + 1);
+  return std::sqrt (-2.0 * std::log (u)) *
+         std::cos (2.0 * std::numbers::pi * v);
+}
+
+Position
+centre_of (Extent size)
+{
+  return {0.5 * (size.width - 1), 0.5 * (size.height - 1)};
+}
+
+/** A vector from the camera's centre as the orientation has it. */
+Position
+oriented (const Orientation &orientation, Position d)
+{
+  if (orientation.flipped_x)
+    d.x = -d.x;
+  if (orientation.flipped_y)
+    d.y = -d.y;
+  switch (orientation.turned) {
+  case 90:
+    return {-d.y, d.x};
+  case 180:
+    return {-d.x, -d.y};
+  case 270:
+    return {d.y, -d.x};
+  default:
+    return d;
+  }
+}
+
+Position
+mirror_of (const SickBenchOptions &options, Position pixel)
+{
+  const Extent camera = options.camera;
+  const Position c = centre_of (camera), m = centre_of (options.mirrors);
+  const Position d =
+      oriented (options.orientation, {pixel.x - c.x, pixel.y - c.y});
+  const Position seen = mirror_seen (
+      options.alignment, camera.width, camera.height, {c.x + d.x, c.y + d.y});
+  return {seen.x - c.x + m.x, seen.y - c.y + m.y};
+}
+
+/** mirror_of () without distortion. */
+Homography
+homography_of (const SickBenchOptions &options)
+{
+  const Alignment &a = options.alignment;
+  const Position c = centre_of (options.camera);
+  const Position m = centre_of (options.mirrors);
+  const double turn = a.rotation * std::numbers::pi / 180.0;
+  const double cosine = std::cos (turn) / a.scale;
+  const double sine = std::sin (turn) / a.scale;
+  const double mx = m.x + a.shift_x, my = m.y + a.shift_y;
+  const double tx = a.tilt_x / std::max (1.0, c.x);
+  const double ty = a.tilt_y / std::max (1.0, c.y);
+  Homography h;
+  const Position along[] = {oriented (options.orientation, {1.0, 0.0}),
+      oriented (options.orientation, {0.0, 1.0})};
+  for (std::size_t i = 0; i < 2; i++) {
+    const auto [x, y] = along[i];
+    const double z = tx * x + ty * y;
+    h[i] = cosine * x - sine * y + mx * z;
+    h[3 + i] = sine * x + cosine * y + my * z;
+    h[6 + i] = z;
+  }
+  const double last[] = {mx, my, 1.0};
+  for (std::size_t row = 0; row < 3; row++)
+    h[3 * row + 2] = last[row] - h[3 * row] * c.x - h[3 * row + 1] * c.y;
+  return h;
+}
+
+Result<Mapping>
+mapping_of (const SickBenchOptions &options)
+{
+  Mapping::Parts parts{.camera = options.camera,
+      .mirrors = options.mirrors,
+      .homography = homography_of (options),
+      .psf_sigma = options.blur};
+  if (options.alignment.distortion == 0.0)
+    return Mapping::make (std::move (parts));
+  ASSIGN_OR_RETURN (const Mapping straight, Mapping::make (parts));
+  Displacement bent{65, 49, {}, {}};
+  for (int j = 0; j < bent.rows; j++)
+    for (int i = 0; i < bent.columns; i++) {
+      const Position at{
+          double (i) * (options.camera.width - 1) / (bent.columns - 1),
+          double (j) * (options.camera.height - 1) / (bent.rows - 1)};
+      const Position is = mirror_of (options, at);
+      const Position was = straight.mirror_at (at.x, at.y);
+      bent.x.push_back (is.x - was.x);
+      bent.y.push_back (is.y - was.y);
+    }
+  parts.displacement = std::move (bent);
+  return Mapping::make (std::move (parts));
+}
+
+/* Multiplies two pictures of one size, and more. */
+template <typename Function>
+void
+for_each_pixel (Extent size, Function function)
+{
+  for (int y = 0; y < size.height; y++)
+    for (int x = 0; x < size.width; x++)
+      function (x, y);
+}
+
+/** @p from blurred along one axis; the border goes on beyond the frame. */
+Image<float>
+blurred (const Image<float> &from, double sigma, bool upright)
+{
+  const int reach = int (std::ceil (4.0 * sigma));
+  std::vector<float> weights;
+  double sum = 0.0;
+  for (int i = -reach; i <= reach; i++)
+    sum += std::exp (-0.5 * i * i / (sigma * sigma));
+  for (int i = -reach; i <= reach; i++)
+    weights.push_back (float (std::exp (-0.5 * i * i / (sigma * sigma)) / sum));
+  const Extent size{from.width (), from.height ()};
+  Image<float> to (size.width, size.height);
+  for_each_pixel (size, [&] (int x, int y) {
+    float all = 0.0f;
+    for (int i = -reach; i <= reach; i++) {
+      const int px = upright ? x : std::clamp (x + i, 0, size.width - 1);
+      const int py = upright ? std::clamp (y + i, 0, size.height - 1) : y;
+      all += weights[std::size_t (i + reach)] * from.at (px, py);
+    }
+    to.at (x, y) = all;
+  });
+  return to;
+}
+
+} // namespace
+
+Result<SickBench>
+SickBench::make (const SickBenchOptions &options)
+{
+  for (const Extent size : {options.camera, options.mirrors})
+    if (size.width < 8 || size.height < 8 || size.width > Mapping::kMaxSize ||
+        size.height > Mapping::kMaxSize)
+      return Error{"a bench needs cameras and mirrors of 8x8 to 16384x16384"};
+  if (options.bits < 8 || options.bits > 16)
+    return Error{
+        "a bench has 8 to 16 bits, not " + std::to_string (options.bits)};
+  ASSIGN_OR_RETURN (Mapping mapping, mapping_of (options));
+  SickBench bench (options, std::move (mapping));
+  if (bench.longest () <= 0)
+    return Error{"nothing is left of the frame period for the exposure; use "
+                 "shorter times or a lower rate"};
+  if (bench.view_.width < 1 || bench.view_.height < 1)
+    return Error{"the camera sees no mirror; use a smaller shift"};
+  bench.measure_field ();
+  return bench;
+}
+
+SickBench::SickBench (const SickBenchOptions &options, Mapping mapping)
+    : options_ (options), mapping_ (std::move (mapping))
+{
+  constexpr double kMinute = 60.0;
+  light_over_time_ = {options.flicker_rate, options.flicker_depth,
+      2.0 * std::numbers::pi * draw (options, kPhase, 0),
+      options.drift / kMinute};
+  find_view ();
+  draw_defects ();
+  fill_profile ();
+}
+
+/* The mirrors that the border of the frame sees, and what a blur reaches. */
+void
+SickBench::find_view ()
+{
+  const auto [width, height] = options_.camera;
+  const Extent mirrors = options_.mirrors;
+  const double margin = 16.0 + 6.0 * options_.blur;
+  double left = 1e9, top = 1e9, right = -1e9, bottom = -1e9;
+  for_each_pixel (options_.camera, [&] (int x, int y) {
+    if (x % (width - 1) != 0 && y % (height - 1) != 0)
+      return;
+    const Position at = mapping_.mirror_at (x, y);
+    left = std::min (left, at.x - margin);
+    right = std::max (right, at.x + margin);
+    top = std::min (top, at.y - margin);
+    bottom = std::max (bottom, at.y + margin);
+  });
+  const int x = int (std::clamp (left, 0.0, double (mirrors.width)));
+  const int y = int (std::clamp (top, 0.0, double (mirrors.height)));
+  view_ = {x, y, int (std::clamp (right, 0.0, double (mirrors.width))) - x,
+      int (std::clamp (bottom, 0.0, double (mirrors.height))) - y};
+  constexpr double kLeastBlur = 0.05; // pictures of other sizes need one
+  lens_ =
+      std::make_unique<Lens> (Alignment{}, std::max (kLeastBlur, options_.blur),
+          width, height, mapping_, Offset{view_.x, view_.y});
+}
+
+void
+SickBench::draw_defects ()
+{
+  std::uint64_t drawn = 0;
+  /* Not at the border, where the picture of the mirrors may end. */
+  const auto place = [&] {
+    const auto along = [&] (int size) {
+      return int (size * (0.08 + 0.84 * draw (options_, kPlace, drawn++)));
+    };
+    const int x = along (options_.camera.width);
+    return Offset{x, along (options_.camera.height)};
+  };
+  const auto mirror = [&] {
+    const Offset pixel = place ();
+    const Position at = mapping_.mirror_at (pixel.x, pixel.y);
+    return Offset{int (std::lround (at.x)), int (std::lround (at.y))};
+  };
+  for (int i = 0; i < options_.hot_pixels; i++) {
+    const double heat = 0.2 + 0.7 * draw (options_, kHeat, std::uint64_t (i));
+    hot_.push_back ({place (), float (heat)});
+    truth_.hot.push_back (hot_.back ().at);
+  }
+  for (int i = 0; i < options_.dead_pixels; i++)
+    truth_.dead.push_back (place ());
+  for (int i = 0; i < options_.stuck_on; i++)
+    truth_.stuck_on.push_back (mirror ());
+  for (int i = 0; i < options_.stuck_off; i++)
+    truth_.stuck_off.push_back (mirror ());
+  for (int i = 0; i < options_.dust; i++)
+    truth_.dust.push_back (place ());
+}
+
+void
+SickBench::fill_profile ()
+{
+  const SickBenchOptions &o = options_;
+  truth_.options = o;
+  BenchProfile &profile = truth_.profile;
+  profile.measured = std::chrono::sys_seconds{};
+  profile.camera.size = o.camera;
+  profile.dmd = BenchProfile::Device{.size = o.mirrors};
+  profile.bits = o.bits;
+  const auto exact = [] (double value) { return Measured{value, 0.0}; };
+  profile.conversion_gain =
+      exact (o.full_well / (profile.largest () - o.black_level));
+  profile.full_well = exact (o.full_well);
+  profile.read_noise = exact (o.read_noise);
+  profile.black_level = exact (o.black_level);
+  profile.linearity_error = exact (std::abs (o.nonlinear));
+  profile.leak = exact (o.leak);
+  profile.trigger_delay = exact (double (delay ()));
+  profile.exposure = exact (double (longest ()));
+  profile.psf_sigma = exact (o.blur);
+  profile.mapping = mapping_;
+}
+
+Nanoseconds
+SickBench::delay () const
+{
+  return options_.delay + options_.edge + options_.late;
+}
+
+Nanoseconds
+SickBench::longest () const
+{
+  using Trigger = SickBenchOptions::Trigger;
+  const Nanoseconds period = options_.rate.period ();
+  if (options_.trigger == Trigger::free_running)
+    return Nanoseconds (1e9 / options_.free_rate) - options_.readout;
+  if (options_.trigger == Trigger::double_rate)
+    return period / 2 - options_.readout;
+  if (options_.ends_early)
+    return period - *options_.ends_early - delay ();
+  return period - options_.readout;
+}
+
+/** Mirrors of the view through a mask, those that are stuck included. */
+Image<float>
+SickBench::mirrors_of (const MirrorProgram::Mask &mask) const
+{
+  Image<float> mirrors (view_.width, view_.height);
+  for_each_pixel ({view_.width, view_.height}, [&] (int x, int y) {
+    const int mx = x + view_.x, my = y + view_.y;
+    const bool known = mx < mask->width () && my < mask->height ();
+    mirrors.at (x, y) = known && mask->at (mx, my) != 0 ? 1.0f : 0.0f;
+  });
+  for (const auto *stuck : {&truth_.stuck_on, &truth_.stuck_off})
+    for (const Offset at : *stuck)
+      if (view_.holds (at.x, at.y))
+        mirrors.at (at.x - view_.x, at.y - view_.y) =
+            stuck == &truth_.stuck_on ? 1.0f : 0.0f;
+  return mirrors;
+}
+
+void
+SickBench::look (const Image<float> &mirrors, Image<float> &seen)
+{
+  if (seen.width () == 0)
+    seen = Image<float> (options_.camera.width, options_.camera.height);
+  lens_->image (mirrors.view (), seen.view ());
+  if (options_.focus_tilt > 0.0)
+    blur_with_tilt (seen);
+}
+
+/* The blur of each pixel lies between two of some pictures of the whole frame,
+ * each with more blur; in between, variances are mixed. */
+void
+SickBench::blur_with_tilt (Image<float> &seen) const
+{
+  constexpr double kStep = 0.5;
+  const Position c = centre_of (options_.camera);
+  const double turn = options_.focus_direction * std::numbers::pi / 180.0;
+  const double cosine = std::cos (turn), sine = std::sin (turn);
+  const double far = std::abs (c.x * cosine) + std::abs (c.y * sine);
+  const auto sigma_at = [&] (int x, int y) {
+    const double along = ((x - c.x) * cosine + (y - c.y) * sine) / far;
+    return options_.focus_tilt * 0.5 * (1.0 + along);
+  };
+  const Image<float> sharp = seen;
+  Image<float> less = seen;
+  const int steps = int (std::ceil (options_.focus_tilt / kStep));
+  for (int step = 1; step <= steps; step++) {
+    const double low = kStep * (step - 1), high = kStep * step;
+    const Image<float> more =
+        blurred (blurred (sharp, high, false), high, true);
+    for_each_pixel (options_.camera, [&] (int x, int y) {
+      const double sigma = sigma_at (x, y);
+      if (sigma < low || sigma > high)
+        return;
+      const double part =
+          (sigma * sigma - low * low) / (high * high - low * low);
+      seen.at (x, y) =
+          float ((1.0 - part) * less.at (x, y) + part * more.at (x, y));
+    });
+    less = more;
+  }
+}
+
+/** Light that reaches a pixel: vignetting, dust, and its own sensitivity. */
+float
+SickBench::passed_by (int x, int y, const std::vector<float> &dust) const
+{
+  const Position c = centre_of (options_.camera);
+  const double dx = x - c.x, dy = y - c.y;
+  double passed =
+      1.0 - options_.vignetting * (dx * dx + dy * dy) / (c.x * c.x + c.y * c.y);
+  for (std::size_t i = 0; i < dust.size (); i++) {
+    const Offset at = truth_.dust[i];
+    const double distance = std::hypot (x - at.x, y - at.y) / dust[i];
+    passed *= 1.0 - 0.85 / (1.0 + std::pow (distance, 6.0));
+  }
+  const auto pixel = std::uint64_t (y) * std::uint64_t (options_.camera.width) +
+                     std::uint64_t (x);
+  const double own =
+      options_.prnu > 0.0
+          ? 1.0 + options_.prnu * draw_normal (options_, kSensitivity, pixel)
+          : 1.0;
+  return float (options_.level * passed * std::max (0.0, own));
+}
+
+void
+SickBench::measure_field ()
+{
+  const auto &[width, height] = options_.camera;
+  for (Image<float> *image : {&on_, &off_, &leaked_, &field_, &light_, &seen_})
+    *image = Image<float> (width, height);
+  std::vector<float> dust; // radii, pixels
+  for (std::size_t i = 0; i < truth_.dust.size (); i++)
+    dust.push_back (3.0f + 5.0f * float (draw (options_, kDust, i)));
+
+  const Extent size = options_.mirrors;
+  const auto none =
+      std::make_shared<Image<std::uint8_t>> (size.width, size.height);
+  const auto all = std::make_shared<Image<std::uint8_t>> (*none);
+  for_each_pixel (size, [&] (int x, int y) { all->at (x, y) = 1; });
+  Image<float> bare (view_.width, view_.height);
+  for_each_pixel ({view_.width, view_.height},
+      [&] (int x, int y) { bare.at (x, y) = 1.0f; });
+  look (bare, leaked_);
+  look (mirrors_of (all), on_);
+  look (mirrors_of (none), off_);
+  const float leak = float (options_.leak);
+  for_each_pixel (options_.camera, [&] (int x, int y) {
+    const float passed = passed_by (x, y, dust);
+    field_.at (x, y) = passed * (1.0f - leak);
+    leaked_.at (x, y) *= passed * leak;
+    for (Image<float> *image : {&on_, &off_})
+      image->at (x, y) =
+          leaked_.at (x, y) + field_.at (x, y) * image->at (x, y);
+  });
+}
+
+void
+SickBench::show (Nanoseconds time, MirrorProgram program)
+{
+  park (time);
+  Shown shown{.start = time, .program = std::move (program)};
+  for (const MirrorProgram::Mask &mask : shown.program.masks) {
+    const auto rows = mask->view ();
+    std::int64_t on = 0;
+    for (int y = 0; y < rows.height; y++)
+      on +=
+          rows.width - std::count (rows.row (y), rows.row (y) + rows.width, 0);
+    const auto every = std::int64_t (rows.width) * rows.height;
+    using Kind = Shown::Kind;
+    shown.kinds.push_back (on == 0       ? Kind::off
+                           : on == every ? Kind::on
+                                         : Kind::picture);
+  }
+  shown_.push_back (std::move (shown));
+  for (; shown_.size () > kRemembered && at_ > 0; at_--)
+    shown_.pop_front ();
+}
+
+void
+SickBench::park (Nanoseconds time)
+{
+  if (!shown_.empty ())
+    shown_.back ().stop = std::min (shown_.back ().stop, time);
+}
+
+std::optional<Nanoseconds>
+SickBench::next_trigger (Nanoseconds until)
+{
+  using Trigger = SickBenchOptions::Trigger;
+  if (options_.trigger == Trigger::none)
+    return std::nullopt;
+  if (options_.trigger == Trigger::free_running) {
+    const auto time =
+        Nanoseconds (double (triggers_) * 1e9 / options_.free_rate);
+    if (time >= until)
+      return std::nullopt;
+    triggers_++;
+    return time;
+  }
+  for (; at_ < shown_.size (); at_++, triggers_ = 0) {
+    const Shown &shown = shown_[at_];
+    const Nanoseconds period = shown.program.period;
+    const Nanoseconds step = options_.trigger == Trigger::half_rate ? 2 * period
+                             : options_.trigger == Trigger::double_rate
+                                 ? period / 2
+                                 : period;
+    const Nanoseconds time = shown.start + triggers_ * step;
+    if (time >= until && time < shown.stop)
+      return std::nullopt;
+    if (time < shown.stop) {
+      triggers_++;
+      return time;
+    }
+    if (at_ + 1 == shown_.size ())
+      return std::nullopt; // parked; another one may follow
+  }
+  return std::nullopt;
+}
+
+std::optional<Shot>
+SickBench::next (Nanoseconds until)
+{
+  const auto trigger = next_trigger (until);
+  if (!trigger)
+    return std::nullopt;
+  Shot shot{.number = shots_++, .trigger = *trigger};
+  const double jitter =
+      options_.jitter * draw_normal (options_, kJitter, shot.number);
+  const Nanoseconds length =
+      exposure_ ? std::min (*exposure_, longest ()) : longest ();
+  shot.begin =
+      *trigger + std::max<Nanoseconds> (0, delay () + Nanoseconds (jitter));
+  shot.end = shot.begin + length;
+  shot.lost = draw (options_, kLoss, shot.number) < options_.lose;
+  past_.push_back (shot);
+  if (past_.size () > kPast)
+    past_.pop_front ();
+  return shot;
+}
+
+/** The exposure that is in the frame of @p shot. */
+const Shot &
+SickBench::exposed_for (const Shot &shot) const
+{
+  constexpr std::uint64_t kUnchanged = 10; // frames
+  std::size_t late = std::size_t (options_.frame_late);
+  if (options_.late_varies)
+    late += std::size_t (
+        3.0 * draw (options_, kLateness, shot.number / kUnchanged));
+  const std::uint64_t oldest = past_.front ().number;
+  return past_[std::size_t (
+      std::max (shot.number, oldest + late) - late - oldest)];
+}
+
+void
+SickBench::add_light (const Shot &shot, const LightWindow &window,
+    const Shown &shown, Passed &passed) const
+{
+  const MirrorProgram &program = shown.program;
+  if (shot.end <= shown.start || shown.stop <= shot.begin - options_.switching)
+    return;
+  const Nanoseconds cycle = program.period * program.periods;
+  /* Slips may bring in the cycle before. */
+  const std::int64_t first = std::max<std::int64_t> (
+      0, (shot.begin - options_.switching - shown.start) / cycle - 1);
+  for (std::int64_t n = first;; n++) {
+    const Nanoseconds start = shown.start + n * cycle;
+    if (start >= shot.end || start >= shown.stop)
+      return;
+    const Nanoseconds slips =
+        options_.slip_every > 0 ? n * cycle / options_.slip_every : 0;
+    const Nanoseconds origin = start + slips * program.slot % cycle;
+    for (const MirrorProgram::Stretch &stretch : program.stretches) {
+      const Shown::Kind kind = shown.kinds[stretch.mask];
+      if (kind == Shown::Kind::off)
+        continue;
+      const double light =
+          window.through (std::min (origin + stretch.begin, shown.stop),
+              std::min (origin + stretch.end, shown.stop));
+      if (light == 0.0)
+        continue;
+      if (kind == Shown::Kind::on)
+        passed.on += light;
+      else
+        passed.pictures[program.masks[stretch.mask]] += light;
+    }
+  }
+}
+
+/** Sets light_ to that of an exposure. */
+void
+SickBench::collect (const Shot &shot)
+{
+  const LightWindow window (
+      light_over_time_, shot.begin, shot.end, options_.switching);
+  Passed passed;
+  for (const Shown &shown : shown_)
+    add_light (shot, window, shown, passed);
+  const double unit =
+      1e-9 * double (options_.rate.period () - options_.readout);
+  double dark = window.whole () - passed.on;
+  for (const auto &[mask, light] : passed.pictures)
+    dark -= light;
+  const float on = float (passed.on / unit), off = float (dark / unit);
+  for (int y = 0; y < light_.height (); y++) {
+    float *light = light_.view ().row (y);
+    const float *a = on_.view ().row (y), *b = off_.view ().row (y);
+    for (int x = 0; x < light_.width (); x++)
+      light[x] = on * a[x] + off * b[x];
+  }
+  if (!passed.pictures.empty ())
+    add_pictures (passed, unit);
+  const float exposed = float (1e-9 * double (shot.end - shot.begin) / unit);
+  for (const HotPixel &hot : hot_)
+    light_.at (hot.at.x, hot.at.y) += hot.light * exposed;
+  for (const Offset dead : truth_.dead)
+    light_.at (dead.x, dead.y) = 0.0f;
+}
+
+void
+SickBench::add_pictures (const Passed &passed, double unit)
+{
+  double all = 0.0;
+  for (const auto &[mask, light] : passed.pictures)
+    all += light / unit;
+  double scale = 1.0;
+  if (passed.pictures.size () == 1) {
+    const auto &[mask, light] = *passed.pictures.begin ();
+    if (mask != known_)
+      look (mirrors_of (mask), seen_);
+    known_ = mask;
+    scale = light / unit;
+  } else {
+    Image<float> sum (view_.width, view_.height);
+    for (const auto &[mask, light] : passed.pictures) {
+      const Image<float> mirrors = mirrors_of (mask);
+      const float part = float (light / unit);
+      for (int y = 0; y < sum.height (); y++)
+        for (int x = 0; x < sum.width (); x++)
+          sum.at (x, y) += part * mirrors.at (x, y);
+    }
+    look (sum, seen_);
+    known_.reset ();
+  }
+  for (int y = 0; y < light_.height (); y++) {
+    float *light = light_.view ().row (y);
+    const float *leaked = leaked_.view ().row (y);
+    const float *field = field_.view ().row (y);
+    const float *seen = seen_.view ().row (y);
+    for (int x = 0; x < light_.width (); x++)
+      light[x] += float (all) * leaked[x] + float (scale) * field[x] * seen[x];
+  }
+}
+
+void
+SickBench::read_out (const Shot &shot, ImageView<std::uint16_t> picture)
+{
+  const int largest = (1 << options_.bits) - 1;
+  const Sensor sensor{.full_well = options_.full_well,
+      .read_noise = options_.read_noise,
+      .gain = (largest - options_.black_level) / largest,
+      .black_level = options_.black_level,
+      .bits = options_.bits,
+      .seed = options_.seed,
+      .bow = options_.nonlinear};
+  sensor.read_out<std::uint16_t> (light_.view (), 1.0, shot.number, picture);
+  std::vector<std::uint16_t> table;
+  if (options_.gamma != 1.0)
+    for (int value = 0; value <= largest; value++)
+      table.push_back (std::uint16_t (std::lround (
+          largest * std::pow (double (value) / largest, options_.gamma))));
+  const auto kept = std::uint16_t (~0u << options_.missing_bits);
+  if (table.empty () && options_.missing_bits == 0)
+    return;
+  for_each_pixel (options_.camera, [&] (int x, int y) {
+    std::uint16_t &pixel = picture.at (x, y);
+    pixel = kept & (table.empty () ? pixel : table[pixel]);
+  });
+}
+
+void
+SickBench::take (const Shot &shot, ImageView<std::uint16_t> picture)
+{
+  collect (exposed_for (shot));
+  read_out (shot, picture);
+}
+
+} // namespace codedexposure

@@ -1,0 +1,414 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "bench/sick_options.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <random>
+#include <vector>
+
+#include "base/text.h"
+#include "base/try.h"
+
+namespace codedexposure
+{
+
+namespace
+{
+
+using Bench = SickBenchOptions;
+using Values = std::vector<double>;
+
+/** A number of a word's value, and what it may be. */
+struct Range {
+  enum class Kind { real, whole, time };
+  Kind kind = Kind::real;
+  double low = 0.0, high = 1.0;
+};
+constexpr Range kPart{Range::Kind::real, 0.0, 1.0};
+constexpr Range kAny{Range::Kind::real, -1e4, 1e4};
+constexpr Range kTime{Range::Kind::time, 0.0, 1e12};
+constexpr Range kCount{Range::Kind::whole, 0.0, 10'000.0};
+
+/** A word of inflict (). */
+struct Word {
+  const char *name;
+  const char *value; ///< for people: "HZ:DEPTH"; empty: it has none
+  const char *usual; ///< taken where a word has no value
+  const char *help;
+  std::vector<Range> ranges;
+  void (*set) (Bench &bench, const Values &values);
+};
+
+Nanoseconds
+ns (double time)
+{
+  return Nanoseconds (std::llround (time));
+}
+
+/** A level of 8 bits in DN of the bench. */
+double
+scaled_black (const Bench &b, double level)
+{
+  return level * ((1 << b.bits) - 1) / 255.0;
+}
+
+std::vector<Word>
+words_of_parts ()
+{
+  const auto nothing = [] (Bench &, const Values &) {};
+  return {
+      {"dmd-missing", "", "", "no board answers on the USB", {}, nothing},
+      {"dmd-busy", "", "", "another program uses the board", {}, nothing},
+      {"dmd-permission", "", "", "the user may not open the board", {},
+          nothing},
+      {"firmware", "VERSION", "3.0.0", "firmware that is too old", {}, nothing},
+      {"camera-missing", "", "", "no camera answers", {}, nothing},
+      {"test-image", "", "", "the camera sends a test picture", {}, nothing},
+      {"rolling-shutter", "", "", "the sensor exposes line by line", {},
+          nothing},
+      {"colour", "", "", "the sensor has a colour filter", {}, nothing},
+      {"gamma", "GAMMA", "0.45", "pixel values are a power of the light",
+          {{Range::Kind::real, 0.1, 4.0}},
+          [] (Bench &b, const Values &v) { b.gamma = v[0]; }},
+      {"auto-exposure", "", "", "ExposureAuto is on", {}, nothing},
+      {"auto-gain", "", "", "GainAuto is on", {}, nothing},
+      {"black-clamp", "", "", "the camera moves its black level", {}, nothing},
+      {"lut", "", "", "a look-up table changes pixel values", {}, nothing},
+      {"binning", "", "", "pixels are joined, 2 by 2", {}, nothing},
+      {"roi", "", "", "a part of the sensor is read", {}, nothing},
+      {"pixel-format", "", "", "fewer bits are sent than the sensor has", {},
+          nothing},
+      {"packet-size", "", "", "packets of 576 bytes", {}, nothing},
+      {"packet-loss", "PART", "0.02", "packets are lost on the network",
+          {kPart}, [] (Bench &b, const Values &v) { b.packet_loss = v[0]; }},
+      {"slow-disk", "", "", "the disk is slower than the camera", {}, nothing},
+  };
+}
+
+std::vector<Word>
+words_of_trigger ()
+{
+  using T = Bench::Trigger;
+  return {
+      {"no-trigger", "", "", "the trigger does not reach the camera", {},
+          [] (Bench &b, const Values &) { b.trigger = T::none; }},
+      {"free-running", "RATE", "24.7", "the camera ignores the trigger",
+          {{Range::Kind::real, 0.1, 10'000.0}},
+          [] (Bench &b, const Values &v) {
+            b.trigger = T::free_running;
+            b.free_rate = v[0];
+          }},
+      {"half-rate", "", "", "every other trigger is ignored", {},
+          [] (Bench &b, const Values &) { b.trigger = T::half_rate; }},
+      {"double-rate", "", "", "two frames come for each trigger", {},
+          [] (Bench &b, const Values &) { b.trigger = T::double_rate; }},
+      {"trigger-edge", "TIME", "20ms",
+          "the exposure begins with the end of a pulse of that length", {kTime},
+          [] (Bench &b, const Values &v) { b.edge = ns (v[0]); }},
+      {"exposure-late", "TIME", "2ms", "the exposure begins later", {kTime},
+          [] (Bench &b, const Values &v) { b.late = ns (v[0]); }},
+      {"exposure-short", "TIME", "4ms",
+          "the longest exposure ends that long before the period", {kTime},
+          [] (Bench &b, const Values &v) { b.ends_early = ns (v[0]); }},
+      {"exposure-long", "TIME", "2ms",
+          "the longest exposure ends that long after the period", {kTime},
+          [] (Bench &b, const Values &v) { b.ends_early = -ns (v[0]); }},
+      {"frame-late", "FRAMES", "1", "a frame has an earlier exposure",
+          {{Range::Kind::whole, 0.0, 16.0}},
+          [] (Bench &b, const Values &v) { b.frame_late = int (v[0]); }},
+      {"frame-late-varies", "", "", "the same, by 0 to 2 frames", {},
+          [] (Bench &b, const Values &) { b.late_varies = true; }},
+      {"jitter", "TIME", "200us", "jitter of the trigger's delay, rms", {kTime},
+          [] (Bench &b, const Values &v) { b.jitter = v[0]; }},
+      {"delay", "TIME", "50us", "from the trigger to the exposure", {kTime},
+          [] (Bench &b, const Values &v) { b.delay = ns (v[0]); }},
+      {"readout", "TIME", "100us", "time that no exposure covers", {kTime},
+          [] (Bench &b, const Values &v) { b.readout = ns (v[0]); }},
+  };
+}
+
+std::vector<Word>
+words_of_light ()
+{
+  return {
+      {"dark", "LEVEL", "0.03", "too little light; 1: saturation", {kPart},
+          [] (Bench &b, const Values &v) { b.level = v[0]; }},
+      {"bright", "LEVEL", "1.6", "too much light; 1: saturation",
+          {{Range::Kind::real, 0.0, 100.0}},
+          [] (Bench &b, const Values &v) { b.level = v[0]; }},
+      {"level", "LEVEL", "0.8", "light of all mirrors; 1: saturation",
+          {{Range::Kind::real, 0.0, 100.0}},
+          [] (Bench &b, const Values &v) { b.level = v[0]; }},
+      {"vignetting", "PART", "0.6", "light that a corner loses", {kPart},
+          [] (Bench &b, const Values &v) { b.vignetting = v[0]; }},
+      {"flicker", "HZ:DEPTH", "100:0.1", "amplitude / mean of the light",
+          {{Range::Kind::real, 0.01, 100'000.0}, kPart},
+          [] (Bench &b, const Values &v) {
+            b.flicker_rate = v[0];
+            b.flicker_depth = v[1];
+          }},
+      {"drift", "PART", "0.1", "change of the light in a minute",
+          {{Range::Kind::real, -1.0, 1.0}},
+          [] (Bench &b, const Values &v) { b.drift = v[0]; }},
+  };
+}
+
+std::vector<Word>
+words_of_sensor ()
+{
+  return {
+      {"nonlinear", "PART", "0.05", "bow of the response, part of the range",
+          {{Range::Kind::real, -0.2, 0.2}},
+          [] (Bench &b, const Values &v) { b.nonlinear = v[0]; }},
+      {"noise", "ELECTRONS", "100", "read noise, e- rms",
+          {{Range::Kind::real, 0.0, 1e5}},
+          [] (Bench &b, const Values &v) { b.read_noise = v[0]; }},
+      {"black-clipped", "DN", "2", "DN of 8 bits that black lies below 0",
+          {{Range::Kind::real, 0.0, 100.0}},
+          [] (Bench &b, const Values &v) {
+            b.black_level = -scaled_black (b, v[0]);
+          }},
+      {"hot-pixels", "N", "200", "pixels with a dark current", {kCount},
+          [] (Bench &b, const Values &v) { b.hot_pixels = int (v[0]); }},
+      {"dead-pixels", "N", "200", "pixels that see nothing", {kCount},
+          [] (Bench &b, const Values &v) { b.dead_pixels = int (v[0]); }},
+      {"missing-bits", "N", "2", "lowest bits that are always 0",
+          {{Range::Kind::whole, 0.0, 8.0}},
+          [] (Bench &b, const Values &v) { b.missing_bits = int (v[0]); }},
+      {"full-well", "ELECTRONS", "10000", "electrons at saturation",
+          {{Range::Kind::real, 1.0, 1e7}},
+          [] (Bench &b, const Values &v) { b.full_well = v[0]; }},
+      {"black", "DN", "4", "black level, DN of 8 bits",
+          {{Range::Kind::real, 0.0, 100.0}},
+          [] (Bench &b, const Values &v) {
+            b.black_level = scaled_black (b, v[0]);
+          }},
+      {"prnu", "PART", "0.01", "rms difference of sensitivity", {kPart},
+          [] (Bench &b, const Values &v) { b.prnu = v[0]; }},
+  };
+}
+
+std::vector<Word>
+words_of_mirrors ()
+{
+  return {
+      {"leak", "PART", "0.03", "light of mirrors that are off", {kPart},
+          [] (Bench &b, const Values &v) { b.leak = v[0]; }},
+      {"slow-mirrors", "TIME", "500us", "time of a transition", {kTime},
+          [] (Bench &b, const Values &v) { b.switching = ns (v[0]); }},
+      {"stuck-on", "N", "20", "mirrors that stay on", {kCount},
+          [] (Bench &b, const Values &v) { b.stuck_on = int (v[0]); }},
+      {"stuck-off", "N", "20", "mirrors that stay off", {kCount},
+          [] (Bench &b, const Values &v) { b.stuck_off = int (v[0]); }},
+      {"flipped-x", "", "", "the picture is mirrored, left to right", {},
+          [] (Bench &b, const Values &) { b.orientation.flipped_x = true; }},
+      {"flipped-y", "", "", "the picture is mirrored, top to bottom", {},
+          [] (Bench &b, const Values &) { b.orientation.flipped_y = true; }},
+      {"turned", "90|180|270", "90", "the camera is turned, degrees",
+          {{Range::Kind::whole, 90.0, 270.0}},
+          [] (Bench &b, const Values &v) {
+            b.orientation.turned = int (v[0]) / 90 * 90;
+          }},
+  };
+}
+
+std::vector<Word>
+words_of_optics ()
+{
+  return {
+      {"blur", "PIXELS", "3", "standard deviation of the blur",
+          {{Range::Kind::real, 0.0, 16.0}},
+          [] (Bench &b, const Values &v) { b.blur = v[0]; }},
+      {"focus-tilt", "PIXELS:DEGREES", "3:30",
+          "blur that grows across the frame, towards that direction",
+          {{Range::Kind::real, 0.0, 16.0}, kAny},
+          [] (Bench &b, const Values &v) {
+            b.focus_tilt = v[0];
+            b.focus_direction = v[1];
+          }},
+      {"perspective", "X/Y", "0.03/0.02", "tilt of the mirrors",
+          {{Range::Kind::real, -0.3, 0.3}, {Range::Kind::real, -0.3, 0.3}},
+          [] (Bench &b, const Values &v) {
+            b.alignment.tilt_x = v[0];
+            b.alignment.tilt_y = v[1];
+          }},
+      {"distortion", "PART", "0.02", "radial shift of a corner",
+          {{Range::Kind::real, -0.1, 0.1}},
+          [] (Bench &b, const Values &v) { b.alignment.distortion = v[0]; }},
+      {"rotation", "DEGREES", "4", "of the camera",
+          {{Range::Kind::real, -45.0, 45.0}},
+          [] (Bench &b, const Values &v) { b.alignment.rotation = v[0]; }},
+      {"scale", "PIXELS", "1.1", "pixels for each mirror",
+          {{Range::Kind::real, 0.5, 4.0}},
+          [] (Bench &b, const Values &v) { b.alignment.scale = v[0]; }},
+      {"shift", "X/Y", "100/0", "of the camera, mirrors", {kAny, kAny},
+          [] (Bench &b, const Values &v) {
+            b.alignment.shift_x = v[0];
+            b.alignment.shift_y = v[1];
+          }},
+      {"dust", "N", "6", "spots that block light", {kCount},
+          [] (Bench &b, const Values &v) { b.dust = int (v[0]); }},
+  };
+}
+
+std::vector<Word>
+words_of_frames ()
+{
+  return {
+      {"lose", "PART", "0.05", "frames that are lost", {kPart},
+          [] (Bench &b, const Values &v) { b.lose = v[0]; }},
+      {"slip", "TIME", "7s", "the masks come a slot later that often", {kTime},
+          [] (Bench &b, const Values &v) { b.slip_every = ns (v[0]); }},
+      {"frame-jitter", "TIME", "30ms", "max delay of a frame on its way",
+          {kTime},
+          [] (Bench &b, const Values &v) { b.frame_jitter = ns (v[0]); }},
+  };
+}
+
+const std::vector<Word> &
+all_words ()
+{
+  static const std::vector<Word> words = [] {
+    std::vector<Word> all = words_of_parts ();
+    for (const auto &more :
+        {words_of_trigger (), words_of_light (), words_of_sensor (),
+            words_of_mirrors (), words_of_optics (), words_of_frames ()})
+      all.insert (all.end (), more.begin (), more.end ());
+    return all;
+  }();
+  return words;
+}
+
+std::optional<double>
+parse_number (std::string_view text, const Range &range)
+{
+  std::optional<double> number;
+  if (range.kind == Range::Kind::time) {
+    if (const auto time = parse_time (text))
+      number = double (*time);
+  } else {
+    number = parse_real (text);
+  }
+  const bool fits =
+      number && *number >= range.low && *number <= range.high &&
+      (range.kind != Range::Kind::whole || *number == std::floor (*number));
+  return fits ? number : std::nullopt;
+}
+
+/** None if @p text is not as @p word wants its value. */
+std::optional<Values>
+parse_values (const Word &word, std::string_view text)
+{
+  Values values;
+  if (word.ranges.empty ())
+    return values;
+  const char separator =
+      std::string_view (word.value).find ('/') != std::string_view::npos ? '/'
+                                                                         : ':';
+  const auto pieces = split (text, separator);
+  if (pieces.size () != word.ranges.size ())
+    return std::nullopt;
+  for (std::size_t i = 0; i < pieces.size (); i++) {
+    const auto number = parse_number (pieces[i], word.ranges[i]);
+    if (!number)
+      return std::nullopt;
+    values.push_back (*number);
+  }
+  return values;
+}
+
+Result<void>
+apply (Bench &bench, std::string_view piece)
+{
+  const auto equals = piece.find ('=');
+  const std::string_view name = piece.substr (0, equals);
+  const auto found = std::ranges::find (all_words (), name, &Word::name);
+  if (found == all_words ().end ())
+    return Error{"fault " + in_quotes (piece) +
+                 " has no known name; \"--faults help\" lists the names"};
+  const bool given = equals != piece.npos;
+  if (given && found->value[0] == '\0')
+    return Error{
+        "fault " + in_quotes (piece) + " has no value; write " + found->name};
+  const std::string_view text =
+      given ? piece.substr (equals + 1) : std::string_view (found->usual);
+  const auto values = parse_values (*found, text);
+  if (!values)
+    return Error{"fault " + in_quotes (piece) + " is not " + found->name + "=" +
+                 found->value + " within its limits; write for example " +
+                 found->name + "=" + found->usual};
+  found->set (bench, *values);
+  bench.parts[found->name] = std::string (text);
+  return {};
+}
+
+} // namespace
+
+Result<void>
+inflict (SickBenchOptions &bench, std::string_view words)
+{
+  SickBenchOptions changed = bench;
+  for (const std::string_view piece : split (words, ' '))
+    if (!piece.empty ())
+      RETURN_IF_ERROR (apply (changed, piece));
+  bench = std::move (changed);
+  return {};
+}
+
+std::string
+fault_help ()
+{
+  std::string text;
+  for (const Word &word : all_words ()) {
+    std::string left = "  " + std::string (word.name);
+    if (word.value[0] != '\0')
+      left += "[=" + std::string (word.value) + "]";
+    left.resize (std::max<std::size_t> (left.size () + 2, 34), ' ');
+    text += left + word.help;
+    if (word.usual[0] != '\0')
+      text += " [" + std::string (word.usual) + "]";
+    text += '\n';
+  }
+  return text;
+}
+
+SickBenchOptions
+random_healthy_bench (std::uint64_t seed, const SickBenchOptions &like)
+{
+  std::mt19937_64 random (seed * 0x9E3779B97F4A7C15u + 1);
+  const auto any = [&random] (double low, double high) {
+    /* A standard distribution may differ between libraries. */
+    return low + (high - low) * double (random () >> 11) * 0x1p-53;
+  };
+  SickBenchOptions b = like;
+  b.seed = seed;
+  b.delay = ns (any (0, 300e3));
+  b.readout = ns (any (10e3, 500e3));
+  b.jitter = any (0, 10e3);
+  b.level = any (0.7, 0.95);
+  b.vignetting = any (0, 0.2);
+  const double rates[] = {100.0, 120.0, any (1, 500)};
+  b.flicker_rate = rates[std::size_t (any (0, 3))];
+  b.flicker_depth = any (0, 0.005);
+  b.drift = any (-0.01, 0.01);
+  b.full_well = any (5000, 30000);
+  b.read_noise = any (2, 12);
+  b.black_level = scaled_black (b, any (2, 20));
+  b.prnu = 0.01;
+  b.hot_pixels = int (any (0, 11));
+  b.dead_pixels = int (any (0, 11));
+  b.leak = any (0.001, 0.01);
+  b.switching = ns (any (1e3, 5e3));
+  b.alignment = {.shift_x = any (-2, 2),
+      .shift_y = any (-2, 2),
+      .rotation = any (-0.5, 0.5),
+      .scale = any (0.99, 1.01),
+      .tilt_x = any (-0.003, 0.003),
+      .tilt_y = any (-0.003, 0.003),
+      .distortion = any (-0.002, 0.002)};
+  b.blur = any (0.2, 0.7);
+  return b;
+}
+
+} // namespace codedexposure

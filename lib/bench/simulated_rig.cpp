@@ -1,0 +1,350 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "bench/simulated_rig.h"
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "base/text.h"
+#include "base/try.h"
+#include "dmd/pattern_timing.h"
+#include "schedule/mask_renderer.h"
+
+namespace codedexposure
+{
+
+namespace
+{
+
+constexpr Nanoseconds kUpload = 60'000'000;
+constexpr Nanoseconds kTransfer = 8'000'000; // of a frame
+constexpr Nanoseconds kMicrosecond = 1000;
+constexpr int kInFlight = 2;
+/* Of a DLPC900. */
+constexpr PatternLimits kLimits{.minimum_exposure = 105,
+    .maximum_exposure = 0xFFFFFF,
+    .minimum_dark = 105,
+    .trigger_delay = 105,
+    .trigger_dark = 105};
+/* The camera's clock is not that of the machine. */
+constexpr Nanoseconds kEpoch = 5'000'000'000'000;
+constexpr double kClockError = 12e-6;
+constexpr double kPacketBytes = 1444;
+
+std::uint64_t
+mixed (std::uint64_t seed, std::uint64_t number)
+{
+  std::uint64_t z = seed + (number + 1) * 0x9E3779B97F4A7C15u;
+  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
+  z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
+  return z ^ (z >> 31);
+}
+
+double
+fraction (std::uint64_t seed, std::uint64_t number)
+{
+  return double (mixed (seed, number) >> 11) * 0x1p-53;
+}
+
+RigParts
+parts_of (const SickBenchOptions &options)
+{
+  RigParts parts;
+  parts.camera = {"Codedexposure", "Simulated", "SIM1", options.camera};
+  parts.bits = options.bits;
+  parts.pixel_format = options.bits > 8 ? "Mono12" : "Mono8";
+  parts.dmd.name = "sim:bench";
+  parts.dmd.size = options.mirrors;
+  parts.dmd.minimum_active = kLimits.minimum_exposure * kMicrosecond;
+  parts.dmd.minimum_dark = kLimits.minimum_dark * kMicrosecond;
+  parts.dmd.resident_masks = 400;
+  parts.dmd.still_masks = true;
+  parts.dmd.triggers_camera = true;
+  parts.dmd.trigger_in = parts.dmd.trigger_out = true;
+  parts.dmd.serial = "SIMDMD1";
+  const auto firmware = options.parts.find ("firmware");
+  parts.dmd_status.details = {{"controller", "DLPC900"},
+      {"firmware",
+          firmware == options.parts.end () ? "6.0.0" : firmware->second}};
+  parts.dmd_device = {
+      "Texas Instruments", "Simulated", "SIMDMD1", options.mirrors};
+  parts.rate = options.rate;
+  parts.features = camera_features (options);
+  return parts;
+}
+
+MirrorProgram::Mask
+rendered (const StillMask &mask, Extent mirrors)
+{
+  const auto picture =
+      std::make_shared<Image<std::uint8_t>> (mirrors.width, mirrors.height);
+  for (int y = 0; y < mirrors.height; y++)
+    for (int x = 0; x < mirrors.width; x++)
+      picture->at (x, y) = mask.on (x, y);
+  return picture;
+}
+
+} // namespace
+
+std::map<std::string, std::string>
+camera_features (const SickBenchOptions &o)
+{
+  const auto choose = [&o] (const char *fault, const char *ill,
+                          const char *well) {
+    return std::string (o.has (fault) ? ill : well);
+  };
+  const int whole = o.has ("roi") ? 2 : 1;
+  const bool deep = o.bits > 8 || o.has ("pixel-format");
+  return {
+      {"SensorShutterMode", choose ("rolling-shutter", "Rolling", "Global")},
+      {"PixelColorFilter", choose ("colour", "BayerRG", "None")},
+      {"TestPattern", choose ("test-image", "GreyHorizontalRamp", "Off")},
+      {"GammaEnable", choose ("gamma", "true", "false")},
+      {"Gamma", real_text (o.gamma)},
+      {"ExposureAuto", choose ("auto-exposure", "Continuous", "Off")},
+      {"GainAuto", choose ("auto-gain", "Continuous", "Off")},
+      {"BlackLevelAuto", choose ("black-clamp", "Continuous", "Off")},
+      {"LUTEnable", choose ("lut", "true", "false")},
+      {"BinningHorizontal", choose ("binning", "2", "1")},
+      {"BinningVertical", choose ("binning", "2", "1")},
+      {"OffsetX", choose ("roi", "16", "0")}, {"OffsetY", "0"},
+      {"Width", std::to_string (o.camera.width)},
+      {"Height", std::to_string (o.camera.height)},
+      {"WidthMax", std::to_string (whole * o.camera.width)},
+      {"HeightMax", std::to_string (whole * o.camera.height)},
+      {"PixelFormat", o.bits > 8 ? "Mono12" : "Mono8"},
+      {"PixelFormat.available", deep ? "Mono8 Mono12" : "Mono8"},
+      {"GevSCPSPacketSize", choose ("packet-size", "576", "1500")},
+      {"DeviceSerialNumber", "SIM1"}};
+}
+
+Result<std::unique_ptr<SimulatedRig>>
+SimulatedRig::make (const SickBenchOptions &options)
+{
+  const struct {
+    const char *fault, *what;
+    ErrorCode code;
+  } missing[] = {
+      {"camera-missing", "no camera answers", ErrorCode::not_found},
+      {"dmd-missing", "no DMD is connected", ErrorCode::not_found},
+      {"dmd-busy", "another program uses the DMD", ErrorCode::busy},
+      {"dmd-permission", "you may not open the DMD", ErrorCode::denied},
+  };
+  for (const auto &[fault, what, code] : missing)
+    if (options.has (fault))
+      return Error{what, code};
+  ASSIGN_OR_RETURN (SickBench bench, SickBench::make (options));
+  return std::unique_ptr<SimulatedRig> (new SimulatedRig (std::move (bench)));
+}
+
+SimulatedRig::SimulatedRig (SickBench bench)
+    : bench_ (std::move (bench)), options_ (bench_.truth ().options),
+      parts_ (parts_of (options_))
+{
+}
+
+/** The next exposure, with the setting that is then in force. */
+std::optional<Shot>
+SimulatedRig::fetch (Nanoseconds until)
+{
+  if (setting_ && setting_->frames == 0) {
+    bench_.expose (setting_->exposure);
+    setting_.reset ();
+  }
+  const auto shot = bench_.next (until);
+  if (shot && setting_)
+    setting_->frames--;
+  return shot;
+}
+
+Nanoseconds
+SimulatedRig::arrival_of (const Shot &shot) const
+{
+  return shot.end + kTransfer +
+         Nanoseconds (fraction (options_.seed + 1, shot.number) *
+                      double (options_.frame_jitter));
+}
+
+/** The next frame that arrives; none: for too long, none does. */
+std::optional<Shot>
+SimulatedRig::arrive ()
+{
+  constexpr Nanoseconds kPatience = 2'000'000'000;
+  const Nanoseconds limit =
+      now_ + std::max (kPatience, 10 * options_.rate.period ());
+  for (;;) {
+    std::optional<Shot> shot;
+    if (!on_their_way_.empty ()) {
+      shot = on_their_way_.front ();
+      on_their_way_.pop_front ();
+    } else {
+      shot = fetch (limit);
+    }
+    if (!shot) {
+      now_ = limit;
+      return std::nullopt;
+    }
+    if (shot->lost)
+      continue;
+    now_ = std::max (now_, arrival_of (*shot));
+    return shot;
+  }
+}
+
+/** The mirrors stop within an exposure. */
+void
+SimulatedRig::stop ()
+{
+  if (!shows_)
+    return;
+  const Nanoseconds period = options_.rate.period ();
+  while (int (on_their_way_.size ()) < kInFlight) {
+    const auto shot = fetch (now_ + 2 * period);
+    if (!shot)
+      break;
+    on_their_way_.push_back (*shot);
+    now_ = std::max (now_, shot->trigger + period / 2);
+  }
+  bench_.park (now_);
+  shows_ = false;
+}
+
+void
+SimulatedRig::start (MirrorProgram program)
+{
+  stop ();
+  now_ += kUpload + options_.rate.period ();
+  bench_.show (now_, std::move (program));
+  shows_ = true;
+}
+
+Result<void>
+SimulatedRig::show (const StillMask &mask, int slots)
+{
+  ASSIGN_OR_RETURN (
+      const SlotPlan plan, SlotPlan::fit ({}, slots, options_.rate));
+  const auto times = fit_still (plan, mask, kLimits, Master::dmd);
+  if (!times)
+    return times.error ().with_prefix (parts_.dmd.name + ": ");
+  MirrorProgram program{.period = options_.rate.period ()};
+  program.masks = {rendered (mask, options_.mirrors)};
+  const Nanoseconds begin = times->before * kMicrosecond;
+  /* The whole of a period has no dark nanosecond at its end. */
+  const Nanoseconds end = times->lit.dark == 0
+                              ? program.period
+                              : begin + times->lit.exposure * kMicrosecond;
+  program.stretches = {{begin, end, 0}};
+  program.slot = program.period / slots;
+  start (std::move (program));
+  return {};
+}
+
+void
+SimulatedRig::park ()
+{
+  stop ();
+}
+
+Result<void>
+SimulatedRig::expose (std::optional<Nanoseconds> time)
+{
+  constexpr Nanoseconds kShortest = 20 * kMicrosecond;
+  if (time && *time < kShortest)
+    return Error{"the camera exposes for 20us at least, not for " +
+                 time_text (std::max<Nanoseconds> (0, *time))};
+  setting_ = {time, kInFlight};
+  return {};
+}
+
+Nanoseconds
+SimulatedRig::stamp_of (const Shot &shot) const
+{
+  /* A camera stamps in ticks, here of 1 us. */
+  const double since = double (shot.begin) * (1.0 + kClockError);
+  return kEpoch + Nanoseconds (since) / kMicrosecond * kMicrosecond;
+}
+
+/** Blackens rows whose packets are lost; false: none is. */
+bool
+SimulatedRig::spoil (const Shot &shot, ImageView<std::uint16_t> picture) const
+{
+  if (options_.packet_loss <= 0.0)
+    return false;
+  const int row_bytes = picture.width * (options_.bits > 8 ? 2 : 1);
+  const int rows = std::max (1, int (kPacketBytes / row_bytes));
+  bool damaged = false;
+  for (int y = 0; y < picture.height; y += rows) {
+    const std::uint64_t packet = shot.number * 65536 + std::uint64_t (y);
+    if (fraction (options_.seed + 2, packet) >= options_.packet_loss)
+      continue;
+    damaged = true;
+    for (int row = y; row < std::min (y + rows, picture.height); row++)
+      std::fill_n (picture.row (row), picture.width, std::uint16_t (0));
+  }
+  return damaged;
+}
+
+Result<std::vector<SeenFrame>>
+SimulatedRig::watch (int frames)
+{
+  std::vector<SeenFrame> seen;
+  while (int (seen.size ()) < frames) {
+    const auto shot = arrive ();
+    if (!shot)
+      break;
+    SeenFrame frame{.time = stamp_of (*shot),
+        .arrival = now_,
+        .picture = Image<std::uint16_t> (
+            options_.camera.width, options_.camera.height)};
+    bench_.take (*shot, frame.picture.view ());
+    frame.damaged = spoil (*shot, frame.picture.view ());
+    seen.push_back (std::move (frame));
+  }
+  return seen;
+}
+
+Result<void>
+SimulatedRig::record (const Schedule &schedule, double seconds,
+    const std::function<void (const RecordedFrame &)> &take)
+{
+  ASSIGN_OR_RETURN (const SlotPlan plan,
+      SlotPlan::fit (schedule.timing (), schedule.slots (), options_.rate));
+  MirrorProgram program{.period = options_.rate.period ()};
+  program.slot = program.period / schedule.slots ();
+  program.periods = schedule.masks () / schedule.slots ();
+  const MaskRenderer renderer (schedule, options_.mirrors);
+  for (int mask = 0; mask < schedule.masks (); mask++) {
+    program.masks.push_back (std::make_shared<Image<std::uint8_t>> (
+        renderer.render (mask).image ()));
+    const Nanoseconds begin =
+        plan.start (mask % schedule.slots ()) +
+        Nanoseconds (mask / schedule.slots ()) * program.period;
+    program.stretches.push_back (
+        {begin, begin + plan.active (), std::size_t (mask)});
+  }
+  start (std::move (program));
+  on_their_way_.clear ();
+  const Nanoseconds began = now_;
+  Image<std::uint16_t> picture (options_.camera.width, options_.camera.height);
+  std::optional<std::uint64_t> last;
+  while (now_ < began + Nanoseconds (seconds * 1e9)) {
+    const auto shot = arrive ();
+    if (!shot)
+      break;
+    bench_.take (*shot, picture.view ());
+    RecordedFrame frame{.time = shot->begin, .arrival = now_};
+    frame.damaged = spoil (*shot, picture.view ());
+    frame.lost_before = last ? shot->number - *last - 1 : 0;
+    frame.synchronised =
+        options_.slip_every == 0 || shot->trigger - began < options_.slip_every;
+    frame.uncertainty = 100 * kMicrosecond;
+    frame.picture = picture.view ();
+    last = shot->number;
+    take (frame);
+  }
+  park ();
+  on_their_way_.clear ();
+  return {};
+}
+
+} // namespace codedexposure

@@ -80,6 +80,21 @@ smooth (const Image<float> &image)
   return result;
 }
 
+/* Of the pixels around one, beyond what a mirror lights. */
+double
+ring_median (const Image<float> &image, Offset at)
+{
+  constexpr int kNear = 3, kFar = 5;
+  std::vector<float> values;
+  for (int y = std::max (0, at.y - kFar);
+       y <= std::min (image.height () - 1, at.y + kFar); y++)
+    for (int x = std::max (0, at.x - kFar);
+         x <= std::min (image.width () - 1, at.x + kFar); x++)
+      if (std::max (std::abs (x - at.x), std::abs (y - at.y)) >= kNear)
+        values.push_back (image.at (x, y));
+  return double (median (values));
+}
+
 /* Pixels that touch, also at corners. */
 struct Group {
   std::vector<Offset> pixels;
@@ -199,9 +214,8 @@ Search::find_bright ()
     const Offset peak = *std::ranges::max_element (group.pixels, {},
         [&] (const Offset &at) { return off_.at (at.x, at.y); });
     const double more =
-        double (off_.at (peak.x, peak.y) - dark_.at (peak.x, peak.y));
-    const double usual =
-        double (field_.at (peak.x, peak.y) + dark_.at (peak.x, peak.y));
+        double (off_.at (peak.x, peak.y)) - ring_median (off_, peak);
+    const double usual = ring_median (on_, peak);
     const double brighter = double (on_.at (peak.x, peak.y)) - usual;
     if (brighter > 0.5 * std::min (more, largest_ - usual)) {
       for (const Offset &at : group.pixels)

@@ -79,6 +79,7 @@ private:
   void report_share ();
   void diagnose_pose ();
   void diagnose_blur ();
+  void diagnose_no_mapping (const Error &why);
   void diagnose_dust ();
   void diagnose (const char *id, Verdict severity, const std::string &cause,
       const std::string &remedy)
@@ -96,7 +97,6 @@ private:
   std::optional<CoarseView> view_;
   std::optional<Calibration> calibration_;
   std::optional<CalibrationResult> result_;
-  std::string why_no_mapping_;
   std::optional<LensFit> lens_;
   BlurMap blur_;
   std::optional<FocusTilt> focus_;
@@ -382,19 +382,21 @@ OpticsRun::report_share ()
   const auto verdict = verdict_of (1.0 - share, 0.0, kUncovered);
   if (!verdict || !lens_)
     return;
-  const double width = camera_.width / lens_->magnification.value;
-  const double height = camera_.height / lens_->magnification.value;
+  const bool turned =
+      std::lround (std::abs (lens_->rotation.value) / 90.0) % 2 != 0;
+  double width = camera_.width / lens_->magnification.value;
+  double height = camera_.height / lens_->magnification.value;
+  if (turned)
+    std::swap (width, height);
   const bool fits =
       width < 1.02 * mirrors_.width && height < 1.02 * mirrors_.height;
   if (fits)
     diagnose ("shift", *verdict,
         fixed (100 * (1 - share), 0) +
-            " % of the pixels see no mirror: the "
-            "camera looks " +
-            fixed (lens_->shift_x.value, 0) +
-            " mirrors to "
-            "the right of the centre of the array and " +
-            fixed (lens_->shift_y.value, 0) + " below it",
+            " % of the pixels see no mirror: from the centre of the array to "
+            "where the camera looks, it is " +
+            fixed (lens_->shift_x.value, 0) + " mirrors to the right and " +
+            fixed (lens_->shift_y.value, 0) + " down",
         "move the camera until its centre looks at that of the array");
   else
     diagnose ("field", Verdict::warn,
@@ -474,6 +476,34 @@ OpticsRun::diagnose_blur ()
         "whether it is the lens");
 }
 
+/* A picture that is too bright or too blurred is a better reason than that of
+ * the fit. */
+void
+OpticsRun::diagnose_no_mapping (const Error &why)
+{
+  const float largest = float (largest_number (examination_));
+  double full = 0.0;
+  for (int y = 0; y < camera_.height; y++)
+    for (int x = 0; x < camera_.width; x++)
+      full += stack_.white.at (x, y) >= largest;
+  const double pixels = double (camera_.width) * camera_.height;
+  if (full > 0.3 * pixels)
+    return diagnose ("bright", Verdict::fail,
+        fixed (100 * full / pixels, 0) + " % of the pixels have the largest "
+                                         "DN",
+        "reduce the light");
+  if (modulation () < kFaint)
+    return diagnose ("blur", Verdict::fail,
+        "gratings of " + std::to_string (kPeriod) +
+            " mirrors vanish: the picture is out of focus",
+        "focus the lens on the mirrors");
+  diagnose_blur ();
+  if (finding_.diagnoses.empty ())
+    diagnose ("mapping", Verdict::fail,
+        "the patterns give no mapping: " + why.message,
+        "align the camera with pipelines/calibrate");
+}
+
 void
 OpticsRun::diagnose_dust ()
 {
@@ -528,17 +558,10 @@ OpticsRun::run ()
     measure_mapping ();
   RETURN_IF_ERROR (see_chessboard ());
   measure_blur ();
-  if (!result_ && modulation () < kFaint)
-    diagnose ("blur", Verdict::fail,
-        "gratings of " + std::to_string (kPeriod) +
-            " mirrors vanish: the picture is out of focus",
-        "focus the lens on the mirrors");
-  else if (!result_)
-    diagnose ("mapping", Verdict::fail,
-        "the patterns give no mapping: " + solved.error ().message,
-        "align the camera with pipelines/calibrate");
-  else
+  if (result_)
     diagnose_blur ();
+  else
+    diagnose_no_mapping (solved.error ());
   if (lens_)
     diagnose_pose ();
   report_share ();

@@ -68,16 +68,23 @@ fit (const std::vector<Sample> &samples, int degree)
 
 } // namespace
 
+double
+PhotonTransfer::light_of (double number) const
+{
+  /* Newton's method; beyond its top, a parabola goes on as a line. */
+  double light = (number - dark.value) / slope;
+  for (int i = 0; i < 20; i++) {
+    const double steep = std::max (0.2 * slope, slope + 2.0 * bow * light);
+    light -= (number_of (light) - number) / steep;
+  }
+  return light;
+}
+
 Measured
 PhotonTransfer::deviation (
     const std::vector<TransferPoint> &points, double largest) const
 {
-  /* Newton's method for the light of the largest number. */
-  double full = (largest - dark.value) / slope;
-  for (int i = 0; i < 20; i++) {
-    const double steep = std::max (0.2 * slope, slope + 2.0 * bow * full);
-    full -= (number_of (full) - largest) / steep;
-  }
+  const double full = light_of (largest);
   const double line = (number_of (full) - dark.value) / full;
   Measured worst = {
       std::abs (bow) * full * full / 4.0, bow_sigma * full * full / 4.0};

@@ -33,6 +33,14 @@ struct PhotonTransfer {
   {
     return dark.value + (slope + bow * light) * light;
   }
+  /** The inverse of number_of (). */
+  double light_of (double number) const;
+  /** Electrons of a pixel with that number, without those of noise. */
+  Measured electrons_of (double number) const
+  {
+    const double numbers = slope * light_of (number);
+    return {conversion_gain.value * numbers, conversion_gain.sigma * numbers};
+  }
   /** The largest deviation from the straight line that has the same numbers
    * without light and at @p largest, DN, of the points and between them. */
   Measured deviation (

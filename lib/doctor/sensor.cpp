@@ -32,6 +32,12 @@ constexpr std::array kLevels = {
 constexpr double kFull = 0.001;
 /* Errors of levels, relative: light that the model does not know of. */
 constexpr double kLightError = 0.001, kVarianceError = 0.004;
+/* Part of the values that may be 0 there; noise is cut off otherwise. */
+constexpr double kZeros = 0.005;
+/* A gain with this relative error is not known. */
+constexpr double kUnknown = 0.2;
+/* Light below this part of the range is too little to measure noise. */
+constexpr double kDim = 0.15;
 /* A variance below this part of the expected one is that of a full well. */
 constexpr double kFullWell = 0.4;
 
@@ -234,18 +240,20 @@ std::vector<TransferPoint>
 PhotonTransferRun::points (std::optional<double> leak) const
 {
   const double leak_slots = leak.value_or (0.0);
-  std::vector<TransferPoint> all = {point_of (dark_means_, leak_slots, 0.0)};
+  std::vector<TransferPoint> all;
+  const auto add = [&] (const StackMeans &means, double slots, double scatter) {
+    if (means.full < kFull && means.zeros < kZeros)
+      all.push_back (point_of (means, slots, scatter));
+  };
+  add (dark_means_, leak_slots, 0.0);
   for (const Level &level : levels_)
-    if (level.means.full < kFull &&
-        (!plateau_ || level.means.mean < 0.9 * *plateau_))
-      all.push_back (point_of (level.means,
-          level.slots * drift_at (level.stack.time) + leak_slots,
-          level.stack.scatter / std::sqrt (level.stack.frames)));
+    if (!plateau_ || level.means.mean < 0.9 * *plateau_)
+      add (level.means, level.slots * drift_at (level.stack.time) + leak_slots,
+          level.stack.scatter / std::sqrt (level.stack.frames));
   if (leak) {
-    all.push_back (
-        point_of (off_.shorter, pedestal_ + off_.part * leak_slots, 0.02));
+    add (off_.shorter, pedestal_ + off_.part * leak_slots, 0.02);
     if (pedestal_ > 0)
-      all.push_back (point_of (off_.longest, pedestal_ + leak_slots, 0.02));
+      add (off_.longest, pedestal_ + leak_slots, 0.02);
   }
   return all;
 }
@@ -288,11 +296,13 @@ void
 PhotonTransferRun::report ()
 {
   BenchProfile &profile = examination_.profile;
-  const Measured gain = transfer_->conversion_gain;
   const double range = largest_ - black_.value;
-  const double well = plateau_.value_or (largest_) - black_.value;
-  const Measured full_well = {gain.value * well,
-      std::hypot (gain.sigma * well, gain.value * black_.sigma)};
+  const double top = plateau_.value_or (largest_);
+  const Measured electrons = transfer_->electrons_of (top);
+  const double numbers = top - black_.value;
+  const Measured gain = {electrons.value / numbers, electrons.sigma / numbers};
+  const Measured full_well = {
+      electrons.value, std::hypot (electrons.sigma, gain.value * black_.sigma)};
   const Measured bow = transfer_->deviation (
       points (off_.light.value / transfer_->slope), largest_);
   const Measured linearity = {bow.value / range, bow.sigma / range};
@@ -301,6 +311,11 @@ PhotonTransferRun::report ()
   profile.read_noise = transfer_->read_noise;
   profile.black_level = black_;
   profile.linearity_error = linearity;
+  const bool known = gain.sigma < kUnknown * gain.value;
+  if (!known)
+    profile.conversion_gain = profile.full_well = profile.read_noise = {};
+  if (!known || off_.shorter.zeros > kZeros)
+    profile.read_noise = profile.black_level = {};
   finding_.readings = {{"conversion gain", gain, "e-/DN"},
       {"full well", full_well, "e-"},
       {"read noise", transfer_->read_noise, "e-",
@@ -389,7 +404,14 @@ PhotonTransferRun::diagnose ()
           "use a mode of the camera with a slower readout or a higher analog "
           "gain"});
   }
-  if (!transfer_ && known)
+  const bool dim = signal (levels_.back ().means) < kDim * largest_;
+  if (!transfer_ && known && dim)
+    finding_.diagnoses.push_back ({"dark", Verdict::fail,
+        "the brightest level has " +
+            fixed (100 * signal (levels_.back ().means) / largest_, 0) +
+            " % of the range, too little to measure noise",
+        "give more light"});
+  else if (!transfer_ && known)
     finding_.diagnoses.push_back ({"noise", Verdict::fail,
         "noise does not grow with light as that of photons does",
         "switch off noise reduction and other processing in the camera"});

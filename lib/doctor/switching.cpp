@@ -124,8 +124,14 @@ measure_switching (Examination &examination, const Image<float> &dark,
     if (!stack)
       return stack.error ();
     const StackMeans means = means_of (*stack, good);
-    points.push_back ({double (last) * double (period) / slots * 1e-9,
-        means.mean, std::hypot (0.01, stack->scatter / std::sqrt (kFrames))});
+    /* Rounding is an error of the mean where there is little noise. */
+    const double noise = std::max (0.0, means.variance - 1.0 / 12.0) +
+                         means.spread * means.spread;
+    const double rounding = 0.3 * std::exp (-20.0 * noise);
+    points.push_back (
+        {double (last) * double (period) / slots * 1e-9, means.mean,
+            std::hypot (std::hypot (rounding, kLightError * means.mean),
+                stack->scatter / std::sqrt (kFrames))});
   }
   RETURN_IF_ERROR (rig.expose (std::nullopt));
   RETURN_IF_ERROR (rig.watch (examination.lag));

@@ -305,7 +305,9 @@ PhotonTransferRun::report ()
       electrons.value, std::hypot (electrons.sigma, gain.value * black_.sigma)};
   const Measured bow = transfer_->deviation (
       points (off_.light.value / transfer_->slope), largest_);
-  const Measured linearity = {bow.value / range, bow.sigma / range};
+  /* Flicker makes a bow, too. */
+  const Measured linearity = {
+      bow.value / range, std::hypot (kLightError, bow.sigma / range)};
   profile.conversion_gain = gain;
   profile.full_well = full_well;
   profile.read_noise = transfer_->read_noise;

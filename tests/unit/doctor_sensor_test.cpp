@@ -1,0 +1,76 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The check of the sensor, on simulated benches whose numbers are known. */
+#include "checked_bench.h"
+
+namespace
+{
+
+using namespace codedexposure;
+using namespace codedexposure::test;
+
+TEST (SensorCheck, NumbersOfHealthyBenchesAreThoseInjected)
+{
+  int covered = 0, all = 0;
+  for (int seed = 0; seed < bench_count (6); seed++) {
+    const CheckedBench e = check_bench (healthy_bench (seed), check_sensor);
+    SCOPED_TRACE ("bench " + std::to_string (seed));
+    EXPECT_EQ (e.finding.verdict (), Verdict::pass) << e.first_diagnosis ();
+    EXPECT_LT (e.seconds, 25.0);
+    const BenchProfile &truth = e.truth (), &found = e.found ();
+    ASSERT_TRUE (found.full_well && found.read_noise && found.black_level &&
+                 found.linearity_error);
+    expect_near (*found.full_well, truth.full_well->value,
+        0.05 * truth.full_well->value, "full well");
+    expect_near (*found.read_noise, truth.read_noise->value,
+        0.05 * truth.read_noise->value, "read noise");
+    expect_near (*found.black_level, truth.black_level->value, 0.2, "black");
+    EXPECT_LT (found.linearity_error->value, 0.003);
+    EXPECT_EQ (e.finding.reading ("hot pixels")->number.value,
+        double (e.rig->truth ().hot.size ()));
+    EXPECT_EQ (e.finding.reading ("dead pixels")->number.value,
+        double (e.rig->truth ().dead.size ()));
+    for (const auto &[measured, exact] :
+        {std::pair{found.full_well, truth.full_well},
+            std::pair{found.read_noise, truth.read_noise},
+            std::pair{found.black_level, truth.black_level}}) {
+      covered +=
+          std::abs (measured->value - exact->value) <= 2 * measured->sigma;
+      all++;
+    }
+  }
+  EXPECT_GT (covered, 0.85 * all);
+}
+
+TEST (SensorCheck, NamesWhatIsWrong)
+{
+  for (const char *words :
+      {"nonlinear=0.05", "nonlinear=-0.03", "noise=100", "black-clipped=2",
+          "hot-pixels=200", "dead-pixels=200", "missing-bits=2"})
+    expect_named (words, check_sensor);
+}
+
+TEST (SensorCheck, TakesLightOfAnyKind)
+{
+  for (const char *words : {"vignetting=0.6", "bright=1.6", "drift=0.1",
+           "leak=0.03", "stuck-on=20", "dust=6", "shift=100/0"}) {
+    const CheckedBench e = check_bench (sick_bench (3, words), check_sensor);
+    EXPECT_EQ (e.finding.verdict (), Verdict::pass) << words;
+    expect_near (*e.found ().full_well, e.truth ().full_well->value,
+        0.05 * e.truth ().full_well->value, words);
+  }
+}
+
+TEST (SensorCheck, MeasuresTheBowOfTheResponse)
+{
+  for (const char *bow : {"0.01", "0.03", "-0.02"}) {
+    const CheckedBench e = check_bench (
+        sick_bench (5, std::string ("nonlinear=") + bow), check_sensor);
+    ASSERT_TRUE (e.found ().linearity_error);
+    EXPECT_NEAR (
+        e.found ().linearity_error->value, std::abs (std::atof (bow)), 0.003);
+    expect_near (*e.found ().full_well, e.truth ().full_well->value,
+        0.05 * e.truth ().full_well->value, bow);
+  }
+}
+
+} // namespace

@@ -90,7 +90,7 @@ class Reader
 public:
   explicit Reader (const std::string &name)
       : name_ (name), pipeline_ ("filesrc location=" + in_pipeline (name) +
-                                 " ! matroskademux name=file ! appsink "
+                                 " ! matroskademux name=file file.video_0 ! appsink "
                                  "name=frames sync=false max-buffers=32"),
         frames_ (pipeline_.find ("frames"))
   {

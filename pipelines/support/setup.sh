@@ -35,6 +35,9 @@ gstreamer1.0-plugins-bad|parses H.264 in tests|tests
 gstreamer1.0-plugins-ugly|H.264 encoder|run
 gstreamer1.0-libav|FFV1, and decoding most video files|run
 gstreamer1.0-x|windows under X, text in pictures|run
+parallel|decodes archives on the cores of a machine|tests
+slurm-wlm|a Slurm of their own for the tests of archives|tests
+munge|authentication of that Slurm|tests
 gnuplot-nox|draws the figures of a report|report
 libgtest-dev|unit and element tests|tests
 libbenchmark-dev|benchmarks|tests

@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Decodes one chunk."""
+import os
+import resource
+import shutil
+import socket
+import subprocess
+import time
+
+from archive import ledger, programs
+from archive.store import (Problem, digest, fingerprint, read_json, write_json)
+
+OUTPUTS = {'mkv': 'pictures.mkv', 'png': 'pictures/'}
+NAMES = {'mkv': 'pictures.mkv', 'png': 'pictures'}
+DONE, DAMAGED, EMPTY = 0, 3, 4  # of decode
+ENGINE_NAMES = 'SLURM_ARRAY_JOB_ID', 'SLURM_ARRAY_TASK_ID', 'PARALLEL_SEQ'
+
+
+def seconds(time_ns):
+    return f'{time_ns // 10**9}.{time_ns % 10**9:09d}'
+
+
+def identity(plan, recording, chunk):
+    """What a chunk's manifest must say to belong to the plan."""
+    source = plan.recordings[recording]
+    return {
+        'format': 'coded-exposure-archive-chunk', 'version': 1,
+        'recording': source.path, 'recording_hash': source.fingerprint,
+        'excerpt_ns': list(source.excerpt(chunk, plan.length)),
+        'options': plan.options, 'options_sha256': plan.options_digest,
+        'form': plan.form, 'program': plan.program,
+    }
+
+
+def command(plan, recording, chunk, scratch):
+    """A recording that is one chunk because it is damaged is decoded like any
+    other, from front to back if need be."""
+    source = plan.recordings[recording]
+    start, stop = source.excerpt(chunk, plan.length)
+    words = [programs.DECODE, source.path, *plan.options,
+             f'--threads={plan.threads}',
+             f'--output={os.path.join(scratch, OUTPUTS[plan.form])}']
+    if source.whole != 'it is cut off':
+        stop = '' if stop is None else seconds(stop)
+        words += [f'--excerpt={seconds(start)}-{stop}',
+                  f'--ledger={os.path.join(scratch, "ledger")}']
+    return words
+
+
+def cpu_seconds():
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
+
+
+def check_source(source):
+    if fingerprint(source.path) != source.fingerprint:
+        raise Problem(f'{source.path} is not the file that was planned; put it '
+                      'back, or submit it to a new archive')
+
+
+def decode(plan, recording, chunk, scratch):
+    """The manifest of a decoded chunk; raises Problem."""
+    source = plan.recordings[recording]
+    log = os.path.join(scratch, 'log')
+    check_source(source)
+    begun, cpu = time.time(), cpu_seconds()
+    status = programs.run(command(plan, recording, chunk, scratch), log,
+                          stdin=subprocess.DEVNULL)
+    if status not in (DONE, DAMAGED, EMPTY):
+        raise Problem(f'decode ended with status {status}')
+    check_source(source)
+    names = [NAMES[plan.form]] if status != EMPTY else []
+    counts = {}
+    path = os.path.join(scratch, 'ledger')
+    if os.path.exists(path):
+        counts = ledger.check(path, *source.excerpt(chunk, plan.length))
+        names.append('ledger')
+    manifest = identity(plan, recording, chunk)
+    manifest.update(
+        outputs={name: digest(os.path.join(scratch, name)) for name in names},
+        counts=counts, status=status, host=socket.gethostname(),
+        begun=begun, seconds=time.time() - begun, cpu_seconds=cpu_seconds() - cpu,
+        engine={name: os.environ[name] for name in ENGINE_NAMES
+                if name in os.environ})
+    return manifest
+
+
+def run(store, plan, recording, chunk):
+    """Decodes a chunk that is not there yet. False, with a record of it, if that
+    fails."""
+    if os.path.isdir(store.part(recording, chunk)):
+        return True
+    scratch = store.scratch(recording, chunk)
+    try:
+        manifest = decode(plan, recording, chunk, scratch)
+        write_json(os.path.join(scratch, 'manifest.json'), manifest)
+        store.publish(scratch, recording, chunk)
+    except (Problem, OSError) as error:
+        log = os.path.join(scratch, 'log')
+        note_failure(store, recording, chunk, error, programs.last_lines(log))
+        shutil.rmtree(scratch, ignore_errors=True)
+        return False
+    try:
+        os.remove(store.failure(recording, chunk))
+    except FileNotFoundError:
+        pass
+    return True
+
+
+def note_failure(store, recording, chunk, error, lines=()):
+    """For status; a full disk may not take it."""
+    try:
+        write_json(store.failure(recording, chunk), {
+            'error': str(error), 'lines': list(lines),
+            'host': socket.gethostname(), 'time': time.time()})
+    except OSError:
+        pass
+
+
+def mismatch(store, plan, recording, chunk):
+    """Why a chunk is not what its manifest and the plan say, or None. The
+    manifest, if it is."""
+    folder = store.part(recording, chunk)
+    manifest = read_json(os.path.join(folder, 'manifest.json'))
+    if manifest is None:
+        return 'its manifest cannot be read', None
+    for name, value in identity(plan, recording, chunk).items():
+        if manifest.get(name) != value:
+            return f'its {name} is not that of the plan', None
+    for name, said in manifest['outputs'].items():
+        path = os.path.join(folder, name)
+        if not os.path.exists(path) or digest(path) != said:
+            return f'{name} is not what its manifest says', None
+    return None, manifest

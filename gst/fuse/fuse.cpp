@@ -135,8 +135,8 @@ Fuse::properties ()
           kReadWrite, &FuseOptions::lookahead, 0u,
           guint (Fuser<std::uint8_t>::kMaxLookahead)},
       {"threads", "Threads",
-          "Threads of quality balanced and best, which do not change pixels; "
-          "0: one for each processor; fast uses the streaming thread",
+          "Threads, which do not change pixels; 0: one for each processor, and "
+          "for quality fast, the streaming thread only",
           kReadWrite, &FuseOptions::threads, 0u, guint (Workers::kMost)},
       {"full-well", "Full well",
           "Electrons at white in a pixel that is on for the whole exposure, as "

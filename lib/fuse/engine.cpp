@@ -128,6 +128,7 @@ Engine::Engine (const Schedule &schedule, int width, int height,
           steps),
       phases_ (schedule), kernels_ (*find_kernels (options.target)),
       radius_ (tap_radius (schedule.slots ())),
+      steps_ (65535.0f / largest_light (observation_)),
       static_pixels_ (width, height, StaticPixels::radius_of (schedule.cell ()),
           !observation_.noise_free (), largest_light (observation_))
 {
@@ -162,7 +163,7 @@ Engine::map_noise (const Schedule &schedule)
 void
 Engine::find_margin (const Schedule &schedule)
 {
-  const Field field (width_, height_, radius_);
+  const PairField field (width_, height_, radius_);
   const int reach =
       std::max (schedule.tile ().period_x (), schedule.tile ().period_y ());
   const auto closest = [&] (int x, int y, int element) {
@@ -214,16 +215,17 @@ Engine::prepare (const Schedule &schedule, const FuseOptions &options)
   std::vector<SceneClass> predicted{kStatic, kMoving};
   if (models.size () > 1) {
     predicted.insert (predicted.end (), models.begin (), models.end ());
-    slow_weight_ = Field (width_, height_);
+    preference_ = Field (width_, height_);
   }
   predictions_.emplace (phases_, observation_, predicted, radius_ - 2,
       StaticPixels::radius_of (schedule.cell ()), Extent{width_, height_},
-      noise);
+      noise, steps_);
   for (const SceneClass &model : models)
     prepare_linear (model, noise);
   if (!models.empty ())
     return;
-  motion_.emplace (phases_, observation_, motion_classes (), radius_, noise);
+  motion_.emplace (
+      phases_, observation_, motion_classes (), radius_, noise, steps_);
   if (options.quality == FuseQuality::kBest)
     collaborative_.emplace (schedule, observation_, width_, height_);
   light_.assign (std::size_t (slots ()), Field (width_, height_));
@@ -233,7 +235,7 @@ void
 Engine::prepare_linear (const SceneClass &model, std::span<const double> noise)
 {
   const std::vector<Offset> taps = disc (radius_ + 0.5);
-  FilterBank &filters = linear_.emplace_back (phases_, taps, slots ());
+  FilterBank &filters = linear_.emplace_back (phases_, taps, slots (), steps_);
   for_each_phase (phases_, observation_, model, taps, noise,
       [&] (int row, int x, const PhaseWeights &weights) {
         filters.set_all (row, x, weights.slots);
@@ -243,9 +245,9 @@ Engine::prepare_linear (const SceneClass &model, std::span<const double> noise)
 Field &
 Engine::next ()
 {
-  if (spare_.empty ())
-    spare_ = Field (width_, height_, radius_);
-  return spare_;
+  if (spare_.light.empty ())
+    spare_ = {Field (width_, height_), PairField (width_, height_, radius_)};
+  return spare_.light;
 }
 
 const float *
@@ -257,41 +259,61 @@ Engine::gain (int y) const
 void
 Engine::take ()
 {
-  float *origin = spare_.row (0);
+  pair_pixels (spare_);
+  queue_.push_back (std::exchange (spare_, Coded ()));
+}
+
+void
+Engine::pair_pixels (Coded &coded) const
+{
+  for (int y = 0; y < height_; y++)
+    kernels_.to_steps (
+        coded.light.row (y), steps_, width_, coded.pairs.row (y));
+  std::int32_t *origin = coded.pairs.row (0);
   for (const Repeat &repeat : margin_)
     origin[repeat.to] = origin[repeat.from];
-  queue_.push_back (std::exchange (spare_, Field ()));
+  for (int y = -radius_; y < height_ + radius_; y++)
+    kernels_.pair (coded.pairs.row (y) - radius_, width_ + 2 * radius_);
 }
 
-/* And of fast, which model fits around each pixel. */
-void
-Engine::find_static_pixels (const Field &coded)
+/* Rows that a thread takes at a time: all if there is one, as neighbouring
+ * parts compute some rows twice. */
+int
+Engine::part_rows (const Workers &workers) const
 {
-  predictions_->run (kernels_, coded, [&] (int y, const float *const *errors) {
-    static_pixels_.set_errors (y, errors[0], errors[1]);
-    if (linear_.size () > 1)
-      set_slow_weight (y, errors[2], errors[3]);
-  });
-  static_pixels_.update (
-      kernels_, coded, queue_.size () > 1 ? &queue_[1] : nullptr, noise_);
+  constexpr int kPartsPerThread = 2, kMinRows = 16;
+  const int parts =
+      workers.count () == 1 ? 1 : kPartsPerThread * workers.count ();
+  return std::max ((height_ + parts - 1) / parts, kMinRows);
 }
 
-/* Weights are the inverse of the models' errors to the power of 8, which stands
- * for the number of independent errors in a square. */
 void
-Engine::set_slow_weight (int y, const float *slow, const float *moving)
+Engine::each_part (
+    Workers &workers, const std::function<void (StaticPixels::Rows)> &use) const
+{
+  const int rows = part_rows (workers);
+  workers.run ((height_ + rows - 1) / rows, [&] (int part, int worker) {
+    const int first = part * rows;
+    use ({first, std::min (first + rows, height_), worker});
+  });
+}
+
+/* Models are compared by the sums of their squared errors. Their power of 8
+ * stands for the number of independent errors in a square. */
+void
+Engine::find_static_pixels (const StaticPixels::Frames &frames,
+    const PairField &coded, StaticPixels::Rows rows)
 {
   const float side = float (2 * static_pixels_.radius () + 1);
-  const float floor = kErrorFloor * side * side;
-  float *weight = slow_weight_.row (y);
-  for (int x = 0; x < width_; x++) {
-    const float ratio =
-        std::min ((slow[x] + floor) / (moving[x] + floor), 1e3f);
-    const float fourth = ratio * ratio * ratio * ratio;
-    const float share = 1.0f / (1.0f + fourth * fourth);
-    weight[x] = std::clamp (
-        (share - kMinWeight) / (1.0f - 2.0f * kMinWeight), 0.0f, 1.0f);
-  }
+  predictions_->run (kernels_, coded, rows.first, rows.end, rows.worker,
+      [&] (int y, const float *const *errors) {
+        static_pixels_.set_errors (kernels_, y, errors[0], errors[1]);
+        if (linear_.size () > 1)
+          kernels_.prefer ({errors[2], errors[3], kErrorFloor * side * side,
+                               kMinWeight, width_},
+              preference_.row (y));
+      });
+  static_pixels_.compare (kernels_, frames, rows);
 }
 
 /* Static pixels are the same in every slot. */
@@ -305,56 +327,41 @@ Engine::blend (int y, float *const *rows) const
       rows[s][x] += weight[x] * (light[x] - rows[s][x]);
 }
 
-/* Weight of each model in row @y; the rest is static. */
 void
-Engine::model_weights (int y, Field &weights) const
-{
-  const float *if_static = static_pixels_.weight (y);
-  float *first = weights.row (0);
-  for (int x = 0; x < width_; x++)
-    first[x] = 1.0f - if_static[x];
-  if (linear_.size () == 1)
-    return;
-  const float *slow = slow_weight_.row (y);
-  float *second = weights.row (1);
-  for (int x = 0; x < width_; x++) {
-    second[x] = first[x] * (1.0f - slow[x]);
-    first[x] *= slow[x];
-  }
-}
-
-void
-Engine::fuse_linear (const Field &coded, const RowSink &sink)
+Engine::fuse_linear (
+    const PairField &coded, const RowSink &sink, StaticPixels::Rows part) const
 {
   const auto offsets = linear_[0].offsets (coded);
   Field rows_of_slots (width_, slots ());
-  Field weights (width_, int (linear_.size ()));
-  std::vector<float *> rows;
+  Field shares (width_, int (linear_.size ()));
+  std::vector<float *> rows, shares_of_models;
   for (int s = 0; s < slots (); s++)
     rows.push_back (rows_of_slots.row (s));
-  for (int y = 0; y < height_; y++) {
-    const float *weight = static_pixels_.weight (y),
-                *light = static_pixels_.light (y);
-    for (int x = 0; x < width_; x++)
-      rows[0][x] = weight[x] * light[x];
+  for (std::size_t model = 0; model < linear_.size (); model++)
+    shares_of_models.push_back (shares.row (int (model)));
+  for (int y = part.first; y < part.end; y++) {
+    kernels_.share (
+        {static_pixels_.weight (y), static_pixels_.light (y),
+            linear_.size () > 1 ? preference_.row (y) : nullptr, width_},
+        rows[0], shares_of_models.data ());
     for (std::size_t s = 1; s < rows.size (); s++)
       std::copy_n (rows[0], width_, rows[s]);
-    model_weights (y, weights);
     for (std::size_t model = 0; model < linear_.size (); model++)
-      kernels_.filter_add (linear_[model].row (phases_, coded, y, offsets),
-          weights.row (int (model)), rows.data ());
+      kernels_.filter_pairs_add (
+          linear_[model].row (phases_, coded, y, offsets),
+          shares_of_models[model], rows.data ());
     sink (y, rows.data ());
   }
 }
 
 bool
-Engine::fuse_motion (const Field &coded, const RowSink &sink, Workers &workers,
+Engine::fuse_motion (const Coded &coded, const RowSink &sink, Workers &workers,
     std::stop_token stop)
 {
-  if (!motion_->run (kernels_, coded, light_, workers, stop))
+  if (!motion_->run (kernels_, coded.pairs, light_, workers, stop))
     return false;
-  if (collaborative_ && !collaborative_->run (kernels_, coded, typical_noise (),
-                            light_, workers, stop))
+  if (collaborative_ && !collaborative_->run (kernels_, coded.light,
+                            typical_noise (), light_, workers, stop))
     return false;
   std::vector<float *> rows (light_.size ());
   for (int y = 0; y < height_; y++) {
@@ -369,13 +376,22 @@ Engine::fuse_motion (const Field &coded, const RowSink &sink, Workers &workers,
 bool
 Engine::fuse (const RowSink &sink, Workers &workers, std::stop_token stop)
 {
-  const Field &coded = queue_.front ();
-  find_static_pixels (coded);
-  bool done = true;
-  if (!linear_.empty ())
-    fuse_linear (coded, sink);
-  else
-    done = fuse_motion (coded, sink, workers, std::move (stop));
+  const Coded &coded = queue_.front ();
+  const StaticPixels::Frames frames{
+      coded.light, queue_.size () > 1 ? &queue_[1].light : nullptr, noise_};
+  predictions_->make_room (workers.count ());
+  static_pixels_.make_room (workers.count ());
+  each_part (workers, [&] (StaticPixels::Rows rows) {
+    find_static_pixels (frames, coded.pairs, rows);
+  });
+  each_part (workers, [&] (StaticPixels::Rows rows) {
+    static_pixels_.average (kernels_, frames, rows);
+    if (!linear_.empty ())
+      fuse_linear (coded.pairs, sink, rows);
+  });
+  static_pixels_.finish (frames);
+  const bool done =
+      !linear_.empty () || fuse_motion (coded, sink, workers, std::move (stop));
   spare_ = std::move (queue_.front ());
   queue_.pop_front ();
   return done;

@@ -22,7 +22,8 @@
 namespace codedexposure::fuse
 {
 
-/** Row @p y of every slot, of the frame's width, 255 for white. */
+/** Row @p y of every slot, of the frame's width, 255 for white. Threads may
+ * call it for different rows at the same time. */
 using RowSink = std::function<void (int y, const float *const *slots)>;
 
 /** Light in the coded frame to light in every slot; see Fuser. */
@@ -35,6 +36,7 @@ public:
   int slots () const { return observation_.slots (); }
   int width () const { return width_; }
   int height () const { return height_; }
+  const Kernels &kernels () const { return kernels_; }
 
   /** A field to write the next coded frame to, times gain () row by row. */
   Field &next ();
@@ -56,12 +58,22 @@ private:
   void find_margin (const Schedule &schedule);
   void prepare (const Schedule &schedule, const FuseOptions &options);
   void prepare_linear (const SceneClass &model, std::span<const double> noise);
-  void find_static_pixels (const Field &coded);
-  void set_slow_weight (int y, const float *slow, const float *moving);
-  void model_weights (int y, Field &weights) const;
+  /** A coded frame; the pairs have a margin. */
+  struct Coded {
+    Field light;
+    PairField pairs;
+  };
+  void pair_pixels (Coded &coded) const;
+  int part_rows (const Workers &workers) const;
+  void each_part (Workers &workers,
+      const std::function<void (StaticPixels::Rows)> &use) const;
+  /** What rows need to know before static pixels are averaged. */
+  void find_static_pixels (const StaticPixels::Frames &frames,
+      const PairField &coded, StaticPixels::Rows rows);
+  void fuse_linear (const PairField &coded, const RowSink &sink,
+      StaticPixels::Rows part) const;
   void blend (int y, float *const *rows) const;
-  void fuse_linear (const Field &coded, const RowSink &sink);
-  bool fuse_motion (const Field &coded, const RowSink &sink, Workers &workers,
+  bool fuse_motion (const Coded &coded, const RowSink &sink, Workers &workers,
       std::stop_token stop);
   /** Standard deviation of coded pixels in grey levels. */
   double typical_noise () const;
@@ -71,9 +83,10 @@ private:
   Phases phases_;
   const Kernels &kernels_;
   int radius_;
+  float steps_; ///< of 16 bits, per grey level
   std::optional<Predictions> predictions_;
   std::vector<FilterBank> linear_; ///< fast: of its one or two models
-  Field slow_weight_; ///< of the first of two models; the second has the rest
+  Field preference_;               ///< for the first of two models
   std::optional<MotionFilter> motion_;
   std::optional<CollaborativeFilter> collaborative_;
   std::vector<Field> light_; ///< of each slot, unless fast
@@ -87,8 +100,8 @@ private:
   };
   std::vector<Repeat> margin_;
 
-  std::deque<Field> queue_;
-  Field spare_;
+  std::deque<Coded> queue_;
+  Coded spare_;
 };
 
 } // namespace codedexposure::fuse

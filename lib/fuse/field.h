@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* A plane of light with a margin, so that filters need no special case at the
+/* A plane of values with a margin, so that filters need no special case at the
  * border. */
 #pragma once
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 namespace codedexposure
@@ -21,17 +22,18 @@ mirrored (int at, int size)
 }
 
 /**
- * width x height floats, 255 for white, with @p margin more on every side and
- * kSlack after every row, which vectors may read and write.
+ * width x height values (of light: 255 for white), with @p margin more on every
+ * side and kSlack after every row, which vectors may read and write.
  */
-class Field
+template <typename T>
+class FieldOf
 {
 public:
-  /** Floats of the widest vector. */
+  /** Values of the widest vector. */
   static constexpr int kSlack = 16;
 
-  Field () = default;
-  Field (int width, int height, int margin = 0)
+  FieldOf () = default;
+  FieldOf (int width, int height, int margin = 0)
       : width_ (width), height_ (height), margin_ (margin),
         stride_ (width + 2 * margin + kSlack),
         values_ (std::size_t (stride_) * std::size_t (height + 2 * margin))
@@ -40,10 +42,11 @@ public:
 
   int width () const { return width_; }
   int height () const { return height_; }
-  std::ptrdiff_t stride () const { return stride_; } ///< in floats
+  int margin () const { return margin_; }
+  std::ptrdiff_t stride () const { return stride_; } ///< in values
   /** Row @p y in -margin .. height + margin - 1, from x = 0. */
-  float *row (int y) { return values_.data () + start (y); }
-  const float *row (int y) const { return values_.data () + start (y); }
+  T *row (int y) { return values_.data () + start (y); }
+  const T *row (int y) const { return values_.data () + start (y); }
   bool empty () const { return values_.empty (); }
 
 private:
@@ -54,7 +57,11 @@ private:
 
   int width_ = 0, height_ = 0, margin_ = 0;
   std::ptrdiff_t stride_ = 0;
-  std::vector<float> values_;
+  std::vector<T> values_;
 };
+
+using Field = FieldOf<float>;
+/** Pairs of neighbouring pixels; see fuse::PairRow. */
+using PairField = FieldOf<std::int32_t>;
 
 } // namespace codedexposure

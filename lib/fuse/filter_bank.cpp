@@ -1,29 +1,113 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "fuse/filter_bank.h"
 
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
 namespace codedexposure::fuse
 {
 
-FilterBank::FilterBank (
-    const Phases &phases, std::vector<Offset> taps, int outputs)
-    : taps_ (std::move (taps)), outputs_ (outputs), period_ (phases.period ()),
-      width_ (period_ + Field::kSlack - 1),
-      weights_ (std::size_t (phases.rows ()) * taps_.size () *
-                std::size_t (outputs) * std::size_t (width_))
+namespace
 {
+
+/* Weights times @p unit, a power of two. */
+struct WholeWeights {
+  std::vector<int> values;
+  float unit;
+};
+
+/* The largest unit with which no weight and no sum of products overflows. */
+float
+unit_of (std::span<const float> weights)
+{
+  double sum = 0.0, largest = 0.0;
+  for (const float weight : weights) {
+    sum += std::abs (weight);
+    largest = std::max (largest, std::abs (double (weight)));
+  }
+  const double most = 65535.0 - double (weights.size ());
+  float unit = 1.0f;
+  while (unit < 16384.0f && 2.0 * unit * largest < FilterBank::kLargest &&
+         2.0 * unit * sum < most)
+    unit *= 2.0f;
+  return unit;
+}
+
+/* Rounded so that the sum stays: up where most is left, down elsewhere. */
+WholeWeights
+round_weights (std::span<const float> weights)
+{
+  WholeWeights whole{{}, unit_of (weights)};
+  std::vector<float> rest;
+  double sum = 0.0;
+  for (const float weight : weights) {
+    const float scaled = weight * whole.unit;
+    whole.values.push_back (int (std::floor (scaled)));
+    rest.push_back (scaled - std::floor (scaled));
+    sum += weight;
+  }
+  const double total = std::round (sum) * double (whole.unit);
+  const auto missing = std::clamp<std::ptrdiff_t> (
+      std::ptrdiff_t (total) -
+          std::accumulate (whole.values.begin (), whole.values.end (), 0),
+      0, std::ptrdiff_t (weights.size ()));
+  std::vector<std::size_t> order (weights.size ());
+  std::iota (order.begin (), order.end (), std::size_t (0));
+  std::ranges::stable_sort (
+      order, [&] (std::size_t a, std::size_t b) { return rest[a] > rest[b]; });
+  for (std::ptrdiff_t i = 0; i < missing; i++)
+    whole.values[order[std::size_t (i)]]++;
+  return whole;
+}
+
+} // namespace
+
+FilterBank::FilterBank (
+    const Phases &phases, std::vector<Offset> taps, int outputs, float steps)
+    : outputs_ (outputs), period_ (phases.period ()),
+      width_ (period_ + Field::kSlack - 1), steps_ (steps)
+{
+  for (const Offset &tap : taps) {
+    const Offset left{tap.x - 1, tap.y};
+    if (!pairs_.empty () && pairs_.back () == left && !places_.back ().upper) {
+      places_.push_back ({pairs_.size () - 1, true});
+    } else {
+      places_.push_back ({pairs_.size (), false});
+      pairs_.push_back (tap);
+    }
+  }
+  const std::size_t line = std::size_t (outputs) * std::size_t (width_);
+  weights_.resize (std::size_t (phases.rows ()) * pairs_.size () * line);
+  scales_.resize (std::size_t (phases.rows ()) * line);
 }
 
 void
 FilterBank::set (int row, int x, int output, std::span<const float> weights)
 {
-  for (std::size_t t = 0; t < taps_.size (); t++) {
-    const std::size_t line =
-        (std::size_t (row) * taps_.size () + t) * std::size_t (outputs_) +
-        std::size_t (output);
-    float *to = weights_.data () + line * std::size_t (width_);
-    for (int i = x; i < width_; i += period_)
-      to[i] = weights[t];
+  const WholeWeights whole = round_weights (weights);
+  std::vector<std::int32_t> pairs (pairs_.size ());
+  for (std::size_t t = 0; t < places_.size (); t++) {
+    const auto [pair, upper] = places_[t];
+    const auto half = std::uint16_t (whole.values[t]);
+    pairs[pair] |= std::int32_t (std::uint32_t (half) << (upper ? 16 : 0));
   }
+  const auto line_at = [&] (std::size_t line) {
+    return (line * std::size_t (outputs_) + std::size_t (output)) *
+           std::size_t (width_);
+  };
+  const auto repeat = [&] (auto *to, auto value) {
+    for (int i = x; i < width_; i += period_)
+      to[i] = value;
+  };
+  for (std::size_t p = 0; p < pairs.size (); p++)
+    repeat (weights_.data () + line_at (std::size_t (row) * pairs.size () + p),
+        pairs[p]);
+  repeat (scales_.data () + line_at (std::size_t (row)),
+      1.0f / (whole.unit * steps_));
+  const int sum =
+      std::accumulate (whole.values.begin (), whole.values.end (), 0);
+  base_ = float (-kSmallest) * float (sum) / (whole.unit * steps_);
 }
 
 void
@@ -31,25 +115,27 @@ FilterBank::set_all (int row, int x, std::span<const float> weights)
 {
   for (int k = 0; k < outputs_; k++)
     set (row, x, k,
-        weights.subspan (std::size_t (k) * taps_.size (), taps_.size ()));
+        weights.subspan (std::size_t (k) * places_.size (), places_.size ()));
 }
 
-FilterRow
-FilterBank::row (const Phases &phases, const Field &source, int y,
+PairRow
+FilterBank::row (const Phases &phases, const PairField &source, int y,
     std::span<const std::ptrdiff_t> offsets) const
 {
-  const std::size_t start = std::size_t (phases.row_of (y)) * taps_.size () *
-                            std::size_t (outputs_) * std::size_t (width_);
-  return {source.row (y), source.width (), offsets.data (), int (taps_.size ()),
-      weights_.data () + start, width_, outputs_, period_, phases.shift (y)};
+  const std::size_t row = std::size_t (phases.row_of (y)) *
+                          std::size_t (outputs_) * std::size_t (width_);
+  return {source.row (y), source.width (), offsets.data (),
+      int (pairs_.size ()), weights_.data () + row * pairs_.size (),
+      scales_.data () + row, base_, width_, outputs_, period_,
+      phases.shift (y)};
 }
 
 std::vector<std::ptrdiff_t>
-FilterBank::offsets (const Field &field) const
+FilterBank::offsets (const PairField &field) const
 {
   std::vector<std::ptrdiff_t> offsets;
-  for (const Offset &tap : taps_)
-    offsets.push_back (tap.y * field.stride () + tap.x);
+  for (const Offset &pair : pairs_)
+    offsets.push_back (pair.y * field.stride () + pair.x);
   return offsets;
 }
 

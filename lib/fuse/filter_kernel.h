@@ -11,6 +11,8 @@ namespace codedexposure::CODEDEXPOSURE_TARGET
 using Floats = Vector<float>;
 constexpr int kFloats = kLanes<float>;
 
+using Ints = Vector<std::int32_t>;
+
 /* What is done with a vector of an output. */
 struct Put {
   CODEDEXPOSURE_INLINE void operator() (float *to, int, Floats value) const
@@ -18,49 +20,97 @@ struct Put {
     store (to, value);
   }
 };
+struct PutSquare {
+  CODEDEXPOSURE_INLINE void operator() (float *to, int, Floats value) const
+  {
+    store (to, value * value);
+  }
+};
 struct Add {
-  const float *scale;
+  const float *share;
   CODEDEXPOSURE_INLINE void operator() (float *to, int x, Floats value) const
   {
-    store (to, load (to) + load (scale + x) * value);
+    store (to, load (to) + load (share + x) * value);
   }
 };
 
+CODEDEXPOSURE_INLINE Floats
+add_product (Floats sum, Floats a, Floats b)
+{
+  return sum + a * b;
+}
+
+/* Both products of pairs of 16 bits. */
+CODEDEXPOSURE_INLINE Ints
+add_product (Ints sum, Ints a, Ints b)
+{
+#if defined __AVX512VNNI__
+  return Ints (_mm512_dpwssd_epi32 (__m512i (sum), __m512i (a), __m512i (b)));
+#elif defined __AVX512BW__
+  return sum + Ints (_mm512_madd_epi16 (__m512i (a), __m512i (b)));
+#elif defined __AVX2__
+  return sum + Ints (_mm256_madd_epi16 (__m256i (a), __m256i (b)));
+#elif defined __SSE2__
+  return sum + Ints (_mm_madd_epi16 (__m128i (a), __m128i (b)));
+#else
+  const auto low = [] (Ints v) { return Ints (v << 16) >> 16; };
+  return sum + low (a) * low (b) + (a >> 16) * (b >> 16);
+#endif
+}
+
+/* Output @k of a vector at @at of the period, from its sum. */
+CODEDEXPOSURE_INLINE Floats
+result (const fuse::FilterRow &, int, int, Floats sum)
+{
+  return sum;
+}
+CODEDEXPOSURE_INLINE Floats
+result (const fuse::PairRow &row, int k, int at, Ints sum)
+{
+  return load (row.scale + k * row.width + at) *
+             __builtin_convertvector(sum, Floats) +
+         row.base;
+}
+
 /* Outputs first .. first + Outputs - 1 of Vectors neighbouring vectors; Alike:
  * with the same weights. */
-template <int Outputs, int Vectors, bool Alike, typename Finish>
+template <int Outputs, int Vectors, bool Alike, typename Row, typename Finish>
 CODEDEXPOSURE_INLINE void
-filter_vectors (const fuse::FilterRow &row, int first, int x, Finish finish,
-    float *const *outputs)
+filter_vectors (
+    const Row &row, int first, int x, Finish finish, float *const *outputs)
 {
-  Floats sum[Vectors][Outputs] = {};
-  const float *weights[Vectors];
-  for (int v = 0; v < Vectors; v++)
-    weights[v] = row.weights + first * row.width +
-                 (row.phase + x + (Alike ? 0 : v * kFloats)) % row.period;
+  using Values = decltype (load (row.source));
+  Values sum[Vectors][Outputs] = {};
+  decltype (row.source) weights[Vectors];
+  int at[Vectors];
+  for (int v = 0; v < Vectors; v++) {
+    at[v] = (row.phase + x + (Alike ? 0 : v * kFloats)) % row.period;
+    weights[v] = row.weights + first * row.width + at[v];
+  }
   for (int t = 0; t < row.taps; t++) {
-    const float *from = row.source + x + row.offsets[t];
-    Floats weight[Outputs];
+    const auto *from = row.source + x + row.offsets[t];
+    Values weight[Outputs];
     for (int v = 0; v < Vectors; v++) {
-      const Floats value = load (from + v * kFloats);
+      const Values value = load (from + v * kFloats);
       for (int k = 0; k < Outputs; k++) {
         if (!Alike || v == 0)
           weight[k] = load (weights[v] + k * row.width);
-        sum[v][k] += weight[k] * value;
+        sum[v][k] = add_product (sum[v][k], weight[k], value);
       }
       weights[v] += row.outputs * row.width;
     }
   }
   for (int v = 0; v < Vectors; v++)
     for (int k = 0; k < Outputs; k++)
-      finish (outputs[first + k] + x + v * kFloats, x + v * kFloats, sum[v][k]);
+      finish (outputs[first + k] + x + v * kFloats, x + v * kFloats,
+          result (row, first + k, at[v], sum[v][k]));
 }
 
-template <int Outputs, int Vectors, bool Alike, typename Finish,
+template <int Outputs, int Vectors, bool Alike, typename Row, typename Finish,
     typename Wanted>
 CODEDEXPOSURE_INLINE void
-filter_along (const fuse::FilterRow &row, int first, Finish finish,
-    Wanted wanted, float *const *outputs)
+filter_along (const Row &row, int first, Finish finish, Wanted wanted,
+    float *const *outputs)
 {
   int x = 0;
   for (; x + Vectors * kFloats <= row.count; x += Vectors * kFloats)
@@ -74,20 +124,20 @@ filter_along (const fuse::FilterRow &row, int first, Finish finish,
 /* Where whole periods fill a vector, neighbouring vectors share their weights:
  * as many as the registers hold sums of, as weights are read from further away
  * than pixels. Elsewhere a pair hides the latency of the sums. */
-template <int Outputs, bool Alike, typename Finish, typename Wanted>
+template <int Outputs, bool Alike, typename Row, typename Finish,
+    typename Wanted>
 CODEDEXPOSURE_INLINE void
-filter_outputs (const fuse::FilterRow &row, int first, Finish finish,
-    Wanted wanted, float *const *outputs)
+filter_outputs (const Row &row, int first, Finish finish, Wanted wanted,
+    float *const *outputs)
 {
   constexpr int kPair = Outputs <= 4 ? 2 : 1;
   constexpr int kVectors = Alike && kVectorBytes == 64 ? 4 : kPair;
   filter_along<Outputs, kVectors, Alike> (row, first, finish, wanted, outputs);
 }
 
-template <typename Finish, typename Wanted>
+template <typename Row, typename Finish, typename Wanted>
 CODEDEXPOSURE_INLINE void
-filter_all (const fuse::FilterRow &row, Finish finish, Wanted wanted,
-    float *const *outputs)
+filter_all (const Row &row, Finish finish, Wanted wanted, float *const *outputs)
 {
   const bool alike = kFloats % row.period == 0;
   int first = 0;
@@ -103,24 +153,33 @@ filter_all (const fuse::FilterRow &row, Finish finish, Wanted wanted,
     filter_outputs<1, false> (row, first, finish, wanted, outputs);
 }
 
+struct Everywhere {
+  CODEDEXPOSURE_INLINE bool operator() (int, int) const { return true; }
+};
+
 inline void
 filter (const fuse::FilterRow &row, float *const *outputs)
 {
-  filter_all (
-      row, Put (), [] (int, int) { return true; }, outputs);
+  filter_all (row, Put (), Everywhere (), outputs);
 }
 
 inline void
-filter_add (
-    const fuse::FilterRow &row, const float *scale, float *const *outputs)
+filter_pairs_squared (const fuse::PairRow &row, float *const *outputs)
 {
-  const auto wanted = [scale] (int x, int count) {
+  filter_all (row, PutSquare (), Everywhere (), outputs);
+}
+
+inline void
+filter_pairs_add (
+    const fuse::PairRow &row, const float *share, float *const *outputs)
+{
+  const auto wanted = [share] (int x, int count) {
     for (int i = x; i < x + count; i++)
-      if (scale[i] != 0.0f)
+      if (share[i] != 0.0f)
         return true;
     return false;
   };
-  filter_all (row, Add{scale}, wanted, outputs);
+  filter_all (row, Add{share}, wanted, outputs);
 }
 
 } // namespace codedexposure::CODEDEXPOSURE_TARGET

@@ -19,14 +19,17 @@ namespace
 constexpr std::string_view kQualityNames[] = {"fast", "balanced", "best"};
 constexpr float kWhite = 255.0f;
 
-template <typename Pixel>
 void
-write_row (const float *light, float scale, float largest, int width, Pixel *to)
+write_row (const fuse::Kernels &kernels, const float *light, float scale,
+    float largest, int width, std::uint8_t *to)
 {
-  for (int x = 0; x < width; x++) {
-    const float value = light[x] * scale + 0.5f;
-    to[x] = Pixel (value < 0.0f ? 0.0f : value > largest ? largest : value);
-  }
+  kernels.to_bytes (light, scale, largest, width, to);
+}
+void
+write_row (const fuse::Kernels &kernels, const float *light, float scale,
+    float largest, int width, std::uint16_t *to)
+{
+  kernels.to_words (light, scale, largest, width, to);
 }
 
 /** A part of the frame that is fused separately. */
@@ -221,7 +224,8 @@ Fuser<Pixel>::State::fuse (
       };
       for (std::size_t k = 0; k < frames.size (); k++)
         if (k % held == 0)
-          write_row (rows[k / held], scale, largest, width, row (k));
+          write_row (piece.engine->kernels (), rows[k / held], scale, largest,
+              width, row (k));
         else
           std::copy_n (row (k - 1), width, row (k));
     };
@@ -287,7 +291,9 @@ try {
       find_covers (schedule, {width, height - schedule.pilot_rows ()}),
       schedule.slots (), float (largest),
       std::make_unique<Workers> (
-          options.quality == FuseQuality::kFast ? 1 : options.threads)});
+          options.threads == 0 && options.quality == FuseQuality::kFast
+              ? 1
+              : options.threads)});
   return Fuser (std::move (state));
 } catch (const std::bad_alloc &) {
   return out_of_memory ();

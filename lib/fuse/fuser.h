@@ -33,8 +33,8 @@ struct FuseOptions {
   int bits = 0;
   SensorNoise noise;
   SceneModel scene;
-  /** Threads of balanced and best, 1..64; 0: one per processor. The pixels do
-   * not depend on it. */
+  /** Threads, 1..64; 0: one per processor, and for fast, only the caller's. The
+   * pixels do not depend on it. */
   int threads = 0;
   /** One of fuse_targets (), all of which give the same pixels; empty: the
    * fastest. */

@@ -10,6 +10,7 @@
   }
 
 #if defined __x86_64__
+CODEDEXPOSURE_DECLARE (fuse_avx512vnni)
 CODEDEXPOSURE_DECLARE (fuse_avx512)
 CODEDEXPOSURE_DECLARE (fuse_avx2)
 #endif
@@ -23,7 +24,12 @@ find_kernels ()
 {
   std::vector<Kernels> found;
 #if defined __x86_64__
-  if (__builtin_cpu_supports ("avx512f") && __builtin_cpu_supports ("avx512dq"))
+  const bool wide = __builtin_cpu_supports ("avx512f") &&
+                    __builtin_cpu_supports ("avx512dq") &&
+                    __builtin_cpu_supports ("avx512bw");
+  if (wide && __builtin_cpu_supports ("avx512vnni"))
+    found.push_back (fuse_avx512vnni::kernels);
+  if (wide)
     found.push_back (fuse_avx512::kernels);
   if (__builtin_cpu_supports ("avx2"))
     found.push_back (fuse_avx2::kernels);

@@ -34,6 +34,31 @@ struct FilterRow {
 };
 
 /**
+ * The same in whole numbers, over pairs of pixels. The value at x of the source
+ * is the pixel at x in its lower 16 bits and the pixel at x + 1 in its upper
+ * ones, both signed; weights are pairs like it. Output k at x is
+ *
+ *   scale[k width + i] * sum + base,   i = (phase + x) mod period,
+ *
+ * where sum is over pairs t, of both products of weights[(t outputs + k) width
+ * + i] and source[x + offsets[t]]. It fits into 32 bits, so that its order does
+ * not matter. No weight is -32768.
+ */
+struct PairRow {
+  const std::int32_t *source;
+  int count;
+  const std::ptrdiff_t *offsets;
+  int taps; ///< pairs
+  const std::int32_t *weights;
+  const float *scale;
+  float base;
+  int width;
+  int outputs;
+  int period;
+  int phase;
+};
+
+/**
  * Overlapping blocks of kBlock x kBlock pixels x slots, kBlockStep apart. A
  * vector has one block per lane: column x of row y of block l is at
  * source[slot][y * stride + ((x + shift) mod kBlockStep) * split
@@ -56,18 +81,80 @@ struct ShrinkRow {
   float *scratch; ///< slots * kBlock^2 * 16 floats
 };
 
+/** 1 up to @p none, 0 from @p all on, linear between them. */
+struct Fade {
+  float none, all;
+};
+
+/** Squared differences of two rows in units of their variance, 2 (slope light +
+ * offset) + floor. */
+struct CompareRow {
+  const float *now, *other;
+  const float *slope, *offset;
+  const float *frames; ///< of which other is the mean; null: one
+  float floor;
+  int count;
+};
+
+/** fade of sum / area, times fade of max, times unrepeated. */
+struct RateRow {
+  const float *sum, *max, *unrepeated;
+  float area;
+  Fade mean_fade, max_fade;
+  int count;
+};
+
+/** What each of two models has a share of, by their squared errors. */
+struct PreferRow {
+  const float *first, *second; ///< sums of squared errors
+  float floor;                 ///< added to these sums
+  float min_share;             ///< less is 0
+  int count;
+};
+
+/** The light of static pixels and the shares of one or two models. */
+struct ShareRow {
+  const float *weight, *light; ///< of static pixels
+  const float *preference;     ///< for the first of two models; null: one
+  int count;
+};
+
 /** The kernels of one instruction set; all give the same values. */
 struct Kernels {
   std::string_view name;
   /** outputs[k][x] = output k. */
   void (*filter) (const FilterRow &row, float *const *outputs);
-  /** outputs[k][x] += scale[x] * output k, where scale is not 0. */
-  void (*filter_add) (
-      const FilterRow &row, const float *scale, float *const *outputs);
+  /** outputs[k][x] = the square of output k. */
+  void (*filter_pairs_squared) (const PairRow &row, float *const *outputs);
+  /** outputs[k][x] += share[x] * output k, where share is not 0. */
+  void (*filter_pairs_add) (
+      const PairRow &row, const float *share, float *const *outputs);
   /** to[x] = the sum of rows[i][x], in the order of the rows, or the largest.
    * Up to 15 values more than @p count are read and written. */
   void (*sum) (const float *const *rows, int rows_count, int count, float *to);
   void (*max) (const float *const *rows, int rows_count, int count, float *to);
+  /** to[x] = the change of pixel x. */
+  void (*compare) (const CompareRow &row, float *to);
+  void (*rate) (const RateRow &row, float *to);
+  /** to[x] = fade of a[x] / (floor + b[x]). */
+  void (*fade_ratio) (const float *a, const float *b, float floor,
+      const Fade &fade, int count, float *to);
+  /** to[x] = preference for the first model: in proportion to the inverse of
+   * the models' errors to the power of 8. */
+  void (*prefer) (const PreferRow &row, float *to);
+  /** base[x] = static light times its weight; shares[i][x] = share of model i
+   * in the rest. */
+  void (*share) (const ShareRow &row, float *base, float *const *shares);
+  /** Pixels of 16 bits, kSmallest more than light times @p steps, rounded. */
+  void (*to_steps) (
+      const float *light, float steps, int count, std::int32_t *to);
+  /** Pairs of each value and the next one, in place. */
+  void (*pair) (std::int32_t *values, int count);
+  /** Light times scale as pixels of 0 .. largest, rounded. */
+  void (*to_bytes) (const float *light, float scale, float largest, int count,
+      std::uint8_t *to);
+  void (*to_words) (const float *light, float scale, float largest, int count,
+      std::uint16_t *to);
   /** Transforms each block (slot_transform over slots, DCT in x and y), sets
    * all coefficients below the threshold but the mean to 0, transforms back,
    * and adds the block weighted with 1 / number of coefficients kept. */

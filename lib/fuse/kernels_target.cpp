@@ -8,7 +8,8 @@ namespace codedexposure::CODEDEXPOSURE_TARGET
 {
 
 extern const fuse::Kernels kernels;
-const fuse::Kernels kernels = {
-    CODEDEXPOSURE_TARGET_NAME, filter, filter_add, sum, max, shrink};
+const fuse::Kernels kernels = {CODEDEXPOSURE_TARGET_NAME, filter,
+    filter_pairs_squared, filter_pairs_add, sum, max, compare, rate, fade_ratio,
+    prefer, share, to_steps, pair, to_bytes, to_words, shrink};
 
 } // namespace codedexposure::CODEDEXPOSURE_TARGET

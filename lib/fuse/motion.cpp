@@ -85,7 +85,7 @@ struct MotionFilter::Band {
 
 MotionFilter::MotionFilter (const Phases &phases,
     const Observation &observation, std::span<const SceneClass> classes,
-    int radius, std::span<const double> noise)
+    int radius, std::span<const double> noise, float steps)
     : phases_ (phases)
 {
   const std::vector<Offset> taps = disc (radius + 0.5);
@@ -93,9 +93,9 @@ MotionFilter::MotionFilter (const Phases &phases,
     const SceneClass &patch = classes[c];
     if (c % kChunk == 0)
       residuals_.emplace_back (
-          phases, taps, int (std::min (kChunk, classes.size () - c)));
+          phases, taps, int (std::min (kChunk, classes.size () - c)), steps);
     penalties_.push_back (float (1.0 + 0.1 * std::hypot (patch.vx, patch.vy)));
-    filters_.emplace_back (phases, taps, observation.slots ());
+    filters_.emplace_back (phases, taps, observation.slots (), steps);
     for_each_phase (phases, observation, patch, taps, noise,
         [&] (int row, int x, const PhaseWeights &weights) {
           filters_.back ().set_all (row, x, weights.slots);
@@ -107,7 +107,7 @@ MotionFilter::MotionFilter (const Phases &phases,
 /* The squared error of every class around each pixel of the band. */
 void
 MotionFilter::measure (
-    const Kernels &kernels, const Field &coded, Band &band) const
+    const Kernels &kernels, const PairField &coded, Band &band) const
 {
   const Blur blur;
   const int width = coded.width (), height = coded.height ();
@@ -118,16 +118,15 @@ MotionFilter::measure (
       std::array<float *, kChunk> to;
       for (std::size_t i = 0; i < count; i++)
         to[i] = band.squares[i].row (y);
-      kernels.filter (residuals_[c / kChunk].row (phases_, coded,
-                          mirrored (band.first + y, height), offsets),
+      kernels.filter_pairs_squared (
+          residuals_[c / kChunk].row (
+              phases_, coded, mirrored (band.first + y, height), offsets),
           to.data ());
     }
     for (std::size_t i = 0; i < count; i++) {
       Field &squares = band.squares[i];
       for (int y = -kReach; y < band.rows + kReach; y++) {
         float *square = squares.row (y);
-        for (int x = 0; x < width; x++)
-          square[x] *= square[x];
         for (int x = 1; x <= kReach; x++) {
           square[-x] = square[mirrored (-x, width)];
           square[width - 1 + x] = square[mirrored (width - 1 + x, width)];
@@ -178,8 +177,8 @@ MotionFilter::set_weights (Band &band) const
 }
 
 void
-MotionFilter::mix (const Kernels &kernels, const Field &coded, const Band &band,
-    std::span<Field> slots) const
+MotionFilter::mix (const Kernels &kernels, const PairField &coded,
+    const Band &band, std::span<Field> slots) const
 {
   const auto offsets = filters_[0].offsets (coded);
   std::vector<float *> to (slots.size ());
@@ -190,7 +189,7 @@ MotionFilter::mix (const Kernels &kernels, const Field &coded, const Band &band,
     for (int y = 0; y < band.rows; y++) {
       for (std::size_t s = 0; s < slots.size (); s++)
         to[s] = slots[s].row (band.first + y);
-      kernels.filter_add (
+      kernels.filter_pairs_add (
           filters_[c].row (phases_, coded, band.first + y, offsets),
           band.fit[c].row (y), to.data ());
     }
@@ -198,7 +197,7 @@ MotionFilter::mix (const Kernels &kernels, const Field &coded, const Band &band,
 }
 
 bool
-MotionFilter::run (const Kernels &kernels, const Field &coded,
+MotionFilter::run (const Kernels &kernels, const PairField &coded,
     std::span<Field> slots, Workers &workers, std::stop_token stop) const
 {
   const int height = coded.height ();

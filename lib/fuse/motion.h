@@ -23,22 +23,24 @@ class MotionFilter
 {
 public:
   /** @p radius  of the taps, px; coded frames have a margin of this size.
-   *  @p noise   variance of each element in units of the scene's variance. */
+   *  @p noise   variance of each element in units of the scene's variance.
+   *  @p steps  see FilterBank. */
   MotionFilter (const Phases &phases, const Observation &observation,
       std::span<const SceneClass> classes, int radius,
-      std::span<const double> noise);
+      std::span<const double> noise, float steps);
 
   /** Writes the light of every slot to @p slots, fields of the size of
    * @p coded. The result does not depend on the number of workers.
    * @return  false when it was stopped. */
-  bool run (const Kernels &kernels, const Field &coded, std::span<Field> slots,
-      Workers &workers, std::stop_token stop) const;
+  bool run (const Kernels &kernels, const PairField &coded,
+      std::span<Field> slots, Workers &workers, std::stop_token stop) const;
 
 private:
   struct Band;
-  void measure (const Kernels &kernels, const Field &coded, Band &band) const;
+  void measure (
+      const Kernels &kernels, const PairField &coded, Band &band) const;
   void set_weights (Band &band) const;
-  void mix (const Kernels &kernels, const Field &coded, const Band &band,
+  void mix (const Kernels &kernels, const PairField &coded, const Band &band,
       std::span<Field> slots) const;
 
   const Phases &phases_;

@@ -8,11 +8,12 @@ namespace codedexposure::fuse
 
 Predictions::Predictions (const Phases &phases, const Observation &observation,
     std::span<const SceneClass> classes, int taps, int around, Extent size,
-    std::span<const double> noise)
+    std::span<const double> noise, float steps)
     : phases_ (phases),
-      filters_ (phases, disc (taps + 0.5), int (classes.size ())),
-      rows_ (size.width, int (classes.size ()), around),
-      sums_ (classes.size (), BoxFilter (size.width, size.height, around))
+      filters_ (phases, disc (taps + 0.5), int (classes.size ()), steps),
+      rooms_ (1, {Field (size.width, int (classes.size ()), around),
+                     std::vector (classes.size (),
+                         BoxFilter (size.width, size.height, around))})
 {
   for (std::size_t k = 0; k < classes.size (); k++)
     for_each_phase (phases, observation, classes[k], disc (taps + 0.5), noise,
@@ -22,29 +23,35 @@ Predictions::Predictions (const Phases &phases, const Observation &observation,
 }
 
 void
-Predictions::run (const Kernels &kernels, const Field &coded, const Use &use)
+Predictions::make_room (int count)
 {
-  const int width = coded.width (), height = coded.height ();
-  const int around = sums_[0].radius ();
+  rooms_.resize (std::size_t (count), rooms_.front ());
+}
+
+void
+Predictions::run (const Kernels &kernels, const PairField &coded, int first,
+    int end, int worker, const Use &use)
+{
+  auto &[rows, filters] = rooms_[std::size_t (worker)];
+  const int height = coded.height ();
+  const int around = filters[0].radius ();
   const auto offsets = filters_.offsets (coded);
   std::vector<float *> errors;
-  for (std::size_t k = 0; k < sums_.size (); k++)
-    errors.push_back (rows_.row (int (k)));
-  std::vector<const float *> sums (sums_.size ());
-  for (int y = 0; y < height + around; y++) {
+  for (std::size_t k = 0; k < filters.size (); k++)
+    errors.push_back (rows.row (int (k)));
+  std::vector<const float *> sums (filters.size ());
+  for (int y = std::max (first - around, 0); y < end + around; y++) {
     if (y < height) {
-      kernels.filter (
+      kernels.filter_pairs_squared (
           filters_.row (phases_, coded, y, offsets), errors.data ());
-      for (std::size_t k = 0; k < sums_.size (); k++) {
-        for (int x = 0; x < width; x++)
-          errors[k][x] *= errors[k][x];
-        sums_[k].extend (errors[k]);
-        sums_[k].add_row (kernels.sum, y, errors[k]);
+      for (std::size_t k = 0; k < filters.size (); k++) {
+        filters[k].extend (errors[k]);
+        filters[k].add_row (kernels.sum, y, errors[k]);
       }
     }
-    if (y >= around) {
-      for (std::size_t k = 0; k < sums_.size (); k++)
-        sums[k] = sums_[k].result (kernels.sum, y - around);
+    if (y - around >= first) {
+      for (std::size_t k = 0; k < filters.size (); k++)
+        sums[k] = filters[k].result (kernels.sum, y - around);
       use (y - around, sums.data ());
     }
   }

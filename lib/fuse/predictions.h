@@ -25,20 +25,30 @@ public:
   /** @p taps    radius of the neighbours, px; coded frames have a margin of
    * this size.
    *  @p around  radius of the squares over which errors are summed, px.
-   *  @p noise   variance of each element in units of the scene's variance. */
+   *  @p noise   variance of each element in units of the scene's variance.
+   *  @p steps  see FilterBank. */
   Predictions (const Phases &phases, const Observation &observation,
       std::span<const SceneClass> classes, int taps, int around, Extent size,
-      std::span<const double> noise);
+      std::span<const double> noise, float steps);
 
-  /** Sums of squared errors around the pixels of row @p y, of each class. */
+  /** Room for threads of number 0 .. @p count - 1. */
+  void make_room (int count);
+  /** Calls @p use with the sums of squared errors around the pixels of rows
+   * @p first .. @p end - 1, of each class. */
   using Use = std::function<void (int y, const float *const *errors)>;
-  void run (const Kernels &kernels, const Field &coded, const Use &use);
+  void run (const Kernels &kernels, const PairField &coded, int first, int end,
+      int worker, const Use &use);
 
 private:
+  /** Of a thread. */
+  struct Room {
+    Field rows; ///< of squared errors, one of each class
+    std::vector<BoxFilter> sums;
+  };
+
   const Phases &phases_;
   FilterBank filters_;
-  Field rows_; ///< of squared errors, one of each class
-  std::vector<BoxFilter> sums_;
+  std::vector<Room> rooms_; ///< one at least
 };
 
 } // namespace codedexposure::fuse

@@ -9,7 +9,6 @@
 namespace codedexposure::CODEDEXPOSURE_TARGET
 {
 
-using Ints = Vector<std::int32_t>;
 constexpr int kArea = fuse::kBlock * fuse::kBlock;
 
 /* Orthonormal DCT-II of 12 values. The even half of the output needs only sums,

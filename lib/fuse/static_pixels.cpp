@@ -14,49 +14,23 @@ namespace
 constexpr float kFloor = 0.5f;
 /* Mean squared change around a pixel in units of the noise's, up to which it is
  * static, and from which on it moves. */
-constexpr float kStaticMean = 1.8f, kMovedMean = 3.0f;
+constexpr Fade kMeanChange{1.8f, 3.0f};
 /* The same for the largest squared change: a small object may have passed. */
-constexpr float kStaticMax = 25.0f, kMovedMax = 40.0f;
+constexpr Fade kLargestChange{25.0f, 40.0f};
 /* Ratio of the prediction errors if static and if moving, up to which nothing
  * repeats, and from which on it does. */
-constexpr float kUniqueError = 1.3f, kRepeatedError = 1.8f;
+constexpr Fade kRepetition{1.3f, 1.8f};
 /* Pixels with more weight are static. */
 constexpr float kStatic = 0.5f;
-
-float
-fade (float value, float none, float all)
-{
-  return std::clamp ((all - value) / (all - none), 0.0f, 1.0f);
-}
-
-/* change = squared difference of rows @y in units of its variance. @count:
- * frames of which @other is the mean. */
-void
-compare (const Field &now, const Field &other, const Field *count,
-    const NoiseMap &noise, int y, float *change)
-{
-  const int width = now.width ();
-  const float *a = now.row (y), *b = other.row (y);
-  const float *slope = noise.slope.row (y), *offset = noise.offset.row (y);
-  for (int x = 0; x < width; x++) {
-    const float variance =
-        slope[x] * std::max (0.5f * (a[x] + b[x]), 0.0f) + offset[x];
-    change[x] = (a[x] - b[x]) * (a[x] - b[x]) / (2.0f * variance + kFloor);
-  }
-  if (count) {
-    const float *frames = count->row (y);
-    for (int x = 0; x < width; x++)
-      change[x] *= 2.0f * frames[x] / (frames[x] + 1.0f);
-  }
-}
 
 } // namespace
 
 StaticPixels::StaticPixels (
     int width, int height, int radius, bool average, float largest)
     : radius_ (radius), average_ (average), steps_ (65535.0f / largest),
-      last_ (width, height), change_ (width, 1, radius),
-      sums_ (width, height, radius), maxima_ (width, height, radius),
+      last_ (width, height),
+      rooms_ (1, {Field (width, 1, radius), BoxFilter (width, height, radius),
+                     BoxFilter (width, height, radius)}),
       unrepeated_ (width, height), weight_ (width, height),
       unchanged_ (width, height)
 {
@@ -74,49 +48,50 @@ StaticPixels::radius_of (Extent cell)
   return std::max (3, std::max (cell.width, cell.height) / 2 + 1);
 }
 
-/* Sets @rating by the differences of @now from @other. */
+void
+StaticPixels::make_room (int count)
+{
+  rooms_.resize (std::size_t (count), rooms_.front ());
+}
+
+/* Sets @rating by the differences of @now from @other. @count: frames of which
+ * @other is the mean. */
 void
 StaticPixels::compare_frames (const Kernels &kernels, const Field &now,
-    const Field &other, const Field *count, const NoiseMap &noise,
+    const Field &other, const Field *count, const NoiseMap &noise, Rows rows,
     Field &rating)
 {
-  const int height = now.height ();
-  float *change = change_.row (0);
-  for (int y = 0; y < height + radius_; y++) {
+  auto &[changes, sums, maxima] = rooms_[std::size_t (rows.worker)];
+  const int width = now.width (), height = now.height ();
+  const float area = float ((2 * radius_ + 1) * (2 * radius_ + 1));
+  float *change = changes.row (0);
+  for (int y = std::max (rows.first - radius_, 0); y < rows.end + radius_;
+       y++) {
     if (y < height) {
-      compare (now, other, count, noise, y, change);
-      sums_.extend (change);
-      sums_.add_row (kernels.sum, y, change);
-      maxima_.add_row (kernels.max, y, change);
+      kernels.compare ({now.row (y), other.row (y), noise.slope.row (y),
+                           noise.offset.row (y),
+                           count ? count->row (y) : nullptr, kFloor, width},
+          change);
+      sums.extend (change);
+      sums.add_row (kernels.sum, y, change);
+      maxima.add_row (kernels.max, y, change);
     }
-    if (y >= radius_)
-      rate_row (y - radius_, sums_.result (kernels.sum, y - radius_),
-          maxima_.result (kernels.max, y - radius_), rating);
+    const int out = y - radius_;
+    if (out >= rows.first)
+      kernels.rate (
+          {sums.result (kernels.sum, out), maxima.result (kernels.max, out),
+              unrepeated_.row (out), area, kMeanChange, kLargestChange, width},
+          rating.row (out));
   }
 }
 
 void
-StaticPixels::rate_row (
-    int y, const float *sum, const float *max, Field &rating)
+StaticPixels::set_errors (const Kernels &kernels, int y, const float *if_static,
+    const float *if_moving)
 {
-  const int width = rating.width ();
-  const float area = float ((2 * radius_ + 1) * (2 * radius_ + 1));
-  const float *unrepeated = unrepeated_.row (y);
-  float *out = rating.row (y);
-  for (int x = 0; x < width; x++)
-    out[x] = fade (sum[x] / area, kStaticMean, kMovedMean) *
-             fade (max[x], kStaticMax, kMovedMax) * unrepeated[x];
-}
-
-void
-StaticPixels::set_errors (int y, const float *if_static, const float *if_moving)
-{
-  const int width = weight_.width ();
   const float floor = kFloor * float ((2 * radius_ + 1) * (2 * radius_ + 1));
-  float *unrepeated = unrepeated_.row (y);
-  for (int x = 0; x < width; x++)
-    unrepeated[x] = fade (
-        if_static[x] / (floor + if_moving[x]), kUniqueError, kRepeatedError);
+  kernels.fade_ratio (if_static, if_moving, floor, kRepetition,
+      weight_.width (), unrepeated_.row (y));
 }
 
 std::uint16_t *
@@ -154,35 +129,47 @@ StaticPixels::average_row (int y, const float *now)
 }
 
 void
-StaticPixels::update (const Kernels &kernels, const Field &coded,
-    const Field *after, const NoiseMap &noise)
+StaticPixels::compare (const Kernels &kernels, const Frames &frames, Rows rows)
 {
-  const int width = coded.width (), height = coded.height ();
-  if (frames_ == 0)
-    for (int y = 0; y < height; y++)
-      std::fill_n (weight_.row (y), width, 0.0f);
-  else if (average_)
-    compare_frames (kernels, coded, mean_, &count_, noise, weight_);
-  else
-    compare_frames (kernels, coded, last_, nullptr, noise, weight_);
-  if (average_ && frames_ > 0 && !compared_)
-    compare_frames (kernels, coded, last_, nullptr, noise, unchanged_);
-  for (int y = 0; y < height; y++) {
+  const auto &[coded, after, noise] = frames;
+  if (frames_ == 0) {
+    for (int y = rows.first; y < rows.end; y++)
+      std::fill_n (weight_.row (y), coded.width (), 0.0f);
+    return;
+  }
+  const Field &other = average_ ? mean_ : last_;
+  compare_frames (kernels, coded, other, average_ ? &count_ : nullptr, noise,
+      rows, weight_);
+  if (average_ && !compared_)
+    compare_frames (kernels, coded, last_, nullptr, noise, rows, unchanged_);
+}
+
+void
+StaticPixels::average (const Kernels &kernels, const Frames &frames, Rows rows)
+{
+  const auto &[coded, after, noise] = frames;
+  const int width = coded.width ();
+  for (int y = rows.first; y < rows.end; y++) {
     if (average_)
       average_row (y, coded.row (y));
     std::copy_n (coded.row (y), width, last_.row (y));
   }
-  frames_++;
-  compared_ = after != nullptr;
   if (!after)
     return;
-  compare_frames (kernels, *after, coded, nullptr, noise, unchanged_);
-  for (int y = 0; y < height; y++) {
+  compare_frames (kernels, *after, coded, nullptr, noise, rows, unchanged_);
+  for (int y = rows.first; y < rows.end; y++) {
     const float *unchanged = unchanged_.row (y);
     float *weight = weight_.row (y);
     for (int x = 0; x < width; x++)
       weight[x] = std::max (weight[x], unchanged[x]);
   }
+}
+
+void
+StaticPixels::finish (const Frames &frames)
+{
+  frames_++;
+  compared_ = frames.after != nullptr;
 }
 
 } // namespace codedexposure::fuse

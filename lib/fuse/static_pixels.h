@@ -45,14 +45,33 @@ public:
   /** The radius for a tile with this cell. */
   static int radius_of (Extent cell);
 
-  /** Prediction errors of row @p y of the next frame of update (), by which
-   * repetition is detected: sums of squared errors around each pixel, under the
-   * assumption that the scene is static and that every slot shows a different
-   * picture. */
-  void set_errors (int y, const float *if_static, const float *if_moving);
-  /** Takes the next coded frame, and the frame after it or null. */
-  void update (const Kernels &kernels, const Field &coded, const Field *after,
-      const NoiseMap &noise);
+  /** Room for threads of number 0 .. @p count - 1. */
+  void make_room (int count);
+
+  /** The next coded frame, and the frame after it or null. */
+  struct Frames {
+    const Field &coded;
+    const Field *after;
+    const NoiseMap &noise;
+  };
+  /** Some rows, and the thread that computes them. */
+  struct Rows {
+    int first, end;
+    int worker;
+  };
+  /* The frame is taken in these steps: each for all rows, the first one for a
+   * row before the second one, which is for all rows before the third one. */
+  /** Prediction errors of row @p y, by which repetition is detected: sums of
+   * squared errors around each pixel, under the assumption that the scene is
+   * static and that every slot shows a different picture. */
+  void set_errors (const Kernels &kernels, int y, const float *if_static,
+      const float *if_moving);
+  void compare (const Kernels &kernels, const Frames &frames, Rows rows);
+  /** After it, weight () and light () of these rows are those of the frame. */
+  void average (const Kernels &kernels, const Frames &frames, Rows rows);
+  /** After these steps. */
+  void finish (const Frames &frames);
+
   /** Forgets all frames. */
   void forget () { frames_ = 0; }
 
@@ -66,9 +85,8 @@ public:
 
 private:
   void compare_frames (const Kernels &kernels, const Field &now,
-      const Field &other, const Field *count, const NoiseMap &noise,
+      const Field &other, const Field *count, const NoiseMap &noise, Rows rows,
       Field &rating);
-  void rate_row (int y, const float *sum, const float *max, Field &rating);
   void average_row (int y, const float *now);
   std::uint16_t *past_row (std::int64_t frame, int y);
 
@@ -79,10 +97,14 @@ private:
   Field last_;              ///< frame
   Field mean_;              ///< of the frames since the last change
   Field count_;             ///< of these frames
-  Field light_;  ///< the mean, or the last frame where that differs from it
-  Field change_; ///< one row
-  BoxFilter sums_, maxima_;
-  Field unrepeated_; ///< 1 where no repetition is detected
+  Field light_; ///< the mean, or the last frame where that differs from it
+  /** Of a thread. */
+  struct Room {
+    Field change; ///< one row
+    BoxFilter sums, maxima;
+  };
+  std::vector<Room> rooms_; ///< one at least
+  Field unrepeated_;        ///< 1 where no repetition is detected
   Field weight_;
   Field unchanged_;       ///< from the last frame to the next: 1, none changed
   bool compared_ = false; ///< unchanged_ is of the next frame

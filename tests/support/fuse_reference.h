@@ -153,13 +153,39 @@ reference_filter (const FilterRow &row, float *const *outputs)
       outputs[k][x] = filtered (row, x, k);
 }
 
+inline float
+filtered_pairs (const PairRow &row, int x, int k)
+{
+  const int i = (row.phase + x) % row.period;
+  std::int64_t sum = 0;
+  for (int t = 0; t < row.taps; t++) {
+    const std::int32_t weights =
+        row.weights[(t * row.outputs + k) * row.width + i];
+    const std::int32_t values = row.source[x + row.offsets[t]];
+    for (const int shift : {0, 16})
+      sum += std::int64_t (std::int16_t (weights >> shift)) *
+             std::int16_t (values >> shift);
+  }
+  return row.scale[k * row.width + i] * float (std::int32_t (sum)) + row.base;
+}
+
 inline void
-reference_filter_add (
-    const FilterRow &row, const float *scale, float *const *outputs)
+reference_filter_pairs_squared (const PairRow &row, float *const *outputs)
+{
+  for (int k = 0; k < row.outputs; k++)
+    for (int x = 0; x < row.count; x++) {
+      const float value = filtered_pairs (row, x, k);
+      outputs[k][x] = value * value;
+    }
+}
+
+inline void
+reference_filter_pairs_add (
+    const PairRow &row, const float *share, float *const *outputs)
 {
   for (int k = 0; k < row.outputs; k++)
     for (int x = 0; x < row.count; x++)
-      outputs[k][x] += scale[x] * filtered (row, x, k);
+      outputs[k][x] += share[x] * filtered_pairs (row, x, k);
 }
 
 inline void
@@ -184,6 +210,93 @@ reference_max (const float *const *rows, int rows_count, int count, float *to)
   }
 }
 
+inline float
+faded (float value, const Fade &fade)
+{
+  return std::clamp ((fade.all - value) / (fade.all - fade.none), 0.0f, 1.0f);
+}
+
+inline void
+reference_compare (const CompareRow &row, float *to)
+{
+  for (int x = 0; x < row.count; x++) {
+    const float apart = row.now[x] - row.other[x];
+    const float light = std::max (0.5f * (row.now[x] + row.other[x]), 0.0f);
+    const float variance = row.slope[x] * light + row.offset[x];
+    to[x] = apart * apart / (2.0f * variance + row.floor);
+    if (row.frames)
+      to[x] *= 2.0f * row.frames[x] / (row.frames[x] + 1.0f);
+  }
+}
+
+inline void
+reference_rate (const RateRow &row, float *to)
+{
+  for (int x = 0; x < row.count; x++)
+    to[x] = faded (row.sum[x] / row.area, row.mean_fade) *
+            faded (row.max[x], row.max_fade) * row.unrepeated[x];
+}
+
+inline void
+reference_fade_ratio (const float *a, const float *b, float floor,
+    const Fade &fade, int count, float *to)
+{
+  for (int x = 0; x < count; x++)
+    to[x] = faded (a[x] / (floor + b[x]), fade);
+}
+
+inline void
+reference_prefer (const PreferRow &row, float *to)
+{
+  for (int x = 0; x < row.count; x++) {
+    const float ratio = std::min (
+        (row.first[x] + row.floor) / (row.second[x] + row.floor), 1e3f);
+    const float fourth = ratio * ratio * ratio * ratio;
+    const float share = 1.0f / (1.0f + fourth * fourth);
+    to[x] = std::clamp (
+        (share - row.min_share) / (1.0f - 2.0f * row.min_share), 0.0f, 1.0f);
+  }
+}
+
+inline void
+reference_share (const ShareRow &row, float *base, float *const *shares)
+{
+  for (int x = 0; x < row.count; x++) {
+    const float rest = 1.0f - row.weight[x];
+    base[x] = row.weight[x] * row.light[x];
+    shares[0][x] = row.preference ? rest * row.preference[x] : rest;
+    if (row.preference)
+      shares[1][x] = rest * (1.0f - row.preference[x]);
+  }
+}
+
+inline void
+reference_to_steps (
+    const float *light, float steps, int count, std::int32_t *to)
+{
+  for (int x = 0; x < count; x++)
+    to[x] =
+        std::int32_t (std::clamp (light[x] * steps + 0.5f, 0.0f, 65535.0f)) -
+        32768;
+}
+
+inline void
+reference_pair (std::int32_t *values, int count)
+{
+  for (int x = 0; x < count; x++)
+    values[x] = std::int32_t (std::uint32_t (values[x]) % 65536 +
+                              std::uint32_t (values[x + 1]) * 65536);
+}
+
+template <typename Pixel>
+void
+reference_to_pixels (
+    const float *light, float scale, float largest, int count, Pixel *to)
+{
+  for (int x = 0; x < count; x++)
+    to[x] = Pixel (std::clamp (light[x] * scale + 0.5f, 0.0f, largest));
+}
+
 inline void
 reference_shrink (const ShrinkRow &row)
 {
@@ -195,6 +308,10 @@ reference_shrink (const ShrinkRow &row)
 }
 
 inline constexpr Kernels kReference{"reference", reference_filter,
-    reference_filter_add, reference_sum, reference_max, reference_shrink};
+    reference_filter_pairs_squared, reference_filter_pairs_add, reference_sum,
+    reference_max, reference_compare, reference_rate, reference_fade_ratio,
+    reference_prefer, reference_share, reference_to_steps, reference_pair,
+    reference_to_pixels<std::uint8_t>, reference_to_pixels<std::uint16_t>,
+    reference_shrink};
 
 } // namespace codedexposure::test

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Kernels of fusion: every instruction set of the processor, compared with the
  * reference. */
+#include <cmath>
+#include <random>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -17,52 +19,108 @@ using namespace codedexposure;
 using test::kReference;
 using test::random_numbers;
 
-/* The outputs of a kernel for @row. */
+/* What @filter writes to @count values of @outputs rows. */
+template <typename Filter>
 std::vector<std::vector<float>>
-outputs_of (const fuse::Kernels &kernels, const fuse::FilterRow &row,
-    const std::vector<float> *scale)
+outputs_of (int outputs, int count, const Filter &filter)
 {
-  std::vector<std::vector<float>> outputs (
-      std::size_t (row.outputs), random_numbers (256, 5));
+  std::vector<std::vector<float>> rows (
+      std::size_t (outputs), random_numbers (256, 5));
   std::vector<float *> to;
-  for (auto &output : outputs)
-    to.push_back (output.data ());
-  if (scale)
-    kernels.filter_add (row, scale->data (), to.data ());
-  else
-    kernels.filter (row, to.data ());
-  for (auto &output : outputs)
-    output.resize (std::size_t (row.count));
-  return outputs;
+  for (auto &row : rows)
+    to.push_back (row.data ());
+  filter (to.data ());
+  for (auto &row : rows)
+    row.resize (std::size_t (count));
+  return rows;
 }
+
+/* Rows of @width values that repeat after @period. */
+template <typename T>
+void
+repeat_rows (std::vector<T> &rows, int width, int period)
+{
+  for (std::size_t i = 0; i < rows.size (); i++)
+    if (i % std::size_t (width) >= std::size_t (period))
+      rows[i] = rows[i - std::size_t (period)];
+}
+
+constexpr int kCount = 77;
+constexpr int kPeriods[] = {1, 3, 4, 8, 25}, kOutputs[] = {1, 3, 4, 8, 13};
+const std::vector<std::ptrdiff_t> kOffsets = {-300, -17, -1, 0, 2, 256, 301};
 
 TEST (FuseKernels, FiltersEqualTheReference)
 {
   const auto source = random_numbers (4096, 1);
-  const std::vector<std::ptrdiff_t> offsets = {-300, -17, -1, 0, 2, 256, 301};
-  for (const int period : {1, 3, 4, 8, 25}) {
-    for (const int outputs : {1, 3, 4, 8, 13}) {
+  for (const int period : kPeriods)
+    for (const int outputs : kOutputs) {
       const int width = period + 15;
       auto weights =
-          random_numbers (offsets.size () * std::size_t (outputs * width), 2);
-      for (std::size_t i = 0; i < weights.size (); i++)
-        if (i % std::size_t (width) >= std::size_t (period))
-          weights[i] = weights[i - std::size_t (period)];
-      const fuse::FilterRow row{source.data () + 1000, 77, offsets.data (),
-          int (offsets.size ()), weights.data (), width, outputs, period,
+          random_numbers (kOffsets.size () * std::size_t (outputs * width), 2);
+      repeat_rows (weights, width, period);
+      const fuse::FilterRow row{source.data () + 1000, kCount, kOffsets.data (),
+          int (kOffsets.size ()), weights.data (), width, outputs, period,
           period / 2};
-      std::vector<float> scale (256, 0.0f);
-      for (std::size_t x = 20; x < 60; x += 3)
-        scale[x] = 0.25f * float (x % 5);
+      const auto filtered = [&] (const fuse::Kernels &kernels) {
+        return outputs_of (outputs, kCount,
+            [&] (float *const *to) { kernels.filter (row, to); });
+      };
       for (const fuse::Kernels &kernels : fuse::supported_kernels ()) {
         SCOPED_TRACE (kernels.name);
-        EXPECT_EQ (outputs_of (kernels, row, nullptr),
-            outputs_of (kReference, row, nullptr));
-        EXPECT_EQ (outputs_of (kernels, row, &scale),
-            outputs_of (kReference, row, &scale));
+        EXPECT_EQ (filtered (kernels), filtered (kReference));
       }
     }
-  }
+}
+
+/* Pairs of 16 bits, the most negative values among them; @largest at most if it
+ * is not 0. */
+std::vector<std::int32_t>
+random_pairs (std::size_t count, int seed, int largest)
+{
+  std::mt19937 random{std::mt19937::result_type (seed)};
+  std::vector<std::int32_t> pairs;
+  const auto half = [&] {
+    const int value = int (random () % 65536) - 32768;
+    if (largest != 0)
+      return std::uint32_t (value % (largest + 1)) & 0xffff;
+    return std::uint32_t (random () % 4 == 0 ? -32768 : value) & 0xffff;
+  };
+  for (std::size_t i = 0; i < count; i++)
+    pairs.push_back (std::int32_t (half () << 16 | half ()));
+  return pairs;
+}
+
+TEST (FuseKernels, FiltersOfPairsEqualTheReference)
+{
+  const auto source = random_pairs (4096, 1, 0);
+  std::vector<float> share (256, 0.0f);
+  for (std::size_t x = 20; x < 60; x += 3)
+    share[x] = 0.25f * float (x % 5);
+  for (const int period : kPeriods)
+    for (const int outputs : kOutputs) {
+      const int width = period + 15;
+      auto weights = random_pairs (
+          kOffsets.size () * std::size_t (outputs * width), 2, 4000);
+      auto scale = random_numbers (std::size_t (outputs * width), 3);
+      repeat_rows (weights, width, period);
+      repeat_rows (scale, width, period);
+      const fuse::PairRow row{source.data () + 1000, kCount, kOffsets.data (),
+          int (kOffsets.size ()), weights.data (), scale.data (), 127.5f, width,
+          outputs, period, period / 2};
+      const auto filtered = [&] (const fuse::Kernels &kernels, bool add) {
+        return outputs_of (outputs, kCount, [&] (float *const *to) {
+          if (add)
+            kernels.filter_pairs_add (row, share.data (), to);
+          else
+            kernels.filter_pairs_squared (row, to);
+        });
+      };
+      for (const fuse::Kernels &kernels : fuse::supported_kernels ())
+        for (const bool add : {false, true}) {
+          SCOPED_TRACE (kernels.name);
+          EXPECT_EQ (filtered (kernels, add), filtered (kReference, add));
+        }
+    }
 }
 
 TEST (FuseKernels, JoinedRowsEqualTheReference)
@@ -83,6 +141,85 @@ TEST (FuseKernels, JoinedRowsEqualTheReference)
       EXPECT_EQ (joined (kernels.sum), joined (kReference.sum));
       EXPECT_EQ (joined (kernels.max), joined (kReference.max));
     }
+  }
+}
+
+/* Numbers in 0 .. 100. */
+std::vector<float>
+random_magnitudes (int seed)
+{
+  auto numbers = random_numbers (kCount + 16, seed);
+  for (float &number : numbers)
+    number = std::abs (number);
+  return numbers;
+}
+
+/* All rows of light to @count values each, one after the other. */
+std::vector<float>
+rated (const fuse::Kernels &kernels)
+{
+  const auto light = random_numbers (kCount + 16, 1);
+  const auto other = random_numbers (kCount + 16, 2);
+  const auto slope = random_magnitudes (3), offset = random_magnitudes (4);
+  const auto frames = random_magnitudes (5);
+  std::vector<float> all;
+  std::vector<float> to (kCount + 16), more (to), third (to);
+  const auto add = [&] (const std::vector<float> &row) {
+    all.insert (all.end (), row.begin (), row.begin () + kCount);
+  };
+  for (const float *of :
+      {frames.data (), static_cast<const float *> (nullptr)}) {
+    kernels.compare ({light.data (), other.data (), slope.data (),
+                         offset.data (), of, 0.5f, kCount},
+        to.data ());
+    add (to);
+  }
+  kernels.rate ({slope.data (), offset.data (), frames.data (), 49.0f,
+                    {0.8f, 1.5f}, {25.0f, 70.0f}, kCount},
+      to.data ());
+  add (to);
+  kernels.fade_ratio (
+      slope.data (), offset.data (), 3.0f, {1.3f, 1.8f}, kCount, to.data ());
+  add (to);
+  kernels.prefer (
+      {slope.data (), offset.data (), 7.0f, 0.01f, kCount}, to.data ());
+  add (to);
+  for (const float *preference :
+      {slope.data (), static_cast<const float *> (nullptr)}) {
+    float *const shares[] = {more.data (), third.data ()};
+    kernels.share ({offset.data (), light.data (), preference, kCount},
+        to.data (), shares);
+    for (const auto &row : {to, more, third})
+      add (row);
+  }
+  return all;
+}
+
+/* The conversions of light to whole numbers, likewise. */
+std::vector<int>
+converted (const fuse::Kernels &kernels)
+{
+  const auto light = random_numbers (kCount + 16, 1);
+  std::vector<std::int32_t> steps (kCount + 32);
+  std::vector<std::uint8_t> bytes (kCount);
+  std::vector<std::uint16_t> words (kCount);
+  kernels.to_steps (light.data (), 900.0f, kCount, steps.data ());
+  std::vector<int> all (steps.begin (), steps.begin () + kCount);
+  kernels.pair (steps.data (), kCount);
+  all.insert (all.end (), steps.begin (), steps.begin () + kCount);
+  kernels.to_bytes (light.data (), 3.0f, 250.0f, kCount, bytes.data ());
+  kernels.to_words (light.data (), 800.0f, 65535.0f, kCount, words.data ());
+  all.insert (all.end (), bytes.begin (), bytes.end ());
+  all.insert (all.end (), words.begin (), words.end ());
+  return all;
+}
+
+TEST (FuseKernels, OperationsOnRowsEqualTheReference)
+{
+  for (const fuse::Kernels &kernels : fuse::supported_kernels ()) {
+    SCOPED_TRACE (kernels.name);
+    EXPECT_EQ (rated (kernels), rated (kReference));
+    EXPECT_EQ (converted (kernels), converted (kReference));
   }
 }
 

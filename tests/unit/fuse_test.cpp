@@ -155,13 +155,13 @@ TEST (Fuse, AllTargetsGiveTheSamePixels)
 TEST (Fuse, AnyNumberOfThreadsGivesTheSamePixels)
 {
   const Schedule schedule = schedule_of ("sequential:lattice:4/2");
-  const auto coded = take (schedule, 1, [] (int slot) {
+  const auto coded = take (schedule, 3, [] (int slot) {
     return draw (
         24, 160, [slot] (int x, int y) { return texture (x - slot, y); });
   });
-  for (const FuseQuality quality :
-      {FuseQuality::kBalanced, FuseQuality::kBest}) {
-    FuseOptions options = with_quality (quality);
+  for (const FuseQuality quality : kQualities) {
+    FuseOptions options = with_quality (quality, true);
+    options.lookahead = 1;
     options.threads = 1;
     const auto expected = fuse (coded, schedule, options);
     for (const int threads : {2, 3, 7}) {

@@ -2,6 +2,7 @@
 #include "bench/gige_camera.h"
 
 #include <algorithm>
+#include <bit>
 #include <chrono>
 #include <cmath>
 #include <iterator>
@@ -10,6 +11,7 @@
 #include <random>
 #include <sstream>
 #include <thread>
+#include <tuple>
 #include <vector>
 
 #include <arv.h>
@@ -117,10 +119,78 @@ line_choice (const std::string &name, const std::vector<std::string> &values,
           "<Endianess>BigEndian</Endianess></IntReg>\n");
 }
 
-/* The GenICam description: that of Aravis, with the formats and, if it has
- * @outputs, the lines of this camera. */
+/* Registers of features that Aravis' camera does not have. */
+struct ExtraFeature {
+  const char *name;
+  guint32 address;
+  std::vector<std::string> values; // of an enumeration; none: a number
+};
+
+const std::vector<ExtraFeature> &
+extra_features ()
+{
+  static const std::vector<ExtraFeature> features = {
+      {"SensorShutterMode", 0x500, {"Global", "Rolling"}},
+      {"PixelColorFilter", 0x504, {"None", "BayerRG"}},
+      {"TestPattern", 0x508, {"Off", "GreyHorizontalRamp"}},
+      {"GammaEnable", 0x50c, {"false", "true"}},
+      {"ExposureAuto", 0x510, {"Off", "Once", "Continuous"}},
+      {"BlackLevelAuto", 0x514, {"Off", "Once", "Continuous"}},
+      {"LUTEnable", 0x518, {"false", "true"}},
+  };
+  return features;
+}
+constexpr guint32 kGammaEnable = 0x50c, kGamma = 0x51c;
+
+std::string
+int_reg (const std::string &name, guint32 address)
+{
+  return "<IntReg Name=\"" + name + "\"><Address>" + std::to_string (address) +
+         "</Address><Length>4</Length><AccessMode>RW</AccessMode>"
+         "<pPort>Device</pPort><Sign>Unsigned</Sign>"
+         "<Endianess>BigEndian</Endianess></IntReg>\n";
+}
+
+/* Nodes of features by which a user can spoil the measurement of light. */
+std::string
+extra_nodes ()
+{
+  std::string text;
+  for (const ExtraFeature &feature : extra_features ()) {
+    const std::string name = feature.name;
+    const std::string node = int_reg (name + "Value", feature.address);
+    text += feature.values.front () == "false"
+                ? "<Boolean Name=\"" + name + "\"><pValue>" + name +
+                      "Value</pValue><OnValue>1</OnValue>"
+                      "<OffValue>0</OffValue></Boolean>\n" +
+                      node
+                : choice (name, feature.values, node);
+  }
+  text += "<Float Name=\"Gamma\"><pValue>GammaRegister</pValue><Min>0.1</Min>"
+          "<Max>4</Max></Float>\n<FloatReg Name=\"GammaRegister\"><Address>" +
+          std::to_string (kGamma) +
+          "</Address><Length>4</Length><AccessMode>RW</AccessMode>"
+          "<pPort>Device</pPort><Endianess>BigEndian</Endianess></FloatReg>\n";
+  for (const std::string side : {"Width", "Height"})
+    text += "<Integer Name=\"" + side + "Max\"><pValue>Sensor" + side +
+            "Register</pValue></Integer>\n";
+  return text + "<StringReg Name=\"DeviceSerialNumber\"><Address>0xd8</Address>"
+                "<Length>16</Length><AccessMode>RO</AccessMode>"
+                "<pPort>Device</pPort></StringReg>\n";
+}
+
+/* Whether the camera offers @format. */
+bool
+offers (const GigeCameraOptions &options, MonoFormat format)
+{
+  return options.features.empty () || options.deep ||
+         significant_bits (format) <= std::max (8, options.bits);
+}
+
+/* The GenICam description: that of Aravis, with formats, lines and features of
+ * this camera. */
 Result<std::string>
-describe (bool outputs)
+describe (const GigeCameraOptions &options)
 {
   const std::unique_ptr<ArvFakeCamera, Unref> model (
       arv_fake_camera_new ("model"));
@@ -130,7 +200,8 @@ describe (bool outputs)
 
   std::vector<std::pair<std::string, guint32>> formats;
   for (const WireFormat &wire : kWireFormats)
-    formats.emplace_back (mono_format_text (wire.format), wire.code);
+    if (offers (options, wire.format))
+      formats.emplace_back (mono_format_text (wire.format), wire.code);
   if (!set_entries (xml, "PixelFormat", formats) ||
       !set_entries (xml, "TriggerSource", {{"Line0", 0}, {"Line1", 1}}) ||
       !set_entries (
@@ -145,7 +216,9 @@ describe (bool outputs)
   const auto end = xml.rfind ("<Port Name");
   if (mode == xml.npos || end == xml.npos || mode > end)
     return Error{"the description of Aravis' fake camera lacks its trigger"};
-  if (outputs)
+  if (!options.features.empty ())
+    xml.insert (end, extra_nodes ());
+  if (options.outputs)
     xml.insert (end,
         line_selector () +
             line_choice ("LineMode", {"Input", "Output"}, kLineMode) +
@@ -248,8 +321,17 @@ struct SimulatedCamera final : public GigeCamera {
   }
 
   CameraSettings settings ();
+  struct Taken {
+    std::uint64_t frame = 0;
+    Nanoseconds device_time = 0;
+    Fault fault = {};
+  };
+
+  void set_features ();
   void tell_settings ();
+  std::optional<Taken> take ();
   void send (ArvBuffer *buffer);
+  void bend ();
   void set_loss (double part)
   {
     g_object_set (server.get (), "gvsp-lost-ratio", part, nullptr);
@@ -298,7 +380,8 @@ SimulatedCamera::take_light (MonoFormat format)
 {
   const double exposure =
       1e3 * get_register (ARV_FAKE_CAMERA_REGISTER_EXPOSURE_TIME_US);
-  const double light = std::min (1.0, exposure / period ());
+  const double light =
+      options.shoot ? 1.0 : std::min (1.0, exposure / period ());
   const int shift = significant_bits (format) - options.bits;
   if (light == 1.0 && shift == 0)
     return;
@@ -368,26 +451,55 @@ SimulatedCamera::obey (const Fault &fault, ArvBuffer *buffer, std::size_t size)
   hold_up (fault);
 }
 
+/* The next frame, its picture and what happens to it; none: there is none. */
+std::optional<SimulatedCamera::Taken>
+SimulatedCamera::take ()
+{
+  Taken taken;
+  bool lost = false;
+  if (options.shoot) {
+    const auto shot = options.shoot (picture.view ());
+    if (!shot)
+      return std::nullopt;
+    taken.frame = shot->number;
+    device_time = 1e9 + double (shot->begin) * (1 + options.drift * 1e-6);
+    lost = shot->lost;
+  }
+  const std::lock_guard guard (lock);
+  if (!options.shoot)
+    taken.frame = next;
+  next = taken.frame + 1;
+  taken.fault = lost ? Fault{Fault::Kind::lose} : faults.at (taken.frame);
+  taken.device_time = std::llround (device_time);
+  device_time += period () * (1 + options.drift * 1e-6);
+  return taken;
+}
+
 void
 SimulatedCamera::send (ArvBuffer *buffer)
 {
-  SentFrame sent;
-  {
-    const std::lock_guard guard (lock);
-    sent.frame = next++;
-    sent.fault = faults.at (sent.frame);
-  }
   tell_settings ();
+  SentFrame sent;
   sent.host_time = monotonic_now ();
-  sent.device_time = std::llround (device_time);
-  device_time += period () * (1 + options.drift * 1e-6);
+  const auto taken = take ();
+  if (!taken) {
+    set_loss (1);
+    return;
+  }
+  sent.frame = taken->frame;
+  sent.fault = taken->fault;
+  sent.device_time = taken->device_time;
 
   const MonoFormat format =
       format_of (get_register (ARV_FAKE_CAMERA_REGISTER_PIXEL_FORMAT));
   /* The buffer does not know its size before it is received. */
   const std::size_t size = arv_fake_camera_get_payload (camera);
   arv_buffer_set_timestamp (buffer, guint64 (sent.device_time));
-  if (expose (sent.frame, picture.view ())) {
+  /* Without a gap where the camera asked in vain. */
+  if (options.shoot)
+    arv_buffer_set_frame_id (buffer, sent.frame % 65535 + 1);
+  if (options.shoot || expose (sent.frame, picture.view ())) {
+    bend ();
     take_light (format);
     pack (format, int (get_register (ARV_FAKE_CAMERA_REGISTER_WIDTH)),
         int (get_register (ARV_FAKE_CAMERA_REGISTER_HEIGHT)));
@@ -396,6 +508,25 @@ SimulatedCamera::send (ArvBuffer *buffer)
     set_loss (1);
   if (options.sent)
     options.sent (sent);
+}
+
+/* Applies the camera's gamma. */
+void
+SimulatedCamera::bend ()
+{
+  if (options.features.empty () || get_register (kGammaEnable) == 0)
+    return;
+  const double gamma = std::bit_cast<float> (get_register (kGamma));
+  const int largest = (1 << options.bits) - 1;
+  std::vector<std::uint16_t> table;
+  for (int value = 0; value <= largest; value++)
+    table.push_back (std::uint16_t (
+        std::lround (largest * std::pow (double (value) / largest, gamma))));
+  for (int y = 0; y < picture.height (); y++)
+    for (int x = 0; x < picture.width (); x++) {
+      std::uint16_t &pixel = picture.at (x, y);
+      pixel = table[std::min<std::size_t> (pixel, std::size_t (largest))];
+    }
 }
 
 /* The server runs until it is destroyed, but no longer calls this object or
@@ -418,9 +549,9 @@ struct TemporaryFile {
 };
 
 Result<void>
-write_description (TemporaryFile &file, bool outputs)
+write_description (TemporaryFile &file, const GigeCameraOptions &options)
 {
-  ASSIGN_OR_RETURN (const std::string xml, describe (outputs));
+  ASSIGN_OR_RETURN (const std::string xml, describe (options));
   gchar *path = nullptr;
   const int descriptor =
       g_file_open_tmp ("codedexposure-XXXXXX.xml", &path, nullptr);
@@ -436,11 +567,48 @@ write_description (TemporaryFile &file, bool outputs)
   return {};
 }
 
+/* Those of the options that the camera has; others are for other cameras. */
+void
+SimulatedCamera::set_features ()
+{
+  const auto number = [this] (const char *name, double usual) {
+    const auto found = options.features.find (name);
+    return found == options.features.end ()
+               ? usual
+               : parse_real (found->second).value_or (usual);
+  };
+  const auto set = [this] (guint32 address, guint32 value) {
+    arv_fake_camera_write_register (camera, address, value);
+  };
+  for (const ExtraFeature &feature : extra_features ())
+    if (const auto found = options.features.find (feature.name);
+        found != options.features.end ()) {
+      const auto value = std::ranges::find (feature.values, found->second);
+      if (value != feature.values.end ())
+        set (feature.address, guint32 (value - feature.values.begin ()));
+    }
+  set (kGamma, std::bit_cast<guint32> (float (number ("Gamma", 1.0))));
+  const auto automatic = options.features.find ("GainAuto");
+  const bool on =
+      automatic != options.features.end () && automatic->second != "Off";
+  set (ARV_FAKE_CAMERA_REGISTER_GAIN_MODE, on ? 2 : 1);
+  const std::tuple<const char *, guint32, int> numbers[] = {
+      {"BinningHorizontal", ARV_FAKE_CAMERA_REGISTER_BINNING_HORIZONTAL, 1},
+      {"BinningVertical", ARV_FAKE_CAMERA_REGISTER_BINNING_VERTICAL, 1},
+      {"OffsetX", ARV_FAKE_CAMERA_REGISTER_X_OFFSET, 0},
+      {"OffsetY", ARV_FAKE_CAMERA_REGISTER_Y_OFFSET, 0},
+      {"WidthMax", ARV_FAKE_CAMERA_REGISTER_SENSOR_WIDTH, options.width},
+      {"HeightMax", ARV_FAKE_CAMERA_REGISTER_SENSOR_HEIGHT, options.height}};
+  if (!options.features.empty ())
+    for (const auto &[name, address, usual] : numbers)
+      set (address, guint32 (number (name, usual)));
+}
+
 Result<void>
 SimulatedCamera::start (GigeCameraOptions with, Expose light)
 {
   TemporaryFile description;
-  RETURN_IF_ERROR (write_description (description, with.outputs));
+  RETURN_IF_ERROR (write_description (description, with));
   options = std::move (with);
   expose = std::move (light);
   faults = options.faults;
@@ -464,6 +632,7 @@ SimulatedCamera::start (GigeCameraOptions with, Expose light)
       {ARV_FAKE_CAMERA_REGISTER_EXPOSURE_TIME_US, 10'000'000}};
   for (const auto &[address, value] : settings)
     arv_fake_camera_write_register (camera, address, value);
+  set_features ();
   arv_fake_camera_set_fill_pattern (
       camera,
       [] (ArvBuffer *buffer, void *self, guint32, guint32, ArvPixelFormat) {

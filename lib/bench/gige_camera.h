@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 
@@ -11,6 +12,7 @@
 #include "base/packed_mono.h"
 #include "base/result.h"
 #include "bench/fault_plan.h"
+#include "bench/sick_bench.h"
 #include "schedule/timing.h"
 
 namespace codedexposure
@@ -72,6 +74,15 @@ struct GigeCameraOptions {
   /** Whether it has the feature LineSelector, for lines that are outputs. */
   bool outputs = true;
   FaultPlan faults = {};
+  /** Settings of GenICam features that the camera has at first, by name. With
+   * any, it has those that a check of a camera looks at, and offers no pixel
+   * format of more than `bits` unless `deep` is set. */
+  std::map<std::string, std::string> features = {};
+  bool deep = false;
+  /** In place of Expose: the next exposure and its picture, with the light of
+   * its exposure time; none: there was none yet, and the camera asks again. */
+  std::function<std::optional<Shot> (ImageView<std::uint16_t> picture)> shoot =
+      {};
   /** Called on the camera's thread. */
   std::function<void (const SentFrame &)> sent = {};
   /** Called there before the first frame with other settings than before. */

@@ -317,6 +317,18 @@ SickBench::longest () const
   return period - options_.readout;
 }
 
+/** Of the next shot. A camera that exposes for too long always does. */
+Nanoseconds
+SickBench::exposed_time () const
+{
+  const Nanoseconds whole = options_.rate.period () - options_.readout;
+  const Nanoseconds asked =
+      exposure_ ? std::min (*exposure_, whole) : longest ();
+  if (exposure_ && options_.ends_early && longest () > whole)
+    return asked + longest () - whole;
+  return std::min (asked, longest ());
+}
+
 /** Mirrors of the view through a mask, those that are stuck included. */
 Image<float>
 SickBench::mirrors_of (const MirrorProgram::Mask &mask) const
@@ -505,8 +517,7 @@ SickBench::next (Nanoseconds until)
   Shot shot{.number = shots_++, .trigger = *trigger};
   const double jitter =
       options_.jitter * draw_normal (options_, kJitter, shot.number);
-  const Nanoseconds length =
-      exposure_ ? std::min (*exposure_, longest ()) : longest ();
+  const Nanoseconds length = exposed_time ();
   shot.begin =
       *trigger + std::max<Nanoseconds> (0, delay () + Nanoseconds (jitter));
   shot.end = shot.begin + length;

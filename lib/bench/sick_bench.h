@@ -111,6 +111,7 @@ private:
 
   Nanoseconds delay () const;
   Nanoseconds longest () const;
+  Nanoseconds exposed_time () const;
   std::optional<Nanoseconds> next_trigger (Nanoseconds until);
   const Shot &exposed_for (const Shot &shot) const;
   void add_light (const Shot &shot, const LightWindow &window,

@@ -100,7 +100,7 @@ camera_features (const SickBenchOptions &o)
       {"PixelColorFilter", choose ("colour", "BayerRG", "None")},
       {"TestPattern", choose ("test-image", "GreyHorizontalRamp", "Off")},
       {"GammaEnable", choose ("gamma", "true", "false")},
-      {"Gamma", real_text (o.gamma)},
+      {"Gamma", o.has ("gamma") ? o.parts.at ("gamma") : "1"},
       {"ExposureAuto", choose ("auto-exposure", "Continuous", "Off")},
       {"GainAuto", choose ("auto-gain", "Continuous", "Off")},
       {"BlackLevelAuto", choose ("black-clamp", "Continuous", "Off")},

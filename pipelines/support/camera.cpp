@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure-camera: an emulated GigE Vision camera that serves the coded
- * frames of a GStreamer pipeline. */
+ * frames of a GStreamer pipeline, or what a bench with an emulated DMD on the
+ * USB shows. */
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <iostream>
@@ -14,8 +16,12 @@
 #include <gst/app/gstappsink.h>
 #include <gst/gst.h>
 
+#include "base/text.h"
+#include "base/try.h"
 #include "bench/gige_camera.h"
+#include "bench/simulated_rig.h"
 #include "common/raii.h"
+#include "usb_board.h"
 
 using namespace codedexposure;
 using namespace codedexposure::gst;
@@ -28,6 +34,8 @@ struct Arguments {
   std::string pipeline;
   std::string faults;
   std::string jitter = "0";
+  std::string dmd;
+  std::string size = "768x576";
   int bits = 0;
   bool loop = false;
   bool log = false;
@@ -174,56 +182,150 @@ read_faults (GigeCamera &camera)
   }).detach ();
 }
 
-int
-serve (Arguments &arguments)
+/* Blocked before the thread of the camera starts, which inherits this. */
+sigset_t
+block_ends ()
 {
-  const auto jitter = parse_time (arguments.jitter);
-  const auto faults = arguments.camera.faults.add (arguments.faults);
-  auto frames = Frames::open (arguments.pipeline, arguments.loop);
-  if (!jitter || !faults || !frames) {
-    say (!jitter   ? jitter.error ().message
-         : !faults ? faults.error ().message
-                   : frames.error ().message);
-    return 1;
-  }
-  Frames &source = **frames;
-  GigeCameraOptions &options = arguments.camera;
-  options.jitter = *jitter;
-  options.width = source.info ().width;
-  options.height = source.info ().height;
-  options.bits = arguments.bits > 0  ? arguments.bits
-                 : source.is_wide () ? 16
-                                     : 8;
-  options.set_up = [] (const CameraSettings &settings) {
-    say ("sends " + camera_settings_text (settings));
-  };
-  if (arguments.log)
-    options.sent = log_frame;
-
-  /* Blocked before the thread of the camera starts, which inherits this. */
   sigset_t ends;
   sigemptyset (&ends);
   sigaddset (&ends, SIGINT);
   sigaddset (&ends, SIGTERM);
   pthread_sigmask (SIG_BLOCK, &ends, nullptr);
-  const auto camera = GigeCamera::open (
-      options, [&] (std::uint64_t, ImageView<std::uint16_t> picture) {
-        return source.take (picture);
-      });
-  if (!camera) {
-    say (camera.error ().message);
-    return 1;
-  }
+  return ends;
+}
+
+void
+say_serving (const GigeCameraOptions &options)
+{
   say ("serving " + std::to_string (options.width) + "x" +
        std::to_string (options.height) + " as Aravis-Fake-" + options.serial +
        " at " + options.address);
-  read_faults (**camera);
+}
+
+/* Coded frames of the pipeline. */
+Result<void>
+serve_pipeline (Arguments &arguments)
+{
+  GigeCameraOptions &options = arguments.camera;
+  RETURN_IF_ERROR (options.faults.add (arguments.faults));
+  ASSIGN_OR_RETURN (
+      const auto frames, Frames::open (arguments.pipeline, arguments.loop));
+  Frames &source = *frames;
+  options.width = source.info ().width;
+  options.height = source.info ().height;
+  options.bits = arguments.bits > 0  ? arguments.bits
+                 : source.is_wide () ? 16
+                                     : 8;
+  const sigset_t ends = block_ends ();
+  ASSIGN_OR_RETURN (const auto camera,
+      GigeCamera::open (
+          options, [&] (std::uint64_t, ImageView<std::uint16_t> picture) {
+            return source.take (picture);
+          }));
+  say_serving (options);
+  read_faults (*camera);
   const timespec moment{0, 100'000'000};
   while (!source.ended () && sigtimedwait (&ends, nullptr, &moment) < 0)
     ;
   if (source.ended ())
     say (source.why_ended ());
-  return 0;
+  return {};
+}
+
+/* Words with '@' are faults of frames; the others are of the bench. */
+Result<SickBenchOptions>
+bench_of (Arguments &arguments)
+{
+  std::string frames, bench;
+  for (const std::string_view word : split (arguments.faults, ' '))
+    (word.find ('@') == word.npos ? bench : frames) += std::string (word) + " ";
+  RETURN_IF_ERROR (arguments.camera.faults.add (frames));
+  const auto size = parse_size (arguments.size);
+  if (!size)
+    return Error{"size " + in_quotes (arguments.size) +
+                 " is not WIDTHxHEIGHT; write for example 256x192"};
+  SickBenchOptions options;
+  options.camera = *size;
+  options.rate = {
+      int (std::lround (arguments.camera.trigger_rate * 1000)), 1000};
+  options.bits = arguments.bits > 0 ? arguments.bits : 8;
+  options.seed = arguments.camera.seed;
+  RETURN_IF_ERROR (inflict (options, bench));
+  return options;
+}
+
+/* The camera's side of a bench. */
+void
+look_at (LiveBench &bench, GigeCameraOptions &camera)
+{
+  const SickBenchOptions &options = bench.truth ().options;
+  camera.width = options.camera.width;
+  camera.height = options.camera.height;
+  camera.bits = options.bits;
+  camera.packet_loss = std::max (camera.packet_loss, options.packet_loss);
+  camera.jitter = std::max (camera.jitter, options.frame_jitter);
+  camera.features = camera_features (options);
+  camera.deep = options.has ("pixel-format");
+  if (options.trigger == SickBenchOptions::Trigger::double_rate)
+    camera.trigger_rate *= 2;
+  camera.shoot = [&bench] (ImageView<std::uint16_t> picture) {
+    return bench.take (picture);
+  };
+  camera.set_up = [&bench, say_set_up = camera.set_up] (
+                      const CameraSettings &settings) {
+    const double period = 1e6 / settings.frame_rate;
+    bench.expose (settings.exposure_us < period
+                      ? std::optional (Nanoseconds (settings.exposure_us * 1e3))
+                      : std::nullopt);
+    say_set_up (settings);
+  };
+}
+
+/* What the board on the USB shows. */
+Result<void>
+serve_board (Arguments &arguments)
+{
+  ASSIGN_OR_RETURN (const int kind, board_kind (arguments.dmd));
+  ASSIGN_OR_RETURN (SickBenchOptions options, bench_of (arguments));
+  const bool dark = options.has ("camera-missing");
+  /* The camera bends its values itself. */
+  ASSIGN_OR_RETURN (
+      const auto bench, LiveBench::make (std::move (options), kind));
+  ASSIGN_OR_RETURN (const auto board, UsbBoard::plug (*bench));
+  look_at (*bench, arguments.camera);
+  const sigset_t ends = block_ends ();
+  std::unique_ptr<GigeCamera> camera;
+  if (!dark) {
+    ASSIGN_OR_RETURN (camera, GigeCamera::open (arguments.camera, {}));
+    read_faults (*camera);
+  }
+  say ("USB " + board->environment ());
+  say_serving (arguments.camera);
+  int signal = 0;
+  sigwait (&ends, &signal);
+  return {};
+}
+
+int
+serve (Arguments &arguments)
+{
+  const auto jitter = parse_time (arguments.jitter);
+  if (!jitter) {
+    say (jitter.error ().message);
+    return 1;
+  }
+  GigeCameraOptions &options = arguments.camera;
+  options.jitter = *jitter;
+  options.set_up = [] (const CameraSettings &settings) {
+    say ("sends " + camera_settings_text (settings));
+  };
+  if (arguments.log)
+    options.sent = log_frame;
+  const auto served = arguments.dmd.empty () ? serve_pipeline (arguments)
+                                             : serve_board (arguments);
+  if (!served)
+    say (served.error ().message);
+  return served ? 0 : 1;
 }
 
 } // namespace
@@ -238,8 +340,12 @@ main (int argc, char **argv)
                "Vision camera, one for each exposure of the camera. Faults can "
                "also be entered on standard input, such as lose@now:3."};
   app.add_option (
-         "pipeline", arguments.pipeline, "GStreamer pipeline description")
-      ->required ();
+      "pipeline", arguments.pipeline, "GStreamer pipeline description");
+  app.add_option ("--dmd", arguments.dmd,
+      "in place of a pipeline: the camera sees an emulated DMD, dlp6500 or "
+      "dlp5500, on an emulated USB");
+  app.add_option ("--size", arguments.size, "pixels of the camera, with --dmd")
+      ->capture_default_str ();
   app.add_option ("--address", camera.address, "address of the interface")
       ->capture_default_str ();
   app.add_option ("--serial", camera.serial, "serial number")
@@ -266,6 +372,14 @@ main (int argc, char **argv)
   app.add_flag ("--loop", arguments.loop, "restart the pipeline at its end");
   app.add_flag ("--log", arguments.log, "print a line of JSON for every frame");
   CLI11_PARSE (app, argc, argv);
+  if (arguments.faults == "help") {
+    std::fputs (fault_help ().c_str (), stdout);
+    return 0;
+  }
+  if (arguments.pipeline.empty () == arguments.dmd.empty ()) {
+    say ("give either a pipeline or --dmd");
+    return 1;
+  }
   const int result = serve (arguments);
   gst_deinit ();
   return result;

@@ -41,14 +41,14 @@ munge|authentication of that Slurm|tests
 gnuplot-nox|draws the figures of a report|report
 libgtest-dev|unit and element tests|tests
 libbenchmark-dev|benchmarks|tests
-libumockdev-dev|an emulated USB for the DMD tests|tests
+libumockdev-dev|an emulated USB, for a DMD in software|tests package
 libtiff-dev|decode to OME-TIFF|tests package
 libhdf5-dev|decode to HDF5|tests package
 python3-tifffile|reads OME-TIFF, to test it|tests
 python3-h5py|reads HDF5, to test it|tests
 libaravis-dev|the emulated camera, and aravissrc|tests package
 iproute2|the private network of the emulated camera|tests
-umockdev|an emulated USB for the DMD tests|tests
+umockdev|an emulated USB, for a DMD in software|tests package
 xvfb|a virtual screen for the window tests|tests
 xdotool|presses keys in the window tests|tests
 shellcheck|checks the scripts|tests

@@ -12,17 +12,18 @@
 #include "bench/bench.h"
 #include "camera_rig.h"
 #include "dmd/dmd.h"
-#include "emulated_dlpc900.h"
+#include "bench/emulated_dlpc900.h"
 #include "linked_elements.h"
 #include "mirrors.h"
 #include "screen.h"
-#include "usb_bed.h"
+#include "bench/usb_bed.h"
 
 namespace
 {
 
 using namespace codedexposure;
 using namespace codedexposure::test;
+using namespace codedexposure::emulated;
 
 const auto *const linked =
     ::testing::AddGlobalTestEnvironment (new LinkedElements);

@@ -8,10 +8,12 @@
 #include <map>
 #include <optional>
 
-#include "emulated_hid.h"
+#include "bench/emulated_hid.h"
 
 namespace codedexposure::test
 {
+
+using namespace emulated;
 
 class EmulatedDlpc350 : public EmulatedHid
 {

@@ -8,10 +8,12 @@
 #include <memory>
 
 #include "dmd/hid_link.h"
-#include "emulated_hid.h"
+#include "bench/emulated_hid.h"
 
 namespace codedexposure::test
 {
+
+using namespace emulated;
 
 class EmulatedPipe : public PacketPipe
 {

@@ -9,10 +9,11 @@
 #include "dmd/dlpc900_protocol.h"
 #include "hex.h"
 #include "mirrors.h"
-#include "spld_decoder.h"
+#include "bench/spld_decoder.h"
 
 using namespace codedexposure;
 using namespace codedexposure::test;
+using namespace codedexposure::emulated;
 
 namespace
 {

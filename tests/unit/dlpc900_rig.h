@@ -4,13 +4,15 @@
 
 #include <memory>
 
+#include "bench/emulated_dlpc900.h"
 #include "dmd/drivers.h"
 #include "dmd_rig.h"
-#include "emulated_dlpc900.h"
 #include "mirrors.h"
 
 namespace codedexposure::test
 {
+
+using namespace emulated;
 
 /* Types of boards, as they report them. */
 constexpr int kDlp6500 = 1, kDlp9000 = 2, kDlp5500 = 5;

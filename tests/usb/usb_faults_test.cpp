@@ -9,12 +9,13 @@
 #include <thread>
 
 #include "emulated_dlpc350.h"
-#include "emulated_dlpc900.h"
+#include "bench/emulated_dlpc900.h"
 #include "fault_life.h"
-#include "usb_bed.h"
+#include "bench/usb_bed.h"
 
 using namespace codedexposure;
 using namespace codedexposure::test;
+using namespace codedexposure::emulated;
 
 namespace
 {

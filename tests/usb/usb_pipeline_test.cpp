@@ -2,16 +2,17 @@
 /* dmdsync with a board on the USB in a pipeline: masks, cancelled uploads and a
  * board that is disconnected. */
 #include "emulated_dlpc350.h"
-#include "emulated_dlpc900.h"
+#include "bench/emulated_dlpc900.h"
 #include "mirrors.h"
 #include "sync_harness.h"
-#include "usb_bed.h"
+#include "bench/usb_bed.h"
 
 namespace
 {
 
 using namespace codedexposure;
 using namespace codedexposure::test;
+using namespace codedexposure::emulated;
 
 const auto *const linked =
     ::testing::AddGlobalTestEnvironment (new LinkedElements);

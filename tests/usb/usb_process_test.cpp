@@ -17,10 +17,11 @@
 #include <gtest/gtest.h>
 
 #include "emulated_dlpc350.h"
-#include "emulated_dlpc900.h"
-#include "usb_bed.h"
+#include "bench/emulated_dlpc900.h"
+#include "bench/usb_bed.h"
 
 using namespace codedexposure::test;
+using namespace codedexposure::emulated;
 
 namespace
 {

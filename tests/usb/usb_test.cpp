@@ -8,12 +8,13 @@
 #include "dmd/usb_bus.h"
 #include "dmd_rig.h"
 #include "emulated_dlpc350.h"
-#include "emulated_dlpc900.h"
+#include "bench/emulated_dlpc900.h"
 #include "mirrors.h"
-#include "usb_bed.h"
+#include "bench/usb_bed.h"
 
 using namespace codedexposure;
 using namespace codedexposure::test;
+using namespace codedexposure::emulated;
 
 namespace
 {

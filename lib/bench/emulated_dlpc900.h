@@ -6,13 +6,15 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 #include <map>
 #include <optional>
 
-#include "emulated_hid.h"
-#include "spld_decoder.h"
+#include "base/geometry.h"
+#include "bench/emulated_hid.h"
+#include "bench/spld_decoder.h"
 
-namespace codedexposure::test
+namespace codedexposure::emulated
 {
 
 class EmulatedDlpc900 : public EmulatedHid
@@ -29,6 +31,9 @@ public:
   /** @p type  1: DLP6500, 2: DLP9000 with two controllers, 5: DLP5500. */
   explicit EmulatedDlpc900 (int type = 1) : type_ (type) {}
 
+  /** Called after its patterns were started or stopped. */
+  std::function<void (bool running)> on_run = {};
+
   bool firmware_has_minima = true;
   int firmware_major = 6, firmware_minor = 0;
 
@@ -37,6 +42,7 @@ public:
   int park_cycles () const { return park_cycles_; }
   int images_received () const { return images_received_; }
   bool dual () const { return type_ == 2; }
+  Extent size () const { return {width (), height ()}; }
 
   /** Loses its power and restarts, without a mode and without masks. */
   void power_cycle ()
@@ -303,10 +309,16 @@ private:
 
   int run (int what)
   {
-    if (what != 2) {
+    const int error = what == 2 ? start () : 0;
+    if (what != 2)
       running_ = false;
-      return 0;
-    }
+    if (error == 0 && on_run)
+      on_run (running_);
+    return error;
+  }
+
+  int start ()
+  {
     if (mode_ != 3 || !configured_ || idle_ || order_.empty ())
       return kNotNow;
     for (const auto &[index, line] : lines_) {
@@ -343,4 +355,4 @@ private:
   std::array<std::map<int, Pixels>, 2> images_;
 };
 
-} // namespace codedexposure::test
+} // namespace codedexposure::emulated

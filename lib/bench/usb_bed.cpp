@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-#include "usb_bed.h"
+#include "bench/usb_bed.h"
 
 #include <linux/usbdevice_fs.h>
 #include <sys/ioctl.h>
@@ -17,7 +17,7 @@
 #include <utility>
 #include <vector>
 
-namespace codedexposure::test
+namespace codedexposure::emulated
 {
 
 namespace
@@ -451,8 +451,12 @@ UsbBed::UsbBed () : bed_ (umockdev_testbed_new ()) {}
 
 UsbBed::~UsbBed ()
 {
-  while (!ports_.empty ())
-    unplug (ports_.begin ()->first);
+  /* No event tells of it: without the library that is preloaded, this process
+   * has none. */
+  for (const auto &[name, port] : ports_) {
+    port->pull ();
+    umockdev_testbed_detach_ioctl (bed_, port->node.c_str (), nullptr);
+  }
   g_object_unref (bed_);
 }
 
@@ -534,4 +538,4 @@ UsbBed::occupy (const std::string &port)
   ports_.at (port)->occupy ();
 }
 
-} // namespace codedexposure::test
+} // namespace codedexposure::emulated

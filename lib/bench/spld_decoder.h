@@ -10,7 +10,7 @@
 
 #include "base/image.h"
 
-namespace codedexposure::test
+namespace codedexposure::emulated
 {
 
 using Pixels = Image<std::uint32_t>;
@@ -148,4 +148,4 @@ decode_spld (const std::vector<std::uint8_t> &bytes)
   return in.failed () ? std::nullopt : std::optional (image);
 }
 
-} // namespace codedexposure::test
+} // namespace codedexposure::emulated

@@ -11,9 +11,9 @@
 
 #include <umockdev.h>
 
-#include "emulated_hid.h"
+#include "bench/emulated_hid.h"
 
-namespace codedexposure::test
+namespace codedexposure::emulated
 {
 
 class UsbPort;
@@ -60,4 +60,4 @@ private:
   std::vector<std::unique_ptr<UsbPort>> pulled_;
 };
 
-} // namespace codedexposure::test
+} // namespace codedexposure::emulated

@@ -9,7 +9,7 @@
 #include <optional>
 #include <vector>
 
-namespace codedexposure::test
+namespace codedexposure::emulated
 {
 
 using Packet = std::vector<std::uint8_t>;
@@ -184,4 +184,4 @@ private:
   bool hesitates_ = false;
 };
 
-} // namespace codedexposure::test
+} // namespace codedexposure::emulated

@@ -3,11 +3,12 @@
 #include "doctor/chessboard.h"
 
 #include <algorithm>
+#include <cmath>
+#include <optional>
 
 #ifdef HAVE_OPENCV
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
-#include <opencv2/imgproc.hpp>
 #endif
 
 namespace codedexposure
@@ -35,6 +36,77 @@ Chessboard::mask () const
       .on = [board = *this] (int x, int y) { return board.on (x, y); }};
 }
 
+namespace
+{
+
+/* A line: place = at + slope * along, by least squares. */
+class EdgeLine
+{
+public:
+  void add (double along, double place)
+  {
+    n_++;
+    s_ += along;
+    ss_ += along * along;
+    p_ += place;
+    sp_ += along * place;
+  }
+  bool known () const { return n_ >= 4.0 && n_ * ss_ - s_ * s_ > 0.0; }
+  double slope () const { return (n_ * sp_ - s_ * p_) / (n_ * ss_ - s_ * s_); }
+  double at () const { return (p_ - slope () * s_) / n_; }
+
+private:
+  double n_ = 0.0, s_ = 0.0, ss_ = 0.0, p_ = 0.0, sp_ = 0.0;
+};
+
+/* Where an edge crosses @count values, from the middle of the first one on, in
+ * pixels. Pixels integrate light without gaps: the sum tells it exactly. */
+template <typename Light>
+std::optional<double>
+edge_in (int count, Light light)
+{
+  const double first = 0.5 * (light (0) + light (1));
+  const double last = 0.5 * (light (count - 1) + light (count - 2));
+  if (std::abs (first - last) < 0.3)
+    return std::nullopt;
+  double sum = 0.0;
+  for (int i = 0; i < count; i++)
+    sum += light (i) - last;
+  return sum / (first - last) - 0.5;
+}
+
+} // namespace
+
+Position
+refine_corner (const Image<float> &light, Position corner, double side)
+{
+  constexpr int kNear = 2; // where both edges mix
+  const int half = std::clamp (int (0.5 * side) - 2, kNear + 1, 10);
+  const int cx = int (std::lround (corner.x));
+  const int cy = int (std::lround (corner.y));
+  if (cx < half || cy < half || cx >= light.width () - half ||
+      cy >= light.height () - half)
+    return corner;
+  EdgeLine upright, level; // x over y, and y over x, from (cx, cy) on
+  for (int d = -half; d <= half; d++) {
+    if (std::abs (d) < kNear)
+      continue;
+    if (const auto x = edge_in (2 * half + 1,
+            [&] (int i) { return double (light.at (cx - half + i, cy + d)); }))
+      upright.add (d, *x - half);
+    if (const auto y = edge_in (2 * half + 1,
+            [&] (int i) { return double (light.at (cx + d, cy - half + i)); }))
+      level.add (d, *y - half);
+  }
+  if (!upright.known () || !level.known ())
+    return corner;
+  const double x = (upright.at () + upright.slope () * level.at ()) /
+                   (1.0 - upright.slope () * level.slope ());
+  const double y = level.at () + level.slope () * x;
+  const bool near = std::hypot (cx + x - corner.x, cy + y - corner.y) < 1.5;
+  return near ? Position{cx + x, cy + y} : corner;
+}
+
 #ifdef HAVE_OPENCV
 
 bool
@@ -55,11 +127,6 @@ try {
           cv::CALIB_CB_NORMALIZE_IMAGE);
   if (!found)
     return Error{"the chessboard is not seen as a whole"};
-  /* Half the side of the window that refines a corner, pixels. */
-  const int half = std::clamp (
-      std::min (picture.width / columns, picture.height / rows) / 3, 2, 8);
-  cv::cornerSubPix (mat, corners, cv::Size (half, half), cv::Size (-1, -1),
-      {cv::TermCriteria::EPS | cv::TermCriteria::COUNT, 50, 1e-4});
   std::vector<Position> places;
   for (const cv::Point2f &corner : corners)
     places.push_back ({double (corner.x), double (corner.y)});

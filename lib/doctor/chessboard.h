@@ -35,6 +35,14 @@ struct Chessboard {
 Result<std::vector<Position>> find_corners (
     ImageView<const std::uint8_t> picture, int columns, int rows);
 
+/**
+ * A corner from the edges that cross there, without a bias by the pixels' size.
+ *
+ * @p light: 0 to 1. @p corner: to a pixel. @p side: of a square, pixels.
+ */
+Position refine_corner (
+    const Image<float> &light, Position corner, double side);
+
 /** Those of @p pairs that a projection explains (RANSAC), to @p tolerance
  * mirrors. */
 std::vector<PlacePair> without_outliers (

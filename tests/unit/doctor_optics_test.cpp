@@ -38,11 +38,15 @@ TEST (OpticsCheck, NumbersOfHealthyBenchesAreThoseInjected)
     EXPECT_EQ (value_of (e, "pixels that see a mirror"), 100.0);
     if (!has_chessboard ())
       continue;
-    EXPECT_LT (value_of (e, "chessboard against gratings"), 0.15);
-    EXPECT_NEAR (
-        value_of (e, "rotation, chessboard"), truth.alignment.rotation, 0.05);
-    EXPECT_NEAR (value_of (e, "magnification, chessboard"),
-        truth.alignment.scale, 0.001);
+    EXPECT_LT (value_of (e, "chessboard against gratings"), 0.06);
+    for (const auto &[name, exact] :
+        {std::pair{"rotation, chessboard", truth.alignment.rotation},
+            std::pair{"magnification, chessboard", truth.alignment.scale},
+            std::pair{"shift in x, chessboard", truth.alignment.shift_x},
+            std::pair{"shift in y, chessboard", truth.alignment.shift_y}}) {
+      const Measured found = e.finding.reading (name)->number;
+      EXPECT_NEAR (found.value, exact, 4 * found.sigma) << name;
+    }
   }
 }
 

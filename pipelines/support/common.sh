@@ -140,6 +140,7 @@ check_options ()
   check_option excerpt '[0-9]+(\.[0-9]+)?-([0-9]+(\.[0-9]+)?)?' \
     'FROM-UNTIL in seconds, such as 10-20 or 10-'
   check_option threads '[1-9]|[1-5][0-9]|6[0-4]' 'a number from 1 to 64'
+  check_option jobs '[1-9][0-9]{0,2}' 'a number from 1 to 999'
   check_option fuse 'fast|balanced|best' 'fast, balanced or best'
   check_option trigger 'dmd|camera|none' 'dmd, camera or none'
   check_option trigger-edge 'rising|falling' 'rising or falling'

@@ -12,6 +12,7 @@ from archive.store import (Problem, digest, fingerprint, read_json, write_json)
 
 OUTPUTS = {'mkv': 'pictures.mkv', 'png': 'pictures/'}
 NAMES = {'mkv': 'pictures.mkv', 'png': 'pictures'}
+TABLE = 'statistics.csv'
 DONE, DAMAGED, EMPTY = 0, 3, 4  # of decode
 ENGINE_NAMES = 'SLURM_ARRAY_JOB_ID', 'SLURM_ARRAY_TASK_ID', 'PARALLEL_SEQ'
 
@@ -24,6 +25,7 @@ def identity(plan, recording, chunk):
     """What a chunk's manifest must say to belong to the plan."""
     source = plan.recordings[recording]
     return {
+        'statistics': plan.statistics,
         'format': 'coded-exposure-archive-chunk', 'version': 1,
         'recording': source.path, 'recording_hash': source.fingerprint,
         'excerpt_ns': list(source.excerpt(chunk, plan.length)),
@@ -40,6 +42,8 @@ def command(plan, recording, chunk, scratch):
     words = [programs.DECODE, source.path, *plan.options,
              f'--threads={plan.threads}',
              f'--output={os.path.join(scratch, OUTPUTS[plan.form])}']
+    if plan.statistics:
+        words.append(f'--statistics={os.path.join(scratch, TABLE)}')
     if source.whole != 'it is cut off':
         stop = '' if stop is None else seconds(stop)
         words += [f'--excerpt={seconds(start)}-{stop}',
@@ -69,7 +73,9 @@ def decode(plan, recording, chunk, scratch):
     if status not in (DONE, DAMAGED, EMPTY):
         raise Problem(f'decode ended with status {status}')
     check_source(source)
-    names = [NAMES[plan.form]] if status != EMPTY else []
+    names = [NAMES[plan.form], *[TABLE] * plan.statistics]
+    if status == EMPTY:
+        names = []
     counts = {}
     path = os.path.join(scratch, 'ledger')
     if os.path.exists(path):

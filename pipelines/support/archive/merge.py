@@ -7,6 +7,7 @@ import subprocess
 
 from archive import chunk as chunks
 from archive import ledger, programs
+from archive.plan import table_of
 from archive.store import Problem, digest, read_json, sync, write_json
 
 TABLE = 'times.csv'
@@ -58,6 +59,20 @@ def join_videos(parts, output):
     return int(joined.stdout)
 
 
+def join_tables(parts, output):
+    """Tables with the same head."""
+    with open(output + '.part', 'w', encoding='utf-8') as table:
+        for i, part in enumerate(parts):
+            with open(part, encoding='utf-8') as lines:
+                head = lines.readline()
+                if i == 0:
+                    table.write(head)
+                shutil.copyfileobj(lines, table)
+        table.flush()
+        os.fsync(table.fileno())
+    os.replace(output + '.part', output)
+
+
 def join_pictures(parts, output):
     """Pictures have the numbers of the whole recording. Links take no room."""
     folder = output.rstrip('/')
@@ -65,26 +80,21 @@ def join_pictures(parts, output):
     shutil.rmtree(new, ignore_errors=True)
     os.makedirs(new)
     pictures = 0
-    with open(os.path.join(new, TABLE), 'w', encoding='utf-8') as table:
-        for i, part in enumerate(parts):
-            with open(os.path.join(part, TABLE), encoding='utf-8') as lines:
-                head = lines.readline()
-                if i == 0:
-                    table.write(head)
-                shutil.copyfileobj(lines, table)
-            for name in os.listdir(part):
-                if name == TABLE:
-                    continue
-                try:
-                    os.link(os.path.join(part, name), os.path.join(new, name))
-                except FileExistsError as error:
-                    raise Problem(f'{name} is in two chunks') from error
-                except OSError:  # a file system without links
-                    shutil.copyfile(os.path.join(part, name),
-                                    os.path.join(new, name))
-                    sync(os.path.join(new, name))
-                pictures += 1
-    sync(os.path.join(new, TABLE))
+    join_tables([os.path.join(part, TABLE) for part in parts],
+                os.path.join(new, TABLE))
+    for part in parts:
+        for name in os.listdir(part):
+            if name == TABLE:
+                continue
+            try:
+                os.link(os.path.join(part, name), os.path.join(new, name))
+            except FileExistsError as error:
+                raise Problem(f'{name} is in two chunks') from error
+            except OSError:  # a file system without links
+                shutil.copyfile(os.path.join(part, name),
+                                os.path.join(new, name))
+                sync(os.path.join(new, name))
+            pictures += 1
     shutil.rmtree(folder, ignore_errors=True)
     os.rename(new, folder)
     return pictures
@@ -103,15 +113,23 @@ def write_ledger(store, plan, recording):
     os.replace(path + '.part', path)
 
 
+def outputs_of(store, plan, recording):
+    """The paths of the pictures and of their statistics."""
+    output = os.path.join(store.folder, plan.recordings[recording].output)
+    return [output, *[table_of(output)] * plan.statistics]
+
+
 def merge(store, plan, recording):
     """Raises Problem."""
     source = plan.recordings[recording]
     manifests = check_chunks(store, plan, recording)
     sums = ledger.total([m['counts'] for m in manifests if m['counts']])
     name = chunks.NAMES[plan.form]
-    parts = [os.path.join(store.part(recording, number), name)
-             for number, m in enumerate(manifests) if name in m['outputs']]
-    output = os.path.join(store.folder, source.output)
+    def files(name):
+        return [os.path.join(store.part(recording, number), name)
+                for number, m in enumerate(manifests) if name in m['outputs']]
+    parts, outputs = files(name), outputs_of(store, plan, recording)
+    output = outputs[0]
     if not parts:
         raise Problem(f'{source.path} has no coded frame')
     os.makedirs(os.path.dirname(output.rstrip('/')), exist_ok=True)
@@ -121,13 +139,16 @@ def merge(store, plan, recording):
     if counted and pictures != sums['pictures']:
         raise Problem(f'{output} has {pictures} pictures, but its ledger '
                       f'{sums["pictures"]}')
+    if plan.statistics:
+        join_tables(files(chunks.TABLE), outputs[1])
     write_ledger(store, plan, recording)
     missing = max(0, source.recorded - sums['coded']) if counted else 0
     status = max(m['status'] % chunks.EMPTY for m in manifests)
     write_json(store.merged(recording), {
         'format': 'coded-exposure-archive-recording', 'version': 1,
         'recording': source.path, 'recording_hash': source.fingerprint,
-        'output': source.output, 'output_hash': digest(output),
+        'output': source.output,
+        'output_hashes': [digest(path) for path in outputs],
         'options': plan.options, 'program': plan.program, 'pictures': pictures,
         'counts': sums if counted else {},
         'missing': missing, 'status': chunks.DAMAGED if missing else status,
@@ -182,9 +203,12 @@ def verify(store, plan, recording):
     said = read_json(store.merged(recording))
     if said is None:
         raise Problem(f'{source.path} is not merged; see status')
-    if not os.path.exists(output) or digest(output) != said['output_hash']:
-        raise Problem(f'{output} is not what was merged; remove '
-                      f'{store.merged(recording)} and resume to merge it again')
+    for path, digested in zip(outputs_of(store, plan, recording),
+                              said['output_hashes']):
+        if not os.path.exists(path) or digest(path) != digested:
+            raise Problem(f'{path} is not what was merged; remove '
+                          f'{store.merged(recording)} and resume to merge it '
+                          'again')
     if not said['counts']:
         return said
     coded, pictures = ledger.read(store.ledger(recording))

@@ -151,6 +151,7 @@ class Plan:
     threads: int
     program: str         # name and version
     recordings: list
+    statistics: bool = False  # of each picture, in a table
     engine: dict = dataclasses.field(default_factory=dict)
 
     def __post_init__(self):
@@ -183,6 +184,11 @@ class Plan:
             'format', 'version')}
         fields['recordings'] = [Recording(**r) for r in fields['recordings']]
         return Plan(**fields)
+
+
+def table_of(output):
+    """The statistics beside an output."""
+    return os.path.splitext(output.rstrip('/'))[0] + '.csv'
 
 
 def make(words, lists, folder, form, length, threads, options, program):

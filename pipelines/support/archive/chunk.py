@@ -8,6 +8,7 @@ import subprocess
 import time
 
 from archive import ledger, programs
+from archive.plan import digest_of_options
 from archive.store import (Problem, digest, fingerprint, read_json, write_json)
 
 OUTPUTS = {'mkv': 'pictures.mkv', 'png': 'pictures/'}
@@ -56,6 +57,17 @@ def cpu_seconds():
     return usage.ru_utime + usage.ru_stime
 
 
+def check_program(plan):
+    """The plan's must be what runs here, so that no result is mixed."""
+    version = programs.version()
+    if version != plan.program:
+        raise Problem(f'this is {version}, but {plan.program} began the archive; '
+                      'install that on every node, or submit to a new folder')
+    if digest_of_options(plan.options) != plan.options_digest:
+        raise Problem('a file that an option of decode names was changed; put it '
+                      'back, or submit to a new folder')
+
+
 def check_source(source):
     if fingerprint(source.path) != source.fingerprint:
         raise Problem(f'{source.path} is not the file that was planned; put it '
@@ -66,6 +78,7 @@ def decode(plan, recording, chunk, scratch):
     """The manifest of a decoded chunk; raises Problem."""
     source = plan.recordings[recording]
     log = os.path.join(scratch, 'log')
+    check_program(plan)
     check_source(source)
     begun, cpu = time.time(), cpu_seconds()
     status = programs.run(command(plan, recording, chunk, scratch), log,

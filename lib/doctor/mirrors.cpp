@@ -18,6 +18,7 @@ namespace
 {
 
 constexpr int kFrames = 16;
+constexpr int kOffFrames = 24;             // of each exposure time
 constexpr Nanoseconds kShortest = 110'000; // of a slot
 constexpr double kFull = 0.002; // part of the values that may be the largest
 constexpr double kLeakWarn = 0.015, kLeakFail = 0.02;
@@ -92,8 +93,9 @@ MirrorRun::measure_leak ()
   const int pedestal =
       pedestal_for (fine, slot, gain, off.variance > 0.3 ? 1.0 : 0.0);
   ASSIGN_OR_RETURN (const OffLight found,
-      measure_off_light (examination_, fine, pedestal, defects_.good.view (),
-          off_.mean, light_parts (off_.mean, on_.mean, defects_.good.view ()),
+      measure_off_light (examination_, kOffFrames, fine, pedestal,
+          defects_.good.view (), off_.mean,
+          light_parts (off_.mean, on_.mean, defects_.good.view ()),
           pedestal * slot));
   /* Light with the mirrors on for all of the exposure. */
   const double whole = light / exposed_ + found.light.value;
@@ -129,7 +131,7 @@ MirrorRun::see_switching ()
   std::vector<SwitchPoint> points;
   const auto time = measure_switching (
       examination_, off_.mean, defects_.good.view (), points);
-  if (!time && time.error ().code == ErrorCode::invalid_argument) {
+  if (!time && time.error ().code == ErrorCode::unsupported) {
     finding_.notes.push_back ({"switching", time.error ().message});
     return {};
   }
@@ -249,7 +251,7 @@ MirrorRun::run ()
 Result<Finding>
 check_mirrors (Examination &examination)
 {
-  return MirrorRun (examination).run ();
+  return or_no_frames (MirrorRun (examination).run (), "mirrors");
 }
 
 } // namespace codedexposure

@@ -13,11 +13,10 @@ namespace codedexposure
 namespace
 {
 
-constexpr int kFrames = 24;
 /* The short exposure, of the frame period. */
 constexpr int kShorter = 5;
 /* Variance of the noise with which rounding can be undone, DN squared. */
-constexpr double kEnough = 0.2;
+constexpr double kEnough = 0.16;
 /* Error of a mean that is left where rounding was undone, and where not, DN. */
 constexpr double kUnrounded = 0.01, kRounded = 0.25;
 
@@ -55,8 +54,9 @@ pedestal_for (
 }
 
 Result<OffLight>
-measure_off_light (Examination &examination, const Examination::Lit &fine,
-    int pedestal, ImageView<const std::uint8_t> good, const Image<float> &dark,
+measure_off_light (Examination &examination, int frames,
+    const Examination::Lit &fine, int pedestal,
+    ImageView<const std::uint8_t> good, const Image<float> &dark,
     const std::vector<double> &parts, double pedestal_light)
 {
   Rig &rig = examination.rig;
@@ -70,12 +70,12 @@ measure_off_light (Examination &examination, const Examination::Lit &fine,
                              : double (period);
   OffLight found;
   ASSIGN_OR_RETURN (const Stack first,
-      look_at_light (examination, mask, fine.of, kFrames, weights));
+      look_at_light (examination, mask, fine.of, frames, weights));
   RETURN_IF_ERROR (rig.expose (shorter));
   /* The exposure time changes with a later frame than the mask. */
   RETURN_IF_ERROR (rig.watch (examination.lag));
   const auto second =
-      look_at_light (examination, mask, fine.of, kFrames, weights);
+      look_at_light (examination, mask, fine.of, frames, weights);
   RETURN_IF_ERROR (rig.expose (std::nullopt));
   RETURN_IF_ERROR (rig.watch (examination.lag));
   if (!second)
@@ -89,7 +89,7 @@ measure_off_light (Examination &examination, const Examination::Lit &fine,
   found.part = double (shorter) / longest;
   const double scale = 1.0 / (1.0 - found.part);
   const double flicker =
-      std::hypot (first.scatter, second->scatter) / std::sqrt (kFrames);
+      std::hypot (first.scatter, second->scatter) / std::sqrt (frames);
   found.light = {scale * (a.value - b.value),
       scale * std::hypot (std::hypot (a.sigma, b.sigma), flicker)};
   return found;

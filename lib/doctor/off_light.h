@@ -21,10 +21,11 @@ struct OffLight {
  * level does not. The @p pedestal is the same in both exposures: it gives
  * rounding the noise that it needs (0: none).
  *
- * @p fine: as of fine_slots (). @p good: pixels that count. @p parts: as of
- * light_parts (). @p pedestal_light: that of the pedestal, DN.
+ * @p frames: of each exposure time. @p fine: as of fine_slots (). @p good:
+ * pixels that count. @p parts: as of light_parts (). @p pedestal_light: that of
+ * the pedestal, DN.
  */
-Result<OffLight> measure_off_light (Examination &examination,
+Result<OffLight> measure_off_light (Examination &examination, int frames,
     const Examination::Lit &fine, int pedestal,
     ImageView<const std::uint8_t> good, const Image<float> &dark,
     const std::vector<double> &parts, double pedestal_light);

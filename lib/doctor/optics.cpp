@@ -106,8 +106,6 @@ OpticsRun::keep (const Pattern &pattern, const std::vector<SeenFrame> &frames)
   Image<float> mean;
   int count = 0;
   for (const SeenFrame &frame : frames) {
-    if (frame.damaged)
-      continue;
     const Image<std::uint16_t> &picture = frame.picture;
     if (!calibration_) {
       camera_ = {picture.width (), picture.height ()};
@@ -123,10 +121,6 @@ OpticsRun::keep (const Pattern &pattern, const std::vector<SeenFrame> &frames)
       for (int x = 0; x < camera_.width; x++)
         mean.at (x, y) += float (picture.at (x, y));
   }
-  if (count == 0)
-    return Error{"no complete frame shows the pattern " + pattern.text () +
-                     "; see the check of the trigger",
-        ErrorCode::timeout};
   for (int y = 0; y < camera_.height; y++)
     for (int x = 0; x < camera_.width; x++)
       mean.at (x, y) /= float (count);
@@ -147,7 +141,8 @@ OpticsRun::show_patterns ()
   for (const Pattern &pattern : calibration_patterns (mirrors_, kPeriod)) {
     const StillMask mask = {.name = pattern.text (),
         .on = [pattern] (int x, int y) { return pattern.on (x, y); }};
-    ASSIGN_OR_RETURN (const auto frames, look (examination_, mask, 1, kFrames));
+    ASSIGN_OR_RETURN (const auto frames,
+        look_for_whole_frames (examination_, mask, 1, kFrames));
     RETURN_IF_ERROR (keep (pattern, frames));
   }
   defects_ =
@@ -580,7 +575,7 @@ OpticsRun::run ()
 Result<Finding>
 check_optics (Examination &examination)
 {
-  return OpticsRun (examination).run ();
+  return or_no_frames (OpticsRun (examination).run (), "optics");
 }
 
 } // namespace codedexposure

@@ -143,12 +143,10 @@ fit_photon_transfer (const std::vector<TransferPoint> &points)
       2.0 * floor * found.conversion_gain.sigma / gain);
   found.read_variance = {gain * gain * floor, gain * gain * floor_sigma};
   const double read = std::sqrt (std::max (0.0, found.read_variance.value));
-  const double more = std::sqrt (
-      std::max (0.0, found.read_variance.value + found.read_variance.sigma));
+  const double least = std::sqrt (found.read_variance.sigma);
   found.read_noise = {read,
-      read > 0.0 ? std::min (0.5 * found.read_variance.sigma / read,
-                       std::max (more, std::sqrt (found.read_variance.sigma)))
-                 : more};
+      read > 0.0 ? std::min (0.5 * found.read_variance.sigma / read, least)
+                 : least};
   return found;
 }
 

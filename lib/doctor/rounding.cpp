@@ -25,15 +25,25 @@ below (double x)
   return 0.5 * std::erfc (-x / std::numbers::sqrt2);
 }
 
-Moments
-rounded_pixel (double mean, double sigma)
+/* Probability below z, by the series of Edgeworth. */
+double
+below (double z, double skewness)
 {
+  const double density =
+      std::exp (-0.5 * z * z) * std::numbers::inv_sqrtpi / std::numbers::sqrt2;
+  return below (z) - density * skewness / 6.0 * (z * z - 1.0);
+}
+
+Moments
+rounded_pixel (double mean, double sigma, double third)
+{
+  const double skewness = third / (sigma * sigma * sigma);
   const int first = std::max (0, int (std::floor (mean - 6 * sigma)));
   const int last = std::max (first, int (std::ceil (mean + 6 * sigma)));
   double sum = 0.0, squares = 0.0, before = 0.0;
   for (int value = first; value <= last; value++) {
     const double to =
-        value == last ? 1.0 : below ((value + 0.5 - mean) / sigma);
+        value == last ? 1.0 : below ((value + 0.5 - mean) / sigma, skewness);
     sum += value * (to - before);
     squares += (value - mean) * (value - mean) * (to - before);
     before = to;
@@ -43,12 +53,13 @@ rounded_pixel (double mean, double sigma)
 
 /* The exact mean that is rounded to @seen, by bisection. */
 double
-mean_behind (double seen, double variance, const Offsets &offsets)
+mean_behind (double seen, double variance, double third, const Offsets &offsets)
 {
   double low = seen - 2.0, high = seen + 1.0;
   for (int i = 0; i < kSteps; i++) {
     const double middle = 0.5 * (low + high);
-    (rounded ({middle, variance}, offsets).mean < seen ? low : high) = middle;
+    (rounded ({middle, variance, third}, offsets).mean < seen ? low : high) =
+        middle;
   }
   return 0.5 * (low + high);
 }
@@ -60,10 +71,10 @@ rounded (const Moments &exact, const Offsets &offsets)
 {
   const double sigma = std::sqrt (std::max (1e-12, exact.variance));
   if (offsets.empty ())
-    return rounded_pixel (exact.mean, sigma);
+    return rounded_pixel (exact.mean, sigma, exact.third);
   Moments sum = {};
   for (const double offset : offsets) {
-    const Moments one = rounded_pixel (exact.mean + offset, sigma);
+    const Moments one = rounded_pixel (exact.mean + offset, sigma, exact.third);
     sum.mean += one.mean;
     sum.variance += one.variance;
   }
@@ -72,14 +83,14 @@ rounded (const Moments &exact, const Offsets &offsets)
 }
 
 std::optional<Moments>
-unrounded (const Moments &seen, const Offsets &offsets)
+unrounded (const Moments &seen, const Offsets &offsets, double third)
 {
   if (seen.variance > kSmooth && seen.mean > 6 * std::sqrt (seen.variance))
     return Moments{seen.mean, seen.variance - kRounding};
   double low = kHidden, high = seen.variance + 1.0;
   const auto excess = [&] (double variance) {
-    const double mean = mean_behind (seen.mean, variance, offsets);
-    return rounded ({mean, variance}, offsets).variance - seen.variance;
+    const double mean = mean_behind (seen.mean, variance, third, offsets);
+    return rounded ({mean, variance, third}, offsets).variance - seen.variance;
   };
   if (excess (low) > 0.0 || excess (high) < 0.0)
     return std::nullopt;
@@ -88,7 +99,7 @@ unrounded (const Moments &seen, const Offsets &offsets)
     (excess (middle) < 0.0 ? low : high) = middle;
   }
   const double variance = 0.5 * (low + high);
-  return Moments{mean_behind (seen.mean, variance, offsets), variance};
+  return Moments{mean_behind (seen.mean, variance, third, offsets), variance};
 }
 
 } // namespace codedexposure

@@ -13,19 +13,23 @@ struct Moments {
   double mean = 0.0;
   /** Over time, the mean of that of the pixels. */
   double variance = 0.0;
+  /** Third central moment over time; that of photons is their variance, in
+   * electrons. */
+  double third = 0.0;
 };
 
 /** Differences of the pixels' means from their common mean, DN: equally many
  * pixels have each. Empty: there are none. */
 using Offsets = std::vector<double>;
 
-/** What rounding makes of Gaussian noise. */
+/** What rounding makes of almost Gaussian noise; without the third moment. */
 Moments rounded (const Moments &exact, const Offsets &offsets);
 
 /**
  * The inverse of rounded (). None where the noise is too small for that: less
- * than 0.35 DN, which rounding hides.
+ * than 0.35 DN, which rounding hides. @p third: moment before rounding.
  */
-std::optional<Moments> unrounded (const Moments &seen, const Offsets &offsets);
+std::optional<Moments> unrounded (
+    const Moments &seen, const Offsets &offsets, double third = 0.0);
 
 } // namespace codedexposure

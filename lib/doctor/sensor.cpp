@@ -21,6 +21,7 @@ namespace
 
 constexpr int kFrames = 16;         // of a level
 constexpr int kDarkFrames = 24;     // of the dark
+constexpr int kManyFrames = 64;     // where rounding hides read noise
 constexpr int kReferenceFrames = 6; // of the level that shows drift
 constexpr int kLevelsPerReference = 4;
 /* Slots are at least that long: masks of DLPC900 take 105 us. */
@@ -32,12 +33,16 @@ constexpr std::array kLevels = {
 constexpr double kFull = 0.001;
 /* Errors of levels, relative: light that the model does not know of. */
 constexpr double kLightError = 0.001, kVarianceError = 0.004;
+/* Error of a variance where rounding was undone, DN^2. */
+constexpr double kUnroundedError = 0.0007;
 /* Part of the values that may be 0 there; noise is cut off otherwise. */
 constexpr double kZeros = 0.005;
 /* A gain with this relative error is not known. */
 constexpr double kUnknown = 0.2;
 /* Light below this part of the range is too little to measure noise. */
 constexpr double kDim = 0.15;
+/* Controllers count in microseconds: error of the time of a level, ns. */
+constexpr double kTimeError = 500;
 /* A variance below this part of the expected one is that of a full well. */
 constexpr double kFullWell = 0.4;
 
@@ -208,7 +213,8 @@ PhotonTransferRun::see_off ()
   pedestal_ =
       pedestal_for (fine_, slot, gain, dark_means_.variance > 0.3 ? 1.0 : 0.0);
   ASSIGN_OR_RETURN (
-      off_, measure_off_light (examination_, fine_, pedestal_,
+      off_, measure_off_light (examination_,
+                pedestal_ > 0 ? kManyFrames : kDarkFrames, fine_, pedestal_,
                 defects_.good.view (), dark_.mean, parts_, pedestal_ * slot));
   return {};
 }
@@ -218,20 +224,25 @@ PhotonTransferRun::point_of (
     const StackMeans &means, double slots, double scatter) const
 {
   const double light = std::max (0.0, signal (means));
-  const auto exact =
-      unrounded ({means.mean, means.variance}, offsets_of (parts_, light));
+  const double gain = transfer_ ? transfer_->conversion_gain.value : 0.0;
+  const auto exact = unrounded ({means.mean, means.variance},
+      offsets_of (parts_, light), gain > 0.0 ? light / (gain * gain) : 0.0);
   TransferPoint point = {slots, {means.mean, 0.0}};
   double rounding = spread_ * light > 0.5 ? 0.02 : 0.25;
   if (exact) {
     point.mean.value = exact->mean;
     rounding = 0.01;
     const double relative =
-        std::hypot (kVarianceError, std::sqrt (2.0 / means.values));
+        std::hypot (kVarianceError * (0.3 + light / largest_),
+            std::sqrt (2.0 / means.values));
     point.variance = Measured{exact->variance,
-        relative * (means.variance + (means.variance < 0.8 ? 0.1 : 0.0))};
+        std::hypot (kUnroundedError, relative * means.variance)};
   }
-  point.mean.sigma =
-      std::hypot (rounding, std::hypot (kLightError * light, scatter));
+  const double slot = transfer_ ? transfer_->slope : 0.0;
+  const double times = slot * kTimeError * fine_.of /
+                       double (examination_.rig.parts ().rate.period ());
+  point.mean.sigma = std::hypot (
+      std::hypot (rounding, times), std::hypot (kLightError * light, scatter));
   return point;
 }
 
@@ -272,6 +283,7 @@ PhotonTransferRun::evaluate ()
     if (!first)
       return false;
   }
+  transfer_ = first;
   transfer_ = fit_photon_transfer (points (off_.light.value / first->slope));
   if (!transfer_)
     return false;
@@ -476,7 +488,7 @@ PhotonTransferRun::run ()
 Result<Finding>
 check_sensor (Examination &examination)
 {
-  return PhotonTransferRun (examination).run ();
+  return or_no_frames (PhotonTransferRun (examination).run (), "sensor");
 }
 
 } // namespace codedexposure

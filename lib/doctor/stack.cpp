@@ -97,28 +97,50 @@ stack_of (
   return stack;
 }
 
+Result<std::vector<SeenFrame>>
+look_for_whole_frames (
+    Examination &examination, const StillMask &mask, int slots, int frames)
+{
+  constexpr int kTries = 5;
+  std::vector<SeenFrame> whole;
+  ASSIGN_OR_RETURN (auto seen, look (examination, mask, slots, frames));
+  for (int more = 1;; more++) {
+    for (SeenFrame &frame : seen)
+      if (!frame.damaged && int (whole.size ()) < frames &&
+          (whole.empty () || same_size (std::as_const (frame.picture).view (),
+                                 std::as_const (whole[0].picture).view ())))
+        whole.push_back (std::move (frame));
+    if (int (whole.size ()) == frames || seen.empty () || more == kTries)
+      break;
+    ASSIGN_OR_RETURN (seen, examination.rig.watch (frames));
+  }
+  if (int (whole.size ()) < std::max (1, frames / 2))
+    return Error{"only " + std::to_string (whole.size ()) + " of " +
+                     std::to_string (frames) + " frames came complete",
+        ErrorCode::timeout};
+  return whole;
+}
+
 Result<Stack>
 look_at_light (Examination &examination, const StillMask &mask, int slots,
     int frames, const Image<float> *dark)
 {
-  ASSIGN_OR_RETURN (auto seen, look (examination, mask, slots, frames));
-  const auto unusable = [&] (const SeenFrame &frame) {
-    return frame.damaged ||
-           frame.picture.width () != seen[0].picture.width () ||
-           frame.picture.height () != seen[0].picture.height () ||
-           (dark && (frame.picture.width () != dark->width () ||
-                        frame.picture.height () != dark->height ()));
-  };
-  std::vector<SeenFrame> good;
-  for (SeenFrame &frame : seen)
-    if (!unusable (frame))
-      good.push_back (frame);
-  if (int (good.size ()) < std::max (2, frames / 2))
-    return Error{"only " + std::to_string (good.size ()) + " of " +
-                     std::to_string (frames) +
-                     " frames came complete; see the check of the trigger",
-        ErrorCode::timeout};
-  return stack_of (good, largest_number (examination), dark);
+  ASSIGN_OR_RETURN (const auto seen,
+      look_for_whole_frames (examination, mask, slots, std::max (4, frames)));
+  if (dark && !same_size (seen[0].picture.view (), dark->view ()))
+    return Error{"the size of the frames has changed", ErrorCode::device};
+  return stack_of (seen, largest_number (examination), dark);
+}
+
+Result<Finding>
+or_no_frames (Result<Finding> finding, const std::string &name)
+{
+  if (finding || finding.error ().code != ErrorCode::timeout)
+    return finding;
+  Finding none{name, ""};
+  none.diagnoses.push_back ({"no-frames", Verdict::fail,
+      finding.error ().message, "run the checks of the parts and the trigger"});
+  return none;
 }
 
 StackMeans

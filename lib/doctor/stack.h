@@ -26,11 +26,14 @@ struct Stack {
   double scatter = 0.0;        ///< rms of the means of frames, DN
 };
 
+/** look () until there are as many frames without damage as asked for, or half
+ * as many after five times that time. Error with fewer. */
+Result<std::vector<SeenFrame>> look_for_whole_frames (
+    Examination &examination, const StillMask &mask, int slots, int frames);
+
 /**
- * look () whose frames are complete. Error when fewer than half of them come.
- *
- * @p dark  mean without light, so that common changes of light are in
- *          proportion to it; null: they are the same in each pixel.
+ * The same, put together. @p dark: mean without light, so that common changes
+ * of light are in proportion to it; null: they are the same in each pixel.
  */
 Result<Stack> look_at_light (Examination &examination, const StillMask &mask,
     int slots, int frames, const Image<float> *dark = nullptr);
@@ -61,6 +64,10 @@ StillMask no_light ();
  * least @p shortest long. */
 Examination::Lit fine_slots (
     const Examination &examination, Nanoseconds shortest);
+
+/** @p finding of check @p name; where frames do not come, a finding that says
+ * so in place of the error. */
+Result<Finding> or_no_frames (Result<Finding> finding, const std::string &name);
 
 /** The largest DN of the camera. */
 inline int

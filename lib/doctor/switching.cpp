@@ -16,6 +16,7 @@ namespace
 
 constexpr int kFrames = 6;
 constexpr Nanoseconds kStep = 25'000;      // of the places of a slot
+constexpr Nanoseconds kLeast = 110'000;    // of a mask, and of darkness
 constexpr Nanoseconds kBefore = 2'500'000; // of the light that all points have
 /* Of the moments at which mirrors go off, from the end of the exposure on. */
 constexpr Nanoseconds kMoments[] = {-1'500'000, -1'000'000, -700'000, -500'000,
@@ -97,6 +98,51 @@ fit_switching (const std::vector<SwitchPoint> &points)
   return {best * step, std::max (step, 0.5 * (high - low) * step)};
 }
 
+namespace
+{
+
+/* The mean of frames whose light goes off with slot @last. */
+Result<SwitchPoint>
+see_point (Examination &examination, const Examination::Lit &run,
+    const Image<float> &dark, ImageView<const std::uint8_t> good)
+{
+  ASSIGN_OR_RETURN (
+      const Stack stack, look_at_light (examination, lit (run.first, run.slots),
+                             run.of, kFrames, &dark));
+  const StackMeans means = means_of (stack, good);
+  /* Rounding is an error of the mean where there is little noise. */
+  const double noise =
+      std::max (0.0, means.variance - 1.0 / 12.0) + means.spread * means.spread;
+  const double rounding = 0.3 * std::exp (-20.0 * noise);
+  const double period = double (examination.rig.parts ().rate.period ());
+  return SwitchPoint{1e-9 * period * (run.first + run.slots) / run.of,
+      means.mean,
+      std::hypot (std::hypot (rounding, kLightError * means.mean),
+          stack.scatter / std::sqrt (kFrames))};
+}
+
+/* The points of all moments; @run begins with its slot. */
+Result<void>
+see_points (Examination &examination, Examination::Lit run, double end,
+    std::vector<SwitchPoint> &points, const Image<float> &dark,
+    ImageView<const std::uint8_t> good)
+{
+  const double period = double (examination.rig.parts ().rate.period ());
+  RETURN_IF_ERROR (examination.rig.watch (examination.lag));
+  for (const Nanoseconds moment : kMoments) {
+    const double time = end + double (moment);
+    run.slots = int (std::lround (time * run.of / period)) - run.first;
+    if (time > period - double (kLeast))
+      break;
+    ASSIGN_OR_RETURN (
+        const SwitchPoint point, see_point (examination, run, dark, good));
+    points.push_back (point);
+  }
+  return {};
+}
+
+} // namespace
+
 Result<Measured>
 measure_switching (Examination &examination, const Image<float> &dark,
     ImageView<const std::uint8_t> good, std::vector<SwitchPoint> &points)
@@ -111,32 +157,20 @@ measure_switching (Examination &examination, const Image<float> &dark,
                            ? examination.profile.trigger_delay->value
                            : 0.0;
   const double end = delay + 0.5 * double (period);
-  const int first = std::max (0, slot_at (end - double (kBefore)));
+  const int least = slot_at (double (kLeast)) + 1;
+  int first = slot_at (end - double (kBefore));
+  if (first < least)
+    first = 0;
+  if (slot_at (end + double (kMoments[0])) < first + least)
+    return Error{"The frame period is too short to see mirrors move.",
+        ErrorCode::unsupported};
 
   RETURN_IF_ERROR (rig.expose (period / 2));
-  RETURN_IF_ERROR (rig.watch (examination.lag));
-  for (const Nanoseconds moment : kMoments) {
-    const int last = slot_at (end + double (moment));
-    if (last <= first || last >= slots)
-      continue;
-    const auto stack = look_at_light (
-        examination, lit (first, last - first), slots, kFrames, &dark);
-    if (!stack)
-      return stack.error ();
-    const StackMeans means = means_of (*stack, good);
-    /* Rounding is an error of the mean where there is little noise. */
-    const double noise = std::max (0.0, means.variance - 1.0 / 12.0) +
-                         means.spread * means.spread;
-    const double rounding = 0.3 * std::exp (-20.0 * noise);
-    points.push_back (
-        {double (last) * double (period) / slots * 1e-9, means.mean,
-            std::hypot (std::hypot (rounding, kLightError * means.mean),
-                stack->scatter / std::sqrt (kFrames))});
-  }
+  Result<void> done =
+      see_points (examination, {first, 0, slots}, end, points, dark, good);
   RETURN_IF_ERROR (rig.expose (std::nullopt));
   RETURN_IF_ERROR (rig.watch (examination.lag));
-  if (points.size () < 8)
-    return Error{"the frame period is too short to see mirrors move"};
+  RETURN_IF_ERROR (done);
   return fit_switching (points);
 }
 

@@ -2,6 +2,7 @@
 /* One check of the doctor on a simulated bench, whose numbers are known. */
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <memory>
@@ -62,7 +63,12 @@ check_bench (const SickBenchOptions &options,
   done.rig = std::move (*rig);
   done.examination = std::make_unique<Examination> (Examination{*done.rig});
   done.examination->exhibits = false;
-  done.examination->inside = {1, 14, 16};
+  const double period = double (done.rig->parts ().rate.period ());
+  const double begin = done.truth ().trigger_delay->value;
+  const double end = begin + done.truth ().exposure->value;
+  const int first = int (std::ceil (begin * 16 / period));
+  done.examination->inside = {
+      first, std::min (16, int (std::floor (end * 16 / period))) - first, 16};
   done.examination->profile.exposure =
       Measured{done.truth ().exposure->value, 5e3};
   done.examination->profile.trigger_delay =

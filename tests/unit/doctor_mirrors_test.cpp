@@ -61,6 +61,24 @@ TEST (MirrorsCheck, LeavesOtherFaultsToOtherChecks)
         << words;
 }
 
+TEST (MirrorsCheck, WorksAtHighFrameRates)
+{
+  for (const int rate : {100, 200, 400}) {
+    SickBenchOptions options = healthy_bench (4);
+    options.rate = {rate, 1};
+    const CheckedBench e = check_bench (options, check_mirrors);
+    EXPECT_EQ (e.first_diagnosis (), "") << rate;
+    EXPECT_NEAR (e.found ().leak->value, e.truth ().leak->value, 0.0005);
+  }
+}
+
+TEST (MirrorsCheck, SaysThatFramesDoNotCome)
+{
+  EXPECT_EQ (check_bench (sick_bench (4, "no-trigger"), check_mirrors)
+                 .first_diagnosis (),
+      "no-frames");
+}
+
 TEST (MirrorsCheck, SaysHowTheCameraIsTurned)
 {
   for (const int turned : {90, 180, 270}) {

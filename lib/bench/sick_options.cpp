@@ -58,6 +58,11 @@ words_of_parts ()
 {
   const auto nothing = [] (Bench &, const Values &) {};
   return {
+      {"healthy", "SEED", "1", "all numbers drawn from those of good benches",
+          {{Range::Kind::whole, 0.0, 1e9}},
+          [] (Bench &b, const Values &v) {
+            b = random_healthy_bench (std::uint64_t (v[0]), b);
+          }},
       {"dmd-missing", "", "", "no board answers on the USB", {}, nothing},
       {"dmd-busy", "", "", "another program uses the board", {}, nothing},
       {"dmd-permission", "", "", "the user may not open the board", {},

@@ -355,6 +355,10 @@ TEST (SickBench, WordsAreCheckedAndAllOrNothing)
 
 TEST (SickBench, RandomBenchesAreMade)
 {
+  SickBenchOptions drawn;
+  ASSERT_TRUE (inflict (drawn, "healthy=7 leak=0.1").ok ());
+  EXPECT_EQ (drawn.full_well, random_healthy_bench (7).full_well);
+  EXPECT_EQ (drawn.leak, 0.1);
   for (std::uint64_t seed = 0; seed < 200; seed++) {
     SickBenchOptions like;
     like.bits = seed % 2 == 0 ? 8 : 12;

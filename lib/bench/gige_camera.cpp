@@ -315,8 +315,11 @@ struct SimulatedCamera final : public GigeCamera {
     if (get_register (kTriggerMode) != 1)
       return 1e3 * get_register (kPeriod);
     const double triggered = 1e9 / options.trigger_rate;
+    /* It asks for exposures more often than they come, so that it can make up
+     * for a delay. */
+    const double asked = options.shoot ? triggered / 4 : triggered;
     arv_fake_camera_write_register (
-        camera, kPeriod, guint32 (std::lround (triggered / 1e3)));
+        camera, kPeriod, guint32 (std::lround (asked / 1e3)));
     return triggered;
   }
 
@@ -329,6 +332,7 @@ struct SimulatedCamera final : public GigeCamera {
 
   void set_features ();
   void tell_settings ();
+  void tell_start (ArvBuffer *buffer);
   std::optional<Taken> take ();
   void send (ArvBuffer *buffer);
   void bend ();
@@ -475,10 +479,23 @@ SimulatedCamera::take ()
   return taken;
 }
 
+/* The server makes a new buffer when a client starts the camera. */
+void
+SimulatedCamera::tell_start (ArvBuffer *buffer)
+{
+  constexpr const char *kKnown = "codedexposure-known";
+  if (g_object_get_data (G_OBJECT (buffer), kKnown) != nullptr)
+    return;
+  g_object_set_data (G_OBJECT (buffer), kKnown, this);
+  if (options.started)
+    options.started ();
+}
+
 void
 SimulatedCamera::send (ArvBuffer *buffer)
 {
   tell_settings ();
+  tell_start (buffer);
   SentFrame sent;
   sent.host_time = monotonic_now ();
   const auto taken = take ();

@@ -85,6 +85,8 @@ struct GigeCameraOptions {
       {};
   /** Called on the camera's thread. */
   std::function<void (const SentFrame &)> sent = {};
+  /** Called there before the first frame since a client has started it. */
+  std::function<void ()> started = {};
   /** Called there before the first frame with other settings than before. */
   std::function<void (const CameraSettings &)> set_up = {};
 };

@@ -80,18 +80,13 @@ LiveBench::expose (std::optional<Nanoseconds> time)
   bench_.expose (time);
 }
 
-/** Nobody took frames for a while: there were none, as the camera was off. */
 void
-LiveBench::skip_unseen ()
+LiveBench::skip ()
 {
-  constexpr Nanoseconds kOff = 1'000'000'000;
-  const Nanoseconds time = now ();
-  if (time - asked_ > kOff) {
-    pending_.reset ();
-    while (bench_.next (time))
-      ;
-  }
-  asked_ = time;
+  const std::lock_guard guard (lock_);
+  pending_.reset ();
+  while (bench_.next (now ()))
+    ;
 }
 
 std::optional<Shot>

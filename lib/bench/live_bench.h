@@ -39,6 +39,9 @@ public:
   /** The exposure time of frames from now on; none: the longest. Thread-safe,
    * like take (). */
   void expose (std::optional<Nanoseconds> time);
+  /** The camera was off until now: what was triggered before is not exposed.
+   * Thread-safe, too. */
+  void skip ();
   /**
    * Waits for the end of the next exposure and takes its frame. Waits for two
    * frame periods at most, so that a camera can answer meanwhile; none if there
@@ -50,7 +53,6 @@ private:
   LiveBench (SickBench bench, int kind);
   Nanoseconds now () const;
   void follow (bool running);
-  void skip_unseen ();
 
   std::shared_ptr<emulated::EmulatedDlpc900> board_;
   const std::chrono::steady_clock::time_point began_;
@@ -59,7 +61,6 @@ private:
   std::condition_variable changed_;
   SickBench bench_;
   std::optional<Shot> pending_; // its exposure is not over
-  Nanoseconds asked_ = 0;       // last time for a frame
 };
 
 } // namespace codedexposure

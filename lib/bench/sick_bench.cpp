@@ -19,6 +19,8 @@ namespace
 /* Masks that frames may still show. */
 constexpr std::size_t kRemembered = 32;
 constexpr std::size_t kPast = 32;
+/* Pictures of masks that are kept. */
+constexpr std::size_t kPictures = 32;
 
 /* What a number is drawn for. */
 enum Purpose : std::uint32_t {
@@ -417,7 +419,7 @@ void
 SickBench::measure_field ()
 {
   const auto &[width, height] = options_.camera;
-  for (Image<float> *image : {&on_, &off_, &leaked_, &field_, &light_, &seen_})
+  for (Image<float> *image : {&on_, &off_, &leaked_, &field_, &light_})
     *image = Image<float> (width, height);
   std::vector<float> dust; // radii, pixels
   for (std::size_t i = 0; i < truth_.dust.size (); i++)
@@ -607,38 +609,61 @@ SickBench::collect (const Shot &shot)
     light_.at (dead.x, dead.y) = 0.0f;
 }
 
+/** The picture of a mask, which is kept while it is shown. */
+const Image<float> &
+SickBench::picture_of (const MirrorProgram::Mask &mask)
+{
+  const auto known = std::ranges::find (seen_, mask, &Seen::mask);
+  if (known != seen_.end ())
+    return known->picture;
+  if (seen_.size () >= kPictures)
+    seen_.pop_front ();
+  seen_.push_back ({mask, {}});
+  look (mirrors_of (mask), seen_.back ().picture);
+  return seen_.back ().picture;
+}
+
+/** One picture in place of those of many masks. */
+void
+SickBench::add_sum (const Passed &passed, double unit)
+{
+  Image<float> sum (view_.width, view_.height);
+  float all = 0.0f;
+  for (const auto &[mask, light] : passed.pictures) {
+    const Image<float> mirrors = mirrors_of (mask);
+    const float part = float (light / unit);
+    all += part;
+    for (int y = 0; y < sum.height (); y++)
+      for (int x = 0; x < sum.width (); x++)
+        sum.at (x, y) += part * mirrors.at (x, y);
+  }
+  Image<float> seen;
+  look (sum, seen);
+  add_picture (seen, all, 1.0f);
+}
+
+/** Adds @p light that leaks, and @p part of what is @p seen. */
+void
+SickBench::add_picture (const Image<float> &seen, float light, float part)
+{
+  for (int y = 0; y < light_.height (); y++) {
+    float *out = light_.view ().row (y);
+    const float *leaked = leaked_.view ().row (y);
+    const float *field = field_.view ().row (y);
+    const float *in = seen.view ().row (y);
+    for (int x = 0; x < light_.width (); x++)
+      out[x] += light * leaked[x] + part * field[x] * in[x];
+  }
+}
+
 void
 SickBench::add_pictures (const Passed &passed, double unit)
 {
-  double all = 0.0;
-  for (const auto &[mask, light] : passed.pictures)
-    all += light / unit;
-  double scale = 1.0;
-  if (passed.pictures.size () == 1) {
-    const auto &[mask, light] = *passed.pictures.begin ();
-    if (mask != known_)
-      look (mirrors_of (mask), seen_);
-    known_ = mask;
-    scale = light / unit;
-  } else {
-    Image<float> sum (view_.width, view_.height);
-    for (const auto &[mask, light] : passed.pictures) {
-      const Image<float> mirrors = mirrors_of (mask);
-      const float part = float (light / unit);
-      for (int y = 0; y < sum.height (); y++)
-        for (int x = 0; x < sum.width (); x++)
-          sum.at (x, y) += part * mirrors.at (x, y);
-    }
-    look (sum, seen_);
-    known_.reset ();
-  }
-  for (int y = 0; y < light_.height (); y++) {
-    float *light = light_.view ().row (y);
-    const float *leaked = leaked_.view ().row (y);
-    const float *field = field_.view ().row (y);
-    const float *seen = seen_.view ().row (y);
-    for (int x = 0; x < light_.width (); x++)
-      light[x] += float (all) * leaked[x] + float (scale) * field[x] * seen[x];
+  if (passed.pictures.size () > kPictures / 2)
+    return add_sum (passed, unit);
+  for (const auto &[mask, light] : passed.pictures) {
+    const float part = float (light / unit);
+    add_picture (picture_of (mask), part, part);
   }
 }
 

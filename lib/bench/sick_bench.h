@@ -117,6 +117,9 @@ private:
   void add_light (const Shot &shot, const LightWindow &window,
       const Shown &shown, Passed &passed) const;
   void collect (const Shot &shot);
+  const Image<float> &picture_of (const MirrorProgram::Mask &mask);
+  void add_picture (const Image<float> &seen, float light, float part);
+  void add_sum (const Passed &passed, double unit);
   void add_pictures (const Passed &passed, double unit);
   void read_out (const Shot &shot, ImageView<std::uint16_t> picture);
 
@@ -142,9 +145,12 @@ private:
    * on or off; what leaks; and for the light from its mirrors. */
   Image<float> on_, off_, leaked_, field_;
   Image<float> light_;
-  /* The picture of the mask of the last frame. */
-  MirrorProgram::Mask known_;
-  Image<float> seen_;
+  /* Pictures of the masks of the last frames. */
+  struct Seen {
+    MirrorProgram::Mask mask;
+    Image<float> picture;
+  };
+  std::deque<Seen> seen_;
   std::vector<HotPixel> hot_;
 };
 

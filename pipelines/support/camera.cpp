@@ -271,6 +271,7 @@ look_at (LiveBench &bench, GigeCameraOptions &camera)
   camera.shoot = [&bench] (ImageView<std::uint16_t> picture) {
     return bench.take (picture);
   };
+  camera.started = [&bench] { bench.skip (); };
   camera.set_up = [&bench, say_set_up = camera.set_up] (
                       const CameraSettings &settings) {
     const double period = 1e6 / settings.frame_rate;

@@ -1,0 +1,43 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Looks for a periodic part of light that was seen in short pieces; for this
+ * folder only. */
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "doctor/light_fit.h"
+
+namespace codedexposure
+{
+
+/** A time in which sample @p sample was lit and exposed, s. */
+struct LitTime {
+  int sample = 0;
+  double weight = 1.0;
+  double from = 0.0, until = 0.0;
+};
+
+struct LineSearch {
+  std::vector<LitTime> lit;
+  /** What remains of each sample without the line, in seconds of light times
+   * its weight. */
+  std::vector<double> residual;
+  /** What else may explain it, with the same weights: columns of the length of
+   * residual. */
+  std::vector<std::vector<double>> others;
+
+  /**
+   * The frequency in [@p slowest, @p fastest] Hz that explains most of the
+   * residual, once all else was fitted beside it.
+   *
+   * @p spectrum  if not null: the largest depth in each of kStretches parts of
+   *              the range, roughly.
+   */
+  LightLine strongest (double slowest, double fastest,
+      std::vector<Position> *spectrum = nullptr) const;
+
+  static constexpr int kStretches = 300;
+};
+
+} // namespace codedexposure

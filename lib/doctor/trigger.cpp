@@ -1,0 +1,614 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Check "trigger": when the camera exposes, and which frame that is. */
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <string>
+
+#include "base/text.h"
+#include "base/try.h"
+#include "doctor/checks.h"
+#include "doctor/level.h"
+#include "doctor/light_fit.h"
+
+namespace codedexposure
+{
+
+namespace
+{
+
+/* Stamps may differ from the frame rate by that part: clocks do by less. */
+constexpr double kRateError = 0.003;
+constexpr int kRateFrames = 25;
+/* More than the frames that are on their way when the mirrors are parked. */
+constexpr int kFramesInFlight = 10;
+constexpr int kChanges = 8, kFramesOfChange = 10;
+/* Slots of the walk: runs of one are long enough for a DMD. */
+constexpr double kShortestRun = 130e-6;
+constexpr int kFinestGrid = 256, kTiles = 8;
+constexpr int kCoarseFrames = 4, kFineFrames = 8;
+constexpr int kInsideLooks = 12, kInsideFrames = 6;
+/* Levels of one mask differ less, as part of the step to the other one. */
+constexpr double kSameLevel = 0.2;
+/* Mirrors move, and clocks tick, within that; s. */
+constexpr double kTicks = 2e-6;
+/* Light of all mirrors by which a run of an eighth can be measured, part of the
+ * range. */
+constexpr double kFaint = 0.05;
+
+/* Beyond these, a slot loses light that others do not; seconds. */
+constexpr double kLateWarn = 400e-6, kLateFail = 700e-6;
+constexpr double kShortWarn = 600e-6, kShortFail = 900e-6;
+constexpr double kJitterWarn = 25e-6, kJitterFail = 60e-6;
+/* A delay of that part of a period is that of a pulse, not of a setting. */
+constexpr double kEdge = 0.3;
+
+std::string
+us_text (double seconds)
+{
+  return std::to_string (std::lround (seconds * 1e6)) + " us";
+}
+
+/** Whether @p number is above @p limit, as far as it is known. */
+bool
+above (const Measured &number, double limit)
+{
+  return number.value - 2.0 * number.sigma > limit;
+}
+
+/** What shows when the exposure began, from the start of the frames. */
+struct Change {
+  std::optional<int> late = {}; ///< frames after the pause with the old mask
+  int old = 0;                  ///< frames after show () with the old mask
+  int lost = 0;                 ///< frames that did not come
+  bool mixed = false;           ///< the old mask came again after the new one
+};
+
+/** The check, step by step. A step returns false if those after it make no
+ * sense. */
+class TriggerCheck
+{
+public:
+  explicit TriggerCheck (Examination &examination)
+      : examination_ (examination), rig_ (examination.rig),
+        parts_ (rig_.parts ()),
+        period_ (1e-9 * double (parts_.rate.time_of (1000)) / 1000.0),
+        largest_ ((1 << parts_.bits) - 1)
+  {
+    const double fit = period_ / kShortestRun / kTiles;
+    grid_ = std::clamp (int (fit) * kTiles, kTiles, kFinestGrid);
+  }
+
+  Result<Finding> run ();
+
+private:
+  double slot () const { return period_ / grid_; }
+  double coarse (int tile) const { return period_ * tile / kTiles; }
+  void fail (const char *id, std::string cause, std::string remedy,
+      Verdict severity = Verdict::fail);
+  Result<bool> check_frames ();
+  Result<bool> check_parked (double ratio);
+  Result<bool> check_lag ();
+  Result<std::vector<SeenFrame>> change (bool all);
+  Change judge (const std::vector<SeenFrame> &seen, double before, double after,
+      Nanoseconds last) const;
+  void diagnose_lag (const std::vector<Change> &changes);
+  Result<void> sample (int first, int count, int exposure, int frames);
+  Result<void> sample_tiles (int exposure);
+  Result<void> sample_starts (double start, int exposure);
+  Result<void> sample_ends (double end, int exposure);
+  Result<void> sample_inside (const LightModel &guess);
+  Result<void> measure_exposure ();
+  void diagnose_exposure (const LightFit &fit);
+  void remember (
+      const LightFit &fit, const Measured &start, const Measured &length);
+
+  Examination &examination_;
+  Rig &rig_;
+  const RigParts &parts_;
+  double period_; // s
+  int largest_;
+  int grid_ = kTiles; // slots in a period
+  int step_ = 1;      // DN
+  Finding finding_{"trigger",
+      "all mirrors on in one part of the frame period after the other"};
+  Nanoseconds last_ = 0; // stamp of the last frame that came
+  std::vector<LightSample> samples_;
+};
+
+void
+TriggerCheck::fail (
+    const char *id, std::string cause, std::string remedy, Verdict severity)
+{
+  finding_.diagnoses.push_back (
+      {id, severity, std::move (cause), std::move (remedy)});
+}
+
+/** Whether frames come, and how many in a cycle. */
+Result<bool>
+TriggerCheck::check_frames ()
+{
+  ASSIGN_OR_RETURN (
+      const auto seen, look (examination_, lit (0, 1), 1, kRateFrames));
+  if (seen.size () < 2) {
+    finding_.readings.push_back ({"frames per cycle", {0.0, 0.0}, "", "1"});
+    fail ("no-trigger",
+        "the DMD runs, but " + std::string (seen.empty ()
+                                                ? "no frame comes"
+                                                : "only one frame came"),
+        "connect the trigger output of the DMD to the input that the camera's "
+        "TriggerSource names");
+    return false;
+  }
+  std::vector<double> steps;
+  std::uint16_t bits = 0;
+  for (std::size_t i = 0; i < seen.size (); i++) {
+    if (i > 0)
+      steps.push_back (1e-9 * double (seen[i].time - seen[i - 1].time));
+    if (!seen[i].damaged)
+      bits |= level_of (seen[i].picture.view (), largest_).bits_seen;
+  }
+  step_ = bits ? bits & -bits : 1;
+  last_ = seen.back ().time;
+  std::ranges::nth_element (
+      steps, steps.begin () + std::ptrdiff_t (steps.size () / 2));
+  const double step = std::max (steps[steps.size () / 2], 1e-9);
+  double frames = 0.0; // those that are lost included
+  for (std::size_t i = 1; i < seen.size (); i++)
+    frames +=
+        std::round (1e-9 * double (seen[i].time - seen[i - 1].time) / step);
+  const double ratio =
+      frames * period_ /
+      std::max (1e-9 * double (seen.back ().time - seen.front ().time), 1e-9);
+  finding_.readings.push_back ({"frames per cycle", {ratio, 0.0}, "", "1"});
+  return check_parked (ratio);
+}
+
+/** Frames of a camera that waits for the trigger end with it. */
+Result<bool>
+TriggerCheck::check_parked (double ratio)
+{
+  rig_.park ();
+  ASSIGN_OR_RETURN (const auto parked, rig_.watch (kFramesInFlight + 2));
+  const std::string rate = real_text (
+      std::round (ratio * parts_.rate.num / parts_.rate.den * 1e3) / 1e3);
+  if (int (parked.size ()) > kFramesInFlight)
+    fail ("free-running",
+        "frames come at " + rate +
+            " frames/s even when the DMD is parked: the camera does not wait "
+            "for the trigger",
+        "set TriggerMode=On, TriggerSelector=FrameStart and the TriggerSource "
+        "of the cable");
+  else if (std::abs (ratio - 0.5) < 0.1)
+    fail ("half-rate", "one frame comes for two triggers",
+        "shorten the exposure time of the camera, until exposure and readout "
+        "fit the frame period");
+  else if (std::abs (ratio - 2.0) < 0.4)
+    fail ("double-rate", "two frames come for each trigger",
+        "set TriggerActivation=RisingEdge, and the trigger divider to the "
+        "number of pulses in a cycle");
+  else if (std::abs (ratio - 1.0) > kRateError)
+    fail ("free-running",
+        "the frame rate is " + rate + " frames/s, not that of the trigger",
+        "set TriggerMode=On and the TriggerSource of the cable");
+  return finding_.diagnoses.empty ();
+}
+
+/** Shows all mirrors on in the whole period, or in one tile of the middle. */
+Result<std::vector<SeenFrame>>
+TriggerCheck::change (bool all)
+{
+  RETURN_IF_ERROR (
+      rig_.show (all ? lit (0, kTiles) : lit (kTiles / 2, 1), kTiles));
+  ASSIGN_OR_RETURN (auto seen, rig_.watch (kFramesOfChange));
+  std::erase_if (seen, &SeenFrame::damaged);
+  return seen;
+}
+
+/** @p before, @p after: levels of the masks. @p last: stamp of the frame before
+ * the change. */
+Change
+TriggerCheck::judge (const std::vector<SeenFrame> &seen, double before,
+    double after, Nanoseconds last) const
+{
+  const auto cycles = [this] (Nanoseconds a, Nanoseconds b) {
+    return std::lround (1e-9 * double (b - a) / period_);
+  };
+  // A show () leaves out a cycle at least; frames before that pause, the last
+  // of which may be cut short, are of the mask before.
+  std::size_t pause = 0;
+  long longest = 0;
+  for (std::size_t i = 0; i < seen.size (); i++) {
+    const long step = cycles (i > 0 ? seen[i - 1].time : last, seen[i].time);
+    if (step > longest) {
+      longest = step;
+      pause = i;
+    }
+  }
+  Change change{.old = int (pause)};
+  int late = 0;
+  bool turned = false;
+  for (std::size_t i = pause; i < seen.size (); i++) {
+    const double mean = level_of (seen[i].picture.view (), largest_).mean;
+    // A frame that was cut short lies between the masks, and is not new.
+    const bool is_old =
+        std::abs (mean - after) > kSameLevel * std::abs (before - after);
+    if (is_old) {
+      change.old = int (i) + 1;
+      change.mixed |= turned;
+    }
+    if (i > 0 && i != pause)
+      change.lost += int (cycles (seen[i - 1].time, seen[i].time)) - 1;
+    turned |= !is_old;
+    late += !turned;
+  }
+  if (longest >= 2)
+    change.late = late;
+  return change;
+}
+
+/** In which frame a new mask shows first. */
+Result<bool>
+TriggerCheck::check_lag ()
+{
+  double levels[2] = {};
+  std::vector<Change> changes;
+  for (int i = 0; i < kChanges + 2; i++) {
+    ASSIGN_OR_RETURN (const auto seen, change (i % 2 == 0));
+    if (seen.empty ()) {
+      fail ("no-trigger", "frames ended after a change of the mask",
+          "check the plugs of the trigger cable");
+      return false;
+    }
+    const Level level = level_of (seen.back ().picture.view (), largest_);
+    const double before = levels[(i + 1) % 2];
+    levels[i % 2] = level.mean;
+    if (i >= 2)
+      changes.push_back (judge (seen, before, level.mean, last_));
+    last_ = seen.back ().time;
+    if (i != 1)
+      continue;
+    const std::string range = " of " + std::to_string (largest_) + " DN";
+    if (level.saturated > 0.5) {
+      fail ("bright",
+          "an eighth of the frame period is enough light to saturate the "
+          "camera",
+          "reduce the light by 10 times or more");
+      return false;
+    }
+    if (levels[0] - levels[1] < kFaint * largest_) {
+      fail ("dark",
+          "all mirrors on instead of an eighth of the time add " +
+              real_text (std::round ((levels[0] - levels[1]) * 10.0) / 10.0) +
+              range,
+          "switch on the light, open the iris, and check that the camera sees "
+          "mirrors that are on");
+      return false;
+    }
+  }
+  diagnose_lag (changes);
+  return true;
+}
+
+void
+TriggerCheck::diagnose_lag (const std::vector<Change> &changes)
+{
+  int old = 1, lost = 0, number = 0;
+  bool mixed = false;
+  std::map<int, int> counts; // of changes by how late they are
+  double sum = 0.0;
+  for (const Change &change : changes) {
+    old = std::max (old, change.old);
+    lost += change.lost;
+    mixed |= change.mixed;
+    if (!change.late)
+      continue;
+    counts[*change.late]++;
+    sum += *change.late;
+    number++;
+  }
+  examination_.lag = old + 1;
+  if (number == 0)
+    return;
+  const auto usual = std::ranges::max_element (
+      counts, {}, [] (const auto &count) { return count.second; });
+  const int low = counts.begin ()->first, high = counts.rbegin ()->first;
+  finding_.readings.push_back (
+      {"lag", {sum / number, 0.5 * (high - low)}, "frames", "0"});
+  // A frame that is lost after the pause takes one from the count.
+  const int fewer = high == usual->first ? (lost > 0 ? 2 : 1) : 0;
+  if (mixed || number - usual->second > fewer)
+    fail ("frame-late-varies",
+        "a new mask shows " + std::to_string (low) + " to " +
+            std::to_string (high) +
+            " frames late: the camera or the network holds frames back",
+        "set StreamBufferHandlingMode=OldestFirst, and connect the camera "
+        "without a switch");
+  else if (usual->first > 0)
+    fail ("frame-late",
+        "every frame shows the mask of " + std::to_string (usual->first) +
+            (usual->first > 1 ? " frames" : " frame") + " before",
+        "switch off frame buffers of the camera, such as its burst or sequence "
+        "mode");
+}
+
+/** Frames with all mirrors on in slots [first, first + count). */
+Result<void>
+TriggerCheck::sample (int first, int count, int exposure, int frames)
+{
+  ASSIGN_OR_RETURN (
+      const auto seen, look (examination_, lit (first, count), grid_, frames));
+  for (const SeenFrame &frame : seen) {
+    if (frame.damaged)
+      continue;
+    const Level level = level_of (frame.picture.view (), largest_);
+    samples_.push_back (
+        {1e-9 * double (frame.time), first * slot (), (first + count) * slot (),
+            level.mean, rounding_doubt (level.noise, step_), exposure});
+  }
+  return {};
+}
+
+Result<void>
+TriggerCheck::sample_tiles (int exposure)
+{
+  const int count = grid_ / kTiles;
+  for (int tile = 0; tile < kTiles; tile++)
+    RETURN_IF_ERROR (sample (tile * count, count, exposure, kCoarseFrames));
+  return {};
+}
+
+/** Runs that begin before and after the exposure does. */
+Result<void>
+TriggerCheck::sample_starts (double start, int exposure)
+{
+  const int at = std::clamp (int (std::floor (start / slot ())), 0, grid_ - 1);
+  const int end = std::min (grid_, at + grid_ / kTiles);
+  for (const int aside : {-2, 0, 1, 2, 4})
+    if (const int first = std::max (at + aside, 0); first < end)
+      RETURN_IF_ERROR (sample (first, end - first, exposure, kFineFrames));
+  return {};
+}
+
+/** Runs that end before and after the exposure does. */
+Result<void>
+TriggerCheck::sample_ends (double end, int exposure)
+{
+  int at = int (std::lround (end / slot ())) % grid_;
+  if (at < grid_ / 16)
+    at = grid_; // a run that short has little light
+  const int first = std::max (at - grid_ / kTiles, 0);
+  for (const int aside : {-4, -2, -1, 0, 2})
+    if (const int until = at + aside; until > first && until <= grid_)
+      RETURN_IF_ERROR (sample (first, until - first, exposure, kFineFrames));
+  return {};
+}
+
+/** Runs here and there in the exposure, by which flicker shows. */
+Result<void>
+TriggerCheck::sample_inside (const LightModel &guess)
+{
+  using std::numbers::phi, std::numbers::sqrt2;
+  const auto part = [] (double number) { return number - std::floor (number); };
+  // The period after the start of the exposure, as far as a run can have it.
+  const int first = int (std::ceil (guess.start / slot ())) + 1;
+  const bool wraps = first > grid_ / 2;
+  const int from = wraps ? 0 : first;
+  const int room = (wraps ? first - 4 : grid_) - from;
+  for (int i = 1; i <= kInsideLooks; i++) {
+    const int count = int (grid_ * (1.0 + part (i * sqrt2)) / 16.0);
+    const int place = int (part (i * phi) * (room - count - 1));
+    RETURN_IF_ERROR (sample (from + place, count, 1, kInsideFrames));
+  }
+  return {};
+}
+
+/** Squares that remain where runs of one exposure are explained by a window,
+ * with the best gain and offset or with those of @p model. */
+double
+misfit (std::span<const LightSample> samples, int exposure,
+    const LightModel &window, LightModel *model)
+{
+  LightModel unit = window;
+  unit.gain = 1.0;
+  unit.offsets.assign (unit.lengths.size (), 0.0);
+  double n = 0.0, x = 0.0, y = 0.0, xx = 0.0, xy = 0.0;
+  for (const LightSample &sample : samples) {
+    if (sample.exposure != exposure)
+      continue;
+    const double seconds = unit.light (sample);
+    n += 1.0;
+    x += seconds;
+    y += sample.light;
+    xx += seconds * seconds;
+    xy += seconds * sample.light;
+  }
+  if (model) {
+    const double spread = n * xx - x * x;
+    unit.gain =
+        spread > 1e-12 * n * xx ? std::max (0.0, (n * xy - x * y) / spread) : 0;
+    unit.offsets.assign (unit.lengths.size (), (y - unit.gain * x) / n);
+    *model = unit;
+  } else {
+    unit = window;
+  }
+  double squares = 0.0;
+  for (const LightSample &sample : samples)
+    if (sample.exposure == exposure)
+      squares += std::pow (sample.light - unit.light (sample), 2);
+  return squares;
+}
+
+/** The window of exposure 0 by its tiles, to a hundredth of a period. */
+LightModel
+guess_window (std::span<const LightSample> samples, double period)
+{
+  constexpr int kSteps = 96;
+  LightModel best, tried;
+  double least = -1.0;
+  for (int length = kSteps / 8; length < kSteps; length++)
+    for (int start = 0; start < kSteps; start++) {
+      LightModel window{.period = period,
+          .start = period * start / kSteps,
+          .lengths = {period * length / kSteps}};
+      const double squares = misfit (samples, 0, window, &tried);
+      if (least < 0.0 || squares < least) {
+        least = squares;
+        best = tried;
+      }
+    }
+  return best;
+}
+
+/** The length of exposure 1, where all else of @p model is known. */
+double
+guess_length (std::span<const LightSample> samples, LightModel model)
+{
+  constexpr int kSteps = 200;
+  double best = 0.0, least = -1.0;
+  model.lengths.push_back (0.0);
+  model.offsets.push_back (model.offsets.front ());
+  for (int step = 1; step <= kSteps; step++) {
+    model.lengths[1] = 1.5 * model.period * step / kSteps;
+    const double squares = misfit (samples, 1, model, nullptr);
+    if (least < 0.0 || squares < least) {
+      least = squares;
+      best = model.lengths[1];
+    }
+  }
+  return best;
+}
+
+/**
+ * Half of the period leaves its start alone in the dark; of the longest
+ * exposure, only the length is to be found. Both start with the same delay.
+ */
+Result<void>
+TriggerCheck::measure_exposure ()
+{
+  const auto half = Nanoseconds (std::llround (0.5e9 * period_));
+  RETURN_IF_ERROR (rig_.expose (half));
+  RETURN_IF_ERROR (sample_tiles (0));
+  LightModel guess = guess_window (samples_, period_);
+  RETURN_IF_ERROR (sample_starts (guess.start, 0));
+  RETURN_IF_ERROR (rig_.expose ({}));
+  RETURN_IF_ERROR (sample_tiles (1));
+  guess.lengths.push_back (guess_length (samples_, guess));
+  RETURN_IF_ERROR (sample_starts (guess.start, 1));
+  RETURN_IF_ERROR (sample_ends (guess.start + guess.lengths[1], 1));
+  RETURN_IF_ERROR (sample_inside (guess));
+  if (samples_.size () < 40)
+    return {};
+  diagnose_exposure (fit_light (samples_, guess, {.lines = 2}));
+  return {};
+}
+
+/** Slots that lie in the exposure as a whole, and the profile. */
+void
+TriggerCheck::remember (
+    const LightFit &fit, const Measured &start, const Measured &length)
+{
+  BenchProfile &profile = examination_.profile;
+  profile.trigger_delay = {start.value * 1e9, start.sigma * 1e9};
+  profile.exposure = {length.value * 1e9, length.sigma * 1e9};
+  const double margin = 3.0 * (fit.jitter.value + start.sigma) + 10e-6;
+  const double end = start.value + length.value;
+  const double next = std::max (0.0, end - period_); // of the exposure before
+  int first = int (std::ceil ((start.value + margin) / slot ()));
+  int until = int (std::floor ((end - margin) / slot ()));
+  if (start.value < margin && start.value + margin < 0.1 * slot ())
+    first = 0;
+  until = std::min (until, grid_);
+  if (const int before = int (std::floor ((next - margin) / slot ()));
+      before > until - first) {
+    first = 0;
+    until = before;
+  }
+  if (until > first)
+    examination_.inside = {first, until - first, grid_};
+}
+
+void
+TriggerCheck::diagnose_exposure (const LightFit &fit)
+{
+  Measured start = fit.start, length = fit.lengths[1];
+  start.sigma = std::hypot (start.sigma, kTicks);
+  length.sigma = std::hypot (length.sigma, kTicks);
+  start.value = std::fmod (start.value + period_, period_);
+  if (start.value > period_ - kShortFail)
+    start.value -= period_; // it is not almost a whole period late
+  remember (fit, start, length);
+  const Measured end{start.value + length.value - period_,
+      std::hypot (start.sigma, length.sigma)};
+  const auto reading = [&] (const char *name, const Measured &seconds,
+                           const char *rule) {
+    finding_.readings.push_back (
+        {name, {seconds.value * 1e6, seconds.sigma * 1e6}, "us", rule});
+  };
+  reading ("delay", start, "at most 400");
+  reading ("exposure", length, "");
+  reading (
+      "end of the exposure, from that of the frame period", end, "-600 to 400");
+  reading ("jitter", fit.jitter, "at most 25");
+
+  const auto severity = [] (bool bad) {
+    return bad ? Verdict::fail : Verdict::warn;
+  };
+  const std::string late =
+      "the exposure begins " + us_text (start.value) + " after the trigger";
+  if (above (start, kEdge * period_))
+    fail ("trigger-edge", late + ", which is the length of a pulse",
+        "choose the other edge with TriggerActivation, or the other level of "
+        "the pulse with pulse=low in the options of the DMD");
+  else if (above (start, kLateWarn))
+    fail ("exposure-late", late, "set TriggerDelay of the camera to 0",
+        severity (above (start, kLateFail)));
+  const Measured lost{-end.value, end.sigma};
+  const Measured missing{period_ - length.value, length.sigma};
+  if (above (lost, kShortWarn) && above (missing, kShortWarn))
+    fail ("exposure-short",
+        "the exposure ends " + us_text (lost.value) +
+            " before the frame period does",
+        "set a longer ExposureTime, or give the schedule a readout time of " +
+            us_text (lost.value),
+        severity (above (lost, kShortFail) && above (missing, kShortFail)));
+  else if (above (end, kLateWarn) && finding_.diagnoses.empty ())
+    fail ("exposure-long",
+        "the exposure runs " + us_text (end.value) +
+            " into the next frame period",
+        "set ExposureTime to the frame period less the readout of the camera",
+        severity (above (end, kLateFail)));
+  if (above (fit.jitter, kJitterWarn))
+    fail ("jitter",
+        "from frame to frame, the exposure begins earlier or later by " +
+            us_text (fit.jitter.value) + " rms",
+        "use the opto-isolated or the direct input of the camera that is "
+        "specified for triggers, and switch off its debouncer",
+        severity (above (fit.jitter, kJitterFail)));
+}
+
+Result<Finding>
+TriggerCheck::run ()
+{
+  for (const auto step :
+      {&TriggerCheck::check_frames, &TriggerCheck::check_lag}) {
+    ASSIGN_OR_RETURN (const bool go_on, (this->*step) ());
+    if (!go_on)
+      return std::move (finding_);
+  }
+  RETURN_IF_ERROR (measure_exposure ());
+  std::ranges::stable_sort (
+      finding_.diagnoses, std::ranges::greater (), &Diagnosis::severity);
+  return std::move (finding_);
+}
+
+} // namespace
+
+Result<Finding>
+check_trigger (Examination &examination)
+{
+  return TriggerCheck (examination).run ();
+}
+
+} // namespace codedexposure

@@ -20,6 +20,8 @@ constexpr double kDiffers = 0.12;
 constexpr double kDead = 0.1;
 /* Light of a stuck mirror, in mirrors; more is dust. */
 constexpr double kMirrorMin = 0.3, kMirrorMax = 2.6;
+/* Pixels of a spot that mirrors make, in mirrors. */
+constexpr double kSpot = 30.0;
 
 float
 median (std::vector<float> &values)
@@ -167,6 +169,7 @@ private:
 
   const Image<float> &off_, &on_;
   Image<float> light_, dark_, field_;
+  float bright_ = 0.0f; // light of bright pixels
   int largest_;
   double mirror_;
   Image<float> part_;         // of its light that a pixel has too much or lacks
@@ -206,7 +209,8 @@ Search::find_bright ()
 {
   Image<std::uint8_t> marked (off_.width (), off_.height ());
   each_pixel ([&] (int x, int y) {
-    const float unit = std::max (0.1f * float (largest_), field_.at (x, y));
+    const float unit =
+        std::max ({0.1f * float (largest_), 0.5f * bright_, field_.at (x, y)});
     part_.at (x, y) = (off_.at (x, y) - dark_.at (x, y)) / unit;
     marked.at (x, y) = part_.at (x, y) > 0.5f * float (kDiffers);
   });
@@ -225,7 +229,8 @@ Search::find_bright ()
     }
     const DefectSpot spot = spot_of (group);
     know (group, 2);
-    if (spot.light > kMirrorMin * mirror_)
+    /* Larger ones are the border of what leaks past the mirrors. */
+    if (spot.light > kMirrorMin * mirror_ && spot.pixels < kSpot * mirror_)
       found_.stuck_on.push_back (spot);
   }
 }
@@ -274,8 +279,9 @@ Search::run ()
   each_pixel ([&] (int x, int y) { values.push_back (field_.at (x, y)); });
   const auto high = values.begin () + std::ptrdiff_t (values.size () * 9 / 10);
   std::nth_element (values.begin (), high, values.end ());
+  bright_ = *high;
   const float least =
-      std::max (float (kCovered) * *high, 0.005f * float (largest_));
+      std::max (float (kCovered) * bright_, 0.005f * float (largest_));
   each_pixel ([&] (int x, int y) {
     found_.covered.at (x, y) = field_.at (x, y) > least;
   });

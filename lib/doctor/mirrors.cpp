@@ -187,21 +187,18 @@ MirrorRun::diagnose_stuck (
 {
   const double mirror = view_.pixels_per_mirror ();
   double light = 0.0;
-  std::string places;
+  std::vector<Position> places;
   for (const DefectSpot &spot : spots) {
     light += std::max (1.0, std::round (spot.light / (mirror * mirror)));
-    const Position at = view_.mirror_at (spot.centre);
-    if (places.size () < 400)
-      places += (places.empty () ? "" : " ") +
-                std::to_string (std::lround (at.x)) + "," +
-                std::to_string (std::lround (at.y));
+    places.push_back (view_.mirror_at (spot.centre));
   }
   finding_.readings.push_back (
       {"mirrors that are " + std::string (what), {light, 0.0}, "", "0"});
   if (spots.empty ())
     return;
   finding_.notes.push_back (
-      {"mirrors that are " + std::string (what) + ", about", places});
+      {"mirrors that are " + std::string (what) + ", about",
+          places_text (places)});
   const double seen =
       std::abs (view_.area ()) * off_.mean.width () * off_.mean.height ();
   finding_.diagnoses.push_back (

@@ -39,6 +39,7 @@ constexpr Rule kDistortion = {0.005, 0.01}; // part
 constexpr Rule kBlur = {0.95, 1.4};         // pixels
 constexpr Rule kGrowth = {0.6, 1.2};        // pixels
 constexpr Rule kUncovered = {0.03, 0.1};    // part of the pixels
+constexpr double kCentred = 5.0;            // mirrors
 constexpr double kDustFail = 0.01;          // part of the pixels
 constexpr double kFaint = 0.15; // modulation of gratings that are too blurred
 
@@ -95,6 +96,7 @@ private:
   std::optional<Calibration> calibration_;
   std::optional<CalibrationResult> result_;
   std::optional<LensFit> lens_;
+  std::optional<double> disagreement_; // of chessboard and gratings, mirrors
   BlurMap blur_;
   std::optional<FocusTilt> focus_;
 };
@@ -260,10 +262,7 @@ OpticsRun::compare (const std::vector<PlacePair> &pairs)
   finding_.readings.push_back ({"chessboard against gratings", {apart, sigma},
       "mirrors", "at most " + real_text (kAgree)});
   if (apart - 3.0 * sigma > kAgree)
-    diagnose ("mapping", Verdict::warn,
-        "the chessboard and the gratings differ by " + fixed (apart, 2) +
-            " mirrors",
-        "see that nothing moves, and run this check again");
+    disagreement_ = apart;
 }
 
 void
@@ -377,8 +376,14 @@ OpticsRun::report_share ()
   finding_.readings.push_back ({"mirrors that are seen",
       {100 * mirrors / (double (mirrors_.width) * mirrors_.height), 0.0}, "%"});
   const auto verdict = verdict_of (1.0 - share, 0.0, kUncovered);
-  if (!verdict || !lens_)
+  if (!verdict)
     return;
+  const std::string blind =
+      fixed (100 * (1 - share), 0) + " % of the pixels see no mirror";
+  const std::string centre =
+      "move the camera until its centre looks at that of the array";
+  if (!lens_)
+    return diagnose ("shift", *verdict, blind, centre);
   const bool turned =
       std::lround (std::abs (lens_->rotation.value) / 90.0) % 2 != 0;
   double width = camera_.width / lens_->magnification.value;
@@ -387,14 +392,16 @@ OpticsRun::report_share ()
     std::swap (width, height);
   const bool fits =
       width < 1.02 * mirrors_.width && height < 1.02 * mirrors_.height;
+  const bool centred =
+      std::hypot (lens_->shift_x.value, lens_->shift_y.value) < kCentred;
+  if (fits && centred && !finding_.diagnoses.empty ())
+    return; // what was found explains it
   if (fits)
     diagnose ("shift", *verdict,
-        fixed (100 * (1 - share), 0) +
-            " % of the pixels see no mirror: from the centre of the array to "
-            "where the camera looks, it is " +
-            fixed (lens_->shift_x.value, 0) + " mirrors to the right and " +
-            fixed (lens_->shift_y.value, 0) + " down",
-        "move the camera until its centre looks at that of the array");
+        blind + ": the camera looks " + fixed (lens_->shift_x.value, 0) +
+            " mirrors to the right of the centre of the array and " +
+            fixed (lens_->shift_y.value, 0) + " below it",
+        centre);
   else
     diagnose ("field", Verdict::warn,
         "the camera sees " + fixed (width, 0) + " x " + fixed (height, 0) +
@@ -505,22 +512,20 @@ void
 OpticsRun::diagnose_dust ()
 {
   double pixels = 0.0;
-  std::string places;
+  std::vector<Position> places;
   for (const DefectSpot &spot : defects_.dust) {
     pixels += spot.pixels;
-    if (places.size () < 400)
-      places += (places.empty () ? "" : " ") +
-                std::to_string (std::lround (spot.centre.x)) + "," +
-                std::to_string (std::lround (spot.centre.y));
+    places.push_back (spot.centre);
   }
   finding_.readings.push_back (
       {"spots of dust", {double (defects_.dust.size ()), 0.0}, ""});
   if (defects_.dust.empty ())
     return;
-  finding_.notes.push_back ({"dust at the pixels", places});
+  finding_.notes.push_back ({"dust at the pixels", places_text (places)});
   const double part = pixels / (double (camera_.width) * camera_.height);
   diagnose ("dust", part > kDustFail ? Verdict::fail : Verdict::warn,
-      std::to_string (defects_.dust.size ()) + " spots, " +
+      std::to_string (defects_.dust.size ()) +
+          (defects_.dust.size () == 1 ? " spot, " : " spots, ") +
           fixed (100 * part, 2) + " % of the picture, block light",
       "blow dust off the window of the DMD, the lens and the sensor");
 }
@@ -562,6 +567,11 @@ OpticsRun::run ()
   if (lens_)
     diagnose_pose ();
   report_share ();
+  if (disagreement_ && finding_.diagnoses.empty ())
+    diagnose ("mapping", Verdict::warn,
+        "the chessboard and the gratings differ by " +
+            fixed (*disagreement_, 2) + " mirrors",
+        "see that nothing moves, and run this check again");
   diagnose_dust ();
   std::ranges::stable_sort (
       finding_.diagnoses, std::greater<> (), &Diagnosis::severity);

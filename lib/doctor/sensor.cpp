@@ -352,16 +352,13 @@ PhotonTransferRun::report_defects ()
       {"hot pixels", {double (defects_.hot.size ()), 0.0}, ""});
   finding_.readings.push_back (
       {"dead pixels", {double (defects_.dead.size ()), 0.0}, ""});
-  std::string places;
-  for (const auto &[name, pixels] :
-      {std::pair{"hot", &defects_.hot}, std::pair{"dead", &defects_.dead}}) {
-    places.clear ();
-    for (std::size_t i = 0; i < std::min<std::size_t> (pixels->size (), 50);
-         i++)
-      places += (i > 0 ? " " : "") + std::to_string ((*pixels)[i].x) + "," +
-                std::to_string ((*pixels)[i].y);
+  for (const auto &[name, pixels] : {std::pair{"hot pixels", &defects_.hot},
+           std::pair{"dead pixels", &defects_.dead}}) {
+    std::vector<Position> places;
+    for (const Offset &at : *pixels)
+      places.push_back ({double (at.x), double (at.y)});
     if (!places.empty ())
-      finding_.notes.push_back ({std::string (name) + " pixels", places});
+      finding_.notes.push_back ({name, places_text (places)});
   }
 }
 

@@ -230,11 +230,26 @@ picture_of (const Image<float> &image, double low, double high)
 }
 
 std::string
+places_text (const std::vector<Position> &places)
+{
+  constexpr std::size_t kMost = 50;
+  std::string text;
+  for (std::size_t i = 0; i < std::min (places.size (), kMost); i++) {
+    text.append (i > 0 ? " " : "");
+    text.append (fixed (places[i].x, 0)).append (",");
+    text.append (fixed (places[i].y, 0));
+  }
+  return text.append (places.size () > kMost ? " ..." : "");
+}
+
+std::string
 fixed (double value, int decimals)
 {
   std::array<char, 64> text;
   std::snprintf (text.data (), text.size (), "%.*f", decimals, value);
-  return text.data ();
+  const std::string number = text.data ();
+  const bool zero = number.find_first_of ("123456789") == number.npos;
+  return zero && number[0] == '-' ? number.substr (1) : number;
 }
 
 } // namespace codedexposure

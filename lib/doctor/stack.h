@@ -80,7 +80,10 @@ largest_number (const Examination &examination)
 Image<std::uint8_t> picture_of (
     const Image<float> &image, double low, double high);
 
-/** "1.50" */
+/** "12,40 13,7", rounded, of some of them where there are many. */
+std::string places_text (const std::vector<Position> &places);
+
+/** "1.50"; never "-0". */
 std::string fixed (double value, int decimals);
 
 } // namespace codedexposure

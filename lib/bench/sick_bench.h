@@ -125,7 +125,6 @@ private:
 
   Image<float> mirrors_of (const MirrorProgram::Mask &mask) const;
   void look (const Image<float> &mirrors, Image<float> &seen);
-  void blur_with_tilt (Image<float> &seen) const;
 
   SickBenchOptions options_;
   BenchTruth truth_;

@@ -32,6 +32,8 @@ constexpr guint32 kTriggerMode = 0x400;
 /* Registers of the lines, one after the other. */
 constexpr guint32 kLineMode = 0x440, kLineSource = 0x444, kLineInverter = 0x448;
 constexpr guint32 kNextLine = 0x20;
+/* GigE Vision's own register of the packet size. */
+constexpr guint32 kPacketSize = 0x0d04;
 
 struct Unref {
   void operator() (gpointer object) const { g_object_unref (object); }
@@ -614,6 +616,7 @@ SimulatedCamera::set_features ()
       {"BinningVertical", ARV_FAKE_CAMERA_REGISTER_BINNING_VERTICAL, 1},
       {"OffsetX", ARV_FAKE_CAMERA_REGISTER_X_OFFSET, 0},
       {"OffsetY", ARV_FAKE_CAMERA_REGISTER_Y_OFFSET, 0},
+      {"GevSCPSPacketSize", kPacketSize, 1400},
       {"WidthMax", ARV_FAKE_CAMERA_REGISTER_SENSOR_WIDTH, options.width},
       {"HeightMax", ARV_FAKE_CAMERA_REGISTER_SENSOR_HEIGHT, options.height}};
   if (!options.features.empty ())

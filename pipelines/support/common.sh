@@ -198,6 +198,8 @@ find_plugin ()
     die "the plugin is not built; run $pipelines/demo, or" \
       "meson setup build && meson compile -C build"
   fi
+  # The guard that stops a board.
+  export CODEDEXPOSURE_TOOL=${CODEDEXPOSURE_TOOL:-$tool}
   # GStreamer finds a plugin in its own folder without this path.
   [ -z "$libs" ] || export \
     GST_PLUGIN_PATH_1_0="$libs${GST_PLUGIN_PATH_1_0:+:$GST_PLUGIN_PATH_1_0}"

@@ -2,7 +2,9 @@
 #include "doctor/checks.h"
 
 #include <algorithm>
+#include <set>
 
+#include "base/text.h"
 #include "base/try.h"
 
 namespace codedexposure
@@ -26,6 +28,85 @@ look (Examination &examination, const StillMask &mask, int slots, int frames)
   const auto old = std::min (seen.size (), std::size_t (examination.lag));
   seen.erase (seen.begin (), seen.begin () + std::ptrdiff_t (old));
   return seen;
+}
+
+const std::vector<Check> &
+all_checks ()
+{
+  static const std::vector<Check> checks = {
+      {"parts", "Parts", {}, check_parts},
+      {"trigger", "Trigger and exposure", {"parts"}, check_trigger},
+      {"light", "Light", {"trigger"}, check_light},
+      {"sensor", "Sensor", {"trigger", "light"}, check_sensor},
+      {"mirrors", "Mirrors", {"trigger", "light"}, check_mirrors},
+      {"optics", "Optics", {"trigger", "light"}, check_optics},
+      {"whole", "Recording", {"trigger"}, check_whole},
+  };
+  return checks;
+}
+
+namespace
+{
+
+const Check *
+find_check (std::string_view name)
+{
+  const auto found = std::ranges::find (all_checks (), name, &Check::name);
+  return found == all_checks ().end () ? nullptr : &*found;
+}
+
+void
+choose (const Check &check, std::set<std::string> &chosen)
+{
+  chosen.insert (check.name);
+  for (const std::string &needed : check.needs)
+    choose (*find_check (needed), chosen);
+}
+
+bool
+has_failed (const std::string &name, const std::vector<Finding> &findings)
+{
+  return std::ranges::any_of (findings, [&name] (const Finding &finding) {
+    return finding.check == name &&
+           (finding.skipped || finding.verdict () == Verdict::fail);
+  });
+}
+
+} // namespace
+
+Result<std::vector<Check>>
+choose_checks (std::string_view only)
+{
+  if (only.empty ())
+    return all_checks ();
+  std::set<std::string> chosen;
+  for (const std::string_view name : split (only, ',')) {
+    const Check *check = find_check (name);
+    if (!check) {
+      std::string known;
+      for (const Check &each : all_checks ())
+        known += (known.empty () ? "" : ", ") + each.name;
+      return Error{in_quotes (name) + " is no check; choose from " + known};
+    }
+    choose (*check, chosen);
+  }
+  std::vector<Check> checks;
+  for (const Check &check : all_checks ())
+    if (chosen.contains (check.name))
+      checks.push_back (check);
+  return checks;
+}
+
+Result<Finding>
+run_check (const Check &check, Examination &examination,
+    const std::vector<Finding> &before)
+{
+  const auto failed = [&before] (const std::string &name) {
+    return has_failed (name, before);
+  };
+  if (std::ranges::any_of (check.needs, failed))
+    return Finding{.check = check.name, .skipped = true};
+  return check.run (examination);
 }
 
 } // namespace codedexposure

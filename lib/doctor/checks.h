@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "doctor/finding.h"
@@ -61,6 +62,16 @@ struct Check {
 
 /** What is found where a part cannot be opened: the camera, or the DMD. */
 Finding part_missing (const Error &why, bool camera);
+
+/** All checks, in their order. */
+const std::vector<Check> &all_checks ();
+/** Those of the comma-separated names @p only, and what they need; empty: all.
+ * Error for a name that is none. */
+Result<std::vector<Check>> choose_checks (std::string_view only);
+/** Runs @p check unless one that it needs has failed in @p before; its finding is
+ * skipped then. */
+Result<Finding> run_check (const Check &check, Examination &examination,
+    const std::vector<Finding> &before);
 
 Result<Finding> check_parts (Examination &examination);
 Result<Finding> check_trigger (Examination &examination);

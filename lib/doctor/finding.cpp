@@ -75,7 +75,7 @@ findings_json (const std::vector<Finding> &findings)
     checks.push_back (json_of (finding));
     worst = std::max (worst, finding.verdict ());
   }
-  const OrderedJson root{{"format", "gst-codedexposure-findings"},
+  const OrderedJson root{{"format", "coded-exposure-findings"},
       {"version", 1}, {"verdict", verdict_text (worst)}, {"checks", checks}};
   return root.dump (-1, ' ', false, OrderedJson::error_handler_t::replace);
 }

@@ -237,8 +237,11 @@ MirrorRun::run ()
     const int largest = largest_number (examination_);
     finding_.exhibits.push_back (
         {"All mirrors on", picture_of (on_.mean, 0.0, largest)});
-    finding_.exhibits.push_back ({"All mirrors off, 20 times as bright",
-        picture_of (off_.mean, 0.0, 0.05 * largest)});
+    const auto &black = examination_.profile.black_level;
+    const double dark = black ? black->value : 0.0;
+    finding_.exhibits.push_back (
+        {"All mirrors off, 20 times as bright; black: no light",
+            picture_of (off_.mean, dark, dark + 0.05 * largest)});
   }
   return std::move (finding_);
 }

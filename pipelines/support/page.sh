@@ -95,32 +95,14 @@ $(seconds "$shown") s on"
   printf '</dl>\n'
 }
 
+# style COLUMNS SHAPE: of a grid with that many columns, and pictures of that
+# shape.
 style ()
 {
-  cat << END
-body{font:15px/1.5 sans-serif;max-width:1200px;margin:1.5em auto;padding:0 1em;
-  color:#222}
-figure{margin:0} figcaption{color:#555;font-size:13px}
-img{width:100%;image-rendering:pixelated} .plot img{image-rendering:auto}
-.badge{font-size:15px;background:#e4572e;color:#fff;border-radius:4px;
-  padding:2px 8px;vertical-align:middle}
-dl{display:grid;grid-template-columns:max-content minmax(0,1fr);gap:2px 14px}
-dd{margin:0;overflow-wrap:anywhere}
-dt{color:#555}
-.pair{display:grid;grid-template-columns:1fr 1fr;gap:12px}
+  cat "$pipelines/support/page.css" - << END
 .grid{display:grid;gap:8px;align-content:start;grid-template-columns:
   repeat(auto-fill,minmax(max(84px,calc((100% - $((8 * ($1 - 1)))px)/$1)),1fr))}
-.wide>div{overflow-x:auto} .wide img{min-width:900px}
-.one,.many>figure{max-width:750px} .many>.grid{margin-top:8px}
 .frame img{display:block;aspect-ratio:$2}
-.frame div{position:relative} svg{position:absolute;inset:0;width:100%;height:100%}
-line{stroke:#e4572e;stroke-width:2;stroke-dasharray:6 4;
-  vector-effect:non-scaling-stroke}
-.table{overflow-x:auto} table{border-collapse:collapse}
-th,td{padding:2px 10px;text-align:right;border-bottom:1px solid #ddd;
-  white-space:nowrap}
-@media(max-width:700px){.pair{grid-template-columns:1fr} th,td{padding:2px 5px}
-  body{font-size:14px} table{font-size:13px}}
 END
 }
 

@@ -36,6 +36,9 @@ constexpr double kFieldWarn = 0.25, kFieldFail = 0.4;
 constexpr double kFlickerWarn = 0.01, kFlickerFail = 0.02;
 constexpr double kDriftWarn = 0.02, kDriftFail = 0.05; // a minute
 
+/* Of the light to which an amplitude is related. */
+constexpr double kGainError = 0.01;
+
 std::string
 percent (double part)
 {
@@ -280,7 +283,9 @@ LightCheck::judge_flicker (const LightFit &fit)
         {"flicker", {0.0, 100.0 * fit.faintest}, "%", "at most 1"});
     return;
   }
-  const auto &[frequency, depth] = fit.lines.front ();
+  const auto &[frequency, seen] = fit.lines.front ();
+  const Measured depth{
+      seen.value, std::hypot (seen.sigma, kGainError * seen.value)};
   finding_.readings.push_back ({"flicker",
       {100.0 * depth.value, 100.0 * depth.sigma}, "%", "at most 1"});
   finding_.readings.push_back ({"frequency of the flicker", frequency, "Hz"});

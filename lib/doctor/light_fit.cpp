@@ -558,7 +558,7 @@ Fit::remember (LightFit &fit) const
       [] (const LightFit::Line &line) { return line.depth.value; });
   const double free = std::max (1.0, used () - double (j.cols ()));
   fit.residual = residual.norm () / std::sqrt (free) / model_.gain;
-  fit.faintest = std::max (question_.faintest, missed_);
+  fit.faintest = std::clamp (missed_, question_.faintest, 1.0);
   fit.rejected = int (double (samples_.size ()) - used ());
   if (question_.window)
     fit.jitter = jitter ();

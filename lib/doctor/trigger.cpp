@@ -31,8 +31,8 @@ constexpr int kCoarseFrames = 4, kFineFrames = 8;
 constexpr int kInsideLooks = 12, kInsideFrames = 6;
 /* Levels of one mask differ less, as part of the step to the other one. */
 constexpr double kSameLevel = 0.2;
-/* Mirrors move, and clocks tick, within that; s. */
-constexpr double kTicks = 2e-6;
+/* Mirrors are half way, and clocks tick, within that; s. */
+constexpr double kTicks = 3e-6;
 /* Light of all mirrors by which a run of an eighth can be measured, part of the
  * range. */
 constexpr double kFaint = 0.05;

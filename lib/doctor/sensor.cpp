@@ -328,7 +328,7 @@ PhotonTransferRun::report ()
   const bool known = gain.sigma < kUnknown * gain.value;
   if (!known)
     profile.conversion_gain = profile.full_well = profile.read_noise = {};
-  if (!known || off_.shorter.zeros > kZeros)
+  if (!known || off_.shorter.zeros > kZeros || missing_bits () > 0)
     profile.read_noise = profile.black_level = {};
   finding_.readings = {{"conversion gain", gain, "e-/DN"},
       {"full well", full_well, "e-"},

@@ -30,6 +30,11 @@ TEST (SensorCheck, NumbersOfHealthyBenchesAreThoseInjected)
         double (e.rig->truth ().hot.size ()), 1.0);
     EXPECT_NEAR (e.finding.reading ("dead pixels")->number.value,
         double (e.rig->truth ().dead.size ()), 1.0);
+    BenchProfile profile = found;
+    profile.camera.size = e.rig->truth ().options.camera;
+    profile.bits = e.rig->truth ().options.bits;
+    const auto valid = profile.check ();
+    EXPECT_TRUE (valid) << valid.error ().message;
     for (const auto &[measured, exact] :
         {std::pair{found.full_well, truth.full_well},
             std::pair{found.read_noise, truth.read_noise},

@@ -43,6 +43,10 @@ struct SceneModel {
   /** What `fast` chooses between around each pixel. */
   SceneClass slow{.correlation = 0.97, .spread = 0.2};
   SceneClass moving{.correlation = 0.85, .spread = 2.0};
+  /** In place of `slow` where neighbouring coded frames are used, too: errors
+   * of the velocity grow from frame to frame. */
+  SceneClass slow_over_frames{.correlation = 0.97, .spread = 0.2};
+  SceneClass medium_over_frames{.correlation = 0.97, .spread = 0.5};
   /** The only class of `fast` for schedules of more slots than motion models
    * exist for. */
   SceneClass plain;

@@ -33,6 +33,13 @@ constexpr float kErrorFloor = 0.5f;
 /* Models with less weight are left out. */
 constexpr float kMinWeight = 0.01f;
 
+/* Of the taps in the coded frames before and after, px: for estimates, and for
+ * the comparison of models. Larger ones are not more accurate. */
+constexpr double kNeighbourRadius = 2.3, kComparedRadius = 1.2;
+/* Errors of models with such taps count as this much larger, as their taps fit
+ * some motion by chance. The factor is that of the squared errors, 1.2. */
+constexpr float kChance = 1.0954f;
+
 /* Of the taps: large enough to contain every slot several times. */
 int
 tap_radius (int slots)
@@ -203,26 +210,24 @@ void
 Engine::prepare (const Schedule &schedule, const FuseOptions &options)
 {
   const double scene = options.scene.contrast * options.scene.contrast;
-  std::vector<double> noise;
+  std::vector<double> &noise = noise_of_elements_;
   for (int e = 0; e < slots (); e++)
     noise.push_back (
         std::max (observation_.variance (e, kTypicalLight) / scene, kMinNoise));
-  std::vector<SceneClass> models;
   if (options.quality == FuseQuality::kFast)
-    models = slots () > Fuser<std::uint8_t>::kMaxSlots
-                 ? std::vector{options.scene.plain}
-                 : std::vector{options.scene.slow, options.scene.moving};
-  std::vector<SceneClass> predicted{kStatic, kMoving};
-  if (models.size () > 1) {
-    predicted.insert (predicted.end (), models.begin (), models.end ());
-    preference_ = Field (width_, height_);
-  }
-  predictions_.emplace (phases_, observation_, predicted, radius_ - 2,
-      StaticPixels::radius_of (schedule.cell ()), Extent{width_, height_},
-      noise, steps_);
-  for (const SceneClass &model : models)
-    prepare_linear (model, noise);
-  if (!models.empty ())
+    models_ = slots () > Fuser<std::uint8_t>::kMaxSlots
+                  ? std::vector{options.scene.plain}
+                  : std::vector{options.scene.slow, options.scene.moving};
+  models_over_frames_ = {options.scene.slow_over_frames,
+      options.scene.medium_over_frames, options.scene.moving};
+  predictions_.emplace (
+      2 + int (models_.size () > 1 ? models_over_frames_.size ()
+                                   : models_.size ()),
+      StaticPixels::radius_of (schedule.cell ()), Extent{width_, height_});
+  filters_[0] = make_filters (false, false);
+  if (models_.size () > 1)
+    preferences_.assign (models_over_frames_.size (), Field (width_, height_));
+  if (!models_.empty ())
     return;
   motion_.emplace (
       phases_, observation_, motion_classes (), radius_, noise, steps_);
@@ -231,15 +236,66 @@ Engine::prepare (const Schedule &schedule, const FuseOptions &options)
   light_.assign (std::size_t (slots ()), Field (width_, height_));
 }
 
-void
-Engine::prepare_linear (const SceneClass &model, std::span<const double> noise)
+Engine::Filters
+Engine::make_filters (bool previous, bool next) const
 {
-  const std::vector<Offset> taps = disc (radius_ + 0.5);
-  FilterBank &filters = linear_.emplace_back (phases_, taps, slots (), steps_);
-  for_each_phase (phases_, observation_, model, taps, noise,
-      [&] (int row, int x, const PhaseWeights &weights) {
-        filters.set_all (row, x, weights.slots);
-      });
+  const auto around = [&] (double own, double neighbours) {
+    std::vector<Tap> taps = taps_within (own);
+    for (const int frame : {-1, 1})
+      if (frame < 0 ? previous : next)
+        std::ranges::copy (
+            taps_within (neighbours, frame), std::back_inserter (taps));
+    return taps;
+  };
+  const auto each_phase = [&] (const SceneClass &scene,
+                              std::span<const Tap> taps,
+                              const UseWeights &use) {
+    for_each_phase (
+        phases_, observation_, scene, taps, noise_of_elements_, use);
+  };
+  const std::vector<Tap> near = taps_within (radius_ - 1.5),
+                         near_all = around (radius_ - 1.5, kComparedRadius),
+                         wide = taps_within (radius_ + 0.5),
+                         wide_all = around (radius_ + 0.5, kNeighbourRadius);
+  const std::vector<SceneClass> &models =
+      previous || next ? models_over_frames_ : models_;
+  std::vector<SceneClass> predicted{kStatic, kMoving};
+  predicted.insert (predicted.end (), models.begin (), models.end ());
+  Filters filters{
+      FilterBank (phases_, near_all, int (predicted.size ()), steps_), {}};
+  for (std::size_t k = 0; k < predicted.size (); k++) {
+    /* What moves fast has left the pixel in other frames. */
+    const bool alone =
+        k < 2 || k + 1 == predicted.size () || !(previous || next);
+    each_phase (predicted[k], alone ? near : near_all,
+        [&] (int row, int x, PhaseWeights weights) {
+          if (!alone)
+            for (float &weight : weights.residual)
+              weight *= kChance;
+          weights.residual.resize (near_all.size ());
+          filters.predictions.set (row, x, int (k), weights.residual);
+        });
+    if (k < 2)
+      continue;
+    const std::vector<Tap> &taps = alone ? wide : wide_all;
+    FilterBank &bank =
+        filters.models.emplace_back (phases_, taps, slots (), steps_);
+    each_phase (
+        predicted[k], taps, [&] (int row, int x, const PhaseWeights &weights) {
+          bank.set_all (row, x, weights.slots);
+        });
+  }
+  return filters;
+}
+
+const Engine::Filters &
+Engine::filters_for (const PairFrames &frames)
+{
+  const bool previous = frames[0] != nullptr, next = frames[2] != nullptr;
+  auto &filters = filters_[(previous ? 1u : 0u) + (next ? 2u : 0u)];
+  if (!filters)
+    filters = make_filters (previous, next);
+  return *filters;
 }
 
 Field &
@@ -301,17 +357,22 @@ Engine::each_part (
 /* Models are compared by the sums of their squared errors. Their power of 8
  * stands for the number of independent errors in a square. */
 void
-Engine::find_static_pixels (const StaticPixels::Frames &frames,
-    const PairField &coded, StaticPixels::Rows rows)
+Engine::find_static_pixels (const Filters &filters,
+    const StaticPixels::Frames &frames, const PairFrames &pairs,
+    StaticPixels::Rows rows)
 {
   const float side = float (2 * static_pixels_.radius () + 1);
-  predictions_->run (kernels_, coded, rows.first, rows.end, rows.worker,
-      [&] (int y, const float *const *errors) {
+  predictions_->run (kernels_, phases_, filters.predictions, pairs, rows.first,
+      rows.end, rows.worker, [&] (int y, const float *const *errors) {
         static_pixels_.set_errors (kernels_, y, errors[0], errors[1]);
-        if (linear_.size () > 1)
-          kernels_.prefer ({errors[2], errors[3], kErrorFloor * side * side,
-                               kMinWeight, width_},
-              preference_.row (y));
+        if (preferences_.empty ())
+          return;
+        std::vector<float *> to;
+        for (Field &preference : preferences_)
+          to.push_back (preference.row (y));
+        kernels_.prefer ({errors + 2, int (filters.models.size ()),
+                             kErrorFloor * side * side, kMinWeight, width_},
+            to.data ());
       });
   static_pixels_.compare (kernels_, frames, rows);
 }
@@ -328,27 +389,31 @@ Engine::blend (int y, float *const *rows) const
 }
 
 void
-Engine::fuse_linear (
-    const PairField &coded, const RowSink &sink, StaticPixels::Rows part) const
+Engine::fuse_linear (const Filters &filters, const PairFrames &frames,
+    const RowSink &sink, StaticPixels::Rows part) const
 {
-  const auto offsets = linear_[0].offsets (coded);
+  const auto &models = filters.models;
+  std::vector<const std::int32_t *> sources;
   Field rows_of_slots (width_, slots ());
-  Field shares (width_, int (linear_.size ()));
+  Field shares (width_, int (models.size ()));
   std::vector<float *> rows, shares_of_models;
   for (int s = 0; s < slots (); s++)
     rows.push_back (rows_of_slots.row (s));
-  for (std::size_t model = 0; model < linear_.size (); model++)
+  for (std::size_t model = 0; model < models.size (); model++)
     shares_of_models.push_back (shares.row (int (model)));
   for (int y = part.first; y < part.end; y++) {
-    kernels_.share (
-        {static_pixels_.weight (y), static_pixels_.light (y),
-            linear_.size () > 1 ? preference_.row (y) : nullptr, width_},
+    std::vector<const float *> preferences;
+    for (const Field &preference : preferences_)
+      preferences.push_back (preference.row (y));
+    kernels_.share ({static_pixels_.weight (y), static_pixels_.light (y),
+                        preferences.empty () ? nullptr : preferences.data (),
+                        int (models.size ()), width_},
         rows[0], shares_of_models.data ());
     for (std::size_t s = 1; s < rows.size (); s++)
       std::copy_n (rows[0], width_, rows[s]);
-    for (std::size_t model = 0; model < linear_.size (); model++)
+    for (std::size_t model = 0; model < models.size (); model++)
       kernels_.filter_pairs_add (
-          linear_[model].row (phases_, coded, y, offsets),
+          models[model].row (phases_, frames, y, sources),
           shares_of_models[model], rows.data ());
     sink (y, rows.data ());
   }
@@ -379,20 +444,28 @@ Engine::fuse (const RowSink &sink, Workers &workers, std::stop_token stop)
   const Coded &coded = queue_.front ();
   const StaticPixels::Frames frames{
       coded.light, queue_.size () > 1 ? &queue_[1].light : nullptr, noise_};
+  PairFrames neighbours{nullptr, &coded.pairs, nullptr};
+  if (models_.size () > 1) {
+    if (!previous_.light.empty ())
+      neighbours[0] = &previous_.pairs;
+    if (queue_.size () > 1)
+      neighbours[2] = &queue_[1].pairs;
+  }
+  const Filters &filters = filters_for (neighbours);
   predictions_->make_room (workers.count ());
   static_pixels_.make_room (workers.count ());
   each_part (workers, [&] (StaticPixels::Rows rows) {
-    find_static_pixels (frames, coded.pairs, rows);
+    find_static_pixels (filters, frames, neighbours, rows);
   });
   each_part (workers, [&] (StaticPixels::Rows rows) {
     static_pixels_.average (kernels_, frames, rows);
-    if (!linear_.empty ())
-      fuse_linear (coded.pairs, sink, rows);
+    if (!models_.empty ())
+      fuse_linear (filters, neighbours, sink, rows);
   });
   static_pixels_.finish (frames);
   const bool done =
-      !linear_.empty () || fuse_motion (coded, sink, workers, std::move (stop));
-  spare_ = std::move (queue_.front ());
+      !models_.empty () || fuse_motion (coded, sink, workers, std::move (stop));
+  spare_ = std::exchange (previous_, std::move (queue_.front ()));
   queue_.pop_front ();
   return done;
 }
@@ -409,6 +482,7 @@ void
 Engine::forget ()
 {
   queue_.clear ();
+  previous_ = {};
   static_pixels_.forget ();
 }
 

@@ -3,6 +3,7 @@
  */
 #pragma once
 
+#include <array>
 #include <deque>
 #include <functional>
 #include <memory>
@@ -57,7 +58,13 @@ private:
   void map_noise (const Schedule &schedule);
   void find_margin (const Schedule &schedule);
   void prepare (const Schedule &schedule, const FuseOptions &options);
-  void prepare_linear (const SceneClass &model, std::span<const double> noise);
+  /** Filters that use some of the neighbouring coded frames. */
+  struct Filters {
+    FilterBank predictions; ///< of kStatic, kMoving, and the models of fast
+    std::vector<FilterBank> models; ///< of fast
+  };
+  Filters make_filters (bool previous, bool next) const;
+  const Filters &filters_for (const PairFrames &frames);
   /** A coded frame; the pairs have a margin. */
   struct Coded {
     Field light;
@@ -68,10 +75,11 @@ private:
   void each_part (Workers &workers,
       const std::function<void (StaticPixels::Rows)> &use) const;
   /** What rows need to know before static pixels are averaged. */
-  void find_static_pixels (const StaticPixels::Frames &frames,
-      const PairField &coded, StaticPixels::Rows rows);
-  void fuse_linear (const PairField &coded, const RowSink &sink,
-      StaticPixels::Rows part) const;
+  void find_static_pixels (const Filters &filters,
+      const StaticPixels::Frames &frames, const PairFrames &pairs,
+      StaticPixels::Rows rows);
+  void fuse_linear (const Filters &filters, const PairFrames &frames,
+      const RowSink &sink, StaticPixels::Rows part) const;
   void blend (int y, float *const *rows) const;
   bool fuse_motion (const Coded &coded, const RowSink &sink, Workers &workers,
       std::stop_token stop);
@@ -85,8 +93,13 @@ private:
   int radius_;
   float steps_; ///< of 16 bits, per grey level
   std::optional<Predictions> predictions_;
-  std::vector<FilterBank> linear_; ///< fast: of its one or two models
-  Field preference_;               ///< for the first of two models
+  std::vector<SceneClass> models_;             ///< of fast
+  std::vector<SceneClass> models_over_frames_; ///< with neighbouring frames
+  std::vector<double> noise_of_elements_; ///< in units of the scene's variance
+  /** Without and with taps of the previous, + 2 of the next coded frame. Those
+   * that a stream rarely needs are made when it does. */
+  std::array<std::optional<Filters>, 4> filters_;
+  std::vector<Field> preferences_; ///< for each of several models
   std::optional<MotionFilter> motion_;
   std::optional<CollaborativeFilter> collaborative_;
   std::vector<Field> light_; ///< of each slot, unless fast
@@ -101,6 +114,7 @@ private:
   std::vector<Repeat> margin_;
 
   std::deque<Coded> queue_;
+  Coded previous_; ///< empty if there is none
   Coded spare_;
 };
 

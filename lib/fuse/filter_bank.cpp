@@ -64,12 +64,12 @@ round_weights (std::span<const float> weights)
 } // namespace
 
 FilterBank::FilterBank (
-    const Phases &phases, std::vector<Offset> taps, int outputs, float steps)
+    const Phases &phases, std::span<const Tap> taps, int outputs, float steps)
     : outputs_ (outputs), period_ (phases.period ()),
       width_ (period_ + Field::kSlack - 1), steps_ (steps)
 {
-  for (const Offset &tap : taps) {
-    const Offset left{tap.x - 1, tap.y};
+  for (const Tap &tap : taps) {
+    const Tap left{tap.x - 1, tap.y, tap.frame};
     if (!pairs_.empty () && pairs_.back () == left && !places_.back ().upper) {
       places_.push_back ({pairs_.size () - 1, true});
     } else {
@@ -119,24 +119,18 @@ FilterBank::set_all (int row, int x, std::span<const float> weights)
 }
 
 PairRow
-FilterBank::row (const Phases &phases, const PairField &source, int y,
-    std::span<const std::ptrdiff_t> offsets) const
+FilterBank::row (const Phases &phases, const PairFrames &frames, int y,
+    std::vector<const std::int32_t *> &sources) const
 {
+  sources.clear ();
+  for (const Tap &pair : pairs_)
+    sources.push_back (
+        frames[std::size_t (pair.frame + 1)]->row (y + pair.y) + pair.x);
   const std::size_t row = std::size_t (phases.row_of (y)) *
                           std::size_t (outputs_) * std::size_t (width_);
-  return {source.row (y), source.width (), offsets.data (),
-      int (pairs_.size ()), weights_.data () + row * pairs_.size (),
-      scales_.data () + row, base_, width_, outputs_, period_,
-      phases.shift (y)};
-}
-
-std::vector<std::ptrdiff_t>
-FilterBank::offsets (const PairField &field) const
-{
-  std::vector<std::ptrdiff_t> offsets;
-  for (const Offset &pair : pairs_)
-    offsets.push_back (pair.y * field.stride () + pair.x);
-  return offsets;
+  return {sources.data (), frames[1]->width (), int (pairs_.size ()),
+      weights_.data () + row * pairs_.size (), scales_.data () + row, base_,
+      width_, outputs_, period_, phases.shift (y)};
 }
 
 } // namespace codedexposure::fuse

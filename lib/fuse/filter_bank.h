@@ -2,6 +2,7 @@
 /* Filters of every phase, in the layout of the kernels. */
 #pragma once
 
+#include <array>
 #include <span>
 #include <vector>
 
@@ -11,6 +12,10 @@
 
 namespace codedexposure::fuse
 {
+
+/** The coded frames before, at and after the one that is fused; null if there
+ * is none. */
+using PairFrames = std::array<const PairField *, 3>;
 
 /** For every pixel of a frame, @p outputs weighted sums over the same taps.
  * Pixels and weights are rounded to 16 bits: pixels to kSmallest for black and
@@ -22,19 +27,18 @@ public:
   static constexpr int kSmallest = -32768, kLargest = 32767;
 
   /** @p steps  of a pixel per grey level. */
-  FilterBank (
-      const Phases &phases, std::vector<Offset> taps, int outputs, float steps);
+  FilterBank (const Phases &phases, std::span<const Tap> taps, int outputs,
+      float steps);
 
+  int outputs () const { return outputs_; }
   /** Weights of the pixels at @p x of distinct row @p row of the phases. */
   void set (int row, int x, int output, std::span<const float> weights);
   /** Of all outputs, one after the other. */
   void set_all (int row, int x, std::span<const float> weights);
-  /** The kernels' input for row @p y of @p source, whose margin is as large as
-   * the taps' radius; @p offsets from offsets () of a field of its size. */
-  PairRow row (const Phases &phases, const PairField &source, int y,
-      std::span<const std::ptrdiff_t> offsets) const;
-  /** Offsets of the pairs in @p field. */
-  std::vector<std::ptrdiff_t> offsets (const PairField &field) const;
+  /** The kernels' input for row @p y of @p frames, whose margin is as large as
+   * the taps' radius. Valid until @p sources changes. */
+  PairRow row (const Phases &phases, const PairFrames &frames, int y,
+      std::vector<const std::int32_t *> &sources) const;
 
 private:
   struct Place {
@@ -42,7 +46,7 @@ private:
     bool upper;
   };
 
-  std::vector<Offset> pairs_; ///< of their first tap
+  std::vector<Tap> pairs_;    ///< of their first tap
   std::vector<Place> places_; ///< of each tap
   int outputs_;
   int period_;

@@ -58,6 +58,18 @@ add_product (Ints sum, Ints a, Ints b)
 #endif
 }
 
+/* Values of tap @t. */
+CODEDEXPOSURE_INLINE const float *
+source (const fuse::FilterRow &row, int t)
+{
+  return row.source + row.offsets[t];
+}
+CODEDEXPOSURE_INLINE const std::int32_t *
+source (const fuse::PairRow &row, int t)
+{
+  return row.sources[t];
+}
+
 /* Output @k of a vector at @at of the period, from its sum. */
 CODEDEXPOSURE_INLINE Floats
 result (const fuse::FilterRow &, int, int, Floats sum)
@@ -79,16 +91,16 @@ CODEDEXPOSURE_INLINE void
 filter_vectors (
     const Row &row, int first, int x, Finish finish, float *const *outputs)
 {
-  using Values = decltype (load (row.source));
+  using Values = decltype (load (row.weights));
   Values sum[Vectors][Outputs] = {};
-  decltype (row.source) weights[Vectors];
+  decltype (row.weights) weights[Vectors];
   int at[Vectors];
   for (int v = 0; v < Vectors; v++) {
     at[v] = (row.phase + x + (Alike ? 0 : v * kFloats)) % row.period;
     weights[v] = row.weights + first * row.width + at[v];
   }
   for (int t = 0; t < row.taps; t++) {
-    const auto *from = row.source + x + row.offsets[t];
+    const auto *from = source (row, t) + x;
     Values weight[Outputs];
     for (int v = 0; v < Vectors; v++) {
       const Values value = load (from + v * kFloats);

@@ -34,20 +34,19 @@ struct FilterRow {
 };
 
 /**
- * The same in whole numbers, over pairs of pixels. The value at x of the source
+ * The same in whole numbers, over pairs of pixels. The value at x of a source
  * is the pixel at x in its lower 16 bits and the pixel at x + 1 in its upper
  * ones, both signed; weights are pairs like it. Output k at x is
  *
  *   scale[k width + i] * sum + base,   i = (phase + x) mod period,
  *
  * where sum is over pairs t, of both products of weights[(t outputs + k) width
- * + i] and source[x + offsets[t]]. It fits into 32 bits, so that its order does
- * not matter. No weight is -32768.
+ * + i] and sources[t][x]. It fits into 32 bits, so that its order does not
+ * matter. No weight is -32768.
  */
 struct PairRow {
-  const std::int32_t *source;
+  const std::int32_t *const *sources;
   int count;
-  const std::ptrdiff_t *offsets;
   int taps; ///< pairs
   const std::int32_t *weights;
   const float *scale;
@@ -104,18 +103,20 @@ struct RateRow {
   int count;
 };
 
-/** What each of two models has a share of, by their squared errors. */
+/** What each of several models has a share of, by their squared errors. */
 struct PreferRow {
-  const float *first, *second; ///< sums of squared errors
-  float floor;                 ///< added to these sums
-  float min_share;             ///< less is 0
+  const float *const *errors; ///< sums of squared errors of each model
+  int models;
+  float floor;      ///< added to these sums
+  float min_weight; ///< relative to the best model's; less is 0
   int count;
 };
 
-/** The light of static pixels and the shares of one or two models. */
+/** The light of static pixels and the shares of models. */
 struct ShareRow {
-  const float *weight, *light; ///< of static pixels
-  const float *preference;     ///< for the first of two models; null: one
+  const float *weight, *light;     ///< of static pixels
+  const float *const *preferences; ///< for each model; null: there is one
+  int models;
   int count;
 };
 
@@ -139,9 +140,10 @@ struct Kernels {
   /** to[x] = fade of a[x] / (floor + b[x]). */
   void (*fade_ratio) (const float *a, const float *b, float floor,
       const Fade &fade, int count, float *to);
-  /** to[x] = preference for the first model: in proportion to the inverse of
-   * the models' errors to the power of 8. */
-  void (*prefer) (const PreferRow &row, float *to);
+  /** to[i][x] = preference for model i: in proportion to the inverse of the
+   * models' errors to the power of 8. Up to 15 values more than count are read
+   * and written. */
+  void (*prefer) (const PreferRow &row, float *const *to);
   /** base[x] = static light times its weight; shares[i][x] = share of model i
    * in the rest. */
   void (*share) (const ShareRow &row, float *base, float *const *shares);

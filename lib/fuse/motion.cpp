@@ -88,7 +88,7 @@ MotionFilter::MotionFilter (const Phases &phases,
     int radius, std::span<const double> noise, float steps)
     : phases_ (phases)
 {
-  const std::vector<Offset> taps = disc (radius + 0.5);
+  const std::vector<Tap> taps = taps_within (radius + 0.5);
   for (std::size_t c = 0; c < classes.size (); c++) {
     const SceneClass &patch = classes[c];
     if (c % kChunk == 0)
@@ -111,7 +111,8 @@ MotionFilter::measure (
 {
   const Blur blur;
   const int width = coded.width (), height = coded.height ();
-  const auto offsets = filters_[0].offsets (coded);
+  std::vector<const std::int32_t *> sources;
+  const PairFrames frames{nullptr, &coded, nullptr};
   for (std::size_t c = 0; c < band.fit.size (); c += kChunk) {
     const std::size_t count = std::min (kChunk, band.fit.size () - c);
     for (int y = -kReach; y < band.rows + kReach; y++) {
@@ -120,7 +121,7 @@ MotionFilter::measure (
         to[i] = band.squares[i].row (y);
       kernels.filter_pairs_squared (
           residuals_[c / kChunk].row (
-              phases_, coded, mirrored (band.first + y, height), offsets),
+              phases_, frames, mirrored (band.first + y, height), sources),
           to.data ());
     }
     for (std::size_t i = 0; i < count; i++) {
@@ -180,7 +181,8 @@ void
 MotionFilter::mix (const Kernels &kernels, const PairField &coded,
     const Band &band, std::span<Field> slots) const
 {
-  const auto offsets = filters_[0].offsets (coded);
+  std::vector<const std::int32_t *> sources;
+  const PairFrames frames{nullptr, &coded, nullptr};
   std::vector<float *> to (slots.size ());
   for (Field &slot : slots)
     for (int y = 0; y < band.rows; y++)
@@ -190,7 +192,7 @@ MotionFilter::mix (const Kernels &kernels, const PairField &coded,
       for (std::size_t s = 0; s < slots.size (); s++)
         to[s] = slots[s].row (band.first + y);
       kernels.filter_pairs_add (
-          filters_[c].row (phases_, coded, band.first + y, offsets),
+          filters_[c].row (phases_, frames, band.first + y, sources),
           band.fit[c].row (y), to.data ());
     }
   }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <functional>
 
 #include "estimate/kriging.h"
 
@@ -41,33 +42,81 @@ Phases::is_shift (int y, int from, int shift) const
 }
 
 std::vector<int>
-Phases::elements (int row, int x, std::span<const Offset> taps) const
+Phases::elements (int row, int x, std::span<const Tap> taps) const
 {
   const int y = row_starts_[std::size_t (row)];
   std::vector<int> elements;
-  for (const Offset &tap : taps)
+  for (const Tap &tap : taps)
     elements.push_back (schedule_.element_at (x + tap.x, y + tap.y));
   return elements;
+}
+
+std::vector<Tap>
+taps_within (double radius, int frame)
+{
+  std::vector<Tap> taps;
+  for (const Offset &at : disc (radius))
+    taps.push_back ({at.x, at.y, frame});
+  return taps;
 }
 
 namespace
 {
 
+/* The frames of taps as one exposure of several times as many slots. Elements
+ * of later frames come after those of earlier ones. */
+struct Exposure {
+  int first, frames;
+  int slots, elements; ///< of one frame
+  std::vector<SlotShares> shares;
+
+  Exposure (const Observation &observation, std::span<const Tap> taps)
+      : slots (observation.slots ()),
+        elements (int (observation.shares ().size ()))
+  {
+    const auto [low, high] =
+        std::ranges::minmax (taps, std::less (), &Tap::frame);
+    first = low.frame;
+    frames = high.frame - low.frame + 1;
+    for (int frame = 0; frame < frames; frame++)
+      for (SlotShares element : observation.shares ()) {
+        for (SlotShare &share : element)
+          share.slot += frame * slots;
+        shares.push_back (std::move (element));
+      }
+  }
+  int element (const Tap &tap, int of_frame) const
+  {
+    return (tap.frame - first) * elements + of_frame;
+  }
+};
+
 PhaseWeights
 weights_of (const CodedCovariance &covariance, const Observation &observation,
-    std::span<const Offset> taps, std::span<const int> elements,
-    std::span<const double> noise)
+    const Exposure &exposure, std::span<const Tap> taps,
+    std::span<const int> elements, std::span<const double> noise)
 {
-  const std::size_t m = taps.size (), n = std::size_t (covariance.slots ());
+  const std::size_t m = taps.size (), n = std::size_t (exposure.slots);
   const std::size_t middle =
-      std::size_t (std::ranges::find (taps, Offset{}) - taps.begin ());
-  KrigingSystem system = slot_equations (covariance, taps, elements, noise);
+      std::size_t (std::ranges::find (taps, Tap{0, 0, 0}) - taps.begin ());
+  std::vector<Offset> places;
+  std::vector<int> exposed;
+  for (std::size_t i = 0; i < m; i++) {
+    places.push_back ({taps[i].x, taps[i].y});
+    exposed.push_back (exposure.element (taps[i], elements[i]));
+  }
+  KrigingSystem system = slot_equations (covariance, places, exposed, noise);
+  /* Only the slots of the middle frame are sought. */
+  const std::size_t before = std::size_t (-exposure.first) * n * m;
+  system.targets.erase (system.targets.begin (),
+      system.targets.begin () + std::ptrdiff_t (before));
   /* Ordinary kriging. As one target more, row `middle` of the inverse of the
    * bordered matrix: it holds the prediction of that pixel by all others,
    * scaled. */
   system.flat.assign (m, 1.0);
   system.flat_targets.assign (n, 1.0);
   system.flat_targets.push_back (0.0);
+  system.targets.resize (n * m);
   system.targets.resize ((n + 1) * m);
   system.targets[n * m + middle] = 1.0;
   const std::vector<double> solved = solve_kriging (system);
@@ -91,19 +140,23 @@ weights_of (const CodedCovariance &covariance, const Observation &observation,
 
 void
 for_each_phase (const Phases &phases, const Observation &observation,
-    const SceneClass &patch, std::span<const Offset> taps,
+    const SceneClass &patch, std::span<const Tap> taps,
     std::span<const double> noise, const UseWeights &use)
 {
   int radius = 0;
-  for (const Offset &tap : taps)
+  for (const Tap &tap : taps)
     radius = std::max ({radius, std::abs (tap.x), std::abs (tap.y)});
+  const Exposure exposure (observation, taps);
   const CodedCovariance covariance (
-      patch, observation.shares (), observation.slots (), 2 * radius);
+      patch, exposure.shares, exposure.slots * exposure.frames, 2 * radius);
+  std::vector<double> noises;
+  for (int frame = 0; frame < exposure.frames; frame++)
+    noises.insert (noises.end (), noise.begin (), noise.end ());
   for (int row = 0; row < phases.rows (); row++)
     for (int x = 0; x < phases.period (); x++)
       use (row, x,
-          weights_of (covariance, observation, taps,
-              phases.elements (row, x, taps), noise));
+          weights_of (covariance, observation, exposure, taps,
+              phases.elements (row, x, taps), noises));
 }
 
 } // namespace codedexposure::fuse

@@ -13,6 +13,18 @@
 namespace codedexposure::fuse
 {
 
+/** A pixel relative to another one, of coded frame -1, the one before, 0, the
+ * same one, or 1, the one after it. */
+struct Tap {
+  int x, y;
+  int frame = 0;
+
+  bool operator== (const Tap &) const = default;
+};
+
+/** The pixels of a coded frame within @p radius px. */
+std::vector<Tap> taps_within (double radius, int frame = 0);
+
 /**
  * Which elements lie around a pixel. Pixels with the same neighbourhood are of
  * one phase, so that filters are made once for each.
@@ -32,8 +44,7 @@ public:
   int shift (int y) const { return at (y).shift; }
   /** Elements of the pixels at @p taps from pixel @p x of distinct row @p row.
    */
-  std::vector<int> elements (
-      int row, int x, std::span<const Offset> taps) const;
+  std::vector<int> elements (int row, int x, std::span<const Tap> taps) const;
 
 private:
   struct Row {
@@ -62,12 +73,12 @@ struct PhaseWeights {
 
 /** Calls @p use with the weights of every phase, the pixels at @p x of distinct
  * row @p row, under class @p patch.
- * @p taps   offsets of coded pixels, (0, 0) among them.
+ * @p taps   coded pixels, {0, 0, 0} among them.
  * @p noise  variance of each element in units of the scene's variance. */
 using UseWeights =
     std::function<void (int row, int x, const PhaseWeights &weights)>;
 void for_each_phase (const Phases &phases, const Observation &observation,
-    const SceneClass &patch, std::span<const Offset> taps,
+    const SceneClass &patch, std::span<const Tap> taps,
     std::span<const double> noise, const UseWeights &use);
 
 } // namespace codedexposure::fuse

@@ -22,21 +22,16 @@ namespace codedexposure::fuse
 class Predictions
 {
 public:
-  /** @p taps    radius of the neighbours, px; coded frames have a margin of
-   * this size.
-   *  @p around  radius of the squares over which errors are summed, px.
-   *  @p noise   variance of each element in units of the scene's variance.
-   *  @p steps  see FilterBank. */
-  Predictions (const Phases &phases, const Observation &observation,
-      std::span<const SceneClass> classes, int taps, int around, Extent size,
-      std::span<const double> noise, float steps);
+  /** @p around  radius of the squares over which errors are summed, px. */
+  Predictions (int classes, int around, Extent size);
 
   /** Room for threads of number 0 .. @p count - 1. */
   void make_room (int count);
   /** Calls @p use with the sums of squared errors around the pixels of rows
-   * @p first .. @p end - 1, of each class. */
+   * @p first .. @p end - 1, of each class, an output of @p filters. */
   using Use = std::function<void (int y, const float *const *errors)>;
-  void run (const Kernels &kernels, const PairField &coded, int first, int end,
+  void run (const Kernels &kernels, const Phases &phases,
+      const FilterBank &filters, const PairFrames &frames, int first, int end,
       int worker, const Use &use);
 
 private:
@@ -46,8 +41,6 @@ private:
     std::vector<BoxFilter> sums;
   };
 
-  const Phases &phases_;
-  FilterBank filters_;
   std::vector<Room> rooms_; ///< one at least
 };
 

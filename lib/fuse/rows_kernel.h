@@ -99,17 +99,23 @@ fade_ratio (const float *a, const float *b, float floor, const fuse::Fade &fade,
 }
 
 inline void
-prefer (const fuse::PreferRow &row, float *__restrict to)
+prefer (const fuse::PreferRow &row, float *const *to)
 {
-  const float *first = row.first, *second = row.second;
-  const float floor = row.floor, least = row.min_share;
-  const int count = row.count;
-  for (int x = 0; x < count; x++) {
-    const float ratio =
-        clamped ((first[x] + floor) / (second[x] + floor), 0.0f, 1e3f);
-    const float fourth = ratio * ratio * ratio * ratio;
-    const float part = 1.0f / (1.0f + fourth * fourth);
-    to[x] = clamped ((part - least) / (1.0f - 2.0f * least), 0.0f, 1.0f);
+  for (int x = 0; x < row.count; x += kFloats) {
+    Floats best = load (row.errors[0] + x) + row.floor;
+    for (int i = 1; i < row.models; i++)
+      best = smaller (best, load (row.errors[i] + x) + row.floor);
+    Floats sum = {};
+    for (int i = 0; i < row.models; i++) {
+      const Floats ratio = best / (load (row.errors[i] + x) + row.floor);
+      const Floats fourth = ratio * ratio * ratio * ratio;
+      const Floats weight = fourth * fourth;
+      const Floats kept = weight < row.min_weight ? Floats{} : weight;
+      sum += kept;
+      store (to[i] + x, kept);
+    }
+    for (int i = 0; i < row.models; i++)
+      store (to[i] + x, load (to[i] + x) / sum);
   }
 }
 
@@ -117,19 +123,19 @@ inline void
 share (const fuse::ShareRow &row, float *__restrict base, float *const *shares)
 {
   const float *weight = row.weight, *light = row.light;
-  const float *preference = row.preference;
-  float *__restrict first = shares[0];
-  float *__restrict second = preference ? shares[1] : nullptr;
   const int count = row.count;
-  for (int x = 0; x < count; x++) {
+  for (int x = 0; x < count; x++)
     base[x] = weight[x] * light[x];
-    first[x] = 1.0f - weight[x];
-  }
-  if (preference)
-    for (int x = 0; x < count; x++) {
-      second[x] = first[x] * (1.0f - preference[x]);
-      first[x] *= preference[x];
+  for (int i = 0; i < row.models; i++) {
+    float *__restrict to = shares[i];
+    for (int x = 0; x < count; x++)
+      to[x] = 1.0f - weight[x];
+    if (row.preferences) {
+      const float *preference = row.preferences[i];
+      for (int x = 0; x < count; x++)
+        to[x] *= preference[x];
     }
+  }
 }
 
 inline void

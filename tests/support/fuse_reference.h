@@ -161,7 +161,7 @@ filtered_pairs (const PairRow &row, int x, int k)
   for (int t = 0; t < row.taps; t++) {
     const std::int32_t weights =
         row.weights[(t * row.outputs + k) * row.width + i];
-    const std::int32_t values = row.source[x + row.offsets[t]];
+    const std::int32_t values = row.sources[t][x];
     for (const int shift : {0, 16})
       sum += std::int64_t (std::int16_t (weights >> shift)) *
              std::int16_t (values >> shift);
@@ -246,15 +246,22 @@ reference_fade_ratio (const float *a, const float *b, float floor,
 }
 
 inline void
-reference_prefer (const PreferRow &row, float *to)
+reference_prefer (const PreferRow &row, float *const *to)
 {
   for (int x = 0; x < row.count; x++) {
-    const float ratio = std::min (
-        (row.first[x] + row.floor) / (row.second[x] + row.floor), 1e3f);
-    const float fourth = ratio * ratio * ratio * ratio;
-    const float share = 1.0f / (1.0f + fourth * fourth);
-    to[x] = std::clamp (
-        (share - row.min_share) / (1.0f - 2.0f * row.min_share), 0.0f, 1.0f);
+    float best = 1e30f, sum = 0.0f;
+    for (int i = 0; i < row.models; i++)
+      best = std::min (best, row.errors[i][x] + row.floor);
+    for (int i = 0; i < row.models; i++) {
+      const float ratio = best / (row.errors[i][x] + row.floor);
+      const float fourth = ratio * ratio * ratio * ratio;
+      to[i][x] = fourth * fourth;
+      if (to[i][x] < row.min_weight)
+        to[i][x] = 0.0f;
+      sum += to[i][x];
+    }
+    for (int i = 0; i < row.models; i++)
+      to[i][x] /= sum;
   }
 }
 
@@ -262,11 +269,12 @@ inline void
 reference_share (const ShareRow &row, float *base, float *const *shares)
 {
   for (int x = 0; x < row.count; x++) {
-    const float rest = 1.0f - row.weight[x];
     base[x] = row.weight[x] * row.light[x];
-    shares[0][x] = row.preference ? rest * row.preference[x] : rest;
-    if (row.preference)
-      shares[1][x] = rest * (1.0f - row.preference[x]);
+    for (int i = 0; i < row.models; i++) {
+      shares[i][x] = 1.0f - row.weight[x];
+      if (row.preferences)
+        shares[i][x] *= row.preferences[i][x];
+    }
   }
 }
 

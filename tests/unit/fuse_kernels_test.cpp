@@ -93,6 +93,9 @@ random_pairs (std::size_t count, int seed, int largest)
 TEST (FuseKernels, FiltersOfPairsEqualTheReference)
 {
   const auto source = random_pairs (4096, 1, 0);
+  std::vector<const std::int32_t *> sources;
+  for (const std::ptrdiff_t offset : kOffsets)
+    sources.push_back (source.data () + 1000 + offset);
   std::vector<float> share (256, 0.0f);
   for (std::size_t x = 20; x < 60; x += 3)
     share[x] = 0.25f * float (x % 5);
@@ -104,9 +107,9 @@ TEST (FuseKernels, FiltersOfPairsEqualTheReference)
       auto scale = random_numbers (std::size_t (outputs * width), 3);
       repeat_rows (weights, width, period);
       repeat_rows (scale, width, period);
-      const fuse::PairRow row{source.data () + 1000, kCount, kOffsets.data (),
-          int (kOffsets.size ()), weights.data (), scale.data (), 127.5f, width,
-          outputs, period, period / 2};
+      const fuse::PairRow row{sources.data (), kCount, int (sources.size ()),
+          weights.data (), scale.data (), 127.5f, width, outputs, period,
+          period / 2};
       const auto filtered = [&] (const fuse::Kernels &kernels, bool add) {
         return outputs_of (outputs, kCount, [&] (float *const *to) {
           if (add)
@@ -181,13 +184,17 @@ rated (const fuse::Kernels &kernels)
   kernels.fade_ratio (
       slope.data (), offset.data (), 3.0f, {1.3f, 1.8f}, kCount, to.data ());
   add (to);
-  kernels.prefer (
-      {slope.data (), offset.data (), 7.0f, 0.01f, kCount}, to.data ());
-  add (to);
-  for (const float *preference :
-      {slope.data (), static_cast<const float *> (nullptr)}) {
-    float *const shares[] = {more.data (), third.data ()};
-    kernels.share ({offset.data (), light.data (), preference, kCount},
+  const float *const rows[] = {slope.data (), offset.data (), frames.data ()};
+  float *const outputs[] = {to.data (), more.data (), third.data ()};
+  for (const int models : {2, 3}) {
+    kernels.prefer ({rows, models, 7.0f, 0.01f, kCount}, outputs);
+    for (const auto &row : {to, more, third})
+      add (row);
+  }
+  float *const shares[] = {more.data (), third.data ()};
+  for (const int models : {1, 2}) {
+    kernels.share ({offset.data (), light.data (), models > 1 ? rows : nullptr,
+                       models, kCount},
         to.data (), shares);
     for (const auto &row : {to, more, third})
       add (row);

@@ -408,6 +408,27 @@ TEST (Fuse, FastTakesTheModelThatFits)
   }
 }
 
+/* The second of three coded frames, beside the same frame alone. */
+TEST (Fuse, NeighbouringFramesHelpWhatMovesSlowly)
+{
+  const Schedule schedule = schedule_of ("sequential:lattice:4/2");
+  const auto picture = [] (int slot) { return discs (0.1, slot); };
+  const auto coded = take (schedule, 3, picture);
+  const auto mean = [&] (const Pictures<> &frames, std::size_t first) {
+    double sum = 0.0;
+    for (std::size_t s = 0; s < 4; s++)
+      sum += psnr (frames[first + s], picture (int (4 + s))) / 4.0;
+    return sum;
+  };
+  FuseOptions options;
+  const double alone = mean (fuse<std::uint8_t> ({coded[1]}, schedule), 0);
+  const double before = mean (fuse (coded, schedule, options), 4);
+  options.lookahead = 1;
+  const double both = mean (fuse (coded, schedule, options), 4);
+  EXPECT_GT (before, alone + 0.3);
+  EXPECT_GT (both, before + 0.3);
+}
+
 TEST (Fuse, WhatMovesLeavesNoGhosts)
 {
   const Schedule schedule = schedule_of ("sequential:lattice:4/2");

@@ -132,7 +132,7 @@ check_options ()
   check_option pattern "${patterns// /|}" "one of $patterns"
   check_option region '[0-9]{1,2}' 'the number of a region, from 0 on'
   check_option scene 'candle|blown-out|pour' 'candle, blown-out or pour'
-  check_option codec 'raw|ffv1' 'raw or ffv1'
+  check_option codec 'raw|ffv1|auto' 'ffv1, raw or auto'
   check_option port '[1-9][0-9]{0,4}' 'a TCP port'
   check_option wait '[0-9]+(\.[0-9]+)?' 'a number of seconds'
   check_option start '[0-9]+(\.[0-9]+)?' 'a number of seconds'
@@ -273,16 +273,46 @@ sidecar_of ()
   printf '%s.jsonl' "${1%.mkv}"
 }
 
-# Writes coded frames to FFV1 in Matroska with the track of what is known of each
-# frame, and the same to the sidecar. Every frame can be decoded alone; with
-# ticks of 1 µs it has its own cluster.
+# Pixels and bytes depend on the slices, not on the threads.
+ffv1_encoder ()
+{
+  printf 'avenc_ffv1 gop-size=1 slices=4 threads=%s' \
+    "${opt[threads]:-auto}"
+}
+
+# is_raw RECORDING: whether its frames are not compressed.
+is_raw ()
+{
+  LC_ALL=C grep -qa V_UNCOMPRESSED <(head -c 100000 "$1")
+}
+
+# Prints how many frames, and how many bytes, may wait for encoder and disk: 3 s,
+# and a quarter of the memory.
+buffer_limits ()
+{
+  local rate=${frame_rate:-25/1} free
+  free=$(awk '$1 == "MemAvailable:" { print $2 * 256 }' /proc/meminfo)
+  awk -v num="${rate%/*}" -v den="${rate#*/}" -v bytes="${free:-1000000000}" 'BEGIN {
+    frames = 3 * num / den
+    printf "max-size-buffers=%d max-size-bytes=%.0f max-size-time=0",
+      (frames < 75 ? 75 : frames), (bytes > 4e9 ? 4e9 : bytes) }'
+}
+
+# coded_recording FILE [CODEC]: writes coded frames to Matroska, as FFV1 or raw,
+# with the track of what is known of each frame, and the same to the sidecar.
+# Every frame can be decoded alone; with ticks of 1 µs it has its own cluster.
 coded_recording ()
 {
+  local encoder mode=
+  encoder="$(ffv1_encoder) !"
+  if [ "${2:-ffv1}" = raw ]; then
+    encoder='' mode='buffer-mode=unbuffered '
+  fi
   printf 'codedexposure-log name=log location=%s ! ' \
     "$(quoted "$(sidecar_of "$1")")"
-  printf 'queue max-size-buffers=75 max-size-bytes=0 max-size-time=0 ! '
-  printf 'avenc_ffv1 gop-size=1 slices=4 threads=auto ! matroskamux name=mux '
-  printf 'timecodescale=1000 ! filesink location=%s ' "$(quoted "$1")"
+  printf 'queue name=buffer %s ! %s matroskamux name=mux ' "$(buffer_limits)" \
+    "$encoder"
+  printf 'timecodescale=1000 ! filesink %slocation=%s ' "$mode" "$(quoted "$1")"
   printf 'log.track ! queue max-size-buffers=0 max-size-time=0 ! mux.subtitle_0 '
 }
 
@@ -310,8 +340,7 @@ launch_decoder ()
 
 lossless_video ()
 {
-  printf 'avenc_ffv1 gop-size=1 slices=4 threads=%s ! ' \
-    "${opt[threads]:-auto}"
+  printf '%s ! ' "$(ffv1_encoder)"
   printf 'matroskamux timecodescale=1000 ! filesink location=%s ' \
     "$(quoted "$1")"
 }
@@ -335,16 +364,16 @@ check_recording ()
   # The names of its codecs are at its beginning.
   codec=$(head -c 100000 "$1" | LC_ALL=C grep -aoE '[VA]_[A-Z0-9/_]{3,30}|FFV1' \
     | tr '\n' ' ') || true
-  [ -z "$codec" ] || [[ $codec == *FFV1* ]] \
-    || die "$1 has ${codec% }, but coded frames are recorded as FFV1; use a" \
-      "recording of $(sibling record) or $(sibling simulate)"
+  [ -z "$codec" ] || [[ $codec == *FFV1* || $codec == *V_UNCOMPRESSED* ]] \
+    || die "$1 has ${codec% }, but coded frames are recorded as FFV1 or raw; use" \
+      "a recording of $(sibling record) or $(sibling simulate)"
 }
 
 # check_recording_name OPTION: whether its value can be written.
 check_recording_name ()
 {
   [[ ${opt[$1]} == *.mkv ]] || usage_error "--$1 ${opt[$1]}: coded frames are" \
-    "recorded as FFV1 in Matroska; end the name in .mkv"
+    "recorded in Matroska; end the name in .mkv"
 }
 
 # Writes frames to a file by its ending: FFV1, H.264, a stack, or a folder of

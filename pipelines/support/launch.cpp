@@ -12,12 +12,14 @@
 
 #include <sys/prctl.h>
 
+#include "buffer_watch.h"
 #include "byte_watch.h"
 #include "each_element.h"
 #include "excerpt.h"
 #include "frame_counter.h"
 #include "frame_limit.h"
 #include "leaky_queue.h"
+#include "plain_text.h"
 #include "player.h"
 #include "screen.h"
 #include "whole_picture.h"
@@ -49,14 +51,16 @@ struct Options {
   gchar *receiver = nullptr; // tcpserversink to wait for
   gdouble retry = 0;         // time for which to try to connect, s
   FrameCounter::Times times;
-  gchar *excerpt = nullptr;   // FROM:UNTIL:BEFORE:AFTER, of Excerpt
-  gchar *ledger = nullptr;    // file for what came of each coded frame of it
-  gboolean salvage = FALSE;   // go on after damage of the container
-  gchar *need = nullptr;      // name of an element message that must come
-  gboolean camera = FALSE;    // frames come all the time
-  gboolean no_result = FALSE; // print no result
-  gboolean force = FALSE;     // replace files that exist
-  gboolean verbose = FALSE;   // also print messages and counters of elements
+  gchar *excerpt = nullptr;    // FROM:UNTIL:BEFORE:AFTER, of Excerpt
+  gchar *ledger = nullptr;     // file for what came of each coded frame of it
+  gboolean salvage = FALSE;    // go on after damage of the container
+  gchar *plain_text = nullptr; // element whose texts become plain
+  gchar *need = nullptr;       // name of an element message that must come
+  gboolean camera = FALSE;     // frames come all the time
+  gboolean live = FALSE;       // frames come in real time
+  gboolean no_result = FALSE;  // print no result
+  gboolean force = FALSE;      // replace files that exist
+  gboolean verbose = FALSE;    // also print messages and counters of elements
 };
 
 class Launch : public Player
@@ -106,6 +110,8 @@ private:
   std::unique_ptr<FrameCounter> counter_;
   std::vector<std::unique_ptr<LeakyQueue>> leaky_queues_;
   std::unique_ptr<ByteWatch> byte_watch_;
+  ObjectPtr<GstElement> buffer_;
+  std::unique_ptr<BufferWatch> buffer_watch_;
   std::unique_ptr<FrameLimit> limit_;
   std::unique_ptr<ExcerptFilter> excerpt_;
   std::unique_ptr<Window> window_;
@@ -235,6 +241,15 @@ Launch::run ()
     byte_watch_ =
         std::make_unique<ByteWatch> (demuxer.get (), counter_->frames ());
   }
+  if (options_.plain_text) {
+    const ObjectPtr<GstElement> texts = find (options_.plain_text);
+    const ObjectPtr<GstElement> demuxer = find ("file");
+    make_texts_plain (texts.get ());
+    keep_times_of_file (demuxer.get ());
+  }
+  buffer_ = find ("buffer");
+  if (buffer_ && options_.live)
+    buffer_watch_ = std::make_unique<BufferWatch> (buffer_.get ());
   if (const ObjectPtr<GstElement> limit = find ("limit"))
     limit_ = std::make_unique<FrameLimit> (limit.get ());
   const guint ticks = g_timeout_add (200, on_tick, this);
@@ -513,6 +528,9 @@ Launch::tick ()
       std::chrono::duration<double> (Clock::now () - began_).count ();
   const gint64 frames = this->frames ();
   watch_for_silence (frames);
+  if (buffer_watch_ && !interrupted_ && !failed_)
+    if (const std::string text = buffer_watch_->tick (); !text.empty ())
+      status_.line (text);
   if (!counter_ || frames == 0)
     return;
   if (window_) {
@@ -589,6 +607,10 @@ main (int argc, char **argv)
           "Element message without which the run has failed", "NAME"},
       {"camera", 0, 0, G_OPTION_ARG_NONE, &options.camera,
           "Warn if no frame comes for 5 s", nullptr},
+      {"live", 0, 0, G_OPTION_ARG_NONE, &options.live,
+          "Warn if the queue \"buffer\" fills", nullptr},
+      {"plain-text", 0, 0, G_OPTION_ARG_STRING, &options.plain_text,
+          "Element whose texts become plain", "NAME"},
       {"no-result", 0, 0, G_OPTION_ARG_NONE, &options.no_result,
           "Do not print the result", nullptr},
       {"force", 0, 0, G_OPTION_ARG_NONE, &options.force,
@@ -622,6 +644,7 @@ main (int argc, char **argv)
   g_free (options.count);
   g_free (options.receiver);
   g_free (options.need);
+  g_free (options.plain_text);
   g_free (options.excerpt);
   g_free (options.ledger);
   gst_deinit ();

@@ -114,9 +114,10 @@ class Recording:
             raise Error(f"{self.path} is not a Matroska file; use a recording "
                         "of codedexposure-record or codedexposure-simulate")
         codecs = re.findall(rb"[VA]_[A-Z0-9/_]{3,30}|FFV1", head)
-        if codecs and not any(b"FFV1" in codec for codec in codecs):
+        if codecs and not any(b"FFV1" in codec or codec == b"V_UNCOMPRESSED"
+                              for codec in codecs):
             raise Error(f"{self.path} has {codecs[0].decode()}, but coded "
-                        "frames are recorded as FFV1")
+                        "frames are recorded as FFV1 or raw")
         self._cut = self._is_cut_short(head)
 
     def _is_cut_short(self, head: bytes) -> bool:

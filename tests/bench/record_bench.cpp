@@ -1,0 +1,252 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Speed of recording coded frames from memory:
+ *   record_bench [FOLDER [WIDTH HEIGHT [SECONDS [RATE]]]]
+ * FOLDER is memory-backed by default, so that no disk is measured. */
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <functional>
+#include <memory>
+#include <random>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <fcntl.h>
+#include <gst/app/gstappsrc.h>
+#include <gst/gst.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include "common/raii.h"
+
+namespace
+{
+
+using namespace codedexposure::gst;
+using Clock = std::chrono::steady_clock;
+
+struct Setting {
+  std::string folder = "/dev/shm";
+  int width = 4096, height = 3072;
+  double seconds = 10, rate = 100;
+
+  std::size_t size () const { return std::size_t (width) * height; }
+  std::string file () const { return folder + "/record_bench.mkv"; }
+};
+
+double
+seconds_since (Clock::time_point begin)
+{
+  return std::chrono::duration<double> (Clock::now () - begin).count ();
+}
+
+double
+processor_seconds ()
+{
+  rusage used = {};
+  getrusage (RUSAGE_SELF, &used);
+  const auto seconds = [] (const timeval &time) {
+    return double (time.tv_sec) + 1e-6 * double (time.tv_usec);
+  };
+  return seconds (used.ru_utime) + seconds (used.ru_stime);
+}
+
+/** Frames of noise on a gradient, more than the caches hold. */
+class Ring
+{
+public:
+  static constexpr std::size_t kFrames = 8;
+
+  explicit Ring (std::size_t size)
+  {
+    std::minstd_rand random (1);
+    for (auto &frame : frames_) {
+      frame.resize (size);
+      for (std::size_t i = 0; i < size; i++)
+        frame[i] = std::uint8_t (i / 4096 % 128 + random () % 16);
+    }
+  }
+  std::vector<std::uint8_t> &frame (gint64 k)
+  {
+    return frames_[std::size_t (k) % kFrames];
+  }
+
+private:
+  std::array<std::vector<std::uint8_t>, kFrames> frames_;
+};
+
+struct Speed {
+  double rate = 0;  ///< frames/s
+  double cores = 0; ///< that it got
+};
+
+/** Of @p work, for half a second. */
+Speed
+speed_of (const std::function<void (gint64)> &work)
+{
+  const double used = processor_seconds ();
+  const auto begin = Clock::now ();
+  gint64 frames = 0;
+  while (seconds_since (begin) < 0.5)
+    work (frames++);
+  const double seconds = seconds_since (begin);
+  return {double (frames) / seconds, (processor_seconds () - used) / seconds};
+}
+
+Speed
+memcpy_speed (const Setting &setting, Ring &ring)
+{
+  Ring copies (setting.size ());
+  return speed_of ([&] (gint64 k) {
+    std::memcpy (
+        copies.frame (k).data (), ring.frame (k).data (), setting.size ());
+  });
+}
+
+/** Plain write () to a file that is new. */
+Speed
+write_speed (const Setting &setting, Ring &ring)
+{
+  const int file =
+      open (setting.file ().c_str (), O_CREAT | O_TRUNC | O_WRONLY, 0666);
+  const Speed speed = speed_of ([&] (gint64 k) {
+    if (write (file, ring.frame (k).data (), setting.size ()) < 0)
+      std::perror ("write");
+  });
+  close (file);
+  unlink (setting.file ().c_str ());
+  return speed;
+}
+
+/** Frames that may wait for the disk, as in a recording. */
+constexpr guint kWaiting = 75;
+
+struct Run {
+  gint64 frames = 0, lost = 0;
+  double seconds = 0, cores = 0;
+};
+
+/** @p rate  frames/s of the source, which drops frames while kWaiting wait; 0:
+ * as fast as they are taken, in 2 s. */
+Run
+record (
+    const Setting &setting, Ring &ring, const std::string &codec, double rate)
+{
+  const std::string description =
+      "appsrc name=in format=time caps=\"video/x-raw,format=GRAY8,width=" +
+      std::to_string (setting.width) +
+      ",height=" + std::to_string (setting.height) +
+      ",framerate=100/1\" ! codedexposure-log name=log ! queue name=buffer "
+      "max-size-buffers=" +
+      std::to_string (rate > 0 ? kWaiting : 2) +
+      " max-size-bytes=0 max-size-time=0 ! " + codec +
+      " matroskamux name=mux timecodescale=1000 ! filesink "
+      "buffer-mode=unbuffered location=" +
+      setting.file () +
+      " log.track ! queue max-size-buffers=0 max-size-time=0 ! mux.subtitle_0";
+  const ObjectPtr<GstElement> pipeline (
+      gst_parse_launch (description.c_str (), nullptr));
+  const ObjectPtr<GstElement> in (
+      gst_bin_get_by_name (GST_BIN (pipeline.get ()), "in"));
+  const ObjectPtr<GstElement> queue (
+      gst_bin_get_by_name (GST_BIN (pipeline.get ()), "buffer"));
+  g_object_set (in.get (), "block", TRUE, "max-buffers", guint64 (2), nullptr);
+  gst_element_set_state (pipeline.get (), GST_STATE_PLAYING);
+  Run run;
+  const double length = rate > 0 ? setting.seconds : 2;
+  const double used = processor_seconds ();
+  const auto begin = Clock::now ();
+  for (gint64 k = 0; seconds_since (begin) < length; k++) {
+    if (rate > 0)
+      std::this_thread::sleep_until (
+          begin + std::chrono::duration_cast<Clock::duration> (
+                      std::chrono::duration<double> (double (k) / rate)));
+    guint waiting = 0;
+    g_object_get (queue.get (), "current-level-buffers", &waiting, nullptr);
+    if (rate > 0 && waiting >= kWaiting) {
+      run.lost++;
+      continue;
+    }
+    auto &frame = ring.frame (k);
+    GstBuffer *buffer = gst_buffer_new_wrapped_full (GST_MEMORY_FLAG_READONLY,
+        frame.data (), frame.size (), 0, frame.size (), nullptr, nullptr);
+    GST_BUFFER_PTS (buffer) = guint64 (k) * (GST_SECOND / 100);
+    GST_BUFFER_DURATION (buffer) = GST_SECOND / 100;
+    gst_app_src_push_buffer (GST_APP_SRC (in.get ()), buffer);
+    run.frames++;
+  }
+  gst_app_src_end_of_stream (GST_APP_SRC (in.get ()));
+  const ObjectPtr<GstBus> bus (gst_element_get_bus (pipeline.get ()));
+  GstMessage *end = gst_bus_timed_pop_filtered (bus.get (), 300 * GST_SECOND,
+      GstMessageType (GST_MESSAGE_EOS | GST_MESSAGE_ERROR));
+  if (!end || GST_MESSAGE_TYPE (end) != GST_MESSAGE_EOS)
+    std::printf ("The recording failed.\n");
+  gst_clear_message (&end);
+  run.seconds = seconds_since (begin);
+  run.cores = (processor_seconds () - used) / run.seconds;
+  gst_element_set_state (pipeline.get (), GST_STATE_NULL);
+  unlink (setting.file ().c_str ());
+  return run;
+}
+
+void
+print (const Setting &setting, const char *name, const Speed &speed,
+    const Speed &reference)
+{
+  std::printf ("| %s | %.1f | %.2f | %.2f | %.2f | %.0f |\n", name, speed.rate,
+      speed.rate * double (setting.size ()) / 1e9, speed.rate / reference.rate,
+      speed.cores, speed.rate / speed.cores);
+}
+
+void
+run_all (const Setting &setting)
+{
+  Ring ring (setting.size ());
+  const Speed copies = memcpy_speed (setting, ring);
+  std::printf ("%dx%d, 8 bits, %s\n\n", setting.width, setting.height,
+      setting.folder.c_str ());
+  std::printf (
+      "| | coded frames/s | GB/s | of memcpy | cores | frames/s of a core |\n"
+      "|---|---|---|---|---|---|\n");
+  print (setting, "memcpy", copies, copies);
+  print (
+      setting, "write () to a new file", write_speed (setting, ring), copies);
+  for (const auto &[name, codec] : {std::pair ("raw", ""),
+           std::pair (
+               "FFV1", "avenc_ffv1 gop-size=1 slices=4 threads=auto !")}) {
+    const Run run = record (setting, ring, codec, 0);
+    print (
+        setting, name, {double (run.frames) / run.seconds, run.cores}, copies);
+  }
+  const Run live = record (setting, ring, "", setting.rate);
+  std::printf ("\nraw at %g frames/s for %g s: %" G_GINT64_FORMAT
+               " recorded, %" G_GINT64_FORMAT
+               " lost, %.2f cores, %.1f s until all were written\n",
+      setting.rate, setting.seconds, live.frames, live.lost, live.cores,
+      live.seconds);
+}
+
+} // namespace
+
+int
+main (int argc, char **argv)
+{
+  gst_init (&argc, &argv);
+  std::setvbuf (stdout, nullptr, _IOLBF, 0);
+  Setting setting;
+  if (argc > 1)
+    setting.folder = argv[1];
+  if (argc > 3) {
+    setting.width = std::atoi (argv[2]);
+    setting.height = std::atoi (argv[3]);
+  }
+  if (argc > 4)
+    setting.seconds = std::atof (argv[4]);
+  if (argc > 5)
+    setting.rate = std::atof (argv[5]);
+  run_all (setting);
+}

@@ -82,12 +82,12 @@ method_named (const std::string &name)
 FuseQuality
 quality_named (const std::string &name)
 {
-  for (const FuseQuality quality :
-      {FuseQuality::kFast, FuseQuality::kBalanced, FuseQuality::kBest})
+  for (const FuseQuality quality : {FuseQuality::kFast, FuseQuality::kBalanced,
+           FuseQuality::kBest, FuseQuality::kLearned})
     if (quality_name (quality) == name)
       return quality;
   throw py::value_error (
-      "quality '" + name + "' is not fast, balanced or best");
+      "quality '" + name + "' is not fast, balanced, best or learned");
 }
 
 template <typename Pixel>

@@ -41,6 +41,11 @@
  * than half of a core of a fast processor. `balanced` and `best` look for the
  * motion around each pixel, take a hundred times as long, and are for decoding
  * of recordings; #codedexposure-fuse:threads share their work.
+ * `learned`, and #codedexposure-fuse:refine with the others, corrects the
+ * result by a small network that learned from photographs; nothing else learns
+ * from pictures. Schedules and noise that it was not trained for post a
+ * WARNING, and the result stays as it was.
+ *
  * Tell the element about the camera's noise (#codedexposure-fuse:full-well,
  * #codedexposure-fuse:read-noise), or give it a bench profile, which a
  * recording may carry: it filters more where the noise is larger, and tells
@@ -118,16 +123,24 @@ G_DEFINE_ENUM_TYPE (GstCodedExposureQuality, gst_coded_exposure_quality,
     {int (FuseQuality::kBest),
         "more motions, and collaborative filtering of similar blocks; for "
         "recordings",
-        "best"});
+        "best"},
+    {int (FuseQuality::kLearned),
+        "best, then refined by a network that learned from pictures",
+        "learned"});
 
 const PropertyTable<Settings> &
 Fuse::properties ()
 {
   static const PropertyTable<Settings> table{
       {"quality", "Quality",
-          "Quality against speed; balanced and best are for up to 16 slots",
+          "Quality against speed; all but fast are for up to 16 slots",
           kReadWrite, &FuseOptions::quality,
           gst_coded_exposure_quality_get_type ()},
+      {"refine", "Refine",
+          "Refine the result by a network that learned from pictures, as "
+          "quality=learned does with best; for one-hot codes of 2 to 16 slots, "
+          "others stay as they are, with a warning",
+          kReadWrite, &FuseOptions::refine},
       {"lookahead", "Lookahead",
           "Coded frames to wait for before one is fused; static pixels are "
           "then known from the first frame on; each adds a frame period to the "
@@ -136,7 +149,7 @@ Fuse::properties ()
           guint (Fuser<std::uint8_t>::kMaxLookahead)},
       {"threads", "Threads",
           "Threads, which do not change pixels; 0: one for each processor, and "
-          "for quality fast, the streaming thread only",
+          "for quality fast without refine, the streaming thread only",
           kReadWrite, &FuseOptions::threads, 0u, guint (Workers::kMost)},
       {"full-well", "Full well",
           "Electrons at white in a pixel that is on for the whole exposure, as "
@@ -355,8 +368,23 @@ Fuse::method_name () const
 {
   auto *qualities =
       G_ENUM_CLASS (g_type_class_peek (gst_coded_exposure_quality_get_type ()));
-  return std::string ("fuse ") +
-         g_enum_get_value (qualities, int (in_force_.quality))->value_nick;
+  const bool learned = in_force_.quality == FuseQuality::kLearned;
+  const auto quality = learned ? FuseQuality::kBest : in_force_.quality;
+  std::string name = std::string ("fuse ") +
+                     g_enum_get_value (qualities, int (quality))->value_nick;
+  if ((learned || in_force_.refine) && unrefined ().empty ())
+    name += ", learned " + refinement_hash ();
+  return name;
+}
+
+/* Why the result is not refined although it should be. */
+std::string
+Fuse::unrefined () const
+{
+  return plan_ ? std::visit (
+                     [] (const auto &fuser) { return fuser.unrefined (); },
+                     plan_->fuser)
+               : std::string ();
 }
 
 /* A pixel at the largest value has seen the light of white_slots () slots. */
@@ -437,6 +465,9 @@ Fuse::plan (const CodedFormat &format)
   Plan made{std::move (*fuser), {}, options.lookahead};
   gst_video_info_from_caps (&made.fused, caps.get ());
   plan_ = std::move (made);
+  if (const std::string reason = unrefined (); !reason.empty ())
+    POST_WARNING (element (), STREAM, FORMAT,
+        "The result is not refined: " + reason + ".");
   const ObjectLock lock (element ());
   caps_ = std::move (caps);
   return true;

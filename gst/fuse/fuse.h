@@ -73,6 +73,7 @@ private:
   RectifyOptions rectify_options (const Schedule &schedule) const override;
   SensorNoise noise (const Schedule &schedule) const;
   std::string method_name () const override;
+  std::string unrefined () const;
 
   template <typename Pixel>
   Result<guint64> take_pixels (MappedFrame &coded);

@@ -142,6 +142,11 @@ Engine::Engine (const Schedule &schedule, int width, int height,
   map_noise (schedule);
   find_margin (schedule);
   prepare (schedule, options);
+  if (options.refine)
+    unrefined_ = Refiner::why_not (schedule, observation_, typical_noise ());
+  if (options.refine && unrefined_.empty ())
+    refiner_.emplace (
+        schedule, width, height, observation_.noise_free (), typical_noise ());
 }
 
 void
@@ -442,6 +447,10 @@ bool
 Engine::fuse (const RowSink &sink, Workers &workers, std::stop_token stop)
 {
   const Coded &coded = queue_.front ();
+  const RowSink estimated = [this] (int y, const float *const *slots) {
+    refiner_->set_row (y, slots);
+  };
+  const RowSink &out = refiner_ ? estimated : sink;
   const StaticPixels::Frames frames{
       coded.light, queue_.size () > 1 ? &queue_[1].light : nullptr, noise_};
   PairFrames neighbours{nullptr, &coded.pairs, nullptr};
@@ -460,11 +469,15 @@ Engine::fuse (const RowSink &sink, Workers &workers, std::stop_token stop)
   each_part (workers, [&] (StaticPixels::Rows rows) {
     static_pixels_.average (kernels_, frames, rows);
     if (!models_.empty ())
-      fuse_linear (filters, neighbours, sink, rows);
+      fuse_linear (filters, neighbours, out, rows);
   });
   static_pixels_.finish (frames);
-  const bool done =
-      !models_.empty () || fuse_motion (coded, sink, workers, std::move (stop));
+  bool done = !models_.empty () || fuse_motion (coded, out, workers, stop);
+  if (done && refiner_)
+    done = refiner_->run (
+        kernels_, coded.light,
+        [this] (int y) { return static_pixels_.weight (y); }, sink, workers,
+        stop);
   spare_ = std::exchange (previous_, std::move (queue_.front ()));
   queue_.pop_front ();
   return done;

@@ -8,6 +8,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "base/result.h"
@@ -18,6 +19,7 @@
 #include "fuse/fuser.h"
 #include "fuse/motion.h"
 #include "fuse/predictions.h"
+#include "fuse/refine.h"
 #include "fuse/static_pixels.h"
 
 namespace codedexposure::fuse
@@ -38,6 +40,9 @@ public:
   int width () const { return width_; }
   int height () const { return height_; }
   const Kernels &kernels () const { return kernels_; }
+
+  /** Why options.refine has no effect here; empty if it has or is not set. */
+  const std::string &unrefined () const { return unrefined_; }
 
   /** A field to write the next coded frame to, times gain () row by row. */
   Field &next ();
@@ -103,6 +108,8 @@ private:
   std::optional<MotionFilter> motion_;
   std::optional<CollaborativeFilter> collaborative_;
   std::vector<Field> light_; ///< of each slot, unless fast
+  std::optional<Refiner> refiner_;
+  std::string unrefined_;
   NoiseMap noise_;
   Field gain_; ///< empty if it is 1 everywhere
   StaticPixels static_pixels_;

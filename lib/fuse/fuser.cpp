@@ -16,7 +16,8 @@ namespace codedexposure
 namespace
 {
 
-constexpr std::string_view kQualityNames[] = {"fast", "balanced", "best"};
+constexpr std::string_view kQualityNames[] = {
+    "fast", "balanced", "best", "learned"};
 constexpr float kWhite = 255.0f;
 
 void
@@ -151,6 +152,12 @@ fuse_targets ()
   return names;
 }
 
+const std::string &
+refinement_hash ()
+{
+  return fuse::RefineNetwork::trained ().hash ();
+}
+
 template <typename Pixel>
 struct Fuser<Pixel>::State {
   /** The background, or the whole frame, and the regions. */
@@ -272,8 +279,13 @@ Fuser<Pixel>::~Fuser () = default;
 template <typename Pixel>
 Result<Fuser<Pixel>>
 Fuser<Pixel>::make (
-    const Schedule &schedule, int width, int height, const FuseOptions &options)
+    const Schedule &schedule, int width, int height, const FuseOptions &wanted)
 try {
+  FuseOptions options = wanted;
+  if (wanted.quality == FuseQuality::kLearned) {
+    options.quality = FuseQuality::kBest;
+    options.refine = true;
+  }
   constexpr int kBits = 8 * int (sizeof (Pixel));
   if (options.bits < 0 || options.bits > kBits)
     return Error{"bits " + std::to_string (options.bits) +
@@ -291,7 +303,8 @@ try {
       find_covers (schedule, {width, height - schedule.pilot_rows ()}),
       schedule.slots (), float (largest),
       std::make_unique<Workers> (
-          options.threads == 0 && options.quality == FuseQuality::kFast
+          options.threads == 0 && options.quality == FuseQuality::kFast &&
+                  !options.refine
               ? 1
               : options.threads)});
   return Fuser (std::move (state));
@@ -304,6 +317,16 @@ int
 Fuser<Pixel>::slots () const
 {
   return state_->slots;
+}
+
+template <typename Pixel>
+std::string
+Fuser<Pixel>::unrefined () const
+{
+  for (const Piece &piece : state_->pieces)
+    if (!piece.engine->unrefined ().empty ())
+      return piece.engine->unrefined ();
+  return {};
 }
 
 template <typename Pixel>

@@ -6,6 +6,7 @@
 #include <memory>
 #include <span>
 #include <stop_token>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -23,26 +24,33 @@ enum class FuseQuality {
   kFast,     ///< one linear filter a pixel, for live pictures
   kBalanced, ///< the filter of the motion that fits around each pixel
   kBest,     ///< balanced, then collaborative filtering
+  kLearned,  ///< best, then refined
 };
 
 struct FuseOptions {
   FuseQuality quality = FuseQuality::kFast;
+  /** Refine the result by a network that learned from pictures. Otherwise,
+   * nothing is learned from pictures but the parameters of the scene model. */
+  bool refine = false;
   /** Later coded frames that are used to fuse one: 0 or 1. */
   int lookahead = 0;
   /** Significant bits of a pixel, 1..8 or 1..16; 0: all that the type has. */
   int bits = 0;
   SensorNoise noise;
   SceneModel scene;
-  /** Threads, 1..64; 0: one per processor, and for fast, only the caller's. The
-   * pixels do not depend on it. */
+  /** Threads, 1..64; 0: one per processor, and for fast without refine, only
+   * the caller's. The pixels do not depend on it. */
   int threads = 0;
   /** One of fuse_targets (), all of which give the same pixels; empty: the
    * fastest. */
   std::string_view target = {};
 };
 
-/** "fast", "balanced" or "best". */
+/** "fast", "balanced", "best" or "learned". */
 std::string_view quality_name (FuseQuality quality);
+
+/** Names the weights of the refinement: a hash with 16 hexadecimal digits. */
+const std::string &refinement_hash ();
 
 /** The instruction sets that fusion can use on this machine, fastest first. */
 std::vector<std::string_view> fuse_targets ();
@@ -87,6 +95,10 @@ public:
   ~Fuser ();
 
   int slots () const;
+  /** Why frames, or a region of them, are not refined although the options say
+   * so: the schedule or the noise is not among those of the training. Empty if
+   * they are refined, or should not be. */
+  std::string unrefined () const;
   /** Of the fused frames: the coded frame's without the pilot's rows. */
   Extent size () const;
 

@@ -31,7 +31,7 @@ find_kernels ()
     found.push_back (fuse_avx512vnni::kernels);
   if (wide)
     found.push_back (fuse_avx512::kernels);
-  if (__builtin_cpu_supports ("avx2"))
+  if (__builtin_cpu_supports ("avx2") && __builtin_cpu_supports ("fma"))
     found.push_back (fuse_avx2::kernels);
 #endif
   found.push_back (fuse_baseline::kernels);

@@ -120,6 +120,31 @@ struct ShareRow {
   int count;
 };
 
+/** Outputs of a convolution come in multiples of this, 1 or 2 times. */
+constexpr int kConvolveLanes = 16;
+
+/**
+ * One row of a 3x3 convolution. A pixel of a source row has @p inputs values,
+ * one of the result @p outputs. Output k at x is
+ *
+ *   bias[k] + sum over taps t = 3 row + column, then inputs i, of
+ *             weights[(t inputs + i) outputs + k]
+ *             * source[row][(x + column) inputs + i],
+ *
+ * summed in this order; the sum with each product is rounded once (fma).
+ */
+struct ConvolveRow {
+  const float *const *source; ///< three rows, from the pixel before the first
+  int inputs;
+  const float *weights;
+  const float *bias;
+  int outputs; ///< kConvolveLanes or twice as many
+  int pixels;
+  bool hidden;      ///< negative results become 0
+  const float *add; ///< then added, of the result's layout; or null
+  float *to;
+};
+
 /** The kernels of one instruction set; all give the same values. */
 struct Kernels {
   std::string_view name;
@@ -161,6 +186,7 @@ struct Kernels {
    * all coefficients below the threshold but the mean to 0, transforms back,
    * and adds the block weighted with 1 / number of coefficients kept. */
   void (*shrink) (const ShrinkRow &row);
+  void (*convolve) (const ConvolveRow &row);
 };
 
 /** The kernels that this processor can run, widest first. */

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* The kernels of one instruction set, compiled once for each. */
+#include "fuse/convolve_kernel.h"
 #include "fuse/filter_kernel.h"
 #include "fuse/rows_kernel.h"
 #include "fuse/shrink_kernel.h"
@@ -10,6 +11,6 @@ namespace codedexposure::CODEDEXPOSURE_TARGET
 extern const fuse::Kernels kernels;
 const fuse::Kernels kernels = {CODEDEXPOSURE_TARGET_NAME, filter,
     filter_pairs_squared, filter_pairs_add, sum, max, compare, rate, fade_ratio,
-    prefer, share, to_steps, pair, to_bytes, to_words, shrink};
+    prefer, share, to_steps, pair, to_bytes, to_words, shrink, convolve};
 
 } // namespace codedexposure::CODEDEXPOSURE_TARGET

@@ -141,7 +141,8 @@ check_options ()
     'FROM-UNTIL in seconds, such as 10-20 or 10-'
   check_option threads '[1-9]|[1-5][0-9]|6[0-4]' 'a number from 1 to 64'
   check_option jobs '[1-9][0-9]{0,2}' 'a number from 1 to 999'
-  check_option fuse 'fast|balanced|best' 'fast, balanced or best'
+  check_option fuse 'fast|balanced|best|learned' \
+    'fast, balanced, best or learned'
   check_option trigger 'dmd|camera|none' 'dmd, camera or none'
   check_option trigger-edge 'rising|falling' 'rising or falling'
   check_option reconnect '[0-9]{1,9}' 'a number of tries'

@@ -61,6 +61,7 @@ debhelper|steps of building a Debian package|package
 dh-python|Debian package of the Python package|package
 lintian|checks Debian packages|check
 libopencv-calib3d-dev|a chessboard on the mirrors, for doctor|tests package
+libopencv-dnn-dev|runs the refinement of fusion, for comparison|tests
 libopencv-video-dev|calibration with OpenCV, for comparison|rivals
 '
 

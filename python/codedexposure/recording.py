@@ -89,7 +89,7 @@ class Recording:
               bits: int | None = None) -> Iterator[Frame]:
         """Full-size frames at the rate of the subframes.
 
-        quality     fast, balanced or best
+        quality     fast, balanced, best or learned
         full_well   noise of the camera: electrons at white, e-; 0: no noise
         read_noise  noise of the camera, e- rms
         The rest is as for subframes ().

@@ -46,13 +46,14 @@ rank_way (int n, bool normalised)
 }
 
 FusionWay
-fusion_way (int n, FuseQuality quality)
+fusion_way (int n, FuseQuality quality, bool refine = false)
 {
-  return {std::string (quality_name (quality)),
+  return {std::string (quality_name (quality)) + (refine ? ", refined" : ""),
       [=] (const Scene &scene, const Condition &condition) {
         const Schedule schedule = fusion_schedule (n);
-        return fuse (take (scene, schedule, condition), schedule,
-            options_of (quality, condition));
+        FuseOptions options = options_of (quality, condition);
+        options.refine = refine;
+        return fuse (take (scene, schedule, condition), schedule, options);
       }};
 }
 
@@ -71,7 +72,10 @@ ways (int n)
           }},
       fusion_way (n, FuseQuality::kFast),
       fusion_way (n, FuseQuality::kBalanced),
-      fusion_way (n, FuseQuality::kBest)};
+      fusion_way (n, FuseQuality::kBest),
+      fusion_way (n, FuseQuality::kFast, true),
+      fusion_way (n, FuseQuality::kBalanced, true),
+      fusion_way (n, FuseQuality::kLearned)};
 }
 
 /* The first frames of @p scene, as many as complete coded frames contain. */

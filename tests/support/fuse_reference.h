@@ -315,11 +315,30 @@ reference_shrink (const ShrinkRow &row)
   }
 }
 
+inline void
+reference_convolve (const ConvolveRow &row)
+{
+  for (int x = 0; x < row.pixels; x++) {
+    for (int k = 0; k < row.outputs; k++) {
+      float sum = row.bias[k];
+      for (int t = 0; t < 9; t++)
+        for (int i = 0; i < row.inputs; i++)
+          sum = std::fma (row.weights[(t * row.inputs + i) * row.outputs + k],
+              row.source[t / 3][(x + t % 3) * row.inputs + i], sum);
+      if (row.hidden)
+        sum = std::max (sum, 0.0f);
+      if (row.add)
+        sum += row.add[x * row.outputs + k];
+      row.to[x * row.outputs + k] = sum;
+    }
+  }
+}
+
 inline constexpr Kernels kReference{"reference", reference_filter,
     reference_filter_pairs_squared, reference_filter_pairs_add, reference_sum,
     reference_max, reference_compare, reference_rate, reference_fade_ratio,
     reference_prefer, reference_share, reference_to_steps, reference_pair,
     reference_to_pixels<std::uint8_t>, reference_to_pixels<std::uint16_t>,
-    reference_shrink};
+    reference_shrink, reference_convolve};
 
 } // namespace codedexposure::test

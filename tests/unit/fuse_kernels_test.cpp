@@ -264,6 +264,33 @@ TEST (FuseKernels, ShrinkingEqualsTheReference)
   }
 }
 
+TEST (FuseKernels, ConvolutionsEqualTheReference)
+{
+  for (const int inputs : {1, 32, 36}) {
+    for (const int outputs : {fuse::kConvolveLanes, 2 * fuse::kConvolveLanes}) {
+      const std::size_t row = 40 * std::size_t (inputs);
+      const auto light = random_numbers (3 * row, 6);
+      const auto weights =
+          random_numbers (std::size_t (9 * inputs * outputs), 7);
+      const auto more = random_numbers (std::size_t (38 * outputs), 8);
+      const float *source[] = {
+          light.data () + row, light.data () + 2 * row, light.data ()};
+      for (const bool hidden : {false, true}) {
+        const auto convolved = [&] (const fuse::Kernels &kernels) {
+          std::vector<float> to (more.size ());
+          kernels.convolve (
+              {source, inputs, weights.data (), more.data (), outputs, 37,
+                  hidden, hidden ? more.data () : nullptr, to.data ()});
+          return to;
+        };
+        for (const fuse::Kernels &kernels : fuse::supported_kernels ())
+          EXPECT_EQ (convolved (kernels), convolved (kReference))
+              << kernels.name << ' ' << inputs << ' ' << outputs;
+      }
+    }
+  }
+}
+
 TEST (FuseKernels, NothingIsLostBelowAThresholdOfNothing)
 {
   /* All coefficients are kept, so the result is the blocks times their weight.

@@ -186,8 +186,8 @@ fused (Fuser<std::uint8_t> &fuser)
 TEST (Memory, FusersGoOnAfterAFrameThatFailed)
 {
   const Schedule schedule = Schedule::parse ("sequential:2x2").value ();
-  for (const FuseQuality quality :
-      {FuseQuality::kFast, FuseQuality::kBalanced, FuseQuality::kBest}) {
+  for (const FuseQuality quality : {FuseQuality::kFast, FuseQuality::kBalanced,
+           FuseQuality::kBest, FuseQuality::kLearned}) {
     FuseOptions options;
     options.quality = quality;
     options.threads = 3;

@@ -1,0 +1,189 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "fuse/refine.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+
+#include "base/text.h"
+
+namespace codedexposure::fuse
+{
+
+namespace
+{
+
+using Net = RefineNetwork;
+
+constexpr float kWhite = 255.0f;
+/* What tests/quality/train draws, and how it scales its inputs and outputs. */
+constexpr int kMinSlots = 2, kMaxSlots = 16;
+constexpr double kMaxNoise = 0.08 * kWhite;
+constexpr float kChangeScale = 4.0f / kWhite;
+constexpr float kSlotScale = 0.25f;
+constexpr float kNoiseScale = 8.0f / kWhite;
+constexpr float kStep = 0.25f * kWhite;
+
+int
+half (int pixels)
+{
+  return (pixels + Net::kFold - 1) / Net::kFold;
+}
+
+} // namespace
+
+std::string
+Refiner::why_not (
+    const Schedule &schedule, const Observation &observation, double noise)
+{
+  const std::string text = schedule.text ();
+  if (schedule.slots () < kMinSlots || schedule.slots () > kMaxSlots)
+    return text + " has " + std::to_string (schedule.slots ()) +
+           " slots; the refinement was trained for " +
+           std::to_string (kMinSlots) + " to " + std::to_string (kMaxSlots);
+  if (!observation.exact () || observation.gains ())
+    return text + " has pixels that see more or less than one slot; the "
+                  "refinement was trained for one-hot codes without leakage";
+  if (!observation.noise_free () && schedule.slots () == 2)
+    return text + " has two slots, which hide little; with noise, the "
+                  "refinement loses more there than it gains";
+  if (noise > kMaxNoise)
+    return "the noise of a coded pixel is " +
+           real_text (std::round (1000.0 * noise / kWhite) / 10.0) +
+           " % of white; the refinement was trained for up to " +
+           real_text (std::round (100.0 * kMaxNoise / kWhite)) + " %";
+  return {};
+}
+
+Refiner::Refiner (const Schedule &schedule, int width, int height,
+    bool noise_free, double noise)
+    : slots_ (schedule.slots ()), width_ (width), height_ (height),
+      noise_free_ (noise_free), noise_ (float (noise)),
+      light_ (std::size_t (slots_), Field (width, height)), refined_ (light_)
+{
+  std::vector<std::int8_t> slot_of_element;
+  for (int e = 0; e < slots_; e++) {
+    int slot = 0;
+    while (slot + 1 < slots_ && schedule.light (e, slot) <= 0.0)
+      slot++;
+    slot_of_element.push_back (std::int8_t (slot));
+  }
+  slot_of_.reserve (std::size_t (width) * std::size_t (height));
+  for (int y = 0; y < height; y++)
+    for (int x = 0; x < width; x++)
+      slot_of_.push_back (
+          slot_of_element[std::size_t (schedule.element_at (x, y))]);
+}
+
+void
+Refiner::set_row (int y, const float *const *slots)
+{
+  for (int s = 0; s < slots_; s++) {
+    float *to = light_[std::size_t (s)].row (y);
+    for (int x = 0; x < width_; x++)
+      to[x] = std::clamp (slots[s][x], 0.0f, kWhite);
+  }
+}
+
+/* One row of the network's inputs, of pixels that begin kReach before the frame
+ * and mirror it at its borders. */
+void
+Refiner::fold_row (const Field &coded, int slot, int row, float *to) const
+{
+  const auto light = [&] (int s, int y) {
+    return light_[std::size_t (std::clamp (s, 0, slots_ - 1))].row (y);
+  };
+  for (int dy = 0; dy < Net::kFold; dy++) {
+    const int y = mirrored (Net::kFold * row + dy, height_);
+    const float *own = light (slot, y), *seen = coded.row (y);
+    const std::array<const float *, 4> near{light (slot + 1, y),
+        light (slot - 1, y), light (slot + 2, y), light (slot - 2, y)};
+    const std::int8_t *slots = slot_of_.data () + std::ptrdiff_t (y) * width_;
+    const int end = Net::kFold * (half (width_) + Net::kReach);
+    for (int at = -Net::kFold * Net::kReach; at < end; at++) {
+      const int x = mirrored (at, width_);
+      const int column = at + Net::kFold * Net::kReach;
+      float *value = to + column / Net::kFold * Net::kInputs + dy * Net::kFold +
+                     column % Net::kFold;
+      const auto put = [&value] (float input) {
+        *value = input;
+        value += Net::kOutputs;
+      };
+      const float distance = float (slots[x] - slot);
+      put (own[x] * (1.0f / kWhite) - 0.5f);
+      for (const float *other : near)
+        put (kChangeScale * (other[x] - own[x]));
+      put (kChangeScale * (seen[x] - own[x]));
+      put (kSlotScale * distance);
+      put (1.0f / (1.0f + std::abs (distance)));
+      put (noise_free_ ? 0.0f : kNoiseScale * noise_);
+    }
+  }
+}
+
+/* @change: results of the row's pixels, from kReach before the frame; @part:
+ * row of them in a pixel of the network. */
+void
+Refiner::correct_row (
+    const float *change, const float *is_static, int slot, int y, int part)
+{
+  const float *from = light_[std::size_t (slot)].row (y);
+  const std::int8_t *slots = slot_of_.data () + std::ptrdiff_t (y) * width_;
+  float *to = refined_[std::size_t (slot)].row (y);
+  const int padded = Net::padded (Net::kOutputs);
+  for (int x = 0; x < width_; x++) {
+    const bool keep = noise_free_ && slots[x] == slot;
+    const float step = keep ? 0.0f : kStep * (1.0f - is_static[x]);
+    to[x] = from[x] + step * change[(x / Net::kFold + Net::kReach) * padded +
+                                    part * Net::kFold + x % Net::kFold];
+  }
+}
+
+/* Rows from .. to - 1 of the network. What lies beyond them is computed as
+ * well, as far as they depend on it, so that the parts do not change the
+ * result. */
+void
+Refiner::refine_part (const Kernels &kernels, const Field &coded,
+    const std::function<const float *(int y)> &is_static, int slot, int from,
+    int to)
+{
+  const int first = from - Net::kReach;
+  Net::trained ().run (
+      kernels, half (width_) + 2 * Net::kReach, to - from + 2 * Net::kReach,
+      [&] (int y, float *row) { fold_row (coded, slot, first + y, row); },
+      [&] (int y, const float *change) {
+        const int row = first + y;
+        if (row < from || row >= to)
+          return;
+        for (int part = 0; part < Net::kFold; part++)
+          if (const int line = Net::kFold * row + part; line < height_)
+            correct_row (change, is_static (line), slot, line, part);
+      });
+}
+
+bool
+Refiner::run (const Kernels &kernels, const Field &coded,
+    const std::function<const float *(int y)> &is_static,
+    const std::function<void (int y, const float *const *slots)> &sink,
+    Workers &workers, std::stop_token stop)
+{
+  const int rows = half (height_);
+  const int parts = slots_ % workers.count () == 0 ? 1 : workers.count ();
+  const auto refine = [&] (int task, int) {
+    const int part = task % parts;
+    refine_part (kernels, coded, is_static, task / parts, rows * part / parts,
+        rows * (part + 1) / parts);
+  };
+  if (!workers.run (slots_ * parts, refine, std::move (stop)))
+    return false;
+  std::vector<const float *> slots (refined_.size ());
+  for (int y = 0; y < height_; y++) {
+    for (std::size_t s = 0; s < slots.size (); s++)
+      slots[s] = refined_[s].row (y);
+    sink (y, slots.data ());
+  }
+  return true;
+}
+
+} // namespace codedexposure::fuse

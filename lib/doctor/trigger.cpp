@@ -243,7 +243,8 @@ TriggerCheck::judge (const std::vector<SeenFrame> &seen, double before,
     turned |= !is_old;
     late += !turned;
   }
-  if (longest >= 2)
+  // A bright frame that was cut short may look like the darker mask.
+  if (longest >= 2 && after > before)
     change.late = late;
   return change;
 }

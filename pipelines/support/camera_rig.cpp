@@ -363,8 +363,11 @@ CameraRig::show (const StillMask &mask, int slots)
   RETURN_IF_ERROR (reopen_dmd ());
   ASSIGN_OR_RETURN (
       const SlotPlan plan, SlotPlan::fit ({}, slots, options_.rate));
-  RETURN_IF_ERROR (dmd_->show (mask, plan, stop_));
+  /* Not later: the first frames of this mask may be here when show () returns,
+   * and how late they turn to it is measured. */
+  dmd_->stop ();
   forget_frames ();
+  RETURN_IF_ERROR (dmd_->show (mask, plan, stop_));
   return {};
 }
 

@@ -105,7 +105,7 @@ run_check (const Check &check, Examination &examination,
     return has_failed (name, before);
   };
   if (std::ranges::any_of (check.needs, failed))
-    return Finding{.check = check.name, .skipped = true};
+    return Finding{.check = check.name, .shown = {}, .skipped = true};
   return check.run (examination);
 }
 

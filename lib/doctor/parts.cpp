@@ -19,6 +19,8 @@ namespace
 constexpr double kSmallPacket = 1000;
 /* A second of frames shows a loss of packets that would ruin a recording. */
 constexpr double kWatched = 1.0;
+/* More is no single frame that a busy machine has lost. */
+constexpr double kMissingPart = 0.1;
 
 /** A setting of the camera that must have one of some values. */
 struct Rule {
@@ -213,21 +215,44 @@ check_host (const RigParts &parts, const HostFacts &host, Finding &finding)
         "run sysctl net.core.rmem_max=33554432"});
 }
 
-/* A loss of packets shows in frames that are damaged. */
+/** Frames that are missing between those that came: their stamps are whole
+ * periods apart, some of them one. */
+int
+missing_frames (const std::vector<SeenFrame> &seen, double period)
+{
+  constexpr double kNear = 0.1; // of a period
+  int missing = 0, steps_of_one = 0;
+  for (std::size_t k = 1; k < seen.size (); k++) {
+    const double steps = double (seen[k].time - seen[k - 1].time) / period;
+    const double whole = std::max (1.0, std::round (steps));
+    if (std::abs (steps - whole) > kNear)
+      return 0;
+    missing += int (whole) - 1;
+    steps_of_one += whole == 1.0;
+  }
+  return steps_of_one > 1 ? missing : 0;
+}
+
+/* A loss of packets shows in frames that are damaged, or dropped for that. */
 Result<void>
 check_network (Examination &examination, Finding &finding)
 {
   const FrameRate rate = examination.rig.parts ().rate;
   const int frames = std::max (10, int (kWatched * rate.num / rate.den));
   ASSIGN_OR_RETURN (const auto seen, look (examination, lit (0, 1), 1, frames));
-  const auto damaged = std::ranges::count (seen, true, &SeenFrame::damaged);
-  finding.readings.push_back (
-      {"damaged frames", {double (damaged), std::sqrt (double (damaged))},
-          "of " + std::to_string (seen.size ()), "0"});
-  if (damaged > 0)
+  const auto damaged =
+      int (std::ranges::count (seen, true, &SeenFrame::damaged));
+  const int missing = missing_frames (seen, double (rate.period ()));
+  const int all = int (seen.size ()) + missing;
+  for (const auto &[name, count] : {std::pair{"damaged frames", damaged},
+           std::pair{"missing frames", missing}})
+    finding.readings.push_back (
+        {name, {double (count), std::sqrt (double (count))},
+            "of " + std::to_string (all), "0"});
+  if (damaged > 0 || missing > kMissingPart * all)
     finding.diagnoses.push_back ({"packet-loss", Verdict::fail,
-        std::to_string (damaged) + " of " + std::to_string (seen.size ()) +
-            " frames lack packets",
+        std::to_string (damaged + missing) + " of " + std::to_string (all) +
+            " frames lack packets or did not come",
         "connect the camera to a network interface of its own, and check cable "
         "and switch"});
   return {};

@@ -90,7 +90,7 @@ public:
     return made;
   }
   FramePipeline () = default;
-  ~FramePipeline () { set_state (GST_STATE_NULL); }
+  ~FramePipeline () { (void)set_state (GST_STATE_NULL); }
   FramePipeline (const FramePipeline &) = delete;
   FramePipeline &operator= (const FramePipeline &) = delete;
 

@@ -100,7 +100,7 @@ public:
 
 private:
   sigset_t set_;
-  std::stop_source source_;
+  std::stop_source source_{};
   std::jthread thread_;
 };
 

@@ -1,0 +1,125 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The checks of the parts and of a recording, and the order of all checks. */
+#include "checked_bench.h"
+
+#include <nlohmann/json.hpp>
+
+namespace
+{
+
+using namespace codedexposure;
+using namespace codedexposure::test;
+
+std::vector<std::string>
+names_of (const std::vector<Check> &checks)
+{
+  std::vector<std::string> names;
+  for (const Check &check : checks)
+    names.push_back (check.name);
+  return names;
+}
+
+TEST (PartsCheck, AHealthyBenchPassesAndIsNamedInTheProfile)
+{
+  const CheckedBench e = check_bench (healthy_bench (1), check_parts);
+  EXPECT_EQ (e.first_diagnosis (), "");
+  EXPECT_EQ (e.found ().camera.serial, e.rig->parts ().camera.serial);
+  EXPECT_EQ (e.found ().dmd->serial, e.rig->parts ().dmd_device.serial);
+  EXPECT_EQ (e.found ().bits, 12);
+}
+
+TEST (PartsCheck, NamesWhatIsWrong)
+{
+  for (const char *words : {"rolling-shutter", "colour", "test-image", "gamma",
+           "auto-exposure", "auto-gain", "black-clamp", "lut", "binning", "roi",
+           "pixel-format", "firmware", "packet-size", "packet-loss=0.05"})
+    expect_named (words, check_parts);
+}
+
+TEST (PartsCheck, LeavesOtherFaultsToOtherChecks)
+{
+  for (const char *words : {"half-rate", "double-rate", "free-running=24.7",
+           "exposure-late=2ms", "dark", "flicker=100:0.1", "lose=0.02"})
+    EXPECT_EQ (
+        check_bench (sick_bench (4, words), check_parts).first_diagnosis (), "")
+        << words;
+}
+
+TEST (PartsCheck, AMissingPartIsNamedByItsError)
+{
+  const auto id = [] (ErrorCode code, bool camera) {
+    return part_missing ({"why", code}, camera).diagnoses.at (0).id;
+  };
+  EXPECT_EQ (id (ErrorCode::not_found, true), "camera-missing");
+  EXPECT_EQ (id (ErrorCode::not_found, false), "dmd-missing");
+  EXPECT_EQ (id (ErrorCode::denied, false), "dmd-permission");
+  EXPECT_EQ (id (ErrorCode::busy, false), "dmd-busy");
+}
+
+TEST (PartsCheck, ASlowDiskFailsBelowWhatRecordingNeeds)
+{
+  auto rig = SimulatedRig::make (healthy_bench (2));
+  ASSERT_TRUE (rig);
+  const Extent size = (*rig)->parts ().camera.size;
+  const double needed = 25.0 * size.width * size.height;
+  Examination examination{**rig};
+  for (const auto &[rate, verdict] : {std::pair{0.9, Verdict::fail},
+           std::pair{1.5, Verdict::warn}, std::pair{2.1, Verdict::pass}}) {
+    examination.host.disk_rate = Measured{rate * needed, 0.0};
+    EXPECT_EQ (check_parts (examination)->verdict (), verdict) << rate;
+  }
+}
+
+TEST (WholeCheck, NamesWhatIsWrong)
+{
+  EXPECT_EQ (
+      check_bench (healthy_bench (3), check_whole).first_diagnosis (), "");
+  for (const char *words : {"lose=0.05", "slip=7s", "frame-jitter=60ms"})
+    expect_named (words, check_whole);
+}
+
+TEST (Checks, WhatANamedCheckNeedsIsDoneBefore)
+{
+  using Names = std::vector<std::string>;
+  EXPECT_EQ (names_of (*choose_checks ("")), names_of (all_checks ()));
+  EXPECT_EQ (
+      names_of (*choose_checks ("trigger")), (Names{"parts", "trigger"}));
+  EXPECT_EQ (names_of (*choose_checks ("whole,light")),
+      (Names{"parts", "trigger", "light", "whole"}));
+  EXPECT_FALSE (choose_checks ("trigger,soul"));
+}
+
+TEST (Checks, OneIsSkippedAfterAFailureThatItNeeds)
+{
+  auto rig = SimulatedRig::make (healthy_bench (4));
+  ASSERT_TRUE (rig);
+  Examination examination{**rig};
+  const Check check{"b", "B", {"a"}, [] (Examination &) {
+                      return Result<Finding> (Finding{"b", "something"});
+                    }};
+  Finding before{"a", "something"};
+  EXPECT_FALSE (run_check (check, examination, {before})->skipped);
+  before.diagnoses = {{"x", Verdict::warn, "", ""}};
+  EXPECT_FALSE (run_check (check, examination, {before})->skipped);
+  before.diagnoses[0].severity = Verdict::fail;
+  EXPECT_TRUE (run_check (check, examination, {before})->skipped);
+  EXPECT_TRUE (run_check (
+      check, examination, {{.check = "a", .shown = {}, .skipped = true}})
+                   ->skipped);
+}
+
+TEST (Findings, TheirJsonHasTheWorstVerdict)
+{
+  Finding good{"a", "light"}, bad{"b", "more \"light\""};
+  good.readings = {{"level", {0.5, 0.1}, "%", "at most 1"}};
+  bad.diagnoses = {{"dark", Verdict::fail, "why", "try"}};
+  const auto json = nlohmann::json::parse (findings_json ({good, bad}));
+  EXPECT_EQ (json["format"], "coded-exposure-findings");
+  EXPECT_EQ (json["verdict"], "FAIL");
+  EXPECT_EQ (json["checks"][0]["verdict"], "PASS");
+  EXPECT_EQ (json["checks"][0]["readings"][0]["sigma"], 0.1);
+  EXPECT_EQ (json["checks"][1]["shown"], "more \"light\"");
+  EXPECT_EQ (json["checks"][1]["diagnoses"][0]["id"], "dark");
+}
+
+} // namespace

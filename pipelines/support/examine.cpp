@@ -365,7 +365,12 @@ Doctor::write () const
   RETURN_IF_ERROR (write_file (arguments_.page_path (), html_of (page ())));
   voice_.line ("page: " + arguments_.page_path ());
   if (!profile_) {
-    voice_.line ("no bench profile, since a check failed");
+    const bool earlier =
+        access (arguments_.profile_path ().c_str (), F_OK) == 0;
+    voice_.line ("no bench profile, since a check failed" +
+                 (earlier ? "; " + arguments_.profile_path () +
+                                " is that of an earlier run"
+                          : std::string ()));
     return {};
   }
   RETURN_IF_ERROR (profile_->save (arguments_.profile_path ()));

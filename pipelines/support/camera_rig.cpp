@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <deque>
 
 #include <unistd.h>
 
@@ -252,6 +253,7 @@ private:
   void read_features (ArvCamera *camera);
   void read_dmd ();
   void forget_frames ();
+  bool is_outdated (const SeenFrame &frame);
   Nanoseconds exposure_of (std::optional<Nanoseconds> time) const;
   Nanoseconds patience () const
   {
@@ -265,6 +267,8 @@ private:
   std::unique_ptr<FramePipeline> pipeline_;
   bool playing_ = false;
   Nanoseconds exposure_ = 0;
+  Nanoseconds stopped_ = 0;        // the masks before, by monotonic_now ()
+  std::deque<Nanoseconds> delays_; // of the last frames, with any offset
 };
 
 std::string
@@ -367,6 +371,7 @@ CameraRig::show (const StillMask &mask, int slots)
    * and how late they turn to it is measured. */
   dmd_->stop ();
   forget_frames ();
+  stopped_ = monotonic_now ();
   RETURN_IF_ERROR (dmd_->show (mask, plan, stop_));
   return {};
 }
@@ -377,6 +382,19 @@ CameraRig::park ()
   if (dmd_)
     dmd_->stop ();
   forget_frames ();
+  stopped_ = monotonic_now ();
+}
+
+/** Whether a frame would have come before the masks were stopped if it were as
+ * fast as others are: a busy machine or network held it up. */
+bool
+CameraRig::is_outdated (const SeenFrame &frame)
+{
+  constexpr std::size_t kRecent = 100; // clocks drift
+  delays_.push_back (frame.arrival - frame.time);
+  if (delays_.size () > kRecent)
+    delays_.pop_front ();
+  return frame.time + *std::ranges::min_element (delays_) < stopped_;
 }
 
 void
@@ -413,6 +431,7 @@ CameraRig::start ()
   if (playing_ || !pipeline_) {
     pipeline_.reset ();
     playing_ = false;
+    delays_.clear ();
     ASSIGN_OR_RETURN (pipeline_, FramePipeline::make (source ()));
   }
   RETURN_IF_ERROR (pipeline_->set_state (GST_STATE_PLAYING));
@@ -436,7 +455,9 @@ CameraRig::watch (int frames)
     const Nanoseconds now = monotonic_now ();
     if (sample) {
       last = now;
-      seen.push_back (seen_frame (sample.get (), now));
+      SeenFrame frame = seen_frame (sample.get (), now);
+      if (!is_outdated (frame))
+        seen.push_back (std::move (frame));
     } else if (pipeline_->ended () && seen.empty () && !restarted) {
       restarted = true;
       RETURN_IF_ERROR (start ());

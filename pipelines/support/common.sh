@@ -389,13 +389,15 @@ video_output ()
       # go through colour, with 16 bits for exact values. All other modes of
       # x264 spend less on pictures that follow each other fast, but these are
       # looked at one by one. The fragments of a file that was not finished can
-      # be played.
+      # be played. Its bytes depend on the number of threads, so that is fixed.
+      # A video to look at begins at 0; its provenance names its first frame.
+      printf 'identity name=from-zero-%s silent=true ! ' "${1//[^a-zA-Z0-9]/-}"
       for_display
       printf 'videoconvert ! video/x-raw,format=ARGB64 ! videoconvert ! '
       printf 'videoscale ! %s ! ' \
         'video/x-raw,format=I420,width=[2,65536,2],height=[2,65536,2]'
       printf 'x264enc pass=quant quantizer=18 vbv-buf-capacity=0 '
-      printf 'speed-preset=veryfast ! mp4mux fragment-duration=1000 '
+      printf 'speed-preset=veryfast threads=4 ! mp4mux fragment-duration=1000 '
       printf 'fragment-mode=first-moov-then-finalise ! filesink location=%s ' \
         "$(quoted "$1")"
       ;;

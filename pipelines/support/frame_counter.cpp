@@ -40,7 +40,41 @@ frame_period (GstPad *pad)
   return gst_util_uint64_scale_int (GST_SECOND, den, num);
 }
 
+/* Gives @frame, at the sink @pad of an element, and what follows the running
+ * time @wanted behind that element. False: it has no time. */
+bool
+shift_running_time (GstPad *pad, GstBuffer *frame, GstClockTime wanted)
+{
+  const EventPtr sticky (gst_pad_get_sticky_event (pad, GST_EVENT_SEGMENT, 0));
+  const GstSegment *segment = nullptr;
+  gst_event_parse_segment (sticky.get (), &segment);
+  const guint64 running = gst_segment_to_running_time (
+      segment, GST_FORMAT_TIME, GST_BUFFER_PTS (frame));
+  if (!GST_CLOCK_TIME_IS_VALID (running))
+    return false;
+  const ObjectPtr<GstElement> element (gst_pad_get_parent_element (pad));
+  const ObjectPtr<GstPad> src (
+      gst_element_get_static_pad (element.get (), "src"));
+  if (src)
+    gst_pad_set_offset (src.get (), gint64 (wanted) - gint64 (running));
+  return true;
+}
+
 } // namespace
+
+void
+begin_at_zero (GstElement *element)
+{
+  const ObjectPtr<GstPad> sink (gst_element_get_static_pad (element, "sink"));
+  gst_pad_add_probe (
+      sink.get (), GST_PAD_PROBE_TYPE_BUFFER,
+      [] (GstPad *pad, GstPadProbeInfo *info, gpointer) {
+        return shift_running_time (pad, GST_PAD_PROBE_INFO_BUFFER (info), 0)
+                   ? GST_PAD_PROBE_REMOVE
+                   : GST_PAD_PROBE_OK;
+      },
+      nullptr, nullptr);
+}
 
 FrameCounter::FrameCounter (ObjectPtr<GstPad> sink, const Times &times,
     std::function<void ()> cannot_seek)
@@ -147,22 +181,12 @@ FrameCounter::shift_first_frame (
     GstPad *pad, GstPadProbeInfo *info, gpointer self)
 {
   const Times &times = static_cast<FrameCounter *> (self)->times_;
-  const GstClockTime pts = GST_BUFFER_PTS (GST_PAD_PROBE_INFO_BUFFER (info));
-  const EventPtr sticky (gst_pad_get_sticky_event (pad, GST_EVENT_SEGMENT, 0));
-  const GstSegment *segment = nullptr;
-  gst_event_parse_segment (sticky.get (), &segment);
-  const guint64 running =
-      gst_segment_to_running_time (segment, GST_FORMAT_TIME, pts);
-  if (!GST_CLOCK_TIME_IS_VALID (running))
-    return GST_PAD_PROBE_OK;
-  const ObjectPtr<GstElement> element (gst_pad_get_parent_element (pad));
-  const ObjectPtr<GstPad> src (
-      gst_element_get_static_pad (element.get (), "src"));
-  const GstClockTime wanted =
-      times.keep_time ? pts : nanoseconds (times.shift_to);
-  if (src)
-    gst_pad_set_offset (src.get (), gint64 (wanted) - gint64 (running));
-  return GST_PAD_PROBE_REMOVE;
+  GstBuffer *frame = GST_PAD_PROBE_INFO_BUFFER (info);
+  return shift_running_time (pad, frame,
+             times.keep_time ? GST_BUFFER_PTS (frame)
+                             : nanoseconds (times.shift_to))
+             ? GST_PAD_PROBE_REMOVE
+             : GST_PAD_PROBE_OK;
 }
 
 GstPadProbeReturn

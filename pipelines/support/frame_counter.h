@@ -10,6 +10,9 @@
 #include "common/raii.h"
 #include "excerpt.h"
 
+/** Lets the running time behind @p element begin at 0 with its first frame. */
+void begin_at_zero (GstElement *element);
+
 /** Counts the coded frames at a pad, and fits their times to what is wanted. */
 class FrameCounter
 {

@@ -15,6 +15,7 @@
 
 #include "base/result.h"
 #include "common/raii.h"
+#include "notes.h"
 #include "part.h"
 #include "record/matroska.h"
 #include "report.h"
@@ -50,6 +51,10 @@ public:
     return ObjectPtr<GstElement> (
         gst_bin_get_by_name (GST_BIN (bin_.get ()), name));
   }
+  void set_location (const char *element, const std::string &path)
+  {
+    g_object_set (find (element).get (), "location", path.c_str (), nullptr);
+  }
   void play () { gst_element_set_state (bin_.get (), GST_STATE_PLAYING); }
   /** Why it failed, or none; waits for its end if @p wait. */
   std::optional<std::string> failure (bool wait) const;
@@ -75,25 +80,17 @@ Pipeline::failure (bool wait) const
   return text;
 }
 
-std::string
-in_pipeline (const std::string &name)
-{
-  std::string quoted = "\"";
-  for (const char c : name)
-    (quoted += c == '"' || c == '\\' ? "\\" : "") += c;
-  return quoted + '"';
-}
-
 /** The encoded frames of a Matroska file. */
 class Reader
 {
 public:
   explicit Reader (const std::string &name)
-      : name_ (name), pipeline_ ("filesrc location=" + in_pipeline (name) +
-                                 " ! matroskademux name=file file.video_0 ! appsink "
+      : name_ (name), pipeline_ ("filesrc name=source ! matroskademux "
+                                 "name=file file.video_0 ! appsink "
                                  "name=frames sync=false max-buffers=32"),
         frames_ (pipeline_.find ("frames"))
   {
+    pipeline_.set_location ("source", name);
     pipeline_.play ();
   }
 
@@ -144,10 +141,10 @@ public:
   explicit Writer (const std::string &path)
       : pipeline_ ("appsrc name=frames format=time block=true max-bytes=" +
                    std::to_string (kMaxQueued) +
-                   " ! matroskamux timecodescale=1000 ! filesink location=" +
-                   in_pipeline (path)),
+                   " ! matroskamux timecodescale=1000 ! filesink name=target"),
         frames_ (pipeline_.find ("frames"))
   {
+    pipeline_.set_location ("target", path);
   }
 
   void begin (GstSample *first, const Reader &reader)
@@ -195,17 +192,33 @@ same_video (GstSample *a, GstSample *b)
   return gst_caps_is_equal (gst_sample_get_caps (a), gst_sample_get_caps (b));
 }
 
-/** Copies the frames of @p parts, in their order, to @p path, and prints the
- * time of each if @p list. */
+struct PartFiles {
+  std::string video, notes;
+};
+
+/* Gives @frame its exact times, which Matroska has rounded. */
+Result<void>
+restore_times (GstBuffer *frame, NoteTimes &notes, const PartFiles &part)
+{
+  const auto times = notes.next ();
+  if (!times || !is_rounded (GST_BUFFER_PTS (frame), times->pts))
+    return Error{part.notes + " are not the notes of " + part.video};
+  GST_BUFFER_PTS (frame) = times->pts;
+  GST_BUFFER_DURATION (frame) = times->duration;
+  return {};
+}
+
+/** Copies the frames of @p parts, in their order, to @p path. */
 Result<guint64>
-join (const std::vector<std::string> &parts, const std::string &path)
+join (const std::vector<PartFiles> &parts, const std::string &path)
 {
   Writer writer (path);
   SamplePtr first;
   guint64 frames = 0;
   GstClockTime last = GST_CLOCK_TIME_NONE;
-  for (const std::string &part : parts) {
-    Reader reader (part);
+  for (const PartFiles &part : parts) {
+    Reader reader (part.video);
+    NoteTimes notes (part.notes);
     for (;;) {
       auto next = reader.next ();
       if (!next)
@@ -213,16 +226,22 @@ join (const std::vector<std::string> &parts, const std::string &path)
       if (!*next)
         break;
       SamplePtr &sample = *next;
-      GstBuffer *frame = gst_sample_get_buffer (sample.get ());
+      const BufferPtr owned (
+          gst_buffer_copy (gst_sample_get_buffer (sample.get ())));
+      GstBuffer *frame = owned.get ();
       if (!first) {
         writer.begin (sample.get (), reader);
         first.reset (gst_sample_ref (sample.get ()));
       } else if (!same_video (first.get (), sample.get ())) {
-        return Error{part + " is another kind of video than the parts before "
-                            "it; decode all parts with the same options"};
+        return Error{part.video +
+                     " is another kind of video than the parts before "
+                     "it; decode all parts with the same options"};
       } else if (GST_BUFFER_PTS (frame) <= last) {
-        return Error{part + " begins before the end of the part before it"};
+        return Error{
+            part.video + " begins before the end of the part before it"};
       }
+      if (auto restored = restore_times (frame, notes, part); !restored)
+        return restored.error ();
       last = GST_BUFFER_PTS (frame);
       if (auto written = writer.write (frame); !written)
         return written.error ();
@@ -238,7 +257,7 @@ join (const std::vector<std::string> &parts, const std::string &path)
 
 Result<guint64>
 join_to_file (
-    const std::vector<std::string> &parts, const std::string &name, bool force)
+    const std::vector<PartFiles> &parts, const std::string &name, bool force)
 {
   Part output (name, Part::kFile);
   if (auto claimed = output.claim (true); !claimed)
@@ -275,7 +294,8 @@ list_times (const std::string &name)
 int
 usage ()
 {
-  std::cerr << "codedexposure-join [--force] OUT.mkv < list of parts\n"
+  std::cerr << "codedexposure-join [--force] OUT.mkv < names of the video and "
+               "the notes of each part, each ends with a byte 0\n"
                "codedexposure-join --times IN.mkv\n";
   return 2;
 }
@@ -295,9 +315,10 @@ main (int argc, char **argv)
   if (option == "--times") {
     done = list_times (words[1]);
   } else {
-    std::vector<std::string> parts;
-    for (std::string line; std::getline (std::cin, line);)
-      parts.push_back (line);
+    std::vector<PartFiles> parts;
+    for (PartFiles part; std::getline (std::cin, part.video, '\0') &&
+                         std::getline (std::cin, part.notes, '\0');)
+      parts.push_back (part);
     done = join_to_file (parts, words.back (), option == "--force");
     if (done)
       std::printf ("%" G_GUINT64_FORMAT "\n", *done);

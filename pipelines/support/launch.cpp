@@ -19,6 +19,7 @@
 #include "frame_counter.h"
 #include "frame_limit.h"
 #include "leaky_queue.h"
+#include "notes.h"
 #include "plain_text.h"
 #include "player.h"
 #include "screen.h"
@@ -51,8 +52,10 @@ struct Options {
   gchar *receiver = nullptr; // tcpserversink to wait for
   gdouble retry = 0;         // time for which to try to connect, s
   FrameCounter::Times times;
-  gchar *excerpt = nullptr;    // FROM:UNTIL:BEFORE:AFTER, of Excerpt
-  gchar *ledger = nullptr;     // file for what came of each coded frame of it
+  gchar *excerpt = nullptr; // FROM:UNTIL:BEFORE:AFTER, of Excerpt
+  gchar *ledger = nullptr;  // file for what came of each coded frame of it
+  gchar *notes = nullptr; // file for the notes of the pictures of "output-kept"
+  gchar *from_notes = nullptr; // file with those of "noted"
   gboolean salvage = FALSE;    // go on after damage of the container
   gchar *plain_text = nullptr; // element whose texts become plain
   gchar *need = nullptr;       // name of an element message that must come
@@ -78,6 +81,8 @@ public:
 private:
   bool connect_counter ();
   void add_window ();
+  void add_notes ();
+  bool finish_notes ();
   gint64 frames () const { return counter_ ? counter_->frames ().load () : 0; }
   void watch_leaky_queues ();
   void begin () override;
@@ -114,6 +119,8 @@ private:
   std::unique_ptr<BufferWatch> buffer_watch_;
   std::unique_ptr<FrameLimit> limit_;
   std::unique_ptr<ExcerptFilter> excerpt_;
+  std::unique_ptr<NoteWriter> note_writer_;
+  std::unique_ptr<NoteReader> note_reader_;
   std::unique_ptr<Window> window_;
   gint64 frames_before_ = -1; // at the last tick
   bool silent_ = false;       // no frame came for a while, and that was said
@@ -161,6 +168,33 @@ Launch::connect_counter ()
         quit (kFailed);
       });
   return true;
+}
+
+/* After the gates of the excerpt: only pictures that pass them are noted. */
+void
+Launch::add_notes ()
+{
+  if (options_.notes)
+    if (const auto element = find ("output-kept"))
+      note_writer_ =
+          std::make_unique<NoteWriter> (element.get (), options_.notes);
+  if (options_.from_notes)
+    if (const auto element = find ("noted"))
+      note_reader_ =
+          std::make_unique<NoteReader> (element.get (), options_.from_notes);
+}
+
+/* False, with a message: they are not complete. */
+bool
+Launch::finish_notes ()
+{
+  const std::string problem = note_writer_ && !note_writer_->finish ()
+                                  ? "cannot write the notes"
+                              : note_reader_ ? note_reader_->finish ()
+                                             : "";
+  if (!problem.empty ())
+    status_.line ("error: " + problem);
+  return problem.empty ();
 }
 
 void
@@ -232,6 +266,11 @@ Launch::run ()
     excerpt_ =
         std::make_unique<ExcerptFilter> (pipeline_.get (), counter_->pad (),
             *options_.times.excerpt, options_.ledger ? options_.ledger : "");
+  add_notes ();
+  for_each_element (pipeline_.get (), [] (GstElement *element) {
+    if (g_str_has_prefix (GST_OBJECT_NAME (element), "from-zero"))
+      begin_at_zero (element);
+  });
   watch_leaky_queues ();
   add_window ();
   whole_picture::wait_for_inputs (pipeline_.get ());
@@ -285,7 +324,8 @@ Launch::finish (int code)
   if (options_.verbose && frames () > 0)
     print_counters ();
   const std::string flaws = flaws_of (pipeline_.get ());
-  if (!finish_outputs (code != kContainer))
+  const bool noted = finish_notes ();
+  if (!finish_outputs (code != kContainer && noted) || !noted)
     return kFailed;
   if (excerpt_ && !excerpt_->finish ()) {
     status_.line ("error: cannot write the ledger");
@@ -596,6 +636,10 @@ main (int argc, char **argv)
           "FROM:UNTIL:BEFORE:AFTER"},
       {"ledger", 0, 0, G_OPTION_ARG_STRING, &options.ledger,
           "File for what came of each coded frame of the excerpt", "FILE"},
+      {"notes", 0, 0, G_OPTION_ARG_STRING, &options.notes,
+          "File for what Matroska does not hold of the pictures", "FILE"},
+      {"from-notes", 0, 0, G_OPTION_ARG_STRING, &options.from_notes,
+          "File with what Matroska does not hold of the pictures", "FILE"},
       {"keep-time", 0, 0, G_OPTION_ARG_NONE, &options.times.keep_time,
           "Times of the output are those of the recording", nullptr},
       {"salvage", 0, 0, G_OPTION_ARG_NONE, &options.salvage,
@@ -647,6 +691,8 @@ main (int argc, char **argv)
   g_free (options.plain_text);
   g_free (options.excerpt);
   g_free (options.ledger);
+  g_free (options.notes);
+  g_free (options.from_notes);
   gst_deinit ();
   return code;
 }

@@ -8,18 +8,23 @@ import subprocess
 import time
 
 from archive import ledger, programs
-from archive.plan import digest_of_options
+from archive.plan import FORMS, digest_of_options
 from archive.store import (Problem, digest, fingerprint, read_json, write_json)
 
-OUTPUTS = {'mkv': 'pictures.mkv', 'png': 'pictures/'}
-NAMES = {'mkv': 'pictures.mkv', 'png': 'pictures'}
 TABLE = 'statistics.csv'
+NOTES = 'notes'
+FOR_OUTPUT = '--deflate', '--white'  # for other forms than lossless video
 DONE, DAMAGED, EMPTY = 0, 3, 4  # of decode
 ENGINE_NAMES = 'SLURM_ARRAY_JOB_ID', 'SLURM_ARRAY_TASK_ID', 'PARALLEL_SEQ'
 
 
 def seconds(time_ns):
     return f'{time_ns // 10**9}.{time_ns % 10**9:09d}'
+
+
+def name_of(form):
+    """The file or folder with the pictures of a chunk."""
+    return 'pictures' + FORMS[form].rstrip('/')
 
 
 def identity(plan, recording, chunk):
@@ -40,16 +45,39 @@ def command(plan, recording, chunk, scratch):
     other, from front to back if need be."""
     source = plan.recordings[recording]
     start, stop = source.excerpt(chunk, plan.length)
-    words = [programs.DECODE, source.path, *plan.options,
-             f'--threads={plan.threads}',
-             f'--output={os.path.join(scratch, OUTPUTS[plan.form])}']
+    form = plan.chunk_form(recording)
+    options = [option for option in plan.options if form == plan.form
+               or not option.startswith(FOR_OUTPUT)]
+    words = [programs.DECODE, source.path, *options, f'--threads={plan.threads}',
+             '--output=' + os.path.join(scratch, 'pictures' + FORMS[form])]
     if plan.statistics:
         words.append(f'--statistics={os.path.join(scratch, TABLE)}')
-    if source.whole != 'it is cut off':
+    if not source.cut_off():
+        if form == 'mkv':
+            words.append(f'--notes={os.path.join(scratch, NOTES)}')
         stop = '' if stop is None else seconds(stop)
         words += [f'--excerpt={seconds(start)}-{stop}',
                   f'--ledger={os.path.join(scratch, "ledger")}']
     return words
+
+
+def check_options(plan):
+    """Raises Problem if decode does not take the options of the plan, or does not
+    write its form."""
+    said = subprocess.run(
+        [programs.DECODE, plan.recordings[0].path, *plan.options, '--print',
+         f'--output=pictures{FORMS[plan.form]}'], capture_output=True, text=True,
+        check=False, stdin=subprocess.DEVNULL)
+    if said.returncode != 0:
+        raise Problem(said.stderr.partition('\n')[0])
+
+
+def finish_command(plan, video, notes, output):
+    """Writes the pictures of lossless chunks in the form of the plan."""
+    options = [option for option in plan.options
+               if option.startswith((*FOR_OUTPUT, '--bits'))]
+    return [programs.DECODE, video, *options, f'--from-notes={notes}', '--force',
+            f'--threads={plan.threads}', f'--output={output}']
 
 
 def cpu_seconds():
@@ -86,7 +114,8 @@ def decode(plan, recording, chunk, scratch):
     if status not in (DONE, DAMAGED, EMPTY):
         raise Problem(f'decode ended with status {status}')
     check_source(source)
-    names = [NAMES[plan.form], *[TABLE] * plan.statistics]
+    form = plan.chunk_form(recording)
+    names = [name_of(form), *[TABLE] * plan.statistics]
     if status == EMPTY:
         names = []
     counts = {}
@@ -94,6 +123,7 @@ def decode(plan, recording, chunk, scratch):
     if os.path.exists(path):
         counts = ledger.check(path, *source.excerpt(chunk, plan.length))
         names.append('ledger')
+        names += [NOTES] * (form == 'mkv' and status != EMPTY)
     manifest = identity(plan, recording, chunk)
     manifest.update(
         outputs={name: digest(os.path.join(scratch, name)) for name in names},

@@ -7,6 +7,7 @@ import time
 
 from archive import chunk as chunks
 from archive import programs
+from archive.plan import FORMS
 from archive.store import Problem, digest
 
 SHORT = 5     # coded frames of the first measurement
@@ -19,7 +20,8 @@ def overlap(plan):
 
 
 def decode(plan, frames):
-    """(core seconds, seconds, bytes) for so many frames of the first recording."""
+    """(core seconds, seconds, bytes until clean) for so many frames of the first
+    recording."""
     part = copy.copy(plan)
     part.length = frames
     first = copy.copy(plan.recordings[0])
@@ -29,16 +31,24 @@ def decode(plan, frames):
         begun, cpu = time.monotonic(), chunks.cpu_seconds()
         log = os.path.join(folder, 'log')
         status = programs.run(chunks.command(part, 0, 0, folder), log)
+        form = part.chunk_form(0)
+        output = os.path.join(folder, chunks.name_of(form))
+        size = digest(output)['bytes'] if status == 0 else 0
+        if status == 0 and form != plan.form:
+            video, output = output, os.path.join(folder, 'out' + FORMS[plan.form])
+            status = programs.run(chunks.finish_command(
+                part, video, os.path.join(folder, chunks.NOTES), output), log)
         if status != 0:
             raise Problem('decoding the first frames failed: ' +
                           ' '.join(programs.last_lines(log)))
         cpu, begun = chunks.cpu_seconds() - cpu, time.monotonic() - begun
-        output = os.path.join(folder, chunks.NAMES[plan.form])
-        return cpu, begun, digest(output)['bytes']
+        # A form that is written at the end needs all chunks joined for it.
+        return cpu, begun, (1 + (form != plan.form)) * size + digest(
+            output)['bytes']
 
 
 def predict(plan):
-    """(core seconds, bytes) of the whole plan: a straight line through two
+    """(core seconds, bytes until clean) of the whole plan: a straight line through two
     measurements."""
     first = plan.recordings[0]
     if first.whole or first.frames <= SHORT:

@@ -2,13 +2,16 @@
 """Puts the chunks of a recording together, and checks what came of it."""
 import bisect
 import os
+import pathlib
+import re
 import shutil
 import subprocess
 
 from archive import chunk as chunks
 from archive import ledger, programs
-from archive.plan import table_of
-from archive.store import Problem, digest, read_json, sync, write_json
+from archive.plan import FINISHED
+from archive.store import (Problem, digest, files_below, read_json, sync,
+                           write_json)
 
 TABLE = 'times.csv'
 
@@ -48,12 +51,12 @@ def check_chunks(store, plan, recording):
     return manifests
 
 
-def join_videos(parts, output):
+def join_videos(parts, notes, output):
     """The number of pictures."""
     joined = subprocess.run(
         [programs.join_program(), '--force', output], text=True, check=False,
-        input=''.join(f'{part}\n' for part in parts), capture_output=True,
-        preexec_fn=programs.end_with_parent)
+        input=''.join(f'{video}\0{note}\0' for video, note in zip(parts, notes)),
+        capture_output=True, preexec_fn=programs.end_with_parent)
     if joined.returncode != 0:
         raise Problem(joined.stderr.strip() or 'codedexposure-join failed')
     return int(joined.stdout)
@@ -100,6 +103,64 @@ def join_pictures(parts, output):
     return pictures
 
 
+def provenance(line):
+    """Of a line of notes, without the number of the first picture; empty: none."""
+    said = re.search(r'coded-exposure-decoded.*?(?<!\\)"', line)
+    return re.sub(r'\\"(frame|slot)\\":\d+', '', said[0]) if said else ''
+
+
+def join_notes(parts, output):
+    """Notes of one run: those of the whole stream are at its beginning. The times
+    of the pictures, ns. Raises Problem if the provenance changes on the way."""
+    times, known = [], set()
+    with open(output, 'w', encoding='utf-8') as notes:
+        for part in parts:
+            with open(part, encoding='utf-8') as lines:
+                for line in lines:
+                    if line.startswith('picture '):
+                        times.append(int(line.split(' ', 2)[1]))
+                    elif line.startswith('tags ') and (said := provenance(line)):
+                        known.add(said)
+                    if line.startswith('picture ') or part == parts[0]:
+                        notes.write(line)
+    if len(known) > 1:
+        raise Problem('the schedule changes within the recording; decode it '
+                      'without archive')
+    return times
+
+
+def finish(store, plan, recording, videos, notes, output):
+    """Writes the chunks' pictures in the form of the plan. The number of
+    pictures."""
+    video, all_notes, log = (os.path.join(store.merging(recording), name)
+                             for name in ('pictures.mkv', 'notes', 'log'))
+    times = join_notes(notes, all_notes)
+    pictures = join_videos(videos, notes, video)
+    status = programs.run(
+        chunks.finish_command(plan, video, all_notes, output), log,
+        stdin=subprocess.DEVNULL)
+    if status != 0:
+        raise Problem(f'{output} could not be written: ' +
+                      ' '.join(programs.last_lines(log)))
+    with open(store.times(recording) + '.part', 'w', encoding='ascii') as file:
+        file.writelines(f'{time}\n' for time in times)
+    os.replace(store.times(recording) + '.part', store.times(recording))
+    sync(output)
+    return pictures
+
+
+def take_whole(part, output):
+    """The only chunk is the result. A link takes no room."""
+    new = output + '.part'
+    pathlib.Path(new).unlink(missing_ok=True)
+    try:
+        os.link(part, new)
+    except OSError:  # a file system without links
+        shutil.copyfile(part, new)
+        sync(new)
+    os.replace(new, output)
+
+
 def write_ledger(store, plan, recording):
     path = store.ledger(recording)
     with open(path + '.part', 'wb') as file:
@@ -114,9 +175,26 @@ def write_ledger(store, plan, recording):
 
 
 def outputs_of(store, plan, recording):
-    """The paths of the pictures and of their statistics."""
-    output = os.path.join(store.folder, plan.recordings[recording].output)
-    return [output, *[table_of(output)] * plan.statistics]
+    """The paths of the pictures, their statistics, and the report."""
+    return [os.path.join(store.folder, name) for name in plan.outputs(recording)]
+
+
+def write_report(store, plan, recording, output):
+    """As one run of report. It measures the recording itself."""
+    new = os.path.join(store.merging(recording), 'page')
+    log = os.path.join(store.merging(recording), 'log')
+    options = [option for option in plan.options if option.startswith(
+        ('--method=', '--schedule=', '--bench=', '--bits='))]
+    status = programs.run(
+        [programs.REPORT, plan.recordings[recording].path, *options,
+         f'--output={new}'], log, stdin=subprocess.DEVNULL)
+    if status != 0:
+        raise Problem(f'{output} could not be written: ' +
+                      ' '.join(programs.last_lines(log)))
+    for name in files_below(new):
+        sync(os.path.join(new, name))
+    shutil.rmtree(output, ignore_errors=True)
+    os.rename(new, output)
 
 
 def merge(store, plan, recording):
@@ -124,23 +202,35 @@ def merge(store, plan, recording):
     source = plan.recordings[recording]
     manifests = check_chunks(store, plan, recording)
     sums = ledger.total([m['counts'] for m in manifests if m['counts']])
-    name = chunks.NAMES[plan.form]
+    form = plan.chunk_form(recording)
     def files(name):
         return [os.path.join(store.part(recording, number), name)
                 for number, m in enumerate(manifests) if name in m['outputs']]
-    parts, outputs = files(name), outputs_of(store, plan, recording)
+    parts, outputs = files(chunks.name_of(form)), outputs_of(store, plan, recording)
     output = outputs[0]
     if not parts:
         raise Problem(f'{source.path} has no coded frame')
     os.makedirs(os.path.dirname(output.rstrip('/')), exist_ok=True)
-    join = join_videos if plan.form == 'mkv' else join_pictures
-    pictures = join(parts, output)
+    shutil.rmtree(store.merging(recording), ignore_errors=True)
+    os.mkdir(store.merging(recording))
+    if form != plan.form:
+        pictures = finish(store, plan, recording, parts, files(chunks.NOTES),
+                          output)
+    elif form == 'png':
+        pictures = join_pictures(parts, output)
+    elif source.cut_off():
+        pictures = take_whole(parts[0], output)
+    else:
+        pictures = join_videos(parts, files(chunks.NOTES), output)
     counted = any(m['counts'] for m in manifests)
     if counted and pictures != sums['pictures']:
         raise Problem(f'{output} has {pictures} pictures, but its ledger '
                       f'{sums["pictures"]}')
     if plan.statistics:
         join_tables(files(chunks.TABLE), outputs[1])
+    if plan.report:
+        write_report(store, plan, recording, outputs[-1])
+    shutil.rmtree(store.merging(recording))
     write_ledger(store, plan, recording)
     missing = max(0, source.recorded - sums['coded']) if counted else 0
     status = max(m['status'] % chunks.EMPTY for m in manifests)
@@ -187,8 +277,13 @@ def times_in(path):
     return [int(line) for line in listed.stdout.split()]
 
 
-def times_of_output(path):
-    if os.path.isfile(path):
+def times_of_output(store, plan, recording, path):
+    """Of all pictures, ns. Forms that cannot be listed were compared with the
+    notes of their pictures when they were written, and are as they were."""
+    if plan.form in FINISHED:
+        with open(store.times(recording), encoding='ascii') as file:
+            return [int(line) for line in file]
+    if plan.form == 'mkv':
         return times_in(path)
     with open(os.path.join(path, TABLE), encoding='utf-8') as table:
         column = table.readline().strip().split(',').index('pts_ns')
@@ -212,13 +307,21 @@ def verify(store, plan, recording):
     if not said['counts']:
         return said
     coded, pictures = ledger.read(store.ledger(recording))
-    recorded = times_in(source.path)
-    if sorted(recorded) != sorted(coded):
-        odd = sorted(set(recorded) ^ set(coded))
-        raise Problem(f'{source.path} and the ledger differ in {len(odd)} coded '
-                      f'frames, the first at {odd[0] if odd else "?"} ns')
-    check_once(sorted(coded), pictures, times_of_output(output), output)
+    check_coded(sorted(times_in(source.path)), sorted(coded), source.path)
+    check_once(sorted(coded), pictures, times_of_output(
+        store, plan, recording, output), output)
     return said
+
+
+def check_coded(recorded, coded, path):
+    """Whether these are the same times, up to the rounding of the recording."""
+    if len(recorded) != len(coded):
+        raise Problem(f'{path} has {len(recorded)} coded frames, but the ledger '
+                      f'{len(coded)}')
+    for time, said in zip(recorded, coded):
+        if abs(time - said) > ledger.ROUNDING:
+            raise Problem(f'{path} has a coded frame at {time} ns, but the ledger '
+                          f'at {said} ns')
 
 
 def check_once(coded, pictures, times, output):

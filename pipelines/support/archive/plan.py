@@ -12,9 +12,14 @@ FORMAT, VERSION = 'coded-exposure-archive', 1
 # Options of decode with a value; others are flags.
 VALUED = {'method', 'mapping', 'fuse', 'bench', 'full-well', 'read-noise',
           'region', 'schedule', 'bits', 'white'}
-FLAGS = {'view', 'verbose'}
+FLAGS = {'view', 'verbose', 'refine', 'deflate'}
 FILES = {'mapping', 'bench', 'schedule'}  # values that may be files
-FORMS = {'mkv': '.mkv', 'png': '/'}
+FORMS = {'mkv': '.mkv', 'png': '/', 'mp4': '.mp4', 'ome.tif': '.ome.tif',
+         'h5': '.h5'}
+# Forms that cannot be cut: the chunks are lossless video, with notes of what that
+# does not hold, and become the form when they are merged.
+FINISHED = {'mp4', 'ome.tif', 'h5'}
+CUT_OFF = 'it is cut off'
 
 
 @dataclasses.dataclass
@@ -28,6 +33,9 @@ class Recording:
     recorded: int        # coded frames, by the end of its track; 0: unknown
     chunks: int
     whole: str = ''      # why it is one chunk
+
+    def cut_off(self):
+        return self.whole == CUT_OFF
 
     def excerpt(self, chunk, length):
         """[from, until) of a chunk, ns; None: to the end. A border lies in the
@@ -50,20 +58,24 @@ def read_recording(path, output, length):
     except (matroska.NotMatroska, IndexError) as error:
         raise Problem(f'{path}: {error}; use a recording of record or '
                       'simulate') from error
-    if 'FFV1' not in head.codec:
+    if not has_coded_frames(head):
         raise Problem(f'{path} has {head.codec or "no video"}, but coded frames '
-                      'are recorded as FFV1; use a recording of record or '
+                      'are recorded as FFV1 or raw; use a recording of record or '
                       'simulate')
     frames = round(head.duration / head.period) if head.period else 0
     whole = ''
     if not head.complete:
-        whole = 'it is cut off'
+        whole = CUT_OFF
     elif not head.has_track:
         whole = 'it has no track that numbers its frames'
     elif not frames:
         whole = 'its length or rate is not known'
     return Recording(path, output, print_of_file, head.start, head.period,
                      frames, recorded, 1 if whole else max(1, -(-frames // length)), whole)
+
+
+def has_coded_frames(head):
+    return 'FFV1' in head.codec or head.codec == 'V_UNCOMPRESSED'
 
 
 def is_recording(path):
@@ -73,7 +85,7 @@ def is_recording(path):
         head = matroska.read_head(path, os.stat(path).st_size)
     except (OSError, matroska.NotMatroska, IndexError):
         return False
-    return 'FFV1' in head.codec and head.has_track
+    return has_coded_frames(head) and head.has_track
 
 
 def find_recordings(words, lists, avoid):
@@ -152,6 +164,7 @@ class Plan:
     program: str         # name and version
     recordings: list
     statistics: bool = False  # of each picture, in a table
+    report: bool = False      # a page of each recording
     engine: dict = dataclasses.field(default_factory=dict)
 
     def __post_init__(self):
@@ -160,6 +173,19 @@ class Plan:
             self.first.append(total)
             total += recording.chunks
         self.chunks = total
+
+    def chunk_form(self, recording):
+        """The form of the chunks of a recording. One that is cut off is decoded
+        without an excerpt, and has its form at once."""
+        if self.form in FINISHED and not self.recordings[recording].cut_off():
+            return 'mkv'
+        return self.form
+
+    def outputs(self, recording):
+        """What is written for a recording, relative to the folder."""
+        output = self.recordings[recording].output
+        return [output, *[table_of(output)] * self.statistics,
+                *[report_of(output)] * self.report]
 
     def locate(self, number):
         """(recording, chunk) of the chunk of that number."""
@@ -186,9 +212,21 @@ class Plan:
         return Plan(**fields)
 
 
+def beside(output, ending):
+    """The name of what is written beside an output."""
+    output = output.rstrip('/')
+    for other in sorted(FORMS.values(), key=len, reverse=True):
+        if output.endswith(other):
+            return output.removesuffix(other) + ending
+    return output + ending
+
+
 def table_of(output):
-    """The statistics beside an output."""
-    return os.path.splitext(output.rstrip('/'))[0] + '.csv'
+    return beside(output, '.csv')
+
+
+def report_of(output):
+    return beside(output, '.report')
 
 
 def make(words, lists, folder, form, length, threads, options, program):

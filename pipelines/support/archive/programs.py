@@ -12,6 +12,7 @@ from archive.store import Problem
 SCRIPTS = pathlib.Path(__file__).resolve().parents[2]
 SCRIPT = str(SCRIPTS / 'archive')
 DECODE = str(SCRIPTS / 'decode')
+REPORT = str(SCRIPTS / 'report')
 
 
 def join_program():

@@ -9,11 +9,13 @@ from archive.store import Problem, Store, read_json, write_json
 
 CHUNKS = 4      # for each job, so that all end at about the same time
 SHORTEST = 250  # coded frames; each chunk starts a process and reads more
+STATISTICS = '--statistics='
 
 
 def check_name(output, force):
     """The form of an output."""
-    form = 'png' if output.endswith('/') else 'mkv'
+    form = next(form for form, ending in plan.FORMS.items()
+                if output.endswith(ending))
     name = output.rstrip('/')
     if not force and (os.listdir(name) if form == 'png' and os.path.isdir(name)
                       else os.path.lexists(name)):
@@ -22,11 +24,21 @@ def check_name(output, force):
     return form
 
 
+def check_table(table, force):
+    if os.path.lexists(table) and not force:
+        raise Problem(f'{table} exists; choose another name, or set --force to '
+                      'replace it')
+
+
 def run(recording, output, jobs, force, options):
     """The exit status of decode. What it needs meanwhile is beside the output,
     and removed at the end."""
     form = check_name(output, force)
     name = os.path.abspath(output)
+    tables = [option for option in options if option.startswith(STATISTICS)]
+    table = tables[-1].removeprefix(STATISTICS) if tables else None
+    if table:
+        check_table(table, force)
     frames = plan.read_recording(recording, '', 1).frames
     length = max(SHORTEST, -(-frames // (CHUNKS * jobs)))
     if frames <= length:
@@ -38,15 +50,17 @@ def run(recording, output, jobs, force, options):
         try:
             store.create()
             made = plan.make([recording], [], store.folder, form, length, 1,
-                             options, programs.version())
+                             [o for o in options if o not in tables],
+                             programs.version())
+            made.statistics = bool(table)
             made.engine = {'on': 'parallel', 'jobs': jobs}
             write_json(store.plan, made.to_json())
-            return decode(store, made, name, output)
+            return decode(store, made, name, output, table)
         finally:
             shutil.rmtree(store.folder, ignore_errors=True)
 
 
-def decode(store, made, name, output):
+def decode(store, made, name, output, table):
     watch = status.Watch(store, made)
     try:
         engine.start(store, made, watch)
@@ -60,6 +74,8 @@ def decode(store, made, name, output):
     if made.form == 'png':
         shutil.rmtree(name, ignore_errors=True)
     os.replace(result, name)
+    if table:
+        shutil.move(plan.table_of(result), table)
     said = read_json(store.merged(0))
     counts = said['counts']
     if counts:

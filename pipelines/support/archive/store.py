@@ -6,6 +6,8 @@ FOLDER/.archive/parts/R/C/          chunk C of recording R, with manifest.json
 FOLDER/.archive/failed/R-C.json     why a chunk or (C: merge) a merge failed
 FOLDER/.archive/merged/R.json       the manifest of a finished recording
 FOLDER/.archive/merged/R.ledger     its coded frames and their pictures
+FOLDER/.archive/merged/R.times      times of the pictures of a form that cannot be
+                                    listed
 FOLDER/.archive/runs/N/             lists, script and logs of a run
 
 A chunk is written to a folder of another name and renamed as a whole."""
@@ -117,6 +119,10 @@ class Store:
     def part(self, recording, chunk):
         return os.path.join(self.parts(recording), f'{chunk:06d}')
 
+    def merging(self, recording):
+        """What is needed only while the chunks of a recording are merged."""
+        return os.path.join(self.parts(recording), 'merging')
+
     def failure(self, recording, chunk):
         name = 'merge' if chunk is None else f'{chunk:06d}'
         return os.path.join(self.work, 'failed', f'{recording:06d}-{name}.json')
@@ -126,6 +132,9 @@ class Store:
 
     def ledger(self, recording):
         return os.path.join(self.work, 'merged', f'{recording:06d}.ledger')
+
+    def times(self, recording):
+        return os.path.join(self.work, 'merged', f'{recording:06d}.times')
 
     def new_run(self):
         runs = os.path.join(self.work, 'runs')

@@ -20,8 +20,11 @@ plugin_init (GstPlugin *plugin)
 #endif
   return GST_ELEMENT_REGISTER (codedexposure_camerasrc, plugin) &&
          GST_ELEMENT_REGISTER (codedexposure_demux, plugin) &&
+         GST_ELEMENT_REGISTER (codedexposure_filesink, plugin) &&
          GST_ELEMENT_REGISTER (codedexposure_fuse, plugin) &&
          GST_ELEMENT_REGISTER (codedexposure_log, plugin) &&
+         GST_ELEMENT_REGISTER (codedexposure_matroskamux, plugin) &&
+         GST_ELEMENT_REGISTER (codedexposure_rawdec, plugin) &&
          GST_ELEMENT_REGISTER (codedexposure_restore, plugin) &&
          GST_ELEMENT_REGISTER (codedexposure_scene, plugin) &&
          GST_ELEMENT_REGISTER (codedexposure_sim, plugin) &&

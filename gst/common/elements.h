@@ -6,8 +6,11 @@
 
 GST_ELEMENT_REGISTER_DECLARE (codedexposure_camerasrc);
 GST_ELEMENT_REGISTER_DECLARE (codedexposure_demux);
+GST_ELEMENT_REGISTER_DECLARE (codedexposure_filesink);
 GST_ELEMENT_REGISTER_DECLARE (codedexposure_fuse);
 GST_ELEMENT_REGISTER_DECLARE (codedexposure_log);
+GST_ELEMENT_REGISTER_DECLARE (codedexposure_matroskamux);
+GST_ELEMENT_REGISTER_DECLARE (codedexposure_rawdec);
 GST_ELEMENT_REGISTER_DECLARE (codedexposure_restore);
 GST_ELEMENT_REGISTER_DECLARE (codedexposure_scene);
 GST_ELEMENT_REGISTER_DECLARE (codedexposure_sim);

@@ -13,7 +13,7 @@ ffv1_speed ()
   local file log frames
   file=$(dirname "$1")/.codec-$$.mkv
   # A second at 0.03 GB/s.
-  frames=$((30000000 / (width * height)))
+  frames=$((30000000 / (width * height * $(grey_bytes))))
   frames=$((frames < 4 ? 4 : frames > 200 ? 200 : frames))
   log=$(timeout --signal=KILL 20 "$launcher" --what=codec --verbose --count=log \
     "videotestsrc num-buffers=1 pattern=snow !
@@ -43,12 +43,6 @@ choose_codec ()
 {
   local speed disk needed words
   codec=${opt[codec]:-ffv1}
-  if [ "$(grey_format)" != GRAY8 ]; then
-    [ "$codec" != raw ] || usage_error "--codec raw carries 8 bits, because" \
-      "GStreamer writes no raw Matroska with more; use ffv1"
-    [ "$codec" != auto ] || say "codec ffv1: raw carries 8 bits only"
-    codec=ffv1
-  fi
   [ "$codec" = auto ] || return 0
   ! is_set source || is_set size || usage_error "--codec auto measures with" \
     "frames of the camera; set their --size"
@@ -66,8 +60,8 @@ choose_codec ()
   codec=raw
   disk=$(disk_speed "$1")
   say "codec raw: $words would be needed; $(awk -v d="$disk" -v n="$needed" \
-    -v w="$width" -v h="$height" 'BEGIN {
+    -v b=$((width * height * $(grey_bytes))) 'BEGIN {
       printf "the disk writes %.2f GB/s, and raw frames need %.2f GB/s",
-        d / 1e9, n * w * h / 1e9
-      if (d < n * w * h) printf ", so the buffer will fill: use a faster disk" }')"
+        d / 1e9, n * b / 1e9
+      if (d < n * b) printf ", so the buffer will fill: use a faster disk" }')"
 }

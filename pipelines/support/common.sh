@@ -299,21 +299,32 @@ buffer_limits ()
       (frames < 75 ? 75 : frames), (bytes > 4e9 ? 4e9 : bytes) }'
 }
 
+# Prints the bytes of a raw recording whose length and frame size are known; else
+# nothing.
+raw_size ()
+{
+  is_set frames || return 0
+  is_set size || ! is_set source || return 0
+  # A frame has a line in the track and an entry in the index.
+  printf 'reserve=%d ' $((opt[frames] * (width * height * $(grey_bytes) + 4096)))
+}
+
 # coded_recording FILE [CODEC]: writes coded frames to Matroska, as FFV1 or raw,
 # with the track of what is known of each frame, and the same to the sidecar.
 # Every frame can be decoded alone; with ticks of 1 µs it has its own cluster.
 coded_recording ()
 {
-  local encoder mode=
-  encoder="$(ffv1_encoder) !"
-  if [ "${2:-ffv1}" = raw ]; then
-    encoder='' mode='buffer-mode=unbuffered '
+  local encoder='' muxer=codedexposure-matroskamux sink
+  sink="codedexposure-filesink direct=true $(raw_size)"
+  if [ "${2:-ffv1}" = ffv1 ]; then
+    encoder="$(ffv1_encoder) !" sink='filesink '
+    muxer='matroskamux timecodescale=1000'
   fi
   printf 'codedexposure-log name=log location=%s ! ' \
     "$(quoted "$(sidecar_of "$1")")"
-  printf 'queue name=buffer %s ! %s matroskamux name=mux ' "$(buffer_limits)" \
-    "$encoder"
-  printf 'timecodescale=1000 ! filesink %slocation=%s ' "$mode" "$(quoted "$1")"
+  printf 'queue name=buffer %s ! %s %s name=mux ! ' "$(buffer_limits)" \
+    "$encoder" "$muxer"
+  printf '%slocation=%s ' "$sink" "$(quoted "$1")"
   printf 'log.track ! queue max-size-buffers=0 max-size-time=0 ! mux.subtitle_0 '
 }
 

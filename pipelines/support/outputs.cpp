@@ -24,6 +24,7 @@ constexpr struct {
   std::string_view factory;
   const char *property;
 } kWriters[] = {
+    {"codedexposure-filesink", "location"},
     {"codedexposure-log", "location"},
     {"codedexposure-stack", "location"},
     {"filesink", "location"},
@@ -58,7 +59,7 @@ frames_pad (GstElement *element)
   const ObjectPtr<GstPad> peer (gst_pad_get_peer (own.get ()));
   const ObjectPtr<GstElement> before (
       peer ? gst_pad_get_parent_element (peer.get ()) : nullptr);
-  if (!before || factory_of (element) != "filesink")
+  if (!before || !factory_of (element).ends_with ("filesink"))
     return own;
   for (const char *name : {"video_0", "sink"})
     if (ObjectPtr<GstPad> pad{gst_element_get_static_pad (before.get (), name)})

@@ -68,6 +68,11 @@ grey_format ()
   fi
 }
 
+grey_bytes ()
+{
+  [ "$(grey_format)" = GRAY8 ] && printf 1 || printf 2
+}
+
 # Prints WIDTH HEIGHT NUM DEN of a video file.
 probe_video ()
 {

@@ -60,8 +60,10 @@ TEST (Plugin, HasTheElementsOfTheBench)
 {
   for (const char *name :
       {"codedexposure-camerasrc", "codedexposure-sim", "codedexposure-demux",
-          "codedexposure-fuse", "codedexposure-log", "codedexposure-scene",
-          "codedexposure-view", "dmdsync", "moirecalib", "subframestats"}) {
+          "codedexposure-filesink", "codedexposure-fuse", "codedexposure-log",
+          "codedexposure-matroskamux", "codedexposure-rawdec",
+          "codedexposure-scene", "codedexposure-view", "dmdsync", "moirecalib",
+          "subframestats"}) {
     const std::unique_ptr<GstElementFactory, ObjectUnref> factory (
         gst_element_factory_find (name));
     EXPECT_NE (factory, nullptr) << name;

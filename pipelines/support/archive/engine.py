@@ -11,9 +11,13 @@ import sys
 import time
 
 from archive import programs
-from archive.store import Problem, write_json
+from archive.store import Problem, digest, write_json
 
 RETRIES = 3
+READY = 'ready'  # what a computer says that can work
+# A computer that says nothing for a minute is given up.
+SSH = ('ssh -o BatchMode=yes -o ConnectTimeout=20 -o ServerAliveInterval=20 '
+       '-o ServerAliveCountMax=3')
 PASSED = 'partition', 'time', 'account', 'qos', 'mem'  # on to sbatch
 
 
@@ -131,15 +135,46 @@ def running_jobs(jobs):
 
 # ---- GNU parallel ------------------------------------------------------------
 
+def at_hosts(engine):
+    """The words that have parallel use the computers of the engine."""
+    if not engine.get('hosts'):
+        return []
+    words = ['--sshloginfile', engine['hosts'], '--workdir', os.getcwd()]
+    if 'PARALLEL_SSH' not in os.environ:
+        words += ['--ssh', SSH]
+    if 'CODEDEXPOSURE_BUILD' in os.environ:
+        words += ['--env', 'CODEDEXPOSURE_BUILD']
+    return words
+
+
+def check_hosts(store, plan):
+    """Raises Problem if a computer would mix results, or none answers; prints
+    which do not."""
+    with open(plan.engine['hosts'], encoding='utf-8') as file:
+        hosts = [line.strip() for line in file]
+    hosts = [host for host in hosts if host and not host.startswith('#')]
+    said = subprocess.run(
+        ['parallel', '--will-cite', '--nonall', '--tag', *at_hosts(plan.engine),
+         shlex.join([sys.executable, programs.SCRIPT, 'work', 'host', store.folder,
+                     digest(store.plan)['sha256']])],
+        capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL)
+    answers = dict(line.partition('\t')[::2] for line in said.stdout.splitlines())
+    bad = [f'{host}: {answer}' for host, answer in answers.items()
+           if answer != READY]
+    if bad:
+        raise Problem('; '.join(bad))
+    if not answers:
+        raise Problem('no computer answers: ' + ' '.join(said.stderr.split()))
+    for host in hosts:
+        if host not in answers:
+            print(f'{host} does not answer; its work is done by others')
+
+
 def parallel(kind, store, run, engine, watch):
     """Runs the list of the run; calls @watch meanwhile. Whether all went well."""
     words = ['parallel', '--will-cite', f'--retries={RETRIES}', '--halt=never',
              '--joblog', os.path.join(run, f'{kind}.joblog'),
-             f'--jobs={engine.get("jobs") or "100%"}']
-    if engine.get('hosts'):
-        words += ['--sshloginfile', engine['hosts'], '--workdir', os.getcwd()]
-        if 'CODEDEXPOSURE_BUILD' in os.environ:
-            words += ['--env', 'CODEDEXPOSURE_BUILD']
+             f'--jobs={engine.get("jobs") or "100%"}', *at_hosts(engine)]
     words += [shlex.join([sys.executable, programs.SCRIPT, 'work', f'one-{kind}',
                           store.folder]) + ' {}',
               '::::', os.path.join(run, f'{kind}.list')]
@@ -175,6 +210,8 @@ def _passed_on(child):
 
 
 def start_parallel(store, plan, run, chunks, merges, watch):
+    if plan.engine.get('hosts'):
+        check_hosts(store, plan)
     if chunks:
         parallel('chunk', store, run, plan.engine, watch)
     parallel('merge', store, run, plan.engine, watch)

@@ -5,11 +5,12 @@ import os
 import sys
 import time
 
-from archive import engine
+from archive import engine, programs
 from archive.store import Busy, read_json
 
 BAR = 30
 SHOWN = 5  # failures
+RESUME = 'resume goes on with what is missing'
 
 
 @dataclasses.dataclass
@@ -78,6 +79,14 @@ def show_failures(store, plan, status, out=sys.stdout):
               f'{os.path.join(store.work, "failed")}', file=out)
 
 
+def show_log(store, out):
+    """What the engine said last, of jobs that could not say it themselves."""
+    for kind in 'chunk', 'merge':
+        path = os.path.join(store.last_run() or '', f'{kind}.log')
+        for line in programs.last_lines(path):
+            print(f'{kind}: {line}', file=out)
+
+
 def show(store, plan):
     """Whether everything is merged."""
     status = take(store, plan)
@@ -90,7 +99,7 @@ def show(store, plan):
             f'{count} {state}' for state, count in sorted(states.items())))
     show_failures(store, plan, status)
     if not status.complete() and not states and not store_is_busy(store):
-        print('nothing runs; resume goes on with what is missing')
+        print(f'nothing runs; {RESUME}')
     return status.complete()
 
 

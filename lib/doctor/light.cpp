@@ -38,6 +38,8 @@ constexpr double kDriftWarn = 0.02, kDriftFail = 0.05; // a minute
 
 /* Of the light to which an amplitude is related. */
 constexpr double kGainError = 0.01;
+/* The clock of a camera is that wrong, relative. */
+constexpr double kClockError = 5e-5;
 
 std::string
 percent (double part)
@@ -283,7 +285,9 @@ LightCheck::judge_flicker (const LightFit &fit)
         {"flicker", {0.0, 100.0 * fit.faintest}, "%", "at most 1"});
     return;
   }
-  const auto &[frequency, seen] = fit.lines.front ();
+  const auto &[ticks, seen] = fit.lines.front ();
+  const Measured frequency{
+      ticks.value, std::hypot (ticks.sigma, kClockError * ticks.value)};
   const Measured depth{
       seen.value, std::hypot (seen.sigma, kGainError * seen.value)};
   finding_.readings.push_back ({"flicker",

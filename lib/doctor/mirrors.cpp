@@ -21,6 +21,7 @@ constexpr int kFrames = 16;
 constexpr int kOffFrames = 24;             // of each exposure time
 constexpr Nanoseconds kShortest = 110'000; // of a slot
 constexpr double kFull = 0.002; // part of the values that may be the largest
+constexpr double kLightError = 0.0015; // of the light that leaks, relative
 constexpr double kLeakWarn = 0.015, kLeakFail = 0.02;
 constexpr double kSlowWarn = 100.0, kSlowFail = 200.0; // us
 /* Stuck mirrors, of those seen. */
@@ -99,7 +100,8 @@ MirrorRun::measure_leak ()
           pedestal * slot));
   /* Light with the mirrors on for all of the exposure. */
   const double whole = light / exposed_ + found.light.value;
-  const Measured leak = {found.light.value / whole, found.light.sigma / whole};
+  const Measured leak = {found.light.value / whole,
+      std::hypot (found.light.sigma, kLightError * found.light.value) / whole};
   examination_.profile.leak = {std::clamp (leak.value, 0.0, 0.5), leak.sigma};
   diagnose_leak (leak);
   return {};

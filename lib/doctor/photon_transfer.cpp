@@ -68,6 +68,20 @@ fit (const std::vector<Sample> &samples, int degree)
 
 } // namespace
 
+void
+PhotonTransfer::set_floor (const Measured &variance)
+{
+  const double gain = conversion_gain.value;
+  /* The gain's own error changes electrons, and with them the noise. */
+  const double sigma = std::hypot (
+      variance.sigma, 2.0 * variance.value * conversion_gain.sigma / gain);
+  read_variance = {gain * gain * variance.value, gain * gain * sigma};
+  const double read = std::sqrt (std::max (0.0, read_variance.value));
+  const double least = std::sqrt (read_variance.sigma);
+  read_noise = {read,
+      read > 0.0 ? std::min (0.5 * read_variance.sigma / read, least) : least};
+}
+
 double
 PhotonTransfer::light_of (double number) const
 {
@@ -137,16 +151,7 @@ fit_photon_transfer (const std::vector<TransferPoint> &points)
   /* Light that flickers at a multiple of the frame rate looks like a bow. */
   found.conversion_gain.sigma =
       std::hypot (found.conversion_gain.sigma, kLightError * gain);
-  const double floor = noise.factors[0];
-  /* The gain's own error changes electrons, and with them the noise. */
-  const double floor_sigma = std::hypot (std::sqrt (noise.covariance (0, 0)),
-      2.0 * floor * found.conversion_gain.sigma / gain);
-  found.read_variance = {gain * gain * floor, gain * gain * floor_sigma};
-  const double read = std::sqrt (std::max (0.0, found.read_variance.value));
-  const double least = std::sqrt (found.read_variance.sigma);
-  found.read_noise = {read,
-      read > 0.0 ? std::min (0.5 * found.read_variance.sigma / read, least)
-                 : least};
+  found.set_floor ({noise.factors[0], std::sqrt (noise.covariance (0, 0))});
   return found;
 }
 

@@ -29,6 +29,8 @@ struct PhotonTransfer {
   double slope = 0.0, bow = 0.0;
   double bow_sigma = 0.0;
 
+  /** Sets the read noise from the variance without light, DN squared. */
+  void set_floor (const Measured &variance);
   double number_of (double light) const
   {
     return dark.value + (slope + bow * light) * light;

@@ -34,23 +34,6 @@ below (double z, double skewness)
   return below (z) - density * skewness / 6.0 * (z * z - 1.0);
 }
 
-Moments
-rounded_pixel (double mean, double sigma, double third)
-{
-  const double skewness = third / (sigma * sigma * sigma);
-  const int first = std::max (0, int (std::floor (mean - 6 * sigma)));
-  const int last = std::max (first, int (std::ceil (mean + 6 * sigma)));
-  double sum = 0.0, squares = 0.0, before = 0.0;
-  for (int value = first; value <= last; value++) {
-    const double to =
-        value == last ? 1.0 : below ((value + 0.5 - mean) / sigma, skewness);
-    sum += value * (to - before);
-    squares += (value - mean) * (value - mean) * (to - before);
-    before = to;
-  }
-  return {sum, squares - (sum - mean) * (sum - mean)};
-}
-
 /* The exact mean that is rounded to @seen, by bisection. */
 double
 mean_behind (double seen, double variance, double third, const Offsets &offsets)
@@ -66,15 +49,40 @@ mean_behind (double seen, double variance, double third, const Offsets &offsets)
 
 } // namespace
 
+RoundedMoments
+rounded_moments (double mean, double sigma, double third)
+{
+  const double skewness = third / (sigma * sigma * sigma);
+  const int first = std::max (0, int (std::floor (mean - 6 * sigma)));
+  const int last = std::max (first, int (std::ceil (mean + 6 * sigma)));
+  double sum = 0.0, squares = 0.0, cubes = 0.0, fourth = 0.0, before = 0.0;
+  for (int value = first; value <= last; value++) {
+    const double to =
+        value == last ? 1.0 : below ((value + 0.5 - mean) / sigma, skewness);
+    const double x = value - mean, part = to - before;
+    sum += x * part;
+    squares += x * x * part;
+    cubes += x * x * x * part;
+    fourth += x * x * x * x * part;
+    before = to;
+  }
+  return {mean + sum, squares - sum * sum,
+      fourth - 4 * sum * cubes + 6 * sum * sum * squares -
+          3 * sum * sum * sum * sum};
+}
+
 Moments
 rounded (const Moments &exact, const Offsets &offsets)
 {
   const double sigma = std::sqrt (std::max (1e-12, exact.variance));
+  const auto pixel = [&] (double offset) {
+    return rounded_moments (exact.mean + offset, sigma, exact.third);
+  };
   if (offsets.empty ())
-    return rounded_pixel (exact.mean, sigma, exact.third);
+    return {pixel (0.0).mean, pixel (0.0).variance};
   Moments sum = {};
   for (const double offset : offsets) {
-    const Moments one = rounded_pixel (exact.mean + offset, sigma, exact.third);
+    const RoundedMoments one = pixel (offset);
     sum.mean += one.mean;
     sum.variance += one.variance;
   }

@@ -18,6 +18,16 @@ struct Moments {
   double third = 0.0;
 };
 
+/** Of the rounded values of one pixel. */
+struct RoundedMoments {
+  double mean = 0.0, variance = 0.0;
+  double fourth = 0.0; ///< central
+};
+
+/** What rounding makes of almost Gaussian noise, whose third central moment is
+ * @p third; there are no values below 0. */
+RoundedMoments rounded_moments (double mean, double sigma, double third);
+
 /** Differences of the pixels' means from their common mean, DN: equally many
  * pixels have each. Empty: there are none. */
 using Offsets = std::vector<double>;

@@ -8,6 +8,7 @@
 #include "base/text.h"
 #include "base/try.h"
 #include "doctor/defects.h"
+#include "doctor/dither.h"
 #include "doctor/off_light.h"
 #include "doctor/photon_transfer.h"
 #include "doctor/rounding.h"
@@ -21,7 +22,6 @@ namespace
 
 constexpr int kFrames = 16;         // of a level
 constexpr int kDarkFrames = 24;     // of the dark
-constexpr int kManyFrames = 64;     // where rounding hides read noise
 constexpr int kReferenceFrames = 6; // of the level that shows drift
 constexpr int kLevelsPerReference = 4;
 /* Slots are at least that long: masks of DLPC900 take 105 us. */
@@ -37,6 +37,10 @@ constexpr double kLightError = 0.001, kVarianceError = 0.004;
 constexpr double kUnroundedError = 0.0007;
 /* Part of the values that may be 0 there; noise is cut off otherwise. */
 constexpr double kZeros = 0.005;
+/* Error of the dark beside levels with light, DN. */
+constexpr double kDarkError = 0.02;
+/* Below this variance of the dark, DN squared, rounding changes it. */
+constexpr double kRounded = 0.9;
 /* A gain with this relative error is not known. */
 constexpr double kUnknown = 0.2;
 /* Light below this part of the range is too little to measure noise. */
@@ -115,7 +119,7 @@ private:
   double spread_ = 0.0;       // of the pixels' light, as a part of it
   std::vector<double> parts_; // of the light that pixels get
   OffLight off_;
-  int pedestal_ = 0;
+  std::optional<Dark> dithered_; // where rounding hides the dark
   std::optional<PhotonTransfer> transfer_;
   Measured black_;
   std::optional<double> plateau_; // DN of a full well below the largest DN
@@ -208,14 +212,20 @@ Result<void>
 PhotonTransferRun::see_off ()
 {
   const auto first = fit_photon_transfer (points ({}));
-  const double slot = first ? first->slope : 0.0;
-  const double gain = first ? first->conversion_gain.value : 0.0;
-  pedestal_ =
-      pedestal_for (fine_, slot, gain, dark_means_.variance > 0.3 ? 1.0 : 0.0);
+  if (first && dark_means_.variance < kRounded) {
+    ASSIGN_OR_RETURN (
+        const auto sight, measure_dither (examination_, fine_, top_, dark_.mean,
+                              bright_.mean, defects_.good.view (), *first));
+    if (sight) {
+      dithered_ = sight->dark;
+      off_.light = sight->dark.off;
+      off_.shorter = sight->shorter;
+      return {};
+    }
+  }
   ASSIGN_OR_RETURN (
-      off_, measure_off_light (examination_,
-                pedestal_ > 0 ? kManyFrames : kDarkFrames, fine_, pedestal_,
-                defects_.good.view (), dark_.mean, parts_, pedestal_ * slot));
+      off_, measure_off_light (examination_, kDarkFrames, fine_, 0,
+                defects_.good.view (), dark_.mean, parts_, 0.0));
   return {};
 }
 
@@ -261,11 +271,10 @@ PhotonTransferRun::points (std::optional<double> leak) const
     if (!plateau_ || level.means.mean < 0.9 * *plateau_)
       add (level.means, level.slots * drift_at (level.stack.time) + leak_slots,
           level.stack.scatter / std::sqrt (level.stack.frames));
-  if (leak) {
-    add (off_.shorter, pedestal_ + off_.part * leak_slots, 0.02);
-    if (pedestal_ > 0)
-      add (off_.longest, pedestal_ + leak_slots, 0.02);
-  }
+  if (dithered_)
+    all.push_back ({0.0, {dithered_->black.value, kDarkError}});
+  else if (leak)
+    add (off_.shorter, off_.part * leak_slots, 0.02);
   return all;
 }
 
@@ -287,6 +296,11 @@ PhotonTransferRun::evaluate ()
   transfer_ = fit_photon_transfer (points (off_.light.value / first->slope));
   if (!transfer_)
     return false;
+  if (dithered_) {
+    transfer_->set_floor (dithered_->variance);
+    black_ = dithered_->black;
+    return true;
+  }
   black_ = {transfer_->dark.value,
       std::hypot (transfer_->dark.sigma, off_.light.sigma)};
   const double electrons_per_number = transfer_->conversion_gain.value;
@@ -396,7 +410,7 @@ void
 PhotonTransferRun::diagnose ()
 {
   const double zeros = std::max (off_.shorter.zeros, dark_means_.zeros);
-  diagnose_range (pedestal_ > 0 ? dark_means_.zeros : zeros);
+  diagnose_range (dithered_ ? dark_means_.zeros : zeros);
   const bool known = finding_.diagnoses.empty ();
   if (transfer_ && known) {
     const Measured &bow = *examination_.profile.linearity_error;

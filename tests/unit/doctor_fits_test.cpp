@@ -10,6 +10,7 @@
 #include "doctor/blur_map.h"
 #include "doctor/chessboard.h"
 #include "doctor/defects.h"
+#include "doctor/dither.h"
 #include "doctor/lens_fit.h"
 #include "doctor/photon_transfer.h"
 #include "doctor/rounding.h"
@@ -38,6 +39,66 @@ TEST (Rounding, SaysWhatItHides)
 {
   EXPECT_FALSE (unrounded (rounded ({4.2, 0.01}, {}), {}));
   EXPECT_FALSE (unrounded ({4.0, 0.0}, {}));
+}
+
+/* Groups of pixels, as a camera that rounds to whole DN sees them. */
+std::vector<DitherGroup>
+dithered (double black, double off, double read, double gain, double unlike,
+    double part)
+{
+  constexpr int kPixels = 150, kFrames = 16;
+  std::mt19937 random (7);
+  std::normal_distribution<double> normal;
+  std::vector<DitherGroup> groups;
+  for (int look = 0; look < 4; look++)
+    for (int step = 0; step < 30; step++) {
+      DitherGroup group{.look = look,
+          .longer = look == 3,
+          .light = 0.05 * step,
+          .pixels = kPixels,
+          .frames = kFrames};
+      const double light =
+          1.003 * group.light + (group.longer ? off : part * off);
+      for (int pixel = 0; pixel < kPixels; pixel++) {
+        const double own = black + light + unlike * normal (random);
+        std::poisson_distribution<int> electrons (gain * light);
+        double sum = 0.0, squares = 0.0;
+        for (int frame = 0; frame < kFrames; frame++) {
+          const double value =
+              std::round (own - light +
+                          (electrons (random) + read * normal (random)) / gain);
+          sum += value / kFrames;
+          squares += value * value / kFrames;
+        }
+        group.mean += sum / kPixels;
+        group.spread += sum * sum / kPixels;
+        group.variance +=
+            (squares - sum * sum) * kFrames / (kFrames - 1) / kPixels;
+      }
+      group.spread -= group.mean * group.mean;
+      groups.push_back (group);
+    }
+  return groups;
+}
+
+TEST (Dither, ShowsNoiseThatRoundingHides)
+{
+  const double gain = 60.0, part = 0.2, off = 0.7;
+  for (const double black : {5.0, 5.3, 5.6, 5.9})
+    for (const double read : {3.0, 10.0})
+      for (const double unlike : {0.0, 0.06}) {
+        SCOPED_TRACE (
+            testing::Message () << black << " " << read << " " << unlike);
+        const auto dark = fit_dither (
+            dithered (black, off, read, gain, unlike, part), part, {gain, 0.3});
+        ASSERT_TRUE (dark);
+        const double variance = read * read / (gain * gain);
+        EXPECT_NEAR (dark->black.value, black, 0.02);
+        EXPECT_NEAR (dark->off.value, off, 0.02);
+        EXPECT_NEAR (
+            dark->variance.value, variance, 3.5 * dark->variance.sigma);
+        EXPECT_LT (dark->variance.sigma, 0.02 * variance + 2.5e-4);
+      }
 }
 
 TEST (PhotonTransfer, FindsGainAndReadNoise)

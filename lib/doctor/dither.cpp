@@ -1,0 +1,225 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "doctor/dither.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+
+#include "base/try.h"
+
+namespace codedexposure
+{
+
+namespace
+{
+
+/* The short exposure, of the frame period. */
+constexpr int kShorter = 5;
+/* Lengths of the light, of the shortest that mirrors can make. */
+constexpr std::array kLengths = {1.0, 1.25, 1.6, 2.4};
+constexpr int kBrightFrames = 8, kShortFrames = 16, kLongFrames = 8;
+/* Looks are repeated until read noise is known to this part. */
+constexpr double kAim = 0.02;
+constexpr int kMostRounds = 5;
+/* Groups are that wide and go that far, DN; fewer pixels are no group. */
+constexpr double kWidth = 1.0 / 24, kMost = 2.0;
+constexpr double kFewPixels = 30;
+
+StillMask
+random_mirrors (int first, int count)
+{
+  const auto on = [] (int x, int y) {
+    std::uint32_t z =
+        std::uint32_t (x) * 0x9E3779B1u ^ std::uint32_t (y) * 0x85EBCA77u;
+    z = (z ^ (z >> 15)) * 0x2C1B3C6Du;
+    z = (z ^ (z >> 12)) * 0x297A2D39u;
+    return ((z ^ (z >> 15)) & 1u) != 0;
+  };
+  return {.name = "random mirrors", .on = on, .slots = count, .first = first};
+}
+
+/** The looks, and what they give. */
+class DitherRun
+{
+public:
+  DitherRun (Examination &examination, const Examination::Lit &fine,
+      ImageView<const std::uint8_t> good, const PhotonTransfer &transfer)
+      : examination_ (examination), fine_ (fine), good_ (good),
+        transfer_ (transfer)
+  {
+    const double period = double (examination.rig.parts ().rate.period ());
+    const auto &exposure = examination.profile.exposure;
+    part_ = period / kShorter / (exposure ? exposure->value : period);
+  }
+
+  Result<void> see_light (
+      int top, const Image<float> &dark, const Image<float> &bright);
+  Result<void> look (bool longer);
+  std::optional<Dark> fit () const;
+
+  double part () const { return part_; }
+  StackMeans shorter () const { return means_of (looks_.back ().stack, good_); }
+
+private:
+  struct Look {
+    Stack stack;
+    double length; // of the light
+    bool longer;
+  };
+  std::vector<DitherGroup> groups (double off) const;
+  void group (
+      std::size_t look, double off, std::vector<DitherGroup> &all) const;
+
+  Examination &examination_;
+  const Examination::Lit fine_;
+  const ImageView<const std::uint8_t> good_;
+  const PhotonTransfer &transfer_;
+  double part_;
+  /* Of each pixel: light of the mask in the shortest time, DN; and that of all
+   * mirrors, as part of the mean. */
+  Image<float> light_, field_;
+  std::vector<Look> looks_;
+};
+
+Result<void>
+DitherRun::see_light (
+    int top, const Image<float> &dark, const Image<float> &bright)
+{
+  ASSIGN_OR_RETURN (const Stack seen,
+      look_at_light (examination_, random_mirrors (fine_.first, top), fine_.of,
+          kBrightFrames, &dark));
+  light_ = field_ = Image<float> (dark.width (), dark.height ());
+  double mean = 0.0, pixels = 0.0;
+  for (int y = 0; y < dark.height (); y++)
+    for (int x = 0; x < dark.width (); x++) {
+      const double none = transfer_.light_of (double (dark.at (x, y)));
+      const auto of = [&] (const Image<float> &image) {
+        const double light = transfer_.light_of (double (image.at (x, y)));
+        return transfer_.slope * (light - none);
+      };
+      light_.at (x, y) = float (of (seen.mean) / top);
+      field_.at (x, y) = float (of (bright));
+      mean += good_.at (x, y) != 0 ? double (field_.at (x, y)) : 0.0;
+      pixels += good_.at (x, y) != 0;
+    }
+  const float scale = float (pixels / std::max (1e-3, mean));
+  for (int y = 0; y < dark.height (); y++)
+    for (int x = 0; x < dark.width (); x++)
+      field_.at (x, y) *= scale;
+  return {};
+}
+
+/* The mirrors are on a while after the exposure has begun. */
+Result<void>
+DitherRun::look (bool longer)
+{
+  for (const double length : kLengths) {
+    const int of = std::max (1, int (fine_.of / length));
+    const int first = of * fine_.first / fine_.of + of / (4 * kShorter);
+    ASSIGN_OR_RETURN (
+        Stack stack, look_at_light (examination_, random_mirrors (first, 1), of,
+                         longer ? kLongFrames : kShortFrames));
+    stack.zeros = stack.full = longer ? Image<std::uint16_t> () : stack.zeros;
+    looks_.push_back ({std::move (stack), double (fine_.of) / of, longer});
+  }
+  return {};
+}
+
+void
+DitherRun::group (
+    std::size_t look, double off, std::vector<DitherGroup> &all) const
+{
+  const auto &[stack, length, longer] = looks_[look];
+  std::vector<DitherGroup> groups (std::size_t (kMost / kWidth) + 1);
+  for (int y = 0; y < good_.height; y++)
+    for (int x = 0; x < good_.width; x++) {
+      const double light = length * double (light_.at (x, y));
+      const double field = double (field_.at (x, y));
+      const double more = light + (longer ? 1.0 : part_) * off * (field - 1.0);
+      if (good_.at (x, y) == 0 || more >= kMost || more < -kWidth / 2)
+        continue;
+      DitherGroup &group =
+          groups[std::size_t (std::max (0.0, more / kWidth + 0.5))];
+      const double mean = double (stack.mean.at (x, y));
+      group.pixels++;
+      group.light += light;
+      group.field += field;
+      group.mean += mean;
+      group.spread += mean * mean;
+      group.variance += double (stack.variance.at (x, y));
+    }
+  for (DitherGroup &group : groups) {
+    if (group.pixels < kFewPixels)
+      continue;
+    group.look = int (look);
+    group.longer = longer;
+    group.frames = stack.frames;
+    group.field -= 1.0; // where the sum began
+    for (double *sum : {&group.light, &group.field, &group.mean, &group.spread,
+             &group.variance})
+      *sum /= group.pixels;
+    group.spread = std::max (0.0, group.spread - group.mean * group.mean);
+    all.push_back (group);
+  }
+}
+
+std::vector<DitherGroup>
+DitherRun::groups (double off) const
+{
+  std::vector<DitherGroup> all;
+  for (std::size_t look = 0; look < looks_.size (); look++)
+    group (look, off, all);
+  return all;
+}
+
+/* Which pixels get the same light depends on the off light. */
+std::optional<Dark>
+DitherRun::fit () const
+{
+  std::optional<Dark> dark;
+  for (int round = 0; round < 3; round++) {
+    const double off = dark ? std::max (0.0, dark->off.value) : 0.0;
+    const auto next =
+        fit_dither (groups (off), part_, transfer_.conversion_gain,
+            dark ? std::optional<double> (off) : std::nullopt);
+    if (!next)
+      break;
+    dark = next;
+  }
+  return dark;
+}
+
+} // namespace
+
+Result<std::optional<DitherSight>>
+measure_dither (Examination &examination, const Examination::Lit &fine, int top,
+    const Image<float> &dark, const Image<float> &bright,
+    ImageView<const std::uint8_t> good, const PhotonTransfer &transfer)
+{
+  Rig &rig = examination.rig;
+  DitherRun run (examination, fine, good, transfer);
+  RETURN_IF_ERROR (run.see_light (top, dark, bright));
+  RETURN_IF_ERROR (run.look (true));
+  RETURN_IF_ERROR (rig.expose (rig.parts ().rate.period () / kShorter));
+  /* The exposure time changes with a later frame than the mask. */
+  Result<void> seen;
+  if (const auto late = rig.watch (examination.lag); !late)
+    seen = late.error ();
+  std::optional<Dark> found;
+  for (int round = 0; seen && round < kMostRounds; round++) {
+    seen = run.look (false);
+    if (seen)
+      found = run.fit ();
+    if (!found || found->variance.sigma < 2 * kAim * found->variance.value)
+      break;
+  }
+  RETURN_IF_ERROR (rig.expose (std::nullopt));
+  RETURN_IF_ERROR (rig.watch (examination.lag));
+  RETURN_IF_ERROR (seen);
+  if (!found)
+    return std::optional<DitherSight> ();
+  return std::optional<DitherSight> ({*found, run.shorter ()});
+}
+
+} // namespace codedexposure

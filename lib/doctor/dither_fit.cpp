@@ -1,0 +1,223 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <Eigen/Dense>
+
+#include "doctor/dither.h"
+#include "doctor/rounding.h"
+
+namespace codedexposure
+{
+
+namespace
+{
+
+constexpr int kRounds = 30;
+/* Black levels of pixels: standard deviations of a Gaussian, and their weights.
+ * With a larger spread, these would not be dense enough. */
+constexpr std::array kOffsets = {
+    -2.4, -1.8, -1.2, -0.6, 0.0, 0.6, 1.2, 1.8, 2.4};
+constexpr std::array kWeights = {
+    0.0137, 0.0480, 0.1179, 0.2023, 0.2362, 0.2023, 0.1179, 0.0480, 0.0137};
+constexpr double kMostSpread = 0.2; // DN
+/* Light of a look is known to this part: from the response of the sensor, but
+ * for flicker and the microseconds in which controllers count. */
+constexpr double kLightError = 0.01;
+/* What is left of errors of the model: DN of the black level, and part of the
+ * shot noise of half a DN. */
+constexpr double kBlackError = 0.003, kShotError = 0.01;
+
+/* What is fitted; then the factor of light of each look. */
+enum Number : Eigen::Index {
+  kBlack,
+  kOff,
+  kVariance,
+  kSpread,
+  kPerGain, // variance of a DN of light
+  kLooks
+};
+using Numbers = Eigen::VectorXd;
+
+/** What groups are expected to show, and how well they show it. */
+class Model
+{
+public:
+  Model (
+      const std::vector<DitherGroup> &groups, double part, const Measured &gain)
+      : groups_ (groups), part_ (part), per_gain_ (1.0 / gain.value),
+        per_gain_sigma_ (gain.sigma / (gain.value * gain.value))
+  {
+    for (const DitherGroup &group : groups)
+      looks_ = std::max (looks_, group.look + 1);
+  }
+
+  Eigen::Index count () const { return kLooks + looks_; }
+  double freedom () const
+  {
+    return double (2 * groups_.size () + 1) + looks_ - double (count ());
+  }
+  Numbers start (std::optional<double> off) const;
+  /** Sets the errors of mean and variance from what @p n expects. */
+  void weigh (const Numbers &n);
+  /** By their errors: means, variances, the gain, and light of looks. */
+  Eigen::VectorXd residuals (const Numbers &n) const;
+  Eigen::MatrixXd slopes (const Numbers &n, const Eigen::VectorXd &rest) const;
+
+private:
+  RoundedMoments expected (const DitherGroup &group, const Numbers &n) const;
+
+  const std::vector<DitherGroup> &groups_;
+  double part_, per_gain_, per_gain_sigma_;
+  int looks_ = 0;
+  std::vector<std::pair<double, double>> errors_;
+};
+
+Numbers
+Model::start (std::optional<double> off) const
+{
+  /* Means over many groups are hardly rounded. */
+  double dark[2] = {}, pixels[2] = {};
+  for (const DitherGroup &group : groups_) {
+    dark[group.longer] += (group.mean - group.light) * group.pixels;
+    pixels[group.longer] += group.pixels;
+  }
+  const double shorter = dark[0] / std::max (1.0, pixels[0]);
+  const double longer = dark[1] / std::max (1.0, pixels[1]);
+  Numbers n = Numbers::Ones (count ());
+  n[kOff] = off.value_or (std::max (0.0, (longer - shorter) / (1.0 - part_)));
+  n[kBlack] = shorter - part_ * n[kOff];
+  n[kVariance] = 0.01;
+  n[kSpread] = 0.02;
+  n[kPerGain] = per_gain_;
+  return n;
+}
+
+RoundedMoments
+Model::expected (const DitherGroup &group, const Numbers &n) const
+{
+  const double light = n[kLooks + group.look] * group.light +
+                       (group.longer ? 1.0 : part_) * group.field * n[kOff];
+  const double shot = std::max (0.0, light) * n[kPerGain];
+  const double sigma = std::sqrt (std::max (1e-6, n[kVariance] + shot));
+  RoundedMoments sum;
+  for (std::size_t i = 0; i < kOffsets.size (); i++) {
+    const RoundedMoments one =
+        rounded_moments (n[kBlack] + light + kOffsets[i] * n[kSpread], sigma,
+            shot * n[kPerGain]);
+    sum.mean += kWeights[i] * one.mean;
+    sum.variance += kWeights[i] * one.variance;
+    sum.fourth += kWeights[i] * one.fourth;
+  }
+  return sum;
+}
+
+void
+Model::weigh (const Numbers &n)
+{
+  errors_.clear ();
+  for (const DitherGroup &group : groups_) {
+    const RoundedMoments e = expected (group, n);
+    const double values = group.pixels * group.frames;
+    const double square = e.variance * e.variance;
+    const double one = 1.0 / values; // a single value that differs
+    const double of_variance =
+        std::max (0.0, e.fourth - square) + 2.0 * square / (group.frames - 1);
+    errors_.emplace_back (
+        std::sqrt (std::max (group.spread / group.pixels, e.variance / values) +
+                   one * one),
+        std::sqrt (of_variance / values + one * one));
+  }
+}
+
+Eigen::VectorXd
+Model::residuals (const Numbers &n) const
+{
+  Eigen::VectorXd rest (Eigen::Index (2 * groups_.size () + 1) + looks_);
+  Eigen::Index i = 0;
+  for (std::size_t g = 0; g < groups_.size (); g++) {
+    const RoundedMoments e = expected (groups_[g], n);
+    rest[i++] = (groups_[g].mean - e.mean) / errors_[g].first;
+    rest[i++] = (groups_[g].variance - e.variance) / errors_[g].second;
+  }
+  rest[i++] = (per_gain_ - n[kPerGain]) / per_gain_sigma_;
+  for (int look = 0; look < looks_; look++)
+    rest[i++] = (1.0 - n[kLooks + look]) / kLightError;
+  return rest;
+}
+
+Eigen::MatrixXd
+Model::slopes (const Numbers &n, const Eigen::VectorXd &rest) const
+{
+  Eigen::MatrixXd all (rest.size (), n.size ());
+  for (Eigen::Index i = 0; i < n.size (); i++) {
+    const double step = 1e-5 * std::max (0.02, std::abs (n[i]));
+    Numbers moved = n;
+    moved[i] += step;
+    all.col (i) = (rest - residuals (moved)) / step;
+  }
+  return all;
+}
+
+/** A step of Levenberg and Marquardt; false: none is better. */
+bool
+improve (const Model &model, const Eigen::MatrixXd &normal,
+    const Eigen::VectorXd &right, double chi, double &damping, Numbers &n)
+{
+  for (int i = 0; i < 8; i++, damping *= 10.0) {
+    Eigen::MatrixXd damped = normal;
+    damped.diagonal () *= 1.0 + damping;
+    Numbers next = n + damped.ldlt ().solve (right);
+    if (!next.allFinite ())
+      continue;
+    next[kSpread] = std::clamp (next[kSpread], 0.0, kMostSpread);
+    if (model.residuals (next).squaredNorm () >= chi)
+      continue;
+    n = next;
+    damping *= 0.1;
+    return true;
+  }
+  return false;
+}
+
+} // namespace
+
+std::optional<Dark>
+fit_dither (const std::vector<DitherGroup> &groups, double part,
+    const Measured &gain, std::optional<double> off)
+{
+  Model model (groups, part, gain);
+  if (model.freedom () < 1.0 || !(gain.value > 0.0))
+    return std::nullopt;
+  Numbers n = model.start (off);
+  Eigen::MatrixXd normal;
+  double damping = 1e-2, chi = 0.0;
+  for (int round = 0; round < kRounds; round++) {
+    model.weigh (n);
+    const Eigen::VectorXd rest = model.residuals (n);
+    const Eigen::MatrixXd slopes = model.slopes (n, rest);
+    const double before = chi;
+    chi = rest.squaredNorm ();
+    normal = slopes.transpose () * slopes;
+    if (!improve (model, normal, slopes.transpose () * rest, chi, damping, n) ||
+        std::abs (chi - before) < 1e-4 * chi)
+      break;
+  }
+  const double excess = std::max (1.0, chi / model.freedom ());
+  normal.diagonal ().array () += 1e-9;
+  const Eigen::MatrixXd covariance = excess * normal.inverse ();
+  if (!covariance.allFinite ())
+    return std::nullopt;
+  const auto measured = [&] (Number i) {
+    return Measured{n[i], std::sqrt (std::max (0.0, covariance (i, i)))};
+  };
+  const auto doubted = [] (const Measured &number, double more) {
+    return Measured{number.value, std::hypot (number.sigma, more)};
+  };
+  return Dark{doubted (measured (kBlack), kBlackError),
+      doubted (measured (kOff), kBlackError),
+      doubted (measured (kVariance), kShotError * 0.5 / gain.value)};
+}
+
+} // namespace codedexposure

@@ -21,7 +21,10 @@
  * the frames: if the track is missing in a recording,
  * #codedexposure-restore reports damage.
  *
- * Put a `queue` after each pad.
+ * Put a `queue` after each pad. If one before this element drops frames,
+ * because the encoder or the disk is too slow (`leaky=downstream`), the line of
+ * the next frame counts them as lost, by the numbers of the frames; so does
+ * #codedexposure-log:stats.
  *
  * #codedexposure-log:location writes the lines to a file for other programs:
  * first the schedule in its JSON form, then the mapping, if there is one, then
@@ -39,6 +42,7 @@
  *
  * Since: 0.1
  */
+#include <algorithm>
 #include <optional>
 #include <string>
 #include <utility>
@@ -65,11 +69,14 @@ namespace
 struct LogState {
   explicit LogState (GstElement *element = nullptr) : track (element) {}
 
-  std::string location; // object lock
+  /* Object lock: */
+  std::string location;
+  guint64 frames_lost = 0; ///< since the first
   /* Streaming thread, and start and stop, which exclude it: */
   LineFile file;
   TrackPad track;
   guint64 frames = 0;
+  std::optional<guint64> last; ///< number of the last frame with a meta
   GstVideoInfo info = {};
   GstClockTime end = 0; ///< of the last frame
   /** Of the stream. */
@@ -151,6 +158,22 @@ push_line (GstCodedExposureLog *self, GstBuffer *frame, FrameRecord record)
       line.to_json (), pts, duration, GST_BASE_TRANSFORM (self)->segment);
 }
 
+/* Also those that a queue dropped between the element that numbers the frames
+ * and this one. */
+void
+count_lost (GstCodedExposureLog *self, FrameRecord &record)
+{
+  LogState &state = *self->state;
+  if (!record.lost_before) // without a meta, the number is a count
+    return;
+  if (state.last && record.frame > *state.last)
+    record.lost_before =
+        std::max (*record.lost_before, record.frame - *state.last - 1);
+  state.last = record.frame;
+  const ObjectLock lock (self);
+  state.frames_lost += *record.lost_before;
+}
+
 GstFlowReturn
 transform_ip (GstBaseTransform *base, GstBuffer *frame) noexcept
 {
@@ -159,6 +182,7 @@ transform_ip (GstBaseTransform *base, GstBuffer *frame) noexcept
   const int pilot = state.setup ? state.setup->schedule.pilot_rows () : 0;
   FrameRecord record =
       record_of (frame, state.info, base->segment, pilot, state.frames++);
+  count_lost (self, record);
   if (state.file.is_open () && !state.file.write (record.to_json ()))
     return GST_FLOW_ERROR;
   return state.track.exists () ? push_line (self, frame, std::move (record))
@@ -271,8 +295,10 @@ begin_run (GstElement *element)
   {
     const ObjectLock lock (self);
     location = state.location;
+    state.frames_lost = 0;
   }
   state.frames = 0;
+  state.last.reset ();
   state.setup.reset ();
   state.schedule.reset ();
   state.mapping.reset ();
@@ -307,13 +333,26 @@ release_pad (GstElement *element, GstPad *pad) noexcept
   state_in<GstCodedExposureLog> (element).track.release (pad);
 }
 
+StructurePtr
+stats_of (const LogState &state)
+{
+  return StructurePtr (
+      gst_structure_new ("application/x-codedexposure-log-stats", "frames-lost",
+          G_TYPE_UINT64, state.frames_lost, nullptr));
+}
+
 const PropertyTable<LogState> &
 properties ()
 {
-  static const PropertyTable<LogState> table{{"location", "File location",
-      "File to write, one line of JSON a coded frame; overwritten when it "
-      "exists; empty: none",
-      kReadWriteReady, &LogState::location}};
+  static const PropertyTable<LogState> table{
+      {"location", "File location",
+          "File to write, one line of JSON a coded frame; overwritten when it "
+          "exists; empty: none",
+          kReadWriteReady, &LogState::location},
+      {"stats", "Statistics",
+          "Counters: frames-lost, the coded frames that are missing before "
+          "frames that came, by their numbers",
+          kReadOnly, stats_of}};
   return table;
 }
 

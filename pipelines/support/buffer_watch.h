@@ -35,8 +35,8 @@ public:
       state_ = kIsFull;
       post (level, 0);
       return report::format (
-          "warning: %u frames wait to be written, and the buffer is full: the "
-          "camera loses frames until encoder and disk catch up",
+          "warning: %u frames wait to be written, and the buffer is full: "
+          "frames are lost until encoder and disk catch up",
           level.frames);
     }
     if (level.fill >= kHalf && growth > 0 && state_ == kKeepsUp) {

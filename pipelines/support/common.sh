@@ -309,21 +309,26 @@ raw_size ()
   printf 'reserve=%d ' $((opt[frames] * (width * height * $(grey_bytes) + 4096)))
 }
 
-# coded_recording FILE [CODEC]: writes coded frames to Matroska, as FFV1 or raw,
+# coded_recording FILE [CODEC [live]]: writes coded frames to Matroska, as FFV1 or raw,
 # with the track of what is known of each frame, and the same to the sidecar.
 # Every frame can be decoded alone; with ticks of 1 µs it has its own cluster.
+# "live": when the buffer is full, frames are dropped, and nothing else waits; the
+# oldest, so that the next one that is written shows how many are missing.
 coded_recording ()
 {
-  local encoder='' muxer=codedexposure-matroskamux sink
+  local encoder='' muxer=codedexposure-matroskamux sink leaky=
+  [ "${3:-}" != live ] || leaky='leaky=downstream '
   sink="codedexposure-filesink direct=true $(raw_size)"
   if [ "${2:-ffv1}" = ffv1 ]; then
     encoder="$(ffv1_encoder) !" sink='filesink '
     muxer='matroskamux timecodescale=1000'
   fi
+  printf 'queue name=buffer %s%s ! ' "$leaky" "$(buffer_limits)"
   printf 'codedexposure-log name=log location=%s ! ' \
     "$(quoted "$(sidecar_of "$1")")"
-  printf 'queue name=buffer %s ! %s %s name=mux ! ' "$(buffer_limits)" \
-    "$encoder" "$muxer"
+  # Hashes and writes in two threads.
+  printf 'queue max-size-buffers=2 max-size-bytes=0 max-size-time=0 ! '
+  printf '%s %s name=mux ! ' "$encoder" "$muxer"
   printf '%slocation=%s ' "$sink" "$(quoted "$1")"
   printf 'log.track ! queue max-size-buffers=0 max-size-time=0 ! mux.subtitle_0 '
 }

@@ -190,6 +190,13 @@ simulation ()
   printf 'video/x-raw,framerate=%s ! ' "$frame_rate"
 }
 
+# Prints "live" if frames come in real time and do not wait; a source may be a
+# file.
+pace_of_frames ()
+{
+  is_set source || printf live
+}
+
 # Coded frames of a camera, of any source, or of the bench with its DMD.
 coded_source ()
 {

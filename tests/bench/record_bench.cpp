@@ -181,11 +181,13 @@ record (const Setting &setting, Ring &ring, const std::string &codec,
       "appsrc name=in format=time caps=\"video/x-raw,format=GRAY8,width=" +
       std::to_string (setting.width) +
       ",height=" + std::to_string (setting.height) +
-      ",framerate=100/1\" ! codedexposure-log name=log ! queue name=buffer "
+      ",framerate=100/1\" ! queue name=buffer "
       "max-size-buffers=" +
       std::to_string (rate > 0 ? kWaiting : 2) +
-      " max-size-bytes=0 max-size-time=0 ! " + codec +
-      " matroskamux name=mux timecodescale=1000 ! codedexposure-filesink "
+      " max-size-bytes=0 max-size-time=0 ! codedexposure-log name=log ! queue "
+      "max-size-buffers=2 max-size-bytes=0 max-size-time=0 ! " +
+      codec +
+      " codedexposure-matroskamux name=mux ! codedexposure-filesink "
       "direct=true reserve=" +
       std::to_string (
           reserve ? guint64 (expected * double (setting.size ())) : 0) +

@@ -134,6 +134,35 @@ TEST_F (LogTest, WritesWhatTheMetaSays)
       "flags": ["discont", "corrupted"], "hash": "162b7b9d327aa515"})"));
 }
 
+/* A queue before it, for example. */
+TEST_F (LogTest, CountsFramesThatWereDroppedAfterTheyWereNumbered)
+{
+  play (path_.get ());
+  const auto push_number = [this] (guint64 number, guint64 lost) {
+    BufferPtr buffer = frame (number * 40 * GST_MSECOND);
+    FrameMeta meta;
+    meta.frame = number;
+    meta.lost_before = lost;
+    set_frame_meta (buffer.get (), meta);
+    ASSERT_EQ (push (std::move (buffer)), GST_FLOW_OK);
+  };
+  push_number (3, 0);
+  push_number (4, 0);
+  push_number (9, 1);  // 5 to 8 are missing, of which dmdsync missed one
+  push_number (12, 2); // as dmdsync says
+  push_number (0, 0);  // the source began anew
+  std::vector<int> lost;
+  for (const Json &line : lines ())
+    lost.push_back (line.at ("lost_before"));
+  EXPECT_EQ (lost, (std::vector{0, 0, 4, 2, 0}));
+  GstStructure *stats = nullptr;
+  g_object_get (harness_->element, "stats", &stats, nullptr);
+  const StructurePtr owned (stats);
+  guint64 count = 0;
+  EXPECT_TRUE (gst_structure_get_uint64 (stats, "frames-lost", &count));
+  EXPECT_EQ (count, 6u);
+}
+
 TEST_F (LogTest, LockedIsTrueFalseOrNull)
 {
   play (path_.get ());

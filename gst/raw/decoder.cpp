@@ -6,8 +6,9 @@
  *
  * Gives the raw frames with 16-bit pixels that #codedexposure-matroskamux wrote
  * their caps again; `matroskademux` does not know their format. The size and
- * the rate are those in the tag with the schedule. `decodebin` finds this
- * element.
+ * the rate are those in the tag with the schedule or, if that is missing
+ * because the file was cut off, those in the head of the file. `decodebin`
+ * finds this element.
  *
  * ## Example pipeline
  * |[
@@ -32,6 +33,7 @@
 #include "common/elements.h"
 #include "common/raii.h"
 #include "common/tag.h"
+#include "record/matroska.h"
 
 using namespace codedexposure;
 using namespace codedexposure::gst;
@@ -73,30 +75,66 @@ push_pending (DecoderState &state)
     gst_pad_push_event (state.src, event.release ());
 }
 
+/* None: it is no file, or has no such head. */
+std::optional<RawFormat>
+format_in_file (GstElement *self)
+{
+  const ObjectPtr<GstPad> sink (gst_element_get_static_pad (self, "sink"));
+  const QueryPtr query (gst_query_new_uri ());
+  if (!gst_pad_peer_query (sink.get (), query.get ()))
+    return std::nullopt;
+  gchar *uri = nullptr;
+  gst_query_parse_uri (query.get (), &uri);
+  const CharPtr owned (uri);
+  const CharPtr path (
+      uri ? g_filename_from_uri (uri, nullptr, nullptr) : nullptr);
+  const auto format = path ? raw_format (path.get ())
+                           : Result<RawFormat> (Error{"there is no file"});
+  return format ? std::optional (*format) : std::nullopt;
+}
+
+/* False: not known. */
+bool
+find_format (GstElement *self)
+{
+  DecoderState &state = state_in<GstCodedExposureRawDec> (self);
+  Extent size;
+  if (state.setup && state.setup->size)
+    size = *state.setup->size;
+  else if (const auto format = format_in_file (self))
+    size = format->size;
+  else
+    return false;
+  gst_video_info_set_format (&state.info, GST_VIDEO_FORMAT_GRAY16_LE,
+      guint (size.width), guint (size.height));
+  if (state.setup && state.setup->rate) {
+    state.info.fps_n = int (state.setup->rate->num);
+    state.info.fps_d = int (state.setup->rate->den);
+  } else if (const auto format = format_in_file (self);
+             format && format->duration > 0)
+    gst_video_guess_framerate (
+        GstClockTime (format->duration), &state.info.fps_n, &state.info.fps_d);
+  return true;
+}
+
 /* False, with an error: the size is not known. */
 bool
 push_caps (GstElement *self, gsize frame)
 {
   DecoderState &state = state_in<GstCodedExposureRawDec> (self);
-  if (!state.setup || !state.setup->size) {
+  if (!find_format (self)) {
     POST_ERROR (self, STREAM, DECODE,
         "The size of the raw frames is not known, because the stream has no "
         "readable schedule. FFmpeg reads them: ffmpeg -i IN.mkv -map 0:v -c:v "
         "ffv1 OUT.mkv");
     return false;
   }
-  const auto &[width, height] = *state.setup->size;
-  gst_video_info_set_format (
-      &state.info, GST_VIDEO_FORMAT_GRAY16_LE, guint (width), guint (height));
-  if (state.setup->rate) {
-    state.info.fps_n = int (state.setup->rate->num);
-    state.info.fps_d = int (state.setup->rate->den);
-  }
   if (frame != GST_VIDEO_INFO_SIZE (&state.info)) {
     POST_ERROR (self, STREAM, DECODE,
         "A raw frame has " + std::to_string (frame) +
-            " bytes, but 16-bit frames of " + std::to_string (width) + "x" +
-            std::to_string (height) + " have " +
+            " bytes, but 16-bit frames of " +
+            std::to_string (state.info.width) + "x" +
+            std::to_string (state.info.height) + " have " +
             std::to_string (GST_VIDEO_INFO_SIZE (&state.info)) +
             ". Record the stream again.");
     return false;

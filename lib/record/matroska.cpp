@@ -19,10 +19,14 @@ constexpr std::uint64_t kEbml = 0x1a45dfa3, kSegment = 0x18538067,
                         kSeekHead = 0x114d9b74, kSeek = 0x4dbb,
                         kSeekId = 0x53ab, kSeekPosition = 0x53ac,
                         kTracks = 0x1654ae6b, kTrackEntry = 0xae,
-                        kTrackType = 0x83, kName = 0x536e,
-                        kCluster = 0x1f43b675, kTags = 0x1254c367,
-                        kTag = 0x7373, kSimpleTag = 0x67c8, kTagString = 0x4487;
+                        kTrackType = 0x83, kName = 0x536e, kVideo = 0xe0,
+                        kPixelWidth = 0xb0, kPixelHeight = 0xba,
+                        kDefaultDuration = 0x23e383, kCluster = 0x1f43b675,
+                        kTags = 0x1254c367, kTag = 0x7373, kSimpleTag = 0x67c8,
+                        kTagString = 0x4487;
 constexpr char kTextTrack = 0x11;
+/** Where the end of the file does not limit an element. */
+constexpr std::uint64_t kUnlimited = std::uint64_t (1) << 60;
 
 /** Positions in the file. */
 struct Element {
@@ -32,8 +36,8 @@ struct Element {
 class File
 {
 public:
-  explicit File (const std::string &path)
-      : stream_ (path, std::ios::in | std::ios::out | std::ios::binary)
+  File (const std::string &path, std::ios::openmode mode)
+      : stream_ (path, mode | std::ios::binary)
   {
     stream_.seekg (0, std::ios::end);
     size_ = std::uint64_t (stream_.tellg ());
@@ -66,6 +70,15 @@ public:
   std::string text (const Element &element)
   {
     return content (element).c_str ();
+  }
+  std::uint64_t number (const Element &element)
+  {
+    std::uint64_t value = 0;
+    for (const char byte :
+        read (element.data,
+            std::min<std::uint64_t> (element.end - element.data, sizeof value)))
+      value = value << 8 | std::uint8_t (byte);
+    return value;
   }
   std::string content (const Element &element)
   {
@@ -191,8 +204,7 @@ find_tags (File &file, const Element &seek_head)
       if (part.id == kSeekId)
         id = file.content (part);
       if (part.id == kSeekPosition)
-        for (const char byte : file.content (part))
-          at = at << 8 | std::uint8_t (byte);
+        at = file.number (part);
       return true;
     });
     if (id == "\x12\x54\xc3\x67")
@@ -202,19 +214,69 @@ find_tags (File &file, const Element &seek_head)
   return position;
 }
 
+/** The segment of a file that is not finished has no size. */
+std::optional<Element>
+segment_of (File &file)
+{
+  const auto head = file.element_at (0, file.size ());
+  if (!head || head->id != kEbml)
+    return std::nullopt;
+  const auto segment = file.element_at (head->end, kUnlimited);
+  return segment && segment->id == kSegment ? segment : std::nullopt;
+}
+
+std::optional<RawFormat>
+video_format (File &file, const Element &entry)
+{
+  RawFormat format{.size = {0, 0}};
+  file.each (entry, [&] (const Element &part) {
+    if (part.id == kDefaultDuration)
+      format.duration = Nanoseconds (file.number (part));
+    if (part.id == kVideo)
+      file.each (part, [&] (const Element &value) {
+        if (value.id == kPixelWidth)
+          format.size.width = int (file.number (value) & 0xffffff);
+        if (value.id == kPixelHeight)
+          format.size.height = int (file.number (value) & 0xffffff);
+        return true;
+      });
+    return true;
+  });
+  if (format.size.width <= 0 || format.size.height <= 0)
+    return std::nullopt;
+  return format;
+}
+
 } // namespace
+
+Result<RawFormat>
+raw_format (const std::string &path)
+{
+  File file (path, std::ios::in);
+  std::optional<RawFormat> format;
+  if (const auto segment = file.good () ? segment_of (file) : std::nullopt)
+    file.each (*segment, [&] (const Element &part) {
+      if (part.id == kTracks && part.end <= file.size ())
+        file.each (part, [&] (const Element &entry) {
+          if (entry.id == kTrackEntry && !format)
+            format = video_format (file, entry);
+          return !format;
+        });
+      return !format && part.id != kCluster;
+    });
+  if (!format)
+    return Error{"no video is described in " + path, ErrorCode::parse};
+  return *format;
+}
 
 Result<void>
 tidy_matroska (const std::string &path)
 {
-  File file (path);
+  File file (path, std::ios::in | std::ios::out);
   if (!file.good ())
     return Error{"cannot open " + path, ErrorCode::io};
-  const auto head = file.element_at (0, file.size ());
-  if (!head || head->id != kEbml)
-    return {};
-  const auto segment = file.element_at (head->end, file.size ());
-  if (!segment || segment->id != kSegment)
+  const auto segment = segment_of (file);
+  if (!segment || segment->end > file.size ())
     return {};
   std::optional<std::uint64_t> tags_at;
   file.each (*segment, [&] (const Element &part) {

@@ -1,10 +1,13 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* What GStreamer's muxer writes in a way that only GStreamer reads well. */
+/* What GStreamer's muxer writes in a way that only GStreamer reads well, and
+ * what its demuxer does not say. */
 #pragma once
 
 #include <string>
 
+#include "base/geometry.h"
 #include "base/result.h"
+#include "schedule/timing.h"
 
 namespace codedexposure
 {
@@ -20,5 +23,15 @@ namespace codedexposure
  * Other files stay as they are. An error if @p path cannot be read or written.
  */
 Result<void> tidy_matroska (const std::string &path);
+
+/** Of raw frames in a Matroska file. */
+struct RawFormat {
+  Extent size;
+  Nanoseconds duration = 0; ///< of a frame; 0: not known
+};
+
+/** The format of the video in the Matroska file @p path, from its head, which
+ * a file that is cut off has, too. */
+Result<RawFormat> raw_format (const std::string &path);
 
 } // namespace codedexposure

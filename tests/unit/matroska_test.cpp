@@ -61,13 +61,29 @@ file_with (char track_type, const std::string &tag)
              "\x18\x53\x80\x67", head (tags_at) + tracks + clusters + tags);
 }
 
-/** The file after tidy_matroska (). */
-std::string
-tidied (const std::string &content)
+std::filesystem::path
+file_of (const std::string &content)
 {
   const auto path = std::filesystem::temp_directory_path () /
                     ("cexp-" + std::to_string (getpid ()) + ".mkv");
   std::ofstream (path, std::ios::binary) << content;
+  return path;
+}
+
+Result<RawFormat>
+format_of (const std::string &content)
+{
+  const auto path = file_of (content);
+  const auto format = raw_format (path.string ());
+  std::filesystem::remove (path);
+  return format;
+}
+
+/** The file after tidy_matroska (). */
+std::string
+tidied (const std::string &content)
+{
+  const auto path = file_of (content);
   EXPECT_TRUE (tidy_matroska (path.string ()).ok ());
   std::ostringstream read;
   read << std::ifstream (path, std::ios::binary).rdbuf ();
@@ -129,4 +145,30 @@ TEST (Matroska, AMissingFileIsAnError)
   EXPECT_EQ (missing.error ().code, ErrorCode::io);
   EXPECT_NE (
       missing.error ().message.find ("/nowhere/at/all.mkv"), std::string::npos);
+}
+
+TEST (Matroska, TheHeadOfAFileThatWasCutOffHasTheFormat)
+{
+  const std::string video = short_element ("\xb0", "\x10\x00"s) +
+                            short_element ("\xba", "\x0c\x00"s) +
+                            short_element ("\x2e\xb5\x24", "Y1\0\x10"s);
+  const std::string tracks = element ("\x16\x54\xae\x6b",
+      element ("\xae", short_element ("\x83", {kText})) +
+          element ("\xae", short_element ("\x23\xe3\x83", "\x98\x96\x80"s) +
+                               element ("\xe0", video)));
+  const std::string unfinished =
+      element ("\x1a\x45\xdf\xa3", "") +
+      "\x18\x53\x80\x67\x01\xff\xff\xff\xff\xff\xff\xff" + tracks +
+      "\x1f\x43\xb6\x75\x01\xff\xff\xff\xff\xff\xff\xff";
+  const auto format = format_of (unfinished + "pictures");
+  ASSERT_TRUE (format) << format.error ().message;
+  EXPECT_EQ (format->size, (Extent{4096, 3072}));
+  EXPECT_EQ (format->duration, 10'000'000);
+  EXPECT_EQ (tidied (unfinished), unfinished);
+
+  EXPECT_FALSE (format_of (""));
+  EXPECT_FALSE (format_of ("no Matroska"));
+  EXPECT_FALSE (format_of (file_with (kVideo, "plain")));
+  for (std::size_t length = 0; length < unfinished.size () - 12; length++)
+    EXPECT_FALSE (format_of (unfinished.substr (0, length))) << length;
 }

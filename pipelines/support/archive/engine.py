@@ -214,7 +214,11 @@ def start_parallel(store, plan, run, chunks, merges, watch):
         check_hosts(store, plan)
     if chunks:
         parallel('chunk', store, run, plan.engine, watch)
-    parallel('merge', store, run, plan.engine, watch)
+    # The last job of a recording merges it; if it could not, this tells why.
+    merges = [number for number in merges if not store.is_merged(number)]
+    write_list(os.path.join(run, 'merge.list'), merges)
+    if merges:
+        parallel('merge', store, run, plan.engine, watch)
     watch()
 
 

@@ -10,7 +10,7 @@ import subprocess
 from archive import chunk as chunks
 from archive import ledger, programs
 from archive.plan import FINISHED
-from archive.store import (Problem, digest, files_below, read_json, sync,
+from archive.store import (Busy, Problem, digest, files_below, read_json, sync,
                            write_json)
 
 TABLE = 'times.csv'
@@ -149,8 +149,9 @@ def finish(store, plan, recording, videos, notes, output):
     return pictures
 
 
-def take_whole(part, output):
-    """The only chunk is the result. A link takes no room."""
+def take_whole(part, notes, output):
+    """The only part is the result. A link takes no room. The number of pictures;
+    None: there are no notes."""
     new = output + '.part'
     pathlib.Path(new).unlink(missing_ok=True)
     try:
@@ -159,6 +160,10 @@ def take_whole(part, output):
         shutil.copyfile(part, new)
         sync(new)
     os.replace(new, output)
+    if not notes:
+        return None
+    with open(notes[0], encoding='utf-8') as lines:
+        return sum(line.startswith('picture ') for line in lines)
 
 
 def write_ledger(store, plan, recording):
@@ -218,8 +223,8 @@ def merge(store, plan, recording):
                           output)
     elif form == 'png':
         pictures = join_pictures(parts, output)
-    elif source.cut_off():
-        pictures = take_whole(parts[0], output)
+    elif len(parts) == 1:
+        pictures = take_whole(parts[0], files(chunks.NOTES), output)
     else:
         pictures = join_videos(parts, files(chunks.NOTES), output)
     counted = any(m['counts'] for m in manifests)
@@ -247,7 +252,14 @@ def merge(store, plan, recording):
     })
 
 
-def run(store, plan, recording):
+def run_if_ready(store, plan, recording):
+    """Merges a recording as soon as its last chunk is there, unless another
+    process does."""
+    if len(store.done(recording)) == plan.recordings[recording].chunks:
+        run(store, plan, recording, others_may=True)
+
+
+def run(store, plan, recording, others_may=False):
     """Merges a recording that is not merged yet. False, with a record of it, if
     that fails."""
     if store.is_merged(recording):
@@ -257,6 +269,8 @@ def run(store, plan, recording):
             if not store.is_merged(recording):
                 merge(store, plan, recording)
     except (Problem, OSError) as error:
+        if others_may and isinstance(error, Busy):
+            return True
         chunks.note_failure(store, recording, None, error)
         return False
     for path in (store.failure(recording, None),

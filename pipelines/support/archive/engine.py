@@ -80,8 +80,7 @@ def script_for(kind, store, run, tasks, engine, threads):
              f'#SBATCH --array=0-{tasks - 1}' +
              (f'%{engine["jobs"]}' if engine.get('jobs') else ''),
              '#SBATCH --requeue --open-mode=append --ntasks=1',
-             f'#SBATCH --cpus-per-task={threads}',
-             f'#SBATCH --output={os.path.join(run, kind)}-%a.log']
+             f'#SBATCH --cpus-per-task={threads}']
     lines += [f'#SBATCH --{name}={engine[name]}' for name in PASSED
               if engine.get(name)]
     if 'CODEDEXPOSURE_BUILD' in os.environ:
@@ -97,7 +96,9 @@ def sbatch(kind, store, run, tasks, engine, threads, after=None):
     path = os.path.join(run, f'{kind}.sh')
     with open(path, 'w', encoding='utf-8') as file:
         file.write(script_for(kind, store, run, tasks, engine, threads))
-    words = ['sbatch', '--parsable']
+    # A script could not have every name of a folder.
+    log = os.path.join(run, kind).replace('%', '%%') + '-%a.log'
+    words = ['sbatch', '--parsable', f'--output={log}']
     if after:
         words.append(f'--dependency=afterany:{after}')
     said = subprocess.run(words + [path], capture_output=True, text=True,

@@ -9,9 +9,9 @@ import subprocess
 
 from archive import chunk as chunks
 from archive import ledger, programs
-from archive.plan import FINISHED
-from archive.store import (Busy, Problem, digest, files_below, read_json, sync,
-                           write_json)
+from archive.plan import FINISHED, FORMS
+from archive.store import (Busy, Problem, digest, files_below, read_json,
+                           size_of, sync, write_json)
 
 TABLE = 'times.csv'
 
@@ -129,15 +129,16 @@ def join_notes(parts, output):
     return times
 
 
-def finish(store, plan, recording, videos, notes, output):
+def finish(store, plan, recording, videos, notes, output, scratch):
     """Writes the chunks' pictures in the form of the plan. The number of
     pictures."""
-    video, all_notes, log = (os.path.join(store.merging(recording), name)
-                             for name in ('pictures.mkv', 'notes', 'log'))
+    video, all_notes, log, new = (
+        os.path.join(scratch, name) for name in (
+            'pictures.mkv', 'notes', 'log', 'result' + FORMS[plan.form]))
     times = join_notes(notes, all_notes)
     pictures = join_videos(videos, notes, video)
     status = programs.run(
-        chunks.finish_command(plan, video, all_notes, output), log,
+        chunks.finish_command(plan, video, all_notes, new), log,
         stdin=subprocess.DEVNULL)
     if status != 0:
         raise Problem(f'{output} could not be written: ' +
@@ -145,7 +146,8 @@ def finish(store, plan, recording, videos, notes, output):
     with open(store.times(recording) + '.part', 'w', encoding='ascii') as file:
         file.writelines(f'{time}\n' for time in times)
     os.replace(store.times(recording) + '.part', store.times(recording))
-    sync(output)
+    sync(new)
+    os.replace(new, output)
     return pictures
 
 
@@ -184,10 +186,9 @@ def outputs_of(store, plan, recording):
     return [os.path.join(store.folder, name) for name in plan.outputs(recording)]
 
 
-def write_report(store, plan, recording, output):
+def write_report(plan, recording, output, scratch):
     """As one run of report. It measures the recording itself."""
-    new = os.path.join(store.merging(recording), 'page')
-    log = os.path.join(store.merging(recording), 'log')
+    new, log = os.path.join(scratch, 'page'), os.path.join(scratch, 'log')
     options = [option for option in plan.options if option.startswith(
         ('--method=', '--schedule=', '--bench=', '--bits='))]
     status = programs.run(
@@ -216,11 +217,10 @@ def merge(store, plan, recording):
     if not parts:
         raise Problem(f'{source.path} has no coded frame')
     os.makedirs(os.path.dirname(output.rstrip('/')), exist_ok=True)
-    shutil.rmtree(store.merging(recording), ignore_errors=True)
-    os.mkdir(store.merging(recording))
+    scratch = store.merging(recording)
     if form != plan.form:
         pictures = finish(store, plan, recording, parts, files(chunks.NOTES),
-                          output)
+                          output, scratch)
     elif form == 'png':
         pictures = join_pictures(parts, output)
     elif len(parts) == 1:
@@ -234,8 +234,8 @@ def merge(store, plan, recording):
     if plan.statistics:
         join_tables(files(chunks.TABLE), outputs[1])
     if plan.report:
-        write_report(store, plan, recording, outputs[-1])
-    shutil.rmtree(store.merging(recording))
+        write_report(plan, recording, outputs[-1], scratch)
+    shutil.rmtree(scratch)
     write_ledger(store, plan, recording)
     missing = max(0, source.recorded - sums['coded']) if counted else 0
     status = max(m['status'] % chunks.EMPTY for m in manifests)
@@ -302,6 +302,15 @@ def times_of_output(store, plan, recording, path):
     with open(os.path.join(path, TABLE), encoding='utf-8') as table:
         column = table.readline().strip().split(',').index('pts_ns')
         return [int(line.split(',')[column]) for line in table]
+
+
+def is_there(store, plan, recording):
+    """Whether all that was merged is there, by its size."""
+    said = read_json(store.merged(recording))
+    return said is not None and all(
+        os.path.exists(path) and size_of(path) == hashed['bytes']
+        for path, hashed in zip(outputs_of(store, plan, recording),
+                                said['output_hashes']))
 
 
 def verify(store, plan, recording):

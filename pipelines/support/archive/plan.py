@@ -109,7 +109,9 @@ def find_recordings(words, lists, avoid):
                 os.path.abspath(os.path.join(folder, name)) != avoid)
             for name in sorted(names):
                 path = os.path.join(folder, name)
-                if name.endswith('.mkv') and is_recording(path):
+                # pack writes hidden files.
+                if (name.endswith('.mkv') and not name.startswith('.')
+                        and is_recording(path)):
                     stem = os.path.relpath(path, word)[:-len('.mkv')]
                     found.append((os.path.abspath(path), stem))
     if not found:

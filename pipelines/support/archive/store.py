@@ -70,6 +70,12 @@ def files_below(path):
     return sorted(found)
 
 
+def size_of(path):
+    """Bytes of a file, or of all files of a folder."""
+    return sum(os.path.getsize(os.path.join(path, name) if name else path)
+               for name in files_below(path))
+
+
 def digest(path):
     """SHA-256 of a file; of a folder, of the names and contents of its files.
     And the bytes."""
@@ -120,8 +126,15 @@ class Store:
         return os.path.join(self.parts(recording), f'{chunk:06d}')
 
     def merging(self, recording):
-        """What is needed only while the chunks of a recording are merged."""
-        return os.path.join(self.parts(recording), 'merging')
+        """A folder for what this process needs to merge a recording. Those of
+        others, who died or were given up, are removed."""
+        parts = self.parts(recording)
+        mine = f'merging-{socket.gethostname()}-{os.getpid()}'
+        for name in os.listdir(parts):
+            if name.startswith('merging-'):
+                shutil.rmtree(os.path.join(parts, name), ignore_errors=True)
+        os.mkdir(os.path.join(parts, mine))
+        return os.path.join(parts, mine)
 
     def failure(self, recording, chunk):
         name = 'merge' if chunk is None else f'{chunk:06d}'

@@ -142,7 +142,7 @@ extra_features ()
   };
   return features;
 }
-constexpr guint32 kGammaEnable = 0x50c, kGamma = 0x51c;
+constexpr guint32 kGammaEnable = 0x50c, kGamma = 0x51c, kTriggerDelay = 0x520;
 
 std::string
 int_reg (const std::string &name, guint32 address)
@@ -151,6 +151,17 @@ int_reg (const std::string &name, guint32 address)
          "</Address><Length>4</Length><AccessMode>RW</AccessMode>"
          "<pPort>Device</pPort><Sign>Unsigned</Sign>"
          "<Endianess>BigEndian</Endianess></IntReg>\n";
+}
+
+/* A number with a fraction, in the register @address. */
+std::string
+float_reg (const std::string &name, guint32 address, const std::string &range)
+{
+  return "<Float Name=\"" + name + "\"><pValue>" + name + "Register</pValue>" +
+         range + "</Float>\n<FloatReg Name=\"" + name + "Register\"><Address>" +
+         std::to_string (address) +
+         "</Address><Length>4</Length><AccessMode>RW</AccessMode>"
+         "<pPort>Device</pPort><Endianess>BigEndian</Endianess></FloatReg>\n";
 }
 
 /* Nodes of features by which a user can spoil the measurement of light. */
@@ -168,11 +179,9 @@ extra_nodes ()
                       node
                 : choice (name, feature.values, node);
   }
-  text += "<Float Name=\"Gamma\"><pValue>GammaRegister</pValue><Min>0.1</Min>"
-          "<Max>4</Max></Float>\n<FloatReg Name=\"GammaRegister\"><Address>" +
-          std::to_string (kGamma) +
-          "</Address><Length>4</Length><AccessMode>RW</AccessMode>"
-          "<pPort>Device</pPort><Endianess>BigEndian</Endianess></FloatReg>\n";
+  text += float_reg ("Gamma", kGamma, "<Min>0.1</Min><Max>4</Max>") +
+          float_reg ("TriggerDelay", kTriggerDelay,
+              "<Min>0</Min><Max>1000000</Max><Unit>us</Unit>");
   for (const std::string side : {"Width", "Height"})
     text += "<Integer Name=\"" + side + "Max\"><pValue>Sensor" + side +
             "Register</pValue></Integer>\n";
@@ -606,7 +615,9 @@ SimulatedCamera::set_features ()
       if (value != feature.values.end ())
         set (feature.address, guint32 (value - feature.values.begin ()));
     }
-  set (kGamma, std::bit_cast<guint32> (float (number ("Gamma", 1.0))));
+  for (const auto &[name, address, usual] : {std::tuple{"Gamma", kGamma, 1.0},
+           std::tuple{"TriggerDelay", kTriggerDelay, 0.0}})
+    set (address, std::bit_cast<guint32> (float (number (name, usual))));
   const auto automatic = options.features.find ("GainAuto");
   const bool on =
       automatic != options.features.end () && automatic->second != "Off";

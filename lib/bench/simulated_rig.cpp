@@ -107,6 +107,7 @@ camera_features (const SickBenchOptions &o)
       {"LUTEnable", choose ("lut", "true", "false")},
       {"BinningHorizontal", choose ("binning", "2", "1")},
       {"BinningVertical", choose ("binning", "2", "1")},
+      {"TriggerDelay", real_text (1e-3 * double (o.late))}, // us
       {"OffsetX", choose ("roi", "16", "0")}, {"OffsetY", "0"},
       {"Width", std::to_string (o.camera.width)},
       {"Height", std::to_string (o.camera.height)},
@@ -303,6 +304,14 @@ SimulatedRig::watch (int frames)
   return seen;
 }
 
+Result<std::vector<SeenFrame>>
+SimulatedRig::deliver (int frames)
+{
+  RETURN_IF_ERROR (
+      show ({.name = "light", .on = [] (int, int) { return true; }}, 1));
+  return watch (frames);
+}
+
 Result<void>
 SimulatedRig::record (const Schedule &schedule, double seconds,
     const std::function<void (const RecordedFrame &)> &take)
@@ -335,8 +344,9 @@ SimulatedRig::record (const Schedule &schedule, double seconds,
     RecordedFrame frame{.time = shot->begin, .arrival = now_};
     frame.damaged = spoil (*shot, picture.view ());
     frame.lost_before = last ? shot->number - *last - 1 : 0;
-    frame.synchronised =
-        options_.slip_every == 0 || shot->trigger - began < options_.slip_every;
+    if (schedule.pilot_rows () > 0) // nothing else shows it
+      frame.synchronised = options_.slip_every == 0 ||
+                           shot->trigger - began < options_.slip_every;
     frame.uncertainty = 100 * kMicrosecond;
     frame.picture = picture.view ();
     last = shot->number;

@@ -34,6 +34,7 @@ public:
   void park () override;
   Result<void> expose (std::optional<Nanoseconds> time) override;
   Result<std::vector<SeenFrame>> watch (int frames) override;
+  Result<std::vector<SeenFrame>> deliver (int frames) override;
   Result<void> record (const Schedule &schedule, double seconds,
       const std::function<void (const RecordedFrame &)> &take) override;
 

@@ -338,6 +338,9 @@ LightCheck::judge_time ()
     diagnose ("drift", above (size, kDriftFail),
         "the light changes by " + percent (drift.value) + " a minute",
         "wait until the light is warm, and drive it with a constant current");
+  // Light that grows saturates in the end.
+  if (saturated_ && above (drift, kDriftFail))
+    std::ranges::rotate (finding_.diagnoses, finding_.diagnoses.end () - 1);
 }
 
 void

@@ -233,28 +233,32 @@ missing_frames (const std::vector<SeenFrame> &seen, double period)
   return steps_of_one > 1 ? missing : 0;
 }
 
-/* A loss of packets shows in frames that are damaged, or dropped for that. */
+/* A loss of packets shows in frames that are damaged. */
 Result<void>
 check_network (Examination &examination, Finding &finding)
 {
   const FrameRate rate = examination.rig.parts ().rate;
   const int frames = std::max (10, int (kWatched * rate.num / rate.den));
-  ASSIGN_OR_RETURN (const auto seen, look (examination, lit (0, 1), 1, frames));
-  const auto damaged =
-      int (std::ranges::count (seen, true, &SeenFrame::damaged));
-  const int missing = missing_frames (seen, double (rate.period ()));
-  const int all = int (seen.size ()) + missing;
+  ASSIGN_OR_RETURN (auto seen, examination.rig.deliver (frames));
+  const auto damaged = int (std::erase_if (seen, &SeenFrame::damaged));
+  const int gaps = missing_frames (seen, double (rate.period ()));
+  const int missing = std::max (0, gaps - damaged);
+  const int all = int (seen.size ()) + damaged + missing;
   for (const auto &[name, count] : {std::pair{"damaged frames", damaged},
            std::pair{"missing frames", missing}})
     finding.readings.push_back (
         {name, {double (count), std::sqrt (double (count))},
             "of " + std::to_string (all), "0"});
-  if (damaged > 0 || missing > kMissingPart * all)
+  const std::string of_all = " of " + std::to_string (all) + " frames ";
+  const std::string remedy =
+      "connect the camera to a network interface of its own, and check cable "
+      "and switch";
+  if (damaged > 0)
     finding.diagnoses.push_back ({"packet-loss", Verdict::fail,
-        std::to_string (damaged + missing) + " of " + std::to_string (all) +
-            " frames lack packets or did not come",
-        "connect the camera to a network interface of its own, and check cable "
-        "and switch"});
+        std::to_string (damaged) + of_all + "lack packets", remedy});
+  else if (missing > kMissingPart * all)
+    finding.diagnoses.push_back ({"lose", Verdict::fail,
+        std::to_string (missing) + of_all + "did not come", remedy});
   return {};
 }
 

@@ -85,6 +85,10 @@ public:
    * seconds, or for ten frame periods, whichever is longer.
    */
   virtual Result<std::vector<SeenFrame>> watch (int frames) = 0;
+  /** Shows all mirrors on and takes @p frames as the network delivers them: also
+   * those that lack pixels, which watch () may leave out. They need not have a
+   * picture. */
+  virtual Result<std::vector<SeenFrame>> deliver (int frames) = 0;
   /**
    * Records with @p schedule as a user would, for @p seconds, and hands each
    * frame to @p take. Ends early if no frame comes, as watch () does. The

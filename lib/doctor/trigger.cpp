@@ -41,7 +41,8 @@ constexpr double kFaint = 0.05;
 constexpr double kLateWarn = 400e-6, kLateFail = 700e-6;
 constexpr double kShortWarn = 600e-6, kShortFail = 900e-6;
 constexpr double kJitterWarn = 25e-6, kJitterFail = 60e-6;
-/* A delay of that part of a period is that of a pulse, not of a setting. */
+/* A delay of that part of a period is that of a pulse, not of a setting, where
+ * the camera does not say what it is set to. */
 constexpr double kEdge = 0.3;
 
 std::string
@@ -101,6 +102,7 @@ private:
   Result<void> sample_inside (const LightModel &guess);
   Result<void> measure_exposure ();
   void diagnose_exposure (const LightFit &fit);
+  void diagnose_delay (const Measured &start);
   void remember (
       const LightFit &fit, const Measured &start, const Measured &length);
 
@@ -530,6 +532,29 @@ TriggerCheck::remember (
     examination_.inside = {first, until - first, grid_};
 }
 
+/** A delay that is not set is the length of a pulse. */
+void
+TriggerCheck::diagnose_delay (const Measured &start)
+{
+  const auto feature = parts_.features.find ("TriggerDelay");
+  const bool told = feature != parts_.features.end ();
+  const double set = // s
+      told ? 1e-6 * parse_real (feature->second).value_or (0.0) : 0.0;
+  std::string late =
+      "the exposure begins " + us_text (start.value) + " after the trigger";
+  if (above (start, told ? set + kLateFail : kEdge * period_))
+    return fail ("trigger-edge", late + ", which is the length of a pulse",
+        "choose the other edge with TriggerActivation, or the other level of "
+        "the pulse with pulse=low in the options of the DMD");
+  if (!above (start, kLateWarn))
+    return;
+  if (set > 0.0)
+    late += ", and TriggerDelay is " + us_text (set);
+  fail ("exposure-late", late,
+      "set TriggerDelay of the camera to 0, and switch off its debouncer",
+      above (start, kLateFail) ? Verdict::fail : Verdict::warn);
+}
+
 void
 TriggerCheck::diagnose_exposure (const LightFit &fit)
 {
@@ -556,15 +581,7 @@ TriggerCheck::diagnose_exposure (const LightFit &fit)
   const auto severity = [] (bool bad) {
     return bad ? Verdict::fail : Verdict::warn;
   };
-  const std::string late =
-      "the exposure begins " + us_text (start.value) + " after the trigger";
-  if (above (start, kEdge * period_))
-    fail ("trigger-edge", late + ", which is the length of a pulse",
-        "choose the other edge with TriggerActivation, or the other level of "
-        "the pulse with pulse=low in the options of the DMD");
-  else if (above (start, kLateWarn))
-    fail ("exposure-late", late, "set TriggerDelay of the camera to 0",
-        severity (above (start, kLateFail)));
+  diagnose_delay (start);
   const Measured lost{-end.value, end.sigma};
   const Measured missing{period_ - length.value, length.sigma};
   if (above (lost, kShortWarn) && above (missing, kShortWarn))

@@ -8,6 +8,7 @@
 #include "base/text.h"
 #include "base/try.h"
 #include "doctor/checks.h"
+#include "doctor/level.h"
 #include "extract/extractor.h"
 
 namespace codedexposure
@@ -22,7 +23,10 @@ constexpr double kSlotsWarn = 0.02, kSlotsFail = 0.1;
  */
 constexpr int kCompared = 64;
 /* Delays between frames that a recording can do with, as part of a period. */
-constexpr double kJitterWarn = 0.25;
+constexpr double kJitterWarn = 0.2;
+/* Light that changes by that part is of another part of the cycle. */
+constexpr double kOtherSlot = 0.3;
+constexpr double kLongestWatch = 10.0; // s
 
 double
 mean_of (const std::vector<double> &values)
@@ -90,6 +94,39 @@ private:
   std::vector<Image<std::uint16_t>> pictures_;
   std::vector<std::vector<double>> means_; // by slot
 };
+
+/** How often an exposure of half of a period saw another part of the cycle than
+ * the first one, in @p seconds at most, where the second quarter is lit. A
+ * recording of a still target does not show slips by whole slots. */
+Result<std::uint64_t>
+count_slips (Examination &examination, double seconds)
+{
+  constexpr int kFrames = 10; // in memory at a time
+  Rig &rig = examination.rig;
+  const RigParts &parts = rig.parts ();
+  const double frames =
+      std::min (seconds, kLongestWatch) * parts.rate.num / parts.rate.den;
+  RETURN_IF_ERROR (rig.expose (parts.rate.period () / 2));
+  ASSIGN_OR_RETURN (auto seen, look (examination, lit (1, 1), 4, kFrames));
+  std::vector<double> levels;
+  while (!seen.empty ()) {
+    for (const SeenFrame &frame : seen)
+      if (!frame.damaged)
+        levels.push_back (
+            level_of (frame.picture.view (), (1 << parts.bits) - 1).mean);
+    if (double (levels.size ()) >= frames)
+      break;
+    ASSIGN_OR_RETURN (seen, rig.watch (kFrames));
+  }
+  RETURN_IF_ERROR (rig.expose (std::nullopt));
+  if (levels.empty ())
+    return std::uint64_t (0);
+  const auto &black = examination.profile.black_level;
+  const double first = levels.front ();
+  const double other = kOtherSlot * (first - (black ? black->value : 0.0));
+  return std::uint64_t (std::ranges::count_if (
+      levels, [&] (double level) { return std::abs (level - first) > other; }));
+}
 
 struct Recording {
   std::uint64_t frames = 0, lost = 0, damaged = 0, unsynchronised = 0;
@@ -195,6 +232,7 @@ check_whole (Examination &examination)
                                ", for " + real_text (seconds) + " s"};
   ASSIGN_OR_RETURN (auto slots, SlotMeans::make (examination.schedule, parts));
   Recording counts;
+  ASSIGN_OR_RETURN (counts.unsynchronised, count_slips (examination, seconds));
   const double expected = seconds * parts.rate.num / parts.rate.den;
   const auto every = std::uint64_t (std::max (1.0, expected / kCompared));
   RETURN_IF_ERROR (examination.rig.record (

@@ -289,6 +289,8 @@ serve_board (Arguments &arguments)
   ASSIGN_OR_RETURN (const int kind, board_kind (arguments.dmd));
   ASSIGN_OR_RETURN (SickBenchOptions options, bench_of (arguments));
   const bool dark = options.has ("camera-missing");
+  const char *disk =
+      options.has ("slow-disk") ? " CODEDEXPOSURE_SLOW_DISK=1" : "";
   /* The camera bends its values itself. */
   ASSIGN_OR_RETURN (
       const auto bench, LiveBench::make (std::move (options), kind));
@@ -300,7 +302,7 @@ serve_board (Arguments &arguments)
     ASSIGN_OR_RETURN (camera, GigeCamera::open (arguments.camera, {}));
     read_faults (*camera);
   }
-  say ("USB " + board->environment ());
+  say ("USB " + board->environment () + disk);
   say_serving (arguments.camera);
   int signal = 0;
   sigwait (&ends, &signal);

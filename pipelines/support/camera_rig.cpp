@@ -14,8 +14,10 @@
 #include "base/file.h"
 #include "base/packed_mono.h"
 #include "base/try.h"
+#include "camera_stream.h"
 #include "common/meta.h"
 #include "common/raii.h"
+#include "doctor/checks.h"
 
 using namespace codedexposure;
 using namespace codedexposure::gst;
@@ -44,8 +46,8 @@ constexpr const char *kFeatures[] = {"DeviceVendorName", "DeviceModelName",
     "BinningHorizontal", "BinningVertical", "DecimationHorizontal",
     "DecimationVertical", "Width", "Height", "WidthMax", "HeightMax", "OffsetX",
     "OffsetY", "TriggerMode", "TriggerSource", "TriggerActivation",
-    "DeviceLinkThroughputLimitMode", "DeviceLinkThroughputLimit",
-    "GevSCPSPacketSize"};
+    "TriggerDelay", "DeviceLinkThroughputLimitMode",
+    "DeviceLinkThroughputLimit", "GevSCPSPacketSize"};
 
 struct SampleUnref {
   void operator() (GstSample *sample) const { gst_sample_unref (sample); }
@@ -243,11 +245,13 @@ public:
   void park () override;
   Result<void> expose (std::optional<Nanoseconds> time) override;
   Result<std::vector<SeenFrame>> watch (int frames) override;
+  Result<std::vector<SeenFrame>> deliver (int frames) override;
   Result<void> record (const Schedule &schedule, double seconds,
       const std::function<void (const RecordedFrame &)> &take) override;
 
 private:
   std::string source () const;
+  std::string close_pipeline ();
   Result<void> start ();
   Result<void> reopen_dmd ();
   void read_features (ArvCamera *camera);
@@ -469,6 +473,35 @@ CameraRig::watch (int frames)
   return seen;
 }
 
+/** The features that it gave the camera. */
+std::string
+CameraRig::close_pipeline ()
+{
+  gchar *features = nullptr;
+  if (pipeline_)
+    g_object_get (
+        pipeline_->find ("source").get (), "features", &features, nullptr);
+  const std::unique_ptr<gchar, FreeWith<g_free>> owner (features);
+  pipeline_.reset ();
+  playing_ = false;
+  return features ? features : "";
+}
+
+/** Without aravissrc, which passes on whole frames only, and cannot be stopped
+ * as long as none of the frames that come is. */
+Result<std::vector<SeenFrame>>
+CameraRig::deliver (int frames)
+{
+  const std::string features = close_pipeline ();
+  return receive_frames ({.camera = options_.camera,
+      .features = features,
+      .exposure = exposure_,
+      .begin = [this] { return show (lit (0, 1), 1); },
+      .frames = frames,
+      .patience = patience (),
+      .stop = stop_});
+}
+
 /* ------------------------------------------------------------- recording -- */
 
 RecordedFrame
@@ -491,8 +524,7 @@ Result<void>
 CameraRig::record (const Schedule &schedule, double seconds,
     const std::function<void (const RecordedFrame &)> &take)
 {
-  pipeline_.reset ();
-  playing_ = false;
+  close_pipeline ();
   dmd_.reset (); // dmdsync opens it
   const ScheduleFile file (schedule);
   ASSIGN_OR_RETURN (const auto pipeline,

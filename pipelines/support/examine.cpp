@@ -39,6 +39,9 @@ enum ExitCode { kGood = 0, kBad = 1, kUsage = 2 };
 constexpr std::size_t kBlock = std::size_t (8) << 20; // of the disk's test
 constexpr std::size_t kMostWritten = std::size_t (512) << 20;
 constexpr double kDiskSeconds = 1.5;
+/* Of a bench with the fault slow-disk, bytes/s. */
+constexpr double kSlowDisk = 1e5;
+constexpr const char *kSlowDiskVariable = "CODEDEXPOSURE_SLOW_DISK";
 
 struct Arguments {
   CameraRigOptions rig;
@@ -132,10 +135,12 @@ disk_rate (const std::string &folder)
 }
 
 HostFacts
-host_facts (const std::string &folder)
+host_facts (const std::string &folder, bool slow_disk)
 {
   HostFacts host;
-  if (!folder.empty ())
+  if (slow_disk)
+    host.disk_rate = Measured{kSlowDisk, 0.0};
+  else if (!folder.empty ())
     host.disk_rate = disk_rate (folder);
   if (const auto text = read_file ("/proc/sys/net/core/rmem_max", 64))
     host.socket_buffer = std::atof (text->c_str ());
@@ -148,6 +153,7 @@ host_facts (const std::string &folder)
 struct Opened {
   std::unique_ptr<Rig> rig;
   std::optional<Finding> missing;
+  bool slow_disk = false; // as a fault
 };
 
 Result<Opened>
@@ -161,7 +167,7 @@ open_rig (const Arguments &arguments, const std::stop_token &stop)
     if (!rig)
       return Opened{
           nullptr, part_missing (rig.error (), options.has ("camera-missing"))};
-    return Opened{*std::move (rig), {}};
+    return Opened{*std::move (rig), {}, options.has ("slow-disk")};
   }
   auto dmd = open_dmd (arguments.rig.device);
   if (!dmd)
@@ -169,7 +175,7 @@ open_rig (const Arguments &arguments, const std::stop_token &stop)
   auto rig = open_camera_rig (arguments.rig, *std::move (dmd), stop);
   if (!rig)
     return Opened{nullptr, part_missing (rig.error (), true)};
-  return Opened{*std::move (rig), {}};
+  return Opened{*std::move (rig), {}, g_getenv (kSlowDiskVariable) != nullptr};
 }
 
 /* ----------------------------------------------------------- the dialogue --
@@ -280,7 +286,8 @@ Doctor::examine (const std::vector<Check> &checks)
     return {};
   }
   parts_ = opened.rig->parts ();
-  Examination examination{*opened.rig, host_facts (arguments_.output)};
+  Examination examination{
+      *opened.rig, host_facts (arguments_.output, opened.slow_disk)};
   ASSIGN_OR_RETURN (
       examination.schedule, Schedule::parse (arguments_.schedule));
   examination.recording = arguments_.seconds;

@@ -30,9 +30,10 @@ TEST (PartsCheck, AHealthyBenchPassesAndIsNamedInTheProfile)
 
 TEST (PartsCheck, NamesWhatIsWrong)
 {
-  for (const char *words : {"rolling-shutter", "colour", "test-image", "gamma",
-           "auto-exposure", "auto-gain", "black-clamp", "lut", "binning", "roi",
-           "pixel-format", "firmware", "packet-size", "packet-loss=0.05"})
+  for (const char *words :
+      {"rolling-shutter", "colour", "test-image", "gamma", "auto-exposure",
+          "auto-gain", "black-clamp", "lut", "binning", "roi", "pixel-format",
+          "firmware", "packet-size", "packet-loss=0.05", "lose=0.3"})
     expect_named (words, check_parts);
 }
 

@@ -311,7 +311,7 @@ TEST (SickBench, AnExposureTimeHoldsFromALaterFrameOn)
 
 TEST (SickBench, RecordsAScheduleWithItsLossesAndSlips)
 {
-  const auto schedule = Schedule::from_preset ("sequential:2x2");
+  const auto schedule = Schedule::parse ("sequential:2x2,pilot=8");
   const auto rig = rig_with ("lose=0.1 slip=1s");
   std::uint64_t frames = 0, lost = 0;
   bool slipped = false;

@@ -44,6 +44,44 @@ struct KrigingSystem {
  */
 std::vector<double> solve_kriging (const KrigingSystem &system);
 
+/** Taps that are used together, by their numbers; no second one if it is
+ * negative. */
+struct TapPair {
+  int first, second;
+};
+
+/**
+ * Kriging with few taps. Pairs of taps are added one by one, each time the one
+ * that lowers the expected squared error of a target most, until it is close
+ * enough to the error with all taps. As the pairs are known, the weights are
+ * those of solve_kriging () for their taps; all others are 0.
+ */
+class SparseKriging
+{
+public:
+  /** Of @p system, only the equations of taps are used. */
+  SparseKriging (KrigingSystem system, std::vector<TapPair> pairs);
+
+  /** Weights of the taps for a target.
+   * @p target    its covariances with the taps.
+   * @p flat      what it is in flat light; not for simple kriging.
+   * @p variance  its own one.
+   * @p excess    squared error that is accepted beyond that with all taps, as
+   *              a part of it. */
+  std::vector<double> solve (std::span<const double> target, double flat,
+      double variance, double excess) const;
+
+private:
+  struct Search;
+  std::vector<double> solve_with (std::span<const int> chosen,
+      std::span<const double> target, double flat) const;
+
+  KrigingSystem system_;
+  std::vector<TapPair> pairs_;
+  double flat_variance_;       ///< of the unknown mean
+  std::vector<double> matrix_; ///< of the taps, noise and mean included
+};
+
 /** Simple kriging of the light of each slot at (0, 0).
  *  @p taps      places of coded pixels.
  *  @p elements  of each tap.

@@ -30,15 +30,15 @@ constexpr SceneClass kMoving{0.0, 0.0, 5.0, 1.5, 0.6};
 /* Mean squared errors of this size, in grey levels squared, do not tell models
  * apart. */
 constexpr float kErrorFloor = 0.5f;
-/* Models with less weight are left out. */
-constexpr float kMinWeight = 0.01f;
+/* No model has less weight, so that there is always one. */
+constexpr float kMinWeight = 1e-6f;
 
 /* Of the taps in the coded frames before and after, px: for estimates, and for
  * the comparison of models. Larger ones are not more accurate. */
 constexpr double kNeighbourRadius = 2.3, kComparedRadius = 1.2;
-/* Errors of models with such taps count as this much larger, as their taps fit
- * some motion by chance. The factor is that of the squared errors, 1.2. */
-constexpr float kChance = 1.0954f;
+/* Squared errors of filters beyond those with all taps, as a part of them: for
+ * estimates, and for the comparison of models. */
+constexpr double kExcess = 0.015, kPredictionExcess = 0.01;
 
 /* Of the taps: large enough to contain every slot several times. */
 int
@@ -152,7 +152,8 @@ Engine::Engine (const Schedule &schedule, int width, int height,
 void
 Engine::map_noise (const Schedule &schedule)
 {
-  noise_ = {Field (width_, height_), Field (width_, height_)};
+  const int rows = std::min (height_, schedule.tile ().period_y ());
+  noise_ = {Field (width_, rows), Field (width_, rows)};
   if (observation_.gains ())
     gain_ = Field (width_, height_);
   for (int y = 0; y < height_; y++) {
@@ -160,8 +161,10 @@ Engine::map_noise (const Schedule &schedule)
       const int element = schedule.element_at (x, y);
       const double dark = observation_.variance (element, 0.0);
       const double white = observation_.variance (element, 1.0);
-      noise_.slope.row (y)[x] = float ((white - dark) * kWhite);
-      noise_.offset.row (y)[x] = float (dark * kWhite * kWhite);
+      if (y < rows) {
+        noise_.slope.row (y)[x] = float ((white - dark) * kWhite);
+        noise_.offset.row (y)[x] = float (dark * kWhite * kWhite);
+      }
       if (!gain_.empty ())
         gain_.row (y)[x] = float (observation_.gain (element));
     }
@@ -226,12 +229,14 @@ Engine::prepare (const Schedule &schedule, const FuseOptions &options)
   models_over_frames_ = {options.scene.slow_over_frames,
       options.scene.medium_over_frames, options.scene.moving};
   predictions_.emplace (
-      2 + int (models_.size () > 1 ? models_over_frames_.size ()
-                                   : models_.size ()),
-      StaticPixels::radius_of (schedule.cell ()), Extent{width_, height_});
-  filters_[0] = make_filters (false, false);
-  if (models_.size () > 1)
-    preferences_.assign (models_over_frames_.size (), Field (width_, height_));
+      several_models () ? 1 + int (models_over_frames_.size ()) : 2,
+      StaticPixels::radius_of (schedule.cell ()), Extent{width_, height_},
+      split_period ());
+  filters_[0] = make_filters ({});
+  const Extent blocks = Predictions::blocks ({width_, height_});
+  if (several_models ())
+    preferences_.assign (
+        models_over_frames_.size (), Field (blocks.width, blocks.height));
   if (!models_.empty ())
     return;
   motion_.emplace (
@@ -241,65 +246,112 @@ Engine::prepare (const Schedule &schedule, const FuseOptions &options)
   light_.assign (std::size_t (slots ()), Field (width_, height_));
 }
 
-Engine::Filters
-Engine::make_filters (bool previous, bool next) const
+std::vector<Tap>
+Engine::Around::taps (double own, double neighbours) const
 {
-  const auto around = [&] (double own, double neighbours) {
-    std::vector<Tap> taps = taps_within (own);
-    for (const int frame : {-1, 1})
-      if (frame < 0 ? previous : next)
-        std::ranges::copy (
-            taps_within (neighbours, frame), std::back_inserter (taps));
-    return taps;
-  };
-  const auto each_phase = [&] (const SceneClass &scene,
-                              std::span<const Tap> taps,
-                              const UseWeights &use) {
-    for_each_phase (
-        phases_, observation_, scene, taps, noise_of_elements_, use);
-  };
-  const std::vector<Tap> near = taps_within (radius_ - 1.5),
-                         near_all = around (radius_ - 1.5, kComparedRadius),
-                         wide = taps_within (radius_ + 0.5),
-                         wide_all = around (radius_ + 0.5, kNeighbourRadius);
-  const std::vector<SceneClass> &models =
-      previous || next ? models_over_frames_ : models_;
-  std::vector<SceneClass> predicted{kStatic, kMoving};
-  predicted.insert (predicted.end (), models.begin (), models.end ());
-  Filters filters{
-      FilterBank (phases_, near_all, int (predicted.size ()), steps_), {}};
-  for (std::size_t k = 0; k < predicted.size (); k++) {
-    /* What moves fast has left the pixel in other frames. */
-    const bool alone =
-        k < 2 || k + 1 == predicted.size () || !(previous || next);
-    each_phase (predicted[k], alone ? near : near_all,
-        [&] (int row, int x, PhaseWeights weights) {
-          if (!alone)
-            for (float &weight : weights.residual)
-              weight *= kChance;
-          weights.residual.resize (near_all.size ());
-          filters.predictions.set (row, x, int (k), weights.residual);
+  std::vector<Tap> all = taps_within (own);
+  for (const int frame : {-1, 1})
+    if (frame < 0 ? previous : next)
+      std::ranges::copy (
+          taps_within (neighbours, frame), std::back_inserter (all));
+  return all;
+}
+
+/* Filters of many slots would take too long to be made sparse. */
+void
+Engine::each_filter (const SceneClass &scene, std::span<const Tap> taps,
+    Sought sought, const UseSparse &use) const
+{
+  const bool residual = sought == Sought::kResidual;
+  if (slots () <= Fuser<std::uint8_t>::kMaxSlots)
+    for_each_sparse_phase (phases_, observation_, scene, taps,
+        noise_of_elements_, sought, residual ? kPredictionExcess : kExcess,
+        use);
+  else
+    for_each_phase (phases_, observation_, scene, taps, noise_of_elements_,
+        [&] (int row, int x, const PhaseWeights &weights) {
+          use (row, x, residual ? weights.residual : weights.slots);
         });
-    if (k < 2)
-      continue;
-    const std::vector<Tap> &taps = alone ? wide : wide_all;
-    FilterBank &bank =
-        filters.models.emplace_back (phases_, taps, slots (), steps_);
-    each_phase (
-        predicted[k], taps, [&] (int row, int x, const PhaseWeights &weights) {
-          bank.set_all (row, x, weights.slots);
+}
+
+SparseBank
+Engine::make_predictions (const SparseSources &sources, Around around) const
+{
+  std::vector<SceneClass> classes{kStatic, kMoving};
+  if (several_models ()) {
+    classes = around.any () ? models_over_frames_ : models_;
+    classes.insert (classes.begin (), kStatic);
+  }
+  const std::vector<Tap> near = taps_within (radius_ - 1.5),
+                         all = around.taps (radius_ - 1.5, kComparedRadius);
+  /* Their taps fit some motion by chance, the more of all taps they are: their
+   * squared errors count as this much larger. */
+  const float chance = std::sqrt (1.0f + 1.0f / float (slots ()));
+  SparseBank bank (phases_, int (classes.size ()), steps_);
+  for (std::size_t k = 0; k < classes.size (); k++) {
+    /* Neither a static scene nor fast motion needs other frames. */
+    const bool alone = k == 0 || k + 1 == classes.size () || !around.any ();
+    const std::vector<Tap> &taps = alone ? near : all;
+    each_filter (classes[k], taps, Sought::kResidual,
+        [&] (int row, int x, std::vector<float> weights) {
+          if (!alone)
+            for (float &weight : weights)
+              weight *= chance;
+          bank.set (sources, row, x, int (k), taps, weights);
         });
   }
-  return filters;
+  return bank;
+}
+
+std::vector<SparseBank>
+Engine::make_models (const SparseSources &sources, Around around) const
+{
+  const std::vector<SceneClass> &models =
+      around.any () ? models_over_frames_ : models_;
+  const std::vector<Tap> wide = taps_within (radius_ + 0.5),
+                         all = around.taps (radius_ + 0.5, kNeighbourRadius);
+  std::vector<SparseBank> banks;
+  for (const SceneClass &model : models) {
+    /* What moves fast has left the pixel in other frames. */
+    const std::vector<Tap> &taps = &model == &models.back () ? wide : all;
+    SparseBank &bank = banks.emplace_back (phases_, slots (), steps_);
+    each_filter (model, taps, Sought::kSlots,
+        [&] (int row, int x, const std::vector<float> &weights) {
+          for (int s = 0; s < slots (); s++)
+            bank.set (sources, row, x, s, taps,
+                std::span (weights).subspan (
+                    std::size_t (s) * taps.size (), taps.size ()));
+        });
+  }
+  return banks;
+}
+
+Engine::Filters
+Engine::make_filters (Around around) const
+{
+  constexpr int kReach = int (kNeighbourRadius);
+  const SparseSources sources (
+      {around.previous ? kReach : -1, radius_, around.next ? kReach : -1},
+      SplitField (width_, 0, radius_, split_period ()));
+  return {sources, make_predictions (sources, around),
+      make_models (sources, around)};
+}
+
+/* Parts of rows hold two columns of a block of predictions. */
+int
+Engine::split_period () const
+{
+  return phases_.period () * (phases_.period () % 2 + 1);
 }
 
 const Engine::Filters &
-Engine::filters_for (const PairFrames &frames)
+Engine::filters_for (const SplitFrames &frames)
 {
-  const bool previous = frames[0] != nullptr, next = frames[2] != nullptr;
-  auto &filters = filters_[(previous ? 1u : 0u) + (next ? 2u : 0u)];
+  const Around around{frames[0] != nullptr, frames[2] != nullptr};
+  auto &filters =
+      filters_[(around.previous ? 1u : 0u) + (around.next ? 2u : 0u)];
   if (!filters)
-    filters = make_filters (previous, next);
+    filters = make_filters (around);
   return *filters;
 }
 
@@ -307,7 +359,8 @@ Field &
 Engine::next ()
 {
   if (spare_.light.empty ())
-    spare_ = {Field (width_, height_), PairField (width_, height_, radius_)};
+    spare_ = {Field (width_, height_), PairField (width_, height_, radius_),
+        SplitField (width_, height_, radius_, split_period ())};
   return spare_.light;
 }
 
@@ -333,19 +386,25 @@ Engine::pair_pixels (Coded &coded) const
   std::int32_t *origin = coded.pairs.row (0);
   for (const Repeat &repeat : margin_)
     origin[repeat.to] = origin[repeat.from];
-  for (int y = -radius_; y < height_ + radius_; y++)
-    kernels_.pair (coded.pairs.row (y) - radius_, width_ + 2 * radius_);
+  const Parts parts{
+      split_period (), coded.split.stride (), width_ + 2 * radius_};
+  for (int y = -radius_; y < height_ + radius_; y++) {
+    std::int32_t *row = coded.pairs.row (y) - radius_;
+    kernels_.pair (row, parts.count);
+    kernels_.split_pairs (parts, row, coded.split.row (y));
+  }
 }
 
-/* Rows that a thread takes at a time: all if there is one, as neighbouring
- * parts compute some rows twice. */
+/* Rows that a thread takes at a time, an even number: all if there is one, as
+ * neighbouring parts compute some rows twice. */
 int
 Engine::part_rows (const Workers &workers) const
 {
   constexpr int kPartsPerThread = 2, kMinRows = 16;
   const int parts =
       workers.count () == 1 ? 1 : kPartsPerThread * workers.count ();
-  return std::max ((height_ + parts - 1) / parts, kMinRows);
+  const int rows = std::max ((height_ + parts - 1) / parts, kMinRows);
+  return rows + rows % 2;
 }
 
 void
@@ -362,64 +421,133 @@ Engine::each_part (
 /* Models are compared by the sums of their squared errors. Their power of 8
  * stands for the number of independent errors in a square. */
 void
-Engine::find_static_pixels (const Filters &filters,
-    const StaticPixels::Frames &frames, const PairFrames &pairs,
-    StaticPixels::Rows rows)
+Engine::compare_predictions (
+    const Filters &filters, const SplitFrames &frames, StaticPixels::Rows rows)
 {
-  const float side = float (2 * static_pixels_.radius () + 1);
-  predictions_->run (kernels_, phases_, filters.predictions, pairs, rows.first,
-      rows.end, rows.worker, [&] (int y, const float *const *errors) {
-        static_pixels_.set_errors (kernels_, y, errors[0], errors[1]);
+  const float area = float (predictions_->area ());
+  const int classes = filters.predictions.outputs ();
+  const Extent blocks = Predictions::blocks ({width_, height_});
+  std::vector<float *> to;
+  predictions_->run (kernels_, phases_, filters.sources, filters.predictions,
+      frames, rows.first / 2, std::min ((rows.end + 1) / 2, blocks.height),
+      rows.worker, [&] (int row, const float *const *errors) {
+        static_pixels_.set_errors (kernels_, row, predictions_->area (),
+            errors[0], errors[classes - 1]);
         if (preferences_.empty ())
           return;
-        std::vector<float *> to;
+        to.clear ();
         for (Field &preference : preferences_)
-          to.push_back (preference.row (y));
-        kernels_.prefer ({errors + 2, int (filters.models.size ()),
-                             kErrorFloor * side * side, kMinWeight, width_},
+          to.push_back (preference.row (row));
+        kernels_.prefer ({errors + 1, classes - 1, kErrorFloor * area,
+                             kMinWeight, blocks.width},
             to.data ());
+        for (float *preference : to)
+          preference[blocks.width] = preference[blocks.width - 1];
       });
-  static_pixels_.compare (kernels_, frames, rows);
 }
 
 /* Static pixels are the same in every slot. */
 void
-Engine::blend (int y, float *const *rows) const
+Engine::blend (const Field &coded, int y, float *const *rows) const
 {
   const float *weight = static_pixels_.weight (y),
-              *light = static_pixels_.light (y);
+              *light = static_pixels_.light (coded, y);
   for (int s = 0; s < slots (); s++)
     for (int x = 0; x < width_; x++)
       rows[s][x] += weight[x] * (light[x] - rows[s][x]);
 }
 
-void
-Engine::fuse_linear (const Filters &filters, const PairFrames &frames,
-    const RowSink &sink, StaticPixels::Rows part) const
-{
-  const auto &models = filters.models;
+/* The estimates of one row, in parts. */
+struct Engine::Estimates {
+  Parts parts;
+  int blocks;                     ///< of a part, kRunBlock values each
+  Field shares;                   ///< of the models, as rows
+  Field split;                    ///< the same in parts
+  Field light;                    ///< of the slots in parts
+  Field rows;                     ///< of the slots
+  Field still;                    ///< static light times its weight
+  std::vector<std::uint8_t> kept; ///< blocks of each model
+  std::vector<Run> runs;          ///< of one model
   std::vector<const std::int32_t *> sources;
-  Field rows_of_slots (width_, slots ());
-  Field shares (width_, int (models.size ()));
-  std::vector<float *> rows, shares_of_models;
+
+  Estimates (int width, int period, int models, int slots)
+      : parts{period, SplitField::split_length (width, period), width},
+        blocks (int (parts.stride) / kRunBlock), shares (width, models),
+        split (int (parts.stride) * period, models),
+        light (int (parts.stride) * period, slots), rows (width, slots),
+        still (width, 1), kept (std::size_t (models * blocks))
+  {
+  }
+
+  void find_runs (int model)
+  {
+    runs.clear ();
+    for (int b = 0; b < blocks; b++) {
+      if (!kept[std::size_t (model * blocks + b)])
+        continue;
+      const int first = b * kRunBlock;
+      if (!runs.empty () && runs.back ().first + runs.back ().count == first)
+        runs.back ().count += kRunBlock;
+      else
+        runs.push_back ({first, kRunBlock});
+    }
+  }
+};
+
+void
+Engine::share (const Field &coded, int y, Estimates &to) const
+{
+  std::vector<const float *> preferences;
+  for (const Field &preference : preferences_)
+    preferences.push_back (
+        preference.row (std::min (y / 2, preference.height () - 1)));
+  std::vector<float *> shares;
+  for (int model = 0; model < to.shares.height (); model++)
+    shares.push_back (to.shares.row (model));
+  kernels_.share (
+      {static_pixels_.weight (y), static_pixels_.light (coded, y),
+          preferences.empty () ? nullptr : preferences.data (),
+          int (shares.size ()), kRunBlock * to.parts.period, width_},
+      to.still.row (0), shares.data (), to.kept.data ());
+  for (int model = 0; model < to.shares.height (); model++)
+    kernels_.split (to.parts, to.shares.row (model), to.split.row (model));
+}
+
+void
+Engine::estimate (const Filters &filters, const SplitFrames &frames, int y,
+    Estimates &to) const
+{
+  const auto sources = filters.sources.row (frames, y, to.sources);
   for (int s = 0; s < slots (); s++)
-    rows.push_back (rows_of_slots.row (s));
-  for (std::size_t model = 0; model < models.size (); model++)
-    shares_of_models.push_back (shares.row (int (model)));
+    std::fill_n (to.light.row (s), to.light.width (), 0.0f);
+  for (std::size_t model = 0; model < filters.models.size (); model++) {
+    to.find_runs (int (model));
+    for (int column = 0; column < to.parts.period; column++) {
+      const auto at = column * to.parts.stride;
+      for (int s = 0; s < slots (); s++)
+        kernels_.filter_sparse_add (
+            filters.models[model].row (phases_, y, column, s, sources, to.runs),
+            to.split.row (int (model)) + at, to.light.row (s) + at);
+    }
+  }
+  for (int s = 0; s < slots (); s++)
+    kernels_.join (
+        to.parts, to.light.row (s), to.still.row (0), to.rows.row (s));
+}
+
+void
+Engine::fuse_linear (const Filters &filters, const Field &coded,
+    const SplitFrames &frames, const RowSink &sink,
+    StaticPixels::Rows part) const
+{
+  Estimates estimates (
+      width_, split_period (), int (filters.models.size ()), slots ());
+  std::vector<const float *> rows;
+  for (int s = 0; s < slots (); s++)
+    rows.push_back (estimates.rows.row (s));
   for (int y = part.first; y < part.end; y++) {
-    std::vector<const float *> preferences;
-    for (const Field &preference : preferences_)
-      preferences.push_back (preference.row (y));
-    kernels_.share ({static_pixels_.weight (y), static_pixels_.light (y),
-                        preferences.empty () ? nullptr : preferences.data (),
-                        int (models.size ()), width_},
-        rows[0], shares_of_models.data ());
-    for (std::size_t s = 1; s < rows.size (); s++)
-      std::copy_n (rows[0], width_, rows[s]);
-    for (std::size_t model = 0; model < models.size (); model++)
-      kernels_.filter_pairs_add (
-          models[model].row (phases_, frames, y, sources),
-          shares_of_models[model], rows.data ());
+    share (coded, y, estimates);
+    estimate (filters, frames, y, estimates);
     sink (y, rows.data ());
   }
 }
@@ -437,7 +565,7 @@ Engine::fuse_motion (const Coded &coded, const RowSink &sink, Workers &workers,
   for (int y = 0; y < height_; y++) {
     for (std::size_t s = 0; s < rows.size (); s++)
       rows[s] = light_[s].row (y);
-    blend (y, rows.data ());
+    blend (coded.light, y, rows.data ());
     sink (y, rows.data ());
   }
   return true;
@@ -451,25 +579,27 @@ Engine::fuse (const RowSink &sink, Workers &workers, std::stop_token stop)
     refiner_->set_row (y, slots);
   };
   const RowSink &out = refiner_ ? estimated : sink;
-  const StaticPixels::Frames frames{
-      coded.light, queue_.size () > 1 ? &queue_[1].light : nullptr, noise_};
-  PairFrames neighbours{nullptr, &coded.pairs, nullptr};
-  if (models_.size () > 1) {
+  const StaticPixels::Frames frames{coded.light,
+      previous_.light.empty () ? nullptr : &previous_.light,
+      queue_.size () > 1 ? &queue_[1].light : nullptr, noise_};
+  SplitFrames neighbours{nullptr, &coded.split, nullptr};
+  if (several_models ()) {
     if (!previous_.light.empty ())
-      neighbours[0] = &previous_.pairs;
+      neighbours[0] = &previous_.split;
     if (queue_.size () > 1)
-      neighbours[2] = &queue_[1].pairs;
+      neighbours[2] = &queue_[1].split;
   }
   const Filters &filters = filters_for (neighbours);
   predictions_->make_room (workers.count ());
   static_pixels_.make_room (workers.count ());
   each_part (workers, [&] (StaticPixels::Rows rows) {
-    find_static_pixels (filters, frames, neighbours, rows);
+    compare_predictions (filters, neighbours, rows);
+    static_pixels_.compare (kernels_, frames, rows);
   });
   each_part (workers, [&] (StaticPixels::Rows rows) {
     static_pixels_.average (kernels_, frames, rows);
     if (!models_.empty ())
-      fuse_linear (filters, neighbours, out, rows);
+      fuse_linear (filters, coded.light, neighbours, out, rows);
   });
   static_pixels_.finish (frames);
   bool done = !models_.empty () || fuse_motion (coded, out, workers, stop);

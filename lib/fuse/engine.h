@@ -20,6 +20,7 @@
 #include "fuse/motion.h"
 #include "fuse/predictions.h"
 #include "fuse/refine.h"
+#include "fuse/sparse_bank.h"
 #include "fuse/static_pixels.h"
 
 namespace codedexposure::fuse
@@ -65,27 +66,50 @@ private:
   void prepare (const Schedule &schedule, const FuseOptions &options);
   /** Filters that use some of the neighbouring coded frames. */
   struct Filters {
-    FilterBank predictions; ///< of kStatic, kMoving, and the models of fast
-    std::vector<FilterBank> models; ///< of fast
+    SparseSources sources;
+    SparseBank predictions;         ///< of a static scene and of moving ones
+    std::vector<SparseBank> models; ///< of fast
   };
-  Filters make_filters (bool previous, bool next) const;
-  const Filters &filters_for (const PairFrames &frames);
+  /** The neighbouring coded frames that there are. */
+  struct Around {
+    bool previous = false, next = false;
+
+    bool any () const { return previous || next; }
+    /** Taps within these radii in the frame itself and in its neighbours. */
+    std::vector<Tap> taps (double own, double neighbours) const;
+  };
+  bool several_models () const { return models_.size () > 1; }
+  int split_period () const;
+  void each_filter (const SceneClass &scene, std::span<const Tap> taps,
+      Sought sought, const UseSparse &use) const;
+  SparseBank make_predictions (
+      const SparseSources &sources, Around around) const;
+  std::vector<SparseBank> make_models (
+      const SparseSources &sources, Around around) const;
+  Filters make_filters (Around around) const;
+  const Filters &filters_for (const SplitFrames &frames);
   /** A coded frame; the pairs have a margin. */
   struct Coded {
     Field light;
     PairField pairs;
+    SplitField split; ///< the pairs
   };
   void pair_pixels (Coded &coded) const;
   int part_rows (const Workers &workers) const;
   void each_part (Workers &workers,
       const std::function<void (StaticPixels::Rows)> &use) const;
-  /** What rows need to know before static pixels are averaged. */
-  void find_static_pixels (const Filters &filters,
-      const StaticPixels::Frames &frames, const PairFrames &pairs,
+  /** Sets what static pixels and the preferences need to know of predictions.
+   */
+  void compare_predictions (const Filters &filters, const SplitFrames &frames,
       StaticPixels::Rows rows);
-  void fuse_linear (const Filters &filters, const PairFrames &frames,
-      const RowSink &sink, StaticPixels::Rows part) const;
-  void blend (int y, float *const *rows) const;
+  struct Estimates;
+  void share (const Field &coded, int y, Estimates &to) const;
+  void estimate (const Filters &filters, const SplitFrames &frames, int y,
+      Estimates &to) const;
+  void fuse_linear (const Filters &filters, const Field &coded,
+      const SplitFrames &frames, const RowSink &sink,
+      StaticPixels::Rows part) const;
+  void blend (const Field &coded, int y, float *const *rows) const;
   bool fuse_motion (const Coded &coded, const RowSink &sink, Workers &workers,
       std::stop_token stop);
   /** Standard deviation of coded pixels in grey levels. */
@@ -104,7 +128,7 @@ private:
   /** Without and with taps of the previous, + 2 of the next coded frame. Those
    * that a stream rarely needs are made when it does. */
   std::array<std::optional<Filters>, 4> filters_;
-  std::vector<Field> preferences_; ///< for each of several models
+  std::vector<Field> preferences_; ///< of blocks, for each of several models
   std::optional<MotionFilter> motion_;
   std::optional<CollaborativeFilter> collaborative_;
   std::vector<Field> light_; ///< of each slot, unless fast

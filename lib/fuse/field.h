@@ -64,4 +64,53 @@ using Field = FieldOf<float>;
 /** Pairs of neighbouring pixels; see fuse::PairRow. */
 using PairField = FieldOf<std::int32_t>;
 
+/**
+ * The same, with each row split into parts: every period-th pixel, from which
+ * a tile repeats. Row y begins at x = -margin.
+ */
+class SplitField
+{
+public:
+  SplitField () = default;
+  SplitField (int width, int height, int margin, int period)
+      : width_ (width), height_ (height), margin_ (margin), period_ (period),
+        stride_ (split_length (width, period) + 2 * margin / period + 1),
+        values_ (
+            std::size_t (stride_ * period) * std::size_t (height + 2 * margin))
+  {
+  }
+
+  /** Values of a part of @p width pixels, in whole vectors. */
+  static int split_length (int width, int period)
+  {
+    const int length = (width + period - 1) / period;
+    return (length + Field::kSlack - 1) / Field::kSlack * Field::kSlack;
+  }
+
+  int width () const { return width_; }
+  int height () const { return height_; }
+  int margin () const { return margin_; }
+  int period () const { return period_; }
+  std::ptrdiff_t stride () const { return stride_; } ///< of parts
+  bool empty () const { return values_.empty (); }
+  std::int32_t *row (int y) { return values_.data () + start (y); }
+  const std::int32_t *row (int y) const { return values_.data () + start (y); }
+  /** Where in a row pixel @p x is, from -margin on; every period-th pixel after
+   * it follows. */
+  std::ptrdiff_t place (int x) const
+  {
+    return (x + margin_) % period_ * stride_ + (x + margin_) / period_;
+  }
+
+private:
+  std::ptrdiff_t start (int y) const
+  {
+    return (y + margin_) * stride_ * period_;
+  }
+
+  int width_ = 0, height_ = 0, margin_ = 0, period_ = 1;
+  std::ptrdiff_t stride_ = 0;
+  std::vector<std::int32_t> values_;
+};
+
 } // namespace codedexposure

@@ -11,12 +11,6 @@ namespace codedexposure::fuse
 namespace
 {
 
-/* Weights times @p unit, a power of two. */
-struct WholeWeights {
-  std::vector<int> values;
-  float unit;
-};
-
 /* The largest unit with which no weight and no sum of products overflows. */
 float
 unit_of (std::span<const float> weights)
@@ -34,7 +28,9 @@ unit_of (std::span<const float> weights)
   return unit;
 }
 
-/* Rounded so that the sum stays: up where most is left, down elsewhere. */
+} // namespace
+
+/* Up where most is left, down elsewhere. */
 WholeWeights
 round_weights (std::span<const float> weights)
 {
@@ -60,8 +56,6 @@ round_weights (std::span<const float> weights)
     whole.values[order[std::size_t (i)]]++;
   return whole;
 }
-
-} // namespace
 
 FilterBank::FilterBank (
     const Phases &phases, std::span<const Tap> taps, int outputs, float steps)

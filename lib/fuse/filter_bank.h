@@ -17,6 +17,15 @@ namespace codedexposure::fuse
  * is none. */
 using PairFrames = std::array<const PairField *, 3>;
 
+/** Weights times @p unit, a power of two. */
+struct WholeWeights {
+  std::vector<int> values;
+  float unit;
+};
+
+/** Rounded to 16 bits such that the sum stays. */
+WholeWeights round_weights (std::span<const float> weights);
+
 /** For every pixel of a frame, @p outputs weighted sums over the same taps.
  * Pixels and weights are rounded to 16 bits: pixels to kSmallest for black and
  * a number of steps per grey level, weights such that their sum stays. The sums

@@ -57,6 +57,46 @@ struct PairRow {
   int phase;
 };
 
+/** Values of a row are filtered in blocks of this many. */
+constexpr int kRunBlock = 16;
+
+/** Some values of a row; both multiples of kRunBlock. */
+struct Run {
+  int first, count;
+};
+
+/** Weights of two neighbouring pixels, as in PairRow. */
+struct SparsePair {
+  std::int32_t source; ///< number of a source
+  std::int32_t weights;
+};
+
+/**
+ * The same for pixels that all have the same filter, which are every few pixels
+ * of a row. The value at i is
+ *
+ *   scale * sum + base,
+ *
+ * where sum is over pairs t, of both products of pairs[t].weights and
+ * sources[pairs[t].source][i].
+ */
+struct SparseRow {
+  const std::int32_t *const *sources;
+  const SparsePair *pairs;
+  int pairs_count;
+  float scale, base;
+  const Run *runs;
+  int runs_count;
+};
+
+/** A row of pixels and its parts: pixel x is at part[x mod period * stride + x
+ * / period]. */
+struct Parts {
+  int period;
+  std::ptrdiff_t stride;
+  int count; ///< pixels of the row
+};
+
 /**
  * Overlapping blocks of kBlock x kBlock pixels x slots, kBlockStep apart. A
  * vector has one block per lane: column x of row y of block l is at
@@ -95,7 +135,8 @@ struct CompareRow {
   int count;
 };
 
-/** fade of sum / area, times fade of max, times unrepeated. */
+/** fade of sum / area, times fade of max, times unrepeated, which has a value
+ * for every two pixels. */
 struct RateRow {
   const float *sum, *max, *unrepeated;
   float area;
@@ -112,11 +153,17 @@ struct PreferRow {
   int count;
 };
 
+/** Models that are the best ones of fewer moving pixels of a block than one of
+ * this many are left out there. */
+constexpr int kWantedPart = 16;
+
 /** The light of static pixels and the shares of models. */
 struct ShareRow {
-  const float *weight, *light;     ///< of static pixels
-  const float *const *preferences; ///< for each model; null: there is one
+  const float *weight, *light; ///< of static pixels
+  /** For each model, a value for every two pixels; null: there is one model. */
+  const float *const *preferences;
   int models;
+  int block; ///< pixels for which models are left out
   int count;
 };
 
@@ -155,23 +202,39 @@ struct Kernels {
   /** outputs[k][x] += share[x] * output k, where share is not 0. */
   void (*filter_pairs_add) (
       const PairRow &row, const float *share, float *const *outputs);
+  /** to[i] += the square of value i, or share[i] * value i, in the runs. */
+  void (*filter_sparse_squared) (const SparseRow &row, float *to);
+  void (*filter_sparse_add) (
+      const SparseRow &row, const float *share, float *to);
+  /** A row to its parts. */
+  void (*split_pairs) (
+      const Parts &parts, const std::int32_t *from, std::int32_t *to);
+  void (*split) (const Parts &parts, const float *from, float *to);
+  /** Parts to their row, which is added to @p add if it is not null. */
+  void (*join) (
+      const Parts &parts, const float *from, const float *add, float *to);
   /** to[x] = the sum of rows[i][x], in the order of the rows, or the largest.
    * Up to 15 values more than @p count are read and written. */
   void (*sum) (const float *const *rows, int rows_count, int count, float *to);
   void (*max) (const float *const *rows, int rows_count, int count, float *to);
   /** to[x] = the change of pixel x. */
   void (*compare) (const CompareRow &row, float *to);
+  /** Up to 15 values more than count are read and written. */
   void (*rate) (const RateRow &row, float *to);
-  /** to[x] = fade of a[x] / (floor + b[x]). */
+  /** to[x] = fade of a[x] / (floor + b[x]). Up to 15 values more than count are
+   * read and written. */
   void (*fade_ratio) (const float *a, const float *b, float floor,
       const Fade &fade, int count, float *to);
-  /** to[i][x] = preference for model i: in proportion to the inverse of the
-   * models' errors to the power of 8. Up to 15 values more than count are read
-   * and written. */
+  /** to[i][x] = preference for model i: 1 for the best one, in proportion to
+   * the inverse of the models' errors to the power of 8. Up to 15 values more
+   * than count are read and written. */
   void (*prefer) (const PreferRow &row, float *const *to);
   /** base[x] = static light times its weight; shares[i][x] = share of model i
-   * in the rest. */
-  void (*share) (const ShareRow &row, float *base, float *const *shares);
+   * in the rest. Models that too few pixels of a block want are left out
+   * there: kept[i * blocks + b] = whether model i is used in block b. Up to 15
+   * values more than count are read and written. */
+  void (*share) (const ShareRow &row, float *base, float *const *shares,
+      std::uint8_t *kept);
   /** Pixels of 16 bits, kSmallest more than light times @p steps, rounded. */
   void (*to_steps) (
       const float *light, float steps, int count, std::int32_t *to);

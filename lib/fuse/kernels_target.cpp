@@ -4,13 +4,16 @@
 #include "fuse/filter_kernel.h"
 #include "fuse/rows_kernel.h"
 #include "fuse/shrink_kernel.h"
+#include "fuse/sparse_kernel.h"
 
 namespace codedexposure::CODEDEXPOSURE_TARGET
 {
 
 extern const fuse::Kernels kernels;
 const fuse::Kernels kernels = {CODEDEXPOSURE_TARGET_NAME, filter,
-    filter_pairs_squared, filter_pairs_add, sum, max, compare, rate, fade_ratio,
-    prefer, share, to_steps, pair, to_bytes, to_words, shrink, convolve};
+    filter_pairs_squared, filter_pairs_add, filter_sparse_squared,
+    filter_sparse_add, split_pairs, split, join, sum, max, compare, rate,
+    fade_ratio, prefer, share, to_steps, pair, to_bytes, to_words, shrink,
+    convolve};
 
 } // namespace codedexposure::CODEDEXPOSURE_TARGET

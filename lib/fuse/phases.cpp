@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <functional>
+#include <utility>
 
 #include "estimate/kriging.h"
 
@@ -91,14 +92,19 @@ struct Exposure {
   }
 };
 
-PhaseWeights
-weights_of (const CodedCovariance &covariance, const Observation &observation,
-    const Exposure &exposure, std::span<const Tap> taps,
-    std::span<const int> elements, std::span<const double> noise)
+std::size_t
+middle_of (std::span<const Tap> taps)
+{
+  return std::size_t (std::ranges::find (taps, Tap{0, 0, 0}) - taps.begin ());
+}
+
+/* Simple kriging of the slots of the middle frame. */
+KrigingSystem
+equations (const CodedCovariance &covariance, const Exposure &exposure,
+    std::span<const Tap> taps, std::span<const int> elements,
+    std::span<const double> noise)
 {
   const std::size_t m = taps.size (), n = std::size_t (exposure.slots);
-  const std::size_t middle =
-      std::size_t (std::ranges::find (taps, Tap{0, 0, 0}) - taps.begin ());
   std::vector<Offset> places;
   std::vector<int> exposed;
   for (std::size_t i = 0; i < m; i++) {
@@ -106,17 +112,39 @@ weights_of (const CodedCovariance &covariance, const Observation &observation,
     exposed.push_back (exposure.element (taps[i], elements[i]));
   }
   KrigingSystem system = slot_equations (covariance, places, exposed, noise);
-  /* Only the slots of the middle frame are sought. */
   const std::size_t before = std::size_t (-exposure.first) * n * m;
   system.targets.erase (system.targets.begin (),
       system.targets.begin () + std::ptrdiff_t (before));
+  system.targets.resize (n * m);
+  return system;
+}
+
+/* Without noise, a pixel of a one-hot code is known in its own slot. */
+template <typename Weights>
+void
+keep_known (const Observation &observation, int element, std::size_t taps,
+    std::size_t middle, Weights &weights)
+{
+  if (!observation.exact () || !observation.noise_free ())
+    return;
+  const int known = observation.shares (element)[0].slot;
+  const auto slot = weights.begin () + known * std::ptrdiff_t (taps);
+  std::fill_n (slot, taps, 0.0f);
+  slot[std::ptrdiff_t (middle)] = 1.0f;
+}
+
+PhaseWeights
+weights_of (KrigingSystem system, const Observation &observation,
+    std::span<const Tap> taps, int element)
+{
+  const std::size_t m = taps.size (), n = system.targets.size () / m;
+  const std::size_t middle = middle_of (taps);
   /* Ordinary kriging. As one target more, row `middle` of the inverse of the
    * bordered matrix: it holds the prediction of that pixel by all others,
    * scaled. */
   system.flat.assign (m, 1.0);
   system.flat_targets.assign (n, 1.0);
   system.flat_targets.push_back (0.0);
-  system.targets.resize (n * m);
   system.targets.resize ((n + 1) * m);
   system.targets[n * m + middle] = 1.0;
   const std::vector<double> solved = solve_kriging (system);
@@ -127,21 +155,79 @@ weights_of (const CodedCovariance &covariance, const Observation &observation,
   for (std::size_t i = 0; i < m; i++)
     weights.residual.push_back (float (
         -residual[std::ptrdiff_t (i)] / residual[std::ptrdiff_t (middle)]));
-  if (observation.exact () && observation.noise_free ()) {
-    const int known = observation.shares (elements[middle])[0].slot;
-    const auto slot = weights.slots.begin () + known * std::ptrdiff_t (m);
-    std::fill_n (slot, m, 0.0f);
-    slot[std::ptrdiff_t (middle)] = 1.0f;
-  }
+  keep_known (observation, element, m, middle, weights.slots);
   return weights;
 }
 
-} // namespace
+/* Every tap with the one to its right. */
+std::vector<TapPair>
+pairs_of (std::span<const Tap> taps)
+{
+  std::vector<TapPair> pairs;
+  for (std::size_t i = 0; i < taps.size (); i++) {
+    const Tap right{taps[i].x + 1, taps[i].y, taps[i].frame};
+    const bool next = i + 1 < taps.size () && taps[i + 1] == right;
+    pairs.push_back ({int (i), next ? int (i + 1) : -1});
+  }
+  return pairs;
+}
 
+std::vector<float>
+sparse_slots (KrigingSystem system, const Observation &observation,
+    std::span<const Tap> taps, int element, double excess)
+{
+  constexpr double kScene = 1.0;
+  const std::size_t m = taps.size ();
+  const std::vector<double> targets = std::exchange (system.targets, {});
+  system.flat.assign (m, 1.0);
+  const SparseKriging kriging (std::move (system), pairs_of (taps));
+  std::vector<float> weights;
+  for (std::size_t at = 0; at < targets.size (); at += m) {
+    const auto solved = kriging.solve (
+        std::span (targets).subspan (at, m), 1.0, kScene, excess);
+    weights.insert (weights.end (), solved.begin (), solved.end ());
+  }
+  keep_known (observation, element, m, middle_of (taps), weights);
+  return weights;
+}
+
+/* The middle tap is sought, so it is not among the equations' taps. */
+std::vector<float>
+sparse_residual (
+    const KrigingSystem &all, std::span<const Tap> taps, double excess)
+{
+  const std::size_t m = taps.size (), middle = middle_of (taps);
+  const auto covariance = [&] (std::size_t a, std::size_t b) {
+    return all.covariance[std::min (a, b) * m + std::max (a, b)];
+  };
+  KrigingSystem system;
+  std::vector<Tap> others;
+  std::vector<double> target;
+  for (std::size_t i = 0; i < m; i++) {
+    if (i == middle)
+      continue;
+    for (std::size_t j = 0; j < m; j++)
+      if (j != middle)
+        system.covariance.push_back (covariance (i, j));
+    system.noise.push_back (all.noise[i]);
+    target.push_back (covariance (i, middle));
+    others.push_back (taps[i]);
+  }
+  system.flat.assign (others.size (), 1.0);
+  const double variance = covariance (middle, middle) + all.noise[middle];
+  const auto solved = SparseKriging (std::move (system), pairs_of (others))
+                          .solve (target, 1.0, variance, excess);
+  std::vector<float> weights (solved.begin (), solved.end ());
+  weights.insert (weights.begin () + std::ptrdiff_t (middle), -1.0f);
+  return weights;
+}
+
+/* Calls use (row, x, equations, elements of the taps) for every phase. */
+template <typename Use>
 void
-for_each_phase (const Phases &phases, const Observation &observation,
+each_system (const Phases &phases, const Observation &observation,
     const SceneClass &patch, std::span<const Tap> taps,
-    std::span<const double> noise, const UseWeights &use)
+    std::span<const double> noise, const Use &use)
 {
   int radius = 0;
   for (const Tap &tap : taps)
@@ -153,10 +239,40 @@ for_each_phase (const Phases &phases, const Observation &observation,
   for (int frame = 0; frame < exposure.frames; frame++)
     noises.insert (noises.end (), noise.begin (), noise.end ());
   for (int row = 0; row < phases.rows (); row++)
-    for (int x = 0; x < phases.period (); x++)
-      use (row, x,
-          weights_of (covariance, observation, exposure, taps,
-              phases.elements (row, x, taps), noises));
+    for (int x = 0; x < phases.period (); x++) {
+      const std::vector<int> elements = phases.elements (row, x, taps);
+      use (row, x, equations (covariance, exposure, taps, elements, noises),
+          elements[middle_of (taps)]);
+    }
+}
+
+} // namespace
+
+void
+for_each_phase (const Phases &phases, const Observation &observation,
+    const SceneClass &patch, std::span<const Tap> taps,
+    std::span<const double> noise, const UseWeights &use)
+{
+  each_system (phases, observation, patch, taps, noise,
+      [&] (int row, int x, KrigingSystem system, int element) {
+        use (row, x,
+            weights_of (std::move (system), observation, taps, element));
+      });
+}
+
+void
+for_each_sparse_phase (const Phases &phases, const Observation &observation,
+    const SceneClass &patch, std::span<const Tap> taps,
+    std::span<const double> noise, Sought sought, double excess,
+    const UseSparse &use)
+{
+  each_system (phases, observation, patch, taps, noise,
+      [&] (int row, int x, KrigingSystem system, int element) {
+        use (row, x,
+            sought == Sought::kSlots ? sparse_slots (std::move (system),
+                                           observation, taps, element, excess)
+                                     : sparse_residual (system, taps, excess));
+      });
 }
 
 } // namespace codedexposure::fuse

@@ -81,4 +81,21 @@ void for_each_phase (const Phases &phases, const Observation &observation,
     const SceneClass &patch, std::span<const Tap> taps,
     std::span<const double> noise, const UseWeights &use);
 
+/** What each pixel of a phase is to be estimated from the pixels around it. */
+enum class Sought {
+  kSlots,    ///< its light in every slot
+  kResidual, ///< the coded pixel from all others, less that pixel
+};
+
+/** As for_each_phase (), with few taps; see SparseKriging. All other weights
+ * are 0. Weight of tap i for output k is at [k * taps + i].
+ * @p excess  squared error that is accepted beyond that with all taps, as a
+ *            part of it. */
+using UseSparse =
+    std::function<void (int row, int x, const std::vector<float> &weights)>;
+void for_each_sparse_phase (const Phases &phases,
+    const Observation &observation, const SceneClass &patch,
+    std::span<const Tap> taps, std::span<const double> noise, Sought sought,
+    double excess, const UseSparse &use);
+
 } // namespace codedexposure::fuse

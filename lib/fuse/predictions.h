@@ -9,7 +9,7 @@
 
 #include "fuse/box_filter.h"
 #include "fuse/field.h"
-#include "fuse/filter_bank.h"
+#include "fuse/sparse_bank.h"
 
 namespace codedexposure::fuse
 {
@@ -22,25 +22,43 @@ namespace codedexposure::fuse
 class Predictions
 {
 public:
-  /** @p around  radius of the squares over which errors are summed, px. */
-  Predictions (int classes, int around, Extent size);
+  /** @p around  radius of the squares over which errors are summed, px.
+   *  @p period  of the parts of rows, even. */
+  Predictions (int classes, int around, Extent size, int period);
+
+  /** Blocks of 2x2 pixels; an odd last row or column belongs to the one before
+   * it. */
+  static Extent blocks (Extent size)
+  {
+    return {std::max (size.width / 2, 1), std::max (size.height / 2, 1)};
+  }
+  /** Pixels of a square over which errors are summed. */
+  int area () const { return 4 * (2 * reach_ + 1) * (2 * reach_ + 1); }
 
   /** Room for threads of number 0 .. @p count - 1. */
   void make_room (int count);
-  /** Calls @p use with the sums of squared errors around the pixels of rows
-   * @p first .. @p end - 1, of each class, an output of @p filters. */
-  using Use = std::function<void (int y, const float *const *errors)>;
+  /** Calls @p use with the sums of squared errors around the blocks of rows
+   * @p first .. @p end - 1 of blocks, of each class, an output of @p filters.
+   */
+  using Use = std::function<void (int row, const float *const *errors)>;
   void run (const Kernels &kernels, const Phases &phases,
-      const FilterBank &filters, const PairFrames &frames, int first, int end,
-      int worker, const Use &use);
+      const SparseSources &sources, const SparseBank &filters,
+      const SplitFrames &frames, int first, int end, int worker,
+      const Use &use);
 
 private:
   /** Of a thread. */
   struct Room {
-    Field rows; ///< of squared errors, one of each class
+    Field rows;  ///< of squared errors of blocks, one of each class
+    Field parts; ///< of one of them
     std::vector<BoxFilter> sums;
   };
 
+  void predict (const Kernels &kernels, const Phases &phases,
+      const SparseSources &sources, const SparseBank &filters,
+      const SplitFrames &frames, int row, Room &room) const;
+
+  int reach_; ///< blocks around a block over which errors are summed
   std::vector<Room> rooms_; ///< one at least
 };
 

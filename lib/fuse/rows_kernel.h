@@ -53,12 +53,6 @@ clamped (float value, float low, float high)
   return above > high ? high : above;
 }
 
-CODEDEXPOSURE_INLINE float
-faded (float value, const fuse::Fade &fade)
-{
-  return clamped ((fade.all - value) / (fade.all - fade.none), 0.0f, 1.0f);
-}
-
 inline void
 compare (const fuse::CompareRow &row, float *__restrict to)
 {
@@ -77,25 +71,43 @@ compare (const fuse::CompareRow &row, float *__restrict to)
       to[x] *= 2.0f * frames[x] / (frames[x] + 1.0f);
 }
 
-inline void
-rate (const fuse::RateRow &row, float *__restrict to)
+/* Each lane of the lower half twice. */
+struct Twice {
+  static constexpr int at (int lane) { return lane / 2; }
+};
+
+/* Values of pixels from @p x on, of which there is one for every two. */
+CODEDEXPOSURE_INLINE Floats
+load_twice (const float *from, int x)
 {
-  const float *sum = row.sum, *max = row.max, *unrepeated = row.unrepeated;
-  const fuse::Fade mean_fade = row.mean_fade, max_fade = row.max_fade;
-  const float area = row.area;
-  const int count = row.count;
-  for (int x = 0; x < count; x++)
-    to[x] = faded (sum[x] / area, mean_fade) * faded (max[x], max_fade) *
-            unrepeated[x];
+  constexpr std::make_integer_sequence<int, kFloats> lanes;
+  const Floats v = load (from + x / 2);
+  return pick (v, v, Twice (), lanes);
+}
+
+CODEDEXPOSURE_INLINE Floats
+faded (Floats value, const fuse::Fade &fade)
+{
+  const Floats left = (fade.all - value) * (1.0f / (fade.all - fade.none));
+  return smaller (larger (left, Floats{}), Floats{} + 1.0f);
+}
+
+inline void
+rate (const fuse::RateRow &row, float *to)
+{
+  const float part = 1.0f / row.area;
+  for (int x = 0; x < row.count; x += kFloats)
+    store (to + x, faded (load (row.sum + x) * part, row.mean_fade) *
+                       faded (load (row.max + x), row.max_fade) *
+                       load_twice (row.unrepeated, x));
 }
 
 inline void
 fade_ratio (const float *a, const float *b, float floor, const fuse::Fade &fade,
-    int count, float *__restrict to)
+    int count, float *to)
 {
-  const fuse::Fade by = fade;
-  for (int x = 0; x < count; x++)
-    to[x] = faded (a[x] / (floor + b[x]), by);
+  for (int x = 0; x < count; x += kFloats)
+    store (to + x, faded (load (a + x) / (floor + load (b + x)), fade));
 }
 
 inline void
@@ -105,36 +117,104 @@ prefer (const fuse::PreferRow &row, float *const *to)
     Floats best = load (row.errors[0] + x) + row.floor;
     for (int i = 1; i < row.models; i++)
       best = smaller (best, load (row.errors[i] + x) + row.floor);
-    Floats sum = {};
     for (int i = 0; i < row.models; i++) {
       const Floats ratio = best / (load (row.errors[i] + x) + row.floor);
       const Floats fourth = ratio * ratio * ratio * ratio;
       const Floats weight = fourth * fourth;
-      const Floats kept = weight < row.min_weight ? Floats{} : weight;
-      sum += kept;
-      store (to[i] + x, kept);
+      store (to[i] + x,
+          weight < row.min_weight ? Floats{} + row.min_weight : weight);
     }
-    for (int i = 0; i < row.models; i++)
-      store (to[i] + x, load (to[i] + x) / sum);
   }
 }
 
+template <int Reach = kFloats / 2>
+CODEDEXPOSURE_INLINE int
+sum_of_lanes (Ints v)
+{
+  if constexpr (Reach == 0) {
+    return v[0];
+  } else {
+    constexpr std::make_integer_sequence<int, kFloats> lanes;
+    return sum_of_lanes<Reach / 2> (
+        v + pick (v, v, Rotate<kFloats, Reach> (), lanes));
+  }
+}
+
+/* Whether enough pixels that move prefer a model, whose preference is 1 then.
+ */
+CODEDEXPOSURE_INLINE bool
+is_wanted (
+    const fuse::ShareRow &row, const float *preference, int first, int end)
+{
+  Ints best = {}, moving = {};
+  int x = first;
+  for (; x + kFloats <= end; x += kFloats) {
+    const Ints moves = load (row.weight + x) < 1.0f;
+    moving += moves;
+    best += moves & (load_twice (preference, x) == 1.0f);
+  }
+  int bests = -sum_of_lanes (best), all = -sum_of_lanes (moving);
+  for (; x < end; x++) {
+    const bool moves = row.weight[x] < 1.0f;
+    all += moves;
+    bests += moves && preference[x / 2] == 1.0f;
+  }
+  return fuse::kWantedPart * bests >= all && all > 0;
+}
+
+/* Of the pixels of a vector; those of no block are not used. */
+CODEDEXPOSURE_INLINE void
+share_vector (const fuse::ShareRow &row, const std::uint8_t *kept, int blocks,
+    int x, float *const *shares)
+{
+  Floats sum = {};
+  for (int i = 0; i < row.models; i++)
+    if (kept[i * blocks])
+      sum += load_twice (row.preferences[i], x);
+  const Floats rest = (1.0f - load (row.weight + x)) / sum;
+  for (int i = 0; i < row.models; i++)
+    store (shares[i] + x, kept[i * blocks]
+                              ? load_twice (row.preferences[i], x) * rest
+                              : Floats{});
+}
+
+CODEDEXPOSURE_INLINE void
+share_block (const fuse::ShareRow &row, std::uint8_t *kept, int blocks,
+    int first, int end, float *const *shares)
+{
+  for (int i = 0; i < row.models; i++)
+    kept[i * blocks] = is_wanted (row, row.preferences[i], first, end);
+  for (int x = first; x < end; x += kFloats)
+    share_vector (row, kept, blocks, x, shares);
+}
+
+CODEDEXPOSURE_INLINE std::uint8_t
+share_rest (const fuse::ShareRow &row, int first, int end, float *share)
+{
+  int moving = 0;
+  for (int x = first; x < end; x++) {
+    share[x] = 1.0f - row.weight[x];
+    moving |= int (row.weight[x] < 1.0f);
+  }
+  return moving != 0;
+}
+
 inline void
-share (const fuse::ShareRow &row, float *__restrict base, float *const *shares)
+share (const fuse::ShareRow &row, float *__restrict base, float *const *shares,
+    std::uint8_t *kept)
 {
   const float *weight = row.weight, *light = row.light;
   const int count = row.count;
   for (int x = 0; x < count; x++)
     base[x] = weight[x] * light[x];
-  for (int i = 0; i < row.models; i++) {
-    float *__restrict to = shares[i];
-    for (int x = 0; x < count; x++)
-      to[x] = 1.0f - weight[x];
-    if (row.preferences) {
-      const float *preference = row.preferences[i];
-      for (int x = 0; x < count; x++)
-        to[x] *= preference[x];
-    }
+  const int blocks = (count + row.block - 1) / row.block;
+  for (int b = 0; b < blocks; b++) {
+    const int first = b * row.block;
+    const int end = count - first < row.block ? count : first + row.block;
+    if (row.preferences)
+      share_block (row, kept + b, blocks, first, end, shares);
+    else
+      kept[b] = share_rest (row, first, end, shares[0]);
   }
 }
 

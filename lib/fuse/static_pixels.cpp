@@ -28,11 +28,10 @@ constexpr float kStatic = 0.5f;
 StaticPixels::StaticPixels (
     int width, int height, int radius, bool average, float largest)
     : radius_ (radius), average_ (average), steps_ (65535.0f / largest),
-      last_ (width, height),
       rooms_ (1, {Field (width, 1, radius), BoxFilter (width, height, radius),
                      BoxFilter (width, height, radius)}),
-      unrepeated_ (width, height), weight_ (width, height),
-      unchanged_ (width, height)
+      unrepeated_ (std::max (width / 2, 1), std::max (height / 2, 1)),
+      weight_ (width, height), unchanged_ (width, height)
 {
   if (!average)
     return;
@@ -68,8 +67,9 @@ StaticPixels::compare_frames (const Kernels &kernels, const Field &now,
   for (int y = std::max (rows.first - radius_, 0); y < rows.end + radius_;
        y++) {
     if (y < height) {
-      kernels.compare ({now.row (y), other.row (y), noise.slope.row (y),
-                           noise.offset.row (y),
+      const int noise_row = y % noise.slope.height ();
+      kernels.compare ({now.row (y), other.row (y), noise.slope.row (noise_row),
+                           noise.offset.row (noise_row),
                            count ? count->row (y) : nullptr, kFloor, width},
           change);
       sums.extend (change);
@@ -80,18 +80,21 @@ StaticPixels::compare_frames (const Kernels &kernels, const Field &now,
     if (out >= rows.first)
       kernels.rate (
           {sums.result (kernels.sum, out), maxima.result (kernels.max, out),
-              unrepeated_.row (out), area, kMeanChange, kLargestChange, width},
+              unrepeated_.row (std::min (out / 2, unrepeated_.height () - 1)),
+              area, kMeanChange, kLargestChange, width},
           rating.row (out));
   }
 }
 
 void
-StaticPixels::set_errors (const Kernels &kernels, int y, const float *if_static,
-    const float *if_moving)
+StaticPixels::set_errors (const Kernels &kernels, int row, int area,
+    const float *if_static, const float *if_moving)
 {
-  const float floor = kFloor * float ((2 * radius_ + 1) * (2 * radius_ + 1));
-  kernels.fade_ratio (if_static, if_moving, floor, kRepetition,
-      weight_.width (), unrepeated_.row (y));
+  float *unrepeated = unrepeated_.row (row);
+  const int width = unrepeated_.width ();
+  kernels.fade_ratio (if_static, if_moving, kFloor * float (area), kRepetition,
+      width, unrepeated);
+  unrepeated[width] = unrepeated[width - 1];
 }
 
 std::uint16_t *
@@ -131,29 +134,27 @@ StaticPixels::average_row (int y, const float *now)
 void
 StaticPixels::compare (const Kernels &kernels, const Frames &frames, Rows rows)
 {
-  const auto &[coded, after, noise] = frames;
-  if (frames_ == 0) {
+  const auto &[coded, before, after, noise] = frames;
+  if (!before) {
     for (int y = rows.first; y < rows.end; y++)
       std::fill_n (weight_.row (y), coded.width (), 0.0f);
     return;
   }
-  const Field &other = average_ ? mean_ : last_;
+  const Field &other = average_ ? mean_ : *before;
   compare_frames (kernels, coded, other, average_ ? &count_ : nullptr, noise,
       rows, weight_);
   if (average_ && !compared_)
-    compare_frames (kernels, coded, last_, nullptr, noise, rows, unchanged_);
+    compare_frames (kernels, coded, *before, nullptr, noise, rows, unchanged_);
 }
 
 void
 StaticPixels::average (const Kernels &kernels, const Frames &frames, Rows rows)
 {
-  const auto &[coded, after, noise] = frames;
+  const auto &[coded, before, after, noise] = frames;
   const int width = coded.width ();
-  for (int y = rows.first; y < rows.end; y++) {
-    if (average_)
+  if (average_)
+    for (int y = rows.first; y < rows.end; y++)
       average_row (y, coded.row (y));
-    std::copy_n (coded.row (y), width, last_.row (y));
-  }
   if (!after)
     return;
   compare_frames (kernels, *after, coded, nullptr, noise, rows, unchanged_);

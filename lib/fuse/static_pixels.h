@@ -13,7 +13,7 @@ namespace codedexposure::fuse
 {
 
 /** Noise of every pixel of a frame: variance = slope * light + offset, in
- * units of the fields (255 for white). */
+ * units of the fields (255 for white). Rows repeat with the tile. */
 struct NoiseMap {
   Field slope, offset;
 };
@@ -48,10 +48,10 @@ public:
   /** Room for threads of number 0 .. @p count - 1. */
   void make_room (int count);
 
-  /** The next coded frame, and the frame after it or null. */
+  /** The next coded frame, and those before and after it or null. */
   struct Frames {
     const Field &coded;
-    const Field *after;
+    const Field *before, *after;
     const NoiseMap &noise;
   };
   /** Some rows, and the thread that computes them. */
@@ -61,11 +61,12 @@ public:
   };
   /* The frame is taken in these steps: each for all rows, the first one for a
    * row before the second one, which is for all rows before the third one. */
-  /** Prediction errors of row @p y, by which repetition is detected: sums of
-   * squared errors around each pixel, under the assumption that the scene is
-   * static and that every slot shows a different picture. */
-  void set_errors (const Kernels &kernels, int y, const float *if_static,
-      const float *if_moving);
+  /** Prediction errors of row @p row of blocks of 2x2 pixels, by which
+   * repetition is detected: sums of squared errors over @p area pixels around
+   * each block, if the scene is static and if every slot shows a different
+   * picture. */
+  void set_errors (const Kernels &kernels, int row, int area,
+      const float *if_static, const float *if_moving);
   void compare (const Kernels &kernels, const Frames &frames, Rows rows);
   /** After it, weight () and light () of these rows are those of the frame. */
   void average (const Kernels &kernels, const Frames &frames, Rows rows);
@@ -77,10 +78,10 @@ public:
 
   /** Weight of light (): 0, moving, to 1, static. */
   const float *weight (int y) const { return weight_.row (y); }
-  /** The picture of static pixels. */
-  const float *light (int y) const
+  /** The picture of static pixels of @p coded. */
+  const float *light (const Field &coded, int y) const
   {
-    return average_ ? light_.row (y) : last_.row (y);
+    return average_ ? light_.row (y) : coded.row (y);
   }
 
 private:
@@ -94,7 +95,6 @@ private:
   bool average_;
   float steps_;             ///< of past_, per grey level
   std::int64_t frames_ = 0; ///< since the last forget ()
-  Field last_;              ///< frame
   Field mean_;              ///< of the frames since the last change
   Field count_;             ///< of these frames
   Field light_; ///< the mean, or the last frame where that differs from it
@@ -104,7 +104,7 @@ private:
     BoxFilter sums, maxima;
   };
   std::vector<Room> rooms_; ///< one at least
-  Field unrepeated_;        ///< 1 where no repetition is detected
+  Field unrepeated_;        ///< of blocks: 1 where no repetition is detected
   Field weight_;
   Field unchanged_;       ///< from the last frame to the next: 1, none changed
   bool compared_ = false; ///< unchanged_ is of the next frame

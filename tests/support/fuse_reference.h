@@ -188,6 +188,63 @@ reference_filter_pairs_add (
       outputs[k][x] += share[x] * filtered_pairs (row, x, k);
 }
 
+inline float
+filtered_sparse (const SparseRow &row, int i)
+{
+  std::int64_t sum = 0;
+  for (int t = 0; t < row.pairs_count; t++) {
+    const auto [source, weights] = row.pairs[t];
+    for (const int shift : {0, 16})
+      sum += std::int64_t (std::int16_t (weights >> shift)) *
+             std::int16_t (row.sources[source][i] >> shift);
+  }
+  return row.scale * float (std::int32_t (sum)) + row.base;
+}
+
+/* Calls use (i) for all values of the runs. */
+template <typename Use>
+void
+each_value (const SparseRow &row, const Use &use)
+{
+  for (int r = 0; r < row.runs_count; r++)
+    for (int i = 0; i < row.runs[r].count; i++)
+      use (row.runs[r].first + i);
+}
+
+inline void
+reference_filter_sparse_squared (const SparseRow &row, float *to)
+{
+  each_value (row, [&] (int i) {
+    const float value = filtered_sparse (row, i);
+    to[i] += value * value;
+  });
+}
+
+inline void
+reference_filter_sparse_add (
+    const SparseRow &row, const float *share, float *to)
+{
+  each_value (
+      row, [&] (int i) { to[i] += share[i] * filtered_sparse (row, i); });
+}
+
+template <typename T>
+void
+reference_split (const Parts &parts, const T *from, T *to)
+{
+  for (int x = 0; x < parts.count; x++)
+    to[x % parts.period * parts.stride + x / parts.period] = from[x];
+}
+
+inline void
+reference_join (
+    const Parts &parts, const float *from, const float *add, float *to)
+{
+  for (int x = 0; x < parts.count; x++)
+    to[x] = (add ? add[x] : 0.0f) +
+            from[x % parts.period * parts.stride + x / parts.period];
+}
+
 inline void
 reference_sum (const float *const *rows, int rows_count, int count, float *to)
 {
@@ -213,7 +270,8 @@ reference_max (const float *const *rows, int rows_count, int count, float *to)
 inline float
 faded (float value, const Fade &fade)
 {
-  return std::clamp ((fade.all - value) / (fade.all - fade.none), 0.0f, 1.0f);
+  return std::clamp (
+      (fade.all - value) * (1.0f / (fade.all - fade.none)), 0.0f, 1.0f);
 }
 
 inline void
@@ -233,8 +291,8 @@ inline void
 reference_rate (const RateRow &row, float *to)
 {
   for (int x = 0; x < row.count; x++)
-    to[x] = faded (row.sum[x] / row.area, row.mean_fade) *
-            faded (row.max[x], row.max_fade) * row.unrepeated[x];
+    to[x] = faded (row.sum[x] * (1.0f / row.area), row.mean_fade) *
+            faded (row.max[x], row.max_fade) * row.unrepeated[x / 2];
 }
 
 inline void
@@ -249,32 +307,47 @@ inline void
 reference_prefer (const PreferRow &row, float *const *to)
 {
   for (int x = 0; x < row.count; x++) {
-    float best = 1e30f, sum = 0.0f;
+    float best = 1e30f;
     for (int i = 0; i < row.models; i++)
       best = std::min (best, row.errors[i][x] + row.floor);
     for (int i = 0; i < row.models; i++) {
       const float ratio = best / (row.errors[i][x] + row.floor);
       const float fourth = ratio * ratio * ratio * ratio;
-      to[i][x] = fourth * fourth;
-      if (to[i][x] < row.min_weight)
-        to[i][x] = 0.0f;
-      sum += to[i][x];
+      to[i][x] = std::max (fourth * fourth, row.min_weight);
     }
-    for (int i = 0; i < row.models; i++)
-      to[i][x] /= sum;
   }
 }
 
 inline void
-reference_share (const ShareRow &row, float *base, float *const *shares)
+reference_share (
+    const ShareRow &row, float *base, float *const *shares, std::uint8_t *kept)
 {
-  for (int x = 0; x < row.count; x++) {
-    base[x] = row.weight[x] * row.light[x];
+  const auto preference = [&] (int i, int x) {
+    return row.preferences ? row.preferences[i][x / 2] : 1.0f;
+  };
+  const int blocks = (row.count + row.block - 1) / row.block;
+  for (int b = 0; b < blocks; b++) {
+    const int end = std::min ((b + 1) * row.block, row.count);
     for (int i = 0; i < row.models; i++) {
-      shares[i][x] = 1.0f - row.weight[x];
-      if (row.preferences)
-        shares[i][x] *= row.preferences[i][x];
+      int best = 0, moving = 0;
+      for (int x = b * row.block; x < end; x++) {
+        moving += row.weight[x] < 1.0f;
+        best += row.weight[x] < 1.0f && preference (i, x) == 1.0f;
+      }
+      kept[i * blocks + b] = moving > 0 && best * kWantedPart >= moving;
     }
+  }
+  for (int x = 0; x < row.count; x++)
+    base[x] = row.weight[x] * row.light[x];
+  for (int x = 0; x < row.count; x++) {
+    float sum = 0.0f;
+    for (int i = 0; i < row.models; i++)
+      if (kept[i * blocks + x / row.block])
+        sum += preference (i, x);
+    const float rest = (1.0f - row.weight[x]) / sum;
+    for (int i = 0; i < row.models; i++)
+      shares[i][x] =
+          kept[i * blocks + x / row.block] ? preference (i, x) * rest : 0.0f;
   }
 }
 
@@ -335,10 +408,12 @@ reference_convolve (const ConvolveRow &row)
 }
 
 inline constexpr Kernels kReference{"reference", reference_filter,
-    reference_filter_pairs_squared, reference_filter_pairs_add, reference_sum,
-    reference_max, reference_compare, reference_rate, reference_fade_ratio,
-    reference_prefer, reference_share, reference_to_steps, reference_pair,
-    reference_to_pixels<std::uint8_t>, reference_to_pixels<std::uint16_t>,
-    reference_shrink, reference_convolve};
+    reference_filter_pairs_squared, reference_filter_pairs_add,
+    reference_filter_sparse_squared, reference_filter_sparse_add,
+    reference_split<std::int32_t>, reference_split<float>, reference_join,
+    reference_sum, reference_max, reference_compare, reference_rate,
+    reference_fade_ratio, reference_prefer, reference_share, reference_to_steps,
+    reference_pair, reference_to_pixels<std::uint8_t>,
+    reference_to_pixels<std::uint16_t>, reference_shrink, reference_convolve};
 
 } // namespace codedexposure::test

@@ -61,6 +61,30 @@ TEST (Kriging, GivesFiniteWeightsWithoutACholeskyFactor)
   }
 }
 
+/* The first two taps see the target almost alone; the third one, with its pair,
+ * adds little. */
+TEST (SparseKriging, TakesThePairsThatHelpMost)
+{
+  const KrigingSystem system{{1.0, 0.5, 0.1, 0.0, 0.0, 1.0, 0.1, 0.0, 0.0, 0.0,
+                                 1.0, 0.0, 0.0, 0.0, 0.0, 1.0},
+      {0.01, 0.01, 0.01, 0.01}, {}, {1.0, 1.0, 1.0, 1.0}};
+  const std::vector<double> target{0.8, 0.7, 0.15, 0.1};
+  const std::vector<TapPair> pairs{{0, 1}, {1, 2}, {2, 3}, {3, -1}};
+  const SparseKriging kriging (system, pairs);
+  const auto solved = [&] (double excess) {
+    return kriging.solve (target, 1.0, 1.0, excess);
+  };
+  KrigingSystem all = system, two{{1.0, 0.5, 0.0, 1.0}, {0.01, 0.01},
+                                  {0.8, 0.7}, {1.0, 1.0}, {1.0}};
+  all.targets = target;
+  all.flat_targets = {1.0};
+  const auto every = solve_kriging (all), best = solve_kriging (two);
+  for (std::size_t i = 0; i < 4; i++) {
+    EXPECT_NEAR (solved (0.0)[i], every[i], 1e-9) << i;
+    EXPECT_NEAR (solved (0.5)[i], i < 2 ? best[i] : 0.0, 1e-9) << i;
+  }
+}
+
 /* A one-hot code: pixels are points of the scene, each in its slot. */
 TEST (CodedCovariance, IsTheScenesForOneHotCodes)
 {

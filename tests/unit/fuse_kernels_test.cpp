@@ -126,6 +126,75 @@ TEST (FuseKernels, FiltersOfPairsEqualTheReference)
     }
 }
 
+TEST (FuseKernels, SparseFiltersEqualTheReference)
+{
+  const auto source = random_pairs (4096, 1, 0);
+  const auto weights = random_pairs (kOffsets.size (), 2, 4000);
+  const auto share = random_numbers (512, 3);
+  std::vector<const std::int32_t *> sources;
+  std::vector<fuse::SparsePair> pairs;
+  for (std::size_t t = 0; t < kOffsets.size (); t++) {
+    sources.push_back (source.data () + 1000 + kOffsets[t]);
+    pairs.push_back ({int (kOffsets.size () - 1 - t), weights[t]});
+  }
+  /* All that a vector holds sums of, and what is left of it. */
+  const std::vector<fuse::Run> runs{{0, 16}, {32, 15 * 16}, {288, 7 * 16}};
+  const fuse::SparseRow row{sources.data (), pairs.data (), int (pairs.size ()),
+      0.25f, 127.5f, runs.data (), int (runs.size ())};
+  for (const bool add : {false, true}) {
+    const auto filtered = [&] (const fuse::Kernels &kernels) {
+      auto to = random_numbers (512, 5);
+      if (add)
+        kernels.filter_sparse_add (row, share.data (), to.data ());
+      else
+        kernels.filter_sparse_squared (row, to.data ());
+      return to;
+    };
+    for (const fuse::Kernels &kernels : fuse::supported_kernels ()) {
+      SCOPED_TRACE (kernels.name);
+      EXPECT_EQ (filtered (kernels), filtered (kReference));
+    }
+  }
+}
+
+TEST (FuseKernels, PartsOfRowsEqualTheReference)
+{
+  constexpr std::ptrdiff_t kStride = 320;
+  const auto row = random_numbers (300, 1);
+  const auto pairs = random_pairs (300, 2, 0);
+  for (const int period : {1, 2, 4, 5, 8, 25})
+    for (const int count : {3, 64, 300}) {
+      SCOPED_TRACE (std::to_string (period) + ' ' + std::to_string (count));
+      const fuse::Parts parts{period, kStride, count};
+      const auto split = [&] (const fuse::Kernels &kernels) {
+        std::vector<float> to (std::size_t (kStride * period));
+        kernels.split (parts, row.data (), to.data ());
+        return to;
+      };
+      const auto split_pairs = [&] (const fuse::Kernels &kernels) {
+        std::vector<std::int32_t> to (std::size_t (kStride * period));
+        kernels.split_pairs (parts, pairs.data (), to.data ());
+        return to;
+      };
+      const auto joined = [&] (const fuse::Kernels &kernels, bool add) {
+        std::vector<float> to (300);
+        kernels.join (parts, split (kReference).data (),
+            add ? row.data () : nullptr, to.data ());
+        return to;
+      };
+      for (const fuse::Kernels &kernels : fuse::supported_kernels ()) {
+        SCOPED_TRACE (kernels.name);
+        EXPECT_EQ (split (kernels), split (kReference));
+        EXPECT_EQ (split_pairs (kernels), split_pairs (kReference));
+        for (const bool add : {false, true})
+          EXPECT_EQ (joined (kernels, add), joined (kReference, add));
+      }
+      const auto again = joined (kReference, false);
+      EXPECT_TRUE (
+          std::equal (again.begin (), again.begin () + count, row.begin ()));
+    }
+}
+
 TEST (FuseKernels, JoinedRowsEqualTheReference)
 {
   const auto numbers = random_numbers (4096, 4);
@@ -155,6 +224,36 @@ random_magnitudes (int seed)
   for (float &number : numbers)
     number = std::abs (number);
   return numbers;
+}
+
+/* Static pixels, and pixels that prefer one of three models: the first block
+ * has all of them, the second one only some. */
+void
+add_shares (const fuse::Kernels &kernels, const std::vector<float> &light,
+    std::vector<float> &all)
+{
+  constexpr int kBlock = 32, kModels = 3;
+  std::vector<std::vector<float>> preferences (
+      kModels, std::vector<float> (kCount + 16, 0.25f));
+  std::vector<float> weight (kCount + 16);
+  for (std::size_t x = 0; x < weight.size (); x++) {
+    preferences[x < 16 ? x % kModels : x % 2][x] = 1.0f;
+    weight[x] = x % 5 == 0 ? 1.0f : 0.01f * float (x % 7);
+  }
+  std::vector<float> base (kCount + 16);
+  std::vector<std::vector<float>> shares (kModels, base);
+  std::vector<std::uint8_t> kept (kModels * (kCount / kBlock + 1));
+  const float *const from[] = {
+      preferences[0].data (), preferences[1].data (), preferences[2].data ()};
+  float *const to[] = {shares[0].data (), shares[1].data (), shares[2].data ()};
+  for (const int models : {1, 2, 3}) {
+    kernels.share ({weight.data (), light.data (), models > 1 ? from : nullptr,
+                       models, kBlock, kCount},
+        base.data (), to, kept.data ());
+    all.insert (all.end (), kept.begin (), kept.end ());
+    for (const auto &row : {base, shares[0], shares[1], shares[2]})
+      all.insert (all.end (), row.begin (), row.begin () + kCount);
+  }
 }
 
 /* All rows of light to @count values each, one after the other. */
@@ -191,14 +290,7 @@ rated (const fuse::Kernels &kernels)
     for (const auto &row : {to, more, third})
       add (row);
   }
-  float *const shares[] = {more.data (), third.data ()};
-  for (const int models : {1, 2}) {
-    kernels.share ({offset.data (), light.data (), models > 1 ? rows : nullptr,
-                       models, kCount},
-        to.data (), shares);
-    for (const auto &row : {to, more, third})
-      add (row);
-  }
+  add_shares (kernels, light, all);
   return all;
 }
 

@@ -206,6 +206,14 @@ find_plugin ()
     GST_PLUGIN_PATH_1_0="$libs${GST_PLUGIN_PATH_1_0:+:$GST_PLUGIN_PATH_1_0}"
 }
 
+# need_program PROGRAM [PACKAGE]: ends with the remedy if PROGRAM was not built,
+# for which PACKAGE may be missing.
+need_program ()
+{
+  [ -x "$1" ] || die "$(basename "$1") was not built;" \
+    "${2:+install $2 and }run meson compile -C build"
+}
+
 # run COMMAND...: the signals that end this script end COMMAND, which finishes
 # its files. They arrive as SIGTERM, since a terminal sends its own to both.
 run ()

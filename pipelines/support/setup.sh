@@ -5,7 +5,9 @@
 #
 #   install_packages PURPOSE     Debian packages for one of these: run, report,
 #                                tests (with both), rivals, package, check
-#   build_tree DIR OPTION...     meson setup and compile
+#   configure_tree DIR OPTION... meson setup
+#   compile_tree DIR TARGET...   these, or all
+#   build_tree DIR OPTION...     both, all
 #   sample_video                 in sample.sh
 #
 # Nothing here asks the network for what is already there.
@@ -177,8 +179,8 @@ apt_get ()
   fi
 }
 
-# Configures a build folder, or changes the options of one, and builds it.
-build_tree ()
+# Configures a build folder, or changes the options of one.
+configure_tree ()
 {
   local dir=$1
   shift
@@ -192,6 +194,16 @@ build_tree ()
   elif [ $# -gt 0 ]; then
     meson configure "$dir" "$@" >/dev/null
   fi
-  note "building $dir"
-  meson compile -C "$dir" || give_up "the build failed"
+}
+
+compile_tree ()
+{
+  meson compile -C "$@" || give_up "the build failed"
+}
+
+build_tree ()
+{
+  configure_tree "$@"
+  note "building $1"
+  compile_tree "$1"
 }

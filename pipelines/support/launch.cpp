@@ -22,6 +22,7 @@
 #include "notes.h"
 #include "plain_text.h"
 #include "player.h"
+#include "recording_branch.h"
 #include "screen.h"
 #include "whole_picture.h"
 #include "window.h"
@@ -82,6 +83,7 @@ private:
   bool connect_counter ();
   void add_window ();
   void add_notes ();
+  void add_recording ();
   bool finish_notes ();
   gint64 frames () const { return counter_ ? counter_->frames ().load () : 0; }
   void watch_leaky_queues ();
@@ -117,6 +119,7 @@ private:
   std::unique_ptr<ByteWatch> byte_watch_;
   ObjectPtr<GstElement> buffer_;
   std::unique_ptr<BufferWatch> buffer_watch_;
+  std::unique_ptr<RecordingBranch> recording_; // beside a window
   std::unique_ptr<FrameLimit> limit_;
   std::unique_ptr<ExcerptFilter> excerpt_;
   std::unique_ptr<NoteWriter> note_writer_;
@@ -213,6 +216,21 @@ Launch::add_window ()
       Window::Calls{[this] { on_signal (1); }, said});
 }
 
+/* A queue that is not leaky blocks its source. */
+void
+Launch::add_recording ()
+{
+  gint leaky = 0;
+  buffer_ = find ("buffer");
+  if (buffer_ && options_.live)
+    buffer_watch_ = std::make_unique<BufferWatch> (buffer_.get ());
+  if (buffer_)
+    g_object_get (buffer_.get (), "leaky", &leaky, nullptr);
+  if (window_ && leaky != 0)
+    recording_ =
+        std::make_unique<RecordingBranch> (pipeline_.get (), buffer_.get ());
+}
+
 void
 Launch::watch_leaky_queues ()
 {
@@ -286,9 +304,7 @@ Launch::run ()
     make_texts_plain (texts.get ());
     keep_times_of_file (demuxer.get ());
   }
-  buffer_ = find ("buffer");
-  if (buffer_ && options_.live)
-    buffer_watch_ = std::make_unique<BufferWatch> (buffer_.get ());
+  add_recording ();
   if (const ObjectPtr<GstElement> limit = find ("limit"))
     limit_ = std::make_unique<FrameLimit> (limit.get ());
   const guint ticks = g_timeout_add (200, on_tick, this);
@@ -343,6 +359,8 @@ Launch::finish (int code)
     result = format ("%" G_GINT64_FORMAT " coded frames", frames ()) + flaws +
              (wrote.empty () ? "" : "; ");
   status_.line (result + (wrote.empty () ? "" : "wrote " + wrote));
+  if (recording_ && recording_->is_removed ())
+    return kFailed;
   return damaged_ ? kDamaged : kDone;
 }
 
@@ -428,6 +446,9 @@ Launch::end_after_error (GstObject *failed)
 void
 Launch::on_error (GstMessage *message)
 {
+  if (recording_ && recording_->is_removed () &&
+      recording_->has (GST_MESSAGE_SRC (message)))
+    return; // it follows from the first
   GError *error = nullptr;
   gchar *detail = nullptr;
   gst_message_parse_error (message, &error, &detail);
@@ -465,6 +486,11 @@ Launch::on_error (GstMessage *message)
   const std::string remedy = remedy_for (kind, error, detail);
   if (!remedy.empty ())
     status_.line (remedy);
+  if (recording_ && recording_->has (source)) {
+    status_.line ("the recording ends here; the window goes on");
+    recording_->remove ();
+    return;
+  }
   end_after_error (source);
 }
 
@@ -568,7 +594,8 @@ Launch::tick ()
       std::chrono::duration<double> (Clock::now () - began_).count ();
   const gint64 frames = this->frames ();
   watch_for_silence (frames);
-  if (buffer_watch_ && !interrupted_ && !failed_)
+  if (buffer_watch_ && !interrupted_ && !failed_ &&
+      !(recording_ && recording_->is_removed ()))
     if (const std::string text = buffer_watch_->tick (); !text.empty ())
       status_.line (text);
   if (!counter_ || frames == 0)

@@ -13,11 +13,18 @@ namespace
 {
 
 constexpr int kBorder = kBlock;
-constexpr int kIterations = 40;
+constexpr int kIterations = 28;
+/* An iteration goes this many times as far as from an estimate to the mean of
+ * its shrunk blocks, so that fewer are needed. */
+constexpr float kStep = 1.6f;
+/* The thresholds' logarithm falls with this power of the iteration. */
+constexpr double kSlowing = 1.2;
 /* Thresholds of the first and the last iteration, in grey levels; with noise,
  * the last one is kNoiseThreshold standard deviations at least. */
 constexpr double kFirstThreshold = 30.0, kLastThreshold = 2.0;
 constexpr double kNoiseThreshold = 1.8;
+/* No slot. */
+constexpr std::uint8_t kNotMeasured = 255;
 /* Rows of blocks that are shrunk, and rows of pixels that are updated, at a
  * time. Strips of blocks overlap the next ones only. */
 constexpr int kStripBlocks = 6;
@@ -44,14 +51,21 @@ CollaborativeFilter::CollaborativeFilter (const Schedule &schedule,
   const auto area = std::size_t (stride_) * std::size_t (height + 2 * kBorder);
   const auto slots = std::size_t (observation.slots ());
   elements_.resize (area);
+  measured_.resize (area);
   coded_.resize (area);
   weight_.resize (area);
   light_.assign (slots, std::vector<float> (area));
   sum_ = light_;
   for (int y = -kBorder; y < height + kBorder; y++)
-    for (int x = -kBorder; x < int (stride_) - kBorder; x++)
-      elements_[place (x, y)] = std::uint8_t (
-          schedule.element_at (mirrored (x, width), mirrored (y, height)));
+    for (int x = -kBorder; x < int (stride_) - kBorder; x++) {
+      const int element =
+          schedule.element_at (mirrored (x, width), mirrored (y, height));
+      elements_[place (x, y)] = std::uint8_t (element);
+      measured_[place (x, y)] =
+          observation.exact ()
+              ? std::uint8_t (observation.shares (element)[0].slot)
+              : kNotMeasured;
+    }
 }
 
 std::size_t
@@ -123,26 +137,36 @@ CollaborativeFilter::shrink (
   const int height = height_ + 2 * kBorder;
   return workers.run ((height + kStripRows - 1) / kStripRows,
       [&] (int part, int) {
-        update_rows (
-            part * kStripRows, std::min (height, (part + 1) * kStripRows));
+        update_rows (step.kernels, part * kStripRows,
+            std::min (height, (part + 1) * kStripRows));
       },
       stop);
 }
 
-/* The light of rows @first .. @end - 1 from the sums, which are cleared, and
- * then corrected so that it gives the coded pixels that were measured. */
+/* The light of rows @first .. @end - 1 from the sums, which are cleared, such
+ * that it gives the coded pixels that were measured. */
 void
-CollaborativeFilter::update_rows (int first, int end)
+CollaborativeFilter::update_rows (const Kernels &kernels, int first, int end)
+{
+  std::vector<float *> light, sum;
+  for (std::size_t s = 0; s < light_.size (); s++) {
+    light.push_back (light_[s].data () + first * stride_);
+    sum.push_back (sum_[s].data () + first * stride_);
+  }
+  const auto at = first * stride_;
+  kernels.settle ({light.data (), sum.data (), weight_.data () + at,
+      coded_.data () + at, measured_.data () + at, int (light_.size ()),
+      int ((end - first) * stride_), kStep});
+  if (!observation_.exact ())
+    correct_rows (first, end);
+}
+
+/* Coded pixels that several slots share. */
+void
+CollaborativeFilter::correct_rows (int first, int end)
 {
   const auto from = std::size_t (first * stride_);
   const auto to = std::size_t (end * stride_);
-  for (std::size_t s = 0; s < light_.size (); s++) {
-    float *light = light_[s].data (), *sum = sum_[s].data ();
-    for (std::size_t i = from; i < to; i++)
-      light[i] = weight_[i] > 0.0f ? sum[i] / weight_[i] : light[i];
-    std::fill (sum + from, sum + to, 0.0f);
-  }
-  std::fill (weight_.data () + from, weight_.data () + to, 0.0f);
   for (std::size_t i = from; i < to; i++) {
     const auto &shares = observation_.shares (elements_[i]);
     double seen = 0.0, power = 0.0;
@@ -175,7 +199,8 @@ CollaborativeFilter::run (const Kernels &kernels, const Field &coded,
   const double first = std::max (kFirstThreshold, 2.0 * last);
   for (int i = 0; i < kIterations; i++) {
     const double threshold =
-        first * std::pow (last / first, double (i) / (kIterations - 1));
+        first * std::pow (last / first,
+                    std::pow (double (i) / (kIterations - 1), kSlowing));
     if (!shrink ({kernels, (i / 2 + 2 * i) % kBlockStep, i % kBlockStep,
                      float (threshold)},
             workers, stop))

@@ -41,13 +41,15 @@ private:
   struct Step;
   bool shrink (const Step &step, Workers &workers, std::stop_token stop);
   void shrink_strip (const Step &step, int strip, float *scratch);
-  void update_rows (int first, int end);
+  void update_rows (const Kernels &kernels, int first, int end);
+  void correct_rows (int first, int end);
 
   const Observation &observation_;
   int width_, height_;
   std::ptrdiff_t split_, stride_;
   std::vector<float> transform_;
   std::vector<std::uint8_t> elements_; ///< at every place
+  std::vector<std::uint8_t> measured_; ///< slots of coded pixels that see one
   std::vector<float> coded_;
   std::vector<std::vector<float>> light_, sum_; ///< of each slot
   std::vector<float> weight_;

@@ -114,10 +114,23 @@ struct ShrinkRow {
   std::ptrdiff_t split;
   int shift; ///< of the blocks to the right, 0 .. kBlockStep - 1
   int slots;
-  const float *slot_transform; ///< orthonormal, slots x slots
+  const float *slot_transform; ///< dct_matrix () of the slots
   int blocks;                  ///< a multiple of 16
   float threshold;
   float *scratch; ///< slots * kBlock^2 * 16 floats
+};
+
+/** Light of slots after shrinking: of each slot, light + step * (sum / weight -
+ * light) where there is a weight, but the coded light where it is measured. */
+struct SettleRow {
+  float *const *light; ///< of each slot
+  float *const *sum;   ///< likewise; set to 0, as is weight
+  float *weight;
+  const float *coded;
+  const std::uint8_t *measured; ///< slot, or a larger number
+  int slots;
+  int count; ///< a multiple of 16
+  float step;
 };
 
 /** 1 up to @p none, 0 from @p all on, linear between them. */
@@ -249,6 +262,7 @@ struct Kernels {
    * all coefficients below the threshold but the mean to 0, transforms back,
    * and adds the block weighted with 1 / number of coefficients kept. */
   void (*shrink) (const ShrinkRow &row);
+  void (*settle) (const SettleRow &row);
   void (*convolve) (const ConvolveRow &row);
 };
 

@@ -14,6 +14,6 @@ const fuse::Kernels kernels = {CODEDEXPOSURE_TARGET_NAME, filter,
     filter_pairs_squared, filter_pairs_add, filter_sparse_squared,
     filter_sparse_add, split_pairs, split, join, sum, max, compare, rate,
     fade_ratio, prefer, share, to_steps, pair, to_bytes, to_words, shrink,
-    convolve};
+    settle, convolve};
 
 } // namespace codedexposure::CODEDEXPOSURE_TARGET

@@ -11,52 +11,70 @@ namespace codedexposure::CODEDEXPOSURE_TARGET
 
 constexpr int kArea = fuse::kBlock * fuse::kBlock;
 
-/* Orthonormal DCT-II of 12 values. The even half of the output needs only sums,
- * the odd half only differences. */
+/* Orthonormal DCT-II of 12 values. Even frequencies need only sums of the first
+ * value and the last one and so on, odd ones only differences; among the even
+ * ones it is so again. Of the rest, frequencies 3 and 9 have two factors. */
 CODEDEXPOSURE_INLINE void
-dct (Floats *values)
+dct (Floats *x)
 {
   constexpr int kHalf = fuse::kBlock / 2;
-  Floats sum[kHalf], difference[kHalf];
+  const auto &f = fuse::kDct.at;
+  Floats s[kHalf], d[kHalf];
 #pragma GCC unroll 6
   for (int i = 0; i < kHalf; i++) {
-    const Floats a = values[i], b = values[fuse::kBlock - 1 - i];
-    sum[i] = a + b;
-    difference[i] = a - b;
+    s[i] = x[i] + x[fuse::kBlock - 1 - i];
+    d[i] = x[i] - x[fuse::kBlock - 1 - i];
   }
-#pragma GCC unroll 6
-  for (int k = 0; k < kHalf; k++) {
-    Floats even = {}, odd = {};
-#pragma GCC unroll 6
-    for (int i = 0; i < kHalf; i++) {
-      even += fuse::kDct.at[2 * k][i] * sum[i];
-      odd += fuse::kDct.at[2 * k + 1][i] * difference[i];
-    }
-    values[2 * k] = even;
-    values[2 * k + 1] = odd;
+  const Floats p0 = s[0] + s[5], p1 = s[1] + s[4], p2 = s[2] + s[3];
+  const Floats q0 = s[0] - s[5], q1 = s[1] - s[4], q2 = s[2] - s[3];
+  const Floats ends = p0 + p2, middle = f[2][1] * q1;
+  x[0] = f[0][0] * (ends + p1);
+  x[4] = f[4][0] * (p0 - p2);
+  x[8] = f[8][0] * ends + f[8][1] * p1;
+  x[2] = f[2][0] * q0 + f[2][2] * q2 + middle;
+  x[6] = f[6][0] * (q0 - q1 - q2);
+  x[10] = f[2][2] * q0 + f[2][0] * q2 - middle;
+  const Floats u = d[0] - d[3] - d[4], v = d[1] - d[2] - d[5];
+  x[3] = f[3][0] * u + f[3][1] * v;
+  x[9] = f[9][0] * u + f[9][1] * v;
+#pragma GCC unroll 4
+  for (const int k : {1, 5, 7, 11}) {
+    Floats sum = f[k][0] * d[0];
+#pragma GCC unroll 5
+    for (int i = 1; i < kHalf; i++)
+      sum += f[k][i] * d[i];
+    x[k] = sum;
   }
 }
 
 /* The inverse of dct (). */
 CODEDEXPOSURE_INLINE void
-undo_dct (Floats *values)
+undo_dct (Floats *x)
 {
   constexpr int kHalf = fuse::kBlock / 2;
-  Floats in[fuse::kBlock];
-#pragma GCC unroll 12
-  for (int k = 0; k < fuse::kBlock; k++)
-    in[k] = values[k];
+  const auto &f = fuse::kDct.at;
+  const Floats mean = f[0][0] * x[0], fourth = f[4][0] * x[4];
+  const Floats ends = mean + f[8][0] * x[8], sixth = f[6][0] * x[6];
+  const Floats p[] = {ends + fourth, mean + f[8][1] * x[8], ends - fourth};
+  const Floats q[] = {f[2][0] * x[2] + f[2][2] * x[10] + sixth,
+      f[2][1] * (x[2] - x[10]) - sixth,
+      f[2][2] * x[2] + f[2][0] * x[10] - sixth};
+  const Floats u = f[3][0] * x[3] + f[9][0] * x[9];
+  const Floats v = f[3][1] * x[3] + f[9][1] * x[9];
+  const Floats few[] = {u, v, -v, -u, -u, -v};
+  Floats out[fuse::kBlock];
 #pragma GCC unroll 6
   for (int i = 0; i < kHalf; i++) {
-    Floats even = {}, odd = {};
-#pragma GCC unroll 6
-    for (int k = 0; k < kHalf; k++) {
-      even += fuse::kDct.at[2 * k][i] * in[2 * k];
-      odd += fuse::kDct.at[2 * k + 1][i] * in[2 * k + 1];
-    }
-    values[i] = even + odd;
-    values[fuse::kBlock - 1 - i] = even - odd;
+    const int near = i < 3 ? i : kHalf - 1 - i;
+    const Floats even = i < 3 ? p[near] + q[near] : p[near] - q[near];
+    const Floats odd = f[1][i] * x[1] + f[5][i] * x[5] + f[7][i] * x[7] +
+                       f[11][i] * x[11] + few[i];
+    out[i] = even + odd;
+    out[fuse::kBlock - 1 - i] = even - odd;
   }
+#pragma GCC unroll 12
+  for (int i = 0; i < fuse::kBlock; i++)
+    x[i] = out[i];
 }
 
 /* 12 values, @p step apart. */
@@ -75,23 +93,45 @@ store_line (float *to, std::ptrdiff_t step, const Floats *values)
     store (to + i * step, values[i]);
 }
 
-/* out (k) = sum over s of the transform's [k][s], or [s][k], times in (s).
- * Slots: their number if it is known at compile time, else 0. */
-template <bool Back, int Slots, typename In, typename Out>
+/* The cosine transform of slots: out (k) = sum over s of [k][s] * in (s), by
+ * the sums and differences of the first slot and the last one and so on. Slots:
+ * their number if it is known at compile time, else 0. */
+template <int Slots, typename In, typename Out>
 CODEDEXPOSURE_INLINE void
 transform_slots (const fuse::ShrinkRow &row, In in, Out out)
 {
-  constexpr int kMaxSlots = Slots ? Slots : 16;
-  const int slots = Slots ? Slots : row.slots;
-  Floats values[kMaxSlots];
-  for (int s = 0; s < slots; s++)
-    values[s] = in (s);
+  const int slots = Slots ? Slots : row.slots, half = slots / 2;
+  Floats sum[(Slots ? Slots : 16) / 2], difference[(Slots ? Slots : 16) / 2];
+  for (int s = 0; s < half; s++) {
+    const Floats a = in (s), b = in (slots - 1 - s);
+    sum[s] = a + b;
+    difference[s] = a - b;
+  }
   for (int k = 0; k < slots; k++) {
-    Floats sum = {};
-    for (int s = 0; s < slots; s++)
-      sum +=
-          row.slot_transform[Back ? s * slots + k : k * slots + s] * values[s];
-    out (k, sum);
+    const float *factors = row.slot_transform + k * slots;
+    Floats value = slots % 2 ? factors[half] * in (half) : Floats{};
+    for (int s = 0; s < half; s++)
+      value += factors[s] * (k % 2 ? difference[s] : sum[s]);
+    out (k, value);
+  }
+}
+
+/* Its inverse. */
+template <int Slots, typename In, typename Out>
+CODEDEXPOSURE_INLINE void
+undo_transform_slots (const fuse::ShrinkRow &row, In in, Out out)
+{
+  const int slots = Slots ? Slots : row.slots;
+  Floats values[Slots ? Slots : 16];
+  for (int k = 0; k < slots; k++)
+    values[k] = in (k);
+  for (int s = 0; s < (slots + 1) / 2; s++) {
+    Floats even = {}, odd = {};
+    for (int k = 0; k < slots; k++)
+      (k % 2 ? odd : even) += row.slot_transform[k * slots + s] * values[k];
+    out (s, even + odd);
+    if (s != slots - 1 - s)
+      out (slots - 1 - s, even - odd);
   }
 }
 
@@ -151,7 +191,7 @@ shrink_vector (const fuse::ShrinkRow &row, int first)
     for (int x = 0; x < fuse::kBlock; x++) {
       const std::ptrdiff_t at = y * row.stride + column (row, x) + first;
       float *to = block + y * kRow + x * kFloats;
-      transform_slots<false, Slots> (
+      transform_slots<Slots> (
           row,
           [&] (int s)
               CODEDEXPOSURE_INLINE_BODY { return load (row.source[s] + at); },
@@ -170,7 +210,7 @@ shrink_vector (const fuse::ShrinkRow &row, int first)
     for (int x = 0; x < fuse::kBlock; x++) {
       const std::ptrdiff_t at = y * row.stride + column (row, x) + first;
       const float *from = block + y * kRow + x * kFloats;
-      transform_slots<true, Slots> (
+      undo_transform_slots<Slots> (
           row,
           [&] (int k)
               CODEDEXPOSURE_INLINE_BODY { return load (from + k * kPlane); },
@@ -203,6 +243,36 @@ shrink (const fuse::ShrinkRow &row)
     shrink_all<8> (row);
   else
     shrink_all<0> (row);
+}
+
+/* Bytes as whole numbers. */
+CODEDEXPOSURE_INLINE Ints
+load_bytes (const std::uint8_t *from)
+{
+  typedef std::uint8_t Bytes __attribute__ ((vector_size (kFloats)));
+  Bytes bytes;
+  __builtin_memcpy (&bytes, from, kFloats);
+  return __builtin_convertvector(bytes, Ints);
+}
+
+inline void
+settle (const fuse::SettleRow &row)
+{
+  for (int x = 0; x < row.count; x += kFloats) {
+    const Floats weight = load (row.weight + x);
+    const Floats inverse = 1.0f / weight;
+    const Floats coded = load (row.coded + x);
+    const Ints measured = load_bytes (row.measured + x);
+    for (int s = 0; s < row.slots; s++) {
+      const Floats light = load (row.light[s] + x);
+      const Floats mean =
+          light + row.step * (load (row.sum[s] + x) * inverse - light);
+      const Floats settled = weight > 0.0f ? mean : light;
+      store (row.light[s] + x, measured == s ? coded : settled);
+      store (row.sum[s] + x, Floats{});
+    }
+    store (row.weight + x, Floats{});
+  }
 }
 
 } // namespace codedexposure::CODEDEXPOSURE_TARGET

@@ -29,16 +29,32 @@ inline void
 dct (float *values, int step)
 {
   constexpr int kHalf = kBlock / 2;
+  const auto &f = kDct.at;
   float sum[kHalf], difference[kHalf];
   for (int i = 0; i < kHalf; i++) {
     const float a = values[i * step], b = values[(kBlock - 1 - i) * step];
     sum[i] = a + b;
     difference[i] = a - b;
   }
+  float p[3], q[3];
+  for (int i = 0; i < 3; i++) {
+    p[i] = sum[i] + sum[kHalf - 1 - i];
+    q[i] = sum[i] - sum[kHalf - 1 - i];
+  }
+  const float u = difference[0] - difference[3] - difference[4];
+  const float v = difference[1] - difference[2] - difference[5];
+  const float middle = f[2][1] * q[1];
+  const float few[kBlock] = {f[0][0] * (p[0] + p[2] + p[1]), 0.0f,
+      f[2][0] * q[0] + f[2][2] * q[2] + middle, f[3][0] * u + f[3][1] * v,
+      f[4][0] * (p[0] - p[2]), 0.0f, f[6][0] * (q[0] - q[1] - q[2]), 0.0f,
+      f[8][0] * (p[0] + p[2]) + f[8][1] * p[1], f[9][0] * u + f[9][1] * v,
+      f[2][2] * q[0] + f[2][0] * q[2] - middle, 0.0f};
   for (int k = 0; k < kBlock; k++) {
-    float value = 0.0f;
-    for (int i = 0; i < kHalf; i++)
-      value += kDct.at[k][i] * (k % 2 ? difference[i] : sum[i]);
+    float value = few[k];
+    if (k == 1 || k == 5 || k == 7 || k == 11)
+      for (int i = 0; i < kHalf; i++)
+        value =
+            i == 0 ? f[k][i] * difference[i] : value + f[k][i] * difference[i];
     values[k * step] = value;
   }
 }
@@ -47,13 +63,25 @@ inline void
 undo_dct (float *values, int step)
 {
   constexpr int kHalf = kBlock / 2;
+  const auto &f = kDct.at;
+  const auto in = [&] (int k) { return values[k * step]; };
+  const float ends = f[0][0] * in (0) + f[8][0] * in (8);
+  const float fourth = f[4][0] * in (4), sixth = f[6][0] * in (6);
+  const float p[] = {
+      ends + fourth, f[0][0] * in (0) + f[8][1] * in (8), ends - fourth};
+  const float q[] = {f[2][0] * in (2) + f[2][2] * in (10) + sixth,
+      f[2][1] * (in (2) - in (10)) - sixth,
+      f[2][2] * in (2) + f[2][0] * in (10) - sixth};
+  const float u = f[3][0] * in (3) + f[9][0] * in (9);
+  const float v = f[3][1] * in (3) + f[9][1] * in (9);
+  const float few[] = {u, v, -v, -u, -u, -v};
   float out[kBlock];
   for (int i = 0; i < kHalf; i++) {
-    float part[2] = {};
-    for (int k = 0; k < kBlock; k++)
-      part[k % 2] += kDct.at[k][i] * values[k * step];
-    out[i] = part[0] + part[1];
-    out[kBlock - 1 - i] = part[0] - part[1];
+    const float even = i < 3 ? p[i] + q[i] : p[5 - i] - q[5 - i];
+    const float odd = f[1][i] * in (1) + f[5][i] * in (5) + f[7][i] * in (7) +
+                      f[11][i] * in (11) + few[i];
+    out[i] = even + odd;
+    out[kBlock - 1 - i] = even - odd;
   }
   for (int i = 0; i < kBlock; i++)
     values[i * step] = out[i];
@@ -75,18 +103,36 @@ public:
     return y * row_.stride + (column % kBlockStep) * row_.split +
            column / kBlockStep + lane_;
   }
-  void transform_slots (int y, int x, bool back)
+  float factor (int k, int s) const
   {
+    return row_.slot_transform[k * row_.slots + s];
+  }
+  void transform_slots (int y, int x)
+  {
+    const int slots = row_.slots, half = slots / 2;
     float in[16] = {};
-    for (int s = 0; s < row_.slots; s++)
+    for (int s = 0; s < slots; s++)
       in[s] = at (s, y, x);
-    for (int k = 0; k < row_.slots; k++) {
-      float sum = 0.0f;
-      for (int s = 0; s < row_.slots; s++)
-        sum += row_.slot_transform[back ? s * row_.slots + k
-                                        : k * row_.slots + s] *
-               in[s];
+    for (int k = 0; k < slots; k++) {
+      float sum = slots % 2 ? factor (k, half) * in[half] : 0.0f;
+      for (int s = 0; s < half; s++)
+        sum += factor (k, s) *
+               (k % 2 ? in[s] - in[slots - 1 - s] : in[s] + in[slots - 1 - s]);
       at (k, y, x) = sum;
+    }
+  }
+  void undo_transform_slots (int y, int x)
+  {
+    const int slots = row_.slots;
+    float in[16] = {};
+    for (int k = 0; k < slots; k++)
+      in[k] = at (k, y, x);
+    for (int s = 0; s < (slots + 1) / 2; s++) {
+      float part[2] = {};
+      for (int k = 0; k < slots; k++)
+        part[k % 2] += factor (k, s) * in[k];
+      at (slots - 1 - s, y, x) = part[0] - part[1];
+      at (s, y, x) = part[0] + part[1];
     }
   }
   /* Slots first. */
@@ -96,7 +142,7 @@ public:
       for (int x = 0; x < kBlock; x++) {
         for (int s = 0; s < row_.slots; s++)
           at (s, y, x) = row_.source[s][place (y, x)];
-        transform_slots (y, x, false);
+        transform_slots (y, x);
       }
     }
     for (int k = 0; k < row_.slots; k++) {
@@ -132,7 +178,7 @@ public:
     }
     for (int y = 0; y < kBlock; y++) {
       for (int x = 0; x < kBlock; x++) {
-        transform_slots (y, x, true);
+        undo_transform_slots (y, x);
         for (int s = 0; s < row_.slots; s++)
           row_.sum[s][place (y, x)] += weight * at (s, y, x);
         row_.weight[place (y, x)] += weight;
@@ -407,6 +453,23 @@ reference_convolve (const ConvolveRow &row)
   }
 }
 
+inline void
+reference_settle (const SettleRow &row)
+{
+  for (int x = 0; x < row.count; x++) {
+    const float inverse = 1.0f / row.weight[x];
+    for (int s = 0; s < row.slots; s++) {
+      float &light = row.light[s][x];
+      if (row.weight[x] > 0.0f)
+        light += row.step * (row.sum[s][x] * inverse - light);
+      if (row.measured[x] == s)
+        light = row.coded[x];
+      row.sum[s][x] = 0.0f;
+    }
+    row.weight[x] = 0.0f;
+  }
+}
+
 inline constexpr Kernels kReference{"reference", reference_filter,
     reference_filter_pairs_squared, reference_filter_pairs_add,
     reference_filter_sparse_squared, reference_filter_sparse_add,
@@ -414,6 +477,7 @@ inline constexpr Kernels kReference{"reference", reference_filter,
     reference_sum, reference_max, reference_compare, reference_rate,
     reference_fade_ratio, reference_prefer, reference_share, reference_to_steps,
     reference_pair, reference_to_pixels<std::uint8_t>,
-    reference_to_pixels<std::uint16_t>, reference_shrink, reference_convolve};
+    reference_to_pixels<std::uint16_t>, reference_shrink, reference_settle,
+    reference_convolve};
 
 } // namespace codedexposure::test

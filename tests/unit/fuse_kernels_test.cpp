@@ -356,6 +356,58 @@ TEST (FuseKernels, ShrinkingEqualsTheReference)
   }
 }
 
+/* By the definition of the transform. */
+TEST (FuseKernels, TheReferenceIsACosineTransform)
+{
+  constexpr int kSize = fuse::kBlock;
+  const auto numbers = random_numbers (kSize, 1);
+  const auto matrix = fuse::dct_matrix (kSize);
+  std::vector<float> transformed (numbers.begin (), numbers.begin () + kSize);
+  test::dct (transformed.data (), 1);
+  for (int k = 0; k < kSize; k++) {
+    double expected = 0.0;
+    for (int i = 0; i < kSize; i++)
+      expected += double (matrix[std::size_t (k * kSize + i)]) *
+                  double (numbers[std::size_t (i)]);
+    EXPECT_NEAR (transformed[std::size_t (k)], expected, 1e-3) << k;
+  }
+  test::undo_dct (transformed.data (), 1);
+  for (std::size_t i = 0; i < kSize; i++)
+    EXPECT_NEAR (transformed[i], numbers[i], 1e-3) << i;
+}
+
+/* Light, sums and weights afterwards. */
+std::vector<float>
+settled (const fuse::Kernels &kernels)
+{
+  constexpr int kSlots = 3, kPixels = 64;
+  auto light = random_numbers (kSlots * kPixels, 1);
+  auto sum = random_numbers (kSlots * kPixels, 2);
+  auto weight = random_numbers (kPixels, 3);
+  const auto coded = random_numbers (kPixels, 4);
+  std::vector<std::uint8_t> measured;
+  for (std::size_t x = 0; x < kPixels; x++) {
+    measured.push_back (x % 5 < kSlots ? std::uint8_t (x % 5) : 255);
+    weight[x] = x % 7 == 0 ? 0.0f : std::abs (weight[x]);
+  }
+  std::vector<float *> lights, sums;
+  for (int s = 0; s < kSlots; s++) {
+    lights.push_back (light.data () + s * kPixels);
+    sums.push_back (sum.data () + s * kPixels);
+  }
+  kernels.settle ({lights.data (), sums.data (), weight.data (), coded.data (),
+      measured.data (), kSlots, kPixels, 1.5f});
+  light.insert (light.end (), sum.begin (), sum.end ());
+  light.insert (light.end (), weight.begin (), weight.end ());
+  return light;
+}
+
+TEST (FuseKernels, SettlingEqualsTheReference)
+{
+  for (const fuse::Kernels &kernels : fuse::supported_kernels ())
+    EXPECT_EQ (settled (kernels), settled (kReference)) << kernels.name;
+}
+
 TEST (FuseKernels, ConvolutionsEqualTheReference)
 {
   for (const int inputs : {1, 32, 36}) {

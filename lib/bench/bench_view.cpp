@@ -105,6 +105,8 @@ blurred (const Image<float> &from, double sigma, bool upright)
 Result<Mapping>
 mapping_of (const SickBenchOptions &options)
 {
+  if (options.mapping)
+    return *options.mapping;
   Mapping::Parts parts{.camera = options.camera,
       .mirrors = options.mirrors,
       .homography = homography_of (options),

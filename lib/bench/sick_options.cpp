@@ -416,4 +416,34 @@ random_healthy_bench (std::uint64_t seed, const SickBenchOptions &like)
   return b;
 }
 
+void
+replay (SickBenchOptions &bench, const BenchProfile &profile)
+{
+  const auto set = [] (auto &number, const std::optional<Measured> &measured) {
+    using Number = std::remove_reference_t<decltype (number)>;
+    if (measured)
+      number = Number (measured->value);
+  };
+  bench.camera = profile.camera.size;
+  if (profile.dmd)
+    bench.mirrors = profile.dmd->size;
+  bench.mapping = profile.mapping;
+  if (profile.mapping)
+    bench.mirrors = profile.mapping->mirrors ();
+  bench.bits = profile.bits;
+  set (bench.black_level, profile.black_level);
+  set (bench.read_noise, profile.read_noise);
+  if (const auto gain = profile.electrons_per_number ())
+    bench.full_well = *gain * (profile.largest () - bench.black_level);
+  const auto &bow = profile.linearity_error;
+  if (bow && bow->value > 2.0 * bow->sigma)
+    bench.nonlinear = bow->value;
+  set (bench.leak, profile.leak);
+  set (bench.delay, profile.trigger_delay);
+  if (profile.exposure)
+    bench.readout =
+        bench.rate.period () - Nanoseconds (profile.exposure->value);
+  set (bench.blur, profile.psf_sigma);
+}
+
 } // namespace codedexposure

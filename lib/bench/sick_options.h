@@ -11,7 +11,9 @@
 #include "base/geometry.h"
 #include "base/result.h"
 #include "bench/lens.h"
+#include "mapping/mapping.h"
 #include "schedule/timing.h"
+#include "setup/bench_profile.h"
 
 namespace codedexposure
 {
@@ -72,7 +74,9 @@ struct SickBenchOptions {
 
   /* Optics. */
   Alignment alignment = {}; ///< shift: of the camera's centre from the array's
-  double blur = 0.4;        ///< standard deviation, pixels
+  /** In place of orientation and alignment. */
+  std::optional<Mapping> mapping = {};
+  double blur = 0.4; ///< standard deviation, pixels
   /** The blur grows by that along the frame, pixels, in that direction. */
   double focus_tilt = 0.0, focus_direction = 0.0;
   int dust = 0;
@@ -104,5 +108,9 @@ std::string fault_help ();
  * benches work well. Keeps sizes, rate and bits of @p like. */
 SickBenchOptions random_healthy_bench (
     std::uint64_t seed, const SickBenchOptions &like = {});
+
+/** Gives @p bench the numbers that were measured of one; those that @p profile
+ * does not have stay. */
+void replay (SickBenchOptions &bench, const BenchProfile &profile);
 
 } // namespace codedexposure

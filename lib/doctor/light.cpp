@@ -38,6 +38,8 @@ constexpr double kDriftWarn = 0.02, kDriftFail = 0.05; // a minute
 
 /* Of the light to which an amplitude is related. */
 constexpr double kGainError = 0.01;
+/* Frames that beat with the light more slowly, Hz, seem to be in step. */
+constexpr double kSlowBeat = 0.02;
 /* The clock of a camera is that wrong, relative. */
 constexpr double kClockError = 5e-5;
 
@@ -279,7 +281,7 @@ void
 LightCheck::judge_flicker (const LightFit &fit)
 {
   finding_.plots.push_back ({"Flicker of the light", "frequency, Hz",
-      "amplitude, part of the mean", fit.spectrum});
+      "part of the changes of the light that it explains", fit.spectrum});
   if (fit.lines.empty ()) {
     finding_.readings.push_back (
         {"flicker", {0.0, 100.0 * fit.faintest}, "%", "at most 1"});
@@ -305,10 +307,18 @@ LightCheck::judge_flicker (const LightFit &fit)
     return;
   char text[160];
   std::snprintf (text, sizeof text,
-      "the light flickers by +-%.2g %% at %.2f Hz; whole frames change by "
-      "+-%.2g %% at %.2f Hz",
-      100.0 * depth.value, frequency.value, 100.0 * whole, beat);
-  diagnose ("flicker", above (depth, kFlickerFail), text,
+      "the light flickers by +-%.2g %% at %.2f Hz", 100.0 * depth.value,
+      frequency.value);
+  std::string cause = text;
+  if (beat < kSlowBeat)
+    cause += ", in step with the frames: all of them get the same light, but "
+             "slots do not";
+  else {
+    std::snprintf (text, sizeof text,
+        "; whole frames change by +-%.2g %% at %.2f Hz", 100.0 * whole, beat);
+    cause += text;
+  }
+  diagnose ("flicker", above (depth, kFlickerFail), cause,
       "drive the light with a constant current, without mains ripple or PWM");
 }
 

@@ -74,8 +74,8 @@ struct LightFit {
   Measured jitter = {};
   double residual = 0.0; ///< standard deviation, s of light
   int rejected = 0;      ///< samples that no model explains
-  /** Depth at frequencies, before any line was taken away: the largest in each
-   * of some stretches. */
+  /** Which part of the changes of the light a frequency explains, before any
+   * line was taken away: the largest in each of some stretches. */
   std::vector<Position> spectrum = {};
 };
 

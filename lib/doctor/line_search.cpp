@@ -147,14 +147,14 @@ private:
 
 void
 add_to_spectrum (std::vector<Position> &spectrum, double slowest,
-    double fastest, double frequency, double depth)
+    double fastest, double frequency, double explained)
 {
   const double part = (frequency - slowest) / (fastest - slowest);
   const auto stretch = std::size_t (std::clamp (
       int (part * LineSearch::kStretches), 0, LineSearch::kStretches - 1));
   Position &point = spectrum[stretch];
-  if (depth >= point.y)
-    point = {frequency, depth};
+  if (explained >= point.y)
+    point = {frequency, explained};
 }
 
 /** The peaks where other parameters are taken as known. */
@@ -172,7 +172,7 @@ quick_peaks (const LineSearch &search, const VectorXd &residual, double slowest,
         sine.squaredNorm (), cosine.dot (residual), sine.dot (residual));
     if (spectrum)
       add_to_spectrum (*spectrum, slowest, fastest, comb.frequency (),
-          std::hypot (found.cosine, found.sine));
+          found.power / std::max (1e-30, residual.squaredNorm ()));
     if (last.power > before.power && last.power >= found.power)
       peaks.push_back (last);
     before = last;

@@ -31,8 +31,8 @@ struct LineSearch {
    * The frequency in [@p slowest, @p fastest] Hz that explains most of the
    * residual, once all else was fitted beside it.
    *
-   * @p spectrum  if not null: the largest depth in each of kStretches parts of
-   *              the range, roughly.
+   * @p spectrum  if not null: which part of the squares of the residual a line
+   *              explains, at most, in each of kStretches parts of the range.
    */
   LightLine strongest (double slowest, double fastest,
       std::vector<Position> *spectrum = nullptr) const;

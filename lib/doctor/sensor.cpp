@@ -266,7 +266,8 @@ PhotonTransferRun::points (std::optional<double> leak) const
     if (means.full < kFull && means.zeros < kZeros)
       all.push_back (point_of (means, slots, scatter));
   };
-  add (dark_means_, leak_slots, 0.0);
+  if (!dithered_)
+    add (dark_means_, leak_slots, 0.0);
   for (const Level &level : levels_)
     if (!plateau_ || level.means.mean < 0.9 * *plateau_)
       add (level.means, level.slots * drift_at (level.stack.time) + leak_slots,
@@ -453,7 +454,7 @@ void
 PhotonTransferRun::plot ()
 {
   Plot response{"Response", "light, slots", "mean, DN"};
-  Plot noise{"Photon transfer", "mean, DN", "variance, DN^2"};
+  Plot noise{"Photon transfer", "mean, DN", "variance, DN²"};
   for (const TransferPoint &p : points (off_.light.value / transfer_->slope)) {
     response.points.push_back ({p.light, p.mean.value});
     response.model.push_back ({p.light, transfer_->number_of (p.light)});
@@ -461,9 +462,12 @@ PhotonTransferRun::plot ()
       continue;
     noise.points.push_back ({p.mean.value, p.variance->value});
     const double gain = transfer_->conversion_gain.value;
-    noise.model.push_back (
-        {p.mean.value, (p.mean.value - black_.value) / gain +
-                           transfer_->read_variance.value / (gain * gain)});
+    const double steep =
+        1.0 + 2.0 * transfer_->bow * p.light / transfer_->slope;
+    noise.model.push_back ({p.mean.value,
+        steep * steep *
+            (transfer_->slope * p.light / gain +
+                transfer_->read_variance.value / (gain * gain))});
   }
   for (Plot *each : {&response, &noise}) {
     std::ranges::sort (each->points, {}, &Position::x);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <memory>
+#include <regex>
 
 #include <cairo.h>
 #include <glib.h>
@@ -18,7 +19,7 @@ namespace
 {
 
 constexpr int kWide = 560, kHigh = 260; // a plot
-constexpr int kLeft = 62, kRight = 14, kTop = 12, kBottom = 42;
+constexpr int kLeft = 62, kRight = 26, kTop = 26, kBottom = 42;
 constexpr int kTicks = 5;
 
 std::string
@@ -30,10 +31,22 @@ escaped (const std::string &text)
   return result;
 }
 
+/** For people: a number stays on the line of its unit. */
+std::string
+typeset (const std::string &text)
+{
+  static const std::regex unit ("([0-9]) (%|Hz|us|ms|DN|e-)(?![a-zA-Z])");
+  static const std::regex micro ("([0-9]\u00a0)us"), plus_minus ("\\+-");
+  const std::string together =
+      std::regex_replace (escaped (text), unit, "$1\u00a0$2");
+  return std::regex_replace (
+      std::regex_replace (together, micro, "$1µs"), plus_minus, "±");
+}
+
 std::string
 row (const std::pair<std::string, std::string> &of)
 {
-  return "<dt>" + escaped (of.first) + "</dt><dd>" + escaped (of.second) +
+  return "<dt>" + escaped (of.first) + "</dt><dd>" + typeset (of.second) +
          "</dd>\n";
 }
 
@@ -155,6 +168,17 @@ curve_of (const std::vector<Position> &points, const Scale &x, const Scale &y,
 }
 
 std::string
+dots_of (const std::vector<Position> &points, const Scale &x, const Scale &y)
+{
+  std::string text;
+  for (const Position &point : points)
+    if (std::isfinite (point.x) && std::isfinite (point.y))
+      text += format ("<circle cx=\"%.1f\" cy=\"%.1f\" r=\"3\"/>",
+          place_x (x, point.x), place_y (y, point.y));
+  return text;
+}
+
+std::string
 ticks_of (const Scale &x, const Scale &y)
 {
   std::string text;
@@ -180,15 +204,15 @@ figure_of (const Plot &plot)
                  "role=\"img\" aria-label=\"%s\">",
              kWide, kHigh, escaped (plot.title).c_str ()) +
          ticks_of (x, y) + curve_of (plot.model, x, y, "model") +
-         curve_of (plot.points, x, y, "seen") +
+         (plot.model.empty () ? curve_of (plot.points, x, y, "seen")
+                              : dots_of (plot.points, x, y)) +
          format ("<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">%s</text>",
              (kLeft + kWide - kRight) / 2, kHigh - 6,
              escaped (plot.x_axis).c_str ()) +
-         format ("<text transform=\"translate(12 %d) rotate(-90)\" "
-                 "text-anchor=\"middle\">%s</text>",
-             (kTop + kHigh - kBottom) / 2, escaped (plot.y_axis).c_str ()) +
+         format ("<text x=\"6\" y=\"16\">%s</text>",
+             escaped (plot.y_axis).c_str ()) +
          "</svg><figcaption>" + escaped (plot.title) +
-         (plot.model.empty () ? "" : " (thin: the model)") +
+         (plot.model.empty () ? "" : " (dots: measured; line: the model)") +
          "</figcaption></figure>\n";
 }
 
@@ -224,7 +248,7 @@ readings_of (const Finding &finding)
                      "</th><th>should be</th></tr>\n";
   for (const Reading &reading : finding.readings)
     text += "<tr><th>" + escaped (reading.name) + "</th><td>" +
-            escaped (reading_text (reading)) + "</td><td>" +
+            typeset (reading_text (reading)) + "</td><td>" +
             escaped (reading.rule) + "</td></tr>\n";
   return text + "</table></div>\n";
 }
@@ -235,8 +259,8 @@ diagnoses_of (const Finding &finding)
   std::string text;
   for (const Diagnosis &diagnosis : finding.diagnoses)
     text += "<p>" + badge (verdict_text (diagnosis.severity)) + " <b>" +
-            escaped (diagnosis.id) + "</b>: " + escaped (diagnosis.cause) +
-            ".<br>Try next: " + escaped (diagnosis.remedy) + ".</p>\n";
+            escaped (diagnosis.id) + "</b>: " + typeset (diagnosis.cause) +
+            ".<br>Try next: " + typeset (diagnosis.remedy) + ".</p>\n";
   return text;
 }
 
@@ -276,7 +300,7 @@ summary_of (const Finding &finding)
     return "a check before it failed";
   return finding.diagnoses.empty ()
              ? std::string ()
-             : escaped (finding.diagnoses.front ().cause);
+             : typeset (finding.diagnoses.front ().cause);
 }
 
 std::string
@@ -295,10 +319,17 @@ constexpr const char *kStyle =
     ".FAIL{background:#c62828} .SKIPPED{background:#777}\n"
     ".badge{font-size:13px} .curve svg{width:100%;height:auto}\n"
     ".curve text{font:11px sans-serif;fill:#555} .curve path{stroke:#ddd}\n"
+    "circle{fill:#1f5fa8} th:first-child{text-align:left} "
+    "tr:first-child th{white-space:nowrap}\n"
     ".seen{fill:none;stroke:#1f5fa8;stroke-width:1.6} "
     ".model{fill:none;stroke:#e4572e;stroke-width:1}\n"
     ".words{white-space:normal;text-align:left}\n"
-    "td .badge{font-size:11px} th{white-space:normal} pre{overflow-x:auto}\n";
+    "td .badge{font-size:11px} th{white-space:normal} pre{overflow-x:auto}\n"
+    "@media(max-width:700px){.curve text{font-size:17px}}\n"
+    "@media(prefers-color-scheme:dark){body{background:#16181c;color:#ddd}\n"
+    "dt,figcaption{color:#aaa} a{color:#8ab4f8} th,td{border-color:#444}\n"
+    ".curve text{fill:#bbb} .curve path{stroke:#444} "
+    ".seen{stroke:#6aa6e8} circle{fill:#6aa6e8}}\n";
 
 } // namespace
 
@@ -308,7 +339,7 @@ reading_text (const Reading &reading)
   const auto [value, sigma] = reading.number;
   const std::string unit = reading.unit.empty () ? "" : " " + reading.unit;
   if (!(sigma > 0) || !std::isfinite (sigma))
-    return format ("%.6g", value) + unit;
+    return format (std::floor (value) == value ? "%.0f" : "%.4g", value) + unit;
   const int digits =
       std::clamp (1 - int (std::floor (std::log10 (sigma))), 0, 9);
   return format ("%.*f ± %.*f", digits, value, digits, sigma) + unit;

@@ -46,7 +46,7 @@ constexpr const char *kSlowDiskVariable = "CODEDEXPOSURE_SLOW_DISK";
 struct Arguments {
   CameraRigOptions rig;
   std::string rate = "25", exposure, schedule = "sequential:2x2", only, output,
-              style, what = "doctor", faults, version;
+              style, what = "doctor", bench, faults, version;
   double seconds = 60;
   std::uint64_t seed = 1;
   bool json = false, yes = false;
@@ -162,6 +162,12 @@ open_rig (const Arguments &arguments, const std::stop_token &stop)
   if (arguments.simulated ()) {
     SickBenchOptions options =
         random_healthy_bench (arguments.seed, {.rate = arguments.rig.rate});
+    if (!arguments.bench.empty ()) {
+      ASSIGN_OR_RETURN (
+          const auto profile, BenchProfile::parse (arguments.bench));
+      options = {.rate = arguments.rig.rate, .seed = arguments.seed};
+      replay (options, profile);
+    }
     RETURN_IF_ERROR (inflict (options, arguments.faults));
     auto rig = SimulatedRig::make (options);
     if (!rig)
@@ -456,6 +462,7 @@ main (int argc, char **argv)
   app.add_option ("--style", arguments.style, "CSS of the page");
   app.add_option ("--what", arguments.what, "prefix of lines");
   app.add_option ("--program-version", arguments.version, "for the page");
+  app.add_option ("--bench", arguments.bench, "profile of the simulated bench");
   app.add_option ("--faults", arguments.faults, "of the simulated bench");
   app.add_option ("--seed", arguments.seed, "of the simulated bench");
   app.add_flag ("--json", arguments.json, "print findings as JSON");

@@ -151,7 +151,7 @@ FiguresOfBench::exposure ()
   const Seen seen = examine (options, {check_trigger});
   print ("delay, up to 8 ms", seen.truth ().trigger_delay->value,
       seen.profile ().trigger_delay, 1e-3);
-  print ("exposure, any", seen.truth ().exposure->value,
+  print ("exposure, up to 5 ms off", seen.truth ().exposure->value,
       seen.profile ().exposure, 1e-3);
 }
 

@@ -26,12 +26,15 @@ ffv1_speed ()
   sed -nE 's/.* s, ([0-9.]+) coded frames\/s.*/\1/p' <<< "$log"
 }
 
-# disk_speed FILE: prints the bytes/s that the disk of FILE takes.
+# disk_speed FILE: prints the bytes/s that the disk of FILE takes, past the page
+# cache where its file system can, as raw recordings are written.
 disk_speed ()
 {
-  local file begin
-  file=$(dirname "$1")/.disk-$$ begin=$(date +%s.%N)
-  timeout 5 dd if=/dev/zero of="$file" bs=8M count=32 conv=fdatasync 2>/dev/null || true
+  local file begin how=conv=fdatasync
+  file=$(dirname "$1")/.disk-$$
+  ! dd if=/dev/zero of="$file" bs=1M count=1 oflag=direct 2>/dev/null || how=oflag=direct
+  begin=$(date +%s.%N)
+  timeout 5 dd if=/dev/zero of="$file" bs=8M count=32 "$how" 2>/dev/null || true
   awk -v bytes="$(stat -c %s "$file" 2>/dev/null || echo 0)" -v from="$begin" \
     -v to="$(date +%s.%N)" 'BEGIN { printf "%.0f", bytes / (to - from) }'
   rm -f "$file"

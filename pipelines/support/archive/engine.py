@@ -75,7 +75,8 @@ def tasks_for(count, most):
     return max(1, min(count, elements - 1, jobs // 2, most or count))
 
 
-def script_for(kind, store, run, tasks, engine, threads):
+def header(kind, tasks, engine, threads):
+    """The first lines of a script for sbatch."""
     lines = ['#!/bin/bash', f'#SBATCH --job-name=codedexposure-{kind}',
              f'#SBATCH --array=0-{tasks - 1}' +
              (f'%{engine["jobs"]}' if engine.get('jobs') else ''),
@@ -86,6 +87,11 @@ def script_for(kind, store, run, tasks, engine, threads):
     if 'CODEDEXPOSURE_BUILD' in os.environ:
         build = os.path.abspath(os.environ['CODEDEXPOSURE_BUILD'])
         lines.append(f'export CODEDEXPOSURE_BUILD={shlex.quote(build)}')
+    return lines
+
+
+def script_for(kind, store, run, tasks, engine, threads):
+    lines = header(kind, tasks, engine, threads)
     lines.append(shlex.join(['exec', sys.executable, programs.SCRIPT, 'work', kind,
                              store.folder, run]) +
                  f' "$SLURM_ARRAY_TASK_ID" {tasks}')

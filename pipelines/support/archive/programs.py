@@ -13,6 +13,7 @@ SCRIPTS = pathlib.Path(__file__).resolve().parents[2]
 SCRIPT = str(SCRIPTS / 'archive')
 DECODE = str(SCRIPTS / 'decode')
 REPORT = str(SCRIPTS / 'report')
+PACK = str(SCRIPTS / 'pack')
 
 
 def join_program():

@@ -130,6 +130,9 @@ struct Picture {
 class CodedFilter
 {
 public:
+  /** Follows the method of pictures in the provenance of their uncertainty. */
+  static constexpr const char *kUncertaintyMethod = ", uncertainty";
+
   CodedFilter (GstCodedFilter *element, const StatsNames &names);
   virtual ~CodedFilter () = default;
   CodedFilter (const CodedFilter &) = delete;
@@ -220,6 +223,8 @@ protected:
    * coded frames have their setup. Transfer: full, of both. */
   static GstEvent *event_for (
       const GstCodedPad *pad, GstEvent *event, const Provenance *provenance);
+  /** @p made for the pictures of @p pad. */
+  static Provenance provenance_for (const GstCodedPad *pad, Provenance made);
   bool backwards () const { return stream_.segment.rate < 0; }
   /** Of the bench; null: not known. */
   const BenchProfile *bench () const

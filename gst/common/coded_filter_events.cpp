@@ -82,6 +82,14 @@ CodedFilter::forward_in_turn (EventPtr event)
   return TRUE;
 }
 
+Provenance
+CodedFilter::provenance_for (const GstCodedPad *pad, Provenance made)
+{
+  if (pad->coded.kind == PadKind::uncertainty)
+    made.method += kUncertaintyMethod;
+  return made;
+}
+
 GstEvent *
 CodedFilter::event_for (
     const GstCodedPad *pad, GstEvent *event, const Provenance *provenance)
@@ -89,7 +97,7 @@ CodedFilter::event_for (
   if (GST_EVENT_TYPE (event) != GST_EVENT_TAG ||
       pad->coded.kind == PadKind::coded || !provenance)
     return event;
-  return replace_by_provenance (event, *provenance);
+  return replace_by_provenance (event, provenance_for (pad, *provenance));
 }
 
 gboolean
@@ -313,7 +321,8 @@ CodedFilter::src_caps (GstCodedPad *pad) const
   const CapsContext context = caps_context ();
   const CapsPtr templ (gst_pad_get_pad_template_caps (GST_PAD (pad)));
   const CapsPtr peer (gst_pad_peer_query_caps (sinkpad_, nullptr));
-  const CapsPtr coded = intersect_caps (peer.get (), templ.get ());
+  const CapsPtr taken (gst_pad_get_pad_template_caps (sinkpad_));
+  const CapsPtr coded = intersect_caps (peer.get (), taken.get ());
   const CapsPtr filled = fill_in_rate (context.rate, coded.get ());
   const CapsPtr own = convert_caps (context, pad, filled.get (), false);
   return intersect_caps (own.get (), templ.get ());

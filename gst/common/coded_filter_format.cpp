@@ -369,7 +369,8 @@ CodedFilter::push_provenance ()
   const auto made = provenance ();
   each_pad ([&] (GstCodedPad *pad) {
     if (pad->coded.kind != PadKind::coded)
-      gst_pad_push_event (GST_PAD (pad), provenance_to_event (*made));
+      gst_pad_push_event (
+          GST_PAD (pad), provenance_to_event (provenance_for (pad, *made)));
   });
 }
 

@@ -30,10 +30,11 @@ struct Allocation {
 
 /** What a pad pushes for each coded frame. */
 enum class PadKind {
-  coded,  ///< the coded frame
-  all,    ///< all pictures, at the raised rate
-  one,    ///< one picture, at the rate of coded frames
-  region, ///< all pictures of one region
+  coded,       ///< the coded frame
+  all,         ///< all pictures, at the raised rate
+  one,         ///< one picture, at the rate of coded frames
+  region,      ///< all pictures of one region
+  uncertainty, ///< of all pictures
 };
 
 struct CodedPad {
@@ -47,6 +48,7 @@ struct CodedPad {
 
   /* Object lock of the element. */
   bool released = false;
+  bool served = false; ///< it has the events that came before the request
   /** Running time before which a picture would be late. */
   GstClockTime earliest = GST_CLOCK_TIME_NONE;
   gdouble proportion = 1.0;
@@ -62,6 +64,9 @@ struct _GstCodedPad {
 
 namespace codedexposure::gst
 {
+
+/** The STREAM_START event of @p pad, one of several, for that of upstream. */
+EventPtr stream_start_for (GstCodedPad *pad, GstEvent *upstream);
 
 /** Whether a buffer pushed there is used, by a peer or by a blocking probe that
  * waits for data. */

@@ -25,27 +25,6 @@ is_sticky (const GstEvent *event)
          GST_EVENT_TYPE_STICKY;
 }
 
-/* gst_pad_create_stream_id () needs the sink pad's sticky event, which is
- * stored only after its handler has returned. */
-EventPtr
-stream_start_for (GstCodedPad *pad, GstEvent *upstream)
-{
-  const gchar *id = nullptr;
-  gst_event_parse_stream_start (upstream, &id);
-  const CharPtr name (gst_object_get_name (GST_OBJECT (pad)));
-  const std::string own = std::string (id) + "/" + name.get ();
-
-  EventPtr event (gst_event_new_stream_start (own.c_str ()));
-  gst_event_set_seqnum (event.get (), gst_event_get_seqnum (upstream));
-  GstStreamFlags flags = GST_STREAM_FLAG_NONE;
-  gst_event_parse_stream_flags (upstream, &flags);
-  gst_event_set_stream_flags (event.get (), flags);
-  guint group = GST_GROUP_ID_INVALID;
-  if (gst_event_parse_group_id (upstream, &group))
-    gst_event_set_group_id (event.get (), group);
-  return event;
-}
-
 struct Replay {
   GstCodedPad *pad;
   const PadCaps &caps;

@@ -51,6 +51,16 @@
  * recording may carry: it filters more where the noise is larger, and tells
  * motion from noise.
  *
+ * ## Uncertainty
+ *
+ * The request pad `uncertainty` gives a GRAY16_LE frame for each fused frame,
+ * with the same time and flags: half the width of the interval that holds 68 %
+ * of the errors of each pixel, in 1/65280 of white, which is 1/256 of a grey
+ * level of 8 bits. Measured pixels have the noise of the camera, static ones
+ * that of their mean, and estimated ones a value that depends on how well their
+ * neighbours are predicted and on how the picture changes there. It is not
+ * computed unless the pad is linked.
+ *
  * ## Flags, metas and messages
  *
  * As those of codedexposure-demux: a lost, corrupted or saturated frame is
@@ -80,6 +90,7 @@
 #include "base/workers.h"
 #include "common/element.h"
 #include "common/elements.h"
+#include "common/tag.h"
 #include "extract/saturation.h"
 
 GST_DEBUG_CATEGORY_STATIC (codedexposure_fuse_debug);
@@ -181,6 +192,18 @@ Fuse::set_up_class (gpointer klass)
       "Reconstructs full-resolution frames at a multiple of the frame rate "
       "from the frames of a camera behind a micromirror device",
       {});
+  add_pad_template (klass, "uncertainty",
+      {.presence = GST_PAD_REQUEST,
+          .type = GST_TYPE_CODED_PAD,
+          .caps = GST_VIDEO_CAPS_MAKE ("GRAY16_LE")});
+  auto *element = GST_ELEMENT_CLASS (klass);
+  element->request_new_pad = [] (GstElement *self, GstPadTemplate *,
+                                 const gchar *, const GstCaps *) noexcept {
+    return static_cast<Fuse &> (filter_of (self)).request_pad ();
+  };
+  element->release_pad = [] (GstElement *self, GstPad *pad) noexcept {
+    static_cast<Fuse &> (filter_of (self)).release_pad (pad);
+  };
 }
 
 namespace
@@ -194,8 +217,10 @@ constexpr guint kUnfit = GST_BUFFER_FLAG_CORRUPTED | GST_BUFFER_FLAG_GAP;
 Fuse::Fuse (GstCodedExposureFuse *element)
     : CodedFilter (GST_CODED_FILTER (element),
           {"application/x-codedexposure-fuse-stats", "frames-out", nullptr}),
-      srcpad_ (new_source_pad ("src", "src", PadKind::all))
+      srcpad_ (new_source_pad ("src", "src", PadKind::all)),
+      uncertainty_ (GST_ELEMENT (element))
 {
+  gst_flow_combiner_add_pad (combiner_.get (), GST_PAD (srcpad_.get ()));
   gst_element_add_pad (this->element (), GST_PAD (srcpad_.get ()));
 }
 
@@ -204,6 +229,7 @@ Fuse::Fuse (GstCodedExposureFuse *element)
 GstFlowReturn
 Fuse::process (CodedFrame frame)
 {
+  serve_requested ();
   const bool alone = frame.has_flags (kUnfit) || backwards ();
   GstFlowReturn flow = GST_FLOW_OK;
   if (alone) {
@@ -266,22 +292,35 @@ Fuse::take (CodedFrame frame)
   return GST_FLOW_OK;
 }
 
-/* Fuses the oldest coded frame that waits into @buffers; none on an error,
- * which is posted unless it is a flush. */
+/* A buffer for each slot. */
 GstFlowReturn
-Fuse::render (std::vector<BufferPtr> &buffers)
+Fuse::acquire_all (Pictures &pictures) const
 {
   const auto n = std::size_t (format ().schedule.slots ());
-  prepare_allocation (
-      srcpad_.get (), caps_for (srcpad_.get ()).get (), guint (n));
-  std::vector<MappedFrame> mapped (n);
-  std::vector<BufferPtr> made (n);
+  prepare_allocation (pictures.pad, caps_for (pictures.pad).get (), guint (n));
+  pictures.mapped = std::vector<MappedFrame> (n);
+  pictures.buffers.resize (n);
   for (std::size_t k = 0; k < n; k++) {
-    const GstFlowReturn flow = acquire_picture (
-        srcpad_.get (), plan_->fused, k == 0, made[k], mapped[k]);
+    const GstFlowReturn flow = acquire_picture (pictures.pad, pictures.info,
+        k == 0, pictures.buffers[k], pictures.mapped[k]);
     if (flow != GST_FLOW_OK)
       return flow;
   }
+  return GST_FLOW_OK;
+}
+
+/* Fuses the oldest coded frame that waits; there are no buffers on an error,
+ * which is posted unless it is a flush. */
+GstFlowReturn
+Fuse::render (Pictures &fused, Pictures *uncertainty)
+{
+  for (Pictures *pictures : {&fused, uncertainty})
+    if (const GstFlowReturn flow =
+            pictures ? acquire_all (*pictures) : GST_FLOW_OK;
+        flow != GST_FLOW_OK) {
+      fused.buffers.clear ();
+      return flow;
+    }
   const std::stop_token stop = [this] {
     const ObjectLock lock (element ());
     return stop_.get_token ();
@@ -289,17 +328,40 @@ Fuse::render (std::vector<BufferPtr> &buffers)
   const Result<void> done = std::visit (
       [&]<typename Pixel> (Fuser<Pixel> &fuser) {
         std::vector<ImageView<Pixel>> views;
-        for (MappedFrame &frame : mapped)
+        for (MappedFrame &frame : fused.mapped)
           views.push_back (view_of<Pixel> (frame));
-        return fuser.fuse (views, stop);
+        std::vector<ImageView<std::uint16_t>> deviations;
+        if (uncertainty)
+          for (MappedFrame &frame : uncertainty->mapped)
+            deviations.push_back (view_of<std::uint16_t> (frame));
+        return fuser.fuse (views, stop, deviations);
       },
       plan_->fuser);
-  if (!done)
-    return done.error ().code == ErrorCode::cancelled
-               ? GST_FLOW_FLUSHING
-               : post_decode_error (done.error ());
-  buffers = std::move (made);
-  return GST_FLOW_OK;
+  if (done)
+    return GST_FLOW_OK;
+  fused.buffers.clear ();
+  return done.error ().code == ErrorCode::cancelled
+             ? GST_FLOW_FLUSHING
+             : post_decode_error (done.error ());
+}
+
+GstFlowReturn
+Fuse::push_one (Pictures &pictures, const CodedFrame &coded, int k)
+{
+  const SlotPlan &slots = format ().slots;
+  const GstClockTime pts = coded.pts () + boundary (k);
+  const GstClockTime duration = boundary (k + 1) - boundary (k);
+  if (!is_within (pts, duration))
+    return GST_FLOW_OK;
+  BufferPtr &outbuf = pictures.buffers[std::size_t (k)];
+  describe (outbuf.get (), coded.buffer.get (), coded.meta,
+      {pictures.info, k, pts, coded.pts () + GstClockTime (slots.start (k)),
+          GstClockTime (slots.active ())});
+  const GstFlowReturn flow =
+      pictures.pad == srcpad_.get ()
+          ? push (pictures.pad, std::move (outbuf), duration)
+          : push_picture (pictures.pad, std::move (outbuf), duration);
+  return combine_flow (pictures.pad, flow);
 }
 
 /* Buffers are pushed one by one, because a sink would show a whole list at the
@@ -307,25 +369,23 @@ Fuse::render (std::vector<BufferPtr> &buffers)
 GstFlowReturn
 Fuse::push_oldest ()
 {
-  std::vector<BufferPtr> buffers;
-  GstFlowReturn flow = render (buffers);
+  const ObjectPtr<GstCodedPad> pad = uncertainty_pad ();
+  Pictures fused{srcpad_.get (), plan_->fused};
+  Pictures uncertainty{pad.get (), plan_->uncertainty};
+  const bool wanted = pad && is_wanted (GST_PAD (pad.get ()));
+  GstFlowReturn flow = render (fused, wanted ? &uncertainty : nullptr);
+  for (Pictures *pictures : {&fused, &uncertainty})
+    pictures->mapped.clear ();
   const CodedFrame coded = std::move (waiting_.front ());
   waiting_.pop_front ();
   if (flow == GST_FLOW_FLUSHING)
     break_history ();
-  const int n = int (buffers.size ());
-  const SlotPlan &slots = format ().slots;
+  const int n = int (fused.buffers.size ());
   for (int i = 0; i < n && flow == GST_FLOW_OK; i++) {
     const int k = backwards () ? n - 1 - i : i;
-    const GstClockTime pts = coded.pts () + boundary (k);
-    const GstClockTime duration = boundary (k + 1) - boundary (k);
-    if (!is_within (pts, duration))
-      continue;
-    BufferPtr &outbuf = buffers[std::size_t (k)];
-    describe (outbuf.get (), coded.buffer.get (), coded.meta,
-        {plan_->fused, k, pts, coded.pts () + GstClockTime (slots.start (k)),
-            GstClockTime (slots.active ())});
-    flow = push (srcpad_.get (), std::move (outbuf), duration);
+    flow = push_one (fused, coded, k);
+    if (flow == GST_FLOW_OK && wanted)
+      flow = push_one (uncertainty, coded, k);
   }
   return flow;
 }
@@ -345,6 +405,105 @@ Fuse::break_history ()
   waiting_.clear ();
   if (plan_)
     std::visit ([] (auto &fuser) { fuser.forget (); }, plan_->fuser);
+}
+
+/* ------------------------------------------------------------------ pads -- */
+
+GstPad *
+Fuse::request_pad ()
+{
+  GstPad *pad = uncertainty_.add (GST_PAD (
+      new_source_pad ("uncertainty", "uncertainty", PadKind::uncertainty)
+          .release ()));
+  if (!pad)
+    GST_WARNING_OBJECT (element (),
+        "pad uncertainty exists; put a tee after it to use it twice");
+  return pad;
+}
+
+void
+Fuse::release_pad (GstPad *pad)
+{
+  {
+    const ObjectLock lock (element ());
+    CodedPad &coded = GST_CODED_PAD (pad)->coded;
+    if (std::exchange (coded.served, false))
+      gst_flow_combiner_remove_pad (combiner_.get (), pad);
+    coded.released = true;
+  }
+  uncertainty_.release (pad);
+}
+
+/* The pad, if it was requested and has the events that came before. */
+ObjectPtr<GstCodedPad>
+Fuse::uncertainty_pad () const
+{
+  ObjectPtr<GstPad> pad = uncertainty_.get ();
+  const ObjectLock lock (element ());
+  return ObjectPtr<GstCodedPad> (pad && GST_CODED_PAD (pad.get ())->coded.served
+                                     ? GST_CODED_PAD (pad.release ())
+                                     : nullptr);
+}
+
+void
+Fuse::each_pad (const PadVisitor &visit) const
+{
+  visit (srcpad_.get ());
+  if (const auto pad = uncertainty_pad ())
+    visit (pad.get ());
+}
+
+/* A pad that was requested since the last event or frame gets the events of the
+ * other one. On the streaming thread, which is the only one that sends them. */
+void
+Fuse::serve_requested ()
+{
+  const ObjectPtr<GstPad> pad = uncertainty_.get ();
+  if (!pad || uncertainty_pad ())
+    return;
+  GstCodedPad *coded = GST_CODED_PAD (pad.get ());
+  std::vector<EventPtr> events;
+  gst_pad_sticky_events_foreach (
+      GST_PAD (srcpad_.get ()),
+      [] (GstPad *, GstEvent **event, gpointer to) noexcept -> gboolean {
+        static_cast<std::vector<EventPtr> *> (to)->emplace_back (
+            gst_event_ref (*event));
+        return TRUE;
+      },
+      &events);
+  for (EventPtr &event : events) {
+    const GstEventType type = GST_EVENT_TYPE (event.get ());
+    if (type == GST_EVENT_STREAM_START)
+      event = stream_start_for (coded, event.get ());
+    else if (type == GST_EVENT_CAPS)
+      event.reset (gst_event_new_caps (caps_for (coded).get ()));
+    else if (type == GST_EVENT_TAG && why_not_coded (event.get ()))
+      event.reset (
+          provenance_to_event (provenance_for (coded, *provenance ())));
+    gst_pad_push_event (pad.get (), event.release ());
+  }
+  const ObjectLock lock (element ());
+  if (coded->coded.released)
+    return;
+  coded->coded.served = true;
+  gst_flow_combiner_add_pad (combiner_.get (), pad.get ());
+}
+
+GstFlowReturn
+Fuse::combine_flow (GstCodedPad *pad, GstFlowReturn flow)
+{
+  const ObjectLock lock (element ());
+  if (pad->coded.released)
+    return GST_FLOW_OK;
+  return gst_flow_combiner_update_pad_flow (
+      combiner_.get (), GST_PAD (pad), flow);
+}
+
+void
+Fuse::flushed ()
+{
+  const ObjectLock lock (element ());
+  gst_flow_combiner_reset (combiner_.get ());
 }
 
 void
@@ -443,6 +602,15 @@ coded_to_fused (const Schedule &schedule)
   return {.rate = {schedule.slots ()}, .crop_rows = schedule.pilot_rows ()};
 }
 
+CapsPtr
+of_sixteen_bits (GstCaps *caps)
+{
+  CapsPtr wide (gst_caps_copy (caps));
+  gst_caps_set_simple (
+      wide.get (), "format", G_TYPE_STRING, "GRAY16_LE", nullptr);
+  return wide;
+}
+
 } // namespace
 
 bool
@@ -462,8 +630,10 @@ Fuse::plan (const CodedFormat &format)
                                 : CapsPtr (gst_caps_ref (format.caps.get ()));
   CapsPtr caps (
       scale_caps (rectified.get (), coded_to_fused (format.schedule)));
-  Plan made{std::move (*fuser), {}, options.lookahead};
+  Plan made{std::move (*fuser), {}, {}, options.lookahead};
   gst_video_info_from_caps (&made.fused, caps.get ());
+  gst_video_info_from_caps (
+      &made.uncertainty, of_sixteen_bits (caps.get ()).get ());
   plan_ = std::move (made);
   if (const std::string reason = unrefined (); !reason.empty ())
     POST_WARNING (element (), STREAM, FORMAT,
@@ -506,15 +676,45 @@ Fuse::forget ()
 gboolean
 Fuse::forward (EventPtr event)
 {
+  if (GST_EVENT_IS_SERIALIZED (event.get ()))
+    serve_requested ();
+  const auto made = provenance ();
+  if (const auto pad = uncertainty_pad ()) {
+    const bool start = GST_EVENT_TYPE (event.get ()) == GST_EVENT_STREAM_START;
+    EventPtr own = start ? stream_start_for (pad.get (), event.get ())
+                         : EventPtr (event_for (pad.get (),
+                               gst_event_ref (event.get ()), made.get ()));
+    gst_pad_push_event (GST_PAD (pad.get ()), own.release ());
+  }
   return gst_pad_push_event (GST_PAD (srcpad_.get ()),
-      event_for (srcpad_.get (), event.release (), provenance ().get ()));
+      event_for (srcpad_.get (), event.release (), made.get ()));
 }
 
 CapsPtr
-Fuse::caps_for (const GstCodedPad *) const
+Fuse::caps_for (const GstCodedPad *pad) const
 {
   const ObjectLock lock (element ());
+  if (caps_ && pad->coded.kind == PadKind::uncertainty)
+    return of_sixteen_bits (caps_.get ());
   return CapsPtr (caps_ ? gst_caps_ref (caps_.get ()) : nullptr);
+}
+
+/* The uncertainty has 16 bits, whatever the coded frames have. */
+CapsPtr
+Fuse::convert_caps (const CapsContext &context, const GstCodedPad *pad,
+    GstCaps *caps, bool to_coded) const
+{
+  CapsPtr converted = CodedFilter::convert_caps (context, pad, caps, to_coded);
+  if (pad->coded.kind != PadKind::uncertainty ||
+      gst_caps_is_any (converted.get ()))
+    return converted;
+  if (!to_coded)
+    return of_sixteen_bits (converted.get ());
+  CapsPtr any (gst_caps_make_writable (converted.release ()));
+  for (guint i = 0; i < gst_caps_get_size (any.get ()); i++)
+    gst_structure_remove_field (
+        gst_caps_get_structure (any.get (), i), "format");
+  return any;
 }
 
 CapsScale

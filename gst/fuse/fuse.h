@@ -8,9 +8,11 @@
 #include <variant>
 #include <vector>
 
+#include <gst/base/gstflowcombiner.h>
 #include <gst/gst.h>
 
 #include "common/coded_filter.h"
+#include "common/request_pad.h"
 #include "fuse/fuser.h"
 
 G_BEGIN_DECLS
@@ -28,7 +30,7 @@ using AnyFuser = std::variant<Fuser<std::uint8_t>, Fuser<std::uint16_t>>;
 /** Everything that follows from the format and the settings. */
 struct Plan {
   AnyFuser fuser;
-  GstVideoInfo fused;
+  GstVideoInfo fused, uncertainty;
   int lookahead;
 };
 
@@ -44,6 +46,8 @@ public:
   explicit Fuse (GstCodedExposureFuse *element);
 
   static void set_up_class (gpointer klass);
+  GstPad *request_pad ();
+  void release_pad (GstPad *pad);
 
 private:
   static const PropertyTable<Settings> &properties ();
@@ -59,11 +63,11 @@ private:
   void forget () override;
   void cancel () override;
   void resume () override;
-  void each_pad (const PadVisitor &visit) const override
-  {
-    visit (srcpad_.get ());
-  }
+  void flushed () override;
+  void each_pad (const PadVisitor &visit) const override;
   CapsPtr caps_for (const GstCodedPad *pad) const override;
+  CapsPtr convert_caps (const CapsContext &context, const GstCodedPad *pad,
+      GstCaps *caps, bool to_coded) const override;
   CapsScale scale_for (
       const Schedule &schedule, const GstCodedPad *pad) const override;
   int pictures_a_frame (const GstCodedPad *) const override
@@ -78,14 +82,29 @@ private:
   template <typename Pixel>
   Result<guint64> take_pixels (MappedFrame &coded);
   GstFlowReturn take (CodedFrame frame);
-  GstFlowReturn render (std::vector<BufferPtr> &buffers);
+  /** The pictures of a pad for one coded frame. */
+  struct Pictures {
+    GstCodedPad *pad;
+    const GstVideoInfo &info;
+    std::vector<BufferPtr> buffers = {};
+    std::vector<MappedFrame> mapped = {};
+  };
+  GstFlowReturn acquire_all (Pictures &pictures) const;
+  GstFlowReturn render (Pictures &fused, Pictures *uncertainty);
+  GstFlowReturn push_one (Pictures &pictures, const CodedFrame &coded, int k);
+  GstFlowReturn combine_flow (GstCodedPad *pad, GstFlowReturn flow);
+  void serve_requested ();
+  ObjectPtr<GstCodedPad> uncertainty_pad () const;
   GstFlowReturn push_oldest ();
   /** Start of slot @p k by even steps, from the frame's PTS. */
   GstClockTime boundary (int k) const;
 
   const ObjectPtr<GstCodedPad> srcpad_;
+  RequestPad uncertainty_;
 
   /* Object lock. */
+  std::unique_ptr<GstFlowCombiner, FreeWith<gst_flow_combiner_free>> combiner_{
+      gst_flow_combiner_new ()};
   Settings settings_;
   CapsPtr caps_;
   std::stop_source stop_; ///< of the fusion that is under way

@@ -147,6 +147,13 @@ Engine::Engine (const Schedule &schedule, int width, int height,
   if (options.refine && unrefined_.empty ())
     refiner_.emplace (
         schedule, width, height, observation_.noise_free (), typical_noise ());
+  make_uncertainty_ = [=, this, quality = options.quality,
+                          scene = options.scene.moving] {
+    const bool learned = refiner_ && quality == FuseQuality::kBest;
+    uncertainty_.emplace (schedule, phases_, observation_,
+        learned ? FuseQuality::kLearned : quality, scene, Extent{width, height},
+        steps);
+  };
 }
 
 void
@@ -418,6 +425,26 @@ Engine::each_part (
   });
 }
 
+/* The mean squared error of the best model around the pixels of row @row of
+ * blocks. */
+void
+Engine::set_misfit (int row, const float *const *errors, int models)
+{
+  const float area = float (predictions_->area ());
+  const Extent blocks = Predictions::blocks ({width_, height_});
+  const int end = row + 1 < blocks.height ? 2 * row + 2 : height_;
+  for (int y = 2 * row; y < end; y++) {
+    float *to = misfit_->row (y);
+    for (int x = 0; x < width_; x++) {
+      const int block = std::min (x / 2, blocks.width - 1);
+      float least = errors[0][block];
+      for (int k = 1; k < models; k++)
+        least = std::min (least, errors[k][block]);
+      to[x] = least / area + kErrorFloor;
+    }
+  }
+}
+
 /* Models are compared by the sums of their squared errors. Their power of 8
  * stands for the number of independent errors in a square. */
 void
@@ -433,6 +460,8 @@ Engine::compare_predictions (
       rows.worker, [&] (int row, const float *const *errors) {
         static_pixels_.set_errors (kernels_, row, predictions_->area (),
             errors[0], errors[classes - 1]);
+        if (misfit_ && !models_.empty ())
+          set_misfit (row, errors + 1, classes - 1);
         if (preferences_.empty ())
           return;
         to.clear ();
@@ -556,7 +585,7 @@ bool
 Engine::fuse_motion (const Coded &coded, const RowSink &sink, Workers &workers,
     std::stop_token stop)
 {
-  if (!motion_->run (kernels_, coded.pairs, light_, workers, stop))
+  if (!motion_->run (kernels_, coded.pairs, light_, misfit_, workers, stop))
     return false;
   if (collaborative_ && !collaborative_->run (kernels_, coded.light,
                             typical_noise (), light_, workers, stop))
@@ -572,9 +601,18 @@ Engine::fuse_motion (const Coded &coded, const RowSink &sink, Workers &workers,
 }
 
 bool
-Engine::fuse (const RowSink &sink, Workers &workers, std::stop_token stop)
+Engine::fuse (const RowSink &wanted, Workers &workers, std::stop_token stop,
+    const Uncertainty::Sink &deviations)
 {
   const Coded &coded = queue_.front ();
+  if (deviations && !uncertainty_)
+    make_uncertainty_ ();
+  misfit_ = deviations ? &uncertainty_->misfit () : nullptr;
+  const RowSink measured = [&] (int y, const float *const *slots) {
+    uncertainty_->set_row (y, slots);
+    wanted (y, slots);
+  };
+  const RowSink &sink = deviations ? measured : wanted;
   const RowSink estimated = [this] (int y, const float *const *slots) {
     refiner_->set_row (y, slots);
   };
@@ -608,9 +646,22 @@ Engine::fuse (const RowSink &sink, Workers &workers, std::stop_token stop)
         kernels_, coded.light,
         [this] (int y) { return static_pixels_.weight (y); }, sink, workers,
         stop);
+  if (done && deviations)
+    done = uncertainty_->run (kernels_, {coded.light, noise_, static_pixels_},
+        deviations, workers, stop);
   spare_ = std::exchange (previous_, std::move (queue_.front ()));
   queue_.pop_front ();
   return done;
+}
+
+void
+Engine::each_uncertain_row (const UseUncertain &use, Workers &workers) const
+{
+  uncertainty_->each_row (kernels_, {previous_.light, noise_, static_pixels_},
+      [&] (int slot, int y, const Uncertainty::Pixel *pixels) {
+        use (slot, y, pixels, static_pixels_.weight (y));
+      },
+      workers, {});
 }
 
 double

@@ -22,6 +22,7 @@
 #include "fuse/refine.h"
 #include "fuse/sparse_bank.h"
 #include "fuse/static_pixels.h"
+#include "fuse/uncertainty.h"
 
 namespace codedexposure::fuse
 {
@@ -54,9 +55,18 @@ public:
   void take ();
 
   int pending () const { return int (queue_.size ()); }
-  /** False when it was stopped; the frame is dropped then. */
-  bool fuse (const RowSink &sink, Workers &workers, std::stop_token stop);
+  /** @p deviations  gets the half-width of the 68 % interval of each pixel, if
+   *                 it is set.
+   * False when it was stopped; the frame is dropped then. */
+  bool fuse (const RowSink &sink, Workers &workers, std::stop_token stop,
+      const Uncertainty::Sink &deviations = {});
   void forget ();
+  /** What the deviations of the last frame were computed from, row by row, and
+   * the weight of static pixels, for tests/quality/uncertainty. Only after a
+   * fuse () that gave deviations. */
+  using UseUncertain = std::function<void (int slot, int y,
+      const Uncertainty::Pixel *pixels, const float *is_static)>;
+  void each_uncertain_row (const UseUncertain &use, Workers &workers) const;
 
 private:
   Engine (const Schedule &schedule, int width, int height,
@@ -102,6 +112,7 @@ private:
    */
   void compare_predictions (const Filters &filters, const SplitFrames &frames,
       StaticPixels::Rows rows);
+  void set_misfit (int row, const float *const *errors, int models);
   struct Estimates;
   void share (const Field &coded, int y, Estimates &to) const;
   void estimate (const Filters &filters, const SplitFrames &frames, int y,
@@ -121,6 +132,7 @@ private:
   const Kernels &kernels_;
   int radius_;
   float steps_; ///< of 16 bits, per grey level
+  std::function<void ()> make_uncertainty_;
   std::optional<Predictions> predictions_;
   std::vector<SceneClass> models_;             ///< of fast
   std::vector<SceneClass> models_over_frames_; ///< with neighbouring frames
@@ -131,7 +143,9 @@ private:
   std::vector<Field> preferences_; ///< of blocks, for each of several models
   std::optional<MotionFilter> motion_;
   std::optional<CollaborativeFilter> collaborative_;
-  std::vector<Field> light_; ///< of each slot, unless fast
+  std::vector<Field> light_;               ///< of each slot, unless fast
+  std::optional<Uncertainty> uncertainty_; ///< made when it is first wanted
+  Field *misfit_ = nullptr;                ///< of the frame; null: not wanted
   std::optional<Refiner> refiner_;
   std::string unrefined_;
   NoiseMap noise_;

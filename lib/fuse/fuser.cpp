@@ -168,10 +168,11 @@ struct Fuser<Pixel>::State {
   std::unique_ptr<Workers> workers;
 
   Result<void> take (ImageView<const Pixel> coded);
-  Result<void> check (
-      std::span<const ImageView<Pixel>> frames, Extent size) const;
+  Result<void> check (std::span<const ImageView<Pixel>> frames,
+      std::span<const ImageView<std::uint16_t>> uncertainty, Extent size) const;
   /** False when it was stopped. */
-  bool fuse (std::span<const ImageView<Pixel>> frames, std::stop_token stop);
+  bool fuse (std::span<const ImageView<Pixel>> frames, std::stop_token stop,
+      std::span<const ImageView<std::uint16_t>> uncertainty);
   void forget ();
   /** What @p function returns; when that is an error, the pieces may have
    * gone different ways, and all forget. */
@@ -198,27 +199,31 @@ Fuser<Pixel>::State::take (ImageView<const Pixel> coded)
 
 template <typename Pixel>
 Result<void>
-Fuser<Pixel>::State::check (
-    std::span<const ImageView<Pixel>> frames, Extent size) const
+Fuser<Pixel>::State::check (std::span<const ImageView<Pixel>> frames,
+    std::span<const ImageView<std::uint16_t>> uncertainty, Extent size) const
 {
   if (pieces.front ().engine->pending () == 0)
     return Error{"no coded frame is pending; take () one first"};
-  if (int (frames.size ()) != slots)
-    return Error{std::to_string (frames.size ()) + " views instead of " +
-                 std::to_string (slots) + ", one for each slot"};
-  std::array<ViewBytes, Schedule::kMaxSlots> outputs;
-  for (std::size_t k = 0; k < frames.size (); k++) {
-    outputs[k] = ViewBytes::of (frames[k]);
+  for (const std::size_t count : {frames.size (),
+           uncertainty.empty () ? frames.size () : uncertainty.size ()})
+    if (int (count) != slots)
+      return Error{std::to_string (count) + " views instead of " +
+                   std::to_string (slots) + ", one for each slot"};
+  std::vector<ViewBytes> outputs;
+  for (const auto &frame : frames)
+    outputs.push_back (ViewBytes::of (frame));
+  for (const auto &frame : uncertainty)
+    outputs.push_back (ViewBytes::of (frame));
+  for (const ViewBytes &output : outputs)
     RETURN_IF_ERROR (
-        check_view (outputs[k], "fused frame", size.width, size.height));
-  }
-  return check_apart (std::span (outputs).first (frames.size ()));
+        check_view (output, "fused frame", size.width, size.height));
+  return check_apart (outputs);
 }
 
 template <typename Pixel>
 bool
-Fuser<Pixel>::State::fuse (
-    std::span<const ImageView<Pixel>> frames, std::stop_token stop)
+Fuser<Pixel>::State::fuse (std::span<const ImageView<Pixel>> frames,
+    std::stop_token stop, std::span<const ImageView<std::uint16_t>> uncertainty)
 {
   const float scale = largest / kWhite;
   bool done = true;
@@ -236,7 +241,16 @@ Fuser<Pixel>::State::fuse (
         else
           std::copy_n (row (k - 1), width, row (k));
     };
-    done &= piece.engine->fuse (write, *workers, stop);
+    const fuse::Uncertainty::Sink write_deviation =
+        [&] (int slot, int y, const float *deviation) {
+          for (std::size_t k = std::size_t (slot) * held;
+               k < std::size_t (slot + 1) * held; k++)
+            piece.engine->kernels ().to_words (deviation,
+                float (kUncertaintyWhite) / kWhite, 65535.0f, width,
+                uncertainty[k].row (top + y) + left);
+        };
+    done &= piece.engine->fuse (write, *workers, stop,
+        uncertainty.empty () ? fuse::Uncertainty::Sink () : write_deviation);
   }
   return done;
 }
@@ -356,12 +370,12 @@ Fuser<Pixel>::pending () const
 
 template <typename Pixel>
 Result<void>
-Fuser<Pixel>::fuse (
-    std::span<const ImageView<Pixel>> frames, std::stop_token stop)
+Fuser<Pixel>::fuse (std::span<const ImageView<Pixel>> frames,
+    std::stop_token stop, std::span<const ImageView<std::uint16_t>> uncertainty)
 {
-  RETURN_IF_ERROR (state_->check (frames, size ()));
+  RETURN_IF_ERROR (state_->check (frames, uncertainty, size ()));
   return state_->or_forget ([&] () -> Result<void> {
-    if (state_->fuse (frames, std::move (stop)))
+    if (state_->fuse (frames, std::move (stop), uncertainty))
       return {};
     return Error{"stopped", ErrorCode::cancelled};
   });

@@ -84,6 +84,8 @@ public:
    * the noise is 0. Fused with as many before it, and lookahead after it, a
    * part of a stream gives the same pixels as the whole. */
   static constexpr int kMaxHistory = 16;
+  /** 256 steps per grey level of 8 bits. */
+  static constexpr int kUncertaintyWhite = 255 * 256;
 
   /** @p width, @p height  of the coded frames, the pilot's rows included.
    * Error when an option or the schedule is out of the bounds above. */
@@ -112,12 +114,16 @@ public:
    * @p frames  slots () views of size (), in exposure order, fully
    *            overwritten; none overlaps another.
    * @p stop    another thread can request it if balanced or best take too long.
+   * @p uncertainty  none, or as many views like them: half the width of the
+   *            interval that holds 68 % of the errors of each pixel, of which
+   *            the value kUncertaintyWhite is as much as white.
    * Error when no frame is pending or a view is wrong; the frame stays pending
    * then. ErrorCode::cancelled when it was stopped: then, and after
    * ErrorCode::out_of_memory, the contents of the views are undefined, and the
    * stream is as after forget (). */
-  Result<void> fuse (
-      std::span<const ImageView<Pixel>> frames, std::stop_token stop = {});
+  Result<void> fuse (std::span<const ImageView<Pixel>> frames,
+      std::stop_token stop = {},
+      std::span<const ImageView<std::uint16_t>> uncertainty = {});
   /** Starts anew after lost frames or a seek: the next frame does not continue
    * the previous ones. Pending frames are dropped. */
   void forget ();

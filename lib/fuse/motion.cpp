@@ -144,7 +144,7 @@ MotionFilter::measure (
 /* Weights (best error / error) ^ 12.5, the number of independent errors in the
  * surroundings being some 25. */
 void
-MotionFilter::set_weights (Band &band) const
+MotionFilter::set_weights (Band &band, Field *misfit) const
 {
   const int width = band.along.width ();
   Field room (width, 2);
@@ -159,6 +159,8 @@ MotionFilter::set_weights (Band &band) const
         best[x] = std::min (best[x], fit[x]);
       }
     }
+    if (misfit)
+      std::copy_n (best, width, misfit->row (band.first + y));
     for (Field &field : band.fit) {
       float *fit = field.row (y);
       for (int x = 0; x < width; x++) {
@@ -200,7 +202,8 @@ MotionFilter::mix (const Kernels &kernels, const PairField &coded,
 
 bool
 MotionFilter::run (const Kernels &kernels, const PairField &coded,
-    std::span<Field> slots, Workers &workers, std::stop_token stop) const
+    std::span<Field> slots, Field *misfit, Workers &workers,
+    std::stop_token stop) const
 {
   const int height = coded.height ();
   std::vector<std::optional<Band>> bands (std::size_t (workers.count ()));
@@ -212,7 +215,7 @@ MotionFilter::run (const Kernels &kernels, const PairField &coded,
         band->first = part * kBandRows;
         band->rows = std::min (kBandRows, height - band->first);
         measure (kernels, coded, *band);
-        set_weights (*band);
+        set_weights (*band, misfit);
         mix (kernels, coded, *band, slots);
       },
       stop);

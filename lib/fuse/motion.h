@@ -31,15 +31,18 @@ public:
 
   /** Writes the light of every slot to @p slots, fields of the size of
    * @p coded. The result does not depend on the number of workers.
+   * @p misfit  null, or gets the mean squared error around each pixel of the
+   *            class that fits best there, in grey levels squared.
    * @return  false when it was stopped. */
   bool run (const Kernels &kernels, const PairField &coded,
-      std::span<Field> slots, Workers &workers, std::stop_token stop) const;
+      std::span<Field> slots, Field *misfit, Workers &workers,
+      std::stop_token stop) const;
 
 private:
   struct Band;
   void measure (
       const Kernels &kernels, const PairField &coded, Band &band) const;
-  void set_weights (Band &band) const;
+  void set_weights (Band &band, Field *misfit) const;
   void mix (const Kernels &kernels, const PairField &coded, const Band &band,
       std::span<Field> slots) const;
 

@@ -83,6 +83,13 @@ public:
   {
     return average_ ? light_.row (y) : coded.row (y);
   }
+  /** Frames of which light () is the mean. */
+  float frames (int x, int y) const
+  {
+    return average_ && light_.row (y)[x] == mean_.row (y)[x]
+               ? count_.row (y)[x]
+               : 1.0f;
+  }
 
 private:
   void compare_frames (const Kernels &kernels, const Field &now,

@@ -83,6 +83,46 @@ TEST (FusionQuality, MotionIsTruerThanAFilterAndLikenessThanMotion)
   EXPECT_GT (best, bicubic + 0.5);
 }
 
+/* Estimated pixels of a drawn scene; the factors were fitted to others. */
+TEST (FusionQuality, ErrorsLieWithinTheUncertainty)
+{
+  constexpr int kSize = 96, kSlots = 4;
+  const Scene scene = leaves_scene (3, kSize, kSlots);
+  const Schedule schedule = fusion_schedule (kSlots);
+  for (const bool noisy : {false, true}) {
+    const Condition condition = noisy ? kNoisy : Condition ();
+    FuseOptions options;
+    options.noise = {condition.electrons, condition.read_noise};
+    auto fuser =
+        Fuser<std::uint8_t>::make (schedule, kSize, kSize, options).value ();
+    ASSERT_TRUE (fuser.take (take (scene, schedule, condition)[0].view ()));
+    std::vector<Picture> fused (kSlots, Picture (kSize, kSize));
+    std::vector<Image<std::uint16_t>> deviations (
+        kSlots, Image<std::uint16_t> (kSize, kSize));
+    std::vector<ImageView<std::uint8_t>> views;
+    std::vector<ImageView<std::uint16_t>> deviation_views;
+    for (std::size_t s = 0; s < kSlots; s++) {
+      views.push_back (fused[s].view ());
+      deviation_views.push_back (deviations[s].view ());
+    }
+    ASSERT_TRUE (fuser.fuse (views, {}, deviation_views));
+    int pixels = 0, within = 0, within_twice = 0;
+    for (std::size_t s = 0; s < kSlots; s++)
+      for (int y = 0; y < kSize; y++)
+        for (int x = 0; x < kSize; x++) {
+          if ((x + 2 * y) % kSlots == int (s))
+            continue;
+          const int error =
+              256 * std::abs (fused[s].at (x, y) - scene.frames[s].at (x, y));
+          pixels++;
+          within += error <= deviations[s].at (x, y);
+          within_twice += error <= 2 * deviations[s].at (x, y);
+        }
+    EXPECT_NEAR (100.0 * within / pixels, 68.0, 12.0) << noisy;
+    EXPECT_NEAR (100.0 * within_twice / pixels, 94.0, 4.0) << noisy;
+  }
+}
+
 TEST (FusionQuality, SsimIsOneOfThatWhichIsTheSame)
 {
   const Scene scene = synthetic_scene (64, 48, 2);

@@ -1,0 +1,139 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Writes what the uncertainty of fused pixels is computed from, and their
+ * errors, for tests/quality/uncertainty. */
+#include <array>
+#include <cstdio>
+#include <iostream>
+#include <random>
+
+#include "footage.h"
+#include "fuse/engine.h"
+#include "fusion_figures.h"
+#include "must.h"
+
+namespace
+{
+
+using namespace codedexposure;
+using namespace codedexposure::quality;
+
+/* One pixel, as float32: quality, slots, noisy, number of the scene, measured,
+ * then the logarithms of A, D, L and V, N, the error in grey levels, and the
+ * deviation by which the library says that it is expected. */
+using Record = std::array<float, 12>;
+
+constexpr int kFrames = 16, kSide = 256;
+
+Scene
+cropped (const Scene &scene)
+{
+  Scene part{scene.name, {}};
+  for (const Picture &frame : scene.frames) {
+    if (part.frames.size () == kFrames)
+      break;
+    Picture crop (
+        std::min (kSide, frame.width ()), std::min (kSide, frame.height ()));
+    for (int y = 0; y < crop.height (); y++)
+      for (int x = 0; x < crop.width (); x++)
+        crop.at (x, y) = frame.at (x, y);
+    part.frames.push_back (std::move (crop));
+  }
+  return part;
+}
+
+/* A tenth of the pixels that are not static. */
+void
+write_features (
+    const Scene &scene, int number, int n, bool noisy, FuseQuality quality)
+{
+  const Condition condition =
+      noisy ? Condition{.electrons = 10000.0, .read_noise = 5.0} : Condition{};
+  const Schedule schedule = fusion_schedule (n);
+  const auto coded = take (scene, schedule, condition);
+  FuseOptions options;
+  options.quality =
+      quality == FuseQuality::kLearned ? FuseQuality::kBest : quality;
+  options.refine = quality == FuseQuality::kLearned;
+  options.noise = {condition.electrons, condition.read_noise};
+  const int width = coded[0].width (), height = coded[0].height ();
+  auto engine =
+      must (fuse::Engine::make (schedule, width, height, options, 255.0));
+
+  Workers workers (1);
+  std::mt19937 dice (std::mt19937::result_type (100 * number + n));
+  for (std::size_t frame = 0; frame < coded.size (); frame++) {
+    Field &light = engine->next ();
+    for (int y = 0; y < height; y++)
+      for (int x = 0; x < width; x++)
+        light.row (y)[x] = coded[frame].at (x, y);
+    engine->take ();
+    std::vector<Field> fused (std::size_t (n), Field (width, height));
+    std::vector<Field> deviations (fused);
+    engine->fuse (
+        [&] (int y, const float *const *rows) {
+          for (int s = 0; s < n; s++)
+            std::copy_n (rows[s], width, fused[std::size_t (s)].row (y));
+        },
+        workers, {},
+        [&] (int s, int y, const float *row) {
+          std::copy_n (row, width, deviations[std::size_t (s)].row (y));
+        });
+    engine->each_uncertain_row (
+        [&] (int s, int y, const fuse::Uncertainty::Pixel *pixels,
+            const float *is_static) {
+          const Picture &truth =
+              scene.frames[frame * std::size_t (n) + std::size_t (s)];
+          for (int x = 0; x < width; x++) {
+            const unsigned drawn = dice ();
+            const auto &p = pixels[x];
+            if (drawn % 16 != 0 || is_static[x] > 0.0f ||
+                (p.measured && !noisy))
+              continue;
+            /* The scene is rounded; where in its grey level the light was is
+             * not known. */
+            const float within = float (drawn >> 8) / 16777216.0f - 0.5f;
+            const Record record{float (int (quality)), float (n), float (noisy),
+                float (number), float (p.measured), p.misfit, p.change,
+                p.roughness, p.geometry, p.noise,
+                fused[std::size_t (s)].row (y)[x] - float (truth.at (x, y)) +
+                    within,
+                deviations[std::size_t (s)].row (y)[x]};
+            std::fwrite (record.data (), sizeof record, 1, stdout);
+          }
+        },
+        workers);
+  }
+}
+
+} // namespace
+
+/* uncertainty_features FOLDER|drawn: raw clips with a manifest.json, or the
+ * project's own drawn scenes. */
+int
+main (int argc, char **argv)
+{
+  if (argc != 2)
+    return 2;
+  std::vector<Scene> scenes;
+  if (std::string (argv[1]) == "drawn") {
+    scenes.push_back (synthetic_scene (160, 128, kFrames));
+    for (unsigned seed = 1; seed <= 8; seed++)
+      scenes.push_back (leaves_scene (seed, 160, kFrames));
+  } else {
+    auto clips = read_clips (argv[1], kFrames);
+
+    scenes = *std::move (clips);
+  }
+  int number = 0;
+  for (const Scene &scene : scenes) {
+    number++;
+    for (const int n : {4, 8})
+      for (const bool noisy : {false, true})
+        for (const FuseQuality quality :
+            {FuseQuality::kFast, FuseQuality::kBalanced, FuseQuality::kBest,
+                FuseQuality::kLearned})
+          write_features (cropped (scene), number, n, noisy, quality);
+    std::cerr << scene.name << '\n';
+  }
+  return 0;
+}

@@ -299,7 +299,7 @@ def bit_reversed(n):
 def choose_schedule(rng):
     """Text of a schedule, n, and the slot of each pixel."""
     n = int(rng.choice([8, 4, 16, 2, 3, 5, 6, 7, 9, 10, 12],
-                       p=[.34, .32, .08, .04] + [.22 / 7] * 7))
+                       p=[.38, .36, .06, .03] + [.17 / 7] * 7))
     y, x = np.mgrid[:HEIGHT, :WIDTH]
     if n in RASTERS and rng.random() < .15:
         width, height = RASTERS[n]
@@ -330,7 +330,7 @@ def observe(scene, rng, folder):
     schedule, n, slot = choose_schedule(rng)
     quality = rng.choice(['best', 'balanced', 'fast'], p=[.6, .22, .18])
     full_well, read_noise = 0., 0.
-    if rng.random() < .35:
+    if rng.random() < .3:
         full_well = math.exp(rng.uniform(math.log(3000), math.log(40000)))
         read_noise = rng.uniform(0, 10)
     coded_count = len(scene) // n

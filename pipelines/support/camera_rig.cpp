@@ -389,8 +389,9 @@ CameraRig::park ()
   stopped_ = monotonic_now ();
 }
 
-/** Whether a frame would have come before the masks were stopped if it were as
- * fast as others are: a busy machine or network held it up. */
+/** Whether a frame was exposed before the masks were stopped, if others are as
+ * fast as a frame can be: a busy machine or network held it up. After a stop,
+ * there is no trigger for a period at least. */
 bool
 CameraRig::is_outdated (const SeenFrame &frame)
 {
@@ -398,7 +399,9 @@ CameraRig::is_outdated (const SeenFrame &frame)
   delays_.push_back (frame.arrival - frame.time);
   if (delays_.size () > kRecent)
     delays_.pop_front ();
-  return frame.time + *std::ranges::min_element (delays_) < stopped_;
+  const Nanoseconds earliest =
+      frame.time + *std::ranges::min_element (delays_); // arrival
+  return earliest < stopped_ + exposure_ + options_.rate.period ();
 }
 
 void

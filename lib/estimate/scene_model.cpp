@@ -114,4 +114,14 @@ motion_classes ()
   return classes;
 }
 
+std::vector<SceneClass>
+lasting_classes ()
+{
+  std::vector<SceneClass> classes = motion_classes ();
+  std::erase_if (classes, [] (const SceneClass &patch) {
+    return patch.moves () || patch.correlation < 0.99;
+  });
+  return classes;
+}
+
 } // namespace codedexposure

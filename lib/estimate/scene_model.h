@@ -60,5 +60,8 @@ struct SceneModel {
 /** Still and moving patches for motion-adaptive fusion: up to 4 px per slot
  * along each axis. */
 std::vector<SceneClass> motion_classes ();
+/** Those of them whose patches are still there, in the same place, in the
+ * coded frames before and after. */
+std::vector<SceneClass> lasting_classes ();
 
 } // namespace codedexposure

@@ -33,9 +33,9 @@ constexpr float kErrorFloor = 0.5f;
 /* No model has less weight, so that there is always one. */
 constexpr float kMinWeight = 1e-6f;
 
-/* Of the taps in the coded frames before and after, px: for estimates, and for
- * the comparison of models. Larger ones are not more accurate. */
-constexpr double kNeighbourRadius = 2.3, kComparedRadius = 1.2;
+/* Of the taps in the coded frames before and after, px, for the comparison of
+ * models. */
+constexpr double kComparedRadius = 1.2;
 /* Squared errors of filters beyond those with all taps, as a part of them: for
  * estimates, and for the comparison of models. */
 constexpr double kExcess = 0.015, kPredictionExcess = 0.01;
@@ -246,8 +246,14 @@ Engine::prepare (const Schedule &schedule, const FuseOptions &options)
         models_over_frames_.size (), Field (blocks.width, blocks.height));
   if (!models_.empty ())
     return;
+  MotionFilter::Classes classes{motion_classes (), lasting_classes ()};
+  for (const SceneClass &model : {options.scene.slow, options.scene.moving})
+    classes.of_frame.push_back (model);
+  for (const SceneClass &model :
+      {options.scene.slow_over_frames, options.scene.medium_over_frames})
+    classes.over_frames.push_back (model);
   motion_.emplace (
-      phases_, observation_, motion_classes (), radius_, noise, steps_);
+      phases_, observation_, std::move (classes), radius_, noise, steps_);
   if (options.quality == FuseQuality::kBest)
     collaborative_.emplace (schedule, observation_, width_, height_);
   light_.assign (std::size_t (slots ()), Field (width_, height_));
@@ -256,12 +262,7 @@ Engine::prepare (const Schedule &schedule, const FuseOptions &options)
 std::vector<Tap>
 Engine::Around::taps (double own, double neighbours) const
 {
-  std::vector<Tap> all = taps_within (own);
-  for (const int frame : {-1, 1})
-    if (frame < 0 ? previous : next)
-      std::ranges::copy (
-          taps_within (neighbours, frame), std::back_inserter (all));
-  return all;
+  return taps_around (own, neighbours, previous, next);
 }
 
 /* Filters of many slots would take too long to be made sparse. */
@@ -582,19 +583,19 @@ Engine::fuse_linear (const Filters &filters, const Field &coded,
 }
 
 bool
-Engine::fuse_motion (const Coded &coded, const RowSink &sink, Workers &workers,
-    std::stop_token stop)
+Engine::fuse_motion (const Field &coded, const PairFrames &frames,
+    const RowSink &sink, Workers &workers, std::stop_token stop)
 {
-  if (!motion_->run (kernels_, coded.pairs, light_, misfit_, workers, stop))
+  if (!motion_->run (kernels_, frames, light_, misfit_, workers, stop))
     return false;
-  if (collaborative_ && !collaborative_->run (kernels_, coded.light,
-                            typical_noise (), light_, workers, stop))
+  if (collaborative_ && !collaborative_->run (kernels_, coded, typical_noise (),
+                            light_, workers, stop))
     return false;
   std::vector<float *> rows (light_.size ());
   for (int y = 0; y < height_; y++) {
     for (std::size_t s = 0; s < rows.size (); s++)
       rows[s] = light_[s].row (y);
-    blend (coded.light, y, rows.data ());
+    blend (coded, y, rows.data ());
     sink (y, rows.data ());
   }
   return true;
@@ -627,6 +628,8 @@ Engine::fuse (const RowSink &wanted, Workers &workers, std::stop_token stop,
     if (queue_.size () > 1)
       neighbours[2] = &queue_[1].split;
   }
+  const PairFrames all{previous_.light.empty () ? nullptr : &previous_.pairs,
+      &coded.pairs, queue_.size () > 1 ? &queue_[1].pairs : nullptr};
   const Filters &filters = filters_for (neighbours);
   predictions_->make_room (workers.count ());
   static_pixels_.make_room (workers.count ());
@@ -640,7 +643,8 @@ Engine::fuse (const RowSink &wanted, Workers &workers, std::stop_token stop,
       fuse_linear (filters, coded.light, neighbours, out, rows);
   });
   static_pixels_.finish (frames);
-  bool done = !models_.empty () || fuse_motion (coded, out, workers, stop);
+  bool done =
+      !models_.empty () || fuse_motion (coded.light, all, out, workers, stop);
   if (done && refiner_)
     done = refiner_->run (
         kernels_, coded.light,

@@ -121,8 +121,8 @@ private:
       const SplitFrames &frames, const RowSink &sink,
       StaticPixels::Rows part) const;
   void blend (const Field &coded, int y, float *const *rows) const;
-  bool fuse_motion (const Coded &coded, const RowSink &sink, Workers &workers,
-      std::stop_token stop);
+  bool fuse_motion (const Field &coded, const PairFrames &frames,
+      const RowSink &sink, Workers &workers, std::stop_token stop);
   /** Standard deviation of coded pixels in grey levels. */
   double typical_noise () const;
 

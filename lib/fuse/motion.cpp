@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <optional>
+#include <utility>
 
 #include "estimate/kriging.h"
 
@@ -15,8 +15,8 @@ namespace
 {
 
 /* Surroundings over which the error of a class is averaged. */
-constexpr double kSigma = 2.5;
-constexpr int kReach = 8;
+constexpr double kSigma = 3.2;
+constexpr int kReach = 10;
 /* Rows that a worker takes at a time. */
 constexpr int kBandRows = 48;
 /* Classes whose error is measured at a time: the outputs of one pass of a
@@ -70,57 +70,91 @@ private:
 
 /* Rows first .. first + rows - 1 of a frame that is being filtered. */
 struct MotionFilter::Band {
-  Band (int width, std::size_t classes)
-      : fit (classes, Field (width, kBandRows)),
+  Band (int width, const std::vector<float> &factors_of_classes)
+      : factors (factors_of_classes),
+        fit (factors.size (), Field (width, kBandRows)),
         squares (kChunk, Field (width, kBandRows, kReach)),
         along (width, kBandRows + 2 * kReach)
   {
   }
 
   int first = 0, rows = 0;
+  std::vector<float> factors; ///< of each class
   std::vector<Field> fit;     ///< of each class: error, then weight
   std::vector<Field> squares; ///< of a chunk: squared residuals
   Field along;                ///< blurred along x
 };
 
 MotionFilter::MotionFilter (const Phases &phases,
-    const Observation &observation, std::span<const SceneClass> classes,
-    int radius, std::span<const double> noise, float steps)
-    : phases_ (phases)
+    const Observation &observation, Classes classes, int radius,
+    std::span<const double> noise, float steps)
+    : phases_ (phases), observation_ (observation),
+      classes_ (std::move (classes)), radius_ (radius),
+      noise_ (noise.begin (), noise.end ()), steps_ (steps),
+      of_frame_ (make_set (classes_.of_frame, taps_within (radius + 0.5)))
 {
-  const std::vector<Tap> taps = taps_within (radius + 0.5);
+}
+
+/* Under a class whose motion brings several samples to the same places of the
+ * patch, pixels are predicted well and the gaps between these places are not.
+ * Errors therefore count by how much larger the class expects those of the
+ * slots to be. Half of this ratio's logarithm, as gaps are easier to fill than
+ * the class says where light changes along one direction only. */
+MotionFilter::Set
+MotionFilter::make_set (
+    std::span<const SceneClass> classes, std::span<const Tap> taps) const
+{
+  Set set;
   for (std::size_t c = 0; c < classes.size (); c++) {
     const SceneClass &patch = classes[c];
     if (c % kChunk == 0)
-      residuals_.emplace_back (
-          phases, taps, int (std::min (kChunk, classes.size () - c)), steps);
-    penalties_.push_back (float (1.0 + 0.1 * std::hypot (patch.vx, patch.vy)));
-    filters_.emplace_back (phases, taps, observation.slots (), steps);
-    for_each_phase (phases, observation, patch, taps, noise,
+      set.residuals.emplace_back (
+          phases_, taps, int (std::min (kChunk, classes.size () - c)), steps_);
+    FilterBank &filter =
+        set.filters.emplace_back (phases_, taps, observation_.slots (), steps_);
+    double predicted = 0.0, sought = 0.0;
+    for_each_phase (phases_, observation_, patch, taps, noise_,
         [&] (int row, int x, const PhaseWeights &weights) {
-          filters_.back ().set_all (row, x, weights.slots);
-          residuals_.back ().set (row, x, int (c % kChunk), weights.residual);
+          filter.set_all (row, x, weights.slots);
+          set.residuals.back ().set (
+              row, x, int (c % kChunk), weights.residual);
+          predicted += weights.predicted_variance;
+          sought += weights.slot_variance;
         });
+    set.factors.push_back (float (std::sqrt (sought / predicted)));
   }
+  return set;
+}
+
+const MotionFilter::Set *
+MotionFilter::set_over (const PairFrames &frames)
+{
+  const bool previous = frames[0] != nullptr, next = frames[2] != nullptr;
+  if (!previous && !next)
+    return nullptr;
+  auto &set = over_frames_[(previous ? 1u : 0u) + (next ? 2u : 0u)];
+  if (!set)
+    set = make_set (classes_.over_frames,
+        taps_around (radius_ + 0.5, kNeighbourRadius, previous, next));
+  return &*set;
 }
 
 /* The squared error of every class around each pixel of the band. */
 void
-MotionFilter::measure (
-    const Kernels &kernels, const PairField &coded, Band &band) const
+MotionFilter::measure (const Kernels &kernels, const PairFrames &frames,
+    const Set &set, Band &band, std::span<Field> fit) const
 {
   const Blur blur;
-  const int width = coded.width (), height = coded.height ();
+  const int width = frames[1]->width (), height = frames[1]->height ();
   std::vector<const std::int32_t *> sources;
-  const PairFrames frames{nullptr, &coded, nullptr};
-  for (std::size_t c = 0; c < band.fit.size (); c += kChunk) {
-    const std::size_t count = std::min (kChunk, band.fit.size () - c);
+  for (std::size_t c = 0; c < fit.size (); c += kChunk) {
+    const std::size_t count = std::min (kChunk, fit.size () - c);
     for (int y = -kReach; y < band.rows + kReach; y++) {
       std::array<float *, kChunk> to;
       for (std::size_t i = 0; i < count; i++)
         to[i] = band.squares[i].row (y);
       kernels.filter_pairs_squared (
-          residuals_[c / kChunk].row (
+          set.residuals[c / kChunk].row (
               phases_, frames, mirrored (band.first + y, height), sources),
           to.data ());
     }
@@ -134,15 +168,19 @@ MotionFilter::measure (
         }
         blur.run (kernels, square, 1, width, band.along.row (y + kReach));
       }
-      for (int y = 0; y < band.rows; y++)
+      for (int y = 0; y < band.rows; y++) {
+        float *error = fit[c + i].row (y);
         blur.run (kernels, band.along.row (y + kReach), band.along.stride (),
-            width, band.fit[c + i].row (y));
+            width, error);
+      }
     }
   }
 }
 
-/* Weights (best error / error) ^ 12.5, the number of independent errors in the
- * surroundings being some 25. */
+/* Weights (best error / error) ^ 8. Were the errors independent, the number of
+ * those in the surroundings would ask for a power of some 20; but they are not,
+ * and a mean of several filters is truer than the one that happens to fit best.
+ */
 void
 MotionFilter::set_weights (Band &band, Field *misfit) const
 {
@@ -152,21 +190,25 @@ MotionFilter::set_weights (Band &band, Field *misfit) const
   for (int y = 0; y < band.rows; y++) {
     std::fill_n (best, width, 1e30f);
     std::fill_n (sum, width, 0.0f);
+    float *const raw = misfit ? misfit->row (band.first + y) : nullptr;
     for (std::size_t c = 0; c < band.fit.size (); c++) {
       float *fit = band.fit[c].row (y);
       for (int x = 0; x < width; x++) {
-        fit[x] = penalties_[c] * fit[x] + kErrorFloor;
-        best[x] = std::min (best[x], fit[x]);
+        const float error = fit[x] + kErrorFloor;
+        fit[x] = band.factors[c] * fit[x] + kErrorFloor;
+        if (fit[x] < best[x]) {
+          best[x] = fit[x];
+          if (raw)
+            raw[x] = error;
+        }
       }
     }
-    if (misfit)
-      std::copy_n (best, width, misfit->row (band.first + y));
     for (Field &field : band.fit) {
       float *fit = field.row (y);
       for (int x = 0; x < width; x++) {
         const float ratio = best[x] / fit[x];
         const float fourth = ratio * ratio * ratio * ratio;
-        const float weight = fourth * fourth * fourth * std::sqrt (ratio);
+        const float weight = fourth * fourth;
         fit[x] = weight < kMinWeight ? 0.0f : weight;
         sum[x] += fit[x];
       }
@@ -179,44 +221,62 @@ MotionFilter::set_weights (Band &band, Field *misfit) const
   }
 }
 
+/* Adds the slots of the classes of @set. */
 void
-MotionFilter::mix (const Kernels &kernels, const PairField &coded,
-    const Band &band, std::span<Field> slots) const
+MotionFilter::mix (const Kernels &kernels, const PairFrames &frames,
+    const Set &set, const Band &band, std::span<const Field> fit,
+    std::span<Field> slots) const
 {
   std::vector<const std::int32_t *> sources;
-  const PairFrames frames{nullptr, &coded, nullptr};
   std::vector<float *> to (slots.size ());
-  for (Field &slot : slots)
-    for (int y = 0; y < band.rows; y++)
-      std::fill_n (slot.row (band.first + y), coded.width (), 0.0f);
-  for (std::size_t c = 0; c < filters_.size (); c++) {
+  for (std::size_t c = 0; c < set.filters.size (); c++) {
     for (int y = 0; y < band.rows; y++) {
       for (std::size_t s = 0; s < slots.size (); s++)
         to[s] = slots[s].row (band.first + y);
       kernels.filter_pairs_add (
-          filters_[c].row (phases_, frames, band.first + y, sources),
-          band.fit[c].row (y), to.data ());
+          set.filters[c].row (phases_, frames, band.first + y, sources),
+          fit[c].row (y), to.data ());
     }
   }
 }
 
 bool
-MotionFilter::run (const Kernels &kernels, const PairField &coded,
+MotionFilter::run (const Kernels &kernels, const PairFrames &frames,
     std::span<Field> slots, Field *misfit, Workers &workers,
-    std::stop_token stop) const
+    std::stop_token stop)
 {
-  const int height = coded.height ();
+  const int width = frames[1]->width (), height = frames[1]->height ();
+  std::vector<const Set *> sets{&of_frame_};
+  if (const Set *over = set_over (frames))
+    sets.push_back (over);
+  std::vector<float> factors;
+  for (const Set *set : sets)
+    std::ranges::copy (set->factors, std::back_inserter (factors));
   std::vector<std::optional<Band>> bands (std::size_t (workers.count ()));
   return workers.run ((height + kBandRows - 1) / kBandRows,
       [&] (int part, int worker) {
         auto &band = bands[std::size_t (worker)];
         if (!band)
-          band.emplace (coded.width (), filters_.size ());
+          band.emplace (width, factors);
         band->first = part * kBandRows;
         band->rows = std::min (kBandRows, height - band->first);
-        measure (kernels, coded, *band);
+        const auto each_set = [&] (const auto &use) {
+          std::span<Field> fit (band->fit);
+          for (const Set *set : sets) {
+            use (*set, fit.first (set->filters.size ()));
+            fit = fit.subspan (set->filters.size ());
+          }
+        };
+        each_set ([&] (const Set &set, std::span<Field> fit) {
+          measure (kernels, frames, set, *band, fit);
+        });
         set_weights (*band, misfit);
-        mix (kernels, coded, *band, slots);
+        for (Field &slot : slots)
+          for (int y = 0; y < band->rows; y++)
+            std::fill_n (slot.row (band->first + y), width, 0.0f);
+        each_set ([&] (const Set &set, std::span<Field> fit) {
+          mix (kernels, frames, set, *band, fit, slots);
+        });
       },
       stop);
 }

@@ -2,6 +2,8 @@
 /* Motion-adaptive kriging. */
 #pragma once
 
+#include <array>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -18,39 +20,62 @@ namespace codedexposure::fuse
  * of aliasing: its squared error, averaged around a pixel, measures how well
  * the class fits there. The frames are the sum of the filters of all classes,
  * with weights by how well they fit.
+ *
+ * Some classes exist a second time, with pixels of the coded frames before and
+ * after the one that is fused, and compete with the others.
  */
 class MotionFilter
 {
 public:
+  struct Classes {
+    std::vector<SceneClass> of_frame;
+    std::vector<SceneClass> over_frames; ///< with neighbouring frames
+  };
   /** @p radius  of the taps, px; coded frames have a margin of this size.
    *  @p noise   variance of each element in units of the scene's variance.
    *  @p steps  see FilterBank. */
   MotionFilter (const Phases &phases, const Observation &observation,
-      std::span<const SceneClass> classes, int radius,
-      std::span<const double> noise, float steps);
+      Classes classes, int radius, std::span<const double> noise, float steps);
 
   /** Writes the light of every slot to @p slots, fields of the size of
-   * @p coded. The result does not depend on the number of workers.
+   * @p frames. The result does not depend on the number of workers.
    * @p misfit  null, or gets the mean squared error around each pixel of the
    *            class that fits best there, in grey levels squared.
    * @return  false when it was stopped. */
-  bool run (const Kernels &kernels, const PairField &coded,
+  bool run (const Kernels &kernels, const PairFrames &frames,
       std::span<Field> slots, Field *misfit, Workers &workers,
-      std::stop_token stop) const;
+      std::stop_token stop);
 
 private:
+  /** Classes with the same taps. */
+  struct Set {
+    std::vector<float> factors; ///< of the squared error of each class
+    std::vector<FilterBank>
+        residuals; ///< one output per class, kChunk classes each
+    std::vector<FilterBank> filters; ///< of each class, one output per slot
+  };
+  Set make_set (
+      std::span<const SceneClass> classes, std::span<const Tap> taps) const;
+  const Set *set_over (const PairFrames &frames);
+
   struct Band;
-  void measure (
-      const Kernels &kernels, const PairField &coded, Band &band) const;
+  void measure (const Kernels &kernels, const PairFrames &frames,
+      const Set &set, Band &band, std::span<Field> fit) const;
   void set_weights (Band &band, Field *misfit) const;
-  void mix (const Kernels &kernels, const PairField &coded, const Band &band,
+  void mix (const Kernels &kernels, const PairFrames &frames, const Set &set,
+      const Band &band, std::span<const Field> fit,
       std::span<Field> slots) const;
 
   const Phases &phases_;
-  std::vector<float> penalties_; ///< of fast motion, a factor on its error
-  std::vector<FilterBank>
-      residuals_; ///< one output per class, kChunk classes each
-  std::vector<FilterBank> filters_; ///< of each class, one output per slot
+  const Observation &observation_;
+  Classes classes_;
+  int radius_;
+  std::vector<double> noise_;
+  float steps_;
+  Set of_frame_;
+  /** With taps of the previous, + 2 of the next coded frame. Made when they are
+   * needed. */
+  std::array<std::optional<Set>, 4> over_frames_;
 };
 
 } // namespace codedexposure::fuse

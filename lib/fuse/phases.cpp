@@ -61,8 +61,42 @@ taps_within (double radius, int frame)
   return taps;
 }
 
+std::vector<Tap>
+taps_around (double own, double neighbours, bool previous, bool next)
+{
+  std::vector<Tap> taps = taps_within (own);
+  for (const int frame : {-1, 1})
+    if (frame < 0 ? previous : next)
+      std::ranges::copy (
+          taps_within (neighbours, frame), std::back_inserter (taps));
+  return taps;
+}
+
 namespace
 {
+
+/* The mean over targets of the expected squared error of ordinary kriging in
+ * flat light, 1 - w c + lambda. The multiplier lambda is the same in all
+ * equations of a target; it is taken from that of tap @middle. */
+double
+mean_variance (const KrigingSystem &system, std::size_t middle,
+    std::span<const double> weights, std::size_t targets)
+{
+  const std::size_t m = system.noise.size ();
+  const auto covariance = [&] (std::size_t i) {
+    return system.covariance[std::min (i, middle) * m + std::max (i, middle)];
+  };
+  double sum = 0.0;
+  for (std::size_t k = 0; k < targets; k++) {
+    const double *w = weights.data () + k * m;
+    const double *c = system.targets.data () + k * m;
+    double variance = 1.0 - c[middle] + system.noise[middle] * w[middle];
+    for (std::size_t i = 0; i < m; i++)
+      variance += w[i] * (covariance (i) - c[i]);
+    sum += variance;
+  }
+  return sum / double (targets);
+}
 
 /* The frames of taps as one exposure of several times as many slots. Elements
  * of later frames come after those of earlier ones. */
@@ -155,6 +189,8 @@ weights_of (KrigingSystem system, const Observation &observation,
   for (std::size_t i = 0; i < m; i++)
     weights.residual.push_back (float (
         -residual[std::ptrdiff_t (i)] / residual[std::ptrdiff_t (middle)]));
+  weights.predicted_variance = 1.0 / residual[std::ptrdiff_t (middle)];
+  weights.slot_variance = mean_variance (system, middle, solved, n);
   keep_known (observation, element, m, middle, weights.slots);
   return weights;
 }

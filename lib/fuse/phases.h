@@ -24,6 +24,13 @@ struct Tap {
 
 /** The pixels of a coded frame within @p radius px. */
 std::vector<Tap> taps_within (double radius, int frame = 0);
+/** The pixels within @p own px, and of the coded frames before and after, if
+ * they are used, those within @p neighbours px. */
+std::vector<Tap> taps_around (
+    double own, double neighbours, bool previous, bool next);
+/** Of the taps in the coded frames before and after, px. Larger ones are not
+ * more accurate. */
+constexpr double kNeighbourRadius = 2.3;
 
 /**
  * Which elements lie around a pixel. Pixels with the same neighbourhood are of
@@ -69,6 +76,9 @@ struct PhaseWeights {
   std::vector<float> slots;
   /** Prediction of the middle pixel from all others, less that pixel. */
   std::vector<float> residual;
+  /** Expected squared errors, in units of the scene's variance: of that
+   * prediction, and of the mean slot. */
+  double predicted_variance = 0.0, slot_variance = 0.0;
 };
 
 /** Calls @p use with the weights of every phase, the pixels at @p x of distinct

@@ -1,5 +1,12 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The same with linear algebra, which takes the compiler a second a source. */
-#include "precompiled/std.h"
-
+/* The same for sources with linear algebra, which most of these are. */
 #include <Eigen/Dense>
+#include <functional>
+#include <memory>
+#include <numeric>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>

@@ -45,8 +45,8 @@ public:
       post (level, left);
       return report::format (
           "warning: %u frames wait to be written, the buffer is %.0f %% full "
-          "and lasts %.1f s more; then frames are lost: use --codec raw, a "
-          "faster disk, or fewer frames/s",
+          "and lasts %.1f s more; then frames are lost: use a faster disk, fewer "
+          "frames/s, or raw in place of FFV1",
           level.frames, 100 * level.fill, left);
     }
     if (level.fill < kLow && state_ != kKeepsUp) {

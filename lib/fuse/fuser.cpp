@@ -204,16 +204,19 @@ Fuser<Pixel>::State::check (std::span<const ImageView<Pixel>> frames,
 {
   if (pieces.front ().engine->pending () == 0)
     return Error{"no coded frame is pending; take () one first"};
-  for (const std::size_t count : {frames.size (),
+  for (const std::size_t views : {frames.size (),
            uncertainty.empty () ? frames.size () : uncertainty.size ()})
-    if (int (count) != slots)
-      return Error{std::to_string (count) + " views instead of " +
+    if (int (views) != slots)
+      return Error{std::to_string (views) + " views instead of " +
                    std::to_string (slots) + ", one for each slot"};
-  std::vector<ViewBytes> outputs;
+  /* Without memory of the heap: an error leaves the coded frame pending. */
+  std::array<ViewBytes, 2 * Schedule::kMaxSlots> room;
+  std::size_t count = 0;
   for (const auto &frame : frames)
-    outputs.push_back (ViewBytes::of (frame));
+    room[count++] = ViewBytes::of (frame);
   for (const auto &frame : uncertainty)
-    outputs.push_back (ViewBytes::of (frame));
+    room[count++] = ViewBytes::of (frame);
+  const auto outputs = std::span<const ViewBytes> (room).first (count);
   for (const ViewBytes &output : outputs)
     RETURN_IF_ERROR (
         check_view (output, "fused frame", size.width, size.height));

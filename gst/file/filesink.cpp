@@ -22,7 +22,7 @@
  *     ! codedexposure-sim ! codedexposure-log name=log ! queue ! mux.video_0 \
  *     log.track ! queue ! mux.subtitle_0 \
  *     codedexposure-matroskamux name=mux \
- *     ! codedexposure-filesink direct=true location=coded.mkv
+ *     ! codedexposure-filesink direct=true location=direct.mkv
  * ]|
  *
  * Since: 0.1

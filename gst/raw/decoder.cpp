@@ -12,7 +12,7 @@
  *
  * ## Example pipeline
  * |[
- * gst-launch-1.0 filesrc location=coded.mkv ! matroskademux name=file \
+ * gst-launch-1.0 filesrc location=raw.mkv ! matroskademux name=file \
  *     ! codedexposure-rawdec ! codedexposure-restore name=restore \
  *     ! codedexposure-demux ! queue ! videoconvert ! autovideosink \
  *     file.subtitle_0 ! restore.track

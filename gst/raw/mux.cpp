@@ -17,7 +17,7 @@
  *     ! video/x-raw,format=GRAY16_LE,framerate=100/1 ! codedexposure-sim \
  *     ! codedexposure-log name=log ! queue ! mux.video_0 \
  *     log.track ! queue ! mux.subtitle_0 \
- *     codedexposure-matroskamux name=mux ! filesink location=coded.mkv
+ *     codedexposure-matroskamux name=mux ! filesink location=raw.mkv
  * ]|
  *
  * Since: 0.1

@@ -41,6 +41,7 @@
  *
  * Since: 0.1
  */
+#include <algorithm>
 #include <deque>
 #include <optional>
 #include <utility>
@@ -334,16 +335,31 @@ take_event (Self *self, EventPtr event)
 
 /* ----------------------------------------------------- frames and events -- */
 
+/* A container rounds times, and its segment may begin with the rounded one. A
+ * frame that was in the segment, at @time, stays in it with its exact time. */
+void
+keep_in_segment (RestoreState &state, GstClockTime time, GstClockTime exact)
+{
+  GstSegment &segment = state.segment;
+  if (time < segment.start || exact >= segment.start)
+    return;
+  segment.time -= std::min (segment.time, segment.start - exact);
+  segment.start = exact;
+  gst_pad_push_event (state.src, gst_event_new_segment (&segment));
+}
+
 GstFlowReturn
 push_frame (Self *self, BufferPtr frame, const TrackReader::Match &match)
 {
   RestoreState &state = *self->state;
   frame.reset (gst_buffer_make_writable (frame.release ()));
+  const GstClockTime time = GST_BUFFER_PTS (frame.get ());
   settle_setup (self, match.line ? &*match.line : nullptr);
   report_missing (state, match);
-  if (match.line)
+  if (match.line) {
     restore (self, frame.get (), match);
-  else
+    keep_in_segment (state, time, GST_BUFFER_PTS (frame.get ()));
+  } else
     mark_unknown (state, frame.get ());
   if (GST_BUFFER_PTS_IS_VALID (frame.get ()))
     state.segment.position = GST_BUFFER_PTS (frame.get ());

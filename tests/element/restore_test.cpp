@@ -257,6 +257,27 @@ TEST_F (Restore, AfterASeekTheFramesBeforeItAreNotMissed)
   EXPECT_FALSE (file.posted<StreamIncomplete> ());
 }
 
+TEST_F (Restore, AFrameWhoseTimeTheFileRoundedUpStaysInTheSegment)
+{
+  constexpr GstClockTime kRounded = kPeriod + 400;
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_TIME);
+  segment.start = segment.time = kRounded;
+  file.push_event (gst_event_new_segment (&segment));
+  GST_BUFFER_PTS (recording.frames[1].get ()) = kRounded;
+  play (0, 0);
+  while (const EventPtr event = file.pull_event (GST_EVENT_SEGMENT))
+    gst_event_copy_segment (event.get (), &segment);
+  for (GstClockTime n = 0; n < restored.size (); n++) {
+    const GstClockTime time = GST_BUFFER_PTS (restored[n].get ());
+    EXPECT_EQ (time, (n + 1) * kPeriod);
+    EXPECT_EQ (gst_segment_to_running_time (&segment, GST_FORMAT_TIME, time),
+        n * kPeriod);
+    EXPECT_EQ (
+        gst_segment_to_stream_time (&segment, GST_FORMAT_TIME, time), time);
+  }
+}
+
 TEST_F (Restore, WithoutTheLastLineTheStreamWasCut)
 {
   play (-1, kFrames);

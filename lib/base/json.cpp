@@ -206,6 +206,24 @@ number_into (double &to, const std::string &rule)
   };
 }
 
+std::string
+json_text (const Json &value)
+{
+  return value.dump ();
+}
+
+std::string
+json_text (const OrderedJson &value)
+{
+  return value.dump ();
+}
+
+OrderedJson
+json_value (std::string_view text)
+{
+  return OrderedJson::parse (text);
+}
+
 Json
 parse_strictly (std::string_view text, const std::string &what)
 {

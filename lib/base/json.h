@@ -87,6 +87,15 @@ JsonReader number_into (double &to, const std::string &rule);
  * it; and a zero byte. @p what, such as "schedule", is for the message. */
 Json parse_strictly (std::string_view text, const std::string &what);
 
+/** @p value on one line; a text that is no UTF-8 throws. Here and in
+ * json_value (), so that the writer and the parser are compiled once. */
+std::string json_text (const Json &value);
+std::string json_text (const OrderedJson &value);
+
+/** The value that json_text () or a to_json () wrote as @p text, as a part of
+ * another. */
+OrderedJson json_value (std::string_view text);
+
 /** What @p read makes of the JSON text @p text of at most @p limit bytes.
  * @p what, such as "schedule", is for the message. */
 template <typename T>

@@ -112,7 +112,7 @@ Mapping::to_json () const
     root["displacement"] = displacement_json (*displacement ());
   if (psf_sigma () != 0.0)
     root["psf_sigma"] = psf_sigma ();
-  return root.dump ();
+  return json_text (root);
 }
 
 Result<Mapping>

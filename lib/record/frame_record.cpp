@@ -171,7 +171,7 @@ read_record (const Json &object)
 std::string
 FrameRecord::to_json () const
 {
-  return record_json (*this).dump ();
+  return json_text (record_json (*this));
 }
 
 } // namespace codedexposure

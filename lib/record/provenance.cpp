@@ -23,7 +23,7 @@ read_provenance (const Json &root)
       "a provenance needs format, version, setup, method, frame and slot",
       {{"setup",
            [&] (const Json &value, const std::string &) {
-             read.setup = or_throw (StreamSetup::from_json (value.dump ()));
+             read.setup = or_throw (StreamSetup::from_json (json_text (value)));
            },
            true},
           {"method",
@@ -52,8 +52,8 @@ Provenance::to_json () const
   root["method"] = method;
   root["frame"] = first_frame;
   root["slot"] = first_slot;
-  root["setup"] = OrderedJson::parse (setup.to_json ());
-  return root.dump ();
+  root["setup"] = json_value (setup.to_json ());
+  return json_text (root);
 }
 
 Result<Provenance>

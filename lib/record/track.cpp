@@ -72,7 +72,7 @@ read_line (const Json &root)
   if (root.contains ("frame"))
     line.frame = read_record (root);
   if (const auto setup = root.find ("setup"); setup != root.end ())
-    line.setup = or_throw (StreamSetup::from_json (setup->dump ()));
+    line.setup = or_throw (StreamSetup::from_json (json_text (*setup)));
   return line;
 }
 
@@ -87,8 +87,8 @@ TrackLine::to_json () const
   if (end)
     line["end"] = *end;
   if (setup)
-    line["setup"] = OrderedJson::parse (setup->to_json ());
-  std::string text = without_markup (line.dump ());
+    line["setup"] = json_value (setup->to_json ());
+  std::string text = without_markup (json_text (line));
   text.pop_back ();
   const std::string check = hex_text (check_of (text), kCheckDigits);
   return text + std::string (kCheckKey) + check + "\"}";

@@ -220,7 +220,7 @@ Schedule::to_json () const
     root["pilot_rows"] = pilot_rows ();
   for (const Region &region : regions ())
     root["regions"].push_back (region_json (region));
-  return root.dump ();
+  return json_text (root);
 }
 
 } // namespace codedexposure

@@ -188,8 +188,8 @@ BenchProfile::to_json () const
       root[std::string (key)] = {
           {"value", number->value}, {"sigma", number->sigma}};
   if (mapping)
-    root["mapping"] = OrderedJson::parse (mapping->to_json ());
-  return root.dump ();
+    root["mapping"] = json_value (mapping->to_json ());
+  return json_text (root);
 }
 
 } // namespace codedexposure

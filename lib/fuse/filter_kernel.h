@@ -26,11 +26,26 @@ struct PutSquare {
     store (to, value * value);
   }
 };
+
+/* Each lane of the lower half twice. */
+struct Twice {
+  static constexpr int at (int lane) { return lane / 2; }
+};
+
+/* Values of pixels from @p x on, of which there is one for every two. */
+CODEDEXPOSURE_INLINE Floats
+load_twice (const float *from, int x)
+{
+  constexpr std::make_integer_sequence<int, kFloats> lanes;
+  const Floats v = load (from + x / 2);
+  return pick (v, v, Twice (), lanes);
+}
+
 struct Add {
   const float *share;
   CODEDEXPOSURE_INLINE void operator() (float *to, int x, Floats value) const
   {
-    store (to, load (to) + load (share + x) * value);
+    store (to, load (to) + load_twice (share, x) * value);
   }
 };
 
@@ -186,7 +201,7 @@ filter_pairs_add (
     const fuse::PairRow &row, const float *share, float *const *outputs)
 {
   const auto wanted = [share] (int x, int count) {
-    for (int i = x; i < x + count; i++)
+    for (int i = x / 2; i < (x + count) / 2; i++)
       if (share[i] != 0.0f)
         return true;
     return false;

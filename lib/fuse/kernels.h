@@ -166,6 +166,18 @@ struct PreferRow {
   int count;
 };
 
+/** Classes of motion by their mean squared errors. */
+struct WeighRow {
+  /** errors[c][x] of class c, which becomes its weight: the power of 8 of the
+   * best error / its error, of a sum of 1. */
+  float *const *errors;
+  const float *factors; ///< of the errors of each class
+  int classes;
+  float floor;      ///< added to the errors
+  float min_weight; ///< relative to the best class's; less is 0
+  int count;
+};
+
 /** Models that are the best ones of fewer moving pixels of a block than one of
  * this many are left out there. */
 constexpr int kWantedPart = 16;
@@ -212,7 +224,7 @@ struct Kernels {
   void (*filter) (const FilterRow &row, float *const *outputs);
   /** outputs[k][x] = the square of output k. */
   void (*filter_pairs_squared) (const PairRow &row, float *const *outputs);
-  /** outputs[k][x] += share[x] * output k, where share is not 0. */
+  /** outputs[k][x] += share[x / 2] * output k, where share is not 0. */
   void (*filter_pairs_add) (
       const PairRow &row, const float *share, float *const *outputs);
   /** to[i] += the square of value i, or share[i] * value i, in the runs. */
@@ -248,6 +260,13 @@ struct Kernels {
    * values more than count are read and written. */
   void (*share) (const ShareRow &row, float *base, float *const *shares,
       std::uint8_t *kept);
+  /** to[x] = values 2x and 2x + 1 of both rows. Up to 15 values more than count
+   * are written, and up to 30 more read. */
+  void (*sum_blocks) (
+      const float *upper, const float *lower, int count, float *to);
+  /** least[x] = the error of the best class and the floor, without its factor.
+   * Up to 15 values more than count are read and written. */
+  void (*weigh) (const WeighRow &row, float *least);
   /** Pixels of 16 bits, kSmallest more than light times @p steps, rounded. */
   void (*to_steps) (
       const float *light, float steps, int count, std::int32_t *to);

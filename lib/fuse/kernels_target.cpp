@@ -13,7 +13,7 @@ extern const fuse::Kernels kernels;
 const fuse::Kernels kernels = {CODEDEXPOSURE_TARGET_NAME, filter,
     filter_pairs_squared, filter_pairs_add, filter_sparse_squared,
     filter_sparse_add, split_pairs, split, join, sum, max, compare, rate,
-    fade_ratio, prefer, share, to_steps, pair, to_bytes, to_words, shrink,
-    settle, convolve};
+    fade_ratio, prefer, share, sum_blocks, weigh, to_steps, pair, to_bytes,
+    to_words, shrink, settle, convolve};
 
 } // namespace codedexposure::CODEDEXPOSURE_TARGET

@@ -14,10 +14,12 @@ namespace codedexposure::fuse
 namespace
 {
 
-/* Surroundings over which the error of a class is averaged. */
-constexpr double kSigma = 3.2;
-constexpr int kReach = 10;
-/* Rows that a worker takes at a time. */
+/* Surroundings over which the error of a class is averaged, in blocks of 2x2
+ * pixels: they are so much larger that classes are weighted block by block. */
+constexpr double kSigma = 1.6;
+constexpr int kReach = 5;
+/* Rows of blocks that a worker takes at a time: many, as it computes errors of
+ * 2 kReach more. */
 constexpr int kBandRows = 48;
 /* Classes whose error is measured at a time: the outputs of one pass of a
  * filter.
@@ -28,6 +30,7 @@ constexpr float kErrorFloor = 1.0f;
 /* Classes with less weight relative to the best one are left out. */
 constexpr float kMinWeight = 0.01f;
 
+/* Of both axes together 1/4, as sums of blocks become means of pixels. */
 std::vector<float>
 gaussian ()
 {
@@ -37,7 +40,7 @@ gaussian ()
     sum += std::exp (-0.5 * i * i / (kSigma * kSigma));
   for (int i = -kReach; i <= kReach; i++)
     weights.push_back (
-        float (std::exp (-0.5 * i * i / (kSigma * kSigma)) / sum));
+        float (0.5 * std::exp (-0.5 * i * i / (kSigma * kSigma)) / sum));
   return weights;
 }
 
@@ -68,21 +71,31 @@ private:
 
 } // namespace
 
-/* Rows first .. first + rows - 1 of a frame that is being filtered. */
+/* Rows first .. first + rows - 1 of the blocks of a frame that is filtered. */
 struct MotionFilter::Band {
   Band (int width, const std::vector<float> &factors_of_classes)
-      : factors (factors_of_classes),
-        fit (factors.size (), Field (width, kBandRows)),
-        squares (kChunk, Field (width, kBandRows, kReach)),
-        along (width, kBandRows + 2 * kReach)
+      : factors (factors_of_classes), blocks ((width + 1) / 2),
+        squares (width, 2 * kChunk, 2 * kReach),
+        sums (kChunk, Field (blocks, kBandRows, kReach)),
+        along (blocks, kBandRows + 2 * kReach),
+        fit_rows (blocks, kBandRows * int (factors.size ()))
   {
+  }
+
+  /* Of class @c: error, then weight. Rows of all classes lie together, as they
+   * are compared. */
+  float *fit (std::size_t c, int y)
+  {
+    return fit_rows.row (y * int (factors.size ()) + int (c));
   }
 
   int first = 0, rows = 0;
   std::vector<float> factors; ///< of each class
-  std::vector<Field> fit;     ///< of each class: error, then weight
-  std::vector<Field> squares; ///< of a chunk: squared residuals
+  int blocks;                 ///< of a row
+  Field squares;              ///< of a chunk: squared residuals of two rows
+  std::vector<Field> sums;    ///< of a chunk: the same of blocks
   Field along;                ///< blurred along x
+  Field fit_rows;
 };
 
 MotionFilter::MotionFilter (const Phases &phases,
@@ -139,40 +152,52 @@ MotionFilter::set_over (const PairFrames &frames)
   return &*set;
 }
 
-/* The squared error of every class around each pixel of the band. */
+/* The squared residuals of a chunk of classes in all blocks of the band and
+ * around it. */
 void
-MotionFilter::measure (const Kernels &kernels, const PairFrames &frames,
-    const Set &set, Band &band, std::span<Field> fit) const
+MotionFilter::measure_blocks (const Kernels &kernels, const PairFrames &frames,
+    const FilterBank &residuals, Band &band) const
 {
-  const Blur blur;
   const int width = frames[1]->width (), height = frames[1]->height ();
+  const auto count = std::size_t (residuals.outputs ());
   std::vector<const std::int32_t *> sources;
-  for (std::size_t c = 0; c < fit.size (); c += kChunk) {
-    const std::size_t count = std::min (kChunk, fit.size () - c);
-    for (int y = -kReach; y < band.rows + kReach; y++) {
-      std::array<float *, kChunk> to;
-      for (std::size_t i = 0; i < count; i++)
-        to[i] = band.squares[i].row (y);
+  for (int y = -kReach; y < band.rows + kReach; y++) {
+    std::array<float *, 2 * kChunk> to;
+    for (std::size_t i = 0; i < 2 * kChunk; i++)
+      to[i] = band.squares.row (int (i));
+    for (const int half : {0, 1})
       kernels.filter_pairs_squared (
-          set.residuals[c / kChunk].row (
-              phases_, frames, mirrored (band.first + y, height), sources),
-          to.data ());
-    }
+          residuals.row (phases_, frames,
+              mirrored (2 * (band.first + y) + half, height), sources),
+          to.data () + (half ? kChunk : 0));
     for (std::size_t i = 0; i < count; i++) {
-      Field &squares = band.squares[i];
-      for (int y = -kReach; y < band.rows + kReach; y++) {
-        float *square = squares.row (y);
-        for (int x = 1; x <= kReach; x++) {
+      for (float *square : {to[i], to[i + kChunk]})
+        for (int x = 1; x <= 2 * kReach + 1; x++) {
           square[-x] = square[mirrored (-x, width)];
           square[width - 1 + x] = square[mirrored (width - 1 + x, width)];
         }
-        blur.run (kernels, square, 1, width, band.along.row (y + kReach));
-      }
-      for (int y = 0; y < band.rows; y++) {
-        float *error = fit[c + i].row (y);
+      kernels.sum_blocks (to[i] - 2 * kReach, to[i + kChunk] - 2 * kReach,
+          band.blocks + 2 * kReach, band.sums[i].row (y) - kReach);
+    }
+  }
+}
+
+/* The squared error of the classes of @set around each block of the band. */
+void
+MotionFilter::measure (const Kernels &kernels, const PairFrames &frames,
+    const Set &set, std::size_t first, Band &band) const
+{
+  const Blur blur;
+  for (const FilterBank &residuals : set.residuals) {
+    measure_blocks (kernels, frames, residuals, band);
+    for (int i = 0; i < residuals.outputs (); i++, first++) {
+      const Field &sums = band.sums[std::size_t (i)];
+      for (int y = -kReach; y < band.rows + kReach; y++)
+        blur.run (
+            kernels, sums.row (y), 1, band.blocks, band.along.row (y + kReach));
+      for (int y = 0; y < band.rows; y++)
         blur.run (kernels, band.along.row (y + kReach), band.along.stride (),
-            width, error);
-      }
+            band.blocks, band.fit (first, y));
     }
   }
 }
@@ -182,61 +207,41 @@ MotionFilter::measure (const Kernels &kernels, const PairFrames &frames,
  * and a mean of several filters is truer than the one that happens to fit best.
  */
 void
-MotionFilter::set_weights (Band &band, Field *misfit) const
+MotionFilter::set_weights (
+    const Kernels &kernels, Band &band, Field *misfit) const
 {
-  const int width = band.along.width ();
-  Field room (width, 2);
-  float *const best = room.row (0), *const sum = room.row (1);
+  Field least (band.blocks, 1);
+  std::vector<float *> fit (band.factors.size ());
   for (int y = 0; y < band.rows; y++) {
-    std::fill_n (best, width, 1e30f);
-    std::fill_n (sum, width, 0.0f);
-    float *const raw = misfit ? misfit->row (band.first + y) : nullptr;
-    for (std::size_t c = 0; c < band.fit.size (); c++) {
-      float *fit = band.fit[c].row (y);
-      for (int x = 0; x < width; x++) {
-        const float error = fit[x] + kErrorFloor;
-        fit[x] = band.factors[c] * fit[x] + kErrorFloor;
-        if (fit[x] < best[x]) {
-          best[x] = fit[x];
-          if (raw)
-            raw[x] = error;
-        }
-      }
-    }
-    for (Field &field : band.fit) {
-      float *fit = field.row (y);
-      for (int x = 0; x < width; x++) {
-        const float ratio = best[x] / fit[x];
-        const float fourth = ratio * ratio * ratio * ratio;
-        const float weight = fourth * fourth;
-        fit[x] = weight < kMinWeight ? 0.0f : weight;
-        sum[x] += fit[x];
-      }
-    }
-    for (Field &field : band.fit) {
-      float *fit = field.row (y);
-      for (int x = 0; x < width; x++)
-        fit[x] /= sum[x];
-    }
+    for (std::size_t c = 0; c < fit.size (); c++)
+      fit[c] = band.fit (c, y);
+    kernels.weigh ({fit.data (), band.factors.data (), int (fit.size ()),
+                       kErrorFloor, kMinWeight, band.blocks},
+        least.row (0));
+    for (int row = 2 * (band.first + y);
+         misfit && row < misfit->height () && row < 2 * (band.first + y + 1);
+         row++)
+      for (int x = 0; x < misfit->width (); x++)
+        misfit->row (row)[x] = least.row (0)[x / 2];
   }
 }
 
-/* Adds the slots of the classes of @set. */
+/* Adds the slots of the classes of @set, the first of which is @first. */
 void
 MotionFilter::mix (const Kernels &kernels, const PairFrames &frames,
-    const Set &set, const Band &band, std::span<const Field> fit,
-    std::span<Field> slots) const
+    const Set &set, std::size_t first, Band &band, std::span<Field> slots) const
 {
   std::vector<const std::int32_t *> sources;
   std::vector<float *> to (slots.size ());
-  for (std::size_t c = 0; c < set.filters.size (); c++) {
-    for (int y = 0; y < band.rows; y++) {
+  const int end = std::min (2 * (band.first + band.rows), frames[1]->height ());
+  for (const FilterBank &filter : set.filters) {
+    for (int y = 2 * band.first; y < end; y++) {
       for (std::size_t s = 0; s < slots.size (); s++)
-        to[s] = slots[s].row (band.first + y);
-      kernels.filter_pairs_add (
-          set.filters[c].row (phases_, frames, band.first + y, sources),
-          fit[c].row (y), to.data ());
+        to[s] = slots[s].row (y);
+      kernels.filter_pairs_add (filter.row (phases_, frames, y, sources),
+          band.fit (first, y / 2 - band.first), to.data ());
     }
+    first++;
   }
 }
 
@@ -253,29 +258,31 @@ MotionFilter::run (const Kernels &kernels, const PairFrames &frames,
   for (const Set *set : sets)
     std::ranges::copy (set->factors, std::back_inserter (factors));
   std::vector<std::optional<Band>> bands (std::size_t (workers.count ()));
-  return workers.run ((height + kBandRows - 1) / kBandRows,
+  const int rows = (height + 1) / 2;
+  return workers.run ((rows + kBandRows - 1) / kBandRows,
       [&] (int part, int worker) {
         auto &band = bands[std::size_t (worker)];
         if (!band)
           band.emplace (width, factors);
         band->first = part * kBandRows;
-        band->rows = std::min (kBandRows, height - band->first);
+        band->rows = std::min (kBandRows, rows - band->first);
         const auto each_set = [&] (const auto &use) {
-          std::span<Field> fit (band->fit);
+          std::size_t first = 0;
           for (const Set *set : sets) {
-            use (*set, fit.first (set->filters.size ()));
-            fit = fit.subspan (set->filters.size ());
+            use (*set, first);
+            first += set->filters.size ();
           }
         };
-        each_set ([&] (const Set &set, std::span<Field> fit) {
-          measure (kernels, frames, set, *band, fit);
+        each_set ([&] (const Set &set, std::size_t c) {
+          measure (kernels, frames, set, c, *band);
         });
-        set_weights (*band, misfit);
+        set_weights (kernels, *band, misfit);
+        const int end = std::min (2 * (band->first + band->rows), height);
         for (Field &slot : slots)
-          for (int y = 0; y < band->rows; y++)
-            std::fill_n (slot.row (band->first + y), width, 0.0f);
-        each_set ([&] (const Set &set, std::span<Field> fit) {
-          mix (kernels, frames, set, *band, fit, slots);
+          for (int y = 2 * band->first; y < end; y++)
+            std::fill_n (slot.row (y), width, 0.0f);
+        each_set ([&] (const Set &set, std::size_t c) {
+          mix (kernels, frames, set, c, *band, slots);
         });
       },
       stop);

@@ -17,9 +17,9 @@ namespace codedexposure::fuse
 /**
  * Under each class of patches, every coded pixel is predicted from those around
  * it, which saw other slots. The prediction of the right class is good in spite
- * of aliasing: its squared error, averaged around a pixel, measures how well
- * the class fits there. The frames are the sum of the filters of all classes,
- * with weights by how well they fit.
+ * of aliasing: its squared error, averaged around a block of 2x2 pixels,
+ * measures how well the class fits there. The frames are the sum of the filters
+ * of all classes, with weights by how well they fit.
  *
  * Some classes exist a second time, with pixels of the coded frames before and
  * after the one that is fused, and compete with the others.
@@ -39,7 +39,7 @@ public:
 
   /** Writes the light of every slot to @p slots, fields of the size of
    * @p frames. The result does not depend on the number of workers.
-   * @p misfit  null, or gets the mean squared error around each pixel of the
+   * @p misfit  null, or gets the mean squared error around each block of the
    *            class that fits best there, in grey levels squared.
    * @return  false when it was stopped. */
   bool run (const Kernels &kernels, const PairFrames &frames,
@@ -59,12 +59,13 @@ private:
   const Set *set_over (const PairFrames &frames);
 
   struct Band;
+  void measure_blocks (const Kernels &kernels, const PairFrames &frames,
+      const FilterBank &residuals, Band &band) const;
   void measure (const Kernels &kernels, const PairFrames &frames,
-      const Set &set, Band &band, std::span<Field> fit) const;
-  void set_weights (Band &band, Field *misfit) const;
+      const Set &set, std::size_t first, Band &band) const;
+  void set_weights (const Kernels &kernels, Band &band, Field *misfit) const;
   void mix (const Kernels &kernels, const PairFrames &frames, const Set &set,
-      const Band &band, std::span<const Field> fit,
-      std::span<Field> slots) const;
+      std::size_t first, Band &band, std::span<Field> slots) const;
 
   const Phases &phases_;
   const Observation &observation_;

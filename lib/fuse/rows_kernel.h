@@ -71,20 +71,6 @@ compare (const fuse::CompareRow &row, float *__restrict to)
       to[x] *= 2.0f * frames[x] / (frames[x] + 1.0f);
 }
 
-/* Each lane of the lower half twice. */
-struct Twice {
-  static constexpr int at (int lane) { return lane / 2; }
-};
-
-/* Values of pixels from @p x on, of which there is one for every two. */
-CODEDEXPOSURE_INLINE Floats
-load_twice (const float *from, int x)
-{
-  constexpr std::make_integer_sequence<int, kFloats> lanes;
-  const Floats v = load (from + x / 2);
-  return pick (v, v, Twice (), lanes);
-}
-
 CODEDEXPOSURE_INLINE Floats
 faded (Floats value, const fuse::Fade &fade)
 {
@@ -124,6 +110,52 @@ prefer (const fuse::PreferRow &row, float *const *to)
       store (to[i] + x,
           weight < row.min_weight ? Floats{} + row.min_weight : weight);
     }
+  }
+}
+
+/* Every second lane of two vectors in a row. */
+template <int First>
+struct Second {
+  static constexpr int at (int lane) { return 2 * lane + First; }
+};
+
+inline void
+sum_blocks (const float *upper, const float *lower, int count, float *to)
+{
+  constexpr std::make_integer_sequence<int, kFloats> lanes;
+  for (int x = 0; x < count; x += kFloats) {
+    const Floats a = load (upper + 2 * x) + load (lower + 2 * x);
+    const Floats b =
+        load (upper + 2 * x + kFloats) + load (lower + 2 * x + kFloats);
+    store (to + x,
+        pick (a, b, Second<0> (), lanes) + pick (a, b, Second<1> (), lanes));
+  }
+}
+
+inline void
+weigh (const fuse::WeighRow &row, float *least)
+{
+  for (int x = 0; x < row.count; x += kFloats) {
+    Floats best = Floats{} + 1e30f, of_best = best, sum = {};
+    for (int c = 0; c < row.classes; c++) {
+      const Floats error = load (row.errors[c] + x);
+      const Floats scaled = row.factors[c] * error + row.floor;
+      of_best = scaled < best ? error + row.floor : of_best;
+      best = smaller (scaled, best);
+      store (row.errors[c] + x, scaled);
+    }
+    for (int c = 0; c < row.classes; c++) {
+      const Floats ratio = best / load (row.errors[c] + x);
+      const Floats fourth = ratio * ratio * ratio * ratio;
+      const Floats power = fourth * fourth;
+      const Floats weight = power < row.min_weight ? Floats{} : power;
+      store (row.errors[c] + x, weight);
+      sum += weight;
+    }
+    const Floats part = 1.0f / sum;
+    for (int c = 0; c < row.classes; c++)
+      store (row.errors[c] + x, load (row.errors[c] + x) * part);
+    store (least + x, of_best);
   }
 }
 

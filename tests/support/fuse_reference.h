@@ -231,7 +231,7 @@ reference_filter_pairs_add (
 {
   for (int k = 0; k < row.outputs; k++)
     for (int x = 0; x < row.count; x++)
-      outputs[k][x] += share[x] * filtered_pairs (row, x, k);
+      outputs[k][x] += share[x / 2] * filtered_pairs (row, x, k);
 }
 
 inline float
@@ -398,6 +398,40 @@ reference_share (
 }
 
 inline void
+reference_sum_blocks (
+    const float *upper, const float *lower, int count, float *to)
+{
+  for (int x = 0; x < count; x++)
+    to[x] =
+        (upper[2 * x] + lower[2 * x]) + (upper[2 * x + 1] + lower[2 * x + 1]);
+}
+
+inline void
+reference_weigh (const WeighRow &row, float *least)
+{
+  for (int x = 0; x < row.count; x++) {
+    float best = 1e30f, sum = 0.0f;
+    for (int c = 0; c < row.classes; c++) {
+      const float scaled = row.factors[c] * row.errors[c][x] + row.floor;
+      if (scaled < best) {
+        best = scaled;
+        least[x] = row.errors[c][x] + row.floor;
+      }
+    }
+    for (int c = 0; c < row.classes; c++) {
+      float &weight = row.errors[c][x];
+      const float ratio = best / (row.factors[c] * weight + row.floor);
+      const float fourth = ratio * ratio * ratio * ratio;
+      weight = fourth * fourth < row.min_weight ? 0.0f : fourth * fourth;
+      sum += weight;
+    }
+    const float part = 1.0f / sum;
+    for (int c = 0; c < row.classes; c++)
+      row.errors[c][x] *= part;
+  }
+}
+
+inline void
 reference_to_steps (
     const float *light, float steps, int count, std::int32_t *to)
 {
@@ -475,9 +509,9 @@ inline constexpr Kernels kReference{"reference", reference_filter,
     reference_filter_sparse_squared, reference_filter_sparse_add,
     reference_split<std::int32_t>, reference_split<float>, reference_join,
     reference_sum, reference_max, reference_compare, reference_rate,
-    reference_fade_ratio, reference_prefer, reference_share, reference_to_steps,
-    reference_pair, reference_to_pixels<std::uint8_t>,
-    reference_to_pixels<std::uint16_t>, reference_shrink, reference_settle,
-    reference_convolve};
+    reference_fade_ratio, reference_prefer, reference_share,
+    reference_sum_blocks, reference_weigh, reference_to_steps, reference_pair,
+    reference_to_pixels<std::uint8_t>, reference_to_pixels<std::uint16_t>,
+    reference_shrink, reference_settle, reference_convolve};
 
 } // namespace codedexposure::test

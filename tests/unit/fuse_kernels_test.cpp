@@ -294,6 +294,50 @@ rated (const fuse::Kernels &kernels)
   return all;
 }
 
+TEST (FuseKernels, SumsOfBlocksEqualTheReference)
+{
+  const auto upper = random_numbers (2 * kCount + 30, 1);
+  const auto lower = random_numbers (2 * kCount + 30, 2);
+  const auto summed = [&] (const fuse::Kernels &kernels) {
+    std::vector<float> to (kCount + 15);
+    kernels.sum_blocks (upper.data (), lower.data (), kCount, to.data ());
+    to.resize (kCount);
+    return to;
+  };
+  for (const fuse::Kernels &kernels : fuse::supported_kernels ())
+    EXPECT_EQ (summed (kernels), summed (kReference)) << kernels.name;
+}
+
+TEST (FuseKernels, WeightsOfClassesEqualTheReference)
+{
+  constexpr int kClasses = 5;
+  const std::vector<float> factors{1.0f, 0.7f, 1.3f, 0.9f, 1.1f};
+  const auto weighed = [&] (const fuse::Kernels &kernels) {
+    std::vector<std::vector<float>> rows;
+    std::vector<float *> errors;
+    for (int c = 0; c < kClasses; c++)
+      rows.push_back (random_magnitudes (c));
+    for (auto &row : rows)
+      errors.push_back (row.data ());
+    rows.emplace_back (kCount + 15);
+    kernels.weigh (
+        {errors.data (), factors.data (), kClasses, 1.0f, 0.01f, kCount},
+        rows.back ().data ());
+    for (auto &row : rows)
+      row.resize (kCount);
+    return rows;
+  };
+  for (const fuse::Kernels &kernels : fuse::supported_kernels ())
+    EXPECT_EQ (weighed (kernels), weighed (kReference)) << kernels.name;
+  const auto rows = weighed (kReference);
+  for (std::size_t x = 0; x < kCount; x++) {
+    float sum = 0.0f;
+    for (std::size_t c = 0; c < kClasses; c++)
+      sum += rows[c][x];
+    EXPECT_NEAR (sum, 1.0f, 1e-6f);
+  }
+}
+
 /* The conversions of light to whole numbers, likewise. */
 std::vector<int>
 converted (const fuse::Kernels &kernels)

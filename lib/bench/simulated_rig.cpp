@@ -7,6 +7,8 @@
 
 #include "base/text.h"
 #include "base/try.h"
+#include "dmd/erle.h"
+#include "dmd/hid_link.h"
 #include "dmd/pattern_timing.h"
 #include "schedule/mask_renderer.h"
 
@@ -16,7 +18,7 @@ namespace codedexposure
 namespace
 {
 
-constexpr Nanoseconds kUpload = 60'000'000;
+constexpr Nanoseconds kStart = 60'000'000;   // of masks that are there
 constexpr Nanoseconds kTransfer = 8'000'000; // of a frame
 constexpr Nanoseconds kMicrosecond = 1000;
 constexpr int kInFlight = 2;
@@ -73,15 +75,14 @@ parts_of (const SickBenchOptions &options)
   return parts;
 }
 
-MirrorProgram::Mask
-rendered (const StillMask &mask, Extent mirrors)
+/** How long a DLPC900 takes to receive @p mask. */
+Nanoseconds
+transfer_time (const StillMask &mask, Extent mirrors)
 {
-  const auto picture =
-      std::make_shared<Image<std::uint8_t>> (mirrors.width, mirrors.height);
-  for (int y = 0; y < mirrors.height; y++)
-    for (int x = 0; x < mirrors.width; x++)
-      picture->at (x, y) = mask.on (x, y);
-  return picture;
+  constexpr Nanoseconds kPacketTime = 1'000'000;
+  const auto rows = render_still<PlanePixel> (mask, mirrors);
+  return Nanoseconds (hid_packets (encode_erle (rows, 0, mirrors.width).size)) *
+         kPacketTime;
 }
 
 } // namespace
@@ -166,23 +167,28 @@ SimulatedRig::arrival_of (const Shot &shot) const
                       double (options_.frame_jitter));
 }
 
-/** The next frame that arrives; none: for too long, none does. */
-std::optional<Shot>
-SimulatedRig::arrive ()
+/** How long a rig waits for a frame. */
+Nanoseconds
+SimulatedRig::patience () const
 {
   constexpr Nanoseconds kPatience = 2'000'000'000;
-  const Nanoseconds limit =
-      now_ + std::max (kPatience, 10 * options_.rate.period ());
+  return std::max (kPatience, 10 * options_.rate.period ());
+}
+
+/** The next frame that arrives; none: none is exposed before @p until. */
+std::optional<Shot>
+SimulatedRig::arrive (Nanoseconds until)
+{
   for (;;) {
     std::optional<Shot> shot;
     if (!on_their_way_.empty ()) {
       shot = on_their_way_.front ();
       on_their_way_.pop_front ();
     } else {
-      shot = fetch (limit);
+      shot = fetch (until);
     }
     if (!shot) {
-      now_ = limit;
+      now_ = std::max (now_, until);
       return std::nullopt;
     }
     if (shot->lost)
@@ -211,10 +217,10 @@ SimulatedRig::stop ()
 }
 
 void
-SimulatedRig::start (MirrorProgram program)
+SimulatedRig::start (MirrorProgram program, Nanoseconds transfer)
 {
   stop ();
-  now_ += kUpload + options_.rate.period ();
+  now_ += kStart + transfer + options_.rate.period ();
   bench_.show (now_, std::move (program));
   shows_ = true;
 }
@@ -228,7 +234,8 @@ SimulatedRig::show (const StillMask &mask, int slots)
   if (!times)
     return times.error ().with_prefix (parts_.dmd.name + ": ");
   MirrorProgram program{.period = options_.rate.period ()};
-  program.masks = {rendered (mask, options_.mirrors)};
+  program.masks = {std::make_shared<Image<std::uint8_t>> (
+      render_still<std::uint8_t> (mask, options_.mirrors).image ())};
   const Nanoseconds begin = times->before * kMicrosecond;
   /* The whole of a period has no dark nanosecond at its end. */
   const Nanoseconds end = times->lit.dark == 0
@@ -236,7 +243,7 @@ SimulatedRig::show (const StillMask &mask, int slots)
                               : begin + times->lit.exposure * kMicrosecond;
   program.stretches = {{begin, end, 0}};
   program.slot = program.period / slots;
-  start (std::move (program));
+  start (std::move (program), transfer_time (mask, options_.mirrors));
   return {};
 }
 
@@ -285,21 +292,41 @@ SimulatedRig::spoil (const Shot &shot, ImageView<std::uint16_t> picture) const
   return damaged;
 }
 
+SeenFrame
+SimulatedRig::frame_of (const Shot &shot)
+{
+  SeenFrame frame{.time = stamp_of (shot),
+      .arrival = now_,
+      .picture =
+          Image<std::uint16_t> (options_.camera.width, options_.camera.height)};
+  bench_.take (shot, frame.picture.view ());
+  frame.damaged = spoil (shot, frame.picture.view ());
+  return frame;
+}
+
 Result<std::vector<SeenFrame>>
 SimulatedRig::watch (int frames)
 {
   std::vector<SeenFrame> seen;
   while (int (seen.size ()) < frames) {
-    const auto shot = arrive ();
+    const auto shot = arrive (now_ + patience ());
     if (!shot)
       break;
-    SeenFrame frame{.time = stamp_of (*shot),
-        .arrival = now_,
-        .picture = Image<std::uint16_t> (
-            options_.camera.width, options_.camera.height)};
-    bench_.take (*shot, frame.picture.view ());
-    frame.damaged = spoil (*shot, frame.picture.view ());
-    seen.push_back (std::move (frame));
+    seen.push_back (frame_of (*shot));
+  }
+  return seen;
+}
+
+Result<std::vector<SeenFrame>>
+SimulatedRig::watch_for (Nanoseconds time, int frames)
+{
+  const Nanoseconds until = now_ + time;
+  std::vector<SeenFrame> seen;
+  while (int (seen.size ()) < frames && now_ < until) {
+    const auto shot = arrive (until);
+    if (!shot)
+      break;
+    seen.push_back (frame_of (*shot));
   }
   return seen;
 }
@@ -337,7 +364,7 @@ SimulatedRig::record (const Schedule &schedule, double seconds,
   Image<std::uint16_t> picture (options_.camera.width, options_.camera.height);
   std::optional<std::uint64_t> last;
   while (now_ < began + Nanoseconds (seconds * 1e9)) {
-    const auto shot = arrive ();
+    const auto shot = arrive (now_ + patience ());
     if (!shot)
       break;
     bench_.take (*shot, picture.view ());

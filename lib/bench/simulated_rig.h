@@ -15,9 +15,10 @@ namespace codedexposure
  * A Rig over a SickBench. Nothing waits: now () is the time that a real bench
  * would have taken.
  *
- * The DMD has the limits of a DLPC900 and needs 60 ms to show a mask, after
- * which one period passes without a trigger. Two frames are on their way when
- * it stops, the later one cut short; they come first in the next watch ().
+ * The DMD has the limits of a DLPC900, receives masks as fast as one, and needs
+ * 60 ms to show them, after which one period passes without a trigger. Two
+ * frames are on their way when it stops, the later one cut short; they come
+ * first in the next watch ().
  */
 class SimulatedRig : public Rig
 {
@@ -27,13 +28,15 @@ public:
       const SickBenchOptions &options);
 
   const BenchTruth &truth () const { return bench_.truth (); }
-  Nanoseconds now () const { return now_; }
+  Nanoseconds now () const override { return now_; }
 
   const RigParts &parts () const override { return parts_; }
   Result<void> show (const StillMask &mask, int slots) override;
   void park () override;
   Result<void> expose (std::optional<Nanoseconds> time) override;
   Result<std::vector<SeenFrame>> watch (int frames) override;
+  Result<std::vector<SeenFrame>> watch_for (
+      Nanoseconds time, int frames) override;
   Result<std::vector<SeenFrame>> deliver (int frames) override;
   Result<void> record (const Schedule &schedule, double seconds,
       const std::function<void (const RecordedFrame &)> &take) override;
@@ -46,10 +49,12 @@ private:
 
   explicit SimulatedRig (SickBench bench);
   std::optional<Shot> fetch (Nanoseconds until);
-  std::optional<Shot> arrive ();
+  std::optional<Shot> arrive (Nanoseconds until);
+  Nanoseconds patience () const;
+  SeenFrame frame_of (const Shot &shot);
   Nanoseconds arrival_of (const Shot &shot) const;
   void stop ();
-  void start (MirrorProgram program);
+  void start (MirrorProgram program, Nanoseconds transfer = 0);
   bool spoil (const Shot &shot, ImageView<std::uint16_t> picture) const;
   Nanoseconds stamp_of (const Shot &shot) const;
 

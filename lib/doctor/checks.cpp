@@ -106,7 +106,11 @@ run_check (const Check &check, Examination &examination,
   };
   if (std::ranges::any_of (check.needs, failed))
     return Finding{.check = check.name, .shown = {}, .skipped = true};
-  return check.run (examination);
+  const Nanoseconds begin = examination.rig.now ();
+  auto finding = check.run (examination);
+  if (finding)
+    finding->seconds = 1e-9 * double (examination.rig.now () - begin);
+  return finding;
 }
 
 } // namespace codedexposure

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
 #include "base/try.h"
 
@@ -19,24 +20,27 @@ constexpr int kShorter = 5;
 /* Lengths of the light, of the shortest that mirrors can make. */
 constexpr std::array kLengths = {1.0, 1.25, 1.6, 2.4};
 constexpr int kBrightFrames = 8, kShortFrames = 16, kLongFrames = 8;
-/* Looks are repeated until read noise is known to this part. */
-constexpr double kAim = 0.02;
+/* Looks are repeated until read noise is known to this part, or as long as its
+ * error shrinks to that part of what it was: more looks do not help where the
+ * model is what is wrong. */
+constexpr double kAim = 0.02, kHelps = 0.85;
 constexpr int kMostRounds = 5;
 /* Groups are that wide and go that far, DN; fewer pixels are no group. */
 constexpr double kWidth = 1.0 / 24, kMost = 2.0;
 constexpr double kFewPixels = 30;
 
+/* All rows are the same: controllers take minutes for masks that are random in
+ * x and y, which cannot be compressed. */
 StillMask
-random_mirrors (int first, int count)
+random_columns (int first, int count)
 {
-  const auto on = [] (int x, int y) {
-    std::uint32_t z =
-        std::uint32_t (x) * 0x9E3779B1u ^ std::uint32_t (y) * 0x85EBCA77u;
+  const auto on = [] (int x, int) {
+    std::uint32_t z = std::uint32_t (x) * 0x9E3779B1u;
     z = (z ^ (z >> 15)) * 0x2C1B3C6Du;
     z = (z ^ (z >> 12)) * 0x297A2D39u;
     return ((z ^ (z >> 15)) & 1u) != 0;
   };
-  return {.name = "random mirrors", .on = on, .slots = count, .first = first};
+  return {.name = "random columns", .on = on, .slots = count, .first = first};
 }
 
 /** The looks, and what they give. */
@@ -87,7 +91,7 @@ DitherRun::see_light (
     int top, const Image<float> &dark, const Image<float> &bright)
 {
   ASSIGN_OR_RETURN (const Stack seen,
-      look_at_light (examination_, random_mirrors (fine_.first, top), fine_.of,
+      look_at_light (examination_, random_columns (fine_.first, top), fine_.of,
           kBrightFrames, &dark));
   light_ = field_ = Image<float> (dark.width (), dark.height ());
   double mean = 0.0, pixels = 0.0;
@@ -118,7 +122,7 @@ DitherRun::look (bool longer)
     const int of = std::max (1, int (fine_.of / length));
     const int first = of * fine_.first / fine_.of + of / (4 * kShorter);
     ASSIGN_OR_RETURN (
-        Stack stack, look_at_light (examination_, random_mirrors (first, 1), of,
+        Stack stack, look_at_light (examination_, random_columns (first, 1), of,
                          longer ? kLongFrames : kShortFrames));
     stack.zeros = stack.full = longer ? Image<std::uint16_t> () : stack.zeros;
     looks_.push_back ({std::move (stack), double (fine_.of) / of, longer});
@@ -207,12 +211,15 @@ measure_dither (Examination &examination, const Examination::Lit &fine, int top,
   if (const auto late = rig.watch (examination.lag); !late)
     seen = late.error ();
   std::optional<Dark> found;
+  double error = std::numeric_limits<double>::infinity (); // of the variance
   for (int round = 0; seen && round < kMostRounds; round++) {
     seen = run.look (false);
     if (seen)
       found = run.fit ();
-    if (!found || found->variance.sigma < 2 * kAim * found->variance.value)
+    if (!found || found->variance.sigma < 2 * kAim * found->variance.value ||
+        found->variance.sigma > kHelps * error)
       break;
+    error = found->variance.sigma;
   }
   RETURN_IF_ERROR (rig.expose (std::nullopt));
   RETURN_IF_ERROR (rig.watch (examination.lag));

@@ -53,8 +53,8 @@ struct DitherSight {
 };
 
 /**
- * Shows half of the mirrors, at random, in short and in long exposures. None if
- * that does not determine the dark.
+ * Shows half of the columns of mirrors, at random, in short and in long
+ * exposures. None if that does not determine the dark.
  *
  * @p fine: as of fine_slots (). @p top: slots of it that do not saturate. @p
  * dark, @p bright: means with all mirrors off, and on for so long. @p good:

@@ -60,8 +60,8 @@ json_of (const Finding &finding)
   return {{"check", finding.check},
       {"verdict",
           finding.skipped ? "SKIPPED" : verdict_text (finding.verdict ())},
-      {"shown", finding.shown}, {"readings", readings}, {"notes", notes},
-      {"diagnoses", diagnoses}};
+      {"shown", finding.shown}, {"seconds", finding.seconds},
+      {"readings", readings}, {"notes", notes}, {"diagnoses", diagnoses}};
 }
 
 } // namespace
@@ -75,8 +75,8 @@ findings_json (const std::vector<Finding> &findings)
     checks.push_back (json_of (finding));
     worst = std::max (worst, finding.verdict ());
   }
-  const OrderedJson root{{"format", "coded-exposure-findings"},
-      {"version", 1}, {"verdict", verdict_text (worst)}, {"checks", checks}};
+  const OrderedJson root{{"format", "coded-exposure-findings"}, {"version", 1},
+      {"verdict", verdict_text (worst)}, {"checks", checks}};
   return root.dump (-1, ' ', false, OrderedJson::error_handler_t::replace);
 }
 

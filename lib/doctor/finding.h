@@ -51,6 +51,7 @@ struct Finding {
   std::string check;    ///< such as "trigger"
   std::string shown;    ///< what the mirrors showed, one sentence
   bool skipped = false; ///< what it depends on has failed
+  double seconds = 0.0; ///< that it took
   std::vector<Reading> readings = {};
   /** What was found that is no number: name and text. */
   std::vector<std::pair<std::string, std::string>> notes = {};

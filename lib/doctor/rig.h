@@ -66,6 +66,8 @@ public:
   virtual ~Rig () = default;
 
   virtual const RigParts &parts () const = 0;
+  /** Time as it passes at the bench, from any start. */
+  virtual Nanoseconds now () const = 0;
 
   /**
    * Shows one mask from now on, repeated with the trigger of every frame period
@@ -85,9 +87,12 @@ public:
    * seconds, or for ten frame periods, whichever is longer.
    */
   virtual Result<std::vector<SeenFrame>> watch (int frames) = 0;
-  /** Shows all mirrors on and takes @p frames as the network delivers them: also
-   * those that lack pixels, which watch () may leave out. They need not have a
-   * picture. */
+  /** The same, for @p time at most. */
+  virtual Result<std::vector<SeenFrame>> watch_for (
+      Nanoseconds time, int frames) = 0;
+  /** Shows all mirrors on and takes @p frames as the network delivers them:
+   * also those that lack pixels, which watch () may leave out. They need not
+   * have a picture. */
   virtual Result<std::vector<SeenFrame>> deliver (int frames) = 0;
   /**
    * Records with @p schedule as a user would, for @p seconds, and hands each

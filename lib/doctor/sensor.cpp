@@ -20,7 +20,7 @@ namespace codedexposure
 namespace
 {
 
-constexpr int kFrames = 16;         // of a level
+constexpr int kFrames = 12;         // of a level
 constexpr int kDarkFrames = 24;     // of the dark
 constexpr int kReferenceFrames = 6; // of the level that shows drift
 constexpr int kLevelsPerReference = 4;

@@ -27,7 +27,7 @@ constexpr int kChanges = 8, kFramesOfChange = 10;
 /* Slots of the walk: runs of one are long enough for a DMD. */
 constexpr double kShortestRun = 130e-6;
 constexpr int kFinestGrid = 256, kTiles = 8;
-constexpr int kCoarseFrames = 4, kFineFrames = 8;
+constexpr int kCoarseFrames = 4, kFineFrames = 6;
 constexpr int kInsideLooks = 12, kInsideFrames = 6;
 /* Levels of one mask differ less, as part of the step to the other one. */
 constexpr double kSameLevel = 0.2;
@@ -89,7 +89,7 @@ private:
   void fail (const char *id, std::string cause, std::string remedy,
       Verdict severity = Verdict::fail);
   Result<bool> check_frames ();
-  Result<bool> check_parked (double ratio);
+  Result<bool> check_parked (double ratio, double step);
   Result<bool> check_lag ();
   Result<std::vector<SeenFrame>> change (bool all);
   Change judge (const std::vector<SeenFrame> &seen, double before, double after,
@@ -164,15 +164,17 @@ TriggerCheck::check_frames ()
       frames * period_ /
       std::max (1e-9 * double (seen.back ().time - seen.front ().time), 1e-9);
   finding_.readings.push_back ({"frames per cycle", {ratio, 0.0}, "", "1"});
-  return check_parked (ratio);
+  return check_parked (ratio, step);
 }
 
 /** Frames of a camera that waits for the trigger end with it. */
 Result<bool>
-TriggerCheck::check_parked (double ratio)
+TriggerCheck::check_parked (double ratio, double step)
 {
   rig_.park ();
-  ASSIGN_OR_RETURN (const auto parked, rig_.watch (kFramesInFlight + 2));
+  const double enough = 2.0 * step * kFramesInFlight; // s
+  ASSIGN_OR_RETURN (const auto parked,
+      rig_.watch_for (Nanoseconds (1e9 * enough), kFramesInFlight + 2));
   const std::string rate = real_text (
       std::round (ratio * parts_.rate.num / parts_.rate.den * 1e3) / 1e3);
   if (int (parked.size ()) > kFramesInFlight)

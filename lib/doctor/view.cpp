@@ -2,7 +2,7 @@
 #include "doctor/view.h"
 
 #include <cmath>
-#include <cstdint>
+#include <numbers>
 
 #include <Eigen/Dense>
 
@@ -17,20 +17,16 @@ namespace
 constexpr int kFrames = 3;
 constexpr double kFewPixels = 500;
 
-/* A number in 0..1 for each mirror, without any pattern. */
+/* A number in 0..1 for each row, spread evenly over those of any region. */
 double
-draw (int x, int y)
+threshold (int y)
 {
-  std::uint64_t bits = std::uint64_t (std::uint32_t (x)) << 32 |
-                       std::uint64_t (std::uint32_t (y));
-  for (const std::uint64_t factor :
-      {0xbf58476d1ce4e5b9u, 0x94d049bb133111ebu, 0x9e3779b97f4a7c15u}) {
-    bits ^= bits >> 31;
-    bits *= factor;
-  }
-  return double (bits >> 11) * 0x1p-53;
+  const double turns = y * std::numbers::phi;
+  return turns - std::floor (turns);
 }
 
+/* Mirrors of a row are on from its left end up to a place, or all of them:
+ * controllers take minutes for masks that cannot be compressed. */
 StillMask
 ramp (bool along_x, Extent mirrors)
 {
@@ -38,7 +34,7 @@ ramp (bool along_x, Extent mirrors)
       .on = [along_x, mirrors] (int x, int y) {
         const double part =
             along_x ? (x + 0.5) / mirrors.width : (y + 0.5) / mirrors.height;
-        return draw (x, y) < part;
+        return threshold (y) < part;
       }};
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <deque>
+#include <limits>
 
 #include <unistd.h>
 
@@ -241,10 +242,19 @@ public:
   Result<void> open ();
 
   const RigParts &parts () const override { return parts_; }
+  Nanoseconds now () const override { return monotonic_now (); }
   Result<void> show (const StillMask &mask, int slots) override;
   void park () override;
   Result<void> expose (std::optional<Nanoseconds> time) override;
-  Result<std::vector<SeenFrame>> watch (int frames) override;
+  Result<std::vector<SeenFrame>> watch (int frames) override
+  {
+    return watch_until (std::numeric_limits<Nanoseconds>::max (), frames);
+  }
+  Result<std::vector<SeenFrame>> watch_for (
+      Nanoseconds time, int frames) override
+  {
+    return watch_until (monotonic_now () + time, frames);
+  }
   Result<std::vector<SeenFrame>> deliver (int frames) override;
   Result<void> record (const Schedule &schedule, double seconds,
       const std::function<void (const RecordedFrame &)> &take) override;
@@ -257,6 +267,7 @@ private:
   void read_features (ArvCamera *camera);
   void read_dmd ();
   void forget_frames ();
+  Result<std::vector<SeenFrame>> watch_until (Nanoseconds until, int frames);
   bool is_outdated (const SeenFrame &frame);
   Nanoseconds exposure_of (std::optional<Nanoseconds> time) const;
   Nanoseconds patience () const
@@ -449,13 +460,13 @@ CameraRig::start ()
 /** A camera that was silent for too long has ended its stream, perhaps while
  * the masks were changed: it gets one more chance. */
 Result<std::vector<SeenFrame>>
-CameraRig::watch (int frames)
+CameraRig::watch_until (Nanoseconds until, int frames)
 {
   RETURN_IF_ERROR (start ());
   bool restarted = false;
   std::vector<SeenFrame> seen;
   Nanoseconds last = monotonic_now ();
-  while (int (seen.size ()) < frames) {
+  while (int (seen.size ()) < frames && monotonic_now () < until) {
     if (stop_.stop_requested ())
       return stopped ();
     const Sample sample = pipeline_->pull (kMoment);

@@ -244,11 +244,11 @@ Doctor::tell (const Finding &finding) const
   const auto number = check - checks_.begin () + 1;
   const std::string title =
       check == checks_.end () ? finding.check : check->title;
-  voice_.line (format ("%d. %-22s %s", int (number), title.c_str (),
-      finding.skipped ? "SKIPPED: a check before it failed"
-                      : verdict_text (finding.verdict ())));
+  const std::string line = format ("%d. %-22s ", int (number), title.c_str ());
   if (finding.skipped)
-    return;
+    return voice_.line (line + "SKIPPED: a check before it failed");
+  voice_.line (line + verdict_text (finding.verdict ()) +
+               format (" (%.0f s)", finding.seconds));
   voice_.line ("   shown: " + finding.shown);
   for (const auto &[name, text] : finding.notes)
     voice_.line ("   " + name + ": " + text);

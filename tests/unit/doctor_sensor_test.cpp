@@ -15,7 +15,7 @@ TEST (SensorCheck, NumbersOfHealthyBenchesAreThoseInjected)
     const CheckedBench e = check_bench (healthy_bench (seed), check_sensor);
     SCOPED_TRACE ("bench " + std::to_string (seed));
     EXPECT_EQ (e.finding.verdict (), Verdict::pass) << e.first_diagnosis ();
-    EXPECT_LT (e.seconds, 40.0);
+    EXPECT_LT (e.seconds, 35.0);
     const BenchProfile &truth = e.truth (), &found = e.found ();
     ASSERT_TRUE (found.full_well && found.read_noise && found.black_level &&
                  found.linearity_error);

@@ -121,23 +121,24 @@ TEST (SickBench, TheExposureIsWhereTheTruthHasIt)
 
 TEST (SickBench, FlickerHasItsFrequencyAndDepth)
 {
-  const auto rig = rig_with ("flicker=100:0.2 leak=0 level=0.9 delay=0s "
+  const auto rig = rig_with ("flicker=101:0.2 leak=0 level=0.9 delay=0s "
                              "readout=0s full-well=1000000",
       12);
-  /* In 1/40 of a period, a flicker of 100 Hz is almost still. */
-  std::vector<double> levels;
-  for (int slot = 0; slot < 40; slot++)
-    levels.push_back (level_of (*rig, light_in (slot, 1), 40) - 4.0);
+  /* 25 frames/s see 101 Hz as 1 Hz; in 1/40 of a period, it is almost still. */
+  constexpr int kFrames = 25;
   double sum = 0.0, in_phase = 0.0, across = 0.0;
-  for (std::size_t slot = 0; slot < 40; slot++) {
-    const double angle = 2.0 * std::numbers::pi * (double (slot) + 0.5) / 10;
-    sum += levels[slot];
-    in_phase += 2 * levels[slot] * std::cos (angle);
-    across += 2 * levels[slot] * std::sin (angle);
+  const auto frames = frames_of (*rig, light_in (20, 1), 40, kFrames);
+  ASSERT_EQ (frames.size (), std::size_t (kFrames));
+  for (std::size_t k = 0; k < frames.size (); k++) {
+    const double level = mean_of (frames[k].picture) - 4.0;
+    const double angle = 2.0 * std::numbers::pi * double (k) / kFrames;
+    sum += level;
+    in_phase += 2 * level * std::cos (angle);
+    across += 2 * level * std::sin (angle);
   }
-  const double sinc =
-      std::sin (0.1 * std::numbers::pi) / (0.1 * std::numbers::pi);
-  EXPECT_NEAR (std::hypot (in_phase, across) / sum, 0.2 * sinc, 0.001);
+  const double turn = 0.101 * std::numbers::pi;
+  EXPECT_NEAR (
+      std::hypot (in_phase, across) / sum, 0.2 * std::sin (turn) / turn, 0.001);
 }
 
 TEST (SickBench, AFrameThatIsLateCarriesTheMaskBefore)
@@ -178,6 +179,24 @@ TEST (SickBench, TheTriggerDecidesWhichFramesCome)
   const auto before = parked->now ();
   EXPECT_TRUE (parked->watch (10)->empty ());
   EXPECT_EQ (parked->now () - before, 2000 * kMs);
+  EXPECT_TRUE (parked->watch_for (600 * kMs, 10)->empty ());
+  EXPECT_EQ (parked->now () - before, 2600 * kMs);
+}
+
+TEST (SickBench, MasksThatCannotBeCompressedTakeLongToReceive)
+{
+  const auto rig = rig_with ("");
+  const auto seconds_to_show = [&rig] (std::function<bool (int, int)> on) {
+    const auto before = rig->now ();
+    EXPECT_TRUE (rig->show ({.name = "mask", .on = std::move (on)}, 1).ok ());
+    return 1e-9 * double (rig->now () - before);
+  };
+  EXPECT_LT (seconds_to_show ([] (int, int) { return true; }), 0.3);
+  EXPECT_LT (seconds_to_show ([] (int x, int) { return x % 3 == 0; }), 0.3);
+  /* 24 bits of each mirror, at 64 kB/s. */
+  const Extent mirrors = rig->parts ().dmd.size;
+  EXPECT_NEAR (seconds_to_show ([] (int x, int y) { return (x + y) % 2 == 0; }),
+      3.0 * mirrors.width * mirrors.height / 64e3, 0.3);
 }
 
 TEST (SickBench, ThePhotonsHaveTheirNoise)

@@ -257,6 +257,8 @@ Engine::prepare (const Schedule &schedule, const FuseOptions &options)
   if (options.quality == FuseQuality::kBest)
     collaborative_.emplace (schedule, observation_, width_, height_);
   light_.assign (std::size_t (slots ()), Field (width_, height_));
+  if (!observation_.noise_free ())
+    static_light_ = Field (width_, height_);
 }
 
 std::vector<Tap>
@@ -478,13 +480,25 @@ Engine::compare_predictions (
 
 /* Static pixels are the same in every slot. */
 void
-Engine::blend (const Field &coded, int y, float *const *rows) const
+Engine::blend (const float *light, int y, float *const *rows) const
 {
-  const float *weight = static_pixels_.weight (y),
-              *light = static_pixels_.light (coded, y);
+  const float *weight = static_pixels_.weight (y);
   for (int s = 0; s < slots (); s++)
     for (int x = 0; x < width_; x++)
       rows[s][x] += weight[x] * (light[x] - rows[s][x]);
+}
+
+void
+Engine::smooth_static_light (const StaticPixels::Frames &frames)
+{
+  for (int y = 0; y < height_; y++) {
+    float *to = static_light_.row (y);
+    std::fill_n (to, width_, 0.0f);
+    for (const Field &slot : light_)
+      for (int x = 0; x < width_; x++)
+        to[x] += slot.row (y)[x] / float (slots ());
+  }
+  static_pixels_.smooth (kernels_, frames, static_light_);
 }
 
 /* The estimates of one row, in parts. */
@@ -583,19 +597,25 @@ Engine::fuse_linear (const Filters &filters, const Field &coded,
 }
 
 bool
-Engine::fuse_motion (const Field &coded, const PairFrames &frames,
-    const RowSink &sink, Workers &workers, std::stop_token stop)
+Engine::fuse_motion (const StaticPixels::Frames &frames,
+    const PairFrames &pairs, const RowSink &sink, Workers &workers,
+    std::stop_token stop)
 {
-  if (!motion_->run (kernels_, frames, light_, misfit_, workers, stop))
+  const Field &coded = frames.coded;
+  if (!motion_->run (kernels_, pairs, light_, misfit_, workers, stop))
     return false;
   if (collaborative_ && !collaborative_->run (kernels_, coded, typical_noise (),
                             light_, workers, stop))
     return false;
+  const bool smooth = !static_light_.empty ();
+  if (smooth)
+    smooth_static_light (frames);
   std::vector<float *> rows (light_.size ());
   for (int y = 0; y < height_; y++) {
     for (std::size_t s = 0; s < rows.size (); s++)
       rows[s] = light_[s].row (y);
-    blend (coded, y, rows.data ());
+    blend (smooth ? static_light_.row (y) : static_pixels_.light (coded, y), y,
+        rows.data ());
     sink (y, rows.data ());
   }
   return true;
@@ -644,7 +664,7 @@ Engine::fuse (const RowSink &wanted, Workers &workers, std::stop_token stop,
   });
   static_pixels_.finish (frames);
   bool done =
-      !models_.empty () || fuse_motion (coded.light, all, out, workers, stop);
+      !models_.empty () || fuse_motion (frames, all, out, workers, stop);
   if (done && refiner_)
     done = refiner_->run (
         kernels_, coded.light,

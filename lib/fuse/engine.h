@@ -120,8 +120,9 @@ private:
   void fuse_linear (const Filters &filters, const Field &coded,
       const SplitFrames &frames, const RowSink &sink,
       StaticPixels::Rows part) const;
-  void blend (const Field &coded, int y, float *const *rows) const;
-  bool fuse_motion (const Field &coded, const PairFrames &frames,
+  void blend (const float *light, int y, float *const *rows) const;
+  void smooth_static_light (const StaticPixels::Frames &frames);
+  bool fuse_motion (const StaticPixels::Frames &frames, const PairFrames &pairs,
       const RowSink &sink, Workers &workers, std::stop_token stop);
   /** Standard deviation of coded pixels in grey levels. */
   double typical_noise () const;
@@ -144,6 +145,7 @@ private:
   std::optional<MotionFilter> motion_;
   std::optional<CollaborativeFilter> collaborative_;
   std::vector<Field> light_;               ///< of each slot, unless fast
+  Field static_light_;                     ///< unless fast, or without noise
   std::optional<Uncertainty> uncertainty_; ///< made when it is first wanted
   Field *misfit_ = nullptr;                ///< of the frame; null: not wanted
   std::optional<Refiner> refiner_;

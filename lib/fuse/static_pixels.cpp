@@ -167,6 +167,40 @@ StaticPixels::average (const Kernels &kernels, const Frames &frames, Rows rows)
 }
 
 void
+StaticPixels::smooth (
+    const Kernels &kernels, const Frames &frames, Field &light)
+{
+  auto &[differences, sums, maxima] = rooms_.front ();
+  const int width = light.width (), height = light.height ();
+  const float area = float ((2 * radius_ + 1) * (2 * radius_ + 1));
+  const NoiseMap &noise = frames.noise;
+  float *squared = differences.row (0);
+  for (int y = 0; y < height + radius_; y++) {
+    if (y < height) {
+      const float *own = this->light (frames.coded, y), *other = light.row (y);
+      for (int x = 0; x < width; x++)
+        squared[x] = (own[x] - other[x]) * (own[x] - other[x]);
+      sums.extend (squared);
+      sums.add_row (kernels.sum, y, squared);
+    }
+    const int out = y - radius_;
+    if (out < 0)
+      continue;
+    const float *own = this->light (frames.coded, out);
+    const float *around = sums.result (kernels.sum, out);
+    const float *slope = noise.slope.row (out % noise.slope.height ());
+    const float *offset = noise.offset.row (out % noise.slope.height ());
+    float *to = light.row (out);
+    for (int x = 0; x < width; x++) {
+      const float variance = (slope[x] * std::max (to[x], 0.0f) + offset[x]) /
+                             this->frames (x, out);
+      const float seen = around[x] / area + kFloor;
+      to[x] += std::max (1.0f - variance / seen, 0.0f) * (own[x] - to[x]);
+    }
+  }
+}
+
+void
 StaticPixels::finish (const Frames &frames)
 {
   frames_++;

@@ -73,6 +73,15 @@ public:
   /** After these steps. */
   void finish (const Frames &frames);
 
+  /**
+   * With noise, static pixels of a smooth picture are truer if they are also
+   * averaged over their surroundings.
+   * @p light  the estimates of a static pixel. Becomes its light (), moved
+   *           towards them by the part of the squared differences around it
+   *           that noise explains: a local Wiener filter.
+   */
+  void smooth (const Kernels &kernels, const Frames &frames, Field &light);
+
   /** Forgets all frames. */
   void forget () { frames_ = 0; }
 

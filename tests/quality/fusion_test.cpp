@@ -83,6 +83,25 @@ TEST (FusionQuality, MotionIsTruerThanAFilterAndLikenessThanMotion)
   EXPECT_GT (best, bicubic + 0.5);
 }
 
+/* Smooth light that stands still: averages of a few frames are noisier than
+ * averages of a few pixels. */
+TEST (FusionQuality, StillLightIsAlsoAveragedOverPixels)
+{
+  constexpr int kCoded = 2, kSize = 64;
+  Picture ramp (kSize, kSize);
+  for (int y = 0; y < kSize; y++)
+    for (int x = 0; x < kSize; x++)
+      ramp.at (x, y) = std::uint8_t (100 + x);
+  for (const int n : {4, 8}) {
+    const Scene scene = still_scene ("ramp", ramp, kCoded * n);
+    for (const FuseQuality quality :
+        {FuseQuality::kBalanced, FuseQuality::kBest})
+      EXPECT_GT (figure (scene, n, quality, kNoisy).psnr,
+          figure (scene, n, FuseQuality::kFast, kNoisy).psnr + 3.0)
+          << n;
+  }
+}
+
 /* Estimated pixels of a drawn scene; the factors were fitted to others. */
 TEST (FusionQuality, ErrorsLieWithinTheUncertainty)
 {

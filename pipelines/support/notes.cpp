@@ -134,6 +134,11 @@ NoteWriter::write_event (GstEvent *event)
     gst_event_parse_tag (event, &tags);
     write (format ("tags %d ", int (gst_tag_list_get_scope (tags))) +
            CharPtr (gst_tag_list_to_string (tags)).get ());
+  } else if (GST_EVENT_TYPE (event) == GST_EVENT_SEGMENT) {
+    const GstSegment *segment = nullptr;
+    gst_event_parse_segment (event, &segment);
+    write (format ("segment %" G_GUINT64_FORMAT " %" G_GUINT64_FORMAT,
+        segment->start, segment->time));
   }
 }
 
@@ -215,11 +220,27 @@ NoteReader::push_tags ()
   gst_pad_push_event (src_.get (), gst_event_new_tag (tags));
 }
 
+/* That of the file begins with a rounded time, which may be too late for the
+ * first picture. */
+void
+NoteReader::push_segment ()
+{
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_TIME);
+  if (std::sscanf (rest_.c_str (), "%" SCNu64 " %" SCNu64, &segment.start,
+          &segment.time) == 2)
+    gst_pad_push_event (src_.get (), gst_event_new_segment (&segment));
+}
+
 void
 NoteReader::take_picture (GstPadProbeInfo *info)
 {
-  for (; kind_ == "tags"; next ())
-    push_tags ();
+  for (; kind_ == "tags" || kind_ == "segment"; next ()) {
+    if (kind_ == "tags")
+      push_tags ();
+    else
+      push_segment ();
+  }
   GstBuffer *picture =
       gst_buffer_make_writable (GST_PAD_PROBE_INFO_BUFFER (info));
   info->data = picture;

@@ -5,6 +5,7 @@
  *
  * Lines of the file, in their order:
  *   caps CAPS
+ *   segment START TIME, ns; TIME is that of the stream at START
  *   tags SCOPE TAGS
  *   picture PTS DURATION FLAGS META */
 #pragma once
@@ -76,6 +77,7 @@ private:
   GstPadProbeReturn take_event (GstPadProbeInfo *info);
   void take_picture (GstPadProbeInfo *info);
   void push_tags ();
+  void push_segment ();
   void next ();
 
   const codedexposure::gst::ObjectPtr<GstPad> src_;

@@ -304,6 +304,16 @@ forget_frames (RestoreState &state)
   gst_segment_init (&state.segment, GST_FORMAT_TIME);
 }
 
+/* Matroska rounds times to microseconds, and the time of the stream begins with
+ * the rounded one of the first frame, which may be too late by this. */
+void
+include_rounding (GstSegment &segment)
+{
+  constexpr guint64 kRounding = 500;
+  if (GST_CLOCK_TIME_IS_VALID (segment.time) && segment.time < segment.start)
+    segment.start -= std::min (kRounding, segment.start - segment.time);
+}
+
 /* A serialised event, in its turn. */
 gboolean
 take_event (Self *self, EventPtr event)
@@ -320,6 +330,12 @@ take_event (Self *self, EventPtr event)
   case GST_EVENT_SEGMENT:
     gst_event_copy_segment (event.get (), &state.segment);
     state.track.next_segment ();
+    if (state.track.exists ()) {
+      include_rounding (state.segment);
+      const guint32 seqnum = gst_event_get_seqnum (event.get ());
+      event.reset (gst_event_new_segment (&state.segment));
+      gst_event_set_seqnum (event.get (), seqnum);
+    }
     break;
   case GST_EVENT_TAG:
     return on_tag (self, std::move (event));
@@ -335,8 +351,8 @@ take_event (Self *self, EventPtr event)
 
 /* ----------------------------------------------------- frames and events -- */
 
-/* A container rounds times, and its segment may begin with the rounded one. A
- * frame that was in the segment, at @time, stays in it with its exact time. */
+/* Other programs round times more. A frame that was in the segment, at @time,
+ * stays in it with its exact time. */
 void
 keep_in_segment (RestoreState &state, GstClockTime time, GstClockTime exact)
 {

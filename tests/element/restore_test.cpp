@@ -278,6 +278,23 @@ TEST_F (Restore, AFrameWhoseTimeTheFileRoundedUpStaysInTheSegment)
   }
 }
 
+TEST_F (Restore, AfterASeekTheTimeOfTheStreamIsTheSame)
+{
+  const auto time_of_second_frame = [this] (GstClockTime start) {
+    GstSegment segment;
+    gst_segment_init (&segment, GST_FORMAT_TIME);
+    segment.start = start;
+    segment.time = start - kPeriod / 2;
+    file.push_event (gst_event_new_segment (&segment));
+    while (const EventPtr event = file.pull_event (GST_EVENT_SEGMENT))
+      gst_event_copy_segment (event.get (), &segment);
+    return gst_segment_to_stream_time (&segment, GST_FORMAT_TIME, 2 * kPeriod);
+  };
+  const guint64 whole = time_of_second_frame (kPeriod / 2);
+  EXPECT_EQ (whole, time_of_second_frame (kPeriod));
+  EXPECT_GE (whole, 2 * kPeriod - kPeriod / 2);
+}
+
 TEST_F (Restore, WithoutTheLastLineTheStreamWasCut)
 {
   play (-1, kFrames);

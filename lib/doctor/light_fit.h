@@ -52,8 +52,8 @@ struct LightModel {
 struct LightQuestion {
   /** Find start and lengths, too; else they are known. */
   bool window = true;
-  int lines = 3;                         ///< at most
-  double slowest = 0.5, fastest = 600.0; ///< lines, Hz
+  int lines = 3;                          ///< at most
+  double slowest = 0.5, fastest = 1200.0; ///< lines, Hz
   /** Weaker lines are those of noise, as a part of the light. */
   double faintest = 5e-4;
 };

@@ -160,10 +160,13 @@ void
 MirrorRun::diagnose_orientation ()
 {
   const ViewOrientation is = view_.orientation ();
-  finding_.notes.push_back ({"orientation",
+  const std::string flipped =
       std::string (is.flipped_x ? "flipped in x, " : "") +
-          (is.flipped_y ? "flipped in y, " : "") + "turned by " +
-          std::to_string (is.turned) + " degrees"});
+      (is.flipped_y ? "flipped in y, " : "");
+  finding_.notes.push_back ({"orientation",
+      flipped + (is.turned == 0 ? "upright"
+                                : "turned by " + std::to_string (is.turned) +
+                                      " degrees")});
   if (is.turned != 0)
     finding_.diagnoses.push_back ({"turned", Verdict::fail,
         "the camera is turned against the mirrors by " +

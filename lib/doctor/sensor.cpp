@@ -41,6 +41,9 @@ constexpr double kZeros = 0.005;
 constexpr double kDarkError = 0.02;
 /* Below this variance of the dark, DN squared, rounding changes it. */
 constexpr double kRounded = 0.9;
+/* Light of mirrors that are off, part of the range, whose own noise tips the
+ * rounding. */
+constexpr double kMostOff = 0.05;
 /* A gain with this relative error is not known. */
 constexpr double kUnknown = 0.2;
 /* Light below this part of the range is too little to measure noise. */
@@ -216,7 +219,7 @@ PhotonTransferRun::see_off ()
     ASSIGN_OR_RETURN (
         const auto sight, measure_dither (examination_, fine_, top_, dark_.mean,
                               bright_.mean, defects_.good.view (), *first));
-    if (sight) {
+    if (sight && sight->dark.off.value < kMostOff * largest_) {
       dithered_ = sight->dark;
       off_.light = sight->dark.off;
       off_.shorter = sight->shorter;

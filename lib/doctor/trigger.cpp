@@ -11,6 +11,7 @@
 #include "doctor/checks.h"
 #include "doctor/level.h"
 #include "doctor/light_fit.h"
+#include "doctor/window_guess.h"
 
 namespace codedexposure
 {
@@ -33,6 +34,8 @@ constexpr int kInsideLooks = 12, kInsideFrames = 6;
 constexpr double kSameLevel = 0.2;
 /* Mirrors are half way, and clocks tick, within that; s. */
 constexpr double kTicks = 3e-6;
+/* Steps of pixel values in which nothing can be measured, part of the range. */
+constexpr double kCoarsest = 0.1;
 /* Light of all mirrors by which a run of an eighth can be measured, part of the
  * range. */
 constexpr double kFaint = 0.05;
@@ -41,6 +44,11 @@ constexpr double kFaint = 0.05;
 constexpr double kLateWarn = 400e-6, kLateFail = 700e-6;
 constexpr double kShortWarn = 600e-6, kShortFail = 900e-6;
 constexpr double kJitterWarn = 25e-6, kJitterFail = 60e-6;
+/* An exposure that is longer, or known less well, is none that explains the
+ * light; parts of the period. */
+constexpr double kLongest = 1.5, kUnclear = 0.02;
+/* Slowest flicker beside which the exposure is found, Hz. */
+constexpr double kSlowest = 0.15;
 /* A delay of that part of a period is that of a pulse, not of a setting, where
  * the camera does not say what it is set to. */
 constexpr double kEdge = 0.3;
@@ -89,7 +97,7 @@ private:
   void fail (const char *id, std::string cause, std::string remedy,
       Verdict severity = Verdict::fail);
   Result<bool> check_frames ();
-  Result<bool> check_parked (double ratio, double step);
+  Result<bool> check_parked (double ratio, double step, double uneven);
   Result<bool> check_lag ();
   Result<std::vector<SeenFrame>> change (bool all);
   Change judge (const std::vector<SeenFrame> &seen, double before, double after,
@@ -152,6 +160,12 @@ TriggerCheck::check_frames ()
       bits |= level_of (seen[i].picture.view (), largest_).bits_seen;
   }
   step_ = bits ? bits & -bits : 1;
+  if (step_ > kCoarsest * largest_) {
+    fail ("missing-bits",
+        "all pixel values are multiples of " + std::to_string (step_),
+        "set the pixel format to the number of bits that the sensor delivers");
+    return false;
+  }
   last_ = seen.back ().time;
   std::ranges::nth_element (
       steps, steps.begin () + std::ptrdiff_t (steps.size () / 2));
@@ -164,12 +178,19 @@ TriggerCheck::check_frames ()
       frames * period_ /
       std::max (1e-9 * double (seen.back ().time - seen.front ().time), 1e-9);
   finding_.readings.push_back ({"frames per cycle", {ratio, 0.0}, "", "1"});
-  return check_parked (ratio, step);
+  /* Of stamps that jitter, only the steps tell by how much. */
+  double squares = 0.0;
+  for (const double each : steps)
+    squares += std::pow (std::remainder (each, step), 2);
+  const double uneven = std::sqrt (squares / double (steps.size ())) /
+                        (step * double (steps.size ()));
+  return check_parked (ratio, step, 3.0 * uneven);
 }
 
-/** Frames of a camera that waits for the trigger end with it. */
+/** Frames of a camera that waits for the trigger end with it. @p step: from
+ * frame to frame, s. @p uneven: error of @p ratio. */
 Result<bool>
-TriggerCheck::check_parked (double ratio, double step)
+TriggerCheck::check_parked (double ratio, double step, double uneven)
 {
   rig_.park ();
   const double enough = 2.0 * step * kFramesInFlight; // s
@@ -192,7 +213,7 @@ TriggerCheck::check_parked (double ratio, double step)
     fail ("double-rate", "two frames come for each trigger",
         "set TriggerActivation=RisingEdge, and the trigger divider to the "
         "number of pulses in a cycle");
-  else if (std::abs (ratio - 1.0) > kRateError)
+  else if (std::abs (ratio - 1.0) > kRateError + uneven)
     fail ("free-running",
         "the frame rate is " + rate + " frames/s, not that of the trigger",
         "set TriggerMode=On and the TriggerSource of the cable");
@@ -409,82 +430,6 @@ TriggerCheck::sample_inside (const LightModel &guess)
   return {};
 }
 
-/** Squares that remain where runs of one exposure are explained by a window,
- * with the best gain and offset or with those of @p model. */
-double
-misfit (std::span<const LightSample> samples, int exposure,
-    const LightModel &window, LightModel *model)
-{
-  LightModel unit = window;
-  unit.gain = 1.0;
-  unit.offsets.assign (unit.lengths.size (), 0.0);
-  double n = 0.0, x = 0.0, y = 0.0, xx = 0.0, xy = 0.0;
-  for (const LightSample &sample : samples) {
-    if (sample.exposure != exposure)
-      continue;
-    const double seconds = unit.light (sample);
-    n += 1.0;
-    x += seconds;
-    y += sample.light;
-    xx += seconds * seconds;
-    xy += seconds * sample.light;
-  }
-  if (model) {
-    const double spread = n * xx - x * x;
-    unit.gain =
-        spread > 1e-12 * n * xx ? std::max (0.0, (n * xy - x * y) / spread) : 0;
-    unit.offsets.assign (unit.lengths.size (), (y - unit.gain * x) / n);
-    *model = unit;
-  } else {
-    unit = window;
-  }
-  double squares = 0.0;
-  for (const LightSample &sample : samples)
-    if (sample.exposure == exposure)
-      squares += std::pow (sample.light - unit.light (sample), 2);
-  return squares;
-}
-
-/** The window of exposure 0 by its tiles, to a hundredth of a period. */
-LightModel
-guess_window (std::span<const LightSample> samples, double period)
-{
-  constexpr int kSteps = 96;
-  LightModel best, tried;
-  double least = -1.0;
-  for (int length = kSteps / 8; length < kSteps; length++)
-    for (int start = 0; start < kSteps; start++) {
-      LightModel window{.period = period,
-          .start = period * start / kSteps,
-          .lengths = {period * length / kSteps}};
-      const double squares = misfit (samples, 0, window, &tried);
-      if (least < 0.0 || squares < least) {
-        least = squares;
-        best = tried;
-      }
-    }
-  return best;
-}
-
-/** The length of exposure 1, where all else of @p model is known. */
-double
-guess_length (std::span<const LightSample> samples, LightModel model)
-{
-  constexpr int kSteps = 200;
-  double best = 0.0, least = -1.0;
-  model.lengths.push_back (0.0);
-  model.offsets.push_back (model.offsets.front ());
-  for (int step = 1; step <= kSteps; step++) {
-    model.lengths[1] = 1.5 * model.period * step / kSteps;
-    const double squares = misfit (samples, 1, model, nullptr);
-    if (least < 0.0 || squares < least) {
-      least = squares;
-      best = model.lengths[1];
-    }
-  }
-  return best;
-}
-
 /**
  * Half of the period leaves its start alone in the dark; of the longest
  * exposure, only the length is to be found. Both start with the same delay.
@@ -505,7 +450,8 @@ TriggerCheck::measure_exposure ()
   RETURN_IF_ERROR (sample_inside (guess));
   if (samples_.size () < 40)
     return {};
-  diagnose_exposure (fit_light (samples_, guess, {.lines = 2}));
+  diagnose_exposure (
+      fit_light (samples_, guess, {.lines = 2, .slowest = kSlowest}));
   return {};
 }
 
@@ -564,10 +510,17 @@ TriggerCheck::diagnose_exposure (const LightFit &fit)
   start.sigma = std::hypot (start.sigma, kTicks);
   length.sigma = std::hypot (length.sigma, kTicks);
   start.value = std::fmod (start.value + period_, period_);
-  if (start.value > period_ - kShortFail)
+  if (start.value > period_ - kLateWarn)
     start.value -= period_; // it is not almost a whole period late
+  const bool possible = length.value > 0.0 && length.value < kLongest * period_;
+  const bool known = start.sigma + length.sigma < kUnclear * period_;
+  if (!possible || (!known && !above (fit.jitter, kJitterFail)))
+    return fail ("flicker",
+        "the light changes so much within the frame period that the exposure "
+        "cannot be found",
+        "drive the light with a constant current, without mains ripple or PWM");
   remember (fit, start, length);
-  const Measured end{start.value + length.value - period_,
+  Measured end{start.value + length.value - period_,
       std::hypot (start.sigma, length.sigma)};
   const auto reading = [&] (const char *name, const Measured &seconds,
                            const char *rule) {
@@ -583,6 +536,9 @@ TriggerCheck::diagnose_exposure (const LightFit &fit)
   const auto severity = [] (bool bad) {
     return bad ? Verdict::fail : Verdict::warn;
   };
+  /* What jitters as much is no setting. */
+  start.sigma = std::hypot (start.sigma, fit.jitter.value);
+  end.sigma = std::hypot (end.sigma, fit.jitter.value);
   diagnose_delay (start);
   const Measured lost{-end.value, end.sigma};
   const Measured missing{period_ - length.value, length.sigma};

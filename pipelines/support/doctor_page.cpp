@@ -19,7 +19,7 @@ namespace
 {
 
 constexpr int kWide = 560, kHigh = 260; // a plot
-constexpr int kLeft = 62, kRight = 26, kTop = 26, kBottom = 42;
+constexpr int kLeft = 76, kRight = 26, kTop = 34, kBottom = 42;
 constexpr int kTicks = 5;
 
 std::string
@@ -31,16 +31,18 @@ escaped (const std::string &text)
   return result;
 }
 
-/** For people: a number stays on the line of its unit. */
+/** For people: a number stays on the line of its unit and of its error. */
 std::string
 typeset (const std::string &text)
 {
   static const std::regex unit ("([0-9]) (%|Hz|us|ms|DN|e-)(?![a-zA-Z])");
-  static const std::regex micro ("([0-9]\u00a0)us"), plus_minus ("\\+-");
+  static const std::regex micro ("([0-9]\u00a0)us"), plus_minus ("\\+-"),
+      spaced (" \u00b1 ");
   const std::string together =
       std::regex_replace (escaped (text), unit, "$1\u00a0$2");
-  return std::regex_replace (
+  const std::string symbols = std::regex_replace (
       std::regex_replace (together, micro, "$1µs"), plus_minus, "±");
+  return std::regex_replace (symbols, spaced, "\u00a0±\u00a0");
 }
 
 std::string
@@ -209,7 +211,7 @@ figure_of (const Plot &plot)
          format ("<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">%s</text>",
              (kLeft + kWide - kRight) / 2, kHigh - 6,
              escaped (plot.x_axis).c_str ()) +
-         format ("<text x=\"6\" y=\"16\">%s</text>",
+         format ("<text x=\"6\" y=\"14\">%s</text>",
              escaped (plot.y_axis).c_str ()) +
          "</svg><figcaption>" + escaped (plot.title) +
          (plot.model.empty () ? "" : " (dots: measured; line: the model)") +
@@ -270,7 +272,10 @@ section_of (const DoctorPage &page, const Finding &finding)
   std::string text = "<h2 id=\"" + finding.check + "\">" +
                      escaped (title_of (page, finding.check)) + " " +
                      badge (outcome (finding)) + "</h2>\n";
-  text += "<p>Shown: " + escaped (finding.shown) + ".</p>\n";
+  text += "<p>Shown: " + escaped (finding.shown) + ".";
+  if (!finding.skipped)
+    text += format (" It took %.0f\u00a0s.", finding.seconds);
+  text += "</p>\n";
   text += diagnoses_of (finding) + readings_of (finding);
   if (!finding.notes.empty ())
     text += rows (finding.notes);
@@ -325,7 +330,9 @@ constexpr const char *kStyle =
     ".model{fill:none;stroke:#e4572e;stroke-width:1}\n"
     ".words{white-space:normal;text-align:left}\n"
     "td .badge{font-size:11px} th{white-space:normal} pre{overflow-x:auto}\n"
-    "@media(max-width:700px){.curve text{font-size:17px}}\n"
+    ".pair{margin-top:12px}\n"
+    "@media(max-width:700px){.curve text{font-size:17px} "
+    "td{white-space:normal}}\n"
     "@media(prefers-color-scheme:dark){body{background:#16181c;color:#ddd}\n"
     "dt,figcaption{color:#aaa} a{color:#8ab4f8} th,td{border-color:#444}\n"
     ".curve text{fill:#bbb} .curve path{stroke:#444} "

@@ -170,6 +170,8 @@ open_rig (const Arguments &arguments, const std::stop_token &stop)
     }
     RETURN_IF_ERROR (inflict (options, arguments.faults));
     auto rig = SimulatedRig::make (options);
+    if (!rig && rig.error ().code == ErrorCode::invalid_argument)
+      return rig.error (); // no bench has such numbers
     if (!rig)
       return Opened{
           nullptr, part_missing (rig.error (), options.has ("camera-missing"))};

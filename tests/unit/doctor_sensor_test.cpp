@@ -58,7 +58,7 @@ TEST (SensorCheck, NamesWhatIsWrong)
 TEST (SensorCheck, TakesLightOfAnyKind)
 {
   for (const char *words : {"vignetting=0.6", "bright=1.6", "drift=0.1",
-           "leak=0.03", "stuck-on=20", "dust=6", "shift=100/0"}) {
+           "leak=0.03", "leak=0.15", "stuck-on=20", "dust=6", "shift=100/0"}) {
     const CheckedBench e = check_bench (sick_bench (3, words), check_sensor);
     EXPECT_EQ (e.finding.verdict (), Verdict::pass) << words;
     expect_near (*e.found ().full_well, e.truth ().full_well->value,

@@ -47,11 +47,13 @@ coded_frames (const Schedule &schedule)
 }
 
 void
-fuse (benchmark::State &state, const char *preset, FuseQuality quality)
+fuse (benchmark::State &state, const char *preset, FuseQuality quality,
+    bool refine = false)
 {
   const Schedule schedule = Schedule::from_preset (preset).value ();
   FuseOptions options;
   options.quality = quality;
+  options.refine = refine;
   options.threads = 1;
   auto fuser =
       Fuser<std::uint8_t>::make (schedule, kWidth, kHeight, options).value ();
@@ -67,9 +69,8 @@ fuse (benchmark::State &state, const char *preset, FuseQuality quality)
     quality::must (fuser.take (frames[next++ % frames.size ()].view ()));
     quality::must (fuser.fuse (views));
   };
-  if (quality == FuseQuality::kFast) // filters of neighbours are made once
-    for (int i = 0; i < 2; i++)
-      fuse_next ();
+  for (int i = 0; i < 2; i++) // filters of neighbours are made once
+    fuse_next ();
   for (auto _ : state)
     fuse_next ();
   state.counters["x_real_time"] = benchmark::Counter (
@@ -79,11 +80,13 @@ fuse (benchmark::State &state, const char *preset, FuseQuality quality)
 constexpr const char *kFour = "sequential:lattice:4/2";
 constexpr const char *kEight = "sequential:lattice:8/3,order=bit-reversal";
 
-#define FUSE_BENCHMARK(name, preset, quality)                                  \
-  BENCHMARK_CAPTURE (fuse, name, preset, quality)                              \
+#define FUSE_BENCHMARK(name, preset, ...)                                      \
+  BENCHMARK_CAPTURE (fuse, name, preset, __VA_ARGS__)                          \
       ->Unit (benchmark::kMillisecond)
 FUSE_BENCHMARK (fast_4, kFour, FuseQuality::kFast);
 FUSE_BENCHMARK (fast_8, kEight, FuseQuality::kFast);
+FUSE_BENCHMARK (fast_refined_4, kFour, FuseQuality::kFast, true);
+FUSE_BENCHMARK (fast_refined_8, kEight, FuseQuality::kFast, true);
 FUSE_BENCHMARK (balanced_4, kFour, FuseQuality::kBalanced);
 FUSE_BENCHMARK (balanced_8, kEight, FuseQuality::kBalanced);
 FUSE_BENCHMARK (best_4, kFour, FuseQuality::kBest);

@@ -38,6 +38,47 @@ private:
   std::vector<double> sums_;
 };
 
+/* Root mean square error of the change from @p i to the next frame. */
+double
+change_error (const std::vector<Picture> &frames,
+    const std::vector<Picture> &truth, std::size_t i)
+{
+  double sum = 0.0;
+  for (int y = 0; y < truth[i].height (); y++)
+    for (int x = 0; x < truth[i].width (); x++) {
+      const auto change = [&] (const std::vector<Picture> &of) {
+        return of[i + 1].at (x, y) - of[i].at (x, y);
+      };
+      const double error = change (frames) - change (truth);
+      sum += error * error;
+    }
+  return std::sqrt (sum / (truth[i].width () * truth[i].height ()));
+}
+
+int
+laplacian (const Picture &picture, int x, int y)
+{
+  return 4 * picture.at (x, y) - picture.at (x - 1, y) - picture.at (x + 1, y) -
+         picture.at (x, y - 1) - picture.at (x, y + 1);
+}
+
+/* Adds 1 / @p frames of a frame's detail and likeness to their means. */
+void
+add_texture (
+    const Picture &frame, const Picture &truth, double frames, FrameMean &mean)
+{
+  double own = 0.0, true_one = 0.0, both = 0.0;
+  for (int y = 1; y + 1 < truth.height (); y++)
+    for (int x = 1; x + 1 < truth.width (); x++) {
+      const double a = laplacian (frame, x, y), b = laplacian (truth, x, y);
+      own += a * a;
+      true_one += b * b;
+      both += a * b;
+    }
+  mean.detail += own / true_one / frames;
+  mean.likeness += both / std::sqrt (own * true_one) / frames;
+}
+
 } // namespace
 
 double
@@ -74,18 +115,27 @@ ssim (ImageView<const std::uint8_t> a, ImageView<const std::uint8_t> b)
   return total / ((a.width - kWindow + 1) * (a.height - kWindow + 1));
 }
 
+double
+psnr (const Picture &frame, const Picture &truth)
+{
+  PooledError error;
+  for (int y = 0; y < truth.height (); y++)
+    for (int x = 0; x < truth.width (); x++)
+      error.add (frame.at (x, y), truth.at (x, y));
+  return std::min (error.psnr (), 99.0);
+}
+
 FrameMean
 compare (const std::vector<Picture> &frames, const std::vector<Picture> &truth)
 {
   FrameMean mean;
+  const auto count = double (frames.size ());
   for (std::size_t i = 0; i < frames.size (); i++) {
-    PooledError error;
-    for (int y = 0; y < frames[i].height (); y++)
-      for (int x = 0; x < frames[i].width (); x++)
-        error.add (frames[i].at (x, y), truth[i].at (x, y));
-    mean.psnr += std::min (error.psnr (), 99.0) / double (frames.size ());
-    mean.ssim +=
-        ssim (frames[i].view (), truth[i].view ()) / double (frames.size ());
+    mean.psnr += psnr (frames[i], truth[i]) / count;
+    mean.ssim += ssim (frames[i].view (), truth[i].view ()) / count;
+    add_texture (frames[i], truth[i], count, mean);
+    if (i + 1 < frames.size ())
+      mean.flicker += change_error (frames, truth, i) / (count - 1);
   }
   return mean;
 }

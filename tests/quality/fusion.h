@@ -17,7 +17,17 @@ namespace codedexposure::quality
 struct FrameMean {
   double psnr = 0.0; ///< dB, peak 255
   double ssim = 0.0;
+  /** Root mean square error of the change to the next frame, grey levels. */
+  double flicker = 0.0;
+  /** Energy of the Laplacian, relative to that of the truth: below 1, detail is
+   * missing; above, it is noise or invented. */
+  double detail = 0.0;
+  /** Correlation of the Laplacian with that of the truth. */
+  double likeness = 0.0;
 };
+
+/** At most 99 dB, peak 255. */
+double psnr (const Picture &frame, const Picture &truth);
 
 /** Structural similarity (Wang et al., 2004) with uniform windows of 7x7, their
  * sample covariance, K1 = 0.01, K2 = 0.03, without the border. */

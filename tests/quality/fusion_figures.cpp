@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <numeric>
 #include <span>
 #include <utility>
 
 #include "baselines.h"
+#include "bench/scene.h"
 
 namespace codedexposure::quality
 {
@@ -15,6 +17,7 @@ namespace codedexposure::quality
 namespace
 {
 
+constexpr int kDrawnFrames = 16;
 constexpr Condition kClean = {};
 constexpr Condition kNoisy = {.electrons = 10000.0, .read_noise = 5.0};
 
@@ -46,13 +49,15 @@ rank_way (int n, bool normalised)
 }
 
 FusionWay
-fusion_way (int n, FuseQuality quality, bool refine = false)
+fusion_way (int n, FuseQuality quality, bool refine = false, int lookahead = 0)
 {
-  return {std::string (quality_name (quality)) + (refine ? ", refined" : ""),
+  return {std::string (quality_name (quality)) + (refine ? ", refined" : "") +
+              (lookahead ? ", lookahead" : ""),
       [=] (const Scene &scene, const Condition &condition) {
         const Schedule schedule = fusion_schedule (n);
         FuseOptions options = options_of (quality, condition);
         options.refine = refine;
+        options.lookahead = lookahead;
         return fuse (take (scene, schedule, condition), schedule, options);
       }};
 }
@@ -78,6 +83,21 @@ ways (int n)
       fusion_way (n, FuseQuality::kLearned)};
 }
 
+/* Those of sequences: files are fused with lookahead. */
+std::vector<FusionWay>
+sequence_ways (int n)
+{
+  std::vector<FusionWay> all;
+  for (const FuseQuality quality :
+      {FuseQuality::kFast, FuseQuality::kBalanced, FuseQuality::kBest})
+    for (const int lookahead : {0, 1})
+      all.push_back (fusion_way (n, quality, false, lookahead));
+  all.push_back (fusion_way (n, FuseQuality::kFast, true, 1));
+  all.push_back (fusion_way (n, FuseQuality::kBalanced, true, 1));
+  all.push_back (fusion_way (n, FuseQuality::kLearned, false, 1));
+  return all;
+}
+
 /* The first frames of @p scene, as many as complete coded frames contain. */
 Scene
 first_of (const Scene &scene, int frames, int n)
@@ -88,19 +108,43 @@ first_of (const Scene &scene, int frames, int n)
   return part;
 }
 
+std::string
+condition_name (bool noisy)
+{
+  return noisy ? "noisy" : "clean";
+}
+
+using Figures = std::vector<double>;
+
+/* A table that has @p figures of every scene and their mean. */
 Table
-empty_table (std::string id, std::string title,
-    const std::vector<Scene> &scenes, const char *second, int decimals)
+scene_table (std::string id, std::string title,
+    const std::vector<Scene> &scenes, const std::vector<Column> &figures)
 {
   Table table{std::move (id), std::move (title), {{"n"}, {"method"}}, {}};
   const auto add = [&] (const std::string &name) {
-    table.columns.push_back ({name + " dB", 2});
-    table.columns.push_back ({name + " " + second, decimals});
+    for (const Column &figure : figures)
+      table.columns.push_back ({name + figure.title, figure.decimals});
   };
   for (const Scene &scene : scenes)
     add (scene.name);
   add ("mean");
   return table;
+}
+
+/* @p row with the figures of every scene and their mean. */
+void
+add_row (
+    Table &table, std::vector<Cell> row, const std::vector<Figures> &scenes)
+{
+  Figures mean (scenes[0].size ());
+  for (const Figures &figures : scenes)
+    for (std::size_t i = 0; i < figures.size (); i++) {
+      row.emplace_back (figures[i]);
+      mean[i] += figures[i] / double (scenes.size ());
+    }
+  row.insert (row.end (), mean.begin (), mean.end ());
+  table.rows.push_back (std::move (row));
 }
 
 /* Root mean square over pixels of the standard deviation over pictures. */
@@ -138,30 +182,38 @@ fusion_tables (
 {
   std::vector<Table> tables;
   for (const bool noisy : {false, true}) {
-    const char *name = noisy ? "noisy" : "clean";
-    Table &table =
-        tables.emplace_back (empty_table (std::string ("fusion-") + name,
-            "Full-size frames, " + std::string (name) +
-                ": mean PSNR (dB) and SSIM of the first " +
-                std::to_string (frames) + " frames",
-            scenes, "SSIM", 3));
+    const std::string name = condition_name (noisy);
+    const std::string first =
+        " of the first " + std::to_string (frames) + " frames, " + name;
+    Table accuracy = scene_table ("fusion-" + name,
+        "Mean PSNR (dB) and SSIM" + first, scenes, {{" dB", 2}, {" SSIM", 3}});
+    Table flicker = scene_table ("fusion-flicker-" + name,
+        "Error of the change from slot to slot (grey levels, rms)" + first,
+        scenes, {{"", 2}});
+    Table texture = scene_table ("fusion-texture-" + name,
+        "Detail relative to the truth, and its correlation with the truth," +
+            first,
+        scenes, {{" detail", 2}, {" correlation", 2}});
     for (const int n : {4, 8}) {
       for (const FusionWay &way : ways (n)) {
-        auto &row = table.rows.emplace_back (
-            std::vector<Cell>{std::to_string (n), way.name});
-        FrameMean mean;
+        std::vector<Figures> accuracies, flickers, textures;
         for (const Scene &scene : scenes) {
           progress (std::to_string (n) + " " + way.name + " of " + scene.name);
           const Scene part = first_of (scene, frames, n);
-          const FrameMean figure =
+          const FrameMean mean =
               compare (way.frames (part, noisy ? kNoisy : kClean), part.frames);
-          row.insert (row.end (), {figure.psnr, figure.ssim});
-          mean.psnr += figure.psnr / double (scenes.size ());
-          mean.ssim += figure.ssim / double (scenes.size ());
+          accuracies.push_back ({mean.psnr, mean.ssim});
+          flickers.push_back ({mean.flicker});
+          textures.push_back ({mean.detail, mean.likeness});
         }
-        row.insert (row.end (), {mean.psnr, mean.ssim});
+        const std::vector<Cell> row{std::to_string (n), way.name};
+        add_row (accuracy, row, accuracies);
+        add_row (flicker, row, flickers);
+        add_row (texture, row, textures);
       }
     }
+    std::ranges::move (std::initializer_list<Table>{accuracy, flicker, texture},
+        std::back_inserter (tables));
   }
   return tables;
 }
@@ -170,19 +222,16 @@ Table
 still_fusion_table (const std::vector<Scene> &scenes, const Progress &progress)
 {
   constexpr int kCoded = 3;
-  Table table = empty_table ("fusion-still",
+  Table table = scene_table ("fusion-still",
       "Static pixels, third coded frame: PSNR (dB), and standard deviation "
       "over slots in grey levels",
-      scenes, "levels", 2);
+      scenes, {{" dB", 2}, {" levels", 2}});
   table.columns.insert (table.columns.begin () + 1, {"condition"});
   for (const bool noisy : {false, true}) {
     for (const int n : {4, 8}) {
       for (const FuseQuality quality :
           {FuseQuality::kFast, FuseQuality::kBest}) {
-        auto &row = table.rows.emplace_back (
-            std::vector<Cell>{std::to_string (n), noisy ? "noisy" : "clean",
-                std::string (quality_name (quality))});
-        double psnr = 0.0, levels = 0.0;
+        std::vector<Figures> figures;
         for (const Scene &scene : scenes) {
           progress ("still " + scene.name);
           const Scene still =
@@ -192,15 +241,145 @@ still_fusion_table (const std::vector<Scene> &scenes, const Progress &progress)
           const std::vector<Picture> last (
               all.end () - std::ptrdiff_t (n), all.end ());
           const std::vector<Picture> truth (std::size_t (n), still.frames[0]);
-          row.insert (row.end (), {compare (last, truth).psnr, flicker (last)});
-          psnr += compare (last, truth).psnr / double (scenes.size ());
-          levels += flicker (last) / double (scenes.size ());
+          figures.push_back ({compare (last, truth).psnr, flicker (last)});
         }
-        row.insert (row.end (), {psnr, levels});
+        add_row (table,
+            {std::to_string (n), condition_name (noisy),
+                std::string (quality_name (quality))},
+            figures);
       }
     }
   }
   return table;
+}
+
+/* Mean PSNR of each slot over the coded frames from frame @p from on. */
+static Figures
+slot_psnr (const std::vector<Picture> &frames,
+    const std::vector<Picture> &truth, int from, int n)
+{
+  Figures slots (std::size_t (n), 0.0);
+  const auto count =
+      double ((truth.size () - std::size_t (from)) / slots.size ());
+  for (auto i = std::size_t (from); i < truth.size (); i++)
+    slots[i % slots.size ()] += psnr (frames[i], truth[i]) / count;
+  return slots;
+}
+
+static double
+mean_of (const Figures &figures)
+{
+  return std::accumulate (figures.begin (), figures.end (), 0.0) /
+         double (figures.size ());
+}
+
+std::vector<Table>
+sequence_tables (const std::vector<Scene> &scenes, const Progress &progress)
+{
+  constexpr int kFrom = 8;
+  std::vector<Table> tables;
+  for (const bool noisy : {false, true}) {
+    for (const int n : {4, 8}) {
+      const std::string slots = std::to_string (n);
+      Table &table = tables.emplace_back (
+          Table{"fusion-sequences-" + condition_name (noisy) + "-" + slots,
+              "Frames 8 to 31, n = " + slots + ", " + condition_name (noisy) +
+                  ": mean PSNR (dB), and that of each slot of the coded frame",
+              {{"clip"}, {"method"}, {"mean", 2}}, {}});
+      for (int s = 0; s < n; s++)
+        table.columns.push_back ({"slot " + std::to_string (s), 2});
+      for (const Scene &scene : scenes) {
+        if (scene.frames.size () < kSequenceFrames)
+          continue;
+        const Scene part = first_of (scene, kSequenceFrames, n);
+        for (const FusionWay &way : sequence_ways (n)) {
+          progress (
+              "sequence, " + slots + " " + way.name + " of " + scene.name);
+          const Figures psnrs =
+              slot_psnr (way.frames (part, noisy ? kNoisy : kClean),
+                  part.frames, kFrom, n);
+          auto &row = table.rows.emplace_back (
+              std::vector<Cell>{scene.name, way.name, mean_of (psnrs)});
+          row.insert (row.end (), psnrs.begin (), psnrs.end ());
+        }
+      }
+    }
+  }
+  return tables;
+}
+
+/* The scene of codedexposure-scene from just before the candle is blown out. */
+static Scene
+bench_scene (std::string name, SceneKind kind)
+{
+  constexpr Extent kSize{192, 144};
+  constexpr double kStart = 0.45, kRate = 100.0;
+  const auto drawn = SyntheticScene::make (kind, kSize);
+  Scene scene{std::move (name), {}};
+  Image<float> light (kSize.width, kSize.height);
+  for (int t = 0; t < kDrawnFrames; t++) {
+    drawn->draw (kStart + t / kRate, light.view ());
+    Picture &picture = scene.frames.emplace_back (kSize.width, kSize.height);
+    for (int y = 0; y < kSize.height; y++)
+      for (int x = 0; x < kSize.width; x++)
+        picture.at (x, y) = std::uint8_t (std::lround (
+            255.0 * std::clamp (double (light.at (x, y)), 0.0, 1.0)));
+  }
+  return scene;
+}
+
+static std::vector<Scene>
+drawn_scenes ()
+{
+  constexpr unsigned kDiscs = 12;
+  constexpr int kSize = 128;
+  std::vector<Scene> scenes{synthetic_scene (192, 144, kDrawnFrames),
+      bench_scene ("candle", SceneKind::kCandle),
+      bench_scene ("blown-out", SceneKind::kBlownOut),
+      bench_scene ("pour", SceneKind::kPour)};
+  for (unsigned seed = 1; seed <= kDiscs; seed++) {
+    scenes.push_back (leaves_scene (seed, kSize, kDrawnFrames));
+    scenes.back ().name = "discs " + std::to_string (seed);
+  }
+  return scenes;
+}
+
+std::vector<Table>
+refinement_tables (const std::vector<Scene> &clips, const Progress &progress)
+{
+  constexpr FuseQuality kQualities[] = {
+      FuseQuality::kFast, FuseQuality::kBalanced, FuseQuality::kBest};
+  std::vector<Scene> scenes = clips;
+  std::ranges::move (drawn_scenes (), std::back_inserter (scenes));
+  std::vector<Table> tables;
+  for (const bool noisy : {false, true}) {
+    Table &table = tables.emplace_back (
+        Table{"fusion-refinement-" + condition_name (noisy),
+            "PSNR (dB) that the refinement gains over each quality, " +
+                condition_name (noisy),
+            {{"scene"}}, {}});
+    for (const int n : {4, 8})
+      for (const FuseQuality quality : kQualities)
+        table.columns.push_back ({std::string (quality_name (quality)) +
+                                      ", n = " + std::to_string (n),
+            2});
+    for (const Scene &scene : scenes) {
+      progress ("refinement of " + scene.name);
+      auto &row = table.rows.emplace_back (std::vector<Cell>{scene.name});
+      for (const int n : {4, 8}) {
+        const Scene part = first_of (scene, kSequenceFrames, n);
+        for (const FuseQuality quality : kQualities) {
+          const auto figure = [&] (bool refine) {
+            const auto frames = fusion_way (n, quality, refine)
+                                    .frames (part, noisy ? kNoisy : kClean);
+            return mean_of (slot_psnr (frames, part.frames, 0, n));
+          };
+          row.emplace_back (figure (true) - figure (false));
+        }
+      }
+    }
+  }
+  return tables;
 }
 
 /* Mean PSNR of fast over whole coded frames of @scenes. */

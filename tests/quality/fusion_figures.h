@@ -15,9 +15,12 @@ namespace codedexposure::quality
 /** The schedule that is measured for @p n slots, 4 or 8. */
 Schedule fusion_schedule (int n);
 
-/** PSNR and SSIM of fused frames and of what they are compared with on the
- * first @p frames frames of every scene, clean and noisy: means over frames,
- * and over scenes. */
+/** Frames of a clip that the tables of sequences and of the refinement use. */
+constexpr int kSequenceFrames = 32;
+
+/** PSNR and SSIM, flicker and texture of fused frames and of what they are
+ * compared with on the first @p frames frames of every scene, clean and noisy:
+ * means over frames, and over scenes. */
 std::vector<Table> fusion_tables (
     const std::vector<Scene> &scenes, int frames, const Progress &progress);
 
@@ -25,6 +28,16 @@ std::vector<Table> fusion_tables (
  * deviation over the slots of the third coded frame. */
 Table still_fusion_table (
     const std::vector<Scene> &scenes, const Progress &progress);
+
+/** PSNR of frames 8 to 31 of every scene that has as many, in all and by slot,
+ * clean and noisy. */
+std::vector<Table> sequence_tables (
+    const std::vector<Scene> &scenes, const Progress &progress);
+
+/** What the refinement changes the PSNR by in up to kSequenceFrames frames of
+ * every clip and of drawn scenes, clean and noisy. */
+std::vector<Table> refinement_tables (
+    const std::vector<Scene> &clips, const Progress &progress);
 
 /** Mean PSNR of `fast` over the first @p frames frames of drawn scenes and of
  * @p clips, clean, for scene models near the current one: a basis for the

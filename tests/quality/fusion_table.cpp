@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Prints the tables of docs/fusion.md, or writes them into it. */
+#include <algorithm>
 #include <iostream>
 #include <iterator>
 
@@ -63,7 +64,8 @@ parse (int &argc, char **&argv, Options &options)
 std::vector<Scene>
 find_scenes (const Options &options)
 {
-  auto clips = read_clips (options.clips ? options.clips : "", options.frames);
+  const int frames = std::max (options.frames, kSequenceFrames);
+  auto clips = read_clips (options.clips ? options.clips : "", frames);
   if (clips)
     std::erase_if (*clips, [] (const Scene &scene) {
       return scene.frames.size () < std::size_t (kLeastFrames);
@@ -75,7 +77,7 @@ find_scenes (const Options &options)
   std::cerr << "no clips"
             << (clips ? std::string () : ": " + clips.error ().message)
             << "; name a folder with --clips. Drawing a scene instead\n";
-  return {synthetic_scene (256, 192, options.frames)};
+  return {synthetic_scene (256, 192, frames)};
 }
 
 } // namespace
@@ -98,6 +100,10 @@ main (int argc, char **argv)
   } else {
     tables = fusion_tables (scenes, options.frames, progress);
     tables.push_back (still_fusion_table (scenes, progress));
+    std::ranges::move (
+        sequence_tables (scenes, progress), std::back_inserter (tables));
+    std::ranges::move (
+        refinement_tables (scenes, progress), std::back_inserter (tables));
   }
   progress ("");
 

@@ -142,6 +142,26 @@ TEST (FusionQuality, ErrorsLieWithinTheUncertainty)
   }
 }
 
+TEST (FusionQuality, FlickerAndTextureAreSeen)
+{
+  const Scene scene = synthetic_scene (64, 48, 2);
+  const FrameMean same = compare (scene.frames, scene.frames);
+  EXPECT_DOUBLE_EQ (same.flicker, 0.0);
+  EXPECT_DOUBLE_EQ (same.detail, 1.0);
+  EXPECT_DOUBLE_EQ (same.likeness, 1.0);
+
+  /* A chequered pattern of 8 levels in the second frame only. */
+  std::vector<Picture> invented = scene.frames;
+  for (int y = 0; y < 48; y++)
+    for (int x = 0; x < 64; x++)
+      invented[1].at (x, y) =
+          std::uint8_t (invented[1].at (x, y) + ((x + y) % 2 ? 4 : -4));
+  const FrameMean figures = compare (invented, scene.frames);
+  EXPECT_DOUBLE_EQ (figures.flicker, 4.0);
+  EXPECT_GT (figures.detail, 1.0);
+  EXPECT_LT (figures.likeness, 1.0);
+}
+
 TEST (FusionQuality, SsimIsOneOfThatWhichIsTheSame)
 {
   const Scene scene = synthetic_scene (64, 48, 2);

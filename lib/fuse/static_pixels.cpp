@@ -20,6 +20,8 @@ constexpr Fade kLargestChange{25.0f, 40.0f};
 /* Ratio of the prediction errors if static and if moving, up to which nothing
  * repeats, and from which on it does. */
 constexpr Fade kRepetition{1.3f, 1.8f};
+/* Of the noise of static light, how much is not in its estimates, too. */
+constexpr float kOwnNoise = 0.6f;
 /* Pixels with more weight are static. */
 constexpr float kStatic = 0.5f;
 
@@ -195,7 +197,8 @@ StaticPixels::smooth (
       const float variance = (slope[x] * std::max (to[x], 0.0f) + offset[x]) /
                              this->frames (x, out);
       const float seen = around[x] / area + kFloor;
-      to[x] += std::max (1.0f - variance / seen, 0.0f) * (own[x] - to[x]);
+      to[x] += std::max (1.0f - kOwnNoise * variance / seen, 0.0f) *
+               (own[x] - to[x]);
     }
   }
 }

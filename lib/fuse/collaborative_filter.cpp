@@ -13,10 +13,13 @@ namespace
 {
 
 constexpr int kBorder = kBlock;
-constexpr int kIterations = 28;
+constexpr int kIterations = 29;
 /* An iteration goes this many times as far as from an estimate to the mean of
  * its shrunk blocks, so that fewer are needed. */
 constexpr float kStep = 1.6f;
+/* The last ones go just there: what remains of single blocks is not enlarged.
+ */
+constexpr int kLastIterations = 2;
 /* The thresholds' logarithm falls with this power of the iteration. */
 constexpr double kSlowing = 1.2;
 /* Thresholds of the first and the last iteration, in grey levels; with noise,
@@ -27,7 +30,7 @@ constexpr double kNoiseThreshold = 1.8;
 constexpr std::uint8_t kNotMeasured = 255;
 /* Rows of blocks that are shrunk, and rows of pixels that are updated, at a
  * time. Strips of blocks overlap the next ones only. */
-constexpr int kStripBlocks = 6;
+constexpr int kStripBlocks = 4;
 constexpr int kStripRows = 24;
 static_assert (kStripBlocks * kBlockStep >= kBlock - kBlockStep);
 
@@ -42,9 +45,11 @@ round_up (int value, int step)
 CollaborativeFilter::CollaborativeFilter (const Schedule &schedule,
     const Observation &observation, int width, int height)
     : observation_ (observation), width_ (width), height_ (height),
-      split_ (round_up (width + 2 * kBorder, kBlockStep * Field::kSlack) /
-                  kBlockStep +
-              kBlock / kBlockStep + 1),
+      split_ (
+          round_up (round_up (width + 2 * kBorder, kBlockStep * Field::kSlack) /
+                            kBlockStep +
+                        kBlock / kBlockStep + 1,
+              Field::kSlack)),
       stride_ (split_ * kBlockStep),
       transform_ (dct_matrix (observation.slots ()))
 {
@@ -92,6 +97,7 @@ struct CollaborativeFilter::Step {
   const Kernels &kernels;
   int shift_x, shift_y;
   float threshold;
+  float length; ///< as kStep
 };
 
 void
@@ -137,7 +143,7 @@ CollaborativeFilter::shrink (
   const int height = height_ + 2 * kBorder;
   return workers.run ((height + kStripRows - 1) / kStripRows,
       [&] (int part, int) {
-        update_rows (step.kernels, part * kStripRows,
+        update_rows (step, part * kStripRows,
             std::min (height, (part + 1) * kStripRows));
       },
       stop);
@@ -146,7 +152,7 @@ CollaborativeFilter::shrink (
 /* The light of rows @first .. @end - 1 from the sums, which are cleared, such
  * that it gives the coded pixels that were measured. */
 void
-CollaborativeFilter::update_rows (const Kernels &kernels, int first, int end)
+CollaborativeFilter::update_rows (const Step &step, int first, int end)
 {
   std::vector<float *> light, sum;
   for (std::size_t s = 0; s < light_.size (); s++) {
@@ -154,9 +160,9 @@ CollaborativeFilter::update_rows (const Kernels &kernels, int first, int end)
     sum.push_back (sum_[s].data () + first * stride_);
   }
   const auto at = first * stride_;
-  kernels.settle ({light.data (), sum.data (), weight_.data () + at,
+  step.kernels.settle ({light.data (), sum.data (), weight_.data () + at,
       coded_.data () + at, measured_.data () + at, int (light_.size ()),
-      int ((end - first) * stride_), kStep});
+      int ((end - first) * stride_), step.length});
   if (!observation_.exact ())
     correct_rows (first, end);
 }
@@ -202,7 +208,8 @@ CollaborativeFilter::run (const Kernels &kernels, const Field &coded,
         first * std::pow (last / first,
                     std::pow (double (i) / (kIterations - 1), kSlowing));
     if (!shrink ({kernels, (i / 2 + 2 * i) % kBlockStep, i % kBlockStep,
-                     float (threshold)},
+                     float (threshold),
+                     i < kIterations - kLastIterations ? kStep : 1.0f},
             workers, stop))
       return false;
   }

@@ -34,14 +34,14 @@ public:
       std::span<Field> slots, Workers &workers, std::stop_token stop);
 
 private:
-  /* Planes are split into every fourth column, as the kernels expect, with a
-   * mirrored border of one block. */
+  /* Planes are split into every kBlockStep-th column, as the kernels expect,
+   * with a mirrored border of one block. Rows are a multiple of 16 long. */
   std::size_t place (int x, int y) const;
   void split (const Field &field, std::vector<float> &plane) const;
   struct Step;
   bool shrink (const Step &step, Workers &workers, std::stop_token stop);
   void shrink_strip (const Step &step, int strip, float *scratch);
-  void update_rows (const Kernels &kernels, int first, int end);
+  void update_rows (const Step &step, int first, int end);
   void correct_rows (int first, int end);
 
   const Observation &observation_;

@@ -104,7 +104,7 @@ struct Parts {
  *              + (x + shift) / kBlockStep + l].
  */
 constexpr int kBlock = 12;
-constexpr int kBlockStep = 4;
+constexpr int kBlockStep = 6;
 
 struct ShrinkRow {
   const float *const *source; ///< of each slot, the first block's first row

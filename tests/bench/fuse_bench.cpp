@@ -54,7 +54,7 @@ fuse (benchmark::State &state, const char *preset, FuseQuality quality,
   FuseOptions options;
   options.quality = quality;
   options.refine = refine;
-  options.threads = 1;
+  options.threads = int (state.range (0));
   auto fuser =
       Fuser<std::uint8_t>::make (schedule, kWidth, kHeight, options).value ();
   const auto frames = coded_frames (schedule);
@@ -82,6 +82,11 @@ constexpr const char *kEight = "sequential:lattice:8/3,order=bit-reversal";
 
 #define FUSE_BENCHMARK(name, preset, ...)                                      \
   BENCHMARK_CAPTURE (fuse, name, preset, __VA_ARGS__)                          \
+      ->ArgName ("threads")                                                    \
+      ->Arg (1)                                                                \
+      ->Arg (2)                                                                \
+      ->MeasureProcessCPUTime ()                                               \
+      ->UseRealTime ()                                                         \
       ->Unit (benchmark::kMillisecond)
 FUSE_BENCHMARK (fast_4, kFour, FuseQuality::kFast);
 FUSE_BENCHMARK (fast_8, kEight, FuseQuality::kFast);

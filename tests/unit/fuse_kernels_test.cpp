@@ -486,8 +486,8 @@ TEST (FuseKernels, NothingIsLostBelowAThresholdOfNothing)
   for (const fuse::Kernels &kernels : fuse::supported_kernels ()) {
     SCOPED_TRACE (kernels.name);
     const auto sums = shrunk (kernels, 4, -1.0f);
-    const auto light = random_numbers (std::size_t (64 * 4 * 12 * 4), 3);
-    const std::size_t plane = 64 * 4 * 12;
+    constexpr std::size_t plane = 64 * fuse::kBlockStep * fuse::kBlock;
+    const auto light = random_numbers (4 * plane, 3);
     for (std::size_t i = 0; i < 4 * plane; i++) {
       const float weight = sums[4 * plane + i % plane];
       if (weight > 0.0f) {

@@ -35,6 +35,8 @@ struct Examination {
     int first = 0, slots = 1, of = 1;
   };
   Lit inside = {};
+  /** Of the exposure's start, s rms; measured by the check of the trigger. */
+  double jitter = 0.0;
   /** What the bench is to record, and for how many seconds the check of the
    * whole does. */
   Schedule schedule = {};

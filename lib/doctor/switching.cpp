@@ -14,7 +14,9 @@ namespace codedexposure
 namespace
 {
 
-constexpr int kFrames = 6;
+/* Frames of light that goes off before the exposure ends, and about when it
+ * does: there, its jitter changes the light. */
+constexpr int kFramesBefore = 6, kFramesAbout = 20;
 constexpr Nanoseconds kStep = 25'000;      // of the places of a slot
 constexpr Nanoseconds kLeast = 110'000;    // of a mask, and of darkness
 constexpr Nanoseconds kBefore = 2'500'000; // of the light that all points have
@@ -22,8 +24,9 @@ constexpr Nanoseconds kBefore = 2'500'000; // of the light that all points have
 constexpr Nanoseconds kMoments[] = {-1'500'000, -1'000'000, -700'000, -500'000,
     -350'000, -250'000, -175'000, -125'000, -75'000, -25'000, 25'000, 75'000,
     150'000, 300'000, 600'000};
-/* Error of the light of a point, relative: flicker bends the line. */
-constexpr double kLightError = 0.001;
+/* Error of the light of a point, relative: flicker and drift. */
+constexpr double kLightError = 0.0003;
+constexpr Nanoseconds kAbout = -150'000;
 constexpr double kLongest = 1.5e-3; // transition that points can show, s
 
 /* Light, in seconds, of mirrors that go off at @time, within @took, seen until
@@ -37,35 +40,51 @@ light_of (double time, double took, double end)
   return over > 0.0 ? time - 0.5 * over * over / std::max (1e-9, took) : time;
 }
 
-/* Chi-square of the best line through the points, for a bend. */
+/* The same of many exposures, whose end jitters by @jitter, rms. */
 double
-misfit (const std::vector<SwitchPoint> &points, double took, double end)
+mean_light_of (double time, double took, double end, double jitter)
 {
-  Eigen::Matrix2d normal = Eigen::Matrix2d::Zero ();
-  Eigen::Vector2d right = Eigen::Vector2d::Zero ();
-  double squares = 0.0;
-  for (const SwitchPoint &point : points) {
-    const Eigen::Vector2d row (1.0, 1e3 * light_of (point.time, took, end));
-    const double weight = 1.0 / (point.sigma * point.sigma);
-    normal += weight * row * row.transpose ();
-    right += weight * point.light * row;
-    squares += weight * point.light * point.light;
+  if (jitter <= 0.0)
+    return light_of (time, took, end);
+  const double off = std::sqrt (3.0) * jitter; // Gauss-Hermite
+  return (light_of (time, took, end - off) + 4 * light_of (time, took, end) +
+             light_of (time, took, end + off)) /
+         6;
+}
+
+/* Chi-square of the best parabola through the points, for a bend: slow flicker
+ * and a response that is not quite linear curve the line. */
+double
+misfit (const std::vector<SwitchPoint> &points, double took, double end,
+    double jitter)
+{
+  const Eigen::Index count = Eigen::Index (points.size ());
+  Eigen::MatrixX3d rows (count, 3);
+  Eigen::VectorXd lights (count);
+  for (Eigen::Index i = 0; i < count; i++) {
+    const SwitchPoint &point = points[std::size_t (i)];
+    const double ms =
+        1e3 * (mean_light_of (point.time, took, end, jitter) - points[0].time);
+    rows.row (i) << 1.0, ms, ms * ms;
+    rows.row (i) /= point.sigma;
+    lights (i) = point.light / point.sigma;
   }
-  const Eigen::Vector2d line = normal.ldlt ().solve (right);
-  return squares - right.dot (line);
+  const Eigen::Vector3d curve =
+      (rows.transpose () * rows).ldlt ().solve (rows.transpose () * lights);
+  return (lights - rows * curve).squaredNorm ();
 }
 
 /* The least misfit of all moments at which the exposure may end. */
 double
-best_misfit (const std::vector<SwitchPoint> &points, double took)
+best_misfit (const std::vector<SwitchPoint> &points, double took, double jitter)
 {
   double from = points.front ().time, to = points.back ().time;
   double best = 0.0, at = 0.0;
   for (int round = 0; round < 4; round++) {
     const double step = (to - from) / 40;
-    best = misfit (points, took, at = from);
+    best = misfit (points, took, at = from, jitter);
     for (double end = from; end <= to; end += step)
-      if (const double now = misfit (points, took, end); now < best) {
+      if (const double now = misfit (points, took, end, jitter); now < best) {
         best = now;
         at = end;
       }
@@ -78,14 +97,14 @@ best_misfit (const std::vector<SwitchPoint> &points, double took)
 } // namespace
 
 Measured
-fit_switching (const std::vector<SwitchPoint> &points)
+fit_switching (const std::vector<SwitchPoint> &points, double jitter)
 {
-  constexpr int kGrid = 100;
+  constexpr int kGrid = 300;
   std::vector<double> values;
   for (int i = 0; i <= kGrid; i++)
-    values.push_back (best_misfit (points, kLongest * i / kGrid));
+    values.push_back (best_misfit (points, kLongest * i / kGrid, jitter));
   const auto least = std::ranges::min_element (values);
-  const double freedom = std::max (1.0, double (points.size ()) - 4.0);
+  const double freedom = std::max (1.0, double (points.size ()) - 5.0);
   const double unit = std::max (1.0, *least / freedom);
   /* One standard deviation is where chi-square has grown by one. */
   int low = int (least - values.begin ()), high = low;
@@ -101,14 +120,14 @@ fit_switching (const std::vector<SwitchPoint> &points)
 namespace
 {
 
-/* The mean of frames whose light goes off with slot @last. */
+/* The mean of @frames whose light goes off with the end of @run. */
 Result<SwitchPoint>
-see_point (Examination &examination, const Examination::Lit &run,
+see_point (Examination &examination, const Examination::Lit &run, int frames,
     const Image<float> &dark, ImageView<const std::uint8_t> good)
 {
   ASSIGN_OR_RETURN (
       const Stack stack, look_at_light (examination, lit (run.first, run.slots),
-                             run.of, kFrames, &dark));
+                             run.of, frames, &dark));
   const StackMeans means = means_of (stack, good);
   /* Rounding is an error of the mean where there is little noise. */
   const double noise =
@@ -118,7 +137,7 @@ see_point (Examination &examination, const Examination::Lit &run,
   return SwitchPoint{1e-9 * period * (run.first + run.slots) / run.of,
       means.mean,
       std::hypot (std::hypot (rounding, kLightError * means.mean),
-          stack.scatter / std::sqrt (kFrames))};
+          stack.scatter / std::sqrt (frames))};
 }
 
 /* The points of all moments; @run begins with its slot. */
@@ -134,8 +153,9 @@ see_points (Examination &examination, Examination::Lit run, double end,
     run.slots = int (std::lround (time * run.of / period)) - run.first;
     if (time > period - double (kLeast))
       break;
-    ASSIGN_OR_RETURN (
-        const SwitchPoint point, see_point (examination, run, dark, good));
+    ASSIGN_OR_RETURN (const SwitchPoint point,
+        see_point (examination, run,
+            moment < kAbout ? kFramesBefore : kFramesAbout, dark, good));
     points.push_back (point);
   }
   return {};
@@ -171,7 +191,7 @@ measure_switching (Examination &examination, const Image<float> &dark,
   RETURN_IF_ERROR (rig.expose (std::nullopt));
   RETURN_IF_ERROR (rig.watch (examination.lag));
   RETURN_IF_ERROR (done);
-  return fit_switching (points);
+  return fit_switching (points, examination.jitter);
 }
 
 } // namespace codedexposure

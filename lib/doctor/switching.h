@@ -20,9 +20,10 @@ struct SwitchPoint {
  * The time of a linear transition, s, from mirrors that go off before, during
  * and after the end of an exposure: light grows with the time until the
  * transition ends after the exposure does. The slower the mirrors, the rounder
- * the bend.
+ * the bend. @p jitter of the exposure, s rms, rounds it, too.
  */
-Measured fit_switching (const std::vector<SwitchPoint> &points);
+Measured fit_switching (
+    const std::vector<SwitchPoint> &points, double jitter = 0.0);
 
 /** Makes the points and fits them, s. @p dark: mean with all mirrors off. */
 Result<Measured> measure_switching (Examination &examination,

@@ -463,6 +463,7 @@ TriggerCheck::remember (
   BenchProfile &profile = examination_.profile;
   profile.trigger_delay = {start.value * 1e9, start.sigma * 1e9};
   profile.exposure = {length.value * 1e9, length.sigma * 1e9};
+  examination_.jitter = fit.jitter.value;
   const double margin = 3.0 * (fit.jitter.value + start.sigma) + 10e-6;
   const double end = start.value + length.value;
   const double next = std::max (0.0, end - period_); // of the exposure before

@@ -69,6 +69,7 @@ check_bench (const SickBenchOptions &options,
   const int first = int (std::ceil (begin * 16 / period));
   done.examination->inside = {
       first, std::min (16, int (std::floor (end * 16 / period))) - first, 16};
+  done.examination->jitter = 1e-9 * options.jitter;
   done.examination->profile.exposure =
       Measured{done.truth ().exposure->value, 5e3};
   done.examination->profile.trigger_delay =

@@ -176,6 +176,22 @@ TEST (Switching, IsTheRoundnessOfTheBend)
   }
 }
 
+TEST (Switching, IsNotJitterOfTheExposure)
+{
+  for (const double took : {5e-6, 150e-6}) {
+    std::vector<SwitchPoint> points;
+    for (double time = 0.0185; time < 0.0206; time += 5e-5) {
+      double light = 0.0; // as if the mirrors were told at as many times
+      for (int i = -3; i <= 3; i++)
+        light += (light_seen (time + 20e-6 * i, took) - 20e-6 * i) / 7;
+      points.push_back ({time, 30.0 + 5e3 * light, 0.01});
+    }
+    const Measured found = fit_switching (points, 40e-6);
+    EXPECT_NEAR (found.value, took, std::max (30e-6, 3 * found.sigma));
+    EXPECT_LT (found.sigma, 60e-6);
+  }
+}
+
 TEST (LensFit, FindsPosePerspectiveAndDistortion)
 {
   const Extent camera{256, 192}, mirrors{288, 224};

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <optional>
 #include <string>
 
 #include "base/text.h"
@@ -47,6 +48,8 @@ constexpr double kJitterWarn = 25e-6, kJitterFail = 60e-6;
 /* An exposure that is longer, or known less well, is none that explains the
  * light; parts of the period. */
 constexpr double kLongest = 1.5, kUnclear = 0.02;
+/* Mirrors that are late make the exposure look early, s. */
+constexpr double kSlowMirrors = 1.5e-3;
 /* Slowest flicker beside which the exposure is found, Hz. */
 constexpr double kSlowest = 0.15;
 /* A delay of that part of a period is that of a pulse, not of a setting, where
@@ -110,6 +113,8 @@ private:
   Result<void> sample_inside (const LightModel &guess);
   Result<void> measure_exposure ();
   void diagnose_exposure (const LightFit &fit);
+  std::optional<double> set_delay () const;
+  double possible_start (double start) const;
   void diagnose_delay (const Measured &start);
   void remember (
       const LightFit &fit, const Measured &start, const Measured &length);
@@ -481,14 +486,32 @@ TriggerCheck::remember (
     examination_.inside = {first, until - first, grid_};
 }
 
+/** TriggerDelay of the camera, s, if it says. */
+std::optional<double>
+TriggerCheck::set_delay () const
+{
+  const auto feature = parts_.features.find ("TriggerDelay");
+  if (feature == parts_.features.end ())
+    return std::nullopt;
+  return 1e-6 * parse_real (feature->second).value_or (0.0);
+}
+
+/** Of the times a period apart at which an exposure may begin as seen, the one
+ * that is not before the set delay, but for slow mirrors. */
+double
+TriggerCheck::possible_start (double start) const
+{
+  const double first =
+      set_delay ().value_or (0.0) - std::min (kSlowMirrors, 0.05 * period_);
+  return start - period_ * std::floor ((start - first) / period_);
+}
+
 /** A delay that is not set is the length of a pulse. */
 void
 TriggerCheck::diagnose_delay (const Measured &start)
 {
-  const auto feature = parts_.features.find ("TriggerDelay");
-  const bool told = feature != parts_.features.end ();
-  const double set = // s
-      told ? 1e-6 * parse_real (feature->second).value_or (0.0) : 0.0;
+  const bool told = set_delay ().has_value ();
+  const double set = set_delay ().value_or (0.0); // s
   std::string late =
       "the exposure begins " + us_text (start.value) + " after the trigger";
   if (above (start, told ? set + kLateFail : kEdge * period_))
@@ -510,9 +533,7 @@ TriggerCheck::diagnose_exposure (const LightFit &fit)
   Measured start = fit.start, length = fit.lengths[1];
   start.sigma = std::hypot (start.sigma, kTicks);
   length.sigma = std::hypot (length.sigma, kTicks);
-  start.value = std::fmod (start.value + period_, period_);
-  if (start.value > period_ - kLateWarn)
-    start.value -= period_; // it is not almost a whole period late
+  start.value = possible_start (start.value);
   const bool possible = length.value > 0.0 && length.value < kLongest * period_;
   const bool known = start.sigma + length.sigma < kUnclear * period_;
   if (!possible || (!known && !above (fit.jitter, kJitterFail)))

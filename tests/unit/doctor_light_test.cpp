@@ -263,6 +263,14 @@ INSTANTIATE_TEST_SUITE_P (OfOtherChecks, OtherFaults,
         Case{"dust", ""}, Case{"lose", ""}, Case{"slip", ""},
         Case{"frame-jitter", ""}));
 
+/** They make the exposure look as if it began before the trigger. */
+TEST (SlowMirrors, AreNotAWrongEdge)
+{
+  for (const char *words :
+      {"delay=50us slow-mirrors=1ms", "delay=20us slow-mirrors=2ms"})
+    EXPECT_EQ (visit (bench (1), words).first (), "") << words;
+}
+
 TEST (RoundingDoubt, VanishesWithNoise)
 {
   EXPECT_NEAR (rounding_doubt (0.0, 1), 0.225, 0.001);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "estimate/scene_model.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -120,6 +121,18 @@ lasting_classes ()
   std::vector<SceneClass> classes = motion_classes ();
   std::erase_if (classes, [] (const SceneClass &patch) {
     return patch.moves () || patch.correlation < 0.99;
+  });
+  return classes;
+}
+
+std::vector<SceneClass>
+passing_classes ()
+{
+  constexpr double kFastest = 2.0;
+  std::vector<SceneClass> classes = motion_classes ();
+  std::erase_if (classes, [] (const SceneClass &patch) {
+    return !patch.directed () || patch.correlation < 0.99 ||
+           std::max (std::abs (patch.vx), std::abs (patch.vy)) > kFastest;
   });
   return classes;
 }

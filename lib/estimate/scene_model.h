@@ -63,5 +63,9 @@ std::vector<SceneClass> motion_classes ();
 /** Those of them whose patches are still there, in the same place, in the
  * coded frames before and after. */
 std::vector<SceneClass> lasting_classes ();
+/** Those that move so slowly, up to 2 px per slot along each axis, that the
+ * last slots of the coded frame before and the first ones of the next show the
+ * patch nearby. */
+std::vector<SceneClass> passing_classes ();
 
 } // namespace codedexposure

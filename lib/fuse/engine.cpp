@@ -6,7 +6,6 @@
 
 #include "base/text.h"
 #include "base/try.h"
-#include "estimate/kriging.h"
 
 namespace codedexposure::fuse
 {
@@ -22,23 +21,11 @@ constexpr double kTypicalLight = 0.4;
  * equations become ill-conditioned. */
 constexpr double kMinNoise = 1e-3;
 
-/* All slots are the same; or they are less correlated than in any real scene.
- */
-constexpr SceneClass kStatic{0.0, 0.0, 5.0, 1.5, 1.0};
-constexpr SceneClass kMoving{0.0, 0.0, 5.0, 1.5, 0.6};
-
 /* Mean squared errors of this size, in grey levels squared, do not tell models
  * apart. */
 constexpr float kErrorFloor = 0.5f;
 /* No model has less weight, so that there is always one. */
 constexpr float kMinWeight = 1e-6f;
-
-/* Of the taps in the coded frames before and after, px, for the comparison of
- * models. */
-constexpr double kComparedRadius = 1.2;
-/* Squared errors of filters beyond those with all taps, as a part of them: for
- * estimates, and for the comparison of models. */
-constexpr double kExcess = 0.015, kPredictionExcess = 0.01;
 
 /* Of the taps: large enough to contain every slot several times. */
 int
@@ -64,6 +51,19 @@ largest_light (const Observation &observation)
   for (int e = 0; e < observation.slots (); e++)
     gain = std::max (gain, observation.gain (e));
   return float (gain * kWhite);
+}
+
+MotionFilter::Classes
+classes_of_motion (const SceneModel &scene)
+{
+  MotionFilter::Classes classes{
+      motion_classes (), lasting_classes (), passing_classes ()};
+  for (const SceneClass &model : {scene.slow, scene.moving})
+    classes.of_frame.push_back (model);
+  for (const SceneClass &model :
+      {scene.slow_over_frames, scene.medium_over_frames})
+    classes.over_frames.push_back (model);
+  return classes;
 }
 
 Result<void>
@@ -225,35 +225,32 @@ void
 Engine::prepare (const Schedule &schedule, const FuseOptions &options)
 {
   const double scene = options.scene.contrast * options.scene.contrast;
-  std::vector<double> &noise = noise_of_elements_;
+  std::vector<double> noise;
   for (int e = 0; e < slots (); e++)
     noise.push_back (
         std::max (observation_.variance (e, kTypicalLight) / scene, kMinNoise));
-  if (options.quality == FuseQuality::kFast)
-    models_ = slots () > Fuser<std::uint8_t>::kMaxSlots
-                  ? std::vector{options.scene.plain}
-                  : std::vector{options.scene.slow, options.scene.moving};
-  models_over_frames_ = {options.scene.slow_over_frames,
-      options.scene.medium_over_frames, options.scene.moving};
-  predictions_.emplace (
-      several_models () ? 1 + int (models_over_frames_.size ()) : 2,
+  FilterSets::Models models;
+  if (options.quality == FuseQuality::kFast) {
+    if (slots () > Fuser<std::uint8_t>::kMaxSlots)
+      models.of_frame = {options.scene.plain};
+    else
+      models = {{options.scene.slow, options.scene.moving},
+          {options.scene.slow_over_frames, options.scene.medium_over_frames,
+              options.scene.moving}};
+  }
+  filters_.emplace (phases_, observation_, std::move (models), noise,
+      FilterSets::Frames{width_, radius_, split_period (), steps_});
+  predictions_.emplace (filters_->most_classes (),
       StaticPixels::radius_of (schedule.cell ()), Extent{width_, height_},
       split_period ());
-  filters_[0] = make_filters ({});
   const Extent blocks = Predictions::blocks ({width_, height_});
-  if (several_models ())
-    preferences_.assign (
-        models_over_frames_.size (), Field (blocks.width, blocks.height));
-  if (!models_.empty ())
+  if (filters_->use_neighbours ())
+    preferences_.assign (std::size_t (filters_->most_models ()),
+        Field (blocks.width, blocks.height));
+  if (filters_->estimate ())
     return;
-  MotionFilter::Classes classes{motion_classes (), lasting_classes ()};
-  for (const SceneClass &model : {options.scene.slow, options.scene.moving})
-    classes.of_frame.push_back (model);
-  for (const SceneClass &model :
-      {options.scene.slow_over_frames, options.scene.medium_over_frames})
-    classes.over_frames.push_back (model);
-  motion_.emplace (
-      phases_, observation_, std::move (classes), radius_, noise, steps_);
+  motion_.emplace (phases_, observation_, classes_of_motion (options.scene),
+      radius_, noise, steps_);
   if (options.quality == FuseQuality::kBest)
     collaborative_.emplace (schedule, observation_, width_, height_);
   light_.assign (std::size_t (slots ()), Field (width_, height_));
@@ -261,108 +258,11 @@ Engine::prepare (const Schedule &schedule, const FuseOptions &options)
     static_light_ = Field (width_, height_);
 }
 
-std::vector<Tap>
-Engine::Around::taps (double own, double neighbours) const
-{
-  return taps_around (own, neighbours, previous, next);
-}
-
-/* Filters of many slots would take too long to be made sparse. */
-void
-Engine::each_filter (const SceneClass &scene, std::span<const Tap> taps,
-    Sought sought, const UseSparse &use) const
-{
-  const bool residual = sought == Sought::kResidual;
-  if (slots () <= Fuser<std::uint8_t>::kMaxSlots)
-    for_each_sparse_phase (phases_, observation_, scene, taps,
-        noise_of_elements_, sought, residual ? kPredictionExcess : kExcess,
-        use);
-  else
-    for_each_phase (phases_, observation_, scene, taps, noise_of_elements_,
-        [&] (int row, int x, const PhaseWeights &weights) {
-          use (row, x, residual ? weights.residual : weights.slots);
-        });
-}
-
-SparseBank
-Engine::make_predictions (const SparseSources &sources, Around around) const
-{
-  std::vector<SceneClass> classes{kStatic, kMoving};
-  if (several_models ()) {
-    classes = around.any () ? models_over_frames_ : models_;
-    classes.insert (classes.begin (), kStatic);
-  }
-  const std::vector<Tap> near = taps_within (radius_ - 1.5),
-                         all = around.taps (radius_ - 1.5, kComparedRadius);
-  /* Their taps fit some motion by chance, the more of all taps they are: their
-   * squared errors count as this much larger. */
-  const float chance = std::sqrt (1.0f + 1.0f / float (slots ()));
-  SparseBank bank (phases_, int (classes.size ()), steps_);
-  for (std::size_t k = 0; k < classes.size (); k++) {
-    /* Neither a static scene nor fast motion needs other frames. */
-    const bool alone = k == 0 || k + 1 == classes.size () || !around.any ();
-    const std::vector<Tap> &taps = alone ? near : all;
-    each_filter (classes[k], taps, Sought::kResidual,
-        [&] (int row, int x, std::vector<float> weights) {
-          if (!alone)
-            for (float &weight : weights)
-              weight *= chance;
-          bank.set (sources, row, x, int (k), taps, weights);
-        });
-  }
-  return bank;
-}
-
-std::vector<SparseBank>
-Engine::make_models (const SparseSources &sources, Around around) const
-{
-  const std::vector<SceneClass> &models =
-      around.any () ? models_over_frames_ : models_;
-  const std::vector<Tap> wide = taps_within (radius_ + 0.5),
-                         all = around.taps (radius_ + 0.5, kNeighbourRadius);
-  std::vector<SparseBank> banks;
-  for (const SceneClass &model : models) {
-    /* What moves fast has left the pixel in other frames. */
-    const std::vector<Tap> &taps = &model == &models.back () ? wide : all;
-    SparseBank &bank = banks.emplace_back (phases_, slots (), steps_);
-    each_filter (model, taps, Sought::kSlots,
-        [&] (int row, int x, const std::vector<float> &weights) {
-          for (int s = 0; s < slots (); s++)
-            bank.set (sources, row, x, s, taps,
-                std::span (weights).subspan (
-                    std::size_t (s) * taps.size (), taps.size ()));
-        });
-  }
-  return banks;
-}
-
-Engine::Filters
-Engine::make_filters (Around around) const
-{
-  constexpr int kReach = int (kNeighbourRadius);
-  const SparseSources sources (
-      {around.previous ? kReach : -1, radius_, around.next ? kReach : -1},
-      SplitField (width_, 0, radius_, split_period ()));
-  return {sources, make_predictions (sources, around),
-      make_models (sources, around)};
-}
-
 /* Parts of rows hold two columns of a block of predictions. */
 int
 Engine::split_period () const
 {
   return phases_.period () * (phases_.period () % 2 + 1);
-}
-
-const Engine::Filters &
-Engine::filters_for (const SplitFrames &frames)
-{
-  const Around around{frames[0] != nullptr, frames[2] != nullptr};
-  auto &filters =
-      filters_[(around.previous ? 1u : 0u) + (around.next ? 2u : 0u)];
-  if (!filters)
-    filters = make_filters (around);
-  return *filters;
 }
 
 Field &
@@ -451,8 +351,8 @@ Engine::set_misfit (int row, const float *const *errors, int models)
 /* Models are compared by the sums of their squared errors. Their power of 8
  * stands for the number of independent errors in a square. */
 void
-Engine::compare_predictions (
-    const Filters &filters, const SplitFrames &frames, StaticPixels::Rows rows)
+Engine::compare_predictions (const FilterSets::Set &filters,
+    const SplitFrames &frames, StaticPixels::Rows rows)
 {
   const float area = float (predictions_->area ());
   const int classes = filters.predictions.outputs ();
@@ -463,7 +363,7 @@ Engine::compare_predictions (
       rows.worker, [&] (int row, const float *const *errors) {
         static_pixels_.set_errors (kernels_, row, predictions_->area (),
             errors[0], errors[classes - 1]);
-        if (misfit_ && !models_.empty ())
+        if (misfit_ && filters_->estimate ())
           set_misfit (row, errors + 1, classes - 1);
         if (preferences_.empty ())
           return;
@@ -558,19 +458,19 @@ Engine::share (const Field &coded, int y, Estimates &to) const
 }
 
 void
-Engine::estimate (const Filters &filters, const SplitFrames &frames, int y,
-    Estimates &to) const
+Engine::estimate (const FilterSets::Set &filters, const SplitFrames &frames,
+    int y, Estimates &to) const
 {
   const auto sources = filters.sources.row (frames, y, to.sources);
   for (int s = 0; s < slots (); s++)
     std::fill_n (to.light.row (s), to.light.width (), 0.0f);
-  for (std::size_t model = 0; model < filters.models.size (); model++) {
+  for (std::size_t model = 0; model < filters.estimates.size (); model++) {
     to.find_runs (int (model));
     for (int column = 0; column < to.parts.period; column++) {
       const auto at = column * to.parts.stride;
       for (int s = 0; s < slots (); s++)
-        kernels_.filter_sparse_add (
-            filters.models[model].row (phases_, y, column, s, sources, to.runs),
+        kernels_.filter_sparse_add (filters.estimates[model].row (phases_, y,
+                                        column, s, sources, to.runs),
             to.split.row (int (model)) + at, to.light.row (s) + at);
     }
   }
@@ -580,12 +480,12 @@ Engine::estimate (const Filters &filters, const SplitFrames &frames, int y,
 }
 
 void
-Engine::fuse_linear (const Filters &filters, const Field &coded,
+Engine::fuse_linear (const FilterSets::Set &filters, const Field &coded,
     const SplitFrames &frames, const RowSink &sink,
     StaticPixels::Rows part) const
 {
   Estimates estimates (
-      width_, split_period (), int (filters.models.size ()), slots ());
+      width_, split_period (), int (filters.estimates.size ()), slots ());
   std::vector<const float *> rows;
   for (int s = 0; s < slots (); s++)
     rows.push_back (estimates.rows.row (s));
@@ -642,7 +542,7 @@ Engine::fuse (const RowSink &wanted, Workers &workers, std::stop_token stop,
       previous_.light.empty () ? nullptr : &previous_.light,
       queue_.size () > 1 ? &queue_[1].light : nullptr, noise_};
   SplitFrames neighbours{nullptr, &coded.split, nullptr};
-  if (several_models ()) {
+  if (filters_->use_neighbours ()) {
     if (!previous_.light.empty ())
       neighbours[0] = &previous_.split;
     if (queue_.size () > 1)
@@ -650,7 +550,7 @@ Engine::fuse (const RowSink &wanted, Workers &workers, std::stop_token stop,
   }
   const PairFrames all{previous_.light.empty () ? nullptr : &previous_.pairs,
       &coded.pairs, queue_.size () > 1 ? &queue_[1].pairs : nullptr};
-  const Filters &filters = filters_for (neighbours);
+  const FilterSets::Set &filters = filters_->for_frames (neighbours);
   predictions_->make_room (workers.count ());
   static_pixels_.make_room (workers.count ());
   each_part (workers, [&] (StaticPixels::Rows rows) {
@@ -659,12 +559,12 @@ Engine::fuse (const RowSink &wanted, Workers &workers, std::stop_token stop,
   });
   each_part (workers, [&] (StaticPixels::Rows rows) {
     static_pixels_.average (kernels_, frames, rows);
-    if (!models_.empty ())
+    if (filters_->estimate ())
       fuse_linear (filters, coded.light, neighbours, out, rows);
   });
   static_pixels_.finish (frames);
   bool done =
-      !models_.empty () || fuse_motion (frames, all, out, workers, stop);
+      filters_->estimate () || fuse_motion (frames, all, out, workers, stop);
   if (done && refiner_)
     done = refiner_->run (
         kernels_, coded.light,

@@ -3,7 +3,6 @@
  */
 #pragma once
 
-#include <array>
 #include <deque>
 #include <functional>
 #include <memory>
@@ -15,12 +14,11 @@
 #include "estimate/observation.h"
 #include "fuse/collaborative_filter.h"
 #include "fuse/field.h"
-#include "fuse/filter_bank.h"
+#include "fuse/filter_sets.h"
 #include "fuse/fuser.h"
 #include "fuse/motion.h"
 #include "fuse/predictions.h"
 #include "fuse/refine.h"
-#include "fuse/sparse_bank.h"
 #include "fuse/static_pixels.h"
 #include "fuse/uncertainty.h"
 
@@ -74,30 +72,7 @@ private:
   void map_noise (const Schedule &schedule);
   void find_margin (const Schedule &schedule);
   void prepare (const Schedule &schedule, const FuseOptions &options);
-  /** Filters that use some of the neighbouring coded frames. */
-  struct Filters {
-    SparseSources sources;
-    SparseBank predictions;         ///< of a static scene and of moving ones
-    std::vector<SparseBank> models; ///< of fast
-  };
-  /** The neighbouring coded frames that there are. */
-  struct Around {
-    bool previous = false, next = false;
-
-    bool any () const { return previous || next; }
-    /** Taps within these radii in the frame itself and in its neighbours. */
-    std::vector<Tap> taps (double own, double neighbours) const;
-  };
-  bool several_models () const { return models_.size () > 1; }
   int split_period () const;
-  void each_filter (const SceneClass &scene, std::span<const Tap> taps,
-      Sought sought, const UseSparse &use) const;
-  SparseBank make_predictions (
-      const SparseSources &sources, Around around) const;
-  std::vector<SparseBank> make_models (
-      const SparseSources &sources, Around around) const;
-  Filters make_filters (Around around) const;
-  const Filters &filters_for (const SplitFrames &frames);
   /** A coded frame; the pairs have a margin. */
   struct Coded {
     Field light;
@@ -110,14 +85,14 @@ private:
       const std::function<void (StaticPixels::Rows)> &use) const;
   /** Sets what static pixels and the preferences need to know of predictions.
    */
-  void compare_predictions (const Filters &filters, const SplitFrames &frames,
-      StaticPixels::Rows rows);
+  void compare_predictions (const FilterSets::Set &filters,
+      const SplitFrames &frames, StaticPixels::Rows rows);
   void set_misfit (int row, const float *const *errors, int models);
   struct Estimates;
   void share (const Field &coded, int y, Estimates &to) const;
-  void estimate (const Filters &filters, const SplitFrames &frames, int y,
-      Estimates &to) const;
-  void fuse_linear (const Filters &filters, const Field &coded,
+  void estimate (const FilterSets::Set &filters, const SplitFrames &frames,
+      int y, Estimates &to) const;
+  void fuse_linear (const FilterSets::Set &filters, const Field &coded,
       const SplitFrames &frames, const RowSink &sink,
       StaticPixels::Rows part) const;
   void blend (const float *light, int y, float *const *rows) const;
@@ -135,12 +110,7 @@ private:
   float steps_; ///< of 16 bits, per grey level
   std::function<void ()> make_uncertainty_;
   std::optional<Predictions> predictions_;
-  std::vector<SceneClass> models_;             ///< of fast
-  std::vector<SceneClass> models_over_frames_; ///< with neighbouring frames
-  std::vector<double> noise_of_elements_; ///< in units of the scene's variance
-  /** Without and with taps of the previous, + 2 of the next coded frame. Those
-   * that a stream rarely needs are made when it does. */
-  std::array<std::optional<Filters>, 4> filters_;
+  std::optional<FilterSets> filters_;
   std::vector<Field> preferences_; ///< of blocks, for each of several models
   std::optional<MotionFilter> motion_;
   std::optional<CollaborativeFilter> collaborative_;

@@ -139,17 +139,27 @@ MotionFilter::make_set (
   return set;
 }
 
-const MotionFilter::Set *
-MotionFilter::set_over (const PairFrames &frames)
+/* What moves uses one neighbouring frame: with both, filters of wrong motions
+ * fit by chance more often, as they have more taps. */
+std::vector<const MotionFilter::Set *>
+MotionFilter::sets_for (const PairFrames &frames)
 {
   const bool previous = frames[0] != nullptr, next = frames[2] != nullptr;
   if (!previous && !next)
-    return nullptr;
-  auto &set = over_frames_[(previous ? 1u : 0u) + (next ? 2u : 0u)];
-  if (!set)
-    set = make_set (classes_.over_frames,
-        taps_around (radius_ + 0.5, kNeighbourRadius, previous, next));
-  return &*set;
+    return {&of_frame_};
+  const auto made = [&] (std::optional<Set> &set,
+                        std::span<const SceneClass> classes, bool with_previous,
+                        bool with_next) {
+    if (!set)
+      set = make_set (classes, taps_around (radius_ + 0.5, kNeighbourRadius,
+                                   with_previous, with_next));
+    return &*set;
+  };
+  return {&of_frame_,
+      made (over_frames_[(previous ? 1u : 0u) + (next ? 2u : 0u)],
+          classes_.over_frames, previous, next),
+      made (
+          over_one_[previous ? 0 : 1], classes_.over_one, previous, !previous)};
 }
 
 /* The squared residuals of a chunk of classes in all blocks of the band and
@@ -251,9 +261,7 @@ MotionFilter::run (const Kernels &kernels, const PairFrames &frames,
     std::stop_token stop)
 {
   const int width = frames[1]->width (), height = frames[1]->height ();
-  std::vector<const Set *> sets{&of_frame_};
-  if (const Set *over = set_over (frames))
-    sets.push_back (over);
+  const std::vector<const Set *> sets = sets_for (frames);
   std::vector<float> factors;
   for (const Set *set : sets)
     std::ranges::copy (set->factors, std::back_inserter (factors));

@@ -30,6 +30,8 @@ public:
   struct Classes {
     std::vector<SceneClass> of_frame;
     std::vector<SceneClass> over_frames; ///< with neighbouring frames
+    /** With one of them: the one before, if there is one. */
+    std::vector<SceneClass> over_one;
   };
   /** @p radius  of the taps, px; coded frames have a margin of this size.
    *  @p noise   variance of each element in units of the scene's variance.
@@ -56,7 +58,7 @@ private:
   };
   Set make_set (
       std::span<const SceneClass> classes, std::span<const Tap> taps) const;
-  const Set *set_over (const PairFrames &frames);
+  std::vector<const Set *> sets_for (const PairFrames &frames);
 
   struct Band;
   void measure_blocks (const Kernels &kernels, const PairFrames &frames,
@@ -77,6 +79,7 @@ private:
   /** With taps of the previous, + 2 of the next coded frame. Made when they are
    * needed. */
   std::array<std::optional<Set>, 4> over_frames_;
+  std::array<std::optional<Set>, 2> over_one_; ///< the previous, the next
 };
 
 } // namespace codedexposure::fuse

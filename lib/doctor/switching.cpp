@@ -14,20 +14,25 @@ namespace codedexposure
 namespace
 {
 
-/* Frames of light that goes off before the exposure ends, and about when it
- * does: there, its jitter changes the light. */
-constexpr int kFramesBefore = 6, kFramesAbout = 20;
+/* Frames of light that goes off about when the exposure ends, whose jitter then
+ * changes it, and of other light. */
+constexpr int kFramesAbout = 20, kFramesElse = 6;
 constexpr Nanoseconds kStep = 25'000;      // of the places of a slot
 constexpr Nanoseconds kLeast = 110'000;    // of a mask, and of darkness
-constexpr Nanoseconds kBefore = 2'500'000; // of the light that all points have
+constexpr Nanoseconds kBefore = 3'500'000; // of the light that all points have
+/* The earliest moment that must be there: high frame rates have no earlier. */
+constexpr Nanoseconds kFirst = -1'500'000;
 /* Of the moments at which mirrors go off, from the end of the exposure on. */
-constexpr Nanoseconds kMoments[] = {-1'500'000, -1'000'000, -700'000, -500'000,
-    -350'000, -250'000, -175'000, -125'000, -75'000, -25'000, 25'000, 75'000,
-    150'000, 300'000, 600'000};
+constexpr Nanoseconds kMoments[] = {-2'500'000, -1'500'000, -1'000'000,
+    -700'000, -500'000, -350'000, -250'000, -175'000, -125'000, -75'000,
+    -25'000, 25'000, 75'000, 150'000, 300'000, 600'000, 1'100'000, 1'600'000};
 /* Error of the light of a point, relative: flicker and drift. */
-constexpr double kLightError = 0.0003;
-constexpr Nanoseconds kAbout = -150'000;
-constexpr double kLongest = 1.5e-3; // transition that points can show, s
+constexpr double kLightError = 0.0002;
+/* By how much flicker and a bent response change the slope in a ms. */
+constexpr double kCurvature = 0.02;
+/* Moments about the end of the exposure. */
+constexpr Nanoseconds kAboutFrom = -150'000, kAboutUntil = 400'000;
+constexpr double kLongest = 4e-3; // transition that points can show, s
 
 /* Light, in seconds, of mirrors that go off at @time, within @took, seen until
  * the exposure's @end. */
@@ -52,15 +57,23 @@ mean_light_of (double time, double took, double end, double jitter)
          6;
 }
 
+/* Light by ms, before the bend. */
+double
+slope_of (const std::vector<SwitchPoint> &points)
+{
+  const double ms = 1e3 * (points[1].time - points[0].time);
+  return std::max (1e-3, (points[1].light - points[0].light) / ms);
+}
+
 /* Chi-square of the best parabola through the points, for a bend: slow flicker
- * and a response that is not quite linear curve the line. */
+ * and a response that is not quite linear curve the line a little. */
 double
 misfit (const std::vector<SwitchPoint> &points, double took, double end,
     double jitter)
 {
   const Eigen::Index count = Eigen::Index (points.size ());
-  Eigen::MatrixX3d rows (count, 3);
-  Eigen::VectorXd lights (count);
+  Eigen::MatrixX3d rows (count + 1, 3);
+  Eigen::VectorXd lights (count + 1);
   for (Eigen::Index i = 0; i < count; i++) {
     const SwitchPoint &point = points[std::size_t (i)];
     const double ms =
@@ -69,6 +82,8 @@ misfit (const std::vector<SwitchPoint> &points, double took, double end,
     rows.row (i) /= point.sigma;
     lights (i) = point.light / point.sigma;
   }
+  rows.row (count) << 0.0, 0.0, 1.0 / (0.5 * kCurvature * slope_of (points));
+  lights (count) = 0.0;
   const Eigen::Vector3d curve =
       (rows.transpose () * rows).ldlt ().solve (rows.transpose () * lights);
   return (lights - rows * curve).squaredNorm ();
@@ -99,7 +114,7 @@ best_misfit (const std::vector<SwitchPoint> &points, double took, double jitter)
 Measured
 fit_switching (const std::vector<SwitchPoint> &points, double jitter)
 {
-  constexpr int kGrid = 300;
+  constexpr int kGrid = 400;
   std::vector<double> values;
   for (int i = 0; i <= kGrid; i++)
     values.push_back (best_misfit (points, kLongest * i / kGrid, jitter));
@@ -151,11 +166,14 @@ see_points (Examination &examination, Examination::Lit run, double end,
   for (const Nanoseconds moment : kMoments) {
     const double time = end + double (moment);
     run.slots = int (std::lround (time * run.of / period)) - run.first;
+    if (moment < kFirst && time < double (kLeast))
+      continue;
     if (time > period - double (kLeast))
       break;
+    const bool about = moment > kAboutFrom && moment < kAboutUntil;
     ASSIGN_OR_RETURN (const SwitchPoint point,
-        see_point (examination, run,
-            moment < kAbout ? kFramesBefore : kFramesAbout, dark, good));
+        see_point (
+            examination, run, about ? kFramesAbout : kFramesElse, dark, good));
     points.push_back (point);
   }
   return {};
@@ -181,7 +199,7 @@ measure_switching (Examination &examination, const Image<float> &dark,
   int first = slot_at (end - double (kBefore));
   if (first < least)
     first = 0;
-  if (slot_at (end + double (kMoments[0])) < first + least)
+  if (slot_at (end + double (kFirst)) < first + least)
     return Error{"The frame period is too short to see mirrors move.",
         ErrorCode::unsupported};
 

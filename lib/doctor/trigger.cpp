@@ -49,7 +49,7 @@ constexpr double kJitterWarn = 25e-6, kJitterFail = 60e-6;
  * light; parts of the period. */
 constexpr double kLongest = 1.5, kUnclear = 0.02;
 /* Mirrors that are late make the exposure look early, s. */
-constexpr double kSlowMirrors = 1.5e-3;
+constexpr double kSlowMirrors = 2e-3;
 /* Slowest flicker beside which the exposure is found, Hz. */
 constexpr double kSlowest = 0.15;
 /* A delay of that part of a period is that of a pulse, not of a setting, where

@@ -26,6 +26,8 @@ constexpr double kSlowing = 1.2;
  * the last one is kNoiseThreshold standard deviations at least. */
 constexpr double kFirstThreshold = 30.0, kLastThreshold = 2.0;
 constexpr double kNoiseThreshold = 1.8;
+/* Of the result in the mean with the estimate that it began with. */
+constexpr float kShare = 0.4f;
 /* No slot. */
 constexpr std::uint8_t kNotMeasured = 255;
 /* Rows of blocks that are shrunk, and rows of pixels that are updated, at a
@@ -217,7 +219,7 @@ CollaborativeFilter::run (const Kernels &kernels, const Field &coded,
     for (int y = 0; y < height_; y++) {
       float *row = slots[s].row (y);
       for (int x = 0; x < width_; x++)
-        row[x] = 0.5f * (row[x] + light_[s][place (x, y)]);
+        row[x] += kShare * (light_[s][place (x, y)] - row[x]);
     }
   }
   return true;

@@ -3,6 +3,7 @@
 that move over one another, and the scenes of codedexposure-scene. Each is seen
 through codedexposure-sim and fused with some schedules and noise."""
 import math
+import os
 import pathlib
 import subprocess
 
@@ -276,7 +277,9 @@ class Drawing:
 
 
 def launch(pipeline):
+    elements = pathlib.Path(__file__).resolve().parents[3] / 'build/gst'
     done = subprocess.run(['gst-launch-1.0', '-q', *pipeline.split()],
+                          env={'GST_PLUGIN_PATH': str(elements), **os.environ},
                           capture_output=True)
     if done.returncode or done.stderr:
         raise SystemExit(f'{pipeline}\n{done.stderr.decode()}')

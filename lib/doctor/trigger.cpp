@@ -36,7 +36,7 @@ constexpr double kSameLevel = 0.2;
 /* Mirrors are half way, and clocks tick, within that; s. */
 constexpr double kTicks = 3e-6;
 /* Steps of pixel values in which nothing can be measured, part of the range. */
-constexpr double kCoarsest = 0.1;
+constexpr double kCoarsest = 0.05;
 /* Light of all mirrors by which a run of an eighth can be measured, part of the
  * range. */
 constexpr double kFaint = 0.05;
@@ -577,13 +577,17 @@ TriggerCheck::diagnose_exposure (const LightFit &fit)
             " into the next frame period",
         "set ExposureTime to the frame period less the readout of the camera",
         severity (above (end, kLateFail)));
-  if (above (fit.jitter, kJitterWarn))
+  /* If all frames scatter, none tells by how much the exposure jitters. */
+  const bool jitters = above (fit.jitter, kJitterWarn);
+  const bool scattered = !jitters && fit.jitter.sigma > kJitterFail;
+  if (jitters || scattered)
     fail ("jitter",
         "from frame to frame, the exposure begins earlier or later by " +
-            us_text (fit.jitter.value) + " rms",
+            (scattered ? "a large part of the frame period"
+                       : us_text (fit.jitter.value) + " rms"),
         "use the opto-isolated or the direct input of the camera that is "
         "specified for triggers, and switch off its debouncer",
-        severity (above (fit.jitter, kJitterFail)));
+        severity (above (fit.jitter, kJitterFail) || scattered));
 }
 
 Result<Finding>

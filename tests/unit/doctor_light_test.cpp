@@ -213,6 +213,7 @@ INSTANTIATE_TEST_SUITE_P (Single, Faults,
         Case{"frame-late-varies", " frame-late-varies "},
         Case{"jitter", " jitter "}, Case{"jitter=500us", " jitter "},
         Case{"jitter=3ms", " jitter "}, Case{"jitter=8ms", " jitter "},
+        Case{"missing-bits=4", " missing-bits "},
         Case{"missing-bits=6", " missing-bits "}, Case{"dark", " dark "},
         Case{"dark=0.1", " dark "}, Case{"bright", " bright "},
         Case{"bright=5", " bright "}, Case{"vignetting", " vignetting "},
@@ -262,6 +263,12 @@ INSTANTIATE_TEST_SUITE_P (OfOtherChecks, OtherFaults,
         Case{"rotation", ""}, Case{"scale", ""}, Case{"shift", ""},
         Case{"dust", ""}, Case{"lose", ""}, Case{"slip", ""},
         Case{"frame-jitter", ""}));
+
+TEST (Jitter, IsNamedWhereAllFramesScatter)
+{
+  for (std::uint64_t seed = 1; seed <= 8; seed++)
+    EXPECT_EQ (visit (bench (seed), "jitter=8ms").first (), "jitter") << seed;
+}
 
 /** They make the exposure look as if it began before the trigger. */
 TEST (SlowMirrors, AreNotAWrongEdge)

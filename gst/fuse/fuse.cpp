@@ -37,9 +37,9 @@
  *
  * ## Quality and speed
  *
- * `quality=fast` runs in real time: 768x576 from 25 to 100 frames/s take less
- * than half of a core of a fast processor. `balanced` and `best` look for the
- * motion around each pixel, take a hundred times as long, and are for decoding
+ * `quality=fast` runs in real time: 768x576 from 25 to 100 frames/s take a
+ * seventh of a core of a fast processor. `balanced` and `best` look for the
+ * motion around each pixel, take 30 to 90 times as long, and are for decoding
  * of recordings; #codedexposure-fuse:threads share their work.
  * `learned`, and #codedexposure-fuse:refine with the others, corrects the
  * result by a small network that learned from photographs; nothing else learns
@@ -84,16 +84,13 @@
  */
 #include "fuse.h"
 
-#include <cmath>
 #include <utility>
 
-#include "base/workers.h"
 #include "common/element.h"
 #include "common/elements.h"
-#include "common/tag.h"
 #include "extract/saturation.h"
 
-GST_DEBUG_CATEGORY_STATIC (codedexposure_fuse_debug);
+GST_DEBUG_CATEGORY (codedexposure_fuse_debug);
 #define GST_CAT_DEFAULT codedexposure_fuse_debug
 
 using namespace codedexposure;
@@ -125,63 +122,6 @@ gst_coded_exposure_fuse_init (GstCodedExposureFuse *element)
 
 namespace codedexposure::gst::fuse
 {
-
-G_DEFINE_ENUM_TYPE (GstCodedExposureQuality, gst_coded_exposure_quality,
-    {int (FuseQuality::kFast), "one linear filter a pixel, in real time",
-        "fast"},
-    {int (FuseQuality::kBalanced),
-        "the filter of the motion that fits around each pixel", "balanced"},
-    {int (FuseQuality::kBest),
-        "more motions, and collaborative filtering of similar blocks; for "
-        "recordings",
-        "best"},
-    {int (FuseQuality::kLearned),
-        "best, then refined by a network that learned from pictures",
-        "learned"});
-
-const PropertyTable<Settings> &
-Fuse::properties ()
-{
-  static const PropertyTable<Settings> table{
-      {"quality", "Quality",
-          "Quality against speed; all but fast are for up to 16 slots",
-          kReadWrite, &FuseOptions::quality,
-          gst_coded_exposure_quality_get_type ()},
-      {"refine", "Refine",
-          "Refine the result by a network that learned from pictures, as "
-          "quality=learned does with best; for one-hot codes of 2 to 16 slots, "
-          "others stay as they are, with a warning",
-          kReadWrite, &FuseOptions::refine},
-      {"lookahead", "Lookahead",
-          "Coded frames to wait for before one is fused; static pixels are "
-          "then known from the first frame on; each adds a frame period to the "
-          "latency",
-          kReadWrite, &FuseOptions::lookahead, 0u,
-          guint (Fuser<std::uint8_t>::kMaxLookahead)},
-      {"threads", "Threads",
-          "Threads, which do not change pixels; 0: one for each processor, and "
-          "for quality fast without refine, the streaming thread only",
-          kReadWrite, &FuseOptions::threads, 0u, guint (Workers::kMost)},
-      {"full-well", "Full well",
-          "Electrons at white in a pixel that is on for the whole exposure, as "
-          "in codedexposure-sim; determines the shot noise; 0: the frames are "
-          "noise-free; -1: by the bench profile, or noise-free",
-          kReadWrite, within (&FuseOptions::noise, &SensorNoise::full_well),
-          Settings::kUnset, SensorNoise::kMaxFullWell},
-      {"read-noise", "Read noise",
-          "Noise of the camera's electronics in electrons rms; counts only "
-          "with a full-well; -1: that of the bench profile, or none",
-          kReadWrite, within (&FuseOptions::noise, &SensorNoise::read_noise),
-          Settings::kUnset, SensorNoise::kMaxReadNoise},
-  };
-  return table;
-}
-
-Settings &
-Fuse::settings_of (GObject *object)
-{
-  return static_cast<Fuse &> (filter_of (object)).settings_;
-}
 
 void
 Fuse::set_up_class (gpointer klass)
@@ -407,98 +347,6 @@ Fuse::break_history ()
     std::visit ([] (auto &fuser) { fuser.forget (); }, plan_->fuser);
 }
 
-/* ------------------------------------------------------------------ pads -- */
-
-GstPad *
-Fuse::request_pad ()
-{
-  GstPad *pad = uncertainty_.add (GST_PAD (
-      new_source_pad ("uncertainty", "uncertainty", PadKind::uncertainty)
-          .release ()));
-  if (!pad)
-    GST_WARNING_OBJECT (element (),
-        "pad uncertainty exists; put a tee after it to use it twice");
-  return pad;
-}
-
-void
-Fuse::release_pad (GstPad *pad)
-{
-  {
-    const ObjectLock lock (element ());
-    CodedPad &coded = GST_CODED_PAD (pad)->coded;
-    if (std::exchange (coded.served, false))
-      gst_flow_combiner_remove_pad (combiner_.get (), pad);
-    coded.released = true;
-  }
-  uncertainty_.release (pad);
-}
-
-/* The pad, if it was requested and has the events that came before. */
-ObjectPtr<GstCodedPad>
-Fuse::uncertainty_pad () const
-{
-  ObjectPtr<GstPad> pad = uncertainty_.get ();
-  const ObjectLock lock (element ());
-  return ObjectPtr<GstCodedPad> (pad && GST_CODED_PAD (pad.get ())->coded.served
-                                     ? GST_CODED_PAD (pad.release ())
-                                     : nullptr);
-}
-
-void
-Fuse::each_pad (const PadVisitor &visit) const
-{
-  visit (srcpad_.get ());
-  if (const auto pad = uncertainty_pad ())
-    visit (pad.get ());
-}
-
-/* A pad that was requested since the last event or frame gets the events of the
- * other one. On the streaming thread, which is the only one that sends them. */
-void
-Fuse::serve_requested ()
-{
-  const ObjectPtr<GstPad> pad = uncertainty_.get ();
-  if (!pad || uncertainty_pad ())
-    return;
-  GstCodedPad *coded = GST_CODED_PAD (pad.get ());
-  std::vector<EventPtr> events;
-  gst_pad_sticky_events_foreach (
-      GST_PAD (srcpad_.get ()),
-      [] (GstPad *, GstEvent **event, gpointer to) noexcept -> gboolean {
-        static_cast<std::vector<EventPtr> *> (to)->emplace_back (
-            gst_event_ref (*event));
-        return TRUE;
-      },
-      &events);
-  for (EventPtr &event : events) {
-    const GstEventType type = GST_EVENT_TYPE (event.get ());
-    if (type == GST_EVENT_STREAM_START)
-      event = stream_start_for (coded, event.get ());
-    else if (type == GST_EVENT_CAPS)
-      event.reset (gst_event_new_caps (caps_for (coded).get ()));
-    else if (type == GST_EVENT_TAG && why_not_coded (event.get ()))
-      event.reset (
-          provenance_to_event (provenance_for (coded, *provenance ())));
-    gst_pad_push_event (pad.get (), event.release ());
-  }
-  const ObjectLock lock (element ());
-  if (coded->coded.released)
-    return;
-  coded->coded.served = true;
-  gst_flow_combiner_add_pad (combiner_.get (), pad.get ());
-}
-
-GstFlowReturn
-Fuse::combine_flow (GstCodedPad *pad, GstFlowReturn flow)
-{
-  const ObjectLock lock (element ());
-  if (pad->coded.released)
-    return GST_FLOW_OK;
-  return gst_flow_combiner_update_pad_flow (
-      combiner_.get (), GST_PAD (pad), flow);
-}
-
 void
 Fuse::flushed ()
 {
@@ -518,209 +366,6 @@ Fuse::resume ()
 {
   const ObjectLock lock (element ());
   stop_ = std::stop_source ();
-}
-
-/* ------------------------------------------------------------------ plan -- */
-
-std::string
-Fuse::method_name () const
-{
-  auto *qualities =
-      G_ENUM_CLASS (g_type_class_peek (gst_coded_exposure_quality_get_type ()));
-  const bool learned = in_force_.quality == FuseQuality::kLearned;
-  const auto quality = learned ? FuseQuality::kBest : in_force_.quality;
-  std::string name = std::string ("fuse ") +
-                     g_enum_get_value (qualities, int (quality))->value_nick;
-  if ((learned || in_force_.refine) && unrefined ().empty ())
-    name += ", learned " + refinement_hash ();
-  return name;
-}
-
-/* Why the result is not refined although it should be. */
-std::string
-Fuse::unrefined () const
-{
-  return plan_ ? std::visit (
-                     [] (const auto &fuser) { return fuser.unrefined (); },
-                     plan_->fuser)
-               : std::string ();
-}
-
-/* A pixel at the largest value has seen the light of white_slots () slots. */
-SensorNoise
-Fuse::noise (const Schedule &schedule) const
-{
-  SensorNoise noise = in_force_.noise;
-  const BenchProfile *known = bench ();
-  if (noise.full_well == Settings::kUnset) {
-    const auto electrons =
-        known ? known->electrons_per_number () : std::nullopt;
-    noise.full_well = electrons.value_or (0.0) *
-                      (known ? known->largest () : 0) * schedule.slots () /
-                      schedule.white_slots ();
-  }
-  if (noise.read_noise == Settings::kUnset)
-    noise.read_noise =
-        known && known->read_noise ? known->read_noise->value : 0.0;
-  return noise;
-}
-
-/* Relative noise of a plain exposure at typical light, if the camera is
- * described. */
-RectifyOptions
-Fuse::rectify_options (const Schedule &schedule) const
-{
-  constexpr double kTypicalLight = 0.4;
-  const SensorNoise noise = this->noise (schedule);
-  RectifyOptions options;
-  if (noise.full_well > 0.0)
-    options.noise = std::clamp (
-        std::sqrt (noise.variance (kTypicalLight * noise.full_well, 0.0)) /
-            noise.full_well,
-        RectifyOptions::kMinNoise, RectifyOptions::kMaxNoise);
-  return options;
-}
-
-namespace
-{
-
-template <typename Pixel>
-Result<AnyFuser>
-make_fuser (const CodedFormat &format, const FuseOptions &options)
-{
-  auto made = Fuser<Pixel>::make (
-      format.schedule, format.size.width, format.size.height, options);
-  if (!made)
-    return made.error ();
-  return AnyFuser (std::move (*made));
-}
-
-/* Rate times N, and the pilot's rows cropped. */
-CapsScale
-coded_to_fused (const Schedule &schedule)
-{
-  return {.rate = {schedule.slots ()}, .crop_rows = schedule.pilot_rows ()};
-}
-
-CapsPtr
-of_sixteen_bits (GstCaps *caps)
-{
-  CapsPtr wide (gst_caps_copy (caps));
-  gst_caps_set_simple (
-      wide.get (), "format", G_TYPE_STRING, "GRAY16_LE", nullptr);
-  return wide;
-}
-
-} // namespace
-
-bool
-Fuse::plan (const CodedFormat &format)
-{
-  FuseOptions options = in_force_;
-  options.bits = significant_bits ();
-  options.noise = noise (format.schedule);
-  auto fuser = format.wide () ? make_fuser<std::uint16_t> (format, options)
-                              : make_fuser<std::uint8_t> (format, options);
-  if (!fuser) {
-    post_error (fuser.error ().message);
-    return false;
-  }
-  const CapsPtr rectified = format.rectifier
-                                ? format.resized (format.size)
-                                : CapsPtr (gst_caps_ref (format.caps.get ()));
-  CapsPtr caps (
-      scale_caps (rectified.get (), coded_to_fused (format.schedule)));
-  Plan made{std::move (*fuser), {}, {}, options.lookahead};
-  gst_video_info_from_caps (&made.fused, caps.get ());
-  gst_video_info_from_caps (
-      &made.uncertainty, of_sixteen_bits (caps.get ()).get ());
-  plan_ = std::move (made);
-  if (const std::string reason = unrefined (); !reason.empty ())
-    POST_WARNING (element (), STREAM, FORMAT,
-        "The result is not refined: " + reason + ".");
-  const ObjectLock lock (element ());
-  caps_ = std::move (caps);
-  return true;
-}
-
-void
-Fuse::planned (bool)
-{
-  const GstClockTime latency =
-      GstClockTime (plan_->lookahead) * boundary (format ().schedule.slots ());
-  bool changed;
-  {
-    const ObjectLock lock (element ());
-    changed = std::exchange (shared_.latency, latency) != latency;
-  }
-  if (changed)
-    post_latency (element ());
-}
-
-GstClockTime
-Fuse::boundary (int k) const
-{
-  const CodedFormat &now = format ();
-  return GstClockTime (now.rate.time_of (0, k, now.schedule.slots ()));
-}
-
-void
-Fuse::forget ()
-{
-  waiting_.clear ();
-  plan_.reset ();
-  const ObjectLock lock (element ());
-  caps_.reset ();
-}
-
-gboolean
-Fuse::forward (EventPtr event)
-{
-  if (GST_EVENT_IS_SERIALIZED (event.get ()))
-    serve_requested ();
-  const auto made = provenance ();
-  if (const auto pad = uncertainty_pad ()) {
-    const bool start = GST_EVENT_TYPE (event.get ()) == GST_EVENT_STREAM_START;
-    EventPtr own = start ? stream_start_for (pad.get (), event.get ())
-                         : EventPtr (event_for (pad.get (),
-                               gst_event_ref (event.get ()), made.get ()));
-    gst_pad_push_event (GST_PAD (pad.get ()), own.release ());
-  }
-  return gst_pad_push_event (GST_PAD (srcpad_.get ()),
-      event_for (srcpad_.get (), event.release (), made.get ()));
-}
-
-CapsPtr
-Fuse::caps_for (const GstCodedPad *pad) const
-{
-  const ObjectLock lock (element ());
-  if (caps_ && pad->coded.kind == PadKind::uncertainty)
-    return of_sixteen_bits (caps_.get ());
-  return CapsPtr (caps_ ? gst_caps_ref (caps_.get ()) : nullptr);
-}
-
-/* The uncertainty has 16 bits, whatever the coded frames have. */
-CapsPtr
-Fuse::convert_caps (const CapsContext &context, const GstCodedPad *pad,
-    GstCaps *caps, bool to_coded) const
-{
-  CapsPtr converted = CodedFilter::convert_caps (context, pad, caps, to_coded);
-  if (pad->coded.kind != PadKind::uncertainty ||
-      gst_caps_is_any (converted.get ()))
-    return converted;
-  if (!to_coded)
-    return of_sixteen_bits (converted.get ());
-  CapsPtr any (gst_caps_make_writable (converted.release ()));
-  for (guint i = 0; i < gst_caps_get_size (any.get ()); i++)
-    gst_structure_remove_field (
-        gst_caps_get_structure (any.get (), i), "format");
-  return any;
-}
-
-CapsScale
-Fuse::scale_for (const Schedule &schedule, const GstCodedPad *) const
-{
-  return coded_to_fused (schedule);
 }
 
 } // namespace codedexposure::gst::fuse

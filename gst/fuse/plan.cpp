@@ -1,0 +1,260 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Properties; the plan and the caps of the pads, which follow from them and the
+ * format. */
+#include "fuse.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "base/workers.h"
+#include "common/element.h"
+
+GST_DEBUG_CATEGORY_EXTERN (codedexposure_fuse_debug);
+#define GST_CAT_DEFAULT codedexposure_fuse_debug
+
+namespace codedexposure::gst::fuse
+{
+
+G_DEFINE_ENUM_TYPE (GstCodedExposureQuality, gst_coded_exposure_quality,
+    {int (FuseQuality::kFast), "one linear filter a pixel, in real time",
+        "fast"},
+    {int (FuseQuality::kBalanced),
+        "the filter of the motion that fits around each pixel", "balanced"},
+    {int (FuseQuality::kBest),
+        "more motions, and collaborative filtering of similar blocks; for "
+        "recordings",
+        "best"},
+    {int (FuseQuality::kLearned),
+        "best, then refined by a network that learned from pictures",
+        "learned"});
+
+const PropertyTable<Settings> &
+Fuse::properties ()
+{
+  static const PropertyTable<Settings> table{
+      {"quality", "Quality",
+          "Quality against speed; all but fast are for up to 16 slots",
+          kReadWrite, &FuseOptions::quality,
+          gst_coded_exposure_quality_get_type ()},
+      {"refine", "Refine",
+          "Refine the result by a network that learned from pictures, as "
+          "quality=learned does with best; for one-hot codes of 2 to 16 slots, "
+          "others stay as they are, with a warning",
+          kReadWrite, &FuseOptions::refine},
+      {"lookahead", "Lookahead",
+          "Coded frames to wait for before one is fused; static pixels are "
+          "then known from the first frame on; each adds a frame period to the "
+          "latency",
+          kReadWrite, &FuseOptions::lookahead, 0u,
+          guint (Fuser<std::uint8_t>::kMaxLookahead)},
+      {"threads", "Threads",
+          "Threads, which do not change pixels; 0: one for each processor, and "
+          "for quality fast without refine, the streaming thread only",
+          kReadWrite, &FuseOptions::threads, 0u, guint (Workers::kMost)},
+      {"full-well", "Full well",
+          "Electrons at white in a pixel that is on for the whole exposure, as "
+          "in codedexposure-sim; determines the shot noise; 0: the frames are "
+          "noise-free; -1: by the bench profile, or noise-free",
+          kReadWrite, within (&FuseOptions::noise, &SensorNoise::full_well),
+          Settings::kUnset, SensorNoise::kMaxFullWell},
+      {"read-noise", "Read noise",
+          "Noise of the camera's electronics in electrons rms; counts only "
+          "with a full-well; -1: that of the bench profile, or none",
+          kReadWrite, within (&FuseOptions::noise, &SensorNoise::read_noise),
+          Settings::kUnset, SensorNoise::kMaxReadNoise},
+  };
+  return table;
+}
+
+Settings &
+Fuse::settings_of (GObject *object)
+{
+  return static_cast<Fuse &> (filter_of (object)).settings_;
+}
+
+std::string
+Fuse::method_name () const
+{
+  auto *qualities =
+      G_ENUM_CLASS (g_type_class_peek (gst_coded_exposure_quality_get_type ()));
+  const bool learned = in_force_.quality == FuseQuality::kLearned;
+  const auto quality = learned ? FuseQuality::kBest : in_force_.quality;
+  std::string name = std::string ("fuse ") +
+                     g_enum_get_value (qualities, int (quality))->value_nick;
+  if ((learned || in_force_.refine) && unrefined ().empty ())
+    name += ", learned " + refinement_hash ();
+  return name;
+}
+
+/* Why the result is not refined although it should be. */
+std::string
+Fuse::unrefined () const
+{
+  return plan_ ? std::visit (
+                     [] (const auto &fuser) { return fuser.unrefined (); },
+                     plan_->fuser)
+               : std::string ();
+}
+
+/* A pixel at the largest value has seen the light of white_slots () slots. */
+SensorNoise
+Fuse::noise (const Schedule &schedule) const
+{
+  SensorNoise noise = in_force_.noise;
+  const BenchProfile *known = bench ();
+  if (noise.full_well == Settings::kUnset) {
+    const auto electrons =
+        known ? known->electrons_per_number () : std::nullopt;
+    noise.full_well = electrons.value_or (0.0) *
+                      (known ? known->largest () : 0) * schedule.slots () /
+                      schedule.white_slots ();
+  }
+  if (noise.read_noise == Settings::kUnset)
+    noise.read_noise =
+        known && known->read_noise ? known->read_noise->value : 0.0;
+  return noise;
+}
+
+/* Relative noise of a plain exposure at typical light, if the camera is
+ * described. */
+RectifyOptions
+Fuse::rectify_options (const Schedule &schedule) const
+{
+  constexpr double kTypicalLight = 0.4;
+  const SensorNoise noise = this->noise (schedule);
+  RectifyOptions options;
+  if (noise.full_well > 0.0)
+    options.noise = std::clamp (
+        std::sqrt (noise.variance (kTypicalLight * noise.full_well, 0.0)) /
+            noise.full_well,
+        RectifyOptions::kMinNoise, RectifyOptions::kMaxNoise);
+  return options;
+}
+
+namespace
+{
+
+template <typename Pixel>
+Result<AnyFuser>
+make_fuser (const CodedFormat &format, const FuseOptions &options)
+{
+  auto made = Fuser<Pixel>::make (
+      format.schedule, format.size.width, format.size.height, options);
+  if (!made)
+    return made.error ();
+  return AnyFuser (std::move (*made));
+}
+
+/* Rate times N, and the pilot's rows cropped. */
+CapsScale
+coded_to_fused (const Schedule &schedule)
+{
+  return {.rate = {schedule.slots ()}, .crop_rows = schedule.pilot_rows ()};
+}
+
+CapsPtr
+of_sixteen_bits (GstCaps *caps)
+{
+  CapsPtr wide (gst_caps_copy (caps));
+  gst_caps_set_simple (
+      wide.get (), "format", G_TYPE_STRING, "GRAY16_LE", nullptr);
+  return wide;
+}
+
+} // namespace
+
+bool
+Fuse::plan (const CodedFormat &format)
+{
+  FuseOptions options = in_force_;
+  options.bits = significant_bits ();
+  options.noise = noise (format.schedule);
+  auto fuser = format.wide () ? make_fuser<std::uint16_t> (format, options)
+                              : make_fuser<std::uint8_t> (format, options);
+  if (!fuser) {
+    post_error (fuser.error ().message);
+    return false;
+  }
+  const CapsPtr rectified = format.rectifier
+                                ? format.resized (format.size)
+                                : CapsPtr (gst_caps_ref (format.caps.get ()));
+  CapsPtr caps (
+      scale_caps (rectified.get (), coded_to_fused (format.schedule)));
+  Plan made{std::move (*fuser), {}, {}, options.lookahead};
+  gst_video_info_from_caps (&made.fused, caps.get ());
+  gst_video_info_from_caps (
+      &made.uncertainty, of_sixteen_bits (caps.get ()).get ());
+  plan_ = std::move (made);
+  if (const std::string reason = unrefined (); !reason.empty ())
+    POST_WARNING (element (), STREAM, FORMAT,
+        "The result is not refined: " + reason + ".");
+  const ObjectLock lock (element ());
+  caps_ = std::move (caps);
+  return true;
+}
+
+void
+Fuse::planned (bool)
+{
+  const GstClockTime latency =
+      GstClockTime (plan_->lookahead) * boundary (format ().schedule.slots ());
+  bool changed;
+  {
+    const ObjectLock lock (element ());
+    changed = std::exchange (shared_.latency, latency) != latency;
+  }
+  if (changed)
+    post_latency (element ());
+}
+
+GstClockTime
+Fuse::boundary (int k) const
+{
+  const CodedFormat &now = format ();
+  return GstClockTime (now.rate.time_of (0, k, now.schedule.slots ()));
+}
+
+void
+Fuse::forget ()
+{
+  waiting_.clear ();
+  plan_.reset ();
+  const ObjectLock lock (element ());
+  caps_.reset ();
+}
+
+CapsPtr
+Fuse::caps_for (const GstCodedPad *pad) const
+{
+  const ObjectLock lock (element ());
+  if (caps_ && pad->coded.kind == PadKind::uncertainty)
+    return of_sixteen_bits (caps_.get ());
+  return CapsPtr (caps_ ? gst_caps_ref (caps_.get ()) : nullptr);
+}
+
+/* The uncertainty has 16 bits, whatever the coded frames have. */
+CapsPtr
+Fuse::convert_caps (const CapsContext &context, const GstCodedPad *pad,
+    GstCaps *caps, bool to_coded) const
+{
+  CapsPtr converted = CodedFilter::convert_caps (context, pad, caps, to_coded);
+  if (pad->coded.kind != PadKind::uncertainty ||
+      gst_caps_is_any (converted.get ()))
+    return converted;
+  if (!to_coded)
+    return of_sixteen_bits (converted.get ());
+  CapsPtr any (gst_caps_make_writable (converted.release ()));
+  for (guint i = 0; i < gst_caps_get_size (any.get ()); i++)
+    gst_structure_remove_field (
+        gst_caps_get_structure (any.get (), i), "format");
+  return any;
+}
+
+CapsScale
+Fuse::scale_for (const Schedule &schedule, const GstCodedPad *) const
+{
+  return coded_to_fused (schedule);
+}
+
+} // namespace codedexposure::gst::fuse

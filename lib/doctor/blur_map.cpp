@@ -28,6 +28,9 @@ constexpr std::array kHarmonics = {1, 3, 5};
 constexpr std::size_t kTerms = kHarmonics.size ();
 /* Errors of the powers of harmonics and of the squared swing, relative. */
 constexpr double kPowerError = 0.01, kSwingError = 0.03;
+/* Of the blur's growth over the field, relative: lenses blur in other ways,
+ * too. */
+constexpr double kSlopeError = 0.01;
 
 using Powers = std::array<double, kTerms>;
 /* Parts of a block's pixels by their place; they add up to 1. */
@@ -324,8 +327,9 @@ fit_focus (const BlurMap &map, Extent camera)
   /* Slopes by pixel, so that the direction is one on the frame. */
   const double sx = found[2] / rx, sy = found[3] / ry;
   const double slope = std::hypot (sx, sy);
-  const double doubt = std::sqrt (
+  const double scatter = std::sqrt (
       std::max (covariance (2, 2) / (rx * rx), covariance (3, 3) / (ry * ry)));
+  const double doubt = std::hypot (scatter, kSlopeError * slope);
   FocusTilt tilt;
   const double degrees = 180.0 / std::numbers::pi;
   tilt.direction = {std::atan2 (sy, sx) * degrees,

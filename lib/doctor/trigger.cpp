@@ -36,7 +36,7 @@ constexpr double kSameLevel = 0.2;
 /* Mirrors are half way, and clocks tick, within that; s. */
 constexpr double kTicks = 3e-6;
 /* Steps of pixel values in which nothing can be measured, part of the range. */
-constexpr double kCoarsest = 0.05;
+constexpr double kCoarsest = 0.03;
 /* Light of all mirrors by which a run of an eighth can be measured, part of the
  * range. */
 constexpr double kFaint = 0.05;

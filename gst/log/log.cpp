@@ -37,7 +37,7 @@
  *     ! video/x-raw,format=GRAY8,framerate=100/1 ! codedexposure-sim \
  *     ! codedexposure-log name=log ! queue ! avenc_ffv1 ! mux.video_0 \
  *     log.track ! queue ! mux.subtitle_0 \
- *     matroskamux name=mux timecodescale=1000 ! filesink location=coded.mkv
+ *     codedexposure-matroskamux name=mux ! filesink location=coded.mkv
  * ]|
  *
  * Since: 0.1

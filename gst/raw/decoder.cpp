@@ -5,7 +5,8 @@
  * @short_description: Raw frames of 9 to 16 bits from Matroska
  *
  * Gives the raw frames with 16-bit pixels that #codedexposure-matroskamux wrote
- * their caps again; `matroskademux` does not know their format. The size and
+ * their caps again; before GStreamer 1.26, `matroskademux` does not know their
+ * format, and later the frames only get their alignment here. The size and
  * the rate are those in the tag with the schedule or, if that is missing
  * because the file was cut off, those in the head of the file. `decodebin`
  * finds this element.
@@ -117,9 +118,23 @@ find_format (GstElement *self)
   return true;
 }
 
+/* The caps, and what precedes them in a stream. */
+void
+push_caps (DecoderState &state, GstEvent *caps)
+{
+  if (!state.pending.empty () &&
+      GST_EVENT_TYPE (state.pending.front ().get ()) ==
+          GST_EVENT_STREAM_START) {
+    gst_pad_push_event (state.src, state.pending.front ().release ());
+    state.pending.erase (state.pending.begin ());
+  }
+  gst_pad_push_event (state.src, caps);
+  state.has_caps = true;
+}
+
 /* False, with an error: the size is not known. */
 bool
-push_caps (GstElement *self, gsize frame)
+find_caps (GstElement *self, gsize frame)
 {
   DecoderState &state = state_in<GstCodedExposureRawDec> (self);
   if (!find_format (self)) {
@@ -140,15 +155,7 @@ push_caps (GstElement *self, gsize frame)
     return false;
   }
   const CapsPtr caps (gst_video_info_to_caps (&state.info));
-  /* What precedes them in a stream. */
-  if (!state.pending.empty () &&
-      GST_EVENT_TYPE (state.pending.front ().get ()) ==
-          GST_EVENT_STREAM_START) {
-    gst_pad_push_event (state.src, state.pending.front ().release ());
-    state.pending.erase (state.pending.begin ());
-  }
-  gst_pad_push_event (state.src, gst_event_new_caps (caps.get ()));
-  state.has_caps = true;
+  push_caps (state, gst_event_new_caps (caps.get ()));
   return true;
 }
 
@@ -175,7 +182,7 @@ chain (GstPad *, GstObject *parent, GstBuffer *frame) noexcept
   GstElement *self = GST_ELEMENT (parent);
   DecoderState &state = state_in<GstCodedExposureRawDec> (self);
   const gsize size = gst_buffer_get_size (frame);
-  if (!state.has_caps && !push_caps (self, size))
+  if (!state.has_caps && !find_caps (self, size))
     return GST_FLOW_ERROR;
   push_pending (state);
   if (size < GST_VIDEO_INFO_SIZE (&state.info))
@@ -197,13 +204,27 @@ note_setup (DecoderState &state, GstEvent *event)
     state.setup = setup->value ();
 }
 
+/* Those of a demuxer that knows the format; others say too little. */
+void
+take_caps (DecoderState &state, GstEvent *event)
+{
+  EventPtr owned (event);
+  GstCaps *caps = nullptr;
+  gst_event_parse_caps (event, &caps);
+  if (gst_structure_has_name (
+          gst_caps_get_structure (caps, 0), "video/x-raw") &&
+      gst_video_info_from_caps (&state.info, caps))
+    push_caps (state, owned.release ());
+}
+
 gboolean
 on_event (GstPad *pad, GstObject *parent, GstEvent *event) noexcept
 {
   DecoderState &state = state_in<GstCodedExposureRawDec> (parent);
-  switch (GST_EVENT_TYPE (event)) {
+  const GstEventType type = GST_EVENT_TYPE (event);
+  switch (type) {
   case GST_EVENT_CAPS:
-    gst_event_unref (event);
+    take_caps (state, event);
     return TRUE;
   case GST_EVENT_TAG:
     note_setup (state, event);
@@ -216,9 +237,8 @@ on_event (GstPad *pad, GstObject *parent, GstEvent *event) noexcept
     break;
   }
   if (state.has_caps ||
-      !(int (GST_EVENT_TYPE (event)) & int (GST_EVENT_TYPE_SERIALIZED)) ||
-      GST_EVENT_TYPE (event) == GST_EVENT_EOS ||
-      GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP)
+      !(gst_event_type_get_flags (type) & GST_EVENT_TYPE_SERIALIZED) ||
+      type == GST_EVENT_EOS || type == GST_EVENT_FLUSH_STOP)
     return gst_pad_event_default (pad, parent, event);
   state.pending.emplace_back (event);
   return TRUE;
@@ -273,6 +293,7 @@ gst_coded_exposure_raw_dec_class_init (GstCodedExposureRawDecClass *klass)
   describe_element (klass, "Coded exposure raw decoder", "Codec/Decoder/Video",
       "Raw frames with 16-bit pixels from Matroska", {});
   add_pad_template (klass, "sink",
-      {.caps = "video/x-unknown,codec-id=(string)V_UNCOMPRESSED"});
+      {.caps = "video/x-unknown,codec-id=(string)V_UNCOMPRESSED;"
+               "video/x-raw,format=GRAY16_LE"});
   add_pad_template (klass, "src", {.caps = "video/x-raw,format=GRAY16_LE"});
 }

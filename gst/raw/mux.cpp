@@ -2,14 +2,20 @@
 /**
  * SECTION:element-codedexposure-matroskamux
  * @title: codedexposure-matroskamux
- * @short_description: Matroska with raw frames of 9 to 16 bits
+ * @short_description: Matroska with coded frames and their track
  *
- * `matroskamux` with ticks of 1 µs, which also takes raw frames with 16-bit
- * pixels (GRAY16_LE). In the file, these are `V_UNCOMPRESSED` with the FourCC
- * of FFmpeg for 16-bit grey, so FFmpeg and programs that use it read them.
- * `matroskademux` does not know the format; #codedexposure-rawdec, which
- * `decodebin` finds, gives the frames their caps again. It needs the size of
- * the frames, so their tag must have it, as every schedule of a stream does.
+ * `matroskamux` with ticks of 1 µs, in which each frame stands beside its line
+ * of the track, from live sources, too: since GStreamer 1.24, `matroskamux`
+ * itself does not wait for live frames, so the lines of frames that come late,
+ * because their encoder is slow, precede them by seconds, and the frames get
+ * wrong times or no track at all.
+ *
+ * It also takes raw frames with 16-bit pixels (GRAY16_LE). In the file, these
+ * are `V_UNCOMPRESSED` with the FourCC of FFmpeg for 16-bit grey, so FFmpeg and
+ * programs that use it read them. Before GStreamer 1.26, `matroskademux` does
+ * not know the format; #codedexposure-rawdec, which `decodebin` finds, gives
+ * the frames their caps again. It needs the size of the frames, so their tag
+ * must have it, as every schedule of a stream does.
  *
  * ## Example pipeline
  * |[
@@ -46,6 +52,7 @@ namespace
 
 struct MuxState {
   GstElement *mux = nullptr;         ///< of the bin
+  bool is_streamable = false;        ///< setting; applied at the next run
   std::atomic<bool> is_deep = false; ///< 16-bit frames come
   /* Streaming thread of the frames: */
   std::optional<Extent> size;   ///< of the frames
@@ -190,6 +197,18 @@ on_output (GstPad *, GstPadProbeInfo *info, gpointer self) noexcept
   return GST_PAD_PROBE_OK;
 }
 
+/* A muxer of live streams writes a line of the track before its frame has
+ * come. */
+GstPadProbeReturn
+on_latency (GstPad *, GstPadProbeInfo *info, gpointer) noexcept
+{
+  GstQuery *query = GST_PAD_PROBE_INFO_QUERY (info);
+  if (GST_QUERY_TYPE (query) != GST_QUERY_LATENCY)
+    return GST_PAD_PROBE_OK;
+  gst_query_set_latency (query, FALSE, 0, GST_CLOCK_TIME_NONE);
+  return GST_PAD_PROBE_HANDLED;
+}
+
 GstPad *
 request_new_pad (GstElement *element, GstPadTemplate *templ, const gchar *name,
     const GstCaps *) noexcept
@@ -199,6 +218,8 @@ request_new_pad (GstElement *element, GstPadTemplate *templ, const gchar *name,
       mux, name ? name : GST_PAD_TEMPLATE_NAME_TEMPLATE (templ)));
   if (!inner)
     return nullptr;
+  gst_pad_add_probe (inner.get (), GST_PAD_PROBE_TYPE_QUERY_UPSTREAM,
+      on_latency, nullptr, nullptr);
   if (g_str_has_prefix (GST_PAD_TEMPLATE_NAME_TEMPLATE (templ), "video"))
     gst_pad_add_probe (inner.get (),
         GstPadProbeType (GST_PAD_PROBE_TYPE_BUFFER |
@@ -230,8 +251,11 @@ begin_run (GstElement *element)
   state.is_deep = state.is_marked = false;
   state.size.reset ();
   state.tagged.reset ();
-  if (state.mux)
+  if (state.mux) {
+    g_object_set (
+        state.mux, "streamable", gboolean (state.is_streamable), nullptr);
     return true;
+  }
   POST_ERROR (element, CORE, MISSING_PLUGIN,
       "matroskamux is missing; install gstreamer1.0-plugins-good");
   return false;
@@ -245,7 +269,9 @@ end_run (GstElement *)
 const PropertyTable<MuxState> &
 properties ()
 {
-  static const PropertyTable<MuxState> table{};
+  static const PropertyTable<MuxState> table{{"streamable", "Streamable",
+      "Write for a network, without an index and without going back",
+      kReadWriteReady, &MuxState::is_streamable}};
   return table;
 }
 
@@ -277,7 +303,9 @@ gst_coded_exposure_matroska_mux_class_init (
   install_state<GstCodedExposureMatroskaMux, properties> (klass);
   install_run<begin_run, end_run> (klass);
   describe_element (klass, "Coded exposure Matroska muxer", "Codec/Muxer",
-      "Matroska that also holds raw frames with 16-bit pixels", {});
+      "Matroska with coded frames, also raw ones with 16-bit pixels, beside "
+      "the lines of their track",
+      {});
   add_pad_template (klass, "src", {.caps = "video/x-matroska"});
   add_pad_template (klass, "video_%u",
       {.presence = GST_PAD_REQUEST,

@@ -324,19 +324,18 @@ raw_size ()
 # oldest, so that the next one that is written shows how many are missing.
 coded_recording ()
 {
-  local encoder='' muxer=codedexposure-matroskamux sink leaky=
+  local encoder='' sink leaky=
   [ "${3:-}" != live ] || leaky='leaky=downstream '
   sink="codedexposure-filesink direct=true $(raw_size)"
   if [ "${2:-ffv1}" = ffv1 ]; then
     encoder="$(ffv1_encoder) !" sink='filesink '
-    muxer='matroskamux timecodescale=1000'
   fi
   printf 'queue name=buffer %s%s ! ' "$leaky" "$(buffer_limits)"
   printf 'codedexposure-log name=log location=%s ! ' \
     "$(quoted "$(sidecar_of "$1")")"
   # Hashes and writes in two threads.
   printf 'queue max-size-buffers=2 max-size-bytes=0 max-size-time=0 ! '
-  printf '%s %s name=mux ! ' "$encoder" "$muxer"
+  printf '%s codedexposure-matroskamux name=mux ! ' "$encoder"
   printf '%slocation=%s ' "$sink" "$(quoted "$1")"
   printf 'log.track ! queue max-size-buffers=0 max-size-time=0 ! mux.subtitle_0 '
 }

@@ -281,6 +281,7 @@ CodedFilter::after_state_change (GstStateChange transition)
   });
   forget ();
   const ObjectLock lock (element_);
+  gst_flow_combiner_reset (combiner_.get ());
   shared_.settings_changed = true;
   shared_.schedule.reset ();
   shared_.provenance.reset ();

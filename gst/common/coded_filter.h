@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include <gst/base/gstflowcombiner.h>
 #include <gst/gst.h>
 #include <gst/video/video.h>
 
@@ -253,6 +254,9 @@ protected:
   /** Pushes @p outbuf, which is writable, and counts it. */
   GstFlowReturn push (
       GstCodedPad *pad, BufferPtr outbuf, GstClockTime duration);
+  /** Combines @p flow of @p pad with the flows of the others; NOT_LINKED: for a
+   * pad on which nothing is pushed. OK if the pad was released. */
+  GstFlowReturn combine_flow (GstCodedPad *pad, GstFlowReturn flow);
   /** Gives @p outbuf flags, metas and time of a picture made from @p coded. */
   void describe (GstBuffer *outbuf, GstBuffer *coded, FrameMeta meta,
       const Picture &picture) const;
@@ -278,6 +282,10 @@ protected:
     StructurePtr stats () const;
   };
   Shared shared_; ///< object lock
+  /** Of the source pads that count; a subclass adds and removes them. Object
+   * lock. */
+  std::unique_ptr<GstFlowCombiner, FreeWith<gst_flow_combiner_free>> combiner_{
+      gst_flow_combiner_new ()};
 
   /** A flush comes from another thread than frames, and is forwarded, too. */
   std::shared_ptr<const Provenance> provenance () const;

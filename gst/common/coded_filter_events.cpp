@@ -195,6 +195,8 @@ CodedFilter::on_flush_stop (EventPtr event)
   break_time ();
   const gboolean done = forward (std::move (event));
   flushed ();
+  const ObjectLock lock (element_);
+  gst_flow_combiner_reset (combiner_.get ());
   return done;
 }
 

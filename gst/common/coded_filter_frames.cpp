@@ -356,4 +356,14 @@ CodedFilter::push (GstCodedPad *pad, BufferPtr outbuf, GstClockTime duration)
   return flow;
 }
 
+GstFlowReturn
+CodedFilter::combine_flow (GstCodedPad *pad, GstFlowReturn flow)
+{
+  const ObjectLock lock (element_);
+  if (pad->coded.released)
+    return GST_FLOW_OK;
+  return gst_flow_combiner_update_pad_flow (
+      combiner_.get (), GST_PAD (pad), flow);
+}
+
 } // namespace codedexposure::gst

@@ -9,7 +9,6 @@
 #include <string>
 #include <vector>
 
-#include <gst/base/gstflowcombiner.h>
 #include <gst/gst.h>
 
 #include "common/coded_filter.h"
@@ -107,9 +106,6 @@ private:
   bool index_allowed (PadKind kind, int index) const;
   bool check_pads (const PadMap &pads) const;
   EventPtr gap_for (const GstCodedPad *pad, GstEvent *gap) const;
-  /** Combines @p flow of @p pad with the flows of the others; NOT_LINKED if
-   * nothing was pushed. */
-  GstFlowReturn combine_flow (GstCodedPad *pad, GstFlowReturn flow);
 
   /* Frames. */
   bool is_live ();
@@ -139,8 +135,6 @@ private:
   /** Replaced, never changed: the streaming thread uses a map while the
    * application requests and releases pads. */
   std::shared_ptr<const PadMap> pads_ = std::make_shared<PadMap> ();
-  std::unique_ptr<GstFlowCombiner, FreeWith<gst_flow_combiner_free>> combiner_{
-      gst_flow_combiner_new ()};
   PadCaps caps_;
   bool ended_ = false; ///< EOS was forwarded
 

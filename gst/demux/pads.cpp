@@ -18,13 +18,6 @@ namespace codedexposure::gst::demux
 namespace
 {
 
-bool
-is_sticky (const GstEvent *event)
-{
-  return gst_event_type_get_flags (GST_EVENT_TYPE (event)) &
-         GST_EVENT_TYPE_STICKY;
-}
-
 struct Replay {
   GstCodedPad *pad;
   const PadCaps &caps;
@@ -284,7 +277,8 @@ gboolean
 Demux::forward (EventPtr event)
 {
   const GstEventType type = GST_EVENT_TYPE (event.get ());
-  if (is_sticky (event.get ()) && type != GST_EVENT_EOS)
+  if (gst_event_type_get_flags (type) & GST_EVENT_TYPE_STICKY &&
+      type != GST_EVENT_EOS)
     gst_pad_store_sticky_event (sinkpad (), event.get ());
   if (type == GST_EVENT_EOS || type == GST_EVENT_STREAM_START ||
       type == GST_EVENT_FLUSH_STOP) {
@@ -304,22 +298,10 @@ Demux::forward (EventPtr event)
   return TRUE;
 }
 
-GstFlowReturn
-Demux::combine_flow (GstCodedPad *pad, GstFlowReturn flow)
-{
-  const ObjectLock lock (element ());
-  if (pad->coded.released)
-    return GST_FLOW_OK;
-  return gst_flow_combiner_update_pad_flow (
-      combiner_.get (), GST_PAD (pad), flow);
-}
-
 void
 Demux::flushed ()
 {
   live_.reset ();
-  const ObjectLock lock (element ());
-  gst_flow_combiner_reset (combiner_.get ());
 }
 
 } // namespace codedexposure::gst::demux

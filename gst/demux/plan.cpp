@@ -209,7 +209,6 @@ Demux::forget ()
   caps_ = PadCaps ();
   settings_.method_in_force = Method::kAuto;
   ended_ = false;
-  gst_flow_combiner_reset (combiner_.get ());
 }
 
 CapsPtr

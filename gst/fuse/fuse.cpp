@@ -348,13 +348,6 @@ Fuse::break_history ()
 }
 
 void
-Fuse::flushed ()
-{
-  const ObjectLock lock (element ());
-  gst_flow_combiner_reset (combiner_.get ());
-}
-
-void
 Fuse::cancel ()
 {
   const ObjectLock lock (element ());

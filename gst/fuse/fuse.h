@@ -8,7 +8,6 @@
 #include <variant>
 #include <vector>
 
-#include <gst/base/gstflowcombiner.h>
 #include <gst/gst.h>
 
 #include "common/coded_filter.h"
@@ -63,7 +62,6 @@ private:
   void forget () override;
   void cancel () override;
   void resume () override;
-  void flushed () override;
   void each_pad (const PadVisitor &visit) const override;
   CapsPtr caps_for (const GstCodedPad *pad) const override;
   CapsPtr convert_caps (const CapsContext &context, const GstCodedPad *pad,
@@ -92,7 +90,6 @@ private:
   GstFlowReturn acquire_all (Pictures &pictures) const;
   GstFlowReturn render (Pictures &fused, Pictures *uncertainty);
   GstFlowReturn push_one (Pictures &pictures, const CodedFrame &coded, int k);
-  GstFlowReturn combine_flow (GstCodedPad *pad, GstFlowReturn flow);
   void serve_requested ();
   ObjectPtr<GstCodedPad> uncertainty_pad () const;
   GstFlowReturn push_oldest ();
@@ -103,8 +100,6 @@ private:
   RequestPad uncertainty_;
 
   /* Object lock. */
-  std::unique_ptr<GstFlowCombiner, FreeWith<gst_flow_combiner_free>> combiner_{
-      gst_flow_combiner_new ()};
   Settings settings_;
   CapsPtr caps_;
   std::stop_source stop_; ///< of the fusion that is under way

@@ -93,20 +93,11 @@ Fuse::serve_requested ()
   gst_flow_combiner_add_pad (combiner_.get (), pad.get ());
 }
 
-GstFlowReturn
-Fuse::combine_flow (GstCodedPad *pad, GstFlowReturn flow)
-{
-  const ObjectLock lock (element ());
-  if (pad->coded.released)
-    return GST_FLOW_OK;
-  return gst_flow_combiner_update_pad_flow (
-      combiner_.get (), GST_PAD (pad), flow);
-}
-
 gboolean
 Fuse::forward (EventPtr event)
 {
-  if (GST_EVENT_IS_SERIALIZED (event.get ()))
+  if (gst_event_type_get_flags (GST_EVENT_TYPE (event.get ())) &
+      GST_EVENT_TYPE_SERIALIZED)
     serve_requested ();
   const auto made = provenance ();
   if (const auto pad = uncertainty_pad ()) {

@@ -309,9 +309,9 @@ forget_frames (RestoreState &state)
 void
 include_rounding (GstSegment &segment)
 {
-  constexpr guint64 kRounding = 500;
+  constexpr guint64 kHalfTick = 500; // ns
   if (GST_CLOCK_TIME_IS_VALID (segment.time) && segment.time < segment.start)
-    segment.start -= std::min (kRounding, segment.start - segment.time);
+    segment.start -= std::min (kHalfTick, segment.start - segment.time);
 }
 
 /* A serialised event, in its turn. */

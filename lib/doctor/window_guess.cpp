@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace codedexposure
 {
@@ -10,39 +11,41 @@ namespace codedexposure
 namespace
 {
 
-/** Squares that remain where runs of one exposure are explained by a window,
- * with the best gain and offset or with those of @p model. */
-double
-misfit (std::span<const LightSample> samples, int exposure,
-    const LightModel &window, LightModel *model)
+/** @p window with the gain and the offset that explain runs of one exposure
+ * best. */
+LightModel
+with_best_gain (
+    std::span<const LightSample> samples, int exposure, LightModel window)
 {
-  LightModel unit = window;
-  unit.gain = 1.0;
-  unit.offsets.assign (unit.lengths.size (), 0.0);
+  window.gain = 1.0;
+  window.offsets.assign (window.lengths.size (), 0.0);
   double n = 0.0, x = 0.0, y = 0.0, xx = 0.0, xy = 0.0;
   for (const LightSample &sample : samples) {
     if (sample.exposure != exposure)
       continue;
-    const double seconds = unit.light (sample);
+    const double seconds = window.light (sample);
     n += 1.0;
     x += seconds;
     y += sample.light;
     xx += seconds * seconds;
     xy += seconds * sample.light;
   }
-  if (model) {
-    const double spread = n * xx - x * x;
-    unit.gain =
-        spread > 1e-12 * n * xx ? std::max (0.0, (n * xy - x * y) / spread) : 0;
-    unit.offsets.assign (unit.lengths.size (), (y - unit.gain * x) / n);
-    *model = unit;
-  } else {
-    unit = window;
-  }
+  const double spread = n * xx - x * x;
+  window.gain =
+      spread > 1e-12 * n * xx ? std::max (0.0, (n * xy - x * y) / spread) : 0;
+  window.offsets.assign (window.lengths.size (), (y - window.gain * x) / n);
+  return window;
+}
+
+/** Squares that @p model does not explain, of runs of one exposure. */
+double
+misfit (
+    std::span<const LightSample> samples, int exposure, const LightModel &model)
+{
   double squares = 0.0;
   for (const LightSample &sample : samples)
     if (sample.exposure == exposure)
-      squares += std::pow (sample.light - unit.light (sample), 2);
+      squares += std::pow (sample.light - model.light (sample), 2);
   return squares;
 }
 
@@ -65,17 +68,18 @@ LightModel
 guess_window (std::span<const LightSample> samples, double period)
 {
   constexpr int kSteps = 96;
-  LightModel best, tried;
+  LightModel best;
   double least = -1.0;
   for (int length = kSteps / 8; length < kSteps; length++)
     for (int start = 0; start < kSteps; start++) {
-      LightModel window{.period = period,
-          .start = period * start / kSteps,
-          .lengths = {period * length / kSteps}};
-      const double squares = misfit (samples, 0, window, &tried);
+      LightModel window = with_best_gain (samples, 0,
+          {.period = period,
+              .start = period * start / kSteps,
+              .lengths = {period * length / kSteps}});
+      const double squares = misfit (samples, 0, window);
       if (least < 0.0 || squares < least) {
         least = squares;
-        best = tried;
+        best = std::move (window);
       }
     }
   return best;
@@ -96,7 +100,7 @@ guess_length (std::span<const LightSample> samples, LightModel model)
     model.offsets[1] = 0.0;
     model.offsets[1] = std::clamp (mean_beyond (samples, model),
         std::min (low, high), std::max (low, high));
-    const double squares = misfit (samples, 1, model, nullptr);
+    const double squares = misfit (samples, 1, model);
     if (least < 0.0 || squares < least) {
       least = squares;
       best = model.lengths[1];

@@ -7,10 +7,11 @@
 #include <complex>
 #include <numbers>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 
 #include "calibrate/gratings.h"
 #include "calibrate/response.h"
+#include "doctor/solve.h"
 
 namespace codedexposure
 {
@@ -272,7 +273,7 @@ improve (const std::vector<FocusPoint> &points, Focus &f, double &damping,
     Eigen::Matrix4d damped = normal;
     damped.diagonal () *= 1.0 + damping;
     damped.diagonal ().array () += 1e-9;
-    Focus next = f + damped.ldlt ().solve (right);
+    Focus next = f + solve_normal (damped, right);
     next[0] = std::max (0.0, next[0]);
     if (next.allFinite () && misfit (points, next) < before) {
       f = next;
@@ -323,7 +324,7 @@ fit_focus (const BlurMap &map, Extent camera)
   const double excess =
       std::max (1.0, best / std::max (1.0, double (points.size ()) - 4.0));
   normal.diagonal ().array () += 1e-9;
-  const Eigen::Matrix4d covariance = excess * normal.inverse ();
+  const Eigen::Matrix4d covariance = excess * inverse_of (normal);
   /* Slopes by pixel, so that the direction is one on the frame. */
   const double sx = found[2] / rx, sy = found[3] / ry;
   const double slope = std::hypot (sx, sy);

@@ -3,10 +3,11 @@
 #include <array>
 #include <cmath>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 
 #include "doctor/dither.h"
 #include "doctor/rounding.h"
+#include "doctor/solve.h"
 
 namespace codedexposure
 {
@@ -168,7 +169,7 @@ improve (const Model &model, const Eigen::MatrixXd &normal,
   for (int i = 0; i < 8; i++, damping *= 10.0) {
     Eigen::MatrixXd damped = normal;
     damped.diagonal () *= 1.0 + damping;
-    Numbers next = n + damped.ldlt ().solve (right);
+    Numbers next = n + solve_normal (damped, right);
     if (!next.allFinite ())
       continue;
     next[kSpread] = std::clamp (next[kSpread], 0.0, kMostSpread);
@@ -199,14 +200,14 @@ fit_dither (const std::vector<DitherGroup> &groups, double part,
     const Eigen::MatrixXd slopes = model.slopes (n, rest);
     const double before = chi;
     chi = rest.squaredNorm ();
-    normal = slopes.transpose () * slopes;
+    normal = normal_of (slopes);
     if (!improve (model, normal, slopes.transpose () * rest, chi, damping, n) ||
         std::abs (chi - before) < 1e-4 * chi)
       break;
   }
   const double excess = std::max (1.0, chi / model.freedom ());
   normal.diagonal ().array () += 1e-9;
-  const Eigen::MatrixXd covariance = excess * normal.inverse ();
+  const Eigen::MatrixXd covariance = excess * inverse_of (normal);
   if (!covariance.allFinite ())
     return std::nullopt;
   const auto measured = [&] (Number i) {

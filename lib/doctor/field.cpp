@@ -8,8 +8,9 @@
 #include <iterator>
 #include <vector>
 
-#include <Eigen/LU>
-#include <Eigen/QR>
+#include <Eigen/Core>
+
+#include "doctor/solve.h"
 
 namespace codedexposure
 {
@@ -110,8 +111,8 @@ corner_loss (ImageView<const float> picture)
       a.row (i) = Eigen::Map<const Eigen::RowVectorXd> (row.data (), 7);
       b[i] = block.light;
     }
-    surface = a.colPivHouseholderQr ().solve (b);
-    inverse = (a.transpose () * a).inverse ();
+    surface = least_squares (a, b);
+    inverse = inverse_of (normal_of (a));
     const VectorXd residual = b - a * surface;
     noise = residual.norm () / std::sqrt (double (a.rows ()));
     std::vector<double> sizes;

@@ -6,7 +6,9 @@
 #include <cmath>
 #include <numbers>
 
-#include <Eigen/Dense>
+#include <Eigen/Cholesky>
+
+#include "doctor/solve.h"
 
 namespace codedexposure
 {
@@ -97,7 +99,7 @@ fit_lens (const std::vector<PlacePair> &pairs, Extent camera, Extent mirrors,
   found.rms = std::sqrt (squares / freedom);
   const double sigma = std::max (noise, found.rms);
   const Numbers doubt = steps.cwiseProduct (
-      sigma * normal.inverse ().diagonal ().cwiseMax (0.0).cwiseSqrt ());
+      sigma * inverse_of (normal).diagonal ().cwiseMax (0.0).cwiseSqrt ());
   const double area = std::abs (n[0] * n[3] - n[1] * n[2]);
   if (!(area > 1e-9))
     return std::nullopt;

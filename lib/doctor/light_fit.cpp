@@ -7,10 +7,10 @@
 #include <numbers>
 #include <tuple>
 
-#include <Eigen/Cholesky>
-#include <Eigen/QR>
+#include <Eigen/Core>
 
 #include "doctor/line_search.h"
+#include "doctor/solve.h"
 
 namespace codedexposure
 {
@@ -293,7 +293,7 @@ Fit::descend ()
   VectorXd r = residuals (model_);
   for (int round = 0; round < 40; round++) {
     const MatrixXd j = jacobian ();
-    MatrixXd normal = j.transpose () * j;
+    MatrixXd normal = normal_of (j);
     const VectorXd slope = j.transpose () * r;
     const VectorXd diagonal = normal.diagonal ();
     const VectorXd x = parameters.from (model_);
@@ -304,7 +304,7 @@ Fit::descend ()
       damped.diagonal () += damping * diagonal;
       damped.diagonal ().array () += 1e-300;
       LightModel moved = model_;
-      parameters.to (x + damped.ldlt ().solve (slope), moved);
+      parameters.to (x + solve_normal (damped, slope), moved);
       obey (moved);
       const VectorXd after = residuals (moved);
       better = after.squaredNorm () < r.squaredNorm ();
@@ -527,9 +527,7 @@ Fit::remember (LightFit &fit) const
   const VectorXd scale = j.colwise ().norm ().cwiseMax (1e-300).cwiseInverse ();
   const MatrixXd even = j * scale.asDiagonal ();
   const MatrixXd inverse = scale.asDiagonal () *
-                           (even.transpose () * even)
-                               .completeOrthogonalDecomposition ()
-                               .pseudoInverse () *
+                           pseudo_inverse_of (normal_of (even)) *
                            scale.asDiagonal ();
   const MatrixXd spread = covariance (j, inverse, residual);
   const auto sigma = [&] (Index p) { return std::sqrt (spread (p, p)); };

@@ -6,7 +6,9 @@
 #include <complex>
 #include <numbers>
 
-#include <Eigen/QR>
+#include <Eigen/Core>
+
+#include "doctor/solve.h"
 
 namespace codedexposure
 {
@@ -110,8 +112,7 @@ public:
       if (norm > 0.0)
         others.col (i) /= norm;
     }
-    const Eigen::ColPivHouseholderQR<MatrixXd> factors (others);
-    basis_ = MatrixXd (factors.householderQ ()).leftCols (factors.rank ());
+    basis_ = basis_of (others);
     residual_ -= basis_ * (basis_.transpose () * residual_);
   }
 

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
+
+#include "doctor/solve.h"
 
 namespace codedexposure
 {
@@ -54,7 +56,7 @@ fit (const std::vector<Sample> &samples, int degree)
     right += weight * s.y.value * row;
   }
   Polynomial fitted;
-  fitted.covariance = normal.inverse ();
+  fitted.covariance = inverse_of (normal);
   fitted.factors = fitted.covariance * right;
   double squares = 0.0;
   for (const Sample &s : samples)

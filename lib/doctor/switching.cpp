@@ -4,9 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 
 #include "base/try.h"
+#include "doctor/solve.h"
 
 namespace codedexposure
 {
@@ -72,7 +73,7 @@ misfit (const std::vector<SwitchPoint> &points, double took, double end,
     double jitter)
 {
   const Eigen::Index count = Eigen::Index (points.size ());
-  Eigen::MatrixX3d rows (count + 1, 3);
+  Eigen::MatrixXd rows (count + 1, 3);
   Eigen::VectorXd lights (count + 1);
   for (Eigen::Index i = 0; i < count; i++) {
     const SwitchPoint &point = points[std::size_t (i)];
@@ -85,7 +86,7 @@ misfit (const std::vector<SwitchPoint> &points, double took, double end,
   rows.row (count) << 0.0, 0.0, 1.0 / (0.5 * kCurvature * slope_of (points));
   lights (count) = 0.0;
   const Eigen::Vector3d curve =
-      (rows.transpose () * rows).ldlt ().solve (rows.transpose () * lights);
+      solve_normal (normal_of (rows), rows.transpose () * lights);
   return (lights - rows * curve).squaredNorm ();
 }
 

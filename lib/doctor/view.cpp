@@ -4,9 +4,10 @@
 #include <cmath>
 #include <numbers>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 
 #include "base/try.h"
+#include "doctor/solve.h"
 
 namespace codedexposure
 {
@@ -59,7 +60,7 @@ plane_of (const Image<float> &seen, const Image<float> &off,
   if (normal (2, 2) < kFewPixels)
     return Error{"fewer than " + std::to_string (int (kFewPixels)) +
                  " pixels see mirrors; check light, focus and alignment"};
-  return Eigen::Vector3d (normal.ldlt ().solve (right));
+  return Eigen::Vector3d (solve_normal (normal, right));
 }
 
 } // namespace

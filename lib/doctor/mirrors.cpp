@@ -174,10 +174,10 @@ MirrorRun::diagnose_orientation ()
         is.turned == 180
             ? "set ReverseX=true and ReverseY=true of the camera, or turn it"
             : "turn the camera by 90 degrees"});
-  for (const auto &[flipped, id, feature] :
+  for (const auto &[mirrored, id, feature] :
       {std::tuple{is.flipped_x, "flipped-x", "ReverseX"},
           std::tuple{is.flipped_y, "flipped-y", "ReverseY"}})
-    if (flipped)
+    if (mirrored)
       finding_.diagnoses.push_back ({id, Verdict::fail,
           "the picture is mirrored, " +
               std::string (is.flipped_x ? "left to right" : "top to bottom"),

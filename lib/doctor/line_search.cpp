@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <complex>
 #include <numbers>
 
 #include <Eigen/Core>
@@ -19,7 +18,6 @@ namespace
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using Complex = std::complex<double>;
 
 constexpr double kTurn = 2.0 * std::numbers::pi;
 /** Frequencies in the width of a line. */
@@ -55,12 +53,13 @@ public:
   Comb (const LineSearch &search, double frequency, double step)
       : lit_ (search.lit), frequency_ (frequency), step_ (step)
   {
-    for (const LitTime &time : lit_) {
-      phases_.push_back (std::polar (1.0, kTurn * frequency * time.from));
-      phases_.push_back (std::polar (1.0, kTurn * frequency * time.until));
-      turns_.push_back (std::polar (1.0, kTurn * step * time.from));
-      turns_.push_back (std::polar (1.0, kTurn * step * time.until));
-    }
+    for (const LitTime &time : lit_)
+      for (const double edge : {time.from, time.until}) {
+        cosines_.push_back (std::cos (kTurn * frequency * edge));
+        sines_.push_back (std::sin (kTurn * frequency * edge));
+        turn_cosines_.push_back (std::cos (kTurn * step * edge));
+        turn_sines_.push_back (std::sin (kTurn * step * edge));
+      }
   }
 
   double frequency () const { return frequency_; }
@@ -71,27 +70,28 @@ public:
     sine.setZero ();
     const double turn = 1.0 / (kTurn * frequency_);
     for (std::size_t i = 0; i < lit_.size (); i++) {
-      const Complex &from = phases_[2 * i], &until = phases_[2 * i + 1];
+      const std::size_t from = 2 * i, until = from + 1;
       const double weight = turn * lit_[i].weight;
-      cosine[lit_[i].sample] += (until.imag () - from.imag ()) * weight;
-      sine[lit_[i].sample] += (from.real () - until.real ()) * weight;
+      cosine[lit_[i].sample] += (sines_[until] - sines_[from]) * weight;
+      sine[lit_[i].sample] += (cosines_[from] - cosines_[until]) * weight;
     }
   }
 
   void next ()
   {
     frequency_ += step_;
-    for (std::size_t i = 0; i < phases_.size (); i++) {
-      const Complex p = phases_[i], t = turns_[i];
-      phases_[i] = {p.real () * t.real () - p.imag () * t.imag (),
-          p.real () * t.imag () + p.imag () * t.real ()};
+    for (std::size_t i = 0; i < cosines_.size (); i++) {
+      const double c = cosines_[i], s = sines_[i];
+      cosines_[i] = c * turn_cosines_[i] - s * turn_sines_[i];
+      sines_[i] = c * turn_sines_[i] + s * turn_cosines_[i];
     }
   }
 
 private:
   const std::vector<LitTime> &lit_;
   double frequency_, step_;
-  std::vector<Complex> phases_, turns_;
+  /* Of both ends of each time, and of a step there. */
+  std::vector<double> cosines_, sines_, turn_cosines_, turn_sines_;
 };
 
 /** The residual without what other parameters explain. */

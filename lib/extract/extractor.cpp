@@ -42,10 +42,11 @@ method_for (const Schedule &schedule)
 std::vector<int>
 elements_by_slot (const Code &code)
 {
+  const bool one_hot = code.one_hot ();
   std::vector<int> elements (std::size_t (code.slots ()));
   for (int s = 0; s < code.slots (); s++) {
     int &element = elements[std::size_t (s)] = s;
-    if (code.one_hot ())
+    if (one_hot)
       for (element = 0; !code.on (element, s); element++) {
       }
   }

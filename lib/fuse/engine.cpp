@@ -239,7 +239,8 @@ Engine::prepare (const Schedule &schedule, const FuseOptions &options)
               options.scene.moving}};
   }
   filters_.emplace (phases_, observation_, std::move (models), noise,
-      FilterSets::Frames{width_, radius_, split_period (), steps_});
+      FilterSets::Frames{
+          width_, radius_, split_period (), steps_, options.lookahead > 0});
   predictions_.emplace (filters_->most_classes (),
       StaticPixels::radius_of (schedule.cell ()), Extent{width_, height_},
       split_period ());

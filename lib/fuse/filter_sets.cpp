@@ -45,7 +45,9 @@ FilterSets::FilterSets (const Phases &phases, const Observation &observation,
       models_ (std::move (models)), noise_ (noise.begin (), noise.end ()),
       frames_ (frames)
 {
-  for_frames ({});
+  const bool next = use_neighbours () && frames.lookahead;
+  for (const bool previous : {false, use_neighbours ()})
+    set_for ({previous, next});
 }
 
 int
@@ -134,8 +136,13 @@ FilterSets::make_estimates (const SparseSources &sources, Around around) const
 const FilterSets::Set &
 FilterSets::for_frames (const SplitFrames &frames)
 {
+  return set_for ({frames[0] != nullptr, frames[2] != nullptr});
+}
+
+const FilterSets::Set &
+FilterSets::set_for (Around around)
+{
   constexpr int kReach = int (kNeighbourRadius);
-  const Around around{frames[0] != nullptr, frames[2] != nullptr};
   auto &set = sets_[(around.previous ? 1u : 0u) + (around.next ? 2u : 0u)];
   if (!set) {
     const SparseSources sources ({around.previous ? kReach : -1, frames_.radius,

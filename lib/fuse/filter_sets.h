@@ -30,9 +30,10 @@ public:
   };
   struct Frames {
     int width;
-    int radius;  ///< of taps, px; coded frames have a margin of this size
-    int period;  ///< of the parts of rows
-    float steps; ///< see SparseBank
+    int radius;     ///< of taps, px; coded frames have a margin of this size
+    int period;     ///< of the parts of rows
+    float steps;    ///< see SparseBank
+    bool lookahead; ///< the next coded frame is usually known
   };
   struct Set {
     SparseSources sources;
@@ -51,11 +52,13 @@ public:
   /** The largest number of classes that predict in a set. */
   int most_classes () const;
   /** Filters for the neighbours that there are in @p frames. Those that a
-   * stream rarely needs are made when it does. */
+   * stream needs only at its end, or where frames are missing, are made when
+   * it does. */
   const Set &for_frames (const SplitFrames &frames);
 
 private:
   struct Around;
+  const Set &set_for (Around around);
   void each_filter (const SceneClass &scene, std::span<const Tap> taps,
       Sought sought, const UseSparse &use) const;
   SparseBank make_predictions (

@@ -1,6 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "element.h"
 
+#include <cerrno>
+
+#include "raii.h"
+
 namespace codedexposure::gst
 {
 
@@ -85,6 +89,20 @@ add_latency (GstQuery *query, GstClockTime own)
   gst_query_parse_latency (query, &live, &min, &max);
   gst_query_set_latency (
       query, live, min + own, GST_CLOCK_TIME_IS_VALID (max) ? max + own : max);
+}
+
+void
+post_write_error (
+    GstElement *sink, std::string &problem, const std::string &why)
+{
+  {
+    const ObjectLock lock (sink);
+    problem = why;
+  }
+  if (why.find (g_strerror (ENOSPC)) != std::string::npos)
+    POST_ERROR (sink, RESOURCE, NO_SPACE_LEFT, why);
+  else
+    POST_ERROR (sink, RESOURCE, WRITE, why);
 }
 
 } // namespace codedexposure::gst

@@ -99,6 +99,11 @@ GstClockTime running_time (const GstSegment &segment, GstClockTime time);
  * maximum moves with the minimum, because both count from the PTS. */
 void add_latency (GstQuery *query, GstClockTime own);
 
+/** Posts why the file of @p sink could not be written, and keeps it in @p
+ * problem for a property. Takes the object lock. */
+void post_write_error (
+    GstElement *sink, std::string &problem, const std::string &why);
+
 } // namespace codedexposure::gst
 
 /** GST_ELEMENT_ERROR, _WARNING and _INFO with a std::string or a literal as

@@ -19,7 +19,6 @@
  *
  * Since: 0.1
  */
-#include <cerrno>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -172,14 +171,7 @@ fail (GstBaseSink *sink, const Error &error)
 {
   Stack &state = state_of (sink);
   state.file.reset ();
-  {
-    const ObjectLock lock (sink);
-    state.problem = error.message;
-  }
-  if (error.message.find (g_strerror (ENOSPC)) != std::string::npos)
-    POST_ERROR (sink, RESOURCE, NO_SPACE_LEFT, error.message);
-  else
-    POST_ERROR (sink, RESOURCE, WRITE, error.message);
+  post_write_error (GST_ELEMENT (sink), state.problem, error.message);
   return GST_FLOW_ERROR;
 }
 

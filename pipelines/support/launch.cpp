@@ -4,7 +4,6 @@
 #include <atomic>
 #include <chrono>
 #include <csignal>
-#include <cstdio>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -18,6 +17,7 @@
 #include "excerpt.h"
 #include "frame_counter.h"
 #include "frame_limit.h"
+#include "launch_options.h"
 #include "leaky_queue.h"
 #include "notes.h"
 #include "plain_text.h"
@@ -46,31 +46,10 @@ enum ExitCode {
   kEmpty = 7      // the excerpt has no frame
 };
 
-struct Options {
-  gchar *what = nullptr;     // prefix of every line
-  gchar *count = nullptr;    // element at whose sink pad frames are counted
-  gint64 total = 0;          // expected coded frames, 0: unknown
-  gchar *receiver = nullptr; // tcpserversink to wait for
-  gdouble retry = 0;         // time for which to try to connect, s
-  FrameCounter::Times times;
-  gchar *excerpt = nullptr; // FROM:UNTIL:BEFORE:AFTER, of Excerpt
-  gchar *ledger = nullptr;  // file for what came of each coded frame of it
-  gchar *notes = nullptr; // file for the notes of the pictures of "output-kept"
-  gchar *from_notes = nullptr; // file with those of "noted"
-  gboolean salvage = FALSE;    // go on after damage of the container
-  gchar *plain_text = nullptr; // element whose texts become plain
-  gchar *need = nullptr;       // name of an element message that must come
-  gboolean camera = FALSE;     // frames come all the time
-  gboolean live = FALSE;       // frames come in real time
-  gboolean no_result = FALSE;  // print no result
-  gboolean force = FALSE;      // replace files that exist
-  gboolean verbose = FALSE;    // also print messages and counters of elements
-};
-
 class Launch : public Player
 {
 public:
-  explicit Launch (const Options &options)
+  explicit Launch (const LaunchOptions &options)
       : Player (options.what ? options.what : "launch", options.verbose),
         options_ (options)
   {
@@ -113,7 +92,7 @@ private:
     return G_SOURCE_REMOVE;
   }
 
-  const Options &options_;
+  const LaunchOptions &options_;
   std::unique_ptr<FrameCounter> counter_;
   std::vector<std::unique_ptr<LeakyQueue>> leaky_queues_;
   std::unique_ptr<ByteWatch> byte_watch_;
@@ -640,68 +619,10 @@ Launch::print_counters ()
 int
 main (int argc, char **argv)
 {
-  Options options;
-  const GOptionEntry entries[] = {
-      {"what", 0, 0, G_OPTION_ARG_STRING, &options.what, "Prefix of every line",
-          "WORD"},
-      {"count", 0, 0, G_OPTION_ARG_STRING, &options.count,
-          "Element at whose sink pad the coded frames are counted", "NAME"},
-      {"total", 0, 0, G_OPTION_ARG_INT64, &options.total,
-          "Expected number of coded frames", "N"},
-      {"start-with-receiver", 0, 0, G_OPTION_ARG_STRING, &options.receiver,
-          "Wait until this tcpserversink has a receiver", "NAME"},
-      {"retry", 0, 0, G_OPTION_ARG_DOUBLE, &options.retry,
-          "Time for which to try to connect; status 4 if nobody listens",
-          "SECONDS"},
-      {"start", 0, 0, G_OPTION_ARG_DOUBLE, &options.times.start,
-          "Time of the stream at which to start", "SECONDS"},
-      {"duration", 0, 0, G_OPTION_ARG_DOUBLE, &options.times.duration,
-          "Duration to play", "SECONDS"},
-      {"excerpt", 0, 0, G_OPTION_ARG_STRING, &options.excerpt,
-          "Only the coded frames from FROM to UNTIL, ns, as in the whole "
-          "stream",
-          "FROM:UNTIL:BEFORE:AFTER"},
-      {"ledger", 0, 0, G_OPTION_ARG_FILENAME, &options.ledger,
-          "File for what came of each coded frame of the excerpt", "FILE"},
-      {"notes", 0, 0, G_OPTION_ARG_FILENAME, &options.notes,
-          "File for what Matroska does not hold of the pictures", "FILE"},
-      {"from-notes", 0, 0, G_OPTION_ARG_FILENAME, &options.from_notes,
-          "File with what Matroska does not hold of the pictures", "FILE"},
-      {"keep-time", 0, 0, G_OPTION_ARG_NONE, &options.times.keep_time,
-          "Times of the output are those of the recording", nullptr},
-      {"salvage", 0, 0, G_OPTION_ARG_NONE, &options.salvage,
-          "Go on with the frames that are left after damage of the container",
-          nullptr},
-      {"shift-to", 0, 0, G_OPTION_ARG_DOUBLE, &options.times.shift_to,
-          "Running time for the first counted frame", "SECONDS"},
-      {"need", 0, 0, G_OPTION_ARG_STRING, &options.need,
-          "Element message without which the run has failed", "NAME"},
-      {"camera", 0, 0, G_OPTION_ARG_NONE, &options.camera,
-          "Warn if no frame comes for 5 s", nullptr},
-      {"live", 0, 0, G_OPTION_ARG_NONE, &options.live,
-          "Warn if the queue \"buffer\" fills", nullptr},
-      {"plain-text", 0, 0, G_OPTION_ARG_STRING, &options.plain_text,
-          "Element whose texts become plain", "NAME"},
-      {"no-result", 0, 0, G_OPTION_ARG_NONE, &options.no_result,
-          "Do not print the result", nullptr},
-      {"force", 0, 0, G_OPTION_ARG_NONE, &options.force,
-          "Replace files that exist", nullptr},
-      {"verbose", 0, 0, G_OPTION_ARG_NONE, &options.verbose,
-          "Print messages and counters of the elements", nullptr},
-      {},
-  };
-  const char *pipeline =
-      pipeline_argument ("codedexposure-launch", entries, argc, argv);
+  LaunchOptions options;
+  const char *pipeline = options.parse (argc, argv);
   if (!pipeline)
     return kUsage;
-  if (options.excerpt &&
-      !(options.times.excerpt = Excerpt::parse (options.excerpt))) {
-    std::fprintf (stderr,
-        "codedexposure-launch: --excerpt %s is not "
-        "FROM:UNTIL:BEFORE:AFTER\n",
-        options.excerpt);
-    return kUsage;
-  }
   /* A script that is killed cannot pass that on. */
   prctl (PR_SET_PDEATHSIG, SIGTERM);
 
@@ -711,15 +632,6 @@ main (int argc, char **argv)
     if (launch.parse (pipeline))
       code = launch.run ();
   }
-  g_free (options.what);
-  g_free (options.count);
-  g_free (options.receiver);
-  g_free (options.need);
-  g_free (options.plain_text);
-  g_free (options.excerpt);
-  g_free (options.ledger);
-  g_free (options.notes);
-  g_free (options.from_notes);
   gst_deinit ();
   return code;
 }

@@ -447,7 +447,7 @@ complete (Arguments &arguments)
 int
 main (int argc, char **argv)
 {
-  const Signals signals;
+  Signals signals;
   gst_init (&argc, &argv);
   Arguments arguments;
   CLI::App app{"Examines a bench. Run it by pipelines/doctor."};

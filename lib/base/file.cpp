@@ -61,4 +61,17 @@ write_file (const std::string &path, const std::string &content)
   return {};
 }
 
+Result<void>
+finish_output ()
+{
+  errno = 0;
+  if (std::fflush (stdout) == 0 && std::ferror (stdout) == 0)
+    return {};
+  const std::string why =
+      errno == 0 ? "" : ": " + std::generic_category ().message (errno);
+  return Error{"the output cannot be written" + why +
+                   "; what was printed is not complete",
+      ErrorCode::io};
+}
+
 } // namespace codedexposure

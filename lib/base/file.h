@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Reads and writes whole files. */
+/* Reads and writes whole files, and ends what was printed. */
 #pragma once
 
 #include <cstddef>
@@ -19,5 +19,9 @@ Result<std::string> read_file (const std::string &path, std::size_t limit);
  * complete. The error, "cannot be written to 'PATH': why", is to follow the
  * name of what is written. */
 Result<void> write_file (const std::string &path, const std::string &content);
+
+/** Writes what was printed to stdout and is still held. Error, also if an
+ * earlier part of it was lost: it cannot be written. */
+Result<void> finish_output ();
 
 } // namespace codedexposure

@@ -9,6 +9,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "base/file.h"
 #include "base/text.h"
 #include "bench/simulated_dmd.h"
 #include "tools/tool.h"
@@ -262,5 +263,11 @@ run (int argc, char **argv)
 int
 main (int argc, char **argv)
 {
-  return codedexposure::tool::run (argc, argv);
+  int code = codedexposure::tool::run (argc, argv);
+  if (const auto written = codedexposure::finish_output (); !written) {
+    std::fprintf (
+        stderr, "codedexposure: %s\n", written.error ().message.c_str ());
+    code = int (codedexposure::tool::Exit::failed);
+  }
+  return code;
 }

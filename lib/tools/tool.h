@@ -22,7 +22,7 @@ using Json = nlohmann::ordered_json;
 /** Exit status; the man page lists them. */
 enum class Exit {
   done = 0,
-  failed = 1,        ///< the device failed
+  failed = 1,        ///< the device failed, or output was lost
   usage = 2,         ///< the command line or a schedule is wrong
   no_device = 3,     ///< there is no such device, or it cannot be opened
   does_not_fit = 4,  ///< the schedule does not fit the device or the rate

@@ -476,6 +476,11 @@ main (int argc, char **argv)
         good.error ().message.c_str ());
   else
     code = Doctor (arguments, signals.token ()).run ();
+  if (const auto written = finish_output (); !written) {
+    std::fprintf (stderr, "%s: %s\n", arguments.what.c_str (),
+        written.error ().message.c_str ());
+    code = kBad;
+  }
   gst_deinit ();
   return code;
 }

@@ -5,9 +5,9 @@ namespace codedexposure::gst
 {
 
 GstPad *
-RequestPad::add (GstPad *floating)
+RequestPad::add (GstPad *made)
 {
-  const ObjectPtr<GstPad> pad (GST_PAD (gst_object_ref_sink (floating)));
+  const ObjectPtr<GstPad> pad (GST_PAD (gst_object_ref_sink (made)));
   {
     const ObjectLock lock (element_);
     if (pad_)

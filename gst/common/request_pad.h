@@ -15,8 +15,8 @@ class RequestPad
 public:
   explicit RequestPad (GstElement *element) : element_ (element) {}
 
-  /** Adds @p pad, which is floating, to the element. Null if there is one
-   * already. */
+  /** Adds @p pad to the element, which takes a floating reference. Null if
+   * there is one already. */
   GstPad *add (GstPad *pad);
   /** For the release_pad () of the element. */
   void release (GstPad *pad);

@@ -16,9 +16,9 @@ namespace codedexposure::gst::fuse
 GstPad *
 Fuse::request_pad ()
 {
-  GstPad *pad = uncertainty_.add (GST_PAD (
-      new_source_pad ("uncertainty", "uncertainty", PadKind::uncertainty)
-          .release ()));
+  const auto made =
+      new_source_pad ("uncertainty", "uncertainty", PadKind::uncertainty);
+  GstPad *pad = uncertainty_.add (GST_PAD (made.get ()));
   if (!pad)
     GST_WARNING_OBJECT (element (),
         "pad uncertainty exists; put a tee after it to use it twice");

@@ -131,4 +131,22 @@ TEST_F (Fuse, UncertaintyDoesNotRestrictTheCodedFrames)
         << format;
 }
 
+TEST_F (Fuse, ThePadOfTheUncertaintyGoesWithItsElement)
+{
+  fuse = std::make_unique<ElementHarness> (
+      "codedexposure-fuse schedule=sequential:lattice:4/2");
+  fuse->request ("uncertainty");
+  GstPad *pad = nullptr;
+  {
+    const ObjectPtr<GstPad> found (
+        gst_element_get_static_pad (fuse->element (), "uncertainty"));
+    ASSERT_TRUE (found);
+    pad = found.get ();
+    g_object_add_weak_pointer (
+        G_OBJECT (pad), reinterpret_cast<gpointer *> (&pad));
+  }
+  fuse.reset ();
+  EXPECT_EQ (pad, nullptr);
+}
+
 } // namespace

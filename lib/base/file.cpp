@@ -69,8 +69,9 @@ finish_output ()
     return {};
   const std::string why =
       errno == 0 ? "" : ": " + std::generic_category ().message (errno);
-  return Error{"the output cannot be written" + why +
-                   "; what was printed is not complete",
+  return Error{
+      "the output cannot be written" + why +
+          "; it is not complete: make room, or send it to another file",
       ErrorCode::io};
 }
 

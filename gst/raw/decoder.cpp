@@ -5,8 +5,8 @@
  * @short_description: Raw frames of 9 to 16 bits from Matroska
  *
  * Gives the raw frames with 16-bit pixels that #codedexposure-matroskamux wrote
- * their caps again; before GStreamer 1.26, `matroskademux` does not know their
- * format, and later the frames only get their alignment here. The size and
+ * their caps again, which `matroskademux` does not know before GStreamer 1.26;
+ * frames that have them pass and are only aligned. For the others, the size and
  * the rate are those in the tag with the schedule or, if that is missing
  * because the file was cut off, those in the head of the file. `decodebin`
  * finds this element.

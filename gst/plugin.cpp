@@ -22,10 +22,8 @@ plugin_init (GstPlugin *plugin)
          GST_ELEMENT_REGISTER (codedexposure_demux, plugin) &&
          GST_ELEMENT_REGISTER (codedexposure_filesink, plugin) &&
          GST_ELEMENT_REGISTER (codedexposure_fuse, plugin) &&
-         GST_ELEMENT_REGISTER (codedexposure_log, plugin) &&
-         GST_ELEMENT_REGISTER (codedexposure_matroskamux, plugin) &&
-         GST_ELEMENT_REGISTER (codedexposure_rawdec, plugin) &&
-         GST_ELEMENT_REGISTER (codedexposure_restore, plugin) &&
+         GST_ELEMENT_REGISTER (codedexposure_recorddemux, plugin) &&
+         GST_ELEMENT_REGISTER (codedexposure_recordmux, plugin) &&
          GST_ELEMENT_REGISTER (codedexposure_scene, plugin) &&
          GST_ELEMENT_REGISTER (codedexposure_sim, plugin) &&
          GST_ELEMENT_REGISTER (codedexposure_view, plugin) &&

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* GstCodedFilter: type, properties and state changes.
  *
- * coded_filter_events.cpp handles events and queries, coded_filter_format.cpp
- * finds schedule and mapping, coded_filter_frames.cpp counts and reports
- * frames. */
+ * coded_filter_pads.cpp has the source pads, coded_filter_events.cpp handles
+ * events and queries, coded_filter_format.cpp finds schedule and mapping,
+ * coded_filter_frames.cpp counts and reports frames. */
 #include "coded_filter.h"
 
 #include <utility>
@@ -92,7 +92,8 @@ CodedFilter::properties ()
       {"bits", "Bits",
           "Significant bits of a pixel, counted from the lowest, for example "
           "12 for a 12-bit camera in GRAY16_LE; pixels at the largest value "
-          "are saturated; 0: as the frames or the bench profile say, or all "
+          "are saturated; 0: as the frames, their tag or the bench profile "
+          "say, or all "
           "bits of the format",
           kReadWrite, set (&CodedSettings::bits), 0, 16},
       {"frame-rate", "Frame rate",
@@ -173,8 +174,19 @@ CodedFilter::set_up_class (gpointer klass)
         filter.after_state_change (transition);
         return changed;
       };
+  auto *element_class = GST_ELEMENT_CLASS (klass);
+  element_class->request_new_pad = [] (GstElement *self, GstPadTemplate *templ,
+                                       const gchar *name,
+                                       const GstCaps *) noexcept {
+    return filter_of (self).request_pad (templ, name);
+  };
+  element_class->release_pad = [] (GstElement *self, GstPad *pad) noexcept {
+    filter_of (self).release_pad (pad);
+  };
   add_pad_template (klass, "sink");
   add_pad_template (klass, "src", {.type = GST_TYPE_CODED_PAD});
+  add_pad_template (klass, "coded",
+      {.presence = GST_PAD_REQUEST, .type = GST_TYPE_CODED_PAD});
   for (const GType type : {GST_TYPE_CODED_FILTER, GST_TYPE_CODED_PAD})
     gst_type_mark_as_plugin_api (type, GstPluginAPIFlags (0));
 }
@@ -202,27 +214,7 @@ CodedFilter::CodedFilter (GstCodedFilter *element, const StatsNames &names)
   GST_PAD_SET_ACCEPT_INTERSECT (sinkpad_);
   GST_PAD_SET_ACCEPT_TEMPLATE (sinkpad_);
   gst_element_add_pad (element_, sinkpad_);
-}
-
-ObjectPtr<GstCodedPad>
-CodedFilter::new_source_pad (
-    const char *templ, const std::string &name, PadKind kind, int index) const
-{
-  GstPad *pad = gst_pad_new_from_template (
-      gst_element_get_pad_template (element_, templ), name.c_str ());
-  gst_pad_set_event_function (
-      pad, [] (GstPad *self, GstObject *parent, GstEvent *event) noexcept {
-        return filter_of (parent).src_event (GST_CODED_PAD (self), event);
-      });
-  gst_pad_set_query_function (
-      pad, [] (GstPad *self, GstObject *parent, GstQuery *query) noexcept {
-        return filter_of (parent).src_query (GST_CODED_PAD (self), query);
-      });
-  GST_PAD_SET_ACCEPT_TEMPLATE (pad);
-  CodedPad &coded = GST_CODED_PAD (pad)->coded;
-  coded.kind = kind;
-  coded.index = index;
-  return ObjectPtr<GstCodedPad> (GST_CODED_PAD (gst_object_ref_sink (pad)));
+  add_pad ("src", PadKind::all, "src", -1);
 }
 
 /* ---------------------------------------------------------------- states -- */
@@ -271,6 +263,7 @@ CodedFilter::after_state_change (GstStateChange transition)
 {
   if (transition != GST_STATE_CHANGE_PAUSED_TO_READY)
     return;
+  SeekBook::forget (this);
   stream_ = Stream ();
   each_pad ([this] (GstCodedPad *pad) {
     pad->coded.discont = true;
@@ -282,12 +275,17 @@ CodedFilter::after_state_change (GstStateChange transition)
   forget ();
   const ObjectLock lock (element_);
   gst_flow_combiner_reset (combiner_.get ());
+  caps_ = PadCaps ();
+  ended_ = false;
   shared_.settings_changed = true;
   shared_.schedule.reset ();
   shared_.provenance.reset ();
   shared_.assumed = false;
   shared_.rectifies = false;
   shared_.latency = 0;
+  shared_.period = 0;
+  shared_.last_seek = GST_SEQNUM_INVALID;
+  shared_.stop_asked = GST_CLOCK_TIME_NONE;
 }
 
 void

@@ -15,6 +15,7 @@
 #include "base/result.h"
 #include "caps.h"
 #include "coded_pad.h"
+#include "excerpt.h"
 #include "messages.h"
 #include "meta.h"
 #include "named.h"
@@ -98,6 +99,8 @@ struct CodedFrame {
   FrameMeta meta;
   /** It directly follows the frame before, by its time and flags. */
   bool follows;
+  /** In the part that a seek asked for. */
+  Place place = Place::inside;
 
   GstClockTime pts () const { return GST_BUFFER_PTS (buffer.get ()); }
   bool has_flags (guint flags) const
@@ -155,13 +158,14 @@ protected:
 
   /** Handles a frame, which has format (). */
   virtual GstFlowReturn process (CodedFrame frame) = 0;
-  /** Pushes @p frame, which is not decoded, on the pad for coded frames. */
-  virtual GstFlowReturn forward_coded (const CodedFrame & /* frame */)
-  {
-    return GST_FLOW_OK;
-  }
-  /** Prepares for frames of @p format. On failure posts an error, keeps the
-   * plan in force and returns false. */
+  /** The frames on which the pictures of another depend. Streaming thread, also
+   * before there is a plan. */
+  virtual Reach reach () const { return {}; }
+  /** Learns from a frame outside of the part that a seek asked for: it has no
+   * pictures. */
+  virtual GstFlowReturn learn (CodedFrame) { return GST_FLOW_OK; }
+  /** Prepares for frames of @p format: take_caps (). On failure posts an error,
+   * keeps the plan in force and returns false. */
   virtual bool plan (const CodedFormat &format) = 0;
   /** Called after the source pads got the caps of the plan. */
   virtual void planned (bool /* schedule_changed */) {}
@@ -169,8 +173,13 @@ protected:
   virtual GstFlowReturn drain () { return GST_FLOW_OK; }
   /** Forgets past frames: the next one does not follow them. */
   virtual void break_history () {}
-  /** Pushes @p event on the source pads. */
-  virtual gboolean forward (EventPtr event) = 0;
+  /** Whether there may be a numbered pad; if not, it says so. Any thread. */
+  virtual bool allows_pad (PadKind, int /* index */) const { return true; }
+  /** What @p gap, in place of a coded frame, is on @p pad. */
+  virtual EventPtr gap_for (const GstCodedPad *, GstEvent *gap) const
+  {
+    return EventPtr (gst_event_ref (gap));
+  }
   /** After FLUSH_STOP went downstream. */
   virtual void flushed () {}
   /** Puts the subclass's settings into force. Object lock. */
@@ -183,18 +192,12 @@ protected:
   virtual void cancel () {}
   /** Allows computations again. Any thread. */
   virtual void resume () {}
-  /** Calls @p visit for each source pad. Any thread. */
-  using PadVisitor = std::function<void (GstCodedPad *)>;
-  virtual void each_pad (const PadVisitor &visit) const = 0;
-  /** The caps in force of @p pad; null: none yet. Any thread. */
-  virtual CapsPtr caps_for (const GstCodedPad *pad) const = 0;
   /** How the caps of @p pad follow from those of coded frames. */
   virtual CapsScale scale_for (
       const Schedule &schedule, const GstCodedPad *pad) const = 0;
-  /** Pictures of @p pad for each coded frame. Object lock. */
+  /** Pictures of @p pad, which has pictures, for each coded frame. Object lock.
+   */
   virtual int pictures_a_frame (const GstCodedPad *pad) const = 0;
-  /** The pad that forwards coded frames without a copy; null: none. */
-  virtual ObjectPtr<GstPad> coded_pad () const { return nullptr; }
   virtual RectifyOptions rectify_options (const Schedule &) const { return {}; }
   /** How pictures are made, for their provenance: "select". */
   virtual std::string method_name () const = 0;
@@ -205,35 +208,36 @@ protected:
     FrameRate rate;
     bool mapped; ///< frames and pictures can be of any size
   };
-  /** Converts @p caps of @p pad to those of coded frames, or back. Any thread.
-   */
+  /** Converts @p caps of @p pad, which has pictures, to those of coded frames,
+   * or back. Any thread. */
   virtual CapsPtr convert_caps (const CapsContext &context,
       const GstCodedPad *pad, GstCaps *caps, bool to_coded) const;
 
   /* For subclasses to use. */
 
-  /** A new source pad that handles events and queries. */
-  ObjectPtr<GstCodedPad> new_source_pad (const char *templ,
-      const std::string &name, PadKind kind, int index = -1) const;
+  /** The source pads. Replaced, never changed: the streaming thread uses a map
+   * while the application requests and releases pads. Any thread. */
+  std::shared_ptr<const PadMap> pads () const;
+  using PadVisitor = std::function<void (GstCodedPad *)>;
+  void each_pad (const PadVisitor &visit) const;
+  /** The caps in force of @p pad; null: none yet. Any thread. */
+  CapsPtr caps_for (const GstCodedPad *pad) const;
+  /** Puts them into force with the plan. */
+  void take_caps (PadCaps caps);
   GstElement *element () const { return element_; }
   GstPad *sinkpad () const { return sinkpad_; }
   bool has_format () const { return stream_.format.has_value (); }
   const CodedFormat &format () const { return *stream_.format; }
+  /** That downstream has. */
   const GstSegment &segment () const { return stream_.segment; }
-  /** @p event as @p pad is to have it: pictures say how they were made, where
-   * coded frames have their setup. Transfer: full, of both. */
-  static GstEvent *event_for (
-      const GstCodedPad *pad, GstEvent *event, const Provenance *provenance);
-  /** @p made for the pictures of @p pad. */
-  static Provenance provenance_for (const GstCodedPad *pad, Provenance made);
   bool backwards () const { return stream_.segment.rate < 0; }
   /** Of the bench; null: not known. */
   const BenchProfile *bench () const
   {
     return stream_.bench ? &*stream_.bench : nullptr;
   }
-  /** From the property, else from the frames, else from the bench profile; 0:
-   * all bits of the format. */
+  /** From the property, else from the frames, else from their tag, else from
+   * the bench profile; 0: all bits of the format. */
   int significant_bits () const;
   void post_error (const std::string &why) const;
   /** Posts that a frame could not be decoded. Returns GST_FLOW_ERROR. */
@@ -257,6 +261,11 @@ protected:
   /** Combines @p flow of @p pad with the flows of the others; NOT_LINKED: for a
    * pad on which nothing is pushed. OK if the pad was released. */
   GstFlowReturn combine_flow (GstCodedPad *pad, GstFlowReturn flow);
+  /** The others go on when one pad is NOT_LINKED or EOS. */
+  static bool is_fatal (GstFlowReturn flow)
+  {
+    return flow == GST_FLOW_FLUSHING || flow <= GST_FLOW_NOT_NEGOTIATED;
+  }
   /** Gives @p outbuf flags, metas and time of a picture made from @p coded. */
   void describe (GstBuffer *outbuf, GstBuffer *coded, FrameMeta meta,
       const Picture &picture) const;
@@ -276,19 +285,15 @@ protected:
     bool assumed = false; ///< the schedule is the default
     /** Of the pictures; null before the first frame. */
     std::shared_ptr<const Provenance> provenance;
-    bool rectifies = false;   ///< a mapping is in force
+    bool rectifies = false;  ///< a mapping is in force
+    GstClockTime period = 0; ///< of the coded frames; 0: not known yet
+    guint32 last_seek = GST_SEQNUM_INVALID; ///< that went upstream
+    GstClockTime stop_asked = GST_CLOCK_TIME_NONE;
     GstClockTime latency = 0; ///< added by frames that are held
 
     StructurePtr stats () const;
   };
   Shared shared_; ///< object lock
-  /** Of the source pads that count; a subclass adds and removes them. Object
-   * lock. */
-  std::unique_ptr<GstFlowCombiner, FreeWith<gst_flow_combiner_free>> combiner_{
-      gst_flow_combiner_new ()};
-
-  /** A flush comes from another thread than frames, and is forwarded, too. */
-  std::shared_ptr<const Provenance> provenance () const;
 
 private:
   /** A sequence of saturated frames. */
@@ -315,18 +320,29 @@ private:
   };
   /** Reset from PAUSED to READY. */
   struct Stream {
-    Stream () { gst_segment_init (&segment, GST_FORMAT_UNDEFINED); }
+    Stream () { end_segment (); }
+
+    void end_segment ()
+    {
+      excerpt.reset ();
+      gst_segment_init (&segment, GST_FORMAT_UNDEFINED);
+      upstream = segment;
+    }
 
     std::string id;
     CapsPtr caps;
     guint32 caps_seqnum = 0;
     GstSegment segment;
+    GstSegment upstream; ///< its segment
+    guint32 segment_seqnum = GST_SEQNUM_INVALID;
+    std::optional<Excerpt> excerpt; ///< that a seek asked for
     /** From the tags; an error if they cannot be read. */
     std::optional<Result<StreamSetup>> tagged;
     /** Why the frames are refused, if they were decoded before. */
     std::optional<std::string> not_coded;
-    int bits = 0;      ///< significant bits by the metas; 0: unknown
-    bool stale = true; ///< the plan must be made again
+    int bits = 0;        ///< significant bits by the metas; 0: unknown
+    int tagged_bits = 0; ///< by the tags
+    bool stale = true;   ///< the plan must be made again
     bool provenance_due = false;
     CodedSettings settings;
     std::optional<CodedFormat> format; ///< in force
@@ -336,7 +352,9 @@ private:
     std::optional<FrameSequence> sequence;
     GstClockTime last_pts = GST_CLOCK_TIME_NONE;
     bool was_late = false; ///< the last frame was
-    std::string pattern;   ///< that was said of frames that are not decoded
+    /** Until when upstream has said that frames are missing. */
+    GstClockTime missing_until = 0;
+    std::string pattern; ///< that was said of frames that are not decoded
     Burst saturation;
     std::optional<Schedule> overruled; ///< tagged, and reported as overruled
     bool warned_assumed = false;
@@ -347,6 +365,28 @@ private:
     Scratch light; ///< a frame without its black level
     Scratch rectified;
   };
+
+  /* Pads. */
+  ObjectPtr<GstCodedPad> new_source_pad (const char *templ,
+      const std::string &name, PadKind kind, int index) const;
+  GstCodedPad *add_pad (
+      const char *templ, PadKind kind, const std::string &name, int index);
+  void insert_pad (PadRef pad);
+  PadRef take_pad (GstPad *pad);
+  GstPad *request_pad (GstPadTemplate *templ, const gchar *name);
+  void release_pad (GstPad *pad);
+  static gboolean replay_sticky (GstPad *, GstEvent **event, gpointer replay);
+  /** @p event as @p pad is to have it: pictures say how they were made, where
+   * coded frames have their setup. Transfer: full, of both. */
+  static GstEvent *event_for (
+      const GstCodedPad *pad, GstEvent *event, const Provenance *provenance);
+  /** @p made for the pictures of @p pad. */
+  static Provenance provenance_for (const GstCodedPad *pad, Provenance made);
+  /** Pushes @p event on the source pads. */
+  gboolean forward (EventPtr event);
+  GstFlowReturn push_coded (const CodedFrame &frame);
+  /** A flush comes from another thread than frames, and is forwarded, too. */
+  std::shared_ptr<const Provenance> provenance () const;
 
   static const PropertyTable<Shared> &properties ();
   static Shared &shared_of (GObject *object);
@@ -361,6 +401,11 @@ private:
   bool find_schedule (CodedFormat &format);
   bool find_bench (CodedFormat &format);
   Result<void> check_bench (const GstVideoInfo &info) const;
+  /** By the metas of the frames, else by their tag. */
+  int said_bits () const
+  {
+    return stream_.bits > 0 ? stream_.bits : stream_.tagged_bits;
+  }
   bool find_mapping (Extent camera, std::optional<Mapping> &mapping);
   bool find_rectifier (CodedFormat &format);
   bool check_camera (const CodedFormat &format) const;
@@ -374,8 +419,10 @@ private:
   GstFlowReturn check_time_stamp (GstBuffer *frame) const;
   BufferPtr restore_clipped_frame (BufferPtr frame);
   CodedFrame admit (BufferPtr frame);
+  void include (const CodedFrame &frame);
   GstFlowReturn break_off ();
   GstFlowReturn skip (const CodedFrame &frame);
+  void note_missing (GstEvent *gap);
   void report_loss (GstClockTime pts, guint64 lost);
   void warn_of_wrong_time (GstClockTime pts);
   void end_saturation ();
@@ -388,11 +435,22 @@ private:
   gboolean on_segment (EventPtr event);
   gboolean on_tag (EventPtr event);
   gboolean on_gap (EventPtr event);
+  gboolean on_segment_done (EventPtr event);
   gboolean on_eos (EventPtr event);
   gboolean on_flush_stop (EventPtr event);
   void break_time ();
+  void begin_excerpt (const SeekRequest &request);
+  EventPtr segment_event () const;
+  bool awaits_excerpt () const
+  {
+    return stream_.excerpt && !stream_.excerpt->begun;
+  }
+  gboolean seek (EventPtr event);
+  GstClockTime period_for_seek () const;
 
   CapsContext caps_context () const;
+  CapsPtr caps_between (const CapsContext &context, const GstCodedPad *pad,
+      GstCaps *caps, bool to_coded) const;
   CapsPtr sink_caps () const;
   CapsPtr src_caps (GstCodedPad *pad) const;
   gboolean answer_allocation (GstQuery *query) const;
@@ -401,6 +459,13 @@ private:
   GstElement *element_;
   GstPad *sinkpad_;
   Stream stream_;
+
+  /* Object lock. */
+  std::shared_ptr<const PadMap> pads_ = std::make_shared<PadMap> ();
+  PadCaps caps_;
+  bool ended_ = false; ///< EOS was forwarded
+  std::unique_ptr<GstFlowCombiner, FreeWith<gst_flow_combiner_free>> combiner_{
+      gst_flow_combiner_new ()};
 };
 
 /** Gives @p element its implementation; call once, from instance init. */

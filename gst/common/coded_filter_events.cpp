@@ -2,6 +2,7 @@
 /* GstCodedFilter: events and queries. */
 #include "coded_filter.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "element.h"
@@ -49,6 +50,8 @@ CodedFilter::sink_event (EventPtr event)
     return on_tag (std::move (event));
   case GST_EVENT_GAP:
     return on_gap (std::move (event));
+  case GST_EVENT_SEGMENT_DONE:
+    return on_segment_done (std::move (event));
   case GST_EVENT_EOS:
     return on_eos (std::move (event));
   case GST_EVENT_FLUSH_STOP:
@@ -64,7 +67,11 @@ CodedFilter::sink_event (EventPtr event)
 void
 CodedFilter::settle_events ()
 {
+  if (stream_.excerpt)
+    stream_.excerpt->begun = true;
   for (EventPtr &event : std::exchange (stream_.pending, {})) {
+    if (GST_EVENT_TYPE (event.get ()) == GST_EVENT_SEGMENT)
+      event = segment_event ();
     if (GST_EVENT_TYPE (event.get ()) == GST_EVENT_TAG &&
         takes_provenance (event.get ()))
       stream_.provenance_due = false;
@@ -82,24 +89,6 @@ CodedFilter::forward_in_turn (EventPtr event)
   return TRUE;
 }
 
-Provenance
-CodedFilter::provenance_for (const GstCodedPad *pad, Provenance made)
-{
-  if (pad->coded.kind == PadKind::uncertainty)
-    made.method += kUncertaintyMethod;
-  return made;
-}
-
-GstEvent *
-CodedFilter::event_for (
-    const GstCodedPad *pad, GstEvent *event, const Provenance *provenance)
-{
-  if (GST_EVENT_TYPE (event) != GST_EVENT_TAG ||
-      pad->coded.kind == PadKind::coded || !provenance)
-    return event;
-  return replace_by_provenance (event, provenance_for (pad, *provenance));
-}
-
 gboolean
 CodedFilter::on_stream_start (EventPtr event)
 {
@@ -113,6 +102,7 @@ CodedFilter::on_stream_start (EventPtr event)
     stream_.not_coded.reset ();
     stream_.stale = true;
   }
+  SeekBook::read (this, stream_.id, reach ());
   return forward (std::move (event));
 }
 
@@ -131,15 +121,53 @@ CodedFilter::on_caps (const EventPtr &event)
 gboolean
 CodedFilter::on_segment (EventPtr event)
 {
-  gst_event_copy_segment (event.get (), &stream_.segment);
-  if (stream_.segment.format != GST_FORMAT_TIME) {
+  gst_event_copy_segment (event.get (), &stream_.upstream);
+  if (stream_.upstream.format != GST_FORMAT_TIME) {
     post_error (
         std::string ("The segment of the coded frames has the format ") +
-        gst_format_get_name (stream_.segment.format) + "; it must be TIME.");
+        gst_format_get_name (stream_.upstream.format) + "; it must be TIME.");
+    stream_.end_segment ();
     return FALSE;
   }
   break_time ();
+  std::erase_if (stream_.pending, [] (const EventPtr &waiting) {
+    return GST_EVENT_TYPE (waiting.get ()) == GST_EVENT_SEGMENT;
+  });
+  stream_.segment_seqnum = gst_event_get_seqnum (event.get ());
+  const auto request = SeekBook::find (this, stream_.segment_seqnum);
+  if (request && request->rate == stream_.upstream.rate &&
+      stream_.upstream.applied_rate == 1.0) {
+    begin_excerpt (*request);
+    stream_.pending.push_back (std::move (event));
+    return TRUE;
+  }
+  stream_.excerpt.reset ();
+  stream_.segment = stream_.upstream;
   return forward_in_turn (std::move (event));
+}
+
+/* Downstream gets the segment that it asked for, with the first frame. Without
+ * a flush its running time goes on from the excerpt before, because upstream's
+ * contains frames that were only read. */
+void
+CodedFilter::begin_excerpt (const SeekRequest &request)
+{
+  const GstSegment before = stream_.segment;
+  const bool goes_on = stream_.excerpt && stream_.upstream.base > 0;
+  stream_.segment = stream_.upstream;
+  stream_.excerpt.emplace (request, stream_.segment);
+  if (goes_on)
+    stream_.segment.base =
+        gst_segment_to_running_time (&before, GST_FORMAT_TIME,
+            std::clamp (before.position, before.start, before.stop));
+}
+
+EventPtr
+CodedFilter::segment_event () const
+{
+  EventPtr event (gst_event_new_segment (&stream_.segment));
+  gst_event_set_seqnum (event.get (), stream_.segment_seqnum);
+  return event;
 }
 
 gboolean
@@ -165,9 +193,40 @@ gboolean
 CodedFilter::on_gap (EventPtr event)
 {
   break_history ();
+  note_missing (event.get ());
   if (!stream_.caps)
     return forward_in_turn (std::move (event));
-  return negotiate () == GST_FLOW_OK && forward (std::move (event));
+  if (negotiate () != GST_FLOW_OK)
+    return FALSE;
+  if (!stream_.excerpt)
+    return forward (std::move (event));
+  GstClockTime pts, duration;
+  gst_event_parse_gap (event.get (), &pts, &duration);
+  const GstClockTime end =
+      GST_CLOCK_TIME_IS_VALID (duration) ? pts + duration : duration;
+  guint64 from, to;
+  if (!gst_segment_clip (
+          &stream_.segment, GST_FORMAT_TIME, pts, end, &from, &to))
+    return TRUE;
+  settle_events ();
+  return forward (gap_like (
+      event.get (), from, GST_CLOCK_TIME_IS_VALID (to) ? to - from : to));
+}
+
+/* Upstream read beyond the end. */
+gboolean
+CodedFilter::on_segment_done (EventPtr event)
+{
+  settle_events ();
+  GstSegment &segment = stream_.segment;
+  const GstClockTime end = segment.rate > 0 ? segment.stop : segment.start;
+  if (stream_.excerpt && GST_CLOCK_TIME_IS_VALID (end)) {
+    segment.position = end;
+    EventPtr own (gst_event_new_segment_done (GST_FORMAT_TIME, gint64 (end)));
+    gst_event_set_seqnum (own.get (), gst_event_get_seqnum (event.get ()));
+    event = std::move (own);
+  }
+  return forward (std::move (event));
 }
 
 /* Muxers need caps even if no frame came. */
@@ -190,7 +249,7 @@ CodedFilter::on_flush_stop (EventPtr event)
     return !has_flag (waiting, GST_EVENT_TYPE_STICKY) ||
            GST_EVENT_TYPE (waiting.get ()) == GST_EVENT_SEGMENT;
   });
-  gst_segment_init (&stream_.segment, GST_FORMAT_UNDEFINED);
+  stream_.end_segment ();
   end_saturation ();
   break_time ();
   const gboolean done = forward (std::move (event));
@@ -205,6 +264,7 @@ CodedFilter::break_time ()
 {
   if (stream_.sequence)
     stream_.sequence->resync ();
+  stream_.missing_until = 0;
   break_history ();
   each_pad ([this] (GstCodedPad *pad) {
     pad->coded.discont = true;
@@ -218,12 +278,64 @@ CodedFilter::break_time ()
 gboolean
 CodedFilter::src_event (GstCodedPad *pad, GstEvent *event)
 {
+  EventPtr owned (event);
+  if (GST_EVENT_TYPE (event) == GST_EVENT_SEEK)
+    return seek (std::move (owned));
   if (GST_EVENT_TYPE (event) != GST_EVENT_QOS)
-    return gst_pad_event_default (GST_PAD (pad), GST_OBJECT (element_), event);
-  const EventPtr owned (event);
+    return gst_pad_event_default (
+        GST_PAD (pad), GST_OBJECT (element_), owned.release ());
   const ObjectLock lock (element_);
   note_lateness (pad, event);
   return TRUE;
+}
+
+/* Upstream reads the frames around those that are asked for, too. Each of
+ * several pads gets the same seek. */
+gboolean
+CodedFilter::seek (EventPtr event)
+{
+  const guint32 seqnum = gst_event_get_seqnum (event.get ());
+  GstClockTime stop;
+  {
+    const ObjectLock lock (element_);
+    if (std::exchange (shared_.last_seek, seqnum) == seqnum)
+      return TRUE;
+    stop = shared_.stop_asked;
+  }
+  const auto request = SeekRequest::parse (event.get (), sinkpad_, stop);
+  if (request) {
+    SeekBook::note (this, seqnum, *request);
+    event = request->widen (
+        event.get (), SeekBook::reach (this), period_for_seek ());
+  }
+  GST_DEBUG_OBJECT (element_, "%" GST_PTR_FORMAT, event.get ());
+  const gboolean done = gst_pad_push_event (sinkpad_, event.release ());
+  const ObjectLock lock (element_);
+  if (!done)
+    shared_.last_seek = GST_SEQNUM_INVALID;
+  else if (request)
+    shared_.stop_asked = request->stop;
+  return done;
+}
+
+/* By the caps, if there was no frame yet; a long one, if they have no rate. */
+GstClockTime
+CodedFilter::period_for_seek () const
+{
+  FrameRate rate;
+  {
+    const ObjectLock lock (element_);
+    if (shared_.period > 0)
+      return shared_.period;
+    rate = shared_.settings.rate;
+  }
+  const CapsPtr caps (gst_pad_get_current_caps (sinkpad_));
+  const CapsPtr filled = caps ? fill_in_rate (rate, caps.get ()) : nullptr;
+  GstVideoInfo info;
+  if (!filled || !gst_video_info_from_caps (&info, filled.get ()) ||
+      info.fps_n == 0)
+    return GST_SECOND;
+  return GstClockTime (FrameRate{info.fps_n, info.fps_d}.period ());
 }
 
 /* --------------------------------------------------------------- queries -- */
@@ -292,6 +404,15 @@ CodedFilter::caps_context () const
 }
 
 CapsPtr
+CodedFilter::caps_between (const CapsContext &context, const GstCodedPad *pad,
+    GstCaps *caps, bool to_coded) const
+{
+  return pad->coded.kind == PadKind::coded
+             ? CapsPtr (gst_caps_ref (caps))
+             : convert_caps (context, pad, caps, to_coded);
+}
+
+CapsPtr
 CodedFilter::convert_caps (const CapsContext &context, const GstCodedPad *pad,
     GstCaps *caps, bool to_coded) const
 {
@@ -311,7 +432,7 @@ CodedFilter::sink_caps () const
   CapsPtr caps (gst_pad_get_pad_template_caps (sinkpad_));
   each_pad ([&] (GstCodedPad *pad) {
     const CapsPtr peer (gst_pad_peer_query_caps (GST_PAD (pad), nullptr));
-    const CapsPtr coded = convert_caps (context, pad, peer.get (), true);
+    const CapsPtr coded = caps_between (context, pad, peer.get (), true);
     caps = intersect_caps (coded.get (), caps.get ());
   });
   return admit_unknown_rate (context.rate, std::move (caps));
@@ -326,7 +447,7 @@ CodedFilter::src_caps (GstCodedPad *pad) const
   const CapsPtr taken (gst_pad_get_pad_template_caps (sinkpad_));
   const CapsPtr coded = intersect_caps (peer.get (), taken.get ());
   const CapsPtr filled = fill_in_rate (context.rate, coded.get ());
-  const CapsPtr own = convert_caps (context, pad, filled.get (), false);
+  const CapsPtr own = caps_between (context, pad, filled.get (), false);
   return intersect_caps (own.get (), templ.get ());
 }
 
@@ -341,9 +462,9 @@ CodedFilter::answer_allocation (GstQuery *query) const
   if (!caps || !gst_video_info_from_caps (&info, caps))
     return FALSE;
 
-  const auto coded = coded_pad ();
-  if (!coded || !is_wanted (coded.get ()) ||
-      peer_reads_video_meta (coded.get (), caps))
+  const auto served = pads ();
+  auto *coded = GST_PAD_CAST (find_pad (*served, PadKind::coded));
+  if (!coded || !is_wanted (coded) || peer_reads_video_meta (coded, caps))
     gst_query_add_allocation_meta (query, GST_VIDEO_META_API_TYPE, nullptr);
 
   const ObjectPtr<GstBufferPool> pool (gst_video_buffer_pool_new ());
@@ -372,7 +493,8 @@ CodedFilter::scale_frames (GstCodedPad *pad, GstQuery *query) const
     return;
   {
     const ObjectLock lock (element_);
-    frames *= shared_.schedule ? pictures_a_frame (pad) : 1;
+    if (shared_.schedule && pad->coded.kind != PadKind::coded)
+      frames *= pictures_a_frame (pad);
   }
   if (duration)
     gst_query_set_duration (query, format, frames);

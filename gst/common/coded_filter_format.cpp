@@ -66,6 +66,8 @@ CodedFilter::negotiate (GstBuffer *next)
       return GST_FLOW_NOT_NEGOTIATED;
     adopt (std::move (*format), next);
   }
+  if (awaits_excerpt ())
+    return GST_FLOW_OK;
   settle_events ();
   push_provenance ();
   return GST_FLOW_OK;
@@ -97,6 +99,10 @@ CodedFilter::find_format ()
     return std::nullopt;
   }
   format.rate = {info.fps_n, info.fps_d};
+  stream_.tagged_bits =
+      stream_.tagged && *stream_.tagged
+          ? significant_bits_of (stream_.tagged->value ().bits, info)
+          : 0;
   format.size = {info.width, info.height};
   if (stream_.not_coded) {
     post_error (*stream_.not_coded);
@@ -200,7 +206,7 @@ CodedFilter::report_overruled (const Schedule &asked)
 Result<void>
 CodedFilter::check_bench (const GstVideoInfo &info) const
 {
-  int bits = stream_.settings.bits > 0 ? stream_.settings.bits : stream_.bits;
+  int bits = stream_.settings.bits > 0 ? stream_.settings.bits : said_bits ();
   if (const int all = GST_VIDEO_FORMAT_INFO_BITS (info.finfo);
       bits == 0 && stream_.bench->bits > all)
     bits = all;
@@ -344,6 +350,7 @@ CodedFilter::set_provenance (GstBuffer *next)
   const GstVideoInfo &info = format ().info;
   made.setup.size = Extent{info.width, info.height};
   made.setup.rate = format ().rate;
+  made.setup.bits = significant_bits_of (significant_bits (), info);
   if (stream_.tagged && *stream_.tagged)
     made.setup.simulated = stream_.tagged->value ().simulated;
   if ((made.setup.bench = stream_.bench))
@@ -399,7 +406,9 @@ CodedFilter::adopt (CodedFormat format, GstBuffer *next)
     shared_.schedule = std::make_shared<const Schedule> (adopted.schedule);
     shared_.assumed = adopted.assumed;
     shared_.rectifies = adopted.rectifier != nullptr;
+    shared_.period = adopted.period ();
   }
+  SeekBook::read (this, stream_.id, reach ());
   each_pad ([this] (GstCodedPad *pad) {
     pad->coded.allocation.reset ();
     push_caps (pad);
@@ -446,7 +455,9 @@ CodedFilter::significant_bits () const
 {
   if (stream_.settings.bits > 0)
     return stream_.settings.bits;
-  return stream_.bits > 0 || !bench () ? stream_.bits : bench ()->bits;
+  if (const int said = said_bits (); said > 0 || !bench ())
+    return said;
+  return bench ()->bits;
 }
 
 } // namespace codedexposure::gst

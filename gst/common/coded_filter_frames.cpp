@@ -17,9 +17,6 @@ namespace codedexposure::gst
 namespace
 {
 
-/* Recordings round times to a microsecond; shorter times are ignored. */
-constexpr GstClockTime kRounding = 10 * GST_USECOND;
-
 bool
 ends_with_stream (GstPad *sinkpad, GstClockTime stop)
 {
@@ -46,10 +43,61 @@ CodedFilter::chain (BufferPtr frame)
     flow = break_off ();
   if (flow != GST_FLOW_OK)
     return flow;
+  if (coded.place == Place::inside)
+    include (coded);
+  if (coded.place == Place::inside && coded.meta.pattern.empty ())
+    flow = push_coded (coded);
+  if (is_fatal (flow))
+    return flow;
   if (!coded.meta.pattern.empty ())
     return skip (coded);
   stream_.pattern.clear ();
-  return process (std::move (coded));
+  return coded.place == Place::inside ? process (std::move (coded))
+                                      : learn (std::move (coded));
+}
+
+/* This pad comes first, because the recorder of coded frames must not wait for
+ * a display of pictures. */
+GstFlowReturn
+CodedFilter::push_coded (const CodedFrame &frame)
+{
+  const auto served = pads ();
+  GstCodedPad *pad = find_pad (*served, PadKind::coded);
+  if (!pad)
+    return GST_FLOW_OK;
+  BufferPtr outbuf (gst_buffer_ref (frame.buffer.get ()));
+  if (std::exchange (pad->coded.discont, false) &&
+      !GST_BUFFER_IS_DISCONT (outbuf.get ())) {
+    outbuf.reset (gst_buffer_make_writable (outbuf.release ()));
+    GST_BUFFER_FLAG_SET (outbuf.get (), GST_BUFFER_FLAG_DISCONT);
+  }
+  GST_LOG_OBJECT (pad, "[OUT] %" GST_PTR_FORMAT, outbuf.get ());
+  return combine_flow (pad, gst_pad_push (GST_PAD (pad), outbuf.release ()));
+}
+
+/* The segment of an excerpt goes downstream with its first frame, and changes
+ * if a frame does not end within it. */
+void
+CodedFilter::include (const CodedFrame &frame)
+{
+  if (!stream_.excerpt)
+    return;
+  const bool changed = stream_.excerpt->include (
+      stream_.segment, frame.pts (), format ().period ());
+  if (!awaits_excerpt ()) {
+    if (changed)
+      forward (segment_event ());
+    return;
+  }
+  if (const auto made = provenance (); made->first_frame != frame.meta.frame) {
+    Provenance own = *made;
+    own.first_frame = frame.meta.frame;
+    stream_.provenance_due = true;
+    const ObjectLock lock (element_);
+    shared_.provenance = std::make_shared<const Provenance> (std::move (own));
+  }
+  settle_events ();
+  push_provenance ();
 }
 
 /* A frame that does not show the schedule: a GAP takes the place of its
@@ -58,6 +106,11 @@ GstFlowReturn
 CodedFilter::skip (const CodedFrame &frame)
 {
   const std::string &pattern = frame.meta.pattern;
+  if (frame.place != Place::inside) {
+    const GstFlowReturn flow = drain ();
+    break_history ();
+    return flow;
+  }
   count (&CodedCounters::frames_not_coded);
   notify ("stats");
   if (pattern != stream_.pattern &&
@@ -69,14 +122,14 @@ CodedFilter::skip (const CodedFrame &frame)
   break_history ();
   if (flow != GST_FLOW_OK)
     return flow;
+  const EventPtr gap (gst_event_new_gap (frame.pts (), format ().period ()));
   each_pad ([&] (GstCodedPad *pad) {
     if (pad->coded.kind == PadKind::coded)
       return;
     pad->coded.discont = true;
-    gst_pad_push_event (
-        GST_PAD (pad), gst_event_new_gap (frame.pts (), format ().period ()));
+    gst_pad_push_event (GST_PAD (pad), gap_for (pad, gap.get ()).release ());
   });
-  return forward_coded (frame);
+  return push_coded (frame);
 }
 
 /* The next frame does not follow the last one. */
@@ -116,8 +169,8 @@ CodedFilter::restore_clipped_frame (BufferPtr frame)
   if (!GST_CLOCK_TIME_IS_VALID (duration) || duration == 0 ||
       duration + kRounding >= period)
     return frame;
-  const bool at_start = pts == segment ().start;
-  const bool at_stop = pts + duration == segment ().stop;
+  const bool at_start = pts == stream_.upstream.start;
+  const bool at_stop = pts + duration == stream_.upstream.stop;
   if (at_stop && !at_start && duration <= kRounding)
     return nullptr;
   if (!at_start || pts + duration < period)
@@ -128,12 +181,13 @@ CodedFilter::restore_clipped_frame (BufferPtr frame)
     stream_.sequence->take (Nanoseconds (stream_.last_pts), backwards ());
     return nullptr;
   }
-  if (at_stop && !ends_with_stream (sinkpad_, segment ().stop)) {
+  if (at_stop && !ends_with_stream (sinkpad_, stream_.upstream.stop)) {
     GST_ELEMENT_WARNING (element_, STREAM, FORMAT,
         ("From %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT
          " there is only a part of one coded frame, whose start is not known; "
          "it is dropped. Seek to a longer segment.",
-            GST_TIME_ARGS (segment ().start), GST_TIME_ARGS (segment ().stop)),
+            GST_TIME_ARGS (stream_.upstream.start),
+            GST_TIME_ARGS (stream_.upstream.stop)),
         (nullptr));
     return nullptr;
   }
@@ -156,17 +210,24 @@ CodedFrame
 CodedFilter::admit (BufferPtr frame)
 {
   const GstClockTime pts = GST_BUFFER_PTS (frame.get ());
-  count (&CodedCounters::frames_in);
-  if (GST_BUFFER_FLAG_IS_SET (frame.get (), GST_BUFFER_FLAG_CORRUPTED)) {
+  const Place place = stream_.excerpt
+                          ? stream_.excerpt->place (pts, format ().period ())
+                          : Place::inside;
+  const bool counts = place == Place::inside;
+  if (counts)
+    count (&CodedCounters::frames_in);
+  if (counts &&
+      GST_BUFFER_FLAG_IS_SET (frame.get (), GST_BUFFER_FLAG_CORRUPTED)) {
     count (&CodedCounters::frames_corrupted);
     notify ("stats");
   }
   FrameStep step = stream_.sequence->take (Nanoseconds (pts), backwards ());
   if (step.arrival == Arrival::behind)
     step = stream_.sequence->restart (Nanoseconds (pts));
-  if (step.arrival == Arrival::after_loss)
+  if (counts && step.arrival == Arrival::after_loss)
     report_loss (pts, step.lost);
-  else if (step.arrival != Arrival::next && step.arrival != Arrival::first)
+  else if (counts && step.arrival != Arrival::next &&
+           step.arrival != Arrival::first)
     warn_of_wrong_time (pts);
   stream_.last_pts = pts;
   const bool after_late =
@@ -177,9 +238,22 @@ CodedFilter::admit (BufferPtr frame)
   counted.frame = step.number;
   counted.lost_before = step.lost;
   counted = get_frame_meta (frame.get ()).value_or (counted);
-  return {std::move (frame), std::move (counted), follows};
+  return {std::move (frame), std::move (counted), follows, place};
 }
 
+void
+CodedFilter::note_missing (GstEvent *gap)
+{
+  GstClockTime pts, duration;
+  GstGapFlags flags;
+  gst_event_parse_gap (gap, &pts, &duration);
+  gst_event_parse_gap_flags (gap, &flags);
+  if (flags & GST_GAP_FLAG_MISSING_DATA && GST_CLOCK_TIME_IS_VALID (duration))
+    stream_.missing_until = pts + duration;
+}
+
+/* The element that says where frames are missing, such as dmdsync, has posted
+ * the loss. */
 void
 CodedFilter::report_loss (GstClockTime pts, guint64 lost)
 {
@@ -192,7 +266,8 @@ CodedFilter::report_loss (GstClockTime pts, guint64 lost)
       " to %" GST_TIME_FORMAT,
       lost, GST_TIME_ARGS (from), GST_TIME_ARGS (pts));
   count (&CodedCounters::frames_lost, lost);
-  post_message (element_, FramesLost{lost, from, pts});
+  if (stream_.missing_until + period / 2 < pts)
+    post_message (element_, FramesLost{lost, from, pts});
   notify ("stats");
 }
 
@@ -215,7 +290,7 @@ CodedFilter::note_saturation (const CodedFrame &frame)
 {
   /* Noise makes a bright pixel saturate in one frame and not in the next. */
   constexpr GstClockTimeDiff kCalm = GST_SECOND;
-  if (frame.has_flags (GST_BUFFER_FLAG_GAP))
+  if (frame.has_flags (GST_BUFFER_FLAG_GAP) || frame.place != Place::inside)
     return;
   const GstClockTime pts = frame.pts ();
   Burst &burst = stream_.saturation;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <new>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "pool.h"
@@ -127,6 +128,62 @@ choose_pool (
 }
 
 } // namespace
+
+namespace
+{
+
+constexpr struct {
+  PadKind kind;
+  std::string_view name; ///< of the template
+} kTemplates[] = {{PadKind::coded, "coded"}, {PadKind::all, "src"},
+    {PadKind::one, "subframe_%u"}, {PadKind::region, "region_%u"},
+    {PadKind::uncertainty, "uncertainty"}};
+
+} // namespace
+
+GstCodedPad *
+find_pad (const PadMap &pads, PadKind kind, int index)
+{
+  const auto found = pads.find ({kind, index});
+  return found == pads.end () ? nullptr : found->second.get ();
+}
+
+PadKind
+kind_of_template (const std::string &name)
+{
+  return std::ranges::find (kTemplates, name, [] (const auto &templ) {
+    return templ.name;
+  })->kind;
+}
+
+std::string
+prefix_of (PadKind kind)
+{
+  const std::string_view name =
+      std::ranges::find (kTemplates, kind, [] (const auto &templ) {
+        return templ.kind;
+      })->name;
+  return std::string (name.substr (0, name.find ('%')));
+}
+
+GstCaps *
+PadCaps::of (const CodedPad &pad) const
+{
+  switch (pad.kind) {
+  case PadKind::coded:
+    return coded.get ();
+  case PadKind::one:
+    return one.get ();
+  case PadKind::region:
+    return pad.index < int (regions.size ())
+               ? regions[std::size_t (pad.index)].get ()
+               : nullptr;
+  case PadKind::uncertainty:
+    return uncertainty.get ();
+  default:
+    return all.get ();
+  }
+}
 
 /* gst_pad_create_stream_id () needs the sink pad's sticky event, which is
  * stored only after its handler has returned. */

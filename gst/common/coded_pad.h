@@ -2,8 +2,12 @@
 /* The source pads of a GstCodedFilter. */
 #pragma once
 
+#include <map>
 #include <memory>
 #include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include <gst/gst.h>
 
@@ -48,7 +52,6 @@ struct CodedPad {
 
   /* Object lock of the element. */
   bool released = false;
-  bool served = false; ///< it has the events that came before the request
   /** Running time before which a picture would be late. */
   GstClockTime earliest = GST_CLOCK_TIME_NONE;
   gdouble proportion = 1.0;
@@ -64,6 +67,27 @@ struct _GstCodedPad {
 
 namespace codedexposure::gst
 {
+
+using PadRef = std::shared_ptr<GstCodedPad>;
+/** Source pads by kind and index, in the order in which they are served. */
+using PadMap = std::map<std::pair<PadKind, int>, PadRef>;
+/** Null if there is no such pad. */
+GstCodedPad *find_pad (const PadMap &pads, PadKind kind, int index = -1);
+
+/** The kind of the pads of a template, by its name. */
+PadKind kind_of_template (const std::string &name);
+/** Names of numbered pads begin with it: "subframe_". */
+std::string prefix_of (PadKind kind);
+
+/** Caps of each kind of pad. */
+struct PadCaps {
+  CapsPtr coded, all, one, uncertainty;
+  std::vector<CapsPtr> regions;
+
+  /** Null for a region that does not exist. */
+  GstCaps *of (const CodedPad &pad) const;
+  explicit operator bool () const { return all != nullptr; }
+};
 
 /** The STREAM_START event of @p pad, one of several, for that of upstream. */
 EventPtr stream_start_for (GstCodedPad *pad, GstEvent *upstream);

@@ -3,8 +3,6 @@
 
 #include <cerrno>
 
-#include "raii.h"
-
 namespace codedexposure::gst
 {
 
@@ -89,6 +87,17 @@ add_latency (GstQuery *query, GstClockTime own)
   gst_query_parse_latency (query, &live, &min, &max);
   gst_query_set_latency (
       query, live, min + own, GST_CLOCK_TIME_IS_VALID (max) ? max + own : max);
+}
+
+EventPtr
+gap_like (GstEvent *gap, GstClockTime pts, GstClockTime duration)
+{
+  GstGapFlags flags;
+  gst_event_parse_gap_flags (gap, &flags);
+  EventPtr own (gst_event_new_gap (pts, duration));
+  gst_event_set_gap_flags (own.get (), flags);
+  gst_event_set_seqnum (own.get (), gst_event_get_seqnum (gap));
+  return own;
 }
 
 void

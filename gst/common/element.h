@@ -10,6 +10,7 @@
 
 #include "caps.h"
 #include "properties.h"
+#include "raii.h"
 
 namespace codedexposure::gst
 {
@@ -98,6 +99,9 @@ GstClockTime running_time (const GstSegment &segment, GstClockTime time);
 /** Adds @p own to the latency in @p query, which upstream has answered. The
  * maximum moves with the minimum, because both count from the PTS. */
 void add_latency (GstQuery *query, GstClockTime own);
+
+/** A GAP event from @p pts for @p duration, otherwise as @p gap. */
+EventPtr gap_like (GstEvent *gap, GstClockTime pts, GstClockTime duration);
 
 /** Posts why the file of @p sink could not be written, and keeps it in @p
  * problem for a property. Takes the object lock. */

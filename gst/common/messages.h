@@ -148,7 +148,7 @@ struct CameraBack {
   CODED_FIELDS (silent, tries);
 };
 
-/** codedexposure-restore: frames are not as they were recorded, or cannot be
+/** codedexposure-recorddemux: frames are not as they were recorded, or cannot be
  * compared; they are CORRUPTED. Posted when a sequence of them begins, and when
  * it is over. */
 struct FramesDamaged {
@@ -160,21 +160,21 @@ struct FramesDamaged {
   std::string reason; ///< of the first
   CODED_FIELDS (active, frame, count, from, reason);
 };
-/** codedexposure-restore: the recording knows of frames that did not come. */
+/** codedexposure-recorddemux: the recording knows of frames that did not come. */
 struct FramesMissing {
   static constexpr const char *kName = "codedexposure/frames-missing";
   guint64 count = 0;
   GstClockTime from = 0; ///< of the first of them
   CODED_FIELDS (count, from);
 };
-/** codedexposure-restore: the stream ended without the last line of its track:
+/** codedexposure-recorddemux: the stream ended without the last line of its track:
  * a recording that was cut off, or a sender that was killed. */
 struct StreamCut {
   static constexpr const char *kName = "codedexposure/stream-cut";
   guint64 frames = 0; ///< that came
   CODED_FIELDS (frames);
 };
-/** codedexposure-restore: the last line of the track counts more frames than
+/** codedexposure-recorddemux: the last line of the track counts more frames than
  * came and were missed: the beginning is missing, or parts with their lines. */
 struct StreamIncomplete {
   static constexpr const char *kName = "codedexposure/stream-incomplete";

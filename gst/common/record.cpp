@@ -88,6 +88,8 @@ record_of (GstBuffer *frame, const GstVideoInfo &info,
   if (meta) {
     record_meta (record, *meta);
     record.exposure_start = running (meta->exposure_start);
+    if (meta->subframe >= 0)
+      record.slot = meta->subframe;
   }
   for (const char *flag : flag_names (frame))
     record.flags.emplace_back (flag);
@@ -122,6 +124,7 @@ apply_record (
 
   FrameMeta meta;
   meta.frame = record.frame;
+  meta.subframe = record.slot.value_or (-1);
   if (record.exposure_start)
     meta.exposure_start = GstClockTime (*record.exposure_start + offset);
   meta.exposure_duration = time_or_none (record.exposure_duration);

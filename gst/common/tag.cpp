@@ -19,6 +19,8 @@ namespace
 
 constexpr std::string_view kPrefix = "coded-exposure=";
 constexpr std::string_view kDecodedPrefix = "coded-exposure-decoded=";
+/** Of a recording whose setup changes. */
+constexpr std::string_view kSetupsPrefix = "coded-exposure-setup=";
 
 /** The comments in @p tags, in their order. */
 std::vector<std::string>
@@ -66,7 +68,9 @@ merge_others (GstTagList *ours, GstEvent *event)
   gst_event_parse_tag (event, &tags);
   gst_tag_list_set_scope (ours, gst_tag_list_get_scope (tags));
   for (const std::string &comment : comments_of (tags))
-    if (!comment.starts_with (kPrefix) && !comment.starts_with (kDecodedPrefix))
+    if (!comment.starts_with (kPrefix) &&
+        !comment.starts_with (kDecodedPrefix) &&
+        !comment.starts_with (kSetupsPrefix))
       gst_tag_list_add (ours, GST_TAG_MERGE_APPEND, GST_TAG_COMMENT,
           comment.c_str (), nullptr);
   const auto copy_other = [] (const GstTagList *from, const gchar *tag,
@@ -178,6 +182,18 @@ replace_by_provenance (GstEvent *event, const Provenance &provenance)
     return event;
   return merge_others (
       comment_to_tags (kDecodedPrefix, provenance.to_json ()), event);
+}
+
+std::optional<int>
+bits_from_tags (GstEvent *event)
+{
+  GstTagList *tags = nullptr;
+  gst_event_parse_tag (event, &tags);
+  if (const auto setup = setup_from_tags (tags))
+    return *setup ? setup->value ().bits : 0;
+  if (const auto made = provenance_from_tags (tags))
+    return *made ? made->value ().setup.bits : 0;
+  return std::nullopt;
 }
 
 std::optional<std::string>

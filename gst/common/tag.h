@@ -54,6 +54,10 @@ GstEvent *replace_by_provenance (GstEvent *event, const Provenance &provenance);
 /** The provenance in @p tags; as schedule_from_tags (). */
 std::optional<Result<Provenance>> provenance_from_tags (const GstTagList *tags);
 
+/** The significant bits that a setup or a provenance in the TAG event @p event
+ * says of frames; 0: not known. None if it has neither. */
+std::optional<int> bits_from_tags (GstEvent *event);
+
 /** If the tags of @p event say that its frames were decoded before: a message
  * of an element that takes coded frames only. */
 std::optional<std::string> why_not_coded (GstEvent *event);

@@ -31,6 +31,9 @@
  * The period comes from the caps, or from #GstCodedFilter:frame-rate
  * where they have none; a lost frame never stretches its neighbours.
  *
+ * A seek gives all subframes of the coded frames whose times lie in the
+ * segment, and no others.
+ *
  * ## Schedule
  *
  * The schedule defines which pixel saw which part of the exposure. It is the
@@ -151,28 +154,13 @@ Demux::set_up_class (gpointer klass)
       "Splits the frames of a camera behind a micromirror device into "
       "subframes at a multiple of the frame rate",
       {});
-  for (const char *pad : {"subframe_%u", "region_%u", "coded"})
+  for (const char *pad : {"subframe_%u", "region_%u"})
     add_pad_template (
         klass, pad, {.presence = GST_PAD_REQUEST, .type = GST_TYPE_CODED_PAD});
-  auto *element = GST_ELEMENT_CLASS (klass);
-  element->request_new_pad = [] (GstElement *self, GstPadTemplate *templ,
-                                 const gchar *name, const GstCaps *) noexcept {
-    return static_cast<Demux &> (filter_of (self)).request_pad (templ, name);
-  };
-  element->release_pad = [] (GstElement *self, GstPad *pad) noexcept {
-    static_cast<Demux &> (filter_of (self)).release_pad (pad);
-  };
 }
 
 namespace
 {
-
-/* The others go on when one pad is NOT_LINKED or EOS. */
-bool
-is_fatal (GstFlowReturn flow)
-{
-  return flow == GST_FLOW_FLUSHING || flow <= GST_FLOW_NOT_NEGOTIATED;
-}
 
 /* Whether any subframe of a part has a pad to go to. */
 bool
@@ -189,7 +177,6 @@ Demux::Demux (GstCodedExposureDemux *element)
           {"application/x-codedexposure-demux-stats", "subframes-out",
               "subframes-dropped"})
 {
-  add_pad ("src", PadKind::all, "src", -1);
 }
 
 /* One thread serves all pads, so a sink that waits for its time delays the
@@ -199,34 +186,8 @@ GstFlowReturn
 Demux::process (CodedFrame frame)
 {
   const auto served = pads ();
-  if (!check_pads (*served))
-    return GST_FLOW_NOT_NEGOTIATED;
-  const GstFlowReturn flow = push_coded (frame, *served);
-  return is_fatal (flow) ? flow : push_subframes (frame, *served);
-}
-
-/* This pad comes first, because the recorder of coded frames must not wait for
- * a display of subframes. */
-GstFlowReturn
-Demux::push_coded (const CodedFrame &frame, const PadMap &pads)
-{
-  GstCodedPad *pad = find_pad (pads, PadKind::coded);
-  if (!pad)
-    return GST_FLOW_OK;
-  BufferPtr outbuf (gst_buffer_ref (frame.buffer.get ()));
-  if (std::exchange (pad->coded.discont, false) &&
-      !GST_BUFFER_IS_DISCONT (outbuf.get ())) {
-    outbuf.reset (gst_buffer_make_writable (outbuf.release ()));
-    GST_BUFFER_FLAG_SET (outbuf.get (), GST_BUFFER_FLAG_DISCONT);
-  }
-  GST_LOG_OBJECT (pad, "[OUT] %" GST_PTR_FORMAT, outbuf.get ());
-  return combine_flow (pad, gst_pad_push (GST_PAD (pad), outbuf.release ()));
-}
-
-GstFlowReturn
-Demux::forward_coded (const CodedFrame &frame)
-{
-  return push_coded (frame, *pads ());
+  return check_pads (*served) ? push_subframes (frame, *served)
+                              : GST_FLOW_NOT_NEGOTIATED;
 }
 
 GstFlowReturn
@@ -384,11 +345,12 @@ Demux::map_subframes (
     std::size_t part, Targets &targets, std::vector<MappedFrame> &subframes)
 {
   subframes.reserve (targets.size ());
+  bool waited = false; // for a buffer of the pad that gets all
   for (Target &target : targets) {
     MappedFrame &mapped = subframes.emplace_back ();
     if (!target.owner ())
       continue;
-    const bool first = &target == &targets.front ();
+    const bool first = !target.all || !std::exchange (waited, true);
     const GstFlowReturn flow = acquire_picture (
         target.owner (), plan_->infos[part], first, target.buffer, mapped);
     if (flow != GST_FLOW_OK)

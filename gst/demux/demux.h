@@ -3,7 +3,6 @@
 #pragma once
 
 #include <array>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -31,21 +30,6 @@ struct Settings {
   Method method_in_force = Method::kAuto;
 };
 
-using PadRef = std::shared_ptr<GstCodedPad>;
-
-/** The source pads by kind and index, in the order in which they are served. */
-using PadMap = std::map<std::pair<PadKind, int>, PadRef>;
-
-/** Caps of each kind of pad. */
-struct PadCaps {
-  CapsPtr coded, all, one;
-  std::vector<CapsPtr> regions;
-
-  /** Null for a region that does not exist. */
-  GstCaps *of (const CodedPad &pad) const;
-  explicit operator bool () const { return all != nullptr; }
-};
-
 /** Everything that follows from the format and the settings. */
 struct Plan {
   std::vector<SplitPart> parts;    ///< the background, then the regions
@@ -61,10 +45,7 @@ class Demux final : public CodedFilter
 public:
   explicit Demux (GstCodedExposureDemux *element);
 
-  GstPad *request_pad (GstPadTemplate *templ, const gchar *name);
-  void release_pad (GstPad *pad);
   static void set_up_class (gpointer klass);
-  using CodedFilter::event_for;
 
 private:
   /** The pads that a subframe goes to; null where it does not. */
@@ -78,34 +59,23 @@ private:
   using Targets = std::vector<Target>;
 
   GstFlowReturn process (CodedFrame frame) override;
-  GstFlowReturn forward_coded (const CodedFrame &frame) override;
   bool plan (const CodedFormat &format) override;
   void planned (bool schedule_changed) override;
-  gboolean forward (EventPtr event) override;
-  void flushed () override;
+  void flushed () override { live_.reset (); }
   void take_settings () override { in_force_ = settings_; }
   void forget () override;
   static const PropertyTable<Settings> &properties ();
   static Settings &settings_of (GObject *object);
-  void each_pad (const PadVisitor &visit) const override;
-  CapsPtr caps_for (const GstCodedPad *pad) const override;
   CapsScale scale_for (
       const Schedule &schedule, const GstCodedPad *pad) const override;
   CapsPtr convert_caps (const CapsContext &context, const GstCodedPad *pad,
       GstCaps *caps, bool to_coded) const override;
   int pictures_a_frame (const GstCodedPad *pad) const override;
-  ObjectPtr<GstPad> coded_pad () const override;
+  bool allows_pad (PadKind kind, int index) const override;
+  EventPtr gap_for (const GstCodedPad *pad, GstEvent *gap) const override;
   std::string method_name () const override;
 
-  /* Pads. */
-  std::shared_ptr<const PadMap> pads () const;
-  GstCodedPad *add_pad (
-      const char *templ, PadKind kind, const std::string &name, int index);
-  void insert_pad (PadRef pad);
-  PadRef take_pad (GstPad *pad);
-  bool index_allowed (PadKind kind, int index) const;
   bool check_pads (const PadMap &pads) const;
-  EventPtr gap_for (const GstCodedPad *pad, GstEvent *gap) const;
 
   /* Frames. */
   bool is_live ();
@@ -123,7 +93,6 @@ private:
       Targets &targets, ImageView<const Pixel> light);
   template <typename Pixel>
   GstFlowReturn render (CodedFrame &frame, std::vector<Targets> &parts);
-  GstFlowReturn push_coded (const CodedFrame &frame, const PadMap &pads);
   GstFlowReturn push_subframes (CodedFrame &frame, const PadMap &pads);
   GstFlowReturn push_subframe (
       const CodedFrame &frame, SplitTurn turn, Target target);
@@ -132,11 +101,6 @@ private:
 
   /* Object lock. */
   Settings settings_;
-  /** Replaced, never changed: the streaming thread uses a map while the
-   * application requests and releases pads. */
-  std::shared_ptr<const PadMap> pads_ = std::make_shared<PadMap> ();
-  PadCaps caps_;
-  bool ended_ = false; ///< EOS was forwarded
 
   /* Sink pad's stream lock. */
   Settings in_force_;
@@ -145,12 +109,8 @@ private:
   std::vector<std::byte> scratch_; ///< subframes that no pad wants
 };
 
-/** Null if there is no such pad. */
-GstCodedPad *find_pad (const PadMap &pads, PadKind kind, int index = -1);
-
-/** How many numbered pads of @p kind @p schedule allows; null: any schedule. */
-int numbered_pads (PadKind kind, const Schedule *schedule);
-/** The names of these pads, in a sentence. */
+/** The names of the numbered pads that @p schedule allows, in a sentence; null:
+ * any schedule. */
 std::string pads_text (PadKind kind, const Schedule *schedule);
 
 } // namespace codedexposure::gst::demux

@@ -131,23 +131,6 @@ report_regions (GstElement *element, const Schedule &schedule)
 
 } // namespace
 
-GstCaps *
-PadCaps::of (const CodedPad &pad) const
-{
-  switch (pad.kind) {
-  case PadKind::coded:
-    return coded.get ();
-  case PadKind::one:
-    return one.get ();
-  case PadKind::region:
-    return pad.index < int (regions.size ())
-               ? regions[std::size_t (pad.index)].get ()
-               : nullptr;
-  default:
-    return all.get ();
-  }
-}
-
 bool
 Demux::plan (const CodedFormat &format)
 {
@@ -178,8 +161,7 @@ Demux::plan (const CodedFormat &format)
   log_plan (element (), format, made);
   plan_ = std::move (made);
   scratch_.clear ();
-  const ObjectLock lock (element ());
-  caps_ = std::move (caps);
+  take_caps (std::move (caps));
   return true;
 }
 
@@ -206,17 +188,7 @@ Demux::forget ()
   live_.reset ();
   scratch_.clear ();
   const ObjectLock lock (element ());
-  caps_ = PadCaps ();
   settings_.method_in_force = Method::kAuto;
-  ended_ = false;
-}
-
-CapsPtr
-Demux::caps_for (const GstCodedPad *pad) const
-{
-  const ObjectLock lock (element ());
-  GstCaps *caps = caps_.of (pad->coded);
-  return CapsPtr (caps ? gst_caps_ref (caps) : nullptr);
 }
 
 CapsScale
@@ -229,8 +201,6 @@ CapsPtr
 Demux::convert_caps (const CapsContext &context, const GstCodedPad *pad,
     GstCaps *caps, bool to_coded) const
 {
-  if (pad->coded.kind == PadKind::coded)
-    return CapsPtr (gst_caps_ref (caps));
   if (pad->coded.kind == PadKind::region && context.schedule)
     return convert_region (*context.schedule, pad->coded.index, caps, to_coded);
   return CodedFilter::convert_caps (context, pad, caps, to_coded);

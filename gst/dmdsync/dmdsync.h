@@ -115,6 +115,7 @@ struct Stream {
   std::optional<Mapping> mapping;
   std::optional<BenchProfile> bench;
   bool simulated = false;
+  int bits = 0; ///< that upstream's tag has
   std::string refused; ///< the error of the caps that were refused last
 };
 

@@ -103,6 +103,9 @@ own_setup (GstDmdSync *self)
   StreamSetup setup = setup_at (
       GST_BASE_TRANSFORM_SRC_PAD (self), st.schedule, st.stream.mapping);
   setup.simulated = st.stream.simulated;
+  const auto &frames = st.stream.frames;
+  setup.bits =
+      frames && frames->knows_bits () ? frames->bits () : st.stream.bits;
   setup.bench = st.stream.bench ? st.stream.bench : st.bench;
   return setup;
 }
@@ -123,6 +126,7 @@ take_bench (GstDmdSync *self, const StreamSetup &theirs)
   SyncState &st = state (self);
   st.stream.mapping = theirs.mapping;
   st.stream.simulated = theirs.simulated;
+  st.stream.bits = theirs.bits;
   st.stream.bench = theirs.bench;
   if (st.bench && theirs.bench)
     if (const auto same = st.bench->check_bench (*theirs.bench); !same)
@@ -172,10 +176,8 @@ moved_gap (GstDmdSync *self, GstEvent *event)
   }
   const GstClockTimeDiff start = std::max<GstClockTimeDiff> (
       0, GstClockTimeDiff (pipeline_time_of_gap (self, pts)) - by);
-  GstEvent *moved = gst_event_new_gap (GstClockTime (start), duration);
-  gst_event_set_seqnum (moved, gst_event_get_seqnum (event));
-  gst_event_unref (event);
-  return moved;
+  const EventPtr came (event);
+  return gap_like (event, GstClockTime (start), duration).release ();
 }
 
 /* The tag has the size and the rate; before a segment, it is due anyway. */

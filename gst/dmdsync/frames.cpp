@@ -48,11 +48,13 @@ drop (GstDmdSync *self, const Frame &frame, const char *reason)
   return GST_BASE_TRANSFORM_FLOW_DROPPED;
 }
 
+/** In place of frames that are missing. */
 void
 push_gap (GstDmdSync *self, GstClockTime from, GstClockTime duration)
 {
-  gst_pad_push_event (
-      GST_BASE_TRANSFORM_SRC_PAD (self), gst_event_new_gap (from, duration));
+  GstEvent *gap = gst_event_new_gap (from, duration);
+  gst_event_set_gap_flags (gap, GST_GAP_FLAG_MISSING_DATA);
+  gst_pad_push_event (GST_BASE_TRANSFORM_SRC_PAD (self), gap);
 }
 
 /** The same for a frame whose time is left empty. */

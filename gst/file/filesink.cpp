@@ -19,9 +19,7 @@
  * |[
  * gst-launch-1.0 -e videotestsrc num-buffers=100 \
  *     ! video/x-raw,format=GRAY8,framerate=100/1,width=2048,height=2048 \
- *     ! codedexposure-sim ! codedexposure-log name=log ! queue ! mux.video_0 \
- *     log.track ! queue ! mux.subtitle_0 \
- *     codedexposure-matroskamux name=mux \
+ *     ! codedexposure-sim ! codedexposure-recordmux codec=raw \
  *     ! codedexposure-filesink direct=true location=direct.mkv
  * ]|
  *

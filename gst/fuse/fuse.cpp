@@ -25,8 +25,11 @@
  * the next one, and T is added to the latency.
  *
  * Earlier frames help to find what stands still. A lost, corrupted or late
- * frame, a DISCONT, a seek and a new segment reset this history. At a negative
- * rate there is none: each coded frame is fused alone.
+ * frame, a DISCONT and a new segment reset this history. At a negative rate
+ * there is none: each coded frame is fused alone.
+ *
+ * A seek reads the frames on which the first and the last pictures depend, too,
+ * so that they are those of the whole stream.
  *
  * ## Schedule and mapping
  *
@@ -84,6 +87,7 @@
  */
 #include "fuse.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "common/element.h"
@@ -136,14 +140,6 @@ Fuse::set_up_class (gpointer klass)
       {.presence = GST_PAD_REQUEST,
           .type = GST_TYPE_CODED_PAD,
           .caps = GST_VIDEO_CAPS_MAKE ("GRAY16_LE")});
-  auto *element = GST_ELEMENT_CLASS (klass);
-  element->request_new_pad = [] (GstElement *self, GstPadTemplate *,
-                                 const gchar *, const GstCaps *) noexcept {
-    return static_cast<Fuse &> (filter_of (self)).request_pad ();
-  };
-  element->release_pad = [] (GstElement *self, GstPad *pad) noexcept {
-    static_cast<Fuse &> (filter_of (self)).release_pad (pad);
-  };
 }
 
 namespace
@@ -156,12 +152,8 @@ constexpr guint kUnfit = GST_BUFFER_FLAG_CORRUPTED | GST_BUFFER_FLAG_GAP;
 
 Fuse::Fuse (GstCodedExposureFuse *element)
     : CodedFilter (GST_CODED_FILTER (element),
-          {"application/x-codedexposure-fuse-stats", "frames-out", nullptr}),
-      srcpad_ (new_source_pad ("src", "src", PadKind::all)),
-      uncertainty_ (GST_ELEMENT (element))
+          {"application/x-codedexposure-fuse-stats", "frames-out", nullptr})
 {
-  gst_flow_combiner_add_pad (combiner_.get (), GST_PAD (srcpad_.get ()));
-  gst_element_add_pad (this->element (), GST_PAD (srcpad_.get ()));
 }
 
 /* A coded frame is fused when enough of those after it have come. The fuser
@@ -169,7 +161,6 @@ Fuse::Fuse (GstCodedExposureFuse *element)
 GstFlowReturn
 Fuse::process (CodedFrame frame)
 {
-  serve_requested ();
   const bool alone = frame.has_flags (kUnfit) || backwards ();
   GstFlowReturn flow = GST_FLOW_OK;
   if (alone) {
@@ -182,9 +173,25 @@ Fuse::process (CodedFrame frame)
     flow = drain ();
     break_history ();
   }
-  while (flow == GST_FLOW_OK && int (waiting_.size ()) > plan_->lookahead)
+  while (flow == GST_FLOW_OK && int (waiting_.size ()) > plan_->reach.lookahead)
     flow = push_oldest ();
   return flow;
+}
+
+/* Frames before those that are asked for are their history, the next one their
+ * lookahead. */
+GstFlowReturn
+Fuse::learn (CodedFrame frame)
+{
+  const bool needed =
+      frame.place == Place::early ||
+      std::ranges::any_of (waiting_, [] (const CodedFrame &waiting) {
+        return waiting.place == Place::inside;
+      });
+  if (needed && !backwards ())
+    return process (std::move (frame));
+  break_history ();
+  return GST_FLOW_OK;
 }
 
 /* Returns the number of saturated pixels. */
@@ -261,10 +268,7 @@ Fuse::render (Pictures &fused, Pictures *uncertainty)
       fused.buffers.clear ();
       return flow;
     }
-  const std::stop_token stop = [this] {
-    const ObjectLock lock (element ());
-    return stop_.get_token ();
-  }();
+  const std::stop_token stop = stop_token ();
   const Result<void> done = std::visit (
       [&]<typename Pixel> (Fuser<Pixel> &fuser) {
         std::vector<ImageView<Pixel>> views;
@@ -298,10 +302,20 @@ Fuse::push_one (Pictures &pictures, const CodedFrame &coded, int k)
       {pictures.info, k, pts, coded.pts () + GstClockTime (slots.start (k)),
           GstClockTime (slots.active ())});
   const GstFlowReturn flow =
-      pictures.pad == srcpad_.get ()
+      pictures.pad->coded.kind == PadKind::all
           ? push (pictures.pad, std::move (outbuf), duration)
           : push_picture (pictures.pad, std::move (outbuf), duration);
   return combine_flow (pictures.pad, flow);
+}
+
+/* The oldest frame that waits is not asked for: frames after it may be. */
+GstFlowReturn
+Fuse::pass_oldest ()
+{
+  const auto done =
+      std::visit ([] (auto &fuser) { return fuser.pass (); }, plan_->fuser);
+  waiting_.pop_front ();
+  return done ? GST_FLOW_OK : post_decode_error (done.error ());
 }
 
 /* Buffers are pushed one by one, because a sink would show a whole list at the
@@ -309,10 +323,13 @@ Fuse::push_one (Pictures &pictures, const CodedFrame &coded, int k)
 GstFlowReturn
 Fuse::push_oldest ()
 {
-  const ObjectPtr<GstCodedPad> pad = uncertainty_pad ();
-  Pictures fused{srcpad_.get (), plan_->fused};
-  Pictures uncertainty{pad.get (), plan_->uncertainty};
-  const bool wanted = pad && is_wanted (GST_PAD (pad.get ()));
+  if (waiting_.front ().place != Place::inside)
+    return pass_oldest ();
+  const auto served = pads ();
+  Pictures fused{find_pad (*served, PadKind::all), plan_->fused};
+  Pictures uncertainty{
+      find_pad (*served, PadKind::uncertainty), plan_->uncertainty};
+  const bool wanted = uncertainty.pad && is_wanted (GST_PAD (uncertainty.pad));
   GstFlowReturn flow = render (fused, wanted ? &uncertainty : nullptr);
   for (Pictures *pictures : {&fused, &uncertainty})
     pictures->mapped.clear ();
@@ -345,6 +362,13 @@ Fuse::break_history ()
   waiting_.clear ();
   if (plan_)
     std::visit ([] (auto &fuser) { fuser.forget (); }, plan_->fuser);
+}
+
+std::stop_token
+Fuse::stop_token () const
+{
+  const ObjectLock lock (element ());
+  return stop_.get_token ();
 }
 
 void

@@ -11,7 +11,6 @@
 #include <gst/gst.h>
 
 #include "common/coded_filter.h"
-#include "common/request_pad.h"
 #include "fuse/fuser.h"
 
 G_BEGIN_DECLS
@@ -30,7 +29,7 @@ using AnyFuser = std::variant<Fuser<std::uint8_t>, Fuser<std::uint16_t>>;
 struct Plan {
   AnyFuser fuser;
   GstVideoInfo fused, uncertainty;
-  int lookahead;
+  Reach reach;
 };
 
 /** Properties; noise that was not set is that of the bench profile. */
@@ -45,25 +44,22 @@ public:
   explicit Fuse (GstCodedExposureFuse *element);
 
   static void set_up_class (gpointer klass);
-  GstPad *request_pad ();
-  void release_pad (GstPad *pad);
 
 private:
   static const PropertyTable<Settings> &properties ();
   static Settings &settings_of (GObject *object);
 
   GstFlowReturn process (CodedFrame frame) override;
+  Reach reach () const override;
+  GstFlowReturn learn (CodedFrame frame) override;
   bool plan (const CodedFormat &format) override;
   void planned (bool schedule_changed) override;
   GstFlowReturn drain () override;
   void break_history () override;
-  gboolean forward (EventPtr event) override;
   void take_settings () override { in_force_ = settings_; }
   void forget () override;
   void cancel () override;
   void resume () override;
-  void each_pad (const PadVisitor &visit) const override;
-  CapsPtr caps_for (const GstCodedPad *pad) const override;
   CapsPtr convert_caps (const CapsContext &context, const GstCodedPad *pad,
       GstCaps *caps, bool to_coded) const override;
   CapsScale scale_for (
@@ -88,21 +84,17 @@ private:
     std::vector<MappedFrame> mapped = {};
   };
   GstFlowReturn acquire_all (Pictures &pictures) const;
+  std::stop_token stop_token () const;
   GstFlowReturn render (Pictures &fused, Pictures *uncertainty);
   GstFlowReturn push_one (Pictures &pictures, const CodedFrame &coded, int k);
-  void serve_requested ();
-  ObjectPtr<GstCodedPad> uncertainty_pad () const;
   GstFlowReturn push_oldest ();
+  GstFlowReturn pass_oldest ();
   /** Start of slot @p k by even steps, from the frame's PTS. */
   GstClockTime boundary (int k) const;
 
-  const ObjectPtr<GstCodedPad> srcpad_;
-  RequestPad uncertainty_;
-
   /* Object lock. */
   Settings settings_;
-  CapsPtr caps_;
-  std::stop_source stop_; ///< of the fusion that is under way
+  std::stop_source stop_; ///< of what is under way
 
   /* Sink pad's stream lock. */
   Settings in_force_;

@@ -29,6 +29,9 @@ G_DEFINE_ENUM_TYPE (GstCodedExposureQuality, gst_coded_exposure_quality,
         "best, then refined by a network that learned from pictures",
         "learned"});
 
+constexpr Reach kMaxReach{
+    Fuser<std::uint8_t>::kMaxHistory, Fuser<std::uint8_t>::kMaxLookahead};
+
 const PropertyTable<Settings> &
 Fuse::properties ()
 {
@@ -137,10 +140,11 @@ namespace
 
 template <typename Pixel>
 Result<AnyFuser>
-make_fuser (const CodedFormat &format, const FuseOptions &options)
+make_fuser (
+    const CodedFormat &format, const FuseOptions &options, std::stop_token stop)
 {
-  auto made = Fuser<Pixel>::make (
-      format.schedule, format.size.width, format.size.height, options);
+  auto made = Fuser<Pixel>::make (format.schedule, format.size.width,
+      format.size.height, options, std::move (stop));
   if (!made)
     return made.error ();
   return AnyFuser (std::move (*made));
@@ -170,35 +174,41 @@ Fuse::plan (const CodedFormat &format)
   FuseOptions options = in_force_;
   options.bits = significant_bits ();
   options.noise = noise (format.schedule);
-  auto fuser = format.wide () ? make_fuser<std::uint16_t> (format, options)
-                              : make_fuser<std::uint8_t> (format, options);
+  const std::stop_token stop = stop_token ();
+  auto fuser = format.wide ()
+                   ? make_fuser<std::uint16_t> (format, options, stop)
+                   : make_fuser<std::uint8_t> (format, options, stop);
   if (!fuser) {
-    post_error (fuser.error ().message);
+    if (fuser.error ().code != ErrorCode::cancelled)
+      post_error (fuser.error ().message);
     return false;
   }
   const CapsPtr rectified = format.rectifier
                                 ? format.resized (format.size)
                                 : CapsPtr (gst_caps_ref (format.caps.get ()));
-  CapsPtr caps (
+  PadCaps caps;
+  caps.coded.reset (gst_caps_ref (format.caps.get ()));
+  caps.all.reset (
       scale_caps (rectified.get (), coded_to_fused (format.schedule)));
-  Plan made{std::move (*fuser), {}, {}, options.lookahead};
-  gst_video_info_from_caps (&made.fused, caps.get ());
-  gst_video_info_from_caps (
-      &made.uncertainty, of_sixteen_bits (caps.get ()).get ());
+  caps.uncertainty = of_sixteen_bits (caps.all.get ());
+  Plan made{std::move (*fuser), {}, {},
+      {options.noise.full_well > 0.0 ? kMaxReach.history : 1,
+          options.lookahead}};
+  gst_video_info_from_caps (&made.fused, caps.all.get ());
+  gst_video_info_from_caps (&made.uncertainty, caps.uncertainty.get ());
   plan_ = std::move (made);
   if (const std::string reason = unrefined (); !reason.empty ())
     POST_WARNING (element (), STREAM, FORMAT,
         "The result is not refined: " + reason + ".");
-  const ObjectLock lock (element ());
-  caps_ = std::move (caps);
+  take_caps (std::move (caps));
   return true;
 }
 
 void
 Fuse::planned (bool)
 {
-  const GstClockTime latency =
-      GstClockTime (plan_->lookahead) * boundary (format ().schedule.slots ());
+  const GstClockTime latency = GstClockTime (plan_->reach.lookahead) *
+                               boundary (format ().schedule.slots ());
   bool changed;
   {
     const ObjectLock lock (element ());
@@ -206,6 +216,12 @@ Fuse::planned (bool)
   }
   if (changed)
     post_latency (element ());
+}
+
+Reach
+Fuse::reach () const
+{
+  return plan_ ? plan_->reach : kMaxReach;
 }
 
 GstClockTime
@@ -220,17 +236,6 @@ Fuse::forget ()
 {
   waiting_.clear ();
   plan_.reset ();
-  const ObjectLock lock (element ());
-  caps_.reset ();
-}
-
-CapsPtr
-Fuse::caps_for (const GstCodedPad *pad) const
-{
-  const ObjectLock lock (element ());
-  if (caps_ && pad->coded.kind == PadKind::uncertainty)
-    return of_sixteen_bits (caps_.get ());
-  return CapsPtr (caps_ ? gst_caps_ref (caps_.get ()) : nullptr);
 }
 
 /* The uncertainty has 16 bits, whatever the coded frames have. */

@@ -560,6 +560,8 @@ own_setup (GstCodedExposureSim *self)
   StreamSetup setup = setup_at (
       GST_BASE_TRANSFORM_SRC_PAD (self), *state (self).stream.schedule);
   setup.simulated = true;
+  setup.bits = significant_bits_of (
+      state (self).stream.optics.bits, state (self).stream.plan->out);
   setup.bench = state (self).stream.profile;
   return setup;
 }

@@ -51,6 +51,7 @@
 #include "common/lines.h"
 #include "common/meta.h"
 #include "common/record.h"
+#include "common/tag.h"
 #include "report.h"
 
 using namespace codedexposure;
@@ -86,6 +87,7 @@ struct StatsState {
   Settings in_force;
   StatsOptions options;
   GstVideoInfo info;
+  int tagged_bits = 0;
   Meter meter;
   LineFile file;
 };
@@ -135,7 +137,7 @@ properties ()
           kReadWriteReady, set (&Settings::line)},
       {"bits", "Significant bits",
           "Significant bits of a pixel; their largest value is saturation. 0: "
-          "as the frame metadata say, or all bits of the format",
+          "as the frame metadata or the tags say, or all bits of the format",
           kReadWriteReady, set (&Settings::bits), 0, 16},
       {"histogram-bins", "Bins of the histogram",
           "Bins of the histogram, of equal width over all grey levels; 0: no "
@@ -225,17 +227,30 @@ set_caps (GstBaseTransform *base, GstCaps *caps, GstCaps *) noexcept
   return make_meter (self);
 }
 
-/* Without the bits property, the metas set the significant bits. */
+/* Without the bits property, the metas set the significant bits; frames of a
+ * file without a track have none, but tags. */
 bool
 follow_bits (GstSubframeStats *self, GstBuffer *frame)
 {
   StatsState &state = *self->state;
   const auto meta = get_frame_meta (frame);
-  const int bits = meta ? significant_bits_of (meta->bits, state.info) : 0;
+  const int bits =
+      significant_bits_of (meta ? meta->bits : state.tagged_bits, state.info);
   if (state.in_force.bits > 0 || bits == state.options.bits)
     return true;
   state.options.bits = bits;
   return make_meter (self);
+}
+
+gboolean
+sink_event (GstBaseTransform *base, GstEvent *event) noexcept
+{
+  StatsState &state = *GST_SUBFRAME_STATS (base)->state;
+  if (GST_EVENT_TYPE (event) == GST_EVENT_STREAM_START)
+    state.tagged_bits = 0;
+  if (GST_EVENT_TYPE (event) == GST_EVENT_TAG)
+    state.tagged_bits = bits_from_tags (event).value_or (state.tagged_bits);
+  return base_transform_class ()->sink_event (base, event);
 }
 
 /* The statistics of @frame; null, with an error posted, if it is too short. */
@@ -334,5 +349,6 @@ gst_subframe_stats_class_init (GstSubframeStatsClass *klass)
 
   auto *transform_class = GST_BASE_TRANSFORM_CLASS (klass);
   transform_class->set_caps = GST_DEBUG_FUNCPTR (set_caps);
+  transform_class->sink_event = GST_DEBUG_FUNCPTR (sink_event);
   transform_class->generate_output = GST_DEBUG_FUNCPTR (generate_output);
 }

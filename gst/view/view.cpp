@@ -2,6 +2,7 @@
 /**
  * SECTION:element-codedexposure-view
  * @title: codedexposure-view
+ * @short_description: Pictures of any bit depth in 8 bits, for display
  *
  * Converts pictures of any bit depth to 8 bits for display. A 12-bit camera
  * uses a sixteenth of the range of GRAY16_LE, so other converters show its
@@ -30,6 +31,7 @@
 #include "common/element.h"
 #include "common/elements.h"
 #include "common/meta.h"
+#include "common/tag.h"
 
 using namespace codedexposure;
 using namespace codedexposure::gst;
@@ -43,6 +45,7 @@ G_DECLARE_FINAL_TYPE (GstCodedExposureView, gst_coded_exposure_view, GST,
 struct _GstCodedExposureView {
   GstVideoFilter parent;
   gint bits, white; // object lock
+  gint tagged_bits; // streaming thread
 };
 
 G_DEFINE_TYPE_WITH_CODE (GstCodedExposureView, gst_coded_exposure_view,
@@ -70,9 +73,10 @@ white_of (GstCodedExposureView *self, GstBuffer *picture, int depth)
   }
   if (white > 0)
     return guint64 (white);
-  if (bits == 0)
-    if (const auto meta = get_frame_meta (picture))
-      bits = meta->bits;
+  if (bits == 0) {
+    const auto meta = get_frame_meta (picture);
+    bits = meta ? meta->bits : self->tagged_bits;
+  }
   return (guint64 (1) << (bits <= 0 ? depth : std::min (bits, depth))) - 1;
 }
 
@@ -103,6 +107,18 @@ transform_caps (GstBaseTransform *, GstPadDirection direction, GstCaps *caps,
   g_value_unset (&formats);
   return (filter ? intersect_caps (filter, other.get ()) : std::move (other))
       .release ();
+}
+
+/* Frames of a file without a track have no metadata, but tags. */
+gboolean
+sink_event (GstBaseTransform *base, GstEvent *event)
+{
+  auto *self = GST_CODED_EXPOSURE_VIEW (base);
+  if (GST_EVENT_TYPE (event) == GST_EVENT_STREAM_START)
+    self->tagged_bits = 0;
+  if (GST_EVENT_TYPE (event) == GST_EVENT_TAG)
+    self->tagged_bits = bits_from_tags (event).value_or (self->tagged_bits);
+  return base_transform_class ()->sink_event (base, event);
 }
 
 void
@@ -153,7 +169,7 @@ properties ()
   static const PropertyTable<GstCodedExposureView> table{
       {"bits", "Significant bits",
           "Significant bits of a pixel; their largest value becomes white. 0: "
-          "as the frame metadata say, or all bits of the format",
+          "as the frame metadata or the tags say, or all bits of the format",
           kReadWrite, &GstCodedExposureView::bits, 0, 16},
       {"white", "White",
           "Pixel value that becomes white, to see a dark scene; larger ones "
@@ -185,6 +201,7 @@ gst_coded_exposure_view_class_init (GstCodedExposureViewClass *klass)
 
   auto *transform_class = GST_BASE_TRANSFORM_CLASS (klass);
   transform_class->transform_caps = GST_DEBUG_FUNCPTR (transform_caps);
+  transform_class->sink_event = GST_DEBUG_FUNCPTR (sink_event);
   transform_class->before_transform = GST_DEBUG_FUNCPTR (before_transform);
   /* A video filter works in place where it can; depths differ here. */
   transform_class->transform_ip = nullptr;

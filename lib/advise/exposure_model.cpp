@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "base/pixels.h"
 #include "base/range.h"
 #include "base/try.h"
 
@@ -64,7 +65,7 @@ ExposureModel::ExposureModel (const std::optional<Schedule> &schedule,
       white_slots_ (schedule ? schedule->white_slots () : 1.0),
       slot_electrons_ (slot_electrons),
       observation_ (schedule, camera.noise, white_slots_ * slot_electrons,
-          double ((1 << camera.bits) - 1))
+          double (largest_pixel (camera.bits)))
 {
 }
 

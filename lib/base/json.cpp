@@ -5,8 +5,6 @@
 #include <optional>
 #include <set>
 
-#include "base/text.h"
-
 namespace codedexposure
 {
 
@@ -204,6 +202,33 @@ number_into (double &to, const std::string &rule)
       throw expected (key, rule, value);
     to = value.get<double> ();
   };
+}
+
+JsonReader
+text_into (std::string &to)
+{
+  return [&to] (const Json &value, const std::string &key) {
+    if (!value.is_string ())
+      throw expected (key, "a text", value);
+    to = value.get<std::string> ();
+  };
+}
+
+JsonReader
+flag_into (bool &to)
+{
+  return [&to] (const Json &value, const std::string &key) {
+    if (!value.is_boolean ())
+      throw expected (key, "true or false", value);
+    to = value.get<bool> ();
+  };
+}
+
+JsonReader
+size_into (Extent &to, int highest)
+{
+  return integers_into (
+      {&to.width, &to.height}, highest, "two whole numbers, width and height");
 }
 
 std::string

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -13,7 +14,10 @@
 
 #include <nlohmann/json.hpp>
 
+#include "base/file.h"
+#include "base/geometry.h"
 #include "base/result.h"
+#include "base/text.h"
 
 namespace codedexposure
 {
@@ -81,6 +85,26 @@ JsonReader numbers_into (std::span<double> to);
 /** One. @p rule describes it: "a number of pixels". */
 JsonReader number_into (double &to, const std::string &rule);
 
+/** A text. */
+JsonReader text_into (std::string &to);
+JsonReader flag_into (bool &to);
+/** Two whole numbers, width and height. */
+JsonReader size_into (Extent &to, int highest);
+
+/** A text of its own within another. */
+template <typename T>
+JsonReader
+inner_into (std::optional<T> &to, T (*read) (const Json &))
+{
+  return [=, &to] (const Json &value, const std::string &key) {
+    try {
+      to = read (value);
+    } catch (const Error &refused) {
+      throw refused.with_prefix ("in key '" + key + "': ");
+    }
+  };
+}
+
 /** Parses one JSON text. Also refuses what the parser would accept: a key that
  * an object has twice, because readers disagree on which one is valid; nesting
  * deeper than any text of this project has, because recursive functions read
@@ -112,6 +136,23 @@ try {
   } catch (const Error &refused) {
     return refused.with_prefix (what + " JSON: ");
   }
+} catch (const std::bad_alloc &) {
+  return out_of_memory ();
+}
+
+/** What @p read makes of the file @p path of at most @p limit bytes. @p what,
+ * such as "mapping file", names a file that cannot be read. */
+template <typename T>
+Result<T>
+load_json (const std::string &path, const std::string &what, std::size_t limit,
+    Result<T> (*read) (std::string_view json))
+try {
+  const auto text = read_file (path, limit);
+  auto value = text ? read (*text) : Result<T> (text.error ());
+  if (!value)
+    return value.error ().with_prefix (
+        (text ? "file" : what) + " " + in_quotes (path, 200) + ": ");
+  return value;
 } catch (const std::bad_alloc &) {
   return out_of_memory ();
 }

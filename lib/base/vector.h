@@ -48,19 +48,6 @@ store (T *to, Vector<T> v)
   __builtin_memcpy (to, &v, kVectorBytes);
 }
 
-/** A non-temporal store where that is faster, which is with vectors of a whole
- * line; @p to is aligned to a vector. */
-template <typename T>
-CODEDEXPOSURE_INLINE void
-stream (T *to, Vector<T> v)
-{
-#if CODEDEXPOSURE_VECTOR_BYTES == 64
-  _mm512_stream_si512 (reinterpret_cast<__m512i *> (to), __m512i (v));
-#else
-  store (to, v);
-#endif
-}
-
 template <typename V>
 CODEDEXPOSURE_INLINE V
 smaller (V a, V b)

@@ -103,15 +103,4 @@ check_apart (std::span<const ViewBytes> outputs, const ViewBytes *input)
   return {};
 }
 
-Result<void>
-check_rows (int first, int count, int height)
-{
-  if (first >= 0 && count >= 0 && first <= height - count)
-    return {};
-  return Error{"rows " + std::to_string (first) + " to " +
-               std::to_string (first + std::int64_t (count) - 1) +
-               " are not among the " + std::to_string (height) +
-               " of the image"};
-}
-
 } // namespace codedexposure

@@ -38,7 +38,4 @@ Result<void> check_view (
 Result<void> check_apart (
     std::span<const ViewBytes> outputs, const ViewBytes *input = nullptr);
 
-/** Error unless rows [@p first, @p first + @p count) are among @p height. */
-Result<void> check_rows (int first, int count, int height);
-
 } // namespace codedexposure

@@ -7,6 +7,7 @@
 #include <new>
 #include <sstream>
 
+#include "base/pixels.h"
 #include "base/text.h"
 #include "base/try.h"
 #include "bench/sensor.h"
@@ -236,11 +237,9 @@ OpticalBench::read_out (std::uint64_t frame, ImageView<Pixel> coded)
   if (!lens_.ideal ())
     lens_.image (light_.view (), seen_.view ());
 
-  const int all_bits = std::numeric_limits<Pixel>::digits;
-  const int bits =
-      options_.bits > 0 ? std::min (options_.bits, all_bits) : all_bits;
+  const int bits = significant_bits_of<Pixel> (options_.bits);
   /* White is white above the black level, too. */
-  const double range = 1.0 - options_.black_level / ((1 << bits) - 1);
+  const double range = 1.0 - options_.black_level / largest_pixel (bits);
   const Sensor sensor{.full_well = options_.full_well,
       .well = options_.well,
       .read_noise = options_.read_noise,

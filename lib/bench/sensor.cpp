@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/pixels.h"
 #include "bench/random.h"
 
 namespace codedexposure
@@ -208,7 +209,7 @@ void
 Sensor::read_out (ImageView<const float> light, double unit,
     std::uint64_t frame, ImageView<Pixel> out) const
 {
-  const float largest = float ((1 << bits) - 1);
+  const float largest = float (largest_pixel (bits));
   const float black = float (black_level);
 
   if (full_well <= 0.0) {

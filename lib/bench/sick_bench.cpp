@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/pixels.h"
 #include "base/try.h"
 #include "bench/bench_view.h"
 #include "bench/random.h"
@@ -510,7 +511,7 @@ SickBench::add_pictures (const Passed &passed, double unit)
 void
 SickBench::read_out (const Shot &shot, ImageView<std::uint16_t> picture)
 {
-  const int largest = (1 << options_.bits) - 1;
+  const int largest = largest_pixel (options_.bits);
   const Sensor sensor{.full_well = options_.full_well,
       .read_noise = options_.read_noise,
       .gain = (largest - options_.black_level) / largest,

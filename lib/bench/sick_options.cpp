@@ -7,6 +7,7 @@
 #include <random>
 #include <vector>
 
+#include "base/pixels.h"
 #include "base/text.h"
 #include "base/try.h"
 
@@ -50,7 +51,7 @@ ns (double time)
 double
 scaled_black (const Bench &b, double level)
 {
-  return level * ((1 << b.bits) - 1) / 255.0;
+  return level * largest_pixel (b.bits) / 255.0;
 }
 
 std::vector<Word>

@@ -43,7 +43,6 @@ struct SickBenchOptions {
   Nanoseconds readout = 100'000; ///< what the longest exposure leaves of T
   Nanoseconds edge = 0;          ///< more delay, by a pulse and the wrong edge
   Nanoseconds late = 0;          ///< more delay
-  Nanoseconds longer = 0;        ///< the exposure is longer than asked for
   /** The window of the longest exposure ends that long before (> 0) or after
    * (< 0) the end of the period, in place of what follows from the above. */
   std::optional<Nanoseconds> ends_early = {};

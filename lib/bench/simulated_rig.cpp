@@ -7,6 +7,7 @@
 
 #include "base/text.h"
 #include "base/try.h"
+#include "dmd/boards.h"
 #include "dmd/erle.h"
 #include "dmd/hid_link.h"
 #include "dmd/pattern_timing.h"
@@ -22,12 +23,6 @@ constexpr Nanoseconds kStart = 60'000'000;   // of masks that are there
 constexpr Nanoseconds kTransfer = 8'000'000; // of a frame
 constexpr Nanoseconds kMicrosecond = 1000;
 constexpr int kInFlight = 2;
-/* Of a DLPC900. */
-constexpr PatternLimits kLimits{.minimum_exposure = 105,
-    .maximum_exposure = 0xFFFFFF,
-    .minimum_dark = 105,
-    .trigger_delay = 105,
-    .trigger_dark = 105};
 /* The camera's clock is not that of the machine. */
 constexpr Nanoseconds kEpoch = 5'000'000'000'000;
 constexpr double kClockError = 12e-6;
@@ -55,14 +50,9 @@ parts_of (const SickBenchOptions &options)
   parts.camera = {"Codedexposure", "Simulated", "SIM1", options.camera};
   parts.bits = options.bits;
   parts.pixel_format = options.bits > 8 ? "Mono12" : "Mono8";
+  parts.dmd = *board_info (*find_board ("dlp6500"), {});
   parts.dmd.name = "sim:bench";
   parts.dmd.size = options.mirrors;
-  parts.dmd.minimum_active = kLimits.minimum_exposure * kMicrosecond;
-  parts.dmd.minimum_dark = kLimits.minimum_dark * kMicrosecond;
-  parts.dmd.resident_masks = 400;
-  parts.dmd.still_masks = true;
-  parts.dmd.triggers_camera = true;
-  parts.dmd.trigger_in = parts.dmd.trigger_out = true;
   parts.dmd.serial = "SIMDMD1";
   const auto firmware = options.parts.find ("firmware");
   parts.dmd_status.details = {{"controller", "DLPC900"},
@@ -230,7 +220,7 @@ SimulatedRig::show (const StillMask &mask, int slots)
 {
   ASSIGN_OR_RETURN (
       const SlotPlan plan, SlotPlan::fit ({}, slots, options_.rate));
-  const auto times = fit_still (plan, mask, kLimits, Master::dmd);
+  const auto times = fit_still (plan, mask, *parts_.dmd.patterns);
   if (!times)
     return times.error ().with_prefix (parts_.dmd.name + ": ");
   MirrorProgram program{.period = options_.rate.period ()};

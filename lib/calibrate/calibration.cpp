@@ -6,6 +6,8 @@
 #include <limits>
 #include <new>
 
+#include "base/pixels.h"
+#include "base/statistics.h"
 #include "base/try.h"
 #include "calibrate/displacement_fit.h"
 #include "calibrate/gray_fit.h"
@@ -26,6 +28,9 @@ constexpr int kSmooth = 16;
 
 /* Reduced chi-square of blocks above which a displacement grid is fitted. */
 constexpr double kDisplaced = 1.3;
+
+/* Pixels between the nodes of a displacement grid. */
+constexpr int kNodeDistance = 32;
 
 constexpr int kRounds = 12;
 /* Mirrors; shorter steps end the fit. */
@@ -49,31 +54,6 @@ smoothed (const Image<float> &image)
         std::fill (out.view ().row (y) + x0, out.view ().row (y) + x1, mean);
     }
   return out;
-}
-
-/* The value that @part of an image's pixels do not exceed. */
-float
-quantile (const Image<float> &image, double part)
-{
-  std::vector<float> values;
-  for (int y = 0; y < image.height (); y += 2)
-    for (int x = y / 2 % 2; x < image.width (); x += 2)
-      values.push_back (image.at (x, y));
-  if (values.empty ())
-    return image.at (0, 0);
-  const auto at =
-      values.begin () + std::ptrdiff_t (part * double (values.size () - 1));
-  std::nth_element (values.begin (), at, values.end ());
-  return *at;
-}
-
-Image<float>
-difference (Image<float> a, const Image<float> &b)
-{
-  for (int y = 0; y < a.height (); y++)
-    for (int x = 0; x < a.width (); x++)
-      a.at (x, y) -= b.at (x, y);
-  return a;
 }
 
 /* Mean residuals of blocks, in mirrors. */
@@ -103,28 +83,27 @@ report (const PhaseFit &fit, CalibrationResult &result)
   result.misfit =
       std::sqrt (0.5 * (reduced_chi_square (fit.blocks_x, fit.noise_ratio) +
                            reduced_chi_square (fit.blocks_y, fit.noise_ratio)));
-  for (int y = 0; y < fit.camera.height; y++)
-    for (int x = 0; x < fit.camera.width; x++) {
-      PixelQuality &quality = result.quality.at (x, y);
-      if (quality != PixelQuality::good)
-        continue;
-      if (!result.mapping.covers (result.mapping.mirror_at (x, y)))
-        quality = PixelQuality::uncovered;
-      else if (fit.faint.at (x, y) != 0)
-        quality = PixelQuality::low_contrast;
-      else if (fit.outlier.at (x, y) != 0)
-        quality = PixelQuality::outlier;
-    }
+  each_pixel (result.quality, [&] (int x, int y) {
+    PixelQuality &quality = result.quality.at (x, y);
+    if (quality != PixelQuality::good)
+      return;
+    if (!result.mapping.covers (result.mapping.mirror_at (x, y)))
+      quality = PixelQuality::uncovered;
+    else if (fit.faint.at (x, y) != 0)
+      quality = PixelQuality::low_contrast;
+    else if (fit.outlier.at (x, y) != 0)
+      quality = PixelQuality::outlier;
+  });
   return {};
 }
 
 /* Repeats rounds until they converge; the noise is estimated with them. */
 Result<void>
-converge (PhaseFit &fit, std::size_t numbers)
+converge (PhaseFit &fit)
 {
   double before = std::numeric_limits<double>::infinity ();
   for (int round = 0; round < kRounds; round++) {
-    const auto step = fit.round (numbers);
+    const auto step = fit.round (8);
     if (!step)
       return Error{"the gratings do not determine a mapping; check light and "
                    "focus, and that each frame shows its own pattern"};
@@ -139,14 +118,14 @@ converge (PhaseFit &fit, std::size_t numbers)
 
 /* Adds a displacement grid if the residuals of blocks exceed the noise. */
 Result<void>
-displace (PhaseFit &fit, int node_distance)
+displace (PhaseFit &fit)
 {
   if (std::max (reduced_chi_square (fit.blocks_x, fit.noise_ratio),
           reduced_chi_square (fit.blocks_y, fit.noise_ratio)) < kDisplaced)
     return {};
-  const auto nodes = [node_distance] (int size) {
+  const auto nodes = [] (int size) {
     return std::clamp (
-        1 + (size + node_distance / 2) / node_distance, 3, Mapping::kMaxNodes);
+        1 + (size + kNodeDistance / 2) / kNodeDistance, 3, Mapping::kMaxNodes);
   };
   Displacement grid;
   grid.columns = nodes (fit.camera.width);
@@ -253,8 +232,7 @@ Result<void>
 Calibration::add (
     const Pattern &pattern, ImageView<const std::uint16_t> frame, int bits)
 try {
-  return add_frame (
-      pattern, frame, (1 << std::clamp (bits > 0 ? bits : 16, 1, 16)) - 1);
+  return add_frame (pattern, frame, largest_pixel_of<std::uint16_t> (bits));
 } catch (const std::bad_alloc &) {
   return out_of_memory ();
 }
@@ -274,9 +252,7 @@ Calibration::Slot::mean () const
 {
   Image<float> mean = sum;
   const float part = 1.0f / float (frames);
-  for (int y = 0; y < mean.height (); y++)
-    for (int x = 0; x < mean.width (); x++)
-      mean.at (x, y) *= part;
+  each_pixel (mean, [&] (int x, int y) { mean.at (x, y) *= part; });
   return mean;
 }
 
@@ -329,8 +305,11 @@ Calibration::gratings (Axis axis) const
 Result<Image<std::uint8_t>>
 Calibration::usable_pixels (CalibrationResult &result) const
 {
+  std::vector<float> contrasts;
+  each_pixel (result.contrast,
+      [&] (int x, int y) { contrasts.push_back (result.contrast.at (x, y)); });
   const float covered =
-      std::max (1.0f, kCovered * quantile (result.contrast, 0.9));
+      std::max (1.0f, kCovered * quantile (std::move (contrasts), 0.9));
   Image<std::uint8_t> usable (camera_.width, camera_.height);
   for (int y = 0; y < camera_.height; y++)
     for (int x = 0; x < camera_.width; x++) {
@@ -348,29 +327,45 @@ Calibration::usable_pixels (CalibrationResult &result) const
 }
 
 Result<Mapping>
-Calibration::coarse_mapping (
-    ImageView<const std::uint8_t> usable, bool affine) const
+Calibration::coarse_mapping (ImageView<const std::uint8_t> usable) const
 {
-  ASSIGN_OR_RETURN (
-      const Homography coarse, fit_gray_codes (*gray_code (Axis::x),
-                                   *gray_code (Axis::y), usable, affine));
+  ASSIGN_OR_RETURN (const Homography coarse,
+      fit_gray_codes (*gray_code (Axis::x), *gray_code (Axis::y), usable));
   return Mapping::from_centred (camera_, mirrors_, coarse);
 }
 
+/* A stripe is wider than what is sought: it shows in the pixels that are beyond
+ * the border of the stripe which they see by the mapping. */
+double
+Calibration::gray_difference (Axis axis, const CalibrationResult &result) const
+{
+  const GrayCode code = *gray_code (axis);
+  double sum = 0.0, pixels = 0.0;
+  each_pixel (result.quality, [&] (int x, int y) {
+    if (result.quality.at (x, y) != PixelQuality::good)
+      return;
+    const Position at = result.mapping.mirror_at (x, y);
+    const double border = ((axis == Axis::x ? at.x : at.y) + 0.5) / code.width;
+    const double stripes =
+        (code.mirror_at (x, y) + 0.5) / code.width - 0.5 - std::floor (border);
+    sum += std::clamp (stripes, -1.0, 1.0) * code.width;
+    pixels++;
+  });
+  return sum / std::max (1.0, pixels);
+}
+
 Result<CalibrationResult>
-Calibration::fit (const CalibrationOptions &options) const
+Calibration::fit () const
 {
   const Image<float> dark = find (Pattern::Kind::dark)->mean ();
   const Image<float> white = find (Pattern::Kind::white)->mean ();
   const Image<float> dark_smooth = smoothed (dark);
   const Image<float> white_smooth = smoothed (white);
-  CalibrationResult result = {Mapping (camera_), 0, 0, 0, 0,
+  CalibrationResult result = {Mapping (camera_), 0, 0, 0, 0, 0,
       Image<PixelQuality> (camera_.width, camera_.height),
       difference (white, dark), {}, {}};
   ASSIGN_OR_RETURN (const Image<std::uint8_t> usable, usable_pixels (result));
-  const bool affine = options.model == FitModel::affine;
-  ASSIGN_OR_RETURN (
-      const Mapping start, coarse_mapping (usable.view (), affine));
+  ASSIGN_OR_RETURN (const Mapping start, coarse_mapping (usable.view ()));
 
   PhaseFit fit = {camera_, mirrors_, {}, {}, usable.view (),
       dark_smooth.view (), white_smooth.view (), start};
@@ -387,27 +382,24 @@ Calibration::fit (const CalibrationOptions &options) const
     (i < of_x ? fit.x : fit.y)
         .frames.push_back (std::as_const (frames[i]).view ());
 
-  RETURN_IF_ERROR (converge (fit, affine ? 6 : 8));
+  RETURN_IF_ERROR (converge (fit));
   result.residual_x = shifts_of (fit, fit.blocks_x);
   result.residual_y = shifts_of (fit, fit.blocks_y);
-  if (options.model == FitModel::displaced)
-    RETURN_IF_ERROR (displace (fit, options.node_distance));
+  RETURN_IF_ERROR (displace (fit));
   RETURN_IF_ERROR (report (fit, result));
+  result.gray_difference = std::hypot (
+      gray_difference (Axis::x, result), gray_difference (Axis::y, result));
   return result;
 }
 
 Result<CalibrationResult>
-Calibration::solve (const CalibrationOptions &options) const
+Calibration::solve () const
 try {
   if (const auto patterns = missing (); !patterns.empty ())
     return Error{std::to_string (patterns.size ()) +
                  " patterns of the calibration have no frame, the first is " +
                  patterns.front ().text () + "; add their frames"};
-  if (options.node_distance < 4)
-    return Error{"the nodes of a displacement grid must be 4 pixels apart or "
-                 "more, not " +
-                 std::to_string (options.node_distance)};
-  return fit (options);
+  return fit ();
 } catch (const std::bad_alloc &) {
   return out_of_memory ();
 }

@@ -24,21 +24,6 @@ enum class PixelQuality : std::uint8_t {
   outlier,      ///< it does not fit its neighbours: dust, a stuck mirror
 };
 
-/** What is fitted. */
-enum class FitModel {
-  affine,
-  homography,
-  /** A homography and, if the residuals exceed the noise, a displacement grid.
-   */
-  displaced,
-};
-
-struct CalibrationOptions {
-  FitModel model = FitModel::displaced;
-  /** Pixels between the nodes of a displacement grid. */
-  int node_distance = 32;
-};
-
 struct CalibrationResult {
   Mapping mapping;
   /** Blur between mirrors and pixels, standard deviation in pixels of a
@@ -50,6 +35,9 @@ struct CalibrationResult {
   /** Root of the reduced chi-square of the mean residuals of blocks: 1 if the
    * mapping explains everything but noise. */
   double misfit = 0.0;
+  /** By how much the mirrors that pixels see by the Gray codes differ from
+   * those by the mapping, in the mean over the frame, mirrors. */
+  double gray_difference = 0.0;
   Image<PixelQuality> quality;
   /** Difference between on and off of each pixel, DN. */
   Image<float> contrast;
@@ -89,8 +77,7 @@ public:
   std::vector<Pattern> missing () const;
 
   /** Takes seconds. Error when frames are missing or show no mirrors. */
-  Result<CalibrationResult> solve (
-      const CalibrationOptions &options = {}) const;
+  Result<CalibrationResult> solve () const;
 
 private:
   struct Slot {
@@ -113,9 +100,9 @@ private:
   Result<void> add_frame (
       const Pattern &pattern, ImageView<const Pixel> frame, int largest);
   Result<Image<std::uint8_t>> usable_pixels (CalibrationResult &result) const;
-  Result<Mapping> coarse_mapping (
-      ImageView<const std::uint8_t> usable, bool affine) const;
-  Result<CalibrationResult> fit (const CalibrationOptions &options) const;
+  Result<Mapping> coarse_mapping (ImageView<const std::uint8_t> usable) const;
+  double gray_difference (Axis axis, const CalibrationResult &result) const;
+  Result<CalibrationResult> fit () const;
 
   Extent camera_, mirrors_;
   std::vector<Slot> slots_;

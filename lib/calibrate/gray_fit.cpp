@@ -68,7 +68,7 @@ GrayCode::mirror_at (int x, int y) const
 
 Result<Homography>
 fit_gray_codes (const GrayCode &gx, const GrayCode &gy,
-    ImageView<const std::uint8_t> usable, bool affine)
+    ImageView<const std::uint8_t> usable)
 {
   const std::vector<Sample> samples = decode (gx, gy, usable);
   const Error lost{
@@ -96,7 +96,7 @@ fit_gray_codes (const GrayCode &gx, const GrayCode &gy,
       squares += dx * dx + dy * dy;
       fit.add (s.xi, s.eta, at, {dx, 1.0}, {dy, 1.0});
     }
-    const auto step = fit.solve (affine || round < 4 ? 6 : 8, false);
+    const auto step = fit.solve (round < 4 ? 6 : 8, false);
     if (!step)
       return lost;
     for (std::size_t i = 0; i < 8; i++)

@@ -23,10 +23,10 @@ struct GrayCode {
   double mirror_at (int x, int y) const;
 };
 
-/** A centred homography, with @p affine one whose numbers 6 and 7 are 0, by
- * least squares over the pixels that are marked @p usable. Outliers are left
- * out. Error when fewer than half of the pixels agree with one mapping. */
-Result<Homography> fit_gray_codes (const GrayCode &x, const GrayCode &y,
-    ImageView<const std::uint8_t> usable, bool affine);
+/** A centred homography, by least squares over the pixels that are marked @p
+ * usable. Outliers are left out. Error when fewer than half of the pixels agree
+ * with one mapping. */
+Result<Homography> fit_gray_codes (
+    const GrayCode &x, const GrayCode &y, ImageView<const std::uint8_t> usable);
 
 } // namespace codedexposure

@@ -11,6 +11,14 @@
 namespace codedexposure
 {
 
+namespace
+{
+
+using Square = Eigen::Matrix<double, int (HomographyFit::kNumbers),
+    int (HomographyFit::kNumbers), Eigen::RowMajor>;
+
+} // namespace
+
 void
 HomographyFit::add_axis (std::size_t first, double mirror, double xi,
     double eta, double z, const Observation &seen)
@@ -41,24 +49,18 @@ HomographyFit::add (double xi, double eta, const Projected &at,
 std::optional<HomographyFit::Step>
 HomographyFit::solve (std::size_t numbers, bool extra) const
 {
-  std::vector<std::size_t> used;
+  std::vector<Eigen::Index> used;
   for (std::size_t i = 0; i < kNumbers; i++)
     if (i < numbers || (i >= kExtra && extra))
-      used.push_back (i);
+      used.push_back (Eigen::Index (i));
+  const Eigen::MatrixXd part =
+      Eigen::Map<const Square> (normal_.data ()) (used, used);
   /* To unit diagonal, so that pivots can be compared with rounding errors. */
-  std::vector<double> scale;
-  for (const std::size_t i : used) {
-    const double diagonal = normal_[i * kNumbers + i];
-    if (!(diagonal > 0.0))
-      return std::nullopt;
-    scale.push_back (1.0 / std::sqrt (diagonal));
-  }
-  const std::size_t n = used.size ();
-  Eigen::MatrixXd matrix (n, n);
-  for (std::size_t i = 0; i < n; i++)
-    for (std::size_t j = 0; j <= i; j++)
-      matrix (Eigen::Index (i), Eigen::Index (j)) =
-          scale[i] * scale[j] * normal_[used[i] * kNumbers + used[j]];
+  if (!(part.diagonal ().minCoeff () > 0.0))
+    return std::nullopt;
+  const Eigen::VectorXd scale = part.diagonal ().cwiseSqrt ().cwiseInverse ();
+  const Eigen::MatrixXd matrix =
+      (scale * scale.transpose ()).cwiseProduct (part);
   const Eigen::LDLT<Eigen::MatrixXd> factor (matrix);
   if (factor.info () != Eigen::Success ||
       !(factor.vectorD ().minCoeff () >
@@ -67,15 +69,16 @@ HomographyFit::solve (std::size_t numbers, bool extra) const
   const Eigen::MatrixXd inverse =
       factor.solve (Eigen::MatrixXd::Identity (matrix.rows (), matrix.rows ()));
 
+  const Eigen::MatrixXd covariance =
+      (0.5 * scale * scale.transpose ())
+          .cwiseProduct (inverse + inverse.transpose ());
   Step step;
-  for (std::size_t i = 0; i < n; i++)
-    for (std::size_t j = 0; j < n; j++) {
-      const auto row = Eigen::Index (i), column = Eigen::Index (j);
-      const double entry = 0.5 * scale[i] * scale[j] *
-                           (inverse (row, column) + inverse (column, row));
-      step.covariance[used[i] * kNumbers + used[j]] = entry;
-      step.change[used[i]] += entry * right_[used[j]];
-    }
+  Eigen::Map<Square> (step.covariance.data ()) (used, used) = covariance;
+  for (std::size_t i = 0; i < used.size (); i++)
+    for (std::size_t j = 0; j < used.size (); j++)
+      step.change[std::size_t (used[i])] +=
+          covariance (Eigen::Index (i), Eigen::Index (j)) *
+          right_[std::size_t (used[j])];
   return step;
 }
 

@@ -2,7 +2,6 @@
 #include "calibrate/live_moire.h"
 
 #include <algorithm>
-#include <array>
 #include <cassert>
 #include <cmath>
 #include <complex>
@@ -13,6 +12,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "base/pixels.h"
 #include "base/try.h"
 
 namespace codedexposure
@@ -151,8 +151,8 @@ Phasors::slope (bool along_y) const
 
 /* phase = a xi + b eta + c, in coordinates relative to the frame's centre. */
 struct Plane {
-  std::array<double, 3> at = {};
-  std::array<double, 9> covariance = {};
+  Eigen::Vector3d at = Eigen::Vector3d::Zero ();
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero ();
 };
 
 /* Sums over the blocks of a row: xi, and the residuals of the phases. */
@@ -172,22 +172,19 @@ struct RowSums {
 
 /* Normal equations of a plane's numbers. */
 struct PlaneSums {
-  std::array<double, 9> normal = {};
-  std::array<double, 3> right = {};
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero ();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero ();
   double squares = 0.0;
 
   void add (const RowSums &row, double eta)
   {
-    const double sums[] = {row.xx, row.x * eta, row.x, row.x * eta,
-        row.n * eta * eta, row.n * eta, row.x, row.n * eta, row.n};
-    for (std::size_t i = 0; i < 9; i++)
-      normal[i] += sums[i];
-    right[0] += row.rest_x;
-    right[1] += row.rest * eta;
-    right[2] += row.rest;
+    const double cross = row.x * eta, y = row.n * eta;
+    normal += Eigen::Matrix3d{
+        {row.xx, cross, row.x}, {cross, y * eta, y}, {row.x, y, row.n}};
+    right += Eigen::Vector3d{row.rest_x, row.rest * eta, row.rest};
     squares += row.squares;
   }
-  double variance () const { return squares / normal[8]; }
+  double variance () const { return squares / normal (2, 2); }
   std::optional<Plane> solve () const;
 };
 
@@ -196,17 +193,12 @@ std::optional<Plane>
 PlaneSums::solve () const
 {
   constexpr double kMinPivot = 1e-12;
-  using Matrix = Eigen::Matrix3d;
-  const Eigen::LDLT<Matrix> factor (Eigen::Map<const Matrix> (normal.data ()));
+  const Eigen::LDLT<Eigen::Matrix3d> factor (normal);
   const Eigen::Vector3d pivots = factor.vectorD ();
   if (!(pivots.minCoeff () > kMinPivot * pivots.maxCoeff ()))
     return std::nullopt;
-  Plane plane;
-  Eigen::Map<Eigen::Vector3d> (plane.at.data ()) =
-      factor.solve (Eigen::Map<const Eigen::Vector3d> (right.data ()));
-  Eigen::Map<Matrix> (plane.covariance.data ()) =
-      factor.solve (Matrix::Identity ());
-  return plane;
+  return Plane{
+      factor.solve (right), factor.solve (Eigen::Matrix3d::Identity ())};
 }
 
 /* Sine of the phase of @z after a rotation by @back; beyond 90 degrees, 1. */
@@ -376,7 +368,8 @@ LiveMoire::State::start (
   /* One period of the carrier per block is invisible in the phasors. */
   (along_y ? slope_y : slope_x) += kTwoPi;
   Plane plane;
-  plane.at = {sign * slope_x / step * r, sign * slope_y / step * r,
+  plane.at = Eigen::Vector3d{sign * slope_x / step * r,
+      sign * slope_y / step * r,
       sign *
           (origin +
               kTwoPi * (along_y ? cy - phasors.first_y : cx - phasors.first_x) /
@@ -415,8 +408,7 @@ LiveMoire::State::refine (
   const auto change = sums.solve ();
   if (!change)
     return -1.0;
-  for (std::size_t i = 0; i < 3; i++)
-    plane.at[i] += sign * change->at[i];
+  plane.at += sign * change->at;
   plane.covariance = change->covariance;
   return sums.variance ();
 }
@@ -431,8 +423,7 @@ LiveMoire::State::fit (const Phasors &phasors, double sign, bool along_y) const
     variance = refine (phasors, plane, sign, 3.0 * std::sqrt (variance));
   if (!(variance >= 0.0))
     return Error{"the grating is seen in too small a part of the frame"};
-  for (double &entry : plane.covariance)
-    entry *= variance * carrier.overlap ();
+  plane.covariance *= variance * carrier.overlap ();
   return plane;
 }
 
@@ -446,21 +437,18 @@ LiveMoire::State::combine (const Plane &px, const Plane &py) const
   const Homography known = expected.centred ();
   Homography h = {0, 0, 0, 0, 0, 0, 0, 0, 1};
   Mapping::Covariance covariance = {};
+  Eigen::Map<Eigen::Matrix<double, Mapping::kParameters, Mapping::kParameters>>
+      all (covariance.data ());
   const Plane *planes[] = {&px, &py};
-  for (std::size_t d = 0; d < 2; d++) {
-    for (std::size_t i = 0; i < 3; i++) {
-      h[3 * d + i] = to_mirrors * planes[d]->at[i];
-      for (std::size_t j = 0; j < 3; j++)
-        covariance[(3 * d + i) * Mapping::kParameters + 3 * d + j] =
-            to_mirrors * to_mirrors *
-            (planes[d]->covariance[3 * i + j] +
-                planes[d]->covariance[3 * j + i]) /
-            2.0;
-    }
-    double &offset = h[3 * d + 2];
-    offset += origin;
-    offset += options.period *
-              std::round ((known[3 * d + 2] - offset) / options.period);
+  for (Eigen::Index d = 0; d < 2; d++) {
+    Eigen::Map<Eigen::Vector3d> (h.data () + 3 * d) =
+        to_mirrors * planes[d]->at;
+    const Eigen::Matrix3d &noise = planes[d]->covariance;
+    all.block<3, 3> (3 * d, 3 * d) =
+        to_mirrors * to_mirrors / 2.0 * (noise + noise.transpose ());
+    const auto at = std::size_t (3 * d + 2);
+    h[at] += origin;
+    h[at] += options.period * std::round ((known[at] - h[at]) / options.period);
   }
   ASSIGN_OR_RETURN (const Mapping mapping,
       Mapping::from_centred (expected.camera (), expected.mirrors (), h));
@@ -499,11 +487,11 @@ LiveMoire::State::solve (ImageView<const Pixel> frame)
     for (std::size_t i = 0; i < phasors->at.size (); i++)
       shown += phasors->shows (i);
   reading.coverage = double (shown) / double (x.at.size () + y.at.size ());
-  const int bits = options.bits > 0 ? options.bits : 8 * int (sizeof (Pixel));
   for (int row = 0; row < frame.height; row++)
     reading.saturated += std::uint64_t (
         std::count_if (frame.row (row), frame.row (row) + frame.width,
-            [largest = (1 << bits) - 1] (Pixel p) { return p >= largest; }));
+            [largest = largest_pixel_of<Pixel> (options.bits)] (
+                Pixel p) { return p >= largest; }));
   return reading;
 }
 

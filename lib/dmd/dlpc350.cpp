@@ -16,12 +16,9 @@ namespace
 using namespace dlpc350;
 using namespace std::chrono_literals;
 
-constexpr Extent kMirrors{912, 1140};
 /** Of the hardware status: resets, forced swap, sequencer. */
 constexpr std::uint8_t kFailures = 0xCC;
 constexpr int kStartAttempts = 3;
-/** Masks in one frame of video. */
-constexpr int kVideoPlanes = kPlanesPerImage;
 
 class Dlpc350 final : public DlpcBoard
 {
@@ -67,10 +64,7 @@ Dlpc350::open ()
 {
   RETURN_IF_ERROR (greet ());
   RETURN_IF_ERROR (read_byte (kHardwareStatus));
-  set_info ("DLP4500", kMirrors, kMinimumExposure, kMinimumDark,
-      video () ? kVideoPlanes : kPreloadedPlanes);
-  info_.array = Array::diamond;
-  return check_placement (options_.placement, info_.array, info_.size);
+  return set_info (*find_board ("dlp4500"));
 }
 
 Result<DmdStatus>
@@ -235,14 +229,9 @@ Dlpc350::start (const SlotPlan &plan, std::stop_token stop_token)
 {
   if (masks_.empty ())
     return Error{info_.name + ": no masks to start; upload first"};
-  const auto time = fit_equal_patterns (plan,
-      {kMinimumExposure, kMaximumExposure, kMinimumDark, 0, kMinimumDark},
-      options_.master);
+  const auto time = fit_equal_patterns (plan, *info_.patterns);
   if (!time)
     return time.error ().with_prefix (info_.name + ": ");
-  if (video () && time->dark != 0)
-    return Error{info_.name + ": masks from video follow each other without "
-                              "dark time; give the schedule switching=0"};
   RETURN_IF_ERROR (watch ());
   begin (std::move (stop_token));
   // After every stop, the board needs its tables and their validation again.

@@ -32,15 +32,6 @@ constexpr std::uint8_t kMailboxClosed = 0;
 constexpr std::uint8_t kMailboxImages = 1;
 constexpr std::uint8_t kMailboxPatterns = 2;
 
-/** Masks in the two buffers, shown without reading flash meanwhile; the table
- * of images takes more. */
-constexpr int kPreloadedPlanes = 48;
-constexpr std::uint32_t kMinimumExposure = 235;
-/** A black mask takes this long to load: period and exposure differ by at least
- * this time, or not at all. */
-constexpr std::uint32_t kMinimumDark = 230;
-constexpr std::uint32_t kMaximumExposure = 200'000'000;
-
 enum class Source : std::uint8_t { video = 0, flash = 3 };
 /** What steps through the table: the frames of the video; or a timer or the
  * trigger input, entry by entry. */

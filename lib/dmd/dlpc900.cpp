@@ -22,10 +22,6 @@ namespace
 using namespace dlpc900;
 
 constexpr Nanoseconds kPacketTime = 1'000'000; // full-speed interrupt transfer
-constexpr std::uint32_t kLongestTime = 0xFFFFFF;
-/** Black that it inserts before a mask that waits for the camera, us. */
-constexpr std::uint32_t kTriggerDark = 105;
-constexpr int kMinTriggerDelay = 104;
 /** Masks whose order fits in one message. */
 constexpr int kMaxOrder = int (kHidRequestData - 6) / 2;
 /** Of the hardware status: DMD of another kind, resets, forced swap, sequencer.
@@ -148,7 +144,6 @@ private:
   using Indexed = std::pair<int, const Halves *>;
 
   std::string explain () override;
-  PatternLimits limits () const;
   Result<std::vector<PatternTime>> times_of (const SlotPlan &plan) const;
   UploadPlan plan_upload (const Schedule &schedule) const;
   EncodedImages &images_of (const Schedule &schedule);
@@ -173,7 +168,7 @@ private:
   Result<void> run (
       const std::vector<PatternTime> &times, const SlotPlan &plan);
 
-  Board kind_ = {};
+  const BoardFacts *facts_ = nullptr;
   Version version_;
   int controllers_ = 1;
 
@@ -219,45 +214,28 @@ Dlpc900::open ()
   ASSIGN_OR_RETURN (const Bytes version, greet ());
   version_ = parse_version (version);
   ASSIGN_OR_RETURN (const std::uint8_t type, read_byte (kHardware));
-  const auto kind = find_board (type);
-  if (!kind)
-    return error ("open it", kind.error ().message);
-  kind_ = *kind;
+  facts_ = find_dlpc900 (type);
+  if (!facts_)
+    return error ("open it", "hardware type " + std::to_string (type) +
+                                 " is not a known DMD (1..5)");
   ASSIGN_OR_RETURN (const std::uint8_t status, read_byte (kHardwareStatus));
   controllers_ = (status & kSecondController) != 0 ? 2 : 1;
 
   // Firmware without this command has the minimum of the table.
-  std::uint32_t min_active = kind_.minimum_exposure;
-  if (const auto minima = read (kMinimumExposures, kMinimumExposuresSize))
-    if (const std::uint32_t binary = read_le (*minima, 0, 2); binary > 0)
-      min_active = binary;
-  set_info (
-      kind_.name, kind_.size, min_active, kind_.minimum_exposure, kMaxEntries);
-  info_.still_masks = true;
-
-  if (options_.trigger_delay < kMinTriggerDelay * 1000 ||
-      options_.trigger_delay > 0xFFFF * 1000)
-    return Error{info_.name + ": trigger-delay is " +
-                 time_text (options_.trigger_delay) + "; use 104us to 65535us"};
-  if (!options_.images.empty ())
-    return Error{info_.name + ": takes its masks over USB; leave out images="};
-  if (const auto &region = options_.placement.region)
-    info_.region = {region->width, region->height};
-  return check_placement (options_.placement, info_.array, info_.size);
-}
-
-PatternLimits
-Dlpc900::limits () const
-{
-  return {std::uint32_t (info_.minimum_active / 1000), kLongestTime,
-      kind_.minimum_exposure, std::uint32_t (options_.trigger_delay / 1000),
-      kTriggerDark};
+  const auto minima = read (kMinimumExposures, kMinimumExposuresSize);
+  RETURN_IF_ERROR (set_info (*facts_));
+  const std::uint32_t binary = minima ? read_le (*minima, 0, 2) : 0;
+  if (binary > 0) {
+    info_.patterns->limits.minimum_exposure = binary;
+    info_.minimum_active = Nanoseconds (binary) * 1000;
+  }
+  return {};
 }
 
 Result<std::vector<PatternTime>>
 Dlpc900::times_of (const SlotPlan &plan) const
 {
-  const auto times = fit_patterns (plan, limits (), options_.master);
+  const auto times = fit_patterns (plan, *info_.patterns);
   if (!times)
     return times.error ().with_prefix (info_.name + ": ");
   return times;
@@ -267,7 +245,7 @@ Result<DmdStatus>
 Dlpc900::status ()
 {
   begin ();
-  return state ({{"controller", "DLPC900"}, {"mirrors", kind_.name},
+  return state ({{"controller", "DLPC900"}, {"mirrors", facts_->mirrors},
       {"firmware", version_.text ()},
       {"controllers", std::to_string (controllers_)}});
 }
@@ -305,7 +283,8 @@ Dlpc900::plan_upload (const Schedule &schedule) const
   }
 
   // Images stay as they are only under a table of the same planes.
-  const bool same_planes = residents_.planes == plan.residents.planes;
+  const bool same_planes = has.size () == wants.size () &&
+                           residents_.planes == plan.residents.planes;
   for (int image = planes.images - 1; image >= 0; image--) {
     bool same = same_planes;
     for (std::size_t mask = 0; same && mask < wants.size (); mask++)
@@ -529,7 +508,7 @@ Result<void>
 Dlpc900::show (
     const StillMask &mask, const SlotPlan &plan, std::stop_token stop_token)
 {
-  const auto still = fit_still (plan, mask, limits (), options_.master);
+  const auto still = fit_still (plan, mask, *info_.patterns);
   if (!still)
     return still.error ().with_prefix (info_.name + ": ");
   RETURN_IF_ERROR (watch ());

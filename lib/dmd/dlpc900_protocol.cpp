@@ -16,14 +16,6 @@ constexpr std::uint8_t kEnhancedRunLength = 2;
 /** Rows of plain images are padded to a multiple of this. */
 constexpr std::size_t kRowPadding = 16;
 
-constexpr std::array<Board, 5> kBoards{{
-    {1, "DLP6500", {1920, 1080}, 105},
-    {2, "DLP9000", {2560, 1600}, 105},
-    {3, "DLP670S", {2716, 1600}, 105},
-    {4, "DLP500YX", {2048, 1200}, 62},
-    {5, "DLP5500", {1024, 768}, 105},
-}};
-
 /** By error code. */
 constexpr const char *kErrors[] = {"", "batch file checksum", "device failure",
     "invalid command number", "controller and DMD do not belong together",
@@ -70,17 +62,6 @@ image_header (Extent image, std::size_t size, std::uint8_t packing)
 }
 
 } // namespace
-
-Result<Board>
-find_board (std::uint8_t type)
-{
-  for (const Board &board : kBoards)
-    if (board.type == type)
-      return board;
-  return Error{
-      "hardware type " + std::to_string (type) + " is not a known DMD (1..5)",
-      ErrorCode::device};
-}
 
 Bytes
 encode_entry (const Entry &entry)

@@ -35,20 +35,8 @@ constexpr std::uint8_t kModeOnTheFly = 3;
 /** Image bytes in one message, after flags, command and their count. */
 constexpr std::size_t kChunkHead = 8;
 constexpr std::size_t kImageChunk = kHidMessageSize - kChunkHead;
-/** Lines of the pattern table; every board holds more planes. */
-constexpr int kMaxEntries = 400;
 /** Bytes of these replies. */
 constexpr std::size_t kMinimumExposuresSize = 16; // 8 depths, the binary first
-
-/** What a board is, by the hardware type that it reports. */
-struct Board {
-  std::uint8_t type;
-  const char *name;
-  Extent size;
-  std::uint32_t minimum_exposure; ///< of a binary mask, us
-};
-/** Fails for a type that is not in the table. */
-Result<Board> find_board (std::uint8_t type);
 
 /** One line of the pattern table. Exposure and dark time are below 2^24 us. */
 struct Entry {
@@ -67,7 +55,7 @@ Bytes encode_order (const std::vector<int> &order);
 
 /** Delays of a trigger output from the exposure, -20..20000 us. */
 Bytes encode_trigger_out (bool invert, int rising_us, int falling_us);
-/** @p delay_us  104 or more. */
+/** @p delay_us  BoardFacts::minimum_trigger_delay or more. */
 Bytes encode_trigger_in (int delay_us, bool falling);
 
 /** What the device gets for columns [x, x + width) of an image: a header and

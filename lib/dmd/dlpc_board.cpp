@@ -9,16 +9,17 @@ namespace codedexposure
 using namespace dlp;
 using namespace std::chrono_literals;
 
-void
-DlpcBoard::set_info (const char *mirrors, Extent size, std::uint32_t active,
-    std::uint32_t dark, int masks)
+Result<void>
+DlpcBoard::set_info (const BoardFacts &facts)
 {
-  info_.name = link_->name () + " (" + mirrors + ")";
+  const std::string name = link_->name () + " (" + facts.mirrors + ")";
+  auto info = board_info (facts, options_);
+  if (!info)
+    return info.error ().with_prefix (name + ": ");
+  info_ = *std::move (info);
+  info_.name = name;
   info_.serial = link_->serial ();
-  info_.size = size;
-  info_.minimum_active = Nanoseconds (active) * 1000;
-  info_.minimum_dark = Nanoseconds (dark) * 1000;
-  info_.resident_masks = masks;
+  return {};
 }
 
 Result<Bytes>

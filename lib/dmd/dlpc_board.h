@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "dmd/boards.h"
 #include "dmd/drivers.h"
 #include "dmd/stop_guard.h"
 
@@ -61,9 +62,9 @@ protected:
   Result<void> check_health ();
   /** The state of the board, after the @p details of the driver. */
   Result<DmdStatus> state (decltype (DmdStatus::details) details);
-  /** Sets what boards differ in. @p active, @p dark  min times in us. */
-  void set_info (const char *mirrors, Extent size, std::uint32_t active,
-      std::uint32_t dark, int masks);
+  /** Takes over what the board can do. Error for options that it does not have.
+   */
+  Result<void> set_info (const BoardFacts &facts);
   Error error (const std::string &what, const std::string &reason) const
   {
     return link_->error (what, reason);

@@ -104,6 +104,9 @@ check_limits (
                  " to switch masks, the schedule leaves " +
                  time_text (schedule.timing ().switching) +
                  "; give it switching=" + time_text (info.minimum_switching)};
+  if (info.patterns)
+    if (const auto times = check_patterns (plan, *info.patterns); !times)
+      return times.error ().with_prefix (info.name + ": ");
   return {};
 }
 

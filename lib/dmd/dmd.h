@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <stop_token>
 #include <string>
 #include <string_view>
@@ -11,6 +12,7 @@
 #include <vector>
 
 #include "base/result.h"
+#include "dmd/pattern_timing.h"
 #include "schedule/mirror_array.h"
 #include "schedule/schedule.h"
 #include "schedule/still_mask.h"
@@ -29,8 +31,8 @@ struct DmdInfo {
   bool triggers_camera = false; ///< no frame is exposed while it is parked
   bool trigger_in = false;      ///< a camera can start its masks
   bool trigger_out = false;     ///< it can start a camera's exposures
-  /** Min dark time between two masks, if it is not 0. */
-  Nanoseconds minimum_dark = 0;
+  /** How its controller times masks; none: it shows any slots. */
+  std::optional<PatternRule> patterns = {};
   Array array = Array::orthogonal;
   /** Size of the region that shows masks; {}: all mirrors. */
   Extent region = {};

@@ -133,8 +133,9 @@ Result<HidReply>
 HidLink::receive (const HidCommand &command)
 {
   const bool slow = command.timeout > kPatience;
-  const Milliseconds limit = slow ? std::max (command.timeout, patience_)
-                                  : std::min (command.timeout, patience_);
+  const Milliseconds left_over = std::max (patience_, 0ms);
+  const Milliseconds limit = slow ? std::max (command.timeout, left_over)
+                                  : std::min (command.timeout, left_over);
   due_ = std::max (command.timeout, limit);
   bool strays = false;
   for (Milliseconds left = limit; left > 0ms;) {
@@ -162,7 +163,10 @@ HidLink::receive (const HidCommand &command)
   return error (command.name,
       strays ? "it sends only replies to other requests; is another program "
                "using it?"
-             : "no reply within " + std::to_string (limit.count ()) + " ms",
+      : limit == 0ms
+          ? std::string ("no time is left to wait for its reply; give it more "
+                         "patience=")
+          : "no reply within " + std::to_string (limit.count ()) + " ms",
       ErrorCode::timeout);
 }
 

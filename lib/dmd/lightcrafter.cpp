@@ -6,6 +6,7 @@
 #include "base/try.h"
 #include "base/wait.h"
 #include "dmd/bitmap.h"
+#include "dmd/boards.h"
 #include "dmd/drivers.h"
 #include "dmd/lightcrafter_protocol.h"
 #include "dmd/stop_guard.h"
@@ -20,9 +21,6 @@ namespace
 using namespace lightcrafter;
 using namespace std::chrono_literals;
 
-constexpr Extent kMirrors{608, 684};
-constexpr std::uint32_t kMinimumExposure = 250;
-constexpr std::uint32_t kMaximumExposure = 2'000'000;
 constexpr std::uint32_t kCameraPulse = 100;
 /** How long a job, and a stop, waits for a board that is silent or busy. */
 constexpr std::chrono::milliseconds kPatience{2000};
@@ -42,12 +40,6 @@ public:
         host_ (std::move (host)), port_ (port)
   {
     info_.name = "lightcrafter:" + host_;
-    info_.size = kMirrors;
-    info_.array = Array::diamond;
-    info_.minimum_active = Nanoseconds (kMinimumExposure) * 1000;
-    info_.minimum_switching = options_.gap;
-    info_.resident_masks = kMaxPatterns;
-    info_.minimum_dark = options_.gap;
   }
   ~Lightcrafter () override
   {
@@ -200,7 +192,12 @@ Lightcrafter::open ()
                                ask (PacketType::read, kVersion, of_system)));
   version_ = printable (std::string (
       version.begin (), std::find (version.begin (), version.end (), 0)));
-  return check_placement (options_.placement, info_.array, info_.size);
+  auto info = board_info (*find_board ("dlp3000"), options_);
+  if (!info)
+    return info.error ().with_prefix (info_.name + ": ");
+  info->name = std::move (info_.name);
+  info_ = *std::move (info);
+  return {};
 }
 
 Result<DmdStatus>
@@ -246,7 +243,7 @@ Lightcrafter::send_masks (
   RETURN_IF_ERROR (
       set_sequence ({10'000, std::uint32_t (options_.gap / 1000)}));
 
-  const MaskRenderer renderer (schedule, kMirrors, options_.placement);
+  const MaskRenderer renderer (schedule, info_.size, options_.placement);
   for (int mask = 0; mask < masks_; mask++) {
     progress (mask, masks_);
     if (cancel_.stop_requested ())
@@ -279,9 +276,7 @@ Lightcrafter::start (const SlotPlan &plan, std::stop_token stop_token)
 {
   if (masks_ == 0)
     return Error{info_.name + ": no masks to start; upload first"};
-  const auto gap = std::uint32_t (options_.gap / 1000);
-  const auto time = fit_equal_patterns (
-      plan, {kMinimumExposure, kMaximumExposure, gap, 0, gap}, options_.master);
+  const auto time = fit_equal_patterns (plan, *info_.patterns);
   if (!time)
     return time.error ().with_prefix (info_.name + ": ");
   RETURN_IF_ERROR (watch ());

@@ -20,7 +20,6 @@ constexpr std::uint16_t kCameraTrigger = 0x0404;
 constexpr std::uint16_t kSequence = 0x0480;
 
 constexpr std::uint8_t kModeSequence = 4;
-constexpr int kMaxPatterns = 96;
 
 enum class PacketType : std::uint8_t {
   busy = 0,

@@ -102,6 +102,9 @@ DmdOptions::parse (std::string_view device)
           {{"plain", false}, {"swapped", true}}),
       value_key ("gap", "TIME", o.gap, parse_time)};
   ASSIGN_OR_RETURN (o.which, parse_device (device, keys));
+  const auto parts = split (device, ',');
+  for (std::size_t i = 1; i < parts.size (); i++)
+    o.keys.emplace_back (parts[i].substr (0, parts[i].find ('=')));
   return o;
 }
 

@@ -25,8 +25,8 @@ namespace codedexposure
  *   layout=address|lattice|cell  of the tile on a diamond array
  *   region=WxH[+X+Y]     mirrors that show masks; the others stay off and
  *                        upload in almost no time
- *   trigger-delay=TIME   from the camera's edge to light (DLPC900: 104 us or
- *                        more, default 105 us)
+ *   trigger-delay=TIME   from the camera's edge to light (DLPC900: default
+ *                        105 us)
  *   edge=rising|falling  of the camera's signal
  *   pulse=high|low       level of the pulses to the camera (USB boards)
  *   patience=TIME        how long a job waits for a USB board that does not
@@ -47,6 +47,7 @@ namespace codedexposure
  */
 struct DmdOptions {
   std::string which; ///< what stands between the scheme and the first comma
+  std::vector<std::string> keys = {}; ///< of the options that follow
   Master master = Master::dmd;
   Placement placement = {};
   Nanoseconds trigger_delay = 105'000;

@@ -70,12 +70,14 @@ check_burst (
 } // namespace
 
 Result<std::vector<PatternTime>>
-fit_patterns (const SlotPlan &plan, const PatternLimits &limits, Master master)
+fit_patterns (const SlotPlan &plan, const PatternRule &rule)
 {
+  const PatternLimits &limits = rule.limits;
   const Nanoseconds switching = switching_of (plan);
   // With the camera as master the burst ends with the light of the last slot.
-  const Nanoseconds end = master == Master::dmd ? plan.frame_period ()
-                                                : plan.exposure () + switching;
+  const Nanoseconds end = rule.master == Master::dmd
+                              ? plan.frame_period ()
+                              : plan.exposure () + switching;
   std::vector<PatternTime> times;
   std::int64_t length = 0;
   for (int slot = 0; slot < plan.slots (); slot++) {
@@ -91,7 +93,7 @@ fit_patterns (const SlotPlan &plan, const PatternLimits &limits, Master master)
     times.push_back (time);
     length += time.exposure + (last ? 0 : time.dark);
   }
-  if (master == Master::camera) {
+  if (rule.master == Master::camera) {
     times.back ().dark = 0; // the controller adds its own before it waits
     RETURN_IF_ERROR (check_burst (length, plan, limits));
   }
@@ -130,9 +132,9 @@ check_stretch (const StillMask &mask, const SlotPlan &plan, const char *what,
 } // namespace
 
 Result<StillTimes>
-fit_still (const SlotPlan &plan, const StillMask &mask,
-    const PatternLimits &limits, Master master)
+fit_still (const SlotPlan &plan, const StillMask &mask, const PatternRule &rule)
 {
+  const PatternLimits &limits = rule.limits;
   const int after = mask.first + mask.slots;
   if (mask.first < 0 || mask.slots < 1 || after > plan.slots ())
     return Error{mask.name + " in " + slots_text (mask) +
@@ -142,7 +144,7 @@ fit_still (const SlotPlan &plan, const StillMask &mask,
   const std::int64_t least = std::max (limits.minimum_dark, 1u);
   const std::int64_t before = us (plan.start (mask.first));
   const std::int64_t end =
-      us (master == Master::dmd ? plan.frame_period () : plan.exposure ());
+      us (rule.master == Master::dmd ? plan.frame_period () : plan.exposure ());
   const std::int64_t light_ends = us (plan.start (after - 1) + plan.active ());
   const std::int64_t next =
       after == plan.slots () ? end : us (plan.start (after));
@@ -157,33 +159,47 @@ fit_still (const SlotPlan &plan, const StillMask &mask,
       check_stretch (mask, plan, "on", lit, limits.minimum_exposure, limits));
   RETURN_IF_ERROR (check_stretch (
       mask, plan, "off after its light", dark, dark > 0 ? least : 0, limits));
-  if (master == Master::camera)
+  if (rule.master == Master::camera)
     RETURN_IF_ERROR (check_burst (end, plan, limits));
   return StillTimes{
       std::uint32_t (before), {std::uint32_t (lit), std::uint32_t (dark)}};
 }
 
 Result<PatternTime>
-fit_equal_patterns (
-    const SlotPlan &plan, const PatternLimits &limits, Master master)
+fit_equal_patterns (const SlotPlan &plan, const PatternRule &rule)
 {
+  const PatternLimits &limits = rule.limits;
   const Nanoseconds switching = switching_of (plan);
   const Nanoseconds slot = plan.active () + switching;
   const std::int64_t pitch =
-      (master == Master::dmd ? plan.frame_period () / plan.slots () : slot) /
+      (rule.master == Master::dmd ? plan.frame_period () / plan.slots ()
+                                  : slot) /
       kMicrosecond;
   const Nanoseconds rest = plan.frame_period () - slot * plan.slots ();
-  if (master == Master::dmd && rest >= kMicrosecond * plan.slots ())
+  if (rule.master == Master::dmd && rest >= kMicrosecond * plan.slots ())
     return Error{"as master, this DMD repeats its masks without a pause, and " +
                  std::to_string (plan.slots ()) + " slots of " +
                  time_text (slot) + " leave " + time_text (rest) +
                  " of the frame; give the schedule active=0 and readout=0, or "
-                 "let the camera be master"};
+                 "let the camera be master (master=camera)"};
   ASSIGN_OR_RETURN (
       const PatternTime time, split_slot (pitch, switching, plan, limits));
-  if (master == Master::camera)
+  if (rule.no_dark && time.dark != 0)
+    return Error{"masks from video follow each other without dark time; give "
+                 "the schedule switching=0"};
+  if (rule.master == Master::camera)
     RETURN_IF_ERROR (check_burst (pitch * plan.slots (), plan, limits));
   return time;
+}
+
+Result<void>
+check_patterns (const SlotPlan &plan, const PatternRule &rule)
+{
+  if (rule.equal_times)
+    RETURN_IF_ERROR (fit_equal_patterns (plan, rule));
+  else
+    RETURN_IF_ERROR (fit_patterns (plan, rule));
+  return {};
 }
 
 } // namespace codedexposure

@@ -36,6 +36,16 @@ struct PatternLimits {
   std::uint32_t trigger_dark = 0;
 };
 
+/** How a controller times the masks of an exposure. */
+struct PatternRule {
+  PatternLimits limits = {};
+  Master master = Master::dmd;
+  bool equal_times = false; ///< fit_equal_patterns (), else fit_patterns ()
+  bool no_dark = false;     ///< masks follow each other without dark time
+};
+/** Whether a controller can show a mask in each slot of @p plan. */
+Result<void> check_patterns (const SlotPlan &plan, const PatternRule &rule);
+
 /**
  * The times of the N masks of one exposure.
  *
@@ -49,7 +59,7 @@ struct PatternLimits {
  * its slots leave too little of the frame period for the trigger.
  */
 Result<std::vector<PatternTime>> fit_patterns (
-    const SlotPlan &plan, const PatternLimits &limits, Master master);
+    const SlotPlan &plan, const PatternRule &rule);
 
 /** How a still mask stands in an exposure. */
 struct StillTimes {
@@ -67,8 +77,8 @@ struct StillTimes {
  *
  * Fails if the plan does not have these slots, or like fit_patterns ().
  */
-Result<StillTimes> fit_still (const SlotPlan &plan, const StillMask &mask,
-    const PatternLimits &limits, Master master);
+Result<StillTimes> fit_still (
+    const SlotPlan &plan, const StillMask &mask, const PatternRule &rule);
 
 /**
  * fit_patterns () for controllers with one exposure and one dark time for all
@@ -76,6 +86,6 @@ Result<StillTimes> fit_still (const SlotPlan &plan, const StillMask &mask,
  * the frame period, because such a controller has no pause.
  */
 Result<PatternTime> fit_equal_patterns (
-    const SlotPlan &plan, const PatternLimits &limits, Master master);
+    const SlotPlan &plan, const PatternRule &rule);
 
 } // namespace codedexposure

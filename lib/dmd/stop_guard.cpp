@@ -153,8 +153,6 @@ stand_guard (int words, const std::string &device)
 BoardDmd::BoardDmd (const DmdOptions &options, std::string device)
     : options_ (options), device_ (std::move (device))
 {
-  info_.triggers_camera = options.master == Master::dmd;
-  info_.trigger_in = info_.trigger_out = true;
 }
 
 Result<void>

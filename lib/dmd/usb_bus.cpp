@@ -18,16 +18,8 @@ namespace codedexposure
 namespace
 {
 
-constexpr std::uint16_t kVendor = 0x0451;
 constexpr int kInterface = 0;
 constexpr int kMaxPorts = 7;
-
-struct Product {
-  std::uint16_t id;
-  UsbController controller;
-};
-constexpr std::array<Product, 2> kProducts{
-    {{0x6401, UsbController::dlpc350}, {0xC900, UsbController::dlpc900}}};
 
 using Context = std::shared_ptr<libusb_context>;
 using Device = std::shared_ptr<libusb_device>;
@@ -86,13 +78,15 @@ recognise (libusb_device *device)
 {
   libusb_device_descriptor descriptor{};
   if (libusb_get_device_descriptor (device, &descriptor) != 0 ||
-      descriptor.idVendor != kVendor)
+      descriptor.idVendor != kUsbVendor ||
+      (descriptor.idProduct != kUsbDlpc350 &&
+          descriptor.idProduct != kUsbDlpc900))
     return std::nullopt;
-  for (const Product &product : kProducts)
-    if (product.id == descriptor.idProduct)
-      return Found{Device (libusb_ref_device (device), libusb_unref_device),
-          UsbBoard{product.controller, port_of (device), "", ""}, descriptor};
-  return std::nullopt;
+  const auto controller = descriptor.idProduct == kUsbDlpc350
+                              ? Controller::dlpc350
+                              : Controller::dlpc900;
+  return Found{Device (libusb_ref_device (device), libusb_unref_device),
+      UsbBoard{controller, port_of (device), "", ""}, descriptor};
 }
 
 Result<Handle>
@@ -302,12 +296,6 @@ choose (std::vector<Found> boards, const std::string &which)
 
 } // namespace
 
-const char *
-controller_text (UsbController controller)
-{
-  return controller == UsbController::dlpc350 ? "DLPC350" : "DLPC900";
-}
-
 Result<std::vector<UsbBoard>>
 list_usb_boards ()
 {
@@ -332,7 +320,7 @@ open_usb_dmd (std::string_view device)
   ASSIGN_OR_RETURN (auto pipe, open_pipe (context, found));
   auto link = std::make_unique<HidLink> (
       std::move (pipe), "usb:" + found.board.port, found.board.serial);
-  return found.board.controller == UsbController::dlpc350
+  return found.board.controller == Controller::dlpc350
              ? open_dlpc350 (std::move (link), options)
              : open_dlpc900 (std::move (link), options);
 }

@@ -7,11 +7,10 @@
 #include <complex>
 #include <numbers>
 
-#include <Eigen/Core>
-
+#include "base/statistics.h"
 #include "calibrate/gratings.h"
 #include "calibrate/response.h"
-#include "doctor/solve.h"
+#include "estimate/least_squares.h"
 
 namespace codedexposure
 {
@@ -192,15 +191,11 @@ double
 BlurMap::median () const
 {
   std::vector<float> known;
-  for (int y = 0; y < variance.height (); y++)
-    for (int x = 0; x < variance.width (); x++)
-      if (variance.at (x, y) >= 0.0f)
-        known.push_back (variance.at (x, y));
-  if (known.empty ())
-    return 0.0;
-  const auto middle = known.begin () + std::ptrdiff_t (known.size () / 2);
-  std::nth_element (known.begin (), middle, known.end ());
-  return std::sqrt (double (*middle));
+  each_pixel (variance, [&] (int x, int y) {
+    if (variance.at (x, y) >= 0.0f)
+      known.push_back (variance.at (x, y));
+  });
+  return std::sqrt (double (codedexposure::median (std::move (known))));
 }
 
 BlurMap
@@ -216,115 +211,69 @@ map_blur (const GratingStack &stack, ImageView<const std::uint8_t> good,
   const Expected of_x (int (stack.x.size ()), 1.0 / magnification);
   const Expected of_y (int (stack.y.size ()), 1.0 / magnification);
   const double scale = magnification * magnification;
-  for (int j = 0; j < map.variance.height (); j++)
-    for (int i = 0; i < map.variance.width (); i++) {
-      const Rect block = {i * map.block, j * map.block,
-          std::min (map.block, good.width - i * map.block),
-          std::min (map.block, good.height - j * map.block)};
-      const BlockPowers x = powers_of (Axis::x, stack, good, block, mapping);
-      const BlockPowers y = powers_of (Axis::y, stack, good, block, mapping);
-      map.variance.at (i, j) = -1.0f;
-      if (x.pixels < kLeastPixels)
-        continue;
-      const Measured vx = variance_of (x, of_x), vy = variance_of (y, of_y);
-      map.variance.at (i, j) = float (scale * 0.5 * (vx.value + vy.value));
-      map.sigma.at (i, j) =
-          float (scale * 0.5 * std::hypot (vx.sigma, vy.sigma));
-    }
+  each_pixel (map.variance, [&] (int i, int j) {
+    const Rect block = {i * map.block, j * map.block,
+        std::min (map.block, good.width - i * map.block),
+        std::min (map.block, good.height - j * map.block)};
+    const BlockPowers x = powers_of (Axis::x, stack, good, block, mapping);
+    const BlockPowers y = powers_of (Axis::y, stack, good, block, mapping);
+    map.variance.at (i, j) = -1.0f;
+    if (x.pixels < kLeastPixels)
+      return;
+    const Measured vx = variance_of (x, of_x), vy = variance_of (y, of_y);
+    map.variance.at (i, j) = float (scale * 0.5 * (vx.value + vy.value));
+    map.sigma.at (i, j) = float (scale * 0.5 * std::hypot (vx.sigma, vy.sigma));
+  });
   return map;
 }
-
-namespace
-{
-
-using Focus = Eigen::Vector4d; // even variance; defocus, its slopes in x and y
-
-struct FocusPoint {
-  double x, y, variance, sigma; // place in half frames from the centre
-};
-
-double
-misfit (const std::vector<FocusPoint> &points, const Focus &f)
-{
-  double sum = 0.0;
-  for (const FocusPoint &p : points) {
-    const double z = f[1] + f[2] * p.x + f[3] * p.y;
-    sum += std::pow ((p.variance - f[0] - z * z) / p.sigma, 2.0);
-  }
-  return sum;
-}
-
-/* A step of Levenberg and Marquardt. */
-void
-improve (const std::vector<FocusPoint> &points, Focus &f, double &damping,
-    Eigen::Matrix4d &normal)
-{
-  Eigen::Vector4d right = Eigen::Vector4d::Zero ();
-  normal.setZero ();
-  for (const FocusPoint &p : points) {
-    const double z = f[1] + f[2] * p.x + f[3] * p.y;
-    const Eigen::Vector4d slope (1.0, 2.0 * z, 2.0 * z * p.x, 2.0 * z * p.y);
-    const double weight = 1.0 / (p.sigma * p.sigma);
-    normal += weight * slope * slope.transpose ();
-    right += weight * (p.variance - f[0] - z * z) * slope;
-  }
-  const double before = misfit (points, f);
-  for (int i = 0; i < 8; i++, damping *= 8.0) {
-    Eigen::Matrix4d damped = normal;
-    damped.diagonal () *= 1.0 + damping;
-    damped.diagonal ().array () += 1e-9;
-    Focus next = f + solve_normal (damped, right);
-    next[0] = std::max (0.0, next[0]);
-    if (next.allFinite () && misfit (points, next) < before) {
-      f = next;
-      damping *= 0.2;
-      return;
-    }
-  }
-}
-
-} // namespace
 
 std::optional<FocusTilt>
 fit_focus (const BlurMap &map, Extent camera)
 {
-  std::vector<FocusPoint> points;
+  /* Places in half frames from the centre, variances, and their errors. */
+  std::vector<Eigen::Vector4d> points;
   const double rx = 0.5 * camera.width, ry = 0.5 * camera.height;
-  for (int j = 0; j < map.variance.height (); j++)
-    for (int i = 0; i < map.variance.width (); i++)
-      if (map.variance.at (i, j) >= 0.0f)
-        points.push_back ({((i + 0.5) * map.block - rx) / rx,
-            ((j + 0.5) * map.block - ry) / ry, double (map.variance.at (i, j)),
-            std::max (0.02, double (map.sigma.at (i, j)))});
+  each_pixel (map.variance, [&] (int i, int j) {
+    if (map.variance.at (i, j) >= 0.0f)
+      points.emplace_back (((i + 0.5) * map.block - rx) / rx,
+          ((j + 0.5) * map.block - ry) / ry, double (map.variance.at (i, j)),
+          std::max (0.02, double (map.sigma.at (i, j))));
+  });
   if (points.size () < 8)
     return std::nullopt;
+  /* The blur without the defocus; the defocus, and its slopes in x and y. */
+  const Residuals residuals = [&points] (const Eigen::VectorXd &f) {
+    Eigen::VectorXd rest (Eigen::Index (points.size ()));
+    for (Eigen::Index i = 0; i < rest.size (); i++) {
+      const Eigen::Vector4d &p = points[std::size_t (i)];
+      const double z = f[1] + f[2] * p[0] + f[3] * p[1];
+      rest[i] = (p[2] - f[0] * f[0] - z * z) / p[3];
+    }
+    return rest;
+  };
+  double least = points[0][2];
+  for (const Eigen::Vector4d &p : points)
+    least = std::min (least, p[2]);
   /* The plane that is found depends on the start where the focus lies in the
    * middle of the frame. */
-  double best = 0.0;
-  Focus found = Focus::Zero ();
-  Eigen::Matrix4d normal = Eigen::Matrix4d::Identity ();
-  double least = points[0].variance;
-  for (const FocusPoint &p : points)
-    least = std::min (least, p.variance);
+  std::optional<Minimum> best;
   for (int start = 0; start < 8; start++) {
     const double turn = start * std::numbers::pi / 4;
-    Focus f (least, 0.5, 0.5 * std::cos (turn), 0.5 * std::sin (turn));
-    Eigen::Matrix4d now;
-    double damping = 1e-2;
-    for (int round = 0; round < 40; round++)
-      improve (points, f, damping, now);
-    if (const double rest = misfit (points, f); start == 0 || rest < best) {
-      best = rest;
-      found = f;
-      normal = now;
-    }
+    Minimum now = minimise (residuals,
+        Eigen::Vector4d (std::sqrt (least) + 0.01, 0.5, 0.5 * std::cos (turn),
+            0.5 * std::sin (turn)),
+        Eigen::Vector4d::Constant (1e-6));
+    if (!best || now.squares () < best->squares ())
+      best = std::move (now);
   }
+  Eigen::Vector4d found = best->numbers;
   if (found[1] < 0.0)
     found.tail<3> () *= -1.0;
-  const double excess =
-      std::max (1.0, best / std::max (1.0, double (points.size ()) - 4.0));
-  normal.diagonal ().array () += 1e-9;
-  const Eigen::Matrix4d covariance = excess * inverse_of (normal);
+  const double excess = std::max (
+      1.0, best->squares () / std::max (1.0, double (points.size ()) - 4.0));
+  Eigen::MatrixXd normal = normal_of (best->slopes);
+  normal.diagonal ().array () += 1e-9; // without a tilt, nothing is known
+  const Eigen::MatrixXd covariance = excess * inverse_of (normal);
   /* Slopes by pixel, so that the direction is one on the frame. */
   const double sx = found[2] / rx, sy = found[3] / ry;
   const double slope = std::hypot (sx, sy);
@@ -345,7 +294,7 @@ fit_focus (const BlurMap &map, Extent camera)
   /* The blur grows with the square of a small tilt. */
   tilt.growth.sigma = std::min (tilt.growth.sigma,
       std::sqrt (2.0 * tilt.growth.value * tilt.growth.sigma));
-  tilt.sharpest = std::sqrt (found[0]);
+  tilt.sharpest = std::abs (found[0]);
   return tilt;
 }
 

@@ -5,7 +5,6 @@
 #include <set>
 
 #include "base/text.h"
-#include "base/try.h"
 
 namespace codedexposure
 {
@@ -17,6 +16,12 @@ lit (int first, int count)
       .on = [] (int, int) { return true; },
       .slots = count,
       .first = first};
+}
+
+StillMask
+no_light ()
+{
+  return {.name = "no light", .on = [] (int, int) { return false; }};
 }
 
 Result<std::vector<SeenFrame>>

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "base/try.h"
 #include "doctor/finding.h"
 #include "doctor/rig.h"
 
@@ -50,8 +51,29 @@ struct Examination {
 Result<std::vector<SeenFrame>> look (
     Examination &examination, const StillMask &mask, int slots, int frames);
 
+/**
+ * Exposes for @p time while @p use () does its work, and as long as possible
+ * afterwards. The exposure time changes with a later frame than the mask.
+ */
+template <typename Use>
+auto
+with_exposure (Examination &examination, Nanoseconds time, Use use)
+    -> decltype (use ())
+{
+  Rig &rig = examination.rig;
+  RETURN_IF_ERROR (rig.expose (time));
+  RETURN_IF_ERROR (rig.watch (examination.lag));
+  auto done = use ();
+  RETURN_IF_ERROR (rig.expose (std::nullopt));
+  RETURN_IF_ERROR (rig.watch (examination.lag));
+  return done;
+}
+
 /** Every mirror on in slots [first, first + count) of an exposure. */
 StillMask lit (int first, int count);
+
+/** Every mirror is off. */
+StillMask no_light ();
 
 /** A check of the bench. An Error is a part that did not obey. */
 struct Check {
@@ -70,8 +92,8 @@ const std::vector<Check> &all_checks ();
 /** Those of the comma-separated names @p only, and what they need; empty: all.
  * Error for a name that is none. */
 Result<std::vector<Check>> choose_checks (std::string_view only);
-/** Runs @p check unless one that it needs has failed in @p before; its finding is
- * skipped then. */
+/** Runs @p check unless one that it needs has failed in @p before; its finding
+ * is skipped then. */
 Result<Finding> run_check (const Check &check, Examination &examination,
     const std::vector<Finding> &before);
 

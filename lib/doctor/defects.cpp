@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/statistics.h"
+
 namespace codedexposure
 {
 
@@ -23,26 +25,6 @@ constexpr double kMirrorMin = 0.3, kMirrorMax = 2.6;
 /* Pixels of a spot that mirrors make, in mirrors. */
 constexpr double kSpot = 30.0;
 
-float
-median (std::vector<float> &values)
-{
-  if (values.empty ())
-    return 0.0f;
-  const auto middle = values.begin () + std::ptrdiff_t (values.size () / 2);
-  std::nth_element (values.begin (), middle, values.end ());
-  return *middle;
-}
-
-Image<float>
-difference (const Image<float> &a, const Image<float> &b)
-{
-  Image<float> result (a.width (), a.height ());
-  for (int y = 0; y < a.height (); y++)
-    for (int x = 0; x < a.width (); x++)
-      result.at (x, y) = a.at (x, y) - b.at (x, y);
-  return result;
-}
-
 /* A smooth picture: the medians of blocks, bilinear between their centres and
  * beyond them. */
 Image<float>
@@ -53,32 +35,29 @@ smooth (const Image<float> &image)
   const double wide = double (image.width ()) / columns;
   const double high = double (image.height ()) / rows;
   Image<float> medians (columns, rows);
-  std::vector<float> values;
-  for (int j = 0; j < rows; j++)
-    for (int i = 0; i < columns; i++) {
-      values.clear ();
-      for (int y = int (j * high); y < int ((j + 1) * high); y++)
-        for (int x = int (i * wide); x < int ((i + 1) * wide); x++)
-          values.push_back (image.at (x, y));
-      medians.at (i, j) = median (values);
-    }
+  each_pixel (medians, [&] (int i, int j) {
+    std::vector<float> values;
+    for (int y = int (j * high); y < int ((j + 1) * high); y++)
+      for (int x = int (i * wide); x < int ((i + 1) * wide); x++)
+        values.push_back (image.at (x, y));
+    medians.at (i, j) = median (std::move (values));
+  });
   const auto place = [] (double at, int count) {
     const int low =
         std::clamp (int (std::floor (at)), 0, std::max (0, count - 2));
     return std::pair (low, count > 1 ? float (at - low) : 0.0f);
   };
   Image<float> result (image.width (), image.height ());
-  for (int y = 0; y < image.height (); y++)
-    for (int x = 0; x < image.width (); x++) {
-      const auto [i, u] = place ((x + 0.5) / wide - 0.5, columns);
-      const auto [j, v] = place ((y + 0.5) / high - 0.5, rows);
-      const int right = std::min (i + 1, columns - 1);
-      const int below = std::min (j + 1, rows - 1);
-      const float top = (1 - u) * medians.at (i, j) + u * medians.at (right, j);
-      const float bottom =
-          (1 - u) * medians.at (i, below) + u * medians.at (right, below);
-      result.at (x, y) = (1 - v) * top + v * bottom;
-    }
+  each_pixel (image, [&] (int x, int y) {
+    const auto [i, u] = place ((x + 0.5) / wide - 0.5, columns);
+    const auto [j, v] = place ((y + 0.5) / high - 0.5, rows);
+    const int right = std::min (i + 1, columns - 1);
+    const int below = std::min (j + 1, rows - 1);
+    const float top = (1 - u) * medians.at (i, j) + u * medians.at (right, j);
+    const float bottom =
+        (1 - u) * medians.at (i, below) + u * medians.at (right, below);
+    result.at (x, y) = (1 - v) * top + v * bottom;
+  });
   return result;
 }
 
@@ -88,13 +67,11 @@ ring_median (const Image<float> &image, Offset at)
 {
   constexpr int kNear = 3, kFar = 5;
   std::vector<float> values;
-  for (int y = std::max (0, at.y - kFar);
-       y <= std::min (image.height () - 1, at.y + kFar); y++)
-    for (int x = std::max (0, at.x - kFar);
-         x <= std::min (image.width () - 1, at.x + kFar); x++)
-      if (std::max (std::abs (x - at.x), std::abs (y - at.y)) >= kNear)
-        values.push_back (image.at (x, y));
-  return double (median (values));
+  each_near (image, at, kFar, [&] (int x, int y) {
+    if (std::max (std::abs (x - at.x), std::abs (y - at.y)) >= kNear)
+      values.push_back (image.at (x, y));
+  });
+  return double (median (std::move (values)));
 }
 
 /* Pixels that touch, also at corners. */
@@ -113,14 +90,11 @@ take_group (Image<std::uint8_t> &marked, Offset first)
     const Offset at = group.pixels[i];
     group.at_border |= at.x == 0 || at.y == 0 || at.x == marked.width () - 1 ||
                        at.y == marked.height () - 1;
-    for (int y = std::max (0, at.y - 1);
-         y <= std::min (marked.height () - 1, at.y + 1); y++)
-      for (int x = std::max (0, at.x - 1);
-           x <= std::min (marked.width () - 1, at.x + 1); x++)
-        if (marked.at (x, y) != 0) {
-          marked.at (x, y) = 0;
-          group.pixels.push_back ({x, y});
-        }
+    each_near (marked, at, 1, [&] (int x, int y) {
+      if (marked.at (x, y) != 0)
+        group.pixels.push_back ({x, y});
+      marked.at (x, y) = 0;
+    });
   }
   return group;
 }
@@ -129,10 +103,10 @@ std::vector<Group>
 groups_of (Image<std::uint8_t> marked)
 {
   std::vector<Group> groups;
-  for (int y = 0; y < marked.height (); y++)
-    for (int x = 0; x < marked.width (); x++)
-      if (marked.at (x, y) != 0)
-        groups.push_back (take_group (marked, {x, y}));
+  each_pixel (marked, [&] (int x, int y) {
+    if (marked.at (x, y) != 0)
+      groups.push_back (take_group (marked, {x, y}));
+  });
   return groups;
 }
 
@@ -146,7 +120,7 @@ public:
         mirror_ (std::max (1.0, mirror))
   {
     found_.good = Image<std::uint8_t> (off.width (), off.height ());
-    found_.covered = found_.good;
+    covered_ = found_.good;
     known_ = found_.good;
     part_ = Image<float> (off.width (), off.height ());
   }
@@ -159,21 +133,14 @@ private:
   void add_dim (const Group &group);
   DefectSpot spot_of (const Group &group) const;
   void know (const Group &group, int margin);
-  template <typename Use>
-  void each_pixel (Use use) const
-  {
-    for (int y = 0; y < off_.height (); y++)
-      for (int x = 0; x < off_.width (); x++)
-        use (x, y);
-  }
-
   const Image<float> &off_, &on_;
   Image<float> light_, dark_, field_;
   float bright_ = 0.0f; // light of bright pixels
   int largest_;
   double mirror_;
-  Image<float> part_;         // of its light that a pixel has too much or lacks
-  Image<std::uint8_t> known_; // pixels of defects, and those beside them
+  Image<float> part_; // of its light that a pixel has too much or lacks
+  Image<std::uint8_t> covered_; // gets light of mirrors, or should
+  Image<std::uint8_t> known_;   // pixels of defects, and those beside them
   Defects found_;
 };
 
@@ -181,11 +148,8 @@ void
 Search::know (const Group &group, int margin)
 {
   for (const Offset &at : group.pixels)
-    for (int y = std::max (0, at.y - margin);
-         y <= std::min (known_.height () - 1, at.y + margin); y++)
-      for (int x = std::max (0, at.x - margin);
-           x <= std::min (known_.width () - 1, at.x + margin); x++)
-        known_.at (x, y) = 1;
+    each_near (
+        known_, at, margin, [&] (int x, int y) { known_.at (x, y) = 1; });
 }
 
 DefectSpot
@@ -208,7 +172,7 @@ void
 Search::find_bright ()
 {
   Image<std::uint8_t> marked (off_.width (), off_.height ());
-  each_pixel ([&] (int x, int y) {
+  each_pixel (off_, [&] (int x, int y) {
     const float unit =
         std::max ({0.1f * float (largest_), 0.5f * bright_, field_.at (x, y)});
     part_.at (x, y) = (off_.at (x, y) - dark_.at (x, y)) / unit;
@@ -250,7 +214,7 @@ Search::add_dim (const Group &group)
   if (group.at_border && spot.light > kMirrorMax * mirror_) {
     for (const Offset &at : group.pixels)
       if (double (part_.at (at.x, at.y)) > 0.5)
-        found_.covered.at (at.x, at.y) = 0;
+        covered_.at (at.x, at.y) = 0;
     return;
   }
   if (spot.light > kMirrorMax * mirror_)
@@ -263,8 +227,8 @@ void
 Search::find_dim ()
 {
   Image<std::uint8_t> marked (off_.width (), off_.height ());
-  each_pixel ([&] (int x, int y) {
-    const bool open = found_.covered.at (x, y) != 0 && known_.at (x, y) == 0;
+  each_pixel (off_, [&] (int x, int y) {
+    const bool open = covered_.at (x, y) != 0 && known_.at (x, y) == 0;
     part_.at (x, y) = open ? 1.0f - light_.at (x, y) / field_.at (x, y) : 0.0f;
     marked.at (x, y) = part_.at (x, y) > float (kDiffers);
   });
@@ -276,20 +240,17 @@ Defects
 Search::run ()
 {
   std::vector<float> values;
-  each_pixel ([&] (int x, int y) { values.push_back (field_.at (x, y)); });
-  const auto high = values.begin () + std::ptrdiff_t (values.size () * 9 / 10);
-  std::nth_element (values.begin (), high, values.end ());
-  bright_ = *high;
+  each_pixel (
+      off_, [&] (int x, int y) { values.push_back (field_.at (x, y)); });
+  bright_ = quantile (std::move (values), 0.9);
   const float least =
       std::max (float (kCovered) * bright_, 0.005f * float (largest_));
-  each_pixel ([&] (int x, int y) {
-    found_.covered.at (x, y) = field_.at (x, y) > least;
-  });
+  each_pixel (off_,
+      [&] (int x, int y) { covered_.at (x, y) = field_.at (x, y) > least; });
   find_bright ();
   find_dim ();
-  each_pixel ([&] (int x, int y) {
-    found_.good.at (x, y) =
-        found_.covered.at (x, y) != 0 && known_.at (x, y) == 0;
+  each_pixel (off_, [&] (int x, int y) {
+    found_.good.at (x, y) = covered_.at (x, y) != 0 && known_.at (x, y) == 0;
   });
   return std::move (found_);
 }

@@ -26,9 +26,6 @@ struct Defects {
   std::vector<DefectSpot> dust;                ///< larger than a mirror
   /** 1: a pixel that sees mirrors, and that has no defect nearby. */
   Image<std::uint8_t> good;
-  /** 1: a pixel that gets light from mirrors that are on, or that would if it
-   * had no defect. */
-  Image<std::uint8_t> covered;
 };
 
 /**

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "base/statistics.h"
 #include "base/try.h"
 
 namespace codedexposure
@@ -95,22 +96,19 @@ DitherRun::see_light (
           kBrightFrames, &dark));
   light_ = field_ = Image<float> (dark.width (), dark.height ());
   double mean = 0.0, pixels = 0.0;
-  for (int y = 0; y < dark.height (); y++)
-    for (int x = 0; x < dark.width (); x++) {
-      const double none = transfer_.light_of (double (dark.at (x, y)));
-      const auto of = [&] (const Image<float> &image) {
-        const double light = transfer_.light_of (double (image.at (x, y)));
-        return transfer_.slope * (light - none);
-      };
-      light_.at (x, y) = float (of (seen.mean) / top);
-      field_.at (x, y) = float (of (bright));
-      mean += good_.at (x, y) != 0 ? double (field_.at (x, y)) : 0.0;
-      pixels += good_.at (x, y) != 0;
-    }
+  each_pixel (dark, [&] (int x, int y) {
+    const double none = transfer_.light_of (double (dark.at (x, y)));
+    const auto of = [&] (const Image<float> &image) {
+      const double light = transfer_.light_of (double (image.at (x, y)));
+      return transfer_.slope * (light - none);
+    };
+    light_.at (x, y) = float (of (seen.mean) / top);
+    field_.at (x, y) = float (of (bright));
+    mean += good_.at (x, y) != 0 ? double (field_.at (x, y)) : 0.0;
+    pixels += good_.at (x, y) != 0;
+  });
   const float scale = float (pixels / std::max (1e-3, mean));
-  for (int y = 0; y < dark.height (); y++)
-    for (int x = 0; x < dark.width (); x++)
-      field_.at (x, y) *= scale;
+  each_pixel (field_, [&] (int x, int y) { field_.at (x, y) *= scale; });
   return {};
 }
 
@@ -134,30 +132,31 @@ void
 DitherRun::group (
     std::size_t look, double off, std::vector<DitherGroup> &all) const
 {
-  const auto &[stack, length, longer] = looks_[look];
+  const Stack &stack = looks_[look].stack;
+  const double stack_length = looks_[look].length;
   std::vector<DitherGroup> groups (std::size_t (kMost / kWidth) + 1);
-  for (int y = 0; y < good_.height; y++)
-    for (int x = 0; x < good_.width; x++) {
-      const double light = length * double (light_.at (x, y));
-      const double field = double (field_.at (x, y));
-      const double more = light + (longer ? 1.0 : part_) * off * (field - 1.0);
-      if (good_.at (x, y) == 0 || more >= kMost || more < -kWidth / 2)
-        continue;
-      DitherGroup &group =
-          groups[std::size_t (std::max (0.0, more / kWidth + 0.5))];
-      const double mean = double (stack.mean.at (x, y));
-      group.pixels++;
-      group.light += light;
-      group.field += field;
-      group.mean += mean;
-      group.spread += mean * mean;
-      group.variance += double (stack.variance.at (x, y));
-    }
+  each_pixel (good_, [&] (int x, int y) {
+    const double light = stack_length * double (light_.at (x, y));
+    const double field = double (field_.at (x, y));
+    const double more =
+        light + (looks_[look].longer ? 1.0 : part_) * off * (field - 1.0);
+    if (good_.at (x, y) == 0 || more >= kMost || more < -kWidth / 2)
+      return;
+    DitherGroup &group =
+        groups[std::size_t (std::max (0.0, more / kWidth + 0.5))];
+    const double mean = double (stack.mean.at (x, y));
+    group.pixels++;
+    group.light += light;
+    group.field += field;
+    group.mean += mean;
+    group.spread += mean * mean;
+    group.variance += double (stack.variance.at (x, y));
+  });
   for (DitherGroup &group : groups) {
     if (group.pixels < kFewPixels)
       continue;
     group.look = int (look);
-    group.longer = longer;
+    group.longer = looks_[look].longer;
     group.frames = stack.frames;
     group.field -= 1.0; // where the sum began
     for (double *sum : {&group.light, &group.field, &group.mean, &group.spread,
@@ -201,29 +200,25 @@ measure_dither (Examination &examination, const Examination::Lit &fine, int top,
     const Image<float> &dark, const Image<float> &bright,
     ImageView<const std::uint8_t> good, const PhotonTransfer &transfer)
 {
-  Rig &rig = examination.rig;
   DitherRun run (examination, fine, good, transfer);
   RETURN_IF_ERROR (run.see_light (top, dark, bright));
   RETURN_IF_ERROR (run.look (true));
-  RETURN_IF_ERROR (rig.expose (rig.parts ().rate.period () / kShorter));
-  /* The exposure time changes with a later frame than the mask. */
-  Result<void> seen;
-  if (const auto late = rig.watch (examination.lag); !late)
-    seen = late.error ();
   std::optional<Dark> found;
   double error = std::numeric_limits<double>::infinity (); // of the variance
-  for (int round = 0; seen && round < kMostRounds; round++) {
-    seen = run.look (false);
-    if (seen)
-      found = run.fit ();
-    if (!found || found->variance.sigma < 2 * kAim * found->variance.value ||
-        found->variance.sigma > kHelps * error)
-      break;
-    error = found->variance.sigma;
-  }
-  RETURN_IF_ERROR (rig.expose (std::nullopt));
-  RETURN_IF_ERROR (rig.watch (examination.lag));
-  RETURN_IF_ERROR (seen);
+  RETURN_IF_ERROR (with_exposure (examination,
+      examination.rig.parts ().rate.period () / kShorter,
+      [&] () -> Result<void> {
+        for (int round = 0; round < kMostRounds; round++) {
+          RETURN_IF_ERROR (run.look (false));
+          found = run.fit ();
+          if (!found ||
+              found->variance.sigma < 2 * kAim * found->variance.value ||
+              found->variance.sigma > kHelps * error)
+            break;
+          error = found->variance.sigma;
+        }
+        return {};
+      }));
   if (!found)
     return std::optional<DitherSight> ();
   return std::optional<DitherSight> ({*found, run.shorter ()});

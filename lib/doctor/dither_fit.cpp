@@ -3,11 +3,9 @@
 #include <array>
 #include <cmath>
 
-#include <Eigen/Core>
-
 #include "doctor/dither.h"
 #include "doctor/rounding.h"
-#include "doctor/solve.h"
+#include "estimate/least_squares.h"
 
 namespace codedexposure
 {
@@ -15,7 +13,7 @@ namespace codedexposure
 namespace
 {
 
-constexpr int kRounds = 30;
+constexpr int kRounds = 4; // of weights
 /* Black levels of pixels: standard deviations of a Gaussian, and their weights.
  * With a larger spread, these would not be dense enough. */
 constexpr std::array kOffsets = {
@@ -64,7 +62,6 @@ public:
   void weigh (const Numbers &n);
   /** By their errors: means, variances, the gain, and light of looks. */
   Eigen::VectorXd residuals (const Numbers &n) const;
-  Eigen::MatrixXd slopes (const Numbers &n, const Eigen::VectorXd &rest) const;
 
 private:
   RoundedMoments expected (const DitherGroup &group, const Numbers &n) const;
@@ -102,11 +99,11 @@ Model::expected (const DitherGroup &group, const Numbers &n) const
                        (group.longer ? 1.0 : part_) * group.field * n[kOff];
   const double shot = std::max (0.0, light) * n[kPerGain];
   const double sigma = std::sqrt (std::max (1e-6, n[kVariance] + shot));
+  const double spread = std::clamp (n[kSpread], 0.0, kMostSpread);
   RoundedMoments sum;
   for (std::size_t i = 0; i < kOffsets.size (); i++) {
-    const RoundedMoments one =
-        rounded_moments (n[kBlack] + light + kOffsets[i] * n[kSpread], sigma,
-            shot * n[kPerGain]);
+    const RoundedMoments one = rounded_moments (
+        n[kBlack] + light + kOffsets[i] * spread, sigma, shot * n[kPerGain]);
     sum.mean += kWeights[i] * one.mean;
     sum.variance += kWeights[i] * one.variance;
     sum.fourth += kWeights[i] * one.fourth;
@@ -148,40 +145,6 @@ Model::residuals (const Numbers &n) const
   return rest;
 }
 
-Eigen::MatrixXd
-Model::slopes (const Numbers &n, const Eigen::VectorXd &rest) const
-{
-  Eigen::MatrixXd all (rest.size (), n.size ());
-  for (Eigen::Index i = 0; i < n.size (); i++) {
-    const double step = 1e-5 * std::max (0.02, std::abs (n[i]));
-    Numbers moved = n;
-    moved[i] += step;
-    all.col (i) = (rest - residuals (moved)) / step;
-  }
-  return all;
-}
-
-/** A step of Levenberg and Marquardt; false: none is better. */
-bool
-improve (const Model &model, const Eigen::MatrixXd &normal,
-    const Eigen::VectorXd &right, double chi, double &damping, Numbers &n)
-{
-  for (int i = 0; i < 8; i++, damping *= 10.0) {
-    Eigen::MatrixXd damped = normal;
-    damped.diagonal () *= 1.0 + damping;
-    Numbers next = n + solve_normal (damped, right);
-    if (!next.allFinite ())
-      continue;
-    next[kSpread] = std::clamp (next[kSpread], 0.0, kMostSpread);
-    if (model.residuals (next).squaredNorm () >= chi)
-      continue;
-    n = next;
-    damping *= 0.1;
-    return true;
-  }
-  return false;
-}
-
 } // namespace
 
 std::optional<Dark>
@@ -192,24 +155,19 @@ fit_dither (const std::vector<DitherGroup> &groups, double part,
   if (model.freedom () < 1.0 || !(gain.value > 0.0))
     return std::nullopt;
   Numbers n = model.start (off);
-  Eigen::MatrixXd normal;
-  double damping = 1e-2, chi = 0.0;
+  const auto residuals = [&] (const Numbers &numbers) {
+    return model.residuals (numbers);
+  };
+  Minimum found;
   for (int round = 0; round < kRounds; round++) {
     model.weigh (n);
-    const Eigen::VectorXd rest = model.residuals (n);
-    const Eigen::MatrixXd slopes = model.slopes (n, rest);
-    const double before = chi;
-    chi = rest.squaredNorm ();
-    normal = normal_of (slopes);
-    if (!improve (model, normal, slopes.transpose () * rest, chi, damping, n) ||
-        std::abs (chi - before) < 1e-4 * chi)
-      break;
+    found = minimise (residuals, n, 1e-5 * n.cwiseAbs ().cwiseMax (0.02));
+    n = found.numbers;
   }
-  const double excess = std::max (1.0, chi / model.freedom ());
-  normal.diagonal ().array () += 1e-9;
-  const Eigen::MatrixXd covariance = excess * inverse_of (normal);
-  if (!covariance.allFinite ())
+  if (!n.allFinite () || !found.covariance.allFinite ())
     return std::nullopt;
+  const Eigen::MatrixXd covariance =
+      std::max (1.0, found.squares () / model.freedom ()) * found.covariance;
   const auto measured = [&] (Number i) {
     return Measured{n[i], std::sqrt (std::max (0.0, covariance (i, i)))};
   };

@@ -11,7 +11,8 @@ namespace codedexposure
 /**
  * Light that the darkest corner loses against the centre of @p picture, as a
  * part; negative if it is the brighter one. It is that of a smooth surface:
- * dust, odd pixels and a part that sees no mirror do not count.
+ * dust, odd pixels and a part that sees no mirror do not count. NaN if too few
+ * pixels see mirrors.
  *
  * @p picture  of all mirrors on, less that of all mirrors off
  */

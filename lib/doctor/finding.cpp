@@ -2,16 +2,35 @@
 #include "doctor/finding.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
 
 #include "base/json.h"
+#include "base/text.h"
+#include "doctor/rules.h"
 
 namespace codedexposure
 {
+
+namespace
+{
+
+bool
+is_known (const Measured &number)
+{
+  return std::isfinite (number.value) && std::isfinite (number.sigma);
+}
+
+} // namespace
 
 Verdict
 Finding::verdict () const
 {
   Verdict worst = Verdict::pass;
+  for (const Reading &reading : readings)
+    if (!is_known (reading.number))
+      worst = Verdict::unknown;
   for (const Diagnosis &diagnosis : diagnoses)
     worst = std::max (worst, diagnosis.severity);
   return worst;
@@ -24,17 +43,101 @@ Finding::reading (std::string_view name) const
   return found == readings.end () ? nullptr : &*found;
 }
 
+namespace
+{
+
+/* "at most 100", "40 to 95", "0" */
+std::string
+text_of (const Limits &limits)
+{
+  const std::string low = real_text (limits.low),
+                    high = real_text (limits.high);
+  if (std::isinf (limits.low))
+    return std::isinf (limits.high) ? "" : "at most " + high;
+  if (std::isinf (limits.high))
+    return "at least " + low;
+  return low == high ? low : low + " to " + high;
+}
+
+} // namespace
+
+void
+Finding::add (std::string_view name, const Measured &number)
+{
+  const Rule &rule = rule_of (name);
+  readings.push_back ({rule.reading, number, rule.unit, text_of (rule.good)});
+}
+
+void
+Finding::blame (std::string_view id, std::string cause, Verdict severity,
+    std::string remedy)
+{
+  diagnoses.push_back ({std::string (id), severity, std::move (cause),
+      remedy.empty () ? rule_of (id).remedy : std::move (remedy)});
+}
+
+Verdict
+Finding::judge (
+    std::string_view name, const Measured &number, const std::string &cause)
+{
+  const Rule &rule = rule_of (name);
+  const Verdict verdict = verdict_of (name, number);
+  if (verdict < Verdict::warn || *rule.id == 0)
+    return verdict;
+  std::string text = cause.empty () ? rule.cause : cause;
+  if (const std::size_t at = text.find ("{}"); at != text.npos)
+    text.replace (at, 2, codedexposure::shown (number.value));
+  blame (rule.id, std::move (text), verdict, rule.remedy);
+  return verdict;
+}
+
+void
+Finding::sort ()
+{
+  std::ranges::stable_sort (
+      diagnoses, std::ranges::greater (), &Diagnosis::severity);
+}
+
+Verdict
+verdict_of (std::string_view name, const Measured &number)
+{
+  if (!is_known (number))
+    return Verdict::unknown;
+  const auto breaks = [&] (const Limits &limits) {
+    return number.value - 2.0 * number.sigma > limits.high ||
+           number.value + 2.0 * number.sigma < limits.low;
+  };
+  const Rule &rule = rule_of (name);
+  return !breaks (rule.good)      ? Verdict::pass
+         : breaks (rule.bearable) ? Verdict::fail
+                                  : Verdict::warn;
+}
+
 const char *
 verdict_text (Verdict verdict)
 {
-  switch (verdict) {
-  case Verdict::pass:
-    return "PASS";
-  case Verdict::warn:
-    return "WARN";
-  default:
-    return "FAIL";
-  }
+  constexpr const char *kTexts[] = {"PASS", "UNKNOWN", "WARN", "FAIL"};
+  return kTexts[int (verdict)];
+}
+
+std::string
+fixed (double value, int decimals)
+{
+  std::array<char, 64> text;
+  std::snprintf (text.data (), text.size (), "%.*f", decimals, value);
+  const std::string number = text.data ();
+  const bool zero = number.find_first_of ("123456789") == number.npos;
+  return zero && number[0] == '-' ? number.substr (1) : number;
+}
+
+std::string
+shown (double value)
+{
+  const double size = std::abs (value);
+  return fixed (
+      value, size >= 100 || !(size > 0)
+                 ? 0
+                 : std::min (6, 2 - int (std::floor (std::log10 (size)))));
 }
 
 namespace

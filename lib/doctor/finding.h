@@ -13,8 +13,8 @@
 namespace codedexposure
 {
 
-/** From the best to the worst. */
-enum class Verdict { pass, warn, fail };
+/** From the best to the worst. What is not known is never good. */
+enum class Verdict { pass, unknown, warn, fail };
 
 /** A number that a check saw. */
 struct Reading {
@@ -60,16 +60,56 @@ struct Finding {
   std::vector<Plot> plots = {};
   std::vector<Exhibit> exhibits = {};
 
-  /** The worst of the diagnoses. */
+  /** The worst of the diagnoses; unknown if there is none, but a reading that
+   * is no finite number. */
   Verdict verdict () const;
   /** Null if there is none of that name. */
   const Reading *reading (std::string_view name) const;
+
+  /** Adds the reading @p name of rules.cpp, with its unit and rule. */
+  void add (std::string_view name, const Measured &number);
+  /** Adds a diagnosis, with the remedy of rules.cpp if there is no other. */
+  void blame (std::string_view id, std::string cause,
+      Verdict severity = Verdict::fail, std::string remedy = {});
+  /**
+   * Judges @p number by the rule @p name of rules.cpp, and adds the diagnosis
+   * if it breaks it by more than twice its standard deviation. @p cause: in
+   * place of that of the rule.
+   */
+  Verdict judge (std::string_view name, const Measured &number,
+      const std::string &cause = {});
+  /** add () and judge (). */
+  Verdict measure (std::string_view name, const Measured &number,
+      const std::string &cause = {})
+  {
+    add (name, number);
+    return judge (name, number, cause);
+  }
+  /** Sorts the diagnoses by their severity. */
+  void sort ();
 };
 
-/** "PASS", "WARN", "FAIL" */
+/** pass, warn or fail by the rule @p name; unknown if @p number is not finite.
+ */
+Verdict verdict_of (std::string_view name, const Measured &number);
+
+/** "PASS", "UNKNOWN", "WARN", "FAIL" */
 const char *verdict_text (Verdict verdict);
 
 /** Findings in the strict form of docs/formats.md, one line. */
 std::string findings_json (const std::vector<Finding> &findings);
+
+/** @p number, and its standard deviation, in a unit that is 1 / @p factor of
+ * its own. */
+inline Measured
+scaled (const Measured &number, double factor)
+{
+  return {factor * number.value, factor * number.sigma};
+}
+
+/** "1.50"; never "-0". */
+std::string fixed (double value, int decimals);
+/** With three digits, or all of those before the point: "0.0123", "1234". */
+std::string shown (double value);
 
 } // namespace codedexposure

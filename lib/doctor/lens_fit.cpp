@@ -6,9 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include <Eigen/Cholesky>
-
-#include "doctor/solve.h"
+#include "estimate/least_squares.h"
 
 namespace codedexposure
 {
@@ -18,7 +16,7 @@ namespace
 
 /* A 2 x 2 matrix row by row, the shift, the tilts and the distortion. */
 constexpr Eigen::Index kNumbers = 9;
-using Numbers = Eigen::Matrix<double, kNumbers, 1>;
+using Numbers = Eigen::VectorXd;
 
 struct Frame {
   double cx, cy, mx, my; // centres of the camera and of the mirrors
@@ -40,7 +38,7 @@ Numbers
 steps_of (const Frame &frame)
 {
   const double r = 1.0 / std::max (1.0, std::max (frame.cx, frame.cy));
-  Numbers steps;
+  Numbers steps (kNumbers);
   steps << r, r, r, r, 1.0, 1.0, r, r, r;
   return steps;
 }
@@ -56,50 +54,31 @@ fit_lens (const std::vector<PlacePair> &pairs, Extent camera, Extent mirrors,
   const Frame frame = {0.5 * (camera.width - 1), 0.5 * (camera.height - 1),
       0.5 * (mirrors.width - 1), 0.5 * (mirrors.height - 1)};
   const Numbers steps = steps_of (frame);
-  Numbers n = Numbers::Zero ();
-  n[4] = pairs[0].mirror.x - frame.mx;
-  n[5] = pairs[0].mirror.y - frame.my;
-  Eigen::Matrix<double, kNumbers, kNumbers> normal;
-  double squares = 0.0;
-  for (int round = 0; round < 20; round++) {
-    normal.setZero ();
-    Numbers right = Numbers::Zero ();
-    squares = 0.0;
-    for (const PlacePair &pair : pairs) {
-      const Eigen::Vector2d at = frame.mirror_at (n, pair.pixel);
-      const Eigen::Vector2d rest =
-          Eigen::Vector2d (pair.mirror.x, pair.mirror.y) - at;
-      Eigen::Matrix<double, 2, kNumbers> slope;
-      for (Eigen::Index i = 0; i < kNumbers; i++) {
-        Numbers moved = n;
-        moved[i] += 1e-3 * steps[i];
-        slope.col (i) = (frame.mirror_at (moved, pair.pixel) - at) / 1e-3;
-      }
-      normal += slope.transpose () * slope;
-      right += slope.transpose () * rest;
-      squares += rest.squaredNorm ();
-    }
-    /* The first rounds are affine: elsewhere, the others make no sense. */
-    const Eigen::Index free = round < 2 ? 6 : kNumbers;
-    const Eigen::LDLT<Eigen::MatrixXd> solver (
-        normal.topLeftCorner (free, free));
-    if (solver.info () != Eigen::Success || !(solver.rcond () > 1e-12))
-      return std::nullopt;
-    const Eigen::VectorXd step = solver.solve (right.head (free));
-    n.head (free) += steps.head (free).cwiseProduct (step);
-    if (round > 3 && step.norm () < 1e-9)
-      break;
-  }
-  if (!n.allFinite ())
+  Numbers start = Numbers::Zero (kNumbers);
+  start[4] = pairs[0].mirror.x - frame.mx;
+  start[5] = pairs[0].mirror.y - frame.my;
+  const Minimum best = minimise (
+      [&] (const Numbers &numbers) {
+        Eigen::Matrix2Xd rest (2, Eigen::Index (pairs.size ()));
+        for (Eigen::Index i = 0; i < rest.cols (); i++) {
+          const PlacePair &pair = pairs[std::size_t (i)];
+          rest.col (i) = Eigen::Vector2d (pair.mirror.x, pair.mirror.y) -
+                         frame.mirror_at (numbers, pair.pixel);
+        }
+        return Eigen::VectorXd (rest.reshaped ());
+      },
+      start, 1e-3 * steps);
+  const Numbers &n = best.numbers;
+  if (!n.allFinite () || !best.determined)
     return std::nullopt;
 
   LensFit found;
   const double freedom =
       std::max (1.0, 2.0 * double (pairs.size ()) - kNumbers);
-  found.rms = std::sqrt (squares / freedom);
+  found.rms = std::sqrt (best.squares () / freedom);
   const double sigma = std::max (noise, found.rms);
-  const Numbers doubt = steps.cwiseProduct (
-      sigma * inverse_of (normal).diagonal ().cwiseMax (0.0).cwiseSqrt ());
+  const Numbers doubt =
+      sigma * best.covariance.diagonal ().cwiseMax (0.0).cwiseSqrt ();
   const double area = std::abs (n[0] * n[3] - n[1] * n[2]);
   if (!(area > 1e-9))
     return std::nullopt;

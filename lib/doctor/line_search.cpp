@@ -3,11 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <numbers>
 
-#include <Eigen/Core>
-
-#include "doctor/solve.h"
+#include "estimate/least_squares.h"
 
 namespace codedexposure
 {
@@ -51,15 +50,15 @@ class Comb
 {
 public:
   Comb (const LineSearch &search, double frequency, double step)
-      : lit_ (search.lit), frequency_ (frequency), step_ (step)
+      : lit_ (search.lit), frequency_ (frequency), step_ (step),
+        phasors_ (2 * lit_.size ()), turns_ (phasors_.size ())
   {
-    for (const LitTime &time : lit_)
-      for (const double edge : {time.from, time.until}) {
-        cosines_.push_back (std::cos (kTurn * frequency * edge));
-        sines_.push_back (std::sin (kTurn * frequency * edge));
-        turn_cosines_.push_back (std::cos (kTurn * step * edge));
-        turn_sines_.push_back (std::sin (kTurn * step * edge));
-      }
+    for (Index i = 0; i < phasors_.size (); i++) {
+      const LitTime &time = lit_[std::size_t (i / 2)];
+      const double edge = i % 2 == 0 ? time.from : time.until;
+      phasors_[i] = std::polar (1.0, kTurn * frequency * edge);
+      turns_[i] = std::polar (1.0, kTurn * step * edge);
+    }
   }
 
   double frequency () const { return frequency_; }
@@ -69,29 +68,25 @@ public:
     cosine.setZero ();
     sine.setZero ();
     const double turn = 1.0 / (kTurn * frequency_);
-    for (std::size_t i = 0; i < lit_.size (); i++) {
-      const std::size_t from = 2 * i, until = from + 1;
-      const double weight = turn * lit_[i].weight;
-      cosine[lit_[i].sample] += (sines_[until] - sines_[from]) * weight;
-      sine[lit_[i].sample] += (cosines_[from] - cosines_[until]) * weight;
+    for (Index i = 0; i < phasors_.size (); i += 2) {
+      const LitTime &time = lit_[std::size_t (i / 2)];
+      const std::complex<double> light =
+          turn * time.weight * (phasors_[i + 1] - phasors_[i]);
+      cosine[time.sample] += light.imag ();
+      sine[time.sample] -= light.real ();
     }
   }
 
   void next ()
   {
     frequency_ += step_;
-    for (std::size_t i = 0; i < cosines_.size (); i++) {
-      const double c = cosines_[i], s = sines_[i];
-      cosines_[i] = c * turn_cosines_[i] - s * turn_sines_[i];
-      sines_[i] = c * turn_sines_[i] + s * turn_cosines_[i];
-    }
+    phasors_ *= turns_;
   }
 
 private:
   const std::vector<LitTime> &lit_;
   double frequency_, step_;
-  /* Of both ends of each time, and of a step there. */
-  std::vector<double> cosines_, sines_, turn_cosines_, turn_sines_;
+  Eigen::ArrayXcd phasors_, turns_; // of both ends of each time, and of a step
 };
 
 /** The residual without what other parameters explain. */
@@ -99,20 +94,9 @@ class WithoutOthers
 {
 public:
   explicit WithoutOthers (const LineSearch &search)
-      : search_ (search),
-        residual_ (Eigen::Map<const VectorXd> (
-            search.residual.data (), Index (search.residual.size ())))
+      : search_ (search), residual_ (search.residual),
+        basis_ (basis_of (search.others.colwise ().normalized ()))
   {
-    MatrixXd others (residual_.size (), Index (search.others.size ()));
-    for (Index i = 0; i < others.cols (); i++) {
-      const auto &column = search.others[std::size_t (i)];
-      others.col (i) =
-          Eigen::Map<const VectorXd> (column.data (), Index (column.size ()));
-      const double norm = others.col (i).norm ();
-      if (norm > 0.0)
-        others.col (i) /= norm;
-    }
-    basis_ = basis_of (others);
     residual_ -= basis_ * (basis_.transpose () * residual_);
   }
 

@@ -3,10 +3,11 @@
  * folder only. */
 #pragma once
 
-#include <span>
 #include <vector>
 
-#include "doctor/light_fit.h"
+#include <Eigen/Core>
+
+#include "doctor/light_model.h"
 
 namespace codedexposure
 {
@@ -22,10 +23,9 @@ struct LineSearch {
   std::vector<LitTime> lit;
   /** What remains of each sample without the line, in seconds of light times
    * its weight. */
-  std::vector<double> residual;
-  /** What else may explain it, with the same weights: columns of the length of
-   * residual. */
-  std::vector<std::vector<double>> others;
+  Eigen::VectorXd residual;
+  /** What else may explain it, with the same weights: columns. */
+  Eigen::MatrixXd others;
 
   /**
    * The frequency in [@p slowest, @p fastest] Hz that explains most of the

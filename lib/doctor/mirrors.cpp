@@ -2,8 +2,9 @@
 /* Check "mirrors": off-state leakage, switching, orientation, stuck mirrors. */
 #include <algorithm>
 #include <cmath>
+#include <string>
+#include <tuple>
 
-#include "base/text.h"
 #include "base/try.h"
 #include "doctor/defects.h"
 #include "doctor/off_light.h"
@@ -22,8 +23,6 @@ constexpr int kOffFrames = 24;             // of each exposure time
 constexpr Nanoseconds kShortest = 110'000; // of a slot
 constexpr double kFull = 0.002; // part of the values that may be the largest
 constexpr double kLightError = 0.0015; // of the light that leaks, relative
-constexpr double kLeakWarn = 0.015, kLeakFail = 0.02;
-constexpr double kSlowWarn = 100.0, kSlowFail = 200.0; // us
 /* Stuck mirrors, of those seen. */
 constexpr double kStuckFail = 1e-3;
 
@@ -39,8 +38,7 @@ private:
   Result<void> measure_leak ();
   void diagnose_orientation ();
   void diagnose_stuck (
-      const char *id, const char *what, const std::vector<DefectSpot> &spots);
-  void diagnose_leak (const Measured &leak);
+      const std::string &what, const std::vector<DefectSpot> &spots);
   Result<void> see_switching ();
 
   Examination &examination_;
@@ -58,7 +56,7 @@ MirrorRun::see_light ()
 {
   ASSIGN_OR_RETURN (
       off_, look_at_light (examination_, no_light (), 1, kFrames));
-  const int largest = largest_number (examination_);
+  const int largest = examination_.rig.parts ().largest ();
   const Examination::Lit &inside = examination_.inside;
   const double period = double (examination_.rig.parts ().rate.period ());
   const double exposure = examination_.profile.exposure
@@ -90,7 +88,7 @@ MirrorRun::measure_leak ()
   /* Without a gain, a small part of the range must do as a pedestal. */
   const double gain = examination_.profile.conversion_gain
                           ? examination_.profile.conversion_gain->value
-                          : 0.3 * largest_number (examination_);
+                          : 0.3 * examination_.rig.parts ().largest ();
   const int pedestal =
       pedestal_for (fine, slot, gain, off.variance > 0.3 ? 1.0 : 0.0);
   ASSIGN_OR_RETURN (const OffLight found,
@@ -103,28 +101,11 @@ MirrorRun::measure_leak ()
   const Measured leak = {found.light.value / whole,
       std::hypot (found.light.sigma, kLightError * found.light.value) / whole};
   examination_.profile.leak = {std::clamp (leak.value, 0.0, 0.5), leak.sigma};
-  diagnose_leak (leak);
-  return {};
-}
-
-void
-MirrorRun::diagnose_leak (const Measured &leak)
-{
+  finding_.measure ("off-state leakage", scaled (leak, 100.0));
+  const double least = std::max (1e-6, leak.value);
   finding_.readings.push_back (
-      {"off-state leakage", {100 * leak.value, 100 * leak.sigma}, "%",
-          "at most " + real_text (100 * kLeakWarn)});
-  finding_.readings.push_back ({"contrast ratio",
-      {1.0 / std::max (1e-6, leak.value),
-          leak.sigma / std::max (1e-12, leak.value * leak.value)},
-      ": 1"});
-  if (leak.value - 2 * leak.sigma < kLeakWarn)
-    return;
-  finding_.diagnoses.push_back ({"leak",
-      leak.value > kLeakFail ? Verdict::fail : Verdict::warn,
-      "mirrors that are off pass " + fixed (100 * leak.value, 1) +
-          " % of the light",
-      "block the light of the off direction with a trap, stop down the lens, "
-      "and look for stray light and reflections between lens and window"});
+      {"contrast ratio", {1.0 / least, leak.sigma / (least * least)}, ": 1"});
+  return {};
 }
 
 Result<void>
@@ -139,20 +120,11 @@ MirrorRun::see_switching ()
   }
   if (!time)
     return time.error ();
-  const Measured us = {time->value * 1e6, time->sigma * 1e6};
-  finding_.readings.push_back (
-      {"switching time", us, "us", "at most " + real_text (kSlowWarn)});
   Plot plot{"Mirrors that go off", "time, ms", "mean, DN"};
   for (const SwitchPoint &point : points)
     plot.points.push_back ({1e3 * point.time, point.light});
   finding_.plots.push_back (std::move (plot));
-  if (us.value - 2 * us.sigma > kSlowWarn)
-    finding_.diagnoses.push_back ({"slow-mirrors",
-        us.value > kSlowFail ? Verdict::fail : Verdict::warn,
-        "the light takes " + fixed (us.value, 0) +
-            " us to go off, where mirrors need less than 20 us",
-        "check that nothing else shutters the light, such as a pulsed lamp or "
-        "a liquid crystal; give the schedule that much switching time"});
+  finding_.measure ("switching time", scaled (*time, 1e6));
   return {};
 }
 
@@ -168,27 +140,27 @@ MirrorRun::diagnose_orientation ()
                                 : "turned by " + std::to_string (is.turned) +
                                       " degrees")});
   if (is.turned != 0)
-    finding_.diagnoses.push_back ({"turned", Verdict::fail,
+    finding_.blame ("turned",
         "the camera is turned against the mirrors by " +
             std::to_string (is.turned) + " degrees",
+        Verdict::fail,
         is.turned == 180
             ? "set ReverseX=true and ReverseY=true of the camera, or turn it"
-            : "turn the camera by 90 degrees"});
-  for (const auto &[mirrored, id, feature] :
-      {std::tuple{is.flipped_x, "flipped-x", "ReverseX"},
-          std::tuple{is.flipped_y, "flipped-y", "ReverseY"}})
+            : "turn the camera by 90 degrees");
+  for (const auto &[mirrored, id, side, feature] :
+      {std::tuple{is.flipped_x, "flipped-x", "left to right", "ReverseX"},
+          std::tuple{is.flipped_y, "flipped-y", "top to bottom", "ReverseY"}})
     if (mirrored)
-      finding_.diagnoses.push_back ({id, Verdict::fail,
-          "the picture is mirrored, " +
-              std::string (is.flipped_x ? "left to right" : "top to bottom"),
+      finding_.blame (id, std::string ("the picture is mirrored, ") + side,
+          Verdict::fail,
           std::string ("change ") + feature +
               " of the camera, or count the mirrors of the light path: an odd "
-              "number flips the picture"});
+              "number flips the picture");
 }
 
 void
 MirrorRun::diagnose_stuck (
-    const char *id, const char *what, const std::vector<DefectSpot> &spots)
+    const std::string &what, const std::vector<DefectSpot> &spots)
 {
   const double mirror = view_.pixels_per_mirror ();
   double light = 0.0;
@@ -197,20 +169,17 @@ MirrorRun::diagnose_stuck (
     light += std::max (1.0, std::round (spot.light / (mirror * mirror)));
     places.push_back (view_.mirror_at (spot.centre));
   }
-  finding_.readings.push_back (
-      {"mirrors that are " + std::string (what), {light, 0.0}, "", "0"});
+  const std::string name = "mirrors that are stuck " + what;
+  finding_.readings.push_back ({name, {light, 0.0}, "", "0"});
   if (spots.empty ())
     return;
-  finding_.notes.push_back (
-      {"mirrors that are " + std::string (what) + ", about",
-          places_text (places)});
+  finding_.notes.push_back ({name + ", about", places_text (places)});
   const double seen =
       std::abs (view_.area ()) * off_.mean.width () * off_.mean.height ();
-  finding_.diagnoses.push_back (
-      {id, light > kStuckFail * seen ? Verdict::fail : Verdict::warn,
-          fixed (light, 0) + " of the mirrors that the camera sees are " + what,
-          "let the mirrors run for an hour with changing masks; if they stay "
-          "stuck, use another part of the array or another board"});
+  finding_.blame ("stuck-" + what,
+      fixed (light, 0) + " of the mirrors that the camera sees are stuck " +
+          what,
+      light > kStuckFail * seen ? Verdict::fail : Verdict::warn);
 }
 
 Result<Finding>
@@ -222,24 +191,22 @@ MirrorRun::run ()
   if (view) {
     view_ = *view;
     const double mirror = view_.pixels_per_mirror ();
-    defects_ = find_defects (
-        off_.mean, on_.mean, largest_number (examination_), mirror * mirror);
+    defects_ = find_defects (off_.mean, on_.mean,
+        examination_.rig.parts ().largest (), mirror * mirror);
     diagnose_orientation ();
   } else if (view.error ().code != ErrorCode::invalid_argument) {
     return view.error ();
   } else {
-    finding_.diagnoses.push_back ({"no-picture", Verdict::fail,
-        view.error ().message, "let light of the mirrors reach the camera"});
+    finding_.blame ("no-picture", view.error ().message);
     return std::move (finding_);
   }
-  diagnose_stuck ("stuck-off", "stuck off", defects_.stuck_off);
-  diagnose_stuck ("stuck-on", "stuck on", defects_.stuck_on);
+  diagnose_stuck ("off", defects_.stuck_off);
+  diagnose_stuck ("on", defects_.stuck_on);
   RETURN_IF_ERROR (see_switching ());
   RETURN_IF_ERROR (measure_leak ());
-  std::ranges::stable_sort (
-      finding_.diagnoses, std::greater<> (), &Diagnosis::severity);
+  finding_.sort ();
   if (examination_.exhibits) {
-    const int largest = largest_number (examination_);
+    const int largest = examination_.rig.parts ().largest ();
     finding_.exhibits.push_back (
         {"All mirrors on", picture_of (on_.mean, 0.0, largest)});
     const auto &black = examination_.profile.black_level;

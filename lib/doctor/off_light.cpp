@@ -21,7 +21,7 @@ constexpr double kEnough = 0.16;
 constexpr double kUnrounded = 0.01, kRounded = 0.25;
 
 Measured
-mean_of (const StackMeans &means, const Offsets &offsets)
+exact_mean (const StackMeans &means, const Offsets &offsets)
 {
   const auto exact = unrounded ({means.mean, means.variance}, offsets);
   const double noise =
@@ -59,11 +59,10 @@ measure_off_light (Examination &examination, int frames,
     ImageView<const std::uint8_t> good, const Image<float> &dark,
     const std::vector<double> &parts, double pedestal_light)
 {
-  Rig &rig = examination.rig;
   const StillMask mask =
       pedestal > 0 ? lit (fine.first, pedestal) : no_light ();
   const Image<float> *weights = pedestal > 0 ? &dark : nullptr;
-  const Nanoseconds period = rig.parts ().rate.period ();
+  const Nanoseconds period = examination.rig.parts ().rate.period ();
   const Nanoseconds shorter = period / kShorter;
   const double longest = examination.profile.exposure
                              ? examination.profile.exposure->value
@@ -71,25 +70,20 @@ measure_off_light (Examination &examination, int frames,
   OffLight found;
   ASSIGN_OR_RETURN (const Stack first,
       look_at_light (examination, mask, fine.of, frames, weights));
-  RETURN_IF_ERROR (rig.expose (shorter));
-  /* The exposure time changes with a later frame than the mask. */
-  RETURN_IF_ERROR (rig.watch (examination.lag));
-  const auto second =
-      look_at_light (examination, mask, fine.of, frames, weights);
-  RETURN_IF_ERROR (rig.expose (std::nullopt));
-  RETURN_IF_ERROR (rig.watch (examination.lag));
-  if (!second)
-    return second.error ();
+  ASSIGN_OR_RETURN (
+      const Stack second, with_exposure (examination, shorter, [&] {
+        return look_at_light (examination, mask, fine.of, frames, weights);
+      }));
 
   found.longest = means_of (first, good);
-  found.shorter = means_of (*second, good);
+  found.shorter = means_of (second, good);
   const Offsets offsets = offsets_of (parts, pedestal_light);
-  const Measured a = mean_of (found.longest, offsets);
-  const Measured b = mean_of (found.shorter, offsets);
+  const Measured a = exact_mean (found.longest, offsets);
+  const Measured b = exact_mean (found.shorter, offsets);
   found.part = double (shorter) / longest;
   const double scale = 1.0 / (1.0 - found.part);
   const double flicker =
-      std::hypot (first.scatter, second->scatter) / std::sqrt (frames);
+      std::hypot (first.scatter, second.scatter) / std::sqrt (frames);
   found.light = {scale * (a.value - b.value),
       scale * std::hypot (std::hypot (a.sigma, b.sigma), flicker)};
   return found;

@@ -1,13 +1,12 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Check "parts": what can be known before anything is measured. */
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 
 #include "base/text.h"
 #include "base/try.h"
 #include "doctor/checks.h"
+#include "doctor/rules.h"
 
 namespace codedexposure
 {
@@ -23,59 +22,43 @@ constexpr double kWatched = 1.0;
 constexpr double kMissingPart = 0.1;
 
 /** A setting of the camera that must have one of some values. */
-struct Rule {
-  const char *feature;
-  std::array<const char *, 3> good; ///< null: no other one
-  const char *unless; ///< feature that switches this one off; null: none
+struct Setting {
+  const char *features; ///< with spaces between them
+  const char *good;     ///< values, the same
+  const char *unless;   ///< feature that switches this one off; empty: none
   const char *id;
   Verdict severity;
-  const char *cause, *remedy;
+  const char *cause;
 };
 
-constexpr Rule kRules[] = {
-    {"SensorShutterMode", {"Global", nullptr, nullptr}, nullptr,
-        "rolling-shutter", Verdict::fail,
+constexpr const char *kFalse = "false False 0";
+constexpr Setting kSettings[] = {
+    {"SensorShutterMode", "Global", "", "rolling-shutter", Verdict::fail,
         "rows of the picture are exposed one after the other, so that masks "
-        "mix",
-        "set SensorShutterMode=Global, or use a camera with a global shutter"},
-    {"PixelColorFilter", {"None", nullptr, nullptr}, nullptr, "colour",
-        Verdict::fail, "each pixel sees one colour only",
-        "use the monochrome model of this camera"},
-    {"TestPattern", {"Off", "False", nullptr}, nullptr, "test-image",
-        Verdict::fail, "the camera sends a test picture",
-        "set TestPattern=Off"},
-    {"Gamma", {"1", nullptr, nullptr}, "GammaEnable", "gamma", Verdict::fail,
-        "pixel values are not proportional to light", "set Gamma=1"},
-    {"ExposureAuto", {"Off", nullptr, nullptr}, nullptr, "auto-exposure",
-        Verdict::fail, "the camera changes its exposure by itself",
-        "set ExposureAuto=Off"},
-    {"GainAuto", {"Off", nullptr, nullptr}, nullptr, "auto-gain", Verdict::fail,
-        "the camera changes its gain by itself", "set GainAuto=Off"},
-    {"BalanceWhiteAuto", {"Off", nullptr, nullptr}, nullptr,
-        "auto-white-balance", Verdict::fail,
-        "the camera changes the gain of its colours by itself",
-        "set BalanceWhiteAuto=Off"},
-    {"LUTEnable", {"false", "False", "0"}, nullptr, "lut", Verdict::fail,
+        "mix"},
+    {"PixelColorFilter", "None", "", "colour", Verdict::fail,
+        "each pixel sees one colour only"},
+    {"TestPattern", "Off False", "", "test-image", Verdict::fail,
+        "the camera sends a test picture"},
+    {"Gamma", "1", "GammaEnable", "gamma", Verdict::fail,
+        "pixel values are not proportional to light"},
+    {"ExposureAuto", "Off", "", "auto-exposure", Verdict::fail,
+        "the camera changes its exposure by itself"},
+    {"GainAuto", "Off", "", "auto-gain", Verdict::fail,
+        "the camera changes its gain by itself"},
+    {"BalanceWhiteAuto", "Off", "", "auto-white-balance", Verdict::fail,
+        "the camera changes the gain of its colours by itself"},
+    {"LUTEnable", kFalse, "", "lut", Verdict::fail,
         "a table changes pixel values, which need not stay proportional to "
-        "light",
-        "set LUTEnable=false"},
-    {"BlackLevelClampingEnable", {"false", "False", "0"}, nullptr,
-        "black-clamp", Verdict::warn,
-        "the camera moves its black level with the picture",
-        "set BlackLevelClampingEnable=false"},
-    {"BlackLevelAuto", {"Off", nullptr, nullptr}, nullptr, "black-clamp",
-        Verdict::warn, "the camera moves its black level with the picture",
-        "set BlackLevelAuto=Off"},
-    {"BinningHorizontal", {"1", nullptr, nullptr}, nullptr, "binning",
-        Verdict::warn, "a pixel value is that of several pixels",
-        "set BinningHorizontal=1"},
-    {"BinningVertical", {"1", nullptr, nullptr}, nullptr, "binning",
-        Verdict::warn, "a pixel value is that of several pixels",
-        "set BinningVertical=1"},
-    {"DecimationHorizontal", {"1", nullptr, nullptr}, nullptr, "binning",
-        Verdict::warn, "pixels are left out", "set DecimationHorizontal=1"},
-    {"DecimationVertical", {"1", nullptr, nullptr}, nullptr, "binning",
-        Verdict::warn, "pixels are left out", "set DecimationVertical=1"},
+        "light"},
+    {"BlackLevelClampingEnable", kFalse, "", "black-clamp", Verdict::warn,
+        "the camera moves its black level with the picture"},
+    {"BlackLevelAuto", "Off", "", "black-clamp", Verdict::warn,
+        "the camera moves its black level with the picture"},
+    {"BinningHorizontal BinningVertical DecimationHorizontal "
+     "DecimationVertical",
+        "1", "", "binning", Verdict::warn,
+        "pixels are put together, or left out"},
 };
 
 const std::string *
@@ -92,35 +75,34 @@ number (const RigParts &parts, const std::string &name)
   return text ? parse_real (*text) : std::nullopt;
 }
 
+/* Whether @value is one of @good, as a text or as a number. */
 bool
-is_off (const RigParts &parts, const char *name)
+is_one_of (std::string_view good, const std::string &value)
 {
-  const std::string *text = name ? feature (parts, name) : nullptr;
-  return text && (*text == "false" || *text == "False" || *text == "0");
-}
-
-bool
-is_good (const Rule &rule, const std::string &value)
-{
-  const auto same = [&value] (const char *good) {
-    const auto a = good ? parse_real (good) : std::nullopt;
-    const auto b = parse_real (value);
-    return good && (value == good || (a && b && *a == *b));
-  };
-  return std::ranges::any_of (rule.good, same);
+  return std::ranges::any_of (split (good, ' '), [&] (std::string_view one) {
+    const auto number = parse_real (one);
+    return value == one || (number && number == parse_real (value));
+  });
 }
 
 void
 check_features (const RigParts &parts, Finding &finding)
 {
-  for (const Rule &rule : kRules) {
-    const std::string *value = feature (parts, rule.feature);
-    if (!value || is_off (parts, rule.unless) || is_good (rule, *value))
-      continue;
-    finding.diagnoses.push_back ({rule.id, rule.severity,
-        std::string (rule.feature) + " is " + *value + ": " + rule.cause,
-        rule.remedy});
-  }
+  for (const Setting &setting : kSettings)
+    for (const std::string_view piece : split (setting.features, ' ')) {
+      const std::string name (piece);
+      const std::string *value = feature (parts, name);
+      const std::string *enabled = feature (parts, setting.unless);
+      if (!value || is_one_of (setting.good, *value) ||
+          (enabled && is_one_of (kFalse, *enabled)))
+        continue;
+      finding.blame (setting.id, name + " is " + *value + ": " + setting.cause,
+          setting.severity,
+          *rule_of (setting.id).remedy != 0
+              ? ""
+              : "set " + name + "=" +
+                    std::string (split (setting.good, ' ')[0]));
+    }
 }
 
 void
@@ -130,23 +112,24 @@ check_picture (const RigParts &parts, Finding &finding)
       {std::pair{"Width", "WidthMax"}, std::pair{"Height", "HeightMax"}}) {
     const auto used = number (parts, side), all = number (parts, most);
     if (used && all && *used < *all)
-      finding.diagnoses.push_back ({"roi", Verdict::warn,
+      finding.blame ("roi",
           std::string (side) + " is " + real_text (*used) + " of " +
               real_text (*all) +
               " pixels: the camera sends a part of its field",
+          Verdict::warn,
           std::string ("set ") + side + "=" + real_text (*all) +
-              ", unless this region is intended"});
+              ", unless this region is intended");
   }
   const std::string *formats = feature (parts, "PixelFormat.available");
   const bool deeper =
       formats && (formats->find ("Mono12") != std::string::npos ||
                      formats->find ("Mono10") != std::string::npos);
   if (parts.bits <= 8 && deeper)
-    finding.diagnoses.push_back ({"pixel-format", Verdict::warn,
+    finding.blame ("pixel-format",
         "frames have " + std::to_string (parts.bits) +
-            " bits, but the camera " + "offers " + *formats +
+            " bits, but the camera offers " + *formats +
             ": noise is rounded away",
-        "set --pixel-format Mono12"});
+        Verdict::warn);
 }
 
 void
@@ -160,10 +143,10 @@ check_firmware (const RigParts &parts, Finding &finding)
     finding.notes.push_back ({"firmware of the DMD", text});
     if (const auto major = parse_int (text.substr (0, text.find ('.')));
         major && *major < kOldest)
-      finding.diagnoses.push_back ({"firmware", Verdict::warn,
+      finding.blame ("firmware",
           "the DMD has firmware " + text + ", which is older than " +
               std::to_string (kOldest) + ".0 and not known to work",
-          "update it with TI's program"});
+          Verdict::warn);
   }
 }
 
@@ -178,9 +161,7 @@ frame_bytes (const RigParts &parts)
 std::string
 megabytes (double bytes)
 {
-  char text[32];
-  std::snprintf (text, sizeof text, "%.3g MB", bytes / 1e6);
-  return text;
+  return shown (bytes / 1e6) + " MB";
 }
 
 void
@@ -189,30 +170,27 @@ check_host (const RigParts &parts, const HostFacts &host, Finding &finding)
   const double needed = frame_bytes (parts) * parts.rate.num / parts.rate.den;
   if (host.disk_rate) {
     const double rate = host.disk_rate->value;
-    finding.readings.push_back (
-        {"disk", {rate / 1e6, host.disk_rate->sigma / 1e6}, "MB/s",
-            "at least " + megabytes (needed) + "/s"});
+    finding.readings.push_back ({"disk", scaled (*host.disk_rate, 1e-6), "MB/s",
+        "at least " + megabytes (needed) + "/s"});
     if (rate < 2 * needed)
-      finding.diagnoses.push_back ({"slow-disk",
-          rate < needed ? Verdict::fail : Verdict::warn,
+      finding.blame ("slow-disk",
           "the disk takes " + megabytes (rate) + "/s, and recording needs " +
               megabytes (needed) + "/s before compression",
-          "choose an --output folder on a faster disk"});
+          rate < needed ? Verdict::fail : Verdict::warn);
   }
   const auto packet = number (parts, "GevSCPSPacketSize");
   if (packet && *packet < kSmallPacket)
-    finding.diagnoses.push_back ({"packet-size", Verdict::warn,
+    finding.blame ("packet-size",
         "packets of the camera have " + real_text (*packet) +
             " bytes, so that there are many of them",
-        "set the MTU of the network interface to 9000, and packet-size with "
-        "it"});
+        Verdict::warn);
   if (packet && host.socket_buffer > 0 &&
       host.socket_buffer < frame_bytes (parts))
-    finding.diagnoses.push_back ({"socket-buffer", Verdict::warn,
+    finding.blame ("socket-buffer",
         "a frame has " + megabytes (frame_bytes (parts)) +
             ", but the network buffers of this machine hold " +
             megabytes (host.socket_buffer),
-        "run sysctl net.core.rmem_max=33554432"});
+        Verdict::warn);
 }
 
 /** Frames that are missing between those that came: their stamps are whole
@@ -250,15 +228,11 @@ check_network (Examination &examination, Finding &finding)
         {name, {double (count), std::sqrt (double (count))},
             "of " + std::to_string (all), "0"});
   const std::string of_all = " of " + std::to_string (all) + " frames ";
-  const std::string remedy =
-      "connect the camera to a network interface of its own, and check cable "
-      "and switch";
   if (damaged > 0)
-    finding.diagnoses.push_back ({"packet-loss", Verdict::fail,
-        std::to_string (damaged) + of_all + "lack packets", remedy});
+    finding.blame (
+        "packet-loss", std::to_string (damaged) + of_all + "lack packets");
   else if (missing > kMissingPart * all)
-    finding.diagnoses.push_back ({"lose", Verdict::fail,
-        std::to_string (missing) + of_all + "did not come", remedy});
+    finding.blame ("lose", std::to_string (missing) + of_all + "did not come");
   return {};
 }
 
@@ -289,8 +263,7 @@ check_parts (Examination &examination)
   check_firmware (parts, finding);
   check_host (parts, examination.host, finding);
   RETURN_IF_ERROR (check_network (examination, finding));
-  std::ranges::stable_sort (
-      finding.diagnoses, std::ranges::greater (), &Diagnosis::severity);
+  finding.sort ();
 
   BenchProfile &profile = examination.profile;
   profile.camera = parts.camera;
@@ -304,22 +277,11 @@ Finding
 part_missing (const Error &why, bool camera)
 {
   Finding finding{"parts", "nothing: a part could not be opened"};
-  const auto add = [&] (const char *id, const char *remedy) {
-    finding.diagnoses.push_back ({id, Verdict::fail, why.message, remedy});
-  };
-  if (camera)
-    add ("camera-missing",
-        "check its cable and power, and whether another program has it open; "
-        "gst-device-monitor-1.0 Source/Video lists the cameras");
-  else if (why.code == ErrorCode::denied)
-    add ("dmd-permission",
-        "install the udev rule 60-codedexposure-dmd.rules and connect the "
-        "board again");
-  else if (why.code == ErrorCode::busy)
-    add ("dmd-busy", "close the other program that uses the board");
-  else
-    add ("dmd-missing",
-        "check its cable and power; codedexposure dmd list shows the boards");
+  finding.blame (camera                          ? "camera-missing"
+                 : why.code == ErrorCode::denied ? "dmd-permission"
+                 : why.code == ErrorCode::busy   ? "dmd-busy"
+                                                 : "dmd-missing",
+      why.message);
   return finding;
 }
 

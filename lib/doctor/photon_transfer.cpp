@@ -4,9 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Core>
-
-#include "doctor/solve.h"
+#include "estimate/least_squares.h"
 
 namespace codedexposure
 {
@@ -16,57 +14,6 @@ namespace
 
 /* Relative error of light that the levels have in common. */
 constexpr double kLightError = 0.005;
-
-/* A polynomial by weighted least squares. */
-struct Polynomial {
-  Eigen::VectorXd factors;
-  Eigen::MatrixXd covariance;
-  double excess = 1.0; ///< root of the reduced chi-square, at least 1
-
-  double at (double x) const
-  {
-    double sum = 0.0;
-    for (Eigen::Index i = factors.size (); i-- > 0;)
-      sum = sum * x + factors[i];
-    return sum;
-  }
-};
-
-struct Sample {
-  double x;
-  Measured y;
-};
-
-Polynomial
-fit (const std::vector<Sample> &samples, int degree)
-{
-  const Eigen::Index terms = degree + 1;
-  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero (terms, terms);
-  Eigen::VectorXd right = Eigen::VectorXd::Zero (terms);
-  const auto row_of = [terms] (double x) {
-    Eigen::VectorXd row (terms);
-    for (Eigen::Index i = 0; i < terms; i++)
-      row[i] = std::pow (x, double (i));
-    return row;
-  };
-  for (const Sample &s : samples) {
-    const Eigen::VectorXd row = row_of (s.x);
-    const double weight = 1.0 / std::max (1e-30, s.y.sigma * s.y.sigma);
-    normal += weight * row * row.transpose ();
-    right += weight * s.y.value * row;
-  }
-  Polynomial fitted;
-  fitted.covariance = inverse_of (normal);
-  fitted.factors = fitted.covariance * right;
-  double squares = 0.0;
-  for (const Sample &s : samples)
-    squares += std::pow ((s.y.value - fitted.at (s.x)) / s.y.sigma, 2.0);
-  const double freedom = double (samples.size ()) - double (terms);
-  if (freedom > 0.0)
-    fitted.excess = std::max (1.0, std::sqrt (squares / freedom));
-  fitted.covariance *= fitted.excess * fitted.excess;
-  return fitted;
-}
 
 } // namespace
 
@@ -121,10 +68,10 @@ fit_photon_transfer (const std::vector<TransferPoint> &points)
     most = std::max (most, point.light);
   std::vector<Sample> means, variances;
   for (const TransferPoint &point : points)
-    means.push_back ({point.light / most, point.mean});
+    means.push_back ({point.light / most, point.mean.value, point.mean.sigma});
   if (means.size () < 4 || !(most > 0.0))
     return std::nullopt;
-  const Polynomial response = fit (means, 2);
+  const Polynomial response = fit_polynomial (means, 2);
 
   PhotonTransfer found;
   found.dark = {response.factors[0], std::sqrt (response.covariance (0, 0))};
@@ -139,11 +86,11 @@ fit_photon_transfer (const std::vector<TransferPoint> &points)
     const double steep = 1.0 + 2.0 * found.bow * point.light / found.slope;
     const double unit = steep * steep;
     variances.push_back ({found.slope * point.light,
-        {point.variance->value / unit, point.variance->sigma / unit}});
+        point.variance->value / unit, point.variance->sigma / unit});
   }
   if (variances.size () < 4)
     return std::nullopt;
-  const Polynomial noise = fit (variances, 1);
+  const Polynomial noise = fit_polynomial (variances, 1);
   const double per_number = noise.factors[1];
   if (!(per_number > 0.0))
     return std::nullopt;

@@ -53,6 +53,11 @@ struct RigParts {
   FrameRate rate; ///< of the schedule, which the trigger gives
   /** GenICam features of the camera that could be read, as texts. */
   std::map<std::string, std::string> features;
+
+  /** The largest DN. */
+  int largest () const { return (1 << bits) - 1; }
+  /** From frame to frame, s. */
+  double period () const { return 1e-12 * double (rate.time_of (1000)); }
 };
 
 /**

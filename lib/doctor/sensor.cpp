@@ -4,8 +4,8 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstring>
 
-#include "base/text.h"
 #include "base/try.h"
 #include "doctor/defects.h"
 #include "doctor/dither.h"
@@ -13,6 +13,7 @@
 #include "doctor/photon_transfer.h"
 #include "doctor/rounding.h"
 #include "doctor/stack.h"
+#include "estimate/least_squares.h"
 
 namespace codedexposure
 {
@@ -53,10 +54,7 @@ constexpr double kTimeError = 500;
 /* A variance below this part of the expected one is that of a full well. */
 constexpr double kFullWell = 0.4;
 
-/* Rules: of warnings and failures. */
-constexpr double kBowWarn = 0.01, kBowFail = 0.02;
-constexpr double kNoiseWarn = 20.0; // e-
-constexpr double kZerosWarn = 0.01, kZerosFail = 0.03;
+/* Defects that warn and fail, as parts of the pixels; fewer are not told. */
 constexpr double kDefectsWarn = 1e-4, kDefectsFail = 0.01;
 constexpr double kFewDefects = 40;
 
@@ -72,7 +70,7 @@ class PhotonTransferRun
 public:
   explicit PhotonTransferRun (Examination &examination)
       : examination_ (examination), fine_ (fine_slots (examination, kShortest)),
-        largest_ (largest_number (examination))
+        largest_ (examination.rig.parts ().largest ())
   {
   }
 
@@ -93,11 +91,9 @@ private:
   }
   bool evaluate ();
   void report ();
-  void report_defects ();
   void diagnose ();
-  void diagnose_range (double zeros);
   void diagnose_defects (
-      const char *id, const char *what, const char *remedy, std::size_t count);
+      const char *id, const char *what, const std::vector<Offset> &pixels);
   void plot ();
   int missing_bits () const;
 
@@ -113,10 +109,7 @@ private:
   int top_ = 0;            // slots of the brightest level
   bool saturates_ = false; // with all slots
   std::vector<Level> levels_;
-  struct Reference {
-    double time, signal;
-  };
-  std::vector<Reference> references_;
+  std::vector<Sample> references_;        // signals over times, s
   double drift_ = 0.0, drift_from_ = 0.0; // 1/s, s
   Nanoseconds start_ = 0;
   double spread_ = 0.0;       // of the pixels' light, as a part of it
@@ -159,25 +152,8 @@ PhotonTransferRun::see_reference ()
       const Stack stack, look_at_light (examination_, lit (fine_.first, top_),
                              fine_.of, kReferenceFrames, &dark_.mean));
   references_.push_back ({double (stack.time - start_) * 1e-9,
-      signal (means_of (stack, defects_.good.view ()))});
+      signal (means_of (stack, defects_.good.view ())), 1.0});
   return {};
-}
-
-/* The line through the references. */
-void
-fit_drift (const auto &references, double &rate, double &from)
-{
-  double time = 0.0, signal = 0.0, products = 0.0, squares = 0.0;
-  for (const auto &r : references) {
-    time += r.time / double (references.size ());
-    signal += r.signal / double (references.size ());
-  }
-  for (const auto &r : references) {
-    products += (r.time - time) * (r.signal - signal);
-    squares += (r.time - time) * (r.time - time);
-  }
-  from = time;
-  rate = squares > 0.0 && signal > 0.0 ? products / squares / signal : 0.0;
 }
 
 Result<void>
@@ -200,7 +176,14 @@ PhotonTransferRun::see_levels ()
   }
   RETURN_IF_ERROR (see_reference ());
   std::ranges::sort (levels_, {}, &Level::slots);
-  fit_drift (references_, drift_, drift_from_);
+  const Polynomial line = fit_polynomial (references_, 1);
+  double light = 0.0;
+  for (const Sample &reference : references_) {
+    drift_from_ += reference.x / double (references_.size ());
+    light += reference.value / double (references_.size ());
+  }
+  if (light > 0.0 && line.factors.allFinite ())
+    drift_ = line.factors[1] / light;
   return {};
 }
 
@@ -348,13 +331,11 @@ PhotonTransferRun::report ()
     profile.conversion_gain = profile.full_well = profile.read_noise = {};
   if (!known || off_.shorter.zeros > kZeros || missing_bits () > 0)
     profile.read_noise = profile.black_level = {};
-  finding_.readings = {{"conversion gain", gain, "e-/DN"},
-      {"full well", full_well, "e-"},
-      {"read noise", transfer_->read_noise, "e-",
-          "at most " + real_text (kNoiseWarn)},
-      {"black level", black_, "DN"},
-      {"linearity error", {100 * linearity.value, 100 * linearity.sigma},
-          "% of the range", "at most " + real_text (100 * kBowWarn)}};
+  finding_.readings = {
+      {"conversion gain", gain, "e-/DN"}, {"full well", full_well, "e-"}};
+  finding_.add ("read noise", transfer_->read_noise);
+  finding_.readings.push_back ({"black level", black_, "DN"});
+  finding_.add ("linearity error", scaled (linearity, 100.0));
   finding_.notes.push_back ({"saturation",
       plateau_ ? "The well is full at " + fixed (*plateau_, 0) + " DN."
       : saturates_
@@ -364,93 +345,50 @@ PhotonTransferRun::report ()
 }
 
 void
-PhotonTransferRun::report_defects ()
-{
-  finding_.readings.push_back (
-      {"hot pixels", {double (defects_.hot.size ()), 0.0}, ""});
-  finding_.readings.push_back (
-      {"dead pixels", {double (defects_.dead.size ()), 0.0}, ""});
-  for (const auto &[name, pixels] : {std::pair{"hot pixels", &defects_.hot},
-           std::pair{"dead pixels", &defects_.dead}}) {
-    std::vector<Position> places;
-    for (const Offset &at : *pixels)
-      places.push_back ({double (at.x), double (at.y)});
-    if (!places.empty ())
-      finding_.notes.push_back ({name, places_text (places)});
-  }
-}
-
-void
-PhotonTransferRun::diagnose_range (double zeros)
-{
-  const int bits = examination_.rig.parts ().bits;
-  if (const int missing = missing_bits (); missing > 0)
-    finding_.diagnoses.push_back ({"missing-bits", Verdict::fail,
-        "the lowest " + std::to_string (missing) + " of " +
-            std::to_string (bits) + " bits are always 0",
-        "set the pixel format to the number of bits that the sensor "
-        "delivers"});
-  if (zeros > kZerosWarn)
-    finding_.diagnoses.push_back (
-        {"black-clipped", zeros > kZerosFail ? Verdict::fail : Verdict::warn,
-            fixed (100 * zeros, 1) +
-                " % of the dark pixel values are 0, where noise is cut off",
-            "raise BlackLevel until no dark pixel is 0"});
-}
-
-void
 PhotonTransferRun::diagnose_defects (
-    const char *id, const char *what, const char *remedy, std::size_t count)
+    const char *id, const char *what, const std::vector<Offset> &pixels)
 {
-  const double pixels = double (dark_.mean.width ()) * dark_.mean.height ();
-  if (double (count) <= std::max (kFewDefects, kDefectsWarn * pixels))
-    return;
-  finding_.diagnoses.push_back ({id,
-      double (count) > kDefectsFail * pixels ? Verdict::fail : Verdict::warn,
-      std::to_string (count) + " pixels " + what, remedy});
+  const double count = double (pixels.size ());
+  const std::string name = std::string (id, std::strchr (id, '-')) + " pixels";
+  finding_.readings.push_back ({name, {count, 0.0}, ""});
+  std::vector<Position> places;
+  for (const Offset &at : pixels)
+    places.push_back ({double (at.x), double (at.y)});
+  if (!places.empty ())
+    finding_.notes.push_back ({name, places_text (places)});
+  const double all = double (dark_.mean.width ()) * dark_.mean.height ();
+  if (count > std::max (kFewDefects, kDefectsWarn * all))
+    finding_.blame (id, fixed (count, 0) + " pixels " + what,
+        count > kDefectsFail * all ? Verdict::fail : Verdict::warn);
 }
 
 void
 PhotonTransferRun::diagnose ()
 {
+  const int bits = examination_.rig.parts ().bits;
+  if (const int missing = missing_bits (); missing > 0)
+    finding_.blame ("missing-bits", "the lowest " + std::to_string (missing) +
+                                        " of " + std::to_string (bits) +
+                                        " bits are always 0");
   const double zeros = std::max (off_.shorter.zeros, dark_means_.zeros);
-  diagnose_range (dithered_ ? dark_means_.zeros : zeros);
+  finding_.judge (
+      "black-clipped", {100.0 * (dithered_ ? dark_means_.zeros : zeros), 0.0});
   const bool known = finding_.diagnoses.empty ();
+  const double light = signal (levels_.back ().means) / largest_;
   if (transfer_ && known) {
-    const Measured &bow = *examination_.profile.linearity_error;
-    if (bow.value - 2 * bow.sigma > kBowWarn)
-      finding_.diagnoses.push_back (
-          {"nonlinear", bow.value > kBowFail ? Verdict::fail : Verdict::warn,
-              "pixel values differ by up to " + fixed (100 * bow.value, 1) +
-                  " % of the range from a straight line",
-              "set Gamma=1 and switch off every look-up table and high dynamic "
-              "range mode of the camera"});
-    const Measured &noise = transfer_->read_noise;
-    if (noise.value - 2 * noise.sigma > kNoiseWarn)
-      finding_.diagnoses.push_back ({"noise", Verdict::warn,
-          "the read noise is " + fixed (noise.value, 0) +
-              " e-, where cameras of this kind have 2 to 15 e-",
-          "use a mode of the camera with a slower readout or a higher analog "
-          "gain"});
+    finding_.judge ("linearity error",
+        scaled (*examination_.profile.linearity_error, 100.0));
+    finding_.judge ("read noise", transfer_->read_noise);
+  } else if (known && light < kDim) {
+    finding_.blame ("dark", "the brightest level has " +
+                                fixed (100 * light, 0) +
+                                " % of the range, too little to measure noise");
+  } else if (known) {
+    finding_.blame (
+        "noise", "noise does not grow with light as that of photons does");
   }
-  const bool dim = signal (levels_.back ().means) < kDim * largest_;
-  if (!transfer_ && known && dim)
-    finding_.diagnoses.push_back ({"dark", Verdict::fail,
-        "the brightest level has " +
-            fixed (100 * signal (levels_.back ().means) / largest_, 0) +
-            " % of the range, too little to measure noise",
-        "give more light"});
-  else if (!transfer_ && known)
-    finding_.diagnoses.push_back ({"noise", Verdict::fail,
-        "noise does not grow with light as that of photons does",
-        "switch off noise reduction and other processing in the camera"});
-  diagnose_defects ("dead-pixels", "do not see light",
-      "clean the window of the sensor, or replace the camera",
-      defects_.dead.size ());
-  diagnose_defects ("hot-pixels", "have a signal without light",
-      "cool the camera or shorten the exposure; defect correction of the "
-      "camera may hide them, but mixes neighbours",
-      defects_.hot.size ());
+  diagnose_defects ("dead-pixels", "do not see light", defects_.dead);
+  diagnose_defects ("hot-pixels", "have a signal without light", defects_.hot);
 }
 
 void
@@ -489,7 +427,6 @@ PhotonTransferRun::run ()
     report ();
     plot ();
   }
-  report_defects ();
   diagnose ();
   if (examination_.exhibits) {
     finding_.exhibits.push_back (

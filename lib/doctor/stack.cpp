@@ -2,10 +2,9 @@
 #include "doctor/stack.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 
+#include "base/statistics.h"
 #include "base/try.h"
 
 namespace codedexposure
@@ -13,16 +12,6 @@ namespace codedexposure
 
 namespace
 {
-
-double
-mean_of (ImageView<const float> image)
-{
-  double sum = 0.0;
-  for (int y = 0; y < image.height; y++)
-    for (int x = 0; x < image.width; x++)
-      sum += double (image.at (x, y));
-  return sum / (double (image.width) * image.height);
-}
 
 /* Parts of a common change of light that pixels get; their mean is 1. */
 Image<float>
@@ -32,29 +21,13 @@ weights_of (const Image<float> &mean, const Image<float> *dark, int largest)
   const double light =
       dark ? mean_of (mean.view ()) - mean_of (dark->view ()) : 0.0;
   const bool lit = light > 0.02 * largest;
-  for (int y = 0; y < mean.height (); y++)
-    for (int x = 0; x < mean.width (); x++)
-      weights.at (x, y) =
-          lit ? float ((double (mean.at (x, y)) - double (dark->at (x, y))) /
-                       light)
-              : 1.0f;
+  each_pixel (mean, [&] (int x, int y) {
+    weights.at (x, y) =
+        lit ? float (
+                  (double (mean.at (x, y)) - double (dark->at (x, y))) / light)
+            : 1.0f;
+  });
   return weights;
-}
-
-void
-add_frame (const Image<std::uint16_t> &frame, int largest, Stack &stack)
-{
-  for (int y = 0; y < frame.height (); y++) {
-    const std::uint16_t *row = frame.view ().row (y);
-    for (int x = 0; x < frame.width (); x++) {
-      stack.mean.at (x, y) += float (row[x]);
-      stack.zeros.at (x, y) =
-          std::uint16_t (stack.zeros.at (x, y) + (row[x] == 0));
-      stack.full.at (x, y) =
-          std::uint16_t (stack.full.at (x, y) + (row[x] >= largest));
-      stack.bits_seen = std::uint16_t (stack.bits_seen | row[x]);
-    }
-  }
 }
 
 } // namespace
@@ -63,37 +36,39 @@ Stack
 stack_of (
     const std::vector<SeenFrame> &frames, int largest, const Image<float> *dark)
 {
-  const Image<std::uint16_t> &first = frames.front ().picture;
-  const int width = first.width (), height = first.height ();
-  Stack stack = {int (frames.size ()), 0, {width, height}, {width, height},
-      {width, height}, {width, height}};
+  if (frames.empty ())
+    return {};
+  const int width = frames[0].picture.width ();
+  const int height = frames[0].picture.height ();
+  Stack stack = {int (frames.size ()), frames[0].time, {width, height},
+      {width, height}, {width, height}, {width, height}};
   for (const SeenFrame &frame : frames) {
     stack.time += (frame.time - frames[0].time) / stack.frames;
-    add_frame (frame.picture, largest, stack);
+    each_pixel (frame.picture, [&] (int x, int y) {
+      const std::uint16_t value = frame.picture.at (x, y);
+      stack.mean.at (x, y) += float (value);
+      stack.zeros.at (x, y) += value == 0;
+      stack.full.at (x, y) += value >= largest;
+      stack.bits_seen |= value;
+    });
   }
-  stack.time += frames[0].time;
-  for (int y = 0; y < height; y++)
-    for (int x = 0; x < width; x++)
-      stack.mean.at (x, y) /= float (stack.frames);
+  each_pixel (stack.mean,
+      [&] (int x, int y) { stack.mean.at (x, y) /= float (stack.frames); });
 
   const Image<float> weights = weights_of (stack.mean, dark, largest);
-  double scatter = 0.0;
+  const double middle = mean_of (stack.mean.view ());
+  const int freedom = std::max (1, stack.frames - 1);
   for (const SeenFrame &frame : frames) {
-    double sum = 0.0;
-    for (int y = 0; y < height; y++)
-      for (int x = 0; x < width; x++)
-        sum += double (frame.picture.at (x, y)) - double (stack.mean.at (x, y));
-    const double more = sum / (double (width) * height);
-    scatter += more * more;
-    for (int y = 0; y < height; y++)
-      for (int x = 0; x < width; x++) {
-        const float rest = float (frame.picture.at (x, y)) -
-                           stack.mean.at (x, y) -
-                           float (more) * weights.at (x, y);
-        stack.variance.at (x, y) += rest * rest / float (stack.frames - 1);
-      }
+    const double more = mean_of (frame.picture.view ()) - middle;
+    stack.scatter += more * more / freedom;
+    each_pixel (frame.picture, [&] (int x, int y) {
+      const float rest = float (frame.picture.at (x, y)) -
+                         stack.mean.at (x, y) -
+                         float (more) * weights.at (x, y);
+      stack.variance.at (x, y) += rest * rest / float (freedom);
+    });
   }
-  stack.scatter = std::sqrt (scatter / (stack.frames - 1));
+  stack.scatter = std::sqrt (stack.scatter);
   return stack;
 }
 
@@ -129,7 +104,7 @@ look_at_light (Examination &examination, const StillMask &mask, int slots,
       look_for_whole_frames (examination, mask, slots, std::max (4, frames)));
   if (dark && !same_size (seen[0].picture.view (), dark->view ()))
     return Error{"the size of the frames has changed", ErrorCode::device};
-  return stack_of (seen, largest_number (examination), dark);
+  return stack_of (seen, examination.rig.parts ().largest (), dark);
 }
 
 Result<Finding>
@@ -138,8 +113,7 @@ or_no_frames (Result<Finding> finding, const std::string &name)
   if (finding || finding.error ().code != ErrorCode::timeout)
     return finding;
   Finding none{name, ""};
-  none.diagnoses.push_back ({"no-frames", Verdict::fail,
-      finding.error ().message, "run the checks of the parts and the trigger"});
+  none.blame ("no-frames", finding.error ().message);
   return none;
 }
 
@@ -149,18 +123,17 @@ means_of (const Stack &stack, ImageView<const std::uint8_t> good)
   StackMeans sum;
   double pixels = 0.0, squares = 0.0;
   const double middle = mean_of (stack.mean.view ());
-  for (int y = 0; y < good.height; y++)
-    for (int x = 0; x < good.width; x++) {
-      if (good.at (x, y) == 0)
-        continue;
-      const double mean = double (stack.mean.at (x, y)) - middle;
-      pixels++;
-      sum.mean += mean;
-      squares += mean * mean;
-      sum.variance += double (stack.variance.at (x, y));
-      sum.zeros += stack.zeros.at (x, y);
-      sum.full += stack.full.at (x, y);
-    }
+  each_pixel (good, [&] (int x, int y) {
+    if (good.at (x, y) == 0)
+      return;
+    const double mean = double (stack.mean.at (x, y)) - middle;
+    pixels++;
+    sum.mean += mean;
+    squares += mean * mean;
+    sum.variance += double (stack.variance.at (x, y));
+    sum.zeros += stack.zeros.at (x, y);
+    sum.full += stack.full.at (x, y);
+  });
   if (pixels < 1.0)
     return {};
   sum.values = pixels * stack.frames;
@@ -180,10 +153,10 @@ light_parts (const Image<float> &dark, const Image<float> &bright,
 {
   constexpr std::size_t kParts = 24;
   std::vector<double> light;
-  for (int y = 0; y < good.height; y++)
-    for (int x = 0; x < good.width; x++)
-      if (good.at (x, y) != 0)
-        light.push_back (double (bright.at (x, y)) - double (dark.at (x, y)));
+  each_pixel (good, [&] (int x, int y) {
+    if (good.at (x, y) != 0)
+      light.push_back (double (bright.at (x, y)) - double (dark.at (x, y)));
+  });
   if (light.size () < kParts)
     return {};
   std::ranges::sort (light);
@@ -197,12 +170,6 @@ light_parts (const Image<float> &dark, const Image<float> &bright,
   for (double &part : parts)
     part /= mean;
   return parts;
-}
-
-StillMask
-no_light ()
-{
-  return {.name = "no light", .on = [] (int, int) { return false; }};
 }
 
 Examination::Lit
@@ -222,10 +189,10 @@ picture_of (const Image<float> &image, double low, double high)
 {
   Image<std::uint8_t> picture (image.width (), image.height ());
   const double scale = 255.0 / std::max (1e-9, high - low);
-  for (int y = 0; y < image.height (); y++)
-    for (int x = 0; x < image.width (); x++)
-      picture.at (x, y) = std::uint8_t (std::clamp (
-          std::lround (scale * (double (image.at (x, y)) - low)), 0l, 255l));
+  each_pixel (image, [&] (int x, int y) {
+    picture.at (x, y) = std::uint8_t (std::clamp (
+        std::lround (scale * (double (image.at (x, y)) - low)), 0l, 255l));
+  });
   return picture;
 }
 
@@ -240,16 +207,6 @@ places_text (const std::vector<Position> &places)
     text.append (fixed (places[i].y, 0));
   }
   return text.append (places.size () > kMost ? " ..." : "");
-}
-
-std::string
-fixed (double value, int decimals)
-{
-  std::array<char, 64> text;
-  std::snprintf (text.data (), text.size (), "%.*f", decimals, value);
-  const std::string number = text.data ();
-  const bool zero = number.find_first_of ("123456789") == number.npos;
-  return zero && number[0] == '-' ? number.substr (1) : number;
 }
 
 } // namespace codedexposure

@@ -38,7 +38,8 @@ Result<std::vector<SeenFrame>> look_for_whole_frames (
 Result<Stack> look_at_light (Examination &examination, const StillMask &mask,
     int slots, int frames, const Image<float> *dark = nullptr);
 
-/** Puts @p frames, at least two of the same size, together. */
+/** Puts @p frames of the same size together; without frames, there is no
+ * picture. */
 Stack stack_of (const std::vector<SeenFrame> &frames, int largest,
     const Image<float> *dark = nullptr);
 
@@ -57,9 +58,6 @@ StackMeans means_of (const Stack &stack, ImageView<const std::uint8_t> good);
 std::vector<double> light_parts (const Image<float> &dark,
     const Image<float> &bright, ImageView<const std::uint8_t> good);
 
-/** Every mirror is off. */
-StillMask no_light ();
-
 /** The slots that lie in the exposure as a whole, in shorter ones: each is at
  * least @p shortest long. */
 Examination::Lit fine_slots (
@@ -69,21 +67,11 @@ Examination::Lit fine_slots (
  * so in place of the error. */
 Result<Finding> or_no_frames (Result<Finding> finding, const std::string &name);
 
-/** The largest DN of the camera. */
-inline int
-largest_number (const Examination &examination)
-{
-  return (1 << examination.rig.parts ().bits) - 1;
-}
-
 /** 255 for @p high and more, 0 for @p low and less. */
 Image<std::uint8_t> picture_of (
     const Image<float> &image, double low, double high);
 
 /** "12,40 13,7", rounded, of some of them where there are many. */
 std::string places_text (const std::vector<Position> &places);
-
-/** "1.50"; never "-0". */
-std::string fixed (double value, int decimals);
 
 } // namespace codedexposure

@@ -4,10 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Core>
-
 #include "base/try.h"
-#include "doctor/solve.h"
+#include "estimate/least_squares.h"
 
 namespace codedexposure
 {
@@ -163,7 +161,6 @@ see_points (Examination &examination, Examination::Lit run, double end,
     ImageView<const std::uint8_t> good)
 {
   const double period = double (examination.rig.parts ().rate.period ());
-  RETURN_IF_ERROR (examination.rig.watch (examination.lag));
   for (const Nanoseconds moment : kMoments) {
     const double time = end + double (moment);
     run.slots = int (std::lround (time * run.of / period)) - run.first;
@@ -186,8 +183,7 @@ Result<Measured>
 measure_switching (Examination &examination, const Image<float> &dark,
     ImageView<const std::uint8_t> good, std::vector<SwitchPoint> &points)
 {
-  Rig &rig = examination.rig;
-  const Nanoseconds period = rig.parts ().rate.period ();
+  const Nanoseconds period = examination.rig.parts ().rate.period ();
   const int slots = int (std::clamp<Nanoseconds> (period / kStep, 8, 8192));
   const auto slot_at = [&] (double time) {
     return int (std::lround (time * slots / double (period)));
@@ -204,12 +200,9 @@ measure_switching (Examination &examination, const Image<float> &dark,
     return Error{"The frame period is too short to see mirrors move.",
         ErrorCode::unsupported};
 
-  RETURN_IF_ERROR (rig.expose (period / 2));
-  Result<void> done =
-      see_points (examination, {first, 0, slots}, end, points, dark, good);
-  RETURN_IF_ERROR (rig.expose (std::nullopt));
-  RETURN_IF_ERROR (rig.watch (examination.lag));
-  RETURN_IF_ERROR (done);
+  RETURN_IF_ERROR (with_exposure (examination, period / 2, [&] {
+    return see_points (examination, {first, 0, slots}, end, points, dark, good);
+  }));
   return fit_switching (points, examination.jitter);
 }
 

@@ -3,16 +3,16 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numbers>
 #include <optional>
 #include <string>
 
+#include "base/statistics.h"
 #include "base/text.h"
 #include "base/try.h"
 #include "doctor/checks.h"
 #include "doctor/level.h"
 #include "doctor/light_fit.h"
-#include "doctor/window_guess.h"
+#include "doctor/runs.h"
 
 namespace codedexposure
 {
@@ -41,13 +41,15 @@ constexpr double kCoarsest = 0.03;
  * range. */
 constexpr double kFaint = 0.05;
 
-/* Beyond these, a slot loses light that others do not; seconds. */
-constexpr double kLateWarn = 400e-6, kLateFail = 700e-6;
-constexpr double kShortWarn = 600e-6, kShortFail = 900e-6;
-constexpr double kJitterWarn = 25e-6, kJitterFail = 60e-6;
+/* An exposure that ends so much too early loses light; us. */
+constexpr double kShortWarn = 600, kShortFail = 900;
+/* One that runs so far into the next period mixes slots; us. */
+constexpr double kLongWarn = 400, kLongFail = 700;
 /* An exposure that is longer, or known less well, is none that explains the
  * light; parts of the period. */
 constexpr double kLongest = 1.5, kUnclear = 0.02;
+/* Jitter that is known no better is large, us. */
+constexpr double kScattered = 60;
 /* Mirrors that are late make the exposure look early, s. */
 constexpr double kSlowMirrors = 2e-3;
 /* Slowest flicker beside which the exposure is found, Hz. */
@@ -55,11 +57,13 @@ constexpr double kSlowest = 0.15;
 /* A delay of that part of a period is that of a pulse, not of a setting, where
  * the camera does not say what it is set to. */
 constexpr double kEdge = 0.3;
+/* After the set delay, us, the exposure begins with the edge of a pulse. */
+constexpr double kEdgeDelay = 700;
 
 std::string
-us_text (double seconds)
+us_text (double us)
 {
-  return std::to_string (std::lround (seconds * 1e6)) + " us";
+  return fixed (us, 0) + " us";
 }
 
 /** Whether @p number is above @p limit, as far as it is known. */
@@ -84,21 +88,18 @@ class TriggerCheck
 public:
   explicit TriggerCheck (Examination &examination)
       : examination_ (examination), rig_ (examination.rig),
-        parts_ (rig_.parts ()),
-        period_ (1e-9 * double (parts_.rate.time_of (1000)) / 1000.0),
-        largest_ ((1 << parts_.bits) - 1)
+        parts_ (rig_.parts ()), period_ (parts_.period ()),
+        largest_ (parts_.largest ()),
+        runs_ (examination,
+            std::clamp (int (period_ / kShortestRun / kTiles) * kTiles, kTiles,
+                kFinestGrid)),
+        grid_ (runs_.grid ())
   {
-    const double fit = period_ / kShortestRun / kTiles;
-    grid_ = std::clamp (int (fit) * kTiles, kTiles, kFinestGrid);
   }
 
   Result<Finding> run ();
 
 private:
-  double slot () const { return period_ / grid_; }
-  double coarse (int tile) const { return period_ * tile / kTiles; }
-  void fail (const char *id, std::string cause, std::string remedy,
-      Verdict severity = Verdict::fail);
   Result<bool> check_frames ();
   Result<bool> check_parked (double ratio, double step, double uneven);
   Result<bool> check_lag ();
@@ -106,13 +107,18 @@ private:
   Change judge (const std::vector<SeenFrame> &seen, double before, double after,
       Nanoseconds last) const;
   void diagnose_lag (const std::vector<Change> &changes);
-  Result<void> sample (int first, int count, int exposure, int frames);
+  Result<void> sample (int first, int count, int exposure, int frames)
+  {
+    RETURN_IF_ERROR (runs_.see (lit (first, count), exposure, frames));
+    return {};
+  }
   Result<void> sample_tiles (int exposure);
   Result<void> sample_starts (double start, int exposure);
   Result<void> sample_ends (double end, int exposure);
   Result<void> sample_inside (const LightModel &guess);
   Result<void> measure_exposure ();
   void diagnose_exposure (const LightFit &fit);
+  void diagnose_end (const Measured &end, const Measured &length);
   std::optional<double> set_delay () const;
   double possible_start (double start) const;
   void diagnose_delay (const Measured &start);
@@ -124,21 +130,12 @@ private:
   const RigParts &parts_;
   double period_; // s
   int largest_;
-  int grid_ = kTiles; // slots in a period
-  int step_ = 1;      // DN
+  Runs runs_;
+  int grid_; // slots in a period
   Finding finding_{"trigger",
       "all mirrors on in one part of the frame period after the other"};
   Nanoseconds last_ = 0; // stamp of the last frame that came
-  std::vector<LightSample> samples_;
 };
-
-void
-TriggerCheck::fail (
-    const char *id, std::string cause, std::string remedy, Verdict severity)
-{
-  finding_.diagnoses.push_back (
-      {id, severity, std::move (cause), std::move (remedy)});
-}
 
 /** Whether frames come, and how many in a cycle. */
 Result<bool>
@@ -147,42 +144,37 @@ TriggerCheck::check_frames ()
   ASSIGN_OR_RETURN (
       const auto seen, look (examination_, lit (0, 1), 1, kRateFrames));
   if (seen.size () < 2) {
-    finding_.readings.push_back ({"frames per cycle", {0.0, 0.0}, "", "1"});
-    fail ("no-trigger",
+    finding_.add ("frames per cycle", {0.0, 0.0});
+    finding_.blame ("no-trigger",
         "the DMD runs, but " + std::string (seen.empty ()
                                                 ? "no frame comes"
-                                                : "only one frame came"),
-        "connect the trigger output of the DMD to the input that the camera's "
-        "TriggerSource names");
+                                                : "only one frame came"));
     return false;
   }
   std::vector<double> steps;
-  std::uint16_t bits = 0;
+  int bits = 0;
   for (std::size_t i = 0; i < seen.size (); i++) {
     if (i > 0)
       steps.push_back (1e-9 * double (seen[i].time - seen[i - 1].time));
     if (!seen[i].damaged)
       bits |= level_of (seen[i].picture.view (), largest_).bits_seen;
   }
-  step_ = bits ? bits & -bits : 1;
-  if (step_ > kCoarsest * largest_) {
-    fail ("missing-bits",
-        "all pixel values are multiples of " + std::to_string (step_),
-        "set the pixel format to the number of bits that the sensor delivers");
+  runs_.bits_seen = bits;
+  const int coarseness = bits ? bits & -bits : 1; // DN
+  if (coarseness > kCoarsest * largest_) {
+    finding_.blame ("missing-bits",
+        "all pixel values are multiples of " + std::to_string (coarseness));
     return false;
   }
   last_ = seen.back ().time;
-  std::ranges::nth_element (
-      steps, steps.begin () + std::ptrdiff_t (steps.size () / 2));
-  const double step = std::max (steps[steps.size () / 2], 1e-9);
+  const double step = std::max (median (steps), 1e-9);
   double frames = 0.0; // those that are lost included
-  for (std::size_t i = 1; i < seen.size (); i++)
-    frames +=
-        std::round (1e-9 * double (seen[i].time - seen[i - 1].time) / step);
+  for (const double each : steps)
+    frames += std::round (each / step);
   const double ratio =
       frames * period_ /
       std::max (1e-9 * double (seen.back ().time - seen.front ().time), 1e-9);
-  finding_.readings.push_back ({"frames per cycle", {ratio, 0.0}, "", "1"});
+  finding_.add ("frames per cycle", {ratio, 0.0});
   /* Of stamps that jitter, only the steps tell by how much. */
   double squares = 0.0;
   for (const double each : steps)
@@ -204,24 +196,17 @@ TriggerCheck::check_parked (double ratio, double step, double uneven)
   const std::string rate = real_text (
       std::round (ratio * parts_.rate.num / parts_.rate.den * 1e3) / 1e3);
   if (int (parked.size ()) > kFramesInFlight)
-    fail ("free-running",
+    finding_.blame ("free-running",
         "frames come at " + rate +
             " frames/s even when the DMD is parked: the camera does not wait "
-            "for the trigger",
-        "set TriggerMode=On, TriggerSelector=FrameStart and the TriggerSource "
-        "of the cable");
+            "for the trigger");
   else if (std::abs (ratio - 0.5) < 0.1)
-    fail ("half-rate", "one frame comes for two triggers",
-        "shorten the exposure time of the camera, until exposure and readout "
-        "fit the frame period");
+    finding_.blame ("half-rate", "one frame comes for two triggers");
   else if (std::abs (ratio - 2.0) < 0.4)
-    fail ("double-rate", "two frames come for each trigger",
-        "set TriggerActivation=RisingEdge, and the trigger divider to the "
-        "number of pulses in a cycle");
+    finding_.blame ("double-rate", "two frames come for each trigger");
   else if (std::abs (ratio - 1.0) > kRateError + uneven)
-    fail ("free-running",
-        "the frame rate is " + rate + " frames/s, not that of the trigger",
-        "set TriggerMode=On and the TriggerSource of the cable");
+    finding_.blame ("free-running",
+        "the frame rate is " + rate + " frames/s, not that of the trigger");
   return finding_.diagnoses.empty ();
 }
 
@@ -288,8 +273,7 @@ TriggerCheck::check_lag ()
   for (int i = 0; i < kChanges + 2; i++) {
     ASSIGN_OR_RETURN (const auto seen, change (i % 2 == 0));
     if (seen.empty ()) {
-      fail ("no-trigger", "frames ended after a change of the mask",
-          "check the plugs of the trigger cable");
+      finding_.blame ("no-trigger", "frames ended after a change of the mask");
       return false;
     }
     const Level level = level_of (seen.back ().picture.view (), largest_);
@@ -300,21 +284,17 @@ TriggerCheck::check_lag ()
     last_ = seen.back ().time;
     if (i != 1)
       continue;
-    const std::string range = " of " + std::to_string (largest_) + " DN";
     if (level.saturated > 0.5) {
-      fail ("bright",
+      finding_.blame ("bright",
           "an eighth of the frame period is enough light to saturate the "
-          "camera",
-          "reduce the light by 10 times or more");
+          "camera");
       return false;
     }
     if (levels[0] - levels[1] < kFaint * largest_) {
-      fail ("dark",
-          "all mirrors on instead of an eighth of the time add " +
-              real_text (std::round ((levels[0] - levels[1]) * 10.0) / 10.0) +
-              range,
-          "switch on the light, open the iris, and check that the camera sees "
-          "mirrors that are on");
+      finding_.blame (
+          "dark", "all mirrors on instead of an eighth of the time add " +
+                      shown (levels[0] - levels[1]) + " of " +
+                      std::to_string (largest_) + " DN");
       return false;
     }
   }
@@ -345,40 +325,18 @@ TriggerCheck::diagnose_lag (const std::vector<Change> &changes)
   const auto usual = std::ranges::max_element (
       counts, {}, [] (const auto &count) { return count.second; });
   const int low = counts.begin ()->first, high = counts.rbegin ()->first;
-  finding_.readings.push_back (
-      {"lag", {sum / number, 0.5 * (high - low)}, "frames", "0"});
+  finding_.add ("lag", {sum / number, 0.5 * (high - low)});
   // A frame that is lost after the pause takes one from the count.
   const int fewer = high == usual->first ? (lost > 0 ? 2 : 1) : 0;
   if (mixed || number - usual->second > fewer)
-    fail ("frame-late-varies",
+    finding_.blame ("frame-late-varies",
         "a new mask shows " + std::to_string (low) + " to " +
             std::to_string (high) +
-            " frames late: the camera or the network holds frames back",
-        "set StreamBufferHandlingMode=OldestFirst, and connect the camera "
-        "without a switch");
+            " frames late: the camera or the network holds frames back");
   else if (usual->first > 0)
-    fail ("frame-late",
+    finding_.blame ("frame-late",
         "every frame shows the mask of " + std::to_string (usual->first) +
-            (usual->first > 1 ? " frames" : " frame") + " before",
-        "switch off frame buffers of the camera, such as its burst or sequence "
-        "mode");
-}
-
-/** Frames with all mirrors on in slots [first, first + count). */
-Result<void>
-TriggerCheck::sample (int first, int count, int exposure, int frames)
-{
-  ASSIGN_OR_RETURN (
-      const auto seen, look (examination_, lit (first, count), grid_, frames));
-  for (const SeenFrame &frame : seen) {
-    if (frame.damaged)
-      continue;
-    const Level level = level_of (frame.picture.view (), largest_);
-    samples_.push_back (
-        {1e-9 * double (frame.time), first * slot (), (first + count) * slot (),
-            level.mean, rounding_doubt (level.noise, step_), exposure});
-  }
-  return {};
+            (usual->first > 1 ? " frames" : " frame") + " before");
 }
 
 Result<void>
@@ -394,7 +352,8 @@ TriggerCheck::sample_tiles (int exposure)
 Result<void>
 TriggerCheck::sample_starts (double start, int exposure)
 {
-  const int at = std::clamp (int (std::floor (start / slot ())), 0, grid_ - 1);
+  const int at =
+      std::clamp (int (std::floor (start / runs_.slot ())), 0, grid_ - 1);
   const int end = std::min (grid_, at + grid_ / kTiles);
   for (const int aside : {-2, 0, 1, 2, 4})
     if (const int first = std::max (at + aside, 0); first < end)
@@ -406,7 +365,7 @@ TriggerCheck::sample_starts (double start, int exposure)
 Result<void>
 TriggerCheck::sample_ends (double end, int exposure)
 {
-  int at = int (std::lround (end / slot ())) % grid_;
+  int at = int (std::lround (end / runs_.slot ())) % grid_;
   if (at < grid_ / 16)
     at = grid_; // a run that short has little light
   const int first = std::max (at - grid_ / kTiles, 0);
@@ -420,18 +379,13 @@ TriggerCheck::sample_ends (double end, int exposure)
 Result<void>
 TriggerCheck::sample_inside (const LightModel &guess)
 {
-  using std::numbers::phi, std::numbers::sqrt2;
-  const auto part = [] (double number) { return number - std::floor (number); };
   // The period after the start of the exposure, as far as a run can have it.
-  const int first = int (std::ceil (guess.start / slot ())) + 1;
+  const int first = int (std::ceil (guess.start / runs_.slot ())) + 1;
   const bool wraps = first > grid_ / 2;
   const int from = wraps ? 0 : first;
   const int room = (wraps ? first - 4 : grid_) - from;
-  for (int i = 1; i <= kInsideLooks; i++) {
-    const int count = int (grid_ * (1.0 + part (i * sqrt2)) / 16.0);
-    const int place = int (part (i * phi) * (room - count - 1));
-    RETURN_IF_ERROR (sample (from + place, count, 1, kInsideFrames));
-  }
+  for (int i = 0; i < kInsideLooks; i++)
+    RETURN_IF_ERROR (runs_.see_one (i, from, room - 1, 1.0, 1, kInsideFrames));
   return {};
 }
 
@@ -445,18 +399,18 @@ TriggerCheck::measure_exposure ()
   const auto half = Nanoseconds (std::llround (0.5e9 * period_));
   RETURN_IF_ERROR (rig_.expose (half));
   RETURN_IF_ERROR (sample_tiles (0));
-  LightModel guess = guess_window (samples_, period_);
+  LightModel guess = guess_window (runs_.samples, period_);
   RETURN_IF_ERROR (sample_starts (guess.start, 0));
   RETURN_IF_ERROR (rig_.expose ({}));
   RETURN_IF_ERROR (sample_tiles (1));
-  guess.lengths.push_back (guess_length (samples_, guess));
+  guess.lengths.push_back (guess_length (runs_.samples, guess));
   RETURN_IF_ERROR (sample_starts (guess.start, 1));
   RETURN_IF_ERROR (sample_ends (guess.start + guess.lengths[1], 1));
   RETURN_IF_ERROR (sample_inside (guess));
-  if (samples_.size () < 40)
+  if (runs_.samples.size () < 40)
     return {};
   diagnose_exposure (
-      fit_light (samples_, guess, {.lines = 2, .slowest = kSlowest}));
+      fit_light (runs_.samples, guess, {.lines = 2, .slowest = kSlowest}));
   return {};
 }
 
@@ -472,12 +426,12 @@ TriggerCheck::remember (
   const double margin = 3.0 * (fit.jitter.value + start.sigma) + 10e-6;
   const double end = start.value + length.value;
   const double next = std::max (0.0, end - period_); // of the exposure before
-  int first = int (std::ceil ((start.value + margin) / slot ()));
-  int until = int (std::floor ((end - margin) / slot ()));
-  if (start.value < margin && start.value + margin < 0.1 * slot ())
+  int first = int (std::ceil ((start.value + margin) / runs_.slot ()));
+  int until = int (std::floor ((end - margin) / runs_.slot ()));
+  if (start.value < margin && start.value + margin < 0.1 * runs_.slot ())
     first = 0;
   until = std::min (until, grid_);
-  if (const int before = int (std::floor ((next - margin) / slot ()));
+  if (const int before = int (std::floor ((next - margin) / runs_.slot ()));
       before > until - first) {
     first = 0;
     until = before;
@@ -506,25 +460,42 @@ TriggerCheck::possible_start (double start) const
   return start - period_ * std::floor ((start - first) / period_);
 }
 
-/** A delay that is not set is the length of a pulse. */
+/** A delay that is not set is the length of a pulse. @p start: us. */
 void
 TriggerCheck::diagnose_delay (const Measured &start)
 {
   const bool told = set_delay ().has_value ();
-  const double set = set_delay ().value_or (0.0); // s
-  std::string late =
+  const double set = 1e6 * set_delay ().value_or (0.0);
+  const std::string late =
       "the exposure begins " + us_text (start.value) + " after the trigger";
-  if (above (start, told ? set + kLateFail : kEdge * period_))
-    return fail ("trigger-edge", late + ", which is the length of a pulse",
-        "choose the other edge with TriggerActivation, or the other level of "
-        "the pulse with pulse=low in the options of the DMD");
-  if (!above (start, kLateWarn))
-    return;
-  if (set > 0.0)
-    late += ", and TriggerDelay is " + us_text (set);
-  fail ("exposure-late", late,
-      "set TriggerDelay of the camera to 0, and switch off its debouncer",
-      above (start, kLateFail) ? Verdict::fail : Verdict::warn);
+  if (above (start, told ? set + kEdgeDelay : 1e6 * kEdge * period_))
+    return finding_.blame (
+        "trigger-edge", late + ", which is the length of a pulse");
+  finding_.judge ("delay", start,
+      late + (set > 0.0 ? ", and TriggerDelay is " + us_text (set) : ""));
+}
+
+/** @p end: from that of the frame period, us. */
+void
+TriggerCheck::diagnose_end (const Measured &end, const Measured &length)
+{
+  const Measured lost = scaled (end, -1.0);
+  const Measured missing{1e6 * period_ - length.value, length.sigma};
+  const auto severity = [] (bool bad) {
+    return bad ? Verdict::fail : Verdict::warn;
+  };
+  if (above (lost, kShortWarn) && above (missing, kShortWarn))
+    finding_.blame ("exposure-short",
+        "the exposure ends " + us_text (lost.value) +
+            " before the frame period does",
+        severity (above (lost, kShortFail) && above (missing, kShortFail)),
+        "set a longer ExposureTime, or give the schedule a readout time of " +
+            us_text (lost.value));
+  else if (above (end, kLongWarn) && finding_.diagnoses.empty ())
+    finding_.blame ("exposure-long",
+        "the exposure runs " + us_text (end.value) +
+            " into the next frame period",
+        severity (above (end, kLongFail)));
 }
 
 void
@@ -534,60 +505,33 @@ TriggerCheck::diagnose_exposure (const LightFit &fit)
   start.sigma = std::hypot (start.sigma, kTicks);
   length.sigma = std::hypot (length.sigma, kTicks);
   start.value = possible_start (start.value);
+  const Measured jitter = scaled (fit.jitter, 1e6);
   const bool possible = length.value > 0.0 && length.value < kLongest * period_;
   const bool known = start.sigma + length.sigma < kUnclear * period_;
-  if (!possible || (!known && !above (fit.jitter, kJitterFail)))
-    return fail ("flicker",
+  if (!possible || (!known && verdict_of ("jitter", jitter) != Verdict::fail))
+    return finding_.blame ("flicker",
         "the light changes so much within the frame period that the exposure "
-        "cannot be found",
-        "drive the light with a constant current, without mains ripple or PWM");
+        "cannot be found");
   remember (fit, start, length);
-  Measured end{start.value + length.value - period_,
+  start = scaled (start, 1e6);
+  length = scaled (length, 1e6);
+  Measured end{start.value + length.value - 1e6 * period_,
       std::hypot (start.sigma, length.sigma)};
-  const auto reading = [&] (const char *name, const Measured &seconds,
-                           const char *rule) {
-    finding_.readings.push_back (
-        {name, {seconds.value * 1e6, seconds.sigma * 1e6}, "us", rule});
-  };
-  reading ("delay", start, "at most 400");
-  reading ("exposure", length, "");
-  reading (
-      "end of the exposure, from that of the frame period", end, "-600 to 400");
-  reading ("jitter", fit.jitter, "at most 25");
-
-  const auto severity = [] (bool bad) {
-    return bad ? Verdict::fail : Verdict::warn;
-  };
+  finding_.add ("delay", start);
+  finding_.add ("exposure", length);
+  finding_.add ("end of the exposure, from that of the frame period", end);
+  finding_.add ("jitter", jitter);
   /* What jitters as much is no setting. */
-  start.sigma = std::hypot (start.sigma, fit.jitter.value);
-  end.sigma = std::hypot (end.sigma, fit.jitter.value);
+  start.sigma = std::hypot (start.sigma, jitter.value);
+  end.sigma = std::hypot (end.sigma, jitter.value);
   diagnose_delay (start);
-  const Measured lost{-end.value, end.sigma};
-  const Measured missing{period_ - length.value, length.sigma};
-  if (above (lost, kShortWarn) && above (missing, kShortWarn))
-    fail ("exposure-short",
-        "the exposure ends " + us_text (lost.value) +
-            " before the frame period does",
-        "set a longer ExposureTime, or give the schedule a readout time of " +
-            us_text (lost.value),
-        severity (above (lost, kShortFail) && above (missing, kShortFail)));
-  else if (above (end, kLateWarn) && finding_.diagnoses.empty ())
-    fail ("exposure-long",
-        "the exposure runs " + us_text (end.value) +
-            " into the next frame period",
-        "set ExposureTime to the frame period less the readout of the camera",
-        severity (above (end, kLateFail)));
+  diagnose_end (end, length);
   /* If all frames scatter, none tells by how much the exposure jitters. */
-  const bool jitters = above (fit.jitter, kJitterWarn);
-  const bool scattered = !jitters && fit.jitter.sigma > kJitterFail;
-  if (jitters || scattered)
-    fail ("jitter",
-        "from frame to frame, the exposure begins earlier or later by " +
-            (scattered ? "a large part of the frame period"
-                       : us_text (fit.jitter.value) + " rms"),
-        "use the opto-isolated or the direct input of the camera that is "
-        "specified for triggers, and switch off its debouncer",
-        severity (above (fit.jitter, kJitterFail) || scattered));
+  if (finding_.judge ("jitter", jitter) == Verdict::pass &&
+      jitter.sigma > kScattered)
+    finding_.blame ("jitter",
+        "from frame to frame, the exposure begins earlier or later by a large "
+        "part of the frame period");
 }
 
 Result<Finding>
@@ -600,8 +544,7 @@ TriggerCheck::run ()
       return std::move (finding_);
   }
   RETURN_IF_ERROR (measure_exposure ());
-  std::ranges::stable_sort (
-      finding_.diagnoses, std::ranges::greater (), &Diagnosis::severity);
+  finding_.sort ();
   return std::move (finding_);
 }
 

@@ -4,10 +4,9 @@
 #include <cmath>
 #include <numbers>
 
-#include <Eigen/Core>
-
+#include "base/statistics.h"
 #include "base/try.h"
-#include "doctor/solve.h"
+#include "estimate/least_squares.h"
 
 namespace codedexposure
 {
@@ -46,17 +45,16 @@ plane_of (const Image<float> &seen, const Image<float> &off,
 {
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero ();
   Eigen::Vector3d right = Eigen::Vector3d::Zero ();
-  for (int y = 0; y < good.height; y++)
-    for (int x = 0; x < good.width; x++) {
-      if (good.at (x, y) == 0)
-        continue;
-      const double light = double (on.at (x, y)) - double (off.at (x, y));
-      const double part =
-          (double (seen.at (x, y)) - double (off.at (x, y))) / light;
-      const Eigen::Vector3d row (x, y, 1.0);
-      normal += row * row.transpose ();
-      right += part * row;
-    }
+  each_pixel (good, [&] (int x, int y) {
+    if (good.at (x, y) == 0)
+      return;
+    const double light = double (on.at (x, y)) - double (off.at (x, y));
+    const double part =
+        (double (seen.at (x, y)) - double (off.at (x, y))) / light;
+    const Eigen::Vector3d row (x, y, 1.0);
+    normal += row * row.transpose ();
+    right += part * row;
+  });
   if (normal (2, 2) < kFewPixels)
     return Error{"fewer than " + std::to_string (int (kFewPixels)) +
                  " pixels see mirrors; check light, focus and alignment"};
@@ -64,13 +62,6 @@ plane_of (const Image<float> &seen, const Image<float> &off,
 }
 
 } // namespace
-
-Position
-CoarseView::camera_at (Position mirror) const
-{
-  const double dx = mirror.x - x0, dy = mirror.y - y0;
-  return {(yy * dx - xy * dy) / area (), (xx * dy - yx * dx) / area ()};
-}
 
 double
 CoarseView::pixels_per_mirror () const

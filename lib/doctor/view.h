@@ -24,7 +24,6 @@ struct CoarseView {
   {
     return {xx * pixel.x + xy * pixel.y + x0, yx * pixel.x + yy * pixel.y + y0};
   }
-  Position camera_at (Position mirror) const;
   double area () const { return xx * yy - xy * yx; }
   double pixels_per_mirror () const;
   ViewOrientation orientation () const;

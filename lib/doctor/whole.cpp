@@ -2,13 +2,12 @@
 /* Check "whole": a recording with the schedule that the user has chosen. */
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <string>
 
+#include "base/statistics.h"
 #include "base/text.h"
 #include "base/try.h"
 #include "doctor/checks.h"
-#include "doctor/level.h"
 #include "extract/extractor.h"
 
 namespace codedexposure
@@ -17,8 +16,6 @@ namespace codedexposure
 namespace
 {
 
-/* Slots of a still target may differ in their mean by this part. */
-constexpr double kSlotsWarn = 0.02, kSlotsFail = 0.1;
 /* Frames that take part in the comparison of slots, spread over the recording.
  */
 constexpr int kCompared = 64;
@@ -28,72 +25,18 @@ constexpr double kJitterWarn = 0.2;
 constexpr double kOtherSlot = 0.3;
 constexpr double kLongestWatch = 10.0; // s
 
-double
-mean_of (const std::vector<double> &values)
+/** Mean and standard deviation of numbers. */
+Measured
+spread_of (const std::vector<double> &values)
 {
-  return std::accumulate (values.begin (), values.end (), 0.0) /
-         double (std::max<std::size_t> (1, values.size ()));
-}
-
-double
-deviation_of (const std::vector<double> &values)
-{
-  const double mean = mean_of (values);
-  double sum = 0;
+  const double count = double (values.size ());
+  double mean = 0.0, squares = 0.0;
   for (const double value : values)
-    sum += (value - mean) * (value - mean);
-  return std::sqrt (
-      sum / double (std::max<std::size_t> (2, values.size ()) - 1));
+    mean += value / std::max (1.0, count);
+  for (const double value : values)
+    squares += (value - mean) * (value - mean);
+  return {mean, std::sqrt (squares / std::max (1.0, count - 1.0))};
 }
-
-/** Mean light of each slot, frame by frame. */
-class SlotMeans
-{
-public:
-  static Result<SlotMeans> make (
-      const Schedule &schedule, const RigParts &parts)
-  {
-    ExtractOptions options;
-    options.bits = parts.bits;
-    ASSIGN_OR_RETURN (auto extractor,
-        Extractor<std::uint16_t>::make (schedule, parts.camera.size.width,
-            parts.camera.size.height, options));
-    return SlotMeans (std::move (extractor));
-  }
-
-  void take (ImageView<const std::uint16_t> coded)
-  {
-    std::vector<ImageView<std::uint16_t>> views;
-    for (auto &picture : pictures_)
-      views.push_back (picture.view ());
-    if (!extractor_.run (coded, views))
-      return;
-    for (std::size_t slot = 0; slot < pictures_.size (); slot++) {
-      double sum = 0;
-      for (int y = 0; y < pictures_[slot].height (); y++)
-        for (int x = 0; x < pictures_[slot].width (); x++)
-          sum += pictures_[slot].at (x, y);
-      means_[slot].push_back (
-          sum / pictures_[slot].width () / pictures_[slot].height ());
-    }
-  }
-
-  const std::vector<std::vector<double>> &means () const { return means_; }
-
-private:
-  explicit SlotMeans (Extractor<std::uint16_t> extractor)
-      : extractor_ (std::move (extractor)),
-        means_ (std::size_t (extractor_.subframes ()))
-  {
-    const auto [width, height] = extractor_.subframe_size ();
-    for (int slot = 0; slot < extractor_.subframes (); slot++)
-      pictures_.emplace_back (width, height);
-  }
-
-  Extractor<std::uint16_t> extractor_;
-  std::vector<Image<std::uint16_t>> pictures_;
-  std::vector<std::vector<double>> means_; // by slot
-};
 
 /** How often an exposure of half of a period saw another part of the cycle than
  * the first one, in @p seconds at most, where the second quarter is lit. A
@@ -102,23 +45,24 @@ Result<std::uint64_t>
 count_slips (Examination &examination, double seconds)
 {
   constexpr int kFrames = 10; // in memory at a time
-  Rig &rig = examination.rig;
-  const RigParts &parts = rig.parts ();
+  const RigParts &parts = examination.rig.parts ();
   const double frames =
       std::min (seconds, kLongestWatch) * parts.rate.num / parts.rate.den;
-  RETURN_IF_ERROR (rig.expose (parts.rate.period () / 2));
-  ASSIGN_OR_RETURN (auto seen, look (examination, lit (1, 1), 4, kFrames));
   std::vector<double> levels;
-  while (!seen.empty ()) {
-    for (const SeenFrame &frame : seen)
-      if (!frame.damaged)
-        levels.push_back (
-            level_of (frame.picture.view (), (1 << parts.bits) - 1).mean);
-    if (double (levels.size ()) >= frames)
-      break;
-    ASSIGN_OR_RETURN (seen, rig.watch (kFrames));
-  }
-  RETURN_IF_ERROR (rig.expose (std::nullopt));
+  RETURN_IF_ERROR (with_exposure (
+      examination, parts.rate.period () / 2, [&] () -> Result<void> {
+        ASSIGN_OR_RETURN (
+            auto seen, look (examination, lit (1, 1), 4, kFrames));
+        while (!seen.empty ()) {
+          for (const SeenFrame &frame : seen)
+            if (!frame.damaged)
+              levels.push_back (mean_of (frame.picture.view ()));
+          if (double (levels.size ()) >= frames)
+            break;
+          ASSIGN_OR_RETURN (seen, examination.rig.watch (kFrames));
+        }
+        return {};
+      }));
   if (levels.empty ())
     return std::uint64_t (0);
   const auto &black = examination.profile.black_level;
@@ -153,19 +97,15 @@ diagnose_losses (const Recording &counts, Finding &finding)
   finding.readings.push_back ({"lost frames", {double (counts.lost), root},
       "of " + std::to_string (counts.frames + counts.lost), "0"});
   if (counts.frames == 0)
-    finding.diagnoses.push_back ({"no-trigger", Verdict::fail, "no frame came",
-        "repeat the check of the trigger"});
+    finding.blame ("no-trigger", "no frame came");
   if (counts.lost + counts.damaged > 0)
-    finding.diagnoses.push_back ({"lose", Verdict::fail,
-        std::to_string (counts.lost) + " frames were lost and " +
-            std::to_string (counts.damaged) + " damaged",
-        "connect the camera to a network interface of its own and stop other "
-        "programs"});
+    finding.blame ("lose", std::to_string (counts.lost) +
+                               " frames were lost and " +
+                               std::to_string (counts.damaged) + " damaged");
   if (counts.unsynchronised > 0)
-    finding.diagnoses.push_back ({"slip", Verdict::fail,
-        "masks and camera were out of step in " +
-            std::to_string (counts.unsynchronised) + " frames",
-        "check the trigger cable for a loose contact, and its level"});
+    finding.blame ("slip", "masks and camera were out of step in " +
+                               std::to_string (counts.unsynchronised) +
+                               " frames");
 }
 
 void
@@ -173,7 +113,7 @@ diagnose_times (const Recording &counts, FrameRate rate, Finding &finding)
 {
   if (counts.delays.size () < 2)
     return;
-  const double jitter = deviation_of (counts.delays);
+  const double jitter = spread_of (counts.delays).sigma;
   finding.readings.push_back ({"jitter of arrival",
       {jitter / 1e3, jitter / 1e3 / std::sqrt (2.0 * double (counts.frames))},
       "us"});
@@ -181,10 +121,10 @@ diagnose_times (const Recording &counts, FrameRate rate, Finding &finding)
     finding.readings.push_back (
         {"time uncertainty", {double (*counts.uncertainty) / 1e3, 0}, "us"});
   if (jitter > kJitterWarn * double (rate.period ()))
-    finding.diagnoses.push_back ({"frame-jitter", Verdict::warn,
-        "frames arrive with delays that differ by " +
-            real_text (std::round (jitter / 1e3)) + " us (rms)",
-        "stop other programs that use the network or the disk"});
+    finding.blame ("frame-jitter",
+        "frames arrive with delays that differ by " + fixed (jitter / 1e3, 0) +
+            " us (rms)",
+        Verdict::warn);
 }
 
 void
@@ -195,8 +135,8 @@ diagnose_slots (const std::vector<std::vector<double>> &means, double black,
     return;
   std::vector<double> levels;
   for (const auto &slot : means)
-    levels.push_back (mean_of (slot) - black);
-  const double all = mean_of (levels);
+    levels.push_back (spread_of (slot).value - black);
+  const double all = spread_of (levels).value;
   std::size_t worst = 0;
   Plot plot{"Light of the slots", "slot", "part of the mean"};
   for (std::size_t slot = 0; slot < levels.size (); slot++) {
@@ -206,19 +146,12 @@ diagnose_slots (const std::vector<std::vector<double>> &means, double black,
   }
   finding.plots.push_back (std::move (plot));
   const double part = levels[worst] / all - 1;
-  const double sigma = deviation_of (means[worst]) / all /
+  const double sigma = spread_of (means[worst]).sigma / all /
                        std::sqrt (double (means[worst].size ()));
-  finding.readings.push_back ({"largest difference of a slot", {part, sigma},
-      "of the mean", "at most " + real_text (kSlotsWarn)});
-  if (std::abs (part) < kSlotsWarn + 2 * sigma)
-    return;
-  const std::string text = real_text (std::round (std::abs (part) * 1e3) / 10);
-  finding.diagnoses.push_back ({"slots-differ",
-      std::abs (part) < kSlotsFail ? Verdict::warn : Verdict::fail,
-      "slot " + std::to_string (worst + 1) + " of a still target is " + text +
-          " % " + (part < 0 ? "darker" : "brighter") + " than the mean",
-      "check that nothing moves or flickers; if it is the first or last slot, "
-      "give the schedule a readout time"});
+  finding.measure ("largest difference of a slot", {part, sigma},
+      "slot " + std::to_string (worst + 1) + " of a still target is " +
+          fixed (100 * std::abs (part), 1) + " % " +
+          (part < 0 ? "darker" : "brighter") + " than the mean");
 }
 
 } // namespace
@@ -230,7 +163,19 @@ check_whole (Examination &examination)
   const double seconds = examination.recording;
   Finding finding{"whole", "the schedule " + examination.schedule.text () +
                                ", for " + real_text (seconds) + " s"};
-  ASSIGN_OR_RETURN (auto slots, SlotMeans::make (examination.schedule, parts));
+  ExtractOptions options;
+  options.bits = parts.bits;
+  ASSIGN_OR_RETURN (auto extractor,
+      Extractor<std::uint16_t>::make (examination.schedule,
+          parts.camera.size.width, parts.camera.size.height, options));
+  std::vector<Image<std::uint16_t>> pictures;
+  for (int slot = 0; slot < extractor.subframes (); slot++)
+    pictures.emplace_back (
+        extractor.subframe_size ().width, extractor.subframe_size ().height);
+  std::vector<ImageView<std::uint16_t>> views;
+  for (auto &picture : pictures)
+    views.push_back (picture.view ());
+  std::vector<std::vector<double>> means (views.size ()); // by slot
   Recording counts;
   ASSIGN_OR_RETURN (counts.unsynchronised, count_slips (examination, seconds));
   const double expected = seconds * parts.rate.num / parts.rate.den;
@@ -238,14 +183,16 @@ check_whole (Examination &examination)
   RETURN_IF_ERROR (examination.rig.record (
       examination.schedule, seconds, [&] (const RecordedFrame &frame) {
         const bool usable = !frame.damaged && frame.synchronised != false;
-        if (usable && counts.frames % every == every / 2)
-          slots.take (frame.picture);
+        if (usable && counts.frames % every == every / 2 &&
+            extractor.run (frame.picture, views))
+          for (std::size_t slot = 0; slot < views.size (); slot++)
+            means[slot].push_back (mean_of (views[slot]));
         count (frame, counts);
       }));
   diagnose_losses (counts, finding);
   diagnose_times (counts, parts.rate, finding);
   const auto &black = examination.profile.black_level;
-  diagnose_slots (slots.means (), black ? black->value : 0, finding);
+  diagnose_slots (means, black ? black->value : 0, finding);
   return finding;
 }
 

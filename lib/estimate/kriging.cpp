@@ -40,6 +40,8 @@ std::vector<double>
 solve_kriging (const KrigingSystem &system)
 {
   const Index m = Index (system.noise.size ());
+  if (m == 0)
+    return {};
   const Index count = Index (system.targets.size ()) / m;
   const bool ordinary = !system.flat.empty ();
   MatrixXd solved (m, count + (ordinary ? 1 : 0));
@@ -58,6 +60,23 @@ solve_kriging (const KrigingSystem &system)
     }
   }
   return {solved.data (), solved.data () + m * count};
+}
+
+KrigingSystem
+equations_of (const KrigingSystem &system, std::span<const int> taps)
+{
+  const std::size_t m = system.noise.size ();
+  KrigingSystem part;
+  for (const int a : taps) {
+    for (const int b : taps)
+      part.covariance.push_back (
+          system.covariance[std::size_t (std::min (a, b)) * m +
+                            std::size_t (std::max (a, b))]);
+    part.noise.push_back (system.noise[std::size_t (a)]);
+    if (!system.flat.empty ())
+      part.flat.push_back (system.flat[std::size_t (a)]);
+  }
+  return part;
 }
 
 /* A mean that is not known is one of a very large variance. */
@@ -190,7 +209,9 @@ SparseKriging::solve (std::span<const double> target, double flat,
   const double error =
       std::max (variance + flat_variance_ * flat * flat - all, 0.0);
   Search search (*this, covariances);
-  while (all - search.explained > excess * error && search.add_best_pair ())
+  /* Flat light is kept with one tap at least. */
+  while ((search.chosen.empty () || all - search.explained > excess * error) &&
+         search.add_best_pair ())
     ;
   return solve_with (search.chosen, target, flat);
 }
@@ -199,22 +220,13 @@ std::vector<double>
 SparseKriging::solve_with (std::span<const int> chosen,
     std::span<const double> target, double flat) const
 {
-  const std::size_t m = system_.noise.size ();
-  KrigingSystem part;
-  for (const int a : chosen) {
-    for (const int b : chosen)
-      part.covariance.push_back (
-          system_.covariance[std::size_t (std::min (a, b)) * m +
-                             std::size_t (std::max (a, b))]);
-    part.noise.push_back (system_.noise[std::size_t (a)]);
-    part.targets.push_back (target[std::size_t (a)]);
-    if (!system_.flat.empty ())
-      part.flat.push_back (system_.flat[std::size_t (a)]);
-  }
-  if (!system_.flat.empty ())
+  KrigingSystem part = equations_of (system_, chosen);
+  for (const int tap : chosen)
+    part.targets.push_back (target[std::size_t (tap)]);
+  if (!part.flat.empty ())
     part.flat_targets = {flat};
   const std::vector<double> solved = solve_kriging (part);
-  std::vector<double> weights (m, 0.0);
+  std::vector<double> weights (system_.noise.size (), 0.0);
   for (std::size_t i = 0; i < chosen.size (); i++)
     weights[std::size_t (chosen[i])] = solved[i];
   return weights;

@@ -44,6 +44,10 @@ struct KrigingSystem {
  */
 std::vector<double> solve_kriging (const KrigingSystem &system);
 
+/** The equations of some taps, without targets. */
+KrigingSystem equations_of (
+    const KrigingSystem &system, std::span<const int> taps);
+
 /** Taps that are used together, by their numbers; no second one if it is
  * negative. */
 struct TapPair {
@@ -53,8 +57,8 @@ struct TapPair {
 /**
  * Kriging with few taps. Pairs of taps are added one by one, each time the one
  * that lowers the expected squared error of a target most, until it is close
- * enough to the error with all taps. As the pairs are known, the weights are
- * those of solve_kriging () for their taps; all others are 0.
+ * enough to the error with all taps; one at least. As the pairs are known, the
+ * weights are those of solve_kriging () for their taps; all others are 0.
  */
 class SparseKriging
 {

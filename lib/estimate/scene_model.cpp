@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 #include <utility>
+#include <vector>
 
 namespace codedexposure
 {
@@ -74,16 +75,6 @@ mean_over_normal (const SceneClass &patch, double x, double y, double sigma)
   return sum / kRings;
 }
 
-void
-add_grid (std::vector<SceneClass> &classes, double reach, double step,
-    double correlation)
-{
-  for (double vx = -reach; vx <= reach; vx += step) {
-    for (double vy = -reach; vy <= reach; vy += step)
-      classes.push_back ({vx, vy, 12.0, 1.0, correlation});
-  }
-}
-
 } // namespace
 
 double
@@ -97,44 +88,6 @@ scene_correlation (const SceneClass &patch, double dx, double dy, double slots)
                               ? mean_over_circle<24> (patch, x, y, path)
                               : space_correlation (patch, x, y);
   return in_space * std::pow (patch.correlation, std::abs (slots));
-}
-
-std::vector<SceneClass>
-motion_classes ()
-{
-  std::vector<SceneClass> classes;
-  classes.push_back ({0.0, 0.0, 12.0, 1.0, 0.9999});
-  add_grid (classes, 4.0, 1.0, 0.99);
-  for (const double vx : {-1.5, -0.5, 0.0, 0.5, 1.5})
-    for (const double vy : {-1.5, -0.5, 0.0, 0.5, 1.5})
-      if (vx != 0.0 || vy != 0.0)
-        classes.push_back ({vx, vy, 12.0, 1.0, 0.99});
-  add_grid (classes, 2.0, 1.0, 0.9);
-  classes.push_back ({0.0, 0.0, 12.0, 1.0, 0.6});
-  classes.push_back ({0.0, 0.0, 5.0, 1.5, 0.9});
-  return classes;
-}
-
-std::vector<SceneClass>
-lasting_classes ()
-{
-  std::vector<SceneClass> classes = motion_classes ();
-  std::erase_if (classes, [] (const SceneClass &patch) {
-    return patch.moves () || patch.correlation < 0.99;
-  });
-  return classes;
-}
-
-std::vector<SceneClass>
-passing_classes ()
-{
-  constexpr double kFastest = 2.0;
-  std::vector<SceneClass> classes = motion_classes ();
-  std::erase_if (classes, [] (const SceneClass &patch) {
-    return !patch.directed () || patch.correlation < 0.99 ||
-           std::max (std::abs (patch.vx), std::abs (patch.vy)) > kFastest;
-  });
-  return classes;
 }
 
 } // namespace codedexposure

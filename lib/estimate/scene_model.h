@@ -3,8 +3,6 @@
  * correlated before any frame is seen. */
 #pragma once
 
-#include <vector>
-
 namespace codedexposure
 {
 
@@ -37,35 +35,5 @@ struct SceneClass {
  * apart. */
 double scene_correlation (
     const SceneClass &patch, double dx, double dy, double slots);
-
-/** The classes that fusion chooses from. */
-struct SceneModel {
-  /** What `fast` chooses between around each pixel. */
-  SceneClass slow{.correlation = 0.97, .spread = 0.2};
-  SceneClass moving{.correlation = 0.85, .spread = 2.0};
-  /** In place of `slow` where neighbouring coded frames are used, too: errors
-   * of the velocity grow from frame to frame. */
-  SceneClass slow_over_frames{.correlation = 0.97, .spread = 0.2};
-  SceneClass medium_over_frames{.correlation = 0.97, .spread = 0.5};
-  /** The only class of `fast` for schedules of more slots than motion models
-   * exist for. */
-  SceneClass plain;
-  /** Standard deviation of a scene as a part of white; the ratio of noise to
-   * scene follows from it. */
-  double contrast = 0.25;
-
-  bool operator== (const SceneModel &) const = default;
-};
-
-/** Still and moving patches for motion-adaptive fusion: up to 4 px per slot
- * along each axis. */
-std::vector<SceneClass> motion_classes ();
-/** Those of them whose patches are still there, in the same place, in the
- * coded frames before and after. */
-std::vector<SceneClass> lasting_classes ();
-/** Those that move so slowly, up to 2 px per slot along each axis, that the
- * last slots of the coded frame before and the first ones of the next show the
- * patch nearby. */
-std::vector<SceneClass> passing_classes ();
 
 } // namespace codedexposure

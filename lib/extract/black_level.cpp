@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "base/pixels.h"
+
 namespace codedexposure
 {
 
@@ -11,8 +13,7 @@ void
 subtract_black (
     ImageView<const Pixel> frame, int black, int bits, ImageView<Pixel> light)
 {
-  const int all = 8 * int (sizeof (Pixel));
-  const int largest = (1 << (bits > 0 && bits < all ? bits : all)) - 1;
+  const int largest = largest_pixel_of<Pixel> (bits);
   for (int y = 0; y < frame.height; y++)
     std::transform (frame.row (y), frame.row (y) + frame.width, light.row (y),
         [=] (Pixel value) {

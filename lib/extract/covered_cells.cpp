@@ -51,16 +51,14 @@ CoveredCells::beside (int i, int j) const
 
 template <typename Pixel>
 void
-CoveredCells::blacken (ImageView<Pixel> subframe, RowRange rows) const
+CoveredCells::blacken (ImageView<Pixel> subframe) const
 {
-  for (const Rect &rect : rects_) {
-    const int end = std::min (rect.bottom (), rows.first + rows.count);
-    for (int j = std::max (rect.y, rows.first); j < end; j++)
+  for (const Rect &rect : rects_)
+    for (int j = rect.y; j < rect.bottom (); j++)
       std::fill_n (subframe.row (j) + rect.x, rect.width, Pixel (0));
-  }
 }
 
-template void CoveredCells::blacken (ImageView<std::uint8_t>, RowRange) const;
-template void CoveredCells::blacken (ImageView<std::uint16_t>, RowRange) const;
+template void CoveredCells::blacken (ImageView<std::uint8_t>) const;
+template void CoveredCells::blacken (ImageView<std::uint16_t>) const;
 
 } // namespace codedexposure

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "base/image.h"
-#include "extract/reference.h"
 #include "schedule/schedule.h"
 
 namespace codedexposure
@@ -29,9 +28,9 @@ public:
   /** Those that are none and have one among the eight around them, row by row.
    */
   std::span<const Offset> neighbours () const { return neighbours_; }
-  /** Blackens them in @p rows of @p subframe. */
+  /** Blackens them in @p subframe. */
   template <typename Pixel>
-  void blacken (ImageView<Pixel> subframe, RowRange rows) const;
+  void blacken (ImageView<Pixel> subframe) const;
 
 private:
   bool beside (int i, int j) const;

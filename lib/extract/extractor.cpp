@@ -9,6 +9,7 @@
 #include <span>
 #include <string>
 
+#include "base/pixels.h"
 #include "base/text.h"
 #include "base/try.h"
 #include "base/view_check.h"
@@ -74,7 +75,7 @@ check_options (const ExtractOptions &options, int type_bits)
   return {};
 }
 
-/** The named target and the narrower ones that help it out. */
+/** The named target and the narrower ones, for narrower frames. */
 std::span<const Target>
 targets_from (std::string_view name)
 {
@@ -122,17 +123,17 @@ struct Extractor<Pixel>::Plan : ExtractPlan {
   std::optional<FastPath<Pixel>> fast = {};
 
   Result<void> check (ImageView<const Pixel> coded,
-      std::span<const ImageView<Pixel>> subframes, RowRange rows) const;
+      std::span<const ImageView<Pixel>> subframes) const;
   ExtractReport run (ImageView<const Pixel> coded,
-      std::span<const ImageView<Pixel>> subframes, RowRange rows) const;
+      std::span<const ImageView<Pixel>> subframes) const;
   void leave_out_regions (ImageView<const Pixel> coded,
-      std::span<const ImageView<Pixel>> subframes, RowRange rows) const;
+      std::span<const ImageView<Pixel>> subframes) const;
 };
 
 template <typename Pixel>
 Result<void>
 Extractor<Pixel>::Plan::check (ImageView<const Pixel> coded,
-    std::span<const ImageView<Pixel>> subframes, RowRange rows) const
+    std::span<const ImageView<Pixel>> subframes) const
 {
   std::array<ViewBytes, Tile::kMaxElements> outputs;
   if (int (subframes.size ()) != grid.elements ())
@@ -147,45 +148,43 @@ Extractor<Pixel>::Plan::check (ImageView<const Pixel> coded,
     RETURN_IF_ERROR (
         check_view (outputs[k], "subframe", size.width, size.height));
   }
-  RETURN_IF_ERROR (check_rows (rows.first, rows.count, size.height));
   return check_apart (std::span (outputs).first (subframes.size ()), &input);
 }
 
 template <typename Pixel>
 ExtractReport
 Extractor<Pixel>::Plan::run (ImageView<const Pixel> coded,
-    std::span<const ImageView<Pixel>> subframes, RowRange rows) const
+    std::span<const ImageView<Pixel>> subframes) const
 {
   if (fast)
-    return fast->run (coded, subframes, rows);
+    return fast->run (coded, subframes);
   switch (this->method) {
   case Method::kDecode:
-    for (int j = rows.first; j < rows.first + rows.count; j++)
+    for (int j = 0; j < size.height; j++)
       for (int i = 0; i < size.width; i++)
-        reference_decode (
-            coded, grid, *decoder, largest, covered, {i, j}, subframes);
+        reference_decode (coded, grid, *decoder, linear->linear (), covered,
+            {i, j}, subframes);
     break;
   case Method::kSelect:
-    reference_select<Pixel> (coded, grid, elements, rows, subframes);
+    reference_select<Pixel> (coded, grid, elements, subframes);
     break;
   default:
-    reference_rank (coded, grid, rows, subframes);
+    reference_rank (coded, grid, subframes);
   }
-  return {reference_saturated (coded, grid, largest, rows)};
+  return {reference_saturated (coded, grid, largest, size.height)};
 }
 
 template <typename Pixel>
 void
 Extractor<Pixel>::Plan::leave_out_regions (ImageView<const Pixel> coded,
-    std::span<const ImageView<Pixel>> subframes, RowRange rows) const
+    std::span<const ImageView<Pixel>> subframes) const
 {
   if (decoder && decoder->interpolates ())
     for (const Offset cell : covered.neighbours ())
-      if (cell.y >= rows.first && cell.y < rows.first + rows.count)
-        reference_decode (
-            coded, grid, *decoder, largest, covered, cell, subframes);
+      reference_decode (
+          coded, grid, *decoder, linear->linear (), covered, cell, subframes);
   for (const ImageView<Pixel> &subframe : subframes)
-    covered.blacken (subframe, rows);
+    covered.blacken (subframe);
 }
 
 template <typename Pixel>
@@ -217,14 +216,15 @@ try {
 
   const Method method =
       options.method == Method::kAuto ? method_for (schedule) : options.method;
-  const int bits = options.bits > 0 ? options.bits : kTypeBits;
-  auto plan =
-      std::make_unique<Plan> (Plan{{method, grid, size, (1 << bits) - 1,
-                                       elements_by_slot (schedule.code ())},
+  auto plan = std::make_unique<Plan> (
+      Plan{{method, grid, size, largest_pixel_of<Pixel> (options.bits),
+               elements_by_slot (schedule.code ())},
           CoveredCells (whole, size), {width, height}});
   if (method == Method::kDecode) {
     ASSIGN_OR_RETURN (plan->decoder,
         Decoder::make (schedule, options.gain, options.interpolate));
+    plan->linear.emplace (
+        *plan->decoder, largest_pixel_of<Pixel> (0), plan->largest);
   }
   if (options.target != kScalar)
     plan->fast = FastPath<Pixel>::make (*plan, targets_from (options.target));
@@ -266,19 +266,10 @@ Result<ExtractReport>
 Extractor<Pixel>::run (ImageView<const Pixel> coded,
     std::span<const ImageView<Pixel>> subframes) const
 {
-  return run_rows (coded, subframes, 0, plan_->size.height);
-}
-
-template <typename Pixel>
-Result<ExtractReport>
-Extractor<Pixel>::run_rows (ImageView<const Pixel> coded,
-    std::span<const ImageView<Pixel>> subframes, int first_row, int rows) const
-{
-  const RowRange range = {first_row, rows};
-  RETURN_IF_ERROR (plan_->check (coded, subframes, range));
-  const ExtractReport report = plan_->run (coded, subframes, range);
+  RETURN_IF_ERROR (plan_->check (coded, subframes));
+  const ExtractReport report = plan_->run (coded, subframes);
   if (plan_->covered.any ())
-    plan_->leave_out_regions (coded, subframes, range);
+    plan_->leave_out_regions (coded, subframes);
   return report;
 }
 

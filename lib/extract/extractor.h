@@ -105,11 +105,6 @@ public:
    */
   Result<ExtractReport> run (ImageView<const Pixel> coded,
       std::span<const ImageView<Pixel>> subframes) const;
-  /** The same for rows [@p first_row, @p first_row + @p rows) of the
-   * subframes only, so that threads can share one frame. */
-  Result<ExtractReport> run_rows (ImageView<const Pixel> coded,
-      std::span<const ImageView<Pixel>> subframes, int first_row,
-      int rows) const;
 
 private:
   struct Plan;

@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
+#ifdef __SSE2__
+#include <emmintrin.h>
+#endif
 
 namespace codedexposure
 {
@@ -19,130 +21,85 @@ constexpr std::size_t kLargeFrame = std::size_t (8) << 20;
 constexpr std::size_t kBand = std::size_t (128) << 10;
 constexpr std::size_t kLine = 64;
 
-/**
- * Calls @p body (kernels, first, count) for parts that cover @p cells cells:
- * the widest vectors, and at the end some half as wide where these are enough.
- * Parts may overlap. @p cells is at least the lanes of the last target; without
- * @p halves vectors have one width throughout.
- */
-template <typename Pixel, typename Body>
-void
-for_segments (
-    std::span<const Target> targets, int cells, bool halves, Body body)
-{
-  int at = 0;
-  for (std::size_t t = 0; t < targets.size () && at < cells; t++) {
-    const Kernels<Pixel> &kernels = targets[t].kernels<Pixel> ();
-    const int lanes = kernels.lanes;
-    if (cells < lanes)
-      continue;
-    const int left_over = (cells - at) % lanes;
-    const bool half_is_enough = halves && t == 0 && targets.size () > 1 &&
-                                left_over <= lanes / 2 &&
-                                lanes / 2 == targets[1].kernels<Pixel> ().lanes;
-    const int end = half_is_enough ? cells - left_over : cells;
-    const int first = std::min (at, end - lanes);
-    if (end > at)
-      body (kernels, first, end - first);
-    at = end;
-  }
-}
-
-/** Whether all rows lie equally to lines of the cache. */
+/** Whether all rows begin with a line of the cache. */
 template <typename Pixel>
 bool
-equally_aligned (std::span<Pixel *const> rows)
+begin_with_lines (std::span<const ImageView<Pixel>> views)
 {
-  const auto address = [] (Pixel *row) {
-    return reinterpret_cast<std::uintptr_t> (row) % kLine;
-  };
-  return std::ranges::all_of (
-      rows, [&] (Pixel *row) { return address (row) == address (rows[0]); });
+  return std::ranges::all_of (views, [] (const ImageView<Pixel> &view) {
+    return reinterpret_cast<std::uintptr_t> (view.data) % kLine == 0 &&
+           std::size_t (view.stride) % kLine == 0;
+  });
 }
 
-/** A staircase without leak: slot k is a multiple of element k less element
- * k - 1. Its factor, or 0. */
-double
-staircase_factor (const Decoder &decoder)
+/** Makes non-temporal stores visible to other threads. */
+void
+finish_stores ()
 {
-  const double factor = decoder.terms (0).back ().factor;
-  for (int s = 0; s < decoder.slots (); s++) {
-    const auto terms = decoder.terms (s);
-    const bool is_step =
-        terms.back () == Term{s, factor} &&
-        (s == 0 ? terms.size () == 1
-                : terms.size () == 2 && terms[0] == Term{s - 1, -factor});
-    if (!is_step)
-      return 0.0;
-  }
-  return factor;
+#ifdef __SSE2__
+  _mm_sfence ();
+#endif
 }
 
 } // namespace
 
-/** Elements of some columns of cells, for one row of cells or a ring of
- * three, with a cell more at either end where neighbours are needed. */
+/** Elements of some columns of cells, for three rows of cells, with a cell more
+ * at either end. */
 template <typename Pixel>
-struct FastPath<Pixel>::Chunk {
-  /* Three rows of 66 cells of 256 elements. A single row takes no more than
-   * the L1 cache. */
-  static constexpr int kRingPixels = 3 * 66 * Tile::kMaxElements;
-  static constexpr int kRowPixels = 64 * Tile::kMaxElements;
-
-  alignas (64) Pixel pixels[kRingPixels];
-  Pixel peaks[3];
-  int n;
-  int first;
-  int count;
-  int halo;
-  int pitch;
-
-  static int most_cells (int n, bool ring)
+class FastPath<Pixel>::Ring
+{
+public:
+  Ring (int n, int first, int count, int width)
+      : n_ (n), first_ (first), count_ (count), width_ (width)
   {
-    return ring ? std::min (kRingPixels / 3 / n - 2, kMaxRowCells)
-                : kRowPixels / n;
   }
 
-  int slot (int j) const { return halo > 0 ? j % 3 : 0; }
-  Pixel *row (int j, int element)
-  {
-    return pixels + (slot (j) * n + element) * pitch + halo;
-  }
+  static int most_cells (int n) { return kPixels / 3 / n - 2; }
+
+  int first () const { return first_; }
+  int count () const { return count_; }
   const Pixel *row (int j, int element) const
   {
-    return pixels + (slot (j) * n + element) * pitch + halo;
+    return pixels_ + at (j, element);
   }
-  Pixel peak (int j) const { return peaks[slot (j)]; }
 
-  void fill (std::span<const Target> targets, const LayoutTable<Pixel> &layout,
-      const SampleGrid &grid, ImageView<const Pixel> coded, int j, int width)
+  /** Returns the largest pixel. */
+  Pixel fill (const Kernels<Pixel> &kernels, const Layout<Pixel> &layout,
+      Extent cell, ImageView<const Pixel> coded, int j)
   {
-    const Extent cell = grid.cell ();
-    const int begin = std::max (first - halo, 0);
-    const int end = std::min (first + count + halo, width);
-    Pixel &peak = peaks[slot (j)] = 0;
-    for_segments<Pixel> (targets, end - begin, true,
-        [&] (const Kernels<Pixel> &kernels, int at, int cells) {
-          RowPointers<Pixel> rows;
-          for (int e = 0; e < n; e++)
-            rows[std::size_t (e)] = row (j, e) + (begin + at - first);
-          const Block<Pixel> block = {
-              coded.row (j * cell.height) + (begin + at) * cell.width,
-              coded.stride, cell.width, cell.height, cells, 1};
-          peak = std::max (
-              peak, kernels.select (
-                        block, layout.from (begin + at, j), {rows.data (), 0}));
-        });
-    if (halo == 0)
-      return;
-    for (int e = 0; e < n; e++) {
-      Pixel *const at = row (j, e);
-      if (first == 0)
-        at[-1] = at[0];
-      if (end == first + count)
-        at[count] = at[count - 1];
+    const int begin = std::max (first_ - 1, 0);
+    const int end = std::min (first_ + count_ + 1, width_);
+    RowPointers<Pixel> rows;
+    for (int e = 0; e < n_; e++)
+      rows[std::size_t (e)] = pixels_ + at (j, e) + begin - first_;
+    const Pixel peak = kernels.select (
+        {coded.row (j * cell.height) + begin * cell.width, coded.stride,
+            cell.width, cell.height, end - begin, 1},
+        layout, {rows.data (), 0});
+    for (int e = 0; e < n_; e++) {
+      Pixel *const row = pixels_ + at (j, e);
+      if (begin == first_)
+        row[-1] = row[0];
+      if (end == first_ + count_)
+        row[count_] = row[count_ - 1];
     }
+    return peak;
   }
+
+private:
+  /* 66 cells of 256 elements. */
+  static constexpr int kPixels = 3 * 66 * Tile::kMaxElements;
+
+  int at (int j, int element) const
+  {
+    return (j % 3 * n_ + element) * (count_ + 2) + 1;
+  }
+
+  alignas (64) Pixel pixels_[kPixels];
+  int n_;
+  int first_;
+  int count_;
+  int width_;
 };
 
 template <typename Pixel>
@@ -168,62 +125,27 @@ template <typename Pixel>
 std::optional<FastPath<Pixel>>
 FastPath<Pixel>::make (const ExtractPlan &plan, std::span<const Target> targets)
 {
-  while (!targets.empty () &&
-         targets.front ().kernels<Pixel> ().lanes > plan.size.width)
-    targets = targets.subspan (1);
-  if (targets.empty ())
-    return {};
-  return FastPath (plan, targets);
+  for (const Target &target : targets)
+    if (const auto &kernels = target.kernels<Pixel> ();
+        kernels.lanes <= plan.size.width)
+      return FastPath (plan, kernels);
+  return {};
 }
 
 template <typename Pixel>
 FastPath<Pixel>::FastPath (
-    const ExtractPlan &plan, std::span<const Target> targets)
-    : plan_ (&plan), targets_ (targets),
-      layout_ (plan.grid, targets.front ().kernels<Pixel> ().lanes)
+    const ExtractPlan &plan, const Kernels<Pixel> &kernels)
+    : plan_ (&plan), kernels_ (&kernels), layout_ (plan.grid, kernels.lanes)
 {
-  if (plan.decoder) {
-    take_terms (*plan.decoder);
-    take_weights ();
-  }
-}
-
-template <typename Pixel>
-void
-FastPath<Pixel>::take_terms (const Decoder &decoder)
-{
-  const double factor = staircase_factor (decoder);
-  if (decoder.interpolates () && factor == 0.25)
-    form_ = DecodeForm::kLerpDifference;
-  else if (!decoder.interpolates () && factor >= 1.0 && factor <= 256.0 &&
-           factor == std::floor (factor))
-    form_ = DecodeForm::kDifference;
-
-  for (int s = 0; s < decoder.slots (); s++) {
-    for (const Term &term : decoder.terms (s)) {
-      term_elements_.push_back (term.element);
-      term_factors_.push_back (term.factor);
-    }
-  }
-  std::size_t start = 0;
-  for (int s = 0; s < decoder.slots (); s++) {
-    const std::size_t size = decoder.terms (s).size ();
-    terms_.push_back ({term_elements_.data () + start,
-        term_factors_.data () + start, int (size)});
-    start += size;
-  }
-}
-
-template <typename Pixel>
-void
-FastPath<Pixel>::take_weights ()
-{
+  if (!plan.decoder)
+    return;
   for (int e = 0; e < plan_->grid.elements (); e++) {
     const Offset offset = plan_->grid.offset (e, 0, 0);
     const Lerp x = plan_->decoder->lerp_x (offset);
     const Lerp y = plan_->decoder->lerp_y (offset);
     weights_.push_back (
-        {nullptr, nullptr, {x.near, x.far}, {y.near, y.far}, x.step});
+        {nullptr, nullptr, short (y.near * x.near), short (y.near * x.far),
+            short (y.far * x.near), short (y.far * x.far), x.step});
     row_steps_.push_back (y.step);
   }
 }
@@ -231,184 +153,118 @@ FastPath<Pixel>::take_weights ()
 template <typename Pixel>
 ExtractReport
 FastPath<Pixel>::run (ImageView<const Pixel> coded,
-    std::span<const ImageView<Pixel>> subframes, RowRange rows) const
+    std::span<const ImageView<Pixel>> subframes) const
 {
-  const bool through_elements =
-      plan_->method == Method::kDecode && form_ != DecodeForm::kDifference;
-  return {through_elements ? decode (coded, subframes, rows)
-                           : run_bands (coded, subframes, rows)};
+  const bool interpolates = plan_->decoder && plan_->decoder->interpolates ();
+  return {interpolates ? interpolate (coded, subframes)
+                       : run_bands (coded, subframes)};
 }
 
 template <typename Pixel>
 std::uint64_t
 FastPath<Pixel>::run_bands (ImageView<const Pixel> coded,
-    std::span<const ImageView<Pixel>> subframes, RowRange rows) const
+    std::span<const ImageView<Pixel>> subframes) const
 {
+  const Extent cell = plan_->grid.cell (), size = plan_->size;
   const std::size_t n = subframes.size ();
-  const std::size_t row_bytes =
-      n * std::size_t (plan_->size.width) * sizeof (Pixel);
+  const std::size_t row_bytes = n * std::size_t (size.width) * sizeof (Pixel);
   const std::ptrdiff_t stride = subframes[0].stride;
   const bool one_stride = std::ranges::all_of (
       subframes, [stride] (const auto &s) { return s.stride == stride; });
   const int band = one_stride ? std::max (1, int (kBand / row_bytes)) : 1;
-  const bool large =
-      row_bytes * std::size_t (plan_->size.height) >= kLargeFrame;
+  const bool stream = row_bytes * std::size_t (size.height) >= kLargeFrame &&
+                      begin_with_lines (subframes);
 
   std::uint64_t count = 0;
-  bool streamed = false;
-  const int end = rows.first + rows.count;
-  for (int j = rows.first; j < end; j += band) {
+  for (int j = 0; j < size.height; j += band) {
     RowPointers<Pixel> to;
     for (std::size_t k = 0; k < n; k++)
       to[plan_->method == Method::kSelect ? std::size_t (plan_->elements[k])
                                           : k] = subframes[k].row (j);
-    const bool stream =
-        large && equally_aligned<Pixel> (std::span (to).first (n));
-    streamed = streamed || stream;
-
-    const RowRange part = {j, std::min (band, end - j)};
-    const Pixel peak = run_band (coded, part, {to.data (), stride, stream});
-    count += saturated (coded, part, 0, plan_->size.width, peak);
+    const int rows = std::min (band, size.height - j);
+    const Pixel peak =
+        run_block ({coded.row (j * cell.height), coded.stride, cell.width,
+                       cell.height, size.width, rows},
+            layout_.from (j), {to.data (), stride, stream});
+    count += saturated (coded, j, rows, peak);
   }
-  if (streamed)
-    targets_.front ().kernels<Pixel> ().fence ();
+  if (stream)
+    finish_stores ();
   return count;
 }
 
 template <typename Pixel>
 Pixel
-FastPath<Pixel>::run_band (
-    ImageView<const Pixel> coded, RowRange rows, const Planes<Pixel> &to) const
-{
-  const Extent cell = plan_->grid.cell ();
-  const std::size_t n = std::size_t (plan_->grid.elements ());
-  Pixel peak = 0;
-  for_segments<Pixel> (targets_, plan_->size.width, !to.stream,
-      [&] (const Kernels<Pixel> &kernels, int first, int count) {
-        RowPointers<Pixel> moved;
-        for (std::size_t k = 0; k < n; k++)
-          moved[k] = to.rows[k] + first;
-        /* Narrower stores leave lines half written, which memory punishes. */
-        const bool whole_lines =
-            std::size_t (kernels.lanes) * sizeof (Pixel) == kLine;
-        const Block<Pixel> block = {
-            coded.row (rows.first * cell.height) + first * cell.width,
-            coded.stride, cell.width, cell.height, count, rows.count};
-        peak = std::max (
-            peak, run_block (kernels, block, layout_.from (first, rows.first),
-                      {moved.data (), to.stride, to.stream && whole_lines}));
-      });
-  return peak;
-}
-
-template <typename Pixel>
-Pixel
-FastPath<Pixel>::run_block (const Kernels<Pixel> &kernels,
-    const Block<Pixel> &block, const Layout<Pixel> &layout,
-    const Planes<Pixel> &to) const
+FastPath<Pixel>::run_block (const Block<Pixel> &block,
+    const Layout<Pixel> &layout, const Planes<Pixel> &to) const
 {
   switch (plan_->method) {
   case Method::kRank:
-    return kernels.rank (block, to);
+    return kernels_->rank (block, layout, to);
   case Method::kDecode:
-    return kernels.difference (block, layout,
-        int (plan_->decoder->terms (0)[0].factor), Pixel (plan_->largest), to);
+    return kernels_->decode (block, layout, plan_->linear->linear (), to);
   default:
-    return kernels.select (block, layout, to);
+    return kernels_->select (block, layout, to);
   }
 }
 
 template <typename Pixel>
 std::uint64_t
-FastPath<Pixel>::decode (ImageView<const Pixel> coded,
-    std::span<const ImageView<Pixel>> subframes, RowRange rows) const
+FastPath<Pixel>::interpolate (ImageView<const Pixel> coded,
+    std::span<const ImageView<Pixel>> subframes) const
 {
-  if (rows.count <= 0)
-    return 0;
-  Chunk chunk;
-  chunk.n = plan_->grid.elements ();
-  chunk.halo = plan_->decoder->interpolates () ? 1 : 0;
-  const int most = Chunk::most_cells (chunk.n, chunk.halo > 0);
-  const int chunks = (plan_->size.width + most - 1) / most;
-  chunk.pitch = (plan_->size.width + chunks - 1) / chunks + 2 * chunk.halo;
-
-  std::uint64_t count = 0;
-  for (int c = 0; c < chunks; c++) {
-    chunk.first = plan_->size.width * c / chunks;
-    chunk.count = plan_->size.width * (c + 1) / chunks - chunk.first;
-    count += decode_chunk (coded, subframes, rows, chunk);
+  const Extent cell = plan_->grid.cell (), size = plan_->size;
+  const int n = plan_->grid.elements ();
+  const int most = std::min (size.width, Ring::most_cells (n));
+  Pixel peak = 0;
+  for (int next = 0; next < size.width; next += most) {
+    Ring ring (n, std::min (next, size.width - most), most, size.width);
+    const auto fill = [&] (int j) {
+      peak = std::max (
+          peak, ring.fill (*kernels_, layout_.from (j), cell, coded, j));
+    };
+    fill (0);
+    for (int j = 0; j < size.height; j++) {
+      if (j + 1 < size.height)
+        fill (j + 1);
+      interpolate_row (ring, j, subframes);
+    }
   }
-  return count;
-}
-
-template <typename Pixel>
-std::uint64_t
-FastPath<Pixel>::decode_chunk (ImageView<const Pixel> coded,
-    std::span<const ImageView<Pixel>> subframes, RowRange rows,
-    Chunk &chunk) const
-{
-  const int width = plan_->size.width;
-  const int height = plan_->size.height;
-  std::uint64_t count = 0;
-  if (chunk.halo > 0)
-    for (int j = std::max (rows.first - 1, 0); j <= rows.first; j++)
-      chunk.fill (targets_, layout_, plan_->grid, coded, j, width);
-
-  for (int j = rows.first; j < rows.first + rows.count; j++) {
-    if (chunk.halo == 0)
-      chunk.fill (targets_, layout_, plan_->grid, coded, j, width);
-    else if (j + 1 < height)
-      chunk.fill (targets_, layout_, plan_->grid, coded, j + 1, width);
-
-    RowPointers<Pixel> to;
-    for (std::size_t k = 0; k < subframes.size (); k++)
-      to[k] = subframes[k].row (j) + chunk.first;
-    decode_row (chunk, j, to);
-    count +=
-        saturated (coded, {j, 1}, chunk.first, chunk.count, chunk.peak (j));
-  }
-  return count;
+  return saturated (coded, 0, size.height, peak);
 }
 
 template <typename Pixel>
 void
-FastPath<Pixel>::decode_row (
-    const Chunk &chunk, int j, const RowPointers<Pixel> &to) const
+FastPath<Pixel>::interpolate_row (
+    const Ring &ring, int j, std::span<const ImageView<Pixel>> subframes) const
 {
-  const Kernels<Pixel> &kernels = targets_.front ().kernels<Pixel> ();
-  const Pixel largest = Pixel (plan_->largest);
-  const std::size_t n = std::size_t (chunk.n);
   std::array<ElementRow<Pixel>, Tile::kMaxElements> rows;
-  for (std::size_t e = 0; e < n; e++) {
+  RowPointers<Pixel> to;
+  for (std::size_t e = 0; e < subframes.size (); e++) {
     const int beside =
         std::clamp (j + row_steps_[e], 0, plan_->size.height - 1);
     rows[e] = weights_[e];
-    rows[e].here = chunk.row (j, int (e));
-    rows[e].there = chunk.row (beside, int (e));
+    rows[e].here = ring.row (j, int (e));
+    rows[e].there = ring.row (beside, int (e));
+    to[e] = subframes[e].row (j) + ring.first ();
   }
-  if (form_ == DecodeForm::kLerpDifference)
-    kernels.lerp_difference (
-        rows.data (), chunk.n, chunk.count, largest, to.data ());
-  else
-    kernels.decode (rows.data (), terms_.data (), chunk.n, chunk.count, largest,
-        to.data ());
+  kernels_->decode_row (
+      rows.data (), plan_->linear->linear (), ring.count (), to.data ());
 }
 
 /** Counts only if the largest pixel, @p peak, is saturated. */
 template <typename Pixel>
 std::uint64_t
-FastPath<Pixel>::saturated (ImageView<const Pixel> coded, RowRange rows,
-    int first, int count, Pixel peak) const
+FastPath<Pixel>::saturated (
+    ImageView<const Pixel> coded, int first_row, int rows, Pixel peak) const
 {
   if (peak < plan_->largest)
     return 0;
-  const Kernels<Pixel> &kernels = targets_.front ().kernels<Pixel> ();
   const Extent cell = plan_->grid.cell ();
   std::uint64_t found = 0;
-  for (int y = 0; y < rows.count * cell.height; y++)
-    found += kernels.count (
-        coded.row (rows.first * cell.height + y) + first * cell.width,
-        count * cell.width, Pixel (plan_->largest));
+  for (int y = 0; y < rows * cell.height; y++)
+    found += kernels_->count (coded.row (first_row * cell.height + y),
+        plan_->size.width * cell.width, Pixel (plan_->largest));
   return found;
 }
 

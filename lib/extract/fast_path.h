@@ -11,7 +11,7 @@
 #include "extract/decoder.h"
 #include "extract/extractor.h"
 #include "extract/kernels.h"
-#include "extract/reference.h"
+#include "extract/linear.h"
 #include "extract/targets.h"
 #include "schedule/sample_grid.h"
 
@@ -27,16 +27,14 @@ template <typename Pixel>
 class LayoutTable
 {
 public:
-  /** @p lanes  of the widest kernels that will read it. */
   LayoutTable (const SampleGrid &grid, int lanes);
 
-  /** For a block that starts with cell (@p column, @p row); valid as long as
-   * the table. */
-  Layout<Pixel> from (int column, int row) const
+  /** For a block that starts with row @p row of cells; valid as long as the
+   * table. */
+  Layout<Pixel> from (int row) const
   {
-    return {places_.data (), n_, repeat_.width, repeat_.height,
-        column % repeat_.width, row % repeat_.height, comb_.data (), identity_,
-        elements_.data ()};
+    return {places_.data (), n_, repeat_.width, repeat_.height, 0,
+        row % repeat_.height, comb_.data (), identity_, elements_.data ()};
   }
 
 private:
@@ -56,6 +54,7 @@ struct ExtractPlan {
   int largest;                         ///< pixel value
   std::vector<int> elements;           ///< select: element of each subframe
   std::optional<Decoder> decoder = {}; ///< decode
+  std::optional<LinearPlan> linear = {};
 };
 
 /**
@@ -67,50 +66,34 @@ class FastPath
 {
 public:
   /** @p plan     outlives this.
-   *  @p targets  the kernels that may be used, widest first; those that are
-   *              too wide for the rows are left out. Nothing when all are. */
+   *  @p targets  the kernels that may be used, widest first; the first one
+   *              whose vectors are no wider than a row is. Nothing when all
+   *              are. */
   static std::optional<FastPath> make (
       const ExtractPlan &plan, std::span<const Target> targets);
 
   ExtractReport run (ImageView<const Pixel> coded,
-      std::span<const ImageView<Pixel>> subframes, RowRange rows) const;
+      std::span<const ImageView<Pixel>> subframes) const;
 
 private:
-  /** What the code's terms come down to. */
-  enum class DecodeForm {
-    kDifference,     ///< whole multiples of element k less element k - 1
-    kLerpDifference, ///< quarters of the same, interpolated
-    kTerms,          ///< anything
-  };
-  struct Chunk;
+  class Ring;
 
-  FastPath (const ExtractPlan &plan, std::span<const Target> targets);
-  void take_terms (const Decoder &decoder);
-  void take_weights ();
+  FastPath (const ExtractPlan &plan, const Kernels<Pixel> &kernels);
 
   std::uint64_t run_bands (ImageView<const Pixel> coded,
-      std::span<const ImageView<Pixel>> subframes, RowRange rows) const;
-  Pixel run_band (ImageView<const Pixel> coded, RowRange rows,
+      std::span<const ImageView<Pixel>> subframes) const;
+  Pixel run_block (const Block<Pixel> &block, const Layout<Pixel> &layout,
       const Planes<Pixel> &to) const;
-  Pixel run_block (const Kernels<Pixel> &kernels, const Block<Pixel> &block,
-      const Layout<Pixel> &layout, const Planes<Pixel> &to) const;
-  std::uint64_t decode (ImageView<const Pixel> coded,
-      std::span<const ImageView<Pixel>> subframes, RowRange rows) const;
-  std::uint64_t decode_chunk (ImageView<const Pixel> coded,
-      std::span<const ImageView<Pixel>> subframes, RowRange rows,
-      Chunk &chunk) const;
-  void decode_row (
-      const Chunk &chunk, int j, const RowPointers<Pixel> &to) const;
-  std::uint64_t saturated (ImageView<const Pixel> coded, RowRange rows,
-      int first, int count, Pixel peak) const;
+  std::uint64_t interpolate (ImageView<const Pixel> coded,
+      std::span<const ImageView<Pixel>> subframes) const;
+  void interpolate_row (const Ring &ring, int j,
+      std::span<const ImageView<Pixel>> subframes) const;
+  std::uint64_t saturated (
+      ImageView<const Pixel> coded, int first_row, int rows, Pixel peak) const;
 
   const ExtractPlan *plan_;
-  std::span<const Target> targets_;
+  const Kernels<Pixel> *kernels_;
   LayoutTable<Pixel> layout_;
-  DecodeForm form_ = DecodeForm::kTerms;
-  std::vector<int> term_elements_;
-  std::vector<double> term_factors_;
-  std::vector<TermList> terms_;
   /** Weights of each element; its rows are filled in for every row of cells. */
   std::vector<ElementRow<Pixel>> weights_;
   /** Row of cells, -1, 0 or 1 from its own, with which an element is joined. */

@@ -32,8 +32,7 @@ template <typename Pixel>
 struct Planes {
   Pixel *const *rows;
   std::ptrdiff_t stride;
-  /** Use non-temporal stores, with vectors of 64 bytes only; all rows[k] lie
-   * equally to such lines. */
+  /** Use non-temporal stores; all rows start with a line of the cache. */
   bool stream = false;
 };
 
@@ -58,12 +57,6 @@ struct Layout {
   const std::uint8_t *element;
 };
 
-/** Whole-number weights of a sample and of its neighbour. */
-struct Weights {
-  int near;
-  int far;
-};
-
 /** One element along a row of cells, and how to bring it to the centre of the
  * cell: here [i] with the cell @p step (-1, 0 or 1) beside it, and the same two
  * of the cell above or below it, at there. */
@@ -71,16 +64,11 @@ template <typename Pixel>
 struct ElementRow {
   const Pixel *here;
   const Pixel *there;
-  Weights x, y;
+  short here_near, here_far, there_near, there_far; ///< weights
   int step;
 };
 
-/** A sum of elements; see Decoder. */
-struct TermList {
-  const int *elements;
-  const double *factors;
-  int size;
-};
+struct Linear;
 
 /**
  * The kernels of one instruction set. None checks its arguments, allocates or
@@ -100,30 +88,19 @@ struct Kernels {
       const Planes<Pixel> &to);
 
   /** Row k of the planes = k-th smallest pixel of each cell. */
-  Pixel (*rank) (const Block<Pixel> &block, const Planes<Pixel> &to);
+  Pixel (*rank) (const Block<Pixel> &block, const Layout<Pixel> &layout,
+      const Planes<Pixel> &to);
 
-  /** Row k of the planes = gain (element k - element k - 1) clamped to
-   * 0..largest; gain in 1..256. */
-  Pixel (*difference) (const Block<Pixel> &block, const Layout<Pixel> &layout,
-      int gain, Pixel largest, const Planes<Pixel> &to);
+  /** Row s of the planes = the light of slot s. */
+  Pixel (*decode) (const Block<Pixel> &block, const Layout<Pixel> &layout,
+      const Linear &linear, const Planes<Pixel> &to);
 
-  /** out[k][i] = a quarter of interpolated element k less element k - 1,
-   * rounded and clamped to 0..largest; cells at most kMaxRowCells. */
-  void (*lerp_difference) (const ElementRow<Pixel> *elements, int n, int cells,
-      Pixel largest, Pixel *const *out);
-
-  /** out[s][i] = terms[s] over the elements, rounded and clamped. */
-  void (*decode) (const ElementRow<Pixel> *elements, const TermList *terms,
-      int n, int cells, Pixel largest, Pixel *const *out);
+  /** out[s][i] = the light of slot s from interpolated elements. */
+  void (*decode_row) (const ElementRow<Pixel> *elements, const Linear &linear,
+      int cells, Pixel *const *out);
 
   /** Pixels that are not below @p largest. */
   std::uint64_t (*count) (const Pixel *row, int pixels, Pixel largest);
-
-  /** Makes non-temporal stores visible to other threads. */
-  void (*fence) ();
 };
-
-/** Bound on the cells of one call of lerp_difference. */
-constexpr int kMaxRowCells = 4096;
 
 } // namespace codedexposure

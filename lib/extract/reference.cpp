@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 
 #include "extract/covered_cells.h"
 #include "extract/group_sort.h"
@@ -56,13 +55,13 @@ element_value (const Samples<Pixel> &samples, const Decoder &decoder,
 template <typename Pixel>
 void
 reference_rank (ImageView<const Pixel> coded, const SampleGrid &grid,
-    RowRange rows, std::span<const ImageView<Pixel>> subframes)
+    std::span<const ImageView<Pixel>> subframes)
 {
   const Samples<Pixel> samples{coded, grid};
   const int n = grid.elements ();
   std::array<Pixel, Tile::kMaxElements> group;
 
-  for (int j = rows.first; j < rows.first + rows.count; j++) {
+  for (int j = 0; j < subframes[0].height; j++) {
     for (int i = 0; i < subframes[0].width; i++) {
       for (int e = 0; e < n; e++)
         group[std::size_t (e)] = samples.at (e, i, j);
@@ -76,12 +75,11 @@ reference_rank (ImageView<const Pixel> coded, const SampleGrid &grid,
 template <typename Pixel>
 void
 reference_select (ImageView<const Pixel> coded, const SampleGrid &grid,
-    std::span<const int> elements, RowRange rows,
-    std::span<const ImageView<Pixel>> subframes)
+    std::span<const int> elements, std::span<const ImageView<Pixel>> subframes)
 {
   const Samples<Pixel> samples{coded, grid};
   for (std::size_t k = 0; k < subframes.size (); k++)
-    for (int j = rows.first; j < rows.first + rows.count; j++)
+    for (int j = 0; j < subframes[k].height; j++)
       for (int i = 0; i < subframes[k].width; i++)
         subframes[k].at (i, j) = samples.at (elements[k], i, j);
 }
@@ -89,7 +87,7 @@ reference_select (ImageView<const Pixel> coded, const SampleGrid &grid,
 template <typename Pixel>
 void
 reference_decode (ImageView<const Pixel> coded, const SampleGrid &grid,
-    const Decoder &decoder, int largest, const CoveredCells &covered,
+    const Decoder &decoder, const Linear &linear, const CoveredCells &covered,
     Offset cell, std::span<const ImageView<Pixel>> subframes)
 {
   const Samples<Pixel> samples{coded, grid};
@@ -99,25 +97,20 @@ reference_decode (ImageView<const Pixel> coded, const SampleGrid &grid,
   for (int e = 0; e < grid.elements (); e++)
     values[std::size_t (e)] =
         element_value (samples, decoder, size, covered, e, i, j);
-  for (int s = 0; s < decoder.slots (); s++) {
-    double light = 0.0;
-    for (const Term &term : decoder.terms (s))
-      light += term.factor * values[std::size_t (term.element)];
+  for (int s = 0; s < decoder.slots (); s++)
     subframes[std::size_t (s)].at (i, j) =
-        Pixel (std::clamp (std::floor (light + 0.5), 0.0, double (largest)));
-  }
+        Pixel (linear.pixel (s, values.data ()));
 }
 
 template <typename Pixel>
 std::uint64_t
-reference_saturated (ImageView<const Pixel> coded, const SampleGrid &grid,
-    int largest, RowRange rows)
+reference_saturated (
+    ImageView<const Pixel> coded, const SampleGrid &grid, int largest, int rows)
 {
   const Extent cell = grid.cell ();
   const int width = coded.width / cell.width * cell.width;
   std::uint64_t count = 0;
-  for (int y = rows.first * cell.height;
-       y < (rows.first + rows.count) * cell.height; y++) {
+  for (int y = 0; y < rows * cell.height; y++) {
     const Pixel *row = coded.row (y);
     count += std::uint64_t (std::count_if (row, row + width,
         [largest] (Pixel pixel) { return pixel >= largest; }));
@@ -127,14 +120,14 @@ reference_saturated (ImageView<const Pixel> coded, const SampleGrid &grid,
 
 #define CODEDEXPOSURE_INSTANTIATE(Pixel)                                       \
   template void reference_rank (ImageView<const Pixel>, const SampleGrid &,    \
-      RowRange, std::span<const ImageView<Pixel>>);                            \
+      std::span<const ImageView<Pixel>>);                                      \
   template void reference_select (ImageView<const Pixel>, const SampleGrid &,  \
-      std::span<const int>, RowRange, std::span<const ImageView<Pixel>>);      \
+      std::span<const int>, std::span<const ImageView<Pixel>>);                \
   template void reference_decode (ImageView<const Pixel>, const SampleGrid &,  \
-      const Decoder &, int, const CoveredCells &, Offset,                      \
+      const Decoder &, const Linear &, const CoveredCells &, Offset,           \
       std::span<const ImageView<Pixel>>);                                      \
   template std::uint64_t reference_saturated (                                 \
-      ImageView<const Pixel>, const SampleGrid &, int, RowRange);
+      ImageView<const Pixel>, const SampleGrid &, int, int);
 
 CODEDEXPOSURE_INSTANTIATE (std::uint8_t)
 CODEDEXPOSURE_INSTANTIATE (std::uint16_t)

@@ -8,6 +8,7 @@
 
 #include "base/image.h"
 #include "extract/decoder.h"
+#include "extract/linear.h"
 #include "schedule/sample_grid.h"
 
 namespace codedexposure
@@ -15,39 +16,31 @@ namespace codedexposure
 
 class CoveredCells;
 
-/** Rows of cells. */
-struct RowRange {
-  int first = 0;
-  int count = 0;
-};
-
-/* In all of these: @p coded is the whole coded frame, @p subframes are n whole
- * subframes in exposure order, of which @p rows or one pixel are written. Pixel
- * is std::uint8_t or std::uint16_t. */
+/* In all of these: @p coded is the coded frame, @p subframes are the n
+ * subframes in exposure order. Pixel is std::uint8_t or std::uint16_t. */
 
 /** Subframe k = k-th smallest of the group, by the paper's group_sort (). */
 template <typename Pixel>
 void reference_rank (ImageView<const Pixel> coded, const SampleGrid &grid,
-    RowRange rows, std::span<const ImageView<Pixel>> subframes);
+    std::span<const ImageView<Pixel>> subframes);
 
 /** Subframe k = element @p elements[k]. */
 template <typename Pixel>
 void reference_select (ImageView<const Pixel> coded, const SampleGrid &grid,
-    std::span<const int> elements, RowRange rows,
-    std::span<const ImageView<Pixel>> subframes);
+    std::span<const int> elements, std::span<const ImageView<Pixel>> subframes);
 
-/** Pixel @p cell of subframe k = light of slot k by @p decoder, clamped to
- * 0..@p largest, without looking at @p covered cells: a missing sample is the
- * one beside it, as at the edge of the frame, and where that one is known on
- * both sides, in the plane through all three. */
+/** Pixel @p cell of subframe k = light of slot k by @p linear, without looking
+ * at @p covered cells: a missing sample is the one beside it, as at the edge of
+ * the frame, and where that one is known on both sides, in the plane through
+ * all three. */
 template <typename Pixel>
 void reference_decode (ImageView<const Pixel> coded, const SampleGrid &grid,
-    const Decoder &decoder, int largest, const CoveredCells &covered,
+    const Decoder &decoder, const Linear &linear, const CoveredCells &covered,
     Offset cell, std::span<const ImageView<Pixel>> subframes);
 
-/** Pixels of the cells in @p rows that are not below @p largest. */
+/** Pixels of the @p rows of cells that are not below @p largest. */
 template <typename Pixel>
 std::uint64_t reference_saturated (ImageView<const Pixel> coded,
-    const SampleGrid &grid, int largest, RowRange rows);
+    const SampleGrid &grid, int largest, int rows);
 
 } // namespace codedexposure

@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "extract/saturation.h"
 
+#include <algorithm>
+
+#include "base/pixels.h"
 #include "extract/targets.h"
 
 namespace codedexposure
@@ -10,13 +13,17 @@ template <typename Pixel>
 std::uint64_t
 count_saturated (ImageView<const Pixel> frame, int bits)
 {
-  const int all = 8 * int (sizeof (Pixel));
-  const auto largest = Pixel ((1 << (bits > 0 && bits < all ? bits : all)) - 1);
-  const Kernels<Pixel> &kernels =
-      supported_targets ().front ().kernels<Pixel> ();
+  const auto largest = largest_pixel_of<Pixel> (bits);
+  const auto targets = supported_targets ();
   std::uint64_t found = 0;
-  for (int y = 0; y < frame.height; y++)
-    found += kernels.count (frame.row (y), frame.width, largest);
+  for (int y = 0; y < frame.height; y++) {
+    const Pixel *row = frame.row (y);
+    found += targets.empty ()
+                 ? std::uint64_t (std::count_if (row, row + frame.width,
+                       [=] (Pixel pixel) { return pixel >= largest; }))
+                 : targets.front ().kernels<Pixel> ().count (
+                       row, frame.width, largest);
+  }
   return found;
 }
 

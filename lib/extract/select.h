@@ -9,35 +9,50 @@
 namespace codedexposure::CODEDEXPOSURE_TARGET
 {
 
+/** What Own gives for cells of a width, by Own<Width> (); Own<0> () is for
+ * widths that are not split by permutations. */
+template <auto Own, int... Width>
+auto
+for_width (int width, std::integer_sequence<int, Width...>)
+{
+  static constexpr decltype (Own.template operator()<0> ()) kAll[] = {
+      Own.template operator() < has_own_code (Width) ? Width : 0 > ()...};
+  return kAll[width <= kOwnWidths ? width : 0];
+}
+template <auto Own>
+auto
+for_width (int width)
+{
+  return for_width<Own> (
+      width, std::make_integer_sequence<int, kOwnWidths + 1> ());
+}
+
 /** Kernels::select where elements stand at one place throughout a row. All
- * cells of a row are worked on before the next Together of their pixel rows, so
- * that only as many subframes are written at a time: many more than a hundred
- * would be more pages than the TLB of the processor holds. Together divides the
- * height of a cell, and 0 stands for all of it; unless it is 1, every element
- * is at the place of its own number. */
-template <int Width, int Together, typename T>
+ * cells of a row are worked on before the next row of their pixels, so that
+ * only as many subframes are written at a time: many more than a hundred would
+ * be more pages than the TLB of the processor holds. Together rows of a cell
+ * are worked on at a time. */
+template <int Width, typename T, int Together = 1>
 T
 select_rows (
     const Block<T> &block, const Layout<T> &layout, const Planes<T> &to)
 {
-  const int together = Together > 0 ? Together : block.height;
   const int width = Width > 0 ? Width : block.width;
   Vector<T> most = {};
   T *out[256];
-  for (int y = 0; y < block.height; y += together) {
+  for (int y = 0; y < block.height; y += Together) {
     int repeat_row = layout.row;
     for (int j = 0; j < block.rows; j++) {
       const std::uint8_t *element =
           layout.element + repeat_row * layout.n + y * width;
-      for (int p = 0; p < together * width; p++)
-        out[p] = bytes_on (
-            to.rows[Together == 1 ? element[p] : y * width + p], j * to.stride);
+      for (int p = 0; p < Together * width; p++)
+        out[p] = bytes_on (to.rows[element[p]], j * to.stride);
       repeat_row = repeat_row + 1 < layout.rows ? repeat_row + 1 : 0;
       const T *row = bytes_on (
           block.pixels, (std::ptrdiff_t (j) * block.height + y) * block.stride);
-      for_strips<T> (block.cells, out[0], to.stream,
-          [&] (int at, auto put) CODEDEXPOSURE_INLINE_BODY {
-            for (int i = 0; i < together; i++)
+      for_strips<T> (block.cells, to.stream,
+          [&] (int at, Put put) CODEDEXPOSURE_INLINE_BODY {
+            for (int i = 0; i < Together; i++)
               most = larger (most,
                   split_row<Width, T> (
                       bytes_on (row, i * block.stride) + at * width, width,
@@ -46,19 +61,6 @@ select_rows (
     }
   }
   return largest_lane<T> (most);
-}
-
-template <typename T>
-using SelectRows = T (*) (
-    const Block<T> &, const Layout<T> &, const Planes<T> &);
-
-template <int Together, typename T, int... Width>
-SelectRows<T>
-select_rows_of (int width, std::integer_sequence<int, Width...>)
-{
-  static constexpr SelectRows<T> kAll[] = {
-      select_rows < has_own_code (Width) ? Width : 0, Together, T > ...};
-  return kAll[width < int (sizeof...(Width)) ? width : 0];
 }
 
 /** One vector of cells, all places of them: places[p] takes the pixels of place
@@ -74,67 +76,46 @@ split_strip (const Block<T> &block, int j, int at, T *const *places)
   for (int y = 0; y < block.height; y++)
     most = larger (most,
         split_row<Width, T> (bytes_on (row, y * block.stride) + at * width,
-            width, places + y * width, 0, Put (), block.height * block.stride));
+            width, places + y * width, 0, Put{false},
+            block.height * block.stride));
   return most;
 }
 
-template <typename T>
-using SplitStrip = Vector<T> (*) (const Block<T> &, int, int, T *const *);
-
-template <typename T, int... Width>
-SplitStrip<T>
-split_strip_of (int width, std::integer_sequence<int, Width...>)
-{
-  static constexpr SplitStrip<T> kAll[] = {
-      split_strip < has_own_code (Width) ? Width : 0, T > ...};
-  return kAll[width <= kOwnWidths ? width : 0];
-}
-template <typename T>
-SplitStrip<T>
-split_strip_of (int width)
-{
-  return split_strip_of<T> (
-      width, std::make_integer_sequence<int, kOwnWidths + 1> ());
-}
-
-/** Brings one vector of all places into the order of the elements where that
- * differs from cell to cell: rows[e] takes element e. */
-template <typename T, typename PutVector>
-CODEDEXPOSURE_INLINE void
-relabel_strip (const Layout<T> &layout, int j, int at, const T *const *places,
-    T *const *rows, std::ptrdiff_t to, PutVector put)
-{
-  const int repeat = layout.repeat;
-  const std::uint8_t *place =
-      layout.place + (j + layout.row) % layout.rows * layout.n * repeat;
-  alignas (kVectorBytes) T masks[256 * kLanes<T>];
-  for (int c = 0; c < repeat; c++)
-    store (masks + c * kLanes<T>,
-        load (layout.comb + (at + layout.column + repeat - c) % repeat));
-  for (int e = 0; e < layout.n; e++) {
-    Vector<T> v = {};
-    for (int c = 0; c < repeat; c++)
-      v |= load (masks + c * kLanes<T>) & load (places[place[e * repeat + c]]);
-    put (rows[e] + to, v);
-  }
-}
-
-/** Kernels::select where the places of elements differ from cell to cell. */
+/** Kernels::select where the places of elements differ from cell to cell: masks
+ * of the comb assemble an element from its places. */
 template <typename T>
 T
 select_relabelled (
     const Block<T> &block, const Layout<T> &layout, const Planes<T> &to)
 {
-  const auto split = split_strip_of<T> (block.width);
-  Wires<T> wires (layout.n);
+  constexpr int kL = kLanes<T>;
+  constexpr auto strip = []<int Width> () { return &split_strip<Width, T>; };
+  const auto split = for_width<strip> (block.width);
+  const int n = layout.n, repeat = layout.repeat;
+  alignas (kVectorBytes) T pixels[256 * kL];
+  alignas (kVectorBytes) T masks[256 * kL];
+  T *places[256];
+  for (int p = 0; p < n; p++)
+    places[p] = pixels + p * kL;
   Vector<T> most = {};
-  for (int j = 0; j < block.rows; j++)
-    for_strips<T> (block.cells, bytes_on (to.rows[0], j * to.stride), to.stream,
-        [&] (int at, auto put) CODEDEXPOSURE_INLINE_BODY {
-          most = larger (most, split (block, j, at, wires.rows));
-          relabel_strip (layout, j, at, wires.rows, to.rows,
-              at + j * to.stride / std::ptrdiff_t (sizeof (T)), put);
+  for (int j = 0; j < block.rows; j++) {
+    const std::uint8_t *place =
+        layout.place + (j + layout.row) % layout.rows * n * repeat;
+    for_strips<T> (block.cells, to.stream,
+        [&] (int at, Put put) CODEDEXPOSURE_INLINE_BODY {
+          most = larger (most, split (block, j, at, places));
+          for (int c = 0; c < repeat; c++)
+            store (masks + c * kL,
+                load (
+                    layout.comb + (at + layout.column + repeat - c) % repeat));
+          for (int e = 0; e < n; e++) {
+            Vector<T> v = {};
+            for (int c = 0; c < repeat; c++)
+              v |= load (masks + c * kL) & load (places[place[e * repeat + c]]);
+            put (bytes_on (to.rows[e], j * to.stride) + at, v);
+          }
         });
+  }
   return largest_lane<T> (most);
 }
 
@@ -145,15 +126,71 @@ select (const Block<T> &block, const Layout<T> &layout, const Planes<T> &to)
   if (layout.repeat > 1)
     return select_relabelled (block, layout, to);
   /* The work on a row of so few pixels is less than what leads up to it. */
-  if (layout.identity && block.width == 2 && block.height == 2)
-    return select_rows<2, 2> (block, layout, to);
-  /* With non-temporal stores, whole cells are read and written more evenly. */
-  if constexpr (kVectorBytes == 64)
-    if (layout.identity && to.stream && layout.n <= 16 && block.width <= 5)
-      return select_rows_of<0, T> (block.width,
-          std::make_integer_sequence<int, 6> ()) (block, layout, to);
-  return select_rows_of<1, T> (block.width,
-      std::make_integer_sequence<int, kOwnWidths + 1> ()) (block, layout, to);
+  if (block.width == 2 && block.height == 2)
+    return select_rows<2, T, 2> (block, layout, to);
+  return for_width<[]<int Width> () { return &select_rows<Width, T>; }> (
+      block.width) (block, layout, to);
+}
+
+/* Vectors of cells that are worked on at a time. */
+constexpr int kMostVectors = 64;
+
+CODEDEXPOSURE_INLINE int
+most_vectors (int n)
+{
+  return n * kMostVectors > 256 ? 256 / n : kMostVectors;
+}
+
+/** Rows of cells whose elements are split: those of element e are at elements +
+ * e pitch, one row after the other. */
+template <typename From>
+struct Elements {
+  const From *at;
+  int pitch;
+  int cells; ///< of a row
+  int rows;
+};
+
+/**
+ * Splits some cells after the other and calls body (elements, planes): the
+ * rows of the planes take those of the elements. Returns the largest pixel.
+ */
+template <typename T, typename Body>
+CODEDEXPOSURE_INLINE T
+for_chunks (
+    const Block<T> &block, Layout<T> layout, const Planes<T> &to, Body body)
+{
+  constexpr int kL = kLanes<T>;
+  alignas (kVectorBytes) T pixels[256 * kL];
+  const int n = layout.n, most = most_vectors (n) * kL, row = layout.row;
+  T *rows[256], *out[256];
+  T peak = 0;
+  for (int next = 0; next < block.cells; next += most) {
+    const int left = block.cells - next;
+    const int cells = left > most ? most : left > kL ? left : kL;
+    const int at = next + cells <= block.cells ? next : block.cells - cells;
+    const int together = most / cells;
+    layout.column = at;
+    for (int j = 0; j < block.rows; j += together) {
+      Block<T> part = block;
+      part.pixels = bytes_on (block.pixels + at * block.width,
+          std::ptrdiff_t (j) * block.height * block.stride);
+      part.cells = cells;
+      part.rows = block.rows - j < together ? block.rows - j : together;
+      layout.row = (row + j) % layout.rows;
+      const int pitch = part.rows * cells;
+      for (int e = 0; e < n; e++) {
+        rows[e] = pixels + e * pitch;
+        out[e] = bytes_on (to.rows[e], j * to.stride) + at;
+      }
+      const T largest = select (
+          part, layout, {rows, cells * std::ptrdiff_t (sizeof (T)), false});
+      peak = peak < largest ? largest : peak;
+      body (Elements<T>{pixels, pitch, cells, part.rows},
+          Planes<T>{out, to.stride, to.stream && at == next});
+    }
+  }
+  return peak;
 }
 
 } // namespace codedexposure::CODEDEXPOSURE_TARGET

@@ -129,269 +129,72 @@ bytes_on (T *p, std::ptrdiff_t bytes)
   return reinterpret_cast<T *> (reinterpret_cast<Byte *> (p) + bytes);
 }
 
-/** Writes a vector. */
+/** Writes a vector, with a non-temporal store where that is asked for and
+ * vectors are lines of the cache. */
 struct Put {
-  CODEDEXPOSURE_INLINE bool streams () const { return false; }
+  bool stream;
   template <typename T, typename V>
   CODEDEXPOSURE_INLINE void operator() (T *to, V v) const
   {
+#if CODEDEXPOSURE_VECTOR_BYTES == 64
+    if (stream)
+      return _mm512_stream_si512 (
+          reinterpret_cast<__m512i *> (to), __m512i (v));
+#endif
     store (to, v);
   }
 };
 
-#if CODEDEXPOSURE_VECTOR_BYTES == 64
-/** Writes a whole vector with a non-temporal store, or only the lanes whose
- * bits are set. */
-struct PutStream {
-  std::uint64_t lanes;
-  CODEDEXPOSURE_INLINE bool streams () const { return lanes + 1 == 0; }
-  template <typename T, typename V>
-  CODEDEXPOSURE_INLINE void operator() (T *to, V v) const
-  {
-    if (streams ())
-      stream (to, v);
-    else if constexpr (sizeof (T) == 1)
-      _mm512_mask_storeu_epi8 (to, lanes, __m512i (v));
-    else
-      _mm512_mask_storeu_epi16 (to, __mmask32 (lanes), __m512i (v));
-  }
-};
-
-/** for_strips () with non-temporal stores. A line that is written both ways
- * costs an access to memory, so what lies before the first whole line and after
- * the last is written by single lanes. */
+/** Calls body (at, put) for every vector of a row of cells; the last one is
+ * moved back to end with the row. */
 template <typename T, typename Body>
 CODEDEXPOSURE_INLINE void
-stream_strips (int cells, int lead, Body body)
+for_strips (int cells, bool stream, Body body)
 {
   constexpr int kL = kLanes<T>;
-  constexpr std::uint64_t kAll = ~std::uint64_t (0);
-  const int last = cells - kL;
-  for (int line = lead > 0 ? lead - kL : 0; line < cells; line += kL) {
-    const std::uint64_t lanes = line < 0      ? ~(kAll << lead)
-                                : line > last ? kAll << (line - last)
-                                              : kAll;
-    body (line < 0 ? 0 : line < last ? line : last, PutStream{lanes});
-  }
-}
-#endif
-
-/**
- * Calls body (at, put) for every vector of a row of cells whose first output
- * pixel is @p to; put (to, vector) uses non-temporal stores where it may.
- */
-template <typename T, typename Body>
-CODEDEXPOSURE_INLINE void
-for_strips (int cells, [[maybe_unused]] const T *to,
-    [[maybe_unused]] bool streams, Body body)
-{
-  constexpr int kL = kLanes<T>;
-#if CODEDEXPOSURE_VECTOR_BYTES == 64
-  const auto address = reinterpret_cast<std::uintptr_t> (to);
-  const int lead = int (-address % kVectorBytes / sizeof (T));
-  if (streams && lead + kL <= cells)
-    return stream_strips<T> (cells, lead, body);
-#endif
-  for (int at = 0; at < cells; at += kL)
-    body (at + kL <= cells ? at : cells - kL, Put ());
+  int at = 0;
+  for (; at + kL <= cells; at += kL)
+    body (at, Put{stream});
+  if (at < cells)
+    body (cells - kL, Put{false});
 }
 
-/* The widths of cells that have code of their own. Others are transposed in
- * squares of 16 bytes: a row of a square is a piece of a cell, a column is a
- * piece of an output row. */
+/* The widths of cells that are split by permutations. */
 constexpr int kOwnWidths = 16;
-
-/* Plain x86-64 cannot permute bytes: the compiler would move them one by one. */
-#if defined __SSE2__ && !defined __SSSE3__
-constexpr bool kPermutesBytes = false;
-#else
-constexpr bool kPermutesBytes = true;
-#endif
 
 constexpr bool
 has_own_code (int width)
 {
-  if (!kPermutesBytes)
-    return width == 1 || width == 2 || width == 4 || width == 8;
   return (width >= 1 && width <= 10) || width == 12 || width == 16;
-}
-
-template <typename T>
-struct SquareOf {
-  static constexpr int kSize = 16 / int (sizeof (T));
-  typedef T Row __attribute__ ((vector_size (16)));
-};
-
-/** The lower (Half = 0) or upper halves of two rows, interleaved. */
-template <int Size, int Half>
-struct Interleave {
-  static constexpr int at (int lane)
-  {
-    return lane / 2 + Half * Size / 2 + lane % 2 * Size;
-  }
-};
-
-template <typename T>
-CODEDEXPOSURE_INLINE void transpose (
-    typename SquareOf<T>::Row (&rows)[SquareOf<T>::kSize])
-{
-  constexpr int kSize = SquareOf<T>::kSize;
-  constexpr std::make_integer_sequence<int, kSize> lanes;
-  for (int step = 1; step < kSize; step *= 2) {
-    typename SquareOf<T>::Row next[kSize];
-#pragma GCC unroll 16
-    for (int r = 0; r < kSize / 2; r++) {
-      const auto &upper = rows[r], &lower = rows[r + kSize / 2];
-      next[2 * r] = pick (upper, lower, Interleave<kSize, 0> (), lanes);
-      next[2 * r + 1] = pick (upper, lower, Interleave<kSize, 1> (), lanes);
-    }
-#pragma GCC unroll 16
-    for (int r = 0; r < kSize; r++)
-      rows[r] = next[r];
-  }
-}
-
-/** The first pixels of a cell narrower than a square, with those before it in
- * front and nothing of what follows: the last cell that may be read. */
-template <typename T>
-CODEDEXPOSURE_INLINE typename SquareOf<T>::Row
-load_last (const T *cell, int width)
-{
-  constexpr int kSize = SquareOf<T>::kSize;
-  T padded[2 * kSize] = {};
-  __builtin_memcpy (padded, cell + width - kSize, 16);
-  typename SquareOf<T>::Row row;
-  __builtin_memcpy (&row, padded + kSize - width, 16);
-  return row;
-}
-
-/** One vector of cells @p width pixels wide: out[x] + at takes pixel x. Returns
- * the largest pixels. */
-template <typename T>
-CODEDEXPOSURE_INLINE Vector<T>
-split_any (const T *from, int width, T *const *out, int at)
-{
-  using Row = typename SquareOf<T>::Row;
-  constexpr int kSize = SquareOf<T>::kSize;
-  const int columns = width < kSize ? width : kSize;
-  Row most = {};
-  for (int i = 0; i < kLanes<T>; i += kSize) {
-    for (int x = 0; x < width; x += kSize) {
-      const int pixel = x + columns <= width ? x : width - columns;
-      Row square[kSize];
-      for (int r = 0; r < kSize; r++) {
-        const T *cell = from + (i + r) * width;
-        if (width < kSize && i + r == kLanes<T> - 1)
-          square[r] = load_last (cell, width);
-        else
-          __builtin_memcpy (&square[r], cell + pixel, 16);
-        most = larger (most, square[r]);
-      }
-      transpose<T> (square);
-      for (int r = 0; r < columns; r++)
-        __builtin_memcpy (out[pixel + r] + at + i, &square[r], 16);
-    }
-  }
-  Vector<T> result = {};
-  __builtin_memcpy (&result, &most, 16);
-  return result;
 }
 
 /** One vector of cells, one row of their pixels; Width 0: any. Fetches the row
  * @p ahead bytes further on. Returns the largest pixels. */
-template <int Width, typename T, typename PutVector>
+template <int Width, typename T>
 CODEDEXPOSURE_INLINE Vector<T>
-split_row (const T *from, int width, T *const *out, int at, PutVector put,
+split_row (const T *from, int width, T *const *out, std::ptrdiff_t at, Put put,
     std::ptrdiff_t ahead)
 {
   prefetch (bytes_on (from, ahead), (Width > 0 ? Width : width) * kVectorBytes);
+  Vector<T> most = {};
   if constexpr (Width == 0) {
-    return split_any (from, width, out, at);
+    for (int x = 0; x < width; x++) {
+      Vector<T> part;
+      for (int i = 0; i < kLanes<T>; i++)
+        part[i] = from[i * width + x];
+      most = larger (most, part);
+      put (out[x] + at, part);
+    }
   } else {
     Vector<T> parts[Width];
     split_cells<Width, T> (from, parts);
-    Vector<T> most = {};
-#pragma GCC unroll 256
+#pragma GCC unroll 16
     for (int x = 0; x < Width; x++) {
       most = larger (most, parts[x]);
       put (out[x] + at, parts[x]);
     }
-    return most;
-  }
-}
-
-/** One vector of cells, Height rows of their pixels from @p row on, a wire for
- * each pixel. Returns the largest pixels, those of @p most among them. */
-template <int Width, int Height, typename T>
-CODEDEXPOSURE_INLINE Vector<T>
-read_cells (const Block<T> &block, const T *row, int at,
-    Vector<T> (&wires)[Width * Height], Vector<T> most)
-{
-#pragma GCC unroll 16
-  for (int y = 0; y < Height; y++) {
-    const T *from = bytes_on (row, y * block.stride) + at * Width;
-    prefetch (
-        bytes_on (from, block.height * block.stride), Width * kVectorBytes);
-    Vector<T> parts[Width];
-    split_cells<Width, T> (from, parts);
-#pragma GCC unroll 16
-    for (int x = 0; x < Width; x++) {
-      wires[y * Width + x] = parts[x];
-      most = larger (most, parts[x]);
-    }
   }
   return most;
 }
-
-/** The function that Own<Width, Height> () gives for cells of this shape: the
- * squarest of 2 to 16 pixels, which fit into the registers. Null for others,
- * and for widths without code of their own. */
-template <auto Own>
-auto
-of_small_cells (int width, int height)
-{
-  using Run = decltype (Own.template operator()<2, 2> ());
-  struct Cell {
-    int width, height;
-    Run run;
-  };
-  constexpr auto cell = []<int Width, int Height> () -> Cell {
-    if constexpr (has_own_code (Width))
-      return {Width, Height, Own.template operator()<Width, Height> ()};
-    else
-      return {Width, Height, nullptr};
-  };
-  static constexpr Cell kCells[] = {
-      cell.template operator()<2, 1> (),
-      cell.template operator()<3, 1> (),
-      cell.template operator()<2, 2> (),
-      cell.template operator()<5, 1> (),
-      cell.template operator()<3, 2> (),
-      cell.template operator()<7, 1> (),
-      cell.template operator()<4, 2> (),
-      cell.template operator()<3, 3> (),
-      cell.template operator()<5, 2> (),
-      cell.template operator()<4, 3> (),
-      cell.template operator()<5, 3> (),
-      cell.template operator()<4, 4> (),
-  };
-  for (const Cell &own : kCells)
-    if (own.width == width && own.height == height)
-      return own.run;
-  return Run (nullptr);
-}
-
-/** A vector for each of up to 256 wires. */
-template <typename T>
-struct Wires {
-  alignas (64) T lanes[256 * kLanes<T>];
-  T *rows[256];
-
-  explicit Wires (int n)
-  {
-    for (int w = 0; w < n; w++)
-      rows[w] = lanes + w * kLanes<T>;
-  }
-};
 
 } // namespace codedexposure::CODEDEXPOSURE_TARGET

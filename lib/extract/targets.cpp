@@ -3,53 +3,37 @@
 
 #include <vector>
 
-#define CODEDEXPOSURE_DECLARE(target)                                          \
-  namespace codedexposure::target                                              \
-  {                                                                            \
-  extern const Kernels<std::uint8_t> *const kernels_u8;                        \
-  extern const Kernels<std::uint16_t> *const kernels_u16;                      \
-  }
-#define CODEDEXPOSURE_TARGET_ENTRY(target)                                     \
-  {                                                                            \
-#target, target::kernels_u8, target::kernels_u16                           \
-  }
+#include "base/targets.h"
 
+/* Plain x86-64 cannot permute bytes: the reference is as fast there. */
 #if defined __x86_64__
-CODEDEXPOSURE_DECLARE (avx512)
-CODEDEXPOSURE_DECLARE (avx512vl)
-CODEDEXPOSURE_DECLARE (avx2)
-CODEDEXPOSURE_DECLARE (sse4)
+#define CODEDEXPOSURE_TARGETS(DO) DO (avx512) DO (avx2) DO (sse4)
+#else
+#define CODEDEXPOSURE_TARGETS(DO) DO (baseline)
 #endif
-CODEDEXPOSURE_DECLARE (baseline)
+
+#define CODEDEXPOSURE_DECLARE(target)                                          \
+  namespace codedexposure::extract_##target                                    \
+  {                                                                            \
+    extern const Kernels<std::uint8_t> *const kernels_u8;                      \
+    extern const Kernels<std::uint16_t> *const kernels_u16;                    \
+  }
+CODEDEXPOSURE_TARGETS (CODEDEXPOSURE_DECLARE)
 
 namespace codedexposure
 {
 
-namespace
-{
-
-std::vector<Target>
+static std::vector<Target>
 find_targets ()
 {
   std::vector<Target> targets;
-#if defined __x86_64__
-  if (__builtin_cpu_supports ("avx512f") &&
-      __builtin_cpu_supports ("avx512bw") &&
-      __builtin_cpu_supports ("avx512dq") &&
-      __builtin_cpu_supports ("avx512vl") &&
-      __builtin_cpu_supports ("avx512vbmi"))
-    targets.insert (targets.end (), {CODEDEXPOSURE_TARGET_ENTRY (avx512),
-                                        CODEDEXPOSURE_TARGET_ENTRY (avx512vl)});
-  if (__builtin_cpu_supports ("avx2"))
-    targets.push_back (CODEDEXPOSURE_TARGET_ENTRY (avx2));
-  if (__builtin_cpu_supports ("sse4.1") && __builtin_cpu_supports ("ssse3"))
-    targets.push_back (CODEDEXPOSURE_TARGET_ENTRY (sse4));
-#endif
-  targets.push_back (CODEDEXPOSURE_TARGET_ENTRY (baseline));
+#define CODEDEXPOSURE_FIND(target)                                             \
+  if (runs_target (#target))                                                   \
+    targets.push_back ({#target, extract_##target::kernels_u8,                 \
+        extract_##target::kernels_u16});
+  CODEDEXPOSURE_TARGETS (CODEDEXPOSURE_FIND)
   return targets;
 }
-
-} // namespace
 
 std::span<const Target>
 supported_targets ()

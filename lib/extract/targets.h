@@ -25,7 +25,8 @@ struct Target {
   }
 };
 
-/** Those that this processor can run, widest first; found out once. */
+/** Those that this processor can run, widest first; found out once. None on a
+ * processor without SSE4.1. */
 std::span<const Target> supported_targets ();
 
 } // namespace codedexposure

@@ -61,12 +61,11 @@ private:
 };
 
 using Field = FieldOf<float>;
-/** Pairs of neighbouring pixels; see fuse::PairRow. */
-using PairField = FieldOf<std::int32_t>;
 
 /**
- * The same, with each row split into parts: every period-th pixel, from which
- * a tile repeats. Row y begins at x = -margin.
+ * Pairs of neighbouring pixels (fuse::FilterRow), with each row split into
+ * parts: every period-th pixel, from which a tile repeats. Row y begins at
+ * x = -margin.
  */
 class SplitField
 {

@@ -11,6 +11,12 @@ namespace codedexposure::fuse
 namespace
 {
 
+/** Weights times @p unit, a power of two. */
+struct WholeWeights {
+  std::vector<int> values;
+  float unit;
+};
+
 /* The largest unit with which no weight and no sum of products overflows. */
 float
 unit_of (std::span<const float> weights)
@@ -28,9 +34,8 @@ unit_of (std::span<const float> weights)
   return unit;
 }
 
-} // namespace
-
-/* Up where most is left, down elsewhere. */
+/* Rounded to 16 bits such that the sum stays: up where most is left, down
+ * elsewhere. */
 WholeWeights
 round_weights (std::span<const float> weights)
 {
@@ -57,74 +62,102 @@ round_weights (std::span<const float> weights)
   return whole;
 }
 
-FilterBank::FilterBank (
-    const Phases &phases, std::span<const Tap> taps, int outputs, float steps)
-    : outputs_ (outputs), period_ (phases.period ()),
-      width_ (period_ + Field::kSlack - 1), steps_ (steps)
+} // namespace
+
+TapSources::TapSources (const SplitField &frame)
+    : reach_{int (kNeighbourRadius), frame.margin (), int (kNeighbourRadius)},
+      margin_ (frame.margin ()), period_ (frame.period ()),
+      width_ (frame.width ())
 {
-  for (const Tap &tap : taps) {
-    const Tap left{tap.x - 1, tap.y, tap.frame};
-    if (!pairs_.empty () && pairs_.back () == left && !places_.back ().upper) {
-      places_.push_back ({pairs_.size () - 1, true});
-    } else {
-      places_.push_back ({pairs_.size (), false});
-      pairs_.push_back (tap);
-    }
+  for (int x = -margin_; x < period_ + margin_; x++)
+    places_.push_back (frame.place (x));
+  for (std::size_t f = 0; f < 3; f++) {
+    first_[f] = rows_ * int (places_.size ());
+    rows_ += 2 * reach_[f] + 1;
   }
-  const std::size_t line = std::size_t (outputs) * std::size_t (width_);
-  weights_.resize (std::size_t (phases.rows ()) * pairs_.size () * line);
-  scales_.resize (std::size_t (phases.rows ()) * line);
 }
 
-void
-FilterBank::set (int row, int x, int output, std::span<const float> weights)
+int
+TapSources::number (const Tap &tap) const
 {
-  const WholeWeights whole = round_weights (weights);
-  std::vector<std::int32_t> pairs (pairs_.size ());
-  for (std::size_t t = 0; t < places_.size (); t++) {
-    const auto [pair, upper] = places_[t];
-    const auto half = std::uint16_t (whole.values[t]);
-    pairs[pair] |= std::int32_t (std::uint32_t (half) << (upper ? 16 : 0));
-  }
-  const auto line_at = [&] (std::size_t line) {
-    return (line * std::size_t (outputs_) + std::size_t (output)) *
-           std::size_t (width_);
-  };
-  const auto repeat = [&] (auto *to, auto value) {
-    for (int i = x; i < width_; i += period_)
-      to[i] = value;
-  };
-  for (std::size_t p = 0; p < pairs.size (); p++)
-    repeat (weights_.data () + line_at (std::size_t (row) * pairs.size () + p),
-        pairs[p]);
-  repeat (scales_.data () + line_at (std::size_t (row)),
-      1.0f / (whole.unit * steps_));
-  const int sum =
-      std::accumulate (whole.values.begin (), whole.values.end (), 0);
-  base_ = float (-kSmallest) * float (sum) / (whole.unit * steps_);
+  const auto frame = std::size_t (tap.frame + 1);
+  return first_[frame] + (tap.y + reach_[frame]) * int (places_.size ()) +
+         tap.x + margin_;
 }
 
-void
-FilterBank::set_all (int row, int x, std::span<const float> weights)
-{
-  for (int k = 0; k < outputs_; k++)
-    set (row, x, k,
-        weights.subspan (std::size_t (k) * places_.size (), places_.size ()));
-}
-
-PairRow
-FilterBank::row (const Phases &phases, const PairFrames &frames, int y,
+std::span<const std::int32_t *const>
+TapSources::row (const CodedFrames &frames, int y,
     std::vector<const std::int32_t *> &sources) const
 {
-  sources.clear ();
-  for (const Tap &pair : pairs_)
-    sources.push_back (
-        frames[std::size_t (pair.frame + 1)]->row (y + pair.y) + pair.x);
-  const std::size_t row = std::size_t (phases.row_of (y)) *
-                          std::size_t (outputs_) * std::size_t (width_);
-  return {sources.data (), frames[1]->width (), int (pairs_.size ()),
-      weights_.data () + row * pairs_.size (), scales_.data () + row, base_,
-      width_, outputs_, period_, phases.shift (y)};
+  const std::array all{frames.before, frames.now, frames.after};
+  sources.resize (std::size_t (rows_) * places_.size ());
+  for (std::size_t f = 0; f < 3; f++) {
+    if (!all[f])
+      continue;
+    const std::int32_t **source = sources.data () + first_[f];
+    for (int dy = -reach_[f]; dy <= reach_[f]; dy++) {
+      const std::int32_t *row = all[f]->pairs.row (y + dy);
+      for (const std::ptrdiff_t place : places_)
+        *source++ = row + place;
+    }
+  }
+  return sources;
+}
+
+FilterBank::FilterBank (const FilterPlan &plan, int groups)
+    : plan_ (&plan), groups_ (groups),
+      filters_ (
+          std::size_t (plan.phases.rows () * plan.phases.period () * groups))
+{
+}
+
+void
+FilterBank::set (int row, int x, int group, std::span<const Tap> taps,
+    std::span<const float> weights)
+{
+  Filter &filter = filters_[place (row, x, group)];
+  std::vector<WholeWeights> outputs;
+  for (std::size_t at = 0; at < weights.size (); at += taps.size ()) {
+    const auto &[values, unit] = outputs.emplace_back (
+        round_weights (weights.subspan (at, taps.size ())));
+    filter.scales.push_back (1.0f / (unit * plan_->steps));
+    base_ = float (-kSmallest) *
+            float (std::accumulate (values.begin (), values.end (), 0)) /
+            (unit * plan_->steps);
+  }
+  const auto used = [&] (std::size_t t) {
+    return std::ranges::any_of (outputs,
+        [t] (const WholeWeights &output) { return output.values[t] != 0; });
+  };
+  for (std::size_t t = 0; t < taps.size (); t++) {
+    if (!used (t))
+      continue;
+    const Tap right{taps[t].x + 1, taps[t].y, taps[t].frame};
+    const bool two = t + 1 < taps.size () && taps[t + 1] == right;
+    filter.pairs.push_back (plan_->sources.number (taps[t]));
+    for (const auto &[values, unit] : outputs) {
+      const auto half = [] (int value) {
+        return std::uint32_t (std::uint16_t (value));
+      };
+      filter.pairs.push_back (std::int32_t (
+          half (values[t]) | (two ? half (values[t + 1]) << 16 : 0u)));
+    }
+    t += two;
+  }
+}
+
+FilterRow
+FilterBank::row (int y, int column, int group,
+    std::span<const std::int32_t *const> sources,
+    std::span<const Run> runs) const
+{
+  const Phases &phases = plan_->phases;
+  const int x = (column + phases.shift (y)) % phases.period ();
+  const Filter &filter = filters_[place (phases.row_of (y), x, group)];
+  const std::size_t outputs = filter.scales.size ();
+  return {sources.data () + column, filter.pairs.data (),
+      int (filter.pairs.size () / (1 + outputs)), int (outputs),
+      filter.scales.data (), base_, runs.data (), int (runs.size ())};
 }
 
 } // namespace codedexposure::fuse

@@ -6,64 +6,89 @@
 #include <span>
 #include <vector>
 
-#include "fuse/field.h"
+#include "fuse/coded_stream.h"
 #include "fuse/kernels.h"
 #include "fuse/phases.h"
 
 namespace codedexposure::fuse
 {
 
-/** The coded frames before, at and after the one that is fused; null if there
- * is none. */
-using PairFrames = std::array<const PairField *, 3>;
+/** Adds block @p block of a row to the runs before it. */
+inline void
+add_block (std::vector<Run> &runs, int block)
+{
+  const int first = block * kRunBlock;
+  if (!runs.empty () && runs.back ().first + runs.back ().count == first)
+    runs.back ().count += kRunBlock;
+  else
+    runs.push_back ({first, kRunBlock});
+}
 
-/** Weights times @p unit, a power of two. */
-struct WholeWeights {
-  std::vector<int> values;
-  float unit;
+/** Where the taps of the filters of a row are: the pixels within a distance of
+ * it in the frame that is fused, and those within kNeighbourRadius in the coded
+ * frames before and after it. */
+class TapSources
+{
+public:
+  /** @p frame  like those that are filtered, with a margin as large as the
+   *            taps' radius. */
+  explicit TapSources (const SplitField &frame);
+
+  int period () const { return period_; } ///< of the parts of rows
+  int width () const { return width_; }   ///< of frames
+  /** Number of the source that has the pixel at @p tap. */
+  int number (const Tap &tap) const;
+  /** Of column 0 of row @p y; those of column c are c further. Sources in
+   * frames that there are not are null. */
+  std::span<const std::int32_t *const> row (const CodedFrames &frames, int y,
+      std::vector<const std::int32_t *> &sources) const;
+
+private:
+  std::array<int, 3> reach_;           ///< of taps in each frame
+  std::array<int, 3> first_;           ///< source of each frame
+  std::vector<std::ptrdiff_t> places_; ///< of a row, from the margin on
+  int rows_ = 0;
+  int margin_, period_, width_;
 };
 
-/** Rounded to 16 bits such that the sum stays. */
-WholeWeights round_weights (std::span<const float> weights);
-
-/** For every pixel of a frame, @p outputs weighted sums over the same taps.
- * Pixels and weights are rounded to 16 bits: pixels to kSmallest for black and
- * a number of steps per grey level, weights such that their sum stays. The sums
- * of all weights of a bank are equal. */
+/**
+ * For every pixel of a frame, weighted sums over its taps. Outputs are in
+ * groups that share taps. Pixels and weights are rounded to 16 bits: pixels to
+ * kSmallest for black and plan.steps per grey level, weights such that their
+ * sum stays. The sums of all weights of a bank are equal.
+ */
 class FilterBank
 {
 public:
   static constexpr int kSmallest = -32768, kLargest = 32767;
 
-  /** @p steps  of a pixel per grey level. */
-  FilterBank (const Phases &phases, std::span<const Tap> taps, int outputs,
-      float steps);
+  FilterBank (const FilterPlan &plan, int groups);
 
-  int outputs () const { return outputs_; }
-  /** Weights of the pixels at @p x of distinct row @p row of the phases. */
-  void set (int row, int x, int output, std::span<const float> weights);
-  /** Of all outputs, one after the other. */
-  void set_all (int row, int x, std::span<const float> weights);
-  /** The kernels' input for row @p y of @p frames, whose margin is as large as
-   * the taps' radius. Valid until @p sources changes. */
-  PairRow row (const Phases &phases, const PairFrames &frames, int y,
-      std::vector<const std::int32_t *> &sources) const;
+  int groups () const { return groups_; }
+  /** Once for each group, for the pixels at @p x of distinct row @p row. The
+   * weight of tap t for output k of the group is at [k * taps + t]. */
+  void set (int row, int x, int group, std::span<const Tap> taps,
+      std::span<const float> weights);
+  /** The kernels' input for a group of the pixels at @p column and every period
+   * after it, of row @p y. */
+  FilterRow row (int y, int column, int group,
+      std::span<const std::int32_t *const> sources,
+      std::span<const Run> runs) const;
 
 private:
-  struct Place {
-    std::size_t pair;
-    bool upper;
+  struct Filter {
+    std::vector<std::int32_t> pairs; ///< see FilterRow
+    std::vector<float> scales;       ///< of each output
   };
+  std::size_t place (int row, int x, int group) const
+  {
+    return std::size_t ((row * plan_->phases.period () + x) * groups_ + group);
+  }
 
-  std::vector<Tap> pairs_;    ///< of their first tap
-  std::vector<Place> places_; ///< of each tap
-  int outputs_;
-  int period_;
-  int width_;
-  float steps_;
+  const FilterPlan *plan_;
+  int groups_;
   float base_ = 0.0f; ///< the sum of weights times the light below black
-  std::vector<std::int32_t> weights_;
-  std::vector<float> scales_; ///< of each row and output, as the weights
+  std::vector<Filter> filters_;
 };
 
 } // namespace codedexposure::fuse

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdlib>
 
+#include "base/pixels.h"
 #include "base/text.h"
 #include "base/try.h"
 #include "base/view_check.h"
@@ -20,17 +21,10 @@ constexpr std::string_view kQualityNames[] = {
     "fast", "balanced", "best", "learned"};
 constexpr float kWhite = 255.0f;
 
-void
-write_row (const fuse::Kernels &kernels, const float *light, float scale,
-    float largest, int width, std::uint8_t *to)
+Error
+stopped ()
 {
-  kernels.to_bytes (light, scale, largest, width, to);
-}
-void
-write_row (const fuse::Kernels &kernels, const float *light, float scale,
-    float largest, int width, std::uint16_t *to)
-{
-  kernels.to_words (light, scale, largest, width, to);
+  return {"stopped", ErrorCode::cancelled};
 }
 
 /** A part of the frame that is fused separately. */
@@ -102,15 +96,15 @@ find_covers (const Schedule &schedule, Extent size)
 
 Result<std::vector<Piece>>
 make_pieces (const Schedule &schedule, int width, int height,
-    const FuseOptions &options, double largest)
+    const FuseOptions &options, double largest, std::stop_token stop)
 {
   std::vector<Piece> pieces;
   for (int i = -1; i < int (schedule.regions ().size ()); i++) {
     const Schedule part = i < 0 ? schedule.background () : schedule.region (i);
     const Rect rect = i < 0 ? Rect{0, 0, width, height}
                             : schedule.regions ()[std::size_t (i)].rect;
-    ASSIGN_OR_RETURN (auto engine,
-        fuse::Engine::make (part, rect.width, rect.height, options, largest));
+    ASSIGN_OR_RETURN (auto engine, fuse::Engine::make (part, rect.width,
+                                       rect.height, options, largest, stop));
     pieces.push_back (
         {rect, schedule.slots () / part.slots (), std::move (engine)});
   }
@@ -122,14 +116,14 @@ template <typename Pixel>
 Field &
 light_of (fuse::Engine &engine, ImageView<const Pixel> coded, float scale)
 {
-  Field &light = engine.next ();
-  for (int y = 0; y < engine.height (); y++) {
+  Field &light = engine.stream ().next ();
+  for (int y = 0; y < light.height (); y++) {
     const Pixel *from = coded.row (y);
     float *to = light.row (y);
-    for (int x = 0; x < engine.width (); x++)
+    for (int x = 0; x < light.width (); x++)
       to[x] = float (from[x]) * scale;
-    if (const float *gain = engine.gain (y))
-      for (int x = 0; x < engine.width (); x++)
+    if (const float *gain = engine.stream ().gain (y))
+      for (int x = 0; x < light.width (); x++)
         to[x] *= gain[x];
   }
   return light;
@@ -192,7 +186,7 @@ Fuser<Pixel>::State::take (ImageView<const Pixel> coded)
     if (&piece == &pieces.front ())
       for (const auto &[at, from] : covers)
         light.row (at.y)[at.x] = light.row (from.y)[from.x];
-    piece.engine->take ();
+    piece.engine->stream ().take (piece.engine->kernels ());
   }
   return {};
 }
@@ -202,7 +196,7 @@ Result<void>
 Fuser<Pixel>::State::check (std::span<const ImageView<Pixel>> frames,
     std::span<const ImageView<std::uint16_t>> uncertainty, Extent size) const
 {
-  if (pieces.front ().engine->pending () == 0)
+  if (pieces.front ().engine->stream ().pending () == 0)
     return Error{"no coded frame is pending; take () one first"};
   for (const std::size_t views : {frames.size (),
            uncertainty.empty () ? frames.size () : uncertainty.size ()})
@@ -237,20 +231,22 @@ Fuser<Pixel>::State::fuse (std::span<const ImageView<Pixel>> frames,
       const auto row = [&] (std::size_t k) {
         return frames[k].row (top + y) + left;
       };
+      const fuse::Kernels &kernels = piece.engine->kernels ();
       for (std::size_t k = 0; k < frames.size (); k++)
-        if (k % held == 0)
-          write_row (piece.engine->kernels (), rows[k / held], scale, largest,
-              width, row (k));
-        else
+        if (k % held != 0)
           std::copy_n (row (k - 1), width, row (k));
+        else if constexpr (sizeof (Pixel) == 1)
+          kernels.to_bytes (rows[k / held], scale, largest, width, row (k));
+        else
+          kernels.to_words (rows[k / held], scale, largest, width, row (k));
     };
     const fuse::Uncertainty::Sink write_deviation =
-        [&] (int slot, int y, const float *deviation) {
-          for (std::size_t k = std::size_t (slot) * held;
-               k < std::size_t (slot + 1) * held; k++)
-            piece.engine->kernels ().to_words (deviation,
+        [&] (const fuse::Uncertainty::Row &row) {
+          for (std::size_t k = std::size_t (row.slot) * held;
+               k < std::size_t (row.slot + 1) * held; k++)
+            piece.engine->kernels ().to_words (row.deviations,
                 float (kUncertaintyWhite) / kWhite, 65535.0f, width,
-                uncertainty[k].row (top + y) + left);
+                uncertainty[k].row (top + row.y) + left);
         };
     done &= piece.engine->fuse (write, *workers, stop,
         uncertainty.empty () ? fuse::Uncertainty::Sink () : write_deviation);
@@ -276,6 +272,9 @@ Fuser<Pixel>::State::or_forget (const Function &function)
     if (!done)
       forget ();
     return done;
+  } catch (const fuse::Stopped &) {
+    forget ();
+    return stopped ();
   } catch (const std::bad_alloc &) {
     forget ();
     return out_of_memory ();
@@ -295,8 +294,8 @@ Fuser<Pixel>::~Fuser () = default;
 
 template <typename Pixel>
 Result<Fuser<Pixel>>
-Fuser<Pixel>::make (
-    const Schedule &schedule, int width, int height, const FuseOptions &wanted)
+Fuser<Pixel>::make (const Schedule &schedule, int width, int height,
+    const FuseOptions &wanted, std::stop_token stop)
 try {
   FuseOptions options = wanted;
   if (wanted.quality == FuseQuality::kLearned) {
@@ -312,10 +311,10 @@ try {
     return Error{"threads " + std::to_string (options.threads) +
                  ": they must be 1 to " + std::to_string (Workers::kMost) +
                  ", and 0 stands for one for each processor"};
-  const int largest = (1 << (options.bits ? options.bits : kBits)) - 1;
+  const int largest = largest_pixel_of<Pixel> (options.bits);
   RETURN_IF_ERROR (schedule.check_size (width, height));
-  ASSIGN_OR_RETURN (
-      auto pieces, make_pieces (schedule, width, height, options, largest));
+  ASSIGN_OR_RETURN (auto pieces, make_pieces (schedule, width, height, options,
+                                     largest, std::move (stop)));
   auto state = std::make_unique<State> (State{std::move (pieces),
       find_covers (schedule, {width, height - schedule.pilot_rows ()}),
       schedule.slots (), float (largest),
@@ -325,6 +324,8 @@ try {
               ? 1
               : options.threads)});
   return Fuser (std::move (state));
+} catch (const fuse::Stopped &) {
+  return stopped ();
 } catch (const std::bad_alloc &) {
   return out_of_memory ();
 }
@@ -350,8 +351,7 @@ template <typename Pixel>
 Extent
 Fuser<Pixel>::size () const
 {
-  const fuse::Engine &all = *state_->pieces.front ().engine;
-  return {all.width (), all.height ()};
+  return state_->pieces.front ().engine->size ();
 }
 
 template <typename Pixel>
@@ -368,7 +368,7 @@ template <typename Pixel>
 int
 Fuser<Pixel>::pending () const
 {
-  return state_->pieces.front ().engine->pending ();
+  return state_->pieces.front ().engine->stream ().pending ();
 }
 
 template <typename Pixel>
@@ -380,7 +380,20 @@ Fuser<Pixel>::fuse (std::span<const ImageView<Pixel>> frames,
   return state_->or_forget ([&] () -> Result<void> {
     if (state_->fuse (frames, std::move (stop), uncertainty))
       return {};
-    return Error{"stopped", ErrorCode::cancelled};
+    return stopped ();
+  });
+}
+
+template <typename Pixel>
+Result<void>
+Fuser<Pixel>::pass ()
+{
+  if (pending () == 0)
+    return Error{"no coded frame is pending; take () one first"};
+  return state_->or_forget ([&] () -> Result<void> {
+    for (Piece &piece : state_->pieces)
+      piece.engine->pass (*state_->workers);
+    return {};
   });
 }
 

@@ -12,7 +12,6 @@
 
 #include "base/image.h"
 #include "base/result.h"
-#include "estimate/scene_model.h"
 #include "estimate/sensor_noise.h"
 #include "schedule/schedule.h"
 
@@ -37,7 +36,6 @@ struct FuseOptions {
   /** Significant bits of a pixel, 1..8 or 1..16; 0: all that the type has. */
   int bits = 0;
   SensorNoise noise;
-  SceneModel scene;
   /** Threads, 1..64; 0: one per processor, and for fast without refine, only
    * the caller's. The pixels do not depend on it. */
   int threads = 0;
@@ -88,9 +86,11 @@ public:
   static constexpr int kUncertaintyWhite = 255 * 256;
 
   /** @p width, @p height  of the coded frames, the pilot's rows included.
-   * Error when an option or the schedule is out of the bounds above. */
+   *  @p stop  another thread can request it if many slots take too long.
+   * Error when an option or the schedule is out of the bounds above, and
+   * ErrorCode::cancelled when it was stopped. */
   static Result<Fuser> make (const Schedule &schedule, int width, int height,
-      const FuseOptions &options = {});
+      const FuseOptions &options = {}, std::stop_token stop = {});
 
   Fuser (Fuser &&) noexcept;
   Fuser &operator= (Fuser &&) noexcept;
@@ -113,7 +113,7 @@ public:
   /** Fuses the oldest pending frame with those before and after it.
    * @p frames  slots () views of size (), in exposure order, fully
    *            overwritten; none overlaps another.
-   * @p stop    another thread can request it if balanced or best take too long.
+   * @p stop    another thread can request it if a frame takes too long.
    * @p uncertainty  none, or as many views like them: half the width of the
    *            interval that holds 68 % of the errors of each pixel, of which
    *            the value kUncertaintyWhite is as much as white.
@@ -124,6 +124,9 @@ public:
   Result<void> fuse (std::span<const ImageView<Pixel>> frames,
       std::stop_token stop = {},
       std::span<const ImageView<std::uint16_t>> uncertainty = {});
+  /** Keeps the oldest pending frame as one before the next, without fusing it.
+   * Error when no frame is pending. */
+  Result<void> pass ();
   /** Starts anew after lost frames or a seek: the next frame does not continue
    * the previous ones. Pending frames are dropped. */
   void forget ();

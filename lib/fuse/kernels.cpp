@@ -3,18 +3,20 @@
 
 #include <vector>
 
-#define CODEDEXPOSURE_DECLARE(target)                                          \
-  namespace codedexposure::target                                              \
-  {                                                                            \
-  extern const fuse::Kernels kernels;                                          \
-  }
+#include "base/targets.h"
 
 #if defined __x86_64__
-CODEDEXPOSURE_DECLARE (fuse_avx512vnni)
-CODEDEXPOSURE_DECLARE (fuse_avx512)
-CODEDEXPOSURE_DECLARE (fuse_avx2)
+#define CODEDEXPOSURE_TARGETS(DO) DO (avx512) DO (avx2) DO (baseline)
+#else
+#define CODEDEXPOSURE_TARGETS(DO) DO (baseline)
 #endif
-CODEDEXPOSURE_DECLARE (fuse_baseline)
+
+#define CODEDEXPOSURE_DECLARE(target)                                          \
+  namespace codedexposure::fuse_##target                                       \
+  {                                                                            \
+    extern const fuse::Kernels kernels;                                        \
+  }
+CODEDEXPOSURE_TARGETS (CODEDEXPOSURE_DECLARE)
 
 namespace codedexposure::fuse
 {
@@ -23,18 +25,10 @@ static std::vector<Kernels>
 find_kernels ()
 {
   std::vector<Kernels> found;
-#if defined __x86_64__
-  const bool wide = __builtin_cpu_supports ("avx512f") &&
-                    __builtin_cpu_supports ("avx512dq") &&
-                    __builtin_cpu_supports ("avx512bw");
-  if (wide && __builtin_cpu_supports ("avx512vnni"))
-    found.push_back (fuse_avx512vnni::kernels);
-  if (wide)
-    found.push_back (fuse_avx512::kernels);
-  if (__builtin_cpu_supports ("avx2") && __builtin_cpu_supports ("fma"))
-    found.push_back (fuse_avx2::kernels);
-#endif
-  found.push_back (fuse_baseline::kernels);
+#define CODEDEXPOSURE_FIND(target)                                             \
+  if (runs_target (#target))                                                   \
+    found.push_back (fuse_##target::kernels);
+  CODEDEXPOSURE_TARGETS (CODEDEXPOSURE_FIND)
   return found;
 }
 

@@ -10,53 +10,6 @@
 namespace codedexposure::fuse
 {
 
-/**
- * One row through a filter bank whose weights repeat along the row. Output k at
- * x is
- *
- *   sum over taps t of weights[(t outputs + k) width + (phase + x) mod period]
- *                      * source[x + offsets[t]],
- *
- * summed in the order of the taps; each product is rounded before it is added.
- * A row of weights continues for at least 15 values after its period. Up to 15
- * pixels more than @p count are read and written.
- */
-struct FilterRow {
-  const float *source;
-  int count;
-  const std::ptrdiff_t *offsets;
-  int taps;
-  const float *weights;
-  int width;
-  int outputs;
-  int period;
-  int phase;
-};
-
-/**
- * The same in whole numbers, over pairs of pixels. The value at x of a source
- * is the pixel at x in its lower 16 bits and the pixel at x + 1 in its upper
- * ones, both signed; weights are pairs like it. Output k at x is
- *
- *   scale[k width + i] * sum + base,   i = (phase + x) mod period,
- *
- * where sum is over pairs t, of both products of weights[(t outputs + k) width
- * + i] and sources[t][x]. It fits into 32 bits, so that its order does not
- * matter. No weight is -32768.
- */
-struct PairRow {
-  const std::int32_t *const *sources;
-  int count;
-  int taps; ///< pairs
-  const std::int32_t *weights;
-  const float *scale;
-  float base;
-  int width;
-  int outputs;
-  int period;
-  int phase;
-};
-
 /** Values of a row are filtered in blocks of this many. */
 constexpr int kRunBlock = 16;
 
@@ -65,26 +18,25 @@ struct Run {
   int first, count;
 };
 
-/** Weights of two neighbouring pixels, as in PairRow. */
-struct SparsePair {
-  std::int32_t source; ///< number of a source
-  std::int32_t weights;
-};
-
 /**
- * The same for pixels that all have the same filter, which are every few pixels
- * of a row. The value at i is
+ * Filters of pixels that all have the same ones, which are every few pixels of
+ * a row, over pairs of pixels. The value at i of a source is the pixel at i in
+ * its lower 16 bits and the pixel to the right of it in its upper ones, both
+ * signed; weights are pairs like it. Output k at i is
  *
- *   scale * sum + base,
+ *   scale[k] * sum + base,
  *
- * where sum is over pairs t, of both products of pairs[t].weights and
- * sources[pairs[t].source][i].
+ * where sum is over pairs, of both products of weight k and sources[number][i].
+ * It fits into 32 bits, so that its order does not matter. No weight is -32768.
  */
-struct SparseRow {
+struct FilterRow {
   const std::int32_t *const *sources;
-  const SparsePair *pairs;
+  /** Of each pair, number and weights, which are read one after the other. */
+  const std::int32_t *pairs;
   int pairs_count;
-  float scale, base;
+  int outputs;
+  const float *scale;
+  float base;
   const Run *runs;
   int runs_count;
 };
@@ -220,17 +172,11 @@ struct ConvolveRow {
 /** The kernels of one instruction set; all give the same values. */
 struct Kernels {
   std::string_view name;
-  /** outputs[k][x] = output k. */
-  void (*filter) (const FilterRow &row, float *const *outputs);
-  /** outputs[k][x] = the square of output k. */
-  void (*filter_pairs_squared) (const PairRow &row, float *const *outputs);
-  /** outputs[k][x] += share[x / 2] * output k, where share is not 0. */
-  void (*filter_pairs_add) (
-      const PairRow &row, const float *share, float *const *outputs);
-  /** to[i] += the square of value i, or share[i] * value i, in the runs. */
-  void (*filter_sparse_squared) (const SparseRow &row, float *to);
-  void (*filter_sparse_add) (
-      const SparseRow &row, const float *share, float *to);
+  /** to[k][i] += the square of output k, or share[i] * output k, in the runs.
+   */
+  void (*filter_squared) (const FilterRow &row, float *const *to);
+  void (*filter_add) (
+      const FilterRow &row, const float *share, float *const *to);
   /** A row to its parts. */
   void (*split_pairs) (
       const Parts &parts, const std::int32_t *from, std::int32_t *to);
@@ -242,6 +188,10 @@ struct Kernels {
    * Up to 15 values more than @p count are read and written. */
   void (*sum) (const float *const *rows, int rows_count, int count, float *to);
   void (*max) (const float *const *rows, int rows_count, int count, float *to);
+  /** to[x] = sum over t of weights[t] * source[x + t step], in this order. Up
+   * to 15 values more than @p count are read and written. */
+  void (*blur) (const float *source, std::ptrdiff_t step, const float *weights,
+      int taps, int count, float *to);
   /** to[x] = the change of pixel x. */
   void (*compare) (const CompareRow &row, float *to);
   /** Up to 15 values more than count are read and written. */

@@ -2,17 +2,16 @@
 /* The kernels of one instruction set, compiled once for each. */
 #include "fuse/convolve_kernel.h"
 #include "fuse/filter_kernel.h"
+#include "fuse/parts_kernel.h"
 #include "fuse/rows_kernel.h"
 #include "fuse/shrink_kernel.h"
-#include "fuse/sparse_kernel.h"
 
 namespace codedexposure::CODEDEXPOSURE_TARGET
 {
 
 extern const fuse::Kernels kernels;
-const fuse::Kernels kernels = {CODEDEXPOSURE_TARGET_NAME, filter,
-    filter_pairs_squared, filter_pairs_add, filter_sparse_squared,
-    filter_sparse_add, split_pairs, split, join, sum, max, compare, rate,
+const fuse::Kernels kernels = {CODEDEXPOSURE_TARGET_NAME, filter_squared,
+    filter_add, split_pairs, split, join, sum, max, blur, compare, rate,
     fade_ratio, prefer, share, sum_blocks, weigh, to_steps, pair, to_bytes,
     to_words, shrink, settle, convolve};
 

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <utility>
-
-#include "estimate/kriging.h"
+#include <map>
+#include <numeric>
+#include <optional>
 
 namespace codedexposure::fuse
 {
@@ -18,12 +18,10 @@ namespace
  * pixels: they are so much larger that classes are weighted block by block. */
 constexpr double kSigma = 1.6;
 constexpr int kReach = 5;
-/* Rows of blocks that a worker takes at a time: many, as it computes errors of
+/* Rows of blocks that a thread takes at a time: many, as it computes errors of
  * 2 kReach more. */
 constexpr int kBandRows = 48;
-/* Classes whose error is measured at a time: the outputs of one pass of a
- * filter.
- */
+/* Classes whose error is measured at a time: the outputs of a filter. */
 constexpr std::size_t kChunk = 8;
 /* Errors of this size, in grey levels squared, do not tell classes apart. */
 constexpr float kErrorFloor = 1.0f;
@@ -31,54 +29,56 @@ constexpr float kErrorFloor = 1.0f;
 constexpr float kMinWeight = 0.01f;
 
 /* Of both axes together 1/4, as sums of blocks become means of pixels. */
-std::vector<float>
+std::array<float, 2 * kReach + 1>
 gaussian ()
 {
-  std::vector<float> weights;
+  std::array<float, 2 * kReach + 1> weights;
   double sum = 0.0;
   for (int i = -kReach; i <= kReach; i++)
     sum += std::exp (-0.5 * i * i / (kSigma * kSigma));
   for (int i = -kReach; i <= kReach; i++)
-    weights.push_back (
-        float (0.5 * std::exp (-0.5 * i * i / (kSigma * kSigma)) / sum));
+    weights[std::size_t (i + kReach)] =
+        float (0.5 * std::exp (-0.5 * i * i / (kSigma * kSigma)) / sum);
   return weights;
 }
 
-/* A filter of one output with the same weights everywhere. */
-class Blur
+/* The values around @source, @step apart. */
+void
+blur (const Kernels &kernels, const float *source, std::ptrdiff_t step,
+    int count, float *to)
 {
-public:
-  Blur ()
-  {
-    for (const float weight : gaussian ())
-      weights_.insert (weights_.end (), Field::kSlack, weight);
-    static_assert (Field::kSlack >= 16, "a row of weights is a vector long");
-  }
-  void run (const Kernels &kernels, const float *source, std::ptrdiff_t step,
-      int count, float *to) const
-  {
-    std::array<std::ptrdiff_t, 2 * kReach + 1> offsets;
-    for (int i = -kReach; i <= kReach; i++)
-      offsets[std::size_t (i + kReach)] = i * step;
-    kernels.filter ({source, count, offsets.data (), int (offsets.size ()),
-                        weights_.data (), Field::kSlack, 1, 1, 0},
-        &to);
-  }
+  static const auto kWeights = gaussian ();
+  kernels.blur (source - kReach * step, step, kWeights.data (),
+      int (kWeights.size ()), count, to);
+}
 
-private:
-  std::vector<float> weights_;
-};
+/* The blocks of a part of a row, kRunBlock values each, with others than 0. */
+void
+find_runs (const float *values, int count, std::vector<Run> &runs)
+{
+  runs.clear ();
+  for (int block = 0; block < count / kRunBlock; block++) {
+    bool any = false;
+    for (int i = 0; i < kRunBlock; i++)
+      any |= values[block * kRunBlock + i] != 0.0f;
+    if (any)
+      add_block (runs, block);
+  }
+}
 
 } // namespace
 
-/* Rows first .. first + rows - 1 of the blocks of a frame that is filtered. */
-struct MotionFilter::Band {
-  Band (int width, const std::vector<float> &factors_of_classes)
-      : factors (factors_of_classes), blocks ((width + 1) / 2),
+/* Of a thread: rows first .. first + rows - 1 of the blocks of a frame. */
+struct MotionFilter::Room {
+  Room (int width, int period, int slots, std::vector<float> factors_of_classes)
+      : factors (std::move (factors_of_classes)), blocks ((width + 1) / 2),
+        part (SplitField::split_length (width, period)),
         squares (width, 2 * kChunk, 2 * kReach),
         sums (kChunk, Field (blocks, kBandRows, kReach)),
         along (blocks, kBandRows + 2 * kReach),
-        fit_rows (blocks, kBandRows * int (factors.size ()))
+        fit_rows (blocks, kBandRows * int (factors.size ())),
+        shares (part * (period / 2), 1),
+        parts (part * period, std::max (2 * slots, int (kChunk)))
   {
   }
 
@@ -92,19 +92,20 @@ struct MotionFilter::Band {
   int first = 0, rows = 0;
   std::vector<float> factors; ///< of each class
   int blocks;                 ///< of a row
+  int part;                   ///< length of the parts of a row of pixels
   Field squares;              ///< of a chunk: squared residuals of two rows
   std::vector<Field> sums;    ///< of a chunk: the same of blocks
   Field along;                ///< blurred along x
   Field fit_rows;
+  Field shares; ///< weights of a class in a row of blocks, in parts
+  Field parts;  ///< rows of outputs in parts
+  std::vector<Run> runs;
+  std::vector<const std::int32_t *> sources[2];
 };
 
-MotionFilter::MotionFilter (const Phases &phases,
-    const Observation &observation, Classes classes, int radius,
-    std::span<const double> noise, float steps)
-    : phases_ (phases), observation_ (observation),
-      classes_ (std::move (classes)), radius_ (radius),
-      noise_ (noise.begin (), noise.end ()), steps_ (steps),
-      of_frame_ (make_set (classes_.of_frame, taps_within (radius + 0.5)))
+MotionFilter::MotionFilter (const FilterPlan &plan)
+    : plan_ (plan), models_ (motion_models ()),
+      of_frame_ (make_set (models_.of_frame, taps_within (plan.radius + 0.5)))
 {
 }
 
@@ -117,24 +118,29 @@ MotionFilter::Set
 MotionFilter::make_set (
     std::span<const SceneClass> classes, std::span<const Tap> taps) const
 {
-  Set set;
+  const std::size_t chunks = (classes.size () + kChunk - 1) / kChunk;
+  Set set{{}, FilterBank (plan_, int (chunks)),
+      FilterBank (plan_, int (classes.size ()))};
+  std::map<std::pair<int, int>, std::vector<float>> residuals; // of a chunk
   for (std::size_t c = 0; c < classes.size (); c++) {
-    const SceneClass &patch = classes[c];
-    if (c % kChunk == 0)
-      set.residuals.emplace_back (
-          phases_, taps, int (std::min (kChunk, classes.size () - c)), steps_);
-    FilterBank &filter =
-        set.filters.emplace_back (phases_, taps, observation_.slots (), steps_);
     double predicted = 0.0, sought = 0.0;
-    for_each_phase (phases_, observation_, patch, taps, noise_,
+    for_each_phase (plan_, classes[c], taps,
         [&] (int row, int x, const PhaseWeights &weights) {
-          filter.set_all (row, x, weights.slots);
-          set.residuals.back ().set (
-              row, x, int (c % kChunk), weights.residual);
+          set.filters.set (row, x, int (c), taps, weights.slots);
+          std::ranges::copy (
+              weights.residual, std::back_inserter (residuals[{row, x}]));
           predicted += weights.predicted_variance;
-          sought += weights.slot_variance;
+          sought += std::accumulate (weights.slot_variances.begin (),
+                        weights.slot_variances.end (), 0.0) /
+                    plan_.observation.slots ();
         });
     set.factors.push_back (float (std::sqrt (sought / predicted)));
+    if (c + 1 < classes.size () && (c + 1) % kChunk != 0)
+      continue;
+    for (const auto &[place, weights] : residuals)
+      set.residuals.set (
+          place.first, place.second, int (c / kChunk), taps, weights);
+    residuals.clear ();
   }
   return set;
 }
@@ -142,73 +148,89 @@ MotionFilter::make_set (
 /* What moves uses one neighbouring frame: with both, filters of wrong motions
  * fit by chance more often, as they have more taps. */
 std::vector<const MotionFilter::Set *>
-MotionFilter::sets_for (const PairFrames &frames)
+MotionFilter::sets_for (Neighbours neighbours)
 {
-  const bool previous = frames[0] != nullptr, next = frames[2] != nullptr;
-  if (!previous && !next)
+  if (!neighbours.any ())
     return {&of_frame_};
-  const auto made = [&] (std::optional<Set> &set,
-                        std::span<const SceneClass> classes, bool with_previous,
-                        bool with_next) {
-    if (!set)
-      set = make_set (classes, taps_around (radius_ + 0.5, kNeighbourRadius,
-                                   with_previous, with_next));
-    return &*set;
+  const auto made = [&] (ForNeighbours<Set> &sets,
+                        std::span<const SceneClass> classes, Neighbours of) {
+    return &sets.get (of, [&] {
+      return make_set (
+          classes, taps_around (plan_.radius + 0.5, kNeighbourRadius, of));
+    });
   };
-  return {&of_frame_,
-      made (over_frames_[(previous ? 1u : 0u) + (next ? 2u : 0u)],
-          classes_.over_frames, previous, next),
-      made (
-          over_one_[previous ? 0 : 1], classes_.over_one, previous, !previous)};
+  return {&of_frame_, made (over_frames_, models_.over_frames, neighbours),
+      made (over_one_, models_.over_one,
+          {neighbours.before, !neighbours.before})};
 }
 
-/* The squared residuals of a chunk of classes in all blocks of the band and
- * around it. */
+/* The squared residuals of a chunk of classes in row @y of pixels. */
 void
-MotionFilter::measure_blocks (const Kernels &kernels, const PairFrames &frames,
-    const FilterBank &residuals, Band &band) const
+MotionFilter::measure_row (const Kernels &kernels, const CodedFrames &frames,
+    const FilterBank &residuals, int group, int y, float *const *to,
+    Room &room) const
 {
-  const int width = frames[1]->width (), height = frames[1]->height ();
-  const auto count = std::size_t (residuals.outputs ());
-  std::vector<const std::int32_t *> sources;
-  for (int y = -kReach; y < band.rows + kReach; y++) {
+  const int period = plan_.sources.period ();
+  const auto sources = plan_.sources.row (frames, y, room.sources[0]);
+  const Run whole{0, room.part};
+  std::array<float *, kChunk> parts;
+  for (int k = 0; k < int (kChunk); k++)
+    std::fill_n (room.parts.row (k), room.parts.width (), 0.0f);
+  int outputs = 0;
+  for (int column = 0; column < period; column++) {
+    const FilterRow row =
+        residuals.row (y, column, group, sources, {&whole, 1});
+    outputs = row.outputs;
+    for (int k = 0; k < outputs; k++)
+      parts[std::size_t (k)] = room.parts.row (k) + column * room.part;
+    kernels.filter_squared (row, parts.data ());
+  }
+  for (int k = 0; k < outputs; k++)
+    kernels.join ({period, room.part, frames.now->light.width ()},
+        room.parts.row (k), nullptr, to[k]);
+}
+
+/* The same in all blocks of the room's rows and around them. */
+void
+MotionFilter::measure_blocks (const Kernels &kernels, const CodedFrames &frames,
+    const FilterBank &residuals, int group, Room &room) const
+{
+  const int width = frames.now->light.width ();
+  const int height = frames.now->light.height ();
+  for (int y = -kReach; y < room.rows + kReach; y++) {
     std::array<float *, 2 * kChunk> to;
     for (std::size_t i = 0; i < 2 * kChunk; i++)
-      to[i] = band.squares.row (int (i));
+      to[i] = room.squares.row (int (i));
     for (const int half : {0, 1})
-      kernels.filter_pairs_squared (
-          residuals.row (phases_, frames,
-              mirrored (2 * (band.first + y) + half, height), sources),
-          to.data () + (half ? kChunk : 0));
-    for (std::size_t i = 0; i < count; i++) {
+      measure_row (kernels, frames, residuals, group,
+          mirrored (2 * (room.first + y) + half, height),
+          to.data () + (half ? kChunk : 0), room);
+    for (std::size_t i = 0; i < kChunk; i++) {
       for (float *square : {to[i], to[i + kChunk]})
         for (int x = 1; x <= 2 * kReach + 1; x++) {
           square[-x] = square[mirrored (-x, width)];
           square[width - 1 + x] = square[mirrored (width - 1 + x, width)];
         }
       kernels.sum_blocks (to[i] - 2 * kReach, to[i + kChunk] - 2 * kReach,
-          band.blocks + 2 * kReach, band.sums[i].row (y) - kReach);
+          room.blocks + 2 * kReach, room.sums[i].row (y) - kReach);
     }
   }
 }
 
-/* The squared error of the classes of @set around each block of the band. */
+/* The squared error of the classes of @set around each block of the room. */
 void
-MotionFilter::measure (const Kernels &kernels, const PairFrames &frames,
-    const Set &set, std::size_t first, Band &band) const
+MotionFilter::measure (const Kernels &kernels, const CodedFrames &frames,
+    const Set &set, std::size_t first, Room &room) const
 {
-  const Blur blur;
-  for (const FilterBank &residuals : set.residuals) {
-    measure_blocks (kernels, frames, residuals, band);
-    for (int i = 0; i < residuals.outputs (); i++, first++) {
-      const Field &sums = band.sums[std::size_t (i)];
-      for (int y = -kReach; y < band.rows + kReach; y++)
-        blur.run (
-            kernels, sums.row (y), 1, band.blocks, band.along.row (y + kReach));
-      for (int y = 0; y < band.rows; y++)
-        blur.run (kernels, band.along.row (y + kReach), band.along.stride (),
-            band.blocks, band.fit (first, y));
-    }
+  for (std::size_t c = 0; c < set.factors.size (); c++) {
+    if (c % kChunk == 0)
+      measure_blocks (kernels, frames, set.residuals, int (c / kChunk), room);
+    const Field &sums = room.sums[c % kChunk];
+    for (int y = -kReach; y < room.rows + kReach; y++)
+      blur (kernels, sums.row (y), 1, room.blocks, room.along.row (y + kReach));
+    for (int y = 0; y < room.rows; y++)
+      blur (kernels, room.along.row (y + kReach), room.along.stride (),
+          room.blocks, room.fit (first + c, y));
   }
 }
 
@@ -218,82 +240,91 @@ MotionFilter::measure (const Kernels &kernels, const PairFrames &frames,
  */
 void
 MotionFilter::set_weights (
-    const Kernels &kernels, Band &band, Field *misfit) const
+    const Kernels &kernels, Room &room, Field &misfit) const
 {
-  Field least (band.blocks, 1);
-  std::vector<float *> fit (band.factors.size ());
-  for (int y = 0; y < band.rows; y++) {
+  std::vector<float *> fit (room.factors.size ());
+  for (int y = 0; y < room.rows; y++) {
     for (std::size_t c = 0; c < fit.size (); c++)
-      fit[c] = band.fit (c, y);
-    kernels.weigh ({fit.data (), band.factors.data (), int (fit.size ()),
-                       kErrorFloor, kMinWeight, band.blocks},
-        least.row (0));
-    for (int row = 2 * (band.first + y);
-         misfit && row < misfit->height () && row < 2 * (band.first + y + 1);
-         row++)
-      for (int x = 0; x < misfit->width (); x++)
-        misfit->row (row)[x] = least.row (0)[x / 2];
+      fit[c] = room.fit (c, y);
+    kernels.weigh ({fit.data (), room.factors.data (), int (fit.size ()),
+                       kErrorFloor, kMinWeight, room.blocks},
+        misfit.row (room.first + y));
   }
 }
 
-/* Adds the slots of the classes of @set, the first of which is @first. */
+/* The sum of all classes by their weights, for row @y of the room's blocks. */
 void
-MotionFilter::mix (const Kernels &kernels, const PairFrames &frames,
-    const Set &set, std::size_t first, Band &band, std::span<Field> slots) const
+MotionFilter::mix (const Kernels &kernels, const CodedFrames &frames,
+    std::span<const Set *const> sets, int y, std::span<Field> slots,
+    Room &room) const
 {
-  std::vector<const std::int32_t *> sources;
+  const int period = plan_.sources.period (), n = int (slots.size ());
+  const int width = slots[0].width ();
+  const int first = 2 * (room.first + y);
+  const int end = std::min (first + 2, slots[0].height ());
+  const Parts of_shares{period / 2, room.part, room.blocks};
+  for (int row = first; row < end; row++)
+    plan_.sources.row (frames, row, room.sources[row - first]);
+  for (int i = 0; i < 2 * n; i++)
+    std::fill_n (room.parts.row (i), room.parts.width (), 0.0f);
   std::vector<float *> to (slots.size ());
-  const int end = std::min (2 * (band.first + band.rows), frames[1]->height ());
-  for (const FilterBank &filter : set.filters) {
-    for (int y = 2 * band.first; y < end; y++) {
-      for (std::size_t s = 0; s < slots.size (); s++)
-        to[s] = slots[s].row (y);
-      kernels.filter_pairs_add (filter.row (phases_, frames, y, sources),
-          band.fit (first, y / 2 - band.first), to.data ());
+  std::size_t c = 0;
+  for (const Set *set : sets)
+    for (int of_set = 0; of_set < set->filters.groups (); of_set++, c++) {
+      kernels.split (of_shares, room.fit (c, y), room.shares.row (0));
+      for (int column = 0; column < period; column++) {
+        const float *share =
+            room.shares.row (0) + column / 2 * std::ptrdiff_t (room.part);
+        if (column % 2 == 0)
+          find_runs (share, room.part, room.runs);
+        if (room.runs.empty ())
+          continue;
+        for (int row = first; row < end; row++) {
+          for (int s = 0; s < n; s++)
+            to[std::size_t (s)] = room.parts.row ((row - first) * n + s) +
+                                  column * std::ptrdiff_t (room.part);
+          kernels.filter_add (set->filters.row (row, column, of_set,
+                                  room.sources[row - first], room.runs),
+              share, to.data ());
+        }
+      }
     }
-    first++;
-  }
+  for (int row = first; row < end; row++)
+    for (int s = 0; s < n; s++)
+      kernels.join ({period, room.part, width},
+          room.parts.row ((row - first) * n + s), nullptr,
+          slots[std::size_t (s)].row (row));
 }
 
 bool
-MotionFilter::run (const Kernels &kernels, const PairFrames &frames,
-    std::span<Field> slots, Field *misfit, Workers &workers,
+MotionFilter::run (const Kernels &kernels, const CodedFrames &frames,
+    std::span<Field> slots, Field &misfit, Workers &workers,
     std::stop_token stop)
 {
-  const int width = frames[1]->width (), height = frames[1]->height ();
-  const std::vector<const Set *> sets = sets_for (frames);
+  const std::vector<const Set *> sets = sets_for (frames.neighbours ());
   std::vector<float> factors;
   for (const Set *set : sets)
     std::ranges::copy (set->factors, std::back_inserter (factors));
-  std::vector<std::optional<Band>> bands (std::size_t (workers.count ()));
-  const int rows = (height + 1) / 2;
+  std::vector<std::optional<Room>> rooms (std::size_t (workers.count ()));
+  const int rows = misfit.height ();
   return workers.run ((rows + kBandRows - 1) / kBandRows,
       [&] (int part, int worker) {
-        auto &band = bands[std::size_t (worker)];
-        if (!band)
-          band.emplace (width, factors);
-        band->first = part * kBandRows;
-        band->rows = std::min (kBandRows, rows - band->first);
-        const auto each_set = [&] (const auto &use) {
-          std::size_t first = 0;
-          for (const Set *set : sets) {
-            use (*set, first);
-            first += set->filters.size ();
-          }
-        };
-        each_set ([&] (const Set &set, std::size_t c) {
-          measure (kernels, frames, set, c, *band);
-        });
-        set_weights (kernels, *band, misfit);
-        const int end = std::min (2 * (band->first + band->rows), height);
-        for (Field &slot : slots)
-          for (int y = 2 * band->first; y < end; y++)
-            std::fill_n (slot.row (y), width, 0.0f);
-        each_set ([&] (const Set &set, std::size_t c) {
-          mix (kernels, frames, set, c, *band, slots);
-        });
+        auto &room = rooms[std::size_t (worker)];
+        if (!room)
+          room.emplace (slots[0].width (), plan_.sources.period (),
+              int (slots.size ()), factors);
+        room->first = part * kBandRows;
+        room->rows = std::min (kBandRows, rows - room->first);
+        std::size_t first = 0;
+        for (const Set *set : sets) {
+          measure (kernels, frames, *set, first, *room);
+          first += set->factors.size ();
+        }
+        set_weights (kernels, *room, misfit);
+        for (int y = 0; y < room->rows; y++)
+          mix (kernels, frames, sets, y, slots, *room);
       },
-      stop);
+      std::move (stop));
 }
 
 } // namespace codedexposure::fuse

@@ -62,138 +62,17 @@ taps_within (double radius, int frame)
 }
 
 std::vector<Tap>
-taps_around (double own, double neighbours, bool previous, bool next)
+taps_around (double own, double reach, Neighbours neighbours)
 {
   std::vector<Tap> taps = taps_within (own);
   for (const int frame : {-1, 1})
-    if (frame < 0 ? previous : next)
-      std::ranges::copy (
-          taps_within (neighbours, frame), std::back_inserter (taps));
+    if (frame < 0 ? neighbours.before : neighbours.after)
+      std::ranges::copy (taps_within (reach, frame), std::back_inserter (taps));
   return taps;
 }
 
 namespace
 {
-
-/* The mean over targets of the expected squared error of ordinary kriging in
- * flat light, 1 - w c + lambda. The multiplier lambda is the same in all
- * equations of a target; it is taken from that of tap @middle. */
-double
-mean_variance (const KrigingSystem &system, std::size_t middle,
-    std::span<const double> weights, std::size_t targets)
-{
-  const std::size_t m = system.noise.size ();
-  const auto covariance = [&] (std::size_t i) {
-    return system.covariance[std::min (i, middle) * m + std::max (i, middle)];
-  };
-  double sum = 0.0;
-  for (std::size_t k = 0; k < targets; k++) {
-    const double *w = weights.data () + k * m;
-    const double *c = system.targets.data () + k * m;
-    double variance = 1.0 - c[middle] + system.noise[middle] * w[middle];
-    for (std::size_t i = 0; i < m; i++)
-      variance += w[i] * (covariance (i) - c[i]);
-    sum += variance;
-  }
-  return sum / double (targets);
-}
-
-/* The frames of taps as one exposure of several times as many slots. Elements
- * of later frames come after those of earlier ones. */
-struct Exposure {
-  int first, frames;
-  int slots, elements; ///< of one frame
-  std::vector<SlotShares> shares;
-
-  Exposure (const Observation &observation, std::span<const Tap> taps)
-      : slots (observation.slots ()),
-        elements (int (observation.shares ().size ()))
-  {
-    const auto [low, high] =
-        std::ranges::minmax (taps, std::less (), &Tap::frame);
-    first = low.frame;
-    frames = high.frame - low.frame + 1;
-    for (int frame = 0; frame < frames; frame++)
-      for (SlotShares element : observation.shares ()) {
-        for (SlotShare &share : element)
-          share.slot += frame * slots;
-        shares.push_back (std::move (element));
-      }
-  }
-  int element (const Tap &tap, int of_frame) const
-  {
-    return (tap.frame - first) * elements + of_frame;
-  }
-};
-
-std::size_t
-middle_of (std::span<const Tap> taps)
-{
-  return std::size_t (std::ranges::find (taps, Tap{0, 0, 0}) - taps.begin ());
-}
-
-/* Simple kriging of the slots of the middle frame. */
-KrigingSystem
-equations (const CodedCovariance &covariance, const Exposure &exposure,
-    std::span<const Tap> taps, std::span<const int> elements,
-    std::span<const double> noise)
-{
-  const std::size_t m = taps.size (), n = std::size_t (exposure.slots);
-  std::vector<Offset> places;
-  std::vector<int> exposed;
-  for (std::size_t i = 0; i < m; i++) {
-    places.push_back ({taps[i].x, taps[i].y});
-    exposed.push_back (exposure.element (taps[i], elements[i]));
-  }
-  KrigingSystem system = slot_equations (covariance, places, exposed, noise);
-  const std::size_t before = std::size_t (-exposure.first) * n * m;
-  system.targets.erase (system.targets.begin (),
-      system.targets.begin () + std::ptrdiff_t (before));
-  system.targets.resize (n * m);
-  return system;
-}
-
-/* Without noise, a pixel of a one-hot code is known in its own slot. */
-template <typename Weights>
-void
-keep_known (const Observation &observation, int element, std::size_t taps,
-    std::size_t middle, Weights &weights)
-{
-  if (!observation.exact () || !observation.noise_free ())
-    return;
-  const int known = observation.shares (element)[0].slot;
-  const auto slot = weights.begin () + known * std::ptrdiff_t (taps);
-  std::fill_n (slot, taps, 0.0f);
-  slot[std::ptrdiff_t (middle)] = 1.0f;
-}
-
-PhaseWeights
-weights_of (KrigingSystem system, const Observation &observation,
-    std::span<const Tap> taps, int element)
-{
-  const std::size_t m = taps.size (), n = system.targets.size () / m;
-  const std::size_t middle = middle_of (taps);
-  /* Ordinary kriging. As one target more, row `middle` of the inverse of the
-   * bordered matrix: it holds the prediction of that pixel by all others,
-   * scaled. */
-  system.flat.assign (m, 1.0);
-  system.flat_targets.assign (n, 1.0);
-  system.flat_targets.push_back (0.0);
-  system.targets.resize ((n + 1) * m);
-  system.targets[n * m + middle] = 1.0;
-  const std::vector<double> solved = solve_kriging (system);
-
-  const auto residual = solved.begin () + std::ptrdiff_t (n * m);
-  PhaseWeights weights;
-  weights.slots.assign (solved.begin (), residual);
-  for (std::size_t i = 0; i < m; i++)
-    weights.residual.push_back (float (
-        -residual[std::ptrdiff_t (i)] / residual[std::ptrdiff_t (middle)]));
-  weights.predicted_variance = 1.0 / residual[std::ptrdiff_t (middle)];
-  weights.slot_variance = mean_variance (system, middle, solved, n);
-  keep_known (observation, element, m, middle, weights.slots);
-  return weights;
-}
 
 /* Every tap with the one to its right. */
 std::vector<TapPair>
@@ -208,107 +87,215 @@ pairs_of (std::span<const Tap> taps)
   return pairs;
 }
 
+/* The equations of the pixels of each phase, under one class. The frames of
+ * taps are one exposure of several times as many slots; elements of later
+ * frames come after those of earlier ones. */
+class Equations
+{
+public:
+  Equations (const FilterPlan &plan, const SceneClass &patch,
+      std::span<const Tap> taps)
+      : plan_ (plan), taps_ (taps),
+        middle_ (std::size_t (
+            std::ranges::find (taps, Tap{0, 0, 0}) - taps.begin ())),
+        frames_ (std::ranges::minmax (taps, std::less (), &Tap::frame)),
+        covariance_ (patch, shares (), slots () * count (), reach ())
+  {
+  }
+
+  /* Calls use (row, x) after setting system () for them. */
+  template <typename Use>
+  void each (const Use &use)
+  {
+    for (int row = 0; row < plan_.phases.rows (); row++)
+      for (int x = 0; x < plan_.phases.period (); x++) {
+        plan_.throw_if_stopped ();
+        set_system (row, x);
+        use (row, x);
+      }
+  }
+  PhaseWeights weights ();
+  std::vector<float> sparse_slots (double excess) const;
+  std::vector<float> sparse_residual (double excess) const;
+
+private:
+  int slots () const { return plan_.observation.slots (); }
+  int count () const { return frames_.max.frame - frames_.min.frame + 1; }
+  int reach () const
+  {
+    int radius = 0;
+    for (const Tap &tap : taps_)
+      radius = std::max ({radius, std::abs (tap.x), std::abs (tap.y)});
+    return 2 * radius;
+  }
+  std::vector<SlotShares> shares () const
+  {
+    std::vector<SlotShares> shares;
+    for (int frame = 0; frame < count (); frame++)
+      for (SlotShares element : plan_.observation.shares ()) {
+        for (SlotShare &share : element)
+          share.slot += frame * slots ();
+        shares.push_back (std::move (element));
+      }
+    return shares;
+  }
+  double covariance (std::size_t a, std::size_t b) const
+  {
+    return system_
+        .covariance[std::min (a, b) * taps_.size () + std::max (a, b)];
+  }
+  void set_system (int row, int x);
+  double slot_variance (
+      std::size_t slot, std::span<const double> weights) const;
+  void keep_known (std::vector<float> &weights) const;
+
+  const FilterPlan &plan_;
+  std::span<const Tap> taps_;
+  std::size_t middle_;
+  std::ranges::minmax_result<Tap> frames_;
+  CodedCovariance covariance_;
+  int element_ = 0;
+  KrigingSystem system_; ///< ordinary kriging of the slots of the middle frame
+};
+
+void
+Equations::set_system (int row, int x)
+{
+  const std::vector<int> elements = plan_.phases.elements (row, x, taps_);
+  std::vector<Offset> places;
+  std::vector<int> exposed;
+  std::vector<double> noise;
+  for (int frame = 0; frame < count (); frame++)
+    noise.insert (noise.end (), plan_.noise.begin (), plan_.noise.end ());
+  for (std::size_t i = 0; i < taps_.size (); i++) {
+    places.push_back ({taps_[i].x, taps_[i].y});
+    exposed.push_back (
+        (taps_[i].frame - frames_.min.frame) * slots () + elements[i]);
+  }
+  element_ = elements[middle_];
+  system_ = slot_equations (covariance_, places, exposed, noise);
+  const std::ptrdiff_t of_frame = slots () * std::ptrdiff_t (taps_.size ());
+  const auto first = system_.targets.begin () - frames_.min.frame * of_frame;
+  system_.targets = {first, first + of_frame};
+  system_.flat.assign (taps_.size (), 1.0);
+  system_.flat_targets.assign (std::size_t (slots ()), 1.0);
+}
+
+/* Without noise, a pixel of a one-hot code is known in its own slot. */
+void
+Equations::keep_known (std::vector<float> &weights) const
+{
+  const Observation &observation = plan_.observation;
+  if (!observation.exact () || !observation.noise_free ())
+    return;
+  const auto slot = weights.begin () + observation.shares (element_)[0].slot *
+                                           std::ptrdiff_t (taps_.size ());
+  std::fill_n (slot, taps_.size (), 0.0f);
+  slot[std::ptrdiff_t (middle_)] = 1.0f;
+}
+
+/* The expected squared error of ordinary kriging in flat light, 1 - w c +
+ * lambda. The multiplier lambda is the same in all equations of a target; it is
+ * taken from that of the middle tap. */
+double
+Equations::slot_variance (
+    std::size_t slot, std::span<const double> weights) const
+{
+  const double *w = weights.data () + slot * taps_.size ();
+  const double *c = system_.targets.data () + slot * taps_.size ();
+  double variance = 1.0 - c[middle_] + system_.noise[middle_] * w[middle_];
+  for (std::size_t i = 0; i < taps_.size (); i++)
+    variance += w[i] * (covariance (i, middle_) - c[i]);
+  return variance;
+}
+
+/* As one target more, row `middle` of the inverse of the bordered matrix: it
+ * holds the prediction of that pixel by all others, scaled. */
+PhaseWeights
+Equations::weights ()
+{
+  const std::size_t m = taps_.size (), n = std::size_t (slots ());
+  system_.flat_targets.push_back (0.0);
+  system_.targets.resize ((n + 1) * m);
+  system_.targets[n * m + middle_] = 1.0;
+  const std::vector<double> solved = solve_kriging (system_);
+  const double *residual = solved.data () + n * m;
+  PhaseWeights weights;
+  weights.slots.assign (solved.data (), residual);
+  keep_known (weights.slots);
+  for (std::size_t i = 0; i < m; i++)
+    weights.residual.push_back (float (-residual[i] / residual[middle_]));
+  weights.predicted_variance = 1.0 / residual[middle_];
+  for (std::size_t slot = 0; slot < n; slot++)
+    weights.slot_variances.push_back (slot_variance (slot, solved));
+  return weights;
+}
+
 std::vector<float>
-sparse_slots (KrigingSystem system, const Observation &observation,
-    std::span<const Tap> taps, int element, double excess)
+Equations::sparse_slots (double excess) const
 {
   constexpr double kScene = 1.0;
-  const std::size_t m = taps.size ();
-  const std::vector<double> targets = std::exchange (system.targets, {});
-  system.flat.assign (m, 1.0);
-  const SparseKriging kriging (std::move (system), pairs_of (taps));
+  const SparseKriging kriging (system_, pairs_of (taps_));
   std::vector<float> weights;
-  for (std::size_t at = 0; at < targets.size (); at += m) {
-    const auto solved = kriging.solve (
-        std::span (targets).subspan (at, m), 1.0, kScene, excess);
-    weights.insert (weights.end (), solved.begin (), solved.end ());
-  }
-  keep_known (observation, element, m, middle_of (taps), weights);
+  for (std::size_t at = 0; at < system_.targets.size (); at += taps_.size ())
+    std::ranges::copy (
+        kriging.solve (std::span (system_.targets).subspan (at, taps_.size ()),
+            1.0, kScene, excess),
+        std::back_inserter (weights));
+  keep_known (weights);
   return weights;
 }
 
 /* The middle tap is sought, so it is not among the equations' taps. */
 std::vector<float>
-sparse_residual (
-    const KrigingSystem &all, std::span<const Tap> taps, double excess)
+Equations::sparse_residual (double excess) const
 {
-  const std::size_t m = taps.size (), middle = middle_of (taps);
-  const auto covariance = [&] (std::size_t a, std::size_t b) {
-    return all.covariance[std::min (a, b) * m + std::max (a, b)];
-  };
-  KrigingSystem system;
-  std::vector<Tap> others;
+  std::vector<int> others;
+  std::vector<Tap> taps;
   std::vector<double> target;
-  for (std::size_t i = 0; i < m; i++) {
-    if (i == middle)
-      continue;
-    for (std::size_t j = 0; j < m; j++)
-      if (j != middle)
-        system.covariance.push_back (covariance (i, j));
-    system.noise.push_back (all.noise[i]);
-    target.push_back (covariance (i, middle));
-    others.push_back (taps[i]);
-  }
-  system.flat.assign (others.size (), 1.0);
-  const double variance = covariance (middle, middle) + all.noise[middle];
-  const auto solved = SparseKriging (std::move (system), pairs_of (others))
-                          .solve (target, 1.0, variance, excess);
-  std::vector<float> weights (solved.begin (), solved.end ());
-  weights.insert (weights.begin () + std::ptrdiff_t (middle), -1.0f);
-  return weights;
-}
-
-/* Calls use (row, x, equations, elements of the taps) for every phase. */
-template <typename Use>
-void
-each_system (const Phases &phases, const Observation &observation,
-    const SceneClass &patch, std::span<const Tap> taps,
-    std::span<const double> noise, const Use &use)
-{
-  int radius = 0;
-  for (const Tap &tap : taps)
-    radius = std::max ({radius, std::abs (tap.x), std::abs (tap.y)});
-  const Exposure exposure (observation, taps);
-  const CodedCovariance covariance (
-      patch, exposure.shares, exposure.slots * exposure.frames, 2 * radius);
-  std::vector<double> noises;
-  for (int frame = 0; frame < exposure.frames; frame++)
-    noises.insert (noises.end (), noise.begin (), noise.end ());
-  for (int row = 0; row < phases.rows (); row++)
-    for (int x = 0; x < phases.period (); x++) {
-      const std::vector<int> elements = phases.elements (row, x, taps);
-      use (row, x, equations (covariance, exposure, taps, elements, noises),
-          elements[middle_of (taps)]);
+  for (std::size_t i = 0; i < taps_.size (); i++)
+    if (i != middle_) {
+      others.push_back (int (i));
+      taps.push_back (taps_[i]);
+      target.push_back (covariance (i, middle_));
     }
+  const double variance =
+      covariance (middle_, middle_) + system_.noise[middle_];
+  const auto solved =
+      SparseKriging (equations_of (system_, others), pairs_of (taps))
+          .solve (target, 1.0, variance, excess);
+  std::vector<float> weights (solved.begin (), solved.end ());
+  weights.insert (weights.begin () + std::ptrdiff_t (middle_), -1.0f);
+  return weights;
 }
 
 } // namespace
 
 void
-for_each_phase (const Phases &phases, const Observation &observation,
-    const SceneClass &patch, std::span<const Tap> taps,
-    std::span<const double> noise, const UseWeights &use)
+for_each_phase (const FilterPlan &plan, const SceneClass &patch,
+    std::span<const Tap> taps, const UseWeights &use)
 {
-  each_system (phases, observation, patch, taps, noise,
-      [&] (int row, int x, KrigingSystem system, int element) {
-        use (row, x,
-            weights_of (std::move (system), observation, taps, element));
-      });
+  Equations equations (plan, patch, taps);
+  equations.each ([&] (int row, int x) { use (row, x, equations.weights ()); });
 }
 
 void
-for_each_sparse_phase (const Phases &phases, const Observation &observation,
-    const SceneClass &patch, std::span<const Tap> taps,
-    std::span<const double> noise, Sought sought, double excess,
+for_each_sparse_phase (const FilterPlan &plan, const SceneClass &patch,
+    std::span<const Tap> taps, Sought sought, double excess,
     const UseSparse &use)
 {
-  each_system (phases, observation, patch, taps, noise,
-      [&] (int row, int x, KrigingSystem system, int element) {
-        use (row, x,
-            sought == Sought::kSlots ? sparse_slots (std::move (system),
-                                           observation, taps, element, excess)
-                                     : sparse_residual (system, taps, excess));
-      });
+  const bool slots = sought == Sought::kSlots;
+  if (plan.observation.slots () > kMaxSparseSlots)
+    return for_each_phase (
+        plan, patch, taps, [&] (int row, int x, const PhaseWeights &weights) {
+          use (row, x, slots ? weights.slots : weights.residual);
+        });
+  Equations equations (plan, patch, taps);
+  equations.each ([&] (int row, int x) {
+    use (row, x,
+        slots ? equations.sparse_slots (excess)
+              : equations.sparse_residual (excess));
+  });
 }
 
 } // namespace codedexposure::fuse

@@ -2,8 +2,11 @@
 /* Pixels with the same neighbourhood, and the weights of their taps. */
 #pragma once
 
+#include <array>
 #include <functional>
+#include <optional>
 #include <span>
+#include <stop_token>
 #include <vector>
 
 #include "estimate/observation.h"
@@ -22,12 +25,37 @@ struct Tap {
   bool operator== (const Tap &) const = default;
 };
 
+/** The neighbouring coded frames that there are. */
+struct Neighbours {
+  bool before = false, after = false;
+
+  bool any () const { return before || after; }
+};
+
+/** Something for each set of neighbours, made when it is first asked for. */
+template <typename T>
+class ForNeighbours
+{
+public:
+  template <typename Make>
+  const T &get (Neighbours neighbours, const Make &make)
+  {
+    auto &made =
+        made_[(neighbours.before ? 1u : 0u) + (neighbours.after ? 2u : 0u)];
+    if (!made)
+      made = make ();
+    return *made;
+  }
+
+private:
+  std::array<std::optional<T>, 4> made_;
+};
+
 /** The pixels of a coded frame within @p radius px. */
 std::vector<Tap> taps_within (double radius, int frame = 0);
-/** The pixels within @p own px, and of the coded frames before and after, if
- * they are used, those within @p neighbours px. */
-std::vector<Tap> taps_around (
-    double own, double neighbours, bool previous, bool next);
+/** The pixels within @p own px, and those of @p neighbours within @p reach px.
+ */
+std::vector<Tap> taps_around (double own, double reach, Neighbours neighbours);
 /** Of the taps in the coded frames before and after, px. Larger ones are not
  * more accurate. */
 constexpr double kNeighbourRadius = 2.3;
@@ -70,6 +98,31 @@ private:
   std::vector<int> row_starts_; ///< y of the first of each distinct row
 };
 
+class TapSources;
+
+/** Thrown where filters are made after their stop was requested; Fuser turns it
+ * into ErrorCode::cancelled. */
+struct Stopped {
+};
+
+/** What the filters of a schedule are made from. */
+struct FilterPlan {
+  const Phases &phases;
+  const Observation &observation;
+  const TapSources &sources;
+  std::vector<double> noise; ///< variance of each element, in the scene's
+  int radius;                ///< of taps, px
+  float steps;               ///< of a pixel per grey level
+  bool lookahead;            ///< the next coded frame is usually known
+  std::stop_token stop;      ///< of the call that makes filters
+
+  void throw_if_stopped () const
+  {
+    if (stop.stop_requested ())
+      throw Stopped ();
+  }
+};
+
 /** Weights of the taps around the pixels of one phase under one class. */
 struct PhaseWeights {
   /** Weight of tap i for slot s at [s * taps + i]. */
@@ -77,19 +130,18 @@ struct PhaseWeights {
   /** Prediction of the middle pixel from all others, less that pixel. */
   std::vector<float> residual;
   /** Expected squared errors, in units of the scene's variance: of that
-   * prediction, and of the mean slot. */
-  double predicted_variance = 0.0, slot_variance = 0.0;
+   * prediction, and of each slot. */
+  double predicted_variance = 0.0;
+  std::vector<double> slot_variances;
 };
 
 /** Calls @p use with the weights of every phase, the pixels at @p x of distinct
  * row @p row, under class @p patch.
- * @p taps   coded pixels, {0, 0, 0} among them.
- * @p noise  variance of each element in units of the scene's variance. */
+ * @p taps  coded pixels, {0, 0, 0} among them. */
 using UseWeights =
     std::function<void (int row, int x, const PhaseWeights &weights)>;
-void for_each_phase (const Phases &phases, const Observation &observation,
-    const SceneClass &patch, std::span<const Tap> taps,
-    std::span<const double> noise, const UseWeights &use);
+void for_each_phase (const FilterPlan &plan, const SceneClass &patch,
+    std::span<const Tap> taps, const UseWeights &use);
 
 /** What each pixel of a phase is to be estimated from the pixels around it. */
 enum class Sought {
@@ -98,14 +150,16 @@ enum class Sought {
 };
 
 /** As for_each_phase (), with few taps; see SparseKriging. All other weights
- * are 0. Weight of tap i for output k is at [k * taps + i].
+ * are 0. Weight of tap i for output k is at [k * taps + i]. Filters of more
+ * than kMaxSparseSlots would take too long to be made sparse, and have all
+ * taps.
  * @p excess  squared error that is accepted beyond that with all taps, as a
  *            part of it. */
 using UseSparse =
     std::function<void (int row, int x, const std::vector<float> &weights)>;
-void for_each_sparse_phase (const Phases &phases,
-    const Observation &observation, const SceneClass &patch,
-    std::span<const Tap> taps, std::span<const double> noise, Sought sought,
-    double excess, const UseSparse &use);
+constexpr int kMaxSparseSlots = 16;
+void for_each_sparse_phase (const FilterPlan &plan, const SceneClass &patch,
+    std::span<const Tap> taps, Sought sought, double excess,
+    const UseSparse &use);
 
 } // namespace codedexposure::fuse

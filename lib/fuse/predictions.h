@@ -3,13 +3,12 @@
  */
 #pragma once
 
-#include <functional>
-#include <span>
 #include <vector>
 
+#include "fuse/bands.h"
 #include "fuse/box_filter.h"
-#include "fuse/field.h"
-#include "fuse/sparse_bank.h"
+#include "fuse/filter_bank.h"
+#include "fuse/models.h"
 
 namespace codedexposure::fuse
 {
@@ -22,29 +21,27 @@ namespace codedexposure::fuse
 class Predictions
 {
 public:
-  /** @p around  radius of the squares over which errors are summed, px.
-   *  @p period  of the parts of rows, even. */
-  Predictions (int classes, int around, Extent size, int period);
+  /** @p plan    outlives this.
+   *  @p models  that are compared with each other and with a static scene; if
+   *             there are not several, scenes that move are.
+   *  @p around  radius of the squares over which errors are summed, px. */
+  Predictions (
+      const FilterPlan &plan, const Models &models, Extent size, int around);
 
-  /** Blocks of 2x2 pixels; an odd last row or column belongs to the one before
-   * it. */
-  static Extent blocks (Extent size)
-  {
-    return {std::max (size.width / 2, 1), std::max (size.height / 2, 1)};
-  }
-  /** Pixels of a square over which errors are summed. */
-  int area () const { return 4 * (2 * reach_ + 1) * (2 * reach_ + 1); }
-
-  /** Room for threads of number 0 .. @p count - 1. */
-  void make_room (int count);
-  /** Calls @p use with the sums of squared errors around the blocks of rows
-   * @p first .. @p end - 1 of blocks, of each class, an output of @p filters.
-   */
-  using Use = std::function<void (int row, const float *const *errors)>;
-  void run (const Kernels &kernels, const Phases &phases,
-      const SparseSources &sources, const SparseBank &filters,
-      const SplitFrames &frames, int first, int end, int worker,
-      const Use &use);
+  /** Of blocks of 2x2 pixels; an odd last row or column belongs to the one
+   * before it. */
+  struct Found {
+    /** 1; less where a scene that repeats with the frame rate is detected, and
+     * 0 where every slot shows a different picture for sure. */
+    Field unrepeated;
+    /** For each of several models, see Kernels::prefer. */
+    std::vector<Field> preferences;
+    /** Mean squared error of the best model, grey levels squared. */
+    Field misfit;
+  };
+  /** Null when it was stopped. Valid until it runs again. */
+  const Found *run (const Kernels &kernels, const CodedFrames &frames,
+      Workers &workers, std::stop_token stop);
 
 private:
   /** Of a thread. */
@@ -52,14 +49,23 @@ private:
     Field rows;  ///< of squared errors of blocks, one of each class
     Field parts; ///< of one of them
     std::vector<BoxFilter> sums;
+    std::vector<const std::int32_t *> of_rows[2];
   };
 
-  void predict (const Kernels &kernels, const Phases &phases,
-      const SparseSources &sources, const SparseBank &filters,
-      const SplitFrames &frames, int row, Room &room) const;
+  FilterBank make_filters (Neighbours neighbours) const;
+  void predict (const Kernels &kernels, const FilterBank &filters,
+      const CodedFrames &frames, int row, Room &room) const;
+  void predict_rows (const Kernels &kernels, const FilterBank &filters,
+      const CodedFrames &frames, const Band &band);
+  void compare (
+      const Kernels &kernels, int row, std::span<const float *const> errors);
 
+  const FilterPlan &plan_;
+  Models models_;
   int reach_; ///< blocks around a block over which errors are summed
+  ForNeighbours<FilterBank> filters_;
   std::vector<Room> rooms_; ///< one at least
+  Found found_;
 };
 
 } // namespace codedexposure::fuse

@@ -60,46 +60,36 @@ Refiner::Refiner (const Schedule &schedule, int width, int height,
     bool noise_free, double noise)
     : slots_ (schedule.slots ()), width_ (width), height_ (height),
       noise_free_ (noise_free), noise_ (float (noise)),
-      light_ (std::size_t (slots_), Field (width, height)), refined_ (light_)
+      slot_of_ (width, height),
+      refined_ (std::size_t (slots_), Field (width, height))
 {
-  std::vector<std::int8_t> slot_of_element;
+  std::vector<std::uint8_t> slot_of_element;
   for (int e = 0; e < slots_; e++) {
     int slot = 0;
     while (slot + 1 < slots_ && schedule.light (e, slot) <= 0.0)
       slot++;
-    slot_of_element.push_back (std::int8_t (slot));
+    slot_of_element.push_back (std::uint8_t (slot));
   }
-  slot_of_.reserve (std::size_t (width) * std::size_t (height));
   for (int y = 0; y < height; y++)
     for (int x = 0; x < width; x++)
-      slot_of_.push_back (
-          slot_of_element[std::size_t (schedule.element_at (x, y))]);
-}
-
-void
-Refiner::set_row (int y, const float *const *slots)
-{
-  for (int s = 0; s < slots_; s++) {
-    float *to = light_[std::size_t (s)].row (y);
-    for (int x = 0; x < width_; x++)
-      to[x] = std::clamp (slots[s][x], 0.0f, kWhite);
-  }
+      slot_of_.row (y)[x] =
+          slot_of_element[std::size_t (schedule.element_at (x, y))];
 }
 
 /* One row of the network's inputs, of pixels that begin kReach before the frame
  * and mirror it at its borders. */
 void
-Refiner::fold_row (const Field &coded, int slot, int row, float *to) const
+Refiner::fold_row (const Frame &frame, int slot, int row, float *to) const
 {
   const auto light = [&] (int s, int y) {
-    return light_[std::size_t (std::clamp (s, 0, slots_ - 1))].row (y);
+    return frame.light[std::size_t (std::clamp (s, 0, slots_ - 1))].row (y);
   };
   for (int dy = 0; dy < Net::kFold; dy++) {
     const int y = mirrored (Net::kFold * row + dy, height_);
-    const float *own = light (slot, y), *seen = coded.row (y);
+    const float *own = light (slot, y), *seen = frame.coded.row (y);
     const std::array<const float *, 4> near{light (slot + 1, y),
         light (slot - 1, y), light (slot + 2, y), light (slot - 2, y)};
-    const std::int8_t *slots = slot_of_.data () + std::ptrdiff_t (y) * width_;
+    const std::uint8_t *slots = slot_of_.row (y);
     const int end = Net::kFold * (half (width_) + Net::kReach);
     for (int at = -Net::kFold * Net::kReach; at < end; at++) {
       const int x = mirrored (at, width_);
@@ -126,10 +116,11 @@ Refiner::fold_row (const Field &coded, int slot, int row, float *to) const
  * row of them in a pixel of the network. */
 void
 Refiner::correct_row (
-    const float *change, const float *is_static, int slot, int y, int part)
+    const Frame &frame, const float *change, int slot, int y, int part)
 {
-  const float *from = light_[std::size_t (slot)].row (y);
-  const std::int8_t *slots = slot_of_.data () + std::ptrdiff_t (y) * width_;
+  const float *from = frame.light[std::size_t (slot)].row (y);
+  const float *is_static = frame.is_static.row (y);
+  const std::uint8_t *slots = slot_of_.row (y);
   float *to = refined_[std::size_t (slot)].row (y);
   const int padded = Net::padded (Net::kOutputs);
   for (int x = 0; x < width_; x++) {
@@ -144,45 +135,42 @@ Refiner::correct_row (
  * well, as far as they depend on it, so that the parts do not change the
  * result. */
 void
-Refiner::refine_part (const Kernels &kernels, const Field &coded,
-    const std::function<const float *(int y)> &is_static, int slot, int from,
-    int to)
+Refiner::refine_part (
+    const Kernels &kernels, const Frame &frame, int slot, int from, int to)
 {
   const int first = from - Net::kReach;
   Net::trained ().run (
       kernels, half (width_) + 2 * Net::kReach, to - from + 2 * Net::kReach,
-      [&] (int y, float *row) { fold_row (coded, slot, first + y, row); },
+      [&] (int y, float *row) { fold_row (frame, slot, first + y, row); },
       [&] (int y, const float *change) {
         const int row = first + y;
         if (row < from || row >= to)
           return;
         for (int part = 0; part < Net::kFold; part++)
           if (const int line = Net::kFold * row + part; line < height_)
-            correct_row (change, is_static (line), slot, line, part);
+            correct_row (frame, change, slot, line, part);
       });
 }
 
 bool
 Refiner::run (const Kernels &kernels, const Field &coded,
-    const std::function<const float *(int y)> &is_static,
-    const std::function<void (int y, const float *const *slots)> &sink,
-    Workers &workers, std::stop_token stop)
+    const Field &is_static, std::vector<Field> &light, Workers &workers,
+    std::stop_token stop)
 {
+  for (Field &slot : light)
+    for (int y = 0; y < height_; y++)
+      for (int x = 0; x < width_; x++)
+        slot.row (y)[x] = std::clamp (slot.row (y)[x], 0.0f, kWhite);
   const int rows = half (height_);
   const int parts = slots_ % workers.count () == 0 ? 1 : workers.count ();
   const auto refine = [&] (int task, int) {
     const int part = task % parts;
-    refine_part (kernels, coded, is_static, task / parts, rows * part / parts,
-        rows * (part + 1) / parts);
+    refine_part (kernels, {coded, is_static, light}, task / parts,
+        rows * part / parts, rows * (part + 1) / parts);
   };
   if (!workers.run (slots_ * parts, refine, std::move (stop)))
     return false;
-  std::vector<const float *> slots (refined_.size ());
-  for (int y = 0; y < height_; y++) {
-    for (std::size_t s = 0; s < slots.size (); s++)
-      slots[s] = refined_[s].row (y);
-    sink (y, slots.data ());
-  }
+  light.swap (refined_);
   return true;
 }
 

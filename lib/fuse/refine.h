@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <stop_token>
 #include <string>
 #include <vector>
@@ -35,29 +34,29 @@ public:
   Refiner (const Schedule &schedule, int width, int height, bool noise_free,
       double noise);
 
-  /** Takes row @p y of the fused light, a row for each slot. */
-  void set_row (int y, const float *const *slots);
-  /** Refines what was taken, and gives it row by row.
-   * @p is_static  row y of the weight of static pixels, 0 to 1.
-   * False when it was stopped; nothing is given then. */
-  bool run (const Kernels &kernels, const Field &coded,
-      const std::function<const float *(int y)> &is_static,
-      const std::function<void (int y, const float *const *slots)> &sink,
-      Workers &workers, std::stop_token stop);
+  /** Refines the fused light of every slot.
+   * @p is_static  weight of static pixels, 0 to 1.
+   * False when it was stopped. */
+  bool run (const Kernels &kernels, const Field &coded, const Field &is_static,
+      std::vector<Field> &light, Workers &workers, std::stop_token stop);
 
 private:
-  void refine_part (const Kernels &kernels, const Field &coded,
-      const std::function<const float *(int y)> &is_static, int slot, int from,
-      int to);
-  void fold_row (const Field &coded, int slot, int row, float *to) const;
+  /** A fused frame. */
+  struct Frame {
+    const Field &coded, &is_static;
+    const std::vector<Field> &light;
+  };
+  void refine_part (
+      const Kernels &kernels, const Frame &frame, int slot, int from, int to);
+  void fold_row (const Frame &frame, int slot, int row, float *to) const;
   void correct_row (
-      const float *change, const float *is_static, int slot, int y, int part);
+      const Frame &frame, const float *change, int slot, int y, int part);
 
   int slots_, width_, height_;
   bool noise_free_;
   float noise_;
-  std::vector<std::int8_t> slot_of_; ///< each pixel, row by row
-  std::vector<Field> light_, refined_;
+  FieldOf<std::uint8_t> slot_of_; ///< of each pixel
+  std::vector<Field> refined_;
 };
 
 } // namespace codedexposure::fuse

@@ -46,6 +46,18 @@ max (const float *const *rows, int rows_count, int count, float *to)
           CODEDEXPOSURE_INLINE_BODY { return larger (a, b); });
 }
 
+inline void
+blur (const float *source, std::ptrdiff_t step, const float *weights, int taps,
+    int count, float *to)
+{
+  for (int x = 0; x < count; x += kFloats) {
+    Floats sum = {};
+    for (int t = 0; t < taps; t++)
+      sum += weights[t] * load (source + x + t * step);
+    store (to + x, sum);
+  }
+}
+
 CODEDEXPOSURE_INLINE float
 clamped (float value, float low, float high)
 {
@@ -113,12 +125,6 @@ prefer (const fuse::PreferRow &row, float *const *to)
   }
 }
 
-/* Every second lane of two vectors in a row. */
-template <int First>
-struct Second {
-  static constexpr int at (int lane) { return 2 * lane + First; }
-};
-
 inline void
 sum_blocks (const float *upper, const float *lower, int count, float *to)
 {
@@ -127,8 +133,8 @@ sum_blocks (const float *upper, const float *lower, int count, float *to)
     const Floats a = load (upper + 2 * x) + load (lower + 2 * x);
     const Floats b =
         load (upper + 2 * x + kFloats) + load (lower + 2 * x + kFloats);
-    store (to + x,
-        pick (a, b, Second<0> (), lanes) + pick (a, b, Second<1> (), lanes));
+    store (to + x, pick (a, b, EverySecond<0> (), lanes) +
+                       pick (a, b, EverySecond<1> (), lanes));
   }
 }
 

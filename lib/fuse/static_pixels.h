@@ -3,11 +3,13 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "estimate/observation.h"
+#include "fuse/bands.h"
 #include "fuse/box_filter.h"
-#include "fuse/field.h"
+#include "fuse/coded_stream.h"
 
 namespace codedexposure::fuse
 {
@@ -16,6 +18,14 @@ namespace codedexposure::fuse
  * units of the fields (255 for white). Rows repeat with the tile. */
 struct NoiseMap {
   Field slope, offset;
+
+  NoiseMap (
+      const Schedule &schedule, const Observation &observation, Extent size);
+  const float *slopes (int y) const { return slope.row (y % slope.height ()); }
+  const float *offsets (int y) const
+  {
+    return offset.row (y % slope.height ());
+  }
 };
 
 /**
@@ -37,76 +47,56 @@ public:
   /** Frames before a frame on which its results can depend. */
   static constexpr int kMemory = 16;
 
-  /** @p radius   of the surroundings, which contain every slot, px.
+  /** @p noise    outlives this.
+   *  @p radius   of the surroundings, which contain every slot, px.
    *  @p average  over frames.
    *  @p largest  light of a pixel, 255 for white. */
-  StaticPixels (int width, int height, int radius, bool average, float largest);
+  StaticPixels (const NoiseMap &noise, Extent size, int radius, bool average,
+      float largest);
   int radius () const { return radius_; }
-  /** The radius for a tile with this cell. */
-  static int radius_of (Extent cell);
 
-  /** Room for threads of number 0 .. @p count - 1. */
-  void make_room (int count);
+  /** Of a coded frame. */
+  struct Found {
+    const Field &weight; ///< of light: 0, moving, to 1, static
+    const Field &light;  ///< the picture of static pixels
+    const Field *mean, *count;
 
-  /** The next coded frame, and those before and after it or null. */
-  struct Frames {
-    const Field &coded;
-    const Field *before, *after;
-    const NoiseMap &noise;
+    /** Frames of which light is the mean. */
+    float frames (int x, int y) const
+    {
+      return mean && light.row (y)[x] == mean->row (y)[x] ? count->row (y)[x]
+                                                          : 1.0f;
+    }
   };
-  /** Some rows, and the thread that computes them. */
-  struct Rows {
-    int first, end;
-    int worker;
-  };
-  /* The frame is taken in these steps: each for all rows, the first one for a
-   * row before the second one, which is for all rows before the third one. */
-  /** Prediction errors of row @p row of blocks of 2x2 pixels, by which
-   * repetition is detected: sums of squared errors over @p area pixels around
-   * each block, if the scene is static and if every slot shows a different
-   * picture. */
-  void set_errors (const Kernels &kernels, int row, int area,
-      const float *if_static, const float *if_moving);
-  void compare (const Kernels &kernels, const Frames &frames, Rows rows);
-  /** After it, weight () and light () of these rows are those of the frame. */
-  void average (const Kernels &kernels, const Frames &frames, Rows rows);
-  /** After these steps. */
-  void finish (const Frames &frames);
-
+  /** Takes the next coded frame, and finds its static pixels.
+   * @p unrepeated  see Predictions::Found.
+   * Nothing when it was stopped. Valid until the next one is taken. */
+  std::optional<Found> take (const Kernels &kernels, const CodedFrames &frames,
+      const Field &unrepeated, Workers &workers, std::stop_token stop);
   /**
    * With noise, static pixels of a smooth picture are truer if they are also
    * averaged over their surroundings.
-   * @p light  the estimates of a static pixel. Becomes its light (), moved
+   * @p light  the estimates of a static pixel. Becomes its light, moved
    *           towards them by the part of the squared differences around it
    *           that noise explains: a local Wiener filter.
    */
-  void smooth (const Kernels &kernels, const Frames &frames, Field &light);
+  void smooth (const Kernels &kernels, const Found &found, Field &light);
 
   /** Forgets all frames. */
   void forget () { frames_ = 0; }
 
-  /** Weight of light (): 0, moving, to 1, static. */
-  const float *weight (int y) const { return weight_.row (y); }
-  /** The picture of static pixels of @p coded. */
-  const float *light (const Field &coded, int y) const
-  {
-    return average_ ? light_.row (y) : coded.row (y);
-  }
-  /** Frames of which light () is the mean. */
-  float frames (int x, int y) const
-  {
-    return average_ && light_.row (y)[x] == mean_.row (y)[x]
-               ? count_.row (y)[x]
-               : 1.0f;
-  }
-
 private:
-  void compare_frames (const Kernels &kernels, const Field &now,
-      const Field &other, const Field *count, const NoiseMap &noise, Rows rows,
+  /** Two coded frames and what their differences are compared with. */
+  struct Pair {
+    const Field &now, &other;
+    const Field *count; ///< frames of which other is the mean; null: one
+    const Field &unrepeated;
+  };
+  void compare (const Kernels &kernels, const Pair &pair, const Band &band,
       Field &rating);
   void average_row (int y, const float *now);
-  std::uint16_t *past_row (std::int64_t frame, int y);
 
+  const NoiseMap &noise_;
   int radius_;
   bool average_;
   float steps_;             ///< of past_, per grey level
@@ -120,7 +110,6 @@ private:
     BoxFilter sums, maxima;
   };
   std::vector<Room> rooms_; ///< one at least
-  Field unrepeated_;        ///< of blocks: 1 where no repetition is detected
   Field weight_;
   Field unchanged_;       ///< from the last frame to the next: 1, none changed
   bool compared_ = false; ///< unchanged_ is of the next frame

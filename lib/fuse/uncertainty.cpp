@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimate/kriging.h"
 #include "fuse/box_filter.h"
+#include "fuse/models.h"
 #include "fuse/uncertainty_factors.h"
 
 namespace codedexposure::fuse
@@ -19,89 +19,56 @@ constexpr float kFloor = 0.25f;
 /* V is that of a typical moving scene without noise. */
 constexpr double kRadius = 5.5, kNoise = 1e-3;
 
-/* Of the slots at the middle of @taps, from all of them. */
-std::vector<double>
-kriging_variances (const CodedCovariance &covariance,
-    std::span<const Offset> taps, std::span<const int> elements,
-    std::span<const double> noise)
+/* Logarithms to base 2 of V, by distinct row, phase and slot. */
+std::vector<float>
+geometry_of (FilterPlan plan)
 {
-  KrigingSystem system = slot_equations (covariance, taps, elements, noise);
-  const std::size_t m = taps.size (), n = std::size_t (covariance.slots ());
-  system.flat.assign (m, 1.0);
-  system.flat_targets.assign (n, 1.0);
-  const std::vector<double> weights = solve_kriging (system);
-  std::vector<double> variances;
-  for (std::size_t s = 0; s < n; s++) {
-    const double *w = weights.data () + s * m;
-    double variance = 1.0;
-    for (std::size_t i = 0; i < m; i++) {
-      variance +=
-          w[i] * (w[i] * system.noise[i] - 2.0 * system.targets[s * m + i]);
-      for (std::size_t j = i; j < m; j++)
-        variance +=
-            (i == j ? 1.0 : 2.0) * w[i] * w[j] * system.covariance[i * m + j];
-    }
-    variances.push_back (std::max (variance, kNoise));
-  }
-  return variances;
+  plan.noise.assign (plan.noise.size (), kNoise);
+  std::vector<float> geometry;
+  for_each_phase (plan, kFastMotion, taps_within (kRadius),
+      [&] (int, int, const PhaseWeights &weights) {
+        for (const double variance : weights.slot_variances)
+          geometry.push_back (float (std::log2 (std::max (variance, kNoise))));
+      });
+  return geometry;
+}
+
+float
+log_of (float square)
+{
+  return std::log2 (std::max (square, 0.0f) + kFloor);
 }
 
 } // namespace
 
-Uncertainty::Uncertainty (const Schedule &schedule, const Phases &phases,
-    const Observation &observation, FuseQuality quality,
-    const SceneClass &scene, Extent size, double depth)
-    : phases_ (phases), slots_ (observation.slots ()), width_ (size.width),
-      height_ (size.height), quality_ (quality),
-      noise_free_ (observation.noise_free ()),
+Uncertainty::Uncertainty (const Schedule &schedule, const FilterPlan &plan,
+    FuseQuality quality, Extent size, double depth)
+    : phases_ (plan.phases), slots_ (plan.observation.slots ()),
+      quality_ (quality), noise_free_ (plan.observation.noise_free ()),
       rounding_ (float (255.0 * 255.0 / (12.0 * depth * depth))),
-      misfit_ (size.width, size.height),
-      light_ (std::size_t (slots_), Field (size.width, size.height))
+      slot_of_ (size.width, size.height), geometry_ (geometry_of (plan))
 {
-  for (int y = 0; y < height_; y++)
-    for (int x = 0; x < width_; x++) {
-      const SlotShares &shares =
-          observation.shares (schedule.element_at (x, y));
-      slot_of_.push_back (
-          observation.exact () ? std::int8_t (shares[0].slot) : -1);
+  for (int y = 0; y < size.height; y++)
+    for (int x = 0; x < size.width; x++) {
+      const int element = schedule.element_at (x, y);
+      slot_of_.row (y)[x] = std::int16_t (
+          plan.observation.exact () ? plan.observation.shares (element)[0].slot
+                                    : -1);
     }
-  find_geometry (observation, scene);
-}
-
-void
-Uncertainty::find_geometry (
-    const Observation &observation, const SceneClass &scene)
-{
-  const std::vector<Offset> places = disc (kRadius);
-  const std::vector<Tap> taps = taps_within (kRadius);
-  const CodedCovariance covariance (
-      scene, observation.shares (), slots_, 2 * int (kRadius));
-  const std::vector<double> noise (observation.shares ().size (), kNoise);
-  for (int row = 0; row < phases_.rows (); row++)
-    for (int x = 0; x < phases_.period (); x++)
-      for (const double variance : kriging_variances (
-               covariance, places, phases_.elements (row, x, taps), noise))
-        geometry_.push_back (float (std::log2 (variance)));
-}
-
-void
-Uncertainty::set_row (int y, const float *const *slots)
-{
-  for (int s = 0; s < slots_; s++)
-    std::copy_n (slots[s], width_, light_[std::size_t (s)].row (y));
 }
 
 void
 Uncertainty::differences (
-    const Field &coded, int slot, int y, float *change, float *rough) const
+    const Frame &frame, int slot, int y, float *change, float *rough) const
 {
-  const Field &light = light_[std::size_t (slot)];
-  const float *own = light.row (y), *seen = coded.row (y);
-  const float *above = light.row (mirrored (y - 1, height_));
-  const float *below = light.row (mirrored (y + 1, height_));
-  for (int x = 0; x < width_; x++) {
-    const float left = own[mirrored (x - 1, width_)];
-    const float right = own[mirrored (x + 1, width_)];
+  const Field &light = frame.light[std::size_t (slot)];
+  const int width = light.width (), height = light.height ();
+  const float *own = light.row (y), *seen = frame.coded.row (y);
+  const float *above = light.row (mirrored (y - 1, height));
+  const float *below = light.row (mirrored (y + 1, height));
+  for (int x = 0; x < width; x++) {
+    const float left = own[mirrored (x - 1, width)];
+    const float right = own[mirrored (x + 1, width)];
     const float apart = own[x] - seen[x];
     const float bent =
         own[x] - 0.25f * ((left + right) + (above[x] + below[x]));
@@ -110,61 +77,30 @@ Uncertainty::differences (
   }
 }
 
+/* Row @y. @change, @rough: sums of differences () around its pixels. */
 void
-Uncertainty::visit_slot (
-    const Kernels &kernels, const Frame &frame, int slot, const Use &use) const
+Uncertainty::set_pixels (const Frame &frame, int slot, int y,
+    const float *change, const float *rough, std::vector<Pixel> &pixels) const
 {
   constexpr float kArea = (2 * kAround + 1) * (2 * kAround + 1);
-  BoxFilter changes (width_, height_, kAround), roughs (changes);
-  Field rows (width_, 2, kAround);
-  std::vector<Pixel> pixels;
-  pixels.resize (std::size_t (width_));
-  for (int y = 0; y < height_ + kAround; y++) {
-    if (y < height_) {
-      differences (frame.coded, slot, y, rows.row (0), rows.row (1));
-      for (int i = 0; i < 2; i++) {
-        BoxFilter &box = i ? roughs : changes;
-        box.extend (rows.row (i));
-        box.add_row (kernels.sum, y, rows.row (i));
-      }
-    }
-    const int out = y - kAround;
-    if (out < 0)
-      continue;
-    const float *change = changes.result (kernels.sum, out);
-    const float *rough = roughs.result (kernels.sum, out);
-    const float *light = light_[std::size_t (slot)].row (out);
-    const float *misfit = misfit_.row (out);
-    const int noise_row = out % frame.noise.slope.height ();
-    const float *slope = frame.noise.slope.row (noise_row);
-    const float *offset = frame.noise.offset.row (noise_row);
-    const std::int8_t *slots = slot_of_.data () + std::ptrdiff_t (out) * width_;
-    const int period = phases_.period ();
-    const float *geometry =
-        geometry_.data () +
-        std::ptrdiff_t (phases_.row_of (out)) * period * slots_ + slot;
-    for (int x = 0; x < width_; x++) {
-      const float noise = slope[x] * std::max (light[x], 0.0f) + offset[x];
-      const auto log_of = [] (float square) {
-        return std::log2 (std::max (square, 0.0f) + kFloor);
-      };
-      pixels[std::size_t (x)] = {log_of (misfit[x] - noise),
-          log_of (change[x] / kArea - noise), log_of (rough[x] / kArea),
-          geometry[std::ptrdiff_t ((x + phases_.shift (out)) % period) *
-                   slots_],
-          noise, slots[x] == slot};
-    }
-    use (slot, out, pixels.data ());
+  const Field &blocks = frame.misfit;
+  const float *light = frame.light[std::size_t (slot)].row (y);
+  const float *misfit = blocks.row (std::min (y / 2, blocks.height () - 1));
+  const float *slope = frame.noise.slopes (y);
+  const float *offset = frame.noise.offsets (y);
+  const std::int16_t *slots = slot_of_.row (y);
+  const int period = phases_.period (), shift = phases_.shift (y);
+  const float *geometry =
+      geometry_.data () +
+      std::ptrdiff_t (phases_.row_of (y)) * period * slots_ + slot;
+  for (int x = 0; x < slot_of_.width (); x++) {
+    const float noise = slope[x] * std::max (light[x], 0.0f) + offset[x];
+    const float of_block = misfit[std::min (x / 2, blocks.width () - 1)];
+    pixels[std::size_t (x)] = {log_of (of_block - noise),
+        log_of (change[x] / kArea - noise), log_of (rough[x] / kArea),
+        geometry[std::ptrdiff_t ((x + shift) % period) * slots_], noise,
+        slots[x] == slot};
   }
-}
-
-bool
-Uncertainty::each_row (const Kernels &kernels, const Frame &frame,
-    const Use &use, Workers &workers, std::stop_token stop) const
-{
-  return workers.run (
-      slots_, [&] (int slot, int) { visit_slot (kernels, frame, slot, use); },
-      std::move (stop));
 }
 
 /* A measured pixel without noise is the light. */
@@ -181,25 +117,51 @@ Uncertainty::deviation (const Pixel &pixel) const
   return std::sqrt (estimated * estimated + by.noise * pixel.noise);
 }
 
+void
+Uncertainty::run_slot (const Kernels &kernels, const Frame &frame, int slot,
+    const Sink &sink) const
+{
+  const int width = frame.coded.width (), height = frame.coded.height ();
+  BoxFilter changes (width, height, kAround), roughs (changes);
+  Field rows (width, 2, kAround);
+  Field deviations (width, 1);
+  std::vector<Pixel> pixels (std::size_t (slot_of_.width ()));
+  for (int y = 0; y < height + kAround; y++) {
+    if (y < height) {
+      differences (frame, slot, y, rows.row (0), rows.row (1));
+      for (int i = 0; i < 2; i++) {
+        BoxFilter &box = i ? roughs : changes;
+        box.extend (rows.row (i));
+        box.add_row (kernels.sum, y, rows.row (i));
+      }
+    }
+    const int out = y - kAround;
+    if (out < 0)
+      continue;
+    set_pixels (frame, slot, out, changes.result (kernels.sum, out),
+        roughs.result (kernels.sum, out), pixels);
+    const float *weight = frame.still.weight.row (out);
+    for (int x = 0; x < width; x++) {
+      const Pixel &seen = pixels[std::size_t (x)];
+      const float still = weight[x], moving = 1.0f - still;
+      const float estimated = moving > 0.0f ? deviation (seen) : 0.0f;
+      const float mean =
+          noise_free_ ? 0.0f : seen.noise / frame.still.frames (x, out);
+      deviations.row (0)[x] =
+          std::sqrt (still * still * mean +
+                     moving * moving * estimated * estimated + rounding_);
+    }
+    sink ({slot, out, deviations.row (0), pixels.data (), weight});
+  }
+}
+
 bool
 Uncertainty::run (const Kernels &kernels, const Frame &frame, const Sink &sink,
     Workers &workers, std::stop_token stop) const
 {
-  const auto use = [&] (int slot, int y, const Pixel *pixels) {
-    const float *weight = frame.still.weight (y);
-    std::vector<float> deviations;
-    for (int x = 0; x < width_; x++) {
-      const float still = weight[x], moving = 1.0f - still;
-      const float estimated = moving > 0.0f ? deviation (pixels[x]) : 0.0f;
-      const float mean =
-          noise_free_ ? 0.0f : pixels[x].noise / frame.still.frames (x, y);
-      deviations.push_back (
-          std::sqrt (still * still * mean +
-                     moving * moving * estimated * estimated + rounding_));
-    }
-    sink (slot, y, deviations.data ());
-  };
-  return each_row (kernels, frame, use, workers, std::move (stop));
+  return workers.run (
+      slots_, [&] (int slot, int) { run_slot (kernels, frame, slot, sink); },
+      std::move (stop));
 }
 
 } // namespace codedexposure::fuse

@@ -8,10 +8,7 @@
 #include <vector>
 
 #include "base/workers.h"
-#include "estimate/observation.h"
-#include "fuse/field.h"
 #include "fuse/fuser.h"
-#include "fuse/kernels.h"
 #include "fuse/phases.h"
 #include "fuse/static_pixels.h"
 
@@ -39,58 +36,56 @@ struct UncertaintyFactors {
 class Uncertainty
 {
 public:
-  /** @p scene  of V.
+  /** @p plan   outlives this.
    *  @p depth  steps of pixels from black to white; they are rounded. */
-  Uncertainty (const Schedule &schedule, const Phases &phases,
-      const Observation &observation, FuseQuality quality,
-      const SceneClass &scene, Extent size, double depth);
+  Uncertainty (const Schedule &schedule, const FilterPlan &plan,
+      FuseQuality quality, Extent size, double depth);
 
-  /** To be written for each frame: A. */
-  Field &misfit () { return misfit_; }
-  /** Takes row @p y of the fused light, a row for each slot. */
-  void set_row (int y, const float *const *slots);
-
+  /** A fused frame. */
   struct Frame {
     const Field &coded;
     const NoiseMap &noise;
-    const StaticPixels &still;
+    const StaticPixels::Found &still;
+    const Field &misfit;             ///< A, of blocks of 2x2 pixels
+    const std::vector<Field> &light; ///< of each slot
   };
-  /** Row @p y of @p slot, in grey levels. Threads may call it for different
-   * slots at the same time. */
-  using Sink = std::function<void (int slot, int y, const float *deviation)>;
-  /** False when it was stopped. */
-  bool run (const Kernels &kernels, const Frame &frame, const Sink &sink,
-      Workers &workers, std::stop_token stop) const;
-
-  /** What the deviation of a row of a slot is computed from: the logarithms to
-   * base 2 of A, D, L and V, and N. Measured pixels saw the slot, and no other
-   * one. For tests/quality/uncertainty. */
+  /** What the deviation of a pixel is computed from: the logarithms to base 2
+   * of A, D, L and V, and N. Measured pixels saw the slot, and no other one. */
   struct Pixel {
     float misfit, change, roughness, geometry, noise;
     bool measured;
   };
-  using Use = std::function<void (int slot, int y, const Pixel *pixels)>;
-  bool each_row (const Kernels &kernels, const Frame &frame, const Use &use,
+  /** Deviations in grey levels, and what those of pixels that are not static
+   * were computed from. Threads may call it for different slots at the same
+   * time. */
+  struct Row {
+    int slot, y;
+    const float *deviations;
+    const Pixel *pixels;
+    const float *is_static;
+  };
+  using Sink = std::function<void (const Row &row)>;
+  /** False when it was stopped. */
+  bool run (const Kernels &kernels, const Frame &frame, const Sink &sink,
       Workers &workers, std::stop_token stop) const;
 
 private:
-  void find_geometry (const Observation &observation, const SceneClass &scene);
-  void visit_slot (const Kernels &kernels, const Frame &frame, int slot,
-      const Use &use) const;
+  void run_slot (const Kernels &kernels, const Frame &frame, int slot,
+      const Sink &sink) const;
   /** Squared D and L of row @p y, before their mean. */
   void differences (
-      const Field &coded, int slot, int y, float *change, float *rough) const;
+      const Frame &frame, int slot, int y, float *change, float *rough) const;
+  void set_pixels (const Frame &frame, int slot, int y, const float *change,
+      const float *rough, std::vector<Pixel> &pixels) const;
   float deviation (const Pixel &pixel) const;
 
   const Phases &phases_;
-  int slots_, width_, height_;
+  int slots_;
   FuseQuality quality_;
   bool noise_free_;
-  float rounding_;                   ///< variance
-  std::vector<std::int8_t> slot_of_; ///< each pixel, row by row; -1: several
-  std::vector<float> geometry_;      ///< by distinct row, phase and slot
-  Field misfit_;
-  std::vector<Field> light_; ///< of each slot
+  float rounding_;                ///< variance
+  FieldOf<std::int16_t> slot_of_; ///< of each pixel; -1: several
+  std::vector<float> geometry_;   ///< by distinct row, phase and slot
 };
 
 } // namespace codedexposure::fuse

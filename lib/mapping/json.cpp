@@ -2,9 +2,6 @@
 /* The versioned JSON form of mappings: docs/formats.md. */
 #include "mapping/json.h"
 
-#include "base/file.h"
-#include "base/text.h"
-
 namespace codedexposure
 {
 
@@ -62,16 +59,12 @@ Mapping
 read_mapping (const Json &root)
 {
   Mapping::Parts parts;
-  const auto extent_into = [] (Extent &to) {
-    return integers_into ({&to.width, &to.height}, Mapping::kMaxSize,
-        "two whole numbers, width and height");
-  };
   read_versioned (root, kHead,
       "a mapping needs at least format, version, camera, mirrors and "
       "homography",
       {
-          {"camera", extent_into (parts.camera), true},
-          {"mirrors", extent_into (parts.mirrors), true},
+          {"camera", size_into (parts.camera, Mapping::kMaxSize), true},
+          {"mirrors", size_into (parts.mirrors, Mapping::kMaxSize), true},
           {"homography", numbers_into (parts.homography), true},
           {"covariance",
               [&parts] (const Json &value, const std::string &key) {
@@ -117,18 +110,8 @@ Mapping::to_json () const
 
 Result<Mapping>
 Mapping::load (const std::string &path)
-try {
-  const auto text = read_file (path, kMaxJsonSize);
-  if (!text)
-    return text.error ().with_prefix (
-        "mapping file " + in_quotes (path, 200) + ": ");
-  auto mapping = from_json (*text);
-  if (!mapping)
-    return mapping.error ().with_prefix (
-        "file " + in_quotes (path, 200) + ": ");
-  return mapping;
-} catch (const std::bad_alloc &) {
-  return out_of_memory ();
+{
+  return load_json (path, "mapping file", kMaxJsonSize, from_json);
 }
 
 Result<void>

@@ -155,6 +155,7 @@ struct Block {
   std::uint64_t at = 0;
   std::size_t size = 0;
   Memory data;
+  std::size_t on_disk = 0; ///< of them, from the first on
 };
 
 /** Past the page cache. */
@@ -165,6 +166,7 @@ public:
       : OpenFile (std::move (path), std::move (file), reserved),
         direct_ (std::move (direct)), last_ (new_block (0))
   {
+    spare_.reserve (kMostBlocks); // so that the thread needs no memory
     thread_ = std::jthread ([this] (std::stop_token stop) { serve (stop); });
   }
 
@@ -178,6 +180,8 @@ private:
   static constexpr std::size_t kMostQueued = 4;
   /** For muxers that go back over frames of 16 bits and 32 megapixels. */
   static constexpr std::uint64_t kMostHeld = 64 << 20;
+  static constexpr std::size_t kMostBlocks =
+      kMostHeld / kBlock + kMostQueued + 3;
 
   /** What the thread writes: a block, or a few bytes of one that it has
    * written. */
@@ -195,7 +199,7 @@ private:
   Result<void> pass (Job job);
   Result<void> release (std::uint64_t hold);
   Result<void> write_all ();
-  int write_direct (const std::byte *data, std::size_t size, std::uint64_t at);
+  int write_direct (const Block &block, std::size_t end);
   int write_job (const Job &job);
   void serve (std::stop_token stop);
 
@@ -280,17 +284,24 @@ DirectFile::change (const std::byte *data, std::size_t size)
     RETURN_IF_ERROR (
         pass ({.at = position_, .bytes = std::vector (data, data + early)}));
   }
-  const auto change_in = [&] (Block &block) {
+  /* Of what is on the disk, only these bytes are written again. */
+  const auto change_in = [&] (Block &block) -> Result<void> {
     const auto begin = std::max (position_, block.at);
     const auto stop = std::min (position_ + size, block.at + block.size);
-    if (begin < stop)
-      std::memcpy (block.data.get () + (begin - block.at),
-          data + (begin - position_), std::size_t (stop - begin));
+    if (begin >= stop)
+      return {};
+    const std::byte *from = data + (begin - position_);
+    std::memcpy (block.data.get () + (begin - block.at), from,
+        std::size_t (stop - begin));
+    const auto known = std::min (stop, block.at + block.on_disk);
+    if (begin >= known)
+      return {};
+    return pass (
+        {.at = begin, .bytes = std::vector (from, from + (known - begin))});
   };
   for (Block &block : held_)
-    change_in (block);
-  change_in (last_);
-  return {};
+    RETURN_IF_ERROR (change_in (block));
+  return change_in (last_);
 }
 
 /** To the thread, when it has room. */
@@ -330,10 +341,12 @@ DirectFile::write_all ()
   changed_.wait (lock, [this] { return error_ != 0 || jobs_.empty (); });
   if (error_ == 0) {
     const std::size_t whole = aligned (last_.size);
-    error_ = write_direct (last_.data.get (), whole, last_.at);
+    error_ = write_direct (last_, whole);
     if (error_ == 0)
       error_ = file_.write (
           last_.data.get () + whole, last_.size - whole, last_.at + whole);
+    if (error_ == 0)
+      last_.on_disk = last_.size;
   }
   written_ = Clock::now ();
   return checked (error_);
@@ -346,20 +359,24 @@ DirectFile::finish ()
   return free_reserve (end ());
 }
 
+/* What is not on the disk yet, up to @end, which is aligned. */
 int
-DirectFile::write_direct (
-    const std::byte *data, std::size_t size, std::uint64_t at)
+DirectFile::write_direct (const Block &block, std::size_t end)
 {
-  const int error = direct_.write (data, size, at);
+  const std::size_t begin = aligned (block.on_disk);
+  if (begin >= end)
+    return 0;
+  const std::byte *data = block.data.get () + begin;
+  const int error = direct_.write (data, end - begin, block.at + begin);
   /* Of a disk with larger sectors. */
-  return error == EINVAL ? file_.write (data, size, at) : error;
+  return error == EINVAL ? file_.write (data, end - begin, block.at + begin)
+                         : error;
 }
 
 int
 DirectFile::write_job (const Job &job)
 {
-  return job.block ? write_direct (
-                         job.block->data.get (), job.block->size, job.block->at)
+  return job.block ? write_direct (*job.block, job.block->size)
                    : file_.write (job.bytes.data (), job.bytes.size (), job.at);
 }
 

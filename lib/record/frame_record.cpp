@@ -111,6 +111,7 @@ record_json (const FrameRecord &record)
 {
   OrderedJson line;
   line["frame"] = record.frame;
+  set_known (line, "slot", record.slot);
   set_known (line, "pts_ns", record.pts);
   set_known (line, "duration_ns", record.duration);
   set_known (line, "exposure_start_ns", record.exposure_start);
@@ -136,6 +137,7 @@ read_record (const Json &object)
 {
   FrameRecord record;
   read_whole (object, "frame", record.frame);
+  read_known (object, "slot", record.slot);
   read_time (object, "pts_ns", record.pts);
   read_time (object, "duration_ns", record.duration);
   read_time (object, "exposure_start_ns", record.exposure_start);

@@ -20,6 +20,7 @@ constexpr Nanoseconds kFarthestTime = Nanoseconds (1) << 61;
  * docs/formats.md, "Per-frame track". */
 struct FrameRecord {
   std::uint64_t frame = 0; ///< its number, lost frames counted
+  std::optional<int> slot; ///< of a picture that was decoded from it, from 0
   std::optional<Nanoseconds> pts;
   std::optional<Nanoseconds> duration;
   std::optional<Nanoseconds> exposure_start;

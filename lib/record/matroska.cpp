@@ -3,10 +3,17 @@
 
 #include <algorithm>
 #include <bit>
+#include <cerrno>
 #include <cstdint>
-#include <fstream>
-#include <optional>
-#include <string_view>
+#include <cstring>
+#include <functional>
+#include <utility>
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "record/track.h"
 
 namespace codedexposure
 {
@@ -16,44 +23,60 @@ namespace
 
 /* Names of elements (RFC 9559). */
 constexpr std::uint64_t kEbml = 0x1a45dfa3, kSegment = 0x18538067,
-                        kSeekHead = 0x114d9b74, kSeek = 0x4dbb,
-                        kSeekId = 0x53ab, kSeekPosition = 0x53ac,
+                        kInfo = 0x1549a966, kTimestampScale = 0x2ad7b1,
                         kTracks = 0x1654ae6b, kTrackEntry = 0xae,
-                        kTrackType = 0x83, kName = 0x536e, kVideo = 0xe0,
-                        kPixelWidth = 0xb0, kPixelHeight = 0xba,
-                        kDefaultDuration = 0x23e383, kCluster = 0x1f43b675,
-                        kTags = 0x1254c367, kTag = 0x7373, kSimpleTag = 0x67c8,
-                        kTagString = 0x4487;
-constexpr char kTextTrack = 0x11;
-/** Where the end of the file does not limit an element. */
+                        kTrackNumber = 0xd7, kTrackType = 0x83, kCodecId = 0x86,
+                        kCodecPrivate = 0x63a2, kDefaultDuration = 0x23e383,
+                        kVideo = 0xe0, kPixelWidth = 0xb0, kPixelHeight = 0xba,
+                        kColourSpace = 0x2eb524, kCluster = 0x1f43b675,
+                        kTimestamp = 0xe7, kBlockGroup = 0xa0, kBlock = 0xa1,
+                        kSimpleBlock = 0xa3;
+constexpr std::uint64_t kVideoTrack = 1, kTextTrack = 0x11;
+/** Where nothing else limits an element. */
 constexpr std::uint64_t kUnlimited = std::uint64_t (1) << 60;
 
 /** Positions in the file. */
 struct Element {
-  std::uint64_t id, begin, data, end;
+  std::uint64_t id, data, end;
+  bool is_open; ///< its size is not known
 };
 
-class File
+/** Reads a file, or a part of it that is in memory. */
+class Source
 {
 public:
-  File (const std::string &path, std::ios::openmode mode)
-      : stream_ (path, mode | std::ios::binary)
+  /** @p fetch copies bytes from a position, fewer at the end. */
+  using Fetch = std::function<std::string (std::uint64_t, std::size_t)>;
+
+  Source (Fetch fetch, std::uint64_t size)
+      : fetch_ (std::move (fetch)), size_ (size)
   {
-    stream_.seekg (0, std::ios::end);
-    size_ = std::uint64_t (stream_.tellg ());
   }
 
-  bool good () const { return stream_.good (); }
   std::uint64_t size () const { return size_; }
 
-  /** None if it does not end by @p limit. */
+  /** Valid until the next call; shorter at the end of the file. */
+  std::string_view bytes (std::uint64_t at, std::size_t length)
+  {
+    constexpr std::size_t kPage = 4096;
+    if (at < begin_ || at + length > begin_ + window_.size ()) {
+      window_ = fetch_ (at, std::max (length, kPage));
+      begin_ = at;
+    }
+    return std::string_view (window_).substr (at - begin_, length);
+  }
+  /** None if it is damaged or begins at @p limit. */
   std::optional<Element> element_at (std::uint64_t at, std::uint64_t limit)
   {
     const auto id = number_at (at, limit, true);
     const auto size = id ? number_at (id->end, limit, false) : std::nullopt;
-    if (!size || size->value > limit - size->end)
+    if (!size)
       return std::nullopt;
-    return Element{id->value, at, size->end, size->end + size->value};
+    if (size->is_unknown)
+      return Element{id->value, size->end, limit, true};
+    if (size->value > limit - size->end)
+      return std::nullopt;
+    return Element{id->value, size->end, size->end + size->value, false};
   }
   /** Calls @p use for each child of @p parent until it returns false. */
   template <typename Use>
@@ -66,68 +89,313 @@ public:
       at = child->end;
     }
   }
-  /** Up to its first zero, which ends a text before its element does. */
-  std::string text (const Element &element)
-  {
-    return content (element).c_str ();
-  }
   std::uint64_t number (const Element &element)
   {
     std::uint64_t value = 0;
-    for (const char byte :
-        read (element.data,
-            std::min<std::uint64_t> (element.end - element.data, sizeof value)))
+    for (const char byte : text (element, sizeof value))
       value = value << 8 | std::uint8_t (byte);
     return value;
   }
-  std::string content (const Element &element)
+  std::string_view text (const Element &element, std::size_t most)
   {
-    constexpr std::uint64_t kLongest = 16 << 20;
-    return read (element.data, std::min (element.end - element.data, kLongest));
+    return bytes (element.data, std::size_t (std::min<std::uint64_t> (
+                                    element.end - element.data, most)));
   }
-  void write (std::uint64_t at, std::string_view bytes)
-  {
-    stream_.seekp (std::streamoff (at));
-    stream_.write (bytes.data (), std::streamsize (bytes.size ()));
-    stream_.flush ();
-  }
-
-private:
   struct Number {
     std::uint64_t value, end;
+    bool is_unknown;
   };
-
-  std::string read (std::uint64_t at, std::uint64_t length)
-  {
-    std::string bytes (length, '\0');
-    stream_.seekg (std::streamoff (at));
-    stream_.read (bytes.data (), std::streamsize (length));
-    return bytes;
-  }
   /** The zeros before the first one say how many bytes follow; names keep that
    * one. */
   std::optional<Number> number_at (
       std::uint64_t at, std::uint64_t limit, bool is_name)
   {
-    if (at >= limit)
+    const std::string_view seen = at < limit ? bytes (at, 8) : "";
+    if (seen.empty ())
       return std::nullopt;
-    const auto first = std::uint8_t (read (at, 1)[0]);
-    const int length = std::countl_zero (first) + 1;
-    if (length > 8 || std::uint64_t (length) > limit - at)
+    const auto first = std::uint8_t (seen[0]);
+    const std::size_t length = std::size_t (std::countl_zero (first)) + 1;
+    if (length > seen.size () || length > limit - at)
       return std::nullopt;
-    std::uint64_t value = is_name ? first : first & (0xffU >> length);
-    for (const char byte : read (at + 1, std::uint64_t (length) - 1))
+    const std::uint64_t mask = (std::uint64_t (1) << 7 * length) - 1;
+    std::uint64_t value = first;
+    for (const char byte : seen.substr (1, length - 1))
       value = value << 8 | std::uint8_t (byte);
-    return Number{value, at + std::uint64_t (length)};
+    if (!is_name)
+      value &= mask;
+    return Number{value, at + length, !is_name && value == mask};
   }
 
-  std::fstream stream_;
-  std::uint64_t size_ = 0;
+private:
+  Fetch fetch_;
+  std::uint64_t size_;
+  std::uint64_t begin_ = 0;
+  std::string window_;
 };
 
-/** The text that gst_value_serialize () quoted; none: it is not quoted. */
+/* ----------------------------------------------------------------- head -- */
+
+/** The segment of a file that is not finished has no size. */
+std::optional<Element>
+segment_of (Source &file)
+{
+  const auto head = file.element_at (0, file.size ());
+  if (!head || head->id != kEbml)
+    return std::nullopt;
+  const auto segment = file.element_at (head->end, kUnlimited);
+  return segment && segment->id == kSegment ? segment : std::nullopt;
+}
+
+int
+pixel_bytes_of (std::string_view format)
+{
+  constexpr std::string_view kOfFfmpeg ("Y1\0\x10", 4);
+  if (format == "Y800" || format == "GREY")
+    return 1;
+  /* The second is in streams of earlier versions. */
+  return format == kOfFfmpeg || format == "Y16 " ? 2 : 0;
+}
+
+void
+read_video (Source &file, const Element &video, MatroskaHead &head)
+{
+  constexpr std::uint64_t kLargest = 1 << 24;
+  file.each (video, [&] (const Element &part) {
+    if (part.id == kPixelWidth)
+      head.size.width = int (std::min (file.number (part), kLargest));
+    else if (part.id == kPixelHeight)
+      head.size.height = int (std::min (file.number (part), kLargest));
+    else if (part.id == kColourSpace)
+      head.pixel_bytes = pixel_bytes_of (file.text (part, 4));
+    return true;
+  });
+}
+
+MatroskaHead::Codec
+codec_of (std::string_view name, std::string_view setup)
+{
+  constexpr std::size_t kFourCc = 16; // its place in a BITMAPINFOHEADER
+  using Codec = MatroskaHead::Codec;
+  if (name == "V_UNCOMPRESSED")
+    return Codec::raw;
+  const bool is_ffv1 =
+      name == "V_FFV1" || (name == "V_MS/VFW/FOURCC" &&
+                              setup.substr (std::min (setup.size (), kFourCc))
+                                  .starts_with ("FFV1"));
+  return is_ffv1 ? Codec::ffv1 : Codec::other;
+}
+
+void
+read_track (Source &file, const Element &entry, MatroskaHead &head)
+{
+  constexpr std::size_t kLongest = 64;
+  std::uint64_t number = 0, type = 0;
+  std::string codec, setup;
+  Nanoseconds duration = 0;
+  std::optional<Element> video;
+  file.each (entry, [&] (const Element &part) {
+    if (part.id == kTrackNumber)
+      number = file.number (part);
+    else if (part.id == kTrackType)
+      type = file.number (part);
+    else if (part.id == kCodecId)
+      codec = std::string (file.text (part, kLongest)).c_str ();
+    else if (part.id == kCodecPrivate)
+      setup = file.text (part, kLongest);
+    else if (part.id == kDefaultDuration)
+      duration = Nanoseconds (file.number (part) & (kUnlimited - 1));
+    else if (part.id == kVideo)
+      video = part;
+    return true;
+  });
+  if (type == kTextTrack && head.lines == 0)
+    head.lines = number;
+  if (type != kVideoTrack || head.codec != MatroskaHead::Codec::none)
+    return;
+  head.video = number;
+  head.codec = codec_of (codec, setup);
+  head.codec_name = codec;
+  head.duration = duration;
+  if (video)
+    read_video (file, *video, head);
+}
+
+std::optional<MatroskaHead>
+head_of (Source &file, const Element &segment)
+{
+  MatroskaHead head;
+  bool complete = false;
+  file.each (segment, [&] (const Element &part) {
+    if (part.end > file.size ())
+      return false;
+    if (part.id == kInfo)
+      file.each (part, [&] (const Element &value) {
+        if (value.id == kTimestampScale)
+          head.tick = Nanoseconds (std::clamp<std::uint64_t> (
+              file.number (value), 1, 1'000'000'000));
+        return true;
+      });
+    if (part.id != kTracks)
+      return part.id != kCluster;
+    complete = true;
+    file.each (part, [&] (const Element &entry) {
+      if (entry.id == kTrackEntry)
+        read_track (file, entry, head);
+      return true;
+    });
+    return false;
+  });
+  return complete ? std::optional (head) : std::nullopt;
+}
+
+/* --------------------------------------------------------------- frames -- */
+
+/** A frame or a line. */
+struct Block {
+  std::uint64_t track, data;
+  Nanoseconds time;
+};
+
+std::optional<Block>
+block_of (
+    Source &file, const Element &part, std::uint64_t cluster, Nanoseconds tick)
+{
+  const auto track = file.number_at (part.data, part.end, false);
+  if (!track || part.end - track->end < 3)
+    return std::nullopt;
+  const std::string_view after = file.bytes (track->end, 2);
+  if (after.size () < 2)
+    return std::nullopt;
+  const auto offset =
+      std::int16_t (std::uint8_t (after[0]) << 8 | std::uint8_t (after[1]));
+  Nanoseconds time = 0;
+  if (cluster > std::uint64_t (kFarthestTime) ||
+      __builtin_mul_overflow (Nanoseconds (cluster) + offset, tick, &time))
+    return std::nullopt;
+  return Block{track->value, track->end + 3, time};
+}
+
+/* Until one is damaged or cut off. Clusters and groups are entered: those of a
+ * stream, and the last of a file that was not finished, have no size. */
+void
+read_blocks (Source &file, const Element &segment, RecordingInfo &info)
+{
+  std::uint64_t cluster = 0;
+  std::uint64_t last = 0, last_end = 0; // of the last line
+  const auto line_at = [&file] (std::uint64_t from, std::uint64_t to) {
+    return TrackLine::from_json (file.bytes (
+        from, std::min<std::size_t> (to - from, TrackLine::kMaxSize)));
+  };
+  for (std::uint64_t at = segment.data; at < file.size ();) {
+    const auto part = file.element_at (at, segment.end);
+    if (!part)
+      break;
+    const bool holds = part->id == kCluster || part->id == kBlockGroup;
+    at = holds ? part->data : part->end;
+    if (at > file.size () || (part->is_open && !holds))
+      break;
+    if (part->id == kTimestamp)
+      cluster = file.number (*part);
+    if (part->id != kBlock && part->id != kSimpleBlock)
+      continue;
+    const auto block = block_of (file, *part, cluster, info.head.tick);
+    if (!block)
+      continue;
+    if (block->track == info.head.video)
+      info.times.push_back (block->time);
+    if (block->track != info.head.lines)
+      continue;
+    last = block->data, last_end = part->end;
+    if (!info.setup)
+      if (auto line = line_at (last, last_end))
+        info.setup = std::move (line->setup);
+  }
+  if (last_end > 0)
+    if (const auto line = line_at (last, last_end))
+      info.recorded = line->end;
+}
+
+class FileNumber
+{
+public:
+  explicit FileNumber (const std::string &path)
+      : number_ (open (path.c_str (), O_RDONLY | O_CLOEXEC))
+  {
+  }
+  ~FileNumber ()
+  {
+    if (number_ >= 0)
+      close (number_);
+  }
+  FileNumber (const FileNumber &) = delete;
+  FileNumber &operator= (const FileNumber &) = delete;
+  operator int () const { return number_; }
+
+private:
+  const int number_;
+};
+
+std::string
+read_at (int file, std::uint64_t at, std::size_t length)
+{
+  std::string bytes (length, '\0');
+  const ssize_t got =
+      TEMP_FAILURE_RETRY (pread (file, bytes.data (), length, off_t (at)));
+  bytes.resize (std::size_t (std::max<ssize_t> (got, 0)));
+  return bytes;
+}
+
+} // namespace
+
+std::optional<MatroskaHead>
+matroska_head (std::string_view bytes)
+{
+  Source file (
+      [bytes] (std::uint64_t at, std::size_t length) {
+        return std::string (bytes.substr (
+            std::size_t (std::min<std::uint64_t> (at, bytes.size ())), length));
+      },
+      bytes.size ());
+  const auto segment = segment_of (file);
+  return segment ? head_of (file, *segment) : std::nullopt;
+}
+
+Result<RecordingInfo>
+recording_info (const std::string &path, bool with_frames)
+{
+  constexpr const char *kRemedy =
+      "; use a recording of \"codedexposure record\" or \"codedexposure "
+      "simulate\"";
+  struct stat status = {};
+  if (stat (path.c_str (), &status) != 0 || !S_ISREG (status.st_mode))
+    return Error{"cannot read " + path + "; give the name of a recording",
+        ErrorCode::io};
+  const FileNumber number (path);
+  if (number < 0)
+    return Error{
+        "cannot read " + path + ": " + std::strerror (errno), ErrorCode::io};
+  Source file ([&number] (std::uint64_t at,
+                   std::size_t length) { return read_at (number, at, length); },
+      std::uint64_t (status.st_size));
+  if (file.bytes (0, 4) != "\x1a\x45\xdf\xa3")
+    return Error{path + " is not a Matroska file" + kRemedy, ErrorCode::parse};
+  const auto segment = segment_of (file);
+  RecordingInfo info;
+  info.is_cut_short =
+      !segment || segment->is_open || segment->end > file.size ();
+  if (auto head = segment ? head_of (file, *segment) : std::nullopt)
+    info.head = *std::move (head);
+  if (info.head.codec == MatroskaHead::Codec::other)
+    return Error{path + " has " + info.head.codec_name +
+                     ", but coded frames are recorded as FFV1 or raw" + kRemedy,
+        ErrorCode::parse};
+  if (segment && with_frames)
+    read_blocks (file, *segment, info);
+  return info;
+}
+
 std::optional<std::string>
-unquoted (std::string_view text)
+unquoted_tag (std::string_view text)
 {
   if (text.size () < 2 || text.front () != '"' || text.back () != '"')
     return std::nullopt;
@@ -147,157 +415,6 @@ unquoted (std::string_view text)
     }
   }
   return plain;
-}
-
-void
-make_tags_plain (File &file, const Element &tags)
-{
-  file.each (tags, [&] (const Element &tag) {
-    if (tag.id == kTag)
-      file.each (tag, [&] (const Element &simple) {
-        if (simple.id == kSimpleTag)
-          file.each (simple, [&] (const Element &part) {
-            if (part.id != kTagString)
-              return true;
-            if (auto plain = unquoted (file.text (part))) {
-              plain->resize (part.end - part.data, '\0');
-              file.write (part.data, *plain);
-            }
-            return true;
-          });
-        return true;
-      });
-    return true;
-  });
-}
-
-/* Its name, "Subtitle" and a zero, is as long as a shorter one with FlagDefault
- * 0. */
-void
-hide_text_track (File &file, const Element &entry)
-{
-  constexpr std::string_view kHidden ("\x88\x81\x00\x53\x6e\x86"
-                                      "Frames",
-      12);
-  bool is_text = false;
-  std::optional<Element> name;
-  file.each (entry, [&] (const Element &part) {
-    if (part.id == kTrackType)
-      is_text = file.content (part) == std::string (1, kTextTrack);
-    if (part.id == kName && file.text (part) == "Subtitle")
-      name = part;
-    return true;
-  });
-  if (is_text && name && name->end - name->begin == kHidden.size ())
-    file.write (name->begin, kHidden);
-}
-
-/** Position of the tags in the segment. */
-std::optional<std::uint64_t>
-find_tags (File &file, const Element &seek_head)
-{
-  std::optional<std::uint64_t> position;
-  file.each (seek_head, [&] (const Element &seek) {
-    std::string id;
-    std::uint64_t at = 0;
-    file.each (seek, [&] (const Element &part) {
-      if (part.id == kSeekId)
-        id = file.content (part);
-      if (part.id == kSeekPosition)
-        at = file.number (part);
-      return true;
-    });
-    if (id == "\x12\x54\xc3\x67")
-      position = at;
-    return true;
-  });
-  return position;
-}
-
-/** The segment of a file that is not finished has no size. */
-std::optional<Element>
-segment_of (File &file)
-{
-  const auto head = file.element_at (0, file.size ());
-  if (!head || head->id != kEbml)
-    return std::nullopt;
-  const auto segment = file.element_at (head->end, kUnlimited);
-  return segment && segment->id == kSegment ? segment : std::nullopt;
-}
-
-std::optional<RawFormat>
-video_format (File &file, const Element &entry)
-{
-  RawFormat format{.size = {0, 0}};
-  file.each (entry, [&] (const Element &part) {
-    if (part.id == kDefaultDuration)
-      format.duration = Nanoseconds (file.number (part));
-    if (part.id == kVideo)
-      file.each (part, [&] (const Element &value) {
-        if (value.id == kPixelWidth)
-          format.size.width = int (file.number (value) & 0xffffff);
-        if (value.id == kPixelHeight)
-          format.size.height = int (file.number (value) & 0xffffff);
-        return true;
-      });
-    return true;
-  });
-  if (format.size.width <= 0 || format.size.height <= 0)
-    return std::nullopt;
-  return format;
-}
-
-} // namespace
-
-Result<RawFormat>
-raw_format (const std::string &path)
-{
-  File file (path, std::ios::in);
-  std::optional<RawFormat> format;
-  if (const auto segment = file.good () ? segment_of (file) : std::nullopt)
-    file.each (*segment, [&] (const Element &part) {
-      if (part.id == kTracks && part.end <= file.size ())
-        file.each (part, [&] (const Element &entry) {
-          if (entry.id == kTrackEntry && !format)
-            format = video_format (file, entry);
-          return !format;
-        });
-      return !format && part.id != kCluster;
-    });
-  if (!format)
-    return Error{"no video is described in " + path, ErrorCode::parse};
-  return *format;
-}
-
-Result<void>
-tidy_matroska (const std::string &path)
-{
-  File file (path, std::ios::in | std::ios::out);
-  if (!file.good ())
-    return Error{"cannot open " + path, ErrorCode::io};
-  const auto segment = segment_of (file);
-  if (!segment || segment->end > file.size ())
-    return {};
-  std::optional<std::uint64_t> tags_at;
-  file.each (*segment, [&] (const Element &part) {
-    if (part.id == kSeekHead)
-      tags_at = find_tags (file, part);
-    if (part.id == kTracks)
-      file.each (part, [&] (const Element &entry) {
-        if (entry.id == kTrackEntry)
-          hide_text_track (file, entry);
-        return true;
-      });
-    return part.id != kCluster;
-  });
-  if (tags_at && *tags_at < segment->end - segment->data)
-    if (const auto tags =
-            file.element_at (segment->data + *tags_at, segment->end);
-        tags && tags->id == kTags)
-      make_tags_plain (file, *tags);
-  if (!file.good ())
-    return Error{"cannot write " + path, ErrorCode::io};
-  return {};
 }
 
 } // namespace codedexposure

@@ -1,37 +1,61 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* What GStreamer's muxer writes in a way that only GStreamer reads well, and
- * what its demuxer does not say. */
+/* Reads what a recording, a Matroska file, says without its pixels. */
 #pragma once
 
+#include <optional>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "base/geometry.h"
 #include "base/result.h"
 #include "schedule/timing.h"
+#include "setup/stream_setup.h"
 
 namespace codedexposure
 {
 
-/**
- * Rewrites a finished Matroska file of GStreamer's muxer for other programs. No
- * byte moves, so a program that is stopped in between leaves a valid file.
- *
- * - Texts of tags, which that muxer quotes and escapes, become plain.
- * - A text track is no longer the default, so players do not show its lines on
- *   the pictures unasked.
- *
- * Other files stay as they are. An error if @p path cannot be read or written.
- */
-Result<void> tidy_matroska (const std::string &path);
+/** The head of a Matroska file, up to its list of tracks. */
+struct MatroskaHead {
+  enum class Codec { none, ffv1, raw, other };
 
-/** Of raw frames in a Matroska file. */
-struct RawFormat {
-  Extent size;
-  Nanoseconds duration = 0; ///< of a frame; 0: not known
+  Codec codec = Codec::none; ///< of the first video track
+  std::string codec_name;    ///< as the file has it
+  /** Of the video; 0x0: there is none, or the head is damaged. */
+  Extent size = {0, 0};
+  /** Bytes of a pixel of raw frames: 1 or 2; 0: their format is not grey. */
+  int pixel_bytes = 0;
+  Nanoseconds duration = 0;     ///< of a frame; 0: not known
+  Nanoseconds tick = 1'000'000; ///< to which times are rounded
+  /** Numbers of the tracks of frames and of their lines; 0: there is none. */
+  std::uint64_t video = 0, lines = 0;
 };
 
-/** The format of the video in the Matroska file @p path, from its head, which
- * a file that is cut off has, too. */
-Result<RawFormat> raw_format (const std::string &path);
+/** The head in the first @p bytes of a file, which a file that is cut off has,
+ * too; none: they are no Matroska, or end too early. */
+std::optional<MatroskaHead> matroska_head (std::string_view bytes);
+
+/** A recording of coded frames. */
+struct RecordingInfo {
+  MatroskaHead head;
+  /** It was not finished, or is shorter than when it was. */
+  bool is_cut_short = false;
+  /** PTS of the coded frames that are complete, in the order of the file. */
+  std::vector<Nanoseconds> times;
+  /** Frames that were recorded, by the last line; none: it is missing. */
+  std::optional<std::uint64_t> recorded;
+  /** Of the first frame whose line says it; none: not known. */
+  std::optional<StreamSetup> setup;
+};
+
+/** Reads the head of the file @p path and, with_frames, the places of all
+ * frames, but no frame. An error says why it is no recording, and what to use
+ * instead. */
+Result<RecordingInfo> recording_info (
+    const std::string &path, bool with_frames = true);
+
+/** The text of a tag that GStreamer's muxer has quoted and escaped; none: it is
+ * not quoted. */
+std::optional<std::string> unquoted_tag (std::string_view text);
 
 } // namespace codedexposure

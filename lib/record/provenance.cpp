@@ -26,13 +26,7 @@ read_provenance (const Json &root)
              read.setup = or_throw (StreamSetup::from_json (json_text (value)));
            },
            true},
-          {"method",
-              [&] (const Json &value, const std::string &key) {
-                if (!value.is_string ())
-                  throw expected (key, "a text", value);
-                read.method = value.get<std::string> ();
-              },
-              true},
+          {"method", text_into (read.method), true},
           {"frame",
               integer_into (frame, std::numeric_limits<std::int64_t>::max ()),
               true},

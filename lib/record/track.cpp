@@ -16,7 +16,7 @@ namespace
 {
 
 constexpr std::string_view kCheckKey = ",\"check\":\"";
-constexpr int kCheckDigits = 16;
+constexpr int kCheckDigits = 16, kSetupDigits = 16;
 
 std::uint64_t
 check_of (std::string_view text)
@@ -71,6 +71,8 @@ read_line (const Json &root)
   }
   if (root.contains ("frame"))
     line.frame = read_record (root);
+  if (const auto id = root.find ("setup_id"); id != root.end ())
+    line.setup_id = read_hex (*id, "setup_id", kSetupDigits);
   if (const auto setup = root.find ("setup"); setup != root.end ())
     line.setup = or_throw (StreamSetup::from_json (json_text (*setup)));
   return line;
@@ -86,6 +88,8 @@ TrackLine::to_json () const
     line = record_json (*frame);
   if (end)
     line["end"] = *end;
+  if (setup_id)
+    line["setup_id"] = hex_text (*setup_id, kSetupDigits);
   if (setup)
     line["setup"] = json_value (setup->to_json ());
   std::string text = without_markup (json_text (line));
@@ -106,6 +110,14 @@ TrackLine::from_json (std::string_view text)
   } catch (const Error &refused) {
     return refused.with_prefix ("line of the track: ");
   }
+}
+
+std::uint64_t
+id_of (const StreamSetup &setup)
+{
+  StreamSetup named = setup;
+  named.track = false;
+  return check_of (named.to_json ());
 }
 
 std::string

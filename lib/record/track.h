@@ -20,7 +20,9 @@ struct TrackLine {
   static constexpr std::size_t kMaxSize = StreamSetup::kMaxJsonSize + 65536;
 
   std::optional<FrameRecord> frame = {};
-  /** Valid from this frame on. */
+  /** id_of () the setup of the frame. Lines of earlier versions have none:
+   * there, a setup is valid from its frame on. */
+  std::optional<std::uint64_t> setup_id = {};
   std::optional<StreamSetup> setup = {};
   /** The stream ended, complete, after so many frames. */
   std::optional<std::uint64_t> end = {};
@@ -33,6 +35,10 @@ struct TrackLine {
 
   bool operator== (const TrackLine &) const = default;
 };
+
+/** By which lines name @p setup: an XXH3 of its JSON form, which does not tell
+ * whether there is a track. */
+std::uint64_t id_of (const StreamSetup &setup);
 
 /** Text that a program has escaped as XML or Pango markup. */
 std::string unescape_markup (std::string_view text);

@@ -38,6 +38,10 @@ TrackReader::add (std::string_view text, Nanoseconds pts, Nanoseconds duration)
                      " ns for " + std::to_string (duration) +
                      " ns; its container is damaged",
         ErrorCode::parse};
+  if (line->setup_id && line->setup) {
+    know (*line->setup_id, *line->setup);
+    line->setup.reset ();
+  }
   if (lines_.size () == kMaxLines)
     lines_.pop_front ();
   lines_.push_back ({pts, duration, *std::move (line)});
@@ -45,9 +49,23 @@ TrackReader::add (std::string_view text, Nanoseconds pts, Nanoseconds duration)
 }
 
 void
+TrackReader::know (std::uint64_t id, const StreamSetup &setup)
+{
+  constexpr std::size_t kMostSetups = 256;
+  if (setups_.contains (id))
+    return;
+  if (setups_.size () == kMostSetups)
+    setups_.erase (setups_.begin ());
+  setups_[id] = std::make_shared<const StreamSetup> (setup);
+}
+
+void
 TrackReader::clear ()
 {
-  *this = {};
+  lines_.clear ();
+  frames_.reset ();
+  offset_.reset ();
+  ended_ = false;
 }
 
 /* A decoder may clip the first frame of a segment: its time is then anywhere
@@ -65,41 +83,86 @@ TrackReader::find (Nanoseconds pts, Nanoseconds start)
   });
 }
 
+void
+TrackReader::skip (Match &match, const Line &line, Nanoseconds start) const
+{
+  if (order_ != Order::all || line.stop () - tolerance (line.duration) <= start)
+    return;
+  if (match.skipped++ == 0)
+    match.skipped_from = line.pts;
+}
+
+void
+TrackReader::place (Match &match, const Line &line)
+{
+  const FrameRecord &record = *line.line.frame;
+  const Nanoseconds offset = line.pts - record.pts.value_or (line.pts);
+  const Nanoseconds rounding =
+      tolerance (record.duration.value_or (line.duration));
+  if (std::abs (offset) > rounding) {
+    match.offset = offset;
+    match.misplaced =
+        std::abs (offset - offset_.value_or (offset)) > 2 * rounding;
+    offset_ = offset_.value_or (offset);
+  }
+  offset_ = offset_.value_or (0);
+  match.line = line.line;
+}
+
+void
+TrackReader::find_setup (Match &match)
+{
+  const auto id = match.line ? match.line->setup_id : std::nullopt;
+  const auto known = id ? setups_.find (*id) : setups_.end ();
+  match.names_unknown_setup = id && known == setups_.end ();
+  if (known != setups_.end ())
+    match.setup = known->second;
+  else if (!id)
+    match.setup = last_setup_;
+}
+
+/* A line that is skipped may hold the setup of those after it. */
 TrackReader::Match
-TrackReader::take_until (Place place, Nanoseconds start)
+TrackReader::take_until (Place end, Nanoseconds start)
 {
   Match match;
-  for (Place line = lines_.begin (); line != place; ++line) {
-    if (line->stop () - tolerance (line->duration) <= start)
-      continue;
-    if (match.skipped++ == 0)
-      match.skipped_from = line->pts;
-  }
-  if (place != lines_.end ()) {
-    const FrameRecord &record = *place->line.frame;
-    const Nanoseconds offset = place->pts - record.pts.value_or (place->pts);
-    const Nanoseconds rounding =
-        tolerance (record.duration.value_or (place->duration));
-    if (std::abs (offset) > rounding) {
-      match.offset = offset;
-      match.misplaced =
-          std::abs (offset - offset_.value_or (offset)) > 2 * rounding;
-      offset_ = offset_.value_or (offset);
+  if (order_ == Order::backwards) {
+    if (end != lines_.end ()) {
+      place (match, *end);
+      lines_.erase (end);
     }
-    offset_ = offset_.value_or (0);
-    match.line = std::move (place->line);
-    ++place;
+    find_setup (match);
+    return match;
   }
-  lines_.erase (lines_.begin (), place);
+  const Place after = end == lines_.end () ? end : std::next (end);
+  for (Place line = lines_.begin (); line != after; ++line) {
+    if (line->line.setup)
+      last_setup_ = std::make_shared<const StreamSetup> (*line->line.setup);
+    if (line == end)
+      place (match, *line);
+    else
+      skip (match, *line, start);
+  }
+  find_setup (match);
+  lines_.erase (lines_.begin (), after);
   return match;
+}
+
+/* A line whose frame comes after that at @pts has come. */
+bool
+TrackReader::is_past (Nanoseconds pts) const
+{
+  if (lines_.empty ())
+    return false;
+  const Nanoseconds apart = lines_.back ().pts - pts;
+  return (order_ == Order::backwards ? -apart : apart) >
+         tolerance (kRounding * 4);
 }
 
 std::optional<TrackReader::Match>
 TrackReader::take (Nanoseconds pts, Nanoseconds start)
 {
-  const bool later =
-      !lines_.empty () && lines_.back ().pts - tolerance (kRounding * 4) > pts;
-  if (find (pts, start) == lines_.end () && !later && !ended_)
+  if (find (pts, start) == lines_.end () && !is_past (pts) && !ended_)
     return std::nullopt;
   return take_now (pts, start);
 }

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -28,15 +30,32 @@ public:
    * @return an error if it cannot be read; its frame will have no line. */
   Result<void> add (
       std::string_view text, Nanoseconds pts, Nanoseconds duration);
+  /** Lines may name @p setup, although none of them holds it. */
+  void know (const StreamSetup &setup) { know (id_of (setup), setup); }
   /** No line follows. */
   void end () { ended_ = true; }
+  /** Forgets the lines, but no setup. */
   void clear ();
+
+  /** In what order frames and lines come. */
+  enum class Order {
+    all,       ///< each after those before it
+    some,      ///< frames are left out on purpose
+    backwards, ///< from the last to the first
+  };
   /** Another recording may follow, with another offset. */
-  void next_segment () { offset_.reset (); }
+  void next_segment (Order order = Order::all)
+  {
+    offset_.reset ();
+    order_ = order;
+  }
 
   struct Match {
     /** Null: the track has no line for this frame. */
     std::optional<TrackLine> line;
+    /** Of the frame; null: not known, or there is none. */
+    std::shared_ptr<const StreamSetup> setup;
+    bool names_unknown_setup = false;
     /** To add to the times of the record. */
     Nanoseconds offset = 0;
     /** The offset is neither 0 nor that of the frames before: the container's
@@ -70,10 +89,19 @@ private:
   };
   using Place = std::deque<Line>::iterator;
 
+  void know (std::uint64_t id, const StreamSetup &setup);
   Place find (Nanoseconds pts, Nanoseconds start);
+  bool is_past (Nanoseconds pts) const;
   Match take_until (Place place, Nanoseconds start);
+  void skip (Match &match, const Line &line, Nanoseconds start) const;
+  void place (Match &match, const Line &line);
+  void find_setup (Match &match);
 
   std::deque<Line> lines_;
+  std::map<std::uint64_t, std::shared_ptr<const StreamSetup>> setups_;
+  /** In force, by lines that name none. */
+  std::shared_ptr<const StreamSetup> last_setup_;
+  Order order_ = Order::all;
   std::optional<std::uint64_t> frames_;
   std::optional<Nanoseconds> offset_; // of the first frame
   bool ended_ = false;

@@ -2,6 +2,7 @@
 #include "rectify/filters.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 
 namespace codedexposure
@@ -18,6 +19,10 @@ constexpr int kMinParts = 4;
 constexpr int kSteps = 8;
 constexpr int kFewSteps = 4;
 constexpr int kManySurroundings = 16;
+
+/* Multiplications that are allowed for windows that repeat, and for those next
+ * to other parts of the schedule: some seconds. */
+constexpr double kMaxWork = 5e9, kMaxWorkOfOthers = 1.5e10;
 
 constexpr std::int32_t kUnknown = -1;
 
@@ -145,6 +150,19 @@ Surroundings::find_border (int part, int y, std::span<int> numbers)
   }
 }
 
+double
+Surroundings::others () const
+{
+  double count = 0.0;
+  for (const Region &region : elements_.schedule ().regions ()) {
+    const double width = region.rect.width, height = region.rect.height;
+    const double border = 2.0 * reach_;
+    count += (width + border) * (height + border) -
+             std::max (width - border, 0.0) * std::max (height - border, 0.0);
+  }
+  return count;
+}
+
 FilterBank::FilterBank (const PixelView &view, const ElementMap &elements,
     Extent mirrors, const SceneClass &scene)
     : elements_ (elements), solver_ (view),
@@ -163,6 +181,23 @@ FilterBank::FilterBank (const PixelView &view, const ElementMap &elements,
       std::size_t (count) * std::size_t ((steps_ + 1) * (steps_ + 1)));
   for (int e = 0; e < elements.elements (); e++)
     most_light_ = std::max (most_light_, elements.light (e));
+}
+
+/* Next to other parts, each window has its own covariances. */
+double
+FilterBank::effort () const
+{
+  const double work = solver_.work (), nodes = (steps_ + 1.0) * (steps_ + 1.0);
+  const double mirrors = std::pow (2.0 * solver_.reach () + 1.0, 2);
+  return surroundings_.repeating () * nodes * work / kMaxWork +
+         surroundings_.others () * (work + 5.0 * mirrors * mirrors) /
+             kMaxWorkOfOthers;
+}
+
+double
+FilterBank::effort (const PixelView &view)
+{
+  return kFewSteps * kFewSteps * WeightSolver (view).work () / kMaxWork;
 }
 
 Neighbourhood

@@ -35,6 +35,8 @@ public:
   /** Windows within one part repeat with its tile and have the first numbers:
    * as many as this. */
   int repeating () const { return repeating_; }
+  /** Windows of mirrors of the array that do not repeat, at most. */
+  double others () const;
 
 private:
   template <typename ElementAt>
@@ -69,6 +71,10 @@ public:
       const SceneClass &scene);
 
   const WeightSolver &solver () const { return solver_; }
+  /** The time to make all filters, as a part of what is allowed. */
+  double effort () const;
+  /** The same for the smallest schedule. */
+  static double effort (const PixelView &view);
   Surroundings &surroundings () { return surroundings_; }
   /** Noise of a pixel, rms, in units of the scene's standard deviation. */
   static constexpr std::array<double, 4> kNoises = {0.05, 0.11, 0.25, 0.55};

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/range.h"
+#include "base/text.h"
 #include "base/try.h"
 #include "base/view_check.h"
 #include "rectify/filters.h"
@@ -64,8 +65,8 @@ struct Rectifier::Plan {
   float noise = 0.0f; // rms, as a part of white
 
   template <typename Pixel>
-  Result<void> run (ImageView<const Pixel> from, ImageView<Pixel> to, int first,
-      int rows, int largest) const;
+  Result<void> run (
+      ImageView<const Pixel> from, ImageView<Pixel> to, int largest) const;
   template <int kTaps, typename Pixel>
   void filter_row (ImageView<const Pixel> from, const Place *places, Pixel *to,
       float largest) const;
@@ -79,18 +80,19 @@ class Planner
 {
 public:
   Planner (const Mapping &mapping, const Schedule &schedule,
-      const RectifyOptions &options, int taps)
+      const RectifyOptions &options, const PixelView &view, bool whole)
       : mapping_ (mapping), tolerance_ (options.tolerance),
         coded_rows_ (mapping.mirrors ().height - schedule.pilot_rows ()),
-        elements_ (schedule), bank_ (view_of (mapping, taps), elements_,
-                                  mapping.mirrors (), scene_of (options)),
-        whole_ (mapping.one_to_one (options.tolerance)),
-        single_ (taps == kWindows[0].taps),
+        elements_ (schedule),
+        bank_ (view, elements_, mapping.mirrors (), scene_of (options)),
+        whole_ (whole), single_ (view.taps == kWindows[0].taps),
         best_share_ (bank_.solver ().own_share (0.0, 0.0)),
         seen_ (std::size_t (mapping.mirrors ().width)), around_ (seen_.size ())
   {
   }
 
+  /** To make all filters, as a part of what is allowed. */
+  double effort () const { return whole_ ? 0.0 : bank_.effort (); }
   void place_row (int y, Place *row, RectifyReport &report);
   std::vector<float> weights () && { return std::move (bank_).weights (); }
   std::vector<FilterBank::WindowScale> scales () &&
@@ -99,13 +101,6 @@ public:
   }
 
 private:
-  static PixelView view_of (const Mapping &mapping, int taps)
-  {
-    const Extent camera = mapping.camera ();
-    return {
-        mapping.slope_at (0.5 * (camera.width - 1), 0.5 * (camera.height - 1)),
-        mapping.psf_sigma (), taps};
-  }
   /* Persistence is that of the part with the shortest slots. */
   SceneClass scene_of (const RectifyOptions &options) const
   {
@@ -210,6 +205,37 @@ check_mirrors (const Mapping &mapping)
                " pixels, which see few of them; use the mapping of this bench"};
 }
 
+/* Displacements can take pixels far apart. */
+Result<void>
+check_slope (const PixelView &view)
+{
+  constexpr double kMaxSlope = 16.0;
+  double slope = 0.0;
+  for (const double along : view.slope)
+    slope = std::max (slope, std::abs (along));
+  if (slope <= kMaxSlope)
+    return {};
+  return Error{"a mapping with " + real_text (std::ceil (slope)) +
+               " mirrors to a pixel at the centre of the frame cannot be "
+               "corrected; use a displacement that changes by less than " +
+               real_text (kMaxSlope) + " a pixel"};
+}
+
+/* @effort: to find the weights, as a part of what is allowed. */
+Result<void>
+check_effort (const PixelView &view, double effort)
+{
+  if (effort <= 1.0)
+    return {};
+  return Error{
+      "with a blur of " + real_text (view.sigma) +
+      " pixels (psf_sigma of the mapping) and this schedule, it takes " +
+      real_text (std::ceil (effort)) +
+      " times as long as allowed to find the weights of the pixels "
+      "around each mirror; focus the camera, or use a schedule with a "
+      "smaller tile or fewer regions"};
+}
+
 } // namespace
 
 Result<Rectifier>
@@ -231,7 +257,17 @@ try {
   plan->mirrors = mirrors;
   plan->noise = float (
       options.noise * std::sqrt (schedule.slots () / schedule.white_slots ()));
-  Planner planner (mapping, schedule, options, plan->taps);
+  PixelView view{mapping.slope_at (0.5 * (plan->camera.width - 1),
+                     0.5 * (plan->camera.height - 1)),
+      mapping.psf_sigma (), plan->taps};
+  RETURN_IF_ERROR (check_slope (view));
+  /* Pixels that are copied need no weights. */
+  const bool whole = mapping.one_to_one (options.tolerance);
+  if (whole)
+    view.sigma = 0.0;
+  RETURN_IF_ERROR (check_effort (view, FilterBank::effort (view)));
+  Planner planner (mapping, schedule, options, view, whole);
+  RETURN_IF_ERROR (check_effort (view, planner.effort ()));
   plan->places = Image<Place> (plan->mirrors.width, plan->mirrors.height);
   for (int y = 0; y < plan->mirrors.height; y++)
     planner.place_row (y, plan->places.view ().row (y), plan->report);
@@ -305,19 +341,18 @@ Rectifier::Plan::filter_row (ImageView<const Pixel> from, const Place *row,
 
 template <typename Pixel>
 Result<void>
-Rectifier::Plan::run (ImageView<const Pixel> from, ImageView<Pixel> to,
-    int first, int rows, int largest) const
+Rectifier::Plan::run (
+    ImageView<const Pixel> from, ImageView<Pixel> to, int largest) const
 {
   const ViewBytes input = ViewBytes::of (from), output = ViewBytes::of (to);
   RETURN_IF_ERROR (
       check_view (input, "camera frame", camera.width, camera.height));
   RETURN_IF_ERROR (
       check_view (output, "output", mirrors.width, mirrors.height));
-  RETURN_IF_ERROR (check_rows (first, rows, mirrors.height));
   RETURN_IF_ERROR (check_apart ({&output, 1}, &input));
   if (largest <= 0)
     largest = std::numeric_limits<Pixel>::max ();
-  for (int y = first; y < first + rows; y++) {
+  for (int y = 0; y < mirrors.height; y++) {
     const Place *row = places.view ().row (y);
     if (taps == 5)
       filter_row<5> (from, row, to.row (y), float (largest));
@@ -333,29 +368,14 @@ Result<void>
 Rectifier::run (ImageView<const std::uint8_t> camera,
     ImageView<std::uint8_t> mirrors, int largest) const
 {
-  return plan_->run (camera, mirrors, 0, mirrors.height, largest);
+  return plan_->run (camera, mirrors, largest);
 }
 
 Result<void>
 Rectifier::run (ImageView<const std::uint16_t> camera,
     ImageView<std::uint16_t> mirrors, int largest) const
 {
-  return plan_->run (camera, mirrors, 0, mirrors.height, largest);
-}
-
-Result<void>
-Rectifier::run_rows (ImageView<const std::uint8_t> camera,
-    ImageView<std::uint8_t> mirrors, int first_row, int rows, int largest) const
-{
-  return plan_->run (camera, mirrors, first_row, rows, largest);
-}
-
-Result<void>
-Rectifier::run_rows (ImageView<const std::uint16_t> camera,
-    ImageView<std::uint16_t> mirrors, int first_row, int rows,
-    int largest) const
-{
-  return plan_->run (camera, mirrors, first_row, rows, largest);
+  return plan_->run (camera, mirrors, largest);
 }
 
 } // namespace codedexposure

@@ -65,8 +65,10 @@ class Rectifier
 {
 public:
   /** Error when an option is out of range, the mapping has less than 0.75 or
-   * more than 3.5 pixels per mirror, a region lies outside the mirrors, the
-   * camera sees none of them, or memory for the weights is not available. */
+   * more than 3.5 pixels per mirror, a blur or a displacement with which pixels
+   * see too many mirrors to find their weights in seconds, a region lies
+   * outside the mirrors, the camera sees none of them, or memory for the
+   * weights is not available. */
   static Result<Rectifier> make (const Mapping &mapping,
       const Schedule &schedule, const RectifyOptions &options = {});
   /** Sizes of the input and the output of run (). */
@@ -81,14 +83,6 @@ public:
       ImageView<std::uint8_t> mirrors, int largest = 0) const;
   Result<void> run (ImageView<const std::uint16_t> camera,
       ImageView<std::uint16_t> mirrors, int largest = 0) const;
-  /** Only rows [@p first_row, @p first_row + @p rows) of the result, so that
-   * threads can share a frame. */
-  Result<void> run_rows (ImageView<const std::uint8_t> camera,
-      ImageView<std::uint8_t> mirrors, int first_row, int rows,
-      int largest = 0) const;
-  Result<void> run_rows (ImageView<const std::uint16_t> camera,
-      ImageView<std::uint16_t> mirrors, int first_row, int rows,
-      int largest = 0) const;
 
 private:
   struct Plan;

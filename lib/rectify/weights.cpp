@@ -71,6 +71,19 @@ WeightSolver::own_share (double dx, double dy) const
          down_.at (view_.slope[2] * dx + view_.slope[3] * dy);
 }
 
+double
+WeightSolver::work () const
+{
+  const int reach = this->reach ();
+  double shares = 0.0;
+  for (int y = -reach; y <= reach; y++)
+    for (int x = -reach; x <= reach; x++)
+      shares += across_.at (x) * down_.at (y) > kMinShare;
+  const double mirrors = std::pow (2.0 * reach + 1.0, 2);
+  const double pixels = double (view_.taps) * view_.taps;
+  return pixels * shares * (mirrors + 0.5 * pixels);
+}
+
 /* Part of the light of the pixel @dx, @dy pixels from where the middle mirror
  * is seen that comes from each mirror; the parts add up to 1. */
 std::vector<WeightSolver::Share>

@@ -78,6 +78,8 @@ public:
   int taps () const { return view_.taps; }
   /** Mirrors to each side that the pixels of a window see. */
   int reach () const;
+  /** Multiplications of solve () for one noise, about. */
+  double work () const;
   /** Part of a pixel's light that comes from the mirror seen @p dx, @p dy
    * pixels from its centre. */
   double own_share (double dx, double dy) const;

@@ -172,7 +172,7 @@ region_json (const Region &region)
 } // namespace
 
 Schedule
-read_schedule (const Json &root)
+read_schedule (const Json &root, const JsonKeys &more)
 {
   const Schedule usual;
   Schedule::Parts parts{usual.tile (), usual.code ()};
@@ -190,6 +190,7 @@ read_schedule (const Json &root)
           }},
   };
   keys.insert (keys.end (), options.begin (), options.end ());
+  keys.insert (keys.end (), more.begin (), more.end ());
   read_versioned (root, kHead,
       "a schedule needs at least format, version, tile and code", keys);
   return or_throw (Schedule::make (std::move (parts)));
@@ -198,7 +199,8 @@ read_schedule (const Json &root)
 Result<Schedule>
 Schedule::from_json (std::string_view json)
 {
-  return read_json<Schedule> (json, kHead.what, kMaxJsonSize, read_schedule);
+  return read_json<Schedule> (json, kHead.what, kMaxJsonSize,
+      [] (const Json &root) { return read_schedule (root); });
 }
 
 std::string

@@ -8,7 +8,7 @@
 namespace codedexposure
 {
 
-/** Throws Error. */
-Schedule read_schedule (const Json &root);
+/** @p more  keys that may stand beside those of a schedule. Throws Error. */
+Schedule read_schedule (const Json &root, const JsonKeys &more = {});
 
 } // namespace codedexposure

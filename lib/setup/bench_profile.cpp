@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-#include "setup/bench_profile.h"
+#include "setup/json.h"
 
 #include <algorithm>
 #include <cmath>
@@ -17,27 +17,27 @@ namespace
 
 constexpr double kLongest = double (kTimeLimit);
 
-const struct {
-  std::optional<Measured> BenchProfile::*member;
-  const char *name, *unit;
-  double low, high;
-} kRanges[] = {
-    {&BenchProfile::conversion_gain, "conversion gain", " e-/DN", 1e-6, 1e6},
-    {&BenchProfile::full_well, "full well", " e-", 1.0, 1e7},
-    {&BenchProfile::read_noise, "read noise", " e-", 0.0, 1e5},
-    {&BenchProfile::black_level, "black level", " DN", 0.0, 65534.0},
-    {&BenchProfile::linearity_error, "linearity error", "", 0.0, 1.0},
-    {&BenchProfile::leak, "leak", "", 0.0, Schedule::kMaxLeak},
-    {&BenchProfile::trigger_delay, "trigger delay", " ns", -kLongest, kLongest},
-    {&BenchProfile::exposure, "exposure", " ns", 1.0, kLongest},
-    {&BenchProfile::psf_sigma, "psf_sigma", " pixels", 0.0,
+constexpr BenchQuantity kQuantities[] = {
+    {&BenchProfile::conversion_gain, "conversion_gain", "conversion gain",
+        " e-/DN", 1e-6, 1e6},
+    {&BenchProfile::full_well, "full_well", "full well", " e-", 1.0, 1e7},
+    {&BenchProfile::read_noise, "read_noise", "read noise", " e-", 0.0, 1e5},
+    {&BenchProfile::black_level, "black_level", "black level", " DN", 0.0,
+        65534.0},
+    {&BenchProfile::linearity_error, "linearity_error", "linearity error", "",
+        0.0, 1.0},
+    {&BenchProfile::leak, "leak", "leak", "", 0.0, Schedule::kMaxLeak},
+    {&BenchProfile::trigger_delay, "trigger_delay_ns", "trigger delay", " ns",
+        -kLongest, kLongest},
+    {&BenchProfile::exposure, "exposure_ns", "exposure", " ns", 1.0, kLongest},
+    {&BenchProfile::psf_sigma, "psf_sigma", "psf_sigma", " pixels", 0.0,
         Mapping::kMaxPsfSigma},
 };
 
 Result<void>
 check_numbers (const BenchProfile &profile)
 {
-  for (const auto &[member, name, unit, low, high] : kRanges) {
+  for (const auto &[member, key, name, unit, low, high] : kQuantities) {
     const auto &number = profile.*member;
     if (!number)
       continue;
@@ -77,6 +77,12 @@ check_named (const std::string &what, const BenchProfile::Device &device)
 
 } // namespace
 
+std::span<const BenchQuantity>
+bench_quantities ()
+{
+  return kQuantities;
+}
+
 Result<void>
 BenchProfile::check () const
 {
@@ -104,25 +110,6 @@ BenchProfile::check () const
                  size_text (mapping->camera ()) + " pixels, but the camera " +
                  "has " + size_text (camera.size) + "; measure a new mapping"};
   return {};
-}
-
-Result<BenchProfile>
-BenchProfile::parse (std::string_view json_or_path)
-try {
-  if (json_or_path.starts_with ('{'))
-    return from_json (json_or_path);
-  const std::string path (json_or_path);
-  const auto text = read_file (path, kMaxJsonSize);
-  if (!text)
-    return text.error ().with_prefix (
-        "bench profile " + in_quotes (path, 200) + ": ");
-  auto profile = from_json (*text);
-  if (!profile)
-    return profile.error ().with_prefix (
-        "file " + in_quotes (path, 200) + ": ");
-  return profile;
-} catch (const std::bad_alloc &) {
-  return out_of_memory ();
 }
 
 Result<void>
@@ -155,7 +142,7 @@ BenchProfile::rows () const
     rows.emplace_back ("DMD", device (*dmd));
     rows.emplace_back ("mirrors", size_text (dmd->size));
   }
-  for (const auto &[member, name, unit, low, high] : kRanges)
+  for (const auto &[member, key, name, unit, low, high] : kQuantities)
     if (const auto &number = this->*member)
       rows.emplace_back (name,
           real_text (number->value) + " ± " + real_text (number->sigma) + unit);

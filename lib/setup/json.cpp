@@ -4,7 +4,6 @@
 
 #include <cstdio>
 
-#include "base/text.h"
 #include "mapping/json.h"
 
 namespace codedexposure
@@ -14,32 +13,6 @@ namespace
 {
 
 const JsonHead kHead{"bench profile", "coded-exposure-bench", 1};
-
-struct Quantity {
-  std::string_view key;
-  std::optional<Measured> BenchProfile::*member;
-};
-constexpr Quantity kQuantities[] = {
-    {"conversion_gain", &BenchProfile::conversion_gain},
-    {"full_well", &BenchProfile::full_well},
-    {"read_noise", &BenchProfile::read_noise},
-    {"black_level", &BenchProfile::black_level},
-    {"linearity_error", &BenchProfile::linearity_error},
-    {"leak", &BenchProfile::leak},
-    {"trigger_delay_ns", &BenchProfile::trigger_delay},
-    {"exposure_ns", &BenchProfile::exposure},
-    {"psf_sigma", &BenchProfile::psf_sigma},
-};
-
-JsonReader
-text_into (std::string &to)
-{
-  return [&to] (const Json &value, const std::string &key) {
-    if (!value.is_string ())
-      throw expected (key, "a text", value);
-    to = value.get<std::string> ();
-  };
-}
 
 /** A UTC time as in ISO 8601, to the second. */
 JsonReader
@@ -94,10 +67,7 @@ device_into (BenchProfile::Device &to)
     read_keys (value, key, "a device has a size, [width, height]",
         {{"vendor", text_into (to.vendor)}, {"model", text_into (to.model)},
             {"serial", text_into (to.serial)},
-            {"size",
-                integers_into ({&to.size.width, &to.size.height},
-                    Mapping::kMaxSize, "two whole numbers, width and height"),
-                true}});
+            {"size", size_into (to.size, Mapping::kMaxSize), true}});
   };
 }
 
@@ -142,18 +112,11 @@ read_bench_profile (const Json &root)
       {"pixel_format", text_into (profile.pixel_format)},
       {"bits", integer_into (profile.bits, 16), true},
   };
-  for (const Quantity &quantity : kQuantities)
+  for (const BenchQuantity &quantity : bench_quantities ())
     keys.push_back ({quantity.key,
         [&number = profile.*quantity.member] (const Json &value,
             const std::string &key) { number = read_measured (value, key); }});
-  keys.push_back (
-      {"mapping", [&profile] (const Json &value, const std::string &key) {
-         try {
-           profile.mapping = read_mapping (value);
-         } catch (const Error &refused) {
-           throw refused.with_prefix ("in key '" + key + "': ");
-         }
-       }});
+  keys.push_back ({"mapping", inner_into (profile.mapping, read_mapping)});
   read_versioned (root, kHead,
       "a bench profile needs at least format, version, measured, camera and "
       "bits",
@@ -161,6 +124,15 @@ read_bench_profile (const Json &root)
   if (const auto good = profile.check (); !good)
     throw Error{good.error ().message, ErrorCode::parse};
   return profile;
+}
+
+Result<BenchProfile>
+BenchProfile::parse (std::string_view json_or_path)
+{
+  return json_or_path.starts_with ('{')
+             ? from_json (json_or_path)
+             : load_json (std::string (json_or_path), kHead.what, kMaxJsonSize,
+                   from_json);
 }
 
 Result<BenchProfile>
@@ -183,10 +155,9 @@ BenchProfile::to_json () const
   if (!pixel_format.empty ())
     root["pixel_format"] = pixel_format;
   root["bits"] = bits;
-  for (const auto &[key, member] : kQuantities)
-    if (const auto &number = this->*member)
-      root[std::string (key)] = {
-          {"value", number->value}, {"sigma", number->sigma}};
+  for (const BenchQuantity &quantity : bench_quantities ())
+    if (const auto &number = this->*quantity.member)
+      root[quantity.key] = {{"value", number->value}, {"sigma", number->sigma}};
   if (mapping)
     root["mapping"] = json_value (mapping->to_json ());
   return json_text (root);

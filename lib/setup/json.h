@@ -8,6 +8,14 @@
 namespace codedexposure
 {
 
+/** A number of a profile, and the range that it is in. */
+struct BenchQuantity {
+  std::optional<Measured> BenchProfile::*member;
+  const char *key, *name, *unit;
+  double low, high;
+};
+std::span<const BenchQuantity> bench_quantities ();
+
 /** Throws Error. */
 BenchProfile read_bench_profile (const Json &root);
 

@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "setup/stream_setup.h"
 
-#include <utility>
-
 #include "mapping/json.h"
 #include "schedule/json.h"
 #include "setup/json.h"
@@ -15,69 +13,37 @@ namespace
 
 constexpr int kMaxRate = 1'000'000'000;
 
-/* A pair of positive integers, which is taken out of @root. */
-std::optional<std::pair<int, int>>
-take_pair (Json &root, const char *key, int highest, const std::string &rule)
-{
-  const auto found = root.find (key);
-  if (found == root.end ())
-    return std::nullopt;
-  int first = 0, second = 0;
-  integers_into ({&first, &second}, highest, rule) (*found, key);
-  if (first < 1 || second < 1)
-    throw expected (key, rule, *found);
-  root.erase (found);
-  return std::pair (first, second);
-}
-
-/* An object of its own, which is taken out of @root. */
+/** Two positive integers. */
 template <typename T>
-std::optional<T>
-take_inner (Json &root, const char *key, T (*read) (const Json &))
+JsonReader
+pair_into (std::optional<T> &to, int T::*first, int T::*second, int highest,
+    const std::string &rule)
 {
-  const auto found = root.find (key);
-  if (found == root.end ())
-    return std::nullopt;
-  try {
-    T inner = read (*found);
-    root.erase (found);
-    return inner;
-  } catch (const Error &refused) {
-    throw refused.with_prefix ("in key '" + std::string (key) + "': ");
-  }
-}
-
-/* Taken out of @root; false if it is left out. */
-bool
-take_bool (Json &root, const char *key)
-{
-  const auto found = root.find (key);
-  if (found == root.end ())
-    return false;
-  if (!found->is_boolean ())
-    throw expected (key, "true or false", *found);
-  const bool value = found->get<bool> ();
-  root.erase (found);
-  return value;
+  return [=, &to] (const Json &value, const std::string &key) {
+    T &pair = to.emplace ();
+    integers_into ({&(pair.*first), &(pair.*second)}, highest, rule) (
+        value, key);
+    if (pair.*first < 1 || pair.*second < 1)
+      throw expected (key, rule, value);
+  };
 }
 
 StreamSetup
-read_setup (Json root)
+read_setup (const Json &root)
 {
   StreamSetup setup;
-  if (root.is_object ()) {
-    setup.mapping = take_inner (root, "mapping", read_mapping);
-    setup.bench = take_inner (root, "bench", read_bench_profile);
-    if (const auto size = take_pair (root, "size", Mapping::kMaxSize,
-            "two whole numbers, width and height"))
-      setup.size = Extent{size->first, size->second};
-    if (const auto rate = take_pair (root, "rate", kMaxRate,
-            "two whole numbers, frames in so many seconds"))
-      setup.rate = FrameRate{rate->first, rate->second};
-    setup.track = take_bool (root, "track");
-    setup.simulated = take_bool (root, "simulated");
-  }
-  setup.schedule = read_schedule (root);
+  setup.schedule = read_schedule (root,
+      {{"mapping", inner_into (setup.mapping, read_mapping)},
+          {"bench", inner_into (setup.bench, read_bench_profile)},
+          {"size",
+              pair_into (setup.size, &Extent::width, &Extent::height,
+                  Mapping::kMaxSize, "two whole numbers, width and height")},
+          {"rate",
+              pair_into (setup.rate, &FrameRate::num, &FrameRate::den, kMaxRate,
+                  "two whole numbers, frames in so many seconds")},
+          {"bits", integer_into (setup.bits, 16)},
+          {"track", flag_into (setup.track)},
+          {"simulated", flag_into (setup.simulated)}});
   return setup;
 }
 
@@ -102,6 +68,8 @@ StreamSetup::to_json () const
     add_pair ("size", size->width, size->height);
   if (rate)
     add_pair ("rate", rate->num, rate->den);
+  if (bits > 0)
+    text += ",\"bits\":" + std::to_string (bits);
   if (track)
     text += ",\"track\":true";
   if (simulated)

@@ -29,6 +29,9 @@ struct StreamSetup {
    * cropped, scaled or timed anew. */
   std::optional<Extent> size = {};
   std::optional<FrameRate> rate = {};
+  /** Significant bits of their pixels, counted from the lowest, if they are
+   * fewer than the format's; 0: all, or unknown. */
+  int bits = 0;
   /** A track with a line for each frame accompanies the frames. */
   bool track = false;
   /** The frames are those of a simulated bench. */
@@ -37,8 +40,8 @@ struct StreamSetup {
   std::optional<BenchProfile> bench = {};
 
   /** The JSON form of the schedule with keys more that may be left out:
-   * "mapping", which holds the JSON form of a mapping, "size", "rate", "track",
-   * "simulated" and "bench", which holds that of a bench profile. */
+   * "mapping", which holds the JSON form of a mapping, "size", "rate", "bits",
+   * "track", "simulated" and "bench", which holds that of a bench profile. */
   static Result<StreamSetup> from_json (std::string_view json);
   /** One line. Without the others it is schedule.to_json (). */
   std::string to_json () const;

@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 
+#include "base/pixels.h"
 #include "base/try.h"
 
 namespace codedexposure
@@ -41,7 +42,7 @@ StatsMeter<Pixel>::make (Extent size, const StatsOptions &options)
     return Error{"a histogram cannot have " + std::to_string (options.bins) +
                  " bins; 0 leaves it out"};
   StatsMeter meter;
-  meter.bits_ = options.bits > 0 ? options.bits : kBits;
+  meter.bits_ = significant_bits_of<Pixel> (options.bits);
   if (options.line) {
     ASSIGN_OR_RETURN (meter.points_, options.line->points (size));
   }
@@ -81,7 +82,7 @@ template <typename Pixel>
 void
 StatsMeter<Pixel>::summarise ()
 {
-  const auto largest = std::size_t ((1 << bits_) - 1);
+  const auto largest = std::size_t (largest_pixel (bits_));
   const auto levels = std::span (levels_).first (kLevels<Pixel>);
   const auto occurs = [] (std::uint32_t count) { return count > 0; };
   const auto first = std::ranges::find_if (levels, occurs);
@@ -111,7 +112,7 @@ StatsMeter<Pixel>::fill_histogram ()
   if (histogram.empty ())
     return;
   std::ranges::fill (histogram, 0u);
-  const auto largest = std::size_t ((1 << bits_) - 1);
+  const auto largest = std::size_t (largest_pixel (bits_));
   for (std::size_t v = stats_.minimum; v <= stats_.maximum; v++) {
     const std::size_t bin =
         (std::min (v, largest) * histogram.size ()) >> bits_;

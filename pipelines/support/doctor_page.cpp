@@ -10,10 +10,11 @@
 #include <cairo.h>
 #include <glib.h>
 
-#include "report.h"
+#include "pipeline/messages.h"
+#include "pipeline/status.h"
 
 using namespace codedexposure;
-using report::format;
+using codedexposure::app::format;
 
 namespace
 {
@@ -321,7 +322,7 @@ summary_of (const DoctorPage &page)
 
 constexpr const char *kStyle =
     ".PASS{background:#2e7d32} .WARN{background:#b26a00} "
-    ".FAIL{background:#c62828} .SKIPPED{background:#777}\n"
+    ".FAIL{background:#c62828} .SKIPPED,.UNKNOWN{background:#777}\n"
     ".badge{font-size:13px} .curve svg{width:100%;height:auto}\n"
     ".curve text{font:11px sans-serif;fill:#555} .curve path{stroke:#ddd}\n"
     "circle{fill:#1f5fa8} th:first-child{text-align:left} "

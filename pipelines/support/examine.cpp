@@ -26,10 +26,11 @@
 #include "dmd/dmd.h"
 #include "doctor/checks.h"
 #include "doctor_page.h"
-#include "report.h"
+#include "pipeline/messages.h"
+#include "pipeline/status.h"
 
 using namespace codedexposure;
-using report::format;
+using codedexposure::app::format;
 
 namespace
 {

@@ -10,13 +10,26 @@
 The frames come from the same GStreamer elements as those of the command line,
 so they are equal to what codedexposure-decode writes.
 """
-from ._pipeline import BUILD, Error, RecordingWarning
-from .arrays import decode_array, fuse_array, simulate
-from .frame import Frame
-from .recording import Recording, open  # pylint: disable=redefined-builtin
+import importlib
+import os
+import pathlib
+
+_ROOT = pathlib.Path(__file__).resolve().parents[2]
+_BUILD = pathlib.Path(os.environ.get("CODEDEXPOSURE_BUILD", _ROOT / "build"))
+__path__.append(str(_BUILD / "python"))  # codedexposure.library is compiled
+
+# Where each name is: archives use this package without GStreamer and numpy.
+_ROOMS = {"Error": "_pipeline", "RecordingWarning": "_pipeline",
+          "decode_array": "arrays", "fuse_array": "arrays",
+          "simulate": "arrays", "Frame": "frame", "Recording": "recording",
+          "open": "recording"}
+
+
+def __getattr__(name):
+    if name not in _ROOMS:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module("." + _ROOMS[name], __name__), name)
+
 
 __all__ = ["Error", "Frame", "Recording", "RecordingWarning", "decode_array",
            "fuse_array", "open", "simulate"]
-
-# codedexposure.library is compiled.
-__path__.append(str(BUILD / "python"))

@@ -121,9 +121,8 @@ def _error_of(message) -> Error:
     factory = getattr(message.src, "get_factory", lambda: None)()
     kind = factory.get_name() if factory else ""
     of_container = (
-        kind == "matroskademux" or message.src.get_name() == "file-queue"
-        or (kind == "filesrc"
-            and error.matches(Gst.StreamError.quark(), error.code)))
+        kind in ("codedexposure-recorddemux", "filesrc")
+        and error.matches(Gst.StreamError.quark(), error.code))
     return (ContainerError if of_container else Error)(
         _text_of(message, error, debug))
 
@@ -156,24 +155,16 @@ def _loss_in(structure) -> str | None:
     return None
 
 
-def _end_at_pads(element) -> None:
-    for pad in element.srcpads:
-        pad.push_event(Gst.Event.new_eos())
-
-
 class Player:
     """Plays a pipeline with an appsink named "out", whose samples are iterated.
 
     Losses and warnings of the elements are RecordingWarnings with @p about,
-    errors are exceptions. With salvage, damage of the container ends the stream
-    with a warning. quiet drops the warnings.
+    errors are exceptions. quiet drops the warnings.
     """
 
-    def __init__(self, description: str, about: str, salvage: bool = False,
-                 quiet: bool = False):
+    def __init__(self, description: str, about: str, quiet: bool = False):
         self.about = about
         self.quiet = quiet
-        self.salvage = salvage
         try:
             self.pipeline = Gst.parse_launch(description)
         except GLib.Error as error:
@@ -201,24 +192,10 @@ class Player:
 
     def _heed(self, message) -> None:
         if message.type == Gst.MessageType.ERROR:
-            error = _error_of(message)
-            if not (self.salvage and isinstance(error, ContainerError)):
-                raise error
-            self.warn(str(error))
-            demuxer = self.pipeline.get_by_name("file")
-            if not demuxer.srcpads:
-                raise error
-            # A demuxer that has failed does not pass the end on. The pads may
-            # block until samples are pulled here.
-            demuxer.call_async(_end_at_pads)
-            # An error also ends the change of the state.
-            self.pipeline.set_state(Gst.State.PLAYING)
-        elif message.type == Gst.MessageType.WARNING:
+            raise _error_of(message)
+        if message.type == Gst.MessageType.WARNING:
             error, debug = message.parse_warning()
-            text = _text_of(message, error, debug)
-            # A recording without a track has none to link; restore says so.
-            if "subtitle_0" not in text:
-                self.warn(text)
+            self.warn(_text_of(message, error, debug))
         elif message.type == Gst.MessageType.ELEMENT:
             text = _loss_in(message.get_structure())
             if text:

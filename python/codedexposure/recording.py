@@ -14,7 +14,7 @@ from ._pipeline import ContainerError, Error, Player, element, quoted
 from .frame import Frame, frame_of
 
 _SETUP = "coded-exposure="
-_NOT_OF_SCHEDULE = ("mapping", "size", "rate", "track", "simulated",
+_NOT_OF_SCHEDULE = ("mapping", "size", "rate", "bits", "track", "simulated",
                     "bench")
 
 
@@ -131,20 +131,16 @@ class Recording:
                 > os.path.getsize(self.path))
 
     def _description(self, decoder: str, salvage: bool) -> str:
-        # The same as read_container in pipelines/support/common.sh.
-        front_to_back = "queue name=file-queue ! " if salvage else ""
-        return (
-            f"filesrc location={quoted(self.path)} ! {front_to_back}"
-            "matroskademux name=file ! decodebin ! codedexposure-restore "
-            "name=restore file.subtitle_0 ! restore.track restore. ! "
-            f"{decoder} appsink name=out sync=false max-buffers=8")
+        return (f"filesrc location={quoted(self.path)} ! "
+                f"codedexposure-recorddemux salvage={salvage} ! "
+                f"{decoder} appsink name=out sync=false max-buffers=8")
 
     def _play(self, decoder: str,
               quiet: bool = False) -> Iterator[tuple[Player, Frame]]:
         last = None  # that was given out, ns
         for salvage in (False, True):
             player = Player(self._description(decoder, salvage), self.path,
-                            salvage, quiet)
+                            quiet)
             try:
                 with player:
                     for sample in player:

@@ -226,6 +226,9 @@ contenders (const Case &c)
                      {.method = Method::kDecode, .interpolate = false})},
       {"decode, interpolated",
           extraction<Pixel> (c, "staircase", {.method = Method::kDecode})},
+      {"decode, leakage",
+          extraction<Pixel> (c, "sequential", {.method = Method::kDecode},
+              c.tile () + ",leak=0.001")},
       {"rank", extraction<Pixel> (c, "staircase", {.method = Method::kRank})},
   };
   if (const auto lattice = kLattices.find (c.n ()); lattice != kLattices.end ())

@@ -184,15 +184,11 @@ record (const Setting &setting, Ring &ring, const std::string &codec,
       ",framerate=100/1\" ! queue name=buffer "
       "max-size-buffers=" +
       std::to_string (rate > 0 ? kWaiting : 2) +
-      " max-size-bytes=0 max-size-time=0 ! codedexposure-log name=log ! queue "
-      "max-size-buffers=2 max-size-bytes=0 max-size-time=0 ! " +
-      codec +
-      " codedexposure-matroskamux name=mux ! codedexposure-filesink "
-      "direct=true reserve=" +
+      " max-size-bytes=0 max-size-time=0 ! codedexposure-recordmux codec=" +
+      codec + " ! codedexposure-filesink direct=true reserve=" +
       std::to_string (
           reserve ? guint64 (expected * double (setting.size ())) : 0) +
-      " location=" + setting.file () +
-      " log.track ! queue max-size-buffers=0 max-size-time=0 ! mux.subtitle_0";
+      " location=" + setting.file ();
   const ObjectPtr<GstElement> pipeline (
       gst_parse_launch (description.c_str (), nullptr));
   const ObjectPtr<GstElement> in (
@@ -257,7 +253,7 @@ void
 record_live (const Setting &setting, Ring &ring, bool reserve)
 {
   warm_up (setting, ring);
-  const Run run = record (setting, ring, "", setting.rate, reserve);
+  const Run run = record (setting, ring, "raw", setting.rate, reserve);
   std::printf ("\nraw at %g frames/s for %g s%s: %" G_GINT64_FORMAT
                " recorded, %" G_GINT64_FORMAT
                " lost, %.2f cores, %.1f s until all were written\n",
@@ -290,11 +286,11 @@ run_all (const Setting &setting)
     print (
         setting, name, {double (run.frames) / run.seconds, run.cores}, copies);
   };
-  fast ("raw", "", false);
-  fast ("raw, space reserved", "", true);
+  fast ("raw", "raw", false);
+  fast ("raw, space reserved", "raw", true);
   record_live (setting, ring, false);
   record_live (setting, ring, true);
-  fast ("FFV1", "avenc_ffv1 gop-size=1 slices=4 threads=auto !", false);
+  fast ("FFV1", "ffv1", false);
 }
 
 } // namespace

@@ -6,7 +6,7 @@
 
 #include <cstdio>
 
-#include "bench/gige_camera.h"
+#include "emulation/gige_camera.h"
 #include "child.h"
 #include "play.h"
 

@@ -28,14 +28,11 @@ write_file (const std::string &path, const std::string &bytes)
 std::string
 record_tail (const std::string &path)
 {
-  return "codedexposure-log name=log ! tee name=both ! queue ! "
-         "avenc_ffv1 gop-size=1 slices=4 ! "
-         "matroskamux name=mux timecodescale=1000 ! filesink async=false "
-         "location=" +
+  return "tee name=both ! queue ! codedexposure-recordmux ! filesink "
+         "async=false location=" +
          path +
          " both. ! queue ! codedexposure-demux ! fakesink name=out sync=false "
-         "async=false "
-         "log.track ! queue ! mux.subtitle_0";
+         "async=false";
 }
 
 Recording
@@ -68,11 +65,8 @@ decode (Row &row, const std::string &path, const Recording &recording,
   Judge judge (
       {.reading = recording.reading, .unknown_slots = recording.unjudged});
   Play play ("filesrc location=" + path + (push_mode ? " ! queue" : "") +
-             " ! matroskademux name=file file.video_0 ! queue ! "
-             "avdec_ffv1 max-errors=-1 max-threads=1 ! "
-             "codedexposure-restore name=restore ! codedexposure-demux "
-             "require-schedule=true ! "
-             "fakesink name=out sync=false file.subtitle_0 ! restore.track");
+             " ! codedexposure-recorddemux threads=1 ! codedexposure-demux "
+             "require-schedule=true ! fakesink name=out sync=false");
   judge.watch (play.pad ("out", "sink").get ());
   play.start ();
   play.wait ();

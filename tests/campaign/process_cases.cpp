@@ -107,13 +107,12 @@ stalled (Scale scale)
   const int frames = scale == Scale::full ? 2000 : 120;
   Judge judge;
   BenchPlay bench (
-      {.tail = "codedexposure-log name=log ! tee name=both ! queue ! "
-               "avenc_ffv1 gop-size=1 slices=4 ! matroskamux name=mux "
-               "timecodescale=1000 ! filesink async=false location=" +
+      {.tail = "tee name=both ! queue ! codedexposure-recordmux ! filesink "
+               "async=false location=" +
                path +
                " both. ! queue leaky=downstream max-size-buffers=2 ! "
-               "codedexposure-demux ! fakesink name=out sync=false async=false "
-               "log.track ! queue ! mux.subtitle_0"});
+               "codedexposure-demux ! fakesink name=out sync=false "
+               "async=false"});
   const auto pad = bench.play.pad ("out", "sink");
   judge.watch (pad.get ());
   bench.start ();

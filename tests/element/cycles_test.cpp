@@ -89,8 +89,8 @@ const Chain kChains[] = {
         "codedexposure-sim ! codedexposure-demux name=d d.src ! queue ! "
         "fakesink d.coded ! queue ! fakesink d.subframe_2 ! queue ! fakesink"},
     {"fuse", "codedexposure-sim ! codedexposure-fuse lookahead=1 ! fakesink"},
-    {"log", "codedexposure-sim ! codedexposure-log location=/dev/null ! "
-            "fakesink"},
+    {"record", "codedexposure-sim ! codedexposure-recordmux ! "
+               "codedexposure-recorddemux ! fakesink"},
     {"subframestats", "subframestats location=/dev/null ! fakesink"},
     {"view", "codedexposure-view bits=4 ! fakesink"},
     {"moirecalib", "moirecalib pattern=grating-both:4/0 ! fakesink"},
@@ -98,7 +98,7 @@ const Chain kChains[] = {
         "codedexposure-sim dmd=sim:cycles ! dmdsync device=sim:cycles ! "
         "tee name=t ! queue ! codedexposure-demux ! queue ! subframestats ! "
         "fakesink t. ! queue ! codedexposure-fuse ! codedexposure-view ! "
-        "fakesink t. ! queue ! codedexposure-log location=/dev/null ! "
+        "fakesink t. ! queue ! codedexposure-recordmux codec=raw ! "
         "fakesink"},
 };
 

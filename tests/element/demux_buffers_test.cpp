@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure-demux: memory, strides, pools and metas. */
+#include <atomic>
+#include <set>
+#include <thread>
+
 #include "downstream.h"
 #include "harness.h"
-
-#include <set>
 
 #include "common/meta.h"
 
@@ -332,6 +334,30 @@ TEST (DemuxMemory, OnlyWantedSubframesTakeBuffers)
   const CapsPtr caps = demux.pad_caps ("subframe_3");
   EXPECT_EQ (image_of<std::uint8_t> (buffer.get (), caps.get ()), subframe (3));
   EXPECT_EQ (counter_of (demux.element (), "subframes-out"), 1u);
+}
+
+/* Otherwise, a slow sink would let memory grow. */
+TEST (DemuxMemory, ALoneSubframeWaitsForItsPool)
+{
+  ElementHarness demux (kLine, "sink", nullptr);
+  Downstream downstream (demux.request ("subframe_2"));
+  downstream.pool.reset (gst_video_buffer_pool_new ());
+  downstream.max = 1;
+  demux.set_caps (gray_caps (kWidth, kHeight));
+  ASSERT_EQ (push (demux), GST_FLOW_OK);
+  BufferPtr kept = demux.pull ("subframe_2");
+  ASSERT_TRUE (kept);
+  std::atomic<bool> pushed = false;
+  std::thread other ([&] {
+    EXPECT_EQ (push (demux, 1), GST_FLOW_OK);
+    pushed = true;
+  });
+  for (int i = 0; i < 20 && !pushed; i++)
+    g_usleep (1000);
+  EXPECT_FALSE (pushed);
+  kept.reset ();
+  other.join ();
+  EXPECT_EQ (demux.pull ("subframe_2")->pool, downstream.pool.get ());
 }
 
 /* ---------------------------------------------------------------- input -- */

@@ -3,6 +3,7 @@
  * its own streams say. */
 #include "demux_schedule.h"
 
+#include "common/meta.h"
 #include "common/tag.h"
 
 namespace
@@ -76,6 +77,30 @@ TEST_F (DemuxSchedule, TagThatComesLaterChangesTheNumberOfSubframes)
       "pixel-aspect-ratio=8/1"));
   EXPECT_EQ (pull_images (*demux),
       expected ("sequential:lattice:8/3", picture (), Method::kSelect));
+}
+
+/* As in a recording without a track; the property wins. */
+TEST (DemuxTagged, BitsOfTheTagCountWhereFramesHaveNoMeta)
+{
+  for (const auto &[settings, bits] : {std::pair ("", 12), {" bits=10", 10}}) {
+    ElementHarness demux (std::string ("codedexposure-demux") + settings);
+    demux.set_caps (gray_caps (8, 8, "25/1", "GRAY16_LE"));
+    StreamSetup setup{schedule_of ("sequential:2x2")};
+    setup.bits = 12;
+    demux.push_event (setup_to_event (setup));
+    ASSERT_EQ (
+        demux.push (frame_of (
+            draw<std::uint16_t> (8, 8, [] (int, int) { return 4095; }), 0)),
+        GST_FLOW_OK);
+    const BufferPtr out = demux.pull ();
+    ASSERT_TRUE (out);
+    const auto meta = get_frame_meta (out.get ());
+    EXPECT_EQ (meta->bits, bits);
+    EXPECT_EQ (meta->saturated, 64u);
+    const EventPtr tag = demux.pull_event (GST_EVENT_TAG);
+    ASSERT_TRUE (tag);
+    EXPECT_EQ (bits_from_tags (tag.get ()), bits);
+  }
 }
 
 TEST_F (DemuxSchedule, TagOfAnotherStreamIsForgotten)

@@ -164,6 +164,21 @@ TEST_F (DemuxTime, LossIsSaidOnTheBusWithItsPlace)
   EXPECT_EQ (counter ("frames-lost"), 3u);
 }
 
+/* dmdsync posts a loss and pushes a gap in its place. */
+TEST_F (DemuxTime, LossThatUpstreamHasSaidIsCountedAndNotSaidAgain)
+{
+  start ();
+  push (0);
+  GstEvent *gap = gst_event_new_gap (40 * kMs, 80 * kMs);
+  gst_event_set_gap_flags (gap, GST_GAP_FLAG_MISSING_DATA);
+  ASSERT_TRUE (demux->push_event (gap));
+  push (120 * kMs);
+  EXPECT_FALSE (demux->posted<FramesLost> ());
+  EXPECT_EQ (counter ("frames-lost"), 2u);
+  push (200 * kMs);
+  EXPECT_TRUE (demux->posted<FramesLost> ());
+}
+
 TEST_F (DemuxTime, JitterUpToHalfAPeriodIsNoLoss)
 {
   start ();

@@ -87,6 +87,9 @@ TEST (DmdsyncLoss, AnIncompleteFrameIsCountedSaidAndFlaggedOrDropped)
   gst_event_parse_gap (gap.get (), &from, &length);
   EXPECT_EQ (from, 80 * kMs);
   EXPECT_EQ (length, 40 * kMs);
+  GstGapFlags flags = GstGapFlags (0);
+  gst_event_parse_gap_flags (gap.get (), &flags);
+  EXPECT_EQ (flags, GST_GAP_FLAG_MISSING_DATA);
 }
 
 /* A source without a pool may write into memory that it has handed out. */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* codedexposure-log: one correct line of JSON for each frame, written
- * immediately. */
+/* The part log: one correct line of JSON for each frame, written immediately.
+ */
 #include <algorithm>
 #include <cstdio>
 #include <fstream>
@@ -17,6 +17,9 @@
 #include "common/meta.h"
 #include "common/raii.h"
 #include "common/tag.h"
+#include "record/setups.h"
+#include "record/track.h"
+#include "record_parts.h"
 
 namespace
 {
@@ -25,6 +28,9 @@ using namespace codedexposure;
 using namespace codedexposure::gst;
 using Json = nlohmann::json;
 using Harness = std::unique_ptr<GstHarness, decltype (&gst_harness_teardown)>;
+
+const auto *const linked =
+    ::testing::AddGlobalTestEnvironment (new test::RecordParts);
 
 constexpr char kCaps[] =
     "video/x-raw,format=GRAY8,width=8,height=8,framerate=30000/1001";
@@ -44,8 +50,7 @@ protected:
 
   void play (const char *location)
   {
-    GstElement *element =
-        gst_element_factory_make ("codedexposure-log", nullptr);
+    GstElement *element = gst_element_factory_make ("part-log", nullptr);
     g_object_set (element, "location", location, nullptr);
     harness_.reset (gst_harness_new_with_element (element, "sink", "src"));
     gst_object_unref (element);
@@ -82,8 +87,8 @@ protected:
 std::pair<GQuark, gint>
 error_at_start (const char *location)
 {
-  const ObjectPtr<GstElement> element (GST_ELEMENT (gst_object_ref_sink (
-      gst_element_factory_make ("codedexposure-log", nullptr))));
+  const ObjectPtr<GstElement> element (GST_ELEMENT (
+      gst_object_ref_sink (gst_element_factory_make ("part-log", nullptr))));
   const ObjectPtr<GstBus> bus (gst_bus_new ());
   gst_element_set_bus (element.get (), bus.get ());
   g_object_set (element.get (), "location", location, nullptr);
@@ -156,7 +161,7 @@ TEST_F (LogTest, CountsFramesThatWereDroppedAfterTheyWereNumbered)
     lost.push_back (line.at ("lost_before"));
   EXPECT_EQ (lost, (std::vector{0, 0, 4, 2, 0}));
   GstStructure *stats = nullptr;
-  g_object_get (harness_->element, "stats", &stats, nullptr);
+  g_object_get (harness_->element, "counters", &stats, nullptr);
   const StructurePtr owned (stats);
   guint64 count = 0;
   EXPECT_TRUE (gst_structure_get_uint64 (stats, "frames-lost", &count));
@@ -322,6 +327,50 @@ TEST_F (LogTest, TheTagSaysThatThereIsATrack)
     EXPECT_NE (text.find ("\"setup\""), std::string::npos);
     EXPECT_EQ (text.find ("\"track\""), std::string::npos) << text;
   }
+}
+
+/** One whose JSON form has more than 512 bytes. */
+StreamSetup
+long_setup (int first)
+{
+  std::string order;
+  for (int i = 0; i < 256; i++)
+    order += (i > 0 ? "/" : "") + std::to_string ((first + i) % 256);
+  return {*Schedule::parse ("sequential:16x16,order=" + order)};
+}
+
+TEST_F (LogTest, LinesNameTheirSetupAndTheTagsHaveAll)
+{
+  play (path_.get ());
+  const Harness track (
+      gst_harness_new_with_element (harness_->element, nullptr, "track"),
+      gst_harness_teardown);
+  const std::vector setups = {long_setup (1), long_setup (2)};
+  for (const StreamSetup &setup : setups) {
+    gst_harness_push_event (harness_.get (), setup_to_event (setup));
+    for (int i = 0; i < 4; i++)
+      ASSERT_EQ (push (frame (GstClockTime (i) * 33'366'666)), GST_FLOW_OK);
+  }
+  for (int i = 0; i < 8; i++) {
+    const BufferPtr line (gst_harness_pull (track.get ()));
+    GstMapInfo map;
+    ASSERT_TRUE (gst_buffer_map (line.get (), &map, GST_MAP_READ));
+    const auto read = TrackLine::from_json (
+        {reinterpret_cast<const char *> (map.data), map.size});
+    gst_buffer_unmap (line.get (), &map);
+    ASSERT_TRUE (read);
+    const StreamSetup &setup = setups[i < 4 ? 0 : 1];
+    EXPECT_EQ (read->setup_id, id_of (setup)) << i;
+    EXPECT_EQ (read->setup.has_value (), i == 0 || i == 1 || i == 4) << i;
+    if (read->setup) {
+      EXPECT_EQ (*read->setup, setup);
+    }
+  }
+  const EventPtr tag (
+      gst_pad_get_sticky_event (harness_->sinkpad, GST_EVENT_TAG, 0));
+  GstTagList *tags = nullptr;
+  gst_event_parse_tag (tag.get (), &tags);
+  EXPECT_EQ (setups_from_tags (tags), std::vector{setups[0]});
 }
 
 TEST_F (LogTest, FramesPassUntouched)

@@ -102,5 +102,10 @@ TEST (PatternFramesDemux, TheCodedPadHandsEveryFrameOn)
     EXPECT_EQ (GST_BUFFER_IS_DISCONT (coded.get ()), k == 0);
   }
   EXPECT_FALSE (demux.pull_event (GST_EVENT_GAP, "coded"));
-  EXPECT_TRUE (demux.pull_event (GST_EVENT_GAP, "subframe_1"));
+  const EventPtr gap = demux.pull_event (GST_EVENT_GAP, "subframe_1");
+  ASSERT_TRUE (gap);
+  GstClockTime from = 0, duration = 0;
+  gst_event_parse_gap (gap.get (), &from, &duration);
+  EXPECT_EQ (from % kPeriod, kPeriod / 4) << "not in place of the subframe";
+  EXPECT_EQ (duration, kPeriod);
 }

@@ -58,12 +58,11 @@ is_ours (const GParamSpec *spec)
 
 TEST (Plugin, HasTheElementsOfTheBench)
 {
-  for (const char *name :
-      {"codedexposure-camerasrc", "codedexposure-sim", "codedexposure-demux",
-          "codedexposure-filesink", "codedexposure-fuse", "codedexposure-log",
-          "codedexposure-matroskamux", "codedexposure-rawdec",
-          "codedexposure-scene", "codedexposure-view", "dmdsync", "moirecalib",
-          "subframestats"}) {
+  for (const char *name : {"codedexposure-camerasrc", "codedexposure-sim",
+           "codedexposure-demux", "codedexposure-filesink",
+           "codedexposure-fuse", "codedexposure-recorddemux",
+           "codedexposure-recordmux", "codedexposure-scene",
+           "codedexposure-view", "dmdsync", "moirecalib", "subframestats"}) {
     const std::unique_ptr<GstElementFactory, ObjectUnref> factory (
         gst_element_factory_find (name));
     EXPECT_NE (factory, nullptr) << name;

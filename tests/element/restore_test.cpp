@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* codedexposure-restore: what codedexposure-log wrote beside frames is on them
- * again, and what is not as it was recorded is CORRUPTED. */
+/* The parts log and restore: what was written beside frames is on them again,
+ * and what is not as it was recorded is CORRUPTED. */
 #include "harness.h"
 
 #include <memory>
@@ -10,7 +10,9 @@
 #include "common/messages.h"
 #include "common/meta.h"
 #include "common/tag.h"
+#include "record/setups.h"
 #include "record/track.h"
+#include "record_parts.h"
 
 namespace
 {
@@ -19,8 +21,20 @@ using namespace codedexposure;
 using namespace codedexposure::gst;
 using namespace codedexposure::test;
 
+const auto *const linked =
+    ::testing::AddGlobalTestEnvironment (new RecordParts);
+
 constexpr GstClockTime kPeriod = 40 * GST_MSECOND;
 constexpr int kFrames = 6;
+
+guint64
+counted (GstElement *element, const char *name)
+{
+  const StructurePtr counters (property<GstStructure *> (element, "counters"));
+  guint64 value = 0;
+  EXPECT_TRUE (gst_structure_get_uint64 (counters.get (), name, &value));
+  return value;
+}
 
 BufferPtr
 picture (int frame)
@@ -56,7 +70,7 @@ struct Recording {
   Recording ()
   {
     /* The file lets it start before the pad is requested. */
-    ElementHarness log ("codedexposure-log location=/dev/null");
+    ElementHarness log ("part-log location=/dev/null");
     log.request ("track");
     log.set_caps (gray_caps (8, 8));
     log.push_event (setup_to_event (setup_of ("staircase:2x2")));
@@ -136,7 +150,7 @@ protected:
   }
 
   Recording recording;
-  ElementHarness file{"codedexposure-restore"};
+  ElementHarness file{"part-restore"};
   HarnessPtr track;
   std::vector<BufferPtr> restored;
 };
@@ -172,7 +186,7 @@ TEST_F (Restore, OtherPixelsAreCorruptedAndCounted)
   play ();
   for (int i = 0; i < kFrames; i++)
     EXPECT_EQ (corrupted (i), i == 2 || i == 3 || i == 4) << i;
-  EXPECT_EQ (counter_of (file.element (), "frames-damaged"), 2u);
+  EXPECT_EQ (counted (file.element (), "frames-damaged"), 2u);
   const auto begin = file.posted<FramesDamaged> ();
   ASSERT_TRUE (begin);
   EXPECT_TRUE (begin->active);
@@ -194,7 +208,7 @@ TEST_F (Restore, AFrameWithoutItsLineIsCorrupted)
   ASSERT_TRUE (meta);
   EXPECT_EQ (meta->frame, 13u);
   EXPECT_FALSE (meta->locked);
-  EXPECT_EQ (counter_of (file.element (), "frames-unknown"), 1u);
+  EXPECT_EQ (counted (file.element (), "frames-unknown"), 1u);
   ASSERT_TRUE (file.posted<FramesDamaged> ());
 }
 
@@ -214,7 +228,7 @@ TEST_F (Restore, ADamagedLineIsCountedAndItsFrameCorrupted)
   gst_buffer_memset (recording.lines[4].get (), 9, '9', 1);
   play ();
   EXPECT_TRUE (corrupted (4));
-  EXPECT_EQ (counter_of (file.element (), "lines-damaged"), 1u);
+  EXPECT_EQ (counted (file.element (), "lines-damaged"), 1u);
 }
 
 TEST_F (Restore, AFrameThatIsMissingIsSaid)
@@ -242,7 +256,7 @@ TEST_F (Restore, FramesThatAreMissingWithTheirLinesAreSaid)
   const auto incomplete = file.posted<StreamIncomplete> ();
   ASSERT_TRUE (incomplete);
   EXPECT_EQ (incomplete->count, 1u);
-  EXPECT_EQ (counter_of (file.element (), "frames-missing"), 1u);
+  EXPECT_EQ (counted (file.element (), "frames-missing"), 1u);
   EXPECT_FALSE (file.posted<FramesMissing> ());
 }
 
@@ -259,6 +273,7 @@ TEST_F (Restore, AfterASeekTheFramesBeforeItAreNotMissed)
 
 TEST_F (Restore, AFrameWhoseTimeTheFileRoundedUpStaysInTheSegment)
 {
+  g_object_set (file.element (), "tick", guint64 (1000), nullptr);
   constexpr GstClockTime kRounded = kPeriod + 400;
   GstSegment segment;
   gst_segment_init (&segment, GST_FORMAT_TIME);
@@ -280,6 +295,7 @@ TEST_F (Restore, AFrameWhoseTimeTheFileRoundedUpStaysInTheSegment)
 
 TEST_F (Restore, AfterASeekTheTimeOfTheStreamIsTheSame)
 {
+  g_object_set (file.element (), "tick", guint64 (1000), nullptr);
   const auto time_of_second_frame = [this] (GstClockTime start) {
     GstSegment segment;
     gst_segment_init (&segment, GST_FORMAT_TIME);
@@ -363,6 +379,134 @@ TEST_F (Restore, MarkupIsUnescaped)
   EXPECT_EQ (schedule (), "staircase:2x2");
 }
 
+TEST_F (Restore, ExactTimesStayAsTheyAre)
+{
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_TIME);
+  segment.start = kPeriod;
+  segment.time = kPeriod / 2;
+  file.push_event (gst_event_new_segment (&segment));
+  const EventPtr event = file.pull_event (GST_EVENT_SEGMENT);
+  const EventPtr last = file.pull_event (GST_EVENT_SEGMENT);
+  gst_event_copy_segment (last ? last.get () : event.get (), &segment);
+  EXPECT_EQ (segment.start, kPeriod);
+}
+
+/* From the last frame to the first, as in reverse playback. */
+TEST_F (Restore, BackwardsTheFlagsAreThoseOfForwards)
+{
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_TIME);
+  segment.rate = -1;
+  segment.stop = kFrames * kPeriod;
+  file.push_event (gst_event_new_segment (&segment));
+  for (int i = kFrames - 1; i >= 0; i--) {
+    push_line (i);
+    push_frame (i);
+  }
+  end ();
+  while (BufferPtr frame = file.pull ())
+    restored.push_back (std::move (frame));
+  ASSERT_EQ (restored.size (), std::size_t (kFrames));
+  for (int i = 0; i < kFrames; i++)
+    EXPECT_EQ (corrupted (kFrames - 1 - i), i == 2) << i;
+  EXPECT_FALSE (file.posted<FramesMissing> ());
+  EXPECT_FALSE (file.posted<StreamCut> ());
+}
+
+/* Key units only, for example. */
+TEST_F (Restore, FramesThatAreLeftOutOnPurposeAreNotMissed)
+{
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_TIME);
+  segment.flags = GST_SEGMENT_FLAG_TRICKMODE_KEY_UNITS;
+  file.push_event (gst_event_new_segment (&segment));
+  play (4);
+  EXPECT_FALSE (corrupted (4));
+  EXPECT_FALSE (file.posted<FramesMissing> ());
+  EXPECT_FALSE (file.posted<StreamIncomplete> ());
+}
+
+TEST_F (Restore, TheCapsAreThoseOfTheFrames)
+{
+  const ObjectPtr<GstPad> src (
+      gst_element_get_static_pad (file.element (), "src"));
+  const CapsPtr caps (gst_pad_query_caps (src.get (), nullptr));
+  EXPECT_FALSE (gst_caps_is_empty (caps.get ()));
+  EXPECT_TRUE (
+      gst_caps_can_intersect (caps.get (), caps_of (gray_caps (8, 8)).get ()));
+}
+
+/** One whose JSON form has more than 512 bytes. */
+StreamSetup
+long_setup (int first)
+{
+  std::string order;
+  for (int i = 0; i < 256; i++)
+    order += (i > 0 ? "/" : "") + std::to_string ((first + i) % 256);
+  return {*Schedule::parse ("sequential:16x16,order=" + order)};
+}
+
+/** Changes of the schedule: two frames by each. */
+struct Changing {
+  std::vector<BufferPtr> frames, lines;
+  std::vector<StreamSetup> setups;
+
+  Changing ()
+  {
+    ElementHarness log ("part-log location=/dev/null");
+    log.request ("track");
+    log.set_caps (gray_caps (8, 8));
+    for (int i = 0; i < 6; i++) {
+      const StreamSetup setup = long_setup (i % 4 < 2 ? 1 : 2);
+      if (i % 2 == 0)
+        log.push_event (setup_to_event (setup));
+      setups.push_back (setup);
+      BufferPtr frame = picture (i);
+      set_frame_meta (frame.get (), meta_of (i));
+      log.push (std::move (frame));
+      frames.push_back (log.pull ());
+      lines.push_back (log.pull ("track"));
+    }
+    for (int i = 0; i < 6; i++)
+      gst_buffer_unset_flags (
+          frames[std::size_t (i)].get (), GST_BUFFER_FLAG_DISCONT);
+  }
+};
+
+/* The line that has the new schedule is lost. */
+TEST (RestoreOfChanges, AFrameWhoseScheduleIsUnknownIsCorrupted)
+{
+  for (const bool tags : {false, true}) {
+    Changing recording;
+    ElementHarness file ("part-restore");
+    const HarnessPtr track (
+        gst_harness_new_with_element (file.element (), "track", nullptr));
+    gst_harness_set_src_caps_str (track.get (), "text/x-raw,format=utf8");
+    file.set_caps (gray_caps (8, 8));
+    if (tags)
+      file.push_event (add_setups (setup_to_event (recording.setups[0]),
+          {recording.setups[2], recording.setups[0]}));
+    std::vector<BufferPtr> restored;
+    for (std::size_t i = 0; i < 6; i++) {
+      if (i != 2)
+        gst_harness_push (track.get (), recording.lines[i].release ());
+      file.push (std::move (recording.frames[i]));
+    }
+    gst_harness_push_event (track.get (), gst_event_new_eos ());
+    file.push_event (gst_event_new_eos ());
+    while (BufferPtr frame = file.pull ())
+      restored.push_back (std::move (frame));
+    ASSERT_EQ (restored.size (), 6u);
+    for (std::size_t i = 0; i < 6; i++)
+      EXPECT_EQ (bool (GST_BUFFER_FLAG_IS_SET (
+                     restored[i].get (), GST_BUFFER_FLAG_CORRUPTED)),
+          i == 2 || (i == 3 && !tags))
+          << i << (tags ? ", with tags" : "");
+    EXPECT_EQ (counted (file.element (), "frames-damaged"), tags ? 0u : 1u);
+  }
+}
+
 /** A setup whose recording has a track. */
 StreamSetup
 with_track (const char *schedule)
@@ -400,7 +544,7 @@ TEST_F (Restore, ATrackWithoutAnyLineIsDamage)
 
 TEST (RestoreWithoutATrack, AMissingTrackIsDamageIfTheTagsSayThatThereIsOne)
 {
-  ElementHarness file ("codedexposure-restore");
+  ElementHarness file ("part-restore");
   file.set_caps (gray_caps (8, 8));
   file.push_event (setup_to_event (with_track ("sequential:4x1")));
   for (int i = 0; i < 2; i++)
@@ -414,7 +558,7 @@ TEST (RestoreWithoutATrack, AMissingTrackIsDamageIfTheTagsSayThatThereIsOne)
     const auto meta = get_frame_meta (frame.get ());
     EXPECT_FALSE (meta) << "its number and synchronisation are unknown";
   }
-  EXPECT_EQ (counter_of (file.element (), "frames-unknown"), 2u);
+  EXPECT_EQ (counted (file.element (), "frames-unknown"), 2u);
   const auto begin = file.posted<FramesDamaged> ();
   ASSERT_TRUE (begin);
   EXPECT_TRUE (begin->active);
@@ -428,7 +572,7 @@ TEST (RestoreWithoutATrack, AMissingTrackIsDamageIfTheTagsSayThatThereIsOne)
 
 TEST (RestoreWithoutATrack, FramesPassAndItIsSaidOnce)
 {
-  ElementHarness file ("codedexposure-restore");
+  ElementHarness file ("part-restore");
   file.set_caps (gray_caps (8, 8));
   file.push_event (setup_to_event (setup_of ("sequential:4x1")));
   for (int i = 0; i < 2; i++)

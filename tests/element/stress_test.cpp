@@ -63,7 +63,8 @@ subjects ()
 {
   return {{"demux", "codedexposure-demux", "sink", true},
       {"dmdsync", "dmdsync device=sim:stress"}, {"fuse", "codedexposure-fuse"},
-      {"log", "codedexposure-log location=" + folder ().path + "/log"},
+      {"recordmux",
+          "codedexposure-recordmux log-location=" + folder ().path + "/log"},
       {"moirecalib", "moirecalib"}, {"scene", "codedexposure-scene", nullptr},
       {"sim", "codedexposure-sim"},
       {"subframestats", "subframestats location=" + folder ().path + "/stats"},

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure-view: display values for all depths. */
 #include "common/meta.h"
+#include "common/tag.h"
 #include "harness.h"
 
 namespace
@@ -42,6 +43,30 @@ shown (const std::string &settings, int value, int meta_bits)
 }
 
 } // namespace
+
+/* As in a recording without a track. */
+TEST (View, BitsOfTheTagCountWhereFramesHaveNoMeta)
+{
+  ElementHarness h ("codedexposure-view");
+  h.set_caps (caps ("GRAY16_LE"));
+  StreamSetup setup;
+  setup.bits = 12;
+  const auto white = [&] {
+    EXPECT_EQ (h.push (frame_of (draw<std::uint16_t> (kWidth, kHeight,
+                                     [] (int, int) { return 4095; }),
+                   0)),
+        GST_FLOW_OK);
+    const BufferPtr out = h.pull ();
+    return int (
+        image_of<std::uint8_t> (out.get (), h.pad_caps ().get ()).at (0, 0));
+  };
+  EXPECT_EQ (white (), 16);
+  ASSERT_TRUE (h.push_event (setup_to_event (setup)));
+  EXPECT_EQ (white (), 255);
+  ASSERT_TRUE (h.push_event (gst_event_new_tag (
+      gst_tag_list_new (GST_TAG_TITLE, "Another tag", nullptr))));
+  EXPECT_EQ (white (), 255);
+}
 
 TEST (View, WhiteIsTheLargestValueOfTheBitsThatCount)
 {

@@ -2,7 +2,7 @@
 /* Any bytes as the short texts of properties and command lines: what is
  * accepted is written so that it parses back. */
 #include "base/packed_mono.h"
-#include "bench/fault_plan.h"
+#include "emulation/fault_plan.h"
 #include "bench/simulated_dmd.h"
 #include "calibrate/gratings.h"
 #include "dmd/options.h"

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* codedexposure-camera as a process of its own, which can be killed. */
+/* The emulated camera as a process of its own, which can be killed. */
 #pragma once
 
 #include <string>
@@ -30,10 +30,9 @@ private:
       const std::string &schedule, const std::vector<std::string> &options)
   {
     std::vector<std::string> words{"env", "GST_PLUGIN_PATH_1_0=" PLUGIN_DIR,
-        "GST_REGISTRY_1_0=" PLUGIN_REGISTRY, CAMERA,
-        "videotestsrc pattern=ball ! video/x-raw,format=GRAY8,width=256,"
-        "height=192,framerate=400/1 ! codedexposure-sim schedule=" +
-            schedule + " ! video/x-raw,framerate=100/1"};
+        "GST_REGISTRY_1_0=" PLUGIN_REGISTRY, PROGRAM, "bench", "--address",
+        "127.0.0.1", "--size", "256x192", "--frame-rate", "100", "--schedule",
+        schedule};
     words.insert (words.end (), options.begin (), options.end ());
     return words;
   }

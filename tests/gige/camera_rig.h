@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "bench/gige_camera.h"
+#include "emulation/gige_camera.h"
 #include "common/meta.h"
 #include "harness.h"
 

@@ -12,11 +12,11 @@
 #include "bench/bench.h"
 #include "camera_rig.h"
 #include "dmd/dmd.h"
-#include "bench/emulated_dlpc900.h"
+#include "emulation/dlpc900.h"
 #include "linked_elements.h"
 #include "mirrors.h"
 #include "screen.h"
-#include "bench/usb_bed.h"
+#include "emulation/usb_bed.h"
 
 namespace
 {

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The Python package gives what pipelines/decode writes, and says what is lost."""
+"""The Python package gives what codedexposure decode writes, and says what is lost."""
 import csv
 import json
 import unittest
@@ -38,10 +38,8 @@ def record_without(lost, name):
     pipeline = Gst.parse_launch(
         "videotestsrc num-buffers=32 ! video/x-raw,format=GRAY8,width=96,"
         "height=64,framerate=100/1 ! codedexposure-sim ! identity name=camera ! "
-        "dmdsync device=sim:bench ! codedexposure-log name=log ! queue ! "
-        "avenc_ffv1 gop-size=1 ! matroskamux name=mux timecodescale=1000 ! "
-        f"filesink location={SCRATCH / name} log.track ! queue ! "
-        "mux.subtitle_0")
+        "dmdsync device=sim:bench ! codedexposure-recordmux ! "
+        f"filesink location={SCRATCH / name}")
     numbers = iter(range(8))
     pipeline.get_by_name("camera").get_static_pad("src").add_probe(
         Gst.PadProbeType.BUFFER, lambda *_: Gst.PadProbeReturn.DROP
@@ -54,7 +52,7 @@ def record_without(lost, name):
 
 
 class Pixels(unittest.TestCase):
-    """Frames are those of pipelines/decode, bit for bit."""
+    """Frames are those of codedexposure decode, bit for bit."""
 
     def test_subframes(self):
         frames = list(opened("plain.mkv").subframes())
@@ -118,7 +116,7 @@ class Pixels(unittest.TestCase):
 
 
 class Facts(unittest.TestCase):
-    """What is known of a frame is what pipelines/decode says of it."""
+    """What is known of a frame is what codedexposure decode says of it."""
 
     def compare_table(self, name, status=0):
         run("decode", name, "--force", "--output", "pictures/", status=status)

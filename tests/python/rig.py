@@ -30,15 +30,16 @@ def clean():
 
 
 def run(name, *arguments, status=0):
-    """Runs a script of pipelines/, which ends with this status."""
-    done = subprocess.run([ROOT / "pipelines" / name, *arguments], cwd=SCRATCH,
-                          capture_output=True, text=True, check=False)
+    """Runs a command of the program, which ends with this status."""
+    done = subprocess.run([BUILD / "app/codedexposure", name, *arguments],
+                          cwd=SCRATCH, capture_output=True, text=True,
+                          check=False)
     assert done.returncode == status, done.stderr
 
 
 def play(pipeline):
-    subprocess.run([BUILD / "pipelines/codedexposure-launch", pipeline,
-                    "--force"], cwd=SCRATCH, check=True, capture_output=True)
+    subprocess.run([BUILD / "tests/pipeline/play", pipeline], cwd=SCRATCH,
+                   check=True, capture_output=True)
 
 
 def simulate(name, *options):
@@ -48,7 +49,7 @@ def simulate(name, *options):
 
 
 def decoded(name, *options, status=0):
-    """The pixels that pipelines/decode writes, one frame after the other."""
+    """The pixels that codedexposure decode writes, one frame after the other."""
     run("decode", name, *options, "--force", "--output", "fast.mkv",
         status=status)
     play("filesrc location=fast.mkv ! matroskademux ! avdec_ffv1 ! "

@@ -39,10 +39,4 @@ std::vector<Table> sequence_tables (
 std::vector<Table> refinement_tables (
     const std::vector<Scene> &clips, const Progress &progress);
 
-/** Mean PSNR of `fast` over the first @p frames frames of drawn scenes and of
- * @p clips, clean, for scene models near the current one: a basis for the
- * choice of SceneModel. */
-Table training_table (
-    const std::vector<Scene> &clips, int frames, const Progress &progress);
-
 } // namespace codedexposure::quality

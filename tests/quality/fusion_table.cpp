@@ -22,7 +22,7 @@ constexpr int kLeastFrames = 8;
 struct Options {
   char *clips = nullptr, *document = nullptr;
   int frames = kLeastFrames;
-  gboolean json = FALSE, quiet = FALSE, train = FALSE;
+  gboolean json = FALSE, quiet = FALSE;
 };
 
 bool
@@ -35,8 +35,6 @@ parse (int &argc, char **&argv, Options &options)
           "of each clip, at most [8]", "N"},
       {"json", 0, 0, G_OPTION_ARG_NONE, &options.json, "figures for a program",
           nullptr},
-      {"train", 0, 0, G_OPTION_ARG_NONE, &options.train,
-          "compare models of scenes instead, for the filters of fast", nullptr},
       {"update", 0, 0, G_OPTION_ARG_FILENAME, &options.document,
           "write the tables to where this document marks places for them",
           "FILE"},
@@ -60,7 +58,7 @@ parse (int &argc, char **&argv, Options &options)
   return ok && argc == 1 && options.frames >= kLeastFrames;
 }
 
-/* The clips, or a drawn scene if there are none and no other is drawn. */
+/* The clips, or a drawn scene if there are none. */
 std::vector<Scene>
 find_scenes (const Options &options)
 {
@@ -72,8 +70,6 @@ find_scenes (const Options &options)
     });
   if (clips && !clips->empty ())
     return std::move (*clips);
-  if (options.train)
-    return {};
   std::cerr << "no clips"
             << (clips ? std::string () : ": " + clips.error ().message)
             << "; name a folder with --clips. Drawing a scene instead\n";
@@ -94,17 +90,12 @@ main (int argc, char **argv)
       std::cerr << "\r\033[K" << what << std::flush;
   };
   const std::vector<Scene> scenes = find_scenes (options);
-  std::vector<Table> tables;
-  if (options.train) {
-    tables = {training_table (scenes, options.frames, progress)};
-  } else {
-    tables = fusion_tables (scenes, options.frames, progress);
-    tables.push_back (still_fusion_table (scenes, progress));
-    std::ranges::move (
-        sequence_tables (scenes, progress), std::back_inserter (tables));
-    std::ranges::move (
-        refinement_tables (scenes, progress), std::back_inserter (tables));
-  }
+  std::vector<Table> tables = fusion_tables (scenes, options.frames, progress);
+  tables.push_back (still_fusion_table (scenes, progress));
+  std::ranges::move (
+      sequence_tables (scenes, progress), std::back_inserter (tables));
+  std::ranges::move (
+      refinement_tables (scenes, progress), std::back_inserter (tables));
   progress ("");
 
   if (options.document)

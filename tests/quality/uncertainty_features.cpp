@@ -57,51 +57,44 @@ write_features (
   options.noise = {condition.electrons, condition.read_noise};
   const int width = coded[0].width (), height = coded[0].height ();
   auto engine =
-      must (fuse::Engine::make (schedule, width, height, options, 255.0));
+      must (fuse::Engine::make (schedule, width, height, options, 255.0, {}));
 
   Workers workers (1);
   std::mt19937 dice (std::mt19937::result_type (100 * number + n));
   for (std::size_t frame = 0; frame < coded.size (); frame++) {
-    Field &light = engine->next ();
+    Field &light = engine->stream ().next ();
     for (int y = 0; y < height; y++)
       for (int x = 0; x < width; x++)
         light.row (y)[x] = coded[frame].at (x, y);
-    engine->take ();
+    engine->stream ().take (engine->kernels ());
     std::vector<Field> fused (std::size_t (n), Field (width, height));
-    std::vector<Field> deviations (fused);
+    const auto write = [&] (const fuse::Uncertainty::Row &row) {
+      const Picture &truth =
+          scene.frames[frame * std::size_t (n) + std::size_t (row.slot)];
+      const float *light_of_slot = fused[std::size_t (row.slot)].row (row.y);
+      for (int x = 0; x < width; x++) {
+        const unsigned drawn = dice ();
+        const auto &p = row.pixels[x];
+        if (drawn % 16 != 0 || row.is_static[x] > 0.0f ||
+            (p.measured && !noisy))
+          continue;
+        /* The scene is rounded; where in its grey level the light was is not
+         * known. */
+        const float within = float (drawn >> 8) / 16777216.0f - 0.5f;
+        const Record record{float (int (quality)), float (n), float (noisy),
+            float (number), float (p.measured), p.misfit, p.change, p.roughness,
+            p.geometry, p.noise,
+            light_of_slot[x] - float (truth.at (x, row.y)) + within,
+            row.deviations[x]};
+        std::fwrite (record.data (), sizeof record, 1, stdout);
+      }
+    };
     engine->fuse (
         [&] (int y, const float *const *rows) {
           for (int s = 0; s < n; s++)
             std::copy_n (rows[s], width, fused[std::size_t (s)].row (y));
         },
-        workers, {},
-        [&] (int s, int y, const float *row) {
-          std::copy_n (row, width, deviations[std::size_t (s)].row (y));
-        });
-    engine->each_uncertain_row (
-        [&] (int s, int y, const fuse::Uncertainty::Pixel *pixels,
-            const float *is_static) {
-          const Picture &truth =
-              scene.frames[frame * std::size_t (n) + std::size_t (s)];
-          for (int x = 0; x < width; x++) {
-            const unsigned drawn = dice ();
-            const auto &p = pixels[x];
-            if (drawn % 16 != 0 || is_static[x] > 0.0f ||
-                (p.measured && !noisy))
-              continue;
-            /* The scene is rounded; where in its grey level the light was is
-             * not known. */
-            const float within = float (drawn >> 8) / 16777216.0f - 0.5f;
-            const Record record{float (int (quality)), float (n), float (noisy),
-                float (number), float (p.measured), p.misfit, p.change,
-                p.roughness, p.geometry, p.noise,
-                fused[std::size_t (s)].row (y)[x] - float (truth.at (x, y)) +
-                    within,
-                deviations[std::size_t (s)].row (y)[x]};
-            std::fwrite (record.data (), sizeof record, 1, stdout);
-          }
-        },
-        workers);
+        workers, {}, write);
   }
 }
 

@@ -8,7 +8,7 @@
 #include <memory>
 
 #include "dmd/hid_link.h"
-#include "bench/emulated_hid.h"
+#include "emulation/hid.h"
 
 namespace codedexposure::test
 {

@@ -14,17 +14,6 @@ namespace codedexposure::test
 
 using namespace fuse;
 
-inline float
-filtered (const FilterRow &row, int x, int k)
-{
-  float sum = 0.0f;
-  for (int t = 0; t < row.taps; t++)
-    sum += row.weights[(t * row.outputs + k) * row.width +
-                       (row.phase + x) % row.period] *
-           row.source[x + row.offsets[t]];
-  return sum;
-}
-
 inline void
 dct (float *values, int step)
 {
@@ -191,87 +180,45 @@ private:
   int lane_;
 };
 
-inline void
-reference_filter (const FilterRow &row, float *const *outputs)
-{
-  for (int k = 0; k < row.outputs; k++)
-    for (int x = 0; x < row.count; x++)
-      outputs[k][x] = filtered (row, x, k);
-}
-
 inline float
-filtered_pairs (const PairRow &row, int x, int k)
-{
-  const int i = (row.phase + x) % row.period;
-  std::int64_t sum = 0;
-  for (int t = 0; t < row.taps; t++) {
-    const std::int32_t weights =
-        row.weights[(t * row.outputs + k) * row.width + i];
-    const std::int32_t values = row.sources[t][x];
-    for (const int shift : {0, 16})
-      sum += std::int64_t (std::int16_t (weights >> shift)) *
-             std::int16_t (values >> shift);
-  }
-  return row.scale[k * row.width + i] * float (std::int32_t (sum)) + row.base;
-}
-
-inline void
-reference_filter_pairs_squared (const PairRow &row, float *const *outputs)
-{
-  for (int k = 0; k < row.outputs; k++)
-    for (int x = 0; x < row.count; x++) {
-      const float value = filtered_pairs (row, x, k);
-      outputs[k][x] = value * value;
-    }
-}
-
-inline void
-reference_filter_pairs_add (
-    const PairRow &row, const float *share, float *const *outputs)
-{
-  for (int k = 0; k < row.outputs; k++)
-    for (int x = 0; x < row.count; x++)
-      outputs[k][x] += share[x / 2] * filtered_pairs (row, x, k);
-}
-
-inline float
-filtered_sparse (const SparseRow &row, int i)
+filtered (const FilterRow &row, int k, int i)
 {
   std::int64_t sum = 0;
   for (int t = 0; t < row.pairs_count; t++) {
-    const auto [source, weights] = row.pairs[t];
+    const std::int32_t *pair = row.pairs + t * (1 + row.outputs);
     for (const int shift : {0, 16})
-      sum += std::int64_t (std::int16_t (weights >> shift)) *
-             std::int16_t (row.sources[source][i] >> shift);
+      sum += std::int64_t (std::int16_t (pair[1 + k] >> shift)) *
+             std::int16_t (row.sources[pair[0]][i] >> shift);
   }
-  return row.scale * float (std::int32_t (sum)) + row.base;
+  return row.scale[k] * float (std::int32_t (sum)) + row.base;
 }
 
-/* Calls use (i) for all values of the runs. */
+/* Calls use (k, i) for all outputs and values of the runs. */
 template <typename Use>
 void
-each_value (const SparseRow &row, const Use &use)
+each_value (const FilterRow &row, const Use &use)
 {
-  for (int r = 0; r < row.runs_count; r++)
-    for (int i = 0; i < row.runs[r].count; i++)
-      use (row.runs[r].first + i);
+  for (int k = 0; k < row.outputs; k++)
+    for (int r = 0; r < row.runs_count; r++)
+      for (int i = 0; i < row.runs[r].count; i++)
+        use (k, row.runs[r].first + i);
 }
 
 inline void
-reference_filter_sparse_squared (const SparseRow &row, float *to)
+reference_filter_squared (const FilterRow &row, float *const *to)
 {
-  each_value (row, [&] (int i) {
-    const float value = filtered_sparse (row, i);
-    to[i] += value * value;
+  each_value (row, [&] (int k, int i) {
+    const float value = filtered (row, k, i);
+    to[k][i] += value * value;
   });
 }
 
 inline void
-reference_filter_sparse_add (
-    const SparseRow &row, const float *share, float *to)
+reference_filter_add (
+    const FilterRow &row, const float *share, float *const *to)
 {
   each_value (
-      row, [&] (int i) { to[i] += share[i] * filtered_sparse (row, i); });
+      row, [&] (int k, int i) { to[k][i] += share[i] * filtered (row, k, i); });
 }
 
 template <typename T>
@@ -310,6 +257,18 @@ reference_max (const float *const *rows, int rows_count, int count, float *to)
     for (int i = 1; i < rows_count; i++)
       largest = std::max (largest, rows[i][x]);
     to[x] = largest;
+  }
+}
+
+inline void
+reference_blur (const float *source, std::ptrdiff_t step, const float *weights,
+    int taps, int count, float *to)
+{
+  for (int x = 0; x < count; x++) {
+    float sum = 0.0f;
+    for (int t = 0; t < taps; t++)
+      sum += weights[t] * source[x + t * step];
+    to[x] = sum;
   }
 }
 
@@ -504,14 +463,13 @@ reference_settle (const SettleRow &row)
   }
 }
 
-inline constexpr Kernels kReference{"reference", reference_filter,
-    reference_filter_pairs_squared, reference_filter_pairs_add,
-    reference_filter_sparse_squared, reference_filter_sparse_add,
-    reference_split<std::int32_t>, reference_split<float>, reference_join,
-    reference_sum, reference_max, reference_compare, reference_rate,
-    reference_fade_ratio, reference_prefer, reference_share,
-    reference_sum_blocks, reference_weigh, reference_to_steps, reference_pair,
-    reference_to_pixels<std::uint8_t>, reference_to_pixels<std::uint16_t>,
-    reference_shrink, reference_settle, reference_convolve};
+inline constexpr Kernels kReference{"reference", reference_filter_squared,
+    reference_filter_add, reference_split<std::int32_t>, reference_split<float>,
+    reference_join, reference_sum, reference_max, reference_blur,
+    reference_compare, reference_rate, reference_fade_ratio, reference_prefer,
+    reference_share, reference_sum_blocks, reference_weigh, reference_to_steps,
+    reference_pair, reference_to_pixels<std::uint8_t>,
+    reference_to_pixels<std::uint16_t>, reference_shrink, reference_settle,
+    reference_convolve};
 
 } // namespace codedexposure::test

@@ -9,6 +9,7 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 export CODEDEXPOSURE_BUILD=${CODEDEXPOSURE_BUILD:-$root/build}
 programs=$CODEDEXPOSURE_BUILD/pipelines
 scripts=$root/pipelines
+PATH=$CODEDEXPOSURE_BUILD/app:$PATH
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 cases=0
@@ -87,7 +88,7 @@ done_testing ()
 # Runs a pipeline, quietly.
 play ()
 {
-  "$programs/codedexposure-launch" --force "$*"
+  "$CODEDEXPOSURE_BUILD/tests/pipeline/play" "$*"
 }
 
 # The pixels of a recording, one after the other.
@@ -102,6 +103,6 @@ times_of ()
   sed -nE 's/.*"frame":([0-9]+),"pts_ns":([0-9]+).*/\1 \2/p' "$1"
 }
 
-GST_PLUGIN_PATH_1_0=$CODEDEXPOSURE_BUILD/gst
-GST_REGISTRY_1_0=$CODEDEXPOSURE_BUILD/registry.bin
+export GST_PLUGIN_PATH_1_0=$CODEDEXPOSURE_BUILD/gst
+export GST_REGISTRY_1_0=$CODEDEXPOSURE_BUILD/registry.bin
 export GST_PLUGIN_PATH_1_0 GST_REGISTRY_1_0

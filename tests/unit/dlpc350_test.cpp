@@ -5,7 +5,7 @@
 
 #include "dmd/dlpc350_protocol.h"
 #include "dmd/drivers.h"
-#include "emulated_dlpc350.h"
+#include "emulation/dlpc350.h"
 #include "fault_life.h"
 
 using namespace codedexposure;
@@ -46,7 +46,7 @@ TEST (Dlpc350, SaysWhatTheBoardIs)
   EXPECT_EQ (info.minimum_active, 235'000);
   EXPECT_EQ (info.resident_masks, 48);
   EXPECT_TRUE (info.trigger_in && info.trigger_out);
-  EXPECT_EQ (info.minimum_dark, 230'000);
+  EXPECT_EQ (info.patterns->limits.minimum_dark, 230u);
 }
 
 TEST (Dlpc350, WithoutImagesSaysWhatTheUserCanDo)

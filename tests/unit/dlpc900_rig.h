@@ -4,7 +4,7 @@
 
 #include <memory>
 
-#include "bench/emulated_dlpc900.h"
+#include "emulation/dlpc900.h"
 #include "dmd/drivers.h"
 #include "dmd_rig.h"
 #include "mirrors.h"

@@ -47,7 +47,7 @@ TEST (Dlpc900, SaysWhatTheBoardIs)
   EXPECT_EQ (info.resident_masks, 400);
   EXPECT_TRUE (info.triggers_camera);
   EXPECT_TRUE (info.trigger_in && info.trigger_out);
-  EXPECT_EQ (info.minimum_dark, 105'000);
+  EXPECT_EQ (info.patterns->limits.minimum_dark, 105u);
   EXPECT_EQ (info.array, Array::orthogonal);
 }
 
@@ -198,6 +198,17 @@ TEST (Dlpc900, AfterAStillMaskTheScheduleIsSentOnceMore)
   ASSERT_EQ (message_of (rig.show (schedule)), "");
   expect_masks (*rig.board, schedule);
   EXPECT_TRUE (rig.board->running ());
+}
+
+TEST (Dlpc900, AfterALaterStillMaskTheSamePlanesAreSentOnceMore)
+{
+  const Schedule schedule = schedule_of ("sequential:2x1,order=1/0");
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open ()), "");
+  ASSERT_EQ (
+      message_of (rig.dmd->show (stripes (1, 1), plan_of (schedule), {})), "");
+  ASSERT_EQ (message_of (rig.show (schedule)), "");
+  expect_masks (*rig.board, schedule);
 }
 
 TEST (Dlpc900, AStillMaskStartsInTheRegion)

@@ -8,7 +8,6 @@
 #include <gtest/gtest.h>
 
 #include "doctor/blur_map.h"
-#include "doctor/chessboard.h"
 #include "doctor/defects.h"
 #include "doctor/dither.h"
 #include "doctor/lens_fit.h"
@@ -257,54 +256,6 @@ TEST (View, TellsOrientations)
   EXPECT_TRUE (is (-1, 0, 0, 1).flipped_x);
   EXPECT_TRUE (is (1, 0, 0, -1).flipped_y);
   EXPECT_FALSE (is (1, 0, 0, 1).flipped_x || is (1, 0, 0, 1).flipped_y);
-}
-
-/* Edges at any part of a pixel, with their true light. */
-TEST (Chessboard, CornersHaveNoBiasByPixels)
-{
-  for (const double at : {20.0, 20.2, 20.5, 20.9}) {
-    Image<float> light (40, 40);
-    const auto beyond = [] (double edge, int pixel) {
-      return std::clamp (pixel + 0.5 - edge, 0.0, 1.0);
-    };
-    for (int y = 0; y < 40; y++)
-      for (int x = 0; x < 40; x++) {
-        const double right = beyond (at, x), below = beyond (19.7, y);
-        light.at (x, y) = float (right * below + (1 - right) * (1 - below));
-      }
-    const Position found = refine_corner (light, {20.4, 19.9}, 14.0);
-    EXPECT_NEAR (found.x, at, 1e-5);
-    EXPECT_NEAR (found.y, 19.7, 1e-5);
-  }
-}
-
-TEST (Chessboard, IsFoundToAFractionOfAPixel)
-{
-  if (!has_chessboard ())
-    GTEST_SKIP () << "this build has no OpenCV";
-  const Chessboard board{.first = {20, 17}, .square = 14};
-  Image<std::uint8_t> picture (256, 192);
-  for (int y = 0; y < 192; y++)
-    for (int x = 0; x < 256; x++)
-      picture.at (x, y) = board.on (x, y) ? 220 : 20;
-  const auto corners =
-      find_corners (std::as_const (picture).view (), board.columns, board.rows);
-  ASSERT_TRUE (corners) << corners.error ().message;
-  ASSERT_EQ (corners->size (), 130u);
-  Image<float> light (256, 192);
-  for (int y = 0; y < 192; y++)
-    for (int x = 0; x < 256; x++)
-      light.at (x, y) = board.on (x, y) ? 1.0f : 0.0f;
-  for (const Position &rough : *corners) {
-    const Position corner = refine_corner (light, rough, 14.0);
-    double least = 1e9;
-    for (int j = 0; j < board.rows - 1; j++)
-      for (int i = 0; i < board.columns - 1; i++) {
-        const Position at = board.corner (i, j);
-        least = std::min (least, std::hypot (at.x - corner.x, at.y - corner.y));
-      }
-    EXPECT_LT (least, 1e-6);
-  }
 }
 
 } // namespace

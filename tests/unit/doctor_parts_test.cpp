@@ -2,6 +2,8 @@
 /* The checks of the parts and of a recording, and the order of all checks. */
 #include "checked_bench.h"
 
+#include <cmath>
+
 #include <nlohmann/json.hpp>
 
 namespace
@@ -107,6 +109,41 @@ TEST (Checks, OneIsSkippedAfterAFailureThatItNeeds)
   EXPECT_TRUE (run_check (
       check, examination, {{.check = "a", .shown = {}, .skipped = true}})
                    ->skipped);
+}
+
+TEST (Findings, AreJudgedByRules)
+{
+  Finding finding{"light", "light"};
+  EXPECT_EQ (finding.measure ("flicker", {0.9, 0.1}, "why"), Verdict::pass);
+  EXPECT_EQ (finding.measure ("flicker", {1.1, 0.1}, "why"), Verdict::pass);
+  EXPECT_EQ (finding.measure ("flicker", {1.3, 0.1}, "why"), Verdict::warn);
+  EXPECT_EQ (finding.measure ("flicker", {2.3, 0.1}, "why"), Verdict::fail);
+  EXPECT_EQ (finding.measure ("drift", {-2.5, 0.1}), Verdict::warn);
+  EXPECT_EQ (finding.measure ("level", {14.0, 0.0}), Verdict::fail);
+  EXPECT_EQ (finding.readings[0].rule, "at most 1");
+  EXPECT_EQ (finding.readings[4].rule, "-2 to 2");
+  EXPECT_EQ (finding.readings[5].rule, "at least 40");
+  finding.sort ();
+  ASSERT_EQ (finding.diagnoses.size (), 4u);
+  EXPECT_EQ (finding.diagnoses[0].id, "flicker");
+  EXPECT_EQ (finding.diagnoses[1].id, "dark");
+  EXPECT_EQ (
+      finding.diagnoses[3].cause, "the light changes by -2.50 % a minute");
+  EXPECT_FALSE (finding.diagnoses[3].remedy.empty ());
+}
+
+TEST (Findings, WhatIsNotKnownIsNotGood)
+{
+  for (const Measured number : {Measured{NAN, 0.1}, Measured{0.1, INFINITY}}) {
+    Finding finding{"light", "light"};
+    EXPECT_EQ (finding.measure ("flicker", number), Verdict::unknown);
+    EXPECT_TRUE (finding.diagnoses.empty ());
+    EXPECT_EQ (finding.verdict (), Verdict::unknown);
+    const auto json = nlohmann::json::parse (findings_json ({finding}));
+    EXPECT_EQ (json["verdict"], "UNKNOWN");
+    finding.blame ("dark", "why", Verdict::warn);
+    EXPECT_EQ (finding.verdict (), Verdict::warn);
+  }
 }
 
 TEST (Findings, TheirJsonHasTheWorstVerdict)

@@ -9,7 +9,7 @@
 #include "dmd/erle.h"
 #include "hex.h"
 #include "mirrors.h"
-#include "bench/spld_decoder.h"
+#include "emulation/spld_decoder.h"
 
 using namespace codedexposure;
 using namespace codedexposure::test;

@@ -85,6 +85,22 @@ TEST (SparseKriging, TakesThePairsThatHelpMost)
   }
 }
 
+/* Where noise hides all, no tap lowers the error by what would be accepted. */
+TEST (SparseKriging, KeepsFlatLightUnderAnyNoise)
+{
+  const std::vector<TapPair> pairs{{0, 1}, {1, -1}};
+  for (const double noise : {1e3, 1e6, 1e12}) {
+    const SparseKriging kriging (
+        {{1.0, 0.5, 0.0, 1.0}, {noise, noise}, {}, {1.0, 1.0}}, pairs);
+    const auto weights =
+        kriging.solve (std::vector{0.8, 0.7}, 1.0, 1.0 + noise, 0.01);
+    EXPECT_NEAR (weights[0] + weights[1], 1.0, 1e-9) << noise;
+  }
+  /* Nothing to estimate it from. */
+  const SparseKriging alone ({{}, {}, {}, {}}, {});
+  EXPECT_TRUE (alone.solve ({}, 1.0, 1.0, 0.01).empty ());
+}
+
 /* A one-hot code: pixels are points of the scene, each in its slot. */
 TEST (CodedCovariance, IsTheScenesForOneHotCodes)
 {

@@ -12,6 +12,7 @@
 
 #include "extract/decoder.h"
 #include "extract/group_sort.h"
+#include "extract/linear.h"
 #include "schedule/sample_grid.h"
 
 namespace
@@ -193,6 +194,53 @@ TEST (Extract, DecodeInterpolatesALinearSceneToTheCentreOfTheCell)
               ramp (i * cell.width + (cell.width - 1) / 2.0,
                   j * cell.height + (cell.height - 1) / 2.0),
               quantisation_bound (schedule));
+  }
+}
+
+TEST (Extract, DecodeEqualsSumsInDoubles)
+{
+  std::mt19937 random (3);
+  for (const char *text : {"staircase:2x2", "staircase:16x16", "s-matrix:7x1",
+           "staircase:3x3,leak=0.02", "sequential:2x2,leak=0.001",
+           "sequential:4x4,leak=0.001", "sequential:9x9,leak=0.05"})
+    for (const bool interpolate : {false, true})
+      for (const int white : {255, 65535})
+        for (const double gain : {0.0, 0.5, 1.7}) {
+          SCOPED_TRACE (std::string (text) + " " + std::to_string (white));
+          const auto decoder = Decoder::make (preset (text), gain, interpolate);
+          const LinearPlan plan (*decoder, white, white);
+          const Linear &linear = plan.linear ();
+          const bool exact =
+              !linear.has_fractions || linear.numbers == Numbers::kDouble;
+          const int n = decoder->slots ();
+          const int most = white * (decoder->interpolates () ? 4 * n : 1);
+          std::vector<int> values (std::size_t (n), 0);
+          for (int i = 0; i < 100; i++) {
+            for (int s = 0; s < n; s++) {
+              double light = 0.0;
+              for (const Term &term : decoder->terms (s))
+                light += term.factor * values[std::size_t (term.element)];
+              light = std::clamp (light, -0.5, white + 0.5);
+              ASSERT_NEAR (linear.pixel (s, values.data ()), light,
+                  exact ? 0.500001 : 0.52);
+            }
+            for (int &value : values)
+              value = i % 9 == 0 ? most : int (random () % unsigned (most + 1));
+          }
+        }
+}
+
+TEST (Extract, LeakageIsDecodedInWholeNumbersAndFloats)
+{
+  for (const char *text :
+      {"sequential:2x2,leak=0.001", "sequential:3x3,leak=0.001",
+          "sequential:4x4,leak=0.001", "sequential:4x4,leak=0.02"}) {
+    SCOPED_TRACE (text);
+    const auto decoder = Decoder::make (preset (text), 0.0, true);
+    EXPECT_EQ (
+        LinearPlan (*decoder, 255, 255).linear ().numbers, Numbers::kShort);
+    EXPECT_EQ (
+        LinearPlan (*decoder, 65535, 4095).linear ().numbers, Numbers::kInt);
   }
 }
 

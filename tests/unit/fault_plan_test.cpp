@@ -2,7 +2,7 @@
 /* Faults of a camera, by frame number. */
 #include <gtest/gtest.h>
 
-#include "bench/fault_plan.h"
+#include "emulation/fault_plan.h"
 
 using namespace codedexposure;
 using Kind = Fault::Kind;

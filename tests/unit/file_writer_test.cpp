@@ -10,6 +10,7 @@
 #include <functional>
 #include <random>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -184,4 +185,53 @@ TEST (FileWriter, SaysBeforeItBeginsThatSpaceIsMissing)
       scratch.file (), {.direct = true, .reserve = 2 * space.capacity});
   ASSERT_FALSE (file);
   EXPECT_NE (file.error ().message.find ("cannot reserve"), std::string::npos);
+}
+
+namespace
+{
+
+/** Bytes that this process has passed to files. */
+std::uint64_t
+passed_bytes ()
+{
+  std::ifstream counters ("/proc/self/io");
+  std::string name;
+  for (std::uint64_t count = 0; counters >> name >> count;)
+    if (name == "wchar:")
+      return count;
+  return 0;
+}
+
+} // namespace
+
+/* At 25 frames/s, each goes to the disk at once; its block is not full yet. */
+TEST (FileWriter, WritesNothingAgain)
+{
+  const Scratch scratch;
+  const auto file = open (scratch, {.direct = true});
+  const std::string frame = noise (442'000);
+  const std::uint64_t before = passed_bytes ();
+  std::uint64_t size_at = 0;
+  std::string expected;
+  for (int k = 0; k < 8; k++) {
+    std::this_thread::sleep_for (std::chrono::milliseconds (55));
+    const auto end = file->position ();
+    file->seek (size_at);
+    ASSERT_TRUE (file->write ("12345678", 8));
+    file->seek (std::max<std::uint64_t> (end, 8));
+    size_at = file->position ();
+    ASSERT_TRUE (file->write (frame.data (), frame.size ()));
+  }
+  ASSERT_TRUE (file->finish ());
+  EXPECT_LT (double (passed_bytes () - before), 1.1 * 8 * 442'000);
+  const std::string content = scratch.content ();
+  ASSERT_EQ (content.size (), 8 + 8 * frame.size ());
+  for (std::size_t k = 0; k < 8; k++) {
+    expected = frame;
+    if (k < 7)
+      expected.replace (0, 8, "12345678");
+    EXPECT_TRUE (
+        content.substr (8 + k * frame.size (), frame.size ()) == expected)
+        << k;
+  }
 }

@@ -19,58 +19,8 @@ using namespace codedexposure;
 using test::kReference;
 using test::random_numbers;
 
-/* What @filter writes to @count values of @outputs rows. */
-template <typename Filter>
-std::vector<std::vector<float>>
-outputs_of (int outputs, int count, const Filter &filter)
-{
-  std::vector<std::vector<float>> rows (
-      std::size_t (outputs), random_numbers (256, 5));
-  std::vector<float *> to;
-  for (auto &row : rows)
-    to.push_back (row.data ());
-  filter (to.data ());
-  for (auto &row : rows)
-    row.resize (std::size_t (count));
-  return rows;
-}
-
-/* Rows of @width values that repeat after @period. */
-template <typename T>
-void
-repeat_rows (std::vector<T> &rows, int width, int period)
-{
-  for (std::size_t i = 0; i < rows.size (); i++)
-    if (i % std::size_t (width) >= std::size_t (period))
-      rows[i] = rows[i - std::size_t (period)];
-}
-
 constexpr int kCount = 77;
-constexpr int kPeriods[] = {1, 3, 4, 8, 25}, kOutputs[] = {1, 3, 4, 8, 13};
 const std::vector<std::ptrdiff_t> kOffsets = {-300, -17, -1, 0, 2, 256, 301};
-
-TEST (FuseKernels, FiltersEqualTheReference)
-{
-  const auto source = random_numbers (4096, 1);
-  for (const int period : kPeriods)
-    for (const int outputs : kOutputs) {
-      const int width = period + 15;
-      auto weights =
-          random_numbers (kOffsets.size () * std::size_t (outputs * width), 2);
-      repeat_rows (weights, width, period);
-      const fuse::FilterRow row{source.data () + 1000, kCount, kOffsets.data (),
-          int (kOffsets.size ()), weights.data (), width, outputs, period,
-          period / 2};
-      const auto filtered = [&] (const fuse::Kernels &kernels) {
-        return outputs_of (outputs, kCount,
-            [&] (float *const *to) { kernels.filter (row, to); });
-      };
-      for (const fuse::Kernels &kernels : fuse::supported_kernels ()) {
-        SCOPED_TRACE (kernels.name);
-        EXPECT_EQ (filtered (kernels), filtered (kReference));
-      }
-    }
-}
 
 /* Pairs of 16 bits, the most negative values among them; @largest at most if it
  * is not 0. */
@@ -90,69 +40,40 @@ random_pairs (std::size_t count, int seed, int largest)
   return pairs;
 }
 
-TEST (FuseKernels, FiltersOfPairsEqualTheReference)
+TEST (FuseKernels, FiltersEqualTheReference)
 {
   const auto source = random_pairs (4096, 1, 0);
+  const auto share = random_numbers (512, 3);
   std::vector<const std::int32_t *> sources;
   for (const std::ptrdiff_t offset : kOffsets)
     sources.push_back (source.data () + 1000 + offset);
-  std::vector<float> share (256, 0.0f);
-  for (std::size_t x = 20; x < 60; x += 3)
-    share[x] = 0.25f * float (x % 5);
-  for (const int period : kPeriods)
-    for (const int outputs : kOutputs) {
-      const int width = period + 15;
-      auto weights = random_pairs (
-          kOffsets.size () * std::size_t (outputs * width), 2, 4000);
-      auto scale = random_numbers (std::size_t (outputs * width), 3);
-      repeat_rows (weights, width, period);
-      repeat_rows (scale, width, period);
-      const fuse::PairRow row{sources.data (), kCount, int (sources.size ()),
-          weights.data (), scale.data (), 127.5f, width, outputs, period,
-          period / 2};
-      const auto filtered = [&] (const fuse::Kernels &kernels, bool add) {
-        return outputs_of (outputs, kCount, [&] (float *const *to) {
-          if (add)
-            kernels.filter_pairs_add (row, share.data (), to);
-          else
-            kernels.filter_pairs_squared (row, to);
-        });
-      };
-      for (const fuse::Kernels &kernels : fuse::supported_kernels ())
-        for (const bool add : {false, true}) {
-          SCOPED_TRACE (kernels.name);
-          EXPECT_EQ (filtered (kernels, add), filtered (kReference, add));
-        }
-    }
-}
-
-TEST (FuseKernels, SparseFiltersEqualTheReference)
-{
-  const auto source = random_pairs (4096, 1, 0);
-  const auto weights = random_pairs (kOffsets.size (), 2, 4000);
-  const auto share = random_numbers (512, 3);
-  std::vector<const std::int32_t *> sources;
-  std::vector<fuse::SparsePair> pairs;
-  for (std::size_t t = 0; t < kOffsets.size (); t++) {
-    sources.push_back (source.data () + 1000 + kOffsets[t]);
-    pairs.push_back ({int (kOffsets.size () - 1 - t), weights[t]});
-  }
   /* All that a vector holds sums of, and what is left of it. */
   const std::vector<fuse::Run> runs{{0, 16}, {32, 15 * 16}, {288, 7 * 16}};
-  const fuse::SparseRow row{sources.data (), pairs.data (), int (pairs.size ()),
-      0.25f, 127.5f, runs.data (), int (runs.size ())};
-  for (const bool add : {false, true}) {
-    const auto filtered = [&] (const fuse::Kernels &kernels) {
-      auto to = random_numbers (512, 5);
-      if (add)
-        kernels.filter_sparse_add (row, share.data (), to.data ());
-      else
-        kernels.filter_sparse_squared (row, to.data ());
-      return to;
-    };
-    for (const fuse::Kernels &kernels : fuse::supported_kernels ()) {
-      SCOPED_TRACE (kernels.name);
-      EXPECT_EQ (filtered (kernels), filtered (kReference));
+  for (const int outputs : {1, 2, 3, 4, 8, 13}) {
+    const auto scales = random_numbers (std::size_t (outputs), 4);
+    auto pairs =
+        random_pairs (sources.size () * std::size_t (1 + outputs), 2, 4000);
+    for (std::size_t t = 0; t < sources.size (); t++)
+      pairs[t * std::size_t (1 + outputs)] = int (sources.size () - 1 - t);
+    const fuse::FilterRow row{sources.data (), pairs.data (),
+        int (sources.size ()), outputs, scales.data (), 127.5f, runs.data (),
+        int (runs.size ())};
+    for (const bool add : {false, true}) {
+      const auto filtered = [&] (const fuse::Kernels &kernels) {
+        std::vector rows (std::size_t (outputs), random_numbers (512, 5));
+        std::vector<float *> to;
+        for (auto &values : rows)
+          to.push_back (values.data ());
+        if (add)
+          kernels.filter_add (row, share.data (), to.data ());
+        else
+          kernels.filter_squared (row, to.data ());
+        return rows;
+      };
+      for (const fuse::Kernels &kernels : fuse::supported_kernels ()) {
+        SCOPED_TRACE (kernels.name);
+        EXPECT_EQ (filtered (kernels), filtered (kReference)) << outputs;
+      }
     }
   }
 }
@@ -213,6 +134,23 @@ TEST (FuseKernels, JoinedRowsEqualTheReference)
       EXPECT_EQ (joined (kernels.sum), joined (kReference.sum));
       EXPECT_EQ (joined (kernels.max), joined (kReference.max));
     }
+  }
+}
+
+TEST (FuseKernels, BlursEqualTheReference)
+{
+  const auto numbers = random_numbers (4096, 4),
+             weights = random_numbers (11, 5);
+  for (const std::ptrdiff_t step : {1, 300}) {
+    const auto blurred = [&] (const fuse::Kernels &kernels) {
+      std::vector<float> to (kCount + 15);
+      kernels.blur (
+          numbers.data (), step, weights.data (), 11, kCount, to.data ());
+      to.resize (kCount);
+      return to;
+    };
+    for (const fuse::Kernels &kernels : fuse::supported_kernels ())
+      EXPECT_EQ (blurred (kernels), blurred (kReference)) << kernels.name;
   }
 }
 

@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Checks from the #include lines which room of lib/ and gst/ uses which.
+"""Checks from the #include lines which room of lib/, gst/ and app/ uses which.
 
 Usage: include_order.py SOURCE_ROOT
 A file of lib/ may include its own room, the rooms that stand above it in ORDER,
 and nothing of GStreamer. A file of gst/ may include its own room, common/ and
-lib/, but of lib/bench only where BENCH names it.
+lib/, but of lib/bench only where BENCH names it. A file of app/ may include lib/,
+gst/common/ and its own hall, but no file of commands/, and of emulation/ only
+where EMULATION names it. Nothing else includes app/.
 """
 
 import pathlib
@@ -13,17 +15,17 @@ import re
 import sys
 
 ORDER = ["base", "schedule", "mapping", "setup", "record", "estimate", "extract", "rectify",
-         "fuse", "calibrate", "sync", "dmd", "doctor", "bench", "stats", "advise",
-         "tools"]
+         "fuse", "calibrate", "sync", "dmd", "doctor", "bench", "stats", "advise"]
 # The emulated bench: the elements that emulate, and the plugin, which registers
 # the simulated DMD.
 BENCH = ["gst/sim/", "gst/scene/", "gst/plugin.cpp"]
+EMULATION = ["app/emulation/", "app/commands/bench.cpp"]
 INCLUDE = re.compile(r'\s*#\s*include\s*(["<])([^">]+)[">]')
 
 
 def target(root, file, name):
-    """The file that '#include "NAME"' in FILE means, as lib/... or gst/..."""
-    for folder in (file.parent, root / "lib", root / "gst"):
+    """The file that '#include "NAME"' in FILE means, as lib/..., gst/... or app/..."""
+    for folder in (file.parent, root / "lib", root / "gst", root / "app"):
         if (folder / name).is_file():
             return (folder / name).resolve().relative_to(root).as_posix()
     # A header that the build makes.
@@ -36,13 +38,24 @@ def fault(file, included):
     other_hall, other_room = included.split("/")[:2]
     if hall == "lib":
         if other_hall != "lib":
-            return "lib/ uses nothing of gst/"
+            return "lib/ uses nothing of gst/ and app/"
         if ORDER.index(other_room) > ORDER.index(room):
             return f"{other_room} stands below {room}"
         return None
+    if hall == "app":
+        if other_hall == "app" and other_room == "commands":
+            return "a command is used by nothing but the list of commands"
+        if other_hall == "app" and other_room == "emulation" \
+                and not file.startswith(tuple(EMULATION)):
+            return "only bench uses what is emulated"
+        if other_hall == "gst" and other_room != "common":
+            return f"the program uses the element of gst/{other_room}, not its code"
+        return None
+    if other_hall == "app":
+        return "gst/ uses nothing of app/"
     if other_hall == "lib":
-        if other_room in ("advise", "tools"):
-            return f"gst/ does not use lib/{other_room}"
+        if other_room == "advise":
+            return "gst/ does not use lib/advise"
         if other_room == "bench" and not file.startswith(tuple(BENCH)):
             return "only what emulates a bench uses lib/bench"
         return None
@@ -70,7 +83,7 @@ def faults_of(root, file):
 
 def main():
     root = pathlib.Path(sys.argv[1]).resolve()
-    files = [file for hall in ("lib", "gst")
+    files = [file for hall in ("lib", "gst", "app")
              for file in sorted((root / hall).rglob("*"))
              if file.suffix in (".h", ".cpp")]
     rooms = {file.relative_to(root).parts[1] for file in files

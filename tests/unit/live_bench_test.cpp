@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "bench/live_bench.h"
+#include "emulation/live_bench.h"
 #include "dlpc900_rig.h"
 
 using namespace codedexposure;

@@ -371,6 +371,21 @@ TEST (StreamSetup, SaysWhetherATrackAccompaniesTheFrames)
       "schedule JSON: key 'track' must be true or false, not 1");
 }
 
+TEST (StreamSetup, SaysHowManyBitsOfAPixelCount)
+{
+  StreamSetup setup;
+  EXPECT_EQ (setup.to_json ().find ("bits"), std::string::npos);
+  setup.bits = 12;
+  const std::string json = setup.to_json ();
+  EXPECT_NE (json.find (R"(,"bits":12})"), std::string::npos) << json;
+  const auto read = StreamSetup::from_json (json);
+  ASSERT_TRUE (read.ok ()) << read.error ().message;
+  EXPECT_EQ (*read, setup);
+  std::string wrong = json;
+  wrong.replace (wrong.find ("12"), 2, "17");
+  EXPECT_FALSE (StreamSetup::from_json (wrong));
+}
+
 TEST (StreamSetup, SaysWhetherTheFramesAreSimulated)
 {
   StreamSetup setup;

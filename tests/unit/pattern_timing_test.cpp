@@ -3,19 +3,16 @@
  */
 #include <gtest/gtest.h>
 
-#include "dmd/pattern_timing.h"
+#include "dmd/boards.h"
 
 using namespace codedexposure;
 
 namespace
 {
 
-/** A DLP6500. */
-const PatternLimits kLimits{.minimum_exposure = 105,
-    .maximum_exposure = 0xFFFFFF,
-    .minimum_dark = 105,
-    .trigger_delay = 105,
-    .trigger_dark = 105};
+const PatternLimits kLimits = find_board ("dlp6500")->limits;
+const PatternRule kMaster{kLimits, Master::dmd};
+const PatternRule kSlave{kLimits, Master::camera};
 
 SlotPlan
 plan (const Timing &timing, int slots, FrameRate rate = {25, 1})
@@ -31,78 +28,72 @@ using Times = std::vector<PatternTime>;
 
 TEST (PatternTiming, EqualSlotsFillTheFrame)
 {
-  EXPECT_EQ (*fit_patterns (plan ({}, 4), kLimits, Master::dmd),
+  EXPECT_EQ (*fit_patterns (plan ({}, 4), kMaster),
       (Times{{10000, 0}, {10000, 0}, {10000, 0}, {10000, 0}}));
 }
 
 TEST (PatternTiming, RoundingErrorsDoNotAddUp)
 {
-  const auto times =
-      fit_patterns (plan ({}, 4, {30000, 1001}), kLimits, Master::dmd);
+  const auto times = fit_patterns (plan ({}, 4, {30000, 1001}), kMaster);
   EXPECT_EQ (*times, (Times{{8341, 0}, {8342, 0}, {8341, 0}, {8342, 0}}));
 }
 
 TEST (PatternTiming, SwitchingIsDarkWhereTheControllerCanKeepIt)
 {
   const Timing bench{.active = 9'800'000, .switching = 200'000};
-  EXPECT_EQ (*fit_patterns (plan (bench, 4), kLimits, Master::dmd),
+  EXPECT_EQ (*fit_patterns (plan (bench, 4), kMaster),
       (Times{{9800, 200}, {9800, 200}, {9800, 200}, {9800, 200}}));
   const Timing quick{.switching = 20'000};
-  EXPECT_EQ (*fit_patterns (plan (quick, 4), kLimits, Master::dmd),
+  EXPECT_EQ (*fit_patterns (plan (quick, 4), kMaster),
       (Times{{10000, 0}, {10000, 0}, {10000, 0}, {10000, 0}}));
 }
 
 TEST (PatternTiming, ReadoutIsDarkAfterTheLastMask)
 {
   const Timing timing{.readout = 400'000};
-  EXPECT_EQ (*fit_patterns (plan (timing, 4), kLimits, Master::dmd),
+  EXPECT_EQ (*fit_patterns (plan (timing, 4), kMaster),
       (Times{{9900, 0}, {9900, 0}, {9900, 0}, {9900, 400}}));
 }
 
 TEST (PatternTiming, MasksThatAreTooShortAreRefusedWithTheNumbers)
 {
-  EXPECT_TRUE (fit_patterns (plan ({}, 256), kLimits, Master::dmd).ok ());
-  EXPECT_EQ (fit_patterns (plan ({}, 256, {60, 1}), kLimits, Master::dmd)
-                 .error ()
-                 .message,
+  EXPECT_TRUE (fit_patterns (plan ({}, 256), kMaster).ok ());
+  EXPECT_EQ (fit_patterns (plan ({}, 256, {60, 1}), kMaster).error ().message,
       "each of 256 slots lasts 65us, the DMD shows a mask for 105us at least; "
       "use fewer slots or a lower frame rate");
 }
 
 TEST (PatternTiming, MasksThatAreTooLongAreRefused)
 {
-  EXPECT_FALSE (
-      fit_patterns (plan ({}, 2, {1, 60}), kLimits, Master::dmd).ok ());
+  EXPECT_FALSE (fit_patterns (plan ({}, 2, {1, 60}), kMaster).ok ());
 }
 
 TEST (PatternTiming, CameraMasterNeedsTimeForItsTrigger)
 {
-  const auto full = fit_patterns (plan ({}, 4), kLimits, Master::camera);
+  const auto full = fit_patterns (plan ({}, 4), kSlave);
   ASSERT_FALSE (full.ok ());
   EXPECT_EQ (full.error ().message,
       "with the camera as master, the masks take 40ms and the trigger 105us + "
       "105us, more than the 40ms of a frame; give the schedule readout=211us "
       "more, or let the DMD be master");
   const Timing timing{.readout = 211'000};
-  const auto fits = fit_patterns (plan (timing, 4), kLimits, Master::camera);
+  const auto fits = fit_patterns (plan (timing, 4), kSlave);
   ASSERT_TRUE (fits.ok ()) << fits.error ().message;
   EXPECT_EQ (*fits, (Times{{9947, 0}, {9947, 0}, {9947, 0}, {9948, 0}}));
 }
 
 TEST (EqualPatternTiming, RoundsDown)
 {
-  const auto time =
-      fit_equal_patterns (plan ({}, 4, {30000, 1001}), kLimits, Master::dmd);
+  const auto time = fit_equal_patterns (plan ({}, 4, {30000, 1001}), kMaster);
   EXPECT_EQ (*time, (PatternTime{8341, 0}));
 }
 
 TEST (EqualPatternTiming, AsMasterKnowsNoPause)
 {
   const Timing timing{.readout = 400'000};
-  EXPECT_FALSE (
-      fit_equal_patterns (plan (timing, 4), kLimits, Master::dmd).ok ());
-  EXPECT_EQ (*fit_equal_patterns (plan (timing, 4), kLimits, Master::camera),
-      (PatternTime{9900, 0}));
+  EXPECT_FALSE (fit_equal_patterns (plan (timing, 4), kMaster).ok ());
+  EXPECT_EQ (
+      *fit_equal_patterns (plan (timing, 4), kSlave), (PatternTime{9900, 0}));
 }
 
 namespace
@@ -110,11 +101,10 @@ namespace
 
 StillTimes
 still (const SlotPlan &plan, int first, int slots,
-    const PatternLimits &limits = kLimits, Master master = Master::dmd)
+    const PatternRule &rule = kMaster)
 {
-  const auto times = fit_still (plan,
-      {.name = "light", .on = {}, .slots = slots, .first = first}, limits,
-      master);
+  const auto times = fit_still (
+      plan, {.name = "light", .on = {}, .slots = slots, .first = first}, rule);
   EXPECT_TRUE (times.ok ()) << times.error ().message;
   return times ? *times : StillTimes{};
 }
@@ -123,8 +113,7 @@ std::string
 refused (const SlotPlan &plan, int first, int slots)
 {
   const auto times = fit_still (plan,
-      {.name = "light", .on = {}, .slots = slots, .first = first}, kLimits,
-      Master::dmd);
+      {.name = "light", .on = {}, .slots = slots, .first = first}, kMaster);
   return times ? "" : times.error ().message;
 }
 
@@ -137,11 +126,11 @@ TEST (StillTiming, AMaskInTheFirstSlotsIsDarkInTheOthers)
   const SlotPlan bench = plan (kBench, 4);
   EXPECT_EQ (still (bench, 0, 1), (StillTimes{0, {9800, 30200}}));
   EXPECT_EQ (still (bench, 0, 3), (StillTimes{0, {29800, 10200}}));
-  PatternLimits limits = kLimits;
+  PatternRule rule = kMaster;
   for (const auto &[least, lit] :
       {std::pair{105u, 39800u}, {200u, 39800u}, {201u, 40000u}}) {
-    limits.minimum_dark = least;
-    EXPECT_EQ (still (bench, 0, 4, limits), (StillTimes{0, {lit, 40000 - lit}}))
+    rule.limits.minimum_dark = least;
+    EXPECT_EQ (still (bench, 0, 4, rule), (StillTimes{0, {lit, 40000 - lit}}))
         << least;
   }
 }
@@ -186,11 +175,8 @@ TEST (StillTiming, SlotsThatThePlanDoesNotHaveAreRefused)
 TEST (StillTiming, WithTheCameraAsMasterItLeavesTimeForTheTrigger)
 {
   const SlotPlan roomy = plan ({.readout = 400'000}, 4);
-  EXPECT_EQ (still (roomy, 1, 1, kLimits, Master::camera),
-      (StillTimes{9900, {9900, 19800}}));
-  EXPECT_EQ (still (roomy, 3, 1, kLimits, Master::camera),
-      (StillTimes{29700, {9900, 0}}));
-  EXPECT_FALSE (fit_still (
-      plan ({}, 4), {.name = "light", .on = {}}, kLimits, Master::camera)
-                    .ok ());
+  EXPECT_EQ (still (roomy, 1, 1, kSlave), (StillTimes{9900, {9900, 19800}}));
+  EXPECT_EQ (still (roomy, 3, 1, kSlave), (StillTimes{29700, {9900, 0}}));
+  EXPECT_FALSE (
+      fit_still (plan ({}, 4), {.name = "light", .on = {}}, kSlave).ok ());
 }

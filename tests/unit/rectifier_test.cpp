@@ -260,18 +260,13 @@ TEST (Rectifier, FollowsATilt)
   EXPECT_GT (left (straight, alignment), 1.5 * left (tilted, alignment));
 }
 
-TEST (Rectifier, RowsAreThoseOfTheWhole)
+TEST (Rectifier, PixelsOfSixteenBitsAreThoseOfEight)
 {
   const Schedule schedule = schedule_of ("sequential:2x2");
   const Alignment alignment = {0.4, 0.4, 0.5, 1.01};
   const auto rectifier = made (mapping_of (alignment), schedule);
   const auto frame = coded (alignment, schedule);
   const auto whole = rectified (rectifier, frame);
-  Image<std::uint8_t> parts (kSize.width, kSize.height);
-  for (int y = 0; y < kSize.height; y += 16)
-    EXPECT_TRUE (rectifier.run_rows (frame.view (), parts.view (), y, 16));
-  EXPECT_EQ (parts, whole);
-
   Image<std::uint16_t> wide (kSize.width, kSize.height), out = wide;
   for (int y = 0; y < kSize.height; y++)
     for (int x = 0; x < kSize.width; x++)
@@ -365,4 +360,36 @@ TEST (Rectifier, RefusesWhatItCannotDo)
   EXPECT_EQ (small.error ().message, "a mapping with 0.500000 pixels per "
                                      "mirror cannot be corrected; use one of "
                                      "0.75 to 3.5");
+}
+
+/* What a stream's tag says of a bench must not cost minutes or gigabytes. */
+TEST (Rectifier, RefusesWindowsThatTakeTooLong)
+{
+  const Schedule schedule;
+  const auto error_of = [&] (const Mapping::Parts &parts) {
+    const auto mapping = Mapping::make (parts);
+    EXPECT_TRUE (mapping.ok ());
+    const auto made = Rectifier::make (*mapping, schedule);
+    return made.ok () ? std::string () : made.error ().message;
+  };
+  Mapping::Parts parts{kSize, kSize};
+  parts.displacement = {2, 2, {0, 1e8, 0, 1e8}, {0, 0, 0, 0}};
+  EXPECT_NE (error_of (parts).find ("mirrors to a pixel"), std::string::npos)
+      << error_of (parts);
+  /* Whole mirrors everywhere. */
+  parts.displacement = {2, 2, {0, 95e6, 0, 95e6}, {0, 0, 0, 0}};
+  EXPECT_NE (error_of (parts), "");
+  parts.displacement = {};
+  parts.homography[2] = 0.5;
+  for (const double sigma : {8.0, 16.0}) {
+    parts.psf_sigma = sigma;
+    EXPECT_NE (error_of (parts).find ("blur of"), std::string::npos)
+        << error_of (parts);
+  }
+  parts.psf_sigma = 2.0;
+  EXPECT_EQ (error_of (parts), "");
+  /* Copied pixels need no windows. */
+  parts.homography[2] = 0.0;
+  parts.psf_sigma = 16.0;
+  EXPECT_EQ (error_of (parts), "");
 }

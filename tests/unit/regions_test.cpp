@@ -487,22 +487,6 @@ TEST (Regions, DecodeInterpolatesWithoutThem)
   }
 }
 
-TEST (Regions, RowsOfTheBackgroundAreThoseOfTheWhole)
-{
-  const Schedule schedule =
-      preset ("staircase:2x2,region=6x6+3+5:sequential:3x2");
-  const auto coded = coded_frame (schedule, 16, 14, light);
-  const auto whole = extract (schedule, coded.view ());
-  const auto extractor = Extractor<std::uint8_t>::make (schedule, 16, 14);
-  auto rows = std::vector (4, Image<std::uint8_t> (8, 7));
-  std::vector<ImageView<std::uint8_t>> views;
-  for (auto &subframe : rows)
-    views.push_back (subframe.view ());
-  for (const auto &[first, count] : {std::pair (0, 3), {3, 1}, {4, 3}})
-    EXPECT_TRUE (extractor->run_rows (coded.view (), views, first, count));
-  EXPECT_EQ (rows, whole);
-}
-
 namespace
 {
 

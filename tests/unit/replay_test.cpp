@@ -1,15 +1,16 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* What a window shows: pictures of the last second, loop, pause and steps; and
  * where it shows them. */
-#include "../../pipelines/support/replay.h"
+#include "window/replay.h"
 
 #include <gtest/gtest.h>
 
-#include "../../pipelines/support/window_layout.h"
+#include "window/layout.h"
 
 namespace
 {
 
+using namespace codedexposure::app;
 using codedexposure::Extent;
 using Key = Replay::Key;
 using Mode = Replay::Mode;

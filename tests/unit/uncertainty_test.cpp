@@ -106,6 +106,18 @@ TEST (Uncertainty, MeasuredAndStaticPixelsHaveTheRoundingOfTheCamera)
       }
 }
 
+TEST (Uncertainty, SlotsBeyond128AreMeasured)
+{
+  const Schedule schedule = test::schedule_of ("sequential:13x10");
+  const Result result = fuse (schedule, {}, 0);
+  const int rounding = int (std::lround (256.0 / std::sqrt (12.0)));
+  for (const int slot : {127, 128, 129})
+    EXPECT_EQ (result.deviations[std::size_t (slot)].at (
+                   26 + slot % 13, 20 + slot / 13),
+        rounding)
+        << slot;
+}
+
 /* The mean of three frames has a third of the variance. */
 TEST (Uncertainty, StaticPixelsHaveTheNoiseOfTheirMean)
 {

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Images that do not fit what they are given to are refused, and left alone. */
-#include <climits>
 #include <functional>
 
 #include <gtest/gtest.h>
@@ -116,10 +115,6 @@ TYPED_TEST (ViewsTest, OfAnExtractor)
       this->spoilt ({this->coded}), [&] (const Views<TypeParam> &views) {
         return extractor->run (views[0], this->halves);
       });
-  for (const auto &[first, rows] :
-      {std::pair (-1, 2), {0, 5}, {4, 1}, {2, -1}, {INT_MAX, INT_MAX}})
-    EXPECT_FALSE (extractor->run_rows (this->coded, this->halves, first, rows));
-  EXPECT_TRUE (extractor->run_rows (this->coded, this->halves, 4, 0));
 }
 
 TYPED_TEST (ViewsTest, OfARectifier)
@@ -139,8 +134,6 @@ TYPED_TEST (ViewsTest, OfARectifier)
       this->spoilt ({this->coded}), [&] (const Views<TypeParam> &views) {
         return rectifier->run (Input (views[0]), output[0]);
       });
-  EXPECT_FALSE (rectifier->run_rows (Input (this->coded), output[0], 7, 2));
-  EXPECT_TRUE (rectifier->run_rows (Input (this->coded), output[0], 7, 1));
 }
 
 TYPED_TEST (ViewsTest, OfAFuser)

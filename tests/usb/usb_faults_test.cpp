@@ -8,10 +8,10 @@
 #include <fstream>
 #include <thread>
 
-#include "emulated_dlpc350.h"
-#include "bench/emulated_dlpc900.h"
+#include "emulation/dlpc350.h"
+#include "emulation/dlpc900.h"
 #include "fault_life.h"
-#include "bench/usb_bed.h"
+#include "emulation/usb_bed.h"
 
 using namespace codedexposure;
 using namespace codedexposure::test;

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* dmdsync with a board on the USB in a pipeline: masks, cancelled uploads and a
  * board that is disconnected. */
-#include "emulated_dlpc350.h"
-#include "bench/emulated_dlpc900.h"
+#include "emulation/dlpc350.h"
+#include "emulation/dlpc900.h"
 #include "mirrors.h"
 #include "sync_harness.h"
-#include "bench/usb_bed.h"
+#include "emulation/usb_bed.h"
 
 namespace
 {

@@ -16,11 +16,10 @@
 
 #include <gtest/gtest.h>
 
-#include "emulated_dlpc350.h"
-#include "bench/emulated_dlpc900.h"
-#include "bench/usb_bed.h"
+#include "emulation/dlpc350.h"
+#include "emulation/dlpc900.h"
+#include "emulation/usb_bed.h"
 
-using namespace codedexposure::test;
 using namespace codedexposure::emulated;
 
 namespace

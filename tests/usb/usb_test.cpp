@@ -7,10 +7,10 @@
 
 #include "dmd/usb_bus.h"
 #include "dmd_rig.h"
-#include "emulated_dlpc350.h"
-#include "bench/emulated_dlpc900.h"
+#include "emulation/dlpc350.h"
+#include "emulation/dlpc900.h"
 #include "mirrors.h"
-#include "bench/usb_bed.h"
+#include "emulation/usb_bed.h"
 
 using namespace codedexposure;
 using namespace codedexposure::test;
@@ -59,10 +59,10 @@ TEST_F (Usb, BoardsAreListedByPortAndSerial)
   ASSERT_EQ (message_of (boards), "");
   ASSERT_EQ (boards->size (), 2u);
   EXPECT_EQ ((*boards)[0].port, "1-2");
-  EXPECT_EQ ((*boards)[0].controller, UsbController::dlpc350);
+  EXPECT_EQ ((*boards)[0].controller, Controller::dlpc350);
   EXPECT_EQ ((*boards)[0].serial, "LCR2");
   EXPECT_EQ ((*boards)[1].port, "1-3");
-  EXPECT_EQ ((*boards)[1].controller, UsbController::dlpc900);
+  EXPECT_EQ ((*boards)[1].controller, Controller::dlpc900);
   EXPECT_EQ ((*boards)[1].serial, "second");
 }
 

@@ -1,0 +1,193 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* codedexposure calibrate: aligns the camera with the mirrors and measures the
+ * mapping. */
+#include <cstdlib>
+#include <filesystem>
+
+#include "base/text.h"
+#include "command.h"
+#include "pipeline/guide.h"
+#include "pipeline/plugin.h"
+#include "pipeline/source.h"
+#include "pipeline/video_output.h"
+
+namespace codedexposure::app
+{
+
+namespace
+{
+
+class Calibrate : public Command
+{
+public:
+  CommandText text () const override;
+  void declare (Options &options) override;
+  Exit run () override;
+
+private:
+  void set_up_bench ();
+  void set_up_device (const SourcePlan &plan);
+  std::string sink () const;
+  void write (Job &job, GstElement *calib) const;
+
+  SourceOptions source_;
+  RunOptions run_;
+  std::string output_ = "mapping.json";
+  std::optional<Text> report_, mode_, stage_, sink_;
+  std::optional<double> mirror_pitch_, tolerance_;
+};
+
+CommandText
+Calibrate::text () const
+{
+  return {.name = "calibrate",
+      .summary = "align the camera with the mirrors and measure the mapping",
+      .usage = "[option...]",
+      .description =
+          "Guides you through the alignment of camera and mirrors. It shows a "
+          "grating on\nthe DMD and displays the fringes and the required stage "
+          "travel, in a window and\non the terminal. When the camera is "
+          "aligned, or when you press Enter, it shows\nthe calibration "
+          "patterns, returns the mirrors to the schedule and writes the\n"
+          "mapping. The mapping corrects the remaining misalignment:\n"
+          "  codedexposure-demux mapping=FILE\n\nUse a plain, bright, static "
+          "target. Nothing may move in the picture.\nBy default, the simulated "
+          "bench is misaligned and has noise; with --bench, it is\nthe one "
+          "that was measured.\n",
+      .examples =
+          "  The simulated bench, which moves its own stage:\n"
+          "    codedexposure calibrate --size 384x288 --output simulated.json\n"
+          "  The mapping as the bench stands, without alignment:\n"
+          "    codedexposure calibrate --size 384x288 --mode map \\\n"
+          "      --output mapping.json\n"
+          "  A camera and a DMD on the USB; you move the stage:\n"
+          "    codedexposure calibrate --camera \"Allied Vision-0123456789\" "
+          "\\\n      --device usb: --size 768x576 --output camera.json\n"};
+}
+
+void
+Calibrate::declare (Options &options)
+{
+  options.heading ("");
+  options.value ("--output", output_, "FILE.json", "the mapping [mapping.json]",
+      file_ending_in (".json"));
+  options.value ("--report", report_, "FILE.png",
+      "picture of fringes, residuals and pixels [beside it]",
+      file_ending_in (".png"));
+  options.value ("--mode", mode_, "M",
+      "auto, align (no mapping) or map (immediately) [auto]",
+      one_of ({"auto", "align", "map"}));
+  options.value ("--stage", stage_, "WHO",
+      "who moves the stage: hand (you) or simulated (this program, only on the "
+      "simulated bench) [simulated there]",
+      one_of ({"hand", "simulated"}));
+  options.value ("--mirror-pitch", mirror_pitch_, "UM",
+      "stage travel for one mirror, µm [7.56]",
+      real (1e-3, 1e6, "a number of micrometres"));
+  options.value ("--tolerance", tolerance_, "M",
+      "largest deviation of an aligned camera, mirrors [0.05]",
+      real (0, 1e6, "a number of mirrors"));
+  options.value ("--sink", sink_, "\"GST\"",
+      "video sink [autovideosink; fakesink without a screen]");
+  source_.declare (options);
+  run_.declare (options);
+}
+
+/* A bench that was just assembled, in white light that stays below the largest
+ * value of the camera. */
+void
+Calibrate::set_up_bench ()
+{
+  constexpr double kWhite = 0.8;
+  const std::string schedule = source_.schedule.value_or ("sequential:2x2");
+  if (!source_.pattern && !source_.input && !source_.scene)
+    source_.pattern = "white";
+  if (!source_.gain && schedule.starts_with ("sequential:"))
+    source_.gain =
+        kWhite * value_of (Schedule::parse (schedule), Exit::usage).slots ();
+  else if (!source_.gain && schedule.starts_with ("staircase:"))
+    source_.gain = kWhite;
+  if (source_.bench)
+    return;
+  source_.full_well = source_.full_well.value_or (10000);
+  source_.read_noise = source_.read_noise.value_or (5);
+  source_.psf_sigma = source_.psf_sigma.value_or (0.5);
+  if (source_.shift_x || source_.shift_y || source_.rotation || source_.scale)
+    return;
+  source_.shift_x = 0.4;
+  source_.shift_y = -0.3;
+  source_.rotation = 0.5;
+  source_.scale = 1.01;
+}
+
+void
+Calibrate::set_up_device (const SourcePlan &plan)
+{
+  Extent mirrors = plan.size;
+  if (plan.bench && plan.bench->mapping)
+    mirrors = plan.bench->mapping->mirrors ();
+  if (!source_.device)
+    source_.device = "sim:bench,size=" + size_text (mirrors);
+}
+
+std::string
+Calibrate::sink () const
+{
+  if (sink_)
+    return *sink_;
+  const bool has_screen =
+      std::getenv ("DISPLAY") || std::getenv ("WAYLAND_DISPLAY");
+  return has_screen ? "autovideosink" : "fakesink sync=true";
+}
+
+void
+Calibrate::write (Job &job, GstElement *calib) const
+{
+  const std::string report = report_.value_or (
+      std::filesystem::path (output_).replace_extension (".png"));
+  job.outputs.file (calib, "location", output_, {});
+  job.outputs.file (calib, "report", report, {});
+}
+
+Exit
+Calibrate::run ()
+{
+  const bool simulated = source_.is_simulated ();
+  if (stage_ == "simulated" && !simulated)
+    usage_error ("--stage simulated needs the simulated bench; leave out "
+                 "--camera and --source");
+  start_gstreamer ();
+  if (simulated)
+    set_up_bench ();
+  const SourcePlan plan = SourcePlan::make (source_);
+  if (simulated)
+    set_up_device (plan);
+  const std::string sink = this->sink ();
+  const bool fast = sink.starts_with ("fakesink") &&
+                    sink.find ("sync=true") == std::string::npos;
+  Job job ("calibrate", run_);
+  Chain chain =
+      coded_source (job, source_, plan, fast ? Pace::fast : Pace::live);
+  Settings settings;
+  set_if (settings, "mode", mode_);
+  set_if (settings, "mirror-pitch", mirror_pitch_);
+  set_if (settings, "tolerance", tolerance_);
+  chain.to ("moirecalib", settings);
+  GstElement *calib = chain.last ();
+  write (job, calib);
+  chain.queue (2, "downstream");
+  add_view (chain, source_.bits);
+  chain.to ("videoconvert").to (job.graph.add_text (sink));
+  const bool moves = simulated && stage_.value_or ("simulated") == "simulated";
+  return guide (job, calib, moves ? job.bench : nullptr);
+}
+
+} // namespace
+
+std::unique_ptr<Command>
+calibrate_command ()
+{
+  return make_command<Calibrate> ();
+}
+
+} // namespace codedexposure::app

@@ -1,0 +1,355 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* codedexposure decode: a recording to subframes, or to full-size frames. */
+#include <cmath>
+
+#include "command.h"
+#include "options/picture.h"
+#include "pipeline/decoder.h"
+#include "pipeline/messages.h"
+#include "pipeline/plugin.h"
+#include "pipeline/python.h"
+#include "pipeline/recording.h"
+#include "pipeline/status.h"
+#include "pipeline/video_output.h"
+#include "record/matroska.h"
+
+namespace codedexposure::app
+{
+
+namespace
+{
+
+class Decode : public Command
+{
+public:
+  CommandText text () const override;
+  void declare (Options &options) override;
+  Exit run () override;
+
+private:
+  void declare_relations (Options &options);
+  void check () const;
+  PlayTimes times () const;
+  VideoStyle style () const;
+  void build (Job &job) const;
+  void build_search (Job &job) const;
+  RunResult play_once (bool salvage, bool &found) const;
+  [[noreturn]] void decode_on_cores () const;
+
+  std::string recording_;
+  DecodeOptions decode_;
+  RunOptions run_;
+  std::optional<Text> output_, coded_, statistics_, uncertainty_, excerpt_;
+  std::optional<double> start_, duration_;
+  std::optional<int> region_, white_, threads_, jobs_;
+  bool deflate_ = false, view_ = false, find_phase_ = false;
+};
+
+CommandText
+Decode::text () const
+{
+  return {.name = "decode",
+      .summary = "decode a recording to pictures at N times the frame rate",
+      .usage = "[option...] RECORDING.mkv --output OUT\n"
+               "       codedexposure decode [--schedule S] RECORDING.mkv "
+               "--find-phase",
+      .description =
+          "Splits the coded frames of a recording into subframes. The "
+          "recording contains\nthe schedule. The ending of OUT selects the "
+          "format: .mkv (FFV1, lossless), .mp4\n(H.264, for viewing), .ome.tif "
+          "(OME-TIFF) or .h5 (HDF5) for other programs,\nFOLDER/ or "
+          "NAME%06d.png (pictures).\n",
+      .notes = "Exit status: 0 all decoded, 1 failed, 2 wrong usage, 3 the "
+               "recording is cut off\nor damaged, and was decoded as far as "
+               "possible, 4 no coded frame lies in the\npart, 130 stopped "
+               "before the end: what was decoded is in OUT.part.\n",
+      .examples =
+          "  A video of 100 frames/s, to look at:\n"
+          "    codedexposure decode coded.mkv --output fast.mp4\n"
+          "  A fifth of a second as single pictures:\n"
+          "    codedexposure decode coded.mkv --start 1 --duration 0.2 \\\n"
+          "      --output pictures/\n"
+          "  Full-size frames, lossless:\n"
+          "    codedexposure decode coded.mkv --fuse balanced --duration 0.2 "
+          "\\\n      --output full.mkv\n"};
+}
+
+void
+Decode::declare (Options &options)
+{
+  options.word ("RECORDING.mkv", recording_);
+  options.heading ("");
+  options.value ("--output", output_, "OUT", "subframes");
+  options.value ("--coded", coded_, "OUT",
+      "also write the coded frames, in one of the same formats");
+  options.value ("--statistics", statistics_, "FILE",
+      "also measure each picture of OUT: a line of CSV with mean, minimum, "
+      "maximum, entropy, saturated pixels and flags");
+  decode_.declare (options);
+  options.value ("--uncertainty", uncertainty_, "OUT",
+      "with --fuse: also write the uncertainty of each pixel: half the width "
+      "of the interval that holds 68 % of the errors, in 1/65280 of white; 16 "
+      "bits, in the same formats but .mp4");
+  options.value ("--region", region_, "I",
+      "for a schedule with regions: the subframes of region I, from 0 on, "
+      "instead of the background",
+      whole (0, 63, "the number of a region"));
+  options.flag (
+      "--deflate", deflate_, "compress .ome.tif and .h5, without loss");
+  options.flag ("--view", view_,
+      "scale pictures (PNG) to 8 bits; without it, they keep the pixel values, "
+      "which many programs show dark");
+  options.value ("--white", white_, "DN",
+      "with --view and in .mp4: the pixel value that becomes white, for a dark "
+      "scene [the largest of the bits]",
+      whole (1, 65535, "a pixel value"));
+  options.flag ("--find-phase", find_phase_,
+      "find the phase of the tile of a staircase, for a recording without "
+      "calibration, and print the --schedule with it; reads 10 s unless "
+      "--duration is set");
+  options.value ("--start", start_, "SECONDS",
+      "begin with the first coded frame that is not before this time of the "
+      "recording [its beginning]",
+      seconds ());
+  options.value ("--duration", duration_, "SECONDS",
+      "duration to decode, exactly as in the whole recording: frames around it "
+      "are read, too [all]",
+      seconds (true));
+  options.value ("--excerpt", excerpt_, "A-B",
+      "the coded frames whose times lie from A to before B (s; no B: to the "
+      "end), in place of --start and --duration",
+      excerpt_rule ());
+  options.value ("--threads", threads_, "N",
+      "threads of the fusion and of the encoder; the pictures do not depend on "
+      "it [one for each processor]",
+      whole (1, 64));
+  options.value ("--jobs", jobs_, "N",
+      "decode on so many cores at the same time; the result is the same [1]",
+      whole (1, 999));
+  run_.declare (options);
+  declare_relations (options);
+}
+
+void
+Decode::declare_relations (Options &options)
+{
+  options.need ({"--uncertainty"}, "--fuse");
+  options.need ({"--statistics"}, "--output");
+  options.exclude ({"--region", "--method"}, "--fuse");
+  options.exclude ({"--start", "--duration", "--find-phase"}, "--excerpt");
+  options.exclude ({"--output", "--coded", "--uncertainty", "--method",
+                       "--mapping", "--fuse", "--region"},
+      "--find-phase");
+  options.exclude ({"--coded", "--uncertainty", "--start", "--duration",
+                       "--excerpt", "--find-phase", "--print"},
+      "--jobs");
+}
+
+/* What the relations between options cannot say. */
+void
+Decode::check () const
+{
+  const auto is = [] (const std::optional<Text> &name, VideoForm form) {
+    return name && form_of (*name) == form;
+  };
+  const auto any = [&] (VideoForm form) {
+    return is (output_, form) || is (coded_, form) || is (uncertainty_, form);
+  };
+  if (!output_ && !coded_ && !find_phase_)
+    usage_error ("set --output OUT");
+  if (deflate_ && !any (VideoForm::stack))
+    usage_error ("--deflate compresses .ome.tif and .h5; set such an --output");
+  if (view_ && !any (VideoForm::pictures))
+    usage_error ("--view scales PNG to 8 bits; set such an --output");
+  if (white_ && !view_ && !any (VideoForm::mp4))
+    usage_error ("--white is for --view and .mp4; other files keep the pixel "
+                 "values");
+  if (is (uncertainty_, VideoForm::mp4))
+    usage_error ("--uncertainty " + *uncertainty_ +
+                 ": .mp4 does not keep values; end in .mkv, .ome.tif or .h5");
+}
+
+PlayTimes
+Decode::times () const
+{
+  constexpr double kSearched = 10; // s
+  const auto ns = [] (double value) {
+    return GstClockTime (std::llround (value * 1e9));
+  };
+  PlayTimes times;
+  if (excerpt_) {
+    const auto [from, until] = excerpt_times (*excerpt_);
+    times.start = ns (from);
+    if (until)
+      times.stop = ns (*until);
+    return times;
+  }
+  std::optional<double> duration = duration_;
+  if (find_phase_ && !duration)
+    duration = kSearched;
+  if (start_)
+    times.start = ns (*start_);
+  if (duration)
+    times.stop = times.start.value_or (0) + ns (*duration);
+  times.from_first = !start_;
+  return times;
+}
+
+VideoStyle
+Decode::style () const
+{
+  VideoStyle style;
+  style.deflate = deflate_;
+  style.view = view_;
+  style.white = white_;
+  style.bits = decode_.bits;
+  style.threads = threads_;
+  return style;
+}
+
+void
+Decode::build (Job &job) const
+{
+  Chain frames = read_recording (job, recording_);
+  DecoderPads pads = decode_.fuse ? add_fusion (job, frames, decode_, threads_)
+                                  : add_demux (job, frames, decode_, region_);
+  job.times = times ();
+  VideoStyle how = style ();
+  how.coded = job.counted;
+  if (output_) {
+    Chain chain = pads.pictures;
+    keep_times (chain.to ("queue").last ());
+    if (statistics_) {
+      Settings settings{{"format", "csv"}, {"post-messages", false}};
+      set_if (settings, "bits", decode_.bits);
+      chain.to ("subframestats", settings);
+      job.outputs.file (chain.last (), "location", *statistics_,
+          {.frames = pad_of (chain.last (), "sink").get (), .sidecar = true});
+    }
+    write_video (job, chain, *output_, how);
+  } else
+    pads.pictures.to ("queue").to ("fakesink");
+  if (coded_) {
+    Chain chain = pads.coded ();
+    keep_times (chain.to ("queue").last ());
+    write_video (job, chain, *coded_, how);
+  }
+  if (uncertainty_) {
+    Chain chain = pads.uncertainty ();
+    how.view = false; // values keep their unit
+    keep_times (chain.to ("queue").last ());
+    write_video (job, chain, *uncertainty_, how);
+  }
+}
+
+void
+Decode::build_search (Job &job) const
+{
+  Chain chain = read_recording (job, recording_);
+  Settings settings{{"mode", "phase"}, {"overlay", false}};
+  set_if (settings, "schedule", decode_.schedule);
+  chain.to ("moirecalib", settings);
+  job.counted = chain.last ();
+  job.times = times ();
+  chain.to ("fakesink");
+}
+
+RunResult
+Decode::play_once (bool salvage, bool &found) const
+{
+  Job job ("decode", run_);
+  job.salvage = salvage;
+  if (find_phase_)
+    build_search (job);
+  else
+    build (job);
+  job.on_message = [&found] (const GstStructure *message) {
+    found |= gst_structure_has_name (message, "moirecalib/phase");
+  };
+  return play (job);
+}
+
+/* By the same chunks as an archive of this recording alone. */
+void
+Decode::decode_on_cores () const
+{
+  if (!output_ || !form_of (*output_) || output_->ends_with (".png"))
+    usage_error ("--jobs is for an --output that ends in .mkv, .mp4, .ome.tif, "
+                 ".h5 or /");
+  value_of (check_is_no_input (*output_, {recording_}), Exit::usage);
+  if (statistics_)
+    value_of (check_is_no_input (*statistics_, {recording_}), Exit::usage);
+  std::vector<std::string> words{"work", "decode", recording_, *output_,
+      std::to_string (*jobs_), run_.force ? "1" : ""};
+  const auto pass = [&words] (const char *name, const std::string &value) {
+    words.push_back (std::string ("--") + name + "=" + value);
+  };
+  const auto pass_text = [&] (const char *name, const std::optional<Text> &v) {
+    if (v)
+      pass (name, *v);
+  };
+  pass_text ("method", decode_.method);
+  pass_text ("mapping", decode_.mapping);
+  pass_text ("fuse", decode_.fuse);
+  pass_text ("bench", decode_.bench);
+  pass_text ("schedule", decode_.schedule);
+  pass_text ("statistics", statistics_);
+  if (decode_.full_well)
+    pass ("full-well", property_text (*decode_.full_well));
+  if (decode_.read_noise)
+    pass ("read-noise", property_text (*decode_.read_noise));
+  if (region_)
+    pass ("region", std::to_string (*region_));
+  if (decode_.bits)
+    pass ("bits", std::to_string (*decode_.bits));
+  if (white_)
+    pass ("white", std::to_string (*white_));
+  for (const auto &[name, set] :
+      {std::pair ("--view", view_), std::pair ("--refine", decode_.refine),
+          std::pair ("--deflate", deflate_)})
+    if (set)
+      words.push_back (name);
+  become_archive (words);
+}
+
+Exit
+Decode::run ()
+{
+  check ();
+  start_gstreamer ();
+  const RecordingInfo info =
+      value_of (recording_info (recording_, false));
+  if (jobs_.value_or (1) > 1)
+    decode_on_cores ();
+  bool found = false;
+  RunResult result = play_once (false, found);
+  if (run_.print)
+    return result.exit;
+  if (result.container_damaged) {
+    Status ("decode", false)
+        .line ("the index or the tags of " + recording_ +
+               " are damaged; reading it from front to back");
+    result = play_once (true, found);
+  }
+  if (info.is_cut_short && result.exit == Exit::failed && result.frames == 0)
+    fail (recording_ + " is cut off and has no complete frame to decode");
+  if (info.is_cut_short && result.exit == Exit::done)
+    result.exit = Exit::damaged;
+  if (result.exit == Exit::damaged)
+    Status ("decode", false)
+        .line (recording_ + " is cut off or damaged; what could be decoded "
+                            "was, and pictures of damaged frames are flagged");
+  if (find_phase_ && result.exit == Exit::done && !found && !run_.print)
+    return Exit::failed;
+  return result.exit;
+}
+
+} // namespace
+
+std::unique_ptr<Command>
+decode_command ()
+{
+  return make_command<Decode> ();
+}
+
+} // namespace codedexposure::app

@@ -1,0 +1,115 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* codedexposure info: what a recording says of itself, without its pixels. */
+#include <cstdio>
+
+#include "base/text.h"
+#include "command.h"
+#include "options/board.h"
+#include "pipeline/messages.h"
+#include "record/matroska.h"
+
+namespace codedexposure::app
+{
+
+namespace
+{
+
+const char *
+codec_text (MatroskaHead::Codec codec)
+{
+  switch (codec) {
+  case MatroskaHead::Codec::ffv1:
+    return "ffv1";
+  case MatroskaHead::Codec::raw:
+    return "raw";
+  default:
+    return "other";
+  }
+}
+
+class Info : public Command
+{
+public:
+  CommandText text () const override
+  {
+    return {.name = "info",
+        .summary = "show what a recording says of itself",
+        .usage = "[option...] RECORDING.mkv...",
+        .description =
+            "Shows the codec, size, rate, length and schedule of "
+            "recordings, without decoding\nthem. With --json, a list "
+            "with an object for each; one that is no recording has\n"
+            "the key \"error\". Exit status 1: one of them is "
+            "none.\n",
+        .examples = "  For people:\n"
+                    "    codedexposure info coded.mkv\n"
+                    "  For programs, with the time of each coded frame:\n"
+                    "    codedexposure info --json --times coded.mkv\n"};
+  }
+
+  void declare (Options &options) override
+  {
+    options.words (paths_);
+    options.heading ("");
+    options.flag ("--times", times_, "also the times of all coded frames, ns");
+    printing_.declare (options);
+  }
+
+  Exit run () override
+  {
+    if (paths_.empty ())
+      usage_error ("give a RECORDING.mkv");
+    Json list = Json::array ();
+    bool good = true;
+    for (const std::string &path : paths_) {
+      const auto info = recording_info (path);
+      good &= bool (info);
+      list.push_back (
+          info ? describe (path, *info)
+               : Json{{"recording", path}, {"error", info.error ().message}});
+    }
+    printing_.print (list);
+    return good ? Exit::done : Exit::failed;
+  }
+
+private:
+  Json describe (const std::string &path, const RecordingInfo &info) const
+  {
+    Json json{{"recording", path}, {"codec", codec_text (info.head.codec)},
+        {"size", size_text (info.head.size)}, {"frames", info.times.size ()},
+        {"complete", !info.is_cut_short}, {"track", info.head.lines != 0},
+        {"period_ns", info.head.duration}};
+    if (!info.times.empty ()) {
+      json["first_ns"] = info.times.front ();
+      json["last_ns"] = info.times.back ();
+    }
+    if (info.recorded)
+      json["recorded"] = *info.recorded;
+    if (info.setup) {
+      json["schedule"] = info.setup->schedule.text ();
+      if (info.setup->rate)
+        json["rate"] = std::to_string (info.setup->rate->num) + "/" +
+                       std::to_string (info.setup->rate->den);
+      json["simulated"] = info.setup->simulated;
+      json["bench_profile"] = info.setup->bench.has_value ();
+      json["mapping"] = info.setup->mapping.has_value ();
+    }
+    if (times_)
+      json["times_ns"] = info.times;
+    return json;
+  }
+
+  std::vector<std::string> paths_;
+  bool times_ = false;
+  Printing printing_;
+};
+
+} // namespace
+
+std::unique_ptr<Command>
+info_command ()
+{
+  return make_command<Info> ();
+}
+
+} // namespace codedexposure::app

@@ -1,0 +1,275 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* codedexposure join: puts the pictures of excerpts together, as one run of
+ * decode would have written them. Archives run it. */
+#include <atomic>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <gst/app/gstappsink.h>
+#include <gst/app/gstappsrc.h>
+#include <nlohmann/json.hpp>
+
+#include "command.h"
+#include "common/meta.h"
+#include "common/tag.h"
+#include "pipeline/messages.h"
+#include "pipeline/plugin.h"
+#include "pipeline/recording.h"
+#include "pipeline/video_output.h"
+
+namespace codedexposure::app
+{
+
+using namespace gst;
+
+namespace
+{
+
+using SamplePtr = std::unique_ptr<GstSample, MiniObjectUnref>;
+
+/** The pictures of one excerpt, in their order. */
+class Part
+{
+public:
+  explicit Part (const std::string &name) : name_ (name), job_ ("join", {})
+  {
+    Chain chain = read_recording (job_, name);
+    chain.to ("appsink", {{"sync", false}, {"max-buffers", 8}});
+    sink_ = GST_APP_SINK (chain.last ());
+    gst_element_set_state (job_.graph.pipeline (), GST_STATE_PLAYING);
+  }
+  ~Part () { gst_element_set_state (job_.graph.pipeline (), GST_STATE_NULL); }
+  Part (const Part &) = delete;
+  Part &operator= (const Part &) = delete;
+
+  const std::string &name () const { return name_; }
+  /** Null at the end, and after an error. */
+  SamplePtr next () const
+  {
+    return SamplePtr (gst_app_sink_pull_sample (sink_));
+  }
+  /** Why there are no more; none: that was the end. */
+  std::optional<std::string> failure () const
+  {
+    const ObjectPtr<GstBus> bus (gst_element_get_bus (job_.graph.pipeline ()));
+    const std::unique_ptr<GstMessage, MiniObjectUnref> message (
+        gst_bus_pop_filtered (bus.get (), GST_MESSAGE_ERROR));
+    if (!message)
+      return std::nullopt;
+    GError *error = nullptr;
+    gst_message_parse_error (message.get (), &error, nullptr);
+    std::string text = error->message;
+    g_error_free (error);
+    return text;
+  }
+  /** How the pictures were made; null: it is not said. */
+  EventPtr provenance () const
+  {
+    const ObjectPtr<GstPad> pad = pad_of (GST_ELEMENT (sink_), "sink");
+    for (guint i = 0;; i++) {
+      EventPtr event (gst_pad_get_sticky_event (pad.get (), GST_EVENT_TAG, i));
+      if (!event)
+        return nullptr;
+      GstTagList *tags = nullptr;
+      gst_event_parse_tag (event.get (), &tags);
+      const auto made = provenance_from_tags (tags);
+      if (made && *made)
+        return EventPtr (provenance_to_event (made->value ()));
+    }
+  }
+
+private:
+  std::string name_;
+  Job job_;
+  GstAppSink *sink_;
+};
+
+/** Pushes the pictures of all parts into a source, one after the other, and
+ * checks that each coded frame's pictures are there exactly once. */
+class Feeder
+{
+public:
+  Feeder (GstElement *source, std::vector<std::string> names)
+      : source_ (source), names_ (std::move (names))
+  {
+    g_object_set (source, "format", GST_FORMAT_TIME, "block", TRUE, "max-bytes",
+        guint64 (64) << 20, nullptr);
+    g_signal_connect (source, "need-data", G_CALLBACK (on_need_data), this);
+  }
+  Feeder (const Feeder &) = delete;
+  Feeder &operator= (const Feeder &) = delete;
+
+  /** After the pipeline has stopped. */
+  nlohmann::ordered_json counts () const
+  {
+    return {{"pictures", pictures_}, {"coded", coded_}, {"slots", slots_},
+        {"first_frame", first_}, {"last_frame", frame_},
+        {"lost", coded_ > 0 ? frame_ - first_ + 1 - coded_ : 0}};
+  }
+
+private:
+  static void on_need_data (GstElement *, guint, gpointer self) noexcept
+  {
+    static_cast<Feeder *> (self)->push_next ();
+  }
+
+  void fail_with (const std::string &why)
+  {
+    GST_ELEMENT_ERROR (
+        source_, STREAM, FAILED, ("%s", why.c_str ()), (nullptr));
+    gst_app_src_end_of_stream (GST_APP_SRC (source_));
+  }
+
+  void push_next ()
+  {
+    SamplePtr sample;
+    while (!sample) {
+      if (!part_ && at_ == names_.size ()) {
+        gst_app_src_end_of_stream (GST_APP_SRC (source_));
+        return;
+      }
+      if (!part_)
+        part_ = std::make_unique<Part> (names_[at_++]);
+      sample = part_->next ();
+      if (sample)
+        break;
+      if (const auto why = part_->failure ())
+        return fail_with (part_->name () + ": " + *why);
+      part_.reset ();
+    }
+    if (const std::string why = check (sample.get ()); !why.empty ())
+      return fail_with (part_->name () + " " + why);
+    BufferPtr picture (
+        gst_buffer_copy (gst_sample_get_buffer (sample.get ())));
+    if (pictures_++ == 0)
+      begin (sample.get ());
+    else if (follows_)
+      GST_BUFFER_FLAG_UNSET (picture.get (), GST_BUFFER_FLAG_DISCONT);
+    gst_app_src_push_buffer (GST_APP_SRC (source_), picture.release ());
+  }
+
+  void begin (GstSample *first)
+  {
+    GstCaps *caps = gst_sample_get_caps (first);
+    caps_.reset (gst_caps_ref (caps));
+    gst_app_src_set_caps (GST_APP_SRC (source_), caps);
+    if (EventPtr made = part_->provenance ())
+      gst_element_send_event (source_, made.release ());
+  }
+
+  /* What is wrong with the next picture; empty: nothing. */
+  std::string check (GstSample *sample)
+  {
+    const GstBuffer *picture = gst_sample_get_buffer (sample);
+    if (caps_ &&
+        !gst_caps_is_equal (caps_.get (), gst_sample_get_caps (sample)))
+      return "is another kind of video than the parts before it; decode all "
+             "parts with the same options";
+    if (GST_CLOCK_TIME_IS_VALID (last_) && GST_BUFFER_PTS (picture) <= last_)
+      return "begins before the end of the part before it";
+    last_ = GST_BUFFER_PTS (picture);
+    const auto meta = get_frame_meta (gst_sample_get_buffer (sample));
+    if (!meta)
+      return "does not number its pictures; decode all parts again";
+    const bool begins = meta->subframe <= 0;
+    if (coded_ > 0 && begins && meta->frame <= frame_)
+      return format ("has pictures of coded frame %" G_GUINT64_FORMAT
+                     " for a second time",
+          meta->frame);
+    if (!begins &&
+        (coded_ == 0 || meta->frame != frame_ || meta->subframe != slot_ + 1))
+      return format (
+          "lacks pictures of coded frame %" G_GUINT64_FORMAT, meta->frame);
+    if (begins && coded_ > 0 && slots_ > 0 && slot_ + 1 != slots_)
+      return format (
+          "follows a coded frame with %d of %d pictures", slot_ + 1, slots_);
+    /* An excerpt begins with a discontinuity, which the whole does not have. */
+    follows_ = coded_ > 0 && (!begins || meta->frame == frame_ + 1);
+    if (begins) {
+      if (coded_ == 0)
+        first_ = meta->frame;
+      else
+        slots_ = slot_ + 1;
+      coded_++;
+    }
+    frame_ = meta->frame;
+    slot_ = std::max (meta->subframe, 0);
+    return {};
+  }
+
+  GstElement *source_; // of the pipeline, which stops before this goes
+  std::vector<std::string> names_;
+  /* Streaming thread: */
+  std::size_t at_ = 0;
+  std::unique_ptr<Part> part_;
+  CapsPtr caps_;
+  GstClockTime last_ = GST_CLOCK_TIME_NONE;
+  guint64 pictures_ = 0, coded_ = 0, first_ = 0, frame_ = 0;
+  int slot_ = 0, slots_ = 0;
+  bool follows_ = false; // the picture before is that of the slot before
+};
+
+class Join : public Command
+{
+public:
+  CommandText text () const override
+  {
+    return {.name = "join",
+        .summary = "",
+        .usage = "[option...] PART.mkv... --output OUT",
+        .description =
+            "Puts lossless videos of excerpts together, as one run of decode "
+            "would have written\nthem, and prints what they hold as JSON.\n"};
+  }
+
+  void declare (Options &options) override
+  {
+    options.words (parts_);
+    options.heading ("");
+    options.value ("--output", output_, "OUT", "as of decode");
+    options.require ("--output", "OUT");
+    options.flag ("--deflate", style_.deflate, "as of decode");
+    options.value ("--white", style_.white, "DN", "as of decode",
+        whole (1, 65535, "a pixel value"));
+    options.value ("--bits", style_.bits, "N", "as of decode", whole (1, 16));
+    options.value (
+        "--threads", style_.threads, "N", "as of decode", whole (1, 64));
+    run_.declare (options);
+  }
+
+  Exit run () override
+  {
+    if (parts_.empty ())
+      usage_error ("give the parts");
+    start_gstreamer ();
+    Job job ("join", run_);
+    job.options.json = false;
+    for (const std::string &part : parts_)
+      job.outputs.reads (part);
+    Chain chain = job.graph.begin ("appsrc");
+    Feeder feeder (chain.last (), parts_);
+    chain.to ("queue");
+    write_video (job, chain, *output_, style_);
+    const Exit exit = play (job).exit;
+    if (exit == Exit::done)
+      std::printf ("%s\n", feeder.counts ().dump ().c_str ());
+    return exit;
+  }
+
+private:
+  std::vector<std::string> parts_;
+  std::optional<Text> output_;
+  VideoStyle style_;
+  RunOptions run_;
+};
+
+} // namespace
+
+std::unique_ptr<Command>
+join_command ()
+{
+  return make_command<Join> ();
+}
+
+} // namespace codedexposure::app

@@ -1,0 +1,284 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* codedexposure pack: a raw recording becomes FFV1, and is replaced once all
+ * frames are checked. */
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include "command.h"
+#include "common/record.h"
+#include "pipeline/messages.h"
+#include "pipeline/part.h"
+#include "pipeline/plugin.h"
+#include "pipeline/recording.h"
+#include "pipeline/status.h"
+#include "record/matroska.h"
+
+namespace codedexposure::app
+{
+
+using namespace gst;
+namespace fs = std::filesystem;
+
+namespace
+{
+
+/** What is known of each frame that passes a pad, with the hash of its pixels;
+ * changed by the streaming thread until the pipeline has stopped. */
+class FrameLog
+{
+public:
+  explicit FrameLog (GstElement *element)
+  {
+    gst_pad_add_probe (
+        pad_of (element, "sink").get (), GST_PAD_PROBE_TYPE_BUFFER,
+        [] (GstPad *pad, GstPadProbeInfo *info, gpointer self) {
+          static_cast<FrameLog *> (self)->add (
+              pad, GST_PAD_PROBE_INFO_BUFFER (info));
+          return GST_PAD_PROBE_OK;
+        },
+        this, nullptr);
+  }
+  FrameLog (const FrameLog &) = delete;
+  FrameLog &operator= (const FrameLog &) = delete;
+
+  const std::vector<std::string> &lines () const { return lines_; }
+
+private:
+  void add (GstPad *pad, GstBuffer *frame)
+  {
+    const CapsPtr caps (gst_pad_get_current_caps (pad));
+    const EventPtr event (gst_pad_get_sticky_event (pad, GST_EVENT_SEGMENT, 0));
+    GstVideoInfo info;
+    const GstSegment *segment = nullptr;
+    if (!caps || !event || !gst_video_info_from_caps (&info, caps.get ()))
+      return;
+    gst_event_parse_segment (event.get (), &segment);
+    lines_.push_back (
+        record_of (frame, info, *segment, 0, lines_.size ()).to_json ());
+  }
+
+  std::vector<std::string> lines_;
+};
+
+class Pack : public Command
+{
+public:
+  CommandText text () const override;
+  void declare (Options &options) override;
+  Exit run () override;
+
+private:
+  struct Seen {
+    RunResult result;
+    std::vector<std::string> lines;
+    bool is_sound () const { return result.exit == Exit::done; }
+  };
+
+  void check_names (const std::string &recording, const std::string &output);
+  void lock (const std::string &recording);
+  Seen look_through (const std::string &file);
+  RunResult encode (
+      const std::string &recording, const std::string &to, bool salvage);
+  Exit replace (const std::string &recording, const std::string &packed,
+      const std::string &output, std::size_t frames);
+
+  std::string recording_;
+  std::optional<Text> output_;
+  std::optional<int> threads_;
+  RunOptions run_;
+  Status status_{"pack", false};
+  int lock_ = -1; // open and locked until the program ends
+};
+
+CommandText
+Pack::text () const
+{
+  return {.name = "pack",
+      .summary = "turn a raw recording into FFV1, checked frame by frame",
+      .usage = "[option...] RECORDING.mkv",
+      .description =
+          "Turns a raw recording into lossless FFV1, which takes about half of "
+          "the space.\nReads the result back and compares every frame with "
+          "that of the raw recording\nand with the hash in its track: pixels, "
+          "time and flags. Only then replaces the\nrecording. A recording that "
+          "is FFV1 stays as it is, and so does one that is cut\noff or "
+          "damaged, because another program may read more of it; --output "
+          "and\n--force pack what can be read, and damaged frames stay "
+          "damaged.\n",
+      .notes =
+          "Exit status: 0 packed, or FFV1 already; 1 failed, and the "
+          "recording is as it\nwas; 2 wrong usage; 3 the recording is cut "
+          "off or damaged; 130 stopped, and the\nrecording is as it was.\n",
+      .examples = "  A recording, in its place:\n"
+                  "    codedexposure pack fast.mkv\n"
+                  "  A copy on another disk:\n"
+                  "    codedexposure pack fast.mkv --output /archive/fast.mkv\n"
+                  "  All recordings of a folder, two at a time:\n"
+                  "    parallel -j2 codedexposure pack --threads 1 ::: "
+                  "recordings/*.mkv\n"};
+}
+
+void
+Pack::declare (Options &options)
+{
+  options.word ("RECORDING.mkv", recording_);
+  options.heading ("");
+  options.value ("--output", output_, "OUT.mkv",
+      "write this file instead; RECORDING.mkv stays", file_ending_in (".mkv"));
+  options.value ("--threads", threads_, "N",
+      "threads of the encoder; pixels do not depend on them [one for each "
+      "processor]",
+      whole (1, 64));
+  run_.declare (options);
+}
+
+void
+Pack::check_names (const std::string &recording, const std::string &output)
+{
+  if (!output_)
+    return;
+  std::error_code ignored;
+  value_of (check_is_no_input (output, {recording}), Exit::usage);
+  if (!run_.force && fs::exists (fs::symlink_status (output, ignored)))
+    fail (
+        output + " exists; choose another name, or set --force to replace it");
+}
+
+void
+Pack::lock (const std::string &recording)
+{
+  lock_ = open (recording.c_str (), O_RDONLY | O_CLOEXEC);
+  if (lock_ < 0 || flock (lock_, LOCK_EX | LOCK_NB) != 0)
+    fail ("another run is packing " + recording + "; wait for its end");
+}
+
+Pack::Seen
+Pack::look_through (const std::string &file)
+{
+  for (bool salvage = false;; salvage = true) {
+    Job job ("pack", run_);
+    job.options.print = job.options.json = job.has_result = false;
+    job.salvage = salvage;
+    Chain chain = read_recording (job, file);
+    chain.to ("fakesink", {{"sync", false}});
+    job.counted = chain.last ();
+    const FrameLog log (chain.last ());
+    const RunResult result = play (job);
+    if (!result.container_damaged || salvage)
+      return {result, log.lines ()};
+  }
+}
+
+RunResult
+Pack::encode (const std::string &recording, const std::string &to, bool salvage)
+{
+  Job job ("pack", run_);
+  job.options.json = job.has_result = false;
+  job.options.force = true;
+  job.salvage = salvage;
+  Chain chain = read_recording (job, recording);
+  chain.queue (8);
+  job.counted = chain.last ();
+  Settings settings;
+  set_if (settings, "threads", threads_);
+  chain.to ("codedexposure-recordmux", settings);
+  const auto frames = pad_of (chain.last (), "sink");
+  chain.to ("filesink");
+  job.outputs.file (chain.last (), "location", to, {.frames = frames.get ()});
+  return play (job);
+}
+
+/* The name changes only when the data is on the disk. */
+Exit
+Pack::replace (const std::string &recording, const std::string &packed,
+    const std::string &output, std::size_t frames)
+{
+  std::error_code error;
+  const double raw = double (fs::file_size (recording, error));
+  const double size = double (fs::file_size (packed, error));
+  fs::permissions (packed, fs::status (recording, error).permissions (), error);
+  if (const int file = open (packed.c_str (), O_RDONLY | O_CLOEXEC);
+      file < 0 || fsync (file) != 0 || close (file) != 0)
+    fail ("cannot write " + output + "; " + recording + " is as it was");
+  value_of (move_file (packed, output, run_.force || !output_));
+  status_.line ("wrote " + output +
+                format (": %zu coded frames, %.0f %% of the raw size, all "
+                        "checked",
+                    frames, 100 * size / raw));
+  return Exit::done;
+}
+
+Exit
+Pack::run ()
+{
+  start_gstreamer ();
+  const RecordingInfo info =
+      value_of (recording_info (recording_, false));
+  std::error_code ignored;
+  const std::string recording = fs::canonical (recording_, ignored);
+  const std::string output = output_.value_or (recording);
+  check_names (recording, output);
+  if (run_.print) {
+    encode (recording, output, false);
+    return Exit::done;
+  }
+  if (info.head.codec != MatroskaHead::Codec::raw) {
+    if (output_)
+      fail (recording + " is FFV1 already; copy it");
+    status_.line (recording + " is FFV1 already");
+    return Exit::done;
+  }
+  lock (recording);
+
+  const std::string as_it_was = "; " + recording + " is as it was";
+  const Seen before = look_through (recording);
+  if (before.result.interrupted)
+    fail ("stopped" + as_it_was, Exit::interrupted);
+  if (before.lines.empty () ||
+      (!before.is_sound () && before.result.exit != Exit::damaged))
+    fail (recording + " cannot be read");
+  if (!before.is_sound () && !output_ && !run_.force) {
+    status_.line (recording + " is cut off or damaged, and stays as it is; set "
+                              "--output or --force to pack what can be read");
+    return Exit::damaged;
+  }
+  const fs::path whole = fs::absolute (output, ignored);
+  Part part ((whole.parent_path () / ("." + whole.filename ().string ())),
+      Part::kFile);
+  const std::string packed = part.name ();
+  const RunResult encoded = encode (recording, packed, !before.is_sound ());
+  const auto give_up = [&] (const std::string &why, Exit exit = Exit::failed) {
+    fs::remove (packed, ignored);
+    fs::remove (part.path (), ignored);
+    fail (why + as_it_was, exit);
+  };
+  if (encoded.interrupted)
+    give_up ("stopped", Exit::interrupted);
+  if (encoded.exit != before.result.exit)
+    give_up ("could not encode");
+  const Seen after = look_through (packed);
+  if (after.result.interrupted)
+    give_up ("stopped", Exit::interrupted);
+  if (after.lines != before.lines)
+    give_up ("the packed frames differ from those of the recording");
+  replace (recording, packed, output, before.lines.size ());
+  if (!before.is_sound ())
+    status_.line (recording + " is cut off or damaged; what could be read was "
+                              "packed, and damaged frames stay damaged");
+  return before.is_sound () ? Exit::done : Exit::damaged;
+}
+
+} // namespace
+
+std::unique_ptr<Command>
+pack_command ()
+{
+  return make_command<Pack> ();
+}
+
+} // namespace codedexposure::app

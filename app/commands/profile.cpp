@@ -1,0 +1,64 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* codedexposure profile: shows bench profiles. */
+#include "command.h"
+#include "options/board.h"
+#include "setup/bench_profile.h"
+
+namespace codedexposure::app
+{
+
+namespace
+{
+
+struct Arguments : Printing {
+  std::string path = "bench.json";
+};
+
+Exit
+show (const Arguments &arguments)
+{
+  const BenchProfile profile =
+      value_of (BenchProfile::parse (arguments.path), Exit::usage);
+  Json lines = Json::object ();
+  if (arguments.json)
+    lines = Json::parse (profile.to_json ());
+  else
+    for (const auto &[name, text] : profile.rows ())
+      lines[name] = text;
+  arguments.print (lines);
+  return Exit::done;
+}
+
+CommandGroup<Arguments>::Commands
+commands_below (Arguments &arguments)
+{
+  CommandGroup<Arguments>::Commands commands;
+  commands.push_back (std::make_unique<SmallCommand> (
+      CommandText{.name = "show",
+          .summary = "check a bench profile and show what it says",
+          .usage = "[option...] [FILE.json]",
+          .description = "Checks the bench profile FILE.json [bench.json], as "
+                         "\"codedexposure doctor\"\nwrites it, and shows what "
+                         "it says; with --json, its JSON form.\n"},
+      [&arguments] (Options &options) {
+        options.word ("FILE.json", arguments.path, true);
+        arguments.declare (options);
+      },
+      [&arguments] { return show (arguments); }));
+  return commands;
+}
+
+} // namespace
+
+std::unique_ptr<Command>
+profile_command ()
+{
+  return std::make_unique<CommandGroup<Arguments>> (
+      CommandText{.name = "profile",
+          .summary = "show bench profiles",
+          .usage = "COMMAND [option...]",
+          .description = "Bench profiles are what was measured of a bench.\n"},
+      commands_below);
+}
+
+} // namespace codedexposure::app

@@ -1,0 +1,118 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* codedexposure record: coded frames of a camera, or of the simulated bench, to
+ * a file. */
+#include "command.h"
+#include "pipeline/codec_choice.h"
+#include "pipeline/plugin.h"
+#include "pipeline/recording.h"
+#include "pipeline/source.h"
+
+namespace codedexposure::app
+{
+
+namespace
+{
+
+class Record : public Command
+{
+public:
+  CommandText text () const override
+  {
+    return {.name = "record",
+        .summary = "record the coded frames of a camera",
+        .usage = "[option...] --output FILE.mkv",
+        .description =
+            "Records coded frames of a camera or of the simulated bench. "
+            "Writes them without\nloss in Matroska with the schedule, and "
+            "FILE.jsonl with one line for each frame\n(number, time, "
+            "synchronisation, losses). Ends after --frames, at the end of "
+            "the\nscene or with Ctrl-C. \"codedexposure decode\" decodes the "
+            "recording later, with\nany method; \"codedexposure pack\" turns a "
+            "raw one into FFV1.\n",
+        .examples =
+            "  The simulated bench, for 2 s:\n"
+            "    codedexposure record --frames 50 --output bench.mkv\n"
+            "  12 bits and the code of the paper, as fast as possible:\n"
+            "    codedexposure record --fast --bits 12 \\\n"
+            "      --schedule staircase:2x2 --frames 50 --output "
+            "staircase.mkv\n"
+            "  A camera, which a DMD on the USB triggers, with the codec for "
+            "which this\n  machine is fast enough:\n"
+            "    codedexposure record --camera \"Allied Vision-0123456789\" "
+            "\\\n      --device usb: --size 768x576 --codec auto "
+            "--output camera.mkv\n"};
+  }
+
+  void declare (Options &options) override
+  {
+    options.heading ("");
+    options.value ("--output", output_, "FILE.mkv", "the recording",
+        file_ending_in (".mkv"));
+    options.require ("--output", "FILE.mkv");
+    options.value ("--codec", codec_, "C",
+        "ffv1: half of the space, but a core for 0.03 GB/s; raw: as fast as "
+        "the disk; auto: measures for some seconds, takes ffv1 if it is fast "
+        "enough, else raw [ffv1]",
+        one_of ({"ffv1", "raw", "auto"}));
+    options.value ("--threads", threads_, "N",
+        "threads of ffv1; pixels do not depend on them [one for each "
+        "processor]",
+        whole (1, 64));
+    options.flag (
+        "--fast", fast_, "run the bench as fast as possible, not in real time");
+    source_.declare (options);
+    options.exclude ({"--fast"}, "--camera");
+    run_.declare (options);
+  }
+
+  Exit run () override
+  {
+    start_gstreamer ();
+    Job job ("record", run_);
+    job.ends_by_signal = true;
+    const SourcePlan plan = SourcePlan::make (source_);
+    const Pace pace = fast_ ? Pace::fast : Pace::live;
+    Chain chain = coded_source (job, source_, plan, pace);
+    write_recording (job, chain, *output_, style (plan, pace));
+    return play (job).exit;
+  }
+
+private:
+  RecordingStyle style (const SourcePlan &plan, Pace pace) const
+  {
+    /* A frame has a line in the track and an entry in the index. */
+    constexpr std::uint64_t kBeside = 4096;
+    RecordingStyle style{.codec = codec_.value_or ("ffv1"),
+        .threads = threads_,
+        .live = is_live (source_, pace),
+        .rate = plan.frame_rate};
+    const bool size_is_known = source_.size || !source_.source;
+    if (style.codec == "auto") {
+      if (!size_is_known)
+        usage_error ("--codec auto measures with frames of the camera; set "
+                     "their --size");
+      Status status ("record", run_.verbose);
+      style.codec = choose_codec (plan, *output_, status);
+    }
+    if (source_.frames && size_is_known)
+      style.bytes =
+          std::uint64_t (*source_.frames) * (plan.frame_bytes () + kBeside);
+    return style;
+  }
+
+  SourceOptions source_;
+  RunOptions run_;
+  std::optional<Text> output_, codec_;
+  std::optional<int> threads_;
+  bool fast_ = false;
+};
+
+} // namespace
+
+std::unique_ptr<Command>
+record_command ()
+{
+  return make_command<Record> ();
+}
+
+} // namespace codedexposure::app

@@ -1,0 +1,209 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* codedexposure schedule: shows schedules, checks them, and writes their masks.
+ */
+#include <fstream>
+
+#include "base/text.h"
+#include "command.h"
+#include "dmd/bitmap.h"
+#include "dmd/boards.h"
+#include "dmd/plane_image.h"
+#include "options/board.h"
+
+namespace codedexposure::app
+{
+
+namespace
+{
+
+struct Arguments : Printing, BoardOptions {
+  std::string layout;
+  std::string region;
+  std::string prefix = "mask";
+  bool planes = false;
+};
+
+Exit
+show (const Arguments &arguments)
+{
+  const Schedule schedule = arguments.parsed ();
+  if (arguments.json) {
+    arguments.print (Json::parse (schedule.to_json ()));
+    return Exit::done;
+  }
+  const Timing &timing = schedule.timing ();
+  Json lines{{"schedule", schedule.text ()}, {"slots", schedule.slots ()},
+      {"masks", schedule.masks ()}, {"cell", size_text (schedule.cell ())},
+      {"active", timing.active > 0 ? time_text (timing.active)
+                                   : "the rest of the frame"},
+      {"switching", time_text (timing.switching)},
+      {"readout", time_text (timing.readout)}};
+  for (int i = 0; i < int (schedule.regions ().size ()); i++) {
+    const Schedule &region = schedule.region (i);
+    lines["region " + std::to_string (i)] =
+        rect_text (schedule.regions ()[std::size_t (i)].rect) + ", slots " +
+        std::to_string (region.slots ()) + ", cell " +
+        size_text (region.cell ());
+  }
+  arguments.print (lines);
+  return Exit::done;
+}
+
+Exit
+check (const Arguments &arguments)
+{
+  const DmdInfo board = arguments.info ();
+  const auto [schedule, plan] = fit (arguments, board);
+  arguments.print ({{"schedule", schedule.text ()}, {"dmd", board.name},
+      {"slots", plan.slots ()}, {"active", time_text (plan.active ())},
+      {"exposure", time_text (plan.exposure ())},
+      {"frame", time_text (plan.frame_period ())}, {"fits", true}});
+  return Exit::done;
+}
+
+Placement
+placement_of (const Arguments &arguments, const NamedBoard &board)
+{
+  Placement placement = board.options.placement;
+  if (!arguments.layout.empty ())
+    placement.layout = value_of (parse_layout (arguments.layout), Exit::usage);
+  if (!arguments.region.empty ())
+    placement.region = value_of (parse_region (arguments.region), Exit::usage);
+  value_of (check_placement (placement, board.info.array, board.info.size),
+      Exit::usage);
+  return placement;
+}
+
+void
+write_file (const std::string &path, const Bytes &bytes)
+{
+  std::ofstream file (path, std::ios::binary);
+  file.write (reinterpret_cast<const char *> (bytes.data ()),
+      std::streamsize (bytes.size ()));
+  file.close ();
+  if (!file)
+    throw Failure{Exit::failed,
+        Error{"cannot write " + in_quotes (path) +
+              "; check that the folder exists and the disk has space"}};
+}
+
+Exit
+render (const Arguments &arguments)
+{
+  const std::stop_token stop = stop_at_signals ();
+  const Schedule schedule = arguments.parsed ();
+  const NamedBoard board =
+      value_of (parse_board (arguments.board), Exit::usage);
+  const MaskRenderer renderer (
+      schedule, board.info.size, placement_of (arguments, board));
+  const PlanePlan plan = plan_planes (schedule);
+  const int count = arguments.planes ? plan.images : schedule.masks ();
+  Json files = Json::array ();
+  for (int picture = 0; picture < count; picture++) {
+    if (stop.stop_requested ())
+      throw Failure{Exit::interrupted, Error{"interrupted"}};
+    const std::string path =
+        arguments.prefix + std::to_string (picture) + ".bmp";
+    write_file (path, arguments.planes
+                          ? encode_plane_bitmap (renderer.render<PlanePixel> (
+                                plan.of_image (picture)))
+                          : encode_bitmap (renderer.render (picture)));
+    files.push_back (path);
+  }
+  arguments.print ({{"schedule", schedule.text ()}, {"dmd", board.info.name},
+      {"files", files}});
+  return Exit::done;
+}
+
+void
+declare (Options &options, Arguments &arguments, bool board, bool rate)
+{
+  options.word ("SCHEDULE", arguments.schedule, true);
+  if (board)
+    arguments.declare_board (options);
+  if (rate)
+    arguments.declare_rate (options);
+}
+
+void
+declare_pictures (Options &options, Arguments &arguments)
+{
+  options.value ("--layout", arguments.layout, "L",
+      "layout of the tile on a diamond array: address, lattice or cell "
+      "[address]",
+      any_text ());
+  options.value ("--region", arguments.region, "WxH[+X+Y]",
+      "mirrors that show masks [all]", any_text ());
+  options.value ("--output", arguments.prefix, "PREFIX",
+      "prefix of the file names [mask]", any_text ());
+  options.flag ("--planes", arguments.planes,
+      "24 masks per file, for the flash or the video of a LightCrafter 4500");
+}
+
+CommandGroup<Arguments>::Commands
+commands_below (Arguments &arguments)
+{
+  CommandGroup<Arguments>::Commands commands;
+  const auto add = [&] (CommandText text, Exit (*run) (const Arguments &),
+                       auto declare_options) {
+    commands.push_back (std::make_unique<SmallCommand> (
+        std::move (text),
+        [&arguments, declare_options] (Options &options) {
+          declare_options (options, arguments);
+          arguments.declare (options);
+        },
+        [&arguments, run] { return run (arguments); }));
+  };
+  add (
+      {.name = "show",
+          .summary = "show what a schedule means",
+          .usage = "[option...] [SCHEDULE]",
+          .description = "Shows what a schedule means; with --json, prints its "
+                         "JSON form, which can be\nedited.\n",
+          .examples = "  A schedule to edit:\n"
+                      "    codedexposure schedule show --json staircase:2x2\n"},
+      show, [] (Options &options, Arguments &a) {
+        declare (options, a, false, false);
+      });
+  add ({.name = "check",
+           .summary = "check whether it fits a DMD and a frame rate",
+           .usage = "[option...] [SCHEDULE]",
+           .description = "Checks whether a board can show a schedule at a "
+                          "frame rate. Exit status 4: it\ncannot.\n",
+           .examples = "  256 slots at 25 frames/s:\n"
+                       "    codedexposure schedule check sequential:16x16 "
+                       "--dmd dlp6500 --rate 25\n"},
+      check, [] (Options &options, Arguments &a) {
+        declare (options, a, true, true);
+      });
+  add ({.name = "render",
+           .summary = "write the masks as bitmap files",
+           .usage = "[option...] [SCHEDULE]",
+           .description = "Writes the masks of a schedule as files "
+                          "PREFIX0.bmp, PREFIX1.bmp ...\n",
+           .examples = "  The four masks of the default:\n"
+                       "    codedexposure schedule render sequential:2x2 "
+                       "--output mask\n"},
+      render, [] (Options &options, Arguments &a) {
+        declare (options, a, true, false);
+        declare_pictures (options, a);
+      });
+  return commands;
+}
+
+} // namespace
+
+std::unique_ptr<Command>
+schedule_command ()
+{
+  return std::make_unique<CommandGroup<Arguments>> (
+      CommandText{.name = "schedule",
+          .summary = "show and check schedules, write their masks",
+          .usage = "COMMAND [option...] [SCHEDULE]",
+          .description =
+              "SCHEDULE is CODE:TILE[,key=value...] or the path of a "
+              "JSON file\n[sequential:2x2].\n"},
+      commands_below);
+}
+
+} // namespace codedexposure::app

@@ -1,0 +1,108 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* codedexposure send: coded frames to other machines. */
+#include "command.h"
+#include "options/network.h"
+#include "pipeline/plugin.h"
+#include "pipeline/source.h"
+
+namespace codedexposure::app
+{
+
+namespace
+{
+
+class Send : public Command
+{
+public:
+  CommandText text () const override;
+  void declare (Options &options) override;
+  Exit run () override;
+
+private:
+  void add_server (Job &job, Chain &frames) const;
+
+  SourceOptions source_;
+  AddressOptions address_;
+  RunOptions run_;
+  std::optional<Text> codec_;
+  bool no_wait_ = false;
+};
+
+CommandText
+Send::text () const
+{
+  return {.name = "send",
+      .summary = "send the coded frames of a camera to other machines",
+      .usage = "[option...]",
+      .description =
+          "Sends coded frames to other machines. The stream (Matroska over "
+          "TCP) "
+          "has their\nschedule and all that is known of each frame. It goes to "
+          "any number of receivers\n(codedexposure receive) and starts with "
+          "the first.\nThe stream is neither encrypted nor authenticated: "
+          "outside this machine, use a\nprivate network or a tunnel (ssh -L "
+          "5000:localhost:5000 BENCH).\n",
+      .notes = "Exit status: 4 if nobody received the stream.\n",
+      .examples =
+          "  The simulated bench, for 2 s, to a receiver on this machine:\n"
+          "    codedexposure send --frames 50\n"
+          "  12 bits, through another port:\n"
+          "    codedexposure send --bits 12 --port 5001 --frames 50\n"
+          "  A camera, to receivers on any machine:\n"
+          "    codedexposure send --camera \"Allied Vision-0123456789\" "
+          "--device usb: \\\n      --size 768x576 --host 0.0.0.0\n"};
+}
+
+void
+Send::declare (Options &options)
+{
+  options.heading ("");
+  address_.declare (
+      options, "address to listen on; 0.0.0.0: all addresses", "TCP port");
+  options.value ("--codec", codec_, "C",
+      "raw, or ffv1: lossless, half of the data, but a good part of a core "
+      "[raw for 8 bits, else ffv1]",
+      one_of ({"raw", "ffv1"}));
+  options.flag ("--no-wait", no_wait_,
+      "start immediately; late receivers miss the beginning");
+  source_.declare (options);
+  run_.declare (options, false);
+}
+
+/* A receiver that is 10 s late is disconnected, to limit the memory. */
+void
+Send::add_server (Job &job, Chain &frames) const
+{
+  frames.to ("tcpserversink",
+      {{"host", address_.host ()}, {"port", address_.port ()},
+          {"sync-method", "burst-keyframe"}, {"burst-format", "buffers"},
+          {"burst-value", 50}, {"buffers-min", 100}, {"buffers-max", 500}});
+  job.server = frames.last ();
+  job.waits_for_receiver = !no_wait_;
+}
+
+Exit
+Send::run ()
+{
+  start_gstreamer ();
+  Job job ("send", run_);
+  job.ends_by_signal = true;
+  const SourcePlan plan = SourcePlan::make (source_);
+  const std::string codec = codec_.value_or (plan.is_deep () ? "ffv1" : "raw");
+  Chain frames = coded_source (job, source_, plan, Pace::live);
+  job.counted = frames.to ("queue").last ();
+  frames.to (
+      "codedexposure-recordmux", {{"codec", codec}, {"streamable", true}});
+  add_server (job, frames);
+  return play (job).exit;
+}
+
+} // namespace
+
+std::unique_ptr<Command>
+send_command ()
+{
+  return make_command<Send> ();
+}
+
+} // namespace codedexposure::app

@@ -1,0 +1,79 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* codedexposure simulate: a video or a test picture through the simulated
+ * bench. */
+#include "command.h"
+#include "pipeline/plugin.h"
+#include "pipeline/recording.h"
+#include "pipeline/source.h"
+
+namespace codedexposure::app
+{
+
+namespace
+{
+
+class Simulate : public Command
+{
+public:
+  CommandText text () const override
+  {
+    return {.name = "simulate",
+        .summary = "record a scene through the simulated bench",
+        .usage = "[option...] --output FILE.mkv",
+        .description =
+            "Simulates the recording of a scene by a camera with a DMD. Writes "
+            "coded frames\nas lossless FFV1 in Matroska with the schedule, and "
+            "FILE.jsonl with one line for\neach frame. Needs no hardware.\n",
+        .examples =
+            "  A moving ball, for 2 s, seen by a camera with shot noise:\n"
+            "    codedexposure simulate --frames 50 --full-well 10000 \\\n"
+            "      --output coded.mkv\n"
+            "  A candle that is blown out, with 12 bits:\n"
+            "    codedexposure simulate --scene blown-out --bits 12 \\\n"
+            "      --output candle.mkv\n"
+            "  A video of your own; 8 of its frames become one coded frame:\n"
+            "    codedexposure simulate --input video.mp4 \\\n"
+            "      --schedule sequential:4x2 --output video.mkv\n"};
+  }
+
+  void declare (Options &options) override
+  {
+    options.heading ("");
+    options.value ("--output", output_, "FILE.mkv", "the recording",
+        file_ending_in (".mkv"));
+    options.require ("--output", "FILE.mkv");
+    source_.declare (options, SourceOptions::Kind::simulated);
+    run_.declare (options);
+  }
+
+  Exit run () override
+  {
+    constexpr int kFrames = 100; // of a scene that has no end
+    start_gstreamer ();
+    if (!source_.input && !source_.frames)
+      source_.frames = kFrames;
+    Job job ("simulate", run_);
+    const SourcePlan plan = SourcePlan::make (source_);
+    Chain chain = simulation (job, source_, plan, Pace::fast);
+    limit_frames (job, source_, chain);
+    RecordingStyle style;
+    style.rate = plan.frame_rate;
+    write_recording (job, chain, *output_, style);
+    return play (job).exit;
+  }
+
+private:
+  SourceOptions source_;
+  RunOptions run_;
+  std::optional<Text> output_;
+};
+
+} // namespace
+
+std::unique_ptr<Command>
+simulate_command ()
+{
+  return make_command<Simulate> ();
+}
+
+} // namespace codedexposure::app

@@ -1,0 +1,88 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "emulation/frame_source.h"
+
+#include <algorithm>
+
+namespace codedexposure::app
+{
+
+using namespace gst;
+
+namespace
+{
+
+template <typename Pixel>
+void
+copy (ImageView<const Pixel> from, ImageView<std::uint16_t> to)
+{
+  for (int y = 0; y < to.height; y++)
+    std::copy_n (from.row (y), to.width, to.row (y));
+}
+
+} // namespace
+
+Result<std::unique_ptr<FrameSource>>
+FrameSource::open (Chain &chain, bool loop)
+{
+  chain.caps ("video/x-raw,format={GRAY8,GRAY16_LE}")
+      .to ("appsink", {{"sync", false}, {"max-buffers", 4}});
+  auto frames = std::unique_ptr<FrameSource> (new FrameSource);
+  frames->pipeline_ = chain.graph ().pipeline ();
+  frames->sink_ = GST_APP_SINK (chain.last ());
+  frames->loop_ = loop;
+  gst_element_set_state (frames->pipeline_, GST_STATE_PLAYING);
+  if (!frames->advance ())
+    return Error{frames->why_ended ()};
+  return frames;
+}
+
+FrameSource::~FrameSource ()
+{
+  gst_element_set_state (pipeline_, GST_STATE_NULL);
+}
+
+bool
+FrameSource::advance ()
+{
+  sample_.reset (gst_app_sink_pull_sample (sink_));
+  if (!sample_ && loop_ && gst_app_sink_is_eos (sink_) &&
+      gst_element_seek_simple (
+          pipeline_, GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH, 0))
+    sample_.reset (gst_app_sink_pull_sample (sink_));
+  ended_ = !sample_ || !gst_video_info_from_caps (
+                           &info_, gst_sample_get_caps (sample_.get ()));
+  return !ended_;
+}
+
+bool
+FrameSource::take (ImageView<std::uint16_t> picture)
+{
+  if (!sample_ && !advance ())
+    return false;
+  MappedFrame mapped (
+      info_, gst_sample_get_buffer (sample_.get ()), GST_MAP_READ);
+  if (mapped && is_wide ())
+    copy (view_of<const std::uint16_t> (mapped), picture);
+  else if (mapped)
+    copy (view_of<const std::uint8_t> (mapped), picture);
+  mapped.reset ();
+  sample_.reset ();
+  return true;
+}
+
+std::string
+FrameSource::why_ended () const
+{
+  const ObjectPtr<GstBus> bus (gst_element_get_bus (pipeline_));
+  const std::unique_ptr<GstMessage, MiniObjectUnref> message (
+      gst_bus_pop_filtered (bus.get (), GST_MESSAGE_ERROR));
+  if (!message)
+    return "the scene has ended";
+  GError *error = nullptr;
+  gst_message_parse_error (message.get (), &error, nullptr);
+  std::string text = error->message;
+  g_error_free (error);
+  return text;
+}
+
+} // namespace codedexposure::app

@@ -1,0 +1,53 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The GenICam description of the simulated camera, and its registers that
+ * Aravis' fake camera does not have. */
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <arv.h>
+
+#include "emulation/gige_camera.h"
+
+namespace codedexposure::genicam
+{
+
+/** Register in which a client enables the trigger. */
+constexpr guint32 kTriggerMode = 0x400;
+/** Registers of the lines, one after the other. */
+constexpr guint32 kLineMode = 0x440, kLineSource = 0x444, kLineInverter = 0x448;
+constexpr guint32 kNextLine = 0x20;
+/** GigE Vision's own register of the packet size. */
+constexpr guint32 kPacketSize = 0x0d04;
+constexpr guint32 kGammaEnable = 0x50c, kGamma = 0x51c, kTriggerDelay = 0x520;
+
+/** The format with that code on the wire. */
+MonoFormat format_of (guint32 code);
+
+/** The register of a feature that Aravis' camera does not have. */
+struct ExtraFeature {
+  const char *name;
+  guint32 address;
+  std::vector<std::string> values; ///< of an enumeration; none: a number
+};
+const std::vector<ExtraFeature> &extra_features ();
+
+/** A temporary file with the description: that of Aravis, with formats, lines
+ * and features of this camera. */
+class GenicamFile
+{
+public:
+  static Result<std::unique_ptr<GenicamFile>> write (
+      const GigeCameraOptions &options);
+  ~GenicamFile ();
+  const std::string &path () const { return path_; }
+
+private:
+  explicit GenicamFile (std::string path) : path_ (std::move (path)) {}
+
+  const std::string path_;
+};
+
+} // namespace codedexposure::genicam

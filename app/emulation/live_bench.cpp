@@ -1,0 +1,117 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "emulation/live_bench.h"
+
+#include <algorithm>
+#include <chrono>
+
+#include "base/try.h"
+
+namespace codedexposure
+{
+
+namespace
+{
+
+using std::chrono::nanoseconds;
+using std::chrono::steady_clock;
+constexpr Nanoseconds kMicrosecond = 1000;
+
+} // namespace
+
+MirrorProgram
+program_of (const emulated::EmulatedDlpc900 &board)
+{
+  MirrorProgram program;
+  Nanoseconds time = 0;
+  int pulses = 0;
+  const auto lines = board.shown ();
+  for (std::size_t line = 0; line < lines.size (); line++) {
+    pulses += lines[line].pulses;
+    const Nanoseconds end = time + lines[line].exposure * kMicrosecond;
+    program.masks.push_back (
+        std::make_shared<Image<std::uint8_t>> (board.mirrors (int (line))));
+    program.stretches.push_back ({time, end, line});
+    time = end + lines[line].dark * kMicrosecond;
+  }
+  program.periods = std::max (1, pulses);
+  program.period = time / program.periods;
+  program.slot = lines.empty () ? 0 : time / Nanoseconds (lines.size ());
+  return program;
+}
+
+Result<std::unique_ptr<LiveBench>>
+LiveBench::make (SickBenchOptions options, int kind)
+{
+  const emulated::EmulatedDlpc900 like (kind);
+  options.mirrors = like.size ();
+  options.gamma = 1.0; // a camera's own feature
+  ASSIGN_OR_RETURN (SickBench bench, SickBench::make (options));
+  return std::unique_ptr<LiveBench> (new LiveBench (std::move (bench), kind));
+}
+
+LiveBench::LiveBench (SickBench bench, int kind)
+    : board_ (std::make_shared<emulated::EmulatedDlpc900> (kind)),
+      began_ (steady_clock::now ()), bench_ (std::move (bench))
+{
+  board_->on_run = [this] (bool running) { follow (running); };
+}
+
+Nanoseconds
+LiveBench::now () const
+{
+  return nanoseconds (steady_clock::now () - began_).count ();
+}
+
+void
+LiveBench::follow (bool running)
+{
+  const std::lock_guard guard (lock_);
+  if (running)
+    bench_.show (now (), program_of (*board_));
+  else
+    bench_.park (now ());
+  changed_.notify_all ();
+}
+
+void
+LiveBench::expose (std::optional<Nanoseconds> time)
+{
+  const std::lock_guard guard (lock_);
+  bench_.expose (time);
+}
+
+void
+LiveBench::skip ()
+{
+  const std::lock_guard guard (lock_);
+  pending_.reset ();
+  while (bench_.next (now ()))
+    ;
+}
+
+std::optional<Shot>
+LiveBench::take (ImageView<std::uint16_t> picture)
+{
+  std::unique_lock guard (lock_);
+  const Nanoseconds limit = now () + 2 * bench_.truth ().options.rate.period ();
+  for (;;) {
+    const Nanoseconds time = now ();
+    if (!pending_)
+      pending_ = bench_.next (time + 1);
+    if (pending_ && pending_->end <= time) {
+      const Shot shot = *pending_;
+      pending_.reset ();
+      bench_.take (shot, picture);
+      return shot;
+    }
+    if (time >= limit)
+      return std::nullopt;
+    /* A trigger may come at any time. */
+    constexpr Nanoseconds kLook = 1'000'000;
+    const Nanoseconds until =
+        std::min (limit, pending_ ? pending_->end : time + kLook);
+    changed_.wait_until (guard, began_ + nanoseconds (until));
+  }
+}
+
+} // namespace codedexposure

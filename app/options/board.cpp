@@ -1,0 +1,135 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "board.h"
+
+#include <signal.h>
+
+#include <cmath>
+#include <cstdio>
+#include <numeric>
+#include <thread>
+
+#include "base/text.h"
+#include "dmd/boards.h"
+#include "failure.h"
+
+namespace codedexposure::app
+{
+
+void
+Printing::declare (Options &options)
+{
+  options.heading ("");
+  options.flag ("--json", json, "print results as JSON");
+  options.flag ("--quiet", quiet, "do not print progress");
+}
+
+void
+Printing::print (const Json &object) const
+{
+  if (json) {
+    std::printf ("%s\n", object.dump (2).c_str ());
+    return;
+  }
+  for (const Json &entry : object.is_array () ? object : Json{object})
+    for (const auto &[name, value] : entry.items ())
+      std::printf ("%-18s %s\n", name.c_str (),
+          (value.is_string () ? value.get<std::string> () : value.dump ())
+              .c_str ());
+}
+
+void
+Printing::say (const std::string &line) const
+{
+  if (!quiet)
+    std::fprintf (stderr, "%s\n", line.c_str ());
+}
+
+Rule<FrameRate>
+any_rate ()
+{
+  const auto read = [] (const std::string &text) -> std::optional<FrameRate> {
+    constexpr int kPerSecond = 1000;
+    const auto parts = split (text, '/');
+    FrameRate rate{0, 0};
+    if (parts.size () == 2) {
+      const auto num = parse_int (parts[0]), den = parse_int (parts[1]);
+      rate = {num.value_or (0), den.value_or (0)};
+    } else if (const auto real = parse_real (text);
+               real && *real > 0 && *real < 1e6) {
+      const int num = int (std::lround (*real * kPerSecond));
+      const int common = std::gcd (num, kPerSecond);
+      rate = {num / common, kPerSecond / common};
+    }
+    return rate.num > 0 && rate.den > 0 ? std::optional (rate) : std::nullopt;
+  };
+  return {read, "a number or a fraction, such as 25 or 30000/1001"};
+}
+
+Rule<Text>
+time_rule ()
+{
+  return {[] (const std::string &text) -> std::optional<Text> {
+            return parse_time (text) ? std::optional (text) : std::nullopt;
+          },
+      "a time such as 500us or 10s"};
+}
+
+void
+BoardOptions::declare_rate (Options &options)
+{
+  options.value ("--rate", rate, "R", "frame rate of the camera, frames/s [25]",
+      any_rate ());
+}
+
+void
+BoardOptions::declare_board (Options &options)
+{
+  options.value ("--dmd", board, "NAME",
+      "board: " + board_names () + ", with the options of its driver [dlp6500]",
+      any_text ());
+}
+
+Schedule
+BoardOptions::parsed () const
+{
+  return value_of (Schedule::parse (schedule), Exit::usage);
+}
+
+DmdInfo
+BoardOptions::info () const
+{
+  return value_of (parse_board (board), Exit::usage).info;
+}
+
+Show
+fit (const BoardOptions &options, const DmdInfo &info)
+{
+  Schedule schedule = options.parsed ();
+  const SlotPlan plan = value_of (
+      SlotPlan::fit (schedule.timing (), schedule.slots (), options.rate),
+      Exit::does_not_fit);
+  value_of (check_limits (info, schedule, plan), Exit::does_not_fit);
+  return {std::move (schedule), plan};
+}
+
+/* A thread waits for the signals, because a signal handler could do almost
+ * nothing. */
+std::stop_token
+stop_at_signals ()
+{
+  static sigset_t signals;
+  sigemptyset (&signals);
+  sigaddset (&signals, SIGINT);
+  sigaddset (&signals, SIGTERM);
+  pthread_sigmask (SIG_BLOCK, &signals, nullptr);
+  static std::stop_source source;
+  static const std::jthread thread ([] (const std::stop_token &quit) {
+    constexpr timespec kPatience{0, 50'000'000};
+    while (!quit.stop_requested ())
+      if (sigtimedwait (&signals, nullptr, &kPatience) > 0)
+        source.request_stop ();
+  });
+  return source.get_token ();
+}
+
+} // namespace codedexposure::app

@@ -1,0 +1,89 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "picture.h"
+
+#include "base/text.h"
+
+namespace codedexposure::app
+{
+
+void
+DecodeOptions::declare_method (Options &options, const std::string &origin)
+{
+  options.value ("--method", method, "M", "auto, rank, select or decode [auto]",
+      one_of ({"auto", "rank", "select", "decode"}));
+  options.value ("--mapping", mapping, "FILE",
+      "mapping from calibrate [that of " + origin + "]");
+}
+
+void
+DecodeOptions::declare_frames (Options &options, const std::string &origin)
+{
+  options.value ("--schedule", schedule, "S", "instead of that of " + origin);
+  options.value ("--bits", bits, "N",
+      "significant bits of the pixels [those of " + origin + "]",
+      whole (1, 16));
+}
+
+void
+DecodeOptions::declare (Options &options)
+{
+  const Rule<double> at_least_0 = real (0, 1e9, "a number of at least 0");
+  declare_method (options, "the recording");
+  options.value ("--fuse", fuse, "QUALITY",
+      "full-size frames instead of subframes: fast, balanced, best, or learned "
+      "(best --refine)",
+      one_of ({"fast", "balanced", "best", "learned"}));
+  options.flag ("--refine", refine,
+      "after --fuse: corrects its frames by a network that learned from "
+      "pictures");
+  options.value ("--bench", bench, "FILE",
+      "bench profile (JSON) with noise, black level, leakage and mapping; "
+      "other options win [that of the recording]");
+  options.value ("--full-well", full_well, "E",
+      "noise of the camera, for --fuse: electrons at white, e-; 0: no noise "
+      "[by the bench profile; 0]",
+      at_least_0);
+  options.value ("--read-noise", read_noise, "E",
+      "noise of the camera, for --fuse: e- rms [by the bench profile; 0]",
+      at_least_0);
+  declare_frames (options, "the recording");
+  options.need ({"--refine", "--full-well", "--read-noise"}, "--fuse");
+}
+
+namespace
+{
+
+std::optional<double>
+time_of (std::string_view text)
+{
+  const auto value = parse_real (text);
+  return value && *value >= 0 && text.find ('-') == text.npos ? value
+                                                              : std::nullopt;
+}
+
+} // namespace
+
+Rule<Text>
+excerpt_rule ()
+{
+  return {[] (const std::string &text) -> std::optional<Text> {
+            const auto parts = split (text, '-');
+            if (parts.size () != 2 || !time_of (parts[0]) ||
+                (!parts[1].empty () &&
+                    (!time_of (parts[1]) ||
+                        *time_of (parts[1]) <= *time_of (parts[0]))))
+              return std::nullopt;
+            return text;
+          },
+      "FROM-UNTIL in seconds, UNTIL after FROM, such as 10-20 or 10-"};
+}
+
+std::pair<double, std::optional<double>>
+excerpt_times (const std::string &excerpt)
+{
+  const auto parts = split (excerpt, '-');
+  return {*time_of (parts[0]),
+      parts[1].empty () ? std::nullopt : time_of (parts[1])};
+}
+
+} // namespace codedexposure::app

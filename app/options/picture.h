@@ -1,0 +1,29 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* How coded frames become pictures. */
+#pragma once
+
+#include <utility>
+
+#include "options.h"
+
+namespace codedexposure::app
+{
+
+struct DecodeOptions {
+  std::optional<Text> method, mapping, fuse, bench, schedule;
+  std::optional<double> full_well, read_noise;
+  std::optional<int> bits;
+  bool refine = false;
+
+  void declare (Options &options);
+  /** Some of them. @p origin  of the frames: "the recording". */
+  void declare_method (Options &options, const std::string &origin);
+  void declare_frames (Options &options, const std::string &origin);
+};
+
+/** "A-B" in seconds; no B: to the end. */
+Rule<Text> excerpt_rule ();
+std::pair<double, std::optional<double>> excerpt_times (
+    const std::string &excerpt);
+
+} // namespace codedexposure::app

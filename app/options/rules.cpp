@@ -1,0 +1,148 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "rules.h"
+
+#include <algorithm>
+#include <string_view>
+#include <vector>
+
+#include "base/text.h"
+
+namespace codedexposure::app
+{
+
+namespace
+{
+
+/* Without signs, spaces and leading zeros, which other readers take in
+ * different ways. */
+std::optional<int>
+digits (std::string_view text, int low, int high)
+{
+  if (text.empty () || text.size () > 9 || (text.size () > 1 && text[0] == '0'))
+    return std::nullopt;
+  for (const char c : text)
+    if (c < '0' || c > '9')
+      return std::nullopt;
+  const auto value = parse_int (text);
+  if (!value || *value < low || *value > high)
+    return std::nullopt;
+  return value;
+}
+
+std::string
+list_of (const std::vector<std::string> &words)
+{
+  std::string text;
+  for (std::size_t i = 0; i < words.size (); i++) {
+    if (i > 0)
+      text += i + 1 == words.size () ? " or " : ", ";
+    text += words[i];
+  }
+  return text;
+}
+
+} // namespace
+
+Rule<Text>
+any_text ()
+{
+  return {[] (const std::string &text) -> std::optional<Text> {
+            return text.empty () ? std::nullopt : std::optional (text);
+          },
+      "a text that is not empty"};
+}
+
+Rule<Text>
+one_of (std::initializer_list<const char *> words)
+{
+  std::vector<std::string> known (words.begin (), words.end ());
+  const std::string list = list_of (known);
+  return {[known = std::move (known)] (
+              const std::string &text) -> std::optional<Text> {
+            return std::ranges::find (known, text) == known.end ()
+                       ? std::nullopt
+                       : std::optional (text);
+          },
+      list};
+}
+
+Rule<Text>
+file_ending_in (const char *ending)
+{
+  const std::string end = ending;
+  return {[end] (const std::string &text) -> std::optional<Text> {
+            return text.size () > end.size () && text.ends_with (end)
+                       ? std::optional (text)
+                       : std::nullopt;
+          },
+      "a file name that ends in " + end};
+}
+
+Rule<int>
+whole (int low, int high, const char *what)
+{
+  return {[low, high] (
+              const std::string &text) { return digits (text, low, high); },
+      std::string (what) + " from " + std::to_string (low) + " to " +
+          std::to_string (high)};
+}
+
+Rule<double>
+real (double low, double high, const char *what)
+{
+  return {[low, high] (const std::string &text) -> std::optional<double> {
+            const auto value = parse_real (text);
+            return value && *value >= low && *value <= high ? value
+                                                            : std::nullopt;
+          },
+      what};
+}
+
+Rule<double>
+any_real ()
+{
+  return real (-1e9, 1e9, "a number");
+}
+
+Rule<double>
+seconds (bool positive)
+{
+  constexpr double kShortest = 1e-9, kLongest = 1e9;
+  return real (positive ? kShortest : 0, kLongest,
+      positive ? "a number of seconds above 0" : "a number of seconds");
+}
+
+Rule<Extent>
+picture_size ()
+{
+  constexpr int kLargest = 99999;
+  return {[] (const std::string &text) -> std::optional<Extent> {
+            const auto parts = split (text, 'x');
+            if (parts.size () != 2)
+              return std::nullopt;
+            const auto width = digits (parts[0], 1, kLargest);
+            const auto height = digits (parts[1], 1, kLargest);
+            if (!width || !height)
+              return std::nullopt;
+            return Extent{*width, *height};
+          },
+      "WIDTHxHEIGHT, such as 768x576"};
+}
+
+Rule<FrameRate>
+frame_rate_rule ()
+{
+  constexpr int kMost = 9'999'999;
+  return {[] (const std::string &text) -> std::optional<FrameRate> {
+            const auto parts = split (text, '/');
+            const auto num = digits (parts[0], 1, kMost);
+            const auto den =
+                parts.size () == 2 ? digits (parts[1], 1, kMost) : 1;
+            if (parts.size () > 2 || !num || !den)
+              return std::nullopt;
+            return FrameRate{*num, *den};
+          },
+      "a rate such as 25 or 30000/1001"};
+}
+
+} // namespace codedexposure::app

@@ -1,0 +1,216 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "source.h"
+
+#include "base/text.h"
+#include "failure.h"
+#include "pipeline/probe.h"
+
+namespace codedexposure::app
+{
+
+namespace
+{
+
+/* Of videotestsrc. */
+Rule<Text>
+patterns ()
+{
+  return one_of ({"ball", "bar", "black", "blink", "blue", "checkers-1",
+      "checkers-2", "checkers-4", "checkers-8", "chroma-zone-plate", "circular",
+      "colors", "gamut", "gradient", "green", "pinwheel", "red", "smpte",
+      "smpte-rp-219", "smpte100", "smpte75", "snow", "solid-color", "spokes",
+      "white", "zone-plate"});
+}
+
+Rule<Text>
+pixel_formats ()
+{
+  return one_of ({"Mono8", "Mono10", "Mono10Packed", "Mono10p", "Mono12",
+      "Mono12Packed", "Mono12p", "Mono16"});
+}
+
+} // namespace
+
+void
+SourceOptions::declare_scene (Options &options, Kind kind)
+{
+  options.heading ("Scene (each frame is one slot of the exposure)");
+  options.value (
+      "--input", input, "FILE", "video file; each frame becomes one slot");
+  options.value ("--input-rate", input_rate, "R",
+      "frame rate of the input, if the file does not have one",
+      frame_rate_rule ());
+  options.value ("--scene", scene, "NAME",
+      std::string ("a drawn scene: candle, blown-out or pour") +
+          (kind == Kind::watched ? " [pour]" : ""),
+      one_of ({"candle", "blown-out", "pour"}));
+  options.value ("--pattern", pattern, "NAME",
+      std::string ("a moving test picture, as of videotestsrc") +
+          (kind == Kind::watched ? "" : " [ball]"),
+      patterns ());
+  options.value ("--size", size, "WxH",
+      "size of scene and camera [that of the input; 768x576]", picture_size ());
+  options.value ("--bits", bits, "N",
+      "significant bits of the camera, 8 to 16 [8]", whole (8, 16));
+  options.need ({"--input-rate"}, "--input");
+  options.exclude ({"--scene", "--pattern"}, "--input");
+  options.exclude ({"--pattern"}, "--scene");
+}
+
+void
+SourceOptions::declare_bench (Options &options, Kind kind)
+{
+  constexpr double kMost = 1e9;
+  const Rule<double> at_least_0 = real (0, kMost, "a number of at least 0");
+  options.heading ("Bench");
+  options.value ("--schedule", schedule, "S",
+      "CODE:TILE[,key=value...] or a JSON file [sequential:2x2]");
+  options.value ("--frame-rate", frame_rate, "R",
+      "coded frames/s, such as 25 or 30000/1001 [25]", frame_rate_rule ());
+  options.value ("--frames", frames, "N", "stop after N coded frames",
+      whole (1, 999'999'999, "a number of coded frames"));
+  options.value ("--bench", bench, "FILE",
+      "bench profile (JSON) of camera and DMD; the simulated bench has its "
+      "noise, black level, leakage, blur and mapping, recordings carry it, and "
+      "other options win");
+  options.value ("--full-well", full_well, "E",
+      "electrons at white, e-; 0: no noise [0]", at_least_0);
+  options.value (
+      "--read-noise", read_noise, "E", "read noise, e- rms [0]", at_least_0);
+  options.value ("--psf-sigma", psf_sigma, "P", "blur of the lens, pixels [0]",
+      at_least_0);
+  options.value ("--gain", gain, "G",
+      "gain; 0: automatic, white maps to the largest value [0]", at_least_0);
+  options.value ("--seed", seed, "N", "seed of the noise [0]",
+      Rule<Text>{[] (const std::string &text) -> std::optional<Text> {
+                   const bool digits =
+                       !text.empty () && text.size () < 20 &&
+                       text.find_first_not_of ("0123456789") == text.npos;
+                   return digits ? std::optional (text) : std::nullopt;
+                 },
+          "a whole number"});
+  options.value (
+      "--shift-x", shift_x, "P", "misalignment, pixels", any_real ());
+  options.value (
+      "--shift-y", shift_y, "P", "misalignment, pixels", any_real ());
+  options.value (
+      "--rotation", rotation, "DEG", "misalignment, degrees", any_real ());
+  options.value ("--scale", scale, "F", "magnification [1]", at_least_0);
+  if (kind == Kind::simulated)
+    return;
+  for (const char *other : {"--camera", "--source"}) {
+    options.exclude (
+        {"--input", "--scene", "--pattern", "--psf-sigma", "--gain", "--seed",
+            "--shift-x", "--shift-y", "--rotation", "--scale"},
+        other);
+    if (kind != Kind::watched)
+      options.exclude ({"--full-well", "--read-noise"}, other);
+  }
+}
+
+void
+SourceOptions::declare_camera (Options &options)
+{
+  options.heading ("Instead of the bench");
+  options.value ("--camera", camera, "NAME",
+      "a GenICam camera, as \"gst-device-monitor-1.0 Source/Video\" lists it");
+  options.value ("--trigger", trigger, "M",
+      "which device triggers: dmd, camera, or none [dmd]",
+      one_of ({"dmd", "camera", "none"}));
+  options.value ("--trigger-line", trigger_line, "L",
+      "line of the camera to or from the DMD [Line0; Line1]");
+  options.value ("--trigger-edge", trigger_edge, "E",
+      "rising or falling [rising]", one_of ({"rising", "falling"}));
+  options.value ("--exposure", exposure, "US",
+      "exposure time, microseconds [as the camera has it]",
+      real (1e-3, 1e9, "a time in microseconds"));
+  options.value ("--pixel-format", pixel_format, "F",
+      "Mono8, Mono12, Mono12Packed ... [Mono8; Mono16]", pixel_formats ());
+  options.value (
+      "--features", features, "\"A=1 ...\"", "camera features beyond these");
+  options.value ("--reconnect", reconnect, "N",
+      "tries to restart a camera that went away [0]",
+      whole (0, 999'999'999, "a number of tries"));
+  options.value ("--device", device, "DEV", "the DMD [sim:bench on the bench]");
+  options.value (
+      "--source", source, "\"GST\"", "any GStreamer source of coded frames");
+  options.need ({"--trigger", "--trigger-line", "--trigger-edge", "--exposure",
+                    "--pixel-format", "--features", "--reconnect"},
+      "--camera");
+  options.exclude ({"--source"}, "--camera");
+}
+
+void
+SourceOptions::declare (Options &options, Kind kind)
+{
+  if (kind != Kind::simulated)
+    declare_camera (options);
+  declare_scene (options, kind);
+  declare_bench (options, kind);
+}
+
+namespace
+{
+
+BenchProfile
+bench_of (const std::string &path)
+{
+  auto profile = BenchProfile::parse (path);
+  if (!profile)
+    usage_error (
+        "--bench " + path + " is not valid: " + profile.error ().message);
+  return *profile;
+}
+
+void
+use_bench (SourcePlan &plan, const SourceOptions &options)
+{
+  plan.bench = bench_of (*options.bench);
+  plan.size = plan.bench->camera.size;
+  plan.bits = plan.bench->bits;
+  if (options.camera && !plan.bench->pixel_format.empty ())
+    plan.pixel_format = plan.bench->pixel_format;
+  if (options.source && !options.device && !options.schedule)
+    usage_error ("--bench with --source needs --schedule, or --device for the "
+                 "DMD");
+}
+
+void
+use_input (SourcePlan &plan, const SourceOptions &options)
+{
+  const VideoFacts facts = probe_video (*options.input);
+  plan.size = facts.size;
+  plan.input_rate = options.input_rate.value_or (facts.rate);
+  if (plan.input_rate.num == 0)
+    usage_error (*options.input + " has no fixed frame rate; set --input-rate");
+}
+
+} // namespace
+
+SourcePlan
+SourcePlan::make (const SourceOptions &options)
+{
+  SourcePlan plan;
+  const std::string text = options.schedule.value_or ("sequential:2x2");
+  auto schedule = Schedule::parse (text);
+  if (!schedule)
+    usage_error (
+        "--schedule " + text + " is not valid: " + schedule.error ().message);
+  plan.schedule = std::move (*schedule);
+  if (options.bench)
+    use_bench (plan, options);
+  if (options.input)
+    use_input (plan, options);
+  plan.frame_rate = options.frame_rate.value_or (plan.frame_rate);
+  plan.size = options.size.value_or (plan.size);
+  plan.bits = options.bits.value_or (plan.bits);
+  plan.pixel_format = options.pixel_format.value_or (plan.pixel_format);
+  const Extent cell = plan.schedule.cell ();
+  if (plan.size.width < cell.width || plan.size.height < cell.height)
+    usage_error (size_text (plan.size) +
+                 " pixels are less than one exposure group of " + text + ", " +
+                 size_text (cell) + "; set a larger --size");
+  return plan;
+}
+
+} // namespace codedexposure::app

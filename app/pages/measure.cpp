@@ -1,0 +1,131 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "measure.h"
+
+#include "common/meta.h"
+#include "common/tag.h"
+#include "pipeline/decoder.h"
+#include "pipeline/recording.h"
+#include "stats/report.h"
+
+namespace codedexposure::app
+{
+
+using namespace gst;
+
+namespace
+{
+
+/* The numbers of the field @name. */
+template <typename T>
+std::vector<T>
+numbers_in (const GstStructure *structure, const char *name)
+{
+  std::vector<T> numbers;
+  const GValue *array = gst_structure_get_value (structure, name);
+  if (!array || !GST_VALUE_HOLDS_ARRAY (array))
+    return numbers;
+  for (guint i = 0; i < gst_value_array_get_size (array); i++)
+    if (const GValue *value = gst_value_array_get_value (array, i);
+        G_VALUE_HOLDS (value, Wire<T>::type ()))
+      numbers.push_back (Wire<T>::get (value));
+  return numbers;
+}
+
+std::optional<Provenance>
+provenance_at (GstPad *pad)
+{
+  std::optional<Provenance> found;
+  for (guint i = 0;; i++) {
+    const EventPtr event (gst_pad_get_sticky_event (pad, GST_EVENT_TAG, i));
+    if (!event)
+      return found;
+    GstTagList *tags = nullptr;
+    gst_event_parse_tag (event.get (), &tags);
+    if (const auto here = provenance_from_tags (tags); here && *here)
+      found = **here;
+  }
+}
+
+/* A chain's end that measures into @stream. */
+void
+add_meter (Chain chain, const MeasureOptions &options, MeasuredStream &stream,
+    const std::string &csv)
+{
+  Settings settings{
+      {"format", "csv"}, {"post-messages", false}, {"line", options.line}};
+  set_if (settings, "bits", options.decode.bits);
+  if (!csv.empty ())
+    settings.emplace_back ("location", csv);
+  chain.to ("queue").to ("subframestats", settings);
+  gst_pad_add_probe (
+      pad_of (chain.last (), "src").get (), GST_PAD_PROBE_TYPE_BUFFER,
+      [] (GstPad *pad, GstPadProbeInfo *info, gpointer of) {
+        static_cast<MeasuredStream *> (of)->add (
+            pad, GST_PAD_PROBE_INFO_BUFFER (info));
+        return GST_PAD_PROBE_OK;
+      },
+      &stream, nullptr);
+  chain.to ("fakesink");
+}
+
+Measurement
+measure_once (const MeasureOptions &options, bool salvage)
+{
+  Measurement all;
+  Job job ("report", options.run);
+  job.options.json = job.has_result = false;
+  job.salvage = all.salvaged = salvage;
+  job.times = options.times;
+  all.coded.details = all.subframes.details = options.details;
+  if (options.decode.bits)
+    all.coded.bits = all.subframes.bits = *options.decode.bits;
+  Chain frames = read_recording (job, options.recording);
+  const DecoderPads pads = add_demux (job, frames, options.decode, {});
+  add_meter (pads.pictures, options, all.subframes, options.subframes_csv);
+  add_meter (pads.coded (), options, all.coded, options.coded_csv);
+  all.result = play (job);
+  return all;
+}
+
+} // namespace
+
+void
+MeasuredStream::add (GstPad *pad, GstBuffer *picture)
+{
+  const CapsPtr caps (gst_pad_get_current_caps (pad));
+  GstVideoInfo info;
+  if (pictures.empty () && caps &&
+      gst_video_info_from_caps (&info, caps.get ())) {
+    const auto meta = get_frame_meta (picture);
+    const int depth = int (GST_VIDEO_INFO_COMP_DEPTH (&info, 0));
+    const int known = meta ? significant_bits_of (meta->bits, info) : 0;
+    if (bits == 0)
+      bits = known > 0 ? known : depth;
+    size = {info.width, info.height};
+    rate = {info.fps_n, info.fps_d};
+    provenance = provenance_at (pad);
+  }
+  MeasuredPicture measured;
+  auto *meta = gst_buffer_get_custom_meta (picture, kStatsMetaName);
+  if (!meta)
+    return;
+  const GstStructure *fields = gst_custom_meta_get_structure (meta);
+  if (!read_fields (fields, measured))
+    return;
+  measured.damaged =
+      GST_BUFFER_FLAG_IS_SET (picture, GST_BUFFER_FLAG_CORRUPTED);
+  if (details) {
+    measured.stats.histogram = numbers_in<guint64> (fields, "histogram");
+    measured.stats.profile = numbers_in<gdouble> (fields, "profile");
+  }
+  pictures.push_back (std::move (measured));
+}
+
+Measurement
+measure (const MeasureOptions &options)
+{
+  Measurement all = measure_once (options, false);
+  return all.result.container_damaged ? measure_once (options, true) : all;
+}
+
+} // namespace codedexposure::app

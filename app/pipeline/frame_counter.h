@@ -1,0 +1,80 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <optional>
+
+#include <gst/gst.h>
+
+#include "common/excerpt.h"
+#include "common/raii.h"
+
+namespace codedexposure::app
+{
+
+/** Lets the running time behind @p element begin at 0 with its first frame. */
+void begin_at_zero (GstElement *element);
+/** Lets it be the time of the frames. */
+void keep_times (GstElement *element);
+
+/** Which part of a recording is played, and at which running times. */
+struct PlayTimes {
+  /** The coded frames whose times lie in [start, stop), ns; the elements read
+   * what they need around them. None: the whole. */
+  std::optional<GstClockTime> start, stop;
+  /** `stop` counts from the first frame. */
+  bool from_first = false;
+  /** Running time of the first frame, ns. */
+  std::optional<GstClockTime> shift_to;
+
+  bool is_part () const { return start || stop; }
+  bool holds (GstClockTime pts) const
+  {
+    return !is_part () || (GST_CLOCK_TIME_IS_VALID (pts) &&
+                              pts + gst::kRounding >= start.value_or (0) &&
+                              (!stop || pts + gst::kRounding < *stop));
+  }
+};
+
+/** Counts the coded frames at a pad, and fits their times to what is wanted. */
+class FrameCounter
+{
+public:
+  /** @p sink         the pad, before the pipeline plays.
+   * @p cannot_seek  the part is not in the stream; called on the thread of the
+   * main loop. */
+  FrameCounter (gst::ObjectPtr<GstPad> sink, const PlayTimes &times,
+      std::function<void ()> cannot_seek);
+  ~FrameCounter ();
+  FrameCounter (const FrameCounter &) = delete;
+  FrameCounter &operator= (const FrameCounter &) = delete;
+
+  GstPad *pad () const { return pad_.get (); }
+  const std::atomic<gint64> &frames () const { return frames_; }
+  /** The share of the stream that was played, of @p total frames if above 0;
+   * 0: unknown. */
+  double done (gint64 total) const;
+  /** Ends the stream after the frames that were counted. */
+  void end ();
+
+private:
+  void seek ();
+  static gboolean on_held (gpointer self);
+  static GstPadProbeReturn hold_first_frame (
+      GstPad *, GstPadProbeInfo *, gpointer self);
+  static GstPadProbeReturn shift_first_frame (
+      GstPad *pad, GstPadProbeInfo *info, gpointer self);
+  static GstPadProbeReturn on_frame (
+      GstPad *, GstPadProbeInfo *info, gpointer self);
+
+  const gst::ObjectPtr<GstPad> pad_;
+  PlayTimes times_; // changed before the first frame passes
+  const std::function<void ()> cannot_seek_;
+  std::atomic<gint64> frames_ = 0;
+  std::atomic<gint64> last_pts_ = -1; // ns
+  gulong hold_ = 0;   // probe that holds the first frame until the seek
+  bool held_ = false; // streaming thread
+};
+
+} // namespace codedexposure::app

@@ -1,0 +1,238 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "graph.h"
+
+#include "base/text.h"
+#include "failure.h"
+#include "pipeline/messages.h"
+
+namespace codedexposure::app
+{
+
+using namespace gst;
+
+std::string
+property_text (double value)
+{
+  return real_text (value);
+}
+
+Graph::Graph ()
+    : pipeline_ (GST_ELEMENT (gst_object_ref_sink (gst_pipeline_new (nullptr))))
+{
+}
+
+Graph::~Graph ()
+{
+  gst_element_set_state (pipeline (), GST_STATE_NULL);
+}
+
+namespace
+{
+
+/* "demux", or "demux2" for the second one: only for messages, as elements are
+ * not found by their names. */
+std::string
+name_for (GstElement *pipeline, std::string_view factory)
+{
+  constexpr std::string_view kOwn = "codedexposure-";
+  if (factory.starts_with (kOwn))
+    factory.remove_prefix (kOwn.size ());
+  std::string name (factory);
+  for (int k = 2;; k++) {
+    const ObjectPtr<GstElement> taken (
+        gst_bin_get_by_name (GST_BIN (pipeline), name.c_str ()));
+    if (!taken)
+      return name;
+    name = std::string (factory) + std::to_string (k);
+  }
+}
+
+} // namespace
+
+GstElement *
+Graph::add (const char *factory, const Settings &settings)
+{
+  GstElement *element = gst_element_factory_make (
+      factory, name_for (pipeline (), factory).c_str ());
+  if (!element) {
+    const std::string package = package_of (factory);
+    fail ("the element \"" + std::string (factory) + "\" is missing" +
+          (package.empty () ? "" : "; run apt-get install " + package));
+  }
+  for (const Setting &setting : settings)
+    set (element, setting);
+  gst_bin_add (GST_BIN (pipeline ()), element);
+  return element;
+}
+
+GstElement *
+Graph::add_text (const std::string &description)
+{
+  GError *error = nullptr;
+  GstElement *bin = gst_parse_bin_from_description_full (description.c_str (),
+      TRUE, nullptr,
+      GstParseFlags (
+          GST_PARSE_FLAG_FATAL_ERRORS | GST_PARSE_FLAG_NO_SINGLE_ELEMENT_BINS),
+      &error);
+  if (!bin) {
+    const std::string why = error ? error->message : "it is empty";
+    g_clear_error (&error);
+    fail ("\"" + description + "\" is no part of a pipeline: " + why,
+        Exit::usage);
+  }
+  g_clear_error (&error);
+  gst_bin_add (GST_BIN (pipeline ()), bin);
+  g_object_set_data_full (
+      G_OBJECT (bin), "description", g_strdup (description.c_str ()), g_free);
+  return bin;
+}
+
+/* A text is set as it is: only the parser of gst-launch-1.0 unescapes it. */
+void
+Graph::set (GstElement *element, const Setting &setting) const
+{
+  GObject *object = G_OBJECT (element);
+  GParamSpec *spec =
+      g_object_class_find_property (G_OBJECT_GET_CLASS (object), setting.name);
+  if (!spec)
+    fail ("the element \"" + factory_of (element) + "\" has no property \"" +
+          setting.name + "\"; install the version that this program needs");
+  if (spec->value_type == G_TYPE_STRING)
+    g_object_set (object, setting.name, setting.value.c_str (), nullptr);
+  else
+    gst_util_set_object_arg (object, setting.name, setting.value.c_str ());
+}
+
+namespace
+{
+
+constexpr const char *kLateLink = "late-link";
+
+struct LateLink {
+  std::string from_pad, to_pad;
+  GstElement *to; // of the same pipeline
+};
+
+const char *
+name_or_null (const std::string &name)
+{
+  return name.empty () ? nullptr : name.c_str ();
+}
+
+/* Pads that do not fit, such as those of another medium, stay free. */
+void
+on_pad_added (GstElement *element, GstPad *pad, gpointer data)
+{
+  const auto *link = static_cast<const LateLink *> (data);
+  if (!link->from_pad.empty () && link->from_pad != GST_PAD_NAME (pad))
+    return;
+  gst_element_link_pads (
+      element, GST_PAD_NAME (pad), link->to, name_or_null (link->to_pad));
+}
+
+bool
+has_late_pads (GstElement *element)
+{
+  for (const GList *t = gst_element_class_get_pad_template_list (
+           GST_ELEMENT_GET_CLASS (element));
+       t; t = t->next) {
+    const auto *templ = GST_PAD_TEMPLATE (t->data);
+    if (GST_PAD_TEMPLATE_DIRECTION (templ) == GST_PAD_SRC &&
+        GST_PAD_TEMPLATE_PRESENCE (templ) == GST_PAD_SOMETIMES)
+      return true;
+  }
+  return false;
+}
+
+} // namespace
+
+void
+Graph::link (GstElement *from, const char *from_pad, GstElement *to,
+    const char *to_pad) const
+{
+  if (gst_element_link_pads (from, from_pad, to, to_pad))
+    return;
+  if (!has_late_pads (from))
+    fail ("cannot link " + factory_of (from) + " to " + factory_of (to) +
+          "; their formats do not fit");
+  g_object_set_data (G_OBJECT (from), kLateLink, to);
+  auto *late = new LateLink{from_pad ? from_pad : "", to_pad ? to_pad : "", to};
+  g_signal_connect_data (
+      from, "pad-added", G_CALLBACK (on_pad_added), late,
+      [] (gpointer data, GClosure *) { delete static_cast<LateLink *> (data); },
+      GConnectFlags (0));
+}
+
+GstElement *
+late_link_of (GstElement *element)
+{
+  return static_cast<GstElement *> (
+      g_object_get_data (G_OBJECT (element), kLateLink));
+}
+
+Chain
+Graph::begin (const char *factory, const Settings &settings)
+{
+  return {*this, add (factory, settings), nullptr};
+}
+
+Chain
+Graph::from (GstElement *element, const char *pad)
+{
+  return {*this, element, pad};
+}
+
+Chain &
+Chain::to (const char *factory, const Settings &settings)
+{
+  return to (graph_->add (factory, settings));
+}
+
+Chain &
+Chain::to (GstElement *element, const char *pad)
+{
+  graph_->link (last_, std::exchange (pad_, nullptr), element, pad);
+  last_ = element;
+  return *this;
+}
+
+Chain &
+Chain::caps (const std::string &caps)
+{
+  return to ("capsfilter", {{"caps", caps}});
+}
+
+Chain &
+Chain::queue (int frames, const char *leaky)
+{
+  return to ("queue", {{"max-size-buffers", frames}, {"max-size-bytes", 0},
+                          {"max-size-time", 0}, {"leaky", leaky}});
+}
+
+void
+each_element (GstElement *bin, const std::function<void (GstElement *)> &visit)
+{
+  GstIterator *elements = gst_bin_iterate_recurse (GST_BIN (bin));
+  GValue item = G_VALUE_INIT;
+  while (gst_iterator_next (elements, &item) == GST_ITERATOR_OK) {
+    visit (GST_ELEMENT (g_value_get_object (&item)));
+    g_value_reset (&item);
+  }
+  g_value_unset (&item);
+  gst_iterator_free (elements);
+}
+
+ObjectPtr<GstPad>
+pad_of (GstElement *element, const char *name)
+{
+  return ObjectPtr<GstPad> (gst_element_get_static_pad (element, name));
+}
+
+std::string
+factory_of (GstElement *element)
+{
+  GstElementFactory *factory = gst_element_get_factory (element);
+  return factory ? GST_OBJECT_NAME (factory) : "";
+}
+
+} // namespace codedexposure::app

@@ -1,0 +1,146 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Builds a pipeline from elements, and keeps pointers to them: no element is
+ * found by its name, and no text is parsed but what a user gave. */
+#pragma once
+
+#include <functional>
+#include <initializer_list>
+#include <optional>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include <gst/gst.h>
+
+#include "common/raii.h"
+
+namespace codedexposure::app
+{
+
+/** The text of a property's value, as gst-launch-1.0 takes it, in the C
+ * locale. */
+std::string property_text (double value);
+
+/** A property of an element and its value. */
+struct Setting {
+  Setting (const char *property, std::string text)
+      : name (property), value (std::move (text))
+  {
+  }
+  Setting (const char *property, const char *text)
+      : name (property), value (text)
+  {
+  }
+  Setting (const char *property, bool on)
+      : name (property), value (on ? "true" : "false")
+  {
+  }
+  template <typename Number>
+  requires std::is_arithmetic_v<Number> Setting (
+      const char *property, Number number)
+      : name (property), value ([number] {
+          if constexpr (std::is_integral_v<Number>)
+            return std::to_string (number);
+          else
+            return property_text (number);
+        }())
+  {
+  }
+
+  const char *name;
+  std::string value;
+};
+using Settings = std::vector<Setting>;
+
+/** Appends the setting @p property if @p value is set. */
+template <typename T>
+void
+set_if (Settings &settings, const char *property, const std::optional<T> &value)
+{
+  if (value)
+    settings.emplace_back (property, *value);
+}
+
+class Chain;
+
+/** A pipeline that is being built. Elements belong to the pipeline, and
+ * pointers to them are valid as long as it is. */
+class Graph
+{
+public:
+  Graph ();
+  ~Graph ();
+  Graph (const Graph &) = delete;
+  Graph &operator= (const Graph &) = delete;
+
+  GstElement *pipeline () const { return pipeline_.get (); }
+
+  /** A new element of the pipeline. Throws Failure, with the Debian package, if
+   * there is none of that kind. */
+  GstElement *add (const char *factory, const Settings &settings = {});
+  /** The elements of @p description, as of gst-launch-1.0, in a bin whose free
+   * pads are its own. Throws Failure. */
+  GstElement *add_text (const std::string &description);
+  void set (GstElement *element, const Setting &setting) const;
+
+  /** Links a pad of @p from, null: any that fits, to one of @p to. A pad that
+   * comes later is linked when it comes. Throws Failure. */
+  void link (GstElement *from, const char *from_pad, GstElement *to,
+      const char *to_pad) const;
+
+  /** A chain that begins with a new element. */
+  Chain begin (const char *factory, const Settings &settings = {});
+  /** A chain that begins at @p element, or one of its pads. */
+  Chain from (GstElement *element, const char *pad = nullptr);
+
+private:
+  gst::ObjectPtr<GstElement> pipeline_;
+};
+
+/** The end of a chain of linked elements, to which the next is linked. */
+class Chain
+{
+public:
+  Chain (Graph &graph, GstElement *last, const char *pad)
+      : graph_ (&graph), last_ (last), pad_ (pad)
+  {
+  }
+
+  /** Links a new element; returns this chain, which now ends with it. */
+  Chain &to (const char *factory, const Settings &settings = {});
+  /** Links an element of the pipeline, at its pad @p pad if named. */
+  Chain &to (GstElement *element, const char *pad = nullptr);
+  /** A filter for these caps. */
+  Chain &caps (const std::string &caps);
+  /** A queue that holds @p frames buffers of any size and time. */
+  Chain &queue (int frames, const char *leaky = "no");
+
+  GstElement *last () const { return last_; }
+  Graph &graph () const { return *graph_; }
+
+private:
+  Graph *graph_;
+  GstElement *last_;
+  const char *pad_; // of the last one; null: any
+};
+
+/** Calls @p visit with every element of @p bin, also in bins. */
+void each_element (
+    GstElement *bin, const std::function<void (GstElement *)> &visit);
+
+/** The static pad @p name of @p element, or null. */
+gst::ObjectPtr<GstPad> pad_of (GstElement *element, const char *name);
+
+/** The name of the factory of @p element; empty: it has none. */
+std::string factory_of (GstElement *element);
+
+/** The element to which a pad of @p element is linked when it comes; null:
+ * none.
+ */
+GstElement *late_link_of (GstElement *element);
+
+/** The pipeline as a line of gst-launch-1.0 that does the same. */
+std::string launch_line (GstElement *pipeline);
+
+} // namespace codedexposure::app

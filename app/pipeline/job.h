@@ -1,0 +1,105 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* A pipeline, what it writes, and how it is played. */
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "failure.h"
+#include "options/common.h"
+#include "pipeline/frame_counter.h"
+#include "pipeline/graph.h"
+#include "pipeline/outputs.h"
+
+namespace codedexposure::app
+{
+
+/** A window that shows a run. All calls are on the main thread. */
+class Viewer
+{
+public:
+  struct Calls {
+    std::function<void ()> end; ///< as Ctrl-C does
+    /** A file was written, or could not be. */
+    std::function<void (const std::string &text, bool failed)> said;
+  };
+  virtual ~Viewer () = default;
+
+  /** Before the pipeline plays. */
+  virtual void begin (Calls calls) = 0;
+  /** Five times a second: "100 coded frames, 1 lost", and whether that is bad.
+   */
+  virtual void tell (const std::string &frames, bool alarm) = 0;
+  /** After the pipeline has ended. */
+  virtual void finish () = 0;
+};
+
+/** What the functions that build a pipeline say of it. */
+struct Job {
+  explicit Job (std::string command_name, const RunOptions &run_options)
+      : command (std::move (command_name)), options (run_options)
+  {
+  }
+
+  std::string command; ///< "record": prefix of every line
+  RunOptions options;
+  Graph graph;
+  Outputs outputs;
+
+  /** Where the frames come from, for the summary: "the simulated bench". */
+  std::string source;
+  /** The element that simulates the bench; null: a camera or another source. */
+  GstElement *bench = nullptr;
+  /** Coded frames are counted where they enter this element. */
+  GstElement *counted = nullptr;
+  /** Of the coded frames; none: not known. */
+  std::optional<gint64> total;
+  PlayTimes times;
+  /** A camera, which may fall silent without an error. */
+  bool from_camera = false;
+  /** Reads a recording or a stream of one: its own end is in it. */
+  GstElement *reader = nullptr;
+  /** The recording is read from front to back, past damage. */
+  bool salvage = false;
+  /** The queue before encoder and disk of a live recording. */
+  GstElement *buffer = nullptr;
+  /** If the recording behind `buffer` fails, the rest goes on. */
+  bool buffer_may_fail = false;
+  /** An identity with eos-after, behind which the stream ends. */
+  GstElement *limit = nullptr;
+  /** A tcpserversink. */
+  GstElement *server = nullptr;
+  /** Frames begin when the server has a receiver. */
+  bool waits_for_receiver = false;
+  /** Reads from a server: for how long to try to connect, s. */
+  std::optional<double> retry;
+  /** Ctrl-C is the usual end, and not an interruption. */
+  bool ends_by_signal = false;
+  /** Prints "100 coded frames of ...; wrote ...". */
+  bool has_result = true;
+  /** Called with each element message, on the main thread. */
+  std::function<void (const GstStructure *)> on_message;
+  std::unique_ptr<Viewer> window;
+  /** An error of an element that is shown in a window ends the run well. */
+  bool has_window = false;
+};
+
+/** How a run ended. */
+struct RunResult {
+  Exit exit = Exit::failed;
+  gint64 frames = 0;
+  bool container_damaged = false; ///< read it again with salvage
+  bool interrupted = false;
+};
+
+/** Plays @p job until its end and publishes its outputs; prints progress,
+ * errors and the result. With --print, it prints the pipeline and does nothing.
+ */
+RunResult play (Job &job);
+
+/** What play () does with --print. */
+void print_pipeline (Job &job);
+
+} // namespace codedexposure::app

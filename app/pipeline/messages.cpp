@@ -1,0 +1,397 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "messages.h"
+
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <cstdarg>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <regex>
+#include <utility>
+
+#include "common/raii.h"
+#include "pipeline/graph.h"
+
+namespace codedexposure::app
+{
+
+namespace
+{
+
+using namespace gst;
+
+/** Elements outside of GStreamer's base package, and their Debian packages. */
+struct Provider {
+  std::string_view element, package;
+};
+constexpr Provider kProviders[] = {
+    {"aravissrc", "libaravis-0.8-0"},
+    {"autovideosink", "gstreamer1.0-plugins-good"},
+    {"avdec_ffv1", "gstreamer1.0-libav"},
+    {"avenc_ffv1", "gstreamer1.0-libav"},
+    {"cairooverlay", "gstreamer1.0-plugins-good"},
+    {"matroskademux", "gstreamer1.0-plugins-good"},
+    {"matroskamux", "gstreamer1.0-plugins-good"},
+    {"pngenc", "gstreamer1.0-plugins-good"},
+    {"textoverlay", "gstreamer1.0-x"},
+    {"x264enc", "gstreamer1.0-plugins-ugly"},
+    {"ximagesink", "gstreamer1.0-x"},
+};
+
+/* Texts are quoted as in a shell command, without GStreamer's escapes; the
+ * largest number means that a value is not known. */
+std::string
+value_text (const GValue *value)
+{
+  if (G_VALUE_HOLDS_STRING (value)) {
+    const gchar *given = g_value_get_string (value);
+    const std::string text = given ? given : "";
+    return text.empty () || text.find (' ') != text.npos ? '"' + text + '"'
+                                                         : text;
+  }
+  if (G_VALUE_HOLDS_UINT64 (value) && g_value_get_uint64 (value) == G_MAXUINT64)
+    return "unknown";
+  const CharPtr text (gst_value_serialize (value));
+  return text ? text.get () : "?";
+}
+
+bool
+is_integer (GType type)
+{
+  return type == G_TYPE_UINT64 || type == G_TYPE_UINT || type == G_TYPE_INT;
+}
+
+StructurePtr
+stats_of (GstElement *element)
+{
+  GstStructure *stats = nullptr;
+  if (g_object_class_find_property (G_OBJECT_GET_CLASS (element), "stats"))
+    g_object_get (element, "stats", &stats, nullptr);
+  return StructurePtr (stats);
+}
+
+/* The counters in the property stats. */
+std::string
+numbers_in (const GstStructure *stats)
+{
+  std::string text;
+  for (gint i = 0; i < gst_structure_n_fields (stats); i++) {
+    const gchar *field = gst_structure_nth_field_name (stats, guint (i));
+    const GValue *value = gst_structure_get_value (stats, field);
+    if (is_integer (G_VALUE_TYPE (value)))
+      text += std::string (" ") + field + "=" + value_text (value);
+  }
+  return text;
+}
+
+/* The counters of an element without stats, which are read-only properties. */
+std::string
+read_only_numbers (GstElement *element)
+{
+  std::string text;
+  guint n = 0;
+  GParamSpec **specs =
+      g_object_class_list_properties (G_OBJECT_GET_CLASS (element), &n);
+  for (guint i = 0; i < n; i++) {
+    if ((specs[i]->flags & G_PARAM_WRITABLE) ||
+        !is_integer (specs[i]->value_type))
+      continue;
+    GValue value = G_VALUE_INIT;
+    g_object_get_property (G_OBJECT (element), specs[i]->name, &value);
+    text += std::string (" ") + specs[i]->name + "=" + value_text (&value);
+    g_value_unset (&value);
+  }
+  g_free (specs);
+  return text;
+}
+
+std::string
+numbers_of (GstElement *element)
+{
+  const StructurePtr stats = stats_of (element);
+  return stats ? numbers_in (stats.get ()) : read_only_numbers (element);
+}
+
+std::string
+frames_shown_by (GstElement *sink)
+{
+  const StructurePtr stats = stats_of (sink);
+  guint64 rendered = 0, dropped = 0;
+  gst_structure_get (stats.get (), "rendered", G_TYPE_UINT64, &rendered,
+      "dropped", G_TYPE_UINT64, &dropped, nullptr);
+  return format (" shown=%" G_GUINT64_FORMAT " late=%" G_GUINT64_FORMAT,
+      rendered, dropped);
+}
+
+/* The details of a debug text after the position in the code, or null. */
+const gchar *
+added (const gchar *debug)
+{
+  const gchar *end_of_place = debug ? std::strchr (debug, '\n') : nullptr;
+  return end_of_place ? end_of_place + 1 : nullptr;
+}
+
+/* An element names its property, but a script has an option for it. */
+std::string
+with_options (const char *text)
+{
+  static const std::regex property ("[Tt]he (schedule|mapping|bench) property");
+  return std::regex_replace (text, property, "--$1");
+}
+
+bool
+is_video_sink (GstElement *element, GstElementFactory *factory)
+{
+  const gchar *klass =
+      gst_element_factory_get_metadata (factory, GST_ELEMENT_METADATA_KLASS);
+  return std::strstr (klass, "Sink") && std::strstr (klass, "Video") &&
+         g_object_class_find_property (G_OBJECT_GET_CLASS (element), "stats");
+}
+
+} // namespace
+
+std::string
+format (const char *pattern, ...)
+{
+  va_list arguments;
+  va_start (arguments, pattern);
+  const CharPtr text (g_strdup_vprintf (pattern, arguments));
+  va_end (arguments);
+  return text.get ();
+}
+
+std::string
+minutes (double seconds)
+{
+  const int whole = int (seconds + 0.5);
+  return format ("%d:%02d", whole / 60, whole % 60);
+}
+
+double
+cpu_seconds ()
+{
+  rusage usage = {};
+  getrusage (RUSAGE_SELF, &usage);
+  const auto seconds = [] (const timeval &t) {
+    return double (t.tv_sec) + 1e-6 * double (t.tv_usec);
+  };
+  return seconds (usage.ru_utime) + seconds (usage.ru_stime);
+}
+
+std::string
+package_of (std::string_view element)
+{
+  for (const Provider &provider : kProviders)
+    if (provider.element == element)
+      return std::string (provider.package);
+  return {};
+}
+
+std::string
+told (GstMessage *message, const GError *error, const gchar *debug)
+{
+  const gchar *detail = added (debug);
+  gchar *file = nullptr;
+  GstObject *source = GST_MESSAGE_SRC (message);
+  if (error->domain == GST_RESOURCE_ERROR &&
+      g_object_class_find_property (G_OBJECT_GET_CLASS (source), "location"))
+    g_object_get (source, "location", &file, nullptr);
+  const CharPtr owned (file);
+  return format ("%s: %s%s%s", file ? file : GST_OBJECT_NAME (source),
+      with_options (error->message).c_str (), detail ? "\n    " : "",
+      detail ? detail : "");
+}
+
+std::string
+remedy_for (std::string_view kind, const GError *error, const gchar *debug)
+{
+  const std::string_view detail = debug ? debug : "";
+  const bool unfit = detail.find ("not-negotiated") != detail.npos;
+  const bool of_camera =
+      kind == "aravissrc" || kind == "codedexposure-camerasrc";
+  if (g_error_matches (
+          error, GST_RESOURCE_ERROR, GST_RESOURCE_ERROR_NO_SPACE_LEFT))
+    return "the disk is full; delete files, or write to another disk";
+  if (unfit && of_camera)
+    return "the camera does not send such frames; check --size, --frame-rate, "
+           "--bits and --pixel-format";
+  if (unfit)
+    return "two elements do not agree on a format; check --size and --bits";
+  const std::string_view text = error->message;
+  const bool of_lines = of_camera && text.find ("LineSelector") != text.npos;
+  const bool of_source = of_camera && text.find ("TriggerSource") != text.npos;
+  if ((of_lines || of_source) && text.find ("not an entry") != text.npos)
+    return "the camera has no such line; set --trigger-line to one that "
+           "\"arv-tool-0.8 features\" lists";
+  if (of_lines)
+    return "--trigger camera needs a camera with the feature LineSelector; for "
+           "others, use --trigger none and set their output with --features";
+  if (kind == "aravissrc" && error->domain == GST_STREAM_ERROR)
+    return "the camera sent nothing for 2 s; check that the DMD runs and is "
+           "wired to the camera's trigger line";
+  return {};
+}
+
+std::string
+warned (GstMessage *message)
+{
+  GError *error = nullptr;
+  gchar *debug = nullptr;
+  gst_message_parse_warning (message, &error, &debug);
+  const std::string text = told (message, error, debug);
+  g_error_free (error);
+  g_free (debug);
+  return text;
+}
+
+std::string
+noted (GstMessage *message)
+{
+  GError *error = nullptr;
+  gchar *debug = nullptr;
+  gst_message_parse_info (message, &error, &debug);
+  const gchar *detail = added (debug);
+  const std::string text =
+      format ("%s: %s", GST_OBJECT_NAME (GST_MESSAGE_SRC (message)),
+          detail ? detail : error->message);
+  g_error_free (error);
+  g_free (debug);
+  return text;
+}
+
+std::string
+fields_of (GstMessage *message)
+{
+  const GstStructure *structure = gst_message_get_structure (message);
+  std::string text =
+      format ("%s: %s", GST_OBJECT_NAME (GST_MESSAGE_SRC (message)),
+          gst_structure_get_name (structure));
+  for (gint i = 0; i < gst_structure_n_fields (structure); i++) {
+    const gchar *field = gst_structure_nth_field_name (structure, guint (i));
+    text += std::string (" ") + field + "=" +
+            value_text (gst_structure_get_value (structure, field));
+  }
+  return text;
+}
+
+std::string
+counters_of (GstElement *element)
+{
+  GstElementFactory *factory = gst_element_get_factory (element);
+  if (!factory)
+    return {};
+  const gchar *plugin =
+      gst_plugin_feature_get_plugin_name (GST_PLUGIN_FEATURE (factory));
+  std::string counters;
+  if (plugin && std::strcmp (plugin, "codedexposure") == 0)
+    counters = numbers_of (element);
+  else if (is_video_sink (element, factory))
+    counters = frames_shown_by (element);
+  return counters.empty () ? counters
+                           : GST_OBJECT_NAME (element) + (":" + counters);
+}
+
+namespace
+{
+
+std::string
+number_in (const GstStructure *message, const char *field)
+{
+  const GValue *value = gst_structure_get_value (message, field);
+  return value ? value_text (value) : "?";
+}
+
+std::string
+seconds_in (const GstStructure *message, const char *field)
+{
+  guint64 time = 0;
+  gst_structure_get_uint64 (message, field, &time);
+  return format ("%.3f s", 1e-9 * double (time));
+}
+
+std::string
+slip_in (const GstStructure *message)
+{
+  gint slots = 0;
+  gst_structure_get_int (message, "slots", &slots);
+  const gint count = std::abs (slots);
+  return format ("%d slot%s %s", count, count == 1 ? "" : "s",
+      slots < 0 ? "early" : "late");
+}
+
+} // namespace
+
+std::string
+notice (const GstStructure *message)
+{
+  const std::string_view name = gst_structure_get_name (message);
+  const auto number = [&] (const char *field) {
+    return number_in (message, field);
+  };
+  if (name == "dmdsync/frames-lost" || name == "codedexposure/frames-lost")
+    return "warning: coded frames were lost before " +
+           seconds_in (message, "to") + ": " + number ("count");
+  if (name == "dmdsync/frame-incomplete")
+    return "warning: frame " + number ("frame") +
+           " arrived incomplete; check the connection of the camera";
+  if (name == "dmdsync/frame-late")
+    return "warning: frame " + number ("frame") + " arrived after the next one";
+  if (name == "dmdsync/slip")
+    return "warning: from frame " + number ("frame") + " on, the mirrors are " +
+           slip_in (message) + "; these frames are flagged";
+  gboolean active = TRUE;
+  gst_structure_get_boolean (message, "active", &active);
+  if (name == "codedexposure/frames-damaged" && active)
+    return "warning: from frame " + number ("frame") + " (" +
+           seconds_in (message, "from") +
+           ") on, frames are flagged: " + number ("reason");
+  if (name == "codedexposure/frames-damaged")
+    return "warning: frames that are flagged from frame " + number ("frame") +
+           " on: " + number ("count");
+  if (name == "codedexposure/frames-missing")
+    return "warning: from " + seconds_in (message, "from") +
+           " on, recorded frames are missing: " + number ("count");
+  if (name == "codedexposure/stream-cut")
+    return "warning: the stream ended without its last line: it was cut off, "
+           "its sender was stopped, or it is a segment of a longer recording";
+  if (name == "codedexposure/stream-incomplete")
+    return "warning: recorded frames are missing with all that is known of "
+           "them: " +
+           number ("count") +
+           "; the recording is damaged, or this is not its first part";
+  if (name == "codedexposure/camera-back")
+    return "the camera sends frames again, after " +
+           seconds_in (message, "silent");
+  if (name == "moirecalib/phase")
+    return "phase found: --schedule " + number ("schedule");
+  return {};
+}
+
+std::string
+flaws_of (GstElement *pipeline)
+{
+  constexpr struct {
+    const char *counter, *text, *text_of_one = text;
+  } kFlaws[] = {{"frames-lost", "lost"}, {"frames-corrupted", "corrupted"},
+      {"frames-incomplete", "incomplete"}, {"frames-late", "late"},
+      {"frames-duplicate", "duplicate"}, {"frames-skipped", "skipped"},
+      {"slips", "losses of synchronisation", "loss of synchronisation"}};
+  std::string text;
+  for (const auto &[counter, text_of_many, text_of_one] : kFlaws) {
+    guint64 most = 0; // several elements count the same frames
+    each_element (pipeline, [&] (GstElement *element) {
+      guint64 count = 0;
+      if (const StructurePtr stats = stats_of (element))
+        gst_structure_get_uint64 (stats.get (), counter, &count);
+      most = std::max (most, count);
+    });
+    if (most > 0)
+      text += format (", %" G_GUINT64_FORMAT " %s", most,
+          most == 1 ? text_of_one : text_of_many);
+  }
+  return text;
+}
+
+} // namespace codedexposure::app

@@ -1,0 +1,54 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Messages and counters of elements, as texts for the user. */
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include <gst/gst.h>
+
+namespace codedexposure::app
+{
+
+/** printf into a string. */
+std::string format (const char *pattern, ...) G_GNUC_PRINTF (1, 2);
+
+/** "m:ss" of a time in seconds. */
+std::string minutes (double seconds);
+
+/** Processor time of this process so far, in seconds. */
+double cpu_seconds ();
+
+/** The Debian package of @p element; empty if not known. */
+std::string package_of (std::string_view element);
+
+/** Source and text of an ERROR or WARNING message with its details, without the
+ * position in the code; properties are named as the options of commands. */
+std::string told (GstMessage *message, const GError *error, const gchar *debug);
+/** What the user can do about an error of an element of @p kind; empty: its
+ * text says it. */
+std::string remedy_for (
+    std::string_view kind, const GError *error, const gchar *debug);
+/** The same of a WARNING message. */
+std::string warned (GstMessage *message);
+/** The same for an INFO message: its details, as gst-launch-1.0 prints them, or
+ * its text. */
+std::string noted (GstMessage *message);
+
+/** "name: field=value ..." of an element message. */
+std::string fields_of (GstMessage *message);
+
+/** An element message about frames that were lost or damaged, as a warning for
+ * the user; empty: it is about something else. */
+std::string notice (const GstStructure *message);
+
+/** ", 3 lost, 1 corrupted": coded frames of @p pipeline, from the counters of
+ * its elements; empty: none. */
+std::string flaws_of (GstElement *pipeline);
+
+/** "name: counter=value ...": the counters in the property stats of an element
+ * of this plugin (without stats: its read-only numbers), or the shown and late
+ * frames of a video sink; empty for other elements. */
+std::string counters_of (GstElement *element);
+
+} // namespace codedexposure::app

@@ -1,0 +1,263 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "outputs.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <set>
+#include <utility>
+
+#include <sys/stat.h>
+
+#include "pipeline/pictures.h"
+
+namespace codedexposure::app
+{
+
+using namespace gst;
+namespace fs = std::filesystem;
+
+namespace
+{
+
+std::string
+text_property (GstElement *element, const char *property)
+{
+  gchar *text = nullptr;
+  g_object_get (element, property, &text, nullptr);
+  const CharPtr owned (text);
+  return text ? text : "";
+}
+
+class File : public Output
+{
+public:
+  File (GstElement *element, const char *property, const std::string &name,
+      const Outputs::FileKind &kind)
+      : element_ (element), property_ (property), sidecar_ (kind.sidecar),
+        part_ (name, Part::kFile)
+  {
+    if (kind.frames)
+      pad_.reset (GST_PAD (gst_object_ref (kind.frames)));
+  }
+
+  Result<void> claim (bool replace) override
+  {
+    replace_ = replace;
+    const std::string &name = part_.name ();
+    std::error_code ignored;
+    if (fs::is_directory (name, ignored))
+      return Error{name + " is a folder; give the name of a file"};
+    if (!replace && fs::exists (fs::symlink_status (name, ignored)))
+      return Error{name + " exists; choose another name, or set --force to "
+                          "replace it"};
+    if (auto claimed = part_.claim (replace); !claimed)
+      return claimed;
+    g_object_set (element_, property_, part_.path ().c_str (), nullptr);
+    if (pad_)
+      gst_pad_add_probe (
+          pad_.get (), GST_PAD_PROBE_TYPE_BUFFER,
+          [] (GstPad *, GstPadProbeInfo *, gpointer frames) {
+            (*static_cast<std::atomic<guint64> *> (frames))++;
+            return GST_PAD_PROBE_OK;
+          },
+          &frames_, nullptr);
+    return {};
+  }
+  void name_element () override
+  {
+    g_object_set (element_, property_, part_.name ().c_str (), nullptr);
+  }
+  Result<void> finished () const override
+  {
+    /* Of elements that finish a file only at its end. */
+    const bool may_fail =
+        g_object_class_find_property (G_OBJECT_GET_CLASS (element_), "problem");
+    if (may_fail && !text_property (element_, "problem").empty ())
+      return Error{part_.name () +
+                   " could not be finished; what was written "
+                   "is in " +
+                   part_.path ()};
+    return {};
+  }
+  Result<void> publish () override { return part_.publish (replace_); }
+  void discard () override { part_.discard (); }
+  bool has_content () const override
+  {
+    return (!pad_ || frames_ > 0) && !part_.is_empty ();
+  }
+  const std::string &name () const override { return part_.name (); }
+  const std::string &part () const override { return part_.path (); }
+  bool is_sidecar () const override { return sidecar_; }
+
+private:
+  GstElement *element_; // of the pipeline, which outlives this
+  const char *property_;
+  bool sidecar_;
+  ObjectPtr<GstPad> pad_;
+  Part part_;
+  bool replace_ = false;
+};
+
+/* What @path is, by device and inode; none: it does not exist. */
+std::optional<std::pair<std::uintmax_t, std::uintmax_t>>
+identity_of (const fs::path &path)
+{
+  struct stat known = {};
+  if (stat (path.c_str (), &known) != 0)
+    return std::nullopt;
+  return std::pair (
+      std::uintmax_t (known.st_dev), std::uintmax_t (known.st_ino));
+}
+
+} // namespace
+
+Result<void>
+check_is_no_input (
+    const std::string &output, const std::vector<std::string> &inputs)
+{
+  std::error_code ignored;
+  for (const std::string &input : inputs) {
+    const auto read = identity_of (input);
+    if (!read)
+      continue;
+    if (identity_of (output) == read)
+      return Error{output + " is the input; use another name for the output"};
+    /* Pictures replace a folder, and the input may be in it. */
+    if (fs::is_directory (output, ignored))
+      for (fs::path above = fs::absolute (input, ignored).parent_path ();;
+           above = above.parent_path ()) {
+        if (identity_of (above) == identity_of (output))
+          return Error{output + " holds the input " + input +
+                       "; use another folder for the output"};
+        if (above == above.parent_path ())
+          break;
+      }
+  }
+  return {};
+}
+
+Outputs::Outputs () = default;
+Outputs::~Outputs () = default;
+
+void
+Outputs::file (GstElement *element, const char *property,
+    const std::string &name, const FileKind &kind)
+{
+  std::error_code ignored;
+  const auto status = fs::status (name, ignored);
+  if (fs::exists (status) && !fs::is_regular_file (status) &&
+      !fs::is_directory (status)) {
+    g_object_set (element, property, name.c_str (), nullptr);
+    return;
+  }
+  /* A link stays, and the file that it leads to is replaced. */
+  outputs_.push_back (std::make_unique<File> (element, property,
+      fs::is_symlink (name, ignored)
+          ? fs::weakly_canonical (name, ignored).string ()
+          : name,
+      kind));
+}
+
+void
+Outputs::pictures (GstElement *sink, GstPad *coded, const std::string &format)
+{
+  outputs_.push_back (std::make_unique<Pictures> (sink, coded, format));
+}
+
+Result<void>
+Outputs::check () const
+{
+  std::set<std::string> names;
+  for (const auto &output : outputs_) {
+    if (auto checked = check_is_no_input (output->name (), inputs_); !checked)
+      return checked;
+    std::error_code error;
+    const fs::path whole = fs::absolute (output->name (), error);
+    const fs::path canonical = fs::weakly_canonical (whole, error);
+    if (!names.insert (error ? whole : canonical).second)
+      return Error{
+          output->name () + " is written twice; give each output its own name"};
+  }
+  return {};
+}
+
+std::vector<std::string>
+Outputs::claim (bool replace)
+{
+  std::vector<std::string> errors;
+  std::vector<Output *> claimed;
+  for (const auto &output : outputs_) {
+    const Result<void> result = output->claim (replace);
+    if (result)
+      claimed.push_back (output.get ());
+    else
+      errors.push_back (result.error ().message);
+  }
+  if (!errors.empty ()) {
+    for (Output *output : claimed)
+      output->discard ();
+    outputs_.clear ();
+  }
+  return errors;
+}
+
+void
+Outputs::name_elements () const
+{
+  for (const auto &output : outputs_)
+    output->name_element ();
+}
+
+std::vector<std::string>
+Outputs::finish (Finish how)
+{
+  bool only_sidecars = true, have_frames = false;
+  for (const auto &output : outputs_) {
+    only_sidecars &= output->is_sidecar ();
+    have_frames |= !output->is_sidecar () && output->has_content ();
+  }
+  std::vector<std::string> errors;
+  published_ = how == Finish::publish;
+  for (const auto &output : outputs_) {
+    const bool described =
+        !output->is_sidecar () || only_sidecars || have_frames;
+    if (how == Finish::discard || !output->has_content () || !described) {
+      output->discard ();
+      continue;
+    }
+    Result<void> done = output->finished ();
+    if (done && published_)
+      done = output->publish ();
+    if (!done) {
+      errors.push_back (done.error ().message);
+      continue;
+    }
+    kept_.push_back (output.get ());
+  }
+  return errors;
+}
+
+std::string
+Outputs::summary (std::optional<guint64> usual) const
+{
+  std::string text;
+  for (const Output *output : kept_) {
+    if (!text.empty ())
+      text += output == kept_.back () ? " and " : ", ";
+    text += published_ ? output->name () : output->part ();
+    if (usual && output->frames () > 0 && output->frames () != *usual)
+      text += " (" + std::to_string (output->frames ()) + " frames)";
+  }
+  return text;
+}
+
+std::vector<std::string>
+Outputs::names () const
+{
+  std::vector<std::string> names;
+  for (const Output *output : kept_)
+    names.push_back (published_ ? output->name () : output->part ());
+  return names;
+}
+
+} // namespace codedexposure::app

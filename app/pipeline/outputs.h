@@ -1,0 +1,111 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The files that a command writes, and those that it reads: an input is never
+ * an output. */
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <gst/gst.h>
+
+#include "common/raii.h"
+#include "pipeline/part.h"
+
+namespace codedexposure::app
+{
+
+/** A file, or pictures, of one element. */
+class Output
+{
+public:
+  virtual ~Output () = default;
+
+  /** Before the element opens anything: refuses a name that exists, unless @p
+   * replace, and lets the element write beside it. */
+  virtual Result<void> claim (bool replace) = 0;
+  /** Gives the element the name itself, for a pipeline that is printed. */
+  virtual void name_element () = 0;
+  /** After the element stopped. Error: the file could not be finished. */
+  virtual Result<void> finished () const { return {}; }
+  /** After that: gives the frames their name. */
+  virtual Result<void> publish () = 0;
+  /** Removes what was written. */
+  virtual void discard () = 0;
+  /** Whether there are frames to publish. */
+  virtual bool has_content () const = 0;
+
+  virtual const std::string &name () const = 0;
+  /** Where it is written until it is published. */
+  virtual const std::string &part () const = 0;
+  guint64 frames () const { return frames_; }
+  /** Whether it only describes the frames that other outputs have. */
+  virtual bool is_sidecar () const { return false; }
+
+protected:
+  /** Frames that the element got. */
+  std::atomic<guint64> frames_ = 0;
+};
+
+/** The files of a command. */
+class Outputs
+{
+public:
+  Outputs ();
+  ~Outputs ();
+
+  /** A file or folder that is read. */
+  void reads (const std::string &path) { inputs_.push_back (path); }
+
+  /** Where frames for a file are counted, and what the file is. */
+  struct FileKind {
+    GstPad *frames = nullptr; ///< each buffer is a frame
+    bool sidecar = false;     ///< describes the frames of other files
+  };
+  /** @p element writes the file @p name, which it gets in its property @p
+   * property. A name such as /dev/null is written directly. */
+  void file (GstElement *element, const char *property, const std::string &name,
+      const FileKind &kind);
+  /** @p sink, a multifilesink, writes numbered pictures of coded frames that
+   * pass @p coded; @p format: "folder/%06d.png". */
+  void pictures (GstElement *sink, GstPad *coded, const std::string &format);
+
+  /** Error if one of them is an input, or two have the same name. */
+  Result<void> check () const;
+  /** Claims all of them. Errors: why they cannot be written, one for each;
+   * nothing is left. */
+  std::vector<std::string> claim (bool replace);
+  bool empty () const { return outputs_.empty (); }
+
+  /** For a pipeline that is printed and not played: elements write the names
+   * themselves. */
+  void name_elements () const;
+
+  enum class Finish {
+    publish, ///< those with frames get their names; the others go
+    keep,    ///< those with frames stay beside their names, as .part
+    discard,
+  };
+  /** After the pipeline has stopped. Errors: what could not be published. */
+  std::vector<std::string> finish (Finish how);
+  /** After finish (): "coded.mkv and fast.mkv (100 frames)", the outputs that
+   * are there; with their frames if they are not @p usual. Empty: none. */
+  std::string summary (std::optional<guint64> usual) const;
+  /** After finish (): the names of the outputs that are there. */
+  std::vector<std::string> names () const;
+
+private:
+  std::vector<std::string> inputs_;
+  std::vector<std::unique_ptr<Output>> outputs_;
+  std::vector<const Output *> kept_;
+  bool published_ = false;
+};
+
+/** Error if @p output is one of @p inputs, or lies in a folder that is one, by
+ * inode: it would be replaced by itself. */
+Result<void> check_is_no_input (
+    const std::string &output, const std::vector<std::string> &inputs);
+
+} // namespace codedexposure::app

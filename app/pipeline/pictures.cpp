@@ -1,0 +1,333 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "pictures.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <optional>
+#include <regex>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include "pipeline/messages.h"
+
+namespace codedexposure::app
+{
+
+using namespace gst;
+namespace fs = std::filesystem;
+
+namespace
+{
+
+/* A text that is formatted back to itself. */
+std::string
+escaped (const std::string &text)
+{
+  return std::regex_replace (text, std::regex ("%"), "%%");
+}
+
+/* 0, if the caps at @pad have no fixed rate. */
+double
+rate_at (GstPad *pad)
+{
+  const CapsPtr caps (pad ? gst_pad_get_current_caps (pad) : nullptr);
+  gint num = 0, den = 1;
+  if (!caps ||
+      !gst_structure_get_fraction (
+          gst_caps_get_structure (caps.get (), 0), "framerate", &num, &den))
+    return 0;
+  return double (num) / den;
+}
+
+std::string
+time_text (GstClockTime time)
+{
+  return GST_CLOCK_TIME_IS_VALID (time) ? std::to_string (time) : "";
+}
+
+/* On the time axis of the recording. */
+GstClockTime
+stream_time (GstPad *pad, GstClockTime time)
+{
+  const EventPtr event (gst_pad_get_sticky_event (pad, GST_EVENT_SEGMENT, 0));
+  const GstSegment *segment = nullptr;
+  if (!event)
+    return time;
+  gst_event_parse_segment (event.get (), &segment);
+  return gst_segment_to_stream_time (segment, GST_FORMAT_TIME, time);
+}
+
+/* Whether @path is a PNG file up to its last chunk. */
+bool
+is_complete (const std::string &path)
+{
+  constexpr std::string_view kEnd ("IEND\xae\x42\x60\x82", 8);
+  std::ifstream file (path, std::ios::binary);
+  std::string end (kEnd.size (), '\0');
+  return file.seekg (-std::streamoff (end.size ()), std::ios::end) &&
+         file.read (end.data (), std::streamsize (end.size ())) && end == kEnd;
+}
+
+} // namespace
+
+Result<PictureNames>
+PictureNames::parse (const std::string &format)
+{
+  static const std::regex pattern (
+      R"((?:((?:[^%]|%%)*)/)?([^%/]*)(%(?:0[1-9])?d)([^%/]*))");
+  std::smatch parts;
+  if (!std::regex_match (format, parts, pattern))
+    return Error{format + " has other numbers than one %d or %06d in the name "
+                          "of its pictures; name a folder, such as pictures/"};
+  return PictureNames{
+      std::regex_replace (parts[1].str (), std::regex ("%%"), "%"), parts[2],
+      parts[3], parts[4]};
+}
+
+bool
+PictureNames::include (const std::string &file) const
+{
+  if (file == table ())
+    return true;
+  const std::size_t around = prefix.size () + suffix.size ();
+  if (file.size () <= around || !file.starts_with (prefix) ||
+      !file.ends_with (suffix))
+    return false;
+  return std::all_of (file.begin () + gssize (prefix.size ()),
+      file.end () - gssize (suffix.size ()),
+      [] (char c) { return c >= '0' && c <= '9'; });
+}
+
+std::string
+PictureNames::picture (gint index) const
+{
+  const int width = number == "%d" ? 1 : number[2] - '0';
+  const std::string digits = app::format ("%0*d", width, index);
+  return prefix + digits + suffix;
+}
+
+std::string
+PictureNames::path (const std::string &file) const
+{
+  return folder.empty () ? file : folder + "/" + file;
+}
+
+struct Pictures::Known {
+  std::optional<guint64> frame;
+  gint slot = -1;
+  const char *synchronised = "unknown";
+  guint64 lost_before = 0;
+
+  explicit Known (GstBuffer *picture);
+};
+
+Pictures::Known::Known (GstBuffer *picture)
+{
+  static const char *const kName = "CodedExposureFrame";
+  GstCustomMeta *meta = gst_meta_get_info (kName)
+                            ? gst_buffer_get_custom_meta (picture, kName)
+                            : nullptr;
+  if (!meta)
+    return;
+  const GstStructure *fields = gst_custom_meta_get_structure (meta);
+  guint64 number = 0;
+  gboolean locked = FALSE;
+  if (gst_structure_get_uint64 (fields, "frame", &number))
+    frame = number;
+  gst_structure_get_int (fields, "subframe", &slot);
+  gst_structure_get_uint64 (fields, "lost-before", &lost_before);
+  if (gst_structure_get_boolean (fields, "locked", &locked))
+    synchronised = locked ? "true" : "false";
+}
+
+Pictures::Pictures (GstElement *sink, GstPad *coded, const std::string &format)
+    : sink_ (sink), coded_ (coded), format_ (format), name_ (format)
+{
+}
+
+Result<void>
+Pictures::check_names () const
+{
+  std::error_code ignored;
+  const fs::path folder = names_.folder.empty () ? "." : names_.folder;
+  for (const auto &entry : fs::directory_iterator (folder, ignored)) {
+    const std::string file = entry.path ().filename ();
+    if (names_.fill_folder ())
+      return Error{name_ + " is not empty; choose another folder, or set "
+                           "--force to replace the pictures of an earlier run"};
+    if (names_.include (file))
+      return Error{names_.path (file) + " exists; choose another name, or set "
+                                        "--force to replace it"};
+  }
+  return {};
+}
+
+Result<void>
+Pictures::claim (bool replace)
+{
+  replace_ = replace;
+  auto names = PictureNames::parse (format_);
+  if (!names)
+    return names.error ();
+  names_ = std::move (*names);
+  const bool fill = names_.fill_folder () && !names_.folder.empty ();
+  name_ = fill ? names_.folder + "/"
+               : names_.path (names_.prefix + names_.number + names_.suffix);
+  std::error_code ignored;
+  if (!names_.folder.empty () && fs::exists (names_.folder, ignored) &&
+      !fs::is_directory (names_.folder, ignored))
+    return Error{names_.folder + " is a file; name a folder"};
+  if (!replace)
+    if (auto unused = check_names (); !unused)
+      return unused;
+  part_ = std::make_unique<Part> (fill ? names_.folder : name_, Part::kFolder);
+  if (auto claimed = part_->claim (replace); !claimed)
+    return claimed;
+  table_.reset (
+      std::fopen ((part_->path () + "/" + names_.table ()).c_str (), "w"));
+  if (!table_) {
+    discard ();
+    return Error{"cannot write the table of " + name_ + ": " +
+                 std::generic_category ().message (errno)};
+  }
+  g_object_set (sink_, "location",
+      (escaped (part_->path ()) + "/" + names_.prefix + names_.number +
+          names_.suffix)
+          .c_str (),
+      nullptr);
+  write_line ("file,frame,slot,pts_ns,duration_ns,synchronised,corrupted,"
+              "lost_before");
+  const ObjectPtr<GstPad> pad (gst_element_get_static_pad (sink_, "sink"));
+  gst_pad_add_probe (
+      pad.get (), GST_PAD_PROBE_TYPE_BUFFER,
+      [] (GstPad *sink_pad, GstPadProbeInfo *info, gpointer self) {
+        static_cast<Pictures *> (self)->add (
+            sink_pad, GST_PAD_PROBE_INFO_BUFFER (info));
+        return GST_PAD_PROBE_OK;
+      },
+      this, nullptr);
+  watch_flags (pad.get ());
+  return {};
+}
+
+/* An encoder drops the flags of its pictures, and gives each on at once. */
+void
+Pictures::watch_flags (GstPad *sink_pad)
+{
+  const ObjectPtr<GstPad> from (gst_pad_get_peer (sink_pad));
+  const ObjectPtr<GstElement> encoder (
+      from ? gst_pad_get_parent_element (from.get ()) : nullptr);
+  const ObjectPtr<GstPad> pad (
+      encoder ? gst_element_get_static_pad (encoder.get (), "sink") : nullptr);
+  if (!pad)
+    return;
+  gst_pad_add_probe (
+      pad.get (), GST_PAD_PROBE_TYPE_BUFFER,
+      [] (GstPad *, GstPadProbeInfo *info, gpointer self) {
+        static_cast<Pictures *> (self)->corrupted_ = GST_BUFFER_FLAG_IS_SET (
+            GST_PAD_PROBE_INFO_BUFFER (info), GST_BUFFER_FLAG_CORRUPTED);
+        return GST_PAD_PROBE_OK;
+      },
+      this, nullptr);
+}
+
+/* The slot of the recording; otherwise, the number after the last. */
+gint
+Pictures::next_index (GstPad *pad, const Known &known) const
+{
+  const double slots = rate_at (pad) / std::max (rate_at (coded_), 1e-9);
+  const guint64 most = std::numeric_limits<gint>::max ();
+  if (!known.frame || slots < 0.5 || slots > 1e6 || *known.frame > most)
+    return index_ + 1;
+  const guint64 number =
+      *known.frame * guint64 (slots + 0.5) + guint64 (std::max (known.slot, 0));
+  return number > most ? index_ + 1 : std::max (index_ + 1, gint (number));
+}
+
+/* Before the sink writes @picture. The last one is complete. */
+void
+Pictures::add (GstPad *pad, GstBuffer *picture)
+{
+  write_line (line_);
+  const Known known (picture);
+  index_ = next_index (pad, known);
+  g_object_set (sink_, "index", index_, nullptr);
+  last_ = names_.picture (index_);
+  line_ = format ("%s,%s,%s,%s,%s,%s,%s,%" G_GUINT64_FORMAT, last_.c_str (),
+      known.frame ? std::to_string (*known.frame).c_str () : "",
+      known.slot >= 0 ? std::to_string (known.slot).c_str () : "",
+      time_text (stream_time (pad, GST_BUFFER_PTS (picture))).c_str (),
+      time_text (GST_BUFFER_DURATION (picture)).c_str (), known.synchronised,
+      corrupted_ ? "true" : "false", known.lost_before);
+  frames_++;
+}
+
+void
+Pictures::write_line (const std::string &line)
+{
+  if (!line.empty () && std::fprintf (table_.get (), "%s\n", line.c_str ()) < 0)
+    table_failed_ = true;
+}
+
+/* Deletes the pictures that the table of an earlier run lists. */
+void
+Pictures::remove_earlier () const
+{
+  std::ifstream table (names_.path (names_.table ()));
+  std::error_code ignored;
+  for (std::string line; std::getline (table, line);) {
+    const std::string file = line.substr (0, line.find (','));
+    if (names_.include (file))
+      fs::remove (names_.path (file), ignored);
+  }
+}
+
+void
+Pictures::name_element ()
+{
+  g_object_set (sink_, "location", format_.c_str (), nullptr);
+}
+
+bool
+Pictures::has_content () const
+{
+  return frames_ > 1 ||
+         (frames_ == 1 && is_complete (part_->path () + "/" + last_));
+}
+
+Result<void>
+Pictures::publish ()
+{
+  const std::string last = part_->path () + "/" + last_;
+  std::error_code error;
+  if (is_complete (last)) {
+    write_line (line_);
+  } else { // the disk is full, or the run was stopped
+    fs::remove (last, error);
+    frames_--;
+  }
+  table_failed_ |= std::fclose (table_.release ()) != 0;
+  if (table_failed_)
+    return Error{"cannot write the table of times in " + part_->path () +
+                 "; the pictures are there"};
+  if (!names_.folder.empty ())
+    fs::create_directories (names_.folder, error);
+  if (replace_)
+    remove_earlier ();
+  std::vector<std::string> files;
+  for (const auto &entry : fs::directory_iterator (part_->path (), error))
+    files.push_back (entry.path ().filename ());
+  for (const std::string &file : files)
+    if (auto moved = move_file (
+            part_->path () + "/" + file, names_.path (file), replace_);
+        !moved)
+      return moved;
+  discard ();
+  return {};
+}
+
+} // namespace codedexposure::app

@@ -1,0 +1,99 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "recording.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+
+#include "record/matroska.h"
+
+namespace codedexposure::app
+{
+
+using namespace gst;
+
+namespace
+{
+
+/* A quarter of the memory that is free, in bytes. */
+std::uint64_t
+room_in_memory ()
+{
+  constexpr std::uint64_t kMost = 4'000'000'000, kUnknown = 1'000'000'000;
+  std::ifstream file ("/proc/meminfo");
+  std::string name, unit;
+  for (std::uint64_t kib = 0; file >> name >> kib;) {
+    if (name == "MemAvailable:")
+      return std::min (kMost, kib * 256);
+    std::getline (file, unit);
+  }
+  return kUnknown;
+}
+
+/* How many frames may wait for encoder and disk: 3 s. */
+int
+frames_that_wait (FrameRate rate)
+{
+  constexpr int kFewest = 75;
+  return std::max (kFewest, 3 * rate.num / std::max (rate.den, 1));
+}
+
+} // namespace
+
+std::string
+sidecar_of (const std::string &recording)
+{
+  return std::filesystem::path (recording).replace_extension (".jsonl");
+}
+
+void
+write_recording (Job &job, Chain &chain, const std::string &file,
+    const RecordingStyle &style)
+{
+  chain.to ("queue",
+      {{"leaky", style.live ? "downstream" : "no"},
+          {"max-size-buffers", frames_that_wait (style.rate)},
+          {"max-size-bytes", room_in_memory ()}, {"max-size-time", 0}});
+  if (style.live)
+    job.buffer = chain.last ();
+  Settings settings{{"codec", style.codec}};
+  set_if (settings, "threads", style.threads);
+  chain.to ("codedexposure-recordmux", settings);
+  GstElement *mux = chain.last ();
+  const ObjectPtr<GstPad> frames = pad_of (mux, "sink");
+  if (style.codec == "raw")
+    chain.to (
+        "codedexposure-filesink", {{"direct", true}, {"reserve", style.bytes}});
+  else
+    chain.to ("filesink");
+  job.outputs.file (chain.last (), "location", file, {.frames = frames.get ()});
+  job.outputs.file (mux, "log-location", sidecar_of (file),
+      {.frames = frames.get (), .sidecar = true});
+  if (!job.counted)
+    job.counted = mux;
+}
+
+Chain
+read_recording (Job &job, const std::string &file)
+{
+  job.outputs.reads (file);
+  job.source = file;
+  Chain chain = job.graph.begin ("filesrc", {{"location", file}});
+  chain.to ("codedexposure-recorddemux", {{"salvage", job.salvage}});
+  job.reader = chain.last ();
+  return chain;
+}
+
+Chain
+read_sender (Job &job, const std::string &host, int port)
+{
+  job.source = host + ":" + std::to_string (port);
+  Chain chain =
+      job.graph.begin ("tcpclientsrc", {{"host", host}, {"port", port}});
+  job.salvage = true;
+  chain.to ("codedexposure-recorddemux", {{"salvage", true}});
+  job.reader = chain.last ();
+  return chain;
+}
+
+} // namespace codedexposure::app

@@ -1,0 +1,172 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "source.h"
+
+#include <string>
+
+namespace codedexposure::app
+{
+
+namespace
+{
+
+std::string
+rate_text (FrameRate rate)
+{
+  return std::to_string (rate.num) + "/" + std::to_string (rate.den);
+}
+
+std::string
+grey_caps (const SourcePlan &plan, FrameRate rate)
+{
+  return std::string ("video/x-raw,format=") +
+         (plan.is_deep () ? "GRAY16_LE" : "GRAY8") +
+         ",width=" + std::to_string (plan.size.width) +
+         ",height=" + std::to_string (plan.size.height) +
+         ",framerate=" + rate_text (rate);
+}
+
+/* Every frame of the file becomes one slot, so its times are scaled. videorate
+ * counts them from 0, and not every file begins at 0. */
+Chain
+input_scene (Job &job, const SourceOptions &options, const SourcePlan &plan)
+{
+  const FrameRate to = plan.scene_rate (), from = plan.input_rate;
+  const double speed =
+      double (to.num) * from.den / (double (to.den) * from.num);
+  Chain chain = job.graph.begin ("filesrc", {{"location", *options.input}});
+  chain.to ("decodebin")
+      .to ("videoconvert")
+      .to ("videoscale")
+      .to ("identity", {{"single-segment", true}})
+      .to ("videorate", {{"rate", speed}})
+      .caps (grey_caps (plan, to));
+  job.outputs.reads (*options.input);
+  return chain;
+}
+
+Chain
+scene (
+    Job &job, const SourceOptions &options, const SourcePlan &plan, Pace pace)
+{
+  const std::string caps = grey_caps (plan, plan.scene_rate ());
+  if (!options.input && !options.scene) {
+    Chain chain = job.graph.begin (
+        "videotestsrc", {{"pattern", options.pattern.value_or ("ball")},
+                            {"is-live", pace == Pace::live}});
+    return chain.caps (caps);
+  }
+  Chain chain =
+      options.input
+          ? input_scene (job, options, plan)
+          : job.graph.begin ("codedexposure-scene",
+                {{"scene", *options.scene}, {"repeat", plan.scene_repeat}});
+  if (!options.input)
+    chain.caps (caps);
+  if (pace == Pace::live)
+    chain.to ("clocksync");
+  return chain.to ("queue");
+}
+
+void
+add_camera_settings (Settings &settings, const SourceOptions &options)
+{
+  settings.emplace_back ("camera-name", *options.camera);
+  settings.emplace_back ("trigger", options.trigger.value_or ("dmd"));
+  set_if (settings, "exposure-time", options.exposure);
+  set_if (settings, "trigger-line", options.trigger_line);
+  set_if (settings, "trigger-edge", options.trigger_edge);
+  set_if (settings, "pixel-format", options.pixel_format);
+  set_if (settings, "features", options.features);
+  set_if (settings, "reconnect", options.reconnect);
+  set_if (settings, "bench", options.bench);
+}
+
+/* Buffers for six seconds at 25 frames/s, while a disk is busy. */
+Chain
+camera (Job &job, const SourceOptions &options, const SourcePlan &plan)
+{
+  constexpr int kBuffers = 150;
+  Settings settings;
+  add_camera_settings (settings, options);
+  if (!options.pixel_format && plan.bench && !plan.pixel_format.empty ())
+    settings.emplace_back ("pixel-format", plan.pixel_format);
+  Chain chain = job.graph.begin ("codedexposure-camerasrc", settings);
+  gst_child_proxy_set (GST_CHILD_PROXY (chain.last ()),
+      "source::num-arv-buffers", kBuffers, nullptr);
+  return chain.caps (grey_caps (plan, plan.frame_rate));
+}
+
+/* The frames of a user's source may already have a schedule and times. */
+void
+synchronise (const SourceOptions &options, Chain &chain)
+{
+  if (options.source && !options.device && !options.schedule)
+    return;
+  Settings settings{{"schedule", options.schedule.value_or ("sequential:2x2")}};
+  const bool simulated = options.is_simulated ();
+  settings.emplace_back (
+      "device", options.device.value_or (simulated ? "sim:bench" : ""));
+  if (options.camera)
+    settings.emplace_back ("timestamp-at", "device-clock");
+  set_if (settings, "bench", options.bench);
+  chain.to ("dmdsync", settings);
+}
+
+} // namespace
+
+Chain
+simulation (Job &job, const SourceOptions &options, const SourcePlan &plan,
+    Pace pace, const Settings &more)
+{
+  Settings settings{{"schedule", options.schedule.value_or ("sequential:2x2")}};
+  set_if (settings, "bench", options.bench);
+  set_if (settings, "psf-sigma", options.psf_sigma);
+  set_if (settings, "full-well", options.full_well);
+  set_if (settings, "read-noise", options.read_noise);
+  set_if (settings, "bits", options.bits);
+  set_if (settings, "gain", options.gain);
+  set_if (settings, "seed", options.seed);
+  set_if (settings, "shift-x", options.shift_x);
+  set_if (settings, "shift-y", options.shift_y);
+  set_if (settings, "rotation", options.rotation);
+  set_if (settings, "scale", options.scale);
+  settings.insert (settings.end (), more.begin (), more.end ());
+  job.source = "the simulated bench";
+  Chain chain = scene (job, options, plan, pace);
+  chain.to ("codedexposure-sim", settings);
+  job.bench = chain.last ();
+  return chain.caps ("video/x-raw,framerate=" + rate_text (plan.frame_rate));
+}
+
+Chain
+coded_source (
+    Job &job, const SourceOptions &options, const SourcePlan &plan, Pace pace)
+{
+  Chain chain =
+      options.camera ? camera (job, options, plan)
+      : options.source
+          ? job.graph.from (job.graph.add_text (*options.source))
+          : simulation (job, options, plan, pace, {{"dmd", "sim:bench"}});
+  if (options.camera)
+    job.source = "the camera " + *options.camera;
+  else if (options.source)
+    job.source = "--source";
+  job.from_camera = bool (options.camera);
+  synchronise (options, chain);
+  limit_frames (job, options, chain);
+  return chain;
+}
+
+/* identity also counts the frame that it refuses; the run ends the stream
+ * before that one is made. */
+void
+limit_frames (Job &job, const SourceOptions &options, Chain &chain)
+{
+  if (!options.frames)
+    return;
+  chain.to ("identity", {{"eos-after", *options.frames + 1}});
+  job.limit = chain.last ();
+  job.total = *options.frames;
+}
+
+} // namespace codedexposure::app

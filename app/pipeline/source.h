@@ -1,0 +1,36 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The beginning of a pipeline: what gives coded frames. */
+#pragma once
+
+#include "options/source.h"
+#include "pipeline/job.h"
+
+namespace codedexposure::app
+{
+
+enum class Pace {
+  live, ///< frames come in real time and wait for nobody
+  fast, ///< as fast as they can be made
+};
+
+/** The scene and the simulated bench, whose masks come from the schedule. */
+Chain simulation (Job &job, const SourceOptions &options,
+    const SourcePlan &plan, Pace pace, const Settings &more = {});
+
+/** Coded frames of a camera, of any source, or of the simulated bench with its
+ * DMD; then dmdsync, and the end after --frames. */
+Chain coded_source (
+    Job &job, const SourceOptions &options, const SourcePlan &plan, Pace pace);
+
+/** Ends the stream after --frames, if set. */
+void limit_frames (Job &job, const SourceOptions &options, Chain &chain);
+
+/** Whether the frames of these options come in real time; those of a user's
+ * source may be a file. */
+inline bool
+is_live (const SourceOptions &options, Pace pace)
+{
+  return pace == Pace::live && !options.source;
+}
+
+} // namespace codedexposure::app

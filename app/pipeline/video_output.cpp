@@ -1,0 +1,146 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "video_output.h"
+
+#include <filesystem>
+#include <regex>
+
+#include "pipeline/frame_counter.h"
+
+namespace codedexposure::app
+{
+
+using namespace gst;
+
+const char *const kVideoForms =
+    ".mkv (FFV1, lossless), .mp4 (H.264), .ome.tif, .h5, / (a folder of PNG) "
+    "or %06d.png";
+
+namespace
+{
+
+void
+write_file (Job &job, Chain &chain, const std::string &name, GstPad *frames)
+{
+  chain.to ("filesink");
+  job.outputs.file (chain.last (), "location", name, {.frames = frames});
+}
+
+void
+write_mkv (
+    Job &job, Chain &chain, const std::string &name, const VideoStyle &style)
+{
+  Settings settings;
+  set_if (settings, "threads", style.threads);
+  chain.to ("codedexposure-recordmux", settings);
+  const auto frames = pad_of (chain.last (), "sink");
+  write_file (job, chain, name, frames.get ());
+}
+
+/* All players and browsers support 4:2:0 with even sides and values from 16 to
+ * 235. From grey, videoconvert would not scale the values, so they go through
+ * colour, with 16 bits for exact values. All other modes of x264 spend less on
+ * pictures that follow each other fast, but these are looked at one by one. The
+ * fragments of a file that was not finished can be played. Its bytes depend on
+ * the number of threads, so that is fixed. A video to look at begins at 0; its
+ * provenance names its first frame. */
+void
+write_mp4 (
+    Job &job, Chain &chain, const std::string &name, const VideoStyle &style)
+{
+  chain.to ("identity", {{"silent", true}});
+  begin_at_zero (chain.last ());
+  add_view (chain, style.bits, style.white);
+  chain.to ("videoconvert")
+      .caps ("video/x-raw,format=ARGB64")
+      .to ("videoconvert")
+      .to ("videoscale")
+      .caps ("video/x-raw,format=I420,width=[2,65536,2],height=[2,65536,2]")
+      .to ("x264enc",
+          {{"pass", "quant"}, {"quantizer", 18}, {"vbv-buf-capacity", 0},
+              {"speed-preset", "veryfast"}, {"threads", 4}});
+  const auto frames = pad_of (chain.last (), "sink");
+  chain.to ("mp4mux", {{"fragment-duration", 1000},
+                          {"fragment-mode", "first-moov-then-finalise"}});
+  write_file (job, chain, name, frames.get ());
+}
+
+void
+write_stack (
+    Job &job, Chain &chain, const std::string &name, const VideoStyle &style)
+{
+  const ObjectPtr<GstElementFactory> found (
+      gst_element_factory_find ("codedexposure-stack"));
+  if (!found)
+    fail (name + ": this build has neither libtiff nor HDF5; install "
+                 "libtiff-dev and libhdf5-dev, and build again");
+  chain.to ("codedexposure-stack", {{"deflate", style.deflate}});
+  const auto frames = pad_of (chain.last (), "sink");
+  job.outputs.file (chain.last (), "location", name, {.frames = frames.get ()});
+}
+
+/* A folder may have any name; only the last part is a format. Without the caps,
+ * videoconvert makes 8-bit colours of 16-bit grey. */
+void
+write_pictures (
+    Job &job, Chain &chain, const std::string &name, const VideoStyle &style)
+{
+  std::string pattern = name;
+  if (name.ends_with ("/"))
+    pattern = std::regex_replace (name, std::regex ("%"), "%%") + "%06d.png";
+  if (style.view)
+    add_view (chain, style.bits, style.white);
+  chain.to ("videoconvert")
+      .caps ("video/x-raw,format={GRAY8,GRAY16_BE}")
+      .to ("pngenc", {{"snapshot", false}})
+      .to ("multifilesink");
+  const auto coded = style.coded ? pad_of (style.coded, "sink") : nullptr;
+  job.outputs.pictures (chain.last (), coded.get (), pattern);
+}
+
+} // namespace
+
+std::optional<VideoForm>
+form_of (const std::string &name)
+{
+  static const std::regex numbers (".*%(0[1-9])?d.*\\.png");
+  if (name.ends_with (".mkv"))
+    return VideoForm::mkv;
+  if (name.ends_with (".mp4"))
+    return VideoForm::mp4;
+  for (const char *end : {".ome.tif", ".ome.tiff", ".h5"})
+    if (name.ends_with (end))
+      return VideoForm::stack;
+  if (name.ends_with ("/") || std::regex_match (name, numbers))
+    return VideoForm::pictures;
+  return std::nullopt;
+}
+
+void
+write_video (
+    Job &job, Chain &chain, const std::string &name, const VideoStyle &style)
+{
+  const auto form = form_of (name);
+  if (!form)
+    usage_error ("--output " + name + ": end in " + kVideoForms);
+  switch (*form) {
+  case VideoForm::mkv:
+    return write_mkv (job, chain, name, style);
+  case VideoForm::mp4:
+    return write_mp4 (job, chain, name, style);
+  case VideoForm::stack:
+    return write_stack (job, chain, name, style);
+  case VideoForm::pictures:
+    return write_pictures (job, chain, name, style);
+  }
+}
+
+void
+add_view (Chain &chain, std::optional<int> bits, std::optional<int> white)
+{
+  Settings settings;
+  set_if (settings, "bits", bits);
+  set_if (settings, "white", white);
+  chain.to ("codedexposure-view", settings);
+}
+
+} // namespace codedexposure::app

@@ -1,0 +1,151 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "branch.h"
+
+#include <cstdlib>
+
+#include "failure.h"
+#include "pipeline/video_output.h"
+#include "window/screen.h"
+
+namespace codedexposure::app
+{
+
+using namespace gst;
+
+namespace
+{
+
+/* The names of panes, in the counters of their queues. */
+constexpr struct {
+  const char *name, *caption;
+} kPanes[] = {{"beside", "camera"}, {"fast", "subframes"}, {"full", "fused"}};
+
+/* The window sets how many frames it holds when their rate is known; until
+ * then, two coded frames of any schedule fit. */
+GstElement *
+add_latest (Chain &chain, const std::string &name)
+{
+  constexpr int kMost = 2 * 256;
+  chain.to ("queue",
+      {{"name", name}, {"leaky", "downstream"}, {"max-size-buffers", kMost},
+          {"max-size-bytes", 0}, {"max-size-time", 0}});
+  return chain.last ();
+}
+
+/* The first queue never blocks the stream; the second one skips frames for
+ * which the screen is too slow, when the window has remembered them. */
+WindowPane
+add_pane (Chain chain, std::size_t index, std::optional<int> bits,
+    GstElement *compositor)
+{
+  const std::string name = kPanes[index].name;
+  WindowPane pane;
+  pane.caption = kPanes[index].caption;
+  pane.entry = add_latest (chain, name);
+  Settings settings{{"qos", false}};
+  set_if (settings, "bits", bits);
+  pane.view = chain.to ("codedexposure-view", settings).last ();
+  chain.to ("videoscale",
+      {{"method", "bilinear2"}, {"add-borders", false}, {"qos", false}});
+  pane.kept = chain.to ("capsfilter").last ();
+  pane.late = add_latest (chain, name + "-late");
+  pane.enlarge = chain
+                     .to ("videoscale", {{"method", "nearest-neighbour"},
+                                            {"add-borders", false}})
+                     .last ();
+  pane.shown = chain.to ("capsfilter").last ();
+  chain.to ("videoconvert").caps ("video/x-raw,format=BGRx");
+  pane.mixed.reset (gst_element_request_pad_simple (compositor, "sink_%u"));
+  chain.to (compositor, GST_PAD_NAME (pane.mixed.get ()));
+  return pane;
+}
+
+bool
+is_set (const char *variable)
+{
+  const char *value = std::getenv (variable);
+  return value && *value;
+}
+
+/* A sink for Wayland needs no X display. */
+bool
+opens_window (GstElement *sink)
+{
+  const auto is_window = [] (GstElement *element) {
+    const std::string kind = factory_of (element);
+    return kind == "autovideosink" || kind == "glimagesink" ||
+           kind == "ximagesink" || kind == "xvimagesink";
+  };
+  bool found = is_window (sink);
+  if (GST_IS_BIN (sink))
+    each_element (
+        sink, [&] (GstElement *element) { found |= is_window (element); });
+  return found;
+}
+
+} // namespace
+
+void
+WindowOptions::declare (Options &options)
+{
+  options.value ("--sink", sink, "\"GST\"",
+      "another video sink, such as ximagesink [autovideosink]");
+}
+
+std::string
+WindowOptions::keys_of (const std::string &command)
+{
+  return "Keys in the window:\n"
+         "  Space           pause at the subframe that is shown; again: live\n"
+         "  Left, Right     pause, and go one subframe back or forward\n"
+         "  L               loop the last second at 1/4 speed; again: live\n"
+         "  S               write what is shown to the current folder, but "
+         "replace no\n                  file: " +
+         command +
+         "-frameN-slotK-TIMEs.png\n"
+         "  Q               end, as Ctrl-C does\n"
+         "The stream does not wait for the window: recording and counting go "
+         "on in a pause\nor loop, and subframes are skipped if the screen is "
+         "too slow. The window keeps\nthe pictures of about one second, 8 "
+         "bits deep and at most as large as shown:\n25 MB for 768x576 pixels "
+         "at 25 frames/s, and N times 14 MB more if fused.\n";
+}
+
+WindowBranch
+add_window_branch (const std::vector<Chain> &sources,
+    const WindowOptions &options, std::optional<int> bits)
+{
+  Graph &graph = sources.front ().graph ();
+  WindowBranch branch;
+  branch.compositor = graph.add ("compositor", {{"background", "black"}});
+  for (const Chain &source : sources)
+    branch.panes.push_back (
+        add_pane (source, branch.panes.size (), bits, branch.compositor));
+  /* No screen shows more; fewer frames would make keys slow. */
+  Chain chain = graph.from (branch.compositor);
+  branch.size =
+      chain.caps ("video/x-raw,format=BGRx,framerate=[25/1,100/1]").last ();
+  branch.overlay = chain.to ("cairooverlay").last ();
+  chain.to ("queue", {{"max-size-buffers", 4}}).to ("videoconvert");
+  branch.sink = options.sink ? graph.add_text (*options.sink)
+                             : graph.add ("autovideosink");
+  chain.to (branch.sink);
+  return branch;
+}
+
+void
+need_screen (const WindowBranch &branch)
+{
+  constexpr const char *kRemedy =
+      " Run this in a desktop session or through ssh -X, or record and decode "
+      "instead.";
+  if (is_set ("WAYLAND_DISPLAY") || !opens_window (branch.sink))
+    return;
+  if (!is_set ("DISPLAY"))
+    fail (std::string ("no screen: DISPLAY is not set.") + kRemedy);
+  if (!find_screen ().opens)
+    fail (std::string ("the screen DISPLAY=") + std::getenv ("DISPLAY") +
+          " cannot be opened." + kRemedy);
+}
+
+} // namespace codedexposure::app

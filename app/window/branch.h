@@ -1,0 +1,63 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The elements of a window: panes beside each other, and a panel below. */
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/geometry.h"
+#include "common/raii.h"
+#include "options/options.h"
+#include "pipeline/graph.h"
+
+namespace codedexposure::app
+{
+
+/** From the pictures of a stream to their place in the window. */
+struct WindowPane {
+  const char *caption = ""; ///< "camera"
+  /** A queue that never blocks the stream. */
+  GstElement *entry = nullptr;
+  /** Scales values to 8 bits. */
+  GstElement *view = nullptr;
+  /** A filter for the size in which pictures are kept. */
+  GstElement *kept = nullptr;
+  /** A queue that skips pictures for which the screen is too slow. */
+  GstElement *late = nullptr;
+  /** Scales from the kept size to that in the window. */
+  GstElement *enlarge = nullptr;
+  /** A filter for the size in the window. */
+  GstElement *shown = nullptr;
+  /** Of the compositor. */
+  gst::ObjectPtr<GstPad> mixed;
+};
+
+struct WindowBranch {
+  /** Camera, subframes, perhaps fused. */
+  std::vector<WindowPane> panes;
+  GstElement *compositor = nullptr;
+  /** A filter for the size of the window. */
+  GstElement *size = nullptr;
+  GstElement *overlay = nullptr;
+  /** An element, or the bin of --sink. */
+  GstElement *sink = nullptr;
+};
+
+struct WindowOptions {
+  std::optional<Text> sink;
+
+  void declare (Options &options);
+  /** What --help says of the keys. @p command  names snapshots. */
+  static std::string keys_of (const std::string &command);
+};
+
+/** Shows the pictures of two or three chains: camera, subframes, perhaps fused.
+ * @p bits  significant bits of the pixels; none: those of the frames. */
+WindowBranch add_window_branch (const std::vector<Chain> &sources,
+    const WindowOptions &options, std::optional<int> bits);
+
+/** Throws Failure if there is no screen for @p branch. */
+void need_screen (const WindowBranch &branch);
+
+} // namespace codedexposure::app

@@ -1,0 +1,187 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "paint.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace codedexposure::app
+{
+
+namespace
+{
+
+struct CairoDestroy {
+  void operator() (cairo_t *cairo) const { cairo_destroy (cairo); }
+};
+using Cairo = std::unique_ptr<cairo_t, CairoDestroy>;
+
+struct Colour {
+  double red, green, blue;
+};
+constexpr Colour kGround{0.13, 0.13, 0.14};
+constexpr Colour kText{0.92, 0.92, 0.92};
+constexpr Colour kFaint{0.62, 0.64, 0.68};
+constexpr Colour kAlarm{1.0, 0.42, 0.35};
+
+constexpr int kMargin = 8;
+constexpr int kFont = 14;
+constexpr int kLine = 19; // distance of lines
+
+const char *const kKeys =
+    "Space: pause, live    Left, Right: step    L: loop the last second at 1/4 "
+    "speed    S: snapshot    Q: end";
+
+void
+use (cairo_t *cairo, const Colour &colour)
+{
+  cairo_set_source_rgb (cairo, colour.red, colour.green, colour.blue);
+}
+
+Surface
+strip (int width, int height)
+{
+  return Surface (
+      cairo_image_surface_create (CAIRO_FORMAT_RGB24, width, height));
+}
+
+/* A context of @p surface, which it fills with the ground. */
+Cairo
+begin (cairo_surface_t *surface)
+{
+  Cairo cairo (cairo_create (surface));
+  use (cairo.get (), kGround);
+  cairo_paint (cairo.get ());
+  cairo_select_font_face (
+      cairo.get (), "sans", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
+  cairo_set_font_size (cairo.get (), kFont);
+  return cairo;
+}
+
+void
+write (cairo_t *cairo, double x, double y, const std::string &text,
+    const Colour &colour)
+{
+  use (cairo, colour);
+  cairo_move_to (cairo, x, y);
+  cairo_show_text (cairo, text.c_str ());
+}
+
+/* On a logarithmic scale, so that few saturated pixels are seen, too; they are
+ * the last bar. */
+void
+draw_histogram (cairo_t *cairo, double left, const Exposure &exposure)
+{
+  constexpr double kTop = 26, kHeight = 54;
+  const auto &bins = exposure.histogram;
+  const auto most = *std::max_element (bins.begin (), bins.end ());
+  const auto height = [most] (double count) {
+    return kHeight * std::log1p (count) / std::log1p (double (most));
+  };
+  const bool clipped = exposure.saturated > 0;
+  char text[64];
+  std::snprintf (text, sizeof text, "exposure: %.*f %% of pixels saturated",
+      clipped && exposure.saturated < 0.001 ? 3 : 1, 100 * exposure.saturated);
+  write (cairo, left, 18, text, clipped ? kAlarm : kText);
+  use (cairo, {0.05, 0.05, 0.05});
+  cairo_rectangle (cairo, left, kTop, 2.0 * double (bins.size ()), kHeight);
+  cairo_fill (cairo);
+  for (std::size_t k = 0; k < bins.size (); k++) {
+    use (cairo, clipped && k + 1 == bins.size () ? kAlarm : kFaint);
+    const double tall = most > 0 ? height (double (bins[k])) : 0;
+    cairo_rectangle (
+        cairo, left + 2.0 * double (k), kTop + kHeight - tall, 2, tall);
+    cairo_fill (cairo);
+  }
+}
+
+} // namespace
+
+Surface
+paint_captions (
+    const WindowLayout &layout, const std::vector<std::string> &captions)
+{
+  Surface surface = strip (layout.size ().width, WindowLayout::kCaption);
+  const Cairo cairo = begin (surface.get ());
+  for (int k = 0; k < int (captions.size ()); k++)
+    write (cairo.get (), layout.left (k) + kMargin, 17,
+        captions[std::size_t (k)], kText);
+  return surface;
+}
+
+Surface
+paint_panel (const WindowLayout &layout, const std::vector<PanelLine> &lines,
+    const Exposure *exposure)
+{
+  const int width = layout.size ().width;
+  Surface surface = strip (width, WindowLayout::kPanel);
+  const Cairo cairo = begin (surface.get ());
+  for (int k = 0; k < int (lines.size ()); k++) {
+    const PanelLine &line = lines[std::size_t (k)];
+    write (cairo.get (), kMargin, 18 + k * kLine, line.text,
+        line.alarm ? kAlarm : kText);
+  }
+  if (exposure && !exposure->histogram.empty ())
+    draw_histogram (cairo.get (),
+        width - kMargin - 2.0 * double (exposure->histogram.size ()),
+        *exposure);
+  write (cairo.get (), kMargin, WindowLayout::kPanel - 9, kKeys, kFaint);
+  return surface;
+}
+
+void
+paint_picture (
+    cairo_t *window, int left, int top, Extent size, const GreyPicture &picture)
+{
+  const Surface surface = strip (picture.width, picture.height);
+  const int stride = cairo_image_surface_get_stride (surface.get ());
+  unsigned char *const rows = cairo_image_surface_get_data (surface.get ());
+  if (!rows) // no memory
+    return;
+  for (int y = 0; y < picture.height; y++) {
+    const std::uint8_t *from =
+        picture.pixels.data () + std::size_t (y) * std::size_t (picture.width);
+    auto *to = reinterpret_cast<std::uint32_t *> (rows + y * stride);
+    std::transform (from, from + picture.width, to,
+        [] (std::uint8_t grey) { return 0x010101u * grey; });
+  }
+  cairo_surface_mark_dirty (surface.get ());
+  cairo_save (window);
+  cairo_rectangle (window, left, top, size.width, size.height);
+  cairo_clip (window);
+  cairo_translate (window, left, top);
+  cairo_scale (window, double (size.width) / picture.width,
+      double (size.height) / picture.height);
+  cairo_set_source_surface (window, surface.get (), 0, 0);
+  cairo_pattern_set_filter (cairo_get_source (window),
+      are_blocks ({picture.width, picture.height}, size)
+          ? CAIRO_FILTER_NEAREST
+          : CAIRO_FILTER_BILINEAR);
+  cairo_paint (window);
+  cairo_restore (window);
+}
+
+void
+paint_strip (cairo_t *window, cairo_surface_t *strip, int top)
+{
+  cairo_save (window);
+  cairo_set_operator (window, CAIRO_OPERATOR_SOURCE);
+  cairo_set_source_surface (window, strip, 0, top);
+  cairo_rectangle (window, 0, top, cairo_image_surface_get_width (strip),
+      cairo_image_surface_get_height (strip));
+  cairo_fill (window);
+  cairo_restore (window);
+}
+
+Surface
+copy_window (cairo_t *window, const WindowLayout &layout)
+{
+  Surface copy =
+      strip (layout.size ().width, layout.size ().height - WindowLayout::kKeys);
+  const Cairo cairo (cairo_create (copy.get ()));
+  cairo_set_source_surface (cairo.get (), cairo_get_target (window), 0, 0);
+  cairo_paint (cairo.get ());
+  return copy;
+}
+
+} // namespace codedexposure::app

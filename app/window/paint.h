@@ -1,0 +1,64 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Draws the parts of the window of live and receive with cairo. */
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <cairo.h>
+
+#include "window/layout.h"
+
+namespace codedexposure::app
+{
+
+struct SurfaceDestroy {
+  void operator() (cairo_surface_t *surface) const
+  {
+    cairo_surface_destroy (surface);
+  }
+};
+using Surface = std::unique_ptr<cairo_surface_t, SurfaceDestroy>;
+
+/** An 8-bit picture; its rows follow each other without padding. */
+struct GreyPicture {
+  int width = 0, height = 0;
+  std::vector<std::uint8_t> pixels;
+};
+
+/** How a coded frame is exposed. */
+struct Exposure {
+  std::vector<std::uint64_t> histogram; ///< of all levels
+  double saturated = 0;                 ///< part of the pixels, 0 to 1
+};
+
+struct PanelLine {
+  std::string text;
+  bool alarm = false;
+};
+
+/** The captions of the panes, in a picture as wide as the window. */
+Surface paint_captions (
+    const WindowLayout &layout, const std::vector<std::string> &captions);
+/** The panel: @p lines, the histogram (null: none) and the keys. */
+Surface paint_panel (const WindowLayout &layout,
+    const std::vector<PanelLine> &lines, const Exposure *exposure);
+/** Whether pixels of a picture become blocks of the same size, if it is @p
+ * shown at that size; otherwise, it has to be interpolated. */
+inline bool
+are_blocks (Extent picture, Extent shown)
+{
+  return shown.width % picture.width == 0 && shown.height % picture.height == 0;
+}
+
+/** Paints @p picture at that place of the window, in that size. */
+void paint_picture (cairo_t *window, int left, int top, Extent size,
+    const GreyPicture &picture);
+/** Paints a part of the window as it is, at that height. */
+void paint_strip (cairo_t *window, cairo_surface_t *strip, int top);
+/** A copy of @p window without its line of keys. */
+Surface copy_window (cairo_t *window, const WindowLayout &layout);
+
+} // namespace codedexposure::app

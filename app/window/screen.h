@@ -1,0 +1,25 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The X screen that windows open on. */
+#pragma once
+
+#include <optional>
+
+#include "base/geometry.h"
+
+namespace codedexposure::app
+{
+
+struct Screen {
+  /** Whether the X display can be opened. GStreamer's sinks show nothing where
+   * it cannot, or crash. True where it is not known. */
+  bool opens = true;
+  /** In pixels; none: not known. */
+  std::optional<Extent> size = {};
+
+  /** The size of a window that surely fits, frame and bars included. */
+  Extent room () const;
+};
+
+Screen find_screen ();
+
+} // namespace codedexposure::app

@@ -1,0 +1,119 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "damage.h"
+
+#include <utility>
+
+#include "common/messages.h"
+
+namespace codedexposure::gst
+{
+
+void
+DamageReport::restart ()
+{
+  forget ();
+  const ObjectLock lock (element_);
+  counters_ = {};
+}
+
+void
+DamageReport::count (guint64 Counters::*counter, guint64 by)
+{
+  const ObjectLock lock (element_);
+  counters_.*counter += by;
+}
+
+void
+DamageReport::frame ()
+{
+  count (&Counters::frames);
+}
+
+void
+DamageReport::frame_damaged (
+    guint64 number, GstClockTime pts, const char *reason)
+{
+  count (&Counters::damaged);
+  extend (number, pts, reason);
+}
+
+void
+DamageReport::frame_unknown (
+    guint64 number, GstClockTime pts, const char *reason)
+{
+  count (&Counters::unknown);
+  extend (number, pts, reason);
+}
+
+void
+DamageReport::extend (guint64 number, GstClockTime pts, const char *reason)
+{
+  if (open_.count++ > 0)
+    return;
+  open_.frame = number;
+  open_.from = pts;
+  post_message (element_, FramesDamaged{.active = true,
+                              .frame = number,
+                              .count = {},
+                              .from = pts,
+                              .reason = reason});
+}
+
+void
+DamageReport::end_sequence ()
+{
+  const Sequence over = std::exchange (open_, {});
+  if (over.count > 0)
+    post_message (element_, FramesDamaged{.active = false,
+                                .frame = over.frame,
+                                .count = over.count,
+                                .from = over.from,
+                                .reason = {}});
+}
+
+void
+DamageReport::frames_missing (guint64 count, GstClockTime from)
+{
+  if (count == 0)
+    return;
+  this->count (&Counters::missing, count);
+  post_message (element_, FramesMissing{count, from});
+}
+
+void
+DamageReport::stream_cut ()
+{
+  guint64 frames;
+  {
+    const ObjectLock lock (element_);
+    frames = counters_.frames;
+  }
+  post_message (element_, StreamCut{frames});
+}
+
+void
+DamageReport::stream_ended (guint64 total)
+{
+  guint64 known;
+  {
+    const ObjectLock lock (element_);
+    known = counters_.frames + counters_.missing;
+  }
+  if (known >= total)
+    return;
+  count (&Counters::missing, total - known);
+  post_message (element_, StreamIncomplete{total - known});
+}
+
+StructurePtr
+DamageReport::stats (guint64 lines_damaged) const
+{
+  return StructurePtr (
+      gst_structure_new ("application/x-codedexposure-restore-counters",
+          "frames", G_TYPE_UINT64, counters_.frames, "frames-damaged",
+          G_TYPE_UINT64, counters_.damaged, "frames-unknown", G_TYPE_UINT64,
+          counters_.unknown, "frames-missing", G_TYPE_UINT64, counters_.missing,
+          "lines-damaged", G_TYPE_UINT64, lines_damaged, nullptr));
+}
+
+} // namespace codedexposure::gst

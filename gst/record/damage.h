@@ -1,0 +1,63 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* What the part restore counts and says of damage. */
+#pragma once
+
+#include <gst/gst.h>
+
+#include "common/raii.h"
+
+namespace codedexposure::gst
+{
+
+/** Counts frames for the property `stats`, and posts the messages
+ * frames-damaged, at both ends of a sequence of frames that are not as
+ * recorded, frames-missing, stream-cut and stream-incomplete. Streaming thread
+ * of the frames. */
+class DamageReport
+{
+public:
+  explicit DamageReport (GstElement *element) : element_ (element) {}
+
+  /** Before a run. */
+  void restart ();
+  /** After a flush: no sequence of damaged frames is open. */
+  void forget () { open_ = {}; }
+
+  /** Each frame, before the others. */
+  void frame ();
+  /** At @p pts; @p reason says what is not as recorded. */
+  void frame_damaged (guint64 number, GstClockTime pts, const char *reason);
+  /** At @p pts; @p reason says why nothing is known of it. */
+  void frame_unknown (guint64 number, GstClockTime pts, const char *reason);
+  /** @p count frames of the track, from @p from on, did not come; 0: says
+   * nothing. */
+  void frames_missing (guint64 count, GstClockTime from);
+  /** The next frame, if any, is as recorded. */
+  void end_sequence ();
+  /** The last line of the track did not come. */
+  void stream_cut ();
+  /** At the end of a stream that began with its first frame: it was to have
+   * @p total frames. */
+  void stream_ended (guint64 total);
+
+  /** Object lock. */
+  StructurePtr stats (guint64 lines_damaged) const;
+
+private:
+  struct Counters {
+    guint64 frames = 0, damaged = 0, unknown = 0, missing = 0;
+  };
+  /** A sequence of frames that are not as recorded. */
+  struct Sequence {
+    guint64 frame = 0, count = 0;
+    GstClockTime from = 0;
+  };
+  void count (guint64 Counters::*counter, guint64 by = 1);
+  void extend (guint64 number, GstClockTime pts, const char *reason);
+
+  GstElement *element_;
+  Counters counters_; ///< object lock
+  Sequence open_;
+};
+
+} // namespace codedexposure::gst

@@ -1,0 +1,358 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The part of codedexposure-recordmux that knows frames: passes them on and
+ * writes a line of JSON for each, to the pad `track` as text with the PTS and
+ * DURATION of its frame, and to a file. Lines name their setup (schedule,
+ * mapping, bench profile) by a hash, and hold it: each line if it takes at most
+ * 512 bytes; else the first two lines, one after each change, and one a second.
+ * The last line says that the recording is complete. With the pad `track`, the
+ * tag with the schedule says that a track accompanies the frames, and has all
+ * setups of before. */
+#include <algorithm>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gst/base/gstbasetransform.h>
+
+#include "common/element.h"
+#include "common/lines.h"
+#include "common/record.h"
+#include "common/tag.h"
+#include "parts.h"
+#include "record/track.h"
+#include "setups.h"
+#include "track_pad.h"
+
+using namespace codedexposure;
+using namespace codedexposure::gst;
+
+GST_DEBUG_CATEGORY_STATIC (codedexposure_log_debug);
+#define GST_CAT_DEFAULT codedexposure_log_debug
+
+namespace
+{
+
+struct LogState {
+  explicit LogState (GstElement *element = nullptr) : track (element) {}
+
+  /* Object lock: */
+  std::string location;
+  guint64 frames_lost = 0; ///< since the first
+  /* Streaming thread, and start and stop, which exclude it: */
+  LineFile file;
+  TrackPad track;
+  guint64 frames = 0;
+  std::optional<guint64> last; ///< number of the last frame with a meta
+  GstVideoInfo info = {};
+  GstClockTime end = 0; ///< of the last frame
+  /** Of the stream. */
+  std::optional<StreamSetup> setup;
+  guint64 setup_id = 0;
+  std::vector<StreamSetup> setups; ///< all, the last one last
+  bool setup_is_short = false;     ///< each line can have it
+  /** As last written to the file. */
+  std::optional<Schedule> schedule;
+  std::optional<Mapping> mapping;
+  std::optional<BenchProfile> bench;
+  /** As last written to the track, and the PTS of that frame. */
+  std::optional<StreamSetup> tracked;
+  GstClockTime tracked_at = GST_CLOCK_TIME_NONE;
+};
+
+} // namespace
+
+G_DECLARE_FINAL_TYPE (GstCodedExposureLog, gst_coded_exposure_log, GST,
+    CODED_EXPOSURE_LOG, GstBaseTransform)
+
+struct _GstCodedExposureLog {
+  GstBaseTransform parent;
+  LogState *state;
+};
+
+G_DEFINE_TYPE_WITH_CODE (GstCodedExposureLog, gst_coded_exposure_log,
+    GST_TYPE_BASE_TRANSFORM,
+    GST_DEBUG_CATEGORY_INIT (codedexposure_log_debug, "codedexposure-log", 0,
+        "per-frame record of coded frames"))
+namespace
+{
+
+/* Receivers that join late, segments, and recordings of which a part is damaged
+ * need it again. */
+constexpr GstClockTime kRepeat = GST_SECOND;
+
+/** Whether the line of a frame at @p pts holds the setup. */
+bool
+repeats_setup (const LogState &state, GstClockTime pts)
+{
+  return state.setup &&
+         (state.setup_is_short || state.frames <= 2 ||
+             !(state.tracked == state.setup) || pts < state.tracked_at ||
+             pts - state.tracked_at >= kRepeat);
+}
+
+/** How long a frame lasts. */
+GstClockTime
+duration_of (const LogState &state, GstBuffer *frame)
+{
+  if (GST_BUFFER_DURATION_IS_VALID (frame))
+    return GST_BUFFER_DURATION (frame);
+  return state.info.fps_n > 0 ? gst_util_uint64_scale_int (GST_SECOND,
+                                    state.info.fps_d, state.info.fps_n)
+                              : GST_CLOCK_TIME_NONE;
+}
+
+GstFlowReturn
+push_line (GstCodedExposureLog *self, GstBuffer *frame, FrameRecord record)
+{
+  LogState &state = *self->state;
+  const GstClockTime pts = GST_BUFFER_PTS (frame);
+  if (!GST_CLOCK_TIME_IS_VALID (pts)) {
+    POST_ERROR (self, STREAM, FORMAT,
+        "A coded frame has no time stamp (PTS), so its line could not be found "
+        "again. Let the source set one, for example with do-timestamp=true.");
+    return GST_FLOW_ERROR;
+  }
+  TrackLine line{.frame = std::move (record)};
+  if (state.setup)
+    line.setup_id = state.setup_id;
+  if (repeats_setup (state, pts)) {
+    line.setup = state.tracked = state.setup;
+    state.tracked_at = pts;
+  }
+  const GstClockTime duration = duration_of (state, frame);
+  state.end = GST_CLOCK_TIME_IS_VALID (duration) ? pts + duration : pts;
+  return state.track.push (
+      line.to_json (), pts, duration, GST_BASE_TRANSFORM (self)->segment);
+}
+
+/* Also those that a queue dropped between the element that numbers the frames
+ * and this one. */
+void
+count_lost (GstCodedExposureLog *self, FrameRecord &record)
+{
+  LogState &state = *self->state;
+  if (!record.lost_before) // without a meta, the number is a count
+    return;
+  const bool is_new = state.last != record.frame; // no further subframe
+  if (state.last && record.frame > *state.last)
+    record.lost_before =
+        std::max (*record.lost_before, record.frame - *state.last - 1);
+  state.last = record.frame;
+  if (!is_new)
+    return;
+  const ObjectLock lock (self);
+  state.frames_lost += *record.lost_before;
+}
+
+GstFlowReturn
+transform_ip (GstBaseTransform *base, GstBuffer *frame) noexcept
+{
+  auto *self = GST_CODED_EXPOSURE_LOG (base);
+  LogState &state = *self->state;
+  const int pilot = state.setup ? state.setup->schedule.pilot_rows () : 0;
+  FrameRecord record =
+      record_of (frame, state.info, base->segment, pilot, state.frames++);
+  count_lost (self, record);
+  if (state.file.is_open () && !state.file.write (record.to_json ()))
+    return GST_FLOW_ERROR;
+  return state.track.exists () ? push_line (self, frame, std::move (record))
+                               : GST_FLOW_OK;
+}
+
+gboolean
+set_caps (GstBaseTransform *base, GstCaps *caps, GstCaps *)
+{
+  LogState &state = state_in<GstCodedExposureLog> (base);
+  return gst_video_info_from_caps (&state.info, caps);
+}
+
+/* Upstream repeats tags; the file holds each schedule, mapping and bench
+ * profile once. */
+void
+note_setup (LogState &state, const StreamSetup &setup)
+{
+  constexpr std::size_t kShort = 512;
+  state.setup = setup;
+  state.setup_id = id_of (setup);
+  state.setup_is_short = state.setup->to_json ().size () <= kShort;
+  std::erase (state.setups, setup);
+  state.setups.push_back (setup);
+  if (!state.file.is_open ())
+    return;
+  if (!(state.schedule == state.setup->schedule)) {
+    state.schedule = state.setup->schedule;
+    state.file.write (state.schedule->to_json ());
+  }
+  if (state.setup->mapping && !(state.mapping == state.setup->mapping)) {
+    state.mapping = state.setup->mapping;
+    state.file.write (state.mapping->to_json ());
+  }
+  if (state.setup->bench && !(state.bench == state.setup->bench)) {
+    state.bench = state.setup->bench;
+    state.file.write (state.bench->to_json ());
+  }
+}
+
+/* The tags that go on say whether there is a track, where its own lines need
+ * not. Transfer: full, of both. */
+GstEvent *
+take_tags (GstCodedExposureLog *self, GstEvent *event)
+{
+  LogState &state = *self->state;
+  GstTagList *tags = nullptr;
+  gst_event_parse_tag (event, &tags);
+  const auto read = setup_from_tags (tags);
+  if (!read)
+    return event;
+  if (!*read) {
+    POST_WARNING (self, STREAM, DECODE,
+        "The schedule of the stream is not recorded: " +
+            read->error ().message);
+    return event;
+  }
+  StreamSetup setup = read->value ();
+  setup.track = false;
+  note_setup (state, setup);
+  if (!state.track.exists ())
+    return event;
+  setup.track = true;
+  return add_setups (replace_setup (event, setup), state.setups);
+}
+
+/* The last line proves that no frame after it is missing. */
+void
+end_track (GstCodedExposureLog *self)
+{
+  LogState &state = *self->state;
+  if (state.frames > 0)
+    state.track.push (TrackLine{.end = state.frames}.to_json (), state.end,
+        GST_MSECOND, GST_BASE_TRANSFORM (self)->segment);
+}
+
+gboolean
+sink_event (GstBaseTransform *base, GstEvent *event) noexcept
+{
+  auto *self = GST_CODED_EXPOSURE_LOG (base);
+  TrackPad &track = self->state->track;
+  switch (GST_EVENT_TYPE (event)) {
+  case GST_EVENT_TAG:
+    event = take_tags (self, event);
+    break;
+  case GST_EVENT_STREAM_START:
+    track.restart (true);
+    break;
+  case GST_EVENT_SEGMENT:
+    track.restart (false);
+    break;
+  case GST_EVENT_EOS:
+    end_track (self);
+    track.forward (event);
+    break;
+  case GST_EVENT_FLUSH_START:
+  case GST_EVENT_FLUSH_STOP:
+    track.forward (event);
+    break;
+  default:
+    break;
+  }
+  return GST_BASE_TRANSFORM_CLASS (gst_coded_exposure_log_parent_class)
+      ->sink_event (base, event);
+}
+
+bool
+begin_run (GstElement *element)
+{
+  auto *self = GST_CODED_EXPOSURE_LOG (element);
+  LogState &state = *self->state;
+  std::string location;
+  {
+    const ObjectLock lock (self);
+    location = state.location;
+    state.frames_lost = 0;
+  }
+  state.frames = 0;
+  state.last.reset ();
+  state.setup.reset ();
+  state.setups.clear ();
+  state.schedule.reset ();
+  state.mapping.reset ();
+  state.tracked.reset ();
+  state.track.restart (true);
+  if (!location.empty ())
+    return state.file.open (self, location);
+  if (state.track.exists ())
+    return true;
+  POST_ERROR (self, RESOURCE, NOT_FOUND, "There is nothing to write to");
+  return false;
+}
+
+void
+end_run (GstElement *element)
+{
+  state_in<GstCodedExposureLog> (element).file.close ();
+}
+
+GstPad *
+request_new_pad (GstElement *element, GstPadTemplate *templ, const gchar *,
+    const GstCaps *) noexcept
+{
+  return state_in<GstCodedExposureLog> (element).track.request (templ);
+}
+
+void
+release_pad (GstElement *element, GstPad *pad) noexcept
+{
+  state_in<GstCodedExposureLog> (element).track.release (pad);
+}
+
+StructurePtr
+stats_of (const LogState &state)
+{
+  return StructurePtr (
+      gst_structure_new ("application/x-codedexposure-log-counters",
+          "frames-lost", G_TYPE_UINT64, state.frames_lost, nullptr));
+}
+
+const PropertyTable<LogState> &
+properties ()
+{
+  static const PropertyTable<LogState> table{
+      {"location", "File location",
+          "File to write, one line of JSON a coded frame; overwritten when it "
+          "exists; empty: none",
+          kReadWriteReady, &LogState::location},
+      {"counters", "Statistics",
+          "Counters: frames-lost, the coded frames that are missing before "
+          "frames that came, by their numbers",
+          kReadOnly, stats_of}};
+  return table;
+}
+
+} // namespace
+
+static void
+gst_coded_exposure_log_init (GstCodedExposureLog *self)
+{
+  self->state = new LogState (GST_ELEMENT (self));
+  gst_base_transform_set_passthrough (GST_BASE_TRANSFORM (self), TRUE);
+}
+
+static void
+gst_coded_exposure_log_class_init (GstCodedExposureLogClass *klass)
+{
+  install_state<GstCodedExposureLog, properties> (klass);
+  install_run<begin_run, end_run> (klass);
+  describe_element (klass, "Coded exposure frame log", "Filter/Analyzer/Video",
+      "Writes what is known of every coded frame: as a text track for a "
+      "container, or to a file of JSON lines");
+  add_pad_template (klass, "track",
+      {.presence = GST_PAD_REQUEST, .caps = "text/x-raw,format=utf8"});
+  GST_ELEMENT_CLASS (klass)->request_new_pad = request_new_pad;
+  GST_ELEMENT_CLASS (klass)->release_pad = release_pad;
+
+  auto *transform_class = GST_BASE_TRANSFORM_CLASS (klass);
+  transform_class->set_caps = GST_DEBUG_FUNCPTR (set_caps);
+  transform_class->sink_event = GST_DEBUG_FUNCPTR (sink_event);
+  transform_class->transform_ip = GST_DEBUG_FUNCPTR (transform_ip);
+}

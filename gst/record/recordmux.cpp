@@ -1,0 +1,429 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-codedexposure-recordmux
+ * @title: codedexposure-recordmux
+ * @short_description: Coded frames to the bytes of a recording
+ *
+ * Takes coded frames and gives a recording: Matroska with the frames, lossless,
+ * and a text track that has one line of JSON for each: number, time, exposure,
+ * synchronisation, lost frames, flags, a hash of the pixels, and the schedule
+ * and mapping. #codedexposure-recorddemux reads it.
+ *
+ * The element encodes in one thread of its own and writes in that of its
+ * encoder. Put a `queue` in front of it if the source must not wait; frames
+ * that such a queue drops (`leaky=downstream`) are counted as lost in the line
+ * of the next frame, by the numbers of the frames, and in
+ * #codedexposure-recordmux:stats.
+ *
+ * With #codedexposure-recordmux:streamable, the bytes are for a network:
+ * without an index, and receivers can join late.
+ *
+ * `splitmuxsink muxer-factory=codedexposure-recordmux` writes a recording in
+ * segments. Each is a recording of its own.
+ *
+ * #codedexposure-recordmux:log-location writes the lines to a second file, for
+ * other programs: first the schedule in its JSON form, then the mapping, if
+ * there is one, then the frames. Each line goes to the system at once: a crash
+ * loses one line at most.
+ *
+ * ## Example pipeline
+ * |[
+ * gst-launch-1.0 -e videotestsrc num-buffers=100 \
+ *     ! video/x-raw,format=GRAY8,framerate=100/1 ! codedexposure-sim \
+ *     ! codedexposure-recordmux ! filesink location=coded.mkv
+ * ]|
+ *
+ * Since: 0.2
+ */
+#include <string>
+
+#include <gst/gst.h>
+
+#include "common/element.h"
+#include "common/elements.h"
+#include "common/raii.h"
+#include "container.h"
+#include "parts.h"
+
+using namespace codedexposure;
+using namespace codedexposure::gst;
+
+G_DECLARE_FINAL_TYPE (GstCodedExposureRecordMux, gst_coded_exposure_record_mux,
+    GST, CODED_EXPOSURE_RECORD_MUX, GstBin)
+
+namespace
+{
+
+enum class Codec { ffv1, raw };
+
+struct Settings {
+  Codec codec = Codec::ffv1;
+  guint threads = 0;
+  bool is_streamable = false;
+  std::string log_location;
+};
+
+struct RecordMuxState {
+  /* Object lock: */
+  Settings settings;
+  GstPad *requested = nullptr; ///< in place of the sink pad
+
+  /* Of the bin: */
+  GstPad *sink = nullptr;
+  GstElement *log = nullptr, *frames = nullptr, *lines = nullptr;
+  GstElement *mux = nullptr;     ///< null: matroskamux is missing
+  GstElement *encoder = nullptr; ///< null: frames are raw, or it is missing
+
+  ContainerOutput output; ///< streaming thread
+};
+
+} // namespace
+
+struct _GstCodedExposureRecordMux {
+  GstBin parent;
+  RecordMuxState *state;
+};
+
+G_DEFINE_TYPE (
+    GstCodedExposureRecordMux, gst_coded_exposure_record_mux, GST_TYPE_BIN)
+GST_ELEMENT_REGISTER_DEFINE (codedexposure_recordmux, "codedexposure-recordmux",
+    GST_RANK_NONE, gst_coded_exposure_record_mux_get_type ())
+
+namespace
+{
+
+using Self = GstCodedExposureRecordMux;
+
+G_DEFINE_ENUM_TYPE (GstCodedExposureRecordCodec,
+    gst_coded_exposure_record_codec,
+    {int (Codec::ffv1), "Lossless, about half of the data", "ffv1"},
+    {int (Codec::raw), "Not compressed", "raw"});
+
+/* ---------------------------------------------------------- inner muxer -- */
+
+bool
+has_format (const GstCaps *caps, const char *format)
+{
+  const GstStructure *structure = gst_caps_get_structure (caps, 0);
+  const gchar *own = gst_structure_get_string (structure, "format");
+  return gst_structure_has_name (structure, "video/x-raw") &&
+         g_strcmp0 (own, format) == 0;
+}
+
+/* It would refuse 16-bit grey. */
+GstPadProbeReturn
+answer (GstQuery *query)
+{
+  GstCaps *caps = nullptr;
+  if (GST_QUERY_TYPE (query) == GST_QUERY_ACCEPT_CAPS) {
+    gst_query_parse_accept_caps (query, &caps);
+    if (!has_format (caps, "GRAY16_LE") && !has_format (caps, kDeepFormat))
+      return GST_PAD_PROBE_OK;
+    gst_query_set_accept_caps_result (query, TRUE);
+    return GST_PAD_PROBE_HANDLED;
+  }
+  if (GST_QUERY_TYPE (query) != GST_QUERY_CAPS)
+    return GST_PAD_PROBE_OK;
+  const CapsPtr all (
+      gst_caps_from_string (CODED_EXPOSURE_VIDEO_CAPS ";video/x-ffv"));
+  gst_query_parse_caps (query, &caps);
+  const CapsPtr wanted (caps ? gst_caps_intersect_full (
+                                   caps, all.get (), GST_CAPS_INTERSECT_FIRST)
+                             : gst_caps_ref (all.get ()));
+  gst_query_set_caps_result (query, wanted.get ());
+  return GST_PAD_PROBE_HANDLED;
+}
+
+GstEvent *
+rename_format (GstEvent *event)
+{
+  GstCaps *caps = nullptr;
+  gst_event_parse_caps (event, &caps);
+  if (!has_format (caps, "GRAY16_LE"))
+    return event;
+  const CapsPtr renamed (gst_caps_copy (caps));
+  gst_caps_set_simple (
+      renamed.get (), "format", G_TYPE_STRING, kDeepFormat, nullptr);
+  gst_event_unref (event);
+  return gst_event_new_caps (renamed.get ());
+}
+
+GstPadProbeReturn
+on_video (GstPad *, GstPadProbeInfo *info, gpointer) noexcept
+{
+  const auto type = GST_PAD_PROBE_INFO_TYPE (info);
+  if (type & GST_PAD_PROBE_TYPE_QUERY_DOWNSTREAM)
+    return type & GST_PAD_PROBE_TYPE_PUSH
+               ? answer (GST_PAD_PROBE_INFO_QUERY (info))
+               : GST_PAD_PROBE_OK;
+  auto *event = GST_PAD_PROBE_INFO_EVENT (info);
+  if (GST_EVENT_TYPE (event) == GST_EVENT_CAPS)
+    info->data = rename_format (event);
+  return GST_PAD_PROBE_OK;
+}
+
+/* With live sources, matroskamux >= 1.24 does not wait for frames: it writes
+ * the lines of frames that come late, because their encoder is slow, seconds
+ * before them, and the frames get wrong times. */
+GstPadProbeReturn
+on_latency (GstPad *, GstPadProbeInfo *info, gpointer) noexcept
+{
+  GstQuery *query = GST_PAD_PROBE_INFO_QUERY (info);
+  if (GST_QUERY_TYPE (query) != GST_QUERY_LATENCY)
+    return GST_PAD_PROBE_OK;
+  gst_query_set_latency (query, FALSE, 0, GST_CLOCK_TIME_NONE);
+  return GST_PAD_PROBE_HANDLED;
+}
+
+GstPadProbeReturn
+on_output (GstPad *, GstPadProbeInfo *info, gpointer self) noexcept
+{
+  state_in<Self> (self).output.rewrite (info);
+  return GST_PAD_PROBE_OK;
+}
+
+/* Its times are exact to 1 ns; each frame, which can be decoded alone, has a
+ * cluster of its own. */
+void
+add_muxer (Self *self)
+{
+  RecordMuxState &state = *self->state;
+  state.mux = gst_element_factory_make ("matroskamux", nullptr);
+  if (!state.mux)
+    return;
+  g_object_set (state.mux, "timecodescale", gint64 (1), nullptr);
+  gst_bin_add (GST_BIN (self), state.mux);
+  const ObjectPtr<GstPad> video (
+      gst_element_request_pad_simple (state.mux, "video_0"));
+  const ObjectPtr<GstPad> text (
+      gst_element_request_pad_simple (state.mux, "subtitle_0"));
+  gst_pad_add_probe (video.get (),
+      GstPadProbeType (GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM |
+                       GST_PAD_PROBE_TYPE_QUERY_DOWNSTREAM),
+      on_video, nullptr, nullptr);
+  for (GstPad *pad : {video.get (), text.get ()})
+    gst_pad_add_probe (
+        pad, GST_PAD_PROBE_TYPE_QUERY_UPSTREAM, on_latency, nullptr, nullptr);
+  const ObjectPtr<GstPad> src (gst_element_get_static_pad (state.mux, "src"));
+  gst_pad_add_probe (src.get (),
+      GstPadProbeType (
+          GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM),
+      on_output, self, nullptr);
+}
+
+/* -------------------------------------------------------------- encoder -- */
+
+/* Bytes depend on the slices, not on the threads. */
+bool
+add_encoder (GstElement *self, guint threads)
+{
+  auto &state = state_in<Self> (self);
+  state.encoder = gst_element_factory_make ("avenc_ffv1", nullptr);
+  if (!state.encoder) {
+    POST_ERROR (self, CORE, MISSING_PLUGIN, missing ("avenc_ffv1"));
+    return false;
+  }
+  g_object_set (state.encoder, "gop-size", 1, "slices", 4, nullptr);
+  gst_util_set_object_arg (G_OBJECT (state.encoder), "threads",
+      threads == 0 ? "auto" : std::to_string (threads).c_str ());
+  gst_bin_add (GST_BIN (self), state.encoder);
+  return gst_element_link (state.frames, state.encoder) &&
+         gst_element_link_pads (state.encoder, "src", state.mux, "video_0");
+}
+
+void
+remove_encoder (GstElement *self)
+{
+  auto &state = state_in<Self> (self);
+  if (!state.encoder)
+    return;
+  gst_element_set_state (state.encoder, GST_STATE_NULL);
+  gst_bin_remove (GST_BIN (self), state.encoder);
+  state.encoder = nullptr;
+}
+
+/* ------------------------------------------------------------------ bin -- */
+
+bool
+begin_run (GstElement *self)
+{
+  auto &state = state_in<Self> (self);
+  if (!state.mux) {
+    POST_ERROR (self, CORE, MISSING_PLUGIN, missing ("matroskamux"));
+    return false;
+  }
+  Settings settings;
+  {
+    const ObjectLock lock (self);
+    settings = state.settings;
+  }
+  g_object_set (state.log, "location", settings.log_location.c_str (), nullptr);
+  g_object_set (
+      state.mux, "streamable", gboolean (settings.is_streamable), nullptr);
+  state.output.restart ();
+  return settings.codec == Codec::ffv1
+             ? add_encoder (self, settings.threads)
+             : gst_element_link_pads (
+                   state.frames, "src", state.mux, "video_0") == TRUE;
+}
+
+void
+end_run (GstElement *self)
+{
+  auto &state = state_in<Self> (self);
+  if (!state.encoder && state.mux)
+    gst_element_unlink (state.frames, state.mux);
+  remove_encoder (self);
+}
+
+/* The inner muxer refuses seeks, which are for the source of the frames; it
+ * does not look at times before its first frame. */
+gboolean
+src_event (GstPad *pad, GstObject *parent, GstEvent *event) noexcept
+{
+  if (GST_EVENT_TYPE (event) != GST_EVENT_SEEK)
+    return gst_pad_event_default (pad, parent, event);
+  ObjectPtr<GstPad> sink;
+  {
+    const auto &state = state_in<Self> (parent);
+    const ObjectLock lock (parent);
+    sink.reset (GST_PAD (
+        gst_object_ref (state.requested ? state.requested : state.sink)));
+  }
+  return gst_pad_push_event (sink.get (), event);
+}
+
+/* splitmuxsink asks for the pad of the video. */
+GstPad *
+request_new_pad (GstElement *self, GstPadTemplate *templ, const gchar *,
+    const GstCaps *) noexcept
+{
+  auto &state = state_in<Self> (self);
+  {
+    const ObjectLock lock (self);
+    if (state.requested)
+      return nullptr;
+  }
+  const ObjectPtr<GstPad> inner (
+      gst_element_get_static_pad (state.log, "sink"));
+  gst_ghost_pad_set_target (GST_GHOST_PAD (state.sink), nullptr);
+  GstPad *pad =
+      gst_ghost_pad_new_from_template ("video_0", inner.get (), templ);
+  gst_pad_set_active (pad, TRUE);
+  gst_element_add_pad (self, pad);
+  const ObjectLock lock (self);
+  return state.requested = pad;
+}
+
+/* A bin that is disposed of has no elements any more. */
+void
+release_pad (GstElement *self, GstPad *pad) noexcept
+{
+  auto &state = state_in<Self> (self);
+  gst_element_remove_pad (self, pad);
+  if (GST_BIN_NUMCHILDREN (self) > 0) {
+    const ObjectPtr<GstPad> inner (
+        gst_element_get_static_pad (state.log, "sink"));
+    gst_ghost_pad_set_target (GST_GHOST_PAD (state.sink), inner.get ());
+  }
+  const ObjectLock lock (self);
+  state.requested = nullptr;
+}
+
+StructurePtr
+stats_of (const RecordMuxState &state)
+{
+  GstStructure *stats = nullptr;
+  g_object_get (state.log, "counters", &stats, nullptr);
+  gst_structure_set_name (stats, "application/x-codedexposure-recordmux-stats");
+  return StructurePtr (stats);
+}
+
+const PropertyTable<RecordMuxState> &
+properties ()
+{
+  static const auto set = [] (auto member) {
+    return within (&RecordMuxState::settings, member);
+  };
+  static const PropertyTable<RecordMuxState> table{
+      {"codec", "Kind of video", "How the frames are stored", kReadWriteReady,
+          set (&Settings::codec), gst_coded_exposure_record_codec_get_type ()},
+      {"threads", "Threads",
+          "Threads of the encoder; the bytes do not depend on them; 0: one for "
+          "each processor",
+          kReadWriteReady, set (&Settings::threads), 0u, 64u},
+      {"streamable", "Streamable",
+          "Write for a network, without an index and without going back",
+          kReadWriteReady, set (&Settings::is_streamable)},
+      {"log-location", "Location of the log",
+          "File to write beside the recording, one line of JSON a coded frame; "
+          "overwritten when it exists; empty: none",
+          kReadWriteReady, set (&Settings::log_location)},
+      {"stats", "Statistics",
+          "Counters: frames-lost, the coded frames that are missing before "
+          "frames that came, by their numbers",
+          kReadOnly, stats_of}};
+  return table;
+}
+
+/* Frames are hashed and encoded in two threads. Lines are much smaller, and the
+ * muxer waits for their frames. */
+void
+set_up_queues (const RecordMuxState &state)
+{
+  constexpr guint64 kNoLimit = 0;
+  g_object_set (state.frames, "max-size-buffers", 2u, "max-size-bytes", 0u,
+      "max-size-time", kNoLimit, nullptr);
+  g_object_set (state.lines, "max-size-buffers", 0u, "max-size-bytes", 0u,
+      "max-size-time", kNoLimit, nullptr);
+}
+
+} // namespace
+
+static void
+gst_coded_exposure_record_mux_init (GstCodedExposureRecordMux *self)
+{
+  self->state = new RecordMuxState ();
+  RecordMuxState &state = *self->state;
+  state.log = make_part (gst_coded_exposure_log_get_type ());
+  state.frames = gst_element_factory_make ("queue", nullptr);
+  state.lines = gst_element_factory_make ("queue", nullptr);
+  set_up_queues (state);
+  gst_bin_add_many (
+      GST_BIN (self), state.log, state.frames, state.lines, nullptr);
+  gst_element_link_pads (state.log, "src", state.frames, "sink");
+  gst_element_link_pads (state.log, "track", state.lines, "sink");
+  add_muxer (self);
+  if (state.mux)
+    gst_element_link_pads (state.lines, "src", state.mux, "subtitle_0");
+
+  auto *klass = GST_ELEMENT_GET_CLASS (self);
+  const auto add = [&] (const char *name, GstElement *inner) {
+    const ObjectPtr<GstPad> target (
+        inner ? gst_element_get_static_pad (inner, name) : nullptr);
+    GstPadTemplate *templ = gst_element_class_get_pad_template (klass, name);
+    GstPad *pad =
+        target ? gst_ghost_pad_new_from_template (name, target.get (), templ)
+               : gst_ghost_pad_new_no_target_from_template (name, templ);
+    gst_element_add_pad (GST_ELEMENT (self), pad);
+    return pad;
+  };
+  state.sink = add ("sink", state.log);
+  gst_pad_set_event_function (add ("src", state.mux), src_event);
+}
+
+static void
+gst_coded_exposure_record_mux_class_init (GstCodedExposureRecordMuxClass *klass)
+{
+  install_state<GstCodedExposureRecordMux, properties> (klass);
+  install_run<begin_run, end_run> (klass);
+  describe_element (klass, "Coded exposure recording muxer", "Codec/Muxer",
+      "Coded frames to a recording: lossless video, and all that is known of "
+      "each frame",
+      {"sink"});
+  add_pad_template (klass, "src", {.caps = "video/x-matroska"});
+  add_pad_template (klass, "video_%u",
+      {.presence = GST_PAD_REQUEST, .direction = GST_PAD_SINK});
+  GST_ELEMENT_CLASS (klass)->request_new_pad = request_new_pad;
+  GST_ELEMENT_CLASS (klass)->release_pad = release_pad;
+}

@@ -1,0 +1,594 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The part of codedexposure-recorddemux that knows frames: puts back onto them
+ * what their track says, and checks their pixels. The pad `track` takes the
+ * text directly from the demuxer, without a queue. A frame is held until the
+ * next one comes if its line is not there yet. */
+#include <algorithm>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include <gst/gst.h>
+
+#include "common/element.h"
+#include "common/meta.h"
+#include "common/record.h"
+#include "common/tag.h"
+#include "damage.h"
+#include "parts.h"
+#include "setups.h"
+#include "track_sink.h"
+
+using namespace codedexposure;
+using namespace codedexposure::gst;
+
+GST_DEBUG_CATEGORY (codedexposure_restore_debug);
+#define GST_CAT_DEFAULT codedexposure_restore_debug
+
+namespace
+{
+
+/** A frame, or a serialised event that came after one that waits. */
+using Item = std::variant<BufferPtr, EventPtr>;
+
+struct RestoreState {
+  explicit RestoreState (GstElement *element = nullptr)
+      : track (element), damage (element)
+  {
+  }
+
+  GstPad *sink = nullptr, *src = nullptr; ///< the element's
+  guint64 tick = 1; ///< object lock; to which the container rounds times, ns
+
+  TrackSink track;
+  DamageReport damage;
+
+  /* Stream lock of the sink pad. */
+  GstVideoInfo info = {};
+  GstSegment segment = {};
+  std::deque<Item> held;
+  guint32 segment_seqnum = GST_SEQNUM_INVALID; ///< of the segment
+  bool is_complete = true;                     ///< all its frames are to come
+  std::optional<StreamSetup> container;     ///< setup of the container's tags
+  std::vector<StreamSetup> others;          ///< those before it
+  std::shared_ptr<const StreamSetup> setup; ///< in force
+  std::optional<guint64> last_frame;
+  bool announced = false; ///< the container's tags say that there is a track
+  bool found_line = false;
+  bool whole = true; ///< no seek: the first frame is that of the stream
+  bool said_no_track = false;
+  bool said_moved = false;
+  bool said_setups_differ = false;
+};
+
+} // namespace
+
+G_DECLARE_FINAL_TYPE (GstCodedExposureRestore, gst_coded_exposure_restore, GST,
+    CODED_EXPOSURE_RESTORE, GstElement)
+
+struct _GstCodedExposureRestore {
+  GstElement parent;
+  RestoreState *state;
+};
+
+G_DEFINE_TYPE_WITH_CODE (GstCodedExposureRestore, gst_coded_exposure_restore,
+    GST_TYPE_ELEMENT,
+    GST_DEBUG_CATEGORY_INIT (codedexposure_restore_debug,
+        "codedexposure-restore", 0, "truth of recorded coded frames"))
+namespace
+{
+
+using Self = GstCodedExposureRestore;
+
+/* ---------------------------------------------------------------- setups -- */
+
+/* The schedule of the track is in force; @said is that of the container. */
+void
+warn_if_different (Self *self, const StreamSetup &said)
+{
+  RestoreState &state = *self->state;
+  const auto &others = state.others;
+  if (!state.setup || said.schedule == state.setup->schedule ||
+      std::ranges::find (others, *state.setup) != others.end () ||
+      std::exchange (state.said_setups_differ, true))
+    return;
+  POST_WARNING (self, STREAM, FORMAT,
+      "The tags of the recording have the schedule " + said.schedule.text () +
+          ", but its frames were recorded with " +
+          state.setup->schedule.text () +
+          ", as their track says, which is used. To use another, set the "
+          "schedule property where they are decoded.");
+}
+
+void
+use_setup (Self *self, std::shared_ptr<const StreamSetup> setup)
+{
+  RestoreState &state = *self->state;
+  if (state.setup == setup || (state.setup && *state.setup == *setup))
+    return;
+  state.setup = std::move (setup);
+  gst_pad_push_event (state.src, setup_to_event (*state.setup));
+}
+
+/* Before the frame to which the line, if it was found, belongs. */
+void
+settle_setup (Self *self, const TrackReader::Match &match)
+{
+  RestoreState &state = *self->state;
+  if (match.setup)
+    use_setup (self, match.setup);
+  else if (!state.setup && state.container)
+    use_setup (self, std::make_shared<const StreamSetup> (*state.container));
+  if (state.container)
+    warn_if_different (self, *state.container);
+}
+
+void
+note_setups (
+    RestoreState &state, const StreamSetup &last, const GstTagList *tags)
+{
+  state.container = last;
+  state.container->track = false;
+  state.others = setups_from_tags (tags);
+  state.track.know (*state.container);
+  for (const StreamSetup &other : state.others)
+    state.track.know (other);
+}
+
+/* With a track, tags pass without their setup, which the track has. */
+gboolean
+on_tag (Self *self, EventPtr event)
+{
+  RestoreState &state = *self->state;
+  GstTagList *tags = nullptr;
+  gst_event_parse_tag (event.get (), &tags);
+  const auto said = setup_from_tags (tags);
+  if (said && *said)
+    state.announced |= said->value ().track;
+  if (!said || !*said || !state.track.exists ())
+    return gst_pad_push_event (state.src, event.release ());
+  note_setups (state, said->value (), tags);
+  warn_if_different (self, *state.container);
+  GstEvent *rest = state.setup ? replace_setup (event.release (), *state.setup)
+                               : remove_setup_and_provenance (event.release ());
+  return !rest || gst_pad_push_event (state.src, rest);
+}
+
+/* ---------------------------------------------------------------- frames -- */
+
+void
+report_missing (RestoreState &state, const TrackReader::Match &match)
+{
+  state.damage.frames_missing (
+      match.skipped, GstClockTime (match.skipped_from));
+}
+
+/* A frame without a line: nothing shows that it is as it was recorded. Without
+ * a track, elements downstream number the frames by their times. */
+void
+mark_unknown (RestoreState &state, GstBuffer *frame)
+{
+  const bool has_track = state.track.exists ();
+  FrameMeta meta;
+  meta.frame = state.last_frame ? *state.last_frame + 1 : 0;
+  if (has_track)
+    set_frame_meta (frame, meta);
+  state.last_frame = meta.frame;
+  GST_BUFFER_FLAG_SET (frame, GST_BUFFER_FLAG_CORRUPTED);
+  state.damage.frame_unknown (meta.frame, GST_BUFFER_PTS (frame),
+      !has_track                        ? "its track is missing"
+      : GST_BUFFER_PTS_IS_VALID (frame) ? "the track has no line for it"
+                                        : "it has no time to find its line by");
+}
+
+void
+say_no_track (Self *self)
+{
+  RestoreState &state = *self->state;
+  if (std::exchange (state.said_no_track, true))
+    return;
+  if (state.announced)
+    POST_WARNING (self, STREAM, DECODE,
+        "The recording has a track, as its tags say, but no line of it can be "
+        "read: it is damaged, or was copied without its track. It is unknown "
+        "whether its frames are synchronised or damaged; all are flagged. Use "
+        "another copy, with all tracks.");
+  else
+    POST_WARNING (self, STREAM, FORMAT,
+        "The stream has no track: it is unknown whether its frames are "
+        "synchronised or damaged. codedexposure-recordmux writes a track when "
+        "it records.");
+}
+
+/* Remuxing moves all frames alike; so does damage to the first times. */
+void
+say_moved (Self *self, const TrackReader::Match &match)
+{
+  if (match.offset == 0 || match.misplaced ||
+      std::exchange (self->state->said_moved, true))
+    return;
+  POST_INFO (self, STREAM, FORMAT,
+      "The frames are " + time_text (std::abs (match.offset)) +
+          (match.offset > 0 ? " later" : " earlier") +
+          " than when they were recorded: the recording was given other times, "
+          "or its first times are damaged.");
+}
+
+/* Why the frame must not be used as it is; null: it can be. */
+const char *
+flaw_of (const RestoreState &state, GstBuffer *frame, const FrameRecord &record,
+    const TrackReader::Match &match)
+{
+  if (record.hash && record.hash != hash_of (frame, state.info))
+    return "its pixels are not those that were recorded";
+  if (match.misplaced)
+    return "its time is not that at which it was recorded";
+  if (match.names_unknown_setup)
+    return "its schedule is not known, because a part of the track is missing";
+  return nullptr;
+}
+
+void
+restore (Self *self, GstBuffer *frame, const TrackReader::Match &match)
+{
+  RestoreState &state = *self->state;
+  FrameRecord record = *match.line->frame;
+  if (match.skipped > 0)
+    record.lost_before = record.lost_before.value_or (0) + match.skipped;
+  apply_record (frame, record, match.offset);
+  if (match.skipped > 0)
+    GST_BUFFER_FLAG_SET (frame, GST_BUFFER_FLAG_DISCONT);
+  state.last_frame = record.frame;
+  state.found_line = true;
+  say_moved (self, match);
+  const char *flaw = flaw_of (state, frame, record, match);
+  if (!flaw) {
+    state.damage.end_sequence ();
+    return;
+  }
+  GST_BUFFER_FLAG_SET (frame, GST_BUFFER_FLAG_CORRUPTED);
+  state.damage.frame_damaged (record.frame, GST_BUFFER_PTS (frame), flaw);
+}
+
+/* ---------------------------------------------------------------- events -- */
+
+/* A seek may end the stream before the last line, after a frame of any length.
+ */
+bool
+ends_early (const RestoreState &state)
+{
+  constexpr GstClockTime kSlack = 100 * GST_MSECOND;
+  return GST_CLOCK_TIME_IS_VALID (state.segment.stop) &&
+         GST_CLOCK_TIME_IS_VALID (state.segment.position) &&
+         state.segment.position + kSlack >= state.segment.stop;
+}
+
+void
+check_end (Self *self)
+{
+  RestoreState &state = *self->state;
+  state.damage.end_sequence ();
+  if (state.announced && state.last_frame && !state.found_line)
+    say_no_track (self);
+  if (!state.track.exists () || !state.is_complete)
+    return;
+  const auto [rest, frames] =
+      state.track.take_rest (Nanoseconds (state.segment.start));
+  if (!frames && ends_early (state))
+    return;
+  report_missing (state, rest);
+  if (!frames)
+    state.damage.stream_cut ();
+  else if (state.whole)
+    state.damage.stream_ended (*frames);
+}
+
+void
+forget_frames (RestoreState &state)
+{
+  state.held.clear ();
+  state.last_frame.reset ();
+  state.damage.forget ();
+  gst_segment_init (&state.segment, GST_FORMAT_TIME);
+}
+
+/* A container rounds times to its ticks, and the time of the stream begins with
+ * the rounded one of the first frame, which may be too late by half a tick. */
+void
+include_rounding (GstSegment &segment, guint64 tick)
+{
+  if (segment.rate > 0 && GST_CLOCK_TIME_IS_VALID (segment.time) &&
+      segment.time < segment.start)
+    segment.start -= std::min (tick / 2, segment.start - segment.time);
+}
+
+TrackReader::Order
+order_of (const GstSegment &segment)
+{
+  constexpr guint kTricks = GST_SEGMENT_FLAG_TRICKMODE |
+                            GST_SEGMENT_FLAG_TRICKMODE_KEY_UNITS |
+                            GST_SEGMENT_FLAG_TRICKMODE_FORWARD_PREDICTED;
+  if (segment.rate < 0)
+    return TrackReader::Order::backwards;
+  return segment.flags & kTricks ? TrackReader::Order::some
+                                 : TrackReader::Order::all;
+}
+
+EventPtr
+segment_event (const RestoreState &state)
+{
+  EventPtr event (gst_event_new_segment (&state.segment));
+  gst_event_set_seqnum (event.get (), state.segment_seqnum);
+  return event;
+}
+
+EventPtr
+take_segment (Self *self, EventPtr event)
+{
+  RestoreState &state = *self->state;
+  guint64 tick;
+  {
+    const ObjectLock lock (self);
+    tick = state.tick;
+  }
+  gst_event_copy_segment (event.get (), &state.segment);
+  state.segment_seqnum = gst_event_get_seqnum (event.get ());
+  const auto order = order_of (state.segment);
+  state.is_complete = order == TrackReader::Order::all;
+  state.track.next_segment (order);
+  if (!state.track.exists () || tick < 2)
+    return event;
+  include_rounding (state.segment, tick);
+  return segment_event (state);
+}
+
+/* A serialised event, in its turn. */
+gboolean
+take_event (Self *self, EventPtr event)
+{
+  RestoreState &state = *self->state;
+  switch (GST_EVENT_TYPE (event.get ())) {
+  case GST_EVENT_CAPS: {
+    GstCaps *caps = nullptr;
+    gst_event_parse_caps (event.get (), &caps);
+    if (!gst_video_info_from_caps (&state.info, caps))
+      return FALSE;
+    break;
+  }
+  case GST_EVENT_SEGMENT:
+    event = take_segment (self, std::move (event));
+    break;
+  case GST_EVENT_TAG:
+    return on_tag (self, std::move (event));
+  case GST_EVENT_EOS:
+    check_end (self);
+    break;
+  default:
+    break;
+  }
+  return gst_pad_event_default (
+      state.sink, GST_OBJECT (self), event.release ());
+}
+
+/* ----------------------------------------------------- frames and events -- */
+
+/* Other programs round times more. A frame that was in the segment, at @time,
+ * stays in it with its exact time. */
+void
+keep_in_segment (RestoreState &state, GstClockTime time, GstClockTime exact)
+{
+  GstSegment &segment = state.segment;
+  if (time < segment.start || exact >= segment.start)
+    return;
+  segment.time -= std::min (segment.time, segment.start - exact);
+  segment.start = exact;
+  gst_pad_push_event (state.src, segment_event (state).release ());
+}
+
+GstFlowReturn
+push_frame (Self *self, BufferPtr frame, const TrackReader::Match &match)
+{
+  RestoreState &state = *self->state;
+  frame.reset (gst_buffer_make_writable (frame.release ()));
+  const GstClockTime time = GST_BUFFER_PTS (frame.get ());
+  settle_setup (self, match);
+  report_missing (state, match);
+  if (match.line) {
+    restore (self, frame.get (), match);
+    keep_in_segment (state, time, GST_BUFFER_PTS (frame.get ()));
+  } else
+    mark_unknown (state, frame.get ());
+  if (GST_BUFFER_PTS_IS_VALID (frame.get ()))
+    state.segment.position = GST_BUFFER_PTS (frame.get ());
+  if (GST_BUFFER_DURATION_IS_VALID (frame.get ()))
+    state.segment.position += GST_BUFFER_DURATION (frame.get ());
+  return gst_pad_push (state.src, frame.release ());
+}
+
+/* Frames whose lines are there go on, or all; events follow the frames before
+ * them. */
+GstFlowReturn
+release (Self *self, bool all)
+{
+  /* A demuxer interleaves a line and its frame more closely than this. */
+  constexpr std::size_t kMaxHeld = 8;
+  RestoreState &state = *self->state;
+  GstFlowReturn flow = GST_FLOW_OK;
+  while (!state.held.empty () && flow == GST_FLOW_OK) {
+    std::optional<TrackReader::Match> match;
+    if (const auto *frame = std::get_if<BufferPtr> (&state.held.front ())) {
+      match =
+          GST_BUFFER_PTS_IS_VALID (frame->get ())
+              ? state.track.take (Nanoseconds (GST_BUFFER_PTS (frame->get ())),
+                    Nanoseconds (state.segment.start),
+                    !all && state.held.size () <= kMaxHeld)
+              : TrackReader::Match ();
+      if (!match)
+        break;
+    }
+    Item item = std::move (state.held.front ());
+    state.held.pop_front ();
+    if (auto *frame = std::get_if<BufferPtr> (&item))
+      flow = push_frame (self, std::move (*frame), *match);
+    else
+      take_event (self, std::move (std::get<EventPtr> (item)));
+  }
+  return flow;
+}
+
+GstFlowReturn
+chain (GstPad *, GstObject *parent, GstBuffer *buffer) noexcept
+{
+  auto *self = GST_CODED_EXPOSURE_RESTORE (parent);
+  RestoreState &state = *self->state;
+  BufferPtr frame (buffer);
+  state.damage.frame ();
+  if (!state.track.exists ()) {
+    say_no_track (self);
+    if (state.announced) {
+      frame.reset (gst_buffer_make_writable (frame.release ()));
+      mark_unknown (state, frame.get ());
+    }
+    return gst_pad_push (state.src, frame.release ());
+  }
+  state.held.push_back (std::move (frame));
+  return release (self, false);
+}
+
+gboolean
+sink_event (GstPad *pad, GstObject *parent, GstEvent *owned) noexcept
+{
+  auto *self = GST_CODED_EXPOSURE_RESTORE (parent);
+  RestoreState &state = *self->state;
+  EventPtr event (owned);
+  const GstEventType type = GST_EVENT_TYPE (owned);
+  if (type == GST_EVENT_FLUSH_STOP) {
+    forget_frames (state);
+    state.whole = false;
+  }
+  if (!(gst_event_type_get_flags (type) & GST_EVENT_TYPE_SERIALIZED) ||
+      type == GST_EVENT_FLUSH_STOP)
+    return gst_pad_event_default (pad, parent, event.release ());
+  /* No line follows the end. */
+  if (type == GST_EVENT_EOS)
+    release (self, true);
+  if (state.held.empty ())
+    return take_event (self, std::move (event));
+  state.held.push_back (std::move (event));
+  return TRUE;
+}
+
+/* The default asks the track, too, whose caps are none of the frames'. */
+gboolean
+src_query (GstPad *pad, GstObject *parent, GstQuery *query) noexcept
+{
+  if (GST_QUERY_TYPE (query) != GST_QUERY_CAPS)
+    return gst_pad_query_default (pad, parent, query);
+  GstCaps *filter = nullptr;
+  gst_query_parse_caps (query, &filter);
+  const CapsPtr own (gst_pad_get_pad_template_caps (pad));
+  const CapsPtr before (
+      gst_pad_peer_query_caps (state_in<Self> (parent).sink, filter));
+  const CapsPtr both (gst_caps_intersect (before.get (), own.get ()));
+  gst_query_set_caps_result (query, both.get ());
+  return TRUE;
+}
+
+/* --------------------------------------------------------------- element -- */
+
+bool
+begin_run (GstElement *element)
+{
+  RestoreState &state = state_in<Self> (element);
+  forget_frames (state);
+  state.container.reset ();
+  state.others.clear ();
+  state.setup.reset ();
+  state.announced = state.found_line = false;
+  state.whole = true;
+  state.said_no_track = state.said_setups_differ = state.said_moved = false;
+  state.track.restart ();
+  state.damage.restart ();
+  return true;
+}
+
+void
+end_run (GstElement *element)
+{
+  forget_frames (state_in<Self> (element));
+}
+
+GstPad *
+request_new_pad (GstElement *element, GstPadTemplate *templ, const gchar *,
+    const GstCaps *) noexcept
+{
+  return state_in<Self> (element).track.request (templ);
+}
+
+void
+release_pad (GstElement *element, GstPad *pad) noexcept
+{
+  state_in<Self> (element).track.release (pad);
+}
+
+StructurePtr
+stats_of (const RestoreState &state)
+{
+  return state.damage.stats (state.track.damaged ());
+}
+
+const PropertyTable<RestoreState> &
+properties ()
+{
+  static const PropertyTable<RestoreState> table{
+      {"tick", "Tick", "To which the container rounds times, ns", kReadWrite,
+          &RestoreState::tick, guint64 (1), guint64 (GST_SECOND)},
+      {"counters", "Statistics",
+          "frames, frames-damaged (their pixels are not those that were "
+          "recorded), frames-unknown (without a line in the track), "
+          "frames-missing (in the track only), lines-damaged",
+          kReadOnly, stats_of}};
+  return table;
+}
+
+} // namespace
+
+static void
+gst_coded_exposure_restore_init (GstCodedExposureRestore *self)
+{
+  self->state = new RestoreState (GST_ELEMENT (self));
+  auto *element_class = GST_ELEMENT_GET_CLASS (self);
+  const auto add = [&] (const char *name) {
+    GstPad *pad = gst_pad_new_from_template (
+        gst_element_class_get_pad_template (element_class, name), name);
+    GST_PAD_SET_PROXY_CAPS (pad);
+    GST_PAD_SET_PROXY_ALLOCATION (pad);
+    gst_element_add_pad (GST_ELEMENT (self), pad);
+    return pad;
+  };
+  self->state->sink = add ("sink");
+  gst_pad_set_chain_function (self->state->sink, chain);
+  gst_pad_set_event_function (self->state->sink, sink_event);
+  self->state->src = add ("src");
+  gst_pad_set_query_function (self->state->src, src_query);
+}
+
+static void
+gst_coded_exposure_restore_class_init (GstCodedExposureRestoreClass *klass)
+{
+  install_state<GstCodedExposureRestore, properties> (klass);
+  install_run<begin_run, end_run> (klass);
+  describe_element (klass, "Coded exposure restorer", "Filter/Analyzer/Video",
+      "Puts back onto recorded coded frames what their track says, and checks "
+      "their pixels");
+  add_pad_template (klass, "track",
+      {.presence = GST_PAD_REQUEST,
+          .caps = "text/x-raw,format={utf8,pango-markup}",
+          .direction = GST_PAD_SINK});
+  auto *element_class = GST_ELEMENT_CLASS (klass);
+  element_class->request_new_pad = request_new_pad;
+  element_class->release_pad = release_pad;
+}

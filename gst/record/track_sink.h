@@ -1,0 +1,71 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The pad of the part restore that takes the text track of a recording. */
+#pragma once
+
+#include <atomic>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include <gst/gst.h>
+
+#include "common/request_pad.h"
+#include "record/track_reader.h"
+
+namespace codedexposure::gst
+{
+
+/** Reads the lines that come on the track's streaming thread, plain or as Pango
+ * markup, and gives each frame its line. */
+class TrackSink
+{
+public:
+  explicit TrackSink (GstElement *element) : pad_ (element) {}
+
+  /* Any thread: */
+
+  /** Null if there is one already. */
+  GstPad *request (GstPadTemplate *templ);
+  void release (GstPad *pad) { pad_.release (pad); }
+  bool exists () const { return pad_.get () != nullptr; }
+  /** Lines that could not be read since restart (). */
+  guint64 damaged () const { return damaged_; }
+
+  /** Before a run. */
+  void restart ();
+
+  /* Streaming thread of the frames: */
+
+  /** TrackReader::next_segment (). */
+  void next_segment (TrackReader::Order order);
+  /** TrackReader::know (). */
+  void know (const StreamSetup &setup);
+  /** TrackReader::take (), or take_now () if the line is not waited for: then
+   * there always is a match. */
+  std::optional<TrackReader::Match> take (
+      Nanoseconds pts, Nanoseconds start, bool wait);
+  struct Rest {
+    TrackReader::Match match;
+    /** In the whole stream, if its last line came. */
+    std::optional<std::uint64_t> frames;
+  };
+  /** TrackReader::take_rest (). */
+  Rest take_rest (Nanoseconds start);
+
+private:
+  static GstFlowReturn chain (
+      GstPad *pad, GstObject *parent, GstBuffer *buffer) noexcept;
+  static gboolean event (
+      GstPad *pad, GstObject *parent, GstEvent *event) noexcept;
+  Result<void> add (
+      const std::string &text, Nanoseconds pts, Nanoseconds duration);
+
+  RequestPad pad_;
+  std::atomic<guint64> damaged_ = 0;
+
+  std::mutex lock_;     ///< never held while pushing
+  TrackReader reader_;  ///< lock_
+  bool markup_ = false; ///< lock_; the text is escaped
+};
+
+} // namespace codedexposure::gst

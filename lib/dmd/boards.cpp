@@ -1,0 +1,198 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "dmd/boards.h"
+
+#include <algorithm>
+#include <initializer_list>
+
+#include "base/text.h"
+#include "base/try.h"
+
+namespace codedexposure
+{
+
+namespace
+{
+
+constexpr Nanoseconds kMicrosecond = 1000;
+/** Masks in one frame of video. */
+constexpr int kVideoMasks = 24;
+
+/** Lines of the pattern table; every board holds more planes. */
+constexpr int kDlpc900Lines = 400;
+
+/** @p least  min time of a binary mask, us. @p delay  the shortest one from the
+ * camera's edge to light. */
+constexpr BoardFacts
+dlpc900_board (const char *name, const char *mirrors, const char *product,
+    Extent size, std::uint8_t type, int controllers = 1,
+    std::uint32_t least = 105, std::uint32_t delay = 104)
+{
+  return {name, mirrors, product, Controller::dlpc900, size, Array::orthogonal,
+      kDlpc900Lines, {least, 0xFFFFFF, least, 105, 105}, delay, false, type,
+      controllers};
+}
+
+/* The dark times of the DLP3000 are those of the option gap. A DLP4500 shows
+ * the masks of its two buffers without reading flash meanwhile, and takes 230
+ * us to load a black one. */
+constexpr BoardFacts kBoards[] = {
+    {"dlp3000", "DLP3000", "LightCrafter", Controller::dlpc300, {608, 684},
+        Array::diamond, 96, {250, 2'000'000, 0, 0, 0}, 0, true},
+    {"dlp4500", "DLP4500", "LightCrafter 4500", Controller::dlpc350,
+        {912, 1140}, Array::diamond, 48, {235, 200'000'000, 230, 0, 230}, 0,
+        true},
+    dlpc900_board (
+        "dlp500yx", "DLP500YX", "DLP500YX board", {2048, 1200}, 4, 1, 62, 62),
+    dlpc900_board ("dlp5500", "DLP5500", "DLP5500 board", {1024, 768}, 5),
+    dlpc900_board ("dlp6500", "DLP6500", "LightCrafter 6500", {1920, 1080}, 1),
+    dlpc900_board ("dlp670s", "DLP670S", "DLP670S board", {2716, 1600}, 3, 2),
+    dlpc900_board (
+        "dlp9000", "DLP9000", "LightCrafter 9000", {2560, 1600}, 2, 2),
+};
+
+/** Options that not all controllers have. */
+struct OwnOption {
+  const char *key;
+  std::initializer_list<Controller> controllers;
+};
+const OwnOption kOwnOptions[] = {
+    {"trigger-delay", {Controller::dlpc900}},
+    {"pulse", {Controller::dlpc350, Controller::dlpc900}},
+    {"patience", {Controller::dlpc350, Controller::dlpc900}},
+    {"images", {Controller::dlpc350}},
+    {"source", {Controller::dlpc350}},
+    {"trigger2-bit", {Controller::dlpc900}},
+    {"table", {Controller::dlpc900}},
+    {"erle-padding", {Controller::dlpc900}},
+    {"polarity-bit", {Controller::dlpc350}},
+    {"odd-rows", {Controller::dlpc300, Controller::dlpc350}},
+    {"image-pair", {Controller::dlpc350}},
+    {"gap", {Controller::dlpc300}},
+};
+
+/** An option that the board does not have would be ignored. */
+Result<void>
+check_own (const BoardFacts &facts, const DmdOptions &options)
+{
+  for (const auto &[key, controllers] : kOwnOptions)
+    if (std::ranges::find (options.keys, key) != options.keys.end () &&
+        std::ranges::find (controllers, facts.controller) == controllers.end ())
+      return Error{"a " + std::string (controller_text (facts.controller)) +
+                   " has no option " + key + "; leave it out" +
+                   (std::string_view (key) == "images"
+                           ? ": the board takes its masks over its link"
+                           : "")};
+  return {};
+}
+
+Result<void>
+check_dlpc900 (const BoardFacts &facts, const DmdOptions &options)
+{
+  const Nanoseconds least = facts.minimum_trigger_delay * kMicrosecond;
+  constexpr Nanoseconds kMost = 0xFFFF * kMicrosecond;
+  if (options.trigger_delay < least || options.trigger_delay > kMost)
+    return Error{"trigger-delay is " + time_text (options.trigger_delay) +
+                 "; use " + std::to_string (facts.minimum_trigger_delay) +
+                 "us to 65535us"};
+  return {};
+}
+
+} // namespace
+
+const char *
+controller_text (Controller controller)
+{
+  return controller == Controller::dlpc300   ? "DLPC300"
+         : controller == Controller::dlpc350 ? "DLPC350"
+                                             : "DLPC900";
+}
+
+std::span<const BoardFacts>
+boards ()
+{
+  return kBoards;
+}
+
+const BoardFacts *
+find_board (std::string_view name)
+{
+  const auto found = std::ranges::find (kBoards, name, &BoardFacts::name);
+  return found == std::end (kBoards) ? nullptr : found;
+}
+
+const BoardFacts *
+find_dlpc900 (int type)
+{
+  for (const BoardFacts &board : kBoards)
+    if (board.controller == Controller::dlpc900 && board.type == type)
+      return &board;
+  return nullptr;
+}
+
+std::string
+board_names ()
+{
+  std::string names;
+  for (const BoardFacts &board : kBoards)
+    names += (names.empty ()                        ? ""
+                 : &board + 1 == std::end (kBoards) ? " or "
+                                                    : ", ") +
+             std::string (board.name);
+  return names;
+}
+
+Result<DmdInfo>
+board_info (const BoardFacts &facts, const DmdOptions &options)
+{
+  PatternRule rule{.limits = facts.limits,
+      .master = options.master,
+      .equal_times = facts.equal_times};
+  DmdInfo info{.name = facts.name,
+      .size = facts.size,
+      .resident_masks = facts.masks,
+      .triggers_camera = options.master == Master::dmd,
+      .trigger_in = true,
+      .trigger_out = true,
+      .array = facts.array};
+  RETURN_IF_ERROR (check_own (facts, options));
+  switch (facts.controller) {
+  case Controller::dlpc300:
+    info.minimum_switching = options.gap;
+    rule.limits.minimum_dark = rule.limits.trigger_dark =
+        std::uint32_t (options.gap / kMicrosecond);
+    break;
+  case Controller::dlpc350:
+    rule.no_dark = options.source == dlpc350::Source::video;
+    if (rule.no_dark)
+      info.resident_masks = kVideoMasks;
+    break;
+  case Controller::dlpc900:
+    RETURN_IF_ERROR (check_dlpc900 (facts, options));
+    rule.limits.trigger_delay =
+        std::uint32_t (options.trigger_delay / kMicrosecond);
+    info.still_masks = true;
+    if (const auto &region = options.placement.region)
+      info.region = {region->width, region->height};
+    break;
+  }
+  info.minimum_active = rule.limits.minimum_exposure * kMicrosecond;
+  info.patterns = rule;
+  RETURN_IF_ERROR (check_placement (options.placement, info.array, info.size));
+  return info;
+}
+
+Result<NamedBoard>
+parse_board (std::string_view text)
+{
+  ASSIGN_OR_RETURN (const DmdOptions options, DmdOptions::parse (text));
+  const BoardFacts *facts = find_board (options.which);
+  if (!facts)
+    return Error{
+        "unknown DMD " + in_quotes (options.which) + "; use " + board_names ()};
+  auto info = board_info (*facts, options);
+  if (!info)
+    return info.error ().with_prefix (std::string (facts->name) + ": ");
+  return NamedBoard{facts, options, *std::move (info)};
+}
+
+} // namespace codedexposure

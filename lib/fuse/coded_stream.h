@@ -1,0 +1,80 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The coded frames that are fused next, and the one before them. */
+#pragma once
+
+#include <deque>
+#include <vector>
+
+#include "estimate/observation.h"
+#include "fuse/field.h"
+#include "fuse/kernels.h"
+#include "fuse/phases.h"
+
+namespace codedexposure::fuse
+{
+
+/** A coded frame; the pairs have a margin of the taps' radius. */
+struct CodedFrame {
+  Field light;
+  SplitField pairs;
+};
+
+/** A coded frame, and those before and after it, null where there is none. */
+struct CodedFrames {
+  const CodedFrame *before, *now, *after;
+
+  Neighbours neighbours () const
+  {
+    return {before != nullptr, after != nullptr};
+  }
+};
+
+/** Coded frames in the order of their exposure. */
+class CodedStream
+{
+public:
+  /** @p size    of the frames; the schedule has no pilot.
+   *  @p radius  of the taps, px.
+   *  @p period  of the parts of rows of pairs.
+   *  @p steps   see FilterBank. */
+  CodedStream (const Schedule &schedule, const Observation &observation,
+      Extent size, int radius, int period, float steps);
+
+  /** A field to write the next coded frame to, times gain () row by row. */
+  Field &next ();
+  /** Factors of the pixels of row @p y, beside 255 / white; null where they are
+   * all 1. */
+  const float *gain (int y) const
+  {
+    return gain_.empty () ? nullptr : gain_.row (y);
+  }
+  /** Queues the frame in next (). */
+  void take (const Kernels &kernels);
+
+  int pending () const { return int (queue_.size ()); }
+  /** The oldest pending frame and its neighbours. */
+  CodedFrames frames () const;
+  /** Goes on to the next frame. */
+  void advance ();
+  void forget ();
+
+private:
+  void find_margin (const Schedule &schedule, bool exact);
+
+  int radius_, period_;
+  float steps_;
+  FieldOf<std::int32_t> pixels_; ///< of one frame, with its margin
+  Field gain_;                   ///< empty if it is 1 everywhere
+
+  /* Pixels of the margin and the pixels that they repeat. */
+  struct Repeat {
+    std::ptrdiff_t to, from;
+  };
+  std::vector<Repeat> margin_;
+
+  std::deque<CodedFrame> queue_;
+  CodedFrame previous_; ///< empty if there is none
+  CodedFrame spare_;
+};
+
+} // namespace codedexposure::fuse

@@ -1,0 +1,49 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The linear filter of `fast`, of the model that fits around each pixel. */
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "base/workers.h"
+#include "fuse/models.h"
+#include "fuse/predictions.h"
+#include "fuse/static_pixels.h"
+
+namespace codedexposure::fuse
+{
+
+/** Row @p y of every slot, of the frame's width, 255 for white. Threads may
+ * call it for different rows at the same time. */
+using RowSink = std::function<void (int y, const float *const *slots)>;
+
+/** The sum of the filters of some models, with the preferences for them as
+ * weights, where pixels are not static. */
+class LinearFilter
+{
+public:
+  /** @p plan  outlives this. */
+  LinearFilter (const FilterPlan &plan, const Models &models);
+
+  /** False when it was stopped. */
+  bool run (const Kernels &kernels, const CodedFrames &frames,
+      const Predictions::Found &predicted, const StaticPixels::Found &still,
+      const RowSink &sink, Workers &workers, std::stop_token stop);
+
+private:
+  using Banks = std::vector<FilterBank>; ///< of each model; groups are slots
+
+  Banks make_filters (Neighbours neighbours) const;
+  /** Of a thread. */
+  struct Room;
+  void share (const Kernels &kernels, const Predictions::Found &predicted,
+      const StaticPixels::Found &still, int y, Room &to) const;
+  void estimate (const Kernels &kernels, const Banks &filters,
+      const CodedFrames &frames, int y, Room &to) const;
+
+  const FilterPlan &plan_;
+  Models models_;
+  ForNeighbours<Banks> filters_;
+};
+
+} // namespace codedexposure::fuse

@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Decodes one chunk."""
+import os
+import resource
+import shutil
+import socket
+import subprocess
+import time
+
+from . import programs
+from .plan import FORMS, digest_of_options
+from .store import (Problem, digest, fingerprint, read_json, write_json)
+
+TABLE = 'statistics.csv'
+FOR_OUTPUT = '--deflate', '--white'  # for other forms than lossless video
+DONE, DAMAGED = 0, 3  # of decode
+ENGINE_NAMES = 'SLURM_ARRAY_JOB_ID', 'SLURM_ARRAY_TASK_ID', 'PARALLEL_SEQ'
+
+
+def seconds(time_ns):
+    return f'{time_ns // 10**9}.{time_ns % 10**9:09d}'
+
+
+def name_of(form):
+    """The file or folder with the pictures of a chunk."""
+    return 'pictures' + FORMS[form].rstrip('/')
+
+
+def identity(plan, recording, chunk):
+    """What a chunk's manifest must say to belong to the plan."""
+    source = plan.recordings[recording]
+    return {
+        'statistics': plan.statistics,
+        'format': 'coded-exposure-archive-chunk', 'version': 1,
+        'recording': source.path, 'recording_hash': source.fingerprint,
+        'excerpt_ns': list(source.excerpt(chunk)),
+        'options': plan.options, 'options_sha256': plan.options_digest,
+        'form': plan.form, 'program': plan.program,
+    }
+
+
+def command(plan, recording, chunk, scratch):
+    """A recording that is one chunk because it is damaged is decoded like any
+    other, from front to back if need be."""
+    source = plan.recordings[recording]
+    start, stop = source.excerpt(chunk)
+    form = plan.chunk_form(recording)
+    options = [option for option in plan.options if form == plan.form
+               or not option.startswith(FOR_OUTPUT)]
+    words = [*programs.DECODE, source.path, *options, '--json',
+             f'--threads={plan.threads}',
+             '--output=' + os.path.join(scratch, 'pictures' + FORMS[form])]
+    if plan.statistics:
+        words.append(f'--statistics={os.path.join(scratch, TABLE)}')
+    if source.chunks > 1:
+        stop = '' if stop is None else seconds(stop)
+        words.append(f'--excerpt={seconds(start)}-{stop}')
+    return words
+
+
+def check_options(plan):
+    """Raises Problem if decode does not take the options of the plan, or does not
+    write its form."""
+    said = subprocess.run(
+        [*programs.DECODE, plan.recordings[0].path, *plan.options, '--print',
+         f'--output=pictures{FORMS[plan.form]}'], capture_output=True, text=True,
+        check=False, stdin=subprocess.DEVNULL)
+    if said.returncode != 0:
+        raise Problem(said.stderr.partition('\n')[0])
+
+
+def join_command(plan, videos, output):
+    """Writes the pictures of lossless chunks in the form of the plan."""
+    options = [option for option in plan.options if plan.form != 'mkv'
+               and option.startswith((*FOR_OUTPUT, '--bits'))]
+    return [*programs.JOIN, *videos, *options, '--force',
+            f'--threads={plan.threads}', f'--output={output}']
+
+
+def cpu_seconds():
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
+
+
+def check_program(plan):
+    """The plan's must be what runs here, so that no result is mixed."""
+    version = programs.version()
+    if version != plan.program:
+        raise Problem(f'this is {version}, but {plan.program} began the archive; '
+                      'install that on every node, or submit to a new folder')
+    if digest_of_options(plan.options) != plan.options_digest:
+        raise Problem('a file that an option of decode names was changed; put it '
+                      'back, or submit to a new folder')
+
+
+def check_source(source):
+    if fingerprint(source.path) != source.fingerprint:
+        raise Problem(f'{source.path} is not the file that was planned; put it '
+                      'back, or submit it to a new archive')
+
+
+def decode(plan, recording, chunk, scratch):
+    """The manifest of a decoded chunk; raises Problem."""
+    source = plan.recordings[recording]
+    log = os.path.join(scratch, 'log')
+    check_program(plan)
+    check_source(source)
+    begun, cpu = time.time(), cpu_seconds()
+    status, said = programs.result(command(plan, recording, chunk, scratch), log,
+                                   stdin=subprocess.DEVNULL)
+    if status not in (DONE, DAMAGED) or said is None:
+        raise Problem(f'decode ended with status {status}')
+    check_source(source)
+    form = plan.chunk_form(recording)
+    names = [name_of(form), *[TABLE] * plan.statistics]
+    expected = source.frames_of(chunk, plan.length)
+    if expected is not None and said['frames'] != expected:
+        raise Problem(f'decode read {said["frames"]} of the {expected} coded '
+                      'frames of this chunk')
+    manifest = identity(plan, recording, chunk)
+    manifest.update(
+        outputs={name: digest(os.path.join(scratch, name)) for name in names},
+        frames=said['frames'], status=status, host=socket.gethostname(),
+        begun=begun, seconds=time.time() - begun, cpu_seconds=cpu_seconds() - cpu,
+        engine={name: os.environ[name] for name in ENGINE_NAMES
+                if name in os.environ})
+    return manifest
+
+
+def run(store, plan, recording, chunk):
+    """Decodes a chunk that is not there yet. False, with a record of it, if that
+    fails."""
+    if os.path.isdir(store.part(recording, chunk)):
+        return True
+    scratch = store.scratch(recording, chunk)
+    try:
+        manifest = decode(plan, recording, chunk, scratch)
+        write_json(os.path.join(scratch, 'manifest.json'), manifest)
+        store.publish(scratch, recording, chunk)
+    except (Problem, OSError) as error:
+        lines = programs.last_lines(os.path.join(scratch, 'log'))
+        shutil.rmtree(scratch, ignore_errors=True)  # a full disk has room again
+        note_failure(store, recording, chunk, error, lines)
+        return False
+    try:
+        os.remove(store.failure(recording, chunk))
+    except FileNotFoundError:
+        pass
+    return True
+
+
+def note_failure(store, recording, chunk, error, lines=()):
+    """For status; a full disk may not take it."""
+    try:
+        write_json(store.failure(recording, chunk), {
+            'error': str(error), 'lines': list(lines),
+            'host': socket.gethostname(), 'time': time.time()})
+    except OSError:
+        pass
+
+
+def mismatch(store, plan, recording, chunk):
+    """Why a chunk is not what its manifest and the plan say, or None. The
+    manifest, if it is."""
+    folder = store.part(recording, chunk)
+    manifest = read_json(os.path.join(folder, 'manifest.json'))
+    if manifest is None:
+        return 'its manifest cannot be read', None
+    for name, value in identity(plan, recording, chunk).items():
+        if manifest.get(name) != value:
+            return f'its {name} is not that of the plan', None
+    for name, said in manifest['outputs'].items():
+        path = os.path.join(folder, name)
+        if not os.path.exists(path) or digest(path) != said:
+            return f'{name} is not what its manifest says', None
+    return None, manifest

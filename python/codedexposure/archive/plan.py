@@ -1,0 +1,244 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Which recordings are decoded, how, and in which chunks."""
+import bisect
+import dataclasses
+import hashlib
+import os
+
+from . import programs
+from .store import Problem, fingerprint
+
+FORMAT, VERSION = 'coded-exposure-archive', 2
+# Options of decode with a value; others are flags.
+VALUED = {'method', 'mapping', 'fuse', 'bench', 'full-well', 'read-noise',
+          'region', 'schedule', 'bits', 'white'}
+FLAGS = {'view', 'verbose', 'refine', 'deflate'}
+FILES = {'mapping', 'bench', 'schedule'}  # values that may be files
+FORMS = {'mkv': '.mkv', 'png': '/', 'mp4': '.mp4', 'ome.tif': '.ome.tif',
+         'h5': '.h5'}
+# Forms that are put together of chunks of lossless video, whose tracks hold what
+# is known of each picture; pictures are already numbered files.
+JOINED = {'mkv', 'mp4', 'ome.tif', 'h5'}
+CUT_OFF = 'it is cut off'
+
+
+@dataclasses.dataclass
+class Recording:
+    path: str
+    output: str          # relative to the folder of the archive
+    fingerprint: dict
+    seconds: float       # from the first coded frame to the last
+    frames: int          # coded frames that it has
+    recorded: int        # frames that it once had; 0: not known
+    borders: list        # between its chunks, ns
+    whole: str = ''      # why it is one chunk
+
+    @property
+    def chunks(self):
+        return len(self.borders) + 1
+
+    def cut_off(self):
+        return self.whole == CUT_OFF
+
+    def excerpt(self, chunk):
+        """[from, until) of a chunk, ns; None: to the end."""
+        return (self.borders[chunk - 1] if chunk > 0 else 0,
+                self.borders[chunk] if chunk + 1 < self.chunks else None)
+
+    def frames_of(self, chunk, length):
+        """Coded frames of a chunk; None: not known."""
+        if self.whole:
+            return None
+        return min(length, self.frames - chunk * length)
+
+
+def borders_of(times, length):
+    """In the middle between two coded frames, wherever those lie: recordings of
+    cameras begin late and have gaps."""
+    return [(times[at - 1] + times[at]) // 2
+            for at in range(length, len(times), length)]
+
+
+def recording_of(info, output, length):
+    """Raises Problem if it cannot be decoded."""
+    path = info['recording']
+    if 'error' in info:
+        raise Problem(info['error'])
+    times, whole = info['times_ns'], ''
+    if not info['complete']:
+        whole = CUT_OFF
+    elif not info['track']:
+        whole = 'it has no track that numbers its frames'
+    elif times != sorted(times):
+        whole = 'its frames are not in the order of their times'
+    seconds = (times[-1] - times[0] + info['period_ns']) / 1e9 if times else 0
+    return Recording(path, output, fingerprint(path), seconds, len(times),
+                     info.get('recorded', 0),
+                     [] if whole else borders_of(times, length), whole)
+
+
+def find_recordings(words, lists, avoid):
+    """(what info says of it, name of its output without an ending) of each.
+    Folders are searched for recordings, but not below the folder @avoid; what is
+    none there is left out, which is said."""
+    for name in lists:
+        try:
+            with open(name, encoding='utf-8') as file:
+                words = words + [line.strip() for line in file if line.strip()]
+        except OSError as error:
+            raise Problem(f'cannot read --list {name}: {error.strerror}') from error
+    found, searched, skipped = [], [], []
+    for word in words:
+        if not os.path.isdir(word):
+            stem = os.path.splitext(os.path.basename(word))[0]
+            found.append((os.path.abspath(word), stem))
+            continue
+        for folder, folders, names in os.walk(word):
+            folders[:] = sorted(
+                name for name in folders if not name.startswith('.') and
+                os.path.abspath(os.path.join(folder, name)) != avoid)
+            for name in sorted(names):
+                path = os.path.join(folder, name)
+                # pack writes hidden files.
+                if name.endswith('.mkv') and not name.startswith('.'):
+                    stem = os.path.relpath(path, word)[:-len('.mkv')]
+                    searched.append((os.path.abspath(path), stem))
+    known = programs.info([path for path, _ in found + searched])
+    for said, (path, stem) in zip(known, found + searched):
+        if 'error' in said and (path, stem) in searched:
+            skipped.append(said['error'])
+    # What decode wrote has no schedule of coded frames.
+    found = [(said, stem) for said, (path, stem) in zip(known, found + searched)
+             if (path, stem) in found or ('error' not in said and 'schedule' in said)]
+    for why in skipped:
+        print(f'left out: {why}')
+    if not found:
+        raise Problem('no recordings; name .mkv files of record, folders with '
+                      'them, or a --list')
+    return found
+
+
+def check_options(words):
+    """The options of decode as a list of --NAME=VALUE, with absolute names of
+    files."""
+    checked, words = [], list(words)
+    while words:
+        word = words.pop(0)
+        name, equals, value = word.removeprefix('--').partition('=')
+        if not word.startswith('--') or name not in VALUED | FLAGS:
+            raise Problem(f'{word}: after --, set options of decode that say how '
+                          'frames are decoded: ' +
+                          ', '.join(f'--{n}' for n in sorted(VALUED | FLAGS)))
+        if name in FLAGS:
+            checked.append(f'--{name}')
+            continue
+        if not equals:
+            if not words:
+                raise Problem(f'--{name} needs a value')
+            value = words.pop(0)
+        if name in FILES and os.path.isfile(value):
+            value = os.path.abspath(value)
+        checked.append(f'--{name}={value}')
+    return checked
+
+
+def digest_of_options(options):
+    """Of the options and of the files that they name."""
+    total = hashlib.sha256()
+    for option in options:
+        total.update(option.encode() + b'\0')
+        name, _, value = option.removeprefix('--').partition('=')
+        if name in FILES and os.path.isfile(value):
+            with open(value, 'rb') as file:
+                total.update(file.read() + b'\0')
+    return total.hexdigest()
+
+
+@dataclasses.dataclass
+class Plan:
+    options: list        # of decode
+    options_digest: str
+    form: str
+    length: int          # of a chunk, coded frames
+    threads: int
+    program: str         # name and version
+    recordings: list
+    statistics: bool = False  # of each picture, in a table
+    report: bool = False      # a page of each recording
+    engine: dict = dataclasses.field(default_factory=dict)
+
+    def __post_init__(self):
+        total, self.first = 0, []  # number of the first chunk of each
+        for recording in self.recordings:
+            self.first.append(total)
+            total += recording.chunks
+        self.chunks = total
+
+    def chunk_form(self, recording):
+        """The form of the chunks of a recording. One that is cut off is decoded
+        without an excerpt, and has its form at once."""
+        if self.form in JOINED and not self.recordings[recording].cut_off():
+            return 'mkv'
+        return self.form
+
+    def outputs(self, recording):
+        """What is written for a recording, relative to the folder."""
+        output = self.recordings[recording].output
+        return [output, *[table_of(output)] * self.statistics,
+                *[report_of(output)] * self.report]
+
+    def locate(self, number):
+        """(recording, chunk) of the chunk of that number."""
+        recording = bisect.bisect_right(self.first, number) - 1
+        return recording, number - self.first[recording]
+
+    def to_json(self):
+        fields = {'format': FORMAT, 'version': VERSION}
+        fields.update((f.name, getattr(self, f.name))
+                      for f in dataclasses.fields(self))
+        fields['recordings'] = [vars(r) for r in self.recordings]
+        return fields
+
+    @staticmethod
+    def from_json(fields):
+        if not fields or fields.get('format') != FORMAT:
+            raise Problem('the plan of this archive cannot be read')
+        if fields['version'] != VERSION:
+            raise Problem(f'this archive has version {fields["version"]}; '
+                          f'this program reads {VERSION}')
+        fields = {k: v for k, v in fields.items() if k not in (
+            'format', 'version')}
+        fields['recordings'] = [Recording(**r) for r in fields['recordings']]
+        return Plan(**fields)
+
+
+def beside(output, ending):
+    """The name of what is written beside an output."""
+    output = output.rstrip('/')
+    for other in sorted(FORMS.values(), key=len, reverse=True):
+        if output.endswith(other):
+            return output.removesuffix(other) + ending
+    return output + ending
+
+
+def table_of(output):
+    return beside(output, '.csv')
+
+
+def report_of(output):
+    return beside(output, '.report')
+
+
+def make(words, lists, folder, form, length, threads, options, program):
+    """The plan of an archive in @folder."""
+    options = check_options(options)
+    recordings, outputs = [], {}
+    for said, stem in find_recordings(words, lists, os.path.abspath(folder)):
+        output, path = stem + FORMS[form], said['recording']
+        if output in outputs:
+            raise Problem(f'{path} and {outputs[output]} would both become '
+                          f'{output}; archive them into different folders')
+        outputs[output] = path
+        recordings.append(recording_of(said, output, length))
+    return Plan(options, digest_of_options(options), form, length, threads,
+                program, recordings)

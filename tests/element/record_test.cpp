@@ -1,0 +1,337 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* codedexposure-recordmux and codedexposure-recorddemux: what goes in comes out
+ * again, from files and streams, whole and damaged. */
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "common/meta.h"
+#include "pipeline.h"
+#include "record/matroska.h"
+
+namespace
+{
+
+using namespace codedexposure;
+using namespace codedexposure::gst;
+using namespace codedexposure::test;
+using namespace std::string_literals;
+
+class Folder
+{
+public:
+  Folder ()
+  {
+    std::string name = "/tmp/record_test_XXXXXX";
+    path_ = mkdtemp (name.data ());
+  }
+  ~Folder () { std::filesystem::remove_all (path_); }
+  std::string operator/ (const std::string &name) const
+  {
+    return path_ + "/" + name;
+  }
+
+private:
+  std::string path_;
+};
+
+std::string
+content (const std::string &path)
+{
+  std::ifstream file (path, std::ios::binary);
+  return {std::istreambuf_iterator<char> (file), {}};
+}
+
+void
+write (const std::string &path, const std::string &bytes)
+{
+  std::ofstream (path, std::ios::binary) << bytes;
+}
+
+constexpr int kFrames = 20;
+
+/** Coded frames of 32x24 pixels with numbers, losses and synchronisation. */
+std::string
+source (const std::string &format = "GRAY8", const std::string &rate = "100/1")
+{
+  return "videotestsrc num-buffers=" + std::to_string (4 * kFrames) +
+         " pattern=ball ! " + gray_caps (32, 24, rate, format) +
+         " ! codedexposure-sim ! dmdsync ! ";
+}
+
+/** A recording of source (), and the line of each frame. */
+std::string
+record (const std::string &path, const std::string &options = "",
+    const std::string &from = source ())
+{
+  Pipeline pipeline (from + "codedexposure-recordmux " + options +
+                     " log-location=" + path +
+                     ".jsonl ! filesink location=" + path);
+  return pipeline.play ();
+}
+
+/** A file as coded frames: times and flags of each, and its messages. */
+class Reading
+{
+public:
+  /** @p log  the lines of the frames that came out; empty: none. */
+  explicit Reading (const std::string &path, const std::string &options = "",
+      const std::string &log = "")
+      : pipeline_ ("filesrc location=" + path +
+                   " ! codedexposure-recorddemux name=demux " + options +
+                   (log.empty () ? ""
+                                 : " ! tee name=t ! queue ! "
+                                   "codedexposure-recordmux codec=raw "
+                                   "log-location=" +
+                                       log + " ! fakesink t. ! queue") +
+                   " ! fakesink name=out sync=false")
+  {
+    gst_pad_add_probe (
+        pipeline_.pad ("out", "sink").get (), GST_PAD_PROBE_TYPE_BUFFER,
+        [] (GstPad *, GstPadProbeInfo *info, gpointer self) {
+          GstBuffer *frame = GST_PAD_PROBE_INFO_BUFFER (info);
+          auto *reading = static_cast<Reading *> (self);
+          reading->times.push_back (GST_BUFFER_PTS (frame));
+          reading->corrupted +=
+              GST_BUFFER_FLAG_IS_SET (frame, GST_BUFFER_FLAG_CORRUPTED) ? 1 : 0;
+          return GST_PAD_PROBE_OK;
+        },
+        this, nullptr);
+  }
+
+  std::string play () { return pipeline_.play (); }
+  guint64 count (const char *name) const
+  {
+    return counter_of (pipeline_["demux"].get (), name);
+  }
+  GstPad *out () { return pipeline_.pad ("out", "sink").get (); }
+  Pipeline &pipeline () { return pipeline_; }
+
+  std::vector<GstClockTime> times;
+  int corrupted = 0;
+
+private:
+  Pipeline pipeline_;
+};
+
+struct Form {
+  const char *name, *format, *options;
+};
+
+class Forms : public ::testing::TestWithParam<Form>
+{
+protected:
+  Folder folder;
+};
+
+TEST_P (Forms, WhatGoesInComesOutAgain)
+{
+  const auto [name, format, options] = GetParam ();
+  const std::string path = folder / "coded.mkv";
+  ASSERT_EQ (record (path, options, source (format, "120000/1001")), "");
+  Reading reading (path, "", folder / "again.jsonl");
+  EXPECT_EQ (reading.play (), "");
+  EXPECT_EQ (content (folder / "again.jsonl"), content (path + ".jsonl"));
+  ASSERT_EQ (reading.times.size (), std::size_t (kFrames));
+  EXPECT_EQ (reading.corrupted, 0);
+  for (const char *flaw :
+      {"frames-damaged", "frames-unknown", "frames-missing", "lines-damaged"})
+    EXPECT_EQ (reading.count (flaw), 0u) << flaw;
+
+  const auto info = recording_info (path);
+  ASSERT_TRUE (info) << info.error ().message;
+  EXPECT_EQ (info->head.codec == MatroskaHead::Codec::raw,
+      std::string (options).find ("raw") != std::string::npos);
+  EXPECT_EQ (info->head.size, (Extent{32, 24}));
+  EXPECT_EQ (info->head.tick, 1);
+  EXPECT_EQ (info->is_cut_short,
+      std::string (options).find ("stream") != std::string::npos);
+  ASSERT_EQ (info->times.size (), std::size_t (kFrames));
+  for (std::size_t i = 0; i < info->times.size (); i++) {
+    EXPECT_EQ (GstClockTime (info->times[i]),
+        gst_util_uint64_scale (i, 1001 * GST_SECOND, 30000))
+        << "exact to the ns";
+    EXPECT_EQ (GstClockTime (info->times[i]), reading.times[i]);
+  }
+  ASSERT_TRUE (info->setup);
+  EXPECT_EQ (info->setup->schedule.text (), "sequential:2x2");
+}
+
+INSTANTIATE_TEST_SUITE_P (All, Forms,
+    ::testing::Values (Form{"FFV1", "GRAY8", "codec=ffv1"},
+        Form{"FFV1Deep", "GRAY16_LE", "threads=1"},
+        Form{"Raw", "GRAY8", "codec=raw"},
+        Form{"RawDeep", "GRAY16_LE", "codec=raw"},
+        Form{"Stream", "GRAY8", "streamable=true"},
+        Form{"RawDeepStream", "GRAY16_LE", "codec=raw streamable=true"}),
+    [] (const auto &form) { return form.param.name; });
+
+class Record : public ::testing::Test
+{
+protected:
+  Folder folder;
+  const std::string path = folder / "coded.mkv";
+};
+
+TEST_F (Record, BytesAreForOtherProgramsToo)
+{
+  ASSERT_EQ (record (path, "codec=raw", source ("GRAY16_LE")), "");
+  const std::string bytes = content (path);
+  EXPECT_NE (bytes.find ("\x2e\xb5\x24\x84Y1\0\x10"s), bytes.npos);
+  EXPECT_NE (bytes.find ("\x88\x81\0\x53\x6e\x86"s + "Frames"), bytes.npos)
+      << "the text track is not the default";
+  EXPECT_NE (bytes.find ("coded-exposure={\"format\""), bytes.npos)
+      << "the tag is plain";
+}
+
+TEST_F (Record, LateReceiversOfAStreamGetTheSameHead)
+{
+  Pipeline pipeline (source ("GRAY16_LE") +
+                     "codedexposure-recordmux codec=raw streamable=true ! "
+                     "fakesink name=out");
+  EXPECT_EQ (pipeline.play (), "");
+  const CapsPtr caps (
+      gst_pad_get_current_caps (pipeline.pad ("out", "sink").get ()));
+  const GValue *heads = gst_structure_get_value (
+      gst_caps_get_structure (caps.get (), 0), "streamheader");
+  ASSERT_NE (heads, nullptr);
+  GstBuffer *head = gst_value_get_buffer (gst_value_array_get_value (heads, 0));
+  std::string bytes (gst_buffer_get_size (head), '\0');
+  gst_buffer_extract (head, 0, bytes.data (), bytes.size ());
+  EXPECT_EQ (bytes.find ("Y16 "), bytes.npos);
+  EXPECT_NE (bytes.find ("Y1\0\x10"s), bytes.npos);
+  EXPECT_NE (bytes.find ("coded-exposure={\"format\""), bytes.npos);
+}
+
+/* A live muxer does not wait for frames, and writes their lines before them. */
+TEST_F (Record, WaitsForLiveFrames)
+{
+  Pipeline pipeline ("videotestsrc is-live=true num-buffers=3 ! " +
+                     gray_caps (8, 8, "100/1") +
+                     " ! codedexposure-recordmux name=mux ! fakesink");
+  EXPECT_EQ (pipeline.play (), "");
+  const QueryPtr query (gst_query_new_latency ());
+  ASSERT_TRUE (
+      gst_pad_query (pipeline.pad ("mux", "src").get (), query.get ()));
+  gboolean live = TRUE;
+  gst_query_parse_latency (query.get (), &live, nullptr, nullptr);
+  EXPECT_FALSE (live);
+}
+
+TEST_F (Record, EachSegmentIsARecording)
+{
+  Pipeline pipeline (source () +
+                     "splitmuxsink muxer-factory=codedexposure-recordmux "
+                     "max-size-time=300000000 location=" +
+                     (folder / "part%d.mkv"));
+  EXPECT_EQ (pipeline.play (), "");
+  std::size_t frames = 0, parts = 0;
+  for (std::string part = folder / "part0.mkv"; std::filesystem::exists (part);
+       part = folder / ("part" + std::to_string (parts) + ".mkv")) {
+    Reading reading (part);
+    EXPECT_EQ (reading.play (), "");
+    EXPECT_EQ (reading.corrupted, 0);
+    EXPECT_EQ (reading.count ("frames-missing"), 0u);
+    frames += reading.times.size ();
+    parts++;
+  }
+  EXPECT_EQ (frames, std::size_t (kFrames));
+  EXPECT_GE (parts, 2u);
+}
+
+TEST_F (Record, ARunFollowsARun)
+{
+  ASSERT_EQ (record (path), "");
+  Reading reading (path);
+  for (int run = 1; run <= 2; run++) {
+    EXPECT_EQ (reading.play (), "");
+    EXPECT_EQ (reading.times.size (), std::size_t (run * kFrames));
+    gst_element_set_state (
+        GST_ELEMENT (GST_OBJECT_PARENT (reading.pipeline ()["demux"].get ())),
+        GST_STATE_READY);
+  }
+}
+
+TEST_F (Record, OtherVideoIsAnErrorThatNamesIt)
+{
+  const auto error_of = [this] (const std::string &video) {
+    Pipeline made ("videotestsrc num-buffers=3 ! " + video +
+                   " ! matroskamux ! filesink location=" + path);
+    EXPECT_EQ (made.play (), "");
+    return Reading (path).play ();
+  };
+  EXPECT_NE (error_of ("video/x-raw,format=I420").find ("not grey"),
+      std::string::npos);
+  ASSERT_EQ (record (path, "codec=raw"), "");
+  std::string bytes = content (path);
+  bytes.replace (bytes.find ("Y800"), 4, "ABCD");
+  write (path, bytes);
+  EXPECT_NE (Reading (path).play ().find ("not grey"), std::string::npos);
+  EXPECT_NE (error_of ("jpegenc").find ("image/jpeg"), std::string::npos);
+}
+
+/* An index that is damaged ends the demuxer; without it, all frames are there.
+ */
+TEST_F (Record, ADamagedIndexIsSalvaged)
+{
+  ASSERT_EQ (record (path), "");
+  std::string bytes = content (path);
+  const auto index = bytes.rfind ("\x1c\x53\xbb\x6b");
+  ASSERT_NE (index, bytes.npos);
+  for (std::size_t i = index + 20; i < index + 60; i++)
+    bytes[i] = char (bytes[i] ^ 0x55);
+  write (path, bytes);
+  Reading salvaged (path, "salvage=true");
+  EXPECT_EQ (salvaged.play (), "");
+  EXPECT_EQ (salvaged.times.size (), std::size_t (kFrames));
+  EXPECT_EQ (salvaged.corrupted, 0);
+}
+
+TEST_F (Record, ABranchCanBeAddedWhileItPlays)
+{
+  ASSERT_EQ (record (path), "");
+  Reading reading (path);
+  ASSERT_EQ (reading.play (), "");
+  const CapsPtr caps (gst_pad_query_caps (
+      reading.pipeline ().pad ("demux", "src").get (), nullptr));
+  EXPECT_FALSE (gst_caps_is_empty (caps.get ()));
+}
+
+TEST_F (Record, BackwardsTheFramesAreThoseOfForwards)
+{
+  ASSERT_EQ (record (path), "");
+  Reading reading (path);
+  GstElement *top =
+      GST_ELEMENT (GST_OBJECT_PARENT (reading.pipeline ()["demux"].get ()));
+  gst_element_set_state (top, GST_STATE_PAUSED);
+  gst_element_get_state (top, nullptr, nullptr, kPatience);
+  ASSERT_TRUE (gst_element_seek (top, -1, GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH,
+      GST_SEEK_TYPE_SET, 0, GST_SEEK_TYPE_SET, kFrames * 40 * GST_MSECOND));
+  gst_element_get_state (top, nullptr, nullptr, kPatience);
+  reading.times.clear ();
+  reading.corrupted = 0;
+  EXPECT_EQ (reading.play (), "");
+  EXPECT_GE (reading.times.size (), std::size_t (kFrames - 1));
+  EXPECT_EQ (reading.corrupted, 0);
+  EXPECT_TRUE (std::ranges::is_sorted (reading.times, std::greater ()));
+  EXPECT_EQ (reading.count ("frames-missing"), 0u);
+}
+
+/* A player that does not want grey finds no decoder, and no crash. */
+TEST_F (Record, OfOursNothingIsBuiltForAPlayer)
+{
+  ASSERT_EQ (record (path, "", source ("GRAY16_LE")), "");
+  Pipeline player ("uridecodebin uri=file://" + path +
+                   " caps=video/x-raw,format=I420 name=bin ! fakesink");
+  player.play ();
+  GstIterator *all = gst_bin_iterate_recurse (
+      GST_BIN (GST_OBJECT_PARENT (player["bin"].get ())));
+  const auto look = [] (const GValue *item, gpointer) {
+    GstElement *element = GST_ELEMENT (g_value_get_object (item));
+    EXPECT_FALSE (g_str_has_prefix (G_OBJECT_TYPE_NAME (element), "GstCoded"));
+  };
+  gst_iterator_foreach (all, look, nullptr);
+  gst_iterator_free (all);
+}
+
+} // namespace

@@ -66,15 +66,9 @@ using namespace codedexposure;
 using namespace codedexposure::gst;
 using camera::CameraState;
 using camera::Edge;
+using camera::GstCodedExposureCameraSrc;
 using camera::Settings;
 using camera::Trigger;
-
-G_DEFINE_TYPE_WITH_CODE (GstCodedExposureCameraSrc,
-    gst_coded_exposure_camera_src, GST_TYPE_BIN,
-    GST_DEBUG_CATEGORY_INIT (camerasrc_debug, "codedexposure-camerasrc", 0,
-        "frames of a GenICam camera"))
-GST_ELEMENT_REGISTER_DEFINE (codedexposure_camerasrc, "codedexposure-camerasrc",
-    GST_RANK_NONE, GST_TYPE_CODED_EXPOSURE_CAMERA_SRC)
 
 namespace
 {
@@ -145,15 +139,16 @@ properties ()
 
 /* What can be known before there is a camera. */
 bool
-check (GstCodedExposureCameraSrc *self)
+check (GstElement *element)
 {
-  if (!self->state->source) {
+  auto *self = as<GstCodedExposureCameraSrc> (element);
+  if (!self->state.source) {
     POST_ERROR (self, CORE, MISSING_PLUGIN,
         "The GStreamer element aravissrc is not installed. It is in Debian's "
         "package libaravis-0.8-0.");
     return false;
   }
-  const auto bench = read_again (self, self->state->settings.bench).read;
+  const auto bench = read_again (self, self->state.settings.bench).read;
   if (bench && !*bench) {
     POST_ERROR (self, RESOURCE, SETTINGS,
         "The bench property cannot be read: " + bench->error ().message);
@@ -166,9 +161,10 @@ check (GstCodedExposureCameraSrc *self)
 }
 
 bool
-begin_run (GstCodedExposureCameraSrc *self)
+begin_run (GstElement *element)
 {
-  CameraState &st = *self->state;
+  auto *self = as<GstCodedExposureCameraSrc> (element);
+  CameraState &st = self->state;
   st.stream = camera::Stream ();
   {
     const ObjectLock lock (self);
@@ -178,37 +174,31 @@ begin_run (GstCodedExposureCameraSrc *self)
   return camera::set_up_source (self);
 }
 
-GstStateChangeReturn
-change_state (GstElement *element, GstStateChange transition)
+void
+end_run (GstElement *element)
 {
-  auto *self = GST_CODED_EXPOSURE_CAMERA_SRC (element);
-  if (transition == GST_STATE_CHANGE_NULL_TO_READY && !check (self))
-    return GST_STATE_CHANGE_FAILURE;
-  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED && !begin_run (self))
-    return GST_STATE_CHANGE_FAILURE;
-  if (transition == GST_STATE_CHANGE_PLAYING_TO_PAUSED)
-    camera::stop_silent_camera (self);
-  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY)
-    camera::end_watch (self);
-  const GstStateChangeReturn changed =
-      GST_ELEMENT_CLASS (gst_coded_exposure_camera_src_parent_class)
-          ->change_state (element, transition);
-  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED &&
-      changed == GST_STATE_CHANGE_FAILURE)
-    camera::end_watch (self);
-  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY)
-    self->state->stream = camera::Stream ();
-  return changed;
+  camera::state (element).stream = camera::Stream ();
 }
+
+constexpr StateHooks kRun{.open = check,
+    .begin = begin_run,
+    .pause =
+        [] (GstElement *element) {
+          camera::stop_silent_camera (as<GstCodedExposureCameraSrc> (element));
+        },
+    .halt =
+        [] (GstElement *element) {
+          camera::end_watch (as<GstCodedExposureCameraSrc> (element));
+        },
+    .end = end_run};
 
 void
 handle_message (GstBin *bin, GstMessage *message)
 {
   if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_ERROR &&
-      camera::take_failure (GST_CODED_EXPOSURE_CAMERA_SRC (bin), message))
+      camera::take_failure (as<GstCodedExposureCameraSrc> (bin), message))
     return gst_message_unref (message);
-  GST_BIN_CLASS (gst_coded_exposure_camera_src_parent_class)
-      ->handle_message (bin, message);
+  parent_class<GstBinClass> (bin)->handle_message (bin, message);
 }
 
 /* aravissrc looks at an end only between two frames, and not while it is
@@ -217,16 +207,14 @@ gboolean
 send_event (GstElement *element, GstEvent *event)
 {
   if (GST_EVENT_TYPE (event) != GST_EVENT_EOS ||
-      !GST_CODED_EXPOSURE_CAMERA_SRC (element)->state->filter)
-    return GST_ELEMENT_CLASS (gst_coded_exposure_camera_src_parent_class)
-        ->send_event (element, event);
+      !as<GstCodedExposureCameraSrc> (element)->state.filter)
+    return parent_class<GstElementClass> (element)->send_event (element, event);
   const auto push = [] (GstElement *source, gpointer end) {
-    auto *self = GST_CODED_EXPOSURE_CAMERA_SRC (source);
+    auto *self = as<GstCodedExposureCameraSrc> (source);
     camera::begin_end (self);
     camera::stop_silent_camera (self);
-    const ObjectPtr<GstPad> pad (
-        gst_element_get_static_pad (self->state->filter, "src"));
-    gst_pad_push_event (pad.get (), gst_event_ref (GST_EVENT (end)));
+    gst_pad_push_event (static_pad (self->state.filter, "src").get (),
+        gst_event_ref (GST_EVENT (end)));
   };
   gst_element_call_async (element, push, event,
       [] (gpointer end) { gst_event_unref (GST_EVENT (end)); });
@@ -251,7 +239,7 @@ Settings
 settings_of (GstCodedExposureCameraSrc *self)
 {
   const ObjectLock lock (self);
-  return self->state->settings;
+  return self->state.settings;
 }
 
 namespace
@@ -283,7 +271,7 @@ check_camera (GstCodedExposureCameraSrc *self, const Named<BenchProfile> &bench,
 bool
 set_up_source (GstCodedExposureCameraSrc *self)
 {
-  CameraState &st = *self->state;
+  CameraState &st = self->state;
   const Settings settings = settings_of (self);
   st.stream.first = true;
   keep_camera (self, nullptr);
@@ -314,32 +302,32 @@ set_up_source (GstCodedExposureCameraSrc *self)
 
 } // namespace codedexposure::gst::camera
 
-static void
-gst_coded_exposure_camera_src_class_init (GstCodedExposureCameraSrcClass *klass)
+namespace
+{
+
+void
+set_up (gpointer klass)
 {
   auto *element_class = GST_ELEMENT_CLASS (klass);
 
+  GST_DEBUG_CATEGORY_INIT (camerasrc_debug, "codedexposure-camerasrc", 0,
+      "frames of a GenICam camera");
   install_state<GstCodedExposureCameraSrc, properties> (klass);
   describe_element (klass, "GenICam camera", "Source/Video/Hardware",
       "Frames of a GenICam camera: aravissrc with trigger set-up, unpacked "
       "pixels, memory of its own and reconnection",
       {"src"});
-  element_class->change_state = GST_DEBUG_FUNCPTR (change_state);
+  install_run<kRun> (klass);
   element_class->send_event = GST_DEBUG_FUNCPTR (send_event);
   element_class->set_clock = GST_DEBUG_FUNCPTR (set_clock);
   GST_BIN_CLASS (klass)->handle_message = GST_DEBUG_FUNCPTR (handle_message);
 }
 
-static void
-gst_coded_exposure_camera_src_init (GstCodedExposureCameraSrc *self)
+void
+set_up_instance (GstCodedExposureCameraSrc *self)
 {
-  self->state = new CameraState;
-  CameraState &st = *self->state;
-  GstPadTemplate *pad_template =
-      gst_element_class_get_pad_template (GST_ELEMENT_GET_CLASS (self), "src");
-  GstPad *ghost =
-      gst_ghost_pad_new_no_target_from_template ("src", pad_template);
-  gst_element_add_pad (GST_ELEMENT (self), ghost);
+  CameraState &st = self->state;
+  GstPad *ghost = add_ghost_pad (GST_ELEMENT (self), "src", nullptr);
   GST_OBJECT_FLAG_SET (self, GST_ELEMENT_FLAG_SOURCE);
 
   GstElement *source = gst_element_factory_make ("aravissrc", "source");
@@ -353,12 +341,18 @@ gst_coded_exposure_camera_src_init (GstCodedExposureCameraSrc *self)
   gst_element_link (source, filter);
   st.source = source;
   st.filter = filter;
-  const ObjectPtr<GstPad> out (gst_element_get_static_pad (filter, "src"));
-  gst_ghost_pad_set_target (GST_GHOST_PAD (ghost), out.get ());
-  const ObjectPtr<GstPad> pad (gst_element_get_static_pad (source, "src"));
-  gst_pad_add_probe (pad.get (),
+  gst_ghost_pad_set_target (
+      GST_GHOST_PAD (ghost), static_pad (filter, "src").get ());
+  gst_pad_add_probe (static_pad (source, "src").get (),
       GstPadProbeType (GST_PAD_PROBE_TYPE_BUFFER |
                        GST_PAD_PROBE_TYPE_EVENT_BOTH |
                        GST_PAD_PROBE_TYPE_QUERY_UPSTREAM),
       camera::take_item, self, nullptr);
 }
+
+} // namespace
+
+GST_ELEMENT_REGISTER_DEFINE (codedexposure_camerasrc, "codedexposure-camerasrc",
+    GST_RANK_NONE,
+    (type_of<GstCodedExposureCameraSrc, set_up, set_up_instance> (
+        "GstCodedExposureCameraSrc", GST_TYPE_BIN)))

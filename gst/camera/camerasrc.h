@@ -17,15 +17,6 @@
 #include "settings.h"
 #include "sync/pause_watch.h"
 
-G_BEGIN_DECLS
-
-#define GST_TYPE_CODED_EXPOSURE_CAMERA_SRC                                     \
-  (gst_coded_exposure_camera_src_get_type ())
-G_DECLARE_FINAL_TYPE (GstCodedExposureCameraSrc, gst_coded_exposure_camera_src,
-    GST, CODED_EXPOSURE_CAMERA_SRC, GstBin)
-
-G_END_DECLS
-
 GST_DEBUG_CATEGORY_EXTERN (camerasrc_debug);
 
 namespace codedexposure::gst::camera
@@ -72,15 +63,8 @@ struct CameraState {
   std::jthread restarts;            ///< while the camera is away
 };
 
-} // namespace codedexposure::gst::camera
-
-struct _GstCodedExposureCameraSrc {
-  GstBin parent;
-  codedexposure::gst::camera::CameraState *state;
+struct GstCodedExposureCameraSrc : Instance<GstBin, CameraState> {
 };
-
-namespace codedexposure::gst::camera
-{
 
 inline constexpr auto &state = state_in<GstCodedExposureCameraSrc>;
 /** A copy, by the object lock. */

@@ -126,7 +126,7 @@ own (const OwnedFrames &frames, BufferPtr frame)
 GstPadProbeReturn
 take_item (GstPad *, GstPadProbeInfo *info, gpointer data)
 {
-  auto *self = GST_CODED_EXPOSURE_CAMERA_SRC (data);
+  auto *self = as<GstCodedExposureCameraSrc> (data);
   if (info->type & GST_PAD_PROBE_TYPE_QUERY_BOTH)
     return is_answered (GST_PAD_PROBE_INFO_QUERY (info)) ? GST_PAD_PROBE_OK
                                                          : GST_PAD_PROBE_DROP;

@@ -9,33 +9,16 @@
 
 using namespace codedexposure::gst;
 
-#define GST_TYPE_CODED_EXPOSURE_CAMERA_PROVIDER                                \
-  (gst_coded_exposure_camera_provider_get_type ())
-G_DECLARE_FINAL_TYPE (GstCodedExposureCameraProvider,
-    gst_coded_exposure_camera_provider, GST, CODED_EXPOSURE_CAMERA_PROVIDER,
-    GstDeviceProvider)
-struct _GstCodedExposureCameraProvider {
-  GstDeviceProvider parent;
-};
-
-G_DEFINE_TYPE (GstCodedExposureCameraProvider,
-    gst_coded_exposure_camera_provider, GST_TYPE_DEVICE_PROVIDER)
-GST_DEVICE_PROVIDER_REGISTER_DEFINE (codedexposure_cameraprovider,
-    "codedexposure-cameraprovider", GST_RANK_PRIMARY,
-    GST_TYPE_CODED_EXPOSURE_CAMERA_PROVIDER)
-
-/* A camera in the list. Its name is in the property "id" of its properties. */
-#define GST_TYPE_CODED_EXPOSURE_CAMERA (gst_coded_exposure_camera_get_type ())
-G_DECLARE_FINAL_TYPE (GstCodedExposureCamera, gst_coded_exposure_camera, GST,
-    CODED_EXPOSURE_CAMERA, GstDevice)
-struct _GstCodedExposureCamera {
-  GstDevice parent;
-};
-G_DEFINE_TYPE (
-    GstCodedExposureCamera, gst_coded_exposure_camera, GST_TYPE_DEVICE)
-
 namespace
 {
+
+struct None {
+};
+struct GstCodedExposureCameraProvider : Instance<GstDeviceProvider, None> {
+};
+/* A camera in the list. Its name is in the property "id" of its properties. */
+struct GstCodedExposureCamera : Instance<GstDevice, None> {
+};
 
 constexpr const char *kId = "id";
 
@@ -61,8 +44,20 @@ create_element (GstDevice *device, const gchar *name)
 gboolean
 reconfigure_element (GstDevice *device, GstElement *element)
 {
-  return GST_IS_CODED_EXPOSURE_CAMERA_SRC (element) &&
+  return g_str_equal (
+             G_OBJECT_TYPE_NAME (element), "GstCodedExposureCameraSrc") &&
          set_name (device, element);
+}
+
+GType
+camera_type ()
+{
+  const auto set_up = [] (gpointer klass) {
+    GST_DEVICE_CLASS (klass)->create_element = create_element;
+    GST_DEVICE_CLASS (klass)->reconfigure_element = reconfigure_element;
+  };
+  return type_of<GstCodedExposureCamera, set_up> (
+      "GstCodedExposureCamera", GST_TYPE_DEVICE);
 }
 
 /* Size and rate are known only after a camera was opened, which another program
@@ -82,9 +77,9 @@ make_device (guint number)
       known (arv_get_device_protocol (number)), nullptr));
   const CapsPtr caps (gst_caps_from_string (CODED_EXPOSURE_VIDEO_CAPS));
   const std::string name = vendor + " " + model + " " + serial;
-  return GST_DEVICE (g_object_new (GST_TYPE_CODED_EXPOSURE_CAMERA,
-      "display-name", name.c_str (), "device-class", "Source/Video", "caps",
-      caps.get (), "properties", facts.get (), nullptr));
+  return GST_DEVICE (g_object_new (camera_type (), "display-name",
+      name.c_str (), "device-class", "Source/Video", "caps", caps.get (),
+      "properties", facts.get (), nullptr));
 }
 
 /* Searching takes a second, and a broadcast to all networks of the machine. */
@@ -98,23 +93,8 @@ probe (GstDeviceProvider *)
   return devices;
 }
 
-} // namespace
-
-static void
-gst_coded_exposure_camera_class_init (GstCodedExposureCameraClass *klass)
-{
-  GST_DEVICE_CLASS (klass)->create_element = create_element;
-  GST_DEVICE_CLASS (klass)->reconfigure_element = reconfigure_element;
-}
-
-static void
-gst_coded_exposure_camera_init (GstCodedExposureCamera *)
-{
-}
-
-static void
-gst_coded_exposure_camera_provider_class_init (
-    GstCodedExposureCameraProviderClass *klass)
+void
+set_up (gpointer klass)
 {
   GST_DEVICE_PROVIDER_CLASS (klass)->probe = probe;
   gst_device_provider_class_set_static_metadata (
@@ -123,7 +103,9 @@ gst_coded_exposure_camera_provider_class_init (
       "The gst-codedexposure authors");
 }
 
-static void
-gst_coded_exposure_camera_provider_init (GstCodedExposureCameraProvider *)
-{
-}
+} // namespace
+
+GST_DEVICE_PROVIDER_REGISTER_DEFINE (codedexposure_cameraprovider,
+    "codedexposure-cameraprovider", GST_RANK_PRIMARY,
+    (type_of<GstCodedExposureCameraProvider, set_up> (
+        "GstCodedExposureCameraProvider", GST_TYPE_DEVICE_PROVIDER)))

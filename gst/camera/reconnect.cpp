@@ -45,10 +45,10 @@ is_own_failure (const CameraState &st, GstMessage *message)
   gint flow = GST_FLOW_ERROR;
   if (details)
     gst_structure_get_int (details, "flow-return", &flow);
-  const ObjectPtr<GstPad> pad (gst_element_get_static_pad (st.source, "src"));
   return GST_MESSAGE_SRC (message) == GST_OBJECT (st.source) &&
          flow == GST_FLOW_ERROR &&
-         gst_pad_get_last_flow_return (pad.get ()) == GST_FLOW_OK;
+         gst_pad_get_last_flow_return (static_pad (st.source, "src").get ()) ==
+             GST_FLOW_OK;
 }
 
 /** @p stopped  for how long the process was; 0: it was not. */
@@ -87,9 +87,8 @@ give_up (GstCodedExposureCameraSrc *self, guint tries)
       "The camera did not come back after " + std::to_string (tries) +
           " tries to restart it (property reconnect): " + why +
           " Check its cable, its power and its trigger.");
-  const ObjectPtr<GstPad> pad (
-      gst_element_get_static_pad (GST_ELEMENT (self), "src"));
-  gst_pad_push_event (pad.get (), gst_event_new_eos ());
+  gst_pad_push_event (
+      static_pad (GST_ELEMENT (self), "src").get (), gst_event_new_eos ());
 }
 
 /* One try. Returns whether a frame came; else the source has failed again, or

@@ -13,51 +13,8 @@
 GST_DEBUG_CATEGORY (coded_filter_debug);
 #define GST_CAT_DEFAULT coded_filter_debug
 
-using codedexposure::gst::CodedFilter;
-
-struct GstCodedFilterPrivate {
-  CodedFilter *filter;
-};
-
-G_DEFINE_ABSTRACT_TYPE_WITH_CODE (
-    GstCodedFilter, gst_coded_filter, GST_TYPE_ELEMENT,
-    G_ADD_PRIVATE (GstCodedFilter);
-    GST_DEBUG_CATEGORY_INIT (coded_filter_debug, "codedexposure-filter", 0,
-        "base class of filters of coded frames"))
-
-static CodedFilter *&
-filter_in (gpointer element)
-{
-  return static_cast<GstCodedFilterPrivate *> (
-      gst_coded_filter_get_instance_private (GST_CODED_FILTER (element)))
-      ->filter;
-}
-
-static void
-gst_coded_filter_class_init (GstCodedFilterClass *klass)
-{
-  CodedFilter::set_up_class (klass);
-}
-
-static void
-gst_coded_filter_init (GstCodedFilter *)
-{
-}
-
 namespace codedexposure::gst
 {
-
-void
-adopt_filter (GstCodedFilter *element, std::unique_ptr<CodedFilter> filter)
-{
-  filter_in (element) = filter.release ();
-}
-
-CodedFilter &
-filter_of (gpointer element)
-{
-  return *filter_in (element);
-}
 
 /* ------------------------------------------------------------ properties -- */
 
@@ -159,21 +116,19 @@ CodedFilter::set_up_class (gpointer klass)
 {
   install_properties<properties, shared_of, settings_changed> (
       G_OBJECT_CLASS (klass));
-  G_OBJECT_CLASS (klass)->finalize = [] (GObject *object) noexcept {
-    delete filter_in (object);
-    G_OBJECT_CLASS (gst_coded_filter_parent_class)->finalize (object);
-  };
-  GST_ELEMENT_CLASS (klass)->change_state =
-      [] (GstElement *element, GstStateChange transition) noexcept {
-        CodedFilter &filter = filter_of (element);
-        if (!filter.before_state_change (transition))
-          return GST_STATE_CHANGE_FAILURE;
-        const GstStateChangeReturn changed =
-            GST_ELEMENT_CLASS (gst_coded_filter_parent_class)
-                ->change_state (element, transition);
-        filter.after_state_change (transition);
-        return changed;
-      };
+  static constexpr StateHooks kRun{
+      .open =
+          [] (GstElement *self) { return filter_of (self).read_settings (); },
+      .begin =
+          [] (GstElement *self) {
+            filter_of (self).begin ();
+            return true;
+          },
+      .halt = [] (GstElement *self) { filter_of (self).cancel (); },
+      .end = [] (GstElement *self) { filter_of (self).forget_stream (); }};
+  GST_DEBUG_CATEGORY_INIT (coded_filter_debug, "codedexposure-filter", 0,
+      "base class of filters of coded frames");
+  install_run<kRun> (klass);
   auto *element_class = GST_ELEMENT_CLASS (klass);
   element_class->request_new_pad = [] (GstElement *self, GstPadTemplate *templ,
                                        const gchar *name,
@@ -184,18 +139,26 @@ CodedFilter::set_up_class (gpointer klass)
     filter_of (self).release_pad (pad);
   };
   add_pad_template (klass, "sink");
-  add_pad_template (klass, "src", {.type = GST_TYPE_CODED_PAD});
-  add_pad_template (klass, "coded",
-      {.presence = GST_PAD_REQUEST, .type = GST_TYPE_CODED_PAD});
-  for (const GType type : {GST_TYPE_CODED_FILTER, GST_TYPE_CODED_PAD})
+  add_pad_template (klass, "src", {.type = coded_pad_type ()});
+  add_pad_template (
+      klass, "coded", {.presence = GST_PAD_REQUEST, .type = coded_pad_type ()});
+  for (const GType type : {G_TYPE_FROM_CLASS (klass), coded_pad_type ()})
     gst_type_mark_as_plugin_api (type, GstPluginAPIFlags (0));
 }
 
-CodedFilter::CodedFilter (GstCodedFilter *element, const StatsNames &names)
-    : element_ (GST_ELEMENT (element)),
+GType
+coded_filter_type ()
+{
+  return type_of<GstCodedFilter, CodedFilter::set_up_class> (
+      "GstCodedFilter", GST_TYPE_ELEMENT, G_TYPE_FLAG_ABSTRACT);
+}
+
+CodedFilter::CodedFilter (GstElement *element, const StatsNames &names)
+    : element_ (element),
       sinkpad_ (gst_pad_new_from_template (
           gst_element_get_pad_template (element_, "sink"), "sink"))
 {
+  state_in<GstCodedFilter> (element) = this;
   shared_.names = names;
   gst_pad_set_chain_function (
       sinkpad_, [] (GstPad *, GstObject *parent, GstBuffer *frame) noexcept {
@@ -237,38 +200,24 @@ CodedFilter::read_settings ()
          check ("bench", read_again (element_, settings.bench));
 }
 
-bool
-CodedFilter::before_state_change (GstStateChange transition)
+/* The counters of a run can be read until the next one begins. */
+void
+CodedFilter::begin ()
 {
-  switch (transition) {
-  case GST_STATE_CHANGE_NULL_TO_READY:
-    return read_settings ();
-  case GST_STATE_CHANGE_READY_TO_PAUSED: {
-    resume ();
-    /* The counters of a run can be read until the next one begins. */
-    const ObjectLock lock (element_);
-    shared_.counters = CodedCounters ();
-    return true;
-  }
-  case GST_STATE_CHANGE_PAUSED_TO_READY:
-    cancel ();
-    return true;
-  default:
-    return true;
-  }
+  resume ();
+  const ObjectLock lock (element_);
+  shared_.counters = CodedCounters ();
 }
 
 void
-CodedFilter::after_state_change (GstStateChange transition)
+CodedFilter::forget_stream ()
 {
-  if (transition != GST_STATE_CHANGE_PAUSED_TO_READY)
-    return;
   SeekBook::forget (this);
   stream_ = Stream ();
   each_pad ([this] (GstCodedPad *pad) {
-    pad->coded.discont = true;
-    pad->coded.offset = 0;
-    pad->coded.allocation.reset ();
+    pad->state.discont = true;
+    pad->state.offset = 0;
+    pad->state.allocation.reset ();
     const ObjectLock lock (element_);
     forget_lateness (pad);
   });

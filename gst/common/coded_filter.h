@@ -15,6 +15,7 @@
 #include "base/result.h"
 #include "caps.h"
 #include "coded_pad.h"
+#include "element.h"
 #include "excerpt.h"
 #include "messages.h"
 #include "meta.h"
@@ -26,18 +27,6 @@
 #include "schedule/schedule.h"
 #include "setup/stream_setup.h"
 #include "sync/frame_sequence.h"
-
-G_BEGIN_DECLS
-
-#define GST_TYPE_CODED_FILTER (gst_coded_filter_get_type ())
-G_DECLARE_DERIVABLE_TYPE (
-    GstCodedFilter, gst_coded_filter, GST, CODED_FILTER, GstElement)
-
-struct _GstCodedFilterClass {
-  GstElementClass parent_class;
-};
-
-G_END_DECLS
 
 namespace codedexposure::gst
 {
@@ -137,7 +126,7 @@ public:
   /** Follows the method of pictures in the provenance of their uncertainty. */
   static constexpr const char *kUncertaintyMethod = ", uncertainty";
 
-  CodedFilter (GstCodedFilter *element, const StatsNames &names);
+  CodedFilter (GstElement *element, const StatsNames &names);
   virtual ~CodedFilter () = default;
   CodedFilter (const CodedFilter &) = delete;
   CodedFilter &operator= (const CodedFilter &) = delete;
@@ -148,7 +137,6 @@ public:
   gboolean sink_query (GstQuery *query);
   gboolean src_query (GstCodedPad *pad, GstQuery *query);
 
-  static void set_up_class (gpointer klass);
   /** After a property of @p object was set. Object lock. */
   static void settings_changed (GObject *object, const GParamSpec *);
 
@@ -296,6 +284,8 @@ protected:
   Shared shared_; ///< object lock
 
 private:
+  friend GType coded_filter_type ();
+
   /** A sequence of saturated frames. */
   struct Burst {
     guint64 frames = 0;
@@ -391,8 +381,9 @@ private:
   static const PropertyTable<Shared> &properties ();
   static Shared &shared_of (GObject *object);
   bool read_settings ();
-  bool before_state_change (GstStateChange transition);
-  void after_state_change (GstStateChange transition);
+  void begin ();
+  void forget_stream ();
+  static void set_up_class (gpointer klass);
   /** Makes a new plan if it is stale, and sends caps and waiting events. Posts
    * an error on failure. @p next: the frame that comes next; null: none. */
   GstFlowReturn negotiate (GstBuffer *next = nullptr);
@@ -468,10 +459,15 @@ private:
       gst_flow_combiner_new ()};
 };
 
-/** Gives @p element its implementation; call once, from instance init. */
-void adopt_filter (
-    GstCodedFilter *element, std::unique_ptr<CodedFilter> filter);
+/** Abstract; an instance of a derived type is its own CodedFilter. */
+struct GstCodedFilter : Instance<GstElement, CodedFilter *> {
+};
+GType coded_filter_type ();
 /** The implementation of @p element. */
-CodedFilter &filter_of (gpointer element);
+inline CodedFilter &
+filter_of (gpointer element)
+{
+  return *state_in<GstCodedFilter> (element);
+}
 
 } // namespace codedexposure::gst

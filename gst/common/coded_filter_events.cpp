@@ -267,7 +267,7 @@ CodedFilter::break_time ()
   stream_.missing_until = 0;
   break_history ();
   each_pad ([this] (GstCodedPad *pad) {
-    pad->coded.discont = true;
+    pad->state.discont = true;
     const ObjectLock lock (element_);
     forget_lateness (pad);
   });
@@ -407,7 +407,7 @@ CapsPtr
 CodedFilter::caps_between (const CapsContext &context, const GstCodedPad *pad,
     GstCaps *caps, bool to_coded) const
 {
-  return pad->coded.kind == PadKind::coded
+  return pad->state.kind == PadKind::coded
              ? CapsPtr (gst_caps_ref (caps))
              : convert_caps (context, pad, caps, to_coded);
 }
@@ -493,7 +493,7 @@ CodedFilter::scale_frames (GstCodedPad *pad, GstQuery *query) const
     return;
   {
     const ObjectLock lock (element_);
-    if (shared_.schedule && pad->coded.kind != PadKind::coded)
+    if (shared_.schedule && pad->state.kind != PadKind::coded)
       frames *= pictures_a_frame (pad);
   }
   if (duration)

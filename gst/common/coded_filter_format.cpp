@@ -375,7 +375,7 @@ CodedFilter::push_provenance ()
     return;
   const auto made = provenance ();
   each_pad ([&] (GstCodedPad *pad) {
-    if (pad->coded.kind != PadKind::coded)
+    if (pad->state.kind != PadKind::coded)
       gst_pad_push_event (
           GST_PAD (pad), provenance_to_event (provenance_for (pad, *made)));
   });
@@ -410,7 +410,7 @@ CodedFilter::adopt (CodedFormat format, GstBuffer *next)
   }
   SeekBook::read (this, stream_.id, reach ());
   each_pad ([this] (GstCodedPad *pad) {
-    pad->coded.allocation.reset ();
+    pad->state.allocation.reset ();
     push_caps (pad);
   });
   GST_INFO_OBJECT (element_, "%s: %dx%d", adopted.schedule.text ().c_str (),

@@ -66,7 +66,7 @@ CodedFilter::push_coded (const CodedFrame &frame)
   if (!pad)
     return GST_FLOW_OK;
   BufferPtr outbuf (gst_buffer_ref (frame.buffer.get ()));
-  if (std::exchange (pad->coded.discont, false) &&
+  if (std::exchange (pad->state.discont, false) &&
       !GST_BUFFER_IS_DISCONT (outbuf.get ())) {
     outbuf.reset (gst_buffer_make_writable (outbuf.release ()));
     GST_BUFFER_FLAG_SET (outbuf.get (), GST_BUFFER_FLAG_DISCONT);
@@ -124,9 +124,9 @@ CodedFilter::skip (const CodedFrame &frame)
     return flow;
   const EventPtr gap (gst_event_new_gap (frame.pts (), format ().period ()));
   each_pad ([&] (GstCodedPad *pad) {
-    if (pad->coded.kind == PadKind::coded)
+    if (pad->state.kind == PadKind::coded)
       return;
-    pad->coded.discont = true;
+    pad->state.discont = true;
     gst_pad_push_event (GST_PAD (pad), gap_for (pad, gap.get ()).release ());
   });
   return push_coded (frame);
@@ -138,7 +138,7 @@ CodedFilter::break_off ()
 {
   const GstFlowReturn flow = drain ();
   break_history ();
-  each_pad ([] (GstCodedPad *pad) { pad->coded.discont = true; });
+  each_pad ([] (GstCodedPad *pad) { pad->state.discont = true; });
   return flow;
 }
 
@@ -398,7 +398,7 @@ CodedFilter::acquire_picture (GstCodedPad *pad, const GstVideoInfo &info,
     return GST_FLOW_OK;
   GST_ELEMENT_ERROR (element_, RESOURCE, NO_SPACE_LEFT,
       ("No buffer for a picture of %dx%d pixels.", info.width, info.height),
-      ("pool %" GST_PTR_FORMAT, pad->coded.allocation->pool.get ()));
+      ("pool %" GST_PTR_FORMAT, pad->state.allocation->pool.get ()));
   return GST_FLOW_ERROR;
 }
 
@@ -435,7 +435,7 @@ GstFlowReturn
 CodedFilter::combine_flow (GstCodedPad *pad, GstFlowReturn flow)
 {
   const ObjectLock lock (element_);
-  if (pad->coded.released)
+  if (pad->state.released)
     return GST_FLOW_OK;
   return gst_flow_combiner_update_pad_flow (
       combiner_.get (), GST_PAD (pad), flow);

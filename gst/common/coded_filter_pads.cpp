@@ -62,7 +62,7 @@ CapsPtr
 CodedFilter::caps_for (const GstCodedPad *pad) const
 {
   const ObjectLock lock (element_);
-  GstCaps *caps = caps_.of (pad->coded);
+  GstCaps *caps = caps_.of (pad->state);
   return CapsPtr (caps ? gst_caps_ref (caps) : nullptr);
 }
 
@@ -83,17 +83,17 @@ CodedFilter::new_source_pad (
       gst_element_get_pad_template (element_, templ), name.c_str ());
   gst_pad_set_event_function (
       pad, [] (GstPad *self, GstObject *parent, GstEvent *event) noexcept {
-        return filter_of (parent).src_event (GST_CODED_PAD (self), event);
+        return filter_of (parent).src_event (as<GstCodedPad> (self), event);
       });
   gst_pad_set_query_function (
       pad, [] (GstPad *self, GstObject *parent, GstQuery *query) noexcept {
-        return filter_of (parent).src_query (GST_CODED_PAD (self), query);
+        return filter_of (parent).src_query (as<GstCodedPad> (self), query);
       });
   GST_PAD_SET_ACCEPT_TEMPLATE (pad);
-  CodedPad &coded = GST_CODED_PAD (pad)->coded;
+  CodedPad &coded = as<GstCodedPad> (pad)->state;
   coded.kind = kind;
   coded.index = index;
-  return ObjectPtr<GstCodedPad> (GST_CODED_PAD (gst_object_ref_sink (pad)));
+  return ObjectPtr<GstCodedPad> (as<GstCodedPad> (gst_object_ref_sink (pad)));
 }
 
 GstCodedPad *
@@ -123,7 +123,7 @@ CodedFilter::replay_sticky (GstPad *, GstEvent **upstream, gpointer user_data)
   } else if (type != GST_EVENT_CAPS) {
     event.reset (event_for (pad, gst_event_ref (*upstream), provenance));
     tagged |= type == GST_EVENT_TAG;
-  } else if (GstCaps *own = caps.of (pad->coded)) {
+  } else if (GstCaps *own = caps.of (pad->state)) {
     event.reset (gst_event_new_caps (own));
     gst_event_set_seqnum (event.get (), gst_event_get_seqnum (*upstream));
   }
@@ -138,7 +138,7 @@ CodedFilter::replay_sticky (GstPad *, GstEvent **upstream, gpointer user_data)
 void
 CodedFilter::insert_pad (PadRef pad)
 {
-  const PadKind kind = pad->coded.kind;
+  const PadKind kind = pad->state.kind;
   const ObjectLock lock (element_);
   const Provenance *made = shared_.provenance.get ();
   Replay replay{pad.get (), caps_, made};
@@ -152,7 +152,7 @@ CodedFilter::insert_pad (PadRef pad)
     gst_pad_store_sticky_event (GST_PAD (pad.get ()), eos.get ());
   gst_flow_combiner_add_pad (combiner_.get (), GST_PAD (pad.get ()));
   auto changed = std::make_shared<PadMap> (*pads_);
-  changed->emplace (std::pair (kind, pad->coded.index), pad);
+  changed->emplace (std::pair (kind, pad->state.index), pad);
   pads_ = std::move (changed);
 }
 
@@ -180,14 +180,14 @@ CodedFilter::request_pad (GstPadTemplate *templ, const gchar *name)
 PadRef
 CodedFilter::take_pad (GstPad *pad)
 {
-  const CodedPad &coded = GST_CODED_PAD (pad)->coded;
+  const CodedPad &coded = as<GstCodedPad> (pad)->state;
   const ObjectLock lock (element_);
   auto changed = std::make_shared<PadMap> (*pads_);
   const auto found = changed->find ({coded.kind, coded.index});
   if (found == changed->end () || GST_PAD (found->second.get ()) != pad)
     return nullptr;
   PadRef taken = std::move (found->second);
-  taken->coded.released = true;
+  taken->state.released = true;
   changed->erase (found);
   pads_ = std::move (changed);
   gst_flow_combiner_remove_pad (combiner_.get (), pad);
@@ -208,7 +208,7 @@ CodedFilter::release_pad (GstPad *pad)
 Provenance
 CodedFilter::provenance_for (const GstCodedPad *pad, Provenance made)
 {
-  if (pad->coded.kind == PadKind::uncertainty) {
+  if (pad->state.kind == PadKind::uncertainty) {
     made.method += kUncertaintyMethod;
     made.setup.bits = 0;
   }
@@ -220,7 +220,7 @@ CodedFilter::event_for (
     const GstCodedPad *pad, GstEvent *event, const Provenance *provenance)
 {
   if (GST_EVENT_TYPE (event) != GST_EVENT_TAG ||
-      pad->coded.kind == PadKind::coded || !provenance)
+      pad->state.kind == PadKind::coded || !provenance)
     return event;
   return replace_by_provenance (event, provenance_for (pad, *provenance));
 }
@@ -244,7 +244,7 @@ CodedFilter::forward (EventPtr event)
   each_pad ([&] (GstCodedPad *pad) {
     EventPtr own =
         type == GST_EVENT_STREAM_START ? stream_start_for (pad, event.get ())
-        : type == GST_EVENT_GAP && pad->coded.kind != PadKind::coded
+        : type == GST_EVENT_GAP && pad->state.kind != PadKind::coded
             ? gap_for (pad, event.get ())
             : EventPtr (
                   event_for (pad, gst_event_ref (event.get ()), made.get ()));

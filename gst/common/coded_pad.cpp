@@ -4,7 +4,6 @@
 #include "coded_pad.h"
 
 #include <algorithm>
-#include <new>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -13,28 +12,6 @@
 
 GST_DEBUG_CATEGORY_EXTERN (coded_filter_debug);
 #define GST_CAT_DEFAULT coded_filter_debug
-
-G_DEFINE_TYPE (GstCodedPad, gst_coded_pad, GST_TYPE_PAD)
-
-static void
-gst_coded_pad_finalize (GObject *object)
-{
-  using codedexposure::gst::CodedPad;
-  GST_CODED_PAD (object)->coded.~CodedPad ();
-  G_OBJECT_CLASS (gst_coded_pad_parent_class)->finalize (object);
-}
-
-static void
-gst_coded_pad_class_init (GstCodedPadClass *klass)
-{
-  G_OBJECT_CLASS (klass)->finalize = gst_coded_pad_finalize;
-}
-
-static void
-gst_coded_pad_init (GstCodedPad *self)
-{
-  new (&self->coded) codedexposure::gst::CodedPad;
-}
 
 namespace codedexposure::gst
 {
@@ -127,11 +104,6 @@ choose_pool (
   return nullptr;
 }
 
-} // namespace
-
-namespace
-{
-
 constexpr struct {
   PadKind kind;
   std::string_view name; ///< of the template
@@ -140,6 +112,12 @@ constexpr struct {
     {PadKind::uncertainty, "uncertainty"}};
 
 } // namespace
+
+GType
+coded_pad_type ()
+{
+  return type_of<GstCodedPad, [] (gpointer) {}> ("GstCodedPad", GST_TYPE_PAD);
+}
 
 GstCodedPad *
 find_pad (const PadMap &pads, PadKind kind, int index)
@@ -222,7 +200,7 @@ void
 prepare_allocation (GstCodedPad *coded, GstCaps *caps, guint at_once)
 {
   GstPad *pad = GST_PAD (coded);
-  std::optional<Allocation> &allocation = coded->coded.allocation;
+  std::optional<Allocation> &allocation = coded->state.allocation;
   if (gst_pad_check_reconfigure (pad))
     allocation.reset ();
   if (allocation)
@@ -243,7 +221,7 @@ GstFlowReturn
 acquire (
     GstCodedPad *pad, const GstVideoInfo &info, bool first, BufferPtr &outbuf)
 {
-  Allocation &allocation = *pad->coded.allocation;
+  Allocation &allocation = *pad->state.allocation;
   if (!allocation.active && allocation.pool)
     allocation.active =
         gst_buffer_pool_set_active (allocation.pool.get (), TRUE);
@@ -268,7 +246,7 @@ acquire (
 GstFlowReturn
 push_picture (GstCodedPad *pad, BufferPtr outbuf, GstClockTime duration)
 {
-  CodedPad &coded = pad->coded;
+  CodedPad &coded = pad->state;
   GST_BUFFER_DURATION (outbuf.get ()) = duration;
   GST_BUFFER_OFFSET (outbuf.get ()) = coded.offset++;
   GST_BUFFER_OFFSET_END (outbuf.get ()) = coded.offset;
@@ -286,7 +264,7 @@ push_picture (GstCodedPad *pad, BufferPtr outbuf, GstClockTime duration)
 void
 note_lateness (GstCodedPad *pad, GstEvent *event)
 {
-  CodedPad &coded = pad->coded;
+  CodedPad &coded = pad->state;
   GstQOSType type;
   GstClockTime time = GST_CLOCK_TIME_NONE;
   gst_event_parse_qos (event, &type, &coded.proportion, &coded.jitter, &time);
@@ -299,9 +277,9 @@ note_lateness (GstCodedPad *pad, GstEvent *event)
 void
 forget_lateness (GstCodedPad *pad)
 {
-  pad->coded.earliest = GST_CLOCK_TIME_NONE;
-  pad->coded.proportion = 1.0;
-  pad->coded.jitter = 0;
+  pad->state.earliest = GST_CLOCK_TIME_NONE;
+  pad->state.proportion = 1.0;
+  pad->state.jitter = 0;
 }
 
 } // namespace codedexposure::gst

@@ -11,14 +11,8 @@
 
 #include <gst/gst.h>
 
+#include "element.h"
 #include "raii.h"
-
-G_BEGIN_DECLS
-
-#define GST_TYPE_CODED_PAD (gst_coded_pad_get_type ())
-G_DECLARE_FINAL_TYPE (GstCodedPad, gst_coded_pad, GST, CODED_PAD, GstPad)
-
-G_END_DECLS
 
 namespace codedexposure::gst
 {
@@ -58,15 +52,9 @@ struct CodedPad {
   GstClockTimeDiff jitter = 0;
 };
 
-} // namespace codedexposure::gst
-
-struct _GstCodedPad {
-  GstPad parent;
-  codedexposure::gst::CodedPad coded;
+struct GstCodedPad : Instance<GstPad, CodedPad> {
 };
-
-namespace codedexposure::gst
-{
+GType coded_pad_type ();
 
 using PadRef = std::shared_ptr<GstCodedPad>;
 /** Source pads by kind and index, in the order in which they are served. */

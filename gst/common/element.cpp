@@ -49,6 +49,57 @@ describe_element (gpointer klass, const char *name, const char *kind,
     add_pad_template (klass, pad);
 }
 
+GstPad *
+add_pad (GstElement *element, const char *name)
+{
+  GstPad *pad = gst_pad_new_from_template (
+      gst_element_get_pad_template (element, name), name);
+  gst_element_add_pad (element, pad);
+  return pad;
+}
+
+GstPad *
+add_ghost_pad (GstElement *bin, const char *name, GstElement *inner)
+{
+  GstPad *pad = gst_ghost_pad_new_no_target_from_template (
+      name, gst_element_get_pad_template (bin, name));
+  if (inner)
+    gst_ghost_pad_set_target (
+        GST_GHOST_PAD (pad), static_pad (inner, name).get ());
+  gst_element_add_pad (bin, pad);
+  return pad;
+}
+
+ObjectPtr<GstPad>
+static_pad (GstElement *element, const char *name)
+{
+  return ObjectPtr<GstPad> (gst_element_get_static_pad (element, name));
+}
+
+GstStateChangeReturn
+StateHooks::change (
+    Change parent, GstElement *element, GstStateChange transition) const
+{
+  const bool begins = transition == GST_STATE_CHANGE_READY_TO_PAUSED;
+  const bool ends = transition == GST_STATE_CHANGE_PAUSED_TO_READY;
+  const auto run = [element] (bool now, Do hook) {
+    if (now && hook)
+      hook (element);
+  };
+  if (transition == GST_STATE_CHANGE_NULL_TO_READY && open && !open (element))
+    return GST_STATE_CHANGE_FAILURE;
+  run (transition == GST_STATE_CHANGE_PLAYING_TO_PAUSED, pause);
+  run (ends, halt);
+  const auto changed = begins && begin && !begin (element)
+                           ? GST_STATE_CHANGE_FAILURE
+                           : parent (element, transition);
+  const bool failed = begins && changed == GST_STATE_CHANGE_FAILURE;
+  run (failed, halt);
+  run (failed || ends, end);
+  run (transition == GST_STATE_CHANGE_READY_TO_NULL, close);
+  return changed;
+}
+
 GstBaseTransformClass *
 base_transform_class ()
 {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <initializer_list>
+#include <new>
 #include <string>
 
 #include <gst/base/gstbasetransform.h>
@@ -33,57 +34,126 @@ void describe_element (gpointer klass, const char *name, const char *kind,
     const char *description,
     std::initializer_list<const char *> pads = {"sink", "src"});
 
-/** The state of an element whose struct points to it by a member `state`. */
-template <typename Element>
-auto &
-state_in (gpointer element)
+/**
+ * An instance of a type: that of its parent, and behind it a state that lives
+ * as long as the instance.
+ *
+ * struct GstDmdSync : Instance<GstBaseTransform, SyncState> {};
+ */
+template <typename Parent, typename State>
+struct Instance {
+  Parent parent;
+  State state;
+};
+
+template <typename Self>
+Self *
+as (gpointer object)
 {
-  return *static_cast<Element *> (element)->state;
+  return static_cast<Self *> (object);
+}
+template <typename Self>
+auto &
+state_in (gpointer object)
+{
+  return as<Self> (object)->state;
+}
+/** The class from which that of @p object is derived. */
+template <typename Class>
+Class *
+parent_class (gpointer object)
+{
+  return static_cast<Class *> (
+      g_type_class_peek_parent (G_OBJECT_GET_CLASS (object)));
 }
 
 /**
- * For the class of a final type whose instances create their `state`: installs
- * the properties of @p Table (), as install_properties (), and deletes the
- * state with the instance.
+ * Registers the type @p name of a Self, whose state is made of its element if
+ * it has such a constructor.
+ *
+ * @p SetUp          (klass) sets up the class.
+ * @p SetUpInstance  (self) completes an instance.
  */
-template <typename Element, auto Table,
+template <typename Self, auto SetUp, auto SetUpInstance = [] (Self *) {}>
+GType
+type_of (const char *name, GType parent, GTypeFlags flags = GTypeFlags (0))
+{
+  using State = decltype (Self::state);
+  static const GType type = [=] {
+    GTypeQuery base;
+    g_type_query (parent, &base);
+    const GClassInitFunc set_up = [] (gpointer klass, gpointer) noexcept {
+      static const auto finalize = G_OBJECT_CLASS (klass)->finalize;
+      G_OBJECT_CLASS (klass)->finalize = [] (GObject *object) noexcept {
+        state_in<Self> (object).~State ();
+        finalize (object);
+      };
+      SetUp (klass);
+    };
+    const GInstanceInitFunc create = [] (GTypeInstance *made,
+                                         gpointer) noexcept {
+      auto *self = reinterpret_cast<Self *> (made);
+      if constexpr (requires { State{as<GstElement> (made)}; })
+        new (&self->state) State{as<GstElement> (made)};
+      else
+        new (&self->state) State ();
+      SetUpInstance (self);
+    };
+    return g_type_register_static_simple (
+        parent, name, base.class_size, set_up, sizeof (Self), create, flags);
+  }();
+  return type;
+}
+
+/** Installs the properties of @p Table (), whose values are in the state of a
+ * Self. */
+template <typename Self, auto Table,
     auto Changed = [] (GObject *, const GParamSpec *) {}>
 void
 install_state (gpointer klass)
 {
-  auto *object_class = G_OBJECT_CLASS (klass);
-  install_properties<Table, state_in<Element>, Changed> (object_class);
-  object_class->finalize = [] (GObject *object) noexcept {
-    delete &state_in<Element> (object);
-    G_OBJECT_CLASS (g_type_class_peek_parent (G_OBJECT_GET_CLASS (object)))
-        ->finalize (object);
-  };
+  install_properties<Table, state_in<Self>, Changed> (G_OBJECT_CLASS (klass));
 }
 
-/**
- * For the class of a final type: calls @p Begin from READY to PAUSED, before
- * frames and events can come, and @p End from PAUSED to READY, when none can
- * come any more. GstBaseTransform's start () and stop () run beside the
- * streaming thread. If @p Begin returns false, it has posted an error.
- */
-template <auto Begin, auto End>
+/** What an element does when its state changes; null: nothing. */
+struct StateHooks {
+  using Try = bool (*) (
+      GstElement *); ///< false, with an error posted: it fails
+  using Do = void (*) (GstElement *);
+
+  Try open = nullptr;  ///< NULL to READY
+  Try begin = nullptr; ///< READY to PAUSED, before frames and events can come
+  Do pause = nullptr;  ///< PLAYING to PAUSED
+  /** PAUSED to READY, while the streaming thread may wait for something. */
+  Do halt = nullptr;
+  /** After that, when nothing can come any more. GstBaseTransform's start ()
+   * and stop () run beside the streaming thread. */
+  Do end = nullptr;
+  Do close = nullptr; ///< after READY to NULL
+
+  using Change = decltype (GstElementClass::change_state);
+  GstStateChangeReturn change (
+      Change parent, GstElement *element, GstStateChange transition) const;
+};
+/** @p Hooks: a constant. */
+template <const StateHooks &Hooks>
 void
 install_run (gpointer klass)
 {
+  static const auto parent = GST_ELEMENT_CLASS (klass)->change_state;
   GST_ELEMENT_CLASS (klass)->change_state =
       [] (GstElement *element, GstStateChange transition) noexcept {
-        const bool begins = transition == GST_STATE_CHANGE_READY_TO_PAUSED;
-        auto changed = GST_STATE_CHANGE_FAILURE;
-        if (!begins || Begin (element))
-          changed = GST_ELEMENT_CLASS (
-              g_type_class_peek_parent (G_OBJECT_GET_CLASS (element)))
-                        ->change_state (element, transition);
-        if (transition == GST_STATE_CHANGE_PAUSED_TO_READY ||
-            (begins && changed == GST_STATE_CHANGE_FAILURE))
-          End (element);
-        return changed;
+        return Hooks.change (parent, element, transition);
       };
 }
+
+/** Adds the pad @p name of the template of this name to @p element. */
+GstPad *add_pad (GstElement *element, const char *name);
+/** The same as a ghost of the pad @p name of @p inner, or without a target if
+ * that is null. */
+GstPad *add_ghost_pad (GstElement *bin, const char *name, GstElement *inner);
+/** A pad that @p element has. */
+ObjectPtr<GstPad> static_pad (GstElement *element, const char *name);
 
 /** The class of GstBaseTransform, to call its default implementations. */
 GstBaseTransformClass *base_transform_class ();

@@ -116,30 +116,6 @@ GST_DEBUG_CATEGORY (codedexposure_demux_debug);
 
 using namespace codedexposure;
 using namespace codedexposure::gst;
-using demux::Demux;
-
-struct _GstCodedExposureDemux {
-  GstCodedFilter parent;
-};
-
-G_DEFINE_TYPE_WITH_CODE (GstCodedExposureDemux, gst_coded_exposure_demux,
-    GST_TYPE_CODED_FILTER,
-    GST_DEBUG_CATEGORY_INIT (codedexposure_demux_debug, "codedexposure-demux",
-        0, "coded frames to subframes"))
-GST_ELEMENT_REGISTER_DEFINE (codedexposure_demux, "codedexposure-demux",
-    GST_RANK_NONE, gst_coded_exposure_demux_get_type ())
-
-static void
-gst_coded_exposure_demux_class_init (GstCodedExposureDemuxClass *klass)
-{
-  Demux::set_up_class (klass);
-}
-
-static void
-gst_coded_exposure_demux_init (GstCodedExposureDemux *element)
-{
-  adopt_filter (GST_CODED_FILTER (element), std::make_unique<Demux> (element));
-}
 
 namespace codedexposure::gst::demux
 {
@@ -147,6 +123,8 @@ namespace codedexposure::gst::demux
 void
 Demux::set_up_class (gpointer klass)
 {
+  GST_DEBUG_CATEGORY_INIT (codedexposure_demux_debug, "codedexposure-demux", 0,
+      "coded frames to subframes");
   install_properties<properties, settings_of, settings_changed> (
       G_OBJECT_CLASS (klass));
   describe_element (klass, "Coded exposure demultiplexer",
@@ -156,7 +134,7 @@ Demux::set_up_class (gpointer klass)
       {});
   for (const char *pad : {"subframe_%u", "region_%u"})
     add_pad_template (
-        klass, pad, {.presence = GST_PAD_REQUEST, .type = GST_TYPE_CODED_PAD});
+        klass, pad, {.presence = GST_PAD_REQUEST, .type = coded_pad_type ()});
 }
 
 namespace
@@ -172,10 +150,9 @@ any_wanted (const auto &targets)
 
 } // namespace
 
-Demux::Demux (GstCodedExposureDemux *element)
-    : CodedFilter (GST_CODED_FILTER (element),
-          {"application/x-codedexposure-demux-stats", "subframes-out",
-              "subframes-dropped"})
+Demux::Demux (GstElement *element)
+    : CodedFilter (element, {"application/x-codedexposure-demux-stats",
+                                "subframes-out", "subframes-dropped"})
 {
 }
 
@@ -243,12 +220,12 @@ Demux::skip (GstCodedPad *pad, GstClockTime pts, GstClockTime duration)
     const ObjectLock lock (element ());
     shared_.counters.pictures_dropped++;
     gst_message_set_qos_values (
-        message, pad->coded.jitter, pad->coded.proportion, 1000000);
+        message, pad->state.jitter, pad->state.proportion, 1000000);
     gst_message_set_qos_stats (message, GST_FORMAT_BUFFERS,
         shared_.counters.pictures_out, shared_.counters.pictures_dropped);
   }
   gst_element_post_message (element (), message);
-  pad->coded.discont = true;
+  pad->state.discont = true;
   gst_pad_push_event (GST_PAD (pad), gst_event_new_gap (pts, duration));
 }
 
@@ -260,7 +237,7 @@ Demux::is_late (GstCodedPad *pad, GstClockTime pts, GstClockTime duration)
   GstClockTime earliest;
   {
     const ObjectLock lock (element ());
-    earliest = pad->coded.earliest;
+    earliest = pad->state.earliest;
   }
   const GstClockTime running = gst_segment_to_running_time (
       &segment (), GST_FORMAT_TIME, backwards () ? pts + duration : pts);
@@ -418,7 +395,7 @@ Demux::share (
   const GstVideoMeta *layout = gst_buffer_get_video_meta (outbuf);
   const bool plain = !layout || (layout->offset[0] == info.offset[0] &&
                                     layout->stride[0] == info.stride[0]);
-  if (plain || pad->coded.allocation->video_meta)
+  if (plain || pad->state.allocation->video_meta)
     return BufferPtr (gst_buffer_copy (outbuf));
 
   BufferPtr packed (
@@ -464,3 +441,10 @@ Demux::push_subframe (const CodedFrame &frame, SplitTurn turn, Target target)
 }
 
 } // namespace codedexposure::gst::demux
+
+struct GstCodedExposureDemux : Instance<GstCodedFilter, demux::Demux> {
+};
+GST_ELEMENT_REGISTER_DEFINE (codedexposure_demux, "codedexposure-demux",
+    GST_RANK_NONE,
+    (type_of<GstCodedExposureDemux, demux::Demux::set_up_class> (
+        "GstCodedExposureDemux", coded_filter_type ())))

@@ -13,13 +13,6 @@
 #include "common/coded_filter.h"
 #include "extract/split_plan.h"
 
-G_BEGIN_DECLS
-
-G_DECLARE_FINAL_TYPE (GstCodedExposureDemux, gst_coded_exposure_demux, GST,
-    CODED_EXPOSURE_DEMUX, GstCodedFilter)
-
-G_END_DECLS
-
 namespace codedexposure::gst::demux
 {
 
@@ -43,7 +36,7 @@ struct Plan {
 class Demux final : public CodedFilter
 {
 public:
-  explicit Demux (GstCodedExposureDemux *element);
+  explicit Demux (GstElement *element);
 
   static void set_up_class (gpointer klass);
 

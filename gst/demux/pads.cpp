@@ -76,8 +76,8 @@ Demux::check_pads (const PadMap &pads) const
 EventPtr
 Demux::gap_for (const GstCodedPad *pad, GstEvent *gap) const
 {
-  const auto k = std::size_t (pad->coded.index);
-  if (pad->coded.kind != PadKind::one || !plan_ ||
+  const auto k = std::size_t (pad->state.index);
+  if (pad->state.kind != PadKind::one || !plan_ ||
       k >= plan_->background ().boundaries.size ())
     return EventPtr (gst_event_ref (gap));
   GstClockTime pts, duration;

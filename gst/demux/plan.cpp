@@ -194,15 +194,15 @@ Demux::forget ()
 CapsScale
 Demux::scale_for (const Schedule &schedule, const GstCodedPad *pad) const
 {
-  return coded_to_subframes (schedule, pad->coded.kind == PadKind::all);
+  return coded_to_subframes (schedule, pad->state.kind == PadKind::all);
 }
 
 CapsPtr
 Demux::convert_caps (const CapsContext &context, const GstCodedPad *pad,
     GstCaps *caps, bool to_coded) const
 {
-  if (pad->coded.kind == PadKind::region && context.schedule)
-    return convert_region (*context.schedule, pad->coded.index, caps, to_coded);
+  if (pad->state.kind == PadKind::region && context.schedule)
+    return convert_region (*context.schedule, pad->state.index, caps, to_coded);
   return CodedFilter::convert_caps (context, pad, caps, to_coded);
 }
 
@@ -210,7 +210,7 @@ int
 Demux::pictures_a_frame (const GstCodedPad *pad) const
 {
   const ScheduleRef schedule = shared_.schedule;
-  const auto &[kind, index] = std::tie (pad->coded.kind, pad->coded.index);
+  const auto &[kind, index] = std::tie (pad->state.kind, pad->state.index);
   if (kind == PadKind::all)
     return schedule->elements ();
   return kind == PadKind::region && index < int (schedule->regions ().size ())

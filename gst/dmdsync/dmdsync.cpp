@@ -113,13 +113,8 @@ GST_DEBUG_CATEGORY (dmdsync_debug);
 using namespace codedexposure;
 using namespace codedexposure::gst;
 using sync::Counters;
+using sync::GstDmdSync;
 using sync::SyncState;
-
-G_DEFINE_TYPE_WITH_CODE (GstDmdSync, gst_dmd_sync, GST_TYPE_BASE_TRANSFORM,
-    GST_DEBUG_CATEGORY_INIT (
-        dmdsync_debug, "dmdsync", 0, "drives the DMD, times coded frames"))
-GST_ELEMENT_REGISTER_DEFINE (
-    dmdsync, "dmdsync", GST_RANK_NONE, GST_TYPE_DMD_SYNC)
 
 namespace
 {
@@ -131,7 +126,7 @@ constexpr std::chrono::milliseconds kQuickUpload{1000};
 void
 say_observable (GstDmdSync *self)
 {
-  const SyncState &st = *self->state;
+  const SyncState &st = self->state;
   const SlipObservable observable = slip_observable (st.schedule);
   if (observable == SlipObservable::always)
     return;
@@ -149,7 +144,7 @@ say_observable (GstDmdSync *self)
 void
 begin_run (GstDmdSync *self)
 {
-  SyncState &st = *self->state;
+  SyncState &st = self->state;
   {
     const ObjectLock lock (self);
     st.counters = Counters ();
@@ -165,7 +160,7 @@ begin_run (GstDmdSync *self)
 void
 forget_stream (GstDmdSync *self)
 {
-  SyncState &st = *self->state;
+  SyncState &st = self->state;
   st.stream = sync::Stream ();
   const ObjectLock lock (self);
   st.time.reset ();
@@ -175,54 +170,46 @@ forget_stream (GstDmdSync *self)
   st.latency = 0;
 }
 
-GstStateChangeReturn
-change_state (GstElement *element, GstStateChange transition)
+/* The schedule before a device is opened, and again because the property may
+ * have changed. */
+bool
+open (GstElement *element)
 {
-  auto *self = GST_DMD_SYNC (element);
-  /* Before a device is opened, and again because the property may have
-   * changed. */
-  const bool schedule_due = transition == GST_STATE_CHANGE_NULL_TO_READY ||
-                            transition == GST_STATE_CHANGE_READY_TO_PAUSED;
-  if (schedule_due && !sync::read_schedule (self))
-    return GST_STATE_CHANGE_FAILURE;
-  if (transition == GST_STATE_CHANGE_NULL_TO_READY && !sync::open_device (self))
-    return GST_STATE_CHANGE_FAILURE;
-  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED &&
-      !sync::read_bench (self))
-    return GST_STATE_CHANGE_FAILURE;
-  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED)
-    begin_run (self);
-  /* First, because the streaming thread may be waiting for the DMD. */
-  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY)
-    sync::park (self);
-
-  const GstStateChangeReturn changed =
-      GST_ELEMENT_CLASS (gst_dmd_sync_parent_class)
-          ->change_state (element, transition);
-
-  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED &&
-      changed == GST_STATE_CHANGE_FAILURE)
-    sync::park (self);
-  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY)
-    forget_stream (self);
-  if (transition == GST_STATE_CHANGE_READY_TO_NULL)
-    sync::close_device (self);
-  return changed;
+  auto *self = as<GstDmdSync> (element);
+  return sync::read_schedule (self) && sync::open_device (self);
 }
 
-} // namespace
-
-static void
-gst_dmd_sync_class_init (GstDmdSyncClass *klass)
+bool
+begin (GstElement *element)
 {
-  auto *element_class = GST_ELEMENT_CLASS (klass);
-  auto *transform_class = GST_BASE_TRANSFORM_CLASS (klass);
+  auto *self = as<GstDmdSync> (element);
+  if (!sync::read_schedule (self) || !sync::read_bench (self))
+    return false;
+  begin_run (self);
+  return true;
+}
 
+constexpr StateHooks kRun{.open = open,
+    .begin = begin,
+    .halt = [] (GstElement *element) { sync::park (as<GstDmdSync> (element)); },
+    .end =
+        [] (GstElement *element) { forget_stream (as<GstDmdSync> (element)); },
+    .close =
+        [] (GstElement *element) {
+          sync::close_device (as<GstDmdSync> (element));
+        }};
+
+void
+set_up (gpointer klass)
+{
+  auto *transform_class = GST_BASE_TRANSFORM_CLASS (klass);
+  GST_DEBUG_CATEGORY_INIT (
+      dmdsync_debug, "dmdsync", 0, "drives the DMD, times coded frames");
   sync::install_own_state (klass);
   describe_element (klass, "DMD synchroniser", "Filter/Video",
       "Drives the DMD of a coded exposure camera; times, counts and watches "
       "its frames");
-  element_class->change_state = GST_DEBUG_FUNCPTR (change_state);
+  install_run<kRun> (klass);
   transform_class->set_caps = GST_DEBUG_FUNCPTR (sync::set_caps);
   transform_class->sink_event = GST_DEBUG_FUNCPTR (sync::sink_event);
   transform_class->src_event = GST_DEBUG_FUNCPTR (sync::src_event);
@@ -230,12 +217,17 @@ gst_dmd_sync_class_init (GstDmdSyncClass *klass)
   transform_class->generate_output = GST_DEBUG_FUNCPTR (sync::generate_output);
 }
 
-static void
-gst_dmd_sync_init (GstDmdSync *self)
+void
+set_up_instance (GstDmdSync *self)
 {
-  self->state = new SyncState;
   auto *transform = GST_BASE_TRANSFORM (self);
   /* Pixels pass untouched: buffers are allocated as downstream wants them. */
   gst_base_transform_set_passthrough (transform, TRUE);
   gst_base_transform_set_qos_enabled (transform, FALSE);
 }
+
+} // namespace
+
+GST_ELEMENT_REGISTER_DEFINE (dmdsync, "dmdsync", GST_RANK_NONE,
+    (type_of<GstDmdSync, set_up, set_up_instance> (
+        "GstDmdSync", GST_TYPE_BASE_TRANSFORM)))

@@ -29,13 +29,6 @@
 #include "sync/rate_watch.h"
 #include "sync/switch_watch.h"
 
-G_BEGIN_DECLS
-
-#define GST_TYPE_DMD_SYNC (gst_dmd_sync_get_type ())
-G_DECLARE_FINAL_TYPE (GstDmdSync, gst_dmd_sync, GST, DMD_SYNC, GstBaseTransform)
-
-G_END_DECLS
-
 GST_DEBUG_CATEGORY_EXTERN (dmdsync_debug);
 
 namespace codedexposure::gst::sync
@@ -115,7 +108,7 @@ struct Stream {
   std::optional<Mapping> mapping;
   std::optional<BenchProfile> bench;
   bool simulated = false;
-  int bits = 0; ///< that upstream's tag has
+  int bits = 0;        ///< that upstream's tag has
   std::string refused; ///< the error of the caps that were refused last
 };
 
@@ -152,15 +145,8 @@ struct SyncState {
   Stream stream;
 };
 
-} // namespace codedexposure::gst::sync
-
-struct _GstDmdSync {
-  GstBaseTransform parent;
-  codedexposure::gst::sync::SyncState *state;
+struct GstDmdSync : Instance<GstBaseTransform, SyncState> {
 };
-
-namespace codedexposure::gst::sync
-{
 
 inline constexpr auto &state = state_in<GstDmdSync>;
 /** A copy, by the object lock. */

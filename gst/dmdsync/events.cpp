@@ -245,7 +245,7 @@ begin_phase (GstDmdSync *self)
 gboolean
 set_caps (GstBaseTransform *trans, GstCaps *incaps, GstCaps *)
 {
-  auto *self = GST_DMD_SYNC (trans);
+  auto *self = as<GstDmdSync> (trans);
   SyncState &st = state (self);
   const Result<Timebase> time = make_timebase (incaps, st);
   if (!time) {
@@ -285,7 +285,7 @@ set_caps (GstBaseTransform *trans, GstCaps *incaps, GstCaps *)
 gboolean
 sink_event (GstBaseTransform *trans, GstEvent *event)
 {
-  auto *self = GST_DMD_SYNC (trans);
+  auto *self = as<GstDmdSync> (trans);
   SyncState &st = state (self);
   switch (GST_EVENT_TYPE (event)) {
   case GST_EVENT_STREAM_START:
@@ -347,7 +347,7 @@ src_event (GstBaseTransform *trans, GstEvent *event)
   }
   if (const auto request = parse_event<PatternRequest> (event)) {
     gst_event_unref (event);
-    return take_request (GST_DMD_SYNC (trans), *request);
+    return take_request (as<GstDmdSync> (trans), *request);
   }
   return base_transform_class ()->src_event (trans, event);
 }
@@ -358,7 +358,7 @@ query (GstBaseTransform *trans, GstPadDirection direction, GstQuery *query)
 {
   const SyncState &st = state (trans);
   if (direction == GST_PAD_SRC && is_query<MirrorsAnswer> (query)) {
-    answer_query (query, describe_mirrors (GST_DMD_SYNC (trans)));
+    answer_query (query, describe_mirrors (as<GstDmdSync> (trans)));
     return TRUE;
   }
   if (!base_transform_class ()->query (trans, direction, query))

@@ -409,7 +409,7 @@ take_frame (GstDmdSync *self, BufferPtr buffer)
 GstFlowReturn
 generate_output (GstBaseTransform *trans, GstBuffer **outbuf)
 {
-  auto *self = GST_DMD_SYNC (trans);
+  auto *self = as<GstDmdSync> (trans);
   SyncState &st = state (self);
   Stream &stream = st.stream;
   if (trans->queued_buf) {

@@ -160,7 +160,7 @@ set_schedule (GstDmdSync *self, const GValue *value, const GParamSpec *pspec)
 void
 set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 {
-  auto *self = GST_DMD_SYNC (object);
+  auto *self = as<GstDmdSync> (object);
   if (g_str_equal (pspec->name, "schedule"))
     return set_schedule (self, value, pspec);
   const auto assign = properties ()[id].read (value);

@@ -38,9 +38,6 @@
 using namespace codedexposure;
 using namespace codedexposure::gst;
 
-G_DECLARE_FINAL_TYPE (GstCodedExposureFileSink, gst_coded_exposure_file_sink,
-    GST, CODED_EXPOSURE_FILE_SINK, GstBaseSink)
-
 namespace
 {
 
@@ -54,20 +51,8 @@ struct FileState {
   std::unique_ptr<FileWriter> file;
 };
 
-} // namespace
-
-struct _GstCodedExposureFileSink {
-  GstBaseSink parent;
-  FileState *state;
+struct GstCodedExposureFileSink : Instance<GstBaseSink, FileState> {
 };
-
-G_DEFINE_TYPE (
-    GstCodedExposureFileSink, gst_coded_exposure_file_sink, GST_TYPE_BASE_SINK)
-GST_ELEMENT_REGISTER_DEFINE (codedexposure_filesink, "codedexposure-filesink",
-    GST_RANK_NONE, gst_coded_exposure_file_sink_get_type ())
-
-namespace
-{
 
 FileState &
 state_of (gpointer self)
@@ -161,8 +146,7 @@ on_event (GstBaseSink *sink, GstEvent *event) noexcept
     gst_event_unref (event);
     return FALSE;
   }
-  return GST_BASE_SINK_CLASS (gst_coded_exposure_file_sink_parent_class)
-      ->event (sink, event);
+  return parent_class<GstBaseSinkClass> (sink)->event (sink, event);
 }
 
 /* A muxer asks whether it can go back and fill in sizes. */
@@ -177,8 +161,7 @@ on_query (GstBaseSink *sink, GstQuery *query) noexcept
     gst_query_set_seeking (query, GST_FORMAT_BYTES, bytes, 0, -1);
     return TRUE;
   }
-  return GST_BASE_SINK_CLASS (gst_coded_exposure_file_sink_parent_class)
-      ->query (sink, query);
+  return parent_class<GstBaseSinkClass> (sink)->query (sink, query);
 }
 
 gboolean
@@ -211,17 +194,8 @@ properties ()
   return table;
 }
 
-} // namespace
-
-static void
-gst_coded_exposure_file_sink_init (GstCodedExposureFileSink *self)
-{
-  self->state = new FileState ();
-  gst_base_sink_set_sync (GST_BASE_SINK (self), FALSE);
-}
-
-static void
-gst_coded_exposure_file_sink_class_init (GstCodedExposureFileSinkClass *klass)
+void
+set_up (gpointer klass)
 {
   install_state<GstCodedExposureFileSink, properties> (klass);
   describe_element (klass, "Coded exposure file sink", "Sink/File",
@@ -234,3 +208,16 @@ gst_coded_exposure_file_sink_class_init (GstCodedExposureFileSinkClass *klass)
   sink_class->query = on_query;
   sink_class->render = render;
 }
+
+void
+set_up_instance (GstCodedExposureFileSink *self)
+{
+  gst_base_sink_set_sync (GST_BASE_SINK (self), FALSE);
+}
+
+} // namespace
+
+GST_ELEMENT_REGISTER_DEFINE (codedexposure_filesink, "codedexposure-filesink",
+    GST_RANK_NONE,
+    (type_of<GstCodedExposureFileSink, set_up, set_up_instance> (
+        "GstCodedExposureFileSink", GST_TYPE_BASE_SINK)))

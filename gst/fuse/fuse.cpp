@@ -100,36 +100,14 @@ GST_DEBUG_CATEGORY (codedexposure_fuse_debug);
 using namespace codedexposure;
 using namespace codedexposure::gst;
 
-struct _GstCodedExposureFuse {
-  GstCodedFilter parent;
-};
-
-G_DEFINE_TYPE_WITH_CODE (GstCodedExposureFuse, gst_coded_exposure_fuse,
-    GST_TYPE_CODED_FILTER,
-    GST_DEBUG_CATEGORY_INIT (codedexposure_fuse_debug, "codedexposure-fuse", 0,
-        "coded frames to full-resolution frames"))
-GST_ELEMENT_REGISTER_DEFINE (codedexposure_fuse, "codedexposure-fuse",
-    GST_RANK_NONE, gst_coded_exposure_fuse_get_type ())
-
-static void
-gst_coded_exposure_fuse_class_init (GstCodedExposureFuseClass *klass)
-{
-  gst::fuse::Fuse::set_up_class (klass);
-}
-
-static void
-gst_coded_exposure_fuse_init (GstCodedExposureFuse *element)
-{
-  adopt_filter (
-      GST_CODED_FILTER (element), std::make_unique<gst::fuse::Fuse> (element));
-}
-
 namespace codedexposure::gst::fuse
 {
 
 void
 Fuse::set_up_class (gpointer klass)
 {
+  GST_DEBUG_CATEGORY_INIT (codedexposure_fuse_debug, "codedexposure-fuse", 0,
+      "coded frames to full-resolution frames");
   install_properties<properties, settings_of, settings_changed> (
       G_OBJECT_CLASS (klass));
   describe_element (klass, "Coded exposure fusion", "Filter/Effect/Video",
@@ -138,7 +116,7 @@ Fuse::set_up_class (gpointer klass)
       {});
   add_pad_template (klass, "uncertainty",
       {.presence = GST_PAD_REQUEST,
-          .type = GST_TYPE_CODED_PAD,
+          .type = coded_pad_type (),
           .caps = GST_VIDEO_CAPS_MAKE ("GRAY16_LE")});
 }
 
@@ -150,8 +128,8 @@ constexpr guint kUnfit = GST_BUFFER_FLAG_CORRUPTED | GST_BUFFER_FLAG_GAP;
 
 } // namespace
 
-Fuse::Fuse (GstCodedExposureFuse *element)
-    : CodedFilter (GST_CODED_FILTER (element),
+Fuse::Fuse (GstElement *element)
+    : CodedFilter (element,
           {"application/x-codedexposure-fuse-stats", "frames-out", nullptr})
 {
 }
@@ -302,7 +280,7 @@ Fuse::push_one (Pictures &pictures, const CodedFrame &coded, int k)
       {pictures.info, k, pts, coded.pts () + GstClockTime (slots.start (k)),
           GstClockTime (slots.active ())});
   const GstFlowReturn flow =
-      pictures.pad->coded.kind == PadKind::all
+      pictures.pad->state.kind == PadKind::all
           ? push (pictures.pad, std::move (outbuf), duration)
           : push_picture (pictures.pad, std::move (outbuf), duration);
   return combine_flow (pictures.pad, flow);
@@ -386,3 +364,10 @@ Fuse::resume ()
 }
 
 } // namespace codedexposure::gst::fuse
+
+struct GstCodedExposureFuse : Instance<GstCodedFilter, gst::fuse::Fuse> {
+};
+GST_ELEMENT_REGISTER_DEFINE (codedexposure_fuse, "codedexposure-fuse",
+    GST_RANK_NONE,
+    (type_of<GstCodedExposureFuse, gst::fuse::Fuse::set_up_class> (
+        "GstCodedExposureFuse", coded_filter_type ())))

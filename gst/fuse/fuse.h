@@ -13,13 +13,6 @@
 #include "common/coded_filter.h"
 #include "fuse/fuser.h"
 
-G_BEGIN_DECLS
-
-G_DECLARE_FINAL_TYPE (GstCodedExposureFuse, gst_coded_exposure_fuse, GST,
-    CODED_EXPOSURE_FUSE, GstCodedFilter)
-
-G_END_DECLS
-
 namespace codedexposure::gst::fuse
 {
 
@@ -41,7 +34,7 @@ struct Settings : FuseOptions {
 class Fuse final : public CodedFilter
 {
 public:
-  explicit Fuse (GstCodedExposureFuse *element);
+  explicit Fuse (GstElement *element);
 
   static void set_up_class (gpointer klass);
 

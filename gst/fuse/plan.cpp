@@ -244,7 +244,7 @@ Fuse::convert_caps (const CapsContext &context, const GstCodedPad *pad,
     GstCaps *caps, bool to_coded) const
 {
   CapsPtr converted = CodedFilter::convert_caps (context, pad, caps, to_coded);
-  if (pad->coded.kind != PadKind::uncertainty ||
+  if (pad->state.kind != PadKind::uncertainty ||
       gst_caps_is_any (converted.get ()))
     return converted;
   if (!to_coded)

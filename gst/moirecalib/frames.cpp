@@ -398,7 +398,7 @@ release_mirrors (GstMoireCalib *self)
 GstFlowReturn
 transform_ip (GstBaseTransform *trans, GstBuffer *buffer) noexcept
 {
-  auto *self = GST_MOIRE_CALIB (trans);
+  auto *self = as<GstMoireCalib> (trans);
   Stream &stream = state (self).stream;
   const Settings settings = settings_of (self);
   if (!stream.info)
@@ -427,7 +427,7 @@ transform_ip (GstBaseTransform *trans, GstBuffer *buffer) noexcept
 gboolean
 set_caps (GstBaseTransform *trans, GstCaps *incaps, GstCaps *) noexcept
 {
-  auto *self = GST_MOIRE_CALIB (trans);
+  auto *self = as<GstMoireCalib> (trans);
   GstVideoInfo info;
   if (!gst_video_info_from_caps (&info, incaps))
     return FALSE;
@@ -439,7 +439,7 @@ set_caps (GstBaseTransform *trans, GstCaps *incaps, GstCaps *) noexcept
 gboolean
 sink_event (GstBaseTransform *trans, GstEvent *event) noexcept
 {
-  auto *self = GST_MOIRE_CALIB (trans);
+  auto *self = as<GstMoireCalib> (trans);
   switch (GST_EVENT_TYPE (event)) {
   case GST_EVENT_TAG:
     event = take_tag (self, event);

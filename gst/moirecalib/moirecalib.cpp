@@ -62,15 +62,9 @@ GST_DEBUG_CATEGORY (moirecalib_debug);
 using namespace codedexposure;
 using namespace codedexposure::gst;
 using moire::CalibState;
+using moire::GstMoireCalib;
 using moire::Mode;
 using moire::Settings;
-
-G_DEFINE_TYPE_WITH_CODE (GstMoireCalib, gst_moire_calib,
-    GST_TYPE_BASE_TRANSFORM,
-    GST_DEBUG_CATEGORY_INIT (
-        moirecalib_debug, "moirecalib", 0, "camera against mirrors"))
-GST_ELEMENT_REGISTER_DEFINE (
-    moirecalib, "moirecalib", GST_RANK_NONE, GST_TYPE_MOIRE_CALIB)
 
 namespace
 {
@@ -177,29 +171,58 @@ before_transform (GstBaseTransform *trans, GstBuffer *) noexcept
       trans, !moire::settings_of (trans).lays_over ());
 }
 
-GstStateChangeReturn
-change_state (GstElement *element, GstStateChange transition) noexcept
+bool
+begin (GstElement *element)
 {
-  auto *self = GST_MOIRE_CALIB (element);
-  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED) {
-    moire::set_stage (self, moire::Stage::searching);
-    if (!moire::start_worker (self))
-      return GST_STATE_CHANGE_FAILURE;
-  }
-  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
-    moire::release_mirrors (self);
-    /* First, because the streaming thread may wait for it at the end. */
-    moire::stop_worker (self);
-  }
-  const GstStateChangeReturn changed =
-      GST_ELEMENT_CLASS (gst_moire_calib_parent_class)
-          ->change_state (element, transition);
-  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED &&
-      changed == GST_STATE_CHANGE_FAILURE)
-    moire::stop_worker (self);
-  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY)
-    self->state->stream = moire::Stream ();
-  return changed;
+  auto *self = as<GstMoireCalib> (element);
+  moire::set_stage (self, moire::Stage::searching);
+  return moire::start_worker (self);
+}
+
+/* The streaming thread may wait for the worker at the end. */
+void
+halt (GstElement *element)
+{
+  moire::release_mirrors (as<GstMoireCalib> (element));
+  moire::stop_worker (as<GstMoireCalib> (element));
+}
+
+void
+end (GstElement *element)
+{
+  moire::state (element).stream = moire::Stream ();
+}
+
+constexpr StateHooks kRun{.begin = begin, .halt = halt, .end = end};
+
+void
+set_up (gpointer klass)
+{
+  auto *transform_class = GST_BASE_TRANSFORM_CLASS (klass);
+
+  GST_DEBUG_CATEGORY_INIT (
+      moirecalib_debug, "moirecalib", 0, "camera against mirrors");
+  install_state<GstMoireCalib, properties, changed> (klass);
+  describe_element (klass, "Moiré calibration", "Filter/Analyzer/Video",
+      "Aligns a coded exposure camera with its mirrors and measures the "
+      "mapping between them");
+  install_run<kRun> (klass);
+  /* An application may drop its last reference without a change to NULL. */
+  G_OBJECT_CLASS (klass)->dispose = [] (GObject *object) noexcept {
+    moire::stop_worker (as<GstMoireCalib> (object));
+    parent_class<GObjectClass> (object)->dispose (object);
+  };
+  transform_class->set_caps = GST_DEBUG_FUNCPTR (moire::set_caps);
+  transform_class->sink_event = GST_DEBUG_FUNCPTR (moire::sink_event);
+  transform_class->before_transform = GST_DEBUG_FUNCPTR (before_transform);
+  transform_class->transform_ip = GST_DEBUG_FUNCPTR (moire::transform_ip);
+}
+
+void
+set_up_instance (GstMoireCalib *self)
+{
+  gst_base_transform_set_in_place (GST_BASE_TRANSFORM (self), TRUE);
+  gst_base_transform_set_qos_enabled (GST_BASE_TRANSFORM (self), FALSE);
 }
 
 } // namespace
@@ -216,32 +239,6 @@ settings_of (gpointer element)
 
 } // namespace codedexposure::gst::moire
 
-static void
-gst_moire_calib_class_init (GstMoireCalibClass *klass)
-{
-  auto *element_class = GST_ELEMENT_CLASS (klass);
-  auto *transform_class = GST_BASE_TRANSFORM_CLASS (klass);
-
-  install_state<GstMoireCalib, properties, changed> (klass);
-  describe_element (klass, "Moiré calibration", "Filter/Analyzer/Video",
-      "Aligns a coded exposure camera with its mirrors and measures the "
-      "mapping between them");
-  element_class->change_state = GST_DEBUG_FUNCPTR (change_state);
-  /* An application may drop its last reference without a change to NULL. */
-  G_OBJECT_CLASS (klass)->dispose = [] (GObject *object) noexcept {
-    moire::stop_worker (GST_MOIRE_CALIB (object));
-    G_OBJECT_CLASS (gst_moire_calib_parent_class)->dispose (object);
-  };
-  transform_class->set_caps = GST_DEBUG_FUNCPTR (moire::set_caps);
-  transform_class->sink_event = GST_DEBUG_FUNCPTR (moire::sink_event);
-  transform_class->before_transform = GST_DEBUG_FUNCPTR (before_transform);
-  transform_class->transform_ip = GST_DEBUG_FUNCPTR (moire::transform_ip);
-}
-
-static void
-gst_moire_calib_init (GstMoireCalib *self)
-{
-  self->state = new CalibState;
-  gst_base_transform_set_in_place (GST_BASE_TRANSFORM (self), TRUE);
-  gst_base_transform_set_qos_enabled (GST_BASE_TRANSFORM (self), FALSE);
-}
+GST_ELEMENT_REGISTER_DEFINE (moirecalib, "moirecalib", GST_RANK_NONE,
+    (type_of<GstMoireCalib, set_up, set_up_instance> (
+        "GstMoireCalib", GST_TYPE_BASE_TRANSFORM)))

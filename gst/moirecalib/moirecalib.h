@@ -21,14 +21,6 @@
 #include "report.h"
 #include "setup/stream_setup.h"
 
-G_BEGIN_DECLS
-
-#define GST_TYPE_MOIRE_CALIB (gst_moire_calib_get_type ())
-G_DECLARE_FINAL_TYPE (
-    GstMoireCalib, gst_moire_calib, GST, MOIRE_CALIB, GstBaseTransform)
-
-G_END_DECLS
-
 GST_DEBUG_CATEGORY_EXTERN (moirecalib_debug);
 
 namespace codedexposure::gst::moire
@@ -147,15 +139,8 @@ struct CalibState {
   Stream stream;
 };
 
-} // namespace codedexposure::gst::moire
-
-struct _GstMoireCalib {
-  GstBaseTransform parent;
-  codedexposure::gst::moire::CalibState *state;
+struct GstMoireCalib : Instance<GstBaseTransform, CalibState> {
 };
-
-namespace codedexposure::gst::moire
-{
 
 inline constexpr auto &state = state_in<GstMoireCalib>;
 /** A copy, by the object lock. */

@@ -22,7 +22,6 @@
 #include "parts.h"
 #include "record/track.h"
 #include "setups.h"
-#include "track_pad.h"
 
 using namespace codedexposure;
 using namespace codedexposure::gst;
@@ -34,14 +33,14 @@ namespace
 {
 
 struct LogState {
-  explicit LogState (GstElement *element = nullptr) : track (element) {}
-
   /* Object lock: */
   std::string location;
   guint64 frames_lost = 0; ///< since the first
   /* Streaming thread, and start and stop, which exclude it: */
   LineFile file;
-  TrackPad track;
+  GstPad *track = nullptr;  ///< the element's
+  bool stream_sent = false; ///< to the track
+  bool segment_sent = false;
   guint64 frames = 0;
   std::optional<guint64> last; ///< number of the last frame with a meta
   GstVideoInfo info = {};
@@ -60,26 +59,54 @@ struct LogState {
   GstClockTime tracked_at = GST_CLOCK_TIME_NONE;
 };
 
-} // namespace
-
-G_DECLARE_FINAL_TYPE (GstCodedExposureLog, gst_coded_exposure_log, GST,
-    CODED_EXPOSURE_LOG, GstBaseTransform)
-
-struct _GstCodedExposureLog {
-  GstBaseTransform parent;
-  LogState *state;
+struct GstCodedExposureLog : Instance<GstBaseTransform, LogState> {
 };
-
-G_DEFINE_TYPE_WITH_CODE (GstCodedExposureLog, gst_coded_exposure_log,
-    GST_TYPE_BASE_TRANSFORM,
-    GST_DEBUG_CATEGORY_INIT (codedexposure_log_debug, "codedexposure-log", 0,
-        "per-frame record of coded frames"))
-namespace
-{
 
 /* Receivers that join late, segments, and recordings of which a part is damaged
  * need it again. */
 constexpr GstClockTime kRepeat = GST_SECOND;
+
+bool
+has_track (const LogState &state)
+{
+  return gst_pad_is_linked (state.track);
+}
+
+/** The next text belongs to another segment, or another stream. */
+void
+restart_track (LogState &state, bool stream)
+{
+  state.segment_sent = false;
+  state.stream_sent &= !stream;
+}
+
+/** Text that belongs to the segment of the frames. */
+GstFlowReturn
+push_text (GstCodedExposureLog *self, const std::string &text, GstClockTime pts,
+    GstClockTime duration)
+{
+  LogState &state = self->state;
+  GstPad *track = state.track;
+  if (!has_track (state))
+    return GST_FLOW_OK;
+  if (!std::exchange (state.stream_sent, true)) {
+    const CharPtr id (
+        gst_pad_create_stream_id (track, GST_ELEMENT (self), "track"));
+    GstEvent *stream = gst_event_new_stream_start (id.get ());
+    gst_event_set_stream_flags (stream, GST_STREAM_FLAG_SPARSE);
+    gst_pad_push_event (track, stream);
+    const CapsPtr caps (gst_pad_get_pad_template_caps (track));
+    gst_pad_push_event (track, gst_event_new_caps (caps.get ()));
+  }
+  if (!std::exchange (state.segment_sent, true))
+    gst_pad_push_event (
+        track, gst_event_new_segment (&GST_BASE_TRANSFORM (self)->segment));
+  GstBuffer *buffer = gst_buffer_new_memdup (text.data (), text.size ());
+  GST_BUFFER_PTS (buffer) = pts;
+  GST_BUFFER_DURATION (buffer) = duration;
+  const GstFlowReturn flow = gst_pad_push (track, buffer);
+  return flow == GST_FLOW_NOT_LINKED ? GST_FLOW_OK : flow;
+}
 
 /** Whether the line of a frame at @p pts holds the setup. */
 bool
@@ -105,7 +132,7 @@ duration_of (const LogState &state, GstBuffer *frame)
 GstFlowReturn
 push_line (GstCodedExposureLog *self, GstBuffer *frame, FrameRecord record)
 {
-  LogState &state = *self->state;
+  LogState &state = self->state;
   const GstClockTime pts = GST_BUFFER_PTS (frame);
   if (!GST_CLOCK_TIME_IS_VALID (pts)) {
     POST_ERROR (self, STREAM, FORMAT,
@@ -122,8 +149,7 @@ push_line (GstCodedExposureLog *self, GstBuffer *frame, FrameRecord record)
   }
   const GstClockTime duration = duration_of (state, frame);
   state.end = GST_CLOCK_TIME_IS_VALID (duration) ? pts + duration : pts;
-  return state.track.push (
-      line.to_json (), pts, duration, GST_BASE_TRANSFORM (self)->segment);
+  return push_text (self, line.to_json (), pts, duration);
 }
 
 /* Also those that a queue dropped between the element that numbers the frames
@@ -131,7 +157,7 @@ push_line (GstCodedExposureLog *self, GstBuffer *frame, FrameRecord record)
 void
 count_lost (GstCodedExposureLog *self, FrameRecord &record)
 {
-  LogState &state = *self->state;
+  LogState &state = self->state;
   if (!record.lost_before) // without a meta, the number is a count
     return;
   const bool is_new = state.last != record.frame; // no further subframe
@@ -148,16 +174,16 @@ count_lost (GstCodedExposureLog *self, FrameRecord &record)
 GstFlowReturn
 transform_ip (GstBaseTransform *base, GstBuffer *frame) noexcept
 {
-  auto *self = GST_CODED_EXPOSURE_LOG (base);
-  LogState &state = *self->state;
+  auto *self = as<GstCodedExposureLog> (base);
+  LogState &state = self->state;
   const int pilot = state.setup ? state.setup->schedule.pilot_rows () : 0;
   FrameRecord record =
       record_of (frame, state.info, base->segment, pilot, state.frames++);
   count_lost (self, record);
   if (state.file.is_open () && !state.file.write (record.to_json ()))
     return GST_FLOW_ERROR;
-  return state.track.exists () ? push_line (self, frame, std::move (record))
-                               : GST_FLOW_OK;
+  return has_track (state) ? push_line (self, frame, std::move (record))
+                           : GST_FLOW_OK;
 }
 
 gboolean
@@ -199,7 +225,7 @@ note_setup (LogState &state, const StreamSetup &setup)
 GstEvent *
 take_tags (GstCodedExposureLog *self, GstEvent *event)
 {
-  LogState &state = *self->state;
+  LogState &state = self->state;
   GstTagList *tags = nullptr;
   gst_event_parse_tag (event, &tags);
   const auto read = setup_from_tags (tags);
@@ -214,7 +240,7 @@ take_tags (GstCodedExposureLog *self, GstEvent *event)
   StreamSetup setup = read->value ();
   setup.track = false;
   note_setup (state, setup);
-  if (!state.track.exists ())
+  if (!has_track (state))
     return event;
   setup.track = true;
   return add_setups (replace_setup (event, setup), state.setups);
@@ -224,47 +250,45 @@ take_tags (GstCodedExposureLog *self, GstEvent *event)
 void
 end_track (GstCodedExposureLog *self)
 {
-  LogState &state = *self->state;
+  LogState &state = self->state;
   if (state.frames > 0)
-    state.track.push (TrackLine{.end = state.frames}.to_json (), state.end,
-        GST_MSECOND, GST_BASE_TRANSFORM (self)->segment);
+    push_text (self, TrackLine{.end = state.frames}.to_json (), state.end,
+        GST_MSECOND);
 }
 
 gboolean
 sink_event (GstBaseTransform *base, GstEvent *event) noexcept
 {
-  auto *self = GST_CODED_EXPOSURE_LOG (base);
-  TrackPad &track = self->state->track;
+  auto *self = as<GstCodedExposureLog> (base);
+  LogState &state = self->state;
   switch (GST_EVENT_TYPE (event)) {
   case GST_EVENT_TAG:
     event = take_tags (self, event);
     break;
   case GST_EVENT_STREAM_START:
-    track.restart (true);
+    restart_track (state, true);
     break;
   case GST_EVENT_SEGMENT:
-    track.restart (false);
+    restart_track (state, false);
     break;
   case GST_EVENT_EOS:
     end_track (self);
-    track.forward (event);
-    break;
+    [[fallthrough]];
   case GST_EVENT_FLUSH_START:
   case GST_EVENT_FLUSH_STOP:
-    track.forward (event);
+    gst_pad_push_event (state.track, gst_event_ref (event));
     break;
   default:
     break;
   }
-  return GST_BASE_TRANSFORM_CLASS (gst_coded_exposure_log_parent_class)
-      ->sink_event (base, event);
+  return base_transform_class ()->sink_event (base, event);
 }
 
 bool
 begin_run (GstElement *element)
 {
-  auto *self = GST_CODED_EXPOSURE_LOG (element);
-  LogState &state = *self->state;
+  auto *self = as<GstCodedExposureLog> (element);
+  LogState &state = self->state;
   std::string location;
   {
     const ObjectLock lock (self);
@@ -278,10 +302,10 @@ begin_run (GstElement *element)
   state.schedule.reset ();
   state.mapping.reset ();
   state.tracked.reset ();
-  state.track.restart (true);
+  restart_track (state, true);
   if (!location.empty ())
     return state.file.open (self, location);
-  if (state.track.exists ())
+  if (has_track (state))
     return true;
   POST_ERROR (self, RESOURCE, NOT_FOUND, "There is nothing to write to");
   return false;
@@ -291,19 +315,6 @@ void
 end_run (GstElement *element)
 {
   state_in<GstCodedExposureLog> (element).file.close ();
-}
-
-GstPad *
-request_new_pad (GstElement *element, GstPadTemplate *templ, const gchar *,
-    const GstCaps *) noexcept
-{
-  return state_in<GstCodedExposureLog> (element).track.request (templ);
-}
-
-void
-release_pad (GstElement *element, GstPad *pad) noexcept
-{
-  state_in<GstCodedExposureLog> (element).track.release (pad);
 }
 
 StructurePtr
@@ -329,30 +340,39 @@ properties ()
   return table;
 }
 
-} // namespace
+constexpr StateHooks kRun{.begin = begin_run, .end = end_run};
 
-static void
-gst_coded_exposure_log_init (GstCodedExposureLog *self)
+void
+set_up (gpointer klass)
 {
-  self->state = new LogState (GST_ELEMENT (self));
-  gst_base_transform_set_passthrough (GST_BASE_TRANSFORM (self), TRUE);
-}
-
-static void
-gst_coded_exposure_log_class_init (GstCodedExposureLogClass *klass)
-{
+  GST_DEBUG_CATEGORY_INIT (codedexposure_log_debug, "codedexposure-log", 0,
+      "per-frame record of coded frames");
   install_state<GstCodedExposureLog, properties> (klass);
-  install_run<begin_run, end_run> (klass);
+  install_run<kRun> (klass);
   describe_element (klass, "Coded exposure frame log", "Filter/Analyzer/Video",
       "Writes what is known of every coded frame: as a text track for a "
       "container, or to a file of JSON lines");
-  add_pad_template (klass, "track",
-      {.presence = GST_PAD_REQUEST, .caps = "text/x-raw,format=utf8"});
-  GST_ELEMENT_CLASS (klass)->request_new_pad = request_new_pad;
-  GST_ELEMENT_CLASS (klass)->release_pad = release_pad;
+  add_pad_template (klass, "track", {.caps = "text/x-raw,format=utf8"});
 
   auto *transform_class = GST_BASE_TRANSFORM_CLASS (klass);
   transform_class->set_caps = GST_DEBUG_FUNCPTR (set_caps);
   transform_class->sink_event = GST_DEBUG_FUNCPTR (sink_event);
   transform_class->transform_ip = GST_DEBUG_FUNCPTR (transform_ip);
+}
+
+void
+set_up_instance (GstCodedExposureLog *self)
+{
+  gst_base_transform_set_passthrough (GST_BASE_TRANSFORM (self), TRUE);
+  self->state.track = add_pad (GST_ELEMENT (self), "track");
+  gst_pad_use_fixed_caps (self->state.track);
+}
+
+} // namespace
+
+GType
+gst_coded_exposure_log_get_type ()
+{
+  return type_of<GstCodedExposureLog, set_up, set_up_instance> (
+      "GstCodedExposureLog", GST_TYPE_BASE_TRANSFORM);
 }

@@ -59,9 +59,6 @@
 using namespace codedexposure;
 using namespace codedexposure::gst;
 
-G_DECLARE_FINAL_TYPE (GstCodedExposureRecordDemux,
-    gst_coded_exposure_record_demux, GST, CODED_EXPOSURE_RECORD_DEMUX, GstBin)
-
 namespace
 {
 
@@ -92,25 +89,10 @@ struct RecordDemuxState {
   /* Streaming thread of the demuxer, and changes of the state: */
   Stream stream;
   GstElement *queue = nullptr, *decoder = nullptr;
-  GstPad *track = nullptr; ///< of restore
 };
 
-} // namespace
-
-struct _GstCodedExposureRecordDemux {
-  GstBin parent;
-  RecordDemuxState *state;
+struct GstCodedExposureRecordDemux : Instance<GstBin, RecordDemuxState> {
 };
-
-G_DEFINE_TYPE (
-    GstCodedExposureRecordDemux, gst_coded_exposure_record_demux, GST_TYPE_BIN)
-GST_ELEMENT_REGISTER_DEFINE (codedexposure_recorddemux,
-    "codedexposure-recorddemux", GST_RANK_NONE,
-    gst_coded_exposure_record_demux_get_type ())
-
-namespace
-{
-
 using Self = GstCodedExposureRecordDemux;
 
 /* ----------------------------------------------------------- raw frames -- */
@@ -271,9 +253,8 @@ add_video (GstElement *self, GstPad *pad, const GstCaps *caps)
   } else
     gst_element_link_pads (state.queue, "src", state.restore, "sink");
   gst_element_sync_state_with_parent (state.queue);
-  const ObjectPtr<GstPad> sink (
-      gst_element_get_static_pad (state.queue, "sink"));
-  gst_pad_link_full (pad, sink.get (), GST_PAD_LINK_CHECK_NOTHING);
+  gst_pad_link_full (
+      pad, static_pad (state.queue, "sink").get (), GST_PAD_LINK_CHECK_NOTHING);
 }
 
 void
@@ -284,10 +265,8 @@ on_pad_added (GstElement *, GstPad *pad, gpointer self)
   const GstStructure *structure = gst_caps_get_structure (caps.get (), 0);
   if (g_str_has_prefix (GST_OBJECT_NAME (pad), "video_") && !state.queue)
     add_video (GST_ELEMENT (self), pad, caps.get ());
-  else if (gst_structure_has_name (structure, "text/x-raw") && !state.track) {
-    state.track = gst_element_request_pad_simple (state.restore, "track");
-    gst_pad_link (pad, state.track);
-  }
+  else if (gst_structure_has_name (structure, "text/x-raw"))
+    gst_pad_link (pad, static_pad (state.restore, "track").get ());
 }
 
 void
@@ -311,10 +290,6 @@ remove_tracks (GstElement *self)
       gst_bin_remove (GST_BIN (self), *part);
       *part = nullptr;
     }
-  if (state.track) {
-    gst_element_release_request_pad (state.restore, state.track);
-    gst_clear_object (&state.track);
-  }
 }
 
 /* ---------------------------------------------------------------- bytes -- */
@@ -427,8 +402,8 @@ container_message (Self *self, GstMessage *from, bool is_warning)
 void
 handle_message (GstBin *bin, GstMessage *message) noexcept
 {
-  auto *self = GST_CODED_EXPOSURE_RECORD_DEMUX (bin);
-  RecordDemuxState &state = *self->state;
+  auto *self = as<GstCodedExposureRecordDemux> (bin);
+  RecordDemuxState &state = self->state;
   if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_ERROR &&
       GST_MESSAGE_SRC (message) == GST_OBJECT (state.file)) {
     state.stream.has_failed = salvages (self) && state.queue;
@@ -437,8 +412,7 @@ handle_message (GstBin *bin, GstMessage *message) noexcept
     gst_message_unref (message);
     message = own;
   }
-  GST_BIN_CLASS (gst_coded_exposure_record_demux_parent_class)
-      ->handle_message (bin, message);
+  parent_class<GstBinClass> (bin)->handle_message (bin, message);
 }
 
 /* -------------------------------------------------------------- element -- */
@@ -495,7 +469,7 @@ properties ()
 void
 add_demuxer (Self *self)
 {
-  RecordDemuxState &state = *self->state;
+  RecordDemuxState &state = self->state;
   state.file = gst_element_factory_make ("matroskademux", nullptr);
   if (!state.file)
     return;
@@ -503,8 +477,7 @@ add_demuxer (Self *self)
   g_signal_connect (state.file, "pad-added", G_CALLBACK (on_pad_added), self);
   g_signal_connect (
       state.file, "no-more-pads", G_CALLBACK (on_no_more_pads), self);
-  const ObjectPtr<GstPad> sink (
-      gst_element_get_static_pad (state.file, "sink"));
+  const auto sink = static_pad (state.file, "sink");
   gst_pad_add_probe (
       sink.get (), GST_PAD_PROBE_TYPE_QUERY_UPSTREAM, on_query, self, nullptr);
   gst_pad_add_probe (
@@ -514,44 +487,35 @@ add_demuxer (Self *self)
 }
 
 void
-add_pad (Self *self, const char *name, GstElement *inner)
+set_up_instance (Self *self)
 {
-  GstPadTemplate *templ =
-      gst_element_class_get_pad_template (GST_ELEMENT_GET_CLASS (self), name);
-  const ObjectPtr<GstPad> target (
-      inner ? gst_element_get_static_pad (inner, name) : nullptr);
-  gst_element_add_pad (GST_ELEMENT (self),
-      target ? gst_ghost_pad_new_from_template (name, target.get (), templ)
-             : gst_ghost_pad_new_no_target_from_template (name, templ));
-}
-
-} // namespace
-
-static void
-gst_coded_exposure_record_demux_init (GstCodedExposureRecordDemux *self)
-{
-  self->state = new RecordDemuxState ();
-  RecordDemuxState &state = *self->state;
+  RecordDemuxState &state = self->state;
   state.restore = make_part (gst_coded_exposure_restore_get_type ());
   gst_bin_add (GST_BIN (self), state.restore);
   add_demuxer (self);
-  add_pad (self, "sink", state.file);
-  add_pad (self, "src", state.restore);
-  const ObjectPtr<GstPad> src (
-      gst_element_get_static_pad (state.restore, "src"));
-  gst_pad_add_probe (
-      src.get (), GST_PAD_PROBE_TYPE_BUFFER, on_frame, self, nullptr);
+  add_ghost_pad (GST_ELEMENT (self), "sink", state.file);
+  add_ghost_pad (GST_ELEMENT (self), "src", state.restore);
+  gst_pad_add_probe (static_pad (state.restore, "src").get (),
+      GST_PAD_PROBE_TYPE_BUFFER, on_frame, self, nullptr);
 }
 
-static void
-gst_coded_exposure_record_demux_class_init (
-    GstCodedExposureRecordDemuxClass *klass)
+constexpr StateHooks kRun{.begin = begin_run, .end = end_run};
+
+void
+set_up (gpointer klass)
 {
   install_state<GstCodedExposureRecordDemux, properties> (klass);
-  install_run<begin_run, end_run> (klass);
+  install_run<kRun> (klass);
   describe_element (klass, "Coded exposure recording demuxer", "Codec/Demuxer",
       "A recording to coded frames, with all that is known of each frame",
       {"src"});
   add_pad_template (klass, "sink", {.caps = "video/x-matroska"});
   GST_BIN_CLASS (klass)->handle_message = handle_message;
 }
+
+} // namespace
+
+GST_ELEMENT_REGISTER_DEFINE (codedexposure_recorddemux,
+    "codedexposure-recorddemux", GST_RANK_NONE,
+    (type_of<Self, set_up, set_up_instance> (
+        "GstCodedExposureRecordDemux", GST_TYPE_BIN)))

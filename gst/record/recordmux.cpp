@@ -48,9 +48,6 @@
 using namespace codedexposure;
 using namespace codedexposure::gst;
 
-G_DECLARE_FINAL_TYPE (GstCodedExposureRecordMux, gst_coded_exposure_record_mux,
-    GST, CODED_EXPOSURE_RECORD_MUX, GstBin)
-
 namespace
 {
 
@@ -77,21 +74,8 @@ struct RecordMuxState {
   ContainerOutput output; ///< streaming thread
 };
 
-} // namespace
-
-struct _GstCodedExposureRecordMux {
-  GstBin parent;
-  RecordMuxState *state;
+struct GstCodedExposureRecordMux : Instance<GstBin, RecordMuxState> {
 };
-
-G_DEFINE_TYPE (
-    GstCodedExposureRecordMux, gst_coded_exposure_record_mux, GST_TYPE_BIN)
-GST_ELEMENT_REGISTER_DEFINE (codedexposure_recordmux, "codedexposure-recordmux",
-    GST_RANK_NONE, gst_coded_exposure_record_mux_get_type ())
-
-namespace
-{
-
 using Self = GstCodedExposureRecordMux;
 
 G_DEFINE_ENUM_TYPE (GstCodedExposureRecordCodec,
@@ -187,7 +171,7 @@ on_output (GstPad *, GstPadProbeInfo *info, gpointer self) noexcept
 void
 add_muxer (Self *self)
 {
-  RecordMuxState &state = *self->state;
+  RecordMuxState &state = self->state;
   state.mux = gst_element_factory_make ("matroskamux", nullptr);
   if (!state.mux)
     return;
@@ -204,8 +188,7 @@ add_muxer (Self *self)
   for (GstPad *pad : {video.get (), text.get ()})
     gst_pad_add_probe (
         pad, GST_PAD_PROBE_TYPE_QUERY_UPSTREAM, on_latency, nullptr, nullptr);
-  const ObjectPtr<GstPad> src (gst_element_get_static_pad (state.mux, "src"));
-  gst_pad_add_probe (src.get (),
+  gst_pad_add_probe (static_pad (state.mux, "src").get (),
       GstPadProbeType (
           GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM),
       on_output, self, nullptr);
@@ -304,11 +287,9 @@ request_new_pad (GstElement *self, GstPadTemplate *templ, const gchar *,
     if (state.requested)
       return nullptr;
   }
-  const ObjectPtr<GstPad> inner (
-      gst_element_get_static_pad (state.log, "sink"));
   gst_ghost_pad_set_target (GST_GHOST_PAD (state.sink), nullptr);
-  GstPad *pad =
-      gst_ghost_pad_new_from_template ("video_0", inner.get (), templ);
+  GstPad *pad = gst_ghost_pad_new_from_template (
+      "video_0", static_pad (state.log, "sink").get (), templ);
   gst_pad_set_active (pad, TRUE);
   gst_element_add_pad (self, pad);
   const ObjectLock lock (self);
@@ -321,11 +302,9 @@ release_pad (GstElement *self, GstPad *pad) noexcept
 {
   auto &state = state_in<Self> (self);
   gst_element_remove_pad (self, pad);
-  if (GST_BIN_NUMCHILDREN (self) > 0) {
-    const ObjectPtr<GstPad> inner (
-        gst_element_get_static_pad (state.log, "sink"));
-    gst_ghost_pad_set_target (GST_GHOST_PAD (state.sink), inner.get ());
-  }
+  if (GST_BIN_NUMCHILDREN (self) > 0)
+    gst_ghost_pad_set_target (
+        GST_GHOST_PAD (state.sink), static_pad (state.log, "sink").get ());
   const ObjectLock lock (self);
   state.requested = nullptr;
 }
@@ -378,13 +357,10 @@ set_up_queues (const RecordMuxState &state)
       "max-size-time", kNoLimit, nullptr);
 }
 
-} // namespace
-
-static void
-gst_coded_exposure_record_mux_init (GstCodedExposureRecordMux *self)
+void
+set_up_instance (Self *self)
 {
-  self->state = new RecordMuxState ();
-  RecordMuxState &state = *self->state;
+  RecordMuxState &state = self->state;
   state.log = make_part (gst_coded_exposure_log_get_type ());
   state.frames = gst_element_factory_make ("queue", nullptr);
   state.lines = gst_element_factory_make ("queue", nullptr);
@@ -397,26 +373,18 @@ gst_coded_exposure_record_mux_init (GstCodedExposureRecordMux *self)
   if (state.mux)
     gst_element_link_pads (state.lines, "src", state.mux, "subtitle_0");
 
-  auto *klass = GST_ELEMENT_GET_CLASS (self);
-  const auto add = [&] (const char *name, GstElement *inner) {
-    const ObjectPtr<GstPad> target (
-        inner ? gst_element_get_static_pad (inner, name) : nullptr);
-    GstPadTemplate *templ = gst_element_class_get_pad_template (klass, name);
-    GstPad *pad =
-        target ? gst_ghost_pad_new_from_template (name, target.get (), templ)
-               : gst_ghost_pad_new_no_target_from_template (name, templ);
-    gst_element_add_pad (GST_ELEMENT (self), pad);
-    return pad;
-  };
-  state.sink = add ("sink", state.log);
-  gst_pad_set_event_function (add ("src", state.mux), src_event);
+  state.sink = add_ghost_pad (GST_ELEMENT (self), "sink", state.log);
+  gst_pad_set_event_function (
+      add_ghost_pad (GST_ELEMENT (self), "src", state.mux), src_event);
 }
 
-static void
-gst_coded_exposure_record_mux_class_init (GstCodedExposureRecordMuxClass *klass)
+constexpr StateHooks kRun{.begin = begin_run, .end = end_run};
+
+void
+set_up (gpointer klass)
 {
   install_state<GstCodedExposureRecordMux, properties> (klass);
-  install_run<begin_run, end_run> (klass);
+  install_run<kRun> (klass);
   describe_element (klass, "Coded exposure recording muxer", "Codec/Muxer",
       "Coded frames to a recording: lossless video, and all that is known of "
       "each frame",
@@ -427,3 +395,10 @@ gst_coded_exposure_record_mux_class_init (GstCodedExposureRecordMuxClass *klass)
   GST_ELEMENT_CLASS (klass)->request_new_pad = request_new_pad;
   GST_ELEMENT_CLASS (klass)->release_pad = release_pad;
 }
+
+} // namespace
+
+GST_ELEMENT_REGISTER_DEFINE (codedexposure_recordmux, "codedexposure-recordmux",
+    GST_RANK_NONE,
+    (type_of<Self, set_up, set_up_instance> (
+        "GstCodedExposureRecordMux", GST_TYPE_BIN)))

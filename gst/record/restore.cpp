@@ -35,10 +35,7 @@ namespace
 using Item = std::variant<BufferPtr, EventPtr>;
 
 struct RestoreState {
-  explicit RestoreState (GstElement *element = nullptr)
-      : track (element), damage (element)
-  {
-  }
+  explicit RestoreState (GstElement *element = nullptr) : damage (element) {}
 
   GstPad *sink = nullptr, *src = nullptr; ///< the element's
   guint64 tick = 1; ///< object lock; to which the container rounds times, ns
@@ -64,23 +61,8 @@ struct RestoreState {
   bool said_setups_differ = false;
 };
 
-} // namespace
-
-G_DECLARE_FINAL_TYPE (GstCodedExposureRestore, gst_coded_exposure_restore, GST,
-    CODED_EXPOSURE_RESTORE, GstElement)
-
-struct _GstCodedExposureRestore {
-  GstElement parent;
-  RestoreState *state;
+struct GstCodedExposureRestore : Instance<GstElement, RestoreState> {
 };
-
-G_DEFINE_TYPE_WITH_CODE (GstCodedExposureRestore, gst_coded_exposure_restore,
-    GST_TYPE_ELEMENT,
-    GST_DEBUG_CATEGORY_INIT (codedexposure_restore_debug,
-        "codedexposure-restore", 0, "truth of recorded coded frames"))
-namespace
-{
-
 using Self = GstCodedExposureRestore;
 
 /* ---------------------------------------------------------------- setups -- */
@@ -89,7 +71,7 @@ using Self = GstCodedExposureRestore;
 void
 warn_if_different (Self *self, const StreamSetup &said)
 {
-  RestoreState &state = *self->state;
+  RestoreState &state = self->state;
   const auto &others = state.others;
   if (!state.setup || said.schedule == state.setup->schedule ||
       std::ranges::find (others, *state.setup) != others.end () ||
@@ -106,7 +88,7 @@ warn_if_different (Self *self, const StreamSetup &said)
 void
 use_setup (Self *self, std::shared_ptr<const StreamSetup> setup)
 {
-  RestoreState &state = *self->state;
+  RestoreState &state = self->state;
   if (state.setup == setup || (state.setup && *state.setup == *setup))
     return;
   state.setup = std::move (setup);
@@ -117,7 +99,7 @@ use_setup (Self *self, std::shared_ptr<const StreamSetup> setup)
 void
 settle_setup (Self *self, const TrackReader::Match &match)
 {
-  RestoreState &state = *self->state;
+  RestoreState &state = self->state;
   if (match.setup)
     use_setup (self, match.setup);
   else if (!state.setup && state.container)
@@ -142,13 +124,13 @@ note_setups (
 gboolean
 on_tag (Self *self, EventPtr event)
 {
-  RestoreState &state = *self->state;
+  RestoreState &state = self->state;
   GstTagList *tags = nullptr;
   gst_event_parse_tag (event.get (), &tags);
   const auto said = setup_from_tags (tags);
   if (said && *said)
     state.announced |= said->value ().track;
-  if (!said || !*said || !state.track.exists ())
+  if (!said || !*said || !state.track.is_linked ())
     return gst_pad_push_event (state.src, event.release ());
   note_setups (state, said->value (), tags);
   warn_if_different (self, *state.container);
@@ -171,7 +153,7 @@ report_missing (RestoreState &state, const TrackReader::Match &match)
 void
 mark_unknown (RestoreState &state, GstBuffer *frame)
 {
-  const bool has_track = state.track.exists ();
+  const bool has_track = state.track.is_linked ();
   FrameMeta meta;
   meta.frame = state.last_frame ? *state.last_frame + 1 : 0;
   if (has_track)
@@ -187,7 +169,7 @@ mark_unknown (RestoreState &state, GstBuffer *frame)
 void
 say_no_track (Self *self)
 {
-  RestoreState &state = *self->state;
+  RestoreState &state = self->state;
   if (std::exchange (state.said_no_track, true))
     return;
   if (state.announced)
@@ -208,7 +190,7 @@ void
 say_moved (Self *self, const TrackReader::Match &match)
 {
   if (match.offset == 0 || match.misplaced ||
-      std::exchange (self->state->said_moved, true))
+      std::exchange (self->state.said_moved, true))
     return;
   POST_INFO (self, STREAM, FORMAT,
       "The frames are " + time_text (std::abs (match.offset)) +
@@ -234,7 +216,7 @@ flaw_of (const RestoreState &state, GstBuffer *frame, const FrameRecord &record,
 void
 restore (Self *self, GstBuffer *frame, const TrackReader::Match &match)
 {
-  RestoreState &state = *self->state;
+  RestoreState &state = self->state;
   FrameRecord record = *match.line->frame;
   if (match.skipped > 0)
     record.lost_before = record.lost_before.value_or (0) + match.skipped;
@@ -269,11 +251,11 @@ ends_early (const RestoreState &state)
 void
 check_end (Self *self)
 {
-  RestoreState &state = *self->state;
+  RestoreState &state = self->state;
   state.damage.end_sequence ();
   if (state.announced && state.last_frame && !state.found_line)
     say_no_track (self);
-  if (!state.track.exists () || !state.is_complete)
+  if (!state.track.is_linked () || !state.is_complete)
     return;
   const auto [rest, frames] =
       state.track.take_rest (Nanoseconds (state.segment.start));
@@ -328,7 +310,7 @@ segment_event (const RestoreState &state)
 EventPtr
 take_segment (Self *self, EventPtr event)
 {
-  RestoreState &state = *self->state;
+  RestoreState &state = self->state;
   guint64 tick;
   {
     const ObjectLock lock (self);
@@ -339,7 +321,7 @@ take_segment (Self *self, EventPtr event)
   const auto order = order_of (state.segment);
   state.is_complete = order == TrackReader::Order::all;
   state.track.next_segment (order);
-  if (!state.track.exists () || tick < 2)
+  if (!state.track.is_linked () || tick < 2)
     return event;
   include_rounding (state.segment, tick);
   return segment_event (state);
@@ -349,7 +331,7 @@ take_segment (Self *self, EventPtr event)
 gboolean
 take_event (Self *self, EventPtr event)
 {
-  RestoreState &state = *self->state;
+  RestoreState &state = self->state;
   switch (GST_EVENT_TYPE (event.get ())) {
   case GST_EVENT_CAPS: {
     GstCaps *caps = nullptr;
@@ -391,7 +373,7 @@ keep_in_segment (RestoreState &state, GstClockTime time, GstClockTime exact)
 GstFlowReturn
 push_frame (Self *self, BufferPtr frame, const TrackReader::Match &match)
 {
-  RestoreState &state = *self->state;
+  RestoreState &state = self->state;
   frame.reset (gst_buffer_make_writable (frame.release ()));
   const GstClockTime time = GST_BUFFER_PTS (frame.get ());
   settle_setup (self, match);
@@ -415,7 +397,7 @@ release (Self *self, bool all)
 {
   /* A demuxer interleaves a line and its frame more closely than this. */
   constexpr std::size_t kMaxHeld = 8;
-  RestoreState &state = *self->state;
+  RestoreState &state = self->state;
   GstFlowReturn flow = GST_FLOW_OK;
   while (!state.held.empty () && flow == GST_FLOW_OK) {
     std::optional<TrackReader::Match> match;
@@ -442,11 +424,11 @@ release (Self *self, bool all)
 GstFlowReturn
 chain (GstPad *, GstObject *parent, GstBuffer *buffer) noexcept
 {
-  auto *self = GST_CODED_EXPOSURE_RESTORE (parent);
-  RestoreState &state = *self->state;
+  auto *self = as<GstCodedExposureRestore> (parent);
+  RestoreState &state = self->state;
   BufferPtr frame (buffer);
   state.damage.frame ();
-  if (!state.track.exists ()) {
+  if (!state.track.is_linked ()) {
     say_no_track (self);
     if (state.announced) {
       frame.reset (gst_buffer_make_writable (frame.release ()));
@@ -461,8 +443,8 @@ chain (GstPad *, GstObject *parent, GstBuffer *buffer) noexcept
 gboolean
 sink_event (GstPad *pad, GstObject *parent, GstEvent *owned) noexcept
 {
-  auto *self = GST_CODED_EXPOSURE_RESTORE (parent);
-  RestoreState &state = *self->state;
+  auto *self = as<GstCodedExposureRestore> (parent);
+  RestoreState &state = self->state;
   EventPtr event (owned);
   const GstEventType type = GST_EVENT_TYPE (owned);
   if (type == GST_EVENT_FLUSH_STOP) {
@@ -521,19 +503,6 @@ end_run (GstElement *element)
   forget_frames (state_in<Self> (element));
 }
 
-GstPad *
-request_new_pad (GstElement *element, GstPadTemplate *templ, const gchar *,
-    const GstCaps *) noexcept
-{
-  return state_in<Self> (element).track.request (templ);
-}
-
-void
-release_pad (GstElement *element, GstPad *pad) noexcept
-{
-  state_in<Self> (element).track.release (pad);
-}
-
 StructurePtr
 stats_of (const RestoreState &state)
 {
@@ -554,41 +523,46 @@ properties ()
   return table;
 }
 
-} // namespace
+constexpr StateHooks kRun{.begin = begin_run, .end = end_run};
 
-static void
-gst_coded_exposure_restore_init (GstCodedExposureRestore *self)
+void
+set_up (gpointer klass)
 {
-  self->state = new RestoreState (GST_ELEMENT (self));
-  auto *element_class = GST_ELEMENT_GET_CLASS (self);
-  const auto add = [&] (const char *name) {
-    GstPad *pad = gst_pad_new_from_template (
-        gst_element_class_get_pad_template (element_class, name), name);
-    GST_PAD_SET_PROXY_CAPS (pad);
-    GST_PAD_SET_PROXY_ALLOCATION (pad);
-    gst_element_add_pad (GST_ELEMENT (self), pad);
-    return pad;
-  };
-  self->state->sink = add ("sink");
-  gst_pad_set_chain_function (self->state->sink, chain);
-  gst_pad_set_event_function (self->state->sink, sink_event);
-  self->state->src = add ("src");
-  gst_pad_set_query_function (self->state->src, src_query);
-}
-
-static void
-gst_coded_exposure_restore_class_init (GstCodedExposureRestoreClass *klass)
-{
+  GST_DEBUG_CATEGORY_INIT (codedexposure_restore_debug, "codedexposure-restore",
+      0, "truth of recorded coded frames");
   install_state<GstCodedExposureRestore, properties> (klass);
-  install_run<begin_run, end_run> (klass);
+  install_run<kRun> (klass);
   describe_element (klass, "Coded exposure restorer", "Filter/Analyzer/Video",
       "Puts back onto recorded coded frames what their track says, and checks "
       "their pixels");
   add_pad_template (klass, "track",
-      {.presence = GST_PAD_REQUEST,
-          .caps = "text/x-raw,format={utf8,pango-markup}",
+      {.caps = "text/x-raw,format={utf8,pango-markup}",
           .direction = GST_PAD_SINK});
-  auto *element_class = GST_ELEMENT_CLASS (klass);
-  element_class->request_new_pad = request_new_pad;
-  element_class->release_pad = release_pad;
+}
+
+void
+set_up_instance (Self *self)
+{
+  RestoreState &state = self->state;
+  const auto add = [self] (const char *name) {
+    GstPad *pad = add_pad (GST_ELEMENT (self), name);
+    GST_PAD_SET_PROXY_CAPS (pad);
+    GST_PAD_SET_PROXY_ALLOCATION (pad);
+    return pad;
+  };
+  state.sink = add ("sink");
+  gst_pad_set_chain_function (state.sink, chain);
+  gst_pad_set_event_function (state.sink, sink_event);
+  state.src = add ("src");
+  gst_pad_set_query_function (state.src, src_query);
+  state.track.take_over (add_pad (GST_ELEMENT (self), "track"));
+}
+
+} // namespace
+
+GType
+gst_coded_exposure_restore_get_type ()
+{
+  return type_of<Self, set_up, set_up_instance> (
+      "GstCodedExposureRestore", GST_TYPE_ELEMENT);
 }

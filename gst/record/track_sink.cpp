@@ -20,14 +20,13 @@ sink_of (GstPad *pad)
 
 /* ------------------------------------------------------------------- pad -- */
 
-GstPad *
-TrackSink::request (GstPadTemplate *templ)
+void
+TrackSink::take_over (GstPad *pad)
 {
-  GstPad *pad = gst_pad_new_from_template (templ, "track");
+  pad_ = pad;
   gst_pad_set_element_private (pad, this);
   gst_pad_set_chain_function (pad, chain);
   gst_pad_set_event_function (pad, event);
-  return pad_.add (pad);
 }
 
 /* --------------------------------------------------- thread of the track -- */

@@ -9,7 +9,7 @@
 
 #include <gst/gst.h>
 
-#include "common/request_pad.h"
+#include "common/raii.h"
 #include "record/track_reader.h"
 
 namespace codedexposure::gst
@@ -20,14 +20,12 @@ namespace codedexposure::gst
 class TrackSink
 {
 public:
-  explicit TrackSink (GstElement *element) : pad_ (element) {}
+  /** @p pad: of the element. */
+  void take_over (GstPad *pad);
 
   /* Any thread: */
 
-  /** Null if there is one already. */
-  GstPad *request (GstPadTemplate *templ);
-  void release (GstPad *pad) { pad_.release (pad); }
-  bool exists () const { return pad_.get () != nullptr; }
+  bool is_linked () const { return gst_pad_is_linked (pad_); }
   /** Lines that could not be read since restart (). */
   guint64 damaged () const { return damaged_; }
 
@@ -60,7 +58,7 @@ private:
   Result<void> add (
       const std::string &text, Nanoseconds pts, Nanoseconds duration);
 
-  RequestPad pad_;
+  GstPad *pad_ = nullptr;
   std::atomic<guint64> damaged_ = 0;
 
   std::mutex lock_;     ///< never held while pushing

@@ -63,29 +63,14 @@ expose (codedexposure::ImageView<const float> light,
         });
 }
 
-} // namespace
-
-G_DECLARE_FINAL_TYPE (GstCodedExposureScene, gst_coded_exposure_scene, GST,
-    CODED_EXPOSURE_SCENE, GstPushSrc)
-
-struct _GstCodedExposureScene {
-  GstPushSrc parent;
-  SceneState *state;
+struct GstCodedExposureScene : Instance<GstPushSrc, SceneState> {
 };
-
-G_DEFINE_TYPE (
-    GstCodedExposureScene, gst_coded_exposure_scene, GST_TYPE_PUSH_SRC)
-GST_ELEMENT_REGISTER_DEFINE (codedexposure_scene, "codedexposure-scene",
-    GST_RANK_NONE, gst_coded_exposure_scene_get_type ())
 
 G_DEFINE_ENUM_TYPE (GstCodedExposureSceneKind, gst_coded_exposure_scene_kind,
     {int (SceneKind::kCandle), "A candle that flickers", "candle"},
     {int (SceneKind::kBlownOut), "A candle that is blown out after 0.5 s",
         "blown-out"},
     {int (SceneKind::kPour), "Liquid that is poured into a glass", "pour"});
-
-namespace
-{
 
 const PropertyTable<SceneState> &
 properties ()
@@ -105,8 +90,8 @@ properties ()
 gboolean
 start (GstBaseSrc *base)
 {
-  auto *self = GST_CODED_EXPOSURE_SCENE (base);
-  SceneState &state = *self->state;
+  auto *self = as<GstCodedExposureScene> (base);
+  SceneState &state = self->state;
   const ObjectLock lock (self);
   state.drawn = state.kind;
   state.period = state.repeat;
@@ -122,15 +107,14 @@ fixate (GstBaseSrc *base, GstCaps *caps)
   gst_structure_fixate_field_nearest_int (fields, "width", 768);
   gst_structure_fixate_field_nearest_int (fields, "height", 576);
   gst_structure_fixate_field_nearest_fraction (fields, "framerate", 100, 1);
-  return GST_BASE_SRC_CLASS (gst_coded_exposure_scene_parent_class)
-      ->fixate (base, caps);
+  return parent_class<GstBaseSrcClass> (base)->fixate (base, caps);
 }
 
 gboolean
 set_caps (GstBaseSrc *base, GstCaps *caps) noexcept
 {
-  auto *self = GST_CODED_EXPOSURE_SCENE (base);
-  SceneState &state = *self->state;
+  auto *self = as<GstCodedExposureScene> (base);
+  SceneState &state = self->state;
   if (!gst_video_info_from_caps (&state.info, caps))
     return FALSE;
   if (state.info.fps_n == 0) {
@@ -148,8 +132,8 @@ set_caps (GstBaseSrc *base, GstCaps *caps) noexcept
 GstFlowReturn
 create (GstPushSrc *base, GstBuffer **outbuf) noexcept
 {
-  auto *self = GST_CODED_EXPOSURE_SCENE (base);
-  SceneState &state = *self->state;
+  auto *self = as<GstCodedExposureScene> (base);
+  SceneState &state = self->state;
   if (!state.scene)
     return GST_FLOW_NOT_NEGOTIATED;
   const auto time_of = [&state] (guint64 frame) {
@@ -174,17 +158,8 @@ create (GstPushSrc *base, GstBuffer **outbuf) noexcept
   return GST_FLOW_OK;
 }
 
-} // namespace
-
-static void
-gst_coded_exposure_scene_init (GstCodedExposureScene *self)
-{
-  self->state = new SceneState;
-  gst_base_src_set_format (GST_BASE_SRC (self), GST_FORMAT_TIME);
-}
-
-static void
-gst_coded_exposure_scene_class_init (GstCodedExposureSceneClass *klass)
+void
+set_up (gpointer klass)
 {
   install_state<GstCodedExposureScene, properties> (klass);
   describe_element (klass, "Coded exposure test scene", "Source/Video",
@@ -197,3 +172,16 @@ gst_coded_exposure_scene_class_init (GstCodedExposureSceneClass *klass)
   base_class->set_caps = GST_DEBUG_FUNCPTR (set_caps);
   GST_PUSH_SRC_CLASS (klass)->create = GST_DEBUG_FUNCPTR (create);
 }
+
+void
+set_up_instance (GstCodedExposureScene *self)
+{
+  gst_base_src_set_format (GST_BASE_SRC (self), GST_FORMAT_TIME);
+}
+
+} // namespace
+
+GST_ELEMENT_REGISTER_DEFINE (codedexposure_scene, "codedexposure-scene",
+    GST_RANK_NONE,
+    (type_of<GstCodedExposureScene, set_up, set_up_instance> (
+        "GstCodedExposureScene", GST_TYPE_PUSH_SRC)))

@@ -156,7 +156,7 @@ GstCaps *
 transform_caps (GstBaseTransform *trans, GstPadDirection direction,
     GstCaps *caps, GstCaps *filter)
 {
-  auto *self = GST_CODED_EXPOSURE_SIM (trans);
+  auto *self = as<GstCodedExposureSim> (trans);
   const CapsScale scale{.rate = {1, schedule_of (self)->slots ()}};
   const GstPadDirection made_for =
       direction == GST_PAD_SINK ? GST_PAD_SRC : GST_PAD_SINK;
@@ -175,7 +175,7 @@ GstCaps *
 fixate_caps (GstBaseTransform *trans, GstPadDirection direction, GstCaps *caps,
     GstCaps *othercaps)
 {
-  const int slots = schedule_of (GST_CODED_EXPOSURE_SIM (trans))->slots ();
+  const int slots = schedule_of (as<GstCodedExposureSim> (trans))->slots ();
   othercaps = gst_caps_make_writable (gst_caps_truncate (othercaps));
   GstStructure *other = gst_caps_get_structure (othercaps, 0);
   int num = 0, den = 1;
@@ -248,7 +248,7 @@ gboolean
 set_info (GstVideoFilter *filter, GstCaps *, GstVideoInfo *in_info, GstCaps *,
     GstVideoInfo *out_info)
 {
-  auto *self = GST_CODED_EXPOSURE_SIM (filter);
+  auto *self = as<GstCodedExposureSim> (filter);
   drop_exposure (self, Drop::kCaps);
   state (self).stream.bench.reset ();
   /* The tag has the size and the rate. */

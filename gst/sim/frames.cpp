@@ -455,7 +455,7 @@ GstFlowReturn
 submit_input_buffer (
     GstBaseTransform *trans, gboolean is_discont, GstBuffer *inbuf)
 {
-  auto *self = GST_CODED_EXPOSURE_SIM (trans);
+  auto *self = as<GstCodedExposureSim> (trans);
   Stream &stream = state (self).stream;
   BufferPtr owned (inbuf);
   GST_LOG_OBJECT (
@@ -492,7 +492,7 @@ submit_input_buffer (
 GstFlowReturn
 generate_output (GstBaseTransform *trans, GstBuffer **outbuf)
 {
-  auto *self = GST_CODED_EXPOSURE_SIM (trans);
+  auto *self = as<GstCodedExposureSim> (trans);
   Stream &stream = state (self).stream;
   const BufferPtr inbuf (std::exchange (trans->queued_buf, nullptr));
   *outbuf = nullptr;

@@ -115,37 +115,31 @@ GST_DEBUG_CATEGORY (codedexposure_sim_debug);
 
 using namespace codedexposure;
 using namespace codedexposure::gst;
+using sim::GstCodedExposureSim;
 using sim::SimState;
-
-G_DEFINE_TYPE_WITH_CODE (GstCodedExposureSim, gst_coded_exposure_sim,
-    GST_TYPE_VIDEO_FILTER,
-    GST_DEBUG_CATEGORY_INIT (codedexposure_sim_debug, "codedexposure-sim", 0,
-        "optical bench in software"))
-GST_ELEMENT_REGISTER_DEFINE (codedexposure_sim, "codedexposure-sim",
-    GST_RANK_NONE, GST_TYPE_CODED_EXPOSURE_SIM)
 
 namespace
 {
 
 GstBaseTransformClass *
-parent_class ()
+parent (gpointer element)
 {
-  return GST_BASE_TRANSFORM_CLASS (gst_coded_exposure_sim_parent_class);
+  return parent_class<GstBaseTransformClass> (element);
 }
 
 bool
 begin_run (GstElement *element)
 {
-  auto *self = GST_CODED_EXPOSURE_SIM (element);
-  read_again (self, self->state->settings.schedule);
-  read_again (self, self->state->settings.bench);
+  auto *self = as<GstCodedExposureSim> (element);
+  read_again (self, self->state.settings.schedule);
+  read_again (self, self->state.settings.bench);
   return sim::begin_stream (self);
 }
 
 void
 end_run (GstElement *element)
 {
-  SimState &st = *GST_CODED_EXPOSURE_SIM (element)->state;
+  SimState &st = sim::state (element);
   st.stream = sim::Stream ();
   const ObjectLock lock (element);
   st.schedule.reset ();
@@ -156,11 +150,11 @@ gboolean
 take_caps (GstBaseTransform *trans, GstEvent *event)
 {
   const EventPtr kept (gst_event_ref (event));
-  if (parent_class ()->sink_event (trans, event))
+  if (parent (trans)->sink_event (trans, event))
     return TRUE;
   GstCaps *caps = nullptr;
   gst_event_parse_caps (kept.get (), &caps);
-  sim::explain_refusal (GST_CODED_EXPOSURE_SIM (trans), caps);
+  sim::explain_refusal (as<GstCodedExposureSim> (trans), caps);
   return FALSE;
 }
 
@@ -170,7 +164,7 @@ take_caps (GstBaseTransform *trans, GstEvent *event)
 gboolean
 take_tags (GstBaseTransform *trans, GstEvent *event)
 {
-  const sim::Stream &stream = GST_CODED_EXPOSURE_SIM (trans)->state->stream;
+  const sim::Stream &stream = as<GstCodedExposureSim> (trans)->state.stream;
   GstTagList *tags = nullptr;
   gst_event_parse_tag (event, &tags);
   const bool global = gst_tag_list_get_scope (tags) == GST_TAG_SCOPE_GLOBAL;
@@ -178,14 +172,14 @@ take_tags (GstBaseTransform *trans, GstEvent *event)
     event = remove_setup_and_provenance (event);
   else
     event =
-        replace_setup (event, sim::own_setup (GST_CODED_EXPOSURE_SIM (trans)));
-  return !event || parent_class ()->sink_event (trans, event);
+        replace_setup (event, sim::own_setup (as<GstCodedExposureSim> (trans)));
+  return !event || parent (trans)->sink_event (trans, event);
 }
 
 gboolean
 sink_event (GstBaseTransform *trans, GstEvent *event)
 {
-  auto *self = GST_CODED_EXPOSURE_SIM (trans);
+  auto *self = as<GstCodedExposureSim> (trans);
   switch (GST_EVENT_TYPE (event)) {
   case GST_EVENT_CAPS:
     return take_caps (trans, event);
@@ -193,13 +187,13 @@ sink_event (GstBaseTransform *trans, GstEvent *event)
     return take_tags (trans, event);
   case GST_EVENT_STREAM_START:
     sim::restart (self, sim::Drop::kSegment);
-    self->state->stream.tag_due = true;
+    self->state.stream.tag_due = true;
     /* A dmdsync lets the start of a stream pass when the DMD has its masks. */
-    return parent_class ()->sink_event (trans, event) &&
+    return parent (trans)->sink_event (trans, event) &&
            sim::follow_schedule (self);
   case GST_EVENT_SEGMENT:
     sim::restart (self, sim::Drop::kSegment);
-    if (!parent_class ()->sink_event (trans, event))
+    if (!parent (trans)->sink_event (trans, event))
       return FALSE;
     /* At once, since it is what the caps of a demultiplexer wait for. */
     sim::push_tag (self);
@@ -213,7 +207,7 @@ sink_event (GstBaseTransform *trans, GstEvent *event)
   default:
     break;
   }
-  return parent_class ()->sink_event (trans, event);
+  return parent (trans)->sink_event (trans, event);
 }
 
 /* A coded frame leaves with its last input frame, and is stamped with the
@@ -221,7 +215,7 @@ sink_event (GstBaseTransform *trans, GstEvent *event)
 gboolean
 query (GstBaseTransform *trans, GstPadDirection direction, GstQuery *query)
 {
-  if (!parent_class ()->query (trans, direction, query))
+  if (!parent (trans)->query (trans, direction, query))
     return FALSE;
   if (direction == GST_PAD_SRC && GST_QUERY_TYPE (query) == GST_QUERY_LATENCY) {
     const ObjectLock lock (trans);
@@ -230,13 +224,15 @@ query (GstBaseTransform *trans, GstPadDirection direction, GstQuery *query)
   return TRUE;
 }
 
-} // namespace
+constexpr StateHooks kRun{.begin = begin_run, .end = end_run};
 
-static void
-gst_coded_exposure_sim_class_init (GstCodedExposureSimClass *klass)
+void
+set_up (gpointer klass)
 {
+  GST_DEBUG_CATEGORY_INIT (codedexposure_sim_debug, "codedexposure-sim", 0,
+      "optical bench in software");
   sim::install_own_state (klass);
-  install_run<begin_run, end_run> (klass);
+  install_run<kRun> (klass);
 
   auto *transform = GST_BASE_TRANSFORM_CLASS (klass);
   /* A video filter works in place where it can; a coded frame needs a buffer
@@ -255,12 +251,18 @@ gst_coded_exposure_sim_class_init (GstCodedExposureSimClass *klass)
       "slow camera behind a micromirror device");
 }
 
-static void
-gst_coded_exposure_sim_init (GstCodedExposureSim *self)
+void
+set_up_instance (GstCodedExposureSim *self)
 {
-  self->state = new SimState;
   auto *trans = GST_BASE_TRANSFORM (self);
   gst_base_transform_set_prefer_passthrough (trans, FALSE);
   /* An instrument drops nothing because it is late. */
   gst_base_transform_set_qos_enabled (trans, FALSE);
 }
+
+} // namespace
+
+GST_ELEMENT_REGISTER_DEFINE (codedexposure_sim, "codedexposure-sim",
+    GST_RANK_NONE,
+    (type_of<GstCodedExposureSim, set_up, set_up_instance> (
+        "GstCodedExposureSim", GST_TYPE_VIDEO_FILTER)))

@@ -21,14 +21,6 @@
 #include "schedule/schedule.h"
 #include "setup/stream_setup.h"
 
-G_BEGIN_DECLS
-
-#define GST_TYPE_CODED_EXPOSURE_SIM (gst_coded_exposure_sim_get_type ())
-G_DECLARE_FINAL_TYPE (GstCodedExposureSim, gst_coded_exposure_sim, GST,
-    CODED_EXPOSURE_SIM, GstVideoFilter)
-
-G_END_DECLS
-
 GST_DEBUG_CATEGORY_EXTERN (codedexposure_sim_debug);
 
 namespace codedexposure::gst::sim
@@ -106,15 +98,8 @@ struct SimState {
   Stream stream;
 };
 
-} // namespace codedexposure::gst::sim
-
-struct _GstCodedExposureSim {
-  GstVideoFilter parent;
-  codedexposure::gst::sim::SimState *state;
+struct GstCodedExposureSim : Instance<GstVideoFilter, SimState> {
 };
-
-namespace codedexposure::gst::sim
-{
 
 inline constexpr auto &state = state_in<GstCodedExposureSim>;
 

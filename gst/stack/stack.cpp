@@ -34,9 +34,6 @@
 using namespace codedexposure;
 using namespace codedexposure::gst;
 
-G_DECLARE_FINAL_TYPE (GstCodedExposureStack, gst_coded_exposure_stack, GST,
-    CODED_EXPOSURE_STACK, GstBaseSink)
-
 namespace
 {
 
@@ -54,25 +51,15 @@ struct Stack {
   std::unique_ptr<StackFile> file;
 };
 
-} // namespace
-
-struct _GstCodedExposureStack {
-  GstBaseSink parent;
-  Stack *state;
+struct GstCodedExposureStack : Instance<GstBaseSink, Stack> {
 };
-
-G_DEFINE_TYPE (
-    GstCodedExposureStack, gst_coded_exposure_stack, GST_TYPE_BASE_SINK)
-
-namespace
-{
 
 using OpenFile = decltype (&open_ome_tiff);
 
 Stack &
 state_of (gpointer self)
 {
-  return *GST_CODED_EXPOSURE_STACK (self)->state;
+  return state_in<GstCodedExposureStack> (self);
 }
 
 /* Its name without the ending of a file that is not finished. */
@@ -282,8 +269,7 @@ on_event (GstBaseSink *sink, GstEvent *event) noexcept
     gst_event_unref (event);
     return FALSE;
   }
-  return GST_BASE_SINK_CLASS (gst_coded_exposure_stack_parent_class)
-      ->event (sink, event);
+  return parent_class<GstBaseSinkClass> (sink)->event (sink, event);
 }
 
 gboolean
@@ -351,17 +337,8 @@ properties ()
   return table;
 }
 
-} // namespace
-
-static void
-gst_coded_exposure_stack_init (GstCodedExposureStack *self)
-{
-  self->state = new Stack ();
-  gst_base_sink_set_sync (GST_BASE_SINK (self), FALSE);
-}
-
-static void
-gst_coded_exposure_stack_class_init (GstCodedExposureStackClass *klass)
+void
+set_up (gpointer klass)
 {
   install_state<GstCodedExposureStack, properties> (klass);
   describe_element (klass, "Coded exposure stack", "Sink/File/Video",
@@ -374,12 +351,21 @@ gst_coded_exposure_stack_class_init (GstCodedExposureStackClass *klass)
   sink_class->stop = stop;
 }
 
+void
+set_up_instance (GstCodedExposureStack *self)
+{
+  gst_base_sink_set_sync (GST_BASE_SINK (self), FALSE);
+}
+
+} // namespace
+
 static gboolean
 plugin_init (GstPlugin *plugin)
 {
   register_meta (kFrameMetaName);
   return gst_element_register (plugin, "codedexposure-stack", GST_RANK_NONE,
-      gst_coded_exposure_stack_get_type ());
+      type_of<GstCodedExposureStack, set_up, set_up_instance> (
+          "GstCodedExposureStack", GST_TYPE_BASE_SINK));
 }
 
 GST_PLUGIN_DEFINE (GST_VERSION_MAJOR, GST_VERSION_MINOR, codedexposurestack,

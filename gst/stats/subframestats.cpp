@@ -92,29 +92,12 @@ struct StatsState {
   LineFile file;
 };
 
-} // namespace
-
-G_DECLARE_FINAL_TYPE (
-    GstSubframeStats, gst_subframe_stats, GST, SUBFRAME_STATS, GstBaseTransform)
-
-struct _GstSubframeStats {
-  GstBaseTransform parent;
-  StatsState *state;
+struct GstSubframeStats : Instance<GstBaseTransform, StatsState> {
 };
-
-G_DEFINE_TYPE_WITH_CODE (GstSubframeStats, gst_subframe_stats,
-    GST_TYPE_BASE_TRANSFORM,
-    GST_DEBUG_CATEGORY_INIT (
-        subframestats_debug, "subframestats", 0, "statistics of subframes"))
-GST_ELEMENT_REGISTER_DEFINE (subframestats, "subframestats", GST_RANK_NONE,
-    gst_subframe_stats_get_type ())
 
 G_DEFINE_ENUM_TYPE (GstSubframeStatsFormat, gst_subframe_stats_format,
     {int (Format::json), "Lines of JSON", "json"},
     {int (Format::csv), "Comma-separated values, with a head", "csv"});
-
-namespace
-{
 
 const PropertyTable<StatsState> &
 properties ()
@@ -159,8 +142,8 @@ properties ()
 bool
 begin_run (GstElement *element)
 {
-  auto *self = GST_SUBFRAME_STATS (element);
-  StatsState &state = *self->state;
+  auto *self = as<GstSubframeStats> (element);
+  StatsState &state = self->state;
   {
     const ObjectLock lock (self);
     state.in_force = state.settings;
@@ -195,7 +178,7 @@ template <typename Pixel>
 bool
 make_meter_of (GstSubframeStats *self)
 {
-  StatsState &state = *self->state;
+  StatsState &state = self->state;
   state.meter = {};
   auto made = StatsMeter<Pixel>::make (
       {state.info.width, state.info.height}, state.options);
@@ -211,7 +194,7 @@ make_meter_of (GstSubframeStats *self)
 bool
 make_meter (GstSubframeStats *self)
 {
-  return GST_VIDEO_INFO_FORMAT (&self->state->info) == GST_VIDEO_FORMAT_GRAY8
+  return GST_VIDEO_INFO_FORMAT (&self->state.info) == GST_VIDEO_FORMAT_GRAY8
              ? make_meter_of<guint8> (self)
              : make_meter_of<guint16> (self);
 }
@@ -219,8 +202,8 @@ make_meter (GstSubframeStats *self)
 gboolean
 set_caps (GstBaseTransform *base, GstCaps *caps, GstCaps *) noexcept
 {
-  auto *self = GST_SUBFRAME_STATS (base);
-  StatsState &state = *self->state;
+  auto *self = as<GstSubframeStats> (base);
+  StatsState &state = self->state;
   if (!gst_video_info_from_caps (&state.info, caps))
     return FALSE;
   state.options.bits = state.in_force.bits;
@@ -232,7 +215,7 @@ set_caps (GstBaseTransform *base, GstCaps *caps, GstCaps *) noexcept
 bool
 follow_bits (GstSubframeStats *self, GstBuffer *frame)
 {
-  StatsState &state = *self->state;
+  StatsState &state = self->state;
   const auto meta = get_frame_meta (frame);
   const int bits =
       significant_bits_of (meta ? meta->bits : state.tagged_bits, state.info);
@@ -245,7 +228,7 @@ follow_bits (GstSubframeStats *self, GstBuffer *frame)
 gboolean
 sink_event (GstBaseTransform *base, GstEvent *event) noexcept
 {
-  StatsState &state = *GST_SUBFRAME_STATS (base)->state;
+  StatsState &state = state_in<GstSubframeStats> (base);
   if (GST_EVENT_TYPE (event) == GST_EVENT_STREAM_START)
     state.tagged_bits = 0;
   if (GST_EVENT_TYPE (event) == GST_EVENT_TAG)
@@ -257,7 +240,7 @@ sink_event (GstBaseTransform *base, GstEvent *event) noexcept
 const PictureStats *
 measure (GstSubframeStats *self, GstBuffer *frame)
 {
-  StatsState &state = *self->state;
+  StatsState &state = self->state;
   MappedFrame mapped (state.info, frame, GST_MAP_READ);
   if (!mapped) {
     POST_ERROR (self, STREAM, FORMAT, unreadable_text (state.info, frame));
@@ -274,15 +257,15 @@ guint64
 count (GstSubframeStats *self, bool saturated)
 {
   const ObjectLock lock (self);
-  self->state->saturated_frames += saturated;
-  return self->state->frames_in++;
+  self->state.saturated_frames += saturated;
+  return self->state.frames_in++;
 }
 
 /* @frame: writable. */
 GstFlowReturn
 describe (GstSubframeStats *self, GstBuffer *frame)
 {
-  StatsState &state = *self->state;
+  StatsState &state = self->state;
   const PictureStats *stats = measure (self, frame);
   if (!stats)
     return GST_FLOW_ERROR;
@@ -312,12 +295,12 @@ describe (GstSubframeStats *self, GstBuffer *frame)
 GstFlowReturn
 generate_output (GstBaseTransform *base, GstBuffer **outbuf) noexcept
 {
-  auto *self = GST_SUBFRAME_STATS (base);
+  auto *self = as<GstSubframeStats> (base);
   if (!base->queued_buf)
     return GST_FLOW_OK;
   BufferPtr frame (
       gst_buffer_make_writable (std::exchange (base->queued_buf, nullptr)));
-  if (std::holds_alternative<std::monostate> (self->state->meter))
+  if (std::holds_alternative<std::monostate> (self->state.meter))
     return GST_FLOW_NOT_NEGOTIATED;
   if (!follow_bits (self, frame.get ()))
     return GST_FLOW_ERROR;
@@ -327,22 +310,15 @@ generate_output (GstBaseTransform *base, GstBuffer **outbuf) noexcept
   return flow;
 }
 
-} // namespace
+constexpr StateHooks kRun{.begin = begin_run, .end = end_run};
 
-static void
-gst_subframe_stats_init (GstSubframeStats *self)
+void
+set_up (gpointer klass)
 {
-  self->state = new StatsState;
-  auto *base = GST_BASE_TRANSFORM (self);
-  gst_base_transform_set_passthrough (base, TRUE);
-  gst_base_transform_set_qos_enabled (base, FALSE);
-}
-
-static void
-gst_subframe_stats_class_init (GstSubframeStatsClass *klass)
-{
+  GST_DEBUG_CATEGORY_INIT (
+      subframestats_debug, "subframestats", 0, "statistics of subframes");
   install_state<GstSubframeStats, properties> (klass);
-  install_run<begin_run, end_run> (klass);
+  install_run<kRun> (klass);
   describe_element (klass, "Subframe statistics", "Filter/Analyzer/Video",
       "Measures intensity, entropy, histogram and a line profile of every "
       "picture");
@@ -352,3 +328,17 @@ gst_subframe_stats_class_init (GstSubframeStatsClass *klass)
   transform_class->sink_event = GST_DEBUG_FUNCPTR (sink_event);
   transform_class->generate_output = GST_DEBUG_FUNCPTR (generate_output);
 }
+
+void
+set_up_instance (GstSubframeStats *self)
+{
+  auto *base = GST_BASE_TRANSFORM (self);
+  gst_base_transform_set_passthrough (base, TRUE);
+  gst_base_transform_set_qos_enabled (base, FALSE);
+}
+
+} // namespace
+
+GST_ELEMENT_REGISTER_DEFINE (subframestats, "subframestats", GST_RANK_NONE,
+    (type_of<GstSubframeStats, set_up, set_up_instance> (
+        "GstSubframeStats", GST_TYPE_BASE_TRANSFORM)))

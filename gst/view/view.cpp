@@ -39,24 +39,15 @@ using namespace codedexposure::gst;
 GST_DEBUG_CATEGORY_STATIC (codedexposure_view_debug);
 #define GST_CAT_DEFAULT codedexposure_view_debug
 
-G_DECLARE_FINAL_TYPE (GstCodedExposureView, gst_coded_exposure_view, GST,
-    CODED_EXPOSURE_VIEW, GstVideoFilter)
-
-struct _GstCodedExposureView {
-  GstVideoFilter parent;
-  gint bits, white; // object lock
-  gint tagged_bits; // streaming thread
-};
-
-G_DEFINE_TYPE_WITH_CODE (GstCodedExposureView, gst_coded_exposure_view,
-    GST_TYPE_VIDEO_FILTER,
-    GST_DEBUG_CATEGORY_INIT (codedexposure_view_debug, "codedexposure-view", 0,
-        "8-bit pictures for display"))
-GST_ELEMENT_REGISTER_DEFINE (codedexposure_view, "codedexposure-view",
-    GST_RANK_NONE, gst_coded_exposure_view_get_type ())
-
 namespace
 {
+
+struct ViewState {
+  gint bits = 0, white = 0; // object lock
+  gint tagged_bits = 0;     // streaming thread
+};
+struct GstCodedExposureView : Instance<GstVideoFilter, ViewState> {
+};
 
 constexpr int kShown = 8, kWhite = 255;
 
@@ -68,14 +59,14 @@ white_of (GstCodedExposureView *self, GstBuffer *picture, int depth)
   int bits, white;
   {
     const ObjectLock lock (self);
-    bits = self->bits;
-    white = self->white;
+    bits = self->state.bits;
+    white = self->state.white;
   }
   if (white > 0)
     return guint64 (white);
   if (bits == 0) {
     const auto meta = get_frame_meta (picture);
-    bits = meta ? meta->bits : self->tagged_bits;
+    bits = meta ? meta->bits : self->state.tagged_bits;
   }
   return (guint64 (1) << (bits <= 0 ? depth : std::min (bits, depth))) - 1;
 }
@@ -113,18 +104,18 @@ transform_caps (GstBaseTransform *, GstPadDirection direction, GstCaps *caps,
 gboolean
 sink_event (GstBaseTransform *base, GstEvent *event)
 {
-  auto *self = GST_CODED_EXPOSURE_VIEW (base);
+  int &bits = state_in<GstCodedExposureView> (base).tagged_bits;
   if (GST_EVENT_TYPE (event) == GST_EVENT_STREAM_START)
-    self->tagged_bits = 0;
+    bits = 0;
   if (GST_EVENT_TYPE (event) == GST_EVENT_TAG)
-    self->tagged_bits = bits_from_tags (event).value_or (self->tagged_bits);
+    bits = bits_from_tags (event).value_or (bits);
   return base_transform_class ()->sink_event (base, event);
 }
 
 void
 before_transform (GstBaseTransform *base, GstBuffer *picture)
 {
-  auto *self = GST_CODED_EXPOSURE_VIEW (base);
+  auto *self = as<GstCodedExposureView> (base);
   const GstVideoInfo &in = GST_VIDEO_FILTER (base)->in_info;
   const bool as_it_is = GST_VIDEO_INFO_FORMAT (&in) == GST_VIDEO_FORMAT_GRAY8 &&
                         white_of (self, picture, kShown) == kWhite;
@@ -143,7 +134,7 @@ refuse (GstCodedExposureView *self, const GstVideoInfo &info, GstBuffer *buffer)
 GstFlowReturn
 transform (GstBaseTransform *base, GstBuffer *picture, GstBuffer *shown)
 {
-  auto *self = GST_CODED_EXPOSURE_VIEW (base);
+  auto *self = as<GstCodedExposureView> (base);
   const GstVideoInfo &in = GST_VIDEO_FILTER (base)->in_info;
   const GstVideoInfo &out = GST_VIDEO_FILTER (base)->out_info;
   MappedFrame from (in, picture, GST_MAP_READ);
@@ -163,38 +154,27 @@ transform (GstBaseTransform *base, GstBuffer *picture, GstBuffer *shown)
   return GST_FLOW_OK;
 }
 
-const PropertyTable<GstCodedExposureView> &
+const PropertyTable<ViewState> &
 properties ()
 {
-  static const PropertyTable<GstCodedExposureView> table{
+  static const PropertyTable<ViewState> table{
       {"bits", "Significant bits",
           "Significant bits of a pixel; their largest value becomes white. 0: "
           "as the frame metadata or the tags say, or all bits of the format",
-          kReadWrite, &GstCodedExposureView::bits, 0, 16},
+          kReadWrite, &ViewState::bits, 0, 16},
       {"white", "White",
           "Pixel value that becomes white, to see a dark scene; larger ones "
           "are white, too. 0: the largest value of the significant bits",
-          kReadWrite, &GstCodedExposureView::white, 0, 65535}};
+          kReadWrite, &ViewState::white, 0, 65535}};
   return table;
 }
 
-GstCodedExposureView &
-view (GObject *object)
+void
+set_up (gpointer klass)
 {
-  return *GST_CODED_EXPOSURE_VIEW (object);
-}
-
-} // namespace
-
-static void
-gst_coded_exposure_view_init (GstCodedExposureView *)
-{
-}
-
-static void
-gst_coded_exposure_view_class_init (GstCodedExposureViewClass *klass)
-{
-  install_properties<properties, view> (G_OBJECT_CLASS (klass));
+  GST_DEBUG_CATEGORY_INIT (codedexposure_view_debug, "codedexposure-view", 0,
+      "8-bit pictures for display");
+  install_state<GstCodedExposureView, properties> (klass);
   describe_element (klass, "Coded exposure view", "Filter/Converter/Video",
       "Converts pictures of any bit depth to 8 bits for display", {"sink"});
   add_pad_template (klass, "src", {.caps = GST_VIDEO_CAPS_MAKE ("GRAY8")});
@@ -207,3 +187,10 @@ gst_coded_exposure_view_class_init (GstCodedExposureViewClass *klass)
   transform_class->transform_ip = nullptr;
   transform_class->transform = GST_DEBUG_FUNCPTR (transform);
 }
+
+} // namespace
+
+GST_ELEMENT_REGISTER_DEFINE (codedexposure_view, "codedexposure-view",
+    GST_RANK_NONE,
+    (type_of<GstCodedExposureView, set_up> (
+        "GstCodedExposureView", GST_TYPE_VIDEO_FILTER)))

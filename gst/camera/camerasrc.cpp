@@ -166,10 +166,7 @@ begin_run (GstElement *element)
   auto *self = as<GstCodedExposureCameraSrc> (element);
   CameraState &st = self->state;
   st.stream = camera::Stream ();
-  {
-    const ObjectLock lock (self);
-    st.reconnects = 0;
-  }
+  locked (self, [&] { st.reconnects = 0; });
   camera::begin_watch (self);
   return camera::set_up_source (self);
 }
@@ -289,11 +286,7 @@ set_up_source (GstCodedExposureCameraSrc *self)
   const CapsPtr caps (
       gst_caps_from_string (caps_of_format (settings.pixel_format).c_str ()));
   g_object_set (st.filter, "caps", caps.get (), nullptr);
-  int frames_left;
-  {
-    const std::lock_guard guard (st.lock);
-    frames_left = st.frames_left;
-  }
+  const int frames_left = locked (st.lock, [&] { return st.frames_left; });
   g_object_set (st.source, "features", feature_assignments (settings).c_str (),
       "exposure", settings.exposure_time > 0 ? settings.exposure_time : -1.0,
       "num-buffers", frames_left, nullptr);

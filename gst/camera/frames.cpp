@@ -42,14 +42,12 @@ passes (GstCodedExposureCameraSrc *self, GstEvent *event)
   case GST_EVENT_STREAM_START:
     return !std::exchange (stream.started, true);
   case GST_EVENT_CAPS: {
-    GstCaps *caps = nullptr;
-    gst_event_parse_caps (event, &caps);
+    GstCaps *caps = caps_of (event);
     return !(stream.caps && gst_caps_is_equal (caps, stream.caps.get ())) &&
            take_caps (self, caps);
   }
   case GST_EVENT_SEGMENT: {
-    const GstSegment *segment = nullptr;
-    gst_event_parse_segment (event, &segment);
+    const GstSegment *segment = segment_of (event);
     if (stream.segment && gst_segment_is_equal (segment, &*stream.segment))
       return false;
     stream.segment = *segment;

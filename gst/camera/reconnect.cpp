@@ -78,11 +78,7 @@ void
 give_up (GstCodedExposureCameraSrc *self, guint tries)
 {
   CameraState &st = state (self);
-  std::string why;
-  {
-    const std::lock_guard guard (st.lock);
-    why = st.why;
-  }
+  const std::string why = locked (st.lock, [&] { return st.why; });
   POST_ERROR (self, RESOURCE, READ,
       "The camera did not come back after " + std::to_string (tries) +
           " tries to restart it (property reconnect): " + why +
@@ -101,12 +97,11 @@ try_restart (GstCodedExposureCameraSrc *self, const std::stop_token &stop)
   CameraState &st = state (self);
   gst_element_set_locked_state (st.source, TRUE);
   gst_element_set_state (st.source, GST_STATE_NULL);
-  {
-    const std::lock_guard guard (st.lock);
+  locked (st.lock, [&] {
     st.why.clear ();
     st.failed = false;
     st.tries++;
-  }
+  });
   if (stop.stop_requested () || !set_up_source (self))
     return false;
   gst_element_set_locked_state (st.source, FALSE);
@@ -121,11 +116,7 @@ void
 bring_back (GstCodedExposureCameraSrc *self, const std::stop_token &stop)
 {
   CameraState &st = state (self);
-  guint most = 0;
-  {
-    const std::lock_guard guard (st.lock);
-    most = st.most_tries;
-  }
+  const guint most = locked (st.lock, [&] { return st.most_tries; });
   for (guint tries = 0; tries < most; tries++) {
     std::unique_lock guard (st.lock);
     if (tries > 0)
@@ -160,12 +151,11 @@ end_watch (GstCodedExposureCameraSrc *self)
 {
   CameraState &st = state (self);
   std::jthread ended;
-  {
-    const std::lock_guard guard (st.lock);
+  locked (st.lock, [&] {
     st.watching = false;
     st.pauses.reset ();
     ended = std::move (st.restarts);
-  }
+  });
   if (ended.joinable ()) {
     ended.request_stop ();
     ended.join ();
@@ -270,10 +260,7 @@ note_frame (GstCodedExposureCameraSrc *self, GstClockTime silent)
     tries = st.tries;
   }
   st.changed.notify_all ();
-  {
-    const ObjectLock lock (self);
-    st.reconnects++;
-  }
+  locked (self, [&] { st.reconnects++; });
   post_message (self, CameraBack{silent, tries});
 }
 

@@ -109,8 +109,7 @@ CodedFilter::on_stream_start (EventPtr event)
 gboolean
 CodedFilter::on_caps (const EventPtr &event)
 {
-  GstCaps *caps = nullptr;
-  gst_event_parse_caps (event.get (), &caps);
+  GstCaps *caps = caps_of (event.get ());
   if (!stream_.caps || !gst_caps_is_equal (stream_.caps.get (), caps))
     stream_.stale = true;
   stream_.caps.reset (gst_caps_ref (caps));
@@ -173,8 +172,7 @@ CodedFilter::segment_event () const
 gboolean
 CodedFilter::on_tag (EventPtr event)
 {
-  GstTagList *tags = nullptr;
-  gst_event_parse_tag (event.get (), &tags);
+  GstTagList *tags = tags_of (event.get ());
   if (auto why = why_not_coded (event.get ())) {
     stream_.not_coded = std::move (why);
     stream_.stale = true;
@@ -491,11 +489,10 @@ CodedFilter::scale_frames (GstCodedPad *pad, GstQuery *query) const
     gst_query_parse_position (query, &format, &frames);
   if (format != GST_FORMAT_DEFAULT || frames < 0)
     return;
-  {
-    const ObjectLock lock (element_);
+  locked (element_, [&] {
     if (shared_.schedule && pad->state.kind != PadKind::coded)
       frames *= pictures_a_frame (pad);
-  }
+  });
   if (duration)
     gst_query_set_duration (query, format, frames);
   else

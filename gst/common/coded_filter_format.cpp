@@ -50,14 +50,13 @@ CodedFilter::negotiate (GstBuffer *next)
   const int bits = meta ? std::max (0, meta->bits) : 0;
   if (meta && std::exchange (stream_.bits, bits) != bits)
     stream_.stale = true;
-  {
-    const ObjectLock lock (element_);
+  locked (element_, [&] {
     if (std::exchange (shared_.settings_changed, false)) {
       stream_.settings = shared_.settings;
       take_settings ();
       stream_.stale = true;
     }
-  }
+  });
   if (stream_.stale) {
     if (const GstFlowReturn flow = drain (); flow != GST_FLOW_OK)
       return flow;
@@ -398,16 +397,15 @@ CodedFilter::adopt (CodedFormat format, GstBuffer *next)
   if (before && !(*before == adopted.schedule))
     report_change (*before, next);
   set_provenance (next);
-  bool schedule_changed;
-  {
-    const ObjectLock lock (element_);
-    schedule_changed =
+  const bool schedule_changed = locked (element_, [&] {
+    const bool changed =
         !shared_.schedule || !(*shared_.schedule == adopted.schedule);
     shared_.schedule = std::make_shared<const Schedule> (adopted.schedule);
     shared_.assumed = adopted.assumed;
     shared_.rectifies = adopted.rectifier != nullptr;
     shared_.period = adopted.period ();
-  }
+    return changed;
+  });
   SeekBook::read (this, stream_.id, reach ());
   each_pad ([this] (GstCodedPad *pad) {
     pad->state.allocation.reset ();
@@ -440,10 +438,7 @@ CodedFilter::report_mirrors ()
       rectifier ? rectifier->report () : RectifyReport ();
   const MirrorsSeen mirrors{
       report.exact, report.weighted, report.mixed, report.unseen};
-  {
-    const ObjectLock lock (element_);
-    shared_.counters.mirrors = mirrors;
-  }
+  locked (element_, [&] { shared_.counters.mirrors = mirrors; });
   if (!rectifier)
     return;
   notify ("stats");

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <utility>
 
+#include "base/pixels.h"
 #include "extract/black_level.h"
 
 GST_DEBUG_CATEGORY_EXTERN (coded_filter_debug);
@@ -364,7 +365,7 @@ CodedFilter::rectify (ImageView<const Pixel> coded)
     return coded;
   auto &rectified = stream_.rectified.of<Pixel> (rectifier->mirrors ());
   if (const auto done = rectifier->run (
-          coded, rectified.view (), bits > 0 ? (1 << bits) - 1 : 0);
+          coded, rectified.view (), bits > 0 ? largest_pixel (bits) : 0);
       !done)
     return done.error ();
   return ImageView<const Pixel> (rectified.view ());

@@ -155,10 +155,7 @@ void
 post_write_error (
     GstElement *sink, std::string &problem, const std::string &why)
 {
-  {
-    const ObjectLock lock (sink);
-    problem = why;
-  }
+  locked (sink, [&] { problem = why; });
   if (why.find (g_strerror (ENOSPC)) != std::string::npos)
     POST_ERROR (sink, RESOURCE, NO_SPACE_LEFT, why);
   else

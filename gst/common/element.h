@@ -160,6 +160,18 @@ GstBaseTransformClass *base_transform_class ();
 
 /** Posts that the latency has changed. */
 void post_latency (gpointer element);
+/** Sets @p own, the element's part of the latency, to what @p compute returns,
+ * under the object lock, and posts it if it changes. */
+template <typename Compute>
+void
+set_latency (gpointer element, GstClockTime &own, Compute compute)
+{
+  if (locked (element, [&] {
+        const GstClockTime latency = compute ();
+        return std::exchange (own, latency) != latency;
+      }))
+    post_latency (element);
+}
 void post_progress (gpointer element, GstProgressType type, const char *code,
     const std::string &text);
 

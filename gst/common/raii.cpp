@@ -28,6 +28,30 @@ misfit (
 
 } // namespace
 
+GstTagList *
+tags_of (GstEvent *event)
+{
+  GstTagList *tags = nullptr;
+  gst_event_parse_tag (event, &tags);
+  return tags;
+}
+
+GstCaps *
+caps_of (GstEvent *event)
+{
+  GstCaps *caps = nullptr;
+  gst_event_parse_caps (event, &caps);
+  return caps;
+}
+
+const GstSegment *
+segment_of (GstEvent *event)
+{
+  const GstSegment *segment = nullptr;
+  gst_event_parse_segment (event, &segment);
+  return segment;
+}
+
 Result<PixelLayout>
 layout_of (const GstVideoInfo &info, GstBuffer *buffer)
 {

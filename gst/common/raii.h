@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <utility>
 
@@ -48,6 +49,11 @@ struct PoolRelease {
 };
 using PoolPtr = std::unique_ptr<GstBufferPool, PoolRelease>;
 
+/* What an event holds, which it keeps. */
+GstTagList *tags_of (GstEvent *event);
+GstCaps *caps_of (GstEvent *event);
+const GstSegment *segment_of (GstEvent *event);
+
 /** Holds the object lock for a scope. Never push, query or block inside. */
 class ObjectLock
 {
@@ -63,6 +69,23 @@ public:
 private:
   gpointer object_;
 };
+
+/** What @p use returns, under the object lock of @p object, or under @p mutex.
+ * Never push, query or block inside. */
+template <typename Use>
+auto
+locked (gpointer object, Use use)
+{
+  const ObjectLock lock (object);
+  return use ();
+}
+template <typename Use>
+auto
+locked (std::mutex &mutex, Use use)
+{
+  const std::lock_guard lock (mutex);
+  return use ();
+}
 
 /** Where the pixels of a grey frame lie in its buffer. */
 struct PixelLayout {

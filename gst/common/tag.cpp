@@ -64,8 +64,7 @@ setup_to_tags (const StreamSetup &setup)
 GstEvent *
 merge_others (GstTagList *ours, GstEvent *event)
 {
-  GstTagList *tags = nullptr;
-  gst_event_parse_tag (event, &tags);
+  GstTagList *tags = tags_of (event);
   gst_tag_list_set_scope (ours, gst_tag_list_get_scope (tags));
   for (const std::string &comment : comments_of (tags))
     if (!comment.starts_with (kPrefix) &&
@@ -149,8 +148,7 @@ GstEvent *
 remove_setup_and_provenance (GstEvent *event)
 {
   GstEvent *rest = merge_others (gst_tag_list_new_empty (), event);
-  GstTagList *tags = nullptr;
-  gst_event_parse_tag (rest, &tags);
+  GstTagList *tags = tags_of (rest);
   if (!gst_tag_list_is_empty (tags))
     return rest;
   gst_event_unref (rest);
@@ -167,8 +165,7 @@ provenance_to_event (const Provenance &provenance)
 bool
 takes_provenance (GstEvent *event)
 {
-  GstTagList *tags = nullptr;
-  gst_event_parse_tag (event, &tags);
+  GstTagList *tags = tags_of (event);
   return gst_tag_list_get_scope (tags) != GST_TAG_SCOPE_GLOBAL ||
          comment_after (kPrefix, tags);
 }
@@ -187,8 +184,7 @@ replace_by_provenance (GstEvent *event, const Provenance &provenance)
 std::optional<int>
 bits_from_tags (GstEvent *event)
 {
-  GstTagList *tags = nullptr;
-  gst_event_parse_tag (event, &tags);
+  GstTagList *tags = tags_of (event);
   if (const auto setup = setup_from_tags (tags))
     return *setup ? setup->value ().bits : 0;
   if (const auto made = provenance_from_tags (tags))
@@ -199,8 +195,7 @@ bits_from_tags (GstEvent *event)
 std::optional<std::string>
 why_not_coded (GstEvent *event)
 {
-  GstTagList *tags = nullptr;
-  gst_event_parse_tag (event, &tags);
+  GstTagList *tags = tags_of (event);
   const auto made = provenance_from_tags (tags);
   if (!made)
     return std::nullopt;

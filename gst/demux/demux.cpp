@@ -216,14 +216,13 @@ Demux::skip (GstCodedPad *pad, GstClockTime pts, GstClockTime duration)
       gst_segment_to_stream_time (&segment (), GST_FORMAT_TIME, pts);
   GstMessage *message = gst_message_new_qos (
       GST_OBJECT (element ()), is_live (), running, stream_time, pts, duration);
-  {
-    const ObjectLock lock (element ());
+  locked (element (), [&] {
     shared_.counters.pictures_dropped++;
     gst_message_set_qos_values (
         message, pad->state.jitter, pad->state.proportion, 1000000);
     gst_message_set_qos_stats (message, GST_FORMAT_BUFFERS,
         shared_.counters.pictures_out, shared_.counters.pictures_dropped);
-  }
+  });
   gst_element_post_message (element (), message);
   pad->state.discont = true;
   gst_pad_push_event (GST_PAD (pad), gst_event_new_gap (pts, duration));
@@ -234,11 +233,8 @@ Demux::is_late (GstCodedPad *pad, GstClockTime pts, GstClockTime duration)
 {
   if (!in_force_.qos)
     return false;
-  GstClockTime earliest;
-  {
-    const ObjectLock lock (element ());
-    earliest = pad->state.earliest;
-  }
+  const GstClockTime earliest =
+      locked (element (), [&] { return pad->state.earliest; });
   const GstClockTime running = gst_segment_to_running_time (
       &segment (), GST_FORMAT_TIME, backwards () ? pts + duration : pts);
   return GST_CLOCK_TIME_IS_VALID (earliest) &&

@@ -40,11 +40,8 @@ pads_text (PadKind kind, const Schedule *schedule)
 bool
 Demux::allows_pad (PadKind kind, int index) const
 {
-  ScheduleRef schedule;
-  {
-    const ObjectLock lock (element ());
-    schedule = shared_.schedule;
-  }
+  const ScheduleRef schedule =
+      locked (element (), [&] { return shared_.schedule; });
   if (index >= 0 && index < numbered_pads (kind, schedule.get ()))
     return true;
   POST_WARNING (element (), STREAM, WRONG_TYPE,

@@ -171,13 +171,9 @@ Demux::planned (bool schedule_changed)
   if (schedule_changed)
     report_regions (element (), format ().schedule);
   const Method method = plan_->background ().method ();
-  bool method_changed;
-  {
-    const ObjectLock lock (element ());
-    method_changed =
-        std::exchange (settings_.method_in_force, method) != method;
-  }
-  if (method_changed)
+  if (locked (element (), [&] {
+        return std::exchange (settings_.method_in_force, method) != method;
+      }))
     notify ("method-in-force");
 }
 

@@ -99,10 +99,7 @@ open_device (GstDmdSync *self)
     return false;
   }
   auto runner = std::make_shared<DmdRunner> (*std::move (dmd), reports (self));
-  {
-    const ObjectLock lock (self);
-    st.runner = std::move (runner);
-  }
+  locked (self, [&] { st.runner = std::move (runner); });
   GST_INFO_OBJECT (self, "opened %s", device.c_str ());
   return true;
 }
@@ -124,10 +121,9 @@ read_bench (GstDmdSync *self)
     POST_ERROR (self, RESOURCE, SETTINGS, refused);
     return false;
   }
-  {
-    const ObjectLock lock (self);
+  locked (self, [&] {
     st.bench = given ? std::optional (given->value ()) : std::nullopt;
-  }
+  });
   if (st.bench)
     if (const auto old = st.bench->why_old (now_utc ()))
       POST_WARNING (self, RESOURCE, SETTINGS, *old);
@@ -156,10 +152,7 @@ park (GstDmdSync *self)
   if (!st.runner)
     return;
   st.runner->halt ();
-  {
-    const ObjectLock lock (self);
-    st.pattern.reset ();
-  }
+  locked (self, [&] { st.pattern.reset (); });
   if (st.uploading.exchange (false))
     post_progress (
         self, GST_PROGRESS_TYPE_CANCELED, kUpload, "Upload cancelled");

@@ -145,11 +145,10 @@ void
 begin_run (GstDmdSync *self)
 {
   SyncState &st = self->state;
-  {
-    const ObjectLock lock (self);
+  locked (self, [&] {
     st.counters = Counters ();
     st.observable = slip_observable (st.schedule);
-  }
+  });
   say_observable (self);
   if (!st.runner)
     return;

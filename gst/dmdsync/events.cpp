@@ -141,8 +141,7 @@ own_schedule (GstDmdSync *self, GstEvent *event)
 {
   refuse_decoded (self, event);
   SyncState &st = state (self);
-  GstTagList *tags = nullptr;
-  gst_event_parse_tag (event, &tags);
+  GstTagList *tags = tags_of (event);
   const auto theirs = setup_from_tags (tags);
   if (theirs && (!*theirs || !(theirs->value ().schedule == st.schedule)) &&
       !std::exchange (st.stream.warned_tag, true))
@@ -169,11 +168,8 @@ moved_gap (GstDmdSync *self, GstEvent *event)
 {
   GstClockTime pts = 0, duration = 0;
   gst_event_parse_gap (event, &pts, &duration);
-  GstClockTimeDiff by;
-  {
-    const ObjectLock lock (self);
-    by = moved_back (state (self));
-  }
+  const GstClockTimeDiff by =
+      locked (self, [&] { return moved_back (state (self)); });
   const GstClockTimeDiff start = std::max<GstClockTimeDiff> (
       0, GstClockTimeDiff (pipeline_time_of_gap (self, pts)) - by);
   const EventPtr came (event);
@@ -196,8 +192,7 @@ gboolean
 take_segment (GstDmdSync *self, GstEvent *event)
 {
   Stream &stream = state (self).stream;
-  const GstSegment *segment = nullptr;
-  gst_event_parse_segment (event, &segment);
+  const GstSegment *segment = segment_of (event);
   if (segment->format != GST_FORMAT_TIME) {
     POST_ERROR (self, STREAM, FORMAT,
         "Frames must come in TIME, not in " +
@@ -263,10 +258,7 @@ set_caps (GstBaseTransform *trans, GstCaps *incaps, GstCaps *)
   }
   st.stream.frames = *std::move (frames);
   st.stream.refused.clear ();
-  {
-    const ObjectLock lock (self);
-    st.time = *time;
-  }
+  locked (self, [&] { st.time = *time; });
   /* Other caps are another stretch of the same stream. */
   begin_frames (
       self, st.stream.sequence ? st.stream.sequence->next_number () : 0);

@@ -226,12 +226,9 @@ say_phase (GstDmdSync *self, const Frame &frame)
   if (phase.locked_now)
     post_message (self, Locked{guint64 (frame.step.number), frame.pts});
 
-  bool changed = false;
-  {
-    const ObjectLock lock (self);
-    changed = std::exchange (st.locked, phase.locked) != phase.locked;
-  }
-  if (changed)
+  if (locked (self, [&] {
+        return std::exchange (st.locked, phase.locked) != phase.locked;
+      }))
     g_object_notify (G_OBJECT (self), "locked");
 }
 
@@ -362,12 +359,11 @@ take_frame (GstDmdSync *self, BufferPtr buffer)
   Stream &stream = st.stream;
   GstClockTimeDiff back = 0;
   bool repeats = false;
-  {
-    const ObjectLock lock (self);
+  locked (self, [&] {
     back = moved_back (st);
     repeats = st.settings.on_loss == OnLoss::repeat;
     st.counters.frames_in++;
-  }
+  });
 
   Frame frame;
   if (stream.frames->is_whole (buffer.get ()))

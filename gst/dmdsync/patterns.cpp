@@ -65,11 +65,10 @@ send (GstDmdSync *self, DmdRunner &runner, const Pattern &pattern,
   }
   if (!time || runner.halted () || runner.failed ())
     return false;
-  {
-    const ObjectLock lock (self);
+  locked (self, [&] {
     st.pattern = ShownPattern{text, frames};
     st.switches++;
-  }
+  });
   GST_INFO_OBJECT (self, "shows %s", text.c_str ());
   runner.show ({.name = "the pattern " + text,
                    .on = [pattern] (int x, int y) { return pattern.on (x, y); },
@@ -166,13 +165,8 @@ look_for_pattern (GstDmdSync *self, GstBuffer *buffer, const FrameStep &step,
 {
   SyncState &st = state (self);
   Stream &stream = st.stream;
-  std::optional<ShownPattern> pattern;
-  guint switches = 0;
-  {
-    const ObjectLock lock (self);
-    pattern = st.pattern;
-    switches = st.switches;
-  }
+  const auto [pattern, switches] =
+      locked (self, [&st] { return std::pair (st.pattern, st.switches); });
   const bool changed = std::exchange (stream.switches, switches) != switches;
   if (stream.coded && !changed)
     return {};
@@ -194,13 +188,10 @@ look_for_pattern (GstDmdSync *self, GstBuffer *buffer, const FrameStep &step,
     post_message (
         self, PatternShown{pattern->text, guint64 (step.number), pts});
 
-  bool over = false;
-  {
-    const ObjectLock lock (self);
-    over = st.pattern && st.pattern->text == pattern->text &&
-           --st.pattern->frames_left == 0;
-  }
-  if (over)
+  if (locked (self, [&] {
+        return st.pattern && st.pattern->text == pattern->text &&
+               --st.pattern->frames_left == 0;
+      }))
     give_back (self, "frames");
   return {.coded = false, .pattern = pattern->text};
 }

@@ -96,14 +96,10 @@ void
 update_latency (GstDmdSync *self)
 {
   SyncState &st = state (self);
-  {
-    const ObjectLock lock (self);
-    const auto latency = GstClockTime (std::max<GstClockTimeDiff> (
+  set_latency (self, st.latency, [&st] {
+    return GstClockTime (std::max<GstClockTimeDiff> (
         0, moved_back (st) + GstClockTimeDiff (st.jitter)));
-    if (std::exchange (st.latency, latency) == latency)
-      return;
-  }
-  post_latency (self);
+  });
 }
 
 GstClockTime
@@ -134,12 +130,11 @@ pipeline_time (GstDmdSync *self, GstBuffer *frame)
       clock.drift () * 1e6);
   if (const auto uncertainty = clock.uncertainty ())
     st.stream.uncertainty = GstClockTime (*uncertainty);
-  {
-    const ObjectLock lock (self);
+  locked (self, [&] {
     st.counters.clock_restarts = clock.restarts ();
     st.counters.clock_drift = clock.drift () * 1e6;
     st.counters.time_uncertainty = st.stream.uncertainty;
-  }
+  });
   note_jitter (self, GstClockTime (clock.lateness ()));
   return GstClockTime (std::max<Nanoseconds> (0, time));
 }

@@ -72,14 +72,10 @@ gboolean
 start (GstBaseSink *sink) noexcept
 {
   FileState &state = state_of (sink);
-  std::string location;
-  FileWriter::Options options;
-  {
-    const ObjectLock lock (sink);
+  const auto [location, options] = locked (sink, [&] {
     state.problem.clear ();
-    location = state.location;
-    options = state.options;
-  }
+    return std::pair (state.location, state.options);
+  });
   if (location.empty ()) {
     POST_ERROR (sink, RESOURCE, NOT_FOUND,
         "codedexposure-filesink has no file to write; set location=FILE");
@@ -137,8 +133,7 @@ on_event (GstBaseSink *sink, GstEvent *event) noexcept
 {
   FileState &state = state_of (sink);
   if (GST_EVENT_TYPE (event) == GST_EVENT_SEGMENT && state.file) {
-    const GstSegment *segment = nullptr;
-    gst_event_parse_segment (event, &segment);
+    const GstSegment *segment = segment_of (event);
     if (segment->format == GST_FORMAT_BYTES)
       state.file->seek (segment->start);
   }

@@ -209,13 +209,7 @@ Fuse::planned (bool)
 {
   const GstClockTime latency = GstClockTime (plan_->reach.lookahead) *
                                boundary (format ().schedule.slots ());
-  bool changed;
-  {
-    const ObjectLock lock (element ());
-    changed = std::exchange (shared_.latency, latency) != latency;
-  }
-  if (changed)
-    post_latency (element ());
+  set_latency (element (), shared_.latency, [latency] { return latency; });
 }
 
 Reach

@@ -79,13 +79,12 @@ begin_mapping (GstMoireCalib *self)
   CalibState &st = state (self);
   std::string first;
   std::size_t count = 0;
-  {
-    const std::lock_guard guard (st.exchange.lock);
+  locked (st.exchange.lock, [&] {
     first = st.exchange.geometry->patterns.front ().text ();
     count = st.exchange.geometry->patterns.size ();
     st.exchange.queue.live.reset ();
     st.exchange.progress.stage = Stage::mapping;
-  }
+  });
   st.stream.mapping = true;
   st.stream.next = 0;
   st.stream.taken = 0;
@@ -101,8 +100,7 @@ begin_run (GstMoireCalib *self, const Settings &settings, Geometry geometry)
 {
   CalibState &st = state (self);
   Stream &stream = st.stream;
-  {
-    const std::lock_guard guard (st.exchange.lock);
+  locked (st.exchange.lock, [&] {
     if (geometry.mode == Mode::phase) {
       st.exchange.found.schedule.reset ();
       st.exchange.panel.reset ();
@@ -111,7 +109,7 @@ begin_run (GstMoireCalib *self, const Settings &settings, Geometry geometry)
     st.exchange.run++;
     st.exchange.queue = {};
     st.exchange.progress = {};
-  }
+  });
   stream.begun = true;
   stream.turn = settings.turn;
   stream.mapping = false;
@@ -252,11 +250,8 @@ void
 overlay (GstMoireCalib *self, GstBuffer *buffer, int bits)
 {
   CalibState &st = state (self);
-  std::shared_ptr<const Panel> panel;
-  {
-    const std::lock_guard guard (st.exchange.lock);
-    panel = st.exchange.panel;
-  }
+  const std::shared_ptr<const Panel> panel =
+      locked (st.exchange.lock, [&] { return st.exchange.panel; });
   const GstVideoInfo &info = *st.stream.info;
   if (!panel || panel->grey.width () != info.width ||
       panel->grey.height () != info.height)
@@ -309,8 +304,7 @@ take_tag (GstMoireCalib *self, GstEvent *event)
 {
   refuse_decoded (self, event);
   CalibState &st = state (self);
-  GstTagList *tags = nullptr;
-  gst_event_parse_tag (event, &tags);
+  GstTagList *tags = tags_of (event);
   const auto said = setup_from_tags (tags);
   if (!said || !*said)
     return event;
@@ -318,8 +312,7 @@ take_tag (GstMoireCalib *self, GstEvent *event)
       !st.stream.setup || st.stream.setup->schedule != said->value ().schedule;
   st.stream.setup = said->value ();
   std::optional<StreamSetup> setup;
-  {
-    const std::lock_guard guard (st.exchange.lock);
+  locked (st.exchange.lock, [&] {
     if (other) {
       st.exchange.found.schedule.reset ();
       if (st.exchange.geometry && st.exchange.geometry->mode == Mode::phase) {
@@ -329,7 +322,7 @@ take_tag (GstMoireCalib *self, GstEvent *event)
       }
     }
     setup = corrected_setup (st);
-  }
+  });
   if (setup == st.stream.setup)
     return event;
   return replace_setup (event, *setup);
@@ -339,10 +332,7 @@ void
 set_flushing (GstMoireCalib *self, bool flushing)
 {
   Exchange &exchange = state (self).exchange;
-  {
-    const std::lock_guard guard (exchange.lock);
-    exchange.flushing = flushing;
-  }
+  locked (exchange.lock, [&] { exchange.flushing = flushing; });
   exchange.changed.notify_all ();
 }
 

@@ -3,9 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 
+#include "base/pixels.h"
 #include "canvas.h"
 
 namespace codedexposure
@@ -157,8 +157,7 @@ template <typename Pixel>
 void
 lay_over (const Panel &panel, ImageView<Pixel> out, int bits)
 {
-  constexpr int kBits = std::numeric_limits<Pixel>::digits;
-  const int white = (1 << (bits > 0 ? std::min (bits, kBits) : kBits)) - 1;
+  const int white = largest_pixel_of<Pixel> (bits);
   const auto grey = panel.grey.view ();
   for (const Rect &at : panel.opaque)
     for (int y = at.y; y < at.y + at.height; y++)

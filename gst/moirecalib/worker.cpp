@@ -217,10 +217,8 @@ Worker::draw (const std::string &title, const std::vector<std::string> &lines,
 void
 Worker::align (const Sample &sample)
 {
-  {
-    const std::lock_guard guard (exchange_.lock);
-    exchange_.progress.readings += exchange_.run == run_;
-  }
+  locked (exchange_.lock,
+      [&] { exchange_.progress.readings += exchange_.run == run_; });
   settings_ = settings_of (self_);
   const auto alignment = with_pixels (sample, [this] (auto pixels) {
     return session_->align (pixels, settings_.stage);
@@ -362,16 +360,12 @@ Worker::finish (const CalibrationResult &result)
 {
   const Settings settings = settings_of (self_);
   const Written written = write_files (result, settings);
-  {
-    const ObjectLock lock (self_);
-    state (self_).mapping = result.mapping.to_json ();
-  }
-  {
-    const std::lock_guard guard (exchange_.lock);
+  locked (self_, [&] { state (self_).mapping = result.mapping.to_json (); });
+  locked (exchange_.lock, [&] {
     exchange_.found.mapping = result.mapping;
     exchange_.found.schedule.reset ();
     exchange_.found.due = true;
-  }
+  });
   set (Stage::mapped);
   correction_ = correct_stage (result.mapping, settings.stage);
   draw ("mapped", mapping_lines (result, *correction_), 1.0);
@@ -454,11 +448,8 @@ Worker::run ()
 void
 set_stage (GstMoireCalib *self, Stage stage)
 {
-  Stage before;
-  {
-    const ObjectLock lock (self);
-    before = std::exchange (state (self).stage, stage);
-  }
+  const Stage before =
+      locked (self, [&] { return std::exchange (state (self).stage, stage); });
   if (before == stage)
     return;
   post_message (self, MoireState{stage_text (stage), stage_text (before)});
@@ -470,14 +461,13 @@ start_worker (GstMoireCalib *self)
 {
   CalibState &st = state (self);
   Exchange &exchange = st.exchange;
-  {
-    const std::lock_guard guard (exchange.lock);
+  locked (exchange.lock, [&] {
     exchange.quit = exchange.flushing = false;
     exchange.geometry.reset ();
     exchange.panel.reset ();
     exchange.progress.stage = Stage::searching;
     exchange.found = {};
-  }
+  });
   try {
     st.worker = std::thread ([self] { Worker (self).run (); });
   } catch (const std::system_error &failure) {
@@ -494,11 +484,10 @@ stop_worker (GstMoireCalib *self)
   CalibState &st = state (self);
   if (!st.worker.joinable ())
     return;
-  {
-    const std::lock_guard guard (st.exchange.lock);
+  locked (st.exchange.lock, [&] {
     st.exchange.quit = true;
     st.exchange.queue = {};
-  }
+  });
   st.exchange.changed.notify_all ();
   st.worker.join ();
 }

@@ -97,8 +97,7 @@ with_head_for_all (GstBuffer *buffer)
 GstEvent *
 with_heads_for_all (GstEvent *event)
 {
-  GstCaps *caps = nullptr;
-  gst_event_parse_caps (event, &caps);
+  GstCaps *caps = caps_of (event);
   const GValue *heads = gst_structure_get_value (
       gst_caps_get_structure (caps, 0), "streamheader");
   if (!heads)

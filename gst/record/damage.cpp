@@ -83,22 +83,15 @@ DamageReport::frames_missing (guint64 count, GstClockTime from)
 void
 DamageReport::stream_cut ()
 {
-  guint64 frames;
-  {
-    const ObjectLock lock (element_);
-    frames = counters_.frames;
-  }
+  const guint64 frames = locked (element_, [&] { return counters_.frames; });
   post_message (element_, StreamCut{frames});
 }
 
 void
 DamageReport::stream_ended (guint64 total)
 {
-  guint64 known;
-  {
-    const ObjectLock lock (element_);
-    known = counters_.frames + counters_.missing;
-  }
+  const guint64 known =
+      locked (element_, [&] { return counters_.frames + counters_.missing; });
   if (known >= total)
     return;
   count (&Counters::missing, total - known);

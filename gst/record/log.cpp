@@ -226,8 +226,7 @@ GstEvent *
 take_tags (GstCodedExposureLog *self, GstEvent *event)
 {
   LogState &state = self->state;
-  GstTagList *tags = nullptr;
-  gst_event_parse_tag (event, &tags);
+  GstTagList *tags = tags_of (event);
   const auto read = setup_from_tags (tags);
   if (!read)
     return event;
@@ -289,12 +288,10 @@ begin_run (GstElement *element)
 {
   auto *self = as<GstCodedExposureLog> (element);
   LogState &state = self->state;
-  std::string location;
-  {
-    const ObjectLock lock (self);
-    location = state.location;
+  const std::string location = locked (self, [&] {
     state.frames_lost = 0;
-  }
+    return state.location;
+  });
   state.frames = 0;
   state.last.reset ();
   state.setup.reset ();

@@ -223,11 +223,7 @@ make_decoder (GstElement *self, GstPad *pad, const GstCaps *caps)
     POST_ERROR (self, CORE, MISSING_PLUGIN, missing ("avdec_ffv1"));
     return false;
   }
-  int threads;
-  {
-    const ObjectLock lock (self);
-    threads = int (state.threads);
-  }
+  const int threads = locked (self, [&] { return int (state.threads); });
   g_object_set (
       state.decoder, "max-threads", threads, "max-errors", -1, nullptr);
   gst_bin_add (GST_BIN (self), state.decoder);

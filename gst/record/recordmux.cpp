@@ -121,8 +121,7 @@ answer (GstQuery *query)
 GstEvent *
 rename_format (GstEvent *event)
 {
-  GstCaps *caps = nullptr;
-  gst_event_parse_caps (event, &caps);
+  GstCaps *caps = caps_of (event);
   if (!has_format (caps, "GRAY16_LE"))
     return event;
   const CapsPtr renamed (gst_caps_copy (caps));
@@ -235,11 +234,7 @@ begin_run (GstElement *self)
     POST_ERROR (self, CORE, MISSING_PLUGIN, missing ("matroskamux"));
     return false;
   }
-  Settings settings;
-  {
-    const ObjectLock lock (self);
-    settings = state.settings;
-  }
+  const Settings settings = locked (self, [&] { return state.settings; });
   g_object_set (state.log, "location", settings.log_location.c_str (), nullptr);
   g_object_set (
       state.mux, "streamable", gboolean (settings.is_streamable), nullptr);

@@ -125,8 +125,7 @@ gboolean
 on_tag (Self *self, EventPtr event)
 {
   RestoreState &state = self->state;
-  GstTagList *tags = nullptr;
-  gst_event_parse_tag (event.get (), &tags);
+  GstTagList *tags = tags_of (event.get ());
   const auto said = setup_from_tags (tags);
   if (said && *said)
     state.announced |= said->value ().track;
@@ -311,11 +310,7 @@ EventPtr
 take_segment (Self *self, EventPtr event)
 {
   RestoreState &state = self->state;
-  guint64 tick;
-  {
-    const ObjectLock lock (self);
-    tick = state.tick;
-  }
+  const guint64 tick = locked (self, [&] { return state.tick; });
   gst_event_copy_segment (event.get (), &state.segment);
   state.segment_seqnum = gst_event_get_seqnum (event.get ());
   const auto order = order_of (state.segment);
@@ -334,8 +329,7 @@ take_event (Self *self, EventPtr event)
   RestoreState &state = self->state;
   switch (GST_EVENT_TYPE (event.get ())) {
   case GST_EVENT_CAPS: {
-    GstCaps *caps = nullptr;
-    gst_event_parse_caps (event.get (), &caps);
+    GstCaps *caps = caps_of (event.get ());
     if (!gst_video_info_from_caps (&state.info, caps))
       return FALSE;
     break;

@@ -21,8 +21,7 @@ add_setups (GstEvent *event, const std::vector<StreamSetup> &setups)
   constexpr std::size_t kMostSetups = 64;
   if (setups.size () < 2)
     return event;
-  GstTagList *tags = nullptr;
-  gst_event_parse_tag (event, &tags);
+  GstTagList *tags = tags_of (event);
   tags = gst_tag_list_copy (tags);
   const std::size_t first =
       setups.size () > kMostSetups ? setups.size () - kMostSetups : 0;

@@ -62,8 +62,7 @@ TrackSink::event (GstPad *pad, GstObject *, GstEvent *owned) noexcept
   const std::lock_guard lock (self.lock_);
   switch (GST_EVENT_TYPE (event.get ())) {
   case GST_EVENT_CAPS: {
-    GstCaps *caps = nullptr;
-    gst_event_parse_caps (event.get (), &caps);
+    GstCaps *caps = caps_of (event.get ());
     const GstStructure *structure = gst_caps_get_structure (caps, 0);
     self.markup_ = g_strcmp0 (gst_structure_get_string (structure, "format"),
                        "pango-markup") == 0;

@@ -216,13 +216,7 @@ make_plan (
   const guint64 held = stream.plan->inputs - 1;
   const GstClockTime latency =
       gst_util_uint64_scale (GST_SECOND, held * in.fps_d, in.fps_n);
-  bool changed = false;
-  {
-    const ObjectLock lock (self);
-    changed = std::exchange (state (self).latency, latency) != latency;
-  }
-  if (changed)
-    post_latency (self);
+  set_latency (self, state (self).latency, [latency] { return latency; });
   return true;
 }
 

@@ -55,11 +55,8 @@ wanted_schedule (GstCodedExposureSim *self)
     if (std::optional<Schedule> programmed = stream.mirrors->schedule ())
       return std::make_shared<const Schedule> (*std::move (programmed));
 
-  std::shared_ptr<const Result<Schedule>> parsed;
-  {
-    const ObjectLock lock (self);
-    parsed = state (self).settings.schedule.read;
-  }
+  const std::shared_ptr<const Result<Schedule>> parsed =
+      locked (self, [&] { return state (self).settings.schedule.read; });
   if (!parsed)
     return std::make_shared<const Schedule> ();
   if (parsed->ok ())
@@ -194,20 +191,16 @@ bool
 prepare_bench (GstCodedExposureSim *self)
 {
   Stream &stream = state (self).stream;
-  BenchOptions optics;
-  {
-    const ObjectLock lock (self);
-    optics = state (self).settings.optics;
-  }
-  const int set_bits = optics.bits;
-  optics = optics.completed (
-      stream.profile ? &*stream.profile : nullptr, stream.lit);
+  const BenchOptions given =
+      locked (self, [&] { return state (self).settings.optics; });
+  BenchOptions optics =
+      given.completed (stream.profile ? &*stream.profile : nullptr, stream.lit);
   if (stream.mirrors)
     optics.diamond = stream.mirrors->diamond ();
   if (stream.bench && optics == stream.optics)
     return true;
 
-  if (!check_profile (self, set_bits))
+  if (!check_profile (self, given.bits))
     return false;
   const GstVideoInfo &info = stream.plan->in;
   const int bits = GST_VIDEO_FORMAT_INFO_BITS (info.finfo);
@@ -341,11 +334,8 @@ stamped_time (const Stream &stream, GstClockTime start)
 GstBuffer *
 stamp (GstCodedExposureSim *self, Exposure exposure)
 {
-  guint64 number;
-  {
-    const ObjectLock lock (self);
-    number = state (self).counters.frames_out++;
-  }
+  const guint64 number =
+      locked (self, [&] { return state (self).counters.frames_out++; });
   const Stream &stream = state (self).stream;
   const GstVideoInfo &info = stream.plan->out;
   describe (stream, exposure);
@@ -425,14 +415,10 @@ bool
 begin_stream (GstCodedExposureSim *self)
 {
   Stream &stream = state (self).stream;
-  std::string dmd;
-  Named<BenchProfile> bench;
-  {
-    const ObjectLock lock (self);
-    dmd = state (self).settings.dmd;
-    bench = state (self).settings.bench;
+  const auto [dmd, bench] = locked (self, [&] {
     state (self).counters = Counters ();
-  }
+    return std::pair (state (self).settings.dmd, state (self).settings.bench);
+  });
   if (bench.read && !*bench.read) {
     POST_ERROR (self, RESOURCE, SETTINGS,
         "The bench property cannot be read: " + bench.read->error ().message);
@@ -529,11 +515,8 @@ drop_exposure (GstCodedExposureSim *self, Drop reason)
   const int needed = stream.plan->inputs;
   stream.exposure.reset ();
   stream.discont = true;
-  guint64 dropped;
-  {
-    const ObjectLock lock (self);
-    dropped = ++state (self).counters.frames_dropped;
-  }
+  const guint64 dropped =
+      locked (self, [&] { return ++state (self).counters.frames_dropped; });
   const std::string taken = std::to_string (exposure.taken) + " of " +
                             std::to_string (needed) + " input frames";
   GST_INFO_OBJECT (self,

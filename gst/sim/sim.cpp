@@ -152,8 +152,7 @@ take_caps (GstBaseTransform *trans, GstEvent *event)
   const EventPtr kept (gst_event_ref (event));
   if (parent (trans)->sink_event (trans, event))
     return TRUE;
-  GstCaps *caps = nullptr;
-  gst_event_parse_caps (kept.get (), &caps);
+  GstCaps *caps = caps_of (kept.get ());
   sim::explain_refusal (as<GstCodedExposureSim> (trans), caps);
   return FALSE;
 }
@@ -165,8 +164,7 @@ gboolean
 take_tags (GstBaseTransform *trans, GstEvent *event)
 {
   const sim::Stream &stream = as<GstCodedExposureSim> (trans)->state.stream;
-  GstTagList *tags = nullptr;
-  gst_event_parse_tag (event, &tags);
+  GstTagList *tags = tags_of (event);
   const bool global = gst_tag_list_get_scope (tags) == GST_TAG_SCOPE_GLOBAL;
   if (global || stream.tag_due)
     event = remove_setup_and_provenance (event);

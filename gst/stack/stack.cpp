@@ -175,12 +175,11 @@ open_file (GstBaseSink *sink, const FrameMeta &meta)
       .rate = {info.fps_n, std::max (info.fps_d, 1)}};
   std::string location;
   guint64 classic = 0;
-  {
-    const ObjectLock lock (sink);
+  locked (sink, [&] {
     location = state.location;
     classic = state.classic;
     format.deflate = state.deflate;
-  }
+  });
   format.big = !is_hdf5 (location) && needs_big (sink, format, classic);
   state.file = writer_of (GST_ELEMENT (sink), location) (location, format);
 }
@@ -251,8 +250,7 @@ finish (GstBaseSink *sink)
 void
 take_origin (Stack &state, GstEvent *event)
 {
-  GstTagList *tags = nullptr;
-  gst_event_parse_tag (event, &tags);
+  GstTagList *tags = tags_of (event);
   if (const auto provenance = provenance_from_tags (tags);
       provenance && *provenance)
     state.origin = (*provenance)->to_json ();
@@ -296,12 +294,10 @@ gboolean
 start (GstBaseSink *sink) noexcept
 {
   Stack &state = state_of (sink);
-  std::string location;
-  {
-    const ObjectLock lock (sink);
+  const std::string location = locked (sink, [&] {
     state.problem.clear ();
-    location = state.location;
-  }
+    return state.location;
+  });
   state.origin.clear ();
   state.written_origin.clear ();
   return writer_of (GST_ELEMENT (sink), location) != nullptr;

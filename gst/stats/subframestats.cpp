@@ -144,11 +144,10 @@ begin_run (GstElement *element)
 {
   auto *self = as<GstSubframeStats> (element);
   StatsState &state = self->state;
-  {
-    const ObjectLock lock (self);
+  locked (self, [&] {
     state.in_force = state.settings;
     state.frames_in = state.saturated_frames = 0;
-  }
+  });
   const Settings &settings = state.in_force;
   state.options = {settings.bits, settings.bins, {}};
   if (!settings.line.empty ()) {

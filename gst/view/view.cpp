@@ -28,6 +28,7 @@
 
 #include <gst/video/gstvideofilter.h>
 
+#include "base/pixels.h"
 #include "common/element.h"
 #include "common/elements.h"
 #include "common/meta.h"
@@ -57,18 +58,17 @@ guint64
 white_of (GstCodedExposureView *self, GstBuffer *picture, int depth)
 {
   int bits, white;
-  {
-    const ObjectLock lock (self);
+  locked (self, [&] {
     bits = self->state.bits;
     white = self->state.white;
-  }
+  });
   if (white > 0)
     return guint64 (white);
   if (bits == 0) {
     const auto meta = get_frame_meta (picture);
     bits = meta ? meta->bits : self->state.tagged_bits;
   }
-  return (guint64 (1) << (bits <= 0 ? depth : std::min (bits, depth))) - 1;
+  return guint64 (largest_pixel (bits <= 0 ? depth : std::min (bits, depth)));
 }
 
 /** 0 to black, @p white and more to 255. */

@@ -53,6 +53,7 @@ struct Settings {
 };
 
 struct Counters {
+  static constexpr const char *kName = "application/x-dmdsync-stats";
   guint64 frames_in = 0;
   guint64 frames_lost = 0;
   guint64 frames_incomplete = 0;
@@ -66,6 +67,9 @@ struct Counters {
   gdouble clock_drift = 0; ///< ppm by which the camera's clock is fast
   /** By how much PTS may be wrong; none: not known. */
   GstClockTime time_uncertainty = GST_CLOCK_TIME_NONE;
+  CODED_FIELDS (frames_in, frames_lost, frames_incomplete, frames_late,
+      frames_duplicate, frames_early, frames_skipped, frames_repeated, slips,
+      clock_restarts, time_uncertainty, clock_drift);
 };
 
 /** Everything that follows from the caps. */

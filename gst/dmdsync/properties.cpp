@@ -48,25 +48,7 @@ constexpr gint64 kMaxOffset = 3600 * GST_SECOND;
 StructurePtr
 stats (const SyncState &st)
 {
-  const Counters &counters = st.counters;
-  StructurePtr stats (gst_structure_new_empty ("application/x-dmdsync-stats"));
-  const std::pair<const char *, guint64> numbers[] = {
-      {"frames-in", counters.frames_in},
-      {"frames-lost", counters.frames_lost},
-      {"frames-incomplete", counters.frames_incomplete},
-      {"frames-late", counters.frames_late},
-      {"frames-duplicate", counters.frames_duplicate},
-      {"frames-early", counters.frames_early},
-      {"frames-skipped", counters.frames_skipped},
-      {"frames-repeated", counters.frames_repeated},
-      {"slips", counters.slips},
-      {"clock-restarts", counters.clock_restarts},
-      {"time-uncertainty", counters.time_uncertainty},
-  };
-  for (const auto &[name, number] : numbers)
-    gst_structure_set (stats.get (), name, G_TYPE_UINT64, number, nullptr);
-  gst_structure_set (stats.get (), "clock-drift", G_TYPE_DOUBLE,
-      counters.clock_drift, nullptr);
+  StructurePtr stats (to_structure (st.counters));
   if (st.locked)
     gst_structure_set (
         stats.get (), "locked", G_TYPE_BOOLEAN, gboolean (*st.locked), nullptr);

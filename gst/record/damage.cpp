@@ -33,7 +33,7 @@ void
 DamageReport::frame_damaged (
     guint64 number, GstClockTime pts, const char *reason)
 {
-  count (&Counters::damaged);
+  count (&Counters::frames_damaged);
   extend (number, pts, reason);
 }
 
@@ -41,7 +41,7 @@ void
 DamageReport::frame_unknown (
     guint64 number, GstClockTime pts, const char *reason)
 {
-  count (&Counters::unknown);
+  count (&Counters::frames_unknown);
   extend (number, pts, reason);
 }
 
@@ -76,7 +76,7 @@ DamageReport::frames_missing (guint64 count, GstClockTime from)
 {
   if (count == 0)
     return;
-  this->count (&Counters::missing, count);
+  this->count (&Counters::frames_missing, count);
   post_message (element_, FramesMissing{count, from});
 }
 
@@ -90,23 +90,20 @@ DamageReport::stream_cut ()
 void
 DamageReport::stream_ended (guint64 total)
 {
-  const guint64 known =
-      locked (element_, [&] { return counters_.frames + counters_.missing; });
+  const guint64 known = locked (
+      element_, [&] { return counters_.frames + counters_.frames_missing; });
   if (known >= total)
     return;
-  count (&Counters::missing, total - known);
+  count (&Counters::frames_missing, total - known);
   post_message (element_, StreamIncomplete{total - known});
 }
 
 StructurePtr
 DamageReport::stats (guint64 lines_damaged) const
 {
-  return StructurePtr (
-      gst_structure_new ("application/x-codedexposure-restore-counters",
-          "frames", G_TYPE_UINT64, counters_.frames, "frames-damaged",
-          G_TYPE_UINT64, counters_.damaged, "frames-unknown", G_TYPE_UINT64,
-          counters_.unknown, "frames-missing", G_TYPE_UINT64, counters_.missing,
-          "lines-damaged", G_TYPE_UINT64, lines_damaged, nullptr));
+  Counters counters = counters_;
+  counters.lines_damaged = lines_damaged;
+  return StructurePtr (to_structure (counters));
 }
 
 } // namespace codedexposure::gst

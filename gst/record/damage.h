@@ -4,7 +4,7 @@
 
 #include <gst/gst.h>
 
-#include "common/raii.h"
+#include "common/structure.h"
 
 namespace codedexposure::gst
 {
@@ -45,7 +45,12 @@ public:
 
 private:
   struct Counters {
-    guint64 frames = 0, damaged = 0, unknown = 0, missing = 0;
+    static constexpr const char *kName =
+        "application/x-codedexposure-restore-counters";
+    guint64 frames = 0, frames_damaged = 0, frames_unknown = 0;
+    guint64 frames_missing = 0, lines_damaged = 0;
+    CODED_FIELDS (
+        frames, frames_damaged, frames_unknown, frames_missing, lines_damaged);
   };
   /** A sequence of frames that are not as recorded. */
   struct Sequence {

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include <array>
 #include <mutex>
 #include <utility>
 
@@ -155,15 +156,6 @@ public:
         H5Sclose);
     check (H5Dwrite (set_, type_, from, to, H5P_DEFAULT, values));
   }
-  /** What @p value returns for each row. */
-  template <typename Value>
-  void append_each (const std::vector<StackRow> &rows, Value value)
-  {
-    std::vector<decltype (value (rows[0]))> values;
-    for (const StackRow &row : rows)
-      values.push_back (value (row));
-    append (values.data (), values.size ());
-  }
   void close () { check (set_.reset ()); }
 
 private:
@@ -210,19 +202,31 @@ private:
   std::vector<Column> columns_;
 };
 
-enum Place {
-  kPictures,
-  kPts,
-  kDuration,
-  kExposure,
-  kFrame,
-  kSlot,
-  kSynchronised,
-  kCorrupted,
-  kLostBefore,
-  kOrigin,
-  kOriginPicture
-};
+gint64
+known (GstClockTime time)
+{
+  return GST_CLOCK_TIME_IS_VALID (time) ? gint64 (time) : -1;
+}
+
+/* The columns after the pictures, a number for each. */
+enum class Type { number, truth, truth_or_unknown };
+constexpr std::pair<const char *, Type> kRowColumns[] = {
+    {"pts_ns", Type::number}, {"duration_ns", Type::number},
+    {"exposure_ns", Type::number}, {"frame", Type::number},
+    {"slot", Type::number}, {"synchronised", Type::truth_or_unknown},
+    {"corrupted", Type::truth}, {"lost_before", Type::number}};
+constexpr std::size_t kNumbers = std::size (kRowColumns);
+constexpr std::size_t kPictures = 0, kOrigin = kNumbers + 1,
+                      kOriginPicture = kOrigin + 1;
+
+std::array<gint64, kNumbers>
+numbers_of (const StackRow &row)
+{
+  return {known (row.pts), known (row.duration), known (row.exposure),
+      row.frame ? gint64 (*row.frame) : -1, row.slot,
+      row.synchronised ? gint64 (*row.synchronised) : -1, row.corrupted,
+      gint64 (row.lost_before)};
+}
 
 Hdf5::Hdf5 (const std::string &path, const StackFormat &format)
     : format_ (format)
@@ -239,20 +243,17 @@ Hdf5::Hdf5 (const std::string &path, const StackFormat &format)
   if (const double rate = double (format.rate.num) / format.rate.den; rate > 0)
     set_attribute (file_, "rate_hz", H5T_NATIVE_DOUBLE, &rate);
 
-  const auto number = [] { return copy_of (H5T_NATIVE_INT64); };
   columns_.emplace_back (file_, "pictures",
       copy_of (format.bytes == 1 ? H5T_NATIVE_UINT8 : H5T_NATIVE_UINT16),
       std::vector<hsize_t>{hsize_t (format.height), hsize_t (format.width)}, 1,
       format.deflate);
-  for (const char *name :
-      {"pts_ns", "duration_ns", "exposure_ns", "frame", "slot"})
-    columns_.emplace_back (file_, name, number ());
-  columns_.emplace_back (file_, "synchronised", truth_type (true));
-  columns_.emplace_back (file_, "corrupted", truth_type (false));
-  columns_.emplace_back (file_, "lost_before", number ());
+  for (const auto &[name, type] : kRowColumns)
+    columns_.emplace_back (file_, name,
+        type == Type::number ? copy_of (H5T_NATIVE_INT64)
+                             : truth_type (type == Type::truth_or_unknown));
   columns_.emplace_back (
       file_, "origin", text_type (), std::vector<hsize_t>{}, 16);
-  columns_.emplace_back (file_, "origin_picture", number ());
+  columns_.emplace_back (file_, "origin_picture", copy_of (H5T_NATIVE_INT64));
   flush ();
 }
 
@@ -300,28 +301,16 @@ Hdf5::add (const StackRow &row, const guint8 *pixels, gsize stride)
 void
 Hdf5::flush ()
 {
-  const auto known = [] (GstClockTime time) {
-    return GST_CLOCK_TIME_IS_VALID (time) ? gint64 (time) : gint64 (-1);
-  };
-  if (!waiting_.empty ()) {
-    const std::vector<StackRow> rows = std::exchange (waiting_, {});
-    const auto put = [&] (Place place, auto value) {
-      columns_[place].append_each (rows, value);
-    };
-    put (kPts, [&] (const StackRow &row) { return known (row.pts); });
-    put (kDuration, [&] (const StackRow &row) { return known (row.duration); });
-    put (kExposure, [&] (const StackRow &row) { return known (row.exposure); });
-    put (kFrame, [&] (const StackRow &row) {
-      return row.frame ? gint64 (*row.frame) : gint64 (-1);
-    });
-    put (kSlot, [] (const StackRow &row) { return gint64 (row.slot); });
-    put (kSynchronised, [] (const StackRow &row) {
-      return row.synchronised ? gint8 (*row.synchronised) : gint8 (-1);
-    });
-    put (
-        kCorrupted, [] (const StackRow &row) { return gint8 (row.corrupted); });
-    put (kLostBefore,
-        [] (const StackRow &row) { return gint64 (row.lost_before); });
+  const std::vector<StackRow> rows = std::exchange (waiting_, {});
+  for (std::size_t i = 0; i < kNumbers && !rows.empty (); i++) {
+    std::vector<gint64> values;
+    for (const StackRow &row : rows)
+      values.push_back (numbers_of (row)[i]);
+    const std::vector<gint8> bytes (values.begin (), values.end ());
+    if (kRowColumns[i].second == Type::number)
+      columns_[i + 1].append (values.data (), rows.size ());
+    else
+      columns_[i + 1].append (bytes.data (), rows.size ());
   }
   check (H5Fflush (file_, H5F_SCOPE_LOCAL));
 }

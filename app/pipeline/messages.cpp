@@ -330,7 +330,7 @@ notice (const GstStructure *message)
   const auto number = [&] (const char *field) {
     return number_in (message, field);
   };
-  if (name == "dmdsync/frames-lost" || name == "codedexposure/frames-lost")
+  if (name == "codedexposure/frames-lost")
     return "warning: coded frames were lost before " +
            seconds_in (message, "to") + ": " + number ("count");
   if (name == "dmdsync/frame-incomplete")

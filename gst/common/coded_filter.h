@@ -414,7 +414,7 @@ private:
   GstFlowReturn break_off ();
   GstFlowReturn skip (const CodedFrame &frame);
   void note_missing (GstEvent *gap);
-  void report_loss (GstClockTime pts, guint64 lost);
+  void report_loss (GstClockTime pts, guint64 lost, guint64 told);
   void warn_of_wrong_time (GstClockTime pts);
   void end_saturation ();
   void count (guint64 CodedCounters::*counter, guint64 by = 1);

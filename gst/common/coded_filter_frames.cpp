@@ -225,8 +225,11 @@ CodedFilter::admit (BufferPtr frame)
   FrameStep step = stream_.sequence->take (Nanoseconds (pts), backwards ());
   if (step.arrival == Arrival::behind)
     step = stream_.sequence->restart (Nanoseconds (pts));
+  FrameMeta counted;
+  counted.frame = step.number;
+  const auto known = get_frame_meta (frame.get ());
   if (counts && step.arrival == Arrival::after_loss)
-    report_loss (pts, step.lost);
+    report_loss (pts, step.lost, known ? known->lost_before : 0);
   else if (counts && step.arrival != Arrival::next &&
            step.arrival != Arrival::first)
     warn_of_wrong_time (pts);
@@ -235,11 +238,8 @@ CodedFilter::admit (BufferPtr frame)
       std::exchange (stream_.was_late, step.arrival == Arrival::late);
   const bool follows = step.arrival == Arrival::next && !after_late &&
                        !GST_BUFFER_IS_DISCONT (frame.get ());
-  FrameMeta counted;
-  counted.frame = step.number;
   counted.lost_before = step.lost;
-  counted = get_frame_meta (frame.get ()).value_or (counted);
-  return {std::move (frame), std::move (counted), follows, place};
+  return {std::move (frame), known.value_or (counted), follows, place};
 }
 
 void
@@ -253,10 +253,10 @@ CodedFilter::note_missing (GstEvent *gap)
     stream_.missing_until = pts + duration;
 }
 
-/* The element that says where frames are missing, such as dmdsync, has posted
- * the loss. */
+/* The element that says where frames are missing, by a GAP event or, as @told,
+ * in the meta of the frame after them, has posted the loss. */
 void
-CodedFilter::report_loss (GstClockTime pts, guint64 lost)
+CodedFilter::report_loss (GstClockTime pts, guint64 lost, guint64 told)
 {
   const GstClockTime period = format ().period ();
   const GstClockTime last = stream_.last_pts;
@@ -267,7 +267,8 @@ CodedFilter::report_loss (GstClockTime pts, guint64 lost)
       " to %" GST_TIME_FORMAT,
       lost, GST_TIME_ARGS (from), GST_TIME_ARGS (pts));
   count (&CodedCounters::frames_lost, lost);
-  if (stream_.missing_until + period / 2 < pts)
+  const bool posted = told >= lost && !backwards ();
+  if (!posted && stream_.missing_until + period / 2 < pts)
     post_message (element_, FramesLost{lost, from, pts});
   notify ("stats");
 }

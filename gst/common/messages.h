@@ -9,7 +9,9 @@
 namespace codedexposure::gst
 {
 
-/** Coded frames never arrived. */
+/** Coded frames never arrived. Posted once, by the element that finds it:
+ * dmdsync, codedexposure-recorddemux for what the recording says, else a filter
+ * of coded frames. */
 struct FramesLost {
   static constexpr const char *kName = "codedexposure/frames-lost";
   guint64 count = 0;
@@ -50,11 +52,7 @@ struct MirrorsSeen {
   CODED_FIELDS (exact, weighted, mixed, unseen);
 };
 
-/** The same for frames of the camera, said by dmdsync. Its numbers of frames
- * count the lost ones, too. */
-struct CameraFramesLost : FramesLost {
-  static constexpr const char *kName = "dmdsync/frames-lost";
-};
+/* From dmdsync; its numbers of frames count the lost ones, too. */
 struct FrameDropped {
   static constexpr const char *kName = "dmdsync/frame-dropped";
   guint64 frame = 0;
@@ -148,9 +146,9 @@ struct CameraBack {
   CODED_FIELDS (silent, tries);
 };
 
-/** codedexposure-recorddemux: frames are not as they were recorded, or cannot be
- * compared; they are CORRUPTED. Posted when a sequence of them begins, and when
- * it is over. */
+/** codedexposure-recorddemux: frames are not as they were recorded, or cannot
+ * be compared; they are CORRUPTED. Posted when a sequence of them begins, and
+ * when it is over. */
 struct FramesDamaged {
   static constexpr const char *kName = "codedexposure/frames-damaged";
   bool active = false;          ///< it begins
@@ -160,22 +158,24 @@ struct FramesDamaged {
   std::string reason; ///< of the first
   CODED_FIELDS (active, frame, count, from, reason);
 };
-/** codedexposure-recorddemux: the recording knows of frames that did not come. */
+/** codedexposure-recorddemux: the recording knows of frames that did not come.
+ */
 struct FramesMissing {
   static constexpr const char *kName = "codedexposure/frames-missing";
   guint64 count = 0;
   GstClockTime from = 0; ///< of the first of them
   CODED_FIELDS (count, from);
 };
-/** codedexposure-recorddemux: the stream ended without the last line of its track:
- * a recording that was cut off, or a sender that was killed. */
+/** codedexposure-recorddemux: the stream ended without the last line of its
+ * track: a recording that was cut off, or a sender that was killed. */
 struct StreamCut {
   static constexpr const char *kName = "codedexposure/stream-cut";
   guint64 frames = 0; ///< that came
   CODED_FIELDS (frames);
 };
-/** codedexposure-recorddemux: the last line of the track counts more frames than
- * came and were missed: the beginning is missing, or parts with their lines. */
+/** codedexposure-recorddemux: the last line of the track counts more frames
+ * than came and were missed: the beginning is missing, or parts with their
+ * lines. */
 struct StreamIncomplete {
   static constexpr const char *kName = "codedexposure/stream-incomplete";
   guint64 count = 0;

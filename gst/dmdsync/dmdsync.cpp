@@ -75,7 +75,7 @@
  * ## Metas, messages and tags
  *
  * Every frame has the custom meta `CodedExposureFrame`. Element messages are
- * `dmdsync/frames-lost`, `dmdsync/frame-late`, `dmdsync/frame-dropped`,
+ * `codedexposure/frames-lost`, `dmdsync/frame-late`, `dmdsync/frame-dropped`,
  * `dmdsync/slip`, `dmdsync/slip-over`, `dmdsync/locked`,
  * `dmdsync/time-uncertainty`, `dmdsync/pattern-shown` and
  * `dmdsync/pattern-over`. The schedule goes downstream as stream tag; another

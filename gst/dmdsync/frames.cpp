@@ -140,7 +140,7 @@ take_loss (GstDmdSync *self, const Frame &frame)
   GST_INFO_OBJECT (self,
       "%" G_GUINT64_FORMAT " frames lost before %" GST_TIME_FORMAT, lost,
       GST_TIME_ARGS (frame.pts));
-  post_message (self, CameraFramesLost{lost, from, frame.pts});
+  post_message (self, FramesLost{lost, from, frame.pts});
   if (on_loss == OnLoss::error && stream.coded) {
     GST_ELEMENT_ERROR (self, RESOURCE, READ,
         ("%" G_GUINT64_FORMAT " frames were lost before %" GST_TIME_FORMAT

@@ -16,6 +16,7 @@
  * The element messages `codedexposure/frames-damaged`
  * (`active`, `frame`, `from`, `reason`, at the end `count`),
  * `codedexposure/frames-missing` (`count`, `from`),
+ * `codedexposure/frames-lost` (`count`, `from`, `to`: never recorded),
  * `codedexposure/stream-cut` (`frames`: the stream ended without its last line)
  * and `codedexposure/stream-incomplete` (`count`: frames are missing together
  * with their lines) report damage; #codedexposure-recorddemux:stats counts it.

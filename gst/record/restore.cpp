@@ -14,6 +14,7 @@
 #include <gst/gst.h>
 
 #include "common/element.h"
+#include "common/messages.h"
 #include "common/meta.h"
 #include "common/record.h"
 #include "common/tag.h"
@@ -212,6 +213,19 @@ flaw_of (const RestoreState &state, GstBuffer *frame, const FrameRecord &record,
   return nullptr;
 }
 
+/* That was found when @record was made. */
+void
+report_loss (Self *self, const FrameRecord &record, GstClockTime pts)
+{
+  const auto last = self->state.last_frame;
+  const guint64 lost = record.lost_before.value_or (0);
+  if (lost == 0 || !last || record.frame <= *last)
+    return;
+  const auto before =
+      GstClockTime (record.duration.value_or (0) * Nanoseconds (lost));
+  post_message (self, FramesLost{lost, pts - std::min (pts, before), pts});
+}
+
 void
 restore (Self *self, GstBuffer *frame, const TrackReader::Match &match)
 {
@@ -220,6 +234,7 @@ restore (Self *self, GstBuffer *frame, const TrackReader::Match &match)
   if (match.skipped > 0)
     record.lost_before = record.lost_before.value_or (0) + match.skipped;
   apply_record (frame, record, match.offset);
+  report_loss (self, *match.line->frame, GST_BUFFER_PTS (frame));
   if (match.skipped > 0)
     GST_BUFFER_FLAG_SET (frame, GST_BUFFER_FLAG_DISCONT);
   state.last_frame = record.frame;

@@ -6,8 +6,8 @@
 
 #include <cstdio>
 
-#include "emulation/gige_camera.h"
 #include "child.h"
+#include "emulation/gige_camera.h"
 #include "play.h"
 
 namespace codedexposure::campaign
@@ -114,7 +114,7 @@ camera_faults (Scale scale)
       going = going && client.wait_frames (12);
     }
   client.end (row);
-  need (row, "dmdsync/frames-lost");
+  need (row, "codedexposure/frames-lost");
   return {row};
 }
 

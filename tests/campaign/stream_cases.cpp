@@ -219,7 +219,7 @@ losses (Scale scale)
                               .fault = sometimes (percent / 100, 11, lose),
                               .need = percent < 1 && scale == Scale::brief
                                           ? ""
-                                          : "dmdsync/frames-lost"});
+                                          : "codedexposure/frames-lost"});
   }
   return rows;
 }

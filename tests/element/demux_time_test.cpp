@@ -179,6 +179,23 @@ TEST_F (DemuxTime, LossThatUpstreamHasSaidIsCountedAndNotSaidAgain)
   EXPECT_TRUE (demux->posted<FramesLost> ());
 }
 
+/* So does the element that restores the metas of a recording. */
+TEST_F (DemuxTime, LossThatTheMetaHasIsCountedAndNotSaidAgain)
+{
+  start ();
+  const auto push_frame = [this] (GstClockTime pts, guint64 told) {
+    BufferPtr frame = frame_of (Image<std::uint8_t> (16, 16), pts);
+    set_frame_meta (frame.get (), {.lost_before = told});
+    ASSERT_EQ (demux->push (std::move (frame)), GST_FLOW_OK);
+  };
+  push_frame (0, 0);
+  push_frame (120 * kMs, 2);
+  EXPECT_FALSE (demux->posted<FramesLost> ());
+  EXPECT_EQ (counter ("frames-lost"), 2u);
+  push_frame (240 * kMs, 1);
+  EXPECT_TRUE (demux->posted<FramesLost> ());
+}
+
 TEST_F (DemuxTime, JitterUpToHalfAPeriodIsNoLoss)
 {
   start ();

@@ -135,11 +135,11 @@ TEST (Dmdsync, ALossIsCountedFlaggedAndSaid)
   EXPECT_EQ (from, 80 * kMs);
   EXPECT_EQ (length, 120 * kMs);
 
-  const MessagePtr said = sync.element_message ("dmdsync/frames-lost");
+  const MessagePtr said = sync.element_message ("codedexposure/frames-lost");
   EXPECT_EQ (uint64_field (said, "count"), 3u);
   EXPECT_EQ (uint64_field (said, "from"), 80 * kMs);
   EXPECT_EQ (uint64_field (said, "to"), 200 * kMs);
-  EXPECT_FALSE (sync.element_message ("dmdsync/frames-lost"));
+  EXPECT_FALSE (sync.element_message ("codedexposure/frames-lost"));
 }
 
 TEST (Dmdsync, LostFramesCanBeRepeatedFromMemoryOfOurOwn)

@@ -53,6 +53,7 @@ meta_of (int frame)
   meta.exposure_duration = 39'200'000;
   meta.locked = frame != 3;
   meta.slip = frame == 3 ? 2 : 0;
+  meta.lost_before = frame == 1 ? 2 : 0;
   meta.bits = 7;
   return meta;
 }
@@ -229,6 +230,17 @@ TEST_F (Restore, ADamagedLineIsCountedAndItsFrameCorrupted)
   play ();
   EXPECT_TRUE (corrupted (4));
   EXPECT_EQ (counted (file.element (), "lines-damaged"), 1u);
+}
+
+TEST_F (Restore, ALossThatTheRecordingHasIsSaidOnce)
+{
+  play ();
+  const auto lost = file.posted<FramesLost> ();
+  ASSERT_TRUE (lost);
+  EXPECT_EQ (lost->count, 2u);
+  EXPECT_EQ (lost->to, kPeriod);
+  EXPECT_FALSE (file.posted<FramesLost> ());
+  EXPECT_EQ (get_frame_meta (restored[1].get ())->lost_before, 2u);
 }
 
 TEST_F (Restore, AFrameThatIsMissingIsSaid)

@@ -107,7 +107,7 @@ TEST_P (Gige, EveryFaultIsAccountedFor)
   ASSERT_NE (late, received.order.end ());
   EXPECT_EQ (*(late - 1), 41 - first);
   EXPECT_EQ (counter (pipeline, "frames-lost"), 7u);
-  EXPECT_EQ (sum_of (pipeline, "dmdsync/frames-lost", "count"), 7u);
+  EXPECT_EQ (sum_of (pipeline, "codedexposure/frames-lost", "count"), 7u);
   EXPECT_EQ (counter (pipeline, "frames-late"), 1u);
   EXPECT_EQ (sum_of (pipeline, "dmdsync/frame-late", "frame"), 40 - first);
   EXPECT_EQ (counter (pipeline, "frames-duplicate"), 1u);
@@ -130,7 +130,7 @@ TEST_P (Gige, WithOnePercentOfThePacketsLostEveryGapIsAccountedFor)
   const guint64 lost = received.order.back () + 1 - 100;
   EXPECT_GT (lost, 0u) << "36 packets a frame";
   EXPECT_EQ (counter (pipeline, "frames-lost"), lost);
-  EXPECT_EQ (sum_of (pipeline, "dmdsync/frames-lost", "count"), lost);
+  EXPECT_EQ (sum_of (pipeline, "codedexposure/frames-lost", "count"), lost);
 }
 
 /* aravissrc gives memory to its camera again that it has handed out. */

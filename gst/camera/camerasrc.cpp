@@ -55,7 +55,6 @@
 #include <arv.h>
 #endif
 
-#include "common/element.h"
 #include "common/elements.h"
 #include "common/properties.h"
 
@@ -85,13 +84,13 @@ G_DEFINE_ENUM_TYPE (GstCodedExposureTriggerEdge,
     {int (Edge::falling), "Falling edge; output low in the exposure",
         "falling"});
 
-const PropertyTable<CameraState> &
+PropertyTable<CameraState>
 properties ()
 {
   static const auto set = [] (auto member) {
     return within (&CameraState::settings, member);
   };
-  static const PropertyTable<CameraState> table = {
+  return {
       {"camera-name", "Camera name",
           "Camera as \"arv-tool-0.8\" or \"gst-device-monitor-1.0 "
           "Source/Video\" lists it, or its address; empty: the first one found",
@@ -134,7 +133,6 @@ properties ()
           "Times that the camera came back, in this run or the last one",
           kReadOnly, &CameraState::reconnects, 0u, G_MAXUINT},
   };
-  return table;
 }
 
 /* What can be known before there is a camera. */
@@ -154,7 +152,7 @@ check (GstElement *element)
         "The bench property cannot be read: " + bench->error ().message);
     return false;
   }
-  const Result<void> good = check_settings (camera::settings_of (self));
+  const Result<void> good = check_settings (settings_of (self));
   if (!good)
     POST_ERROR (self, RESOURCE, SETTINGS, good.error ().message);
   return good.ok ();
@@ -231,13 +229,6 @@ set_clock (GstElement *element, GstClock *clock)
 
 namespace codedexposure::gst::camera
 {
-
-Settings
-settings_of (GstCodedExposureCameraSrc *self)
-{
-  const ObjectLock lock (self);
-  return self->state.settings;
-}
 
 namespace
 {

@@ -67,8 +67,6 @@ struct GstCodedExposureCameraSrc : Instance<GstBin, CameraState> {
 };
 
 inline constexpr auto &state = state_in<GstCodedExposureCameraSrc>;
-/** A copy, by the object lock. */
-Settings settings_of (GstCodedExposureCameraSrc *self);
 
 /** Sets all properties of aravissrc, which opens the camera. False where that
  * fails; aravissrc has posted an error then. */

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure-camerasrc, frame by frame: memory, pixels, time. */
 #include "camerasrc.h"
-#include "common/element.h"
 #include "common/meta.h"
 
 #define GST_CAT_DEFAULT camerasrc_debug

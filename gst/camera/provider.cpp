@@ -5,7 +5,6 @@
 #include "camerasrc.h"
 #include "common/caps.h"
 #include "common/elements.h"
-#include "common/raii.h"
 
 using namespace codedexposure::gst;
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "camerasrc.h"
-#include "common/element.h"
 #include "common/messages.h"
 
 #ifdef CODEDEXPOSURE_ARAVIS

@@ -8,8 +8,6 @@
 
 #include <utility>
 
-#include "element.h"
-
 GST_DEBUG_CATEGORY (coded_filter_debug);
 #define GST_CAT_DEFAULT coded_filter_debug
 
@@ -18,13 +16,13 @@ namespace codedexposure::gst
 
 /* ------------------------------------------------------------ properties -- */
 
-const PropertyTable<CodedFilter::Shared> &
+PropertyTable<CodedFilter::Shared>
 CodedFilter::properties ()
 {
   static const auto set = [] (auto member) {
     return within (&Shared::settings, member);
   };
-  static const PropertyTable<Shared> table{
+  return {
       {"schedule", "Schedule",
           "Schedule of the coded exposure: a preset such as "
           "\"sequential:2x2\" or \"staircase:2x2,active=9.8ms\", or the path "
@@ -71,7 +69,6 @@ CodedFilter::properties ()
           "takes effect",
           kReadOnly, [] (const Shared &shared) { return shared.stats (); }},
   };
-  return table;
 }
 
 StructurePtr

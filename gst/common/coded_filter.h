@@ -378,7 +378,7 @@ private:
   /** A flush comes from another thread than frames, and is forwarded, too. */
   std::shared_ptr<const Provenance> provenance () const;
 
-  static const PropertyTable<Shared> &properties ();
+  static PropertyTable<Shared> properties ();
   static Shared &shared_of (GObject *object);
   bool read_settings ();
   void begin ();

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "element.h"
 #include "tag.h"
 
 GST_DEBUG_CATEGORY_EXTERN (coded_filter_debug);

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "base/text.h"
-#include "element.h"
 #include "tag.h"
 
 GST_DEBUG_CATEGORY_EXTERN (coded_filter_debug);
@@ -115,7 +114,8 @@ CodedFilter::replay_sticky (GstPad *, GstEvent **upstream, gpointer user_data)
 {
   auto &[pad, caps, provenance, tagged] = *static_cast<Replay *> (user_data);
   const GstEventType type = GST_EVENT_TYPE (*upstream);
-  if (type == GST_EVENT_EOS || (!caps && type != GST_EVENT_STREAM_START))
+  if (type == GST_EVENT_EOS ||
+      (caps.empty () && type != GST_EVENT_STREAM_START))
     return TRUE;
   EventPtr event;
   if (type == GST_EVENT_STREAM_START) {
@@ -143,7 +143,7 @@ CodedFilter::insert_pad (PadRef pad)
   const Provenance *made = shared_.provenance.get ();
   Replay replay{pad.get (), caps_, made};
   gst_pad_sticky_events_foreach (sinkpad_, replay_sticky, &replay);
-  if (caps_ && made && !replay.tagged && kind != PadKind::coded) {
+  if (!caps_.empty () && made && !replay.tagged && kind != PadKind::coded) {
     const EventPtr own (
         provenance_to_event (provenance_for (pad.get (), *made)));
     gst_pad_store_sticky_event (GST_PAD (pad.get ()), own.get ());

@@ -4,9 +4,7 @@
 #include "coded_pad.h"
 
 #include <algorithm>
-#include <string>
 #include <string_view>
-#include <utility>
 
 #include "pool.h"
 
@@ -147,20 +145,9 @@ prefix_of (PadKind kind)
 GstCaps *
 PadCaps::of (const CodedPad &pad) const
 {
-  switch (pad.kind) {
-  case PadKind::coded:
-    return coded.get ();
-  case PadKind::one:
-    return one.get ();
-  case PadKind::region:
-    return pad.index < int (regions.size ())
-               ? regions[std::size_t (pad.index)].get ()
-               : nullptr;
-  case PadKind::uncertainty:
-    return uncertainty.get ();
-  default:
-    return all.get ();
-  }
+  const auto found =
+      find ({pad.kind, pad.kind == PadKind::region ? pad.index : -1});
+  return found == end () ? nullptr : found->second.get ();
 }
 
 /* gst_pad_create_stream_id () needs the sink pad's sticky event, which is

@@ -67,14 +67,14 @@ PadKind kind_of_template (const std::string &name);
 /** Names of numbered pads begin with it: "subframe_". */
 std::string prefix_of (PadKind kind);
 
-/** Caps of each kind of pad. */
-struct PadCaps {
-  CapsPtr coded, all, one, uncertainty;
-  std::vector<CapsPtr> regions;
-
+/** Caps of each kind of pad, and of each region. */
+struct PadCaps : std::map<std::pair<PadKind, int>, CapsPtr> {
+  CapsPtr &of (PadKind kind, int region = -1)
+  {
+    return (*this)[{kind, region}];
+  }
   /** Null for a region that does not exist. */
   GstCaps *of (const CodedPad &pad) const;
-  explicit operator bool () const { return all != nullptr; }
 };
 
 /** The STREAM_START event of @p pad, one of several, for that of upstream. */

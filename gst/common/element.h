@@ -105,6 +105,14 @@ type_of (const char *name, GType parent, GTypeFlags flags = GTypeFlags (0))
   return type;
 }
 
+/** A copy of the settings of @p self, by the object lock. */
+template <typename Self>
+auto
+settings_of (Self *self)
+{
+  return locked (self, [self] { return self->state.settings; });
+}
+
 /** Installs the properties of @p Table (), whose values are in the state of a
  * Self. */
 template <typename Self, auto Table,

@@ -60,11 +60,13 @@ struct FrameDropped {
   std::string reason;
   CODED_FIELDS (frame, pts, reason);
 };
-struct FrameLate {
-  static constexpr const char *kName = "dmdsync/frame-late";
+struct AtFrame {
   guint64 frame = 0;
   GstClockTime pts = 0;
   CODED_FIELDS (frame, pts);
+};
+struct FrameLate : AtFrame {
+  static constexpr const char *kName = "dmdsync/frame-late";
 };
 struct FrameIncomplete {
   static constexpr const char *kName = "dmdsync/frame-incomplete";
@@ -75,19 +77,13 @@ struct FrameIncomplete {
 };
 
 /** The first frame that is known to be synchronised, of all or since a slip. */
-struct Locked {
+struct Locked : AtFrame {
   static constexpr const char *kName = "dmdsync/locked";
-  guint64 frame = 0;
-  GstClockTime pts = 0;
-  CODED_FIELDS (frame, pts);
 };
 
 /** Frames are no longer flagged after a slip: the DMD was restarted. */
-struct SlipOver {
+struct SlipOver : AtFrame {
   static constexpr const char *kName = "dmdsync/slip-over";
-  guint64 frame = 0;
-  GstClockTime pts = 0;
-  CODED_FIELDS (frame, pts);
 };
 
 /** The DMD slipped against the camera. */

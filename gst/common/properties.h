@@ -127,6 +127,15 @@ private:
   std::vector<Property<State>> properties_;
 };
 
+/** The table that @p Table () makes, once. */
+template <auto Table>
+const auto &
+table_of ()
+{
+  static const auto table = Table ();
+  return table;
+}
+
 /**
  * Installs the properties of @p Table (), whose values are in @p StateOf
  * (object). They are set and read under the object lock, and set only where
@@ -140,7 +149,7 @@ install_properties (GObjectClass *klass)
 {
   klass->set_property = [] (GObject *object, guint id, const GValue *value,
                             GParamSpec *pspec) noexcept {
-    const auto assign = Table ()[id].read (value);
+    const auto assign = table_of<Table> ()[id].read (value);
     const ObjectLock lock (object);
     if (!may_set (object, pspec))
       return;
@@ -150,9 +159,9 @@ install_properties (GObjectClass *klass)
   klass->get_property = [] (GObject *object, guint id, GValue *value,
                             GParamSpec *) noexcept {
     const ObjectLock lock (object);
-    Table ()[id].get (StateOf (object), value);
+    table_of<Table> ()[id].get (StateOf (object), value);
   };
-  Table ().install (klass);
+  table_of<Table> ().install (klass);
 }
 
 } // namespace codedexposure::gst

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "tag.h"
 
-#include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -89,18 +88,6 @@ merge_others (GstTagList *ours, GstEvent *event)
 
 } // namespace
 
-GstTagList *
-schedule_to_tags (const Schedule &schedule)
-{
-  return setup_to_tags ({schedule, {}});
-}
-
-GstEvent *
-schedule_to_event (const Schedule &schedule)
-{
-  return gst_event_new_tag (schedule_to_tags (schedule));
-}
-
 StreamSetup
 setup_at (GstPad *src, const Schedule &schedule, std::optional<Mapping> mapping)
 {
@@ -126,16 +113,6 @@ setup_from_tags (const GstTagList *tags)
 {
   const auto json = comment_after (kPrefix, tags);
   return json ? std::optional (StreamSetup::from_json (*json)) : std::nullopt;
-}
-
-std::optional<Result<Schedule>>
-schedule_from_tags (const GstTagList *tags)
-{
-  const auto setup = setup_from_tags (tags);
-  if (!setup)
-    return std::nullopt;
-  return *setup ? Result<Schedule> (setup->value ().schedule)
-                : Result<Schedule> (setup->error ());
 }
 
 GstEvent *

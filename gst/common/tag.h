@@ -17,11 +17,6 @@
 namespace codedexposure::gst
 {
 
-/** A tag list with the schedule; Transfer: full. */
-GstTagList *schedule_to_tags (const Schedule &schedule);
-/** A TAG event with the schedule; Transfer: full. */
-GstEvent *schedule_to_event (const Schedule &schedule);
-
 /** The setup of frames that leave an element by @p src, whose caps have their
  * size and rate. */
 StreamSetup setup_at (
@@ -29,11 +24,9 @@ StreamSetup setup_at (
 /** A TAG event with schedule and mapping; Transfer: full. */
 GstEvent *setup_to_event (const StreamSetup &setup);
 
-/** Schedule and mapping in @p tags; as schedule_from_tags (). */
+/** Schedule and mapping in @p tags: none if no comment has them, an error if
+ * they cannot be read. */
 std::optional<Result<StreamSetup>> setup_from_tags (const GstTagList *tags);
-/** The schedule in @p tags: none if no comment has one, an error if it cannot
- * be read. */
-std::optional<Result<Schedule>> schedule_from_tags (const GstTagList *tags);
 
 /** The TAG event @p event with @p setup in place of the setup and the
  * provenance in its tags; Transfer: full, of both. */
@@ -51,7 +44,7 @@ bool takes_provenance (GstEvent *event);
 /** The TAG event @p event with @p provenance in place of setup and provenance;
  * Transfer: full, of both. */
 GstEvent *replace_by_provenance (GstEvent *event, const Provenance &provenance);
-/** The provenance in @p tags; as schedule_from_tags (). */
+/** The provenance in @p tags; as setup_from_tags (). */
 std::optional<Result<Provenance>> provenance_from_tags (const GstTagList *tags);
 
 /** The significant bits that a setup or a provenance in the TAG event @p event

@@ -57,7 +57,7 @@ private:
   void flushed () override { live_.reset (); }
   void take_settings () override { in_force_ = settings_; }
   void forget () override;
-  static const PropertyTable<Settings> &properties ();
+  static PropertyTable<Settings> properties ();
   static Settings &settings_of (GObject *object);
   CapsScale scale_for (
       const Schedule &schedule, const GstCodedPad *pad) const override;

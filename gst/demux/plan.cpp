@@ -25,14 +25,14 @@ G_DEFINE_ENUM_TYPE (GstCodedExposureMethod, gst_coded_exposure_method,
     {int (Method::kDecode), "solves the code for the light of each slot",
         "decode"});
 
-const PropertyTable<Settings> &
+PropertyTable<Settings>
 Demux::properties ()
 {
   static const auto set = [] (auto member) {
     return within (&Settings::extract, member);
   };
   static const GType method = gst_coded_exposure_method_get_type ();
-  static const PropertyTable<Settings> table{
+  return {
       {"method", "Method", "How subframes are found in a coded frame",
           kReadWrite, set (&ExtractOptions::method), method},
       {"gain", "Gain",
@@ -53,7 +53,6 @@ Demux::properties ()
           "notifies",
           kReadOnly, &Settings::method_in_force, method},
   };
-  return table;
 }
 
 std::string
@@ -148,14 +147,13 @@ Demux::plan (const CodedFormat &format)
     CapsPtr one = part_caps (format, part, false);
     gst_video_info_from_caps (&made.infos.emplace_back (), one.get ());
     CapsPtr all = part_caps (format, part, true);
-    if (part.region >= 0) {
-      caps.regions.push_back (std::move (all));
-    } else {
-      caps.all = std::move (all);
-      caps.one = std::move (one);
-    }
+    const bool is_region = part.region >= 0;
+    caps.of (is_region ? PadKind::region : PadKind::all, part.region) =
+        std::move (all);
+    if (!is_region)
+      caps.of (PadKind::one) = std::move (one);
   }
-  caps.coded.reset (gst_caps_ref (format.caps.get ()));
+  caps.of (PadKind::coded).reset (gst_caps_ref (format.caps.get ()));
   for (const bool backwards : {false, true})
     made.turns[backwards] = order_subframes (made.parts, backwards);
   log_plan (element (), format, made);

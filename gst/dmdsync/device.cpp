@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* dmdsync and its DMD: opening, upload, parking. */
-#include "common/element.h"
 #include "dmdsync.h"
 
 #define GST_CAT_DEFAULT dmdsync_debug
@@ -61,13 +60,6 @@ reports (GstDmdSync *self)
 }
 
 } // namespace
-
-Settings
-settings_of (GstDmdSync *self)
-{
-  const ObjectLock lock (self);
-  return state (self).settings;
-}
 
 bool
 read_schedule (GstDmdSync *self)

@@ -104,7 +104,6 @@
  */
 #include "dmdsync.h"
 
-#include "common/element.h"
 #include "common/elements.h"
 
 GST_DEBUG_CATEGORY (dmdsync_debug);

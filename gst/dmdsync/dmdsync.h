@@ -153,8 +153,6 @@ struct GstDmdSync : Instance<GstBaseTransform, SyncState> {
 };
 
 inline constexpr auto &state = state_in<GstDmdSync>;
-/** A copy, by the object lock. */
-Settings settings_of (GstDmdSync *self);
 
 /* Time. */
 /** Follows the settings, the caps and the jitter; posts a message when the

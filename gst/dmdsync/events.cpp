@@ -2,7 +2,6 @@
 /* dmdsync's caps, events and queries. */
 #include <algorithm>
 
-#include "common/element.h"
 #include "common/tag.h"
 #include "dmdsync.h"
 

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* dmdsync, frame by frame: time, number, phase. */
-#include "common/element.h"
 #include "common/messages.h"
 #include "common/meta.h"
 #include "dmdsync.h"

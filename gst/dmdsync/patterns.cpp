@@ -6,7 +6,6 @@
  * frame and the next ones. Nobody waits for the device.
  */
 #include "calibrate/gratings.h"
-#include "common/element.h"
 #include "common/messages.h"
 #include "common/meta.h"
 #include "dmdsync.h"

@@ -56,13 +56,13 @@ stats (const SyncState &st)
 }
 
 /* First those that users set. */
-const PropertyTable<SyncState> &
+PropertyTable<SyncState>
 properties ()
 {
   static const auto set = [] (auto member) {
     return within (&SyncState::settings, member);
   };
-  static const PropertyTable<SyncState> table = {
+  return {
       {"device", "Device",
           "DMD to control: usb: or lightcrafter: for a board (docs/dmd.md), "
           "sim:NAME[,key=value...] for a simulated one (docs/timing.md); "
@@ -117,7 +117,6 @@ properties ()
           "(docs/formats.md)",
           kReadOnly, [] (const SyncState &st) { return stats (st); }},
   };
-  return table;
 }
 
 /* The text may name a file, which is read before the object lock is taken. */
@@ -145,7 +144,7 @@ set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
   auto *self = as<GstDmdSync> (object);
   if (g_str_equal (pspec->name, "schedule"))
     return set_schedule (self, value, pspec);
-  const auto assign = properties ()[id].read (value);
+  const auto assign = table_of<properties> ()[id].read (value);
   {
     const ObjectLock lock (self);
     if (!may_set (self, pspec))

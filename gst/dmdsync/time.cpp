@@ -2,7 +2,6 @@
 /* dmdsync's clocks: the camera's, the pipeline's, and what lies between. */
 #include <cmath>
 
-#include "common/element.h"
 #include "common/messages.h"
 #include "dmdsync.h"
 

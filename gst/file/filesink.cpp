@@ -165,10 +165,10 @@ stop (GstBaseSink *sink) noexcept
   return finish (sink);
 }
 
-const PropertyTable<FileState> &
+PropertyTable<FileState>
 properties ()
 {
-  static const PropertyTable<FileState> table{
+  return {
       {"location", "File location", "File to write; overwritten when it exists",
           kReadWriteReady, &FileState::location},
       {"direct", "Direct",
@@ -186,7 +186,6 @@ properties ()
           "Why the file could not be finished; empty: it was, or is still "
           "written",
           kReadOnly, [] (const FileState &state) { return state.problem; }}};
-  return table;
 }
 
 void

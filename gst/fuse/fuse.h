@@ -39,7 +39,7 @@ public:
   static void set_up_class (gpointer klass);
 
 private:
-  static const PropertyTable<Settings> &properties ();
+  static PropertyTable<Settings> properties ();
   static Settings &settings_of (GObject *object);
 
   GstFlowReturn process (CodedFrame frame) override;

@@ -32,10 +32,10 @@ G_DEFINE_ENUM_TYPE (GstCodedExposureQuality, gst_coded_exposure_quality,
 constexpr Reach kMaxReach{
     Fuser<std::uint8_t>::kMaxHistory, Fuser<std::uint8_t>::kMaxLookahead};
 
-const PropertyTable<Settings> &
+PropertyTable<Settings>
 Fuse::properties ()
 {
-  static const PropertyTable<Settings> table{
+  return {
       {"quality", "Quality",
           "Quality against speed; all but fast are for up to 16 slots",
           kReadWrite, &FuseOptions::quality,
@@ -67,7 +67,6 @@ Fuse::properties ()
           kReadWrite, within (&FuseOptions::noise, &SensorNoise::read_noise),
           Settings::kUnset, SensorNoise::kMaxReadNoise},
   };
-  return table;
 }
 
 Settings &
@@ -187,15 +186,16 @@ Fuse::plan (const CodedFormat &format)
                                 ? format.resized (format.size)
                                 : CapsPtr (gst_caps_ref (format.caps.get ()));
   PadCaps caps;
-  caps.coded.reset (gst_caps_ref (format.caps.get ()));
-  caps.all.reset (
-      scale_caps (rectified.get (), coded_to_fused (format.schedule)));
-  caps.uncertainty = of_sixteen_bits (caps.all.get ());
+  CapsPtr &fused = caps.of (PadKind::all);
+  CapsPtr &uncertainty = caps.of (PadKind::uncertainty);
+  caps.of (PadKind::coded).reset (gst_caps_ref (format.caps.get ()));
+  fused.reset (scale_caps (rectified.get (), coded_to_fused (format.schedule)));
+  uncertainty = of_sixteen_bits (fused.get ());
   Plan made{std::move (*fuser), {}, {},
       {options.noise.full_well > 0.0 ? kMaxReach.history : 1,
           options.lookahead}};
-  gst_video_info_from_caps (&made.fused, caps.all.get ());
-  gst_video_info_from_caps (&made.uncertainty, caps.uncertainty.get ());
+  gst_video_info_from_caps (&made.fused, fused.get ());
+  gst_video_info_from_caps (&made.uncertainty, uncertainty.get ());
   plan_ = std::move (made);
   if (const std::string reason = unrefined (); !reason.empty ())
     POST_WARNING (element (), STREAM, FORMAT,

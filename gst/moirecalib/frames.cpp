@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* moirecalib, frame by frame: requests patterns, gives copies of frames to the
  * worker, draws the panel over the picture. Nothing here waits or solves. */
-#include "common/element.h"
 #include "common/events.h"
 #include "common/meta.h"
 #include "common/tag.h"

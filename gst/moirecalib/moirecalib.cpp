@@ -52,7 +52,6 @@
  */
 #include "moirecalib.h"
 
-#include "common/element.h"
 #include "common/elements.h"
 #include "common/properties.h"
 
@@ -78,7 +77,7 @@ G_DEFINE_ENUM_TYPE (GstMoireCalibMode, gst_moire_calib_mode,
         "Phase of the tile, from a coded frame of a staircase; no patterns",
         "phase"});
 
-const PropertyTable<CalibState> &
+PropertyTable<CalibState>
 properties ()
 {
   static const auto set = [] (auto... path) {
@@ -87,7 +86,7 @@ properties ()
   static const auto stage = [] (auto member) {
     return set (&Settings::stage, member);
   };
-  static const PropertyTable<CalibState> table = {
+  return {
       {"mode", "Mode",
           "What to do; setting it starts over at the next frame, even if the "
           "value does not change",
@@ -152,7 +151,6 @@ properties ()
           "The last mapping, JSON (docs/formats.md); empty: none yet; notifies",
           kReadOnly, &CalibState::mapping},
   };
-  return table;
 }
 
 void
@@ -168,7 +166,7 @@ void
 before_transform (GstBaseTransform *trans, GstBuffer *) noexcept
 {
   gst_base_transform_set_passthrough (
-      trans, !moire::settings_of (trans).lays_over ());
+      trans, !settings_of (as<GstMoireCalib> (trans)).lays_over ());
 }
 
 bool
@@ -226,18 +224,6 @@ set_up_instance (GstMoireCalib *self)
 }
 
 } // namespace
-
-namespace codedexposure::gst::moire
-{
-
-Settings
-settings_of (gpointer element)
-{
-  const ObjectLock lock (element);
-  return state (element).settings;
-}
-
-} // namespace codedexposure::gst::moire
 
 GST_ELEMENT_REGISTER_DEFINE (moirecalib, "moirecalib", GST_RANK_NONE,
     (type_of<GstMoireCalib, set_up, set_up_instance> (

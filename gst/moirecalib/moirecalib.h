@@ -143,8 +143,6 @@ struct GstMoireCalib : Instance<GstBaseTransform, CalibState> {
 };
 
 inline constexpr auto &state = state_in<GstMoireCalib>;
-/** A copy, by the object lock. */
-Settings settings_of (gpointer element);
 
 /* The worker. */
 /** False, with an error posted, when no thread can be started. */

@@ -5,7 +5,6 @@
 #include <new>
 #include <system_error>
 
-#include "common/element.h"
 #include "common/messages.h"
 #include "moirecalib.h"
 

@@ -24,30 +24,10 @@ DamageReport::count (guint64 Counters::*counter, guint64 by)
 }
 
 void
-DamageReport::frame ()
+DamageReport::frame_flagged (
+    bool known, guint64 number, GstClockTime pts, const char *reason)
 {
-  count (&Counters::frames);
-}
-
-void
-DamageReport::frame_damaged (
-    guint64 number, GstClockTime pts, const char *reason)
-{
-  count (&Counters::frames_damaged);
-  extend (number, pts, reason);
-}
-
-void
-DamageReport::frame_unknown (
-    guint64 number, GstClockTime pts, const char *reason)
-{
-  count (&Counters::frames_unknown);
-  extend (number, pts, reason);
-}
-
-void
-DamageReport::extend (guint64 number, GstClockTime pts, const char *reason)
-{
+  count (known ? &Counters::frames_damaged : &Counters::frames_unknown);
   if (open_.count++ > 0)
     return;
   open_.frame = number;

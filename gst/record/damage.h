@@ -24,11 +24,11 @@ public:
   void forget () { open_ = {}; }
 
   /** Each frame, before the others. */
-  void frame ();
-  /** At @p pts; @p reason says what is not as recorded. */
-  void frame_damaged (guint64 number, GstClockTime pts, const char *reason);
-  /** At @p pts; @p reason says why nothing is known of it. */
-  void frame_unknown (guint64 number, GstClockTime pts, const char *reason);
+  void frame () { count (&Counters::frames); }
+  /** At @p pts; @p reason says what is not as recorded, or why nothing is
+   * @p known of it. */
+  void frame_flagged (
+      bool known, guint64 number, GstClockTime pts, const char *reason);
   /** @p count frames of the track, from @p from on, did not come; 0: says
    * nothing. */
   void frames_missing (guint64 count, GstClockTime from);
@@ -58,7 +58,6 @@ private:
     GstClockTime from = 0;
   };
   void count (guint64 Counters::*counter, guint64 by = 1);
-  void extend (guint64 number, GstClockTime pts, const char *reason);
 
   GstElement *element_;
   Counters counters_; ///< object lock

@@ -322,10 +322,10 @@ stats_of (const LogState &state)
           "frames-lost", G_TYPE_UINT64, state.frames_lost, nullptr));
 }
 
-const PropertyTable<LogState> &
+PropertyTable<LogState>
 properties ()
 {
-  static const PropertyTable<LogState> table{
+  return {
       {"location", "File location",
           "File to write, one line of JSON a coded frame; overwritten when it "
           "exists; empty: none",
@@ -334,7 +334,6 @@ properties ()
           "Counters: frames-lost, the coded frames that are missing before "
           "frames that came, by their numbers",
           kReadOnly, stats_of}};
-  return table;
 }
 
 constexpr StateHooks kRun{.begin = begin_run, .end = end_run};

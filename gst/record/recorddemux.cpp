@@ -444,10 +444,10 @@ stats_of (const RecordDemuxState &state)
   return StructurePtr (stats);
 }
 
-const PropertyTable<RecordDemuxState> &
+PropertyTable<RecordDemuxState>
 properties ()
 {
-  static const PropertyTable<RecordDemuxState> table{
+  return {
       {"salvage", "Salvage",
           "Read from front to back, without the index, and end the stream at "
           "damage of the container, with a warning",
@@ -460,7 +460,6 @@ properties ()
           "recorded), frames-unknown (without a line in the track), "
           "frames-missing (in the track only), lines-damaged",
           kReadOnly, stats_of}};
-  return table;
 }
 
 void

@@ -234,7 +234,7 @@ begin_run (GstElement *self)
     POST_ERROR (self, CORE, MISSING_PLUGIN, missing ("matroskamux"));
     return false;
   }
-  const Settings settings = locked (self, [&] { return state.settings; });
+  const Settings settings = settings_of (as<Self> (self));
   g_object_set (state.log, "location", settings.log_location.c_str (), nullptr);
   g_object_set (
       state.mux, "streamable", gboolean (settings.is_streamable), nullptr);
@@ -313,13 +313,13 @@ stats_of (const RecordMuxState &state)
   return StructurePtr (stats);
 }
 
-const PropertyTable<RecordMuxState> &
+PropertyTable<RecordMuxState>
 properties ()
 {
   static const auto set = [] (auto member) {
     return within (&RecordMuxState::settings, member);
   };
-  static const PropertyTable<RecordMuxState> table{
+  return {
       {"codec", "Kind of video", "How the frames are stored", kReadWriteReady,
           set (&Settings::codec), gst_coded_exposure_record_codec_get_type ()},
       {"threads", "Threads",
@@ -337,7 +337,6 @@ properties ()
           "Counters: frames-lost, the coded frames that are missing before "
           "frames that came, by their numbers",
           kReadOnly, stats_of}};
-  return table;
 }
 
 /* Frames are hashed and encoded in two threads. Lines are much smaller, and the

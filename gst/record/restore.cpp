@@ -160,7 +160,7 @@ mark_unknown (RestoreState &state, GstBuffer *frame)
     set_frame_meta (frame, meta);
   state.last_frame = meta.frame;
   GST_BUFFER_FLAG_SET (frame, GST_BUFFER_FLAG_CORRUPTED);
-  state.damage.frame_unknown (meta.frame, GST_BUFFER_PTS (frame),
+  state.damage.frame_flagged (false, meta.frame, GST_BUFFER_PTS (frame),
       !has_track                        ? "its track is missing"
       : GST_BUFFER_PTS_IS_VALID (frame) ? "the track has no line for it"
                                         : "it has no time to find its line by");
@@ -246,7 +246,7 @@ restore (Self *self, GstBuffer *frame, const TrackReader::Match &match)
     return;
   }
   GST_BUFFER_FLAG_SET (frame, GST_BUFFER_FLAG_CORRUPTED);
-  state.damage.frame_damaged (record.frame, GST_BUFFER_PTS (frame), flaw);
+  state.damage.frame_flagged (true, record.frame, GST_BUFFER_PTS (frame), flaw);
 }
 
 /* ---------------------------------------------------------------- events -- */
@@ -518,10 +518,10 @@ stats_of (const RestoreState &state)
   return state.damage.stats (state.track.damaged ());
 }
 
-const PropertyTable<RestoreState> &
+PropertyTable<RestoreState>
 properties ()
 {
-  static const PropertyTable<RestoreState> table{
+  return {
       {"tick", "Tick", "To which the container rounds times, ns", kReadWrite,
           &RestoreState::tick, guint64 (1), guint64 (GST_SECOND)},
       {"counters", "Statistics",
@@ -529,7 +529,6 @@ properties ()
           "recorded), frames-unknown (without a line in the track), "
           "frames-missing (in the track only), lines-damaged",
           kReadOnly, stats_of}};
-  return table;
 }
 
 constexpr StateHooks kRun{.begin = begin_run, .end = end_run};

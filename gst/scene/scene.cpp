@@ -72,10 +72,10 @@ G_DEFINE_ENUM_TYPE (GstCodedExposureSceneKind, gst_coded_exposure_scene_kind,
         "blown-out"},
     {int (SceneKind::kPour), "Liquid that is poured into a glass", "pour"});
 
-const PropertyTable<SceneState> &
+PropertyTable<SceneState>
 properties ()
 {
-  static const PropertyTable<SceneState> table{
+  return {
       {"scene", "Scene to draw",
           "What is drawn; takes effect when the stream starts", kReadWriteReady,
           &SceneState::kind, gst_coded_exposure_scene_kind_get_type ()},
@@ -84,7 +84,6 @@ properties ()
           "when the stream starts",
           kReadWriteReady, &SceneState::repeat, guint64 (0),
           guint64 (G_MAXINT64)}};
-  return table;
 }
 
 gboolean

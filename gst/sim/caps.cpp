@@ -6,7 +6,6 @@
  * offered, the largest that divides it is taken.
  */
 #include "common/caps.h"
-#include "common/element.h"
 #include "sim.h"
 
 #define GST_CAT_DEFAULT codedexposure_sim_debug

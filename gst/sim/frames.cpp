@@ -10,7 +10,6 @@
 #include <string_view>
 #include <utility>
 
-#include "common/element.h"
 #include "common/messages.h"
 #include "common/meta.h"
 #include "common/tag.h"

@@ -10,7 +10,7 @@ namespace codedexposure::gst::sim
 namespace
 {
 
-const PropertyTable<SimState> &
+PropertyTable<SimState>
 properties ()
 {
   using Optics = BenchOptions;
@@ -18,7 +18,7 @@ properties ()
   static const auto optics = [] (auto... path) {
     return within (&SimState::settings, &Settings::optics, path...);
   };
-  static const PropertyTable<SimState> table = {
+  return {
       {"schedule", "Schedule",
           "Schedule of the coded exposure: a preset such as "
           "\"sequential:2x2\" or \"staircase:2x2,active=9.8ms\", or the path "
@@ -87,13 +87,12 @@ properties ()
           kReadOnly, within (&SimState::counters, &Counters::frames_dropped),
           guint64 (0), G_MAXUINT64},
   };
-  return table;
 }
 
 void
 set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 {
-  const auto assign = properties ()[id].read (value);
+  const auto assign = table_of<properties> ()[id].read (value);
   const ObjectLock lock (object);
   /* The DMD is looked up once, when the stream starts. */
   if (g_str_equal (pspec->name, "dmd") && GST_STATE (object) > GST_STATE_READY)

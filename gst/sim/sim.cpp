@@ -106,7 +106,6 @@
  */
 #include "sim.h"
 
-#include "common/element.h"
 #include "common/elements.h"
 #include "common/tag.h"
 

@@ -55,6 +55,16 @@ struct GstCodedExposureStack : Instance<GstBaseSink, Stack> {
 };
 
 using OpenFile = decltype (&open_ome_tiff);
+#ifdef CODEDEXPOSURE_TIFF
+constexpr OpenFile kTiff = open_ome_tiff;
+#else
+constexpr OpenFile kTiff = nullptr;
+#endif
+#ifdef CODEDEXPOSURE_HDF5
+constexpr OpenFile kHdf5 = open_hdf5;
+#else
+constexpr OpenFile kHdf5 = nullptr;
+#endif
 
 Stack &
 state_of (gpointer self)
@@ -90,31 +100,15 @@ writer_of (GstElement *self, const std::string &location)
                "one of these");
     return nullptr;
   }
-#ifndef CODEDEXPOSURE_TIFF
-  if (!hdf5) {
+  const OpenFile writer = hdf5 ? kHdf5 : kTiff;
+  if (!writer)
     POST_ERROR (self, RESOURCE, SETTINGS,
-        "this build has no libtiff; install libtiff-dev and build again, or "
-        "write to .h5");
-    return nullptr;
-  }
-#endif
-#ifndef CODEDEXPOSURE_HDF5
-  if (hdf5) {
-    POST_ERROR (self, RESOURCE, SETTINGS,
-        "this build has no HDF5; install libhdf5-dev and build again, or "
-        "write to .ome.tif");
-    return nullptr;
-  }
-#endif
-#ifdef CODEDEXPOSURE_TIFF
-  if (!hdf5)
-    return open_ome_tiff;
-#endif
-#ifdef CODEDEXPOSURE_HDF5
-  if (hdf5)
-    return open_hdf5;
-#endif
-  return nullptr;
+        hdf5
+            ? "this build has no HDF5; install libhdf5-dev and build again, or "
+              "write to .ome.tif"
+            : "this build has no libtiff; install libtiff-dev and build again, "
+              "or write to .h5");
+  return writer;
 }
 
 /* The bytes that the stream will have without compression; none if its length
@@ -309,10 +303,10 @@ stop (GstBaseSink *sink) noexcept
   return finish (sink);
 }
 
-const PropertyTable<Stack> &
+PropertyTable<Stack>
 properties ()
 {
-  static const PropertyTable<Stack> table{
+  return {
       {"location", "File",
           "The file to write; its ending, .ome.tif, .ome.tiff or .h5, selects "
           "the format. An ending .part after that is ignored",
@@ -330,7 +324,6 @@ properties ()
           "Why the file could not be finished; empty: it was, or is still "
           "written",
           kReadOnly, [] (const Stack &state) { return state.problem; }}};
-  return table;
 }
 
 void

@@ -99,13 +99,13 @@ G_DEFINE_ENUM_TYPE (GstSubframeStatsFormat, gst_subframe_stats_format,
     {int (Format::json), "Lines of JSON", "json"},
     {int (Format::csv), "Comma-separated values, with a head", "csv"});
 
-const PropertyTable<StatsState> &
+PropertyTable<StatsState>
 properties ()
 {
   static const auto set = [] (auto member) {
     return within (&StatsState::settings, member);
   };
-  static const PropertyTable<StatsState> table{
+  return {
       {"location", "File location",
           "File to write, a line a picture; overwritten when it exists; empty: "
           "no file",
@@ -136,7 +136,6 @@ properties ()
           "Pictures with pixels at the largest value, in this run", kReadOnly,
           &StatsState::saturated_frames, guint64 (0), G_MAXUINT64},
   };
-  return table;
 }
 
 bool

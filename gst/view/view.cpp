@@ -154,10 +154,10 @@ transform (GstBaseTransform *base, GstBuffer *picture, GstBuffer *shown)
   return GST_FLOW_OK;
 }
 
-const PropertyTable<ViewState> &
+PropertyTable<ViewState>
 properties ()
 {
-  static const PropertyTable<ViewState> table{
+  return {
       {"bits", "Significant bits",
           "Significant bits of a pixel; their largest value becomes white. 0: "
           "as the frame metadata or the tags say, or all bits of the format",
@@ -166,7 +166,6 @@ properties ()
           "Pixel value that becomes white, to see a dark scene; larger ones "
           "are white, too. 0: the largest value of the significant bits",
           kReadWrite, &ViewState::white, 0, 65535}};
-  return table;
 }
 
 void

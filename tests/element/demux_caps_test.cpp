@@ -4,6 +4,7 @@
 #include "harness.h"
 
 #include "common/tag.h"
+#include "schedule_tags.h"
 
 namespace
 {

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "common/tag.h"
+#include "schedule_tags.h"
 
 namespace
 {

@@ -8,6 +8,7 @@
 #include "common/meta.h"
 #include "common/tag.h"
 #include "pipeline.h"
+#include "schedule_tags.h"
 
 namespace
 {

@@ -9,6 +9,7 @@
 #include <glib/gstdio.h>
 
 #include "common/tag.h"
+#include "schedule_tags.h"
 
 namespace
 {

@@ -5,6 +5,7 @@
 
 #include "common/meta.h"
 #include "common/tag.h"
+#include "schedule_tags.h"
 
 namespace
 {

@@ -3,6 +3,7 @@
 #include <array>
 
 #include "common/tag.h"
+#include "schedule_tags.h"
 #include "sync_harness.h"
 
 namespace

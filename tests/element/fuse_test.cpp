@@ -6,6 +6,7 @@
 #include "common/meta.h"
 #include "common/tag.h"
 #include "downstream.h"
+#include "schedule_tags.h"
 
 namespace
 {

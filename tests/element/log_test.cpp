@@ -20,6 +20,7 @@
 #include "record/setups.h"
 #include "record/track.h"
 #include "record_parts.h"
+#include "schedule_tags.h"
 
 namespace
 {

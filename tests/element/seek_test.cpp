@@ -12,6 +12,7 @@
 #include "common/tag.h"
 #include "pipeline.h"
 #include "preset.h"
+#include "schedule_tags.h"
 
 namespace
 {

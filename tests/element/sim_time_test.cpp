@@ -2,6 +2,7 @@
 /* codedexposure-sim: times, gaps, events and tags. */
 #include "common/meta.h"
 #include "common/tag.h"
+#include "schedule_tags.h"
 #include "sim_harness.h"
 
 namespace

@@ -11,6 +11,7 @@
 
 #include "common/tag.h"
 #include "harness.h"
+#include "schedule_tags.h"
 
 namespace
 {

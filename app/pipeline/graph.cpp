@@ -222,12 +222,6 @@ each_element (GstElement *bin, const std::function<void (GstElement *)> &visit)
   gst_iterator_free (elements);
 }
 
-ObjectPtr<GstPad>
-pad_of (GstElement *element, const char *name)
-{
-  return ObjectPtr<GstPad> (gst_element_get_static_pad (element, name));
-}
-
 std::string
 factory_of (GstElement *element)
 {

@@ -129,8 +129,7 @@ private:
 void each_element (
     GstElement *bin, const std::function<void (GstElement *)> &visit);
 
-/** The static pad @p name of @p element, or null. */
-gst::ObjectPtr<GstPad> pad_of (GstElement *element, const char *name);
+using gst::pad_of;
 
 /** The name of the factory of @p element; empty: it has none. */
 std::string factory_of (GstElement *element);

@@ -147,11 +147,9 @@ check (GstElement *element)
     return false;
   }
   const auto bench = read_again (self, self->state.settings.bench).read;
-  if (bench && !*bench) {
-    POST_ERROR (self, RESOURCE, SETTINGS,
-        "The bench property cannot be read: " + bench->error ().message);
-    return false;
-  }
+  if (bench && !*bench)
+    return refuse_settings (
+        self, "The bench property cannot be read: " + bench->error ().message);
   const Result<void> good = check_settings (settings_of (self));
   if (!good)
     POST_ERROR (self, RESOURCE, SETTINGS, good.error ().message);
@@ -208,7 +206,7 @@ send_event (GstElement *element, GstEvent *event)
     auto *self = as<GstCodedExposureCameraSrc> (source);
     camera::begin_end (self);
     camera::stop_silent_camera (self);
-    gst_pad_push_event (static_pad (self->state.filter, "src").get (),
+    gst_pad_push_event (pad_of (self->state.filter, "src").get (),
         gst_event_ref (GST_EVENT (end)));
   };
   gst_element_call_async (element, push, event,
@@ -326,8 +324,8 @@ set_up_instance (GstCodedExposureCameraSrc *self)
   st.source = source;
   st.filter = filter;
   gst_ghost_pad_set_target (
-      GST_GHOST_PAD (ghost), static_pad (filter, "src").get ());
-  gst_pad_add_probe (static_pad (source, "src").get (),
+      GST_GHOST_PAD (ghost), pad_of (filter, "src").get ());
+  gst_pad_add_probe (pad_of (source, "src").get (),
       GstPadProbeType (GST_PAD_PROBE_TYPE_BUFFER |
                        GST_PAD_PROBE_TYPE_EVENT_BOTH |
                        GST_PAD_PROBE_TYPE_QUERY_UPSTREAM),

@@ -20,10 +20,8 @@ take_caps (GstCodedExposureCameraSrc *self, GstCaps *caps)
     return true; // downstream refuses them
   Result<OwnedFrames> frames =
       OwnedFrames::make (info, settings_of (self).pixel_format);
-  if (!frames) {
-    POST_ERROR (self, RESOURCE, SETTINGS, frames.error ().message);
-    return false;
-  }
+  if (!frames)
+    return refuse_settings (self, frames.error ().message);
   stream.frames = *std::move (frames);
   stream.caps.reset (gst_caps_ref (caps));
   return true;

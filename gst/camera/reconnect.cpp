@@ -46,7 +46,7 @@ is_own_failure (const CameraState &st, GstMessage *message)
     gst_structure_get_int (details, "flow-return", &flow);
   return GST_MESSAGE_SRC (message) == GST_OBJECT (st.source) &&
          flow == GST_FLOW_ERROR &&
-         gst_pad_get_last_flow_return (static_pad (st.source, "src").get ()) ==
+         gst_pad_get_last_flow_return (pad_of (st.source, "src").get ()) ==
              GST_FLOW_OK;
 }
 
@@ -83,7 +83,7 @@ give_up (GstCodedExposureCameraSrc *self, guint tries)
           " tries to restart it (property reconnect): " + why +
           " Check its cable, its power and its trigger.");
   gst_pad_push_event (
-      static_pad (GST_ELEMENT (self), "src").get (), gst_event_new_eos ());
+      pad_of (GST_ELEMENT (self), "src").get (), gst_event_new_eos ());
 }
 
 /* One try. Returns whether a frame came; else the source has failed again, or

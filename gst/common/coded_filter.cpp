@@ -184,12 +184,10 @@ bool
 CodedFilter::read_settings ()
 {
   const auto check = [this] (const char *property, const auto &named) {
-    if (!named.read || *named.read)
-      return true;
-    POST_ERROR (element_, RESOURCE, SETTINGS,
-        std::string ("The ") + property +
-            " property cannot be read: " + named.read->error ().message);
-    return false;
+    return !named.read || *named.read ||
+           refuse_settings (element_,
+               std::string ("The ") + property +
+                   " property cannot be read: " + named.read->error ().message);
   };
   CodedSettings &settings = shared_.settings;
   return check ("schedule", read_again (element_, settings.schedule)) &&
@@ -240,10 +238,11 @@ CodedFilter::notify (const char *property) const
   g_object_notify (G_OBJECT (element_), property);
 }
 
-void
+bool
 CodedFilter::post_error (const std::string &why) const
 {
   POST_ERROR (element_, STREAM, FORMAT, why);
+  return false;
 }
 
 GstFlowReturn

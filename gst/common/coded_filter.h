@@ -227,7 +227,8 @@ protected:
   /** From the property, else from the frames, else from their tag, else from
    * the bench profile; 0: all bits of the format. */
   int significant_bits () const;
-  void post_error (const std::string &why) const;
+  /** Returns false. */
+  bool post_error (const std::string &why) const;
   /** Posts that a frame could not be decoded. Returns GST_FLOW_ERROR. */
   GstFlowReturn post_decode_error (const Error &error) const;
   void notify (const char *property) const;

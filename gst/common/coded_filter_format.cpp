@@ -74,46 +74,38 @@ CodedFilter::negotiate (GstBuffer *next)
 std::optional<CodedFormat>
 CodedFilter::find_format ()
 {
-  if (!stream_.caps) {
-    post_error ("Coded frames came without caps.");
+  const auto refused = [this] (const std::string &why) {
+    post_error (why);
     return std::nullopt;
-  }
+  };
+  if (!stream_.caps)
+    return refused ("Coded frames came without caps.");
   CodedFormat format{};
   format.caps = fill_in_rate (stream_.settings.rate, stream_.caps.get ());
   GstVideoInfo &info = format.info;
-  if (!gst_video_info_from_caps (&info, format.caps.get ())) {
-    post_error ("The caps of the coded frames cannot be read.");
-    return std::nullopt;
-  }
-  if (GST_VIDEO_INFO_IS_INTERLACED (&info)) {
-    post_error ("The coded frames are interlaced. A coded exposure needs a "
-                "progressive camera with a global shutter.");
-    return std::nullopt;
-  }
-  if (info.fps_n == 0) {
-    post_error (
+  if (!gst_video_info_from_caps (&info, format.caps.get ()))
+    return refused ("The caps of the coded frames cannot be read.");
+  if (GST_VIDEO_INFO_IS_INTERLACED (&info))
+    return refused ("The coded frames are interlaced. A coded exposure needs a "
+                    "progressive camera with a global shutter.");
+  if (info.fps_n == 0)
+    return refused (
         "The coded frames have no frame rate, so pictures have no duration. "
         "Set the frame-rate property, for example frame-rate=25/1.");
-    return std::nullopt;
-  }
   format.rate = {info.fps_n, info.fps_d};
   stream_.tagged_bits =
       stream_.tagged && *stream_.tagged
           ? significant_bits_of (stream_.tagged->value ().bits, info)
           : 0;
   format.size = {info.width, info.height};
-  if (stream_.not_coded) {
-    post_error (*stream_.not_coded);
-    return std::nullopt;
-  }
+  if (stream_.not_coded)
+    return refused (*stream_.not_coded);
   if (!find_schedule (format) || !check_camera (format) || !find_bench (format))
     return std::nullopt;
   auto slots = SlotPlan::fit (
       format.schedule.timing (), format.schedule.slots (), format.rate);
-  if (!slots) {
-    post_error (slots.error ().message);
-    return std::nullopt;
-  }
+  if (!slots)
+    return refused (slots.error ().message);
   format.slots = *slots;
   if (!find_rectifier (format))
     return std::nullopt;
@@ -125,29 +117,24 @@ bool
 CodedFilter::find_schedule (CodedFormat &format)
 {
   if (const auto &asked = stream_.settings.schedule.read) {
-    if (!*asked) {
-      post_error (
+    if (!*asked)
+      return post_error (
           "The schedule property cannot be read: " + asked->error ().message);
-      return false;
-    }
     format.schedule = asked->value ();
     report_overruled (format.schedule);
     return true;
   }
   if (const auto &tagged = stream_.tagged) {
-    if (!*tagged) {
-      post_error ("The schedule in the stream's tags cannot be read: " +
-                  tagged->error ().message);
-      return false;
-    }
+    if (!*tagged)
+      return post_error ("The schedule in the stream's tags cannot be read: " +
+                         tagged->error ().message);
     format.schedule = tagged->value ().schedule;
     return true;
   }
-  if (stream_.settings.require_schedule) {
-    post_error ("The stream has no schedule, neither in its tags nor in its "
-                "track. Set the schedule property.");
-    return false;
-  }
+  if (stream_.settings.require_schedule)
+    return post_error (
+        "The stream has no schedule, neither in its tags nor in its "
+        "track. Set the schedule property.");
   format.assumed = true;
   if (!std::exchange (stream_.warned_assumed, true))
     POST_WARNING (element_, STREAM, FORMAT,
@@ -167,12 +154,11 @@ CodedFilter::check_camera (const CodedFormat &format) const
   const std::string remedy =
       " Decode the frames as the camera gave them, or set the schedule "
       "property.";
-  if (camera.size && *camera.size != format.size) {
-    post_error ("The coded frames have " + text_of (format.size) +
-                " pixels, but the camera gave " + text_of (*camera.size) +
-                ": they were cropped or scaled." + remedy);
-    return false;
-  }
+  if (camera.size && *camera.size != format.size)
+    return post_error ("The coded frames have " + text_of (format.size) +
+                       " pixels, but the camera gave " +
+                       text_of (*camera.size) +
+                       ": they were cropped or scaled." + remedy);
   const FrameRate rate = camera.rate.value_or (format.rate);
   if (std::int64_t (rate.num) * format.rate.den ==
       std::int64_t (rate.den) * format.rate.num)
@@ -180,10 +166,9 @@ CodedFilter::check_camera (const CodedFormat &format) const
   const auto text = [] (FrameRate of) {
     return std::to_string (of.num) + "/" + std::to_string (of.den);
   };
-  post_error ("The caps say " + text (format.rate) +
-              " coded frames a second, but the camera gave " + text (rate) +
-              "." + remedy);
-  return false;
+  return post_error ("The caps say " + text (format.rate) +
+                     " coded frames a second, but the camera gave " +
+                     text (rate) + "." + remedy);
 }
 
 void
@@ -227,11 +212,9 @@ CodedFilter::find_bench (CodedFormat &format)
   if (stream_.tagged && *stream_.tagged)
     stream_.bench = stream_.tagged->value ().bench;
   if (const auto &asked = stream_.settings.bench.read) {
-    if (!*asked) {
-      post_error (
+    if (!*asked)
+      return post_error (
           "The bench property cannot be read: " + asked->error ().message);
-      return false;
-    }
     const BenchProfile &given = asked->value ();
     if (stream_.bench && !fits (given.check_bench (*stream_.bench)))
       return false;
@@ -264,19 +247,16 @@ bool
 CodedFilter::find_mapping (Extent camera, std::optional<Mapping> &mapping)
 {
   if (const auto &asked = stream_.settings.mapping.read) {
-    if (!*asked) {
-      post_error (
+    if (!*asked)
+      return post_error (
           "The mapping property cannot be read: " + asked->error ().message);
-      return false;
-    }
     mapping = asked->value ();
     if (mapping->camera () == camera)
       return true;
-    post_error ("The mapping " + stream_.settings.mapping.text +
-                " is for frames of " + text_of (mapping->camera ()) +
-                " pixels, but these have " + text_of (camera) +
-                ". Measure a new mapping with moirecalib.");
-    return false;
+    return post_error ("The mapping " + stream_.settings.mapping.text +
+                       " is for frames of " + text_of (mapping->camera ()) +
+                       " pixels, but these have " + text_of (camera) +
+                       ". Measure a new mapping with moirecalib.");
   }
   if (stream_.settings.bench.read)
     mapping = stream_.bench->mapping;
@@ -311,10 +291,9 @@ CodedFilter::find_rectifier (CodedFormat &format)
   if (!cache || !(cache->mapping == *mapping) ||
       !(cache->schedule == format.schedule) || !(cache->options == options)) {
     auto made = Rectifier::make (*mapping, format.schedule, options);
-    if (!made) {
-      post_error ("The mapping cannot be used: " + made.error ().message);
-      return false;
-    }
+    if (!made)
+      return post_error (
+          "The mapping cannot be used: " + made.error ().message);
     cache.emplace (RectifierCache{*mapping, format.schedule, options,
         std::make_shared<const Rectifier> (*std::move (made))});
   }

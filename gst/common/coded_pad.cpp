@@ -6,7 +6,10 @@
 #include <algorithm>
 #include <string_view>
 
-#include "pool.h"
+#include <gst/video/gstvideopool.h>
+
+#include "extract/planes.h"
+#include "meta.h"
 
 GST_DEBUG_CATEGORY_EXTERN (coded_filter_debug);
 #define GST_CAT_DEFAULT coded_filter_debug
@@ -16,6 +19,67 @@ namespace codedexposure::gst
 
 namespace
 {
+
+struct Count {
+  gint made = 0;
+};
+struct GstCodedPicturePool : Instance<GstVideoBufferPool, Count> {
+};
+
+GstMemory *
+allocate_staggered (GstBufferPool *pool, int k)
+{
+  GstStructure *config = gst_buffer_pool_get_config (pool);
+  GstAllocator *allocator = nullptr;
+  GstAllocationParams params;
+  guint size = 0;
+  gst_buffer_pool_config_get_allocator (config, &allocator, &params);
+  gst_buffer_pool_config_get_params (config, nullptr, &size, nullptr, nullptr);
+  params.align |= kRowAlignment - 1;
+  params.prefix += plane_stagger (k);
+  GstMemory *memory = gst_allocator_alloc (allocator, size, &params);
+  gst_structure_free (config);
+  return memory;
+}
+
+GstFlowReturn
+alloc_buffer (GstBufferPool *pool, GstBuffer **buffer,
+    GstBufferPoolAcquireParams *params) noexcept
+{
+  const GstFlowReturn flow =
+      parent_class<GstBufferPoolClass> (pool)->alloc_buffer (
+          pool, buffer, params);
+  if (flow != GST_FLOW_OK)
+    return flow;
+  const int k =
+      g_atomic_int_add (&state_in<GstCodedPicturePool> (pool).made, 1) &
+      G_MAXINT;
+  if (GstMemory *memory = allocate_staggered (pool, k))
+    gst_buffer_replace_all_memory (*buffer, memory);
+  set_frame_meta (*buffer, FrameMeta ());
+  return GST_FLOW_OK;
+}
+
+void
+set_up_pool (gpointer klass)
+{
+  GST_BUFFER_POOL_CLASS (klass)->alloc_buffer = alloc_buffer;
+}
+
+/* Its buffers start at different offsets in a memory page, because all
+ * subframes of a coded frame are written at once (plane_stagger ()). Each
+ * buffer always has the meta CodedExposureFrame; set it after a buffer is
+ * acquired. Transfer: full. */
+GstBufferPool *
+make_picture_pool ()
+{
+  auto *pool = static_cast<GstBufferPool *> (
+      g_object_new (type_of<GstCodedPicturePool, set_up_pool> (
+                        "GstCodedPicturePool", GST_TYPE_VIDEO_BUFFER_POOL),
+          nullptr));
+  gst_object_ref_sink (pool);
+  return pool;
+}
 
 /* The answer of a pad's peer to an ALLOCATION query. */
 struct Offer {

@@ -64,16 +64,9 @@ add_ghost_pad (GstElement *bin, const char *name, GstElement *inner)
   GstPad *pad = gst_ghost_pad_new_no_target_from_template (
       name, gst_element_get_pad_template (bin, name));
   if (inner)
-    gst_ghost_pad_set_target (
-        GST_GHOST_PAD (pad), static_pad (inner, name).get ());
+    gst_ghost_pad_set_target (GST_GHOST_PAD (pad), pad_of (inner, name).get ());
   gst_element_add_pad (bin, pad);
   return pad;
-}
-
-ObjectPtr<GstPad>
-static_pad (GstElement *element, const char *name)
-{
-  return ObjectPtr<GstPad> (gst_element_get_static_pad (element, name));
 }
 
 GstStateChangeReturn
@@ -104,6 +97,20 @@ GstBaseTransformClass *
 base_transform_class ()
 {
   return GST_BASE_TRANSFORM_CLASS (g_type_class_peek (GST_TYPE_BASE_TRANSFORM));
+}
+
+GstFlowReturn
+refuse_buffer (gpointer element, const GstVideoInfo &info, GstBuffer *buffer)
+{
+  POST_ERROR (element, STREAM, FORMAT, unreadable_text (info, buffer));
+  return GST_FLOW_ERROR;
+}
+
+bool
+refuse_settings (gpointer element, const std::string &why)
+{
+  POST_ERROR (element, RESOURCE, SETTINGS, why);
+  return false;
 }
 
 void

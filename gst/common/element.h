@@ -160,12 +160,15 @@ GstPad *add_pad (GstElement *element, const char *name);
 /** The same as a ghost of the pad @p name of @p inner, or without a target if
  * that is null. */
 GstPad *add_ghost_pad (GstElement *bin, const char *name, GstElement *inner);
-/** A pad that @p element has. */
-ObjectPtr<GstPad> static_pad (GstElement *element, const char *name);
 
 /** The class of GstBaseTransform, to call its default implementations. */
 GstBaseTransformClass *base_transform_class ();
 
+/** Posts that @p buffer cannot be mapped as a frame of @p info. */
+GstFlowReturn refuse_buffer (
+    gpointer element, const GstVideoInfo &info, GstBuffer *buffer);
+/** Posts an error of the settings. Returns false. */
+bool refuse_settings (gpointer element, const std::string &why);
 /** Posts that the latency has changed. */
 void post_latency (gpointer element);
 /** Sets @p own, the element's part of the latency, to what @p compute returns,

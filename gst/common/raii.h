@@ -49,6 +49,13 @@ struct PoolRelease {
 };
 using PoolPtr = std::unique_ptr<GstBufferPool, PoolRelease>;
 
+/** A pad that @p element has. */
+inline ObjectPtr<GstPad>
+pad_of (GstElement *element, const char *name)
+{
+  return ObjectPtr<GstPad> (gst_element_get_static_pad (element, name));
+}
+
 /* What an event holds, which it keeps. */
 GstTagList *tags_of (GstEvent *event);
 GstCaps *caps_of (GstEvent *event);

@@ -58,6 +58,16 @@ setup_to_tags (const StreamSetup &setup)
   return comment_to_tags (kPrefix, setup.to_json ());
 }
 
+/** A TAG event with @p tags. Transfer: full, of all. */
+GstEvent *
+in_place_of (GstEvent *event, GstTagList *tags)
+{
+  GstEvent *made = gst_event_new_tag (tags);
+  gst_event_set_seqnum (made, gst_event_get_seqnum (event));
+  gst_event_unref (event);
+  return made;
+}
+
 /** The TAG event @p event with @p ours in place of its setup and its
  * provenance. Transfer: full, of all. */
 GstEvent *
@@ -80,10 +90,7 @@ merge_others (GstTagList *ours, GstEvent *event)
             gst_tag_list_get_value_index (from, tag, i));
   };
   gst_tag_list_foreach (tags, copy_other, ours);
-  GstEvent *merged = gst_event_new_tag (ours);
-  gst_event_set_seqnum (merged, gst_event_get_seqnum (event));
-  gst_event_unref (event);
-  return merged;
+  return in_place_of (event, ours);
 }
 
 } // namespace
@@ -119,6 +126,33 @@ GstEvent *
 replace_setup (GstEvent *event, const StreamSetup &setup)
 {
   return merge_others (setup_to_tags (setup), event);
+}
+
+GstEvent *
+add_setups (GstEvent *event, const std::vector<StreamSetup> &setups)
+{
+  constexpr std::size_t kMostSetups = 64;
+  if (setups.size () < 2)
+    return event;
+  GstTagList *tags = gst_tag_list_copy (tags_of (event));
+  const std::size_t first =
+      setups.size () > kMostSetups ? setups.size () - kMostSetups : 0;
+  for (std::size_t i = first; i + 1 < setups.size (); i++)
+    gst_tag_list_add (tags, GST_TAG_MERGE_APPEND, GST_TAG_COMMENT,
+        (std::string (kSetupsPrefix) + setups[i].to_json ()).c_str (), nullptr);
+  return in_place_of (event, tags);
+}
+
+std::vector<StreamSetup>
+setups_from_tags (const GstTagList *tags)
+{
+  std::vector<StreamSetup> setups;
+  for (const std::string &comment : comments_of (tags))
+    if (comment.starts_with (kSetupsPrefix))
+      if (auto setup =
+              StreamSetup::from_json (comment.substr (kSetupsPrefix.size ())))
+        setups.push_back (*std::move (setup));
+  return setups;
 }
 
 GstEvent *
@@ -158,15 +192,17 @@ replace_by_provenance (GstEvent *event, const Provenance &provenance)
       comment_to_tags (kDecodedPrefix, provenance.to_json ()), event);
 }
 
-std::optional<int>
-bits_from_tags (GstEvent *event)
+void
+follow_tagged_bits (GstEvent *event, int &bits)
 {
-  GstTagList *tags = tags_of (event);
-  if (const auto setup = setup_from_tags (tags))
-    return *setup ? setup->value ().bits : 0;
-  if (const auto made = provenance_from_tags (tags))
-    return *made ? made->value ().setup.bits : 0;
-  return std::nullopt;
+  if (GST_EVENT_TYPE (event) == GST_EVENT_STREAM_START)
+    bits = 0;
+  if (GST_EVENT_TYPE (event) != GST_EVENT_TAG)
+    return;
+  if (const auto setup = setup_from_tags (tags_of (event)))
+    bits = *setup ? setup->value ().bits : 0;
+  else if (const auto made = provenance_from_tags (tags_of (event)))
+    bits = *made ? made->value ().setup.bits : 0;
 }
 
 std::optional<std::string>

@@ -6,6 +6,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <gst/gst.h>
 
@@ -32,6 +33,16 @@ std::optional<Result<StreamSetup>> setup_from_tags (const GstTagList *tags);
  * provenance in its tags; Transfer: full, of both. */
 GstEvent *replace_setup (GstEvent *event, const StreamSetup &setup);
 
+/** The TAG event @p event with all @p setups but the last, in their order, if
+ * they are not too many: a recording whose schedule, mapping or bench profile
+ * changes has them as comments "coded-exposure-setup={...}" beside the last
+ * one, so that a frame in the middle is decoded by its own. Transfer: full, of
+ * both.
+ */
+GstEvent *add_setups (GstEvent *event, const std::vector<StreamSetup> &setups);
+/** Those in @p tags that can be read. */
+std::vector<StreamSetup> setups_from_tags (const GstTagList *tags);
+
 /** The TAG event @p event without setup and provenance; null if nothing is left
  * of it. Transfer: full, of both. */
 GstEvent *remove_setup_and_provenance (GstEvent *event);
@@ -47,9 +58,9 @@ GstEvent *replace_by_provenance (GstEvent *event, const Provenance &provenance);
 /** The provenance in @p tags; as setup_from_tags (). */
 std::optional<Result<Provenance>> provenance_from_tags (const GstTagList *tags);
 
-/** The significant bits that a setup or a provenance in the TAG event @p event
- * says of frames; 0: not known. None if it has neither. */
-std::optional<int> bits_from_tags (GstEvent *event);
+/** Follows, in @p bits, the significant bits that the tags of a stream say of
+ * its frames; 0: not known. @p event: any, in turn. */
+void follow_tagged_bits (GstEvent *event, int &bits);
 
 /** If the tags of @p event say that its frames were decoded before: a message
  * of an element that takes coded frames only. */

@@ -60,10 +60,9 @@ Demux::check_pads (const PadMap &pads) const
         pads.lower_bound ({kind, numbered_pads (kind, &schedule)});
     if (beyond == pads.end () || beyond->first.first != kind)
       continue;
-    post_error ("Pad " +
-                (prefix_of (kind) + std::to_string (beyond->first.second)) +
-                " was requested, but " + pads_text (kind, &schedule));
-    return false;
+    return post_error (
+        "Pad " + (prefix_of (kind) + std::to_string (beyond->first.second)) +
+        " was requested, but " + pads_text (kind, &schedule));
   }
   return true;
 }

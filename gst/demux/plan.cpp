@@ -137,10 +137,8 @@ Demux::plan (const CodedFormat &format)
   options.bits = significant_bits ();
   auto parts = make_split_plan (format.schedule,
       {format.size, format.wide (), format.rate, format.slots}, options);
-  if (!parts) {
-    post_error (parts.error ().message);
-    return false;
-  }
+  if (!parts)
+    return post_error (parts.error ().message);
   Plan made{std::move (*parts), {}, {}};
   PadCaps caps;
   for (const SplitPart &part : made.parts) {

@@ -66,11 +66,9 @@ read_schedule (GstDmdSync *self)
 {
   SyncState &st = state (self);
   Result<Schedule> schedule = Schedule::parse (settings_of (self).schedule);
-  if (!schedule) {
-    POST_ERROR (self, RESOURCE, SETTINGS,
+  if (!schedule)
+    return refuse_settings (self,
         "The schedule property cannot be read: " + schedule.error ().message);
-    return false;
-  }
   const ObjectLock lock (self);
   st.schedule = *std::move (schedule);
   return true;
@@ -101,18 +99,15 @@ read_bench (GstDmdSync *self)
 {
   SyncState &st = state (self);
   const auto given = read_again (self, st.settings.bench).read;
-  std::string refused;
   if (given && !*given)
-    refused = "The bench property cannot be read: " + given->error ().message;
-  else if (given && given->value ().dmd && st.runner)
+    return refuse_settings (
+        self, "The bench property cannot be read: " + given->error ().message);
+  if (given && given->value ().dmd && st.runner)
     if (const auto same = BenchProfile::check_device (
             "DMD", *given->value ().dmd, {.serial = st.runner->info ().serial});
         !same)
-      refused = "The bench profile does not fit: " + same.error ().message;
-  if (!refused.empty ()) {
-    POST_ERROR (self, RESOURCE, SETTINGS, refused);
-    return false;
-  }
+      return refuse_settings (
+          self, "The bench profile does not fit: " + same.error ().message);
   locked (self, [&] {
     st.bench = given ? std::optional (given->value ()) : std::nullopt;
   });

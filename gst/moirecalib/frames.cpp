@@ -141,9 +141,8 @@ begin (GstMoireCalib *self, const Settings &settings, int bits)
     return true;
   }
   if (const auto shown = Pattern::parse (settings.live_pattern ()); !shown) {
-    POST_ERROR (self, RESOURCE, SETTINGS,
-        "The pattern property cannot be read: " + shown.error ().message);
-    return false;
+    return refuse_settings (
+        self, "The pattern property cannot be read: " + shown.error ().message);
   }
   const MirrorsAnswer mirrors = ask_mirrors (self);
   if (settings.pattern.empty () && !mirrors.patterns)

@@ -21,7 +21,6 @@
 #include "common/tag.h"
 #include "parts.h"
 #include "record/track.h"
-#include "setups.h"
 
 using namespace codedexposure;
 using namespace codedexposure::gst;

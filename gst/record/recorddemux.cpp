@@ -251,7 +251,7 @@ add_video (GstElement *self, GstPad *pad, const GstCaps *caps)
     gst_element_link_pads (state.queue, "src", state.restore, "sink");
   gst_element_sync_state_with_parent (state.queue);
   gst_pad_link_full (
-      pad, static_pad (state.queue, "sink").get (), GST_PAD_LINK_CHECK_NOTHING);
+      pad, pad_of (state.queue, "sink").get (), GST_PAD_LINK_CHECK_NOTHING);
 }
 
 void
@@ -263,7 +263,7 @@ on_pad_added (GstElement *, GstPad *pad, gpointer self)
   if (g_str_has_prefix (GST_OBJECT_NAME (pad), "video_") && !state.queue)
     add_video (GST_ELEMENT (self), pad, caps.get ());
   else if (gst_structure_has_name (structure, "text/x-raw"))
-    gst_pad_link (pad, static_pad (state.restore, "track").get ());
+    gst_pad_link (pad, pad_of (state.restore, "track").get ());
 }
 
 void
@@ -473,7 +473,7 @@ add_demuxer (Self *self)
   g_signal_connect (state.file, "pad-added", G_CALLBACK (on_pad_added), self);
   g_signal_connect (
       state.file, "no-more-pads", G_CALLBACK (on_no_more_pads), self);
-  const auto sink = static_pad (state.file, "sink");
+  const auto sink = pad_of (state.file, "sink");
   gst_pad_add_probe (
       sink.get (), GST_PAD_PROBE_TYPE_QUERY_UPSTREAM, on_query, self, nullptr);
   gst_pad_add_probe (
@@ -491,7 +491,7 @@ set_up_instance (Self *self)
   add_demuxer (self);
   add_ghost_pad (GST_ELEMENT (self), "sink", state.file);
   add_ghost_pad (GST_ELEMENT (self), "src", state.restore);
-  gst_pad_add_probe (static_pad (state.restore, "src").get (),
+  gst_pad_add_probe (pad_of (state.restore, "src").get (),
       GST_PAD_PROBE_TYPE_BUFFER, on_frame, self, nullptr);
 }
 

@@ -187,7 +187,7 @@ add_muxer (Self *self)
   for (GstPad *pad : {video.get (), text.get ()})
     gst_pad_add_probe (
         pad, GST_PAD_PROBE_TYPE_QUERY_UPSTREAM, on_latency, nullptr, nullptr);
-  gst_pad_add_probe (static_pad (state.mux, "src").get (),
+  gst_pad_add_probe (pad_of (state.mux, "src").get (),
       GstPadProbeType (
           GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM),
       on_output, self, nullptr);
@@ -284,7 +284,7 @@ request_new_pad (GstElement *self, GstPadTemplate *templ, const gchar *,
   }
   gst_ghost_pad_set_target (GST_GHOST_PAD (state.sink), nullptr);
   GstPad *pad = gst_ghost_pad_new_from_template (
-      "video_0", static_pad (state.log, "sink").get (), templ);
+      "video_0", pad_of (state.log, "sink").get (), templ);
   gst_pad_set_active (pad, TRUE);
   gst_element_add_pad (self, pad);
   const ObjectLock lock (self);
@@ -299,7 +299,7 @@ release_pad (GstElement *self, GstPad *pad) noexcept
   gst_element_remove_pad (self, pad);
   if (GST_BIN_NUMCHILDREN (self) > 0)
     gst_ghost_pad_set_target (
-        GST_GHOST_PAD (state.sink), static_pad (state.log, "sink").get ());
+        GST_GHOST_PAD (state.sink), pad_of (state.log, "sink").get ());
   const ObjectLock lock (self);
   state.requested = nullptr;
 }

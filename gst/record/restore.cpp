@@ -20,7 +20,6 @@
 #include "common/tag.h"
 #include "damage.h"
 #include "parts.h"
-#include "setups.h"
 #include "track_sink.h"
 
 using namespace codedexposure;

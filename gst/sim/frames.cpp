@@ -29,12 +29,10 @@ use_schedule (GstCodedExposureSim *self, ScheduleRef schedule)
   Stream &stream = state (self).stream;
   Result<Schedule> lit =
       stream.profile ? stream.profile->with_leak (*schedule) : *schedule;
-  if (!lit) {
-    POST_ERROR (self, RESOURCE, SETTINGS,
-        "The schedule cannot have the leak of the bench profile: " +
-            lit.error ().message);
-    return false;
-  }
+  if (!lit)
+    return refuse_settings (
+        self, "The schedule cannot have the leak of the bench profile: " +
+                  lit.error ().message);
   stream.lit = *std::move (lit);
   stream.schedule = schedule;
   stream.tag_due = true;
@@ -156,13 +154,12 @@ check_mirrors (GstCodedExposureSim *self, const SimulatedMirrors &mirrors)
   if (!size || mirrors.diamond () ||
       (size->width >= info.width && size->height >= info.height))
     return true;
-  POST_ERROR (self, RESOURCE, SETTINGS,
+  return refuse_settings (self,
       "The simulated DMD has " + text (size->width, size->height) +
           " mirrors, but the scene has " + text (info.width, info.height) +
           " pixels, and each needs a mirror; set size=" +
           text (info.width, info.height) +
           " of its device, or leave the size out.");
-  return false;
 }
 
 /* Whether the profile, if there is one, is of a camera with such frames; @bits:
@@ -203,21 +200,17 @@ prepare_bench (GstCodedExposureSim *self)
     return false;
   const GstVideoInfo &info = stream.plan->in;
   const int bits = GST_VIDEO_FORMAT_INFO_BITS (info.finfo);
-  if (optics.bits > bits) {
-    POST_ERROR (self, RESOURCE, SETTINGS,
-        "bits = " + std::to_string (optics.bits) + " is more than the " +
-            std::to_string (bits) + " bits of " +
-            std::string (GST_VIDEO_INFO_NAME (&info)) +
-            "; set fewer, or 0 for all.");
-    return false;
-  }
+  if (optics.bits > bits)
+    return refuse_settings (
+        self, "bits = " + std::to_string (optics.bits) + " is more than the " +
+                  std::to_string (bits) + " bits of " +
+                  std::string (GST_VIDEO_INFO_NAME (&info)) +
+                  "; set fewer, or 0 for all.");
   Result<OpticalBench> made =
       OpticalBench::make (info.width, info.height, optics);
-  if (!made) {
-    POST_ERROR (self, RESOURCE, SETTINGS,
-        "The bench cannot be set up: " + made.error ().message + ".");
-    return false;
-  }
+  if (!made)
+    return refuse_settings (
+        self, "The bench cannot be set up: " + made.error ().message + ".");
   stream.bench = *std::move (made);
   stream.optics = optics;
   return true;
@@ -259,14 +252,6 @@ begin_exposure (GstCodedExposureSim *self, GstBuffer *inbuf)
 }
 
 GstFlowReturn
-map_failed (
-    GstCodedExposureSim *self, const GstVideoInfo &info, GstBuffer *buffer)
-{
-  POST_ERROR (self, STREAM, FORMAT, unreadable_text (info, buffer));
-  return GST_FLOW_ERROR;
-}
-
-GstFlowReturn
 collect_light (GstCodedExposureSim *self, GstBuffer *inbuf)
 {
   Stream &stream = state (self).stream;
@@ -278,7 +263,7 @@ collect_light (GstCodedExposureSim *self, GstBuffer *inbuf)
 
   MappedFrame scene (plan.in, inbuf, GST_MAP_READ);
   if (!scene)
-    return map_failed (self, plan.in, inbuf);
+    return refuse_buffer (self, plan.in, inbuf);
   for (const LightShare &share : shares) {
     const int mask = exposure.masks[std::size_t (share.slot)];
     read_pixels (scene, [&] (auto pixels) {
@@ -296,7 +281,7 @@ read_out (GstCodedExposureSim *self, const Exposure &exposure)
   GstBuffer *outbuf = exposure.outbuf.get ();
   MappedFrame coded (stream.plan->out, outbuf, GST_MAP_WRITE);
   if (!coded)
-    return map_failed (self, stream.plan->out, outbuf);
+    return refuse_buffer (self, stream.plan->out, outbuf);
   write_pixels (coded,
       [&] (auto pixels) { stream.bench->read_out (exposure.frame, pixels); });
   return GST_FLOW_OK;
@@ -418,20 +403,16 @@ begin_stream (GstCodedExposureSim *self)
     state (self).counters = Counters ();
     return std::pair (state (self).settings.dmd, state (self).settings.bench);
   });
-  if (bench.read && !*bench.read) {
-    POST_ERROR (self, RESOURCE, SETTINGS,
+  if (bench.read && !*bench.read)
+    return refuse_settings (self,
         "The bench property cannot be read: " + bench.read->error ().message);
-    return false;
-  }
   if (bench.read)
     stream.profile = bench.read->value ();
-  if (!dmd.empty () && !(stream.mirrors = find_mirrors (dmd))) {
-    POST_ERROR (self, RESOURCE, SETTINGS,
-        "dmd '" + dmd +
-            "' is no simulated DMD; write sim:NAME, with the name that "
-            "dmdsync's device has.");
-    return false;
-  }
+  if (!dmd.empty () && !(stream.mirrors = find_mirrors (dmd)))
+    return refuse_settings (
+        self, "dmd '" + dmd +
+                  "' is no simulated DMD; write sim:NAME, with the name that "
+                  "dmdsync's device has.");
   ScheduleRef schedule = wanted_schedule (self);
   return schedule && use_schedule (self, std::move (schedule));
 }

@@ -201,10 +201,8 @@ render (GstBaseSink *sink, GstBuffer *picture) noexcept
 {
   Stack &state = state_of (sink);
   MappedFrame mapped (state.info, picture, GST_MAP_READ);
-  if (!mapped) {
-    POST_ERROR (sink, STREAM, FORMAT, unreadable_text (state.info, picture));
-    return GST_FLOW_ERROR;
-  }
+  if (!mapped)
+    return refuse_buffer (sink, state.info, picture);
   try {
     if (!state.file)
       open_file (sink, get_frame_meta (picture).value_or (FrameMeta ()));

@@ -151,11 +151,9 @@ begin_run (GstElement *element)
   state.options = {settings.bits, settings.bins, {}};
   if (!settings.line.empty ()) {
     const auto line = ProfileLine::parse (settings.line);
-    if (!line) {
-      POST_ERROR (self, RESOURCE, SETTINGS,
-          "The line property cannot be read: " + line.error ().message);
-      return false;
-    }
+    if (!line)
+      return refuse_settings (
+          self, "The line property cannot be read: " + line.error ().message);
     state.options.line = *line;
   }
   if (settings.location.empty ())
@@ -180,11 +178,9 @@ make_meter_of (GstSubframeStats *self)
   state.meter = {};
   auto made = StatsMeter<Pixel>::make (
       {state.info.width, state.info.height}, state.options);
-  if (!made) {
-    POST_ERROR (self, RESOURCE, SETTINGS,
-        "These pictures cannot be measured: " + made.error ().message);
-    return false;
-  }
+  if (!made)
+    return refuse_settings (
+        self, "These pictures cannot be measured: " + made.error ().message);
   state.meter = *std::move (made);
   return true;
 }
@@ -226,11 +222,7 @@ follow_bits (GstSubframeStats *self, GstBuffer *frame)
 gboolean
 sink_event (GstBaseTransform *base, GstEvent *event) noexcept
 {
-  StatsState &state = state_in<GstSubframeStats> (base);
-  if (GST_EVENT_TYPE (event) == GST_EVENT_STREAM_START)
-    state.tagged_bits = 0;
-  if (GST_EVENT_TYPE (event) == GST_EVENT_TAG)
-    state.tagged_bits = bits_from_tags (event).value_or (state.tagged_bits);
+  follow_tagged_bits (event, state_in<GstSubframeStats> (base).tagged_bits);
   return base_transform_class ()->sink_event (base, event);
 }
 

@@ -104,11 +104,7 @@ transform_caps (GstBaseTransform *, GstPadDirection direction, GstCaps *caps,
 gboolean
 sink_event (GstBaseTransform *base, GstEvent *event)
 {
-  int &bits = state_in<GstCodedExposureView> (base).tagged_bits;
-  if (GST_EVENT_TYPE (event) == GST_EVENT_STREAM_START)
-    bits = 0;
-  if (GST_EVENT_TYPE (event) == GST_EVENT_TAG)
-    bits = bits_from_tags (event).value_or (bits);
+  follow_tagged_bits (event, state_in<GstCodedExposureView> (base).tagged_bits);
   return base_transform_class ()->sink_event (base, event);
 }
 
@@ -122,13 +118,6 @@ before_transform (GstBaseTransform *base, GstBuffer *picture)
   gst_base_transform_set_passthrough (base, as_it_is);
 }
 
-GstFlowReturn
-refuse (GstCodedExposureView *self, const GstVideoInfo &info, GstBuffer *buffer)
-{
-  POST_ERROR (self, STREAM, FORMAT, unreadable_text (info, buffer));
-  return GST_FLOW_ERROR;
-}
-
 /* In place of the video filter's own, which passes a buffer that it cannot map
  * on without pixels. */
 GstFlowReturn
@@ -139,10 +128,10 @@ transform (GstBaseTransform *base, GstBuffer *picture, GstBuffer *shown)
   const GstVideoInfo &out = GST_VIDEO_FILTER (base)->out_info;
   MappedFrame from (in, picture, GST_MAP_READ);
   if (!from)
-    return refuse (self, in, picture);
+    return refuse_buffer (self, in, picture);
   MappedFrame to (out, shown, GST_MAP_WRITE);
   if (!to)
-    return refuse (self, out, shown);
+    return refuse_buffer (self, out, shown);
   const guint64 white =
       white_of (self, picture, int (GST_VIDEO_INFO_COMP_DEPTH (&in, 0)));
   read_pixels (

@@ -17,7 +17,6 @@
 #include "common/meta.h"
 #include "common/raii.h"
 #include "common/tag.h"
-#include "record/setups.h"
 #include "record/track.h"
 #include "record_parts.h"
 #include "schedule_tags.h"

@@ -10,7 +10,6 @@
 #include "common/messages.h"
 #include "common/meta.h"
 #include "common/tag.h"
-#include "record/setups.h"
 #include "record/track.h"
 #include "record_parts.h"
 

@@ -358,8 +358,6 @@ private:
   };
 
   /* Pads. */
-  ObjectPtr<GstCodedPad> new_source_pad (const char *templ,
-      const std::string &name, PadKind kind, int index) const;
   GstCodedPad *add_pad (
       const char *templ, PadKind kind, const std::string &name, int index);
   void insert_pad (PadRef pad);

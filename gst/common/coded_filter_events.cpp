@@ -7,7 +7,6 @@
 
 #include "tag.h"
 
-GST_DEBUG_CATEGORY_EXTERN (coded_filter_debug);
 #define GST_CAT_DEFAULT coded_filter_debug
 
 namespace codedexposure::gst
@@ -336,22 +335,6 @@ CodedFilter::period_for_seek () const
 }
 
 /* --------------------------------------------------------------- queries -- */
-
-namespace
-{
-
-/* Takes @own. */
-void
-answer_caps (GstQuery *query, CapsPtr own)
-{
-  GstCaps *filter = nullptr;
-  gst_query_parse_caps (query, &filter);
-  if (filter)
-    own = intersect_caps (filter, own.get ());
-  gst_query_set_caps_result (query, own.get ());
-}
-
-} // namespace
 
 gboolean
 CodedFilter::sink_query (GstQuery *query)

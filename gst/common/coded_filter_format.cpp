@@ -8,7 +8,6 @@
 
 #include "tag.h"
 
-GST_DEBUG_CATEGORY_EXTERN (coded_filter_debug);
 #define GST_CAT_DEFAULT coded_filter_debug
 
 namespace codedexposure::gst

@@ -9,7 +9,6 @@
 #include "base/pixels.h"
 #include "extract/black_level.h"
 
-GST_DEBUG_CATEGORY_EXTERN (coded_filter_debug);
 #define GST_CAT_DEFAULT coded_filter_debug
 
 namespace codedexposure::gst

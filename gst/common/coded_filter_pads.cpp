@@ -8,7 +8,6 @@
 #include "base/text.h"
 #include "tag.h"
 
-GST_DEBUG_CATEGORY_EXTERN (coded_filter_debug);
 #define GST_CAT_DEFAULT coded_filter_debug
 
 namespace codedexposure::gst
@@ -74,9 +73,9 @@ CodedFilter::take_caps (PadCaps caps)
 
 /* ------------------------------------------------- requests and releases -- */
 
-ObjectPtr<GstCodedPad>
-CodedFilter::new_source_pad (
-    const char *templ, const std::string &name, PadKind kind, int index) const
+GstCodedPad *
+CodedFilter::add_pad (
+    const char *templ, PadKind kind, const std::string &name, int index)
 {
   GstPad *pad = gst_pad_new_from_template (
       gst_element_get_pad_template (element_, templ), name.c_str ());
@@ -92,19 +91,11 @@ CodedFilter::new_source_pad (
   CodedPad &coded = as<GstCodedPad> (pad)->state;
   coded.kind = kind;
   coded.index = index;
-  return ObjectPtr<GstCodedPad> (as<GstCodedPad> (gst_object_ref_sink (pad)));
-}
-
-GstCodedPad *
-CodedFilter::add_pad (
-    const char *templ, PadKind kind, const std::string &name, int index)
-{
-  const PadRef pad (
-      new_source_pad (templ, name, kind, index).release (), ObjectUnref ());
-  gst_pad_set_active (GST_PAD (pad.get ()), TRUE);
-  insert_pad (pad);
-  gst_element_add_pad (element_, GST_PAD (pad.get ()));
-  return pad.get ();
+  gst_pad_set_active (pad, TRUE);
+  insert_pad (
+      PadRef (as<GstCodedPad> (gst_object_ref_sink (pad)), ObjectUnref ()));
+  gst_element_add_pad (element_, pad);
+  return as<GstCodedPad> (pad);
 }
 
 /* Before the source pads have caps, they have only STREAM_START; all other

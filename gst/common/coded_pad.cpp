@@ -11,7 +11,6 @@
 #include "extract/planes.h"
 #include "meta.h"
 
-GST_DEBUG_CATEGORY_EXTERN (coded_filter_debug);
 #define GST_CAT_DEFAULT coded_filter_debug
 
 namespace codedexposure::gst

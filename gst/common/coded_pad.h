@@ -14,6 +14,8 @@
 #include "element.h"
 #include "raii.h"
 
+GST_DEBUG_CATEGORY_EXTERN (coded_filter_debug);
+
 namespace codedexposure::gst
 {
 

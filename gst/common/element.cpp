@@ -147,6 +147,16 @@ add_latency (GstQuery *query, GstClockTime own)
       query, live, min + own, GST_CLOCK_TIME_IS_VALID (max) ? max + own : max);
 }
 
+void
+answer_caps (GstQuery *query, CapsPtr own)
+{
+  GstCaps *filter = nullptr;
+  gst_query_parse_caps (query, &filter);
+  if (filter)
+    own = intersect_caps (filter, own.get ());
+  gst_query_set_caps_result (query, own.get ());
+}
+
 EventPtr
 gap_like (GstEvent *gap, GstClockTime pts, GstClockTime duration)
 {

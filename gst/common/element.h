@@ -193,6 +193,9 @@ GstClockTime running_time (const GstSegment &segment, GstClockTime time);
  * maximum moves with the minimum, because both count from the PTS. */
 void add_latency (GstQuery *query, GstClockTime own);
 
+/** Answers the CAPS query @p query by @p own, as far as it asks for. */
+void answer_caps (GstQuery *query, CapsPtr own);
+
 /** A GAP event from @p pts for @p duration, otherwise as @p gap. */
 EventPtr gap_like (GstEvent *gap, GstClockTime pts, GstClockTime duration);
 

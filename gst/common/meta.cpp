@@ -133,6 +133,15 @@ copy_metas (GstBuffer *from, const GstVideoInfo &from_info, GstBuffer *to,
 }
 
 void
+copy_description (GstBuffer *from, const GstVideoInfo &info, GstBuffer *to)
+{
+  gst_buffer_copy_into (to, from,
+      GstBufferCopyFlags (GST_BUFFER_COPY_FLAGS | GST_BUFFER_COPY_TIMESTAMPS),
+      0, -1);
+  copy_metas (from, info, to, info);
+}
+
+void
 copy_metas_to_part (GstBuffer *from, GstBuffer *to)
 {
   MetaCopy copy{to, {}, {}, false};

@@ -75,6 +75,10 @@ std::optional<FrameMeta> get_frame_meta (GstBuffer *buffer);
  * Coordinates are scaled. */
 void copy_metas (GstBuffer *from, const GstVideoInfo &from_info, GstBuffer *to,
     const GstVideoInfo &to_info);
+/** The same, and flags and times, for @p to with pixels of its own, of the same
+ * @p info. */
+void copy_description (
+    GstBuffer *from, const GstVideoInfo &info, GstBuffer *to);
 /** The same for @p to made from a part of the picture; metas with coordinates
  * are not copied. */
 void copy_metas_to_part (GstBuffer *from, GstBuffer *to);

@@ -122,10 +122,7 @@ OwnedFrames::own (GstBuffer *frame) const
   BufferPtr owned (acquired);
   if (!(is_packed () ? unpack (frame, acquired) : copy (frame, acquired)))
     return nullptr;
-  gst_buffer_copy_into (acquired, frame,
-      GstBufferCopyFlags (GST_BUFFER_COPY_FLAGS | GST_BUFFER_COPY_TIMESTAMPS),
-      0, -1);
-  copy_metas (frame, info_, acquired, info_);
+  copy_description (frame, info_, acquired);
   return owned;
 }
 

@@ -396,10 +396,7 @@ Demux::share (
 
   BufferPtr packed (
       gst_buffer_new_allocate (nullptr, GST_VIDEO_INFO_SIZE (&info), nullptr));
-  gst_buffer_copy_into (packed.get (), outbuf,
-      GstBufferCopyFlags (GST_BUFFER_COPY_FLAGS | GST_BUFFER_COPY_TIMESTAMPS),
-      0, -1);
-  copy_metas (outbuf, info, packed.get (), info);
+  copy_description (outbuf, info, packed.get ());
   MappedFrame from (info, outbuf, GST_MAP_READ);
   MappedFrame to (info, packed.get (), GST_MAP_WRITE);
   if (from && to)

@@ -208,10 +208,7 @@ Fuse::take (CodedFrame frame)
   note_saturation (frame);
 
   BufferPtr description (gst_buffer_new ());
-  gst_buffer_copy_into (description.get (), buffer,
-      GstBufferCopyFlags (GST_BUFFER_COPY_FLAGS | GST_BUFFER_COPY_TIMESTAMPS),
-      0, -1);
-  copy_metas (buffer, format ().info, description.get (), format ().info);
+  copy_description (buffer, format ().info, description.get ());
   frame.buffer = std::move (description);
   waiting_.push_back (std::move (frame));
   return GST_FLOW_OK;

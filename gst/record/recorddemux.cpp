@@ -130,11 +130,11 @@ aligned (GstBuffer *frame)
 {
   if (is_aligned (frame))
     return frame;
-  const gsize size = gst_buffer_get_size (frame);
-  GstBuffer *copy = gst_buffer_new_allocate (nullptr, size, nullptr);
+  GstBuffer *copy =
+      gst_buffer_new_allocate (nullptr, gst_buffer_get_size (frame), nullptr);
   GstMapInfo map;
   gst_buffer_map (copy, &map, GST_MAP_WRITE);
-  gst_buffer_extract (frame, 0, map.data, size);
+  gst_buffer_extract (frame, 0, map.data, map.size);
   gst_buffer_unmap (copy, &map);
   gst_buffer_copy_into (copy, frame, GST_BUFFER_COPY_METADATA, 0, -1);
   gst_buffer_unref (frame);

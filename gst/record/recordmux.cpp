@@ -108,13 +108,8 @@ answer (GstQuery *query)
   }
   if (GST_QUERY_TYPE (query) != GST_QUERY_CAPS)
     return GST_PAD_PROBE_OK;
-  const CapsPtr all (
-      gst_caps_from_string (CODED_EXPOSURE_VIDEO_CAPS ";video/x-ffv"));
-  gst_query_parse_caps (query, &caps);
-  const CapsPtr wanted (caps ? gst_caps_intersect_full (
-                                   caps, all.get (), GST_CAPS_INTERSECT_FIRST)
-                             : gst_caps_ref (all.get ()));
-  gst_query_set_caps_result (query, wanted.get ());
+  answer_caps (query, CapsPtr (gst_caps_from_string (
+                          CODED_EXPOSURE_VIDEO_CAPS ";video/x-ffv")));
   return GST_PAD_PROBE_HANDLED;
 }
 

@@ -477,13 +477,10 @@ src_query (GstPad *pad, GstObject *parent, GstQuery *query) noexcept
 {
   if (GST_QUERY_TYPE (query) != GST_QUERY_CAPS)
     return gst_pad_query_default (pad, parent, query);
-  GstCaps *filter = nullptr;
-  gst_query_parse_caps (query, &filter);
   const CapsPtr own (gst_pad_get_pad_template_caps (pad));
   const CapsPtr before (
-      gst_pad_peer_query_caps (state_in<Self> (parent).sink, filter));
-  const CapsPtr both (gst_caps_intersect (before.get (), own.get ()));
-  gst_query_set_caps_result (query, both.get ());
+      gst_pad_peer_query_caps (state_in<Self> (parent).sink, nullptr));
+  answer_caps (query, intersect_caps (before.get (), own.get ()));
   return TRUE;
 }
 

@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <string_view>
 
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "base/file.h"
 #include "base/text.h"
 #include "command.h"
 #include "pipeline/plugin.h"
@@ -21,7 +21,7 @@ namespace
 {
 
 constexpr const char *kName = "codedexposure";
-constexpr std::size_t kMaxProgram = std::size_t (1) << 28;
+constexpr std::size_t kPart = std::size_t (1) << 20; ///< bytes read at once
 
 /** All commands, in the order of --help. */
 std::vector<std::unique_ptr<Command>>
@@ -144,9 +144,14 @@ build_id ()
   const auto plugin =
       program.parent_path ().parent_path () / "gst/libgstcodedexposure.so";
   std::uint64_t id = 0;
+  std::string part;
   for (const auto &path : {program, plugin})
-    if (const auto file = read_file (path, kMaxProgram))
-      id = id * 31 + std::hash<std::string>{}(*file);
+    for (std::ifstream file (path, std::ios::binary); file;) {
+      part.resize (kPart);
+      file.read (part.data (), kPart);
+      part.resize (std::size_t (file.gcount ()));
+      id = id * 31 + std::hash<std::string>{}(part);
+    }
   char text[17];
   std::snprintf (
       text, sizeof text, "%016llx", static_cast<unsigned long long> (id));

@@ -5,7 +5,7 @@
 #include "bench/simulated_dmd.h"
 #include "common/elements.h"
 #include "common/meta.h"
-#include "stats/report.h"
+#include "common/stats_report.h"
 
 static gboolean
 plugin_init (GstPlugin *plugin)

@@ -5,7 +5,7 @@
 #include "common/tag.h"
 #include "pipeline/decoder.h"
 #include "pipeline/recording.h"
-#include "stats/report.h"
+#include "common/stats_report.h"
 
 namespace codedexposure::app
 {

@@ -52,7 +52,7 @@
 #include "common/meta.h"
 #include "common/record.h"
 #include "common/tag.h"
-#include "report.h"
+#include "common/stats_report.h"
 
 using namespace codedexposure;
 using namespace codedexposure::gst;

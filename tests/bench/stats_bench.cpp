@@ -7,7 +7,7 @@
 #include "common/meta.h"
 #include "harness.h"
 #include "stats/picture_stats.h"
-#include "stats/report.h"
+#include "common/stats_report.h"
 
 namespace
 {

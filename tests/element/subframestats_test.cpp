@@ -11,7 +11,7 @@
 #include "common/meta.h"
 #include "harness.h"
 #include "pipeline.h"
-#include "stats/report.h"
+#include "common/stats_report.h"
 
 namespace
 {

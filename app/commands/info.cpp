@@ -43,6 +43,8 @@ public:
             "none.\n",
         .examples = "  For people:\n"
                     "    codedexposure info coded.mkv\n"
+                    "  All recordings of a day:\n"
+                    "    codedexposure info day1/*.mkv\n"
                     "  For programs, with the time of each coded frame:\n"
                     "    codedexposure info --json --times coded.mkv\n"};
   }

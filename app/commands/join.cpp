@@ -63,20 +63,23 @@ public:
     g_error_free (error);
     return text;
   }
-  /** How the pictures were made; null: it is not said. */
-  EventPtr provenance () const
+  /** How the pictures were made, among others. */
+  std::vector<EventPtr> tags () const
   {
     const ObjectPtr<GstPad> pad = pad_of (GST_ELEMENT (sink_), "sink");
-    for (guint i = 0;; i++) {
-      EventPtr event (gst_pad_get_sticky_event (pad.get (), GST_EVENT_TAG, i));
-      if (!event)
-        return nullptr;
-      GstTagList *tags = nullptr;
-      gst_event_parse_tag (event.get (), &tags);
-      const auto made = provenance_from_tags (tags);
-      if (made && *made)
-        return EventPtr (provenance_to_event (made->value ()));
-    }
+    std::vector<EventPtr> all;
+    while (GstEvent *event =
+               gst_pad_get_sticky_event (pad.get (), GST_EVENT_TAG, all.size ()))
+      all.emplace_back (event);
+    return all;
+  }
+  /** When it ends; after next(). */
+  GstClockTime end () const
+  {
+    const ObjectPtr<GstPad> pad = pad_of (GST_ELEMENT (sink_), "sink");
+    gint64 length = 0;
+    gst_pad_peer_query_duration (pad.get (), GST_FORMAT_TIME, &length);
+    return begin_ + GstClockTime (length);
   }
 
 private:
@@ -154,8 +157,8 @@ private:
     GstCaps *caps = gst_sample_get_caps (first);
     caps_.reset (gst_caps_ref (caps));
     gst_app_src_set_caps (GST_APP_SRC (source_), caps);
-    if (EventPtr made = part_->provenance ())
-      gst_element_send_event (source_, made.release ());
+    for (EventPtr &tags : part_->tags ())
+      gst_element_send_event (source_, tags.release ());
   }
 
   /* What is wrong with the next picture; empty: nothing. */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure join: puts the pictures of excerpts together, as one run of
  * decode would have written them. Archives run it. */
-#include <atomic>
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -73,13 +73,13 @@ public:
       all.emplace_back (event);
     return all;
   }
-  /** When it ends; after next(). */
-  GstClockTime end () const
+  /** After next(). */
+  GstClockTime duration () const
   {
-    const ObjectPtr<GstPad> pad = pad_of (GST_ELEMENT (sink_), "sink");
-    gint64 length = 0;
-    gst_pad_peer_query_duration (pad.get (), GST_FORMAT_TIME, &length);
-    return begin_ + GstClockTime (length);
+    gint64 duration = 0;
+    gst_element_query_duration (
+        GST_ELEMENT (sink_), GST_FORMAT_TIME, &duration);
+    return GstClockTime (duration);
   }
 
 private:
@@ -87,6 +87,19 @@ private:
   Job job_;
   GstAppSink *sink_;
 };
+
+/** Of all parts, about; NONE: not known. Files need it to choose their form. */
+GstClockTime
+duration_of (const std::vector<std::string> &names)
+{
+  const Part first (names.front ()), last (names.back ());
+  const SamplePtr begin = first.next (), end = last.next ();
+  if (!begin || !end)
+    return GST_CLOCK_TIME_NONE;
+  return GST_BUFFER_PTS (gst_sample_get_buffer (end.get ())) +
+         last.duration () -
+         GST_BUFFER_PTS (gst_sample_get_buffer (begin.get ()));
+}
 
 /** Pushes the pictures of all parts into a source, one after the other, and
  * checks that each coded frame's pictures are there exactly once. */
@@ -97,7 +110,7 @@ public:
       : source_ (source), names_ (std::move (names))
   {
     g_object_set (source, "format", GST_FORMAT_TIME, "block", TRUE, "max-bytes",
-        guint64 (64) << 20, nullptr);
+        guint64 (64) << 20, "duration", duration_of (names_), nullptr);
     g_signal_connect (source, "need-data", G_CALLBACK (on_need_data), this);
   }
   Feeder (const Feeder &) = delete;
@@ -255,7 +268,9 @@ public:
     chain.to ("queue");
     write_video (job, chain, *output_, style_);
     const Exit exit = play (job).exit;
-    if (exit == Exit::done)
+    if (exit != Exit::done)
+      std::filesystem::remove (*output_ + ".part");
+    else
       std::printf ("%s\n", feeder.counts ().dump ().c_str ());
     return exit;
   }

@@ -44,12 +44,26 @@ input_scene (Job &job, const SourceOptions &options, const SourcePlan &plan)
   return chain;
 }
 
+/* videotestsrc writes outside of narrower pictures. */
+void
+check_ball (const SourceOptions &options, const SourcePlan &plan)
+{
+  constexpr int kDiameter = 40;
+  if (options.pattern.value_or ("ball") == "ball" &&
+      plan.size.width < kDiameter)
+    usage_error ("the ball of --pattern ball is " + std::to_string (kDiameter) +
+                 " pixels wide, the pictures are " +
+                 std::to_string (plan.size.width) +
+                 "; set a larger --size or another --pattern");
+}
+
 Chain
 scene (
     Job &job, const SourceOptions &options, const SourcePlan &plan, Pace pace)
 {
   const std::string caps = grey_caps (plan, plan.scene_rate ());
   if (!options.input && !options.scene) {
+    check_ball (options, plan);
     Chain chain = job.graph.begin (
         "videotestsrc", {{"pattern", options.pattern.value_or ("ball")},
                             {"is-live", pace == Pace::live}});

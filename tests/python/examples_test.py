@@ -11,7 +11,11 @@ from unittest import mock
 
 from rig import ROOT, SCRATCH, clean, decoded, simulate
 import numpy as np
-import codedexposure  # pylint: disable=unused-import
+import codedexposure
+
+# Their modules must be there before those of matplotlib come and go.
+for name in codedexposure.__all__:
+    getattr(codedexposure, name)
 
 BLOCKS = re.findall(r"```python\n(.*?)```",
                     (ROOT / "docs/analyse.md").read_text(), re.DOTALL)

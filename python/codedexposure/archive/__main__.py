@@ -75,6 +75,9 @@ class Parser(argparse.ArgumentParser):
         sys.stderr.write(f'{NAME}: {message}\nTry: {CALL} --help\n')
         sys.exit(2)
 
+    def knows(self, option):
+        return option.partition('=')[0] in self._option_string_actions
+
 
 def number(text):
     value = int(text)
@@ -109,6 +112,9 @@ def parse():
         sys.exit(0)
     if '--' in words:
         words, decode = words[:words.index('--')], words[words.index('--') + 1:]
+    for word in words:
+        if word.startswith('--') and not parser.knows(word):
+            parser.error(f'unknown option {word}')
     options = parser.parse_intermixed_args(words)
     options.decode = decode
     if options.command in ('plan', 'submit'):
@@ -224,6 +230,7 @@ def outcome(store, made):
     status.show_failures(store, made, now, sys.stderr)
     if not now.complete() and not now.failed:
         status.show_log(store, sys.stderr)
+        status.show_room(store, sys.stderr)
     print(status.progress(store, now))
     if not now.complete():
         print(status.RESUME)

@@ -2,6 +2,7 @@
 """What is done, what failed, and how long the rest will take."""
 import dataclasses
 import os
+import shutil
 import sys
 import time
 
@@ -85,6 +86,13 @@ def show_log(store, out):
         path = os.path.join(store.last_run() or '', f'{kind}.log')
         for line in programs.last_lines(path):
             print(f'{kind}: {line}', file=out)
+
+
+def show_room(store, out):
+    """A full disk takes no record of failures."""
+    if shutil.disk_usage(store.folder).free < 1 << 16:
+        print(f'the disk is full; delete files, or move {store.folder} to '
+              'another', file=out)
 
 
 def show(store, plan):

@@ -110,7 +110,8 @@ public:
       : source_ (source), names_ (std::move (names))
   {
     g_object_set (source, "format", GST_FORMAT_TIME, "block", TRUE, "max-bytes",
-        guint64 (64) << 20, "duration", duration_of (names_), nullptr);
+        guint64 (64) << 20, "duration", duration_of (names_),
+        "handle-segment-change", TRUE, nullptr);
     g_signal_connect (source, "need-data", G_CALLBACK (on_need_data), this);
   }
   Feeder (const Feeder &) = delete;
@@ -156,22 +157,23 @@ private:
     }
     if (const std::string why = check (sample.get ()); !why.empty ())
       return fail_with (part_->name () + " " + why);
+    if (pictures_++ == 0)
+      return begin (sample.get ());
     BufferPtr picture (
         gst_buffer_copy (gst_sample_get_buffer (sample.get ())));
-    if (pictures_++ == 0)
-      begin (sample.get ());
-    else if (follows_)
+    if (follows_)
       GST_BUFFER_FLAG_UNSET (picture.get (), GST_BUFFER_FLAG_DISCONT);
     gst_app_src_push_buffer (GST_APP_SRC (source_), picture.release ());
   }
 
+  /* With its segment: the time of the stream may begin with it. */
   void begin (GstSample *first)
   {
-    GstCaps *caps = gst_sample_get_caps (first);
-    caps_.reset (gst_caps_ref (caps));
-    gst_app_src_set_caps (GST_APP_SRC (source_), caps);
+    caps_.reset (gst_caps_ref (gst_sample_get_caps (first)));
+    gst_app_src_set_caps (GST_APP_SRC (source_), caps_.get ());
     for (EventPtr &tags : part_->tags ())
       gst_element_send_event (source_, tags.release ());
+    gst_app_src_push_sample (GST_APP_SRC (source_), first);
   }
 
   /* What is wrong with the next picture; empty: nothing. */

@@ -126,8 +126,22 @@ rename_format (GstEvent *event)
   return gst_event_new_caps (renamed.get ());
 }
 
+/* Frames of another recording were taken when that was made. */
+void
+keep_date (GstElement *mux, const GstTagList *tags)
+{
+  GstDateTime *date = nullptr;
+  if (!gst_tag_list_get_date_time (tags, GST_TAG_DATE_TIME, &date))
+    return;
+  if (GDateTime *taken = gst_date_time_to_g_date_time (date)) {
+    g_object_set (mux, "creation-time", taken, nullptr);
+    g_date_time_unref (taken);
+  }
+  gst_date_time_unref (date);
+}
+
 GstPadProbeReturn
-on_video (GstPad *, GstPadProbeInfo *info, gpointer) noexcept
+on_video (GstPad *pad, GstPadProbeInfo *info, gpointer) noexcept
 {
   const auto type = GST_PAD_PROBE_INFO_TYPE (info);
   if (type & GST_PAD_PROBE_TYPE_QUERY_DOWNSTREAM)
@@ -137,6 +151,8 @@ on_video (GstPad *, GstPadProbeInfo *info, gpointer) noexcept
   auto *event = GST_PAD_PROBE_INFO_EVENT (info);
   if (GST_EVENT_TYPE (event) == GST_EVENT_CAPS)
     info->data = rename_format (event);
+  if (GST_EVENT_TYPE (event) == GST_EVENT_TAG)
+    keep_date (GST_PAD_PARENT (pad), tags_of (event));
   return GST_PAD_PROBE_OK;
 }
 
@@ -232,7 +248,8 @@ begin_run (GstElement *self)
   const Settings settings = settings_of (as<Self> (self));
   g_object_set (state.log, "location", settings.log_location.c_str (), nullptr);
   g_object_set (
-      state.mux, "streamable", gboolean (settings.is_streamable), nullptr);
+      state.mux, "streamable", gboolean (settings.is_streamable),
+      "creation-time", nullptr, nullptr);
   state.output.restart ();
   return settings.codec == Codec::ffv1
              ? add_encoder (self, settings.threads)

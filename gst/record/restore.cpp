@@ -227,6 +227,16 @@ report_loss (Self *self, const FrameRecord &record, GstClockTime pts)
   post_message (self, FramesLost{lost, pts - std::min (pts, before), pts});
 }
 
+/* Frames that are missing together with their lines, by the numbers. */
+guint64
+gap_before (const RestoreState &state, const FrameRecord &record)
+{
+  if (!state.is_complete || !state.last_frame ||
+      record.frame <= *state.last_frame)
+    return 0;
+  return record.frame - *state.last_frame - 1;
+}
+
 void
 restore (Self *self, GstBuffer *frame, const TrackReader::Match &match)
 {
@@ -234,9 +244,12 @@ restore (Self *self, GstBuffer *frame, const TrackReader::Match &match)
   FrameRecord record = *match.line->frame;
   if (match.skipped > 0)
     record.lost_before = record.lost_before.value_or (0) + match.skipped;
+  const guint64 gap = gap_before (state, record);
+  if (gap > 0)
+    record.lost_before = std::max (gap, record.lost_before.value_or (0));
   apply_record (frame, record, match.offset);
   report_loss (self, *match.line->frame, GST_BUFFER_PTS (frame));
-  if (match.skipped > 0)
+  if (match.skipped > 0 || gap > 0)
     GST_BUFFER_FLAG_SET (frame, GST_BUFFER_FLAG_DISCONT);
   state.last_frame = record.frame;
   state.found_line = true;

@@ -163,6 +163,7 @@ private:
         gst_buffer_copy (gst_sample_get_buffer (sample.get ())));
     if (follows_)
       GST_BUFFER_FLAG_UNSET (picture.get (), GST_BUFFER_FLAG_DISCONT);
+    tell_lost (picture.get ());
     gst_app_src_push_buffer (GST_APP_SRC (source_), picture.release ());
   }
 
@@ -205,6 +206,7 @@ private:
     /* An excerpt begins with a discontinuity, which the whole does not have. */
     follows_ = coded_ > 0 && (!begins || meta->frame == frame_ + 1);
     if (begins) {
+      gap_ = coded_ > 0 ? meta->frame - frame_ - 1 : 0;
       if (coded_ == 0)
         first_ = meta->frame;
       else
@@ -216,6 +218,16 @@ private:
     return {};
   }
 
+  /* An excerpt does not know the frame before its first one. */
+  void tell_lost (GstBuffer *picture) const
+  {
+    auto meta = get_frame_meta (picture);
+    if (!meta || meta->lost_before >= gap_)
+      return;
+    meta->lost_before = gap_;
+    set_frame_meta (picture, *meta);
+  }
+
   GstElement *source_; // of the pipeline, which stops before this goes
   std::vector<std::string> names_;
   /* Streaming thread: */
@@ -224,6 +236,7 @@ private:
   CapsPtr caps_;
   GstClockTime last_ = GST_CLOCK_TIME_NONE;
   guint64 pictures_ = 0, coded_ = 0, first_ = 0, frame_ = 0;
+  guint64 gap_ = 0; // coded frames that are missing before frame_
   int slot_ = 0, slots_ = 0;
   bool follows_ = false; // the picture before is that of the slot before
 };

@@ -209,8 +209,6 @@ flaw_of (const RestoreState &state, GstBuffer *frame, const FrameRecord &record,
     return "its time is not that at which it was recorded";
   if (match.names_unknown_setup)
     return "its schedule is not known, because a part of the track is missing";
-  if (GST_BUFFER_FLAG_IS_SET (frame, GST_BUFFER_FLAG_CORRUPTED))
-    return "it was damaged before it was recorded";
   return nullptr;
 }
 

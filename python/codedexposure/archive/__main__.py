@@ -230,6 +230,7 @@ def outcome(store, made):
     status.show_failures(store, made, now, sys.stderr)
     if not now.complete() and not now.failed:
         status.show_log(store, sys.stderr)
+    if not now.complete():
         status.show_room(store, sys.stderr)
     print(status.progress(store, now))
     if not now.complete():

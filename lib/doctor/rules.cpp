@@ -36,7 +36,7 @@ constexpr const char *kNetwork =
     "switch, and stop other programs";
 constexpr const char *kMapping =
     "see that nothing moves, align the camera with "
-    "pipelines/calibrate, and run this check again";
+    "codedexposure calibrate, and run this check again";
 
 constexpr const char *kStuck =
     "let the mirrors run for an hour with changing masks; if they stay stuck, "
@@ -154,8 +154,8 @@ constexpr Rule kRules[] = {
 
     {"rotation", "", "degrees", within (0.8), within (1.5),
         "the camera is rotated against the mirrors by {} degrees",
-        "rotate it back; gst-launch with moirecalib or pipelines/calibrate "
-        "show it live"},
+        "rotate it back; gst-launch-1.0 with moirecalib or codedexposure "
+        "calibrate show it live"},
     {"scale", "", "%", within (2), within (4), "",
         "change the distance of lens and camera until a mirror covers as much, "
         "and focus again"},

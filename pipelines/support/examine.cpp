@@ -35,7 +35,7 @@ using codedexposure::app::format;
 namespace
 {
 
-enum ExitCode { kGood = 0, kBad = 1, kUsage = 2 };
+enum ExitCode { kGood = 0, kBad = 1, kUsage = 2, kNotKnown = 4 };
 
 constexpr std::size_t kBlock = std::size_t (8) << 20; // of the disk's test
 constexpr std::size_t kMostWritten = std::size_t (512) << 20;
@@ -214,6 +214,8 @@ private:
   DoctorPage page () const;
   std::vector<std::string> next_commands () const;
   Verdict worst () const;
+  /** That no check has failed is good only if each has told. */
+  bool is_known () const;
 
   const Arguments &arguments_;
   const std::stop_token stop_;
@@ -326,6 +328,14 @@ Doctor::worst () const
   return worst;
 }
 
+bool
+Doctor::is_known () const
+{
+  return std::ranges::none_of (findings_, [] (const Finding &finding) {
+    return finding.verdict () == Verdict::unknown;
+  });
+}
+
 /* -------------------------------------------------------------- the files --
  */
 
@@ -415,7 +425,12 @@ Doctor::run ()
     return kBad;
   }
   voice_.line (std::string ("result: ") + verdict_text (worst ()));
-  return worst () == Verdict::fail ? kBad : kGood;
+  if (worst () == Verdict::fail)
+    return kBad;
+  if (is_known ())
+    return kGood;
+  voice_.line ("not all is known: see the checks that are UNKNOWN");
+  return kNotKnown;
 }
 
 /* ---------------------------------------------------------- the arguments --

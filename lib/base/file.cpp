@@ -38,24 +38,29 @@ read_file (const std::string &path, std::size_t limit)
 Result<void>
 write_file (const std::string &path, const std::string &content)
 {
+  namespace fs = std::filesystem;
   /* A file that is there stays as it is until the new one is complete; what is
-   * no file, such as /dev/stdout, cannot be replaced. */
-  std::error_code ignored;
-  const bool replace = !std::filesystem::exists (path, ignored) ||
-                       std::filesystem::is_regular_file (path, ignored);
-  const std::string beside = replace ? path + ".new" : path;
+   * no file, such as /dev/stdout, cannot be replaced. A link stays, too. */
+  std::error_code failed;
+  const bool known = fs::is_regular_file (path, failed);
+  const bool replace = known || !fs::exists (fs::symlink_status (path, failed));
+  const std::string target =
+      known ? fs::canonical (path, failed).native () : path;
+  const std::string beside = replace ? target + ".new" : target;
   std::ofstream file (beside, std::ios::binary | std::ios::trunc);
   bool written = file && file << content && file.flush ();
   if (written && replace) {
     file.close ();
-    written = file && std::rename (beside.c_str (), path.c_str ()) == 0;
+    if (known)
+      fs::permissions (beside, fs::status (target).permissions (), failed);
+    written = file && std::rename (beside.c_str (), target.c_str ()) == 0;
   }
   if (!written) {
     Error error{"cannot be written to " + in_quotes (path, 200) + ": " +
                     std::strerror (errno),
         ErrorCode::io};
     if (replace)
-      std::filesystem::remove (beside, ignored);
+      fs::remove (beside, failed);
     return error;
   }
   return {};

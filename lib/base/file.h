@@ -16,8 +16,9 @@ namespace codedexposure
 Result<std::string> read_file (const std::string &path, std::size_t limit);
 
 /** Writes @p content to the file @p path, which gets its name when it is
- * complete. The error, "cannot be written to 'PATH': why", is to follow the
- * name of what is written. */
+ * complete; one that is there keeps its mode, and a link stays a link. The
+ * error, "cannot be written to 'PATH': why", is to follow the name of what is
+ * written. */
 Result<void> write_file (const std::string &path, const std::string &content);
 
 /** Writes what was printed to stdout and is still held. Error, also if an

@@ -1,10 +1,13 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Printing of untrusted text, and parsing of numbers. */
+/* Printing of untrusted text, parsing of numbers, and files of text. */
 #include "base/text.h"
 
 #include <cmath>
+#include <filesystem>
 
 #include <gtest/gtest.h>
+
+#include "base/file.h"
 
 using namespace codedexposure;
 
@@ -74,4 +77,30 @@ TEST (Text, SplitKeepsEmptyPieces)
   EXPECT_EQ (split ("", ','), (Pieces{""}));
   EXPECT_EQ (split ("a", ','), (Pieces{"a"}));
   EXPECT_EQ (split ("a,,b,", ','), (Pieces{"a", "", "b", ""}));
+}
+
+TEST (File, KeepsItsLinksAndItsMode)
+{
+  namespace fs = std::filesystem;
+  const fs::path folder = fs::path (testing::TempDir ()) / "text_test_files";
+  fs::remove_all (folder);
+  fs::create_directory (folder);
+  const std::string file = folder / "file", link = folder / "link",
+                    loose = folder / "loose";
+  constexpr auto kMode = fs::perms::owner_read | fs::perms::owner_write;
+  ASSERT_TRUE (write_file (file, "first").ok ());
+  fs::permissions (file, kMode);
+  fs::create_symlink ("file", link);
+  fs::create_symlink ("later", loose);
+  ASSERT_TRUE (write_file (link, "second").ok ());
+  ASSERT_TRUE (write_file (loose, "third").ok ());
+  for (const auto &[path, content] : {std::pair (link, "second"),
+           std::pair (file, "second"), std::pair (loose, "third"),
+           std::pair ((folder / "later").string (), "third")})
+    EXPECT_EQ (read_file (path, 10).value (), content) << path;
+  EXPECT_TRUE (fs::is_symlink (link));
+  EXPECT_TRUE (fs::is_symlink (loose));
+  EXPECT_EQ (fs::status (file).permissions (), kMode);
+  EXPECT_EQ (std::distance (fs::directory_iterator (folder), {}), 4);
+  fs::remove_all (folder);
 }

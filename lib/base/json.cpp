@@ -234,13 +234,13 @@ size_into (Extent &to, int highest)
 std::string
 json_text (const Json &value)
 {
-  return value.dump ();
+  return value.dump (-1, ' ', false, Json::error_handler_t::replace);
 }
 
 std::string
 json_text (const OrderedJson &value)
 {
-  return value.dump ();
+  return value.dump (-1, ' ', false, OrderedJson::error_handler_t::replace);
 }
 
 OrderedJson

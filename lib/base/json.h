@@ -111,8 +111,8 @@ inner_into (std::optional<T> &to, T (*read) (const Json &))
  * it; and a zero byte. @p what, such as "schedule", is for the message. */
 Json parse_strictly (std::string_view text, const std::string &what);
 
-/** @p value on one line; a text that is no UTF-8 throws. Here and in
- * json_value (), so that the writer and the parser are compiled once. */
+/** @p value on one line; what is no UTF-8 in its texts becomes U+FFFD. Here and
+ * in json_value (), so that the writer and the parser are compiled once. */
 std::string json_text (const Json &value);
 std::string json_text (const OrderedJson &value);
 

@@ -85,6 +85,16 @@ TEST (BenchProfile, ReadsBackBitForBit)
       R"("bits":8})");
 }
 
+/* Cameras say their names in any encoding. */
+TEST (BenchProfile, WritesNamesThatAreNoText)
+{
+  BenchProfile profile = plain ();
+  profile.camera.vendor = "M\xfcller";
+  const auto read = BenchProfile::from_json (profile.to_json ());
+  ASSERT_TRUE (read.ok ()) << read.error ().message;
+  EXPECT_EQ (read->camera.vendor, "M\xef\xbf\xbdller");
+}
+
 TEST (BenchProfile, IsReadFromATextOrAFile)
 {
   const std::string path = testing::TempDir () + "bench_profile_test.json";

@@ -3,6 +3,7 @@
 
 #include <bit>
 #include <memory>
+#include <new>
 
 #include <xxhash.h>
 
@@ -28,6 +29,8 @@ pixel_hash (ImageView<const Pixel> pixels)
   if (pixels.stride == std::ptrdiff_t (row))
     return XXH3_64bits (pixels.data, row * std::size_t (pixels.height));
   const std::unique_ptr<XXH3_state_t, FreeState> state (XXH3_createState ());
+  if (!state)
+    throw std::bad_alloc ();
   XXH3_64bits_reset (state.get ());
   for (int y = 0; y < pixels.height; y++)
     XXH3_64bits_update (state.get (), pixels.row (y), row);

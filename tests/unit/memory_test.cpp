@@ -5,13 +5,16 @@
 #include <limits>
 #include <new>
 
+#include <dlfcn.h>
 #include <gtest/gtest.h>
+#include <xxhash.h>
 
 #include "base/workers.h"
 #include "dmd/runner.h"
 #include "extract/extractor.h"
 #include "fuse/fuser.h"
 #include "mapping/mapping.h"
+#include "record/pixel_hash.h"
 #include "rectify/rectifier.h"
 
 namespace
@@ -69,6 +72,15 @@ void
 operator delete[] (void *memory, std::size_t) noexcept
 {
   std::free (memory);
+}
+
+/** In place of the library's, which calls malloc (). */
+XXH3_state_t *
+XXH3_createState ()
+{
+  static const auto create = reinterpret_cast<decltype (&XXH3_createState)> (
+      dlsym (RTLD_NEXT, "XXH3_createState"));
+  return left-- > 0 ? create () : nullptr;
 }
 
 namespace
@@ -212,6 +224,15 @@ TEST (Memory, FusersGoOnAfterAFrameThatFailed)
     fuser->forget ();
     EXPECT_EQ (fused (*fuser), truth);
   }
+}
+
+TEST (Memory, AHashOfRowsIsMadeOrNot)
+{
+  const Image<std::uint8_t> pixels (8, 4);
+  const auto rows = pixels.view ().block (0, 0, 7, 4);
+  EXPECT_NO_THROW (pixel_hash (rows));
+  const Limit limit (0);
+  EXPECT_THROW (pixel_hash (rows), std::bad_alloc);
 }
 
 TEST (Memory, WorkersHandAnExceptionToTheirCaller)

@@ -23,6 +23,8 @@ constexpr int kManySurroundings = 16;
 /* Multiplications that are allowed for windows that repeat, and for those next
  * to other parts of the schedule: some seconds. */
 constexpr double kMaxWork = 5e9, kMaxWorkOfOthers = 1.5e10;
+/* Mirrors in all windows that repeat: a fraction of a gigabyte. */
+constexpr double kMaxMirrors = 5e7;
 
 constexpr std::int32_t kUnknown = -1;
 
@@ -188,16 +190,24 @@ double
 FilterBank::effort () const
 {
   const double work = solver_.work (), nodes = (steps_ + 1.0) * (steps_ + 1.0);
-  const double mirrors = std::pow (2.0 * solver_.reach () + 1.0, 2);
+  const double mirrors = solver_.mirrors ();
   return surroundings_.repeating () * nodes * work / kMaxWork +
          surroundings_.others () * (work + 5.0 * mirrors * mirrors) /
              kMaxWorkOfOthers;
 }
 
 double
-FilterBank::effort (const PixelView &view)
+FilterBank::effort (const PixelView &view, const Schedule &schedule)
 {
-  return kFewSteps * kFewSteps * WeightSolver (view).work () / kMaxWork;
+  const WeightSolver solver (view);
+  const auto windows = [] (const Tile &tile) {
+    return double (tile.period_x ()) * tile.period_y ();
+  };
+  double repeating = windows (schedule.tile ());
+  for (const Region &region : schedule.regions ())
+    repeating += windows (region.tile);
+  return std::max (kFewSteps * kFewSteps * solver.work () / kMaxWork,
+      repeating * solver.mirrors () / kMaxMirrors);
 }
 
 Neighbourhood

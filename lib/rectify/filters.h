@@ -73,8 +73,8 @@ public:
   const WeightSolver &solver () const { return solver_; }
   /** The time to make all filters, as a part of what is allowed. */
   double effort () const;
-  /** The same for the smallest schedule. */
-  static double effort (const PixelView &view);
+  /** The least that it can be, before anything is made. */
+  static double effort (const PixelView &view, const Schedule &schedule);
   Surroundings &surroundings () { return surroundings_; }
   /** Noise of a pixel, rms, in units of the scene's standard deviation. */
   static constexpr std::array<double, 4> kNoises = {0.05, 0.11, 0.25, 0.55};

@@ -265,7 +265,7 @@ try {
   const bool whole = mapping.one_to_one (options.tolerance);
   if (whole)
     view.sigma = 0.0;
-  RETURN_IF_ERROR (check_effort (view, FilterBank::effort (view)));
+  RETURN_IF_ERROR (check_effort (view, FilterBank::effort (view, schedule)));
   Planner planner (mapping, schedule, options, view, whole);
   RETURN_IF_ERROR (check_effort (view, planner.effort ()));
   plan->places = Image<Place> (plan->mirrors.width, plan->mirrors.height);
@@ -279,11 +279,6 @@ try {
   return Rectifier (std::move (plan));
 } catch (const std::bad_alloc &) {
   return out_of_memory ();
-}
-
-Rectifier::Rectifier (std::shared_ptr<const Plan> plan)
-    : plan_ (std::move (plan))
-{
 }
 
 Extent

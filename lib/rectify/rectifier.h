@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <utility>
 
 #include "base/image.h"
 #include "base/result.h"
@@ -86,7 +87,10 @@ public:
 
 private:
   struct Plan;
-  explicit Rectifier (std::shared_ptr<const Plan> plan);
+  explicit Rectifier (std::shared_ptr<const Plan> plan)
+      : plan_ (std::move (plan))
+  {
+  }
   std::shared_ptr<const Plan> plan_;
 };
 

@@ -79,9 +79,8 @@ WeightSolver::work () const
   for (int y = -reach; y <= reach; y++)
     for (int x = -reach; x <= reach; x++)
       shares += across_.at (x) * down_.at (y) > kMinShare;
-  const double mirrors = std::pow (2.0 * reach + 1.0, 2);
   const double pixels = double (view_.taps) * view_.taps;
-  return pixels * shares * (mirrors + 0.5 * pixels);
+  return pixels * shares * (mirrors () + 0.5 * pixels);
 }
 
 /* Part of the light of the pixel @dx, @dy pixels from where the middle mirror

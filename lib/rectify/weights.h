@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <span>
 #include <vector>
@@ -78,6 +79,8 @@ public:
   int taps () const { return view_.taps; }
   /** Mirrors to each side that the pixels of a window see. */
   int reach () const;
+  /** Mirrors in the window with that reach. */
+  double mirrors () const { return std::pow (2.0 * reach () + 1.0, 2); }
   /** Multiplications of solve () for one noise, about. */
   double work () const;
   /** Part of a pixel's light that comes from the mirror seen @p dx, @p dy

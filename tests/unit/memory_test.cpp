@@ -173,6 +173,34 @@ TEST (Memory, PlansAreMadeOrNot)
       [&] { return Fuser<std::uint8_t>::make (schedule, kWidth, kHeight); });
 }
 
+/* A stream's tag may say anything of its tile and its mapping. */
+TEST (Memory, WindowsOfAHugeTileAreRefusedBeforeTheyAreMade)
+{
+  constexpr int kPeriod = Tile::kMaxPeriod;
+  std::vector<std::uint8_t> labels (kPeriod * kPeriod);
+  for (int y = 0; y < kPeriod; y++)
+    for (int x = 0; x < kPeriod; x++)
+      labels[std::size_t (y * kPeriod + x)] = std::uint8_t (
+          (x % 2 + 2 * (y % 2)) ^ ((x / 2) * (y / 2) * 7 / 5 % 4));
+  const Schedule schedule = Schedule::make (
+      {.tile = Tile::from_labels (kPeriod, kPeriod, labels).value (),
+          .code = Code::named ("sequential", 4).value ()})
+                                .value ();
+  constexpr int kSide = 64;
+  const double slope = 14.0 * (kSide - 1);
+  const Mapping mapping = Mapping::make (
+      {.camera = {kSide, kSide},
+          .mirrors = {kSide, kSide},
+          .displacement = Displacement{2, 2, {0, slope, 0, slope},
+              {0, 0, 0, 0}}}).value ();
+  const auto made = [&] {
+    const Limit limit (5'000);
+    return Rectifier::make (mapping, schedule);
+  }();
+  ASSERT_FALSE (made);
+  EXPECT_EQ (made.error ().code, ErrorCode::invalid_argument);
+}
+
 /** What @p fuser makes of two frames. */
 std::vector<Image<std::uint8_t>>
 fused (Fuser<std::uint8_t> &fuser)

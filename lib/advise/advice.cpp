@@ -67,7 +67,8 @@ predict_part (
   prediction.slot_electrons = model.slot_electrons ();
   ASSIGN_OR_RETURN (prediction.snr_white, model.snr (1.0));
   ASSIGN_OR_RETURN (prediction.snr_grey, model.snr (Prediction::kGrey));
-  prediction.psnr = LinearEstimate (model, conditions.scene).psnr ();
+  prediction.psnr =
+      -10.0 * std::log10 (LinearEstimate (model, conditions.scene).error);
   prediction.overexposed = model.overexposed ();
   return prediction;
 }

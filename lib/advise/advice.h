@@ -32,7 +32,7 @@ struct Prediction {
   double slot_electrons = 0.0; ///< of white in one slot
   double snr_white = 0.0;      ///< dB, ExposureModel::snr ()
   double snr_grey = 0.0;       ///< dB, at kGrey of white
-  double psnr = 0.0;           ///< dB, LinearEstimate::psnr ()
+  double psnr = 0.0;           ///< dB, of LinearEstimate::error
   bool overexposed = false;
   /** Of a schedule with regions, the predictions of the parts: the background,
    * then the regions. The whole has the rate and the subframes of the slowest

@@ -67,51 +67,33 @@ representatives (const ExposureModel &model)
 
 LinearEstimate::LinearEstimate (
     const ExposureModel &model, const SceneStatistics &scene)
-    : slots_ (model.slots ()),
-      places_ (disc (std::max (5.0, 1.6 * std::sqrt (model.elements ()))))
+    : places (disc (std::max (5.0, 1.6 * std::sqrt (model.elements ()))))
 {
   const Observation &observation = model.observation ();
   const CodedCovariance covariance (scene.patch (model.pitch ()),
-      observation.shares (), slots_, 2 * std::abs (places_.front ().y),
+      observation.shares (), model.slots (), 2 * std::abs (places.front ().y),
       slot_times (model, scene));
   const double scene_variance = scene.contrast * scene.contrast;
   std::vector<double> noise;
   for (int e = 0; e < model.elements (); e++)
     noise.push_back (observation.variance (e, scene.level) / scene_variance);
-  const std::size_t n = places_.size (), slots = std::size_t (slots_);
-  weights_.resize (std::size_t (model.elements ()) * slots * n);
+  const std::size_t n = places.size (), slots = std::size_t (model.slots ());
+  weights.resize (std::size_t (model.elements ()) * slots * n);
   double found = 0.0;
   for (const auto &[element, at] : representatives (model)) {
     std::vector<int> elements;
-    for (const Offset place : places_)
+    for (const Offset place : places)
       elements.push_back (model.element_at (at.x + place.x, at.y + place.y));
     const KrigingSystem system =
-        slot_equations (covariance, places_, elements, noise);
+        slot_equations (covariance, places, elements, noise);
     const std::vector<double> solved = solve_kriging (system);
     found += std::inner_product (
         solved.begin (), solved.end (), system.targets.begin (), 0.0);
-    double *weights = weights_.data () + std::size_t (element) * slots * n;
+    double *to = weights.data () + std::size_t (element) * slots * n;
     for (std::size_t i = 0; i < slots * n; i++)
-      weights[i] = solved[i] / model.light (elements[i % n]);
+      to[i] = solved[i] / model.light (elements[i % n]);
   }
-  error_ = scene_variance * (1.0 - found / (model.elements () * slots_));
-}
-
-double
-LinearEstimate::psnr () const
-{
-  return -10.0 * std::log10 (error_);
-}
-
-std::vector<EstimateTap>
-LinearEstimate::taps (int element, int slot) const
-{
-  std::vector<EstimateTap> taps;
-  const std::size_t first =
-      std::size_t (element * slots_ + slot) * places_.size ();
-  for (std::size_t i = 0; i < places_.size (); i++)
-    taps.push_back ({places_[i], weights_[first + i]});
-  return taps;
+  error = scene_variance * (1.0 - found / (model.elements () * model.slots ()));
 }
 
 } // namespace codedexposure

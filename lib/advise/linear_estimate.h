@@ -11,12 +11,6 @@
 namespace codedexposure
 {
 
-/** A coded pixel at (x, y) from the estimated one, and its weight. */
-struct EstimateTap {
-  Offset at;
-  double weight;
-};
-
 /**
  * Simple kriging: each pixel of the full-size picture in each slot is estimated
  * from the coded pixels around it in one frame, with the least expected squared
@@ -26,9 +20,7 @@ struct EstimateTap {
  * subframe. The error thus contains motion blur within the slot, aliasing,
  * motion until the next subframe, and noise.
  */
-class LinearEstimate
-{
-public:
+struct LinearEstimate {
   /** Filters for more elements would take minutes to solve. */
   static constexpr int kMaxElements = 64;
 
@@ -36,22 +28,14 @@ public:
    * pixel of each element represents all others. */
   LinearEstimate (const ExposureModel &model, const SceneStatistics &scene);
 
+  /** The coded pixels around the estimated one. */
+  std::vector<Offset> places;
+  /** Of element e and slot s, place by place, from (e slots + s) times their
+   * number on. They apply to differences of coded pixels from their means;
+   * white in one slot is 1. */
+  std::vector<double> weights;
   /** Mean squared error over pixels and slots; white is 1. */
-  double error () const { return error_; }
-  /** In dB. */
-  double psnr () const;
-  /** The taps around a pixel of @p element and their weights for @p slot. They
-   * apply to differences of coded pixels from their means; white in one slot is
-   * 1. */
-  std::vector<EstimateTap> taps (int element, int slot) const;
-
-private:
-  int slots_;
-  std::vector<Offset> places_;
-  /** Of element e and slot s, place by place, from (e slots_ + s) times their
-   * number on. */
-  std::vector<double> weights_;
-  double error_ = 0.0;
+  double error = 0.0;
 };
 
 } // namespace codedexposure

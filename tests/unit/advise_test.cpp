@@ -225,15 +225,15 @@ compare (const Schedule &schedule, const LinearEstimate &estimate, int slot,
     Sum &sum)
 {
   constexpr int kBorder = 8;
-  std::vector<std::vector<EstimateTap>> taps;
-  for (int e = 0; e < schedule.elements (); e++)
-    taps.push_back (estimate.taps (e, slot));
   for (int y = kBorder; y < kSide - kBorder; y++)
     for (int x = kBorder; x < kSide - kBorder; x++) {
       double value = level;
-      for (const auto &[at, weight] :
-          taps[std::size_t (schedule.element_at (x, y))])
-        value += weight * coded.at (x + at.x, y + at.y);
+      const double *weight =
+          estimate.weights.data () +
+          std::size_t (schedule.element_at (x, y) * schedule.slots () + slot) *
+              estimate.places.size ();
+      for (const auto &[dx, dy] : estimate.places)
+        value += *weight++ * coded.at (x + dx, y + dy);
       for (int m = 0; m < kMoments; m++) {
         const double off = value - truth[m].at (x, y);
         sum.squares += off * off;

@@ -16,7 +16,6 @@
 #include "extract/covered_cells.h"
 #include "extract/fast_path.h"
 #include "extract/reference.h"
-#include "extract/targets.h"
 
 namespace codedexposure
 {
@@ -188,19 +187,6 @@ Extractor<Pixel>::Plan::leave_out_regions (ImageView<const Pixel> coded,
 }
 
 template <typename Pixel>
-Extractor<Pixel>::Extractor (std::unique_ptr<const Plan> plan)
-    : plan_ (std::move (plan))
-{
-}
-
-template <typename Pixel>
-Extractor<Pixel>::Extractor (Extractor &&) noexcept = default;
-template <typename Pixel>
-Extractor<Pixel> &Extractor<Pixel>::operator= (Extractor &&) noexcept = default;
-template <typename Pixel>
-Extractor<Pixel>::~Extractor () = default;
-
-template <typename Pixel>
 Result<Extractor<Pixel>>
 Extractor<Pixel>::make (
     const Schedule &whole, int width, int height, const ExtractOptions &options)
@@ -216,7 +202,7 @@ try {
 
   const Method method =
       options.method == Method::kAuto ? method_for (schedule) : options.method;
-  auto plan = std::make_unique<Plan> (
+  auto plan = std::make_shared<Plan> (
       Plan{{method, grid, size, largest_pixel_of<Pixel> (options.bits),
                elements_by_slot (schedule.code ())},
           CoveredCells (whole, size), {width, height}});

@@ -6,6 +6,7 @@
 #include <memory>
 #include <span>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "base/image.h"
@@ -80,10 +81,6 @@ public:
   static Result<Extractor> make (const Schedule &schedule, int width,
       int height, const ExtractOptions &options = {});
 
-  Extractor (Extractor &&) noexcept;
-  Extractor &operator= (Extractor &&) noexcept;
-  ~Extractor ();
-
   /** The method that is used, never kAuto. */
   Method method () const;
   /** The gain that is used; 1 where it does not apply. */
@@ -108,8 +105,11 @@ public:
 
 private:
   struct Plan;
-  explicit Extractor (std::unique_ptr<const Plan> plan);
-  std::unique_ptr<const Plan> plan_;
+  explicit Extractor (std::shared_ptr<const Plan> plan)
+      : plan_ (std::move (plan))
+  {
+  }
+  std::shared_ptr<const Plan> plan_;
 };
 
 extern template class Extractor<std::uint8_t>;

@@ -12,7 +12,6 @@
 #include "extract/extractor.h"
 #include "extract/kernels.h"
 #include "extract/linear.h"
-#include "extract/targets.h"
 #include "schedule/sample_grid.h"
 
 namespace codedexposure

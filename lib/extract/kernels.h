@@ -5,6 +5,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
+#include <string_view>
 
 namespace codedexposure
 {
@@ -102,5 +104,25 @@ struct Kernels {
   /** Pixels that are not below @p largest. */
   std::uint64_t (*count) (const Pixel *row, int pixels, Pixel largest);
 };
+
+/** The kernels of one instruction set, for both types of pixels. */
+struct Target {
+  std::string_view name;
+  Kernels<std::uint8_t> u8;
+  Kernels<std::uint16_t> u16;
+
+  template <typename Pixel>
+  const Kernels<Pixel> &kernels () const
+  {
+    if constexpr (sizeof (Pixel) == 1)
+      return u8;
+    else
+      return u16;
+  }
+};
+
+/** Those that this processor can run, widest first; found out once. None on a
+ * processor without SSE4.1. */
+std::span<const Target> supported_targets ();
 
 } // namespace codedexposure

@@ -31,8 +31,8 @@ template <typename T>
 constexpr Kernels<T> kKernels = {
     kLanes<T>, select<T>, rank<T>, decode<T>, decode_row<T>, count<T>};
 
-extern const Kernels<std::uint8_t> *const kernels_u8 = &kKernels<std::uint8_t>;
-extern const Kernels<std::uint16_t> *const kernels_u16 =
-    &kKernels<std::uint16_t>;
+extern const Target kernels;
+const Target kernels = {
+    CODEDEXPOSURE_TARGET_NAME, kKernels<std::uint8_t>, kKernels<std::uint16_t>};
 
 } // namespace codedexposure::CODEDEXPOSURE_TARGET

@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "base/pixels.h"
-#include "extract/targets.h"
+#include "extract/kernels.h"
 
 namespace codedexposure
 {

@@ -4,11 +4,28 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/targets.h"
 #include "base/text.h"
 #include "base/try.h"
 
+#define CODEDEXPOSURE_KERNELS(target)                                          \
+  namespace codedexposure::fuse_##target                                       \
+  {                                                                            \
+    extern const fuse::Kernels kernels;                                        \
+  }
+CODEDEXPOSURE_TARGETS (CODEDEXPOSURE_KERNELS, baseline)
+
 namespace codedexposure::fuse
 {
+
+std::span<const Kernels>
+supported_kernels ()
+{
+#define CODEDEXPOSURE_ADDRESS(target) &fuse_##target::kernels,
+  static const auto kernels = supported<Kernels> (
+      {CODEDEXPOSURE_TARGETS (CODEDEXPOSURE_ADDRESS, baseline)});
+  return kernels;
+}
 
 namespace
 {
@@ -197,7 +214,6 @@ Engine::blend_static (const StaticPixels::Found &still)
     }
 }
 
-/* Whole frames, for the stages that look around. */
 /* Whole frames, for the stages that look around. */
 bool
 Engine::fill_light (const CodedFrames &frames, const Seen &seen,

@@ -282,17 +282,6 @@ Fuser<Pixel>::State::or_forget (const Function &function)
 }
 
 template <typename Pixel>
-Fuser<Pixel>::Fuser (std::unique_ptr<State> state) : state_ (std::move (state))
-{
-}
-template <typename Pixel>
-Fuser<Pixel>::Fuser (Fuser &&) noexcept = default;
-template <typename Pixel>
-Fuser<Pixel> &Fuser<Pixel>::operator= (Fuser &&) noexcept = default;
-template <typename Pixel>
-Fuser<Pixel>::~Fuser () = default;
-
-template <typename Pixel>
 Result<Fuser<Pixel>>
 Fuser<Pixel>::make (const Schedule &schedule, int width, int height,
     const FuseOptions &wanted, std::stop_token stop)
@@ -315,7 +304,7 @@ try {
   RETURN_IF_ERROR (schedule.check_size (width, height));
   ASSIGN_OR_RETURN (auto pieces, make_pieces (schedule, width, height, options,
                                      largest, std::move (stop)));
-  auto state = std::make_unique<State> (State{std::move (pieces),
+  auto state = std::make_shared<State> (State{std::move (pieces),
       find_covers (schedule, {width, height - schedule.pilot_rows ()}),
       schedule.slots (), float (largest),
       std::make_unique<Workers> (

@@ -8,6 +8,7 @@
 #include <stop_token>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "base/image.h"
@@ -92,9 +93,8 @@ public:
   static Result<Fuser> make (const Schedule &schedule, int width, int height,
       const FuseOptions &options = {}, std::stop_token stop = {});
 
-  Fuser (Fuser &&) noexcept;
-  Fuser &operator= (Fuser &&) noexcept;
-  ~Fuser ();
+  Fuser (Fuser &&) noexcept = default;
+  Fuser &operator= (Fuser &&) noexcept = default;
 
   int slots () const;
   /** Why frames, or a region of them, are not refined although the options say
@@ -133,8 +133,8 @@ public:
 
 private:
   struct State;
-  explicit Fuser (std::unique_ptr<State> state);
-  std::unique_ptr<State> state_;
+  explicit Fuser (std::shared_ptr<State> state) : state_ (std::move (state)) {}
+  std::shared_ptr<State> state_;
 };
 
 extern template class Fuser<std::uint8_t>;

@@ -90,7 +90,7 @@ struct Window::Pane {
   WindowPane part;
 
   /* The thread of the pane: */
-  Meter meter;
+  std::optional<StatsMeter> meter;
   Extent metered;
   int metered_bits = 0;
   std::shared_ptr<const Exposure> exposure; // of the frame that passes
@@ -266,24 +266,22 @@ Window::measure (Pane &pane, GstPad *pad, GstBuffer *frame)
   g_object_get (pane.part.view, "bits", &bits, nullptr);
   if (const auto meta = get_frame_meta (frame); meta && bits == 0)
     bits = meta->bits;
-  bits = std::min (bits, int (GST_VIDEO_INFO_COMP_DEPTH (&*info, 0)));
+  const int depth = int (GST_VIDEO_INFO_COMP_DEPTH (&*info, 0));
+  bits = bits > 0 ? std::min (bits, depth) : depth;
   MappedFrame mapped (*info, frame, GST_MAP_READ);
   if (!mapped)
     return;
   const Extent size{info->width, info->height};
-  const bool fits = pane.metered == size && pane.metered_bits == bits;
-  pane.metered = size;
-  pane.metered_bits = bits;
-  read_pixels (mapped, [&]<typename Pixel> (ImageView<const Pixel> pixels) {
-    using Exact = StatsMeter<Pixel>;
-    if (!fits || !std::holds_alternative<Exact> (pane.meter)) {
-      pane.meter = {};
-      auto made = Exact::make (size, {.bits = bits, .bins = kBins});
-      if (!made)
-        return;
-      pane.meter = std::move (*made);
-    }
-    const PictureStats &stats = std::get<Exact> (pane.meter).measure (pixels);
+  if (!pane.meter || !(pane.metered == size) || pane.metered_bits != bits) {
+    auto made = StatsMeter::make (size, depth, {.bits = bits, .bins = kBins});
+    if (!made)
+      return;
+    pane.meter = *std::move (made);
+    pane.metered = size;
+    pane.metered_bits = bits;
+  }
+  read_pixels (mapped, [&] (auto pixels) {
+    const PictureStats &stats = pane.meter->measure (pixels);
     pane.exposure = std::make_shared<Exposure> (Exposure{
         stats.histogram, double (stats.saturated) / double (stats.pixels)});
   });

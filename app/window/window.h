@@ -9,7 +9,6 @@
 #include <mutex>
 #include <optional>
 #include <string>
-#include <variant>
 #include <vector>
 
 #include "base/result.h"
@@ -64,8 +63,6 @@ private:
     Surface picture;
     std::string name;
   };
-  using Meter = std::variant<std::monostate, StatsMeter<std::uint8_t>,
-      StatsMeter<std::uint16_t>>;
 
   static GstPadProbeReturn on_camera_caps (
       GstPad *, GstPadProbeInfo *info, gpointer self);

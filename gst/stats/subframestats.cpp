@@ -42,7 +42,6 @@
 #include <optional>
 #include <string>
 #include <utility>
-#include <variant>
 
 #include <gst/base/gstbasetransform.h>
 
@@ -51,8 +50,8 @@
 #include "common/lines.h"
 #include "common/meta.h"
 #include "common/record.h"
-#include "common/tag.h"
 #include "common/stats_report.h"
+#include "common/tag.h"
 
 using namespace codedexposure;
 using namespace codedexposure::gst;
@@ -64,9 +63,6 @@ namespace
 {
 
 enum class Format { json, csv };
-
-using Meter =
-    std::variant<std::monostate, StatsMeter<guint8>, StatsMeter<guint16>>;
 
 struct Settings {
   std::string location;
@@ -88,7 +84,7 @@ struct StatsState {
   StatsOptions options;
   GstVideoInfo info;
   int tagged_bits = 0;
-  Meter meter;
+  std::optional<StatsMeter> meter;
   LineFile file;
 };
 
@@ -167,30 +163,21 @@ end_run (GstElement *element)
 {
   StatsState &state = state_in<GstSubframeStats> (element);
   state.file.close ();
-  state.meter = {};
-}
-
-template <typename Pixel>
-bool
-make_meter_of (GstSubframeStats *self)
-{
-  StatsState &state = self->state;
-  state.meter = {};
-  auto made = StatsMeter<Pixel>::make (
-      {state.info.width, state.info.height}, state.options);
-  if (!made)
-    return refuse_settings (
-        self, "These pictures cannot be measured: " + made.error ().message);
-  state.meter = *std::move (made);
-  return true;
+  state.meter.reset ();
 }
 
 bool
 make_meter (GstSubframeStats *self)
 {
-  return GST_VIDEO_INFO_FORMAT (&self->state.info) == GST_VIDEO_FORMAT_GRAY8
-             ? make_meter_of<guint8> (self)
-             : make_meter_of<guint16> (self);
+  StatsState &state = self->state;
+  state.meter.reset ();
+  auto made = StatsMeter::make ({state.info.width, state.info.height},
+      int (GST_VIDEO_INFO_COMP_DEPTH (&state.info, 0)), state.options);
+  if (!made)
+    return refuse_settings (
+        self, "These pictures cannot be measured: " + made.error ().message);
+  state.meter = *std::move (made);
+  return true;
 }
 
 gboolean
@@ -237,9 +224,7 @@ measure (GstSubframeStats *self, GstBuffer *frame)
     return nullptr;
   }
   return read_pixels (
-      mapped, [&]<typename Pixel> (ImageView<const Pixel> pixels) {
-        return &std::get<StatsMeter<Pixel>> (state.meter).measure (pixels);
-      });
+      mapped, [&] (auto pixels) { return &state.meter->measure (pixels); });
 }
 
 /* Counts the picture. Returns its number, for pictures without metadata. */
@@ -290,7 +275,7 @@ generate_output (GstBaseTransform *base, GstBuffer **outbuf) noexcept
     return GST_FLOW_OK;
   BufferPtr frame (
       gst_buffer_make_writable (std::exchange (base->queued_buf, nullptr)));
-  if (std::holds_alternative<std::monostate> (self->state.meter))
+  if (!self->state.meter)
     return GST_FLOW_NOT_NEGOTIATED;
   if (!follow_bits (self, frame.get ()))
     return GST_FLOW_ERROR;

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <span>
 #include <string>
 
 #include "base/pixels.h"
@@ -16,37 +15,53 @@ namespace codedexposure
 namespace
 {
 
-template <typename Pixel>
-constexpr std::size_t
-    kLevels = std::size_t (std::numeric_limits<Pixel>::max ()) + 1;
-
 /* Equal neighbours, as in flat parts of a picture, would wait for each other at
- * one counter. Several counts of 16-bit levels would not fit into the cache. */
+ * one counter, so that bytes have several. Several counts of 16-bit levels
+ * would not fit into the cache. */
 template <typename Pixel>
-constexpr std::size_t kCounts = sizeof (Pixel) == 1 ? 4 : 1;
+void
+count_levels (
+    ImageView<const Pixel> picture, std::vector<std::uint32_t> &counts)
+{
+  constexpr std::size_t kLevels =
+      std::size_t (std::numeric_limits<Pixel>::max ()) + 1;
+  constexpr std::size_t kSide = sizeof (Pixel) == 1 ? 4 : 1;
+  const auto width = std::size_t (picture.width);
+  counts.assign (kSide * kLevels, 0u);
+  for (int y = 0; y < picture.height; y++) {
+    const Pixel *row = picture.row (y);
+    std::size_t x = 0;
+    for (; x + kSide <= width; x += kSide)
+      for (std::size_t i = 0; i < kSide; i++)
+        counts[i * kLevels + row[x + i]]++;
+    for (; x < width; x++)
+      counts[row[x]]++;
+  }
+  for (std::size_t i = 1; i < kSide; i++)
+    for (std::size_t v = 0; v < kLevels; v++)
+      counts[v] += counts[i * kLevels + v];
+  counts.resize (kLevels);
+}
 
 } // namespace
 
-template <typename Pixel>
-Result<StatsMeter<Pixel>>
-StatsMeter<Pixel>::make (Extent size, const StatsOptions &options)
+Result<StatsMeter>
+StatsMeter::make (Extent size, int depth, const StatsOptions &options)
 {
-  constexpr int kBits = std::numeric_limits<Pixel>::digits;
   if (size.width < 1 || size.height < 1)
     return Error{"a picture of " + size_text (size) + " has no statistics"};
-  if (options.bits < 0 || options.bits > kBits)
+  if (options.bits < 0 || options.bits > depth)
     return Error{"bits = " + std::to_string (options.bits) +
                  " is out of range; a pixel has 1 to " +
-                 std::to_string (kBits) + ", 0 means all"};
+                 std::to_string (depth) + ", 0 means all"};
   if (options.bins < 0)
     return Error{"a histogram cannot have " + std::to_string (options.bins) +
                  " bins; 0 leaves it out"};
   StatsMeter meter;
-  meter.bits_ = significant_bits_of<Pixel> (options.bits);
+  meter.bits_ = options.bits > 0 ? options.bits : depth;
   if (options.line) {
     ASSIGN_OR_RETURN (meter.points_, options.line->points (size));
   }
-  meter.levels_.resize (kCounts<Pixel> * kLevels<Pixel>);
   meter.stats_.pixels =
       std::uint64_t (size.width) * std::uint64_t (size.height);
   meter.stats_.histogram.resize (
@@ -55,58 +70,33 @@ StatsMeter<Pixel>::make (Extent size, const StatsOptions &options)
   return meter;
 }
 
-template <typename Pixel>
-void
-StatsMeter<Pixel>::count_levels (ImageView<const Pixel> picture)
-{
-  constexpr std::size_t kSide = kCounts<Pixel>;
-  std::ranges::fill (levels_, 0u);
-  std::uint32_t *counts = levels_.data ();
-  const auto width = std::size_t (picture.width);
-  for (int y = 0; y < picture.height; y++) {
-    const Pixel *row = picture.row (y);
-    std::size_t x = 0;
-    for (; x + kSide <= width; x += kSide)
-      for (std::size_t i = 0; i < kSide; i++)
-        counts[i * kLevels<Pixel> + row[x + i]]++;
-    for (; x < width; x++)
-      counts[row[x]]++;
-  }
-  for (std::size_t i = 1; i < kSide; i++)
-    for (std::size_t v = 0; v < kLevels<Pixel>; v++)
-      counts[v] += counts[i * kLevels<Pixel> + v];
-}
-
 /* Entropy: -sum p log p with p = c / N is log N - (sum c log c) / N. */
-template <typename Pixel>
 void
-StatsMeter<Pixel>::summarise ()
+StatsMeter::summarise ()
 {
   const auto largest = std::size_t (largest_pixel (bits_));
-  const auto levels = std::span (levels_).first (kLevels<Pixel>);
   const auto occurs = [] (std::uint32_t count) { return count > 0; };
-  const auto first = std::ranges::find_if (levels, occurs);
-  stats_.minimum = unsigned (first - levels.begin ());
+  const auto first = std::ranges::find_if (levels_, occurs);
+  stats_.minimum = unsigned (first - levels_.begin ());
   stats_.saturated = 0;
   double sum = 0.0, weighed = 0.0;
-  for (std::size_t v = stats_.minimum; v < levels.size (); v++) {
-    if (!occurs (levels[v]))
+  for (std::size_t v = stats_.minimum; v < levels_.size (); v++) {
+    if (!occurs (levels_[v]))
       continue;
-    const double count = levels[v];
+    const double count = levels_[v];
     stats_.maximum = unsigned (v);
     sum += count * double (v);
     weighed += count * std::log2 (count);
     if (v >= largest)
-      stats_.saturated += levels[v];
+      stats_.saturated += levels_[v];
   }
   const auto pixels = double (stats_.pixels);
   stats_.mean = sum / pixels;
   stats_.entropy = std::max (0.0, std::log2 (pixels) - weighed / pixels);
 }
 
-template <typename Pixel>
 void
-StatsMeter<Pixel>::fill_histogram ()
+StatsMeter::fill_histogram ()
 {
   std::vector<std::uint64_t> &histogram = stats_.histogram;
   if (histogram.empty ())
@@ -122,9 +112,9 @@ StatsMeter<Pixel>::fill_histogram ()
 
 template <typename Pixel>
 const PictureStats &
-StatsMeter<Pixel>::measure (ImageView<const Pixel> picture)
+StatsMeter::measure_pixels (ImageView<const Pixel> picture)
 {
-  count_levels (picture);
+  count_levels (picture, levels_);
   summarise ();
   fill_histogram ();
   std::ranges::transform (points_, stats_.profile.begin (),
@@ -132,7 +122,9 @@ StatsMeter<Pixel>::measure (ImageView<const Pixel> picture)
   return stats_;
 }
 
-template class StatsMeter<std::uint8_t>;
-template class StatsMeter<std::uint16_t>;
+template const PictureStats &StatsMeter::measure_pixels (
+    ImageView<const std::uint8_t>);
+template const PictureStats &StatsMeter::measure_pixels (
+    ImageView<const std::uint16_t>);
 
 } // namespace codedexposure

@@ -39,31 +39,37 @@ struct PictureStats {
  * Measures pictures of one size. Everything but the profile is computed from
  * the counts of the grey levels, which take one pass.
  */
-template <typename Pixel> // std::uint8_t or std::uint16_t (host order)
 class StatsMeter
 {
 public:
-  /** Error when the picture is empty, a number is out of range, or the line
+  /** @p depth  bits of the pixels' type, 8 or 16.
+   * Error when the picture is empty, a number is out of range, or the line
    * leaves the picture. */
-  static Result<StatsMeter> make (Extent size, const StatsOptions &options);
+  static Result<StatsMeter> make (
+      Extent size, int depth, const StatsOptions &options);
 
-  /** @p picture of the size that was given. Valid until the next call. */
-  const PictureStats &measure (ImageView<const Pixel> picture);
+  /** @p picture of the size and type that were given. Valid until the next
+   * call. */
+  const PictureStats &measure (ImageView<const std::uint8_t> picture)
+  {
+    return measure_pixels (picture);
+  }
+  const PictureStats &measure (ImageView<const std::uint16_t> picture)
+  {
+    return measure_pixels (picture);
+  }
 
 private:
   StatsMeter () = default;
-  void count_levels (ImageView<const Pixel> picture);
+  template <typename Pixel>
+  const PictureStats &measure_pixels (ImageView<const Pixel> picture);
   void summarise ();
   void fill_histogram ();
 
   int bits_ = 0;
   std::vector<Position> points_;
-  /** Pixels of each level; several counts side by side for bytes. */
-  std::vector<std::uint32_t> levels_;
+  std::vector<std::uint32_t> levels_; ///< pixels of each level
   PictureStats stats_;
 };
-
-extern template class StatsMeter<std::uint8_t>;
-extern template class StatsMeter<std::uint16_t>;
 
 } // namespace codedexposure

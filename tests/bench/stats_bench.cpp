@@ -5,9 +5,9 @@
 
 #include "common/elements.h"
 #include "common/meta.h"
+#include "common/stats_report.h"
 #include "harness.h"
 #include "stats/picture_stats.h"
-#include "common/stats_report.h"
 
 namespace
 {
@@ -31,8 +31,8 @@ void
 arithmetic (benchmark::State &state)
 {
   const auto picture = subframe<Pixel> ();
-  auto meter = StatsMeter<Pixel>::make (
-      {384, 288}, {.line = *ProfileLine::parse ("row:50%")});
+  auto meter = StatsMeter::make ({384, 288}, 8 * int (sizeof (Pixel)),
+      {.line = *ProfileLine::parse ("row:50%")});
   for (auto _ : state) {
     auto entropy = meter->measure (picture.view ()).entropy;
     benchmark::DoNotOptimize (entropy);

@@ -31,8 +31,8 @@ template <typename Pixel>
 PictureStats
 stats_of (const Image<Pixel> &picture, const StatsOptions &options = {})
 {
-  auto meter =
-      StatsMeter<Pixel>::make ({picture.width (), picture.height ()}, options);
+  auto meter = StatsMeter::make (
+      {picture.width (), picture.height ()}, 8 * int (sizeof (Pixel)), options);
   EXPECT_TRUE (meter) << meter.error ().message;
   return meter->measure (picture.view ());
 }
@@ -119,7 +119,7 @@ TEST (Stats, MeasureStartsAnewAndHeedsTheStride)
 {
   std::vector<std::uint8_t> memory (3 * 16, 200);
   const ImageView<std::uint8_t> picture{memory.data (), 7, 3, 16};
-  auto meter = StatsMeter<std::uint8_t>::make ({7, 3}, {});
+  auto meter = StatsMeter::make ({7, 3}, 8, {});
   ASSERT_TRUE (meter);
   for (std::uint8_t value : {10, 20}) {
     for (int y = 0; y < 3; y++)
@@ -150,7 +150,7 @@ TEST (Stats, ProfilesAreThePixelsOfALine)
 TEST (Stats, RefusesWhatItCannotMeasure)
 {
   const auto complaint = [] (Extent size, const StatsOptions &options) {
-    const auto meter = StatsMeter<std::uint8_t>::make (size, options);
+    const auto meter = StatsMeter::make (size, 8, options);
     return meter ? "" : meter.error ().message;
   };
   EXPECT_EQ (complaint ({4, 4}, {}), "");

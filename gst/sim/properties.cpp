@@ -62,7 +62,8 @@ properties ()
           "in the pixels that are open longest",
           kReadWrite, optics (&Optics::gain), 0.0, Optics::kMaxGain},
       {"seed", "Seed", "Start of the noise: the same seed gives the same bytes",
-          kReadWrite, optics (&Optics::seed), guint64 (0), G_MAXUINT64},
+          kReadWrite, optics (&Optics::seed), guint64 (0),
+          guint64 (G_MAXINT64)},
       {"shift-x", "Horizontal shift",
           "Mirrors by which the camera looks to the right of where it should",
           kReadWrite, optics (kAlignment, &Alignment::shift_x),
@@ -80,25 +81,19 @@ properties ()
           Optics::kMaxScale},
       {"frames-out", "Frames out", "Coded frames made since the stream started",
           kReadOnly, within (&SimState::counters, &Counters::frames_out),
-          guint64 (0), G_MAXUINT64},
+          guint64 (0), guint64 (G_MAXINT64)},
       {"frames-dropped", "Frames dropped",
           "Coded frames that were begun and not completed, because of a gap, "
           "a flush, new caps or the end of the stream; notifies",
           kReadOnly, within (&SimState::counters, &Counters::frames_dropped),
-          guint64 (0), G_MAXUINT64},
+          guint64 (0), guint64 (G_MAXINT64)},
   };
 }
 
 void
-set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+changed (GObject *object, const GParamSpec *)
 {
-  const auto assign = table_of<properties> ()[id].read (value);
-  const ObjectLock lock (object);
-  /* The DMD is looked up once, when the stream starts. */
-  if (g_str_equal (pspec->name, "dmd") && GST_STATE (object) > GST_STATE_READY)
-    GST_WARNING_OBJECT (object, "dmd is in force from the next start on");
   Settings &settings = state (object).settings;
-  assign (state (object));
   if (settings.schedule.text.empty ())
     settings.schedule = Settings ().schedule;
 }
@@ -108,8 +103,7 @@ set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 void
 install_own_state (gpointer klass)
 {
-  install_state<GstCodedExposureSim, properties> (klass);
-  G_OBJECT_CLASS (klass)->set_property = set_property;
+  install_state<GstCodedExposureSim, properties, changed> (klass);
 }
 
 } // namespace codedexposure::gst::sim

@@ -37,8 +37,8 @@
  * are squares without gaps, light is blurred by a Gaussian of
  * #codedexposure-sim:psf-sigma.
  *
- * Settings are applied at the next coded frame, #codedexposure-sim:dmd at the
- * next start.
+ * Settings are applied at the next coded frame; #codedexposure-sim:dmd and
+ * #codedexposure-sim:bench are set before the start.
  *
  * ## Sensor
  *

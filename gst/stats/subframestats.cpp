@@ -127,10 +127,10 @@ properties ()
           kReadWriteReady, set (&Settings::post_messages)},
       {"frames-in", "Pictures measured",
           "Pictures that were measured in this run", kReadOnly,
-          &StatsState::frames_in, guint64 (0), G_MAXUINT64},
+          &StatsState::frames_in, guint64 (0), guint64 (G_MAXINT64)},
       {"saturated-frames", "Saturated pictures",
           "Pictures with pixels at the largest value, in this run", kReadOnly,
-          &StatsState::saturated_frames, guint64 (0), G_MAXUINT64},
+          &StatsState::saturated_frames, guint64 (0), guint64 (G_MAXINT64)},
   };
 }
 

@@ -204,11 +204,28 @@ told (GstMessage *message, const GError *error, const gchar *debug)
       detail ? detail : "");
 }
 
+namespace
+{
+
+bool
+is_unfit (const gchar *debug)
+{
+  return debug && std::strstr (debug, "not-negotiated");
+}
+
+} // namespace
+
+bool
+is_silence (std::string_view kind, const GError *error, const gchar *debug)
+{
+  return kind == "aravissrc" && error->domain == GST_STREAM_ERROR &&
+         !is_unfit (debug);
+}
+
 std::string
 remedy_for (std::string_view kind, const GError *error, const gchar *debug)
 {
-  const std::string_view detail = debug ? debug : "";
-  const bool unfit = detail.find ("not-negotiated") != detail.npos;
+  const bool unfit = is_unfit (debug);
   const bool of_camera =
       kind == "aravissrc" || kind == "codedexposure-camerasrc";
   if (g_error_matches (
@@ -228,7 +245,10 @@ remedy_for (std::string_view kind, const GError *error, const gchar *debug)
   if (of_lines)
     return "--trigger camera needs a camera with the feature LineSelector; for "
            "others, use --trigger none and set their output with --features";
-  if (kind == "aravissrc" && error->domain == GST_STREAM_ERROR)
+  if (of_camera && text.find ("[PixelFormat]") != text.npos)
+    return "the camera has no such pixel format; set --pixel-format to one "
+           "that \"arv-tool-0.8 features\" lists";
+  if (is_silence (kind, error, debug))
     return "the camera sent nothing for 2 s; check that the DMD runs and is "
            "wired to the camera's trigger line";
   return {};

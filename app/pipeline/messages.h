@@ -25,6 +25,10 @@ std::string package_of (std::string_view element);
 /** Source and text of an ERROR or WARNING message with its details, without the
  * position in the code; properties are named as the options of commands. */
 std::string told (GstMessage *message, const GError *error, const gchar *debug);
+/** Whether an error of an element of @p kind is the one after which aravissrc
+ * ends: its camera sent nothing for 2 s. */
+bool is_silence (
+    std::string_view kind, const GError *error, const gchar *debug);
 /** What the user can do about an error of an element of @p kind; empty: its
  * text says it. */
 std::string remedy_for (

@@ -328,8 +328,12 @@ set_up_instance (GstCodedExposureCameraSrc *self)
   gst_pad_add_probe (pad_of (source, "src").get (),
       GstPadProbeType (GST_PAD_PROBE_TYPE_BUFFER |
                        GST_PAD_PROBE_TYPE_EVENT_BOTH |
-                       GST_PAD_PROBE_TYPE_QUERY_UPSTREAM),
+                       GST_PAD_PROBE_TYPE_QUERY_BOTH),
       camera::take_item, self, nullptr);
+  gst_pad_add_probe (pad_of (filter, "sink").get (),
+      GstPadProbeType (
+          GST_PAD_PROBE_TYPE_QUERY_UPSTREAM | GST_PAD_PROBE_TYPE_PULL),
+      camera::take_answer, self, nullptr);
 }
 
 } // namespace

@@ -74,6 +74,9 @@ bool set_up_source (GstCodedExposureCameraSrc *self);
 
 /** Sees every frame and event that aravissrc pushes, and every query to it. */
 GstPadProbeReturn take_item (GstPad *pad, GstPadProbeInfo *info, gpointer self);
+/** Sees every answer of aravissrc to a query of downstream. */
+GstPadProbeReturn take_answer (
+    GstPad *pad, GstPadProbeInfo *info, gpointer self);
 
 /* A camera that goes away. */
 void begin_watch (GstCodedExposureCameraSrc *self);

@@ -11,6 +11,45 @@ namespace codedexposure::gst::camera
 namespace
 {
 
+/* aravissrc gives all formats of more than 8 bits the caps of Mono16, and then
+ * sets Mono16, which many cameras do not have. It is asked for Mono8 instead;
+ * the features that it sets last choose the format. */
+constexpr const char *kAsked = "GRAY8", *kSent = "GRAY16_LE";
+
+CapsPtr
+with_format (const GstCaps *caps, const char *from, const char *to)
+{
+  GstCaps *changed = gst_caps_copy (caps);
+  for (guint i = 0; i < gst_caps_get_size (changed); i++) {
+    GstStructure *structure = gst_caps_get_structure (changed, i);
+    if (g_strcmp0 (gst_structure_get_string (structure, "format"), from) == 0)
+      gst_structure_set (structure, "format", G_TYPE_STRING, to, nullptr);
+  }
+  return CapsPtr (changed);
+}
+
+bool
+is_deep (GstCodedExposureCameraSrc *self)
+{
+  const auto format = parse_mono_format (settings_of (self).pixel_format);
+  return format && *format != MonoFormat::mono8;
+}
+
+/* What downstream takes, in the words of aravissrc, which has Mono16 alone if
+ * its camera has no Mono8. */
+void
+answer_caps (GstCodedExposureCameraSrc *self, GstQuery *query)
+{
+  GstCaps *offered = nullptr;
+  gst_query_parse_caps (query, &offered);
+  const CapsPtr sent (offered ? with_format (offered, kAsked, kSent) : nullptr);
+  const CapsPtr wanted (gst_pad_query_caps (
+      pad_of (state (self).filter, "sink").get (), sent.get ()));
+  const bool has_mono8 = !offered || !gst_caps_is_equal (offered, sent.get ());
+  gst_query_set_caps_result (query,
+      with_format (wanted.get (), kSent, has_mono8 ? kAsked : kSent).get ());
+}
+
 bool
 take_caps (GstCodedExposureCameraSrc *self, GstCaps *caps)
 {
@@ -28,17 +67,23 @@ take_caps (GstCodedExposureCameraSrc *self, GstCaps *caps)
 }
 
 /* A restarted source begins a stream of its own; to downstream it is the same
- * one. Returns whether @p event goes on. */
+ * one. Returns whether the event goes on. */
 bool
-passes (GstCodedExposureCameraSrc *self, GstEvent *event)
+passes (GstCodedExposureCameraSrc *self, GstPadProbeInfo *info)
 {
   Stream &stream = state (self).stream;
+  GstEvent *event = GST_PAD_PROBE_INFO_EVENT (info);
   switch (GST_EVENT_TYPE (event)) {
   case GST_EVENT_EOS:
     return !is_away (self);
   case GST_EVENT_STREAM_START:
     return !std::exchange (stream.started, true);
   case GST_EVENT_CAPS: {
+    if (is_deep (self)) {
+      info->data = gst_event_new_caps (
+          with_format (caps_of (event), kAsked, kSent).get ());
+      gst_event_unref (std::exchange (event, GST_PAD_PROBE_INFO_EVENT (info)));
+    }
     GstCaps *caps = caps_of (event);
     return !(stream.caps && gst_caps_is_equal (caps, stream.caps.get ())) &&
            take_caps (self, caps);
@@ -58,19 +103,26 @@ passes (GstCodedExposureCameraSrc *self, GstEvent *event)
 }
 
 /* aravissrc answers some queries only between two frames; their answer, of a
- * live camera, is no. */
-bool
-is_answered (const GstQuery *query)
+ * live camera, is no. It allocates its frames itself. */
+GstPadProbeReturn
+take_query (GstCodedExposureCameraSrc *self, GstPadProbeInfo *info)
 {
+  GstQuery *query = GST_PAD_PROBE_INFO_QUERY (info);
   switch (GST_QUERY_TYPE (query)) {
+  case GST_QUERY_ALLOCATION:
   case GST_QUERY_CONVERT:
   case GST_QUERY_DURATION:
   case GST_QUERY_POSITION:
   case GST_QUERY_SEEKING:
   case GST_QUERY_SEGMENT:
-    return false;
+    return GST_PAD_PROBE_DROP;
+  case GST_QUERY_CAPS:
+    if (!is_deep (self) || !(info->type & GST_PAD_PROBE_TYPE_QUERY_DOWNSTREAM))
+      return GST_PAD_PROBE_OK;
+    answer_caps (self, query);
+    return GST_PAD_PROBE_HANDLED;
   default:
-    return true;
+    return GST_PAD_PROBE_OK;
   }
 }
 
@@ -123,11 +175,9 @@ take_item (GstPad *, GstPadProbeInfo *info, gpointer data)
 {
   auto *self = as<GstCodedExposureCameraSrc> (data);
   if (info->type & GST_PAD_PROBE_TYPE_QUERY_BOTH)
-    return is_answered (GST_PAD_PROBE_INFO_QUERY (info)) ? GST_PAD_PROBE_OK
-                                                         : GST_PAD_PROBE_DROP;
+    return take_query (self, info);
   if (!(info->type & GST_PAD_PROBE_TYPE_BUFFER))
-    return passes (self, GST_PAD_PROBE_INFO_EVENT (info)) ? GST_PAD_PROBE_OK
-                                                          : GST_PAD_PROBE_DROP;
+    return passes (self, info) ? GST_PAD_PROBE_OK : GST_PAD_PROBE_DROP;
   const auto &frames = state (self).stream.frames;
   if (!frames)
     return GST_PAD_PROBE_OK;
@@ -136,6 +186,19 @@ take_item (GstPad *, GstPadProbeInfo *info, gpointer data)
   if (!frame)
     return GST_PAD_PROBE_HANDLED;
   set_time (self, frame.release ());
+  return GST_PAD_PROBE_OK;
+}
+
+GstPadProbeReturn
+take_answer (GstPad *, GstPadProbeInfo *info, gpointer data)
+{
+  GstQuery *query = GST_PAD_PROBE_INFO_QUERY (info);
+  if (GST_QUERY_TYPE (query) == GST_QUERY_CAPS &&
+      is_deep (as<GstCodedExposureCameraSrc> (data))) {
+    GstCaps *caps = nullptr;
+    gst_query_parse_caps_result (query, &caps);
+    gst_query_set_caps_result (query, with_format (caps, kAsked, kSent).get ());
+  }
   return GST_PAD_PROBE_OK;
 }
 

@@ -208,6 +208,35 @@ TEST (CameraBin, SetsTheCameraUpAsItsPropertiesSay)
   }
 }
 
+/* For caps of 16 bits, aravissrc sets Mono16. */
+TEST (CameraBin, ACameraOfMoreThan8BitsNeedsNoMono16)
+{
+  for (const char *format : {"Mono10", "Mono10Packed", "Mono10p", "Mono12",
+           "Mono12Packed", "Mono12p"}) {
+    SCOPED_TRACE (format);
+    GigeCameraOptions options;
+    options.bits = significant_bits (*parse_mono_format (format));
+    options.features = {{"GammaEnable", "false"}}; // it has no deeper format
+    const int mask = (1 << options.bits) - 1;
+    const auto camera = open_camera (options);
+    int frames = 0, known = 0;
+    CameraPipeline pipeline (
+        camera_bin ("100/1", "GRAY16_LE",
+            std::string ("num-buffers=3 pixel-format=") + format),
+        [&] (GstBuffer *buffer, const GstVideoInfo &info) {
+          frames++;
+          EXPECT_EQ (get_frame_meta (buffer)->bits, options.bits);
+          for (std::uint64_t frame = 0; frame < 100; frame++)
+            known +=
+                wrong_pixels<std::uint16_t> (buffer, info, frame, mask) == 0;
+        });
+    pipeline.play ();
+    EXPECT_EQ (pipeline.wait_end (), "end");
+    EXPECT_EQ (frames, 3);
+    EXPECT_EQ (known, 3) << "each is one frame of the scene";
+  }
+}
+
 /* A plain aravissrc keeps the camera that is no more. */
 TEST (CameraBin, ACameraThatRestartsServesTheNextRun)
 {

@@ -19,6 +19,8 @@ namespace
 /* Frames that take part in the comparison of slots, spread over the recording.
  */
 constexpr int kCompared = 64;
+/* Fewer say nothing of a recording. */
+constexpr std::uint64_t kFewest = 10;
 /* Delays between frames that a recording can do with, as part of a period. */
 constexpr double kJitterWarn = 0.2;
 /* Light that changes by that part is of another part of the cycle. */
@@ -190,6 +192,11 @@ check_whole (Examination &examination)
         count (frame, counts);
       }));
   diagnose_losses (counts, finding);
+  if (counts.frames < kFewest) {
+    finding.readings.push_back ({"frames", {double (counts.frames), INFINITY},
+        "", "at least " + std::to_string (kFewest)});
+    return finding;
+  }
   diagnose_times (counts, parts.rate, finding);
   const auto &black = examination.profile.black_level;
   diagnose_slots (means, black ? black->value : 0, finding);

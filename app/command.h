@@ -102,6 +102,7 @@ std::unique_ptr<Command> bench_command ();
 std::unique_ptr<Command> calibrate_command ();
 std::unique_ptr<Command> decode_command ();
 std::unique_ptr<Command> dmd_command ();
+std::unique_ptr<Command> doctor_command ();
 std::unique_ptr<Command> live_command ();
 std::unique_ptr<Command> info_command ();
 std::unique_ptr<Command> join_command ();

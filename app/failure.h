@@ -17,6 +17,7 @@ enum class Exit {
   failed = 1,
   usage = 2,         ///< the command line is wrong
   damaged = 3,       ///< done, but frames are missing or not as recorded
+  not_known = 4,     ///< done, but it is not known whether all is good
   nobody = 4,        ///< nobody listens or receives, or the excerpt is empty
   no_device = 3,     ///< there is no such device, or it cannot be opened
   does_not_fit = 4,  ///< the schedule does not fit the device or the rate

@@ -46,6 +46,7 @@ all_commands ()
   commands.push_back (dmd_command ());
   commands.push_back (profile_command ());
 #ifdef HAVE_ARAVIS
+  commands.push_back (doctor_command ());
   commands.push_back (bench_command ());
 #endif
   return commands;

@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "base/text.h"
+#include "bench/sick_options.h"
 #include "command.h"
 #include "emulation/frame_source.h"
 #include "emulation/own_network.h"

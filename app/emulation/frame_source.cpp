@@ -8,19 +8,6 @@ namespace codedexposure::app
 
 using namespace gst;
 
-namespace
-{
-
-template <typename Pixel>
-void
-copy (ImageView<const Pixel> from, ImageView<std::uint16_t> to)
-{
-  for (int y = 0; y < to.height; y++)
-    std::copy_n (from.row (y), to.width, to.row (y));
-}
-
-} // namespace
-
 Result<std::unique_ptr<FrameSource>>
 FrameSource::open (Chain &chain, bool loop)
 {
@@ -61,10 +48,11 @@ FrameSource::take (ImageView<std::uint16_t> picture)
     return false;
   MappedFrame mapped (
       info_, gst_sample_get_buffer (sample_.get ()), GST_MAP_READ);
-  if (mapped && is_wide ())
-    copy (view_of<const std::uint16_t> (mapped), picture);
-  else if (mapped)
-    copy (view_of<const std::uint8_t> (mapped), picture);
+  if (mapped)
+    read_pixels (mapped, [&picture] (auto pixels) {
+      for (int y = 0; y < picture.height; y++)
+        std::copy_n (pixels.row (y), picture.width, picture.row (y));
+    });
   mapped.reset ();
   sample_.reset ();
   return true;

@@ -28,10 +28,6 @@ public:
   FrameSource &operator= (const FrameSource &) = delete;
 
   const GstVideoInfo &info () const { return info_; }
-  bool is_wide () const
-  {
-    return GST_VIDEO_INFO_FORMAT (&info_) == GST_VIDEO_FORMAT_GRAY16_LE;
-  }
   /** Any thread. */
   bool ended () const { return ended_; }
   std::string why_ended () const;

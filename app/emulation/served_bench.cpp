@@ -4,12 +4,17 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
+#include <filesystem>
 
 #include "base/text.h"
 #include "base/try.h"
 #include "bench/simulated_rig.h"
+#include "dmd/boards.h"
 #include "emulation/live_bench.h"
-#include "emulation/usb_board.h"
+#ifdef HAVE_USB_BED
+#include "emulation/usb_bed.h"
+#endif
 
 namespace codedexposure
 {
@@ -70,53 +75,133 @@ look_at (LiveBench &bench, GigeCameraOptions &camera)
   };
 }
 
-class Served final : public ServedBench
+Result<int>
+board_kind (const std::string &name)
 {
-public:
-  Result<void> set_up (const std::string &board, const std::string &faults,
-      Extent size, GigeCameraOptions camera)
-  {
-    ASSIGN_OR_RETURN (const int kind, board_kind (board));
-    ASSIGN_OR_RETURN (
-        SickBenchOptions options, bench_of (faults, size, camera));
-    const bool dark = options.has ("camera-missing");
-    slow_disk_ = options.has ("slow-disk");
-    ASSIGN_OR_RETURN (bench_, LiveBench::make (std::move (options), kind));
-    ASSIGN_OR_RETURN (board_, UsbBoard::plug (*bench_));
-    look_at (*bench_, camera);
-    options_ = camera;
-    if (!dark) {
-      ASSIGN_OR_RETURN (camera_, GigeCamera::open (std::move (camera), {}));
-    }
-    return {};
-  }
-
-  const GigeCameraOptions &camera_options () const override { return options_; }
-  std::vector<std::pair<std::string, std::string>> environment () const override
-  {
-    auto variables = board_->environment ();
-    if (slow_disk_)
-      variables.emplace_back ("CODEDEXPOSURE_SLOW_DISK", "1");
-    return variables;
-  }
-
-private:
-  bool slow_disk_ = false;
-  GigeCameraOptions options_;
-  std::unique_ptr<LiveBench> bench_;
-  std::unique_ptr<UsbBoard> board_;
-  std::unique_ptr<GigeCamera> camera_;
-};
+  const BoardFacts *facts = find_board (name);
+  if (facts && facts->controller == Controller::dlpc900)
+    return int (facts->type);
+  return Error{"board " + in_quotes (name) +
+               " cannot be emulated; use one with a DLPC900, such as dlp6500 "
+               "or dlp5500"};
+}
 
 } // namespace
+
+#ifndef HAVE_USB_BED
+
+struct ServedBench::Usb {
+  Result<void> plug (const LiveBench &)
+  {
+    return Error{"this build has no emulated USB; install libumockdev-dev and "
+                 "build again",
+        ErrorCode::unsupported};
+  }
+};
+
+std::vector<std::pair<std::string, std::string>>
+ServedBench::environment () const
+{
+  return {};
+}
+
+#else
+
+namespace
+{
+
+std::string
+usb_folder ()
+{
+  const char *found = std::getenv ("UMOCKDEV_DIR");
+  return found ? found : "";
+}
+
+void
+set_firmware (emulated::EmulatedDlpc900 &board, const std::string &version)
+{
+  const auto numbers = split (version, '.');
+  board.firmware_major = parse_int (numbers[0]).value_or (6);
+  if (numbers.size () > 1)
+    board.firmware_minor = parse_int (numbers[1]).value_or (0);
+}
+
+/* Nobody may open the node, not even root: a variable of the kernel that cannot
+ * be written takes its place. */
+Result<void>
+lock_node ()
+{
+  const std::filesystem::path node = usb_folder () + "/dev/bus/usb/001/002";
+  std::error_code failed;
+  std::filesystem::remove (node, failed);
+  std::filesystem::create_symlink ("/proc/sys/kernel/version", node, failed);
+  if (failed)
+    return Error{"cannot lock " + node.string () + ": " + failed.message ()};
+  return {};
+}
+
+} // namespace
+
+/* The bus, with the board of a bench and its faults. */
+struct ServedBench::Usb {
+  Result<void> plug (const LiveBench &bench)
+  {
+    constexpr const char *kPort = "1-2";
+    const SickBenchOptions &faults = bench.truth ().options;
+    if (faults.has ("firmware"))
+      set_firmware (*bench.board (), faults.parts.at ("firmware"));
+    if (faults.has ("dmd-missing"))
+      return {};
+    bed.plug (kPort, kUsbDlpc900, "LCR1", bench.board ());
+    if (faults.has ("dmd-busy"))
+      bed.occupy (kPort);
+    return faults.has ("dmd-permission") ? lock_node () : Result<void> ();
+  }
+
+  emulated::UsbBed bed;
+};
+
+std::vector<std::pair<std::string, std::string>>
+ServedBench::environment () const
+{
+  std::vector<std::pair<std::string, std::string>> variables = {
+      {"LD_PRELOAD", emulated::kPreload}, {"UMOCKDEV_DIR", usb_folder ()}};
+  if (slow_disk_)
+    variables.emplace_back ("CODEDEXPOSURE_SLOW_DISK", "1");
+  return variables;
+}
+
+#endif
+
+ServedBench::ServedBench () = default;
+ServedBench::~ServedBench () = default;
+
+Result<void>
+ServedBench::set_up (const std::string &board, const std::string &faults,
+    Extent size, GigeCameraOptions camera)
+{
+  ASSIGN_OR_RETURN (const int kind, board_kind (board));
+  ASSIGN_OR_RETURN (SickBenchOptions options, bench_of (faults, size, camera));
+  const bool dark = options.has ("camera-missing");
+  slow_disk_ = options.has ("slow-disk");
+  ASSIGN_OR_RETURN (bench_, LiveBench::make (std::move (options), kind));
+  usb_ = std::make_unique<Usb> ();
+  RETURN_IF_ERROR (usb_->plug (*bench_));
+  look_at (*bench_, camera);
+  options_ = camera;
+  if (!dark) {
+    ASSIGN_OR_RETURN (camera_, GigeCamera::open (std::move (camera), {}));
+  }
+  return {};
+}
 
 Result<std::unique_ptr<ServedBench>>
 ServedBench::open (const std::string &board, const std::string &faults,
     Extent size, GigeCameraOptions camera)
 {
-  auto served = std::make_unique<Served> ();
+  std::unique_ptr<ServedBench> served (new ServedBench);
   RETURN_IF_ERROR (served->set_up (board, faults, size, std::move (camera)));
-  return std::unique_ptr<ServedBench> (std::move (served));
+  return served;
 }
 
 void

@@ -15,26 +15,41 @@
 namespace codedexposure
 {
 
+class LiveBench;
+
 class ServedBench
 {
 public:
   /** @p board   "dlp6500" or "dlp5500".
-   *  @p faults  words with '@' are of frames; the others are of the bench.
+   *  @p faults  words with '@' are of frames; the others are of the bench, such
+   *  as "dmd-busy".
    *  @p size    of the camera, pixels.
-   *  @p camera  its settings, which faults may change. */
+   *  @p camera  its settings, which faults may change.
+   *  Fails if this build has no emulated USB. */
   static Result<std::unique_ptr<ServedBench>> open (const std::string &board,
       const std::string &faults, Extent size, GigeCameraOptions camera);
-  virtual ~ServedBench () = default;
+  ~ServedBench ();
+  ServedBench (const ServedBench &) = delete;
+  ServedBench &operator= (const ServedBench &) = delete;
 
   /** As the camera serves. */
-  virtual const GigeCameraOptions &camera_options () const = 0;
+  const GigeCameraOptions &camera_options () const { return options_; }
   /** What a process needs in its environment to see the USB. */
-  virtual std::vector<std::pair<std::string, std::string>>
-  environment () const = 0;
-};
+  std::vector<std::pair<std::string, std::string>> environment () const;
 
-/** The faults that a bench can have, a line each. */
-std::string fault_help ();
+private:
+  struct Usb;
+
+  ServedBench ();
+  Result<void> set_up (const std::string &board, const std::string &faults,
+      Extent size, GigeCameraOptions camera);
+
+  bool slow_disk_ = false;
+  GigeCameraOptions options_;
+  std::unique_ptr<LiveBench> bench_;
+  std::unique_ptr<Usb> usb_;
+  std::unique_ptr<GigeCamera> camera_;
+};
 
 /** Prints a line of JSON for a frame that was sent. */
 void print_sent (const SentFrame &sent);

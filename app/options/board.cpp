@@ -121,6 +121,10 @@ stop_at_signals ()
   sigemptyset (&signals);
   sigaddset (&signals, SIGINT);
   sigaddset (&signals, SIGTERM);
+  struct sigaction hangup = {};
+  if (sigaction (SIGHUP, nullptr, &hangup) == 0 &&
+      hangup.sa_handler != SIG_IGN) // nohup
+    sigaddset (&signals, SIGHUP);
   pthread_sigmask (SIG_BLOCK, &signals, nullptr);
   static std::stop_source source;
   static const std::jthread thread ([] (const std::stop_token &quit) {

@@ -53,8 +53,8 @@ Rule<FrameRate> any_rate ();
 /** A time such as 500us or 10s, as text. */
 Rule<Text> time_rule ();
 
-/** Requests a stop at SIGINT and SIGTERM, for work that is no pipeline. Make it
- * before any thread starts. */
+/** Requests a stop at SIGINT, SIGTERM and SIGHUP, for work that is no pipeline.
+ * Make it before any thread starts. */
 std::stop_token stop_at_signals ();
 
 } // namespace codedexposure::app

@@ -16,6 +16,8 @@ struct RunOptions {
   /** @p writes  whether the command writes files, so that --force has a
    * meaning. */
   void declare (Options &options, bool writes = true);
+  /** --force and --json alone, of a command that prints no pipeline. */
+  void declare_result (Options &options, bool writes = true);
 };
 
 } // namespace codedexposure::app

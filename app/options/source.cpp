@@ -62,17 +62,33 @@ SourceOptions::declare_bench (Options &options, Kind kind)
 {
   constexpr double kMost = 1e9;
   const Rule<double> at_least_0 = real (0, kMost, "a number of at least 0");
+  const bool examined = kind == Kind::examined;
   options.heading ("Bench");
   options.value ("--schedule", schedule, "S",
       "CODE:TILE[,key=value...] or a JSON file [sequential:2x2]");
   options.value ("--frame-rate", frame_rate, "R",
       "coded frames/s, such as 25 or 30000/1001 [25]", frame_rate_rule ());
+  options.value ("--bench", bench, "FILE",
+      examined ? "bench profile (JSON) whose numbers the simulated bench has "
+                 "[drawn by the seed]"
+               : "bench profile (JSON) of camera and DMD; the simulated bench "
+                 "has its noise, black level, leakage, blur and mapping, "
+                 "recordings carry it, and other options win");
+  options.value ("--seed", seed, "N",
+      examined ? "seed of the simulated bench [1]" : "seed of the noise [0]",
+      Rule<Text>{[] (const std::string &text) -> std::optional<Text> {
+                   const bool digits =
+                       !text.empty () && text.size () < 20 &&
+                       text.find_first_not_of ("0123456789") == text.npos;
+                   return digits ? std::optional (text) : std::nullopt;
+                 },
+          "a whole number"});
+  if (examined) {
+    options.exclude ({"--bench", "--seed"}, "--camera");
+    return;
+  }
   options.value ("--frames", frames, "N", "stop after N coded frames",
       whole (1, 999'999'999, "a number of coded frames"));
-  options.value ("--bench", bench, "FILE",
-      "bench profile (JSON) of camera and DMD; the simulated bench has its "
-      "noise, black level, leakage, blur and mapping, recordings carry it, and "
-      "other options win");
   options.value ("--full-well", full_well, "E",
       "electrons at white, e-; 0: no noise [0]", at_least_0);
   options.value (
@@ -81,14 +97,6 @@ SourceOptions::declare_bench (Options &options, Kind kind)
       at_least_0);
   options.value ("--gain", gain, "G",
       "gain; 0: automatic, white maps to the largest value [0]", at_least_0);
-  options.value ("--seed", seed, "N", "seed of the noise [0]",
-      Rule<Text>{[] (const std::string &text) -> std::optional<Text> {
-                   const bool digits =
-                       !text.empty () && text.size () < 20 &&
-                       text.find_first_not_of ("0123456789") == text.npos;
-                   return digits ? std::optional (text) : std::nullopt;
-                 },
-          "a whole number"});
   options.value (
       "--shift-x", shift_x, "P", "misalignment, pixels", any_real ());
   options.value (
@@ -109,34 +117,44 @@ SourceOptions::declare_bench (Options &options, Kind kind)
 }
 
 void
-SourceOptions::declare_camera (Options &options)
+SourceOptions::declare_camera (Options &options, Kind kind)
 {
-  options.heading ("Instead of the bench");
+  const bool examined = kind == Kind::examined;
+  options.heading (
+      examined ? "Instead of the simulated bench" : "Instead of the bench");
   options.value ("--camera", camera, "NAME",
       "a GenICam camera, as \"gst-device-monitor-1.0 Source/Video\" lists it");
-  options.value ("--trigger", trigger, "M",
-      "which device triggers: dmd, camera, or none [dmd]",
-      one_of ({"dmd", "camera", "none"}));
+  if (!examined)
+    options.value ("--trigger", trigger, "M",
+        "which device triggers: dmd, camera, or none [dmd]",
+        one_of ({"dmd", "camera", "none"}));
   options.value ("--trigger-line", trigger_line, "L",
-      "line of the camera to or from the DMD [Line0; Line1]");
+      examined ? "line of the camera from the DMD [Line0]"
+               : "line of the camera to or from the DMD [Line0; Line1]");
   options.value ("--trigger-edge", trigger_edge, "E",
       "rising or falling [rising]", one_of ({"rising", "falling"}));
   options.value ("--exposure", exposure, "US",
-      "exposure time, microseconds [as the camera has it]",
+      examined ? "longest exposure time, microseconds [99 % of the period]"
+               : "exposure time, microseconds [as the camera has it]",
       real (1e-3, 1e9, "a time in microseconds"));
   options.value ("--pixel-format", pixel_format, "F",
       "Mono8, Mono12, Mono12Packed ... [Mono8; Mono16]", pixel_formats ());
   options.value (
       "--features", features, "\"A=1 ...\"", "camera features beyond these");
-  options.value ("--reconnect", reconnect, "N",
-      "tries to restart a camera that went away [0]",
-      whole (0, 999'999'999, "a number of tries"));
-  options.value ("--device", device, "DEV", "the DMD [sim:bench on the bench]");
-  options.value (
-      "--source", source, "\"GST\"", "any GStreamer source of coded frames");
+  options.value ("--device", device, "DEV",
+      examined ? "the DMD [usb:]" : "the DMD [sim:bench on the bench]");
   options.need ({"--trigger", "--trigger-line", "--trigger-edge", "--exposure",
                     "--pixel-format", "--features", "--reconnect"},
       "--camera");
+  if (examined) {
+    options.need ({"--device"}, "--camera");
+    return;
+  }
+  options.value ("--reconnect", reconnect, "N",
+      "tries to restart a camera that went away [0]",
+      whole (0, 999'999'999, "a number of tries"));
+  options.value (
+      "--source", source, "\"GST\"", "any GStreamer source of coded frames");
   options.exclude ({"--source"}, "--camera");
 }
 
@@ -144,8 +162,9 @@ void
 SourceOptions::declare (Options &options, Kind kind)
 {
   if (kind != Kind::simulated)
-    declare_camera (options);
-  declare_scene (options, kind);
+    declare_camera (options, kind);
+  if (kind != Kind::examined)
+    declare_scene (options, kind);
   declare_bench (options, kind);
 }
 

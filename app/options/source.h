@@ -17,6 +17,7 @@ struct SourceOptions {
   enum class Kind {
     any,     ///< the simulated bench, a camera, or a source of the user
     watched, ///< the same; the noise is also for fusion, and a liquid is poured
+    examined, ///< a bench without a scene, and a camera that the DMD triggers
     simulated ///< the simulated bench alone
   };
 
@@ -44,7 +45,7 @@ struct SourceOptions {
 private:
   void declare_scene (Options &options, Kind kind);
   void declare_bench (Options &options, Kind kind);
-  void declare_camera (Options &options);
+  void declare_camera (Options &options, Kind kind);
 };
 
 /** What follows from the options: what the frames will be. */
@@ -53,7 +54,7 @@ struct SourcePlan {
   FrameRate frame_rate{25, 1};
   /** Of the frames of the input video. */
   FrameRate input_rate{0, 1};
-  Extent size{768, 576};
+  Extent size{768, 576}; ///< empty: as the camera has it
   int bits = 8;
   std::string pixel_format = "Mono8";
   std::optional<BenchProfile> bench;

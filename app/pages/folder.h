@@ -23,6 +23,7 @@ public:
   PageFolder (const PageFolder &) = delete;
   PageFolder &operator= (const PageFolder &) = delete;
 
+  const std::string &name () const { return name_; }
   /** Where @p file is written, or a folder, whose name ends in "/". */
   std::string path (const std::string &file) const;
   void write (const std::string &file, const std::string &content) const;

@@ -61,8 +61,8 @@ ffv1_speed (const SourcePlan &plan)
   return ended ? frames / seconds_since (begin) : 0;
 }
 
-/* Bytes/s that the disk of @file takes, past the page cache where its file
- * system can, as raw recordings are written. */
+} // namespace
+
 double
 disk_speed (const std::string &file)
 {
@@ -97,8 +97,6 @@ disk_speed (const std::string &file)
       close (open_file);
   return speed;
 }
-
-} // namespace
 
 std::string
 choose_codec (const SourcePlan &plan, const std::string &file, Status &status)

@@ -15,4 +15,8 @@ namespace codedexposure::app
 std::string choose_codec (
     const SourcePlan &plan, const std::string &file, Status &status);
 
+/** Bytes/s that the disk of @p file takes, past the page cache where its file
+ * system can, as raw recordings are written. Throws Failure. */
+double disk_speed (const std::string &file);
+
 } // namespace codedexposure::app

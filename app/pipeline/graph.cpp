@@ -229,4 +229,10 @@ factory_of (GstElement *element)
   return factory ? GST_OBJECT_NAME (factory) : "";
 }
 
+std::string
+factory_of (GstObject *object)
+{
+  return GST_IS_ELEMENT (object) ? factory_of (GST_ELEMENT (object)) : "";
+}
+
 } // namespace codedexposure::app

@@ -133,6 +133,8 @@ using gst::pad_of;
 
 /** The name of the factory of @p element; empty: it has none. */
 std::string factory_of (GstElement *element);
+/** The same of what may be no element. */
+std::string factory_of (GstObject *object);
 
 /** The element to which a pad of @p element is linked when it comes; null:
  * none.

@@ -302,8 +302,7 @@ Run::on_error (GstMessage *message)
   const CharPtr owned_detail (detail);
   const std::unique_ptr<GError, decltype (&g_error_free)> owned (
       error, g_error_free);
-  const std::string kind =
-      GST_IS_ELEMENT (source) ? factory_of (GST_ELEMENT (source)) : "";
+  const std::string kind = factory_of (source);
 
   if (try_to_connect_again (kind, error))
     return;

@@ -18,10 +18,12 @@ rate_text (FrameRate rate)
 std::string
 grey_caps (const SourcePlan &plan, FrameRate rate)
 {
+  const std::string size =
+      plan.size.width > 0 ? ",width=" + std::to_string (plan.size.width) +
+                                ",height=" + std::to_string (plan.size.height)
+                          : "";
   return std::string ("video/x-raw,format=") +
-         (plan.is_deep () ? "GRAY16_LE" : "GRAY8") +
-         ",width=" + std::to_string (plan.size.width) +
-         ",height=" + std::to_string (plan.size.height) +
+         (plan.is_deep () ? "GRAY16_LE" : "GRAY8") + size +
          ",framerate=" + rate_text (rate);
 }
 
@@ -95,21 +97,6 @@ add_camera_settings (Settings &settings, const SourceOptions &options)
   set_if (settings, "bench", options.bench);
 }
 
-/* Buffers for six seconds at 25 frames/s, while a disk is busy. */
-Chain
-camera (Job &job, const SourceOptions &options, const SourcePlan &plan)
-{
-  constexpr int kBuffers = 150;
-  Settings settings;
-  add_camera_settings (settings, options);
-  if (!options.pixel_format && plan.bench && !plan.pixel_format.empty ())
-    settings.emplace_back ("pixel-format", plan.pixel_format);
-  Chain chain = job.graph.begin ("codedexposure-camerasrc", settings);
-  gst_child_proxy_set (GST_CHILD_PROXY (chain.last ()),
-      "source::num-arv-buffers", kBuffers, nullptr);
-  return chain.caps (grey_caps (plan, plan.frame_rate));
-}
-
 /* The frames of a user's source may already have a schedule and times. */
 void
 synchronise (const SourceOptions &options, Chain &chain)
@@ -127,6 +114,21 @@ synchronise (const SourceOptions &options, Chain &chain)
 }
 
 } // namespace
+
+/* Buffers for six seconds at 25 frames/s, while a disk is busy. */
+Chain
+camera_source (Job &job, const SourceOptions &options, const SourcePlan &plan)
+{
+  constexpr int kBuffers = 150;
+  Settings settings;
+  add_camera_settings (settings, options);
+  if (!options.pixel_format && plan.bench && !plan.pixel_format.empty ())
+    settings.emplace_back ("pixel-format", plan.pixel_format);
+  Chain chain = job.graph.begin ("codedexposure-camerasrc", settings);
+  gst_child_proxy_set (GST_CHILD_PROXY (chain.last ()),
+      "source::num-arv-buffers", kBuffers, nullptr);
+  return chain.caps (grey_caps (plan, plan.frame_rate));
+}
 
 Chain
 simulation (Job &job, const SourceOptions &options, const SourcePlan &plan,
@@ -157,7 +159,7 @@ coded_source (
     Job &job, const SourceOptions &options, const SourcePlan &plan, Pace pace)
 {
   Chain chain =
-      options.camera ? camera (job, options, plan)
+      options.camera ? camera_source (job, options, plan)
       : options.source
           ? job.graph.from (job.graph.add_text (*options.source))
           : simulation (job, options, plan, pace, {{"dmd", "sim:bench"}});

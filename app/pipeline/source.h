@@ -17,6 +17,10 @@ enum class Pace {
 Chain simulation (Job &job, const SourceOptions &options,
     const SourcePlan &plan, Pace pace, const Settings &more = {});
 
+/** The frames of a camera, without their schedule. */
+Chain camera_source (
+    Job &job, const SourceOptions &options, const SourcePlan &plan);
+
 /** Coded frames of a camera, of any source, or of the simulated bench with its
  * DMD; then dmdsync, and the end after --frames. */
 Chain coded_source (

@@ -7,7 +7,6 @@ set -uo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 export CODEDEXPOSURE_BUILD=${CODEDEXPOSURE_BUILD:-$root/build}
-programs=$CODEDEXPOSURE_BUILD/pipelines
 scripts=$root/pipelines
 PATH=$CODEDEXPOSURE_BUILD/app:$PATH
 scratch=$(mktemp -d)

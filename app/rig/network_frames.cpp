@@ -1,14 +1,18 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-#include "camera_stream.h"
+#include "network_frames.h"
 
 #include <memory>
 
 #include <arv.h>
 
 #include "base/try.h"
+#include "common/raii.h"
+#include "rig/frame_tap.h"
 
-namespace codedexposure
+namespace codedexposure::app
 {
+
+using namespace gst;
 
 namespace
 {
@@ -16,24 +20,6 @@ namespace
 /* Waits are this long at most, so that a request to stop is obeyed; us. */
 constexpr std::uint64_t kMoment = 50'000;
 constexpr int kBuffers = 10;
-
-struct Unref {
-  void operator() (gpointer object) const { g_object_unref (object); }
-};
-
-Error
-camera_error (GError *error)
-{
-  Error why{error->message, ErrorCode::device};
-  g_error_free (error);
-  return why;
-}
-
-Nanoseconds
-monotonic_now ()
-{
-  return g_get_monotonic_time () * 1000;
-}
 
 SeenFrame
 frame_of (ArvBuffer *buffer)
@@ -65,11 +51,19 @@ pop_frames (ArvStream *stream, const StreamRequest &request)
 
 } // namespace
 
+Error
+camera_error (GError *error)
+{
+  Error why{error->message, ErrorCode::device};
+  g_error_free (error);
+  return why;
+}
+
 Result<std::vector<SeenFrame>>
 receive_frames (const StreamRequest &request)
 {
   GError *error = nullptr;
-  const std::unique_ptr<ArvCamera, Unref> camera (
+  const ObjectPtr<ArvCamera> camera (
       arv_camera_new (request.camera.c_str (), &error));
   if (error)
     return camera_error (error);
@@ -80,7 +74,7 @@ receive_frames (const StreamRequest &request)
   arv_camera_set_exposure_time (
       camera.get (), double (request.exposure) / 1e3, nullptr);
   RETURN_IF_ERROR (request.begin ());
-  const std::unique_ptr<ArvStream, Unref> stream (
+  const ObjectPtr<ArvStream> stream (
       arv_camera_create_stream (camera.get (), nullptr, nullptr, &error));
   if (error)
     return camera_error (error);
@@ -97,4 +91,4 @@ receive_frames (const StreamRequest &request)
   return seen;
 }
 
-} // namespace codedexposure
+} // namespace codedexposure::app

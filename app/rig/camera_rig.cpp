@@ -2,26 +2,24 @@
 #include "camera_rig.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <deque>
 #include <limits>
 
-#include <unistd.h>
-
 #include <arv.h>
-#include <gst/app/gstappsink.h>
-#include <gst/gst.h>
 
-#include "base/file.h"
 #include "base/packed_mono.h"
 #include "base/try.h"
-#include "camera_stream.h"
 #include "common/meta.h"
-#include "common/raii.h"
 #include "doctor/checks.h"
+#include "pipeline/recording.h"
+#include "pipeline/source.h"
+#include "rig/frame_pipeline.h"
+#include "rig/network_frames.h"
 
-using namespace codedexposure;
-using namespace codedexposure::gst;
+namespace codedexposure::app
+{
+
+using namespace gst;
 
 namespace
 {
@@ -30,13 +28,12 @@ constexpr Nanoseconds kSecond = 1'000'000'000;
 /* aravissrc gives up after two seconds of silence. */
 constexpr Nanoseconds kSilence = 2 * kSecond;
 constexpr int kSilentPeriods = 10;
-constexpr int kBuffers = 50; // of aravissrc
 /* Part of a frame period that the camera exposes if nothing else is asked for:
  * a camera that reads out while it exposes needs a pause before the next
  * trigger. */
 constexpr double kExposedPart = 0.99;
 /* Waits are this long at most, so that a request to stop is obeyed. */
-constexpr GstClockTime kMoment = 50 * GST_MSECOND;
+constexpr std::chrono::milliseconds kMoment{50};
 
 /* The features that the checks ask for, where a camera has them. */
 constexpr const char *kFeatures[] = {"DeviceVendorName", "DeviceModelName",
@@ -50,152 +47,29 @@ constexpr const char *kFeatures[] = {"DeviceVendorName", "DeviceModelName",
     "TriggerDelay", "DeviceLinkThroughputLimitMode",
     "DeviceLinkThroughputLimit", "GevSCPSPacketSize"};
 
-struct SampleUnref {
-  void operator() (GstSample *sample) const { gst_sample_unref (sample); }
-};
-using Sample = std::unique_ptr<GstSample, SampleUnref>;
-
 Error
 stopped ()
 {
   return {"stopped", ErrorCode::cancelled};
 }
 
-/** The error of GError @p error, which is freed. */
-Error
-camera_error (GError *error)
-{
-  Error why{error->message, ErrorCode::device};
-  g_error_free (error);
-  return why;
-}
-
-/** A pipeline that ends in an appsink "frames". */
-class FramePipeline
-{
-public:
-  static Result<std::unique_ptr<FramePipeline>> make (const std::string &line)
-  {
-    GError *error = nullptr;
-    GstElement *pipeline = gst_parse_launch (
-        (line + " appsink name=frames sync=false").c_str (), &error);
-    if (pipeline)
-      gst_object_ref_sink (pipeline);
-    ObjectPtr<GstElement> owner (pipeline);
-    if (error)
-      return camera_error (error);
-    auto made = std::make_unique<FramePipeline> ();
-    made->pipeline_ = std::move (owner);
-    made->sink_.reset (GST_APP_SINK (made->find ("frames").release ()));
-    /* In the line, it would keep the camera open for ever: gst_parse_launch
-     * does not release a child whose property is set. */
-    g_object_set (
-        made->find ("source").get (), "num-arv-buffers", kBuffers, nullptr);
-    return made;
-  }
-  FramePipeline () = default;
-  ~FramePipeline () { (void)set_state (GST_STATE_NULL); }
-  FramePipeline (const FramePipeline &) = delete;
-  FramePipeline &operator= (const FramePipeline &) = delete;
-
-  ObjectPtr<GstElement> find (const char *name) const
-  {
-    return ObjectPtr<GstElement> (
-        gst_bin_get_by_name (GST_BIN (pipeline_.get ()), name));
-  }
-
-  /** Error with what the pipeline says where it cannot. */
-  Result<void> set_state (GstState state)
-  {
-    if (!pipeline_ || gst_element_set_state (pipeline_.get (), state) !=
-                          GST_STATE_CHANGE_FAILURE)
-      return {};
-    const auto why = take_error ();
-    gst_element_set_state (pipeline_.get (), GST_STATE_NULL);
-    return why.value_or (
-        Error{"the camera cannot be started", ErrorCode::device});
-  }
-
-  /** The error that was posted, if there is one. */
-  std::optional<Error> take_error ()
-  {
-    const ObjectPtr<GstBus> bus (gst_element_get_bus (pipeline_.get ()));
-    const std::unique_ptr<GstMessage, MiniObjectUnref> message (
-        gst_bus_pop_filtered (bus.get (), GST_MESSAGE_ERROR));
-    if (!message)
-      return std::nullopt;
-    GError *error = nullptr;
-    gst_message_parse_error (message.get (), &error, nullptr);
-    return camera_error (error);
-  }
-
-  /** Null if none comes within @p time, or at the end. */
-  Sample pull (GstClockTime time)
-  {
-    return Sample (gst_app_sink_try_pull_sample (sink_.get (), time));
-  }
-  /** Whether it is still on its way to PLAYING. */
-  bool begins () const
-  {
-    return gst_element_get_state (pipeline_.get (), nullptr, nullptr, 0) ==
-           GST_STATE_CHANGE_ASYNC;
-  }
-  bool ended () const { return gst_app_sink_is_eos (sink_.get ()) != FALSE; }
-  Nanoseconds now () const
-  {
-    return Nanoseconds (
-        gst_element_get_current_running_time (pipeline_.get ()));
-  }
-
-private:
-  ObjectPtr<GstElement> pipeline_;
-  ObjectPtr<GstAppSink> sink_;
-};
-
 /** The camera of aravissrc; null before it is open. */
-ObjectPtr<GObject>
+ObjectPtr<ArvCamera>
 camera_of (const FramePipeline &pipeline)
 {
-  GObject *camera = nullptr;
-  g_object_get (pipeline.find ("source").get (), "camera", &camera, nullptr);
-  return ObjectPtr<GObject> (camera);
+  ArvCamera *camera = nullptr;
+  g_object_get (pipeline.find ("aravissrc"), "camera", &camera, nullptr);
+  return ObjectPtr<ArvCamera> (camera);
 }
 
-/** A file with a schedule, for the life of this object. */
-class ScheduleFile
-{
-public:
-  explicit ScheduleFile (const Schedule &schedule)
-  {
-    gchar *path = nullptr;
-    const int file = g_file_open_tmp ("schedule-XXXXXX.json", &path, nullptr);
-    if (file >= 0)
-      close (file);
-    path_ = path ? path : "";
-    g_free (path);
-    (void)write_file (path_, schedule.to_json ());
-  }
-  ~ScheduleFile () { std::remove (path_.c_str ()); }
-  ScheduleFile (const ScheduleFile &) = delete;
-  ScheduleFile &operator= (const ScheduleFile &) = delete;
-
-  const std::string &path () const { return path_; }
-
-private:
-  std::string path_;
-};
-
-/** The pixels of @p sample, in 16 bits; none if it holds less. */
+/** The pixels of @p frame, in 16 bits; none if it holds less. */
 std::optional<Image<std::uint16_t>>
-picture_of (GstSample *sample)
+picture_of (const TappedFrame &frame)
 {
-  GstVideoInfo info;
-  if (!gst_video_info_from_caps (&info, gst_sample_get_caps (sample)))
-    return std::nullopt;
-  Image<std::uint16_t> picture (info.width, info.height);
-  MappedFrame mapped (info, gst_sample_get_buffer (sample), GST_MAP_READ);
+  MappedFrame mapped (frame.info, frame.buffer.get (), GST_MAP_READ);
   if (!mapped)
     return std::nullopt;
+  Image<std::uint16_t> picture (frame.info.width, frame.info.height);
   read_pixels (mapped, [&picture] (auto pixels) {
     for (int y = 0; y < pixels.height; y++)
       std::copy_n (pixels.row (y), pixels.width, picture.view ().row (y));
@@ -203,30 +77,18 @@ picture_of (GstSample *sample)
   return picture;
 }
 
-bool
-is_damaged (GstSample *sample)
-{
-  return GST_BUFFER_FLAG_IS_SET (
-      gst_sample_get_buffer (sample), GST_BUFFER_FLAG_CORRUPTED);
-}
-
 SeenFrame
-seen_frame (GstSample *sample, Nanoseconds now)
+seen_frame (const TappedFrame &tapped)
 {
   SeenFrame frame;
-  frame.time = Nanoseconds (GST_BUFFER_PTS (gst_sample_get_buffer (sample)));
-  frame.arrival = now;
-  auto picture = picture_of (sample);
-  frame.damaged = is_damaged (sample) || !picture;
+  frame.time = Nanoseconds (GST_BUFFER_PTS (tapped.buffer.get ()));
+  frame.arrival = tapped.arrival;
+  auto picture = picture_of (tapped);
+  frame.damaged = !picture || GST_BUFFER_FLAG_IS_SET (tapped.buffer.get (),
+                                  GST_BUFFER_FLAG_CORRUPTED);
   if (picture)
     frame.picture = *std::move (picture);
   return frame;
-}
-
-Nanoseconds
-monotonic_now ()
-{
-  return g_get_monotonic_time () * 1000;
 }
 
 class CameraRig : public Rig
@@ -260,22 +122,24 @@ public:
       const std::function<void (const RecordedFrame &)> &take) override;
 
 private:
-  std::string source () const;
+  Result<void> make_pipeline ();
   std::string close_pipeline ();
   Result<void> start ();
   Result<void> reopen_dmd ();
   void read_features (ArvCamera *camera);
   void read_dmd ();
   void forget_frames ();
+  Result<std::unique_ptr<FramePipeline>> recording_pipeline () const;
   Result<std::vector<SeenFrame>> watch_until (Nanoseconds until, int frames);
   bool is_outdated (const SeenFrame &frame);
   Nanoseconds exposure_of (std::optional<Nanoseconds> time) const;
   Nanoseconds patience () const
   {
-    return std::max (kSilence, kSilentPeriods * options_.rate.period ());
+    return std::max (
+        kSilence, kSilentPeriods * options_.plan.frame_rate.period ());
   }
 
-  const CameraRigOptions options_;
+  CameraRigOptions options_; // completed by open ()
   std::unique_ptr<Dmd> dmd_; // null while a recording has it
   const std::stop_token stop_;
   RigParts parts_;
@@ -286,21 +150,32 @@ private:
   std::deque<Nanoseconds> delays_; // of the last frames, with any offset
 };
 
-std::string
-CameraRig::source () const
-{
-  return "codedexposure-camerasrc name=camera camera-name=\"" +
-         options_.camera + "\" trigger=dmd exposure-time=" +
-         std::to_string (double (exposure_) / 1e3) + " " + options_.properties +
-         " ! " + "video/x-raw,framerate=" + std::to_string (options_.rate.num) +
-         "/" + std::to_string (options_.rate.den) + " ! ";
-}
-
 Nanoseconds
 CameraRig::exposure_of (std::optional<Nanoseconds> time) const
 {
-  return time.value_or (options_.exposure.value_or (
-      Nanoseconds (kExposedPart * double (options_.rate.period ()))));
+  const double longest = options_.source.exposure
+                             ? 1e3 * *options_.source.exposure
+                             : kExposedPart * double (parts_.rate.period ());
+  return time.value_or (Nanoseconds (longest));
+}
+
+/** The options of a pipeline that exposes for @p time. */
+SourceOptions
+exposing (SourceOptions options, Nanoseconds time)
+{
+  options.exposure = double (time) / 1e3;
+  return options;
+}
+
+Result<void>
+CameraRig::make_pipeline ()
+{
+  ASSIGN_OR_RETURN (pipeline_, FramePipeline::make ([this] (Job &job) {
+    Chain chain = camera_source (
+        job, exposing (options_.source, exposure_), options_.plan);
+    return pad_of (chain.to ("fakesink").last (), "sink");
+  }));
+  return {};
 }
 
 /* ------------------------------------------------------------ the parts -- */
@@ -341,8 +216,7 @@ CameraRig::read_features (ArvCamera *camera)
   gint x = 0, y = 0;
   arv_camera_get_region (
       camera, &x, &y, &of.size.width, &of.size.height, nullptr);
-  parts_.pixel_format =
-      known (arv_camera_get_pixel_format_as_string (camera, nullptr));
+  parts_.pixel_format = options_.plan.pixel_format;
   if (const auto format = parse_mono_format (parts_.pixel_format))
     parts_.bits = significant_bits (*format);
 }
@@ -361,15 +235,17 @@ CameraRig::read_dmd ()
 Result<void>
 CameraRig::open ()
 {
-  parts_.rate = options_.rate;
+  parts_.rate = options_.plan.frame_rate;
+  options_.plan.size = {0, 0}; // as the camera has it
   exposure_ = exposure_of (std::nullopt);
   read_dmd ();
-  ASSIGN_OR_RETURN (pipeline_, FramePipeline::make (source ()));
+  RETURN_IF_ERROR (make_pipeline ());
   RETURN_IF_ERROR (pipeline_->set_state (GST_STATE_PAUSED));
   const auto camera = camera_of (*pipeline_);
   if (!camera)
     return Error{"aravissrc has no camera", ErrorCode::not_found};
-  read_features (ARV_CAMERA (camera.get ()));
+  read_features (camera.get ());
+  options_.plan.size = parts_.camera.size;
   return {};
 }
 
@@ -381,7 +257,7 @@ CameraRig::show (const StillMask &mask, int slots)
 {
   RETURN_IF_ERROR (reopen_dmd ());
   ASSIGN_OR_RETURN (
-      const SlotPlan plan, SlotPlan::fit ({}, slots, options_.rate));
+      const SlotPlan plan, SlotPlan::fit ({}, slots, parts_.rate));
   /* Not later: the first frames of this mask may be here when show () returns,
    * and how late they turn to it is measured. */
   dmd_->stop ();
@@ -412,14 +288,14 @@ CameraRig::is_outdated (const SeenFrame &frame)
     delays_.pop_front ();
   const Nanoseconds earliest =
       frame.time + *std::ranges::min_element (delays_); // arrival
-  return earliest < stopped_ + exposure_ + options_.rate.period ();
+  return earliest < stopped_ + exposure_ + parts_.rate.period ();
 }
 
 void
 CameraRig::forget_frames ()
 {
-  while (playing_ && pipeline_->pull (0))
-    ;
+  if (playing_)
+    pipeline_->frames ().forget ();
 }
 
 Result<void>
@@ -433,24 +309,24 @@ CameraRig::expose (std::optional<Nanoseconds> time)
   GError *error = nullptr;
   const auto camera = camera_of (*pipeline_);
   arv_camera_set_exposure_time (
-      ARV_CAMERA (camera.get ()), double (exposure_) / 1e3, &error);
+      camera.get (), double (exposure_) / 1e3, &error);
   if (error)
     return camera_error (error);
   forget_frames ();
   return {};
 }
 
-/** Plays the pipeline, anew if it has failed. */
+/** Plays the pipeline, anew if it has ended. */
 Result<void>
 CameraRig::start ()
 {
-  if (playing_ && !pipeline_->take_error () && !pipeline_->ended ())
+  if (playing_ && !pipeline_->frames ().ended ())
     return {};
   if (playing_ || !pipeline_) {
     pipeline_.reset ();
     playing_ = false;
     delays_.clear ();
-    ASSIGN_OR_RETURN (pipeline_, FramePipeline::make (source ()));
+    RETURN_IF_ERROR (make_pipeline ());
   }
   RETURN_IF_ERROR (pipeline_->set_state (GST_STATE_PLAYING));
   playing_ = true;
@@ -469,18 +345,20 @@ CameraRig::watch_until (Nanoseconds until, int frames)
   while (int (seen.size ()) < frames && monotonic_now () < until) {
     if (stop_.stop_requested ())
       return stopped ();
-    const Sample sample = pipeline_->pull (kMoment);
-    const Nanoseconds now = monotonic_now ();
-    if (sample) {
-      last = now;
-      SeenFrame frame = seen_frame (sample.get (), now);
+    const auto tapped = pipeline_->frames ().take (kMoment);
+    const bool ended = pipeline_->frames ().ended ();
+    if (tapped) {
+      last = monotonic_now ();
+      SeenFrame frame = seen_frame (*tapped);
       if (!is_outdated (frame))
         seen.push_back (std::move (frame));
-    } else if (pipeline_->ended () && seen.empty () && !restarted) {
+    } else if (const auto why = pipeline_->take_error ()) {
+      return *why;
+    } else if (ended && seen.empty () && !restarted) {
       restarted = true;
       RETURN_IF_ERROR (start ());
       last = monotonic_now ();
-    } else if (pipeline_->ended () || now - last > patience ()) {
+    } else if (ended || monotonic_now () - last > patience ()) {
       break;
     }
   }
@@ -494,8 +372,8 @@ CameraRig::close_pipeline ()
   gchar *features = nullptr;
   if (pipeline_)
     g_object_get (
-        pipeline_->find ("source").get (), "features", &features, nullptr);
-  const std::unique_ptr<gchar, FreeWith<g_free>> owner (features);
+        pipeline_->find ("aravissrc"), "features", &features, nullptr);
+  const CharPtr owner (features);
   pipeline_.reset ();
   playing_ = false;
   return features ? features : "";
@@ -507,7 +385,7 @@ Result<std::vector<SeenFrame>>
 CameraRig::deliver (int frames)
 {
   const std::string features = close_pipeline ();
-  return receive_frames ({.camera = options_.camera,
+  return receive_frames ({.camera = *options_.source.camera,
       .features = features,
       .exposure = exposure_,
       .begin = [this] { return show (lit (0, 1), 1); },
@@ -518,52 +396,70 @@ CameraRig::deliver (int frames)
 
 /* ------------------------------------------------------------- recording -- */
 
+/** What a recorder gets. Frames are missing where its numbers jump, also those
+ * that waited for it too long. */
 RecordedFrame
-recorded (GstSample *sample, Nanoseconds now)
+recorded (const TappedFrame &tapped, std::optional<std::uint64_t> &last)
 {
   RecordedFrame frame;
-  GstBuffer *buffer = gst_sample_get_buffer (sample);
+  GstBuffer *buffer = tapped.buffer.get ();
   const FrameMeta meta = get_frame_meta (buffer).value_or (FrameMeta ());
   frame.time = Nanoseconds (GST_BUFFER_PTS (buffer));
-  frame.arrival = now;
-  frame.lost_before = meta.lost_before;
+  frame.arrival = tapped.arrival;
+  frame.lost_before = last && meta.frame > *last ? meta.frame - *last - 1
+                      : last                     ? 0
+                                                 : meta.lost_before;
+  last = std::max (last.value_or (0), std::uint64_t (meta.frame));
   frame.synchronised = meta.locked;
   if (GST_CLOCK_TIME_IS_VALID (meta.time_uncertainty))
     frame.uncertainty = Nanoseconds (meta.time_uncertainty);
-  frame.damaged = is_damaged (sample);
+  frame.damaged = GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_CORRUPTED);
   return frame;
 }
 
+/** That of the command record. */
+Result<std::unique_ptr<FramePipeline>>
+CameraRig::recording_pipeline () const
+{
+  return FramePipeline::make ([this] (Job &job) {
+    Chain chain = coded_source (
+        job, exposing (options_.source, exposure_), options_.plan, Pace::live);
+    RecordingStyle style;
+    style.live = true;
+    style.rate = parts_.rate;
+    write_recording (job, chain, options_.recording, style);
+    return pad_of (job.counted, "sink");
+  });
+}
+
+/** The options have the text of the schedule. */
 Result<void>
-CameraRig::record (const Schedule &schedule, double seconds,
+CameraRig::record (const Schedule &, double seconds,
     const std::function<void (const RecordedFrame &)> &take)
 {
   close_pipeline ();
   dmd_.reset (); // dmdsync opens it
-  const ScheduleFile file (schedule);
-  ASSIGN_OR_RETURN (const auto pipeline,
-      FramePipeline::make (source () + "dmdsync device=\"" + options_.device +
-                           "\" timestamp-at=device-clock schedule=\"" +
-                           file.path () + "\" ! "));
+  ASSIGN_OR_RETURN (const auto pipeline, recording_pipeline ());
   RETURN_IF_ERROR (pipeline->set_state (GST_STATE_PLAYING));
-  const double periods = seconds * options_.rate.num / options_.rate.den;
-  Nanoseconds last = monotonic_now ();
+  const double periods = seconds * parts_.rate.num / parts_.rate.den;
+  Nanoseconds heard = monotonic_now ();
+  std::optional<std::uint64_t> last;
   for (double frames = 0; frames < periods;) {
     if (stop_.stop_requested ())
       return stopped ();
-    const Sample sample = pipeline->pull (kMoment);
-    if (const auto why = pipeline->take_error (); why && frames == 0)
+    const auto tapped = pipeline->frames ().take (kMoment);
+    if (const auto why = pipeline->take_error ())
       return *why;
     const Nanoseconds now = monotonic_now ();
-    if (pipeline->begins ()) // masks are uploaded
-      last = now;
-    if (!sample && (now - last > patience () || pipeline->ended ()))
+    if (tapped || pipeline->begins ()) // masks are uploaded
+      heard = now;
+    if (!tapped && (now - heard > patience () || pipeline->frames ().ended ()))
       break;
-    if (!sample)
+    if (!tapped)
       continue;
-    last = now;
-    RecordedFrame frame = recorded (sample.get (), pipeline->now ());
-    const auto picture = picture_of (sample.get ());
+    RecordedFrame frame = recorded (*tapped, last);
+    frame.arrival -= pipeline->base_time ();
+    const auto picture = picture_of (*tapped);
     frame.damaged |= !picture;
     if (picture)
       frame.picture = picture->view ();
@@ -578,7 +474,7 @@ CameraRig::reopen_dmd ()
 {
   if (dmd_)
     return {};
-  ASSIGN_OR_RETURN (dmd_, open_dmd (options_.device));
+  ASSIGN_OR_RETURN (dmd_, open_dmd (*options_.source.device));
   return {};
 }
 
@@ -593,3 +489,5 @@ open_camera_rig (const CameraRigOptions &options, std::unique_ptr<Dmd> dmd,
   RETURN_IF_ERROR (rig->open ());
   return std::unique_ptr<Rig> (std::move (rig));
 }
+
+} // namespace codedexposure::app

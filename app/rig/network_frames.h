@@ -7,10 +7,15 @@
 #include <string>
 #include <vector>
 
+#include <glib.h>
+
 #include "doctor/rig.h"
 
-namespace codedexposure
+namespace codedexposure::app
 {
+
+/** Of Aravis; @p error is freed. */
+Error camera_error (GError *error);
 
 struct StreamRequest {
   std::string camera;   ///< as Aravis names it; nobody has it open
@@ -27,4 +32,4 @@ struct StreamRequest {
  * Error cancelled after a request to stop. */
 Result<std::vector<SeenFrame>> receive_frames (const StreamRequest &request);
 
-} // namespace codedexposure
+} // namespace codedexposure::app

@@ -1,0 +1,88 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "frame_pipeline.h"
+
+#include "base/try.h"
+#include "pipeline/messages.h"
+
+namespace codedexposure::app
+{
+
+using namespace gst;
+
+Result<std::unique_ptr<FramePipeline>>
+FramePipeline::make (const Build &build)
+try {
+  std::unique_ptr<FramePipeline> made (new FramePipeline);
+  made->frames_.emplace (build (made->job_));
+  const auto refused = made->job_.outputs.claim (true);
+  if (!refused.empty ())
+    return Error{refused.front (), ErrorCode::io};
+  return made;
+} catch (const Failure &failure) {
+  return failure.error;
+}
+
+FramePipeline::~FramePipeline ()
+{
+  gst_element_set_state (pipeline (), GST_STATE_NULL);
+  job_.outputs.finish (Outputs::Finish::discard);
+}
+
+Result<void>
+FramePipeline::set_state (GstState state)
+{
+  if (gst_element_set_state (pipeline (), state) != GST_STATE_CHANGE_FAILURE)
+    return {};
+  const auto why = take_error ();
+  gst_element_set_state (pipeline (), GST_STATE_NULL);
+  return why.value_or (
+      Error{"the camera cannot be started", ErrorCode::device});
+}
+
+std::optional<Error>
+FramePipeline::take_error ()
+{
+  const ObjectPtr<GstBus> bus (gst_element_get_bus (pipeline ()));
+  while (GstMessage *message =
+             gst_bus_pop_filtered (bus.get (), GST_MESSAGE_ERROR)) {
+    const std::unique_ptr<GstMessage, MiniObjectUnref> owner (message);
+    GError *error = nullptr;
+    gchar *detail = nullptr;
+    gst_message_parse_error (message, &error, &detail);
+    const std::unique_ptr<GError, FreeWith<g_error_free>> owned (error);
+    const CharPtr owned_detail (detail);
+    const std::string kind = factory_of (GST_MESSAGE_SRC (message));
+    if (is_silence (kind, error, detail))
+      continue;
+    const std::string remedy = remedy_for (kind, error, detail);
+    return Error{error->message + (remedy.empty () ? "" : "; " + remedy),
+        ErrorCode::device};
+  }
+  return std::nullopt;
+}
+
+bool
+FramePipeline::begins () const
+{
+  return gst_element_get_state (pipeline (), nullptr, nullptr, 0) ==
+         GST_STATE_CHANGE_ASYNC;
+}
+
+Nanoseconds
+FramePipeline::base_time () const
+{
+  return Nanoseconds (gst_element_get_base_time (pipeline ()));
+}
+
+GstElement *
+FramePipeline::find (const char *factory) const
+{
+  GstElement *found = nullptr;
+  each_element (pipeline (), [&] (GstElement *element) {
+    if (factory_of (element) == factory)
+      found = element;
+  });
+  return found;
+}
+
+} // namespace codedexposure::app

@@ -36,22 +36,9 @@ public:
    * whole (1, 16)). @p into keeps its value, which is the default, unless the
    * option is given.
    */
-  template <typename T>
-  void value (const std::string &name, std::optional<T> &into,
+  template <typename T, typename Into>
+  void value (const std::string &name, Into &into,
       const std::string &placeholder, const std::string &help, Rule<T> rule)
-  {
-    read_with (name, placeholder, help, rule.must_be,
-        [&into, read = std::move (rule.read)] (const std::string &text) {
-          auto read_value = read (text);
-          if (read_value)
-            into = std::move (*read_value);
-          return bool (read_value);
-        });
-  }
-  /** The same with a default that is not shown as missing. */
-  template <typename T>
-  void value (const std::string &name, T &into, const std::string &placeholder,
-      const std::string &help, Rule<T> rule)
   {
     read_with (name, placeholder, help, rule.must_be,
         [&into, read = std::move (rule.read)] (const std::string &text) {

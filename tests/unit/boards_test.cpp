@@ -6,7 +6,7 @@
 
 #include "dlpc900_rig.h"
 #include "dmd/boards.h"
-#include "emulation/dlpc350.h"
+#include "emulated_dlpc350.h"
 #include "lightcrafter_server.h"
 
 using namespace codedexposure;

@@ -5,7 +5,7 @@
 
 #include "dmd/dlpc350_protocol.h"
 #include "dmd/drivers.h"
-#include "emulation/dlpc350.h"
+#include "emulated_dlpc350.h"
 #include "fault_life.h"
 
 using namespace codedexposure;

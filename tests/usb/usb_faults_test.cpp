@@ -8,7 +8,7 @@
 #include <fstream>
 #include <thread>
 
-#include "emulation/dlpc350.h"
+#include "emulated_dlpc350.h"
 #include "emulation/dlpc900.h"
 #include "fault_life.h"
 #include "emulation/usb_bed.h"

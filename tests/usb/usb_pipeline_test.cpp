@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* dmdsync with a board on the USB in a pipeline: masks, cancelled uploads and a
  * board that is disconnected. */
-#include "emulation/dlpc350.h"
+#include "emulated_dlpc350.h"
 #include "emulation/dlpc900.h"
 #include "mirrors.h"
 #include "sync_harness.h"

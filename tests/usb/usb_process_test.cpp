@@ -16,7 +16,7 @@
 
 #include <gtest/gtest.h>
 
-#include "emulation/dlpc350.h"
+#include "emulated_dlpc350.h"
 #include "emulation/dlpc900.h"
 #include "emulation/usb_bed.h"
 

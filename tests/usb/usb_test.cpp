@@ -7,7 +7,7 @@
 
 #include "dmd/usb_bus.h"
 #include "dmd_rig.h"
-#include "emulation/dlpc350.h"
+#include "emulated_dlpc350.h"
 #include "emulation/dlpc900.h"
 #include "mirrors.h"
 #include "emulation/usb_bed.h"

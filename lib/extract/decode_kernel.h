@@ -466,28 +466,34 @@ struct Difference {
 };
 
 /** Kernels::decode where slot k is element k less the one before, and every
- * element is at the place of its own number. */
-template <int Width, typename T>
+ * element is at the place of its own number; Height 0: any. */
+template <int Width, typename T, int Height = 0>
 T
 decode_differences (
     const Block<T> &block, const Linear &linear, const Planes<T> &to)
 {
+  /* Registers hold small cells as a whole. */
+  if constexpr (Height == 0 && Width <= 4)
+    if (block.height == Width)
+      return decode_differences<Width, T, Width> (block, linear, to);
+  const int height = Height > 0 ? Height : block.height;
   const int factor = linear.terms[0].whole;
   const Difference<T> difference = {T (linear.largest) + Vector<T>{},
       T (linear.largest / factor) + Vector<T>{}, std::uint16_t (factor)};
   Vector<T> most = {};
-  T *out[256];
+  T *out[Height > 0 ? Width * Height : 256];
   for (int j = 0; j < block.rows; j++) {
-    for (int k = 0; k < linear.n; k++)
+    for (int k = 0; k < Width * height; k++)
       out[k] = bytes_on (to.rows[k], j * to.stride);
     for_strips<T> (block.cells, to.stream,
         [&] (int at, Put put) CODEDEXPOSURE_INLINE_BODY {
           Vector<T> before = {};
           const T *row = bytes_on (block.pixels + at * Width,
-              std::ptrdiff_t (j) * block.height * block.stride);
-          for (int y = 0; y < block.height; y++) {
-            prefetch (bytes_on (row, block.height * block.stride),
-                Width * kVectorBytes);
+              std::ptrdiff_t (j) * height * block.stride);
+#pragma GCC unroll 4
+          for (int y = 0; y < height; y++) {
+            prefetch (
+                bytes_on (row, height * block.stride), Width * kVectorBytes);
             Vector<T> parts[Width];
             split_cells<Width, T> (row, parts);
 #pragma GCC unroll 16

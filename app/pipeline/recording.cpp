@@ -62,8 +62,7 @@ write_recording (Job &job, Chain &chain, const std::string &file,
   GstElement *mux = chain.last ();
   const ObjectPtr<GstPad> frames = pad_of (mux, "sink");
   if (style.codec == "raw")
-    chain.to (
-        "codedexposure-filesink", {{"direct", true}, {"reserve", style.bytes}});
+    chain.to ("codedexposure-filesink", {{"reserve", style.bytes}});
   else
     chain.to ("filesink");
   job.outputs.file (chain.last (), "location", file, {.frames = frames.get ()});

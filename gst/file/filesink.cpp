@@ -5,25 +5,22 @@
  * @short_description: A file for fast cameras
  *
  * Writes a stream to a file, as `filesink` does, for data rates near those of
- * the disk. On a disk, with #codedexposure-filesink:direct, it bypasses the
- * page cache: that takes a quarter of the processor time, and the memory stays
- * free. With #codedexposure-filesink:reserve, the file system allocates the
- * space before the stream begins, and a disk without it is an error then and
- * not when it is full.
+ * the disk. The bytes go on to the disk at once and leave the page cache, so
+ * the memory stays free. With #codedexposure-filesink:reserve, the file system
+ * allocates the space before the stream begins, and a disk without it is an
+ * error then and not when it is full.
  *
- * If the program is killed, what came 50 ms before is in the file, as long as
- * less came than the memory of the writer holds: about two frames of a fast
- * camera.
+ * If the program is killed, all that came is in the file.
  *
  * ## Example pipeline
  * |[
  * gst-launch-1.0 -e videotestsrc num-buffers=100 \
  *     ! video/x-raw,format=GRAY8,framerate=100/1,width=2048,height=2048 \
  *     ! codedexposure-sim ! codedexposure-recordmux codec=raw \
- *     ! codedexposure-filesink direct=true location=direct.mkv
+ *     ! codedexposure-filesink location=fast.mkv
  * ]|
  *
- * Since: 0.1
+ * Since: 0.2
  */
 #include <memory>
 #include <string>
@@ -44,7 +41,7 @@ namespace
 struct FileState {
   /* Object lock: */
   std::string location;
-  FileWriter::Options options;
+  guint64 reserve = 0;
   std::string problem; // why the file could not be finished
 
   /* Streaming thread, and start and stop, which exclude it: */
@@ -72,16 +69,16 @@ gboolean
 start (GstBaseSink *sink) noexcept
 {
   FileState &state = state_of (sink);
-  const auto [location, options] = locked (sink, [&] {
+  const auto [location, reserve] = locked (sink, [&] {
     state.problem.clear ();
-    return std::pair (state.location, state.options);
+    return std::pair (state.location, state.reserve);
   });
   if (location.empty ()) {
     POST_ERROR (sink, RESOURCE, NOT_FOUND,
         "codedexposure-filesink has no file to write; set location=FILE");
     return FALSE;
   }
-  auto file = FileWriter::open (location, options);
+  auto file = FileWriter::open (location, reserve);
   if (!file) {
     fail (sink, file.error ());
     return FALSE;
@@ -171,17 +168,11 @@ properties ()
   return {
       {"location", "File location", "File to write; overwritten when it exists",
           kReadWriteReady, &FileState::location},
-      {"direct", "Direct",
-          "Write past the page cache, in large blocks, where the file system "
-          "can",
-          kReadWriteReady,
-          within (&FileState::options, &FileWriter::Options::direct)},
       {"reserve", "Reserve",
           "Bytes that are allocated before the stream begins; what is not used "
           "is free again at the end",
-          kReadWriteReady,
-          within (&FileState::options, &FileWriter::Options::reserve),
-          guint64 (0), guint64 (G_MAXINT64)},
+          kReadWriteReady, &FileState::reserve, guint64 (0),
+          guint64 (G_MAXINT64)},
       {"problem", "Problem",
           "Why the file could not be finished; empty: it was, or is still "
           "written",

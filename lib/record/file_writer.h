@@ -16,44 +16,46 @@ namespace codedexposure
  * Writes a new file from front to back, as muxers do, which now and then go
  * back to fill in a size.
  *
- * A direct file bypasses the page cache: its bytes are collected in aligned
- * blocks, which a thread of its own writes. That takes a quarter of the
- * processor time, and no memory. Blocks stay in memory for as long as the
- * muxer went back before. When write () is called 50 ms or more after the last
- * bytes went to the file, all go there, so a program that is killed leaves all
- * but the last frames. File systems in memory have no direct files; there, as
- * without the option, write () writes at once.
+ * All bytes are in the file when write () returns, so a program that is killed
+ * loses none. The page cache passes them on to the disk steadily and keeps few,
+ * so it does not fill with a recording, and write () waits for a disk that is
+ * too slow.
  *
  * For one thread.
  */
 class FileWriter
 {
 public:
-  struct Options {
-    bool direct = false;       ///< where the file system can
-    std::uint64_t reserve = 0; ///< bytes to allocate before anything is written
-  };
-
-  /** Replaces the content of @p path. An error if it cannot be written, or if
-   * there is not enough space for the reserve. */
+  /** Replaces the content of @p path; allocates @p reserve bytes for it. An
+   * error if it cannot be written, or if there is not enough space. */
   static Result<std::unique_ptr<FileWriter>> open (
-      const std::string &path, const Options &options);
+      const std::string &path, std::uint64_t reserve = 0);
 
-  virtual ~FileWriter () = default;
+  ~FileWriter ();
+  FileWriter (const FileWriter &) = delete;
+  FileWriter &operator= (const FileWriter &) = delete;
 
-  /** At the position, which moves behind it. The error may be of an earlier
-   * call. */
-  virtual Result<void> write (const void *data, std::size_t size) = 0;
+  /** At the position, which moves behind it. */
+  Result<void> write (const void *data, std::size_t size);
   /** Moves the position; what is skipped over is zero. */
   void seek (std::uint64_t position) { position_ = position; }
   std::uint64_t position () const { return position_; }
-  /** At the end: all bytes are in the file, and the rest of the reserve is free
-   * again. */
-  virtual Result<void> finish () = 0;
-  virtual bool is_direct () const = 0;
+  /** At the end: the rest of the reserve is free again. */
+  Result<void> finish ();
 
-protected:
+private:
+  FileWriter (const std::string &path, int file, bool reserved)
+      : path_ (path), file_ (file), reserved_ (reserved)
+  {
+  }
+  void pass_on ();
+
+  const std::string path_;
+  const int file_;
+  const bool reserved_;
   std::uint64_t position_ = 0;
+  std::uint64_t end_ = 0;
+  std::uint64_t passed_ = 0; ///< to the disk, from the beginning
 };
 
 } // namespace codedexposure

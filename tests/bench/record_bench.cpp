@@ -185,7 +185,7 @@ record (const Setting &setting, Ring &ring, const std::string &codec,
       "max-size-buffers=" +
       std::to_string (rate > 0 ? kWaiting : 2) +
       " max-size-bytes=0 max-size-time=0 ! codedexposure-recordmux codec=" +
-      codec + " ! codedexposure-filesink direct=true reserve=" +
+      codec + " ! codedexposure-filesink reserve=" +
       std::to_string (
           reserve ? guint64 (expected * double (setting.size ())) : 0) +
       " location=" + setting.file ();

@@ -2,7 +2,6 @@
 #include "record/file_writer.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
@@ -10,11 +9,15 @@
 #include <functional>
 #include <random>
 #include <string>
-#include <thread>
 #include <vector>
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <linux/magic.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
+#include <sys/vfs.h>
+#include <unistd.h>
 
 using namespace codedexposure;
 namespace fs = std::filesystem;
@@ -22,7 +25,7 @@ namespace fs = std::filesystem;
 namespace
 {
 
-/** A file of its own on the disk, where direct writes are possible. */
+/** A file of its own on the disk. */
 class Scratch
 {
 public:
@@ -64,9 +67,9 @@ noise (std::size_t size)
 }
 
 std::unique_ptr<FileWriter>
-open (const Scratch &scratch, const FileWriter::Options &options)
+open (const Scratch &scratch, std::uint64_t reserve = 0)
 {
-  auto file = FileWriter::open (scratch.file (), options);
+  auto file = FileWriter::open (scratch.file (), reserve);
   EXPECT_TRUE (file) << file.error ().message;
   return *std::move (file);
 }
@@ -98,18 +101,30 @@ mux (FileWriter &file, int frames, std::size_t length)
   return expected;
 }
 
-class Kinds : public testing::TestWithParam<bool>
+/** Bytes of @p path that the page cache holds. */
+std::uint64_t
+bytes_in_memory (const std::string &path)
 {
-};
+  const std::uint64_t size = fs::file_size (path);
+  const int file = ::open (path.c_str (), O_RDONLY);
+  void *mapped = mmap (nullptr, size, PROT_READ, MAP_SHARED, file, 0);
+  const auto page = std::uint64_t (sysconf (_SC_PAGESIZE));
+  std::vector<unsigned char> pages (size / page + 1);
+  EXPECT_EQ (mincore (mapped, size, pages.data ()), 0);
+  munmap (mapped, size);
+  close (file);
+  return page * std::uint64_t (std::ranges::count_if (
+                    pages, [] (unsigned char one) { return one & 1; }));
+}
 
 } // namespace
 
-TEST_P (Kinds, WriteWhatAMuxerWrites)
+TEST (FileWriter, WritesWhatAMuxerWrites)
 {
   for (const std::size_t length : {100u, 70'000u, 5'000'000u, 13'000'000u}) {
     SCOPED_TRACE (length);
     const Scratch scratch;
-    const auto file = open (scratch, {.direct = GetParam ()});
+    const auto file = open (scratch);
     const std::string expected =
         mux (*file, length > 1'000'000 ? 4 : 100, length);
     ASSERT_TRUE (file->finish ());
@@ -117,22 +132,21 @@ TEST_P (Kinds, WriteWhatAMuxerWrites)
   }
 }
 
-TEST_P (Kinds, SkipOverZeros)
+TEST (FileWriter, SkipsOverZeros)
 {
   const Scratch scratch;
-  const auto file = open (scratch, {.direct = GetParam ()});
+  const auto file = open (scratch);
   file->seek (9'000'000);
   ASSERT_TRUE (file->write ("end", 3));
   ASSERT_TRUE (file->finish ());
   EXPECT_TRUE (scratch.content () == std::string (9'000'000, '\0') + "end");
 }
 
-TEST_P (Kinds, FreeWhatTheyReservedAndDidNotUse)
+TEST (FileWriter, FreesWhatItReservedAndDidNotUse)
 {
   constexpr std::uint64_t kReserve = 30'000'000;
   const Scratch scratch;
-  const auto file =
-      open (scratch, {.direct = GetParam (), .reserve = kReserve});
+  const auto file = open (scratch, kReserve);
   EXPECT_GE (scratch.allocated (), kReserve);
   EXPECT_EQ (scratch.content ().size (), 0u);
   const std::string bytes = noise (100'000);
@@ -143,34 +157,38 @@ TEST_P (Kinds, FreeWhatTheyReservedAndDidNotUse)
 }
 
 /* A program that is killed calls no destructor. */
-TEST_P (Kinds, HaveAllBytesInTheFileSoon)
+TEST (FileWriter, HasAllBytesInTheFileAtOnce)
 {
   const Scratch scratch;
-  const auto file = open (scratch, {.direct = GetParam ()});
-  const std::string early = noise (10'000);
-  ASSERT_TRUE (file->write (early.data (), early.size ()));
-  std::string content;
-  const auto begin = std::chrono::steady_clock::now ();
-  while (content.size () < early.size () &&
-         std::chrono::steady_clock::now () - begin < std::chrono::minutes (1)) {
-    ASSERT_TRUE (file->write ("+", 1));
-    content = scratch.content ();
-  }
-  EXPECT_TRUE (content.starts_with (early));
-  EXPECT_EQ (content.find_first_not_of ('+', early.size ()), content.npos);
+  const auto file = open (scratch);
+  const std::string bytes = noise (10'000);
+  ASSERT_TRUE (file->write (bytes.data (), bytes.size ()));
+  EXPECT_TRUE (scratch.content () == bytes);
 }
 
-INSTANTIATE_TEST_SUITE_P (FileWriter, Kinds, testing::Bool (),
-    [] (const auto &info) { return info.param ? "Direct" : "Cached"; });
+TEST (FileWriter, DoesNotFillThePageCache)
+{
+  constexpr std::uint64_t kLength = 120'000'000;
+  const Scratch scratch;
+  struct statfs system = {};
+  statfs (fs::path (scratch.file ()).parent_path ().c_str (), &system);
+  if (system.f_type == TMPFS_MAGIC)
+    GTEST_SKIP () << "these files stay in memory";
+  const auto file = open (scratch);
+  const std::string bytes = noise (1'000'000);
+  while (file->position () < kLength)
+    ASSERT_TRUE (file->write (bytes.data (), bytes.size ()));
+  EXPECT_LT (bytes_in_memory (scratch.file ()), kLength / 2);
+}
 
 TEST (FileWriter, SaysWhyItCannotWrite)
 {
-  const auto missing = FileWriter::open ("/nonexistent/file", {});
+  const auto missing = FileWriter::open ("/nonexistent/file");
   ASSERT_FALSE (missing);
   EXPECT_NE (
       missing.error ().message.find ("/nonexistent/file"), std::string::npos);
 
-  const auto full = FileWriter::open ("/dev/full", {.direct = true});
+  const auto full = FileWriter::open ("/dev/full");
   ASSERT_TRUE (full);
   const auto written = (*full)->write ("x", 1);
   ASSERT_FALSE (written);
@@ -181,57 +199,7 @@ TEST (FileWriter, SaysBeforeItBeginsThatSpaceIsMissing)
 {
   const Scratch scratch;
   const auto space = fs::space (fs::path (scratch.file ()).parent_path ());
-  const auto file = FileWriter::open (
-      scratch.file (), {.direct = true, .reserve = 2 * space.capacity});
+  const auto file = FileWriter::open (scratch.file (), 2 * space.capacity);
   ASSERT_FALSE (file);
   EXPECT_NE (file.error ().message.find ("cannot reserve"), std::string::npos);
-}
-
-namespace
-{
-
-/** Bytes that this process has passed to files. */
-std::uint64_t
-passed_bytes ()
-{
-  std::ifstream counters ("/proc/self/io");
-  std::string name;
-  for (std::uint64_t count = 0; counters >> name >> count;)
-    if (name == "wchar:")
-      return count;
-  return 0;
-}
-
-} // namespace
-
-/* At 25 frames/s, each goes to the disk at once; its block is not full yet. */
-TEST (FileWriter, WritesNothingAgain)
-{
-  const Scratch scratch;
-  const auto file = open (scratch, {.direct = true});
-  const std::string frame = noise (442'000);
-  const std::uint64_t before = passed_bytes ();
-  std::uint64_t size_at = 0;
-  std::string expected;
-  for (int k = 0; k < 8; k++) {
-    std::this_thread::sleep_for (std::chrono::milliseconds (55));
-    const auto end = file->position ();
-    file->seek (size_at);
-    ASSERT_TRUE (file->write ("12345678", 8));
-    file->seek (std::max<std::uint64_t> (end, 8));
-    size_at = file->position ();
-    ASSERT_TRUE (file->write (frame.data (), frame.size ()));
-  }
-  ASSERT_TRUE (file->finish ());
-  EXPECT_LT (double (passed_bytes () - before), 1.1 * 8 * 442'000);
-  const std::string content = scratch.content ();
-  ASSERT_EQ (content.size (), 8 + 8 * frame.size ());
-  for (std::size_t k = 0; k < 8; k++) {
-    expected = frame;
-    if (k < 7)
-      expected.replace (0, 8, "12345678");
-    EXPECT_TRUE (
-        content.substr (8 + k * frame.size (), frame.size ()) == expected)
-        << k;
-  }
 }

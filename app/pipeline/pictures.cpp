@@ -116,34 +116,6 @@ PictureNames::path (const std::string &file) const
   return folder.empty () ? file : folder + "/" + file;
 }
 
-struct Pictures::Known {
-  std::optional<guint64> frame;
-  gint slot = -1;
-  const char *synchronised = "unknown";
-  guint64 lost_before = 0;
-
-  explicit Known (GstBuffer *picture);
-};
-
-Pictures::Known::Known (GstBuffer *picture)
-{
-  static const char *const kName = "CodedExposureFrame";
-  GstCustomMeta *meta = gst_meta_get_info (kName)
-                            ? gst_buffer_get_custom_meta (picture, kName)
-                            : nullptr;
-  if (!meta)
-    return;
-  const GstStructure *fields = gst_custom_meta_get_structure (meta);
-  guint64 number = 0;
-  gboolean locked = FALSE;
-  if (gst_structure_get_uint64 (fields, "frame", &number))
-    frame = number;
-  gst_structure_get_int (fields, "subframe", &slot);
-  gst_structure_get_uint64 (fields, "lost-before", &lost_before);
-  if (gst_structure_get_boolean (fields, "locked", &locked))
-    synchronised = locked ? "true" : "false";
-}
-
 Pictures::Pictures (GstElement *sink, GstPad *coded, const std::string &format)
     : sink_ (sink), coded_ (coded), format_ (format), name_ (format)
 {
@@ -228,24 +200,29 @@ Pictures::watch_flags (GstPad *sink_pad)
   gst_pad_add_probe (
       pad.get (), GST_PAD_PROBE_TYPE_BUFFER,
       [] (GstPad *, GstPadProbeInfo *info, gpointer self) {
-        static_cast<Pictures *> (self)->corrupted_ = GST_BUFFER_FLAG_IS_SET (
-            GST_PAD_PROBE_INFO_BUFFER (info), GST_BUFFER_FLAG_CORRUPTED);
+        static_cast<Pictures *> (self)->corrupted_ =
+            is_corrupted (GST_PAD_PROBE_INFO_BUFFER (info));
         return GST_PAD_PROBE_OK;
       },
       this, nullptr);
 }
 
-/* The slot of the recording; otherwise, the number after the last. */
+/* The slot of the recording, also of a frame that comes late; otherwise, or if
+ * that number is taken, the number after the last. */
 gint
-Pictures::next_index (GstPad *pad, const Known &known) const
+Pictures::next_index (GstPad *pad, const std::optional<FrameMeta> &meta)
 {
   const double slots = rate_at (pad) / std::max (rate_at (coded_), 1e-9);
   const guint64 most = std::numeric_limits<gint>::max ();
-  if (!known.frame || slots < 0.5 || slots > 1e6 || *known.frame > most)
-    return index_ + 1;
-  const guint64 number =
-      *known.frame * guint64 (slots + 0.5) + guint64 (std::max (known.slot, 0));
-  return number > most ? index_ + 1 : std::max (index_ + 1, gint (number));
+  const gint after = taken_.empty () ? 0 : *taken_.rbegin () + 1;
+  guint64 number = most + 1;
+  if (meta && slots >= 0.5 && slots <= 1e6 && meta->frame <= most)
+    number = meta->frame * guint64 (slots + 0.5) +
+             guint64 (std::max (meta->subframe, 0));
+  const gint index =
+      number > most || taken_.contains (gint (number)) ? after : gint (number);
+  taken_.insert (index);
+  return index;
 }
 
 /* Before the sink writes @picture. The last one is complete. */
@@ -253,16 +230,21 @@ void
 Pictures::add (GstPad *pad, GstBuffer *picture)
 {
   write_line (line_);
-  const Known known (picture);
-  index_ = next_index (pad, known);
-  g_object_set (sink_, "index", index_, nullptr);
-  last_ = names_.picture (index_);
+  const auto meta = get_frame_meta (picture);
+  const gint index = next_index (pad, meta);
+  g_object_set (sink_, "index", index, nullptr);
+  last_ = names_.picture (index);
+  const auto locked = meta ? meta->locked : std::nullopt;
   line_ = format ("%s,%s,%s,%s,%s,%s,%s,%" G_GUINT64_FORMAT, last_.c_str (),
-      known.frame ? std::to_string (*known.frame).c_str () : "",
-      known.slot >= 0 ? std::to_string (known.slot).c_str () : "",
+      meta ? std::to_string (meta->frame).c_str () : "",
+      meta && meta->subframe >= 0 ? std::to_string (meta->subframe).c_str ()
+                                  : "",
       time_text (stream_time (pad, GST_BUFFER_PTS (picture))).c_str (),
-      time_text (GST_BUFFER_DURATION (picture)).c_str (), known.synchronised,
-      corrupted_ ? "true" : "false", known.lost_before);
+      time_text (GST_BUFFER_DURATION (picture)).c_str (),
+      !locked   ? "unknown"
+      : *locked ? "true"
+                : "false",
+      corrupted_ ? "true" : "false", meta ? meta->lost_before : 0);
   frames_++;
 }
 

@@ -4,8 +4,11 @@
 
 #include <cstdio>
 #include <memory>
+#include <optional>
+#include <set>
 #include <string>
 
+#include "common/meta.h"
 #include "pipeline/outputs.h"
 
 namespace codedexposure::app
@@ -47,12 +50,10 @@ public:
   const std::string &part () const override { return part_->path (); }
 
 private:
-  struct Known;
-
   Result<void> check_names () const;
   void watch_flags (GstPad *sink_pad);
   void add (GstPad *pad, GstBuffer *picture);
-  gint next_index (GstPad *pad, const Known &known) const;
+  gint next_index (GstPad *pad, const std::optional<gst::FrameMeta> &meta);
   void write_line (const std::string &line);
   void remove_earlier () const;
 
@@ -69,7 +70,7 @@ private:
   bool corrupted_ = false; // the picture that is being encoded
   std::string line_;       // of the last picture, which is being written
   std::string last_;       // its file
-  gint index_ = -1;
+  std::set<gint> taken_;   // numbers
 };
 
 } // namespace codedexposure::app

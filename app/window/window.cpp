@@ -328,8 +328,7 @@ Window::remember (Pane &pane, GstPad *pad, GstBuffer *picture)
     shown->grey.pixels.insert (shown->grey.pixels.end (), pixels.row (y),
         pixels.row (y) + pixels.width);
   shown->meta = get_frame_meta (picture);
-  shown->corrupted =
-      GST_BUFFER_FLAG_IS_SET (picture, GST_BUFFER_FLAG_CORRUPTED);
+  shown->corrupted = is_corrupted (picture);
   shown->stream_time = stream;
   shown->exposure = pane.exposure;
   const std::lock_guard lock (mutex_);

@@ -49,11 +49,22 @@ struct FrameMeta {
   /** Significant bits of a pixel, counted from the lowest, if they are fewer
    * than the format's; 0: all, or unknown. */
   gint bits = 0;
+  /** pixel_hash () of a coded frame of a recording, as it was recorded. */
+  std::optional<guint64> hash = {};
 
-  /** All but the pattern; always present, except locked. */
+  /** All but the pattern; always present, except locked and hash. */
   CODED_FIELDS (frame, subframe, exposure_start, exposure_duration, locked,
-      slip, lost_before, saturated, bits, time_uncertainty);
+      slip, lost_before, saturated, bits, time_uncertainty, hash);
 };
+
+/** Whether the pixels of @p picture may not be those of the scene at its time:
+ * they are damaged, or repeat others because its frame was lost. */
+inline bool
+is_corrupted (GstBuffer *picture)
+{
+  return GST_BUFFER_FLAGS (picture) &
+         (GST_BUFFER_FLAG_CORRUPTED | GST_BUFFER_FLAG_GAP);
+}
 
 /** FrameMeta::bits of a picture of @p info with @p bits significant bits. */
 inline int

@@ -17,7 +17,7 @@
  *     ! codedexposure-demux ! queue ! codedexposure-stack location=fast.ome.tif
  * ]|
  *
- * Since: 0.1
+ * Since: 0.2
  */
 #include <memory>
 #include <string>
@@ -185,7 +185,7 @@ row_of (GstBaseSink *sink, GstBuffer *picture)
   row.pts = gst_segment_to_stream_time (
       &sink->segment, GST_FORMAT_TIME, GST_BUFFER_PTS (picture));
   row.duration = GST_BUFFER_DURATION (picture);
-  row.corrupted = GST_BUFFER_FLAG_IS_SET (picture, GST_BUFFER_FLAG_CORRUPTED);
+  row.corrupted = is_corrupted (picture);
   if (const auto meta = get_frame_meta (picture)) {
     row.frame = meta->frame;
     row.slot = meta->subframe;

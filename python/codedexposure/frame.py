@@ -124,7 +124,8 @@ def frame_of(sample) -> Frame:
         frame=value("frame"),
         slot=None if slot is None or slot < 0 else slot,
         synchronised=value("locked"),
-        corrupted=buffer.has_flags(Gst.BufferFlags.CORRUPTED),
+        corrupted=bool(buffer.get_flags() & (
+            Gst.BufferFlags.CORRUPTED | Gst.BufferFlags.GAP)),
         lost_before=value("lost-before") or 0,
         saturated=value("saturated"),
         bits=value("bits") or 8 * image.itemsize,

@@ -33,22 +33,30 @@ def read(name):
     return frames, "\n".join(str(warning.message) for warning in said)
 
 
-def record_without(lost, name):
-    """Records 8 coded frames, but not those with these numbers."""
+def record(name, on_frame, on_loss="gap"):
+    """Records 8 coded frames, for each of which on_frame(pad, number, buffer)
+    says whether it is lost."""
+    def probe(pad, info):
+        frame = info.get_buffer()
+        lost = on_frame(pad, frame.pts // (40 * Gst.MSECOND), frame)
+        return Gst.PadProbeReturn.DROP if lost else Gst.PadProbeReturn.OK
+
     pipeline = Gst.parse_launch(
         "videotestsrc num-buffers=32 ! video/x-raw,format=GRAY8,width=96,"
         "height=64,framerate=100/1 ! codedexposure-sim ! identity name=camera ! "
-        "dmdsync device=sim:bench ! codedexposure-recordmux ! "
+        f"dmdsync device=sim:bench on-loss={on_loss} ! codedexposure-recordmux ! "
         f"filesink location={SCRATCH / name}")
-    numbers = iter(range(8))
     pipeline.get_by_name("camera").get_static_pad("src").add_probe(
-        Gst.PadProbeType.BUFFER, lambda *_: Gst.PadProbeReturn.DROP
-        if next(numbers) in lost else Gst.PadProbeReturn.OK)
+        Gst.PadProbeType.BUFFER, probe)
     pipeline.set_state(Gst.State.PLAYING)
     end = pipeline.get_bus().timed_pop_filtered(
         60 * Gst.SECOND, Gst.MessageType.EOS | Gst.MessageType.ERROR)
     pipeline.set_state(Gst.State.NULL)
     assert end and end.type == Gst.MessageType.EOS
+
+
+def record_without(lost, name, on_loss="gap"):
+    record(name, lambda pad, number, frame: number in lost, on_loss)
 
 
 class Pixels(unittest.TestCase):
@@ -149,6 +157,34 @@ class Facts(unittest.TestCase):
         self.assertIn("coded frames were lost before", said)
         self.assertEqual([f.frame for f in frames if f.lost_before], [5] * 4)
         self.assertEqual({f.lost_before for f in frames}, {0, 2})
+
+    def test_repeated(self):
+        record_without({3, 4}, "repeated.mkv", "repeat")
+        frames, _ = self.compare_table("repeated.mkv")
+        self.assertEqual([f.frame for f in frames if f.corrupted],
+                         [3] * 4 + [4] * 4)
+
+    def test_late(self):
+        """The pictures of a frame that comes after the next one have the
+        numbers of their slots, and so have those after them."""
+        late = []
+
+        def swap(pad, number, frame):
+            if number == 2 and not late:
+                late.append(frame)
+                return True
+            if number == 4:
+                pad.push(late[0])
+            return False
+
+        record("late.mkv", swap)
+        frames, _ = self.compare_table("late.mkv")
+        order = [4 * k + slot for k in (0, 1, 3, 2, 4, 5, 6, 7)
+                 for slot in range(4)]
+        self.assertEqual([4 * f.frame + f.slot for f in frames], order)
+        with open(SCRATCH / "pictures/times.csv", encoding="ascii") as table:
+            self.assertEqual([int(row["file"][:-4])
+                              for row in csv.DictReader(table)], order)
 
     def test_damaged(self):
         data = bytearray((SCRATCH / "plain.mkv").read_bytes())

@@ -342,7 +342,10 @@ private:
     std::vector<EventPtr> pending;
     std::optional<FrameSequence> sequence;
     GstClockTime last_pts = GST_CLOCK_TIME_NONE;
-    bool was_late = false; ///< the last frame was
+    bool was_late = false;    ///< the last frame was
+    bool is_recorded = false; ///< kRecordedEvent came
+    /** PTS of a recorded frame, from its exposure on; all have the same. */
+    std::optional<GstClockTimeDiff> moved;
     /** Until when upstream has said that frames are missing. */
     GstClockTime missing_until = 0;
     std::string pattern; ///< that was said of frames that are not decoded
@@ -350,6 +353,7 @@ private:
     std::optional<Schedule> overruled; ///< tagged, and reported as overruled
     bool warned_assumed = false;
     bool warned_of_time = false;
+    bool warned_of_edit = false;
     bool warned_of_mapping = false;
     bool warned_of_bench = false;
     std::optional<RectifierCache> rectifiers;
@@ -409,6 +413,8 @@ private:
   GstFlowReturn check_time_stamp (GstBuffer *frame) const;
   BufferPtr restore_clipped_frame (BufferPtr frame);
   CodedFrame admit (BufferPtr frame);
+  const char *edit_of (GstBuffer *frame, const std::optional<FrameMeta> &meta);
+  void flag_edited (BufferPtr &frame, const std::optional<FrameMeta> &meta);
   void include (const CodedFrame &frame);
   GstFlowReturn break_off ();
   GstFlowReturn skip (const CodedFrame &frame);

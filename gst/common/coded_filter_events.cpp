@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "events.h"
 #include "tag.h"
 
 #define GST_CAT_DEFAULT coded_filter_debug
@@ -54,6 +55,9 @@ CodedFilter::sink_event (EventPtr event)
     return on_eos (std::move (event));
   case GST_EVENT_FLUSH_STOP:
     return on_flush_stop (std::move (event));
+  case GST_EVENT_CUSTOM_DOWNSTREAM_STICKY:
+    stream_.is_recorded |= gst_event_has_name (event.get (), kRecordedEvent);
+    [[fallthrough]];
   default:
     return in_turn ? forward_in_turn (std::move (event))
                    : forward (std::move (event));
@@ -98,6 +102,7 @@ CodedFilter::on_stream_start (EventPtr event)
   if (std::exchange (stream_.id, id ? id : "") != (id ? id : "")) {
     stream_.tagged.reset ();
     stream_.not_coded.reset ();
+    stream_.is_recorded = false;
     stream_.stale = true;
   }
   SeekBook::read (this, stream_.id, reach ());
@@ -260,6 +265,7 @@ CodedFilter::break_time ()
 {
   if (stream_.sequence)
     stream_.sequence->resync ();
+  stream_.moved.reset ();
   stream_.missing_until = 0;
   break_history ();
   each_pad ([this] (GstCodedPad *pad) {

@@ -8,6 +8,7 @@
 
 #include "base/pixels.h"
 #include "extract/black_level.h"
+#include "record.h"
 
 #define GST_CAT_DEFAULT coded_filter_debug
 
@@ -204,6 +205,45 @@ CodedFilter::count (guint64 CodedCounters::*counter, guint64 by)
   shared_.counters.*counter += by;
 }
 
+/* How a frame of a recording differs from what was recorded, because an element
+ * changed it since; null: it does not, or that is not known. Copies and changed
+ * times lie apart from their exposure. */
+const char *
+CodedFilter::edit_of (GstBuffer *frame, const std::optional<FrameMeta> &meta)
+{
+  if (!meta)
+    return stream_.is_recorded ? "metadata" : nullptr;
+  if (!meta->hash)
+    return nullptr;
+  if (hash_of (frame, format ().info) != meta->hash)
+    return "pixels";
+  if (!GST_CLOCK_TIME_IS_VALID (meta->exposure_start))
+    return nullptr;
+  const GstClockTimeDiff moved =
+      GST_CLOCK_DIFF (meta->exposure_start, GST_BUFFER_PTS (frame));
+  const GstClockTimeDiff before = stream_.moved.value_or (moved);
+  stream_.moved = before;
+  const auto slack = GstClockTimeDiff (format ().period () / 16);
+  return std::abs (moved - before) > slack ? "times" : nullptr;
+}
+
+void
+CodedFilter::flag_edited (
+    BufferPtr &frame, const std::optional<FrameMeta> &meta)
+{
+  const char *edited = edit_of (frame.get (), meta);
+  if (!edited)
+    return;
+  frame.reset (gst_buffer_make_writable (frame.release ()));
+  GST_BUFFER_FLAG_SET (frame.get (), GST_BUFFER_FLAG_CORRUPTED);
+  if (!std::exchange (stream_.warned_of_edit, true))
+    POST_WARNING (element_, STREAM, FORMAT,
+        std::string ("The coded frames have other ") + edited +
+            " than when they were recorded: an element between the recording "
+            "and this one changes them. Their pictures are flagged as "
+            "corrupted. Decode the frames as they were recorded.");
+}
+
 /* Numbers the frame by its time; counts and reports lost and corrupted frames.
  */
 CodedFrame
@@ -214,6 +254,8 @@ CodedFilter::admit (BufferPtr frame)
                           ? stream_.excerpt->place (pts, format ().period ())
                           : Place::inside;
   const bool counts = place == Place::inside;
+  const auto known = get_frame_meta (frame.get ());
+  flag_edited (frame, known);
   if (counts)
     count (&CodedCounters::frames_in);
   if (counts &&
@@ -226,7 +268,6 @@ CodedFilter::admit (BufferPtr frame)
     step = stream_.sequence->restart (Nanoseconds (pts));
   FrameMeta counted;
   counted.frame = step.number;
-  const auto known = get_frame_meta (frame.get ());
   if (counts && step.arrival == Arrival::after_loss)
     report_loss (pts, step.lost, known ? known->lost_before : 0);
   else if (counts && step.arrival != Arrival::next &&
@@ -418,6 +459,7 @@ CodedFilter::describe (GstBuffer *outbuf, GstBuffer *coded, FrameMeta meta,
   meta.bits = significant_bits_of (significant_bits (), picture.info);
   meta.exposure_start = picture.exposure_start;
   meta.exposure_duration = picture.exposure_duration;
+  meta.hash.reset ();
   set_frame_meta (outbuf, meta);
   GST_BUFFER_PTS (outbuf) = picture.pts;
   GST_BUFFER_DTS (outbuf) = GST_CLOCK_TIME_NONE;

@@ -8,6 +8,10 @@
 namespace codedexposure::gst
 {
 
+/** Sticky, downstream: a recording says what each frame of the stream is, so
+ * one without a meta was changed since. */
+inline constexpr const char *kRecordedEvent = "codedexposure/recorded";
+
 /** Any element downstream of dmdsync can request a pattern; it expires unless
  * it is requested again. */
 struct PatternRequest {

@@ -135,6 +135,8 @@ apply_record (
   meta.pattern = record.pattern;
   meta.saturated = record.saturated.value_or (0);
   meta.bits = record.bits;
+  if (!record.slot)
+    meta.hash = record.hash;
   set_frame_meta (frame, meta);
 }
 

@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "damage.h"
 
+#include <algorithm>
 #include <utility>
 
+#include "common/excerpt.h"
 #include "common/messages.h"
 
 namespace codedexposure::gst
@@ -12,6 +14,7 @@ void
 DamageReport::restart ()
 {
   forget ();
+  repeated_ = 0;
   const ObjectLock lock (element_);
   counters_ = {};
 }
@@ -52,6 +55,24 @@ DamageReport::end_sequence ()
 }
 
 void
+DamageReport::frames_lost (const FrameRecord &record, GstClockTime pts,
+    const GstSegment &segment, guint32 seqnum)
+{
+  const guint64 lost = record.lost_before.value_or (0);
+  const GstClockTime length =
+      GstClockTime (record.duration.value_or (0)) * lost;
+  const GstClockTime from = pts - std::min (pts, length);
+  const auto stream_time = [&segment] (GstClockTime time) {
+    return gst_segment_to_stream_time (&segment, GST_FORMAT_TIME, time);
+  };
+  const auto asked = SeekBook::find (this, seqnum);
+  const bool is_asked = !asked || (stream_time (pts) > asked->start &&
+                                      stream_time (from) < asked->stop);
+  if (lost > 0 && is_asked)
+    post_message (element_, FramesLost{lost, from, pts});
+}
+
+void
 DamageReport::frames_missing (guint64 count, GstClockTime from)
 {
   if (count == 0)
@@ -70,8 +91,8 @@ DamageReport::stream_cut ()
 void
 DamageReport::stream_ended (guint64 total)
 {
-  const guint64 known = locked (
-      element_, [&] { return counters_.frames + counters_.frames_missing; });
+  const guint64 known = locked (element_,
+      [&] { return counters_.frames - repeated_ + counters_.frames_missing; });
   if (known >= total)
     return;
   count (&Counters::frames_missing, total - known);

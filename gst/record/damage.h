@@ -5,6 +5,7 @@
 #include <gst/gst.h>
 
 #include "common/structure.h"
+#include "record/frame_record.h"
 
 namespace codedexposure::gst
 {
@@ -29,6 +30,12 @@ public:
    * @p known of it. */
   void frame_flagged (
       bool known, guint64 number, GstClockTime pts, const char *reason);
+  /** It came before: another one did not. */
+  void frame_repeated () { repeated_++; }
+  /** Before the frame at @p pts, when @p record was made. After a seek, frames
+   * around the part that was asked for are read, too: says nothing of these. */
+  void frames_lost (const FrameRecord &record, GstClockTime pts,
+      const GstSegment &segment, guint32 seqnum);
   /** @p count frames of the track, from @p from on, did not come; 0: says
    * nothing. */
   void frames_missing (guint64 count, GstClockTime from);
@@ -62,6 +69,7 @@ private:
   GstElement *element_;
   Counters counters_; ///< object lock
   Sequence open_;
+  guint64 repeated_ = 0;
 };
 
 } // namespace codedexposure::gst

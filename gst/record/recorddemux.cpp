@@ -305,10 +305,11 @@ read_head (RecordDemuxState &state, guint64 at, GstBuffer *bytes)
   constexpr gsize kLongestHead = 1 << 20;
   Stream &stream = state.stream;
   const gsize size = gst_buffer_get_size (bytes);
-  if (stream.head || at + size > kLongestHead)
+  if (stream.head || at >= kLongestHead)
     return;
-  stream.begin.resize (std::max (stream.begin.size (), at + size));
-  gst_buffer_extract (bytes, 0, stream.begin.data () + at, size);
+  const gsize part = std::min (size, gsize (kLongestHead - at));
+  stream.begin.resize (std::max (stream.begin.size (), at + part));
+  gst_buffer_extract (bytes, 0, stream.begin.data () + at, part);
   stream.head = matroska_head (stream.begin);
   if (stream.head) {
     g_object_set (state.restore, "tick", guint64 (stream.head->tick), nullptr);

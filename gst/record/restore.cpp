@@ -14,6 +14,7 @@
 #include <gst/gst.h>
 
 #include "common/element.h"
+#include "common/events.h"
 #include "common/messages.h"
 #include "common/meta.h"
 #include "common/record.h"
@@ -53,9 +54,11 @@ struct RestoreState {
   std::vector<StreamSetup> others;          ///< those before it
   std::shared_ptr<const StreamSetup> setup; ///< in force
   std::optional<guint64> last_frame;
-  bool announced = false; ///< the container's tags say that there is a track
+  GstClockTime last_pts = 0; ///< of that frame
+  bool announced = false;    ///< the container's tags say that there is a track
   bool found_line = false;
-  bool whole = true; ///< no seek: the first frame is that of the stream
+  /** No seek: the first frame is that of the stream, the last one its last. */
+  bool whole = true;
   bool said_no_track = false;
   bool said_moved = false;
   bool said_setups_differ = false;
@@ -198,31 +201,33 @@ say_moved (Self *self, const TrackReader::Match &match)
           "or its first times are damaged.");
 }
 
+/* A part of the file stands in the place of another. A frame that came late
+ * when it was recorded says so. */
+bool
+is_repeated (const RestoreState &state, const TrackReader::Match &match)
+{
+  const FrameRecord &record = *match.line->frame;
+  return state.is_complete && state.last_frame && record.pts &&
+         record.frame <= *state.last_frame &&
+         *record.pts + match.offset <= Nanoseconds (state.last_pts) &&
+         std::ranges::find (record.flags, "discont") == record.flags.end ();
+}
+
 /* Why the frame must not be used as it is; null: it can be. */
 const char *
-flaw_of (const RestoreState &state, GstBuffer *frame, const FrameRecord &record,
+flaw_of (const RestoreState &state, GstBuffer *frame,
     const TrackReader::Match &match)
 {
+  const FrameRecord &record = *match.line->frame;
   if (record.hash && record.hash != hash_of (frame, state.info))
     return "its pixels are not those that were recorded";
+  if (is_repeated (state, match))
+    return "it repeats one that came before";
   if (match.misplaced)
     return "its time is not that at which it was recorded";
   if (match.names_unknown_setup)
     return "its schedule is not known, because a part of the track is missing";
   return nullptr;
-}
-
-/* That was found when @record was made. */
-void
-report_loss (Self *self, const FrameRecord &record, GstClockTime pts)
-{
-  const auto last = self->state.last_frame;
-  const guint64 lost = record.lost_before.value_or (0);
-  if (lost == 0 || !last || record.frame <= *last)
-    return;
-  const auto before =
-      GstClockTime (record.duration.value_or (0) * Nanoseconds (lost));
-  post_message (self, FramesLost{lost, pts - std::min (pts, before), pts});
 }
 
 /* Frames that are missing together with their lines, by the numbers. */
@@ -240,19 +245,32 @@ restore (Self *self, GstBuffer *frame, const TrackReader::Match &match)
 {
   RestoreState &state = self->state;
   FrameRecord record = *match.line->frame;
+  const char *flaw = flaw_of (state, frame, match);
+  if (flaw)
+    record.hash.reset ();
   if (match.skipped > 0)
     record.lost_before = record.lost_before.value_or (0) + match.skipped;
   const guint64 gap = gap_before (state, record);
   if (gap > 0)
     record.lost_before = std::max (gap, record.lost_before.value_or (0));
   apply_record (frame, record, match.offset);
-  report_loss (self, *match.line->frame, GST_BUFFER_PTS (frame));
+  if (state.last_frame && record.frame > *state.last_frame)
+    state.damage.frames_lost (*match.line->frame, GST_BUFFER_PTS (frame),
+        state.segment, state.segment_seqnum);
   if (match.skipped > 0 || gap > 0)
     GST_BUFFER_FLAG_SET (frame, GST_BUFFER_FLAG_DISCONT);
-  state.last_frame = record.frame;
-  state.found_line = true;
+  if (is_repeated (state, match))
+    state.damage.frame_repeated ();
+  if (!state.is_complete || !state.last_frame ||
+      GST_BUFFER_PTS (frame) > state.last_pts) {
+    state.last_frame = record.frame;
+    state.last_pts = GST_BUFFER_PTS (frame);
+  }
+  if (!std::exchange (state.found_line, true))
+    gst_pad_push_event (
+        state.src, gst_event_new_custom (GST_EVENT_CUSTOM_DOWNSTREAM_STICKY,
+                       gst_structure_new_empty (kRecordedEvent)));
   say_moved (self, match);
-  const char *flaw = flaw_of (state, frame, record, match);
   if (!flaw) {
     state.damage.end_sequence ();
     return;
@@ -285,7 +303,7 @@ check_end (Self *self)
     return;
   const auto [rest, frames] =
       state.track.take_rest (Nanoseconds (state.segment.start));
-  if (!frames && ends_early (state))
+  if (!frames && !state.whole && ends_early (state))
     return;
   report_missing (state, rest);
   if (!frames)
@@ -339,6 +357,8 @@ take_segment (Self *self, EventPtr event)
   RestoreState &state = self->state;
   const guint64 tick = locked (self, [&] { return state.tick; });
   gst_event_copy_segment (event.get (), &state.segment);
+  state.whole &= state.segment_seqnum == GST_SEQNUM_INVALID;
+  state.last_frame.reset ();
   state.segment_seqnum = gst_event_get_seqnum (event.get ());
   const auto order = order_of (state.segment);
   state.is_complete = order == TrackReader::Order::all;
@@ -355,12 +375,10 @@ take_event (Self *self, EventPtr event)
 {
   RestoreState &state = self->state;
   switch (GST_EVENT_TYPE (event.get ())) {
-  case GST_EVENT_CAPS: {
-    GstCaps *caps = caps_of (event.get ());
-    if (!gst_video_info_from_caps (&state.info, caps))
+  case GST_EVENT_CAPS:
+    if (!gst_video_info_from_caps (&state.info, caps_of (event.get ())))
       return FALSE;
     break;
-  }
   case GST_EVENT_SEGMENT:
     event = take_segment (self, std::move (event));
     break;
@@ -509,16 +527,11 @@ begin_run (GstElement *element)
   state.setup.reset ();
   state.announced = state.found_line = false;
   state.whole = true;
+  state.segment_seqnum = GST_SEQNUM_INVALID;
   state.said_no_track = state.said_setups_differ = state.said_moved = false;
   state.track.restart ();
   state.damage.restart ();
   return true;
-}
-
-void
-end_run (GstElement *element)
-{
-  forget_frames (state_in<Self> (element));
 }
 
 StructurePtr
@@ -540,7 +553,8 @@ properties ()
           kReadOnly, stats_of}};
 }
 
-constexpr StateHooks kRun{.begin = begin_run, .end = end_run};
+constexpr StateHooks kRun{.begin = begin_run,
+    .end = [] (GstElement *self) { forget_frames (state_in<Self> (self)); }};
 
 void
 set_up (gpointer klass)

@@ -63,19 +63,21 @@ setup_of (const char *schedule)
   return {*Schedule::parse (schedule)};
 }
 
-/** A recording of kFrames frames: the third is CORRUPTED. */
+/** kFrames frames: the third is CORRUPTED, late ones are DISCONT. */
 struct Recording {
   std::vector<BufferPtr> frames, lines;
 
-  Recording ()
+  explicit Recording (const std::vector<int> &order = {0, 1, 2, 3, 4, 5})
   {
     /* The file lets it start before the pad is requested. */
     ElementHarness log ("part-log location=/dev/null");
     log.request ("track");
     log.set_caps (gray_caps (8, 8));
     log.push_event (setup_to_event (setup_of ("staircase:2x2")));
-    for (int i = 0; i < kFrames; i++) {
+    for (int last = 0; const int i : order) {
       BufferPtr frame = picture (i);
+      if (std::exchange (last, std::max (last, i)) > i)
+        GST_BUFFER_FLAG_SET (frame.get (), GST_BUFFER_FLAG_DISCONT);
       set_frame_meta (frame.get (), meta_of (i));
       if (i == 2)
         GST_BUFFER_FLAG_SET (frame.get (), GST_BUFFER_FLAG_CORRUPTED);
@@ -240,6 +242,14 @@ TEST_F (Restore, ALossThatTheRecordingHasIsSaidOnce)
   EXPECT_EQ (lost->to, kPeriod);
   EXPECT_FALSE (file.posted<FramesLost> ());
   EXPECT_EQ (get_frame_meta (restored[1].get ())->lost_before, 2u);
+}
+
+TEST_F (Restore, AFrameThatCameLateIsNoRepetition)
+{
+  recording = Recording ({0, 1, 2, 4, 3, 5});
+  play ();
+  EXPECT_EQ (GST_BUFFER_PTS (restored.at (4).get ()), 3 * kPeriod);
+  EXPECT_EQ (counted (file.element (), "frames-damaged"), 0u);
 }
 
 TEST_F (Restore, AFrameThatIsMissingIsSaid)
@@ -436,16 +446,6 @@ TEST_F (Restore, FramesThatAreLeftOutOnPurposeAreNotMissed)
   EXPECT_FALSE (corrupted (4));
   EXPECT_FALSE (file.posted<FramesMissing> ());
   EXPECT_FALSE (file.posted<StreamIncomplete> ());
-}
-
-TEST_F (Restore, TheCapsAreThoseOfTheFrames)
-{
-  const ObjectPtr<GstPad> src (
-      gst_element_get_static_pad (file.element (), "src"));
-  const CapsPtr caps (gst_pad_query_caps (src.get (), nullptr));
-  EXPECT_FALSE (gst_caps_is_empty (caps.get ()));
-  EXPECT_TRUE (
-      gst_caps_can_intersect (caps.get (), caps_of (gray_caps (8, 8)).get ()));
 }
 
 /** One whose JSON form has more than 512 bytes. */

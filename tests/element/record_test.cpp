@@ -412,6 +412,20 @@ TEST_F (Record, ASeekSaysNothingOfLossesBeforeIt)
   }
 }
 
+TEST_F (Record, NoFlippedBitInTheListOfTracksHangs)
+{
+  ASSERT_EQ (record (path), "");
+  const std::string bytes = content (path);
+  const auto clusters = bytes.find ("\x1f\x43\xb6\x75", 400);
+  for (auto at = bytes.rfind ("\x16\x54\xae\x6b", clusters); at < clusters;
+       at++) {
+    std::string flipped = bytes;
+    flipped[at] = char (flipped[at] ^ 1 << at % 8);
+    write (path, flipped);
+    EXPECT_NE (Reading (path).play (), "the pipeline hangs") << at;
+  }
+}
+
 TEST_F (Record, ABranchCanBeAddedWhileItPlays)
 {
   ASSERT_EQ (record (path), "");

@@ -30,6 +30,12 @@ constexpr struct {
 } kWindows[] = {{1.3, 5}, {2.3, 7}, {3.5, 9}};
 constexpr double kMinMagnification = 0.75;
 
+/* Distance in mirrors within which a pixel is aligned with its mirror. */
+constexpr double kTolerance = 0.05;
+/* Length over which a scene is correlated, mirrors; and its correlation with
+ * itself one slot later. */
+constexpr double kCorrelationLength = 2.0, kPersistence = 0.8;
+
 /* A mirror is mixed if no pixel gets this part of the light that a pixel
  * centred on it gets. */
 constexpr double kMixed = 0.6;
@@ -80,12 +86,12 @@ class Planner
 {
 public:
   Planner (const Mapping &mapping, const Schedule &schedule,
-      const RectifyOptions &options, const PixelView &view, bool whole)
-      : mapping_ (mapping), tolerance_ (options.tolerance),
+      const PixelView &view, bool whole)
+      : mapping_ (mapping),
         coded_rows_ (mapping.mirrors ().height - schedule.pilot_rows ()),
         elements_ (schedule),
-        bank_ (view, elements_, mapping.mirrors (), scene_of (options)),
-        whole_ (whole), single_ (view.taps == kWindows[0].taps),
+        bank_ (view, elements_, mapping.mirrors (), scene ()), whole_ (whole),
+        single_ (view.taps == kWindows[0].taps),
         best_share_ (bank_.solver ().own_share (0.0, 0.0)),
         seen_ (std::size_t (mapping.mirrors ().width)), around_ (seen_.size ())
   {
@@ -102,19 +108,18 @@ public:
 
 private:
   /* Persistence is that of the part with the shortest slots. */
-  SceneClass scene_of (const RectifyOptions &options) const
+  SceneClass scene () const
   {
     int most = 1;
     for (int i = 0; i < elements_.parts (); i++)
       most = std::max (most, elements_.part (i).slots ());
-    return {.length = options.correlation_length / std::numbers::sqrt3,
-        .correlation = std::pow (options.persistence,
-            double (most) / elements_.schedule ().slots ())};
+    return {.length = kCorrelationLength / std::numbers::sqrt3,
+        .correlation = std::pow (
+            kPersistence, double (most) / elements_.schedule ().slots ())};
   }
   Place place (Position seen, int around, bool coded, RectifyReport &report);
 
   const Mapping &mapping_;
-  double tolerance_;
   int coded_rows_;
   ElementMap elements_;
   FilterBank bank_;
@@ -149,7 +154,7 @@ Planner::place (Position seen, int around, bool coded, RectifyReport &report)
   const double fx = seen.x - px, fy = seen.y - py;
   const double share = bank_.solver ().own_share (-fx, -fy);
   const Place pixel = {std::int16_t (px), std::int16_t (py), kLookup};
-  if (whole_ || (single_ && share > 1.0 - 2.0 * tolerance_)) {
+  if (whole_ || (single_ && share > 1.0 - 2.0 * kTolerance)) {
     report.exact++;
     return pixel;
   }
@@ -161,15 +166,6 @@ Planner::place (Position seen, int around, bool coded, RectifyReport &report)
     return pixel;
   return {std::int16_t (px - half), std::int16_t (py - half),
       bank_.filter (around, fx, fy)};
-}
-
-Result<void>
-check (const RectifyOptions &o)
-{
-  return check_ranges ({{"tolerance (mirrors)", o.tolerance, 0.0, 0.5},
-      {"noise (of white)", o.noise, o.kMinNoise, o.kMaxNoise},
-      {"correlation length (mirrors)", o.correlation_length, 0.1, 1000.0},
-      {"persistence", o.persistence, 0.0, 0.9999}});
 }
 
 /* 0 for a magnification out of range. */
@@ -242,7 +238,8 @@ Result<Rectifier>
 Rectifier::make (const Mapping &mapping, const Schedule &schedule,
     const RectifyOptions &options)
 try {
-  RETURN_IF_ERROR (check (options));
+  RETURN_IF_ERROR (check_ranges ({{"noise (of white)", options.noise,
+      RectifyOptions::kMinNoise, RectifyOptions::kMaxNoise}}));
   const Extent mirrors = mapping.mirrors ();
   RETURN_IF_ERROR (schedule.check_size (mirrors.width, mirrors.height));
   const double magnification = mapping.pose ().magnification;
@@ -262,11 +259,11 @@ try {
       mapping.psf_sigma (), plan->taps};
   RETURN_IF_ERROR (check_slope (view));
   /* Pixels that are copied need no weights. */
-  const bool whole = mapping.one_to_one (options.tolerance);
+  const bool whole = mapping.one_to_one (kTolerance);
   if (whole)
     view.sigma = 0.0;
   RETURN_IF_ERROR (check_effort (view, FilterBank::effort (view, schedule)));
-  Planner planner (mapping, schedule, options, view, whole);
+  Planner planner (mapping, schedule, view, whole);
   RETURN_IF_ERROR (check_effort (view, planner.effort ()));
   plan->places = Image<Place> (plan->mirrors.width, plan->mirrors.height);
   for (int y = 0; y < plan->mirrors.height; y++)

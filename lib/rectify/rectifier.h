@@ -14,21 +14,13 @@
 namespace codedexposure
 {
 
-/** What the weights assume about the scene and the noise. */
+/** What the weights assume about the camera. */
 struct RectifyOptions {
   static constexpr double kMinNoise = 1e-5, kMaxNoise = 1.0;
 
-  /** Distance in mirrors within which a pixel counts as aligned with its
-   * mirror.
-   */
-  double tolerance = 0.05;
   /** Noise of a pixel, rms, as a part of white, with the mirrors on in all
    * slots: codes that pass less light have more. */
   double noise = 0.006;
-  /** Length over which a scene is correlated, in mirrors. */
-  double correlation_length = 2.0;
-  /** Correlation of a scene with itself one slot later. */
-  double persistence = 0.8;
 
   bool operator== (const RectifyOptions &) const = default;
 };

@@ -26,6 +26,7 @@ void
 FrameSequence::resync ()
 {
   last_.reset ();
+  loss_step_ = 0;
   stepped_back_ = false;
   lost_.clear ();
 }
@@ -85,6 +86,15 @@ FrameSequence::note_lost (std::uint64_t lost)
     lost_.insert (number);
 }
 
+/** Whether the last frame was late rather than others lost before it, as seen
+ * by the @p step to the next one. */
+bool
+FrameSequence::disproves_loss (Nanoseconds step) const
+{
+  return loss_step_ > 0 && step < period_ / 4 * 3 &&
+         periods (loss_step_ + step) == periods (loss_step_);
+}
+
 FrameStep
 FrameSequence::take (Nanoseconds time, bool reverse)
 {
@@ -96,17 +106,23 @@ FrameSequence::take (Nanoseconds time, bool reverse)
     return {.arrival = Arrival::duplicate, .number = next_number_ - 1};
   if (step < 0)
     return step_back (time, -step);
+  last_ = time;
+  stepped_back_ = false;
+  if (disproves_loss (step) && lost_.erase (next_number_ - 2) > 0) {
+    loss_step_ = 0;
+    return {.arrival = Arrival::late, .number = next_number_ - 2};
+  }
 
   FrameStep taken{.arrival = Arrival::next};
+  loss_step_ = 0;
   if (step > period_ + period_ / 2) {
     taken.arrival = Arrival::after_loss;
     taken.lost = std::max<std::uint64_t> (periods (step), 2) - 1;
     note_lost (taken.lost);
+    loss_step_ = step;
   }
   taken.number = next_number_ + taken.lost;
   next_number_ = taken.number + 1;
-  last_ = time;
-  stepped_back_ = false;
   return taken;
 }
 

@@ -17,7 +17,7 @@ enum class Arrival {
   next,       ///< one frame period later
   after_loss, ///< more than 1.5 frame periods later
   duplicate,  ///< at the time of the frame before
-  late,       ///< at an earlier time, at which a frame is missing
+  late,       ///< takes the number of one that was counted as lost
   behind,     ///< at an earlier time, at which none is missing
   restarted,  ///< the camera's clock restarted
 };
@@ -37,9 +37,11 @@ struct FrameStep {
  *
  * The period comes from the frame rate, never from two frames. A step of less
  * than a quarter of a period is a duplicate, one of more than 1.5 periods a
- * loss; steps between are jitter. A step backward is one frame that is late or
- * behind, or a restart of the camera if the next one steps backward as well or
- * the step is longer than a second.
+ * loss; steps between are jitter. A loss is revoked if the frame after it is so
+ * close that the one before it was only late: what was counted as lost is late
+ * then, and the numbers are right again. A step backward is one frame that is
+ * late or behind, or a restart of the camera if the next one steps backward as
+ * well or the step is longer than a second.
  */
 class FrameSequence
 {
@@ -66,12 +68,14 @@ private:
   std::uint64_t periods (Nanoseconds span) const;
   FrameStep begin (Nanoseconds time, Arrival arrival);
   FrameStep step_back (Nanoseconds time, Nanoseconds by);
+  bool disproves_loss (Nanoseconds step) const;
   void note_lost (std::uint64_t lost);
 
   Nanoseconds period_;
   std::optional<Nanoseconds> last_; // of the frame with the largest number
   std::uint64_t next_number_ = 0;
-  bool stepped_back_ = false;    // the last frame did
+  Nanoseconds loss_step_ = 0; // to the last frame, if frames are lost before it
+  bool stepped_back_ = false; // the last frame did
   std::set<std::uint64_t> lost_; // numbers that may come late
 };
 

@@ -142,6 +142,27 @@ TEST (Dmdsync, ALossIsCountedFlaggedAndSaid)
   EXPECT_FALSE (sync.element_message ("codedexposure/frames-lost"));
 }
 
+TEST (Dmdsync, AFrameThatIsOnlyLateShiftsNoNumbers)
+{
+  SyncHarness sync;
+  sync.start ();
+  const std::pair<GstClockTime, guint64> frames[] = {{0, 0}, {40 * kMs, 1},
+      {80 * kMs, 2}, {144'500'000, 4}, {160 * kMs, 3}, {200 * kMs, 5},
+      {240 * kMs, 6}};
+  for (const auto &[time, number] : frames) {
+    ASSERT_EQ (sync.send (time), GST_FLOW_OK);
+    const BufferPtr frame = sync.pull ();
+    ASSERT_TRUE (frame) << number;
+    EXPECT_EQ (meta_of (frame).frame, number);
+    EXPECT_EQ (GST_BUFFER_PTS (frame.get ()), time);
+    EXPECT_EQ (meta_of (frame).lost_before, number == 4 ? 1u : 0u);
+  }
+  EXPECT_EQ (sync.counter ("frames-lost"), 1u);
+  EXPECT_EQ (sync.counter ("frames-late"), 1u);
+  EXPECT_EQ (
+      uint64_field (sync.element_message ("dmdsync/frame-late"), "frame"), 3u);
+}
+
 TEST (Dmdsync, LostFramesCanBeRepeatedFromMemoryOfOurOwn)
 {
   SyncHarness sync ("on-loss=repeat timestamp-at=exposure-end");
@@ -457,13 +478,20 @@ TEST (Dmdsync, AGapMovesAsFramesDo)
   SyncHarness sync ("timestamp-at=arrival exposure-offset=1000000");
   sync.start ();
   ASSERT_EQ (sync.send (80 * GST_MSECOND), GST_FLOW_OK);
-  sync.push_event (gst_event_new_gap (120 * GST_MSECOND, 40 * GST_MSECOND));
-  const EventPtr gap = sync.pull_event (GST_EVENT_GAP);
-  ASSERT_TRUE (gap);
-  GstClockTime pts = 0, duration = 0;
-  gst_event_parse_gap (gap.get (), &pts, &duration);
-  EXPECT_EQ (pts, 79 * GST_MSECOND);
-  EXPECT_EQ (duration, 40 * GST_MSECOND);
+  for (const auto sent : {GST_GAP_FLAG_MISSING_DATA, GstGapFlags (0)}) {
+    GstEvent *event = gst_event_new_gap (120 * GST_MSECOND, 40 * GST_MSECOND);
+    gst_event_set_gap_flags (event, sent);
+    sync.push_event (event);
+    const EventPtr gap = sync.pull_event (GST_EVENT_GAP);
+    ASSERT_TRUE (gap);
+    GstClockTime pts = 0, duration = 0;
+    gst_event_parse_gap (gap.get (), &pts, &duration);
+    EXPECT_EQ (pts, 79 * GST_MSECOND);
+    EXPECT_EQ (duration, 40 * GST_MSECOND);
+    GstGapFlags flags = {};
+    gst_event_parse_gap_flags (gap.get (), &flags);
+    EXPECT_EQ (flags, sent);
+  }
 }
 
 } // namespace

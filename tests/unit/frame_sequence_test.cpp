@@ -60,6 +60,27 @@ TEST (FrameSequence, AStepOfMoreThanOneAndAHalfPeriodsIsALoss)
                     {1240 * kMs, Arrival::next, 31, 0}});
 }
 
+/* The frame after one that was only late is too close to it: the numbers are
+ * right again, and what was counted as lost has come. */
+TEST (FrameSequence, ALossThatTheNextFrameDisprovesIsRevoked)
+{
+  FrameSequence sequence ({25, 1});
+  expect_steps (sequence,
+      {{0, Arrival::first, 0, 0}, {40 * kMs, Arrival::next, 1, 0},
+          {80 * kMs, Arrival::next, 2, 0},
+          {144'500'000, Arrival::after_loss, 4, 1},
+          {160 * kMs, Arrival::late, 3, 0}, {200 * kMs, Arrival::next, 5, 0},
+          {240 * kMs, Arrival::next, 6, 0}});
+  /* Of several, one. */
+  expect_steps (sequence,
+      {{384'500'000, Arrival::after_loss, 10, 3},
+          {400 * kMs, Arrival::late, 9, 0}, {440 * kMs, Arrival::next, 11, 0}});
+  /* A loss is a loss, whatever the jitter of the next frame. */
+  expect_steps (sequence, {{525 * kMs, Arrival::after_loss, 13, 1},
+                              {553 * kMs, Arrival::next, 14, 0},
+                              {600 * kMs, Arrival::next, 15, 0}});
+}
+
 TEST (FrameSequence, CountsLossesExactlyOverALongGap)
 {
   const FrameRate rate{30000, 1001};

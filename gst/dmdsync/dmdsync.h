@@ -204,6 +204,8 @@ PatternSight look_for_pattern (GstDmdSync *self, GstBuffer *buffer,
     const FrameStep &step, GstClockTime pts);
 
 /* Negotiation and events. */
+/** Of the bench profile, in digital numbers; 0: not known. */
+int black_level (const SyncState &st);
 /** Forgets what frames have shown of the phase. */
 void begin_phase (GstDmdSync *self);
 gboolean set_caps (GstBaseTransform *trans, GstCaps *incaps, GstCaps *outcaps);

@@ -123,10 +123,13 @@ void
 take_bench (GstDmdSync *self, const StreamSetup &theirs)
 {
   SyncState &st = state (self);
+  const int black = black_level (st);
   st.stream.mapping = theirs.mapping;
   st.stream.simulated = theirs.simulated;
   st.stream.bits = theirs.bits;
   st.stream.bench = theirs.bench;
+  if (st.stream.time && black != black_level (st))
+    begin_phase (self);
   if (st.bench && theirs.bench)
     if (const auto same = st.bench->check_bench (*theirs.bench); !same)
       POST_ERROR (self, STREAM, WRONG_TYPE,
@@ -219,6 +222,13 @@ refuse (GstDmdSync *self, GstCaps *incaps, const std::string &why)
 
 } // namespace
 
+int
+black_level (const SyncState &st)
+{
+  const auto &bench = st.stream.bench ? st.stream.bench : st.bench;
+  return bench ? bench->black () : 0;
+}
+
 void
 begin_phase (GstDmdSync *self)
 {
@@ -226,14 +236,15 @@ begin_phase (GstDmdSync *self)
   Stream &stream = st.stream;
   const GstVideoInfo &info = stream.time->info;
   const bool triggers = st.runner && st.runner->info ().triggers_camera;
-  stream.watch.emplace (st.schedule, info.width, info.height);
+  const int black = black_level (st);
+  stream.watch.emplace (st.schedule, info.width, info.height, black);
   stream.lock.emplace (PhaseLock::Options{
       .observable = stream.watch->complete () ? slip_observable (st.schedule)
                                               : SlipObservable::never,
       .can_restart = st.runner != nullptr,
       .gap_shows_restart = triggers});
   if (stream.coded)
-    stream.shown = SwitchWatch (triggers);
+    stream.shown = SwitchWatch (triggers, black);
 }
 
 gboolean

@@ -34,8 +34,9 @@ add_row (const Pixel *row, std::vector<std::uint32_t> &sums)
 
 } // namespace
 
-LevelMeter::LevelMeter (const Schedule &schedule, int width, int height)
-    : width_ (width), tile_rows_ (schedule.tile ().period_y ()),
+LevelMeter::LevelMeter (
+    const Schedule &schedule, int width, int height, double black)
+    : width_ (width), black_ (black), tile_rows_ (schedule.tile ().period_y ()),
       tile_columns_ (schedule.tile ().period_x ()),
       pixels_ (std::size_t (schedule.elements ())),
       column_sums_ (std::size_t (width))
@@ -85,7 +86,8 @@ LevelMeter::measure (ImageView<const Pixel> frame)
           column_sums_[std::size_t (x)];
   }
   for (std::size_t e = 0; e < pixels_.size (); e++)
-    levels_.elements[e] /= std::max (pixels_[e], 1.0);
+    levels_.elements[e] = std::max (
+        0.0, levels_.elements[e] / std::max (pixels_[e], 1.0) - black_);
 
   levels_.pilot.fill (0.0);
   std::fill (column_sums_.begin (), column_sums_.end (), 0u);
@@ -96,8 +98,9 @@ LevelMeter::measure (ImageView<const Pixel> frame)
         column_sums_[std::size_t (x)];
   for (int column = 0; column < kPilotColumns; column++) {
     const int columns = (width_ - column + kPilotColumns - 1) / kPilotColumns;
-    levels_.pilot[std::size_t (column)] /=
-        std::max (1.0, double (columns) * double (pilot_rows_.size ()));
+    double &level = levels_.pilot[std::size_t (column)];
+    level /= std::max (1.0, double (columns) * double (pilot_rows_.size ()));
+    level = std::max (0.0, level - black_);
   }
   return levels_;
 }

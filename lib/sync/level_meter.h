@@ -13,7 +13,7 @@
 namespace codedexposure
 {
 
-/** Means over pixels, in digital numbers. */
+/** Means over pixels, in digital numbers above the black level. */
 struct Levels {
   std::vector<double> elements;              ///< of each element of the code
   std::array<double, kPilotColumns> pilot{}; ///< of the pilot's columns
@@ -27,7 +27,9 @@ struct Levels {
 class LevelMeter
 {
 public:
-  LevelMeter (const Schedule &schedule, int width, int height);
+  /** @p black  digital number without light. */
+  LevelMeter (
+      const Schedule &schedule, int width, int height, double black = 0.0);
 
   /** Whether the frame is large enough to hold every element, and the pilot
    * where there is one. */
@@ -39,6 +41,7 @@ public:
 
 private:
   int width_;
+  double black_;
   int tile_rows_;            // period of the tile in y
   int tile_columns_;         // and in x
   std::vector<int> element_; // of each pixel of the tile

@@ -27,8 +27,9 @@ slip_observable (const Schedule &schedule)
   return SlipObservable::in_the_frame;
 }
 
-PhaseWatch::PhaseWatch (const Schedule &schedule, int width, int height)
-    : meter_ (schedule, width, height)
+PhaseWatch::PhaseWatch (
+    const Schedule &schedule, int width, int height, double black)
+    : meter_ (schedule, width, height, black)
 {
   if (!meter_.complete ())
     return;

@@ -37,7 +37,9 @@ struct PhaseSight {
 class PhaseWatch
 {
 public:
-  PhaseWatch (const Schedule &schedule, int width, int height);
+  /** @p black  as of LevelMeter. */
+  PhaseWatch (
+      const Schedule &schedule, int width, int height, double black = 0.0);
 
   /** Whether the frames are large enough to hold every element, and the pilot
    * where there is one. */

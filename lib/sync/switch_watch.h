@@ -36,8 +36,12 @@ class SwitchWatch
 public:
   static constexpr int kPatience = 8;
 
-  /** @p gap_shows  the camera gets its trigger from the DMD. */
-  explicit SwitchWatch (bool gap_shows = false) : gap_shows_ (gap_shows) {}
+  /** @p gap_shows  the camera gets its trigger from the DMD. @p black  digital
+   * number without light. */
+  explicit SwitchWatch (bool gap_shows = false, double black = 0.0)
+      : gap_shows_ (gap_shows), black_ (black)
+  {
+  }
 
   bool waiting () const { return waiting_; }
   /** A switch is requested. */
@@ -55,8 +59,9 @@ public:
    */
   bool take (bool done, double level, bool gap)
   {
-    const bool dark = level < brightest_ / kDarkPart;
-    brightest_ = std::max (brightest_, level);
+    const double light = level - black_;
+    const bool dark = light < brightest_ / kDarkPart;
+    brightest_ = std::max (brightest_, light);
     if (!waiting_)
       return true;
     border_seen_ = border_seen_ || dark || (gap && gap_shows_);
@@ -70,10 +75,11 @@ private:
   static constexpr double kDarkPart = 8.0;
 
   bool gap_shows_;
+  double black_;
   bool waiting_ = false;
   bool border_seen_ = false;
   int since_ = 0;
-  double brightest_ = 0.0;
+  double brightest_ = 0.0; // light of a frame
 };
 
 } // namespace codedexposure

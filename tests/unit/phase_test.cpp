@@ -36,12 +36,13 @@ constexpr int kHeight = 72;
 class Camera
 {
 public:
-  explicit Camera (const char *preset)
+  explicit Camera (const char *preset, double black = 0)
       : schedule (schedule_of (preset)),
         bench_ (*OpticalBench::make (kWidth, kHeight,
             {.psf_sigma = 0.5,
                 .full_well = 10000,
                 .read_noise = 5,
+                .black_level = black,
                 .alignment = {}})),
         scene_ (kWidth, kHeight), frame_ (kWidth, kHeight)
   {
@@ -290,6 +291,19 @@ TEST (PhaseWatch, SeesParkedMirrors)
     EXPECT_EQ (
         watch.look (camera.expose (moving)).reading.kind, Kind::in_phase);
   }
+}
+
+/* As of a camera in a dim room. */
+TEST (PhaseWatch, TakesTheBlackLevelOfTheCameraForNoLight)
+{
+  constexpr double kBlack = 64;
+  const Scene dim = lit_by ([] (std::int64_t) { return 0.2; });
+  Camera camera ("staircase:2x2", kBlack);
+  PhaseWatch watch (camera.schedule, kWidth, kHeight, kBlack);
+  for (int f = 0; f < 8; f++)
+    EXPECT_EQ (watch.look (camera.expose (dim)).reading.kind, Kind::in_phase);
+  camera.mirrors.stop ();
+  EXPECT_EQ (watch.look (camera.expose (dim)).reading.kind, Kind::parked);
 }
 
 namespace

@@ -50,6 +50,17 @@ TEST (SwitchWatch, AGapShowsItWhereTheDmdTriggersTheCamera)
   EXPECT_FALSE (loses.take (true, kHalf, true));
 }
 
+TEST (SwitchWatch, TheBlackLevelOfTheCameraIsNoLight)
+{
+  constexpr double kBlack = 64;
+  SwitchWatch watch (false, kBlack);
+  EXPECT_TRUE (watch.take (true, kBlack + 10, false));
+  watch.begin ();
+  EXPECT_FALSE (watch.take (true, kBlack + 10, false));
+  EXPECT_FALSE (watch.take (true, kBlack + 0.5, false));
+  EXPECT_TRUE (watch.take (true, kBlack + 8, false));
+}
+
 TEST (SwitchWatch, WhatIsDarkItselfIsBelievedInTheEnd)
 {
   SwitchWatch watch = switching ();

@@ -152,7 +152,7 @@ begin_run (GstDmdSync *self)
   if (!st.runner)
     return;
   st.runner->upload (st.schedule);
-  st.runner->settle_within (kQuickUpload);
+  st.runner->settle (kQuickUpload);
 }
 
 void

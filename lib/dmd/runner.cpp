@@ -102,15 +102,7 @@ DmdRunner::ask (Job job)
 }
 
 bool
-DmdRunner::settle ()
-{
-  std::unique_lock guard (lock_);
-  changed_.wait (guard, [this] { return wait_is_over (); });
-  return is_settled () && !interrupted_;
-}
-
-bool
-DmdRunner::settle_within (std::chrono::milliseconds time)
+DmdRunner::settle (std::chrono::milliseconds time)
 {
   std::unique_lock guard (lock_);
   changed_.wait_for (guard, time, [this] { return wait_is_over (); });

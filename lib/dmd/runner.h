@@ -63,10 +63,9 @@ public:
     const std::lock_guard guard (lock_);
     return is_settled ();
   }
-  /** Waits for that. False if the run ended, or interrupt () ended the wait. */
-  bool settle ();
-  /** The same, but no longer than @p time. */
-  bool settle_within (std::chrono::milliseconds time);
+  /** Waits for that, at most for @p time. False if the run ended, interrupt ()
+   * ended the wait, or the time is over. */
+  bool settle (std::chrono::milliseconds time = std::chrono::hours (24 * 365));
   /** Whether a job failed in the last run. */
   bool failed () const
   {

@@ -187,7 +187,7 @@ TEST_F (DmdRunnerTest, InterruptCutsAWaitShortAndLeavesTheJob)
   const auto runner = make_runner ();
   runner->upload (Schedule ());
   record->uploading.get_future ().wait ();
-  EXPECT_FALSE (runner->settle_within (std::chrono::milliseconds (1)));
+  EXPECT_FALSE (runner->settle (std::chrono::milliseconds (1)));
   runner->interrupt (true);
   EXPECT_FALSE (runner->settle ());
   EXPECT_FALSE (runner->settled ());

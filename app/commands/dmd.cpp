@@ -407,7 +407,8 @@ dmd_command ()
           .summary = "list and control DMD boards",
           .usage = "COMMAND [option...] [DEVICE]",
           .description =
-              "DEVICE is usb:[PORT|SERIAL], lightcrafter:[HOST] or sim:NAME, "
+              "DEVICE is usb:[PORT|SERIAL], lightcrafter:[ADDRESS] or "
+              "sim:NAME, "
               "followed by\noptions such as ,master=camera [usb:, the only "
               "board on the USB].\n",
           .notes = "Exit status: 0 done, 1 the device failed, 2 wrong usage, 3 "

@@ -24,7 +24,7 @@ schemes ()
       {"usb:", "usb:[PORT|SERIAL] (a LightCrafter 4500, 6500 or 9000)",
           open_usb_dmd},
       {"lightcrafter:",
-          "lightcrafter:[HOST[:PORT]] (the first LightCrafter, over TCP)",
+          "lightcrafter:[ADDRESS[:PORT]] (the first LightCrafter, over TCP)",
           open_lightcrafter}};
   return known;
 }

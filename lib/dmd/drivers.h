@@ -34,7 +34,7 @@ Result<std::unique_ptr<Dmd>> open_dlpc900 (
     std::unique_ptr<HidLink> link, const DmdOptions &options);
 
 /**
- * Opens "lightcrafter:[HOST[:PORT]][,key=value...]", see options.h; the
+ * Opens "lightcrafter:[ADDRESS[:PORT]][,key=value...]", see options.h; the
  * defaults are 192.168.1.100 and port 21845.
  *
  * Its sequences have no frames: with the DMD as master, its trigger output

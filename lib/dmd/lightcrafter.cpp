@@ -77,7 +77,7 @@ private:
       const char *what, std::uint16_t command, ByteView payload);
   Result<void> set_sequence (const PatternTime &time);
   Result<void> send_masks (
-      const Schedule &schedule, const UploadProgress &progress);
+      const PatternTime &time, const UploadProgress &progress);
 
   const std::string host_;
   const int port_;
@@ -85,7 +85,8 @@ private:
   std::string version_;
   std::stop_token cancel_;
   std::chrono::milliseconds patience_ = kPatience; // that is left to the job
-  int masks_ = 0;                                  // on the board, 0: none
+  std::optional<Schedule> schedule_;               // on the board
+  PatternTime time_;                               // of its masks
 };
 
 /** Begins a job, with a new connection if the last one failed. */
@@ -107,9 +108,8 @@ Lightcrafter::connect ()
     return {};
   auto stream = TcpStream::connect (host_, port_, patience_, cancel_);
   if (!stream)
-    return Error{info_.name + ": " + stream.error ().message +
-                     "; is the board on, and this computer in its network?",
-        stream.error ().code};
+    return Error{
+        info_.name + ": " + stream.error ().message, stream.error ().code};
   stream_ = *std::move (stream);
   return {};
 }
@@ -211,7 +211,7 @@ Lightcrafter::status ()
 Result<void>
 Lightcrafter::set_sequence (const PatternTime &time)
 {
-  Sequence sequence{.patterns = masks_,
+  Sequence sequence{.patterns = schedule_->masks (),
       .period = time.exposure + time.dark,
       .exposure = time.exposure};
   if (options_.master == Master::camera)
@@ -230,29 +230,31 @@ Lightcrafter::set_sequence (const PatternTime &time)
   return {};
 }
 
+/** The masks of a sequence follow its setting, which forgets them. */
 Result<void>
 Lightcrafter::send_masks (
-    const Schedule &schedule, const UploadProgress &progress)
+    const PatternTime &time, const UploadProgress &progress)
 {
   const Bytes off{0}, sequence_mode{kModeSequence};
   RETURN_IF_ERROR (write ("stop the sequence", kRun, off));
   running_ = false;
   RETURN_IF_ERROR (
       write ("change the display mode", kDisplayMode, sequence_mode));
-  masks_ = schedule.masks ();
-  RETURN_IF_ERROR (
-      set_sequence ({10'000, std::uint32_t (options_.gap / 1000)}));
+  time_ = {}; // until all is sent
+  RETURN_IF_ERROR (set_sequence (time));
 
-  const MaskRenderer renderer (schedule, info_.size, options_.placement);
-  for (int mask = 0; mask < masks_; mask++) {
-    progress (mask, masks_);
+  const int masks = schedule_->masks ();
+  const MaskRenderer renderer (*schedule_, info_.size, options_.placement);
+  for (int mask = 0; mask < masks; mask++) {
+    progress (mask, masks);
     if (cancel_.stop_requested ())
       return Error{info_.name + ": upload cancelled", ErrorCode::cancelled};
     Bytes payload{std::uint8_t (mask)};
     append (payload, encode_bitmap (renderer.render (mask)));
     RETURN_IF_ERROR (write ("send a mask", kPattern, payload));
   }
-  progress (masks_, masks_);
+  progress (masks, masks);
+  time_ = time;
   return {};
 }
 
@@ -263,9 +265,12 @@ Lightcrafter::upload (const Schedule &schedule, std::stop_token stop_token,
   RETURN_IF_ERROR (check_masks (info_, schedule));
   RETURN_IF_ERROR (begin (std::move (stop_token)));
   touched_ = true;
-  const auto sent = send_masks (schedule, progress);
+  schedule_ = schedule;
+  // A time that every board accepts, until start () knows the real one.
+  const auto sent =
+      send_masks ({10'000, std::uint32_t (options_.gap / 1000)}, progress);
   if (!sent) {
-    masks_ = 0;
+    schedule_.reset ();
     stop ();
   }
   return sent;
@@ -274,14 +279,15 @@ Lightcrafter::upload (const Schedule &schedule, std::stop_token stop_token,
 Result<void>
 Lightcrafter::start (const SlotPlan &plan, std::stop_token stop_token)
 {
-  if (masks_ == 0)
+  if (!schedule_)
     return Error{info_.name + ": no masks to start; upload first"};
   const auto time = fit_equal_patterns (plan, *info_.patterns);
   if (!time)
     return time.error ().with_prefix (info_.name + ": ");
   RETURN_IF_ERROR (watch ());
   RETURN_IF_ERROR (begin (std::move (stop_token)));
-  RETURN_IF_ERROR (set_sequence (*time));
+  if (*time != time_)
+    RETURN_IF_ERROR (send_masks (*time, [] (int, int) {}));
   RETURN_IF_ERROR (write ("set up the trigger output", kCameraTrigger,
       encode_camera_trigger (options_.master == Master::dmd, kCameraPulse)));
   if (!wait_for (cancel_, std::chrono::nanoseconds (plan.frame_period ())))
@@ -311,7 +317,7 @@ open_lightcrafter (std::string_view device)
   const auto port = parts.size () < 2 ? kPort : parse_int (parts[1]);
   if (parts.size () > 2 || !port || *port < 1 || *port > kMaxPort)
     return Error{"DMD " + in_quotes (device) +
-                 ": write lightcrafter:HOST or lightcrafter:HOST:PORT"};
+                 ": write lightcrafter:ADDRESS or lightcrafter:ADDRESS:PORT"};
   const std::string host =
       parts[0].empty () ? "192.168.1.100" : std::string (parts[0]);
   auto dmd = std::make_unique<Lightcrafter> (host, *port, options);

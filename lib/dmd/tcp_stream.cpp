@@ -11,15 +11,10 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <condition_variable>
 #include <cstring>
-#include <mutex>
-#include <new>
-#include <optional>
-#include <system_error>
-#include <thread>
 #include <utility>
 
+#include "base/text.h"
 #include "base/try.h"
 
 namespace codedexposure
@@ -34,61 +29,22 @@ constexpr auto kPatience = 50ms;
 
 using Addresses = std::unique_ptr<addrinfo,
     std::integral_constant<decltype (&freeaddrinfo), freeaddrinfo>>;
-using Deadline = std::chrono::steady_clock::time_point;
 
+/** Names would be looked up by servers that the network of a board does not
+ * have, and that cannot be told how long to take. */
 Result<Addresses>
-ask_resolver (const std::string &host, int port, int flags)
+parse_address (const std::string &host, int port)
 {
   addrinfo hints{};
   hints.ai_family = AF_UNSPEC;
   hints.ai_socktype = SOCK_STREAM;
-  hints.ai_flags = flags;
+  hints.ai_flags = AI_NUMERICHOST;
   addrinfo *raw = nullptr;
-  if (const int code = getaddrinfo (
-          host.c_str (), std::to_string (port).c_str (), &hints, &raw);
-      code != 0)
-    return Error{gai_strerror (code), ErrorCode::not_found};
+  if (getaddrinfo (
+          host.c_str (), std::to_string (port).c_str (), &hints, &raw) != 0)
+    return Error{in_quotes (host) +
+                 " is no IP address; write one such as 192.168.1.100"};
   return Addresses (raw);
-}
-
-/** A question to the resolver, which may outlive the one who asked. */
-struct Lookup {
-  std::mutex lock; // covers everything below
-  std::condition_variable_any answered;
-  std::optional<Result<Addresses>> answer;
-};
-
-/** Name servers may take far longer than the caller can wait, and the resolver
- * cannot be cancelled: it works in a thread that nobody waits for. */
-Result<Addresses>
-find_addresses (const std::string &host, int port, Deadline deadline,
-    const std::stop_token &stop)
-{
-  if (auto address = ask_resolver (host, port, AI_NUMERICHOST))
-    return address;
-  const auto lookup = std::make_shared<Lookup> ();
-  try {
-    std::thread ([lookup, host, port] {
-      Result<Addresses> answer = out_of_memory ();
-      try {
-        answer = ask_resolver (host, port, 0);
-      } catch (const std::bad_alloc &) {
-      }
-      const std::lock_guard guard (lookup->lock);
-      lookup->answer = std::move (answer);
-      lookup->answered.notify_all ();
-    }).detach ();
-  } catch (const std::system_error &failed) {
-    return Error{failed.what (), ErrorCode::io};
-  }
-  std::unique_lock guard (lookup->lock);
-  if (lookup->answered.wait_until (
-          guard, stop, deadline, [&] { return lookup->answer.has_value (); }))
-    return *std::move (lookup->answer);
-  return stop.stop_requested ()
-             ? Error{"cancelled", ErrorCode::cancelled}
-             : Error{"the name servers do not answer in time",
-                   ErrorCode::timeout};
 }
 
 } // namespace
@@ -99,10 +55,8 @@ TcpStream::connect (const std::string &host, int port, Milliseconds timeout,
 {
   const std::string where = host + ":" + std::to_string (port);
   const auto deadline = Clock::now () + timeout;
-  const auto found = find_addresses (host, port, deadline, stop);
-  if (!found)
-    return found.error ().with_prefix ("cannot find " + where + ": ");
-  const addrinfo *raw = found->get ();
+  ASSIGN_OR_RETURN (const Addresses found, parse_address (host, port));
+  const addrinfo *raw = found.get ();
 
   const int socket = ::socket (raw->ai_family,
       raw->ai_socktype | SOCK_CLOEXEC | SOCK_NONBLOCK, raw->ai_protocol);
@@ -121,7 +75,8 @@ TcpStream::connect (const std::string &host, int port, Milliseconds timeout,
     getsockopt (socket, SOL_SOCKET, SO_ERROR, &code, &size);
   }
   if (code != 0)
-    return Error{"cannot connect to " + where + ": " + std::strerror (code),
+    return Error{"cannot connect to " + where + ": " + std::strerror (code) +
+                     "; is the board on, and this computer in its network?",
         ErrorCode::io};
   const int on = 1;
   setsockopt (socket, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);

@@ -20,7 +20,7 @@ class TcpStream
 public:
   using Milliseconds = std::chrono::milliseconds;
 
-  /** @p host  a name or an address. @p timeout  for all of it. @p stop  as in
+  /** @p host  an IP address. @p timeout  for all of it. @p stop  as in
    * cancel_on (). */
   static Result<std::unique_ptr<TcpStream>> connect (const std::string &host,
       int port, Milliseconds timeout, std::stop_token stop = {});

@@ -70,6 +70,7 @@ public:
   Data setting () const { return locked (setting_); }
   Data camera () const { return locked (camera_); }
   std::map<int, Mirrors> masks () const { return locked (masks_); }
+  int masks_received () const { return locked (masks_received_); }
 
 private:
   template <typename T>
@@ -202,8 +203,7 @@ private:
     if (data.size () != size || mode_ != 4 || patterns < 1 || patterns > 96)
       return 3;
     setting_ = data;
-    if (patterns != wanted_)
-      masks_.clear ();
+    masks_.clear (); // those of a sequence follow its setting
     wanted_ = patterns;
     return 0;
   }
@@ -233,6 +233,7 @@ private:
         mirrors.at (x, y) = bit == second_is_white;
       }
     masks_[data[0]] = mirrors;
+    masks_received_++;
     return 0;
   }
 
@@ -243,6 +244,7 @@ private:
   int client_ = -1;
   int mode_ = 0;
   int wanted_ = 0;
+  int masks_received_ = 0;
   bool running_ = false;
   Data setting_, camera_;
   std::map<int, Mirrors> masks_;

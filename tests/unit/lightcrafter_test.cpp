@@ -1,16 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* The DLP3000 driver: its bytes, and an emulated board as a server on this
  * machine. */
-#include <dlfcn.h>
-#include <netdb.h>
-
-#include <latch>
-
 #include "dmd/bitmap.h"
 #include "dmd/drivers.h"
 #include "dmd/lightcrafter_protocol.h"
 #include "dmd/plane_image.h"
-#include "dmd/tcp_stream.h"
 #include "dmd_rig.h"
 #include "hex.h"
 #include "lightcrafter_server.h"
@@ -22,7 +16,6 @@ using namespace codedexposure::test;
 namespace
 {
 
-using namespace std::chrono_literals;
 using lightcrafter::encode_message;
 using lightcrafter::PacketType;
 
@@ -31,10 +24,6 @@ packet (PacketType type, std::uint16_t command, const Bytes &payload)
 {
   return to_hex (encode_message (type, command, payload));
 }
-
-constexpr char kSilentName[] = "silent.invalid";
-/** Until then, no name server answers for that name. */
-std::latch silence_is_over{1};
 
 /** switching is the time that the board needs between two masks. */
 const char *const kPreset = "sequential:2x2,switching=250us";
@@ -48,21 +37,6 @@ open (const LightcrafterServer &server, const std::string &options = "")
 }
 
 } // namespace
-
-/** In place of the C library's. */
-extern "C" int
-getaddrinfo (const char *node, const char *service, const addrinfo *hints,
-    addrinfo **found)
-{
-  if (std::string_view (node) == kSilentName) {
-    if ((hints->ai_flags & AI_NUMERICHOST) == 0)
-      silence_is_over.wait ();
-    return EAI_NONAME;
-  }
-  static const auto real = reinterpret_cast<decltype (&getaddrinfo)> (
-      dlsym (RTLD_NEXT, "getaddrinfo"));
-  return real (node, service, hints, found);
-}
 
 TEST (LightcrafterBytes, AreThoseOfTheDocument)
 {
@@ -175,6 +149,24 @@ TEST (Lightcrafter, AsMasterPulsesOnceAMask)
   EXPECT_EQ (to_hex (server.camera ()), "01 00 00 00 00 00 00 64 00 00 00");
 }
 
+/* The setting of a sequence comes before its masks, in protocol 4.7. */
+TEST (Lightcrafter, OtherTimesTakeTheMasksOnceMore)
+{
+  LightcrafterServer server;
+  auto dmd = open (server);
+  ASSERT_EQ (message_of (dmd), "");
+  const Schedule schedule = schedule_of (kPreset);
+  ASSERT_EQ (message_of ((*dmd)->upload (schedule, {}, ignore_progress)), "");
+  for (const FrameRate rate :
+      {FrameRate{25, 1}, FrameRate{25, 1}, FrameRate{20, 1}}) {
+    ASSERT_EQ (message_of ((*dmd)->start (plan_of (schedule, rate))), "");
+    EXPECT_TRUE (server.running ());
+    EXPECT_EQ (server.masks ().size (), 4u);
+    (*dmd)->stop ();
+  }
+  EXPECT_EQ (server.masks_received (), 12) << "not again for the same times";
+}
+
 TEST (Lightcrafter, WithTheCameraAsMasterAnEdgeStepsTheMask)
 {
   LightcrafterServer server;
@@ -273,19 +265,11 @@ TEST (Lightcrafter, ABoardThatRefusesToStartDoesNotRun)
   EXPECT_FALSE ((*dmd)->running ());
 }
 
-TEST (TcpStream, ANameIsLookedForNoLongerThanItWasTold)
+TEST (Lightcrafter, ANameIsNotLookedUp)
 {
-  for (const auto &[timeout, code] : {std::pair{20ms, ErrorCode::timeout},
-           {3'600'000ms, ErrorCode::cancelled}}) {
-    std::stop_source stop;
-    if (code == ErrorCode::cancelled)
-      stop.request_stop ();
-    const auto stream =
-        TcpStream::connect (kSilentName, 1, timeout, stop.get_token ());
-    ASSERT_FALSE (stream.ok ());
-    EXPECT_EQ (stream.error ().code, code) << message_of (stream);
-  }
-  silence_is_over.count_down ();
+  EXPECT_EQ (message_of (open_lightcrafter ("lightcrafter:board.invalid")),
+      "lightcrafter:board.invalid: 'board.invalid' is no IP address; write one "
+      "such as 192.168.1.100");
 }
 
 TEST (Lightcrafter, NobodyThereIsAnError)

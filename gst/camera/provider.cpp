@@ -2,6 +2,9 @@
 /* Lists GenICam cameras as devices of codedexposure-camerasrc. */
 #include <arv.h>
 
+#include <memory>
+#include <mutex>
+
 #include "camerasrc.h"
 #include "common/caps.h"
 #include "common/elements.h"
@@ -11,9 +14,14 @@ using namespace codedexposure::gst;
 namespace
 {
 
-struct None {
+/** Searches that were begun or abandoned. */
+struct Searches {
+  std::mutex lock; // held while the list of devices changes
+  int number = 0;
 };
-struct GstCodedExposureCameraProvider : Instance<GstDeviceProvider, None> {
+struct GstCodedExposureCameraProvider : Instance<GstDeviceProvider, Searches> {
+};
+struct None {
 };
 /* A camera in the list. Its name is in the property "id" of its properties. */
 struct GstCodedExposureCamera : Instance<GstDevice, None> {
@@ -77,8 +85,8 @@ make_device (guint number)
   const CapsPtr caps (gst_caps_from_string (CODED_EXPOSURE_VIDEO_CAPS));
   const std::string name = vendor + " " + model + " " + serial;
   return GST_DEVICE (g_object_new (camera_type (), "display-name",
-      name.c_str (), "device-class", "Source/Video", "caps", caps.get (),
-      "properties", facts.get (), nullptr));
+      name.c_str (), "device-class", "Source/Video/GenICam", "caps",
+      caps.get (), "properties", facts.get (), nullptr));
 }
 
 /* Searching takes a second, and a broadcast to all networks of the machine. */
@@ -92,19 +100,74 @@ probe (GstDeviceProvider *)
   return devices;
 }
 
+/* A search for a monitor, which shall not wait for it. */
+struct Search {
+  ObjectPtr<GstDeviceProvider> provider;
+  int number;
+};
+
+gpointer
+find_cameras (gpointer data)
+{
+  const std::unique_ptr<Search> search (static_cast<Search *> (data));
+  GstDeviceProvider *provider = search->provider.get ();
+  Searches &searches = as<GstCodedExposureCameraProvider> (provider)->state;
+  GList *const devices = probe (provider);
+  const std::lock_guard guard (searches.lock);
+  for (const GList *at = devices; at; at = at->next) {
+    const ObjectPtr<GstDevice> device (
+        GST_DEVICE (gst_object_ref_sink (at->data)));
+    if (search->number == searches.number)
+      gst_device_provider_device_add (provider, device.get ());
+  }
+  g_list_free (devices);
+  return nullptr;
+}
+
+gboolean
+start (GstDeviceProvider *provider)
+{
+  Searches &searches = as<GstCodedExposureCameraProvider> (provider)->state;
+  const std::lock_guard guard (searches.lock);
+  auto search = std::make_unique<Search> (
+      Search{ObjectPtr<GstDeviceProvider> (
+                 GST_DEVICE_PROVIDER (gst_object_ref (provider))),
+          ++searches.number});
+  GThread *thread =
+      g_thread_try_new ("cameras", find_cameras, search.get (), nullptr);
+  if (!thread)
+    return FALSE;
+  (void)search.release (); // the thread has it
+  g_thread_unref (thread);
+  return TRUE;
+}
+
+void
+stop (GstDeviceProvider *provider)
+{
+  Searches &searches = as<GstCodedExposureCameraProvider> (provider)->state;
+  const std::lock_guard guard (searches.lock);
+  searches.number++;
+}
+
+/* The class is not one of those that programs ask for when they list video
+ * sources: only who asks for GenICam cameras has them searched for. */
 void
 set_up (gpointer klass)
 {
-  GST_DEVICE_PROVIDER_CLASS (klass)->probe = probe;
-  gst_device_provider_class_set_static_metadata (
-      GST_DEVICE_PROVIDER_CLASS (klass), "GenICam cameras",
-      "Source/Video/Hardware", "Lists GenICam cameras that Aravis finds",
+  auto *provider_class = GST_DEVICE_PROVIDER_CLASS (klass);
+  provider_class->probe = probe;
+  provider_class->start = start;
+  provider_class->stop = stop;
+  gst_device_provider_class_set_static_metadata (provider_class,
+      "GenICam cameras", "Source/GenICam",
+      "Lists GenICam cameras that Aravis finds",
       "The gst-codedexposure authors");
 }
 
 } // namespace
 
 GST_DEVICE_PROVIDER_REGISTER_DEFINE (codedexposure_cameraprovider,
-    "codedexposure-cameraprovider", GST_RANK_PRIMARY,
+    "codedexposure-cameraprovider", GST_RANK_MARGINAL,
     (type_of<GstCodedExposureCameraProvider, set_up> (
         "GstCodedExposureCameraProvider", GST_TYPE_DEVICE_PROVIDER)))

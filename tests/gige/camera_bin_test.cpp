@@ -341,12 +341,35 @@ TEST (CameraBin, TimesCountFromTheArrivalOfTheFirstFrame)
   EXPECT_TRUE (std::is_sorted (times.begin (), times.end ()));
 }
 
+/* A search is a broadcast on every network of the machine. */
+TEST (CameraBin, IsNotSearchedForByProgramsThatListVideoSources)
+{
+  const ObjectPtr<GstDeviceMonitor> monitor (gst_device_monitor_new ());
+  for (const auto &[classes, asked] : {std::pair{"Source/Video", false},
+           {"Video/Source", false}, {"Source/GenICam", true}}) {
+    const guint filter =
+        gst_device_monitor_add_filter (monitor.get (), classes, nullptr);
+    gchar **providers = gst_device_monitor_get_providers (monitor.get ());
+    EXPECT_EQ (providers &&
+                   g_strv_contains (providers, "codedexposure-cameraprovider"),
+        asked)
+        << classes;
+    g_strfreev (providers);
+    if (filter != 0)
+      gst_device_monitor_remove_filter (monitor.get (), filter);
+  }
+}
+
 TEST (CameraBin, IsListedAsADevice)
 {
   const auto camera = open_camera ({});
   const ObjectPtr<GstDeviceMonitor> monitor (gst_device_monitor_new ());
-  gst_device_monitor_add_filter (monitor.get (), "Source/Video", nullptr);
+  gst_device_monitor_add_filter (monitor.get (), "Source/GenICam", nullptr);
+  const ObjectPtr<GstBus> bus (gst_device_monitor_get_bus (monitor.get ()));
   ASSERT_TRUE (gst_device_monitor_start (monitor.get ()));
+  /* Cameras are said as they are found: nobody waits for the search. */
+  EXPECT_TRUE (MessagePtr (gst_bus_timed_pop_filtered (
+      bus.get (), 20 * GST_SECOND, GST_MESSAGE_DEVICE_ADDED)));
   GList *devices = gst_device_monitor_get_devices (monitor.get ());
   gst_device_monitor_stop (monitor.get ());
   int found = 0;

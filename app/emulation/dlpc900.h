@@ -18,8 +18,11 @@
 namespace codedexposure::emulated
 {
 
-class EmulatedDlpc900 : public EmulatedHid
+class EmulatedDlpc900 : public EmulatedDlpc
 {
+  const int type_;
+  const BoardFacts &facts_;
+
 public:
   using Mirrors = Image<std::uint8_t>;
 
@@ -27,12 +30,18 @@ public:
     std::uint32_t exposure = 0, dark = 0;
     bool waits = false, pulses = false;
     int image = 0, plane = 0;
+    /** Black follows it. It belongs to the line that stands in the table before
+     * one that waits, wherever the order shows either of them. */
+    bool black_after = false;
   };
 
   /** @p type  of the hardware, as find_dlpc900 () has it; of another one, it
    * only tells its type. */
   explicit EmulatedDlpc900 (int type = 1)
-      : type_ (type),
+      : EmulatedDlpc (0, {{0x0200, 1}, {0x0201, 1}, {0x0609, 1}, {0x1A1B, 1},
+                             {0x1A1E, 5}, {0x1A24, 1}, {0x1A2A, 6}, {0x1A2C, 6},
+                             {0x1A31, 6}, {0x1A34, 12}, {0x1A35, 3}}),
+        type_ (type),
         facts_ (find_dlpc900 (type) ? *find_dlpc900 (type) : *find_dlpc900 (1))
   {
   }
@@ -41,9 +50,10 @@ public:
   std::function<void (bool running)> on_run = {};
 
   bool firmware_has_minima = true;
+  /** Min exposure of a binary mask and min delay of its trigger, us. */
+  std::uint32_t minimum = facts_.limits.minimum_exposure;
   int firmware_major = 6, firmware_minor = 0;
 
-  bool running () const override { return running_; }
   bool idle () const { return idle_; }
   int park_cycles () const { return park_cycles_; }
   int images_received () const { return images_received_; }
@@ -88,31 +98,10 @@ public:
     return out;
   }
 
-protected:
-  std::optional<Data> obey (bool read, int command, const Data &data) override
-  {
-    if (read)
-      return answer (command);
-    // The error code belongs to the previous command.
-    error_ = 0;
-    if (command == 0x1A2B || command == 0x1A2D) {
-      take_data (command == 0x1A2B ? 0 : 1, data);
-      return Data{};
-    }
-    error_ = execute (command, data);
-    return error_ == 0 ? std::optional (Data{}) : std::nullopt;
-  }
-
-  std::optional<Data> refuse () override
-  {
-    error_ = kInternal;
-    return std::nullopt;
-  }
-
 private:
-  static constexpr int kNotNow = 5, kInvalid = 6, kBadPlane = 10, kNoImage = 11,
-                       kBadDark = 12, kBadDelay = 13, kBadExposure = 14,
-                       kBadNumber = 15, kBadPattern = 16, kInternal = 255;
+  static constexpr int kBadPlane = 10, kNoImage = 11, kBadDark = 12,
+                       kBadDelay = 13, kBadExposure = 14, kBadNumber = 15,
+                       kBadPattern = 16;
 
   struct Loading {
     int index = -1;
@@ -120,7 +109,7 @@ private:
     Data bytes = {};
   };
 
-  std::optional<Data> answer (int command)
+  std::optional<Data> answer (int command) override
   {
     Data data;
     switch (command) {
@@ -142,17 +131,11 @@ private:
       return data;
     case 0x1A0A:
       return Data{std::uint8_t (dual () ? 0x11 : 0x01)};
-    case 0x1A0C:
-      return Data{std::uint8_t (running_ ? 2 : 0)};
-    case 0x1A1B:
-      return Data{std::uint8_t (mode_)};
     case 0x1A42: {
-      if (!firmware_has_minima) {
-        error_ = 3;
+      if (!firmware_has_minima)
         return std::nullopt;
-      }
-      const std::array<unsigned, 8> minima{facts_.limits.minimum_exposure, 304,
-          394, 823, 1215, 1487, 1998, 4046};
+      const std::array<unsigned, 8> minima{
+          minimum, 304, 394, 823, 1215, 1487, 1998, 4046};
       for (const unsigned us : minima) {
         data.push_back (std::uint8_t (us));
         data.push_back (std::uint8_t (us >> 8));
@@ -160,19 +143,12 @@ private:
       return data;
     }
     default:
-      error_ = 3;
       return std::nullopt;
     }
   }
 
-  int execute (int command, const Data &data)
+  int execute (int command, const Data &data) override
   {
-    static const std::map<int, std::size_t> lengths{{0x0201, 1}, {0x0609, 1},
-        {0x1A1B, 1}, {0x1A1E, 5}, {0x1A24, 1}, {0x1A2A, 6}, {0x1A2C, 6},
-        {0x1A31, 6}, {0x1A34, 12}, {0x1A35, 3}};
-    const auto length = lengths.find (command);
-    if (length != lengths.end () && data.size () != length->second)
-      return kInvalid;
     switch (command) {
     case 0x1A24:
       return run (data[0]);
@@ -190,7 +166,7 @@ private:
     case 0x1A1E:
       return 0;
     case 0x1A35:
-      return word (data, 0) < facts_.minimum_trigger_delay ? kBadDelay : 0;
+      return word (data, 0) < minimum ? kBadDelay : 0;
     case 0x1A34:
       return define (data);
     case 0x1A31:
@@ -201,8 +177,11 @@ private:
       return announce (0, data);
     case 0x1A2C:
       return dual () ? announce (1, data) : kInvalid;
+    case 0x1A2B:
+    case 0x1A2D:
+      return take_data (command == 0x1A2B ? 0 : 1, data);
     default:
-      return 3;
+      return kUnknown;
     }
   }
 
@@ -218,7 +197,7 @@ private:
       return kBadNumber;
     if ((data[5] >> 1 & 7) != 0)
       return kBadPattern; // only binary ones here
-    if (line.exposure < facts_.limits.minimum_exposure)
+    if (line.exposure < minimum)
       return kBadExposure;
     if (line.dark > 0 && line.dark < facts_.limits.minimum_dark)
       return kBadDark;
@@ -251,6 +230,8 @@ private:
     if (!same)
       images_ = {};
     lines_ = defined_;
+    for (int line = 0; line < count; line++)
+      lines_[line].black_after = lines_[(line + 1) % count].waits;
     configured_ = true;
     last_index_ = {18, 18};
     order_.clear ();
@@ -290,27 +271,25 @@ private:
     return 0;
   }
 
-  void take_data (std::size_t half, const Data &data)
+  int take_data (std::size_t half, const Data &data)
   {
+    constexpr int kBadCompression = 9;
     Loading &loading = loading_[half];
     if (loading.index < 0 || data.size () < 2 ||
-        data.size () - 2 != word (data, 0) || data.size () > 506) {
-      error_ = kInvalid;
-      return;
-    }
+        data.size () - 2 != word (data, 0) || data.size () > 506)
+      return kInvalid;
     loading.bytes.insert (loading.bytes.end (), data.begin () + 2, data.end ());
     if (loading.bytes.size () < loading.size)
-      return;
+      return 0;
     const auto image = decode_spld (loading.bytes);
     const bool fits = image && loading.bytes.size () == loading.size &&
                       image->width () * facts_.controllers == size ().width &&
                       image->height () == size ().height;
     if (fits)
       images_[half][loading.index] = *image;
-    else
-      error_ = 9;
     images_received_++;
     loading = {};
+    return fits ? 0 : kBadCompression;
   }
 
   int run (int what)
@@ -342,12 +321,7 @@ private:
     return 0;
   }
 
-  const int type_;
-  const BoardFacts &facts_;
-  int mode_ = 0;
-  int error_ = 0;
   bool idle_ = true;
-  bool running_ = false;
   bool configured_ = false;
   int park_cycles_ = 0;
   int images_received_ = 0;

@@ -7,6 +7,7 @@
 #include <deque>
 #include <map>
 #include <optional>
+#include <utility>
 #include <vector>
 
 namespace codedexposure::emulated
@@ -182,6 +183,91 @@ private:
   int overlaps_ = 0;
   bool gone_ = false;
   bool hesitates_ = false;
+};
+
+/** What DLPC350 and DLPC900 have in common: their power, their mode, and
+ * commands of a fixed length. */
+class EmulatedDlpc : public EmulatedHid
+{
+public:
+  bool standby = false;
+
+  bool running () const override { return running_; }
+
+protected:
+  using Lengths = std::map<int, std::size_t>;
+
+  /** @p lengths  data bytes of the writes that have a fixed number of them. */
+  EmulatedDlpc (int mode, Lengths lengths)
+      : mode_ (mode), lengths_ (std::move (lengths))
+  {
+  }
+
+  /** The data of a register; none: there is none. */
+  virtual std::optional<Data> answer (int command) = 0;
+  /** Does what a write asks for; returns an error code, or 0. */
+  virtual int execute (int command, const Data &data) = 0;
+
+  static constexpr int kUnknown = 3, kNotNow = 5, kInvalid = 6, kInternal = 255;
+
+  int mode_;
+  int error_ = 0; // of the previous command
+  bool running_ = false;
+
+private:
+  std::optional<Data> obey (bool read, int command, const Data &data) override
+  {
+    if (read) {
+      auto found = answer_common (command);
+      if (!found)
+        found = answer (command);
+      if (!found)
+        error_ = kUnknown;
+      return found;
+    }
+    error_ = check (command, data);
+    if (error_ == 0 && command != kPower)
+      error_ = execute (command, data);
+    return error_ == 0 ? std::optional (Data{}) : std::nullopt;
+  }
+
+  std::optional<Data> refuse () override
+  {
+    error_ = kInternal;
+    return std::nullopt;
+  }
+
+  std::optional<Data> answer_common (int command)
+  {
+    switch (command) {
+    case kPower:
+      // Leaving standby takes time.
+      if (waking_ > 0 && --waking_ == 0)
+        standby = false;
+      return Data{std::uint8_t (standby ? 1 : 0)};
+    case 0x1A0C:
+      return Data{std::uint8_t (running_ ? 2 : 0)};
+    case 0x1A1B:
+      return Data{std::uint8_t (mode_)};
+    default:
+      return std::nullopt;
+    }
+  }
+
+  int check (int command, const Data &data)
+  {
+    const auto length = lengths_.find (command);
+    if (length != lengths_.end () && data.size () != length->second)
+      return kInvalid;
+    if (command == kPower)
+      waking_ = standby && data[0] == 0 ? 3 : 0;
+    return standby && command != kPower ? kNotNow : 0;
+  }
+
+  static constexpr int kPower = 0x0200;
+
+  const Lengths lengths_;
+  int waking_ = 0;
 };
 
 } // namespace codedexposure::emulated

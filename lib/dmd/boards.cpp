@@ -20,15 +20,14 @@ constexpr int kVideoMasks = 24;
 /** Lines of the pattern table; every board holds more planes. */
 constexpr int kDlpc900Lines = 400;
 
-/** @p least  min time of a binary mask, us. @p delay  the shortest one from the
- * camera's edge to light. */
+/** @p least  min time of a binary mask, us. */
 constexpr BoardFacts
 dlpc900_board (const char *name, const char *mirrors, const char *product,
     Extent size, std::uint8_t type, int controllers = 1,
-    std::uint32_t least = 105, std::uint32_t delay = 104)
+    std::uint32_t least = 105)
 {
   return {name, mirrors, product, Controller::dlpc900, size, Array::orthogonal,
-      kDlpc900Lines, {least, 0xFFFFFF, least, 105, 105}, delay, false, type,
+      kDlpc900Lines, {least, 0xFFFFFF, least, 105, 105}, false, type,
       controllers};
 }
 
@@ -37,12 +36,11 @@ dlpc900_board (const char *name, const char *mirrors, const char *product,
  * us to load a black one. */
 constexpr BoardFacts kBoards[] = {
     {"dlp3000", "DLP3000", "LightCrafter", Controller::dlpc300, {608, 684},
-        Array::diamond, 96, {250, 2'000'000, 0, 0, 0}, 0, true},
+        Array::diamond, 96, {250, 2'000'000, 0, 0, 0}, true},
     {"dlp4500", "DLP4500", "LightCrafter 4500", Controller::dlpc350,
-        {912, 1140}, Array::diamond, 48, {235, 200'000'000, 230, 0, 230}, 0,
-        true},
+        {912, 1140}, Array::diamond, 48, {235, 200'000'000, 230, 0, 230}, true},
     dlpc900_board (
-        "dlp500yx", "DLP500YX", "DLP500YX board", {2048, 1200}, 4, 1, 62, 62),
+        "dlp500yx", "DLP500YX", "DLP500YX board", {2048, 1200}, 4, 1, 62),
     dlpc900_board ("dlp5500", "DLP5500", "DLP5500 board", {1024, 768}, 5),
     dlpc900_board ("dlp6500", "DLP6500", "LightCrafter 6500", {1920, 1080}, 1),
     dlpc900_board ("dlp670s", "DLP670S", "DLP670S board", {2716, 1600}, 3, 2),
@@ -61,12 +59,8 @@ const OwnOption kOwnOptions[] = {
     {"patience", {Controller::dlpc350, Controller::dlpc900}},
     {"images", {Controller::dlpc350}},
     {"source", {Controller::dlpc350}},
-    {"trigger2-bit", {Controller::dlpc900}},
-    {"table", {Controller::dlpc900}},
-    {"erle-padding", {Controller::dlpc900}},
     {"polarity-bit", {Controller::dlpc350}},
     {"odd-rows", {Controller::dlpc300, Controller::dlpc350}},
-    {"image-pair", {Controller::dlpc350}},
     {"gap", {Controller::dlpc300}},
 };
 
@@ -85,16 +79,18 @@ check_own (const BoardFacts &facts, const DmdOptions &options)
   return {};
 }
 
-Result<void>
-check_dlpc900 (const BoardFacts &facts, const DmdOptions &options)
+/** From the camera's edge to light on a DLPC900, us. */
+Result<std::uint32_t>
+trigger_delay (const PatternLimits &limits, const DmdOptions &options)
 {
-  const Nanoseconds least = facts.minimum_trigger_delay * kMicrosecond;
-  constexpr Nanoseconds kMost = 0xFFFF * kMicrosecond;
-  if (options.trigger_delay < least || options.trigger_delay > kMost)
-    return Error{"trigger-delay is " + time_text (options.trigger_delay) +
-                 "; use " + std::to_string (facts.minimum_trigger_delay) +
+  if (!options.trigger_delay)
+    return std::max (limits.trigger_delay, limits.minimum_exposure);
+  const Nanoseconds delay = *options.trigger_delay / kMicrosecond;
+  if (delay < limits.minimum_exposure || delay > 0xFFFF)
+    return Error{"trigger-delay is " + time_text (*options.trigger_delay) +
+                 "; use " + std::to_string (limits.minimum_exposure) +
                  "us to 65535us"};
-  return {};
+  return std::uint32_t (delay);
 }
 
 } // namespace
@@ -167,9 +163,8 @@ board_info (const BoardFacts &facts, const DmdOptions &options)
       info.resident_masks = kVideoMasks;
     break;
   case Controller::dlpc900:
-    RETURN_IF_ERROR (check_dlpc900 (facts, options));
-    rule.limits.trigger_delay =
-        std::uint32_t (options.trigger_delay / kMicrosecond);
+    ASSIGN_OR_RETURN (
+        rule.limits.trigger_delay, trigger_delay (rule.limits, options));
     info.still_masks = true;
     if (const auto &region = options.placement.region)
       info.region = {region->width, region->height};

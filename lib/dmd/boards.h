@@ -36,10 +36,9 @@ struct BoardFacts {
   Extent size;
   Array array = Array::orthogonal;
   int masks = 0; ///< that it holds at once
-  /** With the default options; a DLPC900 reports its own minimum_exposure. */
+  /** With the default options; a DLPC900 reports its own minimum_exposure,
+   * which is also its min trigger_delay. */
   PatternLimits limits = {};
-  /** Min PatternLimits::trigger_delay that can be set; 0: it cannot. */
-  std::uint32_t minimum_trigger_delay = 0;
   /** One exposure and one dark time for all masks. */
   bool equal_times = false;
   std::uint8_t type = 0; ///< hardware type that a DLPC900 reports

@@ -125,11 +125,7 @@ Dlpc350::upload (const Schedule &schedule, std::stop_token stop_token,
 Result<void>
 Dlpc350::prepare ()
 {
-  ASSIGN_OR_RETURN (const std::uint8_t power, read_byte (kPowerMode));
-  if (power != kPowerNormal) {
-    RETURN_IF_ERROR (write_byte (kPower, kPowerNormal));
-    RETURN_IF_ERROR (await (kPowerMode, 0xFF, kPowerNormal, kPower.name));
-  }
+  RETURN_IF_ERROR (wake ());
   RETURN_IF_ERROR (halt ());
   RETURN_IF_ERROR (enter (kModePattern));
   RETURN_IF_ERROR (write (
@@ -151,8 +147,11 @@ Dlpc350::entries () const
     image = at.image;
     if (video ())
       entry.trigger = mask == 0 ? edge : Trigger::none;
-    else if (camera)
-      entry.trigger = mask % std::size_t (slots_) == 0 ? edge : Trigger::none;
+    else if (camera) {
+      const std::size_t slot = mask % std::size_t (slots_);
+      entry.trigger = slot == 0 ? edge : Trigger::none;
+      entry.black_after = int (slot) == slots_ - 1;
+    }
     entries.push_back (entry);
   }
   return entries;
@@ -177,8 +176,6 @@ Dlpc350::send_tables (const PatternTime &time)
     if (patterns[mask].next_image && !video ())
       images.push_back (
           std::uint8_t (options_.images[std::size_t (masks_[mask].image)]));
-  if (options_.swap_image_pair && images.size () == 2)
-    std::swap (images[0], images[1]);
 
   const TriggerMode mode =
       video () ? TriggerMode::video : TriggerMode::timer_or_input;
@@ -198,7 +195,8 @@ Dlpc350::validate ()
   RETURN_IF_ERROR (write_byte (kValidate, 0));
   do {
     ASSIGN_OR_RETURN (const std::uint8_t byte, read_byte (kValidate));
-    const Verdict verdict = parse_verdict (byte);
+    const Verdict verdict =
+        parse_verdict (byte, options_.master == Master::camera && !video ());
     if (!verdict.busy && !verdict.good)
       return error ("show these masks", verdict.text);
     if (!verdict.busy)

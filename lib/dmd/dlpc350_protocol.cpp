@@ -15,7 +15,8 @@ encode_entries (const std::vector<Entry> &entries)
   for (const Entry &entry : entries)
     append_le (bytes,
         std::uint32_t (entry.trigger) | std::uint32_t (entry.plane) << 2 |
-            kOneBit | kWhite | std::uint32_t (entry.next_image) << 18,
+            kOneBit | kWhite | std::uint32_t (entry.black_after) << 17 |
+            std::uint32_t (entry.next_image) << 18,
         3);
   return bytes;
 }
@@ -45,22 +46,22 @@ encode_pulse (bool low, int polarity_bit)
 }
 
 Verdict
-parse_verdict (std::uint8_t byte)
+parse_verdict (std::uint8_t byte, bool triggered)
 {
   struct Finding {
     std::uint8_t bit;
     bool error;
     const char *text;
   };
-  static constexpr std::array<Finding, 5> kFindings{{
+  const std::array<Finding, 5> findings{{
       {0, true, "exposure or period is out of range"},
       {1, true, "a pattern number is out of range"},
       {2, false, "trigger output 1 never falls"},
-      {3, false, "no black before a triggered pattern"},
+      {3, triggered, "no black before a triggered pattern"},
       {4, false, "less than 230 us of dark time"},
   }};
   Verdict verdict{(byte & 1 << 7) != 0, true, ""};
-  for (const Finding &finding : kFindings) {
+  for (const Finding &finding : findings) {
     if ((byte >> finding.bit & 1) == 0)
       continue;
     verdict.good &= !finding.error;

@@ -14,8 +14,6 @@ namespace codedexposure::dlpc350
 
 using namespace dlp;
 
-constexpr HidCommand kPower{0x0200, "leave standby", std::chrono::seconds (10)};
-constexpr HidCommand kPowerMode{kPower.word, "read the power mode"};
 constexpr HidCommand kSource{0x1A22, "choose the source of patterns"};
 constexpr HidCommand kTriggerMode{0x1A23, "choose the trigger mode"};
 constexpr HidCommand kTimes{0x1A29, "set exposure and period"};
@@ -26,7 +24,6 @@ constexpr HidCommand kMailboxData{0x1A34, "fill the mailbox"};
 constexpr HidCommand kValidate{0x1A1A, "validate the pattern table"};
 constexpr HidCommand kFlashImages{0x1A42, "count the images in flash"};
 
-constexpr std::uint8_t kPowerNormal = 0;
 constexpr std::uint8_t kModePattern = 1;
 constexpr std::uint8_t kMailboxClosed = 0;
 constexpr std::uint8_t kMailboxImages = 1;
@@ -48,6 +45,7 @@ struct Entry {
   Trigger trigger = Trigger::timer;
   int plane = 0;           ///< of the image: 0..7 green, 8..15 red, 16..23 blue
   bool next_image = false; ///< takes the next image of the image table first
+  bool black_after = false;
 };
 /** 3 bytes each, end to end. */
 Bytes encode_entries (const std::vector<Entry> &entries);
@@ -67,6 +65,8 @@ struct Verdict {
   bool good;        ///< no error; it starts in spite of warnings
   std::string text; ///< errors and warnings, or ""
 };
-Verdict parse_verdict (std::uint8_t byte);
+/** @p triggered  each frame waits for the camera: without black before it, its
+ * last mask would stay on until then, which is an error. */
+Verdict parse_verdict (std::uint8_t byte, bool triggered = false);
 
 } // namespace codedexposure::dlpc350

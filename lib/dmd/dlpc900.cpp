@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <functional>
-#include <map>
 #include <numeric>
 #include <optional>
 
@@ -65,16 +64,32 @@ find_order (
   return order;
 }
 
+/** Whether black still comes before each line that waits for the camera, the
+ * first of @p slots each. It belongs to the line before it in the table: in
+ * another place, it would be within the exposure, and there would be light
+ * while the board waits. */
+bool
+keeps_black (const std::vector<int> &order, int slots)
+{
+  const int lines = int (order.size ());
+  for (int first = 0; first < lines; first += slots) {
+    const int shown = order[std::size_t ((first + lines - 1) % lines)];
+    if (order[std::size_t (first)] != (shown + 1) % lines)
+      return false;
+  }
+  return true;
+}
+
 /** An encoded image: one half for each of the board's controllers. */
 using Halves = std::vector<PiecedBytes>;
 
 Halves
-encode_halves (const MirrorRows<PlanePixel> &image, int count, std::size_t unit)
+encode_halves (const MirrorRows<PlanePixel> &image, int count)
 {
   const int width = image.width () / count;
   Halves halves;
   for (int half = 0; half < count; half++)
-    halves.push_back (encode_image (image, half * width, width, unit));
+    halves.push_back (encode_image (image, half * width, width));
   return halves;
 }
 
@@ -86,38 +101,6 @@ packets_of (const Halves &halves)
     packets += image_packets (half.size);
   return packets;
 }
-
-/** The images of one schedule, each rendered and encoded once: to predict the
- * time of an upload, and to be sent. */
-class EncodedImages
-{
-public:
-  EncodedImages (const Schedule &schedule, Extent size, int controllers,
-      const DmdOptions &options)
-      : renderer_ (schedule, size, options.placement),
-        plan_ (plan_planes (schedule)), controllers_ (controllers),
-        unit_ (options.erle_unit)
-  {
-  }
-
-  const Schedule &schedule () const { return renderer_.schedule (); }
-  const Halves &get (int image)
-  {
-    const auto [found, is_new] = images_.try_emplace (image);
-    if (is_new)
-      found->second =
-          encode_halves (renderer_.render<PlanePixel> (plan_.of_image (image)),
-              controllers_, unit_);
-    return found->second;
-  }
-
-private:
-  MaskRenderer renderer_;
-  PlanePlan plan_;
-  int controllers_;
-  std::size_t unit_;
-  std::map<int, Halves> images_;
-};
 
 class Dlpc900 final : public DlpcBoard
 {
@@ -140,13 +123,11 @@ public:
       std::stop_token stop) override;
 
 private:
-  /** An image and its place on the board. */
-  using Indexed = std::pair<int, const Halves *>;
-
   std::string explain () override;
   Result<std::vector<PatternTime>> times_of (const SlotPlan &plan) const;
   UploadPlan plan_upload (const Schedule &schedule) const;
-  EncodedImages &images_of (const Schedule &schedule);
+  std::vector<Halves> encode (const Schedule &schedule,
+      const std::vector<int> &images, const std::stop_token &stop) const;
   Error cancelled () const
   {
     return Error{info_.name + ": upload cancelled", ErrorCode::cancelled};
@@ -156,12 +137,13 @@ private:
   Result<void> stop_after (Result<void> failed);
   Result<void> check_code (const char *what);
   Result<void> prepare ();
-  Result<void> send (const Schedule &schedule, const UploadProgress &progress);
+  Result<void> send (const Schedule &schedule, const std::stop_token &stop,
+      const UploadProgress &progress);
   Result<void> send_table (const std::vector<PatternTime> &times);
   Result<void> send_still (
       const StillMask &mask, const std::vector<PatternTime> &times);
-  Result<void> send_images (
-      const std::vector<Indexed> &images, const UploadProgress &progress);
+  Result<void> send_images (const std::vector<int> &places,
+      const std::vector<Halves> &images, const UploadProgress &progress);
   Result<void> send_half (const HidCommand &load, const HidCommand &data,
       int index, const Bytes &half,
       const std::function<void (std::size_t)> &sent);
@@ -176,8 +158,7 @@ private:
   Residents residents_;    // empty when unknown
   std::vector<int> order_; // line of the table for each mask, empty: no masks
   int slots_ = 1;
-  std::vector<PatternTime> times_;      // in the table, empty: other ones
-  std::optional<EncodedImages> images_; // until they are sent
+  std::vector<PatternTime> times_; // in the table, empty: other ones
 };
 
 Dlpc900::~Dlpc900 ()
@@ -222,14 +203,11 @@ Dlpc900::open ()
   controllers_ = (status & kSecondController) != 0 ? 2 : 1;
 
   // Firmware without this command has the minimum of the table.
+  BoardFacts unit = *facts_;
   const auto minima = read (kMinimumExposures, kMinimumExposuresSize);
-  RETURN_IF_ERROR (set_info (*facts_));
-  const std::uint32_t binary = minima ? read_le (*minima, 0, 2) : 0;
-  if (binary > 0) {
-    info_.patterns->limits.minimum_exposure = binary;
-    info_.minimum_active = Nanoseconds (binary) * 1000;
-  }
-  return {};
+  if (const auto binary = minima ? read_le (*minima, 0, 2) : 0; binary > 0)
+    unit.limits.minimum_exposure = unit.limits.minimum_dark = binary;
+  return set_info (unit);
 }
 
 Result<std::vector<PatternTime>>
@@ -250,12 +228,19 @@ Dlpc900::status ()
       {"controllers", std::to_string (controllers_)}});
 }
 
-EncodedImages &
-Dlpc900::images_of (const Schedule &schedule)
+/** The @p images of @p schedule, but for those after a request to @p stop. */
+std::vector<Halves>
+Dlpc900::encode (const Schedule &schedule, const std::vector<int> &images,
+    const std::stop_token &stop) const
 {
-  if (!images_ || !(images_->schedule () == schedule))
-    images_.emplace (schedule, info_.size, controllers_, options_);
-  return *images_;
+  const MaskRenderer renderer (schedule, info_.size, options_.placement);
+  const PlanePlan planes = plan_planes (schedule);
+  std::vector<Halves> encoded;
+  for (std::size_t i = 0; i < images.size () && !stop.stop_requested (); i++)
+    encoded.push_back (encode_halves (
+        renderer.render<PlanePixel> (planes.of_image (images[i])),
+        controllers_));
+  return encoded;
 }
 
 UploadPlan
@@ -275,7 +260,9 @@ Dlpc900::plan_upload (const Schedule &schedule) const
   const auto &has = residents_.masks;
   const auto &wants = plan.residents.masks;
   if (const auto order = find_order (has, wants);
-      order && version_.major >= 5) {
+      order && version_.major >= 5 &&
+      (options_.master == Master::dmd ||
+          keeps_black (*order, schedule.slots ()))) {
     plan.order = *order;
     plan.residents = residents_;
     plan.new_table = false;
@@ -299,9 +286,9 @@ Nanoseconds
 Dlpc900::upload_time (const Schedule &schedule, std::stop_token stop_token)
 {
   std::size_t packets = 0;
-  for (const int image : plan_upload (schedule).images)
-    if (!stop_token.stop_requested ())
-      packets += packets_of (images_of (schedule).get (image));
+  for (const Halves &image :
+      encode (schedule, plan_upload (schedule).images, stop_token))
+    packets += packets_of (image);
   return Nanoseconds (packets) * kPacketTime;
 }
 
@@ -312,13 +299,13 @@ Dlpc900::upload (const Schedule &schedule, std::stop_token stop_token,
   RETURN_IF_ERROR (check_masks (info_, schedule));
   touched_ = true;
   begin (stop_token);
-  const auto sent = send (schedule, progress);
-  images_.reset ();
+  const auto sent = send (schedule, stop_token, progress);
   return sent ? sent : stop_after (sent);
 }
 
 Result<void>
-Dlpc900::send (const Schedule &schedule, const UploadProgress &progress)
+Dlpc900::send (const Schedule &schedule, const std::stop_token &stop_token,
+    const UploadProgress &progress)
 {
   RETURN_IF_ERROR (prepare ());
   const UploadPlan plan = plan_upload (schedule);
@@ -326,19 +313,16 @@ Dlpc900::send (const Schedule &schedule, const UploadProgress &progress)
   residents_ = plan.residents;
   order_ = plan.order;
   slots_ = schedule.slots ();
-  if (plan.new_table && options_.table_first) {
+  if (plan.new_table) {
     // Times that every board accepts, until start () knows the real ones.
     const std::vector<PatternTime> times (
         std::size_t (slots_), PatternTime{10'000, 0});
     RETURN_IF_ERROR (send_table (times));
   }
-  std::vector<Indexed> images;
-  for (const int index : plan.images) {
-    if (link_->cancelled ())
-      return cancelled ();
-    images.emplace_back (index, &images_of (schedule).get (index));
-  }
-  return send_images (images, progress);
+  const auto images = encode (schedule, plan.images, stop_token);
+  if (link_->cancelled ())
+    return cancelled ();
+  return send_images (plan.images, images, progress);
 }
 
 /** Leaves no masks to start or to use again. */
@@ -374,6 +358,7 @@ Dlpc900::check_code (const char *what)
 Result<void>
 Dlpc900::prepare ()
 {
+  RETURN_IF_ERROR (wake ());
   RETURN_IF_ERROR (halt ());
   if (prepared_) {
     ASSIGN_OR_RETURN (const std::uint8_t mode, read_byte (kDisplayMode));
@@ -390,9 +375,9 @@ Dlpc900::prepare ()
   settings.emplace_back (
       kTriggerOut2, options_.pulse_low ? encode_trigger_out (true, kPulse, 0)
                                        : encode_trigger_out (false, 0, kPulse));
-  settings.emplace_back (
-      kTriggerIn1, encode_trigger_in (int (options_.trigger_delay / 1000),
-                       options_.falling_edge));
+  settings.emplace_back (kTriggerIn1,
+      encode_trigger_in (
+          int (info_.patterns->limits.trigger_delay), options_.falling_edge));
   RETURN_IF_ERROR (write_all (settings));
   prepared_ = true;
   return {};
@@ -411,7 +396,7 @@ Dlpc900::send_table (const std::vector<PatternTime> &times)
     entries[line] = {.index = std::uint16_t (line),
         .time = times[slot],
         .wait_for_trigger = options_.master == Master::camera && begins_frame,
-        .trigger_out_2 = pulse == options_.trigger2_bit_disables,
+        .trigger_out_2 = pulse,
         .plane = residents_.planes[line]};
   }
   for (const Entry &entry : entries)
@@ -427,12 +412,12 @@ Dlpc900::send_table (const std::vector<PatternTime> &times)
 }
 
 Result<void>
-Dlpc900::send_images (
-    const std::vector<Indexed> &images, const UploadProgress &progress)
+Dlpc900::send_images (const std::vector<int> &places,
+    const std::vector<Halves> &images, const UploadProgress &progress)
 {
   std::size_t total = 0, done = 0, told = 0;
-  for (const auto &[index, halves] : images)
-    total += packets_of (*halves);
+  for (const Halves &image : images)
+    total += packets_of (image);
   total = std::max<std::size_t> (total, 1); // the end is always reported
   const auto sent = [&] (std::size_t packets) {
     constexpr std::size_t kSteps = 200;
@@ -446,10 +431,10 @@ Dlpc900::send_images (
   constexpr std::array<HidCommand, 2> kLoad{kLoadImage, kLoadSecond};
   constexpr std::array<HidCommand, 2> kData{kImageData, kSecondData};
   progress (0, int (total));
-  for (const auto &[index, halves] : images)
-    for (std::size_t half = 0; half < halves->size (); half++)
-      if (const auto result = send_half (
-              kLoad[half], kData[half], index, (*halves)[half].joined (), sent);
+  for (std::size_t i = 0; i < images.size (); i++)
+    for (std::size_t half = 0; half < images[i].size (); half++)
+      if (const auto result = send_half (kLoad[half], kData[half], places[i],
+              images[i][half].joined (), sent);
           !result)
         return link_->cancelled () ? cancelled () : result.error ();
   progress (int (total), int (total));
@@ -538,12 +523,11 @@ Dlpc900::send_still (
   slots_ = int (times.size ());
   order_.resize (times.size ());
   std::iota (order_.begin (), order_.end (), 0);
-  if (options_.table_first)
-    RETURN_IF_ERROR (send_table (times));
+  RETURN_IF_ERROR (send_table (times));
   const Halves image = encode_halves (
       render_still<PlanePixel> (mask, info_.size, options_.placement),
-      controllers_, options_.erle_unit);
-  return send_images ({{0, &image}}, [] (int, int) {});
+      controllers_);
+  return send_images ({0}, {image}, [] (int, int) {});
 }
 
 } // namespace

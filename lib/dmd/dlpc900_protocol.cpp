@@ -119,10 +119,9 @@ encode_trigger_in (int delay_us, bool falling)
 }
 
 PiecedBytes
-encode_image (
-    const MirrorRows<PlanePixel> &image, int x, int width, std::size_t unit)
+encode_image (const MirrorRows<PlanePixel> &image, int x, int width)
 {
-  PiecedBytes code = encode_erle (image, x, width, unit);
+  PiecedBytes code = encode_erle (image, x, width);
   std::uint8_t packing = kEnhancedRunLength;
   if (code.size > plain_row (width) * std::size_t (image.height ())) {
     code = plain_pixels (image, x, width);

@@ -55,14 +55,13 @@ Bytes encode_order (const std::vector<int> &order);
 
 /** Delays of a trigger output from the exposure, -20..20000 us. */
 Bytes encode_trigger_out (bool invert, int rising_us, int falling_us);
-/** @p delay_us  BoardFacts::minimum_trigger_delay or more. */
+/** @p delay_us  the min exposure of a binary mask or more. */
 Bytes encode_trigger_in (int delay_us, bool falling);
 
 /** What the device gets for columns [x, x + width) of an image: a header and
- * the encoded pixels, or plain pixels if these are fewer. @p unit  as in
- * encode_erle (). */
-PiecedBytes encode_image (const MirrorRows<PlanePixel> &image, int x, int width,
-    std::size_t unit = kErleUnit);
+ * the encoded pixels, or plain pixels if these are fewer. */
+PiecedBytes encode_image (
+    const MirrorRows<PlanePixel> &image, int x, int width);
 /** Data of kLoadImage for an image of @p size encoded bytes. */
 Bytes encode_load (int index, std::size_t size);
 /** Data of one kImageData with at most kImageChunk bytes. */

@@ -107,6 +107,16 @@ DlpcBoard::enter (std::uint8_t mode)
 }
 
 Result<void>
+DlpcBoard::wake ()
+{
+  ASSIGN_OR_RETURN (const std::uint8_t power, read_byte (kPowerMode));
+  if (power == kPowerNormal)
+    return {};
+  RETURN_IF_ERROR (write_byte (kPower, kPowerNormal));
+  return await (kPowerMode, 0xFF, kPowerNormal, kPower.name);
+}
+
+Result<void>
 DlpcBoard::halt ()
 {
   RETURN_IF_ERROR (write_byte (kRun, kRunStop));

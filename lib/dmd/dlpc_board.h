@@ -52,6 +52,8 @@ protected:
   /** Changes the display mode and waits until the board reports it. */
   Result<void> enter (std::uint8_t mode);
   bool park () override;
+  /** A board in standby takes no other command. */
+  Result<void> wake ();
   /** Stops the sequencer and waits until it has stopped. */
   Result<void> halt ();
   /** Starts the sequencer, which does not run; it may take a moment. */

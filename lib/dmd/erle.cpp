@@ -126,9 +126,9 @@ append_pixels (Bytes &bytes, const PlanePixel *pixels, int count)
 }
 
 PiecedBytes
-encode_erle (
-    const MirrorRows<PlanePixel> &image, int x, int width, std::size_t unit)
+encode_erle (const MirrorRows<PlanePixel> &image, int x, int width)
 {
+  constexpr std::size_t kUnit = 4;
   assert (width >= 1 && width <= kMaxCount);
   PiecedBytes code;
   std::map<std::pair<int, int>, int> known; // by the row and the one above
@@ -144,7 +144,8 @@ encode_erle (
     above = row;
   }
   Bytes end{0, 1, 0};
-  end.resize (end.size () + (unit - (code.size + end.size ()) % unit) % unit);
+  end.resize (
+      end.size () + (kUnit - (code.size + end.size ()) % kUnit) % kUnit);
   code.add (std::move (end));
   return code;
 }

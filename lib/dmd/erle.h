@@ -14,9 +14,6 @@ namespace codedexposure
 /** The 24 bit-planes of a mirror: plane b is bit b. The top byte is 0. */
 using PlanePixel = std::uint32_t;
 
-/** An encoded image is padded to a multiple of this many bytes. */
-constexpr std::size_t kErleUnit = 4;
-
 /** Three bytes a pixel, as on the wire: planes 16..23 come first. */
 void append_pixels (Bytes &bytes, const PlanePixel *pixels, int count);
 
@@ -34,7 +31,7 @@ struct PiecedBytes {
 /**
  * Enhanced run-length encoding: runs of one pixel, copies from the row above,
  * literals. No run crosses a row, so that the code of a row depends only on the
- * row and the one above. Padded with zeros to a multiple of @p unit bytes.
+ * row and the one above. Padded with zeros to a multiple of 4 bytes.
  *
  * @p image    of which columns [x, x + width) are encoded.
  * @p width    1..32767.
@@ -42,7 +39,6 @@ struct PiecedBytes {
  * It compresses what is constant along a row or a column. Masks with a period
  * above 1 in both directions stay at 3 bytes per pixel.
  */
-PiecedBytes encode_erle (const MirrorRows<PlanePixel> &image, int x, int width,
-    std::size_t unit = kErleUnit);
+PiecedBytes encode_erle (const MirrorRows<PlanePixel> &image, int x, int width);
 
 } // namespace codedexposure

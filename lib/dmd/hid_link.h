@@ -75,6 +75,8 @@ Result<HidReplyHead> parse_reply_head (ByteView packet);
 namespace dlp
 {
 
+constexpr HidCommand kPower{0x0200, "leave standby", std::chrono::seconds (10)};
+constexpr HidCommand kPowerMode{kPower.word, "read the power mode"};
 constexpr HidCommand kVersion{0x0205, "read the firmware version"};
 constexpr HidCommand kHardwareStatus{0x1A0A, "read the hardware status"};
 constexpr HidCommand kMainStatus{0x1A0C, "read the main status"};
@@ -83,6 +85,7 @@ constexpr HidCommand kTriggerOut2{0x1A1E, "set up trigger output 2"};
 constexpr HidCommand kRun{0x1A24, "start or stop the patterns"};
 constexpr HidCommand kTriggerIn1{0x1A35, "set up trigger input 1"};
 
+constexpr std::uint8_t kPowerNormal = 0;
 /** Bytes of the version reply. */
 constexpr std::size_t kVersionSize = 16;
 constexpr std::uint8_t kRunStop = 0;

@@ -90,16 +90,9 @@ DmdOptions::parse (std::string_view device)
       value_key ("images", "A[/B...]", o.images, parse_images),
       choice_key ("source", o.source,
           {{"flash", Source::flash}, {"video", Source::video}}),
-      choice_key ("trigger2-bit", o.trigger2_bit_disables,
-          {{"disables", true}, {"enables", false}}),
-      choice_key ("table", o.table_first, {{"first", true}, {"last", false}}),
-      choice_key ("erle-padding", o.erle_unit,
-          {{"on", kErleUnit}, {"off", std::size_t (1)}}),
       choice_key ("polarity-bit", o.polarity_bit, {{"0", 0}, {"1", 1}}),
       choice_key ("odd-rows", o.placement.odd_rows_left,
           {{"right", false}, {"left", true}}),
-      choice_key ("image-pair", o.swap_image_pair,
-          {{"plain", false}, {"swapped", true}}),
       value_key ("gap", "TIME", o.gap, parse_time)};
   ASSIGN_OR_RETURN (o.which, parse_device (device, keys));
   const auto parts = split (device, ',');

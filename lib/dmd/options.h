@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <initializer_list>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -11,7 +12,6 @@
 #include <vector>
 
 #include "dmd/dlpc350_protocol.h"
-#include "dmd/erle.h"
 #include "dmd/hid_link.h"
 #include "dmd/pattern_timing.h"
 #include "schedule/mirror_array.h"
@@ -26,7 +26,7 @@ namespace codedexposure
  *   region=WxH[+X+Y]     mirrors that show masks; the others stay off and
  *                        upload in almost no time
  *   trigger-delay=TIME   from the camera's edge to light (DLPC900: default
- *                        105 us)
+ *                        105 us, or the min time of a mask if that is longer)
  *   edge=rising|falling  of the camera's signal
  *   pulse=high|low       level of the pulses to the camera (USB boards)
  *   patience=TIME        how long a job waits for a USB board that does not
@@ -37,12 +37,8 @@ namespace codedexposure
  *   images=A[/B...]      flash images that hold the masks, 24 each
  *   source=flash|video
  * and for what the documents leave open, see docs/dmd.md:
- *   trigger2-bit=disables|enables  meaning of the DLPC900's trigger output flag
- *   table=first|last     whether its table is sent before the images
- *   erle-padding=on|off  of its encoded images to 4 bytes
  *   polarity-bit=0|1     of the DLPC350 that pulse=low sets
  *   odd-rows=right|left  where they are shifted to on a diamond array
- *   image-pair=plain|swapped  order of two images in the DLPC350's table
  *   gap=TIME             between two masks of a DLP3000, default 250 us
  */
 struct DmdOptions {
@@ -50,18 +46,14 @@ struct DmdOptions {
   std::vector<std::string> keys = {}; ///< of the options that follow
   Master master = Master::dmd;
   Placement placement = {};
-  Nanoseconds trigger_delay = 105'000;
+  std::optional<Nanoseconds> trigger_delay = {};
   bool falling_edge = false;
   bool pulse_low = false;
   std::chrono::milliseconds patience = HidLink::kPatience;
   std::vector<int> images = {};
   dlpc350::Source source = dlpc350::Source::flash;
   bool guard = true;
-  bool trigger2_bit_disables = true;
-  bool table_first = true;
-  std::size_t erle_unit = kErleUnit;
   int polarity_bit = 0;
-  bool swap_image_pair = false;
   Nanoseconds gap = 250'000;
 
   /** @p device  with its scheme, which the message names. */

@@ -14,7 +14,7 @@
 namespace codedexposure::emulated
 {
 
-class EmulatedDlpc350 : public EmulatedHid
+class EmulatedDlpc350 : public EmulatedDlpc
 {
 public:
   struct Line {
@@ -25,9 +25,14 @@ public:
   int flash_images = 2;
   bool video_locked = true;
   bool ignores_first_start = false;
-  bool standby = false;
 
-  bool running () const override { return running_; }
+  EmulatedDlpc350 ()
+      : EmulatedDlpc (0, {{0x0200, 1}, {0x1A1A, 1}, {0x1A1B, 1}, {0x1A1E, 2},
+                             {0x1A22, 1}, {0x1A23, 1}, {0x1A24, 1}, {0x1A29, 8},
+                             {0x1A31, 4}, {0x1A32, 1}, {0x1A33, 1}})
+  {
+  }
+
   const std::vector<Line> &lines () const { return lines_; }
   const Data &images () const { return images_; }
   int source () const { return source_; }
@@ -39,36 +44,19 @@ public:
   /** Masks from one pulse of trigger output 2 to the next. */
   int per_trigger () const { return per_trigger_; }
 
-protected:
-  std::optional<Data> obey (bool read, int command, const Data &data) override
-  {
-    return read                      ? answer (command)
-           : execute (command, data) ? std::optional (Data{})
-                                     : std::nullopt;
-  }
-
 private:
-  std::optional<Data> answer (int command)
+  std::optional<Data> answer (int command) override
   {
     switch (command) {
-    case 0x0200:
-      // Leaving standby takes time.
-      if (waking_ > 0 && --waking_ == 0)
-        standby = false;
-      return Data{std::uint8_t (standby ? 1 : 0)};
     case 0x0205:
       return Data (16, 4);
     case 0x1A0A:
       return Data{1};
-    case 0x1A0C:
-      return Data{std::uint8_t (running_ ? 2 : 0)};
     case 0x1A1A:
       // The validation takes time.
       if (busy_ > 0 && busy_-- > 0)
         return Data{0x80};
       return Data{std::uint8_t (verdict ())};
-    case 0x1A1B:
-      return Data{std::uint8_t (mode_)};
     case 0x1A42:
       return Data{std::uint8_t (flash_images)};
     default:
@@ -76,61 +64,49 @@ private:
     }
   }
 
-  bool execute (int command, const Data &data)
+  int execute (int command, const Data &data) override
   {
-    static const std::map<int, std::size_t> lengths{{0x0200, 1}, {0x1A1A, 1},
-        {0x1A1B, 1}, {0x1A1E, 2}, {0x1A22, 1}, {0x1A23, 1}, {0x1A24, 1},
-        {0x1A29, 8}, {0x1A31, 4}, {0x1A32, 1}, {0x1A33, 1}};
-    const auto length = lengths.find (command);
-    if (length != lengths.end () && data.size () != length->second)
-      return false;
-    if (command == 0x0200) {
-      waking_ = standby && data[0] == 0 ? 3 : 0;
-      return true;
-    }
-    if (standby)
-      return false;
     if (command == 0x1A24)
       return run (data[0]);
     if (running_)
-      return false;
+      return kNotNow;
     if (command != 0x1A1A)
       valid_ = false;
     switch (command) {
     case 0x1A1A:
       busy_ = 2;
       valid_ = (verdict () & 3) == 0;
-      return true;
+      return 0;
     case 0x1A1B:
       mode_ = data[0];
-      return true;
+      return 0;
     case 0x1A1E:
       pulse_ = data;
-      return true;
+      return 0;
     case 0x1A22:
       source_ = data[0];
-      return source_ == 0 || source_ == 3;
+      return source_ == 0 || source_ == 3 ? 0 : kInvalid;
     case 0x1A23:
       trigger_mode_ = data[0];
-      return true;
+      return 0;
     case 0x1A29:
       exposure_ = number (data, 0, 4);
       period_ = number (data, 4, 4);
-      return true;
+      return 0;
     case 0x1A31:
       entries_ = data[0] + 1;
       per_trigger_ = data[2] + 1;
       image_entries_ = data[3] + 1;
-      return true;
+      return 0;
     case 0x1A32:
-      return data[0] == 0;
+      return data[0] == 0 ? 0 : kInvalid;
     case 0x1A33:
       mailbox_ = data[0];
-      return true;
+      return 0;
     case 0x1A34:
-      return fill (data);
+      return fill (data) ? 0 : kInvalid;
     default:
-      return false;
+      return kUnknown;
     }
   }
 
@@ -166,9 +142,14 @@ private:
     if (int (lines_.size ()) != entries_ || lines_.empty () ||
         !lines_.front ().next_image)
       bits |= 2;
-    for (const Line &line : lines_)
-      if (line.plane > 24)
+    for (std::size_t at = 0; at < lines_.size (); at++) {
+      const Line &before = lines_[(at == 0 ? lines_.size () : at) - 1];
+      const bool edge = lines_[at].trigger == 1 || lines_[at].trigger == 2;
+      if (lines_[at].plane > 24)
         bits |= 2;
+      if (edge && !before.black_after)
+        bits |= 8;
+    }
     if (source_ == 3 && int (images_.size ()) != image_entries_)
       bits |= 2;
     for (const int image : images_)
@@ -177,28 +158,27 @@ private:
     return bits;
   }
 
-  bool run (int what)
+  int run (int what)
   {
     if (what != 2) {
       running_ = false;
       valid_ = false;
-      return true;
+      return 0;
     }
     if (ignores_first_start) {
       ignores_first_start = false;
-      return true;
+      return 0;
     }
     // Without a successful validation, it acknowledges and does nothing.
     running_ =
         mode_ == 1 && valid_ && mailbox_ == 0 && (source_ == 3 || video_locked);
-    return true;
+    return 0;
   }
 
-  int mode_ = 0, source_ = 3, trigger_mode_ = 1, mailbox_ = 0;
+  int source_ = 3, trigger_mode_ = 1, mailbox_ = 0;
   int entries_ = 0, per_trigger_ = 0, image_entries_ = 0, busy_ = 0;
-  int waking_ = 0;
   std::uint32_t exposure_ = 0, period_ = 0;
-  bool valid_ = false, running_ = false;
+  bool valid_ = false;
   std::vector<Line> lines_;
   Data images_;
   Data pulse_{0, 0xBB}; // after a reset

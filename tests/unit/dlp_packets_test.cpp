@@ -7,9 +7,9 @@
 
 #include "dmd/dlpc350_protocol.h"
 #include "dmd/dlpc900_protocol.h"
+#include "emulation/spld_decoder.h"
 #include "hex.h"
 #include "mirrors.h"
-#include "emulation/spld_decoder.h"
 
 using namespace codedexposure;
 using namespace codedexposure::test;
@@ -182,12 +182,15 @@ TEST (Dlpc350Bytes, TwentyFourEntriesTakeTwoPackets)
 
 TEST (Dlpc350Verdict, ErrorsAndWarningsAreToldApart)
 {
-  const auto verdict = dlpc350::parse_verdict;
+  const auto verdict = [] (std::uint8_t byte, bool triggered = false) {
+    return dlpc350::parse_verdict (byte, triggered);
+  };
   EXPECT_TRUE (verdict (0).good);
   EXPECT_EQ (verdict (0).text, "");
   EXPECT_TRUE (verdict (0x80).busy);
   EXPECT_TRUE (verdict (0x08).good);
   EXPECT_EQ (verdict (0x08).text, "no black before a triggered pattern");
+  EXPECT_FALSE (verdict (0x08, true).good) << "the last mask stays on";
   EXPECT_FALSE (verdict (0x01).good);
   EXPECT_FALSE (verdict (0x02).good);
   EXPECT_EQ (verdict (0x11).text,

@@ -18,7 +18,9 @@ struct Rig : DmdRig<EmulatedDlpc350, open_dlpc350> {
   Rig () : DmdRig (std::make_shared<EmulatedDlpc350> ()) {}
 };
 
-/** Trigger and plane of each line: "t0 t1" (timer), "r0 n1" (rising, none). */
+/** Trigger and plane of each line: "t0 t1" (timer), "r0 n1" (rising, none),
+ * with
+ * * before which it takes the next image, and _ after which it is black. */
 std::string
 table (const EmulatedDlpc350 &board)
 {
@@ -30,6 +32,8 @@ table (const EmulatedDlpc350 &board)
     text += std::to_string (line.plane);
     if (line.next_image)
       text += '*';
+    if (line.black_after)
+      text += '_';
   }
   return text;
 }
@@ -113,9 +117,19 @@ TEST (Dlpc350, WithTheCameraAsMasterWaitsOnceAFrame)
   const Schedule schedule =
       schedule_of ("sequential:2x2,switching=250us,readout=1ms");
   ASSERT_EQ (message_of (rig.show (schedule)), "");
-  EXPECT_EQ (table (*rig.board), "f0* n1 n2 n3");
+  EXPECT_EQ (table (*rig.board), "f0* n1 n2 n3_");
   EXPECT_EQ (rig.board->exposure (), 9'500u);
   EXPECT_EQ (rig.board->period (), 9'750u);
+}
+
+TEST (Dlpc350, IsBlackBeforeEachFrameThatWaits)
+{
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open ("x,images=0,master=camera")), "");
+  ASSERT_EQ (message_of (
+                 rig.show (schedule_of ("sequential:2x1,pilot=8,readout=1ms"))),
+      "");
+  EXPECT_EQ (table (*rig.board), "r0* n2_ r1 n3_");
 }
 
 TEST (Dlpc350, ShowsOneFrameOfVideoPerSequence)
@@ -137,11 +151,6 @@ TEST (Dlpc350, TwoImagesFollowTheMasks)
   EXPECT_TRUE (rig.board->lines ()[24].next_image);
   EXPECT_EQ (rig.board->lines ()[24].plane, 0);
   EXPECT_EQ (rig.board->images (), (Bytes{0, 1}));
-
-  Rig turned;
-  ASSERT_EQ (message_of (turned.open ("x,images=0/1,image-pair=swapped")), "");
-  ASSERT_EQ (message_of (turned.show (schedule_of ("sequential:6x5"))), "");
-  EXPECT_EQ (turned.board->images (), (Bytes{1, 0}));
 }
 
 TEST (Dlpc350, IsToldToStartAgainWhereItIgnoresTheFirst)

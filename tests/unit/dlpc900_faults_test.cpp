@@ -102,9 +102,9 @@ TEST (Dlpc900Faults, AnUnpluggedBoardIsOneClearErrorAtOnce)
   EXPECT_LE (rig.clock->now - before, 2s);
 }
 
-/** The message of an upload with the table. Before it: stop and its status,
- * idle, mode and its status, two triggers, and the four lines. */
-constexpr int kTableMessage = 11;
+/** The message of an upload with the table. Before it: power, stop and its
+ * status, idle, mode and its status, two triggers, and the four lines. */
+constexpr int kTableMessage = 12;
 
 TEST (Dlpc900Faults, ATableMayTakeTenSecondsAndIsThenGivenUp)
 {

@@ -312,30 +312,12 @@ TEST (Dlpc900, TablesAreThoseOfTheDocumentation)
   EXPECT_EQ (to_hex (slave.board->writes[0x1A35].back ()), "69 00 00");
 }
 
-TEST (Dlpc900, TheSenseOfTheTriggerFlagCanBeTurned)
+TEST (Dlpc900, PulsesCanBeTurned)
 {
   Rig rig;
-  ASSERT_EQ (message_of (rig.open ("x,trigger2-bit=enables")), "");
-  ASSERT_EQ (message_of (rig.show (Schedule ())), "");
-  EXPECT_EQ (flags (*rig.board, &EmulatedDlpc900::Line::pulses), "0111");
-}
-
-TEST (Dlpc900, WhatDocumentsLeaveOpenCanBeTurned)
-{
-  const Schedule schedule = schedule_of ("sequential:4x1");
-  std::vector<std::string> sizes;
-  for (const char *options : {"x", "x,pulse=low,erle-padding=off"}) {
-    Rig rig;
-    ASSERT_EQ (message_of (rig.open (options)), "");
-    ASSERT_EQ (message_of (rig.upload (schedule)), "");
-    const bool low = std::string (options) != "x";
-    EXPECT_EQ (to_hex (rig.board->writes[0x1A1E].back ()),
-        low ? "01 14 00 00 00" : "00 00 00 14 00");
-    ASSERT_FALSE (rig.board->writes[0x1A2A].empty ());
-    sizes.push_back (to_hex (rig.board->writes[0x1A2A].back ()));
-  }
-  ASSERT_EQ (sizes.size (), 2u);
-  EXPECT_NE (sizes[0], sizes[1]) << "the padding";
+  ASSERT_EQ (message_of (rig.open ("x,pulse=low")), "");
+  ASSERT_EQ (message_of (rig.upload (schedule_of ("sequential:4x1"))), "");
+  EXPECT_EQ (to_hex (rig.board->writes[0x1A1E].back ()), "01 14 00 00 00");
 }
 
 TEST (Dlpc900, WithTheCameraAsMasterItWaitsOnceAFrame)
@@ -363,6 +345,32 @@ TEST (Dlpc900, AfterAStopAWholeFrameIsDark)
   const auto stopped = rig.clock->now;
   ASSERT_EQ (message_of (rig.dmd->start (plan_of (Schedule ()))), "");
   EXPECT_GE (rig.clock->now - stopped, 40ms);
+}
+
+TEST (Dlpc900, ABoardInStandbyIsWoken)
+{
+  Rig rig;
+  rig.board->standby = true;
+  ASSERT_EQ (message_of (rig.open ()), "");
+  EXPECT_TRUE (rig.board->standby) << "a question leaves it alone";
+  ASSERT_EQ (message_of (rig.show (Schedule ())), "");
+  EXPECT_TRUE (rig.board->running ());
+}
+
+TEST (Dlpc900, TheTriggerDelayIsNotBelowThatOfTheUnit)
+{
+  for (const auto &[minimum, bytes] :
+      {std::pair{62u, "69 00 00"}, {105u, "69 00 00"}, {110u, "6E 00 00"}}) {
+    Rig rig;
+    rig.board->minimum = minimum;
+    ASSERT_EQ (message_of (rig.open ()), "");
+    ASSERT_EQ (message_of (rig.upload (Schedule ())), "");
+    EXPECT_EQ (to_hex (rig.board->writes[0x1A35].back ()), bytes);
+  }
+  Rig rig;
+  rig.board->minimum = 110;
+  EXPECT_EQ (message_of (rig.open ("x,trigger-delay=105us")),
+      "board (DLP5500): trigger-delay is 105us; use 110us to 65535us");
 }
 
 TEST (Dlpc900, FirmwareThatLocksMirrorsIsParkedOnce)
@@ -434,6 +442,34 @@ TEST (Dlpc900Upload, AnotherOrderOfTheSameMasksMovesLinesOnly)
     expect_masks (*rig.board, schedule);
     EXPECT_EQ (flags (*rig.board, &EmulatedDlpc900::Line::pulses), "1000");
   }
+}
+
+/* The black before a mask that waits for the camera belongs to a line of the
+ * table: an order that shows another line there would have light while it
+ * waits, and black within the exposure. */
+TEST (Dlpc900Upload, BlackComesBeforeTheMaskThatWaitsInEveryOrder)
+{
+  Rig rig;
+  ASSERT_EQ (message_of (rig.open ("x,master=camera")), "");
+  const std::pair<const char *, int> orders[] = {
+      {"sequential:2x2,readout=400us", 1},
+      {"sequential:2x2,readout=400us,order=bit-reversal", 1},
+      {"sequential:2x2,readout=400us,phase=1/1", 2},
+      {"sequential:2x2,readout=400us", 3},
+      {"sequential:2x2,readout=400us,order=3/0/1/2", 3}};
+  for (const auto &[preset, images] : orders) {
+    const Schedule schedule = schedule_of (preset);
+    ASSERT_EQ (message_of (rig.show (schedule)), "") << preset;
+    expect_masks (*rig.board, schedule);
+    EXPECT_EQ (flags (*rig.board, &EmulatedDlpc900::Line::waits), "1000");
+    EXPECT_EQ (flags (*rig.board, &EmulatedDlpc900::Line::black_after), "0001")
+        << preset;
+    EXPECT_EQ (rig.board->images_received (), images) << preset;
+  }
+  const Schedule pilot = schedule_of ("sequential:2x2,readout=400us,pilot=8");
+  ASSERT_EQ (message_of (rig.show (pilot)), "");
+  EXPECT_EQ (
+      flags (*rig.board, &EmulatedDlpc900::Line::black_after), "00010001");
 }
 
 /* 8 masks, then 12 of which some come twice. */

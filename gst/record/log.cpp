@@ -41,7 +41,7 @@ struct LogState {
   bool stream_sent = false; ///< to the track
   bool segment_sent = false;
   guint64 frames = 0;
-  std::optional<guint64> last; ///< number of the last frame with a meta
+  std::optional<guint64> last; ///< largest number of a frame with a meta
   GstVideoInfo info = {};
   GstClockTime end = 0; ///< of the last frame
   /** Of the stream. */
@@ -163,7 +163,7 @@ count_lost (GstCodedExposureLog *self, FrameRecord &record)
   if (state.last && record.frame > *state.last)
     record.lost_before =
         std::max (*record.lost_before, record.frame - *state.last - 1);
-  state.last = record.frame;
+  state.last = std::max<guint64> (record.frame, state.last.value_or (0));
   if (!is_new)
     return;
   const ObjectLock lock (self);

@@ -53,9 +53,9 @@ struct RestoreState {
   std::optional<StreamSetup> container;     ///< setup of the container's tags
   std::vector<StreamSetup> others;          ///< those before it
   std::shared_ptr<const StreamSetup> setup; ///< in force
-  std::optional<guint64> last_frame;
-  GstClockTime last_pts = 0; ///< of that frame
-  bool announced = false;    ///< the container's tags say that there is a track
+  std::optional<guint64> last_frame;        ///< the largest number
+  GstClockTime last_pts = 0;                ///< of the newest frame
+  bool announced = false; ///< the container's tags say that there is a track
   bool found_line = false;
   /** No seek: the first frame is that of the stream, the last one its last. */
   bool whole = true;
@@ -263,7 +263,7 @@ restore (Self *self, GstBuffer *frame, const TrackReader::Match &match)
     state.damage.frame_repeated ();
   if (!state.is_complete || !state.last_frame ||
       GST_BUFFER_PTS (frame) > state.last_pts) {
-    state.last_frame = record.frame;
+    state.last_frame = std::max (record.frame, state.last_frame.value_or (0));
     state.last_pts = GST_BUFFER_PTS (frame);
   }
   if (!std::exchange (state.found_line, true))

@@ -67,7 +67,8 @@ setup_of (const char *schedule)
 struct Recording {
   std::vector<BufferPtr> frames, lines;
 
-  explicit Recording (const std::vector<int> &order = {0, 1, 2, 3, 4, 5})
+  explicit Recording (const std::vector<int> &order = {0, 1, 2, 3, 4, 5},
+      const std::vector<guint64> &numbers = {})
   {
     /* The file lets it start before the pad is requested. */
     ElementHarness log ("part-log location=/dev/null");
@@ -78,7 +79,9 @@ struct Recording {
       BufferPtr frame = picture (i);
       if (std::exchange (last, std::max (last, i)) > i)
         GST_BUFFER_FLAG_SET (frame.get (), GST_BUFFER_FLAG_DISCONT);
-      set_frame_meta (frame.get (), meta_of (i));
+      FrameMeta meta = meta_of (i);
+      meta.frame = numbers.empty () ? meta.frame : numbers[std::size_t (i)];
+      set_frame_meta (frame.get (), meta);
       if (i == 2)
         GST_BUFFER_FLAG_SET (frame.get (), GST_BUFFER_FLAG_CORRUPTED);
       EXPECT_EQ (log.push (std::move (frame)), GST_FLOW_OK);
@@ -250,6 +253,14 @@ TEST_F (Restore, AFrameThatCameLateIsNoRepetition)
   play ();
   EXPECT_EQ (GST_BUFFER_PTS (restored.at (4).get ()), 3 * kPeriod);
   EXPECT_EQ (counted (file.element (), "frames-damaged"), 0u);
+}
+
+TEST_F (Restore, AfterALateFrameNothingIsMissing)
+{
+  recording = Recording ({0, 1, 2, 3, 4, 5}, {10, 11, 13, 12, 14, 15});
+  play ();
+  for (const std::size_t i : {3, 4, 5})
+    EXPECT_EQ (get_frame_meta (restored.at (i).get ())->lost_before, 0u) << i;
 }
 
 TEST_F (Restore, AFrameThatIsMissingIsSaid)

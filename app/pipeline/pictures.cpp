@@ -234,16 +234,15 @@ Pictures::add (GstPad *pad, GstBuffer *picture)
   const gint index = next_index (pad, meta);
   g_object_set (sink_, "index", index, nullptr);
   last_ = names_.picture (index);
-  const auto locked = meta ? meta->locked : std::nullopt;
+  const char *synchronised = "unknown";
+  if (meta && meta->locked)
+    synchronised = *meta->locked ? "true" : "false";
   line_ = format ("%s,%s,%s,%s,%s,%s,%s,%" G_GUINT64_FORMAT, last_.c_str (),
       meta ? std::to_string (meta->frame).c_str () : "",
       meta && meta->subframe >= 0 ? std::to_string (meta->subframe).c_str ()
                                   : "",
       time_text (stream_time (pad, GST_BUFFER_PTS (picture))).c_str (),
-      time_text (GST_BUFFER_DURATION (picture)).c_str (),
-      !locked   ? "unknown"
-      : *locked ? "true"
-                : "false",
+      time_text (GST_BUFFER_DURATION (picture)).c_str (), synchronised,
       corrupted_ ? "true" : "false", meta ? meta->lost_before : 0);
   frames_++;
 }

@@ -2,7 +2,6 @@
 #include "calibrate/live_moire.h"
 
 #include <algorithm>
-#include <cassert>
 #include <cmath>
 #include <complex>
 #include <numbers>
@@ -14,6 +13,7 @@
 
 #include "base/pixels.h"
 #include "base/try.h"
+#include "base/view_check.h"
 
 namespace codedexposure
 {
@@ -460,8 +460,9 @@ template <typename Pixel>
 Result<LiveReading>
 LiveMoire::State::solve (ImageView<const Pixel> frame)
 {
-  assert (frame.width == expected.camera ().width &&
-          frame.height == expected.camera ().height);
+  const Extent camera = expected.camera ();
+  RETURN_IF_ERROR (
+      check_view (ViewBytes::of (frame), "frame", camera.width, camera.height));
   collect (frame);
   for (const auto &[phasors, name] : {std::pair (&x, "x"), std::pair (&y, "y")})
     RETURN_IF_ERROR (find_grating (*phasors, name));

@@ -55,8 +55,8 @@ public:
   LiveMoire &operator= (LiveMoire &&) noexcept;
   ~LiveMoire ();
 
-  /** @p frame of the expected mapping's camera size. Error when it shows no
-   * grating. */
+  /** @p frame of the expected mapping's camera size. Error when it has another
+   * one or shows no grating. */
   Result<LiveReading> solve (ImageView<const std::uint8_t> frame);
   Result<LiveReading> solve (ImageView<const std::uint16_t> frame);
 

@@ -76,10 +76,11 @@ check_placement (const Placement &placement, Array array, Extent size)
   if (!placement.region)
     return {};
   const Rect &region = *placement.region;
-  if (region.x > size.width - region.width ||
+  if (region.x < 0 || region.y < 0 || region.width < 1 || region.height < 1 ||
+      region.x > size.width - region.width ||
       region.y > size.height - region.height)
     return Error{"a region of " + size_text ({region.width, region.height}) +
-                 " at +" + std::to_string (region.x) + "+" +
+                 " at " + std::to_string (region.x) + ", " +
                  std::to_string (region.y) + " does not lie within the " +
                  size_text (size) + " mirrors of the array"};
   if (array == Array::diamond && region.y % 2 != 0)

@@ -191,6 +191,10 @@ TEST (Placement, RegionsAreReadAndChecked)
   EXPECT_FALSE (
       check_placement ({MirrorLayout::cell, {}}, Array::orthogonal, {8, 8})
           .ok ());
+  for (const Rect &beyond : {Rect{-2, 0, 4, 4}, {0, -2, 4, 4}, {0, 0, 0, 4}})
+    EXPECT_FALSE (check_placement (
+        {MirrorLayout::address, beyond}, Array::orthogonal, {8, 8})
+                      .ok ());
 }
 
 class RenderedMirrors : public ::testing::TestWithParam<const char *>

@@ -139,6 +139,18 @@ TEST (LiveMoire, SaysWhereThereIsNoGrating)
       "a frame of 20x20 pixels holds less than 8 periods of the live grating");
 }
 
+TEST (LiveMoire, RefusesFramesOfAnotherSize)
+{
+  auto live = LiveMoire::make (Mapping (kSize));
+  for (const Extent size : {Extent{255, 192}, {256, 191}, {64, 48}}) {
+    const Image<std::uint8_t> frame (size.width, size.height);
+    const auto reading = live->solve (frame.view ());
+    ASSERT_FALSE (reading.ok ());
+    EXPECT_NE (reading.error ().message.find ("256x192"), std::string::npos)
+        << reading.error ().message;
+  }
+}
+
 TEST (Calibration, FindsTheMappingToItsStatedUncertainty)
 {
   const std::pair<Alignment, double> benches[] = {

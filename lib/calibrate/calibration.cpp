@@ -10,7 +10,6 @@
 #include "base/statistics.h"
 #include "base/try.h"
 #include "calibrate/displacement_fit.h"
-#include "calibrate/gray_fit.h"
 #include "calibrate/phase_fit.h"
 
 namespace codedexposure
@@ -78,8 +77,6 @@ report (const PhaseFit &fit, CalibrationResult &result)
   ASSIGN_OR_RETURN (result.mapping,
       Mapping::make ({fit.camera, fit.mirrors, fit.mapping.homography (),
           fit.covariance, fit.mapping.displacement (), result.psf_sigma}));
-  result.noise_floor = fit.noise.floor;
-  result.noise_slope = fit.noise.slope;
   result.misfit =
       std::sqrt (0.5 * (reduced_chi_square (fit.blocks_x, fit.noise_ratio) +
                            reduced_chi_square (fit.blocks_y, fit.noise_ratio)));
@@ -166,7 +163,7 @@ try {
     const bool whole = !gratings.empty () &&
                        int (gratings.size ()) == gratings[0]->pattern.period &&
                        gratings.size () >= 4;
-    if (!whole || !made.gray_code (axis) ||
+    if (!whole || !made.has_gray_code (axis) ||
         made.find (Pattern::Kind::dark) == nullptr ||
         made.find (Pattern::Kind::white) == nullptr)
       return Error{"a calibration needs dark, white, the Gray codes of x and y "
@@ -206,7 +203,12 @@ Calibration::add_frame (
                  "x" + std::to_string (frame.height) + " pixels; " +
                  std::to_string (camera_.width) + "x" +
                  std::to_string (camera_.height) + " are expected"};
-  if (slot->frames++ == 0)
+  if (solved_ || (slot->frames > 0 && slot->sum.width () == 0))
+    return Error{"a frame of pattern " + pattern.text () +
+                 " comes after this pattern was evaluated; add all frames of a "
+                 "pattern before those of the next one"};
+  evaluate_pairs (pattern);
+  if (slot->frames == 0)
     slot->sum = Image<float> (camera_.width, camera_.height);
   for (int y = 0; y < frame.height; y++) {
     const Pixel *in = frame.row (y);
@@ -217,6 +219,7 @@ Calibration::add_frame (
       full[x] |= in[x] >= largest;
     }
   }
+  slot->frames++;
   return {};
 }
 
@@ -247,15 +250,6 @@ Calibration::missing () const
   return patterns;
 }
 
-Image<float>
-Calibration::Slot::mean () const
-{
-  Image<float> mean = sum;
-  const float part = 1.0f / float (frames);
-  each_pixel (mean, [&] (int x, int y) { mean.at (x, y) *= part; });
-  return mean;
-}
-
 const Calibration::Slot *
 Calibration::find (Pattern::Kind kind) const
 {
@@ -264,27 +258,55 @@ Calibration::find (Pattern::Kind kind) const
   return at == slots_.end () ? nullptr : &*at;
 }
 
-std::optional<GrayCode>
-Calibration::gray_code (Axis axis) const
+bool
+Calibration::has_gray_code (Axis axis) const
 {
-  GrayCode code;
-  for (int bit = 0;; bit++) {
-    const Slot *pair[2] = {};
+  int bits = 0, width = 1;
+  for (;; bits++) {
+    int pair = 0;
     for (const Slot &slot : slots_)
-      if (slot.pattern.kind == Pattern::Kind::gray &&
-          slot.pattern.axis == axis && slot.pattern.bit == bit)
-        pair[slot.pattern.inverse ? 1 : 0] = &slot;
-    if (pair[0] == nullptr || pair[1] == nullptr)
+      if (const Pattern &pattern = slot.pattern;
+          pattern.kind == Pattern::Kind::gray && pattern.axis == axis &&
+          pattern.bit == bits) {
+        pair |= pattern.inverse ? 1 : 2;
+        width = pattern.period;
+      }
+    if (pair != 3)
       break;
-    code.width = pair[0]->pattern.period;
-    const bool seen = pair[0]->frames > 0 && pair[1]->frames > 0;
-    code.bits.push_back (seen ? difference (pair[0]->mean (), pair[1]->mean ())
-                              : Image<float> ());
   }
   const int size = axis == Axis::x ? mirrors_.width : mirrors_.height;
-  const bool all =
-      !code.bits.empty () && (size - 1) / code.width < 1 << code.bits.size ();
-  return all ? std::optional (std::move (code)) : std::nullopt;
+  return bits > 0 && (size - 1) / width < 1 << bits;
+}
+
+void
+Calibration::evaluate_pairs (const Pattern &pattern)
+{
+  Pattern now = pattern;
+  now.inverse = false;
+  for (Slot &slot : slots_) {
+    if (slot.pattern.kind != Pattern::Kind::gray || slot.pattern.inverse ||
+        slot.pattern == now || slot.sum.width () == 0)
+      continue;
+    Pattern opposite = slot.pattern;
+    opposite.inverse = true;
+    Slot *other = find (opposite);
+    if (other == nullptr || other->frames == 0)
+      continue;
+    const bool along_x = slot.pattern.axis == Axis::x;
+    GrayCode &code = along_x ? gray_x_ : gray_y_;
+    if (code.bits.width () == 0)
+      code.bits = Image<std::uint16_t> (camera_.width, camera_.height);
+    code.width = slot.pattern.period;
+    const float part = 1.0f / float (slot.frames);
+    const float other_part = 1.0f / float (other->frames);
+    const auto bit = std::uint16_t (1u << slot.pattern.bit);
+    each_pixel (code.bits, [&] (int x, int y) {
+      if (slot.sum.at (x, y) * part > other->sum.at (x, y) * other_part)
+        code.bits.at (x, y) |= bit;
+    });
+    slot.sum = {};
+    other->sum = {};
+  }
 }
 
 std::vector<const Calibration::Slot *>
@@ -329,8 +351,8 @@ Calibration::usable_pixels (CalibrationResult &result) const
 Result<Mapping>
 Calibration::coarse_mapping (ImageView<const std::uint8_t> usable) const
 {
-  ASSIGN_OR_RETURN (const Homography coarse,
-      fit_gray_codes (*gray_code (Axis::x), *gray_code (Axis::y), usable));
+  ASSIGN_OR_RETURN (
+      const Homography coarse, fit_gray_codes (gray_x_, gray_y_, usable));
   return Mapping::from_centred (camera_, mirrors_, coarse);
 }
 
@@ -339,7 +361,7 @@ Calibration::coarse_mapping (ImageView<const std::uint8_t> usable) const
 double
 Calibration::gray_difference (Axis axis, const CalibrationResult &result) const
 {
-  const GrayCode code = *gray_code (axis);
+  const GrayCode &code = gray_code (axis);
   double sum = 0.0, pixels = 0.0;
   each_pixel (result.quality, [&] (int x, int y) {
     if (result.quality.at (x, y) != PixelQuality::good)
@@ -357,11 +379,11 @@ Calibration::gray_difference (Axis axis, const CalibrationResult &result) const
 Result<CalibrationResult>
 Calibration::fit () const
 {
-  const Image<float> dark = find (Pattern::Kind::dark)->mean ();
-  const Image<float> white = find (Pattern::Kind::white)->mean ();
+  const Image<float> &dark = find (Pattern::Kind::dark)->sum;
+  const Image<float> &white = find (Pattern::Kind::white)->sum;
   const Image<float> dark_smooth = smoothed (dark);
   const Image<float> white_smooth = smoothed (white);
-  CalibrationResult result = {Mapping (camera_), 0, 0, 0, 0, 0,
+  CalibrationResult result = {Mapping (camera_), 0, 0, 0,
       Image<PixelQuality> (camera_.width, camera_.height),
       difference (white, dark), {}, {}};
   ASSIGN_OR_RETURN (const Image<std::uint8_t> usable, usable_pixels (result));
@@ -370,17 +392,12 @@ Calibration::fit () const
   PhaseFit fit = {camera_, mirrors_, {}, {}, usable.view (),
       dark_smooth.view (), white_smooth.view (), start};
   fit.block_size = CalibrationResult::kBlock;
-  std::vector<Image<float>> frames;
   fit.frames = std::numeric_limits<int>::max ();
   for (const Axis axis : {Axis::x, Axis::y})
     for (const Slot *slot : gratings (axis)) {
-      frames.push_back (slot->mean ());
+      (axis == Axis::x ? fit.x : fit.y).frames.push_back (slot->sum.view ());
       fit.frames = std::min (fit.frames, slot->frames);
     }
-  const std::size_t of_x = gratings (Axis::x).size ();
-  for (std::size_t i = 0; i < frames.size (); i++)
-    (i < of_x ? fit.x : fit.y)
-        .frames.push_back (std::as_const (frames[i]).view ());
 
   RETURN_IF_ERROR (converge (fit));
   result.residual_x = shifts_of (fit, fit.blocks_x);
@@ -393,12 +410,19 @@ Calibration::fit () const
 }
 
 Result<CalibrationResult>
-Calibration::solve () const
+Calibration::solve ()
 try {
   if (const auto patterns = missing (); !patterns.empty ())
     return Error{std::to_string (patterns.size ()) +
                  " patterns of the calibration have no frame, the first is " +
                  patterns.front ().text () + "; add their frames"};
+  if (solved_)
+    return Error{"a calibration is solved once; make another one"};
+  solved_ = true;
+  evaluate_pairs ({});
+  for (Slot &slot : slots_)
+    each_pixel (slot.sum, [&slot, part = 1.0f / float (slot.frames)] (
+                              int x, int y) { slot.sum.at (x, y) *= part; });
   return fit ();
 } catch (const std::bad_alloc &) {
   return out_of_memory ();

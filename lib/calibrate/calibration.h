@@ -10,6 +10,7 @@
 #include "base/image.h"
 #include "base/result.h"
 #include "calibrate/gratings.h"
+#include "calibrate/gray_fit.h"
 #include "mapping/mapping.h"
 
 namespace codedexposure
@@ -29,9 +30,6 @@ struct CalibrationResult {
   /** Blur between mirrors and pixels, standard deviation in pixels of a
    * Gaussian that explains the gratings. */
   double psf_sigma = 0.0;
-  /** Variance of a pixel with the value N: noise_floor + noise_slope N. */
-  double noise_floor = 0.0;
-  double noise_slope = 0.0;
   /** Root of the reduced chi-square of the mean residuals of blocks: 1 if the
    * mapping explains everything but noise. */
   double misfit = 0.0;
@@ -48,8 +46,6 @@ struct CalibrationResult {
 
   std::uint64_t pixels (PixelQuality what) const;
 };
-
-struct GrayCode;
 
 /**
  * Collects the frames of a calibration run, then solves.
@@ -68,7 +64,9 @@ public:
   static Result<Calibration> make (
       Extent camera, Extent mirrors, std::span<const Pattern> patterns);
   /** Frame of @p pattern, of the camera's size; several frames of the same
-   * pattern are averaged. Error for a pattern of another run. */
+   * pattern are averaged. Those of a Gray code and of its inverse come one
+   * after the other: of a pair, only a bit of each pixel is kept. Error for a
+   * pattern of another run, and for a frame that comes too late. */
   Result<void> add (
       const Pattern &pattern, ImageView<const std::uint8_t> frame);
   Result<void> add (
@@ -76,24 +74,25 @@ public:
   /** Patterns without a frame. */
   std::vector<Pattern> missing () const;
 
-  /** Takes seconds. Error when frames are missing or show no mirrors. */
-  Result<CalibrationResult> solve () const;
+  /** Takes seconds, and uses the frames up. Error when frames are missing or
+   * show no mirrors. */
+  Result<CalibrationResult> solve ();
 
 private:
   struct Slot {
     Pattern pattern;
-    Image<float> sum;
+    Image<float> sum; ///< empty: no frame, or it is not needed any more
     int frames = 0;
-
-    Image<float> mean () const;
   };
 
   Calibration (Extent camera, Extent mirrors);
   Slot *find (const Pattern &pattern);
   /** The first one; null if there is none. */
   const Slot *find (Pattern::Kind kind) const;
-  /** None if a bit is missing. Bits whose patterns have no frames are empty. */
-  std::optional<GrayCode> gray_code (Axis axis) const;
+  /** Whether all bits of the Gray code of @p axis are there, with inverses. */
+  bool has_gray_code (Axis axis) const;
+  /** Keeps the bits of pairs that are complete, but for that of @p pattern. */
+  void evaluate_pairs (const Pattern &pattern);
   /** Sorted by phase. */
   std::vector<const Slot *> gratings (Axis axis) const;
   template <typename Pixel>
@@ -103,9 +102,15 @@ private:
   Result<Mapping> coarse_mapping (ImageView<const std::uint8_t> usable) const;
   double gray_difference (Axis axis, const CalibrationResult &result) const;
   Result<CalibrationResult> fit () const;
+  const GrayCode &gray_code (Axis axis) const
+  {
+    return axis == Axis::x ? gray_x_ : gray_y_;
+  }
 
   Extent camera_, mirrors_;
-  std::vector<Slot> slots_;
+  std::vector<Slot> slots_; ///< their sums are means in fit ()
+  GrayCode gray_x_, gray_y_;
+  bool solved_ = false;
   Image<std::uint8_t> saturated_;
 };
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "calibrate/homography_fit.h"
 
@@ -58,11 +59,9 @@ start_of (const std::vector<Sample> &samples)
 double
 GrayCode::mirror_at (int x, int y) const
 {
-  int stripe = 0, above = 0;
-  for (std::size_t bit = bits.size (); bit-- > 0;) {
-    above ^= bits[bit].at (x, y) > 0.0f ? 1 : 0;
-    stripe = 2 * stripe + above;
-  }
+  int stripe = bits.at (x, y);
+  for (const int shift : {8, 4, 2, 1})
+    stripe ^= stripe >> shift;
   return (stripe + 0.5) * width - 0.5;
 }
 

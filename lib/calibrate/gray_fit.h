@@ -4,7 +4,7 @@
  */
 #pragma once
 
-#include <vector>
+#include <cstdint>
 
 #include "base/image.h"
 #include "base/result.h"
@@ -13,11 +13,11 @@
 namespace codedexposure
 {
 
-/** The frames of the Gray code of one axis. */
+/** What pixels see of the Gray code of one axis. */
 struct GrayCode {
   int width = 1; ///< of a stripe, mirrors
-  /** Of each bit, the finest first: frame minus frame of the inverse. */
-  std::vector<Image<float>> bits;
+  /** Bit 0 is the finest: whether the frame is brighter than its inverse. */
+  Image<std::uint16_t> bits = {};
 
   /** Centre of the stripe that a pixel sees, in mirrors. */
   double mirror_at (int x, int y) const;

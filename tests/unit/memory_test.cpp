@@ -6,10 +6,13 @@
 #include <new>
 
 #include <dlfcn.h>
+#include <malloc.h>
+
 #include <gtest/gtest.h>
 #include <xxhash.h>
 
 #include "base/workers.h"
+#include "calibrate/calibration.h"
 #include "dmd/runner.h"
 #include "extract/extractor.h"
 #include "fuse/fuser.h"
@@ -22,6 +25,8 @@ namespace
 
 /** Allocations that still succeed, in all threads together. */
 std::atomic<long> left = std::numeric_limits<long>::max ();
+/** Bytes that are allocated. */
+std::atomic<std::size_t> held = 0;
 
 void *
 allocate (std::size_t size)
@@ -29,7 +34,15 @@ allocate (std::size_t size)
   void *memory = left-- > 0 ? std::malloc (size > 0 ? size : 1) : nullptr;
   if (!memory)
     throw std::bad_alloc ();
+  held += malloc_usable_size (memory);
   return memory;
+}
+
+void
+release (void *memory)
+{
+  held -= malloc_usable_size (memory);
+  std::free (memory);
 }
 
 } // namespace
@@ -56,22 +69,22 @@ operator new (std::size_t size, const std::nothrow_t &) noexcept
 void
 operator delete (void *memory) noexcept
 {
-  std::free (memory);
+  release (memory);
 }
 void
 operator delete[] (void *memory) noexcept
 {
-  std::free (memory);
+  release (memory);
 }
 void
 operator delete (void *memory, std::size_t) noexcept
 {
-  std::free (memory);
+  release (memory);
 }
 void
 operator delete[] (void *memory, std::size_t) noexcept
 {
-  std::free (memory);
+  release (memory);
 }
 
 /** In place of the library's, which calls malloc (). */
@@ -126,6 +139,38 @@ turned_mapping ()
       .mirrors = {kWidth, kHeight},
       .homography = {1.0, 0.01, 0.2, -0.01, 1.0, 0.1, 0.0, 0.0, 1.0}});
   return made.value ();
+}
+
+TEST (Memory, ACalibrationGoesOnAfterAFrameThatDidNotFit)
+{
+  constexpr Extent kSize{64, 48};
+  const auto patterns = calibration_patterns (kSize);
+  auto run = Calibration::make (kSize, kSize, patterns);
+  ASSERT_TRUE (run);
+  const Image<std::uint8_t> frame (kSize.width, kSize.height);
+  for (const Pattern &pattern : patterns)
+    expect_errors_until_enough (
+        [&] { return run->add (pattern, frame.view ()); });
+  EXPECT_TRUE (run->missing ().empty ());
+}
+
+TEST (Memory, GrayCodesOfACalibrationTakeABitOfAPixel)
+{
+  constexpr Extent kCamera{256, 192}, kMirrors{8192, 8192};
+  const auto patterns = calibration_patterns (kMirrors);
+  auto run = Calibration::make (kCamera, kMirrors, patterns);
+  ASSERT_TRUE (run);
+  const Image<std::uint8_t> frame (kCamera.width, kCamera.height);
+  const std::size_t before = held;
+  int codes = 0;
+  for (const Pattern &pattern : patterns)
+    if (pattern.kind == Pattern::Kind::gray) {
+      ASSERT_TRUE (run->add (pattern, frame.view ()));
+      codes++;
+    }
+  ASSERT_GE (codes, 40);
+  const std::size_t floats = sizeof (float) * 256 * 192;
+  EXPECT_LT (held - before, 4 * floats);
 }
 
 /* JSON takes no part, and neither do regions, whose JSON is measured:

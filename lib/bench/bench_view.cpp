@@ -6,6 +6,7 @@
 #include <numbers>
 #include <vector>
 
+#include "base/statistics.h"
 #include "base/try.h"
 
 namespace codedexposure
@@ -88,7 +89,7 @@ blurred (const Image<float> &from, double sigma, bool upright)
     weights.push_back (float (std::exp (-0.5 * i * i / (sigma * sigma)) / sum));
   const Extent size{from.width (), from.height ()};
   Image<float> to (size.width, size.height);
-  for_each_pixel (size, [&] (int x, int y) {
+  each_pixel (size, [&] (int x, int y) {
     float all = 0.0f;
     for (int i = -reach; i <= reach; i++) {
       const int px = upright ? x : std::clamp (x + i, 0, size.width - 1);
@@ -150,7 +151,7 @@ blur_with_tilt (const SickBenchOptions &options, Image<float> &seen)
     const double low = kStep * (step - 1), high = kStep * step;
     const Image<float> more =
         blurred (blurred (sharp, high, false), high, true);
-    for_each_pixel (options.camera, [&] (int x, int y) {
+    each_pixel (options.camera, [&] (int x, int y) {
       const double sigma = sigma_at (x, y);
       if (sigma < low || sigma > high)
         return;

@@ -17,16 +17,6 @@ centre_of (Extent size)
   return {0.5 * (size.width - 1), 0.5 * (size.height - 1)};
 }
 
-/** Calls @p function with all places, row after row. */
-template <typename Function>
-void
-for_each_pixel (Extent size, Function function)
-{
-  for (int y = 0; y < size.height; y++)
-    for (int x = 0; x < size.width; x++)
-      function (x, y);
-}
-
 /** Camera pixel to mirror: orientation, then alignment, about the centres of
  * camera and array. Fails where a number is out of its range. */
 Result<Mapping> mapping_of (const SickBenchOptions &options);

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "base/pixels.h"
+#include "base/statistics.h"
 #include "base/try.h"
 #include "bench/bench_view.h"
 #include "bench/random.h"
@@ -99,7 +100,7 @@ SickBench::find_view ()
   const Extent mirrors = options_.mirrors;
   const double margin = 16.0 + 6.0 * options_.blur;
   double left = 1e9, top = 1e9, right = -1e9, bottom = -1e9;
-  for_each_pixel (options_.camera, [&] (int x, int y) {
+  each_pixel (options_.camera, [&] (int x, int y) {
     if (x % (width - 1) != 0 && y % (height - 1) != 0)
       return;
     const Position at = mapping_.mirror_at (x, y);
@@ -211,7 +212,7 @@ Image<float>
 SickBench::mirrors_of (const MirrorProgram::Mask &mask) const
 {
   Image<float> mirrors (view_.width, view_.height);
-  for_each_pixel ({view_.width, view_.height}, [&] (int x, int y) {
+  each_pixel (Extent{view_.width, view_.height}, [&] (int x, int y) {
     const int mx = x + view_.x, my = y + view_.y;
     const bool known = mx < mask->width () && my < mask->height ();
     mirrors.at (x, y) = known && mask->at (mx, my) != 0 ? 1.0f : 0.0f;
@@ -270,15 +271,15 @@ SickBench::measure_field ()
   const auto none =
       std::make_shared<Image<std::uint8_t>> (size.width, size.height);
   const auto all = std::make_shared<Image<std::uint8_t>> (*none);
-  for_each_pixel (size, [&] (int x, int y) { all->at (x, y) = 1; });
+  each_pixel (size, [&] (int x, int y) { all->at (x, y) = 1; });
   Image<float> bare (view_.width, view_.height);
-  for_each_pixel ({view_.width, view_.height},
+  each_pixel (Extent{view_.width, view_.height},
       [&] (int x, int y) { bare.at (x, y) = 1.0f; });
   look (bare, leaked_);
   look (mirrors_of (all), on_);
   look (mirrors_of (none), off_);
   const float leak = float (options_.leak);
-  for_each_pixel (options_.camera, [&] (int x, int y) {
+  each_pixel (options_.camera, [&] (int x, int y) {
     const float passed = passed_by (x, y, dust);
     field_.at (x, y) = passed * (1.0f - leak);
     leaked_.at (x, y) *= passed * leak;
@@ -528,7 +529,7 @@ SickBench::read_out (const Shot &shot, ImageView<std::uint16_t> picture)
   const auto kept = std::uint16_t (~0u << options_.missing_bits);
   if (table.empty () && options_.missing_bits == 0)
     return;
-  for_each_pixel (options_.camera, [&] (int x, int y) {
+  each_pixel (options_.camera, [&] (int x, int y) {
     std::uint16_t &pixel = picture.at (x, y);
     pixel = kept & (table.empty () ? pixel : table[pixel]);
   });

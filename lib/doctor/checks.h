@@ -2,6 +2,7 @@
 /* The checks of a bench, in their order. */
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -10,6 +11,7 @@
 
 #include "base/try.h"
 #include "doctor/finding.h"
+#include "doctor/light_fit.h"
 #include "doctor/rig.h"
 
 namespace codedexposure
@@ -38,6 +40,8 @@ struct Examination {
   Lit inside = {};
   /** Of the exposure's start, s rms; measured by the check of the trigger. */
   double jitter = 0.0;
+  /** How the light changes; measured by the check of the trigger. */
+  std::optional<LightFit> light = {};
   /** What the bench is to record, and for how many seconds the check of the
    * whole does. */
   Schedule schedule = {};
@@ -68,6 +72,11 @@ with_exposure (Examination &examination, Nanoseconds time, Use use)
   RETURN_IF_ERROR (rig.watch (examination.lag));
   return done;
 }
+
+/** A number that could not be measured. */
+inline constexpr Measured kNotMeasured{
+    std::numeric_limits<double>::quiet_NaN (),
+    std::numeric_limits<double>::quiet_NaN ()};
 
 /** Every mirror on in slots [first, first + count) of an exposure. */
 StillMask lit (int first, int count);

@@ -13,27 +13,29 @@
 namespace codedexposure
 {
 
-namespace
-{
-
 bool
-is_known (const Measured &number)
+is_finite (const Measured &number)
 {
   return std::isfinite (number.value) && std::isfinite (number.sigma);
 }
-
-} // namespace
 
 Verdict
 Finding::verdict () const
 {
   Verdict worst = Verdict::pass;
   for (const Reading &reading : readings)
-    if (!is_known (reading.number))
+    if (!is_finite (reading.number))
       worst = Verdict::unknown;
   for (const Diagnosis &diagnosis : diagnoses)
     worst = std::max (worst, diagnosis.severity);
   return worst;
+}
+
+bool
+Finding::is_ill () const
+{
+  return std::ranges::any_of (diagnoses,
+      [] (const Diagnosis &each) { return each.severity >= Verdict::warn; });
 }
 
 const Reading *
@@ -82,11 +84,16 @@ Finding::judge (
 {
   const Rule &rule = rule_of (name);
   const Verdict verdict = verdict_of (name, number);
-  if (verdict < Verdict::warn || *rule.id == 0)
+  if (verdict == Verdict::pass || *rule.id == 0)
     return verdict;
   std::string text = cause.empty () ? rule.cause : cause;
   if (const std::size_t at = text.find ("{}"); at != text.npos)
     text.replace (at, 2, codedexposure::shown (number.value));
+  if (verdict == Verdict::unknown)
+    text = std::string (*rule.reading == 0 ? rule.id : rule.reading) + " is " +
+           codedexposure::shown (number.value) + " +- " +
+           codedexposure::shown (number.sigma) + " " + rule.unit +
+           ", too uncertain to tell whether it is " + text_of (rule.good);
   blame (rule.id, std::move (text), verdict, rule.remedy);
   return verdict;
 }
@@ -101,16 +108,25 @@ Finding::sort ()
 Verdict
 verdict_of (std::string_view name, const Measured &number)
 {
-  if (!is_known (number))
+  if (!is_finite (number))
     return Verdict::unknown;
+  const double low = number.value - 2.0 * number.sigma;
+  const double high = number.value + 2.0 * number.sigma;
   const auto breaks = [&] (const Limits &limits) {
-    return number.value - 2.0 * number.sigma > limits.high ||
-           number.value + 2.0 * number.sigma < limits.low;
+    return low > limits.high || high < limits.low;
   };
   const Rule &rule = rule_of (name);
-  return !breaks (rule.good)      ? Verdict::pass
-         : breaks (rule.bearable) ? Verdict::fail
-                                  : Verdict::warn;
+  if (breaks (rule.good))
+    return breaks (rule.bearable) ? Verdict::fail : Verdict::warn;
+  /* What never fails is good only if it surely is. */
+  const auto limit = [] (double bearable, double good) {
+    return std::isinf (bearable) ? good : bearable;
+  };
+  const bool sure = low >= limit (rule.bearable.low, rule.good.low) &&
+                    high <= limit (rule.bearable.high, rule.good.high);
+  return sure && number.value >= rule.good.low && number.value <= rule.good.high
+             ? Verdict::pass
+             : Verdict::unknown;
 }
 
 const char *

@@ -28,9 +28,10 @@ struct Reading {
 struct Diagnosis {
   /** Names the cause, as in docs/doctor.md, such as "trigger-edge". */
   std::string id;
-  Verdict severity = Verdict::fail; ///< warn or fail
-  std::string cause;                ///< one sentence with what was seen
-  std::string remedy;               ///< the one thing to try next
+  /** warn or fail; unknown: whether it is so cannot be told. */
+  Verdict severity = Verdict::fail;
+  std::string cause;  ///< one sentence with what was seen
+  std::string remedy; ///< the one thing to try next
 };
 
 /** Points of a curve, in the order in which they are joined. */
@@ -63,6 +64,8 @@ struct Finding {
   /** The worst of the diagnoses; unknown if there is none, but a reading that
    * is no finite number. */
   Verdict verdict () const;
+  /** Whether a diagnosis says that something is wrong. */
+  bool is_ill () const;
   /** Null if there is none of that name. */
   const Reading *reading (std::string_view name) const;
 
@@ -71,11 +74,8 @@ struct Finding {
   /** Adds a diagnosis, with the remedy of rules.cpp if there is no other. */
   void blame (std::string_view id, std::string cause,
       Verdict severity = Verdict::fail, std::string remedy = {});
-  /**
-   * Judges @p number by the rule @p name of rules.cpp, and adds the diagnosis
-   * if it breaks it by more than twice its standard deviation. @p cause: in
-   * place of that of the rule.
-   */
+  /** Adds the diagnosis of the rule @p name unless verdict_of () passes.
+   * @p cause: of what is wrong, in place of that of the rule. */
   Verdict judge (std::string_view name, const Measured &number,
       const std::string &cause = {});
   /** add () and judge (). */
@@ -89,9 +89,14 @@ struct Finding {
   void sort ();
 };
 
-/** pass, warn or fail by the rule @p name; unknown if @p number is not finite.
+/**
+ * What the rule @p name of rules.cpp says of @p number: warn or fail if it is
+ * beyond the limits by twice its standard deviation; pass if it is within them,
+ * and within those of a failure by as much. Else it is unknown.
  */
 Verdict verdict_of (std::string_view name, const Measured &number);
+
+bool is_finite (const Measured &number);
 
 /** "PASS", "UNKNOWN", "WARN", "FAIL" */
 const char *verdict_text (Verdict verdict);

@@ -13,7 +13,6 @@ namespace codedexposure
 namespace
 {
 
-constexpr double kPeak = 0.995;
 /** Part of the differences of neighbours that are hot or dead pixels, dust and
  * borders of the mirrors at most. */
 constexpr double kOdd = 0.02;
@@ -57,7 +56,6 @@ level_of (ImageView<const std::uint16_t> picture, int largest)
   const double pixels = double (picture.width) * picture.height;
   for (std::size_t i = 0; i < counts.size (); i++)
     level.mean += double (i) * counts[i] / pixels;
-  level.peak = quantile (counts, kPeak);
   level.saturated = counts.back () / pixels;
   const int usual = quantile (differences, 1.0 - kOdd);
   double squares = 0.0, number = 0.0;

@@ -15,7 +15,6 @@ struct Level {
   /** Standard deviation of a pixel against its neighbour. A few pixels that
    * are far off do not count. */
   double noise = 0.0;
-  double peak = 0.0;      ///< 99.5 % of the pixels are not above it
   double saturated = 0.0; ///< part of the pixels at the largest DN
   /** Bits that are set in any pixel. */
   std::uint16_t bits_seen = 0;

@@ -26,7 +26,11 @@ constexpr double kOutlier = 6.0, kOtherMask = 1.0 / 64.0;
 /** Squares that a line must explain, in those of noise: there are many thousand
  * frequencies to choose from. */
 constexpr double kSurprise = 80.0;
-constexpr double kTiny = 1e-12; // DN^2
+constexpr double kTiny = 1e-12;                      // DN^2
+constexpr int kLines = 2;                            // at most
+constexpr double kSlowest = 0.15, kFastest = 1200.0; // Hz
+/** Weaker lines are those of noise, as a part of the light. */
+constexpr double kFaintest = 5e-4;
 
 /** A number of a model that is fitted, and a step for its derivative: into the
  * runs that begin or end with the exposure. */
@@ -39,8 +43,7 @@ struct Unknown {
 class Fit
 {
 public:
-  Fit (std::span<const LightSample> samples, LightModel model,
-      const LightQuestion &question);
+  Fit (std::span<const LightSample> samples, LightModel model);
   LightFit run ();
 
 private:
@@ -70,16 +73,14 @@ private:
   /** Samples of each run: they share what is wrong with it. */
   std::vector<std::vector<Index>> runs_;
   LightModel model_;
-  LightQuestion question_;
   VectorXd weights_; // 0: left out
   double epoch_ = 0.0, span_ = 0.0;
   double missed_ = 0.0; // depth of the last line that was looked for
 };
 
-Fit::Fit (std::span<const LightSample> samples, LightModel model,
-    const LightQuestion &question)
+Fit::Fit (std::span<const LightSample> samples, LightModel model)
     : samples_ (samples.begin (), samples.end ()), model_ (std::move (model)),
-      question_ (question), weights_ (VectorXd::Ones (Index (samples.size ())))
+      weights_ (VectorXd::Ones (Index (samples.size ())))
 {
   const auto [first, last] =
       std::ranges::minmax (samples_, {}, &LightSample::time);
@@ -104,11 +105,9 @@ Fit::unknowns (LightModel &model) const
       {&model.gain, 1e-3 * std::abs (model.gain) + 1e-9}, {&model.drift, 1e-6}};
   for (double &offset : model.offsets)
     all.push_back ({&offset, 1e-3});
-  if (question_.window) {
-    all.push_back ({&model.start, 1e-6 * model.period});
-    for (double &length : model.lengths)
-      all.push_back ({&length, -1e-6 * model.period});
-  }
+  all.push_back ({&model.start, 1e-6 * model.period});
+  for (double &length : model.lengths)
+    all.push_back ({&length, -1e-6 * model.period});
   for (LightLine &line : model.lines) {
     all.push_back ({&line.frequency, 1e-3 / span_});
     all.push_back ({&line.cosine, 1e-6});
@@ -122,8 +121,7 @@ Fit::unknowns (LightModel &model) const
 void
 Fit::obey (LightModel &model) const
 {
-  if (question_.window)
-    model.start = std::max (model.start, 0.0);
+  model.start = std::max (model.start, 0.0);
   for (LightLine &line : model.lines)
     if (const double depth = line.depth (); depth > 1.0) {
       line.cosine /= depth;
@@ -263,10 +261,9 @@ Fit::add_line (std::vector<Position> *spectrum)
   const Minimum before = solve (false);
   search.residual = before.residuals / model_.gain;
   search.others = before.slopes;
-  const LightLine line =
-      search.strongest (question_.slowest, question_.fastest, spectrum);
+  const LightLine line = search.strongest (kSlowest, kFastest, spectrum);
   missed_ = line.depth ();
-  if (line.depth () < question_.faintest)
+  if (line.depth () < kFaintest)
     return false;
 
   const LightModel without = model_;
@@ -373,8 +370,7 @@ Fit::remember (LightFit &fit)
     return Measured{value, std::sqrt (spread (p, p))};
   };
   const auto edge = [&] (double value, Index p) {
-    return question_.window ? known (value, 2 + exposures + p)
-                            : Measured{value, 0.0};
+    return known (value, 2 + exposures + p);
   };
   fit.model = model_;
   fit.epoch = epoch_;
@@ -393,9 +389,8 @@ Fit::remember (LightFit &fit)
   }
   std::ranges::sort (fit.lines, std::ranges::greater (),
       [] (const LightFit::Line &line) { return line.depth.value; });
-  fit.faintest = std::clamp (missed_, question_.faintest, 1.0);
-  if (question_.window)
-    fit.jitter = jitter ();
+  fit.faintest = std::clamp (missed_, kFaintest, 1.0);
+  fit.jitter = jitter ();
 }
 
 LightFit
@@ -403,16 +398,14 @@ Fit::run ()
 {
   LightFit fit;
   match (model_);
-  if (question_.window)
-    scan_window ();
+  scan_window ();
   solve (true);
   weigh ();
-  for (int line = 0; line < question_.lines; line++) {
+  for (int line = 0; line < kLines; line++) {
     if (!add_line (line == 0 ? &fit.spectrum : nullptr))
       break;
     weigh ();
-    if (question_.window)
-      scan_window ();
+    scan_window ();
     solve (true);
   }
   weigh ();
@@ -424,12 +417,11 @@ Fit::run ()
 } // namespace
 
 LightFit
-fit_light (std::span<const LightSample> samples, const LightModel &guess,
-    const LightQuestion &question)
+fit_light (std::span<const LightSample> samples, const LightModel &guess)
 {
   if (samples.empty ())
     return {.model = guess};
-  return Fit (samples, guess, question).run ();
+  return Fit (samples, guess).run ();
 }
 
 } // namespace codedexposure

@@ -2,20 +2,12 @@
 /* What the light of frames says of the exposure and of the lamp. */
 #pragma once
 
+#include <span>
+
 #include "doctor/light_model.h"
 
 namespace codedexposure
 {
-
-/** What to find. */
-struct LightQuestion {
-  /** Find start and lengths, too; else they are known. */
-  bool window = true;
-  int lines = 3;                          ///< at most
-  double slowest = 0.5, fastest = 1200.0; ///< lines, Hz
-  /** Weaker lines are those of noise, as a part of the light. */
-  double faintest = 5e-4;
-};
 
 /** A model and how well it is known. */
 struct LightFit {
@@ -39,12 +31,13 @@ struct LightFit {
 /**
  * Fits by least squares over all samples: for runs that the exposure cuts,
  * light is lost; lines show in runs at different times of the cycle, because
- * the frames alone see each frequency as one below half of their rate.
+ * the frames alone see each frequency as one below half of their rate. Lines
+ * are those of 0.15 to 1200 Hz, two at most.
  *
  * @p guess  period; start and lengths to a tenth of a period. gain, drift,
  *           offsets and lines are not read.
  */
-LightFit fit_light (std::span<const LightSample> samples,
-    const LightModel &guess, const LightQuestion &question = {});
+LightFit fit_light (
+    std::span<const LightSample> samples, const LightModel &guess);
 
 } // namespace codedexposure

@@ -40,6 +40,7 @@ private:
   void diagnose_stuck (
       const std::string &what, const std::vector<DefectSpot> &spots);
   Result<void> see_switching ();
+  void diagnose_early (const Measured &switching);
 
   Examination &examination_;
   Finding finding_ = {"mirrors",
@@ -125,7 +126,25 @@ MirrorRun::see_switching ()
     plot.points.push_back ({1e3 * point.time, point.light});
   finding_.plots.push_back (std::move (plot));
   finding_.measure ("switching time", scaled (*time, 1e6));
+  diagnose_early (*time);
   return {};
+}
+
+/* Mirrors that take @p switching, s, make the exposure look early by half of
+ * that. */
+void
+MirrorRun::diagnose_early (const Measured &switching)
+{
+  constexpr double kEarly = 100e-6; // s
+  const auto &delay = examination_.profile.trigger_delay;
+  if (!delay)
+    return;
+  const double early = -1e-9 * delay->value - 0.5 * switching.value;
+  if (early > kEarly + 2.0 * std::hypot (1e-9 * delay->sigma, switching.sigma))
+    finding_.blame ("trigger-edge",
+        "the exposure begins " + fixed (1e6 * early, 0) +
+            " us before the trigger, as it does with the end of a pulse in the "
+            "period before");
 }
 
 void

@@ -235,7 +235,7 @@ OpticsRun::report_share ()
       width < 1.02 * mirrors_.width && height < 1.02 * mirrors_.height;
   const bool centred =
       std::hypot (lens_->shift_x.value, lens_->shift_y.value) < kCentred;
-  if (fits && centred && !finding_.diagnoses.empty ())
+  if (fits && centred && finding_.is_ill ())
     return; // what was found explains it
   if (fits)
     finding_.judge ("shift", share,
@@ -305,7 +305,7 @@ OpticsRun::diagnose_no_mapping (const Error &why)
         "blur", "gratings of " + std::to_string (kPeriod) +
                     " mirrors vanish: the picture is out of focus");
   diagnose_blur ();
-  if (finding_.diagnoses.empty ())
+  if (!finding_.is_ill ())
     finding_.blame ("mapping", "the patterns give no mapping: " + why.message);
 }
 
@@ -367,7 +367,7 @@ OpticsRun::run ()
   if (lens_)
     diagnose_pose ();
   report_share ();
-  if (result_ && finding_.diagnoses.empty ())
+  if (result_ && !finding_.is_ill ())
     finding_.judge ("mapping", {result_->gray_difference, 0.0});
   diagnose_dust ();
   finding_.sort ();

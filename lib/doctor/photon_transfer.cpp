@@ -79,6 +79,9 @@ fit_photon_transfer (const std::vector<TransferPoint> &points)
   found.bow = response.factors[2] / (most * most);
   found.bow_sigma = std::sqrt (response.covariance (2, 2)) / (most * most);
 
+  if (!(found.slope + 2.0 * std::min (0.0, found.bow) * most > 0.0))
+    return std::nullopt; // no response decreases
+
   /* An electron counts more or less where the response is steep or flat. */
   for (const TransferPoint &point : points) {
     if (!point.variance)

@@ -52,7 +52,7 @@ struct PhotonTransfer {
 /**
  * A parabola through the means; and a line through the variances over the
  * light, where each electron counts the same. None with fewer than four points
- * that have a variance, or if noise does not grow with light.
+ * that have a variance, or if means or noise do not grow with light.
  */
 std::optional<PhotonTransfer> fit_photon_transfer (
     const std::vector<TransferPoint> &points);

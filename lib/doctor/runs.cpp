@@ -11,35 +11,31 @@
 namespace codedexposure
 {
 
-Result<RunFrames>
+Result<void>
 Runs::see (const StillMask &mask, int exposure, int frames)
 {
-  RunFrames seen;
-  ASSIGN_OR_RETURN (seen.frames, look (examination_, mask, grid_, frames));
-  std::erase_if (seen.frames, &SeenFrame::damaged);
-  const double count = double (seen.frames.size ());
-  for (const SeenFrame &frame : seen.frames) {
+  ASSIGN_OR_RETURN (const auto seen, look (examination_, mask, grid_, frames));
+  for (const SeenFrame &frame : seen) {
+    if (frame.damaged)
+      continue;
     const Level level =
         level_of (frame.picture.view (), examination_.rig.parts ().largest ());
     bits_seen |= level.bits_seen;
     const int step = bits_seen ? bits_seen & -bits_seen : 1; // DN
-    seen.mean += level.mean / count;
-    seen.peak += level.peak / count;
     samples.push_back ({1e-9 * double (frame.time), mask.first * slot (),
         (mask.first + mask.slots) * slot (), level.mean,
         rounding_doubt (level.noise, step), exposure});
   }
-  return seen;
+  return {};
 }
 
-Result<RunFrames>
-Runs::see_one (
-    int number, int first, int slots, double scale, int exposure, int frames)
+Result<void>
+Runs::see_one (int number, int first, int slots, int exposure, int frames)
 {
   using std::numbers::phi, std::numbers::sqrt2;
   const auto part = [] (double turns) { return turns - std::floor (turns); };
   const int count =
-      std::clamp (int (scale * grid_ * (1.0 + part (number * sqrt2)) / 16.0), 1,
+      std::clamp (int (grid_ * (1.0 + part (number * sqrt2)) / 16.0), 1,
           std::max (1, slots - 1));
   const int room = slots - count;
   const int place = int (part ((number + 1) * phi) * (room + 1));

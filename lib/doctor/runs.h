@@ -10,12 +10,6 @@
 namespace codedexposure
 {
 
-/** What was seen of a mask. */
-struct RunFrames {
-  std::vector<SeenFrame> frames = {}; ///< without those that are damaged
-  double mean = 0.0, peak = 0.0;      ///< of their levels, in the mean
-};
-
 /** Shows runs of slots, of which a cycle has a number, and keeps a sample of
  * each frame. */
 class Runs
@@ -29,15 +23,15 @@ public:
   double slot () const { return examination_.rig.parts ().period () / grid_; }
   int grid () const { return grid_; }
   /** Frames of @p mask; @p exposure: of the samples. */
-  Result<RunFrames> see (const StillMask &mask, int exposure, int frames);
+  Result<void> see (const StillMask &mask, int exposure, int frames);
   /**
    * A run somewhere in slots [@p first, @p first + @p slots). Places and
    * lengths are spread evenly over @p number = 0, 1, ..., and their order is
-   * not that of time, so that no frequency hides. @p scale: of lengths of 1/16
-   * to 1/8 of the cycle.
+   * not that of time, so that no frequency hides. They have 1/16 to 1/8 of the
+   * cycle.
    */
-  Result<RunFrames> see_one (
-      int number, int first, int slots, double scale, int exposure, int frames);
+  Result<void> see_one (
+      int number, int first, int slots, int exposure, int frames);
 
   std::vector<LightSample> samples = {};
   int bits_seen = 0; ///< in any pixel value

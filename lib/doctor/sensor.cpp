@@ -118,6 +118,7 @@ private:
   std::optional<Dark> dithered_; // where rounding hides the dark
   std::optional<PhotonTransfer> transfer_;
   Measured black_;
+  Measured linearity_;            // % of the range
   std::optional<double> plateau_; // DN of a full well below the largest DN
 };
 
@@ -321,21 +322,25 @@ PhotonTransferRun::report ()
   /* Flicker makes a bow, too. */
   const Measured linearity = {
       bow.value / range, std::hypot (kLightError, bow.sigma / range)};
-  profile.conversion_gain = gain;
-  profile.full_well = full_well;
-  profile.read_noise = transfer_->read_noise;
-  profile.black_level = black_;
-  profile.linearity_error = linearity;
-  const bool known = gain.sigma < kUnknown * gain.value;
-  if (!known)
-    profile.conversion_gain = profile.full_well = profile.read_noise = {};
-  if (!known || off_.shorter.zeros > kZeros || missing_bits () > 0)
-    profile.read_noise = profile.black_level = {};
+  const bool known =
+      std::isfinite (gain.value) && gain.sigma < kUnknown * gain.value;
+  const bool floor =
+      known && off_.shorter.zeros <= kZeros && missing_bits () == 0;
+  const auto keep = [] (bool is_known, const Measured &number) {
+    return is_known && is_finite (number) ? std::optional (number)
+                                          : std::nullopt;
+  };
+  profile.conversion_gain = keep (known, gain);
+  profile.full_well = keep (known, full_well);
+  profile.read_noise = keep (floor, transfer_->read_noise);
+  profile.black_level = keep (floor, black_);
+  profile.linearity_error = keep (true, linearity);
   finding_.readings = {
       {"conversion gain", gain, "e-/DN"}, {"full well", full_well, "e-"}};
   finding_.add ("read noise", transfer_->read_noise);
   finding_.readings.push_back ({"black level", black_, "DN"});
-  finding_.add ("linearity error", scaled (linearity, 100.0));
+  linearity_ = scaled (linearity, 100.0);
+  finding_.add ("linearity error", linearity_);
   finding_.notes.push_back ({"saturation",
       plateau_ ? "The well is full at " + fixed (*plateau_, 0) + " DN."
       : saturates_
@@ -373,19 +378,26 @@ PhotonTransferRun::diagnose ()
   const double zeros = std::max (off_.shorter.zeros, dark_means_.zeros);
   finding_.judge (
       "black-clipped", {100.0 * (dithered_ ? dark_means_.zeros : zeros), 0.0});
-  const bool known = finding_.diagnoses.empty ();
+  const bool known = !finding_.is_ill ();
   const double light = signal (levels_.back ().means) / largest_;
   if (transfer_ && known) {
-    finding_.judge ("linearity error",
-        scaled (*examination_.profile.linearity_error, 100.0));
+    finding_.judge ("linearity error", linearity_);
     finding_.judge ("read noise", transfer_->read_noise);
   } else if (known && light < kDim) {
     finding_.blame ("dark", "the brightest level has " +
                                 fixed (100 * light, 0) +
                                 " % of the range, too little to measure noise");
   } else if (known) {
-    finding_.blame (
-        "noise", "noise does not grow with light as that of photons does");
+    const Level &top = levels_.back ();
+    double bend = 0.0;
+    for (const Level &level : levels_)
+      bend =
+          std::max (bend, std::abs (signal (level.means) / signal (top.means) -
+                                    double (level.slots) / top.slots));
+    if (finding_.measure ("linearity error", {100.0 * bend, 0.2}) ==
+        Verdict::pass)
+      finding_.blame (
+          "noise", "noise does not grow with light as that of photons does");
   }
   diagnose_defects ("dead-pixels", "do not see light", defects_.dead);
   diagnose_defects ("hot-pixels", "have a signal without light", defects_.hot);

@@ -16,9 +16,11 @@ namespace
 /* Frames of light that goes off about when the exposure ends, whose jitter then
  * changes it, and of other light. */
 constexpr int kFramesAbout = 20, kFramesElse = 6;
-constexpr Nanoseconds kStep = 25'000;      // of the places of a slot
-constexpr Nanoseconds kLeast = 110'000;    // of a mask, and of darkness
-constexpr Nanoseconds kBefore = 3'500'000; // of the light that all points have
+constexpr Nanoseconds kStep = 25'000;   // of the places of a slot
+constexpr Nanoseconds kLeast = 110'000; // of a mask, and of darkness
+/* Of the light that all points have, at least; and as a part of the period,
+ * without which rounding makes steps of it. */
+constexpr double kBefore = 3.5e6, kBeforePart = 0.09;
 /* The earliest moment that must be there: high frame rates have no earlier. */
 constexpr Nanoseconds kFirst = -1'500'000;
 /* Of the moments at which mirrors go off, from the end of the exposure on. */
@@ -193,7 +195,7 @@ measure_switching (Examination &examination, const Image<float> &dark,
                            : 0.0;
   const double end = delay + 0.5 * double (period);
   const int least = slot_at (double (kLeast)) + 1;
-  int first = slot_at (end - double (kBefore));
+  int first = slot_at (end - std::max (kBefore, kBeforePart * double (period)));
   if (first < least)
     first = 0;
   if (slot_at (end + double (kFirst)) < first + least)

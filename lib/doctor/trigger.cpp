@@ -30,7 +30,7 @@ constexpr int kChanges = 8, kFramesOfChange = 10;
 constexpr double kShortestRun = 130e-6;
 constexpr int kFinestGrid = 256, kTiles = 8;
 constexpr int kCoarseFrames = 4, kFineFrames = 6;
-constexpr int kInsideLooks = 12, kInsideFrames = 6;
+constexpr int kInsideLooks = 20, kInsideFrames = 6;
 /* Levels of one mask differ less, as part of the step to the other one. */
 constexpr double kSameLevel = 0.2;
 /* Mirrors are half way, and clocks tick, within that; s. */
@@ -41,10 +41,11 @@ constexpr double kCoarsest = 0.03;
  * range. */
 constexpr double kFaint = 0.05;
 
-/* An exposure that ends so much too early loses light; us. */
-constexpr double kShortWarn = 600, kShortFail = 900;
-/* One that runs so far into the next period mixes slots; us. */
-constexpr double kLongWarn = 400, kLongFail = 700;
+constexpr const char *kEnd = "end of the exposure, from that of the frame "
+                             "period";
+/* An exposure that begins so long before the trigger does so with slow mirrors
+ * only, us. */
+constexpr double kEarly = 100;
 /* An exposure that is longer, or known less well, is none that explains the
  * light; parts of the period. */
 constexpr double kLongest = 1.5, kUnclear = 0.02;
@@ -52,8 +53,6 @@ constexpr double kLongest = 1.5, kUnclear = 0.02;
 constexpr double kScattered = 60;
 /* Mirrors that are late make the exposure look early, s. */
 constexpr double kSlowMirrors = 2e-3;
-/* Slowest flicker beside which the exposure is found, Hz. */
-constexpr double kSlowest = 0.15;
 /* A delay of that part of a period is that of a pulse, not of a setting, where
  * the camera does not say what it is set to. */
 constexpr double kEdge = 0.3;
@@ -109,8 +108,7 @@ private:
   void diagnose_lag (const std::vector<Change> &changes);
   Result<void> sample (int first, int count, int exposure, int frames)
   {
-    RETURN_IF_ERROR (runs_.see (lit (first, count), exposure, frames));
-    return {};
+    return runs_.see (lit (first, count), exposure, frames);
   }
   Result<void> sample_tiles (int exposure);
   Result<void> sample_starts (double start, int exposure);
@@ -385,7 +383,7 @@ TriggerCheck::sample_inside (const LightModel &guess)
   const int from = wraps ? 0 : first;
   const int room = (wraps ? first - 4 : grid_) - from;
   for (int i = 0; i < kInsideLooks; i++)
-    RETURN_IF_ERROR (runs_.see_one (i, from, room - 1, 1.0, 1, kInsideFrames));
+    RETURN_IF_ERROR (runs_.see_one (i, from, room - 1, 1, kInsideFrames));
   return {};
 }
 
@@ -409,8 +407,8 @@ TriggerCheck::measure_exposure ()
   RETURN_IF_ERROR (sample_inside (guess));
   if (runs_.samples.size () < 40)
     return {};
-  diagnose_exposure (
-      fit_light (runs_.samples, guess, {.lines = 2, .slowest = kSlowest}));
+  examination_.light = fit_light (runs_.samples, guess);
+  diagnose_exposure (*examination_.light);
   return {};
 }
 
@@ -471,6 +469,12 @@ TriggerCheck::diagnose_delay (const Measured &start)
   if (above (start, told ? set + kEdgeDelay : 1e6 * kEdge * period_))
     return finding_.blame (
         "trigger-edge", late + ", which is the length of a pulse");
+  if (above (scaled (start, -1.0), kEarly))
+    return finding_.blame ("trigger-edge",
+        "the exposure seems to begin " + us_text (-start.value) +
+            " before the trigger: mirrors are slow, or it begins with the end "
+            "of a pulse in the period before",
+        Verdict::unknown);
   finding_.judge ("delay", start,
       late + (set > 0.0 ? ", and TriggerDelay is " + us_text (set) : ""));
 }
@@ -479,23 +483,24 @@ TriggerCheck::diagnose_delay (const Measured &start)
 void
 TriggerCheck::diagnose_end (const Measured &end, const Measured &length)
 {
-  const Measured lost = scaled (end, -1.0);
-  const Measured missing{1e6 * period_ - length.value, length.sigma};
-  const auto severity = [] (bool bad) {
-    return bad ? Verdict::fail : Verdict::warn;
-  };
-  if (above (lost, kShortWarn) && above (missing, kShortWarn))
+  /* What is late ends late, and is not short. */
+  const Measured missing{length.value - 1e6 * period_, length.sigma};
+  const Verdict verdict = verdict_of (kEnd, end);
+  const Verdict both = std::min (verdict, verdict_of (kEnd, missing));
+  if (end.value < 0.0 && both > Verdict::pass)
     finding_.blame ("exposure-short",
-        "the exposure ends " + us_text (lost.value) +
-            " before the frame period does",
-        severity (above (lost, kShortFail) && above (missing, kShortFail)),
+        "the exposure ends " + us_text (-end.value) +
+            " before the frame period does" +
+            (both == Verdict::unknown ? ", within " + us_text (2 * end.sigma)
+                                      : ""),
+        both,
         "set a longer ExposureTime, or give the schedule a readout time of " +
-            us_text (lost.value));
-  else if (above (end, kLongWarn) && finding_.diagnoses.empty ())
+            us_text (-end.value));
+  else if (end.value >= 0.0 && verdict > Verdict::pass && !finding_.is_ill ())
     finding_.blame ("exposure-long",
         "the exposure runs " + us_text (end.value) +
             " into the next frame period",
-        severity (above (end, kLongFail)));
+        verdict);
 }
 
 void
@@ -519,7 +524,7 @@ TriggerCheck::diagnose_exposure (const LightFit &fit)
       std::hypot (start.sigma, length.sigma)};
   finding_.add ("delay", start);
   finding_.add ("exposure", length);
-  finding_.add ("end of the exposure, from that of the frame period", end);
+  finding_.add (kEnd, end);
   finding_.add ("jitter", jitter);
   /* What jitters as much is no setting. */
   start.sigma = std::hypot (start.sigma, jitter.value);
@@ -527,8 +532,10 @@ TriggerCheck::diagnose_exposure (const LightFit &fit)
   diagnose_delay (start);
   diagnose_end (end, length);
   /* If all frames scatter, none tells by how much the exposure jitters. */
-  if (finding_.judge ("jitter", jitter) == Verdict::pass &&
-      jitter.sigma > kScattered)
+  if (verdict_of ("jitter", jitter) >= Verdict::warn ||
+      jitter.sigma < kScattered)
+    finding_.judge ("jitter", jitter);
+  else
     finding_.blame ("jitter",
         "from frame to frame, the exposure begins earlier or later by a large "
         "part of the frame period");

@@ -72,6 +72,22 @@ TEST (MirrorsCheck, WorksAtHighFrameRates)
   }
 }
 
+/** An exposure that begins almost a period late looks early. */
+TEST (MirrorsCheck, NamesAPulseThatEndsWithThePeriod)
+{
+  SickBenchOptions options = sick_bench (4, "trigger-edge=38ms");
+  auto rig = SimulatedRig::make (options);
+  ASSERT_TRUE (rig);
+  Examination examination{**rig};
+  const auto trigger = check_trigger (examination);
+  ASSERT_TRUE (trigger);
+  EXPECT_EQ (trigger->verdict (), Verdict::unknown);
+  const auto mirrors = check_mirrors (examination);
+  ASSERT_TRUE (mirrors);
+  EXPECT_EQ (mirrors->verdict (), Verdict::fail);
+  EXPECT_EQ (mirrors->diagnoses.at (0).id, "trigger-edge");
+}
+
 TEST (MirrorsCheck, SaysThatFramesDoNotCome)
 {
   EXPECT_EQ (check_bench (sick_bench (4, "no-trigger"), check_mirrors)

@@ -114,8 +114,8 @@ TEST (Checks, OneIsSkippedAfterAFailureThatItNeeds)
 TEST (Findings, AreJudgedByRules)
 {
   Finding finding{"light", "light"};
-  EXPECT_EQ (finding.measure ("flicker", {0.9, 0.1}, "why"), Verdict::pass);
-  EXPECT_EQ (finding.measure ("flicker", {1.1, 0.1}, "why"), Verdict::pass);
+  EXPECT_EQ (finding.measure ("flicker", {0.7, 0.1}, "why"), Verdict::pass);
+  EXPECT_EQ (finding.measure ("flicker", {0.9, 0.04}, "why"), Verdict::pass);
   EXPECT_EQ (finding.measure ("flicker", {1.3, 0.1}, "why"), Verdict::warn);
   EXPECT_EQ (finding.measure ("flicker", {2.3, 0.1}, "why"), Verdict::fail);
   EXPECT_EQ (finding.measure ("drift", {-2.5, 0.1}), Verdict::warn);
@@ -137,13 +137,30 @@ TEST (Findings, WhatIsNotKnownIsNotGood)
   for (const Measured number : {Measured{NAN, 0.1}, Measured{0.1, INFINITY}}) {
     Finding finding{"light", "light"};
     EXPECT_EQ (finding.measure ("flicker", number), Verdict::unknown);
-    EXPECT_TRUE (finding.diagnoses.empty ());
+    EXPECT_FALSE (finding.is_ill ());
     EXPECT_EQ (finding.verdict (), Verdict::unknown);
     const auto json = nlohmann::json::parse (findings_json ({finding}));
     EXPECT_EQ (json["verdict"], "UNKNOWN");
     finding.blame ("dark", "why", Verdict::warn);
     EXPECT_EQ (finding.verdict (), Verdict::warn);
   }
+}
+
+TEST (Findings, WhatMayBeBeyondTheLimitIsNotGood)
+{
+  EXPECT_EQ (verdict_of ("flicker", {0.0, 23.0}), Verdict::unknown);
+  EXPECT_EQ (verdict_of ("flicker", {0.9, 0.6}), Verdict::unknown);
+  EXPECT_EQ (verdict_of ("flicker", {1.1, 0.1}), Verdict::unknown);
+  EXPECT_EQ (verdict_of ("drift", {-2.1, 0.1}), Verdict::unknown);
+  EXPECT_EQ (verdict_of ("level", {39.0, 1.0}), Verdict::unknown);
+  EXPECT_EQ (verdict_of ("noise", {19.0, 1.0}), Verdict::unknown);
+  Finding finding{"light", "light"};
+  finding.judge ("flicker", {1.1, 0.1});
+  ASSERT_EQ (finding.diagnoses.size (), 1u);
+  EXPECT_EQ (finding.verdict (), Verdict::unknown);
+  EXPECT_EQ (finding.diagnoses[0].cause,
+      "flicker is 1.10 +- 0.100 %, too uncertain to tell whether it is at "
+      "most 1");
 }
 
 TEST (Findings, TheirJsonHasTheWorstVerdict)

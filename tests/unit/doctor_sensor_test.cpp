@@ -66,6 +66,23 @@ TEST (SensorCheck, TakesLightOfAnyKind)
   }
 }
 
+/** A camera without the feature that would tell of it. */
+TEST (SensorCheck, NamesAPowerOfTheLight)
+{
+  for (const int seed : {2, 3}) {
+    SickBenchOptions options = healthy_bench (seed);
+    options.gamma = 0.45;
+    const CheckedBench e = check_bench (options, check_sensor);
+    EXPECT_EQ (e.first_diagnosis (), "nonlinear") << seed;
+    EXPECT_EQ (e.finding.verdict (), Verdict::fail) << seed;
+    BenchProfile profile = e.found ();
+    profile.camera.size = options.camera;
+    profile.bits = options.bits;
+    const auto valid = profile.check ();
+    EXPECT_TRUE (valid) << valid.error ().message;
+  }
+}
+
 TEST (SensorCheck, MeasuresTheBowOfTheResponse)
 {
   for (const char *bow : {"0.01", "0.03", "-0.02"}) {

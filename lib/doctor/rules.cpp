@@ -189,10 +189,11 @@ constexpr Rule kRules[] = {
     told ("slip", "check the trigger cable for a loose contact, and its level"),
     told (
         "frame-jitter", "stop other programs that use the network or the disk"),
-    {"slots-differ", "largest difference of a slot", "of the mean",
-        within (0.02), within (0.1), "",
-        "check that nothing moves or flickers; if it is the first or last "
-        "slot, give the schedule a readout time"},
+    {"slots-differ", "largest difference of a slot", "", within (0.02),
+        within (0.1), "", "check that nothing moves or flickers"},
+    {"slot-cut", "light that a slot loses", "%", most (10), most (kAny), "",
+        "use a schedule with fewer slots, give it a readout time, or set "
+        "TriggerDelay of the camera to 0"},
 };
 
 constexpr Rule kNone = told ("", "");

@@ -75,10 +75,109 @@ TEST (PartsCheck, ASlowDiskFailsBelowWhatRecordingNeeds)
 
 TEST (WholeCheck, NamesWhatIsWrong)
 {
-  EXPECT_EQ (
-      check_bench (healthy_bench (3), check_whole).first_diagnosis (), "");
   for (const char *words : {"lose=0.05", "slip=7s", "frame-jitter=60ms"})
     expect_named (words, check_whole);
+}
+
+TEST (WholeCheck, DoesNotKnowSlotsWithoutAMapping)
+{
+  const CheckedBench e = check_bench (healthy_bench (3), check_whole);
+  EXPECT_EQ (e.finding.verdict (), Verdict::unknown);
+  EXPECT_EQ (e.first_diagnosis (), "");
+}
+
+/** The check of a recording, where all that others measure is known. */
+Finding
+recorded (const SickBenchOptions &options, const char *schedule)
+{
+  auto rig = SimulatedRig::make (options);
+  EXPECT_TRUE (rig);
+  Examination examination{**rig};
+  examination.profile = (*rig)->truth ().profile;
+  examination.inside = {1, 14, 16};
+  examination.schedule = *Schedule::parse (schedule);
+  examination.recording = 100.0 * options.rate.den / options.rate.num;
+  auto finding = check_whole (examination);
+  EXPECT_TRUE (finding) << finding.error ().message;
+  return *std::move (finding);
+}
+
+TEST (WholeCheck, KnowsTheCodeOfTheSlots)
+{
+  int seed = 1;
+  for (const char *schedule : {"staircase:2x2", "s-matrix:4x2",
+           "sequential:2x2", "staircase:lattice:8/3"}) {
+    const Finding finding = recorded (healthy_bench (seed++), schedule);
+    EXPECT_EQ (finding.verdict (), Verdict::pass)
+        << schedule << " "
+        << finding.reading ("largest difference of a slot")->number.value;
+  }
+}
+
+TEST (WholeCheck, FindsASlotWithOtherLight)
+{
+  for (const char *schedule : {"staircase:2x2", "sequential:2x2"}) {
+    const Finding finding =
+        recorded (sick_bench (2, "flicker=50:0.3"), schedule);
+    ASSERT_FALSE (finding.diagnoses.empty ()) << schedule;
+    EXPECT_EQ (finding.diagnoses[0].id, "slots-differ") << schedule;
+    EXPECT_TRUE (finding.is_ill ()) << schedule;
+  }
+}
+
+TEST (WholeCheck, NamesASlotThatTheExposureCuts)
+{
+  SickBenchOptions options = healthy_bench (1);
+  options.delay = 0;
+  options.readout = 500'000;
+  const Finding finding = recorded (options, "sequential:8x8");
+  ASSERT_EQ (finding.diagnoses.size (), 1u);
+  EXPECT_EQ (finding.diagnoses[0].id, "slot-cut");
+  EXPECT_EQ (finding.verdict (), Verdict::warn);
+  EXPECT_NEAR (
+      finding.reading ("light that a slot loses")->number.value, 80.0, 0.5);
+}
+
+TEST (WholeCheck, DoesNotJudgeAFewFrames)
+{
+  auto rig = SimulatedRig::make (healthy_bench (3));
+  ASSERT_TRUE (rig);
+  Examination examination{**rig};
+  examination.profile = (*rig)->truth ().profile;
+  examination.recording = 0.05;
+  EXPECT_EQ (check_whole (examination)->verdict (), Verdict::unknown);
+}
+
+/** A healthy bench at @p rate and with @p schedule, from the first check to the
+ * last. */
+void
+expect_healthy (int seed, FrameRate rate, const char *schedule)
+{
+  SCOPED_TRACE (
+      testing::Message () << seed << " " << rate.num << " " << schedule);
+  SickBenchOptions options = healthy_bench (seed);
+  options.rate = rate;
+  auto rig = SimulatedRig::make (options);
+  ASSERT_TRUE (rig);
+  Examination examination{**rig};
+  examination.exhibits = false;
+  examination.schedule = *Schedule::parse (schedule);
+  examination.recording = 100.0 * rate.den / rate.num;
+  std::vector<Finding> findings;
+  for (const Check &check : all_checks ()) {
+    auto finding = run_check (check, examination, findings);
+    ASSERT_TRUE (finding) << finding.error ().message;
+    EXPECT_LT (finding->verdict (), Verdict::warn)
+        << check.name << " " << verdict_text (finding->verdict ()) << " "
+        << (finding->diagnoses.empty () ? "" : finding->diagnoses[0].cause);
+    findings.push_back (*std::move (finding));
+  }
+}
+
+TEST (Doctor, GivesNoAlarmForHealthyBenches)
+{
+  expect_healthy (1, {25, 1}, "staircase:2x2");
+  expect_healthy (3, {5, 1}, "sequential:2x2");
 }
 
 TEST (Checks, WhatANamedCheckNeedsIsDoneBefore)

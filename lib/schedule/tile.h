@@ -36,7 +36,8 @@ public:
   static Result<Tile> lattice (int elements, int step);
   static Result<Tile> diamond (int elements);
   /** @p labels: period_y rows of period_x labels. Every label from 0 to the
-   * largest must occur, and some cell () must exist. */
+   * largest must occur. Whether it has a cell () depends on the phase, which
+   * Schedule::make () checks. */
   static Result<Tile> from_labels (
       int period_x, int period_y, std::vector<std::uint8_t> labels);
   static Result<Tile> parse (std::string_view text);

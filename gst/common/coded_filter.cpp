@@ -26,7 +26,7 @@ CodedFilter::properties ()
       {"schedule", "Schedule",
           "Schedule of the coded exposure: a preset such as "
           "\"sequential:2x2\" or \"staircase:2x2,active=9.8ms\", or the path "
-          "of a JSON file; empty: that of the stream's tag, else "
+          "of a JSON file, or its text; empty: that of the stream's tag, else "
           "sequential:2x2",
           kReadWrite, set (&CodedSettings::schedule)},
       {"require-schedule", "Require a schedule",
@@ -36,7 +36,7 @@ CodedFilter::properties ()
           kReadWrite, set (&CodedSettings::require_schedule)},
       {"mapping", "Mapping",
           "File with the mapping from camera pixels to mirrors (moirecalib "
-          "writes one); empty: that of the stream's tags, or none",
+          "writes one), or its text; empty: that of the stream's tags, or none",
           kReadWrite, set (&CodedSettings::mapping)},
       {"bench", "Bench profile",
           "What was measured of the bench, a JSON file or its text "

@@ -31,6 +31,8 @@ struct Named {
 private:
   static Result<T> read_named (const std::string &text)
   {
+    if (text.starts_with ('{'))
+      return T::from_json (text);
     if constexpr (requires { T::load (text); })
       return T::load (text);
     else

@@ -22,7 +22,7 @@ properties ()
       {"schedule", "Schedule",
           "Schedule of the coded exposure: a preset such as "
           "\"sequential:2x2\" or \"staircase:2x2,active=9.8ms\", or the path "
-          "of a JSON file; empty: sequential:2x2",
+          "of a JSON file, or its text; empty: sequential:2x2",
           kReadWrite, within (&SimState::settings, &Settings::schedule)},
       {"dmd", "DMD",
           "Simulated DMD, \"sim:NAME\", whose masks are looked through as a "

@@ -3,18 +3,16 @@
 and warnings."""
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import pathlib
 import sys
-import tempfile
 import warnings
 
 try:
     import gi
     gi.require_version("Gst", "1.0")
-    from gi.repository import GLib, Gst
+    from gi.repository import GLib, GObject, Gst
 except (ImportError, ValueError) as missing:
     raise ImportError(
         f"{missing}: codedexposure needs PyGObject and GStreamer for this "
@@ -71,34 +69,33 @@ def quoted(text) -> str:
     return f'"{text}"'
 
 
-_files = tempfile.TemporaryDirectory(prefix="codedexposure-")
-
-
-def _value(value):
-    """What stands for a value in a pipeline: elements read JSON from files."""
-    if not isinstance(value, dict):
-        return value
-    text = json.dumps(value).encode()
-    path = pathlib.Path(_files.name) / f"{hashlib.sha1(text).hexdigest()}.json"
-    path.write_bytes(text)
-    return path
+def _check(spec, name: str, value) -> None:
+    """Raises ValueError for a value that GStreamer would drop."""
+    least = getattr(spec, "minimum", None)
+    if least is not None and not least <= value <= spec.maximum:
+        raise ValueError(
+            f"{name} is from {least} to {spec.maximum}, not {value}")
+    if spec.value_type.is_a(GObject.TYPE_ENUM):
+        choices = [choice.value_nick for choice
+                   in type(spec.default_value).__enum_values__.values()]
+        if value not in choices:
+            raise ValueError(
+                f"{name} is {', '.join(choices[:-1])} or {choices[-1]}, not "
+                f"{value}")
 
 
 def element(kind: str, **values) -> str:
-    """The element with its properties, as in a pipeline; None: the default.
-
-    GStreamer drops a number that is out of range, so it is refused here.
-    """
+    """The element with its properties, as in a pipeline; None: the default. A
+    dict is given as the text of its JSON form."""
     made, text = Gst.ElementFactory.make(kind), kind
     for name, value in values.items():
         if value is None:
             continue
         spec = made.find_property(name.replace("_", "-"))
-        least = getattr(spec, "minimum", None)
-        if least is not None and not least <= value <= spec.maximum:
-            raise ValueError(
-                f"{name} is from {least} to {spec.maximum}, not {value}")
-        text += f" {spec.name}={quoted(_value(value))}"
+        _check(spec, name, value)
+        if isinstance(value, dict):
+            value = json.dumps(value)
+        text += f" {spec.name}={quoted(value)}"
     return text
 
 
@@ -162,7 +159,16 @@ class Player:
     errors are exceptions. quiet drops the warnings.
     """
 
+    process: int | None = None  # that has played a pipeline
+
     def __init__(self, description: str, about: str, quiet: bool = False):
+        # Its threads, which GStreamer counts on, are not in a copy of it.
+        if Player.process not in (None, os.getpid()):
+            raise Error(
+                "this process was forked from one that had already used "
+                "codedexposure, whose threads it lacks; start it anew, as "
+                'multiprocessing.get_context("spawn") does')
+        Player.process = os.getpid()
         self.about = about
         self.quiet = quiet
         try:

@@ -26,6 +26,14 @@ def _buffers(frames: Iterable[np.ndarray], period: Fraction) -> Iterator:
         yield buffer
 
 
+def _rate(rate) -> Fraction:
+    most = 10**9  # that caps can hold
+    if not 0 < rate < most:
+        raise ValueError(
+            f"rate is a number of frames per second above 0, not {rate}")
+    return Fraction(rate).limit_denominator(100000) or Fraction(1, 100000)
+
+
 def _play(frames: np.ndarray, rate, filters: str) -> Iterator[Frame]:
     """What the filters make of frames at this rate, frames/s."""
     frames = np.asarray(frames)
@@ -34,7 +42,10 @@ def _play(frames: np.ndarray, rate, filters: str) -> Iterator[Frame]:
         raise TypeError(
             f"frames are a {frames.dtype} array of {frames.ndim} dimensions; "
             "give uint8 or uint16 of shape (frames, height, width)")
-    rate = Fraction(rate).limit_denominator(100000)
+    if 0 in frames.shape[1:]:
+        raise ValueError(f"frames of shape {frames.shape} have no pixels; give "
+                         "(frames, height, width)")
+    rate = _rate(rate)
     player = Player(
         "appsrc name=in format=time caps=video/x-raw,"
         f"format={kind},width={frames.shape[2]},height={frames.shape[1]},"

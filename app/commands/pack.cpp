@@ -80,12 +80,14 @@ private:
   };
 
   void check_names (const std::string &recording, const std::string &output);
+  void check_extras (const std::vector<std::string> &extras);
   void lock (const std::string &recording);
   Seen look_through (const std::string &file);
   RunResult encode (
       const std::string &recording, const std::string &to, bool salvage);
-  Exit replace (const std::string &recording, const std::string &packed,
-      const std::string &output, std::size_t frames);
+  void publish (Part &part, const std::string &recording, std::size_t frames);
+  [[noreturn]] void give_up (
+      Part &part, const std::string &why, Exit exit = Exit::failed);
 
   std::string recording_;
   std::optional<Text> output_;
@@ -149,6 +151,22 @@ Pack::check_names (const std::string &recording, const std::string &output)
         output + " exists; choose another name, or set --force to replace it");
 }
 
+/* A file of another program, or one to which something was added. */
+void
+Pack::check_extras (const std::vector<std::string> &extras)
+{
+  std::string all;
+  for (const std::string &extra : extras)
+    all += (all.empty () ? "" : ", ") + extra;
+  if (all.empty ())
+    return;
+  if (!output_)
+    fail (recording_ + " also has " + all +
+          ", which FFV1 frames would replace; "
+          "set --output to keep it beside the packed one");
+  status_.line ("only " + recording_ + " has " + all);
+}
+
 void
 Pack::lock (const std::string &recording)
 {
@@ -179,46 +197,46 @@ Pack::encode (const std::string &recording, const std::string &to, bool salvage)
 {
   Job job ("pack", run_);
   job.options.json = job.has_result = false;
-  job.options.force = true;
   job.salvage = salvage;
   Chain chain = read_recording (job, recording);
   chain.queue (8);
   job.counted = chain.last ();
   Settings settings;
   set_if (settings, "threads", threads_);
-  chain.to ("codedexposure-recordmux", settings);
-  const auto frames = pad_of (chain.last (), "sink");
-  chain.to ("filesink");
-  job.outputs.file (chain.last (), "location", to, {.frames = frames.get ()});
+  chain.to ("codedexposure-recordmux", settings)
+      .to ("filesink", {{"location", to}});
   return play (job);
 }
 
 /* The name changes only when the data is on the disk. */
-Exit
-Pack::replace (const std::string &recording, const std::string &packed,
-    const std::string &output, std::size_t frames)
+void
+Pack::publish (Part &part, const std::string &recording, std::size_t frames)
 {
   std::error_code error;
   const double raw = double (fs::file_size (recording, error));
-  const double size = double (fs::file_size (packed, error));
-  fs::permissions (packed, fs::status (recording, error).permissions (), error);
-  if (const int file = open (packed.c_str (), O_RDONLY | O_CLOEXEC);
-      file < 0 || fsync (file) != 0 || close (file) != 0)
-    fail ("cannot write " + output + "; " + recording + " is as it was");
-  value_of (move_file (packed, output, run_.force || !output_));
-  status_.line ("wrote " + output +
+  const double size = double (fs::file_size (part.path (), error));
+  fs::permissions (
+      part.path (), fs::status (recording, error).permissions (), error);
+  if (const auto published = part.publish (run_.force || !output_); !published)
+    give_up (part, published.error ().message);
+  status_.line ("wrote " + part.name () +
                 format (": %zu coded frames, %.0f %% of the raw size, all "
                         "checked",
                     frames, 100 * size / raw));
-  return Exit::done;
+}
+
+void
+Pack::give_up (Part &part, const std::string &why, Exit exit)
+{
+  part.discard ();
+  fail (why + "; " + recording_ + " is as it was", exit);
 }
 
 Exit
 Pack::run ()
 {
   start_gstreamer ();
-  const RecordingInfo info =
-      value_of (recording_info (recording_, false));
+  const RecordingInfo info = value_of (recording_info (recording_));
   std::error_code ignored;
   const std::string recording = fs::canonical (recording_, ignored);
   const std::string output = output_.value_or (recording);
@@ -233,12 +251,12 @@ Pack::run ()
     status_.line (recording + " is FFV1 already");
     return Exit::done;
   }
+  check_extras (info.extras);
   lock (recording);
 
-  const std::string as_it_was = "; " + recording + " is as it was";
   const Seen before = look_through (recording);
   if (before.result.interrupted)
-    fail ("stopped" + as_it_was, Exit::interrupted);
+    fail ("stopped; " + recording_ + " is as it was", Exit::interrupted);
   if (before.lines.empty () ||
       (!before.is_sound () && before.result.exit != Exit::damaged))
     fail (recording + " cannot be read");
@@ -248,25 +266,21 @@ Pack::run ()
     return Exit::damaged;
   }
   const fs::path whole = fs::absolute (output, ignored);
-  Part part ((whole.parent_path () / ("." + whole.filename ().string ())),
-      Part::kFile);
-  const std::string packed = part.name ();
-  const RunResult encoded = encode (recording, packed, !before.is_sound ());
-  const auto give_up = [&] (const std::string &why, Exit exit = Exit::failed) {
-    fs::remove (packed, ignored);
-    fs::remove (part.path (), ignored);
-    fail (why + as_it_was, exit);
-  };
+  Part part (output, Part::kFile,
+      whole.parent_path () / ("." + whole.filename ().string () + ".part"));
+  value_of (part.claim (true));
+  const RunResult encoded =
+      encode (recording, part.path (), !before.is_sound ());
   if (encoded.interrupted)
-    give_up ("stopped", Exit::interrupted);
+    give_up (part, "stopped", Exit::interrupted);
   if (encoded.exit != before.result.exit)
-    give_up ("could not encode");
-  const Seen after = look_through (packed);
+    give_up (part, "could not encode");
+  const Seen after = look_through (part.path ());
   if (after.result.interrupted)
-    give_up ("stopped", Exit::interrupted);
+    give_up (part, "stopped", Exit::interrupted);
   if (after.lines != before.lines)
-    give_up ("the packed frames differ from those of the recording");
-  replace (recording, packed, output, before.lines.size ());
+    give_up (part, "the packed frames differ from those of the recording");
+  publish (part, recording, before.lines.size ());
   if (!before.is_sound ())
     status_.line (recording + " is cut off or damaged; what could be read was "
                               "packed, and damaged frames stay damaged");

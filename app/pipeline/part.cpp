@@ -28,8 +28,9 @@ reason (int error)
 
 } // namespace
 
-Part::Part (std::string name, Kind kind)
-    : name_ (std::move (name)), path_ (name_ + ".part"), kind_ (kind)
+Part::Part (std::string name, Kind kind, std::string path)
+    : name_ (std::move (name)),
+      path_ (path.empty () ? name_ + ".part" : std::move (path)), kind_ (kind)
 {
 }
 

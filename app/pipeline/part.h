@@ -17,7 +17,8 @@ class Part
 public:
   enum Kind { kFile, kFolder };
 
-  Part (std::string name, Kind kind);
+  /** @p path  where it is written, in place of NAME.part; empty: there. */
+  Part (std::string name, Kind kind, std::string path = {});
   /** Leaves NAME.part as it is. */
   ~Part ();
   Part (const Part &) = delete;

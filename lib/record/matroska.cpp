@@ -30,7 +30,8 @@ constexpr std::uint64_t kEbml = 0x1a45dfa3, kSegment = 0x18538067,
                         kVideo = 0xe0, kPixelWidth = 0xb0, kPixelHeight = 0xba,
                         kColourSpace = 0x2eb524, kCluster = 0x1f43b675,
                         kTimestamp = 0xe7, kBlockGroup = 0xa0, kBlock = 0xa1,
-                        kSimpleBlock = 0xa3;
+                        kSimpleBlock = 0xa3, kTitle = 0x7ba9,
+                        kAttachments = 0x1941a469, kChapters = 0x1043a770;
 constexpr std::uint64_t kVideoTrack = 1, kTextTrack = 0x11;
 /** Where nothing else limits an element. */
 constexpr std::uint64_t kUnlimited = std::uint64_t (1) << 60;
@@ -275,6 +276,26 @@ block_of (
   return Block{track->value, track->end + 3, time};
 }
 
+void
+read_extras (Source &file, const Element &part, RecordingInfo &info)
+{
+  std::size_t tracks = 0;
+  const std::size_t own = info.head.lines != 0 ? 2 : 1;
+  if (part.id == kAttachments)
+    info.extras.emplace_back ("attachments");
+  else if (part.id == kChapters)
+    info.extras.emplace_back ("chapters");
+  else if (part.id == kInfo || part.id == kTracks)
+    file.each (part, [&] (const Element &child) {
+      if (part.id == kInfo && child.id == kTitle)
+        info.extras.emplace_back ("a title");
+      tracks += part.id == kTracks && child.id == kTrackEntry;
+      return true;
+    });
+  if (tracks > own)
+    info.extras.emplace_back ("other tracks, such as sound");
+}
+
 /* Until one is damaged or cut off. Clusters and groups are entered: those of a
  * stream, and the last of a file that was not finished, have no size. */
 void
@@ -296,6 +317,7 @@ read_blocks (Source &file, const Element &segment, RecordingInfo &info)
       break;
     if (part->id == kTimestamp)
       cluster = file.number (*part);
+    read_extras (file, *part, info);
     if (part->id != kBlock && part->id != kSimpleBlock)
       continue;
     const auto block = block_of (file, *part, cluster, info.head.tick);

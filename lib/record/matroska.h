@@ -46,6 +46,9 @@ struct RecordingInfo {
   std::optional<std::uint64_t> recorded;
   /** Of the first frame whose line says it; none: not known. */
   std::optional<StreamSetup> setup;
+  /** What the file has beside frames and their lines, such as "sound"; of files
+   * of other programs. */
+  std::vector<std::string> extras;
 };
 
 /** Reads the head of the file @p path and, with_frames, the places of all

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure schedule: shows schedules, checks them, and writes their masks.
  */
-#include <fstream>
+#include <filesystem>
 
+#include "base/file.h"
 #include "base/text.h"
 #include "command.h"
 #include "dmd/bitmap.h"
@@ -21,6 +22,7 @@ struct Arguments : Printing, BoardOptions {
   std::string region;
   std::string prefix = "mask";
   bool planes = false;
+  bool force = false;
 };
 
 Exit
@@ -74,17 +76,21 @@ placement_of (const Arguments &arguments, const NamedBoard &board)
   return placement;
 }
 
-void
-write_file (const std::string &path, const Bytes &bytes)
+std::string
+file_of (const Arguments &arguments, int picture)
 {
-  std::ofstream file (path, std::ios::binary);
-  file.write (reinterpret_cast<const char *> (bytes.data ()),
-      std::streamsize (bytes.size ()));
-  file.close ();
-  if (!file)
-    throw Failure{Exit::failed,
-        Error{"cannot write " + in_quotes (path) +
-              "; check that the folder exists and the disk has space"}};
+  return arguments.prefix + std::to_string (picture) + ".bmp";
+}
+
+void
+check_unused (const Arguments &arguments, int pictures)
+{
+  std::error_code ignored;
+  for (int picture = 0; picture < pictures && !arguments.force; picture++)
+    if (const std::string path = file_of (arguments, picture);
+        std::filesystem::exists (path, ignored))
+      fail (path + " exists; choose another --output, or set --force to "
+                   "replace it");
 }
 
 Exit
@@ -98,16 +104,20 @@ render (const Arguments &arguments)
       schedule, board.info.size, placement_of (arguments, board));
   const PlanePlan plan = plan_planes (schedule);
   const int count = arguments.planes ? plan.images : schedule.masks ();
+  check_unused (arguments, count);
   Json files = Json::array ();
   for (int picture = 0; picture < count; picture++) {
     if (stop.stop_requested ())
       throw Failure{Exit::interrupted, Error{"interrupted"}};
-    const std::string path =
-        arguments.prefix + std::to_string (picture) + ".bmp";
-    write_file (path, arguments.planes
-                          ? encode_plane_bitmap (renderer.render<PlanePixel> (
-                                plan.of_image (picture)))
-                          : encode_bitmap (renderer.render (picture)));
+    const Bytes bytes = arguments.planes
+                            ? encode_plane_bitmap (renderer.render<PlanePixel> (
+                                  plan.of_image (picture)))
+                            : encode_bitmap (renderer.render (picture));
+    const std::string path = file_of (arguments, picture);
+    if (const auto written = write_file (path, {bytes.begin (), bytes.end ()});
+        !written)
+      fail (path + " " + written.error ().message +
+            "; check that the folder exists and the disk has space");
     files.push_back (path);
   }
   arguments.print ({{"schedule", schedule.text ()}, {"dmd", board.info.name},
@@ -138,6 +148,7 @@ declare_pictures (Options &options, Arguments &arguments)
       "prefix of the file names [mask]", any_text ());
   options.flag ("--planes", arguments.planes,
       "24 masks per file, for the flash or the video of a LightCrafter 4500");
+  options.flag ("--force", arguments.force, "replace files that exist");
 }
 
 CommandGroup<Arguments>::Commands

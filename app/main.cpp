@@ -13,6 +13,7 @@
 #include "base/file.h"
 #include "base/text.h"
 #include "command.h"
+#include "options/common.h"
 #include "pipeline/plugin.h"
 
 namespace codedexposure::app
@@ -175,8 +176,7 @@ report (const Failure &failure, const std::string &path, bool json)
   const std::string &message = failure.error.message;
   const auto command = path.find (' ');
   if (json)
-    std::printf (
-        "%s\n", nlohmann::ordered_json{{"error", message}}.dump (2).c_str ());
+    print_json ({{"error", message}}, 2);
   std::fprintf (stderr, "%s: %s\n",
       command == path.npos ? path.c_str () : path.c_str () + command + 1,
       message.c_str ());

@@ -29,6 +29,9 @@ public:
             "the\nscene or with Ctrl-C. \"codedexposure decode\" decodes the "
             "recording later, with\nany method; \"codedexposure pack\" turns a "
             "raw one into FFV1.\n",
+        .notes =
+            "Exit status: 0 recorded, 1 failed, 2 wrong usage, 3 recorded, "
+            "but frames were\nlost, 130 stopped before the first frame.\n",
         .examples =
             "  The simulated bench, for 2 s:\n"
             "    codedexposure record --frames 50 --output bench.mkv\n"

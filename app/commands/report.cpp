@@ -113,7 +113,9 @@ Report::declare (Options &options)
       "bench profile (JSON) with black level, leakage and mapping [that of the "
       "recording]");
   decode_.declare_frames (options, "the recording");
-  run_.declare (options);
+  run_.declare_result (options);
+  options.flag ("--verbose", run_.verbose,
+      "also print messages and counters of the elements");
 }
 
 void
@@ -226,10 +228,6 @@ Report::run ()
       .decode = decode_,
       .line = line_.value_or ("row:50%"),
       .run = run_};
-  if (run_.print) {
-    measure (options);
-    return Exit::done;
-  }
   PageFolder folder (*output_, run_.force);
   options.coded_csv = folder.path ("coded.csv");
   options.subframes_csv = folder.path ("subframes.csv");
@@ -258,7 +256,7 @@ Report::run ()
     const nlohmann::ordered_json json = {{"command", "report"},
         {"source", recording_}, {"frames", all.coded.pictures.size ()},
         {"outputs", {name + "index.html"}}, {"status", int (exit)}};
-    std::printf ("%s\n", json.dump ().c_str ());
+    print_json (json);
   }
   return exit;
 }

@@ -3,14 +3,13 @@
 
 #include <signal.h>
 
-#include <cmath>
 #include <cstdio>
-#include <numeric>
 #include <thread>
 
 #include "base/text.h"
 #include "dmd/boards.h"
 #include "failure.h"
+#include "options/common.h"
 
 namespace codedexposure::app
 {
@@ -27,7 +26,7 @@ void
 Printing::print (const Json &object) const
 {
   if (json) {
-    std::printf ("%s\n", object.dump (2).c_str ());
+    print_json (object, 2);
     return;
   }
   for (const Json &entry : object.is_array () ? object : Json{object})
@@ -44,27 +43,6 @@ Printing::say (const std::string &line) const
     std::fprintf (stderr, "%s\n", line.c_str ());
 }
 
-Rule<FrameRate>
-any_rate ()
-{
-  const auto read = [] (const std::string &text) -> std::optional<FrameRate> {
-    constexpr int kPerSecond = 1000;
-    const auto parts = split (text, '/');
-    FrameRate rate{0, 0};
-    if (parts.size () == 2) {
-      const auto num = parse_int (parts[0]), den = parse_int (parts[1]);
-      rate = {num.value_or (0), den.value_or (0)};
-    } else if (const auto real = parse_real (text);
-               real && *real > 0 && *real < 1e6) {
-      const int num = int (std::lround (*real * kPerSecond));
-      const int common = std::gcd (num, kPerSecond);
-      rate = {num / common, kPerSecond / common};
-    }
-    return rate.num > 0 && rate.den > 0 ? std::optional (rate) : std::nullopt;
-  };
-  return {read, "a number or a fraction, such as 25 or 30000/1001"};
-}
-
 Rule<Text>
 time_rule ()
 {
@@ -78,7 +56,7 @@ void
 BoardOptions::declare_rate (Options &options)
 {
   options.value ("--rate", rate, "R", "frame rate of the camera, frames/s [25]",
-      any_rate ());
+      frame_rate_rule ());
 }
 
 void

@@ -48,8 +48,6 @@ struct Show {
 /** Throws Failure if the schedule does not fit the device or the rate. */
 Show fit (const BoardOptions &options, const DmdInfo &info);
 
-/** A rate such as 25, 29.97 or 30000/1001. */
-Rule<FrameRate> any_rate ();
 /** A time such as 500us or 10s, as text. */
 Rule<Text> time_rule ();
 

@@ -2,10 +2,16 @@
 /* What all commands that run a pipeline take. */
 #pragma once
 
+#include <nlohmann/json_fwd.hpp>
+
 #include "options.h"
 
 namespace codedexposure::app
 {
+
+/** Prints @p json on standard output. Names of files may have bytes that JSON
+ * cannot hold; they become U+FFFD. @p indent -1: in one line. */
+void print_json (const nlohmann::ordered_json &json, int indent = -1);
 
 struct RunOptions {
   bool force = false;

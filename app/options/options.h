@@ -33,8 +33,8 @@ public:
 
   /**
    * An option with a value: value ("--bits", bits, "N", "significant bits [8]",
-   * whole (1, 16)). @p into keeps its value, which is the default, unless the
-   * option is given.
+   * whole (1, 16)). @p into, which may be an optional, keeps its value, which
+   * is the default, unless the option is given.
    */
   template <typename T, typename Into>
   void value (const std::string &name, Into &into,

@@ -2,6 +2,8 @@
 #include "rules.h"
 
 #include <algorithm>
+#include <cmath>
+#include <numeric>
 #include <string_view>
 #include <vector>
 
@@ -132,17 +134,23 @@ picture_size ()
 Rule<FrameRate>
 frame_rate_rule ()
 {
-  constexpr int kMost = 9'999'999;
+  constexpr int kMost = 9'999'999, kParts = 1000;
   return {[] (const std::string &text) -> std::optional<FrameRate> {
             const auto parts = split (text, '/');
-            const auto num = digits (parts[0], 1, kMost);
-            const auto den =
-                parts.size () == 2 ? digits (parts[1], 1, kMost) : 1;
-            if (parts.size () > 2 || !num || !den)
+            if (parts.size () == 2) {
+              const auto num = digits (parts[0], 1, kMost);
+              const auto den = digits (parts[1], 1, kMost);
+              return num && den ? std::optional (FrameRate{*num, *den})
+                                : std::nullopt;
+            }
+            const auto real = parse_real (text);
+            if (!real || *real < 1.0 / kParts || *real > kMost / kParts)
               return std::nullopt;
-            return FrameRate{*num, *den};
+            const int num = int (std::lround (*real * kParts));
+            const int common = std::gcd (num, kParts);
+            return FrameRate{num / common, kParts / common};
           },
-      "a rate such as 25 or 30000/1001"};
+      "a rate such as 25, 29.97 or 30000/1001"};
 }
 
 } // namespace codedexposure::app

@@ -37,7 +37,7 @@ Rule<double> any_real ();
 /** At least 0; a time is above 0 if @p positive. */
 Rule<double> seconds (bool positive = false);
 Rule<Extent> picture_size ();
-/** "25" or "30000/1001". */
+/** "25", "29.97" or "30000/1001". */
 Rule<FrameRate> frame_rate_rule ();
 
 } // namespace codedexposure::app

@@ -205,6 +205,24 @@ use_input (SourcePlan &plan, const SourceOptions &options)
     usage_error (*options.input + " has no fixed frame rate; set --input-rate");
 }
 
+/* A shorter exposure leaves masks out, and a longer one misses the trigger of
+ * the next frame; what is recorded of a frame would then be wrong. */
+void
+check_exposure (const SourcePlan &plan, double exposure)
+{
+  const SlotPlan slots = value_of (SlotPlan::fit (plan.schedule.timing (),
+                                       plan.schedule.slots (), plan.frame_rate),
+      Exit::usage);
+  const double least = 1e-3 * double (slots.start (slots.slots () - 1));
+  const double most = 1e-3 * double (slots.frame_period ());
+  if (exposure <= least || exposure > most)
+    usage_error ("--exposure " + real_text (exposure) + " does not fit " +
+                 plan.schedule.text () + ": the last slot begins after " +
+                 real_text (least) + " us, and the next frame after " +
+                 real_text (most) + " us; set a time between them, such as " +
+                 real_text (1e-3 * double (slots.exposure ())));
+}
+
 } // namespace
 
 SourcePlan
@@ -230,6 +248,8 @@ SourcePlan::make (const SourceOptions &options)
     usage_error (size_text (plan.size) +
                  " pixels are less than one exposure group of " + text + ", " +
                  size_text (cell) + "; set a larger --size");
+  if (options.exposure)
+    check_exposure (plan, *options.exposure);
   return plan;
 }
 

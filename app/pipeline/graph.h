@@ -141,7 +141,9 @@ std::string factory_of (GstObject *object);
  */
 GstElement *late_link_of (GstElement *element);
 
-/** The pipeline as a line of gst-launch-1.0 that does the same. */
+/** The pipeline as a line of a shell with gst-launch-1.0 that does the same. */
 std::string launch_line (GstElement *pipeline);
+/** @p text as one word of a shell. */
+std::string shell_word (const std::string &text);
 
 } // namespace codedexposure::app

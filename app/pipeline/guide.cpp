@@ -8,7 +8,6 @@
 #include <glib-unix.h>
 
 #include "calibrate/session.h"
-#include "pipeline/loop.h"
 #include "pipeline/messages.h"
 #include "pipeline/status.h"
 
@@ -41,38 +40,22 @@ text_of (const GstStructure *structure, const char *field)
   return text ? text : "";
 }
 
-class Guide : public Loop
+class Guide
 {
 public:
-  Guide (Job &job, GstElement *calib, GstElement *stage)
-      : Loop (job.graph.pipeline ()), job_ (job), calib_ (calib),
-        stage_ (stage), status_ (job.command, job.options.verbose)
-  {
-  }
-  ~Guide () override { stop (); }
-
-  Exit play ();
+  Guide (Job &job, GstElement *calib, GstElement *stage);
+  ~Guide ();
+  Guide (const Guide &) = delete;
+  Guide &operator= (const Guide &) = delete;
 
 private:
-  static gboolean on_key (gint, GIOCondition, gpointer self)
-  {
-    return static_cast<Guide *> (self)->take_key ();
-  }
-
   gboolean take_key ();
   bool is_done ();
-  void begin () override
+  Exit judge (bool interrupted);
+  void end () const
   {
-    gst_element_set_state (pipeline (), GST_STATE_PLAYING);
+    gst_element_send_event (job_.graph.pipeline (), gst_event_new_eos ());
   }
-  void end (Exit exit)
-  {
-    exit_ = exit;
-    quit ();
-  }
-  void stop () { gst_element_set_state (pipeline (), GST_STATE_NULL); }
-  void on_signal (int times) override;
-  void on_message (GstMessage *message) override;
   void on_element (const GstStructure *structure);
   void on_state (const std::string &state);
   void on_reading (const GstStructure *reading);
@@ -83,19 +66,32 @@ private:
   GstElement *calib_;
   GstElement *stage_; ///< the simulated bench to move; null: a person does
   Status status_;
-  Exit exit_ = Exit::failed;
   int readings_ = 0;
   std::string last_reading_;
   bool mapped_ = false;
-  bool unwritten_ = false;  ///< a requested file could not be written
-  bool takes_keys_ = false; ///< standard input is a terminal
+  bool unwritten_ = false; ///< a requested file could not be written
+  guint keys_ = 0;         ///< source of keys; 0: no terminal
 };
 
-void
-Guide::on_signal (int)
+Guide::Guide (Job &job, GstElement *calib, GstElement *stage)
+    : job_ (job), calib_ (calib), stage_ (stage),
+      status_ (job.command, job.options.verbose)
 {
-  status_.line ("stopped; the mirrors show the schedule again");
-  end (is_done () ? Exit::done : Exit::interrupted);
+  job.ends_by_signal = true;
+  job.on_message = [this] (
+                       const GstStructure *message) { on_element (message); };
+  job.judge = [this] (bool interrupted) { return judge (interrupted); };
+  const auto on_key = [] (gint, GIOCondition, gpointer self) {
+    return static_cast<Guide *> (self)->take_key ();
+  };
+  if (isatty (STDIN_FILENO) != 0)
+    keys_ = g_unix_fd_add (STDIN_FILENO, G_IO_IN, on_key, this);
+}
+
+Guide::~Guide ()
+{
+  if (keys_ != 0)
+    g_source_remove (keys_);
 }
 
 /* Enter starts the mapping without further alignment. */
@@ -103,8 +99,10 @@ gboolean
 Guide::take_key ()
 {
   char keys[64];
-  if (read (STDIN_FILENO, keys, sizeof keys) <= 0)
+  if (read (STDIN_FILENO, keys, sizeof keys) <= 0) {
+    keys_ = 0;
     return G_SOURCE_REMOVE;
+  }
   if (!mapped_) {
     status_.line ("mapping without further alignment");
     gst_util_set_object_arg (G_OBJECT (calib_), "mode", "map");
@@ -144,11 +142,11 @@ Guide::on_state (const std::string &state)
     status_.line ("showing patterns; do not touch the bench");
   else if (state == "solving")
     status_.line ("solving; the mirrors show the schedule again");
-  else if (state == "failed" && takes_keys_)
+  else if (state == "failed" && keys_ != 0)
     status_.line ("the mapping failed; correct the bench and press Enter to "
                   "try again");
   else if (state == "failed")
-    end (Exit::failed);
+    end ();
 }
 
 std::string
@@ -228,7 +226,7 @@ Guide::on_mapping (const GstStructure *mapping)
     unwritten_ |= path.empty () && asked && *asked;
     g_free (asked);
   }
-  gst_element_send_event (pipeline (), gst_event_new_eos ());
+  end ();
 }
 
 void
@@ -243,68 +241,15 @@ Guide::on_element (const GstStructure *structure)
     on_mapping (structure);
 }
 
-void
-Guide::on_message (GstMessage *message)
-{
-  GError *error = nullptr;
-  gchar *text = nullptr;
-  switch (GST_MESSAGE_TYPE (message)) {
-  case GST_MESSAGE_EOS:
-    end (mapped_ && !unwritten_ ? Exit::done : Exit::failed);
-    return;
-  case GST_MESSAGE_ERROR:
-    gst_message_parse_error (message, &error, &text);
-    status_.line ("error: " + told (message, error, text));
-    end (mapped_ ? Exit::done : Exit::failed);
-    break;
-  case GST_MESSAGE_WARNING:
-    status_.line ("warning: " + warned (message));
-    break;
-  case GST_MESSAGE_INFO:
-    status_.line ("info: " + noted (message));
-    break;
-  case GST_MESSAGE_PROGRESS:
-    gst_message_parse_progress (message, nullptr, nullptr, &text);
-    status_.progress (text ? text : "");
-    break;
-  case GST_MESSAGE_LATENCY:
-    gst_bin_recalculate_latency (GST_BIN (pipeline ()));
-    break;
-  case GST_MESSAGE_ELEMENT:
-    on_element (gst_message_get_structure (message));
-    break;
-  default:
-    break;
-  }
-  g_clear_error (&error);
-  g_free (text);
-}
-
+/* A signal ends an alignment well. */
 Exit
-Guide::play ()
+Guide::judge (bool interrupted)
 {
-  value_of (job_.outputs.check (), Exit::usage);
-  const auto refused = job_.outputs.claim (job_.options.force);
-  for (const std::string &error : refused)
-    status_.line ("error: " + error);
-  if (!refused.empty ())
-    return Exit::failed;
-  takes_keys_ = isatty (STDIN_FILENO) != 0;
-  const guint keys =
-      takes_keys_ ? g_unix_fd_add (STDIN_FILENO, G_IO_IN, on_key, this) : 0;
-  run ();
-  if (keys != 0)
-    g_source_remove (keys);
-  stop ();
-  const auto errors = job_.outputs.finish (
-      mapped_ ? Outputs::Finish::publish : Outputs::Finish::discard);
-  for (const std::string &error : errors)
-    status_.line ("error: " + error);
-  if (!errors.empty ())
-    return Exit::failed;
-  if (const std::string wrote = job_.outputs.summary ({}); !wrote.empty ())
-    status_.line ("wrote " + wrote);
-  return exit_;
+  if (is_done ())
+    return unwritten_ ? Exit::failed : Exit::done;
+  if (interrupted)
+    status_.line ("stopped; the mirrors show the schedule again");
+  return interrupted ? Exit::interrupted : Exit::failed;
 }
 
 } // namespace
@@ -312,10 +257,8 @@ Guide::play ()
 Exit
 guide (Job &job, GstElement *calib, GstElement *stage)
 {
-  if (!job.options.print)
-    return Guide (job, calib, stage).play ();
-  print_pipeline (job);
-  return Exit::done;
+  const Guide guide (job, calib, stage);
+  return play (job).exit;
 }
 
 } // namespace codedexposure::app

@@ -81,6 +81,8 @@ struct Job {
   bool has_result = true;
   /** Called with each element message, on the main thread. */
   std::function<void (const GstStructure *)> on_message;
+  /** How the run ended, if its frames do not say it. */
+  std::function<Exit (bool interrupted)> judge;
   std::unique_ptr<Viewer> window;
   /** An error of an element that is shown in a window ends the run well. */
   bool has_window = false;
@@ -98,8 +100,5 @@ struct RunResult {
  * errors and the result. With --print, it prints the pipeline and does nothing.
  */
 RunResult play (Job &job);
-
-/** What play () does with --print. */
-void print_pipeline (Job &job);
 
 } // namespace codedexposure::app

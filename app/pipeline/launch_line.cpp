@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include <cctype>
 #include <set>
 
 #include "pipeline/graph.h"
@@ -11,23 +12,46 @@ using namespace gst;
 namespace
 {
 
+constexpr const char *kPlain = "abcdefghijklmnopqrstuvwxyz"
+                               "ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789"
+                               "+-_./:,=@%";
+
 /* A value, quoted for a shell and for gst-launch-1.0. */
 std::string
 quoted (const std::string &text)
 {
-  constexpr const char *kPlain = "abcdefghijklmnopqrstuvwxyz"
-                                 "ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789"
-                                 "+-_./:,=@%";
   if (!text.empty () && text.find_first_not_of (kPlain) == text.npos)
     return text;
   std::string inner = "\"";
   for (const char c : text)
     inner +=
         c == '"' || c == '\\' ? std::string ("\\") + c : std::string (1, c);
-  std::string outer = "'";
-  for (const char c : inner + "\"")
-    outer += c == '\'' ? std::string ("'\\''") : std::string (1, c);
-  return outer + "'";
+  return shell_word (inner + "\"");
+}
+
+/* A text for gst-launch-1.0, whose words a shell keeps as they are. */
+std::string
+shell_words (const std::string &text)
+{
+  std::string words, word;
+  bool in_quotes = false;
+  const auto end_word = [&] {
+    if (!word.empty ())
+      words += (words.empty () ? "" : " ") + shell_word (word);
+    word.clear ();
+  };
+  for (std::size_t i = 0; i < text.size (); i++) {
+    const bool escapes = text[i] == '\\' && i + 1 < text.size ();
+    in_quotes ^= text[i] == '"';
+    if (std::isspace (static_cast<unsigned char> (text[i])) && !in_quotes)
+      end_word ();
+    else
+      word += text[i];
+    if (escapes)
+      word += text[++i];
+  }
+  end_word ();
+  return words;
 }
 
 /* " NAME=VALUE" of each property that is not at its default. */
@@ -87,7 +111,7 @@ private:
         g_object_get_data (G_OBJECT (element), "description"));
     if (given)
       text_ += std::string (" \\( name=") + GST_OBJECT_NAME (element) + " " +
-               given + " \\)";
+               shell_words (given) + " \\)";
     else
       text_ += " " + factory_of (element) +
                " name=" + GST_OBJECT_NAME (element) + properties_of (element);
@@ -139,6 +163,17 @@ private:
 };
 
 } // namespace
+
+std::string
+shell_word (const std::string &text)
+{
+  if (!text.empty () && text.find_first_not_of (kPlain) == text.npos)
+    return text;
+  std::string word = "'";
+  for (const char c : text)
+    word += c == '\'' ? std::string ("'\\''") : std::string (1, c);
+  return word + "'";
+}
 
 std::string
 launch_line (GstElement *pipeline)

@@ -11,7 +11,7 @@
 #include <regex>
 #include <utility>
 
-#include "common/raii.h"
+#include "pipeline/cameras.h"
 #include "pipeline/graph.h"
 
 namespace codedexposure::app
@@ -141,6 +141,19 @@ with_options (const char *text)
   return std::regex_replace (text, property, "--$1");
 }
 
+std::string
+cameras_found ()
+{
+  std::string names;
+#ifdef HAVE_ARAVIS
+  for (const std::string &name : camera_names ())
+    names += (names.empty () ? "" : ", ") + name;
+#endif
+  return names.empty () ? "no camera was found; check its power and its network"
+                        : "the cameras that were found are " + names +
+                              "; set --camera to one of them";
+}
+
 bool
 is_video_sink (GstElement *element, GstElementFactory *factory)
 {
@@ -189,48 +202,69 @@ package_of (std::string_view element)
   return {};
 }
 
-std::string
-told (GstMessage *message, const GError *error, const gchar *debug)
+Told::Told (GstMessage *message)
 {
-  const gchar *detail = added (debug);
-  gchar *file = nullptr;
-  GstObject *source = GST_MESSAGE_SRC (message);
-  if (error->domain == GST_RESOURCE_ERROR &&
-      g_object_class_find_property (G_OBJECT_GET_CLASS (source), "location"))
-    g_object_get (source, "location", &file, nullptr);
-  const CharPtr owned (file);
-  return format ("%s: %s%s%s", file ? file : GST_OBJECT_NAME (source),
-      with_options (error->message).c_str (), detail ? "\n    " : "",
-      detail ? detail : "");
+  const auto parse = GST_MESSAGE_TYPE (message) == GST_MESSAGE_ERROR
+                         ? gst_message_parse_error
+                     : GST_MESSAGE_TYPE (message) == GST_MESSAGE_WARNING
+                         ? gst_message_parse_warning
+                         : gst_message_parse_info;
+  GError *parsed = nullptr;
+  gchar *text = nullptr;
+  parse (message, &parsed, &text);
+  error.reset (parsed);
+  debug.reset (text);
 }
 
 namespace
 {
 
 bool
-is_unfit (const gchar *debug)
+is_unfit (const Told &told)
 {
-  return debug && std::strstr (debug, "not-negotiated");
+  return told.debug && std::strstr (told.debug.get (), "not-negotiated");
 }
 
 } // namespace
 
 bool
-is_silence (std::string_view kind, const GError *error, const gchar *debug)
+is_silence (std::string_view kind, const Told &told)
 {
-  return kind == "aravissrc" && error->domain == GST_STREAM_ERROR &&
-         !is_unfit (debug);
+  return kind == "aravissrc" && told.error->domain == GST_STREAM_ERROR &&
+         !is_unfit (told);
 }
 
 std::string
-remedy_for (std::string_view kind, const GError *error, const gchar *debug)
+told (GstMessage *message)
 {
-  const bool unfit = is_unfit (debug);
+  const Told parts (message);
+  const gchar *detail = added (parts.debug.get ());
+  gchar *file = nullptr;
+  GstObject *source = GST_MESSAGE_SRC (message);
+  if (parts.error->domain == GST_RESOURCE_ERROR &&
+      g_object_class_find_property (G_OBJECT_GET_CLASS (source), "location"))
+    g_object_get (source, "location", &file, nullptr);
+  const CharPtr owned (file);
+  const std::string name = file ? file : GST_OBJECT_NAME (source);
+  if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_INFO && detail)
+    return name + ": " + detail;
+  return name + ": " + with_options (parts.error->message) +
+         (detail ? std::string ("\n    ") + detail : "");
+}
+
+std::string
+remedy_for (std::string_view kind, const Told &told)
+{
+  const GError *error = told.error.get ();
+  const bool unfit = is_unfit (told);
   const bool of_camera =
       kind == "aravissrc" || kind == "codedexposure-camerasrc";
   if (g_error_matches (
           error, GST_RESOURCE_ERROR, GST_RESOURCE_ERROR_NO_SPACE_LEFT))
     return "the disk is full; delete files, or write to another disk";
+  if (of_camera &&
+      g_error_matches (error, GST_RESOURCE_ERROR, GST_RESOURCE_ERROR_NOT_FOUND))
+    return cameras_found ();
   if (unfit && of_camera)
     return "the camera does not send such frames; check --size, --frame-rate, "
            "--bits and --pixel-format";
@@ -248,37 +282,10 @@ remedy_for (std::string_view kind, const GError *error, const gchar *debug)
   if (of_camera && text.find ("[PixelFormat]") != text.npos)
     return "the camera has no such pixel format; set --pixel-format to one "
            "that \"arv-tool-0.8 features\" lists";
-  if (is_silence (kind, error, debug))
+  if (is_silence (kind, told))
     return "the camera sent nothing for 2 s; check that the DMD runs and is "
            "wired to the camera's trigger line";
   return {};
-}
-
-std::string
-warned (GstMessage *message)
-{
-  GError *error = nullptr;
-  gchar *debug = nullptr;
-  gst_message_parse_warning (message, &error, &debug);
-  const std::string text = told (message, error, debug);
-  g_error_free (error);
-  g_free (debug);
-  return text;
-}
-
-std::string
-noted (GstMessage *message)
-{
-  GError *error = nullptr;
-  gchar *debug = nullptr;
-  gst_message_parse_info (message, &error, &debug);
-  const gchar *detail = added (debug);
-  const std::string text =
-      format ("%s: %s", GST_OBJECT_NAME (GST_MESSAGE_SRC (message)),
-          detail ? detail : error->message);
-  g_error_free (error);
-  g_free (debug);
-  return text;
 }
 
 std::string
@@ -389,6 +396,19 @@ notice (const GstStructure *message)
   return {};
 }
 
+guint64
+counted (GstElement *pipeline, const char *counter)
+{
+  guint64 most = 0;
+  each_element (pipeline, [&] (GstElement *element) {
+    guint64 count = 0;
+    if (const StructurePtr stats = stats_of (element))
+      gst_structure_get_uint64 (stats.get (), counter, &count);
+    most = std::max (most, count);
+  });
+  return most;
+}
+
 std::string
 flaws_of (GstElement *pipeline)
 {
@@ -400,13 +420,7 @@ flaws_of (GstElement *pipeline)
       {"slips", "losses of synchronisation", "loss of synchronisation"}};
   std::string text;
   for (const auto &[counter, text_of_many, text_of_one] : kFlaws) {
-    guint64 most = 0; // several elements count the same frames
-    each_element (pipeline, [&] (GstElement *element) {
-      guint64 count = 0;
-      if (const StructurePtr stats = stats_of (element))
-        gst_structure_get_uint64 (stats.get (), counter, &count);
-      most = std::max (most, count);
-    });
+    const guint64 most = counted (pipeline, counter);
     if (most > 0)
       text += format (", %" G_GUINT64_FORMAT " %s", most,
           most == 1 ? text_of_one : text_of_many);

@@ -2,10 +2,13 @@
 /* Messages and counters of elements, as texts for the user. */
 #pragma once
 
+#include <memory>
 #include <string>
 #include <string_view>
 
 #include <gst/gst.h>
+
+#include "common/raii.h"
 
 namespace codedexposure::app
 {
@@ -22,22 +25,24 @@ double cpu_seconds ();
 /** The Debian package of @p element; empty if not known. */
 std::string package_of (std::string_view element);
 
-/** Source and text of an ERROR or WARNING message with its details, without the
- * position in the code; properties are named as the options of commands. */
-std::string told (GstMessage *message, const GError *error, const gchar *debug);
+/** What an ERROR, WARNING or INFO message says. */
+struct Told {
+  explicit Told (GstMessage *message);
+
+  std::unique_ptr<GError, decltype (&g_error_free)> error{
+      nullptr, g_error_free};
+  gst::CharPtr debug;
+};
+/** Source and text of such a message with its details, without the position in
+ * the code; properties are named as the options of commands. Of an INFO
+ * message, the details alone, as gst-launch-1.0 prints them. */
+std::string told (GstMessage *message);
 /** Whether an error of an element of @p kind is the one after which aravissrc
  * ends: its camera sent nothing for 2 s. */
-bool is_silence (
-    std::string_view kind, const GError *error, const gchar *debug);
+bool is_silence (std::string_view kind, const Told &told);
 /** What the user can do about an error of an element of @p kind; empty: its
  * text says it. */
-std::string remedy_for (
-    std::string_view kind, const GError *error, const gchar *debug);
-/** The same of a WARNING message. */
-std::string warned (GstMessage *message);
-/** The same for an INFO message: its details, as gst-launch-1.0 prints them, or
- * its text. */
-std::string noted (GstMessage *message);
+std::string remedy_for (std::string_view kind, const Told &told);
 
 /** "name: field=value ..." of an element message. */
 std::string fields_of (GstMessage *message);
@@ -45,6 +50,10 @@ std::string fields_of (GstMessage *message);
 /** An element message about frames that were lost or damaged, as a warning for
  * the user; empty: it is about something else. */
 std::string notice (const GstStructure *message);
+
+/** The largest of the counters @p counter in the property stats of the elements
+ * of @p pipeline: several count the same frames. */
+guint64 counted (GstElement *pipeline, const char *counter);
 
 /** ", 3 lost, 1 corrupted": coded frames of @p pipeline, from the counters of
  * its elements; empty: none. */

@@ -6,9 +6,14 @@
 #include <set>
 #include <utility>
 
+#include <fcntl.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
+#include "failure.h"
+#include "pipeline/graph.h"
 #include "pipeline/pictures.h"
+#include "record/matroska.h"
 
 namespace codedexposure::app
 {
@@ -33,16 +38,15 @@ class File : public Output
 public:
   File (GstElement *element, const char *property, const std::string &name,
       const Outputs::FileKind &kind)
-      : element_ (element), property_ (property), sidecar_ (kind.sidecar),
+      : element_ (element), property_ (property), kind_ (kind),
         part_ (name, Part::kFile)
   {
     if (kind.frames)
       pad_.reset (GST_PAD (gst_object_ref (kind.frames)));
   }
 
-  Result<void> claim (bool replace) override
+  Result<void> check_name (bool replace) override
   {
-    replace_ = replace;
     const std::string &name = part_.name ();
     std::error_code ignored;
     if (fs::is_directory (name, ignored))
@@ -50,6 +54,11 @@ public:
     if (!replace && fs::exists (fs::symlink_status (name, ignored)))
       return Error{name + " exists; choose another name, or set --force to "
                           "replace it"};
+    return {};
+  }
+  Result<void> claim (bool replace) override
+  {
+    replace_ = replace;
     if (auto claimed = part_.claim (replace); !claimed)
       return claimed;
     g_object_set (element_, property_, part_.path ().c_str (), nullptr);
@@ -87,16 +96,42 @@ public:
   }
   const std::string &name () const override { return part_.name (); }
   const std::string &part () const override { return part_.path (); }
-  bool is_sidecar () const override { return sidecar_; }
+  bool is_sidecar () const override { return kind_.sidecar; }
+  bool is_recording () const override { return kind_.recording; }
 
 private:
   GstElement *element_; // of the pipeline, which outlives this
   const char *property_;
-  bool sidecar_;
+  Outputs::FileKind kind_;
   ObjectPtr<GstPad> pad_;
   Part part_;
   bool replace_ = false;
 };
+
+/* The files that elements read: those of sources, and those that settings
+ * name. */
+std::vector<std::string>
+inputs_of (GstElement *pipeline)
+{
+  std::vector<std::string> inputs;
+  each_element (pipeline, [&inputs] (GstElement *element) {
+    const bool reads =
+        GST_OBJECT_FLAG_IS_SET (element, GST_ELEMENT_FLAG_SOURCE);
+    for (const char *property : {"location", "schedule", "mapping", "bench"})
+      if ((reads || !g_str_equal (property, "location")) &&
+          g_object_class_find_property (G_OBJECT_GET_CLASS (element), property))
+        inputs.push_back (text_property (element, property));
+  });
+  return inputs;
+}
+
+/* Whether @path has the coded frames of an earlier run. */
+bool
+has_recording (const std::string &path)
+{
+  const auto info = recording_info (path);
+  return info && info->setup;
+}
 
 /* What @path is, by device and inode; none: it does not exist. */
 std::optional<std::pair<std::uintmax_t, std::uintmax_t>>
@@ -137,7 +172,12 @@ check_is_no_input (
 }
 
 Outputs::Outputs () = default;
-Outputs::~Outputs () = default;
+Outputs::~Outputs ()
+{
+  for (const auto &[name, opened] : pipes_)
+    if (opened >= 0)
+      close (opened);
+}
 
 void
 Outputs::file (GstElement *element, const char *property,
@@ -148,6 +188,8 @@ Outputs::file (GstElement *element, const char *property,
   if (fs::exists (status) && !fs::is_regular_file (status) &&
       !fs::is_directory (status)) {
     g_object_set (element, property, name.c_str (), nullptr);
+    if (fs::is_fifo (status))
+      pipes_.emplace_back (name, -1);
     return;
   }
   /* A link stays, and the file that it leads to is replaced. */
@@ -165,12 +207,20 @@ Outputs::pictures (GstElement *sink, GstPad *coded, const std::string &format)
 }
 
 Result<void>
-Outputs::check () const
+Outputs::check (GstElement *pipeline) const
 {
+  std::vector<std::string> inputs = inputs_of (pipeline);
+  inputs.insert (inputs.end (), inputs_.begin (), inputs_.end ());
   std::set<std::string> names;
   for (const auto &output : outputs_) {
-    if (auto checked = check_is_no_input (output->name (), inputs_); !checked)
-      return checked;
+    for (const std::string &written :
+        {output->name (), output->name () + ".part"})
+      if (auto checked = check_is_no_input (written, inputs); !checked)
+        return checked;
+    if (!output->is_recording () && has_recording (output->name ()))
+      return Error{output->name () +
+                   " is a recording, which nothing but a recording replaces; "
+                   "use another name, or delete it yourself"};
     std::error_code error;
     const fs::path whole = fs::absolute (output->name (), error);
     const fs::path canonical = fs::weakly_canonical (whole, error);
@@ -187,7 +237,9 @@ Outputs::claim (bool replace)
   std::vector<std::string> errors;
   std::vector<Output *> claimed;
   for (const auto &output : outputs_) {
-    const Result<void> result = output->claim (replace);
+    Result<void> result = output->check_name (replace);
+    if (result)
+      result = output->claim (replace);
     if (result)
       claimed.push_back (output.get ());
     else
@@ -201,11 +253,28 @@ Outputs::claim (bool replace)
   return errors;
 }
 
-void
-Outputs::name_elements () const
+std::string
+Outputs::unread_pipe ()
 {
-  for (const auto &output : outputs_)
+  for (auto &[name, opened] : pipes_) {
+    if (opened < 0)
+      opened = open (name.c_str (), O_WRONLY | O_NONBLOCK | O_CLOEXEC);
+    if (opened < 0)
+      return name;
+  }
+  return {};
+}
+
+std::string
+Outputs::name_elements (bool replace)
+{
+  std::string before;
+  for (const auto &output : outputs_) {
+    value_of (output->check_name (replace));
     output->name_element ();
+    before += output->preparation ();
+  }
+  return before;
 }
 
 std::vector<std::string>

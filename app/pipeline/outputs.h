@@ -23,8 +23,11 @@ class Output
 public:
   virtual ~Output () = default;
 
-  /** Before the element opens anything: refuses a name that exists, unless @p
-   * replace, and lets the element write beside it. */
+  /** Error: the name cannot be one of an output, or what has it may not be
+   * replaced. */
+  virtual Result<void> check_name (bool replace) = 0;
+  /** After that, and before the element opens anything: lets the element write
+   * beside the name. */
   virtual Result<void> claim (bool replace) = 0;
   /** Gives the element the name itself, for a pipeline that is printed. */
   virtual void name_element () = 0;
@@ -43,6 +46,10 @@ public:
   guint64 frames () const { return frames_; }
   /** Whether it only describes the frames that other outputs have. */
   virtual bool is_sidecar () const { return false; }
+  /** Whether it is a recording, which may replace another one. */
+  virtual bool is_recording () const { return false; }
+  /** What a shell has to do before the element can write the name itself. */
+  virtual std::string preparation () const { return {}; }
 
 protected:
   /** Frames that the element got. */
@@ -56,32 +63,38 @@ public:
   Outputs ();
   ~Outputs ();
 
-  /** A file or folder that is read. */
+  /** A file that is read, but by no element of the pipeline. */
   void reads (const std::string &path) { inputs_.push_back (path); }
 
   /** Where frames for a file are counted, and what the file is. */
   struct FileKind {
     GstPad *frames = nullptr; ///< each buffer is a frame
     bool sidecar = false;     ///< describes the frames of other files
+    bool recording = false;   ///< of coded frames
   };
   /** @p element writes the file @p name, which it gets in its property @p
-   * property. A name such as /dev/null is written directly. */
+   * property. A pipe, or a name such as /dev/null, is written directly. */
   void file (GstElement *element, const char *property, const std::string &name,
       const FileKind &kind);
   /** @p sink, a multifilesink, writes numbered pictures of coded frames that
    * pass @p coded; @p format: "folder/%06d.png". */
   void pictures (GstElement *sink, GstPad *coded, const std::string &format);
 
-  /** Error if one of them is an input, or two have the same name. */
-  Result<void> check () const;
+  /** Error if one of them is an input of @p pipeline or a recording, or if two
+   * have the same name. */
+  Result<void> check (GstElement *pipeline) const;
   /** Claims all of them. Errors: why they cannot be written, one for each;
    * nothing is left. */
   std::vector<std::string> claim (bool replace);
   bool empty () const { return outputs_.empty (); }
+  /** A pipe that nobody reads; empty: none, and those that are read stay open
+   * until this ends. */
+  std::string unread_pipe ();
 
   /** For a pipeline that is printed and not played: elements write the names
-   * themselves. */
-  void name_elements () const;
+   * themselves. Returns what a shell does before: "mkdir -p ... && ". Throws
+   * Failure if a name may not be written. */
+  std::string name_elements (bool replace);
 
   enum class Finish {
     publish, ///< those with frames get their names; the others go
@@ -99,6 +112,7 @@ public:
 private:
   std::vector<std::string> inputs_;
   std::vector<std::unique_ptr<Output>> outputs_;
+  std::vector<std::pair<std::string, int>> pipes_; // -1: nobody reads it yet
   std::vector<const Output *> kept_;
   bool published_ = false;
 };

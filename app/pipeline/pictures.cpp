@@ -12,6 +12,7 @@
 #include <system_error>
 #include <utility>
 
+#include "pipeline/graph.h"
 #include "pipeline/messages.h"
 
 namespace codedexposure::app
@@ -122,7 +123,7 @@ Pictures::Pictures (GstElement *sink, GstPad *coded, const std::string &format)
 }
 
 Result<void>
-Pictures::check_names () const
+Pictures::check_unused () const
 {
   std::error_code ignored;
   const fs::path folder = names_.folder.empty () ? "." : names_.folder;
@@ -139,24 +140,28 @@ Pictures::check_names () const
 }
 
 Result<void>
-Pictures::claim (bool replace)
+Pictures::check_name (bool replace)
 {
-  replace_ = replace;
   auto names = PictureNames::parse (format_);
   if (!names)
     return names.error ();
   names_ = std::move (*names);
-  const bool fill = names_.fill_folder () && !names_.folder.empty ();
-  name_ = fill ? names_.folder + "/"
-               : names_.path (names_.prefix + names_.number + names_.suffix);
+  name_ = fills_named_folder ()
+              ? names_.folder + "/"
+              : names_.path (names_.prefix + names_.number + names_.suffix);
   std::error_code ignored;
   if (!names_.folder.empty () && fs::exists (names_.folder, ignored) &&
       !fs::is_directory (names_.folder, ignored))
     return Error{names_.folder + " is a file; name a folder"};
-  if (!replace)
-    if (auto unused = check_names (); !unused)
-      return unused;
-  part_ = std::make_unique<Part> (fill ? names_.folder : name_, Part::kFolder);
+  return replace ? Result<void> () : check_unused ();
+}
+
+Result<void>
+Pictures::claim (bool replace)
+{
+  replace_ = replace;
+  part_ = std::make_unique<Part> (
+      fills_named_folder () ? names_.folder : name_, Part::kFolder);
   if (auto claimed = part_->claim (replace); !claimed)
     return claimed;
   table_.reset (
@@ -271,6 +276,14 @@ void
 Pictures::name_element ()
 {
   g_object_set (sink_, "location", format_.c_str (), nullptr);
+}
+
+std::string
+Pictures::preparation () const
+{
+  return names_.folder.empty ()
+             ? ""
+             : "mkdir -p -- " + shell_word (names_.folder) + " && ";
 }
 
 bool

@@ -41,8 +41,10 @@ public:
   /** @p coded  pad with the coded frames of the pictures, or null. */
   Pictures (GstElement *sink, GstPad *coded, const std::string &format);
 
+  Result<void> check_name (bool replace) override;
   Result<void> claim (bool replace) override;
   void name_element () override;
+  std::string preparation () const override;
   Result<void> publish () override;
   void discard () override { part_->discard (); }
   bool has_content () const override;
@@ -50,7 +52,11 @@ public:
   const std::string &part () const override { return part_->path (); }
 
 private:
-  Result<void> check_names () const;
+  bool fills_named_folder () const
+  {
+    return names_.fill_folder () && !names_.folder.empty ();
+  }
+  Result<void> check_unused () const;
   void watch_flags (GstPad *sink_pad);
   void add (GstPad *pad, GstBuffer *picture);
   gint next_index (GstPad *pad, const std::optional<gst::FrameMeta> &meta);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "plugin.h"
 
+#include <clocale>
 #include <cstdlib>
 #include <filesystem>
 #include <string>
@@ -68,6 +69,9 @@ start_gstreamer ()
     setenv ("GST_PLUGIN_PATH_1_0", path.c_str (), 1);
   }
   gst_init (nullptr, nullptr);
+  /* GStreamer takes the locale of the user, in which numbers may have a comma:
+   * texts are translated, but numbers are printed and read as in C. */
+  std::setlocale (LC_NUMERIC, "C");
   const ObjectPtr<GstElementFactory> found (
       gst_element_factory_find ("codedexposure-demux"));
   if (!found)

@@ -65,7 +65,8 @@ write_recording (Job &job, Chain &chain, const std::string &file,
     chain.to ("codedexposure-filesink", {{"reserve", style.bytes}});
   else
     chain.to ("filesink");
-  job.outputs.file (chain.last (), "location", file, {.frames = frames.get ()});
+  job.outputs.file (chain.last (), "location", file,
+      {.frames = frames.get (), .recording = true});
   job.outputs.file (mux, "log-location", sidecar_of (file),
       {.frames = frames.get (), .sidecar = true});
   if (!job.counted)
@@ -75,7 +76,6 @@ write_recording (Job &job, Chain &chain, const std::string &file,
 Chain
 read_recording (Job &job, const std::string &file)
 {
-  job.outputs.reads (file);
   job.source = file;
   Chain chain = job.graph.begin ("filesrc", {{"location", file}});
   chain.to ("codedexposure-recorddemux", {{"salvage", job.salvage}});

@@ -1,24 +1,11 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Plays a pipeline: progress, errors, the end, and the result. */
-#include <algorithm>
-#include <chrono>
-#include <memory>
-#include <string>
-#include <string_view>
+/* Plays a pipeline: signals, progress and errors. */
+#include "run.h"
+
+#include <csignal>
 #include <utility>
-#include <vector>
 
-#include <nlohmann/json.hpp>
-
-#include "pipeline/buffer_watch.h"
-#include "pipeline/frame_limit.h"
-#include "pipeline/job.h"
-#include "pipeline/leaky_queue.h"
-#include "pipeline/loop.h"
-#include "pipeline/messages.h"
-#include "pipeline/receivers.h"
-#include "pipeline/recording_branch.h"
-#include "pipeline/status.h"
+#include <glib-unix.h>
 
 namespace codedexposure::app
 {
@@ -28,72 +15,13 @@ using namespace gst;
 namespace
 {
 
-using Clock = std::chrono::steady_clock;
-
-class Run : public Loop
+bool
+is_ignored (int signal)
 {
-public:
-  explicit Run (Job &job)
-      : Loop (job.graph.pipeline ()), job_ (job),
-        status_ (job.command, job.options.verbose),
-        damaged_ (job.salvage && job.retry <= 0)
-  {
-  }
-  ~Run () override { stop (); }
-
-  RunResult play ();
-
-private:
-  void prepare ();
-  void watch_window ();
-  void begin () override;
-  void on_signal (int times) override;
-  void on_message (GstMessage *message) override;
-  void on_error (GstMessage *message);
-  void on_element_message (const GstStructure *structure, GstMessage *message);
-  bool try_to_connect_again (std::string_view kind, const GError *error);
-  bool is_closed_window (GstObject *source, const GError *error) const;
-  void start_playing ();
-  bool set_playing ();
-  void end_when_received (Exit exit);
-  void wait_for_receivers ();
-  void end_after_error (GstObject *failed);
-  void end (Exit exit);
-  void stop () { gst_element_set_state (pipeline (), GST_STATE_NULL); }
-  void tick ();
-  void watch_for_silence (gint64 frames);
-  RunResult finish ();
-  void say_no_frame ();
-  bool publish ();
-  void print_result (const std::string &flaws, const std::string &wrote);
-  void print_json (Exit exit, const std::string &flaws) const;
-  void print_counters ();
-  gint64 frames () const { return counter_ ? counter_->frames ().load () : 0; }
-
-  Job &job_;
-  Status status_;
-  std::unique_ptr<FrameCounter> counter_;
-  std::vector<std::unique_ptr<LeakyQueue>> leaky_queues_;
-  std::unique_ptr<BufferWatch> buffer_watch_;
-  std::unique_ptr<Receivers> receivers_;
-  std::unique_ptr<RecordingBranch> recording_; // beside a window
-  std::unique_ptr<FrameLimit> limit_;
-  Exit exit_ = Exit::done;
-  Clock::time_point began_ = Clock::now ();
-  Clock::time_point heard_ = Clock::now (); // the last new frame
-  Clock::time_point retry_until_ = Clock::now ();
-  gint64 frames_before_ = -1; // at the last tick
-  double cpu_at_start_ = 0;
-  bool playing_ = false;
-  bool waiting_ = false; // for a receiver, or to try to connect again
-  bool ending_ = false;  // the stream has ended
-  bool silent_ = false;  // no frame came for a while, and that was said
-  bool interrupted_ = false;
-  bool failed_ = false; // the stream ends because of an error
-  bool damaged_;        // frames are missing or damaged
-  bool container_damaged_ = false;
-  std::string noticed_; // the last notice
-};
+  struct sigaction action = {};
+  return sigaction (signal, nullptr, &action) == 0 &&
+         action.sa_handler == SIG_IGN;
+}
 
 void
 end_at_sources (GstElement *element, gpointer)
@@ -103,6 +31,55 @@ end_at_sources (GstElement *element, gpointer)
     return gboolean (TRUE);
   };
   gst_element_foreach_src_pad (element, end, nullptr);
+}
+
+} // namespace
+
+Run::Run (Job &job)
+    : job_ (job), loop_ (g_main_loop_new (nullptr, FALSE)),
+      status_ (job.command, job.options.verbose),
+      damaged_ (job.salvage && job.retry <= 0)
+{
+}
+
+Run::~Run ()
+{
+  stop ();
+  g_main_loop_unref (loop_);
+}
+
+gboolean
+Run::on_unix_signal (gpointer data)
+{
+  auto *signal = static_cast<Signal *> (data);
+  signal->run->on_signal (++signal->times);
+  return G_SOURCE_CONTINUE;
+}
+
+/* Signals are handled before the pipeline starts, so that one during the
+ * opening of a device does not leave it open. */
+void
+Run::run_loop ()
+{
+  const auto on_bus = [] (GstBus *, GstMessage *message, gpointer self) {
+    static_cast<Run *> (self)->on_message (message);
+    return gboolean (G_SOURCE_CONTINUE);
+  };
+  const ObjectPtr<GstBus> bus (gst_element_get_bus (pipeline ()));
+  gst_bus_add_watch (bus.get (), on_bus, this);
+  /* The reader of the messages may be gone. */
+  std::signal (SIGPIPE, SIG_IGN);
+  Signal signals[] = {{this, SIGINT}, {this, SIGTERM}, {this, SIGHUP}};
+  std::vector<guint> sources;
+  for (Signal &signal : signals)
+    if (signal.number != SIGHUP || !is_ignored (SIGHUP)) // nohup
+      sources.push_back (
+          g_unix_signal_add (signal.number, on_unix_signal, &signal));
+  begin ();
+  g_main_loop_run (loop_);
+  for (const guint source : sources)
+    g_source_remove (source);
+  gst_bus_remove_watch (bus.get ());
 }
 
 void
@@ -145,7 +122,7 @@ Run::watch_window ()
 RunResult
 Run::play ()
 {
-  value_of (job_.outputs.check (), Exit::usage);
+  value_of (job_.outputs.check (pipeline ()), Exit::usage);
   prepare ();
   const auto errors = job_.outputs.claim (job_.options.force);
   for (const std::string &error : errors)
@@ -157,7 +134,7 @@ Run::play ()
     return gboolean (G_SOURCE_CONTINUE);
   };
   const guint ticks = g_timeout_add (200, on_tick, this);
-  run ();
+  run_loop ();
   g_source_remove (ticks);
   return finish ();
 }
@@ -167,10 +144,10 @@ Run::begin ()
 {
   retry_until_ = Clock::now () + std::chrono::milliseconds (
                                      gint64 (job_.retry.value_or (0) * 1000));
-  waiting_ = job_.waits_for_receiver;
-  if (waiting_)
+  waiting_ = job_.waits_for_receiver || !job_.outputs.unread_pipe ().empty ();
+  if (job_.waits_for_receiver)
     gst_element_set_state (pipeline (), GST_STATE_PAUSED);
-  else
+  else if (!waiting_)
     start_playing ();
 }
 
@@ -196,7 +173,7 @@ void
 Run::end (Exit exit)
 {
   exit_ = exit;
-  quit ();
+  g_main_loop_quit (loop_);
 }
 
 /* Receivers may be behind. */
@@ -208,14 +185,14 @@ Run::end_when_received (Exit exit)
   if (receivers_)
     wait_for_receivers ();
   else
-    quit ();
+    g_main_loop_quit (loop_);
 }
 
 void
 Run::wait_for_receivers ()
 {
   if (receivers_->are_done ())
-    quit ();
+    g_main_loop_quit (loop_);
   else
     status_.progress ("waiting for the receivers");
 }
@@ -296,12 +273,8 @@ Run::on_error (GstMessage *message)
   GstObject *source = GST_MESSAGE_SRC (message);
   if (recording_ && recording_->is_removed () && recording_->has (source))
     return; // it follows from the first
-  GError *error = nullptr;
-  gchar *detail = nullptr;
-  gst_message_parse_error (message, &error, &detail);
-  const CharPtr owned_detail (detail);
-  const std::unique_ptr<GError, decltype (&g_error_free)> owned (
-      error, g_error_free);
+  const Told parts (message);
+  const GError *error = parts.error.get ();
   const std::string kind = factory_of (source);
 
   if (try_to_connect_again (kind, error))
@@ -320,8 +293,8 @@ Run::on_error (GstMessage *message)
     end (Exit::failed);
     return;
   }
-  status_.line ("error: " + told (message, error, detail));
-  const std::string remedy = remedy_for (kind, error, detail);
+  status_.line ("error: " + told (message));
+  const std::string remedy = remedy_for (kind, parts);
   if (!remedy.empty ())
     status_.line (remedy);
   if (recording_ && recording_->has (source)) {
@@ -371,11 +344,11 @@ Run::on_message (GstMessage *message)
       on_error (message);
     break;
   case GST_MESSAGE_WARNING:
-    status_.line ("warning: " + warned (message));
+    status_.line ("warning: " + told (message));
     break;
   case GST_MESSAGE_INFO:
     if (job_.options.verbose)
-      status_.line ("info: " + noted (message));
+      status_.line ("info: " + told (message));
     break;
   case GST_MESSAGE_PROGRESS: {
     GstProgressType type;
@@ -397,12 +370,16 @@ Run::on_message (GstMessage *message)
   }
 }
 
-/* A camera whose frames are all incomplete posts no error. */
+/* A camera whose frames are all incomplete posts no error. Frames that wait for
+ * a slow disk have come. */
 void
 Run::watch_for_silence (gint64 frames)
 {
   constexpr auto kSilence = std::chrono::seconds (5);
-  if (std::exchange (frames_before_, frames) != frames)
+  guint waiting = 0;
+  if (job_.buffer)
+    g_object_get (job_.buffer, "current-level-buffers", &waiting, nullptr);
+  if (std::exchange (frames_before_, frames) != frames || waiting > 0)
     heard_ = Clock::now ();
   if (!job_.from_camera || silent_ || interrupted_ ||
       Clock::now () - heard_ < kSilence)
@@ -417,7 +394,9 @@ void
 Run::tick ()
 {
   if (waiting_) {
-    if (!receivers_ || receivers_->is_anybody_there ())
+    if (const std::string pipe = job_.outputs.unread_pipe (); !pipe.empty ())
+      status_.progress ("waiting for a program that reads " + pipe);
+    else if (!receivers_ || receivers_->is_anybody_there ())
       start_playing ();
     else
       status_.progress ("waiting for a receiver");
@@ -451,140 +430,23 @@ Run::tick ()
   status_.progress (text);
 }
 
-void
-Run::say_no_frame ()
+namespace
 {
-  if (damaged_)
-    status_.line ("error: the head of the stream is damaged, so its tracks "
-                  "cannot be found; if ffmpeg reads it, \"ffmpeg -i IN.mkv "
-                  "-map 0 -c copy OUT.mkv\" writes a new one");
-  else if (job_.times.is_part ())
-    status_.line (
-        "no coded frame lies in this part of the recording" +
-        (job_.times.start
-                ? format (", from %g s on; check whether that is after its end",
-                      double (*job_.times.start) / double (GST_SECOND))
-                : ""));
-  else if (!interrupted_)
-    status_.line ("error: no coded frame arrived");
-  else if (exit_ != Exit::interrupted)
-    status_.line ("stopped before the first coded frame");
-}
-
-/* A recording gets its name however it ends; other results only if they are
- * whole. False: something could not be written. */
-bool
-Run::publish ()
-{
-  stop ();
-  const bool whole =
-      exit_ == Exit::done && (job_.ends_by_signal || !interrupted_) && !failed_;
-  const auto how = container_damaged_             ? Outputs::Finish::discard
-                   : whole || job_.ends_by_signal ? Outputs::Finish::publish
-                                                  : Outputs::Finish::keep;
-  const auto errors = job_.outputs.finish (how);
-  for (const std::string &error : errors)
-    status_.line ("error: " + error);
-  return errors.empty ();
-}
-
-RunResult
-Run::finish ()
-{
-  if (job_.options.verbose && frames () > 0)
-    print_counters ();
-  if (job_.window)
-    job_.window->finish ();
-  const std::string flaws = flaws_of (pipeline ());
-  const bool published = publish ();
-  RunResult result{exit_, frames (), container_damaged_, interrupted_};
-  if (container_damaged_)
-    return result;
-  if (counter_ && frames () == 0 &&
-      (exit_ != Exit::nobody || job_.times.is_part ())) {
-    say_no_frame ();
-    result.exit = interrupted_                         ? Exit::interrupted
-                  : job_.times.is_part () && !damaged_ ? Exit::nobody
-                                                       : Exit::failed;
-  } else if (result.exit == Exit::done) {
-    if (interrupted_ && !job_.ends_by_signal)
-      result.exit = Exit::interrupted;
-    else if (damaged_)
-      result.exit = Exit::damaged;
-  }
-  if (result.exit == Exit::done && receivers_ && receivers_->count () == 0) {
-    status_.line ("nobody received the stream");
-    result.exit = Exit::nobody;
-  }
-  if (!published || (recording_ && recording_->is_removed ()))
-    result.exit = Exit::failed;
-  const std::string wrote = job_.outputs.summary (guint64 (frames ()));
-  if (frames () > 0 || !counter_)
-    print_result (flaws, wrote);
-  if (job_.options.json)
-    print_json (result.exit, flaws);
-  return result;
-}
-
-void
-Run::print_result (const std::string &flaws, const std::string &wrote)
-{
-  const bool whole =
-      exit_ == Exit::done && (job_.ends_by_signal || !interrupted_);
-  if (!job_.has_result || (!counter_ && wrote.empty ()))
-    return;
-  std::string text;
-  if (counter_)
-    text = format ("%" G_GINT64_FORMAT " coded frames", frames ()) +
-           (job_.source.empty () ? "" : " of " + job_.source) + flaws;
-  if (const int count = receivers_ ? receivers_->count () : 0; count > 0)
-    text += format ("; sent to %d receiver%s", count, count > 1 ? "s" : "");
-  if (!wrote.empty ())
-    text += (text.empty () ? "" : "; ") +
-            std::string (exit_ == Exit::failed ? "kept what was complete: "
-                         : whole               ? "wrote "
-                                               : "stopped; kept ") +
-            wrote;
-  status_.line (text);
-}
-
-void
-Run::print_json (Exit exit, const std::string &flaws) const
-{
-  nlohmann::ordered_json json = {{"command", job_.command},
-      {"source", job_.source}, {"frames", frames ()},
-      {"flaws", flaws.empty () ? "" : flaws.substr (2)},
-      {"outputs", job_.outputs.names ()}, {"damaged", damaged_},
-      {"interrupted", interrupted_}, {"status", int (exit)}};
-  std::printf ("%s\n", json.dump ().c_str ());
-}
-
-void
-Run::print_counters ()
-{
-  const double seconds =
-      std::chrono::duration<double> (Clock::now () - began_).count ();
-  const double cpu = cpu_seconds () - cpu_at_start_;
-  status_.line (
-      format ("%.1f s, %.1f coded frames/s, %.0f %% of one processor core",
-          seconds, double (frames ()) / seconds, 100 * cpu / seconds));
-  each_element (pipeline (), [this] (GstElement *element) {
-    const std::string counters = counters_of (element);
-    if (!counters.empty ())
-      status_.line (counters);
-  });
-  for (const auto &queue : leaky_queues_)
-    status_.line (queue->counters ());
-}
-
-} // namespace
 
 void
 print_pipeline (Job &job)
 {
-  job.outputs.name_elements ();
-  std::printf ("%s\n", launch_line (job.graph.pipeline ()).c_str ());
+  if (job.times.is_part ())
+    usage_error ("--print shows a line for gst-launch-1.0, which plays a whole "
+                 "recording; leave --start, --duration, --excerpt and "
+                 "--find-phase out");
+  value_of (job.outputs.check (job.graph.pipeline ()), Exit::usage);
+  const std::string before = job.outputs.name_elements (job.options.force);
+  std::printf (
+      "%s%s\n", before.c_str (), launch_line (job.graph.pipeline ()).c_str ());
 }
+
+} // namespace
 
 RunResult
 play (Job &job)

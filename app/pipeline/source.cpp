@@ -3,8 +3,14 @@
 
 #include <string>
 
+#include "base/text.h"
+#include "common/element.h"
+#include "pipeline/cameras.h"
+
 namespace codedexposure::app
 {
+
+using namespace gst;
 
 namespace
 {
@@ -42,7 +48,6 @@ input_scene (Job &job, const SourceOptions &options, const SourcePlan &plan)
       .to ("identity", {{"single-segment", true}})
       .to ("videorate", {{"rate", speed}})
       .caps (grey_caps (plan, to));
-  job.outputs.reads (*options.input);
   return chain;
 }
 
@@ -96,6 +101,41 @@ add_camera_settings (Settings &settings, const SourceOptions &options)
   set_if (settings, "reconnect", options.reconnect);
   set_if (settings, "bench", options.bench);
 }
+
+#ifdef HAVE_ARAVIS
+
+/* A camera that is not told how long to expose does what it was last set to.
+ * The first frame, in whose exposure not all slots lie, is an error. */
+GstPadProbeReturn
+check_first_frame (GstPad *pad, GstPadProbeInfo *, gpointer needed)
+{
+  const double least = 1e-3 * double (*static_cast<Nanoseconds *> (needed));
+  const ObjectPtr<GstPad> source (gst_pad_get_peer (pad));
+  const ObjectPtr<GstElement> camera (
+      gst_pad_get_parent_element (source.get ()));
+  const auto exposure = camera_exposure (camera.get ());
+  if (!exposure || *exposure > least)
+    return GST_PAD_PROBE_REMOVE;
+  POST_ERROR (camera.get (), STREAM, WRONG_TYPE,
+      "the camera exposes for " + real_text (*exposure) +
+          " us, but the last slot of the schedule begins after " +
+          real_text (least) + " us; set a longer --exposure");
+  return GST_PAD_PROBE_DROP;
+}
+
+void
+watch_exposure (GstElement *behind_camera, const SourcePlan &plan)
+{
+  const auto slots = SlotPlan::fit (
+      plan.schedule.timing (), plan.schedule.slots (), plan.frame_rate);
+  if (slots)
+    gst_pad_add_probe (pad_of (behind_camera, "sink").get (),
+        GST_PAD_PROBE_TYPE_BUFFER, check_first_frame,
+        new Nanoseconds (slots->start (slots->slots () - 1)),
+        [] (gpointer needed) { delete static_cast<Nanoseconds *> (needed); });
+}
+
+#endif
 
 /* The frames of a user's source may already have a schedule and times. */
 void
@@ -163,6 +203,10 @@ coded_source (
       : options.source
           ? job.graph.from (job.graph.add_text (*options.source))
           : simulation (job, options, plan, pace, {{"dmd", "sim:bench"}});
+#ifdef HAVE_ARAVIS
+  if (options.camera)
+    watch_exposure (chain.last (), plan);
+#endif
   if (options.camera)
     job.source = "the camera " + *options.camera;
   else if (options.source)

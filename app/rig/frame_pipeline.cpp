@@ -46,16 +46,12 @@ FramePipeline::take_error ()
   while (GstMessage *message =
              gst_bus_pop_filtered (bus.get (), GST_MESSAGE_ERROR)) {
     const std::unique_ptr<GstMessage, MiniObjectUnref> owner (message);
-    GError *error = nullptr;
-    gchar *detail = nullptr;
-    gst_message_parse_error (message, &error, &detail);
-    const std::unique_ptr<GError, FreeWith<g_error_free>> owned (error);
-    const CharPtr owned_detail (detail);
+    const Told said (message);
     const std::string kind = factory_of (GST_MESSAGE_SRC (message));
-    if (is_silence (kind, error, detail))
+    if (is_silence (kind, said))
       continue;
-    const std::string remedy = remedy_for (kind, error, detail);
-    return Error{error->message + (remedy.empty () ? "" : "; " + remedy),
+    const std::string remedy = remedy_for (kind, said);
+    return Error{said.error->message + (remedy.empty () ? "" : "; " + remedy),
         ErrorCode::device};
   }
   return std::nullopt;

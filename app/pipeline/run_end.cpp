@@ -1,0 +1,144 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The end of a run: what was written, what is said of it, and its status. */
+#include "run.h"
+
+#include <nlohmann/json.hpp>
+
+namespace codedexposure::app
+{
+
+void
+Run::say_no_frame ()
+{
+  if (damaged_)
+    status_.line ("error: the head of the stream is damaged, so its tracks "
+                  "cannot be found; if ffmpeg reads it, \"ffmpeg -i IN.mkv "
+                  "-map 0 -c copy OUT.mkv\" writes a new one");
+  else if (job_.times.is_part ())
+    status_.line (
+        "no coded frame lies in this part of the recording" +
+        (job_.times.start
+                ? format (", from %g s on; check whether that is after its end",
+                      double (*job_.times.start) / double (GST_SECOND))
+                : ""));
+  else if (!interrupted_)
+    status_.line ("error: no coded frame arrived");
+  else if (exit_ != Exit::interrupted)
+    status_.line ("stopped before the first coded frame");
+}
+
+/* A recording gets its name however it ends; other results only if they are
+ * whole. False: something could not be written. */
+bool
+Run::publish ()
+{
+  stop ();
+  const bool whole =
+      exit_ == Exit::done && (job_.ends_by_signal || !interrupted_) && !failed_;
+  const auto how = container_damaged_             ? Outputs::Finish::discard
+                   : whole || job_.ends_by_signal ? Outputs::Finish::publish
+                                                  : Outputs::Finish::keep;
+  const auto errors = job_.outputs.finish (how);
+  for (const std::string &error : errors)
+    status_.line ("error: " + error);
+  return errors.empty ();
+}
+
+RunResult
+Run::finish ()
+{
+  if (job_.options.verbose && frames () > 0)
+    print_counters ();
+  if (job_.window)
+    job_.window->finish ();
+  const std::string flaws = flaws_of (pipeline ());
+  const guint64 lost = job_.buffer ? counted (pipeline (), "frames-lost") : 0;
+  const bool published = publish ();
+  RunResult result{exit_, frames (), container_damaged_, interrupted_};
+  if (container_damaged_)
+    return result;
+  if (counter_ && frames () == 0 &&
+      (exit_ != Exit::nobody || job_.times.is_part ())) {
+    say_no_frame ();
+    result.exit = interrupted_                         ? Exit::interrupted
+                  : job_.times.is_part () && !damaged_ ? Exit::nobody
+                                                       : Exit::failed;
+  } else if (result.exit == Exit::done) {
+    if (interrupted_ && !job_.ends_by_signal)
+      result.exit = Exit::interrupted;
+    else if (damaged_ || lost > 0)
+      result.exit = Exit::damaged;
+  }
+  if (result.exit == Exit::done && receivers_ && receivers_->count () == 0) {
+    status_.line ("nobody received the stream");
+    result.exit = Exit::nobody;
+  }
+  if (job_.judge)
+    result.exit = job_.judge (interrupted_);
+  if (!published || (recording_ && recording_->is_removed ()))
+    result.exit = Exit::failed;
+  const std::string wrote = job_.outputs.summary (guint64 (frames ()));
+  if (frames () > 0 || !counter_)
+    print_result (flaws, wrote);
+  if (lost > 0)
+    status_.line (
+        format ("%" G_GUINT64_FORMAT " coded frames were lost and are "
+                "not in the recording, which says where",
+            lost));
+  if (job_.options.json)
+    print_json (result.exit, flaws);
+  return result;
+}
+
+void
+Run::print_result (const std::string &flaws, const std::string &wrote)
+{
+  const bool whole =
+      exit_ == Exit::done && (job_.ends_by_signal || !interrupted_);
+  if (!job_.has_result || (!counter_ && wrote.empty ()))
+    return;
+  std::string text;
+  if (counter_)
+    text = format ("%" G_GINT64_FORMAT " coded frames", frames ()) +
+           (job_.source.empty () ? "" : " of " + job_.source) + flaws;
+  if (const int count = receivers_ ? receivers_->count () : 0; count > 0)
+    text += format ("; sent to %d receiver%s", count, count > 1 ? "s" : "");
+  if (!wrote.empty ())
+    text += (text.empty () ? "" : "; ") +
+            std::string (exit_ == Exit::failed ? "kept what was complete: "
+                         : whole               ? "wrote "
+                                               : "stopped; kept ") +
+            wrote;
+  status_.line (text);
+}
+
+void
+Run::print_json (Exit exit, const std::string &flaws) const
+{
+  nlohmann::ordered_json json = {{"command", job_.command},
+      {"source", job_.source}, {"frames", frames ()},
+      {"flaws", flaws.empty () ? "" : flaws.substr (2)},
+      {"outputs", job_.outputs.names ()}, {"damaged", damaged_},
+      {"interrupted", interrupted_}, {"status", int (exit)}};
+  app::print_json (json);
+}
+
+void
+Run::print_counters ()
+{
+  const double seconds =
+      std::chrono::duration<double> (Clock::now () - began_).count ();
+  const double cpu = cpu_seconds () - cpu_at_start_;
+  status_.line (
+      format ("%.1f s, %.1f coded frames/s, %.0f %% of one processor core",
+          seconds, double (frames ()) / seconds, 100 * cpu / seconds));
+  each_element (pipeline (), [this] (GstElement *element) {
+    const std::string counters = counters_of (element);
+    if (!counters.empty ())
+      status_.line (counters);
+  });
+  for (const auto &queue : leaky_queues_)
+    status_.line (queue->counters ());
+}
+
+} // namespace codedexposure::app

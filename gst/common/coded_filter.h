@@ -90,8 +90,12 @@ struct CodedFrame {
   bool follows;
   /** In the part that a seek asked for. */
   Place place = Place::inside;
+  /** PTS of the frame before; none: not known. */
+  GstClockTime before = GST_CLOCK_TIME_NONE;
 
   GstClockTime pts () const { return GST_BUFFER_PTS (buffer.get ()); }
+  /** PTS of its picture @p k of @p n. */
+  GstClockTime pts_of (int k, int n, FrameRate rate) const;
   bool has_flags (guint flags) const
   {
     return GST_BUFFER_FLAGS (buffer.get ()) & flags;
@@ -148,7 +152,7 @@ protected:
   virtual GstFlowReturn process (CodedFrame frame) = 0;
   /** The frames on which the pictures of another depend. Streaming thread, also
    * before there is a plan. */
-  virtual Reach reach () const { return {}; }
+  virtual Reach reach () const { return {.history = 1}; }
   /** Learns from a frame outside of the part that a seek asked for: it has no
    * pictures. */
   virtual GstFlowReturn learn (CodedFrame) { return GST_FLOW_OK; }
@@ -342,6 +346,7 @@ private:
     std::vector<EventPtr> pending;
     std::optional<FrameSequence> sequence;
     GstClockTime last_pts = GST_CLOCK_TIME_NONE;
+    GstClockTime before = GST_CLOCK_TIME_NONE; ///< last_pts, if time goes on
     bool was_late = false;    ///< the last frame was
     bool is_recorded = false; ///< kRecordedEvent came
     /** PTS of a recorded frame, from its exposure on; all have the same. */
@@ -411,6 +416,8 @@ private:
   void report_mirrors ();
 
   GstFlowReturn check_time_stamp (GstBuffer *frame) const;
+  /** After the part that a seek asked for. */
+  bool is_past (GstBuffer *frame) const;
   BufferPtr restore_clipped_frame (BufferPtr frame);
   CodedFrame admit (BufferPtr frame);
   const char *edit_of (GstBuffer *frame, const std::optional<FrameMeta> &meta);

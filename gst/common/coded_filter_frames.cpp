@@ -28,11 +28,27 @@ ends_with_stream (GstPad *sinkpad, GstClockTime stop)
 
 } // namespace
 
+/* The first frames of a camera come less than a period apart, until its clock
+ * is known. Their pictures then lie evenly between the last picture of the
+ * frame before and their own last one, so that no picture comes before another.
+ */
+GstClockTime
+CodedFrame::pts_of (int k, int n, FrameRate rate) const
+{
+  const GstClockTime last = before + GstClockTime (rate.time_of (0, n - 1, n));
+  if (!GST_CLOCK_TIME_IS_VALID (before) || pts () <= before || pts () > last)
+    return pts () + GstClockTime (rate.time_of (0, k, n));
+  return last + gst_util_uint64_scale_int (pts () - before, k + 1, n);
+}
+
 GstFlowReturn
 CodedFilter::chain (BufferPtr frame)
 {
   GST_LOG_OBJECT (sinkpad_, "[IN] %" GST_PTR_FORMAT, frame.get ());
   GstFlowReturn flow = check_time_stamp (frame.get ());
+  /* Another schedule is not that of the pictures that were asked for. */
+  if (flow == GST_FLOW_OK && stream_.stale && is_past (frame.get ()))
+    return drain ();
   if (flow == GST_FLOW_OK)
     flow = negotiate (frame.get ());
   if (flow == GST_FLOW_OK)
@@ -46,6 +62,8 @@ CodedFilter::chain (BufferPtr frame)
     return flow;
   if (coded.place == Place::inside)
     include (coded);
+  else if (coded.place == Place::early)
+    each_pad ([] (GstCodedPad *pad) { pad->state.discont = false; });
   if (coded.place == Place::inside && coded.meta.pattern.empty ())
     flow = push_coded (coded);
   if (is_fatal (flow))
@@ -55,6 +73,14 @@ CodedFilter::chain (BufferPtr frame)
   stream_.pattern.clear ();
   return coded.place == Place::inside ? process (std::move (coded))
                                       : learn (std::move (coded));
+}
+
+bool
+CodedFilter::is_past (GstBuffer *frame) const
+{
+  return stream_.excerpt && has_format () &&
+         stream_.excerpt->place (GST_BUFFER_PTS (frame), format ().period ()) ==
+             Place::past;
 }
 
 /* This pad comes first, because the recorder of coded frames must not wait for
@@ -110,6 +136,9 @@ CodedFilter::skip (const CodedFrame &frame)
   if (frame.place != Place::inside) {
     const GstFlowReturn flow = drain ();
     break_history ();
+    each_pad ([] (GstCodedPad *pad) {
+      pad->state.discont = pad->state.kind != PadKind::coded;
+    });
     return flow;
   }
   count (&CodedCounters::frames_not_coded);
@@ -279,7 +308,8 @@ CodedFilter::admit (BufferPtr frame)
   const bool follows = step.arrival == Arrival::next && !after_late &&
                        !GST_BUFFER_IS_DISCONT (frame.get ());
   counted.lost_before = step.lost;
-  return {std::move (frame), known.value_or (counted), follows, place};
+  return {std::move (frame), known.value_or (counted), follows, place,
+      std::exchange (stream_.before, pts)};
 }
 
 void

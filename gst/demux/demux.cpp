@@ -173,7 +173,7 @@ Demux::push_subframes (CodedFrame &frame, const PadMap &pads)
   GstFlowReturn flow = GST_FLOW_OK;
   std::vector<Targets> parts;
   for (const SplitPart &part : plan_->parts)
-    parts.push_back (find_targets (frame.pts (), pads, part, flow));
+    parts.push_back (find_targets (frame, pads, part, flow));
   if (std::ranges::none_of (parts, any_wanted<Targets>))
     return flow;
   flow = format ().wide () ? render<std::uint16_t> (frame, parts)
@@ -254,18 +254,17 @@ Demux::prepare_pad (GstCodedPad *pad, guint at_once, GstFlowReturn &flow)
   return false;
 }
 
-/* Finds the pads of each subframe of a part, of a frame that starts at @start.
- * Subframes outside of the segment have none; late ones are dropped and
- * reported. */
+/* Finds the pads of each subframe of a part of @frame. Subframes outside of the
+ * segment have none; late ones are dropped and reported. */
 Demux::Targets
-Demux::find_targets (GstClockTime start, const PadMap &pads,
+Demux::find_targets (const CodedFrame &frame, const PadMap &pads,
     const SplitPart &part, GstFlowReturn &flow)
 {
   const auto n = std::size_t (part.subframes ());
   Targets targets (n);
   const auto aim = [&] (GstCodedPad *pad, std::size_t k, Nanoseconds duration,
                        GstCodedPad *&target) {
-    const GstClockTime pts = start + GstClockTime (part.boundaries[k]);
+    const GstClockTime pts = frame.pts_of (int (k), int (n), format ().rate);
     if (!is_within (pts, GstClockTime (duration)))
       return;
     if (is_late (pad, pts, GstClockTime (duration)))
@@ -413,7 +412,7 @@ Demux::push_subframe (const CodedFrame &frame, SplitTurn turn, Target target)
   const GstClockTime start = frame.pts ();
   const LightWindow &light = part.windows[k];
   describe (target.buffer.get (), frame.buffer.get (), frame.meta,
-      {info, int (k), start + GstClockTime (part.boundaries[k]),
+      {info, int (k), frame.pts_of (int (k), part.subframes (), format ().rate),
           start + GstClockTime (light.start), GstClockTime (light.duration),
           part.region >= 0});
   BufferPtr second;

@@ -75,7 +75,7 @@ private:
   bool is_late (GstCodedPad *pad, GstClockTime pts, GstClockTime duration);
   void skip (GstCodedPad *pad, GstClockTime pts, GstClockTime duration);
   bool prepare_pad (GstCodedPad *pad, guint at_once, GstFlowReturn &flow);
-  Targets find_targets (GstClockTime start, const PadMap &pads,
+  Targets find_targets (const CodedFrame &frame, const PadMap &pads,
       const SplitPart &part, GstFlowReturn &flow);
   template <typename Pixel>
   ImageView<Pixel> scratch_view (std::size_t part, std::size_t k);

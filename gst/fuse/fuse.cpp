@@ -268,7 +268,7 @@ GstFlowReturn
 Fuse::push_one (Pictures &pictures, const CodedFrame &coded, int k)
 {
   const SlotPlan &slots = format ().slots;
-  const GstClockTime pts = coded.pts () + boundary (k);
+  const GstClockTime pts = coded.pts_of (k, slots.slots (), format ().rate);
   const GstClockTime duration = boundary (k + 1) - boundary (k);
   if (!is_within (pts, duration))
     return GST_FLOW_OK;

@@ -84,6 +84,22 @@ TEST_P (DemuxRates, SlotsTileTheFrameFromItsOwnTimeStamp)
   }
 }
 
+/* As the first frames of a camera, until its clock is known. */
+TEST_F (DemuxTime, FramesThatComeEarlyGiveNoPictureBeforeAnother)
+{
+  start ();
+  push_all ({0, 20, 40, 80});
+  std::vector<GstClockTime> shown, light;
+  for (const BufferPtr &buffer : pull_all ()) {
+    shown.push_back (pts_of (buffer) / kMs);
+    light.push_back (get_frame_meta (buffer.get ())->exposure_start / kMs);
+  }
+  EXPECT_EQ (shown, (std::vector<GstClockTime>{0, 10, 20, 30, 35, 40, 45, 50,
+                        55, 60, 65, 70, 80, 90, 100, 110}));
+  EXPECT_EQ (light, (std::vector<GstClockTime>{0, 10, 20, 30, 20, 30, 40, 50,
+                        40, 50, 60, 70, 80, 90, 100, 110}));
+}
+
 /* The slots of the reference bench: 4 x (9.8 ms + 0.2 ms). */
 TEST_F (DemuxTime, MetaHoldsTheLightNotTheSlot)
 {

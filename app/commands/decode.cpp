@@ -108,20 +108,22 @@ Decode::declare (Options &options)
       "calibration, and print the --schedule with it; reads 10 s unless "
       "--duration is set");
   options.value ("--start", start_, "SECONDS",
-      "begin with the first coded frame that is not before this time of the "
-      "recording [its beginning]",
+      "begin with the first coded frame that is not before this position: the "
+      "time since the first one [0]",
       seconds ());
   options.value ("--duration", duration_, "SECONDS",
       "duration to decode, exactly as in the whole recording: frames around it "
       "are read, too [all]",
       seconds (true));
   options.value ("--excerpt", excerpt_, "A-B",
-      "the coded frames whose times lie from A to before B (s; no B: to the "
+      "the coded frames whose positions lie from A to before B (s; no B: to "
+      "the "
       "end), in place of --start and --duration",
       excerpt_rule ());
   options.value ("--threads", threads_, "N",
-      "threads of the fusion and of the encoder; the pictures do not depend on "
-      "it [one for each processor]",
+      "threads of decoder, fusion and encoder; the pictures do not depend on "
+      "it "
+      "[one for each processor]",
       whole (1, 64));
   options.value ("--jobs", jobs_, "N",
       "decode on so many cores at the same time; the result is the same [1]",
@@ -191,7 +193,6 @@ Decode::times () const
     times.start = ns (*start_);
   if (duration)
     times.stop = times.start.value_or (0) + ns (*duration);
-  times.from_first = !start_;
   return times;
 }
 
@@ -211,6 +212,8 @@ void
 Decode::build (Job &job) const
 {
   Chain frames = read_recording (job, recording_);
+  if (threads_)
+    g_object_set (job.reader, "threads", guint (*threads_), nullptr);
   DecoderPads pads = decode_.fuse ? add_fusion (job, frames, decode_, threads_)
                                   : add_demux (job, frames, decode_, region_);
   job.times = times ();
@@ -317,8 +320,7 @@ Decode::run ()
 {
   check ();
   start_gstreamer ();
-  const RecordingInfo info =
-      value_of (recording_info (recording_, false));
+  const RecordingInfo info = value_of (recording_info (recording_, false));
   if (jobs_.value_or (1) > 1)
     decode_on_cores ();
   bool found = false;

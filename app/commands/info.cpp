@@ -81,6 +81,8 @@ private:
         {"size", size_text (info.head.size)}, {"frames", info.times.size ()},
         {"complete", !info.is_cut_short}, {"track", info.head.lines != 0},
         {"period_ns", info.head.duration}};
+    if (info.start)
+      json["start_ns"] = *info.start;
     if (!info.times.empty ()) {
       json["first_ns"] = info.times.front ();
       json["last_ns"] = info.times.back ();

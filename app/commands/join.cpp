@@ -32,9 +32,10 @@ using SamplePtr = std::unique_ptr<GstSample, MiniObjectUnref>;
 class Part
 {
 public:
-  explicit Part (const std::string &name) : name_ (name), job_ ("join", {})
+  Part (const std::string &name, bool decode) : name_ (name), job_ ("join", {})
   {
     Chain chain = read_recording (job_, name);
+    g_object_set (job_.reader, "decode", gboolean (decode), nullptr);
     chain.to ("appsink", {{"sync", false}, {"max-buffers", 8}});
     sink_ = GST_APP_SINK (chain.last ());
     gst_element_set_state (job_.graph.pipeline (), GST_STATE_PLAYING);
@@ -68,8 +69,8 @@ public:
   {
     const ObjectPtr<GstPad> pad = pad_of (GST_ELEMENT (sink_), "sink");
     std::vector<EventPtr> all;
-    while (GstEvent *event =
-               gst_pad_get_sticky_event (pad.get (), GST_EVENT_TAG, all.size ()))
+    while (GstEvent *event = gst_pad_get_sticky_event (
+               pad.get (), GST_EVENT_TAG, all.size ()))
       all.emplace_back (event);
     return all;
   }
@@ -92,7 +93,7 @@ private:
 GstClockTime
 duration_of (const std::vector<std::string> &names)
 {
-  const Part first (names.front ()), last (names.back ());
+  const Part first (names.front (), false), last (names.back (), false);
   const SamplePtr begin = first.next (), end = last.next ();
   if (!begin || !end)
     return GST_CLOCK_TIME_NONE;
@@ -102,12 +103,13 @@ duration_of (const std::vector<std::string> &names)
 }
 
 /** Pushes the pictures of all parts into a source, one after the other, and
- * checks that each coded frame's pictures are there exactly once. */
+ * checks that each coded frame's pictures are there exactly once. Those for
+ * .mkv stay encoded. */
 class Feeder
 {
 public:
-  Feeder (GstElement *source, std::vector<std::string> names)
-      : source_ (source), names_ (std::move (names))
+  Feeder (GstElement *source, std::vector<std::string> names, bool decode)
+      : source_ (source), names_ (std::move (names)), decode_ (decode)
   {
     g_object_set (source, "format", GST_FORMAT_TIME, "block", TRUE, "max-bytes",
         guint64 (64) << 20, "duration", duration_of (names_),
@@ -141,13 +143,15 @@ private:
   void push_next ()
   {
     SamplePtr sample;
+    bool begins_part = false;
     while (!sample) {
       if (!part_ && at_ == names_.size ()) {
         gst_app_src_end_of_stream (GST_APP_SRC (source_));
         return;
       }
+      begins_part |= !part_;
       if (!part_)
-        part_ = std::make_unique<Part> (names_[at_++]);
+        part_ = std::make_unique<Part> (names_[at_++], decode_);
       sample = part_->next ();
       if (sample)
         break;
@@ -159,12 +163,10 @@ private:
       return fail_with (part_->name () + " " + why);
     if (pictures_++ == 0)
       return begin (sample.get ());
-    BufferPtr picture (
-        gst_buffer_copy (gst_sample_get_buffer (sample.get ())));
-    if (follows_)
-      GST_BUFFER_FLAG_UNSET (picture.get (), GST_BUFFER_FLAG_DISCONT);
-    tell_lost (picture.get ());
-    gst_app_src_push_buffer (GST_APP_SRC (source_), picture.release ());
+    if (begins_part)
+      pass_tags ();
+    gst_app_src_push_buffer (GST_APP_SRC (source_),
+        gst_buffer_ref (gst_sample_get_buffer (sample.get ())));
   }
 
   /* With its segment: the time of the stream may begin with it. */
@@ -172,9 +174,29 @@ private:
   {
     caps_.reset (gst_caps_ref (gst_sample_get_caps (first)));
     gst_app_src_set_caps (GST_APP_SRC (source_), caps_.get ());
-    for (EventPtr &tags : part_->tags ())
-      gst_element_send_event (source_, tags.release ());
+    pass_tags ();
     gst_app_src_push_sample (GST_APP_SRC (source_), first);
+  }
+
+  /* Each part says how it was made. In the whole, only a change does. */
+  void pass_tags ()
+  {
+    std::vector<EventPtr> tags = part_->tags ();
+    std::optional<Provenance> made;
+    for (const EventPtr &event : tags)
+      if (const auto said = provenance_from_tags (tags_of (event.get ()));
+          said && *said)
+        made = said->value ();
+    if (made && made_ && made->first_frame == frame_) {
+      Provenance whole = *made;
+      whole.first_frame = made_->first_frame;
+      whole.first_slot = made_->first_slot;
+      if (whole == *made_)
+        return;
+    }
+    made_ = std::move (made);
+    for (EventPtr &event : tags)
+      gst_element_send_event (source_, event.release ());
   }
 
   /* What is wrong with the next picture; empty: nothing. */
@@ -203,10 +225,7 @@ private:
     if (begins && coded_ > 0 && slots_ > 0 && slot_ + 1 != slots_)
       return format (
           "follows a coded frame with %d of %d pictures", slot_ + 1, slots_);
-    /* An excerpt begins with a discontinuity, which the whole does not have. */
-    follows_ = coded_ > 0 && (!begins || meta->frame == frame_ + 1);
     if (begins) {
-      gap_ = coded_ > 0 ? meta->frame - frame_ - 1 : 0;
       if (coded_ == 0)
         first_ = meta->frame;
       else
@@ -218,27 +237,17 @@ private:
     return {};
   }
 
-  /* An excerpt does not know the frame before its first one. */
-  void tell_lost (GstBuffer *picture) const
-  {
-    auto meta = get_frame_meta (picture);
-    if (!meta || meta->lost_before >= gap_)
-      return;
-    meta->lost_before = gap_;
-    set_frame_meta (picture, *meta);
-  }
-
   GstElement *source_; // of the pipeline, which stops before this goes
-  std::vector<std::string> names_;
+  const std::vector<std::string> names_;
+  const bool decode_;
   /* Streaming thread: */
   std::size_t at_ = 0;
   std::unique_ptr<Part> part_;
   CapsPtr caps_;
+  std::optional<Provenance> made_; // how, as was passed on
   GstClockTime last_ = GST_CLOCK_TIME_NONE;
   guint64 pictures_ = 0, coded_ = 0, first_ = 0, frame_ = 0;
-  guint64 gap_ = 0; // coded frames that are missing before frame_
   int slot_ = 0, slots_ = 0;
-  bool follows_ = false; // the picture before is that of the slot before
 };
 
 class Join : public Command
@@ -279,8 +288,9 @@ public:
     for (const std::string &part : parts_)
       job.outputs.reads (part);
     Chain chain = job.graph.begin ("appsrc");
-    Feeder feeder (chain.last (), parts_);
-    chain.to ("queue");
+    style_.encoded = form_of (*output_) == VideoForm::mkv;
+    Feeder feeder (chain.last (), parts_, !style_.encoded);
+    keep_times (chain.to ("queue").last ());
     write_video (job, chain, *output_, style_);
     const Exit exit = play (job).exit;
     if (exit != Exit::done)

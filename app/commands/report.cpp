@@ -101,8 +101,8 @@ Report::declare (Options &options)
   options.value ("--output", output_, "FOLDER", "folder of the page");
   options.require ("--output", "FOLDER");
   options.value ("--at", at_, "SECONDS",
-      "time of the coded frame to show [the frame in which the intensity of "
-      "the subframes changes most]",
+      "position of the coded frame to show: the time since the first one [the "
+      "frame in which the intensity of the subframes changes most]",
       seconds ());
   options.value ("--line", line_, "LINE",
       "row:Y%, column:X% or X0%/Y0%/X1%/Y1%, percentages from the first pixel "

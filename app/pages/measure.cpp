@@ -2,10 +2,10 @@
 #include "measure.h"
 
 #include "common/meta.h"
+#include "common/stats_report.h"
 #include "common/tag.h"
 #include "pipeline/decoder.h"
 #include "pipeline/recording.h"
-#include "common/stats_report.h"
 
 namespace codedexposure::app
 {
@@ -112,6 +112,11 @@ MeasuredStream::add (GstPad *pad, GstBuffer *picture)
   const GstStructure *fields = gst_custom_meta_get_structure (meta);
   if (!read_fields (fields, measured))
     return;
+  const EventPtr segment (gst_pad_get_sticky_event (pad, GST_EVENT_SEGMENT, 0));
+  const GstSegment *times = nullptr;
+  gst_event_parse_segment (segment.get (), &times);
+  measured.pts =
+      gst_segment_to_stream_time (times, GST_FORMAT_TIME, measured.pts);
   measured.damaged =
       GST_BUFFER_FLAG_IS_SET (picture, GST_BUFFER_FLAG_CORRUPTED);
   if (details) {

@@ -19,7 +19,7 @@ namespace codedexposure::app
 struct MeasuredPicture {
   guint64 frame = 0;
   gint subframe = -1;
-  GstClockTime pts = 0;
+  GstClockTime pts = 0; ///< a position in the recording
   PictureStats stats;
   bool damaged = false;
   CODED_FIELDS (frame, subframe, pts, stats.mean, stats.minimum, stats.maximum,

@@ -39,9 +39,9 @@ shift_first (GstElement *element, GstPadProbeCallback shift)
       sink.get (), GST_PAD_PROBE_TYPE_BUFFER, shift, nullptr, nullptr);
 }
 
-/* The stream time of a PTS at @pad. */
+/* Of a PTS at @pad. The first one may be rounded to a time before 0. */
 GstClockTime
-stream_time (GstPad *pad, GstClockTime pts)
+position_of (GstPad *pad, GstClockTime pts)
 {
   const EventPtr sticky (gst_pad_get_sticky_event (pad, GST_EVENT_SEGMENT, 0));
   const GstSegment *segment = nullptr;
@@ -104,10 +104,10 @@ FrameCounter::done (gint64 total) const
   gint64 length = 0;
   if (total > 0)
     return double (frames_) / double (total);
-  if (last_pts_ < 0)
+  if (last_ < 0)
     return 0;
   const double start = double (times_.start.value_or (0));
-  const double last = double (last_pts_);
+  const double last = double (last_);
   if (times_.stop)
     return (last - start) / (double (*times_.stop) - start);
   if (gst_pad_peer_query_duration (pad (), GST_FORMAT_TIME, &length) &&
@@ -137,15 +137,12 @@ FrameCounter::seek ()
 {
   const ObjectPtr<GstElement> element (
       gst_pad_get_parent_element (pad_.get ()));
-  const auto time = [this] (GstClockTime pts) {
-    return gint64 (stream_time (pad (), pts));
-  };
   if (!gst_element_send_event (element.get (),
           gst_event_new_seek (1.0, GST_FORMAT_TIME,
               GstSeekFlags (GST_SEEK_FLAG_FLUSH | GST_SEEK_FLAG_ACCURATE),
-              GST_SEEK_TYPE_SET, time (times_.start.value_or (0)),
+              GST_SEEK_TYPE_SET, gint64 (times_.start.value_or (0)),
               times_.stop ? GST_SEEK_TYPE_SET : GST_SEEK_TYPE_NONE,
-              times_.stop ? time (*times_.stop) : -1)))
+              times_.stop ? gint64 (*times_.stop) : -1)))
     cannot_seek_ ();
   gst_pad_remove_probe (pad (), std::exchange (hold_, 0));
 }
@@ -158,15 +155,11 @@ FrameCounter::on_held (gpointer self)
 }
 
 GstPadProbeReturn
-FrameCounter::hold_first_frame (GstPad *, GstPadProbeInfo *info, gpointer self)
+FrameCounter::hold_first_frame (GstPad *, GstPadProbeInfo *, gpointer self)
 {
   auto *counter = static_cast<FrameCounter *> (self);
   if (std::exchange (counter->held_, true))
     return GST_PAD_PROBE_OK;
-  const GstClockTime first = GST_BUFFER_PTS (GST_PAD_PROBE_INFO_BUFFER (info));
-  PlayTimes &times = counter->times_;
-  if (times.stop && times.from_first && GST_CLOCK_TIME_IS_VALID (first))
-    times.stop = first + *times.stop;
   g_idle_add (on_held, self);
   return GST_PAD_PROBE_OK;
 }
@@ -184,15 +177,15 @@ FrameCounter::shift_first_frame (
 
 /* Frames around the part are only read. */
 GstPadProbeReturn
-FrameCounter::on_frame (GstPad *, GstPadProbeInfo *info, gpointer self)
+FrameCounter::on_frame (GstPad *pad, GstPadProbeInfo *info, gpointer self)
 {
   auto *counter = static_cast<FrameCounter *> (self);
-  const GstClockTime pts = GST_BUFFER_PTS (GST_PAD_PROBE_INFO_BUFFER (info));
-  if (!counter->times_.holds (pts))
+  const GstClockTime position =
+      position_of (pad, GST_BUFFER_PTS (GST_PAD_PROBE_INFO_BUFFER (info)));
+  if (!counter->times_.holds (position))
     return GST_PAD_PROBE_OK;
   counter->frames_++;
-  if (GST_CLOCK_TIME_IS_VALID (pts))
-    counter->last_pts_ = gint64 (pts);
+  counter->last_ = gint64 (position);
   return GST_PAD_PROBE_OK;
 }
 

@@ -18,22 +18,20 @@ void begin_at_zero (GstElement *element);
 /** Lets it be the time of the frames. */
 void keep_times (GstElement *element);
 
-/** Which part of a recording is played, and at which running times. */
+/** Which part of a recording is played, and at which running times. Positions
+ * are stream times: they count from the first frame. */
 struct PlayTimes {
-  /** The coded frames whose times lie in [start, stop), ns; the elements read
-   * what they need around them. None: the whole. */
+  /** The coded frames whose positions lie in [start, stop), ns; the elements
+   * read what they need around them. None: the whole. */
   std::optional<GstClockTime> start, stop;
-  /** `stop` counts from the first frame. */
-  bool from_first = false;
   /** Running time of the first frame, ns. */
   std::optional<GstClockTime> shift_to;
 
   bool is_part () const { return start || stop; }
-  bool holds (GstClockTime pts) const
+  bool holds (GstClockTime position) const
   {
-    return !is_part () || (GST_CLOCK_TIME_IS_VALID (pts) &&
-                              pts + gst::kRounding >= start.value_or (0) &&
-                              (!stop || pts + gst::kRounding < *stop));
+    return !is_part () || (position + gst::kRounding >= start.value_or (0) &&
+                              (!stop || position + gst::kRounding < *stop));
   }
 };
 
@@ -72,7 +70,7 @@ private:
   PlayTimes times_; // changed before the first frame passes
   const std::function<void ()> cannot_seek_;
   std::atomic<gint64> frames_ = 0;
-  std::atomic<gint64> last_pts_ = -1; // ns
+  std::atomic<gint64> last_ = -1; // position, ns
   gulong hold_ = 0;   // probe that holds the first frame until the seek
   bool held_ = false; // streaming thread
 };

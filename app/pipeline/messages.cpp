@@ -397,14 +397,20 @@ notice (const GstStructure *message)
 }
 
 guint64
+counter_of (GstElement *element, const char *counter)
+{
+  guint64 count = 0;
+  if (const StructurePtr stats = stats_of (element))
+    gst_structure_get_uint64 (stats.get (), counter, &count);
+  return count;
+}
+
+guint64
 counted (GstElement *pipeline, const char *counter)
 {
   guint64 most = 0;
   each_element (pipeline, [&] (GstElement *element) {
-    guint64 count = 0;
-    if (const StructurePtr stats = stats_of (element))
-      gst_structure_get_uint64 (stats.get (), counter, &count);
-    most = std::max (most, count);
+    most = std::max (most, counter_of (element, counter));
   });
   return most;
 }

@@ -51,6 +51,8 @@ std::string fields_of (GstMessage *message);
  * the user; empty: it is about something else. */
 std::string notice (const GstStructure *message);
 
+/** A value of the statistics of @p element; 0: it has none of that name. */
+guint64 counter_of (GstElement *element, const char *counter);
 /** The largest of the counters @p counter in the property stats of the elements
  * of @p pipeline: several count the same frames. */
 guint64 counted (GstElement *pipeline, const char *counter);

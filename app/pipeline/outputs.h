@@ -106,6 +106,8 @@ public:
   /** After finish (): "coded.mkv and fast.mkv (100 frames)", the outputs that
    * are there; with their frames if they are not @p usual. Empty: none. */
   std::string summary (std::optional<guint64> usual) const;
+  /** After finish (): the frames of the first output that is there. */
+  guint64 frames () const { return kept_.empty () ? 0 : kept_[0]->frames (); }
   /** After finish (): the names of the outputs that are there. */
   std::vector<std::string> names () const;
 

@@ -94,7 +94,8 @@ private:
   bool failed_ = false; // the stream ends because of an error
   bool damaged_;        // frames are missing or damaged
   bool container_damaged_ = false;
-  std::string noticed_; // the last notice
+  guint64 not_coded_ = 0, lost_ = 0; // coded frames
+  std::string noticed_;              // the last notice
 };
 
 } // namespace codedexposure::app

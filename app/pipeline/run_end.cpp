@@ -52,6 +52,10 @@ Run::finish ()
   if (job_.window)
     job_.window->finish ();
   const std::string flaws = flaws_of (pipeline ());
+  if (job_.counted) {
+    not_coded_ = counter_of (job_.counted, "frames-not-coded");
+    lost_ = counter_of (job_.counted, "frames-lost");
+  }
   const guint64 lost = job_.buffer ? counted (pipeline (), "frames-lost") : 0;
   const bool published = publish ();
   RunResult result{exit_, frames (), container_damaged_, interrupted_};
@@ -117,6 +121,8 @@ Run::print_json (Exit exit, const std::string &flaws) const
 {
   nlohmann::ordered_json json = {{"command", job_.command},
       {"source", job_.source}, {"frames", frames ()},
+      {"not_coded", not_coded_}, {"lost", lost_},
+      {"pictures", job_.outputs.frames ()},
       {"flaws", flaws.empty () ? "" : flaws.substr (2)},
       {"outputs", job_.outputs.names ()}, {"damaged", damaged_},
       {"interrupted", interrupted_}, {"status", int (exit)}};

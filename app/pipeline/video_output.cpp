@@ -29,7 +29,7 @@ void
 write_mkv (
     Job &job, Chain &chain, const std::string &name, const VideoStyle &style)
 {
-  Settings settings;
+  Settings settings{{"codec", style.encoded ? "copy" : "ffv1"}};
   set_if (settings, "threads", style.threads);
   chain.to ("codedexposure-recordmux", settings);
   const auto frames = pad_of (chain.last (), "sink");

@@ -18,6 +18,7 @@ struct VideoStyle {
   std::optional<int> white;   ///< DN that becomes white in 8 bits
   std::optional<int> bits;    ///< significant bits; none: those of the frames
   std::optional<int> threads; ///< of the encoder; none: one a processor
+  bool encoded = false;       ///< they come as .mkv has them
   /** Coded frames whose pictures these are pass its sink pad. */
   GstElement *coded = nullptr;
 };

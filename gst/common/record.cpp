@@ -25,6 +25,21 @@ constexpr struct {
     {GST_BUFFER_FLAG_DROPPABLE, "droppable"},
 };
 
+constexpr const char *kCarriedHash = "CodedExposureHash";
+
+std::optional<guint64>
+carried_hash (GstBuffer *frame)
+{
+  guint64 hash = 0;
+  GstCustomMeta *meta = gst_meta_get_info (kCarriedHash)
+                            ? gst_buffer_get_custom_meta (frame, kCarriedHash)
+                            : nullptr;
+  return meta && gst_structure_get_uint64 (
+                     gst_custom_meta_get_structure (meta), "hash", &hash)
+             ? std::optional (hash)
+             : std::nullopt;
+}
+
 std::optional<Nanoseconds>
 known_time (GstClockTime time)
 {
@@ -64,6 +79,15 @@ flag_names (GstBuffer *buffer)
   return names;
 }
 
+void
+carry_hash (GstBuffer *frame, guint64 hash)
+{
+  register_meta (kCarriedHash);
+  gst_structure_set (gst_custom_meta_get_structure (
+                         gst_buffer_add_custom_meta (frame, kCarriedHash)),
+      "hash", G_TYPE_UINT64, hash, nullptr);
+}
+
 std::optional<guint64>
 hash_of (GstBuffer *frame, const GstVideoInfo &info)
 {
@@ -94,6 +118,11 @@ record_of (GstBuffer *frame, const GstVideoInfo &info,
   for (const char *flag : flag_names (frame))
     record.flags.emplace_back (flag);
 
+  if (const auto hash = carried_hash (frame)) {
+    record.hash = hash;
+    record.saturated = meta ? std::optional (meta->saturated) : std::nullopt;
+    return record;
+  }
   MappedFrame mapped (info, frame, GST_MAP_READ);
   if (!mapped)
     return record;

@@ -33,6 +33,10 @@ void apply_record (
  * "corrupted", "gap", "droppable". */
 std::vector<const char *> flag_names (GstBuffer *buffer);
 
+/** Lets a frame that is encoded carry the hash of its pixels, for record_of ().
+ */
+void carry_hash (GstBuffer *frame, guint64 hash);
+
 /** pixel_hash () of @p frame; none if it cannot be mapped. */
 std::optional<guint64> hash_of (GstBuffer *frame, const GstVideoInfo &info);
 

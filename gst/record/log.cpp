@@ -189,7 +189,7 @@ gboolean
 set_caps (GstBaseTransform *base, GstCaps *caps, GstCaps *)
 {
   LogState &state = state_in<GstCodedExposureLog> (base);
-  return gst_video_info_from_caps (&state.info, caps);
+  return is_encoded (caps) || gst_video_info_from_caps (&state.info, caps);
 }
 
 /* Upstream repeats tags; the file holds each schedule, mapping and bench
@@ -346,7 +346,9 @@ set_up (gpointer klass)
   install_run<kRun> (klass);
   describe_element (klass, "Coded exposure frame log", "Filter/Analyzer/Video",
       "Writes what is known of every coded frame: as a text track for a "
-      "container, or to a file of JSON lines");
+      "container, or to a file of JSON lines",
+      {});
+  add_part_templates (klass);
   add_pad_template (klass, "track", {.caps = "text/x-raw,format=utf8"});
 
   auto *transform_class = GST_BASE_TRANSFORM_CLASS (klass);

@@ -7,11 +7,32 @@
 
 #include <gst/gst.h>
 
+#include "common/element.h"
+
 GType gst_coded_exposure_log_get_type ();
 GType gst_coded_exposure_restore_get_type ();
 
 namespace codedexposure::gst
 {
+
+/** Frames, or frames that are encoded. */
+inline constexpr const char *kPartCaps =
+    CODED_EXPOSURE_VIDEO_CAPS ";video/x-ffv";
+
+inline bool
+is_encoded (const GstCaps *caps)
+{
+  return gst_structure_has_name (
+      gst_caps_get_structure (caps, 0), "video/x-ffv");
+}
+
+/** Those of a part that passes frames. */
+inline void
+add_part_templates (gpointer klass)
+{
+  for (const char *pad : {"sink", "src"})
+    add_pad_template (klass, pad, {.caps = kPartCaps});
+}
 
 /** An element of the unregistered @p type. */
 inline GstElement *

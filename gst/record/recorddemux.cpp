@@ -78,6 +78,7 @@ struct Stream {
 struct RecordDemuxState {
   /* Object lock: */
   bool salvage = false;
+  bool decode = true;
   guint threads = 0;
 
   /* Of the bin: */
@@ -199,8 +200,8 @@ take_raw (GstElement *self, GstPad *pad, const GstCaps *caps)
 
 /* --------------------------------------------------------------- tracks -- */
 
-/* Before restore: null: frames are raw. False, with an error: it is no codec of
- * a recording, or is not installed. */
+/* Before restore; none, if frames are raw or stay encoded. False, with an
+ * error: it is no codec of a recording, or is not installed. */
 bool
 make_decoder (GstElement *self, GstPad *pad, const GstCaps *caps)
 {
@@ -219,6 +220,8 @@ make_decoder (GstElement *self, GstPad *pad, const GstCaps *caps)
             "recording of coded frames.");
     return false;
   }
+  if (!locked (self, [&] { return state.decode; }))
+    return true;
   state.decoder = gst_element_factory_make ("avdec_ffv1", nullptr);
   if (!state.decoder) {
     POST_ERROR (self, CORE, MISSING_PLUGIN, missing ("avdec_ffv1"));
@@ -453,6 +456,11 @@ properties ()
           "Read from front to back, without the index, and end the stream at "
           "damage of the container, with a warning",
           kReadWriteReady, &RecordDemuxState::salvage},
+      {"decode", "Decode",
+          "Decode the frames; without it, they are as they are stored, with "
+          "all "
+          "that is known of them, and their pixels are not checked",
+          kReadWriteReady, &RecordDemuxState::decode},
       {"threads", "Threads",
           "Threads of the decoder; 0: one for each processor", kReadWriteReady,
           &RecordDemuxState::threads, 0u, 64u},
@@ -504,8 +512,8 @@ set_up (gpointer klass)
   install_state<GstCodedExposureRecordDemux, properties> (klass);
   install_run<kRun> (klass);
   describe_element (klass, "Coded exposure recording demuxer", "Codec/Demuxer",
-      "A recording to coded frames, with all that is known of each frame",
-      {"src"});
+      "A recording to coded frames, with all that is known of each frame", {});
+  add_pad_template (klass, "src", {.caps = kPartCaps});
   add_pad_template (klass, "sink", {.caps = "video/x-matroska"});
   GST_BIN_CLASS (klass)->handle_message = handle_message;
 }

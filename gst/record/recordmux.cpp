@@ -51,7 +51,7 @@ using namespace codedexposure::gst;
 namespace
 {
 
-enum class Codec { ffv1, raw };
+enum class Codec { ffv1, raw, copy };
 
 struct Settings {
   Codec codec = Codec::ffv1;
@@ -81,7 +81,8 @@ using Self = GstCodedExposureRecordMux;
 G_DEFINE_ENUM_TYPE (GstCodedExposureRecordCodec,
     gst_coded_exposure_record_codec,
     {int (Codec::ffv1), "Lossless, about half of the data", "ffv1"},
-    {int (Codec::raw), "Not compressed", "raw"});
+    {int (Codec::raw), "Not compressed", "raw"},
+    {int (Codec::copy), "As they come, encoded", "copy"});
 
 /* ---------------------------------------------------------- inner muxer -- */
 
@@ -108,8 +109,7 @@ answer (GstQuery *query)
   }
   if (GST_QUERY_TYPE (query) != GST_QUERY_CAPS)
     return GST_PAD_PROBE_OK;
-  answer_caps (query, CapsPtr (gst_caps_from_string (
-                          CODED_EXPOSURE_VIDEO_CAPS ";video/x-ffv")));
+  answer_caps (query, CapsPtr (gst_caps_from_string (kPartCaps)));
   return GST_PAD_PROBE_HANDLED;
 }
 
@@ -247,8 +247,7 @@ begin_run (GstElement *self)
   }
   const Settings settings = settings_of (as<Self> (self));
   g_object_set (state.log, "location", settings.log_location.c_str (), nullptr);
-  g_object_set (
-      state.mux, "streamable", gboolean (settings.is_streamable),
+  g_object_set (state.mux, "streamable", gboolean (settings.is_streamable),
       "creation-time", nullptr, nullptr);
   state.output.restart ();
   return settings.codec == Codec::ffv1
@@ -394,7 +393,8 @@ set_up (gpointer klass)
   describe_element (klass, "Coded exposure recording muxer", "Codec/Muxer",
       "Coded frames to a recording: lossless video, and all that is known of "
       "each frame",
-      {"sink"});
+      {});
+  add_pad_template (klass, "sink", {.caps = kPartCaps});
   add_pad_template (klass, "src", {.caps = "video/x-matroska"});
   add_pad_template (klass, "video_%u",
       {.presence = GST_PAD_REQUEST, .direction = GST_PAD_SINK});

@@ -46,6 +46,7 @@ struct RestoreState {
 
   /* Stream lock of the sink pad. */
   GstVideoInfo info = {};
+  bool encoded = false; ///< there are no pixels to be checked
   GstSegment segment = {};
   std::deque<Item> held;
   guint32 segment_seqnum = GST_SEQNUM_INVALID; ///< of the segment
@@ -219,7 +220,8 @@ flaw_of (const RestoreState &state, GstBuffer *frame,
     const TrackReader::Match &match)
 {
   const FrameRecord &record = *match.line->frame;
-  if (record.hash && record.hash != hash_of (frame, state.info))
+  if (record.hash && !state.encoded &&
+      record.hash != hash_of (frame, state.info))
     return "its pixels are not those that were recorded";
   if (is_repeated (state, match))
     return "it repeats one that came before";
@@ -253,7 +255,11 @@ restore (Self *self, GstBuffer *frame, const TrackReader::Match &match)
   const guint64 gap = gap_before (state, record);
   if (gap > 0)
     record.lost_before = std::max (gap, record.lost_before.value_or (0));
+  /* A demuxer sets it after each seek. */
+  GST_BUFFER_FLAG_UNSET (frame, GST_BUFFER_FLAG_DISCONT);
   apply_record (frame, record, match.offset);
+  if (record.hash && state.encoded)
+    carry_hash (frame, *record.hash);
   if (state.last_frame && record.frame > *state.last_frame)
     state.damage.frames_lost (*match.line->frame, GST_BUFFER_PTS (frame),
         state.segment, state.segment_seqnum);
@@ -281,15 +287,15 @@ restore (Self *self, GstBuffer *frame, const TrackReader::Match &match)
 
 /* ---------------------------------------------------------------- events -- */
 
-/* A seek may end the stream before the last line, after a frame of any length.
- */
+/* A seek may end the stream before the last line. */
 bool
 ends_early (const RestoreState &state)
 {
-  constexpr GstClockTime kSlack = 100 * GST_MSECOND;
+  gint64 duration = 0;
   return GST_CLOCK_TIME_IS_VALID (state.segment.stop) &&
-         GST_CLOCK_TIME_IS_VALID (state.segment.position) &&
-         state.segment.position + kSlack >= state.segment.stop;
+         gst_pad_peer_query_duration (state.sink, GST_FORMAT_TIME, &duration) &&
+         gst_segment_to_stream_time (&state.segment, GST_FORMAT_TIME,
+             state.segment.stop) < guint64 (duration);
 }
 
 void
@@ -376,7 +382,9 @@ take_event (Self *self, EventPtr event)
   RestoreState &state = self->state;
   switch (GST_EVENT_TYPE (event.get ())) {
   case GST_EVENT_CAPS:
-    if (!gst_video_info_from_caps (&state.info, caps_of (event.get ())))
+    state.encoded = is_encoded (caps_of (event.get ()));
+    if (!state.encoded &&
+        !gst_video_info_from_caps (&state.info, caps_of (event.get ())))
       return FALSE;
     break;
   case GST_EVENT_SEGMENT:
@@ -565,7 +573,9 @@ set_up (gpointer klass)
   install_run<kRun> (klass);
   describe_element (klass, "Coded exposure restorer", "Filter/Analyzer/Video",
       "Puts back onto recorded coded frames what their track says, and checks "
-      "their pixels");
+      "their pixels",
+      {});
+  add_part_templates (klass);
   add_pad_template (klass, "track",
       {.caps = "text/x-raw,format={utf8,pango-markup}",
           .direction = GST_PAD_SINK});

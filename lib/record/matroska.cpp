@@ -323,6 +323,8 @@ read_blocks (Source &file, const Element &segment, RecordingInfo &info)
     const auto block = block_of (file, *part, cluster, info.head.tick);
     if (!block)
       continue;
+    if (!info.start)
+      info.start = block->time;
     if (block->track == info.head.video)
       info.times.push_back (block->time);
     if (block->track != info.head.lines)

@@ -40,6 +40,9 @@ struct RecordingInfo {
   MatroskaHead head;
   /** It was not finished, or is shorter than when it was. */
   bool is_cut_short = false;
+  /** The time of the first frame or line: positions count from it; none: there
+   * is none. */
+  std::optional<Nanoseconds> start;
   /** PTS of the coded frames that are complete, in the order of the file. */
   std::vector<Nanoseconds> times;
   /** Frames that were recorded, by the last line; none: it is missing. */

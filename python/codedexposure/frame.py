@@ -24,7 +24,8 @@ class Frame:
     image: np.ndarray = field(repr=False, compare=False)
     """Pixel values, shape (height, width), uint8 or uint16, never scaled."""
     time_ns: int
-    """Start of its slot, or of its exposure, on the clock of the recording."""
+    """Start of its slot, or of its exposure: the time since the first coded
+    frame of the recording."""
     duration_ns: int | None
     """Time until the next frame, if none is lost."""
     frame: int | None
@@ -114,12 +115,16 @@ def frame_of(sample) -> Frame:
 
     # A frame may begin nanoseconds before the segment, whose times are those of
     # the container.
-    sign, start = segment.to_stream_time_full(Gst.Format.TIME, buffer.pts)
+    def position(pts):
+        sign, there = segment.to_stream_time_full(Gst.Format.TIME, pts)
+        return sign * there
+
+    exposure = time("exposure-start")
     image = pixels_of(buffer, caps)
     slot = value("subframe")
     return Frame(
         image=image,
-        time_ns=sign * start,
+        time_ns=position(buffer.pts),
         duration_ns=None if buffer.duration == _NO_TIME else buffer.duration,
         frame=value("frame"),
         slot=None if slot is None or slot < 0 else slot,
@@ -129,6 +134,6 @@ def frame_of(sample) -> Frame:
         lost_before=value("lost-before") or 0,
         saturated=value("saturated"),
         bits=value("bits") or 8 * image.itemsize,
-        exposure_start_ns=time("exposure-start"),
+        exposure_start_ns=None if exposure is None else position(exposure),
         exposure_duration_ns=time("exposure-duration"),
         time_uncertainty_ns=time("time-uncertainty"))

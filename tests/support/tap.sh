@@ -84,6 +84,12 @@ done_testing ()
   exit 0
 }
 
+# camera_file IN OUT OPTION...: a copy with the times of a camera's recording.
+camera_file ()
+{
+  "$CODEDEXPOSURE_BUILD/tests/pipeline/camera_file" "$@"
+}
+
 # Runs a pipeline, quietly.
 play ()
 {

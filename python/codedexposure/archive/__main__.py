@@ -3,13 +3,15 @@
 import argparse
 import os
 import shutil
+import signal
 import sys
 
 from . import (chunk, engine, measure, merge, packing, plan, programs, single,
                status)
-from .store import Problem, Store, digest, read_json, write_json
+from .store import Problem, Stopped, Store, digest, read_json, write_json
 
 NAME = 'archive'
+STOPPED = 130  # status of a command that was stopped
 CALL = 'codedexposure archive'
 HELP = f'''Usage: {CALL} plan|submit RECORDING... --to FOLDER [option...]
            [-- DECODE OPTION...]
@@ -49,14 +51,14 @@ with recordings.
   --qos NAME          slurm: quality of service
   --mem SIZE          slurm: memory of an element, such as 2G
   --no-measure        plan: do not measure
-  --force             submit: replace results that exist
+  --force             replace results that exist, but never a recording
   -h, --help          show this help
 
 Options of decode: --method, --mapping, --fuse, --refine, --bench, --full-well,
 --read-noise, --region, --schedule, --bits, --view, --white, --deflate.
 
 Exit status: 0 all is done, 1 something failed or is missing, 2 wrong usage, 3
-done, but a recording is cut off or damaged.
+done, but a recording is cut off or damaged, 130 stopped.
 
 Examples:
   What the fusion of a folder of recordings will cost:
@@ -71,12 +73,8 @@ Examples:
 
 class Parser(argparse.ArgumentParser):
     def error(self, message):
-        message = message.replace('unrecognized arguments:', 'unknown option')
         sys.stderr.write(f'{NAME}: {message}\nTry: {CALL} --help\n')
         sys.exit(2)
-
-    def knows(self, option):
-        return option.partition('=')[0] in self._option_string_actions
 
 
 def number(text):
@@ -86,45 +84,47 @@ def number(text):
     return value
 
 
+FLAG = {'action': 'store_true'}
+RUNS = {'--list': {'action': 'append', 'default': []},
+        '--on': {'choices': ('slurm', 'parallel')},
+        '--jobs': {'type': number}, '--threads': {'type': number, 'default': 1},
+        '--hosts': {}, '--tasks': {'type': number},
+        **{f'--{name}': {} for name in engine.PASSED}}
+DECODES = {**RUNS, '--to': {},
+           '--form': {'choices': sorted(plan.FORMS), 'default': 'mkv'},
+           '--statistics': FLAG, '--report': FLAG, '--force': FLAG,
+           '--chunk': {'type': number, 'default': 1500}}
+# The options of each command.
+COMMANDS = {'plan': {**DECODES, '--no-measure': FLAG}, 'submit': DECODES,
+            'pack': RUNS, 'status': {}, 'resume': {}, 'verify': {}, 'clean': {}}
+
+
 def parse():
     parser = Parser(prog=NAME, add_help=False, allow_abbrev=False)
-    parser.add_argument('command', choices=(
-        'plan', 'submit', 'status', 'resume', 'verify', 'clean', 'pack'))
-    parser.add_argument('words', nargs='*')
-    parser.add_argument('--to')
-    parser.add_argument('--list', action='append', default=[])
-    parser.add_argument('--form', choices=sorted(plan.FORMS), default='mkv')
-    parser.add_argument('--statistics', action='store_true')
-    parser.add_argument('--report', action='store_true')
-    parser.add_argument('--chunk', type=number, default=1500)
-    parser.add_argument('--on', choices=('slurm', 'parallel'))
-    parser.add_argument('--jobs', type=number)
-    parser.add_argument('--threads', type=number, default=1)
-    parser.add_argument('--hosts')
-    parser.add_argument('--tasks', type=number)
-    for name in engine.PASSED:
-        parser.add_argument(f'--{name}')
-    parser.add_argument('--no-measure', action='store_true')
-    parser.add_argument('--force', action='store_true')
     words, decode = sys.argv[1:], []
     if '-h' in words or '--help' in words:
         sys.stdout.write(HELP)
         sys.exit(0)
     if '--' in words:
         words, decode = words[:words.index('--')], words[words.index('--') + 1:]
-    for word in words:
-        if word.startswith('--') and not parser.knows(word):
-            parser.error(f'unknown option {word}')
-    options = parser.parse_intermixed_args(words)
-    options.decode = decode
-    if options.command in ('plan', 'submit'):
+    command = words[0] if words else ''
+    if command not in COMMANDS:
+        parser.error(f'{command or "no command"}: set one of ' +
+                     ', '.join(COMMANDS))
+    parser.add_argument('words', nargs='*')
+    for name, how in COMMANDS[command].items():
+        parser.add_argument(name, **how)
+    options, unknown = parser.parse_known_intermixed_args(words[1:])
+    if unknown:
+        parser.error(f'{unknown[0]} is no option of {command}')
+    options.command, options.decode = command, decode
+    if command in ('plan', 'submit'):
         if not options.to:
             parser.error('set --to FOLDER')
-    elif options.command == 'pack':
-        if options.to or decode:
-            parser.error('pack takes recordings, which it replaces')
-    elif len(options.words) != 1 or options.to or decode:
-        parser.error(f'{options.command} takes one FOLDER of submit')
+    elif decode:
+        parser.error(f'{command} takes no options of decode')
+    elif command != 'pack' and len(options.words) != 1:
+        parser.error(f'{command} takes one FOLDER of submit')
     return options
 
 
@@ -133,6 +133,7 @@ def make_plan(options):
                      options.chunk, options.threads, options.decode,
                      programs.version())
     made.statistics, made.report = options.statistics, options.report
+    plan.check_outputs(options.to, made)
     chunk.check_options(made)
     return made
 
@@ -256,11 +257,9 @@ def verify(store, made):
             print(f'{NAME}: {error}', file=sys.stderr)
             bad += 1
             continue
-        if not said['counts']:
-            print(f'{said["recording"]} was not counted, since it is cut off')
-        coded += said['counts'].get('coded', 0)
-        lost += said['counts'].get('lost', 0)
-        pictures += said['counts'].get('pictures', 0)
+        coded += said['counts']['coded']
+        lost += said['counts']['lost']
+        pictures += said['counts']['pictures']
     print(f'{len(made.recordings) - bad} of {len(made.recordings)} recordings are '
           f'as merged: {coded} coded frames, each with its pictures exactly once '
           f'({pictures}); {lost} were lost before they were recorded')
@@ -328,6 +327,7 @@ def check_host(folder, plan_sha256):
 
 
 def main():
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # status | head
     if sys.argv[1:3] == ['work', 'decode']:
         recording, output, jobs, force, *rest = sys.argv[3:]
         engine.choose('parallel')
@@ -353,5 +353,8 @@ def main():
 
 try:
     sys.exit(main())
+except Stopped as stopped:
+    print(f'{NAME}: {stopped}', file=sys.stderr)
+    sys.exit(STOPPED)
 except Problem as problem:
     sys.exit(f'{NAME}: {problem}')

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Decodes one chunk."""
+import contextlib
+import json
 import os
 import resource
 import shutil
@@ -14,6 +16,7 @@ from .store import (Problem, digest, fingerprint, read_json, write_json)
 TABLE = 'statistics.csv'
 FOR_OUTPUT = '--deflate', '--white'  # for other forms than lossless video
 DONE, DAMAGED = 0, 3  # of decode
+COUNTED = 'frames', 'not_coded', 'lost', 'pictures'  # by decode
 ENGINE_NAMES = 'SLURM_ARRAY_JOB_ID', 'SLURM_ARRAY_TASK_ID', 'PARALLEL_SEQ'
 
 
@@ -106,21 +109,22 @@ def decode(plan, recording, chunk, scratch):
     check_program(plan)
     check_source(source)
     begun, cpu = time.time(), cpu_seconds()
-    status, said = programs.result(command(plan, recording, chunk, scratch), log,
-                                   stdin=subprocess.DEVNULL)
+    status, said = programs.run(command(plan, recording, chunk, scratch), log)
     if status not in (DONE, DAMAGED) or said is None:
         raise Problem(f'decode ended with status {status}')
     check_source(source)
-    form = plan.chunk_form(recording)
-    names = [name_of(form), *[TABLE] * plan.statistics]
+    names = [name_of(plan.chunk_form(recording)), *[TABLE] * plan.statistics]
     expected = source.frames_of(chunk, plan.length)
-    if expected is not None and said['frames'] != expected:
+    if status == DONE and said['frames'] != (expected or said['frames']):
         raise Problem(f'decode read {said["frames"]} of the {expected} coded '
                       'frames of this chunk')
     manifest = identity(plan, recording, chunk)
+    # All frames of a chunk may show a pattern, so that there is no picture.
     manifest.update(
-        outputs={name: digest(os.path.join(scratch, name)) for name in names},
-        frames=said['frames'], status=status, host=socket.gethostname(),
+        outputs={name: digest(os.path.join(scratch, name))
+                 for name in names if said['pictures']},
+        **{name: said[name] for name in COUNTED}, status=status,
+        host=socket.gethostname(),
         begun=begun, seconds=time.time() - begun, cpu_seconds=cpu_seconds() - cpu,
         engine={name: os.environ[name] for name in ENGINE_NAMES
                 if name in os.environ})
@@ -142,21 +146,18 @@ def run(store, plan, recording, chunk):
         shutil.rmtree(scratch, ignore_errors=True)  # a full disk has room again
         note_failure(store, recording, chunk, error, lines)
         return False
-    try:
+    with contextlib.suppress(FileNotFoundError):
         os.remove(store.failure(recording, chunk))
-    except FileNotFoundError:
-        pass
     return True
 
 
 def note_failure(store, recording, chunk, error, lines=()):
-    """For status; a full disk may not take it."""
-    try:
-        write_json(store.failure(recording, chunk), {
-            'error': str(error), 'lines': list(lines),
-            'host': socket.gethostname(), 'time': time.time()})
-    except OSError:
-        pass
+    """For status; a full disk may not take it. The job that writes it may be
+    killed: nothing else is left of it then."""
+    with contextlib.suppress(OSError):
+        with open(store.failure(recording, chunk), 'w', encoding='utf-8') as file:
+            json.dump({'error': str(error), 'lines': list(lines),
+                       'host': socket.gethostname(), 'time': time.time()}, file)
 
 
 def mismatch(store, plan, recording, chunk):

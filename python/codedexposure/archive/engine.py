@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Gives the work to an engine, which does all scheduling and retrying."""
+import collections
 import contextlib
 import os
 import re
@@ -10,7 +11,7 @@ import subprocess
 import time
 
 from . import programs
-from .store import Problem, digest, write_json
+from .store import Problem, Stopped, digest, write_json
 
 RETRIES = 3
 READY = 'ready'  # what a computer says that can work
@@ -125,15 +126,19 @@ def start_slurm(store, plan, run, chunks, merges):
 
 
 def running_jobs(jobs):
-    """Lines "STATE COUNT" of the jobs of a run that are in Slurm's queue."""
-    if not jobs or shutil.which('squeue') is None:
+    """The counts of the states of the jobs of a run that are in Slurm's queue;
+    None: Slurm does not say it."""
+    if not jobs:
         return {}
-    said = subprocess.run(['squeue', '-h', '-r', '-o', '%T', '-j', ','.join(jobs)],
-                          capture_output=True, text=True, check=False).stdout
-    counts = {}
-    for state in said.split():
-        counts[state.lower()] = counts.get(state.lower(), 0) + 1
-    return counts
+    try:
+        said = subprocess.run(
+            ['squeue', '-h', '-r', '-o', '%T', '-j', ','.join(jobs)],
+            capture_output=True, text=True, check=False)
+    except OSError:
+        return None
+    if said.returncode != 0 and 'Invalid job id' not in said.stderr:
+        return None  # Slurm forgets jobs that ended
+    return collections.Counter(said.stdout.lower().split())
 
 
 # ---- GNU parallel ------------------------------------------------------------
@@ -207,7 +212,7 @@ def _passed_on(child):
         for number, handler in before.items():
             signal.signal(number, handler)
     if stopped:
-        raise Problem('stopped; resume goes on')
+        raise Stopped('stopped; resume goes on')
 
 
 def start_parallel(store, plan, run, chunks, merges, watch):

@@ -2,13 +2,12 @@
 """Predicts time and room by decoding a little of the first recording."""
 import copy
 import os
-import subprocess
 import tempfile
 import time
 
 from . import chunk as chunks
 from . import programs
-from .plan import FORMS, JOINED
+from .plan import FORMS
 from .store import Problem, digest
 
 SHORT = 5     # coded frames of the first measurement
@@ -31,16 +30,15 @@ def decode(plan, times, frames):
     with tempfile.TemporaryDirectory() as folder:
         begun, cpu = time.monotonic(), chunks.cpu_seconds()
         log = os.path.join(folder, 'log')
-        status = programs.run(chunks.command(part, 0, 0, folder), log,
-                              stdout=subprocess.DEVNULL)
+        status, _ = programs.run(chunks.command(part, 0, 0, folder), log)
         form = part.chunk_form(0)
         output = os.path.join(folder, chunks.name_of(form))
         size = digest(output)['bytes'] if status == 0 else 0
-        joined = form == 'mkv' and plan.form in JOINED
+        joined = form == 'mkv' and plan.form != 'mkv'
         if status == 0 and joined:
             video, output = output, os.path.join(folder, 'out' + FORMS[plan.form])
-            status = programs.run(chunks.join_command(part, [video], output), log,
-                                  stdout=subprocess.DEVNULL)
+            status, _ = programs.run(chunks.join_command(part, [video], output),
+                                     log)
         if status != 0:
             raise Problem('decoding the first frames failed: ' +
                           ' '.join(programs.last_lines(log)))
@@ -55,7 +53,8 @@ def predict(plan):
     if first.whole or first.frames <= SHORT:
         raise Problem(f'{first.path} is too short or damaged to measure with; '
                       'name another recording first, or set --no-measure')
-    times = programs.info([first.path])[0]['times_ns']
+    said = programs.info([first.path])[0]
+    times = [time - said['start_ns'] for time in said['times_ns']]
     cpu, wall, size = decode(plan, times, SHORT)
     more = min(first.frames, max(4 * SHORT, int(SHORT * LONGEST / wall)))
     cpu_more, _, size_more = decode(plan, times, more)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Puts the chunks of a recording together, and checks what came of it."""
-import csv
+import contextlib
 import os
 import pathlib
 import shutil
-import subprocess
+import tempfile
 
 from . import chunk as chunks
 from . import programs
@@ -49,50 +49,46 @@ def check_chunks(store, plan, recording):
     return manifests
 
 
-def join_videos(plan, parts, output, log):
-    """What the joined video holds: counts of pictures and coded frames."""
-    status, said = programs.result(chunks.join_command(plan, parts, output), log,
-                                   stdin=subprocess.DEVNULL)
+def join_videos(plan, parts, output, counts, log):
+    """Raises Problem unless the video has the pictures that were counted, those
+    of each coded frame once."""
+    status, said = programs.run(chunks.join_command(plan, parts, output), log)
     if status != 0 or said is None:
         raise Problem(f'{output} could not be written: ' +
                       ' '.join(programs.last_lines(log)))
-    return said
-
-
-def follows(head, last, first):
-    """Whether a row of a table is of the coded frame after that of another."""
-    columns = head.split(',')
-    if 'frame' not in columns or 'flags' not in head:
-        return False
-    at = columns.index('frame')
-    before, after = last.split(',')[at], first.split(',')[at]
-    return before.isdigit() and after.isdigit() and int(after) == int(before) + 1
+    for name in 'pictures', 'coded':
+        if said[name] != counts[name]:
+            raise Problem(f'{output} has {name}: {said[name]}, but its chunks '
+                          f'have {counts[name]}; remove the chunks and resume')
 
 
 def join_tables(parts, output):
-    """Tables with the same head. An excerpt begins with a discontinuity, which
-    the whole does not have where the coded frame before is in the table before."""
-    with open(output + '.part', 'w', encoding='utf-8') as table:
+    """Tables with the same head."""
+    with open(output + '.part', 'wb') as table:
         for i, part in enumerate(parts):
-            with open(part, encoding='utf-8') as lines:
+            with open(part, 'rb') as lines:
                 head = lines.readline()
                 if i == 0:
                     table.write(head)
-                first = lines.readline()
-                if i > 0 and follows(head, last, first):
-                    first = first.replace('discont ', '').replace('discont', '')
-                table.write(first)
-                last = first
-                for last in lines:
-                    table.write(last)
+                shutil.copyfileobj(lines, table)
         table.flush()
         os.fsync(table.fileno())
     os.replace(output + '.part', output)
 
 
+def link(old, new):
+    """Takes no room, but on a file system without links."""
+    try:
+        os.link(old, new)
+    except FileExistsError as error:
+        raise Problem(f'{os.path.basename(new)} is in two chunks') from error
+    except OSError:
+        shutil.copyfile(old, new)
+        sync(new)
+
+
 def join_pictures(parts, output):
-    """Pictures have the numbers of the whole recording. Links take no room. The
-    counts of their tables."""
+    """Pictures have the numbers of the whole recording."""
     folder = output.rstrip('/')
     new = f'{folder}.part'
     shutil.rmtree(new, ignore_errors=True)
@@ -101,39 +97,27 @@ def join_pictures(parts, output):
                 os.path.join(new, TABLE))
     for part in parts:
         for name in os.listdir(part):
-            if name == TABLE:
-                continue
-            try:
-                os.link(os.path.join(part, name), os.path.join(new, name))
-            except FileExistsError as error:
-                raise Problem(f'{name} is in two chunks') from error
-            except OSError:  # a file system without links
-                shutil.copyfile(os.path.join(part, name),
-                                os.path.join(new, name))
-                sync(os.path.join(new, name))
-    counts = count_pictures(os.path.join(new, TABLE))
-    shutil.rmtree(folder, ignore_errors=True)
-    os.rename(new, folder)
-    return counts
+            if name != TABLE:
+                link(os.path.join(part, name), os.path.join(new, name))
+    put_pictures(new, folder)
 
 
-def count_pictures(table):
-    """The same counts as join prints, of a table of pictures; raises Problem
-    unless each coded frame's pictures are there exactly once, in their order."""
-    slots = {}
-    with open(table, encoding='utf-8', newline='') as lines:
-        for row in csv.DictReader(lines):
-            if not row['frame']:
-                raise Problem(f'{table} does not number its pictures')
-            slots.setdefault(int(row['frame']), []).append(int(row['slot'] or 0))
-    frames = list(slots)
-    if frames != sorted(frames):
-        raise Problem(f'the coded frames of {table} are not in their order')
-    kinds = {tuple(found) for found in slots.values()}
-    if len(kinds) > 1 or any(found != tuple(range(len(found))) for found in kinds):
-        raise Problem(f'coded frames of {table} have different pictures')
-    return {'pictures': sum(map(len, slots.values())), 'coded': len(frames),
-            'lost': frames[-1] - frames[0] + 1 - len(frames) if frames else 0}
+def put_pictures(new, folder, force=True):
+    """As decode does: pictures of an earlier run go, and other files stay."""
+    try:
+        os.rename(new, folder)  # there is none, or it is empty
+        return
+    except OSError:
+        if not force:
+            raise
+    with contextlib.suppress(FileNotFoundError):
+        with open(os.path.join(folder, TABLE), encoding='utf-8') as table:
+            for line in list(table)[1:]:
+                name = os.path.basename(line.partition(',')[0])
+                pathlib.Path(folder, name).unlink(missing_ok=True)
+    for name in os.listdir(new):
+        os.replace(os.path.join(new, name), os.path.join(folder, name))
+    os.rmdir(new)
 
 
 def outputs_of(store, plan, recording):
@@ -146,9 +130,9 @@ def write_report(plan, recording, output, scratch):
     new, log = os.path.join(scratch, 'page'), os.path.join(scratch, 'log')
     options = [option for option in plan.options if option.startswith(
         ('--method=', '--schedule=', '--bench=', '--bits='))]
-    status = programs.run(
+    status, _ = programs.run(
         [*programs.REPORT, plan.recordings[recording].path, *options,
-         f'--output={new}'], log, stdin=subprocess.DEVNULL)
+         f'--output={new}'], log)
     if status not in (0, 3):  # 3: the recording is damaged
         raise Problem(f'{output} could not be written: ' +
                       ' '.join(programs.last_lines(log)))
@@ -167,49 +151,41 @@ def merge(store, plan, recording):
         return [os.path.join(store.part(recording, number), name)
                 for number, m in enumerate(manifests) if name in m['outputs']]
     parts, outputs = files(chunks.name_of(form)), outputs_of(store, plan, recording)
-    output = outputs[0]
+    output, counts = outputs[0], counted(manifests)
+    if not parts:
+        raise Problem(f'{source.path} has no picture: during all its frames, the '
+                      'mirrors show a pattern')
     os.makedirs(os.path.dirname(output.rstrip('/')), exist_ok=True)
-    scratch = store.merging(recording)
-    if source.cut_off() and form != 'png':
-        take_whole(parts[0], output)
-        counts = {}
-    elif form == 'png':
-        counts = join_pictures(parts, output)
-    else:
-        counts = join_videos(plan, parts, output, os.path.join(scratch, 'log'))
-    frames = sum(m['frames'] for m in manifests)
-    missing = max(0, source.recorded - frames)
-    if counts and counts['coded'] != frames:
-        raise Problem(f'{output} has pictures of {counts["coded"]} coded frames, but '
-                      f'{frames} were decoded; remove the chunks and resume')
-    if plan.statistics:
-        join_tables(files(chunks.TABLE), outputs[1])
-    if plan.report:
-        write_report(plan, recording, outputs[-1], scratch)
-    shutil.rmtree(scratch)
+    with tempfile.TemporaryDirectory(dir=store.parts(recording)) as scratch:
+        if form == 'png':
+            join_pictures(parts, output)
+        elif source.chunks == 1:
+            pathlib.Path(output + '.part').unlink(missing_ok=True)
+            link(parts[0], output + '.part')
+            os.replace(output + '.part', output)
+        else:
+            join_videos(plan, parts, output, counts, os.path.join(scratch, 'log'))
+        if plan.statistics:
+            join_tables(files(chunks.TABLE), outputs[1])
+        if plan.report:
+            write_report(plan, recording, outputs[-1], scratch)
     write_json(store.merged(recording), {
         'format': 'coded-exposure-archive-recording', 'version': 2,
         'recording': source.path, 'recording_hash': source.fingerprint,
         'output': source.output, 'output_hashes': [*map(digest, outputs)],
-        'options': plan.options, 'program': plan.program,
-        'counts': counts, 'frames': frames,
-        'status': chunks.DAMAGED if missing else max(
+        'options': plan.options, 'program': plan.program, 'counts': counts,
+        'status': chunks.DAMAGED if counts['frames'] < source.recorded else max(
             m['status'] for m in manifests),
         'seconds': sum(m['seconds'] for m in manifests),
         'cpu_seconds': sum(m['cpu_seconds'] for m in manifests),
     })
 
 
-def take_whole(part, output):
-    """The only part is the result. A link takes no room."""
-    new = output + '.part'
-    pathlib.Path(new).unlink(missing_ok=True)
-    try:
-        os.link(part, new)
-    except OSError:  # a file system without links
-        shutil.copyfile(part, new)
-        sync(new)
-    os.replace(new, output)
+def counted(manifests):
+    """Of all chunks; the frames that are decoded have pictures."""
+    counts = {name: sum(m[name] for m in manifests) for name in chunks.COUNTED}
+    counts['coded'] = counts['frames'] - counts['not_coded']
+    return counts
 
 
 def run_if_ready(store, plan, recording):
@@ -235,10 +211,7 @@ def run(store, plan, recording, others_may=False):
         return False
     for path in (store.failure(recording, None),
                  os.path.join(store.work, f'merge-{recording:06d}.lock')):
-        try:
-            os.remove(path)
-        except FileNotFoundError:
-            pass
+        pathlib.Path(path).unlink(missing_ok=True)
     return True
 
 
@@ -264,8 +237,8 @@ def verify(store, plan, recording):
             raise Problem(f'{path} is not what was merged; remove '
                           f'{store.merged(recording)} and resume to merge it '
                           'again')
-    recorded = programs.info([source.path])[0]
-    if said['counts'] and len(recorded.get('times_ns', [])) != said['frames']:
-        raise Problem(f'{source.path} has {len(recorded.get("times_ns", []))} coded '
-                      f'frames, but {said["frames"]} were decoded')
+    frames = programs.info([source.path])[0].get('frames')
+    if frames != said['counts']['frames'] and not said['status']:
+        raise Problem(f'{source.path} has {frames} coded frames, but '
+                      f'{said["counts"]["frames"]} were decoded')
     return said

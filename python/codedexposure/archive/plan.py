@@ -16,10 +16,6 @@ FLAGS = {'view', 'verbose', 'refine', 'deflate'}
 FILES = {'mapping', 'bench', 'schedule'}  # values that may be files
 FORMS = {'mkv': '.mkv', 'png': '/', 'mp4': '.mp4', 'ome.tif': '.ome.tif',
          'h5': '.h5'}
-# Forms that are put together of chunks of lossless video, whose tracks hold what
-# is known of each picture; pictures are already numbered files.
-JOINED = {'mkv', 'mp4', 'ome.tif', 'h5'}
-CUT_OFF = 'it is cut off'
 
 
 @dataclasses.dataclass
@@ -30,15 +26,12 @@ class Recording:
     seconds: float       # from the first coded frame to the last
     frames: int          # coded frames that it has
     recorded: int        # frames that it once had; 0: not known
-    borders: list        # between its chunks, ns
+    borders: list        # between its chunks: positions, as of --excerpt, ns
     whole: str = ''      # why it is one chunk
 
     @property
     def chunks(self):
         return len(self.borders) + 1
-
-    def cut_off(self):
-        return self.whole == CUT_OFF
 
     def excerpt(self, chunk):
         """[from, until) of a chunk, ns; None: to the end."""
@@ -52,10 +45,10 @@ class Recording:
         return min(length, self.frames - chunk * length)
 
 
-def borders_of(times, length):
+def borders_of(times, start, length):
     """In the middle between two coded frames, wherever those lie: recordings of
     cameras begin late and have gaps."""
-    return [(times[at - 1] + times[at]) // 2
+    return [(times[at - 1] + times[at]) // 2 - start
             for at in range(length, len(times), length)]
 
 
@@ -66,7 +59,7 @@ def recording_of(info, output, length):
         raise Problem(info['error'])
     times, whole = info['times_ns'], ''
     if not info['complete']:
-        whole = CUT_OFF
+        whole = 'it is cut off'
     elif not info['track']:
         whole = 'it has no track that numbers its frames'
     elif times != sorted(times):
@@ -74,20 +67,21 @@ def recording_of(info, output, length):
     seconds = (times[-1] - times[0] + info['period_ns']) / 1e9 if times else 0
     return Recording(path, output, fingerprint(path), seconds, len(times),
                      info.get('recorded', 0),
-                     [] if whole else borders_of(times, length), whole)
+                     [] if whole or not times else
+                     borders_of(times, info['start_ns'], length), whole)
 
 
 def find_recordings(words, lists, avoid):
     """(what info says of it, name of its output without an ending) of each.
     Folders are searched for recordings, but not below the folder @avoid; what is
-    none there is left out, which is said."""
+    none there is named and left out."""
     for name in lists:
         try:
             with open(name, encoding='utf-8') as file:
                 words = words + [line.strip() for line in file if line.strip()]
         except OSError as error:
             raise Problem(f'cannot read --list {name}: {error.strerror}') from error
-    found, searched, skipped = [], [], []
+    found, searched = [], []
     for word in words:
         if not os.path.isdir(word):
             stem = os.path.splitext(os.path.basename(word))[0]
@@ -104,14 +98,15 @@ def find_recordings(words, lists, avoid):
                     stem = os.path.relpath(path, word)[:-len('.mkv')]
                     searched.append((os.path.abspath(path), stem))
     known = programs.info([path for path, _ in found + searched])
-    for said, (path, stem) in zip(known, found + searched):
-        if 'error' in said and (path, stem) in searched:
-            skipped.append(said['error'])
-    # What decode wrote has no schedule of coded frames.
-    found = [(said, stem) for said, (path, stem) in zip(known, found + searched)
-             if (path, stem) in found or ('error' not in said and 'schedule' in said)]
-    for why in skipped:
-        print(f'left out: {why}')
+    named, found = len(found), found + searched
+    for said in known[named:]:
+        if 'schedule' not in said:
+            said.setdefault('error', f'{said["recording"]} says no schedule: it '
+                            'was decoded, or is damaged; name it to decode it')
+        if 'error' in said:
+            print('left out:', said['error'])
+    found = [(said, stem) for i, (said, (_, stem)) in enumerate(zip(known, found))
+             if i < named or 'error' not in said]
     if not found:
         raise Problem('no recordings; name .mkv files of record, folders with '
                       'them, or a --list')
@@ -175,11 +170,11 @@ class Plan:
         self.chunks = total
 
     def chunk_form(self, recording):
-        """The form of the chunks of a recording. One that is cut off is decoded
-        without an excerpt, and has its form at once."""
-        if self.form in JOINED and not self.recordings[recording].cut_off():
-            return 'mkv'
-        return self.form
+        """The form of the chunks of a recording. Several are lossless video, whose
+        track holds what is known of each picture, or pictures, which are numbered
+        files."""
+        several = self.recordings[recording].chunks > 1 and self.form != 'png'
+        return 'mkv' if several else self.form
 
     def outputs(self, recording):
         """What is written for a recording, relative to the folder."""
@@ -227,6 +222,32 @@ def table_of(output):
 
 def report_of(output):
     return beside(output, '.report')
+
+
+def identity_of(path):
+    status = os.stat(path)
+    return status.st_dev, status.st_ino
+
+
+def check_outputs(folder, plan):
+    """Raises Problem if an output is a recording, or holds one, or another
+    output."""
+    paths = {os.path.realpath(os.path.join(folder, name))
+             for number in range(len(plan.recordings))
+             for name in plan.outputs(number)}
+    inputs = [recording.path for recording in plan.recordings]
+    known = {identity_of(path) for path in inputs}
+    for path in sorted(paths):
+        if os.path.exists(path) and identity_of(path) in known:
+            raise Problem(f'{path} is a recording, and would be replaced; choose '
+                          'another --to')
+    for path in [*sorted(paths), *map(os.path.realpath, inputs)]:
+        above = os.path.dirname(path)
+        while above != '/':
+            if above in paths:
+                raise Problem(f'{path} is in {above}, which would be replaced; '
+                              'choose another --to, or --form')
+            above = os.path.dirname(above)
 
 
 def make(words, lists, folder, form, length, threads, options, program):

@@ -46,18 +46,13 @@ def end_with_parent():
     ctypes.CDLL(None).prctl(pr_set_pdeathsig, signal.SIGTERM)
 
 
-def run(command, log, **options):
-    """Runs a program whose messages go to the file @log; its status."""
+def run(command, log):
+    """Runs a program whose messages go to the file @log. Its status, and what it
+    prints as JSON, or None."""
     with open(log, 'ab') as messages:
-        return subprocess.run(command, stderr=messages, check=False,
-                              preexec_fn=end_with_parent, **options).returncode
-
-
-def result(command, log, **options):
-    """Runs a program that prints its result as JSON; its status and the result."""
-    with open(log, 'ab') as messages:
-        done = subprocess.run(command, stderr=messages, stdout=subprocess.PIPE,
-                              check=False, preexec_fn=end_with_parent, **options)
+        done = subprocess.run(command, stdin=subprocess.DEVNULL, stderr=messages,
+                              stdout=subprocess.PIPE, check=False,
+                              preexec_fn=end_with_parent)
     try:
         return done.returncode, json.loads(done.stdout)
     except ValueError:

@@ -3,9 +3,11 @@
 import os
 import shutil
 import sys
+import tempfile
 
 from . import chunk, engine, plan, programs, status
-from .store import Problem, Store, read_json, write_json
+from .merge import put_pictures
+from .store import Problem, Stopped, Store, read_json, write_json
 
 CHUNKS = 4      # for each job, so that all end at about the same time
 SHORTEST = 250  # coded frames; each chunk starts a process and reads more
@@ -30,9 +32,16 @@ def check_table(table, force):
                       'replace it')
 
 
+def put_file(new, path, force):
+    """Gives a file its name, which may have been taken meanwhile."""
+    if not force and os.path.lexists(path):
+        raise Problem(f'{path} appeared meanwhile; it was not replaced')
+    shutil.move(new, os.path.realpath(path))  # a link stays
+
+
 def run(recording, output, jobs, force, options):
-    """The exit status of decode. What it needs meanwhile is beside the output,
-    and removed at the end."""
+    """The exit status of decode. What it needs meanwhile is in a new folder
+    beside the output, and removed at the end."""
     form = check_name(output, force)
     name = os.path.abspath(output)
     tables = [option for option in options if option.startswith(STATISTICS)]
@@ -47,44 +56,42 @@ def run(recording, output, jobs, force, options):
     if frames <= length:
         os.execv(programs.PROGRAM, [*programs.DECODE, recording, *options,
                                    f'--output={output}', *['--force'] * force])
-    store = Store(name + '.jobs')
-    os.makedirs(store.work, exist_ok=True)
-    with store.lock('run'):
-        try:
-            store.create()
-            made = plan.make([recording], [], store.folder, form, length, 1,
-                             [o for o in options if o not in tables],
-                             programs.version())
-            made.statistics = bool(table)
-            made.engine = {'on': 'parallel', 'jobs': jobs}
-            write_json(store.plan, made.to_json())
-            return decode(store, made, recording, name, output, table)
-        finally:
-            shutil.rmtree(store.folder, ignore_errors=True)
+    above, base = os.path.split(name)
+    os.makedirs(above, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=f'.{base}.', dir=above) as folder:
+        store = Store(folder)
+        store.create()
+        made = plan.make([recording], [], folder, form, length, 1,
+                         [o for o in options if o not in tables],
+                         programs.version())
+        made.statistics = bool(table)
+        made.engine = {'on': 'parallel', 'jobs': jobs}
+        write_json(store.plan, made.to_json())
+        return decode(store, made, recording, output, table, force)
 
 
-def decode(store, made, recording, name, output, table):
+def decode(store, made, recording, output, table, force):
     watch = status.Watch(store, made)
     try:
         engine.start(store, made, watch)
+    except Stopped:
+        raise Stopped('stopped; nothing was written') from None
     finally:
         watch.end()
     now = status.take(store, made)
     if not now.complete():
         status.show_failures(store, made, now, sys.stderr)
         return 1
-    result = os.path.join(store.folder, made.recordings[0].output).rstrip('/')
-    if made.form == 'png':
-        shutil.rmtree(name, ignore_errors=True)
-    os.replace(result, name)
+    result = os.path.join(store.folder, made.recordings[0].output)
     if table:
-        shutil.move(plan.table_of(result), table)
+        put_file(plan.table_of(result), table, force)
+    (put_pictures if made.form == 'png' else put_file)(
+        result.rstrip('/'), output.rstrip('/'), force)
     said = read_json(store.merged(0))
     counts = said['counts']
-    if counts:
-        lost = f', {counts["lost"]} lost' if counts['lost'] else ''
-        print(f'decode: {counts["coded"]} coded frames of {recording}{lost}; wrote '
-              f'{output} ({counts["pictures"]} frames)', file=sys.stderr)
+    lost = f', {counts["lost"]} lost' if counts['lost'] else ''
+    print(f'decode: {counts["frames"]} coded frames of {recording}{lost}; wrote '
+          f'{output} ({counts["pictures"]} frames)', file=sys.stderr)
     if said['status'] == chunk.DAMAGED:
         print(f'decode: {made.recordings[0].path} is cut off or damaged; what '
               'could be decoded was, and pictures of damaged frames are flagged',

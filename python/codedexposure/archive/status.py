@@ -106,9 +106,11 @@ def show(store, plan):
         print('in the queue of Slurm: ' + ', '.join(
             f'{count} {state}' for state, count in sorted(states.items())))
     show_failures(store, plan, status)
-    if not status.complete() and not states and not store_is_busy(store):
-        print(f'nothing runs; {RESUME}')
-    return status.complete()
+    if status.complete() or states or store_is_busy(store):
+        return status.complete()
+    print('nothing runs;' if states is not None else
+          'Slurm does not answer; if no job runs,', RESUME)
+    return False
 
 
 def store_is_busy(store):

@@ -22,6 +22,10 @@ class Problem(Exception):
     """A message for the user: value, rule and remedy."""
 
 
+class Stopped(Problem):
+    """A signal ended the work."""
+
+
 class Busy(Problem):
     """Another process is at it."""
 
@@ -121,17 +125,6 @@ class Store:
 
     def part(self, recording, chunk):
         return os.path.join(self.parts(recording), f'{chunk:06d}')
-
-    def merging(self, recording):
-        """A folder for what this process needs to merge a recording. Those of
-        others, who died or were given up, are removed."""
-        parts = self.parts(recording)
-        mine = f'merging-{socket.gethostname()}-{os.getpid()}'
-        for name in os.listdir(parts):
-            if name.startswith('merging-'):
-                shutil.rmtree(os.path.join(parts, name), ignore_errors=True)
-        os.mkdir(os.path.join(parts, mine))
-        return os.path.join(parts, mine)
 
     def failure(self, recording, chunk):
         name = 'merge' if chunk is None else f'{chunk:06d}'

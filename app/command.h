@@ -95,7 +95,12 @@ make_command ()
   return std::make_unique<T> ();
 }
 
-/* One for each file of commands/. */
+/** All of this build, in the order of --help. */
+std::vector<std::unique_ptr<Command>> all_commands ();
+/** A message: there is none of that name, or not in this build. */
+std::string no_command (const std::string &name);
+
+/* One for each file of commands/; nullptr: this build lacks its libraries. */
 std::unique_ptr<Command> advise_command ();
 std::unique_ptr<Command> archive_command ();
 std::unique_ptr<Command> bench_command ();

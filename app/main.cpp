@@ -25,34 +25,6 @@ namespace
 constexpr const char *kName = "codedexposure";
 constexpr std::size_t kPart = std::size_t (1) << 20; ///< bytes read at once
 
-/** All commands, in the order of --help. */
-std::vector<std::unique_ptr<Command>>
-all_commands ()
-{
-  std::vector<std::unique_ptr<Command>> commands;
-  commands.push_back (simulate_command ());
-  commands.push_back (live_command ());
-  commands.push_back (record_command ());
-  commands.push_back (decode_command ());
-  commands.push_back (info_command ());
-  commands.push_back (calibrate_command ());
-  commands.push_back (pack_command ());
-  commands.push_back (send_command ());
-  commands.push_back (receive_command ());
-  commands.push_back (archive_command ());
-  commands.push_back (join_command ());
-  commands.push_back (report_command ());
-  commands.push_back (schedule_command ());
-  commands.push_back (advise_command ());
-  commands.push_back (dmd_command ());
-  commands.push_back (profile_command ());
-#ifdef HAVE_ARAVIS
-  commands.push_back (doctor_command ());
-  commands.push_back (bench_command ());
-#endif
-  return commands;
-}
-
 /** A command, its place on the command line, and its options. */
 struct Node {
   std::string path; ///< "codedexposure schedule show"
@@ -119,12 +91,12 @@ std::string
 words_for (const CLI::ParseError &error, const CLI::App &app, bool in_group)
 {
   if (dynamic_cast<const CLI::ExtrasError *> (&error)) {
-    for (const std::string &word : app.remaining (true))
-      if (word.starts_with ("-"))
-        return "unknown option " + word;
     const std::string word = app.remaining (true).front ();
-    if (in_group)
-      return "there is no command " + in_quotes (word);
+    if (in_group && !word.starts_with ("-"))
+      return no_command (word);
+    for (const std::string &other : app.remaining (true))
+      if (other.starts_with ("-"))
+        return "unknown option " + other;
     return word +
            " belongs to no option; name a file with its option, as in "
            "--output " +

@@ -3,8 +3,10 @@
 # Installs what is missing and builds; sourced by pipelines/demo, tools/package
 # and tests/run.
 #
-#   install_packages PURPOSE     Debian packages for one of these: run, tests,
-#                                rivals, package, check
+#   install_packages PURPOSE     Debian packages for one of these: build, run,
+#                                tests, rivals, package, check
+#   install_beside PURPOSE       the same while the rest of a shell goes on; then
+#                                wait_for_packages
 #   configure_tree DIR OPTION... meson setup
 #   compile_tree DIR TARGET...   these, or all
 #   build_tree DIR OPTION...     both, all
@@ -154,6 +156,20 @@ install_packages ()
   apt_get "${names[@]}"
 }
 
+# Most packages are needed only to run, and dpkg uses one processor: they are
+# installed while what the demo needs is compiled.
+install_beside ()
+{
+  install_packages build
+  install_packages "$1" &
+  packages_job=$!
+}
+
+wait_for_packages ()
+{
+  wait "$packages_job" || exit
+}
+
 # apt_get OPTION-OR-NAME-OR-FILE...: installs packages, with new package lists if
 # need be.
 apt_get ()
@@ -204,6 +220,13 @@ configure_tree ()
 compile_tree ()
 {
   meson compile -C "$@" || give_up "the build failed"
+}
+
+# What records and decodes.
+compile_demo ()
+{
+  note "building $1: what records and decodes"
+  compile_tree "$1" gstcodedexposure app/codedexposure:executable
 }
 
 build_tree ()

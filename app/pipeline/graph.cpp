@@ -57,7 +57,9 @@ Graph::add (const char *factory, const Settings &settings)
   if (!element) {
     const std::string package = package_of (factory);
     fail ("the element \"" + std::string (factory) + "\" is missing" +
-          (package.empty () ? "" : "; run apt-get install " + package));
+          (package.empty () ? "; a build with -Dparts=all has all elements of "
+                              "this project"
+                            : "; run apt-get install " + package));
   }
   for (const Setting &setting : settings)
     set (element, setting);

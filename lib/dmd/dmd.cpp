@@ -6,7 +6,6 @@
 
 #include "base/try.h"
 #include "dmd/drivers.h"
-#include "dmd/usb_bus.h"
 
 namespace codedexposure
 {
@@ -20,12 +19,7 @@ std::mutex schemes_lock;
 std::vector<DmdScheme> &
 schemes ()
 {
-  static std::vector<DmdScheme> known{
-      {"usb:", "usb:[PORT|SERIAL] (a LightCrafter 4500, 6500 or 9000)",
-          open_usb_dmd},
-      {"lightcrafter:",
-          "lightcrafter:[ADDRESS[:PORT]] (the first LightCrafter, over TCP)",
-          open_lightcrafter}};
+  static std::vector<DmdScheme> known = board_schemes ();
   return known;
 }
 

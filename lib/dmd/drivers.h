@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <string_view>
+#include <vector>
 
 #include "dmd/dmd.h"
 #include "dmd/hid_link.h"
@@ -11,6 +12,9 @@
 
 namespace codedexposure
 {
+
+/** The devices that these drivers open, by their names. */
+std::vector<DmdScheme> board_schemes ();
 
 /**
  * Opens the LightCrafter 4500 behind @p link. The board continues with what it

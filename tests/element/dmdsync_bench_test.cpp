@@ -13,9 +13,6 @@ namespace
 using namespace codedexposure;
 using namespace codedexposure::test;
 
-const auto *const linked =
-    ::testing::AddGlobalTestEnvironment (new LinkedElements);
-
 constexpr const char *kOptics =
     " full-well=10000 read-noise=5 psf-sigma=0.5 seed=3 ";
 

@@ -17,9 +17,6 @@ namespace
 using namespace codedexposure;
 using namespace codedexposure::test;
 
-const auto *const linked =
-    ::testing::AddGlobalTestEnvironment (new LinkedElements);
-
 /** A dmdsync without a pipeline, whose states the test changes. */
 class Device
 {

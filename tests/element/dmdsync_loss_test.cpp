@@ -12,9 +12,6 @@ namespace
 using namespace codedexposure;
 using namespace codedexposure::test;
 
-const auto *const linked =
-    ::testing::AddGlobalTestEnvironment (new LinkedElements);
-
 constexpr GstClockTime kMs = GST_MSECOND;
 
 BufferPtr

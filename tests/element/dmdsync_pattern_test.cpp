@@ -14,9 +14,6 @@ namespace
 using namespace codedexposure;
 using namespace codedexposure::test;
 
-const auto *const linked =
-    ::testing::AddGlobalTestEnvironment (new LinkedElements);
-
 /** Frames are exposed as fast as they can be, and the thread that moves the
  * mirrors may have to wait for its turn meanwhile. */
 constexpr int kPatience = 100'000;

@@ -10,9 +10,6 @@ namespace
 using namespace codedexposure;
 using namespace codedexposure::test;
 
-const auto *const linked =
-    ::testing::AddGlobalTestEnvironment (new LinkedElements);
-
 constexpr Extent kSize = {kSyncWidth, kSyncHeight};
 
 std::optional<BenchProfile>

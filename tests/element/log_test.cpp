@@ -18,7 +18,6 @@
 #include "common/raii.h"
 #include "common/tag.h"
 #include "record/track.h"
-#include "record_parts.h"
 #include "schedule_tags.h"
 
 namespace
@@ -28,9 +27,6 @@ using namespace codedexposure;
 using namespace codedexposure::gst;
 using Json = nlohmann::json;
 using Harness = std::unique_ptr<GstHarness, decltype (&gst_harness_teardown)>;
-
-const auto *const linked =
-    ::testing::AddGlobalTestEnvironment (new test::RecordParts);
 
 constexpr char kCaps[] =
     "video/x-raw,format=GRAY8,width=8,height=8,framerate=30000/1001";

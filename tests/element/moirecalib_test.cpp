@@ -17,9 +17,6 @@ namespace
 using namespace codedexposure;
 using namespace codedexposure::test;
 
-const auto *const linked =
-    ::testing::AddGlobalTestEnvironment (new LinkedElements);
-
 /** Frames are exposed as fast as they can be, and threads may have to wait for
  * their turn meanwhile. */
 constexpr int kPatience = 30'000;

@@ -21,8 +21,15 @@ struct ObjectUnref {
 FeatureList
 features ()
 {
-  return FeatureList (gst_registry_get_feature_list_by_plugin (
-      gst_registry_get (), "codedexposure"));
+  GList *list = nullptr;
+  for (const char *plugin : {"codedexposure", "codedexposuredevices"}) {
+    GList *const of_plugin =
+        gst_registry_get_feature_list_by_plugin (gst_registry_get (), plugin);
+    EXPECT_NE (of_plugin, nullptr)
+        << "the plugin " << plugin << " is missing or blacklisted";
+    list = g_list_concat (list, of_plugin);
+  }
+  return FeatureList (list);
 }
 
 /** Every element of the plugin, one after the other. */
@@ -31,7 +38,6 @@ void
 for_each_element (Check check)
 {
   const FeatureList list = features ();
-  ASSERT_NE (list, nullptr) << "the plugin is missing or blacklisted";
   for (GList *at = list.get (); at; at = at->next) {
     if (!GST_IS_ELEMENT_FACTORY (at->data))
       continue;

@@ -11,7 +11,6 @@
 #include "common/meta.h"
 #include "common/tag.h"
 #include "record/track.h"
-#include "record_parts.h"
 
 namespace
 {
@@ -19,9 +18,6 @@ namespace
 using namespace codedexposure;
 using namespace codedexposure::gst;
 using namespace codedexposure::test;
-
-const auto *const linked =
-    ::testing::AddGlobalTestEnvironment (new RecordParts);
 
 constexpr GstClockTime kPeriod = 40 * GST_MSECOND;
 constexpr int kFrames = 6;

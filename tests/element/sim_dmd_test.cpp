@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure-sim with a simulated DMD that the test controls. */
 #include "bench/simulated_dmd.h"
-#include "linked_elements.h"
 #include "mirrors.h"
 #include "sim_harness.h"
 
@@ -10,9 +9,6 @@ namespace
 
 using namespace codedexposure;
 using namespace codedexposure::test;
-
-const auto *const linked =
-    ::testing::AddGlobalTestEnvironment (new LinkedElements);
 
 TEST (SimDmd, ParkedMirrorsAreDarkAndSaidOnce)
 {

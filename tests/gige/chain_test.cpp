@@ -13,7 +13,6 @@
 #include "camera_rig.h"
 #include "dmd/dmd.h"
 #include "emulation/dlpc900.h"
-#include "linked_elements.h"
 #include "mirrors.h"
 #include "screen.h"
 #include "emulation/usb_bed.h"
@@ -24,9 +23,6 @@ namespace
 using namespace codedexposure;
 using namespace codedexposure::test;
 using namespace codedexposure::emulated;
-
-const auto *const linked =
-    ::testing::AddGlobalTestEnvironment (new LinkedElements);
 
 constexpr std::uint16_t kDlpc900 = 0xC900;
 constexpr int kDlp5500 = 5;

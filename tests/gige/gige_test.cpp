@@ -5,7 +5,6 @@
 #include <latch>
 
 #include "base/packed_mono.h"
-#include "linked_elements.h"
 #include "received.h"
 
 namespace
@@ -13,9 +12,6 @@ namespace
 
 using namespace codedexposure;
 using namespace codedexposure::test;
-
-const auto *const linked =
-    ::testing::AddGlobalTestEnvironment (new LinkedElements);
 
 /** Tests of both sources. */
 class Gige : public ::testing::TestWithParam<bool>

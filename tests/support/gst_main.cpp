@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* main () of the element tests. */
 #include <gst/gst.h>
-#include <gtest/gtest.h>
+
+#include "run_tests.h"
 
 int
 main (int argc, char **argv)
@@ -12,8 +13,7 @@ main (int argc, char **argv)
   /* GStreamer logs a warning if an element violates its rules. */
   g_log_set_always_fatal (GLogLevelFlags (
       G_LOG_FATAL_MASK | G_LOG_LEVEL_CRITICAL | G_LOG_LEVEL_WARNING));
-  ::testing::InitGoogleTest (&argc, argv);
-  const int failed = RUN_ALL_TESTS ();
+  const int failed = codedexposure::test::run_tests (argc, argv);
   gst_deinit ();
   return failed;
 }

@@ -7,7 +7,6 @@
 
 #include "common/meta.h"
 #include "harness.h"
-#include "linked_elements.h"
 #include "schedule/timing.h"
 
 namespace codedexposure::test

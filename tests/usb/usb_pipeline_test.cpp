@@ -14,9 +14,6 @@ using namespace codedexposure;
 using namespace codedexposure::test;
 using namespace codedexposure::emulated;
 
-const auto *const linked =
-    ::testing::AddGlobalTestEnvironment (new LinkedElements);
-
 constexpr std::uint16_t kDlpc350 = 0x6401, kDlpc900 = 0xC900;
 constexpr int kDlp5500 = 5;
 

@@ -1,0 +1,16 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "common/elements.h"
+#include "common/meta.h"
+#include "parts.h"
+
+bool
+codedexposure::gst::register_devices (GstPlugin *plugin)
+{
+  register_meta (kFrameMetaName);
+#ifdef CODEDEXPOSURE_ARAVIS
+  if (!GST_DEVICE_PROVIDER_REGISTER (codedexposure_cameraprovider, plugin))
+    return false;
+#endif
+  return GST_ELEMENT_REGISTER (codedexposure_camerasrc, plugin) &&
+         GST_ELEMENT_REGISTER (moirecalib, plugin);
+}

@@ -1,0 +1,29 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "parts.h"
+
+#include "bench/simulated_dmd.h"
+#include "common/elements.h"
+#include "common/meta.h"
+
+namespace codedexposure::gst
+{
+
+/* dmdsync and the simulated bench share the mirrors of a process, so they are
+ * in the same plugin. */
+bool
+register_elements (GstPlugin *plugin)
+{
+  register_meta (kFrameMetaName);
+  serve_simulated_dmds ();
+  return GST_ELEMENT_REGISTER (codedexposure_demux, plugin) &&
+         GST_ELEMENT_REGISTER (codedexposure_filesink, plugin) &&
+         GST_ELEMENT_REGISTER (codedexposure_recorddemux, plugin) &&
+         GST_ELEMENT_REGISTER (codedexposure_recordmux, plugin) &&
+         GST_ELEMENT_REGISTER (codedexposure_scene, plugin) &&
+         GST_ELEMENT_REGISTER (codedexposure_sim, plugin) &&
+         GST_ELEMENT_REGISTER (codedexposure_view, plugin) &&
+         GST_ELEMENT_REGISTER (dmdsync, plugin) &&
+         register_more_elements (plugin);
+}
+
+} // namespace codedexposure::gst

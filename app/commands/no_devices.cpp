@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Without Aravis, there is no emulated camera, and none to examine a bench. */
 #include "command.h"
+#include "pipeline/cameras.h"
 
 namespace codedexposure::app
 {
@@ -15,6 +16,19 @@ std::unique_ptr<Command>
 doctor_command ()
 {
   return nullptr;
+}
+
+/* Nothing is known of cameras here. */
+std::vector<std::string>
+camera_names ()
+{
+  return {};
+}
+
+std::optional<double>
+camera_exposure (GstElement *)
+{
+  return std::nullopt;
 }
 
 } // namespace codedexposure::app

@@ -145,10 +145,8 @@ std::string
 cameras_found ()
 {
   std::string names;
-#ifdef HAVE_ARAVIS
   for (const std::string &name : camera_names ())
     names += (names.empty () ? "" : ", ") + name;
-#endif
   return names.empty () ? "no camera was found; check its power and its network"
                         : "the cameras that were found are " + names +
                               "; set --camera to one of them";

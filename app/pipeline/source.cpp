@@ -102,8 +102,6 @@ add_camera_settings (Settings &settings, const SourceOptions &options)
   set_if (settings, "bench", options.bench);
 }
 
-#ifdef HAVE_ARAVIS
-
 /* A camera that is not told how long to expose does what it was last set to.
  * The first frame, in whose exposure not all slots lie, is an error. */
 GstPadProbeReturn
@@ -134,8 +132,6 @@ watch_exposure (GstElement *behind_camera, const SourcePlan &plan)
         new Nanoseconds (slots->start (slots->slots () - 1)),
         [] (gpointer needed) { delete static_cast<Nanoseconds *> (needed); });
 }
-
-#endif
 
 /* The frames of a user's source may already have a schedule and times. */
 void
@@ -203,13 +199,10 @@ coded_source (
       : options.source
           ? job.graph.from (job.graph.add_text (*options.source))
           : simulation (job, options, plan, pace, {{"dmd", "sim:bench"}});
-#ifdef HAVE_ARAVIS
-  if (options.camera)
+  if (options.camera) {
     watch_exposure (chain.last (), plan);
-#endif
-  if (options.camera)
     job.source = "the camera " + *options.camera;
-  else if (options.source)
+  } else if (options.source)
     job.source = "--source";
   job.from_camera = bool (options.camera);
   synchronise (options, chain);

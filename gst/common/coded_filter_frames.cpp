@@ -29,16 +29,24 @@ ends_with_stream (GstPad *sinkpad, GstClockTime stop)
 } // namespace
 
 /* The first frames of a camera come less than a period apart, until its clock
- * is known. Their pictures then lie evenly between the last picture of the
- * frame before and their own last one, so that no picture comes before another.
- */
+ * is known. Pictures that would then not be later than the last one of the frame
+ * before follow right after it; the others keep their times. */
 GstClockTime
 CodedFrame::pts_of (int k, int n, FrameRate rate) const
 {
+  const auto own = [&] (int i) {
+    return pts () + GstClockTime (rate.time_of (0, i, n));
+  };
+  if (!GST_CLOCK_TIME_IS_VALID (before) || pts () <= before)
+    return own (k);
   const GstClockTime last = before + GstClockTime (rate.time_of (0, n - 1, n));
-  if (!GST_CLOCK_TIME_IS_VALID (before) || pts () <= before || pts () > last)
-    return pts () + GstClockTime (rate.time_of (0, k, n));
-  return last + gst_util_uint64_scale_int (pts () - before, k + 1, n);
+  if (own (k) > last)
+    return own (k);
+  int late = k + 1;
+  while (own (late) <= last)
+    late++;
+  const GstClockTime most = GstClockTime (rate.period ()) / (4 * n * n);
+  return last + (k + 1) * std::min (most, (own (late) - last) / (late + 1));
 }
 
 GstFlowReturn

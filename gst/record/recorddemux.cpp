@@ -47,6 +47,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include <gst/gst.h>
 #include <gst/video/video.h>
@@ -73,6 +74,7 @@ struct Stream {
   /** Of raw frames with 16-bit pixels, and their bytes; null: of others. */
   CapsPtr deep_caps;
   gsize frame_bytes = 0;
+  GstClockTime decoded = GST_CLOCK_TIME_NONE; ///< time of the last frame
 };
 
 struct RecordDemuxState {
@@ -198,6 +200,42 @@ take_raw (GstElement *self, GstPad *pad, const GstCaps *caps)
   return true;
 }
 
+/* ------------------------------------------------------- encoded frames -- */
+
+GstStaticCaps file_caps = GST_STATIC_CAPS ("timestamp/x-file");
+
+/* A decoder gives the time of the frame before to one that is earlier. */
+GstPadProbeReturn
+on_encoded (GstPad *, GstPadProbeInfo *info, gpointer) noexcept
+{
+  GstBuffer *frame =
+      gst_buffer_make_writable (GST_PAD_PROBE_INFO_BUFFER (info));
+  info->data = frame;
+  const CapsPtr caps (gst_static_caps_get (&file_caps));
+  if (GST_BUFFER_PTS_IS_VALID (frame))
+    gst_buffer_add_reference_timestamp_meta (
+        frame, caps.get (), GST_BUFFER_PTS (frame), GST_CLOCK_TIME_NONE);
+  return GST_PAD_PROBE_OK;
+}
+
+GstPadProbeReturn
+on_decoded (GstPad *, GstPadProbeInfo *info, gpointer self) noexcept
+{
+  GstBuffer *frame =
+      gst_buffer_make_writable (GST_PAD_PROBE_INFO_BUFFER (info));
+  info->data = frame;
+  const CapsPtr caps (gst_static_caps_get (&file_caps));
+  auto *own = gst_buffer_get_reference_timestamp_meta (frame, caps.get ());
+  if (!own)
+    return GST_PAD_PROBE_OK;
+  const GstClockTime before = std::exchange (
+      state_in<Self> (self).stream.decoded, GST_BUFFER_PTS (frame));
+  if (GST_BUFFER_PTS (frame) == before)
+    GST_BUFFER_PTS (frame) = own->timestamp;
+  gst_buffer_remove_meta (frame, &own->parent);
+  return GST_PAD_PROBE_OK;
+}
+
 /* --------------------------------------------------------------- tracks -- */
 
 /* Before restore; none, if frames are raw or stay encoded. False, with an
@@ -230,6 +268,10 @@ make_decoder (GstElement *self, GstPad *pad, const GstCaps *caps)
   const int threads = locked (self, [&] { return int (state.threads); });
   g_object_set (
       state.decoder, "max-threads", threads, "max-errors", -1, nullptr);
+  gst_pad_add_probe (pad_of (state.decoder, "sink").get (),
+      GST_PAD_PROBE_TYPE_BUFFER, on_encoded, nullptr, nullptr);
+  gst_pad_add_probe (pad_of (state.decoder, "src").get (),
+      GST_PAD_PROBE_TYPE_BUFFER, on_decoded, self, nullptr);
   gst_bin_add (GST_BIN (self), state.decoder);
   return true;
 }

@@ -35,7 +35,9 @@
  *
  * Since: 0.2
  */
+#include <algorithm>
 #include <string>
+#include <utility>
 
 #include <gst/gst.h>
 
@@ -72,6 +74,10 @@ struct RecordMuxState {
   GstElement *encoder = nullptr; ///< null: frames are raw, or it is missing
 
   ContainerOutput output; ///< streaming thread
+
+  /** DTS of the last frame, of its streaming thread, and of the last line. */
+  GstClockTime frame_order = GST_CLOCK_TIME_NONE;
+  GstClockTime line_order = GST_CLOCK_TIME_NONE;
 };
 
 struct GstCodedExposureRecordMux : Instance<GstBin, RecordMuxState> {
@@ -169,6 +175,26 @@ on_latency (GstPad *, GstPadProbeInfo *info, gpointer) noexcept
   return GST_PAD_PROBE_HANDLED;
 }
 
+/* The muxer takes frames and lines in the order of their DTS, which is that in
+ * which they come, so that a frame that is late is written with its line. @last:
+ * a GstClockTime. */
+GstPadProbeReturn
+on_buffer (GstPad *, GstPadProbeInfo *info, gpointer last) noexcept
+{
+  auto &order = *static_cast<GstClockTime *> (last);
+  GstBuffer *buffer =
+      gst_buffer_make_writable (GST_PAD_PROBE_INFO_BUFFER (info));
+  info->data = buffer;
+  if (!GST_BUFFER_PTS_IS_VALID (buffer))
+    return GST_PAD_PROBE_OK;
+  if (GST_CLOCK_TIME_IS_VALID (order))
+    order = std::max (order + 1, GST_BUFFER_PTS (buffer));
+  else
+    order = GST_BUFFER_PTS (buffer);
+  GST_BUFFER_DTS (buffer) = order;
+  return GST_PAD_PROBE_OK;
+}
+
 GstPadProbeReturn
 on_output (GstPad *, GstPadProbeInfo *info, gpointer self) noexcept
 {
@@ -176,8 +202,9 @@ on_output (GstPad *, GstPadProbeInfo *info, gpointer self) noexcept
   return GST_PAD_PROBE_OK;
 }
 
-/* Its times are exact to 1 ns; each frame, which can be decoded alone, has a
- * cluster of its own. */
+/* Its times are exact to 1 ns. Each frame, which can be decoded alone, has a
+ * cluster of its own, also one that is late: times in a cluster are within 33 us
+ * of its own. */
 void
 add_muxer (Self *self)
 {
@@ -185,7 +212,8 @@ add_muxer (Self *self)
   state.mux = gst_element_factory_make ("matroskamux", nullptr);
   if (!state.mux)
     return;
-  g_object_set (state.mux, "timecodescale", gint64 (1), nullptr);
+  g_object_set (state.mux, "timecodescale", gint64 (1), "min-cluster-duration",
+      gint64 (0), nullptr);
   gst_bin_add (GST_BIN (self), state.mux);
   const ObjectPtr<GstPad> video (
       gst_element_request_pad_simple (state.mux, "video_0"));
@@ -195,9 +223,14 @@ add_muxer (Self *self)
       GstPadProbeType (GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM |
                        GST_PAD_PROBE_TYPE_QUERY_DOWNSTREAM),
       on_video, nullptr, nullptr);
-  for (GstPad *pad : {video.get (), text.get ()})
+  for (const auto &[pad, order] :
+      {std::pair{video.get (), &state.frame_order},
+          std::pair{text.get (), &state.line_order}}) {
     gst_pad_add_probe (
         pad, GST_PAD_PROBE_TYPE_QUERY_UPSTREAM, on_latency, nullptr, nullptr);
+    gst_pad_add_probe (
+        pad, GST_PAD_PROBE_TYPE_BUFFER, on_buffer, order, nullptr);
+  }
   gst_pad_add_probe (pad_of (state.mux, "src").get (),
       GstPadProbeType (
           GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM),
@@ -250,6 +283,7 @@ begin_run (GstElement *self)
   g_object_set (state.mux, "streamable", gboolean (settings.is_streamable),
       "creation-time", nullptr, nullptr);
   state.output.restart ();
+  state.frame_order = state.line_order = GST_CLOCK_TIME_NONE;
   return settings.codec == Codec::ffv1
              ? add_encoder (self, settings.threads)
              : gst_element_link_pads (

@@ -263,7 +263,11 @@ Fit::add_line (std::vector<Position> *spectrum)
   search.others = before.slopes;
   const LightLine line = search.strongest (kSlowest, kFastest, spectrum);
   missed_ = line.depth ();
-  if (line.depth () < kFaintest)
+  /* Lines that are closer cannot be told from one. */
+  const auto is_near = [&] (const LightLine &other) {
+    return std::abs (other.frequency - line.frequency) * span_ < 1.0;
+  };
+  if (line.depth () < kFaintest || std::ranges::any_of (model_.lines, is_near))
     return false;
 
   const LightModel without = model_;

@@ -13,8 +13,10 @@ namespace codedexposure
 namespace
 {
 
-/* The short exposure, of the frame period. */
+/* The short exposure, of the frame period; or what a pedestal takes and that much
+ * time after it. */
 constexpr int kShorter = 5;
+constexpr double kAfterPedestal = 50e3; // ns
 /* Variance of the noise with which rounding can be undone, DN squared. */
 constexpr double kEnough = 0.16;
 /* Error of a mean that is left where rounding was undone, and where not, DN. */
@@ -63,7 +65,14 @@ measure_off_light (Examination &examination, int frames,
       pedestal > 0 ? lit (fine.first, pedestal) : no_light ();
   const Image<float> *weights = pedestal > 0 ? &dark : nullptr;
   const Nanoseconds period = examination.rig.parts ().rate.period ();
-  const Nanoseconds shorter = period / kShorter;
+  const double delay = examination.profile.trigger_delay
+                           ? examination.profile.trigger_delay->value
+                           : 0.0;
+  const double lit_until = double (period) * (fine.first + pedestal) / fine.of;
+  const double enough =
+      pedestal > 0 ? lit_until - delay + kAfterPedestal : 0.0;
+  const auto shorter =
+      std::max (period / kShorter, Nanoseconds (std::llround (enough)));
   const double longest = examination.profile.exposure
                              ? examination.profile.exposure->value
                              : double (period);

@@ -23,8 +23,10 @@ namespace
 /* Stamps may differ from the frame rate by that part: clocks do by less. */
 constexpr double kRateError = 0.003;
 constexpr int kRateFrames = 25;
-/* More than the frames that are on their way when the mirrors are parked. */
+/* More than the frames that are on their way when the mirrors are parked, and
+ * the time for which those of high rates are, s. */
 constexpr int kFramesInFlight = 10;
+constexpr double kTimeInFlight = 0.03;
 constexpr int kChanges = 8, kFramesOfChange = 10;
 /* Slots of the walk: runs of one are long enough for a DMD. */
 constexpr double kShortestRun = 130e-6;
@@ -188,12 +190,13 @@ Result<bool>
 TriggerCheck::check_parked (double ratio, double step, double uneven)
 {
   rig_.park ();
-  const double enough = 2.0 * step * kFramesInFlight; // s
+  const int in_flight = kFramesInFlight + int (kTimeInFlight / step);
+  const double enough = 2.0 * step * in_flight; // s
   ASSIGN_OR_RETURN (const auto parked,
-      rig_.watch_for (Nanoseconds (1e9 * enough), kFramesInFlight + 2));
+      rig_.watch_for (Nanoseconds (1e9 * enough), in_flight + 2));
   const std::string rate = real_text (
       std::round (ratio * parts_.rate.num / parts_.rate.den * 1e3) / 1e3);
-  if (int (parked.size ()) > kFramesInFlight)
+  if (int (parked.size ()) > in_flight)
     finding_.blame ("free-running",
         "frames come at " + rate +
             " frames/s even when the DMD is parked: the camera does not wait "
@@ -526,19 +529,22 @@ TriggerCheck::diagnose_exposure (const LightFit &fit)
   finding_.add ("exposure", length);
   finding_.add (kEnd, end);
   finding_.add ("jitter", jitter);
+  /* Where all frames scatter, nothing else can be told, not even by how much. */
+  if (jitter.sigma >= kScattered) {
+    if (verdict_of ("jitter", jitter) >= Verdict::warn)
+      finding_.judge ("jitter", jitter);
+    else
+      finding_.blame ("jitter",
+          "from frame to frame, the exposure begins earlier or later by a "
+          "large part of the frame period");
+    return;
+  }
   /* What jitters as much is no setting. */
   start.sigma = std::hypot (start.sigma, jitter.value);
   end.sigma = std::hypot (end.sigma, jitter.value);
   diagnose_delay (start);
   diagnose_end (end, length);
-  /* If all frames scatter, none tells by how much the exposure jitters. */
-  if (verdict_of ("jitter", jitter) >= Verdict::warn ||
-      jitter.sigma < kScattered)
-    finding_.judge ("jitter", jitter);
-  else
-    finding_.blame ("jitter",
-        "from frame to frame, the exposure begins earlier or later by a large "
-        "part of the frame period");
+  finding_.judge ("jitter", jitter);
 }
 
 Result<Finding>

@@ -89,15 +89,18 @@ TEST_F (DemuxTime, FramesThatComeEarlyGiveNoPictureBeforeAnother)
 {
   start ();
   push_all ({0, 20, 40, 80});
-  std::vector<GstClockTime> shown, light;
+  std::vector<GstClockTime> shown, light; // us
   for (const BufferPtr &buffer : pull_all ()) {
-    shown.push_back (pts_of (buffer) / kMs);
-    light.push_back (get_frame_meta (buffer.get ())->exposure_start / kMs);
+    shown.push_back (pts_of (buffer) / GST_USECOND);
+    light.push_back (
+        get_frame_meta (buffer.get ())->exposure_start / GST_USECOND);
   }
-  EXPECT_EQ (shown, (std::vector<GstClockTime>{0, 10, 20, 30, 35, 40, 45, 50,
-                        55, 60, 65, 70, 80, 90, 100, 110}));
-  EXPECT_EQ (light, (std::vector<GstClockTime>{0, 10, 20, 30, 20, 30, 40, 50,
-                        40, 50, 60, 70, 80, 90, 100, 110}));
+  EXPECT_EQ (shown, (std::vector<GstClockTime>{0, 10'000, 20'000, 30'000,
+                        30'625, 31'250, 40'000, 50'000, 50'625, 51'250, 60'000,
+                        70'000, 80'000, 90'000, 100'000, 110'000}));
+  EXPECT_EQ (light, (std::vector<GstClockTime>{0, 10'000, 20'000, 30'000,
+                        20'000, 30'000, 40'000, 50'000, 40'000, 50'000, 60'000,
+                        70'000, 80'000, 90'000, 100'000, 110'000}));
 }
 
 /* The slots of the reference bench: 4 x (9.8 ms + 0.2 ms). */

@@ -108,6 +108,10 @@ def parse():
     if '--' in words:
         words, decode = words[:words.index('--')], words[words.index('--') + 1:]
     command = words[0] if words else ''
+    option = command.split('=')[0]
+    if option.startswith('-') and not any(
+            option in known for known in COMMANDS.values()):
+        parser.error(f'unknown option {option}')
     if command not in COMMANDS:
         parser.error(f'{command or "no command"}: set one of ' +
                      ', '.join(COMMANDS))

@@ -42,8 +42,9 @@ Fuse::properties ()
           gst_coded_exposure_quality_get_type ()},
       {"refine", "Refine",
           "Refine the result by a network that learned from pictures, as "
-          "quality=learned does with best; for one-hot codes of 2 to 16 slots, "
-          "others stay as they are, with a warning",
+          "quality=learned does with best; for one-hot codes of 2 to 16 slots "
+          "and an off-state leakage of up to 5 %, others stay as they are, with "
+          "a warning",
           kReadWrite, &FuseOptions::refine},
       {"lookahead", "Lookahead",
           "Coded frames to wait for before one is fused; static pixels are "
@@ -85,7 +86,8 @@ Fuse::method_name () const
   std::string name = std::string ("fuse ") +
                      g_enum_get_value (qualities, int (quality))->value_nick;
   if ((learned || in_force_.refine) && unrefined ().empty ())
-    name += ", learned " + refinement_hash ();
+    name += ", learned " + refinement_hash () +
+            (format ().schedule.leak () > 0.0 ? ", leakage undone" : "");
   return name;
 }
 

@@ -186,8 +186,8 @@ Engine::Engine (const Schedule &schedule, Extent size,
   if (options.refine)
     unrefined_ = Refiner::why_not (schedule, observation_, typical_noise ());
   if (options.refine && unrefined_.empty ())
-    refiner_.emplace (schedule, size.width, size.height,
-        observation_.noise_free (), typical_noise ());
+    refiner_.emplace (
+        schedule, observation_, size.width, size.height, typical_noise ());
 }
 
 /* Static pixels are the same in every slot. */

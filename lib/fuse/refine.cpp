@@ -42,9 +42,14 @@ Refiner::why_not (
     return text + " has " + std::to_string (schedule.slots ()) +
            " slots; the refinement was trained for " +
            std::to_string (kMinSlots) + " to " + std::to_string (kMaxSlots);
-  if (!observation.exact () || observation.gains ())
+  if (!schedule.code ().one_hot () || observation.gains ())
     return text + " has pixels that see more or less than one slot; the "
-                  "refinement was trained for one-hot codes without leakage";
+                  "refinement was trained for one-hot codes";
+  if (schedule.leak () > kMaxLeak)
+    return text + ": mirrors that are off pass " +
+           real_text (std::round (1000.0 * schedule.leak ()) / 10.0) +
+           " % of the light; the refinement is for up to " +
+           real_text (100.0 * kMaxLeak) + " %";
   if (!observation.noise_free () && schedule.slots () == 2)
     return text + " has two slots, which hide little; with noise, the "
                   "refinement loses more there than it gains";
@@ -56,17 +61,21 @@ Refiner::why_not (
   return {};
 }
 
-Refiner::Refiner (const Schedule &schedule, int width, int height,
-    bool noise_free, double noise)
+Refiner::Refiner (const Schedule &schedule, const Observation &observation,
+    int width, int height, double noise)
     : slots_ (schedule.slots ()), width_ (width), height_ (height),
-      noise_free_ (noise_free), noise_ (float (noise)),
+      noise_free_ (observation.noise_free ()),
+      leak_ (float (schedule.leak ())),
+      noise_ (float (noise * (1.0 + schedule.leak () * (slots_ - 1)))),
       slot_of_ (width, height),
       refined_ (std::size_t (slots_), Field (width, height))
 {
+  if (leak_ > 0.0f)
+    own_ = Field (width, height);
   std::vector<std::uint8_t> slot_of_element;
   for (int e = 0; e < slots_; e++) {
     int slot = 0;
-    while (slot + 1 < slots_ && schedule.light (e, slot) <= 0.0)
+    while (schedule.light (e, slot) < 1.0)
       slot++;
     slot_of_element.push_back (std::uint8_t (slot));
   }
@@ -74,6 +83,25 @@ Refiner::Refiner (const Schedule &schedule, int width, int height,
     for (int x = 0; x < width; x++)
       slot_of_.row (y)[x] =
           slot_of_element[std::size_t (schedule.element_at (x, y))];
+}
+
+/* A coded pixel is the mean of the slots, of which its own has the weight 1 and
+ * each other one that of the leak. */
+void
+Refiner::undo_leak (const Field &coded, const std::vector<Field> &light)
+{
+  const float whole = 1.0f + leak_ * float (slots_ - 1);
+  for (int y = 0; y < height_; y++) {
+    float *own = own_.row (y);
+    for (int x = 0; x < width_; x++)
+      own[x] = whole * coded.row (y)[x];
+    for (int s = 0; s < slots_; s++) {
+      const float *other = light[std::size_t (s)].row (y);
+      const std::uint8_t *slots = slot_of_.row (y);
+      for (int x = 0; x < width_; x++)
+        own[x] -= slots[x] == s ? 0.0f : leak_ * other[x];
+    }
+  }
 }
 
 /* One row of the network's inputs, of pixels that begin kReach before the frame
@@ -161,11 +189,14 @@ Refiner::run (const Kernels &kernels, const Field &coded,
     for (int y = 0; y < height_; y++)
       for (int x = 0; x < width_; x++)
         slot.row (y)[x] = std::clamp (slot.row (y)[x], 0.0f, kWhite);
+  if (leak_ > 0.0f)
+    undo_leak (coded, light);
+  const Field &seen = leak_ > 0.0f ? own_ : coded;
   const int rows = half (height_);
   const int parts = slots_ % workers.count () == 0 ? 1 : workers.count ();
   const auto refine = [&] (int task, int) {
     const int part = task % parts;
-    refine_part (kernels, {coded, is_static, light}, task / parts,
+    refine_part (kernels, {seen, is_static, light}, task / parts,
         rows * part / parts, rows * (part + 1) / parts);
   };
   if (!workers.run (slots_ * parts, refine, std::move (stop)))

@@ -22,6 +22,9 @@ namespace codedexposure::fuse
  * coded pixel and the noise. It sees one coded frame only: at both ends, the
  * end slot stands for those that are missing. Without noise, measured pixels
  * stay as they are; static ones always do.
+ *
+ * The network was trained without leakage. Of each coded pixel, the light that
+ * leaked is undone first: it is known from the fused light of the other slots.
  */
 class Refiner
 {
@@ -31,8 +34,11 @@ public:
   static std::string why_not (
       const Schedule &schedule, const Observation &observation, double noise);
 
-  Refiner (const Schedule &schedule, int width, int height, bool noise_free,
-      double noise);
+  /** Of the light of its own slot, a pixel may see as much from each other one. */
+  static constexpr double kMaxLeak = 0.05;
+
+  Refiner (const Schedule &schedule, const Observation &observation, int width,
+      int height, double noise);
 
   /** Refines the fused light of every slot.
    * @p is_static  weight of static pixels, 0 to 1.
@@ -46,6 +52,7 @@ private:
     const Field &coded, &is_static;
     const std::vector<Field> &light;
   };
+  void undo_leak (const Field &coded, const std::vector<Field> &light);
   void refine_part (
       const Kernels &kernels, const Frame &frame, int slot, int from, int to);
   void fold_row (const Frame &frame, int slot, int row, float *to) const;
@@ -54,8 +61,10 @@ private:
 
   int slots_, width_, height_;
   bool noise_free_;
-  float noise_;
+  float leak_; ///< of each other slot, as a part of the light of its own one
+  float noise_; ///< of a coded pixel without what leaked, grey levels
   FieldOf<std::uint8_t> slot_of_; ///< of each pixel
+  Field own_;                     ///< coded light without what leaked
   std::vector<Field> refined_;
 };
 

@@ -49,12 +49,13 @@ rank_way (int n, bool normalised)
 }
 
 FusionWay
-fusion_way (int n, FuseQuality quality, bool refine = false, int lookahead = 0)
+fusion_way (int n, FuseQuality quality, bool refine = false, int lookahead = 0,
+    const std::string &leak = "0")
 {
   return {std::string (quality_name (quality)) + (refine ? ", refined" : "") +
               (lookahead ? ", lookahead" : ""),
       [=] (const Scene &scene, const Condition &condition) {
-        const Schedule schedule = fusion_schedule (n);
+        const Schedule schedule = fusion_schedule (n, leak);
         FuseOptions options = options_of (quality, condition);
         options.refine = refine;
         options.lookahead = lookahead;
@@ -170,10 +171,11 @@ flicker (std::span<const Picture> slots)
 } // namespace
 
 Schedule
-fusion_schedule (int n)
+fusion_schedule (int n, const std::string &leak)
 {
-  return schedule_of (n == 4 ? "sequential:lattice:4/2"
-                             : "sequential:lattice:8/3,order=bit-reversal");
+  return schedule_of ((n == 4 ? "sequential:lattice:4/2"
+                              : "sequential:lattice:8/3,order=bit-reversal") +
+                      (leak == "0" ? "" : ",leak=" + leak));
 }
 
 std::vector<Table>
@@ -380,6 +382,40 @@ refinement_tables (const std::vector<Scene> &clips, const Progress &progress)
     }
   }
   return tables;
+}
+
+Table
+leakage_table (const std::vector<Scene> &scenes, const Progress &progress)
+{
+  Table table{"fusion-leakage",
+      "PSNR (dB) with off-state leakage that is known, mean over scenes",
+      {{"leakage"}}, {}};
+  for (const int n : {4, 8})
+    for (const bool noisy : {false, true})
+      for (const FuseQuality quality :
+          {FuseQuality::kBest, FuseQuality::kLearned})
+        table.columns.push_back (
+            {std::string (quality_name (quality)) + ", " +
+                    condition_name (noisy) + ", n = " + std::to_string (n),
+                2});
+  for (const char *leak : {"0", "0.001", "0.01", "0.05"}) {
+    progress ("leakage " + std::string (leak));
+    auto &row = table.rows.emplace_back (std::vector<Cell>{leak});
+    for (const int n : {4, 8})
+      for (const bool noisy : {false, true})
+        for (const FuseQuality quality :
+            {FuseQuality::kBest, FuseQuality::kLearned}) {
+          double sum = 0.0;
+          for (const Scene &scene : scenes) {
+            const Scene part = first_of (scene, kSequenceFrames, n);
+            const auto frames = fusion_way (n, quality, false, 0, leak)
+                                    .frames (part, noisy ? kNoisy : kClean);
+            sum += mean_of (slot_psnr (frames, part.frames, 0, n));
+          }
+          row.emplace_back (sum / double (scenes.size ()));
+        }
+  }
+  return table;
 }
 
 } // namespace codedexposure::quality

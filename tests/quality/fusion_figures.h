@@ -2,6 +2,7 @@
 /* The tables of docs/fusion.md. */
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "figures.h"
@@ -13,7 +14,7 @@ namespace codedexposure::quality
 {
 
 /** The schedule that is measured for @p n slots, 4 or 8. */
-Schedule fusion_schedule (int n);
+Schedule fusion_schedule (int n, const std::string &leak = "0");
 
 /** Frames of a clip that the tables of sequences and of the refinement use. */
 constexpr int kSequenceFrames = 32;
@@ -38,5 +39,10 @@ std::vector<Table> sequence_tables (
  * every clip and of drawn scenes, clean and noisy. */
 std::vector<Table> refinement_tables (
     const std::vector<Scene> &clips, const Progress &progress);
+
+/** Mean PSNR of up to kSequenceFrames frames of every scene by the off-state
+ * leakage, which the schedule has, clean and noisy. */
+Table leakage_table (
+    const std::vector<Scene> &scenes, const Progress &progress);
 
 } // namespace codedexposure::quality

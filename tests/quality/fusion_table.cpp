@@ -96,6 +96,7 @@ main (int argc, char **argv)
       sequence_tables (scenes, progress), std::back_inserter (tables));
   std::ranges::move (
       refinement_tables (scenes, progress), std::back_inserter (tables));
+  tables.push_back (leakage_table (scenes, progress));
   progress ("");
 
   if (options.document)

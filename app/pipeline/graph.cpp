@@ -29,8 +29,9 @@ Graph::~Graph ()
 namespace
 {
 
-/* "demux", or "demux2" for the second one: only for messages, as elements are
- * not found by their names. */
+/* "demux", or "demux-2" for the second one: only for messages and printed lines,
+ * as elements are not found by their names. gst-launch-1.0 would take "queue2"
+ * for one that a bin has inside. */
 std::string
 name_for (GstElement *pipeline, std::string_view factory)
 {
@@ -43,7 +44,7 @@ name_for (GstElement *pipeline, std::string_view factory)
         gst_bin_get_by_name (GST_BIN (pipeline), name.c_str ()));
     if (!taken)
       return name;
-    name = std::string (factory) + std::to_string (k);
+    name = std::string (factory) + "-" + std::to_string (k);
   }
 }
 

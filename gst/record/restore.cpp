@@ -337,18 +337,6 @@ include_rounding (GstSegment &segment, guint64 tick)
     segment.start -= std::min (tick / 2, segment.start - segment.time);
 }
 
-TrackReader::Order
-order_of (const GstSegment &segment)
-{
-  constexpr guint kTricks = GST_SEGMENT_FLAG_TRICKMODE |
-                            GST_SEGMENT_FLAG_TRICKMODE_KEY_UNITS |
-                            GST_SEGMENT_FLAG_TRICKMODE_FORWARD_PREDICTED;
-  if (segment.rate < 0)
-    return TrackReader::Order::backwards;
-  return segment.flags & kTricks ? TrackReader::Order::some
-                                 : TrackReader::Order::all;
-}
-
 EventPtr
 segment_event (const RestoreState &state)
 {

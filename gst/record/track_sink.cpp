@@ -18,6 +18,18 @@ sink_of (GstPad *pad)
 
 } // namespace
 
+TrackReader::Order
+order_of (const GstSegment &segment)
+{
+  constexpr guint kTricks = GST_SEGMENT_FLAG_TRICKMODE |
+                            GST_SEGMENT_FLAG_TRICKMODE_KEY_UNITS |
+                            GST_SEGMENT_FLAG_TRICKMODE_FORWARD_PREDICTED;
+  if (segment.rate < 0)
+    return TrackReader::Order::backwards;
+  return segment.flags & kTricks ? TrackReader::Order::some
+                                 : TrackReader::Order::all;
+}
+
 /* ------------------------------------------------------------------- pad -- */
 
 void

@@ -15,6 +15,9 @@
 namespace codedexposure::gst
 {
 
+/** Of which frames a segment has some or all. */
+TrackReader::Order order_of (const GstSegment &segment);
+
 /** Reads the lines that come on the track's streaming thread, plain or as Pango
  * markup, and gives each frame its line. */
 class TrackSink

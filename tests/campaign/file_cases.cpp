@@ -59,16 +59,21 @@ record (
 
 void
 decode (Row &row, const std::string &path, const Recording &recording,
-    bool push_mode)
+    const Reader &reader)
 {
   row.runs++;
-  Judge judge (
-      {.reading = recording.reading, .unknown_slots = recording.unjudged});
-  Play play ("filesrc location=" + path + (push_mode ? " ! queue" : "") +
-             " ! codedexposure-recorddemux threads=1 ! codedexposure-demux "
-             "require-schedule=true ! fakesink name=out sync=false");
+  Judge judge ({.reading = recording.reading,
+      .unknown_slots = recording.unjudged,
+      .any_order = reader.is_trick ()});
+  Play play ("filesrc location=" + path + (reader.push_mode ? " ! queue" : "") +
+             " ! codedexposure-recorddemux threads=1 ! " + reader.edit +
+             " codedexposure-demux require-schedule=true ! fakesink name=out "
+             "sync=false");
   judge.watch (play.pad ("out", "sink").get ());
-  play.start ();
+  if (reader.is_trick ())
+    play.start_at (reader.rate, reader.flags);
+  else
+    play.start ();
   play.wait ();
   play.stop ();
   judge.end (recording.slots, play.told_of_the_end ());
@@ -89,7 +94,9 @@ decode (Row &row, const std::string &path, const Recording &recording,
   if (play.hung)
     row.note (path + " hangs");
   if (tally.as_good + tally.untold > 0)
-    row.note (path + (push_mode ? " (push): " : ": ") + judge.evidence ());
+    row.note (path + (reader.push_mode ? " (push)" : "") +
+              (reader.edit.empty () ? "" : " " + reader.edit) + ": " +
+              judge.evidence ());
 }
 
 namespace
@@ -103,7 +110,7 @@ try_file (Row &row, const std::string &name, const std::string &bytes,
   const std::string path = work_folder () + "/" + name + ".mkv";
   write_file (path, bytes);
   Row one;
-  decode (one, path, recording, push_mode);
+  decode (one, path, recording, {.push_mode = push_mode});
   if (!one.passed () && g_getenv ("CAMPAIGN_KEEP"))
     std::filesystem::copy_file (path,
         std::string (g_getenv ("CAMPAIGN_KEEP")) + "/" + name + ".mkv",
@@ -118,7 +125,42 @@ whole (Scale)
   Row row{.name = "a whole recording, read again"};
   const auto recording = record (work_folder () + "/whole.mkv", 40, 8);
   for (const bool push_mode : {false, true})
-    decode (row, work_folder () + "/whole.mkv", recording, push_mode);
+    decode (row, work_folder () + "/whole.mkv", recording,
+        {.push_mode = push_mode});
+  return {row};
+}
+
+/* All frames can be decoded alone, so all of them come. */
+std::vector<Row>
+tricks (Scale)
+{
+  Row reverse{.name = "a recording played in reverse"};
+  Row keys{.name = "a recording played by key frames"};
+  const std::string path = work_folder () + "/tricks.mkv";
+  for (const char *schedule : {"sequential:2x2,pilot=8", kStaircase}) {
+    const auto recording = record (path, 40, -1, schedule);
+    decode (reverse, path, recording, {.rate = -1.0});
+    decode (keys, path, recording,
+        {.flags = GST_SEEK_FLAG_TRICKMODE_KEY_UNITS});
+  }
+  return {reverse, keys};
+}
+
+/* Size and rate stay as they are. */
+std::vector<Row>
+edits (Scale)
+{
+  Row row{.name = "other elements edit recorded frames"};
+  const std::string path = work_folder () + "/edits.mkv";
+  const auto recording = record (path, 40, -1);
+  const std::string same = "video/x-raw,width=" + std::to_string (kWidth) +
+                           ",height=" + std::to_string (kHeight) + " ! ";
+  for (const std::string &edit :
+      {std::string ("videoflip video-direction=180 !"),
+          std::string ("videoflip video-direction=horiz !"),
+          "videocrop top=2 ! videobox top=-2 ! " + same,
+          "videoscale ! video/x-raw,width=24,height=20 ! videoscale ! " + same})
+    decode (row, path, recording, {.edit = edit});
   return {row};
 }
 
@@ -175,7 +217,8 @@ cuts (Scale scale)
 std::vector<Case>
 file_cases ()
 {
-  return {{"whole", whole}, {"flips", flips}, {"cuts", cuts}};
+  return {{"whole", whole}, {"tricks", tricks}, {"edits", edits},
+      {"flips", flips}, {"cuts", cuts}};
 }
 
 } // namespace codedexposure::campaign

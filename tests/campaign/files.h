@@ -29,8 +29,19 @@ inline constexpr const char *kStaircase = "staircase:2x2,pilot=8";
  * comes. */
 Recording record (const std::string &path, int frames, int lost,
     const std::string &schedule = "sequential:2x2,pilot=8");
+
+/** How a recording is read. */
+struct Reader {
+  bool push_mode = false; ///< as a stream, without seeking
+  double rate = 1.0;
+  GstSeekFlags flags = GST_SEEK_FLAG_NONE;
+  std::string edit = {}; ///< elements before codedexposure-demux, with "!"
+
+  bool is_trick () const { return rate < 0 || flags != GST_SEEK_FLAG_NONE; }
+};
+
 /** Reads @p path again and judges it. */
 void decode (Row &row, const std::string &path, const Recording &recording,
-    bool push_mode);
+    const Reader &reader);
 
 } // namespace codedexposure::campaign

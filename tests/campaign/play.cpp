@@ -71,6 +71,18 @@ Play::start ()
 }
 
 void
+Play::start_at (double rate, GstSeekFlags flags)
+{
+  gst_element_set_state (pipeline_.get (), GST_STATE_PAUSED);
+  gst_element_get_state (
+      pipeline_.get (), nullptr, nullptr, 20 * GST_SECOND);
+  gst_element_seek (pipeline_.get (), rate, GST_FORMAT_TIME,
+      GstSeekFlags (flags | GST_SEEK_FLAG_FLUSH), GST_SEEK_TYPE_SET, 0,
+      GST_SEEK_TYPE_END, 0);
+  start ();
+}
+
+void
 Play::stop ()
 {
   gst_element_set_state (pipeline_.get (), GST_STATE_NULL);

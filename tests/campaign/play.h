@@ -21,6 +21,8 @@ public:
 
   void start ();
   void stop ();
+  /** Plays the whole from its end on, or with the flags of a trick mode. */
+  void start_at (double rate, GstSeekFlags flags);
   /** Collects what is told; waits until the pipeline ends, fails, or nothing
    * happens for @p patience. */
   void wait (GstClockTime patience = 20 * GST_SECOND);

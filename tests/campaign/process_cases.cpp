@@ -22,7 +22,7 @@ void
 decode_rest (Row &row, const std::string &path, bool push_mode)
 {
   Row one;
-  decode (one, path, {}, push_mode);
+  decode (one, path, {}, {.push_mode = push_mode});
   if (!one.told.count ("codedexposure/stream-cut") && one.refused == 0) {
     one.mute++;
     one.note (path + ": no codedexposure/stream-cut");
@@ -134,7 +134,7 @@ stalled (Scale scale)
   shown.hung += bench.play.hung;
   shown.told = bench.play.told;
   shown.note (judge.evidence ());
-  decode (recorded, path, {.bytes = {}, .slots = bench.slots ()}, false);
+  decode (recorded, path, {.bytes = {}, .slots = bench.slots ()}, {});
   if (recorded.tally.missing > 0 || shown.tally.missing == 0) {
     recorded.mute++;
     recorded.note (

@@ -273,6 +273,10 @@ Judge::judge (GstPad *pad, GstBuffer *buffer)
     gap_ |= flagged;
     return;
   }
+  if (options_.any_order) {
+    seen_.insert (*slot);
+    return;
+  }
   note_missing (*slot, std::exchange (gap_, false) ||
                            GST_BUFFER_IS_DISCONT (buffer) ||
                            (meta && meta->lost_before > 0));
@@ -283,6 +287,9 @@ void
 Judge::end (std::int64_t slots, bool told)
 {
   const std::lock_guard guard (lock_);
+  for (; options_.any_order && next_ < slots; next_++)
+    if (!seen_.contains (next_))
+      note_missing (next_ + 1, told);
   note_missing (slots, told || gap_);
 }
 

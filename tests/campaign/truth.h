@@ -75,6 +75,8 @@ public:
      * not across so many lost frames or more, when the camera was gone. */
     bool by_number = false;
     guint64 gone = 20;
+    /** Subframes come in any order, and the same one may come again. */
+    bool any_order = false;
   };
 
   explicit Judge (Options options) : options_ (std::move (options)) {}
@@ -105,6 +107,7 @@ private:
   std::set<std::int64_t> unjudged_;
   std::string evidence_;
   std::int64_t next_ = 0; ///< slot
+  std::set<std::int64_t> seen_; ///< slots, in any_order
   bool gap_ = false;      ///< a GAP event came since the last subframe
   std::optional<std::int64_t> anchor_; ///< slot of number 0, in by_number
   std::optional<std::int64_t> origin_; ///< the anchor before

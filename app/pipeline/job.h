@@ -63,8 +63,10 @@ struct Job {
   GstElement *reader = nullptr;
   /** The recording is read from front to back, past damage. */
   bool salvage = false;
-  /** The queue before encoder and disk of a live recording. */
+  /** The queue before encoder and disk of a live recording, and what writes it:
+   * it counts what is missing there, while a display may lose more. */
   GstElement *buffer = nullptr;
+  GstElement *recorder = nullptr;
   /** If the recording behind `buffer` fails, the rest goes on. */
   bool buffer_may_fail = false;
   /** An identity with eos-after, behind which the stream ends. */

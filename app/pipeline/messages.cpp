@@ -403,18 +403,8 @@ counter_of (GstElement *element, const char *counter)
   return count;
 }
 
-guint64
-counted (GstElement *pipeline, const char *counter)
-{
-  guint64 most = 0;
-  each_element (pipeline, [&] (GstElement *element) {
-    most = std::max (most, counter_of (element, counter));
-  });
-  return most;
-}
-
 std::string
-flaws_of (GstElement *pipeline)
+flaws_of (GstElement *pipeline, GstElement *recorder)
 {
   constexpr struct {
     const char *counter, *text, *text_of_one = text;
@@ -424,7 +414,13 @@ flaws_of (GstElement *pipeline)
       {"slips", "losses of synchronisation", "loss of synchronisation"}};
   std::string text;
   for (const auto &[counter, text_of_many, text_of_one] : kFlaws) {
-    const guint64 most = counted (pipeline, counter);
+    guint64 most = 0;
+    if (recorder && std::string_view (counter) == "frames-lost")
+      most = counter_of (recorder, counter);
+    else
+      each_element (pipeline, [&] (GstElement *element) {
+        most = std::max (most, counter_of (element, counter));
+      });
     if (most > 0)
       text += format (", %" G_GUINT64_FORMAT " %s", most,
           most == 1 ? text_of_one : text_of_many);

@@ -53,13 +53,12 @@ std::string notice (const GstStructure *message);
 
 /** A value of the statistics of @p element; 0: it has none of that name. */
 guint64 counter_of (GstElement *element, const char *counter);
-/** The largest of the counters @p counter in the property stats of the elements
- * of @p pipeline: several count the same frames. */
-guint64 counted (GstElement *pipeline, const char *counter);
 
-/** ", 3 lost, 1 corrupted": coded frames of @p pipeline, from the counters of
- * its elements; empty: none. */
-std::string flaws_of (GstElement *pipeline);
+/** ", 3 lost, 1 corrupted": coded frames of @p pipeline, from the largest
+ * counters of its elements, of which several count the same frames; empty: none.
+ * @p recorder  counts those that are lost, whatever a display loses; null: any.
+ */
+std::string flaws_of (GstElement *pipeline, GstElement *recorder);
 
 /** "name: counter=value ...": the counters in the property stats of an element
  * of this plugin (without stats: its read-only numbers), or the shown and late

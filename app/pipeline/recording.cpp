@@ -54,12 +54,15 @@ write_recording (Job &job, Chain &chain, const std::string &file,
       {{"leaky", style.live ? "downstream" : "no"},
           {"max-size-buffers", frames_that_wait (style.rate)},
           {"max-size-bytes", room_in_memory ()}, {"max-size-time", 0}});
-  if (style.live)
-    job.buffer = chain.last ();
+  GstElement *queue = chain.last ();
   Settings settings{{"codec", style.codec}};
   set_if (settings, "threads", style.threads);
   chain.to ("codedexposure-recordmux", settings);
   GstElement *mux = chain.last ();
+  if (style.live) {
+    job.buffer = queue;
+    job.recorder = mux;
+  }
   const ObjectPtr<GstPad> frames = pad_of (mux, "sink");
   if (style.codec == "raw")
     chain.to ("codedexposure-filesink", {{"reserve", style.bytes}});

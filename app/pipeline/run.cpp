@@ -415,7 +415,7 @@ Run::tick ()
   if (!counter_ || frames == 0)
     return;
   if (job_.window) {
-    const std::string flaws = flaws_of (pipeline ());
+    const std::string flaws = flaws_of (pipeline (), job_.recorder);
     job_.window->tell (
         format ("%" G_GINT64_FORMAT " coded frames", frames) +
             (flaws.empty () ? ", none lost or corrupted" : flaws),

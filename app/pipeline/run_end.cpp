@@ -51,12 +51,13 @@ Run::finish ()
     print_counters ();
   if (job_.window)
     job_.window->finish ();
-  const std::string flaws = flaws_of (pipeline ());
+  const std::string flaws = flaws_of (pipeline (), job_.recorder);
   if (job_.counted) {
     not_coded_ = counter_of (job_.counted, "frames-not-coded");
     lost_ = counter_of (job_.counted, "frames-lost");
   }
-  const guint64 lost = job_.buffer ? counted (pipeline (), "frames-lost") : 0;
+  const guint64 lost =
+      job_.recorder ? counter_of (job_.recorder, "frames-lost") : 0;
   const bool published = publish ();
   RunResult result{exit_, frames (), container_damaged_, interrupted_};
   if (container_damaged_)

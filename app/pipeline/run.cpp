@@ -56,9 +56,18 @@ Run::on_unix_signal (gpointer data)
   return G_SOURCE_CONTINUE;
 }
 
-/* Signals are handled before the pipeline starts, so that one during the
- * opening of a device does not leave it open. */
-void
+bool
+Run::claim_outputs ()
+{
+  const auto errors = job_.outputs.claim (job_.options.force);
+  for (const std::string &error : errors)
+    status_.line ("error: " + error);
+  return errors.empty ();
+}
+
+/* Signals are handled before files are made and the pipeline starts, so that one
+ * in between leaves neither a file nor an open device. */
+bool
 Run::run_loop ()
 {
   const auto on_bus = [] (GstBus *, GstMessage *message, gpointer self) {
@@ -75,11 +84,15 @@ Run::run_loop ()
     if (signal.number != SIGHUP || !is_ignored (SIGHUP)) // nohup
       sources.push_back (
           g_unix_signal_add (signal.number, on_unix_signal, &signal));
-  begin ();
-  g_main_loop_run (loop_);
+  const bool claimed = claim_outputs ();
+  if (claimed) {
+    begin ();
+    g_main_loop_run (loop_);
+  }
   for (const guint source : sources)
     g_source_remove (source);
   gst_bus_remove_watch (bus.get ());
+  return claimed;
 }
 
 void
@@ -124,19 +137,14 @@ Run::play ()
 {
   value_of (job_.outputs.check (pipeline ()), Exit::usage);
   prepare ();
-  const auto errors = job_.outputs.claim (job_.options.force);
-  for (const std::string &error : errors)
-    status_.line ("error: " + error);
-  if (!errors.empty ())
-    return {};
   const auto on_tick = [] (gpointer self) {
     static_cast<Run *> (self)->tick ();
     return gboolean (G_SOURCE_CONTINUE);
   };
   const guint ticks = g_timeout_add (200, on_tick, this);
-  run_loop ();
+  const bool claimed = run_loop ();
   g_source_remove (ticks);
-  return finish ();
+  return claimed ? finish () : RunResult{};
 }
 
 void

@@ -36,7 +36,9 @@ public:
 private:
   void prepare ();
   void watch_window ();
-  void run_loop ();
+  bool claim_outputs ();
+  /** False: the outputs could not be claimed, and nothing ran. */
+  bool run_loop ();
   void begin ();
   void on_signal (int times);
   void on_message (GstMessage *message);

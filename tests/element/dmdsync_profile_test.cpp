@@ -33,13 +33,14 @@ of_dmd (const std::string &serial)
 
 TEST (DmdsyncProfile, GoesDownstreamInTheTag)
 {
-  const BenchFile file (of_dmd ("7"));
+  const BenchProfile own = of_dmd ("7");
+  const BenchFile file (own);
   SyncHarness sync ("bench=" + file.path ());
   sync.start ();
-  EXPECT_EQ (tagged_profile (sync.pull_event (GST_EVENT_TAG)), of_dmd ("7"));
+  EXPECT_EQ (tagged_profile (sync.pull_event (GST_EVENT_TAG)), own);
   EXPECT_EQ (sync.warning (), "");
   /* A simulated bench upstream knows its own. */
-  BenchProfile theirs = of_dmd ("7");
+  BenchProfile theirs = own;
   theirs.black_level = Measured{3, 1};
   StreamSetup setup;
   setup.bench = theirs;

@@ -120,13 +120,25 @@ Options::value_text (const std::string &name) const
 }
 
 void
+Options::check_value (const Declared &option) const
+{
+  if (!option.read || !has (option.name))
+    return;
+  const std::string value = value_text (option.name);
+  if (value.starts_with ("--"))
+    usage_error (option.name + " needs a value, and " + value +
+                 " is an option; write a value after " + option.name +
+                 ", and a file of that name as ./" + value);
+  if (!option.read (value))
+    usage_error (
+        option.name + " must be " + option.must_be + ", not " + value);
+}
+
+void
 Options::finish () const
 {
   for (const Declared &option : declared_)
-    if (option.read && has (option.name) &&
-        !option.read (value_text (option.name)))
-      usage_error (option.name + " must be " + option.must_be + ", not " +
-                   value_text (option.name));
+    check_value (option);
   if (rest_) {
     *rest_ = app_.remaining ();
     const bool marked = !rest_->empty () && rest_->front () == "--";

@@ -96,6 +96,7 @@ private:
       const std::string &help, const std::string &must_be,
       std::function<bool (const std::string &)> read);
   std::string value_text (const std::string &name) const;
+  void check_value (const Declared &option) const;
 
   CLI::App &app_;
   std::string heading_;

@@ -279,9 +279,12 @@ Decode::decode_on_cores () const
   if (!output_ || !form_of (*output_) || output_->ends_with (".png"))
     usage_error ("--jobs is for an --output that ends in .mkv, .mp4, .ome.tif, "
                  ".h5 or /");
-  value_of (check_is_no_input (*output_, {recording_}), Exit::usage);
-  if (statistics_)
-    value_of (check_is_no_input (*statistics_, {recording_}), Exit::usage);
+  for (const auto &written : {output_, statistics_}) {
+    if (!written)
+      continue;
+    value_of (check_is_no_input (*written, {recording_}), Exit::usage);
+    value_of (check_is_no_recording (*written), Exit::usage);
+  }
   std::vector<std::string> words{"work", "decode", recording_, *output_,
       std::to_string (*jobs_), run_.force ? "1" : ""};
   const auto pass = [&words] (const char *name, const std::string &value) {

@@ -125,14 +125,6 @@ inputs_of (GstElement *pipeline)
   return inputs;
 }
 
-/* Whether @path has the coded frames of an earlier run. */
-bool
-has_recording (const std::string &path)
-{
-  const auto info = recording_info (path);
-  return info && info->setup;
-}
-
 /* What @path is, by device and inode; none: it does not exist. */
 std::optional<std::pair<std::uintmax_t, std::uintmax_t>>
 identity_of (const fs::path &path)
@@ -169,6 +161,17 @@ check_is_no_input (
       }
   }
   return {};
+}
+
+Result<void>
+check_is_no_recording (const std::string &output)
+{
+  const auto info = recording_info (output);
+  if (!info || !info->setup)
+    return {};
+  return Error{output +
+               " is a recording, which nothing but a recording replaces; use "
+               "another name, or delete it yourself"};
 }
 
 Outputs::Outputs () = default;
@@ -217,10 +220,9 @@ Outputs::check (GstElement *pipeline) const
         {output->name (), output->name () + ".part"})
       if (auto checked = check_is_no_input (written, inputs); !checked)
         return checked;
-    if (!output->is_recording () && has_recording (output->name ()))
-      return Error{output->name () +
-                   " is a recording, which nothing but a recording replaces; "
-                   "use another name, or delete it yourself"};
+    if (!output->is_recording ())
+      if (auto checked = check_is_no_recording (output->name ()); !checked)
+        return checked;
     std::error_code error;
     const fs::path whole = fs::absolute (output->name (), error);
     const fs::path canonical = fs::weakly_canonical (whole, error);

@@ -123,5 +123,7 @@ private:
  * inode: it would be replaced by itself. */
 Result<void> check_is_no_input (
     const std::string &output, const std::vector<std::string> &inputs);
+/** Error if @p output has the coded frames of an earlier run. */
+Result<void> check_is_no_recording (const std::string &output);
 
 } // namespace codedexposure::app

@@ -237,8 +237,9 @@ def check_outputs(folder, plan):
              for name in plan.outputs(number)}
     inputs = [recording.path for recording in plan.recordings]
     known = {identity_of(path) for path in inputs}
-    for path in sorted(paths):
-        if os.path.exists(path) and identity_of(path) in known:
+    there = [path for path in sorted(paths) if os.path.isfile(path)]
+    for path, said in zip(there, programs.info(there)):
+        if identity_of(path) in known or 'schedule' in said:
             raise Problem(f'{path} is a recording, and would be replaced; choose '
                           'another --to')
     for path in [*sorted(paths), *map(os.path.realpath, inputs)]:

@@ -179,7 +179,7 @@ CodedFilter::report_overruled (const Schedule &asked)
   if (tagged == asked || stream_.overruled == tagged)
     return;
   stream_.overruled = tagged;
-  POST_INFO (element_, STREAM, FORMAT,
+  POST_WARNING (element_, STREAM, FORMAT,
       "The schedule property, " + asked.text () +
           ", overrides the schedule of the stream, " + tagged.text () + ".");
 }

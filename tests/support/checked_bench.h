@@ -44,10 +44,9 @@ struct CheckedBench {
   double seconds = 0.0; ///< of the bench
 
   /** "": there is none. */
-  /** Of what is wrong. */
   std::string first_diagnosis () const
   {
-    return finding.is_ill () ? finding.diagnoses[0].id : "";
+    return finding.diagnoses.empty () ? "" : finding.diagnoses[0].id;
   }
   const BenchProfile &truth () const { return rig->truth ().profile; }
   const BenchProfile &found () const { return examination->profile; }

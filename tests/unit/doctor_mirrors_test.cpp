@@ -53,12 +53,22 @@ TEST (MirrorsCheck, LeavesOtherFaultsToOtherChecks)
 {
   for (const char *words : {"blur=3", "dust=6", "hot-pixels=200",
            "dead-pixels=200", "vignetting=0.6", "bright=1.6", "rotation=4",
-           "scale=1.1", "shift=100/0", "flicker=100:0.1", "noise=100",
-           "nonlinear=0.05", "jitter=40us"})
+           "scale=1.1", "shift=100/0", "noise=100", "nonlinear=0.05",
+           "jitter=40us"})
     EXPECT_EQ (
         check_bench (sick_bench (4, words), check_mirrors).first_diagnosis (),
         "")
         << words;
+}
+
+/* The check of the light has named it before. */
+TEST (MirrorsCheck, DoesNotKnowTheSwitchingTimeInLightThatFlickers)
+{
+  const CheckedBench e =
+      check_bench (sick_bench (4, "flicker=100:0.1"), check_mirrors);
+  EXPECT_EQ (e.finding.verdict (), Verdict::unknown);
+  ASSERT_EQ (e.finding.diagnoses.size (), 1u);
+  EXPECT_EQ (e.first_diagnosis (), "slow-mirrors");
 }
 
 TEST (MirrorsCheck, WorksAtHighFrameRates)

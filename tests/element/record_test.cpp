@@ -412,6 +412,52 @@ TEST_F (Record, ASeekSaysNothingOfLossesBeforeIt)
   }
 }
 
+class LateFrames : public Record,
+                   public testing::WithParamInterface<const char *>
+{
+};
+
+/* Frame 3 comes after frame 5. */
+TEST_P (LateFrames, HaveTheirOwnTimesAndLines)
+{
+  constexpr GstClockTime kPeriod = 40 * GST_MSECOND;
+  Pipeline made ("videotestsrc num-buffers=80 ! " +
+                 gray_caps (32, 24, "100/1") +
+                 " ! codedexposure-sim ! identity name=cable ! dmdsync ! "
+                 "codedexposure-recordmux " +
+                 GetParam () + " ! filesink location=" + path);
+  BufferPtr late;
+  gst_pad_add_probe (
+      made.pad ("cable", "src").get (), GST_PAD_PROBE_TYPE_BUFFER,
+      [] (GstPad *pad, GstPadProbeInfo *info, gpointer late) {
+        auto &held = *static_cast<BufferPtr *> (late);
+        GstBuffer *frame = GST_PAD_PROBE_INFO_BUFFER (info);
+        if (GST_BUFFER_PTS (frame) == 3 * kPeriod && !held) {
+          held.reset (gst_buffer_ref (frame));
+          return GST_PAD_PROBE_DROP;
+        }
+        if (GST_BUFFER_PTS (frame) == 6 * kPeriod)
+          gst_pad_push (pad, gst_buffer_ref (held.get ()));
+        return GST_PAD_PROBE_OK;
+      },
+      &late, nullptr);
+  ASSERT_EQ (made.play (), "");
+  Reading reading (path);
+  ASSERT_EQ (reading.play (), "");
+  std::vector<GstClockTime> expected;
+  for (const int k : {0, 1, 2, 4, 5, 3})
+    expected.push_back (GstClockTime (k) * kPeriod);
+  for (int k = 6; k < kFrames; k++)
+    expected.push_back (GstClockTime (k) * kPeriod);
+  EXPECT_EQ (reading.times, expected);
+  EXPECT_EQ (reading.corrupted, 0);
+  EXPECT_EQ (reading.count ("frames-unknown"), 0u);
+  EXPECT_EQ (reading.count ("frames-missing"), 0u);
+}
+
+INSTANTIATE_TEST_SUITE_P (
+    Record, LateFrames, testing::Values ("codec=ffv1", "codec=raw"));
+
 /* The inner demuxer logs some of them as critical. */
 TEST_F (Record, NoFlippedBitInTheListOfTracksHangs)
 {

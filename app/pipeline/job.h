@@ -63,9 +63,9 @@ struct Job {
   GstElement *reader = nullptr;
   /** The recording is read from front to back, past damage. */
   bool salvage = false;
-  /** The queue before encoder and disk of a live recording, and what writes it:
-   * it counts what is missing there, while a display may lose more. */
+  /** The queue before encoder and disk of a live recording. */
   GstElement *buffer = nullptr;
+  /** Writes a live recording, and counts the frames that are missing in it. */
   GstElement *recorder = nullptr;
   /** If the recording behind `buffer` fails, the rest goes on. */
   bool buffer_may_fail = false;

@@ -15,7 +15,7 @@
 namespace codedexposure::gst
 {
 
-/** Of which frames a segment has some or all. */
+/** Which frames of a segment come, and in which order. */
 TrackReader::Order order_of (const GstSegment &segment);
 
 /** Reads the lines that come on the track's streaming thread, plain or as Pango

@@ -263,7 +263,7 @@ Fit::add_line (std::vector<Position> *spectrum)
   search.others = before.slopes;
   const LightLine line = search.strongest (kSlowest, kFastest, spectrum);
   missed_ = line.depth ();
-  /* Lines that are closer cannot be told from one. */
+  /* Two lines that are closer cannot be told from one line. */
   const auto is_near = [&] (const LightLine &other) {
     return std::abs (other.frequency - line.frequency) * span_ < 1.0;
   };

@@ -13,8 +13,8 @@ namespace codedexposure
 namespace
 {
 
-/* The short exposure, of the frame period; or what a pedestal takes and that much
- * time after it. */
+/* The short exposure is that part of the frame period, or longer: it ends this
+ * much time after the light of the pedestal. */
 constexpr int kShorter = 5;
 constexpr double kAfterPedestal = 50e3; // ns
 /* Variance of the noise with which rounding can be undone, DN squared. */

@@ -23,8 +23,8 @@ namespace
 /* Stamps may differ from the frame rate by that part: clocks do by less. */
 constexpr double kRateError = 0.003;
 constexpr int kRateFrames = 25;
-/* More than the frames that are on their way when the mirrors are parked, and
- * the time for which those of high rates are, s. */
+/* When the mirrors are parked, fewer frames are on their way than this many and
+ * those of this time, s, together. */
 constexpr int kFramesInFlight = 10;
 constexpr double kTimeInFlight = 0.03;
 constexpr int kChanges = 8, kFramesOfChange = 10;

@@ -65,8 +65,8 @@ Refiner::Refiner (const Schedule &schedule, const Observation &observation,
     int width, int height, double noise)
     : slots_ (schedule.slots ()), width_ (width), height_ (height),
       noise_free_ (observation.noise_free ()),
-      leak_ (float (schedule.leak ())),
-      noise_ (float (noise * (1.0 + schedule.leak () * (slots_ - 1)))),
+      leak_ (float (schedule.leak ())), whole_ (float (schedule.light (0))),
+      noise_ (float (noise) * whole_),
       slot_of_ (width, height),
       refined_ (std::size_t (slots_), Field (width, height))
 {
@@ -85,16 +85,15 @@ Refiner::Refiner (const Schedule &schedule, const Observation &observation,
           slot_of_element[std::size_t (schedule.element_at (x, y))];
 }
 
-/* A coded pixel is the mean of the slots, of which its own has the weight 1 and
- * each other one that of the leak. */
+/* A coded pixel is a mean over the slots: its own has the weight 1, the others
+ * have that of the leakage. */
 void
-Refiner::undo_leak (const Field &coded, const std::vector<Field> &light)
+Refiner::undo_leakage (const Field &coded, const std::vector<Field> &light)
 {
-  const float whole = 1.0f + leak_ * float (slots_ - 1);
   for (int y = 0; y < height_; y++) {
     float *own = own_.row (y);
     for (int x = 0; x < width_; x++)
-      own[x] = whole * coded.row (y)[x];
+      own[x] = whole_ * coded.row (y)[x];
     for (int s = 0; s < slots_; s++) {
       const float *other = light[std::size_t (s)].row (y);
       const std::uint8_t *slots = slot_of_.row (y);
@@ -190,7 +189,7 @@ Refiner::run (const Kernels &kernels, const Field &coded,
       for (int x = 0; x < width_; x++)
         slot.row (y)[x] = std::clamp (slot.row (y)[x], 0.0f, kWhite);
   if (leak_ > 0.0f)
-    undo_leak (coded, light);
+    undo_leakage (coded, light);
   const Field &seen = leak_ > 0.0f ? own_ : coded;
   const int rows = half (height_);
   const int parts = slots_ % workers.count () == 0 ? 1 : workers.count ();

@@ -34,7 +34,7 @@ public:
   static std::string why_not (
       const Schedule &schedule, const Observation &observation, double noise);
 
-  /** Of the light of its own slot, a pixel may see as much from each other one. */
+  /** Largest off-state leakage that is undone. */
   static constexpr double kMaxLeak = 0.05;
 
   Refiner (const Schedule &schedule, const Observation &observation, int width,
@@ -52,7 +52,7 @@ private:
     const Field &coded, &is_static;
     const std::vector<Field> &light;
   };
-  void undo_leak (const Field &coded, const std::vector<Field> &light);
+  void undo_leakage (const Field &coded, const std::vector<Field> &light);
   void refine_part (
       const Kernels &kernels, const Frame &frame, int slot, int from, int to);
   void fold_row (const Frame &frame, int slot, int row, float *to) const;
@@ -61,10 +61,11 @@ private:
 
   int slots_, width_, height_;
   bool noise_free_;
-  float leak_; ///< of each other slot, as a part of the light of its own one
-  float noise_; ///< of a coded pixel without what leaked, grey levels
+  float leak_;  ///< off-state leakage
+  float whole_; ///< light of all slots in a coded pixel, 1 from its own slot
+  float noise_; ///< of a coded pixel after its leakage was undone, grey levels
   FieldOf<std::uint8_t> slot_of_; ///< of each pixel
-  Field own_;                     ///< coded light without what leaked
+  Field own_; ///< coded frame after its leakage was undone
   std::vector<Field> refined_;
 };
 

@@ -6,10 +6,13 @@
                                 identifiers and the date that each run writes
   matroska.py lose IN OUT N...  a copy without the Nth clusters, from 0 on; in a
                                 recording, each is a coded frame with its line
+  matroska.py spoil IN OUT N... a copy with nothing that a decoder knows in the
+                                pictures of the Nth clusters
 """
 import sys
 
 SEGMENT, CLUSTER, VOID = 0x18538067, 0x1F43B675, 0xEC
+SIMPLE_BLOCK = 0xA3
 INFO, TRACKS, TRACK, TAGS, TAG, TARGETS = (
     0x1549A966, 0x1654AE6B, 0xAE, 0x1254C367, 0x7373, 0x63C0)
 SEGMENT_UID, DATE, TRACK_UID, TAG_TRACK_UID = 0x73A4, 0x4461, 0x73C5, 0x63C5
@@ -60,17 +63,24 @@ def same(one, other):
     return a == b
 
 
-def lose(source, target, numbers):
+def lose(data, at, body, end):
+    # Void with a size of 8 bytes, over an identifier of 4 and its size.
+    data[at:at + 9] = bytes([VOID]) + (end - at - 9 | 1 << 56).to_bytes(8, 'big')
+
+
+def spoil(data, at, body, end):
+    for kind, _, start, stop in elements(bytes(data), body, end):
+        if kind == SIMPLE_BLOCK and data[start] == 0x81:  # track 1
+            data[start + 4:stop] = b'\xff' * (stop - start - 4)
+
+
+def damage(how, source, target, numbers):
     with open(source, 'rb') as file:
         data = bytearray(file.read())
-    clusters = [at for kind, at, *_ in elements(bytes(data), 0, len(data))
+    clusters = [place for kind, *place in elements(bytes(data), 0, len(data))
                 if kind == CLUSTER]
-    for cluster in (clusters[n] for n in numbers):
-        # Void with a size of 8 bytes, over an identifier of 4 and its size.
-        size, body = number(data, cluster + 4, False)
-        rest = body + size - cluster - 9
-        data[cluster:cluster + 9] = bytes([VOID]) + (rest | 1 << 56).to_bytes(
-            8, 'big')
+    for cluster in numbers:
+        how(data, *clusters[cluster])
     with open(target, 'wb') as file:
         file.write(data)
 
@@ -80,7 +90,8 @@ def main():
         if not same(*sys.argv[2:]):
             sys.exit(f'{sys.argv[2]} and {sys.argv[3]} differ')
     else:
-        lose(sys.argv[2], sys.argv[3], map(int, sys.argv[4:]))
+        damage({'lose': lose, 'spoil': spoil}[sys.argv[1]], sys.argv[2], sys.argv[3],
+               map(int, sys.argv[4:]))
 
 
 main()

@@ -115,9 +115,11 @@ def decode(plan, recording, chunk, scratch):
     check_source(source)
     names = [name_of(plan.chunk_form(recording)), *[TABLE] * plan.statistics]
     expected = source.frames_of(chunk, plan.length)
-    if status == DONE and said['frames'] != (expected or said['frames']):
-        raise Problem(f'decode read {said["frames"]} of the {expected} coded '
-                      'frames of this chunk')
+    # What is too damaged to be decoded is lost.
+    found = said['frames'] + (said['lost'] if status == DAMAGED else 0)
+    if found < expected:
+        raise Problem(f'decode read {found} of the {expected} coded frames of this '
+                      'chunk')
     manifest = identity(plan, recording, chunk)
     # All frames of a chunk may show a pattern, so that there is no picture.
     manifest.update(

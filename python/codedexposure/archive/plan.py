@@ -39,9 +39,9 @@ class Recording:
                 self.borders[chunk] if chunk + 1 < self.chunks else None)
 
     def frames_of(self, chunk, length):
-        """Coded frames of a chunk; None: not known."""
+        """Coded frames of a chunk."""
         if self.whole:
-            return None
+            return self.frames
         return min(length, self.frames - chunk * length)
 
 

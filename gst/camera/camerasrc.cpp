@@ -51,6 +51,8 @@
  */
 #include "camerasrc.h"
 
+#include <cmath>
+
 #ifdef CODEDEXPOSURE_ARAVIS
 #include <arv.h>
 #endif
@@ -281,6 +283,31 @@ set_up_source (GstCodedExposureCameraSrc *self)
       "exposure", settings.exposure_time > 0 ? settings.exposure_time : -1.0,
       "num-buffers", frames_left, nullptr);
   return true;
+}
+
+GstClockTime
+exposure_of_camera ([[maybe_unused]] GstCodedExposureCameraSrc *self)
+{
+#ifdef CODEDEXPOSURE_ARAVIS
+  CameraState &st = self->state;
+  const ObjectPtr<GObject> held (locked (st.lock, [&] {
+    return st.camera ? G_OBJECT (g_object_ref (st.camera.get ())) : nullptr;
+  }));
+  if (!held)
+    return GST_CLOCK_TIME_NONE;
+  ArvCamera *camera = ARV_CAMERA (held.get ());
+  const auto is_set = [&] (const char *feature, const char *usual) {
+    const char *said = arv_camera_get_string (camera, feature, nullptr);
+    return said && g_strcmp0 (said, usual) != 0;
+  };
+  if (is_set ("ExposureAuto", "Off") || is_set ("ExposureMode", "Timed"))
+    return GST_CLOCK_TIME_NONE;
+  /* 0 if it cannot be read. */
+  const double us = arv_camera_get_exposure_time (camera, nullptr);
+  if (us > 0)
+    return GstClockTime (std::llround (1e3 * us));
+#endif
+  return GST_CLOCK_TIME_NONE;
 }
 
 } // namespace codedexposure::gst::camera

@@ -28,6 +28,7 @@ struct Stream {
   CapsPtr caps;
   std::optional<GstSegment> segment;
   std::optional<OwnedFrames> frames;
+  GstClockTime exposure = GST_CLOCK_TIME_NONE; ///< of all frames; none: unknown
   bool first = true;       ///< the next frame is the first since a start
   GstClockTime origin = 0; ///< running time at which the camera's clock began
   GstClockTime last = GST_CLOCK_TIME_NONE; ///< arrival of the newest frame
@@ -71,6 +72,11 @@ inline constexpr auto &state = state_in<GstCodedExposureCameraSrc>;
 /** Sets all properties of aravissrc, which opens the camera. False where that
  * fails; aravissrc has posted an error then. */
 bool set_up_source (GstCodedExposureCameraSrc *self);
+
+/** How long the camera exposes each frame, as it says itself once aravissrc has
+ * set it up. None: another device says it, or it changes by itself, or the build
+ * has no Aravis. */
+GstClockTime exposure_of_camera (GstCodedExposureCameraSrc *self);
 
 /** Sees every frame and event that aravissrc pushes, and every query to it. */
 GstPadProbeReturn take_item (GstPad *pad, GstPadProbeInfo *info, gpointer self);

@@ -62,6 +62,7 @@ take_caps (GstCodedExposureCameraSrc *self, GstCaps *caps)
   if (!frames)
     return refuse_settings (self, frames.error ().message);
   stream.frames = *std::move (frames);
+  stream.exposure = exposure_of_camera (self);
   stream.caps.reset (gst_caps_ref (caps));
   return true;
 }
@@ -152,19 +153,21 @@ set_time (GstCodedExposureCameraSrc *self, GstBuffer *frame)
 /* An incomplete frame stays as it is, apart from its memory: what it lacks is
  * for downstream to judge. */
 BufferPtr
-own (const OwnedFrames &frames, BufferPtr frame)
+own (const Stream &stream, BufferPtr frame)
 {
+  const OwnedFrames &frames = *stream.frames;
   if (!frames.is_whole (frame.get ())) {
     BufferPtr copy (gst_buffer_copy_deep (frame.get ()));
     GST_BUFFER_FLAG_SET (copy.get (), GST_BUFFER_FLAG_CORRUPTED);
     return copy;
   }
   BufferPtr owned = frames.own (frame.get ());
-  if (owned && frames.bits () > 0) {
-    FrameMeta meta;
-    meta.bits = frames.bits ();
+  FrameMeta meta;
+  meta.bits = frames.bits ();
+  meta.exposure_duration = stream.exposure;
+  if (owned &&
+      (meta.bits > 0 || GST_CLOCK_TIME_IS_VALID (meta.exposure_duration)))
     set_frame_meta (owned.get (), meta);
-  }
   return owned;
 }
 
@@ -178,10 +181,10 @@ take_item (GstPad *, GstPadProbeInfo *info, gpointer data)
     return take_query (self, info);
   if (!(info->type & GST_PAD_PROBE_TYPE_BUFFER))
     return passes (self, info) ? GST_PAD_PROBE_OK : GST_PAD_PROBE_DROP;
-  const auto &frames = state (self).stream.frames;
-  if (!frames)
+  const Stream &stream = state (self).stream;
+  if (!stream.frames)
     return GST_PAD_PROBE_OK;
-  BufferPtr frame = own (*frames, BufferPtr (GST_PAD_PROBE_INFO_BUFFER (info)));
+  BufferPtr frame = own (stream, BufferPtr (GST_PAD_PROBE_INFO_BUFFER (info)));
   info->data = frame.get ();
   if (!frame)
     return GST_PAD_PROBE_HANDLED;

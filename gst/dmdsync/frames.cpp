@@ -90,10 +90,12 @@ stamp (GstDmdSync *self, GstBuffer *buffer, FrameMeta meta)
   GST_BUFFER_OFFSET_END (buffer) = meta.frame + 1;
   if (std::exchange (stream.discont, false))
     GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DISCONT);
-  if (stream.frames->knows_bits ())
-    meta.bits = stream.frames->bits ();
-  else if (const auto said = get_frame_meta (buffer))
-    meta.bits = said->bits;
+  const FrameMeta said = get_frame_meta (buffer).value_or (FrameMeta ());
+  meta.bits =
+      stream.frames->knows_bits () ? stream.frames->bits () : said.bits;
+  /* Else it is that which the schedule asks for. */
+  if (GST_CLOCK_TIME_IS_VALID (said.exposure_duration))
+    meta.exposure_duration = said.exposure_duration;
   set_frame_meta (buffer, meta);
 }
 

@@ -199,7 +199,11 @@ TEST (CameraBin, SetsTheCameraUpAsItsPropertiesSay)
         camera_bin ("50/1", format == "Mono8" ? "GRAY8" : "GRAY16_LE",
             "num-buffers=2 exposure-time=4000 pixel-format=" + format + " " +
                 properties),
-        [] (auto *, auto &) {});
+        [] (GstBuffer *frame, auto &) {
+          const auto meta = get_frame_meta (frame);
+          ASSERT_TRUE (meta);
+          EXPECT_EQ (meta->exposure_duration, 4 * GST_MSECOND);
+        });
     pipeline.play ();
     EXPECT_EQ (pipeline.wait_end (), "end");
     const std::lock_guard guard (lock);

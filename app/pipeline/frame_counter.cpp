@@ -11,8 +11,11 @@ using namespace gst;
 namespace
 {
 
-/* Gives @frame, at the sink @pad of an element, and what follows the running
- * time @wanted behind that element. False: it has no time. */
+/* Gives @frame, at the source @pad of an element, and what follows the running
+ * time @wanted. False: it has no time.
+ *
+ * Only in the thread that pushes through @pad: in any other one, a SEGMENT on its
+ * way counts as sent afterwards, without the offset. */
 bool
 shift_running_time (GstPad *pad, GstBuffer *frame, GstClockTime wanted)
 {
@@ -23,20 +26,17 @@ shift_running_time (GstPad *pad, GstBuffer *frame, GstClockTime wanted)
       segment, GST_FORMAT_TIME, GST_BUFFER_PTS (frame));
   if (!GST_CLOCK_TIME_IS_VALID (running))
     return false;
-  const ObjectPtr<GstElement> element (gst_pad_get_parent_element (pad));
-  const ObjectPtr<GstPad> src (
-      gst_element_get_static_pad (element.get (), "src"));
-  if (src)
-    gst_pad_set_offset (src.get (), gint64 (wanted) - gint64 (running));
+  gst_pad_set_offset (pad, gint64 (wanted) - gint64 (running));
   return true;
 }
 
 void
-shift_first (GstElement *element, GstPadProbeCallback shift)
+shift_first (
+    GstElement *element, GstPadProbeCallback shift, gpointer data = nullptr)
 {
-  const ObjectPtr<GstPad> sink (gst_element_get_static_pad (element, "sink"));
+  const ObjectPtr<GstPad> src (gst_element_get_static_pad (element, "src"));
   gst_pad_add_probe (
-      sink.get (), GST_PAD_PROBE_TYPE_BUFFER, shift, nullptr, nullptr);
+      src.get (), GST_PAD_PROBE_TYPE_BUFFER, shift, data, nullptr);
 }
 
 /* Of a PTS at @pad. The first one may be rounded to a time before 0. */
@@ -86,9 +86,10 @@ FrameCounter::FrameCounter (ObjectPtr<GstPad> sink, const PlayTimes &times,
     hold_ = gst_pad_add_probe (pad (),
         GstPadProbeType (GST_PAD_PROBE_TYPE_BLOCK | GST_PAD_PROBE_TYPE_BUFFER),
         hold_first_frame, this, nullptr);
-  if (times.shift_to)
-    gst_pad_add_probe (
-        pad (), GST_PAD_PROBE_TYPE_BUFFER, shift_first_frame, this, nullptr);
+  if (times.shift_to) {
+    const ObjectPtr<GstElement> element (gst_pad_get_parent_element (pad ()));
+    shift_first (element.get (), shift_first_frame, this);
+  }
   gst_pad_add_probe (
       pad (), GST_PAD_PROBE_TYPE_BUFFER, on_frame, this, nullptr);
 }

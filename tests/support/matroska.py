@@ -54,13 +54,24 @@ def contents(name):
     return kept, lengths
 
 
-def same(one, other):
+def difference_of(one, other):
     (a, a_lengths), (b, b_lengths) = contents(one), contents(other)
+    placed = [[item for item in items if item[0] not in PLACES] for items in (a, b)]
     # A random number below 2^56 is a byte shorter, and moves what comes after.
-    if a_lengths != b_lengths:
-        a, b = ([item for item in items if item[0] not in PLACES]
-                for items in (a, b))
-    return a == b
+    return difference(*placed) or (a_lengths == b_lengths and difference(a, b))
+
+
+def difference(a, b):
+    """Where the contents differ, or nothing."""
+    for i, (ours, theirs) in enumerate(zip(a, b)):
+        if ours != theirs:
+            (one, body), (other, content) = ours, theirs
+            at = next((k for k, (x, y) in enumerate(zip(body, content)) if x != y),
+                      min(len(body), len(content)))
+            return (f'element {i}, {one:x} of {len(body)} bytes and {other:x} of '
+                    f'{len(content)}, from byte {at} on: '
+                    f'{body[at:at + 60]} and {content[at:at + 60]}')
+    return f'{len(a)} and {len(b)} elements' if len(a) != len(b) else None
 
 
 def lose(data, at, body, end):
@@ -87,8 +98,8 @@ def damage(how, source, target, numbers):
 
 def main():
     if sys.argv[1] == 'same':
-        if not same(*sys.argv[2:]):
-            sys.exit(f'{sys.argv[2]} and {sys.argv[3]} differ')
+        if where := difference_of(*sys.argv[2:]):
+            sys.exit(f'{sys.argv[2]} and {sys.argv[3]} differ: {where}')
     else:
         damage({'lose': lose, 'spoil': spoil}[sys.argv[1]], sys.argv[2], sys.argv[3],
                map(int, sys.argv[4:]))

@@ -86,6 +86,8 @@ struct BenchOptions {
 class OpticalBench
 {
 public:
+  static constexpr int kAllMirrors = -100;
+
   /** Fails if an option is out of its range. */
   static Result<OpticalBench> make (
       int width, int height, const BenchOptions &options);
@@ -98,8 +100,9 @@ public:
    * Adds the light of @p scene through a mask; mirrors that are on pass all of
    * it, those that are off schedule.leak ().
    * @p scene  of the bench's size.
-   * @p mask   index as in MaskRenderer::render (), or kStillMask; a negative
-   *           one is the parked DMD: every mirror off.
+   * @p mask   index as in MaskRenderer::render (), kStillMask, or kAllMirrors,
+   *           for which all are on; another negative one is the parked DMD:
+   *           every mirror off.
    * @p slots  how long, in active times of a slot.
    */
   template <typename Pixel>

@@ -6,7 +6,7 @@
 namespace codedexposure::fuse
 {
 
-CodedStream::CodedStream (const Schedule &schedule,
+CodedCamera::CodedCamera (const Schedule &schedule,
     const Observation &observation, Extent size, int radius, int period,
     float steps)
     : radius_ (radius), period_ (period), steps_ (steps),
@@ -26,7 +26,7 @@ CodedStream::CodedStream (const Schedule &schedule,
  * image: the weights of a slot have both signs and fit only the code's phase.
  */
 void
-CodedStream::find_margin (const Schedule &schedule, bool exact)
+CodedCamera::find_margin (const Schedule &schedule, bool exact)
 {
   const int width = pixels_.width (), height = pixels_.height ();
   const int reach =
@@ -63,31 +63,57 @@ CodedStream::find_margin (const Schedule &schedule, bool exact)
   }
 }
 
-Field &
-CodedStream::next ()
+CodedLight
+CodedCamera::room () const
 {
   const int width = pixels_.width (), height = pixels_.height ();
-  if (spare_.light.empty ())
-    spare_ = {
-        Field (width, height), SplitField (width, height, radius_, period_)};
-  return spare_.light;
+  return {Field (width, height), SplitField (width, height, radius_, period_)};
+}
+
+void
+CodedCamera::pair (const Kernels &kernels, CodedLight &seen)
+{
+  const int width = pixels_.width (), height = pixels_.height ();
+  for (int y = 0; y < height; y++)
+    kernels.to_steps (seen.light.row (y), steps_, width, pixels_.row (y));
+  std::int32_t *origin = pixels_.row (0);
+  for (const Repeat &repeat : margin_)
+    origin[repeat.to] = origin[repeat.from];
+  const Parts parts{period_, seen.pairs.stride (), width + 2 * radius_};
+  for (int y = -radius_; y < height + radius_; y++) {
+    std::int32_t *row = pixels_.row (y) - radius_;
+    kernels.pair (row, parts.count);
+    kernels.split_pairs (parts, row, seen.pairs.row (y));
+  }
+}
+
+CodedStream::CodedStream (const Schedule &schedule,
+    const Observation &observation, const Observation *partner, Extent size,
+    int radius, int period, float steps)
+    : camera_ (schedule, observation, size, radius, period, steps)
+{
+  if (partner)
+    partner_.emplace (schedule, *partner, size, radius, period, steps);
+}
+
+CodedFrame &
+CodedStream::next ()
+{
+  if (spare_.light.empty ()) {
+    static_cast<CodedLight &> (spare_) = camera_.room ();
+    if (partner_)
+      spare_.partner = partner_->room ();
+  }
+  spare_.has_partner = false;
+  return spare_;
 }
 
 void
 CodedStream::take (const Kernels &kernels)
 {
-  const int width = pixels_.width (), height = pixels_.height ();
-  for (int y = 0; y < height; y++)
-    kernels.to_steps (spare_.light.row (y), steps_, width, pixels_.row (y));
-  std::int32_t *origin = pixels_.row (0);
-  for (const Repeat &repeat : margin_)
-    origin[repeat.to] = origin[repeat.from];
-  const Parts parts{period_, spare_.pairs.stride (), width + 2 * radius_};
-  for (int y = -radius_; y < height + radius_; y++) {
-    std::int32_t *row = pixels_.row (y) - radius_;
-    kernels.pair (row, parts.count);
-    kernels.split_pairs (parts, row, spare_.pairs.row (y));
-  }
+  camera_.pair (kernels, spare_);
+  if (spare_.has_partner)
+    partner_->pair (kernels, spare_.partner);
   queue_.push_back (std::exchange (spare_, CodedFrame ()));
 }
 

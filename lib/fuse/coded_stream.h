@@ -3,6 +3,7 @@
 #pragma once
 
 #include <deque>
+#include <optional>
 #include <vector>
 
 #include "estimate/observation.h"
@@ -13,10 +14,16 @@
 namespace codedexposure::fuse
 {
 
-/** A coded frame; the pairs have a margin of the taps' radius. */
-struct CodedFrame {
+/** What a camera saw; the pairs have a margin of the taps' radius. */
+struct CodedLight {
   Field light;
   SplitField pairs;
+};
+
+/** A coded frame and, if it has one, its partner. */
+struct CodedFrame : CodedLight {
+  CodedLight partner;
+  bool has_partner = false;
 };
 
 /** A coded frame, and those before and after it, null where there is none. */
@@ -25,38 +32,28 @@ struct CodedFrames {
 
   Neighbours neighbours () const
   {
-    return {before != nullptr, after != nullptr};
+    return {before != nullptr, after != nullptr, now->has_partner};
   }
 };
 
-/** Coded frames in the order of their exposure. */
-class CodedStream
+/** Pixels of one camera as light, and as pairs for the filters. */
+class CodedCamera
 {
 public:
-  /** @p size    of the frames; the schedule has no pilot.
-   *  @p radius  of the taps, px.
-   *  @p period  of the parts of rows of pairs.
-   *  @p steps   see FilterBank. */
-  CodedStream (const Schedule &schedule, const Observation &observation,
+  /** @p observation  of the camera, behind the mirrors of @p schedule.
+   *  For the others, see CodedStream. */
+  CodedCamera (const Schedule &schedule, const Observation &observation,
       Extent size, int radius, int period, float steps);
 
-  /** A field to write the next coded frame to, times gain () row by row. */
-  Field &next ();
+  CodedLight room () const;
   /** Factors of the pixels of row @p y, beside 255 / white; null where they are
    * all 1. */
   const float *gain (int y) const
   {
     return gain_.empty () ? nullptr : gain_.row (y);
   }
-  /** Queues the frame in next (). */
-  void take (const Kernels &kernels);
-
-  int pending () const { return int (queue_.size ()); }
-  /** The oldest pending frame and its neighbours. */
-  CodedFrames frames () const;
-  /** Goes on to the next frame. */
-  void advance ();
-  void forget ();
+  /** Makes the pairs of what is in the light. */
+  void pair (const Kernels &kernels, CodedLight &seen);
 
 private:
   void find_margin (const Schedule &schedule, bool exact);
@@ -71,7 +68,42 @@ private:
     std::ptrdiff_t to, from;
   };
   std::vector<Repeat> margin_;
+};
 
+/** Coded frames in the order of their exposure. */
+class CodedStream
+{
+public:
+  /** @p size     of the frames; the schedule has no pilot.
+   *  @p partner  what partners tell of the slots; null: there are none.
+   *  @p radius   of the taps, px.
+   *  @p period   of the parts of rows of pairs.
+   *  @p steps    see FilterBank. */
+  CodedStream (const Schedule &schedule, const Observation &observation,
+      const Observation *partner, Extent size, int radius, int period,
+      float steps);
+
+  const CodedCamera &camera () const { return camera_; }
+  const CodedCamera *partner_camera () const
+  {
+    return partner_ ? &*partner_ : nullptr;
+  }
+  /** The next coded frame, whose light is to be written, times the gain of its
+   * camera row by row; that of the partner as well, if it has one. */
+  CodedFrame &next ();
+  /** Queues the frame in next (). */
+  void take (const Kernels &kernels);
+
+  int pending () const { return int (queue_.size ()); }
+  /** The oldest pending frame and its neighbours. */
+  CodedFrames frames () const;
+  /** Goes on to the next frame. */
+  void advance ();
+  void forget ();
+
+private:
+  CodedCamera camera_;
+  std::optional<CodedCamera> partner_;
   std::deque<CodedFrame> queue_;
   CodedFrame previous_; ///< empty if there is none
   CodedFrame spare_;

@@ -26,6 +26,8 @@ constexpr double kSlowing = 1.2;
  * the last one is kNoiseThreshold standard deviations at least. */
 constexpr double kFirstThreshold = 30.0, kLastThreshold = 2.0;
 constexpr double kNoiseThreshold = 1.8;
+/* With a partner, the first estimate is better. */
+constexpr double kFirstWithPartner = 20.0;
 /* Of the result in the mean with the estimate that it began with. */
 constexpr float kShare = 0.4f;
 /* No slot. */
@@ -45,8 +47,10 @@ round_up (int value, int step)
 } // namespace
 
 CollaborativeFilter::CollaborativeFilter (const Schedule &schedule,
-    const Observation &observation, int width, int height)
-    : observation_ (observation), width_ (width), height_ (height),
+    const Observation &observation, const Observation *partner, int width,
+    int height)
+    : observation_ (observation), partner_ (partner), width_ (width),
+      height_ (height),
       split_ (
           round_up (round_up (width + 2 * kBorder, kBlockStep * Field::kSlack) /
                             kBlockStep +
@@ -100,6 +104,7 @@ struct CollaborativeFilter::Step {
   int shift_x, shift_y;
   float threshold;
   float length; ///< as kStep
+  float of_partner; ///< how far to go towards what it saw
 };
 
 void
@@ -166,23 +171,26 @@ CollaborativeFilter::update_rows (const Step &step, int first, int end)
       coded_.data () + at, measured_.data () + at, int (light_.size ()),
       int ((end - first) * stride_), step.length});
   if (!observation_.exact ())
-    correct_rows (first, end);
+    correct_rows (first, end, observation_, coded_, 1.0f);
+  if (step.of_partner > 0.0f)
+    correct_rows (first, end, *partner_, of_partner_, step.of_partner);
 }
 
-/* Coded pixels that several slots share. */
+/* Pixels @seen that several slots share. */
 void
-CollaborativeFilter::correct_rows (int first, int end)
+CollaborativeFilter::correct_rows (int first, int end,
+    const Observation &observation, const std::vector<float> &seen, float part)
 {
   const auto from = std::size_t (first * stride_);
   const auto to = std::size_t (end * stride_);
   for (std::size_t i = from; i < to; i++) {
-    const auto &shares = observation_.shares (elements_[i]);
-    double seen = 0.0, power = 0.0;
+    const auto &shares = observation.shares (elements_[i]);
+    double made = 0.0, power = 0.0;
     for (const auto &[slot, response] : shares) {
-      seen += response * light_[std::size_t (slot)][i];
+      made += response * light_[std::size_t (slot)][i];
       power += response * response;
     }
-    const double step = (coded_[i] - seen) / power;
+    const double step = part * (seen[i] - made) / power;
     for (const auto &[slot, response] : shares)
       light_[std::size_t (slot)][i] += float (step * response);
   }
@@ -190,13 +198,23 @@ CollaborativeFilter::correct_rows (int first, int end)
 
 bool
 CollaborativeFilter::run (const Kernels &kernels, const Field &coded,
-    double noise, std::span<Field> slots, Workers &workers,
-    std::stop_token stop)
+    const Field *partner, double noise, std::span<Field> slots,
+    Workers &workers, std::stop_token stop)
 {
   scratch_.resize (std::size_t (workers.count ()));
   for (auto &scratch : scratch_)
     scratch.resize (slots.size () * kBlock * kBlock * Field::kSlack);
   split (coded, coded_);
+  of_partner_.resize (partner ? coded_.size () : 0);
+  if (partner)
+    split (*partner, of_partner_);
+  /* The estimate is nearer to the truth than a measurement whose noise is large
+   * beside the threshold. The slots of a partner's pixel have together as much
+   * noise as one has in a coded pixel. */
+  const auto towards_partner = [&] (double threshold) {
+    const double square = threshold * threshold;
+    return partner ? float (square / (square + 4.0 * noise * noise)) : 0.0f;
+  };
   for (std::size_t s = 0; s < slots.size (); s++) {
     split (slots[s], light_[s]);
     std::fill (sum_[s].begin (), sum_[s].end (), 0.0f);
@@ -204,14 +222,15 @@ CollaborativeFilter::run (const Kernels &kernels, const Field &coded,
   std::fill (weight_.begin (), weight_.end (), 0.0f);
 
   const double last = std::max (kLastThreshold, kNoiseThreshold * noise);
-  const double first = std::max (kFirstThreshold, 2.0 * last);
+  const double first = std::max (partner ? kFirstWithPartner : kFirstThreshold, 2.0 * last);
   for (int i = 0; i < kIterations; i++) {
     const double threshold =
         first * std::pow (last / first,
                     std::pow (double (i) / (kIterations - 1), kSlowing));
     if (!shrink ({kernels, (i / 2 + 2 * i) % kBlockStep, i % kBlockStep,
                      float (threshold),
-                     i < kIterations - kLastIterations ? kStep : 1.0f},
+                     i < kIterations - kLastIterations ? kStep : 1.0f,
+                     towards_partner (threshold)},
             workers, stop))
       return false;
   }

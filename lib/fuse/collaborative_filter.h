@@ -23,15 +23,19 @@ namespace codedexposure::fuse
 class CollaborativeFilter
 {
 public:
+  /** @p partner  of a second camera; null: there is none. It and @p observation
+   *              outlive this. */
   CollaborativeFilter (const Schedule &schedule, const Observation &observation,
-      int width, int height);
+      const Observation *partner, int width, int height);
 
   /** Improves @p slots, an estimate of the light of each slot, by @p coded. The
    * result does not depend on the number of workers.
-   * @p noise  standard deviation of the coded pixels' noise, grey levels.
-   * @return   false when it was stopped. */
-  bool run (const Kernels &kernels, const Field &coded, double noise,
-      std::span<Field> slots, Workers &workers, std::stop_token stop);
+   * @p partner  null, or what the slots are to make in the partner.
+   * @p noise    standard deviation of the coded pixels' noise, grey levels.
+   * @return     false when it was stopped. */
+  bool run (const Kernels &kernels, const Field &coded, const Field *partner,
+      double noise, std::span<Field> slots, Workers &workers,
+      std::stop_token stop);
 
 private:
   /* Planes are split into every kBlockStep-th column, as the kernels expect,
@@ -42,15 +46,18 @@ private:
   bool shrink (const Step &step, Workers &workers, std::stop_token stop);
   void shrink_strip (const Step &step, int strip, float *scratch);
   void update_rows (const Step &step, int first, int end);
-  void correct_rows (int first, int end);
+  void correct_rows (int first, int end, const Observation &observation,
+      const std::vector<float> &seen, float part);
 
   const Observation &observation_;
+  const Observation *partner_;
   int width_, height_;
   std::ptrdiff_t split_, stride_;
   std::vector<float> transform_;
   std::vector<std::uint8_t> elements_; ///< at every place
   std::vector<std::uint8_t> measured_; ///< slots of coded pixels that see one
   std::vector<float> coded_;
+  std::vector<float> of_partner_; ///< empty without it
   std::vector<std::vector<float>> light_, sum_; ///< of each slot
   std::vector<float> weight_;
   std::vector<std::vector<float>> scratch_; ///< of each worker

@@ -75,6 +75,15 @@ radius_around (Extent cell)
   return std::max (3, std::max (cell.width, cell.height) / 2 + 1);
 }
 
+Observation
+observation_of (
+    const Schedule &schedule, const SensorNoise &noise, double steps)
+{
+  const double white =
+      noise.full_well * schedule.white_slots () / schedule.slots ();
+  return {schedule, noise, white, steps};
+}
+
 std::vector<double>
 relative_noise (const Observation &observation)
 {
@@ -133,8 +142,8 @@ check (const Schedule &schedule, FuseQuality quality)
 } // namespace
 
 Result<std::unique_ptr<Engine>>
-Engine::make (const Schedule &schedule, int width, int height,
-    const FuseOptions &options, double steps, std::stop_token stop)
+Engine::make (const Schedule &schedule, const Schedule *partner, int width,
+    int height, const FuseOptions &options, double steps, std::stop_token stop)
 {
   const int rows = height - schedule.pilot_rows ();
   const Extent cell = schedule.cell ();
@@ -144,16 +153,18 @@ Engine::make (const Schedule &schedule, int width, int height,
   RETURN_IF_ERROR (check (options));
   RETURN_IF_ERROR (check (schedule, options.quality));
   return std::unique_ptr<Engine> (
-      new Engine (schedule, {width, rows}, options, steps, std::move (stop)));
+      new Engine (schedule, partner, {width, rows}, options, steps,
+          std::move (stop)));
 }
 
-Engine::Engine (const Schedule &schedule, Extent size,
+Engine::Engine (const Schedule &schedule, const Schedule *partner, Extent size,
     const FuseOptions &options, double steps, std::stop_token stop)
     : schedule_ (schedule), size_ (size), quality_ (options.quality),
       depth_ (steps),
-      observation_ (schedule, options.noise,
-          options.noise.full_well * schedule.white_slots () / schedule.slots (),
-          steps),
+      observation_ (observation_of (schedule, options.noise, steps)),
+      partner_ (partner ? std::optional (
+                              observation_of (*partner, options.noise, steps))
+                        : std::nullopt),
       phases_ (schedule), kernels_ (*find_kernels (options.target)),
       noise_ (schedule, observation_, size)
 {
@@ -161,19 +172,25 @@ Engine::Engine (const Schedule &schedule, Extent size,
   const int around = radius_around (schedule.cell ());
   /* Parts of rows hold two columns of a block of predictions. */
   const int period = phases_.period () * (phases_.period () % 2 + 1);
-  const float largest = largest_light (observation_);
+  const Observation *of_partner = partner_ ? &*partner_ : nullptr;
+  const float largest = std::max (largest_light (observation_),
+      of_partner ? largest_light (*of_partner) : 0.0f);
   const float pixel_steps = 65535.0f / largest;
   sources_.emplace (SplitField (size.width, 0, radius, period));
   plan_.emplace (FilterPlan{phases_, observation_, *sources_,
-      relative_noise (observation_), radius, pixel_steps, options.lookahead > 0,
-      std::move (stop)});
-  stream_.emplace (schedule, observation_, size, radius, period, pixel_steps);
+      relative_noise (observation_), of_partner,
+      of_partner ? relative_noise (*of_partner) : std::vector<double> (),
+      radius, pixel_steps, options.lookahead > 0, std::move (stop)});
+  stream_.emplace (schedule, observation_, of_partner, size, radius, period,
+      pixel_steps);
   static_pixels_.emplace (
       noise_, size, around, !observation_.noise_free (), largest);
+  if (partner)
+    partner_fit_.emplace (schedule, *partner_, size);
   Models models;
   if (quality_ == FuseQuality::kFast) {
     models = fast_models (slots ());
-    linear_.emplace (*plan_, models);
+    linear_.emplace (*plan_, models, partner_fit_ ? &*partner_fit_ : nullptr);
   } else {
     motion_.emplace (*plan_);
     misfit_ = Field ((size.width + 1) / 2, (size.height + 1) / 2);
@@ -181,8 +198,12 @@ Engine::Engine (const Schedule &schedule, Extent size,
       static_light_ = Field (size.width, size.height);
   }
   predictions_.emplace (*plan_, models, size, around);
-  if (quality_ == FuseQuality::kBest)
-    collaborative_.emplace (schedule, observation_, size.width, size.height);
+  if (quality_ == FuseQuality::kBest) {
+    collaborative_.emplace (
+        schedule, observation_, of_partner, size.width, size.height);
+    if (partner)
+      made_in_partner_ = Field (size.width, size.height);
+  }
   if (options.refine)
     unrefined_ = Refiner::why_not (schedule, observation_, typical_noise ());
   if (options.refine && unrefined_.empty ())
@@ -230,11 +251,38 @@ Engine::fill_light (const CodedFrames &frames, const Seen &seen,
         kernels_, frames, seen.predicted, seen.still, keep, workers, stop);
   if (!motion_->run (kernels_, frames, light_, misfit_, workers, stop))
     return false;
-  if (collaborative_ && !collaborative_->run (kernels_, frames.now->light,
-                            typical_noise (), light_, workers, stop))
-    return false;
+  if (collaborative_) {
+    if (!fit_partner (frames, workers, stop, &made_in_partner_))
+      return false;
+    if (!collaborative_->run (kernels_, frames.now->light,
+            frames.now->has_partner ? &made_in_partner_ : nullptr,
+            typical_noise (), light_, workers, stop))
+      return false;
+  }
   blend_static (seen.still);
-  return true;
+  return fit_partner (frames, workers, stop);
+}
+
+bool
+Engine::fit_partner (const CodedFrames &frames, Workers &workers,
+    std::stop_token stop, Field *made)
+{
+  if (!frames.now->has_partner)
+    return true;
+  constexpr int kMinRows = 16;
+  return run_bands (
+      workers, size_.height, kMinRows, std::move (stop), [&] (const Band &band) {
+        PartnerFit::Room room (*partner_fit_);
+        std::vector<float *> rows (light_.size ());
+        for (int y = band.first; y < band.end; y++) {
+          for (std::size_t s = 0; s < rows.size (); s++)
+            rows[s] = light_[s].row (y);
+          partner_fit_->run (kernels_, y, frames.now->partner.light.row (y),
+              rows.data (), room);
+          if (made)
+            partner_fit_->make (y, rows.data (), made->row (y));
+        }
+      });
 }
 
 std::optional<Engine::Seen>

@@ -12,6 +12,7 @@
 #include "fuse/collaborative_filter.h"
 #include "fuse/linear_filter.h"
 #include "fuse/motion.h"
+#include "fuse/partner_fit.h"
 #include "fuse/predictions.h"
 #include "fuse/refine.h"
 #include "fuse/static_pixels.h"
@@ -24,10 +25,11 @@ namespace codedexposure::fuse
 class Engine
 {
 public:
-  /** Throws Stopped after a stop. */
+  /** @p partner  what partners see; null: there are none.
+   * Throws Stopped after a stop. */
   static Result<std::unique_ptr<Engine>> make (const Schedule &schedule,
-      int width, int height, const FuseOptions &options, double steps,
-      std::stop_token stop);
+      const Schedule *partner, int width, int height,
+      const FuseOptions &options, double steps, std::stop_token stop);
 
   int slots () const { return observation_.slots (); }
   Extent size () const { return size_; }
@@ -49,8 +51,8 @@ public:
   void forget ();
 
 private:
-  Engine (const Schedule &schedule, Extent size, const FuseOptions &options,
-      double steps, std::stop_token stop);
+  Engine (const Schedule &schedule, const Schedule *partner, Extent size,
+      const FuseOptions &options, double steps, std::stop_token stop);
   /** What is found in coded frames before any slot is estimated. */
   struct Seen {
     const Predictions::Found &predicted;
@@ -64,6 +66,10 @@ private:
       const Uncertainty::Sink &deviations);
   bool fill_light (const CodedFrames &frames, const Seen &seen,
       Workers &workers, std::stop_token stop);
+  /** PartnerFit of light_; @p made, if set, gets what that makes in the partner.
+   */
+  bool fit_partner (const CodedFrames &frames, Workers &workers,
+      std::stop_token stop, Field *made = nullptr);
   void blend_static (const StaticPixels::Found &still);
   /** Standard deviation of coded pixels in grey levels. */
   double typical_noise () const;
@@ -73,6 +79,7 @@ private:
   const FuseQuality quality_;
   const double depth_; ///< steps of pixels from black to white
   const Observation observation_;
+  const std::optional<Observation> partner_;
   const Phases phases_;
   const Kernels &kernels_;
   const NoiseMap noise_;
@@ -84,6 +91,7 @@ private:
   std::optional<CodedStream> stream_;
   std::optional<Predictions> predictions_;
   std::optional<StaticPixels> static_pixels_;
+  std::optional<PartnerFit> partner_fit_; ///< of linear_, or after the others
   std::optional<LinearFilter> linear_;
   std::optional<MotionFilter> motion_;
   std::optional<CollaborativeFilter> collaborative_;
@@ -93,6 +101,7 @@ private:
   std::vector<Field> light_; ///< of each slot; made when it is first needed
   Field static_light_;       ///< unless fast, or without noise
   Field misfit_;             ///< of motion_
+  Field made_in_partner_;    ///< for collaborative_
   std::string unrefined_;
 };
 

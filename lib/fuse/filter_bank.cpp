@@ -65,13 +65,14 @@ round_weights (std::span<const float> weights)
 } // namespace
 
 TapSources::TapSources (const SplitField &frame)
-    : reach_{int (kNeighbourRadius), frame.margin (), int (kNeighbourRadius)},
+    : reach_{int (kNeighbourRadius), frame.margin (), int (kNeighbourRadius),
+          int (kPartnerRadius)},
       margin_ (frame.margin ()), period_ (frame.period ()),
       width_ (frame.width ())
 {
   for (int x = -margin_; x < period_ + margin_; x++)
     places_.push_back (frame.place (x));
-  for (std::size_t f = 0; f < 3; f++) {
+  for (std::size_t f = 0; f < reach_.size (); f++) {
     first_[f] = rows_ * int (places_.size ());
     rows_ += 2 * reach_[f] + 1;
   }
@@ -89,9 +90,11 @@ std::span<const std::int32_t *const>
 TapSources::row (const CodedFrames &frames, int y,
     std::vector<const std::int32_t *> &sources) const
 {
-  const std::array all{frames.before, frames.now, frames.after};
+  const std::array<const CodedLight *, 4> all{frames.before, frames.now,
+      frames.after, frames.now->has_partner ? &frames.now->partner : nullptr};
+  static_assert (kPartner == all.size () - 2);
   sources.resize (std::size_t (rows_) * places_.size ());
-  for (std::size_t f = 0; f < 3; f++) {
+  for (std::size_t f = 0; f < all.size (); f++) {
     if (!all[f])
       continue;
     const std::int32_t **source = sources.data () + first_[f];

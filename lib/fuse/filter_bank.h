@@ -25,8 +25,8 @@ add_block (std::vector<Run> &runs, int block)
 }
 
 /** Where the taps of the filters of a row are: the pixels within a distance of
- * it in the frame that is fused, and those within kNeighbourRadius in the coded
- * frames before and after it. */
+ * it in the frame that is fused, those within kNeighbourRadius in the coded
+ * frames before and after it, and those within kPartnerRadius in its partner. */
 class TapSources
 {
 public:
@@ -44,8 +44,8 @@ public:
       std::vector<const std::int32_t *> &sources) const;
 
 private:
-  std::array<int, 3> reach_;           ///< of taps in each frame
-  std::array<int, 3> first_;           ///< source of each frame
+  std::array<int, 4> reach_;           ///< of taps in each frame
+  std::array<int, 4> first_;           ///< source of each frame
   std::vector<std::ptrdiff_t> places_; ///< of a row, from the margin on
   int rows_ = 0;
   int margin_, period_, width_;

@@ -94,39 +94,53 @@ find_covers (const Schedule &schedule, Extent size)
   return covers;
 }
 
+/* A part of a schedule, or of its complement; -1: the background. */
+Schedule
+part_of (const Schedule &schedule, int region)
+{
+  return region < 0 ? schedule.background () : schedule.region (region);
+}
+
 Result<std::vector<Piece>>
 make_pieces (const Schedule &schedule, int width, int height,
     const FuseOptions &options, double largest, std::stop_token stop)
 {
+  std::optional<Schedule> complement;
+  if (options.partner) {
+    ASSIGN_OR_RETURN (complement, schedule.complement ());
+  }
   std::vector<Piece> pieces;
   for (int i = -1; i < int (schedule.regions ().size ()); i++) {
-    const Schedule part = i < 0 ? schedule.background () : schedule.region (i);
+    const Schedule part = part_of (schedule, i);
+    std::optional<Schedule> partner;
+    if (complement)
+      partner = part_of (*complement, i);
     const Rect rect = i < 0 ? Rect{0, 0, width, height}
                             : schedule.regions ()[std::size_t (i)].rect;
-    ASSIGN_OR_RETURN (auto engine, fuse::Engine::make (part, rect.width,
-                                       rect.height, options, largest, stop));
+    ASSIGN_OR_RETURN (auto engine,
+        fuse::Engine::make (part, partner ? &*partner : nullptr, rect.width,
+            rect.height, options, largest, stop));
     pieces.push_back (
         {rect, schedule.slots () / part.slots (), std::move (engine)});
   }
   return pieces;
 }
 
-/** Writes the light of @p coded to the next field of @p engine. */
+/** Writes what @p camera saw, times @p scale, to @p light. */
 template <typename Pixel>
-Field &
-light_of (fuse::Engine &engine, ImageView<const Pixel> coded, float scale)
+void
+set_light (Field &light, const fuse::CodedCamera &camera,
+    ImageView<const Pixel> seen, float scale)
 {
-  Field &light = engine.stream ().next ();
   for (int y = 0; y < light.height (); y++) {
-    const Pixel *from = coded.row (y);
+    const Pixel *from = seen.row (y);
     float *to = light.row (y);
     for (int x = 0; x < light.width (); x++)
       to[x] = float (from[x]) * scale;
-    if (const float *gain = engine.stream ().gain (y))
+    if (const float *gain = camera.gain (y))
       for (int x = 0; x < light.width (); x++)
         to[x] *= gain[x];
   }
-  return light;
 }
 
 } // namespace
@@ -159,9 +173,11 @@ struct Fuser<Pixel>::State {
   std::vector<Cover> covers;
   int slots;
   float largest;
+  float partner_light; ///< 0: there are no partners
   std::unique_ptr<Workers> workers;
 
-  Result<void> take (ImageView<const Pixel> coded);
+  Result<void> take (ImageView<const Pixel> coded,
+      const std::optional<ImageView<const Pixel>> &partner);
   Result<void> check (std::span<const ImageView<Pixel>> frames,
       std::span<const ImageView<std::uint16_t>> uncertainty, Extent size) const;
   /** False when it was stopped. */
@@ -176,17 +192,28 @@ struct Fuser<Pixel>::State {
 
 template <typename Pixel>
 Result<void>
-Fuser<Pixel>::State::take (ImageView<const Pixel> coded)
+Fuser<Pixel>::State::take (ImageView<const Pixel> coded,
+    const std::optional<ImageView<const Pixel>> &partner)
 {
   const float scale = kWhite / largest;
   for (Piece &piece : pieces) {
     const auto &[x, y, width, height] = piece.rect;
-    Field &light =
-        light_of (*piece.engine, coded.block (x, y, width, height), scale);
+    fuse::CodedStream &stream = piece.engine->stream ();
+    fuse::CodedFrame &frame = stream.next ();
+    frame.has_partner = partner.has_value ();
+    set_light (frame.light, stream.camera (), coded.block (x, y, width, height),
+        scale);
+    if (partner)
+      set_light (frame.partner.light, *stream.partner_camera (),
+          partner->block (x, y, width, height), scale * partner_light);
     if (&piece == &pieces.front ())
-      for (const auto &[at, from] : covers)
-        light.row (at.y)[at.x] = light.row (from.y)[from.x];
-    piece.engine->stream ().take (piece.engine->kernels ());
+      for (const auto &[at, from] : covers) {
+        frame.light.row (at.y)[at.x] = frame.light.row (from.y)[from.x];
+        if (partner)
+          frame.partner.light.row (at.y)[at.x] =
+              frame.partner.light.row (from.y)[from.x];
+      }
+    stream.take (piece.engine->kernels ());
   }
   return {};
 }
@@ -300,6 +327,9 @@ try {
     return Error{"threads " + std::to_string (options.threads) +
                  ": they must be 1 to " + std::to_string (Workers::kMost) +
                  ", and 0 stands for one for each processor"};
+  if (!(options.partner_light > 0.0 && options.partner_light <= 1000.0))
+    return Error{"a partner's light of " + real_text (options.partner_light) +
+                 ": it must be more than 0, and 1000 at most"};
   const int largest = largest_pixel_of<Pixel> (options.bits);
   RETURN_IF_ERROR (schedule.check_size (width, height));
   ASSIGN_OR_RETURN (auto pieces, make_pieces (schedule, width, height, options,
@@ -307,6 +337,7 @@ try {
   auto state = std::make_shared<State> (State{std::move (pieces),
       find_covers (schedule, {width, height - schedule.pilot_rows ()}),
       schedule.slots (), float (largest),
+      wanted.partner ? float (wanted.partner_light) : 0.0f,
       std::make_unique<Workers> (
           options.threads == 0 && options.quality == FuseQuality::kFast &&
                   !options.refine
@@ -345,12 +376,18 @@ Fuser<Pixel>::size () const
 
 template <typename Pixel>
 Result<void>
-Fuser<Pixel>::take (ImageView<const Pixel> coded)
+Fuser<Pixel>::take (ImageView<const Pixel> coded,
+    const std::optional<ImageView<const Pixel>> &partner)
 {
   const Rect &whole = state_->pieces.front ().rect;
   RETURN_IF_ERROR (check_view (
       ViewBytes::of (coded), "coded frame", whole.width, whole.height));
-  return state_->or_forget ([&] { return state_->take (coded); });
+  if (partner && state_->partner_light == 0.0f)
+    return Error{"a partner was not expected; set FuseOptions::partner"};
+  if (partner)
+    RETURN_IF_ERROR (check_view (ViewBytes::of (*partner),
+        "partner of the coded frame", whole.width, whole.height));
+  return state_->or_forget ([&] { return state_->take (coded, partner); });
 }
 
 template <typename Pixel>

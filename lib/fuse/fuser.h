@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <stop_token>
 #include <string>
@@ -32,6 +33,13 @@ struct FuseOptions {
   /** Refine the result by a network that learned from pictures. Otherwise,
    * nothing is learned from pictures but the parameters of the scene model. */
   bool refine = false;
+  /** Coded frames can have partners: frames of a second camera in the beam of the
+   * mirrors that are off, with the same noise. */
+  bool partner = false;
+  /** Flat light that makes a partner's pixel as bright as a coded pixel, as a
+   * part of that which makes the coded one so: 1 if both have white at the same
+   * value. (0, 1000]. It need not be exact. */
+  double partner_light = 1.0;
   /** Later coded frames that are used to fuse one: 0 or 1. */
   int lookahead = 0;
   /** Significant bits of a pixel, 1..8 or 1..16; 0: all that the type has. */
@@ -104,10 +112,15 @@ public:
   /** Of the fused frames: the coded frame's without the pilot's rows. */
   Extent size () const;
 
-  /** Queues the coded frame that follows the last one. Error when the view does
-   * not have the size of make (); the stream is unchanged then. After
+  /** Queues the coded frame that follows the last one.
+   * @p partner  none, or the coded frame of the beam of mirrors that are off,
+   *             which has seen every mirror where @p coded has it (the same
+   *             size), and collected light in the slots in which it was off.
+   * Error when a view does not have the size of make (), or there is a partner
+   * without FuseOptions::partner; the stream is unchanged then. After
    * ErrorCode::out_of_memory it is as after forget (). */
-  Result<void> take (ImageView<const Pixel> coded);
+  Result<void> take (ImageView<const Pixel> coded,
+      const std::optional<ImageView<const Pixel>> &partner = {});
   /** Queued coded frames. */
   int pending () const;
   /** Fuses the oldest pending frame with those before and after it.

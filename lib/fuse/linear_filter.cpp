@@ -10,18 +10,20 @@ namespace codedexposure::fuse
 namespace
 {
 
-/* Squared errors of filters beyond those with all taps, as a part of them. */
-constexpr double kExcess = 0.015;
+/* Squared errors of filters beyond those with all taps, as a part of them, which
+ * are smaller with a partner. */
+constexpr double kExcess = 0.015, kExcessWithPartner = 0.03;
 /* Rows that a thread takes at a time. */
 constexpr int kBandRows = 16;
 
 } // namespace
 
-LinearFilter::LinearFilter (const FilterPlan &plan, const Models &models)
-    : plan_ (plan), models_ (models)
+LinearFilter::LinearFilter (
+    const FilterPlan &plan, const Models &models, const PartnerFit *fit)
+    : plan_ (plan), models_ (models), fit_ (fit)
 {
   for (const bool before : {false, true}) {
-    const Neighbours usual = models_.used ({before, plan.lookahead});
+    const Neighbours usual = models_.used (plan.usual (before));
     filters_.get (usual, [&] { return make_filters (usual); });
   }
 }
@@ -31,16 +33,17 @@ LinearFilter::make_filters (Neighbours neighbours) const
 {
   const std::vector<SceneClass> &models = models_.with (neighbours);
   const double radius = plan_.radius + 0.5;
-  const std::vector<Tap> wide = taps_within (radius),
-                         all =
-                             taps_around (radius, kNeighbourRadius, neighbours);
+  const std::vector<Tap>
+      wide = taps_around (radius, kNeighbourRadius, neighbours.none ()),
+      all = taps_around (radius, kNeighbourRadius, neighbours);
   const int slots = plan_.observation.slots ();
   Banks banks;
   for (const SceneClass &model : models) {
     /* What moves fast has left the pixel in other frames. */
     const std::vector<Tap> &taps = &model == &models.back () ? wide : all;
     FilterBank &bank = banks.emplace_back (plan_, slots);
-    for_each_sparse_phase (plan_, model, taps, Sought::kSlots, kExcess,
+    for_each_sparse_phase (plan_, model, taps, Sought::kSlots,
+        neighbours.partner ? kExcessWithPartner : kExcess,
         [&] (int row, int x, const std::vector<float> &weights) {
           for (int s = 0; s < slots; s++)
             bank.set (row, x, s, taps,
@@ -63,6 +66,7 @@ struct LinearFilter::Room {
   std::vector<std::uint8_t> kept; ///< blocks of each model
   std::vector<Run> runs;          ///< of one model
   std::vector<const std::int32_t *> sources;
+  std::optional<PartnerFit::Room> of_fit;
 
   Room (int width, int period, int models, int slots)
       : parts{period, SplitField::split_length (width, period), width},
@@ -144,13 +148,18 @@ LinearFilter::run (const Kernels &kernels, const CodedFrames &frames,
         if (!room)
           room.emplace (plan_.sources.width (), plan_.sources.period (),
               int (filters.size ()), slots);
-        std::vector<const float *> rows;
+        if (fit_ && !room->of_fit)
+          room->of_fit.emplace (*fit_);
+        std::vector<float *> rows;
         for (int s = 0; s < slots; s++)
           rows.push_back (room->rows.row (s));
         const int end = std::min ((part + 1) * kBandRows, height);
         for (int y = part * kBandRows; y < end; y++) {
           share (kernels, predicted, still, y, *room);
           estimate (kernels, filters, frames, y, *room);
+          if (frames.now->has_partner)
+            fit_->run (kernels, y, frames.now->partner.light.row (y),
+                rows.data (), *room->of_fit);
           sink (y, rows.data ());
         }
       },

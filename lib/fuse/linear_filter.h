@@ -7,6 +7,7 @@
 
 #include "base/workers.h"
 #include "fuse/models.h"
+#include "fuse/partner_fit.h"
 #include "fuse/predictions.h"
 #include "fuse/static_pixels.h"
 
@@ -22,8 +23,10 @@ using RowSink = std::function<void (int y, const float *const *slots)>;
 class LinearFilter
 {
 public:
-  /** @p plan  outlives this. */
-  LinearFilter (const FilterPlan &plan, const Models &models);
+  /** @p plan  outlives this.
+   *  @p fit   to partners, if there are any; likewise. */
+  LinearFilter (
+      const FilterPlan &plan, const Models &models, const PartnerFit *fit);
 
   /** False when it was stopped. */
   bool run (const Kernels &kernels, const CodedFrames &frames,
@@ -43,6 +46,7 @@ private:
 
   const FilterPlan &plan_;
   Models models_;
+  const PartnerFit *fit_;
   ForNeighbours<Banks> filters_;
 };
 

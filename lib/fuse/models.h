@@ -24,7 +24,7 @@ struct Models {
   /** Those of @p neighbours that are used. */
   Neighbours used (Neighbours neighbours) const
   {
-    return over_frames.empty () ? Neighbours () : neighbours;
+    return over_frames.empty () ? neighbours.none () : neighbours;
   }
   /** The largest number of models. */
   int most () const

@@ -104,9 +104,10 @@ struct MotionFilter::Room {
 };
 
 MotionFilter::MotionFilter (const FilterPlan &plan)
-    : plan_ (plan), models_ (motion_models ()),
-      of_frame_ (make_set (models_.of_frame, taps_within (plan.radius + 0.5)))
+    : plan_ (plan), models_ (motion_models ())
 {
+  of_frame ({});
+  of_frame (plan.usual (false));
 }
 
 /* Under a class whose motion brings several samples to the same places of the
@@ -145,13 +146,23 @@ MotionFilter::make_set (
   return set;
 }
 
+const MotionFilter::Set &
+MotionFilter::of_frame (Neighbours neighbours)
+{
+  const Neighbours none = neighbours.none ();
+  return of_frame_.get (none, [&] {
+    return make_set (models_.of_frame,
+        taps_around (plan_.radius + 0.5, kNeighbourRadius, none));
+  });
+}
+
 /* What moves uses one neighbouring frame: with both, filters of wrong motions
  * fit by chance more often, as they have more taps. */
 std::vector<const MotionFilter::Set *>
 MotionFilter::sets_for (Neighbours neighbours)
 {
   if (!neighbours.any ())
-    return {&of_frame_};
+    return {&of_frame (neighbours)};
   const auto made = [&] (ForNeighbours<Set> &sets,
                         std::span<const SceneClass> classes, Neighbours of) {
     return &sets.get (of, [&] {
@@ -159,9 +170,10 @@ MotionFilter::sets_for (Neighbours neighbours)
           classes, taps_around (plan_.radius + 0.5, kNeighbourRadius, of));
     });
   };
-  return {&of_frame_, made (over_frames_, models_.over_frames, neighbours),
+  return {&of_frame (neighbours),
+      made (over_frames_, models_.over_frames, neighbours),
       made (over_one_, models_.over_one,
-          {neighbours.before, !neighbours.before})};
+          {neighbours.before, !neighbours.before, neighbours.partner})};
 }
 
 /* The squared residuals of a chunk of classes in row @y of pixels. */

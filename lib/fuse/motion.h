@@ -46,6 +46,7 @@ private:
   };
   Set make_set (
       std::span<const SceneClass> classes, std::span<const Tap> taps) const;
+  const Set &of_frame (Neighbours neighbours);
   std::vector<const Set *> sets_for (Neighbours neighbours);
 
   struct Room;
@@ -63,8 +64,7 @@ private:
 
   const FilterPlan &plan_;
   MotionModels models_;
-  Set of_frame_;
-  ForNeighbours<Set> over_frames_, over_one_;
+  ForNeighbours<Set> of_frame_, over_frames_, over_one_;
 };
 
 } // namespace codedexposure::fuse

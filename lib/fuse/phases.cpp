@@ -68,6 +68,9 @@ taps_around (double own, double reach, Neighbours neighbours)
   for (const int frame : {-1, 1})
     if (frame < 0 ? neighbours.before : neighbours.after)
       std::ranges::copy (taps_within (reach, frame), std::back_inserter (taps));
+  if (neighbours.partner)
+    std::ranges::copy (
+        taps_within (kPartnerRadius, kPartner), std::back_inserter (taps));
   return taps;
 }
 
@@ -87,9 +90,25 @@ pairs_of (std::span<const Tap> taps)
   return pairs;
 }
 
+/* Variance of light that partners have in common and the coded frame has not:
+ * so large that their weights sum to 0, and their black level and gain need not
+ * be known. */
+constexpr double kPartnerFlatVariance = 1e3;
+
+std::vector<int>
+frames_of (std::span<const Tap> taps)
+{
+  std::vector<int> frames;
+  for (const Tap &tap : taps)
+    if (tap.frame != kPartner)
+      frames.push_back (tap.frame);
+  return frames;
+}
+
 /* The equations of the pixels of each phase, under one class. The frames of
  * taps are one exposure of several times as many slots; elements of later
- * frames come after those of earlier ones. */
+ * frames come after those of earlier ones, and those of the partner come last.
+ */
 class Equations
 {
 public:
@@ -98,7 +117,7 @@ public:
       : plan_ (plan), taps_ (taps),
         middle_ (std::size_t (
             std::ranges::find (taps, Tap{0, 0, 0}) - taps.begin ())),
-        frames_ (std::ranges::minmax (taps, std::less (), &Tap::frame)),
+        frames_ (std::ranges::minmax (frames_of (taps))),
         covariance_ (patch, shares (), slots () * count (), reach ())
   {
   }
@@ -120,7 +139,11 @@ public:
 
 private:
   int slots () const { return plan_.observation.slots (); }
-  int count () const { return frames_.max.frame - frames_.min.frame + 1; }
+  bool is_partner (std::size_t tap) const
+  {
+    return taps_[tap].frame == kPartner;
+  }
+  int count () const { return frames_.max - frames_.min + 1; }
   int reach () const
   {
     int radius = 0;
@@ -131,12 +154,17 @@ private:
   std::vector<SlotShares> shares () const
   {
     std::vector<SlotShares> shares;
-    for (int frame = 0; frame < count (); frame++)
-      for (SlotShares element : plan_.observation.shares ()) {
+    const auto add = [&] (const Observation &observation, int frame) {
+      for (SlotShares element : observation.shares ()) {
         for (SlotShare &share : element)
-          share.slot += frame * slots ();
+          share.slot += (frame - frames_.min) * slots ();
         shares.push_back (std::move (element));
       }
+    };
+    for (int frame = frames_.min; frame <= frames_.max; frame++)
+      add (plan_.observation, frame);
+    if (plan_.partner)
+      add (*plan_.partner, 0);
     return shares;
   }
   double covariance (std::size_t a, std::size_t b) const
@@ -152,7 +180,7 @@ private:
   const FilterPlan &plan_;
   std::span<const Tap> taps_;
   std::size_t middle_;
-  std::ranges::minmax_result<Tap> frames_;
+  std::ranges::minmax_result<int> frames_;
   CodedCovariance covariance_;
   int element_ = 0;
   KrigingSystem system_; ///< ordinary kriging of the slots of the middle frame
@@ -167,16 +195,22 @@ Equations::set_system (int row, int x)
   std::vector<double> noise;
   for (int frame = 0; frame < count (); frame++)
     noise.insert (noise.end (), plan_.noise.begin (), plan_.noise.end ());
+  noise.insert (
+      noise.end (), plan_.partner_noise.begin (), plan_.partner_noise.end ());
   for (std::size_t i = 0; i < taps_.size (); i++) {
     places.push_back ({taps_[i].x, taps_[i].y});
-    exposed.push_back (
-        (taps_[i].frame - frames_.min.frame) * slots () + elements[i]);
+    const int frame = is_partner (i) ? count () : taps_[i].frame - frames_.min;
+    exposed.push_back (frame * slots () + elements[i]);
   }
   element_ = elements[middle_];
   system_ = slot_equations (covariance_, places, exposed, noise);
   const std::ptrdiff_t of_frame = slots () * std::ptrdiff_t (taps_.size ());
-  const auto first = system_.targets.begin () - frames_.min.frame * of_frame;
+  const auto first = system_.targets.begin () - frames_.min * of_frame;
   system_.targets = {first, first + of_frame};
+  for (std::size_t i = 0; i < taps_.size (); i++)
+    for (std::size_t j = i; is_partner (i) && j < taps_.size (); j++)
+      if (is_partner (j))
+        system_.covariance[i * taps_.size () + j] += kPartnerFlatVariance;
   system_.flat.assign (taps_.size (), 1.0);
   system_.flat_targets.assign (std::size_t (slots ()), 1.0);
 }

@@ -16,8 +16,12 @@
 namespace codedexposure::fuse
 {
 
+/** Stands for the partner of a coded frame, in the beam of the mirrors that are
+ * off, where others have the numbers of coded frames. */
+constexpr int kPartner = 2;
+
 /** A pixel relative to another one, of coded frame -1, the one before, 0, the
- * same one, or 1, the one after it. */
+ * same one, or 1, the one after it, or of the partner of the same one. */
 struct Tap {
   int x, y;
   int frame = 0;
@@ -25,11 +29,16 @@ struct Tap {
   bool operator== (const Tap &) const = default;
 };
 
-/** The neighbouring coded frames that there are. */
+/** The neighbouring coded frames that there are, and whether there is a partner.
+ */
 struct Neighbours {
   bool before = false, after = false;
+  bool partner = false;
 
+  /** Of the coded frames. */
   bool any () const { return before || after; }
+  /** Without them. */
+  Neighbours none () const { return {.partner = partner}; }
 };
 
 /** Something for each set of neighbours, made when it is first asked for. */
@@ -41,24 +50,28 @@ public:
   const T &get (Neighbours neighbours, const Make &make)
   {
     auto &made =
-        made_[(neighbours.before ? 1u : 0u) + (neighbours.after ? 2u : 0u)];
+        made_[(neighbours.before ? 1u : 0u) + (neighbours.after ? 2u : 0u) +
+              (neighbours.partner ? 4u : 0u)];
     if (!made)
       made = make ();
     return *made;
   }
 
 private:
-  std::array<std::optional<T>, 4> made_;
+  std::array<std::optional<T>, 8> made_;
 };
 
 /** The pixels of a coded frame within @p radius px. */
 std::vector<Tap> taps_within (double radius, int frame = 0);
-/** The pixels within @p own px, and those of @p neighbours within @p reach px.
- */
+/** The pixels within @p own px, those of @p neighbours within @p reach px, and
+ * of a partner those within kPartnerRadius. */
 std::vector<Tap> taps_around (double own, double reach, Neighbours neighbours);
 /** Of the taps in the coded frames before and after, px. Larger ones are not
  * more accurate. */
 constexpr double kNeighbourRadius = 2.3;
+/** Of the taps in the partner, px: a shallow code has the light of most slots in
+ * every pixel. Larger ones are not more accurate. */
+constexpr double kPartnerRadius = 1.5;
 
 /**
  * Which elements lie around a pixel. Pixels with the same neighbourhood are of
@@ -111,10 +124,19 @@ struct FilterPlan {
   const Observation &observation;
   const TapSources &sources;
   std::vector<double> noise; ///< variance of each element, in the scene's
-  int radius;                ///< of taps, px
-  float steps;               ///< of a pixel per grey level
-  bool lookahead;            ///< the next coded frame is usually known
-  std::stop_token stop;      ///< of the call that makes filters
+  /** What partners tell of the slots, if there are any; else null. */
+  const Observation *partner;
+  std::vector<double> partner_noise;
+  int radius;           ///< of taps, px
+  float steps;          ///< of a pixel per grey level
+  bool lookahead;       ///< the next coded frame is usually known
+  std::stop_token stop; ///< of the call that makes filters
+
+  /** The neighbours that usually there are, beside @p before. */
+  Neighbours usual (bool before) const
+  {
+    return {before, lookahead, partner != nullptr};
+  }
 
   void throw_if_stopped () const
   {

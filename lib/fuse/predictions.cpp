@@ -55,7 +55,7 @@ Predictions::Predictions (
   if (models.most () > 1)
     found_.preferences.assign (std::size_t (models.most ()), of_blocks);
   for (const bool before : {false, true}) {
-    const Neighbours usual = models_.used ({before, plan.lookahead});
+    const Neighbours usual = models_.used (plan.usual (before));
     filters_.get (usual, [&] { return make_filters (usual); });
   }
 }
@@ -68,9 +68,9 @@ Predictions::make_filters (Neighbours neighbours) const
     classes = {kMoving};
   classes.insert (classes.begin (), kStatic);
   const double radius = plan_.radius - 1.5;
-  const std::vector<Tap> near = taps_within (radius),
-                         all =
-                             taps_around (radius, kComparedRadius, neighbours);
+  const std::vector<Tap>
+      near = taps_around (radius, kComparedRadius, neighbours.none ()),
+      all = taps_around (radius, kComparedRadius, neighbours);
   /* Their taps fit some motion by chance, the more of all taps they are: their
    * squared errors count as this much larger. */
   const float chance =

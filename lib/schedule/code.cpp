@@ -230,6 +230,18 @@ Code::max_on_slots () const
   return most;
 }
 
+Result<Code>
+Code::complement () const
+{
+  for (int e = 0; e < n_; e++)
+    if (on_slots (e) == n_)
+      return Error{"element " + std::to_string (e) + " of code " +
+                   in_quotes (name_) +
+                   " is on in every slot, so that the beam of the mirrors that "
+                   "are off never has its light; use sequential"};
+  return Code ("matrix", n_, [this] (int e, int s) { return !on (e, s); });
+}
+
 bool
 Code::one_hot () const
 {

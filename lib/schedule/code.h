@@ -55,6 +55,9 @@ public:
   int on_slots (int element) const;
   /** The largest on_slots (): that element's exposure fills the range. */
   int max_on_slots () const;
+  /** The code of the mirrors' other beam: on where this one is off. Error where
+   * an element is on in every slot, and so never in that beam. */
+  Result<Code> complement () const;
   /** Every element is on in one slot, and in every slot one element is on. */
   bool one_hot () const;
 

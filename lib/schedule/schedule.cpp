@@ -232,6 +232,17 @@ Schedule::with_leak (double leak) const
   return make (std::move (parts));
 }
 
+Result<Schedule>
+Schedule::complement () const
+{
+  Parts parts = parts_;
+  ASSIGN_OR_RETURN (parts.code, parts_.code.complement ());
+  for (Region &region : parts.regions) {
+    ASSIGN_OR_RETURN (region.code, region.code.complement ());
+  }
+  return make (std::move (parts));
+}
+
 Result<void>
 Schedule::check_size (int width, int height) const
 {

@@ -137,6 +137,9 @@ public:
   int region_at (int x, int y) const;
   /** The same with another leak. */
   Result<Schedule> with_leak (double leak) const;
+  /** What the beam of the mirrors that are off has of this schedule: all codes
+   * complemented. Error where an element is on in every slot. */
+  Result<Schedule> complement () const;
   /** Error where a region does not lie within @p width x @p height pixels,
    * above the pilot. */
   Result<void> check_size (int width, int height) const;

@@ -28,6 +28,28 @@ pair_into (std::optional<T> &to, int T::*first, int T::*second, int highest,
   };
 }
 
+PartnerSetup
+read_partner (const Json &root)
+{
+  PartnerSetup partner;
+  read_keys (root, "", "a partner has a size",
+      {{"size", size_into (partner.size, Mapping::kMaxSize), true},
+          {"mapping", inner_into (partner.mapping, read_mapping)}});
+  return partner;
+}
+
+JsonReader
+beam_into (bool &off)
+{
+  return [&off] (const Json &value, const std::string &key) {
+    std::string beam;
+    text_into (beam) (value, key);
+    if (beam != "off")
+      throw expected (key, "\"off\"", value);
+    off = true;
+  };
+}
+
 StreamSetup
 read_setup (const Json &root)
 {
@@ -43,7 +65,9 @@ read_setup (const Json &root)
                   "two whole numbers, frames in so many seconds")},
           {"bits", integer_into (setup.bits, 16)},
           {"track", flag_into (setup.track)},
-          {"simulated", flag_into (setup.simulated)}});
+          {"simulated", flag_into (setup.simulated)},
+          {"beam", beam_into (setup.off_beam)},
+          {"partner", inner_into (setup.partner, read_partner)}});
   return setup;
 }
 
@@ -78,6 +102,15 @@ StreamSetup::to_json () const
     text += ",\"mapping\":" + mapping->to_json ();
   if (bench)
     text += ",\"bench\":" + bench->to_json ();
+  if (off_beam)
+    text += ",\"beam\":\"off\"";
+  if (partner) {
+    text += ",\"partner\":{\"size\":[" + std::to_string (partner->size.width) +
+            "," + std::to_string (partner->size.height) + "]";
+    if (partner->mapping)
+      text += ",\"mapping\":" + partner->mapping->to_json ();
+    text += "}";
+  }
   return text + "}";
 }
 

@@ -16,11 +16,19 @@
 namespace codedexposure
 {
 
+/** The second camera, in the beam of the mirrors that are off. */
+struct PartnerSetup {
+  Extent size; ///< of its frames
+  std::optional<Mapping> mapping = {};
+
+  bool operator== (const PartnerSetup &) const = default;
+};
+
 /** All that was decided and measured before the exposure. */
 struct StreamSetup {
   /** Bound on the JSON form, in bytes. */
   static constexpr std::size_t kMaxJsonSize = Schedule::kMaxJsonSize +
-                                              Mapping::kMaxJsonSize +
+                                              2 * Mapping::kMaxJsonSize +
                                               BenchProfile::kMaxJsonSize;
 
   Schedule schedule;
@@ -38,10 +46,16 @@ struct StreamSetup {
   bool simulated = false;
   /** Of the camera and the DMD. */
   std::optional<BenchProfile> bench = {};
+  /** The camera is in the beam of the mirrors that are off: its frames are
+   * partners of those of another stream. */
+  bool off_beam = false;
+  /** Frames have partners. */
+  std::optional<PartnerSetup> partner = {};
 
   /** The JSON form of the schedule with keys more that may be left out:
    * "mapping", which holds the JSON form of a mapping, "size", "rate", "bits",
-   * "track", "simulated" and "bench", which holds that of a bench profile. */
+   * "track", "simulated", "bench", which holds that of a bench profile,
+   * "beam", which is "off", and "partner" with "size" and "mapping". */
   static Result<StreamSetup> from_json (std::string_view json);
   /** One line. Without the others it is schedule.to_json (). */
   std::string to_json () const;

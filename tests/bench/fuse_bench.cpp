@@ -39,25 +39,33 @@ coded_frames (const Schedule &schedule)
   for (int i = 0; i < kFrames; i++) {
     auto &frame = frames.emplace_back (kWidth, kHeight);
     for (int y = 0; y < kHeight; y++)
-      for (int x = 0; x < kWidth; x++)
-        frame.at (x, y) = std::uint8_t (
-            scene (x, y, i * schedule.slots () + schedule.element_at (x, y)));
+      for (int x = 0; x < kWidth; x++) {
+        double light = 0.0, slots = 0.0;
+        for (int s = 0; s < schedule.slots (); s++)
+          if (schedule.on (x, y, s)) {
+            light += scene (x, y, i * schedule.slots () + s);
+            slots++;
+          }
+        frame.at (x, y) = std::uint8_t (light / slots);
+      }
   }
   return frames;
 }
 
 void
 fuse (benchmark::State &state, const char *preset, FuseQuality quality,
-    bool refine = false)
+    bool refine = false, bool partner = false)
 {
   const Schedule schedule = Schedule::from_preset (preset).value ();
   FuseOptions options;
   options.quality = quality;
   options.refine = refine;
+  options.partner = partner;
   options.threads = int (state.range (0));
   auto fuser =
       Fuser<std::uint8_t>::make (schedule, kWidth, kHeight, options).value ();
   const auto frames = coded_frames (schedule);
+  const auto partners = coded_frames (schedule.complement ().value ());
   std::vector<Image<std::uint8_t>> slots (
       std::size_t (schedule.slots ()), Image<std::uint8_t> (kWidth, kHeight));
   std::vector<ImageView<std::uint8_t>> views;
@@ -66,7 +74,11 @@ fuse (benchmark::State &state, const char *preset, FuseQuality quality,
 
   std::size_t next = 0;
   const auto fuse_next = [&] {
-    quality::must (fuser.take (frames[next++ % frames.size ()].view ()));
+    const std::size_t i = next++ % frames.size ();
+    std::optional<ImageView<const std::uint8_t>> other;
+    if (partner)
+      other = partners[i].view ();
+    quality::must (fuser.take (frames[i].view (), other));
     quality::must (fuser.fuse (views));
   };
   for (int i = 0; i < 2; i++) // filters of neighbours are made once
@@ -90,6 +102,8 @@ constexpr const char *kEight = "sequential:lattice:8/3,order=bit-reversal";
       ->Unit (benchmark::kMillisecond)
 FUSE_BENCHMARK (fast_4, kFour, FuseQuality::kFast);
 FUSE_BENCHMARK (fast_8, kEight, FuseQuality::kFast);
+FUSE_BENCHMARK (fast_both_4, kFour, FuseQuality::kFast, false, true);
+FUSE_BENCHMARK (fast_both_8, kEight, FuseQuality::kFast, false, true);
 FUSE_BENCHMARK (fast_refined_4, kFour, FuseQuality::kFast, true);
 FUSE_BENCHMARK (fast_refined_8, kEight, FuseQuality::kFast, true);
 FUSE_BENCHMARK (balanced_4, kFour, FuseQuality::kBalanced);

@@ -142,7 +142,7 @@ compare (const std::vector<Picture> &frames, const std::vector<Picture> &truth)
 
 std::vector<Picture>
 fuse (const std::vector<Picture> &coded, const Schedule &schedule,
-    const FuseOptions &options)
+    const FuseOptions &options, const std::vector<Picture> &partners)
 {
   auto fuser = Fuser<std::uint8_t>::make (
       schedule, coded[0].width (), coded[0].height (), options);
@@ -160,8 +160,11 @@ fuse (const std::vector<Picture> &coded, const Schedule &schedule,
     must (fuser->fuse (views));
     std::ranges::move (slots, std::back_inserter (frames));
   };
-  for (const Picture &frame : coded) {
-    must (fuser->take (frame.view ()));
+  for (std::size_t i = 0; i < coded.size (); i++) {
+    std::optional<ImageView<const std::uint8_t>> partner;
+    if (!partners.empty ())
+      partner = partners[i].view ();
+    must (fuser->take (coded[i].view (), partner));
     if (fuser->pending () > options.lookahead)
       fuse_one ();
   }

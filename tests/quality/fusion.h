@@ -36,8 +36,10 @@ double ssim (ImageView<const std::uint8_t> a, ImageView<const std::uint8_t> b);
 FrameMean compare (
     const std::vector<Picture> &frames, const std::vector<Picture> &truth);
 
-/** Fused frames of all coded frames of a stream. */
+/** Fused frames of all coded frames of a stream; @p partners: none, or one for
+ * each. */
 std::vector<Picture> fuse (const std::vector<Picture> &coded,
-    const Schedule &schedule, const FuseOptions &options);
+    const Schedule &schedule, const FuseOptions &options,
+    const std::vector<Picture> &partners = {});
 
 } // namespace codedexposure::quality

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Prints the tables of docs/fusion.md, or writes them into it. */
+/* Prints the tables of docs/fusion.md or docs/two-cameras.md, or writes them into
+ * it. */
 #include <algorithm>
 #include <iostream>
 #include <iterator>
@@ -9,6 +10,7 @@
 
 #include "footage.h"
 #include "fusion_figures.h"
+#include "partner_figures.h"
 
 namespace
 {
@@ -22,7 +24,7 @@ constexpr int kLeastFrames = 8;
 struct Options {
   char *clips = nullptr, *document = nullptr;
   int frames = kLeastFrames;
-  gboolean json = FALSE, quiet = FALSE;
+  gboolean two_cameras = FALSE, json = FALSE, quiet = FALSE;
 };
 
 bool
@@ -33,6 +35,8 @@ parse (int &argc, char **&argv, Options &options)
           "folder of raw clips with a manifest.json", "DIR"},
       {"frames", 0, 0, G_OPTION_ARG_INT, &options.frames,
           "of each clip, at most [8]", "N"},
+      {"two-cameras", 0, 0, G_OPTION_ARG_NONE, &options.two_cameras,
+          "the tables of docs/two-cameras.md", nullptr},
       {"json", 0, 0, G_OPTION_ARG_NONE, &options.json, "figures for a program",
           nullptr},
       {"update", 0, 0, G_OPTION_ARG_FILENAME, &options.document,
@@ -76,6 +80,29 @@ find_scenes (const Options &options)
   return {synthetic_scene (256, 192, frames)};
 }
 
+std::vector<Table>
+tables_of_fusion (const std::vector<Scene> &scenes, const Options &options,
+    const Progress &progress)
+{
+  std::vector<Table> tables = fusion_tables (scenes, options.frames, progress);
+  tables.push_back (still_fusion_table (scenes, progress));
+  std::ranges::move (
+      sequence_tables (scenes, progress), std::back_inserter (tables));
+  std::ranges::move (
+      refinement_tables (scenes, progress), std::back_inserter (tables));
+  tables.push_back (leakage_table (scenes, progress));
+  return tables;
+}
+
+std::vector<Table>
+tables_of_two_cameras (
+    const std::vector<Scene> &scenes, const Progress &progress)
+{
+  std::vector<Table> tables = partner_tables (scenes, progress);
+  tables.push_back (partner_error_table (scenes, progress));
+  return tables;
+}
+
 } // namespace
 
 int
@@ -90,13 +117,9 @@ main (int argc, char **argv)
       std::cerr << "\r\033[K" << what << std::flush;
   };
   const std::vector<Scene> scenes = find_scenes (options);
-  std::vector<Table> tables = fusion_tables (scenes, options.frames, progress);
-  tables.push_back (still_fusion_table (scenes, progress));
-  std::ranges::move (
-      sequence_tables (scenes, progress), std::back_inserter (tables));
-  std::ranges::move (
-      refinement_tables (scenes, progress), std::back_inserter (tables));
-  tables.push_back (leakage_table (scenes, progress));
+  const std::vector<Table> tables =
+      options.two_cameras ? tables_of_two_cameras (scenes, progress)
+                          : tables_of_fusion (scenes, options, progress);
   progress ("");
 
   if (options.document)

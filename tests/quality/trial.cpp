@@ -28,6 +28,9 @@ bench_options (const Condition &condition)
   options.read_noise = condition.read_noise;
   options.gain = condition.gain;
   options.alignment.shift_x = options.alignment.shift_y = condition.shift;
+  options.psf_sigma = condition.blur;
+  options.black_level = condition.black_level;
+  options.seed = condition.seed;
   return options;
 }
 

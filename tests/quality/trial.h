@@ -44,6 +44,17 @@ struct Condition {
   /** Analog gain; 0: white in the element that is open longest is white. */
   double gain = 0.0;
   double shift = 0.0; ///< of mirrors against pixels, px, in x and in y
+  double blur = 0.0;  ///< standard deviation, px
+  double black_level = 0.0;
+  std::uint64_t seed = 0; ///< of the noise
+
+  /** The same camera in another place, with noise of its own. */
+  Condition of_partner () const
+  {
+    Condition other = *this;
+    other.seed++;
+    return other;
+  }
 };
 
 /** Scores of a method for a scene. */

@@ -57,12 +57,13 @@ write_features (
   options.noise = {condition.electrons, condition.read_noise};
   const int width = coded[0].width (), height = coded[0].height ();
   auto engine =
-      must (fuse::Engine::make (schedule, width, height, options, 255.0, {}));
+      must (fuse::Engine::make (
+          schedule, nullptr, width, height, options, 255.0, {}));
 
   Workers workers (1);
   std::mt19937 dice (std::mt19937::result_type (100 * number + n));
   for (std::size_t frame = 0; frame < coded.size (); frame++) {
-    Field &light = engine->stream ().next ();
+    Field &light = engine->stream ().next ().light;
     for (int y = 0; y < height; y++)
       for (int x = 0; x < width; x++)
         light.row (y)[x] = coded[frame].at (x, y);

@@ -1,0 +1,35 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The tables of docs/two-cameras.md. */
+#pragma once
+
+#include <vector>
+
+#include "figures.h"
+#include "fusion.h"
+#include "table.h"
+
+namespace codedexposure::quality
+{
+
+/** Mean PSNR over the frames of coded frames, without a border of 8 px, with
+ * one camera and with a second one in the other beam. */
+struct BeamGain {
+  double one = 0.0, two = 0.0;
+};
+
+/** Of the first 8 frames of @p scene.
+ *  @p partner  the second camera; what it is worse by is not known to the
+ *              fusion. */
+BeamGain beam_gain (const Scene &scene, int n, FuseQuality quality,
+    const Condition &condition, const Condition &partner);
+
+/** The gain of every quality, on every scene and in the mean. */
+std::vector<Table> partner_tables (
+    const std::vector<Scene> &scenes, const Progress &progress);
+
+/** What is left of the gain of `fast` with errors of the second camera, and a
+ * lens that both have. */
+Table partner_error_table (
+    const std::vector<Scene> &scenes, const Progress &progress);
+
+} // namespace codedexposure::quality

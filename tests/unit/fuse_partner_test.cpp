@@ -1,0 +1,276 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Fusion with a second camera in the beam of the mirrors that are off. */
+#include <cmath>
+#include <optional>
+
+#include <gtest/gtest.h>
+
+#include "bench/bench.h"
+#include "fuse/fuser.h"
+
+namespace
+{
+
+using namespace codedexposure;
+
+using Pictures = std::vector<Image<std::uint8_t>>;
+
+constexpr int kWidth = 64, kHeight = 48;
+constexpr const char *kPreset = "sequential:lattice:4/2";
+
+Schedule
+schedule_of (const std::string &preset)
+{
+  return Schedule::parse (preset).value ();
+}
+
+/* Edges and gratings that move by @speed px a slot. */
+Image<std::uint8_t>
+scene (double slot, double speed)
+{
+  Image<std::uint8_t> image (kWidth, kHeight);
+  for (int y = 0; y < kHeight; y++)
+    for (int x = 0; x < kWidth; x++) {
+      const double at = x - speed * slot;
+      const double waves = std::sin (0.8 * at + 0.5 * y) + std::cos (1.1 * y);
+      const bool bright =
+          (int (std::floor (at / 9.0)) + int (y / 7.0)) % 2 != 0;
+      image.at (x, y) = std::uint8_t (
+          std::lround (127.0 + 30.0 * waves + (bright ? 40.0 : -40.0)));
+    }
+  return image;
+}
+
+Pictures
+truth (int frames, int slots, double speed)
+{
+  Pictures all;
+  for (int s = 0; s < frames * slots; s++)
+    all.push_back (scene (s, speed));
+  return all;
+}
+
+/* What a camera sees of @slots through the masks of @schedule. */
+Pictures
+coded (const Schedule &schedule, const Pictures &slots,
+    const BenchOptions &options = {})
+{
+  auto bench = OpticalBench::make (kWidth, kHeight, options).value ();
+  Pictures frames;
+  const auto n = std::size_t (schedule.slots ());
+  for (std::size_t at = 0; at < slots.size (); at += n) {
+    bench.begin (schedule);
+    for (std::size_t s = 0; s < n; s++)
+      bench.expose (slots[at + s].view (), int (s), 1.0);
+    auto &frame = frames.emplace_back (kWidth, kHeight);
+    bench.read_out (frames.size () - 1, frame.view ());
+  }
+  return frames;
+}
+
+/* @partners: none, or one for each frame; an empty one is lost. */
+Pictures
+fuse (const Schedule &schedule, const Pictures &frames,
+    const Pictures &partners, FuseOptions options = {})
+{
+  auto fuser = Fuser<std::uint8_t>::make (schedule, kWidth, kHeight, options);
+  EXPECT_TRUE (fuser) << fuser.error ().message;
+  Pictures fused;
+  for (std::size_t i = 0; i < frames.size (); i++) {
+    std::optional<ImageView<const std::uint8_t>> partner;
+    if (i < partners.size () && partners[i].width () > 0)
+      partner = partners[i].view ();
+    const auto taken = fuser->take (frames[i].view (), partner);
+    EXPECT_TRUE (taken) << taken.error ().message;
+    std::vector<ImageView<std::uint8_t>> views;
+    Pictures slots (std::size_t (fuser->slots ()),
+        Image<std::uint8_t> (kWidth, kHeight));
+    for (auto &slot : slots)
+      views.push_back (slot.view ());
+    EXPECT_TRUE (fuser->fuse (views));
+    std::ranges::move (slots, std::back_inserter (fused));
+  }
+  return fused;
+}
+
+/* Of all frames, without the pixels at the border. */
+double
+psnr (const Pictures &fused, const Pictures &truth)
+{
+  constexpr int kBorder = 8;
+  double sum = 0.0, count = 0.0;
+  for (std::size_t i = 0; i < fused.size (); i++)
+    for (int y = kBorder; y < kHeight - kBorder; y++)
+      for (int x = kBorder; x < kWidth - kBorder; x++) {
+        const double error = fused[i].at (x, y) - truth[i].at (x, y);
+        sum += error * error;
+        count++;
+      }
+  return 10.0 * std::log10 (255.0 * 255.0 / std::max (sum / count, 1e-9));
+}
+
+FuseOptions
+with_partner (FuseQuality quality = FuseQuality::kFast)
+{
+  FuseOptions options;
+  options.quality = quality;
+  options.partner = true;
+  return options;
+}
+
+bool
+equal (const Pictures &a, const Pictures &b)
+{
+  return std::ranges::equal (a, b, [] (const auto &one, const auto &other) {
+    for (int y = 0; y < kHeight; y++)
+      for (int x = 0; x < kWidth; x++)
+        if (one.at (x, y) != other.at (x, y))
+          return false;
+    return true;
+  });
+}
+
+/* Light of the whole exposure has the whole resolution at once. */
+TEST (FusePartner, AStaticSceneIsSharpInTheFirstFrame)
+{
+  const Schedule schedule = schedule_of (kPreset);
+  const auto slots = truth (1, schedule.slots (), 0.0);
+  const auto frames = coded (schedule, slots);
+  const auto partners = coded (schedule.complement ().value (), slots);
+  FuseOptions alone;
+  alone.quality = FuseQuality::kBalanced;
+  const double one = psnr (fuse (schedule, frames, {}, alone), slots);
+  const double both = psnr (
+      fuse (schedule, frames, partners, with_partner (alone.quality)), slots);
+  EXPECT_GT (both, one + 5.0);
+  EXPECT_GT (both, 40.0);
+}
+
+TEST (FusePartner, MotionGainsAtEveryQuality)
+{
+  const Schedule schedule = schedule_of (kPreset);
+  const auto slots = truth (3, schedule.slots (), 1.3);
+  const auto frames = coded (schedule, slots);
+  const auto partners = coded (schedule.complement ().value (), slots);
+  for (const FuseQuality quality :
+      {FuseQuality::kFast, FuseQuality::kBalanced, FuseQuality::kBest}) {
+    FuseOptions alone;
+    alone.quality = quality;
+    const double one = psnr (fuse (schedule, frames, {}, alone), slots);
+    const double both =
+        psnr (fuse (schedule, frames, partners, with_partner (quality)), slots);
+    EXPECT_GT (both, one + 1.5) << quality_name (quality);
+  }
+}
+
+/* Neither gain nor black level of the second camera need be known. */
+TEST (FusePartner, GainAndBlackLevelAreNotNeeded)
+{
+  const Schedule schedule = schedule_of (kPreset);
+  const auto slots = truth (2, schedule.slots (), 1.3);
+  const auto frames = coded (schedule, slots);
+  const Schedule off = schedule.complement ().value ();
+  const double good = psnr (
+      fuse (schedule, frames, coded (off, slots), with_partner ()), slots);
+  BenchOptions worse;
+  worse.gain = 0.95 * 4.0 / 3.0;
+  worse.black_level = 8.0;
+  const double bad = psnr (
+      fuse (schedule, frames, coded (off, slots, worse), with_partner ()),
+      slots);
+  EXPECT_GT (bad, good - 0.7);
+
+  /* The same gain for both cameras, as of two of 12 bits. */
+  BenchOptions bright;
+  bright.gain = 1.0;
+  FuseOptions options = with_partner ();
+  options.partner_light = 4.0 / 3.0;
+  const double dim = psnr (
+      fuse (schedule, frames, coded (off, slots, bright), options), slots);
+  EXPECT_GT (dim, good - 0.3);
+}
+
+TEST (FusePartner, AFrameWithoutItsPartnerIsThatOfOneCamera)
+{
+  for (const FuseQuality quality :
+      {FuseQuality::kFast, FuseQuality::kBalanced, FuseQuality::kBest}) {
+    const Schedule schedule = schedule_of (kPreset);
+    const auto slots = truth (4, schedule.slots (), 1.3);
+    const auto frames = coded (schedule, slots);
+    auto partners = coded (schedule.complement ().value (), slots);
+    FuseOptions alone;
+    alone.quality = quality;
+    const auto one = fuse (schedule, frames, {}, alone);
+    EXPECT_TRUE (
+        equal (fuse (schedule, frames, {}, with_partner (quality)), one));
+
+    partners[2] = {};
+    const auto mixed = fuse (schedule, frames, partners, with_partner (quality));
+    const auto third = [] (const Pictures &all) {
+      return Pictures (all.begin () + 8, all.begin () + 12);
+    };
+    EXPECT_TRUE (equal (third (mixed), third (one))) << quality_name (quality);
+    EXPECT_FALSE (equal (mixed, one));
+  }
+}
+
+TEST (FusePartner, RegionsHavePartners)
+{
+  const Schedule schedule =
+      schedule_of ("sequential:2x2,region=32x24+16+12:sequential:4x2");
+  const auto slots = truth (2, schedule.slots (), 0.6);
+  const auto frames = coded (schedule, slots);
+  const auto partners = coded (schedule.complement ().value (), slots);
+  EXPECT_GT (psnr (fuse (schedule, frames, partners, with_partner ()), slots),
+      psnr (fuse (schedule, frames, {}), slots) + 1.0);
+}
+
+/* The result does not depend on threads or the instruction set. */
+TEST (FusePartner, AllTargetsAndThreadsAgree)
+{
+  const Schedule schedule = schedule_of (kPreset);
+  const auto slots = truth (2, schedule.slots (), 1.3);
+  const auto frames = coded (schedule, slots);
+  const auto partners = coded (schedule.complement ().value (), slots);
+  for (const FuseQuality quality :
+      {FuseQuality::kFast, FuseQuality::kBalanced, FuseQuality::kBest}) {
+    FuseOptions options = with_partner (quality);
+    options.threads = 1;
+    const auto expected = fuse (schedule, frames, partners, options);
+    for (const auto target : fuse_targets ())
+      for (const int threads : {1, 3}) {
+        options.target = target;
+        options.threads = threads;
+        EXPECT_TRUE (equal (fuse (schedule, frames, partners, options), expected))
+            << quality_name (quality) << ' ' << target << ' ' << threads;
+      }
+  }
+}
+
+TEST (FusePartner, MisuseIsRefused)
+{
+  const Schedule schedule = schedule_of (kPreset);
+  const Image<std::uint8_t> frame (kWidth, kHeight), small (32, 32);
+  auto alone = Fuser<std::uint8_t>::make (schedule, kWidth, kHeight).value ();
+  const auto refused = alone.take (frame.view (), small.view ());
+  ASSERT_FALSE (refused);
+  EXPECT_NE (refused.error ().message.find ("FuseOptions::partner"),
+      std::string::npos);
+  auto both = Fuser<std::uint8_t>::make (
+      schedule, kWidth, kHeight, with_partner ())
+                  .value ();
+  EXPECT_FALSE (both.take (frame.view (), small.view ()));
+  EXPECT_EQ (both.pending (), 0);
+  FuseOptions dark = with_partner ();
+  dark.partner_light = 0.0;
+  EXPECT_FALSE (
+      Fuser<std::uint8_t>::make (schedule, kWidth, kHeight, dark));
+  /* The last element of a staircase is never in the other beam. */
+  const auto never = Fuser<std::uint8_t>::make (
+      schedule_of ("staircase:2x2"), kWidth, kHeight, with_partner ());
+  ASSERT_FALSE (never);
+  EXPECT_NE (never.error ().message.find ("is on in every slot"),
+      std::string::npos);
+}
+
+} // namespace

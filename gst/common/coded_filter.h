@@ -228,6 +228,13 @@ protected:
   {
     return stream_.bench ? &*stream_.bench : nullptr;
   }
+  /** Of the second camera, as the tags say; none: frames have no partners. */
+  const std::optional<PartnerSetup> &tagged_partner () const
+  {
+    static const std::optional<PartnerSetup> none;
+    return stream_.tagged && *stream_.tagged ? stream_.tagged->value ().partner
+                                             : none;
+  }
   /** From the property, else from the frames, else from their tag, else from
    * the bench profile; 0: all bits of the format. */
   int significant_bits () const;

@@ -150,6 +150,11 @@ CodedFilter::check_camera (const CodedFormat &format) const
   if (stream_.settings.schedule.read || !stream_.tagged || !*stream_.tagged)
     return true;
   const StreamSetup &camera = stream_.tagged->value ();
+  if (camera.off_beam)
+    return post_error (
+        "These are frames of the beam of the mirrors that are off, partners of "
+        "those of another camera. Link them to the pad off of "
+        "codedexposure-pair, and the others to its pad on.");
   const std::string remedy =
       " Decode the frames as the camera gave them, or set the schedule "
       "property.";

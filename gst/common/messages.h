@@ -33,6 +33,17 @@ struct Saturated {
   CODED_FIELDS (active, frame, frames, from, to, pixels);
 };
 
+/** Coded frames begin or cease to come without partners, from
+ * codedexposure-pair. */
+struct PartnerLost {
+  static constexpr const char *kName = "codedexposure/partner-lost";
+  bool active = false;           ///< it begins
+  std::optional<guint64> frames; ///< at the end: how many there were
+  GstClockTime from = 0;
+  std::optional<GstClockTime> to; ///< at the end
+  CODED_FIELDS (active, frames, from, to);
+};
+
 /** Coded frames give way to frames of a pattern, which are not decoded. */
 struct NotCoded {
   static constexpr const char *kName = "codedexposure/not-coded";

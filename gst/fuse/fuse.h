@@ -21,6 +21,9 @@ using AnyFuser = std::variant<Fuser<std::uint8_t>, Fuser<std::uint16_t>>;
 /** Everything that follows from the format and the settings. */
 struct Plan {
   AnyFuser fuser;
+  /** What partners are resampled with; null: they have a pixel a mirror. */
+  std::shared_ptr<const Rectifier> of_partner;
+  bool with_partners;
   GstVideoInfo fused, uncertainty;
   Reach reach;
 };
@@ -66,8 +69,13 @@ private:
   std::string method_name () const override;
   std::string unrefined () const;
 
+  /** False, with a warning, when partners cannot be used. */
+  bool plan_partner (const CodedFormat &format,
+      std::shared_ptr<const Rectifier> &rectifier) const;
+  /** The frame of the second camera; false if @p coded has none of use. */
+  bool map_partner (GstBuffer *coded, BufferPtr &buffer, MappedFrame &mapped);
   template <typename Pixel>
-  Result<guint64> take_pixels (MappedFrame &coded);
+  Result<guint64> take_pixels (MappedFrame &coded, MappedFrame &partner);
   GstFlowReturn take (CodedFrame frame);
   /** The pictures of a pad for one coded frame. */
   struct Pictures {
@@ -92,6 +100,8 @@ private:
   /* Sink pad's stream lock. */
   Settings in_force_;
   std::optional<Plan> plan_;
+  Image<std::uint8_t> narrow_partner_; ///< resampled
+  Image<std::uint16_t> wide_partner_;
   /** Coded frames that were taken, without their pixels; as many as the
    * fuser's pending (). */
   std::deque<CodedFrame> waiting_;

@@ -122,6 +122,25 @@ count_inputs (
                " coded frames/s; " + remedy};
 }
 
+/* What of each input frame falls into no slot, in active times of a slot. */
+std::vector<double>
+light_between (const SlotPlan &slots,
+    const std::vector<std::vector<LightShare>> &shares)
+{
+  const double all =
+      double (slots.frame_period ()) / double (slots.active ()) /
+      double (shares.size ());
+  std::vector<double> between;
+  for (const auto &of_input : shares) {
+    double left = all;
+    for (const LightShare &share : of_input)
+      left -= share.slots;
+    /* Shares are rounded, and so is the period. */
+    between.push_back (left > 1e-5 ? left : 0.0);
+  }
+  return between;
+}
+
 Result<Plan>
 plan_for (
     const GstVideoInfo &in, const GstVideoInfo &out, const Schedule &schedule)
@@ -137,7 +156,9 @@ plan_for (
   if (!slots)
     return Error{"The schedule '" + schedule.text () +
                  "' cannot be shown: " + slots.error ().message + "."};
-  return Plan{in, out, *inputs, share_light (*slots, *inputs)};
+  auto shares = share_light (*slots, *inputs);
+  std::vector<double> between = light_between (*slots, shares);
+  return Plan{in, out, *inputs, std::move (shares), std::move (between)};
 }
 
 /* Posted once, although a source offers the same caps again before it gives up.

@@ -33,6 +33,10 @@ use_schedule (GstCodedExposureSim *self, ScheduleRef schedule)
     return refuse_settings (
         self, "The schedule cannot have the leak of the bench profile: " +
                   lit.error ().message);
+  if (stream.beam == Beam::kOff)
+    lit = lit->complement ();
+  if (!lit)
+    return refuse_settings (self, "beam=off: " + lit.error ().message + ".");
   stream.lit = *std::move (lit);
   stream.schedule = schedule;
   stream.tag_due = true;
@@ -270,6 +274,11 @@ collect_light (GstCodedExposureSim *self, GstBuffer *inbuf)
       stream.bench->expose (pixels, mask, share.slots);
     });
   }
+  if (const double between = plan.between[std::size_t (exposure.taken)];
+      stream.beam == Beam::kOff && between > 0.0)
+    read_pixels (scene, [&] (auto pixels) {
+      stream.bench->expose (pixels, OpticalBench::kAllMirrors, between);
+    });
   exposure.taken++;
   return GST_FLOW_OK;
 }
@@ -399,10 +408,17 @@ bool
 begin_stream (GstCodedExposureSim *self)
 {
   Stream &stream = state (self).stream;
-  const auto [dmd, bench] = locked (self, [&] {
+  const auto [dmd, bench, beam] = locked (self, [&] {
+    const Settings &settings = state (self).settings;
     state (self).counters = Counters ();
-    return std::pair (state (self).settings.dmd, state (self).settings.bench);
+    return std::tuple (settings.dmd, settings.bench, settings.beam);
   });
+  stream.beam = beam;
+  if (beam == Beam::kOff && !dmd.empty ())
+    return refuse_settings (self,
+        "beam=off with dmd '" + dmd +
+            "': a second camera is simulated with masks that step with the "
+            "frames; leave dmd empty, of both cameras.");
   if (bench.read && !*bench.read)
     return refuse_settings (self,
         "The bench property cannot be read: " + bench.read->error ().message);
@@ -523,6 +539,7 @@ own_setup (GstCodedExposureSim *self)
   StreamSetup setup = setup_at (
       GST_BASE_TRANSFORM_SRC_PAD (self), *state (self).stream.schedule);
   setup.simulated = true;
+  setup.off_beam = state (self).stream.beam == Beam::kOff;
   setup.bits = significant_bits_of (
       state (self).stream.optics.bits, state (self).stream.plan->out);
   setup.bench = state (self).stream.profile;

@@ -7,6 +7,11 @@
 namespace codedexposure::gst::sim
 {
 
+G_DEFINE_ENUM_TYPE (GstCodedExposureBeam, gst_coded_exposure_beam,
+    {int (Beam::kOn), "The mirrors that are on", "on"},
+    {int (Beam::kOff), "The mirrors that are off, as a second camera sees them",
+        "off"});
+
 namespace
 {
 
@@ -35,6 +40,13 @@ properties ()
           "mapping and trigger delay, for which other properties and the "
           "schedule win; the tag has it",
           kReadWriteReady, within (&SimState::settings, &Settings::bench)},
+      {"beam", "Beam",
+          "The mirrors whose light the camera gets: those that are on, or, as "
+          "a second camera beside it, those that are off, which is the "
+          "complement of every mask and the light between masks; needs an "
+          "empty dmd",
+          kReadWriteReady, within (&SimState::settings, &Settings::beam),
+          gst_coded_exposure_beam_get_type ()},
       {"psf-sigma", "PSF sigma",
           "Standard deviation of the lens's Gaussian blur in pixels; 0: none; "
           "-1: that of the bench profile, or none",

@@ -67,6 +67,14 @@
  * the mirrors start, coded frames are dark. Without it, the masks step with the
  * frames.
  *
+ * ## A second camera
+ *
+ * With #codedexposure-sim:beam off, the camera is in the beam of the mirrors
+ * that are off: it sees the complement of every mask, and the light between
+ * masks. Two such elements behind a tee, with the same schedule, are a bench
+ * with two cameras, each with optics and noise of its own;
+ * codedexposure-pair brings their frames together.
+ *
  * ## Gaps, tags and messages
  *
  * A gap, DISCONT, a new segment, new caps, a flush or the end of the stream in

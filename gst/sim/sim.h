@@ -28,8 +28,12 @@ namespace codedexposure::gst::sim
 
 using ScheduleRef = std::shared_ptr<const Schedule>;
 
+/** The beam of the mirrors in which the camera is. */
+enum class Beam { kOn, kOff };
+
 /** Properties. */
 struct Settings {
+  Beam beam = Beam::kOn;
   Named<Schedule> schedule{"sequential:2x2"};
   std::string dmd;
   Named<BenchProfile> bench;
@@ -50,6 +54,9 @@ struct Plan {
   int inputs; ///< input frames in a coded frame
   /** What the slots collect of each of them. */
   std::vector<std::vector<LightShare>> shares;
+  /** What falls between the slots, while all mirrors are off, of each; in active
+   * times of a slot. */
+  std::vector<double> between;
 };
 
 /** The coded frame that is being made. */
@@ -67,7 +74,9 @@ struct Stream {
   std::shared_ptr<SimulatedMirrors> mirrors; ///< null: masks in step
   ScheduleRef schedule;                      ///< of the plan and the tag
   std::optional<BenchProfile> profile;
-  Schedule lit; ///< the schedule with the leak of the profile
+  Beam beam = Beam::kOn;
+  /** The schedule with the leak of the profile, as the beam has it. */
+  Schedule lit;
   std::optional<Plan> plan;
   std::string refused; ///< why there can be no plan, as was posted
   std::optional<OpticalBench> bench;

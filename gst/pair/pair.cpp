@@ -1,0 +1,446 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-codedexposure-pair
+ * @title: codedexposure-pair
+ * @short_description: Coded frames with those of a second camera
+ *
+ * A mirror that is off throws its light away from the camera. A second camera
+ * there sees the complement of every mask: together both get all of the light.
+ * This element takes the coded frames of the first camera, the beam of the
+ * mirrors that are on, and gives each the frame of the second that was exposed
+ * at the same time, its partner. codedexposure-fuse uses partners; every other
+ * element sees an ordinary stream of coded frames.
+ *
+ * ## Pairs
+ *
+ * Partners are frames whose exposures begin within a quarter of a frame period
+ * of each other: the start that the frame metadata say, else the PTS. Arrival
+ * and numbers do not count. A coded frame without a partner passes alone, as it
+ * came. So does one that is corrupted or shows a pattern, or whose partner is
+ * or does. A frame of the second camera without a coded frame is dropped.
+ *
+ * In a live pipeline, a coded frame waits for its partner as long as the latency
+ * of the slower camera and a quarter of a frame period allow, and then goes
+ * alone.
+ *
+ * ## Flags, metas and messages
+ *
+ * A partner is in the custom meta `CodedExposurePartner` of the coded frame,
+ * with the fields `buffer` and `caps`. What changes the pixels of the coded
+ * frame drops it, and it does not leave the process. The stream tag of the coded
+ * frames gets the key `partner` with size and mapping of the second camera.
+ *
+ * The message `codedexposure/partner-lost` is posted when coded frames begin to
+ * come alone (`active` TRUE, `from`) and when they have partners again (`frames`
+ * how many came alone, `from`, `to`). #codedexposure-pair:frames-paired,
+ * #codedexposure-pair:frames-alone and #codedexposure-pair:partners-dropped
+ * count.
+ *
+ * ## Example pipeline
+ * |[
+ * gst-launch-1.0 videotestsrc num-buffers=400 pattern=ball \
+ *     ! video/x-raw,format=GRAY8,width=768,height=576,framerate=100/1 \
+ *     ! tee name=light \
+ *     light. ! queue ! codedexposure-sim schedule=sequential:lattice:4/2 ! pair.on \
+ *     light. ! queue \
+ *     ! codedexposure-sim schedule=sequential:lattice:4/2 beam=off seed=1 ! pair.off \
+ *     codedexposure-pair name=pair ! codedexposure-fuse \
+ *     ! queue ! videoconvert ! autovideosink
+ * ]| A simulated bench with two cameras.
+ *
+ * Since: 0.1
+ */
+#include <algorithm>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <gst/base/gstaggregator.h>
+
+#include "common/element.h"
+#include "common/elements.h"
+#include "common/messages.h"
+#include "common/meta.h"
+#include "common/partner.h"
+#include "common/tag.h"
+
+GST_DEBUG_CATEGORY_STATIC (codedexposure_pair_debug);
+#define GST_CAT_DEFAULT codedexposure_pair_debug
+
+using namespace codedexposure;
+using namespace codedexposure::gst;
+
+namespace
+{
+
+struct Counters {
+  guint64 paired = 0, alone = 0, dropped = 0;
+};
+
+struct PairState {
+  Counters counters; ///< object lock
+
+  /* Source pad's streaming thread, which also handles serialized events. */
+  std::optional<StreamSetup> on_setup, off_setup;
+  std::vector<EventPtr> tags; ///< of the coded frames, due
+  bool setup_due = false;
+  guint64 run_alone = 0;                    ///< frames in a row
+  GstClockTime run_from = GST_CLOCK_TIME_NONE; ///< PTS of the first of them
+
+  void reset ()
+  {
+    on_setup.reset ();
+    off_setup.reset ();
+    tags.clear ();
+    setup_due = false;
+    run_alone = 0;
+  }
+};
+
+struct GstCodedExposurePair : Instance<GstAggregator, PairState> {
+};
+
+PairState &
+state (gpointer object)
+{
+  return state_in<GstCodedExposurePair> (object);
+}
+
+GstAggregatorPad *
+sink (gpointer self, const char *name)
+{
+  /* Always there, and so is what it points to. */
+  return GST_AGGREGATOR_PAD (pad_of (GST_ELEMENT (self), name).get ());
+}
+
+/* Of the exposure of @frame, as running time. */
+GstClockTime
+exposure_of (GstAggregatorPad *pad, GstBuffer *frame)
+{
+  const auto meta = get_frame_meta (frame);
+  const GstClockTime start =
+      meta && GST_CLOCK_TIME_IS_VALID (meta->exposure_start)
+          ? meta->exposure_start
+          : GST_BUFFER_PTS (frame);
+  const GstSegment segment =
+      locked (pad, [pad] { return pad->segment; });
+  return running_time (segment, start);
+}
+
+GstClockTime
+period_of (GstAggregatorPad *pad, GstBuffer *frame)
+{
+  const CapsPtr caps (gst_pad_get_current_caps (GST_PAD (pad)));
+  GstVideoInfo info;
+  if (caps && gst_video_info_from_caps (&info, caps.get ()) && info.fps_n > 0)
+    return gst_util_uint64_scale (GST_SECOND, info.fps_d, info.fps_n);
+  return GST_BUFFER_DURATION_IS_VALID (frame) ? GST_BUFFER_DURATION (frame)
+                                              : 40 * GST_MSECOND;
+}
+
+/* Whether the pixels of @frame are the scene through the masks of the
+ * schedule. */
+bool
+is_coded (GstBuffer *frame)
+{
+  const auto meta = get_frame_meta (frame);
+  return !is_corrupted (frame) && (!meta || meta->pattern.empty ());
+}
+
+enum class Found { kPartner, kNone, kWait };
+
+/* The partner of @coded, which is taken from its pad; frames before it are
+ * dropped. @late: no longer waits for it. */
+Found
+find_partner (GstCodedExposurePair *self, GstBuffer *coded, bool late,
+    BufferPtr &partner)
+{
+  GstAggregatorPad *on = sink (self, "on"), *off = sink (self, "off");
+  const GstClockTime start = exposure_of (on, coded);
+  const GstClockTime slack = period_of (on, coded) / 4;
+  while (const BufferPtr next{gst_aggregator_pad_peek_buffer (off)}) {
+    const GstClockTime at = exposure_of (off, next.get ());
+    if (!GST_CLOCK_TIME_IS_VALID (start) ||
+        (GST_CLOCK_TIME_IS_VALID (at) && at > start + slack))
+      return Found::kNone;
+    if (GST_CLOCK_TIME_IS_VALID (at) && at + slack >= start) {
+      partner.reset (gst_aggregator_pad_pop_buffer (off));
+      return Found::kPartner;
+    }
+    gst_aggregator_pad_drop_buffer (off);
+    const ObjectLock lock (self);
+    state (self).counters.dropped++;
+  }
+  return late || gst_aggregator_pad_is_eos (off) ? Found::kNone : Found::kWait;
+}
+
+void
+count (GstCodedExposurePair *self, GstBuffer *coded, bool paired)
+{
+  PairState &st = state (self);
+  locked (self, [&] {
+    (paired ? st.counters.paired : st.counters.alone)++;
+    return 0;
+  });
+  const GstClockTime pts = GST_BUFFER_PTS (coded);
+  if (!paired && st.run_alone++ == 0) {
+    st.run_from = pts;
+    post_message (self, PartnerLost{
+                            .active = true, .frames = {}, .from = pts, .to = {}});
+  } else if (paired && st.run_alone > 0) {
+    post_message (self, PartnerLost{.active = false,
+                            .frames = std::exchange (st.run_alone, 0),
+                            .from = st.run_from,
+                            .to = pts});
+  }
+}
+
+/* Before the frame that is next at the source pad, where caps and segment of the
+ * base class have passed. */
+GstPadProbeReturn
+push_tags (GstPad *pad, GstPadProbeInfo *, gpointer data)
+{
+  auto *self = static_cast<GstCodedExposurePair *> (data);
+  PairState &st = state (self);
+  for (EventPtr &event : std::exchange (st.tags, {}))
+    gst_pad_push_event (pad, event.release ());
+  if (std::exchange (st.setup_due, false) && st.on_setup) {
+    StreamSetup setup = *st.on_setup;
+    const CapsPtr caps (
+        gst_pad_get_current_caps (GST_PAD (sink (self, "off"))));
+    GstVideoInfo info;
+    if (caps && gst_video_info_from_caps (&info, caps.get ()))
+      setup.partner = PartnerSetup{{info.width, info.height},
+          st.off_setup ? st.off_setup->mapping : std::nullopt};
+    gst_pad_push_event (pad, setup_to_event (setup));
+  }
+  return GST_PAD_PROBE_OK;
+}
+
+GstFlowReturn
+aggregate (GstAggregator *aggregator, gboolean late)
+{
+  auto *self = as<GstCodedExposurePair> (aggregator);
+  GstAggregatorPad *on = sink (self, "on"), *off = sink (self, "off");
+  const BufferPtr head (gst_aggregator_pad_peek_buffer (on));
+  if (!head)
+    return gst_aggregator_pad_is_eos (on) ? GST_FLOW_EOS
+                                          : GST_AGGREGATOR_FLOW_NEED_DATA;
+  BufferPtr partner;
+  const Found found = find_partner (self, head.get (), late, partner);
+  if (found == Found::kWait)
+    return GST_AGGREGATOR_FLOW_NEED_DATA;
+  BufferPtr coded (gst_aggregator_pad_pop_buffer (on));
+  if (!coded)
+    return GST_AGGREGATOR_FLOW_NEED_DATA;
+  const bool pairs = partner && is_coded (coded.get ()) &&
+                     is_coded (partner.get ());
+  if (pairs) {
+    coded.reset (gst_buffer_make_writable (coded.release ()));
+    CapsPtr caps (gst_pad_get_current_caps (GST_PAD (off)));
+    set_partner (coded.get (), {std::move (partner), std::move (caps)});
+  }
+  count (self, coded.get (), pairs);
+  auto *src = GST_AGGREGATOR_PAD (GST_AGGREGATOR_SRC_PAD (aggregator));
+  locked (src, [&] {
+    return src->segment.position = GST_BUFFER_PTS (coded.get ());
+  });
+  return gst_aggregator_finish_buffer (aggregator, coded.release ());
+}
+
+/* A coded frame that waits; without one, there is nothing to be late for. */
+GstClockTime
+next_time (GstAggregator *aggregator)
+{
+  GstAggregatorPad *on = sink (aggregator, "on");
+  const BufferPtr head (gst_aggregator_pad_peek_buffer (on));
+  return head ? running_time (on->segment, GST_BUFFER_PTS (head.get ()))
+              : GST_CLOCK_TIME_NONE;
+}
+
+GstFlowReturn
+update_caps (GstAggregator *aggregator, GstCaps *, GstCaps **made)
+{
+  *made = gst_pad_get_current_caps (GST_PAD (sink (aggregator, "on")));
+  return *made ? GST_FLOW_OK : GST_AGGREGATOR_FLOW_NEED_DATA;
+}
+
+/* In the order of the frames of @pad. */
+void
+follow (GstCodedExposurePair *self, bool on, GstEvent *event)
+{
+  PairState &st = state (self);
+  switch (GST_EVENT_TYPE (event)) {
+  case GST_EVENT_STREAM_START:
+    (on ? st.on_setup : st.off_setup).reset ();
+    break;
+  case GST_EVENT_CAPS:
+    st.setup_due = true;
+    if (on) {
+      gst_pad_mark_reconfigure (GST_AGGREGATOR_SRC_PAD (self));
+      GstVideoInfo info;
+      if (gst_video_info_from_caps (&info, caps_of (event)) && info.fps_n > 0) {
+        const GstClockTime wait = gst_util_uint64_scale (
+            GST_SECOND, info.fps_d, 4 * guint64 (info.fps_n));
+        gst_aggregator_set_latency (GST_AGGREGATOR (self), wait, wait);
+      }
+    }
+    break;
+  case GST_EVENT_SEGMENT:
+    if (on)
+      gst_aggregator_update_segment (
+          GST_AGGREGATOR (self), segment_of (event));
+    break;
+  case GST_EVENT_TAG:
+    if (const auto setup = setup_from_tags (tags_of (event)); setup && *setup) {
+      (on ? st.on_setup : st.off_setup) = setup->value ();
+      st.setup_due = true;
+    } else if (on) {
+      st.tags.emplace_back (gst_event_ref (event));
+    }
+    break;
+  default:
+    break;
+  }
+}
+
+/* False, with an error on the bus, if the frames of @pad are of the other
+ * beam. */
+bool
+check_beam (GstCodedExposurePair *self, bool on, GstEvent *event)
+{
+  const auto setup = GST_EVENT_TYPE (event) == GST_EVENT_TAG
+                         ? setup_from_tags (tags_of (event))
+                         : std::nullopt;
+  if (!setup || !*setup || setup->value ().off_beam != on)
+    return true;
+  POST_ERROR (self, STREAM, WRONG_TYPE,
+      std::string ("The frames of pad ") + (on ? "on" : "off") +
+          " are of the beam of the mirrors that are " + (on ? "off" : "on") +
+          ". Link them to pad " + (on ? "off" : "on") + ".");
+  return false;
+}
+
+gboolean
+sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, GstEvent *event)
+{
+  auto *self = as<GstCodedExposurePair> (aggregator);
+  const bool on = pad == sink (self, "on");
+  if (!check_beam (self, on, event)) {
+    gst_event_unref (event);
+    return FALSE;
+  }
+  follow (self, on, event);
+  switch (GST_EVENT_TYPE (event)) {
+  case GST_EVENT_STREAM_START:
+  case GST_EVENT_SEGMENT:
+  case GST_EVENT_EOS:
+  case GST_EVENT_GAP:
+  case GST_EVENT_FLUSH_START:
+  case GST_EVENT_FLUSH_STOP:
+    break;
+  default:
+    /* Only the first camera's reach downstream. */
+    if (on && GST_EVENT_TYPE (event) != GST_EVENT_CAPS &&
+        GST_EVENT_TYPE (event) != GST_EVENT_TAG)
+      break;
+    gst_event_unref (event);
+    return TRUE;
+  }
+  return parent_class<GstAggregatorClass> (aggregator)
+      ->sink_event (aggregator, pad, event);
+}
+
+/* The first camera's caps go through; those of the second are free. */
+gboolean
+sink_query (GstAggregator *aggregator, GstAggregatorPad *pad, GstQuery *query)
+{
+  if (GST_QUERY_TYPE (query) != GST_QUERY_CAPS ||
+      pad != sink (aggregator, "on"))
+    return parent_class<GstAggregatorClass> (aggregator)
+        ->sink_query (aggregator, pad, query);
+  const CapsPtr peer (
+      gst_pad_peer_query_caps (GST_AGGREGATOR_SRC_PAD (aggregator), nullptr));
+  const CapsPtr own (gst_pad_get_pad_template_caps (GST_PAD (pad)));
+  answer_caps (query, intersect_caps (peer.get (), own.get ()));
+  return TRUE;
+}
+
+GstFlowReturn
+flush (GstAggregator *aggregator)
+{
+  state (aggregator).run_alone = 0;
+  return GST_FLOW_OK;
+}
+
+gboolean
+stop (GstAggregator *aggregator)
+{
+  state (aggregator).reset ();
+  const ObjectLock lock (aggregator);
+  state (aggregator).counters = {};
+  return TRUE;
+}
+
+PropertyTable<PairState>
+properties ()
+{
+  const auto counter = [] (const char *name, const char *nick,
+                           const char *blurb, guint64 Counters::*member) {
+    return Property<PairState> (name, nick, blurb, kReadOnly,
+        within (&PairState::counters, member), guint64 (0),
+        guint64 (G_MAXINT64));
+  };
+  return {counter ("frames-paired", "Frames paired",
+              "Coded frames that got a partner", &Counters::paired),
+      counter ("frames-alone", "Frames alone",
+          "Coded frames that passed without a partner", &Counters::alone),
+      counter ("partners-dropped", "Partners dropped",
+          "Frames of the second camera that belong to no coded frame",
+          &Counters::dropped)};
+}
+
+void
+set_up (gpointer klass)
+{
+  GST_DEBUG_CATEGORY_INIT (codedexposure_pair_debug, "codedexposure-pair", 0,
+      "coded frames and their partners");
+  install_state<GstCodedExposurePair, properties> (klass);
+  auto *aggregator = GST_AGGREGATOR_CLASS (klass);
+  aggregator->aggregate = GST_DEBUG_FUNCPTR (aggregate);
+  aggregator->get_next_time = GST_DEBUG_FUNCPTR (next_time);
+  aggregator->update_src_caps = GST_DEBUG_FUNCPTR (update_caps);
+  aggregator->sink_event = GST_DEBUG_FUNCPTR (sink_event);
+  aggregator->sink_query = GST_DEBUG_FUNCPTR (sink_query);
+  aggregator->flush = GST_DEBUG_FUNCPTR (flush);
+  aggregator->stop = GST_DEBUG_FUNCPTR (stop);
+  for (const char *name : {"on", "off"})
+    add_pad_template (klass, name,
+        {.type = GST_TYPE_AGGREGATOR_PAD, .direction = GST_PAD_SINK});
+  add_pad_template (klass, "src", {.type = GST_TYPE_AGGREGATOR_PAD});
+  describe_element (klass, "Coded exposure pairs", "Filter/Video",
+      "Gives coded frames the frames of a second camera, in the beam of the "
+      "mirrors that are off, that were exposed at the same time",
+      {});
+}
+
+void
+set_up_instance (GstCodedExposurePair *self)
+{
+  for (const char *name : {"on", "off"}) {
+    GstPadTemplate *pad_template = gst_element_class_get_pad_template (
+        GST_ELEMENT_GET_CLASS (self), name);
+    gst_element_add_pad (GST_ELEMENT (self),
+        GST_PAD (g_object_new (GST_TYPE_AGGREGATOR_PAD, "name", name,
+            "direction", GST_PAD_SINK, "template", pad_template, nullptr)));
+  }
+  gst_pad_add_probe (GST_AGGREGATOR_SRC_PAD (self), GST_PAD_PROBE_TYPE_BUFFER,
+      push_tags, self, nullptr);
+}
+
+} // namespace
+
+GST_ELEMENT_REGISTER_DEFINE (codedexposure_pair, "codedexposure-pair",
+    GST_RANK_NONE,
+    (type_of<GstCodedExposurePair, set_up, set_up_instance> (
+        "GstCodedExposurePair", GST_TYPE_AGGREGATOR)))

@@ -33,15 +33,20 @@ struct Saturated {
   CODED_FIELDS (active, frame, frames, from, to, pixels);
 };
 
-/** Coded frames begin or cease to come without partners, from
+/** Coded frames begin or cease to go on without partners, from
  * codedexposure-pair. */
 struct PartnerLost {
   static constexpr const char *kName = "codedexposure/partner-lost";
-  bool active = false;           ///< it begins
+  bool active = false; ///< it begins
+  /** Of the first: "missing", "damaged", one of the two, or "other-exposure",
+   * by the pixels. */
+  std::string reason;
   std::optional<guint64> frames; ///< at the end: how many there were
   GstClockTime from = 0;
-  std::optional<GstClockTime> to; ///< at the end
-  CODED_FIELDS (active, frames, from, to);
+  /** At the end: of the first that has a partner again; at the end of the
+   * stream, of the last without. */
+  std::optional<GstClockTime> to;
+  CODED_FIELDS (active, reason, frames, from, to);
 };
 
 /** Coded frames give way to frames of a pattern, which are not decoded. */

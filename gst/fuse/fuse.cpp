@@ -184,7 +184,6 @@ Fuse::learn (CodedFrame frame)
   return GST_FLOW_OK;
 }
 
-/* Returns the number of saturated pixels. */
 bool
 Fuse::map_partner (GstBuffer *coded, BufferPtr &buffer, MappedFrame &mapped)
 {
@@ -205,6 +204,7 @@ Fuse::map_partner (GstBuffer *coded, BufferPtr &buffer, MappedFrame &mapped)
   return bool (mapped);
 }
 
+/* Returns the number of saturated pixels. */
 template <typename Pixel>
 Result<guint64>
 Fuse::take_pixels (MappedFrame &coded, MappedFrame &partner)

@@ -19,6 +19,15 @@
  * came. So does one that is corrupted or shows a pattern, or whose partner is
  * or does. A frame of the second camera without a coded frame is dropped.
  *
+ * Time stamps can be wrong by a frame. The sum of both beams has the light of
+ * the whole exposure and shows no masks; that of different exposures shows them
+ * where the scene moves. A pair that is clearly worse than either frame would be
+ * with one of the three frames before of the other camera is therefore none: the
+ * coded frame passes alone. Eight of these in a row are a warning. Where nothing moves, a
+ * wrong pair is not noticed, and does no harm. This needs the schedule in a tag,
+ * as codedexposure-sim, dmdsync and recordings have it, and, where frames do
+ * not lie on the mirrors pixel by pixel, the mappings of both cameras.
+ *
  * In a live pipeline, a coded frame waits for its partner as long as the latency
  * of the slower camera and a quarter of a frame period allow, and then goes
  * alone.
@@ -31,10 +40,12 @@
  * frames gets the key `partner` with size and mapping of the second camera.
  *
  * The message `codedexposure/partner-lost` is posted when coded frames begin to
- * come alone (`active` TRUE, `from`) and when they have partners again (`frames`
- * how many came alone, `from`, `to`). #codedexposure-pair:frames-paired,
- * #codedexposure-pair:frames-alone and #codedexposure-pair:partners-dropped
- * count.
+ * go on alone (`active` TRUE, `reason`, `from`) and when they have partners again
+ * (`frames` how many were alone, `reason` of the first, `from`, `to`, at the end
+ * of the stream the last of them). The reason
+ * is `missing`, `damaged` or `other-exposure`. #codedexposure-pair:frames-paired,
+ * #codedexposure-pair:frames-alone, #codedexposure-pair:pairs-refused and
+ * #codedexposure-pair:partners-dropped count.
  *
  * ## Example pipeline
  * |[
@@ -63,6 +74,7 @@
 #include "common/meta.h"
 #include "common/partner.h"
 #include "common/tag.h"
+#include "pair/check.h"
 
 GST_DEBUG_CATEGORY_STATIC (codedexposure_pair_debug);
 #define GST_CAT_DEFAULT codedexposure_pair_debug
@@ -73,8 +85,36 @@ using namespace codedexposure::gst;
 namespace
 {
 
+/* Wrong pairs in a row that are no accident. */
+constexpr guint64 kOutOfStep = 8;
+
 struct Counters {
-  guint64 paired = 0, alone = 0, dropped = 0;
+  guint64 paired = 0, alone = 0, refused = 0, dropped = 0;
+};
+
+/* Why a coded frame goes on alone. */
+enum class Alone { no, missing, damaged, other_exposure };
+
+const char *
+name_of (Alone alone)
+{
+  switch (alone) {
+  case Alone::missing:
+    return "missing";
+  case Alone::damaged:
+    return "damaged";
+  default:
+    return "other-exposure";
+  }
+}
+
+/* Coded frames in a row that go on alone. */
+struct Run {
+  guint64 frames = 0;
+  guint64 refused = 0; ///< the last ones
+  GstClockTime from = GST_CLOCK_TIME_NONE; ///< PTS of the first
+  GstClockTime last = GST_CLOCK_TIME_NONE; ///< PTS of the last
+  Alone reason = Alone::no;                ///< of the first
 };
 
 struct PairState {
@@ -84,16 +124,20 @@ struct PairState {
   std::optional<StreamSetup> on_setup, off_setup;
   std::vector<EventPtr> tags; ///< of the coded frames, due
   bool setup_due = false;
-  guint64 run_alone = 0;                    ///< frames in a row
-  GstClockTime run_from = GST_CLOCK_TIME_NONE; ///< PTS of the first of them
+  bool check_due = false; ///< a stream is another
+  bool refused = false;   ///< a stream is of the wrong beam
+  PairCheck check;
+  Run run;
 
+  void set_due () { setup_due = check_due = true; }
   void reset ()
   {
     on_setup.reset ();
     off_setup.reset ();
     tags.clear ();
-    setup_due = false;
-    run_alone = 0;
+    setup_due = check_due = refused = false;
+    check = {};
+    run = {};
   }
 };
 
@@ -113,6 +157,12 @@ sink (gpointer self, const char *name)
   return GST_AGGREGATOR_PAD (pad_of (GST_ELEMENT (self), name).get ());
 }
 
+GstSegment
+segment_at (GstAggregatorPad *pad)
+{
+  return locked (pad, [pad] { return pad->segment; });
+}
+
 /* Of the exposure of @frame, as running time. */
 GstClockTime
 exposure_of (GstAggregatorPad *pad, GstBuffer *frame)
@@ -122,9 +172,7 @@ exposure_of (GstAggregatorPad *pad, GstBuffer *frame)
       meta && GST_CLOCK_TIME_IS_VALID (meta->exposure_start)
           ? meta->exposure_start
           : GST_BUFFER_PTS (frame);
-  const GstSegment segment =
-      locked (pad, [pad] { return pad->segment; });
-  return running_time (segment, start);
+  return running_time (segment_at (pad), start);
 }
 
 GstClockTime
@@ -174,25 +222,90 @@ find_partner (GstCodedExposurePair *self, GstBuffer *coded, bool late,
   return late || gst_aggregator_pad_is_eos (off) ? Found::kNone : Found::kWait;
 }
 
+std::optional<PairStream>
+stream_of (GstAggregatorPad *pad, const std::optional<StreamSetup> &setup)
+{
+  const CapsPtr caps (gst_pad_get_current_caps (GST_PAD (pad)));
+  PairStream stream{.info = {}, .setup = setup};
+  if (caps && gst_video_info_from_caps (&stream.info, caps.get ()))
+    return stream;
+  return {};
+}
+
+/* Whether the pixels speak against a pair. */
+bool
+refuses (GstCodedExposurePair *self, GstBuffer *coded, GstBuffer *partner)
+{
+  PairState &st = state (self);
+  if (std::exchange (st.check_due, false)) {
+    const auto on = stream_of (sink (self, "on"), st.on_setup);
+    const auto off = stream_of (sink (self, "off"), st.off_setup);
+    if (on && off)
+      st.check.configure (*on, *off);
+  }
+  return st.check.check (coded, partner) == PartnerWatch::Verdict::bad;
+}
+
+/* Why @coded goes on without @partner, or that it does not. */
+Alone
+judge (GstCodedExposurePair *self, GstBuffer *coded, GstBuffer *partner)
+{
+  if (!partner)
+    return Alone::missing;
+  if (!is_coded (coded) || !is_coded (partner))
+    return Alone::damaged;
+  return refuses (self, coded, partner) ? Alone::other_exposure : Alone::no;
+}
+
 void
-count (GstCodedExposurePair *self, GstBuffer *coded, bool paired)
+warn_if_out_of_step (GstCodedExposurePair *self, Alone alone)
+{
+  Run &run = state (self).run;
+  run.refused = alone == Alone::other_exposure ? run.refused + 1 : 0;
+  if (run.refused == kOutOfStep)
+    POST_WARNING (self, STREAM, FAILED,
+        "The frames of the second camera are of other exposures than the coded "
+        "frames whose times they have, as their pixels show; coded frames go on "
+        "alone. Trigger both cameras by one signal, and start both before it.");
+}
+
+void
+end_run (GstCodedExposurePair *self, GstClockTime to)
+{
+  const Run run = std::exchange (state (self).run, {});
+  if (run.frames == 0)
+    return;
+  post_message (self, PartnerLost{.active = false,
+                          .reason = name_of (run.reason),
+                          .frames = run.frames,
+                          .from = run.from,
+                          .to = to});
+}
+
+void
+count (GstCodedExposurePair *self, GstBuffer *coded, Alone alone)
 {
   PairState &st = state (self);
   locked (self, [&] {
-    (paired ? st.counters.paired : st.counters.alone)++;
+    Counters &counters = st.counters;
+    (alone == Alone::no ? counters.paired : counters.alone)++;
+    counters.refused += alone == Alone::other_exposure;
     return 0;
   });
   const GstClockTime pts = GST_BUFFER_PTS (coded);
-  if (!paired && st.run_alone++ == 0) {
-    st.run_from = pts;
-    post_message (self, PartnerLost{
-                            .active = true, .frames = {}, .from = pts, .to = {}});
-  } else if (paired && st.run_alone > 0) {
-    post_message (self, PartnerLost{.active = false,
-                            .frames = std::exchange (st.run_alone, 0),
-                            .from = st.run_from,
-                            .to = pts});
+  if (alone != Alone::no && st.run.frames++ == 0) {
+    st.run.from = pts;
+    st.run.reason = alone;
+    post_message (self, PartnerLost{.active = true,
+                            .reason = name_of (alone),
+                            .frames = {},
+                            .from = pts,
+                            .to = {}});
   }
+  st.run.last = pts;
+  warn_if_out_of_step (self, alone);
+  if (alone == Alone::no)
+    end_run (self, pts);
 }
 
 /* Before the frame that is next at the source pad, where caps and segment of the
@@ -206,12 +319,9 @@ push_tags (GstPad *pad, GstPadProbeInfo *, gpointer data)
     gst_pad_push_event (pad, event.release ());
   if (std::exchange (st.setup_due, false) && st.on_setup) {
     StreamSetup setup = *st.on_setup;
-    const CapsPtr caps (
-        gst_pad_get_current_caps (GST_PAD (sink (self, "off"))));
-    GstVideoInfo info;
-    if (caps && gst_video_info_from_caps (&info, caps.get ()))
-      setup.partner = PartnerSetup{{info.width, info.height},
-          st.off_setup ? st.off_setup->mapping : std::nullopt};
+    if (const auto off = stream_of (sink (self, "off"), st.off_setup))
+      setup.partner = PartnerSetup{{off->info.width, off->info.height},
+          off->setup ? off->setup->mapping : std::nullopt};
     gst_pad_push_event (pad, setup_to_event (setup));
   }
   return GST_PAD_PROBE_OK;
@@ -222,10 +332,15 @@ aggregate (GstAggregator *aggregator, gboolean late)
 {
   auto *self = as<GstCodedExposurePair> (aggregator);
   GstAggregatorPad *on = sink (self, "on"), *off = sink (self, "off");
+  if (state (self).refused)
+    return GST_FLOW_ERROR;
   const BufferPtr head (gst_aggregator_pad_peek_buffer (on));
-  if (!head)
-    return gst_aggregator_pad_is_eos (on) ? GST_FLOW_EOS
-                                          : GST_AGGREGATOR_FLOW_NEED_DATA;
+  if (!head && !gst_aggregator_pad_is_eos (on))
+    return GST_AGGREGATOR_FLOW_NEED_DATA;
+  if (!head) {
+    end_run (self, state (self).run.last);
+    return GST_FLOW_EOS;
+  }
   BufferPtr partner;
   const Found found = find_partner (self, head.get (), late, partner);
   if (found == Found::kWait)
@@ -233,14 +348,13 @@ aggregate (GstAggregator *aggregator, gboolean late)
   BufferPtr coded (gst_aggregator_pad_pop_buffer (on));
   if (!coded)
     return GST_AGGREGATOR_FLOW_NEED_DATA;
-  const bool pairs = partner && is_coded (coded.get ()) &&
-                     is_coded (partner.get ());
-  if (pairs) {
+  const Alone alone = judge (self, coded.get (), partner.get ());
+  if (alone == Alone::no) {
     coded.reset (gst_buffer_make_writable (coded.release ()));
     CapsPtr caps (gst_pad_get_current_caps (GST_PAD (off)));
     set_partner (coded.get (), {std::move (partner), std::move (caps)});
   }
-  count (self, coded.get (), pairs);
+  count (self, coded.get (), alone);
   auto *src = GST_AGGREGATOR_PAD (GST_AGGREGATOR_SRC_PAD (aggregator));
   locked (src, [&] {
     return src->segment.position = GST_BUFFER_PTS (coded.get ());
@@ -254,7 +368,7 @@ next_time (GstAggregator *aggregator)
 {
   GstAggregatorPad *on = sink (aggregator, "on");
   const BufferPtr head (gst_aggregator_pad_peek_buffer (on));
-  return head ? running_time (on->segment, GST_BUFFER_PTS (head.get ()))
+  return head ? running_time (segment_at (on), GST_BUFFER_PTS (head.get ()))
               : GST_CLOCK_TIME_NONE;
 }
 
@@ -275,7 +389,7 @@ follow (GstCodedExposurePair *self, bool on, GstEvent *event)
     (on ? st.on_setup : st.off_setup).reset ();
     break;
   case GST_EVENT_CAPS:
-    st.setup_due = true;
+    st.set_due ();
     if (on) {
       gst_pad_mark_reconfigure (GST_AGGREGATOR_SRC_PAD (self));
       GstVideoInfo info;
@@ -294,7 +408,7 @@ follow (GstCodedExposurePair *self, bool on, GstEvent *event)
   case GST_EVENT_TAG:
     if (const auto setup = setup_from_tags (tags_of (event)); setup && *setup) {
       (on ? st.on_setup : st.off_setup) = setup->value ();
-      st.setup_due = true;
+      st.set_due ();
     } else if (on) {
       st.tags.emplace_back (gst_event_ref (event));
     }
@@ -318,6 +432,7 @@ check_beam (GstCodedExposurePair *self, bool on, GstEvent *event)
       std::string ("The frames of pad ") + (on ? "on" : "off") +
           " are of the beam of the mirrors that are " + (on ? "off" : "on") +
           ". Link them to pad " + (on ? "off" : "on") + ".");
+  state (self).refused = true;
   return false;
 }
 
@@ -369,7 +484,8 @@ sink_query (GstAggregator *aggregator, GstAggregatorPad *pad, GstQuery *query)
 GstFlowReturn
 flush (GstAggregator *aggregator)
 {
-  state (aggregator).run_alone = 0;
+  state (aggregator).run = {};
+  state (aggregator).check.reset ();
   return GST_FLOW_OK;
 }
 
@@ -395,6 +511,10 @@ properties ()
               "Coded frames that got a partner", &Counters::paired),
       counter ("frames-alone", "Frames alone",
           "Coded frames that passed without a partner", &Counters::alone),
+      counter ("pairs-refused", "Pairs refused",
+          "Coded frames whose partner is of another exposure, by its pixels; "
+          "they passed alone",
+          &Counters::refused),
       counter ("partners-dropped", "Partners dropped",
           "Frames of the second camera that belong to no coded frame",
           &Counters::dropped)};

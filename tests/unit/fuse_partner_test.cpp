@@ -1,72 +1,18 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Fusion with a second camera in the beam of the mirrors that are off. */
-#include <cmath>
 #include <optional>
 
 #include <gtest/gtest.h>
 
-#include "bench/bench.h"
 #include "fuse/fuser.h"
+#include "two_beams.h"
 
 namespace
 {
 
 using namespace codedexposure;
-
-using Pictures = std::vector<Image<std::uint8_t>>;
-
-constexpr int kWidth = 64, kHeight = 48;
-constexpr const char *kPreset = "sequential:lattice:4/2";
-
-Schedule
-schedule_of (const std::string &preset)
-{
-  return Schedule::parse (preset).value ();
-}
-
-/* Edges and gratings that move by @speed px a slot. */
-Image<std::uint8_t>
-scene (double slot, double speed)
-{
-  Image<std::uint8_t> image (kWidth, kHeight);
-  for (int y = 0; y < kHeight; y++)
-    for (int x = 0; x < kWidth; x++) {
-      const double at = x - speed * slot;
-      const double waves = std::sin (0.8 * at + 0.5 * y) + std::cos (1.1 * y);
-      const bool bright =
-          (int (std::floor (at / 9.0)) + int (y / 7.0)) % 2 != 0;
-      image.at (x, y) = std::uint8_t (
-          std::lround (127.0 + 30.0 * waves + (bright ? 40.0 : -40.0)));
-    }
-  return image;
-}
-
-Pictures
-truth (int frames, int slots, double speed)
-{
-  Pictures all;
-  for (int s = 0; s < frames * slots; s++)
-    all.push_back (scene (s, speed));
-  return all;
-}
-
-/* What a camera sees of @slots through the masks of @schedule. */
-Pictures
-coded (const Schedule &schedule, const Pictures &slots,
-    const BenchOptions &options = {})
-{
-  auto bench = OpticalBench::make (kWidth, kHeight, options).value ();
-  Pictures frames;
-  const auto n = std::size_t (schedule.slots ());
-  for (std::size_t at = 0; at < slots.size (); at += n) {
-    bench.begin (schedule);
-    for (std::size_t s = 0; s < n; s++)
-      bench.expose (slots[at + s].view (), int (s), 1.0);
-    auto &frame = frames.emplace_back (kWidth, kHeight);
-    bench.read_out (frames.size () - 1, frame.view ());
-  }
-  return frames;
-}
+using namespace codedexposure::test;
+using namespace codedexposure::test::two_beams;
 
 /* @partners: none, or one for each frame; an empty one is lost. */
 Pictures

@@ -1,0 +1,37 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Whether the pixels of two buffers are of one exposure. */
+#pragma once
+
+#include <optional>
+
+#include <gst/video/video.h>
+
+#include "setup/stream_setup.h"
+#include "sync/partner_watch.h"
+
+namespace codedexposure::gst
+{
+
+/** One camera: what its stream says. */
+struct PairStream {
+  GstVideoInfo info;
+  std::optional<StreamSetup> setup = {};
+};
+
+class PairCheck
+{
+public:
+  /** With streams whose frames cannot be compared, since no tag says how they
+   * lie on the mirrors, no verdict will be known. */
+  void configure (const PairStream &on, const PairStream &off);
+  /** The next pair has none before it. */
+  void reset ();
+  /** Buffers that cannot be read are not known. */
+  PartnerWatch::Verdict check (GstBuffer *coded, GstBuffer *partner);
+
+private:
+  std::optional<PartnerWatch> watch_;
+  GstVideoInfo on_ = {}, off_ = {};
+};
+
+} // namespace codedexposure::gst

@@ -1,0 +1,242 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "sync/partner_watch.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+namespace codedexposure
+{
+
+namespace
+{
+
+constexpr float kNone = std::numeric_limits<float>::quiet_NaN ();
+/* Mirrors that are compared, spread over the frame. */
+constexpr int kMaxMirrors = 65536;
+/* Standard deviations; and blocks that differ, for these to mean something. */
+constexpr double kClear = 5.0;
+constexpr int kMinBlocks = 16;
+/* Of unevenness, as an amplitude. Light between pixels is uneven by some percent
+ * more or less, as the scene moves. */
+constexpr double kMuchMore = 1.08;
+/* Pairs before. */
+constexpr std::size_t kBefore = 3;
+/* Pixels from a mirror to the next pixel. Farther away, little is left of the
+ * masks. */
+constexpr double kMaxBeside = 0.25;
+
+double
+dot (const float *a, const float *b, std::size_t count)
+{
+  double sum = 0.0;
+  for (std::size_t i = 0; i < count; i++)
+    sum += double (a[i]) * b[i];
+  return sum;
+}
+
+void
+subtract (float *from, const float *what, double factor, std::size_t count)
+{
+  for (std::size_t i = 0; i < count; i++)
+    from[i] -= float (factor * what[i]);
+}
+
+/* An orthonormal basis of the polynomials of second order in a block, one after
+ * the other. */
+std::vector<float>
+smooth_in (Extent block)
+{
+  const std::size_t size = std::size_t (block.width) * block.height;
+  std::vector<float> basis;
+  for (int order = 0; order <= 2; order++)
+    for (int of_x = 0; of_x <= order; of_x++) {
+      std::vector<float> next;
+      for (int y = 0; y < block.height; y++)
+        for (int x = 0; x < block.width; x++)
+          next.push_back (
+              float (std::pow (2.0 * x / block.width - 1.0, of_x) *
+                     std::pow (2.0 * y / block.height - 1.0, order - of_x)));
+      const double length = std::sqrt (dot (next.data (), next.data (), size));
+      for (std::size_t at = 0; at < basis.size (); at += size)
+        subtract (next.data (), &basis[at],
+            dot (next.data (), &basis[at], size), size);
+      const double rest = std::sqrt (dot (next.data (), next.data (), size));
+      if (rest < 1e-3 * length)
+        continue;
+      for (const float value : next)
+        basis.push_back (float (value / rest));
+    }
+  return basis;
+}
+
+/* Of the sum of both beams in one block. */
+double
+unevenness (
+    const float *on, const float *off, std::size_t mirrors, double gain)
+{
+  double sum = 0.0;
+  for (std::size_t i = 0; i < mirrors; i++) {
+    const double both = on[i] + gain * off[i];
+    sum += both * both;
+  }
+  return sum;
+}
+
+template <typename Use>
+void
+for_each_mirror (Extent block, int left, int top, Use use)
+{
+  for (int y = top; y < top + block.height; y++)
+    for (int x = left; x < left + block.width; x++)
+      use (x, y);
+}
+
+Position
+place_in (const PartnerWatch::Camera &camera, int x, int y)
+{
+  const Position mirror{double (x), double (y)};
+  return camera.mapping ? camera.mapping->camera_at (mirror) : mirror;
+}
+
+/* Whether pixels of @camera lie on the mirrors of a block. */
+bool
+sees (const PartnerWatch::Camera &camera, Extent block, int left, int top)
+{
+  bool all = true;
+  for_each_mirror (block, left, top, [&] (int x, int y) {
+    const Position at = place_in (camera, x, y);
+    all = all && at.x >= 0.0 && at.x <= camera.size.width - 1.0 &&
+          at.y >= 0.0 && at.y <= camera.size.height - 1.0 &&
+          std::abs (at.x - std::round (at.x)) <= kMaxBeside &&
+          std::abs (at.y - std::round (at.y)) <= kMaxBeside;
+  });
+  return all;
+}
+
+template <typename Pixel>
+double
+bilinear (ImageView<const Pixel> frame, Position at)
+{
+  const int x = int (at.x), y = int (at.y);
+  const int right = std::min (x + 1, frame.width - 1);
+  const int below = std::min (y + 1, frame.height - 1);
+  const double dx = at.x - x, dy = at.y - y;
+  return (frame.at (x, y) * (1.0 - dx) + frame.at (right, y) * dx) *
+             (1.0 - dy) +
+         (frame.at (x, below) * (1.0 - dx) + frame.at (right, below) * dx) * dy;
+}
+
+} // namespace
+
+PartnerWatch::PartnerWatch (
+    const Schedule &schedule, const Camera &on, const Camera &off)
+    : on_{.black = on.black, .white = on.white},
+      off_{.black = off.black, .white = off.white}
+{
+  const Extent mirrors = on.mapping ? on.mapping->mirrors () : on.size;
+  /* More than a tile, and little of the scene. */
+  const int side = std::max (
+      4, int (std::ceil (1.5 * std::sqrt (double (schedule.slots ())))));
+  const Extent block{side, side};
+  size_ = std::size_t (block.width) * std::size_t (block.height);
+  smooth_ = smooth_in (block);
+  std::vector<Position> blocks;
+  const int bottom = mirrors.height - schedule.pilot_rows () - block.height;
+  for (int y = 0; y <= bottom; y += block.height)
+    for (int x = 0; x <= mirrors.width - block.width; x += block.width)
+      if (sees (on, block, x, y) && sees (off, block, x, y))
+        blocks.push_back ({double (x), double (y)});
+  const std::size_t step = blocks.size () * size_ / kMaxMirrors + 1;
+  double light_on = 0.0, light_all = 0.0;
+  for (std::size_t i = 0; i < blocks.size (); i += step)
+    for_each_mirror (block, int (blocks[i].x), int (blocks[i].y),
+        [&] (int x, int y) {
+          on_.places.push_back (place_in (on, x, y));
+          off_.places.push_back (place_in (off, x, y));
+          for (int slot = 0; slot < schedule.slots (); slot++)
+            light_on += schedule.on (x, y, slot) ? 1.0 : schedule.leak ();
+          light_all += schedule.slots () * (1.0 + schedule.leak ());
+        });
+  expected_ratio_ = light_on / (light_all - light_on);
+}
+
+template <typename Pixel>
+PartnerWatch::Light
+PartnerWatch::read (const View &view, ImageView<const Pixel> frame) const
+{
+  Light light;
+  light.levels.reserve (view.places.size ());
+  for (const Position place : view.places) {
+    const double level = bilinear (frame, place);
+    light.levels.push_back (level < view.white ? float (level) : kNone);
+    light.sum += level - view.black;
+  }
+  for (std::size_t i = 0; i < light.levels.size (); i += size_)
+    for (std::size_t at = 0; at < smooth_.size (); at += size_)
+      subtract (&light.levels[i], &smooth_[at],
+          dot (&light.levels[i], &smooth_[at], size_), size_);
+  return light;
+}
+
+/* By how many standard deviations @now is less even than @on and @off; none
+ * where nothing differs. */
+double
+PartnerWatch::excess (
+    const Pair &now, const Light &on, const Light &off) const
+{
+  if (!(now.on.sum > 0.0 && now.off.sum > 0.0))
+    return 0.0;
+  const double gain = now.on.sum / now.off.sum / expected_ratio_;
+  double sum = 0.0, squares = 0.0, own_sum = 0.0, other_sum = 0.0;
+  int blocks = 0;
+  for (std::size_t i = 0; i < now.on.levels.size (); i += size_) {
+    const double own =
+        unevenness (&now.on.levels[i], &now.off.levels[i], size_, gain);
+    const double other =
+        unevenness (&on.levels[i], &off.levels[i], size_, gain);
+    if (std::isnan (own + other) || own == other)
+      continue;
+    /* About as uncertain in blocks of little texture as in others. */
+    const double more = (own - other) / std::sqrt (own + other);
+    sum += more;
+    squares += more * more;
+    own_sum += std::sqrt (own);
+    other_sum += std::sqrt (other);
+    blocks++;
+  }
+  if (blocks < kMinBlocks || (sum > 0.0 && own_sum < other_sum * kMuchMore))
+    return 0.0;
+  return sum / std::sqrt (squares);
+}
+
+template <typename Pixel, typename OtherPixel>
+PartnerWatch::Verdict
+PartnerWatch::take (ImageView<const Pixel> on, ImageView<const OtherPixel> off)
+{
+  Pair now{read (on_, on), read (off_, off)};
+  double worst = -std::numeric_limits<double>::infinity ();
+  for (const Pair &before : before_) {
+    worst = std::max (worst, excess (now, now.on, before.off));
+    worst = std::max (worst, excess (now, before.on, now.off));
+  }
+  const bool compared = !before_.empty ();
+  before_.push_back (std::move (now));
+  if (before_.size () > kBefore)
+    before_.pop_front ();
+  if (compared && worst > kClear)
+    return Verdict::bad;
+  return compared && worst < -kClear ? Verdict::good : Verdict::unknown;
+}
+
+template PartnerWatch::Verdict PartnerWatch::take (
+    ImageView<const std::uint8_t>, ImageView<const std::uint8_t>);
+template PartnerWatch::Verdict PartnerWatch::take (
+    ImageView<const std::uint16_t>, ImageView<const std::uint16_t>);
+template PartnerWatch::Verdict PartnerWatch::take (
+    ImageView<const std::uint8_t>, ImageView<const std::uint16_t>);
+template PartnerWatch::Verdict PartnerWatch::take (
+    ImageView<const std::uint16_t>, ImageView<const std::uint8_t>);
+
+} // namespace codedexposure

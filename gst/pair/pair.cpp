@@ -44,6 +44,7 @@
  * (`frames` how many were alone, `reason` of the first, `from`, `to`, at the end
  * of the stream the last of them). The reason
  * is `missing`, `damaged` or `other-exposure`. #codedexposure-pair:frames-paired,
+ * #codedexposure-pair:pairs-confirmed,
  * #codedexposure-pair:frames-alone, #codedexposure-pair:pairs-refused and
  * #codedexposure-pair:partners-dropped count.
  *
@@ -89,11 +90,17 @@ namespace
 constexpr guint64 kOutOfStep = 8;
 
 struct Counters {
-  guint64 paired = 0, alone = 0, refused = 0, dropped = 0;
+  guint64 paired = 0, confirmed = 0, alone = 0, refused = 0, dropped = 0;
 };
 
-/* Why a coded frame goes on alone. */
-enum class Alone { no, missing, damaged, other_exposure };
+/* Why a coded frame goes on alone, or how sure it is that it does not. */
+enum class Alone { no, surely_not, missing, damaged, other_exposure };
+
+bool
+is_alone (Alone alone)
+{
+  return alone > Alone::surely_not;
+}
 
 const char *
 name_of (Alone alone)
@@ -232,9 +239,9 @@ stream_of (GstAggregatorPad *pad, const std::optional<StreamSetup> &setup)
   return {};
 }
 
-/* Whether the pixels speak against a pair. */
-bool
-refuses (GstCodedExposurePair *self, GstBuffer *coded, GstBuffer *partner)
+/* What the pixels say of a pair. */
+Alone
+compare (GstCodedExposurePair *self, GstBuffer *coded, GstBuffer *partner)
 {
   PairState &st = state (self);
   if (std::exchange (st.check_due, false)) {
@@ -243,10 +250,17 @@ refuses (GstCodedExposurePair *self, GstBuffer *coded, GstBuffer *partner)
     if (on && off)
       st.check.configure (*on, *off);
   }
-  return st.check.check (coded, partner) == PartnerWatch::Verdict::bad;
+  switch (st.check.check (coded, partner)) {
+  case PartnerWatch::Verdict::good:
+    return Alone::surely_not;
+  case PartnerWatch::Verdict::bad:
+    return Alone::other_exposure;
+  default:
+    return Alone::no;
+  }
 }
 
-/* Why @coded goes on without @partner, or that it does not. */
+/* Why @coded goes on without @partner. */
 Alone
 judge (GstCodedExposurePair *self, GstBuffer *coded, GstBuffer *partner)
 {
@@ -254,7 +268,7 @@ judge (GstCodedExposurePair *self, GstBuffer *coded, GstBuffer *partner)
     return Alone::missing;
   if (!is_coded (coded) || !is_coded (partner))
     return Alone::damaged;
-  return refuses (self, coded, partner) ? Alone::other_exposure : Alone::no;
+  return compare (self, coded, partner);
 }
 
 void
@@ -288,12 +302,13 @@ count (GstCodedExposurePair *self, GstBuffer *coded, Alone alone)
   PairState &st = state (self);
   locked (self, [&] {
     Counters &counters = st.counters;
-    (alone == Alone::no ? counters.paired : counters.alone)++;
+    (is_alone (alone) ? counters.alone : counters.paired)++;
+    counters.confirmed += alone == Alone::surely_not;
     counters.refused += alone == Alone::other_exposure;
     return 0;
   });
   const GstClockTime pts = GST_BUFFER_PTS (coded);
-  if (alone != Alone::no && st.run.frames++ == 0) {
+  if (is_alone (alone) && st.run.frames++ == 0) {
     st.run.from = pts;
     st.run.reason = alone;
     post_message (self, PartnerLost{.active = true,
@@ -304,7 +319,7 @@ count (GstCodedExposurePair *self, GstBuffer *coded, Alone alone)
   }
   st.run.last = pts;
   warn_if_out_of_step (self, alone);
-  if (alone == Alone::no)
+  if (!is_alone (alone))
     end_run (self, pts);
 }
 
@@ -349,7 +364,7 @@ aggregate (GstAggregator *aggregator, gboolean late)
   if (!coded)
     return GST_AGGREGATOR_FLOW_NEED_DATA;
   const Alone alone = judge (self, coded.get (), partner.get ());
-  if (alone == Alone::no) {
+  if (!is_alone (alone)) {
     coded.reset (gst_buffer_make_writable (coded.release ()));
     CapsPtr caps (gst_pad_get_current_caps (GST_PAD (off)));
     set_partner (coded.get (), {std::move (partner), std::move (caps)});
@@ -509,6 +524,10 @@ properties ()
   };
   return {counter ("frames-paired", "Frames paired",
               "Coded frames that got a partner", &Counters::paired),
+      counter ("pairs-confirmed", "Pairs confirmed",
+          "Of these, pairs whose pixels show that they are of one exposure; of "
+          "the others it is not known, as nothing moved or could be compared",
+          &Counters::confirmed),
       counter ("frames-alone", "Frames alone",
           "Coded frames that passed without a partner", &Counters::alone),
       counter ("pairs-refused", "Pairs refused",

@@ -121,7 +121,7 @@ MaskRenderer::render (std::span<const int> masks) const
       if (map_.on (e, mask % slots))
         mirrors[std::size_t (e)] |= bit;
     for (int column = 0; mask >= 0 && column < kPilotColumns; column++)
-      if (pilot_on (column, mask, slots))
+      if (pilot_on (column, mask, slots) != schedule ().pilot_inverted ())
         mirrors[std::size_t (elements + column)] |= bit;
   }
 

@@ -240,7 +240,9 @@ Schedule::complement () const
   for (Region &region : parts.regions) {
     ASSIGN_OR_RETURN (region.code, region.code.complement ());
   }
-  return make (std::move (parts));
+  ASSIGN_OR_RETURN (Schedule other, make (std::move (parts)));
+  other.pilot_inverted_ = !pilot_inverted_;
+  return other;
 }
 
 Result<void>

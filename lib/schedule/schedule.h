@@ -124,6 +124,9 @@ public:
   Offset phase () const { return parts_.phase; }
   double leak () const { return parts_.leak; }
   int pilot_rows () const { return parts_.pilot_rows; }
+  /** Whether mirrors of the pilot are on where pilot_on () says off: in a
+   * complement (). */
+  bool pilot_inverted () const { return pilot_inverted_; }
   const std::vector<Region> &regions () const { return parts_.regions; }
 
   /** Region @p i as a schedule of its own, of the pixels of its rectangle. It
@@ -138,7 +141,8 @@ public:
   /** The same with another leak. */
   Result<Schedule> with_leak (double leak) const;
   /** What the beam of the mirrors that are off has of this schedule: all codes
-   * complemented. Error where an element is on in every slot. */
+   * and the pilot complemented. It has no text form of its own. Error where an
+   * element is on in every slot. */
   Result<Schedule> complement () const;
   /** Error where a region does not lie within @p width x @p height pixels,
    * above the pilot. */
@@ -200,7 +204,8 @@ public:
 
   bool operator== (const Schedule &other) const
   {
-    return parts_ == other.parts_ && white_slots_ == other.white_slots_;
+    return parts_ == other.parts_ && white_slots_ == other.white_slots_ &&
+           pilot_inverted_ == other.pilot_inverted_;
   }
 
 private:
@@ -214,6 +219,7 @@ private:
   /* These follow from parts_, but for the white of a part. */
   int slots_;
   double white_slots_;
+  bool pilot_inverted_ = false;
   std::vector<Schedule> in_region_;
 };
 

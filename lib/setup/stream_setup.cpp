@@ -28,14 +28,22 @@ pair_into (std::optional<T> &to, int T::*first, int T::*second, int highest,
   };
 }
 
+JsonReader
+frame_size_into (std::optional<Extent> &to)
+{
+  return pair_into (to, &Extent::width, &Extent::height, Mapping::kMaxSize,
+      "two whole numbers, width and height");
+}
+
 PartnerSetup
 read_partner (const Json &root)
 {
-  PartnerSetup partner;
+  std::optional<Extent> size;
+  std::optional<Mapping> mapping;
   read_keys (root, "", "a partner has a size",
-      {{"size", size_into (partner.size, Mapping::kMaxSize), true},
-          {"mapping", inner_into (partner.mapping, read_mapping)}});
-  return partner;
+      {{"size", frame_size_into (size), true},
+          {"mapping", inner_into (mapping, read_mapping)}});
+  return {*size, std::move (mapping)};
 }
 
 JsonReader
@@ -57,9 +65,7 @@ read_setup (const Json &root)
   setup.schedule = read_schedule (root,
       {{"mapping", inner_into (setup.mapping, read_mapping)},
           {"bench", inner_into (setup.bench, read_bench_profile)},
-          {"size",
-              pair_into (setup.size, &Extent::width, &Extent::height,
-                  Mapping::kMaxSize, "two whole numbers, width and height")},
+          {"size", frame_size_into (setup.size)},
           {"rate",
               pair_into (setup.rate, &FrameRate::num, &FrameRate::den, kMaxRate,
                   "two whole numbers, frames in so many seconds")},

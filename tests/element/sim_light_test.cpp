@@ -132,6 +132,28 @@ TEST (SimLight, ShutMirrorsLeak)
       elements_of (sim, {130, 0, 0, 26}), (std::vector<int>{102, 12, 12, 30}));
 }
 
+TEST (SimLight, TheOtherBeamHasTheRestOfTheLight)
+{
+  SimHarness sim ("schedule=sequential:2x2 beam=off");
+  sim.start (2, 2);
+  /* The mean of the three slots in which the mirror is off. */
+  EXPECT_EQ (elements_of (sim, {30, 90, 210, 0}),
+      (std::vector<int>{100, 80, 40, 110}));
+}
+
+TEST (SimLight, MirrorsAreOffBetweenTheMasks)
+{
+  SimHarness sim (
+      "schedule=sequential:2x2,active=4ms,switching=6ms beam=off gain=0.5");
+  gst_harness_set_sink_caps_str (sim.get (), gray_caps (2, 2).c_str ());
+  sim.start (2, 2, 200, 1);
+  /* Slots have 4 ms of the first of two frames of 5 ms; all mirrors are off for
+   * a quarter of a slot in it and for 5/4 of a slot in the other, which makes
+   * 118. A half of a fourth of (64 + 0 + 96 + 118), ... */
+  EXPECT_EQ (elements_of (sim, {32, 8, 64, 16, 0, 0, 96, 32}),
+      (std::vector<int>{35, 31, 39, 27}));
+}
+
 TEST (SimLight, WhiteStaysWhite)
 {
   for (const char *schedule : {"sequential:2x2,leak=0.1", "sequential:2x2",

@@ -283,3 +283,17 @@ TEST (Code, WrongRowsAreNamed)
   expect_words (Code::named ("sequential", 1), {"1 elements", "2 to 256"});
   expect_words (Code::named ("sequential", 257), {"257", "2 to 256"});
 }
+
+TEST (Code, ComplementIsOnWhereTheCodeIsOff)
+{
+  const Code code = *Code::named ("s-matrix", 7);
+  const Code other = *code.complement ();
+  for (int e = 0; e < 7; e++)
+    for (int s = 0; s < 7; s++)
+      EXPECT_NE (code.on (e, s), other.on (e, s));
+  EXPECT_EQ (other.max_on_slots (), 3);
+  EXPECT_EQ (other.complement ()->rows (), code.rows ());
+  EXPECT_EQ (Code::named ("staircase", 4)->complement ().error ().message,
+      "element 3 of code 'staircase' is on in every slot, so that the beam of "
+      "the mirrors that are off never has its light; use sequential");
+}

@@ -398,6 +398,35 @@ TEST (StreamSetup, SaysWhetherTheFramesAreSimulated)
   EXPECT_EQ (*read, setup);
 }
 
+TEST (StreamSetup, SaysInWhichBeamTheCameraIs)
+{
+  StreamSetup setup;
+  EXPECT_EQ (setup.to_json ().find ("beam"), std::string::npos);
+  setup.off_beam = true;
+  const std::string json = setup.to_json ();
+  EXPECT_NE (json.find (R"(,"beam":"off"})"), std::string::npos) << json;
+  EXPECT_EQ (*StreamSetup::from_json (json), setup);
+  std::string wrong = json;
+  wrong.replace (wrong.find (R"("off")"), 5, R"("on")");
+  EXPECT_FALSE (StreamSetup::from_json (wrong));
+}
+
+TEST (StreamSetup, SaysHowTheSecondCameraStands)
+{
+  StreamSetup setup;
+  setup.partner = PartnerSetup{{640, 480}};
+  const std::string json = setup.to_json ();
+  EXPECT_NE (
+      json.find (R"(,"partner":{"size":[640,480]}})"), std::string::npos)
+      << json;
+  EXPECT_EQ (*StreamSetup::from_json (json), setup);
+  setup.partner->mapping = made (all_parts ());
+  EXPECT_EQ (*StreamSetup::from_json (setup.to_json ()), setup);
+  std::string wrong = json;
+  wrong.replace (wrong.find ("640"), 3, "0");
+  EXPECT_FALSE (StreamSetup::from_json (wrong));
+}
+
 TEST (StreamSetup, NamesWhatIsWrongInside)
 {
   std::string json = Schedule ().to_json ();

@@ -188,6 +188,25 @@ TEST (Mask, SumOverSlotsIsTheExposureOfTheElement)
   }
 }
 
+TEST (Mask, OfTheOtherBeamIsItsComplement)
+{
+  const Schedule schedule = *Schedule::from_preset (
+      "sequential:2x2,pilot=4,leak=0.1,"
+      "region=8x8+4+4:sequential:lattice:8/3");
+  const Schedule other = *schedule.complement ();
+  EXPECT_EQ (other.slots (), schedule.slots ());
+  const Extent size{40, 24};
+  const MaskRenderer masks (schedule, size), others (other, size);
+  for (int mask = 0; mask < schedule.masks (); mask++) {
+    const auto shown = masks.render (mask).image ();
+    const auto complement = others.render (mask).image ();
+    for (int y = 0; y < size.height; y++)
+      for (int x = 0; x < size.width; x++)
+        ASSERT_EQ (shown.at (x, y) + complement.at (x, y), 1)
+            << "mask " << mask << " at " << x << ", " << y;
+  }
+}
+
 TEST (Pilot, ColumnsOfTheTwoByTwoSchedule)
 {
   const Schedule schedule = preset ("sequential:2x2,pilot=1");

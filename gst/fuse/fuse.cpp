@@ -68,7 +68,7 @@
  *
  * Coded frames that codedexposure-pair gave partners, frames of a second camera
  * in the beam of the mirrors that are off, are fused with them: light that one
- * camera misses is not lost, and pictures are 2 to 4 dB more accurate. Neither
+ * camera misses is not lost, and pictures are 1 to 3 dB more accurate. Neither
  * gain nor black level of the second camera need be known. It must see the
  * mirrors as the first one does, or its mapping must be in its stream tag. A
  * frame without a partner gives what one camera gives. The network of

@@ -73,16 +73,10 @@ partner_tables (const std::vector<Scene> &scenes, const Progress &progress)
     Table &table = tables.emplace_back (Table{"partner-" + name,
         "PSNR (dB) of the first 8 frames with one camera and with two, " + name,
         {{"slots"}, {"quality"}}, {}});
-    for (const char *mean_or_scene : {"", "mean "})
-      for (const Scene &scene : scenes) {
-        const std::string of =
-            *mean_or_scene ? std::string (mean_or_scene) : scene.name + " ";
-        table.columns.push_back ({of + "one", 2});
-        table.columns.push_back ({of + "both", 2});
-        table.columns.push_back ({of + "gain", 2});
-        if (*mean_or_scene)
-          break;
-      }
+    for (const Scene &scene : scenes)
+      table.columns.push_back ({"gain, " + scene.name, 2});
+    for (const char *mean : {"mean of one", "of both", "gain"})
+      table.columns.push_back ({mean, 2});
     for (const int n : {4, 8})
       for (const FuseQuality quality : {FuseQuality::kFast,
                FuseQuality::kBalanced, FuseQuality::kBest}) {
@@ -90,19 +84,15 @@ partner_tables (const std::vector<Scene> &scenes, const Progress &progress)
         auto &row = table.rows.emplace_back (std::vector<Cell>{
             std::to_string (n), std::string (quality_name (quality))});
         BeamGain mean;
-        const auto add = [&] (const BeamGain &gain) {
-          row.emplace_back (gain.one);
-          row.emplace_back (gain.two);
-          row.emplace_back (gain.two - gain.one);
-        };
         for (const Scene &scene : scenes) {
           const BeamGain gain = beam_gain (
               scene, n, quality, condition, condition.of_partner ());
-          add (gain);
+          row.emplace_back (gain.two - gain.one);
           mean.one += gain.one / double (scenes.size ());
           mean.two += gain.two / double (scenes.size ());
         }
-        add (mean);
+        for (const double mean_of : {mean.one, mean.two, mean.two - mean.one})
+          row.emplace_back (mean_of);
       }
   }
   return tables;

@@ -147,6 +147,8 @@ Exit
 Receive::run ()
 {
   check ();
+  if (!run_.print)
+    address_.check ();
   start_gstreamer ();
   Job job ("receive", run_);
   job.ends_by_signal = true;

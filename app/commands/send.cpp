@@ -84,6 +84,8 @@ Send::add_server (Job &job, Chain &frames) const
 Exit
 Send::run ()
 {
+  if (!run_.print)
+    address_.check ();
   start_gstreamer ();
   Job job ("send", run_);
   job.ends_by_signal = true;

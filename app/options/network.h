@@ -21,6 +21,8 @@ public:
 
   std::string host () const { return host_.value_or ("127.0.0.1"); }
   int port () const { return port_.value_or (5000); }
+  /** Throws Failure if no such machine is known. */
+  void check () const;
 
 private:
   std::optional<Text> host_;

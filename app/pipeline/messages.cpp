@@ -260,6 +260,9 @@ remedy_for (std::string_view kind, const Told &told)
   if (g_error_matches (
           error, GST_RESOURCE_ERROR, GST_RESOURCE_ERROR_NO_SPACE_LEFT))
     return "the disk is full; delete files, or write to another disk";
+  if (kind == "tcpserversink" && error->domain == GST_RESOURCE_ERROR)
+    return "--host must be an address of this machine (0.0.0.0: all), and "
+           "--port one that no other program listens on";
   if (of_camera &&
       g_error_matches (error, GST_RESOURCE_ERROR, GST_RESOURCE_ERROR_NOT_FOUND))
     return cameras_found ();

@@ -191,13 +191,31 @@ simulation (Job &job, const SourceOptions &options, const SourcePlan &plan,
 }
 
 Chain
+user_source (Job &job, const std::string &description)
+{
+  GstElement *bin = job.graph.add_text (description);
+  const ObjectPtr<GstPad> pad (gst_element_get_static_pad (bin, "src"));
+  const CapsPtr gives (pad ? gst_pad_query_caps (pad.get (), nullptr) : nullptr);
+  const CapsPtr coded (
+      gst_caps_from_string ("video/x-raw,format={GRAY8,GRAY16_LE}"));
+  if (gives && !gst_caps_can_intersect (gives.get (), coded.get ()))
+    fail ("the frames of --source are " +
+              std::string (CharPtr (gst_caps_to_string (gives.get ())).get ()) +
+              "; coded frames are GRAY8 or GRAY16_LE: end it with \"! "
+              "videoconvert ! capsfilter caps=video/x-raw,format=GRAY8\", if "
+              "no pixel is scaled or moved before",
+        Exit::usage);
+  return job.graph.from (bin);
+}
+
+Chain
 coded_source (
     Job &job, const SourceOptions &options, const SourcePlan &plan, Pace pace)
 {
   Chain chain =
       options.camera ? camera_source (job, options, plan)
       : options.source
-          ? job.graph.from (job.graph.add_text (*options.source))
+          ? user_source (job, *options.source)
           : simulation (job, options, plan, pace, {{"dmd", "sim:bench"}});
   if (options.camera) {
     watch_exposure (chain.last (), plan);

@@ -69,7 +69,8 @@ make_timebase (GstCaps *caps, const SyncState &st)
                  " cannot hold the pilot of " + st.schedule.text () +
                  ", which is " + std::to_string (kPilotColumns) +
                  " pixels wide and " +
-                 std::to_string (st.schedule.pilot_rows ()) + " rows high"};
+                 std::to_string (st.schedule.pilot_rows ()) +
+                 " rows high; use larger frames, or a schedule without pilot"};
   return time;
 }
 

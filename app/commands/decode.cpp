@@ -1,8 +1,11 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure decode: a recording to subframes, or to full-size frames. */
+#include <atomic>
 #include <cmath>
+#include <memory>
 
 #include "command.h"
+#include "common/meta.h"
 #include "options/picture.h"
 #include "pipeline/decoder.h"
 #include "pipeline/messages.h"
@@ -31,6 +34,7 @@ private:
   void check () const;
   PlayTimes times () const;
   VideoStyle style () const;
+  void count_flags (GstElement *queue, const std::string &output) const;
   void build (Job &job) const;
   void build_search (Job &job) const;
   RunResult play_once (bool salvage, bool &found) const;
@@ -43,6 +47,9 @@ private:
   std::optional<double> start_, duration_;
   std::optional<int> region_, white_, threads_, jobs_;
   bool deflate_ = false, view_ = false, find_phase_ = false;
+  /* Pictures whose flags are lost with their form. */
+  std::shared_ptr<std::atomic<guint64>> unflagged_ =
+      std::make_shared<std::atomic<guint64>> (0);
 };
 
 CommandText
@@ -208,9 +215,28 @@ Decode::style () const
   return style;
 }
 
+/* Of pictures that go to .mp4, which has no place for flags. */
+void
+Decode::count_flags (GstElement *queue, const std::string &output) const
+{
+  if (form_of (output) != VideoForm::mp4 || statistics_)
+    return;
+  gst_pad_add_probe (
+      pad_of (queue, "src").get (), GST_PAD_PROBE_TYPE_BUFFER,
+      [] (GstPad *, GstPadProbeInfo *info, gpointer count) {
+        GstBuffer *picture = GST_PAD_PROBE_INFO_BUFFER (info);
+        const auto meta = gst::get_frame_meta (picture);
+        if (gst::is_corrupted (picture) || (meta && meta->locked == false))
+          static_cast<std::atomic<guint64> *> (count)->fetch_add (1);
+        return GST_PAD_PROBE_OK;
+      },
+      unflagged_.get (), nullptr);
+}
+
 void
 Decode::build (Job &job) const
 {
+  *unflagged_ = 0;
   Chain frames = read_recording (job, recording_);
   if (threads_)
     g_object_set (job.reader, "threads", guint (*threads_), nullptr);
@@ -222,6 +248,7 @@ Decode::build (Job &job) const
   if (output_) {
     Chain chain = pads.pictures;
     keep_times (chain.to ("queue").last ());
+    count_flags (chain.last (), *output_);
     if (statistics_) {
       Settings settings{{"format", "csv"}, {"post-messages", false}};
       set_if (settings, "bits", decode_.bits);
@@ -235,6 +262,7 @@ Decode::build (Job &job) const
   if (coded_) {
     Chain chain = pads.coded ();
     keep_times (chain.to ("queue").last ());
+    count_flags (chain.last (), *coded_);
     write_video (job, chain, *coded_, how);
   }
   if (uncertainty_) {
@@ -342,8 +370,17 @@ Decode::run ()
     result.exit = Exit::damaged;
   if (result.exit == Exit::damaged)
     Status ("decode", false)
-        .line (recording_ + " is cut off or damaged; what could be decoded "
-                            "was, and pictures of damaged frames are flagged");
+        .line (recording_ +
+               " is cut off or damaged; what could be decoded was" +
+               (*unflagged_ > 0
+                       ? ""
+                       : ", and pictures of damaged frames are flagged"));
+  if (*unflagged_ > 0)
+    Status ("decode", false)
+        .line (".mp4 has no place for the flags of " +
+               std::to_string (*unflagged_) +
+               " pictures of damaged or unsynchronised frames; add "
+               "--statistics FILE.csv, which lists them, or use another form");
   if (find_phase_ && result.exit == Exit::done && !found && !run_.print)
     return Exit::failed;
   return result.exit;

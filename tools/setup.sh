@@ -59,6 +59,8 @@ pybind11-dev|the Python library for single arrays|tests package
 python3-dev|the Python library for single arrays|tests package
 python3-gi|GStreamer in the Python package|tests
 python3-numpy|frames of the Python package|tests
+python3-venv|installs the Python package, to test it|tests
+python3-wheel|builds the Python package, to test it|tests
 build-essential|flags and programs of Debian packages|tests package
 debhelper|steps of building a Debian package|package
 dh-python|Debian package of the Python package|package

@@ -204,7 +204,8 @@ take_raw (GstElement *self, GstPad *pad, const GstCaps *caps)
 
 GstStaticCaps file_caps = GST_STATIC_CAPS ("timestamp/x-file");
 
-/* A decoder gives the time of the frame before to one that is earlier. */
+/* A decoder gives the time of the frame before to one that is earlier, and that
+ * of the segment's start to one that begins before it and lasts longer. */
 GstPadProbeReturn
 on_encoded (GstPad *, GstPadProbeInfo *info, gpointer) noexcept
 {
@@ -230,7 +231,8 @@ on_decoded (GstPad *, GstPadProbeInfo *info, gpointer self) noexcept
     return GST_PAD_PROBE_OK;
   const GstClockTime before = std::exchange (
       state_in<Self> (self).stream.decoded, GST_BUFFER_PTS (frame));
-  if (GST_BUFFER_PTS (frame) == before)
+  if (GST_BUFFER_PTS (frame) == before ||
+      GST_BUFFER_PTS (frame) > own->timestamp)
     GST_BUFFER_PTS (frame) = own->timestamp;
   gst_buffer_remove_meta (frame, &own->parent);
   return GST_PAD_PROBE_OK;

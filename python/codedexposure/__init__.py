@@ -6,6 +6,7 @@
     recording = codedexposure.open("coded.mkv")
     for frame in recording.subframes():
         print(frame.time, frame.image.mean())
+    tenth = recording.subframes()[10]
 
 The frames come from the same GStreamer elements as those of the command line,
 so they are equal to what codedexposure-decode writes.
@@ -20,6 +21,7 @@ __path__.append(str(_BUILD / "python"))  # codedexposure.library is compiled
 
 # Where each name is: archives use this package without GStreamer and numpy.
 _ROOMS = {"Error": "_pipeline", "RecordingWarning": "_pipeline",
+          "Frames": "frames", "UncountableError": "_pipeline",
           "decode_array": "arrays", "fuse_array": "arrays",
           "simulate": "arrays", "Frame": "frame", "Recording": "recording",
           "open": "recording"}
@@ -31,5 +33,6 @@ def __getattr__(name):
     return getattr(importlib.import_module("." + _ROOMS[name], __name__), name)
 
 
-__all__ = ["Error", "Frame", "Recording", "RecordingWarning", "decode_array",
-           "fuse_array", "open", "simulate"]
+__version__ = "0.1.0"
+__all__ = ["Error", "Frame", "Frames", "Recording", "RecordingWarning",
+           "UncountableError", "decode_array", "fuse_array", "open", "simulate"]

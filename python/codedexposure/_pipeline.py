@@ -24,6 +24,11 @@ class Error(Exception):
     """What cannot be read or decoded, in the words of the element."""
 
 
+class UncountableError(Error, TypeError):
+    """Frames that can only be read in a loop. list () asks for their number,
+    and takes a TypeError for an answer."""
+
+
 class RecordingWarning(UserWarning):
     """Frames are lost, damaged or of unknown state, or the recording ended
     early. To raise these as exceptions:
@@ -99,6 +104,9 @@ def element(kind: str, **values) -> str:
     return text
 
 
+_SETUP = "coded-exposure="  # a comment in the tags
+
+
 class ContainerError(Error):
     """The index or the tags of a file are damaged."""
 
@@ -156,12 +164,14 @@ class Player:
     """Plays a pipeline with an appsink named "out", whose samples are iterated.
 
     Losses and warnings of the elements are RecordingWarnings with @p about,
-    errors are exceptions. quiet drops the warnings.
+    errors are exceptions. quiet drops the warnings. part: the coded frames at
+    times from the first on and before the second, ns; None: to the end.
     """
 
     process: int | None = None  # that has played a pipeline
 
-    def __init__(self, description: str, about: str, quiet: bool = False):
+    def __init__(self, description: str, about: str, quiet: bool = False,
+                 part: tuple[int, int | None] | None = None):
         # Its threads, which GStreamer counts on, are not in a copy of it.
         if Player.process not in (None, os.getpid()):
             raise Error(
@@ -171,16 +181,42 @@ class Player:
         Player.process = os.getpid()
         self.about = about
         self.quiet = quiet
+        self.part = part
         try:
             self.pipeline = Gst.parse_launch(description)
         except GLib.Error as error:
             raise Error(error.message) from None
         self.out = self.pipeline.get_by_name("out")
         self.bus = self.pipeline.get_bus()
+        self._setups: list[str] = []
+        self.out.get_static_pad("sink").add_probe(
+            Gst.PadProbeType.EVENT_DOWNSTREAM, self._on_event)
 
     def __enter__(self):
+        try:
+            if self.part:
+                self._seek(*self.part)
+        except Error:
+            self.pipeline.set_state(Gst.State.NULL)
+            raise
         self.pipeline.set_state(Gst.State.PLAYING)
         return self
+
+    def _seek(self, start: int, stop: int | None) -> None:
+        """While the first frame is held, what is said of it included."""
+        self.pipeline.set_state(Gst.State.PAUSED)
+        while not (message := self.bus.timed_pop_filtered(
+                Gst.SECOND, Gst.MessageType.ASYNC_DONE | Gst.MessageType.ERROR)):
+            pass
+        if message.type == Gst.MessageType.ERROR:
+            raise _error_of(message)
+        if not self.pipeline.seek(
+                1.0, Gst.Format.TIME, Gst.SeekFlags.FLUSH | Gst.SeekFlags.ACCURATE,
+                Gst.SeekType.SET, start,
+                Gst.SeekType.NONE if stop is None else Gst.SeekType.SET,
+                -1 if stop is None else stop):
+            raise Error(f"{self.about}: {start * 1e-9} s cannot be sought; read "
+                        "the frames in a loop")
 
     def __exit__(self, *_):
         self.pipeline.set_state(Gst.State.NULL)
@@ -214,14 +250,19 @@ class Player:
         while message := self.bus.pop_filtered(kinds):
             self._heed(message)
 
-    def comments(self) -> list[str]:
-        """The comments in the tags of the stream."""
-        pad, found, i = self.out.get_static_pad("sink"), [], 0
-        while event := pad.get_sticky_event(Gst.EventType.TAG, i):
-            tags, i = event.parse_tag(), i + 1
-            found += [tags.get_string_index(Gst.TAG_COMMENT, k)[1]
-                      for k in range(tags.get_tag_size(Gst.TAG_COMMENT))]
-        return found
+    def _on_event(self, _, info):
+        event = info.get_event()
+        if event.type == Gst.EventType.TAG:
+            tags = event.parse_tag()
+            for i in range(tags.get_tag_size(Gst.TAG_COMMENT)):
+                comment = tags.get_string_index(Gst.TAG_COMMENT, i)[1]
+                if comment.startswith(_SETUP):
+                    self._setups.append(comment.removeprefix(_SETUP))
+        return Gst.PadProbeReturn.OK
+
+    def setups(self) -> list[dict]:
+        """Those of the stream so far, one after the other."""
+        return [json.loads(setup) for setup in self._setups]
 
     def __iter__(self):
         # An element that fails may never end the stream, so the wait for a

@@ -99,12 +99,31 @@ def pixels_of(buffer, caps) -> np.ndarray:
     return rows.reshape(height, -1)[:, :width]
 
 
+def position_of(sample, time: int | None = None) -> int:
+    """The position of a time, or of the sample itself, in its stream, ns."""
+    # A frame may begin nanoseconds before the segment, whose times are those of
+    # the container.
+    sign, there = sample.get_segment().to_stream_time_full(
+        Gst.Format.TIME, sample.get_buffer().pts if time is None else time)
+    return sign * there
+
+
+def _fields_of(sample):
+    meta = sample.get_buffer().get_custom_meta("CodedExposureFrame")
+    return meta.get_structure() if meta else None
+
+
+def shows_pattern(sample) -> bool:
+    """Whether a coded frame shows a pattern, so that it is not decoded."""
+    fields = _fields_of(sample)
+    return bool(fields and fields.has_field("pattern"))
+
+
 def frame_of(sample) -> Frame:
     """The frame in a GstSample."""
-    buffer, segment = sample.get_buffer(), sample.get_segment()
+    buffer = sample.get_buffer()
     caps = sample.get_caps().get_structure(0)
-    meta = buffer.get_custom_meta("CodedExposureFrame")
-    fields = meta.get_structure() if meta else None
+    fields = _fields_of(sample)
 
     def value(name):
         return fields.get_value(name) if fields and fields.has_field(name) \
@@ -113,18 +132,12 @@ def frame_of(sample) -> Frame:
     def time(name):
         return None if value(name) == _NO_TIME else value(name)
 
-    # A frame may begin nanoseconds before the segment, whose times are those of
-    # the container.
-    def position(pts):
-        sign, there = segment.to_stream_time_full(Gst.Format.TIME, pts)
-        return sign * there
-
     exposure = time("exposure-start")
     image = pixels_of(buffer, caps)
     slot = value("subframe")
     return Frame(
         image=image,
-        time_ns=position(buffer.pts),
+        time_ns=position_of(sample),
         duration_ns=None if buffer.duration == _NO_TIME else buffer.duration,
         frame=value("frame"),
         slot=None if slot is None or slot < 0 else slot,
@@ -134,6 +147,7 @@ def frame_of(sample) -> Frame:
         lost_before=value("lost-before") or 0,
         saturated=value("saturated"),
         bits=value("bits") or 8 * image.itemsize,
-        exposure_start_ns=None if exposure is None else position(exposure),
+        exposure_start_ns=None if exposure is None else position_of(
+            sample, exposure),
         exposure_duration_ns=time("exposure-duration"),
         time_uncertainty_ns=time("time-uncertainty"))

@@ -10,12 +10,13 @@ from collections.abc import Iterator
 from contextlib import closing
 from fractions import Fraction
 
-from ._pipeline import ContainerError, Error, Player, element, quoted
-from .frame import Frame, frame_of
+from ._pipeline import (ContainerError, Error, Player, UncountableError,
+                        element, quoted)
+from .frame import Frame, frame_of, position_of, shows_pattern
+from .frames import Frames
 
-_SETUP = "coded-exposure="
 _NOT_OF_SCHEDULE = ("mapping", "size", "rate", "bits", "track", "simulated",
-                    "bench")
+                    "bench", "partner")
 
 
 def open(path: str | os.PathLike) -> Recording:  # pylint: disable=W0622
@@ -27,23 +28,29 @@ def open(path: str | os.PathLike) -> Recording:  # pylint: disable=W0622
     return Recording(path)
 
 
+def _schedule_of(setup: dict) -> dict:
+    return {key: value for key, value in setup.items()
+            if key not in _NOT_OF_SCHEDULE}
+
+
 class Recording:
     """The coded frames of a recording, and what can be decoded from them.
 
-    Every call that gives frames reads the file from its beginning. If frames
-    were lost or damaged, or the recording was cut off, a RecordingWarning says
-    so as soon as it is known, at the latest after the last frame.
+    subframes (), fused () and coded () are sequences: loop over them, or take
+    frames by index and slice. If frames were lost or damaged, or the recording
+    was cut off, a RecordingWarning says so as soon as it is known, at the
+    latest after the last frame.
     """
 
     def __init__(self, path: str | os.PathLike):
         self.path = os.fspath(path)
+        self._times: list[tuple[int, bool]] | None = None
+        self._is_uniform = True
         self._check()
         first, setup = self._look()
         self.size: tuple[int, int] = (first.image.shape[1], first.image.shape[0])
         """Width and height of the coded frames, pixels."""
-        self.schedule: dict | None = setup and {
-            key: value for key, value in setup.items()
-            if key not in _NOT_OF_SCHEDULE}
+        self.schedule: dict | None = setup and _schedule_of(setup)
         """The JSON form of the schedule; None: the recording has none, and
         decoding needs the argument schedule."""
         self.mapping: dict | None = setup and setup.get("mapping")
@@ -63,7 +70,7 @@ class Recording:
     def subframes(self, *, method: str | None = None, region: int | None = None,
                   schedule: str | os.PathLike | dict | None = None,
                   mapping: str | os.PathLike | dict | None = None,
-                  bits: int | None = None) -> Iterator[Frame]:
+                  bits: int | None = None) -> Frames:
         """The subframes in the order of their times.
 
         method    auto, rank, select or decode
@@ -76,8 +83,8 @@ class Recording:
                   recording
         """
         pad = "src" if region is None else f"region_{int(region)}"
-        return self._frames(
-            "queue max-size-buffers=8 ! "
+        return Frames(
+            self, "queue max-size-buffers=8 ! "
             + element("codedexposure-demux", name="demux",
                       require_schedule=True, method=method, schedule=schedule,
                       mapping=mapping, bits=bits) + f" demux.{pad} !")
@@ -86,7 +93,7 @@ class Recording:
               read_noise: float | None = None,
               schedule: str | os.PathLike | dict | None = None,
               mapping: str | os.PathLike | dict | None = None,
-              bits: int | None = None) -> Iterator[Frame]:
+              bits: int | None = None) -> Frames:
         """Full-size frames at the rate of the subframes.
 
         quality     fast, balanced, best or learned
@@ -94,16 +101,28 @@ class Recording:
         read_noise  noise of the camera, e- rms
         The rest is as for subframes ().
         """
-        return self._frames(
-            "queue max-size-buffers=1 ! "
+        return Frames(
+            self, "queue max-size-buffers=1 ! "
             + element("codedexposure-fuse", name="fuse", lookahead=1,
                       require_schedule=True, quality=quality,
                       full_well=full_well, read_noise=read_noise,
                       schedule=schedule, mapping=mapping, bits=bits) + " !")
 
-    def coded(self) -> Iterator[Frame]:
+    def coded(self) -> Frames:
         """The coded frames as the camera delivered them."""
-        return self._frames("")
+        return Frames(self, "")
+
+    @property
+    def duration(self) -> float:
+        """From the first coded frame to the end of the last one, s."""
+        last = self.coded()[-1]
+        return (last.time_ns + (last.duration_ns or 0)) * 1e-9
+
+    def __enter__(self) -> Recording:
+        return self
+
+    def __exit__(self, *_):
+        """Nothing is open between calls."""
 
     # ---------------------------------------------------------------- file --
 
@@ -130,9 +149,10 @@ class Recording:
         return (at + 12 + int.from_bytes(size[1:], "big")
                 > os.path.getsize(self.path))
 
-    def _description(self, decoder: str, salvage: bool) -> str:
+    def _description(self, decoder: str, salvage: bool,
+                     decode: bool = True) -> str:
         return (f"filesrc location={quoted(self.path)} ! "
-                f"codedexposure-recorddemux salvage={salvage} ! "
+                f"codedexposure-recorddemux salvage={salvage} decode={decode} ! "
                 f"{decoder} appsink name=out sync=false max-buffers=8")
 
     def _play(self, decoder: str,
@@ -160,19 +180,54 @@ class Recording:
         if self._cut:
             player.warn("the recording is cut off; what could be decoded was")
 
-    def _frames(self, decoder: str) -> Iterator[Frame]:
+    def play_whole(self, decoder: str) -> Iterator[Frame]:
+        """What the decoder gives, of all coded frames."""
         for _, frame in self._play(decoder):
             yield frame
+
+    def play_part(self, decoder: str, start: int,
+                  stop: int | None) -> Iterator[Frame]:
+        """The same of the coded frames at times of [start, stop), ns."""
+        with Player(self._description(decoder, False), self.path,
+                    part=(start, stop)) as player:
+            for sample in player:
+                # A coded frame before may last until the start.
+                if position_of(sample) >= start:
+                    yield frame_of(sample)
+
+    def coded_times(self, decoded: bool) -> list[int]:
+        """The times of all coded frames, or of those that are decoded, ns."""
+        if self._times is None:
+            self._times = self._read_times()
+        if decoded and not self._is_uniform:
+            raise UncountableError(
+                f"the schedule changes within {self.path}, so its pictures "
+                "have no numbers; read them in a loop")
+        return [time for time, pattern in self._times
+                if not (decoded and pattern)]
+
+    def _read_times(self) -> list[tuple[int, bool]]:
+        try:
+            with Player(self._description("", False, decode=False), self.path,
+                        quiet=True) as player:
+                times = [(position_of(sample), shows_pattern(sample))
+                         for sample in player]
+        except ContainerError as damage:
+            raise UncountableError(
+                f"{self.path}: the index or the tags are damaged ({damage}), so "
+                "its frames have no numbers; read them in a loop") from None
+        schedules = {json.dumps(_schedule_of(setup))
+                     for setup in player.setups()}
+        self._is_uniform = len(schedules) <= 1
+        return times
 
     def _look(self) -> tuple[Frame, dict | None]:
         """The first frame, and the setup in the stream tag. What is wrong is
         said when frames are read."""
         with closing(self._play("", quiet=True)) as frames:
             player, frame = next(frames)
-            for comment in player.comments():
-                if comment.startswith(_SETUP):
-                    return frame, json.loads(comment.removeprefix(_SETUP))
-        return frame, None
+            setups = player.setups()
+        return frame, setups[0] if setups else None
 
     def _no_frame(self, damage: Error | None = None) -> Error:
         if self._cut:

@@ -54,7 +54,7 @@ class Examples(unittest.TestCase):
         self.plot.savefig.assert_called_once()
 
     def test_all(self):
-        self.assertEqual(len(BLOCKS), 4)
+        self.assertEqual(len(BLOCKS), 5)
         names = {}
         with warnings.catch_warnings():
             for block in BLOCKS:

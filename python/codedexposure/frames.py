@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The frames of a recording as a sequence."""
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import islice
+from typing import TYPE_CHECKING
+
+from ._pipeline import Error
+from .frame import Frame
+
+if TYPE_CHECKING:
+    from .recording import Recording
+
+
+class Frames(Sequence):
+    """Frames of a recording, or every so many of a part of them.
+
+    A loop reads the file once, from front to back. frames[i] and frames[a:b]
+    seek to the coded frames that they need, and give what a loop gives there,
+    bit for bit; a part is again a sequence, which is read when it is used.
+    len (), an index and a part first need to know the times of all coded
+    frames, for which the recording is read once without decoding it.
+
+    An index counts frames that are there, not those that were lost: compare
+    Frame.frame. Where the schedule changes, coded frames do not give equally
+    many pictures, and only a loop is possible.
+    """
+
+    def __init__(self, recording: Recording, decoder: str,
+                 part: range | None = None, per_frame: int | None = None):
+        self._recording = recording
+        self._decoder = decoder
+        self._part = part
+        self._per_frame = per_frame
+
+    def __repr__(self):
+        return f"<Frames of {self._recording.path}>"
+
+    def _times(self) -> list[int]:
+        """Of the coded frames that give pictures."""
+        return self._recording.coded_times(decoded=bool(self._decoder))
+
+    def _count(self) -> int:
+        """Pictures of a coded frame: those of the first one."""
+        if self._per_frame is None:
+            times = self._times()
+            self._per_frame = 1 if not self._decoder else sum(
+                1 for _ in self._recording.play_part(
+                    self._decoder, times[0],
+                    times[1] if len(times) > 1 else None))
+        return self._per_frame
+
+    def _range(self) -> range:
+        if self._part is None:
+            times = self._times()
+            self._part = range(self._count() * len(times) if times else 0)
+        return self._part
+
+    def __len__(self):
+        return len(self._range())
+
+    def __getitem__(self, index):
+        if isinstance(index, slice):
+            part = self._range()[index]
+            return Frames(self._recording, self._decoder, part, self._per_frame)
+        try:
+            place = self._range()[index]
+        except IndexError:
+            raise IndexError(
+                f"there is no frame {index}: {self._recording.path} has "
+                f"{len(self)} here, which count from 0") from None
+        return next(self._read(range(place, place + 1)))
+
+    def __iter__(self) -> Iterator[Frame]:
+        if self._part is None:
+            return self._recording.play_whole(self._decoder)
+        if self._part.step < 0:
+            return iter(list(self._read(self._part[::-1]))[::-1])
+        return self._read(self._part)
+
+    def __reversed__(self):
+        return iter(self[::-1])
+
+    def _read(self, part: range) -> Iterator[Frame]:
+        """The frames of a range that counts upwards."""
+        if not part:
+            return
+        times, count = self._times(), self._count()
+        first, last = part[0] // count, part[-1] // count
+        pictures = self._recording.play_part(
+            self._decoder, times[first],
+            times[last + 1] if last + 1 < len(times) else None)
+        skipped, given = part[0] - first * count, 0
+        for frame in islice(pictures, skipped, skipped + part[-1] - part[0] + 1,
+                            part.step):
+            given += 1
+            yield frame
+        if given < len(part):
+            raise Error(
+                f"{self._recording.path}: coded frames {first} to {last} give "
+                f"fewer pictures than {count} each; read them in a loop over "
+                "all frames")

@@ -1,0 +1,129 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Frames of a recording by index and slice are those of a loop."""
+import re
+import subprocess
+import unittest
+import warnings
+
+from rig import BUILD, ROOT, SCRATCH, clean, run, simulate
+import numpy as np
+import codedexposure
+
+
+def camera_file(name, *options):
+    """plain.mkv with the times of a camera, which begins late."""
+    subprocess.run([BUILD / "tests/pipeline/camera_file", "plain.mkv", name,
+                    *options], cwd=SCRATCH, check=True)
+
+
+def setUpModule():
+    simulate("plain.mkv", "--frames", "60")
+    camera_file("camera.mkv", "--lose=8-27", "--corrupt=33-33")
+    camera_file("pattern.mkv", "--pattern=36-38")
+    camera_file("changed.mkv", "--setup=35:sequential:3x3")
+    whole = (SCRATCH / "camera.mkv").read_bytes()
+    (SCRATCH / "cut.mkv").write_bytes(whole[:len(whole) // 2])
+    data = bytearray((SCRATCH / "plain.mkv").read_bytes())
+    data[data.index(b"\xbb\x01", data.rindex(b"\x1c\x53\xbb\x6b") + 20) + 8] ^= 4
+    (SCRATCH / "damaged.mkv").write_bytes(data)
+    run("record", "--fast", "--frames", "16", "--size", "96x64", "--codec",
+        "raw", "--schedule", "sequential:lattice:8/3", "--output", "raw.mkv")
+
+
+def tearDownModule():
+    clean()
+
+
+def opened(name):
+    return codedexposure.open(SCRATCH / name)
+
+
+def same(one, other):
+    return one == other and np.array_equal(one.image, other.image)
+
+
+class Sequence(unittest.TestCase):
+    def check(self, frames):
+        whole = list(frames)
+        self.assertEqual(len(frames), len(whole))
+        count = len(whole)
+        for index in (0, 1, 5, count // 2 + 1, count - 1, -1, -count):
+            self.assertTrue(same(frames[index], whole[index]), index)
+        for part in (slice(3, 17, 5), slice(None, None, 7), slice(-9, None),
+                     slice(10, 2, -3), slice(5, 5), slice(0, 4)):
+            self.assertEqual(len(frames[part]), len(whole[part]), part)
+            self.assertTrue(all(map(same, frames[part], whole[part])), part)
+        self.assertTrue(same(frames[4:][2:9][3], whole[9]))
+        self.assertTrue(same(next(reversed(frames)), whole[-1]))
+        for beyond in (count, -count - 1):
+            with self.assertRaisesRegex(
+                    IndexError, f"no frame {beyond}: .* has {count} here"):
+                frames[beyond]  # pylint: disable=pointless-statement
+
+    def check_all(self, name):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", codedexposure.RecordingWarning)
+            recording = opened(name)
+            self.check(recording.coded())
+            self.check(recording.subframes())
+            self.check(recording.fused("fast"))
+
+    def test_of_a_bench(self):
+        self.check_all("plain.mkv")
+
+    def test_of_a_camera(self):
+        self.check_all("camera.mkv")
+
+    def test_with_a_pattern(self):
+        self.check_all("pattern.mkv")
+        self.assertEqual(len(opened("pattern.mkv").subframes()), 4 * 57)
+
+    def test_that_was_cut_off(self):
+        self.check_all("cut.mkv")
+
+    def test_raw(self):
+        self.check_all("raw.mkv")
+
+    def test_a_part_warns_of_its_own_losses_only(self):
+        frames = opened("camera.mkv").subframes()
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            list(frames[4:12])
+        with self.assertWarnsRegex(codedexposure.RecordingWarning, "lost.*: 20"):
+            list(frames[28:40])
+
+    def check_uncountable(self, name, why):
+        recording = opened(name)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", codedexposure.RecordingWarning)
+            self.assertGreater(len(list(recording.subframes())), 200)
+        with self.assertRaisesRegex(codedexposure.UncountableError, why):
+            recording.subframes()[3]  # pylint: disable=expression-not-assigned
+
+    def test_a_schedule_that_changes_leaves_the_loop(self):
+        self.check_uncountable("changed.mkv", "the schedule changes within")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", codedexposure.RecordingWarning)
+            self.check(opened("changed.mkv").coded())
+
+    def test_a_damaged_index_leaves_the_loop(self):
+        self.check_uncountable("damaged.mkv", "index or the tags are damaged")
+
+
+class Whole(unittest.TestCase):
+    def test_duration(self):
+        self.assertAlmostEqual(opened("plain.mkv").duration, 2.4, places=9)
+
+    def test_with(self):
+        with opened("plain.mkv") as recording:
+            self.assertEqual(len(recording.coded()), 60)
+
+    def test_version(self):
+        text = (ROOT / "meson.build").read_text()
+        self.assertEqual(codedexposure.__version__,
+                         re.search(r"version: '([0-9.]+)'", text)[1])
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -105,6 +105,7 @@ std::unique_ptr<Command> advise_command ();
 std::unique_ptr<Command> archive_command ();
 std::unique_ptr<Command> bench_command ();
 std::unique_ptr<Command> calibrate_command ();
+std::unique_ptr<Command> camera_command ();
 std::unique_ptr<Command> decode_command ();
 std::unique_ptr<Command> dmd_command ();
 std::unique_ptr<Command> doctor_command ();

@@ -3,7 +3,7 @@
 # Records a camera that a DMD triggers. docs/bench.md explains their wiring,
 # docs/record.md the line; with comfort: codedexposure record --camera.
 OUTPUT=${1:-camera.mkv}
-CAMERA=${CAMERA:-} # as "gst-device-monitor-1.0 -f Source/GenICam" lists it
+CAMERA=${CAMERA:-} # as "codedexposure camera list" shows it
 DEVICE=${DEVICE:-usb:}
 SCHEDULE=${SCHEDULE:-sequential:2x2}
 FORMAT=${FORMAT:-format=GRAY8,width=768,height=576,framerate=25/1}

@@ -12,8 +12,8 @@ all_commands ()
   for (const auto make : {simulate_command, live_command, record_command,
            decode_command, info_command, calibrate_command, pack_command,
            send_command, receive_command, archive_command, join_command,
-           report_command, schedule_command, advise_command, dmd_command,
-           profile_command, doctor_command, bench_command})
+           report_command, schedule_command, advise_command, camera_command,
+           dmd_command, profile_command, doctor_command, bench_command})
     if (auto command = make ())
       commands.push_back (std::move (command));
   return commands;

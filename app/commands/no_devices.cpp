@@ -18,11 +18,23 @@ doctor_command ()
   return nullptr;
 }
 
+std::unique_ptr<Command>
+camera_command ()
+{
+  return nullptr;
+}
+
 /* Nothing is known of cameras here. */
 std::vector<std::string>
 camera_names ()
 {
   return {};
+}
+
+std::string
+cameras_found ()
+{
+  return "this version was built without Aravis, and sees no camera";
 }
 
 std::optional<double>

@@ -123,8 +123,7 @@ SourceOptions::declare_camera (Options &options, Kind kind)
   options.heading (
       examined ? "Instead of the simulated bench" : "Instead of the bench");
   options.value ("--camera", camera, "NAME",
-      "a GenICam camera, as \"gst-device-monitor-1.0 -f Source/GenICam\" lists "
-      "it");
+      "a GenICam camera, as \"codedexposure camera list\" shows it");
   if (!examined)
     options.value ("--trigger", trigger, "M",
         "which device triggers: dmd, camera, or none [dmd]",

@@ -18,6 +18,17 @@ camera_names ()
   return names;
 }
 
+std::string
+cameras_found ()
+{
+  std::string names;
+  for (const std::string &name : camera_names ())
+    names += (names.empty () ? "" : ", ") + name;
+  return names.empty () ? "no camera was found; check its power and its network"
+                        : "the cameras that were found are " + names +
+                              "; set --camera to one of them";
+}
+
 std::optional<double>
 camera_exposure (GstElement *camerasrc)
 {

@@ -14,6 +14,9 @@ namespace codedexposure::app
 /** The names of all cameras that answer. Takes a second. */
 std::vector<std::string> camera_names ();
 
+/** The same for a message: which there are, or that there is none. */
+std::string cameras_found ();
+
 /** For how long the camera of @p camerasrc exposes, us; none: it does not say.
  */
 std::optional<double> camera_exposure (GstElement *camerasrc);

@@ -141,17 +141,6 @@ with_options (const char *text)
   return std::regex_replace (text, property, "--$1");
 }
 
-std::string
-cameras_found ()
-{
-  std::string names;
-  for (const std::string &name : camera_names ())
-    names += (names.empty () ? "" : ", ") + name;
-  return names.empty () ? "no camera was found; check its power and its network"
-                        : "the cameras that were found are " + names +
-                              "; set --camera to one of them";
-}
-
 bool
 is_video_sink (GstElement *element, GstElementFactory *factory)
 {
@@ -276,13 +265,13 @@ remedy_for (std::string_view kind, const Told &told)
   const bool of_source = of_camera && text.find ("TriggerSource") != text.npos;
   if ((of_lines || of_source) && text.find ("not an entry") != text.npos)
     return "the camera has no such line; set --trigger-line to one that "
-           "\"arv-tool-0.8 features\" lists";
+           "\"codedexposure camera show\" lists";
   if (of_lines)
     return "--trigger camera needs a camera with the feature LineSelector; for "
            "others, use --trigger none and set their output with --features";
   if (of_camera && text.find ("[PixelFormat]") != text.npos)
     return "the camera has no such pixel format; set --pixel-format to one "
-           "that \"arv-tool-0.8 features\" lists";
+           "that \"codedexposure camera show\" lists";
   if (is_silence (kind, told))
     return "the camera sent nothing for 2 s; check that the DMD runs and is "
            "wired to the camera's trigger line";

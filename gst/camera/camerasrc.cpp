@@ -94,9 +94,9 @@ properties ()
   };
   return {
       {"camera-name", "Camera name",
-          "Camera as \"arv-tool-0.8\" or \"gst-device-monitor-1.0 -f "
-          "Source/GenICam\" lists it, or its address; empty: the first one "
-          "found",
+          "Camera as \"codedexposure camera list\" or "
+          "\"gst-device-monitor-1.0 -f Source/GenICam\" lists it, or its "
+          "address; empty: the first one found",
           kReadWriteReady, set (&Settings::name)},
       {"pixel-format", "Pixel format",
           "Mono8, Mono10, Mono12, Mono16, Mono10Packed, Mono12Packed, Mono10p "

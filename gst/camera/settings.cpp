@@ -31,7 +31,7 @@ check_settings (const Settings &settings)
   if (settings.trigger_line.find_first_of (" =\t\n\"") != std::string::npos)
     return Error{"trigger-line=\"" + settings.trigger_line +
                  "\" is no line of a camera: it is one word, such as Line0. "
-                 "\"arv-tool-0.8 features\" lists those of the camera"};
+                 "\"codedexposure camera show\" lists those of the camera"};
   if (!settings.trigger_line.empty () && settings.trigger == Trigger::none)
     return Error{"trigger-line=" + settings.trigger_line +
                  " has no effect with trigger=none: set trigger=dmd where the "

@@ -46,7 +46,7 @@ constexpr const char *kStuck =
 constexpr Rule kRules[] = {
     told ("camera-missing",
         "check its cable and power, and whether another program has it open; "
-        "gst-device-monitor-1.0 Source/Video lists the cameras"),
+        "\"codedexposure camera list\" lists the cameras"),
     told ("dmd-missing",
         "check its cable and power; codedexposure dmd list shows the boards"),
     told ("dmd-permission", "install the udev rule "

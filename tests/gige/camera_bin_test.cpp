@@ -304,7 +304,7 @@ TEST (CameraBin, WhatCannotBeIsAnErrorThatNamesTheRemedy)
     const char *value;
     const char *remedy;
   } cases[] = {{"pixel-format=Mono14", "Mono14", "it is Mono8, Mono10"},
-      {"trigger=dmd trigger-line=\"Line 0\"", "Line 0", "arv-tool-0.8"},
+      {"trigger=dmd trigger-line=\"Line 0\"", "Line 0", "camera show"},
       {"trigger-line=Line1", "Line1", "trigger=dmd"},
       {"features=\"Gain=1 PixelFormat=Mono12p\"", "PixelFormat=Mono12p",
           "pixel-format=Mono12p"},

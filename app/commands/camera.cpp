@@ -292,8 +292,8 @@ commands_below (Arguments &arguments)
           .usage = "[option...]",
           .description =
               "Lists the GenICam cameras on the network and the USB: the name "
-              "for --camera, what\nthe sensor has, and whether a DMD can "
-              "trigger it.\n"},
+              "for --camera, the\nsensor, the grey formats, and whether a DMD "
+              "can trigger it.\n"},
       [&arguments] (Options &options) { arguments.declare (options); },
       [&arguments] { return list (arguments); }));
   commands.push_back (std::make_unique<SmallCommand> (
@@ -302,7 +302,7 @@ commands_below (Arguments &arguments)
           .usage = "[option...] CAMERA",
           .description =
               "Shows what a camera can do and how it is set, with the features "
-              "that change coded\nframes. Nothing is changed.\n"},
+              "that change\ncoded frames. Nothing is changed.\n"},
       [&arguments] (Options &options) {
         options.word ("CAMERA", arguments.name);
         arguments.declare (options);
@@ -325,7 +325,10 @@ camera_command ()
                    "camera.\n",
           .examples = "  Which cameras are there:\n"
                       "    codedexposure camera list\n"
-                      "  How one is set, of the emulated chain:\n"
+                      "  The emulated one, as JSON:\n"
+                      "    codedexposure bench codedexposure camera list "
+                      "--json\n"
+                      "  How it is set:\n"
                       "    codedexposure bench codedexposure camera show "
                       "127.0.0.1\n"},
       commands_below);

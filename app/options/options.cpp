@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <sstream>
+#include <string_view>
 #include <utility>
 
 #include <CLI/CLI.hpp>
@@ -16,6 +17,8 @@ namespace
 {
 
 constexpr std::size_t kColumn = 22, kWidth = 80;
+/* The one that has a letter, too. */
+constexpr std::string_view kOutput = "--output";
 
 /* @text behind @head, in lines of kWidth whose words begin at kColumn. */
 std::string
@@ -50,8 +53,9 @@ Options::read_with (const std::string &name, const std::string &placeholder,
     const std::string &help, const std::string &must_be,
     std::function<bool (const std::string &)> read)
 {
-  app_.add_option (name)->expected (1)->multi_option_policy (
-      CLI::MultiOptionPolicy::TakeLast);
+  app_.add_option (name == kOutput ? "-o," + name : name)
+      ->expected (1)
+      ->multi_option_policy (CLI::MultiOptionPolicy::TakeLast);
   declared_.push_back (
       {name, placeholder, help, heading_, must_be, std::move (read)});
 }
@@ -175,7 +179,8 @@ Options::help () const
       text += heading.empty () ? "\n" : "\n" + heading + ":\n";
     }
     text +=
-        wrapped ("  " + option.name + (option.placeholder.empty () ? "" : " ") +
+        wrapped ((option.name == kOutput ? "  -o, " : "  ") + option.name +
+                     (option.placeholder.empty () ? "" : " ") +
                      option.placeholder,
             option.help);
   }

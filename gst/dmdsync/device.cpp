@@ -81,6 +81,11 @@ open_device (GstDmdSync *self)
   const std::string device = settings_of (self).device;
   if (device.empty ())
     return true;
+  if (settings_of (self).beam == Beam::kOff)
+    return refuse_settings (self,
+        "beam=off with the DMD \"" + device +
+            "\": a second camera drives none; leave device empty, and set it "
+            "on the dmdsync of the first camera.");
 
   Result<std::unique_ptr<Dmd>> dmd = open_dmd (device);
   if (!dmd) {

@@ -65,6 +65,13 @@
  * only on frames whose pilot shows all of their masks, and absent on frames of
  * which nothing shows whether they are synchronised.
  *
+ * ## Two cameras
+ *
+ * With #dmdsync:beam off, the camera is a second one, in the beam of the mirrors
+ * that are off. Its frames are stamped and numbered as those of the first, and
+ * tagged for pad `off` of codedexposure-pair. No DMD is driven and no phase
+ * watched: the dmdsync of the first camera does both.
+ *
  * ## Patterns
  *
  * Any downstream element can request a grating or a code with an event
@@ -127,7 +134,7 @@ say_observable (GstDmdSync *self)
 {
   const SyncState &st = self->state;
   const SlipObservable observable = slip_observable (st.schedule);
-  if (observable == SlipObservable::always)
+  if (observable == SlipObservable::always || is_off_beam (st))
     return;
   const std::string schedule = st.schedule.text ();
   const std::string which = observable == SlipObservable::never

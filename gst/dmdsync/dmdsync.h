@@ -14,6 +14,7 @@
 #include <gst/gst.h>
 #include <gst/video/video.h>
 
+#include "common/beam.h"
 #include "common/element.h"
 #include "common/events.h"
 #include "common/named.h"
@@ -44,6 +45,7 @@ enum class OnUnlock { keep, skip, error };
 struct Settings {
   std::string device;
   std::string schedule = "sequential:2x2";
+  Beam beam = Beam::kOn;
   Named<BenchProfile> bench;
   TimestampAt timestamp_at = TimestampAt::exposure_start;
   GstClockTimeDiff exposure_offset = 0;
@@ -112,6 +114,7 @@ struct Stream {
   std::optional<Mapping> mapping;
   std::optional<BenchProfile> bench;
   bool simulated = false;
+  bool off_beam = false; ///< of the camera, as the property or its tag says
   int bits = 0;        ///< that upstream's tag has
   std::string refused; ///< the error of the caps that were refused last
 };
@@ -206,6 +209,9 @@ PatternSight look_for_pattern (GstDmdSync *self, GstBuffer *buffer,
 /* Negotiation and events. */
 /** Of the bench profile, in digital numbers; 0: not known. */
 int black_level (const SyncState &st);
+/** Whether the camera sees the complement of the masks, by which no phase is
+ * watched. */
+bool is_off_beam (const SyncState &st);
 /** Forgets what frames have shown of the phase. */
 void begin_phase (GstDmdSync *self);
 gboolean set_caps (GstBaseTransform *trans, GstCaps *incaps, GstCaps *outcaps);

@@ -103,6 +103,7 @@ own_setup (GstDmdSync *self)
   StreamSetup setup = setup_at (
       GST_BASE_TRANSFORM_SRC_PAD (self), st.schedule, st.stream.mapping);
   setup.simulated = st.stream.simulated;
+  setup.off_beam = is_off_beam (st);
   const auto &frames = st.stream.frames;
   setup.bits =
       frames && frames->knows_bits () ? frames->bits () : st.stream.bits;
@@ -127,6 +128,7 @@ take_bench (GstDmdSync *self, const StreamSetup &theirs)
   const int black = black_level (st);
   st.stream.mapping = theirs.mapping;
   st.stream.simulated = theirs.simulated;
+  st.stream.off_beam = theirs.off_beam;
   st.stream.bits = theirs.bits;
   st.stream.bench = theirs.bench;
   if (st.stream.time && black != black_level (st))
@@ -228,6 +230,12 @@ black_level (const SyncState &st)
 {
   const auto &bench = st.stream.bench ? st.stream.bench : st.bench;
   return bench ? bench->black () : 0;
+}
+
+bool
+is_off_beam (const SyncState &st)
+{
+  return st.settings.beam == Beam::kOff || st.stream.off_beam;
 }
 
 void

@@ -279,6 +279,8 @@ void
 watch_phase (GstDmdSync *self, Frame &frame)
 {
   SyncState &st = state (self);
+  if (is_off_beam (st))
+    return;
   if (!frame.sight.coded) {
     frame.phase.locked = false;
     return say_phase (self, frame);

@@ -72,6 +72,13 @@ properties ()
           "Tile, code and timing of the exposure: a preset such as "
           "staircase:2x2 or sequential:lattice:8/3,pilot=16, or a JSON file",
           kReadWriteReady, set (&Settings::schedule)},
+      {"beam", "Beam",
+          "The mirrors whose light the camera gets. A second camera, in the "
+          "beam of those that are off, sees the complement of every mask: its "
+          "frames are stamped and tagged so, and the first camera's dmdsync "
+          "drives the DMD and watches the phase; needs an empty device",
+          kReadWriteReady, set (&Settings::beam),
+          gst_coded_exposure_beam_get_type ()},
       {"bench", "Bench profile",
           "What was measured of the bench, a JSON file or its text "
           "(docs/formats.md), which goes downstream in the tag; its trigger "

@@ -129,7 +129,7 @@ struct PairState {
 
   /* Source pad's streaming thread, which also handles serialized events. */
   std::optional<StreamSetup> on_setup, off_setup;
-  std::vector<EventPtr> tags; ///< of the coded frames, due
+  std::vector<EventPtr> due; ///< before the next coded frame
   bool setup_due = false;
   bool check_due = false; ///< a stream is another
   bool refused = false;   ///< a stream is of the wrong beam
@@ -141,7 +141,7 @@ struct PairState {
   {
     on_setup.reset ();
     off_setup.reset ();
-    tags.clear ();
+    due.clear ();
     setup_due = check_due = refused = false;
     check = {};
     run = {};
@@ -326,11 +326,11 @@ count (GstCodedExposurePair *self, GstBuffer *coded, Alone alone)
 /* Before the frame that is next at the source pad, where caps and segment of the
  * base class have passed. */
 GstPadProbeReturn
-push_tags (GstPad *pad, GstPadProbeInfo *, gpointer data)
+push_due (GstPad *pad, GstPadProbeInfo *, gpointer data)
 {
   auto *self = static_cast<GstCodedExposurePair *> (data);
   PairState &st = state (self);
-  for (EventPtr &event : std::exchange (st.tags, {}))
+  for (EventPtr &event : std::exchange (st.due, {}))
     gst_pad_push_event (pad, event.release ());
   if (std::exchange (st.setup_due, false) && st.on_setup) {
     StreamSetup setup = *st.on_setup;
@@ -425,8 +425,12 @@ follow (GstCodedExposurePair *self, bool on, GstEvent *event)
       (on ? st.on_setup : st.off_setup) = setup->value ();
       st.set_due ();
     } else if (on) {
-      st.tags.emplace_back (gst_event_ref (event));
+      st.due.emplace_back (gst_event_ref (event));
     }
+    break;
+  case GST_EVENT_GAP:
+    if (on)
+      st.due.emplace_back (gst_event_ref (event));
     break;
   default:
     break;
@@ -465,14 +469,15 @@ sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, GstEvent *event)
   case GST_EVENT_STREAM_START:
   case GST_EVENT_SEGMENT:
   case GST_EVENT_EOS:
-  case GST_EVENT_GAP:
   case GST_EVENT_FLUSH_START:
   case GST_EVENT_FLUSH_STOP:
     break;
   default:
-    /* Only the first camera's reach downstream. */
+    /* Only the first camera's reach downstream. The base class would make
+     * frames of gaps. */
     if (on && GST_EVENT_TYPE (event) != GST_EVENT_CAPS &&
-        GST_EVENT_TYPE (event) != GST_EVENT_TAG)
+        GST_EVENT_TYPE (event) != GST_EVENT_TAG &&
+        GST_EVENT_TYPE (event) != GST_EVENT_GAP)
       break;
     gst_event_unref (event);
     return TRUE;
@@ -499,8 +504,12 @@ sink_query (GstAggregator *aggregator, GstAggregatorPad *pad, GstQuery *query)
 GstFlowReturn
 flush (GstAggregator *aggregator)
 {
-  state (aggregator).run = {};
-  state (aggregator).check.reset ();
+  PairState &st = state (aggregator);
+  st.run = {};
+  st.check.reset ();
+  std::erase_if (st.due, [] (const EventPtr &event) {
+    return GST_EVENT_TYPE (event.get ()) == GST_EVENT_GAP;
+  });
   return GST_FLOW_OK;
 }
 
@@ -574,7 +583,7 @@ set_up_instance (GstCodedExposurePair *self)
             "direction", GST_PAD_SINK, "template", pad_template, nullptr)));
   }
   gst_pad_add_probe (GST_AGGREGATOR_SRC_PAD (self), GST_PAD_PROBE_TYPE_BUFFER,
-      push_tags, self, nullptr);
+      push_due, self, nullptr);
 }
 
 } // namespace

@@ -7,11 +7,6 @@
 namespace codedexposure::gst::sim
 {
 
-G_DEFINE_ENUM_TYPE (GstCodedExposureBeam, gst_coded_exposure_beam,
-    {int (Beam::kOn), "The mirrors that are on", "on"},
-    {int (Beam::kOff), "The mirrors that are off, as a second camera sees them",
-        "off"});
-
 namespace
 {
 

@@ -17,6 +17,7 @@
 #include "bench/simulated_dmd.h"
 #include "common/element.h"
 #include "common/named.h"
+#include "common/beam.h"
 #include "common/raii.h"
 #include "schedule/schedule.h"
 #include "setup/stream_setup.h"
@@ -27,9 +28,6 @@ namespace codedexposure::gst::sim
 {
 
 using ScheduleRef = std::shared_ptr<const Schedule>;
-
-/** The beam of the mirrors in which the camera is. */
-enum class Beam { kOn, kOff };
 
 /** Properties. */
 struct Settings {

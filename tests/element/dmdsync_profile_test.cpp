@@ -48,6 +48,49 @@ TEST (DmdsyncProfile, GoesDownstreamInTheTag)
   EXPECT_EQ (tagged_profile (sync.pull_event (GST_EVENT_TAG)), theirs);
 }
 
+bool
+says_off_beam (const EventPtr &event)
+{
+  const auto setup =
+      event ? setup_from_tags (tags_of (event.get ())) : std::nullopt;
+  return setup && *setup && setup->value ().off_beam;
+}
+
+TEST (DmdsyncBeam, ASecondCameraIsTaggedAndItsPhaseIsNotWatched)
+{
+  SyncHarness sync ("beam=off schedule=staircase:2x2");
+  sync.start ();
+  EXPECT_TRUE (says_off_beam (sync.pull_event (GST_EVENT_TAG)));
+  EXPECT_EQ (sync.info (), "") << "no word of slips that cannot be seen";
+  for (int i = 0; i < 4; i++) {
+    ASSERT_EQ (sync.send (sync.time_of (i)), GST_FLOW_OK);
+    const BufferPtr frame = sync.pull ();
+    ASSERT_TRUE (frame);
+    const auto meta = get_frame_meta (frame.get ());
+    ASSERT_TRUE (meta);
+    EXPECT_EQ (meta->frame, guint64 (i));
+    EXPECT_FALSE (meta->locked.has_value ());
+  }
+}
+
+TEST (DmdsyncBeam, UpstreamMaySayIt)
+{
+  SyncHarness sync;
+  sync.start ();
+  EXPECT_FALSE (says_off_beam (sync.pull_event (GST_EVENT_TAG)));
+  sync.push_event (setup_to_event ({.schedule = {}, .off_beam = true}));
+  EXPECT_TRUE (says_off_beam (sync.pull_event (GST_EVENT_TAG)));
+}
+
+TEST (DmdsyncBeam, ASecondCameraDrivesNoDmd)
+{
+  const ObjectPtr<GstElement> sync (GST_ELEMENT (gst_object_ref_sink (
+      gst_parse_launch ("dmdsync beam=off device=sim:beam", nullptr))));
+  EXPECT_EQ (refusal (sync.get (), GST_STATE_READY),
+      "beam=off with the DMD \"sim:beam\": a second camera drives none; leave "
+      "device empty, and set it on the dmdsync of the first camera.");
+}
+
 TEST (DmdsyncProfile, ItsTriggerDelayMovesFramesBack)
 {
   BenchProfile profile = profile_of (kSize);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure-pair: what becomes a pair, and what is said of the rest. */
 #include <random>
+#include <set>
 #include <thread>
 
 #include "common/messages.h"
@@ -211,6 +212,23 @@ TEST_F (Pair, WhatIsDamagedIsNoPartnerAndGetsNone)
   EXPECT_EQ (run (std::move (on), std::move (partners)),
       (Numbers{{0, kAlone}, {1, kAlone}, {2, kAlone}, {3, 3}}));
   expect_lost ("damaged", 3, 0, 3 * kPeriod);
+}
+
+TEST_F (Pair, GapsOfTheFirstCameraStayBetweenItsFrames)
+{
+  gst_harness_push (off.get (), numbered (0, 0).release ());
+  gst_harness_push (pair.get (), numbered (0, 0).release ());
+  const BufferPtr first (gst_harness_pull (pair.get ()));
+  for (GstHarness *camera : {off.get (), pair.get ()})
+    gst_harness_push_event (camera, gst_event_new_gap (kPeriod, kPeriod));
+  EXPECT_EQ (run (frames ({2}), frames ({2})), (Numbers{{2, 2}}));
+  const EventPtr gap = pair.pull_event (GST_EVENT_GAP);
+  ASSERT_TRUE (gap);
+  GstClockTime pts = 0, duration = 0;
+  gst_event_parse_gap (gap.get (), &pts, &duration);
+  EXPECT_EQ (pts, kPeriod);
+  EXPECT_EQ (duration, kPeriod);
+  EXPECT_FALSE (pair.pull_event (GST_EVENT_GAP));
 }
 
 /* --------------------------------------------------------------- streams -- */
@@ -481,6 +499,43 @@ TEST (PairBench, TwoSimulatedCamerasMakePairs)
   const auto pair = pipeline["pair"];
   EXPECT_EQ (property<guint64> (pair.get (), "frames-paired"), 10u);
   EXPECT_EQ (property<guint64> (pair.get (), "frames-alone"), 0u);
+}
+
+/* Two cameras as on a real bench: each loses frames of its own. */
+TEST (PairBench, ComesBehindDmdsyncOfBothCameras)
+{
+  Pipeline pipeline (
+      "videotestsrc num-buffers=400 pattern=ball "
+      "! video/x-raw,format=GRAY8,width=64,height=48,framerate=100/1 "
+      "! tee name=light "
+      "light. ! queue ! codedexposure-sim schedule=sequential:lattice:4/2 "
+      "! identity name=on ! dmdsync schedule=sequential:lattice:4/2 ! pair.on "
+      "light. ! queue ! codedexposure-sim beam=off "
+      "schedule=sequential:lattice:4/2 ! identity name=off "
+      "! dmdsync schedule=sequential:lattice:4/2 beam=off ! pair.off "
+      "codedexposure-pair name=pair ! codedexposure-fuse ! fakesink");
+  const auto lose = [&] (const char *camera, std::set<int> lost) {
+    auto *losses = new std::pair<int, std::set<int>> (0, std::move (lost));
+    gst_pad_add_probe (
+        pipeline.pad (camera, "src").get (), GST_PAD_PROBE_TYPE_BUFFER,
+        [] (GstPad *, GstPadProbeInfo *, gpointer data) {
+          auto &[number, which] =
+              *static_cast<std::pair<int, std::set<int>> *> (data);
+          return which.contains (number++) ? GST_PAD_PROBE_DROP
+                                           : GST_PAD_PROBE_OK;
+        },
+        losses, [] (gpointer data) {
+          delete static_cast<std::pair<int, std::set<int>> *> (data);
+        });
+  };
+  lose ("on", {20, 21, 60});
+  lose ("off", {21, 22, 23, 80});
+  EXPECT_EQ (pipeline.play (), "");
+  const auto pair = pipeline["pair"];
+  EXPECT_EQ (property<guint64> (pair.get (), "frames-paired"), 100u - 3u - 3u);
+  EXPECT_EQ (property<guint64> (pair.get (), "frames-alone"), 3u);
+  EXPECT_EQ (property<guint64> (pair.get (), "pairs-refused"), 0u);
+  EXPECT_EQ (property<guint64> (pair.get (), "partners-dropped"), 2u);
 }
 
 TEST (PairBench, TheFramesOfTheOtherBeamAreNotDecoded)

@@ -360,8 +360,8 @@ Decode::run ()
     return result.exit;
   if (result.container_damaged) {
     Status ("decode", false)
-        .line ("the index or the tags of " + recording_ +
-               " are damaged; reading it from front to back");
+        .line (recording_ + " is damaged between its frames; reading it from "
+                            "front to back");
     result = play_once (true, found);
   }
   if (info.is_cut_short && result.exit == Exit::failed && result.frames == 0)

@@ -61,6 +61,8 @@ struct Job {
   bool from_camera = false;
   /** Reads a recording or a stream of one: its own end is in it. */
   GstElement *reader = nullptr;
+  /** The file of the reader was finished, and is as long as it was then. */
+  bool is_finished = false;
   /** The recording is read from front to back, past damage. */
   bool salvage = false;
   /** The queue before encoder and disk of a live recording. */

@@ -80,6 +80,8 @@ Chain
 read_recording (Job &job, const std::string &file)
 {
   job.source = file;
+  const auto info = recording_info (file, false);
+  job.is_finished = info && !info->is_cut_short;
   Chain chain = job.graph.begin ("filesrc", {{"location", file}});
   chain.to ("codedexposure-recorddemux", {{"salvage", job.salvage}});
   job.reader = chain.last ();

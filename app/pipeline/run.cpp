@@ -328,6 +328,13 @@ Run::on_element_message (const GstStructure *structure, GstMessage *message)
       (name == "codedexposure/stream-incomplete" && !job_.retry);
   if (damage && (interrupted_ || failed_)) // the stream was cut here
     return;
+  /* A demuxer takes the length that damage claims, which may be all the rest. */
+  if (name == "codedexposure/stream-cut" && job_.is_finished &&
+      !job_.salvage) {
+    container_damaged_ = true;
+    end (Exit::failed);
+    return;
+  }
   damaged_ |= damage;
   if (job_.options.verbose &&
       (name.starts_with ("codedexposure/") || name.starts_with ("dmdsync/") ||

@@ -32,8 +32,10 @@
  * If the index or another part of the container is damaged, the element posts
  * an error, often before the first frame. With
  * #codedexposure-recorddemux:salvage, it reads the recording from front to
- * back, without the index; damage of the container is then a warning, at which
- * the stream ends.
+ * back, without the index, and leaves out what is no cluster of frames: behind
+ * damage, it goes on with the next one. Frames that are lost by it are counted
+ * by the track. Other damage of the container is a warning, at which the stream
+ * ends.
  *
  * ## Example pipeline
  * |[
@@ -56,6 +58,7 @@
 #include "common/elements.h"
 #include "common/raii.h"
 #include "parts.h"
+#include "record/cluster_gate.h"
 #include "record/matroska.h"
 
 using namespace codedexposure;
@@ -75,6 +78,7 @@ struct Stream {
   CapsPtr deep_caps;
   gsize frame_bytes = 0;
   GstClockTime decoded = GST_CLOCK_TIME_NONE; ///< time of the last frame
+  ClusterGate gate;                           ///< of what is salvaged
 };
 
 struct RecordDemuxState {
@@ -410,6 +414,21 @@ on_query (GstPad *, GstPadProbeInfo *info, gpointer self) noexcept
   return GST_PAD_PROBE_HANDLED;
 }
 
+/* Null: none of its bytes may go on yet. */
+GstBuffer *
+through_gate (ClusterGate &gate, GstBuffer *buffer)
+{
+  const BufferPtr owned (buffer);
+  GstMapInfo map;
+  if (!gst_buffer_map (buffer, &map, GST_MAP_READ))
+    return nullptr;
+  const std::string passed =
+      gate.take ({reinterpret_cast<const char *> (map.data), map.size});
+  gst_buffer_unmap (buffer, &map);
+  return passed.empty () ? nullptr
+                         : gst_buffer_new_memdup (passed.data (), passed.size ());
+}
+
 /* A demuxer that has failed does not pass the end on, and its source would post
  * an error. */
 GstFlowReturn
@@ -417,7 +436,10 @@ chain (GstPad *pad, GstObject *parent, GstBuffer *buffer) noexcept
 {
   const ObjectPtr<GstObject> self (gst_object_get_parent (parent));
   auto &state = state_in<Self> (self.get ());
-  const GstFlowReturn flow = state.chain (pad, parent, buffer);
+  if (salvages (self.get ()))
+    buffer = through_gate (state.stream.gate, buffer);
+  const GstFlowReturn flow =
+      buffer ? state.chain (pad, parent, buffer) : GST_FLOW_OK;
   if (!state.stream.has_failed)
     return flow;
   const auto end = [] (GstElement *, GstPad *src, gpointer) {
@@ -497,8 +519,8 @@ properties ()
 {
   return {
       {"salvage", "Salvage",
-          "Read from front to back, without the index, and end the stream at "
-          "damage of the container, with a warning",
+          "Read from front to back, without the index, and go on behind what "
+          "is damaged",
           kReadWriteReady, &RecordDemuxState::salvage},
       {"decode", "Decode",
           "Decode the frames; without it, they are as they are stored, with "

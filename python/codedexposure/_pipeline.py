@@ -182,6 +182,7 @@ class Player:
         self.about = about
         self.quiet = quiet
         self.part = part
+        self.was_cut = False  # the stream ended before its last line
         try:
             self.pipeline = Gst.parse_launch(description)
         except GLib.Error as error:
@@ -239,7 +240,9 @@ class Player:
             error, debug = message.parse_warning()
             self.warn(_text_of(message, error, debug))
         elif message.type == Gst.MessageType.ELEMENT:
-            text = _loss_in(message.get_structure())
+            structure = message.get_structure()
+            self.was_cut |= structure.get_name() == "codedexposure/stream-cut"
+            text = _loss_in(structure)
             if text:
                 self.warn(text)
 

@@ -169,12 +169,14 @@ class Recording:
                         if last is None or frame.time_ns > last or not salvage:
                             last = frame.time_ns
                             yield player, frame
+                    if player.was_cut and not (self._cut or salvage):
+                        raise ContainerError("its end was not reached")
                 break
             except ContainerError as damage:
                 if salvage:
                     raise self._no_frame(damage) from None
-                player.warn("the index or the tags are damaged; reading the "
-                            "file from front to back")
+                player.warn("the file is damaged between its frames; reading "
+                            "it from front to back")
         if last is None:
             raise self._no_frame()
         if self._cut:

@@ -3,6 +3,7 @@
 """The Python package gives what codedexposure decode writes, and says what is lost."""
 import csv
 import json
+import re
 import unittest
 import warnings
 
@@ -201,7 +202,20 @@ class Facts(unittest.TestCase):
             data[:at] + bytes([data[at] ^ 4]) + data[at + 1:])
         frames, said = read("index.mkv")
         self.assertEqual(pixels(frames), decoded("index.mkv", status=3))
-        self.assertIn("the index or the tags are damaged", said)
+        self.assertIn("damaged between its frames", said)
+
+    def test_garbage_over_the_beginning_of_a_frame(self):
+        data = bytearray((SCRATCH / "plain.mkv").read_bytes())
+        begins = [at.start() for at in re.finditer(b"\x1f\x43\xb6\x75", data)]
+        garbage = np.random.default_rng(3).integers(256, size=40, dtype=np.uint8)
+        data[begins[4]:begins[4] + 40] = garbage.tobytes()
+        (SCRATCH / "garbage.mkv").write_bytes(data)
+        frames, said = read("garbage.mkv")
+        self.assertEqual([f.frame for f in frames[::4]],
+                         [0, 1, 2, 3, *range(5, 12)])
+        self.assertEqual(pixels(frames), decoded("garbage.mkv", status=3))
+        self.assertIn("damaged between its frames", said)
+        self.assertIn("missing with all that is known of them: 1", said)
 
     def test_schedule(self):
         recording = opened("plain.mkv")

@@ -15,7 +15,16 @@ using namespace gst;
 namespace
 {
 
-/* A quarter of the memory that is free, in bytes. */
+/* How many frames may wait for encoder and disk: 3 s. */
+int
+frames_that_wait (FrameRate rate)
+{
+  constexpr int kFewest = 75;
+  return std::max (kFewest, 3 * rate.num / std::max (rate.den, 1));
+}
+
+} // namespace
+
 std::uint64_t
 room_in_memory ()
 {
@@ -29,16 +38,6 @@ room_in_memory ()
   }
   return kUnknown;
 }
-
-/* How many frames may wait for encoder and disk: 3 s. */
-int
-frames_that_wait (FrameRate rate)
-{
-  constexpr int kFewest = 75;
-  return std::max (kFewest, 3 * rate.num / std::max (rate.den, 1));
-}
-
-} // namespace
 
 std::string
 sidecar_of (const std::string &recording)

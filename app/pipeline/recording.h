@@ -31,6 +31,9 @@ Chain read_recording (Job &job, const std::string &file);
 /** The same of a sender, over TCP. */
 Chain read_sender (Job &job, const std::string &host, int port);
 
+/** A quarter of the memory that is free, in bytes. */
+std::uint64_t room_in_memory ();
+
 /** FILE.jsonl of FILE.mkv. */
 std::string sidecar_of (const std::string &recording);
 

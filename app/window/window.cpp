@@ -6,6 +6,9 @@
 #include <filesystem>
 #include <utility>
 
+#include <csignal>
+
+#include <glib-unix.h>
 #include <gst/video/navigation.h>
 
 #include "common/element.h"
@@ -103,7 +106,7 @@ struct Window::Pane {
 
 Window::Window (WindowBranch branch, GstPad *coded, const Style &style)
     : size_ (branch.size), room_ (style.room), delay_ (style.delay),
-      name_ (style.name)
+      name_ (style.name), keeper_ (coded)
 {
   for (WindowPane &part : branch.panes) {
     auto pane = std::make_unique<Pane> ();
@@ -126,8 +129,32 @@ Window::Window (WindowBranch branch, GstPad *coded, const Style &style)
 
 Window::~Window ()
 {
+  if (on_signal_ > 0)
+    g_source_remove (on_signal_);
   while (g_idle_remove_by_data (this)) {
   }
+}
+
+/* An experiment tells by a signal that something has happened. */
+void
+Window::begin (Calls calls)
+{
+  calls_ = std::move (calls);
+  keeper_.begin (calls_.said);
+  on_signal_ = g_unix_signal_add (
+      SIGUSR1,
+      [] (gpointer self) {
+        static_cast<Window *> (self)->keep ();
+        return gboolean (G_SOURCE_CONTINUE);
+      },
+      this);
+}
+
+void
+Window::finish ()
+{
+  save_snapshots ();
+  keeper_.finish ();
 }
 
 void
@@ -363,6 +390,8 @@ Window::press (const std::string &key)
   };
   if (is ("q"))
     g_idle_add (on_end, this);
+  if (is ("k"))
+    g_idle_add (on_keep, this);
   const std::lock_guard lock (mutex_);
   snapshot_wanted_ |= is ("s");
   const bool was_live = replay_.is_live ();
@@ -380,6 +409,20 @@ Window::on_end (gpointer self)
 {
   static_cast<Window *> (self)->calls_.end ();
   return G_SOURCE_REMOVE;
+}
+
+gboolean
+Window::on_keep (gpointer self)
+{
+  static_cast<Window *> (self)->keep ();
+  return G_SOURCE_REMOVE;
+}
+
+void
+Window::keep ()
+{
+  if (const auto begun = keeper_.keep (name_); !begun)
+    calls_.said (begun.error ().message, true);
 }
 
 void

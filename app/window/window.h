@@ -17,6 +17,7 @@
 #include "pipeline/job.h"
 #include "stats/picture_stats.h"
 #include "window/branch.h"
+#include "window/keeper.h"
 #include "window/paint.h"
 #include "window/replay.h"
 
@@ -44,10 +45,10 @@ public:
   Window (const Window &) = delete;
   Window &operator= (const Window &) = delete;
 
-  void begin (Calls calls) override { calls_ = std::move (calls); }
+  void begin (Calls calls) override;
   void tell (const std::string &frames, bool alarm) override;
-  /** Writes the snapshots that were not yet written. */
-  void finish () override { save_snapshots (); }
+  /** Writes the snapshots and frames that were not yet written. */
+  void finish () override;
 
 private:
   struct Shown { // a remembered picture
@@ -78,6 +79,7 @@ private:
       GstElement *, cairo_t *cairo, guint64 time, guint64, gpointer self);
   static gboolean on_end (gpointer self);
   static gboolean on_snapshot (gpointer self);
+  static gboolean on_keep (gpointer self);
 
   void watch (Pane &pane);
   void set_layout (const GstVideoInfo &camera);
@@ -94,6 +96,7 @@ private:
   void take_snapshot (
       cairo_t *cairo, const WindowLayout &layout, const Shown &subframe);
   void save_snapshots ();
+  void keep ();
   Result<std::string> save (const Snapshot &snapshot) const;
 
   GstElement *const size_; // of the pipeline
@@ -102,6 +105,8 @@ private:
   const std::string name_;
   Calls calls_; // constant while the pipeline plays
   std::vector<std::unique_ptr<Pane>> panes_; // constant
+  Keeper keeper_;
+  guint on_signal_ = 0; // source
 
   std::mutex mutex_; // of all below
   std::optional<WindowLayout> layout_;

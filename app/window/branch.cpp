@@ -112,9 +112,9 @@ WindowOptions::keys_of (const std::string &command)
          "on in a pause\nor loop, and subframes are skipped if the screen is "
          "too slow. The window keeps\nthe pictures of about one second, 8 "
          "bits deep and at most as large as shown:\n25 MB for 768x576 pixels "
-         "at 25 frames/s, and N times 14 MB more if fused; and the\n"
-         "coded frames of the last 10 s, 110 MB, up to a quarter of the free "
-         "memory.\n";
+         "at 25 frames/s, and N times 14 MB more if fused; and\nthe "
+         "coded frames of the last 10 s, 110 MB, up to a quarter of the "
+         "free memory.\n";
 }
 
 WindowBranch

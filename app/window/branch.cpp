@@ -106,7 +106,7 @@ WindowOptions::keys_of (const std::string &command)
          "  K               keep what has just happened: the coded frames of "
          "the last 10 s\n                  become a recording, " +
          command +
-         "-frameN.mkv. So does the signal USR1\n"
+         "-frameN.mkv;\n                  the signal USR1 does so, too\n"
          "  Q               end, as Ctrl-C does\n"
          "The stream does not wait for the window: recording and counting go "
          "on in a pause\nor loop, and subframes are skipped if the screen is "

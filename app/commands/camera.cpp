@@ -45,9 +45,8 @@ open (const std::string &name)
     return camera;
   const std::string why = failed ? failed->message : "it does not answer";
   g_clear_error (&failed);
-  throw Failure{Exit::no_device,
-      Error{"cannot open the camera " + name + ": " + why + "; " +
-            cameras_found ()}};
+  throw Failure{Exit::no_device, Error{"cannot open the camera " + name + ": " +
+                                       why + "; " + cameras_found ()}};
 }
 
 bool
@@ -84,14 +83,14 @@ in_a_row (const std::vector<std::string> &names)
   return text;
 }
 
-using ReadNames = const char **(*) (ArvCamera *, guint *, GError **);
+using ReadNames = const char **(*)(ArvCamera *, guint *, GError **);
 
 std::vector<std::string>
 names_of (ArvCamera *camera, ReadNames read)
 {
   guint count = 0;
-  const auto list = known (
-      [&] (GError **failed) { return read (camera, &count, failed); });
+  const auto list =
+      known ([&] (GError **failed) { return read (camera, &count, failed); });
   if (!list || !*list)
     return {};
   std::vector<std::string> names (*list, *list + count);
@@ -119,8 +118,8 @@ size_of (ArvCamera *camera)
     arv_camera_get_sensor_size (camera, &width, &height, failed);
     return 0;
   });
-  return width > 0 ? std::to_string (width) + "x" +
-                         std::to_string (height) : "not known";
+  return width > 0 ? std::to_string (width) + "x" + std::to_string (height)
+                   : "not known";
 }
 
 /* A camera that a DMD drives starts each exposure at its trigger. */
@@ -256,11 +255,10 @@ show (const Arguments &arguments)
   const CameraPtr owned = open (arguments.name);
   ArvCamera *camera = owned.get ();
   Json result;
-  for (const auto &[key, feature] :
-      {std::pair ("vendor", "DeviceVendorName"),
-          std::pair ("model", "DeviceModelName"),
-          std::pair ("serial", "DeviceSerialNumber"),
-          std::pair ("firmware", "DeviceFirmwareVersion")})
+  for (const auto &[key, feature] : {std::pair ("vendor", "DeviceVendorName"),
+           std::pair ("model", "DeviceModelName"),
+           std::pair ("serial", "DeviceSerialNumber"),
+           std::pair ("firmware", "DeviceFirmwareVersion")})
     if (const std::string text = text_of (camera, feature); !text.empty ())
       result[key] = text;
   add_abilities (result, camera);

@@ -370,11 +370,10 @@ Decode::run ()
     result.exit = Exit::damaged;
   if (result.exit == Exit::damaged)
     Status ("decode", false)
-        .line (recording_ +
-               " is cut off or damaged; what could be decoded was" +
-               (*unflagged_ > 0
-                       ? ""
-                       : ", and pictures of damaged frames are flagged"));
+        .line (
+            recording_ + " is cut off or damaged; what could be decoded was" +
+            (*unflagged_ > 0 ? ""
+                             : ", and pictures of damaged frames are flagged"));
   if (*unflagged_ > 0)
     Status ("decode", false)
         .line (".mp4 has no place for the flags of " +

@@ -14,9 +14,9 @@ AddressOptions::check () const
   addrinfo *found = nullptr;
   const int error = getaddrinfo (host ().c_str (), nullptr, nullptr, &found);
   if (error != 0)
-    usage_error ("--host " + host () + " is not known here (" +
-                 gai_strerror (error) +
-                 "); give the name or the address of a machine in this network");
+    usage_error (
+        "--host " + host () + " is not known here (" + gai_strerror (error) +
+        "); give the name or the address of a machine in this network");
   freeaddrinfo (found);
 }
 

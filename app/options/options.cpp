@@ -134,8 +134,7 @@ Options::check_value (const Declared &option) const
                  " is an option; write a value after " + option.name +
                  ", and a file of that name as ./" + value);
   if (!option.read (value))
-    usage_error (
-        option.name + " must be " + option.must_be + ", not " + value);
+    usage_error (option.name + " must be " + option.must_be + ", not " + value);
 }
 
 void
@@ -178,11 +177,10 @@ Options::help () const
       heading = option.heading;
       text += heading.empty () ? "\n" : "\n" + heading + ":\n";
     }
-    text +=
-        wrapped ((option.name == kOutput ? "  -o, " : "  ") + option.name +
-                     (option.placeholder.empty () ? "" : " ") +
-                     option.placeholder,
-            option.help);
+    text += wrapped ((option.name == kOutput ? "  -o, " : "  ") + option.name +
+                         (option.placeholder.empty () ? "" : " ") +
+                         option.placeholder,
+        option.help);
   }
   return text;
 }

@@ -65,8 +65,8 @@ Run::claim_outputs ()
   return errors.empty ();
 }
 
-/* Signals are handled before files are made and the pipeline starts, so that one
- * in between leaves neither a file nor an open device. */
+/* Signals are handled before files are made and the pipeline starts, so that
+ * one in between leaves neither a file nor an open device. */
 bool
 Run::run_loop ()
 {
@@ -328,9 +328,9 @@ Run::on_element_message (const GstStructure *structure, GstMessage *message)
       (name == "codedexposure/stream-incomplete" && !job_.retry);
   if (damage && (interrupted_ || failed_)) // the stream was cut here
     return;
-  /* A demuxer takes the length that damage claims, which may be all the rest. */
-  if (name == "codedexposure/stream-cut" && job_.is_finished &&
-      !job_.salvage) {
+  /* A demuxer takes the length that damage claims, which may be all the rest.
+   */
+  if (name == "codedexposure/stream-cut" && job_.is_finished && !job_.salvage) {
     container_damaged_ = true;
     end (Exit::failed);
     return;

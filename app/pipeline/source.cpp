@@ -195,7 +195,8 @@ user_source (Job &job, const std::string &description)
 {
   GstElement *bin = job.graph.add_text (description);
   const ObjectPtr<GstPad> pad (gst_element_get_static_pad (bin, "src"));
-  const CapsPtr gives (pad ? gst_pad_query_caps (pad.get (), nullptr) : nullptr);
+  const CapsPtr gives (
+      pad ? gst_pad_query_caps (pad.get (), nullptr) : nullptr);
   const CapsPtr coded (
       gst_caps_from_string ("video/x-raw,format={GRAY8,GRAY16_LE}"));
   if (gives && !gst_caps_can_intersect (gives.get (), coded.get ()))
@@ -212,11 +213,10 @@ Chain
 coded_source (
     Job &job, const SourceOptions &options, const SourcePlan &plan, Pace pace)
 {
-  Chain chain =
-      options.camera ? camera_source (job, options, plan)
-      : options.source
-          ? user_source (job, *options.source)
-          : simulation (job, options, plan, pace, {{"dmd", "sim:bench"}});
+  Chain chain = options.camera   ? camera_source (job, options, plan)
+                : options.source ? user_source (job, *options.source)
+                                 : simulation (job, options, plan, pace,
+                                       {{"dmd", "sim:bench"}});
   if (options.camera) {
     watch_exposure (chain.last (), plan);
     job.source = "the camera " + *options.camera;

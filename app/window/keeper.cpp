@@ -168,8 +168,8 @@ write (GstCaps *caps, GstEvent *tag, std::deque<BufferPtr> buffers,
   auto *source = GST_APP_SRC (chain.last ());
   gst_app_src_set_caps (source, caps);
   g_object_set (source, "format", GST_FORMAT_TIME, nullptr);
-  chain.to ("codedexposure-recordmux",
-      {{"threads", 1}, {"log-location", sidecar}});
+  chain.to (
+      "codedexposure-recordmux", {{"threads", 1}, {"log-location", sidecar}});
   chain.to ("filesink", {{"location", recording}});
   if (tag)
     gst_element_send_event (GST_ELEMENT (source), gst_event_ref (tag));
@@ -196,9 +196,9 @@ publish (GstCaps *caps, GstEvent *tag, std::deque<BufferPtr> buffers,
   const std::string failed = write (
       caps, tag, std::move (buffers), recording.path (), sidecar.path ());
   Result<void> done =
-      failed.empty () ? recording.publish (false)
-                      : Error{"cannot write " + name + ": " + failed,
-                            ErrorCode::io};
+      failed.empty ()
+          ? recording.publish (false)
+          : Error{"cannot write " + name + ": " + failed, ErrorCode::io};
   if (done)
     done = sidecar.publish (false);
   if (done)
@@ -230,10 +230,9 @@ Keeper::keep (const std::string &begin)
   }
   if (writer_.joinable ())
     writer_.join ();
-  writer_ = std::thread (
-      [this, begin, frames = std::move (frames)] () mutable {
-        run (begin, std::move (frames));
-      });
+  writer_ = std::thread ([this, begin, frames = std::move (frames)] () mutable {
+    run (begin, std::move (frames));
+  });
   return {};
 }
 
@@ -248,8 +247,8 @@ Keeper::run (const std::string &begin, Frames frames)
       begin + format ("-frame%06" G_GUINT64_FORMAT, meta ? meta->frame : 0));
   const std::lock_guard lock (mutex_);
   is_busy_ = false;
-  news_ = {written ? format ("%s (%zu coded frames, %.2f s)",
-                         written->c_str (), count, seconds)
+  news_ = {written ? format ("%s (%zu coded frames, %.2f s)", written->c_str (),
+                         count, seconds)
                    : written.error ().message,
       !written};
   g_idle_add (

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The last seconds of coded frames, for a recording of what has just happened. */
+/* The last seconds of coded frames, for a recording of what has just happened.
+ */
 #pragma once
 
 #include <cstdint>
@@ -40,9 +41,9 @@ public:
   /** What was written, or why not, goes to @p said, on the main thread. */
   void begin (Said said) { said_ = std::move (said); }
   /** Writes what there is now as a recording in the current folder, from a
-   * thread of its own. Its name begins with @p begin and the number of the first
-   * frame, and is that of no other file. An error while the last one is still
-   * being written. */
+   * thread of its own. Its name begins with @p begin and the number of the
+   * first frame, and is that of no other file. An error while the last one is
+   * still being written. */
   Result<void> keep (const std::string &begin);
   /** Waits for what is being written, and says it. */
   void finish ();

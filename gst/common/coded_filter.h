@@ -354,8 +354,8 @@ private:
     std::optional<FrameSequence> sequence;
     GstClockTime last_pts = GST_CLOCK_TIME_NONE;
     GstClockTime before = GST_CLOCK_TIME_NONE; ///< last_pts, if time goes on
-    bool was_late = false;    ///< the last frame was
-    bool is_recorded = false; ///< kRecordedEvent came
+    bool was_late = false;                     ///< the last frame was
+    bool is_recorded = false;                  ///< kRecordedEvent came
     /** PTS of a recorded frame, from its exposure on; all have the same. */
     std::optional<GstClockTimeDiff> moved;
     /** Until when upstream has said that frames are missing. */

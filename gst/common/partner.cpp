@@ -14,7 +14,8 @@ register_partner_meta ()
   static const gchar *tags[] = {GST_META_TAG_VIDEO_STR,
       GST_META_TAG_VIDEO_SIZE_STR, GST_META_TAG_VIDEO_ORIENTATION_STR, nullptr};
   if (!gst_meta_get_info (kPartnerMetaName))
-    gst_meta_register_custom (kPartnerMetaName, tags, nullptr, nullptr, nullptr);
+    gst_meta_register_custom (
+        kPartnerMetaName, tags, nullptr, nullptr, nullptr);
 }
 
 void
@@ -36,8 +37,9 @@ get_partner (GstBuffer *coded)
     return std::nullopt;
   GstBuffer *buffer = nullptr;
   GstCaps *caps = nullptr;
-  const bool complete = gst_structure_get (gst_custom_meta_get_structure (meta),
-      "buffer", GST_TYPE_BUFFER, &buffer, "caps", GST_TYPE_CAPS, &caps, nullptr);
+  const bool complete =
+      gst_structure_get (gst_custom_meta_get_structure (meta), "buffer",
+          GST_TYPE_BUFFER, &buffer, "caps", GST_TYPE_CAPS, &caps, nullptr);
   Partner partner{BufferPtr (buffer), CapsPtr (caps)};
   return complete ? std::optional (std::move (partner)) : std::nullopt;
 }

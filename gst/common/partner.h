@@ -12,9 +12,9 @@
 namespace codedexposure::gst
 {
 
-/** Name of the custom meta, "CodedExposurePartner", with the fields `buffer` and
- * `caps`. It is tagged {"video", "size", "orientation"}: whatever changes the
- * pixels of the coded frame drops it. It does not leave the process. */
+/** Name of the custom meta, "CodedExposurePartner", with the fields `buffer`
+ * and `caps`. It is tagged {"video", "size", "orientation"}: whatever changes
+ * the pixels of the coded frame drops it. It does not leave the process. */
 extern const char *const kPartnerMetaName;
 
 struct Partner {

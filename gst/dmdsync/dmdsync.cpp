@@ -67,10 +67,10 @@
  *
  * ## Two cameras
  *
- * With #dmdsync:beam off, the camera is a second one, in the beam of the mirrors
- * that are off. Its frames are stamped and numbered as those of the first, and
- * tagged for pad `off` of codedexposure-pair. No DMD is driven and no phase
- * watched: the dmdsync of the first camera does both.
+ * With #dmdsync:beam off, the camera is a second one, in the beam of the
+ * mirrors that are off. Its frames are stamped and numbered as those of the
+ * first, and tagged for pad `off` of codedexposure-pair. No DMD is driven and
+ * no phase watched: the dmdsync of the first camera does both.
  *
  * ## Patterns
  *

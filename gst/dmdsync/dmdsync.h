@@ -115,8 +115,8 @@ struct Stream {
   std::optional<BenchProfile> bench;
   bool simulated = false;
   bool off_beam = false; ///< of the camera, as the property or its tag says
-  int bits = 0;        ///< that upstream's tag has
-  std::string refused; ///< the error of the caps that were refused last
+  int bits = 0;          ///< that upstream's tag has
+  std::string refused;   ///< the error of the caps that were refused last
 };
 
 /** The object lock of the element is never held while pushing, querying or

@@ -64,13 +64,12 @@ make_timebase (GstCaps *caps, const SyncState &st)
 
   const PhaseWatch watch (st.schedule, time.info.width, time.info.height);
   if (st.schedule.pilot_rows () > 0 && !watch.complete ())
-    return Error{"frames of " + std::to_string (time.info.width) + "x" +
-                 std::to_string (time.info.height) +
-                 " cannot hold the pilot of " + st.schedule.text () +
-                 ", which is " + std::to_string (kPilotColumns) +
-                 " pixels wide and " +
-                 std::to_string (st.schedule.pilot_rows ()) +
-                 " rows high; use larger frames, or a schedule without pilot"};
+    return Error{
+        "frames of " + std::to_string (time.info.width) + "x" +
+        std::to_string (time.info.height) + " cannot hold the pilot of " +
+        st.schedule.text () + ", which is " + std::to_string (kPilotColumns) +
+        " pixels wide and " + std::to_string (st.schedule.pilot_rows ()) +
+        " rows high; use larger frames, or a schedule without pilot"};
   return time;
 }
 

@@ -91,8 +91,7 @@ stamp (GstDmdSync *self, GstBuffer *buffer, FrameMeta meta)
   if (std::exchange (stream.discont, false))
     GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DISCONT);
   const FrameMeta said = get_frame_meta (buffer).value_or (FrameMeta ());
-  meta.bits =
-      stream.frames->knows_bits () ? stream.frames->bits () : said.bits;
+  meta.bits = stream.frames->knows_bits () ? stream.frames->bits () : said.bits;
   /* Else it is that which the schedule asks for. */
   if (GST_CLOCK_TIME_IS_VALID (said.exposure_duration))
     meta.exposure_duration = said.exposure_duration;

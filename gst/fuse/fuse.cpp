@@ -100,8 +100,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "common/element.h"
 #include "base/pixels.h"
+#include "common/element.h"
 #include "common/elements.h"
 #include "common/partner.h"
 #include "extract/saturation.h"
@@ -193,8 +193,8 @@ Fuse::map_partner (GstBuffer *coded, BufferPtr &buffer, MappedFrame &mapped)
   GstVideoInfo info;
   if (!partner || !gst_video_info_from_caps (&info, partner->caps.get ()))
     return false;
-  const Extent size = plan_->of_partner ? plan_->of_partner->camera ()
-                                        : format ().size;
+  const Extent size =
+      plan_->of_partner ? plan_->of_partner->camera () : format ().size;
   if (GST_VIDEO_INFO_FORMAT (&info) !=
           GST_VIDEO_INFO_FORMAT (&format ().info) ||
       info.width != size.width || info.height != size.height)
@@ -211,14 +211,15 @@ Fuse::take_pixels (MappedFrame &coded, MappedFrame &partner)
 {
   std::optional<ImageView<const Pixel>> other;
   if (partner && plan_->of_partner) {
-    auto &image = std::get<Image<Pixel> &> (
-        std::tie (narrow_partner_, wide_partner_));
+    auto &image =
+        std::get<Image<Pixel> &> (std::tie (narrow_partner_, wide_partner_));
     const auto [width, height] = plan_->of_partner->mirrors ();
     if (image.width () != width || image.height () != height)
       image = Image<Pixel> (width, height);
     const int bits = significant_bits ();
-    if (const auto done = plan_->of_partner->run (view_of<const Pixel> (partner),
-            image.view (), bits > 0 ? largest_pixel (bits) : 0);
+    if (const auto done =
+            plan_->of_partner->run (view_of<const Pixel> (partner),
+                image.view (), bits > 0 ? largest_pixel (bits) : 0);
         !done)
       return done.error ();
     other = image.view ();

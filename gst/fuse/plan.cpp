@@ -43,8 +43,8 @@ Fuse::properties ()
       {"refine", "Refine",
           "Refine the result by a network that learned from pictures, as "
           "quality=learned does with best; for one-hot codes of 2 to 16 slots "
-          "and an off-state leakage of up to 5 %, others stay as they are, with "
-          "a warning",
+          "and an off-state leakage of up to 5 %, others stay as they are, "
+          "with a warning",
           kReadWrite, &FuseOptions::refine},
       {"lookahead", "Lookahead",
           "Coded frames to wait for before one is fused; static pixels are "

@@ -16,8 +16,7 @@ using Verdict = PartnerWatch::Verdict;
 PartnerWatch::Camera
 camera_of (const PairStream &stream)
 {
-  PartnerWatch::Camera camera{
-      {stream.info.width, stream.info.height}, nullptr};
+  PartnerWatch::Camera camera{{stream.info.width, stream.info.height}, nullptr};
   int bits = 0;
   if (stream.setup) {
     bits = stream.setup->bits;
@@ -74,8 +73,8 @@ PairCheck::check (GstBuffer *coded, GstBuffer *partner)
   if (!on || !off)
     return Verdict::unknown;
   return read_pixels (on, [&] (const auto &first) {
-    return read_pixels (off,
-        [&] (const auto &second) { return watch_->take (first, second); });
+    return read_pixels (
+        off, [&] (const auto &second) { return watch_->take (first, second); });
   });
 }
 

@@ -21,41 +21,44 @@
  *
  * Time stamps can be wrong by a frame. The sum of both beams has the light of
  * the whole exposure and shows no masks; that of different exposures shows them
- * where the scene moves. A pair that is clearly worse than either frame would be
- * with one of the three frames before of the other camera is therefore none: the
- * coded frame passes alone. Eight of these in a row are a warning. Where nothing moves, a
- * wrong pair is not noticed, and does no harm. This needs the schedule in a tag,
- * as codedexposure-sim, dmdsync and recordings have it, and, where frames do
- * not lie on the mirrors pixel by pixel, the mappings of both cameras.
+ * where the scene moves. A pair that is clearly worse than either frame would
+ * be with one of the three frames before of the other camera is therefore none:
+ * the coded frame passes alone. Eight of these in a row are a warning. Where
+ * nothing moves, a wrong pair is not noticed, and does no harm. This needs the
+ * schedule in a tag, as codedexposure-sim, dmdsync and recordings have it, and,
+ * where frames do not lie on the mirrors pixel by pixel, the mappings of both
+ * cameras.
  *
- * In a live pipeline, a coded frame waits for its partner as long as the latency
- * of the slower camera and a quarter of a frame period allow, and then goes
- * alone.
+ * In a live pipeline, a coded frame waits for its partner as long as the
+ * latency of the slower camera and a quarter of a frame period allow, and then
+ * goes alone.
  *
  * ## Flags, metas and messages
  *
  * A partner is in the custom meta `CodedExposurePartner` of the coded frame,
  * with the fields `buffer` and `caps`. What changes the pixels of the coded
- * frame drops it, and it does not leave the process. The stream tag of the coded
- * frames gets the key `partner` with size and mapping of the second camera.
+ * frame drops it, and it does not leave the process. The stream tag of the
+ * coded frames gets the key `partner` with size and mapping of the second
+ * camera.
  *
  * The message `codedexposure/partner-lost` is posted when coded frames begin to
- * go on alone (`active` TRUE, `reason`, `from`) and when they have partners again
- * (`frames` how many were alone, `reason` of the first, `from`, `to`, at the end
- * of the stream the last of them). The reason
- * is `missing`, `damaged` or `other-exposure`. #codedexposure-pair:frames-paired,
- * #codedexposure-pair:pairs-confirmed,
- * #codedexposure-pair:frames-alone, #codedexposure-pair:pairs-refused and
- * #codedexposure-pair:partners-dropped count.
+ * go on alone (`active` TRUE, `reason`, `from`) and when they have partners
+ * again (`frames` how many were alone, `reason` of the first, `from`, `to`, at
+ * the end of the stream the last of them). The reason is `missing`, `damaged`
+ * or `other-exposure`. #codedexposure-pair:frames-paired,
+ * #codedexposure-pair:pairs-confirmed, #codedexposure-pair:frames-alone,
+ * #codedexposure-pair:pairs-refused and #codedexposure-pair:partners-dropped
+ * count.
  *
  * ## Example pipeline
  * |[
  * gst-launch-1.0 videotestsrc num-buffers=400 pattern=ball \
  *     ! video/x-raw,format=GRAY8,width=768,height=576,framerate=100/1 \
  *     ! tee name=light \
- *     light. ! queue ! codedexposure-sim schedule=sequential:lattice:4/2 ! pair.on \
- *     light. ! queue \
- *     ! codedexposure-sim schedule=sequential:lattice:4/2 beam=off seed=1 ! pair.off \
+ *     light. ! queue ! codedexposure-sim schedule=sequential:lattice:4/2 \
+ *     ! pair.on \
+ *     light. ! queue ! codedexposure-sim schedule=sequential:lattice:4/2 \
+ *     beam=off seed=1 ! pair.off \
  *     codedexposure-pair name=pair ! codedexposure-fuse \
  *     ! queue ! videoconvert ! autovideosink
  * ]| A simulated bench with two cameras.
@@ -118,7 +121,7 @@ name_of (Alone alone)
 /* Coded frames in a row that go on alone. */
 struct Run {
   guint64 frames = 0;
-  guint64 refused = 0; ///< the last ones
+  guint64 refused = 0;                     ///< the last ones
   GstClockTime from = GST_CLOCK_TIME_NONE; ///< PTS of the first
   GstClockTime last = GST_CLOCK_TIME_NONE; ///< PTS of the last
   Alone reason = Alone::no;                ///< of the first
@@ -207,8 +210,8 @@ enum class Found { kPartner, kNone, kWait };
 /* The partner of @coded, which is taken from its pad; frames before it are
  * dropped. @late: no longer waits for it. */
 Found
-find_partner (GstCodedExposurePair *self, GstBuffer *coded, bool late,
-    BufferPtr &partner)
+find_partner (
+    GstCodedExposurePair *self, GstBuffer *coded, bool late, BufferPtr &partner)
 {
   GstAggregatorPad *on = sink (self, "on"), *off = sink (self, "off");
   const GstClockTime start = exposure_of (on, coded);
@@ -279,8 +282,9 @@ warn_if_out_of_step (GstCodedExposurePair *self, Alone alone)
   if (run.refused == kOutOfStep)
     POST_WARNING (self, STREAM, FAILED,
         "The frames of the second camera are of other exposures than the coded "
-        "frames whose times they have, as their pixels show; coded frames go on "
-        "alone. Trigger both cameras by one signal, and start both before it.");
+        "frames whose times they have, as their pixels show; coded frames go "
+        "on alone. Trigger both cameras by one signal, and start both before "
+        "it.");
 }
 
 void
@@ -323,8 +327,8 @@ count (GstCodedExposurePair *self, GstBuffer *coded, Alone alone)
     end_run (self, pts);
 }
 
-/* Before the frame that is next at the source pad, where caps and segment of the
- * base class have passed. */
+/* Before the frame that is next at the source pad, where caps and segment of
+ * the base class have passed. */
 GstPadProbeReturn
 push_due (GstPad *pad, GstPadProbeInfo *, gpointer data)
 {
@@ -371,9 +375,8 @@ aggregate (GstAggregator *aggregator, gboolean late)
   }
   count (self, coded.get (), alone);
   auto *src = GST_AGGREGATOR_PAD (GST_AGGREGATOR_SRC_PAD (aggregator));
-  locked (src, [&] {
-    return src->segment.position = GST_BUFFER_PTS (coded.get ());
-  });
+  locked (src,
+      [&] { return src->segment.position = GST_BUFFER_PTS (coded.get ()); });
   return gst_aggregator_finish_buffer (aggregator, coded.release ());
 }
 
@@ -417,8 +420,7 @@ follow (GstCodedExposurePair *self, bool on, GstEvent *event)
     break;
   case GST_EVENT_SEGMENT:
     if (on)
-      gst_aggregator_update_segment (
-          GST_AGGREGATOR (self), segment_of (event));
+      gst_aggregator_update_segment (GST_AGGREGATOR (self), segment_of (event));
     break;
   case GST_EVENT_TAG:
     if (const auto setup = setup_from_tags (tags_of (event)); setup && *setup) {
@@ -576,8 +578,8 @@ void
 set_up_instance (GstCodedExposurePair *self)
 {
   for (const char *name : {"on", "off"}) {
-    GstPadTemplate *pad_template = gst_element_class_get_pad_template (
-        GST_ELEMENT_GET_CLASS (self), name);
+    GstPadTemplate *pad_template =
+        gst_element_class_get_pad_template (GST_ELEMENT_GET_CLASS (self), name);
     gst_element_add_pad (GST_ELEMENT (self),
         GST_PAD (g_object_new (GST_TYPE_AGGREGATOR_PAD, "name", name,
             "direction", GST_PAD_SINK, "template", pad_template, nullptr)));

@@ -425,8 +425,9 @@ through_gate (ClusterGate &gate, GstBuffer *buffer)
   const std::string passed =
       gate.take ({reinterpret_cast<const char *> (map.data), map.size});
   gst_buffer_unmap (buffer, &map);
-  return passed.empty () ? nullptr
-                         : gst_buffer_new_memdup (passed.data (), passed.size ());
+  return passed.empty ()
+             ? nullptr
+             : gst_buffer_new_memdup (passed.data (), passed.size ());
 }
 
 /* A demuxer that has failed does not pass the end on, and its source would post

@@ -124,12 +124,11 @@ count_inputs (
 
 /* What of each input frame falls into no slot, in active times of a slot. */
 std::vector<double>
-light_between (const SlotPlan &slots,
-    const std::vector<std::vector<LightShare>> &shares)
+light_between (
+    const SlotPlan &slots, const std::vector<std::vector<LightShare>> &shares)
 {
-  const double all =
-      double (slots.frame_period ()) / double (slots.active ()) /
-      double (shares.size ());
+  const double all = double (slots.frame_period ()) / double (slots.active ()) /
+                     double (shares.size ());
   std::vector<double> between;
   for (const auto &of_input : shares) {
     double left = all;

@@ -15,9 +15,9 @@
 #include "bench/bench.h"
 #include "bench/light_share.h"
 #include "bench/simulated_dmd.h"
+#include "common/beam.h"
 #include "common/element.h"
 #include "common/named.h"
-#include "common/beam.h"
 #include "common/raii.h"
 #include "schedule/schedule.h"
 #include "setup/stream_setup.h"
@@ -52,8 +52,8 @@ struct Plan {
   int inputs; ///< input frames in a coded frame
   /** What the slots collect of each of them. */
   std::vector<std::vector<LightShare>> shares;
-  /** What falls between the slots, while all mirrors are off, of each; in active
-   * times of a slot. */
+  /** What falls between the slots, while all mirrors are off, of each; in
+   * active times of a slot. */
   std::vector<double> between;
 };
 

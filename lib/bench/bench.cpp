@@ -204,8 +204,7 @@ OpticalBench::expose (ImageView<Pixel> scene, int mask, double slots)
   assert (masks_ && same_size (scene, light_.view ()));
   const float on = float (slots);
   const float off =
-      mask == kAllMirrors ? on
-                          : float (slots * masks_->schedule ().leak ());
+      mask == kAllMirrors ? on : float (slots * masks_->schedule ().leak ());
   const auto collect_row =
       empty_ ? collect<true, Pixel> : collect<false, Pixel>;
   const auto collect_shared =

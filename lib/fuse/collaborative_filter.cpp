@@ -103,7 +103,7 @@ struct CollaborativeFilter::Step {
   const Kernels &kernels;
   int shift_x, shift_y;
   float threshold;
-  float length; ///< as kStep
+  float length;     ///< as kStep
   float of_partner; ///< how far to go towards what it saw
 };
 
@@ -222,7 +222,8 @@ CollaborativeFilter::run (const Kernels &kernels, const Field &coded,
   std::fill (weight_.begin (), weight_.end (), 0.0f);
 
   const double last = std::max (kLastThreshold, kNoiseThreshold * noise);
-  const double first = std::max (partner ? kFirstWithPartner : kFirstThreshold, 2.0 * last);
+  const double first =
+      std::max (partner ? kFirstWithPartner : kFirstThreshold, 2.0 * last);
   for (int i = 0; i < kIterations; i++) {
     const double threshold =
         first * std::pow (last / first,

@@ -57,7 +57,7 @@ private:
   std::vector<std::uint8_t> elements_; ///< at every place
   std::vector<std::uint8_t> measured_; ///< slots of coded pixels that see one
   std::vector<float> coded_;
-  std::vector<float> of_partner_; ///< empty without it
+  std::vector<float> of_partner_;               ///< empty without it
   std::vector<std::vector<float>> light_, sum_; ///< of each slot
   std::vector<float> weight_;
   std::vector<std::vector<float>> scratch_; ///< of each worker

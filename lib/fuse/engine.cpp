@@ -152,9 +152,8 @@ Engine::make (const Schedule &schedule, const Schedule *partner, int width,
                  " pixels hold no cell of " + schedule.text ()};
   RETURN_IF_ERROR (check (options));
   RETURN_IF_ERROR (check (schedule, options.quality));
-  return std::unique_ptr<Engine> (
-      new Engine (schedule, partner, {width, rows}, options, steps,
-          std::move (stop)));
+  return std::unique_ptr<Engine> (new Engine (
+      schedule, partner, {width, rows}, options, steps, std::move (stop)));
 }
 
 Engine::Engine (const Schedule &schedule, const Schedule *partner, Extent size,
@@ -181,8 +180,8 @@ Engine::Engine (const Schedule &schedule, const Schedule *partner, Extent size,
       relative_noise (observation_), of_partner,
       of_partner ? relative_noise (*of_partner) : std::vector<double> (),
       radius, pixel_steps, options.lookahead > 0, std::move (stop)});
-  stream_.emplace (schedule, observation_, of_partner, size, radius, period,
-      pixel_steps);
+  stream_.emplace (
+      schedule, observation_, of_partner, size, radius, period, pixel_steps);
   static_pixels_.emplace (
       noise_, size, around, !observation_.noise_free (), largest);
   if (partner)
@@ -270,8 +269,8 @@ Engine::fit_partner (const CodedFrames &frames, Workers &workers,
   if (!frames.now->has_partner)
     return true;
   constexpr int kMinRows = 16;
-  return run_bands (
-      workers, size_.height, kMinRows, std::move (stop), [&] (const Band &band) {
+  return run_bands (workers, size_.height, kMinRows, std::move (stop),
+      [&] (const Band &band) {
         PartnerFit::Room room (*partner_fit_);
         std::vector<float *> rows (light_.size ());
         for (int y = band.first; y < band.end; y++) {

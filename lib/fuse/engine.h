@@ -66,7 +66,8 @@ private:
       const Uncertainty::Sink &deviations);
   bool fill_light (const CodedFrames &frames, const Seen &seen,
       Workers &workers, std::stop_token stop);
-  /** PartnerFit of light_; @p made, if set, gets what that makes in the partner.
+  /** PartnerFit of light_; @p made, if set, gets what that makes in the
+   * partner.
    */
   bool fit_partner (const CodedFrames &frames, Workers &workers,
       std::stop_token stop, Field *made = nullptr);

@@ -26,7 +26,8 @@ add_block (std::vector<Run> &runs, int block)
 
 /** Where the taps of the filters of a row are: the pixels within a distance of
  * it in the frame that is fused, those within kNeighbourRadius in the coded
- * frames before and after it, and those within kPartnerRadius in its partner. */
+ * frames before and after it, and those within kPartnerRadius in its partner.
+ */
 class TapSources
 {
 public:

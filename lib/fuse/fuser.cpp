@@ -117,9 +117,9 @@ make_pieces (const Schedule &schedule, int width, int height,
       partner = part_of (*complement, i);
     const Rect rect = i < 0 ? Rect{0, 0, width, height}
                             : schedule.regions ()[std::size_t (i)].rect;
-    ASSIGN_OR_RETURN (auto engine,
-        fuse::Engine::make (part, partner ? &*partner : nullptr, rect.width,
-            rect.height, options, largest, stop));
+    ASSIGN_OR_RETURN (
+        auto engine, fuse::Engine::make (part, partner ? &*partner : nullptr,
+                         rect.width, rect.height, options, largest, stop));
     pieces.push_back (
         {rect, schedule.slots () / part.slots (), std::move (engine)});
   }

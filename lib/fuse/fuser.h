@@ -33,8 +33,8 @@ struct FuseOptions {
   /** Refine the result by a network that learned from pictures. Otherwise,
    * nothing is learned from pictures but the parameters of the scene model. */
   bool refine = false;
-  /** Coded frames can have partners: frames of a second camera in the beam of the
-   * mirrors that are off, with the same noise. */
+  /** Coded frames can have partners: frames of a second camera in the beam of
+   * the mirrors that are off, with the same noise. */
   bool partner = false;
   /** Flat light that makes a partner's pixel as bright as a coded pixel, as a
    * part of that which makes the coded one so: 1 if both have white at the same

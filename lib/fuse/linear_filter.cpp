@@ -10,8 +10,8 @@ namespace codedexposure::fuse
 namespace
 {
 
-/* Squared errors of filters beyond those with all taps, as a part of them, which
- * are smaller with a partner. */
+/* Squared errors of filters beyond those with all taps, as a part of them,
+ * which are smaller with a partner. */
 constexpr double kExcess = 0.015, kExcessWithPartner = 0.03;
 /* Rows that a thread takes at a time. */
 constexpr int kBandRows = 16;
@@ -33,9 +33,10 @@ LinearFilter::make_filters (Neighbours neighbours) const
 {
   const std::vector<SceneClass> &models = models_.with (neighbours);
   const double radius = plan_.radius + 0.5;
-  const std::vector<Tap>
-      wide = taps_around (radius, kNeighbourRadius, neighbours.none ()),
-      all = taps_around (radius, kNeighbourRadius, neighbours);
+  const std::vector<Tap> wide = taps_around (
+                             radius, kNeighbourRadius, neighbours.none ()),
+                         all =
+                             taps_around (radius, kNeighbourRadius, neighbours);
   const int slots = plan_.observation.slots ();
   Banks banks;
   for (const SceneClass &model : models) {

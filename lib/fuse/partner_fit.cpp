@@ -24,8 +24,8 @@ enum Row { kMissed, kSquared, kParts, kSum, kSquares, kStep, kRows };
 /* Sums over the kCount pixels around each one of @row, whose ends are repeated
  * in its margin. */
 void
-sum_around (const Kernels &kernels, float *row, int width, float *parts,
-    float *to)
+sum_around (
+    const Kernels &kernels, float *row, int width, float *parts, float *to)
 {
   std::fill_n (row - kAround, kAround, row[0]);
   std::fill_n (row + width, kAround, row[width - 1]);

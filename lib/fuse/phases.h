@@ -29,7 +29,8 @@ struct Tap {
   bool operator== (const Tap &) const = default;
 };
 
-/** The neighbouring coded frames that there are, and whether there is a partner.
+/** The neighbouring coded frames that there are, and whether there is a
+ * partner.
  */
 struct Neighbours {
   bool before = false, after = false;
@@ -69,8 +70,8 @@ std::vector<Tap> taps_around (double own, double reach, Neighbours neighbours);
 /** Of the taps in the coded frames before and after, px. Larger ones are not
  * more accurate. */
 constexpr double kNeighbourRadius = 2.3;
-/** Of the taps in the partner, px: a shallow code has the light of most slots in
- * every pixel. Larger ones are not more accurate. */
+/** Of the taps in the partner, px: a shallow code has the light of most slots
+ * in every pixel. Larger ones are not more accurate. */
 constexpr double kPartnerRadius = 1.5;
 
 /**

@@ -68,9 +68,10 @@ Predictions::make_filters (Neighbours neighbours) const
     classes = {kMoving};
   classes.insert (classes.begin (), kStatic);
   const double radius = plan_.radius - 1.5;
-  const std::vector<Tap>
-      near = taps_around (radius, kComparedRadius, neighbours.none ()),
-      all = taps_around (radius, kComparedRadius, neighbours);
+  const std::vector<Tap> near = taps_around (
+                             radius, kComparedRadius, neighbours.none ()),
+                         all =
+                             taps_around (radius, kComparedRadius, neighbours);
   /* Their taps fit some motion by chance, the more of all taps they are: their
    * squared errors count as this much larger. */
   const float chance =

@@ -66,10 +66,10 @@ ClusterGate::find_cluster (std::string &head)
   const std::size_t found = held_.find (kClusterName, at_);
   /* The name may begin in the last bytes. */
   const std::size_t before =
-      found != held_.npos ? found - at_
-                          : held_.size () - at_ -
-                                std::min (held_.size () - at_,
-                                    kClusterName.size () - 1);
+      found != held_.npos
+          ? found - at_
+          : held_.size () - at_ -
+                std::min (held_.size () - at_, kClusterName.size () - 1);
   in_head_ ? pass (before, head) : drop (before);
   return found != held_.npos;
 }

@@ -16,15 +16,17 @@ namespace codedexposure::ebml
 
 /* Names of elements (RFC 9559). */
 inline constexpr std::uint64_t kEbml = 0x1a45dfa3, kSegment = 0x18538067,
-                        kInfo = 0x1549a966, kTimestampScale = 0x2ad7b1,
-                        kTracks = 0x1654ae6b, kTrackEntry = 0xae,
-                        kTrackNumber = 0xd7, kTrackType = 0x83, kCodecId = 0x86,
-                        kCodecPrivate = 0x63a2, kDefaultDuration = 0x23e383,
-                        kVideo = 0xe0, kPixelWidth = 0xb0, kPixelHeight = 0xba,
-                        kColourSpace = 0x2eb524, kCluster = 0x1f43b675,
-                        kTimestamp = 0xe7, kBlockGroup = 0xa0, kBlock = 0xa1,
-                        kSimpleBlock = 0xa3, kTitle = 0x7ba9,
-                        kAttachments = 0x1941a469, kChapters = 0x1043a770;
+                               kInfo = 0x1549a966, kTimestampScale = 0x2ad7b1,
+                               kTracks = 0x1654ae6b, kTrackEntry = 0xae,
+                               kTrackNumber = 0xd7, kTrackType = 0x83,
+                               kCodecId = 0x86, kCodecPrivate = 0x63a2,
+                               kDefaultDuration = 0x23e383, kVideo = 0xe0,
+                               kPixelWidth = 0xb0, kPixelHeight = 0xba,
+                               kColourSpace = 0x2eb524, kCluster = 0x1f43b675,
+                               kTimestamp = 0xe7, kBlockGroup = 0xa0,
+                               kBlock = 0xa1, kSimpleBlock = 0xa3,
+                               kTitle = 0x7ba9, kAttachments = 0x1941a469,
+                               kChapters = 0x1043a770;
 inline constexpr std::uint64_t kVideoTrack = 1, kTextTrack = 0x11;
 /** Where nothing else limits an element. */
 inline constexpr std::uint64_t kUnlimited = std::uint64_t (1) << 60;

@@ -18,8 +18,8 @@ constexpr int kMaxMirrors = 65536;
 /* Standard deviations; and blocks that differ, for these to mean something. */
 constexpr double kClear = 5.0;
 constexpr int kMinBlocks = 16;
-/* Of unevenness, as an amplitude. Light between pixels is uneven by some percent
- * more or less, as the scene moves. */
+/* Of unevenness, as an amplitude. Light between pixels is uneven by some
+ * percent more or less, as the scene moves. */
 constexpr double kMuchMore = 1.08;
 /* Pairs before. */
 constexpr std::size_t kBefore = 3;
@@ -73,8 +73,7 @@ smooth_in (Extent block)
 
 /* Of the sum of both beams in one block. */
 double
-unevenness (
-    const float *on, const float *off, std::size_t mirrors, double gain)
+unevenness (const float *on, const float *off, std::size_t mirrors, double gain)
 {
   double sum = 0.0;
   for (std::size_t i = 0; i < mirrors; i++) {
@@ -132,8 +131,8 @@ bilinear (ImageView<const Pixel> frame, Position at)
 
 PartnerWatch::PartnerWatch (
     const Schedule &schedule, const Camera &on, const Camera &off)
-    : on_{.black = on.black, .white = on.white},
-      off_{.black = off.black, .white = off.white}
+    : on_{.black = on.black, .white = on.white}, off_{.black = off.black,
+                                                     .white = off.white}
 {
   const Extent mirrors = on.mapping ? on.mapping->mirrors () : on.size;
   /* More than a tile, and little of the scene. */
@@ -151,8 +150,8 @@ PartnerWatch::PartnerWatch (
   const std::size_t step = blocks.size () * size_ / kMaxMirrors + 1;
   double light_on = 0.0, light_all = 0.0;
   for (std::size_t i = 0; i < blocks.size (); i += step)
-    for_each_mirror (block, int (blocks[i].x), int (blocks[i].y),
-        [&] (int x, int y) {
+    for_each_mirror (
+        block, int (blocks[i].x), int (blocks[i].y), [&] (int x, int y) {
           on_.places.push_back (place_in (on, x, y));
           off_.places.push_back (place_in (off, x, y));
           for (int slot = 0; slot < schedule.slots (); slot++)
@@ -183,8 +182,7 @@ PartnerWatch::read (const View &view, ImageView<const Pixel> frame) const
 /* By how many standard deviations @now is less even than @on and @off; none
  * where nothing differs. */
 double
-PartnerWatch::excess (
-    const Pair &now, const Light &on, const Light &off) const
+PartnerWatch::excess (const Pair &now, const Light &on, const Light &off) const
 {
   if (!(now.on.sum > 0.0 && now.off.sum > 0.0))
     return 0.0;

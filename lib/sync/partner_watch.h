@@ -15,15 +15,15 @@ namespace codedexposure
 {
 
 /**
- * Determines from the pixels whether a coded frame and a frame of the other beam
- * are partners.
+ * Determines from the pixels whether a coded frame and a frame of the other
+ * beam are partners.
  *
- * Every mirror sends the light of each slot into one of the beams, so the sum of
- * partners shows no masks. The sum of frames of different exposures shows them
- * wherever the scene moved. Each pair is therefore compared with those that its
- * frames would make with the three frames before: nothing needs to be known of the
- * scene, of noise or of the cameras' gains. Where nothing moves, no pair differs
- * from another, and a wrong one does no harm.
+ * Every mirror sends the light of each slot into one of the beams, so the sum
+ * of partners shows no masks. The sum of frames of different exposures shows
+ * them wherever the scene moved. Each pair is therefore compared with those
+ * that its frames would make with the three frames before: nothing needs to be
+ * known of the scene, of noise or of the cameras' gains. Where nothing moves,
+ * no pair differs from another, and a wrong one does no harm.
  *
  * Only mirrors count on which pixels of both cameras lie, to a quarter of a
  * pixel; where a mapping leaves hardly any, no verdict is known.

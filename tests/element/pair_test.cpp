@@ -27,8 +27,8 @@ BufferPtr
 numbered (guint64 number, GstClockTime pts, Image<std::uint8_t> picture = {})
 {
   if (picture.width () == 0)
-    picture = draw<std::uint8_t> (kWidth, kHeight,
-        [&] (int x, int y) { return int (number) + x + y; });
+    picture = draw<std::uint8_t> (
+        kWidth, kHeight, [&] (int x, int y) { return int (number) + x + y; });
   BufferPtr frame = frame_of (picture, pts);
   GST_BUFFER_OFFSET (frame.get ()) = number;
   GST_BUFFER_DURATION (frame.get ()) = kPeriod;
@@ -95,8 +95,8 @@ protected:
     EXPECT_EQ (counter ("pairs-refused"), refused);
     EXPECT_EQ (counter ("partners-dropped"), dropped);
   }
-  void expect_lost (const char *reason, guint64 count, GstClockTime from,
-      GstClockTime to)
+  void expect_lost (
+      const char *reason, guint64 count, GstClockTime from, GstClockTime to)
   {
     const auto begun = pair.posted<PartnerLost> ();
     const auto ended = pair.posted<PartnerLost> ();
@@ -184,8 +184,8 @@ TEST_F (Pair, AFrameWhosePartnerIsLostGoesOnAsItCame)
 
 TEST_F (Pair, AFrameOfTheSecondCameraAloneIsDropped)
 {
-  EXPECT_EQ (run (frames ({0, 3}), frames ({0, 1, 2, 3})),
-      (Numbers{{0, 0}, {3, 3}}));
+  EXPECT_EQ (
+      run (frames ({0, 3}), frames ({0, 1, 2, 3})), (Numbers{{0, 0}, {3, 3}}));
   expect_counters (2, 0, 0, 2);
 }
 
@@ -237,8 +237,8 @@ TEST_F (Pair, TheTagSaysHowTheSecondCameraStands)
 {
   const Schedule schedule = schedule_of (kPreset);
   const Mapping mapping (Extent{40, 30});
-  push_setup (off.get (),
-      {.schedule = schedule, .mapping = mapping, .off_beam = true});
+  push_setup (
+      off.get (), {.schedule = schedule, .mapping = mapping, .off_beam = true});
   push_setup (pair.get (), {.schedule = schedule});
   gst_harness_set_src_caps_str (off.get (), gray_caps (40, 30).c_str ());
   run (frames ({0}), {});
@@ -253,8 +253,7 @@ TEST_F (Pair, TheTagSaysHowTheSecondCameraStands)
 TEST_F (Pair, OtherTagsOfTheFirstCameraGoThroughAndThoseOfTheSecondDoNot)
 {
   const auto titled = [] (const char *title) {
-    return gst_event_new_tag (
-        gst_tag_list_new (GST_TAG_TITLE, title, nullptr));
+    return gst_event_new_tag (gst_tag_list_new (GST_TAG_TITLE, title, nullptr));
   };
   gst_harness_push_event (pair.get (), titled ("first"));
   gst_harness_push_event (off.get (), titled ("second"));
@@ -270,8 +269,8 @@ TEST_F (Pair, OtherTagsOfTheFirstCameraGoThroughAndThoseOfTheSecondDoNot)
 
 TEST_F (Pair, SwappedCamerasAreAnErrorThatSaysSo)
 {
-  push_setup (pair.get (),
-      {.schedule = schedule_of (kPreset), .off_beam = true});
+  push_setup (
+      pair.get (), {.schedule = schedule_of (kPreset), .off_beam = true});
   EXPECT_EQ (run (frames ({0, 1}), frames ({0, 1})), Numbers{});
   EXPECT_EQ (pair.error (),
       "The frames of pad on are of the beam of the mirrors that are off. Link "
@@ -292,8 +291,8 @@ TEST_F (Pair, CapsAndAllocationAreThoseOfTheFirstCamera)
   gst_harness_set_src_caps_str (
       off.get (), gray_caps (32, 20, "50/1", "GRAY16_LE").c_str ());
   run (frames ({0, 1}), {});
-  EXPECT_TRUE (same_caps (
-      pair.pad_caps ().get (), gray_caps (kWidth, kHeight)));
+  EXPECT_TRUE (
+      same_caps (pair.pad_caps ().get (), gray_caps (kWidth, kHeight)));
 }
 
 /* ---------------------------------------------------------------- pixels -- */
@@ -428,7 +427,8 @@ INSTANTIATE_TEST_SUITE_P (Campaign, PairTrouble,
         Trouble{"on_stops", 0.01, 0.01, 9 * kMs, false, true}),
     [] (const auto &trouble) { return std::string (trouble.param.name); });
 
-/* ------------------------------------------------------------ flush, live -- */
+/* ------------------------------------------------------------ flush, live --
+ */
 
 TEST_F (Pair, PairsAgainAfterAFlush)
 {
@@ -455,8 +455,7 @@ TEST (PairLive, AFrameWaitsForItsPartnerAndThenGoesAlone)
   gst_harness_use_testclock (pair.get ());
   for (GstHarness *camera : {pair.get (), off.get ()}) {
     gst_harness_set_upstream_latency (camera, 5 * kMs);
-    gst_harness_set_src_caps_str (
-        camera, gray_caps (kWidth, kHeight).c_str ());
+    gst_harness_set_src_caps_str (camera, gray_caps (kWidth, kHeight).c_str ());
   }
   pair.push (numbered (0, 0));
   gst_harness_push (off.get (), numbered (0, 0).release ());
@@ -471,8 +470,8 @@ TEST (PairLive, AFrameWaitsForItsPartnerAndThenGoesAlone)
   next.reset (gst_harness_pull (pair.get ()));
   ASSERT_TRUE (next);
   EXPECT_FALSE (get_partner (next.get ()));
-  EXPECT_EQ (gst_clock_get_time (GST_CLOCK (gst_harness_get_testclock (
-                 pair.get ()))),
+  EXPECT_EQ (
+      gst_clock_get_time (GST_CLOCK (gst_harness_get_testclock (pair.get ()))),
       kPeriod + 15 * kMs);
 }
 
@@ -524,7 +523,8 @@ TEST (PairBench, ComesBehindDmdsyncOfBothCameras)
           return which.contains (number++) ? GST_PAD_PROBE_DROP
                                            : GST_PAD_PROBE_OK;
         },
-        losses, [] (gpointer data) {
+        losses,
+        [] (gpointer data) {
           delete static_cast<std::pair<int, std::set<int>> *> (data);
         });
   };

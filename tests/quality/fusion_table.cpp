@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Prints the tables of docs/fusion.md or docs/two-cameras.md, or writes them into
- * it. */
+/* Prints the tables of docs/fusion.md or docs/two-cameras.md, or writes them
+ * into it. */
 #include <algorithm>
 #include <iostream>
 #include <iterator>

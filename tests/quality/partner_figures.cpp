@@ -78,15 +78,15 @@ partner_tables (const std::vector<Scene> &scenes, const Progress &progress)
     for (const char *mean : {"mean of one", "of both", "gain"})
       table.columns.push_back ({mean, 2});
     for (const int n : {4, 8})
-      for (const FuseQuality quality : {FuseQuality::kFast,
-               FuseQuality::kBalanced, FuseQuality::kBest}) {
+      for (const FuseQuality quality :
+          {FuseQuality::kFast, FuseQuality::kBalanced, FuseQuality::kBest}) {
         progress ("two cameras, " + std::to_string (n) + " slots");
         auto &row = table.rows.emplace_back (std::vector<Cell>{
             std::to_string (n), std::string (quality_name (quality))});
         BeamGain mean;
         for (const Scene &scene : scenes) {
-          const BeamGain gain = beam_gain (
-              scene, n, quality, condition, condition.of_partner ());
+          const BeamGain gain =
+              beam_gain (scene, n, quality, condition, condition.of_partner ());
           row.emplace_back (gain.two - gain.one);
           mean.one += gain.one / double (scenes.size ());
           mean.two += gain.two / double (scenes.size ());
@@ -108,12 +108,15 @@ partner_error_table (const std::vector<Scene> &scenes, const Progress &progress)
   using C = Condition;
   const Error errors[] = {
       {"none", [] (C &, C &, int) {}},
-      {"shift of 0.05 px along both axes", [] (C &, C &p, int) { p.shift = 0.05; }},
+      {"shift of 0.05 px along both axes",
+          [] (C &, C &p, int) { p.shift = 0.05; }},
       {"0.1 px", [] (C &, C &p, int) { p.shift = 0.1; }},
       {"0.25 px", [] (C &, C &p, int) { p.shift = 0.25; }},
       {"blur of 0.3 px", [] (C &, C &p, int) { p.blur = 0.3; }},
-      {"light 5 % less", [] (C &, C &p, int n) { p.gain = 0.95 * n / (n - 1); }},
-      {"black level 5 % of white", [] (C &, C &p, int) { p.black_level = 12.75; }},
+      {"light 5 % less",
+          [] (C &, C &p, int n) { p.gain = 0.95 * n / (n - 1); }},
+      {"black level 5 % of white",
+          [] (C &, C &p, int) { p.black_level = 12.75; }},
       {"0.3 px of blur on both",
           [] (C &c, C &p, int) { c.blur = p.blur = 0.3; }},
   };
@@ -124,9 +127,9 @@ partner_error_table (const std::vector<Scene> &scenes, const Progress &progress)
   for (const int n : {4, 8})
     for (const char *name : {"clean", "noisy"})
       for (const char *cameras : {"one", "both"})
-        table.columns.push_back (
-            {std::string (cameras) + ", " + name + ", n = " + std::to_string (n),
-                2});
+        table.columns.push_back ({std::string (cameras) + ", " + name +
+                                      ", n = " + std::to_string (n),
+            2});
   for (const Error &error : errors) {
     progress ("second camera: " + std::string (error.name));
     auto &row = table.rows.emplace_back (std::vector<Cell>{error.name});

@@ -56,9 +56,8 @@ write_features (
   options.refine = quality == FuseQuality::kLearned;
   options.noise = {condition.electrons, condition.read_noise};
   const int width = coded[0].width (), height = coded[0].height ();
-  auto engine =
-      must (fuse::Engine::make (
-          schedule, nullptr, width, height, options, 255.0, {}));
+  auto engine = must (fuse::Engine::make (
+      schedule, nullptr, width, height, options, 255.0, {}));
 
   Workers workers (1);
   std::mt19937 dice (std::mt19937::result_type (100 * number + n));

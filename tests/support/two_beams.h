@@ -41,10 +41,10 @@ clouds (Extent size, double slot, double speed)
 {
   constexpr double kSide = 6.0;
   const auto node = [] (int i, int j) {
-    return double ((std::uint32_t (i) * 2654435761u ^
-                       std::uint32_t (j) * 2246822519u) *
-                       3266489917u >>
-                   24);
+    return double (
+        (std::uint32_t (i) * 2654435761u ^ std::uint32_t (j) * 2246822519u) *
+            3266489917u >>
+        24);
   };
   Image<std::uint8_t> image (size.width, size.height);
   for (int y = 0; y < size.height; y++)

@@ -46,8 +46,7 @@ struct Stream {
 
   std::string cluster (std::size_t i) const
   {
-    const std::size_t end =
-        i + 1 < begins.size () ? begins[i + 1] : tail;
+    const std::size_t end = i + 1 < begins.size () ? begins[i + 1] : tail;
     return bytes.substr (begins[i], end - begins[i]);
   }
   std::size_t tail = 0; ///< cues
@@ -62,8 +61,8 @@ stream (int clusters, bool open)
                kUnknown + element ("\x15\x49\xa9\x66", "info");
   for (int i = 0; i < clusters; i++) {
     made.begins.push_back (made.bytes.size ());
-    const std::string content =
-        element ("\xe7", std::string (1, char (i))) + block (i) + block (i + 50);
+    const std::string content = element ("\xe7", std::string (1, char (i))) +
+                                block (i) + block (i + 50);
     made.bytes += open ? name + kUnknown + content : element (name, content);
   }
   made.tail = made.bytes.size ();

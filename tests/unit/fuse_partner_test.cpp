@@ -29,8 +29,8 @@ fuse (const Schedule &schedule, const Pictures &frames,
     const auto taken = fuser->take (frames[i].view (), partner);
     EXPECT_TRUE (taken) << taken.error ().message;
     std::vector<ImageView<std::uint8_t>> views;
-    Pictures slots (std::size_t (fuser->slots ()),
-        Image<std::uint8_t> (kWidth, kHeight));
+    Pictures slots (
+        std::size_t (fuser->slots ()), Image<std::uint8_t> (kWidth, kHeight));
     for (auto &slot : slots)
       views.push_back (slot.view ());
     EXPECT_TRUE (fuser->fuse (views));
@@ -121,9 +121,9 @@ TEST (FusePartner, GainAndBlackLevelAreNotNeeded)
   BenchOptions worse;
   worse.gain = 0.95 * 4.0 / 3.0;
   worse.black_level = 8.0;
-  const double bad = psnr (
-      fuse (schedule, frames, coded (off, slots, worse), with_partner ()),
-      slots);
+  const double bad =
+      psnr (fuse (schedule, frames, coded (off, slots, worse), with_partner ()),
+          slots);
   EXPECT_GT (bad, good - 0.7);
 
   /* The same gain for both cameras, as of two of 12 bits. */
@@ -151,7 +151,8 @@ TEST (FusePartner, AFrameWithoutItsPartnerIsThatOfOneCamera)
         equal (fuse (schedule, frames, {}, with_partner (quality)), one));
 
     partners[2] = {};
-    const auto mixed = fuse (schedule, frames, partners, with_partner (quality));
+    const auto mixed =
+        fuse (schedule, frames, partners, with_partner (quality));
     const auto third = [] (const Pictures &all) {
       return Pictures (all.begin () + 8, all.begin () + 12);
     };
@@ -187,7 +188,8 @@ TEST (FusePartner, AllTargetsAndThreadsAgree)
       for (const int threads : {1, 3}) {
         options.target = target;
         options.threads = threads;
-        EXPECT_TRUE (equal (fuse (schedule, frames, partners, options), expected))
+        EXPECT_TRUE (
+            equal (fuse (schedule, frames, partners, options), expected))
             << quality_name (quality) << ' ' << target << ' ' << threads;
       }
   }
@@ -202,21 +204,20 @@ TEST (FusePartner, MisuseIsRefused)
   ASSERT_FALSE (refused);
   EXPECT_NE (refused.error ().message.find ("FuseOptions::partner"),
       std::string::npos);
-  auto both = Fuser<std::uint8_t>::make (
-      schedule, kWidth, kHeight, with_partner ())
-                  .value ();
+  auto both =
+      Fuser<std::uint8_t>::make (schedule, kWidth, kHeight, with_partner ())
+          .value ();
   EXPECT_FALSE (both.take (frame.view (), small.view ()));
   EXPECT_EQ (both.pending (), 0);
   FuseOptions dark = with_partner ();
   dark.partner_light = 0.0;
-  EXPECT_FALSE (
-      Fuser<std::uint8_t>::make (schedule, kWidth, kHeight, dark));
+  EXPECT_FALSE (Fuser<std::uint8_t>::make (schedule, kWidth, kHeight, dark));
   /* The last element of a staircase is never in the other beam. */
   const auto never = Fuser<std::uint8_t>::make (
       schedule_of ("staircase:2x2"), kWidth, kHeight, with_partner ());
   ASSERT_FALSE (never);
-  EXPECT_NE (never.error ().message.find ("is on in every slot"),
-      std::string::npos);
+  EXPECT_NE (
+      never.error ().message.find ("is on in every slot"), std::string::npos);
 }
 
 } // namespace

@@ -416,8 +416,7 @@ TEST (StreamSetup, SaysHowTheSecondCameraStands)
   StreamSetup setup;
   setup.partner = PartnerSetup{{640, 480}};
   const std::string json = setup.to_json ();
-  EXPECT_NE (
-      json.find (R"(,"partner":{"size":[640,480]}})"), std::string::npos)
+  EXPECT_NE (json.find (R"(,"partner":{"size":[640,480]}})"), std::string::npos)
       << json;
   EXPECT_EQ (*StreamSetup::from_json (json), setup);
   setup.partner->mapping = made (all_parts ());

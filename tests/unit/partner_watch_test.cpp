@@ -111,8 +111,7 @@ TEST (PartnerWatch, DoesNotKnowWhereNothingMoves)
     noisy.seed = std::uint64_t (2 * seed);
     const Beams both = beams (kPreset, 0.0, noisy, noisy);
     for (const int shift : {-1, 0, 1})
-      EXPECT_EQ (verdicts (both, shift, watch_of (both)),
-          all_unknown (shift));
+      EXPECT_EQ (verdicts (both, shift, watch_of (both)), all_unknown (shift));
   }
 }
 
@@ -139,8 +138,8 @@ TEST (PartnerWatch, TheSecondCameraMayHaveItsOwnPose)
       .homography = {
           -1.02, 0.01, kSize.width + 1.4, 0.0, 1.02, 0.3, 0.0, 0.0, 1.0}});
   const Beams both = beams (kPreset, 0.7, {}, second);
-  const PartnerWatch watch (both.schedule, aligned (),
-      {kSize, &*second.mapping});
+  const PartnerWatch watch (
+      both.schedule, aligned (), {kSize, &*second.mapping});
   /* A quarter of the mirrors has a pixel. */
   expect_good (verdicts (both, 0, watch), 4);
   expect_bad (verdicts (both, 1, watch), 1, 3);
@@ -152,8 +151,7 @@ TEST (PartnerWatch, LearnsNothingFromSaturatedPixels)
   BenchOptions bright;
   bright.gain = 50.0;
   const Beams both = beams (kPreset, 0.7, bright, bright);
-  EXPECT_EQ (
-      verdicts (both, 1, watch_of (both)), all_unknown (1));
+  EXPECT_EQ (verdicts (both, 1, watch_of (both)), all_unknown (1));
 }
 
 TEST (PartnerWatch, BeginsAnewAfterAReset)

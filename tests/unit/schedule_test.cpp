@@ -190,9 +190,9 @@ TEST (Mask, SumOverSlotsIsTheExposureOfTheElement)
 
 TEST (Mask, OfTheOtherBeamIsItsComplement)
 {
-  const Schedule schedule = *Schedule::from_preset (
-      "sequential:2x2,pilot=4,leak=0.1,"
-      "region=8x8+4+4:sequential:lattice:8/3");
+  const Schedule schedule =
+      *Schedule::from_preset ("sequential:2x2,pilot=4,leak=0.1,"
+                              "region=8x8+4+4:sequential:lattice:8/3");
   const Schedule other = *schedule.complement ();
   EXPECT_EQ (other.slots (), schedule.slots ());
   const Extent size{40, 24};

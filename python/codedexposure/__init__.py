@@ -21,7 +21,7 @@ __path__.append(str(_BUILD / "python"))  # codedexposure.library is compiled
 
 # Where each name is: archives use this package without GStreamer and numpy.
 _ROOMS = {"Error": "_pipeline", "RecordingWarning": "_pipeline",
-          "Frames": "frames", "UncountableError": "_pipeline",
+          "Camera": "live", "camera": "live", "Frames": "frames", "UncountableError": "_pipeline",
           "decode_array": "arrays", "fuse_array": "arrays",
           "simulate": "arrays", "Frame": "frame", "Recording": "recording",
           "open": "recording"}
@@ -34,5 +34,6 @@ def __getattr__(name):
 
 
 __version__ = "0.1.0"
-__all__ = ["Error", "Frame", "Frames", "Recording", "RecordingWarning",
-           "UncountableError", "decode_array", "fuse_array", "open", "simulate"]
+__all__ = ["Camera", "Error", "Frame", "Frames", "Recording",
+           "RecordingWarning", "UncountableError", "camera", "decode_array",
+           "fuse_array", "open", "simulate"]

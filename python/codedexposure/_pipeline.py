@@ -190,7 +190,8 @@ class Player:
         self.out = self.pipeline.get_by_name("out")
         self.bus = self.pipeline.get_bus()
         self._setups: list[str] = []
-        self.out.get_static_pad("sink").add_probe(
+        self._pad = self.out.get_static_pad("sink")
+        self._probe = self._pad.add_probe(
             Gst.PadProbeType.EVENT_DOWNSTREAM, self._on_event)
 
     def __enter__(self):
@@ -198,7 +199,7 @@ class Player:
             if self.part:
                 self._seek(*self.part)
         except Error:
-            self.pipeline.set_state(Gst.State.NULL)
+            self.__exit__()
             raise
         self.pipeline.set_state(Gst.State.PLAYING)
         return self
@@ -221,6 +222,8 @@ class Player:
 
     def __exit__(self, *_):
         self.pipeline.set_state(Gst.State.NULL)
+        # It would keep both alive, and with them a camera.
+        self._pad.remove_probe(self._probe)
 
     def warn(self, text: str) -> None:
         """A RecordingWarning."""

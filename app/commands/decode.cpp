@@ -35,6 +35,7 @@ private:
   PlayTimes times () const;
   VideoStyle style () const;
   void count_flags (GstElement *queue, const std::string &output) const;
+  Chain read (Job &job) const;
   void build (Job &job) const;
   void build_search (Job &job) const;
   RunResult play_once (bool salvage, bool &found) const;
@@ -43,7 +44,8 @@ private:
   std::string recording_;
   DecodeOptions decode_;
   RunOptions run_;
-  std::optional<Text> output_, coded_, statistics_, uncertainty_, excerpt_;
+  std::optional<Text> output_, coded_, second_, statistics_, uncertainty_,
+      excerpt_;
   std::optional<double> start_, duration_;
   std::optional<int> region_, white_, threads_, jobs_;
   bool deflate_ = false, view_ = false, find_phase_ = false;
@@ -93,6 +95,10 @@ Decode::declare (Options &options)
       "also measure each picture of OUT: a line of CSV with mean, minimum, "
       "maximum, entropy, saturated pixels and flags");
   decode_.declare (options);
+  options.value ("--second", second_, "FILE.mkv",
+      "with --fuse: the recording of a second camera, in the beam of the "
+      "mirrors that are off, at the same time",
+      file_ending_in (".mkv"));
   options.value ("--uncertainty", uncertainty_, "OUT",
       "with --fuse: also write the uncertainty of each pixel: half the width "
       "of the interval that holds 68 % of the errors, in 1/65280 of white; 16 "
@@ -142,7 +148,9 @@ Decode::declare (Options &options)
 void
 Decode::declare_relations (Options &options)
 {
-  options.need ({"--uncertainty"}, "--fuse");
+  options.need ({"--uncertainty", "--second"}, "--fuse");
+  options.exclude (
+      {"--start", "--duration", "--excerpt", "--jobs", "--refine"}, "--second");
   options.need ({"--statistics"}, "--output");
   options.exclude ({"--region", "--method"}, "--fuse");
   options.exclude ({"--start", "--duration", "--find-phase"}, "--excerpt");
@@ -173,6 +181,9 @@ Decode::check () const
   if (white_ && !view_ && !any (VideoForm::mp4))
     usage_error ("--white is for --view and .mp4; other files keep the pixel "
                  "values");
+  if (second_ && decode_.fuse == "learned")
+    usage_error ("--fuse learned knows one camera; use best with --second, or "
+                 "leave --second out");
   if (is (uncertainty_, VideoForm::mp4))
     usage_error ("--uncertainty " + *uncertainty_ +
                  ": .mp4 does not keep values; end in .mkv, .ome.tif or .h5");
@@ -233,11 +244,29 @@ Decode::count_flags (GstElement *queue, const std::string &output) const
       unflagged_.get (), nullptr);
 }
 
+/* With those of the second camera, if there is one. */
+Chain
+Decode::read (Job &job) const
+{
+  Chain frames = read_recording (job, recording_);
+  if (!second_)
+    return frames;
+  GstElement *reader = job.reader;
+  const bool is_finished = job.is_finished;
+  Chain partners = read_recording (job, *second_);
+  job.reader = reader;
+  job.source = recording_;
+  job.is_finished &= is_finished;
+  GstElement *pair = job.graph.add ("codedexposure-pair");
+  partners.to (pair, "off");
+  return frames.to (pair, "on");
+}
+
 void
 Decode::build (Job &job) const
 {
   *unflagged_ = 0;
-  Chain frames = read_recording (job, recording_);
+  Chain frames = read (job);
   if (threads_)
     g_object_set (job.reader, "threads", guint (*threads_), nullptr);
   DecoderPads pads = decode_.fuse ? add_fusion (job, frames, decode_, threads_)
@@ -352,6 +381,8 @@ Decode::run ()
   check ();
   start_gstreamer ();
   const RecordingInfo info = value_of (recording_info (recording_, false));
+  if (second_)
+    value_of (recording_info (*second_, false));
   if (jobs_.value_or (1) > 1)
     decode_on_cores ();
   bool found = false;
@@ -371,7 +402,8 @@ Decode::run ()
   if (result.exit == Exit::damaged)
     Status ("decode", false)
         .line (
-            recording_ + " is cut off or damaged; what could be decoded was" +
+            recording_ + (second_ ? " or " + *second_ : "") +
+            " is cut off or damaged; what could be decoded was" +
             (*unflagged_ > 0 ? ""
                              : ", and pictures of damaged frames are flagged"));
   if (*unflagged_ > 0)

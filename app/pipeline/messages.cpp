@@ -367,6 +367,13 @@ notice (const GstStructure *message)
   if (name == "codedexposure/frames-damaged")
     return "warning: frames that are flagged from frame " + number ("frame") +
            " on: " + number ("count");
+  if (name == "codedexposure/partner-lost" && active)
+    return "warning: from " + seconds_in (message, "from") +
+           " on, coded frames have no partner of the second camera: " +
+           number ("reason");
+  if (name == "codedexposure/partner-lost")
+    return "warning: coded frames without a partner from " +
+           seconds_in (message, "from") + " on: " + number ("frames");
   if (name == "codedexposure/frames-missing")
     return "warning: from " + seconds_in (message, "from") +
            " on, recorded frames are missing: " + number ("count");

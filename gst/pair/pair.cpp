@@ -14,10 +14,11 @@
  * ## Pairs
  *
  * Partners are frames whose exposures begin within a quarter of a frame period
- * of each other: the start that the frame metadata say, else the PTS. Arrival
- * and numbers do not count. A coded frame without a partner passes alone, as it
- * came. So does one that is corrupted or shows a pattern, or whose partner is
- * or does. A frame of the second camera without a coded frame is dropped.
+ * of each other: by the start that the metadata of both say, else by running
+ * time. Arrival and numbers do not count. A coded frame without a partner
+ * passes alone, as it came. So does one that is corrupted or shows a pattern,
+ * or whose partner is or does. A frame of the second camera without a coded
+ * frame is dropped.
  *
  * Time stamps can be wrong by a frame. The sum of both beams has the light of
  * the whole exposure and shows no masks; that of different exposures shows them
@@ -173,16 +174,29 @@ segment_at (GstAggregatorPad *pad)
   return locked (pad, [pad] { return pad->segment; });
 }
 
-/* Of the exposure of @frame, as running time. */
-GstClockTime
-exposure_of (GstAggregatorPad *pad, GstBuffer *frame)
+/* When a frame was exposed: as its meta says, on the clock of both cameras, and
+ * by its PTS, as running time. */
+struct Instant {
+  GstClockTime said, running;
+};
+Instant
+instant_of (GstAggregatorPad *pad, GstBuffer *frame)
 {
   const auto meta = get_frame_meta (frame);
-  const GstClockTime start =
-      meta && GST_CLOCK_TIME_IS_VALID (meta->exposure_start)
-          ? meta->exposure_start
-          : GST_BUFFER_PTS (frame);
-  return running_time (segment_at (pad), start);
+  return {meta ? meta->exposure_start : GST_CLOCK_TIME_NONE,
+      running_time (segment_at (pad), GST_BUFFER_PTS (frame))};
+}
+
+/* By how much @one is later; none: it is not known. Recordings of both cameras
+ * may begin with different frames, so what was said comes first. */
+std::optional<GstClockTimeDiff>
+later_by (const Instant &one, const Instant &other)
+{
+  for (const auto member : {&Instant::said, &Instant::running})
+    if (GST_CLOCK_TIME_IS_VALID (one.*member) &&
+        GST_CLOCK_TIME_IS_VALID (other.*member))
+      return GST_CLOCK_DIFF (other.*member, one.*member);
+  return std::nullopt;
 }
 
 GstClockTime
@@ -214,14 +228,13 @@ find_partner (
     GstCodedExposurePair *self, GstBuffer *coded, bool late, BufferPtr &partner)
 {
   GstAggregatorPad *on = sink (self, "on"), *off = sink (self, "off");
-  const GstClockTime start = exposure_of (on, coded);
-  const GstClockTime slack = period_of (on, coded) / 4;
+  const Instant start = instant_of (on, coded);
+  const auto slack = GstClockTimeDiff (period_of (on, coded) / 4);
   while (const BufferPtr next{gst_aggregator_pad_peek_buffer (off)}) {
-    const GstClockTime at = exposure_of (off, next.get ());
-    if (!GST_CLOCK_TIME_IS_VALID (start) ||
-        (GST_CLOCK_TIME_IS_VALID (at) && at > start + slack))
+    const auto late_by = later_by (instant_of (off, next.get ()), start);
+    if (late_by && *late_by > slack)
       return Found::kNone;
-    if (GST_CLOCK_TIME_IS_VALID (at) && at + slack >= start) {
+    if (late_by && *late_by >= -slack) {
       partner.reset (gst_aggregator_pad_pop_buffer (off));
       return Found::kPartner;
     }

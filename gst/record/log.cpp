@@ -49,6 +49,7 @@ struct LogState {
   guint64 setup_id = 0;
   std::vector<StreamSetup> setups; ///< all, the last one last
   bool setup_is_short = false;     ///< each line can have it
+  bool said_partner = false;
   /** As last written to the file. */
   std::optional<Schedule> schedule;
   std::optional<Mapping> mapping;
@@ -236,6 +237,15 @@ take_tags (GstCodedExposureLog *self, GstEvent *event)
     return event;
   }
   StreamSetup setup = read->value ();
+  if (setup.partner) {
+    if (!std::exchange (state.said_partner, true))
+      POST_WARNING (self, STREAM, FORMAT,
+          "The frames of the second camera are not recorded, only those of the "
+          "first. Record the second one by a branch of its own, before "
+          "codedexposure-pair.");
+    setup.partner.reset ();
+    event = replace_setup (event, setup);
+  }
   setup.track = false;
   note_setup (state, setup);
   if (!has_track (state))

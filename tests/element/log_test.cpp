@@ -325,6 +325,21 @@ TEST_F (LogTest, TheTagSaysThatThereIsATrack)
   }
 }
 
+/* A recording has the frames of one camera. */
+TEST_F (LogTest, OfASecondCameraTheTagSaysNothing)
+{
+  play (path_.get ());
+  const StreamSetup setup{.partner = PartnerSetup{{64, 48}}};
+  gst_harness_push_event (harness_.get (), setup_to_event (setup));
+  ASSERT_EQ (push (frame (0)), GST_FLOW_OK);
+  const EventPtr tag (
+      gst_pad_get_sticky_event (harness_->sinkpad, GST_EVENT_TAG, 0));
+  ASSERT_TRUE (tag);
+  const auto recorded = setup_from_tags (tags_of (tag.get ()));
+  ASSERT_TRUE (recorded && *recorded);
+  EXPECT_FALSE (recorded->value ().partner);
+}
+
 /** One whose JSON form has more than 512 bytes. */
 StreamSetup
 long_setup (int first)

@@ -1,5 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure-pair: what becomes a pair, and what is said of the rest. */
+#include <cstdio>
+#include <fstream>
+#include <iterator>
 #include <random>
 #include <set>
 #include <thread>
@@ -138,15 +141,16 @@ TEST_F (Pair, IsNotWhatIsFartherAway)
   expect_lost ("missing", 3, 0, 2 * kPeriod);
 }
 
-TEST_F (Pair, TheStartThatTheMetaSaysCountsAndNotThePts)
+TEST_F (Pair, TheStartThatTheMetasSayCountsAndNotThePts)
 {
-  auto partners = frames ({0, 1, 2}, 30 * kMs);
-  for (const BufferPtr &partner : partners) {
-    FrameMeta meta;
-    meta.exposure_start = GST_BUFFER_PTS (partner.get ()) - 30 * kMs;
-    set_frame_meta (partner.get (), meta);
-  }
-  EXPECT_EQ (run (frames ({0, 1, 2}), std::move (partners)),
+  auto on = frames ({0, 1, 2}), partners = frames ({0, 1, 2}, 30 * kMs);
+  for (auto *camera : {&on, &partners})
+    for (const BufferPtr &frame : *camera) {
+      FrameMeta meta;
+      meta.exposure_start = GST_BUFFER_OFFSET (frame.get ()) * kPeriod;
+      set_frame_meta (frame.get (), meta);
+    }
+  EXPECT_EQ (run (std::move (on), std::move (partners)),
       (Numbers{{0, 0}, {1, 1}, {2, 2}}));
 }
 
@@ -536,6 +540,60 @@ TEST (PairBench, ComesBehindDmdsyncOfBothCameras)
   EXPECT_EQ (property<guint64> (pair.get (), "frames-alone"), 3u);
   EXPECT_EQ (property<guint64> (pair.get (), "pairs-refused"), 0u);
   EXPECT_EQ (property<guint64> (pair.get (), "partners-dropped"), 2u);
+}
+
+/* Each camera has a recording of its own, and their first frames differ. */
+TEST (PairBench, RecordingsOfBothCamerasMakeTheSamePairs)
+{
+  const std::string folder = ::testing::TempDir ();
+  const std::string schedule = "schedule=sequential:lattice:4/2 ";
+  const auto file = [&] (const std::string &name) {
+    return "location=" + folder + "pair-" + name + " ";
+  };
+  const auto recorded = [&] (const std::string &camera) {
+    return "! identity name=" + camera + " ! dmdsync " + schedule +
+           (camera == "off" ? "beam=off " : "") + "! tee name=" + camera +
+           "-tee ! queue ! pair." + camera + " " + camera +
+           "-tee. ! queue ! codedexposure-recordmux ! filesink " +
+           file (camera + ".mkv");
+  };
+  const std::string fused = "codedexposure-pair name=pair "
+                            "! codedexposure-fuse ! filesink ";
+  Pipeline recording (
+      "videotestsrc num-buffers=160 pattern=ball "
+      "! video/x-raw,format=GRAY8,width=64,height=48,framerate=100/1 "
+      "! tee name=light light. ! queue ! codedexposure-sim " +
+      schedule + recorded ("on") +
+      "light. ! queue ! codedexposure-sim beam=off " + schedule +
+      recorded ("off") + fused + file ("live.gray"));
+  gst_pad_add_probe (
+      recording.pad ("off", "src").get (), GST_PAD_PROBE_TYPE_BUFFER,
+      [] (GstPad *, GstPadProbeInfo *info, gpointer) {
+        return GST_BUFFER_PTS (GST_PAD_PROBE_INFO_BUFFER (info)) < 3 * kPeriod
+                   ? GST_PAD_PROBE_DROP
+                   : GST_PAD_PROBE_OK;
+      },
+      nullptr, nullptr);
+  ASSERT_EQ (recording.play (), "");
+  Pipeline playing (
+      "filesrc " + file ("on.mkv") +
+      "! codedexposure-recorddemux ! pair.on filesrc " + file ("off.mkv") +
+      "! codedexposure-recorddemux ! pair.off " + fused + file ("played.gray"));
+  ASSERT_EQ (playing.play (), "");
+  for (Pipeline *pipeline : {&recording, &playing}) {
+    const auto pair = (*pipeline)["pair"];
+    EXPECT_EQ (property<guint64> (pair.get (), "frames-paired"), 37u);
+    EXPECT_EQ (property<guint64> (pair.get (), "frames-alone"), 3u);
+    EXPECT_EQ (property<guint64> (pair.get (), "pairs-refused"), 0u);
+  }
+  const auto bytes = [&] (const std::string &name) {
+    std::ifstream in (folder + "pair-" + name, std::ios::binary);
+    return std::string (std::istreambuf_iterator<char> (in), {});
+  };
+  EXPECT_EQ (bytes ("live.gray").size (), 160u * 64 * 48);
+  EXPECT_TRUE (bytes ("live.gray") == bytes ("played.gray"));
+  for (const char *name : {"on.mkv", "off.mkv", "live.gray", "played.gray"})
+    std::remove ((folder + "pair-" + name).c_str ());
 }
 
 TEST (PairBench, TheFramesOfTheOtherBeamAreNotDecoded)

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure: what people type. */
 #include <algorithm>
+#include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -248,6 +249,8 @@ int
 main (int argc, char **argv)
 {
   using namespace codedexposure;
+  /* It is for windows, and no other run may end because of it. */
+  std::signal (SIGUSR1, SIG_IGN);
   std::string name;
   auto words = app::words_of (argc, argv, name);
   int code = app::run (int (words.size ()), words.data ());

@@ -103,6 +103,7 @@ WindowOptions::keys_of (const std::string &command)
          "replace no\n                  file: " +
          command +
          "-frameN-slotK-TIMEs.png\n"
+         "  +, -            show pictures twice as bright, and back\n"
          "  K               keep what has just happened: the coded frames of "
          "the last 10 s\n                  become a recording, " +
          command +

@@ -295,6 +295,7 @@ Window::measure (Pane &pane, GstPad *pad, GstBuffer *frame)
     bits = meta->bits;
   const int depth = int (GST_VIDEO_INFO_COMP_DEPTH (&*info, 0));
   bits = bits > 0 ? std::min (bits, depth) : depth;
+  bits_ = bits;
   MappedFrame mapped (*info, frame, GST_MAP_READ);
   if (!mapped)
     return;
@@ -392,6 +393,10 @@ Window::press (const std::string &key)
     g_idle_add (on_end, this);
   if (is ("k"))
     g_idle_add (on_keep, this);
+  if (is ("plus") || is ("equal") || is ("KP_Add"))
+    set_contrast (1);
+  if (is ("minus") || is ("KP_Subtract"))
+    set_contrast (-1);
   const std::lock_guard lock (mutex_);
   snapshot_wanted_ |= is ("s");
   const bool was_live = replay_.is_live ();
@@ -402,6 +407,20 @@ Window::press (const std::string &key)
   if (!was_live && replay_.is_live ())
     for (const auto &pane : panes_)
       pane->recent.clear ();
+}
+
+/* Of what comes from now on; the stream itself stays as it is. */
+void
+Window::set_contrast (int by)
+{
+  int contrast = 0;
+  {
+    const std::lock_guard lock (mutex_);
+    contrast_ = contrast = std::clamp (contrast_ + by, 0, bits_ - 1);
+  }
+  const guint white = contrast > 0 ? ((1u << bits_) - 1) >> contrast : 0;
+  for (const auto &pane : panes_)
+    g_object_set (pane->part.view, "white", white, nullptr);
 }
 
 gboolean
@@ -499,7 +518,9 @@ Window::lines (const Shown *subframe, const Shown *coded, ViewTime time) const
 {
   std::vector<PanelLine> lines;
   if (replay_.is_live ())
-    lines.push_back ({"live"});
+    lines.push_back (
+        {contrast_ > 0 ? format ("live, %d times as bright", 1 << contrast_)
+                       : "live"});
   else {
     const std::string which = format (
         "subframe %zu of %zu, %.2f s before the last", replay_.shown (time) + 1,

@@ -89,6 +89,7 @@ private:
   bool is_kept (const Pane &pane, ViewTime time) const;
   void remember (Pane &pane, GstPad *pad, GstBuffer *picture);
   void press (const std::string &key);
+  void set_contrast (int by);
   static bool is_pair (const Shown &one, const Shown &other);
   void draw (cairo_t *cairo, ViewTime time);
   std::vector<PanelLine> lines (
@@ -108,10 +109,13 @@ private:
   Keeper keeper_;
   guint on_signal_ = 0; // source
 
+  std::atomic<int> bits_ = 8; // of the pixels that came last
+
   std::mutex mutex_; // of all below
   std::optional<WindowLayout> layout_;
   GstVideoInfo camera_ = {}; // set with the layout
   bool captions_changed_ = true;
+  int contrast_ = 0; // pictures are 2 to the power of it brighter
   Replay replay_;
   ViewTime now_ = 0; // of the last picture of the window
   bool snapshot_wanted_ = false;

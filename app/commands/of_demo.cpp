@@ -2,7 +2,6 @@
 /* The commands of a build of what the demo needs. */
 #include "base/text.h"
 #include "command.h"
-#include "pipeline/cameras.h"
 
 namespace codedexposure::app
 {
@@ -23,19 +22,6 @@ no_command (const std::string &name)
   return "there is no command " + in_quotes (name) +
          " in this build, which has only those of the demo; for all, run "
          "\"meson configure build -Dparts=all\" and \"meson compile -C build\"";
-}
-
-/* Nothing is known of cameras here. */
-std::vector<std::string>
-camera_names ()
-{
-  return {};
-}
-
-std::optional<double>
-camera_exposure (GstElement *)
-{
-  return std::nullopt;
 }
 
 } // namespace codedexposure::app

@@ -1,0 +1,26 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* What a program says of cameras that was built without Aravis. */
+#include "pipeline/cameras.h"
+
+namespace codedexposure::app
+{
+
+std::vector<std::string>
+camera_names ()
+{
+  return {};
+}
+
+std::string
+cameras_found ()
+{
+  return "this version was built without Aravis, and sees no camera";
+}
+
+std::optional<double>
+camera_exposure (GstElement *)
+{
+  return std::nullopt;
+}
+
+} // namespace codedexposure::app

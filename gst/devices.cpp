@@ -11,4 +11,4 @@ plugin_init (GstPlugin *plugin)
 
 GST_PLUGIN_DEFINE (GST_VERSION_MAJOR, GST_VERSION_MINOR, codedexposuredevices,
     "Per-pixel coded exposure: cameras, and their calibration to the DMD",
-    plugin_init, PACKAGE_VERSION, "LGPL", PACKAGE, "gst-codedexposure")
+    plugin_init, PACKAGE_VERSION, "LGPL", PACKAGE, "Unknown package origin")

@@ -10,4 +10,4 @@ plugin_init (GstPlugin *plugin)
 
 GST_PLUGIN_DEFINE (GST_VERSION_MAJOR, GST_VERSION_MINOR, codedexposure,
     "Per-pixel coded exposure: a fast camera from a slow one and a DMD",
-    plugin_init, PACKAGE_VERSION, "LGPL", PACKAGE, "gst-codedexposure")
+    plugin_init, PACKAGE_VERSION, "LGPL", PACKAGE, "Unknown package origin")

@@ -79,8 +79,8 @@ private:
   {
     Json json{{"recording", path}, {"codec", codec_text (info.head.codec)},
         {"size", size_text (info.head.size)}, {"frames", info.times.size ()},
-        {"complete", !info.is_cut_short}, {"track", info.head.lines != 0},
-        {"period_ns", info.head.duration}};
+        {"complete", !info.is_cut_short && !info.is_damaged},
+        {"track", info.head.lines != 0}, {"period_ns", info.head.duration}};
     if (info.start)
       json["start_ns"] = *info.start;
     if (!info.times.empty ()) {

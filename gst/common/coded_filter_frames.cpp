@@ -29,8 +29,8 @@ ends_with_stream (GstPad *sinkpad, GstClockTime stop)
 } // namespace
 
 /* The first frames of a camera come less than a period apart, until its clock
- * is known. Pictures that would then not be later than the last one of the frame
- * before follow right after it; the others keep their times. */
+ * is known. Pictures that would then not be later than the last one of the
+ * frame before follow right after it; the others keep their times. */
 GstClockTime
 CodedFrame::pts_of (int k, int n, FrameRate rate) const
 {
@@ -310,6 +310,11 @@ CodedFilter::admit (BufferPtr frame)
   else if (counts && step.arrival != Arrival::next &&
            step.arrival != Arrival::first)
     warn_of_wrong_time (pts);
+  if (counts && step.arrival == Arrival::late) {
+    const ObjectLock lock (element_);
+    guint64 &lost = shared_.counters.frames_lost;
+    lost -= std::min<guint64> (lost, 1);
+  }
   stream_.last_pts = pts;
   const bool after_late =
       std::exchange (stream_.was_late, step.arrival == Arrival::late);

@@ -64,7 +64,7 @@
  *     ! queue ! videoconvert ! autovideosink
  * ]| A simulated bench with two cameras.
  *
- * Since: 0.1
+ * Since: 0.2
  */
 #include <algorithm>
 #include <optional>

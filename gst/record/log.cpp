@@ -161,6 +161,7 @@ count_lost (GstCodedExposureLog *self, FrameRecord &record)
   if (!record.lost_before) // without a meta, the number is a count
     return;
   const bool is_new = state.last != record.frame; // no further subframe
+  const bool is_late = state.last && record.frame < *state.last;
   if (state.last && record.frame > *state.last)
     record.lost_before =
         std::max (*record.lost_before, record.frame - *state.last - 1);
@@ -169,6 +170,8 @@ count_lost (GstCodedExposureLog *self, FrameRecord &record)
     return;
   const ObjectLock lock (self);
   state.frames_lost += *record.lost_before;
+  if (is_late)
+    state.frames_lost -= std::min<guint64> (state.frames_lost, 1);
 }
 
 GstFlowReturn

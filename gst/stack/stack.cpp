@@ -357,4 +357,4 @@ plugin_init (GstPlugin *plugin)
 
 GST_PLUGIN_DEFINE (GST_VERSION_MAJOR, GST_VERSION_MINOR, codedexposurestack,
     "Pictures of a coded exposure in files of the lab", plugin_init,
-    PACKAGE_VERSION, "LGPL", PACKAGE, "gst-codedexposure")
+    PACKAGE_VERSION, "LGPL", PACKAGE, "Unknown package origin")

@@ -193,6 +193,22 @@ DitherRun::fit () const
   return dark;
 }
 
+/** Looks again until more frames would not help. */
+Result<void>
+look_until_known (DitherRun &run, std::optional<Dark> &found)
+{
+  double error = std::numeric_limits<double>::infinity (); // of the variance
+  for (int round = 0; round < kMostRounds; round++) {
+    RETURN_IF_ERROR (run.look (false));
+    found = run.fit ();
+    if (!found || found->variance.sigma < 2 * kAim * found->variance.value ||
+        found->variance.sigma > kHelps * error)
+      break;
+    error = found->variance.sigma;
+  }
+  return {};
+}
+
 } // namespace
 
 Result<std::optional<DitherSight>>
@@ -204,21 +220,9 @@ measure_dither (Examination &examination, const Examination::Lit &fine, int top,
   RETURN_IF_ERROR (run.see_light (top, dark, bright));
   RETURN_IF_ERROR (run.look (true));
   std::optional<Dark> found;
-  double error = std::numeric_limits<double>::infinity (); // of the variance
   RETURN_IF_ERROR (with_exposure (examination,
       examination.rig.parts ().rate.period () / kShorter,
-      [&] () -> Result<void> {
-        for (int round = 0; round < kMostRounds; round++) {
-          RETURN_IF_ERROR (run.look (false));
-          found = run.fit ();
-          if (!found ||
-              found->variance.sigma < 2 * kAim * found->variance.value ||
-              found->variance.sigma > kHelps * error)
-            break;
-          error = found->variance.sigma;
-        }
-        return {};
-      }));
+      [&] { return look_until_known (run, found); }));
   if (!found)
     return std::optional<DitherSight> ();
   return std::optional<DitherSight> ({*found, run.shorter ()});

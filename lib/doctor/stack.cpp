@@ -47,8 +47,10 @@ stack_of (
     each_pixel (frame.picture, [&] (int x, int y) {
       const std::uint16_t value = frame.picture.at (x, y);
       stack.mean.at (x, y) += float (value);
-      stack.zeros.at (x, y) += value == 0;
-      stack.full.at (x, y) += value >= largest;
+      if (value == 0)
+        stack.zeros.at (x, y)++;
+      if (value >= largest)
+        stack.full.at (x, y)++;
       stack.bits_seen |= value;
     });
   }

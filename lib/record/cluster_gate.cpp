@@ -2,7 +2,6 @@
 #include "record/cluster_gate.h"
 
 #include <algorithm>
-#include <iterator>
 
 #include "record/ebml.h"
 
@@ -13,22 +12,6 @@ using namespace ebml;
 
 namespace
 {
-
-constexpr std::string_view kClusterName = "\x1f\x43\xb6\x75";
-/* Children of a segment behind its head, and of a cluster. */
-constexpr std::uint64_t kOfSegment[] = {kCluster, 0x1c53bb6b /* cues */,
-    0x1254c367 /* tags */, 0x114d9b74 /* seek head */, kInfo, kTracks,
-    kAttachments, kChapters, 0xec /* void */, 0xbf /* checksum */};
-constexpr std::uint64_t kOfCluster[] = {kTimestamp, kSimpleBlock, kBlockGroup,
-    0xab /* previous size */, 0xa7 /* position */, 0xec, 0xbf};
-
-template <std::size_t N>
-bool
-is_one_of (const std::uint64_t (&names)[N], std::uint64_t name)
-{
-  return std::find (std::begin (names), std::end (names), name) !=
-         std::end (names);
-}
 
 /* The longest name and length. */
 constexpr std::size_t kHeader = 12;

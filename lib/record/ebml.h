@@ -6,6 +6,7 @@
 #include <bit>
 #include <cstdint>
 #include <functional>
+#include <iterator>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -27,6 +28,22 @@ inline constexpr std::uint64_t kEbml = 0x1a45dfa3, kSegment = 0x18538067,
                                kBlock = 0xa1, kSimpleBlock = 0xa3,
                                kTitle = 0x7ba9, kAttachments = 0x1941a469,
                                kChapters = 0x1043a770;
+/* Children of a segment, and of a cluster. */
+inline constexpr std::string_view kClusterName = "\x1f\x43\xb6\x75";
+inline constexpr std::uint64_t kOfSegment[] = {kCluster, 0x1c53bb6b /* cues */,
+    0x1254c367 /* tags */, 0x114d9b74 /* seek head */, kInfo, kTracks,
+    kAttachments, kChapters, 0xec /* void */, 0xbf /* checksum */};
+inline constexpr std::uint64_t kOfCluster[] = {kTimestamp, kSimpleBlock,
+    kBlockGroup, 0xab /* previous size */, 0xa7 /* position */, 0xec, 0xbf};
+
+template <std::size_t N>
+bool
+is_one_of (const std::uint64_t (&names)[N], std::uint64_t name)
+{
+  return std::find (std::begin (names), std::end (names), name) !=
+         std::end (names);
+}
+
 inline constexpr std::uint64_t kVideoTrack = 1, kTextTrack = 0x11;
 /** Where nothing else limits an element. */
 inline constexpr std::uint64_t kUnlimited = std::uint64_t (1) << 60;

@@ -184,46 +184,88 @@ read_extras (Source &file, const Element &part, RecordingInfo &info)
     info.extras.emplace_back ("other tracks, such as sound");
 }
 
-/* Until one is damaged or cut off. Clusters and groups are entered: those of a
- * stream, and the last of a file that was not finished, have no size. */
+/* Of a block group: the block, its duration, references, additions and the
+ * like. */
+constexpr std::uint64_t kOfGroup[] = {
+    kBlock, 0x9b, 0xfb, 0xfa, 0x75a1, 0x75a2, 0xa4, 0x8e};
+
+/** The size of the file: there is none. */
+std::uint64_t
+next_cluster (Source &file, std::uint64_t at)
+{
+  constexpr std::size_t kStep = std::size_t (1) << 20;
+  for (; at + kClusterName.size () <= file.size ();
+       at += kStep - kClusterName.size ()) {
+    const std::size_t found = file.bytes (at, kStep).find (kClusterName);
+    if (found != std::string_view::npos)
+      return at + found;
+  }
+  return file.size ();
+}
+
+/** What read_blocks has seen. */
+struct Walk {
+  std::uint64_t cluster = 0;            ///< its time
+  std::uint64_t line = 0, line_end = 0; ///< the last one
+};
+
+Result<TrackLine>
+last_line (Source &file, const Walk &walk)
+{
+  return TrackLine::from_json (file.bytes (walk.line,
+      std::min<std::size_t> (walk.line_end - walk.line, TrackLine::kMaxSize)));
+}
+
+void
+read_block (Source &file, const Element &part, Walk &walk, RecordingInfo &info)
+{
+  const auto block = block_of (file, part, walk.cluster, info.head.tick);
+  if (!block)
+    return;
+  if (!info.start)
+    info.start = block->time;
+  if (block->track == info.head.video)
+    info.times.push_back (block->time);
+  if (block->track != info.head.lines)
+    return;
+  walk.line = block->data, walk.line_end = part.end;
+  if (!info.setup)
+    if (auto line = last_line (file, walk))
+      info.setup = std::move (line->setup);
+}
+
+/* To where it is cut off, and past what is damaged. Clusters and groups are
+ * entered: those of a stream, and the last of a file that was not finished,
+ * have no size. */
 void
 read_blocks (Source &file, const Element &segment, RecordingInfo &info)
 {
-  std::uint64_t cluster = 0;
-  std::uint64_t last = 0, last_end = 0; // of the last line
-  const auto line_at = [&file] (std::uint64_t from, std::uint64_t to) {
-    return TrackLine::from_json (file.bytes (
-        from, std::min<std::size_t> (to - from, TrackLine::kMaxSize)));
-  };
-  for (std::uint64_t at = segment.data; at < file.size ();) {
+  Walk walk;
+  for (std::uint64_t at = segment.data;
+       at < std::min (file.size (), segment.end);) {
     const auto part = file.element_at (at, segment.end);
-    if (!part)
-      break;
-    const bool holds = part->id == kCluster || part->id == kBlockGroup;
+    const bool holds =
+        part && (part->id == kCluster || part->id == kBlockGroup);
+    const bool is_known =
+        part && (!part->is_open || holds) &&
+        (is_one_of (kOfSegment, part->id) || is_one_of (kOfCluster, part->id) ||
+            is_one_of (kOfGroup, part->id));
+    if (!is_known) {
+      info.is_damaged = true;
+      at = next_cluster (file, at + 1);
+      continue;
+    }
     at = holds ? part->data : part->end;
-    if (at > file.size () || (part->is_open && !holds))
+    if (at > file.size ())
       break;
     if (part->id == kTimestamp)
-      cluster = file.number (*part);
+      walk.cluster = file.number (*part);
     read_extras (file, *part, info);
-    if (part->id != kBlock && part->id != kSimpleBlock)
-      continue;
-    const auto block = block_of (file, *part, cluster, info.head.tick);
-    if (!block)
-      continue;
-    if (!info.start)
-      info.start = block->time;
-    if (block->track == info.head.video)
-      info.times.push_back (block->time);
-    if (block->track != info.head.lines)
-      continue;
-    last = block->data, last_end = part->end;
-    if (!info.setup)
-      if (auto line = line_at (last, last_end))
-        info.setup = std::move (line->setup);
+    if (part->id == kBlock || part->id == kSimpleBlock)
+      read_block (file, *part, walk, info);
   }
-  if (last_end > 0)
-    if (const auto line = line_at (last, last_end))
+  if (walk.line_end > 0)
+    if (const auto line = last_line (file, walk))
       info.recorded = line->end;
 }
 

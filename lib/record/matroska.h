@@ -40,6 +40,9 @@ struct RecordingInfo {
   MatroskaHead head;
   /** It was not finished, or is shorter than when it was. */
   bool is_cut_short = false;
+  /** Something between its frames is no part of a recording. Only known if
+   * the frames were read. */
+  bool is_damaged = false;
   /** The time of the first frame or line: positions count from it; none: there
    * is none. */
   std::optional<Nanoseconds> start;

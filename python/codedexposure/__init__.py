@@ -33,7 +33,7 @@ def __getattr__(name):
     return getattr(importlib.import_module("." + _ROOMS[name], __name__), name)
 
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 __all__ = ["Camera", "Error", "Frame", "Frames", "Recording",
            "RecordingWarning", "UncountableError", "camera", "decode_array",
            "fuse_array", "open", "simulate"]

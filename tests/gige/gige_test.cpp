@@ -102,7 +102,7 @@ TEST_P (Gige, EveryFaultIsAccountedFor)
       std::find (received.order.begin (), received.order.end (), 40 - first);
   ASSERT_NE (late, received.order.end ());
   EXPECT_EQ (*(late - 1), 41 - first);
-  EXPECT_EQ (counter (pipeline, "frames-lost"), 7u);
+  EXPECT_EQ (counter (pipeline, "frames-lost"), 6u);
   EXPECT_EQ (sum_of (pipeline, "codedexposure/frames-lost", "count"), 7u);
   EXPECT_EQ (counter (pipeline, "frames-late"), 1u);
   EXPECT_EQ (sum_of (pipeline, "dmdsync/frame-late", "frame"), 40 - first);

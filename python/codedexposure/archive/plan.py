@@ -59,7 +59,7 @@ def recording_of(info, output, length):
         raise Problem(info['error'])
     times, whole = info['times_ns'], ''
     if not info['complete']:
-        whole = 'it is cut off'
+        whole = 'it is cut off or damaged'
     elif not info['track']:
         whole = 'it has no track that numbers its frames'
     elif times != sorted(times):

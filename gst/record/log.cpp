@@ -9,6 +9,7 @@
  * setups of before. */
 #include <algorithm>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -42,6 +43,7 @@ struct LogState {
   bool segment_sent = false;
   guint64 frames = 0;
   std::optional<guint64> last; ///< largest number of a frame with a meta
+  std::set<guint64> missing;   ///< numbers that were counted as lost
   GstVideoInfo info = {};
   GstClockTime end = 0; ///< of the last frame
   /** Of the stream. */
@@ -152,6 +154,19 @@ push_line (GstCodedExposureLog *self, GstBuffer *frame, FrameRecord record)
   return push_text (self, line.to_json (), pts, duration);
 }
 
+/** Whether the frame was counted as lost before. */
+bool
+comes_late (LogState &state, const FrameRecord &record)
+{
+  constexpr guint64 kMost = 1000; // no frame is later
+  const bool is_late = state.missing.erase (record.frame) > 0;
+  for (guint64 k = std::min (*record.lost_before, kMost); k > 0; k--)
+    state.missing.insert (record.frame - std::min (record.frame, k));
+  while (state.missing.size () > kMost)
+    state.missing.erase (state.missing.begin ());
+  return is_late;
+}
+
 /* Also those that a queue dropped between the element that numbers the frames
  * and this one. */
 void
@@ -161,7 +176,6 @@ count_lost (GstCodedExposureLog *self, FrameRecord &record)
   if (!record.lost_before) // without a meta, the number is a count
     return;
   const bool is_new = state.last != record.frame; // no further subframe
-  const bool is_late = state.last && record.frame < *state.last;
   if (state.last && record.frame > *state.last)
     record.lost_before =
         std::max (*record.lost_before, record.frame - *state.last - 1);
@@ -170,8 +184,7 @@ count_lost (GstCodedExposureLog *self, FrameRecord &record)
     return;
   const ObjectLock lock (self);
   state.frames_lost += *record.lost_before;
-  if (is_late)
-    state.frames_lost -= std::min<guint64> (state.frames_lost, 1);
+  state.frames_lost -= comes_late (state, record) ? 1 : 0;
 }
 
 GstFlowReturn
@@ -306,6 +319,7 @@ begin_run (GstElement *element)
   });
   state.frames = 0;
   state.last.reset ();
+  state.missing.clear ();
   state.setup.reset ();
   state.setups.clear ();
   state.schedule.reset ();

@@ -113,6 +113,7 @@ std::unique_ptr<Command> live_command ();
 std::unique_ptr<Command> info_command ();
 std::unique_ptr<Command> join_command ();
 std::unique_ptr<Command> pack_command ();
+std::unique_ptr<Command> play_command ();
 std::unique_ptr<Command> profile_command ();
 std::unique_ptr<Command> receive_command ();
 std::unique_ptr<Command> record_command ();

@@ -9,11 +9,12 @@ std::vector<std::unique_ptr<Command>>
 all_commands ()
 {
   std::vector<std::unique_ptr<Command>> commands;
-  for (const auto make : {simulate_command, live_command, record_command,
-           decode_command, info_command, calibrate_command, pack_command,
-           send_command, receive_command, archive_command, join_command,
-           report_command, schedule_command, advise_command, camera_command,
-           dmd_command, profile_command, doctor_command, bench_command})
+  for (const auto make :
+      {simulate_command, live_command, record_command, decode_command,
+          play_command, info_command, calibrate_command, pack_command,
+          send_command, receive_command, archive_command, join_command,
+          report_command, schedule_command, advise_command, camera_command,
+          dmd_command, profile_command, doctor_command, bench_command})
     if (auto command = make ())
       commands.push_back (std::move (command));
   return commands;

@@ -347,31 +347,18 @@ Decode::decode_on_cores () const
   const auto pass = [&words] (const char *name, const std::string &value) {
     words.push_back (std::string ("--") + name + "=" + value);
   };
-  const auto pass_text = [&] (const char *name, const std::optional<Text> &v) {
-    if (v)
-      pass (name, *v);
-  };
-  pass_text ("method", decode_.method);
-  pass_text ("mapping", decode_.mapping);
-  pass_text ("fuse", decode_.fuse);
-  pass_text ("bench", decode_.bench);
-  pass_text ("schedule", decode_.schedule);
-  pass_text ("statistics", statistics_);
-  if (decode_.full_well)
-    pass ("full-well", property_text (*decode_.full_well));
-  if (decode_.read_noise)
-    pass ("read-noise", property_text (*decode_.read_noise));
+  const auto decoding = decode_.words ();
+  words.insert (words.end (), decoding.begin (), decoding.end ());
+  if (statistics_)
+    pass ("statistics", *statistics_);
   if (region_)
     pass ("region", std::to_string (*region_));
-  if (decode_.bits)
-    pass ("bits", std::to_string (*decode_.bits));
   if (white_)
     pass ("white", std::to_string (*white_));
-  for (const auto &[name, set] :
-      {std::pair ("--view", view_), std::pair ("--refine", decode_.refine),
-          std::pair ("--deflate", deflate_)})
-    if (set)
-      words.push_back (name);
+  if (view_)
+    words.emplace_back ("--view");
+  if (deflate_)
+    words.emplace_back ("--deflate");
   become_archive (words);
 }
 

@@ -10,8 +10,8 @@ std::vector<std::unique_ptr<Command>>
 all_commands ()
 {
   std::vector<std::unique_ptr<Command>> commands;
-  for (const auto make :
-      {simulate_command, live_command, record_command, decode_command})
+  for (const auto make : {simulate_command, live_command, record_command,
+           decode_command, play_command})
     commands.push_back (make ());
   return commands;
 }

@@ -2,6 +2,7 @@
 #include "picture.h"
 
 #include "base/text.h"
+#include "pipeline/graph.h"
 
 namespace codedexposure::app
 {
@@ -48,6 +49,30 @@ DecodeOptions::declare (Options &options)
       at_least_0);
   declare_frames (options, "the recording");
   options.need ({"--refine", "--full-well", "--read-noise"}, "--fuse");
+}
+
+std::vector<std::string>
+DecodeOptions::words () const
+{
+  std::vector<std::string> words;
+  const auto add = [&words] (const char *name, const std::string &value) {
+    words.push_back (std::string ("--") + name + "=" + value);
+  };
+  const std::pair<const char *, const std::optional<Text> &> texts[] = {
+      {"method", method}, {"mapping", mapping}, {"fuse", fuse},
+      {"bench", bench}, {"schedule", schedule}};
+  for (const auto &[name, value] : texts)
+    if (value)
+      add (name, *value);
+  if (full_well)
+    add ("full-well", property_text (*full_well));
+  if (read_noise)
+    add ("read-noise", property_text (*read_noise));
+  if (bits)
+    add ("bits", std::to_string (*bits));
+  if (refine)
+    words.emplace_back ("--refine");
+  return words;
 }
 
 namespace

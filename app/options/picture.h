@@ -19,6 +19,9 @@ struct DecodeOptions {
   /** Some of them. @p origin  of the frames: "the recording". */
   void declare_method (Options &options, const std::string &origin);
   void declare_frames (Options &options, const std::string &origin);
+
+  /** Those that are set, as words of another command line. */
+  std::vector<std::string> words () const;
 };
 
 /** "A-B" in seconds; no B: to the end. */

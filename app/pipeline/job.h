@@ -21,6 +21,7 @@ class Viewer
 {
 public:
   struct Calls {
+    GstElement *pipeline = nullptr;
     std::function<void ()> end; ///< as Ctrl-C does
     /** A file was written, or could not be. */
     std::function<void (const std::string &text, bool failed)> said;
@@ -32,6 +33,8 @@ public:
   /** Five times a second: "100 coded frames, 1 lost", and whether that is bad.
    */
   virtual void tell (const std::string &frames, bool alarm) = 0;
+  /** A message of the pipeline; whether nothing else is to be done for it. */
+  virtual bool take (GstMessage *) { return false; }
   /** After the pipeline has ended. */
   virtual void finish () = 0;
 };
@@ -81,6 +84,8 @@ struct Job {
   std::optional<double> retry;
   /** Ctrl-C is the usual end, and not an interruption. */
   bool ends_by_signal = false;
+  /** A person moves in the frames: they are not counted, and end at once. */
+  bool is_moved_in = false;
   /** Prints "100 coded frames of ...; wrote ...". */
   bool has_result = true;
   /** Called with each element message, on the main thread. */

@@ -129,7 +129,7 @@ Run::watch_window ()
     else
       status_.output ("wrote " + text);
   };
-  job_.window->begin ({[this] { on_signal (1); }, said});
+  job_.window->begin ({pipeline (), [this] { on_signal (1); }, said});
 }
 
 RunResult
@@ -210,6 +210,10 @@ Run::wait_for_receivers ()
 void
 Run::on_signal (int times)
 {
+  if (job_.is_moved_in) {
+    end (Exit::done);
+    return;
+  }
   if (times > 1 || !playing_ || failed_) {
     interrupted_ = true;
     status_.line ("stopped");
@@ -348,6 +352,8 @@ Run::on_element_message (const GstStructure *structure, GstMessage *message)
 void
 Run::on_message (GstMessage *message)
 {
+  if (job_.window && job_.window->take (message))
+    return;
   switch (GST_MESSAGE_TYPE (message)) {
   case GST_MESSAGE_EOS:
     end_when_received (failed_ ? Exit::failed : Exit::done);
@@ -427,7 +433,7 @@ Run::tick ()
       !(recording_ && recording_->is_removed ()))
     if (const std::string text = buffer_watch_->tick (); !text.empty ())
       status_.line (text);
-  if (!counter_ || frames == 0)
+  if (!counter_ || frames == 0 || job_.is_moved_in)
     return;
   if (job_.window) {
     const std::string flaws = flaws_of (pipeline (), job_.recorder);

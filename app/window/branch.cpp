@@ -23,32 +23,33 @@ constexpr struct {
 /* The window sets how many frames it holds when their rate is known; until
  * then, two coded frames of any schedule fit. */
 GstElement *
-add_latest (Chain &chain, const std::string &name)
+add_latest (Chain &chain, const std::string &name, bool waits)
 {
   constexpr int kMost = 2 * 256;
-  chain.to ("queue",
-      {{"name", name}, {"leaky", "downstream"}, {"max-size-buffers", kMost},
-          {"max-size-bytes", 0}, {"max-size-time", 0}});
+  chain.to ("queue", {{"name", name}, {"leaky", waits ? "no" : "downstream"},
+                         {"max-size-buffers", kMost}, {"max-size-bytes", 0},
+                         {"max-size-time", 0}});
   return chain.last ();
 }
 
-/* The first queue never blocks the stream; the second one skips frames for
- * which the screen is too slow, when the window has remembered them. */
+/* Unless the stream @waits, the first queue never blocks it, and the second one
+ * skips frames for which the screen is too slow, when the window has remembered
+ * them. */
 WindowPane
 add_pane (Chain chain, std::size_t index, std::optional<int> bits,
-    GstElement *compositor)
+    GstElement *compositor, bool waits)
 {
   const std::string name = kPanes[index].name;
   WindowPane pane;
   pane.caption = kPanes[index].caption;
-  pane.entry = add_latest (chain, name);
+  pane.entry = add_latest (chain, name, waits);
   Settings settings{{"qos", false}};
   set_if (settings, "bits", bits);
   pane.view = chain.to ("codedexposure-view", settings).last ();
   chain.to ("videoscale",
       {{"method", "bilinear2"}, {"add-borders", false}, {"qos", false}});
   pane.kept = chain.to ("capsfilter").last ();
-  pane.late = add_latest (chain, name + "-late");
+  pane.late = add_latest (chain, name + "-late", waits);
   pane.enlarge = chain
                      .to ("videoscale", {{"method", "nearest-neighbour"},
                                             {"add-borders", false}})
@@ -120,18 +121,21 @@ WindowOptions::keys_of (const std::string &command)
 
 WindowBranch
 add_window_branch (const std::vector<Chain> &sources,
-    const WindowOptions &options, std::optional<int> bits)
+    const WindowOptions &options, std::optional<int> bits,
+    const std::string &paced)
 {
   Graph &graph = sources.front ().graph ();
   WindowBranch branch;
   branch.compositor = graph.add ("compositor", {{"background", "black"}});
   for (const Chain &source : sources)
-    branch.panes.push_back (
-        add_pane (source, branch.panes.size (), bits, branch.compositor));
+    branch.panes.push_back (add_pane (source, branch.panes.size (), bits,
+        branch.compositor, !paced.empty ()));
   /* No screen shows more; fewer frames would make keys slow. */
   Chain chain = graph.from (branch.compositor);
-  branch.size =
-      chain.caps ("video/x-raw,format=BGRx,framerate=[25/1,100/1]").last ();
+  branch.size = chain
+                    .caps ("video/x-raw,format=BGRx,framerate=" +
+                           (paced.empty () ? "[25/1,100/1]" : paced))
+                    .last ();
   branch.overlay = chain.to ("cairooverlay").last ();
   chain.to ("queue", {{"max-size-buffers", 4}}).to ("videoconvert");
   branch.sink = options.sink ? graph.add_text (*options.sink)

@@ -53,9 +53,12 @@ struct WindowOptions {
 };
 
 /** Shows the pictures of two or three chains: camera, subframes, perhaps fused.
- * @p bits  significant bits of the pixels; none: those of the frames. */
+ * @p bits  significant bits of the pixels; none: those of the frames.
+ * @p paced  pictures of the window a second, "100/1", for which the stream
+ * waits; empty: the window skips what it is too slow for. */
 WindowBranch add_window_branch (const std::vector<Chain> &sources,
-    const WindowOptions &options, std::optional<int> bits);
+    const WindowOptions &options, std::optional<int> bits,
+    const std::string &paced);
 
 /** Throws Failure if there is no screen for @p branch. */
 void need_screen (const WindowBranch &branch);

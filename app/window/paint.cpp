@@ -28,10 +28,6 @@ constexpr int kMargin = 8;
 constexpr int kFont = 14;
 constexpr int kLine = 19; // distance of lines
 
-const char *const kKeys =
-    "Space: pause, live    Left, Right: step    L: loop the last second at 1/4 "
-    "speed    S: snapshot    Q: end";
-
 void
 use (cairo_t *cairo, const Colour &colour)
 {
@@ -111,7 +107,7 @@ paint_captions (
 
 Surface
 paint_panel (const WindowLayout &layout, const std::vector<PanelLine> &lines,
-    const Exposure *exposure)
+    const Exposure *exposure, const char *keys)
 {
   const int width = layout.size ().width;
   Surface surface = strip (width, WindowLayout::kPanel);
@@ -125,7 +121,7 @@ paint_panel (const WindowLayout &layout, const std::vector<PanelLine> &lines,
     draw_histogram (cairo.get (),
         width - kMargin - 2.0 * double (exposure->histogram.size ()),
         *exposure);
-  write (cairo.get (), kMargin, WindowLayout::kPanel - 9, kKeys, kFaint);
+  write (cairo.get (), kMargin, WindowLayout::kPanel - 9, keys, kFaint);
   return surface;
 }
 

@@ -42,9 +42,11 @@ struct PanelLine {
 /** The captions of the panes, in a picture as wide as the window. */
 Surface paint_captions (
     const WindowLayout &layout, const std::vector<std::string> &captions);
-/** The panel: @p lines, the histogram (null: none) and the keys. */
+/** The panel: @p lines, the histogram (null: none) and
+ * @p keys, a line. */
 Surface paint_panel (const WindowLayout &layout,
-    const std::vector<PanelLine> &lines, const Exposure *exposure);
+    const std::vector<PanelLine> &lines, const Exposure *exposure,
+    const char *keys);
 /** Whether pixels of a picture become blocks of the same size, if it is @p
  * shown at that size; otherwise, it has to be interpolated. */
 inline bool

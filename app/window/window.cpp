@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <utility>
 
 #include <csignal>
@@ -13,7 +12,6 @@
 
 #include "common/element.h"
 #include "pipeline/messages.h"
-#include "pipeline/part.h"
 #include "window/screen.h"
 #include "window/whole_picture.h"
 
@@ -31,6 +29,10 @@ constexpr ViewTime kBeside = kLoop + GST_SECOND / 4;
 /* Texts that change faster cannot be read. */
 constexpr ViewTime kPanelPeriod = GST_SECOND / 10;
 constexpr int kBins = 128;
+
+const char *const kKeys =
+    "Space: pause, live    Left, Right: step    L: loop the last second at 1/4 "
+    "speed    S: snapshot    Q: end";
 
 constexpr std::size_t kCamera = 0, kSubframes = 1; // panes
 
@@ -104,10 +106,13 @@ struct Window::Pane {
   Recent<ShownPtr> recent{kLoop};
 };
 
-Window::Window (WindowBranch branch, GstPad *coded, const Style &style)
+Window::Window (WindowBranch branch, GstPad *coded, Style style)
     : size_ (branch.size), room_ (style.room), delay_ (style.delay),
-      name_ (style.name), keeper_ (coded)
+      name_ (style.name), player_ (std::move (style.player))
 {
+  if (!player_)
+    keeper_.emplace (coded);
+  panel_at_ = pad_of (branch.overlay, "sink");
   for (WindowPane &part : branch.panes) {
     auto pane = std::make_unique<Pane> ();
     pane->window = this;
@@ -124,15 +129,13 @@ Window::Window (WindowBranch branch, GstPad *coded, const Style &style)
       this, nullptr);
   g_signal_connect (branch.overlay, "draw", G_CALLBACK (on_draw), this);
   gst_pad_add_probe (pad_of (branch.overlay, "src").get (),
-      GST_PAD_PROBE_TYPE_EVENT_UPSTREAM, on_upstream, this, nullptr);
+      GST_PAD_PROBE_TYPE_EVENT_UPSTREAM, on_upstream, branch.overlay, nullptr);
 }
 
 Window::~Window ()
 {
   if (on_signal_ > 0)
     g_source_remove (on_signal_);
-  while (g_idle_remove_by_data (this)) {
-  }
 }
 
 /* An experiment tells by a signal that something has happened. */
@@ -140,7 +143,10 @@ void
 Window::begin (Calls calls)
 {
   calls_ = std::move (calls);
-  keeper_.begin (calls_.said);
+  snapshots_.begin (calls_.said);
+  if (player_)
+    return player_->begin (calls_.pipeline, calls_.said);
+  keeper_->begin (calls_.said);
   on_signal_ = g_unix_signal_add (
       SIGUSR1,
       [] (gpointer self) {
@@ -153,8 +159,11 @@ Window::begin (Calls calls)
 void
 Window::finish ()
 {
-  save_snapshots ();
-  keeper_.finish ();
+  snapshots_.write ();
+  if (keeper_)
+    keeper_->finish ();
+  if (player_)
+    player_->finish ();
 }
 
 void
@@ -364,18 +373,34 @@ Window::remember (Pane &pane, GstPad *pad, GstBuffer *picture)
     pane.recent.add (running, std::move (shown));
 }
 
-/* Keys are for the window; no element of the stream needs them. */
+/* Keys are for the window; no element of the stream needs them. They go by the
+ * bus, on which sinks post those that come while the stream is flushed. */
 GstPadProbeReturn
-Window::on_upstream (GstPad *, GstPadProbeInfo *info, gpointer self)
+Window::on_upstream (GstPad *, GstPadProbeInfo *info, gpointer overlay)
 {
   GstEvent *event = gst_pad_probe_info_get_event (info);
-  const gchar *key = nullptr;
   if (GST_EVENT_TYPE (event) != GST_EVENT_NAVIGATION)
     return GST_PAD_PROBE_OK;
-  if (gst_navigation_event_get_type (event) == GST_NAVIGATION_EVENT_KEY_PRESS &&
-      gst_navigation_event_parse_key_event (event, &key) && key)
-    static_cast<Window *> (self)->press (key);
+  gst_element_post_message (GST_ELEMENT (overlay),
+      gst_navigation_message_new_event (GST_OBJECT (overlay), event));
   return GST_PAD_PROBE_DROP;
+}
+
+bool
+Window::take (GstMessage *message)
+{
+  GstEvent *parsed = nullptr;
+  if (gst_navigation_message_get_type (message) !=
+          GST_NAVIGATION_MESSAGE_EVENT ||
+      !gst_navigation_message_parse_event (message, &parsed))
+    return player_ && player_->take (message);
+  const EventPtr event (parsed);
+  const gchar *key = nullptr;
+  if (gst_navigation_event_get_type (parsed) ==
+          GST_NAVIGATION_EVENT_KEY_PRESS &&
+      gst_navigation_event_parse_key_event (parsed, &key) && key)
+    press (key);
+  return true;
 }
 
 void
@@ -389,16 +414,26 @@ Window::press (const std::string &key)
   const auto is = [&key] (const char *name) {
     return g_ascii_strcasecmp (key.c_str (), name) == 0;
   };
-  if (is ("q"))
-    g_idle_add (on_end, this);
-  if (is ("k"))
-    g_idle_add (on_keep, this);
+  if (is ("q")) {
+    calls_.end ();
+    return;
+  }
   if (is ("plus") || is ("equal") || is ("KP_Add"))
     set_contrast (1);
   if (is ("minus") || is ("KP_Subtract"))
     set_contrast (-1);
+  {
+    const std::lock_guard lock (mutex_);
+    snapshot_wanted_ |= is ("s");
+  }
+  if (player_) {
+    if (!player_->press (key))
+      player_->redraw ();
+    return;
+  }
+  if (is ("k"))
+    keep ();
   const std::lock_guard lock (mutex_);
-  snapshot_wanted_ |= is ("s");
   const bool was_live = replay_.is_live ();
   for (const auto &[name, act] : kKeys)
     if (is (name))
@@ -423,24 +458,10 @@ Window::set_contrast (int by)
     g_object_set (pane->part.view, "white", white, nullptr);
 }
 
-gboolean
-Window::on_end (gpointer self)
-{
-  static_cast<Window *> (self)->calls_.end ();
-  return G_SOURCE_REMOVE;
-}
-
-gboolean
-Window::on_keep (gpointer self)
-{
-  static_cast<Window *> (self)->keep ();
-  return G_SOURCE_REMOVE;
-}
-
 void
 Window::keep ()
 {
-  if (const auto begun = keeper_.keep (name_); !begun)
+  if (const auto begun = keeper_->keep (name_); !begun)
     calls_.said (begun.error ().message, true);
 }
 
@@ -448,7 +469,9 @@ void
 Window::on_draw (
     GstElement *, cairo_t *cairo, guint64 time, guint64, gpointer self)
 {
-  static_cast<Window *> (self)->draw (cairo, time);
+  auto *window = static_cast<Window *> (self);
+  /* A seek begins another segment, whose times do not count from 0. */
+  window->draw (cairo, times_of (window->panel_at_.get (), time).running);
 }
 
 /* Whether both are of the same frame, as far as that is known. */
@@ -456,6 +479,14 @@ bool
 Window::is_pair (const Shown &one, const Shown &other)
 {
   return !one.meta || !other.meta || one.meta->frame == other.meta->frame;
+}
+
+bool
+Window::is_wanted (const Shown &subframe) const
+{
+  return subframe.meta && GST_CLOCK_TIME_IS_VALID (subframe.stream_time) &&
+         player_->is_wanted (Nanoseconds (subframe.stream_time),
+             std::max (subframe.meta->subframe, 0));
 }
 
 /* The compositor has drawn the present pictures; others are drawn over them. */
@@ -481,7 +512,8 @@ Window::draw (cairo_t *cairo, ViewTime time)
   const Shown *coded = shown[kCamera].get ();
   const Shown *subframe = shown[kSubframes].get ();
   const bool snapshot = snapshot_wanted_ && subframe && coded &&
-                        (!live || is_pair (*subframe, *coded));
+                        (!live || is_pair (*subframe, *coded)) &&
+                        (!player_ || is_wanted (*subframe));
   snapshot_wanted_ &= !snapshot;
   const auto text = lines (subframe, coded, time);
   if (std::exchange (captions_changed_, false))
@@ -494,7 +526,8 @@ Window::draw (cairo_t *cairo, ViewTime time)
   if (!panel_ || snapshot || (!live && other) || time < painted_ ||
       time >= painted_ + kPanelPeriod) {
     panel_ =
-        paint_panel (layout, text, coded ? coded->exposure.get () : nullptr);
+        paint_panel (layout, text, coded ? coded->exposure.get () : nullptr,
+            player_ ? Player::short_keys () : kKeys);
     painted_ = time;
     painted_subframe_ = subframe;
   }
@@ -517,7 +550,10 @@ std::vector<PanelLine>
 Window::lines (const Shown *subframe, const Shown *coded, ViewTime time) const
 {
   std::vector<PanelLine> lines;
-  if (replay_.is_live ())
+  if (player_)
+    lines.push_back (
+        {player_->line (subframe ? Nanoseconds (subframe->stream_time) : 0)});
+  else if (replay_.is_live ())
     lines.push_back (
         {contrast_ > 0 ? format ("live, %d times as bright", 1 << contrast_)
                        : "live"});
@@ -563,7 +599,6 @@ Window::tell (const std::string &frames, bool alarm)
   frames_ = {frames, alarm};
 }
 
-/* PNG files are made by the main thread. */
 void
 Window::take_snapshot (
     cairo_t *cairo, const WindowLayout &layout, const Shown &subframe)
@@ -574,74 +609,26 @@ Window::take_snapshot (
         subframe.meta->frame, std::max (subframe.meta->subframe, 0));
   if (GST_CLOCK_TIME_IS_VALID (subframe.stream_time))
     name += format ("-%.3fs", 1e-9 * double (subframe.stream_time));
-  const std::lock_guard lock (mutex_);
-  snapshots_.push_back ({copy_window (cairo, layout), name});
-  g_idle_add (on_snapshot, this);
-}
-
-gboolean
-Window::on_snapshot (gpointer self)
-{
-  static_cast<Window *> (self)->save_snapshots ();
-  return G_SOURCE_REMOVE;
-}
-
-void
-Window::save_snapshots ()
-{
-  for (;;) {
-    Snapshot next;
-    {
-      const std::lock_guard lock (mutex_);
-      if (snapshots_.empty ())
-        return;
-      next = std::move (snapshots_.front ());
-      snapshots_.pop_front ();
-    }
-    const Result<std::string> saved = save (next);
-    calls_.said (saved ? *saved : saved.error ().message, !saved);
-  }
-}
-
-/* Returns the name of the file, which no other had. */
-Result<std::string>
-Window::save (const Snapshot &snapshot) const
-{
-  std::string name = snapshot.name + ".png";
-  std::error_code ignored;
-  for (int k = 2; std::filesystem::exists (name, ignored); k++)
-    name = format ("%s-%d.png", snapshot.name.c_str (), k);
-  Part part (name, Part::kFile);
-  if (auto claimed = part.claim (false); !claimed)
-    return claimed.error ();
-  const cairo_status_t status = cairo_surface_write_to_png (
-      snapshot.picture.get (), part.path ().c_str ());
-  Result<void> written =
-      status == CAIRO_STATUS_SUCCESS
-          ? part.publish (false)
-          : Error{"cannot write " + name + ": " +
-                      cairo_status_to_string (status) +
-                      "; free space on the disk, and press S again",
-                ErrorCode::io};
-  if (!written) {
-    part.discard ();
-    return written.error ();
-  }
-  return name;
+  snapshots_.take (copy_window (cairo, layout), name);
 }
 
 void
 add_window (Job &job, const std::vector<Chain> &sources,
-    const WindowOptions &options, std::optional<int> bits)
+    const WindowOptions &options, std::optional<int> bits,
+    std::optional<Played> played)
 {
-  WindowBranch branch = add_window_branch (sources, options, bits);
+  WindowBranch branch = add_window_branch (
+      sources, options, bits, played ? played->slots_per_second () : "");
+  if (played)
+    branch.panes[kSubframes].caption = played->pictures;
   if (!job.options.print)
     need_screen (branch);
   job.has_window = true;
   job.window = std::make_unique<Window> (std::move (branch),
       pad_of (job.counted, "sink").get (),
       Window::Style{find_screen ().room (), job.times.shift_to.value_or (0),
-          job.command});
+          job.command,
+          played ? std::make_unique<Player> (*std::move (played)) : nullptr});
 }
 
 } // namespace codedexposure::app

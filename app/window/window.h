@@ -4,7 +4,6 @@
 #pragma once
 
 #include <atomic>
-#include <deque>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -19,7 +18,9 @@
 #include "window/branch.h"
 #include "window/keeper.h"
 #include "window/paint.h"
+#include "window/player.h"
 #include "window/replay.h"
+#include "window/snapshots.h"
 
 namespace codedexposure::app
 {
@@ -37,16 +38,19 @@ public:
     Extent room;            ///< for the window, in pixels
     GstClockTime delay = 0; ///< after which frames are shown
     std::string name;       ///< of the command, in the names of snapshots
+    /** Moves in a recording; null: the window looks at what comes. */
+    std::unique_ptr<Player> player = nullptr;
   };
 
   /** @p coded  pad whose caps are those of the coded frames. */
-  Window (WindowBranch branch, GstPad *coded, const Style &style);
+  Window (WindowBranch branch, GstPad *coded, Style style);
   ~Window () override;
   Window (const Window &) = delete;
   Window &operator= (const Window &) = delete;
 
   void begin (Calls calls) override;
   void tell (const std::string &frames, bool alarm) override;
+  bool take (GstMessage *message) override;
   /** Writes the snapshots and frames that were not yet written. */
   void finish () override;
 
@@ -60,11 +64,6 @@ private:
   };
   using ShownPtr = std::shared_ptr<const Shown>;
   struct Pane;
-  struct Snapshot {
-    Surface picture;
-    std::string name;
-  };
-
   static GstPadProbeReturn on_camera_caps (
       GstPad *, GstPadProbeInfo *info, gpointer self);
   static GstPadProbeReturn on_arriving_caps (
@@ -74,12 +73,9 @@ private:
   static GstPadProbeReturn on_kept (
       GstPad *pad, GstPadProbeInfo *info, gpointer pane);
   static GstPadProbeReturn on_upstream (
-      GstPad *, GstPadProbeInfo *info, gpointer self);
+      GstPad *, GstPadProbeInfo *info, gpointer overlay);
   static void on_draw (
       GstElement *, cairo_t *cairo, guint64 time, guint64, gpointer self);
-  static gboolean on_end (gpointer self);
-  static gboolean on_snapshot (gpointer self);
-  static gboolean on_keep (gpointer self);
 
   void watch (Pane &pane);
   void set_layout (const GstVideoInfo &camera);
@@ -91,14 +87,13 @@ private:
   void press (const std::string &key);
   void set_contrast (int by);
   static bool is_pair (const Shown &one, const Shown &other);
+  bool is_wanted (const Shown &subframe) const;
   void draw (cairo_t *cairo, ViewTime time);
   std::vector<PanelLine> lines (
       const Shown *subframe, const Shown *coded, ViewTime time) const;
   void take_snapshot (
       cairo_t *cairo, const WindowLayout &layout, const Shown &subframe);
-  void save_snapshots ();
   void keep ();
-  Result<std::string> save (const Snapshot &snapshot) const;
 
   GstElement *const size_; // of the pipeline
   const Extent room_;
@@ -106,8 +101,11 @@ private:
   const std::string name_;
   Calls calls_; // constant while the pipeline plays
   std::vector<std::unique_ptr<Pane>> panes_; // constant
-  Keeper keeper_;
-  guint on_signal_ = 0; // source
+  std::optional<Keeper> keeper_;             // of what comes
+  const std::unique_ptr<Player> player_;
+  Snapshots snapshots_;
+  gst::ObjectPtr<GstPad> panel_at_; // where it is drawn
+  guint on_signal_ = 0;             // source
 
   std::atomic<int> bits_ = 8; // of the pixels that came last
 
@@ -119,7 +117,6 @@ private:
   Replay replay_;
   ViewTime now_ = 0; // of the last picture of the window
   bool snapshot_wanted_ = false;
-  std::deque<Snapshot> snapshots_; // to be written
   PanelLine frames_;
 
   /* The thread that draws: */
@@ -131,6 +128,7 @@ private:
 /** Shows the pictures of two or three chains of @p job in a window: camera,
  * subframes, perhaps fused. Throws Failure if there is no screen. */
 void add_window (Job &job, const std::vector<Chain> &sources,
-    const WindowOptions &options, std::optional<int> bits = {});
+    const WindowOptions &options, std::optional<int> bits = {},
+    std::optional<Played> played = {});
 
 } // namespace codedexposure::app

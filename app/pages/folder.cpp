@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "folder.h"
 
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 
@@ -82,16 +83,24 @@ PageFolder::publish ()
 {
   std::error_code error;
   const fs::path from = part_.path (), to = name_;
+  const fs::path page = "index.html";
   fs::create_directories (to, error);
+  // A signal may end this program at any moment: all files get their names at
+  // once, or those of an earlier page are replaced and the page comes last.
+  if (fs::is_empty (to, error) &&
+      std::rename (from.c_str (), to.c_str ()) == 0)
+    return;
   for (auto entry = fs::recursive_directory_iterator (from, error);
        !error && entry != fs::recursive_directory_iterator (); ++entry) {
-    const fs::path target = to / entry->path ().lexically_relative (from);
+    const fs::path name = entry->path ().lexically_relative (from);
     if (entry->is_directory ()) {
-      fs::create_directories (target, error);
-      remove_pictures (target);
-    } else
-      fs::rename (entry->path (), target, error);
+      fs::create_directories (to / name, error);
+      remove_pictures (to / name);
+    } else if (name != page)
+      fs::rename (entry->path (), to / name, error);
   }
+  if (!error)
+    fs::rename (from / page, to / page, error);
   if (error)
     fail ("cannot write " + name_ + ": " + error.message () +
           "; choose a folder that you can write to");

@@ -43,17 +43,12 @@ add_pane (Chain chain, std::size_t index, std::optional<int> bits,
   WindowPane pane;
   pane.caption = kPanes[index].caption;
   pane.entry = add_latest (chain, name, waits);
+  pane.late = add_latest (chain, name + "-late", waits);
   Settings settings{{"qos", false}};
   set_if (settings, "bits", bits);
   pane.view = chain.to ("codedexposure-view", settings).last ();
-  chain.to ("videoscale",
-      {{"method", "bilinear2"}, {"add-borders", false}, {"qos", false}});
-  pane.kept = chain.to ("capsfilter").last ();
-  pane.late = add_latest (chain, name + "-late", waits);
-  pane.enlarge = chain
-                     .to ("videoscale", {{"method", "nearest-neighbour"},
-                                            {"add-borders", false}})
-                     .last ();
+  pane.scale =
+      chain.to ("videoscale", {{"add-borders", false}, {"qos", false}}).last ();
   pane.shown = chain.to ("capsfilter").last ();
   chain.to ("videoconvert").caps ("video/x-raw,format=BGRx");
   pane.mixed.reset (gst_element_request_pad_simple (compositor, "sink_%u"));
@@ -100,23 +95,39 @@ WindowOptions::keys_of (const std::string &command)
          "  Space           pause at the subframe that is shown; again: live\n"
          "  Left, Right     pause, and go one subframe back or forward\n"
          "  L               loop the last second at 1/4 speed; again: live\n"
-         "  S               write what is shown to the current folder, but "
-         "replace no\n                  file: " +
-         command +
-         "-frameN-slotK-TIMEs.png\n"
-         "  +, -            show pictures twice as bright, and back\n"
          "  K               keep what has just happened: the coded frames of "
          "the last 10 s\n                  become a recording, " +
          command +
-         "-frameN.mkv;\n                  the signal USR1 does so, too\n"
-         "  Q               end, as Ctrl-C does\n"
+         "-frameN.mkv;\n                  the signal USR1 does so, too\n" +
+         common_keys (command) +
          "The stream does not wait for the window: recording and counting go "
          "on in a pause\nor loop, and subframes are skipped if the screen is "
-         "too slow. The window keeps\nthe pictures of about one second, 8 "
-         "bits deep and at most as large as shown:\n25 MB for 768x576 pixels "
-         "at 25 frames/s, and N times 14 MB more if fused; and\nthe "
-         "coded frames of the last 10 s, 110 MB, up to a quarter of the "
-         "free memory.\n";
+         "too slow. The window keeps\nthe pictures of the last second, up to "
+         "256 MB a pane: 25 MB for 768x576 pixels of\n8 bits at 25 frames/s, "
+         "and N times 11 MB more if fused; and the coded frames of\nthe last "
+         "10 s, 110 MB, up to a quarter of the free memory.\n";
+}
+
+std::string
+WindowOptions::common_keys (const std::string &command)
+{
+  return "  S               write what is shown to the current folder, but "
+         "replace no\n                  file: the window to " +
+         command +
+         "-frameN-slotK-TIMEs.png, and each\n                  picture with "
+         "all of its pixels and bits to ...-camera.png and so on\n"
+         "  Wheel, Z, X     look closer at the pointer, and back; 0: see the "
+         "whole picture.\n                  The captions say the pixel at the "
+         "pointer and its value\n"
+         "  Drag            move the part that is seen; with the right button: "
+         "contrast\n                  (right, left) and brightness (up, down)\n"
+         "  +, -            show pictures twice as bright, and back\n"
+         "  C               stretch what is seen of the coded frame from black "
+         "to white;\n                  again: show all values\n"
+         "  R               mark saturated pixels in red; again: do not\n"
+         "  F               fill the screen; again, or Esc: do not\n"
+         "  H               show these keys; again: hide them\n"
+         "  Q               end, as Ctrl-C does\n";
 }
 
 WindowBranch
@@ -137,7 +148,9 @@ add_window_branch (const std::vector<Chain> &sources,
                            (paced.empty () ? "[25/1,100/1]" : paced))
                     .last ();
   branch.overlay = chain.to ("cairooverlay").last ();
-  chain.to ("queue", {{"max-size-buffers", 4}}).to ("videoconvert");
+  chain.to ("queue", {{"max-size-buffers", 4}})
+      .to ("videoscale", {{"add-borders", true}})
+      .to ("videoconvert");
   branch.sink = options.sink ? graph.add_text (*options.sink)
                              : graph.add ("autovideosink");
   chain.to (branch.sink);

@@ -19,14 +19,12 @@ struct WindowPane {
   const char *caption = ""; ///< "camera"
   /** A queue that never blocks the stream. */
   GstElement *entry = nullptr;
-  /** Scales values to 8 bits. */
-  GstElement *view = nullptr;
-  /** A filter for the size in which pictures are kept. */
-  GstElement *kept = nullptr;
   /** A queue that skips pictures for which the screen is too slow. */
   GstElement *late = nullptr;
-  /** Scales from the kept size to that in the window. */
-  GstElement *enlarge = nullptr;
+  /** Scales values to 8 bits. */
+  GstElement *view = nullptr;
+  /** Scales to the size in the window. */
+  GstElement *scale = nullptr;
   /** A filter for the size in the window. */
   GstElement *shown = nullptr;
   /** Of the compositor. */
@@ -50,6 +48,8 @@ struct WindowOptions {
   void declare (Options &options);
   /** What --help says of the keys. @p command  names snapshots. */
   static std::string keys_of (const std::string &command);
+  /** Those of all windows. */
+  static std::string common_keys (const std::string &command);
 };
 
 /** Shows the pictures of two or three chains: camera, subframes, perhaps fused.

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <sstream>
 
 namespace codedexposure::app
 {
@@ -99,9 +100,16 @@ paint_captions (
 {
   Surface surface = strip (layout.size ().width, WindowLayout::kCaption);
   const Cairo cairo = begin (surface.get ());
-  for (int k = 0; k < int (captions.size ()); k++)
+  for (int k = 0; k < int (captions.size ()); k++) {
+    cairo_reset_clip (cairo.get ());
+    if (k + 1 < int (captions.size ())) {
+      cairo_rectangle (
+          cairo.get (), 0, 0, layout.left (k + 1), WindowLayout::kCaption);
+      cairo_clip (cairo.get ());
+    }
     write (cairo.get (), layout.left (k) + kMargin, 17,
         captions[std::size_t (k)], kText);
+  }
   return surface;
 }
 
@@ -125,34 +133,46 @@ paint_panel (const WindowLayout &layout, const std::vector<PanelLine> &lines,
   return surface;
 }
 
-void
-paint_picture (
-    cairo_t *window, int left, int top, Extent size, const GreyPicture &picture)
+Surface
+paint_sheet (const std::string &text, Extent most)
 {
-  const Surface surface = strip (picture.width, picture.height);
-  const int stride = cairo_image_surface_get_stride (surface.get ());
-  unsigned char *const rows = cairo_image_surface_get_data (surface.get ());
-  if (!rows) // no memory
-    return;
-  for (int y = 0; y < picture.height; y++) {
-    const std::uint8_t *from =
-        picture.pixels.data () + std::size_t (y) * std::size_t (picture.width);
-    auto *to = reinterpret_cast<std::uint32_t *> (rows + y * stride);
-    std::transform (from, from + picture.width, to,
-        [] (std::uint8_t grey) { return 0x010101u * grey; });
+  constexpr double kLetter = 7.3, kRow = 16; // pixels, of the font below
+  std::vector<std::string> rows;
+  std::istringstream lines (text);
+  std::size_t longest = 1;
+  for (std::string row; std::getline (lines, row);) {
+    longest = std::max (longest, row.size ());
+    rows.push_back (row);
   }
-  cairo_surface_mark_dirty (surface.get ());
+  const double width = kLetter * double (longest) + 2 * kMargin;
+  const double height = kRow * double (rows.size ()) + 2 * kMargin;
+  const double scale =
+      std::min ({1.0, most.width / width, most.height / height});
+  Surface surface (cairo_image_surface_create (CAIRO_FORMAT_ARGB32,
+      int (std::ceil (width * scale)), int (std::ceil (height * scale))));
+  const Cairo cairo (cairo_create (surface.get ()));
+  cairo_set_source_rgba (cairo.get (), 0, 0, 0, 0.8);
+  cairo_paint (cairo.get ());
+  cairo_scale (cairo.get (), scale, scale);
+  cairo_select_font_face (cairo.get (), "monospace", CAIRO_FONT_SLANT_NORMAL,
+      CAIRO_FONT_WEIGHT_NORMAL);
+  cairo_set_font_size (cairo.get (), 12);
+  /* Letters of a reduced sheet are reduced with it. */
+  cairo_font_options_t *options = cairo_font_options_create ();
+  cairo_font_options_set_hint_metrics (options, CAIRO_HINT_METRICS_OFF);
+  cairo_set_font_options (cairo.get (), options);
+  cairo_font_options_destroy (options);
+  for (std::size_t k = 0; k < rows.size (); k++)
+    write (cairo.get (), kMargin, kMargin + kRow * (double (k) + 0.75), rows[k],
+        kText);
+  return surface;
+}
+
+void
+paint_over (cairo_t *window, cairo_surface_t *sheet)
+{
   cairo_save (window);
-  cairo_rectangle (window, left, top, size.width, size.height);
-  cairo_clip (window);
-  cairo_translate (window, left, top);
-  cairo_scale (window, double (size.width) / picture.width,
-      double (size.height) / picture.height);
-  cairo_set_source_surface (window, surface.get (), 0, 0);
-  cairo_pattern_set_filter (cairo_get_source (window),
-      are_blocks ({picture.width, picture.height}, size)
-          ? CAIRO_FILTER_NEAREST
-          : CAIRO_FILTER_BILINEAR);
+  cairo_set_source_surface (window, sheet, 0, WindowLayout::kCaption);
   cairo_paint (window);
   cairo_restore (window);
 }

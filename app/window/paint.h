@@ -22,12 +22,6 @@ struct SurfaceDestroy {
 };
 using Surface = std::unique_ptr<cairo_surface_t, SurfaceDestroy>;
 
-/** An 8-bit picture; its rows follow each other without padding. */
-struct GreyPicture {
-  int width = 0, height = 0;
-  std::vector<std::uint8_t> pixels;
-};
-
 /** How a coded frame is exposed. */
 struct Exposure {
   std::vector<std::uint64_t> histogram; ///< of all levels
@@ -55,9 +49,10 @@ are_blocks (Extent picture, Extent shown)
   return shown.width % picture.width == 0 && shown.height % picture.height == 0;
 }
 
-/** Paints @p picture at that place of the window, in that size. */
-void paint_picture (cairo_t *window, int left, int top, Extent size,
-    const GreyPicture &picture);
+/** A transparent sheet of @p text, no larger than @p most. */
+Surface paint_sheet (const std::string &text, Extent most);
+/** Paints @p sheet over the panes. */
+void paint_over (cairo_t *window, cairo_surface_t *sheet);
 /** Paints a part of the window as it is, at that height. */
 void paint_strip (cairo_t *window, cairo_surface_t *strip, int top);
 /** A copy of @p window without its line of keys. */

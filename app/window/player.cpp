@@ -8,6 +8,7 @@
 #include "common/excerpt.h"
 #include "pipeline/graph.h"
 #include "pipeline/messages.h"
+#include "window/branch.h"
 
 namespace codedexposure::app
 {
@@ -46,18 +47,15 @@ Player::keys_of ()
          "  L               play the stretch, or all, again and again, or "
          "once\n"
          "  E               export the stretch, as decode does, to the current "
-         "folder\n"
-         "  S               write what is shown to the current folder, but "
-         "replace no\n                  file: play-frameN-slotK-TIMEs.png\n"
-         "  +, -            show pictures twice as bright, and back\n"
-         "  Q               end, as Ctrl-C does\n";
+         "folder\n" +
+         WindowOptions::common_keys ("play");
 }
 
 const char *
 Player::short_keys ()
 {
   return "Space: pause   Left, Right: step   PgUp, PgDn: 1 s   [, ]: speed   "
-         "A, B: mark   L: loop   E: export   Q: end";
+         "A, B: mark   L: loop   E: export   H: all keys";
 }
 
 void

@@ -56,8 +56,8 @@ public:
   /** The same in a line of the window. */
   static const char *short_keys ();
 
-  /** Before @p pipeline plays. Main thread, as all but is_wanted ()
-   * and line (). */
+  /** Before @p pipeline plays. Main thread, as all but
+   * is_paused (), is_wanted () and line (). */
   void begin (GstElement *pipeline, Said said);
   /** Whether the end of the stream, or what else @p message says, is dealt
    * with.
@@ -69,6 +69,7 @@ public:
   bool press (const std::string &key);
   /** Draws the picture of a pause once more. */
   void redraw ();
+  bool is_paused () const { return state ().is_paused; }
   /** Whether the subframe at the position @p time, of this slot, is what is
    * looked for: in a pause, others are drawn as well. */
   bool is_wanted (Nanoseconds time, int slot) const;

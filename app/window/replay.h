@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -23,13 +24,16 @@ public:
   /** @p span  time for which pictures are kept; a few are always kept. */
   explicit Recent (ViewTime span) : span_ (span) {}
 
-  /** One that is not later than the last belongs to a new stream. */
-  void add (ViewTime time, Picture picture)
+  /** One that is not later than the last belongs to a new stream. At most @p
+   * most are kept. */
+  void add (ViewTime time, Picture picture,
+      std::size_t most = std::numeric_limits<std::size_t>::max ())
   {
     if (!kept_.empty () && time <= kept_.back ().first)
       kept_.clear ();
     kept_.emplace_back (time, std::move (picture));
-    while (kept_.size () > kFew && kept_.front ().first + span_ < time)
+    while (kept_.size () > kFew &&
+           (kept_.size () > most || kept_.front ().first + span_ < time))
       kept_.pop_front ();
   }
 

@@ -2,8 +2,11 @@
 #include "screen.h"
 
 #include <algorithm>
+#include <type_traits>
+#include <vector>
 
 #include <dlfcn.h>
+#include <unistd.h>
 
 namespace codedexposure::app
 {
@@ -16,7 +19,99 @@ template <typename Function>
 Function *
 function_of (void *library, const char *name)
 {
-  return reinterpret_cast<Function *> (dlsym (library, name));
+  return library ? reinterpret_cast<Function *> (dlsym (library, name))
+                 : nullptr;
+}
+
+using XDisplay = void;
+using XWindow = unsigned long;
+using XAtom = unsigned long;
+
+using OnError = int (XDisplay *, void *error);
+
+/* XClientMessageEvent, as large as any XEvent. */
+struct XMessage {
+  int type;
+  unsigned long serial;
+  int send_event;
+  XDisplay *display;
+  XWindow window;
+  XAtom message;
+  int format;
+  long data[5];
+  long rest[12];
+};
+
+/* The functions of libX11 that are used here. */
+struct X {
+  void *library = dlopen ("libX11.so.6", RTLD_LAZY);
+#define X_FUNCTION(type, name)                                                 \
+  std::add_pointer_t<type> name = function_of<type> (library, "X" #name)
+  X_FUNCTION (int (), InitThreads);
+  X_FUNCTION (XDisplay *(const char *), OpenDisplay);
+  X_FUNCTION (int (XDisplay *), CloseDisplay);
+  X_FUNCTION (int (XDisplay *), DefaultScreen);
+  X_FUNCTION (int (XDisplay *, int), DisplayWidth);
+  X_FUNCTION (int (XDisplay *, int), DisplayHeight);
+  X_FUNCTION (XWindow (XDisplay *), DefaultRootWindow);
+  X_FUNCTION (XAtom (XDisplay *, const char *, int), InternAtom);
+  X_FUNCTION (
+      int (XDisplay *, XWindow, XWindow *, XWindow *, XWindow **, unsigned *),
+      QueryTree);
+  X_FUNCTION (int (XDisplay *, XWindow, XAtom, long, long, int, XAtom, XAtom *,
+                  int *, unsigned long *, unsigned long *, unsigned char **),
+      GetWindowProperty);
+  X_FUNCTION (int (XDisplay *, XWindow, int, long, XMessage *), SendEvent);
+  X_FUNCTION (int (void *), Free);
+  X_FUNCTION (int (XDisplay *, int), Sync);
+  X_FUNCTION (OnError *(OnError *), SetErrorHandler);
+#undef X_FUNCTION
+
+  bool has_all () const
+  {
+    return InitThreads && OpenDisplay && CloseDisplay && DefaultScreen &&
+           DisplayWidth && DisplayHeight && DefaultRootWindow && InternAtom &&
+           QueryTree && GetWindowProperty && SendEvent && Free && Sync &&
+           SetErrorHandler;
+  }
+};
+
+/* The process that says that it owns @window; 0: none. */
+long
+owner_of (const X &x, XDisplay *display, XWindow window)
+{
+  constexpr XAtom kAnyType = 0; // sinks disagree
+  XAtom type = 0;
+  int format = 0;
+  unsigned long items = 0, rest = 0;
+  unsigned char *data = nullptr;
+  long owner = 0;
+  x.GetWindowProperty (display, window,
+      x.InternAtom (display, "_NET_WM_PID", 0), 0, 1, 0, kAnyType, &type,
+      &format, &items, &rest, &data);
+  if (data && items == 1)
+    owner = *reinterpret_cast<long *> (data);
+  if (data)
+    x.Free (data);
+  return owner;
+}
+
+/* Adds the windows of this process to @found; window managers put them into
+ * windows of their own. */
+void
+find_windows (
+    const X &x, XDisplay *display, XWindow within, std::vector<XWindow> &found)
+{
+  XWindow root = 0, parent = 0, *children = nullptr;
+  unsigned count = 0;
+  if (owner_of (x, display, within) == getpid ())
+    found.push_back (within);
+  if (!x.QueryTree (display, within, &root, &parent, &children, &count))
+    return;
+  for (unsigned k = 0; k < count; k++)
+    find_windows (x, display, children[k], found);
+  if (children)
+    x.Free (children);
 }
 
 } // namespace
@@ -24,26 +119,53 @@ function_of (void *library, const char *name)
 Screen
 find_screen ()
 {
-  void *library = dlopen ("libX11.so.6", RTLD_LAZY);
-  if (!library)
+  const X x;
+  if (!x.has_all ())
     return {};
-  const auto prepare = function_of<int ()> (library, "XInitThreads");
-  const auto open = function_of<void *(const char *)> (library, "XOpenDisplay");
-  const auto close = function_of<int (void *)> (library, "XCloseDisplay");
-  const auto number = function_of<int (void *)> (library, "XDefaultScreen");
-  const auto width = function_of<int (void *, int)> (library, "XDisplayWidth");
-  const auto height =
-      function_of<int (void *, int)> (library, "XDisplayHeight");
-  if (!prepare || !open || !close || !number || !width || !height)
-    return {};
-  prepare ();
-  void *display = open (nullptr);
+  x.InitThreads ();
+  XDisplay *display = x.OpenDisplay (nullptr);
   if (!display)
     return {.opens = false};
-  const int screen = number (display);
-  const Extent size{width (display, screen), height (display, screen)};
-  close (display);
+  const int screen = x.DefaultScreen (display);
+  const Extent size{
+      x.DisplayWidth (display, screen), x.DisplayHeight (display, screen)};
+  x.CloseDisplay (display);
   return {.size = size};
+}
+
+/* Extended Window Manager Hints, "_NET_WM_STATE". */
+bool
+set_full_screen (bool full)
+{
+  constexpr int kClientMessage = 33;
+  constexpr long kToRoot = (1L << 20) | (1L << 19); // substructure
+  const X x;
+  XDisplay *display = x.has_all () ? x.OpenDisplay (nullptr) : nullptr;
+  if (!display)
+    return false;
+  /* Windows of others that close meanwhile would end this program. */
+  OnError *before = x.SetErrorHandler ([] (XDisplay *, void *) { return 0; });
+  std::vector<XWindow> windows;
+  const XWindow root = x.DefaultRootWindow (display);
+  find_windows (x, display, root, windows);
+  for (const XWindow window : windows) {
+    XMessage message{.type = kClientMessage,
+        .serial = 0,
+        .send_event = 1,
+        .display = display,
+        .window = window,
+        .message = x.InternAtom (display, "_NET_WM_STATE", 0),
+        .format = 32,
+        .data = {full ? 1 : 0,
+            long (x.InternAtom (display, "_NET_WM_STATE_FULLSCREEN", 0)), 0, 1,
+            0},
+        .rest = {}};
+    x.SendEvent (display, root, 0, kToRoot, &message);
+  }
+  x.Sync (display, 0);
+  x.SetErrorHandler (before);
+  x.CloseDisplay (display);
+  return !windows.empty ();
 }
 
 Extent

@@ -22,4 +22,8 @@ struct Screen {
 
 Screen find_screen ();
 
+/** Asks the desktop to let the X windows of this program fill the screen, or to
+ * give them back their size. False: there is no such window. */
+bool set_full_screen (bool full);
+
 } // namespace codedexposure::app

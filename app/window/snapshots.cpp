@@ -1,16 +1,123 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "snapshots.h"
 
+#include <cerrno>
 #include <filesystem>
+#include <fstream>
 #include <utility>
 
-#include <glib.h>
+#include <gst/video/video.h>
 
 #include "pipeline/messages.h"
 #include "pipeline/part.h"
 
 namespace codedexposure::app
 {
+
+namespace
+{
+
+using namespace gst;
+using Sample = std::unique_ptr<GstSample, MiniObjectUnref>;
+
+Error
+unwritten (const std::string &name, const std::string &why)
+{
+  return Error{"cannot write " + name + ": " + why +
+                   "; free space on the disk, and press S again",
+      ErrorCode::io};
+}
+
+Result<void>
+save_window (const Snapshot &snapshot, Part &part)
+{
+  const cairo_status_t status = cairo_surface_write_to_png (
+      snapshot.window.get (), part.path ().c_str ());
+  if (status != CAIRO_STATUS_SUCCESS)
+    return unwritten (part.path (), cairo_status_to_string (status));
+  return part.publish (false);
+}
+
+/* Null: @error is set. */
+Sample
+converted (const Sample &sample, const CapsPtr &caps, GError **error)
+{
+  constexpr GstClockTime kMost = 10 * GST_SECOND;
+  return Sample (
+      gst_video_convert_sample (sample.get (), caps.get (), kMost, error));
+}
+
+/* With all of its pixels and bits, as decode writes them: without its format
+ * in a file, 16-bit grey becomes 8-bit colours. */
+Result<void>
+save_picture (const FullPicture &picture, Part &part)
+{
+  const CapsPtr from (gst_video_info_to_caps (&picture.info));
+  const CapsPtr grey (gst_caps_from_string (picture.info.finfo->bits > 8
+                                                ? "video/x-raw,format=GRAY16_BE"
+                                                : "video/x-raw,format=GRAY8"));
+  const CapsPtr png (gst_caps_new_empty_simple ("image/png"));
+  const Sample sample (
+      gst_sample_new (picture.frame.get (), from.get (), nullptr, nullptr));
+  GError *error = nullptr;
+  Sample coded = converted (sample, grey, &error);
+  if (coded)
+    coded = converted (coded, png, &error);
+  if (!coded) {
+    const std::string why = error->message;
+    g_error_free (error);
+    return unwritten (part.path (), why);
+  }
+  gpointer bytes = nullptr;
+  gsize size = 0;
+  gst_buffer_extract_dup (
+      gst_sample_get_buffer (coded.get ()), 0, G_MAXSIZE, &bytes, &size);
+  const CharPtr owner (static_cast<gchar *> (bytes));
+  std::ofstream file (part.path (), std::ios::binary);
+  file.write (owner.get (), std::streamsize (size));
+  file.close ();
+  if (!file)
+    return unwritten (part.path (), g_strerror (errno));
+  return part.publish (false);
+}
+
+/* Returns the name of the file. */
+template <typename Save>
+Result<std::string>
+save_as (const std::string &name, Save save)
+{
+  Part part (name, Part::kFile);
+  Result<void> saved = part.claim (false);
+  if (saved)
+    saved = save (part);
+  if (!saved) {
+    part.discard ();
+    return saved.error ();
+  }
+  return name;
+}
+
+/* Their names, which no other files had. */
+Result<std::string>
+save (const Snapshot &snapshot)
+{
+  std::string stem = snapshot.name, names;
+  std::error_code ignored;
+  for (int k = 2; std::filesystem::exists (stem + ".png", ignored); k++)
+    stem = format ("%s-%d", snapshot.name.c_str (), k);
+  for (const auto &[what, picture] : snapshot.pictures) {
+    const auto name = save_as (stem + "-" + what + ".png",
+        [&] (Part &part) { return save_picture (*picture, part); });
+    if (!name)
+      return name;
+    names += *name + ", ";
+  }
+  const auto name = save_as (
+      stem + ".png", [&] (Part &part) { return save_window (snapshot, part); });
+  return name ? Result<std::string> (names + *name) : name;
+}
+
+} // namespace
 
 Snapshots::~Snapshots ()
 {
@@ -19,14 +126,14 @@ Snapshots::~Snapshots ()
 }
 
 void
-Snapshots::take (Surface picture, const std::string &name)
+Snapshots::take (Snapshot snapshot)
 {
   const auto on_idle = [] (gpointer self) {
     static_cast<Snapshots *> (self)->write ();
     return gboolean (G_SOURCE_REMOVE);
   };
   const std::lock_guard lock (mutex_);
-  taken_.push_back ({std::move (picture), name});
+  taken_.push_back (std::move (snapshot));
   g_idle_add (on_idle, this);
 }
 
@@ -45,33 +152,6 @@ Snapshots::write ()
     const Result<std::string> saved = save (next);
     said_ (saved ? *saved : saved.error ().message, !saved);
   }
-}
-
-/* Returns the name of the file, which no other had. */
-Result<std::string>
-Snapshots::save (const Snapshot &snapshot)
-{
-  std::string name = snapshot.name + ".png";
-  std::error_code ignored;
-  for (int k = 2; std::filesystem::exists (name, ignored); k++)
-    name = format ("%s-%d.png", snapshot.name.c_str (), k);
-  Part part (name, Part::kFile);
-  if (auto claimed = part.claim (false); !claimed)
-    return claimed.error ();
-  const cairo_status_t status = cairo_surface_write_to_png (
-      snapshot.picture.get (), part.path ().c_str ());
-  Result<void> written =
-      status == CAIRO_STATUS_SUCCESS
-          ? part.publish (false)
-          : Error{"cannot write " + name + ": " +
-                      cairo_status_to_string (status) +
-                      "; free space on the disk, and press S again",
-                ErrorCode::io};
-  if (!written) {
-    part.discard ();
-    return written.error ();
-  }
-  return name;
 }
 
 } // namespace codedexposure::app

@@ -4,14 +4,28 @@
 
 #include <deque>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "base/result.h"
+#include "window/detail.h"
 #include "window/paint.h"
 
 namespace codedexposure::app
 {
+
+struct Snapshot {
+  Surface window;
+  /** Of the files, without their ending; if there are such files, a number is
+   * added. */
+  std::string name;
+  /** Of the panes, by what they show. */
+  std::vector<std::pair<std::string, std::shared_ptr<const FullPicture>>>
+      pictures;
+};
 
 /** Drawn on one thread, and written by the main thread to PNG files of the
  * current folder. */
@@ -25,21 +39,14 @@ public:
   Snapshots (const Snapshots &) = delete;
   Snapshots &operator= (const Snapshots &) = delete;
 
-  /** The name of each file, or why it was not written, goes to @p said. */
+  /** The names of the files, that of the window last, or why they were not
+   * written, go to @p said. */
   void begin (Said said) { said_ = std::move (said); }
-  /** @p name  of the file, without its ending; if there is such a file, a
-   * number is added. */
-  void take (Surface picture, const std::string &name);
+  void take (Snapshot snapshot);
   /** Writes those that were not yet written. */
   void write ();
 
 private:
-  struct Snapshot {
-    Surface picture;
-    std::string name;
-  };
-  static Result<std::string> save (const Snapshot &snapshot);
-
   Said said_; ///< constant while the pipeline plays
   std::mutex mutex_;
   std::deque<Snapshot> taken_; ///< of the mutex

@@ -3,15 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <csignal>
 #include <utility>
 
-#include <csignal>
-
 #include <glib-unix.h>
-#include <gst/video/navigation.h>
 
 #include "common/element.h"
 #include "pipeline/messages.h"
+#include "window/pane.h"
 #include "window/screen.h"
 #include "window/whole_picture.h"
 
@@ -23,43 +22,21 @@ using namespace gst;
 namespace
 {
 
-constexpr ViewTime kLoop = GST_SECOND;
 /* Other panes may be ahead of the subframes, or behind. */
 constexpr ViewTime kBeside = kLoop + GST_SECOND / 4;
-/* Texts that change faster cannot be read. */
-constexpr ViewTime kPanelPeriod = GST_SECOND / 10;
 constexpr int kBins = 128;
 
-const char *const kKeys =
-    "Space: pause, live    Left, Right: step    L: loop the last second at 1/4 "
-    "speed    S: snapshot    Q: end";
-
-constexpr std::size_t kCamera = 0, kSubframes = 1; // panes
+/* Of a pane; a camera of 12 Mpixel sends 300 MB a second. */
+constexpr std::size_t kMostBytes = std::size_t (256) << 20;
 
 /* "camera, 25 fps, 768x576" */
 std::string
-caption_of (const char *what, const GstVideoInfo &info)
+caption_of_stream (const char *what, const GstVideoInfo &info)
 {
   const std::string rate =
       info.fps_n > 0 ? format (", %.6g fps", double (info.fps_n) / info.fps_d)
                      : "";
   return format ("%s%s, %dx%d", what, rate.c_str (), info.width, info.height);
-}
-
-/* Running and stream time of @time at @pad; none: it is outside the segment. */
-struct Times {
-  GstClockTime running = GST_CLOCK_TIME_NONE, stream = GST_CLOCK_TIME_NONE;
-};
-Times
-times_of (GstPad *pad, GstClockTime time)
-{
-  const EventPtr event (gst_pad_get_sticky_event (pad, GST_EVENT_SEGMENT, 0));
-  const GstSegment *segment = nullptr;
-  if (!event)
-    return {};
-  gst_event_parse_segment (event.get (), &segment);
-  return {gst_segment_to_running_time (segment, GST_FORMAT_TIME, time),
-      gst_segment_to_stream_time (segment, GST_FORMAT_TIME, time)};
 }
 
 std::optional<GstVideoInfo>
@@ -89,26 +66,10 @@ info_in (GstPadProbeInfo *probed)
 
 } // namespace
 
-struct Window::Pane {
-  Window *window;
-  std::size_t index;
-  WindowPane part;
-
-  /* The thread of the pane: */
-  std::optional<StatsMeter> meter;
-  Extent metered;
-  int metered_bits = 0;
-  std::shared_ptr<const Exposure> exposure; // of the frame that passes
-
-  /* Of the mutex: */
-  Extent size; // of its pictures in the window
-  std::string caption;
-  Recent<ShownPtr> recent{kLoop};
-};
-
 Window::Window (WindowBranch branch, GstPad *coded, Style style)
     : size_ (branch.size), room_ (style.room), delay_ (style.delay),
-      name_ (style.name), player_ (std::move (style.player))
+      name_ (style.name), title_ (style.title),
+      player_ (std::move (style.player))
 {
   if (!player_)
     keeper_.emplace (coded);
@@ -176,8 +137,6 @@ Window::watch (Pane &pane)
       GstPadProbeType (
           GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_EVENT_BOTH),
       on_pane_data, &pane, nullptr);
-  gst_pad_add_probe (pad_of (part.kept, "src").get (),
-      GST_PAD_PROBE_TYPE_BUFFER, on_kept, &pane, nullptr);
 }
 
 /* The layout is set before the caps reach the panes. */
@@ -245,8 +204,7 @@ Window::on_pane_data (GstPad *pad, GstPadProbeInfo *info, gpointer data)
 {
   auto &pane = *static_cast<Pane *> (data);
   if (info->type & GST_PAD_PROBE_TYPE_BUFFER) {
-    if (pane.index == kCamera)
-      pane.window->measure (pane, pad, GST_PAD_PROBE_INFO_BUFFER (info));
+    pane.window->remember (pane, pad, GST_PAD_PROBE_INFO_BUFFER (info));
     return GST_PAD_PROBE_OK;
   }
   /* New sizes in the window are not for the stream, which would begin anew. */
@@ -258,11 +216,10 @@ Window::on_pane_data (GstPad *pad, GstPadProbeInfo *info, gpointer data)
   return GST_PAD_PROBE_OK;
 }
 
-/* Large pictures are reduced before they are kept; small ones are enlarged
- * after. */
 void
 Window::set_pane (Pane &pane, const GstVideoInfo &picture)
 {
+  const Extent whole{picture.width, picture.height};
   Extent size;
   {
     const std::lock_guard lock (mutex_);
@@ -271,65 +228,44 @@ Window::set_pane (Pane &pane, const GstVideoInfo &picture)
     const auto aspect = [] (const GstVideoInfo &info) {
       return double (info.par_n) / info.par_d;
     };
-    size = pane.size = layout_->size_of ({camera_.width, camera_.height},
-        {picture.width, picture.height}, aspect (picture) / aspect (camera_));
-    pane.caption = caption_of (pane.part.caption, picture);
-    captions_changed_ = true;
+    size = pane.size = layout_->size_of ({camera_.width, camera_.height}, whole,
+        aspect (picture) / aspect (camera_));
+    pane.caption = caption_of_stream (pane.part.caption, picture);
   }
-  const CapsPtr kept (gst_caps_new_simple ("video/x-raw", "width", G_TYPE_INT,
-      std::min (size.width, picture.width), "height", G_TYPE_INT,
-      std::min (size.height, picture.height), nullptr));
   const CapsPtr shown (gst_caps_new_simple ("video/x-raw", "width", G_TYPE_INT,
       size.width, "height", G_TYPE_INT, size.height, nullptr));
-  g_object_set (pane.part.kept, "caps", kept.get (), nullptr);
   g_object_set (pane.part.shown, "caps", shown.get (), nullptr);
   g_object_set (pane.part.mixed.get (), "width", size.width, "height",
       size.height, nullptr);
-  gst_util_set_object_arg (G_OBJECT (pane.part.enlarge), "method",
-      are_blocks ({picture.width, picture.height}, size) ? "nearest-neighbour"
-                                                         : "bilinear");
+  gst_util_set_object_arg (G_OBJECT (pane.part.scale), "method",
+      are_blocks (whole, size)   ? "nearest-neighbour"
+      : size.width < whole.width ? "bilinear2"
+                                 : "bilinear");
 }
 
-/* Of the pixels as the camera sent them. */
+/* How the camera's pixels are exposed. */
 void
-Window::measure (Pane &pane, GstPad *pad, GstBuffer *frame)
+Window::measure (Pane &pane, const FullPicture &frame)
 {
-  pane.exposure.reset ();
-  const auto info = info_at (pad);
-  if (!info)
-    return;
-  gint bits = 0;
-  g_object_get (pane.part.view, "bits", &bits, nullptr);
-  if (const auto meta = get_frame_meta (frame); meta && bits == 0)
-    bits = meta->bits;
-  const int depth = int (GST_VIDEO_INFO_COMP_DEPTH (&*info, 0));
-  bits = bits > 0 ? std::min (bits, depth) : depth;
-  bits_ = bits;
-  MappedFrame mapped (*info, frame, GST_MAP_READ);
-  if (!mapped)
-    return;
-  const Extent size{info->width, info->height};
-  if (!pane.meter || !(pane.metered == size) || pane.metered_bits != bits) {
-    auto made = StatsMeter::make (size, depth, {.bits = bits, .bins = kBins});
+  const int depth = int (GST_VIDEO_INFO_COMP_DEPTH (&frame.info, 0));
+  if (!pane.meter || !(pane.metered == frame.size ()) ||
+      pane.metered_bits != frame.bits) {
+    auto made = StatsMeter::make (
+        frame.size (), depth, {.bits = frame.bits, .bins = kBins});
     if (!made)
       return;
     pane.meter = *std::move (made);
-    pane.metered = size;
-    pane.metered_bits = bits;
+    pane.metered = frame.size ();
+    pane.metered_bits = frame.bits;
   }
+  MappedFrame mapped (frame.info, frame.frame.get (), GST_MAP_READ);
+  if (!mapped)
+    return;
   read_pixels (mapped, [&] (auto pixels) {
     const PictureStats &stats = pane.meter->measure (pixels);
     pane.exposure = std::make_shared<Exposure> (Exposure{
         stats.histogram, double (stats.saturated) / double (stats.pixels)});
   });
-}
-
-GstPadProbeReturn
-Window::on_kept (GstPad *pad, GstPadProbeInfo *info, gpointer data)
-{
-  auto &pane = *static_cast<Pane *> (data);
-  pane.window->remember (pane, pad, GST_PAD_PROBE_INFO_BUFFER (info));
-  return GST_PAD_PROBE_OK;
 }
 
 /* A paused window keeps its pictures; those that belong to its subframes may
@@ -342,254 +278,35 @@ Window::is_kept (const Pane &pane, ViewTime time) const
 }
 
 void
-Window::remember (Pane &pane, GstPad *pad, GstBuffer *picture)
+Window::remember (Pane &pane, GstPad *pad, GstBuffer *frame)
 {
   const auto info = info_at (pad);
-  const auto [running, stream] = times_of (pad, GST_BUFFER_PTS (picture));
+  const auto [running, stream] = view_times_of (pad, GST_BUFFER_PTS (frame));
   if (!info || !GST_CLOCK_TIME_IS_VALID (running))
     return;
-  {
-    const std::lock_guard lock (mutex_);
-    if (!is_kept (pane, running))
-      return;
-  }
-  MappedFrame mapped (*info, picture, GST_MAP_READ);
-  if (!mapped)
-    return;
-  const auto pixels = view_of<const guint8> (mapped);
   auto shown = std::make_shared<Shown> ();
-  shown->grey = {pixels.width, pixels.height, {}};
-  shown->grey.pixels.reserve (
-      std::size_t (pixels.width) * std::size_t (pixels.height));
-  for (int y = 0; y < pixels.height; y++)
-    shown->grey.pixels.insert (shown->grey.pixels.end (), pixels.row (y),
-        pixels.row (y) + pixels.width);
-  shown->meta = get_frame_meta (picture);
-  shown->corrupted = is_corrupted (picture);
+  shown->frame.reset (gst_buffer_ref (frame));
+  shown->info = *info;
+  shown->meta = get_frame_meta (frame);
+  shown->corrupted = is_corrupted (frame);
   shown->stream_time = stream;
-  shown->exposure = pane.exposure;
+  gint bits = 0;
+  g_object_get (pane.part.view, "bits", &bits, nullptr);
+  const int depth = int (GST_VIDEO_INFO_COMP_DEPTH (&*info, 0));
+  if (bits == 0)
+    bits = shown->meta ? shown->meta->bits : 0;
+  shown->bits = bits > 0 ? std::min (bits, depth) : depth;
+  if (pane.index == kCamera) {
+    bits_ = shown->bits;
+    pane.exposure.reset ();
+    measure (pane, *shown);
+    shown->exposure = pane.exposure;
+  }
+  const std::size_t most =
+      kMostBytes / std::max<std::size_t> (1, gst_buffer_get_size (frame));
   const std::lock_guard lock (mutex_);
   if (is_kept (pane, running))
-    pane.recent.add (running, std::move (shown));
-}
-
-/* Keys are for the window; no element of the stream needs them. They go by the
- * bus, on which sinks post those that come while the stream is flushed. */
-GstPadProbeReturn
-Window::on_upstream (GstPad *, GstPadProbeInfo *info, gpointer overlay)
-{
-  GstEvent *event = gst_pad_probe_info_get_event (info);
-  if (GST_EVENT_TYPE (event) != GST_EVENT_NAVIGATION)
-    return GST_PAD_PROBE_OK;
-  gst_element_post_message (GST_ELEMENT (overlay),
-      gst_navigation_message_new_event (GST_OBJECT (overlay), event));
-  return GST_PAD_PROBE_DROP;
-}
-
-bool
-Window::take (GstMessage *message)
-{
-  GstEvent *parsed = nullptr;
-  if (gst_navigation_message_get_type (message) !=
-          GST_NAVIGATION_MESSAGE_EVENT ||
-      !gst_navigation_message_parse_event (message, &parsed))
-    return player_ && player_->take (message);
-  const EventPtr event (parsed);
-  const gchar *key = nullptr;
-  if (gst_navigation_event_get_type (parsed) ==
-          GST_NAVIGATION_EVENT_KEY_PRESS &&
-      gst_navigation_event_parse_key_event (parsed, &key) && key)
-    press (key);
-  return true;
-}
-
-void
-Window::press (const std::string &key)
-{
-  static constexpr struct {
-    const char *name;
-    Replay::Key key;
-  } kKeys[] = {{"space", Replay::Key::kPause}, {"l", Replay::Key::kLoop},
-      {"Left", Replay::Key::kBack}, {"Right", Replay::Key::kForward}};
-  const auto is = [&key] (const char *name) {
-    return g_ascii_strcasecmp (key.c_str (), name) == 0;
-  };
-  if (is ("q")) {
-    calls_.end ();
-    return;
-  }
-  if (is ("plus") || is ("equal") || is ("KP_Add"))
-    set_contrast (1);
-  if (is ("minus") || is ("KP_Subtract"))
-    set_contrast (-1);
-  {
-    const std::lock_guard lock (mutex_);
-    snapshot_wanted_ |= is ("s");
-  }
-  if (player_) {
-    if (!player_->press (key))
-      player_->redraw ();
-    return;
-  }
-  if (is ("k"))
-    keep ();
-  const std::lock_guard lock (mutex_);
-  const bool was_live = replay_.is_live ();
-  for (const auto &[name, act] : kKeys)
-    if (is (name))
-      replay_.press (act, now_, panes_[kSubframes]->recent.times ());
-  /* What came in the meantime was not kept. */
-  if (!was_live && replay_.is_live ())
-    for (const auto &pane : panes_)
-      pane->recent.clear ();
-}
-
-/* Of what comes from now on; the stream itself stays as it is. */
-void
-Window::set_contrast (int by)
-{
-  int contrast = 0;
-  {
-    const std::lock_guard lock (mutex_);
-    contrast_ = contrast = std::clamp (contrast_ + by, 0, bits_ - 1);
-  }
-  const guint white = contrast > 0 ? ((1u << bits_) - 1) >> contrast : 0;
-  for (const auto &pane : panes_)
-    g_object_set (pane->part.view, "white", white, nullptr);
-}
-
-void
-Window::keep ()
-{
-  if (const auto begun = keeper_->keep (name_); !begun)
-    calls_.said (begun.error ().message, true);
-}
-
-void
-Window::on_draw (
-    GstElement *, cairo_t *cairo, guint64 time, guint64, gpointer self)
-{
-  auto *window = static_cast<Window *> (self);
-  /* A seek begins another segment, whose times do not count from 0. */
-  window->draw (cairo, times_of (window->panel_at_.get (), time).running);
-}
-
-/* Whether both are of the same frame, as far as that is known. */
-bool
-Window::is_pair (const Shown &one, const Shown &other)
-{
-  return !one.meta || !other.meta || one.meta->frame == other.meta->frame;
-}
-
-bool
-Window::is_wanted (const Shown &subframe) const
-{
-  return subframe.meta && GST_CLOCK_TIME_IS_VALID (subframe.stream_time) &&
-         player_->is_wanted (Nanoseconds (subframe.stream_time),
-             std::max (subframe.meta->subframe, 0));
-}
-
-/* The compositor has drawn the present pictures; others are drawn over them. */
-void
-Window::draw (cairo_t *cairo, ViewTime time)
-{
-  std::unique_lock lock (mutex_);
-  if (!layout_)
-    return;
-  const WindowLayout layout = *layout_;
-  const bool live = replay_.is_live ();
-  now_ = time;
-  const ViewTime shown_time = live ? time : replay_.time (time);
-  std::vector<ShownPtr> shown;
-  std::vector<Extent> sizes;
-  std::vector<std::string> captions;
-  for (const auto &pane : panes_) {
-    const ShownPtr *picture = pane->recent.at (shown_time);
-    shown.push_back (picture ? *picture : nullptr);
-    sizes.push_back (pane->size);
-    captions.push_back (pane->caption);
-  }
-  const Shown *coded = shown[kCamera].get ();
-  const Shown *subframe = shown[kSubframes].get ();
-  const bool snapshot = snapshot_wanted_ && subframe && coded &&
-                        (!live || is_pair (*subframe, *coded)) &&
-                        (!player_ || is_wanted (*subframe));
-  snapshot_wanted_ &= !snapshot;
-  const auto text = lines (subframe, coded, time);
-  if (std::exchange (captions_changed_, false))
-    captions_.reset ();
-  lock.unlock ();
-
-  if (!captions_)
-    captions_ = paint_captions (layout, captions);
-  const bool other = painted_subframe_ != subframe;
-  if (!panel_ || snapshot || (!live && other) || time < painted_ ||
-      time >= painted_ + kPanelPeriod) {
-    panel_ =
-        paint_panel (layout, text, coded ? coded->exposure.get () : nullptr,
-            player_ ? Player::short_keys () : kKeys);
-    painted_ = time;
-    painted_subframe_ = subframe;
-  }
-  /* What a snapshot names is also what it has: a coded frame that was skipped
-   * is not replaced by another one. */
-  static const GreyPicture black{1, 1, {0}};
-  for (std::size_t k = 0; (!live || snapshot) && k < shown.size (); k++)
-    if (shown[k] && subframe)
-      paint_picture (cairo, layout.left (int (k)), WindowLayout::kCaption,
-          sizes[k], is_pair (*subframe, *shown[k]) ? shown[k]->grey : black);
-  paint_strip (cairo, captions_.get (), 0);
-  paint_strip (
-      cairo, panel_.get (), WindowLayout::kCaption + layout.pane.height);
-  if (snapshot)
-    take_snapshot (cairo, layout, *subframe);
-}
-
-/* Of the mutex. */
-std::vector<PanelLine>
-Window::lines (const Shown *subframe, const Shown *coded, ViewTime time) const
-{
-  std::vector<PanelLine> lines;
-  if (player_)
-    lines.push_back (
-        {player_->line (subframe ? Nanoseconds (subframe->stream_time) : 0)});
-  else if (replay_.is_live ())
-    lines.push_back (
-        {contrast_ > 0 ? format ("live, %d times as bright", 1 << contrast_)
-                       : "live"});
-  else {
-    const std::string which = format (
-        "subframe %zu of %zu, %.2f s before the last", replay_.shown (time) + 1,
-        replay_.size (), 1e-9 * double (replay_.last () - replay_.time (time)));
-    lines.push_back (
-        {(replay_.mode () == Replay::Mode::kPaused ? "paused: "
-                                                   : "loop at 1/4 speed: ") +
-            which});
-  }
-  const Shown *known = subframe && subframe->meta ? subframe : coded;
-  if (!known)
-    return lines;
-  std::string frame = "frame ?";
-  if (known->meta)
-    frame = format ("frame %" G_GUINT64_FORMAT, known->meta->frame);
-  if (known->meta && known->meta->subframe >= 0)
-    frame += format (", slot %d", known->meta->subframe);
-  if (GST_CLOCK_TIME_IS_VALID (known->stream_time))
-    frame += format (", %.3f s", 1e-9 * double (known->stream_time));
-  if (known->corrupted)
-    frame += ", CORRUPTED";
-  lines.push_back ({frame, known->corrupted});
-  const auto locked = known->meta ? known->meta->locked : std::nullopt;
-  if (!locked)
-    lines.push_back ({"synchronisation: unknown"});
-  else if (*locked)
-    lines.push_back ({"synchronisation: locked"});
-  else
-    lines.push_back (
-        {format ("synchronisation: lost, %+d slots", known->meta->slip), true});
-  if (!frames_.text.empty ())
-    lines.push_back (frames_);
-  return lines;
+    pane.recent.add (running, std::move (shown), most);
 }
 
 void
@@ -597,19 +314,6 @@ Window::tell (const std::string &frames, bool alarm)
 {
   const std::lock_guard lock (mutex_);
   frames_ = {frames, alarm};
-}
-
-void
-Window::take_snapshot (
-    cairo_t *cairo, const WindowLayout &layout, const Shown &subframe)
-{
-  std::string name = name_;
-  if (subframe.meta)
-    name += format ("-frame%06" G_GUINT64_FORMAT "-slot%d",
-        subframe.meta->frame, std::max (subframe.meta->subframe, 0));
-  if (GST_CLOCK_TIME_IS_VALID (subframe.stream_time))
-    name += format ("-%.3fs", 1e-9 * double (subframe.stream_time));
-  snapshots_.take (copy_window (cairo, layout), name);
 }
 
 void
@@ -627,7 +331,7 @@ add_window (Job &job, const std::vector<Chain> &sources,
   job.window = std::make_unique<Window> (std::move (branch),
       pad_of (job.counted, "sink").get (),
       Window::Style{find_screen ().room (), job.times.shift_to.value_or (0),
-          job.command,
+          job.command, job.command + ": " + job.source,
           played ? std::make_unique<Player> (*std::move (played)) : nullptr});
 }
 

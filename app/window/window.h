@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The window of live and receive: panes beside each other, what is known of
- * the frames, a loop of the last second, and snapshots. */
+/* The window of live, receive and play: panes beside each other, what is known
+ * of the frames, a loop of the last second, a closer look, and snapshots. */
 #pragma once
 
 #include <atomic>
@@ -16,6 +16,7 @@
 #include "pipeline/job.h"
 #include "stats/picture_stats.h"
 #include "window/branch.h"
+#include "window/detail.h"
 #include "window/keeper.h"
 #include "window/paint.h"
 #include "window/player.h"
@@ -38,6 +39,7 @@ public:
     Extent room;            ///< for the window, in pixels
     GstClockTime delay = 0; ///< after which frames are shown
     std::string name;       ///< of the command, in the names of snapshots
+    std::string title;      ///< of the window
     /** Moves in a recording; null: the window looks at what comes. */
     std::unique_ptr<Player> player = nullptr;
   };
@@ -55,8 +57,7 @@ public:
   void finish () override;
 
 private:
-  struct Shown { // a remembered picture
-    GreyPicture grey;
+  struct Shown : FullPicture { // a remembered picture
     std::optional<gst::FrameMeta> meta;
     bool corrupted = false;
     GstClockTime stream_time = GST_CLOCK_TIME_NONE;
@@ -70,35 +71,48 @@ private:
       GstPad *, GstPadProbeInfo *info, gpointer pane);
   static GstPadProbeReturn on_pane_data (
       GstPad *pad, GstPadProbeInfo *info, gpointer pane);
-  static GstPadProbeReturn on_kept (
-      GstPad *pad, GstPadProbeInfo *info, gpointer pane);
   static GstPadProbeReturn on_upstream (
       GstPad *, GstPadProbeInfo *info, gpointer overlay);
-  static void on_draw (
-      GstElement *, cairo_t *cairo, guint64 time, guint64, gpointer self);
+  static void on_draw (GstElement *overlay, cairo_t *cairo, guint64 time,
+      guint64, gpointer self);
 
   void watch (Pane &pane);
   void set_layout (const GstVideoInfo &camera);
   void set_queues (const Pane &pane, const GstVideoInfo &picture);
   void set_pane (Pane &pane, const GstVideoInfo &picture);
-  void measure (Pane &pane, GstPad *pad, GstBuffer *frame);
+  void measure (Pane &pane, const FullPicture &frame);
   bool is_kept (const Pane &pane, ViewTime time) const;
-  void remember (Pane &pane, GstPad *pad, GstBuffer *picture);
+  void remember (Pane &pane, GstPad *pad, GstBuffer *frame);
+
+  bool take_mouse (GstEvent *event);
+  void press_button (int button, Position at);
+  void move_pointer (Position at);
   void press (const std::string &key);
-  void set_contrast (int by);
+  bool press_look (const std::string &key);
+  void press_replay (const std::string &key);
+  void stretch_tones ();
+  void fill_screen (bool fills);
+  std::optional<Position> seen_at (Position in_window) const;
+
   static bool is_pair (const Shown &one, const Shown &other);
   bool is_wanted (const Shown &subframe) const;
+  struct Scene; // what is drawn
+  std::vector<ShownPtr> shown_at (ViewTime time) const;
+  DetailPlace place_of (const Pane &pane) const;
+  std::string caption_of (const Pane &pane, const Shown *shown) const;
+  Scene scene_at (ViewTime time);
   void draw (cairo_t *cairo, ViewTime time);
+  void draw_texts (cairo_t *cairo, const Scene &scene, ViewTime time);
+  std::string view_text () const;
   std::vector<PanelLine> lines (
       const Shown *subframe, const Shown *coded, ViewTime time) const;
-  void take_snapshot (
-      cairo_t *cairo, const WindowLayout &layout, const Shown &subframe);
+  void take_snapshot (cairo_t *cairo, const Scene &scene);
   void keep ();
 
   GstElement *const size_; // of the pipeline
   const Extent room_;
   const GstClockTime delay_;
-  const std::string name_;
+  const std::string name_, title_;
   Calls calls_; // constant while the pipeline plays
   std::vector<std::unique_ptr<Pane>> panes_; // constant
   std::optional<Keeper> keeper_;             // of what comes
@@ -112,15 +126,23 @@ private:
   std::mutex mutex_; // of all below
   std::optional<WindowLayout> layout_;
   GstVideoInfo camera_ = {}; // set with the layout
-  bool captions_changed_ = true;
-  int contrast_ = 0; // pictures are 2 to the power of it brighter
+  Look look_;
+  std::optional<Position> pointer_; // on a pane
+  bool is_helping_ = false;
   Replay replay_;
   ViewTime now_ = 0; // of the last picture of the window
   bool snapshot_wanted_ = false;
   PanelLine frames_;
 
+  /* The main thread: */
+  Position dragged_; // where the pointer was last, with a button down
+  int button_ = 0;
+  bool fills_screen_ = false;
+
   /* The thread that draws: */
-  Surface captions_, panel_;
+  bool has_title_ = false;
+  std::vector<std::string> written_; // captions
+  Surface captions_, panel_, help_;
   ViewTime painted_ = 0;                   // time of the panel
   const void *painted_subframe_ = nullptr; // only compared
 };

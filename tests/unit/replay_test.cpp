@@ -47,6 +47,15 @@ TEST (Recent, KeepsAFewPicturesOfASlowStream)
   EXPECT_EQ (recent.at (45 * kSecond), nullptr);
 }
 
+TEST (Recent, KeepsNoMoreThanItMay)
+{
+  Recent<int> recent (kSecond);
+  for (int k = 0; k < 100; k++)
+    recent.add (ViewTime (k) * 10 * kMs, k, 10);
+  EXPECT_EQ (recent.times ().size (), 10u);
+  EXPECT_EQ (*recent.at (0), 90);
+}
+
 TEST (Recent, ShowsTheLastPictureThatIsNotLater)
 {
   const auto recent = pictures (200);

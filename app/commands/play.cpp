@@ -69,7 +69,7 @@ Play::declare (Options &options)
   options.value ("--export", export_, "FORM",
       "what E writes: mp4, mkv, ome.tif, h5 or png [mp4]",
       one_of ({"mp4", "mkv", "ome.tif", "h5", "png"}));
-  window_.declare (options);
+  window_.declare (options, false);
   run_.declare (options);
 }
 

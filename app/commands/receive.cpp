@@ -82,7 +82,7 @@ Receive::declare (Options &options)
       file_ending_in (".mkv"));
   window_.declare (options);
   run_.declare (options);
-  options.exclude ({"--sink"}, "--output");
+  options.exclude ({"--sink", "--keep-on"}, "--output");
 }
 
 /* What the relations between options cannot say. */
@@ -91,6 +91,9 @@ Receive::check () const
 {
   if (run_.force && !output_ && !coded_)
     usage_error ("--force is for --output and --coded; leave it out");
+  if (window_.keep_on && !has_window ())
+    usage_error ("--keep-on is for a window, and --coded keeps all frames; set "
+                 "--sink as well, or leave it out");
   if (decode_.method && coded_ && !output_ && !window_.sink)
     usage_error ("--method is for subframes; set --output OUT, or leave "
                  "--method out");

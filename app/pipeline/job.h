@@ -25,6 +25,8 @@ public:
     std::function<void ()> end; ///< as Ctrl-C does
     /** A file was written, or could not be. */
     std::function<void (const std::string &text, bool failed)> said;
+    /** Something has happened. */
+    std::function<void (const std::string &text)> told;
   };
   virtual ~Viewer () = default;
 

@@ -129,7 +129,8 @@ Run::watch_window ()
     else
       status_.output ("wrote " + text);
   };
-  job_.window->begin ({pipeline (), [this] { on_signal (1); }, said});
+  const auto told = [this] (const std::string &text) { status_.line (text); };
+  job_.window->begin ({pipeline (), [this] { on_signal (1); }, said, told});
 }
 
 RunResult

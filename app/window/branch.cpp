@@ -5,6 +5,7 @@
 
 #include "failure.h"
 #include "pipeline/video_output.h"
+#include "window/keeper.h"
 #include "window/screen.h"
 
 namespace codedexposure::app
@@ -56,6 +57,13 @@ add_pane (Chain chain, std::size_t index, std::optional<int> bits,
   return pane;
 }
 
+Rule<EventRule>
+event_rule ()
+{
+  return {[] (const std::string &text) { return parse_event_rule (text); },
+      "an event such as mean:10 or motion:2@64x48+100+80"};
+}
+
 bool
 is_set (const char *variable)
 {
@@ -82,10 +90,23 @@ opens_window (GstElement *sink)
 } // namespace
 
 void
-WindowOptions::declare (Options &options)
+WindowOptions::declare (Options &options, bool comes)
 {
   options.value ("--sink", sink, "\"GST\"",
       "another video sink, such as ximagesink [autovideosink]");
+  if (!comes)
+    return;
+  options.value ("--keep-on", keep_on, "EVENT",
+      "keep as K does when the coded frames change suddenly:\n\"mean:10\", "
+      "by 10 % of the largest value on average;\n\"motion:2\", by 2 % from "
+      "one frame to the next more\nthan before; \"motion:2@64x48+100+80\", "
+      "in that\nregion of the frame",
+      event_rule ());
+  options.value ("--keep-after", keep_after, "SECONDS",
+      "time of the 10 s that comes after the event [5]",
+      real (0, 1e-9 * double (Keeper::kLength),
+          "a number of seconds from 0 to 10"));
+  options.need ({"--keep-after"}, "--keep-on");
 }
 
 std::string
@@ -103,8 +124,8 @@ WindowOptions::keys_of (const std::string &command)
          "The stream does not wait for the window: recording and counting go "
          "on in a pause\nor loop, and subframes are skipped if the screen is "
          "too slow. The window keeps\nthe pictures of the last second, up to "
-         "256 MB a pane: 25 MB for 768x576 pixels of\n8 bits at 25 frames/s, "
-         "and N times 11 MB more if fused; and the coded frames of\nthe last "
+         "256 MB a pane: 25 MB for 768x576 pixels\nof 8 bits at 25 frames/s, "
+         "and N times 11 MB more if fused; and the coded frames\nof the last "
          "10 s, 110 MB, up to a quarter of the free memory.\n";
 }
 
@@ -115,10 +136,11 @@ WindowOptions::common_keys (const std::string &command)
          "replace no\n                  file: the window to " +
          command +
          "-frameN-slotK-TIMEs.png, and each\n                  picture with "
-         "all of its pixels and bits to ...-camera.png and so on\n"
+         "all of its pixels and bits beside it,\n                  "
+         "...-camera.png and so on\n"
          "  Wheel, Z, X     look closer at the pointer, and back; 0: see the "
-         "whole picture.\n                  The captions say the pixel at the "
-         "pointer and its value\n"
+         "whole.\n                  The captions say the pixel at the pointer "
+         "and its value\n"
          "  Drag            move the part that is seen; with the right button: "
          "contrast\n                  (right, left) and brightness (up, down)\n"
          "  +, -            show pictures twice as bright, and back\n"

@@ -10,6 +10,7 @@
 #include "common/raii.h"
 #include "options/options.h"
 #include "pipeline/graph.h"
+#include "stats/event_watch.h"
 
 namespace codedexposure::app
 {
@@ -44,8 +45,11 @@ struct WindowBranch {
 
 struct WindowOptions {
   std::optional<Text> sink;
+  std::optional<EventRule> keep_on;
+  std::optional<double> keep_after; ///< s
 
-  void declare (Options &options);
+  /** @p comes  whether frames come, and are not read from a file. */
+  void declare (Options &options, bool comes = true);
   /** What --help says of the keys. @p command  names snapshots. */
   static std::string keys_of (const std::string &command);
   /** Those of all windows. */

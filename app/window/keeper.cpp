@@ -7,6 +7,7 @@
 
 #include <gst/app/gstappsrc.h>
 
+#include "base/pixels.h"
 #include "common/element.h"
 #include "common/meta.h"
 #include "common/tag.h"
@@ -14,6 +15,7 @@
 #include "pipeline/messages.h"
 #include "pipeline/part.h"
 #include "pipeline/recording.h"
+#include "window/kept_frame.h"
 
 namespace codedexposure::app
 {
@@ -35,20 +37,6 @@ free_name (const std::string &begin)
         !std::filesystem::exists (sidecar_of (name), ignored))
       return name;
   }
-}
-
-/* Of a pool that has no more than some buffers, on which its source would
- * wait. */
-bool
-is_bounded (GstBuffer *frame)
-{
-  if (!frame->pool)
-    return false;
-  GstStructure *config = gst_buffer_pool_get_config (frame->pool);
-  guint most = 0;
-  gst_buffer_pool_config_get_params (config, nullptr, nullptr, nullptr, &most);
-  gst_structure_free (config);
-  return most > 0;
 }
 
 /* Why a pipeline has not come to its end; "": it has. */
@@ -80,8 +68,12 @@ Keeper::Frames::length () const
   return last > first ? last - first : 0;
 }
 
-Keeper::Keeper (GstPad *pad) : most_bytes_ (room_in_memory ())
+Keeper::Keeper (GstPad *pad, std::string name, const Rule &rule)
+    : name_ (std::move (name)), after_ (guint (1000 * rule.after)),
+      most_bytes_ (room_in_memory ())
 {
+  if (rule.event)
+    events_.emplace (*rule.event);
   gst_pad_add_probe (pad,
       GstPadProbeType (
           GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM),
@@ -92,7 +84,7 @@ Keeper::~Keeper ()
 {
   if (writer_.joinable ())
     writer_.join ();
-  while (g_idle_remove_by_data (this)) {
+  while (g_source_remove_by_user_data (this)) {
   }
 }
 
@@ -112,8 +104,9 @@ Keeper::take (GstBuffer *frame)
 {
   if (!GST_BUFFER_PTS_IS_VALID (frame))
     return;
-  BufferPtr kept (is_bounded (frame) ? gst_buffer_copy_deep (frame)
-                                     : gst_buffer_ref (frame));
+  if (events_)
+    watch (frame);
+  BufferPtr kept = kept_frame (frame);
   const std::lock_guard lock (mutex_);
   frames_.buffers.push_back (std::move (kept));
   frames_.bytes += gst_buffer_get_size (frame);
@@ -122,6 +115,40 @@ Keeper::take (GstBuffer *frame)
     frames_.bytes -= gst_buffer_get_size (frames_.buffers.front ().get ());
     frames_.buffers.pop_front ();
   }
+}
+
+/* A damaged frame is no event. */
+void
+Keeper::watch (GstBuffer *frame)
+{
+  const auto meta = get_frame_meta (frame);
+  if (!info_ || is_corrupted (frame))
+    return events_->skip ();
+  if (meta && last_ && meta->frame != *last_ + 1)
+    events_->skip ();
+  last_ = meta ? std::optional (meta->frame) : std::nullopt;
+  const int depth = int (GST_VIDEO_INFO_COMP_DEPTH (&*info_, 0));
+  const int bits =
+      meta && meta->bits > 0 ? std::min (meta->bits, depth) : depth;
+  MappedFrame mapped (*info_, frame, GST_MAP_READ);
+  if (!mapped)
+    return events_->skip ();
+  const auto jump = read_pixels (mapped, [&] (auto pixels) {
+    return events_->add (pixels, largest_pixel (bits));
+  });
+  if (!jump)
+    return;
+  const std::string which =
+      meta ? format ("frame %" G_GUINT64_FORMAT, meta->frame)
+           : format ("at %.3f s", 1e-9 * double (GST_BUFFER_PTS (frame)));
+  const std::lock_guard lock (mutex_);
+  add (
+      {format ("%s: %+.3g %% of the largest value, %s; keeps the frames around "
+               "it in %.3g s",
+           events_->rule ().kind == EventRule::Kind::mean ? "the mean jumps"
+                                                          : "motion",
+           100 * *jump, which.c_str (), 1e-3 * after_),
+          false, true});
 }
 
 void
@@ -140,6 +167,16 @@ Keeper::follow (GstEvent *event)
     if (frames_.caps && !gst_caps_is_equal (frames_.caps.get (), caps))
       begin_anew ();
     frames_.caps.reset (gst_caps_ref (caps));
+    GstVideoInfo info;
+    info_.reset ();
+    if (gst_video_info_from_caps (&info, caps))
+      info_ = info;
+    if (info_ && events_ && !events_->fits ({info.width, info.height}))
+      add ({"the region " + rect_text (*events_->rule ().region) +
+                " is not within the frames of " +
+                size_text ({info.width, info.height}) +
+                " pixels, so no event is seen; set another region",
+          true});
   }
   if (GST_EVENT_TYPE (event) != GST_EVENT_TAG)
     return;
@@ -210,8 +247,15 @@ publish (GstCaps *caps, GstEvent *tag, std::deque<BufferPtr> buffers,
 
 } // namespace
 
+void
+Keeper::keep ()
+{
+  if (const auto begun = begin_writing (); !begun)
+    calls_.said (begun.error ().message, true);
+}
+
 Result<void>
-Keeper::keep (const std::string &begin)
+Keeper::begin_writing ()
 {
   Frames frames;
   {
@@ -230,27 +274,34 @@ Keeper::keep (const std::string &begin)
   }
   if (writer_.joinable ())
     writer_.join ();
-  writer_ = std::thread ([this, begin, frames = std::move (frames)] () mutable {
-    run (begin, std::move (frames));
+  writer_ = std::thread ([this, frames = std::move (frames)] () mutable {
+    run (std::move (frames));
   });
   return {};
 }
 
 void
-Keeper::run (const std::string &begin, Frames frames)
+Keeper::run (Frames frames)
 {
   const std::size_t count = frames.buffers.size ();
   const double seconds = 1e-9 * double (frames.length ());
   const auto meta = get_frame_meta (frames.buffers.front ().get ());
   const auto written = publish (frames.caps.get (), frames.tag.get (),
       std::move (frames.buffers),
-      begin + format ("-frame%06" G_GUINT64_FORMAT, meta ? meta->frame : 0));
+      name_ + format ("-frame%06" G_GUINT64_FORMAT, meta ? meta->frame : 0));
   const std::lock_guard lock (mutex_);
   is_busy_ = false;
-  news_ = {written ? format ("%s (%zu coded frames, %.2f s)", written->c_str (),
-                         count, seconds)
-                   : written.error ().message,
-      !written};
+  add ({written ? format ("%s (%zu coded frames, %.2f s)", written->c_str (),
+                      count, seconds)
+                : written.error ().message,
+      !written});
+}
+
+/* Of the mutex. */
+void
+Keeper::add (News news)
+{
+  news_.push_back (std::move (news));
   g_idle_add (
       [] (gpointer self) {
         static_cast<Keeper *> (self)->tell ();
@@ -259,19 +310,38 @@ Keeper::run (const std::string &begin, Frames frames)
       this);
 }
 
+/* What follows an event is of interest, too. */
 void
 Keeper::tell ()
 {
   std::unique_lock lock (mutex_);
-  const auto news = std::exchange (news_, {});
+  const auto all = std::exchange (news_, {});
   lock.unlock ();
-  if (news)
-    said_ (news->text, news->failed);
+  const auto on_time = [] (gpointer self) {
+    auto *keeper = static_cast<Keeper *> (self);
+    keeper->waiting_ = 0;
+    keeper->keep ();
+    return gboolean (G_SOURCE_REMOVE);
+  };
+  for (const News &news : all) {
+    if (!news.event)
+      calls_.said (news.text, news.failed);
+    else if (waiting_ == 0) {
+      calls_.told (news.text);
+      waiting_ = g_timeout_add (after_, on_time, this);
+    }
+  }
 }
 
+/* An event shortly before the end is kept with what there is of it. */
 void
 Keeper::finish ()
 {
+  tell ();
+  if (writer_.joinable ())
+    writer_.join ();
+  if (std::exchange (waiting_, 0) > 0)
+    keep ();
   if (writer_.joinable ())
     writer_.join ();
   tell ();

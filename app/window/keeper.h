@@ -5,7 +5,6 @@
 
 #include <cstdint>
 #include <deque>
-#include <functional>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -13,6 +12,8 @@
 
 #include "base/result.h"
 #include "common/raii.h"
+#include "pipeline/job.h"
+#include "stats/event_watch.h"
 
 namespace codedexposure::app
 {
@@ -29,22 +30,27 @@ class Keeper
 public:
   static constexpr GstClockTime kLength = 10 * GST_SECOND;
 
-  using Said = std::function<void (const std::string &text, bool failed)>;
+  /** What is kept without a key. */
+  struct Rule {
+    std::optional<EventRule> event = {};
+    double after = 5; ///< s, for which frames still come after an event
+  };
 
-  /** At @p pad, before the pipeline plays. */
-  explicit Keeper (GstPad *pad);
+  /** At @p pad, before the pipeline plays. Names of recordings begin with @p
+   * name. */
+  Keeper (GstPad *pad, std::string name, const Rule &rule);
   /** Waits for what is being written. */
   ~Keeper ();
   Keeper (const Keeper &) = delete;
   Keeper &operator= (const Keeper &) = delete;
 
-  /** What was written, or why not, goes to @p said, on the main thread. */
-  void begin (Said said) { said_ = std::move (said); }
+  /** What was written, or why not, and events go to @p calls, on the main
+   * thread. */
+  void begin (Viewer::Calls calls) { calls_ = std::move (calls); }
   /** Writes what there is now as a recording in the current folder, from a
-   * thread of its own. Its name begins with @p begin and the number of the
-   * first frame, and is that of no other file. An error while the last one is
-   * still being written. */
-  Result<void> keep (const std::string &begin);
+   * thread of its own. It is named by its first frame, and as no other file. An
+   * error is said, as while the last one is still being written. */
+  void keep ();
   /** Waits for what is being written, and says it. */
   void finish ();
 
@@ -60,24 +66,34 @@ private:
 
   struct News {
     std::string text;
-    bool failed = false;
+    bool failed = false, event = false;
   };
 
   static GstPadProbeReturn on_data (
       GstPad *, GstPadProbeInfo *info, gpointer self);
   void take (GstBuffer *frame);
+  void watch (GstBuffer *frame);
   void follow (GstEvent *event);
-  void run (const std::string &begin, Frames frames);
+  Result<void> begin_writing ();
+  void run (Frames frames);
+  void add (News news);
   void tell ();
 
+  const std::string name_;
+  const guint after_; // ms
   const std::uint64_t most_bytes_;
+  /* The thread of the stream: */
+  std::optional<EventWatch> events_;
+  std::optional<GstVideoInfo> info_;
+  std::optional<std::uint64_t> last_; // number of a frame
   mutable std::mutex mutex_;
   /* Of the mutex: */
   Frames frames_;
   bool is_busy_ = false;
-  std::optional<News> news_;
+  std::deque<News> news_;
 
-  Said said_; ///< constant while the pipeline plays
+  Viewer::Calls calls_; ///< constant while the pipeline plays
+  guint waiting_ = 0;   ///< source, of the main thread
   std::thread writer_;
 };
 

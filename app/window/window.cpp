@@ -10,6 +10,7 @@
 
 #include "common/element.h"
 #include "pipeline/messages.h"
+#include "window/kept_frame.h"
 #include "window/pane.h"
 #include "window/screen.h"
 #include "window/whole_picture.h"
@@ -72,7 +73,7 @@ Window::Window (WindowBranch branch, GstPad *coded, Style style)
       player_ (std::move (style.player))
 {
   if (!player_)
-    keeper_.emplace (coded);
+    keeper_.emplace (coded, name_, style.keeps);
   panel_at_ = pad_of (branch.overlay, "sink");
   for (WindowPane &part : branch.panes) {
     auto pane = std::make_unique<Pane> ();
@@ -107,11 +108,11 @@ Window::begin (Calls calls)
   snapshots_.begin (calls_.said);
   if (player_)
     return player_->begin (calls_.pipeline, calls_.said);
-  keeper_->begin (calls_.said);
+  keeper_->begin (calls_);
   on_signal_ = g_unix_signal_add (
       SIGUSR1,
       [] (gpointer self) {
-        static_cast<Window *> (self)->keep ();
+        static_cast<Window *> (self)->keeper_->keep ();
         return gboolean (G_SOURCE_CONTINUE);
       },
       this);
@@ -285,7 +286,7 @@ Window::remember (Pane &pane, GstPad *pad, GstBuffer *frame)
   if (!info || !GST_CLOCK_TIME_IS_VALID (running))
     return;
   auto shown = std::make_shared<Shown> ();
-  shown->frame.reset (gst_buffer_ref (frame));
+  shown->frame = kept_frame (frame);
   shown->info = *info;
   shown->meta = get_frame_meta (frame);
   shown->corrupted = is_corrupted (frame);
@@ -332,6 +333,7 @@ add_window (Job &job, const std::vector<Chain> &sources,
       pad_of (job.counted, "sink").get (),
       Window::Style{find_screen ().room (), job.times.shift_to.value_or (0),
           job.command, job.command + ": " + job.source,
+          {options.keep_on, options.keep_after.value_or (5)},
           played ? std::make_unique<Player> (*std::move (played)) : nullptr});
 }
 

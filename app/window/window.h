@@ -40,6 +40,7 @@ public:
     GstClockTime delay = 0; ///< after which frames are shown
     std::string name;       ///< of the command, in the names of snapshots
     std::string title;      ///< of the window
+    Keeper::Rule keeps;     ///< what is kept without a key
     /** Moves in a recording; null: the window looks at what comes. */
     std::unique_ptr<Player> player = nullptr;
   };
@@ -107,7 +108,6 @@ private:
   std::vector<PanelLine> lines (
       const Shown *subframe, const Shown *coded, ViewTime time) const;
   void take_snapshot (cairo_t *cairo, const Scene &scene);
-  void keep ();
 
   GstElement *const size_; // of the pipeline
   const Extent room_;

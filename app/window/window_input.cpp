@@ -17,6 +17,9 @@ using namespace gst;
 namespace
 {
 
+/* An element message by which any element says that something happened. */
+constexpr const char *kKeep = "codedexposure-keep";
+
 constexpr int kLeft = 1, kRight = 3, kWheelUp = 4, kWheelDown = 5; // buttons
 
 bool
@@ -46,6 +49,10 @@ bool
 Window::take (GstMessage *message)
 {
   GstEvent *parsed = nullptr;
+  if (keeper_ && gst_message_has_name (message, kKeep)) {
+    keeper_->keep ();
+    return true;
+  }
   if (gst_navigation_message_get_type (message) !=
           GST_NAVIGATION_MESSAGE_EVENT ||
       !gst_navigation_message_parse_event (message, &parsed))
@@ -151,7 +158,7 @@ Window::press (const std::string &key)
   if (player_)
     player_->press (key);
   else if (is_key (key, {"k"}))
-    keep ();
+    keeper_->keep ();
   else
     press_replay (key);
 }
@@ -242,13 +249,6 @@ Window::fill_screen (bool fills)
 {
   if (fills != fills_screen_ && set_full_screen (fills))
     fills_screen_ = fills;
-}
-
-void
-Window::keep ()
-{
-  if (const auto begun = keeper_->keep (name_); !begun)
-    calls_.said (begun.error ().message, true);
 }
 
 } // namespace codedexposure::app

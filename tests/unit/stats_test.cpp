@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include "stats/event_watch.h"
 #include "stats/picture_stats.h"
 
 namespace
@@ -195,6 +196,87 @@ TEST (ProfileLine, RefusesWhatIsNoLine)
   EXPECT_EQ (ProfileLine::parse ("row:120%").error ().message,
       "'120%' is not a coordinate; use pixels, such as 143, or a percentage, "
       "0% to 100%");
+}
+
+TEST (EventRules, AreRead)
+{
+  const auto mean = parse_event_rule ("mean:12.5");
+  ASSERT_TRUE (mean);
+  EXPECT_EQ (mean->kind, EventRule::Kind::mean);
+  EXPECT_EQ (mean->part, 0.125);
+  EXPECT_FALSE (mean->region);
+  const auto motion = parse_event_rule ("motion:2@64x48+100+80");
+  ASSERT_TRUE (motion);
+  EXPECT_EQ (motion->kind, EventRule::Kind::motion);
+  EXPECT_EQ (motion->region, (Rect{100, 80, 64, 48}));
+  for (const char *text : {"", "mean", "mean:", "mean:0", "mean:101", "mean:-3",
+           "mean:nan", "light:10", "mean:10@", "mean:10@64", "mean:10@0x4+1+1",
+           "mean:10@4x4+-1+1", "motion:2 "})
+    EXPECT_FALSE (parse_event_rule (text)) << text;
+}
+
+/* Pictures of one value, but for a few pixels that have twice of it. */
+template <typename Pixel>
+Image<Pixel>
+event_picture (int value, int place)
+{
+  Image<Pixel> picture (8, 8);
+  for (int y = 0; y < 8; y++)
+    for (int x = 0; x < 8; x++)
+      picture.at (x, y) = Pixel (value * (y == 0 && x == place ? 2 : 1));
+  return picture;
+}
+
+template <typename Pixel>
+class EventsOf : public testing::Test
+{
+};
+using PixelTypes = testing::Types<std::uint8_t, std::uint16_t>;
+TYPED_TEST_SUITE (EventsOf, PixelTypes);
+
+TYPED_TEST (EventsOf, MeanAreJumpsAndNoDrift)
+{
+  EventWatch watch ({EventRule::Kind::mean, 0.05, {}});
+  const auto add = [&] (int value) {
+    return watch.add (event_picture<TypeParam> (value, 8).view (), 200);
+  };
+  for (int k = 0; k < 80; k++)
+    EXPECT_FALSE (add (20 + k / 2)) << k;
+  const auto jump = add (120);
+  ASSERT_TRUE (jump);
+  EXPECT_NEAR (*jump, (120 - 53) / 200.0, 0.01);
+  for (int k = 0; k < 10; k++) // usual now
+    EXPECT_FALSE (add (120)) << k;
+  EXPECT_TRUE (add (20)); // down
+}
+
+TYPED_TEST (EventsOf, MotionIsNoBrightness)
+{
+  EventWatch watch ({EventRule::Kind::motion, 0.002, {}});
+  const auto add = [&] (int place) {
+    return watch.add (event_picture<TypeParam> (100, place).view (), 200);
+  };
+  for (int k = 0; k < 20; k++)
+    EXPECT_FALSE (add (3)) << k;
+  const auto jump = add (4); // two pixels of 64 differ by 100
+  ASSERT_TRUE (jump);
+  EXPECT_NEAR (*jump, 2 * 100 / 64.0 / 200, 1e-9);
+  for (int k = 0; k < 10; k++)
+    EXPECT_FALSE (add (4)) << k;
+  watch.skip ();
+  EXPECT_FALSE (add (6)); // what came between is not known
+  EXPECT_TRUE (add (7));
+}
+
+TYPED_TEST (EventsOf, RegionHasItsOwnPixels)
+{
+  EventWatch watch ({EventRule::Kind::motion, 0.002, Rect{0, 1, 8, 7}});
+  for (int k = 0; k < 40; k++)
+    EXPECT_FALSE (
+        watch.add (event_picture<TypeParam> (100, k % 8).view (), 200));
+  EXPECT_TRUE (watch.fits ({8, 8}));
+  EXPECT_FALSE (watch.fits ({8, 7}));
+  EXPECT_FALSE (watch.add (Image<TypeParam> (8, 7).view (), 200));
 }
 
 } // namespace

@@ -2,10 +2,13 @@
 /* codedexposure schedule: shows schedules, checks them, and writes their masks.
  */
 #include <filesystem>
+#include <optional>
+#include <vector>
 
 #include "base/file.h"
 #include "base/text.h"
 #include "command.h"
+#include "dmd/alp.h"
 #include "dmd/bitmap.h"
 #include "dmd/boards.h"
 #include "dmd/plane_image.h"
@@ -21,6 +24,7 @@ struct Arguments : Printing, BoardOptions {
   std::string layout;
   std::string region;
   std::string prefix = "mask";
+  std::optional<FrameRate> shown_at;
   bool planes = false;
   bool force = false;
 };
@@ -76,21 +80,83 @@ placement_of (const Arguments &arguments, const NamedBoard &board)
   return placement;
 }
 
-std::string
-file_of (const Arguments &arguments, int picture)
+/* Files that exist are kept, unless --force is set. */
+void
+check_unused (const Arguments &arguments, const std::vector<std::string> &files)
 {
-  return arguments.prefix + std::to_string (picture) + ".bmp";
+  std::error_code ignored;
+  for (const std::string &path : files)
+    if (!arguments.force && std::filesystem::exists (path, ignored))
+      fail (path + " exists; choose another --output, or set --force to "
+                   "replace it");
 }
 
 void
-check_unused (const Arguments &arguments, int pictures)
+write (const std::string &path, const std::string &content)
 {
-  std::error_code ignored;
-  for (int picture = 0; picture < pictures && !arguments.force; picture++)
-    if (const std::string path = file_of (arguments, picture);
-        std::filesystem::exists (path, ignored))
-      fail (path + " exists; choose another --output, or set --force to "
-                   "replace it");
+  if (const auto written = write_file (path, content); !written)
+    fail (path + " " + written.error ().message +
+          "; check that the folder exists and the disk has space");
+}
+
+std::string
+text_of (const Bytes &bytes)
+{
+  return {bytes.begin (), bytes.end ()};
+}
+
+/* One file for each mask, or for 24. */
+std::vector<std::string>
+write_bitmaps (const Arguments &arguments, const Schedule &schedule,
+    const MaskRenderer &renderer, const std::stop_token &stop)
+{
+  const PlanePlan plan = plan_planes (schedule);
+  const int count = arguments.planes ? plan.images : schedule.masks ();
+  std::vector<std::string> files;
+  for (int picture = 0; picture < count; picture++)
+    files.push_back (arguments.prefix + std::to_string (picture) + ".bmp");
+  check_unused (arguments, files);
+  for (int picture = 0; picture < count; picture++) {
+    if (stop.stop_requested ())
+      throw Failure{Exit::interrupted, Error{"interrupted"}};
+    const Bytes bytes = arguments.planes
+                            ? encode_plane_bitmap (renderer.render<PlanePixel> (
+                                  plan.of_image (picture)))
+                            : encode_bitmap (renderer.render (picture));
+    write (files[std::size_t (picture)], text_of (bytes));
+  }
+  return files;
+}
+
+/* All masks in one file, and the program that shows them. */
+std::vector<std::string>
+write_alp (const Arguments &arguments, const DmdInfo &info,
+    const MaskRenderer &renderer, const std::stop_token &stop)
+{
+  if (arguments.planes)
+    usage_error ("--planes is for a LightCrafter 4500; leave it out");
+  BoardOptions shown = arguments;
+  shown.rate = arguments.shown_at.value_or (FrameRate{25, 1});
+  const auto [schedule, plan] = fit (shown, info);
+  const AlpSequence sequence =
+      value_of (alp_sequence (info, schedule, plan), Exit::does_not_fit);
+  const std::vector<std::string> files{
+      arguments.prefix + ".bin", arguments.prefix + ".py"};
+  check_unused (arguments, files);
+  Bytes planes;
+  for (int mask = 0; mask < sequence.pictures; mask++) {
+    if (stop.stop_requested ())
+      throw Failure{Exit::interrupted, Error{"interrupted"}};
+    append_bit_plane (planes, renderer.render (mask));
+  }
+  write (files[0], text_of (planes));
+  write (
+      files[1], alp_script (sequence, info.size,
+                    std::filesystem::path (files[0]).filename ().string (),
+                    "Schedule " + schedule.text () + ", " +
+                        std::to_string (shown.rate.num) + "/" +
+                        std::to_string (shown.rate.den) + " coded frames/s"));
+  return files;
 }
 
 Exit
@@ -100,26 +166,15 @@ render (const Arguments &arguments)
   const Schedule schedule = arguments.parsed ();
   const NamedBoard board =
       value_of (parse_board (arguments.board), Exit::usage);
+  const bool is_alp = board.controller == Controller::alp;
+  if (arguments.shown_at && !is_alp)
+    usage_error ("--rate is for --dmd alp:WIDTHxHEIGHT, whose times are in a "
+                 "file; leave it out");
   const MaskRenderer renderer (
       schedule, board.info.size, placement_of (arguments, board));
-  const PlanePlan plan = plan_planes (schedule);
-  const int count = arguments.planes ? plan.images : schedule.masks ();
-  check_unused (arguments, count);
-  Json files = Json::array ();
-  for (int picture = 0; picture < count; picture++) {
-    if (stop.stop_requested ())
-      throw Failure{Exit::interrupted, Error{"interrupted"}};
-    const Bytes bytes = arguments.planes
-                            ? encode_plane_bitmap (renderer.render<PlanePixel> (
-                                  plan.of_image (picture)))
-                            : encode_bitmap (renderer.render (picture));
-    const std::string path = file_of (arguments, picture);
-    if (const auto written = write_file (path, {bytes.begin (), bytes.end ()});
-        !written)
-      fail (path + " " + written.error ().message +
-            "; check that the folder exists and the disk has space");
-    files.push_back (path);
-  }
+  const auto files = is_alp
+                         ? write_alp (arguments, board.info, renderer, stop)
+                         : write_bitmaps (arguments, schedule, renderer, stop);
   arguments.print ({{"schedule", schedule.text ()}, {"dmd", board.info.name},
       {"files", files}});
   return Exit::done;
@@ -146,6 +201,9 @@ declare_pictures (Options &options, Arguments &arguments)
       "mirrors that show masks [all]", any_text ());
   options.value ("--output", arguments.prefix, "PREFIX",
       "prefix of the file names [mask]", any_text ());
+  options.value ("--rate", arguments.shown_at, "R",
+      "frame rate of the camera, for alp:WIDTHxHEIGHT [25]",
+      frame_rate_rule ());
   options.flag ("--planes", arguments.planes,
       "24 masks per file, for the flash or the video of a LightCrafter 4500");
   options.flag ("--force", arguments.force, "replace files that exist");
@@ -190,11 +248,17 @@ commands_below (Arguments &arguments)
   add ({.name = "render",
            .summary = "write the masks as bitmap files",
            .usage = "[option...] [SCHEDULE]",
-           .description = "Writes the masks of a schedule as files "
-                          "PREFIX0.bmp, PREFIX1.bmp ...\n",
+           .description =
+               "Writes the masks of a schedule as files PREFIX0.bmp, "
+               "PREFIX1.bmp ... For a\nViALUX board (alp:WIDTHxHEIGHT), "
+               "writes PREFIX.bin, its bit planes, and\nPREFIX.py, a program "
+               "for its Python binding that shows them.\n",
            .examples = "  The four masks of the default:\n"
                        "    codedexposure schedule render sequential:2x2 "
-                       "--output mask\n"},
+                       "--output mask\n"
+                       "  For a ViALUX board of 1024x768 mirrors:\n"
+                       "    codedexposure schedule render sequential:2x2 "
+                       "--dmd alp:1024x768\n"},
       render, [] (Options &options, Arguments &a) {
         declare (options, a, true, false);
         declare_pictures (options, a);

@@ -142,7 +142,9 @@ SourceOptions::declare_camera (Options &options, Kind kind)
   options.value (
       "--features", features, "\"A=1 ...\"", "camera features beyond these");
   options.value ("--device", device, "DEV",
-      examined ? "the DMD [usb:]" : "the DMD [sim:bench on the bench]");
+      examined ? "the DMD [usb:]"
+               : "the DMD, or external: another program drives it\n"
+                 "[sim:bench on the bench]");
   options.need ({"--trigger", "--trigger-line", "--trigger-edge", "--exposure",
                     "--pixel-format", "--features", "--reconnect"},
       "--camera");
@@ -228,6 +230,9 @@ SourcePlan
 SourcePlan::make (const SourceOptions &options)
 {
   SourcePlan plan;
+  if (options.is_simulated () && options.device == "external")
+    usage_error ("--device external is for a DMD beside a camera, and the "
+                 "simulated bench has none; set --camera, or leave it out");
   const std::string text = options.schedule.value_or ("sequential:2x2");
   auto schedule = Schedule::parse (text);
   if (!schedule)

@@ -79,7 +79,7 @@ open_device (GstDmdSync *self)
 {
   SyncState &st = state (self);
   const std::string device = settings_of (self).device;
-  if (device.empty ())
+  if (device.empty () || device == kExternal)
     return true;
   if (settings_of (self).beam == Beam::kOff)
     return refuse_settings (self,

@@ -65,6 +65,11 @@
  * only on frames whose pilot shows all of their masks, and absent on frames of
  * which nothing shows whether they are synchronised.
  *
+ * With #dmdsync:device external, another program shows the masks, as on a
+ * ViALUX board (docs/dmd.md). Nothing is driven or restarted, and nothing that
+ * this program says counts as synchronised: with a pilot, it is measured, and
+ * without one, it stays unknown, with a warning.
+ *
  * ## Two cameras
  *
  * With #dmdsync:beam off, the camera is a second one, in the beam of the
@@ -140,11 +145,16 @@ say_observable (GstDmdSync *self)
   const std::string which = observable == SlipObservable::never
                                 ? "by whole slots"
                                 : "between two exposures";
-  POST_INFO (self, RESOURCE, SETTINGS,
+  const std::string text =
       "A slip of the DMD " + which + " is not observable with " + schedule +
-          ", so no frame is known to be synchronised; reserve some rows of "
-          "mirrors for a pilot, as in " +
-          schedule + ",pilot=16, to see every slip");
+      ", so no frame is known to be synchronised; reserve some rows of mirrors "
+      "for a pilot, as in " +
+      schedule + ",pilot=16, to see every slip";
+  /* What shows the masks does not say when they begin. */
+  if (settings_of (self).device == sync::kExternal)
+    POST_WARNING (self, RESOURCE, SETTINGS, text);
+  else
+    POST_INFO (self, RESOURCE, SETTINGS, text);
 }
 
 void

@@ -42,6 +42,9 @@ enum class OnLoss { gap, repeat, error };
 /** What becomes of frames whose masks are not synchronised. */
 enum class OnUnlock { keep, skip, error };
 
+/** The device of masks that another program shows. */
+inline constexpr const char *kExternal = "external";
+
 struct Settings {
   std::string device;
   std::string schedule = "sequential:2x2";

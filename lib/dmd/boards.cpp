@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <initializer_list>
+#include <optional>
 
 #include "base/text.h"
 #include "base/try.h"
@@ -48,12 +49,21 @@ constexpr BoardFacts kBoards[] = {
         "dlp9000", "DLP9000", "LightCrafter 9000", {2560, 1600}, 2, 2),
 };
 
+/* The fastest shows a mask for 44 us, and each says its own limit when it is
+ * used. The pulse of its gated output is that of one in up to 16 pictures, and
+ * the pilot has two exposures. */
+constexpr int kAlpSlots = 16;
+constexpr BoardFacts kAlp{"alp", "DMD", "ViALUX board", Controller::alp, {},
+    Array::orthogonal, 2 * kAlpSlots, {44, 10'000'000, 0, 0, 0}, true};
+
 /** Options that not all controllers have. */
 struct OwnOption {
   const char *key;
   std::initializer_list<Controller> controllers;
 };
 const OwnOption kOwnOptions[] = {
+    {"edge", {Controller::dlpc300, Controller::dlpc350, Controller::dlpc900}},
+    {"guard", {Controller::dlpc300, Controller::dlpc350, Controller::dlpc900}},
     {"trigger-delay", {Controller::dlpc900}},
     {"pulse", {Controller::dlpc350, Controller::dlpc900}},
     {"patience", {Controller::dlpc350, Controller::dlpc900}},
@@ -93,6 +103,21 @@ trigger_delay (const PatternLimits &limits, const DmdOptions &options)
   return std::uint32_t (delay);
 }
 
+/** "alp:1024x768"; a row of its mirrors is whole bytes. */
+std::optional<BoardFacts>
+alp_board (std::string_view name)
+{
+  constexpr std::string_view kPrefix = "alp:";
+  if (!name.starts_with (kPrefix))
+    return std::nullopt;
+  const auto size = parse_size (name.substr (kPrefix.size ()));
+  if (!size || size->width % 8 != 0)
+    return std::nullopt;
+  BoardFacts facts = kAlp;
+  facts.size = *size;
+  return facts;
+}
+
 } // namespace
 
 const char *
@@ -100,7 +125,8 @@ controller_text (Controller controller)
 {
   return controller == Controller::dlpc300   ? "DLPC300"
          : controller == Controller::dlpc350 ? "DLPC350"
-                                             : "DLPC900";
+         : controller == Controller::dlpc900 ? "DLPC900"
+                                             : "ViALUX board";
 }
 
 std::span<const BoardFacts>
@@ -130,11 +156,8 @@ board_names ()
 {
   std::string names;
   for (const BoardFacts &board : kBoards)
-    names += (names.empty ()                        ? ""
-                 : &board + 1 == std::end (kBoards) ? " or "
-                                                    : ", ") +
-             std::string (board.name);
-  return names;
+    names += std::string (board.name) + ", ";
+  return names + "or alp:WIDTHxHEIGHT";
 }
 
 Result<DmdInfo>
@@ -162,6 +185,13 @@ board_info (const BoardFacts &facts, const DmdOptions &options)
     if (rule.no_dark)
       info.resident_masks = kVideoMasks;
     break;
+  case Controller::alp:
+    if (options.master == Master::camera)
+      return Error{"a ViALUX board takes an edge for each mask, and a camera "
+                   "gives one an exposure; let the board trigger: master=dmd"};
+    rule.no_dark = true;
+    info.most_slots = kAlpSlots;
+    break;
   case Controller::dlpc900:
     ASSIGN_OR_RETURN (
         rule.limits.trigger_delay, trigger_delay (rule.limits, options));
@@ -180,14 +210,16 @@ Result<NamedBoard>
 parse_board (std::string_view text)
 {
   ASSIGN_OR_RETURN (const DmdOptions options, DmdOptions::parse (text));
-  const BoardFacts *facts = find_board (options.which);
+  const std::string name (split (text, ',').front ());
+  const BoardFacts *found = find_board (name);
+  const auto facts = found ? std::optional (*found) : alp_board (name);
   if (!facts)
-    return Error{
-        "unknown DMD " + in_quotes (options.which) + "; use " + board_names ()};
+    return Error{"unknown DMD " + in_quotes (name) + "; use " + board_names ()};
   auto info = board_info (*facts, options);
   if (!info)
-    return info.error ().with_prefix (std::string (facts->name) + ": ");
-  return NamedBoard{facts, options, *std::move (info)};
+    return info.error ().with_prefix (name + ": ");
+  info->name = name;
+  return NamedBoard{facts->controller, options, *std::move (info)};
 }
 
 } // namespace codedexposure

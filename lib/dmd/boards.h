@@ -17,6 +17,7 @@ enum class Controller {
   dlpc300, ///< behind a TCP port
   dlpc350,
   dlpc900,
+  alp, ///< of a ViALUX board, which another program controls
 };
 
 /** "DLPC350" */
@@ -51,7 +52,8 @@ std::span<const BoardFacts> boards ();
 const BoardFacts *find_board (std::string_view name);
 /** Null for a hardware type that no DLPC900 has. */
 const BoardFacts *find_dlpc900 (int type);
-/** "dlp3000, dlp4500, ... or dlp9000", for help and messages. */
+/** "dlp3000, dlp4500, ... dlp9000, or alp:WIDTHxHEIGHT", for help and messages.
+ */
 std::string board_names ();
 
 /** What a board does with @p options. Error for options that it does not have
@@ -60,12 +62,13 @@ Result<DmdInfo> board_info (const BoardFacts &facts, const DmdOptions &options);
 
 /** A board that need not be connected, with the options of its driver. */
 struct NamedBoard {
-  const BoardFacts *facts;
+  Controller controller;
   DmdOptions options;
   DmdInfo info;
 };
 /** "NAME[,key=value...]" with the keys of DmdOptions, such as
- * "dlp4500,master=camera". */
+ * "dlp4500,master=camera"; a ViALUX board is "alp:WIDTHxHEIGHT", by its
+ * mirrors. */
 Result<NamedBoard> parse_board (std::string_view text);
 
 } // namespace codedexposure

@@ -87,6 +87,11 @@ check_limits (
             schedule.check_size (info.shown ().width, info.shown ().height);
         !within)
       return within.error ().with_prefix (info.name + ": ");
+  if (info.most_slots > 0 && schedule.slots () > info.most_slots)
+    return Error{info.name + " gives the camera a pulse after " +
+                 std::to_string (info.most_slots) +
+                 " slots or fewer, and the schedule has " + slots +
+                 "; use fewer"};
   if (plan.active () < info.minimum_active)
     return Error{slots + " need " + time_text (info.minimum_active) +
                  " each at least on " + info.name + "; " +

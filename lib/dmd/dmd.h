@@ -27,6 +27,7 @@ struct DmdInfo {
   Nanoseconds minimum_active = 0; ///< min time of a mask
   Nanoseconds minimum_switching = 0;
   int resident_masks = 0;       ///< masks the device holds at once
+  int most_slots = 0;           ///< of an exposure; 0: as many as it has masks
   bool still_masks = false;     ///< show () is served
   bool triggers_camera = false; ///< no frame is exposed while it is parked
   bool trigger_in = false;      ///< a camera can start its masks

@@ -135,7 +135,11 @@ TEST (Boards, ARefusalNamesTheBoardAndTheRemedy)
       "and readout=0, or let the camera be master (master=camera)");
   EXPECT_EQ (told ("dlp7000", {"2x2", ""}),
       "unknown DMD 'dlp7000'; use dlp3000, dlp4500, dlp500yx, dlp5500, "
-      "dlp6500, dlp670s or dlp9000");
+      "dlp6500, dlp670s, dlp9000, or alp:WIDTHxHEIGHT");
+  EXPECT_EQ (told ("alp:1024x768", {"5x4", ""}),
+      "alp:1024x768 gives the camera a pulse after 16 slots or fewer, and the "
+      "schedule has 20 slots; use fewer");
+  EXPECT_EQ (told ("alp:1024x768", {"4x4,pilot=16", ""}), "");
   EXPECT_EQ (told ("dlp6500", {"2x2", ",color=red"}).substr (0, 40),
       "DMD 'dlp6500,color=red': unknown option ");
 }

@@ -47,6 +47,8 @@ libbenchmark-dev|benchmarks|tests
 libumockdev-dev|an emulated USB, for a DMD in software|tests package
 libtiff-dev|decode to OME-TIFF|tests package
 libhdf5-dev|decode to HDF5|tests package
+libzstd-dev|decode to OME-Zarr|tests package
+zstd|reads compressed OME-Zarr, to test it|tests
 python3-tifffile|reads OME-TIFF, to test it|tests
 python3-h5py|reads HDF5, to test it|tests
 libaravis-dev|the emulated camera, and aravissrc|tests package

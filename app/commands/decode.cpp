@@ -66,8 +66,8 @@ Decode::text () const
           "Splits the coded frames of a recording into subframes. The "
           "recording contains\nthe schedule. The ending of OUT selects the "
           "format: .mkv (FFV1, lossless), .mp4\n(H.264, for viewing), .ome.tif "
-          "(OME-TIFF) or .h5 (HDF5) for other programs,\nFOLDER/ or "
-          "NAME%06d.png (pictures).\n",
+          "(OME-TIFF), .h5 (HDF5) or .ome.zarr (OME-Zarr)\nfor other "
+          "programs, FOLDER/ or NAME%06d.png (pictures).\n",
       .notes = "Exit status: 0 all decoded, 1 failed, 2 wrong usage, 3 the "
                "recording is cut off\nor damaged, and was decoded as far as "
                "possible, 4 no coded frame lies in the\npart, 130 stopped "
@@ -107,8 +107,8 @@ Decode::declare (Options &options)
       "for a schedule with regions: the subframes of region I, from 0 on, "
       "instead of the background",
       whole (0, 63, "the number of a region"));
-  options.flag (
-      "--deflate", deflate_, "compress .ome.tif and .h5, without loss");
+  options.flag ("--deflate", deflate_,
+      "compress .ome.tif, .h5 and .ome.zarr, without loss");
   options.flag ("--view", view_,
       "scale pictures (PNG) to 8 bits; without it, they keep the pixel values, "
       "which many programs show dark");
@@ -175,7 +175,9 @@ Decode::check () const
   if (!output_ && !coded_ && !find_phase_)
     usage_error ("set --output OUT");
   if (deflate_ && !any (VideoForm::stack))
-    usage_error ("--deflate compresses .ome.tif and .h5; set such an --output");
+    usage_error (
+        "--deflate compresses .ome.tif, .h5 and .ome.zarr; set such an "
+        "--output");
   if (view_ && !any (VideoForm::pictures))
     usage_error ("--view scales PNG to 8 bits; set such an --output");
   if (white_ && !view_ && !any (VideoForm::mp4))
@@ -186,7 +188,8 @@ Decode::check () const
                  "leave --second out");
   if (is (uncertainty_, VideoForm::mp4))
     usage_error ("--uncertainty " + *uncertainty_ +
-                 ": .mp4 does not keep values; end in .mkv, .ome.tif or .h5");
+                 ": .mp4 does not keep values; end in .mkv, .ome.tif, .h5 or "
+                 ".ome.zarr");
 }
 
 PlayTimes
@@ -333,7 +336,8 @@ Decode::play_once (bool salvage, bool &found) const
 void
 Decode::decode_on_cores () const
 {
-  if (!output_ || !form_of (*output_) || output_->ends_with (".png"))
+  if (!output_ || !form_of (*output_) || output_->ends_with (".png") ||
+      output_->ends_with (".ome.zarr") || output_->ends_with (".ome.zarr/"))
     usage_error ("--jobs is for an --output that ends in .mkv, .mp4, .ome.tif, "
                  ".h5 or /");
   for (const auto &written : {output_, statistics_}) {

@@ -67,8 +67,8 @@ Play::declare (Options &options)
   options.heading ("");
   decode_.declare (options);
   options.value ("--export", export_, "FORM",
-      "what E writes: mp4, mkv, ome.tif, h5 or png [mp4]",
-      one_of ({"mp4", "mkv", "ome.tif", "h5", "png"}));
+      "what E writes: mp4, mkv, ome.tif, h5, ome.zarr or png [mp4]",
+      one_of ({"mp4", "mkv", "ome.tif", "h5", "ome.zarr", "png"}));
   window_.declare (options, false);
   run_.declare (options);
 }

@@ -75,8 +75,8 @@ Receive::declare (Options &options)
   decode_.declare_method (options, "the stream");
   decode_.declare_frames (options, "the stream");
   options.value ("--output", output_, "OUT",
-      "subframes: .mkv (FFV1, lossless), .mp4 (H.264), .ome.tif, .h5 or "
-      "FOLDER/");
+      "subframes: .mkv (FFV1, lossless), .mp4 (H.264), .ome.tif, .h5, "
+      ".ome.zarr or FOLDER/");
   options.value ("--coded", coded_, "FILE.mkv",
       "coded frames, in the format of \"codedexposure record\"",
       file_ending_in (".mkv"));

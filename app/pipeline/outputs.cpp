@@ -39,7 +39,7 @@ public:
   File (GstElement *element, const char *property, const std::string &name,
       const Outputs::FileKind &kind)
       : element_ (element), property_ (property), kind_ (kind),
-        part_ (name, Part::kFile)
+        part_ (name, kind.folder_with ? Part::kFolder : Part::kFile)
   {
     if (kind.frames)
       pad_.reset (GST_PAD (gst_object_ref (kind.frames)));
@@ -49,7 +49,11 @@ public:
   {
     const std::string &name = part_.name ();
     std::error_code ignored;
-    if (fs::is_directory (name, ignored))
+    if (kind_.folder_with && fs::exists (name, ignored) &&
+        !fs::exists (fs::path (name) / kind_.folder_with, ignored))
+      return Error{name + " exists and has another content; choose another "
+                          "name"};
+    if (!kind_.folder_with && fs::is_directory (name, ignored))
       return Error{name + " is a folder; give the name of a file"};
     if (!replace && fs::exists (fs::symlink_status (name, ignored)))
       return Error{name + " exists; choose another name, or set --force to "

@@ -71,6 +71,9 @@ public:
     GstPad *frames = nullptr; ///< each buffer is a frame
     bool sidecar = false;     ///< describes the frames of other files
     bool recording = false;   ///< of coded frames
+    /** It is a folder; a file of this name in it shows that it is of this
+     * kind, and may be replaced. */
+    const char *folder_with = nullptr;
   };
   /** @p element writes the file @p name, which it gets in its property @p
    * property. A pipe, or a name such as /dev/null, is written directly. */

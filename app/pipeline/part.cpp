@@ -122,6 +122,13 @@ Part::publish (bool replace)
   if (fsync (lock_) != 0 && errno != EINVAL)
     return Error{
         "cannot finish " + path_ + ": " + reason (errno), ErrorCode::io};
+  /* A folder takes no other's place, but changes it. */
+  if (kind_ == kFolder && replace &&
+      renameat2 (AT_FDCWD, path_.c_str (), AT_FDCWD, name_.c_str (),
+          RENAME_EXCHANGE) == 0) {
+    discard ();
+    return {};
+  }
   return move_file (path_, name_, replace);
 }
 

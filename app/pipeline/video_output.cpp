@@ -12,11 +12,13 @@ namespace codedexposure::app
 using namespace gst;
 
 const char *const kVideoForms =
-    ".mkv (FFV1, lossless), .mp4 (H.264), .ome.tif, .h5, / (a folder of PNG) "
-    "or %06d.png";
+    ".mkv (FFV1, lossless), .mp4 (H.264), .ome.tif, .h5, .ome.zarr, / (a "
+    "folder of PNG) or %06d.png";
 
 namespace
 {
+
+constexpr const char *kZarr = ".ome.zarr"; // a folder
 
 void
 write_file (Job &job, Chain &chain, const std::string &name, GstPad *frames)
@@ -71,11 +73,16 @@ write_stack (
   const ObjectPtr<GstElementFactory> found (
       gst_element_factory_find ("codedexposure-stack"));
   if (!found)
-    fail (name + ": this build has neither libtiff nor HDF5; install "
-                 "libtiff-dev and libhdf5-dev, and build again");
+    fail (name + ": this build has neither libtiff nor HDF5 nor zstd; install "
+                 "libtiff-dev, libhdf5-dev and libzstd-dev, and build again");
   chain.to ("codedexposure-stack", {{"deflate", style.deflate}});
   const auto frames = pad_of (chain.last (), "sink");
-  job.outputs.file (chain.last (), "location", name, {.frames = frames.get ()});
+  std::string path = name;
+  if (path.ends_with ("/"))
+    path.pop_back ();
+  job.outputs.file (chain.last (), "location", path,
+      {.frames = frames.get (),
+          .folder_with = path.ends_with (kZarr) ? "zarr.json" : nullptr});
 }
 
 /* A folder may have any name; only the last part is a format. Without the caps,
@@ -107,7 +114,7 @@ form_of (const std::string &name)
     return VideoForm::mkv;
   if (name.ends_with (".mp4"))
     return VideoForm::mp4;
-  for (const char *end : {".ome.tif", ".ome.tiff", ".h5"})
+  for (const char *end : {".ome.tif", ".ome.tiff", ".h5", kZarr, ".ome.zarr/"})
     if (name.ends_with (end))
       return VideoForm::stack;
   if (name.ends_with ("/") || std::regex_match (name, numbers))

@@ -13,7 +13,7 @@ namespace codedexposure::app
 
 /** How pictures are written. */
 struct VideoStyle {
-  bool deflate = false;       ///< compress .ome.tif and .h5
+  bool deflate = false;       ///< compress .ome.tif, .h5 and .ome.zarr
   bool view = false;          ///< scale PNG to 8 bits
   std::optional<int> white;   ///< DN that becomes white in 8 bits
   std::optional<int> bits;    ///< significant bits; none: those of the frames

@@ -4,10 +4,11 @@
  * @title: codedexposure-stack
  * @short_description: Pictures in one file for programs of the lab
  *
- * Writes pictures to an OME-TIFF file (.ome.tif, .ome.tiff) or an HDF5 file
- * (.h5), with the time, the slot, the number and the synchronisation of each,
- * and the schedule. No picture stays in memory. The file is finished at the end
- * of the stream; until then it says that it is not.
+ * Writes pictures to an OME-TIFF file (.ome.tif, .ome.tiff), an HDF5 file (.h5)
+ * or an OME-Zarr folder (.ome.zarr), with the time, the slot, the number and
+ * the synchronisation of each, and the schedule. No picture stays in memory.
+ * The file is finished at the end of the stream; until then it says that it is
+ * not. A folder .ome.zarr can be read at any moment, also after a kill.
  *
  * docs/formats.md describes the files.
  *
@@ -54,17 +55,30 @@ struct Stack {
 struct GstCodedExposureStack : Instance<GstBaseSink, Stack> {
 };
 
-using OpenFile = decltype (&open_ome_tiff);
+/** A kind of file, by the ending of its name. */
+struct Form {
+  std::string_view ending;
+  decltype (&open_ome_tiff) open; ///< null: this build has not its library
+  const char *needs;              ///< which build again needs
+};
 #ifdef CODEDEXPOSURE_TIFF
-constexpr OpenFile kTiff = open_ome_tiff;
+constexpr auto kTiff = open_ome_tiff;
 #else
-constexpr OpenFile kTiff = nullptr;
+constexpr decltype (&open_ome_tiff) kTiff = nullptr;
 #endif
 #ifdef CODEDEXPOSURE_HDF5
-constexpr OpenFile kHdf5 = open_hdf5;
+constexpr auto kHdf5 = open_hdf5;
 #else
-constexpr OpenFile kHdf5 = nullptr;
+constexpr decltype (&open_hdf5) kHdf5 = nullptr;
 #endif
+#ifdef CODEDEXPOSURE_ZARR
+constexpr auto kZarr = open_ome_zarr;
+#else
+constexpr decltype (&open_ome_zarr) kZarr = nullptr;
+#endif
+constexpr Form kForms[] = {{".ome.tif", kTiff, "libtiff-dev"},
+    {".ome.tiff", kTiff, "libtiff-dev"}, {".h5", kHdf5, "libhdf5-dev"},
+    {".ome.zarr", kZarr, "libzstd-dev"}};
 
 Stack &
 state_of (gpointer self)
@@ -82,33 +96,25 @@ final_name (const std::string &location)
              : location;
 }
 
-bool
-is_hdf5 (const std::string &location)
-{
-  return final_name (location).ends_with (".h5");
-}
-
 /* Null, with an error: this build, or nobody, writes such a file. */
-OpenFile
-writer_of (GstElement *self, const std::string &location)
+const Form *
+form_of (GstElement *self, const std::string &location)
 {
   const std::string name = final_name (location);
-  const bool hdf5 = is_hdf5 (location);
-  if (!hdf5 && !name.ends_with (".ome.tif") && !name.ends_with (".ome.tiff")) {
+  for (const Form &form : kForms) {
+    if (!name.ends_with (form.ending))
+      continue;
+    if (form.open)
+      return &form;
     POST_ERROR (self, RESOURCE, SETTINGS,
-        name + " has another ending than .ome.tif, .ome.tiff or .h5; choose "
-               "one of these");
+        "this build writes no " + std::string (form.ending) + "; install " +
+            form.needs + " and build again, or choose another ending");
     return nullptr;
   }
-  const OpenFile writer = hdf5 ? kHdf5 : kTiff;
-  if (!writer)
-    POST_ERROR (self, RESOURCE, SETTINGS,
-        hdf5
-            ? "this build has no HDF5; install libhdf5-dev and build again, or "
-              "write to .ome.tif"
-            : "this build has no libtiff; install libtiff-dev and build again, "
-              "or write to .h5");
-  return writer;
+  POST_ERROR (self, RESOURCE, SETTINGS,
+      name + " has another ending than .ome.tif, .ome.tiff, .h5 or .ome.zarr; "
+             "choose one of these");
+  return nullptr;
 }
 
 /* The bytes that the stream will have without compression; none if its length
@@ -174,8 +180,9 @@ open_file (GstBaseSink *sink, const FrameMeta &meta)
     classic = state.classic;
     format.deflate = state.deflate;
   });
-  format.big = !is_hdf5 (location) && needs_big (sink, format, classic);
-  state.file = writer_of (GST_ELEMENT (sink), location) (location, format);
+  const Form *form = form_of (GST_ELEMENT (sink), location);
+  format.big = form->open == kTiff && needs_big (sink, format, classic);
+  state.file = form->open (location, format);
 }
 
 StackRow
@@ -292,7 +299,7 @@ start (GstBaseSink *sink) noexcept
   });
   state.origin.clear ();
   state.written_origin.clear ();
-  return writer_of (GST_ELEMENT (sink), location) != nullptr;
+  return form_of (GST_ELEMENT (sink), location) != nullptr;
 }
 
 gboolean
@@ -304,14 +311,15 @@ stop (GstBaseSink *sink) noexcept
 PropertyTable<Stack>
 properties ()
 {
-  return {
-      {"location", "File",
-          "The file to write; its ending, .ome.tif, .ome.tiff or .h5, selects "
-          "the format. An ending .part after that is ignored",
-          kReadWriteReady, &Stack::location},
+  return {{"location", "File",
+              "The file to write; its ending, .ome.tif, .ome.tiff, .h5 or "
+              ".ome.zarr "
+              "(a folder), selects the format. An ending .part after that is "
+              "ignored",
+              kReadWriteReady, &Stack::location},
       {"deflate", "Deflate",
-          "Compress the pictures without loss: smaller files, slower to read "
-          "and write",
+          "Compress the pictures without loss (zstd in .ome.zarr): smaller "
+          "files, slower to read and write",
           kReadWriteReady, &Stack::deflate},
       {"classic-size", "Largest classic TIFF",
           "Bytes from which on a TIFF file is a BigTIFF, which ImageJ cannot "
@@ -329,7 +337,8 @@ set_up (gpointer klass)
 {
   install_state<GstCodedExposureStack, properties> (klass);
   describe_element (klass, "Coded exposure stack", "Sink/File/Video",
-      "Writes pictures with their times to OME-TIFF or HDF5", {"sink"});
+      "Writes pictures with their times to OME-TIFF, HDF5 or OME-Zarr",
+      {"sink"});
   auto *sink_class = GST_BASE_SINK_CLASS (klass);
   sink_class->set_caps = set_caps;
   sink_class->event = on_event;

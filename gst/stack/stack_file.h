@@ -20,8 +20,8 @@ struct StackFormat {
   int bytes = 1;           ///< of a pixel
   int bits = 8;            ///< significant bits of a pixel
   FrameRate rate = {0, 1}; ///< of pictures; 0/1: unknown
-  bool deflate = false;
-  bool big = false; ///< BigTIFF
+  bool deflate = false;    ///< compressed without loss
+  bool big = false;        ///< BigTIFF
 };
 
 /** What is known of one picture. Times are on the time axis of the recording;
@@ -58,10 +58,12 @@ public:
   virtual void finish () = 0;
 };
 
-/** Null: this build has no libtiff, or no HDF5. Throws Error. */
+/** What opens such a file, or folder. Throws Error. */
 std::unique_ptr<StackFile> open_ome_tiff (
     const std::string &path, const StackFormat &format);
 std::unique_ptr<StackFile> open_hdf5 (
+    const std::string &path, const StackFormat &format);
+std::unique_ptr<StackFile> open_ome_zarr (
     const std::string &path, const StackFormat &format);
 
 } // namespace codedexposure::gst

@@ -2,6 +2,7 @@
 """The frames of a recording as a sequence."""
 from __future__ import annotations
 
+import bisect
 from collections.abc import Iterator, Sequence
 from itertools import islice
 from typing import TYPE_CHECKING
@@ -56,6 +57,27 @@ class Frames(Sequence):
             times = self._times()
             self._part = range(self._count() * len(times) if times else 0)
         return self._part
+
+    def between(self, start: float, stop: float | None = None) -> Frames:
+        """Those of the coded frames that begin in [start, stop), in seconds
+        from the first coded frame, as decode --excerpt counts. None: to the
+        end.
+
+        Raises ValueError unless 0 <= start <= stop, and where these frames are
+        only a part already.
+        """
+        if start < 0 or (stop is not None and stop < start):
+            raise ValueError(f"a part is from 0 or later to its start or later, "
+                             f"not from {start} to {stop}")
+        if self._part is not None and self._part != range(
+                self._count() * len(self._times())):
+            raise ValueError("these frames are a part already; take one of the "
+                             "whole recording")
+        times = self._times()
+        first, last = (bisect.bisect_left(times, round(time * 1e9))
+                       if time is not None else len(times)
+                       for time in (start, stop))
+        return self[first * self._count():last * self._count()]
 
     def __len__(self):
         return len(self._range())

@@ -6,7 +6,7 @@ import subprocess
 import unittest
 import warnings
 
-from rig import BUILD, ROOT, SCRATCH, clean, run, simulate
+from rig import BUILD, ROOT, SCRATCH, clean, play, run, simulate
 import numpy as np
 import codedexposure
 
@@ -123,6 +123,45 @@ class Whole(unittest.TestCase):
         text = (ROOT / "meson.build").read_text()
         self.assertEqual(codedexposure.__version__,
                          re.search(r"version: '([0-9.]+)'", text)[1])
+
+    def test_a_part_by_time(self):
+        for name in ("plain.mkv", "camera.mkv"):
+            recording = opened(name)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", codedexposure.RecordingWarning)
+                whole = list(recording.subframes())
+                coded = list(recording.coded())
+            begin = coded[0].time_ns
+            frames = recording.subframes()
+            for start, stop in ((0, None), (0.2, 1.1), (0.5, 0.5), (7, 9)):
+                chosen = [frame.frame for frame in coded
+                          if start * 1e9 <= frame.time_ns - begin
+                          < (stop or 1e9) * 1e9]
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore", codedexposure.RecordingWarning)
+                    part = list(frames.between(start, stop))
+                self.assertEqual(len(part), 4 * len(chosen), (name, start))
+                wanted = [frame for frame in whole if frame.frame in chosen]
+                self.assertEqual(len(wanted), len(part))
+                self.assertTrue(all(map(same, part, wanted)))
+        with self.assertRaisesRegex(ValueError, "not from -1 to None"):
+            frames.between(-1)
+        with self.assertRaisesRegex(ValueError, "not from 2 to 1"):
+            frames.between(2, 1)
+        with self.assertRaisesRegex(ValueError, "a part already"):
+            frames[4:8].between(0, 1)
+
+    def test_uncertainty_is_that_of_decode(self):
+        run("decode", "plain.mkv", "--fuse", "fast", "--full-well", "5000",
+            "--output", "fused.mkv", "--uncertainty", "uncertain.mkv")
+        frames = opened("plain.mkv").uncertainty("fast", full_well=5000)
+        self.assertEqual(frames[0].image.dtype, np.uint16)
+        play("filesrc location=uncertain.mkv ! matroskademux ! avdec_ffv1 ! "
+             "filesink location=uncertain.raw")
+        wanted = np.fromfile(SCRATCH / "uncertain.raw", np.uint16)
+        got = np.stack([frame.image for frame in frames])
+        self.assertTrue(np.array_equal(wanted, got.ravel()))
+        self.assertGreater(got.max(), 0)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """The Python of docs/analyse.md runs as printed."""
+import json
 import os
 import re
 import sys
@@ -37,7 +38,10 @@ class Examples(unittest.TestCase):
         self.plot = mock.Mock()
         library = types.ModuleType("matplotlib")
         library.pyplot = self.plot
-        modules = {"matplotlib": library, "matplotlib.pyplot": self.plot}
+        # So do napari and Jupyter.
+        self.napari = mock.Mock()
+        modules = {"matplotlib": library, "matplotlib.pyplot": self.plot,
+                   "napari": self.napari}
         patch = mock.patch.dict(sys.modules, modules)
         patch.start()
         self.addCleanup(patch.stop)
@@ -54,13 +58,38 @@ class Examples(unittest.TestCase):
         self.plot.savefig.assert_called_once()
 
     def test_all(self):
-        self.assertEqual(len(BLOCKS), 5)
+        self.assertEqual(len(BLOCKS), 6)
         names = {}
         with warnings.catch_warnings():
             for block in BLOCKS:
                 exec(block, names)  # pylint: disable=exec-used
+        add = self.napari.Viewer.return_value.add_image
+        self.assertEqual([call.args[0].shape for call in add.call_args_list],
+                         [(48, 32, 48), (48, 64, 96)])
+        self.assertEqual(add.call_args_list[0].kwargs["scale"], (1, 2, 2))
         self.assertEqual(names["subframes"].shape, (10, 4, 32, 48))
         self.assertEqual(names["fused"].shape, (10, 4, 64, 96))
+
+    def test_the_notebook(self):
+        notebook = json.loads((ROOT / "docs/analyse.ipynb").read_text())
+        self.assertEqual(notebook["nbformat"], 4)
+        axes = [mock.Mock() for _ in range(5)]
+        panes = mock.Mock(), mock.Mock()
+        self.plot.subplots.side_effect = [(None, axes), (None, panes)]
+        names = {}
+        for cell in notebook["cells"]:
+            if cell["cell_type"] == "code":
+                exec("".join(cell["source"]), names)  # pylint: disable=exec-used
+        shown = [axis.imshow.call_args.args[0] for axis in axes]
+        whole = names["recording"].subframes()
+        self.assertEqual(shown[0].shape, (64, 96))
+        for slot in range(4):
+            self.assertTrue(np.array_equal(shown[1 + slot],
+                                           whole[4 * names["middle"] + slot].image))
+        times, means = panes[0].plot.call_args.args
+        self.assertEqual(len(times), 48)
+        self.assertEqual(means[7], whole[7].image.mean())
+        self.assertEqual(len(panes[1].plot.call_args.args[1]), 47)
 
 
 if __name__ == "__main__":

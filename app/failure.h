@@ -11,7 +11,7 @@
 namespace codedexposure::app
 {
 
-/** Exit status of every command; docs/formats.md lists them. */
+/** Exit status of every command, as its --help says. */
 enum class Exit {
   done = 0,
   failed = 1,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The element messages of the plugin; docs/formats.md describes them for users.
+/* The element messages of the plugin; docs/streams.md describes them for users.
  * post_message () sends one, parse_message () reads it. Times are in ns, on the
  * clock of the PTS. */
 #pragma once

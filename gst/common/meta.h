@@ -14,7 +14,7 @@ namespace codedexposure::gst
 {
 
 /** Name of the custom meta, "CodedExposureFrame"; tagged {"video"}. Fields:
- * docs/formats.md. */
+ * docs/streams.md. */
 extern const char *const kFrameMetaName;
 
 /** FrameMeta::pattern of a frame during which the mirrors may have changed from

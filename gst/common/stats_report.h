@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* The measurements of subframestats as a meta, a message or a line of a file;
- * docs/formats.md describes the fields. */
+ * docs/streams.md describes the fields. */
 #pragma once
 
 #include <string>

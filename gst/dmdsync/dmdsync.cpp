@@ -80,7 +80,7 @@
  * ## Patterns
  *
  * Any downstream element can request a grating or a code with an event
- * (docs/formats.md, "Patterns on request"). Frames that show it have its name
+ * (docs/streams.md, "Patterns on request"). Frames that show it have its name
  * in their meta; they are not coded frames and never locked. The schedule is
  * shown again on request, or when the request expires.
  *

@@ -124,7 +124,7 @@ properties ()
           gst_dmd_sync_slip_observable_get_type ()},
       {"stats", "Statistics",
           "All counters at one instant, of this run or the last one "
-          "(docs/formats.md)",
+          "(docs/streams.md)",
           kReadOnly, [] (const SyncState &st) { return stats (st); }},
   };
 }

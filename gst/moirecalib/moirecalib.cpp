@@ -35,7 +35,7 @@
  *
  * `moirecalib/state`, `moirecalib/reading`, `moirecalib/mapping`,
  * `moirecalib/phase` and PROGRESS messages with the code `mapping`; see
- * docs/formats.md.
+ * docs/streams.md.
  *
  * ## Example pipeline
  *

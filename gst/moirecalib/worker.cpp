@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* moirecalib's thread: gives frames to the session, draws and posts results.
- * Fields of messages: docs/formats.md. */
+ * Fields of messages: docs/streams.md. */
 #include <algorithm>
 #include <new>
 #include <system_error>

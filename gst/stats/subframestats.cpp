@@ -13,7 +13,7 @@
  * Each picture gets the custom meta `CodedExposureStats`; with
  * #subframestats:post-messages the bus gets the same fields as the element
  * message `subframestats/stats`; with #subframestats:location they go to a file
- * as lines of JSON or CSV. docs/formats.md describes the fields.
+ * as lines of JSON or CSV. docs/streams.md describes the fields.
  *
  * Entropy is the Shannon entropy of the pixel values, in bits a pixel, whatever
  * #subframestats:histogram-bins is. Noise and exposure raise it as texture

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Fusion of frames of 768x576 in which everything moves: the table of speed in
- * docs/fusion.md. */
+ * docs/fusion-method.md. */
 #include "../quality/must.h"
 #include "fuse/fuser.h"
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Messages, events and queries have on the wire the names and types that
- * docs/formats.md tells, and come back as they were. */
+ * docs/streams.md tells, and come back as they were. */
 #include "common/messages.h"
 
 #include <string>

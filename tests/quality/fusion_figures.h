@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The tables of docs/fusion.md. */
+/* The tables of docs/fusion-method.md. */
 #pragma once
 
 #include <string>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Prints the tables of docs/fusion.md or docs/two-cameras.md, or writes them
+/* Prints the tables of docs/fusion-method.md or docs/two-cameras.md, or writes them
  * into it. */
 #include <algorithm>
 #include <iostream>

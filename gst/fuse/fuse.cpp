@@ -71,7 +71,9 @@
  * camera misses is not lost, and pictures are 1 to 3 dB more accurate. Neither
  * gain nor black level of the second camera need be known. It must see the
  * mirrors as the first one does, or its mapping must be in its stream tag. A
- * frame without a partner gives what one camera gives. The network of
+ * frame without a partner gives what one camera gives, and so do the
+ * surroundings of saturated pixels of the second camera, which gets most of the
+ * light: 16 px to all sides. Such frames take twice the time. The network of
  * `refine` does not know partners: refined frames are made from one camera.
  *
  * ## Flags, metas and messages

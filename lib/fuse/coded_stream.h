@@ -24,15 +24,20 @@ struct CodedLight {
 struct CodedFrame : CodedLight {
   CodedLight partner;
   bool has_partner = false;
+  /** 1 for each pixel near which the partner is saturated, row by row without
+   * padding; empty: it is not. */
+  std::vector<std::uint8_t> clipped;
 };
 
 /** A coded frame, and those before and after it, null where there is none. */
 struct CodedFrames {
   const CodedFrame *before, *now, *after;
+  bool alone = false; ///< as if it had no partner
 
+  bool has_partner () const { return now->has_partner && !alone; }
   Neighbours neighbours () const
   {
-    return {before != nullptr, after != nullptr, now->has_partner};
+    return {before != nullptr, after != nullptr, has_partner ()};
   }
 };
 

@@ -254,7 +254,7 @@ Engine::fill_light (const CodedFrames &frames, const Seen &seen,
     if (!fit_partner (frames, workers, stop, &made_in_partner_))
       return false;
     if (!collaborative_->run (kernels_, frames.now->light,
-            frames.now->has_partner ? &made_in_partner_ : nullptr,
+            frames.has_partner () ? &made_in_partner_ : nullptr,
             typical_noise (), light_, workers, stop))
       return false;
   }
@@ -262,11 +262,40 @@ Engine::fill_light (const CodedFrames &frames, const Seen &seen,
   return fit_partner (frames, workers, stop);
 }
 
+/* Where the partner is saturated, the slots do not sum to what it saw, and the
+ * first camera is all that is known. */
+bool
+Engine::fill_clipped (const CodedFrames &frames, const Seen &seen,
+    Workers &workers, std::stop_token stop)
+{
+  CodedFrames alone = frames;
+  alone.alone = true;
+  const auto fill = [&] (const CodedFrames &of) {
+    const auto *predicted = predictions_->run (kernels_, of, workers, stop);
+    return predicted &&
+           fill_light (of, {*predicted, seen.still}, workers, stop);
+  };
+  if (!fill (alone))
+    return false;
+  std::swap (light_, alone_);
+  if (!fill (frames))
+    return false;
+  for (std::size_t s = 0; s < light_.size (); s++)
+    for (int y = 0; y < size_.height; y++) {
+      const std::uint8_t *clipped =
+          frames.now->clipped.data () + std::ptrdiff_t (y) * size_.width;
+      for (int x = 0; x < size_.width; x++)
+        if (clipped[x])
+          light_[s].row (y)[x] = alone_[s].row (y)[x];
+    }
+  return true;
+}
+
 bool
 Engine::fit_partner (const CodedFrames &frames, Workers &workers,
     std::stop_token stop, Field *made)
 {
-  if (!frames.now->has_partner)
+  if (!frames.has_partner ())
     return true;
   constexpr int kMinRows = 16;
   return run_bands (workers, size_.height, kMinRows, std::move (stop),
@@ -305,10 +334,12 @@ Engine::fuse_frame (const CodedFrames &frames, const RowSink &sink,
   const auto seen = look (frames, workers, stop);
   if (!seen)
     return false;
-  if (linear_ && !refiner_ && !deviations)
+  const bool clipped = frames.has_partner () && !frames.now->clipped.empty ();
+  if (linear_ && !refiner_ && !deviations && !clipped)
     return linear_->run (
         kernels_, frames, seen->predicted, seen->still, sink, workers, stop);
-  if (!fill_light (frames, *seen, workers, stop) ||
+  if (!(clipped ? fill_clipped (frames, *seen, workers, stop)
+                : fill_light (frames, *seen, workers, stop)) ||
       (refiner_ && !refiner_->run (kernels_, frames.now->light,
                        seen->still.weight, light_, workers, stop)))
     return false;

@@ -66,6 +66,8 @@ private:
       const Uncertainty::Sink &deviations);
   bool fill_light (const CodedFrames &frames, const Seen &seen,
       Workers &workers, std::stop_token stop);
+  bool fill_clipped (const CodedFrames &frames, const Seen &seen,
+      Workers &workers, std::stop_token stop);
   /** PartnerFit of light_; @p made, if set, gets what that makes in the
    * partner.
    */
@@ -100,6 +102,7 @@ private:
   std::optional<Uncertainty> uncertainty_; ///< made when it is first wanted
 
   std::vector<Field> light_; ///< of each slot; made when it is first needed
+  std::vector<Field> alone_; ///< by fill_clipped ()
   Field static_light_;       ///< unless fast, or without noise
   Field misfit_;             ///< of motion_
   Field made_in_partner_;    ///< for collaborative_

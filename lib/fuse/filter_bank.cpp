@@ -91,7 +91,7 @@ TapSources::row (const CodedFrames &frames, int y,
     std::vector<const std::int32_t *> &sources) const
 {
   const std::array<const CodedLight *, 4> all{frames.before, frames.now,
-      frames.after, frames.now->has_partner ? &frames.now->partner : nullptr};
+      frames.after, frames.has_partner () ? &frames.now->partner : nullptr};
   static_assert (kPartner == all.size () - 2);
   sources.resize (std::size_t (rows_) * places_.size ());
   for (std::size_t f = 0; f < all.size (); f++) {

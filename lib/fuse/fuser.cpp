@@ -9,6 +9,7 @@
 #include "base/text.h"
 #include "base/try.h"
 #include "base/view_check.h"
+#include "fuse/clipped.h"
 #include "fuse/engine.h"
 
 namespace codedexposure
@@ -178,6 +179,8 @@ struct Fuser<Pixel>::State {
 
   Result<void> take (ImageView<const Pixel> coded,
       const std::optional<ImageView<const Pixel>> &partner);
+  std::vector<std::uint8_t> clipped_near (
+      const Piece &piece, ImageView<const Pixel> partner) const;
   Result<void> check (std::span<const ImageView<Pixel>> frames,
       std::span<const ImageView<std::uint16_t>> uncertainty, Extent size) const;
   /** False when it was stopped. */
@@ -189,6 +192,28 @@ struct Fuser<Pixel>::State {
   template <typename Function>
   Result<void> or_forget (const Function &function);
 };
+
+/* Empty: no pixel of the partner is saturated. */
+template <typename Pixel>
+std::vector<std::uint8_t>
+Fuser<Pixel>::State::clipped_near (
+    const Piece &piece, ImageView<const Pixel> partner) const
+{
+  const auto white = Pixel (largest);
+  const auto [width, height] = piece.engine->size ();
+  const auto seen = partner.block (piece.rect.x, piece.rect.y, width, height);
+  if (!fuse::has_clipped (seen, white))
+    return {};
+  std::vector<std::uint8_t> marks;
+  for (int y = 0; y < height; y++)
+    for (int x = 0; x < width; x++)
+      marks.push_back (seen.at (x, y) >= white);
+  if (&piece == &pieces.front ())
+    for (const auto &[at, from] : covers)
+      marks[std::size_t (at.y) * std::size_t (width) + std::size_t (at.x)] =
+          seen.at (from.x, from.y) >= white;
+  return fuse::near_marks (std::move (marks), width, height);
+}
 
 template <typename Pixel>
 Result<void>
@@ -213,6 +238,8 @@ Fuser<Pixel>::State::take (ImageView<const Pixel> coded,
           frame.partner.light.row (at.y)[at.x] =
               frame.partner.light.row (from.y)[from.x];
       }
+    frame.clipped =
+        partner ? clipped_near (piece, *partner) : std::vector<std::uint8_t> ();
     stream.take (piece.engine->kernels ());
   }
   return {};

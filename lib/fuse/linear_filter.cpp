@@ -158,7 +158,7 @@ LinearFilter::run (const Kernels &kernels, const CodedFrames &frames,
         for (int y = part * kBandRows; y < end; y++) {
           share (kernels, predicted, still, y, *room);
           estimate (kernels, filters, frames, y, *room);
-          if (frames.now->has_partner)
+          if (frames.has_partner ())
             fit_->run (kernels, y, frames.now->partner.light.row (y),
                 rows.data (), *room->of_fit);
           sink (y, rows.data ());

@@ -161,6 +161,44 @@ TEST (FusePartner, AFrameWithoutItsPartnerIsThatOfOneCamera)
   }
 }
 
+/* A second camera gets most of the light, and has too much of it first. What it
+ * cannot tell is left to the first camera; elsewhere nothing changes. */
+TEST (FusePartner, WhereItIsSaturatedTheFirstCameraIsAlone)
+{
+  constexpr Rect kLamp{24, 18, 6, 4};
+  constexpr int kReach = 16;
+  const Schedule schedule = schedule_of (kPreset);
+  const auto slots = truth (3, schedule.slots (), 1.3);
+  const auto frames = coded (schedule, slots);
+  const auto partners = coded (schedule.complement ().value (), slots);
+  auto dazzled = partners;
+  for (int y = kLamp.y; y < kLamp.bottom (); y++)
+    for (int x = kLamp.x; x < kLamp.right (); x++)
+      dazzled[1].at (x, y) = 255;
+  for (const FuseQuality quality :
+      {FuseQuality::kFast, FuseQuality::kBalanced, FuseQuality::kBest}) {
+    FuseOptions alone;
+    alone.quality = quality;
+    const auto one = fuse (schedule, frames, {}, alone);
+    const auto both = fuse (schedule, frames, partners, with_partner (quality));
+    const auto some = fuse (schedule, frames, dazzled, with_partner (quality));
+    const Rect near{kLamp.x - kReach, kLamp.y - kReach,
+        kLamp.width + 2 * kReach, kLamp.height + 2 * kReach};
+    for (std::size_t s = 4; s < 8; s++)
+      for (int y = 0; y < kHeight; y++)
+        for (int x = 0; x < kWidth; x++) {
+          if (near.holds (x, y)) {
+            ASSERT_EQ (some[s].at (x, y), one[s].at (x, y)) << x << ' ' << y;
+          } else if (quality == FuseQuality::kFast) {
+            ASSERT_NEAR (some[s].at (x, y), both[s].at (x, y), 1)
+                << x << ' ' << y;
+          }
+        }
+    EXPECT_GT (psnr (some, slots), psnr (one, slots) + 0.8)
+        << quality_name (quality);
+  }
+}
+
 TEST (FusePartner, RegionsHavePartners)
 {
   const Schedule schedule =

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from itertools import islice
 from typing import TYPE_CHECKING
 
-from ._pipeline import Error
+from ._pipeline import Error, UncountableError
 from .frame import Frame
 
 if TYPE_CHECKING:
@@ -29,7 +29,9 @@ class Frames(Sequence):
     """
 
     def __init__(self, recording: Recording, decoder: str,
-                 part: range | None = None, per_frame: int | None = None):
+                 part: range | None = None, per_frame: int | None = None,
+                 countable: bool = True):
+        self._countable = countable
         self._recording = recording
         self._decoder = decoder
         self._part = part
@@ -40,6 +42,10 @@ class Frames(Sequence):
 
     def _times(self) -> list[int]:
         """Of the coded frames that give pictures."""
+        if not self._countable:
+            raise UncountableError(
+                f"frames of {self._recording.path} and a second camera have no "
+                "numbers; read them in a loop")
         return self._recording.coded_times(decoded=bool(self._decoder))
 
     def _count(self) -> int:

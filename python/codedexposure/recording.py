@@ -89,20 +89,30 @@ class Recording:
                       require_schedule=True, method=method, schedule=schedule,
                       mapping=mapping, bits=bits) + f" demux.{pad} !")
 
-    def fused(self, quality: str = "balanced", *, full_well: float | None = None,
-              read_noise: float | None = None,
+    def fused(self, quality: str = "balanced", *,
+              second: str | os.PathLike | None = None,
+              full_well: float | None = None, read_noise: float | None = None,
               schedule: str | os.PathLike | dict | None = None,
               mapping: str | os.PathLike | dict | None = None,
               bits: int | None = None) -> Frames:
         """Full-size frames at the rate of the subframes.
 
         quality     fast, balanced, best or learned
+        second      the recording of a second camera in the other beam; these
+                    frames can only be read in a loop
         full_well   noise of the camera: electrons at white, e-; 0: no noise
         read_noise  noise of the camera, e- rms
         The rest is as for subframes ().
         """
-        return Frames(self, self._fuse(
-            quality, full_well, read_noise, schedule, mapping, bits) + " !")
+        fuse = self._fuse(
+            quality, full_well, read_noise, schedule, mapping, bits) + " !"
+        if second is None:
+            return Frames(self, fuse)
+        Recording(second)  # raises what is wrong with it
+        return Frames(
+            self, f"pair.on filesrc location={quoted(os.fspath(second))} ! "
+            f"codedexposure-recorddemux ! pair.off codedexposure-pair name=pair ! "
+            f"{fuse}", countable=False)
 
     def uncertainty(self, quality: str = "balanced", *,
                     full_well: float | None = None,

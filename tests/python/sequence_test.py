@@ -164,5 +164,26 @@ class Whole(unittest.TestCase):
         self.assertGreater(got.max(), 0)
 
 
+class TwoCameras(unittest.TestCase):
+    def test_pictures_are_those_of_decode(self):
+        for name, beam in ("first", "on"), ("second", "off"):
+            play("codedexposure-scene scene=candle num-buffers=40 ! video/x-raw,"
+                 "format=GRAY8,width=96,height=64,framerate=100/1 ! "
+                 f"codedexposure-sim schedule=sequential:lattice:4/2 beam={beam} ! "
+                 f"dmdsync schedule=sequential:lattice:4/2 beam={beam} ! "
+                 f"codedexposure-recordmux ! filesink location={name}.mkv")
+        run("decode", "first.mkv", "--second", "second.mkv", "--fuse", "fast",
+            "--output", "both.mkv")
+        play("filesrc location=both.mkv ! matroskademux ! avdec_ffv1 ! "
+             "filesink location=both.raw")
+        frames = opened("first.mkv").fused("fast", second=SCRATCH / "second.mkv")
+        self.assertEqual(b"".join(frame.image.tobytes() for frame in frames),
+                         (SCRATCH / "both.raw").read_bytes())
+        with self.assertRaisesRegex(codedexposure.UncountableError, "second camera"):
+            len(frames)
+        with self.assertRaises(FileNotFoundError):
+            opened("first.mkv").fused(second="none.mkv")
+
+
 if __name__ == "__main__":
     unittest.main()

@@ -1,9 +1,12 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "cameras.h"
 
+#include <algorithm>
+
 #include <arv.h>
 
 #include "common/raii.h"
+#include "pipeline/messages.h"
 
 namespace codedexposure::app
 {
@@ -29,18 +32,78 @@ cameras_found ()
                               "; set --camera to one of them";
 }
 
-std::optional<double>
-camera_exposure (GstElement *camerasrc)
+namespace
+{
+
+/* Null: there is none yet. */
+gst::ObjectPtr<GObject>
+camera_of (GstElement *camerasrc)
 {
   GObject *found = nullptr;
   gst_child_proxy_get (
       GST_CHILD_PROXY (camerasrc), "source::camera", &found, nullptr);
-  const gst::ObjectPtr<GObject> camera (found);
+  return gst::ObjectPtr<GObject> (found);
+}
+
+/* Why @call, which gets the place of an error, fails; "": it does not. */
+template <typename Call>
+std::string
+failure_of (Call call)
+{
+  GError *failed = nullptr;
+  call (&failed);
+  const std::string why = failed ? failed->message : "";
+  g_clear_error (&failed);
+  return why;
+}
+
+} // namespace
+
+Result<std::string>
+change_gain (GstElement *camerasrc, int steps)
+{
+  constexpr double kSteps = 20;
+  const auto held = camera_of (camerasrc);
+  if (!held)
+    return Error{"there is no camera yet"};
+  gchar *bench = nullptr;
+  g_object_get (camerasrc, "bench", &bench, nullptr);
+  if (const gst::CharPtr profile (bench); profile && *profile)
+    return Error{"the bench profile was measured at the gain that the camera "
+                 "has; start without --bench to change it"};
+  ArvCamera *camera = ARV_CAMERA (held.get ());
+  double low = 0, high = 0;
+  std::string why = failure_of ([&] (GError **failed) {
+    arv_camera_get_gain_bounds (camera, &low, &high, failed);
+  });
+  if (why.empty () && !(high > low))
+    why = "it has one gain only";
+  const double before = arv_camera_get_gain (camera, nullptr);
+  /* Some count in whole numbers. */
+  double after = before;
+  for (double step = (high - low) / kSteps;
+       why.empty () && after == before && step <= high - low; step *= 2) {
+    const double wanted = std::clamp (before + steps * step, low, high);
+    why = failure_of ([&] (GError **failed) {
+      arv_camera_set_gain_auto (camera, ARV_AUTO_OFF, nullptr);
+      arv_camera_set_gain (camera, wanted, failed);
+    });
+    after = arv_camera_get_gain (camera, nullptr);
+  }
+  if (!why.empty ())
+    return Error{"the gain of the camera cannot be changed: " + why};
+  return format ("gain %.4g (%.4g to %.4g)", after, low, high);
+}
+
+std::optional<double>
+camera_exposure (GstElement *camerasrc)
+{
+  const auto camera = camera_of (camerasrc);
   GError *failed = nullptr;
   if (!camera)
     return std::nullopt;
   const double exposure =
-      arv_camera_get_exposure_time (ARV_CAMERA (found), &failed);
+      arv_camera_get_exposure_time (ARV_CAMERA (camera.get ()), &failed);
   const bool known = !failed;
   g_clear_error (&failed);
   return known ? std::optional (exposure) : std::nullopt;

@@ -8,6 +8,8 @@
 
 #include <gst/gst.h>
 
+#include "base/result.h"
+
 namespace codedexposure::app
 {
 
@@ -20,5 +22,10 @@ std::string cameras_found ();
 /** For how long the camera of @p camerasrc exposes, us; none: it does not say.
  */
 std::optional<double> camera_exposure (GstElement *camerasrc);
+
+/** Changes the gain of the camera of @p camerasrc by @p steps twentieths of its
+ * range. "gain 3.5 (0 to 24)", as the camera says it. Error: it cannot, or a
+ * bench profile was measured at the gain that it has. */
+Result<std::string> change_gain (GstElement *camerasrc, int steps);
 
 } // namespace codedexposure::app

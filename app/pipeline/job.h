@@ -62,8 +62,9 @@ struct Job {
   /** Of the coded frames; none: not known. */
   std::optional<gint64> total;
   PlayTimes times;
-  /** A camera, which may fall silent without an error. */
-  bool from_camera = false;
+  /** The element of a camera, which may fall silent without an error; null:
+   * the frames are those of no camera. */
+  GstElement *camera = nullptr;
   /** Reads a recording or a stream of one: its own end is in it. */
   GstElement *reader = nullptr;
   /** The file of the reader was finished, and is as long as it was then. */

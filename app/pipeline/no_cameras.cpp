@@ -23,4 +23,10 @@ camera_exposure (GstElement *)
   return std::nullopt;
 }
 
+Result<std::string>
+change_gain (GstElement *, int)
+{
+  return Error{cameras_found ()};
+}
+
 } // namespace codedexposure::app

@@ -403,7 +403,7 @@ Run::watch_for_silence (gint64 frames)
     g_object_get (job_.buffer, "current-level-buffers", &waiting, nullptr);
   if (std::exchange (frames_before_, frames) != frames || waiting > 0)
     heard_ = Clock::now ();
-  if (!job_.from_camera || silent_ || interrupted_ ||
+  if (!job_.camera || silent_ || interrupted_ ||
       Clock::now () - heard_ < kSilence)
     return;
   silent_ = true;

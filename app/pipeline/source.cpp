@@ -163,6 +163,7 @@ camera_source (Job &job, const SourceOptions &options, const SourcePlan &plan)
   Chain chain = job.graph.begin ("codedexposure-camerasrc", settings);
   gst_child_proxy_set (GST_CHILD_PROXY (chain.last ()),
       "source::num-arv-buffers", kBuffers, nullptr);
+  job.camera = chain.last ();
   return chain.caps (grey_caps (plan, plan.frame_rate));
 }
 
@@ -222,7 +223,6 @@ coded_source (
     job.source = "the camera " + *options.camera;
   } else if (options.source)
     job.source = "--source";
-  job.from_camera = bool (options.camera);
   synchronise (options, chain);
   limit_frames (job, options, chain);
   return chain;

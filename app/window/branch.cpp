@@ -119,7 +119,9 @@ WindowOptions::keys_of (const std::string &command)
          "  K               keep what has just happened: the coded frames of "
          "the last 10 s\n                  become a recording, " +
          command +
-         "-frameN.mkv;\n                  the signal USR1 does so, too\n" +
+         "-frameN.mkv;\n                  the signal USR1 does so, too\n"
+         "  Up, Down        change the gain of a GenICam camera by 1/20 of its "
+         "range\n" +
          common_keys (command) +
          "The stream does not wait for the window: recording and counting go "
          "on in a pause\nor loop, and subframes are skipped if the screen is "

@@ -70,7 +70,7 @@ info_in (GstPadProbeInfo *probed)
 Window::Window (WindowBranch branch, GstPad *coded, Style style)
     : size_ (branch.size), room_ (style.room), delay_ (style.delay),
       name_ (style.name), title_ (style.title),
-      player_ (std::move (style.player))
+      player_ (std::move (style.player)), camera_source_ (style.camera)
 {
   if (!player_)
     keeper_.emplace (coded, name_, style.keeps);
@@ -333,7 +333,7 @@ add_window (Job &job, const std::vector<Chain> &sources,
       pad_of (job.counted, "sink").get (),
       Window::Style{find_screen ().room (), job.times.shift_to.value_or (0),
           job.command, job.command + ": " + job.source,
-          {options.keep_on, options.keep_after.value_or (5)},
+          {options.keep_on, options.keep_after.value_or (5)}, job.camera,
           played ? std::make_unique<Player> (*std::move (played)) : nullptr});
 }
 

@@ -36,11 +36,12 @@ class Window : public Viewer
 {
 public:
   struct Style {
-    Extent room;            ///< for the window, in pixels
-    GstClockTime delay = 0; ///< after which frames are shown
-    std::string name;       ///< of the command, in the names of snapshots
-    std::string title;      ///< of the window
-    Keeper::Rule keeps;     ///< what is kept without a key
+    Extent room;                  ///< for the window, in pixels
+    GstClockTime delay = 0;       ///< after which frames are shown
+    std::string name;             ///< of the command, in the names of snapshots
+    std::string title;            ///< of the window
+    Keeper::Rule keeps;           ///< what is kept without a key
+    GstElement *camera = nullptr; ///< whose gain keys change; null: none
     /** Moves in a recording; null: the window looks at what comes. */
     std::unique_ptr<Player> player = nullptr;
   };
@@ -93,6 +94,7 @@ private:
   void press_replay (const std::string &key);
   void stretch_tones ();
   void fill_screen (bool fills);
+  void turn_gain (int steps);
   std::optional<Position> seen_at (Position in_window) const;
 
   static bool is_pair (const Shown &one, const Shown &other);
@@ -117,6 +119,7 @@ private:
   std::vector<std::unique_ptr<Pane>> panes_; // constant
   std::optional<Keeper> keeper_;             // of what comes
   const std::unique_ptr<Player> player_;
+  GstElement *const camera_source_;
   Snapshots snapshots_;
   gst::ObjectPtr<GstPad> panel_at_; // where it is drawn
   guint on_signal_ = 0;             // source

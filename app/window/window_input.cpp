@@ -6,6 +6,7 @@
 #include <gst/video/navigation.h>
 
 #include "base/pixels.h"
+#include "pipeline/cameras.h"
 #include "window/pane.h"
 #include "window/screen.h"
 
@@ -159,6 +160,8 @@ Window::press (const std::string &key)
     player_->press (key);
   else if (is_key (key, {"k"}))
     keeper_->keep ();
+  else if (is_key (key, {"Up", "Down"}))
+    turn_gain (is_key (key, {"Up"}) ? 1 : -1);
   else
     press_replay (key);
 }
@@ -242,6 +245,19 @@ Window::stretch_tones ()
     return;
   const std::lock_guard lock (mutex_);
   look_.set_tones (*tones, coded->largest ());
+}
+
+/* The exposure time is a part of the schedule, and stays. */
+void
+Window::turn_gain (int steps)
+{
+  if (!camera_source_)
+    return;
+  const auto turned = change_gain (camera_source_, steps);
+  if (turned)
+    calls_.told (*turned);
+  else
+    calls_.said (turned.error ().message, true);
 }
 
 void

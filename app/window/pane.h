@@ -9,7 +9,7 @@ namespace codedexposure::app
 
 constexpr std::size_t kCamera = 0, kSubframes = 1; ///< indices of panes
 
-/* Other panes may be ahead of the subframes, or behind. */
+/** For which pictures are kept. */
 constexpr ViewTime kLoop = GST_SECOND;
 
 /** Running and stream time; none: outside of the segment. */

@@ -147,9 +147,8 @@ Window::draw (cairo_t *cairo, ViewTime time)
   const bool paints = !scene.live || scene.snapshot || !scene.look.is_plain ();
   for (std::size_t k = 0; paints && subframe && k < panes_.size (); k++) {
     const ShownPtr &shown = scene.shown[k];
-    const bool belongs =
-        shown &&
-        (scene.live && !scene.snapshot ? true : is_pair (*subframe, *shown));
+    const bool belongs = shown && ((scene.live && !scene.snapshot) ||
+                                      is_pair (*subframe, *shown));
     panes_[k]->detail.paint (
         cairo, belongs ? shown : nullptr, scene.places[k], scene.look);
   }

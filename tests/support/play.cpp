@@ -38,7 +38,12 @@ main (int argc, char **argv)
     std::fprintf (stderr, "play: %s: %s\n%s\n",
         GST_OBJECT_NAME (GST_MESSAGE_SRC (message)), error->message,
         detail ? detail : "");
+    g_clear_error (&error);
+    g_free (detail);
   }
+  gst_message_unref (message);
+  gst_object_unref (bus);
   gst_element_set_state (pipeline, GST_STATE_NULL);
+  gst_object_unref (pipeline);
   return failed ? 1 : 0;
 }

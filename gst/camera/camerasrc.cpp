@@ -86,6 +86,8 @@ G_DEFINE_ENUM_TYPE (GstCodedExposureTriggerEdge,
     {int (Edge::falling), "Falling edge; output low in the exposure",
         "falling"});
 
+constexpr guint kMostTries = 1'000'000; // ten days of one a second
+
 PropertyTable<CameraState>
 properties ()
 {
@@ -131,10 +133,10 @@ properties ()
       {"reconnect", "Reconnect",
           "Tries in a row, at least a second apart, to restart a camera that "
           "failed after its first frame; 0: its error ends the pipeline",
-          kReadWriteReady, set (&Settings::reconnect), 0u, G_MAXUINT},
+          kReadWriteReady, set (&Settings::reconnect), 0u, kMostTries},
       {"reconnects", "Reconnects",
           "Times that the camera came back, in this run or the last one",
-          kReadOnly, &CameraState::reconnects, 0u, G_MAXUINT},
+          kReadOnly, &CameraState::reconnects, 0u, kMostTries},
   };
 }
 

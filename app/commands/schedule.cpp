@@ -154,8 +154,8 @@ write_alp (const Arguments &arguments, const DmdInfo &info,
       files[1], alp_script (sequence, info.size,
                     std::filesystem::path (files[0]).filename ().string (),
                     "Schedule " + schedule.text () + ", " +
-                        std::to_string (shown.rate.num) + "/" +
-                        std::to_string (shown.rate.den) + " coded frames/s"));
+                        real_text (double (shown.rate.num) / shown.rate.den) +
+                        " coded frames/s"));
   return files;
 }
 

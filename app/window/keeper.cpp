@@ -117,12 +117,12 @@ Keeper::take (GstBuffer *frame)
   }
 }
 
-/* A damaged frame is no event. */
+/* Neither a damaged frame is an event, nor one that shows a pattern. */
 void
 Keeper::watch (GstBuffer *frame)
 {
   const auto meta = get_frame_meta (frame);
-  if (!info_ || is_corrupted (frame))
+  if (!info_ || is_corrupted (frame) || (meta && !meta->pattern.empty ()))
     return events_->skip ();
   if (meta && last_ && meta->frame != *last_ + 1)
     events_->skip ();
@@ -312,25 +312,51 @@ Keeper::add (News news)
 
 /* What follows an event is of interest, too. */
 void
+Keeper::on_event (const std::string &text)
+{
+  calls_.told (text);
+  if (waiting_ > 0)
+    has_another_ = true;
+  else
+    wait (after_);
+}
+
+void
+Keeper::wait (guint ms)
+{
+  waiting_ = g_timeout_add (
+      ms,
+      [] (gpointer self) {
+        static_cast<Keeper *> (self)->on_time ();
+        return gboolean (G_SOURCE_REMOVE);
+      },
+      this);
+}
+
+/* An event that came meanwhile is followed for as long as the first one. */
+void
+Keeper::on_time ()
+{
+  constexpr guint kSoon = 100; // ms
+  waiting_ = 0;
+  if (locked (mutex_, [this] { return is_busy_; }))
+    return wait (kSoon);
+  keep ();
+  if (std::exchange (has_another_, false))
+    wait (after_);
+}
+
+void
 Keeper::tell ()
 {
   std::unique_lock lock (mutex_);
   const auto all = std::exchange (news_, {});
   lock.unlock ();
-  const auto on_time = [] (gpointer self) {
-    auto *keeper = static_cast<Keeper *> (self);
-    keeper->waiting_ = 0;
-    keeper->keep ();
-    return gboolean (G_SOURCE_REMOVE);
-  };
-  for (const News &news : all) {
-    if (!news.event)
+  for (const News &news : all)
+    if (news.event)
+      on_event (news.text);
+    else
       calls_.said (news.text, news.failed);
-    else if (waiting_ == 0) {
-      calls_.told (news.text);
-      waiting_ = g_timeout_add (after_, on_time, this);
-    }
-  }
 }
 
 /* An event shortly before the end is kept with what there is of it. */

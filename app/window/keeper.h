@@ -78,6 +78,9 @@ private:
   void run (Frames frames);
   void add (News news);
   void tell ();
+  void on_event (const std::string &text);
+  void wait (guint ms);
+  void on_time ();
 
   const std::string name_;
   const guint after_; // ms
@@ -93,7 +96,9 @@ private:
   std::deque<News> news_;
 
   Viewer::Calls calls_; ///< constant while the pipeline plays
-  guint waiting_ = 0;   ///< source, of the main thread
+  /* The main thread: */
+  guint waiting_ = 0;        ///< source; an event is to be kept
+  bool has_another_ = false; ///< event, while that one waits
   std::thread writer_;
 };
 

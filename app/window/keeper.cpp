@@ -70,7 +70,7 @@ Keeper::Frames::length () const
 
 Keeper::Keeper (GstPad *pad, std::string name, const Rule &rule)
     : name_ (std::move (name)), after_ (guint (1000 * rule.after)),
-      most_bytes_ (room_in_memory ())
+      bits_ (rule.bits), most_bytes_ (room_in_memory ())
 {
   if (rule.event)
     events_.emplace (*rule.event);
@@ -117,7 +117,7 @@ Keeper::take (GstBuffer *frame)
   }
 }
 
-/* Neither a damaged frame is an event, nor one that shows a pattern. */
+/* Frames that are damaged or show a pattern are no events. */
 void
 Keeper::watch (GstBuffer *frame)
 {
@@ -127,9 +127,7 @@ Keeper::watch (GstBuffer *frame)
   if (meta && last_ && meta->frame != *last_ + 1)
     events_->skip ();
   last_ = meta ? std::optional (meta->frame) : std::nullopt;
-  const int depth = int (GST_VIDEO_INFO_COMP_DEPTH (&*info_, 0));
-  const int bits =
-      meta && meta->bits > 0 ? std::min (meta->bits, depth) : depth;
+  const int bits = bits_of (frame, *info_, bits_);
   MappedFrame mapped (*info_, frame, GST_MAP_READ);
   if (!mapped)
     return events_->skip ();

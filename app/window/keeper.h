@@ -34,6 +34,7 @@ public:
   struct Rule {
     std::optional<EventRule> event = {};
     double after = 5; ///< s, for which frames still come after an event
+    int bits = 0;     ///< significant, of a pixel; 0: as frames say
   };
 
   /** At @p pad, before the pipeline plays. Names of recordings begin with @p
@@ -84,6 +85,7 @@ private:
 
   const std::string name_;
   const guint after_; // ms
+  const int bits_;
   const std::uint64_t most_bytes_;
   /* The thread of the stream: */
   std::optional<EventWatch> events_;

@@ -2,6 +2,9 @@
 /* Frames that are kept for later. */
 #pragma once
 
+#include <algorithm>
+
+#include "common/meta.h"
 #include "common/raii.h"
 
 namespace codedexposure::app
@@ -21,6 +24,17 @@ kept_frame (GstBuffer *frame)
   }
   return gst::BufferPtr (
       most > 0 ? gst_buffer_copy_deep (frame) : gst_buffer_ref (frame));
+}
+
+/** Significant bits of the pixels of @p frame: @p set unless that is 0, else
+ * what its metadata say, else all of @p info. */
+inline int
+bits_of (GstBuffer *frame, const GstVideoInfo &info, int set)
+{
+  const auto meta = gst::get_frame_meta (frame);
+  const int depth = int (GST_VIDEO_INFO_COMP_DEPTH (&info, 0));
+  const int bits = set > 0 ? set : meta ? meta->bits : 0;
+  return bits > 0 ? std::min (bits, depth) : depth;
 }
 
 } // namespace codedexposure::app

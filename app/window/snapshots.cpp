@@ -34,7 +34,7 @@ save_window (const Snapshot &snapshot, Part &part)
   const cairo_status_t status = cairo_surface_write_to_png (
       snapshot.window.get (), part.path ().c_str ());
   if (status != CAIRO_STATUS_SUCCESS)
-    return unwritten (part.path (), cairo_status_to_string (status));
+    return unwritten (part.name (), cairo_status_to_string (status));
   return part.publish (false);
 }
 
@@ -66,7 +66,7 @@ save_picture (const FullPicture &picture, Part &part)
   if (!coded) {
     const std::string why = error->message;
     g_error_free (error);
-    return unwritten (part.path (), why);
+    return unwritten (part.name (), why);
   }
   gpointer bytes = nullptr;
   gsize size = 0;
@@ -77,7 +77,7 @@ save_picture (const FullPicture &picture, Part &part)
   file.write (owner.get (), std::streamsize (size));
   file.close ();
   if (!file)
-    return unwritten (part.path (), g_strerror (errno));
+    return unwritten (part.name (), g_strerror (errno));
   return part.publish (false);
 }
 

@@ -293,10 +293,7 @@ Window::remember (Pane &pane, GstPad *pad, GstBuffer *frame)
   shown->stream_time = stream;
   gint bits = 0;
   g_object_get (pane.part.view, "bits", &bits, nullptr);
-  const int depth = int (GST_VIDEO_INFO_COMP_DEPTH (&*info, 0));
-  if (bits == 0)
-    bits = shown->meta ? shown->meta->bits : 0;
-  shown->bits = bits > 0 ? std::min (bits, depth) : depth;
+  shown->bits = bits_of (frame, *info, bits);
   if (pane.index == kCamera) {
     bits_ = shown->bits;
     pane.exposure.reset ();
@@ -333,7 +330,8 @@ add_window (Job &job, const std::vector<Chain> &sources,
       pad_of (job.counted, "sink").get (),
       Window::Style{find_screen ().room (), job.times.shift_to.value_or (0),
           job.command, job.command + ": " + job.source,
-          {options.keep_on, options.keep_after.value_or (5)}, job.camera,
+          {options.keep_on, options.keep_after.value_or (5), bits.value_or (0)},
+          job.camera,
           played ? std::make_unique<Player> (*std::move (played)) : nullptr});
 }
 

@@ -199,7 +199,9 @@ write (GstCaps *caps, GstEvent *tag, std::deque<BufferPtr> buffers,
 {
   Graph graph;
   /* One thread: those of the stream come first. */
-  Chain chain = graph.begin ("appsrc", {{"block", true}});
+  /* It takes all at once, for they are kept already: after an error, it would
+   * wait for ever. */
+  Chain chain = graph.begin ("appsrc", {{"max-bytes", 0}});
   auto *source = GST_APP_SRC (chain.last ());
   gst_app_src_set_caps (source, caps);
   g_object_set (source, "format", GST_FORMAT_TIME, nullptr);
@@ -231,9 +233,10 @@ publish (GstCaps *caps, GstEvent *tag, std::deque<BufferPtr> buffers,
   const std::string failed = write (
       caps, tag, std::move (buffers), recording.path (), sidecar.path ());
   Result<void> done =
-      failed.empty ()
-          ? recording.publish (false)
-          : Error{"cannot write " + name + ": " + failed, ErrorCode::io};
+      failed.empty () ? recording.publish (false)
+                      : Error{"cannot write " + name + ": " + failed +
+                                  " Free space on the disk, and press K again",
+                            ErrorCode::io};
   if (done)
     done = sidecar.publish (false);
   if (done)

@@ -114,7 +114,7 @@ if __name__ == "__main__":
     main()
 )py";
 
-/* As a Python literal; names have no line break. */
+/* As a Python literal. */
 std::string
 in_python (const std::string &text)
 {
@@ -122,7 +122,7 @@ in_python (const std::string &text)
   for (const char c : text) {
     if (c == '"' || c == '\\')
       literal += '\\';
-    literal += c;
+    literal += c == '\n' ? "\\n" : std::string (1, c);
   }
   return literal + "\"";
 }

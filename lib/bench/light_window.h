@@ -13,6 +13,9 @@ struct LightOverTime {
   double flicker_depth = 0.0;  ///< amplitude / mean
   double phase = 0.0;          ///< at time 0, radians
   double drift = 0.0;          ///< 1/s
+  /** Of a lamp that is dimmed by switching it: pulses/s, and the part of the
+   * time in which it is on. 0: it is not. */
+  double pulse_rate = 0.0, pulse_duty = 0.5;
 };
 
 /**
@@ -38,11 +41,14 @@ private:
   double light_to (double x) const;
   double area_to (double x) const;
   double area_before (double x) const;
+  double pulsed_to (double x) const;
+  double pulsed_area_to (double x) const;
 
   Nanoseconds begin_;
   double length_, transition_; // s
   double level_, slope_;       // at begin_; 1/s
   double depth_, omega_, phase_;
+  double pulse_rate_, pulse_duty_, pulses_; // begun at begin_
   double whole_ = 0.0, area_ = 0.0;
 };
 

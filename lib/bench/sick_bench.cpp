@@ -81,12 +81,12 @@ SickBench::make (const SickBenchOptions &options)
 }
 
 SickBench::SickBench (const SickBenchOptions &options, Mapping mapping)
-    : options_ (options), mapping_ (std::move (mapping))
+    : options_ (options), mapping_ (std::move (mapping)), processing_ (options)
 {
   constexpr double kMinute = 60.0;
   light_over_time_ = {options.flicker_rate, options.flicker_depth,
       2.0 * std::numbers::pi * draw (options, kPhase, 0),
-      options.drift / kMinute};
+      options.drift / kMinute, options.pulse_rate, options.pulse_duty};
   find_view ();
   draw_defects ();
   fill_profile ();
@@ -149,6 +149,40 @@ SickBench::draw_defects ()
     truth_.stuck_off.push_back (mirror ());
   for (int i = 0; i < options_.dust; i++)
     truth_.dust.push_back (place ());
+  draw_groups (place);
+}
+
+/* Defects of rows and blocks of 16x16. */
+template <typename Place>
+void
+SickBench::draw_groups (Place place)
+{
+  constexpr int kBlock = 16;
+  const auto add = [] (std::vector<Offset> &to, int x, int y, int width,
+                       int height) {
+    for (int v = y; v < y + height; v++)
+      for (int u = x; u < x + width; u++)
+        to.push_back ({u, v});
+  };
+  const auto mirror = [&] {
+    const Offset pixel = place ();
+    const Position at = mapping_.mirror_at (pixel.x, pixel.y);
+    return Offset{int (std::lround (at.x)), int (std::lround (at.y))};
+  };
+  const Extent camera = options_.camera;
+  for (int i = 0; i < options_.dead_rows; i++)
+    add (truth_.dead, 0, place ().y, camera.width, 1);
+  for (int i = 0; i < options_.dead_blocks; i++) {
+    const Offset at = place ();
+    add (truth_.dead, std::min (at.x, camera.width - kBlock),
+        std::min (at.y, camera.height - kBlock), kBlock, kBlock);
+  }
+  for (int i = 0; i < options_.stuck_rows; i++)
+    add (truth_.stuck_off, 0, mirror ().y, options_.mirrors.width, 1);
+  for (int i = 0; i < options_.stuck_blocks; i++) {
+    const Offset at = mirror ();
+    add (truth_.stuck_off, at.x, at.y, kBlock, kBlock);
+  }
 }
 
 void
@@ -200,6 +234,8 @@ Nanoseconds
 SickBench::exposed_time () const
 {
   const Nanoseconds whole = options_.rate.period () - options_.readout;
+  if (options_.auto_exposure > 0.0)
+    return Nanoseconds (double (longest ()) * processing_.exposure ());
   const Nanoseconds asked =
       exposure_ ? std::min (*exposure_, whole) : longest ();
   if (exposure_ && options_.ends_early && longest () > whole)
@@ -421,9 +457,9 @@ SickBench::add_light (const Shot &shot, const LightWindow &window,
   }
 }
 
-/** Sets light_ to that of an exposure. */
+/** Sets rows of light_ to those of an exposure. */
 void
-SickBench::collect (const Shot &shot)
+SickBench::collect_rows (const Shot &shot, const Rows &rows)
 {
   const LightWindow window (
       light_over_time_, shot.begin, shot.end, options_.switching);
@@ -436,14 +472,35 @@ SickBench::collect (const Shot &shot)
   for (const auto &[mask, light] : passed.pictures)
     dark -= light;
   const float on = float (passed.on / unit), off = float (dark / unit);
-  for (int y = 0; y < light_.height (); y++) {
+  for (int y = rows.begin; y < rows.end; y++) {
     float *light = light_.view ().row (y);
     const float *a = on_.view ().row (y), *b = off_.view ().row (y);
     for (int x = 0; x < light_.width (); x++)
       light[x] = on * a[x] + off * b[x];
   }
   if (!passed.pictures.empty ())
-    add_pictures (passed, unit);
+    add_pictures (passed, unit, rows);
+}
+
+/** Sets light_ to that of an exposure. */
+void
+SickBench::collect (const Shot &shot)
+{
+  const int height = light_.height ();
+  const int bands = options_.rolling > 0 ? std::min (height, 16) : 1;
+  for (int i = 0; i < bands; i++) {
+    const Nanoseconds late = options_.rolling * i / std::max (1, bands - 1);
+    Shot band = shot;
+    band.begin += late;
+    band.end += late;
+    collect_rows (band, {height * i / bands, height * (i + 1) / bands});
+  }
+  if (options_.texture > 0.0)
+    look_at_target (options_, 1e-9 * double (shot.begin), light_.view ());
+  if (options_.colour)
+    filter_colours (light_.view ());
+  const double unit =
+      1e-9 * double (options_.rate.period () - options_.readout);
   const float exposed = float (1e-9 * double (shot.end - shot.begin) / unit);
   for (const HotPixel &hot : hot_)
     light_.at (hot.at.x, hot.at.y) += hot.light * exposed;
@@ -467,7 +524,7 @@ SickBench::picture_of (const MirrorProgram::Mask &mask)
 
 /** One picture in place of those of many masks. */
 void
-SickBench::add_sum (const Passed &passed, double unit)
+SickBench::add_sum (const Passed &passed, double unit, const Rows &rows)
 {
   Image<float> sum (view_.width, view_.height);
   float all = 0.0f;
@@ -481,14 +538,15 @@ SickBench::add_sum (const Passed &passed, double unit)
   }
   Image<float> seen;
   look (sum, seen);
-  add_picture (seen, all, 1.0f);
+  add_picture (seen, all, 1.0f, rows);
 }
 
 /** Adds @p light that leaks, and @p part of what is @p seen. */
 void
-SickBench::add_picture (const Image<float> &seen, float light, float part)
+SickBench::add_picture (
+    const Image<float> &seen, float light, float part, const Rows &rows)
 {
-  for (int y = 0; y < light_.height (); y++) {
+  for (int y = rows.begin; y < rows.end; y++) {
     float *out = light_.view ().row (y);
     const float *leaked = leaked_.view ().row (y);
     const float *field = field_.view ().row (y);
@@ -499,13 +557,13 @@ SickBench::add_picture (const Image<float> &seen, float light, float part)
 }
 
 void
-SickBench::add_pictures (const Passed &passed, double unit)
+SickBench::add_pictures (const Passed &passed, double unit, const Rows &rows)
 {
   if (passed.pictures.size () > kPictures / 2)
-    return add_sum (passed, unit);
+    return add_sum (passed, unit, rows);
   for (const auto &[mask, light] : passed.pictures) {
     const float part = float (light / unit);
-    add_picture (picture_of (mask), part, part);
+    add_picture (picture_of (mask), part, part, rows);
   }
 }
 
@@ -513,26 +571,19 @@ void
 SickBench::read_out (const Shot &shot, ImageView<std::uint16_t> picture)
 {
   const int largest = largest_pixel (options_.bits);
+  const double clamped = options_.black_clamp > 0.0
+                             ? options_.black_clamp * largest *
+                                   mean_of (std::as_const (light_).view ())
+                             : 0.0;
   const Sensor sensor{.full_well = options_.full_well,
       .read_noise = options_.read_noise,
-      .gain = (largest - options_.black_level) / largest,
-      .black_level = options_.black_level,
+      .gain = processing_.gain () * (largest - options_.black_level) / largest,
+      .black_level = options_.black_level - clamped,
       .bits = options_.bits,
       .seed = options_.seed,
       .bow = options_.nonlinear};
   sensor.read_out<std::uint16_t> (light_.view (), 1.0, shot.number, picture);
-  std::vector<std::uint16_t> table;
-  if (options_.gamma != 1.0)
-    for (int value = 0; value <= largest; value++)
-      table.push_back (std::uint16_t (std::lround (
-          largest * std::pow (double (value) / largest, options_.gamma))));
-  const auto kept = std::uint16_t (~0u << options_.missing_bits);
-  if (table.empty () && options_.missing_bits == 0)
-    return;
-  each_pixel (options_.camera, [&] (int x, int y) {
-    std::uint16_t &pixel = picture.at (x, y);
-    pixel = kept & (table.empty () ? pixel : table[pixel]);
-  });
+  processing_.apply (picture);
 }
 
 void

@@ -14,6 +14,7 @@
 #include "base/result.h"
 #include "bench/lens.h"
 #include "bench/light_window.h"
+#include "bench/processing.h"
 #include "bench/sick_options.h"
 #include "mapping/mapping.h"
 #include "setup/bench_profile.h"
@@ -105,6 +106,8 @@ private:
   SickBench (const SickBenchOptions &options, Mapping mapping);
   void find_view ();
   void draw_defects ();
+  template <typename Place>
+  void draw_groups (Place place);
   void fill_profile ();
   void measure_field ();
   float passed_by (int x, int y, const std::vector<float> &dust) const;
@@ -116,11 +119,17 @@ private:
   const Shot &exposed_for (const Shot &shot) const;
   void add_light (const Shot &shot, const LightWindow &window,
       const Shown &shown, Passed &passed) const;
+  /** Rows of the frame that are exposed together. */
+  struct Rows {
+    int begin = 0, end = 0;
+  };
   void collect (const Shot &shot);
+  void collect_rows (const Shot &shot, const Rows &rows);
   const Image<float> &picture_of (const MirrorProgram::Mask &mask);
-  void add_picture (const Image<float> &seen, float light, float part);
-  void add_sum (const Passed &passed, double unit);
-  void add_pictures (const Passed &passed, double unit);
+  void add_picture (
+      const Image<float> &seen, float light, float part, const Rows &rows);
+  void add_sum (const Passed &passed, double unit, const Rows &rows);
+  void add_pictures (const Passed &passed, double unit, const Rows &rows);
   void read_out (const Shot &shot, ImageView<std::uint16_t> picture);
 
   Image<float> mirrors_of (const MirrorProgram::Mask &mask) const;
@@ -132,6 +141,7 @@ private:
   Rect view_; // mirrors that the camera may see
   std::unique_ptr<Lens> lens_;
   LightOverTime light_over_time_;
+  Processing processing_;
 
   std::deque<Shown> shown_;   // the last ones, in their order
   std::size_t at_ = 0;        // the one that triggers next

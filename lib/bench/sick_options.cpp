@@ -71,17 +71,50 @@ words_of_parts ()
       {"firmware", "VERSION", "3.0.0", "firmware that is too old", {}, nothing},
       {"camera-missing", "", "", "no camera answers", {}, nothing},
       {"test-image", "", "", "the camera sends a test picture", {}, nothing},
-      {"rolling-shutter", "", "", "the sensor exposes line by line", {},
-          nothing},
-      {"colour", "", "", "the sensor has a colour filter", {}, nothing},
+      {"mute", "", "", "no feature tells how the camera is set", {}, nothing},
+      {"rolling-shutter", "TIME", "8ms",
+          "rows are exposed one after the other, for so long in all", {kTime},
+          [] (Bench &b, const Values &v) { b.rolling = ns (v[0]); }},
+      {"colour", "", "", "the sensor has a colour filter", {},
+          [] (Bench &b, const Values &) { b.colour = true; }},
       {"gamma", "GAMMA", "0.45", "pixel values are a power of the light",
           {{Range::Kind::real, 0.1, 4.0}},
           [] (Bench &b, const Values &v) { b.gamma = v[0]; }},
-      {"auto-exposure", "", "", "ExposureAuto is on", {}, nothing},
-      {"auto-gain", "", "", "GainAuto is on", {}, nothing},
-      {"black-clamp", "", "", "the camera moves its black level", {}, nothing},
-      {"lut", "", "", "a look-up table changes pixel values", {}, nothing},
-      {"binning", "", "", "pixels are joined, 2 by 2", {}, nothing},
+      {"auto-exposure", "LEVEL", "0.4", "the exposure keeps that mean level",
+          {kPart}, [] (Bench &b, const Values &v) { b.auto_exposure = v[0]; }},
+      {"auto-gain", "LEVEL", "0.4", "the gain keeps that mean level", {kPart},
+          [] (Bench &b, const Values &v) { b.auto_gain = v[0]; }},
+      {"black-clamp", "PART", "0.03",
+          "the black level falls by that part of the mean light", {kPart},
+          [] (Bench &b, const Values &v) { b.black_clamp = v[0]; }},
+      {"lut", "", "", "a look-up table changes pixel values", {},
+          [] (Bench &b, const Values &) { b.lut = true; }},
+      {"noise-reduction", "PART", "0.5", "pixels get part of a mean of 3x3",
+          {kPart},
+          [] (Bench &b, const Values &v) { b.noise_reduction = v[0]; }},
+      {"sharpening", "PART", "0.5", "differences from a mean of 3x3 grow",
+          {{Range::Kind::real, 0.0, 4.0}},
+          [] (Bench &b, const Values &v) { b.sharpening = v[0]; }},
+      {"dark-subtraction", "", "", "a dark frame is taken from each frame", {},
+          [] (Bench &b, const Values &) { b.dark_subtraction = true; }},
+      {"low-bits", "BITS", "12", "16 bits are sent, the lowest are used",
+          {{Range::Kind::whole, 8.0, 15.0}},
+          [] (Bench &b, const Values &v) {
+            b.low_bits = int (v[0]);
+            b.bits = 16;
+          }},
+      {"high-bits", "BITS", "12", "16 bits are sent, the highest are used",
+          {{Range::Kind::whole, 8.0, 15.0}},
+          [] (Bench &b, const Values &v) {
+            b.missing_bits = 16 - int (v[0]);
+            b.bits = 16;
+          }},
+      {"binning", "", "", "pixels are joined, 2 by 2", {},
+          [] (Bench &b, const Values &) {
+            b.alignment.scale *= 0.5;
+            b.mirrors.width *= 2;
+            b.mirrors.height *= 2;
+          }},
       {"roi", "", "", "a part of the sensor is read", {}, nothing},
       {"pixel-format", "", "", "fewer bits are sent than the sensor has", {},
           nothing},
@@ -106,6 +139,8 @@ words_of_trigger ()
             b.free_rate = v[0];
           }},
       {"half-rate", "", "", "every other trigger is ignored", {},
+          [] (Bench &b, const Values &) { b.trigger = T::half_rate; }},
+      {"rate-limit", "", "", "the camera's own rate ignores early triggers", {},
           [] (Bench &b, const Values &) { b.trigger = T::half_rate; }},
       {"double-rate", "", "", "two frames come for each trigger", {},
           [] (Bench &b, const Values &) { b.trigger = T::double_rate; }},
@@ -157,6 +192,21 @@ words_of_light ()
       {"drift", "PART", "0.1", "change of the light in a minute",
           {{Range::Kind::real, -1.0, 1.0}},
           [] (Bench &b, const Values &v) { b.drift = v[0]; }},
+      {"pulsed", "HZ:PART", "1000:0.5", "the lamp is on for part of each pulse",
+          {{Range::Kind::real, 1.0, 1e6}, {Range::Kind::real, 0.001, 1.0}},
+          [] (Bench &b, const Values &v) {
+            b.pulse_rate = v[0];
+            b.pulse_duty = v[1];
+          }},
+      {"texture", "PART", "0.2", "the target is not uniform, rms",
+          {{Range::Kind::real, 0.0, 0.5}},
+          [] (Bench &b, const Values &v) { b.texture = v[0]; }},
+      {"moving", "SPEED", "5", "a target with texture moves, pixels/s",
+          {{Range::Kind::real, -1e4, 1e4}},
+          [] (Bench &b, const Values &v) {
+            b.moving = v[0];
+            b.texture = std::max (b.texture, 0.05);
+          }},
   };
 }
 
@@ -182,6 +232,10 @@ words_of_sensor ()
       {"missing-bits", "N", "2", "lowest bits that are always 0",
           {{Range::Kind::whole, 0.0, 8.0}},
           [] (Bench &b, const Values &v) { b.missing_bits = int (v[0]); }},
+      {"dead-rows", "N", "2", "rows of pixels that see nothing", {kCount},
+          [] (Bench &b, const Values &v) { b.dead_rows = int (v[0]); }},
+      {"dead-blocks", "N", "1", "16x16 pixels that see nothing", {kCount},
+          [] (Bench &b, const Values &v) { b.dead_blocks = int (v[0]); }},
       {"full-well", "ELECTRONS", "10000", "electrons at saturation",
           {{Range::Kind::real, 1.0, 1e7}},
           [] (Bench &b, const Values &v) { b.full_well = v[0]; }},
@@ -207,6 +261,10 @@ words_of_mirrors ()
           [] (Bench &b, const Values &v) { b.stuck_on = int (v[0]); }},
       {"stuck-off", "N", "20", "mirrors that stay off", {kCount},
           [] (Bench &b, const Values &v) { b.stuck_off = int (v[0]); }},
+      {"stuck-rows", "N", "2", "rows of mirrors that stay off", {kCount},
+          [] (Bench &b, const Values &v) { b.stuck_rows = int (v[0]); }},
+      {"stuck-blocks", "N", "1", "16x16 mirrors that stay off", {kCount},
+          [] (Bench &b, const Values &v) { b.stuck_blocks = int (v[0]); }},
       {"flipped-x", "", "", "the picture is mirrored, left to right", {},
           [] (Bench &b, const Values &) { b.orientation.flipped_x = true; }},
       {"flipped-y", "", "", "the picture is mirrored, top to bottom", {},

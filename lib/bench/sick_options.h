@@ -55,6 +55,10 @@ struct SickBenchOptions {
   double vignetting = 0.0;
   double flicker_rate = 100.0, flicker_depth = 0.0; ///< Hz, amplitude / mean
   double drift = 0.0;                               ///< part of it, per minute
+  /** Of a lamp that is dimmed by switching it: pulses/s, part of the time. */
+  double pulse_rate = 0.0, pulse_duty = 0.5;
+  /** Of the target: how much its brightness varies, and its speed, pixels/s. */
+  double texture = 0.0, moving = 0.0;
 
   /* Sensor. */
   double full_well = 10'000.0; ///< electrons at the largest DN
@@ -64,11 +68,21 @@ struct SickBenchOptions {
   double gamma = 1.0;
   double prnu = 0.01; ///< rms difference of the pixels' sensitivity
   int hot_pixels = 0, dead_pixels = 0, missing_bits = 0;
+  int dead_rows = 0, dead_blocks = 0; ///< of pixels; a block has 16x16
+
+  /* What the camera does by itself. */
+  Nanoseconds rolling = 0; ///< from the exposure of the first row to the last
+  double auto_exposure = 0.0, auto_gain = 0.0; ///< mean that it keeps; 0: none
+  double black_clamp = 0.0; ///< part of the mean light that black falls by
+  double noise_reduction = 0.0, sharpening = 0.0; ///< part of a mean of 3x3
+  bool colour = false, lut = false, dark_subtraction = false;
+  int low_bits = 0; ///< of 16 that have the values; 0: all
 
   /* Mirrors. */
   double leak = 0.002;
   Nanoseconds switching = 3'000; ///< time of a linear transition
   int stuck_on = 0, stuck_off = 0;
+  int stuck_rows = 0, stuck_blocks = 0; ///< off; a block has 16x16 mirrors
   Orientation orientation = {};
 
   /* Optics. */

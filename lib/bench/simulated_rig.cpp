@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <random>
 
 #include "base/text.h"
@@ -23,9 +24,9 @@ constexpr Nanoseconds kStart = 60'000'000;   // of masks that are there
 constexpr Nanoseconds kTransfer = 8'000'000; // of a frame
 constexpr Nanoseconds kMicrosecond = 1000;
 constexpr int kInFlight = 2;
-/* The camera's clock is not that of the machine. */
+/* The camera's clock is not that of the machine; rms of its error. */
 constexpr Nanoseconds kEpoch = 5'000'000'000'000;
-constexpr double kClockError = 12e-6;
+constexpr double kClockError = 25e-6;
 constexpr double kPacketBytes = 1444;
 
 std::uint64_t
@@ -43,13 +44,27 @@ fraction (std::uint64_t seed, std::uint64_t number)
   return double (mixed (seed, number) >> 11) * 0x1p-53;
 }
 
+std::string
+pixel_format_of (const SickBenchOptions &options)
+{
+  return options.bits > 12 ? "Mono16" : options.bits > 8 ? "Mono12" : "Mono8";
+}
+
+/** A number of normal distribution, by @p seed. */
+double
+normal (std::uint64_t seed)
+{
+  return std::sqrt (-2.0 * std::log (fraction (seed, 1) + 0x1p-54)) *
+         std::cos (2.0 * std::numbers::pi * fraction (seed, 2));
+}
+
 RigParts
 parts_of (const SickBenchOptions &options)
 {
   RigParts parts;
   parts.camera = {"Codedexposure", "Simulated", "SIM1", options.camera};
   parts.bits = options.bits;
-  parts.pixel_format = options.bits > 8 ? "Mono12" : "Mono8";
+  parts.pixel_format = pixel_format_of (options);
   parts.dmd = *board_info (*find_board ("dlp6500"), {});
   parts.dmd.name = "sim:bench";
   parts.dmd.size = options.mirrors;
@@ -84,6 +99,10 @@ camera_features (const SickBenchOptions &o)
                           const char *well) {
     return std::string (o.has (fault) ? ill : well);
   };
+  if (o.has ("mute"))
+    return {{"Width", std::to_string (o.camera.width)},
+        {"Height", std::to_string (o.camera.height)},
+        {"PixelFormat", pixel_format_of (o)}, {"DeviceSerialNumber", "SIM1"}};
   const int whole = o.has ("roi") ? 2 : 1;
   const bool deep = o.bits > 8 || o.has ("pixel-format");
   return {
@@ -92,6 +111,10 @@ camera_features (const SickBenchOptions &o)
       {"TestPattern", choose ("test-image", "GreyHorizontalRamp", "Off")},
       {"GammaEnable", choose ("gamma", "true", "false")},
       {"Gamma", o.has ("gamma") ? o.parts.at ("gamma") : "1"},
+      {"SharpeningEnable", choose ("sharpening", "true", "false")},
+      {"NoiseReductionEnable", choose ("noise-reduction", "true", "false")},
+      {"AcquisitionFrameRateEnable", choose ("rate-limit", "true", "false")},
+      {"AcquisitionFrameRate", choose ("rate-limit", "20", "1000")},
       {"ExposureAuto", choose ("auto-exposure", "Continuous", "Off")},
       {"GainAuto", choose ("auto-gain", "Continuous", "Off")},
       {"BlackLevelAuto", choose ("black-clamp", "Continuous", "Off")},
@@ -104,7 +127,7 @@ camera_features (const SickBenchOptions &o)
       {"Height", std::to_string (o.camera.height)},
       {"WidthMax", std::to_string (whole * o.camera.width)},
       {"HeightMax", std::to_string (whole * o.camera.height)},
-      {"PixelFormat", o.bits > 8 ? "Mono12" : "Mono8"},
+      {"PixelFormat", pixel_format_of (o)},
       {"PixelFormat.available", deep ? "Mono8 Mono12" : "Mono8"},
       {"GevSCPSPacketSize", choose ("packet-size", "576", "1500")},
       {"DeviceSerialNumber", "SIM1"}};
@@ -131,7 +154,8 @@ SimulatedRig::make (const SickBenchOptions &options)
 
 SimulatedRig::SimulatedRig (SickBench bench)
     : bench_ (std::move (bench)), options_ (bench_.truth ().options),
-      parts_ (parts_of (options_))
+      parts_ (parts_of (options_)),
+      clock_error_ (kClockError * normal (options_.seed))
 {
 }
 
@@ -258,7 +282,7 @@ Nanoseconds
 SimulatedRig::stamp_of (const Shot &shot) const
 {
   /* A camera stamps in ticks, here of 1 us. */
-  const double since = double (shot.begin) * (1.0 + kClockError);
+  const double since = double (shot.begin) * (1.0 + clock_error_);
   return kEpoch + Nanoseconds (since) / kMicrosecond * kMicrosecond;
 }
 

@@ -61,6 +61,7 @@ private:
   SickBench bench_;
   const SickBenchOptions options_;
   RigParts parts_;
+  double clock_error_; // of the camera, relative
   Nanoseconds now_ = 0;
   bool shows_ = false;
   std::deque<Shot> on_their_way_;

@@ -1,0 +1,164 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "bench/processing.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "base/pixels.h"
+#include "base/statistics.h"
+#include "bench/random.h"
+
+namespace codedexposure
+{
+
+namespace
+{
+
+using std::numbers::pi;
+
+/** In -1..1, of a point of a grid. */
+double
+drawn_at (std::uint64_t seed, std::int64_t x, std::int64_t y)
+{
+  const Philox::Words words = Philox::draw (
+      {std::uint32_t (x), std::uint32_t (y), std::uint32_t (x >> 32), 0x7E27},
+      {std::uint32_t (seed), std::uint32_t (seed >> 32)});
+  return (words[0] + 0.5) * 0x1p-31 - 1.0;
+}
+
+std::vector<std::uint16_t>
+table_of (const SickBenchOptions &o, int largest)
+{
+  std::vector<std::uint16_t> table;
+  if (o.gamma == 1.0 && !o.lut)
+    return table;
+  for (int value = 0; value <= largest; value++) {
+    double part = std::pow (double (value) / largest, o.gamma);
+    if (o.lut) // more contrast in the middle
+      part -= 0.08 * std::sin (2.0 * pi * part);
+    table.push_back (std::uint16_t (std::lround (largest * part)));
+  }
+  return table;
+}
+
+} // namespace
+
+void
+look_at_target (
+    const SickBenchOptions &options, double seconds, ImageView<float> light)
+{
+  constexpr double kBlob = 8.0; // pixels between points of the grid
+  /* Of numbers in -1..1, between which is interpolated. */
+  const double rms = 2.0 / 3.0 / std::sqrt (3.0);
+  const double shift = options.moving * seconds;
+  for (int y = 0; y < light.height; y++) {
+    const double v = y / kBlob;
+    const auto row = std::int64_t (std::floor (v));
+    const double below = v - double (row);
+    for (int x = 0; x < light.width; x++) {
+      const double u = (x - shift) / kBlob;
+      const auto column = std::int64_t (std::floor (u));
+      const double right = u - double (column);
+      const auto at = [&] (int dx, int dy) {
+        return drawn_at (options.seed, column + dx, row + dy);
+      };
+      const double blob =
+          (1 - below) * ((1 - right) * at (0, 0) + right * at (1, 0)) +
+          below * ((1 - right) * at (0, 1) + right * at (1, 1));
+      light.at (x, y) *=
+          float (std::max (0.0, 1.0 + options.texture * blob / rms));
+    }
+  }
+}
+
+void
+filter_colours (ImageView<float> light)
+{
+  constexpr float kColours[2][2] = {{0.55f, 1.0f}, {1.0f, 0.4f}};
+  for (int y = 0; y < light.height; y++)
+    for (int x = 0; x < light.width; x++)
+      light.at (x, y) *= kColours[y % 2][x % 2];
+}
+
+Processing::Processing (const SickBenchOptions &options)
+    : options_ (options), largest_ (largest_pixel (options.bits)),
+      table_ (table_of (options, largest_))
+{
+}
+
+/* The next frames get nearer to the mean that is to be kept. */
+void
+Processing::follow (ImageView<std::uint16_t> picture)
+{
+  const double mean = (mean_of (ImageView<const std::uint16_t> (picture)) -
+                          options_.black_level) /
+                      largest_;
+  const auto factor = [mean] (double wanted) {
+    return std::sqrt (std::clamp (wanted / std::max (mean, 1e-3), 0.5, 2.0));
+  };
+  if (options_.auto_gain > 0.0)
+    gain_ = std::clamp (gain_ * factor (options_.auto_gain), 0.25, 16.0);
+  if (options_.auto_exposure > 0.0)
+    exposure_ =
+        std::clamp (exposure_ * factor (options_.auto_exposure), 0.01, 1.0);
+}
+
+/* A dark frame without noise; what would be negative becomes 0. */
+void
+Processing::subtract_dark (ImageView<std::uint16_t> picture) const
+{
+  const int black = int (std::lround (options_.black_level));
+  for (int y = 0; y < picture.height; y++)
+    for (int x = 0; x < picture.width; x++)
+      picture.at (x, y) =
+          std::uint16_t (std::max (int (picture.at (x, y)) - black, 0));
+}
+
+/* @part of the mean of 3x3 pixels, and the rest of the pixel itself. */
+void
+Processing::mix (ImageView<std::uint16_t> picture, double part) const
+{
+  Image<std::uint16_t> old (picture.width, picture.height);
+  each_pixel (old, [&] (int x, int y) { old.at (x, y) = picture.at (x, y); });
+  each_pixel (old, [&] (int x, int y) {
+    int sum = 0;
+    for (int dy = -1; dy <= 1; dy++)
+      for (int dx = -1; dx <= 1; dx++)
+        sum += old.at (std::clamp (x + dx, 0, picture.width - 1),
+            std::clamp (y + dy, 0, picture.height - 1));
+    const double mixed = part * sum / 9.0 + (1.0 - part) * old.at (x, y);
+    picture.at (x, y) =
+        std::uint16_t (std::clamp<long> (std::lround (mixed), 0, largest_));
+  });
+}
+
+void
+Processing::apply (ImageView<std::uint16_t> picture)
+{
+  const SickBenchOptions &o = options_;
+  if (o.has ("test-image"))
+    for (int y = 0; y < picture.height; y++)
+      for (int x = 0; x < picture.width; x++)
+        picture.at (x, y) = std::uint16_t (x * largest_ / picture.width);
+  if (o.dark_subtraction)
+    subtract_dark (picture);
+  if (o.noise_reduction > 0.0)
+    mix (picture, o.noise_reduction);
+  if (o.sharpening > 0.0)
+    mix (picture, -o.sharpening);
+  if (o.auto_gain > 0.0 || o.auto_exposure > 0.0)
+    follow (picture);
+  const int shift = o.low_bits > 0 ? o.bits - o.low_bits : 0;
+  const auto kept = std::uint16_t (~0u << o.missing_bits);
+  if (table_.empty () && o.missing_bits == 0 && shift == 0)
+    return;
+  for (int y = 0; y < picture.height; y++)
+    for (int x = 0; x < picture.width; x++) {
+      std::uint16_t &pixel = picture.at (x, y);
+      pixel = std::uint16_t (
+          (kept & (table_.empty () ? pixel : table_[pixel])) >> shift);
+    }
+}
+
+} // namespace codedexposure

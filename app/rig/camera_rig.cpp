@@ -45,7 +45,9 @@ constexpr const char *kFeatures[] = {"DeviceVendorName", "DeviceModelName",
     "DecimationVertical", "Width", "Height", "WidthMax", "HeightMax", "OffsetX",
     "OffsetY", "TriggerMode", "TriggerSource", "TriggerActivation",
     "TriggerDelay", "DeviceLinkThroughputLimitMode",
-    "DeviceLinkThroughputLimit", "GevSCPSPacketSize"};
+    "DeviceLinkThroughputLimit", "GevSCPSPacketSize", "SharpeningEnable",
+    "NoiseReductionEnable", "BslSharpnessEnhancement", "BslNoiseReduction",
+    "AcquisitionFrameRateEnable", "AcquisitionFrameRate"};
 
 Error
 stopped ()

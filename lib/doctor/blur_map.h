@@ -35,9 +35,8 @@ struct GratingStack {
  * @p good: pixels that count. @p magnification: pixels a mirror. @p mapping: of
  * the pixels; null: not known, which costs accuracy where the blur is small.
  */
-BlurMap map_blur (const GratingStack &stack,
-    ImageView<const std::uint8_t> good, double magnification,
-    const Mapping *mapping);
+BlurMap map_blur (const GratingStack &stack, ImageView<const std::uint8_t> good,
+    double magnification, const Mapping *mapping);
 
 /** A plane of sharp focus that is tilted against the camera's. */
 struct FocusTilt {

@@ -22,6 +22,12 @@ constexpr double kDiffers = 0.12;
 constexpr double kDead = 0.1;
 /* Light of a stuck mirror, in mirrors; more is dust. */
 constexpr double kMirrorMin = 0.3, kMirrorMax = 2.6;
+/* A line has at most so many mirrors across, and so many times that along; a
+ * block fills that part of a rectangle, where dust would fill 0.79. */
+constexpr double kLine = 3.0, kLong = 8.0, kFilled = 0.88;
+constexpr double kThick = 6.0; // of a block, mirrors
+/* Part of the pixels without light where no lens blurs the border. */
+constexpr double kSharp = 0.9;
 /* Pixels of a spot that mirrors make, in mirrors. */
 constexpr double kSpot = 30.0;
 
@@ -132,6 +138,8 @@ private:
   void find_dim ();
   void add_dim (const Group &group);
   DefectSpot spot_of (const Group &group) const;
+  enum class Shape { pixels, mirrors, other };
+  Shape shape_of (const Group &group) const;
   void know (const Group &group, int margin);
   const Image<float> &off_, &on_;
   Image<float> light_, dark_, field_;
@@ -199,6 +207,41 @@ Search::find_bright ()
   }
 }
 
+/** Lines and blocks along the axes do not come from dust: those with sharp
+ * borders are of pixels, those that the lens blurs are of mirrors. */
+Search::Shape
+Search::shape_of (const Group &group) const
+{
+  int left = off_.width (), top = off_.height (), right = 0, bottom = 0;
+  int dark = 0, darkest = 0;
+  double part_of_dark = 0.0;
+  for (const Offset &at : group.pixels) {
+    const double part = double (part_.at (at.x, at.y));
+    darkest += part > 1.0 - kDead;
+    if (part < 0.5)
+      continue;
+    dark++;
+    part_of_dark += part;
+    left = std::min (left, at.x);
+    right = std::max (right, at.x + 1);
+    top = std::min (top, at.y);
+    bottom = std::max (bottom, at.y + 1);
+  }
+  const int width = right - left, height = bottom - top;
+  const double mirror = std::sqrt (mirror_);
+  const double thick = std::min (width, height),
+               length = std::max (width, height);
+  const bool line = thick <= kLine * mirror && length >= kLong * thick;
+  const bool block = thick >= kThick * mirror &&
+                     dark > kFilled * width * height &&
+                     part_of_dark > kFilled * dark;
+  /* A block at the border may be where no mirrors are. */
+  if (!line && (!block || group.at_border))
+    return Shape::other;
+  return darkest > kSharp * double (group.pixels.size ()) ? Shape::pixels
+                                                          : Shape::mirrors;
+}
+
 void
 Search::add_dim (const Group &group)
 {
@@ -211,6 +254,14 @@ Search::add_dim (const Group &group)
     return;
   }
   const DefectSpot spot = spot_of (group);
+  if (const Shape shape = shape_of (group); shape != Shape::other) {
+    if (shape == Shape::pixels)
+      found_.dead.insert (
+          found_.dead.end (), group.pixels.begin (), group.pixels.end ());
+    else
+      found_.stuck_off.push_back (spot);
+    return;
+  }
   if (group.at_border && spot.light > kMirrorMax * mirror_) {
     for (const Offset &at : group.pixels)
       if (double (part_.at (at.x, at.y)) > 0.5)

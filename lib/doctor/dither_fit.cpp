@@ -26,7 +26,7 @@ constexpr double kMostSpread = 0.2; // DN
 constexpr double kLightError = 0.01;
 /* What is left of errors of the model: DN of the black level, and part of the
  * shot noise of half a DN. */
-constexpr double kBlackError = 0.003, kShotError = 0.01;
+constexpr double kBlackError = 0.001, kShotError = 0.008;
 
 /* What is fitted; then the factor of light of each look. */
 enum Number : Eigen::Index {

@@ -10,6 +10,8 @@
 #include "base/try.h"
 #include "doctor/checks.h"
 #include "doctor/field.h"
+#include "doctor/picture.h"
+#include "doctor/pulses.h"
 #include "doctor/stack.h"
 
 namespace codedexposure
@@ -21,12 +23,15 @@ namespace
 constexpr int kFrames = 12, kFewFrames = 6;
 /* Part of the pixels that are not above the level. */
 constexpr double kPeak = 0.995;
-/* Of the light to which an amplitude is related. */
-constexpr double kGainError = 0.01;
+/* Errors of an amplitude: of the light to which it is related, and of the means
+ * of frames, as a part of the light. */
+constexpr double kGainError = 0.003, kMeanError = 1e-4;
+/* Depth and frequency, Hz, that no ripple of a supply has. */
+constexpr double kPulses = 0.4, kFast = 400;
 /* Frames that beat with the light more slowly, Hz, seem to be in step. */
 constexpr double kSlowBeat = 0.02;
 /* The clock of a camera is that wrong, relative. */
-constexpr double kClockError = 5e-5;
+constexpr double kClockError = 2.5e-5;
 
 class LightCheck
 {
@@ -41,6 +46,7 @@ public:
 private:
   bool judge_level (const Stack &all, const Stack &dark);
   void judge_time ();
+  Result<Verdict> judge_pulses ();
   void judge_flicker (const LightFit &fit);
   Result<void> judge_field (const Stack &all, const Stack &dark);
 
@@ -91,7 +97,7 @@ LightCheck::judge_flicker (const LightFit &fit)
   const Measured frequency{
       ticks.value, std::hypot (ticks.sigma, kClockError * ticks.value)};
   const Measured depth{
-      seen.value, std::hypot (seen.sigma, kGainError * seen.value)};
+      seen.value, std::hypot (seen.sigma, kGainError * seen.value, kMeanError)};
   const auto &exposure = examination_.profile.exposure;
   const double seconds = exposure ? 1e-9 * exposure->value : parts_.period ();
   const double turn = std::numbers::pi * frequency.value * seconds;
@@ -108,7 +114,12 @@ LightCheck::judge_flicker (const LightFit &fit)
               : "; whole frames change by +-" +
                     fixed (100.0 * whole * depth.value, 1) + " % at " +
                     fixed (beat, 2) + " Hz");
-  finding_.measure ("flicker", scaled (depth, 100.0), cause);
+  if (depth.value > kPulses && frequency.value > kFast) {
+    finding_.add ("flicker", scaled (depth, 100.0));
+    finding_.blame ("pulsed", cause);
+  } else {
+    finding_.measure ("flicker", scaled (depth, 100.0), cause);
+  }
   finding_.readings.push_back ({"frequency of the flicker", frequency, "Hz"});
   finding_.readings.push_back (
       {"flicker of whole frames", scaled (depth, 100.0 * whole), "%"});
@@ -127,6 +138,20 @@ LightCheck::judge_time ()
   if (finding_.measure ("drift", drift) == Verdict::fail && saturated_ &&
       drift.value > 0.0)
     std::ranges::rotate (finding_.diagnoses, finding_.diagnoses.end () - 1);
+}
+
+Result<Verdict>
+LightCheck::judge_pulses ()
+{
+  ASSIGN_OR_RETURN (const auto light, measure_pulses (examination_));
+  if (light)
+    return finding_.measure ("light of a pulse", scaled (*light, 1e6));
+  if (!examination_.light)
+    finding_.add ("light of a pulse", kNotMeasured);
+  else
+    finding_.notes.push_back (
+        {"pulses", "The frame period is too short to look for them."});
+  return Verdict::unknown;
 }
 
 /** Of a part of the exposure, where the whole saturates. */
@@ -153,11 +178,19 @@ LightCheck::run ()
   const auto &[first, slots, of] = examination_.inside;
   ASSIGN_OR_RETURN (const Stack dark,
       look_at_light (examination_, no_light (), of, kFewFrames));
-  ASSIGN_OR_RETURN (const Stack all,
-      look_at_light (examination_, lit (first, slots), of, kFrames));
+  ASSIGN_OR_RETURN (const auto frames,
+      look_for_whole_frames (examination_, lit (first, slots), of, kFrames));
+  const Stack all = stack_of (frames, parts_.largest ());
+  if (!same_size (std::as_const (all.mean).view (), dark.mean.view ()))
+    return Error{"the size of the frames has changed", ErrorCode::device};
   if (!judge_level (all, dark))
     return std::move (finding_);
-  judge_time ();
+  ASSIGN_OR_RETURN (const Verdict pulses, judge_pulses ());
+  /* Pulses make lines where there are none. */
+  if (pulses < Verdict::warn)
+    judge_time ();
+  if (!finding_.is_ill ())
+    check_pictures (frames, dark.mean, parts_.largest (), finding_);
   RETURN_IF_ERROR (judge_field (all, dark));
   finding_.sort ();
   return std::move (finding_);

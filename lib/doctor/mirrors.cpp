@@ -5,8 +5,10 @@
 #include <string>
 #include <tuple>
 
+#include "base/statistics.h"
 #include "base/try.h"
 #include "doctor/defects.h"
+#include "doctor/level.h"
 #include "doctor/off_light.h"
 #include "doctor/stack.h"
 #include "doctor/switching.h"
@@ -20,6 +22,7 @@ namespace
 
 constexpr int kFrames = 16;
 constexpr int kOffFrames = 24;             // of each exposure time
+constexpr int kLooks = 4;                  // at mirrors that go off, at most
 constexpr Nanoseconds kShortest = 110'000; // of a slot
 constexpr double kFull = 0.002; // part of the values that may be the largest
 constexpr double kLightError = 0.0015; // of the light that leaks, relative
@@ -40,6 +43,7 @@ private:
   void diagnose_stuck (
       const std::string &what, const std::vector<DefectSpot> &spots);
   Result<void> see_switching ();
+  Result<void> see_black ();
   void diagnose_early (const Measured &switching);
 
   Examination &examination_;
@@ -113,8 +117,16 @@ Result<void>
 MirrorRun::see_switching ()
 {
   std::vector<SwitchPoint> points;
-  const auto time = measure_switching (
-      examination_, off_.mean, defects_.good.view (), points);
+  Result<Measured> time = kNotMeasured;
+  /* What is not clear is looked at again: light that flickers in step with the
+   * frames has another phase then. */
+  for (int look = 0; look < kLooks; look++) {
+    time = measure_switching (
+        examination_, off_.mean, defects_.good.view (), points);
+    if (!time ||
+        verdict_of ("switching time", scaled (*time, 1e6)) != Verdict::unknown)
+      break;
+  }
   if (!time && time.error ().code == ErrorCode::unsupported) {
     finding_.notes.push_back ({"switching", time.error ().message});
     return {};
@@ -127,6 +139,43 @@ MirrorRun::see_switching ()
   finding_.plots.push_back (std::move (plot));
   finding_.measure ("switching time", scaled (*time, 1e6));
   diagnose_early (*time);
+  return {};
+}
+
+/* With light on half of the mirrors, pixels of the other half get no less than
+ * in the dark, unless the camera moves its black level. */
+Result<void>
+MirrorRun::see_black ()
+{
+  constexpr double kFewPixels = 500, kLower = 0.002; // of the light
+  const int middle = examination_.rig.parts ().dmd.shown ().width / 2;
+  const StillMask half = {.name = "half of the mirrors",
+      .on = [middle] (int x, int) { return x < middle; }};
+  ASSIGN_OR_RETURN (
+      const Stack seen, look_at_light (examination_, half, 1, kFrames));
+  double below = 0.0, variance = 0.0, count = 0.0, light = 0.0;
+  each_pixel (seen.mean, [&] (int x, int y) {
+    const double full = double (on_.mean.at (x, y) - off_.mean.at (x, y));
+    const double more = double (seen.mean.at (x, y) - off_.mean.at (x, y));
+    light = std::max (light, full);
+    if (defects_.good.at (x, y) == 0 || more > 0.02 * full)
+      return;
+    below -= more;
+    variance += double (seen.variance.at (x, y)) / seen.frames +
+                double (off_.variance.at (x, y)) / off_.frames;
+    count++;
+  });
+  if (count < kFewPixels)
+    return {};
+  const Measured fall{below / count,
+      std::sqrt (variance) / count + 0.1 * rounding_doubt (0.0, 1)};
+  if (fall.value - 2.0 * fall.sigma > kLower * light)
+    finding_.blame ("black-clamp",
+        "with light on half of the mirrors, pixels of the other half fall by " +
+            shown (fall.value) +
+            " DN below their value in the dark: the camera moves its black "
+            "level",
+        Verdict::warn);
   return {};
 }
 
@@ -222,6 +271,7 @@ MirrorRun::run ()
   diagnose_stuck ("off", defects_.stuck_off);
   diagnose_stuck ("on", defects_.stuck_on);
   RETURN_IF_ERROR (see_switching ());
+  RETURN_IF_ERROR (see_black ());
   RETURN_IF_ERROR (measure_leak ());
   finding_.sort ();
   if (examination_.exhibits) {

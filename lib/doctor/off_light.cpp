@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "base/try.h"
 #include "doctor/rounding.h"
@@ -20,7 +21,7 @@ constexpr double kAfterPedestal = 50e3; // ns
 /* Variance of the noise with which rounding can be undone, DN squared. */
 constexpr double kEnough = 0.16;
 /* Error of a mean that is left where rounding was undone, and where not, DN. */
-constexpr double kUnrounded = 0.01, kRounded = 0.25;
+constexpr double kUnrounded = 0.003, kRounded = 0.25;
 
 Measured
 exact_mean (const StackMeans &means, const Offsets &offsets)
@@ -55,6 +56,34 @@ pedestal_for (
       int (std::ceil ((kEnough - variance) * gain / slot)), 1, most);
 }
 
+namespace
+{
+
+/* By how much the light of two looks at the same slots may differ: flicker in
+ * step with the frames has another phase in each. Rms, as a part of it. */
+double
+steady_flicker (const Examination &examination, int frames)
+{
+  if (!examination.light)
+    return 0.0;
+  constexpr double kUnseen = 0.3; // of the faintest line that would be seen
+  const double period = examination.rig.parts ().period ();
+  double squares = std::pow (kUnseen * examination.light->faintest, 2);
+  for (const LightFit::Line &line : examination.light->lines) {
+    const double cycles = line.frequency.value * period;
+    const double turn =
+        std::numbers::pi * (cycles - std::round (cycles)); // of half a frame
+    /* The mean of so many frames. */
+    const double left = std::abs (turn) < 1e-6 ? 1.0
+                                               : std::sin (frames * turn) /
+                                                     (frames * std::sin (turn));
+    squares += std::pow (line.depth.value * left, 2);
+  }
+  return std::sqrt (squares);
+}
+
+} // namespace
+
 Result<OffLight>
 measure_off_light (Examination &examination, int frames,
     const Examination::Lit &fine, int pedestal,
@@ -69,8 +98,7 @@ measure_off_light (Examination &examination, int frames,
                            ? examination.profile.trigger_delay->value
                            : 0.0;
   const double lit_until = double (period) * (fine.first + pedestal) / fine.of;
-  const double enough =
-      pedestal > 0 ? lit_until - delay + kAfterPedestal : 0.0;
+  const double enough = pedestal > 0 ? lit_until - delay + kAfterPedestal : 0.0;
   const auto shorter =
       std::max (period / kShorter, Nanoseconds (std::llround (enough)));
   const double longest = examination.profile.exposure
@@ -91,8 +119,9 @@ measure_off_light (Examination &examination, int frames,
   const Measured b = exact_mean (found.shorter, offsets);
   found.part = double (shorter) / longest;
   const double scale = 1.0 / (1.0 - found.part);
-  const double flicker =
-      std::hypot (first.scatter, second.scatter) / std::sqrt (frames);
+  const double flicker = std::hypot (
+      std::hypot (first.scatter, second.scatter) / std::sqrt (frames),
+      pedestal_light * steady_flicker (examination, frames));
   found.light = {scale * (a.value - b.value),
       scale * std::hypot (std::hypot (a.sigma, b.sigma), flicker)};
   return found;

@@ -255,6 +255,12 @@ OpticsRun::diagnose_pose ()
   Measured turn = lens_->rotation;
   turn.value -= 90.0 * std::round (turn.value / 90.0);
   finding_.judge ("rotation", turn);
+  const double joined = 1.0 / lens_->magnification.value; // mirrors a pixel
+  if (joined > 1.5 && std::abs (joined / std::round (joined) - 1.0) < 0.04)
+    return finding_.blame ("binning",
+        "a pixel sees " + fixed (joined, 2) +
+            " mirrors in x and in y, as it does where the camera joins pixels "
+            "or leaves some out");
   const double target = std::max (1.0, std::round (lens_->magnification.value));
   Measured off = scaled (lens_->magnification, 100.0 / target);
   off.value -= 100.0;

@@ -51,6 +51,14 @@ constexpr Setting kSettings[] = {
     {"LUTEnable", kFalse, "", "lut", Verdict::fail,
         "a table changes pixel values, which need not stay proportional to "
         "light"},
+    {"SharpeningEnable", kFalse, "", "sharpening", Verdict::fail,
+        "the camera makes neighbouring pixels differ more"},
+    {"NoiseReductionEnable", kFalse, "", "noise-reduction", Verdict::fail,
+        "the camera mixes neighbouring pixels"},
+    {"BslSharpnessEnhancement", "0", "", "sharpening", Verdict::fail,
+        "the camera makes neighbouring pixels differ more"},
+    {"BslNoiseReduction", "0", "", "noise-reduction", Verdict::fail,
+        "the camera mixes neighbouring pixels"},
     {"BlackLevelClampingEnable", kFalse, "", "black-clamp", Verdict::warn,
         "the camera moves its black level with the picture"},
     {"BlackLevelAuto", "Off", "", "black-clamp", Verdict::warn,
@@ -130,6 +138,20 @@ check_picture (const RigParts &parts, Finding &finding)
             " bits, but the camera offers " + *formats +
             ": noise is rounded away",
         Verdict::warn);
+}
+
+/* A camera that counts its own frames leaves out triggers that come earlier. */
+void
+check_rate (const RigParts &parts, Finding &finding)
+{
+  const std::string *enabled = feature (parts, "AcquisitionFrameRateEnable");
+  const auto own = number (parts, "AcquisitionFrameRate");
+  const double rate = double (parts.rate.num) / parts.rate.den;
+  if (enabled && !is_one_of (kFalse, *enabled) && own && *own < rate)
+    finding.blame (
+        "rate-limit", "AcquisitionFrameRate is " + real_text (*own) +
+                          ", and the trigger comes " + real_text (rate) +
+                          " times a second: the camera leaves out triggers");
 }
 
 void
@@ -260,6 +282,7 @@ check_parts (Examination &examination)
   finding.notes.push_back ({"pixel format", parts.pixel_format});
   check_features (parts, finding);
   check_picture (parts, finding);
+  check_rate (parts, finding);
   check_firmware (parts, finding);
   check_host (parts, examination.host, finding);
   RETURN_IF_ERROR (check_network (examination, finding));

@@ -38,6 +38,10 @@ constexpr const char *kMapping =
     "see that nothing moves, align the camera with "
     "codedexposure calibrate, and run this check again";
 
+constexpr const char *kStraight =
+    "set Gamma=1 and switch off every look-up table and high dynamic range "
+    "mode of the camera";
+
 constexpr const char *kStuck =
     "let the mirrors run for an hour with changing masks; if they stay stuck, "
     "use another part of the array or another board";
@@ -75,8 +79,8 @@ constexpr Rule kRules[] = {
         "set TriggerMode=On, TriggerSelector=FrameStart and the TriggerSource "
         "of the cable"),
     told ("half-rate",
-        "shorten the exposure time of the camera, until exposure "
-        "and readout fit the frame period"),
+        "shorten the exposure time of the camera, until exposure and readout "
+        "fit the frame period, and set AcquisitionFrameRateEnable=false"),
     told ("double-rate",
         "set TriggerActivation=RisingEdge, and the trigger divider to the "
         "number of pulses in a cycle"),
@@ -91,6 +95,18 @@ constexpr Rule kRules[] = {
     {"exposure-late", "delay", "us", most (400), most (700), "",
         "set TriggerDelay of the camera to 0, and switch off its debouncer"},
     {"", "exposure", "us", {}, {}, "", ""},
+    {"", "last row against the first", "us", {}, {}, "", ""},
+    told ("test-image", "set TestPattern=Off"),
+    told ("auto-gain", "set GainAuto=Off"),
+    told ("auto-exposure", "set ExposureAuto=Off"),
+    told ("gamma", kStraight),
+    told ("lut", kStraight),
+    told ("binning",
+        "set BinningHorizontal, BinningVertical and the decimation "
+        "to 1, or use a lens of that magnification"),
+    told ("black-clamp", "set BlackLevelAuto=Off, and switch off every clamp "
+                         "of the black level"),
+    told ("rate-limit", "set AcquisitionFrameRateEnable=false"),
     {"", "end of the exposure, from that of the frame period", "us",
         {-600, 400}, {-900, 700}, "", ""},
     told ("exposure-short",
@@ -123,14 +139,28 @@ constexpr Rule kRules[] = {
         "the light changes by {} % a minute",
         "wait until the light is warm, and drive it with a constant current"},
 
+    {"pulsed", "light of a pulse", "us", most (2.5), most (5),
+        "the light of some milliseconds changes by that of {} us: the lamp is "
+        "switched on and off",
+        "dim the lamp by its current instead of pulses, or by a grey filter"},
+    told ("moving", "see that neither target nor bench moves"),
+    {"texture", "texture", "%", most (1), most (5),
+        "the target is not even: neighbouring places differ by {} %",
+        "place a plain target, somewhat out of focus"},
+    told ("noise-reduction", "switch off noise reduction, interpolation and "
+                             "every other filter of the camera"),
+    told ("sharpening",
+        "switch off sharpening and every other filter of the camera"),
+    told ("low-bits", "set the pixel format to the number of bits that the "
+                      "sensor delivers, such as Mono12"),
+
     {"noise", "read noise", "e-", most (20), most (kAny),
         "the read noise is {} e-, where cameras of this kind have 2 to 15 e-",
         "switch off noise reduction and other processing in the camera, and "
         "use a mode with a slower readout or a higher analog gain"},
     {"nonlinear", "linearity error", "% of the range", most (1), most (2),
         "pixel values differ by up to {} % of the range from a straight line",
-        "set Gamma=1 and switch off every look-up table and high dynamic "
-        "range mode of the camera"},
+        kStraight},
     {"black-clipped", "", "%", most (1), most (3),
         "{} % of the dark pixel values are 0, where noise is cut off",
         "raise BlackLevel until no dark pixel is 0"},

@@ -22,6 +22,7 @@ Runs::see (const StillMask &mask, int exposure, int frames)
         level_of (frame.picture.view (), examination_.rig.parts ().largest ());
     bits_seen |= level.bits_seen;
     const int step = bits_seen ? bits_seen & -bits_seen : 1; // DN
+    borders.push_back (border_light (frame.picture.view ()));
     samples.push_back ({1e-9 * double (frame.time), mask.first * slot (),
         (mask.first + mask.slots) * slot (), level.mean,
         rounding_doubt (level.noise, step), exposure});

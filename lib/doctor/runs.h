@@ -6,6 +6,7 @@
 
 #include "doctor/checks.h"
 #include "doctor/light_model.h"
+#include "doctor/response.h"
 
 namespace codedexposure
 {
@@ -34,7 +35,8 @@ public:
       int number, int first, int slots, int exposure, int frames);
 
   std::vector<LightSample> samples = {};
-  int bits_seen = 0; ///< in any pixel value
+  std::vector<BorderLight> borders = {}; ///< of the same frames
+  int bits_seen = 0;                     ///< in any pixel value
 
 private:
   Examination &examination_;

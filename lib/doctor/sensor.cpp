@@ -11,6 +11,7 @@
 #include "doctor/dither.h"
 #include "doctor/off_light.h"
 #include "doctor/photon_transfer.h"
+#include "doctor/picture.h"
 #include "doctor/rounding.h"
 #include "doctor/stack.h"
 #include "estimate/least_squares.h"
@@ -33,13 +34,15 @@ constexpr std::array kLevels = {
 /* Part of the values that may be the largest DN at a level that counts. */
 constexpr double kFull = 0.001;
 /* Errors of levels, relative: light that the model does not know of. */
-constexpr double kLightError = 0.001, kVarianceError = 0.004;
+constexpr double kLightError = 0.00025, kVarianceError = 0.004;
 /* Error of a variance where rounding was undone, DN^2. */
-constexpr double kUnroundedError = 0.0007;
+constexpr double kUnroundedError = 0.0003;
+/* Of the deviation from a line, as a part of the range. */
+constexpr double kBowError = 0.0001;
 /* Part of the values that may be 0 there; noise is cut off otherwise. */
 constexpr double kZeros = 0.005;
 /* Error of the dark beside levels with light, DN. */
-constexpr double kDarkError = 0.02;
+constexpr double kDarkError = 0.008;
 /* Below this variance of the dark, DN squared, rounding changes it. */
 constexpr double kRounded = 0.9;
 /* Light of mirrors that are off, part of the range, whose own noise tips the
@@ -110,6 +113,8 @@ private:
   bool saturates_ = false; // with all slots
   std::vector<Level> levels_;
   std::vector<Sample> references_;        // signals over times, s
+  Stack reference_;                       // the first one
+  Measured moved_ = kNotMeasured;         // of the last one against it
   double drift_ = 0.0, drift_from_ = 0.0; // 1/s, s
   Nanoseconds start_ = 0;
   double spread_ = 0.0;       // of the pixels' light, as a part of it
@@ -152,6 +157,9 @@ PhotonTransferRun::see_reference ()
   ASSIGN_OR_RETURN (
       const Stack stack, look_at_light (examination_, lit (fine_.first, top_),
                              fine_.of, kReferenceFrames, &dark_.mean));
+  if (references_.empty ())
+    reference_ = stack;
+  moved_ = change_between (reference_, stack, dark_.mean);
   references_.push_back ({double (stack.time - start_) * 1e-9,
       signal (means_of (stack, defects_.good.view ())), 1.0});
   return {};
@@ -228,7 +236,7 @@ PhotonTransferRun::point_of (
   double rounding = spread_ * light > 0.5 ? 0.02 : 0.25;
   if (exact) {
     point.mean.value = exact->mean;
-    rounding = 0.01;
+    rounding = 0.004;
     const double relative =
         std::hypot (kVarianceError * (0.3 + light / largest_),
             std::sqrt (2.0 / means.values));
@@ -321,7 +329,7 @@ PhotonTransferRun::report ()
       points (off_.light.value / transfer_->slope), largest_);
   /* Flicker makes a bow, too. */
   const Measured linearity = {
-      bow.value / range, std::hypot (kLightError, bow.sigma / range)};
+      bow.value / range, std::hypot (kBowError, bow.sigma / range)};
   const bool known =
       std::isfinite (gain.value) && gain.sigma < kUnknown * gain.value;
   const bool floor =
@@ -370,14 +378,14 @@ PhotonTransferRun::diagnose_defects (
 void
 PhotonTransferRun::diagnose ()
 {
+  judge_change (moved_, finding_);
   const int bits = examination_.rig.parts ().bits;
   if (const int missing = missing_bits (); missing > 0)
     finding_.blame ("missing-bits", "the lowest " + std::to_string (missing) +
                                         " of " + std::to_string (bits) +
                                         " bits are always 0");
   const double zeros = std::max (off_.shorter.zeros, dark_means_.zeros);
-  finding_.judge (
-      "black-clipped", {100.0 * (dithered_ ? dark_means_.zeros : zeros), 0.0});
+  finding_.judge ("black-clipped", {100.0 * zeros, 0.0});
   const bool known = !finding_.is_ill ();
   const double light = signal (levels_.back ().means) / largest_;
   if (transfer_ && known) {

@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
+#include "base/statistics.h"
 #include "base/try.h"
 #include "estimate/least_squares.h"
 
@@ -62,8 +64,12 @@ mean_light_of (double time, double took, double end, double jitter)
 double
 slope_of (const std::vector<SwitchPoint> &points)
 {
-  const double ms = 1e3 * (points[1].time - points[0].time);
-  return std::max (1e-3, (points[1].light - points[0].light) / ms);
+  const auto next = std::ranges::find_if (points,
+      [&points] (const SwitchPoint &p) { return p.time > points[0].time; });
+  if (next == points.end ())
+    return 1e-3;
+  const double ms = 1e3 * (next->time - points[0].time);
+  return std::max (1e-3, (next->light - points[0].light) / ms);
 }
 
 /* Chi-square of the best parabola through the points, for a bend: slow flicker
@@ -150,32 +156,44 @@ see_point (Examination &examination, const Examination::Lit &run, int frames,
       std::max (0.0, means.variance - 1.0 / 12.0) + means.spread * means.spread;
   const double rounding = 0.3 * std::exp (-20.0 * noise);
   const double period = double (examination.rig.parts ().rate.period ());
+  const double black = mean_of (dark.view ());
+  const double grown =
+      examination.light
+          ? examination.light->drift.value *
+                (1e-9 * double (stack.time) - examination.light->epoch)
+          : 0.0;
   return SwitchPoint{1e-9 * period * (run.first + run.slots) / run.of,
-      means.mean,
+      black + (means.mean - black) / (1.0 + grown),
       std::hypot (std::hypot (rounding, kLightError * means.mean),
           stack.scatter / std::sqrt (frames))};
 }
 
-/* The points of all moments; @run begins with its slot. */
+/* The points of all moments; @run begins with its slot. Each time, another one
+ * is the first: flicker that is in step with the looks makes every other one
+ * brighter. */
 Result<void>
 see_points (Examination &examination, Examination::Lit run, double end,
     std::vector<SwitchPoint> &points, const Image<float> &dark,
     ImageView<const std::uint8_t> good)
 {
   const double period = double (examination.rig.parts ().rate.period ());
-  for (const Nanoseconds moment : kMoments) {
+  constexpr std::size_t kCount = std::size (kMoments);
+  const std::size_t turn = (points.size () + kCount - 1) / kCount;
+  for (std::size_t i = 0; i < kCount; i++) {
+    const Nanoseconds moment = kMoments[(i + turn) % kCount];
     const double time = end + double (moment);
     run.slots = int (std::lround (time * run.of / period)) - run.first;
     if (moment < kFirst && time < double (kLeast))
       continue;
     if (time > period - double (kLeast))
-      break;
+      continue;
     const bool about = moment > kAboutFrom && moment < kAboutUntil;
     ASSIGN_OR_RETURN (const SwitchPoint point,
         see_point (
             examination, run, about ? kFramesAbout : kFramesElse, dark, good));
     points.push_back (point);
   }
+  std::ranges::stable_sort (points, {}, &SwitchPoint::time);
   return {};
 }
 

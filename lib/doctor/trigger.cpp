@@ -10,8 +10,11 @@
 #include "base/text.h"
 #include "base/try.h"
 #include "doctor/checks.h"
+#include "doctor/lag.h"
 #include "doctor/level.h"
 #include "doctor/light_fit.h"
+#include "doctor/pulses.h"
+#include "doctor/response.h"
 #include "doctor/runs.h"
 
 namespace codedexposure
@@ -27,21 +30,19 @@ constexpr int kRateFrames = 25;
  * those of this time, s, together. */
 constexpr int kFramesInFlight = 10;
 constexpr double kTimeInFlight = 0.03;
-constexpr int kChanges = 8, kFramesOfChange = 10;
 /* Slots of the walk: runs of one are long enough for a DMD. */
 constexpr double kShortestRun = 130e-6;
 constexpr int kFinestGrid = 256, kTiles = 8;
 constexpr int kCoarseFrames = 4, kFineFrames = 6;
 constexpr int kInsideLooks = 20, kInsideFrames = 6;
-/* Levels of one mask differ less, as part of the step to the other one. */
-constexpr double kSameLevel = 0.2;
+/* Change of the light of whole frames in which nothing can be measured. */
+constexpr double kUnsteady = 0.2;
+/* Rows that are exposed later by that part of a period are not by noise. */
+constexpr double kRowDelay = 0.02;
 /* Mirrors are half way, and clocks tick, within that; s. */
-constexpr double kTicks = 3e-6;
+constexpr double kTicks = 1.8e-6, kLengthTicks = 1.0e-6;
 /* Steps of pixel values in which nothing can be measured, part of the range. */
 constexpr double kCoarsest = 0.03;
-/* Light of all mirrors by which a run of an eighth can be measured, part of the
- * range. */
-constexpr double kFaint = 0.05;
 
 constexpr const char *kEnd = "end of the exposure, from that of the frame "
                              "period";
@@ -74,14 +75,6 @@ above (const Measured &number, double limit)
   return number.value - 2.0 * number.sigma > limit;
 }
 
-/** What shows when the exposure began, from the start of the frames. */
-struct Change {
-  std::optional<int> late = {}; ///< frames after the pause with the old mask
-  int old = 0;                  ///< frames after show () with the old mask
-  int lost = 0;                 ///< frames that did not come
-  bool mixed = false;           ///< the old mask came again after the new one
-};
-
 /** The check, step by step. A step returns false if those after it make no
  * sense. */
 class TriggerCheck
@@ -102,12 +95,11 @@ public:
 
 private:
   Result<bool> check_frames ();
+  bool check_steady (const std::vector<double> &levels);
   Result<bool> check_parked (double ratio, double step, double uneven);
+  Result<bool> check_light ();
   Result<bool> check_lag ();
-  Result<std::vector<SeenFrame>> change (bool all);
-  Change judge (const std::vector<SeenFrame> &seen, double before, double after,
-      Nanoseconds last) const;
-  void diagnose_lag (const std::vector<Change> &changes);
+  bool judge_rows ();
   Result<void> sample (int first, int count, int exposure, int frames)
   {
     return runs_.see (lit (first, count), exposure, frames);
@@ -117,7 +109,8 @@ private:
   Result<void> sample_ends (double end, int exposure);
   Result<void> sample_inside (const LightModel &guess);
   Result<void> measure_exposure ();
-  void diagnose_exposure (const LightFit &fit);
+  Result<void> diagnose_exposure (const LightFit &fit);
+  Result<bool> blame_light (bool surely);
   void diagnose_end (const Measured &end, const Measured &length);
   std::optional<double> set_delay () const;
   double possible_start (double start) const;
@@ -151,13 +144,16 @@ TriggerCheck::check_frames ()
                                                 : "only one frame came"));
     return false;
   }
-  std::vector<double> steps;
+  std::vector<double> steps, levels;
   int bits = 0;
   for (std::size_t i = 0; i < seen.size (); i++) {
     if (i > 0)
       steps.push_back (1e-9 * double (seen[i].time - seen[i - 1].time));
-    if (!seen[i].damaged)
-      bits |= level_of (seen[i].picture.view (), largest_).bits_seen;
+    if (seen[i].damaged)
+      continue;
+    const Level level = level_of (seen[i].picture.view (), largest_);
+    bits |= level.bits_seen;
+    levels.push_back (level.mean);
   }
   runs_.bits_seen = bits;
   const int coarseness = bits ? bits & -bits : 1; // DN
@@ -181,7 +177,27 @@ TriggerCheck::check_frames ()
     squares += std::pow (std::remainder (each, step), 2);
   const double uneven = std::sqrt (squares / double (steps.size ())) /
                         (step * double (steps.size ()));
-  return check_parked (ratio, step, 3.0 * uneven);
+  ASSIGN_OR_RETURN (
+      const bool triggered, check_parked (ratio, step, 3.0 * uneven));
+  return triggered && check_steady (levels);
+}
+
+/** @p levels: of frames with all mirrors on, the first of which may be of the
+ * mask before. */
+bool
+TriggerCheck::check_steady (const std::vector<double> &levels)
+{
+  if (levels.size () < 4)
+    return true;
+  const std::vector<double> later (
+      levels.begin () + std::ptrdiff_t (levels.size () / 2), levels.end ());
+  const double low = quantile (later, 0.2), high = quantile (later, 0.8);
+  if (high - low <= kUnsteady * high)
+    return true;
+  finding_.blame ("flicker", "with all mirrors on, whole frames have " +
+                                 shown (low) + " to " + shown (high) +
+                                 " DN: the light changes from frame to frame");
+  return false;
 }
 
 /** Frames of a camera that waits for the trigger end with it. @p step: from
@@ -211,133 +227,19 @@ TriggerCheck::check_parked (double ratio, double step, double uneven)
   return finding_.diagnoses.empty ();
 }
 
-/** Shows all mirrors on in the whole period, or in one tile of the middle. */
-Result<std::vector<SeenFrame>>
-TriggerCheck::change (bool all)
+/** Whether pixel values can tell how much light there was. */
+Result<bool>
+TriggerCheck::check_light ()
 {
-  RETURN_IF_ERROR (
-      rig_.show (all ? lit (0, kTiles) : lit (kTiles / 2, 1), kTiles));
-  ASSIGN_OR_RETURN (auto seen, rig_.watch (kFramesOfChange));
-  std::erase_if (seen, &SeenFrame::damaged);
-  return seen;
-}
-
-/** @p before, @p after: levels of the masks. @p last: stamp of the frame before
- * the change. */
-Change
-TriggerCheck::judge (const std::vector<SeenFrame> &seen, double before,
-    double after, Nanoseconds last) const
-{
-  const auto cycles = [this] (Nanoseconds a, Nanoseconds b) {
-    return std::lround (1e-9 * double (b - a) / period_);
-  };
-  // A show () leaves out a cycle at least; frames before that pause, the last
-  // of which may be cut short, are of the mask before.
-  std::size_t pause = 0;
-  long longest = 0;
-  for (std::size_t i = 0; i < seen.size (); i++) {
-    const long step = cycles (i > 0 ? seen[i - 1].time : last, seen[i].time);
-    if (step > longest) {
-      longest = step;
-      pause = i;
-    }
-  }
-  Change change{.old = int (pause)};
-  int late = 0;
-  bool turned = false;
-  for (std::size_t i = pause; i < seen.size (); i++) {
-    const double mean = level_of (seen[i].picture.view (), largest_).mean;
-    // A frame that was cut short lies between the masks, and is not new.
-    const bool is_old =
-        std::abs (mean - after) > kSameLevel * std::abs (before - after);
-    if (is_old) {
-      change.old = int (i) + 1;
-      change.mixed |= turned;
-    }
-    if (i > 0 && i != pause)
-      change.lost += int (cycles (seen[i - 1].time, seen[i].time)) - 1;
-    turned |= !is_old;
-    late += !turned;
-  }
-  // A bright frame that was cut short may look like the darker mask.
-  if (longest >= 2 && after > before)
-    change.late = late;
-  return change;
+  RETURN_IF_ERROR (check_response (examination_, finding_));
+  return finding_.diagnoses.empty ();
 }
 
 /** In which frame a new mask shows first. */
 Result<bool>
 TriggerCheck::check_lag ()
 {
-  double levels[2] = {};
-  std::vector<Change> changes;
-  for (int i = 0; i < kChanges + 2; i++) {
-    ASSIGN_OR_RETURN (const auto seen, change (i % 2 == 0));
-    if (seen.empty ()) {
-      finding_.blame ("no-trigger", "frames ended after a change of the mask");
-      return false;
-    }
-    const Level level = level_of (seen.back ().picture.view (), largest_);
-    const double before = levels[(i + 1) % 2];
-    levels[i % 2] = level.mean;
-    if (i >= 2)
-      changes.push_back (judge (seen, before, level.mean, last_));
-    last_ = seen.back ().time;
-    if (i != 1)
-      continue;
-    if (level.saturated > 0.5) {
-      finding_.blame ("bright",
-          "an eighth of the frame period is enough light to saturate the "
-          "camera");
-      return false;
-    }
-    if (levels[0] - levels[1] < kFaint * largest_) {
-      finding_.blame (
-          "dark", "all mirrors on instead of an eighth of the time add " +
-                      shown (levels[0] - levels[1]) + " of " +
-                      std::to_string (largest_) + " DN");
-      return false;
-    }
-  }
-  diagnose_lag (changes);
-  return true;
-}
-
-void
-TriggerCheck::diagnose_lag (const std::vector<Change> &changes)
-{
-  int old = 1, lost = 0, number = 0;
-  bool mixed = false;
-  std::map<int, int> counts; // of changes by how late they are
-  double sum = 0.0;
-  for (const Change &change : changes) {
-    old = std::max (old, change.old);
-    lost += change.lost;
-    mixed |= change.mixed;
-    if (!change.late)
-      continue;
-    counts[*change.late]++;
-    sum += *change.late;
-    number++;
-  }
-  examination_.lag = old + 1;
-  if (number == 0)
-    return;
-  const auto usual = std::ranges::max_element (
-      counts, {}, [] (const auto &count) { return count.second; });
-  const int low = counts.begin ()->first, high = counts.rbegin ()->first;
-  finding_.add ("lag", {sum / number, 0.5 * (high - low)});
-  // A frame that is lost after the pause takes one from the count.
-  const int fewer = high == usual->first ? (lost > 0 ? 2 : 1) : 0;
-  if (mixed || number - usual->second > fewer)
-    finding_.blame ("frame-late-varies",
-        "a new mask shows " + std::to_string (low) + " to " +
-            std::to_string (high) +
-            " frames late: the camera or the network holds frames back");
-  else if (usual->first > 0)
-    finding_.blame ("frame-late",
-        "every frame shows the mask of " + std::to_string (usual->first) +
-            (usual->first > 1 ? " frames" : " frame") + " before");
+  return codedexposure::check_lag (examination_, last_, finding_);
 }
 
 Result<void>
@@ -390,6 +292,25 @@ TriggerCheck::sample_inside (const LightModel &guess)
   return {};
 }
 
+/** Whether all rows are exposed at the same time, by the tiles. */
+bool
+TriggerCheck::judge_rows ()
+{
+  std::map<double, std::vector<BorderLight>> tiles; // by the start of each
+  for (std::size_t i = 0; i < runs_.samples.size (); i++)
+    tiles[runs_.samples[i].from].push_back (runs_.borders[i]);
+  const auto delay = row_delay (tiles, period_);
+  if (!delay)
+    return true;
+  finding_.add ("last row against the first", scaled (*delay, 1e6));
+  if (std::abs (delay->value) - 2.0 * delay->sigma < kRowDelay * period_)
+    return true;
+  finding_.blame ("rolling-shutter",
+      "the last row is exposed " + us_text (1e6 * std::abs (delay->value)) +
+          (delay->value > 0.0 ? " after" : " before") + " the first one");
+  return false;
+}
+
 /**
  * Half of the period leaves its start alone in the dark; of the longest
  * exposure, only the length is to be found. Both start with the same delay.
@@ -400,6 +321,8 @@ TriggerCheck::measure_exposure ()
   const auto half = Nanoseconds (std::llround (0.5e9 * period_));
   RETURN_IF_ERROR (rig_.expose (half));
   RETURN_IF_ERROR (sample_tiles (0));
+  if (!judge_rows ())
+    return rig_.expose ({});
   LightModel guess = guess_window (runs_.samples, period_);
   RETURN_IF_ERROR (sample_starts (guess.start, 0));
   RETURN_IF_ERROR (rig_.expose ({}));
@@ -411,8 +334,7 @@ TriggerCheck::measure_exposure ()
   if (runs_.samples.size () < 40)
     return {};
   examination_.light = fit_light (runs_.samples, guess);
-  diagnose_exposure (*examination_.light);
-  return {};
+  return diagnose_exposure (*examination_.light);
 }
 
 /** Slots that lie in the exposure as a whole, and the profile. */
@@ -506,20 +428,36 @@ TriggerCheck::diagnose_end (const Measured &end, const Measured &length)
         verdict);
 }
 
-void
+/** Where the light hides the exposure, or what looks like jitter. Blames
+ * nothing if it is steady. */
+Result<bool>
+TriggerCheck::blame_light (bool surely)
+{
+  ASSIGN_OR_RETURN (const Steadiness light, steadiness_of (examination_));
+  if (light == Steadiness::steady && !surely)
+    return false;
+  const bool pulsed = light == Steadiness::pulsed;
+  finding_.blame (pulsed ? "pulsed" : "flicker",
+      std::string (pulsed ? "the lamp is switched on and off so fast"
+                          : "the light changes so much") +
+          " within the frame period that the exposure cannot be found");
+  return true;
+}
+
+Result<void>
 TriggerCheck::diagnose_exposure (const LightFit &fit)
 {
   Measured start = fit.start, length = fit.lengths[1];
   start.sigma = std::hypot (start.sigma, kTicks);
-  length.sigma = std::hypot (length.sigma, kTicks);
+  length.sigma = std::hypot (length.sigma, kLengthTicks);
   start.value = possible_start (start.value);
   const Measured jitter = scaled (fit.jitter, 1e6);
   const bool possible = length.value > 0.0 && length.value < kLongest * period_;
   const bool known = start.sigma + length.sigma < kUnclear * period_;
-  if (!possible || (!known && verdict_of ("jitter", jitter) != Verdict::fail))
-    return finding_.blame ("flicker",
-        "the light changes so much within the frame period that the exposure "
-        "cannot be found");
+  if (!possible || (!known && verdict_of ("jitter", jitter) != Verdict::fail)) {
+    RETURN_IF_ERROR (blame_light (true));
+    return {};
+  }
   remember (fit, start, length);
   start = scaled (start, 1e6);
   length = scaled (length, 1e6);
@@ -529,7 +467,13 @@ TriggerCheck::diagnose_exposure (const LightFit &fit)
   finding_.add ("exposure", length);
   finding_.add (kEnd, end);
   finding_.add ("jitter", jitter);
-  /* Where all frames scatter, nothing else can be told, not even by how much. */
+  /* Where all frames scatter, nothing else can be told, not even by how much.
+   */
+  if (verdict_of ("jitter", jitter) >= Verdict::warn) {
+    ASSIGN_OR_RETURN (const bool blamed, blame_light (false));
+    if (blamed)
+      return {};
+  }
   if (jitter.sigma >= kScattered) {
     if (verdict_of ("jitter", jitter) >= Verdict::warn)
       finding_.judge ("jitter", jitter);
@@ -537,7 +481,7 @@ TriggerCheck::diagnose_exposure (const LightFit &fit)
       finding_.blame ("jitter",
           "from frame to frame, the exposure begins earlier or later by a "
           "large part of the frame period");
-    return;
+    return {};
   }
   /* What jitters as much is no setting. */
   start.sigma = std::hypot (start.sigma, jitter.value);
@@ -545,13 +489,14 @@ TriggerCheck::diagnose_exposure (const LightFit &fit)
   diagnose_delay (start);
   diagnose_end (end, length);
   finding_.judge ("jitter", jitter);
+  return {};
 }
 
 Result<Finding>
 TriggerCheck::run ()
 {
-  for (const auto step :
-      {&TriggerCheck::check_frames, &TriggerCheck::check_lag}) {
+  for (const auto step : {&TriggerCheck::check_frames,
+           &TriggerCheck::check_light, &TriggerCheck::check_lag}) {
     ASSIGN_OR_RETURN (const bool go_on, (this->*step) ());
     if (!go_on)
       return std::move (finding_);

@@ -1,0 +1,207 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "doctor/lag.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "base/try.h"
+#include "doctor/level.h"
+
+namespace codedexposure
+{
+
+namespace
+{
+
+constexpr int kChanges = 12, kFramesOfChange = 10;
+constexpr int kTiles = 8;
+/* Levels of one mask differ less, as part of the step to the other one. */
+constexpr double kSameLevel = 0.45;
+/* Light of all mirrors by which a run of an eighth can be measured, part of the
+ * range. */
+constexpr double kFaint = 0.05;
+/* A mean that is so near to the largest DN is one of pixels that are full. */
+constexpr double kBright = 0.95;
+
+/** What shows when the exposure began, from the start of the frames. */
+struct Change {
+  std::optional<int> late = {}; ///< frames after the pause with the old mask
+  int old = 0;                  ///< frames after show () with the old mask
+  int lost = 0;                 ///< frames that did not come
+  bool mixed = false;           ///< the old mask came again after the new one
+};
+
+class LagCheck
+{
+public:
+  LagCheck (Examination &examination, Nanoseconds last, Finding &finding)
+      : examination_ (examination), rig_ (examination.rig),
+        period_ (rig_.parts ().period ()), largest_ (rig_.parts ().largest ()),
+        finding_ (finding), last_ (last)
+  {
+  }
+
+  Result<bool> run ();
+
+private:
+  Result<std::vector<SeenFrame>> change (bool all);
+  Change judge (const std::vector<SeenFrame> &seen, double before, double after,
+      Nanoseconds last) const;
+  void diagnose_lag (const std::vector<Change> &changes);
+
+  Examination &examination_;
+  Rig &rig_;
+  double period_; // s
+  int largest_;
+  Finding &finding_;
+  Nanoseconds last_;
+};
+
+/** Shows all mirrors on in the whole period, or in one tile of the middle. */
+Result<std::vector<SeenFrame>>
+LagCheck::change (bool all)
+{
+  RETURN_IF_ERROR (
+      rig_.show (all ? lit (0, kTiles) : lit (kTiles / 2, 1), kTiles));
+  ASSIGN_OR_RETURN (auto seen, rig_.watch (kFramesOfChange));
+  std::erase_if (seen, &SeenFrame::damaged);
+  return seen;
+}
+
+/** @p before, @p after: levels of the masks. @p last: stamp of the frame before
+ * the change. */
+Change
+LagCheck::judge (const std::vector<SeenFrame> &seen, double before,
+    double after, Nanoseconds last) const
+{
+  const auto cycles = [this] (Nanoseconds a, Nanoseconds b) {
+    return std::lround (1e-9 * double (b - a) / period_);
+  };
+  // A show () leaves out a cycle at least; frames before that pause, the last
+  // of which may be cut short, are of the mask before.
+  std::size_t pause = 0;
+  long longest = 0;
+  for (std::size_t i = 0; i < seen.size (); i++) {
+    const long step = cycles (i > 0 ? seen[i - 1].time : last, seen[i].time);
+    if (step > longest) {
+      longest = step;
+      pause = i;
+    }
+  }
+  Change change{.old = int (pause)};
+  int late = 0;
+  bool turned = false;
+  for (std::size_t i = pause; i < seen.size (); i++) {
+    const double mean = level_of (seen[i].picture.view (), largest_).mean;
+    // A frame that was cut short lies between the masks, and is not new.
+    const bool is_old =
+        std::abs (mean - after) > kSameLevel * std::abs (before - after);
+    if (is_old) {
+      change.old = int (i) + 1;
+      change.mixed |= turned;
+    }
+    if (i > 0 && i != pause)
+      change.lost += int (cycles (seen[i - 1].time, seen[i].time)) - 1;
+    turned |= !is_old;
+    late += !turned;
+  }
+  // A bright frame that was cut short may look like the darker mask.
+  if (longest >= 2 && after > before)
+    change.late = late;
+  return change;
+}
+
+/** In which frame a new mask shows first. */
+Result<bool>
+LagCheck::run ()
+{
+  double levels[2] = {};
+  std::vector<Change> changes;
+  for (int i = 0; i < kChanges + 2; i++) {
+    ASSIGN_OR_RETURN (const auto seen, change (i % 2 == 0));
+    if (seen.empty ()) {
+      finding_.blame ("no-trigger", "frames ended after a change of the mask");
+      return false;
+    }
+    const Level level = level_of (seen.back ().picture.view (), largest_);
+    const double before = levels[(i + 1) % 2];
+    levels[i % 2] = level.mean;
+    if (i >= 2)
+      changes.push_back (judge (seen, before, level.mean, last_));
+    last_ = seen.back ().time;
+    if (i != 1)
+      continue;
+    if (level.saturated > 0.5) {
+      finding_.blame ("bright",
+          "an eighth of the frame period is enough light to saturate the "
+          "camera");
+      return false;
+    }
+    if (levels[0] - levels[1] < kFaint * largest_ &&
+        levels[0] > kBright * largest_) {
+      finding_.blame ("bright",
+          "all mirrors on instead of an eighth of the time make no more than " +
+              shown (levels[0]) + " of " + std::to_string (largest_) + " DN");
+      return false;
+    }
+    if (levels[0] - levels[1] < kFaint * largest_) {
+      finding_.blame (
+          "dark", "all mirrors on instead of an eighth of the time add " +
+                      shown (levels[0] - levels[1]) + " of " +
+                      std::to_string (largest_) + " DN");
+      return false;
+    }
+  }
+  diagnose_lag (changes);
+  return true;
+}
+
+void
+LagCheck::diagnose_lag (const std::vector<Change> &changes)
+{
+  int old = 1, lost = 0, number = 0;
+  bool mixed = false;
+  std::map<int, int> counts; // of changes by how late they are
+  double sum = 0.0;
+  for (const Change &change : changes) {
+    old = std::max (old, change.old);
+    lost += change.lost;
+    mixed |= change.mixed;
+    if (!change.late)
+      continue;
+    counts[*change.late]++;
+    sum += *change.late;
+    number++;
+  }
+  examination_.lag = old + 1;
+  if (number == 0)
+    return;
+  const auto usual = std::ranges::max_element (
+      counts, {}, [] (const auto &count) { return count.second; });
+  const int low = counts.begin ()->first, high = counts.rbegin ()->first;
+  finding_.add ("lag", {sum / number, 0.5 * (high - low)});
+  // A frame that is lost after the pause takes one from the count.
+  const int fewer = high == usual->first ? (lost > 0 ? 2 : 1) : 0;
+  if (mixed || number - usual->second > fewer)
+    finding_.blame ("frame-late-varies",
+        "a new mask shows " + std::to_string (low) + " to " +
+            std::to_string (high) +
+            " frames late: the camera or the network holds frames back");
+  else if (usual->first > 0)
+    finding_.blame ("frame-late",
+        "every frame shows the mask of " + std::to_string (usual->first) +
+            (usual->first > 1 ? " frames" : " frame") + " before");
+}
+
+} // namespace
+
+Result<bool>
+check_lag (Examination &examination, Nanoseconds last, Finding &finding)
+{
+  return LagCheck (examination, last, finding).run ();
+}
+
+} // namespace codedexposure

@@ -177,6 +177,9 @@ Calibrate::run ()
   write (job, calib);
   chain.queue (2, "downstream");
   add_view (chain, source_.bits);
+  /* A window that is made larger shows a larger picture. */
+  if (!sink_)
+    chain.to ("videoscale");
   chain.to ("videoconvert").to (job.graph.add_text (sink));
   const bool moves = simulated && stage_.value_or ("simulated") == "simulated";
   return guide (job, calib, moves ? job.bench : nullptr);

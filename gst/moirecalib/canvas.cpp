@@ -74,6 +74,17 @@ Canvas::text_centred (Position at, double size, const std::string &words)
 }
 
 void
+Canvas::text_within (
+    Position at, double size, double width, const std::string &words)
+{
+  font (size);
+  cairo_text_extents_t extents;
+  cairo_text_extents (cairo_.get (), words.c_str (), &extents);
+  text (
+      at, size * std::min (1.0, width / std::max (1.0, extents.width)), words);
+}
+
+void
 Canvas::label (Position at, double size, const std::string &words)
 {
   font (size);

@@ -38,6 +38,9 @@ public:
   /** @p size  of a line; @p at is where its first letter stands. */
   void text (Position at, double size, const std::string &words);
   void text_centred (Position at, double size, const std::string &words);
+  /** Smaller, if it would be wider than @p width. */
+  void text_within (
+      Position at, double size, double width, const std::string &words);
   /** White on a black ground. */
   void label (Position at, double size, const std::string &words);
   void arrow (Position from, Position to);

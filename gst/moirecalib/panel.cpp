@@ -17,6 +17,9 @@ namespace
 /* Levels of grey, as parts of white. */
 constexpr double kFrame = 0.45, kBody = 0.8, kBright = 1.0;
 
+/* Height of the headline, in lines of text: it is read from the stage. */
+constexpr double kHeadline = 2.2;
+
 struct Layout {
   double unit; // height of a line of text
   int top;     // height of the row of pictures
@@ -25,13 +28,15 @@ struct Layout {
 };
 
 Layout
-lay_out (Extent size, std::size_t lines)
+lay_out (Extent size, const PanelContent &content)
 {
   Layout layout;
   layout.unit = std::clamp (size.height / 30.0, 8.0, 26.0);
   layout.picture = size.width / 3;
   layout.top = std::min (layout.picture * 3 / 4, size.height * 2 / 5);
-  const int text = int (std::lround (layout.unit * (double (lines) + 2.4)));
+  const double lines = double (content.lines.size ()) + 2.4 +
+                       (content.headline.empty () ? 0.0 : kHeadline);
+  const int text = int (std::lround (layout.unit * lines));
   layout.strip = std::max (layout.top, size.height - text);
   return layout;
 }
@@ -112,7 +117,7 @@ draw_progress (Canvas &canvas, const Rect &strip, double unit, double part)
 Panel
 draw_panel (Extent size, const PanelContent &content)
 {
-  const Layout layout = lay_out (size, content.lines.size ());
+  const Layout layout = lay_out (size, content);
   const Rect strip{0, layout.strip, size.width, size.height - layout.strip};
   Panel panel{Image<std::uint8_t> (size.width, size.height), {strip}};
   const auto picture = [&] (int place) {
@@ -142,8 +147,13 @@ draw_panel (Extent size, const PanelContent &content)
 
   canvas.grey (kBright);
   canvas.text ({unit, strip.y + unit * 1.15}, unit * 1.1, content.title);
-  canvas.grey (kBody);
   double line = strip.y + unit * 2.2;
+  if (!content.headline.empty ()) {
+    canvas.text_within ({unit, line + unit * (kHeadline - 1.2)},
+        unit * kHeadline * 0.8, size.width - 2 * unit, content.headline);
+    line += unit * kHeadline;
+  }
+  canvas.grey (kBody);
   for (const std::string &text : content.lines) {
     canvas.text ({unit, line}, unit * 0.85, text);
     line += unit;

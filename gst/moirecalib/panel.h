@@ -18,6 +18,7 @@ namespace codedexposure
 /** The content of a panel. */
 struct PanelContent {
   std::string title = {};
+  std::string headline = {}; ///< to be read from afar; empty: none
   std::vector<std::string> lines = {};
   std::optional<double> progress = {};            ///< 0..1
   std::optional<StageCorrection> correction = {}; ///< arrows

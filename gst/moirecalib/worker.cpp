@@ -199,6 +199,7 @@ Worker::draw (const std::string &title, const std::vector<std::string> &lines,
       geometry_.camera ().height < 120)
     return;
   PanelContent content{.title = title,
+      .headline = correction_ && !progress ? travel_line (*correction_) : "",
       .lines = lines,
       .progress = progress,
       .correction = correction_,

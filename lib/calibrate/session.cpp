@@ -145,12 +145,17 @@ alignment_lines (const CalibrationSession::Alignment &alignment)
           sigma.magnification),
       format ("offset x %+.4f  y %+.4f ± %.0e mirrors    worst corner %.3f",
           todo.offset.x, todo.offset.y, sigma.shift_x, todo.deviation),
-      format ("stage: x %+.2f µm   y %+.2f µm   θ %+.1f m°   magnify %+.2f ‰",
-          todo.stage_x, todo.stage_y, todo.stage_theta, todo.magnify),
       format ("contrast x %.2f  y %.2f    covered %.0f %%%s",
           reading.contrast.x, reading.contrast.y, 100 * reading.coverage,
           reading.saturated > 0 ? "    SATURATED: less light" : ""),
   };
+}
+
+std::string
+travel_line (const StageCorrection &todo)
+{
+  return format ("x %+.2f µm   y %+.2f µm   θ %+.1f m°   magnify %+.2f ‰",
+      todo.stage_x, todo.stage_y, todo.stage_theta, todo.magnify);
 }
 
 std::vector<std::string>

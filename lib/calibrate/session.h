@@ -95,6 +95,8 @@ private:
 /** An alignment in lines of text. */
 std::vector<std::string> alignment_lines (
     const CalibrationSession::Alignment &alignment);
+/** How far each axis of the stage is to travel. */
+std::string travel_line (const StageCorrection &correction);
 /** A mapping in lines of text, briefly and in full; @p correction is of its
  * mapping.
  */

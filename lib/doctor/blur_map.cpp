@@ -30,7 +30,7 @@ constexpr std::size_t kTerms = kHarmonics.size ();
 constexpr double kPowerError = 0.01, kSwingError = 0.03;
 /* Of the blur's growth over the field, relative: lenses blur in other ways,
  * too. */
-constexpr double kSlopeError = 0.006;
+constexpr double kSlopeError = 0.0045;
 
 using Powers = std::array<double, kTerms>;
 /* Parts of a block's pixels by their place; they add up to 1. */

@@ -144,7 +144,7 @@ constexpr Rule kRules[] = {
         "switched on and off",
         "dim the lamp by its current instead of pulses, or by a grey filter"},
     told ("moving", "see that neither target nor bench moves"),
-    {"texture", "texture", "%", most (1), most (5),
+    {"texture", "texture", "%", most (1), most (2),
         "the target is not even: neighbouring places differ by {} %",
         "place a plain target, somewhat out of focus"},
     told ("noise-reduction", "switch off noise reduction, interpolation and "

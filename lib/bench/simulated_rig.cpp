@@ -20,7 +20,9 @@ namespace codedexposure
 namespace
 {
 
-constexpr Nanoseconds kStart = 60'000'000;   // of masks that are there
+constexpr Nanoseconds kStart = 60'000'000; // of masks that are there
+/* More, as it happens: no lamp is in step with that, ns. */
+constexpr double kStartSpread = 20e6;
 constexpr Nanoseconds kTransfer = 8'000'000; // of a frame
 constexpr Nanoseconds kMicrosecond = 1000;
 constexpr int kInFlight = 2;
@@ -234,7 +236,9 @@ void
 SimulatedRig::start (MirrorProgram program, Nanoseconds transfer)
 {
   stop ();
-  now_ += kStart + transfer + options_.rate.period ();
+  now_ += kStart +
+          Nanoseconds (fraction (options_.seed + 3, starts_++) * kStartSpread) +
+          transfer + options_.rate.period ();
   bench_.show (now_, std::move (program));
   shows_ = true;
 }

@@ -16,7 +16,7 @@ namespace codedexposure
  * would have taken.
  *
  * The DMD has the limits of a DLPC900, receives masks as fast as one, and needs
- * 60 ms to show them, after which one period passes without a trigger. Two
+ * 60 to 80 ms to show them, after which one period passes without a trigger. Two
  * frames are on their way when it stops, the later one cut short; they come
  * first in the next watch ().
  */
@@ -64,6 +64,7 @@ private:
   double clock_error_; // of the camera, relative
   Nanoseconds now_ = 0;
   bool shows_ = false;
+  std::uint64_t starts_ = 0; // of masks
   std::deque<Shot> on_their_way_;
   std::optional<Setting> setting_;
 };

@@ -48,6 +48,7 @@ private:
   void judge_time ();
   Result<Verdict> judge_pulses ();
   void judge_flicker (const LightFit &fit);
+  Result<void> judge_target (const Stack &all, const Stack &dark);
   Result<void> judge_field (const Stack &all, const Stack &dark);
 
   Examination &examination_;
@@ -154,6 +155,22 @@ LightCheck::judge_pulses ()
   return Verdict::unknown;
 }
 
+/** What is not even may also move, slowly. */
+Result<void>
+LightCheck::judge_target (const Stack &all, const Stack &dark)
+{
+  if (finding_.diagnoses.empty () || finding_.diagnoses[0].id != "texture")
+    return {};
+  const auto &[first, slots, of] = examination_.inside;
+  ASSIGN_OR_RETURN (
+      const Stack later, look_at_light (examination_, lit (first, slots), of,
+                             kFrames, &dark.mean));
+  judge_change (change_between (all, later, dark.mean), finding_);
+  if (finding_.diagnoses.size () > 1)
+    std::ranges::rotate (finding_.diagnoses, finding_.diagnoses.begin () + 1);
+  return {};
+}
+
 /** Of a part of the exposure, where the whole saturates. */
 Result<void>
 LightCheck::judge_field (const Stack &all, const Stack &dark)
@@ -191,6 +208,7 @@ LightCheck::run ()
     judge_time ();
   if (!finding_.is_ill ())
     check_pictures (frames, dark.mean, parts_.largest (), finding_);
+  RETURN_IF_ERROR (judge_target (all, dark));
   RETURN_IF_ERROR (judge_field (all, dark));
   finding_.sort ();
   return std::move (finding_);

@@ -18,6 +18,9 @@ namespace
  * much time after the light of the pedestal. */
 constexpr int kShorter = 5;
 constexpr double kAfterPedestal = 50e3; // ns
+/* Change of the light from look to look, DN, above which there are some. */
+constexpr double kUnsteady = 0.02;
+constexpr int kRounds = 3;
 /* Variance of the noise with which rounding can be undone, DN squared. */
 constexpr double kEnough = 0.16;
 /* Error of a mean that is left where rounding was undone, and where not, DN. */
@@ -104,26 +107,36 @@ measure_off_light (Examination &examination, int frames,
   const double longest = examination.profile.exposure
                              ? examination.profile.exposure->value
                              : double (period);
+  /* Of flicker that is in step with the frames, each look sees another phase.
+   */
+  const double unsteady = pedestal_light * steady_flicker (examination, frames);
+  const int rounds = unsteady > kUnsteady ? kRounds : 1;
   OffLight found;
-  ASSIGN_OR_RETURN (const Stack first,
-      look_at_light (examination, mask, fine.of, frames, weights));
-  ASSIGN_OR_RETURN (
-      const Stack second, with_exposure (examination, shorter, [&] {
-        return look_at_light (examination, mask, fine.of, frames, weights);
-      }));
-
-  found.longest = means_of (first, good);
-  found.shorter = means_of (second, good);
-  const Offsets offsets = offsets_of (parts, pedestal_light);
-  const Measured a = exact_mean (found.longest, offsets);
-  const Measured b = exact_mean (found.shorter, offsets);
+  std::vector<double> more; // light of the longer exposure, DN
+  double errors = 0.0;      // squares
+  for (int round = 0; round < rounds; round++) {
+    ASSIGN_OR_RETURN (const Stack first,
+        look_at_light (examination, mask, fine.of, frames, weights));
+    ASSIGN_OR_RETURN (
+        const Stack second, with_exposure (examination, shorter, [&] {
+          return look_at_light (examination, mask, fine.of, frames, weights);
+        }));
+    found.longest = means_of (first, good);
+    found.shorter = means_of (second, good);
+    const Offsets offsets = offsets_of (parts, pedestal_light);
+    const Measured a = exact_mean (found.longest, offsets);
+    const Measured b = exact_mean (found.shorter, offsets);
+    more.push_back (a.value - b.value);
+    errors = std::pow (std::hypot (first.scatter, second.scatter), 2) / frames +
+             a.sigma * a.sigma + b.sigma * b.sigma;
+  }
   found.part = double (shorter) / longest;
   const double scale = 1.0 / (1.0 - found.part);
-  const double flicker = std::hypot (
-      std::hypot (first.scatter, second.scatter) / std::sqrt (frames),
-      pedestal_light * steady_flicker (examination, frames));
-  found.light = {scale * (a.value - b.value),
-      scale * std::hypot (std::hypot (a.sigma, b.sigma), flicker)};
+  double mean = 0.0;
+  for (const double each : more)
+    mean += each / rounds;
+  found.light = {scale * mean,
+      scale * std::sqrt (errors + unsteady * unsteady / double (rounds))};
   return found;
 }
 

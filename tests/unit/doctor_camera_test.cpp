@@ -87,12 +87,12 @@ INSTANTIATE_TEST_SUITE_P (Lamp, WithoutFeatures,
         Fault{"pulsed=3000:0.3", "pulsed"},
         Fault{"pulsed=25000:0.5", "light pulsed"},
         Fault{"flicker=24.9:0.3", "light flicker"},
-        Fault{"flicker=1:0.3", "trigger flicker"},
+        Fault{"flicker=1:0.3", "flicker"},
         Fault{"bright=8", "trigger bright"}));
 
 INSTANTIATE_TEST_SUITE_P (Target, WithoutFeatures,
     testing::Values (Fault{"level=0.6 moving=5", "light moving"},
-        Fault{"level=0.6 moving=0.3", "sensor moving"},
+        Fault{"level=0.6 moving=0.3", "light moving"},
         Fault{"level=0.6 texture=0.04", "light texture"}));
 
 INSTANTIATE_TEST_SUITE_P (Groups, WithoutFeatures,

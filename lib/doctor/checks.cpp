@@ -28,11 +28,8 @@ Result<std::vector<SeenFrame>>
 look (Examination &examination, const StillMask &mask, int slots, int frames)
 {
   RETURN_IF_ERROR (examination.rig.show (mask, slots));
-  ASSIGN_OR_RETURN (
-      auto seen, examination.rig.watch (examination.lag + frames));
-  const auto old = std::min (seen.size (), std::size_t (examination.lag));
-  seen.erase (seen.begin (), seen.begin () + std::ptrdiff_t (old));
-  return seen;
+  RETURN_IF_ERROR (examination.rig.watch (examination.lag));
+  return examination.rig.watch (frames);
 }
 
 const std::vector<Check> &

@@ -91,8 +91,8 @@ struct Finding {
 
 /**
  * What the rule @p name of rules.cpp says of @p number: warn or fail if it is
- * beyond the limits by twice its standard deviation; pass if it is within them,
- * and within those of a failure by as much. Else it is unknown.
+ * beyond the limits by twice its standard deviation; pass if it is within them
+ * by as much. Else it is unknown.
  */
 Verdict verdict_of (std::string_view name, const Measured &number);
 

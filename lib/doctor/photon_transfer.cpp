@@ -13,7 +13,7 @@ namespace
 {
 
 /* Relative error of light that the levels have in common. */
-constexpr double kLightError = 0.0006;
+constexpr double kLightError = 0.0005;
 
 } // namespace
 

@@ -174,7 +174,7 @@ constexpr Rule kRules[] = {
         "mirrors that are off pass {} % of the light",
         "block the light of the off direction with a trap, stop down the lens, "
         "and look for stray light and reflections between lens and window"},
-    {"slow-mirrors", "switching time", "us", most (100), most (200),
+    {"slow-mirrors", "switching time", "us", most (150), most (300),
         "the light takes {} us to go off, where mirrors need less than 20 us",
         "check that nothing else shutters the light, such as a pulsed lamp or "
         "a liquid crystal; give the schedule that much switching time"},

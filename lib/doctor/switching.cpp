@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <numbers>
 
 #include "base/statistics.h"
 #include "base/try.h"
@@ -79,19 +80,23 @@ misfit (const std::vector<SwitchPoint> &points, double took, double end,
     double jitter)
 {
   const Eigen::Index count = Eigen::Index (points.size ());
-  Eigen::MatrixXd rows (count + 1, 3);
-  Eigen::VectorXd lights (count + 1);
+  const Eigen::Index lines = Eigen::Index (points[0].flicker.size ());
+  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero (count + 1 + lines, 3 + lines);
+  Eigen::VectorXd lights = Eigen::VectorXd::Zero (count + 1 + lines);
   for (Eigen::Index i = 0; i < count; i++) {
     const SwitchPoint &point = points[std::size_t (i)];
     const double ms =
         1e3 * (mean_light_of (point.time, took, end, jitter) - points[0].time);
-    rows.row (i) << 1.0, ms, ms * ms;
+    rows.row (i).head<3> () << 1.0, ms, ms * ms;
+    for (Eigen::Index line = 0; line < lines; line++)
+      rows (i, 3 + line) = point.flicker[std::size_t (line)];
     rows.row (i) /= point.sigma;
     lights (i) = point.light / point.sigma;
   }
-  rows.row (count) << 0.0, 0.0, 1.0 / (0.5 * kCurvature * slope_of (points));
-  lights (count) = 0.0;
-  const Eigen::Vector3d curve =
+  rows (count, 2) = 1.0 / (0.5 * kCurvature * slope_of (points));
+  for (Eigen::Index line = 0; line < lines; line++)
+    rows (count + 1 + line, 3 + line) = 1e-3 / slope_of (points);
+  const Eigen::VectorXd curve =
       solve_normal (normal_of (rows), rows.transpose () * lights);
   return (lights - rows * curve).squaredNorm ();
 }
@@ -126,7 +131,8 @@ fit_switching (const std::vector<SwitchPoint> &points, double jitter)
   for (int i = 0; i <= kGrid; i++)
     values.push_back (best_misfit (points, kLongest * i / kGrid, jitter));
   const auto least = std::ranges::min_element (values);
-  const double freedom = std::max (1.0, double (points.size ()) - 5.0);
+  const double freedom = std::max (
+      1.0, double (points.size ()) - 5.0 - double (points[0].flicker.size ()));
   const double unit = std::max (1.0, *least / freedom);
   /* One standard deviation is where chi-square has grown by one. */
   int low = int (least - values.begin ()), high = low;
@@ -142,10 +148,39 @@ fit_switching (const std::vector<SwitchPoint> &points, double jitter)
 namespace
 {
 
+/* Seconds of light that the known lines of the lamp add to runs [@from, @until)
+ * of @frames cycles, the mean of whose times is @time; cosine and sine of their
+ * depth. */
+std::vector<double>
+flicker_of (const Examination &examination, double time, double from,
+    double until, int frames)
+{
+  using std::numbers::pi;
+  std::vector<double> parts;
+  if (!examination.light)
+    return parts;
+  for (const LightFit::Line &line : examination.light->lines) {
+    const double turns = 2.0 * pi * line.frequency.value;
+    const double at = turns * (time - examination.light->epoch);
+    /* Of one that is not in step with the frames, the mean is less. */
+    const double step = 0.5 * turns * examination.rig.parts ().period ();
+    const double left =
+        std::abs (std::sin (step)) < 1e-6
+            ? 1.0
+            : std::sin (frames * step) / (frames * std::sin (step));
+    const double depth = line.depth.value * left / turns;
+    parts.push_back (
+        depth * (std::sin (at + turns * until) - std::sin (at + turns * from)));
+    parts.push_back (
+        depth * (std::cos (at + turns * from) - std::cos (at + turns * until)));
+  }
+  return parts;
+}
+
 /* The mean of @frames whose light goes off with the end of @run. */
 Result<SwitchPoint>
-see_point (Examination &examination, const Examination::Lit &run, int frames,
-    const Image<float> &dark, ImageView<const std::uint8_t> good)
+see_point (Examination &examination, const Examination::Lit &run, double end,
+    int frames, const Image<float> &dark, ImageView<const std::uint8_t> good)
 {
   ASSIGN_OR_RETURN (
       const Stack stack, look_at_light (examination, lit (run.first, run.slots),
@@ -162,35 +197,33 @@ see_point (Examination &examination, const Examination::Lit &run, int frames,
           ? examination.light->drift.value *
                 (1e-9 * double (stack.time) - examination.light->epoch)
           : 0.0;
-  return SwitchPoint{1e-9 * period * (run.first + run.slots) / run.of,
-      black + (means.mean - black) / (1.0 + grown),
+  const double slot = 1e-9 * period / run.of;
+  const double off = slot * (run.first + run.slots);
+  return SwitchPoint{off, black + (means.mean - black) / (1.0 + grown),
       std::hypot (std::hypot (rounding, kLightError * means.mean),
-          stack.scatter / std::sqrt (frames))};
+          stack.scatter / std::sqrt (frames)),
+      flicker_of (examination, 1e-9 * double (stack.time), slot * run.first,
+          std::min (off, 1e-9 * end), frames)};
 }
 
-/* The points of all moments; @run begins with its slot. Each time, another one
- * is the first: flicker that is in step with the looks makes every other one
- * brighter. */
+/* The points of all moments; @run begins with its slot. */
 Result<void>
 see_points (Examination &examination, Examination::Lit run, double end,
     std::vector<SwitchPoint> &points, const Image<float> &dark,
     ImageView<const std::uint8_t> good)
 {
   const double period = double (examination.rig.parts ().rate.period ());
-  constexpr std::size_t kCount = std::size (kMoments);
-  const std::size_t turn = (points.size () + kCount - 1) / kCount;
-  for (std::size_t i = 0; i < kCount; i++) {
-    const Nanoseconds moment = kMoments[(i + turn) % kCount];
+  for (const Nanoseconds moment : kMoments) {
     const double time = end + double (moment);
     run.slots = int (std::lround (time * run.of / period)) - run.first;
     if (moment < kFirst && time < double (kLeast))
       continue;
     if (time > period - double (kLeast))
-      continue;
+      break;
     const bool about = moment > kAboutFrom && moment < kAboutUntil;
     ASSIGN_OR_RETURN (const SwitchPoint point,
-        see_point (
-            examination, run, about ? kFramesAbout : kFramesElse, dark, good));
+        see_point (examination, run, end, about ? kFramesAbout : kFramesElse,
+            dark, good));
     points.push_back (point);
   }
   std::ranges::stable_sort (points, {}, &SwitchPoint::time);

@@ -28,7 +28,7 @@ TEST (MirrorsCheck, NumbersOfHealthyBenchesAreThoseInjected)
 TEST (MirrorsCheck, NamesWhatIsWrong)
 {
   for (const char *words : {"leak=0.03", "slow-mirrors=500us",
-           "slow-mirrors=300us", "slow-mirrors=150us", "slow-mirrors=3ms",
+           "slow-mirrors=300us", "slow-mirrors=200us", "slow-mirrors=3ms",
            "stuck-on=20", "stuck-on=2", "stuck-off=20", "stuck-off=100",
            "flipped-x", "flipped-y", "turned=90", "turned=180", "turned=270"})
     expect_named (words, check_mirrors);

@@ -18,8 +18,10 @@ namespace
 
 constexpr int kChanges = 12, kFramesOfChange = 10;
 constexpr int kTiles = 8;
-/* Levels of one mask differ less, as part of the step to the other one. */
-constexpr double kSameLevel = 0.45;
+/* Levels of one mask differ less, as parts of the step to the other one: to
+ * tell which mask it is, though the light flickers; and to tell that a frame is
+ * of one mask alone. */
+constexpr double kSameMask = 0.45, kSameLevel = 0.2;
 /* Light of all mirrors by which a run of an eighth can be measured, part of the
  * range. */
 constexpr double kFaint = 0.05;
@@ -96,13 +98,13 @@ LagCheck::judge (const std::vector<SeenFrame> &seen, double before,
   bool turned = false;
   for (std::size_t i = pause; i < seen.size (); i++) {
     const double mean = level_of (seen[i].picture.view (), largest_).mean;
+    const double off =
+        std::abs (mean - after) / std::max (1e-9, std::abs (before - after));
+    const bool is_old = off > kSameMask;
     // A frame that was cut short lies between the masks, and is not new.
-    const bool is_old =
-        std::abs (mean - after) > kSameLevel * std::abs (before - after);
-    if (is_old) {
+    if (off > kSameLevel)
       change.old = int (i) + 1;
-      change.mixed |= turned;
-    }
+    change.mixed |= is_old && turned;
     if (i > 0 && i != pause)
       change.lost += int (cycles (seen[i - 1].time, seen[i].time)) - 1;
     turned |= !is_old;

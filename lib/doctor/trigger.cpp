@@ -40,7 +40,7 @@ constexpr double kUnsteady = 0.2;
 /* Rows that are exposed later by that part of a period are not by noise. */
 constexpr double kRowDelay = 0.02;
 /* Mirrors are half way, and clocks tick, within that; s. */
-constexpr double kTicks = 1.8e-6, kLengthTicks = 0.9e-6;
+constexpr double kTicks = 1.8e-6, kLengthTicks = 1.3e-6;
 /* Steps of pixel values in which nothing can be measured, part of the range. */
 constexpr double kCoarsest = 0.03;
 
@@ -110,7 +110,7 @@ private:
   Result<void> sample_inside (const LightModel &guess);
   Result<void> measure_exposure ();
   Result<void> diagnose_exposure (const LightFit &fit);
-  Result<bool> blame_light (bool surely);
+  Result<bool> blame_light ();
   void diagnose_end (const Measured &end, const Measured &length);
   std::optional<double> set_delay () const;
   double possible_start (double start) const;
@@ -273,7 +273,7 @@ TriggerCheck::sample_ends (double end, int exposure)
     at = grid_; // a run that short has little light
   const int first = std::max (at - grid_ / kTiles, 0);
   for (const int aside : {-4, -2, -1, 0, 2})
-    if (const int until = at + aside; until > first && until <= grid_)
+    if (const int until = std::min (at + aside, grid_); until > first)
       RETURN_IF_ERROR (sample (first, until - first, exposure, kFineFrames));
   return {};
 }
@@ -428,13 +428,13 @@ TriggerCheck::diagnose_end (const Measured &end, const Measured &length)
         verdict);
 }
 
-/** Where the light hides the exposure, or what looks like jitter. Blames
- * nothing if it is steady. */
+/** Whether it is the light that hides the exposure, or that looks like jitter;
+ * it is blamed then. */
 Result<bool>
-TriggerCheck::blame_light (bool surely)
+TriggerCheck::blame_light ()
 {
   ASSIGN_OR_RETURN (const Steadiness light, steadiness_of (examination_));
-  if (light == Steadiness::steady && !surely)
+  if (light == Steadiness::steady)
     return false;
   const bool pulsed = light == Steadiness::pulsed;
   finding_.blame (pulsed ? "pulsed" : "flicker",
@@ -455,7 +455,11 @@ TriggerCheck::diagnose_exposure (const LightFit &fit)
   const bool possible = length.value > 0.0 && length.value < kLongest * period_;
   const bool known = start.sigma + length.sigma < kUnclear * period_;
   if (!possible || (!known && verdict_of ("jitter", jitter) != Verdict::fail)) {
-    RETURN_IF_ERROR (blame_light (true));
+    ASSIGN_OR_RETURN (const bool blamed, blame_light ());
+    if (!blamed)
+      finding_.blame ("jitter",
+          "the light is steady, but the exposure begins at such varying times "
+          "that it cannot be found");
     return {};
   }
   remember (fit, start, length);
@@ -470,7 +474,7 @@ TriggerCheck::diagnose_exposure (const LightFit &fit)
   /* Where all frames scatter, nothing else can be told, not even by how much.
    */
   if (verdict_of ("jitter", jitter) >= Verdict::warn) {
-    ASSIGN_OR_RETURN (const bool blamed, blame_light (false));
+    ASSIGN_OR_RETURN (const bool blamed, blame_light ());
     if (blamed)
       return {};
   }

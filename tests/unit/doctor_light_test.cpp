@@ -137,9 +137,10 @@ TEST (Checks, FindNothingInHealthyBenches)
     const Measured corner = seen.number (seen.light, "light lost in a corner");
     EXPECT_NEAR (corner.value, 100.0 * seen.options.vignetting, 3.0);
   }
-  EXPECT_GE (delays.inside, 0.9 * delays.all);
-  EXPECT_GE (exposures.inside, 0.9 * exposures.all);
-  EXPECT_GE (depths.inside, 0.9 * depths.all);
+  // Of eight errors, one may well be beyond two standard deviations.
+  EXPECT_GE (delays.inside, 0.9 * delays.all - 1.0);
+  EXPECT_GE (exposures.inside, 0.9 * exposures.all - 1.0);
+  EXPECT_GE (depths.inside, 0.9 * depths.all - 1.0);
 }
 
 TEST (Checks, MeasureFlicker)

@@ -28,6 +28,9 @@ constexpr int kSlots = 8; // of a run
 /* By how much more, as a part of their light, short runs change than long ones
  * where the light is switched and not only slow. */
 constexpr double kFaster = 2.5;
+/* The same of runs that are a third as long: pulses give both the same light.
+ */
+constexpr double kFasterThird = 1.7;
 /* Squares that a model leaves of a change that it explains. */
 constexpr double kExplained = 0.02;
 
@@ -173,9 +176,10 @@ measure_pulses (Examination &examination)
   longer.add (runs, *light);
   if (shorter.count < 2.0 * kFrames || longer.count < kFrames)
     return std::optional<Measured> ();
-  const double rms = shorter.mean () > kFaster * kFaster * longer.mean ()
-                         ? length * std::sqrt (shorter.mean () - longer.mean ())
-                         : 0.0;
+  const double rms =
+      shorter.mean () > kFasterThird * kFasterThird * longer.mean ()
+          ? length * std::sqrt (shorter.mean () - longer.mean ())
+          : 0.0;
   return std::optional (Measured{rms, rms / std::sqrt (2.0 * shorter.count)});
 }
 

@@ -44,7 +44,8 @@ LiveBench::make (SickBenchOptions options, int kind)
 {
   const emulated::EmulatedDlpc900 like (kind);
   options.mirrors = like.size ();
-  options.gamma = 1.0; // a camera's own feature
+  if (!options.has ("mute"))
+    options.gamma = 1.0; // a camera's own feature
   ASSIGN_OR_RETURN (SickBench bench, SickBench::make (options));
   return std::unique_ptr<LiveBench> (new LiveBench (std::move (bench), kind));
 }

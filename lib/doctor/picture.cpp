@@ -262,9 +262,9 @@ check_pictures (const std::vector<SeenFrame> &frames, const Image<float> &dark,
   judge_change (change_between (part_of (frames, 0, half, largest),
                     part_of (frames, half, half, largest), dark),
       finding);
-  if (finding.diagnoses.empty ())
+  if (!finding.is_ill ())
     judge_noise (correlations_of (frames, all, dark), finding);
-  if (finding.diagnoses.empty ())
+  if (!finding.is_ill ())
     finding.measure ("texture", {100.0 * texture_of (light), 0.1});
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/statistics.h"
+#include "doctor/field.h"
 
 namespace codedexposure
 {
@@ -12,8 +13,6 @@ namespace codedexposure
 namespace
 {
 
-/* Side of the blocks whose medians are the light without defects. */
-constexpr int kBlock = 24;
 /* Pixels with less than this part of the bright ones' light see no mirrors. */
 constexpr double kCovered = 0.1;
 /* Part of the light by which a pixel differs that has a defect. */
@@ -30,42 +29,6 @@ constexpr double kThick = 6.0; // of a block, mirrors
 constexpr double kSharp = 0.9;
 /* Pixels of a spot that mirrors make, in mirrors. */
 constexpr double kSpot = 30.0;
-
-/* A smooth picture: the medians of blocks, bilinear between their centres and
- * beyond them. */
-Image<float>
-smooth (const Image<float> &image)
-{
-  const int columns = std::max (1, image.width () / kBlock);
-  const int rows = std::max (1, image.height () / kBlock);
-  const double wide = double (image.width ()) / columns;
-  const double high = double (image.height ()) / rows;
-  Image<float> medians (columns, rows);
-  each_pixel (medians, [&] (int i, int j) {
-    std::vector<float> values;
-    for (int y = int (j * high); y < int ((j + 1) * high); y++)
-      for (int x = int (i * wide); x < int ((i + 1) * wide); x++)
-        values.push_back (image.at (x, y));
-    medians.at (i, j) = median (std::move (values));
-  });
-  const auto place = [] (double at, int count) {
-    const int low =
-        std::clamp (int (std::floor (at)), 0, std::max (0, count - 2));
-    return std::pair (low, count > 1 ? float (at - low) : 0.0f);
-  };
-  Image<float> result (image.width (), image.height ());
-  each_pixel (image, [&] (int x, int y) {
-    const auto [i, u] = place ((x + 0.5) / wide - 0.5, columns);
-    const auto [j, v] = place ((y + 0.5) / high - 0.5, rows);
-    const int right = std::min (i + 1, columns - 1);
-    const int below = std::min (j + 1, rows - 1);
-    const float top = (1 - u) * medians.at (i, j) + u * medians.at (right, j);
-    const float bottom =
-        (1 - u) * medians.at (i, below) + u * medians.at (right, below);
-    result.at (x, y) = (1 - v) * top + v * bottom;
-  });
-  return result;
-}
 
 /* Of the pixels around one, beyond what a mirror lights. */
 double

@@ -23,6 +23,8 @@ constexpr int kColumns = 24, kRows = 18, kFewBlocks = 30;
 /* Of the median: a block that is darker sees no mirrors. */
 constexpr double kNoMirrors = 0.1;
 constexpr double kOutlier = 5.0;
+/* Side of the blocks whose medians are the light without defects, pixels. */
+constexpr int kSide = 24;
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN ();
 
 /** A surface of second order, and of fourth along the radius; u and v are -1
@@ -54,6 +56,40 @@ blocks_of (ImageView<const float> picture)
 }
 
 } // namespace
+
+Image<float>
+smooth (const Image<float> &image)
+{
+  const int columns = std::max (1, image.width () / kSide);
+  const int rows = std::max (1, image.height () / kSide);
+  const double wide = double (image.width ()) / columns;
+  const double high = double (image.height ()) / rows;
+  Image<float> medians (columns, rows);
+  each_pixel (medians, [&] (int i, int j) {
+    std::vector<float> values;
+    for (int y = int (j * high); y < int ((j + 1) * high); y++)
+      for (int x = int (i * wide); x < int ((i + 1) * wide); x++)
+        values.push_back (image.at (x, y));
+    medians.at (i, j) = median (std::move (values));
+  });
+  const auto place = [] (double at, int count) {
+    const int low =
+        std::clamp (int (std::floor (at)), 0, std::max (0, count - 2));
+    return std::pair (low, count > 1 ? float (at - low) : 0.0f);
+  };
+  Image<float> result (image.width (), image.height ());
+  each_pixel (image, [&] (int x, int y) {
+    const auto [i, u] = place ((x + 0.5) / wide - 0.5, columns);
+    const auto [j, v] = place ((y + 0.5) / high - 0.5, rows);
+    const int right = std::min (i + 1, columns - 1);
+    const int below = std::min (j + 1, rows - 1);
+    const float top = (1 - u) * medians.at (i, j) + u * medians.at (right, j);
+    const float bottom =
+        (1 - u) * medians.at (i, below) + u * medians.at (right, below);
+    result.at (x, y) = (1 - v) * top + v * bottom;
+  });
+  return result;
+}
 
 Measured
 corner_loss (ImageView<const float> picture)

@@ -18,4 +18,8 @@ namespace codedexposure
  */
 Measured corner_loss (ImageView<const float> picture);
 
+/** @p image without what is smaller than some ten pixels, such as defects: the
+ * medians of blocks, bilinear between their centres and beyond them. */
+Image<float> smooth (const Image<float> &image);
+
 } // namespace codedexposure

@@ -89,9 +89,12 @@ Finding::judge (
   std::string text = cause.empty () ? rule.cause : cause;
   if (const std::size_t at = text.find ("{}"); at != text.npos)
     text.replace (at, 2, codedexposure::shown (number.value));
-  if (verdict == Verdict::unknown)
-    text = std::string (*rule.reading == 0 ? rule.id : rule.reading) + " is " +
-           codedexposure::shown (number.value) + " +- " +
+  const std::string what = *rule.reading == 0 ? rule.id : rule.reading;
+  if (!is_finite (number))
+    text = what + " could not be measured: it should be " +
+           text_of (rule.good) + " " + rule.unit;
+  else if (verdict == Verdict::unknown)
+    text = what + " is " + codedexposure::shown (number.value) + " +- " +
            codedexposure::shown (number.sigma) + " " + rule.unit +
            ", too uncertain to tell whether it is " + text_of (rule.good);
   blame (rule.id, std::move (text), verdict, rule.remedy);

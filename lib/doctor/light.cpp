@@ -144,15 +144,8 @@ LightCheck::judge_time ()
 Result<Verdict>
 LightCheck::judge_pulses ()
 {
-  ASSIGN_OR_RETURN (const auto light, measure_pulses (examination_));
-  if (light)
-    return finding_.measure ("light of a pulse", scaled (*light, 1e6));
-  if (!examination_.light)
-    finding_.add ("light of a pulse", kNotMeasured);
-  else
-    finding_.notes.push_back (
-        {"pulses", "The frame period is too short to look for them."});
-  return Verdict::unknown;
+  ASSIGN_OR_RETURN (const Measured light, measure_pulses (examination_));
+  return finding_.measure ("light of a pulse", scaled (light, 1e6));
 }
 
 /** What is not even may also move, slowly. */
@@ -165,7 +158,7 @@ LightCheck::judge_target (const Stack &all, const Stack &dark)
   ASSIGN_OR_RETURN (
       const Stack later, look_at_light (examination_, lit (first, slots), of,
                              kFrames, &dark.mean));
-  judge_change (change_between (all, later, dark.mean), finding_);
+  finding_.judge (kChange, change_between (all, later, dark.mean));
   if (finding_.diagnoses.size () > 1)
     std::ranges::rotate (finding_.diagnoses, finding_.diagnoses.begin () + 1);
   return {};

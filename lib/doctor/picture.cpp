@@ -6,6 +6,8 @@
 #include <cmath>
 
 #include "base/statistics.h"
+#include "doctor/defects.h"
+#include "doctor/field.h"
 
 namespace codedexposure
 {
@@ -13,60 +15,18 @@ namespace codedexposure
 namespace
 {
 
-/* Light of the brightest pixels of a mosaic, by that of the darkest, more than
- * which no sensor without colours has. */
-constexpr double kMosaic = 1.05;
 /* Below this variance over time, DN squared, rounding hides the noise. */
 constexpr double kQuiet = 0.15;
-/* Correlation of noise that a linear camera does not have. */
-constexpr double kCorrelated = 0.02, kMixedFrames = 0.05;
-/* Half of the side of the box whose mean is the light without texture. */
-constexpr int kBox = 7;
-/* Texture beyond that part of the light is a defect of the mirrors or dust. */
-constexpr double kSpot = 0.12;
-/* Pixels with less than that part of the light see no mirrors. */
-constexpr double kCovered = 0.3;
-/* Pixels of a block whose means are compared, and how often their squares may
- * be what noise makes them. */
+/* Pixels of a block whose means are compared. */
 constexpr int kBlock = 4;
-constexpr double kMoved = 3.0;
+/* Readings. */
+constexpr const char *kNeighbours = "noise that neighbours share";
+constexpr const char *kOverTime = "noise shared with the frame before";
 
-/** Sums of rectangles of a picture. */
-class Sums
-{
-public:
-  template <typename Value>
-  Sums (int width, int height, Value value)
-      : width_ (width), sums_ (std::size_t ((width + 1) * (height + 1)))
-  {
-    for (int y = 0; y < height; y++)
-      for (int x = 0; x < width; x++)
-        at (x + 1, y + 1) =
-            at (x, y + 1) + at (x + 1, y) - at (x, y) + value (x, y);
-  }
-  /** Of [left, right) and [top, bottom). */
-  double of (int left, int top, int right, int bottom) const
-  {
-    return at (right, bottom) - at (left, bottom) - at (right, top) +
-           at (left, top);
-  }
-
-private:
-  double at (int x, int y) const
-  {
-    return sums_[std::size_t (y * (width_ + 1) + x)];
-  }
-  double &at (int x, int y)
-  {
-    return sums_[std::size_t (y * (width_ + 1) + x)];
-  }
-
-  int width_;
-  std::vector<double> sums_;
-};
-
-void
-judge_mosaic (const Image<float> &light, Finding &finding)
+/* By how much less light than the brightest one the darkest of each 2x2 pixels
+ * has, as a part. */
+double
+mosaic_of (const Image<float> &light)
 {
   std::array<std::array<double, 2>, 2> sums = {};
   each_pixel (light, [&] (int x, int y) {
@@ -74,17 +34,14 @@ judge_mosaic (const Image<float> &light, Finding &finding)
   });
   const auto [low, high] =
       std::minmax ({sums[0][0], sums[0][1], sums[1][0], sums[1][1]});
-  if (high > kMosaic * std::max (low, 1.0))
-    finding.blame (
-        "colour", "of four neighbouring pixels, one always has " +
-                      fixed (100.0 * (1.0 - low / high), 0) +
-                      " % less light than another: each sees one colour only");
+  return 1.0 - low / std::max (high, 1.0);
 }
 
 /** Of the noise of pixels: with the next one in x, in y, and in time. */
 struct Correlations {
   double across = 0.0, down = 0.0, over_time = 0.0;
   double variance = 0.0; ///< DN squared
+  double values = 0.0;   ///< that they are of
 };
 
 /* Only of what all pixels do not have in common. Pixels at the ends of the
@@ -126,59 +83,55 @@ correlations_of (const std::vector<SeenFrame> &frames, const Stack &stack,
   /* What remains of a mean of few frames is correlated by itself. */
   return {across / squares, down / squares,
       time / squares * count / (count - 1.0) + 1.0 / (count - 1.0),
-      squares / std::max (1.0, pixels) * count / (count - 1.0)};
+      squares / std::max (1.0, pixels) * count / (count - 1.0), pixels};
 }
 
+/* Noise that rounding hides says nothing. */
 void
 judge_noise (const Correlations &noise, Finding &finding)
 {
-  if (noise.variance < kQuiet)
-    return;
-  const double most = std::max (noise.across, noise.down);
-  const double least = std::min (noise.across, noise.down);
-  const auto percent = [] (double part) {
-    return fixed (100.0 * part, 0) + " %";
+  const double error = 100.0 / std::sqrt (std::max (1.0, noise.values));
+  const auto measured = [&] (double part) {
+    return noise.variance < kQuiet ? kNotMeasured
+                                   : Measured{100.0 * part, error};
   };
-  if (noise.over_time > kMixedFrames)
+  const double most = std::abs (noise.across) > std::abs (noise.down)
+                          ? noise.across
+                          : noise.down;
+  const Measured beside = measured (most), before = measured (noise.over_time);
+  finding.add (kNeighbours, beside);
+  finding.add (kOverTime, before);
+  const bool spaced = verdict_of (kNeighbours, beside) == Verdict::fail;
+  const bool timed = verdict_of (kOverTime, before) == Verdict::fail;
+  const auto share = [] (const Measured &number) {
+    return " (correlation " + fixed (number.value, 0) + " %)";
+  };
+  if (spaced && most > 0.0)
     finding.blame ("noise-reduction",
-        "the noise of a frame has " + percent (noise.over_time) +
-            " in common with that of the frame before: the camera mixes "
-            "frames");
-  else if (least < -kCorrelated)
+        "neighbouring pixels share noise: the camera mixes them" +
+            share (beside));
+  else if (spaced)
     finding.blame ("sharpening",
-        "the noise of neighbouring pixels has opposite signs (correlation " +
-            percent (least) + "): the camera makes them differ more");
-  else if (most > kCorrelated)
-    finding.blame ("noise-reduction", "the noise of neighbouring pixels has " +
-                                          percent (most) +
-                                          " in common: the camera mixes them");
+        "the noise of neighbouring pixels has opposite signs: the camera makes "
+        "them differ more" +
+            share (beside));
+  else if (timed)
+    finding.blame ("noise-reduction",
+        "frames share noise with those before: the camera mixes them" +
+            share (before));
 }
 
-/* What neighbours two pixels apart have in common beyond the mean around them,
+/* What neighbours two pixels apart have in common beyond the light around them,
  * as a part of the light: no noise, and not the pixels' own sensitivity. */
 double
-texture_of (const Image<float> &light)
+texture_of (const Image<float> &light, ImageView<const std::uint8_t> good)
 {
   const int width = light.width (), height = light.height ();
-  std::vector<float> values;
-  each_pixel (
-      light, [&] (int x, int y) { values.push_back (light.at (x, y)); });
-  const float least = float (kCovered) * median (std::move (values));
-  const Sums sums (
-      width, height, [&] (int x, int y) { return double (light.at (x, y)); });
-  const Sums uncovered (width, height,
-      [&] (int x, int y) { return light.at (x, y) > least ? 0.0 : 1.0; });
+  const Image<float> even = smooth (light);
   Image<float> rest (width, height);
   each_pixel (rest, [&] (int x, int y) {
-    const int left = std::max (0, x - kBox), top = std::max (0, y - kBox);
-    const int right = std::min (width, x + kBox + 1);
-    const int bottom = std::min (height, y + kBox + 1);
-    if (uncovered.of (left, top, right, bottom) > 0.5)
-      return;
-    const double mean = sums.of (left, top, right, bottom) /
-                        double ((right - left) * (bottom - top));
-    const double part = double (light.at (x, y)) / mean - 1.0;
-    rest.at (x, y) = float (std::clamp (part, -kSpot, kSpot));
+    if (good.at (x, y) != 0)
+      rest.at (x, y) = light.at (x, y) / even.at (x, y) - 1.0f;
   });
   double common = 0.0, count = 0.0;
   for (int y = 0; y + 2 < height; y++)
@@ -241,31 +194,24 @@ change_between (const Stack &a, const Stack &b, const Image<float> &dark)
 }
 
 void
-judge_change (const Measured &change, Finding &finding)
-{
-  if (change.value - 2.0 * change.sigma > kMoved)
-    finding.blame ("moving",
-        "the same mask does not make the same picture again: pixels change " +
-            shown (std::sqrt (change.value)) + " times as much as by noise");
-}
-
-void
 check_pictures (const std::vector<SeenFrame> &frames, const Image<float> &dark,
     int largest, Finding &finding)
 {
-  if (frames.size () < 4)
-    return;
   const std::size_t half = frames.size () / 2;
   const Stack all = stack_of (frames, largest, &dark);
   const Image<float> light = difference (all.mean, dark);
-  judge_mosaic (light, finding);
-  judge_change (change_between (part_of (frames, 0, half, largest),
-                    part_of (frames, half, half, largest), dark),
-      finding);
+  finding.measure (
+      "light that one of 2x2 pixels lacks", {100.0 * mosaic_of (light), 0.0});
+  finding.measure (kChange, change_between (part_of (frames, 0, half, largest),
+                                part_of (frames, half, half, largest), dark));
+  // A picture that is not even and moves a little looks like noise.
+  if (!finding.is_ill ())
+    finding.measure ("texture",
+        {100.0 * texture_of (light,
+                     find_defects (dark, all.mean, largest).good.view ()),
+            0.1});
   if (!finding.is_ill ())
     judge_noise (correlations_of (frames, all, dark), finding);
-  if (!finding.is_ill ())
-    finding.measure ("texture", {100.0 * texture_of (light), 0.1});
 }
 
 } // namespace codedexposure

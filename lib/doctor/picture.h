@@ -9,14 +9,14 @@ namespace codedexposure
 {
 
 /**
- * Blames in @p finding what the frames of one mask show, whatever the camera
- * says of itself: "colour" (pixels of a 2x2 mosaic get different light),
- * "noise-reduction" and "sharpening" (the noise of neighbours, or of frames, is
- * not independent), "moving" and "texture" (the light is not even, and changes
- * its place).
+ * Measures and judges in @p finding what the frames of one mask show, whatever
+ * the camera says of itself: "colour" (pixels of a 2x2 mosaic get different
+ * light), "noise-reduction" and "sharpening" (the noise of neighbours, or of
+ * frames, is not independent), "moving" and "texture" (the light is not even,
+ * and changes its place).
  *
- * @p frames: of the same mask, not saturated, in their order. @p dark: their
- * mean without light.
+ * @p frames: four or more, of the same mask, not saturated, in their order. @p
+ * dark: their mean without light.
  */
 void check_pictures (const std::vector<SeenFrame> &frames,
     const Image<float> &dark, int largest, Finding &finding);
@@ -24,12 +24,12 @@ void check_pictures (const std::vector<SeenFrame> &frames,
 /**
  * How much more two stacks of the same mask differ than their noise explains,
  * as the ratio of the squares, in what neighbouring pixels have in common. 1 if
- * nothing moved.
+ * nothing moved; not measured where pixels are full.
  */
 Measured change_between (
     const Stack &a, const Stack &b, const Image<float> &dark);
 
-/** Blames "moving" if @p change is one. */
-void judge_change (const Measured &change, Finding &finding);
+/** The reading of that. */
+inline constexpr const char *kChange = "change of the picture";
 
 } // namespace codedexposure

@@ -18,9 +18,11 @@ namespace
 /* Lengths of the runs, by that of the longest: no frequency of pulses has whole
  * numbers of them in all three. */
 constexpr double kLengths[] = {1.0, 0.9, 0.84};
-/* Of the longest run, s, and as a part of the period. Where it is short, light
- * of some DN is rounded; a DMD shows no mask for less than the least. */
-constexpr double kLongest = 3.6e-3, kLongestPart = 0.09, kLeast = 0.15e-3;
+/* Of the longest run, s, and as a part of the period, within both of which it
+ * lies; where it is short, light of some DN is rounded. A DMD shows no mask for
+ * a shorter time than the least. */
+constexpr double kLongest = 3.6e-3, kLongestPart = 0.09;
+constexpr double kLeast = 0.135e-3, kLeastPart = 0.15;
 /* Runs of which nothing is known, s. */
 constexpr double kMoment = 1.07e-3;
 constexpr int kPlaces = 4, kFrames = 4;
@@ -154,14 +156,16 @@ steadiness_of (Examination &examination)
                                       : Steadiness::steady;
 }
 
-Result<std::optional<Measured>>
+Result<Measured>
 measure_pulses (Examination &examination)
 {
   const auto &light = examination.light;
   const double period = examination.rig.parts ().period ();
-  const double longest = std::min (kLongest, kLongestPart * period);
-  if (!light || light->model.lengths.size () < 2 || longest < kLeast)
-    return std::optional<Measured> ();
+  const double longest =
+      std::max (kLeast, std::min (kLongest, kLongestPart * period));
+  if (!light || light->model.lengths.size () < 2 ||
+      longest > kLeastPart * period)
+    return kNotMeasured;
   Rest shorter, longer;
   double length = 0.0; // of the shorter ones, s, the mean
   for (const double part : kLengths) {
@@ -175,12 +179,12 @@ measure_pulses (Examination &examination)
   RETURN_IF_ERROR (see_runs (runs, light->model, period, runs.grid () / 4));
   longer.add (runs, *light);
   if (shorter.count < 2.0 * kFrames || longer.count < kFrames)
-    return std::optional<Measured> ();
+    return kNotMeasured;
   const double rms =
       shorter.mean () > kFasterThird * kFasterThird * longer.mean ()
           ? length * std::sqrt (shorter.mean () - longer.mean ())
           : 0.0;
-  return std::optional (Measured{rms, rms / std::sqrt (2.0 * shorter.count)});
+  return Measured{rms, rms / std::sqrt (2.0 * shorter.count)};
 }
 
 } // namespace codedexposure

@@ -2,8 +2,6 @@
 /* Whether the lamp is switched faster than flicker is looked for. */
 #pragma once
 
-#include <optional>
-
 #include "doctor/checks.h"
 
 namespace codedexposure
@@ -14,11 +12,10 @@ namespace codedexposure
  * compares their light with what the check of the trigger says of it. A lamp
  * that is dimmed by pulses gives them different parts of a pulse.
  *
- * Of the light of a run that is switched: rms, s. None where the light is not
- * known, frames lack, or the frame period is too short: then flicker of whole
- * frames shows it.
+ * Of the light of a run that is switched: rms, s. Not measured where the light
+ * is not known, frames lack, or the frame period is too short.
  */
-Result<std::optional<Measured>> measure_pulses (Examination &examination);
+Result<Measured> measure_pulses (Examination &examination);
 
 /** What happens to the light within a frame period. */
 enum class Steadiness { steady, flickers, pulsed };

@@ -59,7 +59,6 @@ constexpr Rule kRules[] = {
     told ("dmd-busy", "close the other program that uses the board"),
     told ("rolling-shutter",
         "set SensorShutterMode=Global, or use a camera with a global shutter"),
-    told ("colour", "use the monochrome model of this camera"),
     told ("pixel-format", "set --pixel-format Mono12"),
     told ("firmware", "update it with TI's program"),
     told ("slow-disk", "choose an --output folder on a faster disk"),
@@ -104,8 +103,6 @@ constexpr Rule kRules[] = {
     told ("binning",
         "set BinningHorizontal, BinningVertical and the decimation "
         "to 1, or use a lens of that magnification"),
-    told ("black-clamp", "set BlackLevelAuto=Off, and switch off every clamp "
-                         "of the black level"),
     told ("rate-limit", "set AcquisitionFrameRateEnable=false"),
     {"", "end of the exposure, from that of the frame period", "us",
         {-600, 400}, {-900, 700}, "", ""},
@@ -139,12 +136,24 @@ constexpr Rule kRules[] = {
         "the light changes by {} % a minute",
         "wait until the light is warm, and drive it with a constant current"},
 
-    {"pulsed", "light of a pulse", "us", most (2.5), most (5),
+    {"pulsed", "light of a pulse", "us", most (2.5), most (2.5),
         "the light of some milliseconds changes by that of {} us: the lamp is "
         "switched on and off",
         "dim the lamp by its current instead of pulses, or by a grey filter"},
-    told ("moving", "see that neither target nor bench moves"),
-    {"texture", "texture", "%", most (1), most (2),
+    // Where the camera mixes 3x3 pixels, noise makes 9 of it.
+    {"moving", "change of the picture", "times that of noise", most (10),
+        most (10),
+        "the same mask does not make the same picture again: it changes by {} "
+        "times the squares of noise",
+        "see that neither target nor bench moves"},
+    {"colour", "light that one of 2x2 pixels lacks", "%", most (5), most (5),
+        "of four neighbouring pixels, one always has {} % less light than "
+        "another: each sees one colour only",
+        "use the monochrome model of this camera"},
+    {"", "noise that neighbours share", "%", within (2), within (2), "", ""},
+    {"", "noise shared with the frame before", "%", within (5), within (5), "",
+        ""},
+    {"texture", "texture", "%", most (1), most (1),
         "the target is not even: neighbouring places differ by {} %",
         "place a plain target, somewhat out of focus"},
     told ("noise-reduction", "switch off noise reduction, interpolation and "
@@ -174,6 +183,14 @@ constexpr Rule kRules[] = {
         "mirrors that are off pass {} % of the light",
         "block the light of the off direction with a trap, stop down the lens, "
         "and look for stray light and reflections between lens and window"},
+    {"black-clamp", "fall of the black level", "% of the light", most (0.2),
+        most (0.2),
+        "with light on half of the mirrors, pixels of the other half fall "
+        "below "
+        "their value in the dark, by {} % of the light: the camera moves its "
+        "black level",
+        "set BlackLevelAuto=Off, and switch off every clamp of the black "
+        "level"},
     {"slow-mirrors", "switching time", "us", most (150), most (300),
         "the light takes {} us to go off, where mirrors need less than 20 us",
         "check that nothing else shutters the light, such as a pulsed lamp or "

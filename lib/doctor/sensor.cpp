@@ -378,7 +378,7 @@ PhotonTransferRun::diagnose_defects (
 void
 PhotonTransferRun::diagnose ()
 {
-  judge_change (moved_, finding_);
+  finding_.measure (kChange, moved_);
   const int bits = examination_.rig.parts ().bits;
   if (const int missing = missing_bits (); missing > 0)
     finding_.blame ("missing-bits", "the lowest " + std::to_string (missing) +

@@ -14,8 +14,8 @@ struct SwitchPoint {
   double time = 0.0;  ///< s, from any moment on
   double light = 0.0; ///< DN
   double sigma = 1.0;
-  /** What each known line of the lamp adds, as cosine and sine of unit size: its
-   * phase is another one in each look. As many in all points. */
+  /** What each known line of the lamp adds, as cosine and sine of unit size:
+   * its phase is another one in each look. As many in all points. */
   std::vector<double> flicker = {};
 };
 

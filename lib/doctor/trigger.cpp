@@ -300,10 +300,10 @@ TriggerCheck::judge_rows ()
   for (std::size_t i = 0; i < runs_.samples.size (); i++)
     tiles[runs_.samples[i].from].push_back (runs_.borders[i]);
   const auto delay = row_delay (tiles, period_);
-  if (!delay)
-    return true;
-  finding_.add ("last row against the first", scaled (*delay, 1e6));
-  if (std::abs (delay->value) - 2.0 * delay->sigma < kRowDelay * period_)
+  finding_.add ("last row against the first",
+      delay ? scaled (*delay, 1e6) : kNotMeasured);
+  if (!delay ||
+      std::abs (delay->value) - 2.0 * delay->sigma < kRowDelay * period_)
     return true;
   finding_.blame ("rolling-shutter",
       "the last row is exposed " + us_text (1e6 * std::abs (delay->value)) +
@@ -471,13 +471,13 @@ TriggerCheck::diagnose_exposure (const LightFit &fit)
   finding_.add ("exposure", length);
   finding_.add (kEnd, end);
   finding_.add ("jitter", jitter);
-  /* Where all frames scatter, nothing else can be told, not even by how much.
-   */
   if (verdict_of ("jitter", jitter) >= Verdict::warn) {
     ASSIGN_OR_RETURN (const bool blamed, blame_light ());
     if (blamed)
       return {};
   }
+  /* Where all frames scatter, nothing else can be told, not even by how much.
+   */
   if (jitter.sigma >= kScattered) {
     if (verdict_of ("jitter", jitter) >= Verdict::warn)
       finding_.judge ("jitter", jitter);

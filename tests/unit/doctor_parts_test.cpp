@@ -236,6 +236,8 @@ TEST (Findings, WhatIsNotKnownIsNotGood)
   for (const Measured number : {Measured{NAN, 0.1}, Measured{0.1, INFINITY}}) {
     Finding finding{"light", "light"};
     EXPECT_EQ (finding.measure ("flicker", number), Verdict::unknown);
+    EXPECT_EQ (finding.diagnoses.at (0).cause,
+        "flicker could not be measured: it should be at most 1 %");
     EXPECT_FALSE (finding.is_ill ());
     EXPECT_EQ (finding.verdict (), Verdict::unknown);
     const auto json = nlohmann::json::parse (findings_json ({finding}));

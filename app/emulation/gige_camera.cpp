@@ -20,6 +20,7 @@
 #include "base/pixels.h"
 #include "base/text.h"
 #include "base/try.h"
+#include "bench/processing.h"
 #include "emulation/genicam.h"
 
 namespace codedexposure
@@ -341,10 +342,7 @@ SimulatedCamera::bend ()
     return;
   const double gamma = std::bit_cast<float> (get_register (kGamma));
   const int largest = largest_pixel (options.bits);
-  std::vector<std::uint16_t> table;
-  for (int value = 0; value <= largest; value++)
-    table.push_back (std::uint16_t (
-        std::lround (largest * std::pow (double (value) / largest, gamma))));
+  const auto table = response_table (largest, gamma);
   for (int y = 0; y < picture.height (); y++)
     for (int x = 0; x < picture.width (); x++) {
       std::uint16_t &pixel = picture.at (x, y);

@@ -27,22 +27,20 @@ drawn_at (std::uint64_t seed, std::int64_t x, std::int64_t y)
   return (words[0] + 0.5) * 0x1p-31 - 1.0;
 }
 
+} // namespace
+
 std::vector<std::uint16_t>
-table_of (const SickBenchOptions &o, int largest)
+response_table (int largest, double gamma, bool contrast)
 {
   std::vector<std::uint16_t> table;
-  if (o.gamma == 1.0 && !o.lut)
-    return table;
   for (int value = 0; value <= largest; value++) {
-    double part = std::pow (double (value) / largest, o.gamma);
-    if (o.lut) // more contrast in the middle
+    double part = std::pow (double (value) / largest, gamma);
+    if (contrast)
       part -= 0.08 * std::sin (2.0 * pi * part);
     table.push_back (std::uint16_t (std::lround (largest * part)));
   }
   return table;
 }
-
-} // namespace
 
 void
 look_at_target (
@@ -82,9 +80,10 @@ filter_colours (ImageView<float> light)
 }
 
 Processing::Processing (const SickBenchOptions &options)
-    : options_ (options), largest_ (largest_pixel (options.bits)),
-      table_ (table_of (options, largest_))
+    : options_ (options), largest_ (largest_pixel (options.bits))
 {
+  if (options.gamma != 1.0 || options.lut)
+    table_ = response_table (largest_, options.gamma, options.lut);
 }
 
 /* The next frames get nearer to the mean that is to be kept. */

@@ -19,6 +19,11 @@ void look_at_target (
 /** Each pixel of a 2x2 mosaic sees one colour of a white light. */
 void filter_colours (ImageView<float> light);
 
+/** What becomes of each pixel value up to @p largest: a power of it, perhaps
+ * with more contrast in the middle. */
+std::vector<std::uint16_t> response_table (
+    int largest, double gamma, bool contrast = false);
+
 /** The camera's own changes of its pictures, and of its gain and exposure. */
 class Processing
 {

@@ -89,6 +89,7 @@ SickBench::SickBench (const SickBenchOptions &options, Mapping mapping)
       options.drift / kMinute, options.pulse_rate, options.pulse_duty};
   find_view ();
   draw_defects ();
+  draw_groups ();
   fill_profile ();
 }
 
@@ -119,69 +120,67 @@ SickBench::find_view ()
           width, height, mapping_, Offset{view_.x, view_.y});
 }
 
+/** Not at the border, where the picture of the mirrors may end. */
+Offset
+SickBench::draw_pixel ()
+{
+  const auto along = [this] (int size) {
+    return int (size * (0.08 + 0.84 * draw (options_, kPlace, places_++)));
+  };
+  const int x = along (options_.camera.width);
+  return {x, along (options_.camera.height)};
+}
+
+Offset
+SickBench::draw_mirror ()
+{
+  const Offset pixel = draw_pixel ();
+  const Position at = mapping_.mirror_at (pixel.x, pixel.y);
+  return {int (std::lround (at.x)), int (std::lround (at.y))};
+}
+
 void
 SickBench::draw_defects ()
 {
-  std::uint64_t drawn = 0;
-  /* Not at the border, where the picture of the mirrors may end. */
-  const auto place = [&] {
-    const auto along = [&] (int size) {
-      return int (size * (0.08 + 0.84 * draw (options_, kPlace, drawn++)));
-    };
-    const int x = along (options_.camera.width);
-    return Offset{x, along (options_.camera.height)};
-  };
-  const auto mirror = [&] {
-    const Offset pixel = place ();
-    const Position at = mapping_.mirror_at (pixel.x, pixel.y);
-    return Offset{int (std::lround (at.x)), int (std::lround (at.y))};
-  };
   for (int i = 0; i < options_.hot_pixels; i++) {
     const double heat = 0.2 + 0.7 * draw (options_, kHeat, std::uint64_t (i));
-    hot_.push_back ({place (), float (heat)});
+    hot_.push_back ({draw_pixel (), float (heat)});
     truth_.hot.push_back (hot_.back ().at);
   }
   for (int i = 0; i < options_.dead_pixels; i++)
-    truth_.dead.push_back (place ());
+    truth_.dead.push_back (draw_pixel ());
   for (int i = 0; i < options_.stuck_on; i++)
-    truth_.stuck_on.push_back (mirror ());
+    truth_.stuck_on.push_back (draw_mirror ());
   for (int i = 0; i < options_.stuck_off; i++)
-    truth_.stuck_off.push_back (mirror ());
+    truth_.stuck_off.push_back (draw_mirror ());
   for (int i = 0; i < options_.dust; i++)
-    truth_.dust.push_back (place ());
-  draw_groups (place);
+    truth_.dust.push_back (draw_pixel ());
 }
 
-/* Defects of rows and blocks of 16x16. */
-template <typename Place>
+/** Defects of whole rows and of blocks. */
 void
-SickBench::draw_groups (Place place)
+SickBench::draw_groups ()
 {
   constexpr int kBlock = 16;
-  const auto add = [] (std::vector<Offset> &to, int x, int y, int width,
-                       int height) {
-    for (int v = y; v < y + height; v++)
-      for (int u = x; u < x + width; u++)
-        to.push_back ({u, v});
-  };
-  const auto mirror = [&] {
-    const Offset pixel = place ();
-    const Position at = mapping_.mirror_at (pixel.x, pixel.y);
-    return Offset{int (std::lround (at.x)), int (std::lround (at.y))};
+  const auto add = [] (std::vector<Offset> &to, const Rect &all) {
+    each_pixel (Extent{all.width, all.height}, [&] (int x, int y) {
+      to.push_back ({all.x + x, all.y + y});
+    });
   };
   const Extent camera = options_.camera;
   for (int i = 0; i < options_.dead_rows; i++)
-    add (truth_.dead, 0, place ().y, camera.width, 1);
+    add (truth_.dead, {0, draw_pixel ().y, camera.width, 1});
   for (int i = 0; i < options_.dead_blocks; i++) {
-    const Offset at = place ();
-    add (truth_.dead, std::min (at.x, camera.width - kBlock),
-        std::min (at.y, camera.height - kBlock), kBlock, kBlock);
+    const Offset at = draw_pixel ();
+    add (truth_.dead,
+        {std::min (at.x, camera.width - kBlock),
+            std::min (at.y, camera.height - kBlock), kBlock, kBlock});
   }
   for (int i = 0; i < options_.stuck_rows; i++)
-    add (truth_.stuck_off, 0, mirror ().y, options_.mirrors.width, 1);
+    add (truth_.stuck_off, {0, draw_mirror ().y, options_.mirrors.width, 1});
   for (int i = 0; i < options_.stuck_blocks; i++) {
-    const Offset at = mirror ();
-    add (truth_.stuck_off, at.x, at.y, kBlock, kBlock);
+    const Offset at = draw_mirror ();
+    add (truth_.stuck_off, {at.x, at.y, kBlock, kBlock});
   }
 }
 

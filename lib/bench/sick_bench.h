@@ -106,8 +106,9 @@ private:
   SickBench (const SickBenchOptions &options, Mapping mapping);
   void find_view ();
   void draw_defects ();
-  template <typename Place>
-  void draw_groups (Place place);
+  void draw_groups ();
+  Offset draw_pixel ();
+  Offset draw_mirror ();
   void fill_profile ();
   void measure_field ();
   float passed_by (int x, int y, const std::vector<float> &dust) const;
@@ -161,6 +162,7 @@ private:
   };
   std::deque<Seen> seen_;
   std::vector<HotPixel> hot_;
+  std::uint64_t places_ = 0; // that were drawn
 };
 
 } // namespace codedexposure

@@ -16,8 +16,8 @@ namespace codedexposure
  * would have taken.
  *
  * The DMD has the limits of a DLPC900, receives masks as fast as one, and needs
- * 60 to 80 ms to show them, after which one period passes without a trigger. Two
- * frames are on their way when it stops, the later one cut short; they come
+ * 60 to 80 ms to show them, after which one period passes without a trigger.
+ * Two frames are on their way when it stops, the later one cut short; they come
  * first in the next watch ().
  */
 class SimulatedRig : public Rig

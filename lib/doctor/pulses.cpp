@@ -1,13 +1,16 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "doctor/pulses.h"
 
+#include <algorithm>
 #include <cmath>
 #include <iterator>
 #include <numbers>
+#include <optional>
 #include <vector>
 
 #include "base/statistics.h"
 #include "doctor/runs.h"
+#include "estimate/least_squares.h"
 
 namespace codedexposure
 {
@@ -25,16 +28,17 @@ constexpr double kLongest = 3.6e-3, kLongestPart = 0.09;
 constexpr double kLeast = 0.135e-3, kLeastPart = 0.15;
 /* Runs of which nothing is known, s. */
 constexpr double kMoment = 1.07e-3;
-constexpr int kPlaces = 4, kFrames = 4;
-constexpr int kSlots = 8; // of a run
+constexpr int kPlaces = 6, kFrames = 2;
+constexpr int kSlots = 8;  // of a run
+constexpr int kRounds = 4; // of a fit
+/* Part of a flicker that is no such line. */
+constexpr double kUnlike = 0.04;
 /* By how much more, as a part of their light, short runs change than long ones
  * where the light is switched and not only slow. */
 constexpr double kFaster = 2.5;
 /* The same of runs that are a third as long: pulses give both the same light.
  */
-constexpr double kFasterThird = 1.7;
-/* Squares that a model leaves of a change that it explains. */
-constexpr double kExplained = 0.02;
+constexpr double kFasterThird = 1.4;
 
 /** In 0..1, evenly spread. */
 double
@@ -80,44 +84,122 @@ change_of_runs (Examination &examination, int grid, int slots)
       high / std::max (middle, 1e-3) - 1.0};
 }
 
-/** Squares of what the light of runs differs from what it should be, as parts
- * of it. */
-struct Rest {
-  double squares = 0.0, count = 0.0;
+/** Frequencies, Hz, at which light may flicker without being pulses: those that
+ * were seen, and those of the mains, which hide where nothing else was seen. */
+std::vector<double>
+frequencies_of (const LightFit &light)
+{
+  std::vector<double> all;
+  for (const LightFit::Line &line : light.lines)
+    all.push_back (line.frequency.value);
+  for (const double mains : {100.0, 120.0})
+    if (std::ranges::none_of (all,
+            [mains] (double each) { return std::abs (each - mains) < 1.0; }))
+      all.push_back (mains);
+  return all;
+}
 
-  double mean () const { return squares / std::max (1.0, count); }
-  void add (const Runs &runs, const LightFit &light);
+/** The light of runs as parts of their mean, fitted with flicker. */
+class RunFit
+{
+public:
+  explicit RunFit (const LightFit &light)
+      : light_ (light), frequencies_ (frequencies_of (light))
+  {
+  }
+
+  void add (const Runs &runs);
+  /** Squares that are left of those of add () number @p first to @p last, the
+   * mean, without what rounding explains. None if there are too few. */
+  std::optional<double> rest (int first, int last) const;
+
+private:
+  struct Part {
+    int runs = 0; // number of its add ()
+    LightSample sample;
+    double light = 0.0, doubt = 0.0; // by the mean
+  };
+  Eigen::MatrixXd rows () const;
+
+  const LightFit &light_;
+  std::vector<double> frequencies_;
+  std::vector<Part> parts_;
+  int added_ = 0;
 };
 
 void
-Rest::add (const Runs &runs, const LightFit &light)
+RunFit::add (const Runs &runs)
 {
-  const LightModel &model = light.model;
+  const LightModel &model = light_.model;
   const double offset = model.offsets.size () > 1 ? model.offsets[1] : 0.0;
-  double seen = 0.0, expected = 0.0, doubt = 0.0;
-  std::vector<std::pair<double, double>> pairs;
-  for (LightSample sample : runs.samples) {
-    sample.time -= light.epoch;
-    doubt += sample.doubt * sample.doubt;
-    pairs.emplace_back (sample.light - offset, model.light (sample) - offset);
-    seen += pairs.back ().first;
-    expected += pairs.back ().second;
+  double mean = 0.0;
+  for (const LightSample &sample : runs.samples)
+    mean += (sample.light - offset) / double (runs.samples.size ());
+  for (const LightSample &sample : runs.samples)
+    if (mean > 0.0)
+      parts_.push_back ({added_, sample, (sample.light - offset) / mean,
+          sample.doubt / mean});
+  added_++;
+}
+
+/* A factor for each length, since controllers count in microseconds; cosine and
+ * sine of each frequency, as the mean over a run. */
+Eigen::MatrixXd
+RunFit::rows () const
+{
+  using std::numbers::pi;
+  const auto columns = Eigen::Index (frequencies_.size ());
+  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero (
+      Eigen::Index (parts_.size ()), added_ + 2 * columns);
+  for (std::size_t i = 0; i < parts_.size (); i++) {
+    const auto &[runs, sample, light, doubt] = parts_[i];
+    const auto row = Eigen::Index (i);
+    rows (row, runs) = 1.0;
+    for (Eigen::Index k = 0; k < columns; k++) {
+      const double turns = 2.0 * pi * frequencies_[std::size_t (k)];
+      const double half = 0.5 * turns * (sample.until - sample.from);
+      const double middle = turns * (sample.time - light_.epoch +
+                                        0.5 * (sample.from + sample.until));
+      rows (row, added_ + 2 * k) = std::cos (middle) * std::sin (half) / half;
+      rows (row, added_ + 2 * k + 1) =
+          std::sin (middle) * std::sin (half) / half;
+    }
   }
-  const double mean = seen / std::max (1.0, double (pairs.size ()));
-  if (!(mean > 0.0) || !(expected > 0.0))
-    return;
-  /* Controllers count in microseconds: each length has its own factor. Lines
-   * that the model has may be what it takes pulses for. */
-  double steady = 0.0, modelled = 0.0;
-  for (const auto &[is, should] : pairs) {
-    steady += std::pow (is / mean - 1.0, 2);
-    modelled +=
-        std::pow (is / mean - should * double (pairs.size ()) / expected, 2);
+  return rows;
+}
+
+std::optional<double>
+RunFit::rest (int first, int last) const
+{
+  const Eigen::MatrixXd rows = this->rows ();
+  const double looks = double (parts_.size ()) / kFrames;
+  const double free = looks - double (rows.cols ());
+  if (free < 3.0)
+    return std::nullopt;
+  Eigen::VectorXd light (rows.rows ()), rest, flicker;
+  for (std::size_t i = 0; i < parts_.size (); i++)
+    light[Eigen::Index (i)] = parts_[i].light;
+  /* Few runs under strong flicker have another mean than all light has. */
+  for (int round = 0; round < kRounds; round++) {
+    const Eigen::VectorXd found =
+        solve_normal (normal_of (rows), rows.transpose () * light);
+    rest = light - rows * found;
+    flicker = rows.rightCols (rows.cols () - added_) *
+              found.tail (rows.cols () - added_);
+    for (std::size_t i = 0; i < parts_.size (); i++)
+      light[Eigen::Index (i)] /= found[parts_[i].runs];
   }
-  if (modelled > kExplained * steady)
-    squares +=
-        std::max (0.0, std::min (steady, modelled) - doubt / (mean * mean));
-  count += double (pairs.size ());
+  double squares = 0.0, count = 0.0;
+  for (std::size_t i = 0; i < parts_.size (); i++) {
+    const auto &[runs, sample, value, doubt] = parts_[i];
+    if (runs < first || runs > last)
+      continue;
+    const double left = rest[Eigen::Index (i)];
+    squares += left * left * looks / free - doubt * doubt -
+               std::pow (kUnlike * flicker[Eigen::Index (i)], 2);
+    count++;
+  }
+  return std::max (0.0, squares / std::max (1.0, count));
 }
 
 /** Adds runs of @p slots slots at some places that lie in the exposure. */
@@ -166,25 +248,27 @@ measure_pulses (Examination &examination)
   if (!light || light->model.lengths.size () < 2 ||
       longest > kLeastPart * period)
     return kNotMeasured;
-  Rest shorter, longer;
+  RunFit fit (*light);
   double length = 0.0; // of the shorter ones, s, the mean
   for (const double part : kLengths) {
     Runs runs (examination, int (kSlots * period / (part * longest)));
     RETURN_IF_ERROR (see_runs (runs, light->model, period, kSlots));
-    shorter.add (runs, *light);
+    fit.add (runs);
     length += part * longest / double (std::size (kLengths));
   }
   /* What longer runs have as well is slow, and no pulses. */
   Runs runs (examination, int (kSlots * period / longest));
   RETURN_IF_ERROR (see_runs (runs, light->model, period, runs.grid () / 4));
-  longer.add (runs, *light);
-  if (shorter.count < 2.0 * kFrames || longer.count < kFrames)
+  fit.add (runs);
+  constexpr int kShorter = int (std::size (kLengths));
+  const auto shorter = fit.rest (0, kShorter - 1);
+  const auto longer = fit.rest (kShorter, kShorter);
+  if (!shorter || !longer)
     return kNotMeasured;
-  const double rms =
-      shorter.mean () > kFasterThird * kFasterThird * longer.mean ()
-          ? length * std::sqrt (shorter.mean () - longer.mean ())
-          : 0.0;
-  return Measured{rms, rms / std::sqrt (2.0 * shorter.count)};
+  const double rms = *shorter > kFasterThird * kFasterThird * *longer
+                         ? length * std::sqrt (*shorter - *longer)
+                         : 0.0;
+  return Measured{rms, rms / std::sqrt (2.0 * kShorter * kPlaces)};
 }
 
 } // namespace codedexposure

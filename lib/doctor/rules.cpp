@@ -191,7 +191,7 @@ constexpr Rule kRules[] = {
         "black level",
         "set BlackLevelAuto=Off, and switch off every clamp of the black "
         "level"},
-    {"slow-mirrors", "switching time", "us", most (150), most (300),
+    {"slow-mirrors", "switching time", "us", most (100), most (200),
         "the light takes {} us to go off, where mirrors need less than 20 us",
         "check that nothing else shutters the light, such as a pulsed lamp or "
         "a liquid crystal; give the schedule that much switching time"},

@@ -21,6 +21,8 @@ namespace
 constexpr int kFramesAbout = 20, kFramesElse = 6;
 constexpr Nanoseconds kStep = 25'000;   // of the places of a slot
 constexpr Nanoseconds kLeast = 110'000; // of a mask, and of darkness
+/* Slots by which a run begins earlier than that of the look before. */
+constexpr int kEarlier = 3;
 /* Of the light that all points have, at least; and as a part of the period,
  * without which rounding makes steps of it. */
 constexpr double kBefore = 3.5e6, kBeforePart = 0.09;
@@ -69,7 +71,8 @@ slope_of (const std::vector<SwitchPoint> &points)
       [&points] (const SwitchPoint &p) { return p.time > points[0].time; });
   if (next == points.end ())
     return 1e-3;
-  const double ms = 1e3 * (next->time - points[0].time);
+  const double ms =
+      1e3 * (next->time - next->from - points[0].time + points[0].from);
   return std::max (1e-3, (next->light - points[0].light) / ms);
 }
 
@@ -85,8 +88,8 @@ misfit (const std::vector<SwitchPoint> &points, double took, double end,
   Eigen::VectorXd lights = Eigen::VectorXd::Zero (count + 1 + lines);
   for (Eigen::Index i = 0; i < count; i++) {
     const SwitchPoint &point = points[std::size_t (i)];
-    const double ms =
-        1e3 * (mean_light_of (point.time, took, end, jitter) - points[0].time);
+    const double ms = 1e3 * (mean_light_of (point.time, took, end, jitter) -
+                                point.from - points[0].time + points[0].from);
     rows.row (i).head<3> () << 1.0, ms, ms * ms;
     for (Eigen::Index line = 0; line < lines; line++)
       rows (i, 3 + line) = point.flicker[std::size_t (line)];
@@ -202,17 +205,22 @@ see_point (Examination &examination, const Examination::Lit &run, double end,
   return SwitchPoint{off, black + (means.mean - black) / (1.0 + grown),
       std::hypot (std::hypot (rounding, kLightError * means.mean),
           stack.scatter / std::sqrt (frames)),
+      slot * run.first,
       flicker_of (examination, 1e-9 * double (stack.time), slot * run.first,
           std::min (off, 1e-9 * end), frames)};
 }
 
-/* The points of all moments; @run begins with its slot. */
+/* The points of all moments; @run begins with its slot, and somewhat earlier
+ * each time, so that rounding makes other errors. */
 Result<void>
 see_points (Examination &examination, Examination::Lit run, double end,
     std::vector<SwitchPoint> &points, const Image<float> &dark,
     ImageView<const std::uint8_t> good)
 {
   const double period = double (examination.rig.parts ().rate.period ());
+  const int earlier = int (points.size () / std::size (kMoments)) * kEarlier;
+  if ((run.first - earlier) * period / run.of > double (kLeast))
+    run.first -= earlier;
   for (const Nanoseconds moment : kMoments) {
     const double time = end + double (moment);
     run.slots = int (std::lround (time * run.of / period)) - run.first;

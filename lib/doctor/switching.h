@@ -14,6 +14,7 @@ struct SwitchPoint {
   double time = 0.0;  ///< s, from any moment on
   double light = 0.0; ///< DN
   double sigma = 1.0;
+  double from = 0.0; ///< when they went on, s; 0: all at the same time
   /** What each known line of the lamp adds, as cosine and sine of unit size:
    * its phase is another one in each look. As many in all points. */
   std::vector<double> flicker = {};

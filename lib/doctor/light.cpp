@@ -152,15 +152,16 @@ LightCheck::judge_pulses ()
 Result<void>
 LightCheck::judge_target (const Stack &all, const Stack &dark)
 {
-  if (finding_.diagnoses.empty () || finding_.diagnoses[0].id != "texture")
+  if (finding_.diagnoses.empty () || finding_.diagnoses.back ().id != "texture")
     return {};
   const auto &[first, slots, of] = examination_.inside;
   ASSIGN_OR_RETURN (
       const Stack later, look_at_light (examination_, lit (first, slots), of,
                              kFrames, &dark.mean));
+  const std::size_t known = finding_.diagnoses.size ();
   finding_.judge (kChange, change_between (all, later, dark.mean));
-  if (finding_.diagnoses.size () > 1)
-    std::ranges::rotate (finding_.diagnoses, finding_.diagnoses.begin () + 1);
+  if (finding_.diagnoses.size () > known)
+    std::ranges::rotate (finding_.diagnoses, finding_.diagnoses.end () - 1);
   return {};
 }
 
@@ -199,10 +200,12 @@ LightCheck::run ()
   /* Pulses make lines where there are none. */
   if (pulses < Verdict::warn)
     judge_time ();
-  if (!finding_.is_ill ())
+  const bool ill = finding_.is_ill ();
+  /* Light that falls off steeply looks like texture in small pictures. */
+  RETURN_IF_ERROR (judge_field (all, dark));
+  if (!ill)
     check_pictures (frames, dark.mean, parts_.largest (), finding_);
   RETURN_IF_ERROR (judge_target (all, dark));
-  RETURN_IF_ERROR (judge_field (all, dark));
   finding_.sort ();
   return std::move (finding_);
 }

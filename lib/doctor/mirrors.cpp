@@ -265,9 +265,9 @@ MirrorRun::run ()
   }
   diagnose_stuck ("off", defects_.stuck_off);
   diagnose_stuck ("on", defects_.stuck_on);
+  RETURN_IF_ERROR (measure_leak ());
   RETURN_IF_ERROR (see_switching ());
   RETURN_IF_ERROR (see_black ());
-  RETURN_IF_ERROR (measure_leak ());
   finding_.sort ();
   if (examination_.exhibits) {
     const int largest = examination_.rig.parts ().largest ();

@@ -137,15 +137,16 @@ fit_switching (const std::vector<SwitchPoint> &points, double jitter)
   const double freedom = std::max (
       1.0, double (points.size ()) - 5.0 - double (points[0].flicker.size ()));
   const double unit = std::max (1.0, *least / freedom);
-  /* One standard deviation is where chi-square has grown by one. */
+  /* Two standard deviations are where chi-square has grown by four; fast
+   * mirrors are all alike, so that the least may lie anywhere in between. */
   int low = int (least - values.begin ()), high = low;
-  const int best = low;
-  while (low > 0 && values[std::size_t (low)] < *least + unit)
+  while (low > 0 && values[std::size_t (low)] < *least + 4.0 * unit)
     low--;
-  while (high < kGrid && values[std::size_t (high)] < *least + unit)
+  while (high < kGrid && values[std::size_t (high)] < *least + 4.0 * unit)
     high++;
   const double step = kLongest / kGrid;
-  return {best * step, std::max (step, 0.5 * (high - low) * step)};
+  return {0.5 * (low + high) * step,
+      std::max (0.5 * step, 0.25 * (high - low) * step)};
 }
 
 namespace

@@ -52,6 +52,19 @@ struct CheckedBench {
   const BenchProfile &found () const { return examination->profile; }
 };
 
+/** What the check of the trigger finds of the lamp of @p options. */
+inline LightFit
+light_of (const SickBenchOptions &options)
+{
+  LightFit light{.epoch = 5e3}; // of the stamps of a simulated camera
+  light.drift = {options.drift / 60.0, 1e-5};
+  if (options.flicker_depth > 5e-4)
+    light.lines = {{{options.flicker_rate, 1e-3},
+        {options.flicker_depth, 0.01 * options.flicker_depth}}};
+  light.faintest = 5e-4;
+  return light;
+}
+
 /** The trigger's check has been made before. */
 inline CheckedBench
 check_bench (const SickBenchOptions &options,
@@ -70,6 +83,7 @@ check_bench (const SickBenchOptions &options,
   done.examination->inside = {
       first, std::min (16, int (std::floor (end * 16 / period))) - first, 16};
   done.examination->jitter = 1e-9 * options.jitter;
+  done.examination->light = light_of (options);
   done.examination->profile.exposure =
       Measured{done.truth ().exposure->value, 5e3};
   done.examination->profile.trigger_delay =

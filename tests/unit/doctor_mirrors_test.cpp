@@ -14,7 +14,9 @@ TEST (MirrorsCheck, NumbersOfHealthyBenchesAreThoseInjected)
     const CheckedBench e = check_bench (healthy_bench (seed), check_mirrors);
     SCOPED_TRACE ("bench " + std::to_string (seed));
     EXPECT_EQ (e.finding.verdict (), Verdict::pass) << e.first_diagnosis ();
-    EXPECT_LT (e.seconds, 20.0);
+    // Lamps in step with the frames are looked at three times.
+    const double beat = e.rig->truth ().options.flicker_rate / 25.0;
+    EXPECT_LT (e.seconds, beat == std::round (beat) ? 35.0 : 20.0);
     ASSERT_TRUE (e.found ().leak);
     EXPECT_NEAR (e.found ().leak->value, e.truth ().leak->value, 0.0005);
     EXPECT_NEAR (e.found ().leak->value, e.truth ().leak->value,
@@ -28,7 +30,7 @@ TEST (MirrorsCheck, NumbersOfHealthyBenchesAreThoseInjected)
 TEST (MirrorsCheck, NamesWhatIsWrong)
 {
   for (const char *words : {"leak=0.03", "slow-mirrors=500us",
-           "slow-mirrors=300us", "slow-mirrors=200us", "slow-mirrors=3ms",
+           "slow-mirrors=300us", "slow-mirrors=150us", "slow-mirrors=3ms",
            "stuck-on=20", "stuck-on=2", "stuck-off=20", "stuck-off=100",
            "flipped-x", "flipped-y", "turned=90", "turned=180", "turned=270"})
     expect_named (words, check_mirrors);
@@ -51,10 +53,10 @@ TEST (MirrorsCheck, CountsStuckMirrors)
 
 TEST (MirrorsCheck, LeavesOtherFaultsToOtherChecks)
 {
-  for (const char *words : {"blur=3", "dust=6", "hot-pixels=200",
-           "dead-pixels=200", "vignetting=0.6", "bright=1.6", "rotation=4",
-           "scale=1.1", "shift=100/0", "noise=100", "nonlinear=0.05",
-           "jitter=40us"})
+  for (const char *words :
+      {"blur=3", "dust=6", "hot-pixels=200", "dead-pixels=200",
+          "vignetting=0.6", "bright=1.6", "rotation=4", "scale=1.1",
+          "shift=100/0", "noise=100", "nonlinear=0.05", "jitter=40us"})
     EXPECT_EQ (
         check_bench (sick_bench (4, words), check_mirrors).first_diagnosis (),
         "")
@@ -67,8 +69,9 @@ TEST (MirrorsCheck, DoesNotKnowTheSwitchingTimeInLightThatFlickers)
   const CheckedBench e =
       check_bench (sick_bench (4, "flicker=100:0.1"), check_mirrors);
   EXPECT_EQ (e.finding.verdict (), Verdict::unknown);
-  ASSERT_EQ (e.finding.diagnoses.size (), 1u);
-  EXPECT_EQ (e.first_diagnosis (), "slow-mirrors");
+  ASSERT_EQ (e.finding.diagnoses.size (), 2u);
+  EXPECT_EQ (e.finding.diagnoses[0].id, "leak");
+  EXPECT_EQ (e.finding.diagnoses[1].id, "slow-mirrors");
 }
 
 TEST (MirrorsCheck, WorksAtHighFrameRates)

@@ -32,6 +32,8 @@ constexpr int kSilentPeriods = 10;
  * a camera that reads out while it exposes needs a pause before the next
  * trigger. */
 constexpr double kExposedPart = 0.99;
+/* Bytes of frames that wait while a check computes. */
+constexpr gsize kMostWaiting = 200'000'000;
 /* Waits are this long at most, so that a request to stop is obeyed. */
 constexpr std::chrono::milliseconds kMoment{50};
 
@@ -177,6 +179,7 @@ CameraRig::make_pipeline ()
         job, exposing (options_.source, exposure_), options_.plan);
     return pad_of (chain.to ("fakesink").last (), "sink");
   }));
+  pipeline_->frames ().limit (kMostWaiting);
   return {};
 }
 

@@ -2,9 +2,11 @@
 /* Takes the frames that pass a pad, on another thread. */
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <deque>
+#include <limits>
 #include <mutex>
 #include <optional>
 
@@ -29,7 +31,8 @@ struct TappedFrame {
   Nanoseconds arrival;
 };
 
-/** Keeps the frames that pass a pad until they are taken. Thread-safe. */
+/** Keeps the frames that pass a pad until they are taken, the last ones where
+ * there is a limit. Thread-safe. */
 class FrameTap
 {
 public:
@@ -55,6 +58,12 @@ public:
     std::optional<TappedFrame> first (std::move (frames_.front ()));
     frames_.pop_front ();
     return first;
+  }
+  /** Keeps @p most bytes and a frame more. */
+  void limit (gsize most)
+  {
+    const std::lock_guard guard (lock_);
+    most_ = most;
   }
   void forget ()
   {
@@ -87,9 +96,12 @@ private:
     const bool known = caps && gst_video_info_from_caps (&video, caps.get ());
     const std::lock_guard guard (lock_);
     ended_ |= is_end;
-    if (is_frame && known)
+    if (is_frame && known) {
       frames_.push_back (
           {gst::BufferPtr (gst_buffer_ref (buffer)), video, now});
+      while (frames_.size () > 1 + most_ / std::max<gsize> (1, video.size))
+        frames_.pop_front ();
+    }
     came_.notify_all ();
   }
 
@@ -99,6 +111,7 @@ private:
   std::condition_variable came_;
   std::deque<TappedFrame> frames_;
   bool ended_ = false;
+  gsize most_ = std::numeric_limits<gsize>::max ();
 };
 
 } // namespace codedexposure::app

@@ -354,7 +354,15 @@ SimulatedRig::deliver (int frames)
 {
   RETURN_IF_ERROR (
       show ({.name = "light", .on = [] (int, int) { return true; }}, 1));
-  return watch (frames);
+  std::vector<SeenFrame> seen;
+  while (int (seen.size ()) < frames) {
+    const auto shot = arrive (now_ + patience ());
+    if (!shot)
+      break;
+    seen.push_back (frame_of (*shot));
+    seen.back ().picture = {};
+  }
+  return seen;
 }
 
 Result<void>

@@ -2,6 +2,7 @@
 #include "calibrate/calibration.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <new>
@@ -156,7 +157,7 @@ try {
     if (made.find (pattern) != nullptr)
       return Error{"pattern " + pattern.text () +
                    " is listed twice; list each pattern of a calibration once"};
-    made.slots_.push_back ({pattern, {}, 0});
+    made.slots_.push_back ({pattern, {}, 0, {}});
   }
   for (const Axis axis : {Axis::x, Axis::y}) {
     const auto gratings = made.gratings (axis);
@@ -203,13 +204,24 @@ Calibration::add_frame (
                  "x" + std::to_string (frame.height) + " pixels; " +
                  std::to_string (camera_.width) + "x" +
                  std::to_string (camera_.height) + " are expected"};
-  if (solved_ || (slot->frames > 0 && slot->sum.width () == 0))
+  if (solved_ ||
+      (slot->frames > 0 && slot->sum.width () == 0 && slot->mean.width () == 0))
     return Error{"a frame of pattern " + pattern.text () +
                  " comes after this pattern was evaluated; add all frames of a "
                  "pattern before those of the next one"};
   evaluate_pairs (pattern);
-  if (slot->frames == 0)
+  /* 16 bits hold a DN's parts, too. */
+  unit_ = std::exp2 (float (std::bit_width (unsigned (largest))) - 16.0f);
+  shrink_gratings (pattern);
+  if (slot->sum.width () == 0)
     slot->sum = Image<float> (camera_.width, camera_.height);
+  if (slot->mean.width () > 0) {
+    const float times = unit_ * float (slot->frames);
+    each_pixel (slot->sum, [&] (int x, int y) {
+      slot->sum.at (x, y) = times * float (slot->mean.at (x, y));
+    });
+    slot->mean = {};
+  }
   for (int y = 0; y < frame.height; y++) {
     const Pixel *in = frame.row (y);
     float *sum = slot->sum.view ().row (y);
@@ -309,6 +321,23 @@ Calibration::evaluate_pairs (const Pattern &pattern)
   }
 }
 
+void
+Calibration::shrink_gratings (const Pattern &pattern)
+{
+  for (Slot &slot : slots_) {
+    if (slot.pattern.kind != Pattern::Kind::grating ||
+        slot.pattern == pattern || slot.sum.width () == 0)
+      continue;
+    const float part = 1.0f / (unit_ * float (slot.frames));
+    slot.mean = Image<std::uint16_t> (camera_.width, camera_.height);
+    each_pixel (slot.mean, [&] (int x, int y) {
+      slot.mean.at (x, y) =
+          std::uint16_t (std::lround (part * slot.sum.at (x, y)));
+    });
+    slot.sum = {};
+  }
+}
+
 std::vector<const Calibration::Slot *>
 Calibration::gratings (Axis axis) const
 {
@@ -393,11 +422,14 @@ Calibration::fit () const
       dark_smooth.view (), white_smooth.view (), start};
   fit.block_size = CalibrationResult::kBlock;
   fit.frames = std::numeric_limits<int>::max ();
-  for (const Axis axis : {Axis::x, Axis::y})
+  for (const Axis axis : {Axis::x, Axis::y}) {
+    PhaseStack &stack = axis == Axis::x ? fit.x : fit.y;
+    stack.unit = unit_;
     for (const Slot *slot : gratings (axis)) {
-      (axis == Axis::x ? fit.x : fit.y).frames.push_back (slot->sum.view ());
+      stack.frames.push_back (slot->mean.view ());
       fit.frames = std::min (fit.frames, slot->frames);
     }
+  }
 
   RETURN_IF_ERROR (converge (fit));
   result.residual_x = shifts_of (fit, fit.blocks_x);
@@ -420,6 +452,7 @@ try {
     return Error{"a calibration is solved once; make another one"};
   solved_ = true;
   evaluate_pairs ({});
+  shrink_gratings ({});
   for (Slot &slot : slots_)
     each_pixel (slot.sum, [&slot, part = 1.0f / float (slot.frames)] (
                               int x, int y) { slot.sum.at (x, y) *= part; });

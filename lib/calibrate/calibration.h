@@ -83,6 +83,9 @@ private:
     Pattern pattern;
     Image<float> sum; ///< empty: no frame, or it is not needed any more
     int frames = 0;
+    /** Of a grating that is not shown any more, in units of unit_; empty
+     * before. */
+    Image<std::uint16_t> mean = {};
   };
 
   Calibration (Extent camera, Extent mirrors);
@@ -93,6 +96,9 @@ private:
   bool has_gray_code (Axis axis) const;
   /** Keeps the bits of pairs that are complete, but for that of @p pattern. */
   void evaluate_pairs (const Pattern &pattern);
+  /** Keeps the means of gratings in place of their sums, but for that of
+   * @p pattern. */
+  void shrink_gratings (const Pattern &pattern);
   /** Sorted by phase. */
   std::vector<const Slot *> gratings (Axis axis) const;
   template <typename Pixel>
@@ -111,6 +117,7 @@ private:
   std::vector<Slot> slots_; ///< their sums are means in fit ()
   GrayCode gray_x_, gray_y_;
   bool solved_ = false;
+  float unit_ = 1.0f; ///< of means, DN
   Image<std::uint8_t> saturated_;
 };
 

@@ -259,14 +259,26 @@ find_noise (const float *const *rows, int x, const GratingResponse &response,
       bins.add (expected[k], rest[k] * rest[k] / freedom[k]);
 }
 
-std::vector<const float *>
-rows_of (const PhaseStack &stack, int y)
+/** Row @p y of each frame, DN. */
+class Rows
 {
-  std::vector<const float *> rows;
-  for (const auto &frame : stack.frames)
-    rows.push_back (frame.row (y));
-  return rows;
-}
+public:
+  Rows (const PhaseStack &stack, int y)
+  {
+    for (const auto &frame : stack.frames) {
+      std::vector<float> &row =
+          rows_.emplace_back (frame.row (y), frame.row (y) + frame.width);
+      for (float &value : row)
+        value *= stack.unit;
+      starts_.push_back (row.data ());
+    }
+  }
+  const float *const *data () const { return starts_.data (); }
+
+private:
+  std::vector<std::vector<float>> rows_;
+  std::vector<const float *> starts_;
+};
 
 /* Constants of all pixels of a round. */
 struct Conditions {
@@ -362,7 +374,7 @@ sum_up (PhaseFit &p)
   const Rounding rounding (p.noise, p.frames);
   PhaseSums sums;
   for (int y = 0; y < p.camera.height; y++) {
-    const auto rows_x = rows_of (p.x, y), rows_y = rows_of (p.y, y);
+    const Rows rows_x (p.x, y), rows_y (p.y, y);
     for (int x = 0; x < p.camera.width; x++) {
       const Position m = p.mapping.mirror_at (x, y);
       if (p.usable.at (x, y) == 0 || at.sees_edge (m, p.mirrors))
@@ -449,7 +461,7 @@ PhaseFit::estimate_noise ()
 
   for (int py = 0; py < camera.height; py += 4)
     for (const bool along_y : {false, true}) {
-      const auto rows = rows_of (along_y ? y : x, py);
+      const Rows rows (along_y ? y : x, py);
       for (int px = 0; px < camera.width; px++) {
         if (usable.at (px, py) == 0 || outlier.at (px, py) != 0 ||
             faint.at (px, py) != 0)

@@ -18,7 +18,8 @@ namespace codedexposure
 
 /** Frames of one axis: frame k shows the grating of phase k. */
 struct PhaseStack {
-  std::vector<ImageView<const float>> frames;
+  std::vector<ImageView<const std::uint16_t>> frames;
+  float unit = 1.0f; ///< of a value, DN
 
   int period () const { return int (frames.size ()); }
 };

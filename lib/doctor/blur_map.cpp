@@ -113,12 +113,16 @@ powers_of (Axis axis, const GratingStack &stack,
   const auto &frames = axis == Axis::x ? stack.x : stack.y;
   const int period = int (frames.size ());
   BlockPowers sum;
-  for (int y = block.y; y < block.bottom (); y++)
-    for (int x = block.x; x < block.right (); x++) {
+  const int step = stack.step;
+  for (int row = (block.y + step - 1) / step; row * step < block.bottom ();
+       row++)
+    for (int column = (block.x + step - 1) / step;
+         column * step < block.right (); column++) {
+      const int x = column * step, y = row * step;
       if (good.at (x, y) == 0)
         continue;
       const auto light = [&] (int k) {
-        return double (frames[std::size_t (k)].at (x, y));
+        return double (frames[std::size_t (k)].at (column, row));
       };
       for (std::size_t h = 0; h < kTerms; h++)
         sum.powers[h] += power_at (kHarmonics[h], period, light);

@@ -25,7 +25,9 @@ struct BlurMap {
 
 /** Pictures of gratings that were moved, mirror by mirror, through a period. */
 struct GratingStack {
-  std::vector<Image<float>> x, y; ///< one for each phase, DN
+  /** One for each phase, DN: every @ref step th pixel of every so many rows. */
+  std::vector<Image<float>> x, y;
+  int step = 1;
   Image<float> dark, white;
 };
 

@@ -32,6 +32,24 @@ look (Examination &examination, const StillMask &mask, int slots, int frames)
   return examination.rig.watch (frames);
 }
 
+Result<int>
+watch_each (Rig &rig, int frames, const std::function<void (SeenFrame &)> &take)
+{
+  constexpr double kAtOnce = 32e6; // pixels
+  const Extent size = rig.parts ().camera.size;
+  const int most = std::max (1, int (kAtOnce / size.width / size.height));
+  int came = 0;
+  while (came < frames) {
+    ASSIGN_OR_RETURN (auto some, rig.watch (std::min (most, frames - came)));
+    if (some.empty ())
+      break;
+    came += int (some.size ());
+    for (SeenFrame &frame : some)
+      take (frame);
+  }
+  return came;
+}
+
 const std::vector<Check> &
 all_checks ()
 {

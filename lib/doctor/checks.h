@@ -55,6 +55,12 @@ struct Examination {
 Result<std::vector<SeenFrame>> look (
     Examination &examination, const StillMask &mask, int slots, int frames);
 
+/** Calls @p take with the frames that come from now on, of which only some are
+ * in memory at a time, and returns their number; fewer if frames do not come.
+ */
+Result<int> watch_each (
+    Rig &rig, int frames, const std::function<void (SeenFrame &)> &take);
+
 /**
  * Exposes for @p time while @p use () does its work, and as long as possible
  * afterwards. The exposure time changes with a later frame than the mask.

@@ -51,7 +51,7 @@ public:
   DitherRun (Examination &examination, const Examination::Lit &fine,
       ImageView<const std::uint8_t> good, const PhotonTransfer &transfer)
       : examination_ (examination), fine_ (fine), good_ (good),
-        transfer_ (transfer)
+        transfer_ (transfer), step_ (thinning_of ({good.width, good.height}))
   {
     const double period = double (examination.rig.parts ().rate.period ());
     const auto &exposure = examination.profile.exposure;
@@ -64,12 +64,13 @@ public:
   std::optional<Dark> fit () const;
 
   double part () const { return part_; }
-  StackMeans shorter () const { return means_of (looks_.back ().stack, good_); }
+  const StackMeans &shorter () const { return shorter_; }
 
 private:
   struct Look {
-    Stack stack;
-    double length; // of the light
+    int frames;
+    Image<float> mean, variance; // thinned
+    double length;               // of the light
     bool longer;
   };
   std::vector<DitherGroup> groups (double off) const;
@@ -83,7 +84,9 @@ private:
   double part_;
   /* Of each pixel: light of the mask in the shortest time, DN; and that of all
    * mirrors, as part of the mean. */
-  Image<float> light_, field_;
+  Image<float> light_, field_; // thinned
+  int step_;                   // of thinning
+  StackMeans shorter_;         // of the last look
   std::vector<Look> looks_;
 };
 
@@ -94,18 +97,20 @@ DitherRun::see_light (
   ASSIGN_OR_RETURN (const Stack seen,
       look_at_light (examination_, random_columns (fine_.first, top), fine_.of,
           kBrightFrames, &dark));
-  light_ = field_ = Image<float> (dark.width (), dark.height ());
+  light_ = field_ = thinned (dark, step_);
   double mean = 0.0, pixels = 0.0;
-  each_pixel (dark, [&] (int x, int y) {
-    const double none = transfer_.light_of (double (dark.at (x, y)));
+  each_pixel (light_, [&] (int x, int y) {
+    const Offset at = {x * step_, y * step_};
+    const double none = transfer_.light_of (double (dark.at (at.x, at.y)));
     const auto of = [&] (const Image<float> &image) {
-      const double light = transfer_.light_of (double (image.at (x, y)));
+      const double light = transfer_.light_of (double (image.at (at.x, at.y)));
       return transfer_.slope * (light - none);
     };
     light_.at (x, y) = float (of (seen.mean) / top);
     field_.at (x, y) = float (of (bright));
-    mean += good_.at (x, y) != 0 ? double (field_.at (x, y)) : 0.0;
-    pixels += good_.at (x, y) != 0;
+    const bool counts = good_.at (at.x, at.y) != 0;
+    mean += counts ? double (field_.at (x, y)) : 0.0;
+    pixels += counts;
   });
   const float scale = float (pixels / std::max (1e-3, mean));
   each_pixel (field_, [&] (int x, int y) { field_.at (x, y) *= scale; });
@@ -122,8 +127,9 @@ DitherRun::look (bool longer)
     ASSIGN_OR_RETURN (
         Stack stack, look_at_light (examination_, random_columns (first, 1), of,
                          longer ? kLongFrames : kShortFrames));
-    stack.zeros = stack.full = longer ? Image<std::uint16_t> () : stack.zeros;
-    looks_.push_back ({std::move (stack), double (fine_.of) / of, longer});
+    shorter_ = means_of (stack, good_);
+    looks_.push_back ({stack.frames, thinned (stack.mean, step_),
+        thinned (stack.variance, step_), double (fine_.of) / of, longer});
   }
   return {};
 }
@@ -132,32 +138,32 @@ void
 DitherRun::group (
     std::size_t look, double off, std::vector<DitherGroup> &all) const
 {
-  const Stack &stack = looks_[look].stack;
-  const double stack_length = looks_[look].length;
+  const Look &seen = looks_[look];
   std::vector<DitherGroup> groups (std::size_t (kMost / kWidth) + 1);
-  each_pixel (good_, [&] (int x, int y) {
-    const double light = stack_length * double (light_.at (x, y));
+  each_pixel (light_, [&] (int x, int y) {
+    const double light = seen.length * double (light_.at (x, y));
     const double field = double (field_.at (x, y));
     const double more =
-        light + (looks_[look].longer ? 1.0 : part_) * off * (field - 1.0);
-    if (good_.at (x, y) == 0 || more >= kMost || more < -kWidth / 2)
+        light + (seen.longer ? 1.0 : part_) * off * (field - 1.0);
+    if (good_.at (x * step_, y * step_) == 0 || more >= kMost ||
+        more < -kWidth / 2)
       return;
     DitherGroup &group =
         groups[std::size_t (std::max (0.0, more / kWidth + 0.5))];
-    const double mean = double (stack.mean.at (x, y));
+    const double mean = double (seen.mean.at (x, y));
     group.pixels++;
     group.light += light;
     group.field += field;
     group.mean += mean;
     group.spread += mean * mean;
-    group.variance += double (stack.variance.at (x, y));
+    group.variance += double (seen.variance.at (x, y));
   });
   for (DitherGroup &group : groups) {
     if (group.pixels < kFewPixels)
       continue;
     group.look = int (look);
-    group.longer = looks_[look].longer;
-    group.frames = stack.frames;
+    group.longer = seen.longer;
+    group.frames = seen.frames;
     group.field -= 1.0; // where the sum began
     for (double *sum : {&group.light, &group.field, &group.mean, &group.spread,
              &group.variance})

@@ -159,7 +159,10 @@ LightCheck::judge_target (const Stack &all, const Stack &dark)
       const Stack later, look_at_light (examination_, lit (first, slots), of,
                              kFrames, &dark.mean));
   const std::size_t known = finding_.diagnoses.size ();
-  finding_.judge (kChange, change_between (all, later, dark.mean));
+  finding_.judge (
+      kChange, change_between ({std::as_const (all.mean).view (), all.frames},
+                   {std::as_const (later.mean).view (), later.frames}, later,
+                   dark.mean));
   if (finding_.diagnoses.size () > known)
     std::ranges::rotate (finding_.diagnoses, finding_.diagnoses.end () - 1);
   return {};
@@ -189,11 +192,14 @@ LightCheck::run ()
   const auto &[first, slots, of] = examination_.inside;
   ASSIGN_OR_RETURN (const Stack dark,
       look_at_light (examination_, no_light (), of, kFewFrames));
-  ASSIGN_OR_RETURN (const auto frames,
-      look_for_whole_frames (examination_, lit (first, slots), of, kFrames));
-  const Stack all = stack_of (frames, parts_.largest ());
-  if (!same_size (std::as_const (all.mean).view (), dark.mean.view ()))
-    return Error{"the size of the frames has changed", ErrorCode::device};
+  StackSum sum (parts_.largest ());
+  PictureCheck pictures (kFrames);
+  RETURN_IF_ERROR (look_for_whole_frames (examination_, lit (first, slots), of,
+      kFrames, [&] (const SeenFrame &frame) {
+        sum.add (frame);
+        pictures.add (frame);
+      }));
+  ASSIGN_OR_RETURN (const Stack all, std::move (sum).stack (&dark.mean));
   if (!judge_level (all, dark))
     return std::move (finding_);
   ASSIGN_OR_RETURN (const Verdict pulses, judge_pulses ());
@@ -204,7 +210,7 @@ LightCheck::run ()
   /* Light that falls off steeply looks like texture in small pictures. */
   RETURN_IF_ERROR (judge_field (all, dark));
   if (!ill)
-    check_pictures (frames, dark.mean, parts_.largest (), finding_);
+    pictures.judge (all, dark.mean, parts_.largest (), finding_);
   RETURN_IF_ERROR (judge_target (all, dark));
   finding_.sort ();
   return std::move (finding_);

@@ -24,7 +24,7 @@ constexpr int kRounds = 3;
 /* Variance of the noise with which rounding can be undone, DN squared. */
 constexpr double kEnough = 0.16;
 /* Error of a mean that is left where rounding was undone, and where not, DN. */
-constexpr double kUnrounded = 0.003, kRounded = 0.25;
+constexpr double kUnrounded = 0.001, kRounded = 0.25;
 
 Measured
 exact_mean (const StackMeans &means, const Offsets &offsets)
@@ -67,7 +67,7 @@ namespace
 double
 steady_flicker (const Examination &examination, int frames)
 {
-  constexpr double kUnseen = 0.3; // of the faintest line that would be seen
+  constexpr double kUnseen = 0.1; // of the faintest line that would be seen
   constexpr double kMostFlicker = 0.01; // that no check complains about
   if (!examination.light)
     return kMostFlicker;
@@ -128,8 +128,7 @@ measure_off_light (Examination &examination, int frames,
     const Measured a = exact_mean (found.longest, offsets);
     const Measured b = exact_mean (found.shorter, offsets);
     more.push_back (a.value - b.value);
-    errors = std::pow (std::hypot (first.scatter, second.scatter), 2) / frames +
-             a.sigma * a.sigma + b.sigma * b.sigma;
+    errors = a.sigma * a.sigma + b.sigma * b.sigma;
   }
   found.part = double (shorter) / longest;
   const double scale = 1.0 / (1.0 - found.part);

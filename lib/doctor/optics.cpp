@@ -40,8 +40,8 @@ public:
 
 private:
   Result<void> show_patterns ();
-  Result<void> keep (
-      const Pattern &pattern, const std::vector<SeenFrame> &frames);
+  Result<void> keep (const Pattern &pattern, const SeenFrame &frame);
+  void keep (const Pattern &pattern, Image<float> mean);
   Result<void> look_for_mirrors ();
   void measure_mapping ();
   void measure_blur ();
@@ -66,23 +66,24 @@ private:
   std::optional<FocusTilt> focus_;
 };
 
-/* Adds the frames of a pattern to what needs them. */
 Result<void>
-OpticsRun::keep (const Pattern &pattern, const std::vector<SeenFrame> &frames)
+OpticsRun::keep (const Pattern &pattern, const SeenFrame &frame)
 {
-  for (const SeenFrame &frame : frames) {
-    const Image<std::uint16_t> &picture = frame.picture;
-    if (!calibration_) {
-      camera_ = {picture.width (), picture.height ()};
-      const auto patterns = calibration_patterns (mirrors_, kPeriod);
-      ASSIGN_OR_RETURN (
-          calibration_, Calibration::make (camera_, mirrors_, patterns));
-    }
-    RETURN_IF_ERROR (calibration_->add (
-        pattern, picture.view (), examination_.rig.parts ().bits));
+  const Image<std::uint16_t> &picture = frame.picture;
+  if (!calibration_) {
+    camera_ = {picture.width (), picture.height ()};
+    stack_.step = thinning_of (camera_);
+    const auto patterns = calibration_patterns (mirrors_, kPeriod);
+    ASSIGN_OR_RETURN (
+        calibration_, Calibration::make (camera_, mirrors_, patterns));
   }
-  Image<float> mean =
-      stack_of (frames, examination_.rig.parts ().largest ()).mean;
+  return calibration_->add (
+      pattern, picture.view (), examination_.rig.parts ().bits);
+}
+
+void
+OpticsRun::keep (const Pattern &pattern, Image<float> mean)
+{
   using Kind = Pattern::Kind;
   if (pattern.kind == Kind::dark)
     stack_.dark = std::move (mean);
@@ -90,8 +91,7 @@ OpticsRun::keep (const Pattern &pattern, const std::vector<SeenFrame> &frames)
     stack_.white = std::move (mean);
   else if (pattern.kind == Kind::grating)
     (pattern.axis == Axis::x ? stack_.x : stack_.y)
-        .push_back (std::move (mean));
-  return {};
+        .push_back (thinned (mean, stack_.step));
 }
 
 Result<void>
@@ -100,9 +100,17 @@ OpticsRun::show_patterns ()
   for (const Pattern &pattern : calibration_patterns (mirrors_, kPeriod)) {
     const StillMask mask = {.name = pattern.text (),
         .on = [pattern] (int x, int y) { return pattern.on (x, y); }};
-    ASSIGN_OR_RETURN (const auto frames,
-        look_for_whole_frames (examination_, mask, 1, kFrames));
-    RETURN_IF_ERROR (keep (pattern, frames));
+    StackSum sum (examination_.rig.parts ().largest ());
+    Result<void> kept;
+    RETURN_IF_ERROR (look_for_whole_frames (
+        examination_, mask, 1, kFrames, [&] (const SeenFrame &frame) {
+          if (kept)
+            kept = keep (pattern, frame);
+          sum.add (frame);
+        }));
+    RETURN_IF_ERROR (kept);
+    ASSIGN_OR_RETURN (Stack seen, std::move (sum).stack ());
+    keep (pattern, std::move (seen.mean));
   }
   defects_ = find_defects (
       stack_.dark, stack_.white, examination_.rig.parts ().largest ());
@@ -159,19 +167,20 @@ double
 OpticsRun::modulation () const
 {
   double low = 0.0, high = 0.0, light = 0.0;
-  for (int y = 0; y < camera_.height; y += 2)
-    for (int x = 0; x < camera_.width; x += 2) {
-      if (defects_.good.at (x, y) == 0)
-        continue;
-      float least = stack_.x[0].at (x, y), most = least;
-      for (const Image<float> &frame : stack_.x) {
-        least = std::min (least, frame.at (x, y));
-        most = std::max (most, frame.at (x, y));
-      }
-      low += double (least);
-      high += double (most);
-      light += double (stack_.white.at (x, y) - stack_.dark.at (x, y));
+  each_pixel (stack_.x[0], [&] (int x, int y) {
+    const Offset at = {x * stack_.step, y * stack_.step};
+    if (defects_.good.at (at.x, at.y) == 0)
+      return;
+    float least = stack_.x[0].at (x, y), most = least;
+    for (const Image<float> &frame : stack_.x) {
+      least = std::min (least, frame.at (x, y));
+      most = std::max (most, frame.at (x, y));
     }
+    low += double (least);
+    high += double (most);
+    light +=
+        double (stack_.white.at (at.x, at.y) - stack_.dark.at (at.x, at.y));
+  });
   return (high - low) / std::max (1.0, light);
 }
 

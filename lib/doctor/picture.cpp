@@ -17,6 +17,9 @@ namespace
 
 /* Below this variance over time, DN squared, rounding hides the noise. */
 constexpr double kQuiet = 0.15;
+/* Light that falls below this part within so many pixels ends there. */
+constexpr float kEnds = 0.6f;
+constexpr int kReach = 24;
 /* Pixels of a block whose means are compared. */
 constexpr int kBlock = 4;
 /* Readings. */
@@ -44,26 +47,44 @@ struct Correlations {
   double values = 0.0;   ///< that they are of
 };
 
+/** The middle of @p image, a million pixels at most. */
+template <typename Pixel>
+Image<Pixel>
+middle_of (const Image<Pixel> &image)
+{
+  constexpr int kMost = 1024;
+  const int width = std::min (kMost, image.width ());
+  const int height = std::min (kMost, image.height ());
+  const int left = (image.width () - width) / 2;
+  const int top = (image.height () - height) / 2;
+  Image<Pixel> middle (width, height);
+  each_pixel (middle,
+      [&] (int x, int y) { middle.at (x, y) = image.at (left + x, top + y); });
+  return middle;
+}
+
 /* Only of what all pixels do not have in common. Pixels at the ends of the
  * range are cut. */
 Correlations
-correlations_of (const std::vector<SeenFrame> &frames, const Stack &stack,
-    const Image<float> &dark)
+correlations_of (const std::vector<Image<std::uint16_t>> &frames,
+    const Stack &stack, const Image<float> &whole_dark)
 {
-  const int width = stack.mean.width (), height = stack.mean.height ();
-  const double middle = mean_of (stack.mean.view ());
+  const Image<float> mean = middle_of (stack.mean);
+  const Image<float> dark = middle_of (whole_dark);
+  const Image<std::uint8_t> zeros = middle_of (stack.zeros);
+  const Image<std::uint8_t> full = middle_of (stack.full);
+  const int width = mean.width (), height = mean.height ();
+  const double middle = mean_of (mean.view ());
   const double light = std::max (1.0, middle - mean_of (dark.view ()));
   Image<float> rest (width, height), before;
   double across = 0.0, down = 0.0, time = 0.0, squares = 0.0, pixels = 0.0;
-  for (const SeenFrame &frame : frames) {
-    const double more = mean_of (frame.picture.view ()) - middle;
+  for (const Image<std::uint16_t> &frame : frames) {
+    const double more = mean_of (frame.view ()) - middle;
     each_pixel (rest, [&] (int x, int y) {
-      const bool cut = stack.zeros.at (x, y) > 0 || stack.full.at (x, y) > 0;
-      const double part =
-          double (stack.mean.at (x, y) - dark.at (x, y)) / light;
-      rest.at (x, y) = cut ? 0.0f
-                           : float (frame.picture.at (x, y) - more * part) -
-                                 stack.mean.at (x, y);
+      const bool cut = zeros.at (x, y) > 0 || full.at (x, y) > 0;
+      const double part = double (mean.at (x, y) - dark.at (x, y)) / light;
+      rest.at (x, y) =
+          cut ? 0.0f : float (frame.at (x, y) - more * part) - mean.at (x, y);
     });
     each_pixel (rest, [&] (int x, int y) {
       const double own = double (rest.at (x, y));
@@ -128,9 +149,18 @@ texture_of (const Image<float> &light, ImageView<const std::uint8_t> good)
 {
   const int width = light.width (), height = light.height ();
   const Image<float> even = smooth (light);
+  /* Where the light ends nearby, what is even is not known. */
+  const auto ends = [&] (int x, int y) {
+    float least = even.at (x, y);
+    for (const int i : {-kReach, kReach})
+      for (const int j : {-kReach, kReach})
+        least = std::min (least, even.at (std::clamp (x + i, 0, width - 1),
+                                     std::clamp (y + j, 0, height - 1)));
+    return least < kEnds * even.at (x, y);
+  };
   Image<float> rest (width, height);
   each_pixel (rest, [&] (int x, int y) {
-    if (good.at (x, y) != 0)
+    if (good.at (x, y) != 0 && !ends (x, y))
       rest.at (x, y) = light.at (x, y) / even.at (x, y) - 1.0f;
   });
   double common = 0.0, count = 0.0;
@@ -143,29 +173,18 @@ texture_of (const Image<float> &light, ImageView<const std::uint8_t> good)
   return std::sqrt (std::max (0.0, common / std::max (1.0, count)));
 }
 
-Stack
-part_of (const std::vector<SeenFrame> &frames, std::size_t first,
-    std::size_t count, int largest)
-{
-  std::vector<SeenFrame> part;
-  for (std::size_t i = first; i < first + count; i++) {
-    part.push_back ({frames[i].time, frames[i].arrival, frames[i].damaged,
-        frames[i].picture});
-  }
-  return stack_of (part, largest);
-}
-
 } // namespace
 
 Measured
-change_between (const Stack &a, const Stack &b, const Image<float> &dark)
+change_between (const FrameMean &a, const FrameMean &b, const Stack &noise,
+    const Image<float> &dark)
 {
-  const int width = a.mean.width () / kBlock;
-  const int height = a.mean.height () / kBlock;
-  const double light_a =
-      std::max (1.0, mean_of (a.mean.view ()) - mean_of (dark.view ()));
-  const double light_b =
-      std::max (1.0, mean_of (b.mean.view ()) - mean_of (dark.view ()));
+  const int width = a.picture.width / kBlock;
+  const int height = a.picture.height / kBlock;
+  const double black = mean_of (dark.view ());
+  const double light_a = std::max (1.0, mean_of (a.picture) - black);
+  const double light_b = std::max (1.0, mean_of (b.picture) - black);
+  const double parts = 1.0 / a.frames + 1.0 / b.frames;
   double squares = 0.0, expected = 0.0, blocks = 0.0;
   for (int j = 0; j < height; j++)
     for (int i = 0; i < width; i++) {
@@ -173,14 +192,13 @@ change_between (const Stack &a, const Stack &b, const Image<float> &dark)
       bool cut = false;
       for (int y = j * kBlock; y < (j + 1) * kBlock; y++)
         for (int x = i * kBlock; x < (i + 1) * kBlock; x++) {
-          const double black = double (dark.at (x, y));
-          step += (double (a.mean.at (x, y)) - black) * light_b / light_a -
-                  (double (b.mean.at (x, y)) - black);
+          const double own = double (dark.at (x, y));
+          step += (double (a.picture.at (x, y)) - own) * light_b / light_a -
+                  (double (b.picture.at (x, y)) - own);
           /* Rounding alone has a variance, too. */
           variance +=
-              std::max (1.0 / 12.0, double (a.variance.at (x, y))) / a.frames +
-              std::max (1.0 / 12.0, double (b.variance.at (x, y))) / b.frames;
-          cut |= a.full.at (x, y) > 0 || b.full.at (x, y) > 0;
+              parts * std::max (1.0 / 12.0, double (noise.variance.at (x, y)));
+          cut |= noise.full.at (x, y) > 0;
         }
       if (cut)
         continue;
@@ -194,24 +212,46 @@ change_between (const Stack &a, const Stack &b, const Image<float> &dark)
 }
 
 void
-check_pictures (const std::vector<SeenFrame> &frames, const Image<float> &dark,
-    int largest, Finding &finding)
+PictureCheck::add (const SeenFrame &frame)
 {
-  const std::size_t half = frames.size () / 2;
-  const Stack all = stack_of (frames, largest, &dark);
-  const Image<float> light = difference (all.mean, dark);
-  finding.measure (
-      "light that one of 2x2 pixels lacks", {100.0 * mosaic_of (light), 0.0});
-  finding.measure (kChange, change_between (part_of (frames, 0, half, largest),
-                                part_of (frames, half, half, largest), dark));
+  const bool late = int (middles_.size ()) >= frames_ / 2;
+  Image<float> &half = halves_[late ? 1 : 0];
+  if (half.width () == 0)
+    half = Image<float> (frame.picture.width (), frame.picture.height ());
+  each_pixel (half, [&] (int x, int y) {
+    half.at (x, y) += float (frame.picture.at (x, y));
+  });
+  middles_.push_back (middle_of (frame.picture));
+}
+
+void
+PictureCheck::judge (
+    const Stack &all, const Image<float> &dark, int largest, Finding &finding)
+{
+  const int first = std::min (all.frames, frames_ / 2);
+  const int second = all.frames - first;
+  finding.measure ("light that one of 2x2 pixels lacks",
+      {100.0 * mosaic_of (difference (all.mean, dark)), 0.0});
+  Measured change = kNotMeasured;
+  if (second > 0) {
+    const auto mean = [&] (Image<float> &half, int frames) {
+      each_pixel (
+          half, [&] (int x, int y) { half.at (x, y) /= float (frames); });
+      return FrameMean{std::as_const (half).view (), frames};
+    };
+    change = change_between (
+        mean (halves_[0], first), mean (halves_[1], second), all, dark);
+  }
+  halves_ = {};
+  finding.measure (kChange, change);
   // A picture that is not even and moves a little looks like noise.
   if (!finding.is_ill ())
     finding.measure ("texture",
-        {100.0 * texture_of (light,
+        {100.0 * texture_of (difference (all.mean, dark),
                      find_defects (dark, all.mean, largest).good.view ()),
             0.1});
   if (!finding.is_ill ())
-    judge_noise (correlations_of (frames, all, dark), finding);
+    judge_noise (correlations_of (middles_, all, dark), finding);
 }
 
 } // namespace codedexposure

@@ -2,6 +2,8 @@
 /* What pictures of an even light say of the camera and of the target. */
 #pragma once
 
+#include <array>
+
 #include "doctor/checks.h"
 #include "doctor/stack.h"
 
@@ -9,25 +11,46 @@ namespace codedexposure
 {
 
 /**
- * Measures and judges in @p finding what the frames of one mask show, whatever
- * the camera says of itself: "colour" (pixels of a 2x2 mosaic get different
- * light), "noise-reduction" and "sharpening" (the noise of neighbours, or of
- * frames, is not independent), "moving" and "texture" (the light is not even,
- * and changes its place).
- *
- * @p frames: four or more, of the same mask, not saturated, in their order. @p
- * dark: their mean without light.
+ * Keeps what is needed of frames of one mask to tell, whatever the camera says
+ * of itself: "colour" (pixels of a 2x2 mosaic get different light),
+ * "noise-reduction" and "sharpening" (the noise of neighbours, or of frames, is
+ * not independent), "moving" and "texture" (the light is not even, and changes
+ * its place).
  */
-void check_pictures (const std::vector<SeenFrame> &frames,
-    const Image<float> &dark, int largest, Finding &finding);
+class PictureCheck
+{
+public:
+  /** @p frames: that will come. */
+  explicit PictureCheck (int frames) : frames_ (frames) {}
+
+  /** Of the same mask and size, not saturated, in their order. */
+  void add (const SeenFrame &frame);
+  /** Measures and judges in @p finding. @p all: the same frames, four or more.
+   * @p dark: their mean without light. */
+  void judge (const Stack &all, const Image<float> &dark, int largest,
+      Finding &finding);
+
+private:
+  int frames_;
+  std::vector<Image<std::uint16_t>> middles_; // of frames
+  std::array<Image<float>, 2> halves_;        // sums of frames
+};
+
+/** Mean of frames. */
+struct FrameMean {
+  ImageView<const float> picture;
+  int frames = 0;
+};
 
 /**
- * How much more two stacks of the same mask differ than their noise explains,
- * as the ratio of the squares, in what neighbouring pixels have in common. 1 if
+ * How much more two means of the same mask differ than their noise explains, as
+ * the ratio of the squares, in what neighbouring pixels have in common. 1 if
  * nothing moved; not measured where pixels are full.
+ *
+ * @p noise: of such frames. @p dark: their mean without light.
  */
-Measured change_between (
-    const Stack &a, const Stack &b, const Image<float> &dark);
+Measured change_between (const FrameMean &a, const FrameMean &b,
+    const Stack &noise, const Image<float> &dark);
 
 /** The reading of that. */
 inline constexpr const char *kChange = "change of the picture";

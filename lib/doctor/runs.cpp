@@ -14,10 +14,10 @@ namespace codedexposure
 Result<void>
 Runs::see (const StillMask &mask, int exposure, int frames)
 {
-  ASSIGN_OR_RETURN (const auto seen, look (examination_, mask, grid_, frames));
-  for (const SeenFrame &frame : seen) {
+  RETURN_IF_ERROR (look (examination_, mask, grid_, 0));
+  const auto came = watch_each (examination_.rig, frames, [&] (auto &frame) {
     if (frame.damaged)
-      continue;
+      return;
     const Level level =
         level_of (frame.picture.view (), examination_.rig.parts ().largest ());
     bits_seen |= level.bits_seen;
@@ -26,8 +26,8 @@ Runs::see (const StillMask &mask, int exposure, int frames)
     samples.push_back ({1e-9 * double (frame.time), mask.first * slot (),
         (mask.first + mask.slots) * slot (), level.mean,
         rounding_doubt (level.noise, step), exposure});
-  }
-  return {};
+  });
+  return came ? Result<void> () : came.error ();
 }
 
 Result<void>

@@ -113,7 +113,7 @@ private:
   bool saturates_ = false; // with all slots
   std::vector<Level> levels_;
   std::vector<Sample> references_;        // signals over times, s
-  Stack reference_;                       // the first one
+  Image<float> reference_;                // the first one
   Measured moved_ = kNotMeasured;         // of the last one against it
   double drift_ = 0.0, drift_from_ = 0.0; // 1/s, s
   Nanoseconds start_ = 0;
@@ -158,8 +158,9 @@ PhotonTransferRun::see_reference ()
       const Stack stack, look_at_light (examination_, lit (fine_.first, top_),
                              fine_.of, kReferenceFrames, &dark_.mean));
   if (references_.empty ())
-    reference_ = stack;
-  moved_ = change_between (reference_, stack, dark_.mean);
+    reference_ = stack.mean;
+  moved_ = change_between ({std::as_const (reference_).view (), stack.frames},
+      {std::as_const (stack.mean).view (), stack.frames}, stack, dark_.mean);
   references_.push_back ({double (stack.time - start_) * 1e-9,
       signal (means_of (stack, defects_.good.view ())), 1.0});
   return {};
@@ -178,10 +179,9 @@ PhotonTransferRun::see_levels ()
         Stack stack, look_at_light (examination_, lit (fine_.first, slots),
                          fine_.of, kFrames, &dark_.mean));
     const StackMeans means = means_of (stack, defects_.good.view ());
+    stack.mean = stack.variance = {};
+    stack.zeros = stack.full = {};
     levels_.push_back ({slots, std::move (stack), means});
-    levels_.back ().stack.mean = {};
-    levels_.back ().stack.variance = {};
-    levels_.back ().stack.zeros = levels_.back ().stack.full = {};
   }
   RETURN_IF_ERROR (see_reference ());
   std::ranges::sort (levels_, {}, &Level::slots);

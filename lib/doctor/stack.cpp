@@ -32,81 +32,122 @@ weights_of (const Image<float> &mean, const Image<float> *dark, int largest)
 
 } // namespace
 
-Stack
-stack_of (
-    const std::vector<SeenFrame> &frames, int largest, const Image<float> *dark)
+void
+StackSum::add (const SeenFrame &frame)
 {
-  if (frames.empty ())
-    return {};
-  const int width = frames[0].picture.width ();
-  const int height = frames[0].picture.height ();
-  Stack stack = {int (frames.size ()), frames[0].time, {width, height},
-      {width, height}, {width, height}, {width, height}};
-  for (const SeenFrame &frame : frames) {
-    stack.time += (frame.time - frames[0].time) / stack.frames;
-    each_pixel (frame.picture, [&] (int x, int y) {
-      const std::uint16_t value = frame.picture.at (x, y);
-      stack.mean.at (x, y) += float (value);
-      if (value == 0)
-        stack.zeros.at (x, y)++;
-      if (value >= largest)
-        stack.full.at (x, y)++;
-      stack.bits_seen |= value;
-    });
+  const int width = frame.picture.width (), height = frame.picture.height ();
+  const double level = mean_of (frame.picture.view ());
+  if (stack_.frames++ == 0) {
+    stack_.time = frame.time;
+    stack_.zeros = stack_.full = Image<std::uint8_t> (width, height);
+    first_ = frame.picture;
+    level_ = level;
+    sum_ = squares_ = products_ = Image<float> (width, height);
   }
-  each_pixel (stack.mean,
-      [&] (int x, int y) { stack.mean.at (x, y) /= float (stack.frames); });
-
-  const Image<float> weights = weights_of (stack.mean, dark, largest);
-  const double middle = mean_of (stack.mean.view ());
-  const int freedom = std::max (1, stack.frames - 1);
-  for (const SeenFrame &frame : frames) {
-    const double more = mean_of (frame.picture.view ()) - middle;
-    stack.scatter += more * more / freedom;
-    each_pixel (frame.picture, [&] (int x, int y) {
-      const float rest = float (frame.picture.at (x, y)) -
-                         stack.mean.at (x, y) -
-                         float (more) * weights.at (x, y);
-      stack.variance.at (x, y) += rest * rest / float (freedom);
-    });
-  }
-  stack.scatter = std::sqrt (stack.scatter);
-  return stack;
+  const float more = float (level - level_);
+  times_ += frame.time - stack_.time;
+  levels_ += level - level_;
+  level_squares_ += (level - level_) * (level - level_);
+  each_pixel (frame.picture, [&] (int x, int y) {
+    const std::uint16_t value = frame.picture.at (x, y);
+    const float step = float (value) - float (first_.at (x, y));
+    sum_.at (x, y) += step;
+    squares_.at (x, y) += step * step;
+    products_.at (x, y) += step * more;
+    if (value == 0)
+      stack_.zeros.at (x, y)++;
+    if (value >= largest_)
+      stack_.full.at (x, y)++;
+    stack_.bits_seen |= value;
+  });
 }
 
-Result<std::vector<SeenFrame>>
-look_for_whole_frames (
-    Examination &examination, const StillMask &mask, int slots, int frames)
+/* The mean of (step - mean step - (more - mean more) * weight) squared. */
+Result<Stack>
+StackSum::stack (const Image<float> *dark) &&
+{
+  if (dark && !same_size (first_.view (), dark->view ()))
+    return Error{"the size of the frames has changed", ErrorCode::device};
+  const double count = stack_.frames, freedom = std::max (1.0, count - 1.0);
+  stack_.time += times_ / stack_.frames;
+  const double of_levels =
+      std::max (0.0, level_squares_ - levels_ * levels_ / count);
+  stack_.scatter = std::sqrt (of_levels / freedom);
+  each_pixel (sum_, [&] (int x, int y) {
+    float &sum = sum_.at (x, y), &squares = squares_.at (x, y);
+    squares -= sum * sum / float (count);
+    products_.at (x, y) -= sum * float (levels_ / count);
+    sum = float (first_.at (x, y)) + sum / float (count);
+  });
+  stack_.mean = std::move (sum_);
+  first_ = {};
+  const Image<float> weights = weights_of (stack_.mean, dark, largest_);
+  each_pixel (squares_, [&] (int x, int y) {
+    const float weight = weights.at (x, y);
+    const float rest = squares_.at (x, y) -
+                       2.0f * weight * products_.at (x, y) +
+                       weight * weight * float (of_levels);
+    squares_.at (x, y) = std::max (0.0f, rest / float (freedom));
+  });
+  stack_.variance = std::move (squares_);
+  return std::move (stack_);
+}
+
+Result<void>
+look_for_whole_frames (Examination &examination, const StillMask &mask,
+    int slots, int frames, const std::function<void (const SeenFrame &)> &take)
 {
   constexpr int kTries = 5;
-  std::vector<SeenFrame> whole;
-  ASSIGN_OR_RETURN (auto seen, look (examination, mask, slots, frames));
-  for (int more = 1;; more++) {
-    for (SeenFrame &frame : seen)
-      if (!frame.damaged && int (whole.size ()) < frames &&
-          (whole.empty () || same_size (std::as_const (frame.picture).view (),
-                                 std::as_const (whole[0].picture).view ())))
-        whole.push_back (std::move (frame));
-    if (int (whole.size ()) == frames || seen.empty () || more == kTries)
+  std::optional<Extent> size;
+  int whole = 0;
+  RETURN_IF_ERROR (look (examination, mask, slots, 0));
+  for (int came = 0; whole < frames && came < kTries * frames;) {
+    ASSIGN_OR_RETURN (const int more,
+        watch_each (examination.rig, frames - whole, [&] (SeenFrame &frame) {
+          const Extent own = {frame.picture.width (), frame.picture.height ()};
+          if (frame.damaged || own != size.value_or (own))
+            return;
+          size = own;
+          whole++;
+          take (frame);
+        }));
+    if (more == 0)
       break;
-    ASSIGN_OR_RETURN (seen, examination.rig.watch (frames));
+    came += more;
   }
-  if (int (whole.size ()) < std::max (1, frames / 2))
-    return Error{"only " + std::to_string (whole.size ()) + " of " +
+  if (whole < std::max (1, frames / 2))
+    return Error{"only " + std::to_string (whole) + " of " +
                      std::to_string (frames) + " frames came complete",
         ErrorCode::timeout};
-  return whole;
+  return {};
 }
 
 Result<Stack>
 look_at_light (Examination &examination, const StillMask &mask, int slots,
     int frames, const Image<float> *dark)
 {
-  ASSIGN_OR_RETURN (const auto seen,
-      look_for_whole_frames (examination, mask, slots, std::max (4, frames)));
-  if (dark && !same_size (seen[0].picture.view (), dark->view ()))
-    return Error{"the size of the frames has changed", ErrorCode::device};
-  return stack_of (seen, examination.rig.parts ().largest (), dark);
+  StackSum sum (examination.rig.parts ().largest ());
+  RETURN_IF_ERROR (look_for_whole_frames (examination, mask, slots,
+      std::max (4, frames), [&] (const SeenFrame &frame) { sum.add (frame); }));
+  return std::move (sum).stack (dark);
+}
+
+Image<float>
+thinned (const Image<float> &image, int step)
+{
+  Image<float> result (
+      (image.width () + step - 1) / step, (image.height () + step - 1) / step);
+  each_pixel (result,
+      [&] (int x, int y) { result.at (x, y) = image.at (x * step, y * step); });
+  return result;
+}
+
+int
+thinning_of (Extent picture)
+{
+  constexpr double kEnough = 1e6;
+  const double pixels = double (picture.width) * picture.height;
+  return std::max (1, int (std::sqrt (pixels / kEnough)));
 }
 
 Result<Finding>

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "base/image.h"
@@ -21,27 +22,57 @@ struct Stack {
    * not noise of the sensor. */
   Image<float> variance;
   /** Frames in which a pixel was 0, and in which it had the largest DN. */
-  Image<std::uint16_t> zeros, full;
+  Image<std::uint8_t> zeros, full;
   std::uint16_t bits_seen = 0; ///< that are set in a pixel of a frame
   double scatter = 0.0;        ///< rms of the means of frames, DN
 };
 
-/** look () until there are as many frames without damage as asked for, or half
- * as many after five times that time. Error with fewer. */
-Result<std::vector<SeenFrame>> look_for_whole_frames (
-    Examination &examination, const StillMask &mask, int slots, int frames);
-
 /**
- * The same, put together. @p dark: mean without light, so that common changes
- * of light are in proportion to it; null: they are the same in each pixel.
+ * Puts frames of one size together as they come, in the memory of a few
+ * pictures.
  */
+class StackSum
+{
+public:
+  /** @p largest: DN. */
+  explicit StackSum (int largest) : largest_ (largest) {}
+
+  /** At most 255 of them. */
+  void add (const SeenFrame &frame);
+  /**
+   * Of one frame or more. @p dark: mean without light, so that common changes
+   * of light are in proportion to it; null: they are the same in each pixel.
+   * Error where it has another size.
+   */
+  Result<Stack> stack (const Image<float> *dark = nullptr) &&;
+
+private:
+  int largest_;
+  Stack stack_; // its mean and variance come at the end
+  /* Against the first frame: sums of values, of their squares, and of their
+   * products with the means of frames. */
+  Image<std::uint16_t> first_;
+  Image<float> sum_, squares_, products_;
+  Nanoseconds times_ = 0;
+  double level_ = 0.0; // mean of the first frame
+  double levels_ = 0.0, level_squares_ = 0.0;
+};
+
+/** Calls @p take with as many frames without damage as asked for, or half as
+ * many after five times that time, of one size. Error with fewer. */
+Result<void> look_for_whole_frames (Examination &examination,
+    const StillMask &mask, int slots, int frames,
+    const std::function<void (const SeenFrame &)> &take);
+
+/** The same, put together as a StackSum does. */
 Result<Stack> look_at_light (Examination &examination, const StillMask &mask,
     int slots, int frames, const Image<float> *dark = nullptr);
 
-/** Puts @p frames of the same size together; without frames, there is no
- * picture. */
-Stack stack_of (const std::vector<SeenFrame> &frames, int largest,
-    const Image<float> *dark = nullptr);
+/** Every @p step th pixel of every @p step th row. */
+Image<float> thinned (const Image<float> &image, int step);
+/** The step with which a million pixels of a picture are left, or a few more.
+ */
+int thinning_of (Extent picture);
 
 /** Means over the pixels of @p stack that are not 0 in @p good. */
 struct StackMeans {

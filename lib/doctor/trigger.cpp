@@ -134,26 +134,28 @@ private:
 Result<bool>
 TriggerCheck::check_frames ()
 {
-  ASSIGN_OR_RETURN (
-      const auto seen, look (examination_, lit (0, 1), 1, kRateFrames));
-  if (seen.size () < 2) {
-    finding_.add ("frames per cycle", {0.0, 0.0});
-    finding_.blame ("no-trigger",
-        "the DMD runs, but " + std::string (seen.empty ()
-                                                ? "no frame comes"
-                                                : "only one frame came"));
-    return false;
-  }
   std::vector<double> steps, levels;
   int bits = 0;
-  for (std::size_t i = 0; i < seen.size (); i++) {
-    if (i > 0)
-      steps.push_back (1e-9 * double (seen[i].time - seen[i - 1].time));
-    if (seen[i].damaged)
-      continue;
-    const Level level = level_of (seen[i].picture.view (), largest_);
-    bits |= level.bits_seen;
-    levels.push_back (level.mean);
+  std::optional<Nanoseconds> first;
+  RETURN_IF_ERROR (look (examination_, lit (0, 1), 1, 0));
+  ASSIGN_OR_RETURN (const int came,
+      watch_each (examination_.rig, kRateFrames, [&] (const SeenFrame &frame) {
+        if (first)
+          steps.push_back (1e-9 * double (frame.time - last_));
+        first = first.value_or (frame.time);
+        last_ = frame.time;
+        if (frame.damaged)
+          return;
+        const Level level = level_of (frame.picture.view (), largest_);
+        bits |= level.bits_seen;
+        levels.push_back (level.mean);
+      }));
+  if (came < 2) {
+    finding_.add ("frames per cycle", {0.0, 0.0});
+    finding_.blame ("no-trigger",
+        "the DMD runs, but " +
+            std::string (came == 0 ? "no frame comes" : "only one frame came"));
+    return false;
   }
   runs_.bits_seen = bits;
   const int coarseness = bits ? bits & -bits : 1; // DN
@@ -162,14 +164,12 @@ TriggerCheck::check_frames ()
         "all pixel values are multiples of " + std::to_string (coarseness));
     return false;
   }
-  last_ = seen.back ().time;
   const double step = std::max (median (steps), 1e-9);
   double frames = 0.0; // those that are lost included
   for (const double each : steps)
     frames += std::round (each / step);
   const double ratio =
-      frames * period_ /
-      std::max (1e-9 * double (seen.back ().time - seen.front ().time), 1e-9);
+      frames * period_ / std::max (1e-9 * double (last_ - *first), 1e-9);
   finding_.add ("frames per cycle", {ratio, 0.0});
   /* Of stamps that jitter, only the steps tell by how much. */
   double squares = 0.0;

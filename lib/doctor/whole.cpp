@@ -53,22 +53,20 @@ spread_of (const std::vector<double> &values)
 Result<std::uint64_t>
 count_slips (Examination &examination, double seconds)
 {
-  constexpr int kFrames = 10; // in memory at a time
+  constexpr int kFrames = 10;
   const RigParts &parts = examination.rig.parts ();
   const double frames =
       std::min (seconds, kLongestWatch) * parts.rate.num / parts.rate.den;
   std::vector<double> levels;
   RETURN_IF_ERROR (with_exposure (
       examination, parts.rate.period () / 2, [&] () -> Result<void> {
-        ASSIGN_OR_RETURN (
-            auto seen, look (examination, lit (1, 1), 4, kFrames));
-        while (!seen.empty ()) {
-          for (const SeenFrame &frame : seen)
-            if (!frame.damaged)
-              levels.push_back (mean_of (frame.picture.view ()));
-          if (double (levels.size ()) >= frames)
-            break;
-          ASSIGN_OR_RETURN (seen, examination.rig.watch (kFrames));
+        RETURN_IF_ERROR (look (examination, lit (1, 1), 4, 0));
+        for (int came = 1; came > 0 && double (levels.size ()) < frames;) {
+          ASSIGN_OR_RETURN (
+              came, watch_each (examination.rig, kFrames, [&] (auto &frame) {
+                if (!frame.damaged)
+                  levels.push_back (mean_of (frame.picture.view ()));
+              }));
         }
         return {};
       }));

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* What the camera, the lamp and the target do, found by what is seen alone. */
 #include <cmath>
+#include <random>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -9,6 +10,7 @@
 #include "checked_bench.h"
 #include "doctor/picture.h"
 #include "doctor/response.h"
+#include "doctor/stack.h"
 
 using namespace codedexposure;
 using namespace codedexposure::test;
@@ -160,8 +162,76 @@ TEST (Change, IsOneWhereOnlyNoiseDiffers)
   };
   const Image<float> dark (256, 192);
   const auto still = stack (2, 0.0), moved = stack (2, 1.0);
-  EXPECT_NEAR (change_between (still[0], still[1], dark).value, 1.0, 0.2);
-  EXPECT_GT (change_between (moved[0], moved[1], dark).value, 5.0);
+  const auto change = [&dark] (const std::vector<Stack> &stacks) {
+    const auto mean = [&stacks] (std::size_t i) {
+      return FrameMean{stacks[i].mean.view (), stacks[i].frames};
+    };
+    return change_between (mean (0), mean (1), stacks[1], dark).value;
+  };
+  EXPECT_NEAR (change (still), 1.0, 0.2);
+  EXPECT_GT (change (moved), 5.0);
+}
+
+/* Sums over frames are as good as a second look at each of them. */
+TEST (StackSum, MeansAndNoiseAreThoseOfTheFrames)
+{
+  constexpr int kFrames = 9, kLargest = 4095;
+  std::mt19937 random (7);
+  std::normal_distribution<double> noise (0.0, 3.0);
+  Image<float> dark (8, 6), light (8, 6);
+  each_pixel (light, [&] (int x, int y) {
+    dark.at (x, y) = float (20 + x);
+    light.at (x, y) = float (1000 + 100 * x - 60 * y);
+  });
+  StackSum sum (kLargest);
+  std::vector<SeenFrame> frames (kFrames);
+  for (int i = 0; i < kFrames; i++) {
+    SeenFrame &frame = frames[std::size_t (i)];
+    frame.time = Nanoseconds (1000) + i * Nanoseconds (40);
+    frame.picture = Image<std::uint16_t> (8, 6);
+    const double level = 1.0 + 0.1 * std::sin (i);
+    each_pixel (light, [&] (int x, int y) {
+      const double value = double (dark.at (x, y)) +
+                           level * double (light.at (x, y)) + noise (random);
+      frame.picture.at (x, y) = std::uint16_t (std::lround (value));
+    });
+    frame.picture.at (3, 2) = 0;
+    frame.picture.at (4, 2) = i < 4 ? kLargest : 100;
+    sum.add (frame);
+  }
+  const auto made = std::move (sum).stack (&dark);
+  ASSERT_TRUE (made);
+  EXPECT_EQ (made->frames, kFrames);
+  EXPECT_EQ (made->time, 1000 + 4 * 40);
+  EXPECT_EQ (made->zeros.at (3, 2), kFrames);
+  EXPECT_EQ (made->full.at (4, 2), 4);
+  EXPECT_EQ (made->full.at (5, 2), 0);
+
+  std::vector<double> levels;
+  for (const SeenFrame &frame : frames)
+    levels.push_back (mean_of (frame.picture.view ()));
+  double middle = 0.0;
+  for (const double level : levels)
+    middle += level / kFrames;
+  const double whole =
+      mean_of (std::as_const (made->mean).view ()) - mean_of (dark.view ());
+  each_pixel (light, [&] (int x, int y) {
+    double mean = 0.0, squares = 0.0;
+    for (const SeenFrame &frame : frames)
+      mean += double (frame.picture.at (x, y)) / kFrames;
+    const double part = (mean - double (dark.at (x, y))) / whole;
+    for (std::size_t i = 0; i < frames.size (); i++)
+      squares += std::pow (double (frames[i].picture.at (x, y)) - mean -
+                               part * (levels[i] - middle),
+          2);
+    EXPECT_NEAR (made->mean.at (x, y), mean, 1e-3);
+    EXPECT_NEAR (made->variance.at (x, y), squares / (kFrames - 1),
+        1e-3 * (1.0 + squares / (kFrames - 1)));
+  });
+  const Image<float> other (4, 4);
+  StackSum wrong (kLargest);
+  wrong.add (frames[0]);
+  EXPECT_FALSE (std::move (wrong).stack (&other));
 }
 
 } // namespace

@@ -12,5 +12,6 @@ codedexposure::gst::register_more_elements (GstPlugin *plugin)
   register_partner_meta ();
   return GST_ELEMENT_REGISTER (codedexposure_fuse, plugin) &&
          GST_ELEMENT_REGISTER (codedexposure_pair, plugin) &&
+         GST_ELEMENT_REGISTER (codedexposure_sum, plugin) &&
          GST_ELEMENT_REGISTER (subframestats, plugin);
 }

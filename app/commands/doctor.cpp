@@ -6,6 +6,7 @@
 #include <iostream>
 #include <optional>
 
+#include <malloc.h>
 #include <poll.h>
 #include <unistd.h>
 
@@ -384,6 +385,9 @@ Doctor::run ()
     std::printf ("Faults of the simulated bench:\n%s", fault_help ().c_str ());
     return Exit::done;
   }
+  /* Pictures go back to the system: in the heap, holes between large ones stay
+   * for the whole run. */
+  mallopt (M_MMAP_THRESHOLD, 1 << 20);
   stop_ = stop_at_signals ();
   auto checks = choose_checks (only_.value_or (""));
   if (!checks)

@@ -13,6 +13,7 @@ GST_ELEMENT_REGISTER_DECLARE (codedexposure_recorddemux);
 GST_ELEMENT_REGISTER_DECLARE (codedexposure_recordmux);
 GST_ELEMENT_REGISTER_DECLARE (codedexposure_scene);
 GST_ELEMENT_REGISTER_DECLARE (codedexposure_sim);
+GST_ELEMENT_REGISTER_DECLARE (codedexposure_sum);
 GST_ELEMENT_REGISTER_DECLARE (codedexposure_view);
 GST_ELEMENT_REGISTER_DECLARE (dmdsync);
 GST_ELEMENT_REGISTER_DECLARE (moirecalib);

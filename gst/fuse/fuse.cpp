@@ -103,9 +103,9 @@
 #include <utility>
 
 #include "base/pixels.h"
+#include "base/try.h"
 #include "common/element.h"
 #include "common/elements.h"
-#include "common/partner.h"
 #include "extract/saturation.h"
 
 GST_DEBUG_CATEGORY (codedexposure_fuse_debug);
@@ -186,47 +186,15 @@ Fuse::learn (CodedFrame frame)
   return GST_FLOW_OK;
 }
 
-bool
-Fuse::map_partner (GstBuffer *coded, BufferPtr &buffer, MappedFrame &mapped)
-{
-  if (!plan_->with_partners)
-    return false;
-  auto partner = get_partner (coded);
-  GstVideoInfo info;
-  if (!partner || !gst_video_info_from_caps (&info, partner->caps.get ()))
-    return false;
-  const Extent size =
-      plan_->of_partner ? plan_->of_partner->camera () : format ().size;
-  if (GST_VIDEO_INFO_FORMAT (&info) !=
-          GST_VIDEO_INFO_FORMAT (&format ().info) ||
-      info.width != size.width || info.height != size.height)
-    return false;
-  buffer = std::move (partner->buffer);
-  mapped.map (info, buffer.get (), GST_MAP_READ);
-  return bool (mapped);
-}
-
 /* Returns the number of saturated pixels. */
 template <typename Pixel>
 Result<guint64>
-Fuse::take_pixels (MappedFrame &coded, MappedFrame &partner)
+Fuse::take_pixels (GstBuffer *buffer, MappedFrame &coded)
 {
   std::optional<ImageView<const Pixel>> other;
-  if (partner && plan_->of_partner) {
-    auto &image =
-        std::get<Image<Pixel> &> (std::tie (narrow_partner_, wide_partner_));
-    const auto [width, height] = plan_->of_partner->mirrors ();
-    if (image.width () != width || image.height () != height)
-      image = Image<Pixel> (width, height);
-    const int bits = significant_bits ();
-    if (const auto done =
-            plan_->of_partner->run (view_of<const Pixel> (partner),
-                image.view (), bits > 0 ? largest_pixel (bits) : 0);
-        !done)
-      return done.error ();
-    other = image.view ();
-  } else if (partner) {
-    other = view_of<const Pixel> (partner);
+  if (plan_->partners) {
+    ASSIGN_OR_RETURN (
+        other, plan_->partners->read<Pixel> (buffer, significant_bits ()));
   }
   const auto view = view_of<const Pixel> (coded);
   const guint64 saturated = count_saturated (view, significant_bits ());
@@ -249,12 +217,9 @@ Fuse::take (CodedFrame frame)
     MappedFrame coded = map_coded (buffer);
     if (!coded)
       return GST_FLOW_ERROR;
-    BufferPtr other;
-    MappedFrame partner;
-    map_partner (buffer, other, partner);
     const auto saturated = format ().wide ()
-                               ? take_pixels<std::uint16_t> (coded, partner)
-                               : take_pixels<std::uint8_t> (coded, partner);
+                               ? take_pixels<std::uint16_t> (buffer, coded)
+                               : take_pixels<std::uint8_t> (buffer, coded);
     if (!saturated)
       return post_decode_error (saturated.error ());
     frame.meta.saturated = *saturated;

@@ -11,6 +11,7 @@
 #include <gst/gst.h>
 
 #include "common/coded_filter.h"
+#include "common/partner_reader.h"
 #include "fuse/fuser.h"
 
 namespace codedexposure::gst::fuse
@@ -21,9 +22,7 @@ using AnyFuser = std::variant<Fuser<std::uint8_t>, Fuser<std::uint16_t>>;
 /** Everything that follows from the format and the settings. */
 struct Plan {
   AnyFuser fuser;
-  /** What partners are resampled with; null: they have a pixel a mirror. */
-  std::shared_ptr<const Rectifier> of_partner;
-  bool with_partners;
+  std::optional<PartnerReader> partners; ///< none: they are not used
   GstVideoInfo fused, uncertainty;
   Reach reach;
 };
@@ -69,13 +68,10 @@ private:
   std::string method_name () const override;
   std::string unrefined () const;
 
-  /** False, with a warning, when partners cannot be used. */
-  bool plan_partner (const CodedFormat &format,
-      std::shared_ptr<const Rectifier> &rectifier) const;
-  /** The frame of the second camera; false if @p coded has none of use. */
-  bool map_partner (GstBuffer *coded, BufferPtr &buffer, MappedFrame &mapped);
+  /** None, with a warning if there are any, when partners cannot be used. */
+  std::optional<PartnerReader> plan_partners (const CodedFormat &format) const;
   template <typename Pixel>
-  Result<guint64> take_pixels (MappedFrame &coded, MappedFrame &partner);
+  Result<guint64> take_pixels (GstBuffer *buffer, MappedFrame &coded);
   GstFlowReturn take (CodedFrame frame);
   /** The pictures of a pad for one coded frame. */
   struct Pictures {
@@ -100,8 +96,6 @@ private:
   /* Sink pad's stream lock. */
   Settings in_force_;
   std::optional<Plan> plan_;
-  Image<std::uint8_t> narrow_partner_; ///< resampled
-  Image<std::uint16_t> wide_partner_;
   /** Coded frames that were taken, without their pixels; as many as the
    * fuser's pending (). */
   std::deque<CodedFrame> waiting_;

@@ -85,7 +85,7 @@ Fuse::method_name () const
   const auto quality = learned ? FuseQuality::kBest : in_force_.quality;
   std::string name = std::string ("fuse ") +
                      g_enum_get_value (qualities, int (quality))->value_nick;
-  if (plan_ && plan_->with_partners)
+  if (plan_ && plan_->partners)
     name += ", both beams";
   if ((learned || in_force_.refine) && unrefined ().empty ())
     name += ", learned " + refinement_hash () +
@@ -172,47 +172,32 @@ of_sixteen_bits (GstCaps *caps)
 } // namespace
 
 /* The second camera has its own place, and sees the complement of the masks. */
-bool
-Fuse::plan_partner (const CodedFormat &format,
-    std::shared_ptr<const Rectifier> &rectifier) const
+std::optional<PartnerReader>
+Fuse::plan_partners (const CodedFormat &format) const
 {
   const std::optional<PartnerSetup> &partner = tagged_partner ();
   if (!partner)
-    return false;
-  const auto refused = [this] (const std::string &why) {
-    POST_WARNING (element (), STREAM, FORMAT,
-        "The frames of the second camera are not used: " + why);
-    return false;
-  };
-  if (in_force_.refine || in_force_.quality == FuseQuality::kLearned)
-    return refused ("refined frames are made from one camera. Use "
-                    "quality=fast, balanced or best without refine.");
-  const Result<Schedule> complement = format.schedule.complement ();
-  if (!complement)
-    return refused (complement.error ().message + ".");
-  if (!partner->mapping && partner->size == format.size)
-    return true;
-  if (!partner->mapping)
-    return refused ("they have another size than the mirrors, and no mapping. "
-                    "Calibrate the second camera.");
-  auto made = Rectifier::make (
-      *partner->mapping, *complement, rectify_options (format.schedule));
-  if (!made)
-    return refused (
-        "their mapping cannot be used: " + made.error ().message + ".");
-  if (!(made->mirrors () == format.size))
-    return refused ("their mapping is to another number of mirrors than the "
-                    "coded frames have. Calibrate both cameras.");
-  rectifier = std::make_shared<const Rectifier> (*std::move (made));
-  return true;
+    return std::nullopt;
+  const bool refined =
+      in_force_.refine || in_force_.quality == FuseQuality::kLearned;
+  auto made = refined ? Error{"refined frames are made from one camera; use "
+                              "quality=fast, balanced or best without refine"}
+                      : PartnerReader::make (*partner, format,
+                            rectify_options (format.schedule));
+  if (made)
+    return *std::move (made);
+  POST_WARNING (element (), STREAM, FORMAT,
+      "The frames of the second camera are not used: " + made.error ().message +
+          ".");
+  return std::nullopt;
 }
 
 bool
 Fuse::plan (const CodedFormat &format)
 {
   FuseOptions options = in_force_;
-  std::shared_ptr<const Rectifier> of_partner;
-  options.partner = plan_partner (format, of_partner);
+  auto partners = plan_partners (format);
+  options.partner = partners.has_value ();
   options.bits = significant_bits ();
   options.noise = noise (format.schedule);
   const std::stop_token stop = stop_token ();
@@ -233,7 +218,7 @@ Fuse::plan (const CodedFormat &format)
   caps.of (PadKind::coded).reset (gst_caps_ref (format.caps.get ()));
   fused.reset (scale_caps (rectified.get (), coded_to_fused (format.schedule)));
   uncertainty = of_sixteen_bits (fused.get ());
-  Plan made{std::move (*fuser), std::move (of_partner), options.partner, {}, {},
+  Plan made{std::move (*fuser), std::move (partners), {}, {},
       {options.noise.full_well > 0.0 ? kMaxReach.history : 1,
           options.lookahead}};
   gst_video_info_from_caps (&made.fused, fused.get ());

@@ -22,8 +22,8 @@ namespace
 /* Masks that frames may still show. */
 constexpr std::size_t kRemembered = 32;
 constexpr std::size_t kPast = 32;
-/* Pictures of masks that are kept. */
-constexpr std::size_t kPictures = 32;
+/* Pictures of masks that are kept: of large ones, so many bytes. */
+constexpr std::size_t kPictures = 32, kFewPictures = 4, kKept = 200'000'000;
 
 /* What a number is drawn for. */
 enum Purpose : std::uint32_t {
@@ -514,7 +514,9 @@ SickBench::picture_of (const MirrorProgram::Mask &mask)
   const auto known = std::ranges::find (seen_, mask, &Seen::mask);
   if (known != seen_.end ())
     return known->picture;
-  if (seen_.size () >= kPictures)
+  const std::size_t bytes =
+      sizeof (float) * std::size_t (view_.width) * std::size_t (view_.height);
+  if (seen_.size () >= std::clamp (kKept / bytes, kFewPictures, kPictures))
     seen_.pop_front ();
   seen_.push_back ({mask, {}});
   look (mirrors_of (mask), seen_.back ().picture);

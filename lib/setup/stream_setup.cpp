@@ -40,10 +40,12 @@ read_partner (const Json &root)
 {
   std::optional<Extent> size;
   std::optional<Mapping> mapping;
+  int black = 0;
   read_keys (root, "", "a partner has a size",
       {{"size", frame_size_into (size), true},
-          {"mapping", inner_into (mapping, read_mapping)}});
-  return {*size, std::move (mapping)};
+          {"mapping", inner_into (mapping, read_mapping)},
+          {"black", integer_into (black, 65535)}});
+  return {*size, std::move (mapping), black};
 }
 
 JsonReader
@@ -115,6 +117,8 @@ StreamSetup::to_json () const
             "," + std::to_string (partner->size.height) + "]";
     if (partner->mapping)
       text += ",\"mapping\":" + partner->mapping->to_json ();
+    if (partner->black > 0)
+      text += ",\"black\":" + std::to_string (partner->black);
     text += "}";
   }
   return text + "}";

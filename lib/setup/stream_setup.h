@@ -20,6 +20,7 @@ namespace codedexposure
 struct PartnerSetup {
   Extent size; ///< of its frames
   std::optional<Mapping> mapping = {};
+  int black = 0; ///< level without light, DN
 
   bool operator== (const PartnerSetup &) const = default;
 };

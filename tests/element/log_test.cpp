@@ -330,7 +330,8 @@ TEST_F (LogTest, TheTagSaysThatThereIsATrack)
 TEST_F (LogTest, OfASecondCameraTheTagSaysNothing)
 {
   play (path_.get ());
-  const StreamSetup setup{.partner = PartnerSetup{{64, 48}}};
+  StreamSetup setup;
+  setup.partner = PartnerSetup{{64, 48}};
   gst_harness_push_event (harness_.get (), setup_to_event (setup));
   ASSERT_EQ (push (frame (0)), GST_FLOW_OK);
   const EventPtr tag (

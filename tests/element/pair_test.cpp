@@ -241,8 +241,13 @@ TEST_F (Pair, TheTagSaysHowTheSecondCameraStands)
 {
   const Schedule schedule = schedule_of (kPreset);
   const Mapping mapping (Extent{40, 30});
-  push_setup (
-      off.get (), {.schedule = schedule, .mapping = mapping, .off_beam = true});
+  BenchProfile bench;
+  bench.camera.size = {40, 30};
+  bench.black_level = Measured{5.2, 0.1};
+  push_setup (off.get (), {.schedule = schedule,
+                              .mapping = mapping,
+                              .bench = bench,
+                              .off_beam = true});
   push_setup (pair.get (), {.schedule = schedule});
   gst_harness_set_src_caps_str (off.get (), gray_caps (40, 30).c_str ());
   run (frames ({0}), {});
@@ -251,7 +256,7 @@ TEST_F (Pair, TheTagSaysHowTheSecondCameraStands)
     if (const auto setup = setup_from_tags (tags_of (event.get ())))
       tagged = setup->value ();
   EXPECT_EQ (tagged, (StreamSetup{.schedule = schedule,
-                         .partner = PartnerSetup{{40, 30}, mapping}}));
+                         .partner = PartnerSetup{{40, 30}, mapping, 5}}));
 }
 
 TEST_F (Pair, OtherTagsOfTheFirstCameraGoThroughAndThoseOfTheSecondDoNot)

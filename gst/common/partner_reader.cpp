@@ -1,0 +1,69 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "common/partner_reader.h"
+
+#include <tuple>
+
+#include "base/pixels.h"
+#include "base/try.h"
+
+namespace codedexposure::gst
+{
+
+Result<PartnerReader>
+PartnerReader::make (const PartnerSetup &partner, const CodedFormat &format,
+    const RectifyOptions &options)
+{
+  PartnerReader reader;
+  reader.format_ = GST_VIDEO_INFO_FORMAT (&format.info);
+  reader.size_ = partner.size;
+  ASSIGN_OR_RETURN (const Schedule complement, format.schedule.complement ());
+  if (!partner.mapping && partner.size == format.size)
+    return reader;
+  if (!partner.mapping)
+    return Error{"they have another size than the mirrors, and no mapping; "
+                 "calibrate the second camera"};
+  auto made = Rectifier::make (*partner.mapping, complement, options);
+  if (!made)
+    return made.error ().with_prefix ("their mapping cannot be used: ");
+  if (!(made->mirrors () == format.size))
+    return Error{"their mapping is to another number of mirrors than the coded "
+                 "frames have; calibrate both cameras"};
+  reader.size_ = made->camera ();
+  reader.rectifier_ = std::make_shared<const Rectifier> (*std::move (made));
+  return reader;
+}
+
+template <typename Pixel>
+Result<std::optional<ImageView<const Pixel>>>
+PartnerReader::read (GstBuffer *coded, int bits)
+{
+  using View = ImageView<const Pixel>;
+  mapped_.reset ();
+  auto partner = get_partner (coded);
+  GstVideoInfo info;
+  if (!partner || !gst_video_info_from_caps (&info, partner->caps.get ()) ||
+      GST_VIDEO_INFO_FORMAT (&info) != format_ || info.width != size_.width ||
+      info.height != size_.height)
+    return std::optional<View> ();
+  buffer_ = std::move (partner->buffer);
+  mapped_ = std::make_unique<MappedFrame> (info, buffer_.get (), GST_MAP_READ);
+  if (!*mapped_)
+    return std::optional<View> ();
+  const View seen = view_of<const Pixel> (*mapped_);
+  if (!rectifier_)
+    return std::optional<View> (seen);
+  auto &image = std::get<Image<Pixel> &> (std::tie (narrow_, wide_));
+  const auto [width, height] = rectifier_->mirrors ();
+  if (image.width () != width || image.height () != height)
+    image = Image<Pixel> (width, height);
+  RETURN_IF_ERROR (rectifier_->run (
+      seen, image.view (), bits > 0 ? largest_pixel (bits) : 0));
+  return std::optional<View> (image.view ());
+}
+
+template Result<std::optional<ImageView<const std::uint8_t>>>
+PartnerReader::read (GstBuffer *, int);
+template Result<std::optional<ImageView<const std::uint16_t>>>
+PartnerReader::read (GstBuffer *, int);
+
+} // namespace codedexposure::gst

@@ -1,0 +1,44 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The pixels of partners, a pixel a mirror. */
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "base/image.h"
+#include "common/coded_filter.h"
+#include "common/partner.h"
+
+namespace codedexposure::gst
+{
+
+class PartnerReader
+{
+public:
+  /** @p partner: as the tag of coded frames of @p format says. Error when its
+   * frames cannot be used. */
+  static Result<PartnerReader> make (const PartnerSetup &partner,
+      const CodedFormat &format, const RectifyOptions &options);
+
+  /** The partner of @p coded, until the next call; none if it has none of use.
+   * @p bits: significant ones; 0: all. */
+  template <typename Pixel>
+  Result<std::optional<ImageView<const Pixel>>> read (
+      GstBuffer *coded, int bits);
+
+private:
+  GstVideoFormat format_ = GST_VIDEO_FORMAT_UNKNOWN;
+  Extent size_;
+  std::shared_ptr<const Rectifier> rectifier_; ///< null: a pixel a mirror
+  BufferPtr buffer_;
+  std::unique_ptr<MappedFrame> mapped_; ///< the buffer
+  Image<std::uint8_t> narrow_;          ///< resampled
+  Image<std::uint16_t> wide_;
+};
+
+extern template Result<std::optional<ImageView<const std::uint8_t>>>
+PartnerReader::read (GstBuffer *, int);
+extern template Result<std::optional<ImageView<const std::uint16_t>>>
+PartnerReader::read (GstBuffer *, int);
+
+} // namespace codedexposure::gst

@@ -1,0 +1,148 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* codedexposure-sum: the whole light of both beams. */
+#include <string>
+
+#include "common/meta.h"
+#include "common/partner.h"
+#include "common/tag.h"
+#include "pipeline.h"
+#include "two_beams.h"
+
+namespace
+{
+
+using namespace codedexposure;
+using namespace codedexposure::gst;
+using namespace codedexposure::test;
+using namespace codedexposure::test::two_beams;
+
+constexpr GstClockTime kPeriod = 40 * GST_MSECOND;
+const Schedule kSchedule = schedule_of (kPreset);
+
+class Sum : public ::testing::Test
+{
+protected:
+  Sum () : sum ("codedexposure-sum")
+  {
+    sum.set_caps (gray_caps (kWidth, kHeight));
+    setup.schedule = kSchedule;
+    setup.partner = PartnerSetup{{kWidth, kHeight}};
+    const Pictures slots = truth (3, kSchedule.slots (), 0.8);
+    on = coded (kSchedule, slots);
+    off = coded (kSchedule.complement ().value (), slots);
+  }
+  void tell () { gst_harness_push_event (sum.get (), setup_to_event (setup)); }
+  BufferPtr pair (int i, bool alone = false) const
+  {
+    BufferPtr frame = frame_of (on[std::size_t (i)], i * kPeriod);
+    GST_BUFFER_DURATION (frame.get ()) = kPeriod;
+    if (!alone)
+      set_partner (
+          frame.get (), {frame_of (off[std::size_t (i)], i * kPeriod),
+                            CapsPtr (gst_caps_from_string (
+                                gray_caps (kWidth, kHeight).c_str ()))});
+    return frame;
+  }
+
+  ElementHarness sum;
+  StreamSetup setup;
+  Pictures on, off;
+};
+
+TEST_F (Sum, IsOfEachPairAtItsTime)
+{
+  tell ();
+  for (int i = 0; i < 3; i++)
+    ASSERT_EQ (sum.push (pair (i)), GST_FLOW_OK);
+  const CapsPtr caps (
+      gst_caps_from_string (gray_caps (kWidth, kHeight).c_str ()));
+  for (int i = 0; i < 3; i++) {
+    const BufferPtr made (gst_harness_pull (sum.get ()));
+    EXPECT_EQ (GST_BUFFER_PTS (made.get ()), i * kPeriod);
+    EXPECT_EQ (GST_BUFFER_DURATION (made.get ()), kPeriod);
+    EXPECT_FALSE (get_partner (made.get ()));
+    const auto meta = get_frame_meta (made.get ());
+    ASSERT_TRUE (meta);
+    EXPECT_EQ (meta->subframe, -1);
+    EXPECT_EQ (meta->exposure_start, i * kPeriod);
+    EXPECT_EQ (meta->exposure_duration, kPeriod);
+    const auto picture = image_of<std::uint8_t> (made.get (), caps.get ());
+    for (int y = 0; y < kHeight; y++)
+      for (int x = 0; x < kWidth; x++) {
+        double light = 0.0;
+        for (int s = 0; s < 4; s++)
+          light += scene (4 * i + s, 0.8).at (x, y) / 4.0;
+        EXPECT_NEAR (picture.at (x, y), light, 2.0) << x << "," << y;
+      }
+  }
+  EXPECT_NEAR (
+      property<double> (sum.element (), "measured-ratio"), 1.0 / 3.0, 0.005);
+}
+
+TEST_F (Sum, OfAFrameAloneIsAGap)
+{
+  tell ();
+  ASSERT_EQ (sum.push (pair (0)), GST_FLOW_OK);
+  ASSERT_EQ (sum.push (pair (1, true)), GST_FLOW_OK);
+  ASSERT_EQ (sum.push (pair (2)), GST_FLOW_OK);
+  EXPECT_EQ (gst_harness_buffers_received (sum.get ()), 2u);
+  EXPECT_EQ (property<guint64> (sum.element (), "frames-alone"), 1u);
+  bool gap = false;
+  while (const EventPtr event{gst_harness_try_pull_event (sum.get ())}) {
+    if (GST_EVENT_TYPE (event.get ()) != GST_EVENT_GAP)
+      continue;
+    GstClockTime pts, duration;
+    gst_event_parse_gap (event.get (), &pts, &duration);
+    EXPECT_EQ (pts, kPeriod);
+    EXPECT_EQ (duration, kPeriod);
+    gap = true;
+  }
+  EXPECT_TRUE (gap);
+  for (const bool discont : {true, true}) {
+    const BufferPtr made (gst_harness_pull (sum.get ()));
+    EXPECT_EQ (
+        GST_BUFFER_FLAG_IS_SET (made.get (), GST_BUFFER_FLAG_DISCONT), discont);
+  }
+}
+
+TEST_F (Sum, WithoutASecondCameraSaysWhatIsMissing)
+{
+  setup.partner.reset ();
+  tell ();
+  EXPECT_NE (sum.push (pair (0)), GST_FLOW_OK);
+  EXPECT_NE (
+      sum.error ().find ("put codedexposure-pair before"), std::string::npos);
+}
+
+TEST_F (Sum, OfAnotherSizeNeedsAMapping)
+{
+  setup.partner->size = {kWidth, kHeight + 1};
+  tell ();
+  EXPECT_NE (sum.push (pair (0)), GST_FLOW_OK);
+  EXPECT_NE (
+      sum.error ().find ("calibrate the second camera"), std::string::npos);
+}
+
+/* Of both depths, and beside subframes of the first camera. */
+TEST (SumBench, RunsBesideSubframes)
+{
+  for (const char *format : {"GRAY8", "GRAY16_LE"}) {
+    Pipeline pipeline (
+        std::string ("videotestsrc num-buffers=40 pattern=ball "
+                     "! video/x-raw,format=") +
+        format +
+        ",width=64,height=48,framerate=100/1 ! tee name=light "
+        "light. ! queue ! codedexposure-sim schedule=sequential:lattice:4/2 "
+        "! pair.on light. ! queue ! codedexposure-sim "
+        "schedule=sequential:lattice:4/2 beam=off ! pair.off "
+        "codedexposure-pair name=pair ! tee name=pairs "
+        "pairs. ! queue ! codedexposure-sum name=sum ! "
+        "video/x-raw,framerate=25/1"
+        ",width=64,height=48 ! fakesink name=whole "
+        "pairs. ! queue ! codedexposure-demux ! fakesink name=parts");
+    EXPECT_EQ (pipeline.play (), "");
+    EXPECT_EQ (property<guint64> (pipeline["sum"].get (), "frames-alone"), 0u);
+  }
+}
+
+} // namespace

@@ -136,6 +136,8 @@ begin (GstMoireCalib *self, const Settings &settings, int bits)
   geometry.info = *state (self).stream.info;
   geometry.bits = bits;
   geometry.mirrors = geometry.camera ();
+  const std::optional<StreamSetup> &setup = state (self).stream.setup;
+  geometry.off_beam = settings.beam == Beam::kOff || (setup && setup->off_beam);
   if (settings.mode == Mode::phase) {
     begin_phase (self, settings, std::move (geometry));
     return true;

@@ -31,6 +31,12 @@
  * `moirecalib/phase` message tells the probability; downstream gets the
  * schedule with that phase.
  *
+ * ## A second camera
+ *
+ * A camera in the beam of the mirrors that are off sees the complement of every
+ * pattern. With #moirecalib:beam off, or if the stream's tag says so, it is
+ * aligned and mapped to the same mirrors as the first one.
+ *
  * ## Messages
  *
  * `moirecalib/state`, `moirecalib/reading`, `moirecalib/mapping`,
@@ -107,6 +113,13 @@ properties ()
           "Schedule whose phase mode=phase finds, a preset or a JSON file; "
           "empty: the stream's. Read when the mode is set",
           kReadWrite, set (&Settings::schedule)},
+      {"beam", "Beam",
+          "The beam of the mirrors in which the camera is; one in that of "
+          "those "
+          "that are off sees the complement of every pattern; off if the "
+          "stream's tag says so",
+          kReadWrite, set (&Settings::beam),
+          gst_coded_exposure_beam_get_type ()},
       {"overlay", "Overlay",
           "Draw fringes, numbers and arrows over frames that show a pattern; "
           "frames of the schedule, and all frames if false, pass unchanged",

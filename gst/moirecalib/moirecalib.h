@@ -16,6 +16,7 @@
 #include <gst/video/video.h>
 
 #include "calibrate/session.h"
+#include "common/beam.h"
 #include "common/element.h"
 #include "common/raii.h"
 #include "report.h"
@@ -37,6 +38,7 @@ struct Settings {
   std::string report;
   std::string pattern;
   std::string schedule; ///< whose tile is looked for; "": the stream's
+  Beam beam = Beam::kOn;
   bool overlay = true;
   int period = 12;
   int frames = 4;
@@ -70,6 +72,7 @@ struct Geometry {
   Extent mirrors;
   std::vector<Pattern> patterns;    ///< of a calibration
   std::optional<Schedule> schedule; ///< of the stream's tags
+  bool off_beam = false;            ///< that the camera is in
 
   Extent camera () const { return {info.width, info.height}; }
 };

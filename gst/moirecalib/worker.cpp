@@ -135,7 +135,8 @@ Worker::begin (guint run)
       .mirrors = geometry_.mirrors,
       .bits = settings_.bits > 0 ? settings_.bits : geometry_.bits,
       .patterns = geometry_.patterns,
-      .schedule = std::move (schedule)});
+      .schedule = std::move (schedule),
+      .off_beam = geometry_.off_beam});
   if (geometry_.mode != Mode::phase)
     expect_grating ();
 }

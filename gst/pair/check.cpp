@@ -13,15 +13,15 @@ namespace
 
 using Verdict = PartnerWatch::Verdict;
 
+/** @p mapping: of the stream, which the camera points to. */
 PartnerWatch::Camera
-camera_of (const PairStream &stream)
+camera_of (const PairStream &stream, const std::optional<Mapping> &mapping)
 {
-  PartnerWatch::Camera camera{{stream.info.width, stream.info.height}, nullptr};
+  PartnerWatch::Camera camera{
+      {stream.info.width, stream.info.height}, mapping ? &*mapping : nullptr};
   int bits = 0;
   if (stream.setup) {
     bits = stream.setup->bits;
-    if (stream.setup->mapping)
-      camera.mapping = &*stream.setup->mapping;
     if (stream.setup->bench)
       camera.black = stream.setup->bench->black ();
   }
@@ -45,7 +45,12 @@ PairCheck::configure (const PairStream &on, const PairStream &off)
   watch_.reset ();
   on_ = on.info;
   off_ = off.info;
-  const PartnerWatch::Camera first = camera_of (on), second = camera_of (off);
+  const auto mapping_of = [] (const PairStream &stream) {
+    return stream.setup ? stream.setup->known_mapping () : std::nullopt;
+  };
+  const auto mapping = mapping_of (on), other = mapping_of (off);
+  const PartnerWatch::Camera first = camera_of (on, mapping),
+                             second = camera_of (off, other);
   const auto fits = [] (const PartnerWatch::Camera &camera) {
     return !camera.mapping || camera.mapping->camera () == camera.size;
   };

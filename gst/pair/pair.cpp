@@ -353,7 +353,7 @@ push_due (GstPad *pad, GstPadProbeInfo *, gpointer data)
     StreamSetup setup = *st.on_setup;
     if (const auto off = stream_of (sink (self, "off"), st.off_setup))
       setup.partner = PartnerSetup{{off->info.width, off->info.height},
-          off->setup ? off->setup->mapping : std::nullopt,
+          off->setup ? off->setup->known_mapping () : std::nullopt,
           off->setup && off->setup->bench ? off->setup->bench->black () : 0};
     gst_pad_push_event (pad, setup_to_event (setup));
   }

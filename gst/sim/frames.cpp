@@ -127,6 +127,25 @@ watch_mirrors (GstCodedExposureSim *self, const std::vector<int> &masks)
       ("this is posted once"));
 }
 
+/* The mask of a slot as one camera sees it. @parked: where no mirror is on. */
+int
+seen_mask (SimulatedMirrors &mirrors, std::int64_t slot, int parked)
+{
+  const int mask = mirrors.mask_in_slot (slot).value_or (parked);
+  return mask < 0 ? parked : mask;
+}
+
+/* What the second camera sees of it. */
+std::shared_ptr<const StillMask>
+complement_of (std::shared_ptr<const StillMask> mask)
+{
+  if (!mask)
+    return nullptr;
+  StillMask other = *mask;
+  other.on = [mask] (int x, int y) { return !mask->on (x, y); };
+  return std::make_shared<const StillMask> (std::move (other));
+}
+
 /* The masks of all slots, at the start of the exposure, when the DMD begins to
  * step. */
 std::vector<int>
@@ -134,14 +153,17 @@ find_masks (GstCodedExposureSim *self, std::int64_t frame)
 {
   const Stream &stream = state (self).stream;
   const int slots = stream.schedule->slots ();
+  /* Mirrors that are parked throw all light at the second camera. */
+  const int parked = stream.beam == Beam::kOff ? OpticalBench::kAllMirrors : -1;
   std::vector<int> masks;
   for (int slot = 0; slot < slots; slot++) {
     const std::int64_t counted = frame * slots + slot;
     masks.push_back (stream.mirrors
-                         ? stream.mirrors->mask_in_slot (counted).value_or (-1)
+                         ? seen_mask (*stream.mirrors, counted, parked)
                          : int (counted % stream.schedule->masks ()));
   }
-  watch_mirrors (self, masks);
+  if (stream.beam == Beam::kOn)
+    watch_mirrors (self, masks);
   return masks;
 }
 
@@ -249,8 +271,11 @@ begin_exposure (GstCodedExposureSim *self, GstBuffer *inbuf)
   stream.discont = false;
   stream.last_start = exposure.start;
   stream.last_frame = exposure.frame;
-  stream.bench->begin (
-      stream.lit, stream.mirrors ? stream.mirrors->held () : nullptr);
+  auto held = stream.mirrors ? stream.mirrors->held () : nullptr;
+  if (held != stream.held)
+    stream.seen = stream.beam == Beam::kOff ? complement_of (held) : held;
+  stream.held = std::move (held);
+  stream.bench->begin (stream.lit, stream.seen);
   stream.exposure = std::move (exposure);
   return GST_FLOW_OK;
 }
@@ -414,11 +439,6 @@ begin_stream (GstCodedExposureSim *self)
     return std::tuple (settings.dmd, settings.bench, settings.beam);
   });
   stream.beam = beam;
-  if (beam == Beam::kOff && !dmd.empty ())
-    return refuse_settings (self,
-        "beam=off with dmd '" + dmd +
-            "': a second camera is simulated with masks that step with the "
-            "frames; leave dmd empty, of both cameras.");
   if (bench.read && !*bench.read)
     return refuse_settings (self,
         "The bench property cannot be read: " + bench.read->error ().message);

@@ -79,6 +79,8 @@ struct Stream {
   std::string refused; ///< why there can be no plan, as was posted
   std::optional<OpticalBench> bench;
   BenchOptions optics; ///< of the bench
+  /** The pattern that the DMD holds, and what the camera sees of it. */
+  std::shared_ptr<const StillMask> held, seen;
   std::optional<Exposure> exposure;
   /** The exposure that was begun last, kept or dropped. */
   GstClockTime last_start = GST_CLOCK_TIME_NONE;

@@ -20,7 +20,7 @@ namespace
 {
 
 /* Masks that frames may still show. */
-constexpr std::size_t kRemembered = 32;
+constexpr std::size_t kRemembered = 8;
 constexpr std::size_t kPast = 32;
 /* Pictures of masks that are kept: of large ones, so many bytes. */
 constexpr std::size_t kPictures = 32, kFewPictures = 4, kKept = 200'000'000;
@@ -329,7 +329,7 @@ SickBench::show (Nanoseconds time, MirrorProgram program)
 {
   park (time);
   Shown shown{.start = time, .program = std::move (program)};
-  for (const MirrorProgram::Mask &mask : shown.program.masks) {
+  for (MirrorProgram::Mask &mask : shown.program.masks) {
     const auto rows = mask->view ();
     std::int64_t on = 0;
     for (int y = 0; y < rows.height; y++)
@@ -340,6 +340,8 @@ SickBench::show (Nanoseconds time, MirrorProgram program)
     shown.kinds.push_back (on == 0       ? Kind::off
                            : on == every ? Kind::on
                                          : Kind::picture);
+    if (shown.kinds.back () != Kind::picture)
+      mask.reset ();
   }
   shown_.push_back (std::move (shown));
   for (; shown_.size () > kRemembered && at_ > 0; at_--)

@@ -135,6 +135,19 @@ Pattern::on (int x, int y) const
 }
 
 Pattern
+Pattern::complement () const
+{
+  Pattern other = *this;
+  if (kind == Kind::grating)
+    other.phase = (phase + period / 2) % period;
+  else if (kind == Kind::gray)
+    other.inverse = !inverse;
+  else
+    other.kind = kind == Kind::dark ? Kind::white : Kind::dark;
+  return other;
+}
+
+Pattern
 live_grating (int period)
 {
   return {Pattern::Kind::grating, Axis::both, period};

@@ -44,6 +44,9 @@ struct Pattern {
   static Result<Pattern> parse (std::string_view text);
   std::string text () const;
   bool on (int x, int y) const;
+  /** What the beam of the mirrors that are off shows of it. Not for gratings in
+   * both directions, of which the complement is no pattern. */
+  Pattern complement () const;
 
   bool operator== (const Pattern &) const = default;
 };

@@ -432,8 +432,9 @@ Result<Mapping>
 LiveMoire::State::combine (const Plane &px, const Plane &py) const
 {
   const double to_mirrors = options.period / kTwoPi;
-  /* Mirror of phase 0: the middle of those that are on. */
-  const double origin = 0.5 * (options.period / 2 - 1);
+  /* Mirror of phase 0: the middle of those that are bright. */
+  const double origin = 0.5 * (options.period / 2 - 1) +
+                        (options.off_beam ? options.period / 2 : 0);
   const Homography known = expected.centred ();
   Homography h = {0, 0, 0, 0, 0, 0, 0, 0, 1};
   Mapping::Covariance covariance = {};

@@ -30,8 +30,9 @@ struct LiveReading {
 };
 
 struct LiveMoireOptions {
-  int period = 4; ///< mirrors, as in live_grating ()
-  int bits = 0;   ///< significant ones of a pixel; 0: all of its type
+  int period = 4;        ///< mirrors, as in live_grating ()
+  int bits = 0;          ///< significant ones of a pixel; 0: all of its type
+  bool off_beam = false; ///< the frame is of the beam of mirrors that are off
 };
 
 /**

@@ -47,7 +47,9 @@ CalibrationSession::expect (const Pattern &grating, double pixels_per_mirror)
   ASSIGN_OR_RETURN (
       live_, LiveMoire::make (centred_mapping (options_.camera,
                                   options_.mirrors, pixels_per_mirror),
-                 {.period = grating.period, .bits = options_.bits}));
+                 {.period = grating.period,
+                     .bits = options_.bits,
+                     .off_beam = options_.off_beam}));
   return {};
 }
 
@@ -76,9 +78,9 @@ CalibrationSession::align (
 
 template <typename Pixel>
 Result<void>
-CalibrationSession::collect (
-    const Pattern &pattern, ImageView<const Pixel> frame)
+CalibrationSession::collect (const Pattern &shown, ImageView<const Pixel> frame)
 {
+  const Pattern pattern = options_.off_beam ? shown.complement () : shown;
   if (!calibration_) {
     ASSIGN_OR_RETURN (calibration_, Calibration::make (options_.camera,
                                         options_.mirrors, options_.patterns));
@@ -114,8 +116,11 @@ CalibrationSession::find_phase (ImageView<const Pixel> frame)
 {
   if (!options_.schedule)
     return Error{"there is no schedule whose phase could be found"};
-  ASSIGN_OR_RETURN (
-      const TilePhase tile, find_tile_phase (frame, *options_.schedule));
+  Schedule seen = *options_.schedule;
+  if (options_.off_beam) {
+    ASSIGN_OR_RETURN (seen, seen.complement ());
+  }
+  ASSIGN_OR_RETURN (const TilePhase tile, find_tile_phase (frame, seen));
   confidence_ = std::max (confidence_, tile.confidence);
   if (tile.confidence < kSure)
     return std::optional<Phase> ();

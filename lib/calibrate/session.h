@@ -39,6 +39,9 @@ public:
     int bits = 0; ///< significant ones of a pixel; 0: all of its type
     std::vector<Pattern> patterns = {};    ///< of the mapping
     std::optional<Schedule> schedule = {}; ///< whose phase is sought
+    /** The camera is in the beam of the mirrors that are off, and sees the
+     * complement of every mask. */
+    bool off_beam = false;
   };
   explicit CalibrationSession (Options options) : options_ (std::move (options))
   {

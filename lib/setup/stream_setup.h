@@ -56,10 +56,17 @@ struct StreamSetup {
   /** The JSON form of the schedule with keys more that may be left out:
    * "mapping", which holds the JSON form of a mapping, "size", "rate", "bits",
    * "track", "simulated", "bench", which holds that of a bench profile,
-   * "beam", which is "off", and "partner" with "size" and "mapping". */
+   * "beam", which is "off", and "partner" with "size", "mapping" and
+   * "black". */
   static Result<StreamSetup> from_json (std::string_view json);
   /** One line. Without the others it is schedule.to_json (). */
   std::string to_json () const;
+
+  /** That of the stream, else that of its bench profile. */
+  const std::optional<Mapping> &known_mapping () const
+  {
+    return mapping || !bench ? mapping : bench->mapping;
+  }
 
   bool operator== (const StreamSetup &) const = default;
 };

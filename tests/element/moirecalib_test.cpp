@@ -47,11 +47,11 @@ constexpr const char *kOptics =
 class MoireCalibTest : public ::testing::Test
 {
 protected:
-  void begin (const std::string &settings)
+  void begin (const std::string &settings, const std::string &camera = "")
   {
     bench.emplace ("sequential:2x2",
         "codedexposure-sim name=bench dmd=sim:calib " + std::string (kOptics) +
-            "! dmdsync name=sync device=sim:calib,size=" +
+            camera + "! dmdsync name=sync device=sim:calib,size=" +
             std::to_string (kWidth) + "x" + std::to_string (kHeight) +
             " ! moirecalib name=calib " + settings);
     calib = bench->find ("calib");
@@ -154,6 +154,25 @@ TEST_F (MoireCalibTest, MapsAndTellsEverybody)
       break;
   }
   EXPECT_NE (get_frame_meta (last.get ())->locked, false);
+}
+
+/* It gets the light of the other slots, too. */
+TEST_F (MoireCalibTest, ACameraInTheOtherBeamStandsAgainstTheSameMirrors)
+{
+  begin ("mode=align beam=off", "beam=off gain=0.8 ");
+  const MessagePtr reading = wait_for ("moirecalib/reading");
+  ASSERT_TRUE (reading);
+  EXPECT_NEAR (double_field (reading, "offset-x"), 0.4, 0.05);
+  EXPECT_NEAR (double_field (reading, "offset-y"), -0.3, 0.05);
+  EXPECT_NEAR (double_field (reading, "rotation"), 0.5, 0.05);
+
+  /* The tag says the beam, without the property. */
+  begin ("mode=map frames=2", "beam=off gain=0.8 ");
+  const MessagePtr said = wait_for ("moirecalib/mapping");
+  ASSERT_TRUE (said);
+  const auto mapping = Mapping::from_json (string_field (said, "mapping"));
+  ASSERT_TRUE (mapping.ok ()) << mapping.error ().message;
+  EXPECT_LT (worst_error (*mapping), 0.02);
 }
 
 TEST_F (MoireCalibTest, NamesNoFileThatItCouldNotWrite)

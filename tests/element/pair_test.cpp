@@ -259,6 +259,26 @@ TEST_F (Pair, TheTagSaysHowTheSecondCameraStands)
                          .partner = PartnerSetup{{40, 30}, mapping, 5}}));
 }
 
+/* As behind dmdsync, which tags the profile. */
+TEST_F (Pair, TheMappingOfTheSecondCamerasProfileCounts)
+{
+  const Schedule schedule = schedule_of (kPreset);
+  BenchProfile bench;
+  bench.camera.size = {40, 30};
+  bench.mapping = Mapping (Extent{40, 30});
+  push_setup (
+      off.get (), {.schedule = schedule, .bench = bench, .off_beam = true});
+  push_setup (pair.get (), {.schedule = schedule});
+  gst_harness_set_src_caps_str (off.get (), gray_caps (40, 30).c_str ());
+  run (frames ({0}), {});
+  std::optional<StreamSetup> tagged;
+  while (const EventPtr event = pair.pull_event (GST_EVENT_TAG))
+    if (const auto setup = setup_from_tags (tags_of (event.get ())))
+      tagged = setup->value ();
+  ASSERT_TRUE (tagged && tagged->partner);
+  EXPECT_EQ (tagged->partner->mapping, bench.mapping);
+}
+
 TEST_F (Pair, OtherTagsOfTheFirstCameraGoThroughAndThoseOfTheSecondDoNot)
 {
   const auto titled = [] (const char *title) {

@@ -40,6 +40,19 @@ TEST (Gratings, Mirrors)
   EXPECT_EQ (row_of ("gray-x:2/1-inverse", 8), "11110000");
 }
 
+TEST (Gratings, TheOtherBeamShowsAPatternOfTheRun)
+{
+  const auto patterns = calibration_patterns ({64, 48});
+  for (const Pattern &pattern : patterns) {
+    const Pattern other = pattern.complement ();
+    EXPECT_NE (std::ranges::find (patterns, other), patterns.end ())
+        << pattern.text ();
+    for (int y = 0; y < 48; y++)
+      for (int x = 0; x < 64; x++)
+        ASSERT_NE (pattern.on (x, y), other.on (x, y)) << pattern.text ();
+  }
+}
+
 TEST (Gratings, NamesGoBothWays)
 {
   for (const Pattern &pattern : calibration_patterns ({1024, 768})) {

@@ -64,6 +64,26 @@ TEST (Panel, WritesItsTitle)
   EXPECT_FALSE (empty.grey == titled.grey);
 }
 
+/* The travel of the stage is read from beside the stage. */
+TEST (Panel, WritesItsHeadlineInLargeLetters)
+{
+  /* Rows with bright pixels, of one line of capital letters. */
+  const auto height = [] (const PanelContent &content) {
+    const Panel panel = draw_panel ({768, 576}, content);
+    int rows = 0;
+    for (int y = 0; y < panel.grey.height (); y++) {
+      bool bright = false;
+      for (int x = 0; x < panel.grey.width (); x++)
+        bright |= panel.grey.at (x, y) > 128;
+      rows += bright;
+    }
+    return rows;
+  };
+  const int line = height ({.lines = {"HHH"}});
+  EXPECT_GT (line, 4);
+  EXPECT_GT (height ({.headline = "HHH"}), 2 * line);
+}
+
 TEST (Panel, HidesItsPartsOfThePictureAndLeavesTheRest)
 {
   for (const Extent size : {Extent{768, 576}, Extent{160, 120}}) {

@@ -61,26 +61,62 @@ public:
         "threads of ffv1; pixels do not depend on them [one for each "
         "processor]",
         whole (1, 64));
+    options.value ("--second", second_, "FILE.mkv",
+        "also the recording of a second camera, in the beam of the mirrors "
+        "that are off",
+        file_ending_in (".mkv"));
+    options.value ("--second-camera", beside_.camera, "NAME",
+        "that camera, beside --camera");
+    options.value ("--second-bench", beside_.bench, "FILE",
+        "what was measured with it, as --bench of the first");
     options.flag (
         "--fast", fast_, "run the bench as fast as possible, not in real time");
     source_.declare (options);
     options.exclude ({"--fast"}, "--camera");
+    options.need ({"--second-camera", "--second-bench"}, "--second");
+    options.need ({"--second-camera"}, "--camera");
+    options.exclude ({"--source"}, "--second");
     run_.declare (options);
   }
 
   Exit run () override
   {
+    if (second_)
+      check_second ();
     start_gstreamer ();
     Job job ("record", run_);
     job.ends_by_signal = true;
     const SourcePlan plan = SourcePlan::make (source_);
     const Pace pace = fast_ ? Pace::fast : Pace::live;
+    if (second_)
+      return record_both (job, plan, pace);
     Chain chain = coded_source (job, source_, plan, pace);
     write_recording (job, chain, *output_, style (plan, pace));
     return play (job).exit;
   }
 
 private:
+  void check_second () const
+  {
+    if (source_.camera && !beside_.camera)
+      usage_error ("--second records a second camera beside --camera; say "
+                   "which, by --second-camera");
+    if (!source_.camera && source_.device)
+      usage_error ("--device " + *source_.device +
+                   ": a simulated DMD has one camera; leave it out, and the "
+                   "masks of both cameras step with the frames");
+  }
+
+  /* Frames that one camera has more than the other have no partner later. */
+  Exit record_both (Job &job, const SourcePlan &plan, Pace pace) const
+  {
+    auto [first, other] = coded_sources (job, source_, plan, pace, beside_);
+    const RecordingStyle style = this->style (plan, pace);
+    write_recording (job, first, *output_, style);
+    write_recording (job, other, *second_, style);
+    return play (job).exit;
+  }
+
   RecordingStyle style (const SourcePlan &plan, Pace pace) const
   {
     /* A frame has a line in the track and an entry in the index. */
@@ -105,7 +141,8 @@ private:
 
   SourceOptions source_;
   RunOptions run_;
-  std::optional<Text> output_, codec_;
+  std::optional<Text> output_, codec_, second_;
+  SecondCamera beside_; // whose recording is second_
   std::optional<int> threads_;
   bool fast_ = false;
 };

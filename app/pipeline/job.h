@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "failure.h"
 #include "options/common.h"
@@ -71,14 +72,14 @@ struct Job {
   bool is_finished = false;
   /** The recording is read from front to back, past damage. */
   bool salvage = false;
-  /** The queue before encoder and disk of a live recording. */
-  GstElement *buffer = nullptr;
-  /** Writes a live recording, and counts the frames that are missing in it. */
-  GstElement *recorder = nullptr;
-  /** If the recording behind `buffer` fails, the rest goes on. */
+  /** The queues before encoder and disk of live recordings. */
+  std::vector<GstElement *> buffers;
+  /** Write live recordings, and count the frames that are missing in them. */
+  std::vector<GstElement *> recorders;
+  /** If the recording behind the only buffer fails, the rest goes on. */
   bool buffer_may_fail = false;
-  /** An identity with eos-after, behind which the stream ends. */
-  GstElement *limit = nullptr;
+  /** Identities with eos-after, behind which streams end. */
+  std::vector<GstElement *> limits;
   /** A tcpserversink. */
   GstElement *server = nullptr;
   /** Frames begin when the server has a receiver. */

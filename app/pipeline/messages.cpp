@@ -402,8 +402,17 @@ counter_of (GstElement *element, const char *counter)
   return count;
 }
 
+guint64
+counters_of (const std::vector<GstElement *> &elements, const char *counter)
+{
+  guint64 sum = 0;
+  for (GstElement *element : elements)
+    sum += counter_of (element, counter);
+  return sum;
+}
+
 std::string
-flaws_of (GstElement *pipeline, GstElement *recorder)
+flaws_of (GstElement *pipeline, const std::vector<GstElement *> &recorders)
 {
   constexpr struct {
     const char *counter, *text, *text_of_one = text;
@@ -414,8 +423,8 @@ flaws_of (GstElement *pipeline, GstElement *recorder)
   std::string text;
   for (const auto &[counter, text_of_many, text_of_one] : kFlaws) {
     guint64 most = 0;
-    if (recorder && std::string_view (counter) == "frames-lost")
-      most = counter_of (recorder, counter);
+    if (!recorders.empty () && std::string_view (counter) == "frames-lost")
+      most = counters_of (recorders, counter);
     else
       each_element (pipeline, [&] (GstElement *element) {
         most = std::max (most, counter_of (element, counter));

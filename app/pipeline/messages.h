@@ -53,12 +53,17 @@ std::string notice (const GstStructure *message);
 
 /** A value of the statistics of @p element; 0: it has none of that name. */
 guint64 counter_of (GstElement *element, const char *counter);
+/** The sum of those of @p elements. */
+guint64 counters_of (
+    const std::vector<GstElement *> &elements, const char *counter);
 
 /** ", 3 lost, 1 corrupted": coded frames of @p pipeline, from the largest
- * counters of its elements, of which several count the same frames; empty: none.
- * @p recorder  counts those that are lost, whatever a display loses; null: any.
- */
-std::string flaws_of (GstElement *pipeline, GstElement *recorder);
+ * counters of its elements, of which several count the same frames; empty:
+ * none.
+ * @p recorders  count those that are lost, whatever a display loses; if there
+ * are none, any. */
+std::string flaws_of (
+    GstElement *pipeline, const std::vector<GstElement *> &recorders);
 
 /** "name: counter=value ...": the counters in the property stats of an element
  * of this plugin (without stats: its read-only numbers), or the shown and late

@@ -59,8 +59,8 @@ write_recording (Job &job, Chain &chain, const std::string &file,
   chain.to ("codedexposure-recordmux", settings);
   GstElement *mux = chain.last ();
   if (style.live) {
-    job.buffer = queue;
-    job.recorder = mux;
+    job.buffers.push_back (queue);
+    job.recorders.push_back (mux);
   }
   const ObjectPtr<GstPad> frames = pad_of (mux, "sink");
   if (style.codec == "raw")

@@ -108,16 +108,17 @@ Run::prepare ()
     if (leaky != 0)
       leaky_queues_.push_back (std::make_unique<LeakyQueue> (element));
   });
-  if (job_.buffer)
-    buffer_watch_ = std::make_unique<BufferWatch> (job_.buffer);
-  if (job_.buffer && job_.buffer_may_fail)
-    recording_ = std::make_unique<RecordingBranch> (pipeline (), job_.buffer);
+  for (GstElement *buffer : job_.buffers)
+    buffer_watches_.emplace_back (buffer);
+  if (job_.buffer_may_fail)
+    recording_ =
+        std::make_unique<RecordingBranch> (pipeline (), job_.buffers.front ());
   if (job_.server)
     receivers_ = std::make_unique<Receivers> (job_.server);
   if (job_.window)
     watch_window ();
-  if (job_.limit)
-    limit_ = std::make_unique<FrameLimit> (job_.limit);
+  for (GstElement *limit : job_.limits)
+    limits_.push_back (std::make_unique<FrameLimit> (limit));
 }
 
 void
@@ -399,8 +400,9 @@ Run::watch_for_silence (gint64 frames)
 {
   constexpr auto kSilence = std::chrono::seconds (5);
   guint waiting = 0;
-  if (job_.buffer)
-    g_object_get (job_.buffer, "current-level-buffers", &waiting, nullptr);
+  if (!job_.buffers.empty ())
+    g_object_get (
+        job_.buffers.front (), "current-level-buffers", &waiting, nullptr);
   if (std::exchange (frames_before_, frames) != frames || waiting > 0)
     heard_ = Clock::now ();
   if (!job_.camera || silent_ || interrupted_ ||
@@ -430,14 +432,14 @@ Run::tick ()
       std::chrono::duration<double> (Clock::now () - began_).count ();
   const gint64 frames = this->frames ();
   watch_for_silence (frames);
-  if (buffer_watch_ && !interrupted_ && !failed_ &&
-      !(recording_ && recording_->is_removed ()))
-    if (const std::string text = buffer_watch_->tick (); !text.empty ())
-      status_.line (text);
+  if (!interrupted_ && !failed_ && !(recording_ && recording_->is_removed ()))
+    for (BufferWatch &watch : buffer_watches_)
+      if (const std::string text = watch.tick (); !text.empty ())
+        status_.line (text);
   if (!counter_ || frames == 0 || job_.is_moved_in)
     return;
   if (job_.window) {
-    const std::string flaws = flaws_of (pipeline (), job_.recorder);
+    const std::string flaws = flaws_of (pipeline (), job_.recorders);
     job_.window->tell (
         format ("%" G_GINT64_FORMAT " coded frames", frames) +
             (flaws.empty () ? ", none lost or corrupted" : flaws),

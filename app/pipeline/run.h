@@ -78,10 +78,10 @@ private:
   Status status_;
   std::unique_ptr<FrameCounter> counter_;
   std::vector<std::unique_ptr<LeakyQueue>> leaky_queues_;
-  std::unique_ptr<BufferWatch> buffer_watch_;
+  std::vector<BufferWatch> buffer_watches_;
   std::unique_ptr<Receivers> receivers_;
   std::unique_ptr<RecordingBranch> recording_; // beside a window
-  std::unique_ptr<FrameLimit> limit_;
+  std::vector<std::unique_ptr<FrameLimit>> limits_;
   Exit exit_ = Exit::done;
   Clock::time_point began_ = Clock::now ();
   Clock::time_point heard_ = Clock::now (); // the last new frame

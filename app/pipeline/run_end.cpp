@@ -51,13 +51,12 @@ Run::finish ()
     print_counters ();
   if (job_.window)
     job_.window->finish ();
-  const std::string flaws = flaws_of (pipeline (), job_.recorder);
+  const std::string flaws = flaws_of (pipeline (), job_.recorders);
   if (job_.counted) {
     not_coded_ = counter_of (job_.counted, "frames-not-coded");
     lost_ = counter_of (job_.counted, "frames-lost");
   }
-  const guint64 lost =
-      job_.recorder ? counter_of (job_.recorder, "frames-lost") : 0;
+  const guint64 lost = counters_of (job_.recorders, "frames-lost");
   const bool published = publish ();
   RunResult result{exit_, frames (), container_damaged_, interrupted_};
   if (container_damaged_)
@@ -121,9 +120,8 @@ void
 Run::print_json (Exit exit, const std::string &flaws) const
 {
   nlohmann::ordered_json json = {{"command", job_.command},
-      {"source", job_.source}, {"frames", frames ()},
-      {"not_coded", not_coded_}, {"lost", lost_},
-      {"pictures", job_.outputs.frames ()},
+      {"source", job_.source}, {"frames", frames ()}, {"not_coded", not_coded_},
+      {"lost", lost_}, {"pictures", job_.outputs.frames ()},
       {"flaws", flaws.empty () ? "" : flaws.substr (2)},
       {"outputs", job_.outputs.names ()}, {"damaged", damaged_},
       {"interrupted", interrupted_}, {"status", int (exit)}};

@@ -135,18 +135,56 @@ watch_exposure (GstElement *behind_camera, const SourcePlan &plan)
 
 /* The frames of a user's source may already have a schedule and times. */
 void
-synchronise (const SourceOptions &options, Chain &chain)
+synchronise (
+    const SourceOptions &options, Chain &chain, const Settings &more = {})
 {
   if (options.source && !options.device && !options.schedule)
     return;
   Settings settings{{"schedule", options.schedule.value_or ("sequential:2x2")}};
-  const bool simulated = options.is_simulated ();
-  settings.emplace_back (
-      "device", options.device.value_or (simulated ? "sim:bench" : ""));
+  set_if (settings, "device", options.device);
   if (options.camera)
     settings.emplace_back ("timestamp-at", "device-clock");
   set_if (settings, "bench", options.bench);
+  settings.insert (settings.end (), more.begin (), more.end ());
   chain.to ("dmdsync", settings);
+}
+
+/* The camera of the simulated bench, behind the scene. */
+void
+simulate_camera (Job &job, const SourceOptions &options, const SourcePlan &plan,
+    Chain &chain, const Settings &more)
+{
+  Settings settings{{"schedule", options.schedule.value_or ("sequential:2x2")}};
+  set_if (settings, "bench", options.bench);
+  set_if (settings, "psf-sigma", options.psf_sigma);
+  set_if (settings, "full-well", options.full_well);
+  set_if (settings, "read-noise", options.read_noise);
+  set_if (settings, "bits", options.bits);
+  set_if (settings, "gain", options.gain);
+  set_if (settings, "seed", options.seed);
+  set_if (settings, "shift-x", options.shift_x);
+  set_if (settings, "shift-y", options.shift_y);
+  set_if (settings, "rotation", options.rotation);
+  set_if (settings, "scale", options.scale);
+  settings.insert (settings.end (), more.begin (), more.end ());
+  chain.to ("codedexposure-sim", settings);
+  job.source = "the simulated bench";
+  job.bench = chain.last ();
+  chain.caps ("video/x-raw,framerate=" + rate_text (plan.frame_rate));
+}
+
+/* Of both beams, behind one scene. A simulated DMD has one camera, so that the
+ * masks of both step with the frames. */
+std::pair<Chain, Chain>
+simulated_cameras (Job &job, const SourceOptions &options,
+    const SourcePlan &plan, Pace pace, const SourceOptions &second)
+{
+  GstElement *light = scene (job, options, plan, pace).to ("tee").last ();
+  Chain on = job.graph.from (light).to ("queue");
+  Chain off = job.graph.from (light).to ("queue");
+  simulate_camera (job, second, plan, off, {{"beam", "off"}});
+  simulate_camera (job, options, plan, on, {});
+  return {std::move (on), std::move (off)};
 }
 
 } // namespace
@@ -171,24 +209,9 @@ Chain
 simulation (Job &job, const SourceOptions &options, const SourcePlan &plan,
     Pace pace, const Settings &more)
 {
-  Settings settings{{"schedule", options.schedule.value_or ("sequential:2x2")}};
-  set_if (settings, "bench", options.bench);
-  set_if (settings, "psf-sigma", options.psf_sigma);
-  set_if (settings, "full-well", options.full_well);
-  set_if (settings, "read-noise", options.read_noise);
-  set_if (settings, "bits", options.bits);
-  set_if (settings, "gain", options.gain);
-  set_if (settings, "seed", options.seed);
-  set_if (settings, "shift-x", options.shift_x);
-  set_if (settings, "shift-y", options.shift_y);
-  set_if (settings, "rotation", options.rotation);
-  set_if (settings, "scale", options.scale);
-  settings.insert (settings.end (), more.begin (), more.end ());
-  job.source = "the simulated bench";
   Chain chain = scene (job, options, plan, pace);
-  chain.to ("codedexposure-sim", settings);
-  job.bench = chain.last ();
-  return chain.caps ("video/x-raw,framerate=" + rate_text (plan.frame_rate));
+  simulate_camera (job, options, plan, chain, more);
+  return chain;
 }
 
 Chain
@@ -223,9 +246,42 @@ coded_source (
     job.source = "the camera " + *options.camera;
   } else if (options.source)
     job.source = "--source";
-  synchronise (options, chain);
+  SourceOptions synchronised = options;
+  if (options.is_simulated ())
+    synchronised.device = options.device.value_or ("sim:bench");
+  synchronise (synchronised, chain);
   limit_frames (job, options, chain);
   return chain;
+}
+
+/* The second camera has the first one's settings, and noise of its own. */
+std::pair<Chain, Chain>
+coded_sources (Job &job, const SourceOptions &options, const SourcePlan &plan,
+    Pace pace, const SecondCamera &second)
+{
+  SourceOptions other = options;
+  other.device.reset ();
+  other.camera = second.camera;
+  other.bench = second.bench;
+  std::pair<Chain, Chain> both = [&] {
+    if (!options.camera) {
+      other.seed = std::to_string (
+          1 +
+          std::strtoull (options.seed.value_or ("0").c_str (), nullptr, 10));
+      return simulated_cameras (job, options, plan, pace, other);
+    }
+    Chain off = camera_source (job, other, plan);
+    watch_exposure (off.last (), plan);
+    Chain on = camera_source (job, options, plan);
+    watch_exposure (on.last (), plan);
+    job.source = "the cameras " + *options.camera + " and " + *second.camera;
+    return std::pair (std::move (on), std::move (off));
+  }();
+  synchronise (options, both.first);
+  synchronise (other, both.second, {{"beam", "off"}});
+  limit_frames (job, options, both.second);
+  limit_frames (job, options, both.first);
+  return both;
 }
 
 /* identity also counts the frame that it refuses; the run ends the stream
@@ -236,7 +292,7 @@ limit_frames (Job &job, const SourceOptions &options, Chain &chain)
   if (!options.frames)
     return;
   chain.to ("identity", {{"eos-after", *options.frames + 1}});
-  job.limit = chain.last ();
+  job.limits.push_back (chain.last ());
   job.total = *options.frames;
 }
 

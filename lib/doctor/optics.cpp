@@ -112,8 +112,6 @@ OpticsRun::show_patterns ()
     ASSIGN_OR_RETURN (Stack seen, std::move (sum).stack ());
     keep (pattern, std::move (seen.mean));
   }
-  defects_ = find_defects (
-      stack_.dark, stack_.white, examination_.rig.parts ().largest ());
   return {};
 }
 
@@ -370,6 +368,9 @@ OpticsRun::run ()
   auto solved = calibration_->solve ();
   if (solved)
     result_ = *std::move (solved);
+  calibration_.reset (); // most of the memory
+  defects_ = find_defects (
+      stack_.dark, stack_.white, examination_.rig.parts ().largest ());
   if (result_)
     measure_mapping ();
   else

@@ -179,9 +179,8 @@ PhotonTransferRun::see_levels ()
         Stack stack, look_at_light (examination_, lit (fine_.first, slots),
                          fine_.of, kFrames, &dark_.mean));
     const StackMeans means = means_of (stack, defects_.good.view ());
-    stack.mean = stack.variance = {};
-    stack.zeros = stack.full = {};
     levels_.push_back ({slots, std::move (stack), means});
+    levels_.back ().stack.drop_pictures ();
   }
   RETURN_IF_ERROR (see_reference ());
   std::ranges::sort (levels_, {}, &Level::slots);

@@ -58,18 +58,19 @@ count_slips (Examination &examination, double seconds)
   const double frames =
       std::min (seconds, kLongestWatch) * parts.rate.num / parts.rate.den;
   std::vector<double> levels;
-  RETURN_IF_ERROR (with_exposure (
-      examination, parts.rate.period () / 2, [&] () -> Result<void> {
-        RETURN_IF_ERROR (look (examination, lit (1, 1), 4, 0));
-        for (int came = 1; came > 0 && double (levels.size ()) < frames;) {
-          ASSIGN_OR_RETURN (
-              came, watch_each (examination.rig, kFrames, [&] (auto &frame) {
-                if (!frame.damaged)
-                  levels.push_back (mean_of (frame.picture.view ()));
-              }));
-        }
-        return {};
-      }));
+  const auto watch = [&] () -> Result<void> {
+    RETURN_IF_ERROR (look (examination, lit (1, 1), 4, 0));
+    for (int came = 1; came > 0 && double (levels.size ()) < frames;) {
+      ASSIGN_OR_RETURN (
+          came, watch_each (examination.rig, kFrames, [&] (auto &frame) {
+            if (!frame.damaged)
+              levels.push_back (mean_of (frame.picture.view ()));
+          }));
+    }
+    return {};
+  };
+  RETURN_IF_ERROR (
+      with_exposure (examination, parts.rate.period () / 2, watch));
   if (levels.empty ())
     return std::uint64_t (0);
   const auto &black = examination.profile.black_level;

@@ -8,8 +8,8 @@
  * there sees the complement of every mask: together both get all of the light.
  * This element takes the coded frames of the first camera, the beam of the
  * mirrors that are on, and gives each the frame of the second that was exposed
- * at the same time, its partner. codedexposure-fuse uses partners; every other
- * element sees an ordinary stream of coded frames.
+ * at the same time, its partner. codedexposure-fuse and codedexposure-sum use
+ * partners; every other element sees an ordinary stream of coded frames.
  *
  * ## Pairs
  *
@@ -39,8 +39,8 @@
  * A partner is in the custom meta `CodedExposurePartner` of the coded frame,
  * with the fields `buffer` and `caps`. What changes the pixels of the coded
  * frame drops it, and it does not leave the process. The stream tag of the
- * coded frames gets the key `partner` with size and mapping of the second
- * camera.
+ * coded frames gets the key `partner` with size, mapping and black level of the
+ * second camera.
  *
  * The message `codedexposure/partner-lost` is posted when coded frames begin to
  * go on alone (`active` TRUE, `reason`, `from`) and when they have partners

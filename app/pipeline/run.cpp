@@ -110,7 +110,7 @@ Run::prepare ()
   });
   for (GstElement *buffer : job_.buffers)
     buffer_watches_.emplace_back (buffer);
-  if (job_.buffer_may_fail)
+  if (job_.buffer_may_fail && !job_.buffers.empty ())
     recording_ =
         std::make_unique<RecordingBranch> (pipeline (), job_.buffers.front ());
   if (job_.server)

@@ -174,6 +174,9 @@ copy_of (hid_t type)
 Object
 create_file (const std::string &path)
 {
+  /* At the end of the process, the library writes again what a full disk did
+   * not take, and crashes. Files are closed here. */
+  H5dont_atexit ();
   H5Eset_auto2 (H5E_DEFAULT, nullptr, nullptr);
   const Object access (H5Pcreate (H5P_FILE_ACCESS), H5Pclose);
   check (H5Pset_file_locking (access, 0, 1));

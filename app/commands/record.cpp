@@ -101,13 +101,17 @@ private:
     if (source_.camera && !beside_.camera)
       usage_error ("--second records a second camera beside --camera; say "
                    "which, by --second-camera");
+    if (source_.camera && *source_.camera == *beside_.camera)
+      usage_error ("--camera and --second-camera are both " + *source_.camera +
+                   "; name two cameras");
+    if (beside_.bench)
+      bench_of ("--second-bench", *beside_.bench);
     if (!source_.camera && source_.device)
       usage_error ("--device " + *source_.device +
                    ": a simulated DMD has one camera; leave it out, and the "
                    "masks of both cameras step with the frames");
   }
 
-  /* Frames that one camera has more than the other have no partner later. */
   Exit record_both (Job &job, const SourcePlan &plan, Pace pace) const
   {
     auto [first, other] = coded_sources (job, source_, plan, pace, beside_);

@@ -170,23 +170,23 @@ SourceOptions::declare (Options &options, Kind kind)
   declare_bench (options, kind);
 }
 
-namespace
-{
-
 BenchProfile
-bench_of (const std::string &path)
+bench_of (const char *option, const std::string &path)
 {
   auto profile = BenchProfile::parse (path);
   if (!profile)
-    usage_error (
-        "--bench " + path + " is not valid: " + profile.error ().message);
+    usage_error (std::string (option) + " " + path +
+                 " is not valid: " + profile.error ().message);
   return *profile;
 }
+
+namespace
+{
 
 void
 use_bench (SourcePlan &plan, const SourceOptions &options)
 {
-  plan.bench = bench_of (*options.bench);
+  plan.bench = bench_of ("--bench", *options.bench);
   plan.size = plan.bench->camera.size;
   plan.bits = plan.bench->bits;
   if (options.camera && !plan.bench->pixel_format.empty ())

@@ -48,6 +48,9 @@ private:
   void declare_camera (Options &options, Kind kind);
 };
 
+/** The bench profile @p path, which @p option named. Throws Failure. */
+BenchProfile bench_of (const char *option, const std::string &path);
+
 /** What follows from the options: what the frames will be. */
 struct SourcePlan {
   Schedule schedule;

@@ -270,8 +270,11 @@ coded_sources (Job &job, const SourceOptions &options, const SourcePlan &plan,
           std::strtoull (options.seed.value_or ("0").c_str (), nullptr, 10));
       return simulated_cameras (job, options, plan, pace, other);
     }
-    Chain off = camera_source (job, other, plan);
-    watch_exposure (off.last (), plan);
+    if (second.bench)
+      other.size.reset (); // that of its camera
+    const SourcePlan its = SourcePlan::make (other);
+    Chain off = camera_source (job, other, its);
+    watch_exposure (off.last (), its);
     Chain on = camera_source (job, options, plan);
     watch_exposure (on.last (), plan);
     job.source = "the cameras " + *options.camera + " and " + *second.camera;

@@ -45,11 +45,12 @@ PartnerReader::read (GstBuffer *coded, int bits)
       GST_VIDEO_INFO_FORMAT (&info) != format_ || info.width != size_.width ||
       info.height != size_.height)
     return std::optional<View> ();
-  buffer_ = std::move (partner->buffer);
-  mapped_ = std::make_unique<MappedFrame> (info, buffer_.get (), GST_MAP_READ);
-  if (!*mapped_)
+  mapped_ = std::make_unique<Mapped> ();
+  mapped_->buffer = std::move (partner->buffer);
+  mapped_->frame.map (info, mapped_->buffer.get (), GST_MAP_READ);
+  if (!mapped_->frame)
     return std::optional<View> ();
-  const View seen = view_of<const Pixel> (*mapped_);
+  const View seen = view_of<const Pixel> (mapped_->frame);
   if (!rectifier_)
     return std::optional<View> (seen);
   auto &image = std::get<Image<Pixel> &> (std::tie (narrow_, wide_));

@@ -27,12 +27,16 @@ public:
       GstBuffer *coded, int bits);
 
 private:
+  struct Mapped {
+    BufferPtr buffer;
+    MappedFrame frame; ///< of the buffer, which it is unmapped before
+  };
+
   GstVideoFormat format_ = GST_VIDEO_FORMAT_UNKNOWN;
   Extent size_;
   std::shared_ptr<const Rectifier> rectifier_; ///< null: a pixel a mirror
-  BufferPtr buffer_;
-  std::unique_ptr<MappedFrame> mapped_; ///< the buffer
-  Image<std::uint8_t> narrow_;          ///< resampled
+  std::unique_ptr<Mapped> mapped_;
+  Image<std::uint8_t> narrow_; ///< resampled
   Image<std::uint16_t> wide_;
 };
 

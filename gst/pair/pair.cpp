@@ -80,6 +80,7 @@
 #include "common/partner.h"
 #include "common/tag.h"
 #include "pair/check.h"
+#include "pair/instant.h"
 
 GST_DEBUG_CATEGORY_STATIC (codedexposure_pair_debug);
 #define GST_CAT_DEFAULT codedexposure_pair_debug
@@ -166,48 +167,6 @@ sink (gpointer self, const char *name)
 {
   /* Always there, and so is what it points to. */
   return GST_AGGREGATOR_PAD (pad_of (GST_ELEMENT (self), name).get ());
-}
-
-GstSegment
-segment_at (GstAggregatorPad *pad)
-{
-  return locked (pad, [pad] { return pad->segment; });
-}
-
-/* When a frame was exposed: as its meta says, on the clock of both cameras, and
- * by its PTS, as running time. */
-struct Instant {
-  GstClockTime said, running;
-};
-Instant
-instant_of (GstAggregatorPad *pad, GstBuffer *frame)
-{
-  const auto meta = get_frame_meta (frame);
-  return {meta ? meta->exposure_start : GST_CLOCK_TIME_NONE,
-      running_time (segment_at (pad), GST_BUFFER_PTS (frame))};
-}
-
-/* By how much @one is later; none: it is not known. Recordings of both cameras
- * may begin with different frames, so what was said comes first. */
-std::optional<GstClockTimeDiff>
-later_by (const Instant &one, const Instant &other)
-{
-  for (const auto member : {&Instant::said, &Instant::running})
-    if (GST_CLOCK_TIME_IS_VALID (one.*member) &&
-        GST_CLOCK_TIME_IS_VALID (other.*member))
-      return GST_CLOCK_DIFF (other.*member, one.*member);
-  return std::nullopt;
-}
-
-GstClockTime
-period_of (GstAggregatorPad *pad, GstBuffer *frame)
-{
-  const CapsPtr caps (gst_pad_get_current_caps (GST_PAD (pad)));
-  GstVideoInfo info;
-  if (caps && gst_video_info_from_caps (&info, caps.get ()) && info.fps_n > 0)
-    return gst_util_uint64_scale (GST_SECOND, info.fps_d, info.fps_n);
-  return GST_BUFFER_DURATION_IS_VALID (frame) ? GST_BUFFER_DURATION (frame)
-                                              : 40 * GST_MSECOND;
 }
 
 /* Whether the pixels of @frame are the scene through the masks of the

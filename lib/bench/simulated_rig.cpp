@@ -356,11 +356,11 @@ SimulatedRig::deliver (int frames)
       show ({.name = "light", .on = [] (int, int) { return true; }}, 1));
   std::vector<SeenFrame> seen;
   while (int (seen.size ()) < frames) {
-    const auto shot = arrive (now_ + patience ());
-    if (!shot)
+    ASSIGN_OR_RETURN (auto next, watch (1));
+    if (next.empty ())
       break;
-    seen.push_back (frame_of (*shot));
-    seen.back ().picture = {};
+    next[0].picture = {};
+    seen.push_back (std::move (next[0]));
   }
   return seen;
 }

@@ -9,7 +9,7 @@ namespace codedexposure
 namespace
 {
 
-/* Mirrors along a side that tell of all; more would take seconds. */
+/* Mirrors along a side that tell of all; a tile repeats. */
 constexpr int kMostMirrors = 1024;
 constexpr double kLeast = 1e-3, kMost = 1e3; // of a ratio
 

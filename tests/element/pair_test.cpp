@@ -1,17 +1,13 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure-pair: what becomes a pair, and what is said of the rest. */
-#include <cstdio>
-#include <fstream>
-#include <iterator>
 #include <random>
-#include <set>
 #include <thread>
 
 #include "common/messages.h"
 #include "common/meta.h"
 #include "common/partner.h"
 #include "common/tag.h"
-#include "pipeline.h"
+#include "harness.h"
 #include "two_beams.h"
 
 namespace
@@ -116,6 +112,20 @@ protected:
   void push_setup (GstHarness *to, const StreamSetup &setup)
   {
     ASSERT_TRUE (gst_harness_push_event (to, setup_to_event (setup)));
+  }
+  /* The stream tag, with a second camera of 40x30 pixels of that setup. */
+  std::optional<StreamSetup> tag_with (StreamSetup second)
+  {
+    second.off_beam = true;
+    push_setup (off.get (), second);
+    push_setup (pair.get (), {.schedule = second.schedule});
+    gst_harness_set_src_caps_str (off.get (), gray_caps (40, 30).c_str ());
+    run (frames ({0}), {});
+    std::optional<StreamSetup> tagged;
+    while (const EventPtr event = pair.pull_event (GST_EVENT_TAG))
+      if (const auto setup = setup_from_tags (tags_of (event.get ())))
+        tagged = setup->value ();
+    return tagged;
   }
 
   ElementHarness pair;
@@ -244,17 +254,8 @@ TEST_F (Pair, TheTagSaysHowTheSecondCameraStands)
   BenchProfile bench;
   bench.camera.size = {40, 30};
   bench.black_level = Measured{5.2, 0.1};
-  push_setup (off.get (), {.schedule = schedule,
-                              .mapping = mapping,
-                              .bench = bench,
-                              .off_beam = true});
-  push_setup (pair.get (), {.schedule = schedule});
-  gst_harness_set_src_caps_str (off.get (), gray_caps (40, 30).c_str ());
-  run (frames ({0}), {});
-  std::optional<StreamSetup> tagged;
-  while (const EventPtr event = pair.pull_event (GST_EVENT_TAG))
-    if (const auto setup = setup_from_tags (tags_of (event.get ())))
-      tagged = setup->value ();
+  const auto tagged =
+      tag_with ({.schedule = schedule, .mapping = mapping, .bench = bench});
   EXPECT_EQ (tagged, (StreamSetup{.schedule = schedule,
                          .partner = PartnerSetup{{40, 30}, mapping, 5}}));
 }
@@ -262,19 +263,11 @@ TEST_F (Pair, TheTagSaysHowTheSecondCameraStands)
 /* As behind dmdsync, which tags the profile. */
 TEST_F (Pair, TheMappingOfTheSecondCamerasProfileCounts)
 {
-  const Schedule schedule = schedule_of (kPreset);
   BenchProfile bench;
   bench.camera.size = {40, 30};
   bench.mapping = Mapping (Extent{40, 30});
-  push_setup (
-      off.get (), {.schedule = schedule, .bench = bench, .off_beam = true});
-  push_setup (pair.get (), {.schedule = schedule});
-  gst_harness_set_src_caps_str (off.get (), gray_caps (40, 30).c_str ());
-  run (frames ({0}), {});
-  std::optional<StreamSetup> tagged;
-  while (const EventPtr event = pair.pull_event (GST_EVENT_TAG))
-    if (const auto setup = setup_from_tags (tags_of (event.get ())))
-      tagged = setup->value ();
+  const auto tagged =
+      tag_with ({.schedule = schedule_of (kPreset), .bench = bench});
   ASSERT_TRUE (tagged && tagged->partner);
   EXPECT_EQ (tagged->partner->mapping, bench.mapping);
 }
@@ -502,135 +495,6 @@ TEST (PairLive, AFrameWaitsForItsPartnerAndThenGoesAlone)
   EXPECT_EQ (
       gst_clock_get_time (GST_CLOCK (gst_harness_get_testclock (pair.get ()))),
       kPeriod + 15 * kMs);
-}
-
-/* ----------------------------------------------------------------- bench -- */
-
-std::string
-bench_of (const std::string &rest)
-{
-  return "videotestsrc num-buffers=40 pattern=ball "
-         "! video/x-raw,format=GRAY8,width=64,height=48,framerate=100/1 "
-         "! tee name=light "
-         "light. ! queue ! codedexposure-sim schedule=sequential:lattice:4/2 "
-         "! pair.on "
-         "light. ! queue ! codedexposure-sim "
-         "schedule=sequential:lattice:4/2 beam=off ! pair.off "
-         "codedexposure-pair name=pair ! " +
-         rest;
-}
-
-TEST (PairBench, TwoSimulatedCamerasMakePairs)
-{
-  Pipeline pipeline (bench_of ("codedexposure-fuse ! fakesink"));
-  EXPECT_EQ (pipeline.play (), "");
-  const auto pair = pipeline["pair"];
-  EXPECT_EQ (property<guint64> (pair.get (), "frames-paired"), 10u);
-  EXPECT_EQ (property<guint64> (pair.get (), "frames-alone"), 0u);
-}
-
-/* Two cameras as on a real bench: each loses frames of its own. */
-TEST (PairBench, ComesBehindDmdsyncOfBothCameras)
-{
-  Pipeline pipeline (
-      "videotestsrc num-buffers=400 pattern=ball "
-      "! video/x-raw,format=GRAY8,width=64,height=48,framerate=100/1 "
-      "! tee name=light "
-      "light. ! queue ! codedexposure-sim schedule=sequential:lattice:4/2 "
-      "! identity name=on ! dmdsync schedule=sequential:lattice:4/2 ! pair.on "
-      "light. ! queue ! codedexposure-sim beam=off "
-      "schedule=sequential:lattice:4/2 ! identity name=off "
-      "! dmdsync schedule=sequential:lattice:4/2 beam=off ! pair.off "
-      "codedexposure-pair name=pair ! codedexposure-fuse ! fakesink");
-  const auto lose = [&] (const char *camera, std::set<int> lost) {
-    auto *losses = new std::pair<int, std::set<int>> (0, std::move (lost));
-    gst_pad_add_probe (
-        pipeline.pad (camera, "src").get (), GST_PAD_PROBE_TYPE_BUFFER,
-        [] (GstPad *, GstPadProbeInfo *, gpointer data) {
-          auto &[number, which] =
-              *static_cast<std::pair<int, std::set<int>> *> (data);
-          return which.contains (number++) ? GST_PAD_PROBE_DROP
-                                           : GST_PAD_PROBE_OK;
-        },
-        losses,
-        [] (gpointer data) {
-          delete static_cast<std::pair<int, std::set<int>> *> (data);
-        });
-  };
-  lose ("on", {20, 21, 60});
-  lose ("off", {21, 22, 23, 80});
-  EXPECT_EQ (pipeline.play (), "");
-  const auto pair = pipeline["pair"];
-  EXPECT_EQ (property<guint64> (pair.get (), "frames-paired"), 100u - 3u - 3u);
-  EXPECT_EQ (property<guint64> (pair.get (), "frames-alone"), 3u);
-  EXPECT_EQ (property<guint64> (pair.get (), "pairs-refused"), 0u);
-  EXPECT_EQ (property<guint64> (pair.get (), "partners-dropped"), 2u);
-}
-
-/* Each camera has a recording of its own, and their first frames differ. */
-TEST (PairBench, RecordingsOfBothCamerasMakeTheSamePairs)
-{
-  const std::string folder = ::testing::TempDir ();
-  const std::string schedule = "schedule=sequential:lattice:4/2 ";
-  const auto file = [&] (const std::string &name) {
-    return "location=" + folder + "pair-" + name + " ";
-  };
-  const auto recorded = [&] (const std::string &camera) {
-    return "! identity name=" + camera + " ! dmdsync " + schedule +
-           (camera == "off" ? "beam=off " : "") + "! tee name=" + camera +
-           "-tee ! queue ! pair." + camera + " " + camera +
-           "-tee. ! queue ! codedexposure-recordmux ! filesink " +
-           file (camera + ".mkv");
-  };
-  const std::string fused = "codedexposure-pair name=pair "
-                            "! codedexposure-fuse ! filesink ";
-  Pipeline recording (
-      "videotestsrc num-buffers=160 pattern=ball "
-      "! video/x-raw,format=GRAY8,width=64,height=48,framerate=100/1 "
-      "! tee name=light light. ! queue ! codedexposure-sim " +
-      schedule + recorded ("on") +
-      "light. ! queue ! codedexposure-sim beam=off " + schedule +
-      recorded ("off") + fused + file ("live.gray"));
-  gst_pad_add_probe (
-      recording.pad ("off", "src").get (), GST_PAD_PROBE_TYPE_BUFFER,
-      [] (GstPad *, GstPadProbeInfo *info, gpointer) {
-        return GST_BUFFER_PTS (GST_PAD_PROBE_INFO_BUFFER (info)) < 3 * kPeriod
-                   ? GST_PAD_PROBE_DROP
-                   : GST_PAD_PROBE_OK;
-      },
-      nullptr, nullptr);
-  ASSERT_EQ (recording.play (), "");
-  Pipeline playing (
-      "filesrc " + file ("on.mkv") +
-      "! codedexposure-recorddemux ! pair.on filesrc " + file ("off.mkv") +
-      "! codedexposure-recorddemux ! pair.off " + fused + file ("played.gray"));
-  ASSERT_EQ (playing.play (), "");
-  for (Pipeline *pipeline : {&recording, &playing}) {
-    const auto pair = (*pipeline)["pair"];
-    EXPECT_EQ (property<guint64> (pair.get (), "frames-paired"), 37u);
-    EXPECT_EQ (property<guint64> (pair.get (), "frames-alone"), 3u);
-    EXPECT_EQ (property<guint64> (pair.get (), "pairs-refused"), 0u);
-  }
-  const auto bytes = [&] (const std::string &name) {
-    std::ifstream in (folder + "pair-" + name, std::ios::binary);
-    return std::string (std::istreambuf_iterator<char> (in), {});
-  };
-  EXPECT_EQ (bytes ("live.gray").size (), 160u * 64 * 48);
-  EXPECT_TRUE (bytes ("live.gray") == bytes ("played.gray"));
-  for (const char *name : {"on.mkv", "off.mkv", "live.gray", "played.gray"})
-    std::remove ((folder + "pair-" + name).c_str ());
-}
-
-TEST (PairBench, TheFramesOfTheOtherBeamAreNotDecoded)
-{
-  Pipeline pipeline ("videotestsrc num-buffers=4 "
-                     "! video/x-raw,format=GRAY8,framerate=100/1 "
-                     "! codedexposure-sim beam=off ! codedexposure-demux "
-                     "! fakesink");
-  EXPECT_EQ (pipeline.play (),
-      "These are frames of the beam of the mirrors that are off, partners of "
-      "those of another camera. Link them to the pad off of "
-      "codedexposure-pair, and the others to its pad on.");
 }
 
 } // namespace

@@ -79,6 +79,41 @@ TEST_F (Sum, IsOfEachPairAtItsTime)
       property<double> (sum.element (), "measured-ratio"), 1.0 / 3.0, 0.005);
 }
 
+TEST_F (Sum, TheRatioMayBeSetWhileItPlays)
+{
+  tell ();
+  ASSERT_EQ (sum.push (pair (0)), GST_FLOW_OK);
+  g_object_set (sum.element (), "ratio", 0.5, nullptr);
+  ASSERT_EQ (sum.push (pair (1)), GST_FLOW_OK);
+  EXPECT_EQ (property<double> (sum.element (), "measured-ratio"), 0.5);
+  g_object_set (sum.element (), "ratio", 0.0, nullptr);
+  ASSERT_EQ (sum.push (pair (2)), GST_FLOW_OK);
+  EXPECT_NEAR (
+      property<double> (sum.element (), "measured-ratio"), 1.0 / 3.0, 0.005);
+}
+
+/* A mapping that changes nothing. */
+TEST_F (Sum, ASecondCameraWithAMappingIsResampled)
+{
+  const CapsPtr caps (
+      gst_caps_from_string (gray_caps (kWidth, kHeight).c_str ()));
+  tell ();
+  ASSERT_EQ (sum.push (pair (0)), GST_FLOW_OK);
+  setup.partner->mapping = Mapping (Extent{kWidth, kHeight});
+  tell ();
+  ASSERT_EQ (sum.push (pair (0)), GST_FLOW_OK);
+  const BufferPtr plain (gst_harness_pull (sum.get ()));
+  const BufferPtr mapped (gst_harness_pull (sum.get ()));
+  EXPECT_TRUE (image_of<std::uint8_t> (plain.get (), caps.get ()) ==
+               image_of<std::uint8_t> (mapped.get (), caps.get ()));
+
+  setup.partner->mapping = Mapping (Extent{kWidth, kHeight + 8});
+  tell ();
+  EXPECT_NE (sum.push (pair (1)), GST_FLOW_OK);
+  EXPECT_NE (
+      sum.error ().find ("another number of mirrors"), std::string::npos);
+}
+
 TEST_F (Sum, OfAFrameAloneIsAGap)
 {
   tell ();

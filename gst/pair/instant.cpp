@@ -1,0 +1,47 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "pair/instant.h"
+
+#include <gst/video/video.h>
+
+#include "common/element.h"
+#include "common/meta.h"
+
+namespace codedexposure::gst
+{
+
+GstSegment
+segment_at (GstAggregatorPad *pad)
+{
+  return locked (pad, [pad] { return pad->segment; });
+}
+
+Instant
+instant_of (GstAggregatorPad *pad, GstBuffer *frame)
+{
+  const auto meta = get_frame_meta (frame);
+  return {meta ? meta->exposure_start : GST_CLOCK_TIME_NONE,
+      running_time (segment_at (pad), GST_BUFFER_PTS (frame))};
+}
+
+std::optional<GstClockTimeDiff>
+later_by (const Instant &one, const Instant &other)
+{
+  for (const auto member : {&Instant::said, &Instant::running})
+    if (GST_CLOCK_TIME_IS_VALID (one.*member) &&
+        GST_CLOCK_TIME_IS_VALID (other.*member))
+      return GST_CLOCK_DIFF (other.*member, one.*member);
+  return std::nullopt;
+}
+
+GstClockTime
+period_of (GstAggregatorPad *pad, GstBuffer *frame)
+{
+  const CapsPtr caps (gst_pad_get_current_caps (GST_PAD (pad)));
+  GstVideoInfo info;
+  if (caps && gst_video_info_from_caps (&info, caps.get ()) && info.fps_n > 0)
+    return gst_util_uint64_scale (GST_SECOND, info.fps_d, info.fps_n);
+  return GST_BUFFER_DURATION_IS_VALID (frame) ? GST_BUFFER_DURATION (frame)
+                                              : 40 * GST_MSECOND;
+}
+
+} // namespace codedexposure::gst

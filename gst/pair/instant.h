@@ -1,0 +1,29 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* When the frames of two pads were exposed. */
+#pragma once
+
+#include <optional>
+
+#include <gst/base/gstaggregator.h>
+
+namespace codedexposure::gst
+{
+
+/** As the frame's meta says, on the clock of both cameras, and by its PTS, as
+ * running time. */
+struct Instant {
+  GstClockTime said, running;
+};
+Instant instant_of (GstAggregatorPad *pad, GstBuffer *frame);
+
+/** By how much @p one is later; none: it is not known. Recordings of both
+ * cameras may begin with different frames, so what was said comes first. */
+std::optional<GstClockTimeDiff> later_by (
+    const Instant &one, const Instant &other);
+
+/** From one frame to the next. */
+GstClockTime period_of (GstAggregatorPad *pad, GstBuffer *frame);
+
+GstSegment segment_at (GstAggregatorPad *pad);
+
+} // namespace codedexposure::gst

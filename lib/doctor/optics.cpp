@@ -100,17 +100,22 @@ OpticsRun::show_patterns ()
   for (const Pattern &pattern : calibration_patterns (mirrors_, kPeriod)) {
     const StillMask mask = {.name = pattern.text (),
         .on = [pattern] (int x, int y) { return pattern.on (x, y); }};
-    StackSum sum (examination_.rig.parts ().largest ());
+    Image<float> mean;
+    float frames = 0.0f;
     Result<void> kept;
     RETURN_IF_ERROR (look_for_whole_frames (
         examination_, mask, 1, kFrames, [&] (const SeenFrame &frame) {
           if (kept)
             kept = keep (pattern, frame);
-          sum.add (frame);
+          const Image<std::uint16_t> &picture = frame.picture;
+          if (frames++ == 0.0f)
+            mean = Image<float> (picture.width (), picture.height ());
+          each_pixel (mean,
+              [&] (int x, int y) { mean.at (x, y) += picture.at (x, y); });
         }));
     RETURN_IF_ERROR (kept);
-    ASSIGN_OR_RETURN (Stack seen, std::move (sum).stack ());
-    keep (pattern, std::move (seen.mean));
+    each_pixel (mean, [&] (int x, int y) { mean.at (x, y) /= frames; });
+    keep (pattern, std::move (mean));
   }
   return {};
 }

@@ -17,6 +17,7 @@ register_elements (GstPlugin *plugin)
   serve_simulated_dmds ();
   return GST_ELEMENT_REGISTER (codedexposure_demux, plugin) &&
          GST_ELEMENT_REGISTER (codedexposure_filesink, plugin) &&
+         GST_ELEMENT_REGISTER (codedexposure_keep, plugin) &&
          GST_ELEMENT_REGISTER (codedexposure_recorddemux, plugin) &&
          GST_ELEMENT_REGISTER (codedexposure_recordmux, plugin) &&
          GST_ELEMENT_REGISTER (codedexposure_scene, plugin) &&

@@ -139,6 +139,7 @@ Live::run ()
   Chain frames = coded_source (job, source_, plan, Pace::live);
   if (record_)
     frames = job.graph.from (add_recording (job, frames, plan), "src_%u");
+  job.keeper = window_.add_keeper (frames, "live", source_.bits);
   job.counted = frames.queue (kWaiting).last ();
   add_window (job, panes (job, frames), window_, source_.bits);
   return play (job).exit;

@@ -12,7 +12,7 @@
 #include "command.h"
 #include "common/record.h"
 #include "pipeline/messages.h"
-#include "pipeline/part.h"
+#include "record/part.h"
 #include "pipeline/plugin.h"
 #include "pipeline/recording.h"
 #include "pipeline/status.h"

@@ -116,6 +116,8 @@ Receive::build (Job &job) const
     write_recording (job, recorded, *coded_, {});
     frames = job.graph.from (tee, "src_%u");
   }
+  if (has_window ())
+    job.keeper = window_.add_keeper (frames, "receive", decode_.bits);
   DecoderPads pads = add_demux (job, frames, decode_);
   job.counted = entry;
   if (has_window ()) {

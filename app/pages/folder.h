@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "pipeline/part.h"
+#include "record/part.h"
 
 namespace codedexposure::app
 {

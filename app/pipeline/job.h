@@ -38,7 +38,7 @@ public:
   virtual void tell (const std::string &frames, bool alarm) = 0;
   /** A message of the pipeline; whether nothing else is to be done for it. */
   virtual bool take (GstMessage *) { return false; }
-  /** After the pipeline has ended. */
+  /** After the pipeline has ended, in the state READY. */
   virtual void finish () = 0;
 };
 
@@ -66,6 +66,8 @@ struct Job {
   /** The element of a camera, which may fall silent without an error; null:
    * the frames are those of no camera. */
   GstElement *camera = nullptr;
+  /** Remembers the last frames; null: nothing does. */
+  GstElement *keeper = nullptr;
   /** Reads a recording or a stream of one: its own end is in it. */
   GstElement *reader = nullptr;
   /** The file of the reader was finished, and is as long as it was then. */

@@ -12,7 +12,7 @@
 #include <gst/gst.h>
 
 #include "common/raii.h"
-#include "pipeline/part.h"
+#include "record/part.h"
 
 namespace codedexposure::app
 {

@@ -2,9 +2,8 @@
 #include "recording.h"
 
 #include <algorithm>
-#include <filesystem>
-#include <fstream>
 
+#include "base/memory.h"
 #include "record/matroska.h"
 
 namespace codedexposure::app
@@ -24,26 +23,6 @@ frames_that_wait (FrameRate rate)
 }
 
 } // namespace
-
-std::uint64_t
-room_in_memory ()
-{
-  constexpr std::uint64_t kMost = 4'000'000'000, kUnknown = 1'000'000'000;
-  std::ifstream file ("/proc/meminfo");
-  std::string name, unit;
-  for (std::uint64_t kib = 0; file >> name >> kib;) {
-    if (name == "MemAvailable:")
-      return std::min (kMost, kib * 256);
-    std::getline (file, unit);
-  }
-  return kUnknown;
-}
-
-std::string
-sidecar_of (const std::string &recording)
-{
-  return std::filesystem::path (recording).replace_extension (".jsonl");
-}
 
 void
 write_recording (Job &job, Chain &chain, const std::string &file,

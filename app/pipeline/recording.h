@@ -5,6 +5,7 @@
 
 #include "options/source.h"
 #include "pipeline/job.h"
+#include "record/part.h"
 
 namespace codedexposure::app
 {
@@ -30,11 +31,5 @@ void write_recording (Job &job, Chain &chain, const std::string &file,
 Chain read_recording (Job &job, const std::string &file);
 /** The same of a sender, over TCP. */
 Chain read_sender (Job &job, const std::string &host, int port);
-
-/** A quarter of the memory that is free, in bytes. */
-std::uint64_t room_in_memory ();
-
-/** FILE.jsonl of FILE.mkv. */
-std::string sidecar_of (const std::string &recording);
 
 } // namespace codedexposure::app

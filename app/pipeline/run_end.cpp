@@ -32,6 +32,9 @@ Run::say_no_frame ()
 bool
 Run::publish ()
 {
+  gst_element_set_state (pipeline (), GST_STATE_READY);
+  if (job_.window)
+    job_.window->finish ();
   stop ();
   const bool whole =
       exit_ == Exit::done && (job_.ends_by_signal || !interrupted_) && !failed_;
@@ -49,8 +52,6 @@ Run::finish ()
 {
   if (job_.options.verbose && frames () > 0)
     print_counters ();
-  if (job_.window)
-    job_.window->finish ();
   const std::string flaws = flaws_of (pipeline (), job_.recorders);
   if (job_.counted) {
     not_coded_ = counter_of (job_.counted, "frames-not-coded");

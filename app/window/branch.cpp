@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "branch.h"
 
+#include <cmath>
 #include <cstdlib>
 
 #include "failure.h"
 #include "pipeline/video_output.h"
-#include "window/keeper.h"
+#include "stats/event_watch.h"
 #include "window/screen.h"
 
 namespace codedexposure::app
@@ -57,10 +58,15 @@ add_pane (Chain chain, std::size_t index, std::optional<int> bits,
   return pane;
 }
 
-Rule<EventRule>
+constexpr double kRemembered = 10; // s
+
+Rule<Text>
 event_rule ()
 {
-  return {[] (const std::string &text) { return parse_event_rule (text); },
+  return {[] (const std::string &text) {
+            return parse_event_rule (text) ? std::optional<Text> (text)
+                                           : std::nullopt;
+          },
       "an event such as mean:10 or motion:2@64x48+100+80"};
 }
 
@@ -104,9 +110,23 @@ WindowOptions::declare (Options &options, bool comes)
       event_rule ());
   options.value ("--keep-after", keep_after, "SECONDS",
       "time of the 10 s that comes after the event [5]",
-      real (0, 1e-9 * double (Keeper::kLength),
-          "a number of seconds from 0 to 10"));
+      real (0, kRemembered, "a number of seconds from 0 to 10"));
   options.need ({"--keep-after"}, "--keep-on");
+}
+
+GstElement *
+WindowOptions::add_keeper (
+    Chain &chain, const std::string &command, std::optional<int> bits) const
+{
+  const auto in_ns = [] (double seconds) {
+    return std::uint64_t (std::llround (1e9 * seconds));
+  };
+  Settings settings{{"location", command}, {"length", in_ns (kRemembered)}};
+  set_if (settings, "event", keep_on);
+  if (keep_after)
+    settings.emplace_back ("after", in_ns (*keep_after));
+  set_if (settings, "bits", bits);
+  return chain.to ("codedexposure-keep", settings).last ();
 }
 
 std::string

@@ -10,7 +10,6 @@
 #include "common/raii.h"
 #include "options/options.h"
 #include "pipeline/graph.h"
-#include "stats/event_watch.h"
 
 namespace codedexposure::app
 {
@@ -45,11 +44,15 @@ struct WindowBranch {
 
 struct WindowOptions {
   std::optional<Text> sink;
-  std::optional<EventRule> keep_on;
+  std::optional<Text> keep_on;      ///< an event
   std::optional<double> keep_after; ///< s
 
   /** @p comes  whether frames come, and are not read from a file. */
   void declare (Options &options, bool comes = true);
+  /** Remembers the coded frames of @p chain, for the key K.
+   * @p command  names recordings. */
+  GstElement *add_keeper (
+      Chain &chain, const std::string &command, std::optional<int> bits) const;
   /** What --help says of the keys. @p command  names snapshots. */
   static std::string keys_of (const std::string &command);
   /** Those of all windows. */

@@ -9,7 +9,7 @@
 #include <gst/video/video.h>
 
 #include "pipeline/messages.h"
-#include "pipeline/part.h"
+#include "record/part.h"
 
 namespace codedexposure::app
 {

@@ -9,8 +9,8 @@
 #include <glib-unix.h>
 
 #include "common/element.h"
+#include "common/kept_frame.h"
 #include "pipeline/messages.h"
-#include "window/kept_frame.h"
 #include "window/pane.h"
 #include "window/screen.h"
 #include "window/whole_picture.h"
@@ -70,10 +70,9 @@ info_in (GstPadProbeInfo *probed)
 Window::Window (WindowBranch branch, GstPad *coded, Style style)
     : size_ (branch.size), room_ (style.room), delay_ (style.delay),
       name_ (style.name), title_ (style.title),
-      player_ (std::move (style.player)), camera_source_ (style.camera)
+      player_ (std::move (style.player)), camera_source_ (style.camera),
+      keeper_ (style.keeper)
 {
-  if (!player_)
-    keeper_.emplace (coded, name_, style.keeps);
   panel_at_ = pad_of (branch.overlay, "sink");
   for (WindowPane &part : branch.panes) {
     auto pane = std::make_unique<Pane> ();
@@ -108,11 +107,10 @@ Window::begin (Calls calls)
   snapshots_.begin (calls_.said);
   if (player_)
     return player_->begin (calls_.pipeline, calls_.said);
-  keeper_->begin (calls_);
   on_signal_ = g_unix_signal_add (
       SIGUSR1,
       [] (gpointer self) {
-        static_cast<Window *> (self)->keeper_->keep ();
+        static_cast<Window *> (self)->keep ();
         return gboolean (G_SOURCE_CONTINUE);
       },
       this);
@@ -121,9 +119,16 @@ Window::begin (Calls calls)
 void
 Window::finish ()
 {
+  /* An element that ends says what it has kept. */
+  const ObjectPtr<GstBus> bus (gst_element_get_bus (calls_.pipeline));
+  const auto next = [&bus] {
+    return std::unique_ptr<GstMessage, MiniObjectUnref> (
+        gst_bus_pop_filtered (bus.get (),
+            GstMessageType (GST_MESSAGE_ELEMENT | GST_MESSAGE_WARNING)));
+  };
+  for (auto message = next (); keeper_ && message; message = next ())
+    take_kept (message.get ());
   snapshots_.write ();
-  if (keeper_)
-    keeper_->finish ();
   if (player_)
     player_->finish ();
 }
@@ -329,9 +334,7 @@ add_window (Job &job, const std::vector<Chain> &sources,
   job.window = std::make_unique<Window> (std::move (branch),
       pad_of (job.counted, "sink").get (),
       Window::Style{find_screen ().room (), job.times.shift_to.value_or (0),
-          job.command, job.command + ": " + job.source,
-          {options.keep_on, options.keep_after.value_or (5), bits.value_or (0)},
-          job.camera,
+          job.command, job.command + ": " + job.source, job.keeper, job.camera,
           played ? std::make_unique<Player> (*std::move (played)) : nullptr});
 }
 

@@ -17,7 +17,6 @@
 #include "stats/picture_stats.h"
 #include "window/branch.h"
 #include "window/detail.h"
-#include "window/keeper.h"
 #include "window/paint.h"
 #include "window/player.h"
 #include "window/replay.h"
@@ -40,7 +39,7 @@ public:
     GstClockTime delay = 0;       ///< after which frames are shown
     std::string name;             ///< of the command, in the names of snapshots
     std::string title;            ///< of the window
-    Keeper::Rule keeps;           ///< what is kept without a key
+    GstElement *keeper = nullptr; ///< remembers frames; null: nothing does
     GstElement *camera = nullptr; ///< whose gain keys change; null: none
     /** Moves in a recording; null: the window looks at what comes. */
     std::unique_ptr<Player> player = nullptr;
@@ -92,6 +91,8 @@ private:
   void press (const std::string &key);
   bool press_look (const std::string &key);
   void press_replay (const std::string &key);
+  void keep ();
+  bool take_kept (GstMessage *message);
   void stretch_tones ();
   void fill_screen (bool fills);
   void turn_gain (int steps);
@@ -117,9 +118,9 @@ private:
   const std::string name_, title_;
   Calls calls_; // constant while the pipeline plays
   std::vector<std::unique_ptr<Pane>> panes_; // constant
-  std::optional<Keeper> keeper_;             // of what comes
   const std::unique_ptr<Player> player_;
   GstElement *const camera_source_;
+  GstElement *const keeper_; // null: nothing remembers frames
   Snapshots snapshots_;
   gst::ObjectPtr<GstPad> panel_at_; // where it is drawn
   guint on_signal_ = 0;             // source

@@ -6,7 +6,9 @@
 #include <gst/video/navigation.h>
 
 #include "base/pixels.h"
+#include "common/messages.h"
 #include "pipeline/cameras.h"
+#include "pipeline/messages.h"
 #include "window/pane.h"
 #include "window/screen.h"
 
@@ -31,6 +33,18 @@ is_key (const std::string &key, std::initializer_list<const char *> names)
   });
 }
 
+std::string
+text_of (const EventFound &event)
+{
+  const std::string at = format ("at %.3f s", 1e-9 * double (event.time));
+  const std::string which =
+      event.frame ? format ("frame %" G_GUINT64_FORMAT, *event.frame) : at;
+  return format ("%s: %+.3g %% of the largest value, %s; keeps the frames "
+                 "around it in %.3g s",
+      event.kind == "mean" ? "the mean jumps" : "motion", 100 * event.jump,
+      which.c_str (), 1e-9 * double (event.after));
+}
+
 } // namespace
 
 /* Keys are for the window; no element of the stream needs them. They go by the
@@ -46,14 +60,43 @@ Window::on_upstream (GstPad *, GstPadProbeInfo *info, gpointer overlay)
   return GST_PAD_PROBE_DROP;
 }
 
+void
+Window::keep ()
+{
+  if (keeper_)
+    g_object_set (keeper_, "keep", TRUE, nullptr);
+}
+
+/* Whether the message is about what is kept. */
+bool
+Window::take_kept (GstMessage *message)
+{
+  if (gst_message_has_name (message, kKeep)) {
+    keep ();
+    return true;
+  }
+  if (GST_MESSAGE_SRC (message) != GST_OBJECT (keeper_))
+    return false;
+  if (const auto kept = parse_message<Kept> (message))
+    calls_.said (format ("%s (%" G_GUINT64_FORMAT " coded frames, %.2f s)",
+                     kept->location.c_str (), kept->frames,
+                     1e-9 * double (kept->duration)),
+        false);
+  else if (const auto event = parse_message<EventFound> (message))
+    calls_.told (text_of (*event));
+  else if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_WARNING)
+    calls_.said (Told (message).error->message, true);
+  else
+    return false;
+  return true;
+}
+
 bool
 Window::take (GstMessage *message)
 {
   GstEvent *parsed = nullptr;
-  if (keeper_ && gst_message_has_name (message, kKeep)) {
-    keeper_->keep ();
+  if (keeper_ && take_kept (message))
     return true;
-  }
   if (gst_navigation_message_get_type (message) !=
           GST_NAVIGATION_MESSAGE_EVENT ||
       !gst_navigation_message_parse_event (message, &parsed))
@@ -159,7 +202,7 @@ Window::press (const std::string &key)
   if (player_)
     player_->press (key);
   else if (is_key (key, {"k"}))
-    keeper_->keep ();
+    keep ();
   else if (is_key (key, {"Up", "Down"}))
     turn_gain (is_key (key, {"Up"}) ? 1 : -1);
   else

@@ -8,6 +8,7 @@ GST_ELEMENT_REGISTER_DECLARE (codedexposure_camerasrc);
 GST_ELEMENT_REGISTER_DECLARE (codedexposure_demux);
 GST_ELEMENT_REGISTER_DECLARE (codedexposure_filesink);
 GST_ELEMENT_REGISTER_DECLARE (codedexposure_fuse);
+GST_ELEMENT_REGISTER_DECLARE (codedexposure_keep);
 GST_ELEMENT_REGISTER_DECLARE (codedexposure_pair);
 GST_ELEMENT_REGISTER_DECLARE (codedexposure_recorddemux);
 GST_ELEMENT_REGISTER_DECLARE (codedexposure_recordmux);

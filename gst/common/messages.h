@@ -49,6 +49,27 @@ struct PartnerLost {
   CODED_FIELDS (active, reason, frames, from, to);
 };
 
+/** The last frames have become a recording, from codedexposure-keep. */
+struct Kept {
+  static constexpr const char *kName = "codedexposure/kept";
+  std::string location;
+  guint64 frames = 0;
+  GstClockTime duration = 0;    ///< from the first frame to the last
+  std::optional<guint64> frame; ///< number of the first
+  CODED_FIELDS (location, frames, duration, frame);
+};
+
+/** Frames have changed suddenly, from codedexposure-keep. */
+struct EventFound {
+  static constexpr const char *kName = "codedexposure/event";
+  std::string kind; ///< "mean" or "motion"
+  std::optional<guint64> frame;
+  GstClockTime time = 0;
+  double jump = 0;        ///< part of the largest pixel value
+  GstClockTime after = 0; ///< for which it is followed before it is kept
+  CODED_FIELDS (kind, frame, time, jump, after);
+};
+
 /** Coded frames give way to frames of a pattern, which are not decoded. */
 struct NotCoded {
   static constexpr const char *kName = "codedexposure/not-coded";

@@ -4,15 +4,15 @@
 
 #include <algorithm>
 
-#include "common/meta.h"
-#include "common/raii.h"
+#include "meta.h"
+#include "raii.h"
 
-namespace codedexposure::app
+namespace codedexposure::gst
 {
 
 /** A reference to @p frame, or a copy if it is of a pool that has no more than
  * some buffers, on which its source would wait. */
-inline gst::BufferPtr
+inline BufferPtr
 kept_frame (GstBuffer *frame)
 {
   guint most = 0;
@@ -22,7 +22,7 @@ kept_frame (GstBuffer *frame)
         config, nullptr, nullptr, nullptr, &most);
     gst_structure_free (config);
   }
-  return gst::BufferPtr (
+  return BufferPtr (
       most > 0 ? gst_buffer_copy_deep (frame) : gst_buffer_ref (frame));
 }
 
@@ -31,10 +31,10 @@ kept_frame (GstBuffer *frame)
 inline int
 bits_of (GstBuffer *frame, const GstVideoInfo &info, int set)
 {
-  const auto meta = gst::get_frame_meta (frame);
+  const auto meta = get_frame_meta (frame);
   const int depth = int (GST_VIDEO_INFO_COMP_DEPTH (&info, 0));
   const int bits = set > 0 ? set : meta ? meta->bits : 0;
   return bits > 0 ? std::min (bits, depth) : depth;
 }
 
-} // namespace codedexposure::app
+} // namespace codedexposure::gst

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* A file or folder that is written beside its name. */
+/* Files of a recording, and how a file or folder gets its name. */
 #pragma once
 
 #include <string>
 
 #include "base/result.h"
 
-namespace codedexposure::app
+namespace codedexposure
 {
 
 /** NAME.part, a file or a folder beside NAME. It is locked, so only one run
@@ -52,4 +52,7 @@ private:
 Result<void> move_file (
     const std::string &from, const std::string &to, bool replace);
 
-} // namespace codedexposure::app
+/** FILE.jsonl of FILE.mkv. */
+std::string sidecar_of (const std::string &recording);
+
+} // namespace codedexposure

@@ -12,7 +12,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-namespace codedexposure::app
+namespace codedexposure
 {
 
 namespace fs = std::filesystem;
@@ -158,4 +158,10 @@ move_file (const std::string &from, const std::string &to, bool replace)
       ErrorCode::io};
 }
 
-} // namespace codedexposure::app
+std::string
+sidecar_of (const std::string &recording)
+{
+  return fs::path (recording).replace_extension (".jsonl");
+}
+
+} // namespace codedexposure

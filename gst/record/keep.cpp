@@ -1,0 +1,428 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-codedexposure-keep
+ * @title: codedexposure-keep
+ * @short_description: Keeps what has just happened
+ *
+ * Passes coded frames on and remembers those of the last seconds. When
+ * something has happened that is worth it, they become a recording, with all
+ * that is known of them, as high-speed cameras do ("post-trigger"). What
+ * happens is said by #codedexposure-keep:keep, or found in the frames by
+ * #codedexposure-keep:event, so that an experiment records itself.
+ *
+ * The stream does not wait for the disk: a thread of its own writes the frames.
+ * At the end of the stream, the element waits for what is still written, and
+ * for an event whose #codedexposure-keep:after has not passed, it keeps what
+ * there is. Frames of one format and setup are kept; with others, it begins
+ * anew.
+ *
+ * The memory for the frames is bounded by #codedexposure-keep:max-bytes. Then
+ * a recording is shorter than #codedexposure-keep:length.
+ *
+ * The message `codedexposure/kept` is posted when a recording is finished, and
+ * `codedexposure/event` when an event is found; what could not be kept is a
+ * warning. docs/streams.md describes the fields.
+ *
+ * ## Example pipelines
+ * |[
+ * gst-launch-1.0 -m codedexposure-scene scene=blown-out num-buffers=400 \
+ *     ! video/x-raw,format=GRAY8,width=768,height=576,framerate=100/1 \
+ *     ! codedexposure-sim \
+ *     ! codedexposure-keep event=motion:0.5 after=1000000000 \
+ *     ! codedexposure-demux ! fakesink
+ * ]| A candle is blown out, which is kept with the
+ * second that follows.
+ *
+ * Since: 0.2
+ */
+#include <condition_variable>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include <gst/base/gstbasetransform.h>
+
+#include "base/memory.h"
+#include "base/pixels.h"
+#include "common/element.h"
+#include "common/elements.h"
+#include "common/kept_frame.h"
+#include "common/messages.h"
+#include "common/tag.h"
+#include "kept_file.h"
+#include "stats/event_watch.h"
+
+using namespace codedexposure;
+using namespace codedexposure::gst;
+
+GST_DEBUG_CATEGORY_STATIC (codedexposure_keep_debug);
+#define GST_CAT_DEFAULT codedexposure_keep_debug
+
+namespace
+{
+
+struct Settings {
+  std::string location = "kept";
+  guint64 length = 10 * GST_SECOND;
+  guint64 max_bytes = 0;
+  std::string event;
+  guint64 after = 5 * GST_SECOND;
+  int bits = 0;
+};
+
+struct KeepState {
+  /* Object lock: */
+  Settings settings;
+  bool keep = false; ///< frames are to be kept, or are being written
+  guint64 recordings = 0;
+
+  /* Streaming thread, and what excludes it: */
+  Settings in_force;
+  std::optional<EventWatch> events;
+  std::optional<GstVideoInfo> info;
+  std::optional<guint64> last; ///< number of a frame
+
+  /** Of what follows. Never held while it writes or posts. */
+  std::mutex mutex;
+  KeptFrames frames;
+  int tasks = 0;           ///< threads that write, or will
+  bool is_writing = false; ///< one of them
+  std::condition_variable is_done;
+  /** PTS from which on an event has been followed for long enough. */
+  std::optional<GstClockTime> due;
+  std::optional<GstClockTime> next_due; ///< of an event that came meanwhile
+};
+
+struct GstCodedExposureKeep : Instance<GstBaseTransform, KeepState> {
+};
+
+/* What is remembered now, for the only task that writes it. */
+Result<KeptFrames>
+take_frames (KeepState &state)
+{
+  const std::lock_guard lock (state.mutex);
+  if (state.is_writing)
+    return Error{"The frames that were kept before are still being written; "
+                 "keep again then."};
+  if (state.frames.buffers.empty () || !state.frames.caps)
+    return Error{"There is no coded frame to be kept yet."};
+  state.is_writing = true;
+  return state.frames.copy ();
+}
+
+void
+write_frames (GstCodedExposureKeep *self, KeptFrames frames)
+{
+  KeepState &state = self->state;
+  const auto meta = get_frame_meta (frames.buffers.front ().get ());
+  Kept kept{.location = {},
+      .frames = frames.buffers.size (),
+      .duration = frames.length (),
+      .frame = meta ? std::optional (meta->frame) : std::nullopt};
+  const auto written = write_kept (std::move (frames),
+      locked (self, [&] { return state.settings.location; }));
+  locked (state.mutex, [&] { return state.is_writing = false; });
+  locked (self, [&] {
+    state.recordings += written ? 1 : 0;
+    return state.keep = false;
+  });
+  if (written) {
+    kept.location = *written;
+    post_message (self, kept);
+  } else {
+    POST_WARNING (self, RESOURCE, WRITE, written.error ().message + ".");
+  }
+}
+
+/* A thread of its own. */
+void
+run_task (GstElement *element, gpointer) noexcept
+{
+  auto *self = as<GstCodedExposureKeep> (element);
+  KeepState &state = self->state;
+  auto frames = take_frames (state);
+  if (frames)
+    write_frames (self, *std::move (frames));
+  else
+    POST_WARNING (self, RESOURCE, BUSY, frames.error ().message);
+  const std::lock_guard lock (state.mutex);
+  state.tasks--;
+  state.is_done.notify_all ();
+}
+
+void
+begin_task (GstCodedExposureKeep *self)
+{
+  locked (self->state.mutex, [self] { return ++self->state.tasks; });
+  gst_element_call_async (GST_ELEMENT (self), run_task, nullptr, nullptr);
+}
+
+/* What was to be kept is written when it returns. */
+void
+finish (GstCodedExposureKeep *self)
+{
+  KeepState &state = self->state;
+  std::unique_lock lock (state.mutex);
+  const auto idle = [&state] { return state.tasks == 0; };
+  state.is_done.wait (lock, idle);
+  state.next_due.reset ();
+  if (!std::exchange (state.due, std::nullopt))
+    return;
+  lock.unlock ();
+  begin_task (self);
+  lock.lock ();
+  state.is_done.wait (lock, idle);
+}
+
+/* An event that came meanwhile is followed for as long as the first one. */
+void
+keep_what_is_due (GstCodedExposureKeep *self, GstClockTime pts)
+{
+  KeepState &state = self->state;
+  {
+    const std::lock_guard lock (state.mutex);
+    if (!state.due || pts < *state.due || state.tasks > 0)
+      return;
+    state.due = std::exchange (state.next_due, std::nullopt);
+  }
+  begin_task (self);
+}
+
+void
+on_event (GstCodedExposureKeep *self, GstBuffer *frame, double jump)
+{
+  KeepState &state = self->state;
+  const auto meta = get_frame_meta (frame);
+  const GstClockTime pts = GST_BUFFER_PTS (frame);
+  locked (state.mutex, [&] {
+    auto &due = state.due ? state.next_due : state.due;
+    due = pts + state.in_force.after;
+    return true;
+  });
+  const bool is_mean = state.events->rule ().kind == EventRule::Kind::mean;
+  post_message (
+      self, EventFound{.kind = is_mean ? "mean" : "motion",
+                .frame = meta ? std::optional (meta->frame) : std::nullopt,
+                .time = pts,
+                .jump = jump,
+                .after = state.in_force.after});
+}
+
+/* Frames that are damaged or show a pattern are no events. */
+void
+watch (GstCodedExposureKeep *self, GstBuffer *frame)
+{
+  KeepState &state = self->state;
+  const auto meta = get_frame_meta (frame);
+  if (!state.info || is_corrupted (frame) || (meta && !meta->pattern.empty ()))
+    return state.events->skip ();
+  if (meta && state.last && meta->frame != *state.last + 1)
+    state.events->skip ();
+  state.last = meta ? std::optional (meta->frame) : std::nullopt;
+  MappedFrame mapped (*state.info, frame, GST_MAP_READ);
+  if (!mapped)
+    return state.events->skip ();
+  const int largest =
+      largest_pixel (bits_of (frame, *state.info, state.in_force.bits));
+  const auto jump = read_pixels (mapped,
+      [&] (auto pixels) { return state.events->add (pixels, largest); });
+  if (jump)
+    on_event (self, frame, *jump);
+}
+
+GstFlowReturn
+transform_ip (GstBaseTransform *base, GstBuffer *frame) noexcept
+{
+  auto *self = as<GstCodedExposureKeep> (base);
+  KeepState &state = self->state;
+  const GstClockTime pts = GST_BUFFER_PTS (frame);
+  if (!GST_CLOCK_TIME_IS_VALID (pts))
+    return GST_FLOW_OK;
+  BufferPtr kept = kept_frame (frame);
+  locked (state.mutex, [&] {
+    state.frames.buffers.push_back (std::move (kept));
+    state.frames.bytes += gst_buffer_get_size (frame);
+    state.frames.limit (state.in_force.length, state.in_force.max_bytes);
+    return true;
+  });
+  if (state.events)
+    watch (self, frame);
+  keep_what_is_due (self, pts);
+  return GST_FLOW_OK;
+}
+
+gboolean
+set_caps (GstBaseTransform *base, GstCaps *caps, GstCaps *) noexcept
+{
+  auto *self = as<GstCodedExposureKeep> (base);
+  KeepState &state = self->state;
+  GstVideoInfo info;
+  if (!gst_video_info_from_caps (&info, caps))
+    return FALSE;
+  state.info = info;
+  locked (state.mutex, [&] {
+    KeptFrames &frames = state.frames;
+    if (frames.caps && !gst_caps_is_equal (frames.caps.get (), caps))
+      frames.clear ();
+    frames.caps.reset (gst_caps_ref (caps));
+    return true;
+  });
+  if (state.events && !state.events->fits ({info.width, info.height}))
+    POST_WARNING (self, STREAM, FORMAT,
+        "The region " + rect_text (*state.events->rule ().region) +
+            " is not within the frames of " +
+            size_text ({info.width, info.height}) +
+            " pixels, so no event is seen. Set another region.");
+  return TRUE;
+}
+
+void
+follow_tags (KeepState &state, GstEvent *event)
+{
+  const auto setup = setup_from_tags (tags_of (event));
+  if (!setup || !*setup)
+    return;
+  const std::lock_guard lock (state.mutex);
+  KeptFrames &frames = state.frames;
+  const auto before =
+      frames.tag ? setup_from_tags (tags_of (frames.tag.get ())) : std::nullopt;
+  if (before && *before && !(before->value () == setup->value ()))
+    frames.clear ();
+  frames.tag.reset (gst_event_ref (event));
+}
+
+gboolean
+sink_event (GstBaseTransform *base, GstEvent *event) noexcept
+{
+  auto *self = as<GstCodedExposureKeep> (base);
+  if (GST_EVENT_TYPE (event) == GST_EVENT_TAG)
+    follow_tags (self->state, event);
+  else if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP)
+    locked (self->state.mutex, [self] {
+      self->state.frames.clear ();
+      return true;
+    });
+  else if (GST_EVENT_TYPE (event) == GST_EVENT_EOS)
+    finish (self);
+  return base_transform_class ()->sink_event (base, event);
+}
+
+bool
+begin_run (GstElement *element)
+{
+  auto *self = as<GstCodedExposureKeep> (element);
+  KeepState &state = self->state;
+  state.in_force = locked (self, [&state] {
+    state.recordings = 0;
+    return state.settings;
+  });
+  if (state.in_force.max_bytes == 0)
+    state.in_force.max_bytes = room_in_memory ();
+  state.events.reset ();
+  const std::string &event = state.in_force.event;
+  const auto rule = parse_event_rule (event);
+  if (!event.empty () && !rule)
+    return refuse_settings (self,
+        "The event property \"" + event +
+            "\" is not an event such as mean:10, motion:2 or "
+            "motion:2@64x48+100+80: what changes, by how many percent of the "
+            "largest pixel value, in which region");
+  if (rule)
+    state.events.emplace (*rule);
+  state.last.reset ();
+  return true;
+}
+
+void
+end_run (GstElement *element)
+{
+  auto *self = as<GstCodedExposureKeep> (element);
+  finish (self);
+  KeepState &state = self->state;
+  const std::lock_guard lock (state.mutex);
+  state.frames = {};
+}
+
+PropertyTable<KeepState>
+properties ()
+{
+  static const auto set = [] (auto member) {
+    return within (&KeepState::settings, member);
+  };
+  return {
+      {"location", "Beginning of names",
+          "Recordings are LOCATION-frameN.mkv, after their first frame, and "
+          "have their JSON lines beside them; no file is replaced",
+          kReadWrite, set (&Settings::location)},
+      {"length", "Length", "Frames of this time are remembered (ns)",
+          kReadWriteReady, set (&Settings::length), guint64 (0),
+          guint64 (G_MAXINT64)},
+      {"max-bytes", "Most bytes",
+          "Memory for these frames; 0: a quarter of what is free at the "
+          "beginning, at most 4 GB",
+          kReadWriteReady, set (&Settings::max_bytes), guint64 (0),
+          guint64 (G_MAXINT64)},
+      {"event", "Event",
+          "Frames are kept when they change suddenly: mean:10, by 10 % of the "
+          "largest value on average; motion:2, by 2 % from one frame to the "
+          "next more than before; motion:2@64x48+100+80, in that region; "
+          "empty: never",
+          kReadWriteReady, set (&Settings::event)},
+      {"after", "Time after an event",
+          "How long an event is followed before the frames are kept (ns)",
+          kReadWriteReady, set (&Settings::after), guint64 (0),
+          guint64 (G_MAXINT64)},
+      {"bits", "Significant bits",
+          "Significant bits of a pixel, for the largest value; 0: as the frame "
+          "metadata say, or all bits of the format",
+          kReadWriteReady, set (&Settings::bits), 0, 16},
+      {"keep", "Keep",
+          "TRUE keeps what is remembered now; reads TRUE until that is written",
+          kReadWrite, &KeepState::keep},
+      {"recordings", "Recordings", "Recordings that were written in this run",
+          kReadOnly, &KeepState::recordings, guint64 (0), guint64 (G_MAXINT64)},
+  };
+}
+
+void
+changed (GObject *object, const GParamSpec *spec)
+{
+  auto *self = as<GstCodedExposureKeep> (object);
+  if (std::string_view (spec->name) == "keep" && self->state.keep)
+    begin_task (self);
+}
+
+constexpr StateHooks kRun{.begin = begin_run, .end = end_run};
+
+void
+set_up (gpointer klass)
+{
+  GST_DEBUG_CATEGORY_INIT (codedexposure_keep_debug, "codedexposure-keep", 0,
+      "keeps what has just happened");
+  install_state<GstCodedExposureKeep, properties, changed> (klass);
+  install_run<kRun> (klass);
+  describe_element (klass, "Coded exposure keep", "Filter/Analyzer/Video",
+      "Remembers the coded frames of the last seconds, and makes a recording "
+      "of them after something has happened");
+
+  auto *transform_class = GST_BASE_TRANSFORM_CLASS (klass);
+  transform_class->set_caps = GST_DEBUG_FUNCPTR (set_caps);
+  transform_class->sink_event = GST_DEBUG_FUNCPTR (sink_event);
+  transform_class->transform_ip = GST_DEBUG_FUNCPTR (transform_ip);
+}
+
+void
+set_up_instance (GstCodedExposureKeep *self)
+{
+  auto *base = GST_BASE_TRANSFORM (self);
+  gst_base_transform_set_passthrough (base, TRUE);
+  gst_base_transform_set_qos_enabled (base, FALSE);
+}
+
+} // namespace
+
+GST_ELEMENT_REGISTER_DEFINE (codedexposure_keep, "codedexposure-keep",
+    GST_RANK_NONE,
+    (type_of<GstCodedExposureKeep, set_up, set_up_instance> (
+        "GstCodedExposureKeep", GST_TYPE_BASE_TRANSFORM)))

@@ -1,0 +1,171 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "kept_file.h"
+
+#include <cinttypes>
+#include <cstdio>
+#include <filesystem>
+#include <utility>
+
+#include "common/meta.h"
+#include "record/part.h"
+
+namespace codedexposure::gst
+{
+
+namespace
+{
+
+/* A name that is free, also for the lines. */
+std::string
+free_name (const std::string &begin)
+{
+  std::error_code ignored;
+  for (int k = 1;; k++) {
+    const std::string name =
+        begin + (k > 1 ? "-" + std::to_string (k) : "") + ".mkv";
+    if (!std::filesystem::exists (name, ignored) &&
+        !std::filesystem::exists (sidecar_of (name), ignored))
+      return name;
+  }
+}
+
+std::string
+name_of (const std::string &begin, GstBuffer *first)
+{
+  const auto meta = get_frame_meta (first);
+  char number[32];
+  std::snprintf (number, sizeof number, "-frame%06" PRIu64,
+      std::uint64_t (meta ? meta->frame : 0));
+  return free_name (begin + number);
+}
+
+/* Why @pipeline has not come to its end; "": it has. */
+std::string
+failure_of (GstElement *pipeline)
+{
+  const ObjectPtr<GstBus> bus (gst_element_get_bus (pipeline));
+  const std::unique_ptr<GstMessage, MiniObjectUnref> message (
+      gst_bus_timed_pop_filtered (bus.get (), GST_CLOCK_TIME_NONE,
+          GstMessageType (GST_MESSAGE_EOS | GST_MESSAGE_ERROR)));
+  if (GST_MESSAGE_TYPE (message.get ()) == GST_MESSAGE_EOS)
+    return "";
+  GError *error = nullptr;
+  gst_message_parse_error (message.get (), &error, nullptr);
+  std::string text = error->message;
+  g_error_free (error);
+  return text;
+}
+
+/* To a source pad, as a stream that ends. */
+void
+push_all (GstPad *pad, KeptFrames frames)
+{
+  gst_pad_set_active (pad, TRUE);
+  gst_pad_push_event (pad, gst_event_new_stream_start ("kept"));
+  gst_pad_push_event (pad, gst_event_new_caps (frames.caps.get ()));
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_TIME);
+  gst_pad_push_event (pad, gst_event_new_segment (&segment));
+  if (frames.tag)
+    gst_pad_push_event (pad, frames.tag.release ());
+  for (BufferPtr &buffer : frames.buffers)
+    if (gst_pad_push (pad, buffer.release ()) != GST_FLOW_OK)
+      break;
+  gst_pad_push_event (pad, gst_event_new_eos ());
+  gst_pad_set_active (pad, FALSE);
+}
+
+/* Returns why not; "": it did. One thread encodes: those of the stream come
+ * first. */
+std::string
+write (
+    KeptFrames frames, const std::string &recording, const std::string &sidecar)
+{
+  const ObjectPtr<GstElement> pipeline (
+      GST_ELEMENT (gst_object_ref_sink (gst_pipeline_new (nullptr))));
+  GstElement *mux =
+      gst_element_factory_make ("codedexposure-recordmux", nullptr);
+  GstElement *sink = gst_element_factory_make ("filesink", nullptr);
+  if (!mux || !sink)
+    return "its elements are not installed.";
+  gst_bin_add_many (GST_BIN (pipeline.get ()), mux, sink, nullptr);
+  gst_element_link (mux, sink);
+  g_object_set (mux, "threads", 1, "log-location", sidecar.c_str (), nullptr);
+  g_object_set (sink, "location", recording.c_str (), nullptr);
+  const ObjectPtr<GstPad> pad (
+      GST_PAD (gst_object_ref_sink (gst_pad_new ("frames", GST_PAD_SRC))));
+  gst_pad_link (pad.get (), pad_of (mux, "sink").get ());
+  gst_element_set_state (pipeline.get (), GST_STATE_PLAYING);
+  push_all (pad.get (), std::move (frames));
+  const std::string failed = failure_of (pipeline.get ());
+  gst_element_set_state (pipeline.get (), GST_STATE_NULL);
+  return failed;
+}
+
+} // namespace
+
+GstClockTime
+KeptFrames::length () const
+{
+  if (buffers.empty ())
+    return 0;
+  const GstClockTime first = GST_BUFFER_PTS (buffers.front ().get ());
+  const GstClockTime last = GST_BUFFER_PTS (buffers.back ().get ());
+  return last > first ? last - first : 0;
+}
+
+void
+KeptFrames::limit (GstClockTime longest, std::uint64_t most_bytes)
+{
+  while (buffers.size () > 1 && (length () > longest || bytes > most_bytes)) {
+    bytes -= gst_buffer_get_size (buffers.front ().get ());
+    buffers.pop_front ();
+  }
+}
+
+void
+KeptFrames::clear ()
+{
+  buffers.clear ();
+  bytes = 0;
+}
+
+KeptFrames
+KeptFrames::copy () const
+{
+  KeptFrames made;
+  made.bytes = bytes;
+  if (caps)
+    made.caps.reset (gst_caps_ref (caps.get ()));
+  if (tag)
+    made.tag.reset (gst_event_ref (tag.get ()));
+  for (const BufferPtr &buffer : buffers)
+    made.buffers.emplace_back (gst_buffer_ref (buffer.get ()));
+  return made;
+}
+
+Result<std::string>
+write_kept (KeptFrames frames, const std::string &begin)
+{
+  const std::string name = name_of (begin, frames.buffers.front ().get ());
+  Part recording (name, Part::kFile), sidecar (sidecar_of (name), Part::kFile);
+  for (Part *part : {&recording, &sidecar})
+    if (const auto claimed = part->claim (false); !claimed)
+      return claimed.error ();
+  const std::string failed =
+      write (std::move (frames), recording.path (), sidecar.path ());
+  Result<void> done = failed.empty ()
+                          ? recording.publish (false)
+                          : Error{"cannot write " + name + ": " + failed +
+                                      " Free space on the disk, and keep again",
+                                ErrorCode::io};
+  if (done)
+    done = sidecar.publish (false);
+  if (done)
+    return name;
+  recording.discard ();
+  sidecar.discard ();
+  return done.error ();
+}
+
+} // namespace codedexposure::gst

@@ -5,6 +5,7 @@
 
 #include <arv.h>
 
+#include "base/try.h"
 #include "common/raii.h"
 #include "pipeline/messages.h"
 
@@ -59,8 +60,33 @@ failure_of (Call call)
 
 } // namespace
 
-Result<std::string>
-change_gain (GstElement *camerasrc, int steps)
+namespace
+{
+
+/* A number of a camera that keys change. */
+struct CameraNumber {
+  const char *name;
+  void (*range) (ArvCamera *, double *, double *, GError **);
+  double (*get) (ArvCamera *, GError **);
+  void (*set) (ArvCamera *, double, GError **);
+  void (*set_auto) (ArvCamera *, ArvAuto, GError **);
+};
+
+constexpr CameraNumber kGain{"gain", arv_camera_get_gain_bounds,
+    arv_camera_get_gain, arv_camera_set_gain, arv_camera_set_gain_auto};
+constexpr CameraNumber kExposure{"exposure",
+    arv_camera_get_exposure_time_bounds, arv_camera_get_exposure_time,
+    arv_camera_set_exposure_time, arv_camera_set_exposure_time_auto};
+
+struct Changed {
+  double value = 0;
+  Between range;
+};
+
+/* By steps of a twentieth of the part of its range that lies in @within. */
+Result<Changed>
+change_number (GstElement *camerasrc, const CameraNumber &number, int steps,
+    std::optional<Between> within)
 {
   constexpr double kSteps = 20;
   const auto held = camera_of (camerasrc);
@@ -69,30 +95,61 @@ change_gain (GstElement *camerasrc, int steps)
   gchar *bench = nullptr;
   g_object_get (camerasrc, "bench", &bench, nullptr);
   if (const gst::CharPtr profile (bench); profile && *profile)
-    return Error{"the bench profile was measured at the gain that the camera "
-                 "has; start without --bench to change it"};
+    return Error{"the bench profile was measured at the " +
+                 std::string (number.name) +
+                 " that the camera has; start without --bench to change it"};
   ArvCamera *camera = ARV_CAMERA (held.get ());
   double low = 0, high = 0;
-  std::string why = failure_of ([&] (GError **failed) {
-    arv_camera_get_gain_bounds (camera, &low, &high, failed);
-  });
+  std::string why = failure_of (
+      [&] (GError **failed) { number.range (camera, &low, &high, failed); });
+  if (within) {
+    low = std::max (low, within->low);
+    high = std::min (high, within->high);
+  }
   if (why.empty () && !(high > low))
-    why = "it has one gain only";
-  const double before = arv_camera_get_gain (camera, nullptr);
+    why = "it has one only";
+  const double before = number.get (camera, nullptr);
   /* Some count in whole numbers. */
   double after = before;
   for (double step = (high - low) / kSteps;
        why.empty () && after == before && step <= high - low; step *= 2) {
     const double wanted = std::clamp (before + steps * step, low, high);
     why = failure_of ([&] (GError **failed) {
-      arv_camera_set_gain_auto (camera, ARV_AUTO_OFF, nullptr);
-      arv_camera_set_gain (camera, wanted, failed);
+      number.set_auto (camera, ARV_AUTO_OFF, nullptr);
+      number.set (camera, wanted, failed);
     });
-    after = arv_camera_get_gain (camera, nullptr);
+    after = number.get (camera, nullptr);
   }
   if (!why.empty ())
-    return Error{"the gain of the camera cannot be changed: " + why};
-  return format ("gain %.4g (%.4g to %.4g)", after, low, high);
+    return Error{"the " + std::string (number.name) +
+                 " of the camera cannot be changed: " + why};
+  return Changed{after, {low, high}};
+}
+
+} // namespace
+
+Result<std::string>
+change_gain (GstElement *camerasrc, int steps)
+{
+  ASSIGN_OR_RETURN (const Changed gain,
+      change_number (camerasrc, kGain, steps, std::nullopt));
+  return format (
+      "gain %.4g (%.4g to %.4g)", gain.value, gain.range.low, gain.range.high);
+}
+
+Result<std::string>
+change_exposure (GstElement *camerasrc, int steps, Between allowed)
+{
+  if (!(allowed.high > allowed.low))
+    return Error{format ("the exposure stays: the last slot of the schedule "
+                         "ends after %.0f us, and the next frame needs its "
+                         "trigger; set a schedule with shorter slots",
+        allowed.low)};
+  ASSIGN_OR_RETURN (const Changed exposure,
+      change_number (camerasrc, kExposure, steps, allowed));
+  return format (
+      "exposure %.0f us (%.0f to %.0f, with which all slots are whole)",
+      exposure.value, exposure.range.low, exposure.range.high);
 }
 
 std::optional<double>

@@ -23,9 +23,19 @@ std::string cameras_found ();
  */
 std::optional<double> camera_exposure (GstElement *camerasrc);
 
+/** Both are included. */
+struct Between {
+  double low = 0, high = 0;
+};
+
 /** Changes the gain of the camera of @p camerasrc by @p steps twentieths of its
  * range. "gain 3.5 (0 to 24)", as the camera says it. Error: it cannot, or a
  * bench profile was measured at the gain that it has. */
 Result<std::string> change_gain (GstElement *camerasrc, int steps);
+
+/** The same for the exposure time, within what the schedule allows: @p allowed,
+ * us. */
+Result<std::string> change_exposure (
+    GstElement *camerasrc, int steps, Between allowed);
 
 } // namespace codedexposure::app

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "failure.h"
@@ -66,6 +67,8 @@ struct Job {
   /** The element of a camera, which may fall silent without an error; null:
    * the frames are those of no camera. */
   GstElement *camera = nullptr;
+  /** Its exposure times with which all slots are whole, us. */
+  std::pair<double, double> exposures = {};
   /** Remembers the last frames; null: nothing does. */
   GstElement *keeper = nullptr;
   /** Reads a recording or a stream of one: its own end is in it. */

@@ -29,4 +29,10 @@ change_gain (GstElement *, int)
   return Error{cameras_found ()};
 }
 
+Result<std::string>
+change_exposure (GstElement *, int, Between)
+{
+  return Error{cameras_found ()};
+}
+
 } // namespace codedexposure::app

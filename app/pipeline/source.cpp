@@ -121,6 +121,19 @@ check_first_frame (GstPad *pad, GstPadProbeInfo *, gpointer needed)
   return GST_PAD_PROBE_DROP;
 }
 
+/* Some of the period is left for the trigger of the next frame. */
+std::pair<double, double>
+exposures_of (const SourcePlan &plan)
+{
+  constexpr double kPart = 0.99;
+  const auto slots = SlotPlan::fit (
+      plan.schedule.timing (), plan.schedule.slots (), plan.frame_rate);
+  if (!slots)
+    return {};
+  return {1e-3 * double (slots->exposure ()),
+      1e-3 * kPart * double (slots->frame_period ())};
+}
+
 void
 watch_exposure (GstElement *behind_camera, const SourcePlan &plan)
 {
@@ -243,6 +256,7 @@ coded_source (
                                        {{"dmd", "sim:bench"}});
   if (options.camera) {
     watch_exposure (chain.last (), plan);
+    job.exposures = exposures_of (plan);
     job.source = "the camera " + *options.camera;
   } else if (options.source)
     job.source = "--source";

@@ -141,7 +141,9 @@ WindowOptions::keys_of (const std::string &command)
          command +
          "-frameN.mkv;\n                  the signal USR1 does so, too\n"
          "  Up, Down        change the gain of a GenICam camera by 1/20 of its "
-         "range\n" +
+         "range\n"
+         "  PageUp, PageDown\n                  change its exposure time, as "
+         "far as all slots are whole\n" +
          common_keys (command) +
          "The stream does not wait for the window: recording and counting go "
          "on in a pause\nor loop, and subframes are skipped if the screen is "

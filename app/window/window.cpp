@@ -71,7 +71,7 @@ Window::Window (WindowBranch branch, GstPad *coded, Style style)
     : size_ (branch.size), room_ (style.room), delay_ (style.delay),
       name_ (style.name), title_ (style.title),
       player_ (std::move (style.player)), camera_source_ (style.camera),
-      keeper_ (style.keeper)
+      exposures_ (style.exposures), keeper_ (style.keeper)
 {
   panel_at_ = pad_of (branch.overlay, "sink");
   for (WindowPane &part : branch.panes) {
@@ -335,6 +335,7 @@ add_window (Job &job, const std::vector<Chain> &sources,
       pad_of (job.counted, "sink").get (),
       Window::Style{find_screen ().room (), job.times.shift_to.value_or (0),
           job.command, job.command + ": " + job.source, job.keeper, job.camera,
+          job.exposures,
           played ? std::make_unique<Player> (*std::move (played)) : nullptr});
 }
 

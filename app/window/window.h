@@ -40,7 +40,9 @@ public:
     std::string name;             ///< of the command, in the names of snapshots
     std::string title;            ///< of the window
     GstElement *keeper = nullptr; ///< remembers frames; null: nothing does
-    GstElement *camera = nullptr; ///< whose gain keys change; null: none
+    /** Whose gain and exposure keys change; null: none. */
+    GstElement *camera = nullptr;
+    std::pair<double, double> exposures = {}; ///< that are allowed, us
     /** Moves in a recording; null: the window looks at what comes. */
     std::unique_ptr<Player> player = nullptr;
   };
@@ -95,7 +97,7 @@ private:
   bool take_kept (GstMessage *message);
   void stretch_tones ();
   void fill_screen (bool fills);
-  void turn_gain (int steps);
+  void turn_camera (const std::string &key);
   std::optional<Position> seen_at (Position in_window) const;
 
   static bool is_pair (const Shown &one, const Shown &other);
@@ -120,6 +122,7 @@ private:
   std::vector<std::unique_ptr<Pane>> panes_; // constant
   const std::unique_ptr<Player> player_;
   GstElement *const camera_source_;
+  const std::pair<double, double> exposures_;
   GstElement *const keeper_; // null: nothing remembers frames
   Snapshots snapshots_;
   gst::ObjectPtr<GstPad> panel_at_; // where it is drawn

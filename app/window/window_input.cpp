@@ -203,8 +203,9 @@ Window::press (const std::string &key)
     player_->press (key);
   else if (is_key (key, {"k"}))
     keep ();
-  else if (is_key (key, {"Up", "Down"}))
-    turn_gain (is_key (key, {"Up"}) ? 1 : -1);
+  else if (is_key (
+               key, {"Up", "Down", "Prior", "Next", "Page_Up", "Page_Down"}))
+    turn_camera (key);
   else
     press_replay (key);
 }
@@ -290,13 +291,16 @@ Window::stretch_tones ()
   look_.set_tones (*tones, coded->largest ());
 }
 
-/* The exposure time is a part of the schedule, and stays. */
 void
-Window::turn_gain (int steps)
+Window::turn_camera (const std::string &key)
 {
   if (!camera_source_)
     return;
-  const auto turned = change_gain (camera_source_, steps);
+  const int steps = is_key (key, {"Up", "Prior", "Page_Up"}) ? 1 : -1;
+  const auto turned = is_key (key, {"Up", "Down"})
+                          ? change_gain (camera_source_, steps)
+                          : change_exposure (camera_source_, steps,
+                                {exposures_.first, exposures_.second});
   if (turned)
     calls_.told (*turned);
   else

@@ -144,15 +144,15 @@ displace (PhaseFit &fit)
 } // namespace
 
 Result<Calibration>
-Calibration::make (
-    Extent camera, Extent mirrors, std::span<const Pattern> patterns)
+Calibration::make (Extent camera, Extent mirrors,
+    std::span<const Pattern> patterns, int row_step)
 try {
   RETURN_IF_ERROR (Mapping::make ({camera, mirrors}));
   if (std::min (camera.width, camera.height) < 32)
     return Error{"a calibration needs frames of 32x32 pixels or more, not " +
                  std::to_string (camera.width) + "x" +
                  std::to_string (camera.height)};
-  Calibration made (camera, mirrors);
+  Calibration made (camera, mirrors, row_step);
   for (const Pattern &pattern : patterns) {
     if (made.find (pattern) != nullptr)
       return Error{"pattern " + pattern.text () +
@@ -176,8 +176,8 @@ try {
   return out_of_memory ();
 }
 
-Calibration::Calibration (Extent camera, Extent mirrors)
-    : camera_ (camera), mirrors_ (mirrors),
+Calibration::Calibration (Extent camera, Extent mirrors, int row_step)
+    : camera_ (camera), mirrors_ (mirrors), row_step_ (row_step),
       saturated_ (camera.width, camera.height)
 {
 }
@@ -217,8 +217,8 @@ Calibration::add_frame (
     slot->sum = Image<float> (camera_.width, camera_.height);
   if (slot->mean.width () > 0) {
     const float times = unit_ * float (slot->frames);
-    each_pixel (slot->sum, [&] (int x, int y) {
-      slot->sum.at (x, y) = times * float (slot->mean.at (x, y));
+    each_pixel (slot->mean, [&] (int x, int y) {
+      slot->sum.at (x, y * row_step_) = times * float (slot->mean.at (x, y));
     });
     slot->mean = {};
   }
@@ -329,10 +329,11 @@ Calibration::shrink_gratings (const Pattern &pattern)
         slot.pattern == pattern || slot.sum.width () == 0)
       continue;
     const float part = 1.0f / (unit_ * float (slot.frames));
-    slot.mean = Image<std::uint16_t> (camera_.width, camera_.height);
+    slot.mean = Image<std::uint16_t> (
+        camera_.width, (camera_.height + row_step_ - 1) / row_step_);
     each_pixel (slot.mean, [&] (int x, int y) {
       slot.mean.at (x, y) =
-          std::uint16_t (std::lround (part * slot.sum.at (x, y)));
+          std::uint16_t (std::lround (part * slot.sum.at (x, y * row_step_)));
     });
     slot.sum = {};
   }
@@ -425,6 +426,7 @@ Calibration::fit () const
   for (const Axis axis : {Axis::x, Axis::y}) {
     PhaseStack &stack = axis == Axis::x ? fit.x : fit.y;
     stack.unit = unit_;
+    stack.step = row_step_;
     for (const Slot *slot : gratings (axis)) {
       stack.frames.push_back (slot->mean.view ());
       fit.frames = std::min (fit.frames, slot->frames);

@@ -36,6 +36,7 @@ struct CalibrationResult {
   /** By how much the mirrors that pixels see by the Gray codes differ from
    * those by the mapping, in the mean over the frame, mirrors. */
   double gray_difference = 0.0;
+  /** Outliers and low contrast are known of the rows of the gratings. */
   Image<PixelQuality> quality;
   /** Difference between on and off of each pixel, DN. */
   Image<float> contrast;
@@ -59,10 +60,12 @@ struct CalibrationResult {
 class Calibration
 {
 public:
-  /** Error when @p patterns lack one that is needed or contain one twice, or a
+  /** @p row_step  of the gratings, every row of that number takes part: 1, or
+   * more to save time and memory.
+   * Error when @p patterns lack one that is needed or contain one twice, or a
    * size is out of range. */
-  static Result<Calibration> make (
-      Extent camera, Extent mirrors, std::span<const Pattern> patterns);
+  static Result<Calibration> make (Extent camera, Extent mirrors,
+      std::span<const Pattern> patterns, int row_step = 1);
   /** Frame of @p pattern, of the camera's size; several frames of the same
    * pattern are averaged. Those of a Gray code and of its inverse come one
    * after the other: of a pair, only a bit of each pixel is kept. Error for a
@@ -83,12 +86,12 @@ private:
     Pattern pattern;
     Image<float> sum; ///< empty: no frame, or it is not needed any more
     int frames = 0;
-    /** Of a grating that is not shown any more, in units of unit_; empty
-     * before. */
+    /** Of a grating that is not shown any more, every row_step_-th row, in
+     * units of unit_; empty before. */
     Image<std::uint16_t> mean = {};
   };
 
-  Calibration (Extent camera, Extent mirrors);
+  Calibration (Extent camera, Extent mirrors, int row_step);
   Slot *find (const Pattern &pattern);
   /** The first one; null if there is none. */
   const Slot *find (Pattern::Kind kind) const;
@@ -114,6 +117,7 @@ private:
   }
 
   Extent camera_, mirrors_;
+  int row_step_;
   std::vector<Slot> slots_; ///< their sums are means in fit ()
   GrayCode gray_x_, gray_y_;
   bool solved_ = false;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include "calibrate/gratings.h"
 
@@ -259,15 +260,15 @@ find_noise (const float *const *rows, int x, const GratingResponse &response,
       bins.add (expected[k], rest[k] * rest[k] / freedom[k]);
 }
 
-/** Row @p y of each frame, DN. */
+/** Row @p y of the camera in each frame, DN. */
 class Rows
 {
 public:
   Rows (const PhaseStack &stack, int y)
   {
     for (const auto &frame : stack.frames) {
-      std::vector<float> &row =
-          rows_.emplace_back (frame.row (y), frame.row (y) + frame.width);
+      std::vector<float> &row = rows_.emplace_back (
+          frame.row (y / stack.step), frame.row (y / stack.step) + frame.width);
       for (float &value : row)
         value *= stack.unit;
       starts_.push_back (row.data ());
@@ -364,7 +365,7 @@ moved (double blur, double change)
   return std::clamp (blur + change, std::max (1e-3, 0.4 * blur), 2.5 * blur);
 }
 
-/* Sums over all usable pixels of the frame. */
+/* Sums over all usable pixels of the rows that the frames have. */
 PhaseSums
 sum_up (PhaseFit &p)
 {
@@ -373,7 +374,7 @@ sum_up (PhaseFit &p)
   const Homography centred = p.mapping.centred ();
   const Rounding rounding (p.noise, p.frames);
   PhaseSums sums;
-  for (int y = 0; y < p.camera.height; y++) {
+  for (int y = 0; y < p.camera.height; y += p.x.step) {
     const Rows rows_x (p.x, y), rows_y (p.y, y);
     for (int x = 0; x < p.camera.width; x++) {
       const Position m = p.mapping.mirror_at (x, y);
@@ -459,7 +460,7 @@ PhaseFit::estimate_noise ()
       brightest = std::max (brightest, white.at (px, py));
   bins.width = double (brightest) / NoiseBins::kBins;
 
-  for (int py = 0; py < camera.height; py += 4)
+  for (int py = 0; py < camera.height; py += std::lcm (4, x.step))
     for (const bool along_y : {false, true}) {
       const Rows rows (along_y ? y : x, py);
       for (int px = 0; px < camera.width; px++) {

@@ -16,10 +16,12 @@
 namespace codedexposure
 {
 
-/** Frames of one axis: frame k shows the grating of phase k. */
+/** Frames of one axis: frame k shows the grating of phase k. Row r of them is
+ * row r * step of the camera. */
 struct PhaseStack {
   std::vector<ImageView<const std::uint16_t>> frames;
   float unit = 1.0f; ///< of a value, DN
+  int step = 1;
 
   int period () const { return int (frames.size ()); }
 };
@@ -72,7 +74,8 @@ struct PhaseFit {
   };
   int block_size = 16;
   std::vector<Block> blocks_x = {}, blocks_y = {};
-  /** Pixels that do not fit the model, one byte each. */
+  /** Pixels that do not fit the model, one byte each; of the rows that the
+   * frames have. */
   Image<std::uint8_t> outlier = {};
   /** Pixels in which the gratings are blurred. */
   Image<std::uint8_t> faint = {};

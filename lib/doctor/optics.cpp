@@ -27,6 +27,15 @@ constexpr double kGratingError = 0.005;
 constexpr double kCentred = 5.0; // mirrors
 constexpr double kFaint = 0.15;  // modulation of gratings that are too blurred
 
+/* Of the calibration: its fit needs some million pixels. */
+int
+row_step_of (Extent camera)
+{
+  constexpr double kPixels = 3e6;
+  return std::max (
+      1, int (std::ceil (double (camera.width) * camera.height / kPixels)));
+}
+
 class OpticsRun
 {
 public:
@@ -74,8 +83,8 @@ OpticsRun::keep (const Pattern &pattern, const SeenFrame &frame)
     camera_ = {picture.width (), picture.height ()};
     stack_.step = thinning_of (camera_);
     const auto patterns = calibration_patterns (mirrors_, kPeriod);
-    ASSIGN_OR_RETURN (
-        calibration_, Calibration::make (camera_, mirrors_, patterns));
+    ASSIGN_OR_RETURN (calibration_,
+        Calibration::make (camera_, mirrors_, patterns, row_step_of (camera_)));
   }
   return calibration_->add (
       pattern, picture.view (), examination_.rig.parts ().bits);

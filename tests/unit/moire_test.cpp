@@ -45,10 +45,10 @@ distance (const Mapping &mapping, const Alignment &alignment)
 }
 
 Result<CalibrationResult>
-calibrate (MoireBench &bench, Extent size = kSize)
+calibrate (MoireBench &bench, Extent size = kSize, int row_step = 1)
 {
   const auto patterns = calibration_patterns (size);
-  auto run = Calibration::make (size, size, patterns);
+  auto run = Calibration::make (size, size, patterns, row_step);
   if (!run)
     return run.error ();
   std::uint64_t number = 0;
@@ -182,6 +182,22 @@ TEST (Calibration, FindsATiltAsAHomography)
   EXPECT_LT (distance (result->mapping, alignment).most, 5e-3);
   EXPECT_NEAR (result->mapping.homography ()[6], 0.01 / 127.5, 3e-6);
   EXPECT_NEAR (result->mapping.homography ()[7], -0.02 / 95.5, 3e-6);
+}
+
+/* 192 rows are no multiple of five. */
+TEST (Calibration, AFifthOfTheRowsIsEnough)
+{
+  const Alignment alignment = {12.3, -31.4, 1.7, 0.985};
+  MoireBench bench (alignment, 0.5, kSize);
+  const auto result = calibrate (bench, kSize, 5);
+  ASSERT_TRUE (result.ok ()) << result.error ().message;
+  EXPECT_LT (distance (result->mapping, alignment).most, 2e-3);
+  EXPECT_NEAR (result->psf_sigma, 0.5, 0.02);
+  const Pose pose = result->mapping.pose ();
+  const Pose sigma = result->mapping.pose_sigma ();
+  EXPECT_NEAR (pose.rotation, alignment.rotation, 5 * sigma.rotation);
+  EXPECT_NEAR (pose.magnification, alignment.scale, 5 * sigma.magnification);
+  EXPECT_NEAR (result->gray_difference, 0.0, 0.05);
 }
 
 TEST (Calibration, FindsADistortionAsADisplacement)

@@ -92,8 +92,9 @@ Decode::declare (Options &options)
   options.value ("--coded", coded_, "OUT",
       "also write the coded frames, in one of the same formats");
   options.value ("--statistics", statistics_, "FILE",
-      "also measure each picture of OUT: a line of CSV with mean, minimum, "
-      "maximum, entropy, saturated pixels and flags");
+      "also list and measure each picture of OUT: a line of CSV with its time, "
+      "slot, losses and flags, and mean, minimum, maximum, entropy and "
+      "saturated pixels");
   decode_.declare (options);
   options.value ("--second", second_, "FILE.mkv",
       "with --fuse: the recording of a second camera, in the beam of the "

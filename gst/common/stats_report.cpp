@@ -12,10 +12,16 @@ const char *const kStatsMetaName = "CodedExposureStats";
 
 const char *const kCsvHead =
     "frame,subframe,pts_ns,mean,minimum,maximum,entropy,saturated,pixels,"
-    "flags,histogram,profile";
+    "flags,histogram,profile,duration_ns,synchronised,lost_before";
 
 namespace
 {
+
+std::string
+known (GstClockTime time)
+{
+  return GST_CLOCK_TIME_IS_VALID (time) ? std::to_string (time) : "";
+}
 
 /* Numbers in one field of a line of CSV. */
 template <typename T>
@@ -68,6 +74,11 @@ json_line (const StatsReport &report)
     line["histogram"] = stats.histogram;
   if (!stats.profile.empty ())
     line["profile"] = stats.profile;
+  if (GST_CLOCK_TIME_IS_VALID (report.duration))
+    line["duration_ns"] = report.duration;
+  if (report.synchronised)
+    line["synchronised"] = *report.synchronised;
+  line["lost_before"] = report.lost_before;
   return line.dump ();
 }
 
@@ -80,13 +91,15 @@ csv_line (const StatsReport &report)
     flags.append (flags.empty () ? "" : " ").append (flag);
   const std::string fields[] = {std::to_string (report.frame),
       report.subframe >= 0 ? std::to_string (report.subframe) : "",
-      GST_CLOCK_TIME_IS_VALID (report.running_time)
-          ? std::to_string (report.running_time)
-          : "",
-      real_text (stats.mean), std::to_string (stats.minimum),
-      std::to_string (stats.maximum), real_text (stats.entropy),
-      std::to_string (stats.saturated), std::to_string (stats.pixels), flags,
-      listed (stats.histogram), listed (stats.profile)};
+      known (report.running_time), real_text (stats.mean),
+      std::to_string (stats.minimum), std::to_string (stats.maximum),
+      real_text (stats.entropy), std::to_string (stats.saturated),
+      std::to_string (stats.pixels), flags, listed (stats.histogram),
+      listed (stats.profile), known (report.duration),
+      !report.synchronised   ? ""
+      : *report.synchronised ? "true"
+                             : "false",
+      std::to_string (report.lost_before)};
   std::string line;
   for (const std::string &field : fields)
     line.append (&field == fields ? "" : ",").append (field);

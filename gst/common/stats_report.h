@@ -3,6 +3,7 @@
  * docs/streams.md describes the fields. */
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,10 @@ struct StatsReport {
   GstClockTime pts = GST_CLOCK_TIME_NONE;
   GstClockTime running_time = GST_CLOCK_TIME_NONE;
   std::vector<const char *> flags; ///< flag_names () of the buffer
+  /* For lines of a file only: */
+  GstClockTime duration = GST_CLOCK_TIME_NONE;
+  std::optional<bool> synchronised; ///< none: unknown
+  guint64 lost_before = 0;          ///< coded frames
   const PictureStats &stats;
   CODED_FIELDS (frame, subframe, pts, stats.mean, stats.minimum, stats.maximum,
       stats.entropy, stats.saturated, stats.pixels, stats.histogram,

@@ -250,7 +250,8 @@ describe (GstSubframeStats *self, GstBuffer *frame)
   const StatsReport report{meta ? meta->frame : counted,
       meta ? meta->subframe : -1, pts,
       running_time (GST_BASE_TRANSFORM (self)->segment, pts),
-      flag_names (frame), *stats};
+      flag_names (frame), GST_BUFFER_DURATION (frame),
+      meta ? meta->locked : std::nullopt, meta ? meta->lost_before : 0, *stats};
 
   const GstStructure *fields = set_stats_meta (frame, report);
   if (state.in_force.post_messages) {

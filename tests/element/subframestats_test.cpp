@@ -9,9 +9,9 @@
 #include <nlohmann/json.hpp>
 
 #include "common/meta.h"
+#include "common/stats_report.h"
 #include "harness.h"
 #include "pipeline.h"
-#include "common/stats_report.h"
 
 namespace
 {
@@ -141,7 +141,8 @@ TEST (SubframeStats, SaysTheSameInMetaMessageAndFile)
   EXPECT_EQ (file.objects ()[0], Json::parse (R"({"frame": 7, "subframe": 2,
       "pts_ns": 33366666, "mean": 189.5, "minimum": 0, "maximum": 255,
       "entropy": 3.0, "saturated": 1, "pixels": 8, "flags": ["corrupted"],
-      "histogram": [2, 0, 0, 6], "profile": [254, 255, 0, 1]})"));
+      "histogram": [2, 0, 0, 6], "profile": [254, 255, 0, 1],
+      "lost_before": 0})"));
   EXPECT_EQ (property<guint64> (h.element (), "frames-in"), 1u);
   EXPECT_EQ (property<guint64> (h.element (), "saturated-frames"), 1u);
 }
@@ -155,16 +156,23 @@ TEST (SubframeStats, WritesCsvWithAHead)
   h.set_caps (gray_caps (2, 2));
   for (int k = 0; k < 2; k++) {
     BufferPtr buffer = frame_of (ramp (2, 2, 100 * k), k * 40 * GST_MSECOND);
-    if (k == 1)
+    if (k == 1) {
       GST_BUFFER_FLAG_SET (buffer.get (), GST_BUFFER_FLAG_GAP);
+      GST_BUFFER_DURATION (buffer.get ()) = 40 * GST_MSECOND;
+      FrameMeta meta;
+      meta.frame = 1;
+      meta.locked = true;
+      meta.lost_before = 2;
+      set_frame_meta (buffer.get (), meta);
+    }
     ASSERT_EQ (h.push (std::move (buffer)), GST_FLOW_OK);
   }
   EXPECT_EQ (file.lines (),
       (std::vector<std::string>{
           "frame,subframe,pts_ns,mean,minimum,maximum,entropy,saturated,"
-          "pixels,flags,histogram,profile",
-          "0,,0,1.5,0,3,2,0,4,,4 0,0 2",
-          "1,,40000000,101.5,100,103,2,0,4,gap,4 0,100 102"}));
+          "pixels,flags,histogram,profile,duration_ns,synchronised,lost_before",
+          "0,,0,1.5,0,3,2,0,4,,4 0,0 2,,,0",
+          "1,,40000000,101.5,100,103,2,0,4,gap,4 0,100 102,40000000,true,2"}));
 }
 
 TEST (SubframeStats, MeasuresSixteenBits)

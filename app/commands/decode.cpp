@@ -9,6 +9,7 @@
 #include "options/picture.h"
 #include "pipeline/decoder.h"
 #include "pipeline/messages.h"
+#include "pipeline/partner_seek.h"
 #include "pipeline/plugin.h"
 #include "pipeline/python.h"
 #include "pipeline/recording.h"
@@ -150,8 +151,7 @@ void
 Decode::declare_relations (Options &options)
 {
   options.need ({"--uncertainty", "--second"}, "--fuse");
-  options.exclude (
-      {"--start", "--duration", "--excerpt", "--jobs", "--refine"}, "--second");
+  options.exclude ({"--jobs", "--refine"}, "--second");
   options.need ({"--statistics"}, "--output");
   options.exclude ({"--region", "--method"}, "--fuse");
   options.exclude ({"--start", "--duration", "--find-phase"}, "--excerpt");
@@ -258,6 +258,7 @@ Decode::read (Job &job) const
   GstElement *reader = job.reader;
   const bool is_finished = job.is_finished;
   Chain partners = read_recording (job, *second_);
+  turn_seeks (partners.to ("identity").last (), pad_of (reader, "src").get ());
   job.reader = reader;
   job.source = recording_;
   job.is_finished &= is_finished;

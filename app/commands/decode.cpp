@@ -151,7 +151,7 @@ void
 Decode::declare_relations (Options &options)
 {
   options.need ({"--uncertainty", "--second"}, "--fuse");
-  options.exclude ({"--jobs", "--refine"}, "--second");
+  options.exclude ({"--refine"}, "--second");
   options.need ({"--statistics"}, "--output");
   options.exclude ({"--region", "--method"}, "--fuse");
   options.exclude ({"--start", "--duration", "--find-phase"}, "--excerpt");
@@ -342,10 +342,13 @@ Decode::decode_on_cores () const
       output_->ends_with (".ome.zarr") || output_->ends_with (".ome.zarr/"))
     usage_error ("--jobs is for an --output that ends in .mkv, .mp4, .ome.tif, "
                  ".h5 or /");
+  std::vector<std::string> inputs{recording_};
+  if (second_)
+    inputs.push_back (*second_);
   for (const auto &written : {output_, statistics_}) {
     if (!written)
       continue;
-    value_of (check_is_no_input (*written, {recording_}), Exit::usage);
+    value_of (check_is_no_input (*written, inputs), Exit::usage);
     value_of (check_is_no_recording (*written), Exit::usage);
   }
   std::vector<std::string> words{"work", "decode", recording_, *output_,
@@ -357,6 +360,8 @@ Decode::decode_on_cores () const
   words.insert (words.end (), decoding.begin (), decoding.end ());
   if (statistics_)
     pass ("statistics", *statistics_);
+  if (second_)
+    pass ("second", *second_);
   if (region_)
     pass ("region", std::to_string (*region_));
   if (white_)

@@ -55,7 +55,8 @@ with recordings.
   -h, --help          show this help
 
 Options of decode: --method, --mapping, --fuse, --refine, --bench, --full-well,
---read-noise, --region, --schedule, --bits, --view, --white, --deflate.
+--read-noise, --region, --schedule, --bits, --view, --white, --deflate, --second
+(a file, or a folder whose files have the names of the recordings).
 
 Exit status: 0 all is done, 1 something failed or is missing, 2 wrong usage, 3
 done, but a recording is cut off or damaged, 130 stopped.
@@ -321,9 +322,10 @@ def check_host(folder, plan_sha256):
         made = plan.Plan.from_json(read_json(store.plan))
         chunk.check_program(made)
         for recording in made.recordings:
-            if not os.path.exists(recording.path):
-                raise Problem(f'{recording.path} is not there; mount its folder at '
-                              'the same path')
+            for path in (recording.path, recording.second):
+                if path and not os.path.exists(path):
+                    raise Problem(f'{path} is not there; mount its folder at the '
+                                  'same path')
         print(engine.READY)
     except Problem as problem:
         print(problem)

@@ -29,10 +29,17 @@ def name_of(form):
     return 'pictures' + FORMS[form].rstrip('/')
 
 
+def second_of(source):
+    """What is written of the recording of a second camera, if there is one."""
+    return ({'second': source.second, 'second_hash': source.second_fingerprint}
+            if source.second else {})
+
+
 def identity(plan, recording, chunk):
     """What a chunk's manifest must say to belong to the plan."""
     source = plan.recordings[recording]
     return {
+        **second_of(source),
         'statistics': plan.statistics,
         'format': 'coded-exposure-archive-chunk', 'version': 1,
         'recording': source.path, 'recording_hash': source.fingerprint,
@@ -40,6 +47,10 @@ def identity(plan, recording, chunk):
         'options': plan.options, 'options_sha256': plan.options_digest,
         'form': plan.form, 'program': plan.program,
     }
+
+
+def second_option(source):
+    return [f'--second={source.second}'] * bool(source.second)
 
 
 def command(plan, recording, chunk, scratch):
@@ -55,6 +66,7 @@ def command(plan, recording, chunk, scratch):
              '--output=' + os.path.join(scratch, 'pictures' + FORMS[form])]
     if plan.statistics:
         words.append(f'--statistics={os.path.join(scratch, TABLE)}')
+    words += second_option(source)
     if source.chunks > 1:
         stop = '' if stop is None else seconds(stop)
         words.append(f'--excerpt={seconds(start)}-{stop}')
@@ -64,8 +76,9 @@ def command(plan, recording, chunk, scratch):
 def check_options(plan):
     """Raises Problem if decode does not take the options of the plan, or does not
     write its form."""
+    first = plan.recordings[0]
     said = subprocess.run(
-        [*programs.DECODE, plan.recordings[0].path, *plan.options, '--print',
+        [*programs.DECODE, first.path, *plan.options, *second_option(first), '--print',
          f'--output=pictures{FORMS[plan.form]}'], capture_output=True, text=True,
         check=False, stdin=subprocess.DEVNULL)
     if said.returncode != 0:
@@ -97,9 +110,11 @@ def check_program(plan):
 
 
 def check_source(source):
-    if fingerprint(source.path) != source.fingerprint:
-        raise Problem(f'{source.path} is not the file that was planned; put it '
-                      'back, or submit it to a new archive')
+    for path, known in ((source.path, source.fingerprint),
+                        (source.second, source.second_fingerprint)):
+        if path and fingerprint(path) != known:
+            raise Problem(f'{path} is not the file that was planned; put it '
+                          'back, or submit it to a new archive')
 
 
 def decode(plan, recording, chunk, scratch):

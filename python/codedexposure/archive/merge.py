@@ -172,7 +172,7 @@ def merge(store, plan, recording):
     write_json(store.merged(recording), {
         'format': 'coded-exposure-archive-recording', 'version': 2,
         'recording': source.path, 'recording_hash': source.fingerprint,
-        'output': source.output, 'output_hashes': [*map(digest, outputs)],
+        **chunks.second_of(source), 'output': source.output, 'output_hashes': [*map(digest, outputs)],
         'options': plan.options, 'program': plan.program, 'counts': counts,
         'status': chunks.DAMAGED if counts['frames'] < source.recorded else max(
             m['status'] for m in manifests),

@@ -11,7 +11,7 @@ from .store import Problem, fingerprint
 FORMAT, VERSION = 'coded-exposure-archive', 2
 # Options of decode with a value; others are flags.
 VALUED = {'method', 'mapping', 'fuse', 'bench', 'full-well', 'read-noise',
-          'region', 'schedule', 'bits', 'white'}
+          'region', 'schedule', 'second', 'bits', 'white'}
 FLAGS = {'view', 'verbose', 'refine', 'deflate'}
 FILES = {'mapping', 'bench', 'schedule'}  # values that may be files
 FORMS = {'mkv': '.mkv', 'png': '/', 'mp4': '.mp4', 'ome.tif': '.ome.tif',
@@ -28,6 +28,8 @@ class Recording:
     recorded: int        # frames that it once had; 0: not known
     borders: list        # between its chunks: positions, as of --excerpt, ns
     whole: str = ''      # why it is one chunk
+    second: str = ''     # the recording of a second camera
+    second_fingerprint: dict = dataclasses.field(default_factory=dict)
 
     @property
     def chunks(self):
@@ -69,6 +71,33 @@ def recording_of(info, output, length):
                      info.get('recorded', 0),
                      [] if whole or not times else
                      borders_of(times, info['start_ns'], length), whole)
+
+
+def take_second(options):
+    """(options without --second, its value or '')."""
+    begin = '--second='
+    found = [o.removeprefix(begin) for o in options if o.startswith(begin)]
+    return ([o for o in options if not o.startswith(begin)],
+            os.path.abspath(found[-1]) if found else '')
+
+
+def add_seconds(recordings, second):
+    """The recordings of a second camera: a file for one recording, or a folder
+    whose files have the names of the others."""
+    if not os.path.isdir(second) and len(recordings) > 1:
+        raise Problem(f'--second {second} is one file for {len(recordings)} '
+                      'recordings; name a folder that has one of the name of each')
+    for recording in recordings:
+        recording.second = (os.path.join(second, os.path.basename(recording.path))
+                            if os.path.isdir(second) else second)
+    for recording, said in zip(recordings, programs.info(
+            [recording.second for recording in recordings])):
+        if 'error' in said:
+            raise Problem(f'--second: {said["error"]}')
+        recording.second_fingerprint = fingerprint(recording.second)
+        if not said['complete'] and not recording.whole:
+            recording.borders = []
+            recording.whole = 'its second recording is cut off or damaged'
 
 
 def find_recordings(words, lists, avoid):
@@ -235,7 +264,8 @@ def check_outputs(folder, plan):
     paths = {os.path.realpath(os.path.join(folder, name))
              for number in range(len(plan.recordings))
              for name in plan.outputs(number)}
-    inputs = [recording.path for recording in plan.recordings]
+    inputs = [path for recording in plan.recordings
+              for path in (recording.path, recording.second) if path]
     known = {identity_of(path) for path in inputs}
     there = [path for path in sorted(paths) if os.path.isfile(path)]
     for path, said in zip(there, programs.info(there)):
@@ -253,7 +283,7 @@ def check_outputs(folder, plan):
 
 def make(words, lists, folder, form, length, threads, options, program):
     """The plan of an archive in @folder."""
-    options = check_options(options)
+    options, second = take_second(check_options(options))
     recordings, outputs = [], {}
     for said, stem in find_recordings(words, lists, os.path.abspath(folder)):
         output, path = stem + FORMS[form], said['recording']
@@ -262,5 +292,7 @@ def make(words, lists, folder, form, length, threads, options, program):
                           f'{output}; archive them into different folders')
         outputs[output] = path
         recordings.append(recording_of(said, output, length))
+    if second:
+        add_seconds(recordings, second)
     return Plan(options, digest_of_options(options), form, length, threads,
                 program, recordings)

@@ -11,6 +11,7 @@
 #include "common/meta.h"
 #include "common/tag.h"
 #include "record/track.h"
+#include "recorded.h"
 
 namespace
 {
@@ -18,46 +19,6 @@ namespace
 using namespace codedexposure;
 using namespace codedexposure::gst;
 using namespace codedexposure::test;
-
-constexpr GstClockTime kPeriod = 40 * GST_MSECOND;
-constexpr int kFrames = 6;
-
-guint64
-counted (GstElement *element, const char *name)
-{
-  const StructurePtr counters (property<GstStructure *> (element, "counters"));
-  guint64 value = 0;
-  EXPECT_TRUE (gst_structure_get_uint64 (counters.get (), name, &value));
-  return value;
-}
-
-BufferPtr
-picture (int frame)
-{
-  return frame_of (draw<std::uint8_t> (8, 8,
-                       [frame] (int x, int y) { return 9 * frame + x + y; }),
-      GstClockTime (frame) * kPeriod);
-}
-
-FrameMeta
-meta_of (int frame)
-{
-  FrameMeta meta;
-  meta.frame = 10 + guint64 (frame);
-  meta.exposure_start = GstClockTime (frame) * kPeriod + 3;
-  meta.exposure_duration = 39'200'000;
-  meta.locked = frame != 3;
-  meta.slip = frame == 3 ? 2 : 0;
-  meta.lost_before = frame == 1 ? 2 : 0;
-  meta.bits = 7;
-  return meta;
-}
-
-StreamSetup
-setup_of (const char *schedule)
-{
-  return {*Schedule::parse (schedule)};
-}
 
 /** kFrames frames: the third is CORRUPTED, late ones are DISCONT. */
 struct Recording {

@@ -13,6 +13,7 @@
 #include "pipeline.h"
 #include "preset.h"
 #include "schedule_tags.h"
+#include "shown.h"
 
 namespace
 {
@@ -56,13 +57,6 @@ coded_picture (int number)
     return base + int (noise () % 5);
   });
 }
-
-/* What came out of a picture. */
-struct Shown {
-  GstClockTime pts, duration;
-  Image<std::uint8_t> pixels;
-  bool operator== (const Shown &) const = default;
-};
 
 /* Of a recording and what reads it, as files are: seeks flush, and frames are
  * clipped to the segment. */
@@ -485,38 +479,6 @@ write_file (const std::vector<Recorded> &frames)
   EXPECT_EQ (pipeline.play (), "");
   return path;
 }
-
-/* What comes out of an element since the last flush. */
-class Output
-{
-public:
-  Output (Pipeline &pipeline, const char *name)
-      : pad_ (pipeline.pad (name, "src"))
-  {
-    gst_pad_add_probe (
-        pad_.get (),
-        GstPadProbeType (
-            GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_EVENT_FLUSH),
-        +[] (GstPad *pad, GstPadProbeInfo *info, gpointer self) {
-          auto &shown = static_cast<Output *> (self)->shown;
-          if (!(info->type & GST_PAD_PROBE_TYPE_BUFFER)) {
-            shown.clear ();
-            return GST_PAD_PROBE_OK;
-          }
-          GstBuffer *buffer = GST_PAD_PROBE_INFO_BUFFER (info);
-          const CapsPtr caps (gst_pad_get_current_caps (pad));
-          shown.push_back (
-              {GST_BUFFER_PTS (buffer), GST_BUFFER_DURATION (buffer),
-                  image_of<std::uint8_t> (buffer, caps.get ())});
-          return GST_PAD_PROBE_OK;
-        },
-        this, nullptr);
-  }
-  std::vector<Shown> shown;
-
-private:
-  ObjectPtr<GstPad> pad_;
-};
 
 /* Each of two elements needs other frames around those that are asked for, and
  * only the first copy of a seek is followed. */

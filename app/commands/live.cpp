@@ -25,12 +25,15 @@ private:
   GstElement *add_recording (
       Job &job, Chain &chain, const SourcePlan &plan) const;
   std::vector<Chain> panes (Job &job, Chain &frames) const;
+  void add_fused (Job &job, GstElement *tee, std::vector<Chain> &panes) const;
 
   SourceOptions source_;
   DecodeOptions decode_;
   WindowOptions window_;
   RunOptions run_;
   std::optional<Text> record_;
+  bool second_ = false;
+  SecondCamera beside_;
 };
 
 CommandText
@@ -73,9 +76,14 @@ Live::declare (Options &options)
   options.value ("--record", record_, "FILE.mkv",
       "also record all coded frames", file_ending_in (".mkv"));
   window_.declare (options);
+  options.flag ("--second", second_,
+      "also look through a second camera, in the beam of the mirrors that are "
+      "off: a last picture is the sum of both, and --fuse has both");
+  beside_.declare (options);
   source_.declare (options, SourceOptions::Kind::watched);
   run_.declare (options);
   options.need ({"--force"}, "--record");
+  beside_.declare_relations (options);
 }
 
 /* A fast event that comes again. */
@@ -105,42 +113,74 @@ Live::add_recording (Job &job, Chain &chain, const SourcePlan &plan) const
   return tee;
 }
 
+void
+Live::add_fused (Job &job, GstElement *tee, std::vector<Chain> &panes) const
+{
+  const auto branch = [&] (const char *name) -> Chain & {
+    return panes.emplace_back (job.graph.from (tee, "src_%u"))
+        .to ("queue",
+            {{"name", name}, {"leaky", "downstream"}, {"max-size-buffers", 4}});
+  };
+  if (decode_.fuse) {
+    Settings settings{{"quality", *decode_.fuse}};
+    set_if (settings, "mapping", decode_.mapping);
+    set_if (settings, "full-well", source_.full_well);
+    set_if (settings, "read-noise", source_.read_noise);
+    branch ("fusing").to ("codedexposure-fuse", settings);
+  }
+  if (second_)
+    branch ("adding").to ("codedexposure-sum");
+}
+
+/* Frames of both cameras go to what needs both before they are split. */
 std::vector<Chain>
 Live::panes (Job &job, Chain &frames) const
 {
+  GstElement *both = second_ ? frames.to ("tee").last () : nullptr;
   Settings settings;
   set_if (settings, "method", decode_.method);
   set_if (settings, "mapping", decode_.mapping);
-  GstElement *demux = frames.to ("codedexposure-demux", settings).last ();
+  Chain split = both ? job.graph.from (both, "src_%u") : frames;
+  GstElement *demux = split.to ("codedexposure-demux", settings).last ();
   Chain coded = job.graph.from (demux, "coded");
   const Chain fast = job.graph.from (demux, "src");
-  if (!decode_.fuse)
+  if (!both && !decode_.fuse)
     return {coded, fast};
-  GstElement *tee = coded.to ("tee").last ();
-  Settings of_fuse{{"quality", *decode_.fuse}};
-  set_if (of_fuse, "mapping", decode_.mapping);
-  set_if (of_fuse, "full-well", source_.full_well);
-  set_if (of_fuse, "read-noise", source_.read_noise);
-  Chain full = job.graph.from (tee, "src_%u");
-  full.to ("queue", {{"name", "fusing"}, {"leaky", "downstream"},
-                        {"max-size-buffers", 4}})
-      .to ("codedexposure-fuse", of_fuse);
-  return {job.graph.from (tee, "src_%u"), fast, full};
+  GstElement *tee = both ? both : coded.to ("tee").last ();
+  std::vector<Chain> panes{both ? coded : job.graph.from (tee, "src_%u"), fast};
+  add_fused (job, tee, panes);
+  return panes;
 }
 
 Exit
 Live::run ()
 {
   constexpr int kWaiting = 8; // frames, for the demultiplexer
+  if (second_)
+    beside_.check (source_);
   start_gstreamer ();
   Job job ("live", run_);
   job.ends_by_signal = true;
   const SourcePlan plan = this->plan ();
-  Chain frames = coded_source (job, source_, plan, Pace::live);
+  std::optional<Chain> partners;
+  Chain frames = [&] {
+    if (!second_)
+      return coded_source (job, source_, plan, Pace::live);
+    auto [first, other] =
+        coded_sources (job, source_, plan, Pace::live, beside_);
+    partners = other;
+    return first;
+  }();
   if (record_)
     frames = job.graph.from (add_recording (job, frames, plan), "src_%u");
   job.keeper = window_.add_keeper (frames, "live", source_.bits);
   job.counted = frames.queue (kWaiting).last ();
+  if (partners) {
+    GstElement *pair = job.graph.add ("codedexposure-pair");
+    partners->queue (kWaiting).to (pair, "off");
+    frames = frames.to (pair, "on");
+    window_.last = "sum";
+  }
   add_window (job, panes (job, frames), window_, source_.bits);
   return play (job).exit;
 }

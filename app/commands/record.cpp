@@ -65,24 +65,19 @@ public:
         "also the recording of a second camera, in the beam of the mirrors "
         "that are off",
         file_ending_in (".mkv"));
-    options.value ("--second-camera", beside_.camera, "NAME",
-        "that camera, beside --camera");
-    options.value ("--second-bench", beside_.bench, "FILE",
-        "what was measured with it, as --bench of the first");
+    beside_.declare (options);
     options.flag (
         "--fast", fast_, "run the bench as fast as possible, not in real time");
     source_.declare (options);
     options.exclude ({"--fast"}, "--camera");
-    options.need ({"--second-camera", "--second-bench"}, "--second");
-    options.need ({"--second-camera"}, "--camera");
-    options.exclude ({"--source"}, "--second");
+    beside_.declare_relations (options);
     run_.declare (options);
   }
 
   Exit run () override
   {
     if (second_)
-      check_second ();
+      beside_.check (source_);
     start_gstreamer ();
     Job job ("record", run_);
     job.ends_by_signal = true;
@@ -96,22 +91,6 @@ public:
   }
 
 private:
-  void check_second () const
-  {
-    if (source_.camera && !beside_.camera)
-      usage_error ("--second records a second camera beside --camera; say "
-                   "which, by --second-camera");
-    if (source_.camera && *source_.camera == *beside_.camera)
-      usage_error ("--camera and --second-camera are both " + *source_.camera +
-                   "; name two cameras");
-    if (beside_.bench)
-      bench_of ("--second-bench", *beside_.bench);
-    if (!source_.camera && source_.device)
-      usage_error ("--device " + *source_.device +
-                   ": a simulated DMD has one camera; leave it out, and the "
-                   "masks of both cameras step with the frames");
-  }
-
   Exit record_both (Job &job, const SourcePlan &plan, Pace pace) const
   {
     auto [first, other] = coded_sources (job, source_, plan, pace, beside_);

@@ -226,6 +226,40 @@ check_exposure (const SourcePlan &plan, double exposure)
 
 } // namespace
 
+void
+SecondCamera::declare (Options &options)
+{
+  options.value (
+      "--second-camera", camera, "NAME", "that camera, beside --camera");
+  options.value ("--second-bench", bench, "FILE",
+      "what was measured with it, as --bench of the first");
+}
+
+void
+SecondCamera::declare_relations (Options &options) const
+{
+  options.need ({"--second-camera", "--second-bench"}, "--second");
+  options.need ({"--second-camera"}, "--camera");
+  options.exclude ({"--source"}, "--second");
+}
+
+void
+SecondCamera::check (const SourceOptions &first) const
+{
+  if (first.camera && !camera)
+    usage_error ("--second is for a second camera beside --camera; say which, "
+                 "by --second-camera");
+  if (first.camera && *first.camera == *camera)
+    usage_error ("--camera and --second-camera are both " + *first.camera +
+                 "; name two cameras");
+  if (bench)
+    bench_of ("--second-bench", *bench);
+  if (!first.camera && first.device)
+    usage_error ("--device " + *first.device +
+                 ": a simulated DMD has one camera; leave it out, and the "
+                 "masks of both cameras step with the frames");
+}
+
 SourcePlan
 SourcePlan::make (const SourceOptions &options)
 {

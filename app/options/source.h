@@ -48,6 +48,19 @@ private:
   void declare_camera (Options &options, Kind kind);
 };
 
+/** A second camera, in the beam of the mirrors that are off. */
+struct SecondCamera {
+  std::optional<Text> camera; ///< none: a simulated one
+  std::optional<Text> bench;  ///< what was measured with it
+
+  /** Beside --second, which a command declares. */
+  void declare (Options &options);
+  void declare_relations (Options &options) const;
+  /** What the relations between options cannot say; throws Failure.
+   * @p first  the camera in the beam of the mirrors that are on. */
+  void check (const SourceOptions &first) const;
+};
+
 /** The bench profile @p path, which @p option named. Throws Failure. */
 BenchProfile bench_of (const char *option, const std::string &path);
 

@@ -32,7 +32,8 @@ Run::say_no_frame ()
 bool
 Run::publish ()
 {
-  gst_element_set_state (pipeline (), GST_STATE_READY);
+  if (GST_STATE (pipeline ()) != GST_STATE_NULL) // which opens files
+    gst_element_set_state (pipeline (), GST_STATE_READY);
   if (job_.window)
     job_.window->finish ();
   stop ();

@@ -26,12 +26,6 @@ Chain camera_source (
 Chain coded_source (
     Job &job, const SourceOptions &options, const SourcePlan &plan, Pace pace);
 
-/** A second camera, in the beam of the mirrors that are off. */
-struct SecondCamera {
-  std::optional<Text> camera; ///< none: a simulated one
-  std::optional<Text> bench;  ///< what was measured with it
-};
-
 /** Coded frames of both cameras: as coded_source (), and those of the second
  * behind a dmdsync of its own. */
 std::pair<Chain, Chain> coded_sources (Job &job, const SourceOptions &options,

@@ -20,7 +20,8 @@ namespace
 /* The names of panes, in the counters of their queues. */
 constexpr struct {
   const char *name, *caption;
-} kPanes[] = {{"beside", "camera"}, {"fast", "subframes"}, {"full", "fused"}};
+} kPanes[] = {{"beside", "camera"}, {"fast", "subframes"}, {"full", "fused"},
+    {"added", "sum"}};
 
 /* The window sets how many frames it holds when their rate is known; until
  * then, two coded frames of any schedule fit. */

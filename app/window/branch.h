@@ -46,6 +46,7 @@ struct WindowOptions {
   std::optional<Text> sink;
   std::optional<Text> keep_on;      ///< an event
   std::optional<double> keep_after; ///< s
+  const char *last = nullptr; ///< caption of the last picture; null: the usual
 
   /** @p comes  whether frames come, and are not read from a file. */
   void declare (Options &options, bool comes = true);

@@ -326,6 +326,8 @@ add_window (Job &job, const std::vector<Chain> &sources,
 {
   WindowBranch branch = add_window_branch (
       sources, options, bits, played ? played->slots_per_second () : "");
+  if (options.last)
+    branch.panes.back ().caption = options.last;
   if (played)
     branch.panes[kSubframes].caption = played->pictures;
   if (!job.options.print)

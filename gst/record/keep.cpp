@@ -85,7 +85,7 @@ struct KeepState {
 
   /** Of what follows. Never held while it writes or posts. */
   std::mutex mutex;
-  KeptFrames frames;
+  KeptFrames frames;       ///< changed by the streaming thread only
   int tasks = 0;           ///< threads that write, or will
   bool is_writing = false; ///< one of them
   std::condition_variable is_done;
@@ -175,6 +175,15 @@ finish (GstCodedExposureKeep *self)
   state.is_done.wait (lock, idle);
 }
 
+/* An event is kept before frames of another format or setup come. */
+void
+begin_anew (GstCodedExposureKeep *self)
+{
+  finish (self);
+  const std::lock_guard lock (self->state.mutex);
+  self->state.frames.clear ();
+}
+
 /* An event that came meanwhile is followed for as long as the first one. */
 void
 keep_what_is_due (GstCodedExposureKeep *self, GstClockTime pts)
@@ -261,11 +270,11 @@ set_caps (GstBaseTransform *base, GstCaps *caps, GstCaps *) noexcept
   if (!gst_video_info_from_caps (&info, caps))
     return FALSE;
   state.info = info;
+  const auto &before = state.frames.caps;
+  if (before && !gst_caps_is_equal (before.get (), caps))
+    begin_anew (self);
   locked (state.mutex, [&] {
-    KeptFrames &frames = state.frames;
-    if (frames.caps && !gst_caps_is_equal (frames.caps.get (), caps))
-      frames.clear ();
-    frames.caps.reset (gst_caps_ref (caps));
+    state.frames.caps.reset (gst_caps_ref (caps));
     return true;
   });
   if (state.events && !state.events->fits ({info.width, info.height}))
@@ -278,18 +287,27 @@ set_caps (GstBaseTransform *base, GstCaps *caps, GstCaps *) noexcept
 }
 
 void
-follow_tags (KeepState &state, GstEvent *event)
+follow_tags (GstCodedExposureKeep *self, GstEvent *event)
 {
+  KeepState &state = self->state;
   const auto setup = setup_from_tags (tags_of (event));
   if (!setup || !*setup)
     return;
-  const std::lock_guard lock (state.mutex);
-  KeptFrames &frames = state.frames;
-  const auto before =
-      frames.tag ? setup_from_tags (tags_of (frames.tag.get ())) : std::nullopt;
+  GstEvent *tag = state.frames.tag.get ();
+  const auto before = tag ? setup_from_tags (tags_of (tag)) : std::nullopt;
   if (before && *before && !(before->value () == setup->value ()))
-    frames.clear ();
-  frames.tag.reset (gst_event_ref (event));
+    begin_anew (self);
+  const std::lock_guard lock (state.mutex);
+  state.frames.tag.reset (gst_event_ref (event));
+}
+
+void
+forget (KeepState &state)
+{
+  const std::lock_guard lock (state.mutex);
+  state.frames.clear ();
+  state.due.reset ();
+  state.next_due.reset ();
 }
 
 gboolean
@@ -297,12 +315,9 @@ sink_event (GstBaseTransform *base, GstEvent *event) noexcept
 {
   auto *self = as<GstCodedExposureKeep> (base);
   if (GST_EVENT_TYPE (event) == GST_EVENT_TAG)
-    follow_tags (self->state, event);
+    follow_tags (self, event);
   else if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP)
-    locked (self->state.mutex, [self] {
-      self->state.frames.clear ();
-      return true;
-    });
+    forget (self->state);
   else if (GST_EVENT_TYPE (event) == GST_EVENT_EOS)
     finish (self);
   return base_transform_class ()->sink_event (base, event);
@@ -328,6 +343,13 @@ begin_run (GstElement *element)
             "\" is not an event such as mean:10, motion:2 or "
             "motion:2@64x48+100+80: what changes, by how many percent of the "
             "largest pixel value, in which region");
+  if (rule && state.in_force.after > state.in_force.length)
+    return refuse_settings (self,
+        "The after property, " + std::to_string (state.in_force.after) +
+            " ns, is more than length, " +
+            std::to_string (state.in_force.length) +
+            " ns: an event would be forgotten before it is kept. Set a greater "
+            "length");
   if (rule)
     state.events.emplace (*rule);
   state.last.reset ();

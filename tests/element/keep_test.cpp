@@ -213,6 +213,32 @@ TEST_F (Keep, OnlyFramesOfOneFormatAndSetup)
   EXPECT_EQ (keep_->warning (), "There is no coded frame to be kept yet.");
 }
 
+TEST_F (Keep, AnEventIsKeptBeforeAnotherSetup)
+{
+  begin ("event=mean:20");
+  push_all (0, 30, 50);
+  push_all (31, 33, 150);
+  tell ("sequential:3x3");
+  push_all (34, 36, 150);
+  end ();
+  const auto kept = keep_->posted<Kept> ();
+  ASSERT_TRUE (kept);
+  EXPECT_EQ (kept->frames, 34u);
+  EXPECT_FALSE (keep_->posted<Kept> ());
+}
+
+TEST_F (Keep, ATimeThatIsLongerThanWhatIsRememberedIsRefused)
+{
+  const ObjectPtr<GstElement> element (GST_ELEMENT (gst_object_ref_sink (
+      gst_element_factory_make ("codedexposure-keep", nullptr))));
+  g_object_set (element.get (), "event", "mean:5", "after",
+      guint64 (2 * GST_SECOND), "length", guint64 (GST_SECOND), nullptr);
+  EXPECT_NE (refusal (element.get (), GST_STATE_PAUSED)
+                 .find ("would be forgotten before it is kept"),
+      std::string::npos);
+  gst_element_set_state (element.get (), GST_STATE_NULL);
+}
+
 TEST_F (Keep, MemoryIsBounded)
 {
   begin ("max-bytes=1300"); // five frames

@@ -123,10 +123,7 @@ write_frames (GstCodedExposureKeep *self, KeptFrames frames)
   const auto written = write_kept (std::move (frames),
       locked (self, [&] { return state.settings.location; }));
   locked (state.mutex, [&] { return state.is_writing = false; });
-  locked (self, [&] {
-    state.recordings += written ? 1 : 0;
-    return state.keep = false;
-  });
+  locked (self, [&] { return state.recordings += written ? 1 : 0; });
   if (written) {
     kept.location = *written;
     post_message (self, kept);
@@ -146,6 +143,8 @@ run_task (GstElement *element, gpointer) noexcept
     write_frames (self, *std::move (frames));
   else
     POST_WARNING (self, RESOURCE, BUSY, frames.error ().message);
+  const bool goes_on = locked (state.mutex, [&] { return state.is_writing; });
+  locked (self, [&] { return state.keep &= goes_on; });
   const std::lock_guard lock (state.mutex);
   state.tasks--;
   state.is_done.notify_all ();

@@ -211,6 +211,7 @@ TEST_F (Keep, OnlyFramesOfOneFormatAndSetup)
   keep ();
   end ();
   EXPECT_EQ (keep_->warning (), "There is no coded frame to be kept yet.");
+  EXPECT_FALSE (property<gboolean> (keep_->element (), "keep"));
 }
 
 TEST_F (Keep, AnEventIsKeptBeforeAnotherSetup)

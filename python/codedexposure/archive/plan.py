@@ -83,12 +83,12 @@ def take_second(options):
 
 def add_seconds(recordings, second):
     """The recordings of a second camera: a file for one recording, or a folder
-    whose files have the names of the others."""
+    whose files have the names that the results get."""
     if not os.path.isdir(second) and len(recordings) > 1:
         raise Problem(f'--second {second} is one file for {len(recordings)} '
                       'recordings; name a folder that has one of the name of each')
     for recording in recordings:
-        recording.second = (os.path.join(second, os.path.basename(recording.path))
+        recording.second = (os.path.join(second, beside(recording.output, '.mkv'))
                             if os.path.isdir(second) else second)
     for recording, said in zip(recordings, programs.info(
             [recording.second for recording in recordings])):

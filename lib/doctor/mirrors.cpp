@@ -24,7 +24,7 @@ constexpr int kOffFrames = 24;             // of each exposure time
 constexpr int kLooks = 4;                  // at mirrors that go off, at most
 constexpr Nanoseconds kShortest = 110'000; // of a slot
 constexpr double kFull = 0.002; // part of the values that may be the largest
-constexpr double kLightError = 0.0002; // of the light that leaks, relative
+constexpr double kLightError = 0.0001; // of the light that leaks, relative
 /* Stuck mirrors, of those seen. */
 constexpr double kStuckFail = 1e-3;
 

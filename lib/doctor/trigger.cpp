@@ -40,7 +40,7 @@ constexpr double kUnsteady = 0.2;
 /* Rows that are exposed later by that part of a period are not by noise. */
 constexpr double kRowDelay = 0.02;
 /* Mirrors are half way, and clocks tick, within that; s. */
-constexpr double kTicks = 1.8e-6, kLengthTicks = 1.3e-6;
+constexpr double kTicks = 1.8e-6, kLengthTicks = 0.4e-6;
 /* Steps of pixel values in which nothing can be measured, part of the range. */
 constexpr double kCoarsest = 0.03;
 

@@ -12,11 +12,11 @@
 #include "command.h"
 #include "common/record.h"
 #include "pipeline/messages.h"
-#include "record/part.h"
 #include "pipeline/plugin.h"
 #include "pipeline/recording.h"
 #include "pipeline/status.h"
 #include "record/matroska.h"
+#include "record/part.h"
 
 namespace codedexposure::app
 {

@@ -58,11 +58,6 @@ failure_of (Call call)
   return why;
 }
 
-} // namespace
-
-namespace
-{
-
 /* A number of a camera that keys change. */
 struct CameraNumber {
   const char *name;

@@ -44,12 +44,6 @@ rate_at (GstPad *pad)
   return double (num) / den;
 }
 
-std::string
-time_text (GstClockTime time)
-{
-  return GST_CLOCK_TIME_IS_VALID (time) ? std::to_string (time) : "";
-}
-
 /* On the time axis of the recording. */
 GstClockTime
 stream_time (GstPad *pad, GstClockTime time)

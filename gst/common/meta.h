@@ -66,6 +66,13 @@ is_corrupted (GstBuffer *picture)
          (GST_BUFFER_FLAG_CORRUPTED | GST_BUFFER_FLAG_GAP);
 }
 
+/** A time in a table, ns; "": it is not known. */
+inline std::string
+time_text (GstClockTime time)
+{
+  return GST_CLOCK_TIME_IS_VALID (time) ? std::to_string (time) : "";
+}
+
 /** FrameMeta::bits of a picture of @p info with @p bits significant bits. */
 inline int
 significant_bits_of (int bits, const GstVideoInfo &info)

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/text.h"
+#include "common/meta.h"
 
 namespace codedexposure::gst
 {
@@ -16,12 +17,6 @@ const char *const kCsvHead =
 
 namespace
 {
-
-std::string
-known (GstClockTime time)
-{
-  return GST_CLOCK_TIME_IS_VALID (time) ? std::to_string (time) : "";
-}
 
 /* Numbers in one field of a line of CSV. */
 template <typename T>
@@ -91,11 +86,11 @@ csv_line (const StatsReport &report)
     flags.append (flags.empty () ? "" : " ").append (flag);
   const std::string fields[] = {std::to_string (report.frame),
       report.subframe >= 0 ? std::to_string (report.subframe) : "",
-      known (report.running_time), real_text (stats.mean),
+      time_text (report.running_time), real_text (stats.mean),
       std::to_string (stats.minimum), std::to_string (stats.maximum),
       real_text (stats.entropy), std::to_string (stats.saturated),
       std::to_string (stats.pixels), flags, listed (stats.histogram),
-      listed (stats.profile), known (report.duration),
+      listed (stats.profile), time_text (report.duration),
       !report.synchronised   ? ""
       : *report.synchronised ? "true"
                              : "false",

@@ -16,8 +16,9 @@
  * there is. Frames of one format and setup are kept; with others, it begins
  * anew.
  *
- * The memory for the frames is bounded by #codedexposure-keep:max-bytes. Then
- * a recording is shorter than #codedexposure-keep:length.
+ * The memory for the frames is bounded by #codedexposure-keep:max-bytes. Where
+ * that is reached, a recording is shorter than #codedexposure-keep:length, and
+ * an event is kept before its own frame would be forgotten.
  *
  * The message `codedexposure/kept` is posted when a recording is finished, and
  * `codedexposure/event` when an event is found; what could not be kept is a
@@ -82,26 +83,29 @@ struct KeepState {
   std::optional<EventWatch> events;
   std::optional<GstVideoInfo> info;
   std::optional<guint64> last; ///< number of a frame
+  int tagged_bits = 0;
 
-  /** Of what follows. Never held while it writes or posts. */
+  /** Of what follows; taken after the object lock where both are held. Never
+   * held while it writes or posts. */
   std::mutex mutex;
   KeptFrames frames;       ///< changed by the streaming thread only
-  int tasks = 0;           ///< threads that write, or will
+  int tasks = 0;           ///< threads that write, or say why not
   bool is_writing = false; ///< one of them
   std::condition_variable is_done;
-  /** PTS from which on an event has been followed for long enough. */
-  std::optional<GstClockTime> due;
-  std::optional<GstClockTime> next_due; ///< of an event that came meanwhile
+  /** PTS of the event that is followed, and of one that came meanwhile. */
+  std::optional<GstClockTime> followed, next;
 };
 
 struct GstCodedExposureKeep : Instance<GstBaseTransform, KeepState> {
 };
 
-/* What is remembered now, for the only task that writes it. */
-Result<KeptFrames>
+using Taken = Result<KeptFrames>;
+
+/* What is remembered now, for the only task that writes it. The mutex is held.
+ */
+Taken
 take_frames (KeepState &state)
 {
-  const std::lock_guard lock (state.mutex);
   if (state.is_writing)
     return Error{"The frames that were kept before are still being written; "
                  "keep again then."};
@@ -134,15 +138,15 @@ write_frames (GstCodedExposureKeep *self, KeptFrames frames)
 
 /* A thread of its own. */
 void
-run_task (GstElement *element, gpointer) noexcept
+run_task (GstElement *element, gpointer data) noexcept
 {
   auto *self = as<GstCodedExposureKeep> (element);
   KeepState &state = self->state;
-  auto frames = take_frames (state);
-  if (frames)
-    write_frames (self, *std::move (frames));
+  Taken &taken = *static_cast<Taken *> (data);
+  if (taken)
+    write_frames (self, *std::move (taken));
   else
-    POST_WARNING (self, RESOURCE, BUSY, frames.error ().message);
+    POST_WARNING (self, RESOURCE, BUSY, taken.error ().message);
   const bool goes_on = locked (state.mutex, [&] { return state.is_writing; });
   locked (self, [&] { return state.keep &= goes_on; });
   const std::lock_guard lock (state.mutex);
@@ -150,11 +154,14 @@ run_task (GstElement *element, gpointer) noexcept
   state.is_done.notify_all ();
 }
 
+/* Keeps what is remembered now. The mutex is held. */
 void
 begin_task (GstCodedExposureKeep *self)
 {
-  locked (self->state.mutex, [self] { return ++self->state.tasks; });
-  gst_element_call_async (GST_ELEMENT (self), run_task, nullptr, nullptr);
+  self->state.tasks++;
+  gst_element_call_async (GST_ELEMENT (self), run_task,
+      new Taken (take_frames (self->state)),
+      [] (gpointer taken) { delete static_cast<Taken *> (taken); });
 }
 
 /* What was to be kept is written when it returns. */
@@ -165,12 +172,10 @@ finish (GstCodedExposureKeep *self)
   std::unique_lock lock (state.mutex);
   const auto idle = [&state] { return state.tasks == 0; };
   state.is_done.wait (lock, idle);
-  state.next_due.reset ();
-  if (!std::exchange (state.due, std::nullopt))
+  state.next.reset ();
+  if (!std::exchange (state.followed, std::nullopt))
     return;
-  lock.unlock ();
   begin_task (self);
-  lock.lock ();
   state.is_done.wait (lock, idle);
 }
 
@@ -183,17 +188,22 @@ begin_anew (GstCodedExposureKeep *self)
   self->state.frames.clear ();
 }
 
-/* An event that came meanwhile is followed for as long as the first one. */
+/* An event is followed for its time, or until its own frame would be forgotten,
+ * where there is memory for less. One that came meanwhile is followed for as
+ * long. */
 void
 keep_what_is_due (GstCodedExposureKeep *self, GstClockTime pts)
 {
   KeepState &state = self->state;
-  {
-    const std::lock_guard lock (state.mutex);
-    if (!state.due || pts < *state.due || state.tasks > 0)
-      return;
-    state.due = std::exchange (state.next_due, std::nullopt);
-  }
+  const std::lock_guard lock (state.mutex);
+  if (!state.followed || state.tasks > 0)
+    return;
+  const GstClockTime event = *state.followed;
+  const GstClockTime oldest =
+      GST_BUFFER_PTS (state.frames.buffers.front ().get ());
+  if (pts < event + state.in_force.after && (oldest < event || pts == event))
+    return;
+  state.followed = std::exchange (state.next, std::nullopt);
   begin_task (self);
 }
 
@@ -203,11 +213,8 @@ on_event (GstCodedExposureKeep *self, GstBuffer *frame, double jump)
   KeepState &state = self->state;
   const auto meta = get_frame_meta (frame);
   const GstClockTime pts = GST_BUFFER_PTS (frame);
-  locked (state.mutex, [&] {
-    auto &due = state.due ? state.next_due : state.due;
-    due = pts + state.in_force.after;
-    return true;
-  });
+  locked (state.mutex,
+      [&] { return (state.followed ? state.next : state.followed) = pts; });
   const bool is_mean = state.events->rule ().kind == EventRule::Kind::mean;
   post_message (
       self, EventFound{.kind = is_mean ? "mean" : "motion",
@@ -231,8 +238,9 @@ watch (GstCodedExposureKeep *self, GstBuffer *frame)
   MappedFrame mapped (*state.info, frame, GST_MAP_READ);
   if (!mapped)
     return state.events->skip ();
-  const int largest =
-      largest_pixel (bits_of (frame, *state.info, state.in_force.bits));
+  const int set = state.in_force.bits;
+  const int bits = set > 0 || meta ? set : state.tagged_bits;
+  const int largest = largest_pixel (bits_of (frame, *state.info, bits));
   const auto jump = read_pixels (mapped,
       [&] (auto pixels) { return state.events->add (pixels, largest); });
   if (jump)
@@ -305,14 +313,15 @@ forget (KeepState &state)
 {
   const std::lock_guard lock (state.mutex);
   state.frames.clear ();
-  state.due.reset ();
-  state.next_due.reset ();
+  state.followed.reset ();
+  state.next.reset ();
 }
 
 gboolean
 sink_event (GstBaseTransform *base, GstEvent *event) noexcept
 {
   auto *self = as<GstCodedExposureKeep> (base);
+  follow_tagged_bits (event, self->state.tagged_bits);
   if (GST_EVENT_TYPE (event) == GST_EVENT_TAG)
     follow_tags (self, event);
   else if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP)
@@ -395,8 +404,8 @@ properties ()
           kReadWriteReady, set (&Settings::after), guint64 (0),
           guint64 (G_MAXINT64)},
       {"bits", "Significant bits",
-          "Significant bits of a pixel, for the largest value; 0: as the frame "
-          "metadata say, or all bits of the format",
+          "Significant bits of a pixel, for the largest value. 0: as the frame "
+          "metadata or the tags say, or all bits of the format",
           kReadWriteReady, set (&Settings::bits), 0, 16},
       {"keep", "Keep",
           "TRUE keeps what is remembered now; reads TRUE until that is written",
@@ -410,8 +419,10 @@ void
 changed (GObject *object, const GParamSpec *spec)
 {
   auto *self = as<GstCodedExposureKeep> (object);
-  if (std::string_view (spec->name) == "keep" && self->state.keep)
-    begin_task (self);
+  if (std::string_view (spec->name) != "keep" || !self->state.keep)
+    return;
+  const std::lock_guard lock (self->state.mutex);
+  begin_task (self);
 }
 
 constexpr StateHooks kRun{.begin = begin_run, .end = end_run};

@@ -7,6 +7,7 @@
 #include <tiffio.h>
 
 #include "base/result.h"
+#include "common/meta.h"
 #include "common/raii.h"
 #include "stack_file.h"
 
@@ -30,12 +31,6 @@ seconds_text (GstClockTime time)
   std::string digits = std::to_string (time % GST_SECOND);
   digits.insert (0, 9 - digits.size (), '0');
   return std::to_string (time / GST_SECOND) + "." + digits;
-}
-
-std::string
-known (GstClockTime time)
-{
-  return GST_CLOCK_TIME_IS_VALID (time) ? std::to_string (time) : "";
 }
 
 /* Programs that show the interval expect a picture at each of its multiples. */
@@ -89,7 +84,7 @@ table (const std::vector<StackRow> &rows)
     text += std::to_string (i) + "," +
             (row.frame ? std::to_string (*row.frame) : "") + "," +
             (row.slot >= 0 ? std::to_string (row.slot) : "") + "," +
-            known (row.pts) + "," + known (row.duration) + "," +
+            time_text (row.pts) + "," + time_text (row.duration) + "," +
             (row.synchronised ? truth (*row.synchronised) : "unknown") + "," +
             truth (row.corrupted) + "," + std::to_string (row.lost_before) +
             "\n";

@@ -14,6 +14,7 @@
 #include <zstd.h>
 
 #include "base/result.h"
+#include "common/meta.h"
 #include "stack_file.h"
 
 namespace codedexposure::gst
@@ -285,12 +286,6 @@ OmeZarr::pack (const guint8 *pixels, gsize stride)
   std::swap (packed_, compressed_);
 }
 
-std::string
-known (GstClockTime time)
-{
-  return GST_CLOCK_TIME_IS_VALID (time) ? std::to_string (time) : "";
-}
-
 void
 OmeZarr::add (const StackRow &row, const guint8 *pixels, gsize stride)
 {
@@ -303,8 +298,8 @@ OmeZarr::add (const StackRow &row, const guint8 *pixels, gsize stride)
   }
   pack (pixels, stride);
   current_->add (packed_);
-  times_ += std::to_string (pictures_) + "," + known (row.pts) + "," +
-            known (row.duration) + "," + known (row.exposure) + "," +
+  times_ += std::to_string (pictures_) + "," + time_text (row.pts) + "," +
+            time_text (row.duration) + "," + time_text (row.exposure) + "," +
             (row.frame ? std::to_string (*row.frame) : "") + "," +
             (row.slot < 0 ? "" : std::to_string (row.slot)) + "," +
             (row.synchronised ? *row.synchronised ? "true" : "false" : "") +

@@ -74,7 +74,8 @@ Live::declare (Options &options)
       "it skips coded frames",
       one_of ({"fast", "balanced", "best", "learned"}));
   options.value ("--record", record_, "FILE.mkv",
-      "also record all coded frames", file_ending_in (".mkv"));
+      "also record all coded frames, with --second those of the first camera",
+      file_ending_in (".mkv"));
   window_.declare (options);
   options.flag ("--second", second_,
       "also look through a second camera, in the beam of the mirrors that are "

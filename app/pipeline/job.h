@@ -6,11 +6,11 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "failure.h"
 #include "options/common.h"
+#include "pipeline/cameras.h"
 #include "pipeline/frame_counter.h"
 #include "pipeline/graph.h"
 #include "pipeline/outputs.h"
@@ -68,7 +68,7 @@ struct Job {
    * the frames are those of no camera. */
   GstElement *camera = nullptr;
   /** Its exposure times with which all slots are whole, us. */
-  std::pair<double, double> exposures = {};
+  Between exposures;
   /** Remembers the last frames; null: nothing does. */
   GstElement *keeper = nullptr;
   /** Reads a recording or a stream of one: its own end is in it. */

@@ -32,7 +32,8 @@ Run::say_no_frame ()
 bool
 Run::publish ()
 {
-  if (GST_STATE (pipeline ()) != GST_STATE_NULL) // which opens files
+  /* From NULL it would open files, and wait for who reads a pipe. */
+  if (GST_STATE (pipeline ()) != GST_STATE_NULL)
     gst_element_set_state (pipeline (), GST_STATE_READY);
   if (job_.window)
     job_.window->finish ();

@@ -122,7 +122,7 @@ check_first_frame (GstPad *pad, GstPadProbeInfo *, gpointer needed)
 }
 
 /* Some of the period is left for the trigger of the next frame. */
-std::pair<double, double>
+Between
 exposures_of (const SourcePlan &plan)
 {
   constexpr double kPart = 0.99;

@@ -42,7 +42,7 @@ public:
     GstElement *keeper = nullptr; ///< remembers frames; null: nothing does
     /** Whose gain and exposure keys change; null: none. */
     GstElement *camera = nullptr;
-    std::pair<double, double> exposures = {}; ///< that are allowed, us
+    Between exposures = {}; ///< that are allowed, us
     /** Moves in a recording; null: the window looks at what comes. */
     std::unique_ptr<Player> player = nullptr;
   };
@@ -122,7 +122,7 @@ private:
   std::vector<std::unique_ptr<Pane>> panes_; // constant
   const std::unique_ptr<Player> player_;
   GstElement *const camera_source_;
-  const std::pair<double, double> exposures_;
+  const Between exposures_;
   GstElement *const keeper_; // null: nothing remembers frames
   Snapshots snapshots_;
   gst::ObjectPtr<GstPad> panel_at_; // where it is drawn

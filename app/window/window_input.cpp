@@ -299,8 +299,7 @@ Window::turn_camera (const std::string &key)
   const int steps = is_key (key, {"Up", "Prior", "Page_Up"}) ? 1 : -1;
   const auto turned = is_key (key, {"Up", "Down"})
                           ? change_gain (camera_source_, steps)
-                          : change_exposure (camera_source_, steps,
-                                {exposures_.first, exposures_.second});
+                          : change_exposure (camera_source_, steps, exposures_);
   if (turned)
     calls_.told (*turned);
   else

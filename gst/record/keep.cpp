@@ -382,8 +382,9 @@ properties ()
   };
   return {
       {"location", "Beginning of names",
-          "Recordings are LOCATION-frameN.mkv, after their first frame, and "
-          "have their JSON lines beside them; no file is replaced",
+          "Recordings are LOCATION-frameN.mkv, N: the number of the first "
+          "frame, 0 if it has none, with their JSON lines beside them; no file "
+          "is replaced, and -2 and so on follow where one is there",
           kReadWrite, set (&Settings::location)},
       {"length", "Length", "Frames of this time are remembered (ns)",
           kReadWriteReady, set (&Settings::length), guint64 (0),

@@ -15,16 +15,18 @@ namespace codedexposure::gst
 namespace
 {
 
-/* A name that is free, also for the lines. */
+/* A name that is free, also for the lines, and that no run left unfinished. */
 std::string
 free_name (const std::string &begin)
 {
-  std::error_code ignored;
+  const auto is_free = [] (const std::string &name) {
+    std::error_code ignored;
+    return !std::filesystem::exists (name, ignored) &&
+           !std::filesystem::exists (name + ".part", ignored);
+  };
   for (int k = 1;; k++) {
-    const std::string name =
-        begin + (k > 1 ? "-" + std::to_string (k) : "") + ".mkv";
-    if (!std::filesystem::exists (name, ignored) &&
-        !std::filesystem::exists (sidecar_of (name), ignored))
+    std::string name = begin + (k > 1 ? "-" + std::to_string (k) : "") + ".mkv";
+    if (is_free (name) && is_free (sidecar_of (name)))
       return name;
   }
 }

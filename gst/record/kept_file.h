@@ -30,9 +30,10 @@ struct KeptFrames {
 
 /**
  * Writes @p frames, one at least, as a recording, BEGIN-frameN.mkv, and its
- * JSON lines beside it. N is the number of the first frame; where a file of
- * that name is there, -2 and so on follow. Files get their names when they are
- * finished. Waits for the disk.
+ * JSON lines beside it. N is the number of the first frame, 0 if it has none;
+ * where a file of that name is there, -2 and so on follow. Files get their
+ * names when they are finished; a run that is killed leaves NAME.part. Waits
+ * for the disk.
  *
  * Returns the name.
  */

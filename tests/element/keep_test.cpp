@@ -2,6 +2,7 @@
 /* codedexposure-keep: what has just happened becomes a recording. */
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -154,6 +155,19 @@ TEST_F (Keep, ReplacesNoFileAndLeavesNoOther)
   EXPECT_EQ (read ("event-frame000000.mkv").numbers.size (), 4u);
   EXPECT_EQ (read ("event-frame000000-2.mkv").numbers.size (), 8u);
   EXPECT_EQ (files (), 4u); // two of lines
+}
+
+TEST_F (Keep, WhatAKilledRunLeftIsInNobodysWay)
+{
+  std::ofstream (file ("event-frame000000.mkv.part")) << "left";
+  std::ofstream (file ("event-frame000000-2.jsonl.part")) << "left";
+  begin ();
+  push_all (0, 3);
+  keep ();
+  end ();
+  EXPECT_EQ (keep_->posted<Kept> ().value ().location,
+      file ("event-frame000000-3.mkv"));
+  EXPECT_EQ (files (), 4u);
 }
 
 TEST_F (Keep, FollowsAnEventForItsTime)

@@ -31,8 +31,7 @@
  *     ! codedexposure-sim \
  *     ! codedexposure-keep event=motion:0.5 after=1000000000 \
  *     ! codedexposure-demux ! fakesink
- * ]| A candle is blown out, which is kept with the
- * second that follows.
+ * ]| A candle is blown out; the second that follows is kept, too.
  *
  * Since: 0.2
  */

@@ -14,7 +14,7 @@ Run::say_no_frame ()
     status_.line ("error: the head of the stream is damaged, so its tracks "
                   "cannot be found; if ffmpeg reads it, \"ffmpeg -i IN.mkv "
                   "-map 0 -c copy OUT.mkv\" writes a new one");
-  else if (job_.times.is_part ())
+  else if (job_.times.is_part () && !failed_)
     status_.line (
         "no coded frame lies in this part of the recording" +
         (job_.times.start
@@ -67,9 +67,10 @@ Run::finish ()
   if (counter_ && frames () == 0 &&
       (exit_ != Exit::nobody || job_.times.is_part ())) {
     say_no_frame ();
-    result.exit = interrupted_                         ? Exit::interrupted
-                  : job_.times.is_part () && !damaged_ ? Exit::nobody
-                                                       : Exit::failed;
+    result.exit = interrupted_ ? Exit::interrupted
+                  : job_.times.is_part () && !damaged_ && !failed_
+                      ? Exit::nobody
+                      : Exit::failed;
   } else if (result.exit == Exit::done) {
     if (interrupted_ && !job_.ends_by_signal)
       result.exit = Exit::interrupted;

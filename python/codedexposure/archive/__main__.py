@@ -245,10 +245,10 @@ def outcome(store, made):
 
 
 def result(store, made):
-    damaged = [recording.path for number, recording in enumerate(made.recordings)
+    damaged = [recording.inputs for number, recording in enumerate(made.recordings)
                if (read_json(store.merged(number)) or {}).get('status')]
-    for path in damaged:
-        print(f'{path} is cut off or damaged; what could be decoded was, and '
+    for inputs in damaged:
+        print(f'{inputs} is cut off or damaged; what could be decoded was, and '
               'pictures of damaged frames are flagged')
     return 3 if damaged else 0
 

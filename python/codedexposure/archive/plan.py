@@ -32,6 +32,11 @@ class Recording:
     second_fingerprint: dict = dataclasses.field(default_factory=dict)
 
     @property
+    def inputs(self):
+        """For a message."""
+        return ' or '.join(filter(None, (self.path, self.second)))
+
+    @property
     def chunks(self):
         return len(self.borders) + 1
 

@@ -93,7 +93,7 @@ def decode(store, made, recording, output, table, force):
     print(f'decode: {counts["frames"]} coded frames of {recording}{lost}; wrote '
           f'{output} ({counts["pictures"]} frames)', file=sys.stderr)
     if said['status'] == chunk.DAMAGED:
-        print(f'decode: {made.recordings[0].path} is cut off or damaged; what '
+        print(f'decode: {made.recordings[0].inputs} is cut off or damaged; what '
               'could be decoded was, and pictures of damaged frames are flagged',
               file=sys.stderr)
     return said['status']

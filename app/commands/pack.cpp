@@ -9,6 +9,7 @@
 #include <sys/file.h>
 #include <unistd.h>
 
+#include "base/part.h"
 #include "command.h"
 #include "common/record.h"
 #include "pipeline/messages.h"
@@ -16,7 +17,6 @@
 #include "pipeline/recording.h"
 #include "pipeline/status.h"
 #include "record/matroska.h"
-#include "record/part.h"
 
 namespace codedexposure::app
 {

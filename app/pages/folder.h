@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "record/part.h"
+#include "base/part.h"
 
 namespace codedexposure::app
 {

@@ -11,8 +11,8 @@
 
 #include <gst/gst.h>
 
+#include "base/part.h"
 #include "common/raii.h"
-#include "record/part.h"
 
 namespace codedexposure::app
 {

@@ -5,7 +5,7 @@
 
 #include "options/source.h"
 #include "pipeline/job.h"
-#include "record/part.h"
+#include "record/track.h"
 
 namespace codedexposure::app
 {

@@ -8,8 +8,8 @@
 
 #include <gst/video/video.h>
 
+#include "base/part.h"
 #include "pipeline/messages.h"
-#include "record/part.h"
 
 namespace codedexposure::app
 {

@@ -109,7 +109,8 @@ take_frames (KeepState &state)
     return Error{"The frames that were kept before are still being written; "
                  "keep again then."};
   if (state.frames.buffers.empty () || !state.frames.caps)
-    return Error{"There is no coded frame to be kept yet."};
+    return Error{"There is no coded frame to be kept yet; keep again "
+                 "when frames have come."};
   state.is_writing = true;
   return state.frames.copy ();
 }

@@ -6,8 +6,9 @@
 #include <filesystem>
 #include <utility>
 
+#include "base/part.h"
 #include "common/meta.h"
-#include "record/part.h"
+#include "record/track.h"
 
 namespace codedexposure::gst
 {

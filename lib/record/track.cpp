@@ -2,6 +2,7 @@
 #include "record/track.h"
 
 #include <array>
+#include <filesystem>
 #include <utility>
 
 #include <xxhash.h>
@@ -118,6 +119,12 @@ id_of (const StreamSetup &setup)
   StreamSetup named = setup;
   named.track = false;
   return check_of (named.to_json ());
+}
+
+std::string
+sidecar_of (const std::string &recording)
+{
+  return std::filesystem::path (recording).replace_extension (".jsonl");
 }
 
 std::string

@@ -40,6 +40,9 @@ struct TrackLine {
  * whether there is a track. */
 std::uint64_t id_of (const StreamSetup &setup);
 
+/** The file of lines of a recording: FILE.jsonl of FILE.mkv. */
+std::string sidecar_of (const std::string &recording);
+
 /** Text that a program has escaped as XML or Pango markup. */
 std::string unescape_markup (std::string_view text);
 

@@ -224,7 +224,8 @@ TEST_F (Keep, OnlyFramesOfOneFormatAndSetup)
   keep_->push_event (gst_event_new_flush_stop (TRUE));
   keep ();
   end ();
-  EXPECT_EQ (keep_->warning (), "There is no coded frame to be kept yet.");
+  EXPECT_EQ (keep_->warning (), "There is no coded frame to be kept yet; keep "
+                                "again when frames have come.");
   EXPECT_FALSE (property<gboolean> (keep_->element (), "keep"));
 }
 

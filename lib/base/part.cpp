@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-#include "part.h"
+#include "base/part.h"
 
 #include <cerrno>
 #include <cstdio>
@@ -156,12 +156,6 @@ move_file (const std::string &from, const std::string &to, bool replace)
   return Error{"cannot rename " + from + " to " + to + ": " + reason (errno) +
                    "; rename it yourself",
       ErrorCode::io};
-}
-
-std::string
-sidecar_of (const std::string &recording)
-{
-  return fs::path (recording).replace_extension (".jsonl");
 }
 
 } // namespace codedexposure

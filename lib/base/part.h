@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Files of a recording, and how a file or folder gets its name. */
+/* A file or folder that is written beside its name. */
 #pragma once
 
 #include <string>
@@ -51,8 +51,5 @@ private:
  * replace. */
 Result<void> move_file (
     const std::string &from, const std::string &to, bool replace);
-
-/** FILE.jsonl of FILE.mkv. */
-std::string sidecar_of (const std::string &recording);
 
 } // namespace codedexposure

@@ -51,6 +51,7 @@
 #include "common/messages.h"
 #include "common/tag.h"
 #include "kept_file.h"
+#include "parts.h"
 #include "stats/event_watch.h"
 
 using namespace codedexposure;
@@ -230,7 +231,7 @@ watch (GstCodedExposureKeep *self, GstBuffer *frame)
 {
   KeepState &state = self->state;
   const auto meta = get_frame_meta (frame);
-  if (!state.info || is_corrupted (frame) || (meta && !meta->pattern.empty ()))
+  if (is_corrupted (frame) || (meta && !meta->pattern.empty ()))
     return state.events->skip ();
   if (meta && state.last && meta->frame != *state.last + 1)
     state.events->skip ();
@@ -253,8 +254,10 @@ transform_ip (GstBaseTransform *base, GstBuffer *frame) noexcept
   auto *self = as<GstCodedExposureKeep> (base);
   KeepState &state = self->state;
   const GstClockTime pts = GST_BUFFER_PTS (frame);
-  if (!GST_CLOCK_TIME_IS_VALID (pts))
+  if (!GST_CLOCK_TIME_IS_VALID (pts) || !state.info)
     return GST_FLOW_OK;
+  if (!holds_frame (base, *state.info, frame))
+    return GST_FLOW_ERROR;
   BufferPtr kept = kept_frame (frame);
   locked (state.mutex, [&] {
     state.frames.buffers.push_back (std::move (kept));

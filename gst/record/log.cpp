@@ -45,6 +45,7 @@ struct LogState {
   std::optional<guint64> last; ///< largest number of a frame with a meta
   std::set<guint64> missing;   ///< numbers that were counted as lost
   GstVideoInfo info = {};
+  bool is_raw = true;   ///< frames are pixels, which @c info describes
   GstClockTime end = 0; ///< of the last frame
   /** Of the stream. */
   std::optional<StreamSetup> setup;
@@ -192,6 +193,8 @@ transform_ip (GstBaseTransform *base, GstBuffer *frame) noexcept
 {
   auto *self = as<GstCodedExposureLog> (base);
   LogState &state = self->state;
+  if (state.is_raw && !holds_frame (base, state.info, frame))
+    return GST_FLOW_ERROR;
   const int pilot = state.setup ? state.setup->schedule.pilot_rows () : 0;
   FrameRecord record =
       record_of (frame, state.info, base->segment, pilot, state.frames++);
@@ -206,7 +209,8 @@ gboolean
 set_caps (GstBaseTransform *base, GstCaps *caps, GstCaps *)
 {
   LogState &state = state_in<GstCodedExposureLog> (base);
-  return is_encoded (caps) || gst_video_info_from_caps (&state.info, caps);
+  state.is_raw = !is_encoded (caps);
+  return !state.is_raw || gst_video_info_from_caps (&state.info, caps);
 }
 
 /* Upstream repeats tags; the file holds each schedule, mapping and bench

@@ -8,6 +8,7 @@
 #include <gst/gst.h>
 
 #include "common/element.h"
+#include "common/raii.h"
 
 GType gst_coded_exposure_log_get_type ();
 GType gst_coded_exposure_restore_get_type ();
@@ -24,6 +25,17 @@ is_encoded (const GstCaps *caps)
 {
   return gst_structure_has_name (
       gst_caps_get_structure (caps, 0), "video/x-ffv");
+}
+
+/** Posts an error if @p frame is too short for @p info. avenc_ffv1 of GStreamer
+ * 1.22 would release it twice. */
+inline bool
+holds_frame (gpointer element, const GstVideoInfo &info, GstBuffer *frame)
+{
+  const auto layout = layout_of (info, frame);
+  if (!layout)
+    POST_ERROR (element, STREAM, FORMAT, layout.error ().message);
+  return bool (layout);
 }
 
 /** Those of a part that passes frames. */

@@ -80,8 +80,9 @@ TEST_P (ShortBuffers, AreRefusedWithTheReason)
 
 INSTANTIATE_TEST_SUITE_P (Elements, ShortBuffers,
     ::testing::Values ("codedexposure-demux schedule=sequential:2x2",
-        "codedexposure-fuse schedule=sequential:2x2", "codedexposure-sim",
-        "codedexposure-view bits=4", "subframestats"));
+        "codedexposure-fuse schedule=sequential:2x2", "codedexposure-keep",
+        "codedexposure-recordmux", "codedexposure-recordmux codec=raw",
+        "codedexposure-sim", "codedexposure-view bits=4", "subframestats"));
 
 /* A frame may be in several memories. */
 TEST (ShortBuffer, IsNotOneInTwoMemories)

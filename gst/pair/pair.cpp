@@ -73,9 +73,9 @@
 
 #include <gst/base/gstaggregator.h>
 
+#include "common/alone.h"
 #include "common/element.h"
 #include "common/elements.h"
-#include "common/messages.h"
 #include "common/meta.h"
 #include "common/partner.h"
 #include "common/tag.h"
@@ -101,33 +101,21 @@ struct Counters {
 /* Why a coded frame goes on alone, or how sure it is that it does not. */
 enum class Alone { no, surely_not, missing, damaged, other_exposure };
 
-bool
-is_alone (Alone alone)
-{
-  return alone > Alone::surely_not;
-}
-
+/* Null: it does not go alone. */
 const char *
-name_of (Alone alone)
+reason_of (Alone alone)
 {
   switch (alone) {
   case Alone::missing:
     return "missing";
   case Alone::damaged:
     return "damaged";
-  default:
+  case Alone::other_exposure:
     return "other-exposure";
+  default:
+    return nullptr;
   }
 }
-
-/* Coded frames in a row that go on alone. */
-struct Run {
-  guint64 frames = 0;
-  guint64 refused = 0;                     ///< the last ones
-  GstClockTime from = GST_CLOCK_TIME_NONE; ///< PTS of the first
-  GstClockTime last = GST_CLOCK_TIME_NONE; ///< PTS of the last
-  Alone reason = Alone::no;                ///< of the first
-};
 
 struct PairState {
   Counters counters; ///< object lock
@@ -139,7 +127,8 @@ struct PairState {
   bool check_due = false; ///< a stream is another
   bool refused = false;   ///< a stream is of the wrong beam
   PairCheck check;
-  Run run;
+  AloneFrames alone;
+  guint64 refused_in_a_row = 0;
 
   void set_due () { setup_due = check_due = true; }
   void reset ()
@@ -149,7 +138,8 @@ struct PairState {
     due.clear ();
     setup_due = check_due = refused = false;
     check = {};
-    run = {};
+    alone = {};
+    refused_in_a_row = 0;
   }
 };
 
@@ -249,9 +239,9 @@ judge (GstCodedExposurePair *self, GstBuffer *coded, GstBuffer *partner)
 void
 warn_if_out_of_step (GstCodedExposurePair *self, Alone alone)
 {
-  Run &run = state (self).run;
-  run.refused = alone == Alone::other_exposure ? run.refused + 1 : 0;
-  if (run.refused == kOutOfStep)
+  guint64 &refused = state (self).refused_in_a_row;
+  refused = alone == Alone::other_exposure ? refused + 1 : 0;
+  if (refused == kOutOfStep)
     POST_WARNING (self, STREAM, FAILED,
         "The frames of the second camera are of other exposures than the coded "
         "frames whose times they have, as their pixels show; coded frames go "
@@ -260,43 +250,19 @@ warn_if_out_of_step (GstCodedExposurePair *self, Alone alone)
 }
 
 void
-end_run (GstCodedExposurePair *self, GstClockTime to)
-{
-  const Run run = std::exchange (state (self).run, {});
-  if (run.frames == 0)
-    return;
-  post_message (self, PartnerLost{.active = false,
-                          .reason = name_of (run.reason),
-                          .frames = run.frames,
-                          .from = run.from,
-                          .to = to});
-}
-
-void
 count (GstCodedExposurePair *self, GstBuffer *coded, Alone alone)
 {
   PairState &st = state (self);
+  const char *reason = reason_of (alone);
   locked (self, [&] {
     Counters &counters = st.counters;
-    (is_alone (alone) ? counters.alone : counters.paired)++;
+    (reason ? counters.alone : counters.paired)++;
     counters.confirmed += alone == Alone::surely_not;
     counters.refused += alone == Alone::other_exposure;
     return 0;
   });
-  const GstClockTime pts = GST_BUFFER_PTS (coded);
-  if (is_alone (alone) && st.run.frames++ == 0) {
-    st.run.from = pts;
-    st.run.reason = alone;
-    post_message (self, PartnerLost{.active = true,
-                            .reason = name_of (alone),
-                            .frames = {},
-                            .from = pts,
-                            .to = {}});
-  }
-  st.run.last = pts;
+  st.alone.add (self, GST_BUFFER_PTS (coded), reason);
   warn_if_out_of_step (self, alone);
-  if (!is_alone (alone))
-    end_run (self, pts);
 }
 
 /* Before the frame that is next at the source pad, where caps and segment of
@@ -330,7 +296,7 @@ aggregate (GstAggregator *aggregator, gboolean late)
   if (!head && !gst_aggregator_pad_is_eos (on))
     return GST_AGGREGATOR_FLOW_NEED_DATA;
   if (!head) {
-    end_run (self, state (self).run.last);
+    state (self).alone.end (self);
     return GST_FLOW_EOS;
   }
   BufferPtr partner;
@@ -341,7 +307,7 @@ aggregate (GstAggregator *aggregator, gboolean late)
   if (!coded)
     return GST_AGGREGATOR_FLOW_NEED_DATA;
   const Alone alone = judge (self, coded.get (), partner.get ());
-  if (!is_alone (alone)) {
+  if (!reason_of (alone)) {
     coded.reset (gst_buffer_make_writable (coded.release ()));
     CapsPtr caps (gst_pad_get_current_caps (GST_PAD (off)));
     set_partner (coded.get (), {std::move (partner), std::move (caps)});
@@ -480,7 +446,8 @@ GstFlowReturn
 flush (GstAggregator *aggregator)
 {
   PairState &st = state (aggregator);
-  st.run = {};
+  st.alone.forget ();
+  st.refused_in_a_row = 0;
   st.check.reset ();
   std::erase_if (st.due, [] (const EventPtr &event) {
     return GST_EVENT_TYPE (event.get ()) == GST_EVENT_GAP;

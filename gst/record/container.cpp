@@ -88,7 +88,7 @@ with_head_for_all (GstBuffer *buffer)
     return buffer;
   std::string head = bytes_of (buffer, kLongestHead);
   for (const auto &[own, for_all] : kRewritten)
-    if (const auto at = head.find (own); at != head.npos)
+    for (auto at = head.find (own); at != head.npos; at = head.find (own, at))
       head.replace (at, own.size (), for_all);
   make_texts_plain (head);
   return with_bytes (buffer, head);

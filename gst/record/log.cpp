@@ -20,6 +20,7 @@
 #include "common/lines.h"
 #include "common/record.h"
 #include "common/tag.h"
+#include "partner_output.h"
 #include "parts.h"
 #include "record/track.h"
 
@@ -38,7 +39,8 @@ struct LogState {
   guint64 frames_lost = 0; ///< since the first
   /* Streaming thread, and start and stop, which exclude it: */
   LineFile file;
-  GstPad *track = nullptr;  ///< the element's
+  GstPad *track = nullptr; ///< the element's
+  PartnerOutput partners;
   bool stream_sent = false; ///< to the track
   bool segment_sent = false;
   guint64 frames = 0;
@@ -201,8 +203,14 @@ transform_ip (GstBaseTransform *base, GstBuffer *frame) noexcept
   count_lost (self, record);
   if (state.file.is_open () && !state.file.write (record.to_json ()))
     return GST_FLOW_ERROR;
-  return has_track (state) ? push_line (self, frame, std::move (record))
-                           : GST_FLOW_OK;
+  const GstFlowReturn flow = has_track (state)
+                                 ? push_line (self, frame, std::move (record))
+                                 : GST_FLOW_OK;
+  if (flow != GST_FLOW_OK || !state.partners.is_linked ())
+    return flow;
+  const CapsPtr caps (gst_pad_get_current_caps (base->sinkpad));
+  return state.partners.push (
+      GST_ELEMENT (self), frame, caps.get (), base->segment);
 }
 
 gboolean
@@ -257,12 +265,14 @@ take_tags (GstCodedExposureLog *self, GstEvent *event)
     return event;
   }
   StreamSetup setup = read->value ();
-  if (setup.partner) {
+  if (setup.partner && state.partners.is_linked ()) {
+    state.partners.set_setup (setup);
+  } else if (setup.partner) {
     if (!std::exchange (state.said_partner, true))
       POST_WARNING (self, STREAM, FORMAT,
-          "The frames of the second camera are not recorded, only those of the "
-          "first. Record the second one by a branch of its own, before "
-          "codedexposure-pair.");
+          "The second camera came after the first frame, so that its frames "
+          "are not recorded, only those of the first one. Start both cameras "
+          "before the trigger.");
     setup.partner.reset ();
     event = replace_setup (event, setup);
   }
@@ -284,11 +294,35 @@ end_track (GstCodedExposureLog *self)
         GST_MSECOND);
 }
 
+/* What was written before a flush does not count. */
+bool
+begin_anew (GstCodedExposureLog *self)
+{
+  LogState &state = self->state;
+  const std::string location = locked (self, [&] {
+    state.frames_lost = 0;
+    return state.location;
+  });
+  state.frames = 0;
+  state.last.reset ();
+  state.missing.clear ();
+  state.schedule.reset ();
+  state.mapping.reset ();
+  state.bench.reset ();
+  state.tracked.reset ();
+  const bool has_file = location.empty () || state.file.open (self, location);
+  if (has_file && state.setup)
+    note_setup (state, StreamSetup (*state.setup));
+  return has_file;
+}
+
 gboolean
 sink_event (GstBaseTransform *base, GstEvent *event) noexcept
 {
   auto *self = as<GstCodedExposureLog> (base);
   LogState &state = self->state;
+  if (state.partners.is_linked ())
+    state.partners.follow (event);
   switch (GST_EVENT_TYPE (event)) {
   case GST_EVENT_TAG:
     event = take_tags (self, event);
@@ -299,13 +333,21 @@ sink_event (GstBaseTransform *base, GstEvent *event) noexcept
   case GST_EVENT_SEGMENT:
     restart_track (state, false);
     break;
+  case GST_EVENT_FLUSH_STOP:
+    begin_anew (self);
+    gst_pad_push_event (state.track, gst_event_ref (event));
+    break;
   case GST_EVENT_EOS:
     end_track (self);
     [[fallthrough]];
   case GST_EVENT_FLUSH_START:
-  case GST_EVENT_FLUSH_STOP:
     gst_pad_push_event (state.track, gst_event_ref (event));
     break;
+  case GST_EVENT_GAP:
+    if (base->segment.format == GST_FORMAT_TIME)
+      break;
+    gst_event_unref (event);
+    return TRUE;
   default:
     break;
   }
@@ -317,22 +359,13 @@ begin_run (GstElement *element)
 {
   auto *self = as<GstCodedExposureLog> (element);
   LogState &state = self->state;
-  const std::string location = locked (self, [&] {
-    state.frames_lost = 0;
-    return state.location;
-  });
-  state.frames = 0;
-  state.last.reset ();
-  state.missing.clear ();
   state.setup.reset ();
   state.setups.clear ();
-  state.schedule.reset ();
-  state.mapping.reset ();
-  state.tracked.reset ();
+  state.partners.restart ();
   restart_track (state, true);
-  if (!location.empty ())
-    return state.file.open (self, location);
-  if (has_track (state))
+  if (!begin_anew (self))
+    return false;
+  if (has_track (state) || state.file.is_open ())
     return true;
   POST_ERROR (self, RESOURCE, NOT_FOUND, "There is nothing to write to");
   return false;
@@ -381,6 +414,7 @@ set_up (gpointer klass)
       {});
   add_part_templates (klass);
   add_pad_template (klass, "track", {.caps = "text/x-raw,format=utf8"});
+  add_pad_template (klass, "partner", {.caps = kPartCaps});
 
   auto *transform_class = GST_BASE_TRANSFORM_CLASS (klass);
   transform_class->set_caps = GST_DEBUG_FUNCPTR (set_caps);
@@ -394,6 +428,9 @@ set_up_instance (GstCodedExposureLog *self)
   gst_base_transform_set_passthrough (GST_BASE_TRANSFORM (self), TRUE);
   self->state.track = add_pad (GST_ELEMENT (self), "track");
   gst_pad_use_fixed_caps (self->state.track);
+  GstPad *partners = add_pad (GST_ELEMENT (self), "partner");
+  gst_pad_use_fixed_caps (partners);
+  self->state.partners.take_over (partners);
 }
 
 } // namespace

@@ -54,10 +54,11 @@
 #include <gst/gst.h>
 #include <gst/video/video.h>
 
+#include "camera_tracks.h"
+#include "parts.h"
 #include "common/element.h"
 #include "common/elements.h"
 #include "common/raii.h"
-#include "parts.h"
 #include "record/cluster_gate.h"
 #include "record/matroska.h"
 
@@ -74,247 +75,100 @@ struct Stream {
   std::optional<MatroskaHead> head;
   gsize bytes_without_frame = 0;
   bool has_failed = false; ///< and the rest is salvaged
-  /** Of raw frames with 16-bit pixels, and their bytes; null: of others. */
-  CapsPtr deep_caps;
-  gsize frame_bytes = 0;
-  GstClockTime decoded = GST_CLOCK_TIME_NONE; ///< time of the last frame
-  ClusterGate gate;                           ///< of what is salvaged
+  ClusterGate gate;        ///< of what is salvaged
 };
 
 struct RecordDemuxState {
+  explicit RecordDemuxState (GstElement *self = nullptr)
+      : coded (self), partner (self)
+  {
+  }
+
   /* Object lock: */
   bool salvage = false;
   bool decode = true;
   guint threads = 0;
 
   /* Of the bin: */
-  GstElement *file = nullptr; ///< null: matroskademux is missing
-  GstElement *restore = nullptr;
+  GstElement *file = nullptr;          ///< null: matroskademux is missing
   GstPadChainFunction chain = nullptr; ///< of the demuxer
 
   std::atomic<bool> has_new_frame = false;
 
   /* Streaming thread of the demuxer, and changes of the state: */
   Stream stream;
-  GstElement *queue = nullptr, *decoder = nullptr;
+  CameraTracks coded;
+  CameraTracks partner; ///< of the second camera
 };
 
 struct GstCodedExposureRecordDemux : Instance<GstBin, RecordDemuxState> {
 };
 using Self = GstCodedExposureRecordDemux;
 
-/* ----------------------------------------------------------- raw frames -- */
-
-/* The demuxer knows these only since GStreamer 1.26. */
-CapsPtr
-deep_caps_of (const MatroskaHead &head)
-{
-  GstVideoInfo info;
-  gst_video_info_set_format (&info, GST_VIDEO_FORMAT_GRAY16_LE,
-      guint (head.size.width), guint (head.size.height));
-  if (head.duration > 0)
-    gst_video_guess_framerate (
-        GstClockTime (head.duration), &info.fps_n, &info.fps_d);
-  return CapsPtr (gst_video_info_to_caps (&info));
-}
-
-bool
-is_aligned (GstBuffer *frame)
-{
-  constexpr guintptr kAlignment = 16;
-  GstMapInfo map;
-  if (gst_buffer_n_memory (frame) != 1 ||
-      !gst_buffer_map (frame, &map, GST_MAP_READ))
-    return false;
-  const bool aligned = guintptr (map.data) % kAlignment == 0;
-  gst_buffer_unmap (frame, &map);
-  return aligned;
-}
-
-/* In the file, a frame may begin at an odd byte. */
-GstBuffer *
-aligned (GstBuffer *frame)
-{
-  if (is_aligned (frame))
-    return frame;
-  GstBuffer *copy =
-      gst_buffer_new_allocate (nullptr, gst_buffer_get_size (frame), nullptr);
-  GstMapInfo map;
-  gst_buffer_map (copy, &map, GST_MAP_WRITE);
-  gst_buffer_extract (frame, 0, map.data, map.size);
-  gst_buffer_unmap (copy, &map);
-  gst_buffer_copy_into (copy, frame, GST_BUFFER_COPY_METADATA, 0, -1);
-  gst_buffer_unref (frame);
-  return copy;
-}
-
-/* Frames that are cut off are dropped; the track says that they are missing. */
-GstPadProbeReturn
-on_deep_frame (GstPad *, GstPadProbeInfo *info, gpointer self) noexcept
-{
-  const Stream &stream = state_in<Self> (self).stream;
-  if (GST_PAD_PROBE_INFO_TYPE (info) & GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM) {
-    GstEvent *event = GST_PAD_PROBE_INFO_EVENT (info);
-    if (GST_EVENT_TYPE (event) == GST_EVENT_CAPS) {
-      gst_event_unref (event);
-      info->data = gst_event_new_caps (stream.deep_caps.get ());
-    }
-    return GST_PAD_PROBE_OK;
-  }
-  GstBuffer *frame = GST_PAD_PROBE_INFO_BUFFER (info);
-  const gsize size = gst_buffer_get_size (frame);
-  if (size < stream.frame_bytes)
-    return GST_PAD_PROBE_DROP;
-  if (size == stream.frame_bytes) {
-    info->data = aligned (frame);
-    return GST_PAD_PROBE_OK;
-  }
-  POST_ERROR (self, STREAM, DECODE,
-      "A raw frame has " + std::to_string (size) +
-          " bytes, but by the head of "
-          "the file it should have " +
-          std::to_string (stream.frame_bytes) +
-          ": the head is damaged. Use another copy of the recording.");
-  gst_clear_buffer (reinterpret_cast<GstBuffer **> (&info->data));
-  GST_PAD_PROBE_INFO_FLOW_RETURN (info) = GST_FLOW_ERROR;
-  return GST_PAD_PROBE_HANDLED;
-}
-
-/* False: their format is none of coded frames. */
-bool
-take_raw (GstElement *self, GstPad *pad, const GstCaps *caps)
-{
-  Stream &stream = state_in<Self> (self).stream;
-  const GstStructure *structure = gst_caps_get_structure (caps, 0);
-  const gchar *format = gst_structure_get_string (structure, "format");
-  if (gst_structure_has_name (structure, "video/x-raw") &&
-      g_strcmp0 (format, "GRAY16_LE") != 0)
-    return g_strcmp0 (format, "GRAY8") == 0;
-  if (!stream.head || stream.head->pixel_bytes != 2 ||
-      stream.head->size.width < 1 || stream.head->size.height < 1)
-    return false;
-  stream.deep_caps = deep_caps_of (*stream.head);
-  GstVideoInfo info;
-  gst_video_info_from_caps (&info, stream.deep_caps.get ());
-  stream.frame_bytes = GST_VIDEO_INFO_SIZE (&info);
-  gst_pad_add_probe (pad,
-      GstPadProbeType (
-          GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM),
-      on_deep_frame, self, nullptr);
-  return true;
-}
-
-/* ------------------------------------------------------- encoded frames -- */
-
-GstStaticCaps file_caps = GST_STATIC_CAPS ("timestamp/x-file");
-
-/* A decoder gives the time of the frame before to one that is earlier, and that
- * of the segment's start to one that begins before it and lasts longer. */
-GstPadProbeReturn
-on_encoded (GstPad *, GstPadProbeInfo *info, gpointer) noexcept
-{
-  GstBuffer *frame =
-      gst_buffer_make_writable (GST_PAD_PROBE_INFO_BUFFER (info));
-  info->data = frame;
-  const CapsPtr caps (gst_static_caps_get (&file_caps));
-  if (GST_BUFFER_PTS_IS_VALID (frame))
-    gst_buffer_add_reference_timestamp_meta (
-        frame, caps.get (), GST_BUFFER_PTS (frame), GST_CLOCK_TIME_NONE);
-  return GST_PAD_PROBE_OK;
-}
-
-GstPadProbeReturn
-on_decoded (GstPad *, GstPadProbeInfo *info, gpointer self) noexcept
-{
-  GstBuffer *frame =
-      gst_buffer_make_writable (GST_PAD_PROBE_INFO_BUFFER (info));
-  info->data = frame;
-  const CapsPtr caps (gst_static_caps_get (&file_caps));
-  auto *own = gst_buffer_get_reference_timestamp_meta (frame, caps.get ());
-  if (!own)
-    return GST_PAD_PROBE_OK;
-  const GstClockTime before = std::exchange (
-      state_in<Self> (self).stream.decoded, GST_BUFFER_PTS (frame));
-  if (GST_BUFFER_PTS (frame) == before ||
-      GST_BUFFER_PTS (frame) > own->timestamp)
-    GST_BUFFER_PTS (frame) = own->timestamp;
-  gst_buffer_remove_meta (frame, &own->parent);
-  return GST_PAD_PROBE_OK;
-}
-
 /* --------------------------------------------------------------- tracks -- */
 
-/* Before restore; none, if frames are raw or stay encoded. False, with an
- * error: it is no codec of a recording, or is not installed. */
 bool
-make_decoder (GstElement *self, GstPad *pad, const GstCaps *caps)
+is_text (GstPad *pad)
 {
-  auto &state = state_in<Self> (self);
-  const GstStructure *structure = gst_caps_get_structure (caps, 0);
-  const std::string_view kind = gst_structure_get_name (structure);
-  const gchar *id = gst_structure_get_string (structure, "codec-id");
-  const std::string codec (id ? id : kind);
-  const bool is_raw = kind == "video/x-raw" || codec == "V_UNCOMPRESSED";
-  if (is_raw && take_raw (self, pad, caps))
-    return true;
-  if (kind != "video/x-ffv") {
-    POST_ERROR (self, STREAM, WRONG_TYPE,
-        "The file has " + (is_raw ? "raw frames that are not grey" : codec) +
-            ", but coded frames are recorded as FFV1 or raw grey. Use a "
-            "recording of coded frames.");
-    return false;
-  }
-  if (!locked (self, [&] { return state.decode; }))
-    return true;
-  state.decoder = gst_element_factory_make ("avdec_ffv1", nullptr);
-  if (!state.decoder) {
-    POST_ERROR (self, CORE, MISSING_PLUGIN, missing ("avdec_ffv1"));
-    return false;
-  }
-  const int threads = locked (self, [&] { return int (state.threads); });
-  g_object_set (
-      state.decoder, "max-threads", threads, "max-errors", -1, nullptr);
-  gst_pad_add_probe (pad_of (state.decoder, "sink").get (),
-      GST_PAD_PROBE_TYPE_BUFFER, on_encoded, nullptr, nullptr);
-  gst_pad_add_probe (pad_of (state.decoder, "src").get (),
-      GST_PAD_PROBE_TYPE_BUFFER, on_decoded, self, nullptr);
-  gst_bin_add (GST_BIN (self), state.decoder);
-  return true;
+  const CapsPtr caps (gst_pad_query_caps (pad, nullptr));
+  return gst_structure_has_name (
+      gst_caps_get_structure (caps.get (), 0), "text/x-raw");
 }
 
-/* The demuxer reads in a thread of its own. */
+/* From a track of @pad, as the head of the file says. */
 void
-add_video (GstElement *self, GstPad *pad, const GstCaps *caps)
+add_frames (Self *self, CameraTracks &tracks, GstPad *pad)
 {
-  constexpr guint64 kNoLimit = 0;
-  auto &state = state_in<Self> (self);
-  if (!make_decoder (self, pad, caps))
-    return;
-  state.queue = gst_element_factory_make ("queue", nullptr);
-  g_object_set (state.queue, "max-size-buffers", 8u, "max-size-bytes", 0u,
-      "max-size-time", kNoLimit, nullptr);
-  gst_bin_add (GST_BIN (self), state.queue);
-  if (state.decoder) {
-    gst_element_link_pads (state.decoder, "src", state.restore, "sink");
-    gst_element_link_pads (state.queue, "src", state.decoder, "sink");
-    gst_element_sync_state_with_parent (state.decoder);
-  } else
-    gst_element_link_pads (state.queue, "src", state.restore, "sink");
-  gst_element_sync_state_with_parent (state.queue);
-  gst_pad_link_full (
-      pad, pad_of (state.queue, "sink").get (), GST_PAD_LINK_CHECK_NOTHING);
+  const RecordDemuxState &state = self->state;
+  auto how = locked (self, [&] {
+    return FrameReading{.decode = state.decode, .threads = int (state.threads)};
+  });
+  if (const auto &head = state.stream.head) {
+    const bool first = &tracks == &state.coded;
+    how.size = first ? head->size : head->partner_size;
+    how.pixel_bytes = first ? head->pixel_bytes : head->partner_pixel_bytes;
+    how.duration = head->duration;
+  }
+  tracks.add_frames (pad, how);
 }
 
 void
 on_pad_added (GstElement *, GstPad *pad, gpointer self)
 {
-  auto &state = state_in<Self> (self);
-  const CapsPtr caps (gst_pad_query_caps (pad, nullptr));
-  const GstStructure *structure = gst_caps_get_structure (caps.get (), 0);
-  if (g_str_has_prefix (GST_OBJECT_NAME (pad), "video_") && !state.queue)
-    add_video (GST_ELEMENT (self), pad, caps.get ());
-  else if (gst_structure_has_name (structure, "text/x-raw"))
-    gst_pad_link (pad, pad_of (state.restore, "track").get ());
+  auto &tracks = state_in<Self> (self).coded;
+  if (g_str_has_prefix (GST_OBJECT_NAME (pad), "video_") &&
+      !tracks.has_frames ())
+    add_frames (as<Self> (self), tracks, pad);
+  else if (is_text (pad))
+    tracks.add_lines (pad);
+}
+
+/* The second track of frames and the second one of lines, if the file has both.
+ */
+void
+add_partner (Self *self)
+{
+  RecordDemuxState &state = self->state;
+  std::pair<GstPad *, GstPad *> second;
+  const auto find = [] (GstElement *, GstPad *pad, gpointer data) {
+    auto &[video, text] = *static_cast<decltype (second) *> (data);
+    if (gst_pad_is_linked (pad))
+      return gboolean (TRUE);
+    if (g_str_has_prefix (GST_OBJECT_NAME (pad), "video_"))
+      video = video ? video : pad;
+    else if (is_text (pad))
+      text = text ? text : pad;
+    return gboolean (TRUE);
+  };
+  gst_element_foreach_src_pad (state.file, find, &second);
+  const auto [video, text] = second;
+  if (!video || !text || !state.coded.has_frames ())
+    return;
+  state.partner.begin (state.stream.head ? state.stream.head->tick : 1);
+  gst_element_link_pads (
+      state.partner.restore (), "src", state.coded.restore (), "partner");
+  state.partner.add_lines (text);
+  add_frames (self, state.partner, video);
 }
 
 void
@@ -326,18 +180,7 @@ on_no_more_pads (GstElement *file, gpointer self)
   if (gst_element_foreach_src_pad (file, is_video, nullptr))
     POST_ERROR (self, STREAM, WRONG_TYPE,
         "The file has no video. Use a recording of coded frames.");
-}
-
-void
-remove_tracks (GstElement *self)
-{
-  auto &state = state_in<Self> (self);
-  for (GstElement **part : {&state.queue, &state.decoder})
-    if (*part) {
-      gst_element_set_state (*part, GST_STATE_NULL);
-      gst_bin_remove (GST_BIN (self), *part);
-      *part = nullptr;
-    }
+  add_partner (as<GstCodedExposureRecordDemux> (self));
 }
 
 /* ---------------------------------------------------------------- bytes -- */
@@ -363,7 +206,7 @@ read_head (RecordDemuxState &state, guint64 at, GstBuffer *bytes)
   gst_buffer_extract (bytes, 0, stream.begin.data () + at, part);
   stream.head = matroska_head (stream.begin);
   if (stream.head) {
-    g_object_set (state.restore, "tick", guint64 (stream.head->tick), nullptr);
+    state.coded.set_tick (stream.head->tick);
     stream.begin.clear ();
   }
 }
@@ -474,7 +317,7 @@ handle_message (GstBin *bin, GstMessage *message) noexcept
   RecordDemuxState &state = self->state;
   if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_ERROR &&
       GST_MESSAGE_SRC (message) == GST_OBJECT (state.file)) {
-    state.stream.has_failed = salvages (self) && state.queue;
+    state.stream.has_failed = salvages (self) && state.coded.has_frames ();
     GstMessage *own =
         container_message (self, message, state.stream.has_failed);
     gst_message_unref (message);
@@ -493,7 +336,7 @@ begin_run (GstElement *self)
   state.has_new_frame = false;
   /* Before the demuxer, to which it is not linked yet. */
   if (state.file)
-    return gst_element_set_state (state.restore, GST_STATE_PAUSED) !=
+    return gst_element_set_state (state.coded.restore (), GST_STATE_PAUSED) !=
            GST_STATE_CHANGE_FAILURE;
   POST_ERROR (self, CORE, MISSING_PLUGIN, missing ("matroskademux"));
   return false;
@@ -502,14 +345,16 @@ begin_run (GstElement *self)
 void
 end_run (GstElement *self)
 {
-  remove_tracks (self);
+  auto &state = state_in<Self> (self);
+  state.coded.end ();
+  state.partner.remove ();
 }
 
 StructurePtr
 stats_of (const RecordDemuxState &state)
 {
   GstStructure *stats = nullptr;
-  g_object_get (state.restore, "counters", &stats, nullptr);
+  g_object_get (state.coded.restore (), "counters", &stats, nullptr);
   gst_structure_set_name (
       stats, "application/x-codedexposure-recorddemux-stats");
   return StructurePtr (stats);
@@ -562,13 +407,13 @@ void
 set_up_instance (Self *self)
 {
   RecordDemuxState &state = self->state;
-  state.restore = make_part (gst_coded_exposure_restore_get_type ());
-  gst_bin_add (GST_BIN (self), state.restore);
+  state.coded.begin (1);
+  GstElement *restore = state.coded.restore ();
   add_demuxer (self);
   add_ghost_pad (GST_ELEMENT (self), "sink", state.file);
-  add_ghost_pad (GST_ELEMENT (self), "src", state.restore);
-  gst_pad_add_probe (pad_of (state.restore, "src").get (),
-      GST_PAD_PROBE_TYPE_BUFFER, on_frame, self, nullptr);
+  add_ghost_pad (GST_ELEMENT (self), "src", restore);
+  gst_pad_add_probe (pad_of (restore, "src").get (), GST_PAD_PROBE_TYPE_BUFFER,
+      on_frame, self, nullptr);
 }
 
 constexpr StateHooks kRun{.begin = begin_run, .end = end_run};

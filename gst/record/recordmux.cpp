@@ -18,6 +18,9 @@
  * With #codedexposure-recordmux:streamable, the bytes are for a network:
  * without an index, and receivers can join late.
  *
+ * A flush, which a seek may bring, begins another recording: with the frames
+ * after it, in place of those before.
+ *
  * `splitmuxsink muxer-factory=codedexposure-recordmux` writes a recording in
  * segments. Each is a recording of its own.
  *
@@ -38,12 +41,14 @@
 #include <algorithm>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include <gst/gst.h>
 
 #include "common/element.h"
 #include "common/elements.h"
 #include "common/raii.h"
+#include "common/tag.h"
 #include "container.h"
 #include "parts.h"
 
@@ -62,6 +67,18 @@ struct Settings {
   std::string log_location;
 };
 
+/** What makes the two tracks of a camera. */
+struct Branch {
+  GstElement *log = nullptr; ///< null: there is no such camera
+  GstElement *frames = nullptr, *lines = nullptr;
+  GstElement *encoder = nullptr; ///< null: frames are raw, or it is missing
+  GstPad *video = nullptr, *text = nullptr; ///< of the muxer, which owns them
+
+  /** DTS of the last frame, of its streaming thread, and of the last line. */
+  GstClockTime frame_order = GST_CLOCK_TIME_NONE;
+  GstClockTime line_order = GST_CLOCK_TIME_NONE;
+};
+
 struct RecordMuxState {
   /* Object lock: */
   Settings settings;
@@ -69,15 +86,14 @@ struct RecordMuxState {
 
   /* Of the bin: */
   GstPad *sink = nullptr;
-  GstElement *log = nullptr, *frames = nullptr, *lines = nullptr;
-  GstElement *mux = nullptr;     ///< null: matroskamux is missing
-  GstElement *encoder = nullptr; ///< null: frames are raw, or it is missing
+  GstElement *mux = nullptr; ///< null: matroskamux is missing
+  Branch coded, partner;
 
   ContainerOutput output; ///< streaming thread
 
-  /** DTS of the last frame, of its streaming thread, and of the last line. */
-  GstClockTime frame_order = GST_CLOCK_TIME_NONE;
-  GstClockTime line_order = GST_CLOCK_TIME_NONE;
+  /* Streaming thread of the sink pad, and changes of the state: */
+  bool has_begun = false;   ///< a frame came: no track can be added
+  bool was_flushed = false; ///< after it
 };
 
 struct GstCodedExposureRecordMux : Instance<GstBin, RecordMuxState> {
@@ -176,8 +192,8 @@ on_latency (GstPad *, GstPadProbeInfo *info, gpointer) noexcept
 }
 
 /* The muxer takes frames and lines in the order of their DTS, which is that in
- * which they come, so that a frame that is late is written with its line. @last:
- * a GstClockTime. */
+ * which they come, so that a frame that is late is written with its line.
+ * @last: a GstClockTime. */
 GstPadProbeReturn
 on_buffer (GstPad *, GstPadProbeInfo *info, gpointer last) noexcept
 {
@@ -203,8 +219,8 @@ on_output (GstPad *, GstPadProbeInfo *info, gpointer self) noexcept
 }
 
 /* Its times are exact to 1 ns. Each frame, which can be decoded alone, has a
- * cluster of its own, also one that is late: times in a cluster are within 33 us
- * of its own. */
+ * cluster of its own, also one that is late: times in a cluster are within 33
+ * us of its own. */
 void
 add_muxer (Self *self)
 {
@@ -215,57 +231,199 @@ add_muxer (Self *self)
   g_object_set (state.mux, "timecodescale", gint64 (1), "min-cluster-duration",
       gint64 (0), nullptr);
   gst_bin_add (GST_BIN (self), state.mux);
-  const ObjectPtr<GstPad> video (
-      gst_element_request_pad_simple (state.mux, "video_0"));
-  const ObjectPtr<GstPad> text (
-      gst_element_request_pad_simple (state.mux, "subtitle_0"));
-  gst_pad_add_probe (video.get (),
-      GstPadProbeType (GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM |
-                       GST_PAD_PROBE_TYPE_QUERY_DOWNSTREAM),
-      on_video, nullptr, nullptr);
-  for (const auto &[pad, order] :
-      {std::pair{video.get (), &state.frame_order},
-          std::pair{text.get (), &state.line_order}}) {
-    gst_pad_add_probe (
-        pad, GST_PAD_PROBE_TYPE_QUERY_UPSTREAM, on_latency, nullptr, nullptr);
-    gst_pad_add_probe (
-        pad, GST_PAD_PROBE_TYPE_BUFFER, on_buffer, order, nullptr);
-  }
   gst_pad_add_probe (pad_of (state.mux, "src").get (),
       GstPadProbeType (
           GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM),
       on_output, self, nullptr);
 }
 
-/* -------------------------------------------------------------- encoder -- */
+/* ------------------------------------------------------------- branches -- */
 
-/* Bytes depend on the slices, not on the threads. */
-bool
-add_encoder (GstElement *self, guint threads)
+/* Frames are hashed and encoded in two threads. Lines are much smaller, and the
+ * muxer waits for their frames. */
+void
+set_up_queues (const Branch &branch)
 {
-  auto &state = state_in<Self> (self);
-  state.encoder = gst_element_factory_make ("avenc_ffv1", nullptr);
-  if (!state.encoder) {
-    POST_ERROR (self, CORE, MISSING_PLUGIN, missing ("avenc_ffv1"));
-    return false;
+  constexpr guint64 kNoLimit = 0;
+  g_object_set (branch.frames, "max-size-buffers", 2u, "max-size-bytes", 0u,
+      "max-size-time", kNoLimit, nullptr);
+  g_object_set (branch.lines, "max-size-buffers", 0u, "max-size-bytes", 0u,
+      "max-size-time", kNoLimit, nullptr);
+}
+
+/* The muxer must be there. */
+void
+add_tracks (GstElement *mux, Branch &branch)
+{
+  const ObjectPtr<GstPad> video (
+      gst_element_request_pad_simple (mux, "video_%u"));
+  const ObjectPtr<GstPad> text (
+      gst_element_request_pad_simple (mux, "subtitle_%u"));
+  branch.video = video.get ();
+  branch.text = text.get ();
+  gst_pad_add_probe (branch.video,
+      GstPadProbeType (GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM |
+                       GST_PAD_PROBE_TYPE_QUERY_DOWNSTREAM),
+      on_video, nullptr, nullptr);
+  for (const auto &[pad, order] : {std::pair{branch.video, &branch.frame_order},
+           std::pair{branch.text, &branch.line_order}}) {
+    gst_pad_add_probe (
+        pad, GST_PAD_PROBE_TYPE_QUERY_UPSTREAM, on_latency, nullptr, nullptr);
+    gst_pad_add_probe (
+        pad, GST_PAD_PROBE_TYPE_BUFFER, on_buffer, order, nullptr);
   }
-  g_object_set (state.encoder, "gop-size", 1, "slices", 4, nullptr);
-  gst_util_set_object_arg (G_OBJECT (state.encoder), "threads",
-      threads == 0 ? "auto" : std::to_string (threads).c_str ());
-  gst_bin_add (GST_BIN (self), state.encoder);
-  return gst_element_link (state.frames, state.encoder) &&
-         gst_element_link_pads (state.encoder, "src", state.mux, "video_0");
+  gst_pad_link (pad_of (branch.lines, "src").get (), branch.text);
 }
 
 void
-remove_encoder (GstElement *self)
+add_branch (GstElement *self, Branch &branch)
+{
+  const auto &state = state_in<Self> (self);
+  branch.log = make_part (gst_coded_exposure_log_get_type ());
+  branch.frames = gst_element_factory_make ("queue", nullptr);
+  branch.lines = gst_element_factory_make ("queue", nullptr);
+  set_up_queues (branch);
+  gst_bin_add_many (
+      GST_BIN (self), branch.log, branch.frames, branch.lines, nullptr);
+  gst_element_link_pads (branch.log, "src", branch.frames, "sink");
+  gst_element_link_pads (branch.log, "track", branch.lines, "sink");
+  if (state.mux)
+    add_tracks (state.mux, branch);
+}
+
+/* Bytes depend on the slices, not on the threads. */
+bool
+add_encoder (GstElement *self, Branch &branch, guint threads)
+{
+  branch.encoder = gst_element_factory_make ("avenc_ffv1", nullptr);
+  if (!branch.encoder) {
+    POST_ERROR (self, CORE, MISSING_PLUGIN, missing ("avenc_ffv1"));
+    return false;
+  }
+  g_object_set (branch.encoder, "gop-size", 1, "slices", 4, nullptr);
+  gst_util_set_object_arg (G_OBJECT (branch.encoder), "threads",
+      threads == 0 ? "auto" : std::to_string (threads).c_str ());
+  gst_bin_add (GST_BIN (self), branch.encoder);
+  return gst_element_link (branch.frames, branch.encoder) &&
+         gst_pad_link (pad_of (branch.encoder, "src").get (), branch.video) ==
+             GST_PAD_LINK_OK;
+}
+
+/* From its queue of frames to the muxer. */
+bool
+begin_branch (GstElement *self, Branch &branch, const Settings &settings)
+{
+  branch.frame_order = branch.line_order = GST_CLOCK_TIME_NONE;
+  return settings.codec == Codec::ffv1
+             ? add_encoder (self, branch, settings.threads)
+             : gst_pad_link (pad_of (branch.frames, "src").get (),
+                   branch.video) == GST_PAD_LINK_OK;
+}
+
+void
+remove_part (GstElement *self, GstElement *&part)
+{
+  if (!part)
+    return;
+  gst_element_set_state (part, GST_STATE_NULL);
+  gst_bin_remove (GST_BIN (self), part);
+  part = nullptr;
+}
+
+void
+end_branch (GstElement *self, Branch &branch)
+{
+  if (!branch.encoder && branch.video)
+    gst_pad_unlink (pad_of (branch.frames, "src").get (), branch.video);
+  remove_part (self, branch.encoder);
+}
+
+/* That of the second camera; frames with partners come, and none came yet. */
+bool
+add_partner (GstElement *self)
 {
   auto &state = state_in<Self> (self);
-  if (!state.encoder)
+  Branch &branch = state.partner;
+  add_branch (self, branch);
+  if (!begin_branch (self, branch, settings_of (as<Self> (self))))
+    return false;
+  for (GstElement *part :
+      {branch.lines, branch.encoder, branch.frames, branch.log})
+    if (part)
+      gst_element_sync_state_with_parent (part);
+  return gst_element_link_pads (state.coded.log, "partner", branch.log, "sink");
+}
+
+void
+remove_partner (GstElement *self)
+{
+  auto &state = state_in<Self> (self);
+  Branch &branch = state.partner;
+  if (!branch.log)
     return;
-  gst_element_set_state (state.encoder, GST_STATE_NULL);
-  gst_bin_remove (GST_BIN (self), state.encoder);
-  state.encoder = nullptr;
+  end_branch (self, branch);
+  for (GstElement **part : {&branch.log, &branch.frames, &branch.lines})
+    remove_part (self, *part);
+  for (GstPad *pad : {branch.video, branch.text})
+    gst_element_release_request_pad (state.mux, pad);
+  branch = {};
+}
+
+/* A sink that is flushed forgets the head of the file, so the next frame begins
+ * another one. Nothing is on its way to the muxer. A pad that is linked again
+ * gets all sticky events. */
+void
+begin_anew (GstElement *self)
+{
+  auto &state = state_in<Self> (self);
+  std::vector<std::pair<GstPad *, ObjectPtr<GstPad>>> links;
+  for (Branch *branch : {&state.coded, &state.partner}) {
+    branch->frame_order = branch->line_order = GST_CLOCK_TIME_NONE;
+    for (GstPad *pad : {branch->video, branch->text})
+      if (pad)
+        links.emplace_back (pad, gst_pad_get_peer (pad));
+  }
+  for (const auto &[pad, peer] : links)
+    gst_pad_unlink (peer.get (), pad);
+  state.has_begun = false;
+  gst_element_set_locked_state (state.mux, TRUE);
+  gst_element_set_state (state.mux, GST_STATE_READY);
+  state.output.restart ();
+  gst_element_set_locked_state (state.mux, FALSE);
+  gst_element_sync_state_with_parent (state.mux);
+  for (const auto &[pad, peer] : links)
+    gst_pad_link (peer.get (), pad);
+}
+
+/* A file begins with the list of its tracks. */
+void
+follow_tags (GstElement *self, GstEvent *event)
+{
+  const auto &state = state_in<Self> (self);
+  if (state.has_begun || state.partner.log)
+    return;
+  const auto setup = setup_from_tags (tags_of (event));
+  if (setup && *setup && setup->value ().partner)
+    add_partner (self);
+}
+
+GstPadProbeReturn
+on_input (GstPad *, GstPadProbeInfo *info, gpointer data) noexcept
+{
+  auto *self = as<GstElement> (data);
+  auto &state = state_in<Self> (self);
+  const bool is_frame =
+      GST_PAD_PROBE_INFO_TYPE (info) & GST_PAD_PROBE_TYPE_BUFFER;
+  GstEvent *event = is_frame ? nullptr : GST_PAD_PROBE_INFO_EVENT (info);
+  if (event && GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP)
+    state.was_flushed = state.has_begun;
+  else if (!event || GST_EVENT_IS_SERIALIZED (event))
+    if (std::exchange (state.was_flushed, false))
+      begin_anew (self);
+  if (event && GST_EVENT_TYPE (event) == GST_EVENT_TAG)
+    follow_tags (self, event);
+  state.has_begun |= is_frame;
+  return GST_PAD_PROBE_OK;
 }
 
 /* ------------------------------------------------------------------ bin -- */
@@ -279,24 +437,20 @@ begin_run (GstElement *self)
     return false;
   }
   const Settings settings = settings_of (as<Self> (self));
-  g_object_set (state.log, "location", settings.log_location.c_str (), nullptr);
+  g_object_set (
+      state.coded.log, "location", settings.log_location.c_str (), nullptr);
   g_object_set (state.mux, "streamable", gboolean (settings.is_streamable),
       "creation-time", nullptr, nullptr);
   state.output.restart ();
-  state.frame_order = state.line_order = GST_CLOCK_TIME_NONE;
-  return settings.codec == Codec::ffv1
-             ? add_encoder (self, settings.threads)
-             : gst_element_link_pads (
-                   state.frames, "src", state.mux, "video_0") == TRUE;
+  state.has_begun = state.was_flushed = false;
+  return begin_branch (self, state.coded, settings);
 }
 
 void
 end_run (GstElement *self)
 {
-  auto &state = state_in<Self> (self);
-  if (!state.encoder && state.mux)
-    gst_element_unlink (state.frames, state.mux);
-  remove_encoder (self);
+  remove_partner (self);
+  end_branch (self, state_in<Self> (self).coded);
 }
 
 /* The inner muxer refuses seeks, which are for the source of the frames; it
@@ -329,7 +483,7 @@ request_new_pad (GstElement *self, GstPadTemplate *templ, const gchar *,
   }
   gst_ghost_pad_set_target (GST_GHOST_PAD (state.sink), nullptr);
   GstPad *pad = gst_ghost_pad_new_from_template (
-      "video_0", pad_of (state.log, "sink").get (), templ);
+      "video_0", pad_of (state.coded.log, "sink").get (), templ);
   gst_pad_set_active (pad, TRUE);
   gst_element_add_pad (self, pad);
   const ObjectLock lock (self);
@@ -344,7 +498,7 @@ release_pad (GstElement *self, GstPad *pad) noexcept
   gst_element_remove_pad (self, pad);
   if (GST_BIN_NUMCHILDREN (self) > 0)
     gst_ghost_pad_set_target (
-        GST_GHOST_PAD (state.sink), pad_of (state.log, "sink").get ());
+        GST_GHOST_PAD (state.sink), pad_of (state.coded.log, "sink").get ());
   const ObjectLock lock (self);
   state.requested = nullptr;
 }
@@ -353,7 +507,7 @@ StructurePtr
 stats_of (const RecordMuxState &state)
 {
   GstStructure *stats = nullptr;
-  g_object_get (state.log, "counters", &stats, nullptr);
+  g_object_get (state.coded.log, "counters", &stats, nullptr);
   gst_structure_set_name (stats, "application/x-codedexposure-recordmux-stats");
   return StructurePtr (stats);
 }
@@ -384,35 +538,18 @@ properties ()
           kReadOnly, stats_of}};
 }
 
-/* Frames are hashed and encoded in two threads. Lines are much smaller, and the
- * muxer waits for their frames. */
-void
-set_up_queues (const RecordMuxState &state)
-{
-  constexpr guint64 kNoLimit = 0;
-  g_object_set (state.frames, "max-size-buffers", 2u, "max-size-bytes", 0u,
-      "max-size-time", kNoLimit, nullptr);
-  g_object_set (state.lines, "max-size-buffers", 0u, "max-size-bytes", 0u,
-      "max-size-time", kNoLimit, nullptr);
-}
-
 void
 set_up_instance (Self *self)
 {
   RecordMuxState &state = self->state;
-  state.log = make_part (gst_coded_exposure_log_get_type ());
-  state.frames = gst_element_factory_make ("queue", nullptr);
-  state.lines = gst_element_factory_make ("queue", nullptr);
-  set_up_queues (state);
-  gst_bin_add_many (
-      GST_BIN (self), state.log, state.frames, state.lines, nullptr);
-  gst_element_link_pads (state.log, "src", state.frames, "sink");
-  gst_element_link_pads (state.log, "track", state.lines, "sink");
   add_muxer (self);
-  if (state.mux)
-    gst_element_link_pads (state.lines, "src", state.mux, "subtitle_0");
-
-  state.sink = add_ghost_pad (GST_ELEMENT (self), "sink", state.log);
+  add_branch (GST_ELEMENT (self), state.coded);
+  gst_pad_add_probe (pad_of (state.coded.log, "sink").get (),
+      GstPadProbeType (GST_PAD_PROBE_TYPE_BUFFER |
+                       GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM |
+                       GST_PAD_PROBE_TYPE_EVENT_FLUSH),
+      on_input, self, nullptr);
+  state.sink = add_ghost_pad (GST_ELEMENT (self), "sink", state.coded.log);
   gst_pad_set_event_function (
       add_ghost_pad (GST_ELEMENT (self), "src", state.mux), src_event);
 }

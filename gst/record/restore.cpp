@@ -2,7 +2,8 @@
 /* The part of codedexposure-recorddemux that knows frames: puts back onto them
  * what their track says, and checks their pixels. The pad `track` takes the
  * text directly from the demuxer, without a queue. A frame is held until the
- * next one comes if its line is not there yet. */
+ * next one comes if its line is not there yet. The pad `partner` takes the
+ * frames of the second camera from another such part. */
 #include <algorithm>
 #include <deque>
 #include <memory>
@@ -15,12 +16,13 @@
 
 #include "common/element.h"
 #include "common/events.h"
-#include "common/messages.h"
 #include "common/meta.h"
 #include "common/record.h"
 #include "common/tag.h"
 #include "damage.h"
+#include "partner_input.h"
 #include "parts.h"
+#include "segment.h"
 #include "track_sink.h"
 
 using namespace codedexposure;
@@ -42,6 +44,7 @@ struct RestoreState {
   guint64 tick = 1; ///< object lock; to which the container rounds times, ns
 
   TrackSink track;
+  PartnerInput partners;
   DamageReport damage;
 
   /* Stream lock of the sink pad. */
@@ -287,17 +290,6 @@ restore (Self *self, GstBuffer *frame, const TrackReader::Match &match)
 
 /* ---------------------------------------------------------------- events -- */
 
-/* A seek may end the stream before the last line. */
-bool
-ends_early (const RestoreState &state)
-{
-  gint64 duration = 0;
-  return GST_CLOCK_TIME_IS_VALID (state.segment.stop) &&
-         gst_pad_peer_query_duration (state.sink, GST_FORMAT_TIME, &duration) &&
-         gst_segment_to_stream_time (&state.segment, GST_FORMAT_TIME,
-             state.segment.stop) < guint64 (duration);
-}
-
 void
 check_end (Self *self)
 {
@@ -309,7 +301,7 @@ check_end (Self *self)
     return;
   const auto [rest, frames] =
       state.track.take_rest (Nanoseconds (state.segment.start));
-  if (!frames && !state.whole && ends_early (state))
+  if (!frames && !state.whole && ends_early (state.sink, state.segment))
     return;
   report_missing (state, rest);
   if (!frames)
@@ -324,25 +316,8 @@ forget_frames (RestoreState &state)
   state.held.clear ();
   state.last_frame.reset ();
   state.damage.forget ();
+  state.partners.forget ();
   gst_segment_init (&state.segment, GST_FORMAT_TIME);
-}
-
-/* A container rounds times to its ticks, and the time of the stream begins with
- * the rounded one of the first frame, which may be too late by half a tick. */
-void
-include_rounding (GstSegment &segment, guint64 tick)
-{
-  if (segment.rate > 0 && GST_CLOCK_TIME_IS_VALID (segment.time) &&
-      segment.time < segment.start)
-    segment.start -= std::min (tick / 2, segment.start - segment.time);
-}
-
-EventPtr
-segment_event (const RestoreState &state)
-{
-  EventPtr event (gst_event_new_segment (&state.segment));
-  gst_event_set_seqnum (event.get (), state.segment_seqnum);
-  return event;
 }
 
 EventPtr
@@ -360,7 +335,7 @@ take_segment (Self *self, EventPtr event)
   if (!state.track.is_linked () || tick < 2)
     return event;
   include_rounding (state.segment, tick);
-  return segment_event (state);
+  return segment_event (state.segment, state.segment_seqnum);
 }
 
 /* A serialised event, in its turn. */
@@ -382,6 +357,7 @@ take_event (Self *self, EventPtr event)
     return on_tag (self, std::move (event));
   case GST_EVENT_EOS:
     check_end (self);
+    state.partners.end (GST_ELEMENT (self));
     break;
   default:
     break;
@@ -402,7 +378,8 @@ keep_in_segment (RestoreState &state, GstClockTime time, GstClockTime exact)
     return;
   segment.time -= std::min (segment.time, segment.start - exact);
   segment.start = exact;
-  gst_pad_push_event (state.src, segment_event (state).release ());
+  gst_pad_push_event (state.src,
+      segment_event (state.segment, state.segment_seqnum).release ());
 }
 
 GstFlowReturn
@@ -418,6 +395,8 @@ push_frame (Self *self, BufferPtr frame, const TrackReader::Match &match)
     keep_in_segment (state, time, GST_BUFFER_PTS (frame.get ()));
   } else
     mark_unknown (state, frame.get ());
+  if (state.partners.is_linked ())
+    state.partners.attach (GST_ELEMENT (self), frame.get (), state.encoded);
   if (GST_BUFFER_PTS_IS_VALID (frame.get ()))
     state.segment.position = GST_BUFFER_PTS (frame.get ());
   if (GST_BUFFER_DURATION_IS_VALID (frame.get ()))
@@ -482,7 +461,10 @@ sink_event (GstPad *pad, GstObject *parent, GstEvent *owned) noexcept
   RestoreState &state = self->state;
   EventPtr event (owned);
   const GstEventType type = GST_EVENT_TYPE (owned);
+  if (type == GST_EVENT_FLUSH_START)
+    state.partners.let_wait (false);
   if (type == GST_EVENT_FLUSH_STOP) {
+    state.partners.let_wait (true);
     forget_frames (state);
     state.whole = false;
   }
@@ -496,6 +478,13 @@ sink_event (GstPad *pad, GstObject *parent, GstEvent *owned) noexcept
     return take_event (self, std::move (event));
   state.held.push_back (std::move (event));
   return TRUE;
+}
+
+/* The demuxer of the frames is that of their track and partners. */
+gboolean
+src_event (GstPad *, GstObject *parent, GstEvent *event) noexcept
+{
+  return gst_pad_push_event (state_in<Self> (parent).sink, event);
 }
 
 /* The default asks the track, too, whose caps are none of the frames'. */
@@ -526,6 +515,7 @@ begin_run (GstElement *element)
   state.segment_seqnum = GST_SEQNUM_INVALID;
   state.said_no_track = state.said_setups_differ = state.said_moved = false;
   state.track.restart ();
+  state.partners.restart ();
   state.damage.restart ();
   return true;
 }
@@ -550,6 +540,10 @@ properties ()
 }
 
 constexpr StateHooks kRun{.begin = begin_run,
+    .halt =
+        [] (GstElement *self) {
+          state_in<Self> (self).partners.let_wait (false);
+        },
     .end = [] (GstElement *self) { forget_frames (state_in<Self> (self)); }};
 
 void
@@ -564,6 +558,8 @@ set_up (gpointer klass)
       "their pixels",
       {});
   add_part_templates (klass);
+  add_pad_template (
+      klass, "partner", {.caps = kPartCaps, .direction = GST_PAD_SINK});
   add_pad_template (klass, "track",
       {.caps = "text/x-raw,format={utf8,pango-markup}",
           .direction = GST_PAD_SINK});
@@ -583,8 +579,10 @@ set_up_instance (Self *self)
   gst_pad_set_chain_function (state.sink, chain);
   gst_pad_set_event_function (state.sink, sink_event);
   state.src = add ("src");
+  gst_pad_set_event_function (state.src, src_event);
   gst_pad_set_query_function (state.src, src_query);
   state.track.take_over (add_pad (GST_ELEMENT (self), "track"));
+  state.partners.take_over (add_pad (GST_ELEMENT (self), "partner"));
 }
 
 } // namespace

@@ -46,16 +46,16 @@ pixel_bytes_of (std::string_view format)
 }
 
 void
-read_video (Source &file, const Element &video, MatroskaHead &head)
+read_video (Source &file, const Element &video, Extent &size, int &pixel_bytes)
 {
   constexpr std::uint64_t kLargest = 1 << 24;
   file.each (video, [&] (const Element &part) {
     if (part.id == kPixelWidth)
-      head.size.width = int (std::min (file.number (part), kLargest));
+      size.width = int (std::min (file.number (part), kLargest));
     else if (part.id == kPixelHeight)
-      head.size.height = int (std::min (file.number (part), kLargest));
+      size.height = int (std::min (file.number (part), kLargest));
     else if (part.id == kColourSpace)
-      head.pixel_bytes = pixel_bytes_of (file.text (part, 4));
+      pixel_bytes = pixel_bytes_of (file.text (part, 4));
     return true;
   });
 }
@@ -99,14 +99,23 @@ read_track (Source &file, const Element &entry, MatroskaHead &head)
   });
   if (type == kTextTrack && head.lines == 0)
     head.lines = number;
-  if (type != kVideoTrack || head.codec != MatroskaHead::Codec::none)
+  else if (type == kTextTrack && head.partner_lines == 0)
+    head.partner_lines = number;
+  if (type != kVideoTrack)
     return;
+  if (head.codec != MatroskaHead::Codec::none) {
+    if (head.partner_video == 0 && video)
+      read_video (file, *video, head.partner_size, head.partner_pixel_bytes);
+    if (head.partner_video == 0)
+      head.partner_video = number;
+    return;
+  }
   head.video = number;
   head.codec = codec_of (codec, setup);
   head.codec_name = codec;
   head.duration = duration;
   if (video)
-    read_video (file, *video, head);
+    read_video (file, *video, head.size, head.pixel_bytes);
 }
 
 std::optional<MatroskaHead>
@@ -168,7 +177,9 @@ void
 read_extras (Source &file, const Element &part, RecordingInfo &info)
 {
   std::size_t tracks = 0;
-  const std::size_t own = info.head.lines != 0 ? 2 : 1;
+  const std::size_t own = info.head.has_partners () ? 4
+                          : info.head.lines != 0    ? 2
+                                                    : 1;
   if (part.id == kAttachments)
     info.extras.emplace_back ("attachments");
   else if (part.id == kChapters)

@@ -29,6 +29,16 @@ struct MatroskaHead {
   Nanoseconds tick = 1'000'000; ///< to which times are rounded
   /** Numbers of the tracks of frames and of their lines; 0: there is none. */
   std::uint64_t video = 0, lines = 0;
+  /** Frames of a second camera, if the file has a second track of lines, too.
+   */
+  Extent partner_size = {0, 0};
+  int partner_pixel_bytes = 0;
+  std::uint64_t partner_video = 0, partner_lines = 0;
+
+  bool has_partners () const
+  {
+    return partner_video != 0 && partner_lines != 0;
+  }
 };
 
 /** The head in the first @p bytes of a file, which a file that is cut off has,

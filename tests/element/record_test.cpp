@@ -412,6 +412,77 @@ TEST_F (Record, ASeekSaysNothingOfLossesBeforeIt)
   }
 }
 
+/** Of the frames of a log. */
+std::vector<std::string>
+hashes_in (const std::string &log)
+{
+  std::vector<std::string> hashes;
+  std::ifstream lines (log);
+  for (std::string line; std::getline (lines, line);)
+    if (const auto at = line.find ("\"hash\":"); at != line.npos)
+      hashes.push_back (line.substr (at, 26));
+  return hashes;
+}
+
+/** Plays until the frame @p number passes @p pad, and pauses. @p passed must
+ * outlive the pipeline @p top. */
+void
+play_until (GstElement *top, GstPad *pad, int number, std::atomic<int> &passed)
+{
+  passed = -number;
+  const gulong probe = gst_pad_add_probe (
+      pad, GST_PAD_PROBE_TYPE_BUFFER,
+      [] (GstPad *, GstPadProbeInfo *, gpointer data) {
+        auto &left = *static_cast<std::atomic<int> *> (data);
+        left++;
+        left.notify_one ();
+        left.wait (0);
+        return GST_PAD_PROBE_OK;
+      },
+      &passed, nullptr);
+  gst_element_set_state (top, GST_STATE_PLAYING);
+  for (int seen = passed; seen < 0; seen = passed)
+    passed.wait (seen);
+  gst_element_set_state (top, GST_STATE_PAUSED);
+  gst_pad_remove_probe (pad, probe);
+  passed = 1;
+  passed.notify_one ();
+}
+
+/* A sink that is flushed forgets the head of the file: before it plays, and in
+ * the middle. */
+TEST_F (Record, AFlushBeginsAnotherRecording)
+{
+  constexpr GstClockTime kPeriod = 40 * GST_MSECOND;
+  ASSERT_EQ (record (path), "");
+  for (const int played : {0, 6}) {
+    SCOPED_TRACE (played);
+    std::atomic<int> passed = 0;
+    Pipeline copy ("filesrc location=" + path +
+                   " ! codedexposure-recorddemux name=demux ! identity "
+                   "name=frames ! codedexposure-recordmux log-location=" +
+                   path + ".part.jsonl ! filesink location=" + path + ".part");
+    GstElement *top = GST_ELEMENT (GST_OBJECT_PARENT (copy["demux"].get ()));
+    if (played > 0)
+      play_until (top, copy.pad ("frames", "src").get (), played, passed);
+    else
+      gst_element_set_state (top, GST_STATE_PAUSED);
+    gst_element_get_state (top, nullptr, nullptr, kPatience);
+    ASSERT_TRUE (gst_element_seek_simple (top, GST_FORMAT_TIME,
+        GstSeekFlags (GST_SEEK_FLAG_FLUSH | GST_SEEK_FLAG_ACCURATE),
+        gint64 (8 * kPeriod)));
+    ASSERT_EQ (copy.play (), "");
+    Reading reading (path + ".part");
+    ASSERT_EQ (reading.play (), "");
+    EXPECT_EQ (reading.times.size (), std::size_t (kFrames - 8));
+    EXPECT_FALSE (reading.was_cut);
+    EXPECT_EQ (reading.count ("frames-missing"), 0u);
+    auto expected = hashes_in (path + ".jsonl");
+    expected.erase (expected.begin (), expected.begin () + 8);
+    EXPECT_EQ (hashes_in (path + ".part.jsonl"), expected);
+  }
+}
+
 class LateFrames : public Record,
                    public testing::WithParamInterface<const char *>
 {

@@ -1,0 +1,275 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "camera_tracks.h"
+
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include <gst/video/video.h>
+
+#include "common/element.h"
+#include "parts.h"
+
+namespace codedexposure::gst
+{
+
+/* ----------------------------------------------------------- raw frames -- */
+
+namespace
+{
+
+/* The demuxer knows these only since GStreamer 1.26. */
+CapsPtr
+deep_caps_of (Extent size, Nanoseconds duration)
+{
+  GstVideoInfo info;
+  gst_video_info_set_format (&info, GST_VIDEO_FORMAT_GRAY16_LE,
+      guint (size.width), guint (size.height));
+  if (duration > 0)
+    gst_video_guess_framerate (
+        GstClockTime (duration), &info.fps_n, &info.fps_d);
+  return CapsPtr (gst_video_info_to_caps (&info));
+}
+
+bool
+is_aligned (GstBuffer *frame)
+{
+  constexpr guintptr kAlignment = 16;
+  GstMapInfo map;
+  if (gst_buffer_n_memory (frame) != 1 ||
+      !gst_buffer_map (frame, &map, GST_MAP_READ))
+    return false;
+  const bool aligned = guintptr (map.data) % kAlignment == 0;
+  gst_buffer_unmap (frame, &map);
+  return aligned;
+}
+
+/* In the file, a frame may begin at an odd byte. */
+GstBuffer *
+aligned (GstBuffer *frame)
+{
+  if (is_aligned (frame))
+    return frame;
+  GstBuffer *copy =
+      gst_buffer_new_allocate (nullptr, gst_buffer_get_size (frame), nullptr);
+  GstMapInfo map;
+  gst_buffer_map (copy, &map, GST_MAP_WRITE);
+  gst_buffer_extract (frame, 0, map.data, map.size);
+  gst_buffer_unmap (copy, &map);
+  gst_buffer_copy_into (copy, frame, GST_BUFFER_COPY_METADATA, 0, -1);
+  gst_buffer_unref (frame);
+  return copy;
+}
+
+} // namespace
+
+/* Frames that are cut off are dropped; the track says that they are missing. */
+GstPadProbeReturn
+CameraTracks::on_deep_frame (
+    GstPad *, GstPadProbeInfo *info, gpointer self) noexcept
+{
+  const auto &tracks = *static_cast<const CameraTracks *> (self);
+  if (GST_PAD_PROBE_INFO_TYPE (info) & GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM) {
+    GstEvent *event = GST_PAD_PROBE_INFO_EVENT (info);
+    if (GST_EVENT_TYPE (event) == GST_EVENT_CAPS) {
+      gst_event_unref (event);
+      info->data = gst_event_new_caps (tracks.deep_.caps.get ());
+    }
+    return GST_PAD_PROBE_OK;
+  }
+  GstBuffer *frame = GST_PAD_PROBE_INFO_BUFFER (info);
+  const gsize size = gst_buffer_get_size (frame);
+  if (size < tracks.deep_.frame_bytes)
+    return GST_PAD_PROBE_DROP;
+  if (size == tracks.deep_.frame_bytes) {
+    info->data = aligned (frame);
+    return GST_PAD_PROBE_OK;
+  }
+  POST_ERROR (tracks.element_, STREAM, DECODE,
+      "A raw frame has " + std::to_string (size) +
+          " bytes, but by the head of "
+          "the file it should have " +
+          std::to_string (tracks.deep_.frame_bytes) +
+          ": the head is damaged. Use another copy of the recording.");
+  gst_clear_buffer (reinterpret_cast<GstBuffer **> (&info->data));
+  GST_PAD_PROBE_INFO_FLOW_RETURN (info) = GST_FLOW_ERROR;
+  return GST_PAD_PROBE_HANDLED;
+}
+
+/* False: their format is none of coded frames. */
+bool
+CameraTracks::take_raw (
+    GstPad *pad, const GstCaps *caps, const FrameReading &how)
+{
+  const GstStructure *structure = gst_caps_get_structure (caps, 0);
+  const gchar *format = gst_structure_get_string (structure, "format");
+  if (gst_structure_has_name (structure, "video/x-raw") &&
+      g_strcmp0 (format, "GRAY16_LE") != 0)
+    return g_strcmp0 (format, "GRAY8") == 0;
+  if (how.pixel_bytes != 2 || how.size.width < 1 || how.size.height < 1)
+    return false;
+  deep_.caps = deep_caps_of (how.size, how.duration);
+  GstVideoInfo info;
+  gst_video_info_from_caps (&info, deep_.caps.get ());
+  deep_.frame_bytes = GST_VIDEO_INFO_SIZE (&info);
+  gst_pad_add_probe (pad,
+      GstPadProbeType (
+          GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM),
+      on_deep_frame, this, nullptr);
+  return true;
+}
+
+/* ------------------------------------------------------- encoded frames -- */
+
+namespace
+{
+
+GstStaticCaps file_caps = GST_STATIC_CAPS ("timestamp/x-file");
+
+/* A decoder gives the time of the frame before to one that is earlier, and that
+ * of the segment's start to one that begins before it and lasts longer. */
+GstPadProbeReturn
+on_encoded (GstPad *, GstPadProbeInfo *info, gpointer) noexcept
+{
+  GstBuffer *frame =
+      gst_buffer_make_writable (GST_PAD_PROBE_INFO_BUFFER (info));
+  info->data = frame;
+  const CapsPtr caps (gst_static_caps_get (&file_caps));
+  if (GST_BUFFER_PTS_IS_VALID (frame))
+    gst_buffer_add_reference_timestamp_meta (
+        frame, caps.get (), GST_BUFFER_PTS (frame), GST_CLOCK_TIME_NONE);
+  return GST_PAD_PROBE_OK;
+}
+
+} // namespace
+
+GstPadProbeReturn
+CameraTracks::on_decoded (
+    GstPad *, GstPadProbeInfo *info, gpointer self) noexcept
+{
+  GstBuffer *frame =
+      gst_buffer_make_writable (GST_PAD_PROBE_INFO_BUFFER (info));
+  info->data = frame;
+  const CapsPtr caps (gst_static_caps_get (&file_caps));
+  auto *own = gst_buffer_get_reference_timestamp_meta (frame, caps.get ());
+  if (!own)
+    return GST_PAD_PROBE_OK;
+  const GstClockTime before = std::exchange (
+      static_cast<CameraTracks *> (self)->decoded_, GST_BUFFER_PTS (frame));
+  if (GST_BUFFER_PTS (frame) == before ||
+      GST_BUFFER_PTS (frame) > own->timestamp)
+    GST_BUFFER_PTS (frame) = own->timestamp;
+  gst_buffer_remove_meta (frame, &own->parent);
+  return GST_PAD_PROBE_OK;
+}
+
+/* --------------------------------------------------------------- tracks -- */
+
+/* Before restore; none, if frames are raw or stay encoded. False, with an
+ * error: it is no codec of a recording, or is not installed. */
+bool
+CameraTracks::make_decoder (
+    GstPad *pad, const GstCaps *caps, const FrameReading &how)
+{
+  const GstStructure *structure = gst_caps_get_structure (caps, 0);
+  const std::string_view kind = gst_structure_get_name (structure);
+  const gchar *id = gst_structure_get_string (structure, "codec-id");
+  const std::string codec (id ? id : kind);
+  const bool is_raw = kind == "video/x-raw" || codec == "V_UNCOMPRESSED";
+  if (is_raw && take_raw (pad, caps, how))
+    return true;
+  if (kind != "video/x-ffv") {
+    POST_ERROR (element_, STREAM, WRONG_TYPE,
+        "The file has " + (is_raw ? "raw frames that are not grey" : codec) +
+            ", but coded frames are recorded as FFV1 or raw grey. Use a "
+            "recording of coded frames.");
+    return false;
+  }
+  if (!how.decode)
+    return true;
+  decoder_ = gst_element_factory_make ("avdec_ffv1", nullptr);
+  if (!decoder_) {
+    POST_ERROR (element_, CORE, MISSING_PLUGIN, missing ("avdec_ffv1"));
+    return false;
+  }
+  g_object_set (
+      decoder_, "max-threads", how.threads, "max-errors", -1, nullptr);
+  gst_pad_add_probe (pad_of (decoder_, "sink").get (),
+      GST_PAD_PROBE_TYPE_BUFFER, on_encoded, nullptr, nullptr);
+  gst_pad_add_probe (pad_of (decoder_, "src").get (), GST_PAD_PROBE_TYPE_BUFFER,
+      on_decoded, this, nullptr);
+  gst_bin_add (GST_BIN (element_), decoder_);
+  return true;
+}
+
+/* The demuxer reads in a thread of its own. */
+void
+CameraTracks::add_frames (GstPad *pad, const FrameReading &how)
+{
+  constexpr guint64 kNoLimit = 0;
+  const CapsPtr caps (gst_pad_query_caps (pad, nullptr));
+  if (!make_decoder (pad, caps.get (), how))
+    return;
+  queue_ = gst_element_factory_make ("queue", nullptr);
+  g_object_set (queue_, "max-size-buffers", 8u, "max-size-bytes", 0u,
+      "max-size-time", kNoLimit, nullptr);
+  gst_bin_add (GST_BIN (element_), queue_);
+  if (decoder_) {
+    gst_element_link_pads (decoder_, "src", restore_, "sink");
+    gst_element_link_pads (queue_, "src", decoder_, "sink");
+    gst_element_sync_state_with_parent (decoder_);
+  } else
+    gst_element_link_pads (queue_, "src", restore_, "sink");
+  gst_element_sync_state_with_parent (queue_);
+  gst_pad_link_full (
+      pad, pad_of (queue_, "sink").get (), GST_PAD_LINK_CHECK_NOTHING);
+}
+
+void
+CameraTracks::add_lines (GstPad *pad)
+{
+  gst_pad_link (pad, pad_of (restore_, "track").get ());
+}
+
+void
+CameraTracks::begin (Nanoseconds tick)
+{
+  restore_ = make_part (gst_coded_exposure_restore_get_type ());
+  set_tick (tick);
+  gst_bin_add (GST_BIN (element_), restore_);
+  gst_element_sync_state_with_parent (restore_);
+}
+
+void
+CameraTracks::set_tick (Nanoseconds tick)
+{
+  g_object_set (restore_, "tick", guint64 (tick), nullptr);
+}
+
+void
+CameraTracks::remove_part (GstElement *&part)
+{
+  if (!part)
+    return;
+  gst_element_set_state (part, GST_STATE_NULL);
+  gst_bin_remove (GST_BIN (element_), part);
+  part = nullptr;
+}
+
+void
+CameraTracks::end ()
+{
+  remove_part (queue_);
+  remove_part (decoder_);
+  deep_ = {};
+  decoded_ = GST_CLOCK_TIME_NONE;
+}
+
+void
+CameraTracks::remove ()
+{
+  end ();
+  remove_part (restore_);
+}
+
+} // namespace codedexposure::gst

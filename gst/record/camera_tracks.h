@@ -1,0 +1,72 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The part of codedexposure-recorddemux that reads the two tracks of a camera,
+ * frames and lines. */
+#pragma once
+
+#include <gst/gst.h>
+
+#include "base/geometry.h"
+#include "common/raii.h"
+#include "schedule/timing.h"
+
+namespace codedexposure::gst
+{
+
+/** How frames are read. */
+struct FrameReading {
+  bool decode = true;
+  int threads = 0; ///< of the decoder; 0: one for each processor
+  /* As the head of the file says: */
+  Extent size = {0, 0};     ///< 0x0: not known
+  int pixel_bytes = 0;      ///< of raw frames; 0: not known
+  Nanoseconds duration = 0; ///< of a frame; 0: not known
+};
+
+/** Streaming thread of the demuxer, and changes of the state. */
+class CameraTracks
+{
+public:
+  /** In the bin @p element. */
+  explicit CameraTracks (GstElement *element) : element_ (element) {}
+
+  /** Adds the part restore, which has frames and lines come together. */
+  void begin (Nanoseconds tick);
+  /** Null: not begun. */
+  GstElement *restore () const { return restore_; }
+  /** To which the container rounds times. */
+  void set_tick (Nanoseconds tick);
+
+  /** From the demuxer's pad @p pad; posts an error if they are none of a
+   * recording, or their decoder is missing. */
+  void add_frames (GstPad *pad, const FrameReading &how);
+  bool has_frames () const { return queue_; }
+  void add_lines (GstPad *pad);
+
+  /** Removes what add_frames () made. */
+  void end ();
+  /** And the part restore. */
+  void remove ();
+
+private:
+  /** Of raw frames with 16-bit pixels. */
+  struct Deep {
+    CapsPtr caps;
+    gsize frame_bytes = 0;
+  };
+
+  static GstPadProbeReturn on_deep_frame (
+      GstPad *, GstPadProbeInfo *info, gpointer self) noexcept;
+  static GstPadProbeReturn on_decoded (
+      GstPad *, GstPadProbeInfo *info, gpointer self) noexcept;
+  bool take_raw (GstPad *pad, const GstCaps *caps, const FrameReading &how);
+  bool make_decoder (GstPad *pad, const GstCaps *caps, const FrameReading &how);
+  void remove_part (GstElement *&part);
+
+  GstElement *element_;
+  GstElement *restore_ = nullptr;
+  GstElement *queue_ = nullptr, *decoder_ = nullptr;
+  Deep deep_;
+  GstClockTime decoded_ = GST_CLOCK_TIME_NONE; ///< time of the last frame
+};
+
+} // namespace codedexposure::gst

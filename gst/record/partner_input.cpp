@@ -1,0 +1,181 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "partner_input.h"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include "common/meta.h"
+
+namespace codedexposure::gst
+{
+
+namespace
+{
+
+/* Partners that wait for their frames. */
+constexpr std::size_t kMost = 8;
+
+/* A recording has a partner of the time of each frame. Where it is damaged, so
+ * that none comes any more, frames go on without after this. */
+constexpr std::chrono::seconds kPatience (5);
+
+PartnerInput &
+input_of (GstPad *pad)
+{
+  return *static_cast<PartnerInput *> (gst_pad_get_element_private (pad));
+}
+
+} // namespace
+
+/* ------------------------------------------------------------------- pad -- */
+
+void
+PartnerInput::take_over (GstPad *pad)
+{
+  pad_ = pad;
+  gst_pad_set_element_private (pad, this);
+  gst_pad_set_chain_function (pad, chain);
+  gst_pad_set_event_function (pad, event);
+  gst_pad_set_activatemode_function (pad, activate);
+}
+
+/* A thread that waits in the pad would not let it be deactivated. */
+gboolean
+PartnerInput::activate (
+    GstPad *pad, GstObject *, GstPadMode, gboolean active) noexcept
+{
+  PartnerInput &self = input_of (pad);
+  locked (self.lock_, [&] { return self.is_flushing_ = !active; });
+  self.moved_.notify_all ();
+  return TRUE;
+}
+
+/* ------------------------------------------------ thread of the partners -- */
+
+GstFlowReturn
+PartnerInput::chain (GstPad *pad, GstObject *, GstBuffer *buffer) noexcept
+{
+  PartnerInput &self = input_of (pad);
+  BufferPtr owned (buffer);
+  std::unique_lock lock (self.lock_);
+  self.moved_.wait (lock, [&] {
+    return self.partners_.size () < kMost || self.frames_ended_ ||
+           self.is_flushing_;
+  });
+  if (self.is_flushing_)
+    return GST_FLOW_FLUSHING;
+  if (self.frames_ended_ || !self.caps_)
+    return GST_FLOW_OK;
+  self.is_stalled_ = false;
+  self.partners_.push_back (
+      {std::move (owned), CapsPtr (gst_caps_ref (self.caps_.get ()))});
+  self.moved_.notify_all ();
+  return GST_FLOW_OK;
+}
+
+gboolean
+PartnerInput::event (GstPad *pad, GstObject *, GstEvent *owned) noexcept
+{
+  PartnerInput &self = input_of (pad);
+  const EventPtr event (owned);
+  const std::lock_guard lock (self.lock_);
+  switch (GST_EVENT_TYPE (event.get ())) {
+  case GST_EVENT_STREAM_START:
+    self.has_ended_ = false;
+    break;
+  case GST_EVENT_CAPS:
+    self.caps_.reset (gst_caps_ref (caps_of (event.get ())));
+    break;
+  case GST_EVENT_EOS:
+    self.has_ended_ = true;
+    break;
+  case GST_EVENT_FLUSH_START:
+    self.is_flushing_ = true;
+    break;
+  case GST_EVENT_FLUSH_STOP:
+    self.is_flushing_ = self.has_ended_ = self.frames_ended_ = false;
+    self.partners_.clear ();
+    break;
+  default:
+    break;
+  }
+  self.moved_.notify_all ();
+  return TRUE;
+}
+
+/* -------------------------------------------------- thread of the frames -- */
+
+void
+PartnerInput::restart ()
+{
+  const std::lock_guard lock (lock_);
+  partners_.clear ();
+  caps_.reset ();
+  frames_wait_ = true;
+  has_ended_ = frames_ended_ = is_stalled_ = false;
+}
+
+void
+PartnerInput::let_wait (bool waits)
+{
+  locked (lock_, [&] { return frames_wait_ = waits; });
+  moved_.notify_all ();
+}
+
+/* A frame that came late when it was recorded is in the place of its partner,
+ * too. */
+std::optional<Partner>
+PartnerInput::take (GstClockTime pts)
+{
+  std::unique_lock lock (lock_);
+  const auto time_of = [] (const Partner &partner) {
+    return GST_BUFFER_PTS (partner.buffer.get ());
+  };
+  const auto own = [&] { return std::ranges::find (partners_, pts, time_of); };
+  const auto is_settled = [&] {
+    return own () != partners_.end () || partners_.size () >= kMost ||
+           std::ranges::any_of (partners_,
+               [&] (const Partner &one) { return time_of (one) > pts; }) ||
+           has_ended_ || is_flushing_ || !frames_wait_;
+  };
+  if (!is_stalled_ && !moved_.wait_for (lock, kPatience, is_settled))
+    is_stalled_ = true;
+  const auto found = own ();
+  if (found == partners_.end ())
+    return {};
+  Partner partner = std::move (*found);
+  partners_.erase (partners_.begin (), std::next (found));
+  moved_.notify_all ();
+  return partner;
+}
+
+void
+PartnerInput::attach (GstElement *element, GstBuffer *frame, bool encoded)
+{
+  const GstClockTime pts = GST_BUFFER_PTS (frame);
+  const auto partner = take (pts);
+  GstBuffer *buffer = partner ? partner->buffer.get () : nullptr;
+  const bool is_missing =
+      !buffer || GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_GAP);
+  const bool is_of_use = buffer && !is_corrupted (buffer);
+  if (is_of_use || (buffer && encoded))
+    set_partner (frame, *partner);
+  alone_.add (element, pts,
+      is_of_use    ? nullptr
+      : is_missing ? "missing"
+                   : "damaged");
+}
+
+void
+PartnerInput::end (GstElement *element)
+{
+  alone_.end (element);
+  locked (lock_, [&] {
+    partners_.clear ();
+    return frames_ended_ = true;
+  });
+  moved_.notify_all ();
+}
+
+} // namespace codedexposure::gst

@@ -1,0 +1,44 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Segments of the frames of a recording. */
+#pragma once
+
+#include <algorithm>
+
+#include <gst/gst.h>
+
+#include "common/raii.h"
+
+namespace codedexposure::gst
+{
+
+/** A seek may end the stream before its last line. @p sink: of the frames. */
+inline bool
+ends_early (GstPad *sink, const GstSegment &segment)
+{
+  gint64 duration = 0;
+  return GST_CLOCK_TIME_IS_VALID (segment.stop) &&
+         gst_pad_peer_query_duration (sink, GST_FORMAT_TIME, &duration) &&
+         gst_segment_to_stream_time (&segment, GST_FORMAT_TIME, segment.stop) <
+             guint64 (duration);
+}
+
+/** A container rounds times to its ticks, and the time of the stream begins
+ * with the rounded one of the first frame, which may be too late by half a
+ * tick. */
+inline void
+include_rounding (GstSegment &segment, guint64 tick)
+{
+  if (segment.rate > 0 && GST_CLOCK_TIME_IS_VALID (segment.time) &&
+      segment.time < segment.start)
+    segment.start -= std::min (tick / 2, segment.start - segment.time);
+}
+
+inline EventPtr
+segment_event (const GstSegment &segment, guint32 seqnum)
+{
+  EventPtr event (gst_event_new_segment (&segment));
+  gst_event_set_seqnum (event.get (), seqnum);
+  return event;
+}
+
+} // namespace codedexposure::gst

@@ -379,6 +379,11 @@ Decode::run ()
   check ();
   start_gstreamer ();
   const RecordingInfo info = value_of (recording_info (recording_, false));
+  if (second_ && info.head.has_partners ())
+    usage_error (recording_ +
+                 " has the frames of both cameras; leave out "
+                 "--second " +
+                 *second_);
   if (second_)
     value_of (recording_info (*second_, false));
   if (jobs_.value_or (1) > 1)

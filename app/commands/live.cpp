@@ -74,7 +74,7 @@ Live::declare (Options &options)
       "it skips coded frames",
       one_of ({"fast", "balanced", "best", "learned"}));
   options.value ("--record", record_, "FILE.mkv",
-      "also record all coded frames, with --second those of the first camera",
+      "also record all coded frames, with --second those of both cameras",
       file_ending_in (".mkv"));
   window_.declare (options);
   options.flag ("--second", second_,
@@ -163,25 +163,14 @@ Live::run ()
   Job job ("live", run_);
   job.ends_by_signal = true;
   const SourcePlan plan = this->plan ();
-  std::optional<Chain> partners;
-  Chain frames = [&] {
-    if (!second_)
-      return coded_source (job, source_, plan, Pace::live);
-    auto [first, other] =
-        coded_sources (job, source_, plan, Pace::live, beside_);
-    partners = other;
-    return first;
-  }();
+  Chain frames = second_ ? coded_pairs (job, source_, plan, Pace::live, beside_)
+                         : coded_source (job, source_, plan, Pace::live);
   if (record_)
     frames = job.graph.from (add_recording (job, frames, plan), "src_%u");
   job.keeper = window_.add_keeper (frames, "live", source_.bits);
   job.counted = frames.queue (kWaiting).last ();
-  if (partners) {
-    GstElement *pair = job.graph.add ("codedexposure-pair");
-    partners->queue (kWaiting).to (pair, "off");
-    frames = frames.to (pair, "on");
+  if (second_)
     window_.last = "sum";
-  }
   add_window (job, panes (job, frames), window_, source_.bits);
   return play (job).exit;
 }

@@ -11,6 +11,7 @@
 
 #include "base/part.h"
 #include "command.h"
+#include "common/partner.h"
 #include "common/record.h"
 #include "pipeline/messages.h"
 #include "pipeline/plugin.h"
@@ -27,7 +28,8 @@ namespace fs = std::filesystem;
 namespace
 {
 
-/** What is known of each frame that passes a pad, with the hash of its pixels;
+/** What is known of each frame that passes a pad, and of its partner, with the
+ * hashes of their pixels;
  * changed by the streaming thread until the pipeline has stopped. */
 class FrameLog
 {
@@ -58,8 +60,13 @@ private:
     if (!caps || !event || !gst_video_info_from_caps (&info, caps.get ()))
       return;
     gst_event_parse_segment (event.get (), &segment);
-    lines_.push_back (
-        record_of (frame, info, *segment, 0, lines_.size ()).to_json ());
+    const auto line = [&] (GstBuffer *of) {
+      return record_of (of, info, *segment, 0, lines_.size ()).to_json ();
+    };
+    lines_.push_back (line (frame));
+    const auto partner = get_partner (frame);
+    if (partner && gst_video_info_from_caps (&info, partner->caps.get ()))
+      lines_.back () += line (partner->buffer.get ());
   }
 
   std::vector<std::string> lines_;

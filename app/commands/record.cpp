@@ -65,27 +65,37 @@ public:
         "also the recording of a second camera, in the beam of the mirrors "
         "that are off",
         file_ending_in (".mkv"));
+    options.flag ("--both", both_,
+        "the recording also has the frames of a second camera, with those of "
+        "the first that have the same exposure");
     beside_.declare (options);
     options.flag (
         "--fast", fast_, "run the bench as fast as possible, not in real time");
     source_.declare (options);
     options.exclude ({"--fast"}, "--camera");
-    beside_.declare_relations (options);
+    options.exclude ({"--source", "--both"}, "--second");
+    options.exclude ({"--source"}, "--both");
     run_.declare (options);
   }
 
   Exit run () override
   {
-    if (second_)
+    if (second_ || both_)
       beside_.check (source_);
+    else if (beside_.camera || beside_.bench)
+      usage_error ("--second-camera and --second-bench are for two cameras: "
+                   "set --both, or --second for a recording of its own");
     start_gstreamer ();
     Job job ("record", run_);
     job.ends_by_signal = true;
     const SourcePlan plan = SourcePlan::make (source_);
+    constexpr Nanoseconds kPatience = 1'000'000'000; // nobody looks on
     const Pace pace = fast_ ? Pace::fast : Pace::live;
     if (second_)
       return record_both (job, plan, pace);
-    Chain chain = coded_source (job, source_, plan, pace);
+    Chain chain =
+        both_ ? coded_pairs (job, source_, plan, pace, beside_, kPatience)
+              : coded_source (job, source_, plan, pace);
     write_recording (job, chain, *output_, style (plan, pace));
     return play (job).exit;
   }
@@ -125,9 +135,9 @@ private:
   SourceOptions source_;
   RunOptions run_;
   std::optional<Text> output_, codec_, second_;
-  SecondCamera beside_; // whose recording is second_
+  SecondCamera beside_; // whose recording is second_, or of both
   std::optional<int> threads_;
-  bool fast_ = false;
+  bool fast_ = false, both_ = false;
 };
 
 } // namespace

@@ -25,7 +25,8 @@ private:
   AddressOptions address_;
   RunOptions run_;
   std::optional<Text> codec_;
-  bool no_wait_ = false;
+  SecondCamera beside_;
+  bool no_wait_ = false, second_ = false;
 };
 
 CommandText
@@ -63,10 +64,15 @@ Send::declare (Options &options)
       "raw, or ffv1: lossless, half of the data, but a good part of a core "
       "[raw for 8 bits, else ffv1]",
       one_of ({"raw", "ffv1"}));
+  options.flag ("--second", second_,
+      "also send the frames of a second camera, in the beam of the mirrors "
+      "that are off, with those of the first that have the same exposure");
+  beside_.declare (options);
   options.flag ("--no-wait", no_wait_,
       "start immediately; late receivers miss the beginning");
   source_.declare (options);
   run_.declare (options, false);
+  beside_.declare_relations (options);
 }
 
 /* A receiver that is 10 s late is disconnected, to limit the memory. */
@@ -84,6 +90,8 @@ Send::add_server (Job &job, Chain &frames) const
 Exit
 Send::run ()
 {
+  if (second_)
+    beside_.check (source_);
   if (!run_.print)
     address_.check ();
   start_gstreamer ();
@@ -91,7 +99,10 @@ Send::run ()
   job.ends_by_signal = true;
   const SourcePlan plan = SourcePlan::make (source_);
   const std::string codec = codec_.value_or (plan.is_deep () ? "ffv1" : "raw");
-  Chain frames = coded_source (job, source_, plan, Pace::live);
+  constexpr Nanoseconds kPatience = 200'000'000;
+  Chain frames =
+      second_ ? coded_pairs (job, source_, plan, Pace::live, beside_, kPatience)
+              : coded_source (job, source_, plan, Pace::live);
   job.counted = frames.to ("queue").last ();
   frames.to (
       "codedexposure-recordmux", {{"codec", codec}, {"streamable", true}});

@@ -247,8 +247,7 @@ void
 SecondCamera::check (const SourceOptions &first) const
 {
   if (first.camera && !camera)
-    usage_error ("--second is for a second camera beside --camera; say which, "
-                 "by --second-camera");
+    usage_error ("say which camera is beside --camera, by --second-camera");
   if (first.camera && *first.camera == *camera)
     usage_error ("--camera and --second-camera are both " + *first.camera +
                  "; name two cameras");

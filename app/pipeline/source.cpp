@@ -301,6 +301,21 @@ coded_sources (Job &job, const SourceOptions &options, const SourcePlan &plan,
   return both;
 }
 
+Chain
+coded_pairs (Job &job, const SourceOptions &options, const SourcePlan &plan,
+    Pace pace, const SecondCamera &second, Nanoseconds patience)
+{
+  constexpr int kWaiting = 8; // frames
+  const int waiting =
+      kWaiting + int (patience * plan.frame_rate.num /
+                      (plan.frame_rate.den * Nanoseconds (GST_SECOND)));
+  auto [on, off] = coded_sources (job, options, plan, pace, second);
+  GstElement *pair = job.graph.add (
+      "codedexposure-pair", {{"latency", std::uint64_t (patience)}});
+  off.queue (waiting).to (pair, "off");
+  return on.queue (waiting).to (pair, "on");
+}
+
 /* identity also counts the frame that it refuses; the run ends the stream
  * before that one is made. */
 void

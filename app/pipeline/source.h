@@ -31,6 +31,12 @@ Chain coded_source (
 std::pair<Chain, Chain> coded_sources (Job &job, const SourceOptions &options,
     const SourcePlan &plan, Pace pace, const SecondCamera &second);
 
+/** Pairs of both cameras. @p patience  for a frame of the second camera that is
+ * late; 0: a quarter of a frame period. */
+Chain coded_pairs (Job &job, const SourceOptions &options,
+    const SourcePlan &plan, Pace pace, const SecondCamera &second,
+    Nanoseconds patience = 0);
+
 /** Ends the stream after --frames, if set. */
 void limit_frames (Job &job, const SourceOptions &options, Chain &chain);
 

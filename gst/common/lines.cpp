@@ -33,6 +33,7 @@ write_all (int file, std::string_view text)
 bool
 LineFile::open (gpointer element, const std::string &location)
 {
+  close ();
   element_ = GST_ELEMENT (element);
   location_ = location;
   file_ = ::open (

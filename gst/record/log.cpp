@@ -208,6 +208,8 @@ transform_ip (GstBaseTransform *base, GstBuffer *frame) noexcept
                                  : GST_FLOW_OK;
   if (flow != GST_FLOW_OK || !state.partners.is_linked ())
     return flow;
+  const guint64 lost = state.partners.lost_before (frame);
+  locked (self, [&] { return state.frames_lost += lost; });
   const CapsPtr caps (gst_pad_get_current_caps (base->sinkpad));
   return state.partners.push (
       GST_ELEMENT (self), frame, caps.get (), base->segment);

@@ -18,6 +18,7 @@ PartnerOutput::restart ()
 {
   setup_.reset ();
   last_.reset ();
+  last_number_.reset ();
   caps_.reset ();
   stream_sent_ = segment_sent_ = setup_sent_ = false;
 }
@@ -88,6 +89,18 @@ PartnerOutput::begin_stream (GstElement *element)
     return;
   const CharPtr id (gst_pad_create_stream_id (pad_, element, "partner"));
   gst_pad_push_event (pad_, gst_event_new_stream_start (id.get ()));
+}
+
+guint64
+PartnerOutput::lost_before (GstBuffer *frame)
+{
+  const auto partner = get_partner (frame);
+  const auto meta =
+      partner ? get_frame_meta (partner->buffer.get ()) : std::nullopt;
+  if (!meta)
+    return 0;
+  const auto before = std::exchange (last_number_, meta->frame);
+  return before && meta->frame > *before ? meta->frame - *before - 1 : 0;
 }
 
 void

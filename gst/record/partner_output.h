@@ -28,6 +28,9 @@ public:
   void follow (GstEvent *event);
   /** @p setup: of the frames; its partner is known. */
   void set_setup (const StreamSetup &setup);
+  /** Frames of the second camera that are missing, by their numbers, before the
+   * partner of @p frame, which is pushed next. */
+  guint64 lost_before (GstBuffer *frame);
   /** Both tracks have a frame of each time, so that no reader and no muxer
    * waits for one: in place of a partner that @p frame does not have, the last
    * one goes again, or a black one, as a gap. Posts an error of @p element if
@@ -43,6 +46,7 @@ private:
   GstPad *pad_ = nullptr;
   std::optional<StreamSetup> setup_; ///< of the partners
   std::optional<Partner> last_;
+  std::optional<guint64> last_number_; ///< of the second camera
   bool stream_sent_ = false, segment_sent_ = false, setup_sent_ = false;
   CapsPtr caps_; ///< that were sent
 };

@@ -55,10 +55,10 @@
 #include <gst/video/video.h>
 
 #include "camera_tracks.h"
-#include "parts.h"
 #include "common/element.h"
 #include "common/elements.h"
 #include "common/raii.h"
+#include "parts.h"
 #include "record/cluster_gate.h"
 #include "record/matroska.h"
 
@@ -323,6 +323,10 @@ handle_message (GstBin *bin, GstMessage *message) noexcept
     gst_message_unref (message);
     message = own;
   }
+  /* The frames that go without their partners say so. */
+  if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_ELEMENT &&
+      GST_MESSAGE_SRC (message) == GST_OBJECT (state.partner.restore ()))
+    return gst_message_unref (message);
   parent_class<GstBinClass> (bin)->handle_message (bin, message);
 }
 

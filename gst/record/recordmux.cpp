@@ -533,8 +533,8 @@ properties ()
           "overwritten when it exists; empty: none",
           kReadWriteReady, set (&Settings::log_location)},
       {"stats", "Statistics",
-          "Counters: frames-lost, the coded frames that are missing before "
-          "frames that came, by their numbers",
+          "Counters: frames-lost, the coded frames, and those of a second "
+          "camera, that are missing before frames that came, by their numbers",
           kReadOnly, stats_of}};
 }
 

@@ -150,6 +150,9 @@ def _loss_in(structure) -> str | None:
     if name == "codedexposure/not-coded":
         return (f"from {value('from') * 1e-9:.3f} s on, the mirrors show "
                 f"{value('pattern')} and frames are not decoded")
+    if name == "codedexposure/partner-lost" and not value("active"):
+        return (f"from {value('from') * 1e-9:.3f} s on, coded frames have no "
+                f"complement ({value('reason')}): {value('frames')}")
     if name == "codedexposure/stream-cut":
         return ("the stream ended without its last line: it was cut off, its "
                 "sender was stopped, or it is a segment of a longer recording")

@@ -46,6 +46,9 @@ class Frame:
     exposure_duration_ns: int | None
     time_uncertainty_ns: int | None
     """The error of exposure_start_ns that 95 % of frames stay below."""
+    complement: Frame | None = field(default=None, repr=False, compare=False)
+    """Of a coded frame: that of a second camera, in the other beam, with the
+    same exposure; None: there is none."""
 
     @property
     def time(self) -> float:
@@ -70,10 +73,10 @@ _gst.gst_buffer_map.argtypes.append(ctypes.c_int)
 
 class _Mapped:  # pylint: disable=too-few-public-methods
     """The bytes of a buffer, which stays mapped as long as an array of them is
-    used."""
+    used. owner: it holds the buffer."""
 
-    def __init__(self, buffer):
-        self._buffer = buffer
+    def __init__(self, buffer, owner):
+        self._buffer, self._owner = buffer, owner
         self._info = _MapInfo()
         # The hash of a GstBuffer is its address.
         if not _gst.gst_buffer_map(hash(buffer), self._info,
@@ -88,11 +91,12 @@ class _Mapped:  # pylint: disable=too-few-public-methods
             _gst.gst_buffer_unmap(hash(self._buffer), self._info)
 
 
-def pixels_of(buffer, caps) -> np.ndarray:
-    """The picture, in the memory of the buffer."""
+def pixels_of(buffer, caps, owner=None) -> np.ndarray:
+    """The picture, in the memory of the buffer. PyGObject does not hold a
+    buffer that it found in a structure: owner does."""
     kind = _TYPES[caps.get_value("format")]
     width, height = caps.get_value("width"), caps.get_value("height")
-    data = np.asarray(_Mapped(buffer))
+    data = np.asarray(_Mapped(buffer, owner))
     # Rows are padded to a multiple of four bytes.
     stride = len(data) // height // kind.itemsize * kind.itemsize
     rows = data[:height * stride].view(kind)
@@ -108,22 +112,28 @@ def position_of(sample, time: int | None = None) -> int:
     return sign * there
 
 
-def _fields_of(sample):
-    meta = sample.get_buffer().get_custom_meta("CodedExposureFrame")
+def _fields_of(buffer, name="CodedExposureFrame"):
+    meta = buffer.get_custom_meta(name)
     return meta.get_structure() if meta else None
 
 
 def shows_pattern(sample) -> bool:
     """Whether a coded frame shows a pattern, so that it is not decoded."""
-    fields = _fields_of(sample)
+    fields = _fields_of(sample.get_buffer())
     return bool(fields and fields.has_field("pattern"))
 
 
 def frame_of(sample) -> Frame:
     """The frame in a GstSample."""
     buffer = sample.get_buffer()
-    caps = sample.get_caps().get_structure(0)
-    fields = _fields_of(sample)
+    partner = _fields_of(buffer, "CodedExposurePartner")
+    return _frame(sample, buffer, sample.get_caps(), partner and _frame(
+        sample, partner.get_value("buffer"), partner.get_value("caps")))
+
+
+def _frame(sample, buffer, caps, complement=None) -> Frame:
+    """That in a buffer, whose times are those of the sample."""
+    fields = _fields_of(buffer)
 
     def value(name):
         return fields.get_value(name) if fields and fields.has_field(name) \
@@ -133,11 +143,11 @@ def frame_of(sample) -> Frame:
         return None if value(name) == _NO_TIME else value(name)
 
     exposure = time("exposure-start")
-    image = pixels_of(buffer, caps)
+    image = pixels_of(buffer, caps.get_structure(0), sample.get_buffer())
     slot = value("subframe")
     return Frame(
         image=image,
-        time_ns=position_of(sample),
+        time_ns=position_of(sample, buffer.pts),
         duration_ns=None if buffer.duration == _NO_TIME else buffer.duration,
         frame=value("frame"),
         slot=None if slot is None or slot < 0 else slot,
@@ -150,4 +160,5 @@ def frame_of(sample) -> Frame:
         exposure_start_ns=None if exposure is None else position_of(
             sample, exposure),
         exposure_duration_ns=time("exposure-duration"),
-        time_uncertainty_ns=time("time-uncertainty"))
+        time_uncertainty_ns=time("time-uncertainty"),
+        complement=complement)

@@ -184,6 +184,27 @@ class TwoCameras(unittest.TestCase):
         with self.assertRaises(FileNotFoundError):
             opened("first.mkv").fused(second="none.mkv")
 
+    def test_a_recording_of_both_has_complements(self):
+        run("record", "--both", "--fast", "--frames", "12", "--size", "96x64",
+            "--output", "pairs.mkv")
+        run("record", "--fast", "--frames", "12", "--size", "96x64",
+            "--output", "on.mkv", "--second", "off.mkv")
+        pairs = opened("pairs.mkv")
+        frames = list(pairs.coded())
+        self.assertEqual(len(frames), 12)
+        for frame, on, off in zip(frames, opened("on.mkv").coded(),
+                                  opened("off.mkv").coded()):
+            self.assertTrue(np.array_equal(frame.image, on.image))
+            self.assertTrue(np.array_equal(frame.complement.image, off.image))
+            self.assertEqual(frame.complement.time_ns, frame.time_ns)
+        self.assertTrue(np.array_equal(pairs.coded()[7].complement.image,
+                                       frames[7].complement.image))
+        self.assertIsNone(next(iter(pairs.subframes())).complement)
+        self.assertIsNone(opened("on.mkv").coded()[0].complement)
+        fused = opened("on.mkv").fused("fast", second=SCRATCH / "off.mkv")
+        for one, other in zip(pairs.fused("fast"), fused, strict=True):
+            self.assertTrue(np.array_equal(one.image, other.image))
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -338,6 +338,14 @@ slip_in (const GstStructure *message)
       slots < 0 ? "early" : "late");
 }
 
+std::string
+mirrors_in (const GstStructure *message, const char *field)
+{
+  gdouble mirrors = 0;
+  gst_structure_get_double (message, field, &mirrors);
+  return format ("%.2f", mirrors);
+}
+
 } // namespace
 
 std::string
@@ -374,6 +382,15 @@ notice (const GstStructure *message)
   if (name == "codedexposure/partner-lost")
     return "warning: coded frames without a partner from " +
            seconds_in (message, "from") + " on: " + number ("frames");
+  if (name == "codedexposure/partner-drift" && active)
+    return "warning: the second camera sees the mirrors " +
+           mirrors_in (message, "x") + " further right and " +
+           mirrors_in (message, "y") +
+           " further down than its mapping says; if a camera was moved, "
+           "calibrate both again";
+  if (name == "codedexposure/partner-drift")
+    return "the second camera sees the mirrors where its mapping has them "
+           "again";
   if (name == "codedexposure/frames-missing")
     return "warning: from " + seconds_in (message, "from") +
            " on, recorded frames are missing: " + number ("count");

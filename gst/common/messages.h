@@ -49,6 +49,19 @@ struct PartnerLost {
   CODED_FIELDS (active, reason, frames, from, to);
 };
 
+/** The second camera begins or ceases to see the mirrors where its mapping does
+ * not have them, from codedexposure-pair. */
+struct PartnerDrifted {
+  static constexpr const char *kName = "codedexposure/partner-drift";
+  bool active = false; ///< it begins
+  /* Where that is worst, mirrors; as PartnerDrift::Shift. */
+  gdouble x = 0, y = 0;
+  gdouble uncertainty = 0;
+  gdouble at_x = 0, at_y = 0;
+  GstClockTime from = 0; ///< PTS of the frame that shows it
+  CODED_FIELDS (active, x, y, uncertainty, at_x, at_y, from);
+};
+
 /** The last frames have become a recording, from codedexposure-keep. */
 struct Kept {
   static constexpr const char *kName = "codedexposure/kept";

@@ -31,18 +31,13 @@ camera_of (const PairStream &stream, const std::optional<Mapping> &mapping)
   return camera;
 }
 
-Extent
-mirrors_of (const PartnerWatch::Camera &camera)
-{
-  return camera.mapping ? camera.mapping->mirrors () : camera.size;
-}
-
 } // namespace
 
 void
 PairCheck::configure (const PairStream &on, const PairStream &off)
 {
   watch_.reset ();
+  drift_.reset ();
   on_ = on.info;
   off_ = off.info;
   const auto mapping_of = [] (const PairStream &stream) {
@@ -54,11 +49,13 @@ PairCheck::configure (const PairStream &on, const PairStream &off)
   const auto fits = [] (const PartnerWatch::Camera &camera) {
     return !camera.mapping || camera.mapping->camera () == camera.size;
   };
-  const Extent mirrors = mirrors_of (first);
+  const Extent mirrors = first.mirrors ();
   if (on.setup && fits (first) && fits (second) &&
-      mirrors_of (second) == mirrors && on.setup->schedule.complement () &&
+      second.mirrors () == mirrors && on.setup->schedule.complement () &&
       on.setup->schedule.check_size (mirrors.width, mirrors.height))
     watch_.emplace (on.setup->schedule, first, second);
+  if (watch_ && on.setup->schedule.regions ().empty ())
+    drift_.emplace (on.setup->schedule, first, second);
 }
 
 void
@@ -68,18 +65,38 @@ PairCheck::reset ()
     watch_->reset ();
 }
 
+template <typename Use>
+auto
+PairCheck::read (GstBuffer *coded, GstBuffer *partner, Use use) const
+{
+  MappedFrame on (on_, coded, GST_MAP_READ);
+  MappedFrame off (off_, partner, GST_MAP_READ);
+  using Result = decltype (use (
+      ImageView<const std::uint8_t> (), ImageView<const std::uint8_t> ()));
+  if (!on || !off)
+    return Result ();
+  return read_pixels (on, [&] (const auto &first) {
+    return read_pixels (
+        off, [&] (const auto &second) { return use (first, second); });
+  });
+}
+
 Verdict
 PairCheck::check (GstBuffer *coded, GstBuffer *partner)
 {
   if (!watch_)
     return Verdict::unknown;
-  MappedFrame on (on_, coded, GST_MAP_READ);
-  MappedFrame off (off_, partner, GST_MAP_READ);
-  if (!on || !off)
-    return Verdict::unknown;
-  return read_pixels (on, [&] (const auto &first) {
-    return read_pixels (
-        off, [&] (const auto &second) { return watch_->take (first, second); });
+  return read (coded, partner,
+      [&] (const auto &on, const auto &off) { return watch_->take (on, off); });
+}
+
+std::optional<PartnerDrift::Shift>
+PairCheck::drift (GstBuffer *coded, GstBuffer *partner) const
+{
+  if (!drift_)
+    return {};
+  return read (coded, partner, [&] (const auto &on, const auto &off) {
+    return drift_->largest (on, off);
   });
 }
 

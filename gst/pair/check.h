@@ -7,6 +7,7 @@
 #include <gst/video/video.h>
 
 #include "setup/stream_setup.h"
+#include "sync/partner_drift.h"
 #include "sync/partner_watch.h"
 
 namespace codedexposure::gst
@@ -28,9 +29,18 @@ public:
   void reset ();
   /** Buffers that cannot be read are not known. */
   PartnerWatch::Verdict check (GstBuffer *coded, GstBuffer *partner);
+  /** How far the second camera has moved, by partners; none: not known. */
+  std::optional<PartnerDrift::Shift> drift (
+      GstBuffer *coded, GstBuffer *partner) const;
 
 private:
+  /** What @p use makes of the pixels of both; its default if they cannot be
+   * read. */
+  template <typename Use>
+  auto read (GstBuffer *coded, GstBuffer *partner, Use use) const;
+
   std::optional<PartnerWatch> watch_;
+  std::optional<PartnerDrift> drift_; ///< none: masks are not of one period
   GstVideoInfo on_ = {}, off_ = {};
 };
 

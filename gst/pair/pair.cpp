@@ -34,6 +34,17 @@
  * latency of the slower camera and a quarter of a frame period allow, and then
  * goes alone.
  *
+ * ## Drift
+ *
+ * Once a second, the places of the scene in both frames are compared: summed
+ * over a period of the masks, both are ordinary pictures of the same light.
+ * What is between them is the error of the mappings
+ * (#codedexposure-pair:drift-x, #codedexposure-pair:drift-y, in mirrors). When
+ * the median of five seconds is above 0.1 mirrors by three standard deviations,
+ * one of the cameras has moved, and the message `codedexposure/partner-drift`
+ * (`active` TRUE, `x`, `y`, `uncertainty`, `at-x`, `at-y`, `from`) says so, and
+ * when that is over. A scene without texture shows nothing.
+ *
  * ## Flags, metas and messages
  *
  * A partner is in the custom meta `CodedExposurePartner` of the coded frame,
@@ -80,6 +91,7 @@
 #include "common/partner.h"
 #include "common/tag.h"
 #include "pair/check.h"
+#include "pair/drift.h"
 #include "pair/instant.h"
 
 GST_DEBUG_CATEGORY_STATIC (codedexposure_pair_debug);
@@ -118,7 +130,9 @@ reason_of (Alone alone)
 }
 
 struct PairState {
-  Counters counters; ///< object lock
+  /* Object lock: */
+  Counters counters;
+  std::optional<PartnerDrift::Shift> shift; ///< of the last pairs
 
   /* Source pad's streaming thread, which also handles serialized events. */
   std::optional<StreamSetup> on_setup, off_setup;
@@ -129,6 +143,7 @@ struct PairState {
   PairCheck check;
   AloneFrames alone;
   guint64 refused_in_a_row = 0;
+  DriftWatch drift;
 
   void set_due () { setup_due = check_due = true; }
   void reset ()
@@ -140,6 +155,7 @@ struct PairState {
     check = {};
     alone = {};
     refused_in_a_row = 0;
+    drift.reset ();
   }
 };
 
@@ -214,6 +230,7 @@ compare (GstCodedExposurePair *self, GstBuffer *coded, GstBuffer *partner)
     const auto off = stream_of (sink (self, "off"), st.off_setup);
     if (on && off)
       st.check.configure (*on, *off);
+    st.drift.reset ();
   }
   switch (st.check.check (coded, partner)) {
   case PartnerWatch::Verdict::good:
@@ -223,6 +240,20 @@ compare (GstCodedExposurePair *self, GstBuffer *coded, GstBuffer *partner)
   default:
     return Alone::no;
   }
+}
+
+void
+watch_drift (GstCodedExposurePair *self, GstBuffer *coded, GstBuffer *partner)
+{
+  PairState &st = state (self);
+  const GstClockTime pts = GST_BUFFER_PTS (coded);
+  if (!GST_CLOCK_TIME_IS_VALID (pts) || !st.drift.is_due (pts))
+    return;
+  st.drift.take (self, pts, st.check.drift (coded, partner));
+  locked (self, [&] {
+    st.shift = st.drift.median ();
+    return 0;
+  });
 }
 
 /* Why @coded goes on without @partner. */
@@ -308,6 +339,7 @@ aggregate (GstAggregator *aggregator, gboolean late)
     return GST_AGGREGATOR_FLOW_NEED_DATA;
   const Alone alone = judge (self, coded.get (), partner.get ());
   if (!reason_of (alone)) {
+    watch_drift (self, coded.get (), partner.get ());
     coded.reset (gst_buffer_make_writable (coded.release ()));
     CapsPtr caps (gst_pad_get_current_caps (GST_PAD (off)));
     set_partner (coded.get (), {std::move (partner), std::move (caps)});
@@ -461,6 +493,7 @@ stop (GstAggregator *aggregator)
   state (aggregator).reset ();
   const ObjectLock lock (aggregator);
   state (aggregator).counters = {};
+  state (aggregator).shift.reset ();
   return TRUE;
 }
 
@@ -473,6 +506,15 @@ properties ()
         within (&PairState::counters, member), guint64 (0),
         guint64 (G_MAXINT64));
   };
+  const auto drift = [] (const char *name, const char *nick, const char *blurb,
+                         auto read) {
+    return Property<PairState> (
+        name, nick, blurb, kReadOnly,
+        [read] (
+            const PairState &st) { return st.shift ? read (*st.shift) : 0.0; },
+        -G_MAXDOUBLE, G_MAXDOUBLE);
+  };
+  using Shift = PartnerDrift::Shift;
   return {counter ("frames-paired", "Frames paired",
               "Coded frames that got a partner", &Counters::paired),
       counter ("pairs-confirmed", "Pairs confirmed",
@@ -487,7 +529,18 @@ properties ()
           &Counters::refused),
       counter ("partners-dropped", "Partners dropped",
           "Frames of the second camera that belong to no coded frame",
-          &Counters::dropped)};
+          &Counters::dropped),
+      drift ("drift-x", "Drift along rows",
+          "By how many mirrors the second camera sees the mirrors elsewhere "
+          "than its mapping has them, where that is worst, to the right; 0: "
+          "not known, too",
+          [] (const Shift &shift) { return shift.by.x; }),
+      drift ("drift-y", "Drift along columns", "The same, downwards",
+          [] (const Shift &shift) { return shift.by.y; }),
+      drift ("drift-uncertainty", "Uncertainty of the drift",
+          "Standard deviation of drift-x and drift-y, mirrors; 0: they are not "
+          "known",
+          [] (const Shift &shift) { return shift.uncertainty; })};
 }
 
 void

@@ -21,6 +21,11 @@
  * and `codedexposure/stream-incomplete` (`count`: frames are missing together
  * with their lines) report damage; #codedexposure-recorddemux:stats counts it.
  *
+ * Frames of a recording of two cameras have their partners, as those of
+ * codedexposure-pair. One whose partner is missing or damaged goes on alone,
+ * and `codedexposure/partner-lost` (`active`, `reason`, `from`, at the end `to`
+ * and `frames`) says so.
+ *
  * The schedule of the track wins over that in the container's tags; a
  * difference is a warning. If the tags say that there is a track, a missing one
  * is damage: all frames are CORRUPTED, with a warning. Any other recording

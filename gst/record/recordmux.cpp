@@ -24,6 +24,11 @@
  * `splitmuxsink muxer-factory=codedexposure-recordmux` writes a recording in
  * segments. Each is a recording of its own.
  *
+ * Frames with partners (codedexposure-pair) are recorded with them, in two
+ * tracks more: those of the second camera and their lines. The stream tag must
+ * say that there are partners before the first frame. A frame that is alone has
+ * the partner before in the place of its own, as a gap.
+ *
  * #codedexposure-recordmux:log-location writes the lines to a second file, for
  * other programs: first the schedule in its JSON form, then the mapping, if
  * there is one, then the frames. Each line goes to the system at once: a crash

@@ -92,39 +92,18 @@ for_each_mirror (Extent block, int left, int top, Use use)
       use (x, y);
 }
 
-Position
-place_in (const PartnerWatch::Camera &camera, int x, int y)
-{
-  const Position mirror{double (x), double (y)};
-  return camera.mapping ? camera.mapping->camera_at (mirror) : mirror;
-}
-
 /* Whether pixels of @camera lie on the mirrors of a block. */
 bool
 sees (const PartnerWatch::Camera &camera, Extent block, int left, int top)
 {
   bool all = true;
   for_each_mirror (block, left, top, [&] (int x, int y) {
-    const Position at = place_in (camera, x, y);
-    all = all && at.x >= 0.0 && at.x <= camera.size.width - 1.0 &&
-          at.y >= 0.0 && at.y <= camera.size.height - 1.0 &&
+    const Position at = camera.place (x, y);
+    all = all && camera.contains (at) &&
           std::abs (at.x - std::round (at.x)) <= kMaxBeside &&
           std::abs (at.y - std::round (at.y)) <= kMaxBeside;
   });
   return all;
-}
-
-template <typename Pixel>
-double
-bilinear (ImageView<const Pixel> frame, Position at)
-{
-  const int x = int (at.x), y = int (at.y);
-  const int right = std::min (x + 1, frame.width - 1);
-  const int below = std::min (y + 1, frame.height - 1);
-  const double dx = at.x - x, dy = at.y - y;
-  return (frame.at (x, y) * (1.0 - dx) + frame.at (right, y) * dx) *
-             (1.0 - dy) +
-         (frame.at (x, below) * (1.0 - dx) + frame.at (right, below) * dx) * dy;
 }
 
 } // namespace
@@ -134,7 +113,7 @@ PartnerWatch::PartnerWatch (
     : on_{.black = on.black, .white = on.white}, off_{.black = off.black,
                                                      .white = off.white}
 {
-  const Extent mirrors = on.mapping ? on.mapping->mirrors () : on.size;
+  const Extent mirrors = on.mirrors ();
   /* More than a tile, and little of the scene. */
   const int side = std::max (
       4, int (std::ceil (1.5 * std::sqrt (double (schedule.slots ())))));
@@ -152,8 +131,8 @@ PartnerWatch::PartnerWatch (
   for (std::size_t i = 0; i < blocks.size (); i += step)
     for_each_mirror (
         block, int (blocks[i].x), int (blocks[i].y), [&] (int x, int y) {
-          on_.places.push_back (place_in (on, x, y));
-          off_.places.push_back (place_in (off, x, y));
+          on_.places.push_back (on.place (x, y));
+          off_.places.push_back (off.place (x, y));
           for (int slot = 0; slot < schedule.slots (); slot++)
             light_on += schedule.on (x, y, slot) ? 1.0 : schedule.leak ();
           light_all += schedule.slots () * (1.0 + schedule.leak ());

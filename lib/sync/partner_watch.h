@@ -8,8 +8,8 @@
 
 #include "base/geometry.h"
 #include "base/image.h"
-#include "mapping/mapping.h"
 #include "schedule/schedule.h"
+#include "sync/mirror_light.h"
 
 namespace codedexposure
 {
@@ -37,13 +37,7 @@ public:
     bad,     ///< another pair is clearly better
   };
 
-  /** What is known of a camera. */
-  struct Camera {
-    Extent size;            ///< of its frames
-    const Mapping *mapping; ///< to the mirrors; null: pixels are mirrors
-    double black = 0.0;     ///< level without light
-    double white = 255.0;   ///< pixels from here on are saturated
-  };
+  using Camera = BeamCamera;
 
   /** @p on: in the beam of the mirrors that are on. */
   PartnerWatch (const Schedule &schedule, const Camera &on, const Camera &off);

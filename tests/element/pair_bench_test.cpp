@@ -6,11 +6,13 @@
 #include <iterator>
 #include <set>
 
+#include "common/messages.h"
 #include "pipeline.h"
 
 namespace
 {
 
+using namespace codedexposure::gst;
 using namespace codedexposure::test;
 
 constexpr GstClockTime kPeriod = 40 * GST_MSECOND;
@@ -128,6 +130,51 @@ TEST (PairBench, RecordingsOfBothCamerasMakeTheSamePairs)
   EXPECT_TRUE (bytes ("live.gray") == bytes ("played.gray"));
   for (const char *name : {"on.mkv", "off.mkv", "live.gray", "played.gray"})
     std::remove ((folder + "pair-" + name).c_str ());
+}
+
+/** Messages when the second camera looks @p shift mirrors to the right. */
+std::vector<PartnerDrifted>
+drifts (double shift, double &measured)
+{
+  Pipeline pipeline (
+      "videotestsrc num-buffers=640 pattern=smpte "
+      "! video/x-raw,format=GRAY8,width=288,height=216,framerate=100/1 "
+      "! tee name=light light. ! queue "
+      "! codedexposure-sim schedule=sequential:lattice:4/2 ! pair.on "
+      "light. ! queue ! codedexposure-sim beam=off "
+      "schedule=sequential:lattice:4/2 shift-x=" +
+      std::to_string (shift) +
+      " ! pair.off codedexposure-pair name=pair ! fakesink");
+  std::vector<PartnerDrifted> said;
+  const ObjectPtr<GstBus> bus (gst_element_get_bus (
+      GST_ELEMENT (GST_OBJECT_PARENT (pipeline["pair"].get ()))));
+  gst_bus_set_sync_handler (
+      bus.get (),
+      [] (GstBus *, GstMessage *message, gpointer data) {
+        if (const auto one = parse_message<PartnerDrifted> (message))
+          static_cast<std::vector<PartnerDrifted> *> (data)->push_back (*one);
+        return GST_BUS_PASS;
+      },
+      &said, nullptr);
+  EXPECT_EQ (pipeline.play (), "");
+  measured = property<double> (pipeline["pair"].get (), "drift-x");
+  EXPECT_LT (
+      property<double> (pipeline["pair"].get (), "drift-uncertainty"), 0.05);
+  return said;
+}
+
+TEST (PairBench, ASecondCameraThatHasMovedIsSaid)
+{
+  double measured = 0.0;
+  EXPECT_TRUE (drifts (0.03, measured).empty ());
+  EXPECT_NEAR (measured, -0.03, 0.02);
+  const auto said = drifts (0.25, measured);
+  EXPECT_NEAR (measured, -0.25, 0.05);
+  ASSERT_EQ (said.size (), 1u);
+  EXPECT_TRUE (said[0].active);
+  EXPECT_NEAR (said[0].x, -0.25, 0.05);
+  EXPECT_NEAR (said[0].y, 0.0, 0.05);
+  EXPECT_EQ (said[0].from, 4 * GST_SECOND);
 }
 
 TEST (PairBench, TheFramesOfTheOtherBeamAreNotDecoded)

@@ -1,0 +1,220 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "sync/partner_drift.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+namespace codedexposure
+{
+
+namespace
+{
+
+constexpr float kNone = std::numeric_limits<float>::quiet_NaN ();
+/* Parts of the frame along each axis, and mirrors of a part. */
+constexpr int kParts = 3, kMostMirrors = 96;
+/* Of a part; that of others says too little. */
+constexpr double kMaxUncertainty = 0.05;
+constexpr std::size_t kMinPlaces = 256;
+
+/* The smallest window that holds each label of @tile equally often. */
+Extent
+window_of (const Tile &tile)
+{
+  std::vector<int> count (std::size_t (tile.elements ()), 0);
+  for (int x = 0; x < tile.period_x (); x++)
+    count[std::size_t (tile.label (x, 0))]++;
+  const bool row_has_all =
+      std::ranges::all_of (count, [&] (int n) { return n == count[0]; });
+  return {tile.period_x (), row_has_all ? 1 : tile.period_y ()};
+}
+
+/* Of a window of @size around its middle; the ends of an even one count half.
+ */
+std::vector<float>
+weights_of (int size)
+{
+  std::vector<float> weights (std::size_t (size / 2 * 2 + 1), 1.0f);
+  if (size % 2 == 0)
+    weights.front () = weights.back () = 0.5f;
+  return weights;
+}
+
+/* Sums of products of the columns of a least-squares problem. */
+template <std::size_t Count>
+struct Products {
+  std::array<double, Count> sum = {};
+  std::array<std::array<double, Count>, Count> of = {};
+  double places = 0.0;
+
+  void add (const std::array<double, Count> &row)
+  {
+    for (std::size_t i = 0; i < Count; i++) {
+      sum[i] += row[i];
+      for (std::size_t j = 0; j <= i; j++)
+        of[i][j] += row[i] * row[j];
+    }
+    places++;
+  }
+  /* About the means. */
+  double at (std::size_t i, std::size_t j) const
+  {
+    return of[std::max (i, j)][std::min (i, j)] - sum[i] * sum[j] / places;
+  }
+};
+
+} // namespace
+
+/* Sums over a period around each mirror of a part; not a number where some of
+ * it is saturated. */
+struct PartnerDrift::Picture {
+  Extent size;
+  std::vector<float> levels;
+
+  float at (int x, int y) const
+  {
+    return levels[std::size_t (y) * std::size_t (size.width) + std::size_t (x)];
+  }
+};
+
+PartnerDrift::PartnerDrift (
+    const Schedule &schedule, const BeamCamera &on, const BeamCamera &off)
+    : period_ (window_of (schedule.tile ())), white_on_ (on.white),
+      white_off_ (off.white)
+{
+  const auto [width, height] = on.mirrors ();
+  const int rows = height - schedule.pilot_rows ();
+  part_ = {std::min (kMostMirrors, width / kParts),
+      std::min (kMostMirrors, rows / kParts)};
+  for (int i = 0; i < kParts * kParts; i++) {
+    const int left =
+        (2 * (i % kParts) + 1) * width / (2 * kParts) - part_.width / 2;
+    const int top =
+        (2 * (i / kParts) + 1) * rows / (2 * kParts) - part_.height / 2;
+    Part part{.middle = {left + part_.width / 2.0, top + part_.height / 2.0}};
+    bool is_seen = true;
+    for (int y = top; y < top + part_.height; y++)
+      for (int x = left; x < left + part_.width; x++) {
+        part.on.push_back (on.place (x, y));
+        part.off.push_back (off.place (x, y));
+        is_seen = is_seen && on.contains (part.on.back ()) &&
+                  off.contains (part.off.back ());
+      }
+    if (is_seen)
+      parts_.push_back (std::move (part));
+  }
+}
+
+template <typename Pixel>
+PartnerDrift::Picture
+PartnerDrift::picture (ImageView<const Pixel> frame,
+    const std::vector<Position> &places, double white) const
+{
+  const auto row = weights_of (period_.width);
+  const auto column = weights_of (period_.height);
+  const int wide = int (row.size ()) - 1, high = int (column.size ()) - 1;
+  std::vector<float> levels, sums;
+  levels.reserve (places.size ());
+  for (const Position place : places) {
+    const double level = bilinear (frame, place);
+    levels.push_back (level < white ? float (level) : kNone);
+  }
+  const auto width = std::size_t (part_.width);
+  const Extent inner{part_.width - wide, part_.height - high};
+  if (inner.width < 1 || inner.height < 1)
+    return {};
+  for (int y = 0; y < part_.height; y++)
+    for (int x = 0; x < inner.width; x++) {
+      float sum = 0.0f;
+      for (std::size_t i = 0; i < row.size (); i++)
+        sum += row[i] * levels[std::size_t (y) * width + std::size_t (x) + i];
+      sums.push_back (sum);
+    }
+  Picture picture{inner, {}};
+  for (int y = 0; y < inner.height; y++)
+    for (int x = 0; x < inner.width; x++) {
+      float sum = 0.0f;
+      for (std::size_t j = 0; j < column.size (); j++)
+        sum +=
+            column[j] * sums[(std::size_t (y) + j) * std::size_t (inner.width) +
+                             std::size_t (x)];
+      picture.levels.push_back (sum);
+    }
+  return picture;
+}
+
+/* The picture of the second camera is that of the first, less its gradient
+ * times the shift, times a factor. */
+std::optional<PartnerDrift::Shift>
+PartnerDrift::shift (
+    const Picture &on, const Picture &off, Position middle) const
+{
+  enum : std::size_t { kLevel, kAlongX, kAlongY, kSeen, kCount };
+  Products<kCount> sums;
+  for (int y = 1; y < on.size.height - 1; y++)
+    for (int x = 1; x < on.size.width - 1; x++) {
+      const std::array<double, kCount> row{on.at (x, y),
+          (on.at (x + 1, y) - on.at (x - 1, y)) / 2.0,
+          (on.at (x, y + 1) - on.at (x, y - 1)) / 2.0, off.at (x, y)};
+      if (!std::isnan (row[kAlongX] + row[kAlongY] + row[kLevel] + row[kSeen]))
+        sums.add (row);
+    }
+  if (sums.places < double (kMinPlaces))
+    return {};
+  /* Without the level, which is between them. */
+  const auto rest = [&] (std::size_t i, std::size_t j) {
+    return sums.at (i, j) -
+           sums.at (i, kLevel) * sums.at (j, kLevel) / sums.at (kLevel, kLevel);
+  };
+  const double xx = rest (kAlongX, kAlongX), yy = rest (kAlongY, kAlongY),
+               xy = rest (kAlongX, kAlongY), xs = rest (kAlongX, kSeen),
+               ys = rest (kAlongY, kSeen), ss = rest (kSeen, kSeen);
+  const double determinant = xx * yy - xy * xy;
+  const double factor = sums.at (kLevel, kSeen) / sums.at (kLevel, kLevel);
+  if (!(determinant > 0.0) || !(factor > 0.0))
+    return {};
+  const double x = (xs * yy - ys * xy) / determinant;
+  const double y = (ys * xx - xs * xy) / determinant;
+  /* Neighbouring sums have pixels in common. */
+  const double independent =
+      sums.places / (double (period_.width) * period_.height);
+  const double variance = std::max (0.0, ss - x * xs - y * ys) / sums.places *
+                          (sums.places / independent) * std::max (xx, yy) /
+                          determinant;
+  const double uncertainty = std::sqrt (variance) / factor;
+  if (!(uncertainty < kMaxUncertainty))
+    return {};
+  return Shift{{-x / factor, -y / factor}, uncertainty, middle};
+}
+
+template <typename Pixel, typename OtherPixel>
+std::optional<PartnerDrift::Shift>
+PartnerDrift::largest (
+    ImageView<const Pixel> on, ImageView<const OtherPixel> off) const
+{
+  std::optional<Shift> largest;
+  const auto length = [] (const Shift &shift) {
+    return std::hypot (shift.by.x, shift.by.y);
+  };
+  for (const Part &part : parts_) {
+    const auto found = shift (picture (on, part.on, white_on_),
+        picture (off, part.off, white_off_), part.middle);
+    if (found && (!largest || length (*found) > length (*largest)))
+      largest = found;
+  }
+  return largest;
+}
+
+template std::optional<PartnerDrift::Shift> PartnerDrift::largest (
+    ImageView<const std::uint8_t>, ImageView<const std::uint8_t>) const;
+template std::optional<PartnerDrift::Shift> PartnerDrift::largest (
+    ImageView<const std::uint16_t>, ImageView<const std::uint16_t>) const;
+template std::optional<PartnerDrift::Shift> PartnerDrift::largest (
+    ImageView<const std::uint8_t>, ImageView<const std::uint16_t>) const;
+template std::optional<PartnerDrift::Shift> PartnerDrift::largest (
+    ImageView<const std::uint16_t>, ImageView<const std::uint8_t>) const;
+
+} // namespace codedexposure

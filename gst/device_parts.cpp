@@ -1,12 +1,14 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "common/elements.h"
 #include "common/meta.h"
+#include "common/partner.h"
 #include "parts.h"
 
 bool
 codedexposure::gst::register_devices (GstPlugin *plugin)
 {
   register_meta (kFrameMetaName);
+  register_partner_meta ();
 #ifdef CODEDEXPOSURE_ARAVIS
   if (!GST_DEVICE_PROVIDER_REGISTER (codedexposure_cameraprovider, plugin))
     return false;

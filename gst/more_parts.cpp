@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "common/elements.h"
 #include "common/meta.h"
-#include "common/partner.h"
 #include "common/stats_report.h"
 #include "parts.h"
 
@@ -9,7 +8,6 @@ bool
 codedexposure::gst::register_more_elements (GstPlugin *plugin)
 {
   register_meta (kStatsMetaName);
-  register_partner_meta ();
   return GST_ELEMENT_REGISTER (codedexposure_fuse, plugin) &&
          GST_ELEMENT_REGISTER (codedexposure_pair, plugin) &&
          GST_ELEMENT_REGISTER (codedexposure_sum, plugin) &&

@@ -4,6 +4,7 @@
 #include "bench/simulated_dmd.h"
 #include "common/elements.h"
 #include "common/meta.h"
+#include "common/partner.h"
 
 namespace codedexposure::gst
 {
@@ -14,6 +15,7 @@ bool
 register_elements (GstPlugin *plugin)
 {
   register_meta (kFrameMetaName);
+  register_partner_meta ();
   serve_simulated_dmds ();
   return GST_ELEMENT_REGISTER (codedexposure_demux, plugin) &&
          GST_ELEMENT_REGISTER (codedexposure_filesink, plugin) &&

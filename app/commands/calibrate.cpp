@@ -26,6 +26,7 @@ public:
 
 private:
   void set_up_bench ();
+  void set_up_second (SourceOptions &second) const;
   void set_up_device (const SourcePlan &plan);
   std::string sink () const;
   void write (Job &job, GstElement *calib) const;
@@ -33,7 +34,8 @@ private:
   SourceOptions source_;
   RunOptions run_;
   std::string output_ = "mapping.json";
-  std::optional<Text> report_, mode_, stage_, sink_;
+  std::optional<Text> report_, second_, mode_, stage_, sink_;
+  SecondCamera beside_; // whose mapping is second_
   std::optional<double> mirror_pitch_, tolerance_;
 };
 
@@ -74,6 +76,12 @@ Calibrate::declare (Options &options)
   options.value ("--report", report_, "FILE.png",
       "picture of fringes, residuals and pixels [beside it]",
       file_ending_in (".png"));
+  options.value ("--second", second_, "FILE.json",
+      "also the mapping of a second camera, in the beam of the mirrors that "
+      "are "
+      "off, and its picture beside it",
+      file_ending_in (".json"));
+  beside_.declare (options);
   options.value ("--mode", mode_, "M",
       "auto, align (no mapping) or map (immediately) [auto]",
       one_of ({"auto", "align", "map"}));
@@ -91,6 +99,7 @@ Calibrate::declare (Options &options)
       "video sink [autovideosink; fakesink without a screen]");
   source_.declare (options);
   run_.declare (options);
+  beside_.declare_relations (options);
 }
 
 /* A bench that was just assembled, in white light that stays below the largest
@@ -112,12 +121,25 @@ Calibrate::set_up_bench ()
   source_.full_well = source_.full_well.value_or (10000);
   source_.read_noise = source_.read_noise.value_or (5);
   source_.psf_sigma = source_.psf_sigma.value_or (0.5);
+  beside_.simulate = [this] (SourceOptions &second) { set_up_second (second); };
   if (source_.shift_x || source_.shift_y || source_.rotation || source_.scale)
     return;
   source_.shift_x = 0.4;
   source_.shift_y = -0.3;
   source_.rotation = 0.5;
   source_.scale = 1.01;
+}
+
+/* It gets the light of all slots. */
+void
+Calibrate::set_up_second (SourceOptions &second) const
+{
+  constexpr double kWhite = 0.8;
+  second.gain = kWhite;
+  second.shift_x = -source_.shift_x.value_or (0);
+  second.shift_y = source_.shift_y.value_or (0);
+  second.rotation = -source_.rotation.value_or (0);
+  second.scale = source_.scale;
 }
 
 void
@@ -143,10 +165,16 @@ Calibrate::sink () const
 void
 Calibrate::write (Job &job, GstElement *calib) const
 {
-  const std::string report = report_.value_or (
-      std::filesystem::path (output_).replace_extension (".png"));
+  const auto picture_of = [] (const std::string &mapping) {
+    return std::filesystem::path (mapping).replace_extension (".png").string ();
+  };
   job.outputs.file (calib, "location", output_, {});
-  job.outputs.file (calib, "report", report, {});
+  job.outputs.file (
+      calib, "report", report_.value_or (picture_of (output_)), {});
+  if (!second_)
+    return;
+  job.outputs.file (calib, "second-location", *second_, {});
+  job.outputs.file (calib, "second-report", picture_of (*second_), {});
 }
 
 Exit
@@ -156,6 +184,8 @@ Calibrate::run ()
   if (stage_ == "simulated" && !simulated)
     usage_error ("--stage simulated needs the simulated bench; leave out "
                  "--camera and --source");
+  if (second_)
+    beside_.check (source_);
   start_gstreamer ();
   if (simulated)
     set_up_bench ();
@@ -166,8 +196,11 @@ Calibrate::run ()
   const bool fast = sink.starts_with ("fakesink") &&
                     sink.find ("sync=true") == std::string::npos;
   Job job ("calibrate", run_);
-  Chain chain =
-      coded_source (job, source_, plan, fast ? Pace::fast : Pace::live);
+  const Pace pace = fast ? Pace::fast : Pace::live;
+  constexpr Nanoseconds kPatience = 200'000'000;
+  Chain chain = second_
+                    ? coded_pairs (job, source_, plan, pace, beside_, kPatience)
+                    : coded_source (job, source_, plan, pace);
   Settings settings;
   set_if (settings, "mode", mode_);
   set_if (settings, "mirror-pitch", mirror_pitch_);

@@ -253,10 +253,6 @@ SecondCamera::check (const SourceOptions &first) const
                  "; name two cameras");
   if (bench)
     bench_of ("--second-bench", *bench);
-  if (!first.camera && first.device)
-    usage_error ("--device " + *first.device +
-                 ": a simulated DMD has one camera; leave it out, and the "
-                 "masks of both cameras step with the frames");
 }
 
 SourcePlan

@@ -3,6 +3,8 @@
  * DMD, or a source of the user. */
 #pragma once
 
+#include <functional>
+
 #include "base/geometry.h"
 #include "options.h"
 #include "schedule/schedule.h"
@@ -52,6 +54,8 @@ private:
 struct SecondCamera {
   std::optional<Text> camera; ///< none: a simulated one
   std::optional<Text> bench;  ///< what was measured with it
+  /** Changes what a simulated one has of the first; null: its noise only. */
+  std::function<void (SourceOptions &)> simulate = nullptr;
 
   /** Beside --second, which a command declares. */
   void declare (Options &options);

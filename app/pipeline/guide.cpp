@@ -60,6 +60,8 @@ private:
   void on_state (const std::string &state);
   void on_reading (const GstStructure *reading);
   void on_mapping (const GstStructure *mapping);
+  void say_mapping (const GstStructure *mapping, const char *camera);
+  void check_files (const GstStructure *mapping, const std::string &prefix);
   void move_stage (const GstStructure *reading);
 
   Job &job_;
@@ -68,7 +70,7 @@ private:
   Status status_;
   int readings_ = 0;
   std::string last_reading_;
-  bool mapped_ = false;
+  bool mapped_ = false, second_mapped_ = false;
   bool unwritten_ = false; ///< a requested file could not be written
   guint keys_ = 0;         ///< source of keys; 0: no terminal
 };
@@ -196,36 +198,57 @@ Guide::move_stage (const GstStructure *reading)
       scale * (1.0 + kMovePart * magnify), nullptr);
 }
 
+/* @camera: "" or "second camera, ". */
 void
-Guide::on_mapping (const GstStructure *mapping)
+Guide::say_mapping (const GstStructure *mapping, const char *camera)
 {
-  mapped_ = true;
   guint64 good = 0, uncovered = 0, saturated = 0;
   gst_structure_get (mapping, "good", G_TYPE_UINT64, &good, "uncovered",
       G_TYPE_UINT64, &uncovered, "saturated", G_TYPE_UINT64, &saturated,
       nullptr);
-  status_.line (format ("mapped: rotation %+.5f ± %.0e deg, magnification "
-                        "%.6f ± %.0e, offset %+.5f, %+.5f ± %.0e mirrors",
-      number_of (mapping, "rotation"), number_of (mapping, "sigma-rotation"),
-      number_of (mapping, "magnification"),
-      number_of (mapping, "sigma-magnification"),
-      number_of (mapping, "offset-x"), number_of (mapping, "offset-y"),
-      number_of (mapping, "sigma-x")));
-  status_.line (format ("pixels: %" G_GUINT64_FORMAT " good, %" G_GUINT64_FORMAT
-                        " see no mirror, %" G_GUINT64_FORMAT " saturated",
-      good, uncovered, saturated));
+  status_.line (
+      camera + format ("mapped: rotation %+.5f ± %.0e deg, magnification "
+                       "%.6f ± %.0e, offset %+.5f, %+.5f ± %.0e mirrors",
+                   number_of (mapping, "rotation"),
+                   number_of (mapping, "sigma-rotation"),
+                   number_of (mapping, "magnification"),
+                   number_of (mapping, "sigma-magnification"),
+                   number_of (mapping, "offset-x"),
+                   number_of (mapping, "offset-y"),
+                   number_of (mapping, "sigma-x")));
+  status_.line (
+      camera + format ("pixels: %" G_GUINT64_FORMAT " good, %" G_GUINT64_FORMAT
+                       " see no mirror, %" G_GUINT64_FORMAT " saturated",
+                   good, uncovered, saturated));
+}
+
+/* @prefix: of the properties that name them. */
+void
+Guide::check_files (const GstStructure *mapping, const std::string &prefix)
+{
+  for (const char *file : {"location", "report"}) {
+    gchar *asked = nullptr;
+    g_object_get (calib_, (prefix + file).c_str (), &asked, nullptr);
+    const bool is_written = mapping && !text_of (mapping, file).empty ();
+    unwritten_ |= !is_written && asked && *asked;
+    g_free (asked);
+  }
+}
+
+/* That of a second camera comes before it. */
+void
+Guide::on_mapping (const GstStructure *mapping)
+{
+  mapped_ = true;
+  say_mapping (mapping, "");
   double tolerance = 0;
   g_object_get (calib_, "tolerance", &tolerance, nullptr);
   StageCorrection remaining;
   remaining.deviation = number_of (mapping, "deviation");
   status_.line (alignment_verdict (remaining, tolerance));
-  for (const char *file : {"location", "report"}) {
-    const std::string path = text_of (mapping, file);
-    gchar *asked = nullptr;
-    g_object_get (calib_, file, &asked, nullptr);
-    unwritten_ |= path.empty () && asked && *asked;
-    g_free (asked);
-  }
+  check_files (mapping, "");
+  if (!second_mapped_)
+    check_files (nullptr, "second-");
   end ();
 }
 
@@ -237,7 +260,11 @@ Guide::on_element (const GstStructure *structure)
     on_state (text_of (structure, "state"));
   else if (name == "moirecalib/reading")
     on_reading (structure);
-  else if (name == "moirecalib/mapping")
+  else if (name == "moirecalib/second-mapping") {
+    second_mapped_ = true;
+    say_mapping (structure, "second camera, ");
+    check_files (structure, "second-");
+  } else if (name == "moirecalib/mapping")
     on_mapping (structure);
 }
 

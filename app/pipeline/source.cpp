@@ -186,8 +186,8 @@ simulate_camera (Job &job, const SourceOptions &options, const SourcePlan &plan,
   chain.caps ("video/x-raw,framerate=" + rate_text (plan.frame_rate));
 }
 
-/* Of both beams, behind one scene. A simulated DMD has one camera, so that the
- * masks of both step with the frames. */
+/* Of both beams, behind one scene and, if a device is set, one simulated DMD;
+ * without it, the masks of both step with the frames. */
 std::pair<Chain, Chain>
 simulated_cameras (Job &job, const SourceOptions &options,
     const SourcePlan &plan, Pace pace, const SourceOptions &second)
@@ -195,8 +195,11 @@ simulated_cameras (Job &job, const SourceOptions &options,
   GstElement *light = scene (job, options, plan, pace).to ("tee").last ();
   Chain on = job.graph.from (light).to ("queue");
   Chain off = job.graph.from (light).to ("queue");
-  simulate_camera (job, second, plan, off, {{"beam", "off"}});
-  simulate_camera (job, options, plan, on, {});
+  Settings dmd, beam{{"beam", "off"}};
+  set_if (dmd, "dmd", options.device);
+  set_if (beam, "dmd", options.device);
+  simulate_camera (job, second, plan, off, beam);
+  simulate_camera (job, options, plan, on, dmd);
   return {std::move (on), std::move (off)};
 }
 
@@ -282,6 +285,8 @@ coded_sources (Job &job, const SourceOptions &options, const SourcePlan &plan,
       other.seed = std::to_string (
           1 +
           std::strtoull (options.seed.value_or ("0").c_str (), nullptr, 10));
+      if (second.simulate)
+        second.simulate (other);
       return simulated_cameras (job, options, plan, pace, other);
     }
     if (second.bench)

@@ -302,4 +302,11 @@ struct MoireMapping {
       misfit, good, uncovered, low_contrast, saturated, outlier, move);
 };
 
+/** That of a second camera, in the other beam. */
+struct MoireSecondMapping {
+  static constexpr const char *kName = "moirecalib/second-mapping";
+  MoireMapping of;
+  CODED_FIELDS (of);
+};
+
 } // namespace codedexposure::gst

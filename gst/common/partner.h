@@ -22,7 +22,7 @@ struct Partner {
   CapsPtr caps;
 };
 
-/** Once, before the others. */
+/** Before the others; each plugin does. */
 void register_partner_meta ();
 /** Gives @p coded, which must be writable, a partner. */
 void set_partner (GstBuffer *coded, const Partner &partner);

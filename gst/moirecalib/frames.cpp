@@ -159,8 +159,11 @@ begin (GstMoireCalib *self, const Settings &settings, int bits)
 Sample
 copy_of (GstBuffer *buffer, const std::string &pattern, guint64 number)
 {
-  return {BufferPtr (gst_buffer_copy_deep (buffer)), pattern, number,
-      GST_BUFFER_PTS (buffer)};
+  auto partner = get_partner (buffer);
+  if (partner)
+    partner->buffer.reset (gst_buffer_copy_deep (partner->buffer.get ()));
+  return {BufferPtr (gst_buffer_copy_deep (buffer)), std::move (partner),
+      pattern, number, GST_BUFFER_PTS (buffer)};
 }
 
 /** Gives the worker a frame if it is idle. Exchange's lock. */
@@ -275,6 +278,8 @@ corrected_setup (const CalibState &st)
     setup->mapping.reset (); // the phase is that of an aligned camera
   } else if (setup && st.exchange.found.mapping)
     setup->mapping = st.exchange.found.mapping;
+  if (setup && setup->partner && st.exchange.found.second)
+    setup->partner->mapping = st.exchange.found.second;
   return setup;
 }
 

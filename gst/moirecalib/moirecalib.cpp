@@ -37,11 +37,15 @@
  * pattern. With #moirecalib:beam off, or if the stream's tag says so, it is
  * aligned and mapped to the same mirrors as the first one.
  *
+ * Both are mapped in one run where codedexposure-pair gives the frames of the
+ * second camera to those of the first: #moirecalib:second-location,
+ * #moirecalib:second-report and #moirecalib:second-mapping have the result.
+ *
  * ## Messages
  *
  * `moirecalib/state`, `moirecalib/reading`, `moirecalib/mapping`,
- * `moirecalib/phase` and PROGRESS messages with the code `mapping`; see
- * docs/streams.md.
+ * `moirecalib/second-mapping`, `moirecalib/phase` and PROGRESS messages with
+ * the code `mapping`; see docs/streams.md.
  *
  * ## Example pipeline
  *
@@ -104,6 +108,16 @@ properties ()
           "File for a picture of fringes, residuals and pixel quality, PNG; "
           "empty: none",
           kReadWrite, set (&Settings::report)},
+      {"second-location", "Location of the second mapping",
+          "File to write the mapping of a second camera to, in the beam of the "
+          "mirrors that are off, whose frames codedexposure-pair gives to "
+          "those "
+          "of the first; empty: none",
+          kReadWrite, set (&Settings::second_location)},
+      {"second-report", "Second report",
+          "File for a picture of its residuals and pixel quality, PNG; empty: "
+          "none",
+          kReadWrite, set (&Settings::second_report)},
       {"pattern", "Pattern",
           "Grating that the mirrors show all the time, such as "
           "grating-both:4/0, for a DMD that takes no masks at run time; no "
@@ -163,6 +177,10 @@ properties ()
       {"mapping", "Mapping",
           "The last mapping, JSON (docs/formats.md); empty: none yet; notifies",
           kReadOnly, &CalibState::mapping},
+      {"second-mapping", "Second mapping",
+          "The last mapping of a second camera, JSON; empty: none yet; "
+          "notifies",
+          kReadOnly, &CalibState::second_mapping},
   };
 }
 

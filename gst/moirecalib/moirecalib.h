@@ -18,6 +18,7 @@
 #include "calibrate/session.h"
 #include "common/beam.h"
 #include "common/element.h"
+#include "common/partner.h"
 #include "common/raii.h"
 #include "report.h"
 #include "setup/stream_setup.h"
@@ -34,8 +35,8 @@ using Stage = CalibrationStage;
 struct Settings {
   Mode mode = Mode::automatic;
   guint turn = 0; ///< counts settings of the mode
-  std::string location;
-  std::string report;
+  std::string location, report;
+  std::string second_location, second_report;
   std::string pattern;
   std::string schedule; ///< whose tile is looked for; "": the stream's
   Beam beam = Beam::kOn;
@@ -59,6 +60,7 @@ struct Settings {
  */
 struct Sample {
   BufferPtr frame;
+  std::optional<Partner> partner; ///< its copy
   std::string pattern;
   guint64 number = 0;
   GstClockTime pts = 0;
@@ -96,7 +98,7 @@ struct Progress {
 
 /** The last result: a mapping, or a schedule with the phase that was found. */
 struct Finding {
-  std::optional<Mapping> mapping;
+  std::optional<Mapping> mapping, second;
   std::optional<Schedule> schedule;
   bool due = false; ///< to be sent downstream
 };
@@ -133,8 +135,9 @@ struct Stream {
 
 /** The object lock is never held while pushing, querying or posting. */
 struct CalibState {
-  Settings settings;              ///< object lock
-  std::string mapping;            ///< object lock: JSON, "" before
+  Settings settings; ///< object lock
+  /** Object lock: JSON, "" before. */
+  std::string mapping, second_mapping;
   Stage stage = Stage::searching; ///< object lock: the property
 
   Exchange exchange;

@@ -6,7 +6,7 @@
 #include <system_error>
 
 #include "common/messages.h"
-#include "moirecalib.h"
+#include "second.h"
 
 #define GST_CAT_DEFAULT moirecalib_debug
 
@@ -46,8 +46,8 @@ say_phase (GstMoireCalib *self, const Sample &sample,
                 tile.confidence, tile.contrast, found.schedule.text ()});
 }
 
-void
-say_mapping (GstMoireCalib *self, const CalibrationResult &result,
+MoireMapping
+message_of (GstMoireCalib *self, const CalibrationResult &result,
     const std::string &location, const std::string &report)
 {
   const auto pixels = [&result] (PixelQuality what) {
@@ -56,13 +56,12 @@ say_mapping (GstMoireCalib *self, const CalibrationResult &result,
   const Pose pose = result.mapping.pose ();
   const StageCorrection correction =
       correct_stage (result.mapping, settings_of (self).stage);
-  post_message (self,
-      MoireMapping{{move_of (correction, result.mapping.pose_sigma ())},
-          result.mapping.to_json (), location, report, pose.shift_x,
-          pose.shift_y, pose.stretch, result.psf_sigma, result.misfit,
-          pixels (PixelQuality::good), pixels (PixelQuality::uncovered),
-          pixels (PixelQuality::low_contrast), pixels (PixelQuality::saturated),
-          pixels (PixelQuality::outlier)});
+  return {{move_of (correction, result.mapping.pose_sigma ())},
+      result.mapping.to_json (), location, report, pose.shift_x, pose.shift_y,
+      pose.stretch, result.psf_sigma, result.misfit,
+      pixels (PixelQuality::good), pixels (PixelQuality::uncovered),
+      pixels (PixelQuality::low_contrast), pixels (PixelQuality::saturated),
+      pixels (PixelQuality::outlier)};
 }
 
 constexpr const char *kMapping = "mapping"; // code of PROGRESS messages
@@ -86,11 +85,12 @@ private:
   void collect (const Sample &sample);
   void solve ();
   void finish (const CalibrationResult &result);
+  void finish_second ();
   struct Written {
     std::string location, report; ///< paths; empty: not written
   };
-  Written write_files (
-      const CalibrationResult &result, const Settings &settings);
+  Written write_files (CalibrationReport report, const Settings &settings,
+      const std::string &location, const std::string &to);
   void fail (const std::string &why);
   void fail_of_memory ();
   void set (Stage stage);
@@ -116,6 +116,7 @@ private:
   Settings settings_;
   Geometry geometry_;
   std::optional<CalibrationSession> session_; ///< of this run
+  std::optional<SecondSession> second_;       ///< beside it
   std::optional<StageCorrection> correction_; ///< that the panel shows
   bool failed_ = false;                       ///< in this run
 };
@@ -126,6 +127,7 @@ Worker::begin (guint run)
   run_ = run;
   settings_ = settings_of (self_);
   session_.reset ();
+  second_.reset ();
   correction_.reset ();
   failed_ = false;
   std::optional<Schedule> schedule = geometry_.schedule;
@@ -252,6 +254,11 @@ Worker::collect (const Sample &sample)
       [&] (auto pixels) { return session_->collect (pattern, pixels); });
   if (!added)
     return fail (added.error ().message);
+  if (sample.partner) {
+    if (!second_)
+      second_.emplace (geometry_, settings_);
+    second_->collect (pattern, *sample.partner);
+  }
   const int collected = session_->collected ();
   const std::string text = "frame " + std::to_string (collected) + " of " +
                            std::to_string (total) + ", " + sample.pattern;
@@ -316,6 +323,7 @@ Worker::solve ()
     return;
   set (Stage::solving);
   draw ("solving", {std::to_string (session_->collected ()) + " frames"}, 1.0);
+  finish_second ();
   const auto result = session_->solve ();
   if (!result)
     return fail (result.error ().message);
@@ -323,44 +331,77 @@ Worker::solve ()
     finish (**result);
 }
 
+/* @report: with the result. */
 Worker::Written
-Worker::write_files (const CalibrationResult &result, const Settings &settings)
+Worker::write_files (CalibrationReport report, const Settings &settings,
+    const std::string &location, const std::string &to)
 {
   Written written;
+  const CalibrationResult &result = *report.result;
   const auto take = [this] (const std::string &path, const Result<void> &done) {
     if (!done)
       POST_WARNING (self_, RESOURCE, WRITE, done.error ().message);
     return done ? path : "";
   };
-  if (!settings.location.empty ())
-    written.location =
-        take (settings.location, result.mapping.save (settings.location));
-  if (settings.report.empty ())
+  if (!location.empty ())
+    written.location = take (location, result.mapping.save (location));
+  if (to.empty ())
     return written;
   const StageCorrection correction =
       correct_stage (result.mapping, settings.stage);
   const double tolerance = settings.stage.tolerance;
-  CalibrationReport report{.title = "Camera against mirrors",
-      .verdict = alignment_verdict (correction, tolerance),
-      .within = correction.deviation <= tolerance,
-      .lines = report_lines (result, correction),
-      .before = session_->first_fringes (),
-      .after = session_->last_fringes (),
-      .result = &result};
-  if (const auto live = Pattern::parse (settings.live_pattern ()))
+  report.verdict = alignment_verdict (correction, tolerance);
+  report.within = correction.deviation <= tolerance;
+  report.lines = report_lines (result, correction);
+  const auto live = Pattern::parse (settings.live_pattern ());
+  if (live && report.before)
     report.lines.push_back (
         "Fringes: from white to white is a displacement of " +
         std::to_string (live->period) + " mirrors");
-  written.report =
-      take (settings.report, write_report (settings.report, report));
+  written.report = take (to, write_report (to, report));
   return written;
+}
+
+/* Before that of the first camera, which ends the run. */
+void
+Worker::finish_second ()
+{
+  const Settings settings = settings_of (self_);
+  const auto warn = [&] (const std::string &why) {
+    POST_WARNING (self_, STREAM, FAILED,
+        "There is no mapping of the second camera: " + why);
+  };
+  if (!second_ && !settings.second_location.empty ())
+    warn ("its frames did not come with those of the first; put "
+          "codedexposure-pair before moirecalib");
+  if (!second_)
+    return;
+  const auto solved = second_->solve ();
+  if (!solved)
+    return warn (solved.error ().message);
+  if (!*solved)
+    return warn ("its frames cannot be read");
+  const CalibrationResult &result = **solved;
+  const Written written = write_files (
+      {.title = "Second camera against mirrors", .result = &result}, settings,
+      settings.second_location, settings.second_report);
+  locked (
+      self_, [&] { state (self_).second_mapping = result.mapping.to_json (); });
+  locked (exchange_.lock, [&] { exchange_.found.second = result.mapping; });
+  g_object_notify (G_OBJECT (self_), "second-mapping");
+  post_message (self_, MoireSecondMapping{message_of (
+                           self_, result, written.location, written.report)});
 }
 
 void
 Worker::finish (const CalibrationResult &result)
 {
   const Settings settings = settings_of (self_);
-  const Written written = write_files (result, settings);
+  const Written written = write_files ({.title = "Camera against mirrors",
+                                           .before = session_->first_fringes (),
+                                           .after = session_->last_fringes (),
+                                           .result = &result},
+      settings, settings.location, settings.report);
   locked (self_, [&] { state (self_).mapping = result.mapping.to_json (); });
   locked (exchange_.lock, [&] {
     exchange_.found.mapping = result.mapping;
@@ -373,7 +414,8 @@ Worker::finish (const CalibrationResult &result)
   post_progress (self_, GST_PROGRESS_TYPE_COMPLETE, kMapping,
       "mapped with " + std::to_string (session_->collected ()) + " frames");
   g_object_notify (G_OBJECT (self_), "mapping");
-  say_mapping (self_, result, written.location, written.report);
+  post_message (
+      self_, message_of (self_, result, written.location, written.report));
 }
 
 /** The next one; the exchange's lock is held. Collected frames come first, and

@@ -44,4 +44,24 @@ period_of (GstAggregatorPad *pad, GstBuffer *frame)
                                               : 40 * GST_MSECOND;
 }
 
+Found
+find_partner (GstAggregatorPad *on, GstAggregatorPad *off, GstBuffer *coded,
+    bool late, BufferPtr &partner, guint64 &dropped)
+{
+  const Instant start = instant_of (on, coded);
+  const auto slack = GstClockTimeDiff (period_of (on, coded) / 4);
+  while (const BufferPtr next{gst_aggregator_pad_peek_buffer (off)}) {
+    const auto late_by = later_by (instant_of (off, next.get ()), start);
+    if (late_by && *late_by > slack)
+      return Found::kNone;
+    if (late_by && *late_by >= -slack) {
+      partner.reset (gst_aggregator_pad_pop_buffer (off));
+      return Found::kPartner;
+    }
+    gst_aggregator_pad_drop_buffer (off);
+    dropped++;
+  }
+  return late || gst_aggregator_pad_is_eos (off) ? Found::kNone : Found::kWait;
+}
+
 } // namespace codedexposure::gst

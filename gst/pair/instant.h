@@ -6,6 +6,8 @@
 
 #include <gst/base/gstaggregator.h>
 
+#include "common/raii.h"
+
 namespace codedexposure::gst
 {
 
@@ -23,6 +25,13 @@ std::optional<GstClockTimeDiff> later_by (
 
 /** From one frame to the next. */
 GstClockTime period_of (GstAggregatorPad *pad, GstBuffer *frame);
+
+enum class Found { kPartner, kNone, kWait };
+/** Takes the partner of @p coded, the next frame of @p on, from @p off; drops
+ * frames before it, and counts them in @p dropped. @p late: no longer waits for
+ * it. */
+Found find_partner (GstAggregatorPad *on, GstAggregatorPad *off,
+    GstBuffer *coded, bool late, BufferPtr &partner, guint64 &dropped);
 
 GstSegment segment_at (GstAggregatorPad *pad);
 

@@ -16,9 +16,8 @@
  * Partners are frames whose exposures begin within a quarter of a frame period
  * of each other: by the start that the metadata of both say, else by running
  * time. Arrival and numbers do not count. A coded frame without a partner
- * passes alone, as it came. So does one that is corrupted or shows a pattern,
- * or whose partner is or does. A frame of the second camera without a coded
- * frame is dropped.
+ * passes alone, as it came. So does one that is corrupted, or whose partner is.
+ * A frame of the second camera without a coded frame is dropped.
  *
  * Time stamps can be wrong by a frame. The sum of both beams has the light of
  * the whole exposure and shows no masks; that of different exposures shows them
@@ -175,39 +174,12 @@ sink (gpointer self, const char *name)
   return GST_AGGREGATOR_PAD (pad_of (GST_ELEMENT (self), name).get ());
 }
 
-/* Whether the pixels of @frame are the scene through the masks of the
- * schedule. */
+/* Its pixels are not the scene through the masks of the schedule. */
 bool
-is_coded (GstBuffer *frame)
+shows_pattern (GstBuffer *frame)
 {
   const auto meta = get_frame_meta (frame);
-  return !is_corrupted (frame) && (!meta || meta->pattern.empty ());
-}
-
-enum class Found { kPartner, kNone, kWait };
-
-/* The partner of @coded, which is taken from its pad; frames before it are
- * dropped. @late: no longer waits for it. */
-Found
-find_partner (
-    GstCodedExposurePair *self, GstBuffer *coded, bool late, BufferPtr &partner)
-{
-  GstAggregatorPad *on = sink (self, "on"), *off = sink (self, "off");
-  const Instant start = instant_of (on, coded);
-  const auto slack = GstClockTimeDiff (period_of (on, coded) / 4);
-  while (const BufferPtr next{gst_aggregator_pad_peek_buffer (off)}) {
-    const auto late_by = later_by (instant_of (off, next.get ()), start);
-    if (late_by && *late_by > slack)
-      return Found::kNone;
-    if (late_by && *late_by >= -slack) {
-      partner.reset (gst_aggregator_pad_pop_buffer (off));
-      return Found::kPartner;
-    }
-    gst_aggregator_pad_drop_buffer (off);
-    const ObjectLock lock (self);
-    state (self).counters.dropped++;
-  }
-  return late || gst_aggregator_pad_is_eos (off) ? Found::kNone : Found::kWait;
+  return meta && !meta->pattern.empty ();
 }
 
 std::optional<PairStream>
@@ -262,8 +234,12 @@ judge (GstCodedExposurePair *self, GstBuffer *coded, GstBuffer *partner)
 {
   if (!partner)
     return Alone::missing;
-  if (!is_coded (coded) || !is_coded (partner))
+  if (is_corrupted (coded) || is_corrupted (partner))
     return Alone::damaged;
+  if (shows_pattern (coded) || shows_pattern (partner)) {
+    state (self).check.reset ();
+    return Alone::no;
+  }
   return compare (self, coded, partner);
 }
 
@@ -331,7 +307,10 @@ aggregate (GstAggregator *aggregator, gboolean late)
     return GST_FLOW_EOS;
   }
   BufferPtr partner;
-  const Found found = find_partner (self, head.get (), late, partner);
+  guint64 dropped = 0;
+  const Found found =
+      find_partner (on, off, head.get (), late, partner, dropped);
+  locked (self, [&] { return state (self).counters.dropped += dropped; });
   if (found == Found::kWait)
     return GST_AGGREGATOR_FLOW_NEED_DATA;
   BufferPtr coded (gst_aggregator_pad_pop_buffer (on));
@@ -339,7 +318,8 @@ aggregate (GstAggregator *aggregator, gboolean late)
     return GST_AGGREGATOR_FLOW_NEED_DATA;
   const Alone alone = judge (self, coded.get (), partner.get ());
   if (!reason_of (alone)) {
-    watch_drift (self, coded.get (), partner.get ());
+    if (!shows_pattern (coded.get ()))
+      watch_drift (self, coded.get (), partner.get ());
     coded.reset (gst_buffer_make_writable (coded.release ()));
     CapsPtr caps (gst_pad_get_current_caps (GST_PAD (off)));
     set_partner (coded.get (), {std::move (partner), std::move (caps)});
@@ -474,6 +454,25 @@ sink_query (GstAggregator *aggregator, GstAggregatorPad *pad, GstQuery *query)
   return TRUE;
 }
 
+/* The dmdsync of the first camera drives the mirrors. */
+gboolean
+src_event (GstAggregator *aggregator, GstEvent *event)
+{
+  if (GST_EVENT_TYPE (event) == GST_EVENT_CUSTOM_UPSTREAM)
+    return gst_pad_push_event (GST_PAD (sink (aggregator, "on")), event);
+  return parent_class<GstAggregatorClass> (aggregator)
+      ->src_event (aggregator, event);
+}
+
+gboolean
+src_query (GstAggregator *aggregator, GstQuery *query)
+{
+  if (GST_QUERY_TYPE (query) == GST_QUERY_CUSTOM)
+    return gst_pad_peer_query (GST_PAD (sink (aggregator, "on")), query);
+  return parent_class<GstAggregatorClass> (aggregator)
+      ->src_query (aggregator, query);
+}
+
 GstFlowReturn
 flush (GstAggregator *aggregator)
 {
@@ -555,6 +554,8 @@ set_up (gpointer klass)
   aggregator->update_src_caps = GST_DEBUG_FUNCPTR (update_caps);
   aggregator->sink_event = GST_DEBUG_FUNCPTR (sink_event);
   aggregator->sink_query = GST_DEBUG_FUNCPTR (sink_query);
+  aggregator->src_event = GST_DEBUG_FUNCPTR (src_event);
+  aggregator->src_query = GST_DEBUG_FUNCPTR (src_query);
   aggregator->flush = GST_DEBUG_FUNCPTR (flush);
   aggregator->stop = GST_DEBUG_FUNCPTR (stop);
   for (const char *name : {"on", "off"})

@@ -129,9 +129,9 @@ watch_mirrors (GstCodedExposureSim *self, const std::vector<int> &masks)
 
 /* The mask of a slot as one camera sees it. @parked: where no mirror is on. */
 int
-seen_mask (SimulatedMirrors &mirrors, std::int64_t slot, int parked)
+seen_mask (Stream &stream, std::int64_t slot, int parked)
 {
-  const int mask = mirrors.mask_in_slot (slot).value_or (parked);
+  const int mask = stream.view->mask_in_slot (slot).value_or (parked);
   return mask < 0 ? parked : mask;
 }
 
@@ -151,7 +151,7 @@ complement_of (std::shared_ptr<const StillMask> mask)
 std::vector<int>
 find_masks (GstCodedExposureSim *self, std::int64_t frame)
 {
-  const Stream &stream = state (self).stream;
+  Stream &stream = state (self).stream;
   const int slots = stream.schedule->slots ();
   /* Mirrors that are parked throw all light at the second camera. */
   const int parked = stream.beam == Beam::kOff ? OpticalBench::kAllMirrors : -1;
@@ -159,7 +159,7 @@ find_masks (GstCodedExposureSim *self, std::int64_t frame)
   for (int slot = 0; slot < slots; slot++) {
     const std::int64_t counted = frame * slots + slot;
     masks.push_back (stream.mirrors
-                         ? seen_mask (*stream.mirrors, counted, parked)
+                         ? seen_mask (stream, counted, parked)
                          : int (counted % stream.schedule->masks ()));
   }
   if (stream.beam == Beam::kOn)
@@ -271,7 +271,7 @@ begin_exposure (GstCodedExposureSim *self, GstBuffer *inbuf)
   stream.discont = false;
   stream.last_start = exposure.start;
   stream.last_frame = exposure.frame;
-  auto held = stream.mirrors ? stream.mirrors->held () : nullptr;
+  auto held = stream.view ? stream.view->held () : nullptr;
   if (held != stream.held)
     stream.seen = stream.beam == Beam::kOff ? complement_of (held) : held;
   stream.held = std::move (held);
@@ -449,6 +449,9 @@ begin_stream (GstCodedExposureSim *self)
         self, "dmd '" + dmd +
                   "' is no simulated DMD; write sim:NAME, with the name that "
                   "dmdsync's device has.");
+  if (stream.mirrors)
+    stream.view = std::make_unique<SimulatedMirrors::View> (
+        stream.mirrors, beam == Beam::kOn);
   ScheduleRef schedule = wanted_schedule (self);
   return schedule && use_schedule (self, std::move (schedule));
 }

@@ -73,8 +73,8 @@
  * that are off: it sees the complement of every mask, and the light between
  * masks. Two such elements behind a tee, with the same schedule, are a bench
  * with two cameras, each with optics and noise of its own;
- * codedexposure-pair brings their frames together. A simulated DMD has one
- * camera, in either beam: two of them leave #codedexposure-sim:dmd empty.
+ * codedexposure-pair brings their frames together. Both can look at one
+ * simulated DMD: then the second one waits for the first in each slot.
  *
  * ## Gaps, tags and messages
  *

@@ -69,8 +69,9 @@ struct Exposure {
 
 /** All that is forgotten from PAUSED to READY. Sink pad's stream lock. */
 struct Stream {
-  std::shared_ptr<SimulatedMirrors> mirrors; ///< null: masks in step
-  ScheduleRef schedule;                      ///< of the plan and the tag
+  std::shared_ptr<SimulatedMirrors> mirrors;    ///< null: masks in step
+  std::unique_ptr<SimulatedMirrors::View> view; ///< of them
+  ScheduleRef schedule;                         ///< of the plan and the tag
   std::optional<BenchProfile> profile;
   Beam beam = Beam::kOn;
   /** The schedule with the leak of the profile, as the beam has it. */

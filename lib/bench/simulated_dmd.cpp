@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "bench/simulated_dmd.h"
 
+#include <chrono>
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "base/text.h"
@@ -78,6 +80,58 @@ std::optional<int>
 SimulatedMirrors::mask_in_slot (std::int64_t slot)
 {
   const std::lock_guard guard (lock_);
+  return decide (slot);
+}
+
+SimulatedMirrors::View::View (
+    std::shared_ptr<SimulatedMirrors> mirrors, bool leads)
+    : mirrors_ (std::move (mirrors)), leads_ (leads)
+{
+  const std::lock_guard guard (mirrors_->lock_);
+  mirrors_->leading_ += leads_;
+}
+
+SimulatedMirrors::View::~View ()
+{
+  {
+    const std::lock_guard guard (mirrors_->lock_);
+    mirrors_->leading_ -= leads_;
+    mirrors_->seen_.clear ();
+  }
+  mirrors_->moved_.notify_all ();
+}
+
+std::optional<int>
+SimulatedMirrors::View::mask_in_slot (std::int64_t slot)
+{
+  constexpr std::size_t kMost = 4096;
+  /* For a leading view that stands still. */
+  constexpr std::chrono::seconds kPatience (2);
+  std::unique_lock guard (mirrors_->lock_);
+  auto &seen = mirrors_->seen_;
+  if (slot <= last_)
+    seen.clear (); // it counts anew
+  last_ = slot;
+  if (!leads_)
+    mirrors_->moved_.wait_for (guard, kPatience,
+        [&] { return mirrors_->leading_ == 0 || seen.contains (slot); });
+  if (leads_ || !seen.contains (slot)) {
+    const auto mask = mirrors_->decide (slot);
+    seen.insert_or_assign (slot, Seen{mask, mirrors_->held_});
+  }
+  const Seen found = seen.at (slot);
+  while (seen.size () > kMost)
+    seen.erase (seen.begin ());
+  held_ = found.held;
+  guard.unlock ();
+  mirrors_->moved_.notify_all ();
+  return found.mask;
+}
+
+/* Under the lock. */
+std::optional<int>
+SimulatedMirrors::decide (std::int64_t slot)
+{
   if (!schedule_)
     return std::nullopt;
   if (slot % schedule_->slots () == 0)

@@ -2,8 +2,10 @@
 /* A DMD in this process, for the optical bench in software. */
 #pragma once
 
+#include <condition_variable>
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -82,13 +84,30 @@ public:
    */
   std::optional<int> mask_in_slot (std::int64_t slot);
 
-  /** The mask that is held in the exposure of the last mask_in_slot (); null if
-   * the schedule's masks are shown. */
-  std::shared_ptr<const StillMask> held () const
+  /** One of two benches, in both beams, which count the same slots. */
+  class View
   {
-    const std::lock_guard guard (lock_);
-    return held_;
-  }
+  public:
+    /** @p leads: in the beam of the mirrors that are on. */
+    View (std::shared_ptr<SimulatedMirrors> mirrors, bool leads);
+    ~View ();
+    View (const View &) = delete;
+    View &operator= (const View &) = delete;
+
+    /** SimulatedMirrors::mask_in_slot (). What the leading view saw is kept for
+     * the other one, which waits for it: the driver of the mirrors expects that
+     * no exposure begins before the leading view has begun it. */
+    std::optional<int> mask_in_slot (std::int64_t slot);
+    /** The mask that is held in the exposure of that slot; null if the
+     * schedule's masks are shown. */
+    const std::shared_ptr<const StillMask> &held () const { return held_; }
+
+  private:
+    const std::shared_ptr<SimulatedMirrors> mirrors_;
+    const bool leads_;
+    std::int64_t last_ = -1; // slot that it asked for
+    std::shared_ptr<const StillMask> held_;
+  };
 
   /** From slot @p slot on, the masks come @p by slots late (> 0) or early
    * (< 0): a missed or a spurious trigger. Slips add up, in the order of their
@@ -106,7 +125,13 @@ private:
     int by;
   };
 
+  struct Seen {
+    std::optional<int> mask;
+    std::shared_ptr<const StillMask> held;
+  };
+
   void begin_exposure ();
+  std::optional<int> decide (std::int64_t slot);
 
   mutable std::mutex lock_; // covers everything below; a leaf lock
   std::optional<Schedule> schedule_;
@@ -117,6 +142,9 @@ private:
   bool owes_dark_exposure_ = false;
   std::deque<Slip> slips_;
   std::int64_t offset_ = 0;
+  std::map<std::int64_t, Seen> seen_; // of slots, for the other view
+  int leading_ = 0;                   // views
+  std::condition_variable moved_;     // seen_ or leading_
 };
 
 /**

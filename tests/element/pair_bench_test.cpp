@@ -1,17 +1,22 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure-pair between the other elements, on simulated benches with two
  * cameras. */
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <iterator>
 #include <set>
 
+#include "bench/lens.h"
 #include "common/messages.h"
+#include "common/tag.h"
 #include "pipeline.h"
 
 namespace
 {
 
+using namespace codedexposure;
 using namespace codedexposure::gst;
 using namespace codedexposure::test;
 
@@ -175,6 +180,67 @@ TEST (PairBench, ASecondCameraThatHasMovedIsSaid)
   EXPECT_NEAR (said[0].x, -0.25, 0.05);
   EXPECT_NEAR (said[0].y, 0.0, 0.05);
   EXPECT_EQ (said[0].from, 4 * GST_SECOND);
+}
+
+/* By how much a corner is elsewhere. */
+double
+worst_error (const Mapping &mapping, const Alignment &stand)
+{
+  const auto [width, height] = mapping.camera ();
+  const Homography truth = camera_to_mirrors (stand, width, height);
+  double worst = 0.0;
+  for (const double x : {0.0, width - 1.0})
+    for (const double y : {0.0, height - 1.0}) {
+      const Position found = mapping.mirror_at (x, y);
+      const Projected seen = project (truth, x, y);
+      worst = std::max (worst, std::hypot (found.x - seen.x, found.y - seen.y));
+    }
+  return worst;
+}
+
+TEST (PairBench, BothCamerasAreCalibratedInOneRun)
+{
+  constexpr Alignment kFirst{
+      .shift_x = 0.4, .shift_y = -0.3, .rotation = 0.5, .scale = 1.01},
+      kSecond{.shift_x = -0.2, .shift_y = 0.1, .rotation = -0.4, .scale = 0.99};
+  const auto camera = [] (const std::string &beam, double gain,
+                          const Alignment &stand) {
+    return "light. ! queue ! codedexposure-sim dmd=sim:both-calib "
+           "full-well=10000 read-noise=5 psf-sigma=0.5 beam=" +
+           beam + " gain=" + std::to_string (gain) +
+           " shift-x=" + std::to_string (stand.shift_x) +
+           " shift-y=" + std::to_string (stand.shift_y) +
+           " rotation=" + std::to_string (stand.rotation) +
+           " scale=" + std::to_string (stand.scale) + " ! dmdsync " +
+           (beam == "on" ? "device=sim:both-calib,size=256x192 "
+                         : "beam=off ") +
+           "! pair." + beam + " ";
+  };
+  Pipeline pipeline (
+      "videotestsrc num-buffers=1400 pattern=white "
+      "! video/x-raw,format=GRAY8,width=256,height=192,framerate=100/1 "
+      "! tee name=light " +
+      camera ("on", 3.2, kFirst) + camera ("off", 0.8, kSecond) +
+      "codedexposure-pair name=pair ! moirecalib name=calib mode=map frames=4 "
+      "overlay=false ! codedexposure-fuse ! fakesink");
+  ASSERT_EQ (pipeline.play (), "");
+  const auto calib = pipeline["calib"];
+  const auto first =
+      Mapping::from_json (text_property (calib.get (), "mapping"));
+  ASSERT_TRUE (first) << first.error ().message;
+  EXPECT_LT (worst_error (*first, kFirst), 1e-3);
+  const auto second =
+      Mapping::from_json (text_property (calib.get (), "second-mapping"));
+  ASSERT_TRUE (second) << second.error ().message;
+  EXPECT_LT (worst_error (*second, kSecond), 2e-3);
+  /* What goes on has both. */
+  const EventPtr tag (gst_pad_get_sticky_event (
+      pipeline.pad ("calib", "src").get (), GST_EVENT_TAG, 0));
+  ASSERT_TRUE (tag);
+  const auto setup = setup_from_tags (tags_of (tag.get ()));
+  ASSERT_TRUE (setup && *setup && setup->value ().partner);
+  EXPECT_EQ (setup->value ().partner->mapping->to_json (), second->to_json ());
+  EXPECT_EQ (setup->value ().mapping->to_json (), first->to_json ());
 }
 
 TEST (PairBench, TheFramesOfTheOtherBeamAreNotDecoded)

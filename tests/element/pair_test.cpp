@@ -220,12 +220,21 @@ TEST_F (Pair, WhatIsDamagedIsNoPartnerAndGetsNone)
   auto on = frames ({0, 1, 2, 3}), partners = frames ({0, 1, 2, 3});
   GST_BUFFER_FLAG_SET (on[0].get (), GST_BUFFER_FLAG_CORRUPTED);
   GST_BUFFER_FLAG_SET (partners[1].get (), GST_BUFFER_FLAG_GAP);
+  EXPECT_EQ (run (std::move (on), std::move (partners)),
+      (Numbers{{0, kAlone}, {1, kAlone}, {2, 2}, {3, 3}}));
+  expect_lost ("damaged", 2, 0, 2 * kPeriod);
+}
+
+/* A calibration needs both cameras. */
+TEST_F (Pair, FramesOfAPatternHavePartners)
+{
+  auto on = frames ({0, 1, 2});
   FrameMeta meta;
   meta.pattern = "dmdsync:white";
-  set_frame_meta (partners[2].get (), meta);
-  EXPECT_EQ (run (std::move (on), std::move (partners)),
-      (Numbers{{0, kAlone}, {1, kAlone}, {2, kAlone}, {3, 3}}));
-  expect_lost ("damaged", 3, 0, 3 * kPeriod);
+  meta.frame = 1;
+  set_frame_meta (on[1].get (), meta);
+  EXPECT_EQ (run (std::move (on), frames ({0, 1, 2})),
+      (Numbers{{0, 0}, {1, 1}, {2, 2}}));
 }
 
 TEST_F (Pair, GapsOfTheFirstCameraStayBetweenItsFrames)

@@ -73,6 +73,41 @@ TEST (SimulatedMirrors, StartedInMidExposureWaitForTheNext)
   EXPECT_EQ (masks_shown (mirrors, 2, 6), (std::vector{-1, -1, 0, 1, 2, 3}));
 }
 
+/* The second one waits for the first. */
+TEST (SimulatedMirrors, AreSeenAlikeByTwoCameras)
+{
+  const auto mirrors = std::make_shared<SimulatedMirrors> ();
+  std::optional<SimulatedMirrors::View> on (std::in_place, mirrors, true);
+  SimulatedMirrors::View off (mirrors, false);
+  const auto masks = [] (SimulatedMirrors::View &view, int first, int count) {
+    std::vector<int> seen;
+    for (int s = first; s < first + count; s++)
+      seen.push_back (view.mask_in_slot (s).value_or (-1));
+    return seen;
+  };
+  mirrors->program (Schedule ());
+  std::vector<int> seen;
+  std::jthread second ([&] { seen = masks (off, 0, 16); });
+  EXPECT_EQ (masks (*on, 0, 4), (std::vector{-1, -1, -1, -1}));
+  mirrors->start ();
+  EXPECT_EQ (masks (*on, 4, 4), (std::vector{0, 1, 2, 3}));
+  mirrors->hold ({.name = "all", .on = [] (int, int) { return true; }});
+  mirrors->start ();
+  const auto change = masks (*on, 8, 4);
+  EXPECT_EQ (change, (std::vector{-1, -1, -1, -1}));
+  const auto all = masks (*on, 12, 4);
+  EXPECT_TRUE (on->held ());
+  second.join ();
+  EXPECT_EQ (std::vector (seen.begin () + 4, seen.begin () + 8),
+      (std::vector{0, 1, 2, 3}));
+  EXPECT_EQ (std::vector (seen.begin () + 8, seen.begin () + 12), change);
+  EXPECT_EQ (std::vector (seen.begin () + 12, seen.end ()), all);
+  EXPECT_EQ (off.held (), on->held ());
+  /* Alone, it does not wait. */
+  on.reset ();
+  EXPECT_EQ (masks (off, 16, 4), all);
+}
+
 TEST (SimulatedMirrors, PilotMasksFollowTheParityOfTheFrame)
 {
   SimulatedMirrors mirrors;

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure bench: an emulated GigE Vision camera, and a board on an
  * emulated USB, for another command. */
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <cstring>
@@ -18,6 +19,7 @@
 #include "emulation/frame_source.h"
 #include "emulation/own_network.h"
 #include "emulation/served_bench.h"
+#include "emulation/shared_trigger.h"
 #include "pipeline/plugin.h"
 #include "pipeline/source.h"
 #include "pipeline/status.h"
@@ -40,6 +42,7 @@ private:
   struct Camera {
     std::unique_ptr<Job> job;
     std::unique_ptr<FrameSource> frames;
+    std::unique_ptr<TriggeredCamera> triggered; ///< one of two
     std::unique_ptr<GigeCamera> camera;
   };
 
@@ -58,9 +61,10 @@ private:
   std::optional<Text> dmd_, faults_, jitter_, address_;
   std::optional<int> cameras_;
   std::optional<double> drift_, packet_loss_, trigger_rate_;
-  bool no_outputs_ = false, log_ = false, verbose_ = false;
+  bool no_outputs_ = false, log_ = false, verbose_ = false, second_ = false;
   std::vector<std::string> command_;
   Status status_{"bench", false};
+  std::unique_ptr<SharedTrigger> trigger_; // of both cameras
   std::vector<Camera> open_;
   std::unique_ptr<ServedBench> served_;
 };
@@ -105,6 +109,9 @@ Bench::declare (Options &options)
   options.heading ("");
   options.value ("--cameras", cameras_, "N",
       "number of cameras, at 127.0.0.1, 127.0.0.2 ... [1]", whole (1, 9));
+  options.flag ("--second", second_,
+      "also a camera in the beam of the mirrors that are off, at 127.0.0.2, "
+      "which sees the same scene and is triggered with the first");
   options.value ("--drift", drift_, "PPM",
       "how much the clock of the camera is fast [0]",
       real (-500, 500, "a number of ppm from -500 to 500"));
@@ -139,9 +146,10 @@ Bench::declare (Options &options)
       {"--input", "--input-rate", "--scene", "--pattern", "--schedule",
           "--bench", "--psf-sigma", "--full-well", "--read-noise", "--gain",
           "--shift-x", "--shift-y", "--rotation", "--scale", "--frames",
-          "--trigger-rate", "--cameras", "--address"},
+          "--trigger-rate", "--cameras", "--address", "--second"},
       "--dmd");
-  options.exclude ({"--cameras"}, "--address");
+  options.exclude ({"--cameras", "--second"}, "--address");
+  options.exclude ({"--cameras"}, "--second");
 }
 
 void
@@ -206,13 +214,26 @@ Bench::open_camera (int number)
   value_of (options.faults.add (faults_.value_or ("")), Exit::usage);
   Camera &opened = open_.emplace_back ();
   opened.job = std::make_unique<Job> ("bench", RunOptions{});
-  Chain chain = simulation (*opened.job, source_, plan_, Pace::fast);
+  SourceOptions source = source_;
+  Settings beam;
+  if (second_ && number == 2) {
+    beam = {{"beam", "off"}};
+    source.seed = std::to_string (1 + std::stoull (source.seed.value_or ("0")));
+  }
+  Chain chain = simulation (*opened.job, source, plan_, Pace::fast, beam);
   limit_frames (*opened.job, source_, chain);
   const bool loop = !source_.frames && source_.input;
   opened.frames = value_of (FrameSource::open (chain, loop));
   FrameSource &frames = *opened.frames;
   options.width = frames.info ().width;
   options.height = frames.info ().height;
+  if (second_) {
+    opened.triggered = std::make_unique<TriggeredCamera> (*trigger_, frames);
+    options.shoot = [camera = opened.triggered.get ()] (
+                        ImageView<std::uint16_t> picture) {
+      return camera->shoot (picture);
+    };
+  }
   opened.camera = value_of (GigeCamera::open (
       options, [&frames] (std::uint64_t, ImageView<std::uint16_t> picture) {
         return frames.take (picture);
@@ -248,12 +269,15 @@ Bench::words () const
 {
   if (!command_.empty ())
     return command_;
-  return {"/proc/self/exe", "live", "--camera", "127.0.0.1", "--size",
-      size_text (plan_.size), "--frame-rate",
+  std::vector<std::string> live{"/proc/self/exe", "live", "--camera",
+      "127.0.0.1", "--size", size_text (plan_.size), "--frame-rate",
       std::to_string (plan_.frame_rate.num) + "/" +
           std::to_string (plan_.frame_rate.den),
       "--pixel-format", plan_.bits > 8 ? "Mono16" : "Mono8", "--schedule",
       source_.schedule.value_or ("sequential:2x2")};
+  if (second_)
+    live.insert (live.end (), {"--second", "--second-camera", "127.0.0.2"});
+  return live;
 }
 
 /* A terminal sends its signals to both, and the camera must not end before the
@@ -313,13 +337,17 @@ Bench::run ()
   sigprocmask (SIG_BLOCK, &ends, &before);
   sigdelset (&ends, SIGCHLD);
   if (!address_)
-    value_of (leave_network (cameras_.value_or (1)));
+    value_of (leave_network (second_ ? 2 : cameras_.value_or (1)));
   start_gstreamer ();
   plan_ = SourcePlan::make (source_);
+  const int cameras = second_ ? 2 : cameras_.value_or (1);
+  if (second_)
+    trigger_ = std::make_unique<SharedTrigger> (
+        std::llround (1e9 / camera_options (1).trigger_rate));
   if (dmd_)
     open_board ();
   else
-    for (int number = 1; number <= cameras_.value_or (1); number++)
+    for (int number = 1; number <= cameras; number++)
       open_camera (number);
   if (address_)
     return serve_until_end (ends);

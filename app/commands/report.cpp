@@ -51,8 +51,10 @@ private:
   void check_end (const RunResult &result);
   std::size_t choose_frame (const Measurement &all) const;
   PlayTimes times_of (const Measurement &all, std::size_t shown) const;
+  /** What is written of the frame that is shown. */
+  enum class Kind { split, fused, sum };
   void write_pictures (const PageFolder &folder, ReportPage &page,
-      const PlayTimes &times, bool salvage, bool fused);
+      const PlayTimes &times, bool salvage, Kind kind);
 
   std::string recording_;
   std::optional<Text> output_, line_;
@@ -185,7 +187,7 @@ Report::times_of (const Measurement &all, std::size_t shown) const
 
 void
 Report::write_pictures (const PageFolder &folder, ReportPage &page,
-    const PlayTimes &times, bool salvage, bool fused)
+    const PlayTimes &times, bool salvage, Kind kind)
 {
   Job job ("report", run_);
   job.options.json = job.has_result = false;
@@ -200,7 +202,11 @@ Report::write_pictures (const PageFolder &folder, ReportPage &page,
     style.coded = job.counted;
     write_video (job, chain.to ("queue"), folder.path (name + "/"), style);
   };
-  if (fused) {
+  if (kind == Kind::sum) {
+    style.white.reset ();
+    job.counted = frames.to ("codedexposure-sum").last ();
+    write (frames, "sum");
+  } else if (kind == Kind::fused) {
     DecodeOptions fast = decode_;
     fast.fuse = "fast";
     write (add_fusion (job, frames, fast, {}).pictures, "fused");
@@ -243,9 +249,11 @@ Report::run ()
   check_end (frame.result);
   ReportPage page (all, frame,
       {.recording = recording_, .line = options.line, .decode = decode_});
-  write_pictures (folder, page, options.times, frame.salvaged, false);
+  write_pictures (folder, page, options.times, frame.salvaged, Kind::split);
   if (page.regions () > 0)
-    write_pictures (folder, page, options.times, frame.salvaged, true);
+    write_pictures (folder, page, options.times, frame.salvaged, Kind::fused);
+  if (frame.pairs > 0)
+    write_pictures (folder, page, options.times, frame.salvaged, Kind::sum);
   page.write (folder);
   folder.publish ();
   const std::string name = *output_ + (output_->ends_with ("/") ? "" : "/");

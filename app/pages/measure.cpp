@@ -2,6 +2,7 @@
 #include "measure.h"
 
 #include "common/meta.h"
+#include "common/partner.h"
 #include "common/stats_report.h"
 #include "common/tag.h"
 #include "pipeline/decoder.h"
@@ -80,6 +81,14 @@ measure_once (const MeasureOptions &options, bool salvage)
   if (options.decode.bits)
     all.coded.bits = all.subframes.bits = *options.decode.bits;
   Chain frames = read_recording (job, options.recording);
+  gst_pad_add_probe (
+      pad_of (job.reader, "src").get (), GST_PAD_PROBE_TYPE_BUFFER,
+      [] (GstPad *, GstPadProbeInfo *info, gpointer pairs) {
+        *static_cast<std::size_t *> (pairs) +=
+            get_partner (GST_PAD_PROBE_INFO_BUFFER (info)).has_value ();
+        return GST_PAD_PROBE_OK;
+      },
+      &all.pairs, nullptr);
   const DecoderPads pads = add_demux (job, frames, options.decode, {});
   add_meter (pads.pictures, options, all.subframes, options.subframes_csv);
   add_meter (pads.coded (), options, all.coded, options.coded_csv);

@@ -42,6 +42,7 @@ struct Measurement {
   MeasuredStream coded, subframes;
   RunResult result;
   bool salvaged = false; ///< the recording was read past damage
+  std::size_t pairs = 0; ///< coded frames with one of a second camera
 };
 
 /** What is measured, and where to. */

@@ -207,6 +207,10 @@ ReportPage::head () const
               rate_text (double (slots ()) * rate ()).c_str ())},
       {"Method", provenance_.method + " (--method " +
                      source_.decode.method.value_or ("auto") + ")"}};
+  if (all_.pairs > 0)
+    rows.emplace_back ("Cameras",
+        format ("two; %zu of %zu coded frames have one of the second camera",
+            all_.pairs, all_.coded.pictures.size ()));
   if (setup.simulated)
     rows.emplace_back ("Source", "simulated bench; no camera recorded this");
   if (setup.bench)
@@ -283,6 +287,20 @@ ReportPage::animation (const PageFolder &folder) const
                 k < subframe.size () ? double (subframe[k].pts) / 1e9 : 0.0);
   }
   return text + "</svg>";
+}
+
+/* Of two cameras. */
+void
+ReportPage::add_sum (Page &page, const PageFolder &folder) const
+{
+  const auto sum = pictures_in (folder.path ("sum"));
+  if (sum.empty ())
+    return;
+  page.heading ("Both cameras");
+  page.picture (sum.front (),
+      "The sum of both: the picture of the whole exposure, with all of the "
+      "light",
+      "frame");
 }
 
 void
@@ -509,6 +527,7 @@ ReportPage::write (const PageFolder &folder) const
              "</h1>\n");
   page.rows (head ()).html (links (folder));
   add_pictures (page, folder);
+  add_sum (page, folder);
   if (regions () > 0)
     add_regions (page, folder);
   add_charts (page, folder);

@@ -32,7 +32,7 @@ public:
   /** Regions of the schedule. */
   std::size_t regions () const;
   /** Writes page and figures. The pictures lie in coded/, subframes/, region-I/
-   * and fused/ of @p folder. */
+   * fused/ and sum/ of @p folder. */
   void write (const PageFolder &folder) const;
 
 private:
@@ -44,6 +44,7 @@ private:
   std::string profiles_csv () const;
   std::string animation (const PageFolder &folder) const;
   double seconds_each () const;
+  void add_sum (Page &page, const PageFolder &folder) const;
   void add_pictures (Page &page, const PageFolder &folder) const;
   void add_regions (Page &page, const PageFolder &folder) const;
   void add_charts (Page &page, const PageFolder &folder) const;

@@ -139,7 +139,7 @@ say_observable (GstDmdSync *self)
 {
   const SyncState &st = self->state;
   const SlipObservable observable = slip_observable (st.schedule);
-  if (observable == SlipObservable::always || is_off_beam (st))
+  if (observable == SlipObservable::always || is_off_beam (self))
     return;
   const std::string schedule = st.schedule.text ();
   const std::string which = observable == SlipObservable::never

@@ -213,8 +213,8 @@ PatternSight look_for_pattern (GstDmdSync *self, GstBuffer *buffer,
 /** Of the bench profile, in digital numbers; 0: not known. */
 int black_level (const SyncState &st);
 /** Whether the camera sees the complement of the masks, by which no phase is
- * watched. */
-bool is_off_beam (const SyncState &st);
+ * watched. Takes the object lock. */
+bool is_off_beam (GstDmdSync *self);
 /** Forgets what frames have shown of the phase. */
 void begin_phase (GstDmdSync *self);
 gboolean set_caps (GstBaseTransform *trans, GstCaps *incaps, GstCaps *outcaps);

@@ -102,7 +102,7 @@ own_setup (GstDmdSync *self)
   StreamSetup setup = setup_at (
       GST_BASE_TRANSFORM_SRC_PAD (self), st.schedule, st.stream.mapping);
   setup.simulated = st.stream.simulated;
-  setup.off_beam = is_off_beam (st);
+  setup.off_beam = is_off_beam (self);
   const auto &frames = st.stream.frames;
   setup.bits =
       frames && frames->knows_bits () ? frames->bits () : st.stream.bits;
@@ -232,9 +232,11 @@ black_level (const SyncState &st)
 }
 
 bool
-is_off_beam (const SyncState &st)
+is_off_beam (GstDmdSync *self)
 {
-  return st.settings.beam == Beam::kOff || st.stream.off_beam;
+  const SyncState &st = state (self);
+  return locked (self, [&] { return st.settings.beam; }) == Beam::kOff ||
+         st.stream.off_beam;
 }
 
 void

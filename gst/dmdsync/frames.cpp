@@ -288,7 +288,7 @@ void
 watch_phase (GstDmdSync *self, Frame &frame)
 {
   SyncState &st = state (self);
-  if (is_off_beam (st))
+  if (is_off_beam (self))
     return;
   if (!frame.sight.coded) {
     frame.phase.locked = false;

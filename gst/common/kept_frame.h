@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "meta.h"
+#include "partner.h"
 #include "raii.h"
 
 namespace codedexposure::gst
@@ -24,6 +25,15 @@ kept_frame (GstBuffer *frame)
   }
   return BufferPtr (
       most > 0 ? gst_buffer_copy_deep (frame) : gst_buffer_ref (frame));
+}
+
+/** Bytes of @p frame, and of its partner. */
+inline guint64
+bytes_of (GstBuffer *frame)
+{
+  const auto partner = get_partner (frame);
+  return gst_buffer_get_size (frame) +
+         (partner ? gst_buffer_get_size (partner->buffer.get ()) : 0);
 }
 
 /** Significant bits of the pixels of @p frame: @p set unless that is 0, else

@@ -534,7 +534,7 @@ properties ()
           "than its mapping has them, where that is worst, to the right; 0: "
           "not known, too",
           [] (const Shift &shift) { return shift.by.x; }),
-      drift ("drift-y", "Drift along columns", "The same, downwards",
+      drift ("drift-y", "Drift along columns", "The same as drift-x, downwards",
           [] (const Shift &shift) { return shift.by.y; }),
       drift ("drift-uncertainty", "Uncertainty of the drift",
           "Standard deviation of drift-x and drift-y, mirrors; 0: they are not "

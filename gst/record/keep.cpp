@@ -261,7 +261,7 @@ transform_ip (GstBaseTransform *base, GstBuffer *frame) noexcept
   BufferPtr kept = kept_frame (frame);
   locked (state.mutex, [&] {
     state.frames.buffers.push_back (std::move (kept));
-    state.frames.bytes += gst_buffer_get_size (frame);
+    state.frames.bytes += bytes_of (frame);
     state.frames.limit (state.in_force.length, state.in_force.max_bytes);
     return true;
   });

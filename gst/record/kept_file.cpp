@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/part.h"
+#include "common/kept_frame.h"
 #include "common/meta.h"
 #include "record/track.h"
 
@@ -121,7 +122,7 @@ void
 KeptFrames::limit (GstClockTime longest, std::uint64_t most_bytes)
 {
   while (buffers.size () > 1 && (length () > longest || bytes > most_bytes)) {
-    bytes -= gst_buffer_get_size (buffers.front ().get ());
+    bytes -= bytes_of (buffers.front ().get ());
     buffers.pop_front ();
   }
 }

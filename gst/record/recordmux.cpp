@@ -344,19 +344,19 @@ end_branch (GstElement *self, Branch &branch)
 }
 
 /* That of the second camera; frames with partners come, and none came yet. */
-bool
+void
 add_partner (GstElement *self)
 {
   auto &state = state_in<Self> (self);
   Branch &branch = state.partner;
   add_branch (self, branch);
   if (!begin_branch (self, branch, settings_of (as<Self> (self))))
-    return false;
+    return;
   for (GstElement *part :
       {branch.lines, branch.encoder, branch.frames, branch.log})
     if (part)
       gst_element_sync_state_with_parent (part);
-  return gst_element_link_pads (state.coded.log, "partner", branch.log, "sink");
+  gst_element_link_pads (state.coded.log, "partner", branch.log, "sink");
 }
 
 void

@@ -319,6 +319,32 @@ TEST_F (RecordPairs, APartnerThatIsDamagedIsNoneAndIsSaid)
   EXPECT_EQ (said.lost[0].from, 6 * kPeriod);
 }
 
+TEST_F (RecordPairs, FramesThatAreKeptHaveThem)
+{
+  std::string location = at ("kept");
+  location.pop_back ();
+  Pipeline pipeline (pairs () + "! codedexposure-keep name=keep location=" +
+                     location + " ! fakesink name=live");
+  Seen live, kept;
+  live.follow (pipeline, "live");
+  auto state = std::pair (pipeline["keep"].get (), 0);
+  gst_pad_add_probe (
+      pipeline.pad ("live", "sink").get (), GST_PAD_PROBE_TYPE_BUFFER,
+      [] (GstPad *, GstPadProbeInfo *, gpointer data) {
+        auto &[keep, frames] = *static_cast<decltype (state) *> (data);
+        if (++frames == int (kFrames))
+          g_object_set (keep, "keep", TRUE, nullptr);
+        return GST_PAD_PROBE_OK;
+      },
+      &state, nullptr);
+  ASSERT_EQ (pipeline.play (), "");
+  gst_element_set_state (
+      top_of (pipeline, "live").get (), GST_STATE_NULL); // it is written
+  ASSERT_EQ (play (kept, "kept-frame000000.mkv"), "");
+  EXPECT_EQ (kept.times.size (), kFrames);
+  EXPECT_TRUE (kept.partners == live.partners);
+}
+
 TEST_F (RecordPairs, ASecondCameraThatComesLaterIsSaidNotToBeRecorded)
 {
   Pipeline pipeline (

@@ -157,14 +157,16 @@ Exit
 Live::run ()
 {
   constexpr int kWaiting = 8; // frames, for the demultiplexer
+  constexpr Nanoseconds kPatience = 100'000'000;
   if (second_)
     beside_.check (source_);
   start_gstreamer ();
   Job job ("live", run_);
   job.ends_by_signal = true;
   const SourcePlan plan = this->plan ();
-  Chain frames = second_ ? coded_pairs (job, source_, plan, Pace::live, beside_)
-                         : coded_source (job, source_, plan, Pace::live);
+  Chain frames =
+      second_ ? coded_pairs (job, source_, plan, Pace::live, beside_, kPatience)
+              : coded_source (job, source_, plan, Pace::live);
   if (record_)
     frames = job.graph.from (add_recording (job, frames, plan), "src_%u");
   job.keeper = window_.add_keeper (frames, "live", source_.bits);

@@ -31,7 +31,8 @@
  *
  * In a live pipeline, a coded frame waits for its partner as long as the
  * latency of the slower camera and a quarter of a frame period allow, and then
- * goes alone.
+ * goes alone. The property `latency` adds to that: a pipeline that records, and
+ * nobody looks at, can wait for a second (latency=1000000000).
  *
  * ## Drift
  *

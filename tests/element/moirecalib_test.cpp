@@ -5,10 +5,10 @@
 #include <cmath>
 #include <filesystem>
 
-#include "bench/lens.h"
 #include "calibrate/gratings.h"
 #include "common/events.h"
 #include "common/tag.h"
+#include "mapping_error.h"
 #include "sync_bench.h"
 
 namespace
@@ -76,20 +76,6 @@ protected:
   BufferPtr last;
 };
 
-double
-worst_error (const Mapping &mapping)
-{
-  const Homography truth = camera_to_mirrors (kStand, kWidth, kHeight);
-  double worst = 0.0;
-  for (const double x : {0.0, kWidth - 1.0})
-    for (const double y : {0.0, kHeight - 1.0}) {
-      const Position found = mapping.mirror_at (x, y);
-      const Projected seen = project (truth, x, y);
-      worst = std::max (worst, std::hypot (found.x - seen.x, found.y - seen.y));
-    }
-  return worst;
-}
-
 } // namespace
 
 TEST_F (MoireCalibTest, SaysHowTheBenchStandsAndHowToMove)
@@ -128,7 +114,7 @@ TEST_F (MoireCalibTest, MapsAndTellsEverybody)
   const std::string json = string_field (said, "mapping");
   const Result<Mapping> mapping = Mapping::from_json (json);
   ASSERT_TRUE (mapping.ok ()) << mapping.error ().message;
-  EXPECT_LT (worst_error (*mapping), 0.02);
+  EXPECT_LT (worst_error (*mapping, kStand), 0.02);
   EXPECT_EQ (text_property (calib.get (), "mapping"), json);
   const Result<Mapping> saved = Mapping::load (file.string ());
   ASSERT_TRUE (saved.ok ()) << saved.error ().message;
@@ -172,7 +158,7 @@ TEST_F (MoireCalibTest, ACameraInTheOtherBeamStandsAgainstTheSameMirrors)
   ASSERT_TRUE (said);
   const auto mapping = Mapping::from_json (string_field (said, "mapping"));
   ASSERT_TRUE (mapping.ok ()) << mapping.error ().message;
-  EXPECT_LT (worst_error (*mapping), 0.01);
+  EXPECT_LT (worst_error (*mapping, kStand), 0.01);
 }
 
 TEST_F (MoireCalibTest, NamesNoFileThatItCouldNotWrite)

@@ -1,16 +1,14 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure-pair between the other elements, on simulated benches with two
  * cameras. */
-#include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <iterator>
 #include <set>
 
-#include "bench/lens.h"
 #include "common/messages.h"
 #include "common/tag.h"
+#include "mapping_error.h"
 #include "pipeline.h"
 
 namespace
@@ -180,22 +178,6 @@ TEST (PairBench, ASecondCameraThatHasMovedIsSaid)
   EXPECT_NEAR (said[0].x, -0.25, 0.05);
   EXPECT_NEAR (said[0].y, 0.0, 0.05);
   EXPECT_EQ (said[0].from, 4 * GST_SECOND);
-}
-
-/* By how much a corner is elsewhere. */
-double
-worst_error (const Mapping &mapping, const Alignment &stand)
-{
-  const auto [width, height] = mapping.camera ();
-  const Homography truth = camera_to_mirrors (stand, width, height);
-  double worst = 0.0;
-  for (const double x : {0.0, width - 1.0})
-    for (const double y : {0.0, height - 1.0}) {
-      const Position found = mapping.mirror_at (x, y);
-      const Projected seen = project (truth, x, y);
-      worst = std::max (worst, std::hypot (found.x - seen.x, found.y - seen.y));
-    }
-  return worst;
 }
 
 TEST (PairBench, BothCamerasAreCalibratedInOneRun)

@@ -355,8 +355,11 @@ notice (const GstStructure *message)
   const auto number = [&] (const char *field) {
     return number_in (message, field);
   };
+  const std::string of = gst_structure_has_field (message, "camera")
+                             ? " of the second camera"
+                             : "";
   if (name == "codedexposure/frames-lost")
-    return "warning: coded frames were lost before " +
+    return "warning: coded frames" + of + " were lost before " +
            seconds_in (message, "to") + ": " + number ("count");
   if (name == "dmdsync/frame-incomplete")
     return "warning: frame " + number ("frame") +
@@ -370,11 +373,11 @@ notice (const GstStructure *message)
   gst_structure_get_boolean (message, "active", &active);
   if (name == "codedexposure/frames-damaged" && active)
     return "warning: from frame " + number ("frame") + " (" +
-           seconds_in (message, "from") +
-           ") on, frames are flagged: " + number ("reason");
+           seconds_in (message, "from") + ") on, frames" + of +
+           " are flagged: " + number ("reason");
   if (name == "codedexposure/frames-damaged")
-    return "warning: frames that are flagged from frame " + number ("frame") +
-           " on: " + number ("count");
+    return "warning: frames" + of + " that are flagged from frame " +
+           number ("frame") + " on: " + number ("count");
   if (name == "codedexposure/partner-lost" && active)
     return "warning: from " + seconds_in (message, "from") +
            " on, coded frames have no partner of the second camera: " +
@@ -393,14 +396,14 @@ notice (const GstStructure *message)
            "again";
   if (name == "codedexposure/frames-missing")
     return "warning: from " + seconds_in (message, "from") +
-           " on, recorded frames are missing: " + number ("count");
+           " on, recorded frames" + of + " are missing: " + number ("count");
   if (name == "codedexposure/stream-cut")
-    return "warning: the stream ended without its last line: it was cut off, "
-           "its sender was stopped, or it is a segment of a longer recording";
+    return "warning: the stream" + of +
+           " ended without its last line: it was cut off, its sender was "
+           "stopped, or it is a segment of a longer recording";
   if (name == "codedexposure/stream-incomplete")
-    return "warning: recorded frames are missing with all that is known of "
-           "them: " +
-           number ("count") +
+    return "warning: recorded frames" + of +
+           " are missing with all that is known of them: " + number ("count") +
            "; the recording is damaged, or this is not its first part";
   if (name == "codedexposure/camera-back")
     return "the camera sends frames again, after " +

@@ -13,6 +13,9 @@
 namespace codedexposure::gst
 {
 
+/* In the queue of frames. */
+static constexpr guint kFrames = 8;
+
 /* ----------------------------------------------------------- raw frames -- */
 
 namespace
@@ -211,7 +214,7 @@ CameraTracks::add_frames (GstPad *pad, const FrameReading &how)
   if (!make_decoder (pad, caps.get (), how))
     return;
   queue_ = gst_element_factory_make ("queue", nullptr);
-  g_object_set (queue_, "max-size-buffers", 8u, "max-size-bytes", 0u,
+  g_object_set (queue_, "max-size-buffers", kFrames, "max-size-bytes", 0u,
       "max-size-time", kNoLimit, nullptr);
   gst_bin_add (GST_BIN (element_), queue_);
   if (decoder_) {
@@ -225,6 +228,15 @@ CameraTracks::add_frames (GstPad *pad, const FrameReading &how)
       pad, pad_of (queue_, "sink").get (), GST_PAD_LINK_CHECK_NOTHING);
 }
 
+gboolean
+CameraTracks::on_starving (GstElement *, gpointer self) noexcept
+{
+  guint waiting = 0;
+  g_object_get (static_cast<CameraTracks *> (self)->queue_,
+      "current-level-buffers", &waiting, nullptr);
+  return waiting >= kFrames;
+}
+
 void
 CameraTracks::add_lines (GstPad *pad)
 {
@@ -236,6 +248,7 @@ CameraTracks::begin (Nanoseconds tick)
 {
   restore_ = make_part (gst_coded_exposure_restore_get_type ());
   set_tick (tick);
+  g_signal_connect (restore_, "starving", G_CALLBACK (on_starving), this);
   gst_bin_add (GST_BIN (element_), restore_);
   gst_element_sync_state_with_parent (restore_);
 }

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/meta.h"
+#include "common/tag.h"
 
 namespace codedexposure::gst
 {
@@ -16,8 +17,9 @@ namespace
 /* Partners that wait for their frames. */
 constexpr std::size_t kMost = 8;
 
-/* A recording has a partner of the time of each frame. Where it is damaged, so
- * that none comes any more, frames go on without after this. */
+/* A recording has a partner of the time of each frame. In a damaged one, none
+ * may come any more. If the demuxer has filled the queue of the frames by then,
+ * which it would wait for, frames go on without after this time. */
 constexpr std::chrono::seconds kPatience (5);
 
 PartnerInput &
@@ -29,6 +31,13 @@ input_of (GstPad *pad)
 } // namespace
 
 /* ------------------------------------------------------------------- pad -- */
+
+void
+PartnerInput::add_signal (gpointer klass)
+{
+  g_signal_new ("starving", G_TYPE_FROM_CLASS (klass), G_SIGNAL_RUN_LAST, 0,
+      nullptr, nullptr, nullptr, G_TYPE_BOOLEAN, 0);
+}
 
 void
 PartnerInput::take_over (GstPad *pad)
@@ -60,17 +69,21 @@ PartnerInput::chain (GstPad *pad, GstObject *, GstBuffer *buffer) noexcept
   BufferPtr owned (buffer);
   std::unique_lock lock (self.lock_);
   self.moved_.wait (lock, [&] {
-    return self.partners_.size () < kMost || self.frames_ended_ ||
+    return self.partners_.size () < kMost || !self.is_wanted_ ||
            self.is_flushing_;
   });
   if (self.is_flushing_)
     return GST_FLOW_FLUSHING;
-  if (self.frames_ended_ || !self.caps_)
+  if (!self.is_wanted_ || !self.caps_)
     return GST_FLOW_OK;
   self.is_stalled_ = false;
+  self.moved_.notify_all ();
+  if (!self.is_off_beam_) {
+    self.has_ended_ = true; // none of them is a partner
+    return GST_FLOW_OK;
+  }
   self.partners_.push_back (
       {std::move (owned), CapsPtr (gst_caps_ref (self.caps_.get ()))});
-  self.moved_.notify_all ();
   return GST_FLOW_OK;
 }
 
@@ -87,6 +100,13 @@ PartnerInput::event (GstPad *pad, GstObject *, GstEvent *owned) noexcept
   case GST_EVENT_CAPS:
     self.caps_.reset (gst_caps_ref (caps_of (event.get ())));
     break;
+  case GST_EVENT_TAG:
+    if (const auto setup = setup_from_tags (tags_of (event.get ()));
+        setup && *setup) {
+      self.is_off_beam_ = setup->value ().off_beam;
+      self.has_ended_ = false;
+    }
+    break;
   case GST_EVENT_EOS:
     self.has_ended_ = true;
     break;
@@ -94,7 +114,8 @@ PartnerInput::event (GstPad *pad, GstObject *, GstEvent *owned) noexcept
     self.is_flushing_ = true;
     break;
   case GST_EVENT_FLUSH_STOP:
-    self.is_flushing_ = self.has_ended_ = self.frames_ended_ = false;
+    self.is_flushing_ = self.has_ended_ = false;
+    self.is_wanted_ = true;
     self.partners_.clear ();
     break;
   default:
@@ -112,21 +133,21 @@ PartnerInput::restart ()
   const std::lock_guard lock (lock_);
   partners_.clear ();
   caps_.reset ();
-  frames_wait_ = true;
-  has_ended_ = frames_ended_ = is_stalled_ = false;
+  may_wait_ = is_wanted_ = true;
+  is_off_beam_ = has_ended_ = is_stalled_ = false;
 }
 
 void
 PartnerInput::let_wait (bool waits)
 {
-  locked (lock_, [&] { return frames_wait_ = waits; });
+  locked (lock_, [&] { return may_wait_ = waits; });
   moved_.notify_all ();
 }
 
 /* A frame that came late when it was recorded is in the place of its partner,
  * too. */
 std::optional<Partner>
-PartnerInput::take (GstClockTime pts)
+PartnerInput::take (GstElement *element, GstClockTime pts)
 {
   std::unique_lock lock (lock_);
   const auto time_of = [] (const Partner &partner) {
@@ -134,13 +155,19 @@ PartnerInput::take (GstClockTime pts)
   };
   const auto own = [&] { return std::ranges::find (partners_, pts, time_of); };
   const auto is_settled = [&] {
-    return own () != partners_.end () || partners_.size () >= kMost ||
+    return !gst_pad_is_linked (pad_) || own () != partners_.end () ||
+           partners_.size () >= kMost ||
            std::ranges::any_of (partners_,
                [&] (const Partner &one) { return time_of (one) > pts; }) ||
-           has_ended_ || is_flushing_ || !frames_wait_;
+           has_ended_ || is_flushing_ || !may_wait_;
   };
-  if (!is_stalled_ && !moved_.wait_for (lock, kPatience, is_settled))
-    is_stalled_ = true;
+  while (!is_stalled_ && !moved_.wait_for (lock, kPatience, is_settled)) {
+    gboolean is_backed_up = FALSE;
+    lock.unlock ();
+    g_signal_emit_by_name (element, "starving", &is_backed_up);
+    lock.lock ();
+    is_stalled_ = is_backed_up && !is_settled ();
+  }
   const auto found = own ();
   if (found == partners_.end ())
     return {};
@@ -151,10 +178,14 @@ PartnerInput::take (GstClockTime pts)
 }
 
 void
-PartnerInput::attach (GstElement *element, GstBuffer *frame, bool encoded)
+PartnerInput::attach (
+    GstElement *element, GstBuffer *frame, bool wanted, bool encoded)
 {
+  want (wanted);
+  if (!wanted)
+    return;
   const GstClockTime pts = GST_BUFFER_PTS (frame);
-  const auto partner = take (pts);
+  const auto partner = take (element, pts);
   GstBuffer *buffer = partner ? partner->buffer.get () : nullptr;
   const bool is_missing =
       !buffer || GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_GAP);
@@ -168,14 +199,21 @@ PartnerInput::attach (GstElement *element, GstBuffer *frame, bool encoded)
 }
 
 void
+PartnerInput::want (bool wanted)
+{
+  locked (lock_, [&] {
+    if (!wanted)
+      partners_.clear ();
+    return is_wanted_ = wanted;
+  });
+  moved_.notify_all ();
+}
+
+void
 PartnerInput::end (GstElement *element)
 {
   alone_.end (element);
-  locked (lock_, [&] {
-    partners_.clear ();
-    return frames_ended_ = true;
-  });
-  moved_.notify_all ();
+  want (false);
 }
 
 } // namespace codedexposure::gst

@@ -21,27 +21,33 @@ namespace codedexposure::gst
 class PartnerInput
 {
 public:
+  /** Adds the signal "starving" to the class of the element. It is emitted when
+   * no partner has come for seconds; the handler returns whether the queue of
+   * the frames is full. */
+  static void add_signal (gpointer klass);
+
   /** @p pad: of the element. */
   void take_over (GstPad *pad);
 
   /* Any thread: */
 
-  bool is_linked () const { return gst_pad_is_linked (pad_); }
   /** Before a run. */
   void restart ();
-  /** Nothing waits until @p waits again. */
+  /** Frames wait for their partners; not while a flush or a stop begins. */
   void let_wait (bool waits);
 
   /* Streaming thread of the frames: */
 
-  /** Gives @p frame of @p element its partner, for which it waits as long as
-   * partners come. One that is damaged, or stands in for one that was never
-   * there, is of no use, but to be recorded again with frames that are @p
-   * encoded. */
-  void attach (GstElement *element, GstBuffer *frame, bool encoded);
+  /** Gives @p frame of @p element its partner, and waits until it comes. A
+   * damaged partner, or one that stands in for a lost one, is only given to
+   * frames that are @p encoded, to be recorded again with them.
+   * @p wanted: the setup says that frames have partners; if not, those that
+   * come are dropped: other files may have further tracks, too. */
+  void attach (
+      GstElement *element, GstBuffer *frame, bool wanted, bool encoded);
   /** After a flush. */
   void forget () { alone_.forget (); }
-  /** No frame of @p element follows: partners are dropped. */
+  /** No frame of @p element follows. */
   void end (GstElement *element);
 
 private:
@@ -52,8 +58,9 @@ private:
   static gboolean activate (GstPad *pad, GstObject *parent, GstPadMode mode,
       gboolean active) noexcept;
 
+  void want (bool wanted);
   /** That with the time @p pts; those before it are dropped. */
-  std::optional<Partner> take (GstClockTime pts);
+  std::optional<Partner> take (GstElement *element, GstClockTime pts);
 
   GstPad *pad_ = nullptr;
   AloneFrames alone_;
@@ -62,11 +69,13 @@ private:
   std::condition_variable moved_; ///< any of it
   std::deque<Partner> partners_;
   CapsPtr caps_;
-  bool frames_wait_ = true; ///< false: of the frames' thread, for flushes
-  bool is_flushing_ = false;
-  bool has_ended_ = false; ///< no partner follows
-  bool frames_ended_ = false;
-  bool is_stalled_ = false; ///< none came for too long
+  bool may_wait_ = true;     ///< let_wait ()
+  bool is_flushing_ = false; ///< the pad is flushed, or not active
+  bool is_wanted_ = true;    ///< by the frames
+  /** As their tag says; others are frames of another camera. */
+  bool is_off_beam_ = false;
+  bool has_ended_ = false;  ///< no partner follows
+  bool is_stalled_ = false; ///< none came while frames filled their queue
 };
 
 } // namespace codedexposure::gst

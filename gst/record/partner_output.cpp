@@ -34,9 +34,12 @@ PartnerOutput::follow (GstEvent *event)
   case GST_EVENT_SEGMENT:
     segment_sent_ = false;
     break;
+  case GST_EVENT_FLUSH_STOP:
+    last_.reset ();
+    last_number_.reset ();
+    [[fallthrough]];
   case GST_EVENT_EOS:
   case GST_EVENT_FLUSH_START:
-  case GST_EVENT_FLUSH_STOP:
     gst_pad_push_event (pad_, gst_event_ref (event));
     break;
   default:

@@ -24,7 +24,8 @@
  * Frames of a recording of two cameras have their partners, as those of
  * codedexposure-pair. One whose partner is missing or damaged goes on alone,
  * and `codedexposure/partner-lost` (`active`, `reason`, `from`, at the end `to`
- * and `frames`) says so.
+ * and `frames`) says so. Messages of the second camera's frames have the field
+ * `camera`, "second".
  *
  * The schedule of the track wins over that in the container's tags; a
  * difference is a warning. If the tags say that there is a track, a missing one
@@ -328,10 +329,12 @@ handle_message (GstBin *bin, GstMessage *message) noexcept
     gst_message_unref (message);
     message = own;
   }
-  /* The frames that go without their partners say so. */
   if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_ELEMENT &&
-      GST_MESSAGE_SRC (message) == GST_OBJECT (state.partner.restore ()))
-    return gst_message_unref (message);
+      GST_MESSAGE_SRC (message) == GST_OBJECT (state.partner.restore ())) {
+    message = gst_message_make_writable (message);
+    gst_structure_set (gst_message_writable_structure (message), "camera",
+        G_TYPE_STRING, "second", nullptr);
+  }
   parent_class<GstBinClass> (bin)->handle_message (bin, message);
 }
 

@@ -395,8 +395,8 @@ push_frame (Self *self, BufferPtr frame, const TrackReader::Match &match)
     keep_in_segment (state, time, GST_BUFFER_PTS (frame.get ()));
   } else
     mark_unknown (state, frame.get ());
-  if (state.partners.is_linked ())
-    state.partners.attach (GST_ELEMENT (self), frame.get (), state.encoded);
+  state.partners.attach (GST_ELEMENT (self), frame.get (),
+      state.setup && state.setup->partner, state.encoded);
   if (GST_BUFFER_PTS_IS_VALID (frame.get ()))
     state.segment.position = GST_BUFFER_PTS (frame.get ());
   if (GST_BUFFER_DURATION_IS_VALID (frame.get ()))
@@ -557,6 +557,7 @@ set_up (gpointer klass)
       "Puts back onto recorded coded frames what their track says, and checks "
       "their pixels",
       {});
+  PartnerInput::add_signal (klass);
   add_part_templates (klass);
   add_pad_template (
       klass, "partner", {.caps = kPartCaps, .direction = GST_PAD_SINK});

@@ -135,17 +135,18 @@ def _error_of(message) -> Error:
 def _loss_in(structure) -> str | None:
     """What an element message says of lost or damaged frames."""
     name, value = structure.get_name(), structure.get_value
+    of = " of the second camera" if structure.has_field("camera") else ""
     if name == "codedexposure/frames-lost":
-        return (f"coded frames were lost before {value('to') * 1e-9:.3f} s: "
+        return (f"coded frames{of} were lost before {value('to') * 1e-9:.3f} s: "
                 f"{value('count')}")
     if name == "codedexposure/frames-damaged" and value("active"):
         return (f"from frame {value('frame')} ({value('from') * 1e-9:.3f} s) "
-                f"on, frames are corrupted: {value('reason')}")
+                f"on, frames{of} are corrupted: {value('reason')}")
     if name == "codedexposure/frames-damaged":
-        return (f"corrupted frames from frame {value('frame')} on: "
+        return (f"corrupted frames{of} from frame {value('frame')} on: "
                 f"{value('count')}")
     if name == "codedexposure/frames-missing":
-        return (f"from {value('from') * 1e-9:.3f} s on, recorded frames are "
+        return (f"from {value('from') * 1e-9:.3f} s on, recorded frames{of} are "
                 f"missing: {value('count')}")
     if name == "codedexposure/not-coded":
         return (f"from {value('from') * 1e-9:.3f} s on, the mirrors show "
@@ -154,10 +155,10 @@ def _loss_in(structure) -> str | None:
         return (f"from {value('from') * 1e-9:.3f} s on, coded frames have no "
                 f"complement ({value('reason')}): {value('frames')}")
     if name == "codedexposure/stream-cut":
-        return ("the stream ended without its last line: it was cut off, its "
+        return (f"the stream{of} ended without its last line: it was cut off, its "
                 "sender was stopped, or it is a segment of a longer recording")
     if name == "codedexposure/stream-incomplete":
-        return ("recorded frames are missing with all that is known of them: "
+        return (f"recorded frames{of} are missing with all that is known of them: "
                 f"{value('count')}; the recording is damaged, or this is not "
                 "its first part")
     return None

@@ -17,6 +17,9 @@ namespace codedexposure::app
 namespace
 {
 
+/* Of a simulated bench, as a part of what saturates its camera. */
+constexpr double kWhite = 0.8;
+
 class Calibrate : public Command
 {
 public:
@@ -77,9 +80,8 @@ Calibrate::declare (Options &options)
       "picture of fringes, residuals and pixels [beside it]",
       file_ending_in (".png"));
   options.value ("--second", second_, "FILE.json",
-      "also the mapping of a second camera, in the beam of the mirrors that "
-      "are "
-      "off, and its picture beside it",
+      "also the mapping of a second camera, in the other beam, and a picture "
+      "beside it",
       file_ending_in (".json"));
   beside_.declare (options);
   options.value ("--mode", mode_, "M",
@@ -107,7 +109,6 @@ Calibrate::declare (Options &options)
 void
 Calibrate::set_up_bench ()
 {
-  constexpr double kWhite = 0.8;
   const std::string schedule = source_.schedule.value_or ("sequential:2x2");
   if (!source_.pattern && !source_.input && !source_.scene)
     source_.pattern = "white";
@@ -134,7 +135,6 @@ Calibrate::set_up_bench ()
 void
 Calibrate::set_up_second (SourceOptions &second) const
 {
-  constexpr double kWhite = 0.8;
   second.gain = kWhite;
   second.shift_x = -source_.shift_x.value_or (0);
   second.shift_y = source_.shift_y.value_or (0);

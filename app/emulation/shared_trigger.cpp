@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "emulation/shared_trigger.h"
 
-#include <algorithm>
 #include <thread>
 
 namespace codedexposure::app

@@ -247,7 +247,8 @@ void
 SecondCamera::check (const SourceOptions &first) const
 {
   if (first.camera && !camera)
-    usage_error ("say which camera is beside --camera, by --second-camera");
+    usage_error ("two cameras are used, but only --camera " + *first.camera +
+                 " is named; name the other one by --second-camera");
   if (first.camera && *first.camera == *camera)
     usage_error ("--camera and --second-camera are both " + *first.camera +
                  "; name two cameras");

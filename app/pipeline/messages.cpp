@@ -343,7 +343,7 @@ mirrors_in (const GstStructure *message, const char *field)
 {
   gdouble mirrors = 0;
   gst_structure_get_double (message, field, &mirrors);
-  return format ("%.2f", mirrors);
+  return format ("%+.2f", mirrors);
 }
 
 } // namespace
@@ -386,11 +386,10 @@ notice (const GstStructure *message)
     return "warning: coded frames without a partner from " +
            seconds_in (message, "from") + " on: " + number ("frames");
   if (name == "codedexposure/partner-drift" && active)
-    return "warning: the second camera sees the mirrors " +
-           mirrors_in (message, "x") + " further right and " +
-           mirrors_in (message, "y") +
-           " further down than its mapping says; if a camera was moved, "
-           "calibrate both again";
+    return "warning: the second camera sees the mirrors at " +
+           mirrors_in (message, "x") + ", " + mirrors_in (message, "y") +
+           " mirrors (right, down) from where its mapping has them, above the "
+           "limit of 0.1: a camera was moved; calibrate both again";
   if (name == "codedexposure/partner-drift")
     return "the second camera sees the mirrors where its mapping has them "
            "again";

@@ -260,20 +260,10 @@ CameraTracks::set_tick (Nanoseconds tick)
 }
 
 void
-CameraTracks::remove_part (GstElement *&part)
-{
-  if (!part)
-    return;
-  gst_element_set_state (part, GST_STATE_NULL);
-  gst_bin_remove (GST_BIN (element_), part);
-  part = nullptr;
-}
-
-void
 CameraTracks::end ()
 {
-  remove_part (queue_);
-  remove_part (decoder_);
+  remove_part (element_, queue_);
+  remove_part (element_, decoder_);
   deep_ = {};
   decoded_ = GST_CLOCK_TIME_NONE;
 }
@@ -282,7 +272,7 @@ void
 CameraTracks::remove ()
 {
   end ();
-  remove_part (restore_);
+  remove_part (element_, restore_);
 }
 
 } // namespace codedexposure::gst

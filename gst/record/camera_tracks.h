@@ -61,7 +61,6 @@ private:
       GstPad *, GstPadProbeInfo *info, gpointer self) noexcept;
   bool take_raw (GstPad *pad, const GstCaps *caps, const FrameReading &how);
   bool make_decoder (GstPad *pad, const GstCaps *caps, const FrameReading &how);
-  void remove_part (GstElement *&part);
 
   GstElement *element_;
   GstElement *restore_ = nullptr;

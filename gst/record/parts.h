@@ -53,6 +53,17 @@ make_part (GType type)
   return GST_ELEMENT (g_object_new (type, nullptr));
 }
 
+/** Stops @p part of @p bin, which then has it no longer; null: does nothing. */
+inline void
+remove_part (GstElement *bin, GstElement *&part)
+{
+  if (!part)
+    return;
+  gst_element_set_state (part, GST_STATE_NULL);
+  gst_bin_remove (GST_BIN (bin), part);
+  part = nullptr;
+}
+
 /** An error: the element @p factory is not installed. */
 inline std::string
 missing (const std::string &factory)

@@ -326,16 +326,6 @@ begin_branch (GstElement *self, Branch &branch, const Settings &settings)
 }
 
 void
-remove_part (GstElement *self, GstElement *&part)
-{
-  if (!part)
-    return;
-  gst_element_set_state (part, GST_STATE_NULL);
-  gst_bin_remove (GST_BIN (self), part);
-  part = nullptr;
-}
-
-void
 end_branch (GstElement *self, Branch &branch)
 {
   if (!branch.encoder && branch.video)

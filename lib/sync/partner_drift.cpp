@@ -2,10 +2,11 @@
 #include "sync/partner_drift.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
+
+#include "estimate/least_squares.h"
 
 namespace codedexposure
 {
@@ -18,7 +19,7 @@ constexpr float kNone = std::numeric_limits<float>::quiet_NaN ();
 constexpr int kParts = 3, kMostMirrors = 96;
 /* Of a part; that of others says too little. */
 constexpr double kMaxUncertainty = 0.05;
-constexpr std::size_t kMinPlaces = 256;
+constexpr double kMinPlaces = 256.0;
 
 /* The smallest window that holds each label of @tile equally often. */
 Extent
@@ -42,29 +43,6 @@ weights_of (int size)
     weights.front () = weights.back () = 0.5f;
   return weights;
 }
-
-/* Sums of products of the columns of a least-squares problem. */
-template <std::size_t Count>
-struct Products {
-  std::array<double, Count> sum = {};
-  std::array<std::array<double, Count>, Count> of = {};
-  double places = 0.0;
-
-  void add (const std::array<double, Count> &row)
-  {
-    for (std::size_t i = 0; i < Count; i++) {
-      sum[i] += row[i];
-      for (std::size_t j = 0; j <= i; j++)
-        of[i][j] += row[i] * row[j];
-    }
-    places++;
-  }
-  /* About the means. */
-  double at (std::size_t i, std::size_t j) const
-  {
-    return of[std::max (i, j)][std::min (i, j)] - sum[i] * sum[j] / places;
-  }
-};
 
 } // namespace
 
@@ -147,47 +125,42 @@ PartnerDrift::picture (ImageView<const Pixel> frame,
 }
 
 /* The picture of the second camera is that of the first, less its gradient
- * times the shift, times a factor. */
+ * times the shift, times a factor, on another level. */
 std::optional<PartnerDrift::Shift>
 PartnerDrift::shift (
     const Picture &on, const Picture &off, Position middle) const
 {
-  enum : std::size_t { kLevel, kAlongX, kAlongY, kSeen, kCount };
-  Products<kCount> sums;
+  enum { kOne, kFactor, kAlongX, kAlongY, kUnknowns };
+  using Row = Eigen::Matrix<double, kUnknowns + 1, 1>;
+  Eigen::Matrix<double, kUnknowns + 1, kUnknowns + 1> sums;
+  sums.setZero ();
   for (int y = 1; y < on.size.height - 1; y++)
     for (int x = 1; x < on.size.width - 1; x++) {
-      const std::array<double, kCount> row{on.at (x, y),
-          (on.at (x + 1, y) - on.at (x - 1, y)) / 2.0,
-          (on.at (x, y + 1) - on.at (x, y - 1)) / 2.0, off.at (x, y)};
-      if (!std::isnan (row[kAlongX] + row[kAlongY] + row[kLevel] + row[kSeen]))
-        sums.add (row);
+      Row row;
+      row << 1.0, on.at (x, y), (on.at (x + 1, y) - on.at (x - 1, y)) / 2.0,
+          (on.at (x, y + 1) - on.at (x, y - 1)) / 2.0, off.at (x, y);
+      if (row.allFinite ())
+        sums += row * row.transpose ();
     }
-  if (sums.places < double (kMinPlaces))
+  const double places = sums (kOne, kOne);
+  if (places < kMinPlaces)
     return {};
-  /* Without the level, which is between them. */
-  const auto rest = [&] (std::size_t i, std::size_t j) {
-    return sums.at (i, j) -
-           sums.at (i, kLevel) * sums.at (j, kLevel) / sums.at (kLevel, kLevel);
-  };
-  const double xx = rest (kAlongX, kAlongX), yy = rest (kAlongY, kAlongY),
-               xy = rest (kAlongX, kAlongY), xs = rest (kAlongX, kSeen),
-               ys = rest (kAlongY, kSeen), ss = rest (kSeen, kSeen);
-  const double determinant = xx * yy - xy * xy;
-  const double factor = sums.at (kLevel, kSeen) / sums.at (kLevel, kLevel);
-  if (!(determinant > 0.0) || !(factor > 0.0))
-    return {};
-  const double x = (xs * yy - ys * xy) / determinant;
-  const double y = (ys * xx - xs * xy) / determinant;
+  const Eigen::MatrixXd normal = sums.topLeftCorner<kUnknowns, kUnknowns> ();
+  const Eigen::VectorXd seen = sums.col (kUnknowns).head<kUnknowns> ();
+  const Eigen::VectorXd found = solve_normal (normal, seen);
+  const Eigen::MatrixXd inverse = inverse_of (normal);
+  const double rest = sums (kUnknowns, kUnknowns) - seen.dot (found);
   /* Neighbouring sums have pixels in common. */
-  const double independent =
-      sums.places / (double (period_.width) * period_.height);
-  const double variance = std::max (0.0, ss - x * xs - y * ys) / sums.places *
-                          (sums.places / independent) * std::max (xx, yy) /
-                          determinant;
-  const double uncertainty = std::sqrt (variance) / factor;
-  if (!(uncertainty < kMaxUncertainty))
+  const double independent = places / (double (period_.width) * period_.height);
+  const double uncertainty = std::sqrt (std::max (0.0, rest) / independent *
+                                        std::max (inverse (kAlongX, kAlongX),
+                                            inverse (kAlongY, kAlongY))) /
+                             found[kFactor];
+  if (!(found[kFactor] > 0.0 && uncertainty < kMaxUncertainty))
     return {};
-  return Shift{{-x / factor, -y / factor}, uncertainty, middle};
+  return Shift{
+      {-found[kAlongX] / found[kFactor], -found[kAlongY] / found[kFactor]},
+      uncertainty, middle};
 }
 
 template <typename Pixel, typename OtherPixel>

@@ -78,6 +78,7 @@
  * Since: 0.2
  */
 #include <algorithm>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -129,10 +130,13 @@ reason_of (Alone alone)
   }
 }
 
+constexpr PartnerDrift::Shift kUnknown{
+    {0.0, 0.0}, std::numeric_limits<double>::infinity (), {0.0, 0.0}};
+
 struct PairState {
   /* Object lock: */
   Counters counters;
-  std::optional<PartnerDrift::Shift> shift; ///< of the last pairs
+  PartnerDrift::Shift shift = kUnknown; ///< of the last pairs
 
   /* Source pad's streaming thread, which also handles serialized events. */
   std::optional<StreamSetup> on_setup, off_setup;
@@ -224,7 +228,7 @@ watch_drift (GstCodedExposurePair *self, GstBuffer *coded, GstBuffer *partner)
     return;
   st.drift.take (self, pts, st.check.drift (coded, partner));
   locked (self, [&] {
-    st.shift = st.drift.median ();
+    st.shift = st.drift.median ().value_or (kUnknown);
     return 0;
   });
 }
@@ -493,7 +497,7 @@ stop (GstAggregator *aggregator)
   state (aggregator).reset ();
   const ObjectLock lock (aggregator);
   state (aggregator).counters = {};
-  state (aggregator).shift.reset ();
+  state (aggregator).shift = kUnknown;
   return TRUE;
 }
 
@@ -507,14 +511,12 @@ properties ()
         guint64 (G_MAXINT64));
   };
   const auto drift = [] (const char *name, const char *nick, const char *blurb,
-                         auto read) {
+                         double (*read) (const PartnerDrift::Shift &)) {
     return Property<PairState> (
         name, nick, blurb, kReadOnly,
-        [read] (
-            const PairState &st) { return st.shift ? read (*st.shift) : 0.0; },
-        -G_MAXDOUBLE, G_MAXDOUBLE);
+        [read] (const PairState &st) { return read (st.shift); }, -G_MAXDOUBLE,
+        G_MAXDOUBLE);
   };
-  using Shift = PartnerDrift::Shift;
   return {counter ("frames-paired", "Frames paired",
               "Coded frames that got a partner", &Counters::paired),
       counter ("pairs-confirmed", "Pairs confirmed",
@@ -532,15 +534,14 @@ properties ()
           &Counters::dropped),
       drift ("drift-x", "Drift along rows",
           "By how many mirrors the second camera sees the mirrors elsewhere "
-          "than its mapping has them, where that is worst, to the right; 0: "
-          "not known, too",
-          [] (const Shift &shift) { return shift.by.x; }),
+          "than its mapping has them, where that is worst, to the right",
+          [] (const PartnerDrift::Shift &shift) { return shift.by.x; }),
       drift ("drift-y", "Drift along columns", "The same as drift-x, downwards",
-          [] (const Shift &shift) { return shift.by.y; }),
+          [] (const PartnerDrift::Shift &shift) { return shift.by.y; }),
       drift ("drift-uncertainty", "Uncertainty of the drift",
-          "Standard deviation of drift-x and drift-y, mirrors; 0: they are not "
-          "known",
-          [] (const Shift &shift) { return shift.uncertainty; })};
+          "Standard deviation of drift-x and drift-y, mirrors; "
+          "infinite while they are not known",
+          [] (const PartnerDrift::Shift &shift) { return shift.uncertainty; })};
 }
 
 void

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure-pair between the other elements, on simulated benches with two
  * cameras. */
+#include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <iterator>
@@ -41,6 +42,8 @@ TEST (PairBench, TwoSimulatedCamerasMakePairs)
   const auto pair = pipeline["pair"];
   EXPECT_EQ (property<guint64> (pair.get (), "frames-paired"), 10u);
   EXPECT_EQ (property<guint64> (pair.get (), "frames-alone"), 0u);
+  EXPECT_TRUE (std::isinf (property<double> (pair.get (), "drift-uncertainty")))
+      << "after less than five seconds";
 }
 
 /* Two cameras as on a real bench: each loses frames of its own. */

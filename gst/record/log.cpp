@@ -18,6 +18,7 @@
 
 #include "common/element.h"
 #include "common/lines.h"
+#include "common/partner.h"
 #include "common/record.h"
 #include "common/tag.h"
 #include "partner_output.h"
@@ -206,10 +207,14 @@ transform_ip (GstBaseTransform *base, GstBuffer *frame) noexcept
   const GstFlowReturn flow = has_track (state)
                                  ? push_line (self, frame, std::move (record))
                                  : GST_FLOW_OK;
-  if (flow != GST_FLOW_OK || !state.partners.is_linked ())
+  if (flow != GST_FLOW_OK)
     return flow;
-  const guint64 lost = state.partners.lost_before (frame);
+  const bool records_partners = state.partners.is_linked ();
+  const guint64 lost = records_partners ? state.partners.lost_before (frame)
+                                        : get_partner (frame).has_value ();
   locked (self, [&] { return state.frames_lost += lost; });
+  if (!records_partners)
+    return GST_FLOW_OK;
   const CapsPtr caps (gst_pad_get_current_caps (base->sinkpad));
   return state.partners.push (
       GST_ELEMENT (self), frame, caps.get (), base->segment);
@@ -396,8 +401,9 @@ properties ()
           "exists; empty: none",
           kReadWriteReady, &LogState::location},
       {"counters", "Statistics",
-          "Counters: frames-lost, the coded frames that are missing before "
-          "frames that came, by their numbers",
+          "Counters: frames-lost, the coded frames, and those of a second "
+          "camera, that are missing before frames that came, by their numbers, "
+          "and the frames of a second camera that came too late to be recorded",
           kReadOnly, stats_of}};
 }
 

@@ -529,7 +529,8 @@ properties ()
           kReadWriteReady, set (&Settings::log_location)},
       {"stats", "Statistics",
           "Counters: frames-lost, the coded frames, and those of a second "
-          "camera, that are missing before frames that came, by their numbers",
+          "camera, that are missing before frames that came, by their numbers, "
+          "and the frames of a second camera that came too late to be recorded",
           kReadOnly, stats_of}};
 }
 

@@ -11,6 +11,7 @@
 #include "common/meta.h"
 #include "common/partner.h"
 #include "common/tag.h"
+#include "harness.h"
 #include "pipeline.h"
 #include "record/matroska.h"
 
@@ -345,30 +346,51 @@ TEST_F (RecordPairs, FramesThatAreKeptHaveThem)
   EXPECT_TRUE (kept.partners == live.partners);
 }
 
+/** Tags and partners, from the third frame on. */
+struct LateCamera {
+  int frames = 0;
+
+  void join (GstPad *pad, GstPadProbeInfo *info)
+  {
+    if (++frames < 3)
+      return;
+    if (frames == 3)
+      gst_pad_push_event (pad,
+          setup_to_event (
+              {.schedule = *Schedule::from_preset ("sequential:lattice:4/2"),
+                  .partner = PartnerSetup{{64, 48}}}));
+    GstBuffer *frame =
+        gst_buffer_make_writable (GST_PAD_PROBE_INFO_BUFFER (info));
+    const CapsPtr caps (gst_pad_get_current_caps (pad));
+    set_partner (frame, {BufferPtr (gst_buffer_copy_deep (frame)),
+                            CapsPtr (gst_caps_ref (caps.get ()))});
+    info->data = frame;
+  }
+};
+
 TEST_F (RecordPairs, ASecondCameraThatComesLaterIsSaidNotToBeRecorded)
 {
   Pipeline pipeline (
       "videotestsrc num-buffers=40 ! " + gray_caps (64, 48, "100/1") +
       " ! codedexposure-sim schedule=sequential:lattice:4/2 "
-      "! identity name=camera ! codedexposure-recordmux ! fakesink");
-  int frames = 0;
+      "! identity name=camera ! codedexposure-recordmux name=recorder "
+      "! fakesink");
+  LateCamera camera;
   gst_pad_add_probe (
       pipeline.pad ("camera", "src").get (), GST_PAD_PROBE_TYPE_BUFFER,
-      [] (GstPad *pad, GstPadProbeInfo *, gpointer data) {
-        if (++*static_cast<int *> (data) == 3)
-          gst_pad_push_event (
-              pad, setup_to_event ({.schedule = *Schedule::from_preset (
-                                        "sequential:lattice:4/2"),
-                       .partner = PartnerSetup{{64, 48}}}));
+      [] (GstPad *pad, GstPadProbeInfo *info, gpointer self) {
+        static_cast<LateCamera *> (self)->join (pad, info);
         return GST_PAD_PROBE_OK;
       },
-      &frames, nullptr);
+      &camera, nullptr);
   Said said;
   said.follow (pipeline, "camera");
   ASSERT_EQ (pipeline.play (), "");
   EXPECT_NE (said.warning.find ("The second camera came after the first "
                                 "frame"),
       std::string::npos);
+  EXPECT_EQ (camera.frames, 10);
+  EXPECT_EQ (counter_of (pipeline["recorder"].get (), "frames-lost"), 8u);
 }
 
 } // namespace

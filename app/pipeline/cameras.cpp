@@ -2,6 +2,7 @@
 #include "cameras.h"
 
 #include <algorithm>
+#include <optional>
 
 #include <arv.h>
 
@@ -145,20 +146,6 @@ change_exposure (GstElement *camerasrc, int steps, Between allowed)
   return format (
       "exposure %.0f us (%.0f to %.0f, with which all slots are whole)",
       exposure.value, exposure.range.low, exposure.range.high);
-}
-
-std::optional<double>
-camera_exposure (GstElement *camerasrc)
-{
-  const auto camera = camera_of (camerasrc);
-  GError *failed = nullptr;
-  if (!camera)
-    return std::nullopt;
-  const double exposure =
-      arv_camera_get_exposure_time (ARV_CAMERA (camera.get ()), &failed);
-  const bool known = !failed;
-  g_clear_error (&failed);
-  return known ? std::optional (exposure) : std::nullopt;
 }
 
 } // namespace codedexposure::app

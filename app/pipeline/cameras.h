@@ -2,7 +2,6 @@
 /* What GenICam cameras say of themselves. */
 #pragma once
 
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,10 +17,6 @@ std::vector<std::string> camera_names ();
 
 /** The same for a message: which there are, or that there is none. */
 std::string cameras_found ();
-
-/** For how long the camera of @p camerasrc exposes, us; none: it does not say.
- */
-std::optional<double> camera_exposure (GstElement *camerasrc);
 
 /** Both are included. */
 struct Between {

@@ -17,12 +17,6 @@ cameras_found ()
   return "this version was built without Aravis, and sees no camera";
 }
 
-std::optional<double>
-camera_exposure (GstElement *)
-{
-  return std::nullopt;
-}
-
 Result<std::string>
 change_gain (GstElement *, int)
 {

@@ -5,7 +5,7 @@
 
 #include "base/text.h"
 #include "common/element.h"
-#include "pipeline/cameras.h"
+#include "common/meta.h"
 
 namespace codedexposure::app
 {
@@ -103,21 +103,26 @@ add_camera_settings (Settings &settings, const SourceOptions &options)
 }
 
 /* A camera that is not told how long to expose does what it was last set to.
- * The first frame, in whose exposure not all slots lie, is an error. */
+ * The first frame, in whose exposure not all slots lie, is an error. It says
+ * its exposure itself: asking the camera would hold it up. */
 GstPadProbeReturn
-check_first_frame (GstPad *pad, GstPadProbeInfo *, gpointer needed)
+check_first_frame (GstPad *pad, GstPadProbeInfo *info, gpointer needed)
 {
-  const double least = 1e-3 * double (*static_cast<Nanoseconds *> (needed));
+  const auto least = GstClockTime (*static_cast<Nanoseconds *> (needed));
+  const auto meta = get_frame_meta (GST_PAD_PROBE_INFO_BUFFER (info));
+  if (!meta || !GST_CLOCK_TIME_IS_VALID (meta->exposure_duration) ||
+      meta->exposure_duration > least)
+    return GST_PAD_PROBE_REMOVE;
   const ObjectPtr<GstPad> source (gst_pad_get_peer (pad));
   const ObjectPtr<GstElement> camera (
       gst_pad_get_parent_element (source.get ()));
-  const auto exposure = camera_exposure (camera.get ());
-  if (!exposure || *exposure > least)
-    return GST_PAD_PROBE_REMOVE;
+  const auto in_us = [] (GstClockTime time) {
+    return real_text (1e-3 * double (time)) + " us";
+  };
   POST_ERROR (camera.get (), STREAM, WRONG_TYPE,
-      "the camera exposes for " + real_text (*exposure) +
-          " us, but the last slot of the schedule begins after " +
-          real_text (least) + " us; set a longer --exposure");
+      "the camera exposes for " + in_us (meta->exposure_duration) +
+          ", but the last slot of the schedule begins after " + in_us (least) +
+          "; set a longer --exposure");
   return GST_PAD_PROBE_DROP;
 }
 

@@ -146,7 +146,7 @@ Bench::declare (Options &options)
       {"--input", "--input-rate", "--scene", "--pattern", "--schedule",
           "--bench", "--psf-sigma", "--full-well", "--read-noise", "--gain",
           "--shift-x", "--shift-y", "--rotation", "--scale", "--frames",
-          "--trigger-rate", "--cameras", "--address", "--second"},
+          "--trigger-rate", "--cameras", "--address"},
       "--dmd");
   options.exclude ({"--cameras", "--second"}, "--address");
   options.exclude ({"--cameras"}, "--second");
@@ -244,9 +244,13 @@ Bench::open_camera (int number)
 void
 Bench::open_board ()
 {
+  std::vector<GigeCameraOptions> cameras = {camera_options (1)};
+  if (second_)
+    cameras.push_back (camera_options (2));
   served_ = value_of (ServedBench::open (
-      *dmd_, faults_.value_or (""), plan_.size, camera_options (1)));
-  say_serving (served_->camera_options ());
+      *dmd_, faults_.value_or (""), plan_.size, std::move (cameras)));
+  for (const GigeCameraOptions &options : served_->camera_options ())
+    say_serving (options);
 }
 
 /* The camera is a real one for others until a signal, or until its scene ends.
@@ -341,7 +345,7 @@ Bench::run ()
   start_gstreamer ();
   plan_ = SourcePlan::make (source_);
   const int cameras = second_ ? 2 : cameras_.value_or (1);
-  if (second_)
+  if (second_ && !dmd_)
     trigger_ = std::make_unique<SharedTrigger> (
         std::llround (1e9 / camera_options (1).trigger_rate));
   if (dmd_)

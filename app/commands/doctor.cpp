@@ -62,7 +62,8 @@ private:
   std::optional<Text> only_, faults_;
   std::string output_ = "bench";
   double seconds_ = 60;
-  bool yes_ = false;
+  bool yes_ = false, second_ = false;
+  SecondCamera beside_;
 
   SourcePlan plan_;
   std::stop_token stop_;
@@ -116,16 +117,22 @@ Doctor::declare (Options &options)
       "duration of the recording in the last check [60]", seconds (true));
   options.value ("--only", only_, "CHECKS",
       "only these, separated by commas, and those that they need: parts, "
-      "trigger, light, sensor, mirrors, optics, whole");
+      "trigger, light, sensor, mirrors, optics, second, whole");
   options.value ("--faults", faults_, "\"...\"",
       "faults of the simulated bench, such as \"leak=0.02 flicker=100:0.05\"; "
       "--faults help lists them");
+  options.flag ("--second", second_,
+      "also a camera in the beam of the mirrors that are off");
+  options.value ("--second-camera", beside_.camera, "NAME",
+      "that camera, beside --camera");
   options.flag ("--yes", yes_,
       "ask nothing: every question is answered with Enter, and a failed check "
       "is not repeated");
   source_.declare (options, SourceOptions::Kind::examined);
   run_.declare_result (options);
   options.exclude ({"--faults"}, "--camera");
+  options.need ({"--second-camera"}, "--second");
+  options.need ({"--second-camera"}, "--camera");
 }
 
 /* ----------------------------------------------------------- the dialogue --
@@ -202,6 +209,12 @@ Doctor::open_bench (Finding &missing)
       options = {.rate = plan_.frame_rate, .seed = seed};
       replay (options, *plan_.bench);
     }
+    if (second_) {
+      options.second = {random_second_camera (options)};
+      if (source_.bench)
+        replay (options.second.front (),
+            bench_of ("--bench", *source_.bench).of_beam (true));
+    }
     value_of (inflict (options, faults_.value_or ("")), Exit::usage);
     slow_disk_ = options.has ("slow-disk");
     auto rig = SimulatedRig::make (options);
@@ -220,8 +233,10 @@ Doctor::open_bench (Finding &missing)
     missing = part_missing (dmd.error (), false);
     return dmd.error ();
   }
-  auto rig = open_camera_rig ({source_, plan_, folder_->path ("recording.mkv")},
-      *std::move (dmd), stop_);
+  CameraRigOptions options{source_, plan_, folder_->path ("recording.mkv")};
+  if (second_)
+    options.second = beside_.options (source_);
+  auto rig = open_camera_rig (options, *std::move (dmd), stop_);
   if (!rig)
     missing = part_missing (rig.error (), true);
   return rig;
@@ -286,6 +301,8 @@ Doctor::examine ()
   }
   (*rig)->park ();
   examination.profile.measured = now_utc ();
+  for (BenchProfile &other : examination.profile.second)
+    other.measured = examination.profile.measured;
   if (worst () != Verdict::fail)
     profile_ = examination.profile;
 }
@@ -327,6 +344,9 @@ Doctor::page () const
       {"Result", verdict_text (worst ())}, {"Examined", utc_text (now_utc ())}};
   if (parts_) {
     page.head.emplace_back ("Camera", source_.camera.value_or ("simulated"));
+    if (second_)
+      page.head.emplace_back (
+          "Second camera", beside_.camera.value_or ("simulated"));
     page.head.emplace_back ("DMD", parts_->dmd.name);
     page.head.emplace_back (
         "Frame rate", format ("%.6g frames/s", 1 / parts_->period ()));
@@ -389,7 +409,9 @@ Doctor::run ()
    * for the whole run. */
   mallopt (M_MMAP_THRESHOLD, 1 << 20);
   stop_ = stop_at_signals ();
-  auto checks = choose_checks (only_.value_or (""));
+  if (second_)
+    beside_.check (source_);
+  auto checks = choose_checks (only_.value_or (""), second_);
   if (!checks)
     usage_error ("--only " + checks.error ().message);
   checks_ = *std::move (checks);

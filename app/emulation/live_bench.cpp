@@ -43,18 +43,31 @@ Result<std::unique_ptr<LiveBench>>
 LiveBench::make (SickBenchOptions options, int kind)
 {
   const emulated::EmulatedDlpc900 like (kind);
-  options.mirrors = like.size ();
-  if (!options.has ("mute"))
-    options.gamma = 1.0; // a camera's own feature
-  ASSIGN_OR_RETURN (SickBench bench, SickBench::make (options));
-  return std::unique_ptr<LiveBench> (new LiveBench (std::move (bench), kind));
+  auto board = std::make_shared<emulated::EmulatedDlpc900> (kind);
+  const auto began = steady_clock::now ();
+  const auto open =
+      [&] (SickBenchOptions of) -> Result<std::unique_ptr<LiveBench>> {
+    of.mirrors = like.size ();
+    if (!of.has ("mute"))
+      of.gamma = 1.0; // a camera's own feature
+    ASSIGN_OR_RETURN (SickBench bench, SickBench::make (of));
+    return std::unique_ptr<LiveBench> (
+        new LiveBench (std::move (bench), board, began));
+  };
+  ASSIGN_OR_RETURN (auto bench, open (options));
+  for (const SickBenchOptions &other : options.second) {
+    ASSIGN_OR_RETURN (bench->second_, open (other));
+  }
+  board->on_run = [first = bench.get ()] (
+                      bool running) { first->follow (running); };
+  return bench;
 }
 
-LiveBench::LiveBench (SickBench bench, int kind)
-    : board_ (std::make_shared<emulated::EmulatedDlpc900> (kind)),
-      began_ (steady_clock::now ()), bench_ (std::move (bench))
+LiveBench::LiveBench (SickBench bench,
+    std::shared_ptr<emulated::EmulatedDlpc900> board,
+    std::chrono::steady_clock::time_point began)
+    : board_ (std::move (board)), began_ (began), bench_ (std::move (bench))
 {
-  board_->on_run = [this] (bool running) { follow (running); };
 }
 
 Nanoseconds
@@ -63,14 +76,31 @@ LiveBench::now () const
   return nanoseconds (steady_clock::now () - began_).count ();
 }
 
+/* Both cameras get the same triggers. */
 void
 LiveBench::follow (bool running)
 {
-  const std::lock_guard guard (lock_);
+  const MirrorProgram program =
+      running ? program_of (*board_) : MirrorProgram ();
+  MirrorProgram other;
+  if (second_ && running)
+    other = program.complement (board_->size ());
+  const std::unique_lock guard (lock_);
+  const auto of_second = second_ ? std::unique_lock (second_->lock_)
+                                 : std::unique_lock<std::mutex> ();
+  const Nanoseconds time = now ();
+  show (time, running, program);
+  if (second_)
+    second_->show (time, running, other);
+}
+
+void
+LiveBench::show (Nanoseconds time, bool running, const MirrorProgram &program)
+{
   if (running)
-    bench_.show (now (), program_of (*board_));
+    bench_.show (time, program);
   else
-    bench_.park (now ());
+    bench_.park (time);
   changed_.notify_all ();
 }
 

@@ -20,7 +20,8 @@ MirrorProgram program_of (const emulated::EmulatedDlpc900 &board);
 
 /**
  * A SickBench in the time of this machine. Its board's triggers begin when it
- * is told to run, from whatever thread tells it.
+ * is told to run, from whatever thread tells it. Options with a second camera
+ * have a bench of it, with the same board.
  */
 class LiveBench
 {
@@ -35,6 +36,8 @@ public:
     return board_;
   }
   const BenchTruth &truth () const { return bench_.truth (); }
+  /** In the beam of the mirrors that are off; null: there is none. */
+  LiveBench *second () { return second_.get (); }
 
   /** The exposure time of frames from now on; none: the longest. Thread-safe,
    * like take (). */
@@ -50,12 +53,15 @@ public:
   std::optional<Shot> take (ImageView<std::uint16_t> picture);
 
 private:
-  LiveBench (SickBench bench, int kind);
+  LiveBench (SickBench bench, std::shared_ptr<emulated::EmulatedDlpc900> board,
+      std::chrono::steady_clock::time_point began);
   Nanoseconds now () const;
   void follow (bool running);
+  void show (Nanoseconds time, bool running, const MirrorProgram &program);
 
   std::shared_ptr<emulated::EmulatedDlpc900> board_;
   const std::chrono::steady_clock::time_point began_;
+  std::unique_ptr<LiveBench> second_;
 
   std::mutex lock_; // covers everything below
   std::condition_variable changed_;

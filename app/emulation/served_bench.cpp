@@ -32,8 +32,10 @@ fault_text (Fault::Kind kind)
 
 /* Words with '@' are faults of frames; the others are of the bench. */
 Result<SickBenchOptions>
-bench_of (const std::string &faults, Extent size, GigeCameraOptions &camera)
+bench_of (const std::string &faults, Extent size,
+    std::vector<GigeCameraOptions> &cameras)
 {
+  GigeCameraOptions &camera = cameras.front ();
   std::string frames, bench;
   for (const std::string_view word : split (faults, ' '))
     (word.find ('@') == word.npos ? bench : frames) += std::string (word) + " ";
@@ -43,6 +45,8 @@ bench_of (const std::string &faults, Extent size, GigeCameraOptions &camera)
   options.rate = {int (std::lround (camera.trigger_rate * 1000)), 1000};
   options.bits = camera.bits;
   options.seed = camera.seed;
+  if (cameras.size () > 1)
+    options.second = {second_camera_of (options)};
   RETURN_IF_ERROR (inflict (options, bench));
   return options;
 }
@@ -178,29 +182,33 @@ ServedBench::~ServedBench () = default;
 
 Result<void>
 ServedBench::set_up (const std::string &board, const std::string &faults,
-    Extent size, GigeCameraOptions camera)
+    Extent size, std::vector<GigeCameraOptions> cameras)
 {
   ASSIGN_OR_RETURN (const int kind, board_kind (board));
-  ASSIGN_OR_RETURN (SickBenchOptions options, bench_of (faults, size, camera));
-  const bool dark = options.has ("camera-missing");
+  ASSIGN_OR_RETURN (SickBenchOptions options, bench_of (faults, size, cameras));
+  bool dark = options.has ("camera-missing");
   slow_disk_ = options.has ("slow-disk");
   ASSIGN_OR_RETURN (bench_, LiveBench::make (std::move (options), kind));
   usb_ = std::make_unique<Usb> ();
   RETURN_IF_ERROR (usb_->plug (*bench_));
-  look_at (*bench_, camera);
-  options_ = camera;
-  if (!dark) {
-    ASSIGN_OR_RETURN (camera_, GigeCamera::open (std::move (camera), {}));
+  LiveBench *seen = bench_.get ();
+  for (GigeCameraOptions &camera : cameras) {
+    look_at (*seen, camera);
+    seen = bench_->second ();
+    if (std::exchange (dark, false))
+      continue;
+    ASSIGN_OR_RETURN (cameras_.emplace_back (), GigeCamera::open (camera, {}));
   }
+  options_ = std::move (cameras);
   return {};
 }
 
 Result<std::unique_ptr<ServedBench>>
 ServedBench::open (const std::string &board, const std::string &faults,
-    Extent size, GigeCameraOptions camera)
+    Extent size, std::vector<GigeCameraOptions> cameras)
 {
   std::unique_ptr<ServedBench> served (new ServedBench);
-  RETURN_IF_ERROR (served->set_up (board, faults, size, std::move (camera)));
+  RETURN_IF_ERROR (served->set_up (board, faults, size, std::move (cameras)));
   return served;
 }
 

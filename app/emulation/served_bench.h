@@ -23,17 +23,22 @@ public:
   /** @p board   "dlp6500" or "dlp5500".
    *  @p faults  words with '@' are of frames; the others are of the bench, such
    *  as "dmd-busy".
-   *  @p size    of the camera, pixels.
-   *  @p camera  its settings, which faults may change.
+   *  @p size    of the cameras, pixels.
+   *  @p cameras their settings, which faults may change: of the first one and,
+   *  if there are two, of that in the beam of the mirrors that are off.
    *  Fails if this build has no emulated USB. */
   static Result<std::unique_ptr<ServedBench>> open (const std::string &board,
-      const std::string &faults, Extent size, GigeCameraOptions camera);
+      const std::string &faults, Extent size,
+      std::vector<GigeCameraOptions> cameras);
   ~ServedBench ();
   ServedBench (const ServedBench &) = delete;
   ServedBench &operator= (const ServedBench &) = delete;
 
-  /** As the camera serves. */
-  const GigeCameraOptions &camera_options () const { return options_; }
+  /** As the cameras serve. */
+  const std::vector<GigeCameraOptions> &camera_options () const
+  {
+    return options_;
+  }
   /** What a process needs in its environment to see the USB. */
   std::vector<std::pair<std::string, std::string>> environment () const;
 
@@ -42,13 +47,13 @@ private:
 
   ServedBench ();
   Result<void> set_up (const std::string &board, const std::string &faults,
-      Extent size, GigeCameraOptions camera);
+      Extent size, std::vector<GigeCameraOptions> cameras);
 
   bool slow_disk_ = false;
-  GigeCameraOptions options_;
+  std::vector<GigeCameraOptions> options_;
   std::unique_ptr<LiveBench> bench_;
   std::unique_ptr<Usb> usb_;
-  std::unique_ptr<GigeCamera> camera_;
+  std::vector<std::unique_ptr<GigeCamera>> cameras_;
 };
 
 /** Prints a line of JSON for a frame that was sent. */

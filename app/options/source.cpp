@@ -186,7 +186,7 @@ namespace
 void
 use_bench (SourcePlan &plan, const SourceOptions &options)
 {
-  plan.bench = bench_of ("--bench", *options.bench);
+  plan.bench = bench_of ("--bench", *options.bench).of_beam (options.off_beam);
   plan.size = plan.bench->camera.size;
   plan.bits = plan.bench->bits;
   if (options.camera && !plan.bench->pixel_format.empty ())
@@ -232,7 +232,7 @@ SecondCamera::declare (Options &options)
   options.value (
       "--second-camera", camera, "NAME", "that camera, beside --camera");
   options.value ("--second-bench", bench, "FILE",
-      "what was measured with it, as --bench of the first");
+      "what was measured with it [what --bench says of a second camera]");
 }
 
 void
@@ -254,6 +254,22 @@ SecondCamera::check (const SourceOptions &first) const
                  "; name two cameras");
   if (bench)
     bench_of ("--second-bench", *bench);
+}
+
+SourceOptions
+SecondCamera::options (const SourceOptions &first) const
+{
+  SourceOptions options = first;
+  options.device.reset ();
+  options.camera = camera;
+  options.bench = bench;
+  if (!bench && first.bench &&
+      !bench_of ("--bench", *first.bench).second.empty ())
+    options.bench = first.bench;
+  options.off_beam = true;
+  if (options.bench)
+    options.size.reset (); // that of its camera
+  return options;
 }
 
 SourcePlan

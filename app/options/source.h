@@ -41,6 +41,7 @@ struct SourceOptions {
       features, device, source;
   std::optional<double> exposure;
   std::optional<int> reconnect;
+  bool off_beam = false; ///< of --bench, the second camera is meant
 
   bool is_simulated () const { return !camera && !source; }
 
@@ -63,6 +64,8 @@ struct SecondCamera {
   /** What the relations between options cannot say; throws Failure.
    * @p first  the camera in the beam of the mirrors that are on. */
   void check (const SourceOptions &first) const;
+  /** Those of the first camera, as far as they are also of the second. */
+  SourceOptions options (const SourceOptions &first) const;
 };
 
 /** The bench profile @p path, which @p option named. Throws Failure. */

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "source.h"
 
+#include <memory>
 #include <string>
 
 #include "base/text.h"
@@ -151,6 +152,38 @@ watch_exposure (GstElement *behind_camera, const SourcePlan &plan)
         [] (gpointer needed) { delete static_cast<Nanoseconds *> (needed); });
 }
 
+struct HeldPad {
+  ObjectPtr<GstPad> pad;
+  gulong probe;
+};
+
+/* A camera that waits for its trigger gives up after two seconds, and the masks
+ * may take longer to be sent: @p waiting, the element behind it, gets nothing
+ * before a stream begins behind @p first, which has the masks sent before. */
+void
+begin_after (GstElement *waiting, GstElement *first)
+{
+  auto held = std::make_unique<HeldPad> (pad_of (waiting, "sink"), 0);
+  held->probe = gst_pad_add_probe (
+      held->pad.get (),
+      GstPadProbeType (
+          GST_PAD_PROBE_TYPE_BLOCK | GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM),
+      [] (GstPad *, GstPadProbeInfo *, gpointer) { return GST_PAD_PROBE_OK; },
+      nullptr, nullptr);
+  gst_pad_add_probe (
+      pad_of (first, "src").get (), GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM,
+      [] (GstPad *, GstPadProbeInfo *info, gpointer data) {
+        if (GST_EVENT_TYPE (GST_PAD_PROBE_INFO_EVENT (info)) !=
+            GST_EVENT_STREAM_START)
+          return GST_PAD_PROBE_OK;
+        const auto *held = static_cast<HeldPad *> (data);
+        gst_pad_remove_probe (held->pad.get (), held->probe);
+        return GST_PAD_PROBE_REMOVE;
+      },
+      held.release (),
+      [] (gpointer data) { delete static_cast<HeldPad *> (data); });
+}
+
 /* The frames of a user's source may already have a schedule and times. */
 void
 synchronise (
@@ -281,10 +314,7 @@ std::pair<Chain, Chain>
 coded_sources (Job &job, const SourceOptions &options, const SourcePlan &plan,
     Pace pace, const SecondCamera &second)
 {
-  SourceOptions other = options;
-  other.device.reset ();
-  other.camera = second.camera;
-  other.bench = second.bench;
+  SourceOptions other = second.options (options);
   std::pair<Chain, Chain> both = [&] {
     if (!options.camera) {
       other.seed = std::to_string (
@@ -294,8 +324,6 @@ coded_sources (Job &job, const SourceOptions &options, const SourcePlan &plan,
         second.simulate (other);
       return simulated_cameras (job, options, plan, pace, other);
     }
-    if (second.bench)
-      other.size.reset (); // that of its camera
     const SourcePlan its = SourcePlan::make (other);
     Chain off = camera_source (job, other, its);
     watch_exposure (off.last (), its);
@@ -304,7 +332,10 @@ coded_sources (Job &job, const SourceOptions &options, const SourcePlan &plan,
     job.source = "the cameras " + *options.camera + " and " + *second.camera;
     return std::pair (std::move (on), std::move (off));
   }();
+  GstElement *second_camera = both.second.last ();
   synchronise (options, both.first);
+  if (options.camera)
+    begin_after (second_camera, both.first.last ());
   synchronise (other, both.second, {{"beam", "off"}});
   limit_frames (job, options, both.second);
   limit_frames (job, options, both.first);

@@ -104,6 +104,11 @@ public:
         stop_ (std::move (stop))
   {
   }
+  /** Of a second camera, at the mirrors of @p first. */
+  CameraRig (CameraRigOptions options, CameraRig &first)
+      : options_ (std::move (options)), stop_ (first.stop_), first_ (&first)
+  {
+  }
 
   Result<void> open ();
 
@@ -124,8 +129,10 @@ public:
   Result<std::vector<SeenFrame>> deliver (int frames) override;
   Result<void> record (const Schedule &schedule, double seconds,
       const std::function<void (const RecordedFrame &)> &take) override;
+  Rig *second () override { return second_.get (); }
 
 private:
+  Result<void> open_second ();
   Result<void> make_pipeline ();
   std::string close_pipeline ();
   Result<void> start ();
@@ -152,6 +159,8 @@ private:
   Nanoseconds exposure_ = 0;
   Nanoseconds stopped_ = 0;        // the masks before, by monotonic_now ()
   std::deque<Nanoseconds> delays_; // of the last frames, with any offset
+  std::unique_ptr<CameraRig> second_;
+  CameraRig *const first_ = nullptr; // of the second
 };
 
 Nanoseconds
@@ -229,6 +238,12 @@ CameraRig::read_features (ArvCamera *camera)
 void
 CameraRig::read_dmd ()
 {
+  if (first_) {
+    parts_.dmd = first_->parts_.dmd;
+    parts_.dmd_device = first_->parts_.dmd_device;
+    parts_.dmd_status = first_->parts_.dmd_status;
+    return;
+  }
   parts_.dmd = dmd_->info ();
   parts_.dmd_device = {.model = parts_.dmd.name,
       .serial = parts_.dmd.serial,
@@ -251,7 +266,18 @@ CameraRig::open ()
     return Error{"aravissrc has no camera", ErrorCode::not_found};
   read_features (camera.get ());
   options_.plan.size = parts_.camera.size;
-  return {};
+  return open_second ();
+}
+
+Result<void>
+CameraRig::open_second ()
+{
+  if (!options_.second)
+    return {};
+  CameraRigOptions options{*options_.second, options_.plan};
+  second_ = std::make_unique<CameraRig> (std::move (options), *this);
+  const auto opened = second_->open ();
+  return opened ? opened : opened.error ().with_prefix ("the second camera: ");
 }
 
 /* ------------------------------------------------------ mirrors and frames --
@@ -260,14 +286,16 @@ CameraRig::open ()
 Result<void>
 CameraRig::show (const StillMask &mask, int slots)
 {
+  if (first_ && slots != 1)
+    return Error{"a second camera gets light between masks, too"};
+  if (first_)
+    return first_->show (complement_of (mask), slots);
   RETURN_IF_ERROR (reopen_dmd ());
   ASSIGN_OR_RETURN (
       const SlotPlan plan, SlotPlan::fit ({}, slots, parts_.rate));
   /* Not later: the first frames of this mask may be here when show () returns,
    * and how late they turn to it is measured. */
-  dmd_->stop ();
-  forget_frames ();
-  stopped_ = monotonic_now ();
+  park ();
   RETURN_IF_ERROR (dmd_->show (mask, plan, stop_));
   return {};
 }
@@ -275,10 +303,15 @@ CameraRig::show (const StillMask &mask, int slots)
 void
 CameraRig::park ()
 {
+  if (first_)
+    return first_->park ();
   if (dmd_)
     dmd_->stop ();
-  forget_frames ();
-  stopped_ = monotonic_now ();
+  for (CameraRig *rig : {this, second_.get ()})
+    if (rig) {
+      rig->forget_frames ();
+      rig->stopped_ = monotonic_now ();
+    }
 }
 
 /** Whether a frame was exposed before the masks were stopped, if others are as
@@ -443,6 +476,8 @@ CameraRig::record (const Schedule &, double seconds,
     const std::function<void (const RecordedFrame &)> &take)
 {
   close_pipeline ();
+  if (second_)
+    second_->close_pipeline ();
   dmd_.reset (); // dmdsync opens it
   ASSIGN_OR_RETURN (const auto pipeline, recording_pipeline ());
   RETURN_IF_ERROR (pipeline->set_state (GST_STATE_PLAYING));

@@ -17,7 +17,10 @@ struct CameraRigOptions {
    * leaves. */
   SourceOptions source;
   SourcePlan plan;
-  std::string recording; ///< file that is written and removed
+  std::string recording = {}; ///< file that is written and removed
+  /** Of a camera in the beam of the mirrors that are off; none: there is none.
+   */
+  std::optional<SourceOptions> second = {};
 };
 
 /** Takes @p dmd, which is open, and opens the camera; errors are those of the

@@ -247,8 +247,13 @@ check_camera (GstCodedExposureCameraSrc *self, const Named<BenchProfile> &bench,
 #endif
   if (!bench.read || !serial)
     return true;
-  const auto same = BenchProfile::check_device (
-      "camera", bench.read->value ().camera, {.serial = serial});
+  const auto check = [&] (bool off_beam) {
+    return BenchProfile::check_device ("camera",
+        bench.read->value ().of_beam (off_beam).camera, {.serial = serial});
+  };
+  const auto same = check (false);
+  if (!same && check (true)) // it is the second one
+    return true;
   if (!same)
     POST_ERROR (self, RESOURCE, SETTINGS,
         "The bench profile does not fit: " + same.error ().message);

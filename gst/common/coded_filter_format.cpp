@@ -219,7 +219,9 @@ CodedFilter::find_bench (CodedFormat &format)
     if (!*asked)
       return post_error (
           "The bench property cannot be read: " + asked->error ().message);
-    const BenchProfile &given = asked->value ();
+    const bool tagged = stream_.tagged && *stream_.tagged;
+    const BenchProfile given =
+        asked->value ().of_beam (tagged && stream_.tagged->value ().off_beam);
     if (stream_.bench && !fits (given.check_bench (*stream_.bench)))
       return false;
     stream_.bench = given;

@@ -113,8 +113,10 @@ read_bench (GstDmdSync *self)
         !same)
       return refuse_settings (
           self, "The bench profile does not fit: " + same.error ().message);
+  const bool off_beam = settings_of (self).beam == Beam::kOff;
   locked (self, [&] {
-    st.bench = given ? std::optional (given->value ()) : std::nullopt;
+    st.bench = given ? std::optional (given->value ().of_beam (off_beam))
+                     : std::nullopt;
   });
   if (st.bench)
     if (const auto old = st.bench->why_old (now_utc ()))

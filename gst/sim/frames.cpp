@@ -443,7 +443,7 @@ begin_stream (GstCodedExposureSim *self)
     return refuse_settings (self,
         "The bench property cannot be read: " + bench.read->error ().message);
   if (bench.read)
-    stream.profile = bench.read->value ();
+    stream.profile = bench.read->value ().of_beam (beam == Beam::kOff);
   if (!dmd.empty () && !(stream.mirrors = find_mirrors (dmd)))
     return refuse_settings (
         self, "dmd '" + dmd +

@@ -38,6 +38,10 @@ struct MirrorProgram {
   std::vector<Mask> masks = {};
   std::vector<Stretch> stretches = {};
   Nanoseconds slot = 0; ///< by which a missed trigger is late
+
+  /** What the beam of the mirrors that are off has of it. @p mirrors: of the
+   * array. */
+  MirrorProgram complement (Extent mirrors) const;
 };
 
 /** An exposure of the camera. */

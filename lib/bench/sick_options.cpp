@@ -385,6 +385,13 @@ parse_values (const Word &word, std::string_view text)
 Result<void>
 apply (Bench &bench, std::string_view piece)
 {
+  constexpr std::string_view kSecond = "second:";
+  if (piece.starts_with (kSecond)) {
+    if (bench.second.empty ())
+      return Error{"fault " + in_quotes (piece) +
+                   " is of a second camera, and this bench has one camera"};
+    return apply (bench.second.front (), piece.substr (kSecond.size ()));
+  }
   const auto equals = piece.find ('=');
   const std::string_view name = piece.substr (0, equals);
   const auto found = std::ranges::find (all_words (), name, &Word::name);
@@ -434,7 +441,8 @@ fault_help ()
       text += " [" + std::string (word.usual) + "]";
     text += '\n';
   }
-  return text;
+  return text +
+         "  second:NAME[=VALUE]             the same of a second camera\n";
 }
 
 SickBenchOptions
@@ -472,6 +480,28 @@ random_healthy_bench (std::uint64_t seed, const SickBenchOptions &like)
       .tilt_y = any (-0.003, 0.003),
       .distortion = any (-0.002, 0.002)};
   b.blur = any (0.2, 0.7);
+  return b;
+}
+
+SickBenchOptions
+second_camera_of (const SickBenchOptions &first)
+{
+  SickBenchOptions second = first;
+  second.second.clear ();
+  second.parts.clear ();
+  second.seed = first.seed + 1000;
+  second.orientation.flipped_x = true;
+  return second;
+}
+
+SickBenchOptions
+random_second_camera (const SickBenchOptions &first)
+{
+  const SickBenchOptions like = second_camera_of (first);
+  SickBenchOptions b = random_healthy_bench (like.seed, like);
+  b.flicker_rate = first.flicker_rate; // the lamp is the same
+  b.flicker_depth = first.flicker_depth;
+  b.drift = first.drift;
   return b;
 }
 

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "base/geometry.h"
 #include "base/result.h"
@@ -104,13 +105,17 @@ struct SickBenchOptions {
    * empty. */
   std::map<std::string, std::string> parts = {};
 
+  /** At most one: the camera in the beam of the mirrors that are off, with its
+   * lens. It looks at the same mirrors and is triggered with the first. */
+  std::vector<SickBenchOptions> second = {};
+
   bool has (const std::string &part) const { return parts.contains (part); }
 };
 
 /**
  * Changes @p bench by words NAME[=VALUE] between blanks, such as
- * "flicker=100:0.05 exposure-late=2ms"; fault_help () lists them. Changes
- * nothing on an error.
+ * "flicker=100:0.05 exposure-late=2ms"; fault_help () lists them. Those of a
+ * second camera begin with "second:". Changes nothing on an error.
  */
 Result<void> inflict (SickBenchOptions &bench, std::string_view words);
 
@@ -121,6 +126,11 @@ std::string fault_help ();
  * benches work well. Keeps sizes, rate and bits of @p like. */
 SickBenchOptions random_healthy_bench (
     std::uint64_t seed, const SickBenchOptions &like = {});
+
+/** A second camera like that of @p first, whose picture is its mirror image. */
+SickBenchOptions second_camera_of (const SickBenchOptions &first);
+/** The same, healthy, with numbers of its own. */
+SickBenchOptions random_second_camera (const SickBenchOptions &first);
 
 /** Gives @p bench the numbers that were measured of one; those that @p profile
  * does not have stay. */

@@ -151,7 +151,13 @@ SimulatedRig::make (const SickBenchOptions &options)
     if (options.has (fault))
       return Error{what, code};
   ASSIGN_OR_RETURN (SickBench bench, SickBench::make (options));
-  return std::unique_ptr<SimulatedRig> (new SimulatedRig (std::move (bench)));
+  std::unique_ptr<SimulatedRig> rig (new SimulatedRig (std::move (bench)));
+  for (const SickBenchOptions &other : options.second) {
+    ASSIGN_OR_RETURN (rig->second_, make (other));
+    rig->second_->first_ = rig.get ();
+    rig->second_->parts_.camera.serial = "SIM2";
+  }
+  return rig;
 }
 
 SimulatedRig::SimulatedRig (SickBench bench)
@@ -214,6 +220,24 @@ SimulatedRig::arrive (Nanoseconds until)
   }
 }
 
+Nanoseconds
+SimulatedRig::now () const
+{
+  return second_ ? std::max (now_, second_->now_) : now_;
+}
+
+/** Frames that nobody watched are gone. */
+void
+SimulatedRig::catch_up (Nanoseconds now)
+{
+  const Nanoseconds gone = now - kInFlight * options_.rate.period ();
+  if (now_ < gone)
+    on_their_way_.clear ();
+  now_ = std::max (now_, now);
+  while (fetch (gone))
+    ;
+}
+
 /** The mirrors stop within an exposure. */
 void
 SimulatedRig::stop ()
@@ -235,10 +259,15 @@ SimulatedRig::stop ()
 void
 SimulatedRig::start (MirrorProgram program, Nanoseconds transfer)
 {
-  stop ();
+  park ();
   now_ += kStart +
           Nanoseconds (fraction (options_.seed + 3, starts_++) * kStartSpread) +
           transfer + options_.rate.period ();
+  if (second_) {
+    second_->now_ = now_;
+    second_->bench_.show (now_, program.complement (options_.mirrors));
+    second_->shows_ = true;
+  }
   bench_.show (now_, std::move (program));
   shows_ = true;
 }
@@ -246,6 +275,10 @@ SimulatedRig::start (MirrorProgram program, Nanoseconds transfer)
 Result<void>
 SimulatedRig::show (const StillMask &mask, int slots)
 {
+  if (first_ && slots != 1)
+    return Error{"a second camera gets light between masks, too"};
+  if (first_)
+    return first_->show (complement_of (mask), slots);
   ASSIGN_OR_RETURN (
       const SlotPlan plan, SlotPlan::fit ({}, slots, options_.rate));
   const auto times = fit_still (plan, mask, *parts_.dmd.patterns);
@@ -268,6 +301,13 @@ SimulatedRig::show (const StillMask &mask, int slots)
 void
 SimulatedRig::park ()
 {
+  if (first_)
+    return first_->park ();
+  if (second_) {
+    second_->catch_up (now_);
+    catch_up (second_->now_);
+    second_->stop ();
+  }
   stop ();
 }
 

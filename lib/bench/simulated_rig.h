@@ -19,6 +19,8 @@ namespace codedexposure
  * 60 to 80 ms to show them, after which one period passes without a trigger.
  * Two frames are on their way when it stops, the later one cut short; they come
  * first in the next watch ().
+ *
+ * Options with a second camera have a rig of it.
  */
 class SimulatedRig : public Rig
 {
@@ -28,7 +30,7 @@ public:
       const SickBenchOptions &options);
 
   const BenchTruth &truth () const { return bench_.truth (); }
-  Nanoseconds now () const override { return now_; }
+  Nanoseconds now () const override;
 
   const RigParts &parts () const override { return parts_; }
   Result<void> show (const StillMask &mask, int slots) override;
@@ -40,6 +42,7 @@ public:
   Result<std::vector<SeenFrame>> deliver (int frames) override;
   Result<void> record (const Schedule &schedule, double seconds,
       const std::function<void (const RecordedFrame &)> &take) override;
+  Rig *second () override { return second_.get (); }
 
 private:
   struct Setting {
@@ -54,6 +57,7 @@ private:
   SeenFrame frame_of (const Shot &shot);
   Nanoseconds arrival_of (const Shot &shot) const;
   void stop ();
+  void catch_up (Nanoseconds now);
   void start (MirrorProgram program, Nanoseconds transfer = 0);
   bool spoil (const Shot &shot, ImageView<std::uint16_t> picture) const;
   Nanoseconds stamp_of (const Shot &shot) const;
@@ -67,6 +71,8 @@ private:
   std::uint64_t starts_ = 0; // of masks
   std::deque<Shot> on_their_way_;
   std::optional<Setting> setting_;
+  std::unique_ptr<SimulatedRig> second_;
+  SimulatedRig *first_ = nullptr; // of the second
 };
 
 /** What a camera with these faults says of its GenICam features. */

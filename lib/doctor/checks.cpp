@@ -24,6 +24,14 @@ no_light ()
   return {.name = "no light", .on = [] (int, int) { return false; }};
 }
 
+StillMask
+complement_of (const StillMask &mask)
+{
+  StillMask other = mask;
+  other.on = [on = mask.on] (int x, int y) { return !on (x, y); };
+  return other;
+}
+
 Result<std::vector<SeenFrame>>
 look (Examination &examination, const StillMask &mask, int slots, int frames)
 {
@@ -60,6 +68,7 @@ all_checks ()
       {"sensor", "Sensor", {"trigger", "light"}, check_sensor},
       {"mirrors", "Mirrors", {"trigger", "light"}, check_mirrors},
       {"optics", "Optics", {"trigger", "light"}, check_optics},
+      {"second", "Second camera", {"trigger", "light", "optics"}, check_second, true},
       {"whole", "Recording", {"trigger"}, check_whole},
   };
   return checks;
@@ -95,12 +104,15 @@ has_failed (const std::string &name, const std::vector<Finding> &findings)
 } // namespace
 
 Result<std::vector<Check>>
-choose_checks (std::string_view only)
+choose_checks (std::string_view only, bool two)
 {
-  if (only.empty ())
-    return all_checks ();
   std::set<std::string> chosen;
-  for (const std::string_view name : split (only, ',')) {
+  if (only.empty ())
+    for (const Check &check : all_checks ())
+      if (two || !check.of_two)
+        chosen.insert (check.name);
+  for (const std::string_view name :
+      only.empty () ? std::vector<std::string_view> () : split (only, ',')) {
     const Check *check = find_check (name);
     if (!check) {
       std::string known;
@@ -108,6 +120,8 @@ choose_checks (std::string_view only)
         known += (known.empty () ? "" : ", ") + each.name;
       return Error{in_quotes (name) + " is no check; choose from " + known};
     }
+    if (check->of_two && !two)
+      return Error{in_quotes (name) + " is a check of a second camera"};
     choose (*check, chosen);
   }
   std::vector<Check> checks;
@@ -124,7 +138,8 @@ run_check (const Check &check, Examination &examination,
   const auto failed = [&before] (const std::string &name) {
     return has_failed (name, before);
   };
-  if (std::ranges::any_of (check.needs, failed))
+  if (std::ranges::any_of (check.needs, failed) ||
+      (check.of_two && !examination.rig.second ()))
     return Finding{.check = check.name, .shown = {}, .skipped = true};
   const Nanoseconds begin = examination.rig.now ();
   auto finding = check.run (examination);

@@ -97,6 +97,7 @@ struct Check {
   /** Names of checks that must not have failed. */
   std::vector<std::string> needs;
   Result<Finding> (*run) (Examination &examination);
+  bool of_two = false; ///< only with a second camera
 };
 
 /** What is found where a part cannot be opened: the camera, or the DMD. */
@@ -105,10 +106,10 @@ Finding part_missing (const Error &why, bool camera);
 /** All checks, in their order. */
 const std::vector<Check> &all_checks ();
 /** Those of the comma-separated names @p only, and what they need; empty: all.
- * Error for a name that is none. */
-Result<std::vector<Check>> choose_checks (std::string_view only);
-/** Runs @p check unless one that it needs has failed in @p before; its finding
- * is skipped then. */
+ * Error for a name that is none. @p two: there is a second camera. */
+Result<std::vector<Check>> choose_checks (std::string_view only, bool two);
+/** Runs @p check unless one that it needs has failed in @p before, or the
+ * second camera that it needs is not there; its finding is skipped then. */
 Result<Finding> run_check (const Check &check, Examination &examination,
     const std::vector<Finding> &before);
 
@@ -118,6 +119,7 @@ Result<Finding> check_light (Examination &examination);
 Result<Finding> check_sensor (Examination &examination);
 Result<Finding> check_mirrors (Examination &examination);
 Result<Finding> check_optics (Examination &examination);
+Result<Finding> check_second (Examination &examination);
 Result<Finding> check_whole (Examination &examination);
 
 } // namespace codedexposure

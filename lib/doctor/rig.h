@@ -106,6 +106,17 @@ public:
    */
   virtual Result<void> record (const Schedule &schedule, double seconds,
       const std::function<void (const RecordedFrame &)> &take) = 0;
+  /**
+   * The same mirrors with a second camera, in the beam of those that are off;
+   * null where there is none. It can show () masks of one slot alone, of which
+   * the mirrors get the complement, so that its camera sees them. Both cameras
+   * see all that either shows, and watch () of both gives frames of the same
+   * time. It does not record ().
+   */
+  virtual Rig *second () { return nullptr; }
 };
+
+/** What the mirrors show where the other beam is to have @p mask. */
+StillMask complement_of (const StillMask &mask);
 
 } // namespace codedexposure

@@ -233,6 +233,43 @@ constexpr Rule kRules[] = {
     {"dust", "", "%", most (0), most (1), "",
         "blow dust off the window of the DMD, the lens and the sensor"},
 
+    told ("second-trigger",
+        "connect the trigger output of the DMD to both cameras, and set "
+        "TriggerMode=On and the same TriggerSource and TriggerActivation"),
+    told ("second-frame-late",
+        "set both cameras alike: StreamBufferHandlingMode, burst and sequence "
+        "modes"),
+    {"second-arrival", "arrival of the second camera's frames",
+        "% of a period later", within (15), within (20),
+        "frames of the second camera arrive {} % of a period later than those "
+        "of the first, and pairs are missed from 25 % on",
+        "connect both cameras alike, with the same pixel format and packet "
+        "size"},
+    {"second-late", "start of the second camera's exposure", "us", within (400),
+        within (1000),
+        "the exposure of the second camera begins {} us after that of the "
+        "first one",
+        "set TriggerDelay and TriggerActivation of both cameras alike"},
+    {"second-short", "exposure of the second camera is shorter by", "us",
+        within (600), within (1500),
+        "the exposure of the second camera is {} us shorter than that of the "
+        "first one",
+        "set ExposureTime of both cameras alike"},
+    {"second-bright", "saturated pixels of the second camera", "%", most (1),
+        most (5),
+        "with all mirrors off, {} % of the second camera's pixels "
+        "are saturated",
+        "lower the gain of the second camera, or stop its lens down"},
+    {"second-dark", "level of the second camera", "%", {40, kAny}, {15, kAny},
+        "with all mirrors off, the second camera reaches {} % of its range",
+        "raise the gain of the second camera or open its lens, and check that "
+        "it looks into the beam of the mirrors that are off"},
+    {"second-shift", "mirrors of the first camera that the second sees", "%",
+        {93, kAny}, {80, kAny},
+        "of the mirrors that the first camera sees, the second one sees {} %",
+        "move the second camera until it looks at the same mirrors; "
+        "codedexposure calibrate --second shows where they are"},
+
     told ("slip", "check the trigger cable for a loose contact, and its level"),
     told (
         "frame-jitter", "stop other programs that use the network or the disk"),

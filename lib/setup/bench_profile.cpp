@@ -32,6 +32,7 @@ constexpr BenchQuantity kQuantities[] = {
     {&BenchProfile::exposure, "exposure_ns", "exposure", " ns", 1.0, kLongest},
     {&BenchProfile::psf_sigma, "psf_sigma", "psf_sigma", " pixels", 0.0,
         Mapping::kMaxPsfSigma},
+    {&BenchProfile::light_ratio, "light_ratio", "light ratio", "", 1e-6, 1e6},
 };
 
 Result<void>
@@ -109,7 +110,30 @@ BenchProfile::check () const
     return Error{"the mapping is for frames of " +
                  size_text (mapping->camera ()) + " pixels, but the camera " +
                  "has " + size_text (camera.size) + "; measure a new mapping"};
+  if (light_ratio && !second.empty ())
+    return Error{"a light ratio belongs to a second camera, not to the first"};
+  for (const BenchProfile &other : second) {
+    if (!other.second.empty ())
+      return Error{"the second camera of a profile has no second one itself"};
+    const auto good = other.check ();
+    if (!good)
+      return good.error ().with_prefix ("second camera: ");
+    if (mapping && other.mapping &&
+        !(mapping->mirrors () == other.mapping->mirrors ()))
+      return Error{"the mappings of both cameras are to " +
+                   size_text (mapping->mirrors ()) + " and " +
+                   size_text (other.mapping->mirrors ()) +
+                   " mirrors, and both look at the same ones"};
+  }
   return {};
+}
+
+BenchProfile
+BenchProfile::of_beam (bool off_beam) const
+{
+  BenchProfile one = off_beam && !second.empty () ? second.front () : *this;
+  one.second.clear ();
+  return one;
 }
 
 Result<void>
@@ -148,6 +172,9 @@ BenchProfile::rows () const
           real_text (number->value) + " ± " + real_text (number->sigma) + unit);
   rows.emplace_back ("mapping",
       mapping ? size_text (mapping->mirrors ()) + " mirrors" : "not measured");
+  for (const BenchProfile &other : second)
+    for (auto &[name, text] : other.rows ())
+      rows.emplace_back ("second camera: " + name, std::move (text));
   return rows;
 }
 

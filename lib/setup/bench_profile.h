@@ -32,7 +32,8 @@ struct Measured {
  */
 struct BenchProfile {
   /** Bounds on the JSON form, and on the name of a device, in bytes. */
-  static constexpr std::size_t kMaxJsonSize = Mapping::kMaxJsonSize + 65536;
+  static constexpr std::size_t kMaxJsonSize =
+      2 * (Mapping::kMaxJsonSize + 65536);
   static constexpr std::size_t kMaxName = 128;
   /** An older profile may no longer be that of the bench. */
   static constexpr std::chrono::days kMaxAge{30};
@@ -66,6 +67,16 @@ struct BenchProfile {
   std::optional<Measured> exposure = {};  ///< true duration, ns
   std::optional<Measured> psf_sigma = {}; ///< blur, as of Mapping
   std::optional<Mapping> mapping = {};
+  /** DN of light that goes to this second camera for each DN of the first one,
+   * where the same mirrors are on for the same time. */
+  std::optional<Measured> light_ratio = {};
+  /** One profile at most: that of a second camera, in the beam of the mirrors
+   * that are off. It has none itself. */
+  std::vector<BenchProfile> second = {};
+
+  /** What was measured with one of the cameras: the second one @p off_beam, if
+   * there is one, else the first. */
+  BenchProfile of_beam (bool off_beam) const;
 
   /** The strict, versioned text form: see docs/formats.md. */
   static Result<BenchProfile> from_json (std::string_view json);

@@ -117,6 +117,15 @@ read_bench_profile (const Json &root)
         [&number = profile.*quantity.member] (const Json &value,
             const std::string &key) { number = read_measured (value, key); }});
   keys.push_back ({"mapping", inner_into (profile.mapping, read_mapping)});
+  keys.push_back (
+      {"second", [&profile] (const Json &value, const std::string &key) {
+         if (value.is_object () && value.contains ("second"))
+           throw Error{key + ": a second camera has no second one itself",
+               ErrorCode::parse};
+         std::optional<BenchProfile> one;
+         inner_into (one, read_bench_profile) (value, key);
+         profile.second = {*std::move (one)};
+       }});
   read_versioned (root, kHead,
       "a bench profile needs at least format, version, measured, camera and "
       "bits",
@@ -160,6 +169,8 @@ BenchProfile::to_json () const
       root[quantity.key] = {{"value", number->value}, {"sigma", number->sigma}};
   if (mapping)
     root["mapping"] = json_value (mapping->to_json ());
+  for (const BenchProfile &other : second)
+    root["second"] = json_value (other.to_json ());
   return json_text (root);
 }
 

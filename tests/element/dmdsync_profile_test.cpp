@@ -73,6 +73,22 @@ TEST (DmdsyncBeam, ASecondCameraIsTaggedAndItsPhaseIsNotWatched)
   }
 }
 
+TEST (DmdsyncBeam, EachCameraHasItsPartOfAProfileOfBoth)
+{
+  const BenchProfile first = of_dmd ("7");
+  BenchProfile second = profile_of (kSize);
+  second.black_level = Measured{12, 1};
+  BenchProfile both = first;
+  both.second = {second};
+  const BenchFile file (both);
+  for (const auto &[beam, own] :
+      {std::pair ("beam=on", first), std::pair ("beam=off", second)}) {
+    SyncHarness sync (std::string (beam) + " bench=" + file.path ());
+    sync.start ();
+    EXPECT_EQ (tagged_profile (sync.pull_event (GST_EVENT_TAG)), own) << beam;
+  }
+}
+
 TEST (DmdsyncBeam, UpstreamMaySayIt)
 {
   SyncHarness sync;

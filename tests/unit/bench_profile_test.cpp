@@ -51,6 +51,18 @@ full ()
   return profile;
 }
 
+BenchProfile
+of_two ()
+{
+  BenchProfile both = full ();
+  BenchProfile second = plain ();
+  second.camera.serial = "0456";
+  second.mapping = Mapping (Extent{64, 48});
+  second.light_ratio = Measured{1.25, 0.002};
+  both.second = {second};
+  return both;
+}
+
 std::string
 refusal (const BenchProfile &profile)
 {
@@ -72,7 +84,7 @@ refusal (const std::string &from, const std::string &to)
 
 TEST (BenchProfile, ReadsBackBitForBit)
 {
-  for (const BenchProfile &profile : {plain (), full ()}) {
+  for (const BenchProfile &profile : {plain (), full (), of_two ()}) {
     const std::string json = profile.to_json ();
     const auto read = BenchProfile::from_json (json);
     ASSERT_TRUE (read.ok ()) << read.error ().message;
@@ -83,6 +95,50 @@ TEST (BenchProfile, ReadsBackBitForBit)
       R"({"format":"coded-exposure-bench","version":1,)"
       R"("measured":"2026-03-14T09:26:53Z","camera":{"size":[64,48]},)"
       R"("bits":8})");
+}
+
+TEST (BenchProfile, OfTwoCamerasHasOneForEachBeam)
+{
+  const BenchProfile both = of_two ();
+  EXPECT_EQ (both.of_beam (false), full ());
+  EXPECT_EQ (both.of_beam (true), both.second.front ());
+  EXPECT_EQ (full ().of_beam (true), full ()) << "of one camera in that beam";
+  bool has_ratio = false;
+  for (const auto &[name, text] : both.rows ())
+    has_ratio |= name == "second camera: light ratio" && text == "1.25 ± 0.002";
+  EXPECT_TRUE (has_ratio);
+}
+
+TEST (BenchProfile, RefusesASecondCameraThatIsNone)
+{
+  BenchProfile wrong = of_two ();
+  wrong.second.front ().bits = 17;
+  EXPECT_EQ (refusal (wrong), "second camera: 17 bits of a pixel are not 1 to "
+                              "16");
+  wrong = of_two ();
+  wrong.light_ratio = Measured{1, 0};
+  EXPECT_EQ (refusal (wrong),
+      "a light ratio belongs to a second camera, not to the first");
+  wrong = of_two ();
+  wrong.second.front ().camera.size = {96, 48};
+  wrong.second.front ().mapping = Mapping (Extent{96, 48});
+  EXPECT_EQ (refusal (wrong),
+      "the mappings of both cameras are to 64x48 and 96x48 mirrors, and both "
+      "look at the same ones");
+  wrong = of_two ();
+  wrong.second.front ().second = {plain ()};
+  EXPECT_EQ (refusal (wrong),
+      "the second camera of a profile has no second one itself");
+  const auto read = BenchProfile::from_json (wrong.to_json ());
+  ASSERT_FALSE (read);
+  EXPECT_NE (
+      read.error ().message.find ("a second camera has no second one itself"),
+      std::string::npos)
+      << read.error ().message;
+  std::string deep;
+  for (int i = 0; i < 100'000; i++)
+    deep += R"({"second":)";
+  EXPECT_FALSE (BenchProfile::from_json (deep));
 }
 
 /* Cameras say their names in any encoding. */

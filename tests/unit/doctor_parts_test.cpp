@@ -183,12 +183,12 @@ TEST (Doctor, GivesNoAlarmForHealthyBenches)
 TEST (Checks, WhatANamedCheckNeedsIsDoneBefore)
 {
   using Names = std::vector<std::string>;
-  EXPECT_EQ (names_of (*choose_checks ("")), names_of (all_checks ()));
+  EXPECT_EQ (names_of (*choose_checks ("", true)), names_of (all_checks ()));
   EXPECT_EQ (
-      names_of (*choose_checks ("trigger")), (Names{"parts", "trigger"}));
-  EXPECT_EQ (names_of (*choose_checks ("whole,light")),
+      names_of (*choose_checks ("trigger", false)), (Names{"parts", "trigger"}));
+  EXPECT_EQ (names_of (*choose_checks ("whole,light", true)),
       (Names{"parts", "trigger", "light", "whole"}));
-  EXPECT_FALSE (choose_checks ("trigger,soul"));
+  EXPECT_FALSE (choose_checks ("trigger,soul", true));
 }
 
 TEST (Checks, OneIsSkippedAfterAFailureThatItNeeds)

@@ -88,6 +88,14 @@ void register_meta (const char *name);
 void set_frame_meta (GstBuffer *buffer, const FrameMeta &meta);
 std::optional<FrameMeta> get_frame_meta (GstBuffer *buffer);
 
+/** Its pixels are not the scene through the masks of the schedule. */
+inline bool
+shows_pattern (GstBuffer *frame)
+{
+  const auto meta = get_frame_meta (frame);
+  return meta && !meta->pattern.empty ();
+}
+
 /** Copies the metas of @p from to the picture @p to that was made from it,
  * except those that describe memory, and the frame meta if @p to has one.
  * Coordinates are scaled. */

@@ -33,6 +33,16 @@ camera_of (const PairStream &stream, const std::optional<Mapping> &mapping)
 
 } // namespace
 
+std::optional<PairStream>
+PairStream::at (GstAggregatorPad *pad, const std::optional<StreamSetup> &setup)
+{
+  const CapsPtr caps (gst_pad_get_current_caps (GST_PAD (pad)));
+  PairStream stream{.info = {}, .setup = setup};
+  if (caps && gst_video_info_from_caps (&stream.info, caps.get ()))
+    return stream;
+  return {};
+}
+
 void
 PairCheck::configure (const PairStream &on, const PairStream &off)
 {
@@ -88,6 +98,15 @@ PairCheck::check (GstBuffer *coded, GstBuffer *partner)
     return Verdict::unknown;
   return read (coded, partner,
       [&] (const auto &on, const auto &off) { return watch_->take (on, off); });
+}
+
+void
+PairCheck::take_alone (GstBuffer *frame, bool off)
+{
+  MappedFrame mapped (off ? off_ : on_, frame, GST_MAP_READ);
+  if (watch_ && mapped)
+    read_pixels (
+        mapped, [&] (const auto &view) { watch_->take_alone (view, off); });
 }
 
 std::optional<PartnerDrift::Shift>

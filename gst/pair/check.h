@@ -4,6 +4,7 @@
 
 #include <optional>
 
+#include <gst/base/gstaggregator.h>
 #include <gst/video/video.h>
 
 #include "setup/stream_setup.h"
@@ -15,6 +16,10 @@ namespace codedexposure::gst
 
 /** One camera: what its stream says. */
 struct PairStream {
+  /** None: @p pad has no caps yet. */
+  static std::optional<PairStream> at (
+      GstAggregatorPad *pad, const std::optional<StreamSetup> &setup);
+
   GstVideoInfo info;
   std::optional<StreamSetup> setup = {};
 };
@@ -29,6 +34,8 @@ public:
   void reset ();
   /** Buffers that cannot be read are not known. */
   PartnerWatch::Verdict check (GstBuffer *coded, GstBuffer *partner);
+  /** A frame that has no partner, of the second camera if it is @p off. */
+  void take_alone (GstBuffer *frame, bool off);
   /** How far the second camera has moved, by partners; none: not known. */
   std::optional<PartnerDrift::Shift> drift (
       GstBuffer *coded, GstBuffer *partner) const;

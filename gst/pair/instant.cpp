@@ -46,7 +46,7 @@ period_of (GstAggregatorPad *pad, GstBuffer *frame)
 
 Found
 find_partner (GstAggregatorPad *on, GstAggregatorPad *off, GstBuffer *coded,
-    bool late, BufferPtr &partner, guint64 &dropped)
+    bool late, BufferPtr &partner, std::vector<BufferPtr> &dropped)
 {
   const Instant start = instant_of (on, coded);
   const auto slack = GstClockTimeDiff (period_of (on, coded) / 4);
@@ -58,8 +58,7 @@ find_partner (GstAggregatorPad *on, GstAggregatorPad *off, GstBuffer *coded,
       partner.reset (gst_aggregator_pad_pop_buffer (off));
       return Found::kPartner;
     }
-    gst_aggregator_pad_drop_buffer (off);
-    dropped++;
+    dropped.emplace_back (gst_aggregator_pad_pop_buffer (off));
   }
   return late || gst_aggregator_pad_is_eos (off) ? Found::kNone : Found::kWait;
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <optional>
+#include <vector>
 
 #include <gst/base/gstaggregator.h>
 
@@ -27,11 +28,11 @@ std::optional<GstClockTimeDiff> later_by (
 GstClockTime period_of (GstAggregatorPad *pad, GstBuffer *frame);
 
 enum class Found { kPartner, kNone, kWait };
-/** Takes the partner of @p coded, the next frame of @p on, from @p off; drops
- * frames before it, and counts them in @p dropped. @p late: no longer waits for
- * it. */
+/** Takes the partner of @p coded, the next frame of @p on, from @p off, and the
+ * frames before it into @p dropped. @p late: no longer waits for it. */
 Found find_partner (GstAggregatorPad *on, GstAggregatorPad *off,
-    GstBuffer *coded, bool late, BufferPtr &partner, guint64 &dropped);
+    GstBuffer *coded, bool late, BufferPtr &partner,
+    std::vector<BufferPtr> &dropped);
 
 GstSegment segment_at (GstAggregatorPad *pad);
 

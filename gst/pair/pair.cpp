@@ -22,7 +22,8 @@
  * Time stamps can be wrong by a frame. The sum of both beams has the light of
  * the whole exposure and shows no masks; that of different exposures shows them
  * where the scene moves. A pair that is clearly worse than either frame would
- * be with one of the three frames before of the other camera is therefore none:
+ * be with one of the three frames before of the other camera, or, after frames
+ * that were alone, clearly worse than the last good pair, is therefore none:
  * the coded frame passes alone. Eight of these in a row are a warning. Where
  * nothing moves, a wrong pair is not noticed, and does no harm. This needs the
  * schedule in a tag, as codedexposure-sim, dmdsync and recordings have it, and,
@@ -179,37 +180,34 @@ sink (gpointer self, const char *name)
   return GST_AGGREGATOR_PAD (pad_of (GST_ELEMENT (self), name).get ());
 }
 
-/* Its pixels are not the scene through the masks of the schedule. */
-bool
-shows_pattern (GstBuffer *frame)
+/* For the streams as they are. */
+PairCheck &
+check_of (GstCodedExposurePair *self)
 {
-  const auto meta = get_frame_meta (frame);
-  return meta && !meta->pattern.empty ();
+  PairState &st = state (self);
+  if (std::exchange (st.check_due, false)) {
+    const auto on = PairStream::at (sink (self, "on"), st.on_setup);
+    const auto off = PairStream::at (sink (self, "off"), st.off_setup);
+    if (on && off)
+      st.check.configure (*on, *off);
+    st.drift.reset ();
+  }
+  return st.check;
 }
 
-std::optional<PairStream>
-stream_of (GstAggregatorPad *pad, const std::optional<StreamSetup> &setup)
+/* Pairs that follow are compared with it. */
+void
+take_alone (GstCodedExposurePair *self, GstBuffer *frame, bool off)
 {
-  const CapsPtr caps (gst_pad_get_current_caps (GST_PAD (pad)));
-  PairStream stream{.info = {}, .setup = setup};
-  if (caps && gst_video_info_from_caps (&stream.info, caps.get ()))
-    return stream;
-  return {};
+  if (!is_corrupted (frame) && !shows_pattern (frame))
+    check_of (self).take_alone (frame, off);
 }
 
 /* What the pixels say of a pair. */
 Alone
 compare (GstCodedExposurePair *self, GstBuffer *coded, GstBuffer *partner)
 {
-  PairState &st = state (self);
-  if (std::exchange (st.check_due, false)) {
-    const auto on = stream_of (sink (self, "on"), st.on_setup);
-    const auto off = stream_of (sink (self, "off"), st.off_setup);
-    if (on && off)
-      st.check.configure (*on, *off);
-    st.drift.reset ();
-  }
-  switch (st.check.check (coded, partner)) {
+  switch (check_of (self).check (coded, partner)) {
   case PartnerWatch::Verdict::good:
     return Alone::surely_not;
   case PartnerWatch::Verdict::bad:
@@ -237,8 +235,10 @@ watch_drift (GstCodedExposurePair *self, GstBuffer *coded, GstBuffer *partner)
 Alone
 judge (GstCodedExposurePair *self, GstBuffer *coded, GstBuffer *partner)
 {
-  if (!partner)
+  if (!partner) {
+    take_alone (self, coded, false);
     return Alone::missing;
+  }
   if (is_corrupted (coded) || is_corrupted (partner))
     return Alone::damaged;
   if (shows_pattern (coded) || shows_pattern (partner)) {
@@ -288,7 +288,7 @@ push_due (GstPad *pad, GstPadProbeInfo *, gpointer data)
     gst_pad_push_event (pad, event.release ());
   if (std::exchange (st.setup_due, false) && st.on_setup) {
     StreamSetup setup = *st.on_setup;
-    if (const auto off = stream_of (sink (self, "off"), st.off_setup))
+    if (const auto off = PairStream::at (sink (self, "off"), st.off_setup))
       setup.partner = PartnerSetup{{off->info.width, off->info.height},
           off->setup ? off->setup->known_mapping () : std::nullopt,
           off->setup && off->setup->bench ? off->setup->bench->black () : 0};
@@ -312,10 +312,14 @@ aggregate (GstAggregator *aggregator, gboolean late)
     return GST_FLOW_EOS;
   }
   BufferPtr partner;
-  guint64 dropped = 0;
+  std::vector<BufferPtr> dropped;
   const Found found =
       find_partner (on, off, head.get (), late, partner, dropped);
-  locked (self, [&] { return state (self).counters.dropped += dropped; });
+  locked (
+      self, [&] { return state (self).counters.dropped += dropped.size (); });
+  for (const BufferPtr &frame : dropped)
+    if (frame)
+      take_alone (self, frame.get (), true);
   if (found == Found::kWait)
     return GST_AGGREGATOR_FLOW_NEED_DATA;
   BufferPtr coded (gst_aggregator_pad_pop_buffer (on));

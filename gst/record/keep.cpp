@@ -231,7 +231,7 @@ watch (GstCodedExposureKeep *self, GstBuffer *frame)
 {
   KeepState &state = self->state;
   const auto meta = get_frame_meta (frame);
-  if (is_corrupted (frame) || (meta && !meta->pattern.empty ()))
+  if (is_corrupted (frame) || shows_pattern (frame))
     return state.events->skip ();
   if (meta && state.last && meta->frame != *state.last + 1)
     state.events->skip ();

@@ -21,8 +21,11 @@ constexpr int kMinBlocks = 16;
 /* Of unevenness, as an amplitude. Light between pixels is uneven by some
  * percent more or less, as the scene moves. */
 constexpr double kMuchMore = 1.08;
-/* Pairs before. */
+/* Frames before. */
 constexpr std::size_t kBefore = 3;
+/* Unevenness of a pair of two exposures, beside that of a good one, at least;
+ * 4.5 to 6.5 times were seen where much moves. */
+constexpr double kOther = 1.5;
 /* Pixels from a mirror to the next pixel. Farther away, little is left of the
  * masks. */
 constexpr double kMaxBeside = 0.25;
@@ -158,6 +161,30 @@ PartnerWatch::read (const View &view, ImageView<const Pixel> frame) const
   return light;
 }
 
+double
+PartnerWatch::gain_of (const Pair &pair) const
+{
+  return pair.on.sum / pair.off.sum / expected_ratio_;
+}
+
+/* Mean amplitude of a block. */
+double
+PartnerWatch::unevenness_of (const Pair &pair) const
+{
+  const double gain = gain_of (pair);
+  double sum = 0.0;
+  int blocks = 0;
+  for (std::size_t i = 0; i < pair.on.levels.size (); i += size_) {
+    const double own = std::sqrt (
+        unevenness (&pair.on.levels[i], &pair.off.levels[i], size_, gain));
+    if (std::isnan (own))
+      continue;
+    sum += own;
+    blocks++;
+  }
+  return sum / std::max (blocks, 1);
+}
+
 /* By how many standard deviations @now is less even than @on and @off; none
  * where nothing differs. */
 double
@@ -165,7 +192,7 @@ PartnerWatch::excess (const Pair &now, const Light &on, const Light &off) const
 {
   if (!(now.on.sum > 0.0 && now.off.sum > 0.0))
     return 0.0;
-  const double gain = now.on.sum / now.off.sum / expected_ratio_;
+  const double gain = gain_of (now);
   double sum = 0.0, squares = 0.0, own_sum = 0.0, other_sum = 0.0;
   int blocks = 0;
   for (std::size_t i = 0; i < now.on.levels.size (); i += size_) {
@@ -188,25 +215,50 @@ PartnerWatch::excess (const Pair &now, const Light &on, const Light &off) const
   return sum / std::sqrt (squares);
 }
 
+void
+PartnerWatch::keep (std::deque<Light> &before, Light light) const
+{
+  before.push_back (std::move (light));
+  if (before.size () > kBefore)
+    before.pop_front ();
+}
+
 template <typename Pixel, typename OtherPixel>
 PartnerWatch::Verdict
 PartnerWatch::take (ImageView<const Pixel> on, ImageView<const OtherPixel> off)
 {
   Pair now{read (on_, on), read (off_, off)};
   double worst = -std::numeric_limits<double>::infinity ();
-  for (const Pair &before : before_) {
-    worst = std::max (worst, excess (now, now.on, before.off));
-    worst = std::max (worst, excess (now, before.on, now.off));
-  }
-  const bool compared = !before_.empty ();
-  before_.push_back (std::move (now));
-  if (before_.size () > kBefore)
-    before_.pop_front ();
+  for (const Light &before : before_off_)
+    worst = std::max (worst, excess (now, now.on, before));
+  for (const Light &before : before_on_)
+    worst = std::max (worst, excess (now, before, now.off));
+  const bool compared = !before_on_.empty () || !before_off_.empty ();
+  const bool is_new = new_pairs_ > 0;
+  new_pairs_ -= is_new;
+  const double uneven = unevenness_of (now);
+  keep (before_on_, std::move (now.on));
+  keep (before_off_, std::move (now.off));
   if (compared && worst > kClear)
     return Verdict::bad;
-  return compared && worst < -kClear ? Verdict::good : Verdict::unknown;
+  if (is_new && usual_ && uneven > kOther * *usual_)
+    return Verdict::bad;
+  if (!compared || worst > -kClear)
+    return Verdict::unknown;
+  usual_ = uneven;
+  return Verdict::good;
 }
 
+template <typename Pixel>
+void
+PartnerWatch::take_alone (ImageView<const Pixel> frame, bool off)
+{
+  keep (off ? before_off_ : before_on_, read (off ? off_ : on_, frame));
+  new_pairs_ = int (kBefore);
+}
+
+template void PartnerWatch::take_alone (ImageView<const std::uint8_t>, bool);
+template void PartnerWatch::take_alone (ImageView<const std::uint16_t>, bool);
 template PartnerWatch::Verdict PartnerWatch::take (
     ImageView<const std::uint8_t>, ImageView<const std::uint8_t>);
 template PartnerWatch::Verdict PartnerWatch::take (

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <deque>
+#include <optional>
 #include <vector>
 
 #include "base/geometry.h"
@@ -21,9 +22,14 @@ namespace codedexposure
  * Every mirror sends the light of each slot into one of the beams, so the sum
  * of partners shows no masks. The sum of frames of different exposures shows
  * them wherever the scene moved. Each pair is therefore compared with those
- * that its frames would make with the three frames before: nothing needs to be
- * known of the scene, of noise or of the cameras' gains. Where nothing moves,
- * no pair differs from another, and a wrong one does no harm.
+ * that its frames would make with the three frames before, of each camera:
+ * nothing needs to be known of the scene, of noise or of the cameras' gains.
+ * Where nothing moves, no pair differs from another, and a wrong one does no
+ * harm.
+ *
+ * After a frame alone, a camera's times may be others, and the right partner
+ * may still have to come. The first three pairs are therefore also compared
+ * with the last good one: a wrong pair is several times as uneven.
  *
  * Only mirrors count on which pixels of both cameras lie, to a quarter of a
  * pixel; where a mapping leaves hardly any, no verdict is known.
@@ -46,8 +52,18 @@ public:
    * sizes; for 8 and 16 bits. */
   template <typename Pixel, typename OtherPixel>
   Verdict take (ImageView<const Pixel> on, ImageView<const OtherPixel> off);
+  /** Keeps a frame that has no partner, of the beam of the mirrors that are
+   * @p off or on. */
+  template <typename Pixel>
+  void take_alone (ImageView<const Pixel> frame, bool off);
   /** The next pair has none before it. */
-  void reset () { before_.clear (); }
+  void reset ()
+  {
+    before_on_.clear ();
+    before_off_.clear ();
+    usual_.reset ();
+    new_pairs_ = 0;
+  }
 
 private:
   struct View {
@@ -66,13 +82,18 @@ private:
 
   template <typename Pixel>
   Light read (const View &view, ImageView<const Pixel> frame) const;
+  void keep (std::deque<Light> &before, Light light) const;
+  double gain_of (const Pair &pair) const;
+  double unevenness_of (const Pair &pair) const;
   double excess (const Pair &now, const Light &on, const Light &off) const;
 
   std::size_t size_;          ///< mirrors of a block
   std::vector<float> smooth_; ///< what a smooth scene can look like there
   double expected_ratio_;     ///< of the beams' light, of an even scene
   View on_, off_;
-  std::deque<Pair> before_;
+  std::deque<Light> before_on_, before_off_; // the last frames
+  std::optional<double> usual_;              // unevenness of the last good pair
+  int new_pairs_ = 0;                        // that follow frames alone
 };
 
 } // namespace codedexposure

@@ -83,8 +83,8 @@ int
 run (Scale scale, const std::vector<std::string> &names)
 {
   std::vector<Case> cases;
-  for (const auto &list :
-      {stream_cases (), file_cases (), process_cases (), camera_cases ()})
+  for (const auto &list : {stream_cases (), pair_cases (), file_cases (),
+           process_cases (), camera_cases ()})
     cases.insert (cases.end (), list.begin (), list.end ());
   const auto known = [&] (const std::string &name) {
     return std::ranges::any_of (

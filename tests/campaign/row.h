@@ -59,6 +59,7 @@ struct Case {
 /** All cases of a file. */
 std::vector<Case> stream_cases ();
 std::vector<Case> file_cases ();
+std::vector<Case> pair_cases ();
 std::vector<Case> process_cases ();
 std::vector<Case> camera_cases ();
 /** The camera of camera_cases () in a process of its own. */

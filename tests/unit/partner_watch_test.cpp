@@ -55,6 +55,13 @@ verdicts (const Beams &beams, int shift, PartnerWatch watch)
   return count;
 }
 
+Verdict
+take (PartnerWatch &watch, const Beams &beams, int on, int off)
+{
+  return watch.take<std::uint8_t, std::uint8_t> (
+      beams.on[std::size_t (on)].view (), beams.off[std::size_t (off)].view ());
+}
+
 /* Of partners: the first pair has nothing to be compared with. */
 void
 expect_good (std::map<Verdict, int> count, int unknown = 1)
@@ -166,6 +173,39 @@ TEST (PartnerWatch, BeginsAnewAfterAReset)
   EXPECT_EQ (take (1, 1), Verdict::good);
   watch.reset ();
   EXPECT_EQ (take (3, 2), Verdict::unknown);
+}
+
+/* Its partner was lost, and times are others since. */
+TEST (PartnerWatch, AFrameAloneIsComparedWith)
+{
+  const Beams seen = beams ("sequential:lattice:4/2", 0.7);
+  const PartnerWatch::Camera camera = aligned ();
+  struct Next {
+    int on, off;
+    Verdict verdict;
+  };
+  for (const auto &[on, off, verdict] :
+      {Next{7, 6, Verdict::bad}, Next{7, 7, Verdict::good},
+          Next{7, 8, Verdict::bad}, Next{7, 9, Verdict::bad}}) {
+    PartnerWatch watch (seen.schedule, camera, camera);
+    for (int i = 0; i < 6; i++)
+      take (watch, seen, i, i);
+    watch.take_alone<std::uint8_t> (seen.on[6].view (), false);
+    EXPECT_EQ (take (watch, seen, on, off), verdict) << "partner " << off;
+  }
+}
+
+/* Nothing is known of a scene that does not move. */
+TEST (PartnerWatch, AFrameAloneOfAStillSceneRefusesNone)
+{
+  const Beams seen = beams ("sequential:lattice:4/2", 0.0);
+  const PartnerWatch::Camera camera = aligned ();
+  PartnerWatch watch (seen.schedule, camera, camera);
+  for (int i = 0; i < 6; i++)
+    take (watch, seen, i, i);
+  watch.take_alone<std::uint8_t> (seen.off[6].view (), true);
+  for (int i = 7; i < 10; i++)
+    EXPECT_EQ (take (watch, seen, i, i), Verdict::unknown);
 }
 
 } // namespace

@@ -325,11 +325,16 @@ Doctor::next_commands () const
   if (!profile_)
     return {};
   const std::string bench = " --bench " + profile_path ();
+  const std::string second =
+      !second_         ? ""
+      : beside_.camera ? " --both --second-camera \"" + *beside_.camera + "\""
+                       : " --both";
   const std::string record =
       source_.is_simulated ()
-          ? "simulate --scene pour" + bench + " --frames 50"
-          : "record --camera \"" + *source_.camera + "\" --device " +
-                *source_.device + " --schedule " +
+          ? (second_ ? "record" : "simulate") + second + " --scene pour" +
+                bench + " --frames 50"
+          : "record --camera \"" + *source_.camera + "\"" + second +
+                " --device " + *source_.device + " --schedule " +
                 source_.schedule.value_or ("sequential:2x2") + bench;
   return {"codedexposure " + record + " --output coded.mkv",
       "codedexposure decode coded.mkv --fuse best --output fused.mkv"};

@@ -124,7 +124,7 @@ properties ()
           kReadWriteReady, set (&Settings::features)},
       {"bench", "Bench profile",
           "What was measured of the bench, a JSON file or its text "
-          "(docs/formats.md); refused if it is of another camera",
+          "(docs/formats.md); refused if it is of other cameras",
           kReadWriteReady, set (&Settings::bench)},
       {"num-buffers", "Number of buffers",
           "Frames until EOS, those before and after a restart together; -1: "

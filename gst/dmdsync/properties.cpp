@@ -84,9 +84,9 @@ properties ()
           gst_coded_exposure_beam_get_type ()},
       {"bench", "Bench profile",
           "What was measured of the bench, a JSON file or its text "
-          "(docs/formats.md), which goes downstream in the tag; its trigger "
-          "delay is the exposure-offset where that is 0; refused if it is of "
-          "another DMD",
+          "(docs/formats.md), which goes downstream in the tag, with beam=off "
+          "that of its second camera; its trigger delay is the exposure-offset "
+          "where that is 0; refused if it is of another DMD",
           kReadWriteReady, set (&Settings::bench)},
       {"timestamp-at", "Timestamp at",
           "The instant that PTS of incoming frames mean; outgoing ones mean "

@@ -198,6 +198,8 @@ Fuse::plan (const CodedFormat &format)
   FuseOptions options = in_force_;
   auto partners = plan_partners (format);
   options.partner = partners.has_value ();
+  if (partners)
+    options.partner_black = tagged_partner ()->black;
   options.bits = significant_bits ();
   options.noise = noise (format.schedule);
   const std::stop_token stop = stop_token ();

@@ -33,7 +33,8 @@ properties ()
           "Profile of a bench to simulate, a JSON file or its text "
           "(docs/formats.md): noise, black level, bits, gain, leakage, blur, "
           "mapping and trigger delay, for which other properties and the "
-          "schedule win; the tag has it",
+          "schedule win, with beam=off those of its second camera; the tag has "
+          "it",
           kReadWriteReady, within (&SimState::settings, &Settings::bench)},
       {"beam", "Beam",
           "The mirrors whose light the camera gets: those that are on, or, as "

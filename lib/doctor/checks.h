@@ -108,8 +108,8 @@ const std::vector<Check> &all_checks ();
 /** Those of the comma-separated names @p only, and what they need; empty: all.
  * Error for a name that is none. @p two: there is a second camera. */
 Result<std::vector<Check>> choose_checks (std::string_view only, bool two);
-/** Runs @p check unless one that it needs has failed in @p before, or the
- * second camera that it needs is not there; its finding is skipped then. */
+/** Runs @p check unless one that it needs has failed in @p before; its finding
+ * is skipped then, and where a second camera that it needs is not there. */
 Result<Finding> run_check (const Check &check, Examination &examination,
     const std::vector<Finding> &before);
 

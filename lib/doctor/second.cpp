@@ -456,6 +456,8 @@ SecondRun::run ()
 Result<Finding>
 check_second (Examination &examination)
 {
+  if (!examination.rig.second ())
+    return Finding{.check = "second", .shown = {}, .skipped = true};
   return or_no_frames (SecondRun (examination).run (), "second");
 }
 

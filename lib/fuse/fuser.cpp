@@ -11,6 +11,7 @@
 #include "base/view_check.h"
 #include "fuse/clipped.h"
 #include "fuse/engine.h"
+#include "fuse/light_ratio.h"
 
 namespace codedexposure
 {
@@ -127,17 +128,17 @@ make_pieces (const Schedule &schedule, int width, int height,
   return pieces;
 }
 
-/** Writes what @p camera saw, times @p scale, to @p light. */
+/** Writes what @p camera saw above @p black, times @p scale, to @p light. */
 template <typename Pixel>
 void
 set_light (Field &light, const fuse::CodedCamera &camera,
-    ImageView<const Pixel> seen, float scale)
+    ImageView<const Pixel> seen, float scale, float black = 0.0f)
 {
   for (int y = 0; y < light.height (); y++) {
     const Pixel *from = seen.row (y);
     float *to = light.row (y);
     for (int x = 0; x < light.width (); x++)
-      to[x] = float (from[x]) * scale;
+      to[x] = (float (from[x]) - black) * scale;
     if (const float *gain = camera.gain (y))
       for (int x = 0; x < light.width (); x++)
         to[x] *= gain[x];
@@ -174,11 +175,14 @@ struct Fuser<Pixel>::State {
   std::vector<Cover> covers;
   int slots;
   float largest;
-  float partner_light; ///< 0: there are no partners
+  bool has_partners;
+  float partner_light; ///< 0: measured
+  float partner_black;
   std::unique_ptr<Workers> workers;
 
   Result<void> take (ImageView<const Pixel> coded,
       const std::optional<ImageView<const Pixel>> &partner);
+  float light_of (ImageView<const Pixel> coded, ImageView<const Pixel> partner);
   std::vector<std::uint8_t> clipped_near (
       const Piece &piece, ImageView<const Pixel> partner) const;
   Result<void> check (std::span<const ImageView<Pixel>> frames,
@@ -215,12 +219,52 @@ Fuser<Pixel>::State::clipped_near (
   return fuse::near_marks (std::move (marks), width, height);
 }
 
+/* FuseOptions::partner_light, by parts of rows of the background, or of the
+ * whole, that saturate neither camera. */
+template <typename Pixel>
+float
+Fuser<Pixel>::State::light_of (
+    ImageView<const Pixel> coded, ImageView<const Pixel> partner)
+{
+  constexpr int kStep = 13; // rows; no tile has all of a slot in one of these
+  constexpr int kPart = 32;
+  if (partner_light > 0.0f)
+    return partner_light;
+  const Piece &piece = pieces.front ();
+  const fuse::CodedStream &stream = piece.engine->stream ();
+  const auto [width, height] = piece.engine->size ();
+  const auto gain_at = [] (const float *gain, int x) {
+    return gain ? gain[x] : 1.0f;
+  };
+  fuse::LightRatio ratio;
+  for (int y = 0; y < height; y += kStep) {
+    const Pixel *a = coded.row (piece.rect.y + y) + piece.rect.x;
+    const Pixel *b = partner.row (piece.rect.y + y) + piece.rect.x;
+    const float *of_a = stream.camera ().gain (y);
+    const float *of_b = stream.partner_camera ()->gain (y);
+    for (int left = 0; left + kPart <= width; left += kPart) {
+      float first = 0.0f, second = 0.0f;
+      bool saturated = false;
+      for (int x = left; x < left + kPart; x++) {
+        saturated |= float (a[x]) >= largest || float (b[x]) >= largest;
+        first += float (a[x]) * gain_at (of_a, x);
+        second += (float (b[x]) - partner_black) * gain_at (of_b, x);
+      }
+      if (!saturated)
+        ratio.add (double (first), double (second));
+    }
+  }
+  return float (ratio.value ());
+}
+
 template <typename Pixel>
 Result<void>
 Fuser<Pixel>::State::take (ImageView<const Pixel> coded,
     const std::optional<ImageView<const Pixel>> &partner)
 {
   const float scale = kWhite / largest;
+  const float partner_scale =
+      partner ? scale * light_of (coded, *partner) : 0.0f;
   for (Piece &piece : pieces) {
     const auto &[x, y, width, height] = piece.rect;
     fuse::CodedStream &stream = piece.engine->stream ();
@@ -230,7 +274,7 @@ Fuser<Pixel>::State::take (ImageView<const Pixel> coded,
         scale);
     if (partner)
       set_light (frame.partner.light, *stream.partner_camera (),
-          partner->block (x, y, width, height), scale * partner_light);
+          partner->block (x, y, width, height), partner_scale, partner_black);
     if (&piece == &pieces.front ())
       for (const auto &[at, from] : covers) {
         frame.light.row (at.y)[at.x] = frame.light.row (from.y)[from.x];
@@ -354,17 +398,21 @@ try {
     return Error{"threads " + std::to_string (options.threads) +
                  ": they must be 1 to " + std::to_string (Workers::kMost) +
                  ", and 0 stands for one for each processor"};
-  if (!(options.partner_light > 0.0 && options.partner_light <= 1000.0))
+  if (!(options.partner_light >= 0.0 && options.partner_light <= 1000.0))
     return Error{"a partner's light of " + real_text (options.partner_light) +
-                 ": it must be more than 0, and 1000 at most"};
+                 ": it must be 0 to 1000"};
+  if (!(options.partner_black >= 0.0 && options.partner_black <= 65535.0))
+    return Error{"a partner's black level of " +
+                 real_text (options.partner_black) +
+                 " DN: it must be 0 to 65535"};
   const int largest = largest_pixel_of<Pixel> (options.bits);
   RETURN_IF_ERROR (schedule.check_size (width, height));
   ASSIGN_OR_RETURN (auto pieces, make_pieces (schedule, width, height, options,
                                      largest, std::move (stop)));
   auto state = std::make_shared<State> (State{std::move (pieces),
       find_covers (schedule, {width, height - schedule.pilot_rows ()}),
-      schedule.slots (), float (largest),
-      wanted.partner ? float (wanted.partner_light) : 0.0f,
+      schedule.slots (), float (largest), wanted.partner,
+      float (wanted.partner_light), float (wanted.partner_black),
       std::make_unique<Workers> (
           options.threads == 0 && options.quality == FuseQuality::kFast &&
                   !options.refine
@@ -409,7 +457,7 @@ Fuser<Pixel>::take (ImageView<const Pixel> coded,
   const Rect &whole = state_->pieces.front ().rect;
   RETURN_IF_ERROR (check_view (
       ViewBytes::of (coded), "coded frame", whole.width, whole.height));
-  if (partner && state_->partner_light == 0.0f)
+  if (partner && !state_->has_partners)
     return Error{"a partner was not expected; set FuseOptions::partner"};
   if (partner)
     RETURN_IF_ERROR (check_view (ViewBytes::of (*partner),

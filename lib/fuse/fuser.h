@@ -38,8 +38,11 @@ struct FuseOptions {
   bool partner = false;
   /** Flat light that makes a partner's pixel as bright as a coded pixel, as a
    * part of that which makes the coded one so: 1 if both have white at the same
-   * value. (0, 1000]. It need not be exact. */
-  double partner_light = 1.0;
+   * value. At most 1000; 0: measured in each pair, as that with which both have
+   * the same mean, which is exact to some parts in a thousand. */
+  double partner_light = 0.0;
+  /** Of a partner without light, DN, 0..65535; coded frames have none. */
+  double partner_black = 0.0;
   /** Later coded frames that are used to fuse one: 0 or 1. */
   int lookahead = 0;
   /** Significant bits of a pixel, 1..8 or 1..16; 0: all that the type has. */

@@ -144,6 +144,30 @@ struct ShareRow {
   int count;
 };
 
+/** Slots and what a partner saw of them: the mean, weighted with responses. */
+struct MissRow {
+  const float *const *light;     ///< of each slot
+  const float *const *responses; ///< likewise
+  int slots;
+  const float *partner;
+  int count;
+};
+
+/** How slots move to what a partner saw; PartnerFit. */
+struct MoveRow {
+  const float *missed;           ///< by the slots, of the partner's light
+  const float *sum, *squares;    ///< of that, and of its squares, of the pixels
+                                 ///< around
+  float around;                  ///< number of these
+  const float *partner;          ///< its light, which has noise of the variance
+  const float *slope, *offset;   ///< slope light + offset
+  float noise, floor;            ///< factor of the variance; added to squares
+  const float *step;             ///< 1 / sum of the squared responses
+  const float *const *responses; ///< of each slot
+  int slots;
+  int count;
+};
+
 /** Outputs of a convolution come in multiples of this, 1 or 2 times. */
 constexpr int kConvolveLanes = 16;
 
@@ -232,6 +256,12 @@ struct Kernels {
    * and adds the block weighted with 1 / number of coefficients kept. */
   void (*shrink) (const ShrinkRow &row);
   void (*settle) (const SettleRow &row);
+  /** missed[x] = partner - mean of the slots, and its square. Up to 15 values
+   * more than count are read and written. */
+  void (*miss) (const MissRow &row, float *missed, float *squared);
+  /** light[s][x] += response * step * (missed - its mean around) * (1 - noise /
+   * variance around), or nothing where noise is all. Likewise. */
+  void (*move) (const MoveRow &row, float *const *light);
   void (*convolve) (const ConvolveRow &row);
 };
 

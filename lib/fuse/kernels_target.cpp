@@ -13,6 +13,6 @@ extern const fuse::Kernels kernels;
 const fuse::Kernels kernels = {CODEDEXPOSURE_TARGET_NAME, filter_squared,
     filter_add, split_pairs, split, join, sum, max, blur, compare, rate,
     fade_ratio, prefer, share, sum_blocks, weigh, to_steps, pair, to_bytes,
-    to_words, shrink, settle, convolve};
+    to_words, shrink, settle, miss, move, convolve};
 
 } // namespace codedexposure::CODEDEXPOSURE_TARGET

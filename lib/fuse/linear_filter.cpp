@@ -12,7 +12,7 @@ namespace
 
 /* Squared errors of filters beyond those with all taps, as a part of them,
  * which are smaller with a partner. */
-constexpr double kExcess = 0.015, kExcessWithPartner = 0.03;
+constexpr double kExcess = 0.015, kExcessWithPartner = 0.05;
 /* Rows that a thread takes at a time. */
 constexpr int kBandRows = 16;
 

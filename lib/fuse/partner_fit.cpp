@@ -19,7 +19,7 @@ constexpr int kAround = kCount / 2;
 constexpr float kNoise = 1.5f;
 constexpr float kFloor = 1e-3f;
 
-enum Row { kMissed, kSquared, kParts, kSum, kSquares, kStep, kRows };
+enum Row { kMissed, kSquared, kParts, kSum, kSquares, kRows };
 
 /* Sums over the kCount pixels around each one of @row, whose ends are repeated
  * in its margin. */
@@ -82,33 +82,22 @@ void
 PartnerFit::run (const Kernels &kernels, int y, const float *partner,
     float *const *light, Room &room) const
 {
-  const int width = steps_.width ();
+  const int width = steps_.width (), slots = int (responses_.size ());
+  room.responses_.clear ();
+  for (const Field &response : responses_)
+    room.responses_.push_back (response.row (y % steps_.height ()));
+  const float *const *responses = room.responses_.data ();
   float *missed = room.rows_.row (kMissed);
   float *squared = room.rows_.row (kSquared);
-  make (y, light, missed);
-  for (int x = 0; x < width; x++) {
-    missed[x] = partner[x] - missed[x];
-    squared[x] = missed[x] * missed[x];
-  }
+  kernels.miss ({light, responses, slots, partner, width}, missed, squared);
   float *parts = room.rows_.row (kParts), *sum = room.rows_.row (kSum);
   float *squares = room.rows_.row (kSquares);
   sum_around (kernels, missed, width, parts, sum);
   sum_around (kernels, squared, width, parts, squares);
-  const float *slope = noise_.slopes (y), *offset = noise_.offsets (y);
-  const float *step = steps_.row (y % steps_.height ());
-  float *move = room.rows_.row (kStep);
-  for (int x = 0; x < width; x++) {
-    const float mean = sum[x] / kCount;
-    const float variance = squares[x] / kCount - mean * mean + kFloor;
-    const float noise = slope[x] * std::max (partner[x], 0.0f) + offset[x];
-    move[x] = std::max (1.0f - kNoise * noise / variance, 0.0f) *
-              (missed[x] - mean) * step[x];
-  }
-  for (std::size_t s = 0; s < responses_.size (); s++) {
-    const float *response = responses_[s].row (y % steps_.height ());
-    for (int x = 0; x < width; x++)
-      light[s][x] += response[x] * move[x];
-  }
+  kernels.move ({missed, sum, squares, kCount, partner, noise_.slopes (y),
+                    noise_.offsets (y), kNoise, kFloor,
+                    steps_.row (y % steps_.height ()), responses, slots, width},
+      light);
 }
 
 } // namespace codedexposure::fuse

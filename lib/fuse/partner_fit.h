@@ -39,6 +39,7 @@ public:
   private:
     friend PartnerFit;
     Field rows_; ///< of one row at a time
+    std::vector<const float *> responses_;
   };
 
   /** Row @p y.

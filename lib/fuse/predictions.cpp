@@ -18,7 +18,7 @@ constexpr SceneClass kMoving{0.0, 0.0, 5.0, 1.5, 0.6};
 /* Of the taps in the coded frames before and after, px. */
 constexpr double kComparedRadius = 1.2;
 /* Squared errors of filters beyond those with all taps, as a part of them. */
-constexpr double kExcess = 0.01;
+constexpr double kExcess = 0.01, kExcessWithPartner = 0.06;
 /* Mean squared errors of this size, in grey levels squared, do not tell models
  * apart. */
 constexpr float kErrorFloor = 0.5f;
@@ -81,7 +81,8 @@ Predictions::make_filters (Neighbours neighbours) const
     /* Neither a static scene nor fast motion needs other frames. */
     const bool alone = k == 0 || k + 1 == classes.size () || !neighbours.any ();
     const std::vector<Tap> &taps = alone ? near : all;
-    for_each_sparse_phase (plan_, classes[k], taps, Sought::kResidual, kExcess,
+    for_each_sparse_phase (plan_, classes[k], taps, Sought::kResidual,
+        neighbours.partner ? kExcessWithPartner : kExcess,
         [&] (int row, int x, std::vector<float> weights) {
           if (!alone)
             for (float &weight : weights)

@@ -64,9 +64,8 @@ Refiner::why_not (
 Refiner::Refiner (const Schedule &schedule, const Observation &observation,
     int width, int height, double noise)
     : slots_ (schedule.slots ()), width_ (width), height_ (height),
-      noise_free_ (observation.noise_free ()),
-      leak_ (float (schedule.leak ())), whole_ (float (schedule.light (0))),
-      noise_ (float (noise) * whole_),
+      noise_free_ (observation.noise_free ()), leak_ (float (schedule.leak ())),
+      whole_ (float (schedule.light (0))), noise_ (float (noise) * whole_),
       slot_of_ (width, height),
       refined_ (std::size_t (slots_), Field (width, height))
 {

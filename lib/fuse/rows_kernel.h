@@ -165,6 +165,37 @@ weigh (const fuse::WeighRow &row, float *least)
   }
 }
 
+inline void
+miss (const fuse::MissRow &row, float *missed, float *squared)
+{
+  for (int x = 0; x < row.count; x += kFloats) {
+    Floats made = {};
+    for (int s = 0; s < row.slots; s++)
+      made += load (row.responses[s] + x) * load (row.light[s] + x);
+    const Floats left = load (row.partner + x) - made;
+    store (missed + x, left);
+    store (squared + x, left * left);
+  }
+}
+
+inline void
+move (const fuse::MoveRow &row, float *const *light)
+{
+  for (int x = 0; x < row.count; x += kFloats) {
+    const Floats mean = load (row.sum + x) / row.around;
+    const Floats variance =
+        load (row.squares + x) / row.around - mean * mean + row.floor;
+    const Floats noise =
+        load (row.slope + x) * larger (load (row.partner + x), Floats{}) +
+        load (row.offset + x);
+    const Floats by = larger (1.0f - row.noise * noise / variance, Floats{}) *
+                      (load (row.missed + x) - mean) * load (row.step + x);
+    for (int s = 0; s < row.slots; s++)
+      store (
+          light[s] + x, load (light[s] + x) + load (row.responses[s] + x) * by);
+  }
+}
+
 template <int Reach = kFloats / 2>
 CODEDEXPOSURE_INLINE int
 sum_of_lanes (Ints v)

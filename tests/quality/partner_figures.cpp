@@ -43,6 +43,16 @@ mean_gain (const std::vector<Scene> &scenes, int n, FuseQuality quality,
   return mean;
 }
 
+/* White is not saturated. */
+Condition
+second_camera (const Condition &first, int slots)
+{
+  constexpr double kWhite = 0.95; // of the largest value
+  Condition second = first.of_partner ();
+  second.gain = kWhite * slots / (slots - 1);
+  return second;
+}
+
 } // namespace
 
 BeamGain
@@ -85,8 +95,8 @@ partner_tables (const std::vector<Scene> &scenes, const Progress &progress)
             std::to_string (n), std::string (quality_name (quality))});
         BeamGain mean;
         for (const Scene &scene : scenes) {
-          const BeamGain gain =
-              beam_gain (scene, n, quality, condition, condition.of_partner ());
+          const BeamGain gain = beam_gain (
+              scene, n, quality, condition, second_camera (condition, n));
           row.emplace_back (gain.two - gain.one);
           mean.one += gain.one / double (scenes.size ());
           mean.two += gain.two / double (scenes.size ());
@@ -113,10 +123,14 @@ partner_error_table (const std::vector<Scene> &scenes, const Progress &progress)
       {"0.1 px", [] (C &, C &p, int) { p.shift = 0.1; }},
       {"0.25 px", [] (C &, C &p, int) { p.shift = 0.25; }},
       {"blur of 0.3 px", [] (C &, C &p, int) { p.blur = 0.3; }},
-      {"light 5 % less",
-          [] (C &, C &p, int n) { p.gain = 0.95 * n / (n - 1); }},
+      {"light 5 % less", [] (C &, C &p, int) { p.gain *= 0.95; }},
+      {"half of the light", [] (C &, C &p, int) { p.gain *= 0.5; }},
+      {"white at the largest value", [] (C &, C &p, int) { p.gain = 0.0; }},
       {"black level 5 % of white",
-          [] (C &, C &p, int) { p.black_level = 12.75; }},
+          [] (C &, C &p, int) {
+            p.black_level = 12.75;
+            p.gain *= 0.95;
+          }},
       {"0.3 px of blur on both",
           [] (C &c, C &p, int) { c.blur = p.blur = 0.3; }},
   };
@@ -135,7 +149,7 @@ partner_error_table (const std::vector<Scene> &scenes, const Progress &progress)
     auto &row = table.rows.emplace_back (std::vector<Cell>{error.name});
     for (const int n : {4, 8})
       for (const Condition &usual : {kClean, kNoisy}) {
-        Condition condition = usual, partner = usual.of_partner ();
+        Condition condition = usual, partner = second_camera (usual, n);
         error.apply (condition, partner, n);
         const BeamGain gain =
             mean_gain (scenes, n, FuseQuality::kFast, condition, partner);

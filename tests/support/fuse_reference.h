@@ -463,6 +463,34 @@ reference_settle (const SettleRow &row)
   }
 }
 
+inline void
+reference_miss (const MissRow &row, float *missed, float *squared)
+{
+  for (int x = 0; x < row.count; x++) {
+    float made = 0.0f;
+    for (int s = 0; s < row.slots; s++)
+      made += row.responses[s][x] * row.light[s][x];
+    missed[x] = row.partner[x] - made;
+    squared[x] = missed[x] * missed[x];
+  }
+}
+
+inline void
+reference_move (const MoveRow &row, float *const *light)
+{
+  for (int x = 0; x < row.count; x++) {
+    const float mean = row.sum[x] / row.around;
+    const float variance =
+        row.squares[x] / row.around - mean * mean + row.floor;
+    const float noise =
+        row.slope[x] * std::max (row.partner[x], 0.0f) + row.offset[x];
+    const float by = std::max (1.0f - row.noise * noise / variance, 0.0f) *
+                     (row.missed[x] - mean) * row.step[x];
+    for (int s = 0; s < row.slots; s++)
+      light[s][x] += row.responses[s][x] * by;
+  }
+}
+
 inline constexpr Kernels kReference{"reference", reference_filter_squared,
     reference_filter_add, reference_split<std::int32_t>, reference_split<float>,
     reference_join, reference_sum, reference_max, reference_blur,
@@ -470,6 +498,6 @@ inline constexpr Kernels kReference{"reference", reference_filter_squared,
     reference_share, reference_sum_blocks, reference_weigh, reference_to_steps,
     reference_pair, reference_to_pixels<std::uint8_t>,
     reference_to_pixels<std::uint16_t>, reference_shrink, reference_settle,
-    reference_convolve};
+    reference_miss, reference_move, reference_convolve};
 
 } // namespace codedexposure::test

@@ -390,6 +390,50 @@ TEST (FuseKernels, SettlingEqualsTheReference)
     EXPECT_EQ (settled (kernels), settled (kReference)) << kernels.name;
 }
 
+/* Slots that move to what a partner saw of them, with noise and without. */
+std::vector<float>
+moved (const fuse::Kernels &kernels, float noise)
+{
+  constexpr int kSlots = 3;
+  std::vector<std::vector<float>> light, responses;
+  std::vector<const float *> of_slots, of_responses;
+  std::vector<float *> to;
+  for (int s = 0; s < kSlots; s++) {
+    light.push_back (random_numbers (kCount + 16, 10 + s));
+    responses.push_back (random_magnitudes (20 + s));
+  }
+  for (std::size_t s = 0; s < kSlots; s++) {
+    of_slots.push_back (light[s].data ());
+    of_responses.push_back (responses[s].data ());
+    to.push_back (light[s].data ());
+  }
+  const auto partner = random_numbers (kCount + 16, 1);
+  const auto sum = random_numbers (kCount + 16, 2);
+  const auto squares = random_magnitudes (3), step = random_magnitudes (4);
+  const auto slope = random_magnitudes (5), offset = random_magnitudes (6);
+  std::vector<float> missed (kCount + 16), squared (missed);
+  kernels.miss (
+      {of_slots.data (), of_responses.data (), kSlots, partner.data (), kCount},
+      missed.data (), squared.data ());
+  kernels.move (
+      {missed.data (), sum.data (), squares.data (), 25.0f, partner.data (),
+          slope.data (), offset.data (), noise, 5000.0f, step.data (),
+          of_responses.data (), kSlots, kCount},
+      to.data ());
+  std::vector<float> all;
+  for (const auto &row : {missed, squared, light[0], light[1], light[2]})
+    all.insert (all.end (), row.begin (), row.begin () + kCount);
+  return all;
+}
+
+TEST (FuseKernels, MovesToAPartnerEqualTheReference)
+{
+  for (const float noise : {0.0f, 0.5f, 100.0f})
+    for (const fuse::Kernels &kernels : fuse::supported_kernels ())
+      EXPECT_EQ (moved (kernels, noise), moved (kReference, noise))
+          << kernels.name;
+}
+
 TEST (FuseKernels, ConvolutionsEqualTheReference)
 {
   for (const int inputs : {1, 32, 36}) {

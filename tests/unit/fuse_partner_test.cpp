@@ -109,7 +109,8 @@ TEST (FusePartner, MotionGainsAtEveryQuality)
   }
 }
 
-/* Neither gain nor black level of the second camera need be known. */
+/* The gain of the second camera is measured, and its black level need not be
+ * exact. */
 TEST (FusePartner, GainAndBlackLevelAreNotNeeded)
 {
   const Schedule schedule = schedule_of (kPreset);
@@ -125,15 +126,24 @@ TEST (FusePartner, GainAndBlackLevelAreNotNeeded)
       psnr (fuse (schedule, frames, coded (off, slots, worse), with_partner ()),
           slots);
   EXPECT_GT (bad, good - 0.7);
+  FuseOptions known = with_partner ();
+  known.partner_black = worse.black_level;
+  EXPECT_GT (
+      psnr (fuse (schedule, frames, coded (off, slots, worse), known), slots),
+      good - 0.1);
 
-  /* The same gain for both cameras, as of two of 12 bits. */
-  BenchOptions bright;
-  bright.gain = 1.0;
-  FuseOptions options = with_partner ();
-  options.partner_light = 4.0 / 3.0;
-  const double dim = psnr (
-      fuse (schedule, frames, coded (off, slots, bright), options), slots);
-  EXPECT_GT (dim, good - 0.3);
+  for (const double gain : {1.0, 0.5}) {
+    BenchOptions dim;
+    dim.gain = gain;
+    FuseOptions options = with_partner ();
+    const auto partners = coded (off, slots, dim);
+    const double measured =
+        psnr (fuse (schedule, frames, partners, options), slots);
+    EXPECT_GT (measured, good - 0.3) << gain;
+    options.partner_light = 4.0 / 3.0 / gain;
+    EXPECT_NEAR (psnr (fuse (schedule, frames, partners, options), slots),
+        measured, 0.1);
+  }
 }
 
 TEST (FusePartner, AFrameWithoutItsPartnerIsThatOfOneCamera)
@@ -248,7 +258,7 @@ TEST (FusePartner, MisuseIsRefused)
   EXPECT_FALSE (both.take (frame.view (), small.view ()));
   EXPECT_EQ (both.pending (), 0);
   FuseOptions dark = with_partner ();
-  dark.partner_light = 0.0;
+  dark.partner_light = -1.0;
   EXPECT_FALSE (Fuser<std::uint8_t>::make (schedule, kWidth, kHeight, dark));
   /* The last element of a staircase is never in the other beam. */
   const auto never = Fuser<std::uint8_t>::make (

@@ -240,11 +240,12 @@ SecondRun::look_for_late_frames ()
   ASSIGN_OR_RETURN (const double second,
       when (second_, no_light (), on_.second.level ().value,
           off_.second.level ().value));
-  if (first < 0.0 || second < 0.0)
-    return {}; // without light, which is said
+  const bool known = first >= 0.0 && second >= 0.0;
   const double late = std::round ((second - first) / period_) + 0.0; // not -0
-  finding_.readings.push_back (
-      {"frames of the second camera are later by", {late, 0.0}, "frames", "0"});
+  finding_.readings.push_back ({"frames of the second camera are later by",
+      known ? Measured{late, 0.0} : kNotMeasured, "frames", "0"});
+  if (!known)
+    return {};
   if (late != 0.0)
     finding_.blame ("second-frame-late",
         "new masks are in the second camera's frames " +
@@ -312,8 +313,11 @@ SecondRun::lacking (std::span<const Slot> slots) const
 Result<void>
 SecondRun::compare_exposures ()
 {
-  if (!other_.profile.light_ratio)
-    return {}; // without light, which is said
+  if (!other_.profile.light_ratio) {
+    finding_.add ("second-late", kNotMeasured);
+    finding_.add ("second-short", kNotMeasured);
+    return {};
+  }
   const auto half = Nanoseconds (1e9 * period_ / 2);
   const auto begins = [&] { return light_of_slots (); };
   ASSIGN_OR_RETURN (const auto halves, with_exposure (examination_, half, [&] {
@@ -398,7 +402,7 @@ SecondRun::compare_views (const Mapping &of_second)
           " degrees");
   const auto &of_first = examination_.profile.mapping;
   if (!of_first)
-    return;
+    return finding_.add ("second-shift", kNotMeasured);
   constexpr int kStep = 4;
   double first = 0.0, both = 0.0;
   const Extent camera = of_first->camera (), other = of_second.camera ();

@@ -286,10 +286,10 @@ CameraRig::open_second ()
 Result<void>
 CameraRig::show (const StillMask &mask, int slots)
 {
-  if (first_ && slots != 1)
-    return Error{"a second camera gets light between masks, too"};
-  if (first_)
-    return first_->show (complement_of (mask), slots);
+  if (first_) {
+    ASSIGN_OR_RETURN (const StillMask other, mask_for_second (mask, slots));
+    return first_->show (other, slots);
+  }
   RETURN_IF_ERROR (reopen_dmd ());
   ASSIGN_OR_RETURN (
       const SlotPlan plan, SlotPlan::fit ({}, slots, parts_.rate));

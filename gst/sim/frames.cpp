@@ -135,17 +135,6 @@ seen_mask (Stream &stream, std::int64_t slot, int parked)
   return mask < 0 ? parked : mask;
 }
 
-/* What the second camera sees of it. */
-std::shared_ptr<const StillMask>
-complement_of (std::shared_ptr<const StillMask> mask)
-{
-  if (!mask)
-    return nullptr;
-  StillMask other = *mask;
-  other.on = [mask] (int x, int y) { return !mask->on (x, y); };
-  return std::make_shared<const StillMask> (std::move (other));
-}
-
 /* The masks of all slots, at the start of the exposure, when the DMD begins to
  * step. */
 std::vector<int>
@@ -273,7 +262,9 @@ begin_exposure (GstCodedExposureSim *self, GstBuffer *inbuf)
   stream.last_frame = exposure.frame;
   auto held = stream.view ? stream.view->held () : nullptr;
   if (held != stream.held)
-    stream.seen = stream.beam == Beam::kOff ? complement_of (held) : held;
+    stream.seen = held && stream.beam == Beam::kOff
+                      ? std::make_shared<const StillMask> (held->complement ())
+                      : held;
   stream.held = std::move (held);
   stream.bench->begin (stream.lit, stream.seen);
   stream.exposure = std::move (exposure);

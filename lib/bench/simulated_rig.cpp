@@ -275,10 +275,10 @@ SimulatedRig::start (MirrorProgram program, Nanoseconds transfer)
 Result<void>
 SimulatedRig::show (const StillMask &mask, int slots)
 {
-  if (first_ && slots != 1)
-    return Error{"a second camera gets light between masks, too"};
-  if (first_)
-    return first_->show (complement_of (mask), slots);
+  if (first_) {
+    ASSIGN_OR_RETURN (const StillMask other, mask_for_second (mask, slots));
+    return first_->show (other, slots);
+  }
   ASSIGN_OR_RETURN (
       const SlotPlan plan, SlotPlan::fit ({}, slots, options_.rate));
   const auto times = fit_still (plan, mask, *parts_.dmd.patterns);

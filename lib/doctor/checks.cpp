@@ -24,12 +24,15 @@ no_light ()
   return {.name = "no light", .on = [] (int, int) { return false; }};
 }
 
-StillMask
-complement_of (const StillMask &mask)
+Result<StillMask>
+Rig::mask_for_second (const StillMask &mask, int slots)
 {
-  StillMask other = mask;
-  other.on = [on = mask.on] (int x, int y) { return !on (x, y); };
-  return other;
+  if (slots != 1)
+    return Error{"a second camera cannot see a mask in one of " +
+                 std::to_string (slots) +
+                 " slots, as it gets light in the others; show it for the "
+                 "whole frame period"};
+  return mask.complement ();
 }
 
 Result<std::vector<SeenFrame>>

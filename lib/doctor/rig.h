@@ -114,9 +114,11 @@ public:
    * time. It does not record ().
    */
   virtual Rig *second () { return nullptr; }
-};
 
-/** What the mirrors show where the other beam is to have @p mask. */
-StillMask complement_of (const StillMask &mask);
+protected:
+  /** What the mirrors show where a second camera is to see @p mask in each of
+   * @p slots. Error for more than one. */
+  static Result<StillMask> mask_for_second (const StillMask &mask, int slots);
+};
 
 } // namespace codedexposure

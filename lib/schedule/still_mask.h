@@ -23,6 +23,13 @@ struct StillMask {
   {
     return slot >= first && slot < first + slots;
   }
+  /** What the beam of the mirrors that are off has of it, in its slots. */
+  StillMask complement () const
+  {
+    StillMask other = *this;
+    other.on = [mine = on] (int x, int y) { return !mine (x, y); };
+    return other;
+  }
 };
 
 /** Index of the still mask where those of a schedule are 0, 1, ... */

@@ -216,7 +216,7 @@ PartnerWatch::excess (const Pair &now, const Light &on, const Light &off) const
 }
 
 void
-PartnerWatch::keep (std::deque<Light> &before, Light light) const
+PartnerWatch::keep (std::deque<Light> &before, Light light)
 {
   before.push_back (std::move (light));
   if (before.size () > kBefore)

@@ -82,7 +82,7 @@ private:
 
   template <typename Pixel>
   Light read (const View &view, ImageView<const Pixel> frame) const;
-  void keep (std::deque<Light> &before, Light light) const;
+  static void keep (std::deque<Light> &before, Light light);
   double gain_of (const Pair &pair) const;
   double unevenness_of (const Pair &pair) const;
   double excess (const Pair &now, const Light &on, const Light &off) const;

@@ -176,13 +176,13 @@ struct Fuser<Pixel>::State {
   int slots;
   float largest;
   bool has_partners;
-  float partner_light; ///< 0: measured
   float partner_black;
   std::unique_ptr<Workers> workers;
 
   Result<void> take (ImageView<const Pixel> coded,
       const std::optional<ImageView<const Pixel>> &partner);
-  float light_of (ImageView<const Pixel> coded, ImageView<const Pixel> partner);
+  float light_of (
+      ImageView<const Pixel> coded, ImageView<const Pixel> partner) const;
   std::vector<std::uint8_t> clipped_near (
       const Piece &piece, ImageView<const Pixel> partner) const;
   Result<void> check (std::span<const ImageView<Pixel>> frames,
@@ -219,17 +219,15 @@ Fuser<Pixel>::State::clipped_near (
   return fuse::near_marks (std::move (marks), width, height);
 }
 
-/* FuseOptions::partner_light, by parts of rows of the background, or of the
- * whole, that saturate neither camera. */
+/* Light of the first camera for each 1 of the second, by parts of rows of the
+ * background, or of the whole, that saturate neither. */
 template <typename Pixel>
 float
 Fuser<Pixel>::State::light_of (
-    ImageView<const Pixel> coded, ImageView<const Pixel> partner)
+    ImageView<const Pixel> coded, ImageView<const Pixel> partner) const
 {
   constexpr int kStep = 13; // rows; no tile has all of a slot in one of these
   constexpr int kPart = 32;
-  if (partner_light > 0.0f)
-    return partner_light;
   const Piece &piece = pieces.front ();
   const fuse::CodedStream &stream = piece.engine->stream ();
   const auto [width, height] = piece.engine->size ();
@@ -398,9 +396,6 @@ try {
     return Error{"threads " + std::to_string (options.threads) +
                  ": they must be 1 to " + std::to_string (Workers::kMost) +
                  ", and 0 stands for one for each processor"};
-  if (!(options.partner_light >= 0.0 && options.partner_light <= 1000.0))
-    return Error{"a partner's light of " + real_text (options.partner_light) +
-                 ": it must be 0 to 1000"};
   if (!(options.partner_black >= 0.0 && options.partner_black <= 65535.0))
     return Error{"a partner's black level of " +
                  real_text (options.partner_black) +
@@ -412,7 +407,7 @@ try {
   auto state = std::make_shared<State> (State{std::move (pieces),
       find_covers (schedule, {width, height - schedule.pilot_rows ()}),
       schedule.slots (), float (largest), wanted.partner,
-      float (wanted.partner_light), float (wanted.partner_black),
+      float (wanted.partner_black),
       std::make_unique<Workers> (
           options.threads == 0 && options.quality == FuseQuality::kFast &&
                   !options.refine

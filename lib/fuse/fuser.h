@@ -34,13 +34,9 @@ struct FuseOptions {
    * nothing is learned from pictures but the parameters of the scene model. */
   bool refine = false;
   /** Coded frames can have partners: frames of a second camera in the beam of
-   * the mirrors that are off, with the same noise. */
+   * the mirrors that are off, with the same noise. Their light is measured in
+   * each pair. */
   bool partner = false;
-  /** Flat light that makes a partner's pixel as bright as a coded pixel, as a
-   * part of that which makes the coded one so: 1 if both have white at the same
-   * value. At most 1000; 0: measured in each pair, as that with which both have
-   * the same mean, which is exact to some parts in a thousand. */
-  double partner_light = 0.0;
   /** Of a partner without light, DN, 0..65535; coded frames have none. */
   double partner_black = 0.0;
   /** Later coded frames that are used to fuse one: 0 or 1. */

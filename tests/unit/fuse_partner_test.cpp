@@ -125,7 +125,7 @@ TEST (FusePartner, GainAndBlackLevelAreNotNeeded)
   const double bad =
       psnr (fuse (schedule, frames, coded (off, slots, worse), with_partner ()),
           slots);
-  EXPECT_GT (bad, good - 0.7);
+  EXPECT_GT (bad, good - 0.1);
   FuseOptions known = with_partner ();
   known.partner_black = worse.black_level;
   EXPECT_GT (
@@ -135,14 +135,11 @@ TEST (FusePartner, GainAndBlackLevelAreNotNeeded)
   for (const double gain : {1.0, 0.5}) {
     BenchOptions dim;
     dim.gain = gain;
-    FuseOptions options = with_partner ();
-    const auto partners = coded (off, slots, dim);
-    const double measured =
-        psnr (fuse (schedule, frames, partners, options), slots);
-    EXPECT_GT (measured, good - 0.3) << gain;
-    options.partner_light = 4.0 / 3.0 / gain;
-    EXPECT_NEAR (psnr (fuse (schedule, frames, partners, options), slots),
-        measured, 0.1);
+    EXPECT_GT (
+        psnr (fuse (schedule, frames, coded (off, slots, dim), with_partner ()),
+            slots),
+        good - 0.1)
+        << gain;
   }
 }
 
@@ -258,7 +255,7 @@ TEST (FusePartner, MisuseIsRefused)
   EXPECT_FALSE (both.take (frame.view (), small.view ()));
   EXPECT_EQ (both.pending (), 0);
   FuseOptions dark = with_partner ();
-  dark.partner_light = -1.0;
+  dark.partner_black = -1.0;
   EXPECT_FALSE (Fuser<std::uint8_t>::make (schedule, kWidth, kHeight, dark));
   /* The last element of a staircase is never in the other beam. */
   const auto never = Fuser<std::uint8_t>::make (

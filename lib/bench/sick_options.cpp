@@ -389,7 +389,8 @@ apply (Bench &bench, std::string_view piece)
   if (piece.starts_with (kSecond)) {
     if (bench.second.empty ())
       return Error{"fault " + in_quotes (piece) +
-                   " is of a second camera, and this bench has one camera"};
+                   " is of a second camera, and this bench has one; simulate "
+                   "both, or leave it out"};
     return apply (bench.second.front (), piece.substr (kSecond.size ()));
   }
   const auto equals = piece.find ('=');

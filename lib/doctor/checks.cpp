@@ -71,7 +71,8 @@ all_checks ()
       {"sensor", "Sensor", {"trigger", "light"}, check_sensor},
       {"mirrors", "Mirrors", {"trigger", "light"}, check_mirrors},
       {"optics", "Optics", {"trigger", "light"}, check_optics},
-      {"second", "Second camera", {"trigger", "light", "optics"}, check_second, true},
+      {"second", "Second camera", {"trigger", "light", "optics"}, check_second,
+          true},
       {"whole", "Recording", {"trigger"}, check_whole},
   };
   return checks;
@@ -124,7 +125,9 @@ choose_checks (std::string_view only, bool two)
       return Error{in_quotes (name) + " is no check; choose from " + known};
     }
     if (check->of_two && !two)
-      return Error{in_quotes (name) + " is a check of a second camera"};
+      return Error{in_quotes (name) +
+                   " is a check of a second camera, and there is none; set "
+                   "--second, or leave it out"};
     choose (*check, chosen);
   }
   std::vector<Check> checks;

@@ -111,19 +111,24 @@ BenchProfile::check () const
                  size_text (mapping->camera ()) + " pixels, but the camera " +
                  "has " + size_text (camera.size) + "; measure a new mapping"};
   if (light_ratio && !second.empty ())
-    return Error{"a light ratio belongs to a second camera, not to the first"};
+    return Error{
+        "a light ratio belongs to the second camera, not to the first; "
+        "move it there"};
   for (const BenchProfile &other : second) {
     if (!other.second.empty ())
-      return Error{"the second camera of a profile has no second one itself"};
+      return Error{
+          "the second camera of a profile has no second one itself; leave "
+          "it out"};
     const auto good = other.check ();
     if (!good)
       return good.error ().with_prefix ("second camera: ");
     if (mapping && other.mapping &&
         !(mapping->mirrors () == other.mapping->mirrors ()))
-      return Error{"the mappings of both cameras are to " +
-                   size_text (mapping->mirrors ()) + " and " +
-                   size_text (other.mapping->mirrors ()) +
-                   " mirrors, and both look at the same ones"};
+      return Error{
+          "the mappings of both cameras are to " +
+          size_text (mapping->mirrors ()) + " and " +
+          size_text (other.mapping->mirrors ()) +
+          " mirrors, but they look at the same ones; measure both again"};
   }
   return {};
 }

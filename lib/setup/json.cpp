@@ -120,7 +120,9 @@ read_bench_profile (const Json &root)
   keys.push_back (
       {"second", [&profile] (const Json &value, const std::string &key) {
          if (value.is_object () && value.contains ("second"))
-           throw Error{key + ": a second camera has no second one itself",
+           throw Error{"in key '" + key +
+                           "': the second camera of a profile has no second "
+                           "one itself; leave it out",
                ErrorCode::parse};
          std::optional<BenchProfile> one;
          inner_into (one, read_bench_profile) (value, key);

@@ -163,8 +163,8 @@ TEST (SecondCheck, IsMadeOfTwoCamerasOnly)
   const auto refused = inflict (one, "second:blur=2");
   ASSERT_FALSE (refused);
   EXPECT_EQ (refused.error ().message,
-      "fault 'second:blur=2' is of a second camera, and this bench has one "
-      "camera");
+      "fault 'second:blur=2' is of a second camera, and this bench has one; "
+      "simulate both, or leave it out");
   auto rig = SimulatedRig::make (one);
   ASSERT_TRUE (rig);
   EXPECT_EQ ((*rig)->second (), nullptr);

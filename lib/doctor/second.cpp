@@ -24,11 +24,11 @@ constexpr int kCounted = 20;
 /* By which part the light of a lamp that flickers differs from slot to slot, as
  * the exposures of both cameras do not begin together. */
 constexpr double kUneven = 0.003;
-/* Light that a frame of the new mask has, as a part of all. */
+/* A frame with more than this part of the light is of the new mask. */
 constexpr double kNew = 0.5;
 /* By which part clocks of cameras differ at most. */
 constexpr double kClocks = 2e-3;
-/* Of its camera's pose, which a mapping takes into account. */
+/* Diagnoses of how a camera stands, which its mapping takes into account. */
 constexpr const char *kPose[] = {"rotation", "scale", "perspective",
     "distortion", "shift", "field", "binning"};
 

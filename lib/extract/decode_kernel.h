@@ -490,8 +490,7 @@ decode_differences (
           Vector<T> before = {};
           const T *row = bytes_on (block.pixels + at * Width,
               std::ptrdiff_t (j) * height * block.stride);
-#pragma GCC unroll 4
-          for (int y = 0; y < height; y++) {
+          const auto split = [&] (int y) CODEDEXPOSURE_INLINE_BODY {
             prefetch (
                 bytes_on (row, height * block.stride), Width * kVectorBytes);
             Vector<T> parts[Width];
@@ -503,6 +502,14 @@ decode_differences (
               most = larger (most, before);
             }
             row = bytes_on (row, block.stride);
+          };
+          if constexpr (Height > 0) {
+#pragma GCC unroll 4
+            for (int y = 0; y < Height; y++)
+              split (y);
+          } else {
+            for (int y = 0; y < height; y++)
+              split (y);
           }
         });
   }

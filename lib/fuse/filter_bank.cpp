@@ -118,7 +118,7 @@ void
 FilterBank::set (int row, int x, int group, std::span<const Tap> taps,
     std::span<const float> weights)
 {
-  Filter &filter = filters_[place (row, x, group)];
+  Filter &filter = filters_[place (row * plan_->phases.period () + x, group)];
   std::vector<WholeWeights> outputs;
   for (std::size_t at = 0; at < weights.size (); at += taps.size ()) {
     const auto &[values, unit] = outputs.emplace_back (
@@ -137,6 +137,7 @@ FilterBank::set (int row, int x, int group, std::span<const Tap> taps,
       continue;
     const Tap right{taps[t].x + 1, taps[t].y, taps[t].frame};
     const bool two = t + 1 < taps.size () && taps[t + 1] == right;
+    filter.count++;
     filter.pairs.push_back (plan_->sources.number (taps[t]));
     for (const auto &[values, unit] : outputs) {
       const auto half = [] (int value) {
@@ -150,17 +151,14 @@ FilterBank::set (int row, int x, int group, std::span<const Tap> taps,
 }
 
 FilterRow
-FilterBank::row (int y, int column, int group,
+FilterBank::row (int phase, int column, int group,
     std::span<const std::int32_t *const> sources,
     std::span<const Run> runs) const
 {
-  const Phases &phases = plan_->phases;
-  const int x = (column + phases.shift (y)) % phases.period ();
-  const Filter &filter = filters_[place (phases.row_of (y), x, group)];
-  const std::size_t outputs = filter.scales.size ();
-  return {sources.data () + column, filter.pairs.data (),
-      int (filter.pairs.size () / (1 + outputs)), int (outputs),
-      filter.scales.data (), base_, runs.data (), int (runs.size ())};
+  const Filter &filter = filters_[place (phase, group)];
+  return {sources.data () + column, filter.pairs.data (), filter.count,
+      int (filter.scales.size ()), filter.scales.data (), base_, runs.data (),
+      int (runs.size ())};
 }
 
 } // namespace codedexposure::fuse

@@ -71,19 +71,20 @@ public:
   void set (int row, int x, int group, std::span<const Tap> taps,
       std::span<const float> weights);
   /** The kernels' input for a group of the pixels at @p column and every period
-   * after it, of row @p y. */
-  FilterRow row (int y, int column, int group,
+   * after it, of a row where they have @p phase. */
+  FilterRow row (int phase, int column, int group,
       std::span<const std::int32_t *const> sources,
       std::span<const Run> runs) const;
 
 private:
   struct Filter {
     std::vector<std::int32_t> pairs; ///< see FilterRow
+    int count = 0;                   ///< of them
     std::vector<float> scales;       ///< of each output
   };
-  std::size_t place (int row, int x, int group) const
+  std::size_t place (int phase, int group) const
   {
-    return std::size_t ((row * plan_->phases.period () + x) * groups_ + group);
+    return std::size_t (phase * groups_ + group);
   }
 
   const FilterPlan *plan_;

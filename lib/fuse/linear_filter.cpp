@@ -114,6 +114,7 @@ LinearFilter::estimate (const Kernels &kernels, const Banks &filters,
 {
   const int slots = to.light.height ();
   const auto sources = plan_.sources.row (frames, y, to.sources);
+  const int *phases = plan_.phases.of_row (y);
   for (int s = 0; s < slots; s++)
     std::fill_n (to.light.row (s), to.light.width (), 0.0f);
   for (std::size_t model = 0; model < filters.size (); model++) {
@@ -122,7 +123,8 @@ LinearFilter::estimate (const Kernels &kernels, const Banks &filters,
       const auto at = column * to.parts.stride;
       for (int s = 0; s < slots; s++) {
         float *light = to.light.row (s) + at;
-        kernels.filter_add (filters[model].row (y, column, s, sources, to.runs),
+        kernels.filter_add (
+            filters[model].row (phases[column], column, s, sources, to.runs),
             to.split.row (int (model)) + at, &light);
       }
     }

@@ -184,6 +184,7 @@ MotionFilter::measure_row (const Kernels &kernels, const CodedFrames &frames,
 {
   const int period = plan_.sources.period ();
   const auto sources = plan_.sources.row (frames, y, room.sources[0]);
+  const int *phases = plan_.phases.of_row (y);
   const Run whole{0, room.part};
   std::array<float *, kChunk> parts;
   for (int k = 0; k < int (kChunk); k++)
@@ -191,7 +192,7 @@ MotionFilter::measure_row (const Kernels &kernels, const CodedFrames &frames,
   int outputs = 0;
   for (int column = 0; column < period; column++) {
     const FilterRow row =
-        residuals.row (y, column, group, sources, {&whole, 1});
+        residuals.row (phases[column], column, group, sources, {&whole, 1});
     outputs = row.outputs;
     for (int k = 0; k < outputs; k++)
       parts[std::size_t (k)] = room.parts.row (k) + column * room.part;
@@ -275,8 +276,11 @@ MotionFilter::mix (const Kernels &kernels, const CodedFrames &frames,
   const int first = 2 * (room.first + y);
   const int end = std::min (first + 2, slots[0].height ());
   const Parts of_shares{period / 2, room.part, room.blocks};
-  for (int row = first; row < end; row++)
+  const int *phases[2];
+  for (int row = first; row < end; row++) {
     plan_.sources.row (frames, row, room.sources[row - first]);
+    phases[row - first] = plan_.phases.of_row (row);
+  }
   for (int i = 0; i < 2 * n; i++)
     std::fill_n (room.parts.row (i), room.parts.width (), 0.0f);
   std::vector<float *> to (slots.size ());
@@ -295,8 +299,9 @@ MotionFilter::mix (const Kernels &kernels, const CodedFrames &frames,
           for (int s = 0; s < n; s++)
             to[std::size_t (s)] = room.parts.row ((row - first) * n + s) +
                                   column * std::ptrdiff_t (room.part);
-          kernels.filter_add (set->filters.row (row, column, of_set,
-                                  room.sources[row - first], room.runs),
+          kernels.filter_add (
+              set->filters.row (phases[row - first][column], column, of_set,
+                  room.sources[row - first], room.runs),
               share, to.data ());
         }
       }

@@ -15,17 +15,16 @@ Phases::Phases (const Schedule &schedule)
     : schedule_ (schedule), period_ (schedule.tile ().period_x ())
 {
   for (int y = 0; y < schedule.tile ().period_y (); y++) {
-    Row found{-1, 0};
-    for (int row = 0; row < rows () && found.row < 0; row++) {
-      for (int shift = 0; shift < period_ && found.row < 0; shift++)
-        if (is_shift (y, row_starts_[std::size_t (row)], shift))
-          found = {row, shift};
+    int row = 0, shift = 0;
+    while (
+        row < rows () && !is_shift (y, row_starts_[std::size_t (row)], shift)) {
+      shift = (shift + 1) % period_;
+      row += shift == 0;
     }
-    if (found.row < 0) {
-      found.row = rows ();
+    if (row == rows ())
       row_starts_.push_back (y);
-    }
-    rows_.push_back (found);
+    for (int x = 0; x < 2 * period_; x++)
+      of_rows_.push_back (row * period_ + (x + shift) % period_);
   }
 }
 

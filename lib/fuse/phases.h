@@ -78,8 +78,8 @@ constexpr double kPartnerRadius = 1.5;
  * Which elements lie around a pixel. Pixels with the same neighbourhood are of
  * one phase, so that filters are made once for each.
  *
- * Rows of pixels repeat as shifts of a few: pixel (x, y) has phase
- * first (y) + (x + shift (y)) mod period ().
+ * Rows of pixels repeat as shifts of a few distinct ones: pixel x of distinct
+ * row r has phase r period () + x mod period ().
  */
 class Phases
 {
@@ -88,27 +88,22 @@ public:
 
   int period () const { return period_; }                 ///< along a row, px
   int rows () const { return int (row_starts_.size ()); } ///< distinct ones
-  /** The distinct row that row @p y of the frame is a shift of. */
-  int row_of (int y) const { return at (y).row; }
-  int shift (int y) const { return at (y).shift; }
+  /** Of the pixels of row @p y of the frame, two periods of them. */
+  const int *of_row (int y) const
+  {
+    const int row = floor_mod (y, schedule_.tile ().period_y ());
+    return of_rows_.data () + std::ptrdiff_t (row) * 2 * period_;
+  }
   /** Elements of the pixels at @p taps from pixel @p x of distinct row @p row.
    */
   std::vector<int> elements (int row, int x, std::span<const Tap> taps) const;
 
 private:
-  struct Row {
-    int row;
-    int shift;
-  };
-  const Row &at (int y) const
-  {
-    return rows_[std::size_t (floor_mod (y, int (rows_.size ())))];
-  }
   bool is_shift (int y, int from, int shift) const;
 
   Schedule schedule_;
   int period_;
-  std::vector<Row> rows_;       ///< one period of the tile
+  std::vector<int> of_rows_;    ///< one period of the tile
   std::vector<int> row_starts_; ///< y of the first of each distinct row
 };
 

@@ -99,8 +99,11 @@ void
 Predictions::predict (const Kernels &kernels, const FilterBank &filters,
     const CodedFrames &frames, int row, Room &room) const
 {
-  for (int i = 0; i < 2; i++)
+  const int *phases[2];
+  for (int i = 0; i < 2; i++) {
     plan_.sources.row (frames, 2 * row + i, room.of_rows[i]);
+    phases[i] = plan_.phases.of_row (2 * row + i);
+  }
   const int period = plan_.sources.period ();
   const Run whole{0, room.parts.width ()};
   for (int k = 0; k < filters.groups (); k++) {
@@ -109,8 +112,8 @@ Predictions::predict (const Kernels &kernels, const FilterBank &filters,
       if (column % 2 == 0)
         std::fill_n (to, room.parts.width (), 0.0f);
       for (int i = 0; i < 2; i++)
-        kernels.filter_squared (
-            filters.row (2 * row + i, column, k, room.of_rows[i], {&whole, 1}),
+        kernels.filter_squared (filters.row (phases[i][column], column, k,
+                                    room.of_rows[i], {&whole, 1}),
             &to);
     }
     kernels.join ({period / 2, room.parts.stride (), room.rows.width ()},

@@ -19,7 +19,7 @@ constexpr float kFloor = 0.25f;
 /* V is that of a typical moving scene without noise. */
 constexpr double kRadius = 5.5, kNoise = 1e-3;
 
-/* Logarithms to base 2 of V, by distinct row, phase and slot. */
+/* Logarithms to base 2 of V, by phase and slot. */
 std::vector<float>
 geometry_of (FilterPlan plan)
 {
@@ -89,16 +89,15 @@ Uncertainty::set_pixels (const Frame &frame, int slot, int y,
   const float *slope = frame.noise.slopes (y);
   const float *offset = frame.noise.offsets (y);
   const std::int16_t *slots = slot_of_.row (y);
-  const int period = phases_.period (), shift = phases_.shift (y);
-  const float *geometry =
-      geometry_.data () +
-      std::ptrdiff_t (phases_.row_of (y)) * period * slots_ + slot;
+  const int *phases = phases_.of_row (y);
+  const int period = phases_.period ();
+  const float *geometry = geometry_.data () + slot;
   for (int x = 0; x < slot_of_.width (); x++) {
     const float noise = slope[x] * std::max (light[x], 0.0f) + offset[x];
     const float of_block = misfit[std::min (x / 2, blocks.width () - 1)];
     pixels[std::size_t (x)] = {log_of (of_block - noise),
         log_of (change[x] / kArea - noise), log_of (rough[x] / kArea),
-        geometry[std::ptrdiff_t ((x + shift) % period) * slots_], noise,
+        geometry[std::ptrdiff_t (phases[x % period]) * slots_], noise,
         slots[x] == slot};
   }
 }

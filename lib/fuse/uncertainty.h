@@ -85,7 +85,7 @@ private:
   bool noise_free_;
   float rounding_;                ///< variance
   FieldOf<std::int16_t> slot_of_; ///< of each pixel; -1: several
-  std::vector<float> geometry_;   ///< by distinct row, phase and slot
+  std::vector<float> geometry_;   ///< by phase and slot
 };
 
 } // namespace codedexposure::fuse

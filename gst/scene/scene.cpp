@@ -21,8 +21,6 @@
  *
  * Since: 0.1
  */
-#include <algorithm>
-#include <limits>
 #include <memory>
 
 #include <gst/base/gstpushsrc.h>
@@ -49,19 +47,6 @@ struct SceneState {
   codedexposure::Image<float> light;
   guint64 frame = 0;
 };
-
-template <typename Pixel>
-void
-expose (codedexposure::ImageView<const float> light,
-    codedexposure::ImageView<Pixel> out)
-{
-  constexpr float kWhite = std::numeric_limits<Pixel>::max ();
-  for (int y = 0; y < out.height; y++)
-    std::transform (
-        light.row (y), light.row (y) + out.width, out.row (y), [] (float l) {
-          return Pixel (std::clamp (l, 0.0f, 1.0f) * kWhite + 0.5f);
-        });
-}
 
 struct GstCodedExposureScene : Instance<GstPushSrc, SceneState> {
 };
@@ -147,7 +132,8 @@ create (GstPushSrc *base, GstBuffer **outbuf) noexcept
   {
     MappedFrame mapped (state.info, buffer.get (), GST_MAP_WRITE);
     const auto light = std::as_const (state.light).view ();
-    write_pixels (mapped, [light] (auto pixels) { expose (light, pixels); });
+    write_pixels (mapped,
+        [light] (auto pixels) { codedexposure::expose (light, pixels); });
   }
   GST_BUFFER_PTS (buffer.get ()) = time;
   GST_BUFFER_OFFSET (buffer.get ()) = state.frame++;

@@ -116,20 +116,22 @@ private:
     const int first = frame_.column (-reach), last = frame_.column (reach);
     for (int y = frame_.row (kWick.y - flame.height);
          y < frame_.row (kWick.y + 0.01); y++) {
+      const double up =
+          (kWick.y + 0.01 - frame_.at (first, y).y) / (flame.height + 0.01);
+      const double middle =
+          flame.lean * up * up + flame.sway * std::sin (up * 6.0) * up;
+      const double edge = 1.0 + 0.06 * flame.jitter * std::sin (up * 14.0) * up;
+      const double width = kFlameWidth * edge * 1.9 *
+                           std::pow (std::max (up, 0.0), 0.45) *
+                           std::pow (std::max (1.0 - up, 0.0), 0.85);
+      const double at_wick = 0.6 * std::exp (-up * up / 0.012);
       for (int x = first; x < last; x++) {
-        const Position at = frame_.at (x, y);
-        const double up = (kWick.y + 0.01 - at.y) / (flame.height + 0.01);
-        const double middle =
-            flame.lean * up * up + flame.sway * std::sin (up * 6.0) * up;
-        const double edge =
-            1.0 + 0.06 * flame.jitter * std::sin (up * 14.0) * up;
-        const double width = kFlameWidth * edge * 1.9 *
-                             std::pow (std::max (up, 0.0), 0.45) *
-                             std::pow (std::max (1.0 - up, 0.0), 0.85);
-        const double out = std::abs (at.x - middle) / std::max (width, 1e-6);
+        const double out =
+            std::abs (frame_.at (x, y).x - middle) / std::max (width, 1e-6);
         const double body = 1.0 - smooth_step (0.72, 1.08, out);
-        const double core = 1.0 - 0.6 * std::exp (-up * up / 0.012) *
-                                      std::exp (-out * out / 0.3);
+        if (body <= 0.0)
+          continue;
+        const double core = 1.0 - at_wick * std::exp (-out * out / 0.3);
         const double shade = 0.62 + 0.38 * std::exp (-out * out / 0.5);
         const double own = 0.97 * flame.power * body * core * shade;
         light.at (x, y) =

@@ -38,4 +38,8 @@ public:
   virtual void draw (double seconds, ImageView<float> light) = 0;
 };
 
+/** Light from 0 to 1 as pixels of the whole range of their type, rounded. */
+template <typename Pixel>
+void expose (ImageView<const float> light, ImageView<Pixel> out);
+
 } // namespace codedexposure

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
+#include <vector>
 
 #include "base/pixels.h"
 #include "base/statistics.h"
@@ -46,24 +48,29 @@ void
 look_at_target (
     const SickBenchOptions &options, double seconds, ImageView<float> light)
 {
-  constexpr double kBlob = 8.0; // pixels between points of the grid
+  constexpr int kBlob = 8; // pixels between points of the grid
   /* Of numbers in -1..1, between which is interpolated. */
   const double rms = 2.0 / 3.0 / std::sqrt (3.0);
   const double shift = options.moving * seconds;
+  const auto first = std::int64_t (std::floor (-shift / kBlob));
+  const auto points = [&] (std::int64_t row) {
+    std::vector<double> drawn;
+    for (int i = 0; i < light.width / kBlob + 3; i++)
+      drawn.push_back (drawn_at (options.seed, first + i, row));
+    return drawn;
+  };
+  std::vector<double> above, below = points (0);
   for (int y = 0; y < light.height; y++) {
-    const double v = y / kBlob;
-    const auto row = std::int64_t (std::floor (v));
-    const double below = v - double (row);
+    if (y % kBlob == 0)
+      above = std::exchange (below, points (y / kBlob + 1));
+    const double down = double (y % kBlob) / kBlob;
     for (int x = 0; x < light.width; x++) {
       const double u = (x - shift) / kBlob;
-      const auto column = std::int64_t (std::floor (u));
-      const double right = u - double (column);
-      const auto at = [&] (int dx, int dy) {
-        return drawn_at (options.seed, column + dx, row + dy);
-      };
+      const double column = std::floor (u), right = u - column;
+      const auto i = std::size_t (std::int64_t (column) - first);
       const double blob =
-          (1 - below) * ((1 - right) * at (0, 0) + right * at (1, 0)) +
-          below * ((1 - right) * at (0, 1) + right * at (1, 1));
+          (1 - down) * ((1 - right) * above[i] + right * above[i + 1]) +
+          down * ((1 - right) * below[i] + right * below[i + 1]);
       light.at (x, y) *=
           float (std::max (0.0, 1.0 + options.texture * blob / rms));
     }

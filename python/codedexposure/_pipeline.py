@@ -132,6 +132,14 @@ def _error_of(message) -> Error:
         _text_of(message, error, debug))
 
 
+# Why dmdsync drops a frame; a duplicate is none that is lost.
+_DROPPED = {
+    "before-start": "it was exposed before the stream began",
+    "not-locked": "its masks were not synchronised",
+    "incomplete": "a part of it is missing",
+}
+
+
 def _loss_in(structure) -> str | None:
     """What an element message says of lost or damaged frames."""
     name, value = structure.get_name(), structure.get_value
@@ -139,6 +147,9 @@ def _loss_in(structure) -> str | None:
     if name == "codedexposure/frames-lost":
         return (f"coded frames{of} were lost before {value('to') * 1e-9:.3f} s: "
                 f"{value('count')}")
+    if name == "dmdsync/frame-dropped" and value("reason") in _DROPPED:
+        return (f"coded frame {value('frame')}{of} was dropped: "
+                f"{_DROPPED[value('reason')]}")
     if name == "codedexposure/frames-damaged" and value("active"):
         return (f"from frame {value('frame')} ({value('from') * 1e-9:.3f} s) "
                 f"on, frames{of} are corrupted: {value('reason')}")

@@ -207,7 +207,8 @@ class Player:
         self._setups: list[str] = []
         self._pad = self.out.get_static_pad("sink")
         self._probe = self._pad.add_probe(
-            Gst.PadProbeType.EVENT_DOWNSTREAM, self._on_event)
+            Gst.PadProbeType.EVENT_DOWNSTREAM | Gst.PadProbeType.EVENT_FLUSH,
+            self._on_event)
 
     def __enter__(self):
         try:
@@ -273,7 +274,12 @@ class Player:
 
     def _on_event(self, _, info):
         event = info.get_event()
-        if event.type == Gst.EventType.TAG:
+        if event.type == Gst.EventType.FLUSH_STOP:
+            # Frames that were read before the seek are not of this part, nor
+            # is what was said of them.
+            while self.bus.pop():
+                pass
+        elif event.type == Gst.EventType.TAG:
             tags = event.parse_tag()
             for i in range(tags.get_tag_size(Gst.TAG_COMMENT)):
                 comment = tags.get_string_index(Gst.TAG_COMMENT, i)[1]

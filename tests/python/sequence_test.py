@@ -4,11 +4,13 @@
 import re
 import subprocess
 import unittest
+from unittest import mock
 import warnings
 
 from rig import BUILD, ROOT, SCRATCH, clean, play, run, simulate
 import numpy as np
 import codedexposure
+from gi.repository import Gst
 
 
 def camera_file(name, *options):
@@ -92,6 +94,20 @@ class Sequence(unittest.TestCase):
             list(frames[4:12])
         with self.assertWarnsRegex(codedexposure.RecordingWarning, "lost.*: 20"):
             list(frames[28:40])
+
+    def test_a_part_is_silent_about_what_was_read_before_it(self):
+        seek = Gst.Pipeline.seek
+
+        def seek_late(pipeline, *args):
+            pipeline.get_bus().post(Gst.Message.new_element(
+                pipeline, Gst.Structure.new_from_string(
+                    "codedexposure/stream-incomplete, count=(guint64)20")))
+            return seek(pipeline, *args)
+
+        with warnings.catch_warnings(), \
+                mock.patch.object(Gst.Pipeline, "seek", seek_late):
+            warnings.simplefilter("error")
+            list(opened("camera.mkv").coded()[1:3])
 
     def check_uncountable(self, name, why):
         recording = opened(name)

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "python.h"
 
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 
@@ -29,6 +30,12 @@ become_archive (const std::vector<std::string> &words)
   for (std::string &word : all)
     arguments.push_back (word.data ());
   arguments.push_back (nullptr);
+  /* An interruption while Python starts would be a fatal error of Python's. It
+   * stays pending until main () of the package unblocks it. */
+  sigset_t interruption;
+  sigemptyset (&interruption);
+  sigaddset (&interruption, SIGINT);
+  pthread_sigmask (SIG_BLOCK, &interruption, nullptr);
   execvp (arguments[0], arguments.data ());
   fail (std::string (PYTHON) + " cannot be run; install python3");
 }

@@ -11,6 +11,7 @@ from . import (chunk, engine, measure, merge, packing, plan, programs, single,
 from .store import Problem, Stopped, Store, digest, read_json, write_json
 
 NAME = 'archive'
+OF_DECODE = sys.argv[1:3] == ['work', 'decode']  # what decode --jobs becomes
 STOPPED = 130  # status of a command that was stopped
 CALL = 'codedexposure archive'
 HELP = f'''Usage: {CALL} plan|submit RECORDING... --to FOLDER [option...]
@@ -334,7 +335,9 @@ def check_host(folder, plan_sha256):
 
 def main():
     signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # status | head
-    if sys.argv[1:3] == ['work', 'decode']:
+    # The program that became this one blocked it, while Python started.
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    if OF_DECODE:
         recording, output, jobs, force, *rest = sys.argv[3:]
         engine.choose('parallel')
         return single.run(recording, output, int(jobs), bool(force), rest)
@@ -357,10 +360,18 @@ def main():
         store, made)
 
 
+SAID_BY = 'decode' if OF_DECODE else NAME
 try:
     sys.exit(main())
 except Stopped as stopped:
-    print(f'{NAME}: {stopped}', file=sys.stderr)
+    print(f'{SAID_BY}: {stopped}', file=sys.stderr)
+    sys.exit(STOPPED)
+except KeyboardInterrupt:
+    print(f'{SAID_BY}: stopped', file=sys.stderr)
     sys.exit(STOPPED)
 except Problem as problem:
-    sys.exit(f'{NAME}: {problem}')
+    sys.exit(f'{SAID_BY}: {problem}')
+except OSError as error:
+    said = ': '.join(filter(None, (error.filename, error.strerror)))
+    sys.exit(f'{SAID_BY}: {said}; mend this, and run it again: what was done is '
+             'kept')

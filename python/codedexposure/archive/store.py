@@ -117,8 +117,13 @@ class Store:
         return os.path.exists(self.plan)
 
     def create(self):
-        for name in 'parts', 'failed', 'merged', 'runs':
-            os.makedirs(os.path.join(self.work, name), exist_ok=True)
+        try:
+            for name in 'parts', 'failed', 'merged', 'runs':
+                os.makedirs(os.path.join(self.work, name), exist_ok=True)
+        except OSError as error:
+            raise Problem(f'{self.folder} cannot hold an archive: '
+                          f'{error.strerror}; name a folder that can be '
+                          'written') from None
 
     def parts(self, recording):
         return os.path.join(self.work, 'parts', f'{recording:06d}')

@@ -97,7 +97,7 @@ SickBench::SickBench (const SickBenchOptions &options, Mapping mapping)
 void
 SickBench::find_view ()
 {
-  const auto [width, height] = options_.camera;
+  const int width = options_.camera.width, height = options_.camera.height;
   const Extent mirrors = options_.mirrors;
   const double margin = 16.0 + 6.0 * options_.blur;
   double left = 1e9, top = 1e9, right = -1e9, bottom = -1e9;

@@ -151,7 +151,6 @@ void
 Decode::declare_relations (Options &options)
 {
   options.need ({"--uncertainty", "--second"}, "--fuse");
-  options.exclude ({"--refine"}, "--second");
   options.need ({"--statistics"}, "--output");
   options.exclude ({"--region", "--method"}, "--fuse");
   options.exclude ({"--start", "--duration", "--find-phase"}, "--excerpt");
@@ -184,9 +183,6 @@ Decode::check () const
   if (white_ && !view_ && !any (VideoForm::mp4))
     usage_error ("--white is for --view and .mp4; other files keep the pixel "
                  "values");
-  if (second_ && decode_.fuse == "learned")
-    usage_error ("--fuse learned knows one camera; use best with --second, or "
-                 "leave --second out");
   if (is (uncertainty_, VideoForm::mp4))
     usage_error ("--uncertainty " + *uncertainty_ +
                  ": .mp4 does not keep values; end in .mkv, .ome.tif, .h5 or "

@@ -247,9 +247,11 @@ protected:
   /** Maps @p frame for reading; posts an error if it is too short. */
   MappedFrame map_coded (GstBuffer *frame) const;
   /** The light of a coded frame, which is its pixels less the black level; with
-   * a mapping, one pixel a mirror. Valid until the next call. */
+   * a mapping, one pixel a mirror. Valid until the next call.
+   * @p errors  set with a mapping: see Rectifier::run (). */
   template <typename Pixel>
-  Result<ImageView<const Pixel>> rectify (ImageView<const Pixel> coded);
+  Result<ImageView<const Pixel>> rectify (
+      ImageView<const Pixel> coded, Image<float> *errors = nullptr);
   /** Whether the segment contains the time from @p pts for @p duration. */
   bool is_within (GstClockTime pts, GstClockTime duration) const;
   /** Posts a message when a sequence of saturated frames begins, and when there

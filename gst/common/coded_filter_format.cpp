@@ -247,8 +247,9 @@ CodedFilter::find_bench (CodedFormat &format)
 }
 
 /* The property wins over the stream's tag, and a mapping over that of a bench
- * profile from the same place. Frames that were scaled or cropped after
- * calibration are decoded without the tag's mapping. */
+ * profile from the same place; a blur without a mapping comes last. Frames that
+ * were scaled or cropped after calibration are decoded without the tag's
+ * mapping. */
 bool
 CodedFilter::find_mapping (Extent camera, std::optional<Mapping> &mapping)
 {
@@ -269,7 +270,7 @@ CodedFilter::find_mapping (Extent camera, std::optional<Mapping> &mapping)
   if (!mapping && stream_.tagged && *stream_.tagged)
     mapping = stream_.tagged->value ().mapping;
   if (!mapping && stream_.bench)
-    mapping = stream_.bench->mapping;
+    mapping = stream_.bench->known_mapping ();
   if (!mapping || mapping->camera () == camera)
     return true;
   if (!std::exchange (stream_.warned_of_mapping, true))

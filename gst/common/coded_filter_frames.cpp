@@ -436,7 +436,7 @@ CodedFilter::Scratch::of (Extent size)
 
 template <typename Pixel>
 Result<ImageView<const Pixel>>
-CodedFilter::rectify (ImageView<const Pixel> coded)
+CodedFilter::rectify (ImageView<const Pixel> coded, Image<float> *errors)
 {
   const int bits = significant_bits ();
   if (const int black = bench () ? bench ()->black () : 0; black > 0) {
@@ -448,17 +448,23 @@ CodedFilter::rectify (ImageView<const Pixel> coded)
   if (!rectifier)
     return coded;
   auto &rectified = stream_.rectified.of<Pixel> (rectifier->mirrors ());
-  if (const auto done = rectifier->run (
-          coded, rectified.view (), bits > 0 ? largest_pixel (bits) : 0);
+  std::optional<ImageView<float>> wanted;
+  if (errors) {
+    const auto [width, height] = rectifier->mirrors ();
+    *errors = Image<float> (width, height);
+    wanted = errors->view ();
+  }
+  if (const auto done = rectifier->run (coded, rectified.view (),
+          bits > 0 ? largest_pixel (bits) : 0, wanted);
       !done)
     return done.error ();
   return ImageView<const Pixel> (rectified.view ());
 }
 
 template Result<ImageView<const std::uint8_t>> CodedFilter::rectify (
-    ImageView<const std::uint8_t>);
+    ImageView<const std::uint8_t>, Image<float> *);
 template Result<ImageView<const std::uint16_t>> CodedFilter::rectify (
-    ImageView<const std::uint16_t>);
+    ImageView<const std::uint16_t>, Image<float> *);
 
 /* A seek may begin or end within a coded frame. */
 bool

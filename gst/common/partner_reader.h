@@ -20,6 +20,8 @@ public:
   static Result<PartnerReader> make (const PartnerSetup &partner,
       const CodedFormat &format, const RectifyOptions &options);
 
+  /** Null: it sees one mirror with each pixel. */
+  const Rectifier *rectifier () const { return rectifier_.get (); }
   /** The partner of @p coded, until the next call; none if it has none of use.
    * @p bits: significant ones; 0: all. */
   template <typename Pixel>

@@ -46,8 +46,11 @@
  * of recordings; #codedexposure-fuse:threads share their work.
  * `learned`, and #codedexposure-fuse:refine with the others, corrects the
  * result by a small network that learned from photographs; nothing else learns
- * from pictures. Schedules and noise that it was not trained for post a
- * WARNING, and the result stays as it was.
+ * from pictures. The network takes up to twice as long as `balanced`, and also
+ * sees the coded frame before and, with #codedexposure-fuse:lookahead, the one
+ * after.
+ * Schedules and noise that it was not trained for post a WARNING, and the
+ * result stays as it was.
  *
  * Tell the element about the camera's noise (#codedexposure-fuse:full-well,
  * #codedexposure-fuse:read-noise), or give it a bench profile, which a
@@ -61,7 +64,8 @@
  * of the errors of each pixel, in 1/65280 of white, which is 1/256 of a grey
  * level of 8 bits. Measured pixels have the noise of the camera, static ones
  * that of their mean, and estimated ones a value that depends on how well their
- * neighbours are predicted and on how the picture changes there. It is not
+ * neighbours are predicted and on how the picture changes there, or, where the
+ * network refines them, on what it says of its own correction. It is not
  * computed unless the pad is linked.
  *
  * ## Two cameras
@@ -73,8 +77,7 @@
  * mirrors as the first one does, or its mapping must be in its stream tag. A
  * frame without a partner gives what one camera gives, and so do the
  * surroundings of saturated pixels of the second camera, which gets most of the
- * light: 16 px to all sides. Such frames take twice the time. The network of
- * `refine` does not know partners: refined frames are made from one camera.
+ * light: 16 px to all sides. Such frames take twice the time.
  *
  * ## Flags, metas and messages
  *
@@ -198,11 +201,17 @@ Fuse::take_pixels (GstBuffer *buffer, MappedFrame &coded)
   }
   const auto view = view_of<const Pixel> (coded);
   const guint64 saturated = count_saturated (view, significant_bits ());
-  const auto rectified = rectify (view);
+  /* Without a mapping, it stays empty. */
+  Image<float> errors;
+  const bool wanted = find_pad (*pads (), PadKind::uncertainty) != nullptr;
+  const auto rectified = rectify (view, wanted ? &errors : nullptr);
   if (!rectified)
     return rectified.error ();
+  std::optional<ImageView<const float>> known;
+  if (errors.width () > 0)
+    known = std::as_const (errors).view ();
   if (const auto taken =
-          std::get<Fuser<Pixel>> (plan_->fuser).take (*rectified, other);
+          std::get<Fuser<Pixel>> (plan_->fuser).take (*rectified, other, known);
       !taken)
     return taken.error ();
   return saturated;

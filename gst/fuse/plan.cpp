@@ -178,12 +178,9 @@ Fuse::plan_partners (const CodedFormat &format) const
   const std::optional<PartnerSetup> &partner = tagged_partner ();
   if (!partner)
     return std::nullopt;
-  const bool refined =
-      in_force_.refine || in_force_.quality == FuseQuality::kLearned;
-  auto made = refined ? Error{"refined frames are made from one camera; use "
-                              "quality=fast, balanced or best without refine"}
-                      : PartnerReader::make (*partner, format,
-                            rectify_options (format.schedule));
+  RectifyOptions options = rectify_options (format.schedule);
+  options.keep_unknown = true;
+  auto made = PartnerReader::make (*partner, format, options);
   if (made)
     return *std::move (made);
   POST_WARNING (element (), STREAM, FORMAT,

@@ -142,6 +142,12 @@ Sum::set_up_class (gpointer klass)
       {});
 }
 
+bool
+sees (const Rectifier *camera, int x, int y)
+{
+  return !camera || camera->sees (x, y);
+}
+
 Result<Plan>
 Sum::make_plan (const CodedFormat &format)
 {
@@ -158,8 +164,13 @@ Sum::make_plan (const CodedFormat &format)
       bits > 0 ? bits : int (GST_VIDEO_INFO_COMP_DEPTH (&format.info, 0)));
   const double black = bench () ? bench ()->black () : 0;
   const double ratio = locked (element (), [this] { return settings_.ratio; });
+  Image<std::uint8_t> seen (format.size.width, format.size.height);
+  for (int y = 0; y < seen.height (); y++)
+    for (int x = 0; x < seen.width (); x++)
+      seen.at (x, y) = sees (format.rectifier.get (), x, y) &&
+                       sees (partners->rectifier (), x, y);
   return Plan{*std::move (partners),
-      BeamSum (format.schedule, format.size, ratio),
+      BeamSum (format.schedule, format.size, ratio, std::move (seen)),
       {.on_white = white - black,
           .off_black = double (partner->black),
           .off_white = white,

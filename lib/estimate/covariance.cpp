@@ -12,20 +12,21 @@ namespace codedexposure
 namespace
 {
 
-/* Appends the covariances of each element with each slot, where slots that are
- * d apart have between[d + slots - 1]. */
+/* The covariances of each element with each slot, element after element, where
+ * slots that are d apart have between[slots - 1 - d]. */
 void
-append_with_slots (std::span<const SlotShares> shares,
-    const std::vector<double> &between, std::size_t slots,
-    std::vector<double> &to)
+set_with_slots (std::span<const SlotShares> shares,
+    const std::vector<double> &between, std::size_t slots, double *to)
 {
-  for (const SlotShares &element : shares)
-    for (std::size_t slot = 0; slot < slots; slot++) {
-      double sum = 0.0;
-      for (const auto &[s, response] : element)
-        sum += response * between[std::size_t (s) + slots - 1 - slot];
-      to.push_back (sum);
+  for (const SlotShares &element : shares) {
+    std::fill_n (to, slots, 0.0);
+    for (const auto &[s, response] : element) {
+      const double *from = between.data () + (slots - 1 - std::size_t (s));
+      for (std::size_t slot = 0; slot < slots; slot++)
+        to[slot] += response * from[slot];
     }
+    to += slots;
+  }
 }
 
 /* Places with the same key have the same covariances but for a factor: nothing
@@ -50,6 +51,10 @@ CodedCovariance::CodedCovariance (const SceneClass &patch,
     : reach_ (reach), elements_ (shares.size ()), slots_ (std::size_t (slots))
 {
   std::map<std::pair<int, int>, std::size_t> rows;
+  const auto most = std::size_t (2 * reach + 1) * std::size_t (2 * reach + 1) *
+                    elements_; // of rows
+  coded_.reserve (most * elements_);
+  targets_.reserve (most * slots_);
   for (int dy = -reach; dy <= reach; dy++)
     for (int dx = -reach; dx <= reach; dx++) {
       const auto [row, is_new] =
@@ -67,7 +72,8 @@ CodedCovariance::CodedCovariance (const SceneClass &patch,
     }
 }
 
-/* Covariances of the light of slots that are d apart, at [d + slots - 1]. */
+/* Covariances of the light of a slot and of one d before it, at
+ * [slots - 1 - d]. */
 std::vector<double>
 CodedCovariance::between_slots (const SceneClass &patch, Offset apart,
     const std::vector<TimeStep> &steps) const
@@ -75,11 +81,11 @@ CodedCovariance::between_slots (const SceneClass &patch, Offset apart,
   const int n = int (slots_);
   std::vector<double> between (2 * slots_ - 1);
   for (int d = patch.directed () ? 1 - n : 0; d < n; d++) {
-    double &sum = between[std::size_t (d + n - 1)];
+    double &sum = between[std::size_t (n - 1 - d)];
     for (const auto &[later, part] : steps)
       sum += part * scene_correlation (patch, apart.x, apart.y, d + later);
     if (!patch.directed ())
-      between[std::size_t (n - 1 - d)] = sum;
+      between[std::size_t (n - 1 + d)] = sum;
   }
   return between;
 }
@@ -88,15 +94,20 @@ void
 CodedCovariance::add_row (std::span<const SlotShares> shares,
     const std::vector<double> &light, const std::vector<double> &target)
 {
-  append_with_slots (shares, target, slots_, targets_);
-  std::vector<double> with_slots;
-  append_with_slots (shares, light, slots_, with_slots);
+  const std::size_t of_row = elements_ * slots_;
+  targets_.resize (targets_.size () + of_row);
+  set_with_slots (
+      shares, target, slots_, targets_.data () + targets_.size () - of_row);
+  std::vector<double> with_slots (of_row);
+  set_with_slots (shares, light, slots_, with_slots.data ());
+  coded_.resize (coded_.size () + elements_ * elements_);
+  double *to = coded_.data () + coded_.size () - elements_ * elements_;
   for (std::size_t a = 0; a < elements_; a++)
     for (const SlotShares &other : shares) {
       double sum = 0.0;
       for (const auto &[slot, response] : other)
         sum += response * with_slots[a * slots_ + std::size_t (slot)];
-      coded_.push_back (sum);
+      *to++ = sum;
     }
 }
 

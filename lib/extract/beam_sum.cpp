@@ -2,6 +2,7 @@
 #include "extract/beam_sum.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace codedexposure
 {
@@ -32,14 +33,17 @@ share_of (const Schedule &schedule, Extent mirrors)
 template <typename Pixel>
 double
 ratio_between (ImageView<const Pixel> on, ImageView<const Pixel> off,
-    const BeamLevels &levels, ImageView<Pixel> sum)
+    ImageView<const std::uint8_t> seen, const BeamLevels &levels,
+    ImageView<Pixel> sum)
 {
   double first = 0.0, second = 0.0;
   for (int y = 0; y < sum.height; y++) {
     const Pixel *a = on.row (y), *b = off.row (y);
+    const std::uint8_t *both = seen.row (y);
     std::uint32_t of_first = 0, of_second = 0, pixels = 0;
     for (int x = 0; x < sum.width; x++) {
-      const bool counts = a[x] < levels.on_white && b[x] < levels.off_white;
+      const bool counts =
+          both[x] && a[x] < levels.on_white && b[x] < levels.off_white;
       of_first += counts ? a[x] : 0u;
       of_second += counts ? b[x] : 0u;
       pixels += counts;
@@ -52,9 +56,16 @@ ratio_between (ImageView<const Pixel> on, ImageView<const Pixel> off,
 
 } // namespace
 
-BeamSum::BeamSum (const Schedule &schedule, Extent mirrors, double ratio)
-    : share_ (share_of (schedule, mirrors)), ratio_ (ratio)
+BeamSum::BeamSum (const Schedule &schedule, Extent mirrors, double ratio,
+    Image<std::uint8_t> seen)
+    : share_ (share_of (schedule, mirrors)), ratio_ (ratio),
+      seen_ (std::move (seen))
 {
+  if (seen_.width () > 0)
+    return;
+  seen_ = Image<std::uint8_t> (mirrors.width, mirrors.height);
+  for (int y = 0; y < mirrors.height; y++)
+    std::fill_n (seen_.view ().row (y), mirrors.width, std::uint8_t (1));
 }
 
 template <typename Pixel>
@@ -65,7 +76,8 @@ BeamSum::add (ImageView<const Pixel> on, ImageView<const Pixel> off,
   double ratio = ratio_;
   if (ratio <= 0.0) {
     const double measured =
-        ratio_between (on, off, levels, sum) * share_ / (1.0 - share_);
+        ratio_between (on, off, seen_.view (), levels, sum) * share_ /
+        (1.0 - share_);
     ratio = measured > 0.0 ? std::clamp (measured, kLeast, kMost) : 1.0;
   }
   const double white = std::min (levels.on_white / share_,
@@ -75,12 +87,15 @@ BeamSum::add (ImageView<const Pixel> on, ImageView<const Pixel> off,
   const float black = float (levels.off_black), full = float (levels.sum_white);
   for (int y = 0; y < sum.height; y++) {
     const Pixel *a = on.row (y), *b = off.row (y);
+    const std::uint8_t *both = seen_.view ().row (y);
     Pixel *out = sum.row (y);
     for (int x = 0; x < sum.width; x++) {
       const float light = part * float (a[x]) +
                           other * std::max (0.0f, float (b[x]) - black) + 0.5f;
       const bool is_full = a[x] >= levels.on_white || b[x] >= levels.off_white;
-      out[x] = Pixel (is_full ? full : std::min (light, full));
+      out[x] = Pixel (!both[x]  ? 0.0f
+                      : is_full ? full
+                                : std::min (light, full));
     }
   }
   return ratio;

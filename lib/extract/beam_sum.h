@@ -31,8 +31,11 @@ public:
    * @p ratio: light of a pixel of the second camera, where that of the first is
    * 1 and mirrors are on for half of the time; 0: measured in each pair, as
    * that for which both saw a scene of the same mean.
+   * @p seen: 0 for mirrors that a camera does not see, which are black in the
+   * sum and tell nothing of the ratio; empty: both see all.
    */
-  BeamSum (const Schedule &schedule, Extent mirrors, double ratio);
+  BeamSum (const Schedule &schedule, Extent mirrors, double ratio,
+      Image<std::uint8_t> seen = {});
 
   /**
    * Both frames have a pixel a mirror; @p on is without its black level. Of
@@ -47,6 +50,7 @@ public:
 private:
   double share_; ///< of the light that the first camera gets
   double ratio_;
+  Image<std::uint8_t> seen_;
 };
 
 extern template double BeamSum::add (ImageView<const std::uint8_t>,

@@ -105,6 +105,7 @@ CodedStream::next ()
       spare_.partner = partner_->room ();
   }
   spare_.has_partner = false;
+  spare_.errors = {};
   return spare_;
 }
 

@@ -24,8 +24,11 @@ struct CodedLight {
 struct CodedFrame : CodedLight {
   CodedLight partner;
   bool has_partner = false;
-  /** 1 for each pixel near which the partner is saturated, row by row without
-   * padding; empty: it is not. */
+  /** Squared errors of the light beyond the noise, grey levels, where they are
+   * known; empty: there are none. */
+  Field errors;
+  /** 1 for each pixel near which the partner is not known, row by row without
+   * padding; empty: it is everywhere. */
   std::vector<std::uint8_t> clipped;
 };
 
@@ -35,6 +38,9 @@ struct CodedFrames {
   bool alone = false; ///< as if it had no partner
 
   bool has_partner () const { return now->has_partner && !alone; }
+  /** Whether the partner does not tell of all pixels. */
+  bool clipped () const { return has_partner () && !now->clipped.empty (); }
+  CodedFrames of_first () const { return {before, now, after, true}; }
   Neighbours neighbours () const
   {
     return {before != nullptr, after != nullptr, has_partner ()};

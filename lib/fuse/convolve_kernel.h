@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* One row of a 3x3 convolution, the channels of a pixel in lanes. */
+/* One row of a 3x3 convolution, the outputs of a pixel in lanes. */
 #pragma once
 
 #include "fuse/filter_kernel.h"
@@ -7,73 +7,95 @@
 namespace codedexposure::CODEDEXPOSURE_TARGET
 {
 
-/* a * b + sum, rounded once, which takes half the time of rounding twice. Where
- * the processor cannot, the library computes it value by value. */
-CODEDEXPOSURE_INLINE Floats
-fused (Floats a, Floats b, Floats sum)
-{
-#if CODEDEXPOSURE_VECTOR_BYTES == 64
-  return Floats (_mm512_fmadd_ps (__m512 (a), __m512 (b), __m512 (sum)));
-#elif defined __FMA__
-  return Floats (_mm256_fmadd_ps (__m256 (a), __m256 (b), __m256 (sum)));
-#else
-  for (int i = 0; i < kFloats; i++)
-    sum[i] = __builtin_fmaf (a[i], b[i], sum[i]);
-  return sum;
-#endif
-}
+/* As many values of 16 bits as a vector has sums. */
+typedef std::int16_t Shorts __attribute__ ((vector_size (kVectorBytes / 2)));
 
-/* Vectors: of the outputs of a pixel. */
+/* Pixels x .. x + Pixels - 1; Vectors: of the outputs of a pixel. */
 template <int Vectors, int Pixels>
 CODEDEXPOSURE_INLINE void
-convolve_pixels (const fuse::ConvolveRow &row, int x)
+sum_pixels (const fuse::ConvolveRow &row, int x, Ints (&sum)[Pixels][Vectors])
 {
-  constexpr int kOutputs = Vectors * kFloats;
-  Floats sum[Pixels][Vectors];
   for (int p = 0; p < Pixels; p++)
 #pragma GCC unroll 8
     for (int v = 0; v < Vectors; v++)
       sum[p][v] = load (row.bias + v * kFloats);
-  const float *weights = row.weights;
-  for (int tap = 0; tap < 9; tap++) {
-    const float *from = row.source[tap / 3] + (x + tap % 3) * row.inputs;
-    for (int i = 0; i < row.inputs; i++, weights += kOutputs) {
+  const std::int16_t *weights = row.weights;
+  for (int r = 0; r < 3; r++) {
+    /* The values of the pixels at x - 1, x and x + 1 are one after the other.
+     */
+    const std::int16_t *from = row.source[r] + x * row.inputs;
+    for (int i = 0; i < 3 * row.inputs; i += 2) {
+      Ints weight[Vectors];
+#pragma GCC unroll 8
+      for (int v = 0; v < Vectors; v++, weights += 2 * kFloats)
+        weight[v] = Ints (load (weights));
 #pragma GCC unroll 16
       for (int p = 0; p < Pixels; p++) {
-        const Floats value = Floats{} + from[p * row.inputs + i];
+        std::int32_t pair;
+        __builtin_memcpy (&pair, from + p * row.inputs + i, sizeof pair);
 #pragma GCC unroll 8
         for (int v = 0; v < Vectors; v++)
-          sum[p][v] = fused (load (weights + v * kFloats), value, sum[p][v]);
+          sum[p][v] = add_product (sum[p][v], weight[v], Ints{} + pair);
       }
-    }
-  }
-  for (int p = 0; p < Pixels; p++) {
-    float *to = row.to + (x + p) * kOutputs;
-#pragma GCC unroll 8
-    for (int v = 0; v < Vectors; v++) {
-      Floats value = sum[p][v];
-      if (row.hidden)
-        value = larger (value, Floats{});
-      if (row.add)
-        value += load (row.add + (x + p) * kOutputs + v * kFloats);
-      store (to + v * kFloats, value);
     }
   }
 }
 
+/* The results of a vector of sums at @at, which has the outputs from k on. */
+CODEDEXPOSURE_INLINE void
+finish_sums (const fuse::ConvolveRow &row, Ints sum, int at, int k)
+{
+  const Floats value =
+      load (row.scale + k) * __builtin_convertvector(sum, Floats);
+  if (!row.hidden) {
+    store (row.to + at, value);
+    return;
+  }
+  Ints steps = __builtin_convertvector(
+      smaller (larger (value + 0.5f, Floats{}), Floats{} + 32767.0f), Ints);
+  if (row.add) {
+    Shorts add;
+    __builtin_memcpy (&add, row.add + at, sizeof add);
+    steps =
+        smaller (steps + __builtin_convertvector(add, Ints), Ints{} + 32767);
+  }
+  const Shorts result = __builtin_convertvector(steps, Shorts);
+  __builtin_memcpy (row.hidden + at, &result, sizeof result);
+}
+
+template <int Vectors, int Pixels>
+CODEDEXPOSURE_INLINE void
+convolve_pixels (const fuse::ConvolveRow &row, int x)
+{
+  Ints sum[Pixels][Vectors];
+  sum_pixels<Vectors, Pixels> (row, x, sum);
+  for (int p = 0; p < Pixels; p++)
+#pragma GCC unroll 8
+    for (int v = 0; v < Vectors; v++)
+      finish_sums (
+          row, sum[p][v], ((x + p) * Vectors + v) * kFloats, v * kFloats);
+}
+
 /* Registers hold the sums of some pixels, so that each weight is read once for
- * them. */
+ * them. The last ones of a row may be computed twice, which takes less time
+ * than one by one. */
 template <int Vectors>
 CODEDEXPOSURE_INLINE void
 convolve_outputs (const fuse::ConvolveRow &row)
 {
-  constexpr int kSums = kVectorBytes == 64 ? 16 : 8;
-  constexpr int kPixels = kSums > Vectors ? kSums / Vectors : 1;
-  int x = 0;
-  for (; x + kPixels <= row.pixels; x += kPixels)
-    convolve_pixels<Vectors, kPixels> (row, x);
-  for (; x < row.pixels; x++)
-    convolve_pixels<Vectors, 1> (row, x);
+#if CODEDEXPOSURE_VECTOR_BYTES == 64 || defined __aarch64__
+  constexpr int kSums = 16;
+#else
+  constexpr int kSums = 8;
+#endif
+  constexpr int kPixels = kSums / Vectors;
+  const int last = row.pixels - kPixels;
+  if (last < 0)
+    for (int x = 0; x < row.pixels; x++)
+      convolve_pixels<Vectors, 1> (row, x);
+  else
+    for (int x = 0; x < row.pixels; x += kPixels)
+      convolve_pixels<Vectors, kPixels> (row, x < last ? x : last);
 }
 
 inline void

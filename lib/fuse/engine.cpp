@@ -175,7 +175,9 @@ Engine::Engine (const Schedule &schedule, const Schedule *partner, Extent size,
   const float largest = std::max (largest_light (observation_),
       of_partner ? largest_light (*of_partner) : 0.0f);
   const float pixel_steps = 65535.0f / largest;
-  sources_.emplace (SplitField (size.width, 0, radius, period));
+  /* Only `balanced` and above follow motion into other coded frames. */
+  sources_.emplace (SplitField (size.width, 0, radius, period),
+      quality_ == FuseQuality::kFast ? int (kNeighbourRadius) : radius);
   plan_.emplace (FilterPlan{phases_, observation_, *sources_,
       relative_noise (observation_), of_partner,
       of_partner ? relative_noise (*of_partner) : std::vector<double> (),
@@ -262,32 +264,45 @@ Engine::fill_light (const CodedFrames &frames, const Seen &seen,
   return fit_partner (frames, workers, stop);
 }
 
-/* Where the partner is saturated, the slots do not sum to what it saw, and the
- * first camera is all that is known. */
+/* What the network makes does not add up to what the partner saw. */
 bool
-Engine::fill_clipped (const CodedFrames &frames, const Seen &seen,
+Engine::fill (const CodedFrames &frames, const Seen &seen, bool deviations,
     Workers &workers, std::stop_token stop)
 {
-  CodedFrames alone = frames;
-  alone.alone = true;
-  const auto fill = [&] (const CodedFrames &of) {
-    const auto *predicted = predictions_->run (kernels_, of, workers, stop);
-    return predicted &&
-           fill_light (of, {*predicted, seen.still}, workers, stop);
-  };
-  if (!fill (alone))
+  if (!fill_light (frames, seen, workers, stop))
+    return false;
+  return !refiner_ ||
+         (refiner_->run (kernels_, frames, seen.still.weight, light_,
+              deviations ? &deviations_ : nullptr, workers, stop) &&
+             fit_partner (frames, workers, stop));
+}
+
+/* Where the partner is not known, the first camera is all that there is. */
+bool
+Engine::fill_clipped (const CodedFrames &frames, const Seen &seen,
+    bool deviations, Workers &workers, std::stop_token stop)
+{
+  if (!fill (frames.of_first (), seen, deviations, workers, stop))
     return false;
   std::swap (light_, alone_);
-  if (!fill (frames))
+  std::swap (deviations_, alone_deviations_);
+  const auto *predicted = predictions_->run (kernels_, frames, workers, stop);
+  if (!predicted ||
+      !fill (frames, {*predicted, seen.still}, deviations, workers, stop))
     return false;
-  for (std::size_t s = 0; s < light_.size (); s++)
-    for (int y = 0; y < size_.height; y++) {
-      const std::uint8_t *clipped =
-          frames.now->clipped.data () + std::ptrdiff_t (y) * size_.width;
-      for (int x = 0; x < size_.width; x++)
-        if (clipped[x])
-          light_[s].row (y)[x] = alone_[s].row (y)[x];
-    }
+  const auto restore = [&] (std::vector<Field> &to,
+                           const std::vector<Field> &from) {
+    for (std::size_t s = 0; s < to.size (); s++)
+      for (int y = 0; y < size_.height; y++) {
+        const std::uint8_t *clipped =
+            frames.now->clipped.data () + std::ptrdiff_t (y) * size_.width;
+        for (int x = 0; x < size_.width; x++)
+          if (clipped[x])
+            to[s].row (y)[x] = from[s].row (y)[x];
+      }
+  };
+  restore (light_, alone_);
+  restore (deviations_, alone_deviations_);
   return true;
 }
 
@@ -317,7 +332,8 @@ std::optional<Engine::Seen>
 Engine::look (const CodedFrames &frames, Workers &workers, std::stop_token stop)
 {
   plan_->stop = stop;
-  const auto *predicted = predictions_->run (kernels_, frames, workers, stop);
+  const auto *predicted = predictions_->run (
+      kernels_, frames.clipped () ? frames.of_first () : frames, workers, stop);
   if (!predicted)
     return {};
   const auto still = static_pixels_->take (
@@ -334,14 +350,13 @@ Engine::fuse_frame (const CodedFrames &frames, const RowSink &sink,
   const auto seen = look (frames, workers, stop);
   if (!seen)
     return false;
-  const bool clipped = frames.has_partner () && !frames.now->clipped.empty ();
+  const bool clipped = frames.clipped ();
   if (linear_ && !refiner_ && !deviations && !clipped)
     return linear_->run (
         kernels_, frames, seen->predicted, seen->still, sink, workers, stop);
-  if (!(clipped ? fill_clipped (frames, *seen, workers, stop)
-                : fill_light (frames, *seen, workers, stop)) ||
-      (refiner_ && !refiner_->run (kernels_, frames.now->light,
-                       seen->still.weight, light_, workers, stop)))
+  const bool wanted = bool (deviations);
+  if (clipped ? !fill_clipped (frames, *seen, wanted, workers, stop)
+              : !fill (frames, *seen, wanted, workers, stop))
     return false;
   std::vector<const float *> rows (light_.size ());
   for (int y = 0; y < size_.height; y++) {
@@ -352,14 +367,12 @@ Engine::fuse_frame (const CodedFrames &frames, const RowSink &sink,
   if (!deviations)
     return true;
   if (!uncertainty_)
-    uncertainty_.emplace (schedule_, *plan_,
-        refiner_ && quality_ == FuseQuality::kBest ? FuseQuality::kLearned
-                                                   : quality_,
-        size_, depth_);
+    uncertainty_.emplace (schedule_, *plan_, quality_, size_, depth_);
   const Field &misfit = motion_ ? misfit_ : seen->predicted.misfit;
   return uncertainty_->run (kernels_,
-      {frames.now->light, noise_, seen->still, misfit, light_}, deviations,
-      workers, stop);
+      {frames.now->light, noise_, seen->still, misfit, light_,
+          refiner_ ? &deviations_ : nullptr, frames.now->errors},
+      deviations, workers, stop);
 }
 
 bool

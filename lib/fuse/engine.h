@@ -58,7 +58,8 @@ private:
     const Predictions::Found &predicted;
     StaticPixels::Found still;
   };
-  /** Nothing when it was stopped. */
+  /** Of a frame whose partner does not tell of all pixels, what the first
+   * camera alone tells. Nothing when it was stopped. */
   std::optional<Seen> look (
       const CodedFrames &frames, Workers &workers, std::stop_token stop);
   bool fuse_frame (const CodedFrames &frames, const RowSink &sink,
@@ -66,8 +67,11 @@ private:
       const Uncertainty::Sink &deviations);
   bool fill_light (const CodedFrames &frames, const Seen &seen,
       Workers &workers, std::stop_token stop);
-  bool fill_clipped (const CodedFrames &frames, const Seen &seen,
+  /** Light, refined if it is to be. @p deviations  whether they are wanted. */
+  bool fill (const CodedFrames &frames, const Seen &seen, bool deviations,
       Workers &workers, std::stop_token stop);
+  bool fill_clipped (const CodedFrames &frames, const Seen &seen,
+      bool deviations, Workers &workers, std::stop_token stop);
   /** PartnerFit of light_; @p made, if set, gets what that makes in the
    * partner.
    */
@@ -102,10 +106,11 @@ private:
   std::optional<Uncertainty> uncertainty_; ///< made when it is first wanted
 
   std::vector<Field> light_; ///< of each slot; made when it is first needed
-  std::vector<Field> alone_; ///< by fill_clipped ()
-  Field static_light_;       ///< unless fast, or without noise
-  Field misfit_;             ///< of motion_
-  Field made_in_partner_;    ///< for collaborative_
+  std::vector<Field> deviations_;               ///< by refiner_
+  std::vector<Field> alone_, alone_deviations_; ///< by fill_clipped ()
+  Field static_light_;    ///< unless fast, or without noise
+  Field misfit_;          ///< of motion_
+  Field made_in_partner_; ///< for collaborative_
   std::string unrefined_;
 };
 

@@ -55,8 +55,10 @@ round_weights (std::span<const float> weights)
       0, std::ptrdiff_t (weights.size ()));
   std::vector<std::size_t> order (weights.size ());
   std::iota (order.begin (), order.end (), std::size_t (0));
-  std::ranges::stable_sort (
-      order, [&] (std::size_t a, std::size_t b) { return rest[a] > rest[b]; });
+  std::ranges::nth_element (
+      order, order.begin () + missing, [&] (std::size_t a, std::size_t b) {
+        return rest[a] != rest[b] ? rest[a] > rest[b] : a < b;
+      });
   for (std::ptrdiff_t i = 0; i < missing; i++)
     whole.values[order[std::size_t (i)]]++;
   return whole;
@@ -64,9 +66,8 @@ round_weights (std::span<const float> weights)
 
 } // namespace
 
-TapSources::TapSources (const SplitField &frame)
-    : reach_{int (kNeighbourRadius), frame.margin (), int (kNeighbourRadius),
-          int (kPartnerRadius)},
+TapSources::TapSources (const SplitField &frame, int neighbour)
+    : reach_{neighbour, frame.margin (), neighbour, int (kPartnerRadius)},
       margin_ (frame.margin ()), period_ (frame.period ()),
       width_ (frame.width ())
 {

@@ -25,15 +25,16 @@ add_block (std::vector<Run> &runs, int block)
 }
 
 /** Where the taps of the filters of a row are: the pixels within a distance of
- * it in the frame that is fused, those within kNeighbourRadius in the coded
+ * it in the frame that is fused, those within another distance in the coded
  * frames before and after it, and those within kPartnerRadius in its partner.
  */
 class TapSources
 {
 public:
-  /** @p frame  like those that are filtered, with a margin as large as the
-   *            taps' radius. */
-  explicit TapSources (const SplitField &frame);
+  /** @p frame      like those that are filtered, with a margin as large as the
+   *                taps' radius.
+   *  @p neighbour  radius of taps in the coded frames before and after. */
+  TapSources (const SplitField &frame, int neighbour);
 
   int period () const { return period_; } ///< of the parts of rows
   int width () const { return width_; }   ///< of frames

@@ -145,6 +145,22 @@ set_light (Field &light, const fuse::CodedCamera &camera,
   }
 }
 
+/** Of light, from those of pixels. */
+Field
+squared_errors (
+    const fuse::CodedCamera &camera, ImageView<const float> errors, float scale)
+{
+  Field squares (errors.width, errors.height);
+  for (int y = 0; y < errors.height; y++) {
+    const float *from = errors.row (y), *gain = camera.gain (y);
+    for (int x = 0; x < errors.width; x++) {
+      const float error = from[x] * scale * (gain ? gain[x] : 1.0f);
+      squares.row (y)[x] = error * error;
+    }
+  }
+  return squares;
+}
+
 } // namespace
 
 std::string_view
@@ -180,7 +196,8 @@ struct Fuser<Pixel>::State {
   std::unique_ptr<Workers> workers;
 
   Result<void> take (ImageView<const Pixel> coded,
-      const std::optional<ImageView<const Pixel>> &partner);
+      const std::optional<ImageView<const Pixel>> &partner,
+      const std::optional<ImageView<const float>> &errors);
   float light_of (
       ImageView<const Pixel> coded, ImageView<const Pixel> partner) const;
   std::vector<std::uint8_t> clipped_near (
@@ -258,7 +275,8 @@ Fuser<Pixel>::State::light_of (
 template <typename Pixel>
 Result<void>
 Fuser<Pixel>::State::take (ImageView<const Pixel> coded,
-    const std::optional<ImageView<const Pixel>> &partner)
+    const std::optional<ImageView<const Pixel>> &partner,
+    const std::optional<ImageView<const float>> &errors)
 {
   const float scale = kWhite / largest;
   const float partner_scale =
@@ -273,6 +291,9 @@ Fuser<Pixel>::State::take (ImageView<const Pixel> coded,
     if (partner)
       set_light (frame.partner.light, *stream.partner_camera (),
           partner->block (x, y, width, height), partner_scale, partner_black);
+    if (errors)
+      frame.errors = squared_errors (
+          stream.camera (), errors->block (x, y, width, height), scale);
     if (&piece == &pieces.front ())
       for (const auto &[at, from] : covers) {
         frame.light.row (at.y)[at.x] = frame.light.row (from.y)[from.x];
@@ -447,7 +468,8 @@ Fuser<Pixel>::size () const
 template <typename Pixel>
 Result<void>
 Fuser<Pixel>::take (ImageView<const Pixel> coded,
-    const std::optional<ImageView<const Pixel>> &partner)
+    const std::optional<ImageView<const Pixel>> &partner,
+    const std::optional<ImageView<const float>> &errors)
 {
   const Rect &whole = state_->pieces.front ().rect;
   RETURN_IF_ERROR (check_view (
@@ -457,7 +479,11 @@ Fuser<Pixel>::take (ImageView<const Pixel> coded,
   if (partner)
     RETURN_IF_ERROR (check_view (ViewBytes::of (*partner),
         "partner of the coded frame", whole.width, whole.height));
-  return state_->or_forget ([&] { return state_->take (coded, partner); });
+  if (errors)
+    RETURN_IF_ERROR (check_view (ViewBytes::of (*errors),
+        "errors of the coded frame", whole.width, whole.height));
+  return state_->or_forget (
+      [&] { return state_->take (coded, partner, errors); });
 }
 
 template <typename Pixel>

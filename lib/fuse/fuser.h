@@ -115,11 +115,14 @@ public:
    * @p partner  none, or the coded frame of the beam of mirrors that are off,
    *             which has seen every mirror where @p coded has it (the same
    *             size), and collected light in the slots in which it was off.
+   * @p errors   none, or those of @p coded beyond the noise, rms, DN, as of
+   *             Rectifier::run (); they count in the uncertainty.
    * Error when a view does not have the size of make (), or there is a partner
    * without FuseOptions::partner; the stream is unchanged then. After
    * ErrorCode::out_of_memory it is as after forget (). */
   Result<void> take (ImageView<const Pixel> coded,
-      const std::optional<ImageView<const Pixel>> &partner = {});
+      const std::optional<ImageView<const Pixel>> &partner = {},
+      const std::optional<ImageView<const float>> &errors = {});
   /** Queued coded frames. */
   int pending () const;
   /** Fuses the oldest pending frame with those before and after it.

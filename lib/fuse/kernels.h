@@ -172,25 +172,36 @@ struct MoveRow {
 constexpr int kConvolveLanes = 16;
 
 /**
- * One row of a 3x3 convolution. A pixel of a source row has @p inputs values,
- * one of the result @p outputs. Output k at x is
+ * One row of a 3x3 convolution of 16-bit integers. A pixel of a source row has
+ * @p inputs values, an even number, and one of the result @p outputs. The sum
+ * of output k at x is
  *
  *   bias[k] + sum over taps t = 3 row + column, then inputs i, of
- *             weights[(t inputs + i) outputs + k]
+ *             weights[((t inputs + i) / 2 outputs + k) 2 + i mod 2]
  *             * source[row][(x + column) inputs + i],
  *
- * summed in this order; the sum with each product is rounded once (fma).
+ * where i / 2 is a whole number: weights of two inputs are neighbours, because
+ * processors multiply pairs. Whatever the sources, no sum may need more than 32
+ * bits, so that its order does not matter: |bias[k]| + 32768 * sum of |weights|
+ * of output k must be less than 2^31. No weight is -32768.
+ *
+ * The result is value = scale[k] * sum, in 32-bit floating point. A hidden
+ * layer rounds it, without what is negative, and adds its input:
+ *
+ *   min (floor (clamp (value + 0.5, 0, 32767)) + add, 32767).
  */
 struct ConvolveRow {
-  const float *const *source; ///< three rows, from the pixel before the first
+  /** Three rows, from the pixel before the first. */
+  const std::int16_t *const *source;
   int inputs;
-  const float *weights;
-  const float *bias;
+  const std::int16_t *weights;
+  const std::int32_t *bias;
+  const float *scale;
   int outputs; ///< kConvolveLanes or twice as many
   int pixels;
-  bool hidden;      ///< negative results become 0
-  const float *add; ///< then added, of the result's layout; or null
-  float *to;
+  const std::int16_t *add; ///< of the result's layout; or null
+  std::int16_t *hidden;    ///< result of a hidden layer; null: it is the last
+  float *to;               ///< result of the last layer
 };
 
 /** The kernels of one instruction set; all give the same values. */

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <iterator>
+#include <utility>
 
 #include "fuse/fuser.h"
 
@@ -14,6 +15,8 @@ namespace
 
 constexpr SceneClass kSlow{.correlation = 0.97, .spread = 0.2};
 constexpr SceneClass kMedium{.correlation = 0.97, .spread = 0.5};
+/* Correlation from slot to slot, over frames, of patches that move. */
+constexpr double kFollowerCorrelation = 0.98;
 
 void
 add_grid (std::vector<SceneClass> &classes, double reach, double step,
@@ -48,12 +51,18 @@ is_lasting (const SceneClass &patch)
   return !patch.moves () && patch.correlation >= 0.99;
 }
 
-bool
-is_passing (const SceneClass &patch)
+std::vector<std::size_t>
+find_followed (const std::vector<SceneClass> &classes)
 {
-  constexpr double kFastest = 2.0;
-  return patch.directed () && patch.correlation >= 0.99 &&
-         std::max (std::abs (patch.vx), std::abs (patch.vy)) <= kFastest;
+  std::vector<std::size_t> followed;
+  for (std::size_t i = 0; i < classes.size (); i++)
+    if (classes[i].directed () && classes[i].correlation >= 0.99)
+      followed.push_back (i);
+  std::ranges::stable_sort (followed, {}, [&] (std::size_t i) {
+    return std::pair (
+        std::floor (classes[i].vx / 2.0), std::floor (classes[i].vy / 2.0));
+  });
+  return followed;
 }
 
 } // namespace
@@ -74,13 +83,19 @@ motion_models ()
   MotionModels models{patches (), {}, {}};
   std::ranges::copy_if (
       models.of_frame, std::back_inserter (models.over_frames), is_lasting);
-  std::ranges::copy_if (
-      models.of_frame, std::back_inserter (models.over_one), is_passing);
+  models.followed = find_followed (models.of_frame);
   for (const SceneClass &slow : {kSlow, kFastMotion})
     models.of_frame.push_back (slow);
   for (const SceneClass &slow : {kSlow, kMedium})
     models.over_frames.push_back (slow);
   return models;
+}
+
+SceneClass
+follower (SceneClass patch)
+{
+  patch.correlation = kFollowerCorrelation;
+  return patch;
 }
 
 } // namespace codedexposure::fuse

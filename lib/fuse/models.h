@@ -42,13 +42,15 @@ Models fast_models (int slots);
 /** Models of motion, for `balanced` and `best`. */
 struct MotionModels {
   std::vector<SceneClass> of_frame;
-  /** Again with all neighbouring frames: patches that stay in their place. */
+  /** Again with all neighbouring frames: patches that stay near their place. */
   std::vector<SceneClass> over_frames;
-  /** With one of them, the one before if there is one: patches that move so
-   * slowly, up to 2 px per slot along each axis, that the last slots of the
-   * coded frame before and the first ones of the next show them nearby. */
-  std::vector<SceneClass> over_one;
+  /** Numbers of the classes of the frame that move in a known direction: the
+   * pixels of neighbouring frames that show them are sought along their way.
+   * Those of similar velocities, which share such pixels, are together. */
+  std::vector<std::size_t> followed;
 };
 MotionModels motion_models ();
+/** Such a class as it is over frames, where errors of its velocity add up. */
+SceneClass follower (SceneClass patch);
 
 } // namespace codedexposure::fuse

@@ -27,6 +27,11 @@ constexpr std::size_t kChunk = 8;
 constexpr float kErrorFloor = 1.0f;
 /* Classes with less weight relative to the best one are left out. */
 constexpr float kMinWeight = 0.01f;
+/* The pixels of each neighbouring coded frame that a follower uses. */
+constexpr std::size_t kFollowedTaps = 12;
+/* With these pixels more, some wrong motion fits by chance: the error of a
+ * follower counts as this part at least of the error without them. */
+constexpr float kLeastPart = 0.8f;
 
 /* Of both axes together 1/4, as sums of blocks become means of pixels. */
 std::array<float, 2 * kReach + 1>
@@ -110,39 +115,85 @@ MotionFilter::MotionFilter (const FilterPlan &plan)
   of_frame (plan.usual (false));
 }
 
+/* Predictions of the pixels of one phase by several classes, which need not
+ * have the same taps. */
+class MotionFilter::Chunk
+{
+public:
+  void add (std::span<const Tap> taps, std::span<const float> weights)
+  {
+    for (std::size_t t = 0; t < taps.size (); t++) {
+      const Tap &tap = taps[t];
+      weights_[{tap.frame, tap.y, tap.x}][classes_] = weights[t];
+    }
+    classes_++;
+  }
+  void set (FilterBank &bank, int row, int x, int group) const
+  {
+    std::vector<Tap> taps;
+    std::vector<float> weights (weights_.size () * classes_);
+    for (const auto &[place, of_classes] : weights_) {
+      const auto [frame, tap_y, tap_x] = place;
+      for (std::size_t c = 0; c < classes_; c++)
+        weights[c * weights_.size () + taps.size ()] = of_classes[c];
+      taps.push_back ({tap_x, tap_y, frame});
+    }
+    bank.set (row, x, group, taps, weights);
+  }
+
+private:
+  std::size_t classes_ = 0;
+  /** By frame, y and x of the taps: in this order, neighbours are pairs. */
+  std::map<std::array<int, 3>, std::array<float, kChunk>> weights_;
+};
+
 /* Under a class whose motion brings several samples to the same places of the
  * patch, pixels are predicted well and the gaps between these places are not.
  * Errors therefore count by how much larger the class expects those of the
  * slots to be. Half of this ratio's logarithm, as gaps are easier to fill than
  * the class says where light changes along one direction only. */
 MotionFilter::Set
-MotionFilter::make_set (
-    std::span<const SceneClass> classes, std::span<const Tap> taps) const
+MotionFilter::make_set (std::span<const SceneClass> classes,
+    std::span<const Tap> taps, std::size_t per_neighbour) const
 {
   const std::size_t chunks = (classes.size () + kChunk - 1) / kChunk;
   Set set{{}, FilterBank (plan_, int (chunks)),
-      FilterBank (plan_, int (classes.size ()))};
-  std::map<std::pair<int, int>, std::vector<float>> residuals; // of a chunk
+      FilterBank (plan_, int (classes.size ())), {}};
+  std::map<std::pair<int, int>, Chunk> residuals; // of each phase
   for (std::size_t c = 0; c < classes.size (); c++) {
     double predicted = 0.0, sought = 0.0;
-    for_each_phase (plan_, classes[c], taps,
-        [&] (int row, int x, const PhaseWeights &weights) {
-          set.filters.set (row, x, int (c), taps, weights.slots);
-          std::ranges::copy (
-              weights.residual, std::back_inserter (residuals[{row, x}]));
+    for_each_phase (
+        plan_, classes[c], taps,
+        [&] (int row, int x, std::span<const Tap> used,
+            const PhaseWeights &weights) {
+          set.filters.set (row, x, int (c), used, weights.slots);
+          residuals[{row, x}].add (used, weights.residual);
           predicted += weights.predicted_variance;
           sought += std::accumulate (weights.slot_variances.begin (),
                         weights.slot_variances.end (), 0.0) /
                     plan_.observation.slots ();
-        });
+        },
+        per_neighbour);
     set.factors.push_back (float (std::sqrt (sought / predicted)));
     if (c + 1 < classes.size () && (c + 1) % kChunk != 0)
       continue;
-    for (const auto &[place, weights] : residuals)
-      set.residuals.set (
-          place.first, place.second, int (c / kChunk), taps, weights);
+    for (const auto &[place, chunk] : residuals)
+      chunk.set (set.residuals, place.first, place.second, int (c / kChunk));
     residuals.clear ();
   }
+  return set;
+}
+
+MotionFilter::Set
+MotionFilter::make_followers (Neighbours neighbours) const
+{
+  std::vector<SceneClass> classes;
+  for (const std::size_t number : models_.followed)
+    classes.push_back (follower (models_.of_frame[number]));
+  const double radius = plan_.radius + 0.5;
+  Set set = make_set (
+      classes, taps_around (radius, radius, neighbours), kFollowedTaps);
+  set.followed = models_.followed;
   return set;
 }
 
@@ -156,24 +207,19 @@ MotionFilter::of_frame (Neighbours neighbours)
   });
 }
 
-/* What moves uses one neighbouring frame: with both, filters of wrong motions
- * fit by chance more often, as they have more taps. */
 std::vector<const MotionFilter::Set *>
 MotionFilter::sets_for (Neighbours neighbours)
 {
   if (!neighbours.any ())
     return {&of_frame (neighbours)};
-  const auto made = [&] (ForNeighbours<Set> &sets,
-                        std::span<const SceneClass> classes, Neighbours of) {
-    return &sets.get (of, [&] {
-      return make_set (
-          classes, taps_around (plan_.radius + 0.5, kNeighbourRadius, of));
-    });
-  };
   return {&of_frame (neighbours),
-      made (over_frames_, models_.over_frames, neighbours),
-      made (over_one_, models_.over_one,
-          {neighbours.before, !neighbours.before, neighbours.partner})};
+      &over_frames_.get (neighbours,
+          [&] {
+            return make_set (models_.over_frames,
+                taps_around (plan_.radius + 0.5, kNeighbourRadius, neighbours));
+          }),
+      &followers_.get (
+          neighbours, [&] { return make_followers (neighbours); })};
 }
 
 /* The squared residuals of a chunk of classes in row @y of pixels. */
@@ -230,7 +276,8 @@ MotionFilter::measure_blocks (const Kernels &kernels, const CodedFrames &frames,
   }
 }
 
-/* The squared error of the classes of @set around each block of the room. */
+/* The squared error of the classes of @set around each block of the room, whose
+ * classes of the frame come first. */
 void
 MotionFilter::measure (const Kernels &kernels, const CodedFrames &frames,
     const Set &set, std::size_t first, Room &room) const
@@ -245,6 +292,13 @@ MotionFilter::measure (const Kernels &kernels, const CodedFrames &frames,
       blur (kernels, room.along.row (y + kReach), room.along.stride (),
           room.blocks, room.fit (first + c, y));
   }
+  for (std::size_t c = 0; c < set.followed.size (); c++)
+    for (int y = 0; y < room.rows; y++) {
+      const float *alone = room.fit (set.followed[c], y);
+      float *fit = room.fit (first + c, y);
+      for (int x = 0; x < room.blocks; x++)
+        fit[x] = std::max (fit[x], kLeastPart * alone[x]);
+    }
 }
 
 /* Weights (best error / error) ^ 8. Were the errors independent, the number of

@@ -2,6 +2,7 @@
 /* Motion-adaptive kriging. */
 #pragma once
 
+#include <cstddef>
 #include <span>
 #include <vector>
 
@@ -20,7 +21,9 @@ namespace codedexposure::fuse
  * of all classes, with weights by how well they fit.
  *
  * Some classes exist a second time, with pixels of the coded frames before and
- * after the one that is fused, and compete with the others.
+ * after the one that is fused, and compete with the others: those of what stays
+ * near its place, with pixels there, and the followers, with pixels along their
+ * motion.
  */
 class MotionFilter
 {
@@ -43,9 +46,14 @@ private:
     std::vector<float> factors; ///< of the squared error of each class
     FilterBank residuals;       ///< a group has kChunk classes
     FilterBank filters;         ///< a group is a class, its outputs are slots
+    /** Of followers: the number of each among the classes of the frame. */
+    std::vector<std::size_t> followed;
   };
-  Set make_set (
-      std::span<const SceneClass> classes, std::span<const Tap> taps) const;
+  class Chunk;
+  /** @p per_neighbour  see for_each_phase (). */
+  Set make_set (std::span<const SceneClass> classes, std::span<const Tap> taps,
+      std::size_t per_neighbour = kAllTaps) const;
+  Set make_followers (Neighbours neighbours) const;
   const Set &of_frame (Neighbours neighbours);
   std::vector<const Set *> sets_for (Neighbours neighbours);
 
@@ -64,7 +72,7 @@ private:
 
   const FilterPlan &plan_;
   MotionModels models_;
-  ForNeighbours<Set> of_frame_, over_frames_, over_one_;
+  ForNeighbours<Set> of_frame_, over_frames_, followers_;
 };
 
 } // namespace codedexposure::fuse

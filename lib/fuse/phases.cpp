@@ -112,8 +112,9 @@ class Equations
 {
 public:
   Equations (const FilterPlan &plan, const SceneClass &patch,
-      std::span<const Tap> taps)
-      : plan_ (plan), taps_ (taps),
+      std::span<const Tap> taps, std::size_t per_neighbour = kAllTaps)
+      : plan_ (plan), all_ (taps), taps_ (taps.begin (), taps.end ()),
+        per_neighbour_ (per_neighbour),
         middle_ (std::size_t (
             std::ranges::find (taps, Tap{0, 0, 0}) - taps.begin ())),
         frames_ (std::ranges::minmax (frames_of (taps))),
@@ -132,6 +133,7 @@ public:
         use (row, x);
       }
   }
+  std::span<const Tap> taps () const { return taps_; } ///< of the pixels set
   PhaseWeights weights ();
   std::vector<float> sparse_slots (double excess) const;
   std::vector<float> sparse_residual (double excess) const;
@@ -171,23 +173,53 @@ private:
     return system_
         .covariance[std::min (a, b) * taps_.size () + std::max (a, b)];
   }
+  void choose_taps (int row, int x);
   void set_system (int row, int x);
   double slot_variance (
       std::size_t slot, std::span<const double> weights) const;
   void keep_known (std::vector<float> &weights) const;
 
   const FilterPlan &plan_;
-  std::span<const Tap> taps_;
-  std::size_t middle_;
+  std::span<const Tap> all_;
+  std::vector<Tap> taps_;     ///< those of all that are used
+  std::size_t per_neighbour_; ///< see for_each_phase ()
+  std::size_t middle_; ///< all taps of its frame are used, and come first
   std::ranges::minmax_result<int> frames_;
   CodedCovariance covariance_;
   int element_ = 0;
   KrigingSystem system_; ///< ordinary kriging of the slots of the middle frame
 };
 
+/* Which ones tell most depends on the elements around the pixel. */
+void
+Equations::choose_taps (int row, int x)
+{
+  const std::vector<int> elements = plan_.phases.elements (row, x, all_);
+  std::vector<bool> used (all_.size (), true);
+  for (const int frame : {-1, 1}) {
+    const int slot = (frame < 0 ? 0 : slots () - 1) - frames_.min * slots ();
+    std::vector<std::pair<double, std::size_t>> told;
+    for (std::size_t i = 0; i < all_.size (); i++)
+      if (all_[i].frame == frame)
+        told.emplace_back (
+            -covariance_.target ({all_[i].x, all_[i].y},
+                (frame - frames_.min) * slots () + elements[i], slot),
+            i);
+    std::ranges::sort (told);
+    for (std::size_t i = per_neighbour_; i < told.size (); i++)
+      used[told[i].second] = false;
+  }
+  taps_.clear ();
+  for (std::size_t i = 0; i < all_.size (); i++)
+    if (used[i])
+      taps_.push_back (all_[i]);
+}
+
 void
 Equations::set_system (int row, int x)
 {
+  if (per_neighbour_ != kAllTaps)
+    choose_taps (row, x);
   const std::vector<int> elements = plan_.phases.elements (row, x, taps_);
   std::vector<Offset> places;
   std::vector<int> exposed;
@@ -306,10 +338,12 @@ Equations::sparse_residual (double excess) const
 
 void
 for_each_phase (const FilterPlan &plan, const SceneClass &patch,
-    std::span<const Tap> taps, const UseWeights &use)
+    std::span<const Tap> taps, const UseWeights &use, std::size_t per_neighbour)
 {
-  Equations equations (plan, patch, taps);
-  equations.each ([&] (int row, int x) { use (row, x, equations.weights ()); });
+  Equations equations (plan, patch, taps, per_neighbour);
+  equations.each ([&] (int row, int x) {
+    use (row, x, equations.taps (), equations.weights ());
+  });
 }
 
 void
@@ -319,8 +353,9 @@ for_each_sparse_phase (const FilterPlan &plan, const SceneClass &patch,
 {
   const bool slots = sought == Sought::kSlots;
   if (plan.observation.slots () > kMaxSparseSlots)
-    return for_each_phase (
-        plan, patch, taps, [&] (int row, int x, const PhaseWeights &weights) {
+    return for_each_phase (plan, patch, taps,
+        [&] (
+            int row, int x, std::span<const Tap>, const PhaseWeights &weights) {
           use (row, x, slots ? weights.slots : weights.residual);
         });
   Equations equations (plan, patch, taps);

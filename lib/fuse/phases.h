@@ -4,6 +4,7 @@
 
 #include <array>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <span>
 #include <stop_token>
@@ -67,8 +68,8 @@ std::vector<Tap> taps_within (double radius, int frame = 0);
 /** The pixels within @p own px, those of @p neighbours within @p reach px, and
  * of a partner those within kPartnerRadius. */
 std::vector<Tap> taps_around (double own, double reach, Neighbours neighbours);
-/** Of the taps in the coded frames before and after, px. Larger ones are not
- * more accurate. */
+/** Of the taps in the coded frames before and after, for what stays near its
+ * place, px. Larger ones are not more accurate. */
 constexpr double kNeighbourRadius = 2.3;
 /** Of the taps in the partner, px: a shallow code has the light of most slots
  * in every pixel. Larger ones are not more accurate. */
@@ -153,13 +154,19 @@ struct PhaseWeights {
   std::vector<double> slot_variances;
 };
 
+/** No limit. */
+constexpr std::size_t kAllTaps = std::numeric_limits<std::size_t>::max ();
+
 /** Calls @p use with the weights of every phase, the pixels at @p x of distinct
  * row @p row, under class @p patch.
- * @p taps  coded pixels, {0, 0, 0} among them. */
-using UseWeights =
-    std::function<void (int row, int x, const PhaseWeights &weights)>;
+ * @p taps           coded pixels, {0, 0, 0} among them.
+ * @p per_neighbour  so many at most of those in each neighbouring coded frame:
+ *                   those that tell most of the slot that is next to it. */
+using UseWeights = std::function<void (
+    int row, int x, std::span<const Tap> taps, const PhaseWeights &weights)>;
 void for_each_phase (const FilterPlan &plan, const SceneClass &patch,
-    std::span<const Tap> taps, const UseWeights &use);
+    std::span<const Tap> taps, const UseWeights &use,
+    std::size_t per_neighbour = kAllTaps);
 
 /** What each pixel of a phase is to be estimated from the pixels around it. */
 enum class Sought {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 
@@ -11,9 +12,6 @@
 
 namespace codedexposure::fuse
 {
-
-/** refine_weights.bin, which embed.py makes part of the library. */
-std::span<const std::byte> refine_weights ();
 
 namespace
 {
@@ -34,30 +32,38 @@ class Reader
 {
 public:
   explicit Reader (const std::byte *from) : from_ (from) {}
-  float next ()
+  std::vector<float> next (int count)
   {
-    const float value = std::bit_cast<float> (word_at (from_));
-    from_ += 4;
-    return value;
+    std::vector<float> values;
+    for (; count > 0; count--, from_ += 4)
+      values.push_back (std::bit_cast<float> (word_at (from_)));
+    return values;
   }
 
 private:
   const std::byte *from_;
 };
 
-RefineNetwork::Layer
-read_layer (Reader &reader, int inputs, int outputs)
+/** The largest scale of an output's weights with which no weight needs more
+ * than 16 bits and no sum more than 32, whatever the inputs. */
+double
+weight_scale (const RefineNetwork::Convolution &from, double input_scale, int k)
 {
-  const int padded = RefineNetwork::padded (outputs);
-  RefineNetwork::Layer layer{inputs, padded,
-      std::vector<float> (std::size_t (9 * inputs * padded)),
-      std::vector<float> (std::size_t (padded))};
-  for (int row = 0; row < 9 * inputs; row++)
-    for (int k = 0; k < outputs; k++)
-      layer.weights[std::size_t (row * padded + k)] = reader.next ();
-  for (int k = 0; k < outputs; k++)
-    layer.bias[std::size_t (k)] = reader.next ();
-  return layer;
+  double largest = 0.0, sum = 0.0;
+  for (std::size_t at = std::size_t (k); at < from.weights.size ();
+       at += std::size_t (from.outputs)) {
+    const double weight = std::abs (double (from.weights[at]));
+    largest = std::max (largest, weight);
+    sum += weight;
+  }
+  const double most =
+      32768.0 * sum +
+      input_scale * std::abs (double (from.bias[std::size_t (k)]));
+  if (largest == 0.0 && most == 0.0)
+    return 1.0;
+  /* Rounding adds up to half a step to each weight and to the bias. */
+  const double rounding = 32768.0 * 0.5 * 9.0 * from.inputs + 1.0;
+  return std::min (32767.0 / largest, (2147483647.0 - rounding) / most);
 }
 
 /** Three rows of what goes into a layer, with a pixel of 0 at both ends. */
@@ -71,9 +77,9 @@ public:
   }
 
   /** Pixel 0 of row @p y, which replaces row y - 3. */
-  float *row (int y) { return start (y % 3) + values_; }
+  std::int16_t *row (int y) { return start (y % 3) + values_; }
   /** Rows y - 1 to y + 1 from pixel -1, those beyond the border 0. */
-  std::array<const float *, 3> around (int y, int height)
+  std::array<const std::int16_t *, 3> around (int y, int height)
   {
     return {start (y > 0 ? (y - 1) % 3 : kZero), start (y % 3),
         start (y + 1 < height ? (y + 1) % 3 : kZero)};
@@ -81,13 +87,13 @@ public:
 
 private:
   static constexpr int kZero = 3;
-  float *start (int row)
+  std::int16_t *start (int row)
   {
     return rows_.data () + std::ptrdiff_t (row) * (width_ + 2) * values_;
   }
 
   int width_, values_;
-  std::vector<float> rows_;
+  std::vector<std::int16_t> rows_;
 };
 
 } // namespace
@@ -104,8 +110,8 @@ RefineNetwork::trained ()
   return network;
 }
 
-Result<RefineNetwork>
-RefineNetwork::parse (std::span<const std::byte> file)
+Result<std::vector<RefineNetwork::Convolution>>
+RefineNetwork::read (std::span<const std::byte> file)
 {
   std::array<int, kLayers + 1> widths;
   widths.fill (kChannels);
@@ -123,10 +129,52 @@ RefineNetwork::parse (std::span<const std::byte> file)
                  " bytes are not those of this network, " +
                  std::to_string (4 * words) +
                  " bytes; write them with tests/quality/train"};
-  RefineNetwork network;
   Reader reader (file.data () + 4 * head.size ());
-  for (std::size_t l = 0; l < kLayers; l++)
-    network.layers_.push_back (read_layer (reader, widths[l], widths[l + 1]));
+  std::vector<Convolution> convolutions;
+  for (std::size_t l = 0; l < kLayers; l++) {
+    auto &to = convolutions.emplace_back (widths[l], widths[l + 1]);
+    to.weights = reader.next (9 * to.inputs * to.outputs);
+    to.bias = reader.next (to.outputs);
+  }
+  return convolutions;
+}
+
+RefineNetwork::Layer
+RefineNetwork::quantised (
+    const Convolution &from, double input_scale, double output_scale)
+{
+  static_assert (kInputs % 2 == 0 && kChannels % 2 == 0);
+  const int outputs = padded (from.outputs);
+  Layer layer{from.inputs, outputs,
+      std::vector<std::int16_t> (std::size_t (9 * from.inputs * outputs)),
+      std::vector<std::int32_t> (std::size_t (outputs)),
+      std::vector<float> (std::size_t (outputs))};
+  for (int k = 0; k < from.outputs; k++) {
+    const double scale = weight_scale (from, input_scale, k);
+    for (int i = 0; i < 9 * from.inputs; i++) {
+      const float weight = from.weights[std::size_t (i * from.outputs + k)];
+      layer.weights[std::size_t ((i / 2 * outputs + k) * 2 + i % 2)] =
+          std::int16_t (std::lrint (scale * double (weight)));
+    }
+    const auto at = std::size_t (k);
+    layer.bias[at] = std::int32_t (
+        std::lrint (scale * input_scale * double (from.bias[at])));
+    layer.scale[at] = float (output_scale / (scale * input_scale));
+  }
+  return layer;
+}
+
+Result<RefineNetwork>
+RefineNetwork::parse (std::span<const std::byte> file)
+{
+  const auto convolutions = read (file);
+  if (!convolutions)
+    return convolutions.error ();
+  RefineNetwork network;
+  for (int l = 0; l < kLayers; l++)
+    network.layers_.push_back (quantised ((*convolutions)[std::size_t (l)],
+        l == 0 ? kInputScale : kHiddenScale,
+        l == kLayers - 1 ? 1.0 : kHiddenScale));
   char hash[17];
   std::snprintf (hash, sizeof hash, "%016llx",
       (unsigned long long)XXH3_64bits (file.data (), file.size ()));
@@ -155,12 +203,12 @@ RefineNetwork::run (const Kernels &kernels, int width, int height,
       const Layer &layer = layers_[std::size_t (l)];
       Rows &rows = into[std::size_t (l)];
       const bool last = l == kLayers - 1;
-      float *to = last ? result.data () : into[std::size_t (l + 1)].row (y);
       kernels.convolve ({rows.around (y, height).data (), layer.inputs,
-          layer.weights.data (), layer.bias.data (), layer.outputs, width,
-          !last, adds_input (l) ? rows.row (y) : nullptr, to});
+          layer.weights.data (), layer.bias.data (), layer.scale.data (),
+          layer.outputs, width, adds_input (l) ? rows.row (y) : nullptr,
+          last ? nullptr : into[std::size_t (l + 1)].row (y), result.data ()});
       if (last)
-        sink (y, to);
+        sink (y, result.data ());
     }
   }
 }

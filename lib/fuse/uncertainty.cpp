@@ -26,7 +26,7 @@ geometry_of (FilterPlan plan)
   plan.noise.assign (plan.noise.size (), kNoise);
   std::vector<float> geometry;
   for_each_phase (plan, kFastMotion, taps_within (kRadius),
-      [&] (int, int, const PhaseWeights &weights) {
+      [&] (int, int, std::span<const Tap>, const PhaseWeights &weights) {
         for (const double variance : weights.slot_variances)
           geometry.push_back (float (std::log2 (std::max (variance, kNoise))));
       });
@@ -102,12 +102,9 @@ Uncertainty::set_pixels (const Frame &frame, int slot, int y,
   }
 }
 
-/* A measured pixel without noise is the light. */
 float
 Uncertainty::deviation (const Pixel &pixel) const
 {
-  if (pixel.measured && noise_free_)
-    return 0.0f;
   const UncertaintyFactors &by =
       (pixel.measured ? kMeasured : kEstimated)[int (quality_)];
   const float estimated = std::exp2 (
@@ -140,15 +137,26 @@ Uncertainty::run_slot (const Kernels &kernels, const Frame &frame, int slot,
     set_pixels (frame, slot, out, changes.result (kernels.sum, out),
         roughs.result (kernels.sum, out), pixels);
     const float *weight = frame.still.weight.row (out);
+    const float *refined = frame.refined
+                               ? (*frame.refined)[std::size_t (slot)].row (out)
+                               : nullptr;
+    const float *errors =
+        frame.errors.empty () ? nullptr : frame.errors.row (out);
     for (int x = 0; x < width; x++) {
       const Pixel &seen = pixels[std::size_t (x)];
       const float still = weight[x], moving = 1.0f - still;
-      const float estimated = moving > 0.0f ? deviation (seen) : 0.0f;
+      /* A measured pixel without noise is the light. */
+      const bool exact = seen.measured && noise_free_;
+      const float estimated =
+          exact || moving <= 0.0f ? 0.0f
+          : !refined              ? deviation (seen)
+                                  : std::exp2 (refined[x]) *
+                           (seen.measured ? kRefinedMeasured : 1.0f);
       const float mean =
           noise_free_ ? 0.0f : seen.noise / frame.still.frames (x, out);
-      deviations.row (0)[x] =
-          std::sqrt (still * still * mean +
-                     moving * moving * estimated * estimated + rounding_);
+      deviations.row (0)[x] = std::sqrt (
+          still * still * mean + moving * moving * estimated * estimated +
+          rounding_ + (errors ? errors[x] : 0.0f));
     }
     sink ({slot, out, deviations.row (0), pixels.data (), weight});
   }

@@ -26,7 +26,8 @@ namespace codedexposure::fuse
  * neighbours in 3x3 pixels; 1/4 is added to each. V: the kriging variance for
  * its position in the tile and its slot; N: the noise of a coded pixel. Units
  * are grey levels squared, 255 for white; V is relative to the scene's
- * variance.
+ * variance. Errors of the coded pixel that are known beside its noise, as those
+ * of what was rectified, are added to d^2.
  */
 struct UncertaintyFactors {
   float offset, misfit, change, roughness, geometry, noise;
@@ -48,6 +49,10 @@ public:
     const StaticPixels::Found &still;
     const Field &misfit;             ///< A, of blocks of 2x2 pixels
     const std::vector<Field> &light; ///< of each slot
+    /** Logarithms to base 2 of the deviations of pixels that are not static, by
+     * slot, which the network that refined them said; or null. */
+    const std::vector<Field> *refined;
+    const Field &errors; ///< see CodedFrame
   };
   /** What the deviation of a pixel is computed from: the logarithms to base 2
    * of A, D, L and V, and N. Measured pixels saw the slot, and no other one. */

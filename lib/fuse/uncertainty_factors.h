@@ -9,19 +9,20 @@
 namespace codedexposure::fuse
 {
 
-/** By quality: fast, balanced, best, learned. */
+/** By quality: fast, balanced, best. */
 constexpr UncertaintyFactors kEstimated[] = {
-    {-0.0729f, 0.1988f, 0.1818f, 0.2607f, 0.1271f, 0.4891f},
-    {-0.3493f, 0.2722f, 0.1335f, 0.2465f, 0.1208f, 0.2588f},
-    {-0.3524f, 0.2448f, 0.1375f, 0.2298f, 0.0925f, 0.1405f},
-    {-0.3517f, 0.2392f, 0.1235f, 0.2169f, 0.0848f, 0.1454f},
+    {-0.0639f, 0.1583f, 0.2053f, 0.2868f, 0.1280f, 0.4319f},
+    {-0.3569f, 0.2332f, 0.1574f, 0.2715f, 0.1261f, 0.2568f},
+    {-0.3862f, 0.2073f, 0.1681f, 0.2574f, 0.1068f, 0.1819f},
 };
 /** With noise. */
 constexpr UncertaintyFactors kMeasured[] = {
-    {-0.5396f, 0.0043f, 0.1402f, 0.3183f, 0.0000f, 0.5485f},
-    {-0.8083f, 0.1268f, 0.0769f, 0.2872f, 0.0000f, 0.3801f},
-    {-0.5288f, -0.0401f, 0.0336f, 0.3331f, 0.0000f, 0.6010f},
-    {-0.3413f, -0.0109f, 0.0644f, 0.2892f, 0.0000f, 0.4733f},
+    {-0.9245f, 0.0107f, 0.1536f, 0.3659f, 0.0000f, 0.5016f},
+    {-1.1931f, 0.1323f, 0.0930f, 0.3245f, 0.0000f, 0.3512f},
+    {-1.0816f, 0.0097f, 0.0799f, 0.3606f, 0.0000f, 0.4924f},
 };
+/** Times what the network of the refinement says of measured pixels with noise:
+ * it learned from places that were fused worse than most. */
+constexpr float kRefinedMeasured = 0.8374f;
 
 } // namespace codedexposure::fuse

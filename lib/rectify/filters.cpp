@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <numeric>
 
 namespace codedexposure
 {
@@ -19,6 +20,8 @@ constexpr int kMinParts = 4;
 constexpr int kSteps = 8;
 constexpr int kFewSteps = 4;
 constexpr int kManySurroundings = 16;
+/* Surroundings up to which there are filters for the border: 0.7 MB each. */
+constexpr int kMostAtBorder = 64;
 
 /* Multiplications that are allowed for windows that repeat, and for those next
  * to other parts of the schedule: some seconds. */
@@ -66,6 +69,15 @@ shares_of (const ElementMap &elements)
       if (const double light = elements.light (e, slot); light > 0.0)
         shares[std::size_t (e)].push_back ({slot, light});
   return shares;
+}
+
+/* Beyond the mirrors, tiles continue. */
+int
+element_near (const ElementMap &elements, Extent mirrors, int x, int y)
+{
+  const int part = elements.part_at (std::clamp (x, 0, mirrors.width - 1),
+      std::clamp (y, 0, mirrors.height - 1));
+  return elements.at (part, x, y);
 }
 
 } // namespace
@@ -138,10 +150,7 @@ Surroundings::find_border (int part, int y, std::span<int> numbers)
   const Rect inner{rect.x + reach_, rect.y + reach_, rect.width - 2 * reach_,
       rect.height - 2 * reach_};
   const auto element_at = [this] (int i, int j) {
-    const int part_there =
-        elements_.part_at (std::clamp (i, 0, mirrors_.width - 1),
-            std::clamp (j, 0, mirrors_.height - 1));
-    return elements_.at (part_there, i, j);
+    return element_near (elements_, mirrors_, i, j);
   };
   const int first = std::max (0, rect.x - reach_);
   const int end = std::min (int (numbers.size ()), rect.right () + reach_);
@@ -167,10 +176,10 @@ Surroundings::others () const
 
 FilterBank::FilterBank (const PixelView &view, const ElementMap &elements,
     Extent mirrors, const SceneClass &scene)
-    : elements_ (elements), solver_ (view),
+    : elements_ (elements), mirrors_ (mirrors), solver_ (view),
       surroundings_ (elements, mirrors, solver_.reach ()),
       covariance_ (scene, shares_of (elements), elements.schedule ().slots (),
-          2 * solver_.reach ()),
+          2 * solver_.reach (view.taps / 2)),
       parts_ (kMaxParts),
       steps_ (surroundings_.count () > kManySurroundings ? kFewSteps : kSteps)
 {
@@ -275,7 +284,7 @@ FilterBank::filter (int around, double fx, double fy)
   const int px = part_of (fx), py = part_of (fy);
   std::int32_t &known = known_filter (around, px, py);
   if (known == kUnknown) {
-    known = std::int32_t (scales_.size ());
+    known = std::int32_t (tables_.scales.size ());
     const double x = middle_of (px), y = middle_of (py);
     append (around, around < surroundings_.repeating ()
                         ? interpolated (around, x, y)
@@ -284,20 +293,69 @@ FilterBank::filter (int around, double fx, double fy)
   return known;
 }
 
+bool
+FilterBank::has_border () const
+{
+  return surroundings_.repeating () <= kMostAtBorder;
+}
+
+std::int32_t
+FilterBank::border_filter (int around, Offset at, double fx, double fy)
+{
+  constexpr double kParts = 4.0;
+  const int ix = int (std::lround (kParts * fx));
+  const int iy = int (std::lround (kParts * fy));
+  const auto [known, is_new] =
+      border_filters_.try_emplace ({around, ix, iy}, kUnknown);
+  if (!is_new)
+    return known->second;
+  known->second = std::int32_t (tables_.scales.size ());
+  const double x = ix / kParts, y = iy / kParts;
+  if (around < surroundings_.repeating ()) {
+    auto wide = border_neighbourhoods_.find (around);
+    if (wide == border_neighbourhoods_.end ())
+      wide = border_neighbourhoods_.emplace (around, wide_neighbourhood (at))
+                 .first;
+    append (around, solve (wide->second, x, y));
+  } else {
+    append (around, solve (wide_neighbourhood (at), x, y));
+  }
+  return known->second;
+}
+
+/* Of all mirrors that a window sees which is shifted into the frame. */
+Neighbourhood
+FilterBank::wide_neighbourhood (Offset at) const
+{
+  const int reach = solver_.reach (solver_.taps () / 2);
+  std::vector<int> window;
+  for (int y = at.y - reach; y <= at.y + reach; y++)
+    for (int x = at.x - reach; x <= at.x + reach; x++)
+      window.push_back (element_near (elements_, mirrors_, x, y));
+  return {elements_, covariance_, window};
+}
+
 /* @solved: from WeightSolver::solve (). */
 void
 FilterBank::append (int around, const std::vector<float> &solved)
 {
-  const int taps = solver_.taps (), length = row_length (taps);
+  const int taps = solver_.taps ();
   const float *from = solved.data ();
-  for (std::size_t row = 0; row < kNoises.size () * std::size_t (taps); row++) {
-    weights_.insert (weights_.end (), from, from + taps);
-    weights_.resize (weights_.size () + std::size_t (length - taps));
-    from += taps;
+  const float *scene = from + kNoises.size () * std::size_t (taps * taps);
+  for (std::size_t noise = 0; noise < kNoises.size (); noise++) {
+    const float gain =
+        std::inner_product (from, from + taps * taps, from, 0.0f);
+    tables_.errors.push_back (
+        {std::max (scene[noise], 0.0f), std::max (gain - 1.0f, 0.0f)});
+    for (int row = 0; row < taps; row++, from += taps) {
+      tables_.weights.insert (tables_.weights.end (), from, from + taps);
+      tables_.weights.resize (tables_.weights.size () +
+                              std::size_t (rectify::row_length (taps) - taps));
+    }
   }
   const auto &window = surroundings_.window (around);
   const double light = elements_.light (window[window.size () / 2]);
-  scales_.push_back ({1.0f / std::max (solved.back (), kMinRoughness),
+  tables_.scales.push_back ({1.0f / std::max (solved.back (), kMinRoughness),
       float (most_light_ / light)});
 }
 

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "rectify/kernels.h"
 #include "rectify/weights.h"
 
 namespace codedexposure
@@ -77,25 +78,29 @@ public:
   static double effort (const PixelView &view, const Schedule &schedule);
   Surroundings &surroundings () { return surroundings_; }
   /** Noise of a pixel, rms, in units of the scene's standard deviation. */
-  static constexpr std::array<double, 4> kNoises = {0.05, 0.11, 0.25, 0.55};
+  static constexpr std::array<double, rectify::kNoises> kNoises = {
+      0.05, 0.11, 0.25, 0.55};
   /** Number of the filters for mirrors with surroundings @p around that are
    * seen @p fx, @p fy pixels, -0.5 to 0.5, from the centre of their window. */
   std::int32_t filter (int around, double fx, double fy);
+  /** The same at the border of the frame, where the window is shifted into it:
+   * of the mirror @p at, which is up to half a window further from the centre.
+   * To a quarter of a pixel. */
+  std::int32_t border_filter (int around, Offset at, double fx, double fy);
+  /** Whether there is time and room for these. */
+  bool has_border () const;
 
-  /** How a filter's window shows the scene. */
-  struct WindowScale {
-    float smoothness; ///< 1 / roughness (WeightSolver)
-    float darkness;   ///< light of the brightest element / that of the mirror
+  /** See rectify::Filters. */
+  struct Tables {
+    std::vector<float> weights;
+    std::vector<rectify::WindowScale> scales;
+    std::vector<rectify::FilterError> errors;
   };
-  /** Of each filter. */
-  std::vector<WindowScale> scales () && { return std::move (scales_); }
-  /** Filter after filter, for each of kNoises, row by row; each row is filled
-   * up with zeros to row_length (). */
-  std::vector<float> weights () && { return std::move (weights_); }
-  static constexpr int row_length (int taps) { return (taps + 3) / 4 * 4; }
+  Tables tables () && { return std::move (tables_); }
 
 private:
   Neighbourhood neighbourhood (int around) const;
+  Neighbourhood wide_neighbourhood (Offset at) const;
   std::vector<float> solve (
       const Neighbourhood &mirrors, double fx, double fy) const;
   const std::vector<float> &node (int around, int i, int j);
@@ -104,17 +109,17 @@ private:
   void append (int around, const std::vector<float> &solved);
 
   const ElementMap &elements_;
+  Extent mirrors_;
   WeightSolver solver_;
   Surroundings surroundings_;
   CodedCovariance covariance_;
   int parts_, steps_; // per pixel: filters, and intervals of the solved grid
   double most_light_ = 0.0; // of an element
-  std::map<int, Neighbourhood> neighbourhoods_;
+  std::map<int, Neighbourhood> neighbourhoods_, border_neighbourhoods_;
   std::vector<std::vector<float>> nodes_;
   std::vector<std::int32_t> filters_; // of repeating surroundings
-  std::map<std::array<int, 3>, std::int32_t> other_filters_;
-  std::vector<float> weights_;
-  std::vector<WindowScale> scales_;
+  std::map<std::array<int, 3>, std::int32_t> other_filters_, border_filters_;
+  Tables tables_;
 };
 
 } // namespace codedexposure

@@ -2,23 +2,42 @@
 #include "rectify/rectifier.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <new>
 #include <numbers>
+#include <optional>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "base/range.h"
+#include "base/targets.h"
 #include "base/text.h"
 #include "base/try.h"
 #include "base/view_check.h"
 #include "rectify/filters.h"
-#include "rectify/window.h"
+
+#define CODEDEXPOSURE_KERNELS(target)                                          \
+  namespace codedexposure::rectify_##target                                    \
+  {                                                                            \
+    extern const rectify::Kernels kernels;                                     \
+  }
+CODEDEXPOSURE_TARGETS (CODEDEXPOSURE_KERNELS, baseline)
+
+std::span<const codedexposure::rectify::Kernels>
+codedexposure::rectify::supported_kernels ()
+{
+#define CODEDEXPOSURE_ADDRESS(target) &rectify_##target::kernels,
+  static const auto kernels = supported<Kernels> (
+      {CODEDEXPOSURE_TARGETS (CODEDEXPOSURE_ADDRESS, baseline)});
+  return kernels;
+}
 
 namespace codedexposure
 {
+
+using rectify::Place;
 
 namespace
 {
@@ -32,6 +51,9 @@ constexpr double kMinMagnification = 0.75;
 
 /* Distance in mirrors within which a pixel is aligned with its mirror. */
 constexpr double kTolerance = 0.05;
+/* A pixel that gets a larger part of its light than this from its own mirror is
+ * copied: weights would make its error larger. */
+constexpr double kOwn = 1.0 - 2.0 * kTolerance;
 /* Length over which a scene is correlated, mirrors; and its correlation with
  * itself one slot later. */
 constexpr double kCorrelationLength = 2.0, kPersistence = 0.8;
@@ -40,25 +62,6 @@ constexpr double kCorrelationLength = 2.0, kPersistence = 0.8;
  * centred on it gets. */
 constexpr double kMixed = 0.6;
 
-constexpr std::int32_t kLookup = -1;
-constexpr std::int32_t kUnseen = -2;
-
-/* The first pixel of a mirror's window, or the pixel to copy. */
-struct Place {
-  std::int16_t x = 0, y = 0;
-  std::int32_t filter = kUnseen;
-};
-
-/* Ratios of the scene's variance and the noise's: below each limit, the filters
- * for the next larger noise are used. */
-constexpr auto kLimits = [] {
-  std::array<float, FilterBank::kNoises.size () - 1> limits = {};
-  for (std::size_t i = 0; i < limits.size (); i++)
-    limits[i] =
-        float (1.0 / (FilterBank::kNoises[i] * FilterBank::kNoises[i + 1]));
-  return limits;
-}();
-
 } // namespace
 
 struct Rectifier::Plan {
@@ -66,16 +69,17 @@ struct Rectifier::Plan {
   int taps = 1;
   RectifyReport report;
   Image<Place> places;
-  std::vector<float> weights; // from FilterBank::weights ()
-  std::vector<FilterBank::WindowScale> scales;
+  FilterBank::Tables filters;
+  rectify::Kernels kernels;
   float noise = 0.0f; // rms, as a part of white
+  bool keep_unknown = false;
 
   template <typename Pixel>
-  Result<void> run (
-      ImageView<const Pixel> from, ImageView<Pixel> to, int largest) const;
-  template <int kTaps, typename Pixel>
-  void filter_row (ImageView<const Pixel> from, const Place *places, Pixel *to,
-      float largest) const;
+  Result<void> run (ImageView<const Pixel> from, ImageView<Pixel> to,
+      int largest, const std::optional<ImageView<float>> &errors) const;
+  template <typename Pixel>
+  void mark_unknown (
+      ImageView<const Pixel> from, ImageView<Pixel> to, Pixel largest) const;
 };
 
 namespace
@@ -100,11 +104,7 @@ public:
   /** To make all filters, as a part of what is allowed. */
   double effort () const { return whole_ ? 0.0 : bank_.effort (); }
   void place_row (int y, Place *row, RectifyReport &report);
-  std::vector<float> weights () && { return std::move (bank_).weights (); }
-  std::vector<FilterBank::WindowScale> scales () &&
-  {
-    return std::move (bank_).scales ();
-  }
+  FilterBank::Tables filters () && { return std::move (bank_).tables (); }
 
 private:
   /* Persistence is that of the part with the shortest slots. */
@@ -117,7 +117,7 @@ private:
         .correlation = std::pow (
             kPersistence, double (most) / elements_.schedule ().slots ())};
   }
-  Place place (Position seen, int around, bool coded, RectifyReport &report);
+  Place place (Position seen, Offset mirror, int around, RectifyReport &report);
 
   const Mapping &mapping_;
   int coded_rows_;
@@ -137,11 +137,11 @@ Planner::place_row (int y, Place *row, RectifyReport &report)
   if (!whole_)
     bank_.surroundings ().find_row (y, around_);
   for (std::size_t x = 0; x < seen_.size (); x++)
-    row[x] = place (seen_[x], around_[x], y < coded_rows_, report);
+    row[x] = place (seen_[x], {int (x), y}, around_[x], report);
 }
 
 Place
-Planner::place (Position seen, int around, bool coded, RectifyReport &report)
+Planner::place (Position seen, Offset mirror, int around, RectifyReport &report)
 {
   const Extent camera = mapping_.camera ();
   /* NaN must count as outside, too. */
@@ -153,19 +153,26 @@ Planner::place (Position seen, int around, bool coded, RectifyReport &report)
   const int px = int (seen.x + 0.5), py = int (seen.y + 0.5);
   const double fx = seen.x - px, fy = seen.y - py;
   const double share = bank_.solver ().own_share (-fx, -fy);
-  const Place pixel = {std::int16_t (px), std::int16_t (py), kLookup};
-  if (whole_ || (single_ && share > 1.0 - 2.0 * kTolerance)) {
+  const Place pixel = {std::int16_t (px), std::int16_t (py), Place::kLookup};
+  if (whole_ || (single_ && share > kOwn)) {
     report.exact++;
     return pixel;
   }
   report.weighted++;
   report.mixed += share < kMixed * best_share_;
-  const int half = bank_.solver ().taps () / 2;
-  if (px < half || py < half || px + half >= camera.width ||
-      py + half >= camera.height || !coded)
+  const int taps = bank_.solver ().taps ();
+  if (mirror.y >= coded_rows_ || taps > camera.width || taps > camera.height)
     return pixel;
-  return {std::int16_t (px - half), std::int16_t (py - half),
-      bank_.filter (around, fx, fy)};
+  const int left = std::clamp (px - taps / 2, 0, camera.width - taps);
+  const int top = std::clamp (py - taps / 2, 0, camera.height - taps);
+  const int x = left + taps / 2, y = top + taps / 2;
+  if (x == px && y == py)
+    return {
+        std::int16_t (left), std::int16_t (top), bank_.filter (around, fx, fy)};
+  if (share > kOwn || !bank_.has_border ())
+    return pixel;
+  return {std::int16_t (left), std::int16_t (top),
+      bank_.border_filter (around, mirror, seen.x - x, seen.y - y)};
 }
 
 /* 0 for a magnification out of range. */
@@ -225,11 +232,12 @@ check_effort (const PixelView &view, double effort)
     return {};
   return Error{
       "with a blur of " + real_text (view.sigma) +
-      " pixels (psf_sigma of the mapping) and this schedule, it takes " +
+      " pixels (psf_sigma) and this schedule, it takes " +
       real_text (std::ceil (effort)) +
       " times as long as allowed to find the weights of the pixels "
-      "around each mirror; focus the camera, or use a schedule with a "
-      "smaller tile or fewer regions"};
+      "around each mirror; focus the camera, use a schedule with a smaller "
+      "tile "
+      "or fewer regions, or leave psf_sigma out, and the blur uncorrected"};
 }
 
 } // namespace
@@ -252,6 +260,8 @@ try {
   RETURN_IF_ERROR (check_mirrors (mapping));
   plan->camera = mapping.camera ();
   plan->mirrors = mirrors;
+  plan->keep_unknown = options.keep_unknown;
+  plan->kernels = rectify::supported_kernels ().front ();
   plan->noise = float (
       options.noise * std::sqrt (schedule.slots () / schedule.white_slots ()));
   PixelView view{mapping.slope_at (0.5 * (plan->camera.width - 1),
@@ -259,7 +269,8 @@ try {
       mapping.psf_sigma (), plan->taps};
   RETURN_IF_ERROR (check_slope (view));
   /* Pixels that are copied need no weights. */
-  const bool whole = mapping.one_to_one (kTolerance);
+  const bool whole = mapping.one_to_one (kTolerance) &&
+                     WeightSolver (view).own_share (0.0, 0.0) > kOwn;
   if (whole)
     view.sigma = 0.0;
   RETURN_IF_ERROR (check_effort (view, FilterBank::effort (view, schedule)));
@@ -268,8 +279,7 @@ try {
   plan->places = Image<Place> (plan->mirrors.width, plan->mirrors.height);
   for (int y = 0; y < plan->mirrors.height; y++)
     planner.place_row (y, plan->places.view ().row (y), plan->report);
-  plan->scales = std::move (planner).scales ();
-  plan->weights = std::move (planner).weights ();
+  plan->filters = std::move (planner).filters ();
   if (plan->report.exact + plan->report.weighted == 0)
     return Error{"with this mapping the camera sees none of the mirrors; use "
                  "the mapping of this bench"};
@@ -290,51 +300,53 @@ Rectifier::mirrors () const
   return plan_->mirrors;
 }
 
+bool
+Rectifier::sees (int x, int y) const
+{
+  return plan_->places.at (x, y).filter != Place::kUnseen;
+}
+
 const RectifyReport &
 Rectifier::report () const
 {
   return plan_->report;
 }
 
-template <int kTaps, typename Pixel>
+/* Mirrors that are copied have what their pixel has. */
+template <typename Pixel>
 void
-Rectifier::Plan::filter_row (ImageView<const Pixel> from, const Place *row,
-    Pixel *to, float largest) const
+Rectifier::Plan::mark_unknown (
+    ImageView<const Pixel> from, ImageView<Pixel> to, Pixel largest) const
 {
-  using Seen = Window<kTaps, Pixel>;
-  constexpr int kNoises = int (FilterBank::kNoises.size ());
-  const float to_noise = 0.5f / (noise * noise * largest * largest);
-  Pixel copy[kTaps * Seen::kRead] = {};
-  for (int x = 0; x < mirrors.width; x++) {
-    const Place &place = row[x];
-    if (place.filter < 0) {
-      to[x] = place.filter == kLookup ? from.at (place.x, place.y) : Pixel (0);
-      continue;
+  if (report.unseen > 0)
+    for (int y = 0; y < mirrors.height; y++)
+      for (int x = 0; x < mirrors.width; x++)
+        if (places.at (x, y).filter == Place::kUnseen)
+          to.at (x, y) = largest;
+  const auto any_in = [&] (int y, int first, int count) {
+    const Pixel *row = from.row (y) + first;
+    return std::any_of (
+        row, row + count, [=] (Pixel pixel) { return pixel >= largest; });
+  };
+  std::vector<char> rows;
+  for (int y = 0; y < from.height; y++)
+    rows.push_back (any_in (y, 0, from.width));
+  if (std::find (rows.begin (), rows.end (), 1) == rows.end ())
+    return;
+  for (int y = 0; y < mirrors.height; y++)
+    for (int x = 0; x < mirrors.width; x++) {
+      const Place &place = places.at (x, y);
+      for (int i = 0; place.filter >= 0 && i < taps; i++)
+        if (rows[std::size_t (place.y + i)] &&
+            any_in (place.y + i, place.x, taps))
+          to.at (x, y) = largest;
     }
-    Seen window = {from.row (place.y) + place.x, from.stride};
-    if (place.x + Seen::kRead > from.width) {
-      for (int y = 0; y < kTaps; y++)
-        std::copy_n (window.row (y), kTaps, copy + y * Seen::kRead);
-      window = {copy, sizeof (Pixel) * Seen::kRead};
-    }
-    /* Differences beyond the noise are the scene's. */
-    const FilterBank::WindowScale &scale = scales[std::size_t (place.filter)];
-    const float scene =
-        (window.roughness () * to_noise * scale.darkness - 1.0f) *
-        scale.smoothness;
-    std::ptrdiff_t filter = std::ptrdiff_t (place.filter) * kNoises;
-    for (const float limit : kLimits)
-      filter += scene <= limit;
-    const float sum =
-        window.filtered (weights.data () + filter * kTaps * Seen::kLength);
-    to[x] = Pixel (std::int32_t (std::clamp (sum + 0.5f, 0.0f, largest)));
-  }
 }
 
 template <typename Pixel>
 Result<void>
-Rectifier::Plan::run (
-    ImageView<const Pixel> from, ImageView<Pixel> to, int largest) const
+Rectifier::Plan::run (ImageView<const Pixel> from, ImageView<Pixel> to,
+    int largest, const std::optional<ImageView<float>> &errors) const
 {
   const ViewBytes input = ViewBytes::of (from), output = ViewBytes::of (to);
   RETURN_IF_ERROR (
@@ -342,32 +354,43 @@ Rectifier::Plan::run (
   RETURN_IF_ERROR (
       check_view (output, "output", mirrors.width, mirrors.height));
   RETURN_IF_ERROR (check_apart ({&output, 1}, &input));
+  if (errors)
+    RETURN_IF_ERROR (check_view (
+        ViewBytes::of (*errors), "errors", mirrors.width, mirrors.height));
   if (largest <= 0)
     largest = std::numeric_limits<Pixel>::max ();
-  for (int y = 0; y < mirrors.height; y++) {
-    const Place *row = places.view ().row (y);
-    if (taps == 5)
-      filter_row<5> (from, row, to.row (y), float (largest));
-    else if (taps == 7)
-      filter_row<7> (from, row, to.row (y), float (largest));
-    else
-      filter_row<9> (from, row, to.row (y), float (largest));
-  }
+  rectify::Filters with{filters.weights.data (), filters.scales.data (),
+      filters.errors.data (), {},
+      noise * noise * float (largest) * float (largest), float (largest)};
+  for (std::size_t i = 0; i + 1 < FilterBank::kNoises.size (); i++)
+    with.limits[i] =
+        float (1.0 / (FilterBank::kNoises[i] * FilterBank::kNoises[i + 1]));
+  const std::size_t window = std::size_t (taps - kWindows[0].taps) / 2;
+  const auto run_row = std::get<rectify::RectifyRow<Pixel> *const(&)[3]> (
+      std::tie (kernels.bytes, kernels.words))[window];
+  const rectify::Source<Pixel> source{from.row (0), from.stride, from.width};
+  for (int y = 0; y < mirrors.height; y++)
+    run_row (source, places.view ().row (y), mirrors.width, with, to.row (y),
+        errors ? errors->row (y) : nullptr);
+  if (keep_unknown)
+    mark_unknown (from, to, Pixel (largest));
   return {};
 }
 
 Result<void>
 Rectifier::run (ImageView<const std::uint8_t> camera,
-    ImageView<std::uint8_t> mirrors, int largest) const
+    ImageView<std::uint8_t> mirrors, int largest,
+    const std::optional<ImageView<float>> &errors) const
 {
-  return plan_->run (camera, mirrors, largest);
+  return plan_->run (camera, mirrors, largest, errors);
 }
 
 Result<void>
 Rectifier::run (ImageView<const std::uint16_t> camera,
-    ImageView<std::uint16_t> mirrors, int largest) const
+    ImageView<std::uint16_t> mirrors, int largest,
+    const std::optional<ImageView<float>> &errors) const
 {
-  return plan_->run (camera, mirrors, largest);
+  return plan_->run (camera, mirrors, largest, errors);
 }
 
 } // namespace codedexposure

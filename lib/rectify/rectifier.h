@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "base/image.h"
@@ -21,27 +22,33 @@ struct RectifyOptions {
   /** Noise of a pixel, rms, as a part of white, with the mirrors on in all
    * slots: codes that pass less light have more. */
   double noise = 0.006;
+  /** Mirrors of which a pixel with a part in their estimate has the largest
+   * value get it as well, and so do those that the camera does not see, so that
+   * what is not known is seen to be so. */
+  bool keep_unknown = false;
 
   bool operator== (const RectifyOptions &) const = default;
 };
 
 /** How well the camera sees the mirrors, in numbers of mirrors. */
 struct RectifyReport {
-  /** Copied: one pixel sees this mirror and no other. */
+  /** Copied: the pixel gets nine tenths of its light from this mirror. */
   std::uint64_t exact = 0;
   std::uint64_t weighted = 0; ///< estimated from several pixels
   /** Of the weighted ones, those of which even the best pixel gets less than
    * half of its light: their estimate depends mostly on neighbouring pixels. */
   std::uint64_t mixed = 0;
-  std::uint64_t unseen = 0; ///< outside the frame; they are black
+  /** Outside the frame; they are black, but with keep_unknown. */
+  std::uint64_t unseen = 0;
 };
 
 /**
  * Resamples camera frames to one pixel per mirror, so that extraction and
  * fusion find each element at its place.
  *
- * Where pixels and mirrors are one to one, pixel values are copied. Elsewhere a
- * pixel collects light from several mirrors, which show different slots. Each
+ * Where a pixel gets its light from one mirror, its value is copied. Elsewhere,
+ * also behind a lens that blurs an aligned camera, a pixel collects light from
+ * several mirrors, which show different slots. Each
  * mirror is then estimated from the pixels around it with the least mean
  * squared error. The weights follow from the part of each mirror in each
  * pixel's light (the mapping and its blur) and from the times when the mirrors
@@ -52,7 +59,8 @@ struct RectifyReport {
  *
  * Weights are made once, for fractions of a pixel; along the borders of
  * regions, where pixels mix two codes, for each mirror. run () is const, can be
- * called from several threads, and allocates nothing.
+ * called from several threads, and allocates nothing, or, with keep_unknown,
+ * a byte for each row of the camera.
  */
 class Rectifier
 {
@@ -68,14 +76,22 @@ public:
   Extent camera () const;
   Extent mirrors () const;
   const RectifyReport &report () const;
+  /** Whether the camera sees the mirror @p x, @p y of mirrors (). */
+  bool sees (int x, int y) const;
 
   /** @p largest  pixel value, to which results are clamped; 0: that of the
-   * type. Error when a view does not have the size of camera () or mirrors (),
-   * or both overlap. */
+   * type.
+   * @p errors   of mirrors, beyond the noise of a pixel: rms, DN, as expected
+   *             of a scene whose light varies as much as the pixels around;
+   *             0 where a pixel was copied.
+   * Error when a view does not have the size of camera () or mirrors (), or the
+   * frames overlap. */
   Result<void> run (ImageView<const std::uint8_t> camera,
-      ImageView<std::uint8_t> mirrors, int largest = 0) const;
+      ImageView<std::uint8_t> mirrors, int largest = 0,
+      const std::optional<ImageView<float>> &errors = {}) const;
   Result<void> run (ImageView<const std::uint16_t> camera,
-      ImageView<std::uint16_t> mirrors, int largest = 0) const;
+      ImageView<std::uint16_t> mirrors, int largest = 0,
+      const std::optional<ImageView<float>> &errors = {}) const;
 
 private:
   struct Plan;

@@ -55,10 +55,10 @@ WeightSolver::WeightSolver (const PixelView &view)
 }
 
 int
-WeightSolver::reach () const
+WeightSolver::reach (int shifted) const
 {
   const auto &slope = view_.slope;
-  const double pixels = 0.5 * view_.taps + 0.5 + 2.5 * view_.sigma;
+  const double pixels = 0.5 * view_.taps + shifted + 0.5 + 2.5 * view_.sigma;
   const double along_x = std::abs (slope[0]) + std::abs (slope[1]);
   const double along_y = std::abs (slope[2]) + std::abs (slope[3]);
   return int (std::ceil (pixels * std::max (along_x, along_y)));
@@ -152,14 +152,33 @@ WeightSolver::solve (const Neighbourhood &mirrors, double fx, double fy,
   KrigingSystem system = equations (mirrors, fx, fy);
   const std::size_t middle = mirrors.count () / 2;
   const double variance = mirrors.covariances (middle)[middle];
-  std::vector<float> weights;
+  std::vector<float> weights, errors;
   for (const double noise : noises) {
     system.noise.assign (system.flat.size (), noise * noise * variance);
     const std::vector<double> solved = solve_kriging (system);
     weights.insert (weights.end (), solved.begin (), solved.end ());
+    errors.push_back (
+        float (squared_error (system, solved, variance) / variance));
   }
+  weights.insert (weights.end (), errors.begin (), errors.end ());
   weights.push_back (float (roughness (system.covariance) / variance));
   return weights;
+}
+
+/* Without noise. @variance: of the target. */
+double
+WeightSolver::squared_error (const KrigingSystem &system,
+    std::span<const double> weights, double variance)
+{
+  const std::size_t taps = weights.size ();
+  double error = variance;
+  for (std::size_t p = 0; p < taps; p++) {
+    error += weights[p] * (weights[p] * system.covariance[p * taps + p] -
+                              2.0 * system.targets[p]);
+    for (std::size_t q = p + 1; q < taps; q++)
+      error += 2.0 * weights[p] * weights[q] * system.covariance[p * taps + q];
+  }
+  return error;
 }
 
 double

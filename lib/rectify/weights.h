@@ -77,8 +77,9 @@ public:
   explicit WeightSolver (const PixelView &view);
 
   int taps () const { return view_.taps; }
-  /** Mirrors to each side that the pixels of a window see. */
-  int reach () const;
+  /** Mirrors to each side that the pixels of a window see, which is @p shifted
+   * by up to so many pixels. */
+  int reach (int shifted = 0) const;
   /** Mirrors in the window with that reach. */
   double mirrors () const { return std::pow (2.0 * reach () + 1.0, 2); }
   /** Multiplications of solve () for one noise, about. */
@@ -89,9 +90,10 @@ public:
   /** Weights for the mirror in the middle of @p mirrors, which is seen @p fx,
    * @p fy pixels from the centre of the window: row by row, one set for each of
    * @p noises, a pixel's rms in units of the scene's standard deviation. A
-   * flat, static scene keeps its brightness. The last value is the roughness of
-   * the window: half the mean squared difference of its central 5 x 5 pixels
-   * from their neighbours, in units of the scene's variance. */
+   * flat, static scene keeps its brightness. Then, for each of them, the
+   * squared error that is not noise; and last the roughness of the window: half
+   * the mean squared difference of its central 5 x 5 pixels from their
+   * neighbours; both in units of the scene's variance. */
   std::vector<float> solve (const Neighbourhood &mirrors, double fx, double fy,
       std::span<const double> noises) const;
 
@@ -105,6 +107,8 @@ private:
   KrigingSystem equations (
       const Neighbourhood &mirrors, double fx, double fy) const;
   double roughness (const std::vector<double> &covariances) const;
+  static double squared_error (const KrigingSystem &system,
+      std::span<const double> weights, double variance);
 
   PixelView view_;
   ShareProfile across_, down_;

@@ -141,6 +141,17 @@ BenchProfile::of_beam (bool off_beam) const
   return one;
 }
 
+std::optional<Mapping>
+BenchProfile::known_mapping () const
+{
+  if (mapping || !psf_sigma)
+    return mapping;
+  Mapping::Parts aligned{camera.size, camera.size};
+  aligned.psf_sigma = psf_sigma->value;
+  const auto made = Mapping::make (aligned);
+  return made ? std::optional (*made) : std::nullopt;
+}
+
 Result<void>
 BenchProfile::save (const std::string &path) const
 try {

@@ -78,6 +78,10 @@ struct BenchProfile {
    * there is one, else the first. */
   BenchProfile of_beam (bool off_beam) const;
 
+  /** The mapping, or that of an aligned camera with the blur that was measured;
+   * none: neither is known. */
+  std::optional<Mapping> known_mapping () const;
+
   /** The strict, versioned text form: see docs/formats.md. */
   static Result<BenchProfile> from_json (std::string_view json);
   /** JSON, which begins with '{', or the path of a file. */

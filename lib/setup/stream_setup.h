@@ -63,9 +63,9 @@ struct StreamSetup {
   std::string to_json () const;
 
   /** That of the stream, else that of its bench profile. */
-  const std::optional<Mapping> &known_mapping () const
+  std::optional<Mapping> known_mapping () const
   {
-    return mapping || !bench ? mapping : bench->mapping;
+    return mapping || !bench ? mapping : bench->known_mapping ();
   }
 
   bool operator== (const StreamSetup &) const = default;

@@ -98,11 +98,13 @@ draw_all (benchmark::State &state)
 }
 BENCHMARK (draw_all)->Unit (benchmark::kMicrosecond);
 
+constexpr Alignment kAskew{0.4, 0.4, 0.5, 1.01}, kAligned;
+
 Mapping
-askew ()
+mapping_of (const Alignment &alignment)
 {
-  Mapping::Parts parts = {kSize, kSize,
-      camera_to_mirrors ({0.4, 0.4, 0.5, 1.01}, kSize.width, kSize.height)};
+  Mapping::Parts parts = {
+      kSize, kSize, camera_to_mirrors (alignment, kSize.width, kSize.height)};
   parts.psf_sigma = 0.5;
   return *Mapping::make (parts);
 }
@@ -110,24 +112,26 @@ askew ()
 void
 follow_mapping (benchmark::State &state)
 {
-  const Mapping mapping = askew ();
+  const Mapping mapping = mapping_of (kAskew);
   for (auto _ : state)
     benchmark::DoNotOptimize (Rectifier::make (mapping, Schedule ()).ok ());
 }
 BENCHMARK (follow_mapping)->Unit (benchmark::kMillisecond);
 
-template <typename Pixel>
+template <typename Pixel, const Alignment &alignment>
 void
 rectify (benchmark::State &state)
 {
-  const auto rectifier = Rectifier::make (askew (), Schedule ());
+  const auto rectifier = Rectifier::make (mapping_of (alignment), Schedule ());
   const auto picture = grating<Pixel> ();
   auto mirrors = picture;
   for (auto _ : state)
     quality::must (rectifier->run (picture.view (), mirrors.view ()));
 }
-BENCHMARK (rectify<std::uint8_t>)->Unit (benchmark::kMillisecond);
-BENCHMARK (rectify<std::uint16_t>)->Unit (benchmark::kMillisecond);
+BENCHMARK (rectify<std::uint8_t, kAskew>)->Unit (benchmark::kMillisecond);
+BENCHMARK (rectify<std::uint16_t, kAskew>)->Unit (benchmark::kMillisecond);
+BENCHMARK (rectify<std::uint8_t, kAligned>)->Unit (benchmark::kMillisecond);
+BENCHMARK (rectify<std::uint16_t, kAligned>)->Unit (benchmark::kMillisecond);
 
 } // namespace
 

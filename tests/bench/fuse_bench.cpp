@@ -4,13 +4,16 @@
 #include "../quality/must.h"
 #include "fuse/fuser.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include <benchmark/benchmark.h>
 
 #include "base/image.h"
+#include "fuse/refine_network.h"
 
 namespace
 {
@@ -110,6 +113,79 @@ FUSE_BENCHMARK (balanced_4, kFour, FuseQuality::kBalanced);
 FUSE_BENCHMARK (balanced_8, kEight, FuseQuality::kBalanced);
 FUSE_BENCHMARK (best_4, kFour, FuseQuality::kBest);
 FUSE_BENCHMARK (best_8, kEight, FuseQuality::kBest);
+
+#ifdef __x86_64__
+
+/** As many products of 16 bits as the processor can sum: what the network could
+ * reach at most. */
+void
+most_products (benchmark::State &state)
+{
+  constexpr int kSteps = 10000, kSums = 12, kProducts = 32;
+  for (auto _ : state)
+    for (int step = 0; step < kSteps; step++)
+      asm volatile("vpdpwssd %%zmm0, %%zmm0, %%zmm1\n\t"
+                   "vpdpwssd %%zmm0, %%zmm0, %%zmm2\n\t"
+                   "vpdpwssd %%zmm0, %%zmm0, %%zmm3\n\t"
+                   "vpdpwssd %%zmm0, %%zmm0, %%zmm4\n\t"
+                   "vpdpwssd %%zmm0, %%zmm0, %%zmm5\n\t"
+                   "vpdpwssd %%zmm0, %%zmm0, %%zmm6\n\t"
+                   "vpdpwssd %%zmm0, %%zmm0, %%zmm7\n\t"
+                   "vpdpwssd %%zmm0, %%zmm0, %%zmm8\n\t"
+                   "vpdpwssd %%zmm0, %%zmm0, %%zmm9\n\t"
+                   "vpdpwssd %%zmm0, %%zmm0, %%zmm10\n\t"
+                   "vpdpwssd %%zmm0, %%zmm0, %%zmm11\n\t"
+                   "vpdpwssd %%zmm0, %%zmm0, %%zmm12\n\t"
+                   :
+                   :
+                   : "xmm1", "xmm2", "xmm3", "xmm4", "xmm5", "xmm6", "xmm7",
+                   "xmm8", "xmm9", "xmm10", "xmm11", "xmm12");
+  state.SetItemsProcessed (state.iterations () * kSteps * kSums * kProducts);
+}
+
+[[maybe_unused]] const bool has_most =
+    __builtin_cpu_supports ("avx512vnni") &&
+    benchmark::RegisterBenchmark ("most_products/avx512", most_products);
+
+#endif
+
+/** Products for each pixel of the network. */
+constexpr std::int64_t
+products ()
+{
+  using Net = fuse::RefineNetwork;
+  return 9 * (Net::kInputs * Net::kChannels +
+                 Net::kHidden * Net::kChannels * Net::kChannels +
+                 Net::kChannels * Net::kOutputs);
+}
+
+/** The network of the refinement alone, for one slot; items are products. */
+void
+refine_network (benchmark::State &state, const fuse::Kernels &kernels)
+{
+  using Net = fuse::RefineNetwork;
+  const int width = kWidth / Net::kFold, height = kHeight / Net::kFold;
+  std::vector<std::int16_t> inputs;
+  for (int i = 0; i < width * Net::kInputs; i++)
+    inputs.push_back (std::int16_t (i * 7919 % 2000 - 1000));
+  const auto source = [&] (int, std::int16_t *row) {
+    std::copy (inputs.begin (), inputs.end (), row);
+  };
+  for (auto _ : state)
+    Net::trained ().run (kernels, width, height, source,
+        [] (int, const float *row) { benchmark::DoNotOptimize (*row); });
+  state.SetItemsProcessed (state.iterations () * width * height * products ());
+}
+
+[[maybe_unused]] const bool registered = [] {
+  for (const fuse::Kernels &kernels : fuse::supported_kernels ())
+    benchmark::RegisterBenchmark (
+        ("refine_network/" + std::string (kernels.name)).c_str (),
+        refine_network, kernels)
+        ->MeasureProcessCPUTime ()
+        ->Unit (benchmark::kMillisecond);
+  return true;
+}();
 
 } // namespace
 

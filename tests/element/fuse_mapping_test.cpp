@@ -11,7 +11,9 @@
 #include "common/messages.h"
 #include "common/meta.h"
 #include "common/tag.h"
+#include "fuse/fuser.h"
 #include "harness.h"
+#include "rectify/rectifier.h"
 
 namespace
 {
@@ -41,19 +43,21 @@ protected:
           120 + 50 * std::sin (0.5 * at + 0.3 * y) + 30 * std::sin (0.8 * y));
     });
   }
-  static Mapping mapping (Extent mirrors = {kWidth, kHeight})
+  static Mapping mapping (
+      Extent mirrors = {kWidth, kHeight}, const Alignment &alignment = kAskew)
   {
     auto made = Mapping::make ({.camera = {kWidth, kHeight},
         .mirrors = mirrors,
-        .homography = camera_to_mirrors (kAskew, kWidth, kHeight),
+        .homography = camera_to_mirrors (alignment, kWidth, kHeight),
         .psf_sigma = kPsfSigma});
     EXPECT_TRUE (made.ok ());
     return *made;
   }
-  std::string mapped (Extent mirrors = {kWidth, kHeight})
+  std::string mapped (
+      Extent mirrors = {kWidth, kHeight}, const Alignment &alignment = kAskew)
   {
     return "schedule=" + schedule.text () +
-           " mapping=" + save (mapping (mirrors).to_json ());
+           " mapping=" + save (mapping (mirrors, alignment).to_json ());
   }
   std::string save (const std::string &text)
   {
@@ -72,8 +76,8 @@ protected:
                                      [] (int, int) { return 99; }),
         pts));
   }
-  template <typename Pixel>
-  void expose (const Alignment &alignment)
+  /** What the camera sees. */
+  std::vector<Image<std::uint8_t>> coded (const Alignment &alignment) const
   {
     BenchOptions options;
     options.alignment = alignment;
@@ -81,18 +85,27 @@ protected:
     options.full_well = 10000;
     options.read_noise = 5;
     auto bench = OpticalBench::make (kWidth, kHeight, options);
+    std::vector<Image<std::uint8_t>> frames;
     for (int number = 0; number < kFrames; number++) {
       bench->begin (schedule);
       for (int slot = 0; slot < schedule.slots (); slot++) {
         const auto light = scene (number + double (slot) / schedule.slots ());
         bench->expose (light.view (), slot, 1.0);
       }
-      Image<std::uint8_t> coded (kWidth, kHeight);
-      bench->read_out (std::uint64_t (number), coded.view ());
+      bench->read_out (std::uint64_t (number),
+          frames.emplace_back (kWidth, kHeight).view ());
+    }
+    return frames;
+  }
+  template <typename Pixel>
+  void expose (const Alignment &alignment)
+  {
+    GstClockTime number = 0;
+    for (const auto &seen : coded (alignment)) {
       const auto pixels = draw<Pixel> (kWidth, kHeight, [&] (int x, int y) {
-        return coded.at (x, y) * (sizeof (Pixel) == 1 ? 1 : 257);
+        return seen.at (x, y) * (sizeof (Pixel) == 1 ? 1 : 257);
       });
-      const auto pts = GstClockTime (number) * GST_SECOND * 1001 / 30000;
+      const auto pts = number++ * GST_SECOND * 1001 / 30000;
       ASSERT_EQ (fuse->push (frame_of (pixels, pts)), GST_FLOW_OK);
     }
   }
@@ -137,6 +150,50 @@ TEST_F (FuseMapping, PutsAMisalignedBenchRight)
   EXPECT_GT (psnr<std::uint16_t> (mapped (), kAskew), aligned - 0.3);
 }
 
+TEST_F (FuseMapping, TakesBackTheBlurOfAnAlignedBench)
+{
+  const double blurred = psnr ("schedule=" + schedule.text (), {});
+  EXPECT_GT (psnr (mapped ({kWidth, kHeight}, {}), {}), blurred + 2.0);
+}
+
+TEST_F (FuseMapping, UncertaintyHasTheErrorsOfRectification)
+{
+  start ("full-well=10000 read-noise=5 " + mapped ());
+  GstHarness *pad = fuse->request ("uncertainty");
+  expose<std::uint8_t> (kAskew);
+
+  FuseOptions options;
+  options.noise = {10000.0, 5.0};
+  auto fuser =
+      Fuser<std::uint8_t>::make (schedule, kWidth, kHeight, options).value ();
+  const double light = 0.4 * options.noise.full_well;
+  const Rectifier rectifier = *Rectifier::make (mapping (), schedule,
+      {.noise = std::sqrt (options.noise.variance (light, 0.0)) /
+                options.noise.full_well});
+  std::vector<Image<std::uint8_t>> fused (
+      4, Image<std::uint8_t> (kWidth, kHeight));
+  std::vector<Image<std::uint16_t>> deviations (
+      4, Image<std::uint16_t> (kWidth, kHeight));
+  for (const auto &seen : coded (kAskew)) {
+    Image<std::uint8_t> mirrors (kWidth, kHeight);
+    Image<float> errors (kWidth, kHeight);
+    ASSERT_TRUE (
+        rectifier.run (seen.view (), mirrors.view (), 0, errors.view ()));
+    ASSERT_TRUE (
+        fuser.take (mirrors.view (), {}, std::as_const (errors).view ()));
+    ASSERT_TRUE (fuser.fuse (views_of (fused), {}, views_of (deviations)));
+    for (const auto &expected : deviations) {
+      const BufferPtr buffer (gst_harness_try_pull (pad));
+      ASSERT_TRUE (buffer);
+      Image<std::uint16_t> image (kWidth, kHeight);
+      ASSERT_EQ (gst_buffer_extract (buffer.get (), 0, image.view ().row (0),
+                     2 * kWidth * kHeight),
+          gsize (2 * kWidth * kHeight));
+      EXPECT_EQ (image, expected);
+    }
+  }
+}
+
 TEST_F (FuseMapping, PutsRegionsRight)
 {
   schedule =
@@ -164,6 +221,26 @@ TEST_F (FuseMapping, ComesWithTheTag)
   start (mapped ());
   expose<std::uint8_t> (kAskew);
   EXPECT_EQ (pull_images (*fuse), by_tag);
+}
+
+/* That of a profile without a mapping is of an aligned camera, and a mapping is
+ * better than that, wherever it is from. */
+TEST_F (FuseMapping, IsNotReplacedByTheBlurOfAProfile)
+{
+  BenchProfile profile;
+  profile.camera.size = {kWidth, kHeight};
+  profile.psf_sigma = Measured{kPsfSigma, 0.01};
+  profile.leak = Measured{0.0, 0.0};
+  const std::string bench = "bench=" + save (profile.to_json ());
+  const auto fused = [&] (const std::string &settings, const StreamSetup &tag) {
+    start (settings);
+    fuse->push_event (setup_to_event (tag));
+    expose<std::uint8_t> (kAskew);
+    return pull_images (*fuse);
+  };
+  const auto by_tag = fused ("", {kSchedule, mapping ()});
+  EXPECT_EQ (fused (bench, {kSchedule, mapping ()}), by_tag);
+  EXPECT_NE (fused (bench, {kSchedule, {}}), by_tag);
 }
 
 TEST_F (FuseMapping, FusedFramesHaveTheSizeOfTheMirrors)

@@ -22,14 +22,8 @@ expected_deviations (int number)
       4, Image<std::uint8_t> (kWidth, kHeight));
   std::vector<Image<std::uint16_t>> deviations (
       4, Image<std::uint16_t> (kWidth, kHeight));
-  std::vector<ImageView<std::uint8_t>> views;
-  std::vector<ImageView<std::uint16_t>> deviation_views;
-  for (std::size_t s = 0; s < 4; s++) {
-    views.push_back (fused[s].view ());
-    deviation_views.push_back (deviations[s].view ());
-  }
   EXPECT_TRUE (fuser.take (picture (number).view ()));
-  EXPECT_TRUE (fuser.fuse (views, {}, deviation_views));
+  EXPECT_TRUE (fuser.fuse (views_of (fused), {}, views_of (deviations)));
   return deviations;
 }
 

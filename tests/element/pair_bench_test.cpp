@@ -5,7 +5,9 @@
 #include <cstdio>
 #include <fstream>
 #include <iterator>
+#include <optional>
 #include <set>
+#include <vector>
 
 #include "common/messages.h"
 #include "common/tag.h"
@@ -202,14 +204,21 @@ TEST (PairBench, BothCamerasAreCalibratedInOneRun)
            "! pair." + beam + " ";
   };
   Pipeline pipeline (
-      "videotestsrc num-buffers=1400 pattern=white "
+      "videotestsrc pattern=white "
       "! video/x-raw,format=GRAY8,width=256,height=192,framerate=100/1 "
       "! tee name=light " +
       camera ("on", 3.2, kFirst) + camera ("off", 0.8, kSecond) +
       "codedexposure-pair name=pair ! moirecalib name=calib mode=map frames=4 "
       "overlay=false ! codedexposure-fuse ! fakesink");
-  ASSERT_EQ (pipeline.play (), "");
+  /* How many frames it takes depends on how fast the DMD's thread is. */
   const auto calib = pipeline["calib"];
+  g_signal_connect (calib.get (), "notify::mapping",
+      G_CALLBACK (+[] (GObject *mapped, GParamSpec *, gpointer) {
+        gst_element_send_event (
+            GST_ELEMENT (GST_OBJECT_PARENT (mapped)), gst_event_new_eos ());
+      }),
+      nullptr);
+  ASSERT_EQ (pipeline.play (), "");
   const auto first =
       Mapping::from_json (text_property (calib.get (), "mapping"));
   ASSERT_TRUE (first) << first.error ().message;
@@ -226,6 +235,128 @@ TEST (PairBench, BothCamerasAreCalibratedInOneRun)
   ASSERT_TRUE (setup && *setup && setup->value ().partner);
   EXPECT_EQ (setup->value ().partner->mapping->to_json (), second->to_json ());
   EXPECT_EQ (setup->value ().mapping->to_json (), first->to_json ());
+}
+
+constexpr Extent kSize{64, 48};
+
+/** What a second camera measured that stands @p right mirrors aside, and half
+ * a mirror down. */
+std::string
+bench_of_second (double right)
+{
+  BenchProfile first, second;
+  second.camera.size = first.camera.size = kSize;
+  Mapping::Parts parts{kSize, kSize,
+      camera_to_mirrors (
+          {.shift_x = right, .shift_y = 0.5}, kSize.width, kSize.height)};
+  second.mapping = Mapping::make (parts).value ();
+  first.second = {second};
+  return first.to_json ();
+}
+
+/** Pixels that @p element makes of frames with a partner, or without. @p spot:
+ * a pixel of each partner that is saturated. @p right: see
+ * bench_of_second (). */
+std::vector<std::uint8_t>
+made_by (const std::string &element, bool paired,
+    std::optional<Offset> spot = std::nullopt, double right = 0.5)
+{
+  const std::string path = ::testing::TempDir () + "pair-spot.gray";
+  const std::string schedule = "schedule=sequential:lattice:4/2 ";
+  const std::string second =
+      "light. ! queue ! codedexposure-sim beam=off gain=0.8 shift-y=0.5 "
+      "shift-x=" +
+      std::to_string (right) + " " + schedule +
+      "! identity name=off ! dmdsync name=sync beam=off " + schedule +
+      "! pair.off ";
+  Pipeline pipeline (
+      "videotestsrc num-buffers=16 pattern=smpte horizontal-speed=3 "
+      "! video/x-raw,format=GRAY8,width=64,height=48,framerate=100/1 "
+      "! tee name=light light. ! queue ! codedexposure-sim " +
+      schedule + "! dmdsync " + schedule +
+      (paired ? "! pair.on " + second + "codedexposure-pair name=pair" : "") +
+      " ! " + element + " ! filesink location=" + path);
+  if (paired)
+    g_object_set (pipeline["sync"].get (), "bench",
+        bench_of_second (right).c_str (), nullptr);
+  if (spot)
+    gst_pad_add_probe (
+        pipeline.pad ("off", "src").get (), GST_PAD_PROBE_TYPE_BUFFER,
+        [] (GstPad *, GstPadProbeInfo *info, gpointer data) {
+          const Offset &at = *static_cast<const Offset *> (data);
+          GstBuffer *frame =
+              gst_buffer_make_writable (GST_PAD_PROBE_INFO_BUFFER (info));
+          gst_buffer_memset (frame, gsize (at.y * kSize.width + at.x), 255, 1);
+          info->data = frame;
+          return GST_PAD_PROBE_OK;
+        },
+        &*spot, nullptr);
+  EXPECT_EQ (pipeline.play (), "");
+  std::ifstream in (path, std::ios::binary);
+  const std::vector<std::uint8_t> pixels (
+      std::istreambuf_iterator<char> (in), {});
+  std::remove (path.c_str ());
+  return pixels;
+}
+
+/* Its light is spread over several mirrors, none of which is saturated then.
+ * The sum has it as it is. */
+TEST (PairBench, ASaturatedPixelOfASecondCameraWithAMappingIsNoticed)
+{
+  constexpr Offset kSpot{20, 24};
+  constexpr int kReach = 16;
+  const auto alone = made_by ("codedexposure-fuse", false);
+  const auto both = made_by ("codedexposure-fuse", true);
+  const auto spotted = made_by ("codedexposure-fuse", true, kSpot);
+  ASSERT_EQ (alone.size (), 16u * 64 * 48);
+  ASSERT_EQ (both.size (), alone.size ());
+  ASSERT_EQ (spotted.size (), alone.size ());
+  int paired = 0;
+  for (std::size_t i = 0; i < alone.size (); i++) {
+    const int x = int (i) % 64, y = int (i) / 64 % 48;
+    if (std::abs (x - kSpot.x) <= kReach && std::abs (y - kSpot.y) <= kReach) {
+      ASSERT_EQ (spotted[i], alone[i]) << x << ' ' << y;
+      paired += both[i] != alone[i];
+    }
+  }
+  EXPECT_GT (paired, 0);
+  const auto sum = made_by ("codedexposure-sum", true);
+  const auto with_spot = made_by ("codedexposure-sum", true, kSpot);
+  ASSERT_EQ (sum.size (), 4u * 64 * 48);
+  ASSERT_EQ (with_spot.size (), sum.size ());
+  int white = 0;
+  for (std::size_t i = 0; i < sum.size (); i++)
+    white += with_spot[i] == 255 && sum[i] < 255;
+  EXPECT_LE (white, 4 * 2) << "of four frames";
+}
+
+/* It stands so far to the right that 13 columns of mirrors are outside its
+ * frames. */
+TEST (PairBench, WhatASecondCameraDoesNotSeeIsThatOfTheFirst)
+{
+  constexpr int kUnseen = 13, kReach = 16;
+  const auto alone = made_by ("codedexposure-fuse", false);
+  const auto both = made_by ("codedexposure-fuse", true, std::nullopt, 12.5);
+  ASSERT_EQ (both.size (), alone.size ());
+  int paired = 0;
+  for (std::size_t i = 0; i < alone.size (); i++) {
+    if (i % 64 < kUnseen + kReach)
+      ASSERT_EQ (both[i], alone[i]) << i % 64 << ' ' << i / 64 % 48;
+    else
+      paired += both[i] != alone[i];
+  }
+  EXPECT_GT (paired, 0);
+  const auto whole = made_by ("codedexposure-sum", true);
+  const auto part = made_by ("codedexposure-sum", true, std::nullopt, 12.5);
+  ASSERT_EQ (part.size (), whole.size ());
+  double difference = 0.0;
+  for (std::size_t i = 0; i < part.size (); i++) {
+    if (i % 64 < kUnseen)
+      ASSERT_EQ (part[i], 0);
+    else
+      difference += std::abs (part[i] - whole[i]);
+  }
+  EXPECT_LT (difference / double (part.size ()), 2.0);
 }
 
 TEST (PairBench, TheFramesOfTheOtherBeamAreNotDecoded)

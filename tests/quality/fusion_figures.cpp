@@ -2,12 +2,14 @@
 #include "fusion_figures.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <numeric>
 #include <span>
 #include <utility>
 
+#include "base/text.h"
 #include "baselines.h"
 #include "bench/scene.h"
 
@@ -84,15 +86,33 @@ ways (int n)
       fusion_way (n, FuseQuality::kLearned)};
 }
 
+/* Each coded frame by itself, without those before and after it. */
+FusionWay
+lone_way (int n, FuseQuality quality)
+{
+  return {std::string (quality_name (quality)) + ", each frame alone",
+      [=] (const Scene &scene, const Condition &condition) {
+        const Schedule schedule = fusion_schedule (n);
+        std::vector<Picture> all;
+        for (const Picture &coded : take (scene, schedule, condition))
+          std::ranges::move (
+              fuse ({coded}, schedule, options_of (quality, condition)),
+              std::back_inserter (all));
+        return all;
+      }};
+}
+
 /* Those of sequences: files are fused with lookahead. */
 std::vector<FusionWay>
 sequence_ways (int n)
 {
   std::vector<FusionWay> all;
   for (const FuseQuality quality :
-      {FuseQuality::kFast, FuseQuality::kBalanced, FuseQuality::kBest})
+      {FuseQuality::kFast, FuseQuality::kBalanced, FuseQuality::kBest}) {
+    all.push_back (lone_way (n, quality));
     for (const int lookahead : {0, 1})
       all.push_back (fusion_way (n, quality, false, lookahead));
+  }
   all.push_back (fusion_way (n, FuseQuality::kFast, true, 1));
   all.push_back (fusion_way (n, FuseQuality::kBalanced, true, 1));
   all.push_back (fusion_way (n, FuseQuality::kLearned, false, 1));
@@ -384,37 +404,95 @@ refinement_tables (const std::vector<Scene> &clips, const Progress &progress)
   return tables;
 }
 
+namespace
+{
+
+using Qualities = std::array<FuseQuality, 2>;
+
+/* Calls @p use for the columns of what is measured at both numbers of slots,
+ * clean and noisy. */
+template <typename Use>
+void
+for_each_column (Qualities qualities, const Use &use)
+{
+  for (const int n : {4, 8})
+    for (const bool noisy : {false, true})
+      for (const FuseQuality quality : qualities)
+        use (n, noisy, quality);
+}
+
+void
+add_columns (Table &table, Qualities qualities)
+{
+  for_each_column (qualities, [&] (int n, bool noisy, FuseQuality quality) {
+    table.columns.push_back (
+        {std::string (quality_name (quality)) + ", " + condition_name (noisy) +
+                ", n = " + std::to_string (n),
+            2});
+  });
+}
+
+/* Mean PSNR over the first @p most frames of each scene, and over scenes. */
+double
+mean_psnr (const std::vector<Scene> &scenes, int most, int n,
+    const FusionWay &way, const Condition &condition)
+{
+  double sum = 0.0;
+  for (const Scene &scene : scenes) {
+    const Scene part = first_of (scene, most, n);
+    sum +=
+        mean_of (slot_psnr (way.frames (part, condition), part.frames, 0, n));
+  }
+  return sum / double (scenes.size ());
+}
+
+} // namespace
+
 Table
 leakage_table (const std::vector<Scene> &scenes, const Progress &progress)
 {
+  constexpr Qualities kQualities = {FuseQuality::kBest, FuseQuality::kLearned};
   Table table{"fusion-leakage",
       "PSNR (dB) with off-state leakage that is known, mean over scenes",
       {{"leakage"}}, {}};
-  for (const int n : {4, 8})
-    for (const bool noisy : {false, true})
-      for (const FuseQuality quality :
-          {FuseQuality::kBest, FuseQuality::kLearned})
-        table.columns.push_back (
-            {std::string (quality_name (quality)) + ", " +
-                    condition_name (noisy) + ", n = " + std::to_string (n),
-                2});
+  add_columns (table, kQualities);
   for (const char *leak : {"0", "0.001", "0.01", "0.05"}) {
     progress ("leakage " + std::string (leak));
     auto &row = table.rows.emplace_back (std::vector<Cell>{leak});
-    for (const int n : {4, 8})
-      for (const bool noisy : {false, true})
-        for (const FuseQuality quality :
-            {FuseQuality::kBest, FuseQuality::kLearned}) {
-          double sum = 0.0;
-          for (const Scene &scene : scenes) {
-            const Scene part = first_of (scene, kSequenceFrames, n);
-            const auto frames = fusion_way (n, quality, false, 0, leak)
-                                    .frames (part, noisy ? kNoisy : kClean);
-            sum += mean_of (slot_psnr (frames, part.frames, 0, n));
-          }
-          row.emplace_back (sum / double (scenes.size ()));
-        }
+    for_each_column (kQualities, [&] (int n, bool noisy, FuseQuality quality) {
+      row.emplace_back (mean_psnr (scenes, kSequenceFrames, n,
+          fusion_way (n, quality, false, 0, leak), noisy ? kNoisy : kClean));
+    });
   }
+  return table;
+}
+
+Table
+blur_table (const std::vector<Scene> &scenes, const Progress &progress)
+{
+  constexpr int kFrames = 8;
+  constexpr Qualities kQualities = {FuseQuality::kFast, FuseQuality::kLearned};
+  Table table{"fusion-blur",
+      "PSNR (dB) with a lens that blurs, an aligned camera, mean over scenes",
+      {{"blur"}, {"mapping"}}, {}};
+  add_columns (table, kQualities);
+  for (const double blur : {0.0, 0.1, 0.2, 0.3, 0.5})
+    for (const bool known : {false, true}) {
+      if (blur == 0.0 && known)
+        continue;
+      const std::string name = real_text (blur) + " px";
+      progress ("blur of " + name);
+      auto &row = table.rows.emplace_back (
+          std::vector<Cell>{name, known ? "with the blur" : "none"});
+      for_each_column (
+          kQualities, [&] (int n, bool noisy, FuseQuality quality) {
+            Condition condition = noisy ? kNoisy : kClean;
+            condition.blur = blur;
+            condition.mapped = known;
+            row.emplace_back (mean_psnr (
+                scenes, kFrames, n, fusion_way (n, quality), condition));
+          });
+    }
   return table;
 }
 

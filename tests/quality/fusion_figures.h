@@ -45,4 +45,8 @@ std::vector<Table> refinement_tables (
 Table leakage_table (
     const std::vector<Scene> &scenes, const Progress &progress);
 
+/** Mean PSNR of the first 8 frames of every scene by the blur of the lens of an
+ * aligned camera, whose mapping has it or not, clean and noisy. */
+Table blur_table (const std::vector<Scene> &scenes, const Progress &progress);
+
 } // namespace codedexposure::quality

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Prints the tables of docs/fusion-method.md or docs/two-cameras.md, or writes them
- * into it. */
+/* Prints the tables of docs/fusion-method.md or docs/two-cameras.md, or writes
+ * them into it. */
 #include <algorithm>
 #include <iostream>
 #include <iterator>
@@ -91,6 +91,7 @@ tables_of_fusion (const std::vector<Scene> &scenes, const Options &options,
   std::ranges::move (
       refinement_tables (scenes, progress), std::back_inserter (tables));
   tables.push_back (leakage_table (scenes, progress));
+  tables.push_back (blur_table (scenes, progress));
   return tables;
 }
 
@@ -100,6 +101,7 @@ tables_of_two_cameras (
 {
   std::vector<Table> tables = partner_tables (scenes, progress);
   tables.push_back (partner_error_table (scenes, progress));
+  tables.push_back (partner_view_table (scenes, progress));
   return tables;
 }
 

@@ -102,44 +102,76 @@ TEST (FusionQuality, StillLightIsAlsoAveragedOverPixels)
   }
 }
 
-/* Estimated pixels of a drawn scene; the factors were fitted to others. */
-TEST (FusionQuality, ErrorsLieWithinTheUncertainty)
+/* A drawn scene; neither factors nor network have seen it. Measured pixels
+ * count with noise or blur only. */
+void
+expect_errors_within (FuseQuality quality, bool noisy, double blur)
 {
   constexpr int kSize = 96, kSlots = 4;
   const Scene scene = leaves_scene (3, kSize, kSlots);
   const Schedule schedule = fusion_schedule (kSlots);
-  for (const bool noisy : {false, true}) {
-    const Condition condition = noisy ? kNoisy : Condition ();
-    FuseOptions options;
-    options.noise = {condition.electrons, condition.read_noise};
-    auto fuser =
-        Fuser<std::uint8_t>::make (schedule, kSize, kSize, options).value ();
-    ASSERT_TRUE (fuser.take (take (scene, schedule, condition)[0].view ()));
-    std::vector<Picture> fused (kSlots, Picture (kSize, kSize));
-    std::vector<Image<std::uint16_t>> deviations (
-        kSlots, Image<std::uint16_t> (kSize, kSize));
-    std::vector<ImageView<std::uint8_t>> views;
-    std::vector<ImageView<std::uint16_t>> deviation_views;
-    for (std::size_t s = 0; s < kSlots; s++) {
-      views.push_back (fused[s].view ());
-      deviation_views.push_back (deviations[s].view ());
-    }
-    ASSERT_TRUE (fuser.fuse (views, {}, deviation_views));
-    int pixels = 0, within = 0, within_twice = 0;
-    for (std::size_t s = 0; s < kSlots; s++)
-      for (int y = 0; y < kSize; y++)
-        for (int x = 0; x < kSize; x++) {
-          if ((x + 2 * y) % kSlots == int (s))
-            continue;
-          const int error =
-              256 * std::abs (fused[s].at (x, y) - scene.frames[s].at (x, y));
-          pixels++;
-          within += error <= deviations[s].at (x, y);
-          within_twice += error <= 2 * deviations[s].at (x, y);
-        }
-    EXPECT_NEAR (100.0 * within / pixels, 68.0, 12.0) << noisy;
-    EXPECT_NEAR (100.0 * within_twice / pixels, 94.0, 4.0) << noisy;
+  Condition condition = noisy ? kNoisy : Condition ();
+  condition.blur = blur;
+  FuseOptions options;
+  options.quality = quality;
+  options.noise = {condition.electrons, condition.read_noise};
+  auto fuser =
+      Fuser<std::uint8_t>::make (schedule, kSize, kSize, options).value ();
+  const Corrected coded =
+      corrected (take (scene, schedule, condition)[0], schedule, condition);
+  ASSERT_TRUE (fuser.take (coded.frame.view (), {}, coded.errors.view ()));
+  std::vector<Picture> fused (kSlots, Picture (kSize, kSize));
+  std::vector<Image<std::uint16_t>> deviations (
+      kSlots, Image<std::uint16_t> (kSize, kSize));
+  std::vector<ImageView<std::uint8_t>> views;
+  std::vector<ImageView<std::uint16_t>> deviation_views;
+  for (std::size_t s = 0; s < kSlots; s++) {
+    views.push_back (fused[s].view ());
+    deviation_views.push_back (deviations[s].view ());
   }
+  ASSERT_TRUE (fuser.fuse (views, {}, deviation_views));
+  int pixels = 0, within = 0, within_twice = 0;
+  int measured = 0, measured_within = 0;
+  for (std::size_t s = 0; s < kSlots; s++)
+    for (int y = 0; y < kSize; y++)
+      for (int x = 0; x < kSize; x++) {
+        const int error =
+            256 * std::abs (fused[s].at (x, y) - scene.frames[s].at (x, y));
+        const bool inside = error <= deviations[s].at (x, y);
+        if ((x + 2 * y) % kSlots == int (s)) {
+          measured++;
+          measured_within += inside;
+          continue;
+        }
+        pixels++;
+        within += inside;
+        within_twice += error <= 2 * deviations[s].at (x, y);
+      }
+  EXPECT_NEAR (100.0 * within / pixels, 68.0, 12.0);
+  /* Most of what a lens mixed without noise is separated exactly. */
+  if (noisy) {
+    EXPECT_NEAR (100.0 * measured_within / measured, 68.0, 12.0);
+  } else if (blur > 0.0) {
+    EXPECT_NEAR (100.0 * measured_within / measured, 68.0, 20.0);
+  }
+  /* The network learned the width of the 68 % interval only, and what a lens
+   * mixed is separated worse at edges than elsewhere; at the sharp edges of
+   * this scene, more errors are beyond twice of it. */
+  if (quality != FuseQuality::kLearned && blur == 0.0) {
+    EXPECT_NEAR (100.0 * within_twice / pixels, 94.0, 4.0);
+  }
+}
+
+TEST (FusionQuality, ErrorsLieWithinTheUncertainty)
+{
+  for (const FuseQuality quality : {FuseQuality::kFast, FuseQuality::kLearned})
+    for (const bool noisy : {false, true})
+      for (const double blur : {0.0, 0.3}) {
+        SCOPED_TRACE (quality_name (quality));
+        SCOPED_TRACE (noisy);
+        SCOPED_TRACE (blur);
+        expect_errors_within (quality, noisy, blur);
+      }
 }
 
 TEST (FusionQuality, FlickerAndTextureAreSeen)

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "partner_figures.h"
 
+#include <span>
+
 #include "fusion_figures.h"
 #include "must.h"
 
@@ -12,18 +14,21 @@ namespace
 
 constexpr int kFrames = 8;
 constexpr int kBorder = 8;
+/* Around mirrors that a camera of another view does not see, there is one
+ * camera. */
+constexpr int kWideBorder = 24;
 constexpr Condition kClean = {};
 constexpr Condition kNoisy = {.electrons = 10000.0, .read_noise = 5.0};
 
 double
-inner_psnr (const std::vector<Picture> &frames, const Scene &scene)
+inner_psnr (const std::vector<Picture> &frames, const Scene &scene, int border)
 {
   double sum = 0.0;
   for (std::size_t i = 0; i < frames.size (); i++) {
     const Picture &truth = scene.frames[i];
     PooledError error;
-    for (int y = kBorder; y < truth.height () - kBorder; y++)
-      for (int x = kBorder; x < truth.width () - kBorder; x++)
+    for (int y = border; y < truth.height () - border; y++)
+      for (int x = border; x < truth.width () - border; x++)
         error.add (frames[i].at (x, y), truth.at (x, y));
     sum += std::min (error.psnr (), 99.0);
   }
@@ -32,11 +37,12 @@ inner_psnr (const std::vector<Picture> &frames, const Scene &scene)
 
 BeamGain
 mean_gain (const std::vector<Scene> &scenes, int n, FuseQuality quality,
-    const Condition &condition, const Condition &partner)
+    const Condition &condition, const Condition &partner, int border)
 {
   BeamGain mean;
   for (const Scene &scene : scenes) {
-    const BeamGain gain = beam_gain (scene, n, quality, condition, partner);
+    const BeamGain gain =
+        beam_gain (scene, n, quality, condition, partner, border);
     mean.one += gain.one / double (scenes.size ());
     mean.two += gain.two / double (scenes.size ());
   }
@@ -57,7 +63,7 @@ second_camera (const Condition &first, int slots)
 
 BeamGain
 beam_gain (const Scene &scene, int n, FuseQuality quality,
-    const Condition &condition, const Condition &partner)
+    const Condition &condition, const Condition &partner, int border)
 {
   Scene part = scene;
   part.frames.resize (kFrames);
@@ -70,7 +76,7 @@ beam_gain (const Scene &scene, int n, FuseQuality quality,
   options.partner = true;
   const auto two = fuse (coded, schedule, options,
       take (part, must (schedule.complement ()), partner));
-  return {inner_psnr (one, part), inner_psnr (two, part)};
+  return {inner_psnr (one, part, border), inner_psnr (two, part, border)};
 }
 
 std::vector<Table>
@@ -89,7 +95,8 @@ partner_tables (const std::vector<Scene> &scenes, const Progress &progress)
       table.columns.push_back ({mean, 2});
     for (const int n : {4, 8})
       for (const FuseQuality quality :
-          {FuseQuality::kFast, FuseQuality::kBalanced, FuseQuality::kBest}) {
+          {FuseQuality::kFast, FuseQuality::kBalanced, FuseQuality::kBest,
+              FuseQuality::kLearned}) {
         progress ("two cameras, " + std::to_string (n) + " slots");
         auto &row = table.rows.emplace_back (std::vector<Cell>{
             std::to_string (n), std::string (quality_name (quality))});
@@ -108,15 +115,48 @@ partner_tables (const std::vector<Scene> &scenes, const Progress &progress)
   return tables;
 }
 
+namespace
+{
+
+/** What is other than usual with a pair of cameras. */
+struct Change {
+  const char *name;
+  void (*apply) (Condition &condition, Condition &partner, int slots);
+};
+
+/* PSNR of fast, a row for each change. */
+void
+add_rows (Table &table, std::span<const Change> changes,
+    const std::vector<Scene> &scenes, int border, const Progress &progress)
+{
+  for (const int n : {4, 8})
+    for (const char *name : {"clean", "noisy"})
+      for (const char *cameras : {"one", "both"})
+        table.columns.push_back ({std::string (cameras) + ", " + name +
+                                      ", n = " + std::to_string (n),
+            2});
+  for (const Change &change : changes) {
+    progress ("second camera: " + std::string (change.name));
+    auto &row = table.rows.emplace_back (std::vector<Cell>{change.name});
+    for (const int n : {4, 8})
+      for (const Condition &usual : {kClean, kNoisy}) {
+        Condition condition = usual, partner = second_camera (usual, n);
+        change.apply (condition, partner, n);
+        const BeamGain gain = mean_gain (
+            scenes, n, FuseQuality::kFast, condition, partner, border);
+        row.emplace_back (gain.one);
+        row.emplace_back (gain.two);
+      }
+  }
+}
+
+} // namespace
+
 Table
 partner_error_table (const std::vector<Scene> &scenes, const Progress &progress)
 {
-  struct Error {
-    const char *name;
-    void (*apply) (Condition &condition, Condition &partner, int slots);
-  };
   using C = Condition;
-  const Error errors[] = {
+  const Change errors[] = {
       {"none", [] (C &, C &, int) {}},
       {"shift of 0.05 px along both axes",
           [] (C &, C &p, int) { p.shift = 0.05; }},
@@ -133,30 +173,52 @@ partner_error_table (const std::vector<Scene> &scenes, const Progress &progress)
           }},
       {"0.3 px of blur on both",
           [] (C &c, C &p, int) { c.blur = p.blur = 0.3; }},
+      {"the same, which both mappings have",
+          [] (C &c, C &p, int) {
+            c.blur = p.blur = 0.3;
+            c.mapped = p.mapped = true;
+          }},
   };
   Table table{"partner-errors",
       "PSNR (dB) of fast with an error of the second camera that is not known, "
-      "mean over scenes",
+      "or a lens, mean over scenes",
       {{"error"}}, {}};
-  for (const int n : {4, 8})
-    for (const char *name : {"clean", "noisy"})
-      for (const char *cameras : {"one", "both"})
-        table.columns.push_back ({std::string (cameras) + ", " + name +
-                                      ", n = " + std::to_string (n),
-            2});
-  for (const Error &error : errors) {
-    progress ("second camera: " + std::string (error.name));
-    auto &row = table.rows.emplace_back (std::vector<Cell>{error.name});
-    for (const int n : {4, 8})
-      for (const Condition &usual : {kClean, kNoisy}) {
-        Condition condition = usual, partner = second_camera (usual, n);
-        error.apply (condition, partner, n);
-        const BeamGain gain =
-            mean_gain (scenes, n, FuseQuality::kFast, condition, partner);
-        row.emplace_back (gain.one);
-        row.emplace_back (gain.two);
-      }
-  }
+  add_rows (table, errors, scenes, kBorder, progress);
+  return table;
+}
+
+Table
+partner_view_table (const std::vector<Scene> &scenes, const Progress &progress)
+{
+  using C = Condition;
+  static constexpr View kOwn{.mirrored = true,
+      .shift_x = 0.3,
+      .shift_y = 0.4,
+      .rotation = 0.5,
+      .scale = 1.01};
+  const Change views[] = {
+      {"as the first camera, no blur", [] (C &, C &, int) {}},
+      {"mirror image, 0.5 degrees, 1 %, shift (0.3, 0.4), blur of 0.3 px",
+          [] (C &, C &p, int) {
+            p.view = kOwn;
+            p.blur = 0.3;
+            p.mapped = true;
+          }},
+      {"the same, seen at 24 degrees",
+          [] (C &, C &p, int) {
+            p.view = kOwn;
+            p.view->stretch = 1.05;
+            p.view->keystone = 0.011;
+            p.blur = 0.3;
+            p.mapped = true;
+          }},
+  };
+  Table table{"partner-views",
+      "PSNR (dB) of fast with a second camera of its own view, which its "
+      "mapping "
+      "has, mean over scenes, without a border of 24 px",
+      {{"view"}}, {}};
+  add_rows (table, views, scenes, kWideBorder, progress);
   return table;
 }
 

@@ -19,9 +19,10 @@ struct BeamGain {
 
 /** Of the first 8 frames of @p scene.
  *  @p partner  the second camera; what it is worse by is not known to the
- *              fusion. */
+ *              fusion, but by its mapping, if it has one.
+ *  @p border   in place of 8 px. */
 BeamGain beam_gain (const Scene &scene, int n, FuseQuality quality,
-    const Condition &condition, const Condition &partner);
+    const Condition &condition, const Condition &partner, int border = 8);
 
 /** The gain of every quality, on every scene and in the mean. */
 std::vector<Table> partner_tables (
@@ -30,6 +31,10 @@ std::vector<Table> partner_tables (
 /** What is left of the gain of `fast` with errors of the second camera, and a
  * lens that both have. */
 Table partner_error_table (
+    const std::vector<Scene> &scenes, const Progress &progress);
+
+/** `fast` with a second camera that is turned, mirrored and seen aslant. */
+Table partner_view_table (
     const std::vector<Scene> &scenes, const Progress &progress);
 
 } // namespace codedexposure::quality

@@ -3,12 +3,15 @@
 #include "trial.h"
 
 #include <algorithm>
+#include <cmath>
 #include <iostream>
+#include <numbers>
 #include <numeric>
 #include <utility>
 
 #include "bench/bench.h"
 #include "must.h"
+#include "rectify/rectifier.h"
 #include "schedule/sample_grid.h"
 #include "upsample.h"
 
@@ -20,8 +23,29 @@ namespace
 
 using Values = Image<float>;
 
+Mapping
+mapping_of (const Condition &condition, Extent size)
+{
+  Mapping::Parts parts{size, size};
+  parts.psf_sigma = condition.blur;
+  if (const auto &view = condition.view) {
+    const double cx = 0.5 * (size.width - 1), cy = 0.5 * (size.height - 1);
+    const double angle = view->rotation * std::numbers::pi / 180.0;
+    const double c = std::cos (angle) / view->scale;
+    const double s = std::sin (angle) / view->scale;
+    const double along = view->stretch * (view->mirrored ? -1.0 : 1.0);
+    const double z = view->keystone / cx, z0 = 1.0 - view->keystone;
+    /* Of differences from the centre, which Z and the shift are added to. */
+    const double xx = along * c, xy = -s, yx = along * s, yy = c;
+    const double x = cx + view->shift_x, y = cy + view->shift_y;
+    parts.homography = {xx + x * z, xy, x * z0 - xx * cx - xy * cy, yx + y * z,
+        yy, y * z0 - yx * cx - yy * cy, z, 0.0, z0};
+  }
+  return must (Mapping::make (parts));
+}
+
 BenchOptions
-bench_options (const Condition &condition)
+bench_options (const Condition &condition, Extent size)
 {
   BenchOptions options;
   options.full_well = condition.electrons;
@@ -31,6 +55,8 @@ bench_options (const Condition &condition)
   options.psf_sigma = condition.blur;
   options.black_level = condition.black_level;
   options.seed = condition.seed;
+  if (condition.view)
+    options.mapping = mapping_of (condition, size);
   return options;
 }
 
@@ -179,14 +205,33 @@ Score::operator+= (const Score &other)
   return *this;
 }
 
+/* The noise is that which fusion assumes of such a camera. */
+Corrected
+corrected (
+    const Picture &coded, const Schedule &schedule, const Condition &condition)
+{
+  constexpr double kTypicalLight = 0.4;
+  const Extent size{coded.width (), coded.height ()};
+  RectifyOptions options;
+  options.keep_unknown = condition.second;
+  if (condition.electrons > 0.0)
+    options.noise = std::sqrt (kTypicalLight / condition.electrons);
+  const auto rectifier =
+      must (Rectifier::make (mapping_of (condition, size), schedule, options));
+  Corrected made{Picture (size.width, size.height), {size.width, size.height}};
+  must (rectifier.run (
+      coded.view (), made.frame.view (), 0, made.errors.view ()));
+  return made;
+}
+
 std::vector<Picture>
 take (const Scene &scene, const Schedule &schedule, const Condition &condition)
 {
   const int width = scene.frames.front ().width ();
   const int height = scene.frames.front ().height ();
   const auto slots = std::size_t (schedule.slots ());
-  auto bench =
-      must (OpticalBench::make (width, height, bench_options (condition)));
+  auto bench = must (OpticalBench::make (
+      width, height, bench_options (condition, {width, height})));
 
   std::vector<Picture> coded;
   for (std::size_t at = 0; at + slots <= scene.frames.size (); at += slots) {
@@ -195,6 +240,8 @@ take (const Scene &scene, const Schedule &schedule, const Condition &condition)
       bench.expose (std::as_const (scene.frames[at + s]).view (), int (s), 1.0);
     Picture &frame = coded.emplace_back (width, height);
     bench.read_out (coded.size () - 1, frame.view ());
+    if (condition.mapped)
+      frame = corrected (frame, schedule, condition).frame;
   }
   return coded;
 }

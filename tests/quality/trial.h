@@ -35,6 +35,16 @@ struct Way {
   std::optional<Schedule> believed = {};
 };
 
+/** How a camera sees the mirrors. */
+struct View {
+  bool mirrored = false;
+  double shift_x = 0.0, shift_y = 0.0; ///< mirrors
+  double rotation = 0.0;               ///< degrees
+  double scale = 1.0;                  ///< pixels a mirror
+  double stretch = 1.0;  ///< mirrors a pixel along x, by those along y
+  double keystone = 0.0; ///< relative change of the scale to the right border
+};
+
 /** A condition under which coded frames are taken. */
 struct Condition {
   /** Electrons that white makes in an exposure without masks; an element that
@@ -45,6 +55,10 @@ struct Condition {
   double gain = 0.0;
   double shift = 0.0; ///< of mirrors against pixels, px, in x and in y
   double blur = 0.0;  ///< standard deviation, px
+  std::optional<View> view = {}; ///< in place of the shift
+  /** A mapping of the camera, which has its blur and view, corrects them. */
+  bool mapped = false;
+  bool second = false; ///< camera: what it does not know is seen to be so
   double black_level = 0.0;
   std::uint64_t seed = 0; ///< of the noise
 
@@ -53,6 +67,7 @@ struct Condition {
   {
     Condition other = *this;
     other.seed++;
+    other.second = true;
     return other;
   }
 };
@@ -80,6 +95,14 @@ struct Score {
  * none. Noise depends on the number of the frame only. */
 std::vector<Picture> take (
     const Scene &scene, const Schedule &schedule, const Condition &condition);
+
+/** A coded frame of a camera that has a mapping. */
+struct Corrected {
+  Picture frame;
+  Image<float> errors; ///< see Rectifier::run ()
+};
+Corrected corrected (
+    const Picture &coded, const Schedule &schedule, const Condition &condition);
 
 /** The subframes of one coded frame, as they are, before any Reading. */
 std::vector<Picture> split (const Picture &coded, const Way &way);

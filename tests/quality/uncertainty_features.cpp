@@ -6,6 +6,8 @@
 #include <iostream>
 #include <random>
 
+#include <glib.h>
+
 #include "footage.h"
 #include "fuse/engine.h"
 #include "fusion_figures.h"
@@ -41,13 +43,14 @@ cropped (const Scene &scene)
   return part;
 }
 
-/* A tenth of the pixels that are not static. */
+/* A tenth of the pixels that are not static. @blur: of the lens, px. */
 void
-write_features (
-    const Scene &scene, int number, int n, bool noisy, FuseQuality quality)
+write_features (const Scene &scene, int number, int n, bool noisy,
+    FuseQuality quality, double blur)
 {
-  const Condition condition =
+  Condition condition =
       noisy ? Condition{.electrons = 10000.0, .read_noise = 5.0} : Condition{};
+  condition.blur = blur;
   const Schedule schedule = fusion_schedule (n);
   const auto coded = take (scene, schedule, condition);
   FuseOptions options;
@@ -62,10 +65,20 @@ write_features (
   Workers workers (1);
   std::mt19937 dice (std::mt19937::result_type (100 * number + n));
   for (std::size_t frame = 0; frame < coded.size (); frame++) {
-    Field &light = engine->stream ().next ().light;
+    fuse::CodedFrame &next = engine->stream ().next ();
     for (int y = 0; y < height; y++)
       for (int x = 0; x < width; x++)
-        light.row (y)[x] = coded[frame].at (x, y);
+        next.light.row (y)[x] = coded[frame].at (x, y);
+    if (blur > 0.0) {
+      const Corrected seen = corrected (coded[frame], schedule, condition);
+      next.errors = Field (width, height);
+      for (int y = 0; y < height; y++)
+        for (int x = 0; x < width; x++) {
+          next.light.row (y)[x] = seen.frame.at (x, y);
+          next.errors.row (y)[x] =
+              seen.errors.at (x, y) * seen.errors.at (x, y);
+        }
+    }
     engine->stream ().take (engine->kernels ());
     std::vector<Field> fused (std::size_t (n), Field (width, height));
     const auto write = [&] (const fuse::Uncertainty::Row &row) {
@@ -76,7 +89,7 @@ write_features (
         const unsigned drawn = dice ();
         const auto &p = row.pixels[x];
         if (drawn % 16 != 0 || row.is_static[x] > 0.0f ||
-            (p.measured && !noisy))
+            (p.measured && !noisy && blur == 0.0))
           continue;
         /* The scene is rounded; where in its grey level the light was is not
          * known. */
@@ -100,13 +113,15 @@ write_features (
 
 } // namespace
 
-/* uncertainty_features FOLDER|drawn: raw clips with a manifest.json, or the
- * project's own drawn scenes. */
+/* uncertainty_features FOLDER|drawn [BLUR]: raw clips with a manifest.json, or
+ * the project's own drawn scenes; of an aligned camera, whose lens has a blur
+ * that is known, px. */
 int
 main (int argc, char **argv)
 {
-  if (argc != 2)
+  if (argc != 2 && argc != 3)
     return 2;
+  const double blur = argc > 2 ? g_ascii_strtod (argv[2], nullptr) : 0.0;
   std::vector<Scene> scenes;
   if (std::string (argv[1]) == "drawn") {
     scenes.push_back (synthetic_scene (160, 128, kFrames));
@@ -125,7 +140,7 @@ main (int argc, char **argv)
         for (const FuseQuality quality :
             {FuseQuality::kFast, FuseQuality::kBalanced, FuseQuality::kBest,
                 FuseQuality::kLearned})
-          write_features (cropped (scene), number, n, noisy, quality);
+          write_features (cropped (scene), number, n, noisy, quality, blur);
     std::cerr << scene.name << '\n';
   }
   return 0;

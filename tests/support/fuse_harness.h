@@ -41,10 +41,7 @@ expected (const std::string &preset, std::initializer_list<int> numbers,
   const auto fuse_one = [&] {
     std::vector<Image<Pixel>> slots (std::size_t (fuser->slots ()),
         Image<Pixel> (fuser->size ().width, fuser->size ().height));
-    std::vector<ImageView<Pixel>> views;
-    for (auto &slot : slots)
-      views.push_back (slot.view ());
-    EXPECT_TRUE (fuser->fuse (views));
+    EXPECT_TRUE (fuser->fuse (views_of (slots)));
     frames.insert (frames.end (), slots.begin (), slots.end ());
   };
   for (const int number : numbers) {

@@ -427,23 +427,36 @@ reference_shrink (const ShrinkRow &row)
   }
 }
 
+/* With sums of 64 bits, which show whether those of 32 bits are enough. */
+inline std::int64_t
+reference_convolution (const ConvolveRow &row, int x, int k)
+{
+  std::int64_t sum = row.bias[k];
+  for (int t = 0; t < 9; t++)
+    for (int i = 0; i < row.inputs; i++) {
+      const int pair = (t * row.inputs + i) / 2 * row.outputs + k;
+      sum += row.weights[pair * 2 + i % 2] *
+             row.source[t / 3][(x + t % 3) * row.inputs + i];
+    }
+  return sum;
+}
+
 inline void
 reference_convolve (const ConvolveRow &row)
 {
-  for (int x = 0; x < row.pixels; x++) {
+  for (int x = 0; x < row.pixels; x++)
     for (int k = 0; k < row.outputs; k++) {
-      float sum = row.bias[k];
-      for (int t = 0; t < 9; t++)
-        for (int i = 0; i < row.inputs; i++)
-          sum = std::fma (row.weights[(t * row.inputs + i) * row.outputs + k],
-              row.source[t / 3][(x + t % 3) * row.inputs + i], sum);
-      if (row.hidden)
-        sum = std::max (sum, 0.0f);
-      if (row.add)
-        sum += row.add[x * row.outputs + k];
-      row.to[x * row.outputs + k] = sum;
+      const int at = x * row.outputs + k;
+      const float value =
+          row.scale[k] * float (reference_convolution (row, x, k));
+      if (!row.hidden) {
+        row.to[at] = value;
+        continue;
+      }
+      const int steps = int (std::clamp (value + 0.5f, 0.0f, 32767.0f));
+      row.hidden[at] =
+          std::int16_t (std::min (steps + (row.add ? row.add[at] : 0), 32767));
     }
-  }
 }
 
 inline void

@@ -316,6 +316,16 @@ image_of (GstBuffer *buffer, GstCaps *caps)
   return image;
 }
 
+template <typename Pixel>
+std::vector<ImageView<Pixel>>
+views_of (std::vector<Image<Pixel>> &images)
+{
+  std::vector<ImageView<Pixel>> views;
+  for (Image<Pixel> &image : images)
+    views.push_back (image.view ());
+  return views;
+}
+
 /** The pixels of all buffers of @p pad that have come. */
 template <typename Pixel = std::uint8_t>
 std::vector<Image<Pixel>>

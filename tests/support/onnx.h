@@ -79,7 +79,8 @@ public:
       const std::string &output)
   {
     graph_.text (2, "refine").part (11, value (input, shape));
-    graph_.part (12, value (output, {1, 4, shape[2], shape[3]}));
+    graph_.part (12,
+        value (output, {1, fuse::RefineNetwork::kOutputs, shape[2], shape[3]}));
     return Message ()
         .number (1, 7)
         .part (7, graph_)
@@ -109,30 +110,32 @@ private:
   Message graph_;
 };
 
-/** A network for inputs of 1 x kInputs x @p height x @p width. */
+/** The network of these layers for inputs of 1 x kInputs x @p height x @p
+ * width.
+ */
 inline std::string
-onnx_of (const fuse::RefineNetwork &network, int width, int height)
+onnx_of (const std::vector<fuse::RefineNetwork::Convolution> &layers, int width,
+    int height)
 {
   using Net = fuse::RefineNetwork;
   OnnxGraph graph;
   std::string from = "planes";
   for (int l = 0; l < Net::kLayers; l++) {
-    const auto &layer = network.layers ()[std::size_t (l)];
-    const bool last = l == Net::kLayers - 1;
-    const int outputs = last ? Net::kOutputs : Net::kChannels;
+    const auto &layer = layers[std::size_t (l)];
+    const int outputs = layer.outputs;
     std::vector<float> weights;
     for (int k = 0; k < outputs; k++)
       for (int i = 0; i < layer.inputs; i++)
         for (int t = 0; t < 9; t++)
-          weights.push_back (layer.weights[std::size_t (
-              (t * layer.inputs + i) * layer.outputs + k)]);
+          weights.push_back (
+              layer
+                  .weights[std::size_t ((t * layer.inputs + i) * outputs + k)]);
     const std::string n = std::to_string (l);
     graph.tensor ("weights" + n, {outputs, layer.inputs, 3, 3}, weights);
-    graph.tensor ("bias" + n, {outputs},
-        {layer.bias.begin (), layer.bias.begin () + outputs});
+    graph.tensor ("bias" + n, {outputs}, layer.bias);
     graph.node ("Conv", {from, "weights" + n, "bias" + n}, "conv" + n, true);
     std::string to = "conv" + n;
-    if (!last) {
+    if (l < Net::kLayers - 1) {
       graph.node ("Relu", {to}, "relu" + n);
       to = "relu" + n;
     }

@@ -77,6 +77,31 @@ TEST (BeamSum, HasAllLightOfTheExposureWhateverTheMasksWere)
   }
 }
 
+/* Mirrors that one camera does not see tell nothing of the light of both. */
+TEST (BeamSum, IsBlackWhereACameraSeesNothing)
+{
+  const Schedule schedule = schedule_of ("sequential:lattice:4/2");
+  const Pictures slots = moving_clouds (kSize, 4, 1.5);
+  const auto on = coded (schedule, slots)[0];
+  auto off = coded (schedule.complement ().value (), slots)[0];
+  double all = 0.0;
+  const auto whole = sum_of (schedule, on, off, kLevels, 0.0, &all);
+  Image<std::uint8_t> seen (kSize.width, kSize.height);
+  for (int y = 0; y < kSize.height; y++)
+    for (int x = 0; x < kSize.width; x++) {
+      seen.at (x, y) = x >= 30;
+      off.at (x, y) = x >= 30 ? off.at (x, y) : 0;
+    }
+  Image<std::uint8_t> sum (kSize.width, kSize.height);
+  const double ratio =
+      BeamSum (schedule, kSize, 0.0, seen)
+          .add<std::uint8_t> (on.view (), off.view (), kLevels, sum.view ());
+  EXPECT_NEAR (ratio / all, 1.0, 0.01);
+  for (int y = 0; y < kSize.height; y++)
+    for (int x = 0; x < kSize.width; x++)
+      ASSERT_NEAR (sum.at (x, y), x >= 30 ? whole.at (x, y) : 0, 1);
+}
+
 TEST (BeamSum, HasTheNoiseOfAnOrdinaryCamera)
 {
   constexpr double kFullWell = 10000, kReadNoise = 5;

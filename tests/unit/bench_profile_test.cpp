@@ -82,6 +82,21 @@ refusal (const std::string &from, const std::string &to)
   return read ? "" : read.error ().message;
 }
 
+TEST (BenchProfile, ItsBlurIsThatOfAnAlignedCameraIfThereIsNoMapping)
+{
+  BenchProfile profile;
+  profile.camera.size = {64, 48};
+  EXPECT_EQ (profile.known_mapping (), std::nullopt);
+  profile.psf_sigma = Measured{0.3, 0.01};
+  const auto aligned = profile.known_mapping ();
+  ASSERT_TRUE (aligned);
+  EXPECT_TRUE (aligned->one_to_one (1e-9));
+  EXPECT_EQ (aligned->camera (), profile.camera.size);
+  EXPECT_EQ (aligned->psf_sigma (), 0.3);
+  profile.mapping = Mapping (Extent{64, 48});
+  EXPECT_EQ (profile.known_mapping (), profile.mapping);
+}
+
 TEST (BenchProfile, ReadsBackBitForBit)
 {
   for (const BenchProfile &profile : {plain (), full (), of_two ()}) {

@@ -434,29 +434,111 @@ TEST (FuseKernels, MovesToAPartnerEqualTheReference)
           << kernels.name;
 }
 
+/* Random values, or only the smallest and the largest ones, chosen by
+ * @extreme. */
+std::vector<std::int16_t>
+random_shorts (std::size_t count, unsigned seed, bool extreme = false)
+{
+  std::mt19937 random (seed);
+  std::vector<std::int16_t> values;
+  for (std::size_t i = 0; i < count; i++) {
+    const int value = int (random () % 65536) - 32768;
+    values.push_back (std::int16_t (!extreme    ? value
+                                    : value < 0 ? -32768
+                                                : 32767));
+  }
+  return values;
+}
+
+/* A convolution whose sums need all of 32 bits. */
+struct Convolution {
+  static constexpr int kMaxPixels = 37;
+  int inputs, outputs;
+  std::vector<std::int16_t> light, weights, add;
+  std::vector<std::int32_t> bias;
+  std::vector<float> scale;
+
+  Convolution (int some_inputs, int some_outputs, bool extreme)
+      : inputs (some_inputs), outputs (some_outputs),
+        light (random_shorts (std::size_t (3 * row_values ()), 6, extreme)),
+        weights (random_shorts (std::size_t (9 * inputs * outputs), 7)),
+        add (random_shorts (std::size_t (kMaxPixels * outputs), 8)),
+        bias (std::size_t (outputs)), scale (std::size_t (outputs))
+  {
+    const int largest = 65500 / (9 * inputs);
+    for (std::int16_t &weight : weights)
+      weight = std::int16_t (weight % (largest + 1));
+    for (std::size_t k = 0; k < bias.size (); k++) {
+      bias[k] = 40000 * (int (k) - 8);
+      scale[k] = k % 3 == 0 ? 1.0f : 0.00002f * float (k);
+    }
+  }
+  int row_values () const { return (kMaxPixels + 2) * inputs; }
+
+  /** The result of the last layer, or of a hidden one. */
+  std::vector<float> result (
+      const fuse::Kernels &kernels, int pixels, bool hidden, bool adds) const
+  {
+    const std::int16_t *source[] = {light.data () + row_values (),
+        light.data () + 2 * row_values (), light.data ()};
+    std::vector<float> to (std::size_t (pixels * outputs));
+    std::vector<std::int16_t> shorts (to.size ());
+    kernels.convolve ({source, inputs, weights.data (), bias.data (),
+        scale.data (), outputs, pixels, adds ? add.data () : nullptr,
+        hidden ? shorts.data () : nullptr, to.data ()});
+    return hidden ? std::vector<float> (shorts.begin (), shorts.end ()) : to;
+  }
+};
+
 TEST (FuseKernels, ConvolutionsEqualTheReference)
 {
-  for (const int inputs : {1, 32, 36}) {
-    for (const int outputs : {fuse::kConvolveLanes, 2 * fuse::kConvolveLanes}) {
-      const std::size_t row = 40 * std::size_t (inputs);
-      const auto light = random_numbers (3 * row, 6);
-      const auto weights =
-          random_numbers (std::size_t (9 * inputs * outputs), 7);
-      const auto more = random_numbers (std::size_t (38 * outputs), 8);
-      const float *source[] = {
-          light.data () + row, light.data () + 2 * row, light.data ()};
-      for (const bool hidden : {false, true}) {
-        const auto convolved = [&] (const fuse::Kernels &kernels) {
-          std::vector<float> to (more.size ());
-          kernels.convolve (
-              {source, inputs, weights.data (), more.data (), outputs, 37,
-                  hidden, hidden ? more.data () : nullptr, to.data ()});
-          return to;
-        };
-        for (const fuse::Kernels &kernels : fuse::supported_kernels ())
-          EXPECT_EQ (convolved (kernels), convolved (kReference))
-              << kernels.name << ' ' << inputs << ' ' << outputs;
+  for (const int inputs : {2, 32, 36})
+    for (const int outputs : {fuse::kConvolveLanes, 2 * fuse::kConvolveLanes})
+      for (const bool extreme : {false, true}) {
+        const Convolution convolution (inputs, outputs, extreme);
+        for (const auto &[hidden, adds] :
+            {std::pair{false, false}, {true, false}, {true, true}})
+          for (const int pixels : {1, 7, 16, Convolution::kMaxPixels}) {
+            const auto expected =
+                convolution.result (kReference, pixels, hidden, adds);
+            for (const fuse::Kernels &kernels : fuse::supported_kernels ())
+              EXPECT_EQ (
+                  convolution.result (kernels, pixels, hidden, adds), expected)
+                  << kernels.name << ' ' << inputs << ' ' << outputs << ' '
+                  << pixels;
+          }
       }
+}
+
+/* Each value against the weight of its sign: the largest sums there are. */
+TEST (FuseKernels, TheLargestConvolutionsDoNotOverflow)
+{
+  constexpr int kInputs = 2, kOutputs = fuse::kConvolveLanes;
+  const std::vector<float> scale (kOutputs, 1.0f);
+  for (const int sign : {-1, 1}) {
+    /* 18 products of up to 32768; the bias fills up the rest. */
+    const int weight = sign * 3640;
+    const std::vector<std::int16_t> weights (
+        9 * kInputs * kOutputs, std::int16_t (weight));
+    const std::vector<std::int16_t> light (3 * kInputs, -32768);
+    const std::int32_t most = 18 * 3640 * 32768;
+    const std::vector<std::int32_t> bias (
+        kOutputs, -sign * (2147483647 - most));
+    const std::int16_t *source[] = {
+        light.data (), light.data (), light.data ()};
+    for (const fuse::Kernels &kernels : fuse::supported_kernels ()) {
+      std::vector<std::int16_t> hidden (kOutputs);
+      std::vector<float> to (kOutputs);
+      kernels.convolve ({source, kInputs, weights.data (), bias.data (),
+          scale.data (), kOutputs, 1, nullptr, nullptr, to.data ()});
+      EXPECT_EQ (
+          to, std::vector<float> (kOutputs, -float (sign) * 2147483647.0f))
+          << kernels.name;
+      kernels.convolve ({source, kInputs, weights.data (), bias.data (),
+          scale.data (), kOutputs, 1, nullptr, hidden.data (), nullptr});
+      EXPECT_EQ (
+          hidden, std::vector<std::int16_t> (kOutputs, sign < 0 ? 32767 : 0))
+          << kernels.name;
     }
   }
 }

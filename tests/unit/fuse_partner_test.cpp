@@ -98,8 +98,8 @@ TEST (FusePartner, MotionGainsAtEveryQuality)
   const auto slots = truth (3, schedule.slots (), 1.3);
   const auto frames = coded (schedule, slots);
   const auto partners = coded (schedule.complement ().value (), slots);
-  for (const FuseQuality quality :
-      {FuseQuality::kFast, FuseQuality::kBalanced, FuseQuality::kBest}) {
+  for (const FuseQuality quality : {FuseQuality::kFast, FuseQuality::kBalanced,
+           FuseQuality::kBest, FuseQuality::kLearned}) {
     FuseOptions alone;
     alone.quality = quality;
     const double one = psnr (fuse (schedule, frames, {}, alone), slots);
@@ -145,8 +145,8 @@ TEST (FusePartner, GainAndBlackLevelAreNotNeeded)
 
 TEST (FusePartner, AFrameWithoutItsPartnerIsThatOfOneCamera)
 {
-  for (const FuseQuality quality :
-      {FuseQuality::kFast, FuseQuality::kBalanced, FuseQuality::kBest}) {
+  for (const FuseQuality quality : {FuseQuality::kFast, FuseQuality::kBalanced,
+           FuseQuality::kBest, FuseQuality::kLearned}) {
     const Schedule schedule = schedule_of (kPreset);
     const auto slots = truth (4, schedule.slots (), 1.3);
     const auto frames = coded (schedule, slots);
@@ -182,8 +182,8 @@ TEST (FusePartner, WhereItIsSaturatedTheFirstCameraIsAlone)
   for (int y = kLamp.y; y < kLamp.bottom (); y++)
     for (int x = kLamp.x; x < kLamp.right (); x++)
       dazzled[1].at (x, y) = 255;
-  for (const FuseQuality quality :
-      {FuseQuality::kFast, FuseQuality::kBalanced, FuseQuality::kBest}) {
+  for (const FuseQuality quality : {FuseQuality::kFast, FuseQuality::kBalanced,
+           FuseQuality::kBest, FuseQuality::kLearned}) {
     FuseOptions alone;
     alone.quality = quality;
     const auto one = fuse (schedule, frames, {}, alone);
@@ -206,6 +206,41 @@ TEST (FusePartner, WhereItIsSaturatedTheFirstCameraIsAlone)
   }
 }
 
+/* In all frames, whether the scene moves or not. */
+TEST (FusePartner, WhatItDoesNotSeeIsLeftToTheFirstCamera)
+{
+  constexpr int kUnseen = 9, kReach = 16;
+  const Schedule schedule = schedule_of (kPreset);
+  for (const double speed : {0.0, 0.4, 1.3}) {
+    const auto slots = truth (4, schedule.slots (), speed);
+    const auto frames = coded (schedule, slots);
+    auto partners = coded (schedule.complement ().value (), slots);
+    for (auto &partner : partners)
+      for (int y = 0; y < kHeight; y++)
+        std::fill_n (partner.view ().row (y), kUnseen, std::uint8_t (255));
+    for (const FuseQuality quality :
+        {FuseQuality::kFast, FuseQuality::kBalanced, FuseQuality::kBest}) {
+      FuseOptions alone;
+      alone.quality = quality;
+      const auto one = fuse (schedule, frames, {}, alone);
+      const auto some =
+          fuse (schedule, frames, partners, with_partner (quality));
+      ASSERT_EQ (some.size (), one.size ());
+      bool other = false;
+      for (std::size_t s = 0; s < one.size (); s++)
+        for (int y = 0; y < kHeight; y++)
+          for (int x = 0; x < kWidth; x++)
+            if (x < kUnseen + kReach)
+              ASSERT_EQ (some[s].at (x, y), one[s].at (x, y))
+                  << quality_name (quality) << ' ' << speed << ' ' << s << ' '
+                  << x << ' ' << y;
+            else
+              other |= some[s].at (x, y) != one[s].at (x, y);
+      EXPECT_TRUE (other || speed == 0.0);
+    }
+  }
+}
+
 TEST (FusePartner, RegionsHavePartners)
 {
   const Schedule schedule =
@@ -224,8 +259,8 @@ TEST (FusePartner, AllTargetsAndThreadsAgree)
   const auto slots = truth (2, schedule.slots (), 1.3);
   const auto frames = coded (schedule, slots);
   const auto partners = coded (schedule.complement ().value (), slots);
-  for (const FuseQuality quality :
-      {FuseQuality::kFast, FuseQuality::kBalanced, FuseQuality::kBest}) {
+  for (const FuseQuality quality : {FuseQuality::kFast, FuseQuality::kBalanced,
+           FuseQuality::kBest, FuseQuality::kLearned}) {
     FuseOptions options = with_partner (quality);
     options.threads = 1;
     const auto expected = fuse (schedule, frames, partners, options);

@@ -179,6 +179,57 @@ TEST (Rectifier, TakesBackTheBlur)
       0.8 * rms (coded ({}, schedule, 0.5), sharp, 6));
 }
 
+/* A sharp lens mixes so little that weights would add more than they take. */
+TEST (Rectifier, TakesBackTheBlurOfAnAlignedCamera)
+{
+  for (const char *preset :
+      {"sequential:2x2", "sequential:lattice:8/3", "staircase:2x2"}) {
+    SCOPED_TRACE (preset);
+    const Schedule schedule = schedule_of (preset);
+    const auto sharp = coded ({}, schedule);
+    for (const double blur : {0.1, 0.3, 0.5}) {
+      const auto blurred = coded ({}, schedule, blur);
+      const auto rectifier = made (mapping_of ({}, blur), schedule);
+      EXPECT_EQ (rectifier.report ().weighted, 96u * 64u);
+      EXPECT_LT (rms (rectified (rectifier, blurred), sharp, 2),
+          rms (blurred, sharp, 2) / 2)
+          << blur;
+    }
+    const auto sharper = made (mapping_of ({}, 0.04), schedule);
+    EXPECT_EQ (sharper.report ().exact, 96u * 64u);
+    EXPECT_EQ (rectified (sharper, sharp), sharp);
+  }
+}
+
+/* As a camera with noise sees it: the noise as such is no error. */
+TEST (Rectifier, KnowsItsErrors)
+{
+  constexpr double kWell = 10000.0;
+  for (const double blur : {0.2, 0.3, 0.5}) {
+    const Schedule schedule = schedule_of ("sequential:lattice:8/3");
+    const auto rectifier =
+        Rectifier::make (mapping_of ({}, blur), schedule, {.noise = 0.01});
+    ASSERT_TRUE (rectifier.ok ());
+    const auto seen = coded ({}, schedule, blur, 1, kWell);
+    const auto noiseless = coded ({}, schedule);
+    Image<std::uint8_t> mirrors (kSize.width, kSize.height);
+    Image<float> errors (kSize.width, kSize.height);
+    ASSERT_TRUE (
+        rectifier->run (seen.view (), mirrors.view (), 0, errors.view ()));
+    double expected = 0.0, count = 0.0;
+    for (int y = 0; y < kSize.height; y++)
+      for (int x = 0; x < kSize.width; x++) {
+        /* Of light in an eighth of the exposure. */
+        const double electrons = noiseless.at (x, y) / 255.0 * kWell / 8;
+        const double noise = std::sqrt (electrons) * 255.0 / (kWell / 8);
+        expected += noise * noise + std::pow (errors.at (x, y), 2);
+        count++;
+      }
+    const double error = rms (mirrors, noiseless, 0);
+    EXPECT_NEAR (error / std::sqrt (expected / count), 1.0, 0.3) << blur;
+  }
+}
+
 TEST (Rectifier, KeepsTheBrightnessOfAFlatScene)
 {
   for (const char *preset : {"sequential:2x2", "staircase:2x2", "s-matrix:3x1",
@@ -237,6 +288,43 @@ TEST (Rectifier, TakesNinePixelsAMirror)
   EXPECT_LT (together, 0.25 * alone);
 }
 
+/* The camera sees the middle of the mirrors, and light comes from beyond its
+ * frame: where a window does not fit, it is shifted. */
+TEST (Rectifier, SeparatesMirrorsAtTheBorderOfTheFrame)
+{
+  for (const char *preset : {"sequential:2x2", "sequential:lattice:8/3"})
+    for (const double scale : {1.2, 2.0, 3.0}) {
+      const Schedule schedule = schedule_of (preset);
+      const Alignment alignment{0.3, 0.1, 0.5, scale};
+      const Mapping mapping = mapping_of (alignment, 0.3);
+      const auto rectifier = made (mapping, schedule);
+      const auto truth = coded ({}, schedule);
+      const auto frame = coded (alignment, schedule, 0.3);
+      const auto mirrors = rectified (rectifier, frame);
+      const auto seen = [&] (int x, int y) {
+        return x >= 0 && y >= 0 && x < kSize.width && y < kSize.height &&
+               rectifier.sees (x, y);
+      };
+      double separated = 0.0, copied = 0.0;
+      for (int y = 0; y < kSize.height; y++)
+        for (int x = 0; x < kSize.width; x++) {
+          if (!seen (x, y))
+            continue;
+          if (seen (x - 2, y) && seen (x + 2, y) && seen (x, y - 2) &&
+              seen (x, y + 2))
+            continue;
+          const Position at = mapping.camera_at ({double (x), double (y)});
+          const double pixel =
+              frame.at (int (std::lround (at.x)), int (std::lround (at.y)));
+          separated += std::pow (mirrors.at (x, y) - truth.at (x, y), 2);
+          copied += std::pow (pixel - truth.at (x, y), 2);
+        }
+      /* The middle one of nine pixels sees its mirror alone. */
+      EXPECT_LE (separated, (scale < 3.0 ? 0.45 : 1.0) * copied)
+          << preset << ' ' << scale;
+    }
+}
+
 TEST (Rectifier, FollowsATilt)
 {
   const Schedule schedule = schedule_of ("sequential:2x2");
@@ -275,6 +363,59 @@ TEST (Rectifier, PixelsOfSixteenBitsAreThoseOfEight)
   for (int y = 0; y < kSize.height; y++)
     for (int x = 0; x < kSize.width; x++)
       ASSERT_EQ (out.at (x, y), whole.at (x, y));
+}
+
+/* The estimate of a mirror has a part of one saturated pixel among others. */
+TEST (Rectifier, KeepsSaturationWhereItIsAsked)
+{
+  const Alignment shifted{.shift_x = 0.4, .shift_y = 0.3};
+  const Schedule schedule = schedule_of ("sequential:2x2");
+  const Mapping mapping = mapping_of (shifted);
+  const Rectifier plain = *Rectifier::make (mapping, schedule);
+  const Rectifier keeping =
+      *Rectifier::make (mapping, schedule, {.keep_unknown = true});
+  Image<std::uint8_t> frame = coded (shifted, schedule);
+  const Image<std::uint8_t> before = rectified (plain, frame);
+  EXPECT_EQ (rectified (keeping, frame), before);
+  frame.at (40, 30) = 255;
+  const Image<std::uint8_t> without = rectified (plain, frame);
+  const Image<std::uint8_t> with = rectified (keeping, frame);
+  int saturated = 0, seen = 0;
+  for (int y = 0; y < kSize.height; y++)
+    for (int x = 0; x < kSize.width; x++) {
+      seen += without.at (x, y) == 255;
+      if (with.at (x, y) == 255)
+        saturated++;
+      else
+        EXPECT_EQ (with.at (x, y), before.at (x, y)) << x << ' ' << y;
+    }
+  EXPECT_EQ (saturated, 5 * 5);
+  EXPECT_LT (seen, 2);
+  frame.at (40, 30) = 200;
+  Image<std::uint8_t> mirrors (kSize.width, kSize.height);
+  EXPECT_TRUE (keeping.run (frame.view (), mirrors.view (), 200));
+  EXPECT_EQ (mirrors.at (40, 30), 200);
+}
+
+TEST (Rectifier, KeepsWhatTheCameraDoesNotSeeWhereItIsAsked)
+{
+  const Alignment shifted{.shift_x = 7.4};
+  const Schedule schedule = schedule_of ("sequential:2x2");
+  const auto frame = coded (shifted, schedule);
+  const Rectifier plain = made (mapping_of (shifted), schedule);
+  const Rectifier keeping = *Rectifier::make (
+      mapping_of (shifted), schedule, {.noise = 0.001, .keep_unknown = true});
+  const auto black = rectified (plain, frame);
+  const auto marked = rectified (keeping, frame);
+  EXPECT_EQ (plain.report ().unseen, 7u * 64u);
+  for (int y = 0; y < kSize.height; y++)
+    for (int x = 0; x < kSize.width; x++) {
+      EXPECT_EQ (plain.sees (x, y), x >= 7);
+      EXPECT_EQ (marked.at (x, y), x >= 7 ? black.at (x, y) : 255);
+      if (x < 7) {
+        EXPECT_EQ (black.at (x, y), 0);
+      }
+    }
 }
 
 TEST (Rectifier, NothingComesOverFromTheOtherSideOfTheFrame)
@@ -388,8 +529,10 @@ TEST (Rectifier, RefusesWindowsThatTakeTooLong)
   }
   parts.psf_sigma = 2.0;
   EXPECT_EQ (error_of (parts), "");
-  /* Copied pixels need no windows. */
+  /* An aligned camera, too. */
   parts.homography[2] = 0.0;
-  parts.psf_sigma = 16.0;
   EXPECT_EQ (error_of (parts), "");
+  parts.psf_sigma = 16.0;
+  EXPECT_NE (error_of (parts).find ("focus the camera"), std::string::npos)
+      << error_of (parts);
 }

@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* The uncertainty of fused pixels. */
 #include <cmath>
+#include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -40,7 +43,8 @@ struct Result {
 /* Of the last coded frame. */
 Result
 fuse (const Schedule &schedule, const FuseOptions &options, int noise,
-    bool deviations = true)
+    bool deviations = true,
+    const std::optional<ImageView<const float>> &errors = {})
 {
   auto fuser =
       Fuser<std::uint8_t>::make (schedule, kWidth, kHeight, options).value ();
@@ -56,7 +60,7 @@ fuse (const Schedule &schedule, const FuseOptions &options, int noise,
   for (auto &image : result.deviations)
     deviation_views.push_back (image.view ());
   for (const auto &frame : coded_frames (noise)) {
-    EXPECT_TRUE (fuser.take (frame.view ()));
+    EXPECT_TRUE (fuser.take (frame.view (), {}, errors));
     EXPECT_TRUE (fuser.fuse (views, {}, deviation_views));
   }
   return result;
@@ -129,6 +133,35 @@ TEST (Uncertainty, StaticPixelsHaveTheNoiseOfTheirMean)
       (light * white + 25.0) / (white * white) * 65025.0 + 1.0 / 12.0;
   EXPECT_NEAR (result.deviations[0].at (4, 9) / 256.0,
       std::sqrt (variance / 3.0 + 1.0 / 12.0), 0.1);
+}
+
+TEST (Uncertainty, KnownErrorsOfACodedFrameAreAdded)
+{
+  const Schedule schedule = test::schedule_of ("sequential:2x2");
+  Image<float> errors (kWidth, kHeight);
+  for (int y = 0; y < kHeight; y++)
+    for (int x = 0; x < kWidth; x++)
+      errors.at (x, y) = float (x % 5) / 2;
+  const Result without = fuse (schedule, {}, 3);
+  const Result with =
+      fuse (schedule, {}, 3, true, std::as_const (errors).view ());
+  EXPECT_EQ (with.fused, without.fused);
+  for (std::size_t s = 0; s < 4; s++)
+    for (int y = 0; y < kHeight; y++)
+      for (int x = 0; x < kWidth; x++)
+        ASSERT_NEAR (with.deviations[s].at (x, y),
+            std::hypot (
+                without.deviations[s].at (x, y), 256 * errors.at (x, y)),
+            1.0);
+  auto fuser =
+      Fuser<std::uint8_t>::make (schedule, kWidth, kHeight, {}).value ();
+  const Image<float> small (kWidth, kHeight - 1);
+  const auto refused =
+      fuser.take (coded_frames (0)[0].view (), {}, small.view ());
+  ASSERT_FALSE (refused);
+  EXPECT_NE (refused.error ().message.find ("errors of the coded frame"),
+      std::string::npos)
+      << refused.error ().message;
 }
 
 TEST (Uncertainty, EachSlotOfARegionHasItsOwn)

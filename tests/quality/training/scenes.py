@@ -10,7 +10,8 @@ import subprocess
 import cv2
 import numpy as np
 
-WIDTH, HEIGHT, FRAMES = 384, 288, 16
+WIDTH, HEIGHT, FRAMES = 384, 288, 24
+MOST_CODED = 4  # frames of a view
 MARGIN = 80  # of the background, for its motion
 
 # Package, licences of its photographs, what to leave out: drawings, pictures
@@ -73,7 +74,7 @@ class Drawing:
     """Draws scene number @p index: the same seed and index, the same scene."""
 
     def __init__(self, pictures, seed, index):
-        self.pictures = pictures
+        self.pictures, self.index = pictures, index
         self.random = np.random.default_rng((seed, index))
 
     def texture(self, height, width):
@@ -273,7 +274,18 @@ class Drawing:
         return frames.reshape(-1, HEIGHT, WIDTH)[first:]
 
     def draw(self):
-        return self.synthetic() if self.random.random() < .06 else self.scene()
+        frames = self.synthetic() if self.random.random() < .06 else \
+            self.scene()
+        return self.overexposed(frames) if self.index % 4 == 3 else frames
+
+    def overexposed(self, frames):
+        """With more contrast than a camera has: large parts are white, black or
+        both, where noise is to one side."""
+        rng = self.random
+        gain = math.exp(rng.uniform(math.log(1.3), math.log(4)))
+        fixed = rng.choice([0., rng.uniform(0, 255), 255.], p=[.6, .2, .2])
+        values = np.clip((np.arange(256) - fixed) * gain + fixed, 0, 255)
+        return np.round(values).astype(np.uint8)[frames]
 
 
 def launch(pipeline):
@@ -329,35 +341,43 @@ def noise_level(full_well, read_noise, n):
 
 
 def observe(scene, rng, folder):
-    """A scene as a camera sees it, and fused: a dict of arrays."""
+    """A scene as a camera, or two of them, see it, and fused: a dict."""
     schedule, n, slot = choose_schedule(rng)
     quality = rng.choice(['best', 'balanced', 'fast'], p=[.6, .22, .18])
+    lookahead, pair = rng.random() < .5, rng.random() < .3
     full_well, read_noise = 0., 0.
-    if rng.random() < .3:
+    if rng.random() < .4:
         full_well = math.exp(rng.uniform(math.log(3000), math.log(40000)))
         read_noise = rng.uniform(0, 10)
-    coded_count = len(scene) // n
+    scene = scene[:min(len(scene) // n, MOST_CODED) * n]
     source, coded, fused = (folder / f'{name}.raw'
                             for name in ('scene', 'coded', 'fused'))
-    scene[:coded_count * n].tofile(source)
+    scene.tofile(source)
+    noise = f'full-well={full_well} read-noise={read_noise}'
+
+    def camera(more):
+        return f'codedexposure-sim schedule={schedule} {noise} ' \
+            f'seed={rng.integers(1, 1 << 30)} {more}'
+
+    second = f'! pair.on light. ! queue ! {camera("beam=off")} ! pair.off ' \
+        'codedexposure-pair name=pair' if pair else ''
     launch(f'filesrc location={source} ! rawvideoparse format=gray8 '
            f'width={WIDTH} height={HEIGHT} framerate={25 * n}/1 ! '
-           f'codedexposure-sim schedule={schedule} full-well={full_well} '
-           f'read-noise={read_noise} seed={rng.integers(1, 1 << 30)} ! '
-           f'tee name=t ! queue ! filesink location={coded} t. ! queue ! '
+           f'tee name=light ! queue ! {camera("")} {second} ! tee name=t ! '
+           f'queue ! filesink location={coded} t. ! queue ! '
            f'codedexposure-fuse quality={quality} threads=1 '
-           f'full-well={full_well} read-noise={read_noise} ! '
+           f'lookahead={int(lookahead)} {noise} ! '
            f'filesink location={fused}')
-    shape = (-1, HEIGHT, WIDTH)
-    coded = np.fromfile(coded, np.uint8).reshape(shape)
+    coded = np.fromfile(coded, np.uint8).reshape(-1, HEIGHT, WIDTH)
     fused = np.fromfile(fused, np.uint8).reshape(-1, n, HEIGHT, WIDTH)
-    truth = scene[:coded_count * n].reshape(-1, n, HEIGHT, WIDTH)
+    truth = scene.reshape(-1, n, HEIGHT, WIDTH)
+    assert len(coded) == len(fused) == len(truth), schedule
     if not full_well:
         for c, t in zip(coded, truth):
             assert (np.take_along_axis(t, slot[None], 0)[0] == c).all(), schedule
     return {'truth': truth, 'fused': fused, 'coded': coded,
             'slot': slot.astype(np.int8), 'schedule': schedule,
-            'quality': quality,
+            'quality': quality, 'lookahead': lookahead, 'pair': pair,
             'noise': noise_level(full_well, read_noise, n)}
 
 

@@ -153,7 +153,7 @@ TEST_F (MoireCalibTest, ACameraInTheOtherBeamStandsAgainstTheSameMirrors)
   EXPECT_NEAR (double_field (reading, "rotation"), 0.5, 0.05);
 
   /* The tag says the beam, without the property. */
-  begin ("mode=map frames=2", "beam=off gain=0.8 ");
+  begin ("mode=map frames=6", "beam=off gain=0.8 ");
   const MessagePtr said = wait_for ("moirecalib/mapping");
   ASSERT_TRUE (said);
   const auto mapping = Mapping::from_json (string_field (said, "mapping"));

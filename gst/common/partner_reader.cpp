@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "common/partner_reader.h"
 
-#include <tuple>
-
 #include "base/pixels.h"
 #include "base/try.h"
 
@@ -53,7 +51,7 @@ PartnerReader::read (GstBuffer *coded, int bits)
   const View seen = view_of<const Pixel> (mapped_->frame);
   if (!rectifier_)
     return std::optional<View> (seen);
-  auto &image = std::get<Image<Pixel> &> (std::tie (narrow_, wide_));
+  Image<Pixel> &image = this->image<Pixel> ();
   const auto [width, height] = rectifier_->mirrors ();
   if (image.width () != width || image.height () != height)
     image = Image<Pixel> (width, height);

@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <optional>
+#include <tuple>
 
 #include "base/image.h"
 #include "common/coded_filter.h"
@@ -27,6 +28,12 @@ public:
   template <typename Pixel>
   Result<std::optional<ImageView<const Pixel>>> read (
       GstBuffer *coded, int bits);
+  /** What read () has given, with a rectifier, for its correction. */
+  template <typename Pixel>
+  ImageView<Pixel> rectified ()
+  {
+    return image<Pixel> ().view ();
+  }
 
 private:
   struct Mapped {
@@ -38,6 +45,11 @@ private:
   Extent size_;
   std::shared_ptr<const Rectifier> rectifier_; ///< null: a pixel a mirror
   std::unique_ptr<Mapped> mapped_;
+  template <typename Pixel>
+  Image<Pixel> &image ()
+  {
+    return std::get<Image<Pixel> &> (std::tie (narrow_, wide_));
+  }
   Image<std::uint8_t> narrow_; ///< resampled
   Image<std::uint16_t> wide_;
 };

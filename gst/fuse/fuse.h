@@ -13,16 +13,20 @@
 #include "common/coded_filter.h"
 #include "common/partner_reader.h"
 #include "fuse/fuser.h"
+#include "fuse/partner_correction.h"
 
 namespace codedexposure::gst::fuse
 {
 
 using AnyFuser = std::variant<Fuser<std::uint8_t>, Fuser<std::uint16_t>>;
+using AnyCorrection = std::variant<PartnerCorrection<std::uint8_t>,
+    PartnerCorrection<std::uint16_t>>;
 
 /** Everything that follows from the format and the settings. */
 struct Plan {
   AnyFuser fuser;
-  std::optional<PartnerReader> partners; ///< none: they are not used
+  std::optional<PartnerReader> partners;   ///< none: they are not used
+  std::optional<AnyCorrection> correction; ///< of partners; none: not worth it
   GstVideoInfo fused, uncertainty;
   Reach reach;
 };
@@ -70,6 +74,8 @@ private:
 
   /** None, with a warning if there are any, when partners cannot be used. */
   std::optional<PartnerReader> plan_partners (const CodedFormat &format) const;
+  bool plan_correction (
+      Plan &plan, const CodedFormat &format, const FuseOptions &options) const;
   template <typename Pixel>
   Result<guint64> take_pixels (GstBuffer *buffer, MappedFrame &coded);
   GstFlowReturn take (CodedFrame frame);

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <utility>
 
+#include "base/try.h"
 #include "base/workers.h"
 #include "common/element.h"
 
@@ -54,7 +55,8 @@ Fuse::properties ()
           guint (Fuser<std::uint8_t>::kMaxLookahead)},
       {"threads", "Threads",
           "Threads, which do not change pixels; 0: one for each processor, and "
-          "for quality fast without refine, the streaming thread only",
+          "for quality fast without refine, the streaming thread only, but to "
+          "correct the frames of a second camera",
           kReadWrite, &FuseOptions::threads, 0u, guint (Workers::kMost)},
       {"full-well", "Full well",
           "Electrons at white in a pixel that is on for the whole exposure, as "
@@ -179,7 +181,7 @@ Fuse::plan_partners (const CodedFormat &format) const
   if (!partner)
     return std::nullopt;
   RectifyOptions options = rectify_options (format.schedule);
-  options.keep_unknown = true;
+  options.keep_unknown = options.correct = true;
   auto made = PartnerReader::make (*partner, format, options);
   if (made)
     return *std::move (made);
@@ -187,6 +189,27 @@ Fuse::plan_partners (const CodedFormat &format) const
       "The frames of the second camera are not used: " + made.error ().message +
           ".");
   return std::nullopt;
+}
+
+/* False when it was stopped, or on an error, which is posted. */
+bool
+Fuse::plan_correction (
+    Plan &plan, const CodedFormat &format, const FuseOptions &options) const
+{
+  const Rectifier *partner =
+      plan.partners ? plan.partners->rectifier () : nullptr;
+  if (!partner || !partner->corrects ())
+    return true;
+  const auto make = [&]<typename Pixel> (const Fuser<Pixel> &) -> Result<void> {
+    ASSIGN_OR_RETURN (
+        plan.correction, PartnerCorrection<Pixel>::make (format.schedule,
+                             *partner, options, stop_token ()));
+    return {};
+  };
+  const Result<void> made = std::visit (make, plan.fuser);
+  if (!made && made.error ().code != ErrorCode::cancelled)
+    post_error (made.error ().message);
+  return made.ok ();
 }
 
 bool
@@ -217,9 +240,11 @@ Fuse::plan (const CodedFormat &format)
   caps.of (PadKind::coded).reset (gst_caps_ref (format.caps.get ()));
   fused.reset (scale_caps (rectified.get (), coded_to_fused (format.schedule)));
   uncertainty = of_sixteen_bits (fused.get ());
-  Plan made{std::move (*fuser), std::move (partners), {}, {},
+  Plan made{std::move (*fuser), std::move (partners), {}, {}, {},
       {options.noise.full_well > 0.0 ? kMaxReach.history : 1,
           options.lookahead}};
+  if (!plan_correction (made, format, options))
+    return false;
   gst_video_info_from_caps (&made.fused, fused.get ());
   gst_video_info_from_caps (&made.uncertainty, uncertainty.get ());
   plan_ = std::move (made);

@@ -47,6 +47,7 @@ struct FilterError {
  * row_length (), and errors, kNoises of each after the other. */
 struct Filters {
   const float *weights;
+  /** Null: the first filter of each mirror is used. */
   const WindowScale *scales;
   const FilterError *errors;
   /** Ratios of the scene's variance and the noise's: below each, the filters

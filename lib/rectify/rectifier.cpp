@@ -17,6 +17,7 @@
 #include "base/try.h"
 #include "base/view_check.h"
 #include "rectify/filters.h"
+#include "rectify/sight.h"
 
 #define CODEDEXPOSURE_KERNELS(target)                                          \
   namespace codedexposure::rectify_##target                                    \
@@ -58,6 +59,9 @@ constexpr double kOwn = 1.0 - 2.0 * kTolerance;
  * itself one slot later. */
 constexpr double kCorrelationLength = 2.0, kPersistence = 0.8;
 
+/* Where mirrors have a smaller mean share in their pixels than this part of what
+ * they have in one that is centred on them, corrections pay. */
+constexpr double kBetween = 0.9;
 /* A mirror is mixed if no pixel gets this part of the light that a pixel
  * centred on it gets. */
 constexpr double kMixed = 0.6;
@@ -73,13 +77,22 @@ struct Rectifier::Plan {
   rectify::Kernels kernels;
   float noise = 0.0f; // rms, as a part of white
   bool keep_unknown = false;
+  std::optional<Sight> sight; // of correct ()
+  int reach = 0;              // mirrors on which one depends, to each side
 
+  template <typename Pixel>
+  rectify::RectifyRow<Pixel> *run_row () const;
+  rectify::Filters filters_for (int largest) const;
   template <typename Pixel>
   Result<void> run (ImageView<const Pixel> from, ImageView<Pixel> to,
       int largest, const std::optional<ImageView<float>> &errors) const;
   template <typename Pixel>
   void mark_unknown (
       ImageView<const Pixel> from, ImageView<Pixel> to, Pixel largest) const;
+  template <typename Pixel>
+  Result<void> correct (ImageView<Pixel> mirrors,
+      ImageView<const std::uint16_t> expected, Workers &workers,
+      int largest) const;
 };
 
 namespace
@@ -105,6 +118,10 @@ public:
   double effort () const { return whole_ ? 0.0 : bank_.effort (); }
   void place_row (int y, Place *row, RectifyReport &report);
   FilterBank::Tables filters () && { return std::move (bank_).tables (); }
+  const WeightSolver &solver () const { return bank_.solver (); }
+  /** Mean share of mirrors that are not copied in their best pixel, as a part
+   * of that of a pixel centred on its mirror. */
+  double mean_share () const { return shares_ / (weighted_ * best_share_); }
 
 private:
   /* Persistence is that of the part with the shortest slots. */
@@ -126,6 +143,7 @@ private:
   bool whole_;
   bool single_;       // pixel per mirror; of several, all are used
   double best_share_; // of a pixel centred on its mirror
+  double shares_ = 0.0, weighted_ = 0.0;
   std::vector<Position> seen_;
   std::vector<int> around_;
 };
@@ -159,6 +177,8 @@ Planner::place (Position seen, Offset mirror, int around, RectifyReport &report)
     return pixel;
   }
   report.weighted++;
+  weighted_ += 1.0;
+  shares_ += share;
   report.mixed += share < kMixed * best_share_;
   const int taps = bank_.solver ().taps ();
   if (mirror.y >= coded_rows_ || taps > camera.width || taps > camera.height)
@@ -279,6 +299,11 @@ try {
   plan->places = Image<Place> (plan->mirrors.width, plan->mirrors.height);
   for (int y = 0; y < plan->mirrors.height; y++)
     planner.place_row (y, plan->places.view ().row (y), plan->report);
+  if (options.correct && planner.mean_share () < kBetween)
+    plan->sight = Sight::make (mapping, planner.solver ());
+  if (plan->sight)
+    plan->reach =
+        planner.solver ().reach (plan->taps / 2) + plan->sight->reach ();
   plan->filters = std::move (planner).filters ();
   if (plan->report.exact + plan->report.weighted == 0)
     return Error{"with this mapping the camera sees none of the mirrors; use "
@@ -344,6 +369,26 @@ Rectifier::Plan::mark_unknown (
 }
 
 template <typename Pixel>
+rectify::RectifyRow<Pixel> *
+Rectifier::Plan::run_row () const
+{
+  return std::get<rectify::RectifyRow<Pixel> *const(&)[3]> (
+      std::tie (kernels.bytes, kernels.words))[(taps - kWindows[0].taps) / 2];
+}
+
+rectify::Filters
+Rectifier::Plan::filters_for (int largest) const
+{
+  rectify::Filters with{filters.weights.data (), filters.scales.data (),
+      filters.errors.data (), {},
+      noise * noise * float (largest) * float (largest), float (largest)};
+  for (std::size_t i = 0; i + 1 < FilterBank::kNoises.size (); i++)
+    with.limits[i] =
+        float (1.0 / (FilterBank::kNoises[i] * FilterBank::kNoises[i + 1]));
+  return with;
+}
+
+template <typename Pixel>
 Result<void>
 Rectifier::Plan::run (ImageView<const Pixel> from, ImageView<Pixel> to,
     int largest, const std::optional<ImageView<float>> &errors) const
@@ -359,22 +404,125 @@ Rectifier::Plan::run (ImageView<const Pixel> from, ImageView<Pixel> to,
         ViewBytes::of (*errors), "errors", mirrors.width, mirrors.height));
   if (largest <= 0)
     largest = std::numeric_limits<Pixel>::max ();
-  rectify::Filters with{filters.weights.data (), filters.scales.data (),
-      filters.errors.data (), {},
-      noise * noise * float (largest) * float (largest), float (largest)};
-  for (std::size_t i = 0; i + 1 < FilterBank::kNoises.size (); i++)
-    with.limits[i] =
-        float (1.0 / (FilterBank::kNoises[i] * FilterBank::kNoises[i + 1]));
-  const std::size_t window = std::size_t (taps - kWindows[0].taps) / 2;
-  const auto run_row = std::get<rectify::RectifyRow<Pixel> *const(&)[3]> (
-      std::tie (kernels.bytes, kernels.words))[window];
+  const rectify::Filters with = filters_for (largest);
   const rectify::Source<Pixel> source{from.row (0), from.stride, from.width};
   for (int y = 0; y < mirrors.height; y++)
-    run_row (source, places.view ().row (y), mirrors.width, with, to.row (y),
-        errors ? errors->row (y) : nullptr);
+    run_row<Pixel> () (source, places.view ().row (y), mirrors.width, with,
+        to.row (y), errors ? errors->row (y) : nullptr);
   if (keep_unknown)
     mark_unknown (from, to, Pixel (largest));
   return {};
+}
+
+namespace
+{
+
+constexpr float kWideWhite = 65535.0f;
+
+/* @p expected in units of which kWideWhite are as much as @p largest of
+ * @p mirrors, by the ratio of least squares. */
+template <typename Pixel>
+Image<std::uint16_t>
+scaled_light (ImageView<const std::uint16_t> expected,
+    ImageView<const Pixel> mirrors, int largest)
+{
+  double products = 0.0, squares = 0.0;
+  for (int y = 0; y < expected.height; y++) {
+    const std::uint16_t *light = expected.row (y);
+    const Pixel *made = mirrors.row (y);
+    float of_row = 0.0f, squares_of_row = 0.0f;
+    for (int x = 0; x < expected.width; x++) {
+      const float known = made[x] < largest ? float (light[x]) : 0.0f;
+      of_row += known * float (made[x]);
+      squares_of_row += known * known;
+    }
+    products += double (of_row);
+    squares += double (squares_of_row);
+  }
+  const float scale =
+      squares > 0.0 ? float (products / squares) * kWideWhite / float (largest)
+                    : 0.0f;
+  Image<std::uint16_t> scaled (expected.width, expected.height);
+  for (int y = 0; y < expected.height; y++)
+    for (int x = 0; x < expected.width; x++)
+      scaled.view ().row (y)[x] = std::uint16_t (
+          std::min (float (expected.row (y)[x]) * scale + 0.5f, kWideWhite));
+  return scaled;
+}
+
+/* Of a row but for its ends; what is saturated stays so, and nothing else gets
+ * it. */
+template <typename Pixel>
+void
+take_off (const std::uint16_t *made, const std::uint16_t *truth, int count,
+    int ends, int largest, Pixel *row)
+{
+  const float scale = float (largest) / kWideWhite;
+  for (int x = ends; x < count - ends; x++) {
+    const float better = std::clamp (
+        float (row[x]) - float (int (made[x]) - int (truth[x])) * scale, 0.0f,
+        float (largest - 1));
+    row[x] = row[x] < largest ? Pixel (better + 0.5f) : row[x];
+  }
+}
+
+} // namespace
+
+template <typename Pixel>
+Result<void>
+Rectifier::Plan::correct (ImageView<Pixel> to,
+    ImageView<const std::uint16_t> expected, Workers &workers,
+    int largest) const
+try {
+  if (!sight)
+    return Error{"nothing was prepared to correct frames; see corrects ()"};
+  RETURN_IF_ERROR (check_view (
+      ViewBytes::of (to), "mirrors", mirrors.width, mirrors.height));
+  RETURN_IF_ERROR (check_view (ViewBytes::of (expected), "expected light",
+      mirrors.width, std::min (expected.height, mirrors.height)));
+  if (largest <= 0)
+    largest = std::numeric_limits<Pixel>::max ();
+  const auto light =
+      scaled_light<Pixel> (expected, ImageView<const Pixel> (to), largest);
+  Image<std::uint16_t> seen (camera.width, camera.height);
+  sight->run (kernels, light.view (), seen.view (), workers);
+  const ImageView<const std::uint16_t> view = std::as_const (seen).view ();
+  const rectify::Source<std::uint16_t> source{
+      view.row (0), view.stride, view.width};
+  const rectify::Filters with = filters_for (int (kWideWhite));
+  workers.run (std::max (expected.height - 2 * reach, 0), [&] (int row, int) {
+    const int y = reach + row;
+    std::vector<std::uint16_t> made (std::size_t (mirrors.width));
+    run_row<std::uint16_t> () (source, places.view ().row (y), mirrors.width,
+        with, made.data (), nullptr);
+    take_off (made.data (), light.view ().row (y), mirrors.width, reach,
+        largest, to.row (y));
+  });
+  return {};
+} catch (const std::bad_alloc &) {
+  return out_of_memory ();
+}
+
+bool
+Rectifier::corrects () const
+{
+  return plan_->sight.has_value ();
+}
+
+Result<void>
+Rectifier::correct (ImageView<std::uint8_t> mirrors,
+    ImageView<const std::uint16_t> expected, Workers &workers,
+    int largest) const
+{
+  return plan_->correct (mirrors, expected, workers, largest);
+}
+
+Result<void>
+Rectifier::correct (ImageView<std::uint16_t> mirrors,
+    ImageView<const std::uint16_t> expected, Workers &workers,
+    int largest) const
+{
+  return plan_->correct (mirrors, expected, workers, largest);
 }
 
 Result<void>

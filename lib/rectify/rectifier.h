@@ -9,6 +9,7 @@
 
 #include "base/image.h"
 #include "base/result.h"
+#include "base/workers.h"
 #include "mapping/mapping.h"
 #include "schedule/schedule.h"
 
@@ -26,6 +27,8 @@ struct RectifyOptions {
    * value get it as well, and so do those that the camera does not see, so that
    * what is not known is seen to be so. */
   bool keep_unknown = false;
+  /** Prepares correct (). */
+  bool correct = false;
 
   bool operator== (const RectifyOptions &) const = default;
 };
@@ -92,6 +95,24 @@ public:
   Result<void> run (ImageView<const std::uint16_t> camera,
       ImageView<std::uint16_t> mirrors, int largest = 0,
       const std::optional<ImageView<float>> &errors = {}) const;
+
+  /** Whether correct () is prepared, which it is only where it pays: where many
+   * mirrors lie between pixels. */
+  bool corrects () const;
+  /** Takes out of @p mirrors, which run () has made, what it makes wrong of a
+   * scene of the light @p expected: what it would make of such a camera frame,
+   * less that light. The noise stays as it is, and so do the outermost mirrors
+   * and those of the largest value.
+   * @p expected  of the mirrors of the first rows or of all, in any unit and
+   *              with any error; the smaller, the less is left of that of
+   *              run ().
+   * Error when nothing is prepared or a view has a wrong size. */
+  Result<void> correct (ImageView<std::uint8_t> mirrors,
+      ImageView<const std::uint16_t> expected, Workers &workers,
+      int largest = 0) const;
+  Result<void> correct (ImageView<std::uint16_t> mirrors,
+      ImageView<const std::uint16_t> expected, Workers &workers,
+      int largest = 0) const;
 
 private:
   struct Plan;

@@ -166,13 +166,15 @@ rectify_row (const rectify::Source<Pixel> &from, const rectify::Place *places,
     Window<kTaps> window;
     window.read (first, stride);
     /* Differences beyond the noise are the scene's. */
-    const rectify::WindowScale &scale = filters.scales[place.filter];
-    const float scene =
-        (window.roughness () * to_noise * scale.darkness - 1.0f) *
-        scale.smoothness;
+    float scene = 0.0f;
     std::ptrdiff_t filter = std::ptrdiff_t (place.filter) * kNoises;
-    for (const float limit : filters.limits)
-      filter += scene <= limit;
+    if (filters.scales) {
+      const rectify::WindowScale &scale = filters.scales[place.filter];
+      scene = (window.roughness () * to_noise * scale.darkness - 1.0f) *
+              scale.smoothness;
+      for (const float limit : filters.limits)
+        filter += scene <= limit;
+    }
     const float sum = window.filtered (
         filters.weights + filter * kTaps * rectify::row_length (kTaps));
     const float rounded = sum + 0.5f;

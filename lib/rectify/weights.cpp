@@ -67,8 +67,8 @@ WeightSolver::reach (int shifted) const
 double
 WeightSolver::own_share (double dx, double dy) const
 {
-  return across_.at (view_.slope[0] * dx + view_.slope[1] * dy) *
-         down_.at (view_.slope[2] * dx + view_.slope[3] * dy);
+  return share (view_.slope[0] * dx + view_.slope[1] * dy,
+      view_.slope[2] * dx + view_.slope[3] * dy);
 }
 
 double
@@ -78,7 +78,7 @@ WeightSolver::work () const
   double shares = 0.0;
   for (int y = -reach; y <= reach; y++)
     for (int x = -reach; x <= reach; x++)
-      shares += across_.at (x) * down_.at (y) > kMinShare;
+      shares += share (x, y) > kMinShare;
   const double pixels = double (view_.taps) * view_.taps;
   return pixels * shares * (mirrors () + 0.5 * pixels);
 }

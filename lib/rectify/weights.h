@@ -84,8 +84,13 @@ public:
   double mirrors () const { return std::pow (2.0 * reach () + 1.0, 2); }
   /** Multiplications of solve () for one noise, about. */
   double work () const;
-  /** Part of a pixel's light that comes from the mirror seen @p dx, @p dy
-   * pixels from its centre. */
+  /** Part of a pixel's light, about, that comes from a mirror @p across and
+   * @p down mirrors from where it looks. */
+  double share (double across, double down) const
+  {
+    return across_.at (across) * down_.at (down);
+  }
+  /** The same of the mirror seen @p dx, @p dy pixels from its centre. */
   double own_share (double dx, double dy) const;
   /** Weights for the mirror in the middle of @p mirrors, which is seen @p fx,
    * @p fy pixels from the centre of the window: row by row, one set for each of

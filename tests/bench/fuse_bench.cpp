@@ -3,6 +3,7 @@
  * docs/fusion-method.md. */
 #include "../quality/must.h"
 #include "fuse/fuser.h"
+#include "fuse/partner_correction.h"
 
 #include <algorithm>
 #include <cmath>
@@ -113,6 +114,43 @@ FUSE_BENCHMARK (balanced_4, kFour, FuseQuality::kBalanced);
 FUSE_BENCHMARK (balanced_8, kEight, FuseQuality::kBalanced);
 FUSE_BENCHMARK (best_4, kFour, FuseQuality::kBest);
 FUSE_BENCHMARK (best_8, kEight, FuseQuality::kBest);
+
+/** Of the frames of a second camera between the mirrors. */
+void
+correct (benchmark::State &state, const char *preset)
+{
+  const Schedule schedule = Schedule::from_preset (preset).value ();
+  Mapping::Parts parts{{kWidth, kHeight}, {kWidth, kHeight}};
+  parts.psf_sigma = 0.3;
+  parts.homography = {1.0, 0.008, 0.3, -0.008, 1.0, 0.4, 0.0, 0.0, 1.0};
+  const Schedule complement = schedule.complement ().value ();
+  const Rectifier rectifier = Rectifier::make (
+      Mapping::make (parts).value (), complement, {.correct = true})
+                                  .value ();
+  FuseOptions options;
+  options.threads = int (state.range (0));
+  auto correction =
+      PartnerCorrection<std::uint8_t>::make (schedule, rectifier, options)
+          .value ();
+  const auto frames = coded_frames (schedule);
+  auto partners = coded_frames (complement);
+  std::size_t next = 0;
+  for (auto _ : state) {
+    const std::size_t i = next++ % frames.size ();
+    quality::must (correction.run (
+        std::as_const (frames[i]).view (), partners[i].view ()));
+  }
+}
+
+#define CORRECT_BENCHMARK(name, preset)                                        \
+  BENCHMARK_CAPTURE (correct, name, preset)                                    \
+      ->ArgName ("threads")                                                    \
+      ->Arg (1)                                                                \
+      ->Arg (2)                                                                \
+      ->UseRealTime ()                                                         \
+      ->Unit (benchmark::kMillisecond)
+CORRECT_BENCHMARK (4, kFour);
+CORRECT_BENCHMARK (8, kEight);
 
 #ifdef __x86_64__
 

@@ -74,8 +74,10 @@ beam_gain (const Scene &scene, int n, FuseQuality quality,
   const auto coded = take (part, schedule, condition);
   const auto one = fuse (coded, schedule, options);
   options.partner = true;
-  const auto two = fuse (coded, schedule, options,
-      take (part, must (schedule.complement ()), partner));
+  auto partners = take (part, must (schedule.complement ()), partner);
+  if (partner.mapped)
+    correct_partners (partners, coded, schedule, partner);
+  const auto two = fuse (coded, schedule, options, partners);
   return {inner_psnr (one, part, border), inner_psnr (two, part, border)};
 }
 
@@ -165,6 +167,8 @@ partner_error_table (const std::vector<Scene> &scenes, const Progress &progress)
       {"blur of 0.3 px", [] (C &, C &p, int) { p.blur = 0.3; }},
       {"light 5 % less", [] (C &, C &p, int) { p.gain *= 0.95; }},
       {"half of the light", [] (C &, C &p, int) { p.gain *= 0.5; }},
+      {"a filter that passes 1 of n - 1",
+          [] (C &, C &p, int slots) { p.electrons /= slots - 1; }},
       {"white at the largest value", [] (C &, C &p, int) { p.gain = 0.0; }},
       {"black level 5 % of white",
           [] (C &, C &p, int) {
@@ -209,6 +213,14 @@ partner_view_table (const std::vector<Scene> &scenes, const Progress &progress)
             p.view = kOwn;
             p.view->stretch = 1.05;
             p.view->keystone = 0.011;
+            p.blur = 0.3;
+            p.mapped = true;
+          }},
+      {"seen at 48 degrees, pixels of 1.5 x 1 mirrors",
+          [] (C &, C &p, int) {
+            p.view = kOwn;
+            p.view->stretch = 1.5;
+            p.view->keystone = 0.022;
             p.blur = 0.3;
             p.mapped = true;
           }},

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "bench/bench.h"
+#include "fuse/partner_correction.h"
 #include "must.h"
 #include "rectify/rectifier.h"
 #include "schedule/sample_grid.h"
@@ -205,23 +206,54 @@ Score::operator+= (const Score &other)
   return *this;
 }
 
+namespace
+{
+
 /* The noise is that which fusion assumes of such a camera. */
+Rectifier
+rectifier_for (
+    Extent size, const Schedule &schedule, const Condition &condition)
+{
+  constexpr double kTypicalLight = 0.4;
+  RectifyOptions options;
+  options.keep_unknown = options.correct = condition.second;
+  if (condition.electrons > 0.0)
+    options.noise = std::sqrt (kTypicalLight / condition.electrons);
+  return must (
+      Rectifier::make (mapping_of (condition, size), schedule, options));
+}
+
+} // namespace
+
 Corrected
 corrected (
     const Picture &coded, const Schedule &schedule, const Condition &condition)
 {
-  constexpr double kTypicalLight = 0.4;
   const Extent size{coded.width (), coded.height ()};
-  RectifyOptions options;
-  options.keep_unknown = condition.second;
-  if (condition.electrons > 0.0)
-    options.noise = std::sqrt (kTypicalLight / condition.electrons);
-  const auto rectifier =
-      must (Rectifier::make (mapping_of (condition, size), schedule, options));
+  const Rectifier rectifier = rectifier_for (size, schedule, condition);
   Corrected made{Picture (size.width, size.height), {size.width, size.height}};
   must (rectifier.run (
       coded.view (), made.frame.view (), 0, made.errors.view ()));
   return made;
+}
+
+void
+correct_partners (std::vector<Picture> &partners,
+    const std::vector<Picture> &coded, const Schedule &schedule,
+    const Condition &condition)
+{
+  const Extent size{coded.front ().width (), coded.front ().height ()};
+  const Rectifier rectifier =
+      rectifier_for (size, must (schedule.complement ()), condition);
+  if (!rectifier.corrects ())
+    return;
+  FuseOptions options;
+  options.noise = {condition.electrons, condition.read_noise};
+  auto correction = must (
+      PartnerCorrection<std::uint8_t>::make (schedule, rectifier, options));
+  for (std::size_t i = 0; i < partners.size (); i++)
+    must (
+        correction.run (std::as_const (coded[i]).view (), partners[i].view ()));
 }
 
 std::vector<Picture>

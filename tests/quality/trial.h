@@ -104,6 +104,14 @@ struct Corrected {
 Corrected corrected (
     const Picture &coded, const Schedule &schedule, const Condition &condition);
 
+/** Corrects the frames of a second camera that has a mapping, which take () has
+ * made under @p condition, by what the first one tells.
+ * @p schedule  of the first camera, whose @p coded frames they are partners of.
+ */
+void correct_partners (std::vector<Picture> &partners,
+    const std::vector<Picture> &coded, const Schedule &schedule,
+    const Condition &condition);
+
 /** The subframes of one coded frame, as they are, before any Reading. */
 std::vector<Picture> split (const Picture &coded, const Way &way);
 

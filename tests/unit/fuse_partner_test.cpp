@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "fuse/fuser.h"
+#include "fuse/partner_correction.h"
 #include "two_beams.h"
 
 namespace
@@ -250,6 +251,89 @@ TEST (FusePartner, RegionsHavePartners)
   const auto partners = coded (schedule.complement ().value (), slots);
   EXPECT_GT (psnr (fuse (schedule, frames, partners, with_partner ()), slots),
       psnr (fuse (schedule, frames, {}), slots) + 1.0);
+}
+
+/* A second camera whose pixels lie between the mirrors, and its frames as
+ * rectified and as corrected. */
+template <typename Pixel>
+struct Aside {
+  std::vector<Image<Pixel>> rectified, corrected;
+
+  Aside (const Schedule &schedule, const Pictures &slots, const Pictures &first,
+      int threads, int scale = 1)
+  {
+    const Schedule complement = schedule.complement ().value ();
+    BenchOptions bench;
+    bench.gain = 1.0;
+    bench.psf_sigma = 0.3;
+    bench.alignment = {.shift_x = 0.4, .shift_y = 0.5, .rotation = 0.3};
+    Mapping::Parts parts{{kWidth, kHeight}, {kWidth, kHeight},
+        camera_to_mirrors (bench.alignment, kWidth, kHeight)};
+    parts.psf_sigma = bench.psf_sigma;
+    const Rectifier rectifier = Rectifier::make (Mapping::make (parts).value (),
+        complement, {.noise = 0.002, .keep_unknown = true, .correct = true})
+                                    .value ();
+    FuseOptions options;
+    options.threads = threads;
+    auto correction =
+        PartnerCorrection<Pixel>::make (schedule, rectifier, options);
+    EXPECT_TRUE (correction) << correction.error ().message;
+    const auto scaled = [&] (const Image<std::uint8_t> &image) {
+      Image<Pixel> wide (kWidth, kHeight);
+      for (int y = 0; y < kHeight; y++)
+        for (int x = 0; x < kWidth; x++)
+          wide.at (x, y) = Pixel (image.at (x, y) * scale);
+      return wide;
+    };
+    const auto seen = coded (complement, slots, bench);
+    for (std::size_t i = 0; i < seen.size (); i++) {
+      Image<Pixel> &image = rectified.emplace_back (kWidth, kHeight);
+      const Image<Pixel> from = scaled (seen[i]), coded = scaled (first[i]);
+      EXPECT_TRUE (rectifier.run (from.view (), image.view ()));
+      corrected.push_back (image);
+      EXPECT_TRUE (correction->run (coded.view (), corrected.back ().view ()));
+    }
+  }
+};
+
+TEST (FusePartner, BetweenItsPixelsItIsCorrectedByWhatTheFirstCameraTells)
+{
+  for (const char *preset :
+      {kPreset, "sequential:2x2,region=32x24+16+12:sequential:4x2"}) {
+    const Schedule schedule = schedule_of (preset);
+    const auto slots =
+        moving_clouds ({kWidth, kHeight}, 3 * schedule.slots (), 0.6);
+    const auto frames = coded (schedule, slots);
+    const Aside<std::uint8_t> second (schedule, slots, frames, 1);
+    const double alone = psnr (fuse (schedule, frames, {}), slots);
+    const auto gain = [&] (const Pictures &partners) {
+      return psnr (fuse (schedule, frames, partners, with_partner ()), slots) -
+             alone;
+    };
+    EXPECT_GT (gain (second.corrected), gain (second.rectified) + 0.3)
+        << preset;
+    EXPECT_TRUE (equal (second.corrected,
+        Aside<std::uint8_t> (schedule, slots, frames, 3).corrected));
+  }
+}
+
+/* A part of a stream gives the same as the whole, and 16 bits as 8. */
+TEST (FusePartner, ItsCorrectionKnowsOneFrameOnly)
+{
+  const Schedule schedule = schedule_of (kPreset);
+  const auto slots = truth (2, schedule.slots (), 1.3);
+  const Pictures last (slots.begin () + schedule.slots (), slots.end ());
+  const auto frames = coded (schedule, slots);
+  const Aside<std::uint8_t> whole (schedule, slots, frames, 1);
+  const Aside<std::uint8_t> part (schedule, last, {frames.back ()}, 1);
+  EXPECT_TRUE (equal ({whole.corrected.back ()}, part.corrected));
+  const Aside<std::uint16_t> wide (schedule, last, {frames.back ()}, 1, 257);
+  int most = 0;
+  for (int y = 0; y < kHeight; y++)
+    for (int x = 0; x < kWidth; x++)
+      most = std::max (most, std::abs (wide.corrected[0].at (x, y) / 257 -
+                                       part.corrected[0].at (x, y)));
+  EXPECT_LE (most, 2);
 }
 
 /* The result does not depend on threads or the instruction set. */

@@ -102,14 +102,17 @@ reference (ImageView<const Pixel> from, const Row &row, int taps, Pixel *to,
       }
       differences[lane] = across + down;
     }
-    const WindowScale &scale = filters.scales[place.filter];
-    const float scene = (sum_of (differences) / 32.0f * (0.5f / filters.noise) *
-                                scale.darkness -
-                            1.0f) *
-                        scale.smoothness;
+    float scene = 0.0f;
     int filter = place.filter * kNoises;
-    for (const float limit : filters.limits)
-      filter += scene <= limit;
+    if (filters.scales) {
+      const WindowScale &scale = filters.scales[place.filter];
+      scene = (sum_of (differences) / 32.0f * (0.5f / filters.noise) *
+                      scale.darkness -
+                  1.0f) *
+              scale.smoothness;
+      for (const float limit : filters.limits)
+        filter += scene <= limit;
+    }
     const float *weights = filters.weights + filter * taps * row_length (taps);
     float lanes[12] = {};
     for (int y = 0; y < taps; y++)
@@ -125,9 +128,10 @@ reference (ImageView<const Pixel> from, const Row &row, int taps, Pixel *to,
   }
 }
 
+/** @p chosen  whether filters are chosen by the noise. */
 template <typename Pixel>
 void
-compare (float largest)
+compare (float largest, bool chosen)
 {
   std::mt19937 random{5};
   Image<Pixel> frame (kCamera.width, kCamera.height);
@@ -138,7 +142,9 @@ compare (float largest)
   const ImageView<const Pixel> view = std::as_const (frame).view ();
   const Source<Pixel> source{view.row (0), view.stride, view.width};
   for (const int taps : {5, 7, 9}) {
-    const Row row = random_row (taps, largest);
+    Row row = random_row (taps, largest);
+    if (!chosen)
+      row.filters.scales = nullptr;
     const std::size_t count = row.places.size ();
     std::vector<Pixel> expected (count);
     std::vector<float> expected_errors (count);
@@ -168,9 +174,12 @@ compare (float largest)
 
 TEST (RectifyKernels, EqualTheReference)
 {
-  compare<std::uint8_t> (255.0f);
-  compare<std::uint16_t> (4095.0f);
-  compare<std::uint16_t> (65535.0f);
+  for (const bool chosen : {true, false}) {
+    SCOPED_TRACE (chosen);
+    compare<std::uint8_t> (255.0f, chosen);
+    compare<std::uint16_t> (4095.0f, chosen);
+    compare<std::uint16_t> (65535.0f, chosen);
+  }
 }
 
 } // namespace

@@ -1,0 +1,165 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "fuse/partner_correction.h"
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "base/pixels.h"
+#include "base/try.h"
+#include "base/workers.h"
+#include "schedule/element_map.h"
+
+namespace codedexposure
+{
+
+namespace
+{
+
+/** Light of an element: `all` times the sum of all slots, and `more` times
+ * that of some. */
+struct SlotSum {
+  float all, more;
+  std::vector<int> slots;
+};
+
+/* Of few slots: of those in which the mirror is on or off. */
+SlotSum
+slot_sum (const ElementMap &elements, int element, float scale)
+{
+  const int slots = elements.schedule ().slots ();
+  const float leak = float (elements.schedule ().leak ());
+  std::vector<int> on, off;
+  for (int s = 0; s < slots; s++)
+    (elements.on (element, s) ? on : off).push_back (s);
+  if (on.size () <= off.size ())
+    return {leak * scale, (1.0f - leak) * scale, std::move (on)};
+  return {scale, (leak - 1.0f) * scale, std::move (off)};
+}
+
+} // namespace
+
+template <typename Pixel>
+struct PartnerCorrection<Pixel>::State {
+  Rectifier rectifier;
+  Fuser<Pixel> fuser;
+  std::unique_ptr<Workers> workers;
+  Pixel largest;
+  std::vector<SlotSum> sums;            ///< of each element of the complement
+  Image<std::uint16_t> elements;        ///< of each mirror but the pilot's
+  std::vector<Image<Pixel>> slots = {}; ///< fused
+  Image<std::uint16_t> light = {};      ///< that the partner must have got
+
+  Result<void> estimate (ImageView<const Pixel> coded, std::stop_token stop);
+  void add_up (int y);
+};
+
+template <typename Pixel>
+Result<void>
+PartnerCorrection<Pixel>::State::estimate (
+    ImageView<const Pixel> coded, std::stop_token stop)
+{
+  fuser.forget ();
+  RETURN_IF_ERROR (fuser.take (coded));
+  std::vector<ImageView<Pixel>> views;
+  for (Image<Pixel> &slot : slots)
+    views.push_back (slot.view ());
+  RETURN_IF_ERROR (fuser.fuse (views, std::move (stop)));
+  workers->run (light.height (), [this] (int y, int) { add_up (y); });
+  return {};
+}
+
+template <typename Pixel>
+void
+PartnerCorrection<Pixel>::State::add_up (int y)
+{
+  std::vector<float> all (std::size_t (light.width ()));
+  std::vector<const Pixel *> rows;
+  for (const Image<Pixel> &slot : slots) {
+    rows.push_back (slot.view ().row (y));
+    for (std::size_t x = 0; x < all.size (); x++)
+      all[x] += float (rows.back ()[x]);
+  }
+  const std::uint16_t *numbers = elements.view ().row (y);
+  std::uint16_t *to = light.view ().row (y);
+  for (std::size_t x = 0; x < all.size (); x++) {
+    const SlotSum &sum = sums[numbers[x]];
+    float more = 0.0f;
+    for (const int slot : sum.slots)
+      more += float (rows[std::size_t (slot)][x]);
+    to[x] = std::uint16_t (
+        std::clamp (sum.all * all[x] + sum.more * more + 0.5f, 0.0f, 65535.0f));
+  }
+}
+
+template <typename Pixel>
+PartnerCorrection<Pixel>::PartnerCorrection (std::unique_ptr<State> state)
+    : state_ (std::move (state))
+{
+}
+
+template <typename Pixel>
+PartnerCorrection<Pixel>::PartnerCorrection (
+    PartnerCorrection &&) noexcept = default;
+
+template <typename Pixel>
+PartnerCorrection<Pixel> &PartnerCorrection<Pixel>::operator= (
+    PartnerCorrection &&) noexcept = default;
+
+template <typename Pixel>
+PartnerCorrection<Pixel>::~PartnerCorrection () = default;
+
+template <typename Pixel>
+Result<PartnerCorrection<Pixel>>
+PartnerCorrection<Pixel>::make (const Schedule &schedule,
+    const Rectifier &partner, const FuseOptions &options, std::stop_token stop)
+try {
+  FuseOptions plain = options;
+  plain.quality = FuseQuality::kFast;
+  plain.refine = plain.partner = false;
+  plain.lookahead = 0;
+  auto workers = std::make_unique<Workers> (
+      std::clamp (options.threads, 0, Workers::kMost));
+  if (options.threads == 0)
+    plain.threads = workers->count ();
+  const auto [width, height] = partner.mirrors ();
+  ASSIGN_OR_RETURN (auto fuser,
+      Fuser<Pixel>::make (schedule, width, height, plain, std::move (stop)));
+  ASSIGN_OR_RETURN (const Schedule complement, schedule.complement ());
+  const ElementMap map (complement);
+  double most = 0.0;
+  for (int e = 0; e < map.elements (); e++)
+    most = std::max (most, map.light (e));
+  const Pixel largest = largest_pixel_of<Pixel> (options.bits);
+  std::vector<SlotSum> sums;
+  for (int e = 0; e < map.elements (); e++)
+    sums.push_back (slot_sum (map, e, float (65535.0 / (most * largest))));
+  const Extent size = fuser.size ();
+  const auto slots = std::size_t (fuser.slots ());
+  std::unique_ptr<State> state (
+      new State{partner, std::move (fuser), std::move (workers), largest,
+          std::move (sums), {size.width, size.height}});
+  state->slots.assign (slots, Image<Pixel> (size.width, size.height));
+  state->light = Image<std::uint16_t> (size.width, size.height);
+  for (int y = 0; y < size.height; y++)
+    for (int x = 0; x < size.width; x++)
+      state->elements.at (x, y) = std::uint16_t (map.at (x, y));
+  return PartnerCorrection (std::move (state));
+} catch (const std::bad_alloc &) {
+  return out_of_memory ();
+}
+
+template <typename Pixel>
+Result<void>
+PartnerCorrection<Pixel>::run (ImageView<const Pixel> coded,
+    ImageView<Pixel> partner, std::stop_token stop)
+{
+  RETURN_IF_ERROR (state_->estimate (coded, std::move (stop)));
+  return state_->rectifier.correct (partner,
+      std::as_const (state_->light).view (), *state_->workers, state_->largest);
+}
+
+template class PartnerCorrection<std::uint8_t>;
+template class PartnerCorrection<std::uint16_t>;
+
+} // namespace codedexposure

@@ -35,6 +35,8 @@ struct Plan {
 struct Settings : FuseOptions {
   static constexpr double kUnset = -1.0;
   Settings () { noise = {kUnset, kUnset}; }
+
+  SensorNoise of_second{kUnset, kUnset}; ///< camera
 };
 
 class Fuse final : public CodedFilter
@@ -69,6 +71,7 @@ private:
   }
   RectifyOptions rectify_options (const Schedule &schedule) const override;
   SensorNoise noise (const Schedule &schedule) const;
+  SensorNoise partner_noise (const CodedFormat &format) const;
   std::string method_name () const override;
   std::string unrefined () const;
 

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <utility>
 
+#include "base/pixels.h"
 #include "base/try.h"
 #include "base/workers.h"
 #include "common/element.h"
@@ -69,6 +70,18 @@ Fuse::properties ()
           "with a full-well; -1: that of the bench profile, or none",
           kReadWrite, within (&FuseOptions::noise, &SensorNoise::read_noise),
           Settings::kUnset, SensorNoise::kMaxReadNoise},
+      {"second-full-well", "Second full well",
+          "Electrons that the same light makes in a pixel of a second camera, "
+          "as of full-well; -1: by its bench profile, or as many as in the "
+          "first",
+          kReadWrite, within (&Settings::of_second, &SensorNoise::full_well),
+          Settings::kUnset, SensorNoise::kMaxFullWell},
+      {"second-read-noise", "Second read noise",
+          "Noise of a second camera's electronics in electrons rms; -1: that "
+          "of "
+          "its bench profile, or of the first",
+          kReadWrite, within (&Settings::of_second, &SensorNoise::read_noise),
+          Settings::kUnset, SensorNoise::kMaxReadNoise},
   };
 }
 
@@ -124,13 +137,15 @@ Fuse::noise (const Schedule &schedule) const
   return noise;
 }
 
+namespace
+{
+
 /* Relative noise of a plain exposure at typical light, if the camera is
  * described. */
 RectifyOptions
-Fuse::rectify_options (const Schedule &schedule) const
+rectify_options_of (const SensorNoise &noise)
 {
   constexpr double kTypicalLight = 0.4;
-  const SensorNoise noise = this->noise (schedule);
   RectifyOptions options;
   if (noise.full_well > 0.0)
     options.noise = std::clamp (
@@ -138,6 +153,45 @@ Fuse::rectify_options (const Schedule &schedule) const
             noise.full_well,
         RectifyOptions::kMinNoise, RectifyOptions::kMaxNoise);
   return options;
+}
+
+} // namespace
+
+/* What properties say of the first camera only, the second has, too. Where the
+ * ratio of light is not known, both have white at the largest value. */
+SensorNoise
+Fuse::partner_noise (const CodedFormat &format) const
+{
+  SensorNoise noise = in_force_.of_second;
+  const Schedule &schedule = format.schedule;
+  const SensorNoise first = this->noise (schedule);
+  const PartnerSetup &known = *tagged_partner ();
+  const auto complement = schedule.complement ();
+  const double largest =
+      format.wide () ? largest_pixel_of<std::uint16_t> (significant_bits ())
+                     : largest_pixel_of<std::uint8_t> (significant_bits ());
+  const double electrons =
+      known.electrons * largest * schedule.slots () *
+      (known.light_ratio > 0.0 ? known.light_ratio / schedule.white_slots ()
+          : complement         ? 1.0 / complement->white_slots ()
+                               : 0.0);
+  const auto decide = [] (double &value, double told, double profiled,
+                          double of_first) {
+    if (value == Settings::kUnset)
+      value = told == Settings::kUnset && profiled > 0.0 ? profiled : of_first;
+  };
+  decide (noise.full_well, in_force_.noise.full_well,
+      std::min (electrons, SensorNoise::kMaxFullWell), first.full_well);
+  decide (noise.read_noise, in_force_.noise.read_noise,
+      std::min (known.read_noise, SensorNoise::kMaxReadNoise),
+      first.read_noise);
+  return noise;
+}
+
+RectifyOptions
+Fuse::rectify_options (const Schedule &schedule) const
+{
+  return rectify_options_of (noise (schedule));
 }
 
 namespace
@@ -180,7 +234,7 @@ Fuse::plan_partners (const CodedFormat &format) const
   const std::optional<PartnerSetup> &partner = tagged_partner ();
   if (!partner)
     return std::nullopt;
-  RectifyOptions options = rectify_options (format.schedule);
+  RectifyOptions options = rectify_options_of (partner_noise (format));
   options.keep_unknown = options.correct = true;
   auto made = PartnerReader::make (*partner, format, options);
   if (made)
@@ -218,8 +272,10 @@ Fuse::plan (const CodedFormat &format)
   FuseOptions options = in_force_;
   auto partners = plan_partners (format);
   options.partner = partners.has_value ();
-  if (partners)
+  if (partners) {
     options.partner_black = tagged_partner ()->black;
+    options.partner_noise = partner_noise (format);
+  }
   options.bits = significant_bits ();
   options.noise = noise (format.schedule);
   const std::stop_token stop = stop_token ();

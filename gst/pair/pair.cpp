@@ -51,8 +51,8 @@
  * A partner is in the custom meta `CodedExposurePartner` of the coded frame,
  * with the fields `buffer` and `caps`. What changes the pixels of the coded
  * frame drops it, and it does not leave the process. The stream tag of the
- * coded frames gets the key `partner` with size, mapping and black level of the
- * second camera.
+ * coded frames gets the key `partner` with size, mapping, black level and noise
+ * of the second camera, as its bench profile has them.
  *
  * The message `codedexposure/partner-lost` is posted when coded frames begin to
  * go on alone (`active` TRUE, `reason`, `from`) and when they have partners
@@ -289,9 +289,8 @@ push_due (GstPad *pad, GstPadProbeInfo *, gpointer data)
   if (std::exchange (st.setup_due, false) && st.on_setup) {
     StreamSetup setup = *st.on_setup;
     if (const auto off = PairStream::at (sink (self, "off"), st.off_setup))
-      setup.partner = PartnerSetup{{off->info.width, off->info.height},
-          off->setup ? off->setup->known_mapping () : std::nullopt,
-          off->setup && off->setup->bench ? off->setup->bench->black () : 0};
+      setup.partner = off->setup.value_or (StreamSetup ())
+                          .as_partner ({off->info.width, off->info.height});
     gst_pad_push_event (pad, setup_to_event (setup));
   }
   return GST_PAD_PROBE_OK;

@@ -107,14 +107,15 @@ check (const FuseOptions &options)
   const auto within = [] (double value, double max) {
     return value >= 0.0 && value <= max;
   };
-  if (!within (options.noise.full_well, SensorNoise::kMaxFullWell) ||
-      !within (options.noise.read_noise, SensorNoise::kMaxReadNoise))
-    return Error{"a full well of " + real_text (options.noise.full_well) +
-                 " and a read noise of " +
-                 real_text (options.noise.read_noise) +
-                 " electrons: they must lie in 0.." +
-                 real_text (SensorNoise::kMaxFullWell) + " and 0.." +
-                 real_text (SensorNoise::kMaxReadNoise)};
+  for (const SensorNoise &noise :
+      {options.noise, options.partner_noise.value_or (options.noise)})
+    if (!within (noise.full_well, SensorNoise::kMaxFullWell) ||
+        !within (noise.read_noise, SensorNoise::kMaxReadNoise))
+      return Error{"a full well of " + real_text (noise.full_well) +
+                   " and a read noise of " + real_text (noise.read_noise) +
+                   " electrons: they must lie in 0.." +
+                   real_text (SensorNoise::kMaxFullWell) + " and 0.." +
+                   real_text (SensorNoise::kMaxReadNoise)};
   return {};
 }
 
@@ -161,9 +162,10 @@ Engine::Engine (const Schedule &schedule, const Schedule *partner, Extent size,
     : schedule_ (schedule), size_ (size), quality_ (options.quality),
       depth_ (steps),
       observation_ (observation_of (schedule, options.noise, steps)),
-      partner_ (partner ? std::optional (
-                              observation_of (*partner, options.noise, steps))
-                        : std::nullopt),
+      partner_ (
+          partner ? std::optional (observation_of (*partner,
+                        options.partner_noise.value_or (options.noise), steps))
+                  : std::nullopt),
       phases_ (schedule), kernels_ (*find_kernels (options.target)),
       noise_ (schedule, observation_, size)
 {

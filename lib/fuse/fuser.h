@@ -34,9 +34,11 @@ struct FuseOptions {
    * nothing is learned from pictures but the parameters of the scene model. */
   bool refine = false;
   /** Coded frames can have partners: frames of a second camera in the beam of
-   * the mirrors that are off, with the same noise. Their light is measured in
-   * each pair. */
+   * the mirrors that are off. Their light is measured in each pair. */
   bool partner = false;
+  /** Of partners: the full well is what white makes in a pixel that is on for
+   * the whole exposure, as that of coded frames; none: the same noise. */
+  std::optional<SensorNoise> partner_noise = {};
   /** Of a partner without light, DN, 0..65535; coded frames have none. */
   double partner_black = 0.0;
   /** Later coded frames that are used to fuse one: 0 or 1. */

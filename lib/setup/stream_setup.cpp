@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "setup/stream_setup.h"
 
+#include "base/text.h"
 #include "mapping/json.h"
 #include "schedule/json.h"
 #include "setup/json.h"
@@ -35,17 +36,31 @@ frame_size_into (std::optional<Extent> &to)
       "two whole numbers, width and height");
 }
 
+JsonReader
+at_least_zero_into (double &to)
+{
+  const std::string rule = "a number of 0 or more, and 1e9 at most";
+  return [=, &to] (const Json &value, const std::string &key) {
+    number_into (to, rule) (value, key);
+    if (!(to >= 0.0 && to <= 1e9))
+      throw expected (key, rule, value);
+  };
+}
+
 PartnerSetup
 read_partner (const Json &root)
 {
   std::optional<Extent> size;
-  std::optional<Mapping> mapping;
-  int black = 0;
+  PartnerSetup partner;
   read_keys (root, "", "a partner has a size",
       {{"size", frame_size_into (size), true},
-          {"mapping", inner_into (mapping, read_mapping)},
-          {"black", integer_into (black, 65535)}});
-  return {*size, std::move (mapping), black};
+          {"mapping", inner_into (partner.mapping, read_mapping)},
+          {"black", integer_into (partner.black, 65535)},
+          {"electrons", at_least_zero_into (partner.electrons)},
+          {"read_noise", at_least_zero_into (partner.read_noise)},
+          {"light_ratio", at_least_zero_into (partner.light_ratio)}});
+  partner.size = *size;
+  return partner;
 }
 
 JsonReader
@@ -119,9 +134,31 @@ StreamSetup::to_json () const
       text += ",\"mapping\":" + partner->mapping->to_json ();
     if (partner->black > 0)
       text += ",\"black\":" + std::to_string (partner->black);
+    for (const auto &[name, value] :
+        {std::pair ("electrons", partner->electrons),
+            {"read_noise", partner->read_noise},
+            {"light_ratio", partner->light_ratio}})
+      if (value > 0.0)
+        text += std::string (",\"") + name + "\":" + real_text (value);
     text += "}";
   }
   return text + "}";
+}
+
+PartnerSetup
+StreamSetup::as_partner (Extent frames) const
+{
+  PartnerSetup made{frames, known_mapping ()};
+  if (!bench)
+    return made;
+  const auto value_of = [] (const std::optional<Measured> &measured) {
+    return measured ? measured->value : 0.0;
+  };
+  made.black = bench->black ();
+  made.electrons = bench->electrons_per_number ().value_or (0.0);
+  made.read_noise = value_of (bench->read_noise);
+  made.light_ratio = value_of (bench->light_ratio);
+  return made;
 }
 
 } // namespace codedexposure

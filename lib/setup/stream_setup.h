@@ -18,9 +18,12 @@ namespace codedexposure
 
 /** The second camera, in the beam of the mirrors that are off. */
 struct PartnerSetup {
-  Extent size; ///< of its frames
+  Extent size = {}; ///< of its frames
   std::optional<Mapping> mapping = {};
   int black = 0; ///< level without light, DN
+  /** Of its profile, 0 where they are not known: e-/DN, e- rms, and its DN of
+   * light for each DN of the first camera (BenchProfile::light_ratio). */
+  double electrons = 0.0, read_noise = 0.0, light_ratio = 0.0;
 
   bool operator== (const PartnerSetup &) const = default;
 };
@@ -56,11 +59,15 @@ struct StreamSetup {
   /** The JSON form of the schedule with keys more that may be left out:
    * "mapping", which holds the JSON form of a mapping, "size", "rate", "bits",
    * "track", "simulated", "bench", which holds that of a bench profile,
-   * "beam", which is "off", and "partner" with "size", "mapping" and
-   * "black". */
+   * "beam", which is "off", and "partner" with "size", "mapping",
+   * "black", "electrons", "read_noise" and "light_ratio". */
   static Result<StreamSetup> from_json (std::string_view json);
   /** One line. Without the others it is schedule.to_json (). */
   std::string to_json () const;
+
+  /** What is known of the second camera, whose setup this is, with frames of
+   * @p frames. */
+  PartnerSetup as_partner (Extent frames) const;
 
   /** That of the stream, else that of its bench profile. */
   std::optional<Mapping> known_mapping () const

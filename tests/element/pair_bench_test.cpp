@@ -240,9 +240,9 @@ TEST (PairBench, BothCamerasAreCalibratedInOneRun)
 constexpr Extent kSize{64, 48};
 
 /** What a second camera measured that stands @p right mirrors aside, and half
- * a mirror down. */
+ * a mirror down, @p noise  and how loud it is. */
 std::string
-bench_of_second (double right)
+bench_of_second (double right, bool noise)
 {
   BenchProfile first, second;
   second.camera.size = first.camera.size = kSize;
@@ -250,16 +250,21 @@ bench_of_second (double right)
       camera_to_mirrors (
           {.shift_x = right, .shift_y = 0.5}, kSize.width, kSize.height)};
   second.mapping = Mapping::make (parts).value ();
+  if (noise) {
+    second.conversion_gain = Measured{20.0, 0.1};
+    second.read_noise = Measured{7.0, 0.1};
+  }
   first.second = {second};
   return first.to_json ();
 }
 
 /** Pixels that @p element makes of frames with a partner, or without. @p spot:
- * a pixel of each partner that is saturated. @p right: see
- * bench_of_second (). */
+ * a pixel of each partner that is saturated. @p right,
+ * @p noise: see bench_of_second (). */
 std::vector<std::uint8_t>
 made_by (const std::string &element, bool paired,
-    std::optional<Offset> spot = std::nullopt, double right = 0.5)
+    std::optional<Offset> spot = std::nullopt, double right = 0.5,
+    bool noise = false)
 {
   const std::string path = ::testing::TempDir () + "pair-spot.gray";
   const std::string schedule = "schedule=sequential:lattice:4/2 ";
@@ -278,7 +283,7 @@ made_by (const std::string &element, bool paired,
       " ! " + element + " ! filesink location=" + path);
   if (paired)
     g_object_set (pipeline["sync"].get (), "bench",
-        bench_of_second (right).c_str (), nullptr);
+        bench_of_second (right, noise).c_str (), nullptr);
   if (spot)
     gst_pad_add_probe (
         pipeline.pad ("off", "src").get (), GST_PAD_PROBE_TYPE_BUFFER,
@@ -333,6 +338,17 @@ error_of (bool paired, double right)
 TEST (PairBench, ASecondCameraBetweenTheMirrorsHelpsAsWell)
 {
   EXPECT_LT (error_of (true, 0.5), 0.85 * error_of (false, 0.5));
+}
+
+/* 20 e-/DN, and three slots make white: 20 * 255 * 4 / 3 electrons. */
+TEST (PairBench, TheNoiseOfASecondCameraComesWithItsProfile)
+{
+  const auto profiled =
+      made_by ("codedexposure-fuse", true, std::nullopt, 0.5, true);
+  EXPECT_EQ (profiled, made_by ("codedexposure-fuse second-full-well=6800 "
+                                "second-read-noise=7",
+                           true));
+  EXPECT_NE (profiled, made_by ("codedexposure-fuse", true));
 }
 
 /* Its light is spread over several mirrors, none of which is saturated then.

@@ -263,10 +263,14 @@ TEST_F (Pair, TheTagSaysHowTheSecondCameraStands)
   BenchProfile bench;
   bench.camera.size = {40, 30};
   bench.black_level = Measured{5.2, 0.1};
+  bench.conversion_gain = Measured{20.5, 0.1};
+  bench.read_noise = Measured{6.5, 0.1};
+  bench.light_ratio = Measured{0.75, 0.01};
   const auto tagged =
       tag_with ({.schedule = schedule, .mapping = mapping, .bench = bench});
-  EXPECT_EQ (tagged, (StreamSetup{.schedule = schedule,
-                         .partner = PartnerSetup{{40, 30}, mapping, 5}}));
+  EXPECT_EQ (tagged,
+      (StreamSetup{.schedule = schedule,
+          .partner = PartnerSetup{{40, 30}, mapping, 5, 20.5, 6.5, 0.75}}));
 }
 
 /* As behind dmdsync, which tags the profile. */

@@ -74,6 +74,7 @@ beam_gain (const Scene &scene, int n, FuseQuality quality,
   const auto coded = take (part, schedule, condition);
   const auto one = fuse (coded, schedule, options);
   options.partner = true;
+  options.partner_noise = {partner.electrons, partner.read_noise};
   auto partners = take (part, must (schedule.complement ()), partner);
   if (partner.mapped)
     correct_partners (partners, coded, schedule, partner);

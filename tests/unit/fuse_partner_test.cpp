@@ -144,6 +144,37 @@ TEST (FusePartner, GainAndBlackLevelAreNotNeeded)
   }
 }
 
+/* As behind a grey filter. */
+TEST (FusePartner, APartnerWithMoreNoiseCountsLess)
+{
+  const Schedule schedule = schedule_of (kPreset);
+  const auto slots =
+      moving_clouds ({kWidth, kHeight}, 4 * schedule.slots (), 0.6);
+  BenchOptions bench;
+  bench.full_well = 10000.0;
+  bench.read_noise = 5.0;
+  const auto frames = coded (schedule, slots, bench);
+  FuseOptions options;
+  options.noise = {10000.0, 5.0};
+  const double alone = psnr (fuse (schedule, frames, {}, options), slots);
+  bench.full_well = 400.0;
+  bench.seed = 1;
+  const auto partners = coded (schedule.complement ().value (), slots, bench);
+  for (const FuseQuality quality :
+      {FuseQuality::kFast, FuseQuality::kBalanced}) {
+    options.quality = quality;
+    options.partner = true;
+    options.partner_noise.reset ();
+    const double untold =
+        psnr (fuse (schedule, frames, partners, options), slots);
+    options.partner_noise = {400.0, 5.0};
+    const double told =
+        psnr (fuse (schedule, frames, partners, options), slots);
+    EXPECT_LT (untold, told - 1.0) << quality_name (quality);
+    EXPECT_GT (told, alone - 0.25) << quality_name (quality);
+  }
+}
+
 TEST (FusePartner, AFrameWithoutItsPartnerIsThatOfOneCamera)
 {
   for (const FuseQuality quality : {FuseQuality::kFast, FuseQuality::kBalanced,
@@ -376,6 +407,9 @@ TEST (FusePartner, MisuseIsRefused)
   FuseOptions dark = with_partner ();
   dark.partner_black = -1.0;
   EXPECT_FALSE (Fuser<std::uint8_t>::make (schedule, kWidth, kHeight, dark));
+  FuseOptions loud = with_partner ();
+  loud.partner_noise = {-1.0, 5.0};
+  EXPECT_FALSE (Fuser<std::uint8_t>::make (schedule, kWidth, kHeight, loud));
   /* The last element of a staircase is never in the other beam. */
   const auto never = Fuser<std::uint8_t>::make (
       schedule_of ("staircase:2x2"), kWidth, kHeight, with_partner ());

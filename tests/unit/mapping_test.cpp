@@ -424,6 +424,24 @@ TEST (StreamSetup, SaysHowTheSecondCameraStands)
   std::string wrong = json;
   wrong.replace (wrong.find ("640"), 3, "0");
   EXPECT_FALSE (StreamSetup::from_json (wrong));
+
+  setup.partner->electrons = 31.25;
+  setup.partner->read_noise = 5.0;
+  setup.partner->light_ratio = 0.75;
+  const std::string measured = setup.to_json ();
+  EXPECT_NE (
+      measured.find (R"("electrons":31.25,"read_noise":5,"light_ratio":0.75}})"),
+      std::string::npos)
+      << measured;
+  EXPECT_EQ (*StreamSetup::from_json (measured), setup);
+  for (const char *other : {"-1", "1e10", "\"2\""}) {
+    wrong = measured;
+    wrong.replace (wrong.find ("31.25"), 5, other);
+    const auto refused = StreamSetup::from_json (wrong);
+    ASSERT_FALSE (refused) << other;
+    EXPECT_NE (refused.error ().message.find ("'electrons'"), std::string::npos)
+        << refused.error ().message;
+  }
 }
 
 TEST (StreamSetup, NamesWhatIsWrongInside)

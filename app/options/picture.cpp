@@ -47,8 +47,14 @@ DecodeOptions::declare (Options &options)
   options.value ("--read-noise", read_noise, "E",
       "noise of the camera, for --fuse: e- rms [by the bench profile; 0]",
       at_least_0);
+  options.value ("--range", range, "N",
+      "of a recording of two cameras, for --fuse: white of the pictures in "
+      "whites of the first camera, whose saturated pixels are seen by the "
+      "second behind a filter [1]",
+      whole (1, 16));
   declare_frames (options, "the recording");
-  options.need ({"--refine", "--full-well", "--read-noise"}, "--fuse");
+  options.need (
+      {"--refine", "--full-well", "--read-noise", "--range"}, "--fuse");
 }
 
 std::vector<std::string>
@@ -68,6 +74,8 @@ DecodeOptions::words () const
     add ("full-well", property_text (*full_well));
   if (read_noise)
     add ("read-noise", property_text (*read_noise));
+  if (range)
+    add ("range", std::to_string (*range));
   if (bits)
     add ("bits", std::to_string (*bits));
   if (refine)

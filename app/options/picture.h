@@ -12,7 +12,7 @@ namespace codedexposure::app
 struct DecodeOptions {
   std::optional<Text> method, mapping, fuse, bench, schedule;
   std::optional<double> full_well, read_noise;
-  std::optional<int> bits;
+  std::optional<int> bits, range;
   bool refine = false;
 
   void declare (Options &options);

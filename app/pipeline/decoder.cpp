@@ -58,6 +58,7 @@ add_fusion (Job &job, Chain &frames, const DecodeOptions &options,
     settings.emplace_back ("refine", true);
   set_if (settings, "full-well", options.full_well);
   set_if (settings, "read-noise", options.read_noise);
+  set_if (settings, "range", options.range);
   set_if (settings, "threads", threads);
   frames.to ("queue", {{"max-size-buffers", 1}})
       .to ("codedexposure-fuse", settings);

@@ -79,7 +79,9 @@
  * first camera tells, which takes two to three times as long as `fast`. A
  * frame without a partner gives what one camera gives, and so do the
  * surroundings of saturated pixels of the second camera, which gets most of the
- * light: 16 px to all sides. Such frames take twice the time.
+ * light: 16 px to all sides. Such frames take twice the time. Behind a grey
+ * filter, the second camera shows highlights that saturate the first:
+ * #codedexposure-fuse:range.
  *
  * ## Flags, metas and messages
  *

@@ -59,6 +59,13 @@ Fuse::properties ()
           "for quality fast without refine, the streaming thread only, but to "
           "correct the frames of a second camera",
           kReadWrite, &FuseOptions::threads, 0u, guint (Workers::kMost)},
+      {"range", "Range",
+          "White of fused frames in whites of a coded frame; beyond 1, with "
+          "frames of a second camera behind a filter, light that saturates the "
+          "first is that of the second, and the result is not refined; use 10 "
+          "bits or more",
+          kReadWrite, &FuseOptions::range, 1u,
+          guint (Fuser<std::uint8_t>::kMaxRange)},
       {"full-well", "Full well",
           "Electrons at white in a pixel that is on for the whole exposure, as "
           "in codedexposure-sim; determines the shot noise; 0: the frames are "
@@ -102,6 +109,8 @@ Fuse::method_name () const
                      g_enum_get_value (qualities, int (quality))->value_nick;
   if (plan_ && plan_->partners)
     name += ", both beams";
+  if (in_force_.range > 1)
+    name += ", range " + std::to_string (in_force_.range);
   if ((learned || in_force_.refine) && unrefined ().empty ())
     name += ", learned " + refinement_hash () +
             (format ().schedule.leak () > 0.0 ? ", leakage undone" : "");

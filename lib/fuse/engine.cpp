@@ -101,6 +101,11 @@ check (const FuseOptions &options)
   if (options.lookahead < 0 || options.lookahead > 1)
     return Error{"lookahead " + std::to_string (options.lookahead) +
                  ": it must be 0 or 1 coded frames"};
+  constexpr int kMaxRange = Fuser<std::uint8_t>::kMaxRange;
+  if (options.range < 1 || options.range > kMaxRange)
+    return Error{"range " + std::to_string (options.range) +
+                 ": white of fused frames must be 1 to " +
+                 std::to_string (kMaxRange) + " times that of coded ones"};
   if (!find_kernels (options.target))
     return Error{"target " + in_quotes (options.target) +
                  " does not run on this machine; leave it empty"};
@@ -174,8 +179,9 @@ Engine::Engine (const Schedule &schedule, const Schedule *partner, Extent size,
   /* Parts of rows hold two columns of a block of predictions. */
   const int period = phases_.period () * (phases_.period () % 2 + 1);
   const Observation *of_partner = partner_ ? &*partner_ : nullptr;
-  const float largest = std::max (largest_light (observation_),
-      of_partner ? largest_light (*of_partner) : 0.0f);
+  const float largest = float (options.range) *
+                        std::max (largest_light (observation_),
+                            of_partner ? largest_light (*of_partner) : 0.0f);
   const float pixel_steps = 65535.0f / largest;
   /* Only `balanced` and above follow motion into other coded frames. */
   sources_.emplace (SplitField (size.width, 0, radius, period),
@@ -208,7 +214,11 @@ Engine::Engine (const Schedule &schedule, const Schedule *partner, Extent size,
       made_in_partner_ = Field (size.width, size.height);
   }
   if (options.refine)
-    unrefined_ = Refiner::why_not (schedule, observation_, typical_noise ());
+    unrefined_ =
+        options.range > 1
+            ? "range " + std::to_string (options.range) +
+                  ": the refinement was trained for light up to white"
+            : Refiner::why_not (schedule, observation_, typical_noise ());
   if (options.refine && unrefined_.empty ())
     refiner_.emplace (
         schedule, observation_, size.width, size.height, typical_noise ());

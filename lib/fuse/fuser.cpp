@@ -9,6 +9,7 @@
 #include "base/text.h"
 #include "base/try.h"
 #include "base/view_check.h"
+#include "fuse/beyond_white.h"
 #include "fuse/clipped.h"
 #include "fuse/engine.h"
 #include "fuse/light_ratio.h"
@@ -193,15 +194,21 @@ struct Fuser<Pixel>::State {
   float largest;
   bool has_partners;
   float partner_black;
+  int range;
+  std::optional<fuse::BeyondWhite<Pixel>>
+      beyond; ///< with a range of more than 1
   std::unique_ptr<Workers> workers;
 
   Result<void> take (ImageView<const Pixel> coded,
       const std::optional<ImageView<const Pixel>> &partner,
       const std::optional<ImageView<const float>> &errors);
-  float light_of (
+  fuse::LightRatio light_of (
       ImageView<const Pixel> coded, ImageView<const Pixel> partner) const;
-  std::vector<std::uint8_t> clipped_near (
-      const Piece &piece, ImageView<const Pixel> partner) const;
+  std::vector<std::uint8_t> clipped_near (const Piece &piece,
+      ImageView<const Pixel> coded, ImageView<const Pixel> partner,
+      const fuse::CodedFrame &frame) const;
+  void go_beyond (const Piece &piece, ImageView<const Pixel> coded,
+      float partner_scale, fuse::CodedFrame &frame) const;
   Result<void> check (std::span<const ImageView<Pixel>> frames,
       std::span<const ImageView<std::uint16_t>> uncertainty, Extent size) const;
   /** False when it was stopped. */
@@ -214,37 +221,49 @@ struct Fuser<Pixel>::State {
   Result<void> or_forget (const Function &function);
 };
 
-/* Empty: no pixel of the partner is saturated. */
+/* Near pixels of which the partner does not tell, because it is saturated, or
+ * what it tells is far beyond white of fused frames and saturates the first
+ * camera. Empty: there are none. */
 template <typename Pixel>
 std::vector<std::uint8_t>
-Fuser<Pixel>::State::clipped_near (
-    const Piece &piece, ImageView<const Pixel> partner) const
+Fuser<Pixel>::State::clipped_near (const Piece &piece,
+    ImageView<const Pixel> coded, ImageView<const Pixel> partner,
+    const fuse::CodedFrame &frame) const
 {
   const auto white = Pixel (largest);
+  const float beyond_all = 1.1f * kWhite * float (range);
   const auto [width, height] = piece.engine->size ();
+  const auto first = coded.block (piece.rect.x, piece.rect.y, width, height);
   const auto seen = partner.block (piece.rect.x, piece.rect.y, width, height);
-  if (!fuse::has_clipped (seen, white))
+  if (!fuse::has_clipped (seen, white) && !fuse::has_clipped (first, white))
     return {};
   std::vector<std::uint8_t> marks;
   for (int y = 0; y < height; y++)
     for (int x = 0; x < width; x++)
-      marks.push_back (seen.at (x, y) >= white);
+      marks.push_back (seen.at (x, y) >= white ||
+                       (first.at (x, y) >= white &&
+                           frame.partner.light.row (y)[x] > beyond_all));
   if (&piece == &pieces.front ())
     for (const auto &[at, from] : covers)
       marks[std::size_t (at.y) * std::size_t (width) + std::size_t (at.x)] =
-          seen.at (from.x, from.y) >= white;
+          marks[std::size_t (from.y) * std::size_t (width) +
+                std::size_t (from.x)];
+  if (std::ranges::find (marks, 1) == marks.end ())
+    return {};
   return fuse::near_marks (std::move (marks), width, height);
 }
 
 /* Light of the first camera for each 1 of the second, by parts of rows of the
- * background, or of the whole, that saturate neither. */
+ * background, or of the whole, that saturate neither; by more and smaller
+ * ones where the first one is often saturated. */
 template <typename Pixel>
-float
+fuse::LightRatio
 Fuser<Pixel>::State::light_of (
     ImageView<const Pixel> coded, ImageView<const Pixel> partner) const
 {
-  constexpr int kStep = 13; // rows; no tile has all of a slot in one of these
-  constexpr int kPart = 32;
+  /* Rows; no tile has all of a slot in one of these. */
+  const int step = beyond ? 5 : 13;
+  const int part = beyond ? 8 : 32;
   const Piece &piece = pieces.front ();
   const fuse::CodedStream &stream = piece.engine->stream ();
   const auto [width, height] = piece.engine->size ();
@@ -252,15 +271,15 @@ Fuser<Pixel>::State::light_of (
     return gain ? gain[x] : 1.0f;
   };
   fuse::LightRatio ratio;
-  for (int y = 0; y < height; y += kStep) {
+  for (int y = 0; y < height; y += step) {
     const Pixel *a = coded.row (piece.rect.y + y) + piece.rect.x;
     const Pixel *b = partner.row (piece.rect.y + y) + piece.rect.x;
     const float *of_a = stream.camera ().gain (y);
     const float *of_b = stream.partner_camera ()->gain (y);
-    for (int left = 0; left + kPart <= width; left += kPart) {
+    for (int left = 0; left + part <= width; left += part) {
       float first = 0.0f, second = 0.0f;
       bool saturated = false;
-      for (int x = left; x < left + kPart; x++) {
+      for (int x = left; x < left + part; x++) {
         saturated |= float (a[x]) >= largest || float (b[x]) >= largest;
         first += float (a[x]) * gain_at (of_a, x);
         second += (float (b[x]) - partner_black) * gain_at (of_b, x);
@@ -269,7 +288,29 @@ Fuser<Pixel>::State::light_of (
         ratio.add (double (first), double (second));
     }
   }
-  return float (ratio.value ());
+  return ratio;
+}
+
+/* Light of saturated pixels, which is white at least, where the partner tells
+ * of it. */
+template <typename Pixel>
+void
+Fuser<Pixel>::State::go_beyond (const Piece &piece,
+    ImageView<const Pixel> coded, float partner_scale,
+    fuse::CodedFrame &frame) const
+{
+  const auto [width, height] = piece.engine->size ();
+  for (int y = 0; y < height; y++)
+    for (int x = 0; x < width; x++) {
+      const int left = piece.rect.x + x, top = piece.rect.y + y;
+      const auto at = std::size_t (y) * std::size_t (width) + std::size_t (x);
+      if (coded.at (left, top) < largest ||
+          (!frame.clipped.empty () && frame.clipped[at]))
+        continue;
+      float &light = frame.light.row (y)[x];
+      light = std::max (
+          light, (beyond->at (left, top) - partner_black) * partner_scale);
+    }
 }
 
 template <typename Pixel>
@@ -279,8 +320,13 @@ Fuser<Pixel>::State::take (ImageView<const Pixel> coded,
     const std::optional<ImageView<const float>> &errors)
 {
   const float scale = kWhite / largest;
-  const float partner_scale =
-      partner ? scale * light_of (coded, *partner) : 0.0f;
+  const fuse::LightRatio ratio =
+      partner ? light_of (coded, *partner) : fuse::LightRatio ();
+  const float partner_scale = scale * float (ratio.value ());
+  const bool saturated =
+      beyond && ratio.known () && fuse::has_clipped (coded, Pixel (largest));
+  if (saturated)
+    RETURN_IF_ERROR (beyond->take (*partner));
   for (Piece &piece : pieces) {
     const auto &[x, y, width, height] = piece.rect;
     fuse::CodedStream &stream = piece.engine->stream ();
@@ -294,6 +340,10 @@ Fuser<Pixel>::State::take (ImageView<const Pixel> coded,
     if (errors)
       frame.errors = squared_errors (
           stream.camera (), errors->block (x, y, width, height), scale);
+    frame.clipped = partner ? clipped_near (piece, coded, *partner, frame)
+                            : std::vector<std::uint8_t> ();
+    if (saturated)
+      go_beyond (piece, coded, partner_scale, frame);
     if (&piece == &pieces.front ())
       for (const auto &[at, from] : covers) {
         frame.light.row (at.y)[at.x] = frame.light.row (from.y)[from.x];
@@ -301,8 +351,6 @@ Fuser<Pixel>::State::take (ImageView<const Pixel> coded,
           frame.partner.light.row (at.y)[at.x] =
               frame.partner.light.row (from.y)[from.x];
       }
-    frame.clipped =
-        partner ? clipped_near (piece, *partner) : std::vector<std::uint8_t> ();
     stream.take (piece.engine->kernels ());
   }
   return {};
@@ -339,7 +387,7 @@ bool
 Fuser<Pixel>::State::fuse (std::span<const ImageView<Pixel>> frames,
     std::stop_token stop, std::span<const ImageView<std::uint16_t>> uncertainty)
 {
-  const float scale = largest / kWhite;
+  const float scale = largest / (kWhite * float (range));
   bool done = true;
   for (Piece &piece : pieces) {
     const auto &[left, top, width, height] = piece.rect;
@@ -362,8 +410,8 @@ Fuser<Pixel>::State::fuse (std::span<const ImageView<Pixel>> frames,
           for (std::size_t k = std::size_t (row.slot) * held;
                k < std::size_t (row.slot + 1) * held; k++)
             piece.engine->kernels ().to_words (row.deviations,
-                float (kUncertaintyWhite) / kWhite, 65535.0f, width,
-                uncertainty[k].row (top + row.y) + left);
+                float (kUncertaintyWhite) / (kWhite * float (range)), 65535.0f,
+                width, uncertainty[k].row (top + row.y) + left);
         };
     done &= piece.engine->fuse (write, *workers, stop,
         uncertainty.empty () ? fuse::Uncertainty::Sink () : write_deviation);
@@ -423,12 +471,17 @@ try {
                  " DN: it must be 0 to 65535"};
   const int largest = largest_pixel_of<Pixel> (options.bits);
   RETURN_IF_ERROR (schedule.check_size (width, height));
-  ASSIGN_OR_RETURN (auto pieces, make_pieces (schedule, width, height, options,
-                                     largest, std::move (stop)));
+  ASSIGN_OR_RETURN (auto pieces,
+      make_pieces (schedule, width, height, options, largest, stop));
+  std::optional<fuse::BeyondWhite<Pixel>> beyond;
+  if (options.partner && options.range > 1) {
+    ASSIGN_OR_RETURN (beyond, fuse::BeyondWhite<Pixel>::make (schedule, width,
+                                  height, options, std::move (stop)));
+  }
   auto state = std::make_shared<State> (State{std::move (pieces),
       find_covers (schedule, {width, height - schedule.pilot_rows ()}),
       schedule.slots (), float (largest), wanted.partner,
-      float (wanted.partner_black),
+      float (wanted.partner_black), wanted.range, std::move (beyond),
       std::make_unique<Workers> (
           options.threads == 0 && options.quality == FuseQuality::kFast &&
                   !options.refine

@@ -39,6 +39,10 @@ struct FuseOptions {
   /** Of partners: the full well is what white makes in a pixel that is on for
    * the whole exposure, as that of coded frames; none: the same noise. */
   std::optional<SensorNoise> partner_noise = {};
+  /** White of fused frames in whites of a coded frame, 1..16. Beyond 1, light
+   * that saturates a coded frame is that of its partner, which a filter keeps
+   * from being saturated. Such frames are not refined. */
+  int range = 1;
   /** Of a partner without light, DN, 0..65535; coded frames have none. */
   double partner_black = 0.0;
   /** Later coded frames that are used to fuse one: 0 or 1. */
@@ -88,6 +92,7 @@ public:
   static constexpr int kMaxPhases = 1024;
   static constexpr int kMaxSlots = 16;
   static constexpr int kMaxLookahead = 1;
+  static constexpr int kMaxRange = 16;
   /** Coded frames before a frame on which its pixels can depend, at most; 1 if
    * the noise is 0. Fused with as many before it, and lookahead after it, a
    * part of a stream gives the same pixels as the whole. */
@@ -133,7 +138,8 @@ public:
    * @p stop    another thread can request it if a frame takes too long.
    * @p uncertainty  none, or as many views like them: half the width of the
    *            interval that holds 68 % of the errors of each pixel, of which
-   *            the value kUncertaintyWhite is as much as white.
+   *            the value kUncertaintyWhite is as much as white of a fused
+   *            frame.
    * Error when no frame is pending or a view is wrong; the frame stays pending
    * then. ErrorCode::cancelled when it was stopped: then, and after
    * ErrorCode::out_of_memory, the contents of the views are undefined, and the

@@ -27,12 +27,13 @@ public:
     products_ += first * second;
   }
 
+  bool known () const { return sum_ > 0.0 && other_sum_ > 0.0; }
   /** Within 1e-3 and 1e3; 1 where nothing is known. */
   double value () const
   {
     constexpr double kLeast = 1e-3, kMost = 1e3;
     constexpr double kAgree = 0.98; // squared correlation
-    if (!(sum_ > 0.0 && other_sum_ > 0.0))
+    if (!known ())
       return 1.0;
     const double spread = squares_ - sum_ * sum_ / places_;
     const double other = other_squares_ - other_sum_ * other_sum_ / places_;

@@ -118,6 +118,7 @@ try {
   plain.quality = FuseQuality::kFast;
   plain.refine = plain.partner = false;
   plain.lookahead = 0;
+  plain.range = 1;
   auto workers = std::make_unique<Workers> (
       std::clamp (options.threads, 0, Workers::kMost));
   if (options.threads == 0)

@@ -239,18 +239,26 @@ TEST (PairBench, BothCamerasAreCalibratedInOneRun)
 
 constexpr Extent kSize{64, 48};
 
-/** What a second camera measured that stands @p right mirrors aside, and half
- * a mirror down, @p noise  and how loud it is. */
+/** How the frames of two cameras are made. */
+struct Cameras {
+  std::string first = {}; ///< options of the first one
+  bool paired = true;     ///< there is a second one
+  double right = 0.5;     ///< mirrors that it stands aside; and half a one down
+  bool noise = false;     ///< its profile has it
+  std::optional<Offset> spot = {}; ///< a pixel that is saturated in its frames
+};
+
+/** The bench profile of the second one. */
 std::string
-bench_of_second (double right, bool noise)
+bench_of_second (const Cameras &cameras)
 {
   BenchProfile first, second;
   second.camera.size = first.camera.size = kSize;
   Mapping::Parts parts{kSize, kSize,
-      camera_to_mirrors (
-          {.shift_x = right, .shift_y = 0.5}, kSize.width, kSize.height)};
+      camera_to_mirrors ({.shift_x = cameras.right, .shift_y = 0.5},
+          kSize.width, kSize.height)};
   second.mapping = Mapping::make (parts).value ();
-  if (noise) {
+  if (cameras.noise) {
     second.conversion_gain = Measured{20.0, 0.1};
     second.read_noise = Measured{7.0, 0.1};
   }
@@ -258,33 +266,45 @@ bench_of_second (double right, bool noise)
   return first.to_json ();
 }
 
-/** Pixels that @p element makes of frames with a partner, or without. @p spot:
- * a pixel of each partner that is saturated. @p right,
- * @p noise: see bench_of_second (). */
+constexpr const char *kScene =
+    "videotestsrc num-buffers=16 pattern=smpte horizontal-speed=3 "
+    "! video/x-raw,format=GRAY8,width=64,height=48,framerate=100/1 ";
+
 std::vector<std::uint8_t>
-made_by (const std::string &element, bool paired,
-    std::optional<Offset> spot = std::nullopt, double right = 0.5,
-    bool noise = false)
+bytes_of (Pipeline &pipeline, const std::string &path)
 {
-  const std::string path = ::testing::TempDir () + "pair-spot.gray";
+  EXPECT_EQ (pipeline.play (), "");
+  std::ifstream in (path, std::ios::binary);
+  const std::vector<std::uint8_t> pixels (
+      std::istreambuf_iterator<char> (in), {});
+  std::remove (path.c_str ());
+  return pixels;
+}
+
+/** Pixels that @p element makes of them. */
+std::vector<std::uint8_t>
+made_by (const std::string &element, const Cameras &cameras = {})
+{
+  const std::string path = ::testing::TempDir () + "pair-made.gray";
   const std::string schedule = "schedule=sequential:lattice:4/2 ";
   const std::string second =
       "light. ! queue ! codedexposure-sim beam=off gain=0.8 shift-y=0.5 "
       "shift-x=" +
-      std::to_string (right) + " " + schedule +
+      std::to_string (cameras.right) + " " + schedule +
       "! identity name=off ! dmdsync name=sync beam=off " + schedule +
       "! pair.off ";
   Pipeline pipeline (
-      "videotestsrc num-buffers=16 pattern=smpte horizontal-speed=3 "
-      "! video/x-raw,format=GRAY8,width=64,height=48,framerate=100/1 "
-      "! tee name=light light. ! queue ! codedexposure-sim " +
-      schedule + "! dmdsync " + schedule +
-      (paired ? "! pair.on " + second + "codedexposure-pair name=pair" : "") +
+      kScene +
+      ("! tee name=light light. ! queue ! codedexposure-sim " + cameras.first +
+          " " + schedule) +
+      "! dmdsync " + schedule +
+      (cameras.paired ? "! pair.on " + second + "codedexposure-pair name=pair"
+                      : "") +
       " ! " + element + " ! filesink location=" + path);
-  if (paired)
+  if (cameras.paired)
     g_object_set (pipeline["sync"].get (), "bench",
-        bench_of_second (right, noise).c_str (), nullptr);
-  if (spot)
+        bench_of_second (cameras).c_str (), nullptr);
+  if (cameras.spot)
     gst_pad_add_probe (
         pipeline.pad ("off", "src").get (), GST_PAD_PROBE_TYPE_BUFFER,
         [] (GstPad *, GstPadProbeInfo *info, gpointer data) {
@@ -295,33 +315,19 @@ made_by (const std::string &element, bool paired,
           info->data = frame;
           return GST_PAD_PROBE_OK;
         },
-        &*spot, nullptr);
-  EXPECT_EQ (pipeline.play (), "");
-  std::ifstream in (path, std::ios::binary);
-  const std::vector<std::uint8_t> pixels (
-      std::istreambuf_iterator<char> (in), {});
-  std::remove (path.c_str ());
-  return pixels;
+        const_cast<Offset *> (&*cameras.spot), nullptr);
+  return bytes_of (pipeline, path);
 }
 
-/* Mean squared error of fused frames where both cameras see, with a second
- * camera @p right mirrors aside, or none. */
+/** Mean squared error of what @p element makes of them where both see. */
 double
-error_of (bool paired, double right)
+error_of (const std::string &element, const Cameras &cameras)
 {
   constexpr int kBorder = 8;
   const std::string path = ::testing::TempDir () + "pair-truth.gray";
-  Pipeline scene ("videotestsrc num-buffers=16 pattern=smpte "
-                  "horizontal-speed=3 ! video/x-raw,format=GRAY8,width=64,"
-                  "height=48,framerate=100/1 ! filesink location=" +
-                  path);
-  EXPECT_EQ (scene.play (), "");
-  std::ifstream in (path, std::ios::binary);
-  const std::vector<std::uint8_t> truth (
-      std::istreambuf_iterator<char> (in), {});
-  std::remove (path.c_str ());
-  const auto fused =
-      made_by ("codedexposure-fuse", paired, std::nullopt, right);
+  Pipeline scene (kScene + ("! filesink location=" + path));
+  const auto truth = bytes_of (scene, path);
+  const auto fused = made_by (element, cameras);
   EXPECT_EQ (fused.size (), truth.size ());
   double squares = 0.0, count = 0.0;
   for (std::size_t i = 0; i < truth.size (); i++) {
@@ -337,18 +343,27 @@ error_of (bool paired, double right)
 /* What the first camera tells of the mirrors between its pixels counts. */
 TEST (PairBench, ASecondCameraBetweenTheMirrorsHelpsAsWell)
 {
-  EXPECT_LT (error_of (true, 0.5), 0.85 * error_of (false, 0.5));
+  EXPECT_LT (error_of ("codedexposure-fuse", {}),
+      0.85 * error_of ("codedexposure-fuse", {.paired = false}));
+}
+
+/* Half of the first camera's range is white of the scene. */
+TEST (PairBench, WhatSaturatesTheFirstCameraIsSeenByTheSecond)
+{
+  const Cameras cameras{.first = "gain=8", .right = 0.0};
+  const double both = error_of ("codedexposure-fuse range=2", cameras);
+  Cameras one = cameras;
+  one.paired = false;
+  EXPECT_LT (both, 0.5 * error_of ("codedexposure-fuse range=2", one));
 }
 
 /* 20 e-/DN, and three slots make white: 20 * 255 * 4 / 3 electrons. */
 TEST (PairBench, TheNoiseOfASecondCameraComesWithItsProfile)
 {
-  const auto profiled =
-      made_by ("codedexposure-fuse", true, std::nullopt, 0.5, true);
+  const auto profiled = made_by ("codedexposure-fuse", {.noise = true});
   EXPECT_EQ (profiled, made_by ("codedexposure-fuse second-full-well=6800 "
-                                "second-read-noise=7",
-                           true));
-  EXPECT_NE (profiled, made_by ("codedexposure-fuse", true));
+                                "second-read-noise=7"));
+  EXPECT_NE (profiled, made_by ("codedexposure-fuse"));
 }
 
 /* Its light is spread over several mirrors, none of which is saturated then.
@@ -357,9 +372,9 @@ TEST (PairBench, ASaturatedPixelOfASecondCameraWithAMappingIsNoticed)
 {
   constexpr Offset kSpot{20, 24};
   constexpr int kReach = 16;
-  const auto alone = made_by ("codedexposure-fuse", false);
-  const auto both = made_by ("codedexposure-fuse", true);
-  const auto spotted = made_by ("codedexposure-fuse", true, kSpot);
+  const auto alone = made_by ("codedexposure-fuse", {.paired = false});
+  const auto both = made_by ("codedexposure-fuse");
+  const auto spotted = made_by ("codedexposure-fuse", {.spot = kSpot});
   ASSERT_EQ (alone.size (), 16u * 64 * 48);
   ASSERT_EQ (both.size (), alone.size ());
   ASSERT_EQ (spotted.size (), alone.size ());
@@ -372,8 +387,8 @@ TEST (PairBench, ASaturatedPixelOfASecondCameraWithAMappingIsNoticed)
     }
   }
   EXPECT_GT (paired, 0);
-  const auto sum = made_by ("codedexposure-sum", true);
-  const auto with_spot = made_by ("codedexposure-sum", true, kSpot);
+  const auto sum = made_by ("codedexposure-sum");
+  const auto with_spot = made_by ("codedexposure-sum", {.spot = kSpot});
   ASSERT_EQ (sum.size (), 4u * 64 * 48);
   ASSERT_EQ (with_spot.size (), sum.size ());
   int white = 0;
@@ -387,8 +402,8 @@ TEST (PairBench, ASaturatedPixelOfASecondCameraWithAMappingIsNoticed)
 TEST (PairBench, WhatASecondCameraDoesNotSeeIsThatOfTheFirst)
 {
   constexpr int kUnseen = 13, kReach = 16;
-  const auto alone = made_by ("codedexposure-fuse", false);
-  const auto both = made_by ("codedexposure-fuse", true, std::nullopt, 12.5);
+  const auto alone = made_by ("codedexposure-fuse", {.paired = false});
+  const auto both = made_by ("codedexposure-fuse", {.right = 12.5});
   ASSERT_EQ (both.size (), alone.size ());
   int paired = 0;
   for (std::size_t i = 0; i < alone.size (); i++) {
@@ -398,8 +413,8 @@ TEST (PairBench, WhatASecondCameraDoesNotSeeIsThatOfTheFirst)
       paired += both[i] != alone[i];
   }
   EXPECT_GT (paired, 0);
-  const auto whole = made_by ("codedexposure-sum", true);
-  const auto part = made_by ("codedexposure-sum", true, std::nullopt, 12.5);
+  const auto whole = made_by ("codedexposure-sum");
+  const auto part = made_by ("codedexposure-sum", {.right = 12.5});
   ASSERT_EQ (part.size (), whole.size ());
   double difference = 0.0;
   for (std::size_t i = 0; i < part.size (); i++) {

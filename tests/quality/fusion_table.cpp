@@ -102,6 +102,7 @@ tables_of_two_cameras (
   std::vector<Table> tables = partner_tables (scenes, progress);
   tables.push_back (partner_error_table (scenes, progress));
   tables.push_back (partner_view_table (scenes, progress));
+  tables.push_back (partner_range_table (scenes, progress));
   return tables;
 }
 

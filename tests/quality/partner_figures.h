@@ -37,4 +37,9 @@ Table partner_error_table (
 Table partner_view_table (
     const std::vector<Scene> &scenes, const Progress &progress);
 
+/** `fast` where the first camera is saturated and the second one, behind a grey
+ * filter, is not (FuseOptions::range). */
+Table partner_range_table (
+    const std::vector<Scene> &scenes, const Progress &progress);
+
 } // namespace codedexposure::quality

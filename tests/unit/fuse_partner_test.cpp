@@ -175,6 +175,104 @@ TEST (FusePartner, APartnerWithMoreNoiseCountsLess)
   }
 }
 
+/* The first camera is saturated by half of white; in its frames alone, all that
+ * is brighter is missing. */
+TEST (FusePartner, SeesBeyondWhiteOfTheFirstCamera)
+{
+  for (const char *preset :
+      {kPreset, "sequential:2x2,region=32x24+16+12:sequential:4x2"}) {
+    const Schedule schedule = schedule_of (preset);
+    auto slots = truth (3, schedule.slots (), 0.6);
+    for (auto &slot : slots) // mostly dark
+      for (int y = 0; y < kHeight; y++)
+        for (int x = 0; x < kWidth; x++)
+          slot.at (x, y) = std::uint8_t (slot.at (x, y) * slot.at (x, y) / 255);
+    BenchOptions bright;
+    bright.gain = 2.0 * schedule.slots () / schedule.white_slots ();
+    const auto frames = coded (schedule, slots, bright);
+    const auto partners = coded (schedule.complement ().value (), slots);
+    FuseOptions options = with_partner ();
+    options.range = 2;
+    const double both =
+        psnr (fuse (schedule, frames, partners, options), slots);
+    EXPECT_GT (both, psnr (fuse (schedule, coded (schedule, slots), {}), slots))
+        << preset;
+    EXPECT_LT (psnr (fuse (schedule, frames, {}, options), slots), both - 0.5)
+        << preset;
+  }
+}
+
+/* Where it is saturated far beyond white, what the second one sees there does
+ * not fit into the frames. */
+TEST (FusePartner, AnOverexposedFirstCameraIsAloneThere)
+{
+  constexpr int kReach = 16, kBright = 10;
+  const Schedule schedule = schedule_of (kPreset);
+  auto slots = truth (3, schedule.slots (), 0.6);
+  for (auto &slot : slots)
+    for (int y = 0; y < kHeight; y++)
+      for (int x = 0; x < kWidth; x++)
+        slot.at (x, y) = x < kBright ? std::uint8_t (255)
+                                     : std::uint8_t (slot.at (x, y) / 4);
+  BenchOptions bright;
+  bright.gain = 4.0 * schedule.slots () / schedule.white_slots ();
+  const auto frames = coded (schedule, slots, bright);
+  const auto partners = coded (schedule.complement ().value (), slots);
+  for (const FuseQuality quality :
+      {FuseQuality::kFast, FuseQuality::kBalanced, FuseQuality::kBest}) {
+    FuseOptions alone;
+    alone.quality = quality;
+    const auto one = fuse (schedule, frames, {}, alone);
+    const auto both = fuse (schedule, frames, partners, with_partner (quality));
+    bool other = false;
+    for (std::size_t s = 0; s < one.size (); s++)
+      for (int y = 0; y < kHeight; y++)
+        for (int x = 0; x < kWidth; x++)
+          if (x < kBright + kReach)
+            ASSERT_EQ (both[s].at (x, y), one[s].at (x, y))
+                << quality_name (quality) << ' ' << s << ' ' << x << ' ' << y;
+          else
+            other |= both[s].at (x, y) != one[s].at (x, y);
+    EXPECT_TRUE (other) << quality_name (quality);
+  }
+}
+
+TEST (FusePartner, SaturatedPartnersTellNothingBeyondWhite)
+{
+  const Schedule schedule = schedule_of (kPreset);
+  Image<std::uint8_t> white (kWidth, kHeight);
+  for (int y = 0; y < kHeight; y++)
+    std::fill_n (white.view ().row (y), kWidth, std::uint8_t (255));
+  FuseOptions options = with_partner ();
+  options.range = 4;
+  const auto fused = fuse (schedule, {white, white}, {white, white}, options);
+  for (const auto &frame : fused)
+    for (int y = 0; y < kHeight; y++)
+      for (int x = 0; x < kWidth; x++)
+        ASSERT_EQ (frame.at (x, y), 64) << x << ' ' << y;
+}
+
+TEST (FusePartner, RangesAreNotRefined)
+{
+  const Schedule schedule = schedule_of (kPreset);
+  FuseOptions options = with_partner (FuseQuality::kLearned);
+  options.range = 4;
+  const auto fuser =
+      Fuser<std::uint8_t>::make (schedule, kWidth, kHeight, options);
+  ASSERT_TRUE (fuser);
+  EXPECT_EQ (fuser->unrefined (),
+      "range 4: the refinement was trained for light up to white");
+  for (const int range : {0, 17}) {
+    options.range = range;
+    const auto refused =
+        Fuser<std::uint8_t>::make (schedule, kWidth, kHeight, options);
+    ASSERT_FALSE (refused);
+    EXPECT_EQ (refused.error ().message,
+        "range " + std::to_string (range) +
+            ": white of fused frames must be 1 to 16 times that of coded ones");
+  }
+}
+
 TEST (FusePartner, AFrameWithoutItsPartnerIsThatOfOneCamera)
 {
   for (const FuseQuality quality : {FuseQuality::kFast, FuseQuality::kBalanced,

@@ -92,6 +92,7 @@ class Recording:
     def fused(self, quality: str = "balanced", *,
               second: str | os.PathLike | None = None,
               full_well: float | None = None, read_noise: float | None = None,
+              range: int | None = None,  # pylint: disable=redefined-builtin
               schedule: str | os.PathLike | dict | None = None,
               mapping: str | os.PathLike | dict | None = None,
               bits: int | None = None) -> Frames:
@@ -102,10 +103,13 @@ class Recording:
                     frames can only be read in a loop
         full_well   noise of the camera: electrons at white, e-; 0: no noise
         read_noise  noise of the camera, e- rms
+        range       of both cameras: white of the frames in whites of the first
+                    one, whose saturated pixels are seen by the second behind a
+                    filter
         The rest is as for subframes ().
         """
         fuse = self._fuse(
-            quality, full_well, read_noise, schedule, mapping, bits) + " !"
+            quality, full_well, read_noise, range, schedule, mapping, bits) + " !"
         if second is None:
             return Frames(self, fuse)
         Recording(second)  # raises what is wrong with it
@@ -117,6 +121,7 @@ class Recording:
     def uncertainty(self, quality: str = "balanced", *,
                     full_well: float | None = None,
                     read_noise: float | None = None,
+                    range: int | None = None,  # pylint: disable=redefined-builtin
                     schedule: str | os.PathLike | dict | None = None,
                     mapping: str | os.PathLike | dict | None = None,
                     bits: int | None = None) -> Frames:
@@ -125,16 +130,18 @@ class Recording:
         of the errors, in 1/65280 of white.
         """
         return Frames(self, self._fuse(
-            quality, full_well, read_noise, schedule, mapping, bits)
+            quality, full_well, read_noise, range, schedule, mapping, bits)
             + " fuse. ! queue leaky=downstream ! fakesink sync=false async=false "
             "fuse.uncertainty ! queue max-size-buffers=1 !")
 
     @staticmethod
-    def _fuse(quality, full_well, read_noise, schedule, mapping, bits) -> str:
+    def _fuse(quality, full_well, read_noise, white, schedule, mapping,
+              bits) -> str:
         return "queue max-size-buffers=1 ! " + element(
             "codedexposure-fuse", name="fuse", lookahead=1,
             require_schedule=True, quality=quality, full_well=full_well,
-            read_noise=read_noise, schedule=schedule, mapping=mapping, bits=bits)
+            read_noise=read_noise, range=white, schedule=schedule,
+            mapping=mapping, bits=bits)
 
     def coded(self) -> Frames:
         """The coded frames as the camera delivered them."""

@@ -177,8 +177,17 @@ run (int argc, char **argv)
       if (argc > 1 && each.command->parses_itself () &&
           each.command->text ().name == argv[1])
         each.command->run_with ({argv + 2, argv + argc});
+    /* From "--" on, words are another program's, which CLI11 would read. */
+    int own = argc;
+    for (const Node &each : nodes)
+      if (argc > 1 && each.command->text ().name == argv[1] &&
+          each.options->takes_rest ()) {
+        own = int (
+            std::find (argv + 2, argv + argc, std::string_view ("--")) - argv);
+        each.options->end_rest ({argv + own, argv + argc});
+      }
     try {
-      app.parse (argc, argv);
+      app.parse (own, argv);
     } catch (const CLI::ParseError &error) {
       node = chosen (nodes);
       while (const Node *below = node ? chosen (node->below) : nullptr)

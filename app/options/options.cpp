@@ -144,11 +144,11 @@ Options::finish () const
     check_value (option);
   if (rest_) {
     *rest_ = app_.remaining ();
-    const bool marked = !rest_->empty () && rest_->front () == "--";
-    if (marked)
-      rest_->erase (rest_->begin ());
-    else if (!rest_->empty () && rest_->front ().starts_with ("-"))
+    if (!rest_->empty () && rest_->front ().starts_with ("-"))
       usage_error ("unknown option " + rest_->front ());
+    const bool marked = rest_->empty () && !end_of_rest_.empty ();
+    rest_->insert (rest_->end (), end_of_rest_.begin () + (marked ? 1 : 0),
+        end_of_rest_.end ());
   }
   for (const Relation &relation : relations_) {
     if (!has (relation.name) || has (relation.other) == relation.needs)

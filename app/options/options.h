@@ -64,6 +64,13 @@ public:
   void words (std::vector<std::string> &into);
   /** The first word that is no option, and all after it. */
   void rest (std::vector<std::string> &into);
+  bool takes_rest () const { return rest_; }
+  /** The last words of the rest, from the first "--" of the command line on,
+   * which is not one of them if they are all. */
+  void end_rest (std::vector<std::string> words)
+  {
+    end_of_rest_ = std::move (words);
+  }
 
   /** Each of @p names is an error without @p needed. */
   void need (
@@ -109,6 +116,7 @@ private:
   };
   std::vector<Word> words_;
   std::vector<std::string> *rest_ = nullptr;
+  std::vector<std::string> end_of_rest_;
 };
 
 } // namespace codedexposure::app

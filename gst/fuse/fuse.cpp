@@ -238,7 +238,9 @@ Fuse::take (CodedFrame frame)
                                ? take_pixels<std::uint16_t> (buffer, coded)
                                : take_pixels<std::uint8_t> (buffer, coded);
     if (!saturated)
-      return post_decode_error (saturated.error ());
+      return saturated.error ().code == ErrorCode::cancelled
+                 ? GST_FLOW_FLUSHING
+                 : post_decode_error (saturated.error ());
     frame.meta.saturated = *saturated;
   }
   note_saturation (frame);

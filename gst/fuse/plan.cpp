@@ -84,9 +84,8 @@ Fuse::properties ()
           kReadWrite, within (&Settings::of_second, &SensorNoise::full_well),
           Settings::kUnset, SensorNoise::kMaxFullWell},
       {"second-read-noise", "Second read noise",
-          "Noise of a second camera's electronics in electrons rms; -1: that "
-          "of "
-          "its bench profile, or of the first",
+          "Noise of a second camera's electronics in electrons rms; -1: by its "
+          "bench profile, or as that of the first",
           kReadWrite, within (&Settings::of_second, &SensorNoise::read_noise),
           Settings::kUnset, SensorNoise::kMaxReadNoise},
   };

@@ -475,8 +475,8 @@ try {
       make_pieces (schedule, width, height, options, largest, stop));
   std::optional<fuse::BeyondWhite<Pixel>> beyond;
   if (options.partner && options.range > 1) {
-    ASSIGN_OR_RETURN (beyond, fuse::BeyondWhite<Pixel>::make (schedule, width,
-                                  height, options, std::move (stop)));
+    ASSIGN_OR_RETURN (beyond, fuse::BeyondWhite<Pixel>::make (schedule,
+                                  {width, height}, options, std::move (stop)));
   }
   auto state = std::make_shared<State> (State{std::move (pieces),
       find_covers (schedule, {width, height - schedule.pilot_rows ()}),

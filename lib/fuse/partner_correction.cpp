@@ -8,6 +8,7 @@
 #include "base/pixels.h"
 #include "base/try.h"
 #include "base/workers.h"
+#include "fuse/lone_fuser.h"
 #include "schedule/element_map.h"
 
 namespace codedexposure
@@ -42,32 +43,15 @@ slot_sum (const ElementMap &elements, int element, float scale)
 template <typename Pixel>
 struct PartnerCorrection<Pixel>::State {
   Rectifier rectifier;
-  Fuser<Pixel> fuser;
+  fuse::LoneFuser<Pixel> fuser;
   std::unique_ptr<Workers> workers;
   Pixel largest;
-  std::vector<SlotSum> sums;            ///< of each element of the complement
-  Image<std::uint16_t> elements;        ///< of each mirror but the pilot's
-  std::vector<Image<Pixel>> slots = {}; ///< fused
-  Image<std::uint16_t> light = {};      ///< that the partner must have got
+  std::vector<SlotSum> sums;       ///< of each element of the complement
+  Image<std::uint16_t> elements;   ///< of each mirror but the pilot's
+  Image<std::uint16_t> light = {}; ///< that the partner must have got
 
-  Result<void> estimate (ImageView<const Pixel> coded, std::stop_token stop);
   void add_up (int y);
 };
-
-template <typename Pixel>
-Result<void>
-PartnerCorrection<Pixel>::State::estimate (
-    ImageView<const Pixel> coded, std::stop_token stop)
-{
-  fuser.forget ();
-  RETURN_IF_ERROR (fuser.take (coded));
-  std::vector<ImageView<Pixel>> views;
-  for (Image<Pixel> &slot : slots)
-    views.push_back (slot.view ());
-  RETURN_IF_ERROR (fuser.fuse (views, std::move (stop)));
-  workers->run (light.height (), [this] (int y, int) { add_up (y); });
-  return {};
-}
 
 template <typename Pixel>
 void
@@ -75,7 +59,7 @@ PartnerCorrection<Pixel>::State::add_up (int y)
 {
   std::vector<float> all (std::size_t (light.width ()));
   std::vector<const Pixel *> rows;
-  for (const Image<Pixel> &slot : slots) {
+  for (const Image<Pixel> &slot : fuser.slots ()) {
     rows.push_back (slot.view ().row (y));
     for (std::size_t x = 0; x < all.size (); x++)
       all[x] += float (rows.back ()[x]);
@@ -114,18 +98,14 @@ Result<PartnerCorrection<Pixel>>
 PartnerCorrection<Pixel>::make (const Schedule &schedule,
     const Rectifier &partner, const FuseOptions &options, std::stop_token stop)
 try {
-  FuseOptions plain = options;
-  plain.quality = FuseQuality::kFast;
-  plain.refine = plain.partner = false;
-  plain.lookahead = 0;
-  plain.range = 1;
+  FuseOptions threaded = options;
   auto workers = std::make_unique<Workers> (
       std::clamp (options.threads, 0, Workers::kMost));
   if (options.threads == 0)
-    plain.threads = workers->count ();
-  const auto [width, height] = partner.mirrors ();
-  ASSIGN_OR_RETURN (auto fuser,
-      Fuser<Pixel>::make (schedule, width, height, plain, std::move (stop)));
+    threaded.threads = workers->count ();
+  ASSIGN_OR_RETURN (
+      auto fuser, fuse::LoneFuser<Pixel>::make (schedule, partner.mirrors (),
+                      threaded, std::move (stop)));
   ASSIGN_OR_RETURN (const Schedule complement, schedule.complement ());
   const ElementMap map (complement);
   double most = 0.0;
@@ -135,13 +115,11 @@ try {
   std::vector<SlotSum> sums;
   for (int e = 0; e < map.elements (); e++)
     sums.push_back (slot_sum (map, e, float (65535.0 / (most * largest))));
-  const Extent size = fuser.size ();
-  const auto slots = std::size_t (fuser.slots ());
-  std::unique_ptr<State> state (
-      new State{partner, std::move (fuser), std::move (workers), largest,
-          std::move (sums), {size.width, size.height}});
-  state->slots.assign (slots, Image<Pixel> (size.width, size.height));
-  state->light = Image<std::uint16_t> (size.width, size.height);
+  const Extent size{
+      fuser.slots ().front ().width (), fuser.slots ().front ().height ()};
+  std::unique_ptr<State> state (new State{partner, std::move (fuser),
+      std::move (workers), largest, std::move (sums), {size.width, size.height},
+      {size.width, size.height}});
   for (int y = 0; y < size.height; y++)
     for (int x = 0; x < size.width; x++)
       state->elements.at (x, y) = std::uint16_t (map.at (x, y));
@@ -155,7 +133,9 @@ Result<void>
 PartnerCorrection<Pixel>::run (ImageView<const Pixel> coded,
     ImageView<Pixel> partner, std::stop_token stop)
 {
-  RETURN_IF_ERROR (state_->estimate (coded, std::move (stop)));
+  RETURN_IF_ERROR (state_->fuser.run (coded, std::move (stop)));
+  state_->workers->run (
+      state_->light.height (), [this] (int y, int) { state_->add_up (y); });
   return state_->rectifier.correct (partner,
       std::as_const (state_->light).view (), *state_->workers, state_->largest);
 }

@@ -59,8 +59,8 @@ constexpr double kOwn = 1.0 - 2.0 * kTolerance;
  * itself one slot later. */
 constexpr double kCorrelationLength = 2.0, kPersistence = 0.8;
 
-/* Where mirrors have a smaller mean share in their pixels than this part of what
- * they have in one that is centred on them, corrections pay. */
+/* Where mirrors have a smaller mean share in their pixels than this part of
+ * what they have in one that is centred on them, corrections pay. */
 constexpr double kBetween = 0.9;
 /* A mirror is mixed if no pixel gets this part of the light that a pixel
  * centred on it gets. */
@@ -121,7 +121,10 @@ public:
   const WeightSolver &solver () const { return bank_.solver (); }
   /** Mean share of mirrors that are not copied in their best pixel, as a part
    * of that of a pixel centred on its mirror. */
-  double mean_share () const { return shares_ / (weighted_ * best_share_); }
+  double mean_share (const RectifyReport &report) const
+  {
+    return shares_ / (double (report.weighted) * best_share_);
+  }
 
 private:
   /* Persistence is that of the part with the shortest slots. */
@@ -141,9 +144,9 @@ private:
   ElementMap elements_;
   FilterBank bank_;
   bool whole_;
-  bool single_;       // pixel per mirror; of several, all are used
-  double best_share_; // of a pixel centred on its mirror
-  double shares_ = 0.0, weighted_ = 0.0;
+  bool single_;         // pixel per mirror; of several, all are used
+  double best_share_;   // of a pixel centred on its mirror
+  double shares_ = 0.0; // of all mirrors that are not copied
   std::vector<Position> seen_;
   std::vector<int> around_;
 };
@@ -177,7 +180,6 @@ Planner::place (Position seen, Offset mirror, int around, RectifyReport &report)
     return pixel;
   }
   report.weighted++;
-  weighted_ += 1.0;
   shares_ += share;
   report.mixed += share < kMixed * best_share_;
   const int taps = bank_.solver ().taps ();
@@ -299,7 +301,7 @@ try {
   plan->places = Image<Place> (plan->mirrors.width, plan->mirrors.height);
   for (int y = 0; y < plan->mirrors.height; y++)
     planner.place_row (y, plan->places.view ().row (y), plan->report);
-  if (options.correct && planner.mean_share () < kBetween)
+  if (options.correct && planner.mean_share (plan->report) < kBetween)
     plan->sight = Sight::make (mapping, planner.solver ());
   if (plan->sight)
     plan->reach =

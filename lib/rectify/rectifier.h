@@ -106,6 +106,7 @@ public:
    * @p expected  of the mirrors of the first rows or of all, in any unit and
    *              with any error; the smaller, the less is left of that of
    *              run ().
+   * @p workers   share the rows.
    * Error when nothing is prepared or a view has a wrong size. */
   Result<void> correct (ImageView<std::uint8_t> mirrors,
       ImageView<const std::uint16_t> expected, Workers &workers,

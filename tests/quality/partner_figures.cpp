@@ -196,35 +196,25 @@ Table
 partner_view_table (const std::vector<Scene> &scenes, const Progress &progress)
 {
   using C = Condition;
-  static constexpr View kOwn{.mirrored = true,
-      .shift_x = 0.3,
-      .shift_y = 0.4,
-      .rotation = 0.5,
-      .scale = 1.01};
+  static constexpr auto see = [] (C &p, double stretch, double keystone) {
+    p.view = View{.mirrored = true,
+        .shift_x = 0.3,
+        .shift_y = 0.4,
+        .rotation = 0.5,
+        .scale = 1.01,
+        .stretch = stretch,
+        .keystone = keystone};
+    p.blur = 0.3;
+    p.mapped = true;
+  };
   const Change views[] = {
       {"as the first camera, no blur", [] (C &, C &, int) {}},
       {"mirror image, 0.5 degrees, 1 %, shift (0.3, 0.4), blur of 0.3 px",
-          [] (C &, C &p, int) {
-            p.view = kOwn;
-            p.blur = 0.3;
-            p.mapped = true;
-          }},
+          [] (C &, C &p, int) { see (p, 1.0, 0.0); }},
       {"the same, seen at 24 degrees",
-          [] (C &, C &p, int) {
-            p.view = kOwn;
-            p.view->stretch = 1.05;
-            p.view->keystone = 0.011;
-            p.blur = 0.3;
-            p.mapped = true;
-          }},
+          [] (C &, C &p, int) { see (p, 1.05, 0.011); }},
       {"seen at 48 degrees, pixels of 1.5 x 1 mirrors",
-          [] (C &, C &p, int) {
-            p.view = kOwn;
-            p.view->stretch = 1.5;
-            p.view->keystone = 0.022;
-            p.blur = 0.3;
-            p.mapped = true;
-          }},
+          [] (C &, C &p, int) { see (p, 1.5, 0.022); }},
   };
   Table table{"partner-views",
       "PSNR (dB) of fast with a second camera of its own view, which its "

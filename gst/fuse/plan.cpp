@@ -312,6 +312,12 @@ Fuse::plan (const CodedFormat &format)
   gst_video_info_from_caps (&made.fused, fused.get ());
   gst_video_info_from_caps (&made.uncertainty, uncertainty.get ());
   plan_ = std::move (made);
+  if (options.range > 1 && !options.partner)
+    POST_WARNING (element (), STREAM, FORMAT,
+        "Range " + std::to_string (options.range) +
+            " makes the pictures darker and shows no more light: the frames "
+            "have no partners of a second camera. Leave it at 1, or put "
+            "codedexposure-pair before this element.");
   if (const std::string reason = unrefined (); !reason.empty ())
     POST_WARNING (element (), STREAM, FORMAT,
         "The result is not refined: " + reason + ".");

@@ -253,46 +253,35 @@ Fuser<Pixel>::State::clipped_near (const Piece &piece,
   return fuse::near_marks (std::move (marks), width, height);
 }
 
-/* Light of the first camera for each 1 of the second, by parts of rows of the
- * background, or of the whole, that saturate neither; by more and smaller
- * ones where the first one is often saturated. */
+/* By the background, or the whole. Where the first camera often is saturated,
+ * parts that the second one sees nearly as bright are left out: in some other
+ * slot, the first was saturated. */
 template <typename Pixel>
 fuse::LightRatio
 Fuser<Pixel>::State::light_of (
     ImageView<const Pixel> coded, ImageView<const Pixel> partner) const
 {
-  /* Rows; no tile has all of a slot in one of these. */
-  const int step = beyond ? 5 : 13;
-  const int part = beyond ? 8 : 32;
+  constexpr float kBelow = 0.9f; // white
   const Piece &piece = pieces.front ();
-  const fuse::CodedStream &stream = piece.engine->stream ();
   const auto [width, height] = piece.engine->size ();
-  const auto gain_at = [] (const float *gain, int x) {
-    return gain ? gain[x] : 1.0f;
-  };
-  fuse::LightRatio ratio;
-  for (int y = 0; y < height; y += step) {
-    const Pixel *a = coded.row (piece.rect.y + y) + piece.rect.x;
-    const Pixel *b = partner.row (piece.rect.y + y) + piece.rect.x;
-    const float *of_a = stream.camera ().gain (y);
-    const float *of_b = stream.partner_camera ()->gain (y);
-    for (int left = 0; left + part <= width; left += part) {
-      float first = 0.0f, second = 0.0f;
-      bool saturated = false;
-      for (int x = left; x < left + part; x++) {
-        saturated |= float (a[x]) >= largest || float (b[x]) >= largest;
-        first += float (a[x]) * gain_at (of_a, x);
-        second += (float (b[x]) - partner_black) * gain_at (of_b, x);
-      }
-      if (!saturated)
-        ratio.add (double (first), double (second));
-    }
-  }
-  return ratio;
+  const auto a = coded.block (piece.rect.x, piece.rect.y, width, height);
+  const auto b = partner.block (piece.rect.x, piece.rect.y, width, height);
+  const fuse::CodedStream &stream = piece.engine->stream ();
+  fuse::LightLimits limits{largest, largest, partner_black};
+  if (!beyond)
+    return fuse::light_ratio (stream, a, b, limits, {13, 32});
+  constexpr fuse::LightParts kSmall{5, 8};
+  const auto ratio = fuse::light_ratio (stream, a, b, limits, kSmall);
+  limits.first *= kBelow;
+  limits.second =
+      std::min (largest, limits.first / float (ratio.value ()) + partner_black);
+  return ratio.known () ? fuse::light_ratio (stream, a, b, limits, kSmall)
+                        : ratio;
 }
 
 /* Light of saturated pixels, which is white at least, where the partner tells
- * of it. */
+ * of it. It is as wrong, about, as the slot differs from the others, of which
+ * the partner saw the mean. */
 template <typename Pixel>
 void
 Fuser<Pixel>::State::go_beyond (const Piece &piece,
@@ -300,6 +289,8 @@ Fuser<Pixel>::State::go_beyond (const Piece &piece,
     fuse::CodedFrame &frame) const
 {
   const auto [width, height] = piece.engine->size ();
+  if (frame.errors.empty ())
+    frame.errors = Field (width, height);
   for (int y = 0; y < height; y++)
     for (int x = 0; x < width; x++) {
       const int left = piece.rect.x + x, top = piece.rect.y + y;
@@ -310,6 +301,8 @@ Fuser<Pixel>::State::go_beyond (const Piece &piece,
       float &light = frame.light.row (y)[x];
       light = std::max (
           light, (beyond->at (left, top) - partner_black) * partner_scale);
+      const float apart = light - frame.partner.light.row (y)[x];
+      frame.errors.row (y)[x] = apart * apart;
     }
 }
 
@@ -323,31 +316,36 @@ Fuser<Pixel>::State::take (ImageView<const Pixel> coded,
   const fuse::LightRatio ratio =
       partner ? light_of (coded, *partner) : fuse::LightRatio ();
   const float partner_scale = scale * float (ratio.value ());
+  /* Light that cannot be compared with that of the first camera tells nothing.
+   */
+  const bool both = partner && ratio.known ();
+  const Extent size = pieces.front ().engine->size ();
   const bool saturated =
-      beyond && ratio.known () && fuse::has_clipped (coded, Pixel (largest));
+      both && beyond &&
+      fuse::has_clipped (coded.rows (0, size.height), Pixel (largest));
   if (saturated)
     RETURN_IF_ERROR (beyond->take (*partner));
   for (Piece &piece : pieces) {
     const auto &[x, y, width, height] = piece.rect;
     fuse::CodedStream &stream = piece.engine->stream ();
     fuse::CodedFrame &frame = stream.next ();
-    frame.has_partner = partner.has_value ();
+    frame.has_partner = both;
     set_light (frame.light, stream.camera (), coded.block (x, y, width, height),
         scale);
-    if (partner)
+    if (both)
       set_light (frame.partner.light, *stream.partner_camera (),
           partner->block (x, y, width, height), partner_scale, partner_black);
     if (errors)
       frame.errors = squared_errors (
           stream.camera (), errors->block (x, y, width, height), scale);
-    frame.clipped = partner ? clipped_near (piece, coded, *partner, frame)
-                            : std::vector<std::uint8_t> ();
+    frame.clipped = both ? clipped_near (piece, coded, *partner, frame)
+                         : std::vector<std::uint8_t> ();
     if (saturated)
       go_beyond (piece, coded, partner_scale, frame);
     if (&piece == &pieces.front ())
       for (const auto &[at, from] : covers) {
         frame.light.row (at.y)[at.x] = frame.light.row (from.y)[from.x];
-        if (partner)
+        if (both)
           frame.partner.light.row (at.y)[at.x] =
               frame.partner.light.row (from.y)[from.x];
       }

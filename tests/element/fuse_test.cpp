@@ -187,6 +187,15 @@ TEST_F (Fuse, WarnsWhereItHasToAssumeASchedule)
   EXPECT_EQ (fuse->warning (), "");
 }
 
+TEST_F (Fuse, WarnsOfARangeForOneCamera)
+{
+  start ("schedule=sequential:2x2 range=2");
+  push (0);
+  EXPECT_NE (fuse->warning ().find (
+                 "Range 2 makes the pictures darker and shows no more light"),
+      std::string::npos);
+}
+
 TEST_F (Fuse, RefusesMotionForMoreSlotsThanItCan)
 {
   start ("schedule=sequential:lattice:25/10 quality=best");

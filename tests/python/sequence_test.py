@@ -220,6 +220,12 @@ class TwoCameras(unittest.TestCase):
         fused = opened("on.mkv").fused("fast", second=SCRATCH / "off.mkv")
         for one, other in zip(pairs.fused("fast"), fused, strict=True):
             self.assertTrue(np.array_equal(one.image, other.image))
+        bright, dark = (pairs.fused("fast", range=white)[20].image.astype(int)
+                        for white in (1, 2))
+        self.assertGreater(bright.max(), 200)
+        self.assertLess(np.abs(2 * dark - bright).mean(), 1)
+        with self.assertRaisesRegex(ValueError, "range is from 1 to 16, not 17"):
+            list(pairs.fused("fast", range=17))
 
 
 if __name__ == "__main__":

@@ -188,6 +188,18 @@ bright_left (int columns)
   return slots;
 }
 
+/* Three frames with few bright places. */
+Pictures
+mostly_dark (int count)
+{
+  auto slots = truth (3, count, 0.6);
+  for (auto &slot : slots)
+    for (int y = 0; y < kHeight; y++)
+      for (int x = 0; x < kWidth; x++)
+        slot.at (x, y) = std::uint8_t (slot.at (x, y) * slot.at (x, y) / 255);
+  return slots;
+}
+
 /* A camera that is saturated by so small a part of white. */
 BenchOptions
 times_brighter (int times, const Schedule &schedule)
@@ -204,11 +216,7 @@ TEST (FusePartner, SeesBeyondWhiteOfTheFirstCamera)
   for (const char *preset :
       {kPreset, "sequential:2x2,region=32x24+16+12:sequential:4x2"}) {
     const Schedule schedule = schedule_of (preset);
-    auto slots = truth (3, schedule.slots (), 0.6);
-    for (auto &slot : slots) // mostly dark
-      for (int y = 0; y < kHeight; y++)
-        for (int x = 0; x < kWidth; x++)
-          slot.at (x, y) = std::uint8_t (slot.at (x, y) * slot.at (x, y) / 255);
+    const auto slots = mostly_dark (schedule.slots ());
     const auto frames = coded (schedule, slots, times_brighter (2, schedule));
     const auto partners = coded (schedule.complement ().value (), slots);
     FuseOptions options = with_partner ();
@@ -276,6 +284,64 @@ TEST (FusePartner, SaturatedPartnersTellNothingBeyondWhite)
     for (int y = 0; y < kHeight; y++)
       for (int x = 0; x < kBright - 10; x++)
         ASSERT_EQ (frame.at (x, y), 64) << x << ' ' << y;
+}
+
+/* No place is dark enough to compare what both see. */
+TEST (FusePartner, LightThatCannotBeComparedTellsNothing)
+{
+  const Schedule schedule = schedule_of (kPreset);
+  Image<std::uint8_t> white (kWidth, kHeight), grey (kWidth, kHeight);
+  for (int y = 0; y < kHeight; y++)
+    for (int x = 0; x < kWidth; x++) {
+      white.at (x, y) = 255;
+      grey.at (x, y) = std::uint8_t (100 + x);
+    }
+  for (const int range : {1, 4}) {
+    FuseOptions options = with_partner ();
+    options.range = range;
+    EXPECT_TRUE (equal (fuse (schedule, {white, white}, {grey, grey}, options),
+        fuse (schedule, {white, white}, {}, options)))
+        << range;
+  }
+}
+
+/* What the first camera did not measure is less certain. */
+TEST (FusePartner, TheUncertaintyBeyondWhiteIsThatOfTheSecondCamera)
+{
+  const Schedule schedule = schedule_of (kPreset);
+  const auto slots = mostly_dark (schedule.slots ());
+  const auto coded_frames =
+      coded (schedule, slots, times_brighter (2, schedule));
+  const auto partners = coded (schedule.complement ().value (), slots);
+  FuseOptions options = with_partner ();
+  options.range = 2;
+  auto fuser =
+      Fuser<std::uint8_t>::make (schedule, kWidth, kHeight, options).value ();
+  const auto n = std::size_t (schedule.slots ());
+  Pictures fused (n, Image<std::uint8_t> (kWidth, kHeight));
+  std::vector<Image<std::uint16_t>> widths (
+      n, Image<std::uint16_t> (kWidth, kHeight));
+  std::vector<ImageView<std::uint8_t>> views;
+  std::vector<ImageView<std::uint16_t>> deviations;
+  for (std::size_t s = 0; s < n; s++) {
+    views.push_back (fused[s].view ());
+    deviations.push_back (widths[s].view ());
+  }
+  ASSERT_TRUE (fuser.take (
+      coded_frames[0].view (), std::as_const (partners[0]).view ()));
+  ASSERT_TRUE (fuser.fuse (views, {}, deviations));
+  double beyond = 0.0, within = 0.0;
+  for (std::size_t s = 0; s < n; s++)
+    for (int y = 8; y < kHeight - 8; y++)
+      for (int x = 8; x < kWidth - 8; x++)
+        if (coded_frames[0].at (x, y) == 255 && schedule.on (x, y, int (s))) {
+          const double error =
+              std::abs (fused[s].at (x, y) - slots[s].at (x, y)) - 0.5;
+          beyond++;
+          within += error <= widths[s].at (x, y) / 256.0;
+        }
+  EXPECT_GT (beyond, 100.0);
+  EXPECT_GT (within, 0.4 * beyond);
 }
 
 TEST (FusePartner, RangesAreNotRefined)

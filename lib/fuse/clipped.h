@@ -22,10 +22,11 @@ has_clipped (ImageView<const Pixel> seen, Pixel largest)
 {
   for (int y = 0; y < seen.height; y++) {
     const Pixel *row = seen.row (y);
-    bool any = false;
+    /* A maximum, as compilers know it for vectors. */
+    Pixel brightest = 0;
     for (int x = 0; x < seen.width; x++)
-      any |= row[x] >= largest;
-    if (any)
+      brightest = std::max (brightest, row[x]);
+    if (brightest >= largest)
       return true;
   }
   return false;

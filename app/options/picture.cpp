@@ -37,6 +37,10 @@ DecodeOptions::declare (Options &options)
   options.flag ("--refine", refine,
       "after --fuse: corrects its frames by a network that learned from "
       "pictures");
+  options.flag ("--overlap", overlap,
+      "after --fuse: exposures between coded frames are fused as well, so that "
+      "the first and last slots of a frame are as true as the others; takes "
+      "twice the time");
   options.value ("--bench", bench, "FILE",
       "bench profile (JSON) with noise, black level, leakage and mapping; "
       "other options win [that of the recording]");
@@ -54,7 +58,8 @@ DecodeOptions::declare (Options &options)
       whole (1, 16));
   declare_frames (options, "the recording");
   options.need (
-      {"--refine", "--full-well", "--read-noise", "--range"}, "--fuse");
+      {"--refine", "--overlap", "--full-well", "--read-noise", "--range"},
+      "--fuse");
 }
 
 std::vector<std::string>
@@ -80,6 +85,8 @@ DecodeOptions::words () const
     add ("bits", std::to_string (*bits));
   if (refine)
     words.emplace_back ("--refine");
+  if (overlap)
+    words.emplace_back ("--overlap");
   return words;
 }
 

@@ -13,7 +13,7 @@ struct DecodeOptions {
   std::optional<Text> method, mapping, fuse, bench, schedule;
   std::optional<double> full_well, read_noise;
   std::optional<int> bits, range;
-  bool refine = false;
+  bool refine = false, overlap = false;
 
   void declare (Options &options);
   /** Some of them. @p origin  of the frames: "the recording". */

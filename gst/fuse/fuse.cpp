@@ -52,6 +52,12 @@
  * Schedules and noise that it was not trained for post a WARNING, and the
  * result stays as it was.
  *
+ * The first and the last slots of an exposure are less accurate than those in
+ * its middle, which have others around them. With
+ * #codedexposure-fuse:overlap, the second half of each coded frame and the
+ * first half of the next are fused like one more coded frame, in whose middle
+ * these slots are, and both estimates are mixed. It takes twice the time.
+ *
  * Tell the element about the camera's noise (#codedexposure-fuse:full-well,
  * #codedexposure-fuse:read-noise), or give it a bench profile, which a
  * recording may carry: it filters more where the noise is larger, and tells

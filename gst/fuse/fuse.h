@@ -29,6 +29,7 @@ struct Plan {
   std::optional<AnyCorrection> correction; ///< of partners; none: not worth it
   GstVideoInfo fused, uncertainty;
   Reach reach;
+  std::string gap; ///< that keeps exposures from overlapping; empty: none
 };
 
 /** Properties; noise that was not set is that of the bench profile. */
@@ -74,6 +75,7 @@ private:
   SensorNoise partner_noise (const CodedFormat &format) const;
   std::string method_name () const override;
   std::string unrefined () const;
+  std::string unoverlapped () const;
 
   /** None, with a warning if there are any, when partners cannot be used. */
   std::optional<PartnerReader> plan_partners (const CodedFormat &format) const;

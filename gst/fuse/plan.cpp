@@ -54,6 +54,13 @@ Fuse::properties ()
           "latency",
           kReadWrite, &FuseOptions::lookahead, 0u,
           guint (Fuser<std::uint8_t>::kMaxLookahead)},
+      {"overlap", "Overlap",
+          "Also fuse the exposures from the middle of each coded frame to that "
+          "of the next, which makes the first and last slots of a frame as "
+          "true as the others, in twice the time; needs lookahead=1; for "
+          "one-hot codes and frames with hardly a gap, others stay as they "
+          "are, with a warning",
+          kReadWrite, &FuseOptions::overlap},
       {"threads", "Threads",
           "Threads, which do not change pixels; 0: one for each processor, and "
           "for quality fast without refine, the streaming thread only, but to "
@@ -108,6 +115,8 @@ Fuse::method_name () const
                      g_enum_get_value (qualities, int (quality))->value_nick;
   if (plan_ && plan_->partners)
     name += ", both beams";
+  if (in_force_.overlap && unoverlapped ().empty ())
+    name += ", overlapped";
   if (in_force_.range > 1)
     name += ", range " + std::to_string (in_force_.range);
   if ((learned || in_force_.refine) && unrefined ().empty ())
@@ -124,6 +133,16 @@ Fuse::unrefined () const
                      [] (const auto &fuser) { return fuser.unrefined (); },
                      plan_->fuser)
                : std::string ();
+}
+
+/* Why exposures between coded frames are not fused although they should be. */
+std::string
+Fuse::unoverlapped () const
+{
+  if (!plan_ || !plan_->gap.empty ())
+    return plan_ ? plan_->gap : std::string ();
+  return std::visit (
+      [] (const auto &fuser) { return fuser.unoverlapped (); }, plan_->fuser);
 }
 
 /* A pixel at the largest value has seen the light of white_slots () slots. */
@@ -217,6 +236,25 @@ make_fuser (
   return AnyFuser (std::move (*made));
 }
 
+/* What is too long without light between two coded frames; empty: nothing. A
+ * quarter of a slot, as what moves jumps by as much. */
+std::string
+gap_of (const CodedFormat &format)
+{
+  const Schedule &schedule = format.schedule;
+  const auto slots =
+      SlotPlan::fit (schedule.timing (), schedule.slots (), format.rate);
+  if (!slots)
+    return slots.error ().message;
+  const Nanoseconds gap = slots->frame_period () - slots->exposure ();
+  if (4 * gap <= slots->active ())
+    return {};
+  return "there is no light for " + codedexposure::time_text (gap) +
+         " from one exposure to the next; it must be a quarter of a slot at "
+         "most, " +
+         codedexposure::time_text (slots->active () / 4);
+}
+
 /* Rate times N, and the pilot's rows cropped. */
 CapsScale
 coded_to_fused (const Schedule &schedule)
@@ -286,6 +324,8 @@ Fuse::plan (const CodedFormat &format)
   }
   options.bits = significant_bits ();
   options.noise = noise (format.schedule);
+  std::string gap = options.overlap ? gap_of (format) : std::string ();
+  options.overlap &= gap.empty ();
   const std::stop_token stop = stop_token ();
   auto fuser = format.wide ()
                    ? make_fuser<std::uint16_t> (format, options, stop)
@@ -304,9 +344,10 @@ Fuse::plan (const CodedFormat &format)
   caps.of (PadKind::coded).reset (gst_caps_ref (format.caps.get ()));
   fused.reset (scale_caps (rectified.get (), coded_to_fused (format.schedule)));
   uncertainty = of_sixteen_bits (fused.get ());
+  const int history =
+      std::visit ([] (const auto &made) { return made.history (); }, *fuser);
   Plan made{std::move (*fuser), std::move (partners), {}, {}, {},
-      {options.noise.full_well > 0.0 ? kMaxReach.history : 1,
-          options.lookahead}};
+      {history, options.lookahead}, std::move (gap)};
   if (!plan_correction (made, format, options))
     return false;
   gst_video_info_from_caps (&made.fused, fused.get ());
@@ -321,6 +362,9 @@ Fuse::plan (const CodedFormat &format)
   if (const std::string reason = unrefined (); !reason.empty ())
     POST_WARNING (element (), STREAM, FORMAT,
         "The result is not refined: " + reason + ".");
+  if (const std::string reason = unoverlapped (); !reason.empty ())
+    POST_WARNING (element (), STREAM, FORMAT,
+        "The exposures between coded frames are not used: " + reason + ".");
   take_caps (std::move (caps));
   return true;
 }

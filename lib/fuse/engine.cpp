@@ -31,7 +31,6 @@ namespace
 {
 
 constexpr double kWhite = 255.0;
-static_assert (StaticPixels::kMemory == Fuser<std::uint8_t>::kMaxHistory);
 static_assert (kMaxSparseSlots == Fuser<std::uint8_t>::kMaxSlots);
 /* Light, as a part of white, at which the noise of filters is taken. */
 constexpr double kTypicalLight = 0.4;
@@ -101,6 +100,9 @@ check (const FuseOptions &options)
   if (options.lookahead < 0 || options.lookahead > 1)
     return Error{"lookahead " + std::to_string (options.lookahead) +
                  ": it must be 0 or 1 coded frames"};
+  if (options.overlap && options.lookahead == 0)
+    return Error{"overlap needs the coded frame after the one that is fused; "
+                 "set lookahead to 1"};
   constexpr int kMaxRange = Fuser<std::uint8_t>::kMaxRange;
   if (options.range < 1 || options.range > kMaxRange)
     return Error{"range " + std::to_string (options.range) +

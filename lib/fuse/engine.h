@@ -35,6 +35,8 @@ public:
   Extent size () const { return size_; }
   const Kernels &kernels () const { return kernels_; }
   CodedStream &stream () { return *stream_; }
+  /** Weight of static pixels of the last frame, 0 to 1. */
+  const Field &is_static () const { return static_pixels_->weight (); }
 
   /** Why options.refine has no effect here; empty if it has or is not set. */
   const std::string &unrefined () const { return unrefined_; }

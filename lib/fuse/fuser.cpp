@@ -13,6 +13,7 @@
 #include "fuse/clipped.h"
 #include "fuse/engine.h"
 #include "fuse/light_ratio.h"
+#include "fuse/overlap.h"
 
 namespace codedexposure
 {
@@ -35,6 +36,7 @@ struct Piece {
   Rect rect;
   int held; ///< slots of the exposure per slot of the part
   std::unique_ptr<fuse::Engine> engine;
+  std::unique_ptr<fuse::Overlap> overlap; ///< none: see unoverlapped
 };
 
 /** A pixel of the background that a region covers, and the pixel of the same
@@ -104,9 +106,11 @@ part_of (const Schedule &schedule, int region)
   return region < 0 ? schedule.background () : schedule.region (region);
 }
 
+/* @unoverlapped: gets why a piece has no Overlap. */
 Result<std::vector<Piece>>
 make_pieces (const Schedule &schedule, int width, int height,
-    const FuseOptions &options, double largest, std::stop_token stop)
+    const FuseOptions &options, double largest, std::stop_token stop,
+    std::string &unoverlapped)
 {
   std::optional<Schedule> complement;
   if (options.partner) {
@@ -123,8 +127,17 @@ make_pieces (const Schedule &schedule, int width, int height,
     ASSIGN_OR_RETURN (
         auto engine, fuse::Engine::make (part, partner ? &*partner : nullptr,
                          rect.width, rect.height, options, largest, stop));
-    pieces.push_back (
-        {rect, schedule.slots () / part.slots (), std::move (engine)});
+    Piece &piece = pieces.emplace_back (
+        Piece{rect, schedule.slots () / part.slots (), std::move (engine), {}});
+    if (!options.overlap)
+      continue;
+    const std::string why_not = fuse::Overlap::why_not (part, options);
+    if (!why_not.empty ()) {
+      unoverlapped = why_not;
+      continue;
+    }
+    ASSIGN_OR_RETURN (piece.overlap, fuse::Overlap::make (part, rect.width,
+                                         rect.height, options, largest, stop));
   }
   return pieces;
 }
@@ -191,6 +204,8 @@ struct Fuser<Pixel>::State {
   std::vector<Piece> pieces;
   std::vector<Cover> covers;
   int slots;
+  int history;
+  std::string unoverlapped;
   float largest;
   bool has_partners;
   float partner_black;
@@ -390,6 +405,12 @@ Fuser<Pixel>::State::fuse (std::span<const ImageView<Pixel>> frames,
   for (Piece &piece : pieces) {
     const auto &[left, top, width, height] = piece.rect;
     const std::size_t held = std::size_t (piece.held);
+    const auto of_slot = [&] (std::size_t slot, int y,
+                             const float *const *rows) {
+      return piece.overlap ? piece.overlap->mix (int (slot), y, rows[slot],
+                                 piece.engine->is_static ().row (y))
+                           : rows[slot];
+    };
     const auto write = [&] (int y, const float *const *rows) {
       const auto row = [&] (std::size_t k) {
         return frames[k].row (top + y) + left;
@@ -399,20 +420,31 @@ Fuser<Pixel>::State::fuse (std::span<const ImageView<Pixel>> frames,
         if (k % held != 0)
           std::copy_n (row (k - 1), width, row (k));
         else if constexpr (sizeof (Pixel) == 1)
-          kernels.to_bytes (rows[k / held], scale, largest, width, row (k));
+          kernels.to_bytes (
+              of_slot (k / held, y, rows), scale, largest, width, row (k));
         else
-          kernels.to_words (rows[k / held], scale, largest, width, row (k));
+          kernels.to_words (
+              of_slot (k / held, y, rows), scale, largest, width, row (k));
     };
     const fuse::Uncertainty::Sink write_deviation =
         [&] (const fuse::Uncertainty::Row &row) {
+          const float *deviations =
+              piece.overlap
+                  ? piece.overlap->mix_deviations (row.slot, row.y,
+                        row.deviations, piece.engine->is_static ().row (row.y))
+                  : row.deviations;
           for (std::size_t k = std::size_t (row.slot) * held;
                k < std::size_t (row.slot + 1) * held; k++)
-            piece.engine->kernels ().to_words (row.deviations,
+            piece.engine->kernels ().to_words (deviations,
                 float (kUncertaintyWhite) / (kWhite * float (range)), 65535.0f,
                 width, uncertainty[k].row (top + row.y) + left);
         };
-    done &= piece.engine->fuse (write, *workers, stop,
-        uncertainty.empty () ? fuse::Uncertainty::Sink () : write_deviation);
+    if (piece.overlap)
+      done &= piece.overlap->run (piece.engine->stream ().frames (),
+          !uncertainty.empty (), *workers, stop);
+    done = done && piece.engine->fuse (write, *workers, stop,
+                       uncertainty.empty () ? fuse::Uncertainty::Sink ()
+                                            : write_deviation);
   }
   return done;
 }
@@ -421,8 +453,11 @@ template <typename Pixel>
 void
 Fuser<Pixel>::State::forget ()
 {
-  for (Piece &piece : pieces)
+  for (Piece &piece : pieces) {
     piece.engine->forget ();
+    if (piece.overlap)
+      piece.overlap->forget ();
+  }
 }
 
 template <typename Pixel>
@@ -469,8 +504,15 @@ try {
                  " DN: it must be 0 to 65535"};
   const int largest = largest_pixel_of<Pixel> (options.bits);
   RETURN_IF_ERROR (schedule.check_size (width, height));
-  ASSIGN_OR_RETURN (auto pieces,
-      make_pieces (schedule, width, height, options, largest, stop));
+  std::string unoverlapped;
+  ASSIGN_OR_RETURN (auto pieces, make_pieces (schedule, width, height, options,
+                                     largest, stop, unoverlapped));
+  int history = options.noise.full_well > 0.0 ? fuse::StaticPixels::kMemory : 1;
+  if (std::ranges::any_of (
+          pieces, [] (const Piece &piece) { return piece.overlap != nullptr; }))
+    history += fuse::Overlap::kHistory;
+  static_assert (
+      fuse::StaticPixels::kMemory + fuse::Overlap::kHistory == kMaxHistory);
   std::optional<fuse::BeyondWhite<Pixel>> beyond;
   if (options.partner && options.range > 1) {
     ASSIGN_OR_RETURN (beyond, fuse::BeyondWhite<Pixel>::make (schedule,
@@ -478,8 +520,9 @@ try {
   }
   auto state = std::make_shared<State> (State{std::move (pieces),
       find_covers (schedule, {width, height - schedule.pilot_rows ()}),
-      schedule.slots (), float (largest), wanted.partner,
-      float (wanted.partner_black), wanted.range, std::move (beyond),
+      schedule.slots (), history, std::move (unoverlapped), float (largest),
+      wanted.partner, float (wanted.partner_black), wanted.range,
+      std::move (beyond),
       std::make_unique<Workers> (
           options.threads == 0 && options.quality == FuseQuality::kFast &&
                   !options.refine
@@ -497,6 +540,20 @@ int
 Fuser<Pixel>::slots () const
 {
   return state_->slots;
+}
+
+template <typename Pixel>
+int
+Fuser<Pixel>::history () const
+{
+  return state_->history;
+}
+
+template <typename Pixel>
+std::string
+Fuser<Pixel>::unoverlapped () const
+{
+  return state_->unoverlapped;
 }
 
 template <typename Pixel>
@@ -564,8 +621,12 @@ Fuser<Pixel>::pass ()
   if (pending () == 0)
     return Error{"no coded frame is pending; take () one first"};
   return state_->or_forget ([&] () -> Result<void> {
-    for (Piece &piece : state_->pieces)
+    for (Piece &piece : state_->pieces) {
+      if (piece.overlap)
+        piece.overlap->pass (
+            piece.engine->stream ().frames (), *state_->workers);
       piece.engine->pass (*state_->workers);
+    }
     return {};
   });
 }

@@ -47,6 +47,11 @@ struct FuseOptions {
   double partner_black = 0.0;
   /** Later coded frames that are used to fuse one: 0 or 1. */
   int lookahead = 0;
+  /** Also fuse the exposures between coded frames, from the middle of one to
+   * that of the next, so that the first and the last slots are as true as
+   * those in the middle. It takes twice the time, and needs lookahead 1, a
+   * one-hot code, and coded frames that follow each other with hardly a gap. */
+  bool overlap = false;
   /** Significant bits of a pixel, 1..8 or 1..16; 0: all that the type has. */
   int bits = 0;
   SensorNoise noise;
@@ -93,10 +98,7 @@ public:
   static constexpr int kMaxSlots = 16;
   static constexpr int kMaxLookahead = 1;
   static constexpr int kMaxRange = 16;
-  /** Coded frames before a frame on which its pixels can depend, at most; 1 if
-   * the noise is 0. Fused with as many before it, and lookahead after it, a
-   * part of a stream gives the same pixels as the whole. */
-  static constexpr int kMaxHistory = 16;
+  static constexpr int kMaxHistory = 17;
   /** 256 steps per grey level of 8 bits. */
   static constexpr int kUncertaintyWhite = 255 * 256;
 
@@ -111,6 +113,13 @@ public:
   Fuser &operator= (Fuser &&) noexcept = default;
 
   int slots () const;
+  /** Coded frames before a frame on which its pixels can depend, at most
+   * kMaxHistory. Fused with as many before it, and lookahead after it, a part
+   * of a stream gives the same pixels as the whole. */
+  int history () const;
+  /** Why frames, or a region of them, do not overlap although the options say
+   * so; empty if they do, or should not. */
+  std::string unoverlapped () const;
   /** Why frames, or a region of them, are not refined although the options say
    * so: the schedule or the noise is not among those of the training. Empty if
    * they are refined, or should not be. */

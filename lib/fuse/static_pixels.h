@@ -82,6 +82,8 @@ public:
    */
   void smooth (const Kernels &kernels, const Found &found, Field &light);
 
+  /** Found::weight of the last frame. */
+  const Field &weight () const { return weight_; }
   /** Forgets all frames. */
   void forget () { frames_ = 0; }
 

@@ -242,6 +242,13 @@ Code::complement () const
   return Code ("matrix", n_, [this] (int e, int s) { return !on (e, s); });
 }
 
+Code
+Code::from_slot (int first) const
+{
+  return Code ("matrix", n_,
+      [this, first] (int e, int s) { return on (e, (s + first) % n_); });
+}
+
 bool
 Code::one_hot () const
 {

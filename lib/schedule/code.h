@@ -58,6 +58,8 @@ public:
   /** The code of the mirrors' other beam: on where this one is off. Error where
    * an element is on in every slot, and so never in that beam. */
   Result<Code> complement () const;
+  /** The slots from @p first on, then those before it. */
+  Code from_slot (int first) const;
   /** Every element is on in one slot, and in every slot one element is on. */
   bool one_hot () const;
 

@@ -203,6 +203,14 @@ Schedule::background () const
   return alone;
 }
 
+Schedule
+Schedule::from_slot (int first) const
+{
+  Schedule later (*this);
+  later.parts_.code = parts_.code.from_slot (first);
+  return later;
+}
+
 int
 Schedule::region_at (int x, int y) const
 {

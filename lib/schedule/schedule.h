@@ -140,6 +140,10 @@ public:
   int region_at (int x, int y) const;
   /** The same with another leak. */
   Result<Schedule> with_leak (double leak) const;
+  /** Of a schedule without regions: that of an exposure which begins in slot
+   * @p first, and goes on with the first slots of the next one. It has no text
+   * form of its own. */
+  Schedule from_slot (int first) const;
   /** What the beam of the mirrors that are off has of this schedule: all codes
    * and the pilot complemented. It has no text form of its own. Error where an
    * element is on in every slot. */

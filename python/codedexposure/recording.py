@@ -95,7 +95,7 @@ class Recording:
               range: int | None = None,  # pylint: disable=redefined-builtin
               schedule: str | os.PathLike | dict | None = None,
               mapping: str | os.PathLike | dict | None = None,
-              bits: int | None = None) -> Frames:
+              bits: int | None = None, overlap: bool = False) -> Frames:
         """Full-size frames at the rate of the subframes.
 
         quality     fast, balanced, best or learned
@@ -106,10 +106,13 @@ class Recording:
         range       of both cameras: white of the frames in whites of the first
                     one, whose saturated pixels are seen by the second behind a
                     filter
+        overlap     fuse the exposures between coded frames as well, which makes
+                    the first and last slots of a frame as true as the others,
+                    in twice the time
         The rest is as for subframes ().
         """
-        fuse = self._fuse(
-            quality, full_well, read_noise, range, schedule, mapping, bits) + " !"
+        fuse = self._fuse(quality, full_well, read_noise, range, schedule,
+                          mapping, bits, overlap) + " !"
         if second is None:
             return Frames(self, fuse)
         Recording(second)  # raises what is wrong with it
@@ -124,24 +127,24 @@ class Recording:
                     range: int | None = None,  # pylint: disable=redefined-builtin
                     schedule: str | os.PathLike | dict | None = None,
                     mapping: str | os.PathLike | dict | None = None,
-                    bits: int | None = None) -> Frames:
+                    bits: int | None = None, overlap: bool = False) -> Frames:
         """How uncertain each pixel of fused () is, with the same arguments:
         frames whose image has half the width of the interval that holds 68 %
         of the errors, in 1/65280 of white.
         """
         return Frames(self, self._fuse(
-            quality, full_well, read_noise, range, schedule, mapping, bits)
-            + " fuse. ! queue leaky=downstream ! fakesink sync=false async=false "
+            quality, full_well, read_noise, range, schedule, mapping, bits,
+            overlap) + " fuse. ! queue leaky=downstream ! fakesink sync=false async=false "
             "fuse.uncertainty ! queue max-size-buffers=1 !")
 
     @staticmethod
-    def _fuse(quality, full_well, read_noise, white, schedule, mapping,
-              bits) -> str:
+    def _fuse(quality, full_well, read_noise, white, schedule, mapping, bits,
+              overlap) -> str:
         return "queue max-size-buffers=1 ! " + element(
             "codedexposure-fuse", name="fuse", lookahead=1,
             require_schedule=True, quality=quality, full_well=full_well,
             read_noise=read_noise, range=white, schedule=schedule,
-            mapping=mapping, bits=bits)
+            mapping=mapping, bits=bits, overlap=overlap or None)
 
     def coded(self) -> Frames:
         """The coded frames as the camera delivered them."""

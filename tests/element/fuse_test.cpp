@@ -196,6 +196,37 @@ TEST_F (Fuse, WarnsOfARangeForOneCamera)
       std::string::npos);
 }
 
+TEST_F (Fuse, FramesWithDarkBetweenThemDoNotOverlap)
+{
+  FuseOptions options;
+  options.lookahead = 1;
+  const auto alone = expected ("sequential:2x2", {0, 1, 2}, options);
+  options.overlap = true;
+  const auto both = expected ("sequential:2x2", {0, 1, 2}, options);
+  EXPECT_FALSE (both == alone);
+  const auto fused = [&] (const std::string &times) {
+    start ("schedule=sequential:2x2" + times + " lookahead=1 overlap=true");
+    for (int number : {0, 1, 2})
+      push (number);
+    fuse->push_event (gst_event_new_eos ());
+    return pull_images ();
+  };
+  EXPECT_TRUE (fused (",active=9.8ms,switching=200us") == both);
+  EXPECT_EQ (fuse->warning (), "");
+  EXPECT_TRUE (fused (",active=9ms,readout=3ms") == alone);
+  EXPECT_EQ (fuse->warning (),
+      "The exposures between coded frames are not used: there is no light for "
+      "4ms from one exposure to the next; it must be a quarter of a slot at "
+      "most, 2.25ms.");
+}
+
+TEST_F (Fuse, OverlapNeedsTheNextFrame)
+{
+  start ("schedule=sequential:2x2 overlap=true");
+  EXPECT_EQ (fuse->push (frame_of (picture (0), 0)), GST_FLOW_NOT_NEGOTIATED);
+  EXPECT_NE (fuse->error ().find ("set lookahead to 1"), std::string::npos);
+}
+
 TEST_F (Fuse, RefusesMotionForMoreSlotsThanItCan)
 {
   start ("schedule=sequential:lattice:25/10 quality=best");

@@ -245,8 +245,10 @@ INSTANTIATE_TEST_SUITE_P (Of, Excerpts,
         Case{"rank", "codedexposure-demux method=rank", 10},
         Case{"fast", "codedexposure-fuse", 40},
         Case{"fast_ahead", "codedexposure-fuse lookahead=1", 40},
-        Case{
-            "fast_noise", "codedexposure-fuse lookahead=1 full-well=8000", 60}),
+        Case{"fast_noise", "codedexposure-fuse lookahead=1 full-well=8000", 60},
+        Case{"overlap", "codedexposure-fuse lookahead=1 overlap=true", 30},
+        Case{"overlap_noise",
+            "codedexposure-fuse lookahead=1 overlap=true full-well=8000", 30}),
     name_of);
 
 /* These take long. */

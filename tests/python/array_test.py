@@ -62,6 +62,15 @@ class Arrays(unittest.TestCase):
                                           "fast")
         self.assertEqual(frames.tobytes(), pixels(self.recording.fused("fast")))
 
+    def test_overlap(self):
+        frames = codedexposure.fuse_array(self.coded, "sequential:2x2", "fast",
+                                          overlap=True)
+        both, alone = (pixels(self.recording.fused(
+            "fast", schedule="sequential:2x2", overlap=overlap))
+            for overlap in (True, False))
+        self.assertTrue(frames.tobytes() == both)
+        self.assertFalse(both == alone)
+
     def test_errors(self):
         for array in (self.coded.astype(float), self.coded[0]):
             with self.assertRaisesRegex(TypeError, "give uint8 or uint16"):

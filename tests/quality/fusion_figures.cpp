@@ -52,15 +52,18 @@ rank_way (int n, bool normalised)
 
 FusionWay
 fusion_way (int n, FuseQuality quality, bool refine = false, int lookahead = 0,
-    const std::string &leak = "0")
+    const std::string &leak = "0", bool overlap = false)
 {
   return {std::string (quality_name (quality)) + (refine ? ", refined" : "") +
-              (lookahead ? ", lookahead" : ""),
+              (overlap        ? ", overlap"
+                  : lookahead ? ", lookahead"
+                              : ""),
       [=] (const Scene &scene, const Condition &condition) {
         const Schedule schedule = fusion_schedule (n, leak);
         FuseOptions options = options_of (quality, condition);
         options.refine = refine;
         options.lookahead = lookahead;
+        options.overlap = overlap;
         return fuse (take (scene, schedule, condition), schedule, options);
       }};
 }
@@ -102,6 +105,12 @@ lone_way (int n, FuseQuality quality)
       }};
 }
 
+FusionWay
+overlap_way (int n, FuseQuality quality, bool refine)
+{
+  return fusion_way (n, quality, refine, 1, "0", true);
+}
+
 /* Those of sequences: files are fused with lookahead. */
 std::vector<FusionWay>
 sequence_ways (int n)
@@ -116,6 +125,9 @@ sequence_ways (int n)
   all.push_back (fusion_way (n, FuseQuality::kFast, true, 1));
   all.push_back (fusion_way (n, FuseQuality::kBalanced, true, 1));
   all.push_back (fusion_way (n, FuseQuality::kLearned, false, 1));
+  all.push_back (overlap_way (n, FuseQuality::kBalanced, false));
+  all.push_back (overlap_way (n, FuseQuality::kBalanced, true));
+  all.push_back (overlap_way (n, FuseQuality::kLearned, false));
   return all;
 }
 
@@ -299,6 +311,7 @@ std::vector<Table>
 sequence_tables (const std::vector<Scene> &scenes, const Progress &progress)
 {
   constexpr int kFrom = 8;
+  constexpr int kAll = kSequenceFrames + kFramesAfter;
   std::vector<Table> tables;
   for (const bool noisy : {false, true}) {
     for (const int n : {4, 8}) {
@@ -311,15 +324,17 @@ sequence_tables (const std::vector<Scene> &scenes, const Progress &progress)
       for (int s = 0; s < n; s++)
         table.columns.push_back ({"slot " + std::to_string (s), 2});
       for (const Scene &scene : scenes) {
-        if (scene.frames.size () < kSequenceFrames)
+        if (scene.frames.size () < kAll)
           continue;
-        const Scene part = first_of (scene, kSequenceFrames, n);
+        const Scene part = first_of (scene, kAll, n);
+        Scene compared = part;
+        compared.frames.resize (kSequenceFrames);
         for (const FusionWay &way : sequence_ways (n)) {
           progress (
               "sequence, " + slots + " " + way.name + " of " + scene.name);
-          const Figures psnrs =
-              slot_psnr (way.frames (part, noisy ? kNoisy : kClean),
-                  part.frames, kFrom, n);
+          auto fused = way.frames (part, noisy ? kNoisy : kClean);
+          fused.resize (kSequenceFrames);
+          const Figures psnrs = slot_psnr (fused, compared.frames, kFrom, n);
           auto &row = table.rows.emplace_back (
               std::vector<Cell>{scene.name, way.name, mean_of (psnrs)});
           row.insert (row.end (), psnrs.begin (), psnrs.end ());

@@ -18,6 +18,8 @@ Schedule fusion_schedule (int n, const std::string &leak = "0");
 
 /** Frames of a clip that the tables of sequences and of the refinement use. */
 constexpr int kSequenceFrames = 32;
+/** Frames after these, on which they can depend. */
+constexpr int kFramesAfter = 8;
 
 /** PSNR and SSIM, flicker and texture of fused frames and of what they are
  * compared with on the first @p frames frames of every scene, clean and noisy:

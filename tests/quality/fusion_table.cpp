@@ -66,7 +66,7 @@ parse (int &argc, char **&argv, Options &options)
 std::vector<Scene>
 find_scenes (const Options &options)
 {
-  const int frames = std::max (options.frames, kSequenceFrames);
+  const int frames = std::max (options.frames, kSequenceFrames + kFramesAfter);
   auto clips = read_clips (options.clips ? options.clips : "", frames);
   if (clips)
     std::erase_if (*clips, [] (const Scene &scene) {

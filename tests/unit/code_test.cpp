@@ -284,6 +284,15 @@ TEST (Code, WrongRowsAreNamed)
   expect_words (Code::named ("sequential", 257), {"257", "2 to 256"});
 }
 
+TEST (Code, GoesOnFromALaterSlot)
+{
+  const Code code = *Code::from_rows ({"110", "010", "001"});
+  EXPECT_EQ (code.from_slot (1).rows (),
+      (std::vector<std::string>{"101", "100", "010"}));
+  EXPECT_EQ (code.from_slot (0).rows (), code.rows ());
+  EXPECT_EQ (code.from_slot (1).from_slot (2).rows (), code.rows ());
+}
+
 TEST (Code, ComplementIsOnWhereTheCodeIsOff)
 {
   const Code code = *Code::named ("s-matrix", 7);

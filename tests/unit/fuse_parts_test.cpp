@@ -16,11 +16,8 @@ using namespace codedexposure::test;
 template <typename Pixel>
 Pictures<Pixel>
 fuse_part (const Pictures<Pixel> &coded, std::size_t from, std::size_t to,
-    const Schedule &schedule, const FuseOptions &options)
+    const Schedule &schedule, const FuseOptions &options, std::size_t history)
 {
-  using Any = Fuser<Pixel>;
-  const std::size_t history =
-      options.noise.full_well > 0 ? Any::kMaxHistory : 1;
   const std::size_t first = from - std::min (from, history);
   const std::size_t end =
       std::min (to + std::size_t (options.lookahead), coded.size ());
@@ -37,18 +34,22 @@ void
 expect_parts_as_whole (const Pictures<Pixel> &coded, const Schedule &schedule,
     const FuseOptions &options, std::initializer_list<std::size_t> lengths)
 {
+  const auto fuser = Fuser<Pixel>::make (
+      schedule, coded[0].width (), coded[0].height (), options);
+  ASSERT_TRUE (fuser) << fuser.error ().message;
+  const auto history = std::size_t (fuser->history ());
   const auto whole = fuse (coded, schedule, options);
   for (const std::size_t length : lengths) {
     Pictures<Pixel> joined;
     for (std::size_t from = 0; from < coded.size (); from += length)
       std::ranges::move (
           fuse_part (coded, from, std::min (from + length, coded.size ()),
-              schedule, options),
+              schedule, options, history),
           std::back_inserter (joined));
     EXPECT_TRUE (joined == whole)
         << quality_name (options.quality) << ", parts of " << length
-        << ", lookahead " << options.lookahead << ", full well "
-        << options.noise.full_well;
+        << ", lookahead " << options.lookahead << ", overlap "
+        << options.overlap << ", full well " << options.noise.full_well;
   }
 }
 
@@ -74,6 +75,26 @@ TEST (Fuse, APartWithItsHistoryIsFusedAsInTheWhole)
       const Pictures<> some (coded.begin (), coded.begin () + 20);
       expect_parts_as_whole (some, schedule, options, {19});
     }
+}
+
+TEST (Fuse, APartThatOverlapsIsFusedAsInTheWhole)
+{
+  const Schedule schedule = schedule_of ("sequential:lattice:4/2");
+  const auto picture = [] (int slot) {
+    return draw (48, 32, [slot] (int x, int y) {
+      return (0.5 + 0.0006 * slot) * texture (x - slot / 3, y);
+    });
+  };
+  const auto coded = take (schedule, 40, picture, noisy_bench ());
+  for (const bool noisy : {false, true}) {
+    FuseOptions options = with_quality (FuseQuality::kFast, noisy);
+    options.lookahead = 1;
+    options.overlap = true;
+    expect_parts_as_whole (coded, schedule, options, {3, 19});
+    options.refine = true;
+    const Pictures<> some (coded.begin (), coded.begin () + 6);
+    expect_parts_as_whole (some, schedule, options, {4});
+  }
 }
 
 TEST (Fuse, APartOfSixteenBitsIsFusedAsInTheWhole)

@@ -188,6 +188,20 @@ TEST (Mask, SumOverSlotsIsTheExposureOfTheElement)
   }
 }
 
+TEST (Schedule, GoesOnFromALaterSlotWithTheWhiteOfTheWhole)
+{
+  const Schedule whole = *Schedule::parse (
+      "sequential:2x2,pilot=2,region=8x8+8+8:staircase:lattice:2/1");
+  const Schedule part = whole.background ();
+  const Schedule later = part.from_slot (3);
+  EXPECT_EQ (later.white_slots (), part.white_slots ());
+  EXPECT_EQ (later.pilot_rows (), 2);
+  for (int y = 0; y < 4; y++)
+    for (int x = 0; x < 4; x++)
+      for (int s = 0; s < 4; s++)
+        ASSERT_EQ (later.on (x, y, s), part.on (x, y, (s + 3) % 4));
+}
+
 TEST (Mask, OfTheOtherBeamIsItsComplement)
 {
   const Schedule schedule =

@@ -55,10 +55,10 @@ with recordings.
   --force             replace results that exist, but never a recording
   -h, --help          show this help
 
-Options of decode: --method, --mapping, --fuse, --refine, --range, --bench,
---full-well, --read-noise, --region, --schedule, --bits, --view, --white,
---deflate, --second (a file, or a folder whose files are named as the recordings
-in theirs).
+Options of decode: --method, --mapping, --fuse, --refine, --overlap, --range,
+--bench, --full-well, --read-noise, --region, --schedule, --bits, --view,
+--white, --deflate, --second (a file, or a folder whose files are named as the
+recordings in theirs).
 
 Exit status: 0 all is done, 1 something failed or is missing, 2 wrong usage, 3
 done, but a recording is cut off or damaged, 130 stopped.
